@@ -1,0 +1,31 @@
+# unity.cmake - the library target `unity`, and how tests are declared: heave_unit_test, heave_script_test.
+# Unity is not part of this tree: tools/lib/unity.sh finds or fetches it, unless UNITY_DIR says where it is.
+set(UNITY_DIR "" CACHE PATH "Folder that holds unity.c and unity.h; empty: found or fetched by tools/lib/unity.sh")
+if(NOT EXISTS "${UNITY_DIR}/unity.c")
+  execute_process(COMMAND ${PROJECT_SOURCE_DIR}/tools/lib/unity.sh OUTPUT_VARIABLE found OUTPUT_STRIP_TRAILING_WHITESPACE RESULT_VARIABLE status)
+  if(NOT status EQUAL 0)
+    message(FATAL_ERROR "Unity not found, the reason stands above")
+  endif()
+  set_property(CACHE UNITY_DIR PROPERTY VALUE "${found}")
+endif()
+add_library(unity STATIC ${UNITY_DIR}/unity.c)
+target_include_directories(unity SYSTEM PUBLIC ${UNITY_DIR})
+target_compile_definitions(unity PUBLIC UNITY_INCLUDE_DOUBLE= UNITY_SUPPORT_64 UNITY_DOUBLE_PRECISION=1e-12)
+
+find_package(Python3 REQUIRED COMPONENTS Interpreter)
+
+# heave_unit_test(NAME [SOURCE...]): one executable per module, tests/unit/test_NAME.c, linked with the core.
+function(heave_unit_test name)
+  add_executable(test_${name} test_${name}.c ${ARGN})
+  target_link_libraries(test_${name} PRIVATE heave_core unity m)
+  target_compile_definitions(test_${name} PRIVATE HEAVE_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
+  # on the file, because a target's own options stand before those of heave_options and would lose
+  set_source_files_properties(test_${name}.c PROPERTIES COMPILE_OPTIONS "-Wno-conversion;-Wno-sign-conversion")
+  add_test(NAME unit.${name} COMMAND test_${name})
+endfunction()
+
+# heave_script_test(NAME SCRIPT [ARG...]): a Python script that reports its cases in TAP (tests/lib/tap.py, importable as `tap`).
+function(heave_script_test name script)
+  add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/${script} ${ARGN})
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib;PYTHONDONTWRITEBYTECODE=1")
+endfunction()

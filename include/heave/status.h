@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT
+ * status.h - the one result type of every function that can fail, and the assertion for programmer errors.
+ * Zero is success, negatives are errors; positive values stay free for counts. Device codes never travel here.
+ */
+#ifndef HEAVE_STATUS_H
+#define HEAVE_STATUS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/** Result of an operation; each function documents which of these it returns. */
+typedef enum {
+    HV_OK = 0,
+    HV_ERR_ARG = -1,     /**< the caller broke the contract */
+    HV_ERR_RANGE = -2,   /**< a value outside its documented range */
+    HV_ERR_FORMAT = -3,  /**< malformed wire data */
+    HV_ERR_AGAIN = -4,   /**< nothing consumed or produced; try next cycle */
+    HV_ERR_TIMEOUT = -5, /**< the deadline passed */
+    HV_ERR_FULL = -6,    /**< the queue is full, nothing was taken */
+    HV_ERR_STATE = -7,   /**< not allowed in this state */
+    HV_ERR_IO = -8,      /**< the backend failed; its context keeps the detail */
+    HV_ERR_NOSUP = -9    /**< an optional operation that is absent */
+} hv_status_t;
+
+#if defined(__GNUC__)
+#define HV_MUST_CHECK __attribute__((warn_unused_result))
+#else
+#define HV_MUST_CHECK
+#endif
+
+/** Called when an HV_ASSERT fails: supplied by the program (hosted: print and abort; firmware: fail silent). Never returns. */
+void hv_assert_failed(const char *file, int line);
+
+/** Programmer errors only; what the outside can cause is an hv_status_t. */
+#define HV_ASSERT(condition) ((condition) ? (void)0 : hv_assert_failed(__FILE__, __LINE__))
+
+#endif

@@ -1,0 +1,119 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_tools.py - the tools that count and check are themselves able to fail: each is given something wrong and has to say so."""
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import tap
+
+TOP = Path(__file__).resolve().parents[2]
+CHECKER = TOP / "tests/check/check_core.py"
+sys.path.insert(0, str(TOP / "tools/lib"))
+import run_tests  # noqa: E402  the path above has to be set first
+
+# what a test printed, what ctest says of it, and the (passed, failed, skipped) that must come out
+COUNTED = {
+    "Unity: all pass": (["a/test_x.c:9:test_one:PASS", "a/test_x.c:12:test_two:PASS", "", "2 Tests 0 Failures 0 Ignored ", "OK"], "Passed", (2, 0, 0)),
+    "Unity: one fails, one ignored": (["x.c:9:test_a:FAIL: Expected 1 Was 2", "x.c:5:test_b:IGNORE: no vcan", "x.c:6:test_c:PASS",
+                                       "3 Tests 1 Failures 1 Ignored ", "FAIL"], "***Failed", (1, 1, 1)),
+    "Unity: failures although ctest passed": (["x.c:9:test_a:FAIL: no", "1 Tests 1 Failures 0 Ignored"], "Passed", (0, 1, 0)),
+    "Unity: no case": (["0 Tests 0 Failures 0 Ignored", "OK"], "Passed", (0, 1, 0)),
+    "Unity: crash half way": (["x.c:9:test_a:PASS"], "***Exception: SegFault", (1, 1, 0)),
+    "Unity: exit 0 half way": (["x.c:9:test_a:PASS"], "Passed", (1, 1, 0)),
+    "Unity: crash after the summary": (["x.c:9:test_a:PASS", "1 Tests 0 Failures 0 Ignored"], "Subprocess aborted***Exception:", (1, 1, 0)),
+    "Unity: a case that printed no verdict": (["x.c:9:test_a:PASS", "2 Tests 0 Failures 0 Ignored"], "Passed", (1, 1, 0)),
+    "TAP: all pass": (["ok 1 - one", "ok 2 - two", "1..2"], "Passed", (2, 0, 0)),
+    "TAP: one fails, one skipped": (["1..3", "ok 1 - one", "not ok 2 - two", "# why", "ok 3 - three # SKIP no vcan"], "***Failed", (1, 1, 1)),
+    "TAP: a skipped script": (["1..0 # SKIP no vcan"], "Passed", (0, 0, 1)),
+    "TAP: no plan": (["ok 1 - one"], "Passed", (1, 1, 0)),
+    "TAP: fewer cases than planned": (["1..3", "ok 1 - one"], "Passed", (1, 1, 0)),
+    "TAP: Unity's output quoted in a comment": (["# x.c:9:test_a:FAIL: no", "ok 1 - one", "1..1"], "Passed", (1, 0, 0)),
+    "plain: passed": (["hello"], "Passed", (1, 0, 0)),
+    "plain: failed": (["hello"], "***Failed", (0, 1, 0)),
+    "plain: took too long": ([], "***Timeout", (0, 1, 0)),
+    "plain: not built": ([], "***Not Run", (0, 1, 0)),
+    "plain: skipped by ctest": ([], "***Skipped", (0, 0, 1)),
+}
+
+# a file with something wrong, the check that has to find it, and the case that fails
+WRONG = {
+    "an OS header in the core": ("src/a/a.c", "#include <unistd.h>\n", "includes", "freestanding headers"),
+    "the core reaches into hal/": ("src/a/a.c", '#include "../../hal/sim/sim.h"\n', "includes", "freestanding headers"),
+    "a contract reaches into src/": ("include/heave/a.h", '#include "../../src/a/a.h"\n', "includes", "nothing but each other"),
+    "hal/ reaches into src/": ("hal/sim/x.c", '#include "../../src/a/a.h"\n', "includes", "hal/ includes nothing"),
+    "a double in the core": ("src/a/a.c", "int a(void) { return (int)(double)1; }\n", "includes", "no floating point"),
+    "a float constant in the core": ("src/a/a.c", "int a(void) { return 1.5 > 1; }\n", "includes", "no floating point"),
+    "a test that is not run": ("tests/unit/test_a.c", "void test_a(void)\n{\n}\n", "runners", "runs all it defines"),
+    "a test run only in a comment": ("tests/unit/test_a.c", "void test_a(void)\n{\n}\n/* RUN_TEST(test_a); */\n", "runners", "runs all it defines"),
+    "a test file that is not built": ("tests/unit/test_b.c", "void test_b(void) {}\nint x = RUN_TEST(test_b);\n", "runners", "is built"),
+    "memory from the heap": ("src/a/a.c", "void *malloc(unsigned long);\nvoid *a(void) { return malloc(9); }\n", "core", "allocates nothing"),
+    "a call of the C library": ("src/a/a.c", "int puts(const char *);\nint a(void) { return puts(\"a\"); }\n", "core", "neither OS nor C library"),
+    "a variable at file scope": ("src/a/a.c", "int a(void) { static int n; return n++; }\n", "core", "no state"),
+    "an initialised variable": ("src/a/a.c", "int counter = 3;\n", "core", "no state"),
+    "arithmetic in floating point": ("src/a/a.c", "int a(int x) { return (int)(x * 1.5); }\n", "core", "integer registers"),
+    "a header that needs another first": ("include/heave/a.h", "uint32_t a(void);\n", "core", "compiles alone"),
+}
+
+# Nothing wrong: comments, texts, constant tables with pointers.
+FINE = {
+    "include/heave/b.h": "#include <stdint.h>\nint b(int x); /* 1.5 double */\n",
+    "src/a/a.h": "int a(void);\n",
+    "src/a/b.c": '#include "heave/b.h"\n#include "a.h"\nstatic const char *const k_names[] = {"1.5", "float"};\n'
+                 "int b(int x) { return k_names[x & 1][0]; }\n",
+    "src/app/main.c": "#include <stdio.h>\ndouble unused;\n",
+    "hal/sim/sim.h": "#include <math.h>\n",
+    "tests/unit/CMakeLists.txt": "heave_unit_test(a)\n",
+    "tests/unit/test_a.c": "void test_fine(void)\n{\n}\nint main(void) { RUN_TEST(test_fine); }\n",
+}
+
+
+def run_checker(root, check):
+    """The names of the cases that failed."""
+    command = [sys.executable, CHECKER, "--root", root, check]
+    if check == "core":
+        objects = []
+        for source in sorted((root / "src/a").glob("*.c")):
+            objects.append(source.with_suffix(".o"))
+            subprocess.run(["cc", "-fPIC", "-w", "-I", root / "include", "-c", "-o", objects[-1], source], check=True)
+        subprocess.run(["ar", "rc", root / "core.a", *objects], check=True)
+        command += ["--lib", root / "core.a"]
+    run = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=False)
+    failed = [line for line in run.stdout.splitlines() if line.startswith("not ok")]
+    assert bool(failed) == (run.returncode != 0), run.stdout
+    assert "1.." in run.stdout, run.stdout
+    return failed
+
+
+def failed_with(extra, check):
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        for name, text in {**FINE, **extra}.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(text, encoding="utf-8")
+        return run_checker(root, check)
+
+
+def main():
+    suite = tap.Suite()
+    for name, (lines, verdict, expected) in COUNTED.items():
+        with suite.case(f"counting, {name}"):
+            result = run_tests.judge(lines, verdict)
+            got = (result.passed, len(result.failures), len(result.skips))
+            assert got == expected, f"counted {got}, must be {expected}: {result.failures}"
+    with suite.case("counting, ctest's own lines are no output of the test"):
+        assert run_tests.after_preamble(["Test command: /t", "Working Directory: /", "Test timeout computed to be: 9", "ok 1 - a"]) == ["ok 1 - a"]
+        assert run_tests.after_preamble(["Test command: /t", "Test timeout computed to be: 9", "ok 1 - a"]) == ["ok 1 - a"]
+    for check in ("core", "includes", "runners"):
+        with suite.case(f"checking, {check}: a tree with nothing wrong passes"):
+            assert not failed_with({}, check), failed_with({}, check)
+    for name, (path, text, check, case) in WRONG.items():
+        with suite.case(f"checking, {name} is found"):
+            failed = failed_with({path: text}, check)
+            assert any(case in line for line in failed), f"failed were only {failed}"
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: MIT
+"""tap.py - how a script test reports its cases (Test Anything Protocol), so that tools/test counts each of them.
+
+    suite = tap.Suite()
+    with suite.case("the frame is refused"):
+        assert answer == expected, f"got {answer}"
+    with suite.case("error frames"):
+        raise tap.Skip("this kernel has no vcan")
+    sys.exit(suite.done())
+
+A case fails by any exception; what it says follows as comment lines. done() prints the plan; a script that dies before it has failed.
+"""
+import contextlib
+import traceback
+
+
+class Skip(Exception):
+    """Raised in a case that cannot run here; the text is the reason."""
+
+
+class Suite:
+    def __init__(self):
+        self.count = 0
+        self.failed = 0
+
+    @contextlib.contextmanager
+    def case(self, name):
+        self.count += 1
+        try:
+            yield
+            print(f"ok {self.count} - {name}", flush=True)
+        except Skip as reason:
+            print(f"ok {self.count} - {name} # SKIP {reason}", flush=True)
+        except Exception as error:
+            self.failed += 1
+            text = str(error) if isinstance(error, AssertionError) and str(error) else traceback.format_exc()
+            print(f"not ok {self.count} - {name}")
+            print("\n".join(f"# {line}" for line in text.rstrip().splitlines()), flush=True)
+
+    def done(self):
+        print(f"1..{self.count}", flush=True)
+        return 1 if self.failed or not self.count else 0
