@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: MIT
+ * supervisor.h - the states of a platform and what may change them: one table, pure, no clock and no I/O.
+ * The gateway turns what it sees into events and carries out the action a transition names. The table is in supervisor.c;
+ * tools/gen_states.py draws the README's diagram from it. One caller at a time per instance; nothing blocks.
+ */
+#ifndef HEAVE_SUPERVISOR_H
+#define HEAVE_SUPERVISOR_H
+
+#include "heave/status.h"
+
+/** States, in the trade's words. */
+typedef enum {
+    STATE_OFF,      /**< drives disabled */
+    STATE_HOMING,   /**< drives come up, find their zero, go to the settled extension at engage speed */
+    STATE_SETTLED,  /**< lowest, at rest; people may board */
+    STATE_RISING,   /**< to the neutral pose at engage speed */
+    STATE_NEUTRAL,  /**< up, at rest, not listening */
+    STATE_ENGAGED,  /**< follows the sender */
+    STATE_HOLD,     /**< stopped where it is, drives enabled */
+    STATE_SETTLING, /**< to the settled extension at engage speed */
+    STATE_FAULT,    /**< latched: controlled stop, then drives disabled */
+    STATE_ESTOP,    /**< latched: targets stopped, set-points follow the actual positions */
+    STATES
+} state_t;
+
+/** What can happen. A level may be offered in every cycle while it lasts; where it changes nothing it is not counted. */
+typedef enum {
+    EVENT_DRIVES_READY,    /**< level: every drive answers, is enabled and its position is known */
+    EVENT_TICK,            /**< level, once a cycle and first: SETTLED and NEUTRAL go on to the goal after one visible cycle */
+    EVENT_MOVE_DONE,       /**< the move of HOMING, RISING or SETTLING has ended at rest on its target; offer it before the
+                                requests of the cycle, else it would end the move that a request has only just begun */
+    EVENT_ENGAGE,          /**< operator, enable key, or the auto policy */
+    EVENT_HOLD,            /**< operator */
+    EVENT_RESUME,          /**< operator: go on with what a hold interrupted */
+    EVENT_PARK,            /**< operator: settle */
+    EVENT_RESET,           /**< operator: leave FAULT or ESTOP, once the cause is gone */
+    EVENT_SHUTDOWN,        /**< operator or SIGTERM: settle, then off */
+    EVENT_FRAME,           /**< a valid frame came */
+    EVENT_SILENCE_HOLD,    /**< level: the sender has been silent for silence_hold_ms */
+    EVENT_SILENCE_NEUTRAL, /**< level: for silence_neutral_ms */
+    EVENT_SILENCE_SETTLE,  /**< level: for silence_settle_ms */
+    EVENT_FAULT,           /**< level: a machine fault was raised, drives that drop out included */
+    EVENT_ESTOP,           /**< level: the e-stop input is active */
+    EVENTS
+} event_t;
+
+/** What the gateway must do on entering the new state. */
+typedef enum {
+    ACTION_NONE,
+    ACTION_HOME,       /**< enable and home the drives, then move to the settled extension */
+    ACTION_SETTLE,     /**< controlled stop, then move to the settled extension */
+    ACTION_RISE,       /**< controlled stop, then move to the neutral pose */
+    ACTION_FOLLOW,     /**< follow the sender, the first pose at engage speed */
+    ACTION_STOP,       /**< controlled stop where it is */
+    ACTION_STAY,       /**< arrived: nothing to move */
+    ACTION_OFF,        /**< bring to rest what still moves, then disable the drives */
+    ACTION_FAULT_STOP, /**< controlled stop, then disable the drives; relays to the safe mask */
+    ACTION_ESTOP       /**< stop targets at once, set-points follow actual; relays to the safe mask */
+} action_t;
+
+/** What the guards of the table look at; the gateway fills it before each event. */
+typedef struct {
+    bool is_at_settled;    /**< actual extensions at the settled extension */
+    bool is_at_rest;       /**< set-points at rest */
+    bool is_fault_present; /**< the cause of a fault is still there */
+    bool is_estop_active;
+} supervisor_view_t;
+
+/** A platform's state; others read it, only supervisor.c writes it. */
+typedef struct {
+    state_t state;
+    state_t goal;             /**< where it is to end up: STATE_OFF, STATE_SETTLED, STATE_NEUTRAL or STATE_ENGAGED */
+    state_t interrupted;      /**< in HOLD: the state that was interrupted */
+    bool is_held_by_silence;  /**< HOLD, RISING or NEUTRAL because the sender fell silent: its next frame engages again */
+    uint32_t ignored[EVENTS]; /**< events that had no row for the state, by event; wraps */
+} supervisor_t;
+
+/** Starts in OFF, free to become SETTLED if the drives come up enabled at the settled extension (goal SETTLED). Once told to be
+ *  off, by SHUTDOWN or RESET (goal OFF), OFF is left for ENGAGE and PARK only. */
+void supervisor_init(supervisor_t *self);
+
+/** Starts in SETTLED (offline runs: simulated drives that are enabled and at the settled extension). */
+void supervisor_init_settled(supervisor_t *self);
+
+/** Takes an event.
+ *  @return the action to carry out now. Every change of state has one; ACTION_NONE where the state stays. An event without a row
+ *  is counted in ignored[], nothing else. */
+action_t supervisor_event(supervisor_t *self, event_t event, const supervisor_view_t *view);
+
+/** True in FAULT and ESTOP, which only RESET leaves for OFF. */
+bool supervisor_is_latched(const supervisor_t *self);
+
+/** "SETTLED", "engage", ...: constant text; "?" outside the enum. */
+const char *state_name(state_t state);
+const char *event_name(event_t event);
+
+#endif

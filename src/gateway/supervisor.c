@@ -1,0 +1,252 @@
+/* SPDX-License-Identifier: MIT
+ * supervisor.c - the table of states: one row per transition, the first row that matches wins, no row means stay and count.
+ * Owns the state, its goal and the counters; never moves anything itself.
+ *
+ * How to read it. The goal is where the platform is to end up, and it goes there by itself, one state at a time. Only ENGAGE
+ * brings it up from below. Silence of the sender may stop it, send it to neutral or settle it, and a frame brings back only what
+ * silence took: it never releases an operator's hold and never raises a platform that has begun to settle.
+ */
+#include "heave/supervisor.h"
+
+/** What must be true for a row to match. */
+typedef enum {
+    ALWAYS,
+    COMES_UP_SETTLED, /**< the drives stand at the settled extension, and nobody has asked for OFF: they may still be going off */
+    GOAL_OFF,
+    GOAL_UP, /**< NEUTRAL or ENGAGED */
+    GOAL_ENGAGED,
+    BY_SILENCE, /**< see is_held_by_silence */
+    WAS_HOMING, /**< HOLD interrupted it; the positions may be unknown */
+    WAS_RISING,
+    WAS_NEUTRAL,
+    WAS_ENGAGED,
+    WAS_SETTLING,
+    FAULT_CLEARED,
+    ESTOP_RELEASED
+} guard_t;
+
+/** What becomes of is_held_by_silence. */
+typedef enum { SAME, SET, CLEAR } mark_t;
+
+/* STATES is no state; the columns use it for these. */
+#define ANY  STATES /* from: every state */
+#define STAY STATES /* to: the state it is in */
+#define KEEP STATES /* goal: as it was */
+
+typedef struct {
+    state_t from;
+    event_t event;
+    guard_t guard;
+    state_t to;
+    state_t goal;
+    mark_t by_silence;
+    action_t action;
+} row_t;
+
+/* clang-format off */
+static const row_t k_rows[] = {
+    /* from          event                  guard             to              goal           silence action          */
+
+    /* latching: from everywhere, entered once */
+    {STATE_ESTOP,    EVENT_ESTOP,           ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {ANY,            EVENT_ESTOP,           ALWAYS,           STATE_ESTOP,    KEEP,           CLEAR, ACTION_ESTOP},
+    {STATE_ESTOP,    EVENT_FAULT,           ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {STATE_FAULT,    EVENT_FAULT,           ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {ANY,            EVENT_FAULT,           ALWAYS,           STATE_FAULT,    KEEP,           CLEAR, ACTION_FAULT_STOP},
+
+    {STATE_FAULT,    EVENT_RESET,           FAULT_CLEARED,    STATE_OFF,      STATE_OFF,      CLEAR, ACTION_OFF},
+    {STATE_FAULT,    EVENT_SHUTDOWN,        ALWAYS,           STAY,           STATE_OFF,      SAME,  ACTION_NONE},
+    {STATE_ESTOP,    EVENT_RESET,           ESTOP_RELEASED,   STATE_OFF,      STATE_OFF,      CLEAR, ACTION_OFF},
+    {STATE_ESTOP,    EVENT_SHUTDOWN,        ALWAYS,           STAY,           STATE_OFF,      SAME,  ACTION_NONE},
+
+    {STATE_OFF,      EVENT_DRIVES_READY,    COMES_UP_SETTLED, STATE_SETTLED,  STATE_SETTLED,  CLEAR, ACTION_STAY},
+    {STATE_OFF,      EVENT_ENGAGE,          ALWAYS,           STATE_HOMING,   STATE_ENGAGED,  CLEAR, ACTION_HOME},
+    {STATE_OFF,      EVENT_PARK,            ALWAYS,           STATE_HOMING,   STATE_SETTLED,  CLEAR, ACTION_HOME},
+    {STATE_OFF,      EVENT_SHUTDOWN,        ALWAYS,           STAY,           STATE_OFF,      CLEAR, ACTION_NONE},
+
+    {STATE_HOMING,   EVENT_MOVE_DONE,       ALWAYS,           STATE_SETTLED,  KEEP,           CLEAR, ACTION_STAY},
+    {STATE_HOMING,   EVENT_ENGAGE,          ALWAYS,           STAY,           STATE_ENGAGED,  CLEAR, ACTION_NONE},
+    {STATE_HOMING,   EVENT_PARK,            ALWAYS,           STAY,           STATE_SETTLED,  CLEAR, ACTION_NONE},
+    {STATE_HOMING,   EVENT_SHUTDOWN,        ALWAYS,           STAY,           STATE_OFF,      CLEAR, ACTION_NONE},
+    {STATE_HOMING,   EVENT_HOLD,            ALWAYS,           STATE_HOLD,     KEEP,           CLEAR, ACTION_STOP},
+
+    {STATE_SETTLED,  EVENT_TICK,            GOAL_UP,          STATE_RISING,   KEEP,           CLEAR, ACTION_RISE},
+    {STATE_SETTLED,  EVENT_TICK,            GOAL_OFF,         STATE_OFF,      KEEP,           CLEAR, ACTION_OFF},
+    {STATE_SETTLED,  EVENT_ENGAGE,          ALWAYS,           STATE_RISING,   STATE_ENGAGED,  CLEAR, ACTION_RISE},
+    {STATE_SETTLED,  EVENT_HOLD,            GOAL_UP,          STAY,           STATE_SETTLED,  CLEAR, ACTION_NONE},
+    {STATE_SETTLED,  EVENT_PARK,            ALWAYS,           STAY,           STATE_SETTLED,  CLEAR, ACTION_NONE},
+    {STATE_SETTLED,  EVENT_SHUTDOWN,        ALWAYS,           STATE_OFF,      STATE_OFF,      CLEAR, ACTION_OFF},
+
+    {STATE_RISING,   EVENT_MOVE_DONE,       ALWAYS,           STATE_NEUTRAL,  KEEP,           SAME,  ACTION_STAY},
+    {STATE_RISING,   EVENT_ENGAGE,          ALWAYS,           STAY,           STATE_ENGAGED,  CLEAR, ACTION_NONE},
+    {STATE_RISING,   EVENT_HOLD,            ALWAYS,           STATE_HOLD,     KEEP,           CLEAR, ACTION_STOP},
+    {STATE_RISING,   EVENT_PARK,            ALWAYS,           STATE_SETTLING, STATE_SETTLED,  CLEAR, ACTION_SETTLE},
+    {STATE_RISING,   EVENT_SHUTDOWN,        ALWAYS,           STATE_SETTLING, STATE_OFF,      CLEAR, ACTION_SETTLE},
+    {STATE_RISING,   EVENT_FRAME,           BY_SILENCE,       STAY,           STATE_ENGAGED,  CLEAR, ACTION_NONE},
+    {STATE_RISING,   EVENT_SILENCE_SETTLE,  BY_SILENCE,       STATE_SETTLING, STATE_SETTLED,  CLEAR, ACTION_SETTLE},
+
+    {STATE_NEUTRAL,  EVENT_TICK,            GOAL_ENGAGED,     STATE_ENGAGED,  STATE_ENGAGED,  CLEAR, ACTION_FOLLOW},
+    {STATE_NEUTRAL,  EVENT_ENGAGE,          ALWAYS,           STATE_ENGAGED,  STATE_ENGAGED,  CLEAR, ACTION_FOLLOW},
+    {STATE_NEUTRAL,  EVENT_HOLD,            ALWAYS,           STATE_HOLD,     KEEP,           CLEAR, ACTION_STOP},
+    {STATE_NEUTRAL,  EVENT_PARK,            ALWAYS,           STATE_SETTLING, STATE_SETTLED,  CLEAR, ACTION_SETTLE},
+    {STATE_NEUTRAL,  EVENT_SHUTDOWN,        ALWAYS,           STATE_SETTLING, STATE_OFF,      CLEAR, ACTION_SETTLE},
+    {STATE_NEUTRAL,  EVENT_FRAME,           BY_SILENCE,       STATE_ENGAGED,  STATE_ENGAGED,  CLEAR, ACTION_FOLLOW},
+    {STATE_NEUTRAL,  EVENT_SILENCE_SETTLE,  BY_SILENCE,       STATE_SETTLING, STATE_SETTLED,  CLEAR, ACTION_SETTLE},
+
+    {STATE_ENGAGED,  EVENT_ENGAGE,          ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {STATE_ENGAGED,  EVENT_FRAME,           ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {STATE_ENGAGED,  EVENT_HOLD,            ALWAYS,           STATE_HOLD,     KEEP,           CLEAR, ACTION_STOP},
+    {STATE_ENGAGED,  EVENT_PARK,            ALWAYS,           STATE_SETTLING, STATE_SETTLED,  CLEAR, ACTION_SETTLE},
+    {STATE_ENGAGED,  EVENT_SHUTDOWN,        ALWAYS,           STATE_SETTLING, STATE_OFF,      CLEAR, ACTION_SETTLE},
+    {STATE_ENGAGED,  EVENT_SILENCE_HOLD,    ALWAYS,           STATE_HOLD,     KEEP,           SET,   ACTION_STOP},
+    {STATE_ENGAGED,  EVENT_SILENCE_NEUTRAL, ALWAYS,           STATE_RISING,   STATE_NEUTRAL,  SET,   ACTION_RISE},
+    {STATE_ENGAGED,  EVENT_SILENCE_SETTLE,  ALWAYS,           STATE_SETTLING, STATE_SETTLED,  CLEAR, ACTION_SETTLE},
+
+    {STATE_HOLD,     EVENT_RESUME,          WAS_HOMING,       STATE_HOMING,   KEEP,           CLEAR, ACTION_HOME},
+    {STATE_HOLD,     EVENT_RESUME,          WAS_RISING,       STATE_RISING,   KEEP,           CLEAR, ACTION_RISE},
+    {STATE_HOLD,     EVENT_RESUME,          WAS_NEUTRAL,      STATE_NEUTRAL,  KEEP,           CLEAR, ACTION_STAY},
+    {STATE_HOLD,     EVENT_RESUME,          WAS_ENGAGED,      STATE_ENGAGED,  STATE_ENGAGED,  CLEAR, ACTION_FOLLOW},
+    {STATE_HOLD,     EVENT_RESUME,          WAS_SETTLING,     STATE_SETTLING, KEEP,           CLEAR, ACTION_SETTLE},
+    {STATE_HOLD,     EVENT_ENGAGE,          WAS_HOMING,       STATE_HOMING,   STATE_ENGAGED,  CLEAR, ACTION_HOME},
+    {STATE_HOLD,     EVENT_ENGAGE,          WAS_RISING,       STATE_RISING,   STATE_ENGAGED,  CLEAR, ACTION_RISE},
+    {STATE_HOLD,     EVENT_ENGAGE,          WAS_NEUTRAL,      STATE_ENGAGED,  STATE_ENGAGED,  CLEAR, ACTION_FOLLOW},
+    {STATE_HOLD,     EVENT_ENGAGE,          WAS_ENGAGED,      STATE_ENGAGED,  STATE_ENGAGED,  CLEAR, ACTION_FOLLOW},
+    {STATE_HOLD,     EVENT_ENGAGE,          WAS_SETTLING,     STATE_RISING,   STATE_ENGAGED,  CLEAR, ACTION_RISE},
+    {STATE_HOLD,     EVENT_HOLD,            ALWAYS,           STAY,           KEEP,           CLEAR, ACTION_NONE},
+    {STATE_HOLD,     EVENT_PARK,            WAS_HOMING,       STATE_HOMING,   STATE_SETTLED,  CLEAR, ACTION_HOME},
+    {STATE_HOLD,     EVENT_PARK,            ALWAYS,           STATE_SETTLING, STATE_SETTLED,  CLEAR, ACTION_SETTLE},
+    {STATE_HOLD,     EVENT_SHUTDOWN,        WAS_HOMING,       STATE_OFF,      STATE_OFF,      CLEAR, ACTION_OFF},
+    {STATE_HOLD,     EVENT_SHUTDOWN,        ALWAYS,           STATE_SETTLING, STATE_OFF,      CLEAR, ACTION_SETTLE},
+    {STATE_HOLD,     EVENT_FRAME,           BY_SILENCE,       STATE_ENGAGED,  STATE_ENGAGED,  CLEAR, ACTION_FOLLOW},
+    {STATE_HOLD,     EVENT_SILENCE_NEUTRAL, BY_SILENCE,       STATE_RISING,   STATE_NEUTRAL,  SET,   ACTION_RISE},
+    {STATE_HOLD,     EVENT_SILENCE_SETTLE,  BY_SILENCE,       STATE_SETTLING, STATE_SETTLED,  CLEAR, ACTION_SETTLE},
+
+    {STATE_SETTLING, EVENT_MOVE_DONE,       ALWAYS,           STATE_SETTLED,  KEEP,           CLEAR, ACTION_STAY},
+    {STATE_SETTLING, EVENT_ENGAGE,          ALWAYS,           STATE_RISING,   STATE_ENGAGED,  CLEAR, ACTION_RISE},
+    {STATE_SETTLING, EVENT_HOLD,            ALWAYS,           STATE_HOLD,     KEEP,           CLEAR, ACTION_STOP},
+    {STATE_SETTLING, EVENT_PARK,            ALWAYS,           STAY,           STATE_SETTLED,  CLEAR, ACTION_NONE},
+    {STATE_SETTLING, EVENT_SHUTDOWN,        ALWAYS,           STAY,           STATE_OFF,      CLEAR, ACTION_NONE},
+
+    /* levels that no row above takes: expected, not counted */
+    {ANY,            EVENT_DRIVES_READY,    ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {ANY,            EVENT_TICK,            ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {ANY,            EVENT_SILENCE_HOLD,    ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {ANY,            EVENT_SILENCE_NEUTRAL, ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {ANY,            EVENT_SILENCE_SETTLE,  ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+};
+/* clang-format on */
+
+static bool holds(guard_t guard, const supervisor_t *self, const supervisor_view_t *view)
+{
+    switch (guard) {
+    case ALWAYS:
+        return true;
+    case COMES_UP_SETTLED:
+        return view->is_at_settled && self->goal != STATE_OFF;
+    case GOAL_OFF:
+        return self->goal == STATE_OFF;
+    case GOAL_UP:
+        return self->goal == STATE_NEUTRAL || self->goal == STATE_ENGAGED;
+    case GOAL_ENGAGED:
+        return self->goal == STATE_ENGAGED;
+    case BY_SILENCE:
+        return self->is_held_by_silence;
+    case WAS_HOMING:
+        return self->interrupted == STATE_HOMING;
+    case WAS_RISING:
+        return self->interrupted == STATE_RISING;
+    case WAS_NEUTRAL:
+        return self->interrupted == STATE_NEUTRAL;
+    case WAS_ENGAGED:
+        return self->interrupted == STATE_ENGAGED;
+    case WAS_SETTLING:
+        return self->interrupted == STATE_SETTLING;
+    case FAULT_CLEARED:
+        return !view->is_fault_present && view->is_at_rest;
+    case ESTOP_RELEASED:
+        return !view->is_estop_active && !view->is_fault_present;
+    }
+    return false;
+}
+
+/* The first row that matches, NULL if none does. */
+static const row_t *find_row(const supervisor_t *self, event_t event, const supervisor_view_t *view)
+{
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        const row_t *const row = &k_rows[i];
+        if (row->event == event && (row->from == self->state || row->from == ANY) && holds(row->guard, self, view))
+            return row;
+    }
+    return NULL;
+}
+
+static void take(supervisor_t *self, const row_t *row)
+{
+    if (row->to == STATE_HOLD)
+        self->interrupted = self->state;
+    if (row->to != STAY)
+        self->state = row->to;
+    if (row->goal != KEEP)
+        self->goal = row->goal;
+    if (row->by_silence != SAME)
+        self->is_held_by_silence = row->by_silence == SET;
+}
+
+void supervisor_init(supervisor_t *self)
+{
+    *self = (supervisor_t){.state = STATE_OFF, .goal = STATE_SETTLED};
+}
+
+void supervisor_init_settled(supervisor_t *self)
+{
+    *self = (supervisor_t){.state = STATE_SETTLED, .goal = STATE_SETTLED};
+}
+
+action_t supervisor_event(supervisor_t *self, event_t event, const supervisor_view_t *view)
+{
+    HV_ASSERT((unsigned)event < EVENTS && view != NULL);
+    const row_t *const row = find_row(self, event, view);
+    if (row == NULL) {
+        self->ignored[event]++;
+        return ACTION_NONE;
+    }
+    take(self, row);
+    return row->action;
+}
+
+bool supervisor_is_latched(const supervisor_t *self)
+{
+    return self->state == STATE_FAULT || self->state == STATE_ESTOP;
+}
+
+const char *state_name(state_t state)
+{
+    static const char *const k_names[STATES] = {
+        [STATE_OFF] = "OFF",         [STATE_HOMING] = "HOMING",   [STATE_SETTLED] = "SETTLED", [STATE_RISING] = "RISING",
+        [STATE_NEUTRAL] = "NEUTRAL", [STATE_ENGAGED] = "ENGAGED", [STATE_HOLD] = "HOLD",       [STATE_SETTLING] = "SETTLING",
+        [STATE_FAULT] = "FAULT",     [STATE_ESTOP] = "ESTOP",
+    };
+    return (unsigned)state < STATES ? k_names[state] : "?";
+}
+
+const char *event_name(event_t event)
+{
+    static const char *const k_names[EVENTS] = {
+        [EVENT_DRIVES_READY] = "drives-ready",
+        [EVENT_TICK] = "tick",
+        [EVENT_MOVE_DONE] = "move-done",
+        [EVENT_ENGAGE] = "engage",
+        [EVENT_HOLD] = "hold",
+        [EVENT_RESUME] = "resume",
+        [EVENT_PARK] = "park",
+        [EVENT_RESET] = "reset",
+        [EVENT_SHUTDOWN] = "shutdown",
+        [EVENT_FRAME] = "frame",
+        [EVENT_SILENCE_HOLD] = "silence-hold",
+        [EVENT_SILENCE_NEUTRAL] = "silence-neutral",
+        [EVENT_SILENCE_SETTLE] = "silence-settle",
+        [EVENT_FAULT] = "fault",
+        [EVENT_ESTOP] = "estop",
+    };
+    return (unsigned)event < EVENTS ? k_names[event] : "?";
+}
