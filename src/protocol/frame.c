@@ -1,0 +1,487 @@
+/* SPDX-License-Identifier: MIT
+ * frame.c - the vendor's frames, one byte at a time.
+ * Outside a frame: idle, or in text to be rejected. Inside: command, colon, values, mask or time. The first error sends the frame
+ * to PHASE_REJECTED, where its remaining bytes are skipped up to its `#`, the next head or the end.
+ *
+ * In the lenient dialect `#` is head and tail. Inside a frame or rejected text it is the tail, elsewhere a head. The `#` that
+ * ends rejected text may have been meant as a head, so a command may follow it directly: bad text never spoils the good frame
+ * behind it.
+ */
+#include "heave/frame.h"
+
+typedef enum {
+    PHASE_IDLE,
+    PHASE_LETTER,
+    PHASE_DIGIT,
+    PHASE_SUFFIX, /* T or colon */
+    PHASE_COLON,
+    PHASE_VALUE,
+    PHASE_MASK,
+    PHASE_TIME,
+    PHASE_REJECTED
+} phase_t;
+
+enum { MASK_DIGITS_MAX = 4 };
+
+typedef struct {
+    char name[3];
+    uint8_t value_count;
+} command_t;
+
+static const command_t k_commands[FRAME_COMMANDS] = {
+    [FRAME_A3] = {"A3", 3}, [FRAME_A4] = {"A4", 4}, [FRAME_A6] = {"A6", 6}, [FRAME_A7] = {"A7", 7},
+    [FRAME_C3] = {"C3", 3}, [FRAME_C6] = {"C6", 6}, [FRAME_C7] = {"C7", 7},
+};
+
+unsigned frame_value_count(frame_command_t command)
+{
+    return k_commands[command].value_count;
+}
+
+const char *frame_command_name(frame_command_t command)
+{
+    return k_commands[command].name;
+}
+
+static bool is_blank(uint8_t byte)
+{
+    return byte == ' ' || byte == '\t';
+}
+
+static bool is_line_end(uint8_t byte)
+{
+    return byte == '\r' || byte == '\n' || byte == '\0';
+}
+
+/* 0 to 15, or 16 where the byte is no hex digit. */
+static unsigned hex_value(uint8_t byte)
+{
+    const unsigned lower = byte | 0x20u;
+    if (byte >= '0' && byte <= '9') {
+        return byte - (unsigned)'0';
+    }
+    return lower >= 'a' && lower <= 'f' ? lower - 'a' + 10u : 16u;
+}
+
+/* Letters of a command: the lenient dialect takes lower case. */
+static uint8_t command_byte(const frame_scanner_t *self, uint8_t byte)
+{
+    return self->dialect == FRAME_LENIENT && byte >= 'a' && byte <= 'z' ? (uint8_t)(byte - 'a' + 'A') : byte;
+}
+
+/* First byte of an offending character: how many bytes of UTF-8 follow it. */
+static void look_alike_begin(frame_scanner_t *self, uint8_t byte)
+{
+    self->utf8_left = byte < 0xC2 || byte > 0xF4 ? 0 : byte < 0xE0 ? 1 : byte < 0xF0 ? 2 : 3;
+    self->reject.look_alike = self->utf8_left == 0 ? 0 : byte & (0x3Fu >> self->utf8_left);
+}
+
+/* The bytes behind it. */
+static void look_alike_take(frame_scanner_t *self, uint8_t byte)
+{
+    const bool is_continuation = (byte & 0xC0u) == 0x80u;
+    self->reject.look_alike = is_continuation ? self->reject.look_alike << 6 | (byte & 0x3Fu) : 0;
+    self->utf8_left = is_continuation ? (uint8_t)(self->utf8_left - 1) : 0;
+}
+
+/* Records an error at an offset that no single byte explains. */
+static void fail_at(frame_scanner_t *self, frame_error_t error, uint32_t offset, uint8_t field)
+{
+    self->reject = (frame_reject_t){.error = error,
+                                    .offset = offset,
+                                    .start = self->start,
+                                    .field = field,
+                                    .command = self->frame.command,
+                                    .is_timed = self->frame.is_timed};
+    self->utf8_left = 0;
+    self->phase = PHASE_REJECTED;
+}
+
+/* Records an error at the byte being read. */
+static void fail(frame_scanner_t *self, frame_error_t error, uint8_t byte, uint8_t field)
+{
+    fail_at(self, error, self->offset, field);
+    self->reject.byte = byte;
+    look_alike_begin(self, byte);
+}
+
+static void fail_count(frame_scanner_t *self, uint8_t byte, unsigned found)
+{
+    fail(self, FRAME_ERR_COUNT, byte, 0);
+    self->reject.expected = self->frame.count;
+    self->reject.found = (uint8_t)found;
+}
+
+/* No command starts so: without a head of its own it was no frame at all. */
+static void fail_command(frame_scanner_t *self, uint8_t byte)
+{
+    fail(self, self->is_headless ? FRAME_ERR_NO_HEAD : FRAME_ERR_COMMAND, byte, 0);
+}
+
+static void begin_frame(frame_scanner_t *self, bool is_headless)
+{
+    self->frame = (frame_t){.command = FRAME_COMMANDS};
+    self->start = self->offset;
+    self->is_headless = is_headless;
+    self->may_be_headless = false;
+    self->phase = PHASE_LETTER;
+}
+
+/* Starts the field behind the separator being read. */
+static void begin_field(frame_scanner_t *self, uint8_t field)
+{
+    const bool is_value = field <= self->frame.count;
+    self->field = field;
+    self->field_start = self->offset + 1;
+    self->phase = is_value ? PHASE_VALUE : self->frame.is_timed ? PHASE_TIME : PHASE_MASK;
+    if (self->phase == PHASE_MASK) {
+        self->frame.relay_mask = 0;
+        self->mask_digits = 0;
+        self->is_mask_prefixed = false;
+        self->is_mask_ended = false;
+    } else {
+        number_init(&self->number);
+    }
+}
+
+static void take_letter(frame_scanner_t *self, uint8_t byte)
+{
+    self->letter = (char)command_byte(self, byte);
+    if (self->letter == 'A' || self->letter == 'C') {
+        self->phase = PHASE_DIGIT;
+    } else {
+        fail_command(self, byte);
+    }
+}
+
+static void take_digit(frame_scanner_t *self, uint8_t byte)
+{
+    for (unsigned command = 0; command < FRAME_COMMANDS; command++) {
+        const char *name = k_commands[command].name;
+        if (name[0] == self->letter && (uint8_t)name[1] == byte) {
+            self->frame.command = (frame_command_t)command;
+            self->frame.count = k_commands[command].value_count;
+            self->phase = PHASE_SUFFIX;
+            return;
+        }
+    }
+    fail_command(self, byte);
+}
+
+static void take_suffix(frame_scanner_t *self, uint8_t byte)
+{
+    if (byte == ':') {
+        begin_field(self, 1);
+    } else if (self->phase == PHASE_SUFFIX && command_byte(self, byte) == 'T') {
+        self->frame.is_timed = true;
+        self->phase = PHASE_COLON;
+    } else {
+        fail(self, FRAME_ERR_SEPARATOR, byte, 0);
+    }
+}
+
+/* The separator behind a value came. */
+static void finish_value(frame_scanner_t *self, uint8_t separator)
+{
+    switch (number_finish(&self->number, &self->frame.value_q16[self->field - 1])) {
+    case NUMBER_OK:
+        break;
+    case NUMBER_EMPTY:
+        fail(self, FRAME_ERR_VALUE_EMPTY, separator, self->field);
+        break;
+    case NUMBER_SYNTAX:
+        fail(self, FRAME_ERR_VALUE_SYNTAX, separator, self->field);
+        break;
+    case NUMBER_OVERFLOW:
+        fail_at(self, FRAME_ERR_VALUE_OVERFLOW, self->field_start, self->field);
+        break;
+    }
+}
+
+static void take_value(frame_scanner_t *self, uint8_t byte)
+{
+    if (byte == ',') {
+        finish_value(self, byte);
+        if (self->phase != PHASE_REJECTED) {
+            begin_field(self, (uint8_t)(self->field + 1));
+        }
+    } else if (number_feed(&self->number, byte) != NUMBER_OK) {
+        fail(self, FRAME_ERR_VALUE_SYNTAX, byte, self->field);
+    }
+}
+
+static void take_mask_digit(frame_scanner_t *self, uint8_t byte)
+{
+    const unsigned digit = hex_value(byte);
+    const bool is_prefix =
+        (byte | 0x20u) == 'x' && !self->is_mask_prefixed && self->mask_digits == 1 && self->frame.relay_mask == 0;
+    if (self->is_mask_ended || (digit > 15 && !is_prefix) || (digit <= 15 && self->mask_digits == MASK_DIGITS_MAX)) {
+        fail(self, FRAME_ERR_MASK, byte, self->field);
+    } else if (is_prefix) {
+        self->is_mask_prefixed = true;
+        self->mask_digits = 0;
+    } else {
+        self->frame.relay_mask = (uint16_t)((unsigned)self->frame.relay_mask << 4 | digit);
+        self->mask_digits++;
+    }
+}
+
+static void take_mask(frame_scanner_t *self, uint8_t byte)
+{
+    if (byte == ',') {
+        fail_count(self, byte, self->frame.count + 2u);
+    } else if (is_blank(byte)) {
+        self->is_mask_ended = self->mask_digits > 0 || self->is_mask_prefixed;
+    } else {
+        take_mask_digit(self, byte);
+    }
+}
+
+static void finish_mask(frame_scanner_t *self, uint8_t tail)
+{
+    if (self->mask_digits == 0) {
+        fail(self, FRAME_ERR_MASK, tail, self->field);
+        return;
+    }
+    self->frame.relay_mask &= FRAME_RELAY_MASK;
+    self->frame.has_mask = true;
+}
+
+static void take_time(frame_scanner_t *self, uint8_t byte)
+{
+    if (byte == ',') {
+        fail_count(self, byte, self->frame.count + 2u);
+    } else if (number_feed(&self->number, byte) != NUMBER_OK) {
+        fail(self, FRAME_ERR_TIME, byte, self->field);
+    }
+}
+
+static void finish_time(frame_scanner_t *self, uint8_t tail)
+{
+    const number_error_t error = number_finish_natural(&self->number, &self->frame.time_ms);
+    if (error == NUMBER_EMPTY || error == NUMBER_SYNTAX) {
+        fail(self, FRAME_ERR_TIME, tail, self->field);
+    } else if (error == NUMBER_OVERFLOW && self->number.is_negative) {
+        fail_at(self, FRAME_ERR_TIME, self->field_start, self->field);
+    } else if (error == NUMBER_OVERFLOW || self->frame.time_ms > FRAME_TIME_MAX_MS) {
+        fail_at(self, FRAME_ERR_TIME_RANGE, self->field_start, self->field);
+    }
+}
+
+/* A comma in a rejected frame: behind the last field it says that there are too many, whatever that field looked like. */
+static void count_rejected(frame_scanner_t *self)
+{
+    const frame_error_t error = self->reject.error;
+    if (error == FRAME_ERR_COUNT) {
+        self->reject.found = (uint8_t)(self->reject.found + (self->reject.found < UINT8_MAX));
+    } else if (error == FRAME_ERR_MASK || error == FRAME_ERR_TIME) {
+        fail_count(self, ',', self->frame.count + 2u);
+    }
+}
+
+static void take_rejected(frame_scanner_t *self, uint8_t byte)
+{
+    if (self->utf8_left > 0) {
+        look_alike_take(self, byte);
+    }
+    if (byte == ',') {
+        count_rejected(self);
+    }
+}
+
+static void take_idle(frame_scanner_t *self, uint8_t byte)
+{
+    const bool may_be_headless = self->may_be_headless;
+    self->may_be_headless = false;
+    if (is_blank(byte) || is_line_end(byte)) {
+        return;
+    }
+    begin_frame(self, true);
+    if (may_be_headless) {
+        take_letter(self, byte);
+    } else {
+        fail(self, FRAME_ERR_NO_HEAD, byte, 0);
+    }
+}
+
+/* Any byte but a head or a tail. */
+typedef void take_t(frame_scanner_t *self, uint8_t byte);
+
+static take_t *const k_take[] = {
+    [PHASE_IDLE] = take_idle,     [PHASE_LETTER] = take_letter, [PHASE_DIGIT] = take_digit,
+    [PHASE_SUFFIX] = take_suffix, [PHASE_COLON] = take_suffix,  [PHASE_VALUE] = take_value,
+    [PHASE_MASK] = take_mask,     [PHASE_TIME] = take_time,     [PHASE_REJECTED] = take_rejected,
+};
+
+static bool is_unicode(uint32_t code_point, uint8_t first_byte)
+{
+    const uint32_t least = first_byte < 0xE0 ? 0x80u : first_byte < 0xF0 ? 0x800u : 0x10000u;
+    return code_point >= least && code_point <= 0x10FFFFu && (code_point < 0xD800u || code_point > 0xDFFFu);
+}
+
+/* Hands out the recorded error; the rejected text ends before `end`. */
+static frame_event_t report(frame_scanner_t *self, uint32_t end, frame_reject_t *reject)
+{
+    if (self->utf8_left > 0 || !is_unicode(self->reject.look_alike, self->reject.byte)) {
+        self->reject.look_alike = 0;
+    }
+    self->reject.end = end;
+    *reject = self->reject;
+    self->phase = PHASE_IDLE;
+    self->has_event = true;
+    return FRAME_EVENT_REJECT;
+}
+
+/* Reports what is pending as unfinished, unless it had an error before. */
+static frame_event_t report_unfinished(frame_scanner_t *self, uint32_t end, frame_reject_t *reject)
+{
+    if (self->phase != PHASE_REJECTED) {
+        fail_at(self, FRAME_ERR_UNFINISHED, self->offset, 0);
+    }
+    return report(self, end, reject);
+}
+
+/* `#` behind a value: all must be there but the mask. */
+static void finish_at_value(frame_scanner_t *self, uint8_t tail)
+{
+    q16_t ignored;
+    if (self->field == 1 && number_finish(&self->number, &ignored) == NUMBER_EMPTY) {
+        fail_count(self, tail, 0);
+        return;
+    }
+    finish_value(self, tail);
+    if (self->phase == PHASE_REJECTED) {
+        return;
+    }
+    if (self->field < self->frame.count) {
+        fail_count(self, tail, self->field);
+    } else if (self->frame.is_timed) {
+        fail(self, FRAME_ERR_TIME, tail, (uint8_t)(self->field + 1));
+    }
+}
+
+/* `#` inside a frame: the checks of its last field. */
+static void finish(frame_scanner_t *self, uint8_t tail)
+{
+    switch ((phase_t)self->phase) {
+    case PHASE_LETTER:
+    case PHASE_DIGIT:
+        fail_command(self, tail);
+        break;
+    case PHASE_SUFFIX:
+    case PHASE_COLON:
+        fail(self, FRAME_ERR_SEPARATOR, tail, 0);
+        break;
+    case PHASE_VALUE:
+        finish_at_value(self, tail);
+        break;
+    case PHASE_MASK:
+        finish_mask(self, tail);
+        break;
+    case PHASE_TIME:
+        finish_time(self, tail);
+        break;
+    case PHASE_IDLE:
+    case PHASE_REJECTED:
+        break;
+    }
+}
+
+static frame_event_t take_at(frame_scanner_t *self, frame_reject_t *reject)
+{
+    const frame_event_t event = self->phase == PHASE_IDLE ? FRAME_EVENT_NONE : report_unfinished(self, self->offset, reject);
+    begin_frame(self, false);
+    return event;
+}
+
+static frame_event_t take_hash(frame_scanner_t *self, frame_t *frame, frame_reject_t *reject)
+{
+    if (self->phase == PHASE_IDLE && self->dialect == FRAME_LENIENT) {
+        begin_frame(self, false);
+        return FRAME_EVENT_NONE;
+    }
+    if (self->phase == PHASE_IDLE) {
+        take_idle(self, '#');
+    }
+    finish(self, '#');
+    if (self->phase == PHASE_REJECTED) {
+        self->may_be_headless = self->dialect == FRAME_LENIENT;
+        return report(self, self->offset + 1, reject);
+    }
+    *frame = self->frame;
+    self->phase = PHASE_IDLE;
+    self->has_event = true;
+    return FRAME_EVENT_FRAME;
+}
+
+/* Blanks and line ends: a line end cannot stand in a frame, and a field starts behind its leading blanks. */
+static void take_white(frame_scanner_t *self, uint8_t byte)
+{
+    if (is_line_end(byte) && self->phase != PHASE_IDLE && self->phase != PHASE_REJECTED) {
+        fail(self, FRAME_ERR_UNFINISHED, byte, 0);
+        return;
+    }
+    self->field_start += self->field_start == self->offset;
+    k_take[self->phase](self, byte);
+}
+
+static frame_event_t take_other(frame_scanner_t *self, uint8_t byte, frame_reject_t *reject)
+{
+    if (byte <= ' ') {
+        take_white(self, byte);
+    } else {
+        k_take[self->phase](self, byte);
+    }
+    if (self->offset - self->start >= FRAME_LENGTH_MAX - 1 && self->phase != PHASE_IDLE) {
+        return report_unfinished(self, self->offset + 1, reject);
+    }
+    return FRAME_EVENT_NONE;
+}
+
+void frame_scanner_init(frame_scanner_t *self, frame_dialect_t dialect)
+{
+    *self = (frame_scanner_t){.dialect = dialect, .phase = PHASE_IDLE, .may_be_headless = dialect == FRAME_LENIENT};
+}
+
+frame_event_t frame_scanner_feed(frame_scanner_t *self, uint8_t byte, frame_t *frame, frame_reject_t *reject)
+{
+    frame_event_t event = FRAME_EVENT_NONE;
+    if (byte == '@') {
+        event = take_at(self, reject);
+    } else if (byte == '#') {
+        event = take_hash(self, frame, reject);
+    } else {
+        event = take_other(self, byte, reject);
+    }
+    self->offset++;
+    return event;
+}
+
+frame_event_t frame_scanner_end(frame_scanner_t *self, frame_reject_t *reject)
+{
+    frame_event_t event = FRAME_EVENT_NONE;
+    if (self->phase == PHASE_IDLE && !self->has_event) {
+        self->frame.command = FRAME_COMMANDS;
+        fail_at(self, FRAME_ERR_NO_HEAD, 0, 0);
+    }
+    if (self->phase != PHASE_IDLE) {
+        event = report_unfinished(self, self->offset, reject);
+    }
+    frame_scanner_init(self, self->dialect);
+    return event;
+}
+
+frame_event_t frame_next(frame_scanner_t *self, const uint8_t *datagram, size_t length, size_t *position, frame_t *frame,
+                         frame_reject_t *reject)
+{
+    for (size_t i = *position; i < length; i++) {
+        const frame_event_t event = frame_scanner_feed(self, datagram[i], frame, reject);
+        if (event != FRAME_EVENT_NONE) {
+            *position = i + 1;
+            return event;
+        }
+    }
+    const bool is_at_end = *position <= length;
+    *position = length + 1;
+    return is_at_end ? frame_scanner_end(self, reject) : FRAME_EVENT_NONE;
+}
