@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: MIT
+ * drives.h - contract of the drive layer: what the gateway talks to, whatever bus or simulation is behind it.
+ * Values in mm (deg for the rotation motor), one entry per axis: the cylinders, then the rotation motor where there is one.
+ * The motion thread alone calls the ops; none blocks. Scaling, signs and bus protocol stay below this line, limits stay above it.
+ */
+#ifndef HEAVE_DRIVES_H
+#define HEAVE_DRIVES_H
+
+#include "heave/axes.h"
+
+/** Most axes: the cylinders and the rotation motor. */
+#define DRIVES_MAX (CYLINDERS_MAX + 1u)
+
+/** State of one drive. */
+typedef enum {
+    DRIVE_OFFLINE,  /**< does not answer (any more), or is not configured yet; nothing else in its feedback is current */
+    DRIVE_DISABLED, /**< answers, no torque */
+    DRIVE_ENABLING, /**< on the way to DRIVE_ENABLED; may hold the position already */
+    DRIVE_ENABLED,  /**< follows the set-points */
+    DRIVE_HOMING,   /**< moves by itself to find its zero; set-points are ignored */
+    DRIVE_FAULT     /**< stopped itself; fault_code says why. Left only by DRIVES_RESET_FAULT */
+} drive_state_t;
+
+/** What one drive reports. */
+typedef struct {
+    drive_state_t state;
+    bool is_homed;       /**< actual counts from the true zero */
+    bool has_actual;     /**< actual_mm_q32 and actual_us are valid (since the drive first reported) */
+    q32_t actual_mm_q32; /**< extension [mm], or angle [deg] of the rotation motor; jumps when homing ends */
+    uint64_t actual_us;  /**< when actual was measured or received; an old value means stale feedback */
+    uint32_t fault_code; /**< the device's own code, 0 = none; valid in DRIVE_FAULT */
+} drive_feedback_t;
+
+/** Requests to all axes together: all or none, because one leg that stops alone racks the platform. */
+typedef enum {
+    DRIVES_ENABLE,     /**< DISABLED -> ENABLING -> ENABLED; the set-points sent must equal actual until every axis is ENABLED */
+    DRIVES_DISABLE,    /**< any -> DISABLED (torque off by the drives' own ramps and brakes); FAULT and OFFLINE stay */
+    DRIVES_HOME,       /**< ENABLED -> HOMING -> ENABLED and is_homed. Afterwards the set-points must start at actual again */
+    DRIVES_QUICK_STOP, /**< stop now by the drives' own ramps, then DISABLED; also ends ENABLING and HOMING */
+    DRIVES_RESET_FAULT /**< FAULT -> DISABLED where the cause is gone, else FAULT stays */
+} drives_request_t;
+
+/** Every op is mandatory. */
+typedef struct {
+    hv_status_t (*poll)(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX]);
+    hv_status_t (*send)(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX]);
+    hv_status_t (*request)(void *ctx, drives_request_t request);
+    uint8_t (*count)(void *ctx);
+} drives_ops_t;
+
+/** Passed by value; ctx belongs to the backend and lives until its close. */
+typedef struct {
+    const drives_ops_t *ops;
+    void *ctx;
+} drives_t;
+
+/** True where every mandatory op is there; refuse to start otherwise. */
+static inline bool drives_valid(drives_t drives)
+{
+    return drives.ops != NULL && drives.ops->poll != NULL && drives.ops->send != NULL && drives.ops->request != NULL &&
+           drives.ops->count != NULL;
+}
+
+/** Axes, [1, DRIVES_MAX]; constant from the open on. */
+static inline uint8_t drives_count(drives_t drives)
+{
+    return drives.ops->count(drives.ctx);
+}
+
+/** Takes in what has arrived and tells the state of each axis. Once per cycle, before send. Never blocks (<= 200 us).
+ *  @param now_us   never decreasing
+ *  @param feedback out: the first drives_count() entries, always written (also on errors); the others unchanged
+ *  @return HV_OK; HV_ERR_IO: the bus is gone, every axis is DRIVE_OFFLINE; go on polling, it may return (then
+ *          DRIVE_DISABLED). */
+static inline HV_MUST_CHECK hv_status_t drives_poll(drives_t drives, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
+{
+    return drives.ops->poll(drives.ctx, now_us, feedback);
+}
+
+/** Sends one coherent set of set-points, all axes or none. Once per cycle, also while axes are not enabled: they ignore it,
+ *  and buses that watch for silence stay content. Never blocks (<= 200 us). A drive takes a set-point in ENABLED only. At
+ *  the moment it becomes ENABLED the set-point must equal actual; an axis that is asked to jump faults (following error).
+ *  @param setpoint_q32 the caller's, read before the return
+ *  @return HV_OK; HV_ERR_AGAIN: the bus has not taken the last set yet, this one is dropped whole (send the next one next
+ *          cycle; drives see the step from the last set that was taken; several in a row mean a stalled bus);
+ *          HV_ERR_IO: the bus is gone. */
+static inline HV_MUST_CHECK hv_status_t drives_send(drives_t drives, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
+{
+    return drives.ops->send(drives.ctx, now_us, setpoint_q32);
+}
+
+/** Asks all axes for a change; asynchronous. A newer request replaces an unfinished one. Never blocks (<= 50 us). The next
+ *  poll already shows that ENABLE or HOME has begun (ENABLING, HOMING), so that the state before it cannot be taken for its
+ *  end; the end is seen in later polls. Axes for which the request means nothing in their state stay as they are.
+ *  @return HV_OK: taken; HV_ERR_AGAIN: not taken, ask again next cycle; HV_ERR_STATE: not every axis is in a state that the
+ *          request needs (ENABLE: DISABLED, ENABLING or ENABLED; HOME: ENABLED), nothing changes; HV_ERR_IO: the bus is
+ *          gone, nobody hears it. */
+static inline HV_MUST_CHECK hv_status_t drives_request(drives_t drives, drives_request_t request)
+{
+    return drives.ops->request(drives.ctx, request);
+}
+
+#endif

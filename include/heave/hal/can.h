@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: MIT
+ * can.h - contract of one classic CAN bus: frames out, frames in, and what is known about the wire.
+ * One thread calls the ops, except restart, see there. Bit rate and receive filters are given to the backend's open.
+ */
+#ifndef HEAVE_HAL_CAN_H
+#define HEAVE_HAL_CAN_H
+
+#include "heave/status.h"
+
+/** Highest identifiers. */
+#define CAN_ID_MAX          0x7FFu
+#define CAN_ID_EXTENDED_MAX 0x1FFFFFFFu
+
+/** A frame, or a report of the controller (is_error). */
+typedef struct {
+    uint32_t id; /**< [0, CAN_ID_MAX] or [0, CAN_ID_EXTENDED_MAX]; with is_error: CAN_ERROR_* */
+    bool is_extended;
+    bool is_rtr;
+    bool is_error;  /**< received only */
+    uint8_t length; /**< [0, 8] bytes of data; bytes beyond it are 0 when received and ignored when sent */
+    uint8_t data[8];
+} can_frame_t;
+
+/** What a report says, in can_frame_t.id; bits may be combined. Reports come in order with the frames around them. */
+enum {
+    CAN_ERROR_WARNING = 1u,
+    CAN_ERROR_PASSIVE = 2u,
+    CAN_ERROR_BUS_OFF = 4u,
+    CAN_ERROR_RESTARTED = 8u, /**< the controller came back from bus-off: everything on the bus must be treated as lost */
+    CAN_ERROR_NO_ACK = 16u,   /**< nobody acknowledged a frame */
+    CAN_ERROR_OVERRUN = 32u,  /**< received frames were lost */
+    CAN_ERROR_OTHER = 64u
+};
+
+/** State of the controller. */
+typedef enum {
+    HAL_CAN_ACTIVE,
+    HAL_CAN_WARNING,
+    HAL_CAN_PASSIVE,
+    HAL_CAN_BUS_OFF,
+    HAL_CAN_DOWN /**< interface down, or unplugged */
+} hal_can_state_t;
+
+/** A receive filter: a frame passes where (id ^ filter.id) & mask is 0 and its width is the filter's. A backend takes a list
+ *  of these when it is opened; a frame that passes none is never seen, an empty list lets everything pass. Reports always
+ *  pass. */
+typedef struct {
+    uint32_t id;
+    uint32_t mask;
+    bool is_extended;
+} hal_can_filter_t;
+
+/** send and recv are mandatory, the rest optional. */
+typedef struct {
+    hv_status_t (*send)(void *ctx, const can_frame_t *frame);
+    hv_status_t (*recv)(void *ctx, can_frame_t *out, uint64_t *rx_time_us);
+    hv_status_t (*bus_state)(void *ctx, hal_can_state_t *out); /* optional: always active */
+    hv_status_t (*unconfirmed)(void *ctx, uint32_t *frames);   /* optional */
+    hv_status_t (*restart)(void *ctx);                         /* optional */
+} hal_can_ops_t;
+
+/** Passed by value; ctx belongs to the backend and lives until its close. */
+typedef struct {
+    const hal_can_ops_t *ops;
+    void *ctx;
+} hal_can_t;
+
+/** True where every mandatory op is there; refuse to start otherwise. */
+static inline bool hal_can_valid(hal_can_t can)
+{
+    return can.ops != NULL && can.ops->send != NULL && can.ops->recv != NULL;
+}
+
+/** Queues a frame; frames leave in the order of their sending. <= 50 us. HV_OK means queued, not sent: with no partner or in
+ *  bus-off frames pile up and would go out much later. Set-points need unconfirmed().
+ *  @param frame the caller's, copied
+ *  @return HV_OK; HV_ERR_AGAIN: the queue is full, the frame is not taken (a set-point is then worthless: drop it, do not
+ *          spin); HV_ERR_ARG: id, length or is_error out of range; HV_ERR_IO: interface down or gone, the frame is not
+ *          taken. */
+static inline HV_MUST_CHECK hv_status_t hal_can_send(hal_can_t can, const can_frame_t *frame)
+{
+    return can.ops->send(can.ctx, frame);
+}
+
+/** Takes the oldest received frame or report. Own frames never come back here: the backend takes their echo in and counts
+ *  it, see hal_can_unconfirmed(). Never blocks (<= 50 us).
+ *  @param rx_time_us out: when it was received, on the time line of hal_clock_now_us()
+ *  @return HV_OK; HV_ERR_AGAIN: none waiting; HV_ERR_IO: interface down or gone: go on calling once a cycle. Outputs
+ *          unchanged on error. */
+static inline HV_MUST_CHECK hv_status_t hal_can_recv(hal_can_t can, can_frame_t *out, uint64_t *rx_time_us)
+{
+    return can.ops->recv(can.ctx, out, rx_time_us);
+}
+
+/** State of the controller as last reported. Never blocks. Up to date once recv has returned HV_ERR_AGAIN or HV_ERR_IO.
+ *  @return HV_OK. A backend without the op is always HAL_CAN_ACTIVE. */
+static inline HV_MUST_CHECK hv_status_t hal_can_bus_state(hal_can_t can, hal_can_state_t *out)
+{
+    if (can.ops->bus_state != NULL) {
+        return can.ops->bus_state(can.ctx, out);
+    }
+    *out = HAL_CAN_ACTIVE;
+    return HV_OK;
+}
+
+/** Frames taken by send of which no echo has come: not seen on the wire. Up to date once recv has returned HV_ERR_AGAIN. The
+ *  next set of set-points may be queued only where this is 0, so that no stale set can ever wait in a queue. Never blocks.
+ *  After bus-off or a pulled cable it stays above 0 until restart.
+ *  @return HV_OK; HV_ERR_NOSUP: the backend gets no echo. */
+static inline HV_MUST_CHECK hv_status_t hal_can_unconfirmed(hal_can_t can, uint32_t *frames)
+{
+    return can.ops->unconfirmed != NULL ? can.ops->unconfirmed(can.ctx, frames) : HV_ERR_NOSUP;
+}
+
+/** Starts afresh after bus-off, stall or unplugging: takes the interface up again by name, discards received frames, drops
+ *  the frames that wait to be sent where the system lets it, forgets unconfirmed ones. Call only while no drive is enabled:
+ *  frames that the system keeps may still go out. <= 10 ms.
+ *  @return HV_OK; HV_ERR_AGAIN: the interface is not there yet, try later; HV_ERR_IO: it is there but refuses; HV_ERR_NOSUP.
+ *          */
+static inline HV_MUST_CHECK hv_status_t hal_can_restart(hal_can_t can)
+{
+    return can.ops->restart != NULL ? can.ops->restart(can.ctx) : HV_ERR_NOSUP;
+}
+
+#endif

@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: MIT
+ * modbus.h - contract of one Modbus line (TCP or RTU) behind a worker: submit a transaction, ask later what became of it.
+ * One thread (the motion thread) calls the ops and is never made to wait; the worker is the backend's.
+ * The line is shared by slots: each holds the newest transaction of one purpose (set-point of axis 3, status of axis 3, relays).
+ */
+#ifndef HEAVE_HAL_MODBUS_H
+#define HEAVE_HAL_MODBUS_H
+
+#include "heave/status.h"
+
+/** Independent transactions a line keeps, numbered from 0. */
+#define HAL_MODBUS_SLOTS 32u
+
+/** Most registers or coils of one transaction. */
+#define HAL_MODBUS_VALUES_MAX 64u
+
+/** Unit id of a broadcast: writes only, nobody answers. */
+#define HAL_MODBUS_BROADCAST 0u
+
+/** Function codes. */
+typedef enum {
+    MODBUS_READ_COILS = 1,
+    MODBUS_READ_DISCRETE_INPUTS = 2,
+    MODBUS_READ_HOLDING = 3,
+    MODBUS_READ_INPUT = 4,
+    MODBUS_WRITE_COIL = 5,
+    MODBUS_WRITE_REGISTER = 6,
+    MODBUS_WRITE_COILS = 15,
+    MODBUS_WRITE_REGISTERS = 16
+} modbus_function_t;
+
+/** A transaction. */
+typedef struct {
+    modbus_function_t function;
+    uint8_t unit;                          /**< [1, 247], 255 on TCP, or HAL_MODBUS_BROADCAST for a write */
+    uint16_t address;                      /**< of the first register or coil, from 0 */
+    uint8_t count;                         /**< registers or coils, [1, HAL_MODBUS_VALUES_MAX]; 1 for the single writes */
+    uint32_t tag;                          /**< the caller's; comes back in the result */
+    uint16_t value[HAL_MODBUS_VALUES_MAX]; /**< writes: registers, or coils as 0 / 1 */
+} modbus_request_t;
+
+/** What became of it. */
+typedef struct {
+    hv_status_t
+        status; /**< HV_OK; HV_ERR_TIMEOUT: no answer in time (a write may have acted); HV_ERR_FORMAT: the answer was damaged or
+                   not to this question; HV_ERR_STATE: the device answered with an exception; HV_ERR_IO: no link */
+    uint8_t exception;                     /**< the device's exception code with HV_ERR_STATE, else 0 */
+    uint8_t count;                         /**< values read, 0 for writes and errors */
+    uint32_t tag;                          /**< of the request */
+    uint64_t done_us;                      /**< when it ended, on the time line of hal_clock_now_us() */
+    uint16_t value[HAL_MODBUS_VALUES_MAX]; /**< reads: registers, or coils as 0 / 1 */
+} modbus_result_t;
+
+/** Every op is mandatory. */
+typedef struct {
+    hv_status_t (*submit)(void *ctx, unsigned slot, const modbus_request_t *request);
+    hv_status_t (*poll)(void *ctx, unsigned slot, modbus_result_t *result);
+} hal_modbus_ops_t;
+
+/** Passed by value; ctx belongs to the backend and lives until its close. */
+typedef struct {
+    const hal_modbus_ops_t *ops;
+    void *ctx;
+} hal_modbus_t;
+
+/** True where every mandatory op is there; refuse to start otherwise. */
+static inline bool hal_modbus_valid(hal_modbus_t modbus)
+{
+    return modbus.ops != NULL && modbus.ops->submit != NULL && modbus.ops->poll != NULL;
+}
+
+/** Puts a transaction into a slot. Newest wins: one that waits in the slot is replaced and never gets a result; one that is
+ *  already on the wire ends first and gets its own result. Waiting slots are served in turn, so that none starves. Never
+ *  blocks (<= 20 us).
+ *  @param request the caller's, copied
+ *  @return HV_OK; HV_ERR_ARG: slot, function, unit or count out of range, nothing changes. */
+static inline HV_MUST_CHECK hv_status_t hal_modbus_submit(hal_modbus_t modbus, unsigned slot, const modbus_request_t *request)
+{
+    return modbus.ops->submit(modbus.ctx, slot, request);
+}
+
+/** Takes the newest result of a slot, once; an older one that was not taken is lost. A transaction ends at the latest with
+ *  the backend's timeout: no result for much longer means that the worker is stuck. The backend never repeats a transaction
+ *  by itself, restores the link by itself, and never takes a late answer for that of a later transaction. Never blocks (<=
+ *  20 us).
+ *  @param result out: unchanged on error
+ *  @return HV_OK; HV_ERR_AGAIN: nothing new; HV_ERR_ARG: slot out of range. */
+static inline HV_MUST_CHECK hv_status_t hal_modbus_poll(hal_modbus_t modbus, unsigned slot, modbus_result_t *result)
+{
+    return modbus.ops->poll(modbus.ctx, slot, result);
+}
+
+#endif

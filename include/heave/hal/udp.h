@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: MIT
+ * udp.h - contract of a bound UDP socket that only receives. Nothing is ever sent to a sender.
+ * One thread calls the ops. Address, port and receive buffer are given to the backend's open.
+ */
+#ifndef HEAVE_HAL_UDP_H
+#define HEAVE_HAL_UDP_H
+
+#include "heave/status.h"
+
+/** Who sent a datagram. IPv4 (also where it came in mapped into IPv6) has is_ipv6 false and uses address[0..3]; unused bytes
+ *  are 0, so that two peers can be compared byte for byte. */
+typedef struct {
+    uint8_t address[16]; /**< network byte order */
+    uint32_t scope_id;   /**< interface index of a link-local IPv6 address, else 0 */
+    uint16_t port;       /**< host byte order */
+    bool is_ipv6;
+} hal_udp_peer_t;
+
+/** Holds every text of hal_udp_peer_text() with its NUL. */
+#define HAL_UDP_PEER_TEXT_MAX 64u
+
+/** dropped is optional, the rest mandatory. */
+typedef struct {
+    hv_status_t (*recv)(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from);
+    hv_status_t (*dropped)(void *ctx, uint32_t *datagrams); /* optional */
+} hal_udp_ops_t;
+
+/** Passed by value; ctx belongs to the backend and lives until its close. */
+typedef struct {
+    const hal_udp_ops_t *ops;
+    void *ctx;
+} hal_udp_t;
+
+/** True where every mandatory op is there; refuse to start otherwise. */
+static inline bool hal_udp_valid(hal_udp_t udp)
+{
+    return udp.ops != NULL && udp.ops->recv != NULL;
+}
+
+/** Takes the oldest waiting datagram. Never blocks (<= 50 us).
+ *  @param buffer   the caller's, filled before the return and not kept; a datagram may be empty (length 0)
+ *  @param length   out: length of the datagram; on HV_ERR_RANGE its real length, above capacity
+ *  @param from     out: its sender, also on HV_ERR_RANGE
+ *  @return HV_OK; HV_ERR_AGAIN: none waiting (outputs unchanged); HV_ERR_RANGE: longer than capacity, the whole datagram is
+ *          dropped and buffer is undefined; HV_ERR_IO: the socket reports an error: go on calling once a cycle, it may pass.
+ *          */
+static inline HV_MUST_CHECK hv_status_t hal_udp_recv(hal_udp_t udp, uint8_t *buffer, size_t capacity, size_t *length,
+                                                     hal_udp_peer_t *from)
+{
+    return udp.ops->recv(udp.ctx, buffer, capacity, length, from);
+}
+
+/** Datagrams lost since the open because the receive queue was full; as known at the last successful recv. Never blocks.
+ *  @return HV_OK; HV_ERR_NOSUP where the backend cannot know. */
+static inline HV_MUST_CHECK hv_status_t hal_udp_dropped(hal_udp_t udp, uint32_t *datagrams)
+{
+    return udp.ops->dropped != NULL ? udp.ops->dropped(udp.ctx, datagrams) : HV_ERR_NOSUP;
+}
+
+/** "192.168.1.5:9800" or "[fe80::1%2]:9800" (shortest form, lower case). Pure.
+ *  @param capacity bytes at text, at least 1; HAL_UDP_PEER_TEXT_MAX holds every text, a shorter one is cut. Always ends in
+ *          NUL.
+ *  @return length without NUL */
+size_t hal_udp_peer_text(const hal_udp_peer_t *peer, char *text, size_t capacity);
+
+#endif

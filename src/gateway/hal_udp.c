@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: MIT
+ * hal_udp.c - text of a peer's address, IPv6 in the canonical form of RFC 5952.
+ */
+#include "heave/hal/udp.h"
+
+#define GROUPS 8u
+
+/** Text that grows up to its capacity, always ended by NUL. */
+typedef struct {
+    char *text;
+    size_t capacity;
+    size_t length;
+} writer_t;
+
+static void put(writer_t *out, char c)
+{
+    if (out->length + 1 < out->capacity) {
+        out->text[out->length++] = c;
+        out->text[out->length] = '\0';
+    }
+}
+
+static void put_number(writer_t *out, uint32_t value, uint32_t base)
+{
+    char digits[10];
+    size_t count = 0;
+    do {
+        digits[count++] = "0123456789abcdef"[value % base];
+        value /= base;
+    } while (value != 0);
+    while (count > 0) {
+        put(out, digits[--count]);
+    }
+}
+
+static void put_ipv4(writer_t *out, const uint8_t *address)
+{
+    for (unsigned i = 0; i < 4; i++) {
+        if (i > 0) {
+            put(out, '.');
+        }
+        put_number(out, address[i], 10);
+    }
+}
+
+static uint32_t group(const uint8_t *address, unsigned i)
+{
+    return (uint32_t)address[2 * i] << 8 | address[2 * i + 1];
+}
+
+/* Groups of zero from `from` on. */
+static unsigned zeros_at(const uint8_t *address, unsigned from)
+{
+    unsigned end = from;
+    while (end < GROUPS && group(address, end) == 0) {
+        end++;
+    }
+    return end - from;
+}
+
+static void put_ipv6(writer_t *out, const uint8_t *address)
+{
+    unsigned gap = GROUPS; /* the first of the longest runs of zero groups; a single one is written out */
+    unsigned gap_length = 1;
+    for (unsigned i = 0; i < GROUPS; i++) {
+        if (zeros_at(address, i) > gap_length) {
+            gap = i;
+            gap_length = zeros_at(address, i);
+        }
+    }
+    for (unsigned i = 0; i < GROUPS; i++) {
+        if (i == gap) {
+            put(out, ':');
+            put(out, ':');
+            i += gap_length - 1;
+            continue;
+        }
+        if (i > 0 && i != gap + gap_length) {
+            put(out, ':');
+        }
+        put_number(out, group(address, i), 16);
+    }
+}
+
+size_t hal_udp_peer_text(const hal_udp_peer_t *peer, char *text, size_t capacity)
+{
+    writer_t out = {text, capacity, 0};
+    text[0] = '\0';
+    if (peer->is_ipv6) {
+        put(&out, '[');
+        put_ipv6(&out, peer->address);
+        if (peer->scope_id != 0) {
+            put(&out, '%');
+            put_number(&out, peer->scope_id, 10);
+        }
+        put(&out, ']');
+    } else {
+        put_ipv4(&out, peer->address);
+    }
+    put(&out, ':');
+    put_number(&out, peer->port, 10);
+    return out.length;
+}

@@ -1,0 +1,745 @@
+/* SPDX-License-Identifier: MIT
+ * test_drives.c - the contract of drives.h on every backend, and the simulated drives: lag, supervision, determinism, fault plan.
+ */
+#include "contract.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "sim_drives.h"
+
+/** A backend under test: seven axes with 300 mm of travel each, standing at 100 mm + 10 mm per axis, homed, disabled. */
+typedef struct {
+    const char *name;
+    bool (*open)(drives_t *drives); /**< false: not to be had on this machine */
+    void (*close)(void);
+    void (*settle)(uint64_t now_us);             /**< lets the other side act up to now */
+    void (*fault_axis)(uint8_t axis);            /**< the drive of an axis fails; NULL: cannot */
+    void (*set_power)(uint8_t axis, bool is_on); /**< takes an axis off the bus and back; NULL: cannot */
+} fixture_t;
+
+#define AXES     DRIVES_MAX
+#define CYCLE_US 1000u
+#define MM(x)    ((q32_t)(x)*Q32_ONE)
+
+static const fixture_t *fixture;
+static drives_t hal;
+static uint64_t now_us;
+static drive_feedback_t feedback[DRIVES_MAX];
+static q32_t setpoint_q32[DRIVES_MAX];
+
+static sim_drives_t sim;
+static sim_drive_config_t config[DRIVES_MAX];
+
+static void configure(void)
+{
+    for (uint8_t k = 0; k < AXES; k++) {
+        config[k] = (sim_drive_config_t){.start_q32 = MM(100 + 10 * k),
+                                         .travel_max_q32 = MM(300),
+                                         .time_constant_us = 5000,
+                                         .enable_us = 20000u + 3000u * k,
+                                         .homing_per_s_q32 = MM(50),
+                                         .step_max_q32 = MM(1),
+                                         .lag_max_q32 = MM(5),
+                                         .is_homed = true};
+    }
+}
+
+static void start_sim(const sim_drives_fault_t *plan, uint32_t planned)
+{
+    now_us = 5000000;
+    TEST_ASSERT_EQUAL(HV_OK, sim_drives_init(&sim, AXES, config, plan, planned));
+    hal = sim_drives_hal(&sim);
+}
+
+static bool open_sim(drives_t *drives)
+{
+    configure();
+    start_sim(NULL, 0);
+    *drives = hal;
+    return true;
+}
+
+static void close_sim(void) {}
+
+static void settle_sim(uint64_t until_us)
+{
+    (void)until_us;
+}
+
+static void inject(sim_drives_fault_kind_t kind, uint8_t axis)
+{
+    sim_drives_inject(&sim, &(sim_drives_fault_t){.kind = kind, .axis = axis, .code = 0x2310});
+}
+
+static void fault_sim(uint8_t axis)
+{
+    inject(SIM_DRIVES_FAULT, axis);
+}
+
+static void power_sim(uint8_t axis, bool is_on)
+{
+    inject(is_on ? SIM_DRIVES_RECOVER : SIM_DRIVES_OFFLINE, axis);
+}
+
+static const fixture_t k_fixtures[] = {{"sim", open_sim, close_sim, settle_sim, fault_sim, power_sim}};
+
+static hv_status_t poll_once(void)
+{
+    now_us += CYCLE_US;
+    fixture->settle(now_us);
+    return drives_poll(hal, now_us, feedback);
+}
+
+/* One cycle as the gateway does it. */
+static void cycle(void)
+{
+    TEST_ASSERT_EQUAL(HV_OK, poll_once());
+    TEST_ASSERT_EQUAL(HV_OK, drives_send(hal, now_us, setpoint_q32));
+}
+
+static void follow_actual(void)
+{
+    for (uint8_t k = 0; k < AXES; k++) {
+        setpoint_q32[k] = feedback[k].actual_mm_q32;
+    }
+}
+
+void setUp(void)
+{
+    now_us = 5000000;
+    if (!fixture->open(&hal)) {
+        TEST_IGNORE_MESSAGE("not to be had on this machine");
+    }
+    memset(setpoint_q32, 0, sizeof setpoint_q32);
+    TEST_ASSERT_EQUAL(HV_OK, poll_once());
+    follow_actual();
+}
+
+void tearDown(void)
+{
+    fixture->close();
+}
+
+static bool are_all(drive_state_t state)
+{
+    for (uint8_t k = 0; k < AXES; k++) {
+        if (feedback[k].state != state) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void assert_all(drive_state_t state)
+{
+    for (uint8_t k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL(state, feedback[k].state);
+    }
+}
+
+static void request_ok(drives_request_t request)
+{
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, request));
+}
+
+/* Cycles until every axis is in the state; the set-points follow actual, as they must while axes come up. */
+static void await(drive_state_t state)
+{
+    int cycles = 0;
+    do {
+        TEST_ASSERT_EQUAL(HV_OK, poll_once());
+        follow_actual();
+        TEST_ASSERT_EQUAL(HV_OK, drives_send(hal, now_us, setpoint_q32));
+    } while (!are_all(state) && ++cycles < 20000);
+    assert_all(state);
+}
+
+static void enable(void)
+{
+    request_ok(DRIVES_ENABLE);
+    await(DRIVE_ENABLED);
+}
+
+/* The greatest distance of an axis from the given positions, in Q32. */
+static q32_t distance(const q32_t from_q32[DRIVES_MAX])
+{
+    q32_t most_q32 = 0;
+    for (uint8_t k = 0; k < AXES; k++) {
+        const q32_t d_q32 = fx_abs(feedback[k].actual_mm_q32 - from_q32[k]);
+        most_q32 = d_q32 > most_q32 ? d_q32 : most_q32;
+    }
+    return most_q32;
+}
+
+static void keep_actual(q32_t kept_q32[DRIVES_MAX])
+{
+    for (uint8_t k = 0; k < AXES; k++) {
+        kept_q32[k] = feedback[k].actual_mm_q32;
+    }
+}
+
+static void test_valid_complete_accepts(void)
+{
+    TEST_ASSERT_TRUE(drives_valid(hal));
+}
+
+static void test_valid_any_op_missing_refuses(void)
+{
+    TEST_ASSERT_FALSE(drives_valid((drives_t){NULL, NULL}));
+    for (int i = 0; i < 4; i++) {
+        drives_ops_t ops = *hal.ops;
+        ops.poll = i == 0 ? NULL : ops.poll;
+        ops.send = i == 1 ? NULL : ops.send;
+        ops.request = i == 2 ? NULL : ops.request;
+        ops.count = i == 3 ? NULL : ops.count;
+        TEST_ASSERT_FALSE(drives_valid((drives_t){&ops, hal.ctx}));
+    }
+}
+
+static void test_poll_after_start_tells_where_the_axes_are(void)
+{
+    TEST_ASSERT_EQUAL_UINT8(AXES, drives_count(hal));
+    assert_all(DRIVE_DISABLED);
+    for (uint8_t k = 0; k < AXES; k++) {
+        TEST_ASSERT_TRUE(feedback[k].has_actual);
+        TEST_ASSERT_TRUE(feedback[k].is_homed);
+        TEST_ASSERT_TRUE(fx_abs(feedback[k].actual_mm_q32 - MM(100 + 10 * k)) < MM(1) / 1000);
+        TEST_ASSERT_TRUE(feedback[k].actual_us <= now_us && now_us - feedback[k].actual_us <= 5 * CYCLE_US);
+        TEST_ASSERT_EQUAL_UINT32(0, feedback[k].fault_code);
+    }
+}
+
+static void test_send_while_disabled_moves_nothing(void)
+{
+    q32_t before_q32[DRIVES_MAX];
+    keep_actual(before_q32);
+    memset(setpoint_q32, 0, sizeof setpoint_q32);
+    for (int i = 0; i < 200; i++) {
+        cycle();
+    }
+    assert_all(DRIVE_DISABLED);
+    TEST_ASSERT_TRUE(distance(before_q32) < MM(1) / 100);
+}
+
+static void test_request_enable_comes_up_without_motion(void)
+{
+    q32_t before_q32[DRIVES_MAX];
+    keep_actual(before_q32);
+    request_ok(DRIVES_ENABLE);
+    for (int i = 0; i < 20000 && !are_all(DRIVE_ENABLED); i++) {
+        cycle();
+        TEST_ASSERT_TRUE(distance(before_q32) < MM(1) / 100);
+        for (uint8_t k = 0; k < AXES; k++) {
+            TEST_ASSERT_TRUE(feedback[k].state == DRIVE_DISABLED || feedback[k].state == DRIVE_ENABLING ||
+                             feedback[k].state == DRIVE_ENABLED);
+        }
+    }
+    assert_all(DRIVE_ENABLED);
+}
+
+static void test_send_while_enabled_is_followed_to_the_end(void)
+{
+    q32_t goal_q32[DRIVES_MAX];
+    enable();
+    for (int i = 0; i < 2000; i++) {
+        for (uint8_t k = 0; k < AXES; k++) {
+            setpoint_q32[k] += MM(k % 2 ? 1 : -1) / 40;
+            goal_q32[k] = setpoint_q32[k];
+        }
+        cycle();
+    }
+    for (int i = 0; i < 500; i++) {
+        cycle();
+    }
+    assert_all(DRIVE_ENABLED);
+    TEST_ASSERT_TRUE(distance(goal_q32) < MM(1) / 50);
+}
+
+static void test_send_jump_while_enabled_faults_that_axis(void)
+{
+    enable();
+    setpoint_q32[2] += MM(50);
+    for (int i = 0; i < 300 && feedback[2].state == DRIVE_ENABLED; i++) {
+        cycle();
+    }
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_TRUE(feedback[2].fault_code != 0);
+}
+
+static void test_send_elsewhere_while_enabling_faults_instead_of_jumping(void)
+{
+    q32_t before_q32[DRIVES_MAX];
+    keep_actual(before_q32);
+    request_ok(DRIVES_ENABLE);
+    for (uint8_t k = 0; k < AXES; k++) {
+        setpoint_q32[k] -= MM(60);
+    }
+    for (int i = 0; i < 3000 && !are_all(DRIVE_FAULT); i++) {
+        cycle();
+    }
+    assert_all(DRIVE_FAULT);
+    TEST_ASSERT_TRUE(distance(before_q32) < MM(10));
+}
+
+static void test_request_reset_fault_leads_back_to_enabled(void)
+{
+    if (fixture->fault_axis == NULL) {
+        TEST_IGNORE_MESSAGE("this backend's drives cannot be made to fail from here");
+    }
+    enable();
+    fixture->fault_axis(3);
+    cycle();
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[3].state);
+    TEST_ASSERT_TRUE(feedback[3].fault_code != 0);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_HOME));
+    request_ok(DRIVES_DISABLE);
+    cycle();
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[3].state);
+    request_ok(DRIVES_RESET_FAULT);
+    await(DRIVE_DISABLED);
+    TEST_ASSERT_EQUAL_UINT32(0, feedback[3].fault_code);
+    enable();
+}
+
+/* A request that was taken is seen in the next poll: nobody may take the state before it for its result. */
+static void test_request_taken_is_seen_in_the_next_poll(void)
+{
+    request_ok(DRIVES_ENABLE);
+    TEST_ASSERT_EQUAL(HV_OK, poll_once());
+    assert_all(DRIVE_ENABLING);
+    await(DRIVE_ENABLED);
+    request_ok(DRIVES_HOME);
+    TEST_ASSERT_EQUAL(HV_OK, poll_once());
+    assert_all(DRIVE_HOMING);
+}
+
+static void test_request_disable_and_quick_stop_end_in_disabled(void)
+{
+    static const drives_request_t k_requests[] = {DRIVES_DISABLE, DRIVES_QUICK_STOP};
+    for (size_t i = 0; i < 2; i++) {
+        enable();
+        request_ok(k_requests[i]);
+        await(DRIVE_DISABLED);
+        request_ok(DRIVES_ENABLE);
+        cycle();
+        request_ok(k_requests[i]);
+        await(DRIVE_DISABLED);
+    }
+}
+
+static void test_request_home_needs_enabled_and_returns_there_homed(void)
+{
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_HOME));
+    enable();
+    request_ok(DRIVES_HOME);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_HOME));
+    await(DRIVE_ENABLED);
+    for (uint8_t k = 0; k < AXES; k++) {
+        TEST_ASSERT_TRUE(feedback[k].is_homed);
+    }
+    for (int i = 0; i < 50; i++) {
+        cycle();
+    }
+    assert_all(DRIVE_ENABLED);
+}
+
+static void test_power_lost_is_offline_and_returns_disabled(void)
+{
+    if (fixture->set_power == NULL) {
+        TEST_IGNORE_MESSAGE("this backend's drives cannot be cut off from here");
+    }
+    enable();
+    fixture->set_power(1, false);
+    for (int i = 0; i < 1000 && feedback[1].state != DRIVE_OFFLINE; i++) {
+        cycle();
+    }
+    TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[1].state);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
+    fixture->set_power(1, true);
+    for (int i = 0; i < 10000 && feedback[1].state == DRIVE_OFFLINE; i++) {
+        cycle();
+    }
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[1].state);
+}
+
+static void test_power_lost_everywhere_says_io_and_comes_back(void)
+{
+    hv_status_t status = HV_OK;
+    if (fixture->set_power == NULL) {
+        TEST_IGNORE_MESSAGE("this backend's drives cannot be cut off from here");
+    }
+    for (uint8_t k = 0; k < AXES; k++) {
+        fixture->set_power(k, false);
+    }
+    for (int i = 0; i < 1000 && status == HV_OK; i++) {
+        status = poll_once();
+    }
+    TEST_ASSERT_EQUAL(HV_ERR_IO, status);
+    assert_all(DRIVE_OFFLINE);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, drives_send(hal, now_us, setpoint_q32));
+    TEST_ASSERT_EQUAL(HV_ERR_IO, drives_request(hal, DRIVES_DISABLE));
+    for (uint8_t k = 0; k < AXES; k++) {
+        fixture->set_power(k, true);
+    }
+    for (int i = 0; i < 10000 && !are_all(DRIVE_DISABLED); i++) {
+        (void)!poll_once();
+    }
+    assert_all(DRIVE_DISABLED);
+    follow_actual();
+    enable();
+}
+
+static void run_contract(void)
+{
+    RUN_TEST(test_valid_complete_accepts);
+    RUN_TEST(test_valid_any_op_missing_refuses);
+    RUN_TEST(test_poll_after_start_tells_where_the_axes_are);
+    RUN_TEST(test_send_while_disabled_moves_nothing);
+    RUN_TEST(test_request_enable_comes_up_without_motion);
+    RUN_TEST(test_send_while_enabled_is_followed_to_the_end);
+    RUN_TEST(test_send_jump_while_enabled_faults_that_axis);
+    RUN_TEST(test_send_elsewhere_while_enabling_faults_instead_of_jumping);
+    RUN_TEST(test_request_reset_fault_leads_back_to_enabled);
+    RUN_TEST(test_request_taken_is_seen_in_the_next_poll);
+    RUN_TEST(test_request_disable_and_quick_stop_end_in_disabled);
+    RUN_TEST(test_request_home_needs_enabled_and_returns_there_homed);
+    RUN_TEST(test_power_lost_is_offline_and_returns_disabled);
+    RUN_TEST(test_power_lost_everywhere_says_io_and_comes_back);
+}
+
+/* The simulated drives. */
+
+static void reopen_sim(const sim_drives_fault_t *plan, uint32_t planned)
+{
+    start_sim(plan, planned);
+    TEST_ASSERT_EQUAL(HV_OK, poll_once());
+    follow_actual();
+}
+
+static void test_sim_init_impossible_figures_are_refused(void)
+{
+    static const sim_drives_fault_t k_plan[SIM_DRIVES_PLAN_MAX + 1];
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, sim_drives_init(&sim, 0, config, NULL, 0));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, sim_drives_init(&sim, DRIVES_MAX + 1, config, NULL, 0));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, sim_drives_init(&sim, AXES, config, k_plan, SIM_DRIVES_PLAN_MAX + 1));
+    for (int i = 0; i < 6; i++) {
+        configure();
+        config[4].start_q32 = i == 0 ? MM(301) : config[4].start_q32;
+        config[4].travel_max_q32 = i == 1 ? INT64_MAX : config[4].travel_max_q32;
+        config[4].travel_min_q32 = i == 2 ? MM(150) : config[4].travel_min_q32;
+        config[4].homing_per_s_q32 = i == 3 ? -1 : config[4].homing_per_s_q32;
+        config[4].step_max_q32 = i == 4 ? -1 : config[4].step_max_q32;
+        config[4].unhomed_offset_q32 = i == 5 ? INT64_MIN : config[4].unhomed_offset_q32;
+        TEST_ASSERT_EQUAL(HV_ERR_RANGE, sim_drives_init(&sim, AXES, config, NULL, 0));
+    }
+}
+
+static void test_sim_start_enabled_follows_from_the_first_cycle(void)
+{
+    for (uint8_t k = 0; k < AXES; k++) {
+        config[k].is_enabled = true;
+    }
+    reopen_sim(NULL, 0);
+    assert_all(DRIVE_ENABLED);
+    for (int i = 0; i < 100; i++) {
+        setpoint_q32[0] += MM(1) / 100;
+        cycle();
+    }
+    TEST_ASSERT_TRUE(feedback[0].actual_mm_q32 > MM(100));
+    TEST_ASSERT_TRUE(sim.axis[0].step_largest_q32 == MM(1) / 100);
+}
+
+/* Against the same recursion in double precision, with cycles of uneven length. */
+static void test_sim_lag_matches_the_model(void)
+{
+    double model_mm = 100.0, asked_mm = 100.0, worst_mm = 0.0;
+    enable();
+    for (unsigned i = 0; i < 5000; i++) {
+        const unsigned dt_us = 500u + i * 7919u % 1500u;
+        model_mm += (asked_mm - model_mm) * dt_us / (5000.0 + dt_us);
+        now_us += dt_us;
+        now_us -= CYCLE_US; /* which the cycle adds */
+        cycle();
+        asked_mm = ldexp((double)setpoint_q32[0], -32); /* sent in this cycle, in force in the next */
+        worst_mm = fmax(worst_mm, fabs(model_mm - ldexp((double)feedback[0].actual_mm_q32, -32)));
+        setpoint_q32[0] = MM(100) + (q32_t)(sin(i * 0.001) * 20.0 * 4294967296.0);
+        TEST_ASSERT_TRUE(setpoint_q32[0] >= MM(79));
+    }
+    assert_all(DRIVE_ENABLED);
+    TEST_ASSERT_TRUE_MESSAGE(worst_mm < 1e-6, "worst error");
+}
+
+static void test_sim_no_time_constant_follows_at_once(void)
+{
+    config[5].time_constant_us = 0;
+    reopen_sim(NULL, 0);
+    enable();
+    for (int i = 0; i < 50; i++) {
+        setpoint_q32[5] += MM(1) / 3;
+        cycle();
+        TEST_ASSERT_EQUAL_INT64(setpoint_q32[5] - MM(1) / 3, feedback[5].actual_mm_q32);
+    }
+}
+
+static void test_sim_step_window_is_exact(void)
+{
+    enable();
+    setpoint_q32[0] += MM(1);
+    cycle();
+    cycle();
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[0].state);
+    TEST_ASSERT_EQUAL_INT64(MM(1), sim.axis[0].step_largest_q32);
+    setpoint_q32[0] += MM(1) + 1;
+    cycle();
+    cycle();
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state);
+    TEST_ASSERT_EQUAL_HEX32(SIM_DRIVES_FOLLOWING_ERROR, feedback[0].fault_code);
+    TEST_ASSERT_EQUAL_INT64(MM(1) + 1, sim.axis[0].step_largest_q32);
+    TEST_ASSERT_EQUAL_UINT32(1, sim.axis[0].following_errors);
+}
+
+static void test_sim_extreme_setpoints_fault_and_do_not_overflow(void)
+{
+    static const q32_t k_wild[] = {INT64_MAX, INT64_MIN};
+    for (size_t i = 0; i < 2; i++) {
+        reopen_sim(NULL, 0);
+        enable();
+        for (uint8_t k = 0; k < AXES; k++) {
+            setpoint_q32[k] = k_wild[i];
+        }
+        cycle();
+        cycle();
+        assert_all(DRIVE_FAULT);
+        config[0].step_max_q32 = 0;
+        config[0].lag_max_q32 = 0;
+        reopen_sim(NULL, 0);
+        enable();
+        setpoint_q32[0] = k_wild[i];
+        for (int n = 0; n < 100; n++) {
+            cycle();
+        }
+        TEST_ASSERT_EQUAL_INT64(i == 0 ? MM(300) : 0, feedback[0].actual_mm_q32);
+        configure();
+    }
+}
+
+static void test_sim_homing_moves_the_zero(void)
+{
+    config[0].is_homed = false;
+    config[0].unhomed_offset_q32 = MM(37);
+    config[0].home_q32 = MM(2);
+    reopen_sim(NULL, 0);
+    TEST_ASSERT_FALSE(feedback[0].is_homed);
+    TEST_ASSERT_EQUAL_INT64(MM(137), feedback[0].actual_mm_q32);
+    enable();
+    request_ok(DRIVES_HOME);
+    await(DRIVE_ENABLED);
+    TEST_ASSERT_TRUE(feedback[0].is_homed);
+    TEST_ASSERT_EQUAL_INT64(MM(2), feedback[0].actual_mm_q32);
+    cycle();
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[0].state);
+}
+
+/* Set-points that stay in the old zero after homing are a jump. */
+static void test_sim_homing_old_setpoints_afterwards_fault(void)
+{
+    enable();
+    request_ok(DRIVES_HOME);
+    for (int i = 0; i < 10000 && feedback[0].state != DRIVE_FAULT; i++) {
+        cycle();
+    }
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state);
+}
+
+/* As a real drive that kept its last target over a crash of the gateway. */
+static void test_sim_setpoint_left_over_from_before_enabling_faults(void)
+{
+    setpoint_q32[1] += MM(20);
+    cycle();
+    request_ok(DRIVES_ENABLE);
+    for (int i = 0; i < 60; i++) {
+        TEST_ASSERT_EQUAL(HV_OK, poll_once());
+    }
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[0].state);
+    TEST_ASSERT_EQUAL_INT64(MM(110), feedback[1].actual_mm_q32);
+}
+
+static void test_sim_frozen_axis_is_found_by_its_lag(void)
+{
+    enable();
+    inject(SIM_DRIVES_FREEZE, 2);
+    for (int i = 0; i < 200; i++) {
+        for (uint8_t k = 0; k < AXES; k++) {
+            setpoint_q32[k] += MM(1) / 20;
+        }
+        cycle();
+    }
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_EQUAL_INT64(MM(120), feedback[2].actual_mm_q32);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[1].state);
+}
+
+static void test_sim_stale_axis_shows_its_age(void)
+{
+    enable();
+    const uint64_t last_us = feedback[4].actual_us;
+    inject(SIM_DRIVES_STALE, 4);
+    for (int i = 1; i <= 20; i++) {
+        cycle();
+        TEST_ASSERT_EQUAL_UINT64(last_us, feedback[4].actual_us);
+        TEST_ASSERT_EQUAL_UINT64(now_us, feedback[3].actual_us);
+        TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[4].state);
+    }
+    inject(SIM_DRIVES_RECOVER, 4);
+    cycle();
+    TEST_ASSERT_EQUAL_UINT64(now_us, feedback[4].actual_us);
+}
+
+static void test_sim_busy_bus_takes_nothing_until_it_recovers(void)
+{
+    enable();
+    inject(SIM_DRIVES_BUSY, SIM_DRIVES_ALL);
+    TEST_ASSERT_EQUAL(HV_OK, poll_once());
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, drives_send(hal, now_us, setpoint_q32));
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, drives_request(hal, DRIVES_DISABLE));
+    TEST_ASSERT_EQUAL_UINT32(1, sim.refused);
+    inject(SIM_DRIVES_RECOVER, SIM_DRIVES_ALL);
+    cycle();
+    assert_all(DRIVE_ENABLED);
+}
+
+static void test_sim_broken_axis_resets_only_after_recovery(void)
+{
+    inject(SIM_DRIVES_BROKEN, 0);
+    cycle();
+    for (int i = 0; i < 5; i++) {
+        request_ok(DRIVES_RESET_FAULT);
+        cycle();
+        TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state);
+    }
+    inject(SIM_DRIVES_RECOVER, 0);
+    request_ok(DRIVES_RESET_FAULT);
+    await(DRIVE_DISABLED);
+}
+
+/* Runs a script with everything in it and folds every feedback bit into one number (FNV-1a). */
+static uint64_t fingerprint(void)
+{
+    static const sim_drives_fault_t k_plan[] = {{SIM_DRIVES_STALE, 1, 0, 90, 0},
+                                                {SIM_DRIVES_RECOVER, 1, 0, 110, 0},
+                                                {SIM_DRIVES_FAULT, 6, 0x3210, 0, 5350000},
+                                                {SIM_DRIVES_OFFLINE, 2, 0, 250, 0}};
+    uint64_t hash = UINT64_C(0xCBF29CE484222325);
+    for (uint8_t k = 0; k < AXES; k++) {
+        config[k].homing_per_s_q32 = MM(4000) + k * 12345;
+    }
+    reopen_sim(k_plan, 4);
+    request_ok(DRIVES_ENABLE);
+    for (int64_t i = 0; i < 400; i++) {
+        TEST_ASSERT_EQUAL(HV_OK, poll_once());
+        for (uint8_t k = 0; k < AXES; k++) {
+            const q32_t step_q32 = ((i * 977 + k * 131) % 201 - 100) * (Q32_ONE / 1000);
+            setpoint_q32[k] = feedback[k].state == DRIVE_ENABLED ? setpoint_q32[k] + step_q32 : feedback[k].actual_mm_q32;
+        }
+        TEST_ASSERT_EQUAL(HV_OK, drives_send(hal, now_us, setpoint_q32));
+        if (i == 60) {
+            request_ok(DRIVES_HOME);
+        }
+        for (uint8_t k = 0; k < AXES; k++) {
+            const uint64_t words[] = {(uint64_t)feedback[k].actual_mm_q32, feedback[k].actual_us, (uint64_t)feedback[k].state,
+                                      feedback[k].fault_code};
+            for (size_t w = 0; w < 4; w++) {
+                hash = (hash ^ words[w]) * UINT64_C(0x100000001B3);
+            }
+        }
+    }
+    return hash;
+}
+
+/* The number is part of the promise "the same bits on every CPU": it changes only where the model is changed on purpose. */
+static void test_sim_same_calls_give_the_same_bits(void)
+{
+    const uint64_t hash = fingerprint();
+    TEST_ASSERT_EQUAL_HEX64(hash, fingerprint());
+    TEST_ASSERT_EQUAL_HEX64(UINT64_C(0x853FB7B7E6B1EEF1), hash);
+}
+
+/* Moves all axes together with one fault at step `at`, then recovers, resets, enables: whatever the kind and the step, no axis
+ * moves without being told, the others stay as they are, and the way back is free of jumps. */
+static void sweep(sim_drives_fault_kind_t kind, uint32_t at)
+{
+    const sim_drives_fault_t plan[] = {{kind, 3, 0x7305, at, 0}, {SIM_DRIVES_RECOVER, 3, 0, 121, 0}};
+    q32_t before_q32[DRIVES_MAX];
+    reopen_sim(plan, 2);
+    const hv_status_t asked = drives_request(hal, DRIVES_ENABLE);
+    TEST_ASSERT_TRUE(asked == HV_OK || at == 1);
+    for (int i = 0; i < 119; i++) {
+        keep_actual(before_q32);
+        TEST_ASSERT_EQUAL(HV_OK, poll_once());
+        for (uint8_t k = 0; k < AXES; k++) {
+            TEST_ASSERT_TRUE(feedback[k].state == DRIVE_ENABLED || feedback[k].actual_mm_q32 == before_q32[k]);
+            TEST_ASSERT_TRUE(k == 3 || (feedback[k].state != DRIVE_FAULT && feedback[k].state != DRIVE_OFFLINE));
+        }
+        const q32_t step_q32 = are_all(DRIVE_ENABLED) && !sim.is_busy ? MM(1) / 50 : 0;
+        for (uint8_t k = 0; k < AXES; k++) {
+            setpoint_q32[k] += step_q32;
+        }
+        TEST_ASSERT_EQUAL(sim.is_busy ? HV_ERR_AGAIN : HV_OK, drives_send(hal, now_us, setpoint_q32));
+    }
+    cycle();
+    request_ok(DRIVES_DISABLE);
+    request_ok(DRIVES_RESET_FAULT);
+    await(DRIVE_DISABLED);
+    enable();
+    for (uint8_t k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(0, sim.axis[k].following_errors);
+        TEST_ASSERT_TRUE(sim.axis[k].step_largest_q32 <= MM(1) / 10);
+    }
+}
+
+static void test_sim_one_fault_at_every_step_leads_back_to_enabled(void)
+{
+    static const sim_drives_fault_kind_t k_kinds[] = {SIM_DRIVES_FAULT,  SIM_DRIVES_BROKEN, SIM_DRIVES_OFFLINE,
+                                                      SIM_DRIVES_FREEZE, SIM_DRIVES_STALE,  SIM_DRIVES_BUSY};
+    for (size_t kind = 0; kind < sizeof k_kinds / sizeof k_kinds[0]; kind++) {
+        for (uint32_t at = 1; at <= 119; at++) {
+            sweep(k_kinds[kind], at);
+        }
+    }
+}
+
+static void run_sim(void)
+{
+    RUN_TEST(test_sim_init_impossible_figures_are_refused);
+    RUN_TEST(test_sim_start_enabled_follows_from_the_first_cycle);
+    RUN_TEST(test_sim_lag_matches_the_model);
+    RUN_TEST(test_sim_no_time_constant_follows_at_once);
+    RUN_TEST(test_sim_step_window_is_exact);
+    RUN_TEST(test_sim_extreme_setpoints_fault_and_do_not_overflow);
+    RUN_TEST(test_sim_homing_moves_the_zero);
+    RUN_TEST(test_sim_homing_old_setpoints_afterwards_fault);
+    RUN_TEST(test_sim_setpoint_left_over_from_before_enabling_faults);
+    RUN_TEST(test_sim_frozen_axis_is_found_by_its_lag);
+    RUN_TEST(test_sim_stale_axis_shows_its_age);
+    RUN_TEST(test_sim_busy_bus_takes_nothing_until_it_recovers);
+    RUN_TEST(test_sim_broken_axis_resets_only_after_recovery);
+    RUN_TEST(test_sim_same_calls_give_the_same_bits);
+    RUN_TEST(test_sim_one_fault_at_every_step_leads_back_to_enabled);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    for (size_t i = 0; i < sizeof k_fixtures / sizeof k_fixtures[0]; i++) {
+        fixture = &k_fixtures[i];
+        contract_backend = fixture->name;
+        run_contract();
+    }
+    fixture = &k_fixtures[0];
+    contract_backend = fixture->name;
+    run_sim();
+    return UNITY_END();
+}

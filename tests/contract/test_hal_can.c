@@ -1,0 +1,638 @@
+/* SPDX-License-Identifier: MIT
+ * test_hal_can.c - the contract of hal/can.h on every backend, and the simulated bus: arbitration, timing, fault plan.
+ */
+#include "contract.h"
+
+#include <string.h>
+
+#include "sim_can.h"
+
+/** A backend under test, with a partner on the same bus that acknowledges, sends and listens to everything. */
+typedef struct {
+    const char *name;
+    bool (*open)(hal_can_t *can, const hal_can_filter_t *filter, uint32_t filters); /**< false: not to be had on this machine */
+    void (*close)(void);
+    void (*settle)(void);                     /**< until everything that can move on the wire has moved */
+    void (*inject)(const can_frame_t *frame); /**< the partner sends */
+    bool (*fetch)(can_frame_t *frame);        /**< the partner takes the next frame it heard, false: none */
+    uint32_t queue_max;                       /**< send must have refused by then while nothing leaves */
+    void (*set_partner)(bool is_there);       /**< NULL: the partner cannot leave */
+    void (*set_plugged)(bool is_plugged);     /**< pulls the adapter out; NULL: cannot */
+    void (*set_bus_off)(void);                /**< NULL: cannot */
+} fixture_t;
+
+static const fixture_t *fixture;
+static hal_can_t hal;
+
+static sim_can_bus_t bus;
+static sim_can_t node, partner;
+static uint64_t sim_now_us;
+
+static void open_bus(uint32_t frame_us, const sim_can_fault_t *plan, uint32_t planned, const hal_can_filter_t *filter,
+                     uint32_t filters)
+{
+    sim_now_us = 0;
+    sim_can_bus_init(&bus, frame_us, plan, planned);
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, filter, filters));
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&partner, &bus, NULL, 0));
+}
+
+static bool open_sim(hal_can_t *can, const hal_can_filter_t *filter, uint32_t filters)
+{
+    open_bus(115, NULL, 0, filter, filters);
+    *can = sim_can_hal(&node);
+    return true;
+}
+
+static void close_sim(void)
+{
+    sim_can_close(&node);
+    sim_can_close(&partner);
+}
+
+static void settle_sim(void)
+{
+    sim_now_us += 100000;
+    sim_can_bus_step(&bus, sim_now_us);
+}
+
+static void inject_sim(const can_frame_t *frame)
+{
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&partner), frame));
+}
+
+static bool fetch_sim(can_frame_t *frame)
+{
+    uint64_t time_us;
+    while (hal_can_recv(sim_can_hal(&partner), frame, &time_us) == HV_OK) {
+        if (!frame->is_error) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void set_partner_sim(bool is_there)
+{
+    if (is_there) {
+        TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&partner, &bus, NULL, 0));
+    } else {
+        sim_can_close(&partner);
+    }
+}
+
+static void set_plugged_sim(bool is_plugged)
+{
+    (is_plugged ? sim_can_plug : sim_can_unplug)(&node);
+}
+
+static void bus_off_sim(void)
+{
+    sim_can_set_state(&node, HAL_CAN_BUS_OFF);
+}
+
+static const fixture_t k_fixtures[] = {
+    {"sim", open_sim, close_sim, settle_sim, inject_sim, fetch_sim, 1000, set_partner_sim, set_plugged_sim, bus_off_sim}};
+
+void setUp(void)
+{
+    if (!fixture->open(&hal, NULL, 0)) {
+        TEST_IGNORE_MESSAGE("not to be had on this machine");
+    }
+}
+
+void tearDown(void)
+{
+    fixture->close();
+}
+
+static can_frame_t make(uint32_t id, uint8_t length)
+{
+    can_frame_t frame = {.id = id, .length = length};
+    for (uint8_t i = 0; i < length; i++) {
+        frame.data[i] = (uint8_t)((id & 0xFFFFu) * 31u + i + 1u);
+    }
+    return frame;
+}
+
+static can_frame_t make_extended(uint32_t id, uint8_t length)
+{
+    can_frame_t frame = make(id, length);
+    frame.is_extended = true;
+    return frame;
+}
+
+static void assert_same(const can_frame_t *expected, const can_frame_t *got)
+{
+    TEST_ASSERT_EQUAL_HEX32(expected->id, got->id);
+    TEST_ASSERT_EQUAL(expected->is_extended, got->is_extended);
+    TEST_ASSERT_EQUAL(expected->is_rtr, got->is_rtr);
+    TEST_ASSERT_EQUAL(expected->is_error, got->is_error);
+    TEST_ASSERT_EQUAL_UINT8(expected->length, got->length);
+    TEST_ASSERT_EQUAL_UINT8_ARRAY(expected->data, got->data, 8);
+}
+
+static void send_ok(const can_frame_t *frame)
+{
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(hal, frame));
+}
+
+static void assert_fetched(const can_frame_t *expected)
+{
+    can_frame_t got;
+    TEST_ASSERT_TRUE(fixture->fetch(&got));
+    assert_same(expected, &got);
+}
+
+static void assert_received(const can_frame_t *expected)
+{
+    can_frame_t got;
+    uint64_t time_us;
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_recv(hal, &got, &time_us));
+    assert_same(expected, &got);
+}
+
+static void assert_nothing_received(void)
+{
+    can_frame_t got = {.id = 0x123};
+    uint64_t time_us = 77;
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_can_recv(hal, &got, &time_us));
+    TEST_ASSERT_EQUAL_HEX32(0x123, got.id);
+    TEST_ASSERT_EQUAL_UINT64(77, time_us);
+}
+
+static void assert_nothing_fetched(void)
+{
+    can_frame_t got;
+    TEST_ASSERT_FALSE(fixture->fetch(&got));
+}
+
+/* The reports that wait, as one set of bits; frames are not expected. */
+static uint32_t receive_reports(void)
+{
+    uint32_t reports = 0;
+    can_frame_t got;
+    uint64_t time_us;
+    while (hal_can_recv(hal, &got, &time_us) == HV_OK) {
+        TEST_ASSERT_TRUE(got.is_error);
+        reports |= got.id;
+    }
+    return reports;
+}
+
+static hal_can_state_t state_now(void)
+{
+    hal_can_state_t state = HAL_CAN_DOWN;
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_bus_state(hal, &state));
+    return state;
+}
+
+static void test_valid_complete_accepts(void)
+{
+    TEST_ASSERT_TRUE(hal_can_valid(hal));
+}
+
+static void test_valid_mandatory_op_missing_refuses(void)
+{
+    hal_can_ops_t ops = *hal.ops;
+    TEST_ASSERT_FALSE(hal_can_valid((hal_can_t){NULL, NULL}));
+    ops.send = NULL;
+    TEST_ASSERT_FALSE(hal_can_valid((hal_can_t){&ops, hal.ctx}));
+    ops = *hal.ops;
+    ops.recv = NULL;
+    TEST_ASSERT_FALSE(hal_can_valid((hal_can_t){&ops, hal.ctx}));
+}
+
+static void test_optional_ops_absent_have_their_documented_answers(void)
+{
+    const hal_can_ops_t ops = {.send = hal.ops->send, .recv = hal.ops->recv};
+    const hal_can_t bare = {&ops, hal.ctx};
+    hal_can_state_t state = HAL_CAN_DOWN;
+    uint32_t frames = 5;
+    TEST_ASSERT_TRUE(hal_can_valid(bare));
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_bus_state(bare, &state));
+    TEST_ASSERT_EQUAL(HAL_CAN_ACTIVE, state);
+    TEST_ASSERT_EQUAL(HV_ERR_NOSUP, hal_can_unconfirmed(bare, &frames));
+    TEST_ASSERT_EQUAL(HV_ERR_NOSUP, hal_can_restart(bare));
+}
+
+static void test_recv_nothing_waiting_says_again_and_keeps_outputs(void)
+{
+    assert_nothing_received();
+}
+
+static void test_send_every_length_reaches_the_partner(void)
+{
+    for (uint8_t length = 0; length <= 8; length++) {
+        const can_frame_t standard = make(0x600u + length, length);
+        const can_frame_t extended = make_extended(CAN_ID_EXTENDED_MAX - length, length);
+        send_ok(&standard);
+        send_ok(&extended);
+        fixture->settle();
+        assert_fetched(&standard);
+        assert_fetched(&extended);
+    }
+}
+
+static void test_send_remote_frame_reaches_the_partner(void)
+{
+    const can_frame_t frame = {.id = 0x701, .is_rtr = true, .length = 3};
+    send_ok(&frame);
+    fixture->settle();
+    assert_fetched(&frame);
+}
+
+static void test_send_bytes_beyond_length_arrive_as_zero(void)
+{
+    can_frame_t frame = make(0x181, 8);
+    frame.length = 3;
+    send_ok(&frame);
+    fixture->settle();
+    memset(frame.data + 3, 0, 5);
+    assert_fetched(&frame);
+}
+
+static void test_send_invalid_frame_is_refused_and_nothing_leaves(void)
+{
+    const can_frame_t wrong[] = {
+        make(CAN_ID_MAX + 1, 0), make_extended(CAN_ID_EXTENDED_MAX + 1, 0), {.id = 1, .length = 9}, {.id = 1, .is_error = true}};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        TEST_ASSERT_EQUAL(HV_ERR_ARG, hal_can_send(hal, &wrong[i]));
+    }
+    fixture->settle();
+    assert_nothing_fetched();
+}
+
+static void test_send_burst_keeps_order(void)
+{
+    for (uint32_t i = 0; i < 8; i++) {
+        const can_frame_t frame = make(0x207u - i, 6);
+        send_ok(&frame);
+    }
+    fixture->settle();
+    for (uint32_t i = 0; i < 8; i++) {
+        const can_frame_t frame = make(0x207u - i, 6);
+        assert_fetched(&frame);
+    }
+    assert_nothing_fetched();
+}
+
+static void test_send_own_frames_do_not_come_back(void)
+{
+    const can_frame_t frame = make(0x201, 6);
+    send_ok(&frame);
+    fixture->settle();
+    assert_nothing_received();
+}
+
+static void test_recv_burst_keeps_order_and_times_rise(void)
+{
+    uint64_t last_us = 0;
+    for (uint32_t i = 0; i < 14; i++) {
+        const can_frame_t frame = make(0x180u + i, 8);
+        fixture->inject(&frame);
+    }
+    fixture->settle();
+    for (uint32_t i = 0; i < 14; i++) {
+        const can_frame_t expected = make(0x180u + i, 8);
+        can_frame_t got;
+        uint64_t time_us = 0;
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_recv(hal, &got, &time_us));
+        assert_same(&expected, &got);
+        TEST_ASSERT_TRUE(time_us >= last_us);
+        last_us = time_us;
+    }
+    assert_nothing_received();
+}
+
+static void test_send_full_queue_says_again_and_what_was_taken_arrives(void)
+{
+    uint32_t taken = 0;
+    hv_status_t status = HV_OK;
+    if (fixture->set_partner == NULL) {
+        TEST_IGNORE_MESSAGE("the wire of this backend cannot be stopped");
+    }
+    fixture->set_partner(false);
+    while (status == HV_OK && taken <= fixture->queue_max) {
+        const can_frame_t frame = make(taken & CAN_ID_MAX, 4);
+        status = hal_can_send(hal, &frame);
+        taken += status == HV_OK;
+    }
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, status);
+    TEST_ASSERT_TRUE(taken > 0);
+    fixture->set_partner(true);
+    fixture->settle();
+    for (uint32_t i = 0; i < taken; i++) {
+        const can_frame_t expected = make(i & CAN_ID_MAX, 4);
+        assert_fetched(&expected);
+    }
+    assert_nothing_fetched();
+}
+
+static void test_unconfirmed_falls_to_zero_when_the_frames_are_on_the_wire(void)
+{
+    uint32_t frames = 99;
+    if (hal_can_unconfirmed(hal, &frames) == HV_ERR_NOSUP) {
+        TEST_IGNORE_MESSAGE("this backend gets no echo");
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, frames);
+    for (uint32_t i = 1; i <= 7; i++) {
+        const can_frame_t frame = make(0x200u + i, 6);
+        send_ok(&frame);
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &frames));
+        TEST_ASSERT_TRUE(frames <= i);
+    }
+    fixture->settle();
+    assert_nothing_received();
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &frames));
+    TEST_ASSERT_EQUAL_UINT32(0, frames);
+}
+
+static void test_unconfirmed_without_a_partner_stays_until_restart(void)
+{
+    uint32_t frames = 0;
+    const can_frame_t frame = make(0x201, 6);
+    if (fixture->set_partner == NULL || hal_can_unconfirmed(hal, &frames) == HV_ERR_NOSUP) {
+        TEST_IGNORE_MESSAGE("no partner that leaves, or no echo");
+    }
+    fixture->set_partner(false);
+    send_ok(&frame);
+    fixture->settle();
+    (void)receive_reports();
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &frames));
+    TEST_ASSERT_EQUAL_UINT32(1, frames);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &frames));
+    TEST_ASSERT_EQUAL_UINT32(0, frames);
+}
+
+static void reopen(const hal_can_filter_t *filter, uint32_t filters)
+{
+    fixture->close();
+    TEST_ASSERT_TRUE(fixture->open(&hal, filter, filters));
+}
+
+static void test_filter_only_matching_frames_of_its_width_pass(void)
+{
+    static const hal_can_filter_t k_filters[] = {{0x180, 0x780, false}, {0x12345, CAN_ID_EXTENDED_MAX, true}};
+    reopen(k_filters, 2);
+    const can_frame_t frames[] = {make(0x17F, 1), make(0x180, 1), make_extended(0x180, 1),   make(0x1FF, 1),
+                                  make(0x200, 1), make(0x345, 1), make_extended(0x12345, 1), make_extended(0x12344, 1)};
+    for (size_t i = 0; i < sizeof frames / sizeof frames[0]; i++) {
+        fixture->inject(&frames[i]);
+    }
+    fixture->settle();
+    assert_received(&frames[1]);
+    assert_received(&frames[3]);
+    assert_received(&frames[6]);
+    assert_nothing_received();
+}
+
+static void test_unplugged_says_io_and_works_again_after_restart(void)
+{
+    const can_frame_t frame = make(0x201, 6);
+    can_frame_t got;
+    uint64_t time_us;
+    if (fixture->set_plugged == NULL) {
+        TEST_IGNORE_MESSAGE("this backend cannot be unplugged from here");
+    }
+    fixture->set_plugged(false);
+    for (int i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_recv(hal, &got, &time_us));
+        TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_send(hal, &frame));
+        TEST_ASSERT_EQUAL(HAL_CAN_DOWN, state_now());
+        TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_can_restart(hal));
+    }
+    fixture->set_plugged(true);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    fixture->settle();
+    assert_nothing_received();
+    TEST_ASSERT_EQUAL(HAL_CAN_ACTIVE, state_now());
+    send_ok(&frame);
+    fixture->settle();
+    assert_fetched(&frame);
+}
+
+static void test_bus_off_is_reported_and_nothing_passes_until_restart(void)
+{
+    const can_frame_t stale = make(0x201, 6), fresh = make(0x202, 6);
+    if (fixture->set_bus_off == NULL) {
+        TEST_IGNORE_MESSAGE("this backend cannot be driven bus-off from here");
+    }
+    fixture->set_bus_off();
+    fixture->settle();
+    TEST_ASSERT_TRUE(receive_reports() & CAN_ERROR_BUS_OFF);
+    TEST_ASSERT_EQUAL(HAL_CAN_BUS_OFF, state_now());
+    (void)!hal_can_send(hal, &stale);
+    fixture->inject(&fresh);
+    fixture->settle();
+    assert_nothing_fetched();
+    assert_nothing_received();
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    fixture->settle();
+    TEST_ASSERT_EQUAL(HAL_CAN_ACTIVE, state_now());
+}
+
+static void run_contract(void)
+{
+    RUN_TEST(test_valid_complete_accepts);
+    RUN_TEST(test_valid_mandatory_op_missing_refuses);
+    RUN_TEST(test_optional_ops_absent_have_their_documented_answers);
+    RUN_TEST(test_recv_nothing_waiting_says_again_and_keeps_outputs);
+    RUN_TEST(test_send_every_length_reaches_the_partner);
+    RUN_TEST(test_send_remote_frame_reaches_the_partner);
+    RUN_TEST(test_send_bytes_beyond_length_arrive_as_zero);
+    RUN_TEST(test_send_invalid_frame_is_refused_and_nothing_leaves);
+    RUN_TEST(test_send_burst_keeps_order);
+    RUN_TEST(test_send_own_frames_do_not_come_back);
+    RUN_TEST(test_recv_burst_keeps_order_and_times_rise);
+    RUN_TEST(test_send_full_queue_says_again_and_what_was_taken_arrives);
+    RUN_TEST(test_unconfirmed_falls_to_zero_when_the_frames_are_on_the_wire);
+    RUN_TEST(test_unconfirmed_without_a_partner_stays_until_restart);
+    RUN_TEST(test_filter_only_matching_frames_of_its_width_pass);
+    RUN_TEST(test_unplugged_says_io_and_works_again_after_restart);
+    RUN_TEST(test_bus_off_is_reported_and_nothing_passes_until_restart);
+}
+
+/* The simulated bus. */
+
+static void reopen_sim(uint32_t frame_us, const sim_can_fault_t *plan, uint32_t planned)
+{
+    open_bus(frame_us, plan, planned, NULL, 0);
+    hal = sim_can_hal(&node);
+}
+
+static void test_sim_wire_takes_its_time_per_frame(void)
+{
+    can_frame_t got;
+    uint64_t time_us;
+    reopen_sim(115, NULL, 0);
+    sim_can_bus_step(&bus, 1000);
+    for (uint32_t i = 0; i < 7; i++) {
+        const can_frame_t frame = make(0x201u + i, 6);
+        send_ok(&frame);
+    }
+    for (uint64_t now_us = 1000; now_us <= 2000; now_us++) {
+        uint32_t left = 0;
+        sim_can_bus_step(&bus, now_us);
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &left));
+        const uint64_t gone = (now_us - 1000) / 115;
+        TEST_ASSERT_EQUAL_UINT64(gone < 7 ? 7 - gone : 0, left);
+    }
+    for (uint32_t i = 1; i <= 7; i++) {
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_recv(sim_can_hal(&partner), &got, &time_us));
+        TEST_ASSERT_EQUAL_UINT64(1000 + 115 * i, time_us);
+    }
+}
+
+/* Against a sort: of frames that all wait, the lowest arbitration field goes first. */
+static void test_sim_arbitration_lowest_identifier_wins(void)
+{
+    static sim_can_t sender[5];
+    const can_frame_t frames[] = {make(0x300, 1), make_extended(0x300u << 18, 1), make_extended((0x2FFu << 18) + 5, 1),
+                                  make(0x000, 1), make(0x7FF, 1)};
+    static const uint32_t k_expected[] = {3, 2, 0, 1, 4};
+    reopen_sim(115, NULL, 0);
+    for (size_t i = 0; i < 5; i++) {
+        TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&sender[i], &bus, NULL, 0));
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&sender[i]), &frames[i]));
+    }
+    settle_sim();
+    for (size_t i = 0; i < 5; i++) {
+        assert_received(&frames[k_expected[i]]);
+    }
+}
+
+static void test_sim_receive_queue_overrun_is_reported_after_the_last_kept_frame(void)
+{
+    for (uint32_t i = 0; i < SIM_CAN_RX_FRAMES + 5; i++) {
+        const can_frame_t frame = make(i, 1);
+        fixture->inject(&frame);
+        settle_sim();
+    }
+    TEST_ASSERT_EQUAL_UINT32(5, node.lost);
+    for (uint32_t i = 0; i < SIM_CAN_RX_FRAMES; i++) {
+        const can_frame_t expected = make(i, 1);
+        assert_received(&expected);
+    }
+    TEST_ASSERT_EQUAL_HEX32(CAN_ERROR_OVERRUN, receive_reports());
+    assert_nothing_received();
+}
+
+/* With a third controller there to acknowledge, so that the wire goes on. */
+static void test_sim_controller_in_bus_off_hears_nothing(void)
+{
+    static sim_can_t third;
+    const can_frame_t missed = make(0x181, 8), heard = make(0x182, 8);
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&third, &bus, NULL, 0));
+    sim_can_set_state(&node, HAL_CAN_BUS_OFF);
+    TEST_ASSERT_EQUAL_HEX32(CAN_ERROR_BUS_OFF, receive_reports());
+    fixture->inject(&missed);
+    settle_sim();
+    TEST_ASSERT_EQUAL_UINT32(1, bus.frames);
+    assert_nothing_received();
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    fixture->inject(&heard);
+    settle_sim();
+    assert_received(&heard);
+}
+
+static void test_sim_open_too_many_is_refused(void)
+{
+    static sim_can_t extra[SIM_CAN_NODES_MAX];
+    static hal_can_filter_t filters[SIM_CAN_FILTERS_MAX + 1];
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, sim_can_open(&extra[0], &bus, filters, SIM_CAN_FILTERS_MAX + 1));
+    for (uint32_t i = 2; i < SIM_CAN_NODES_MAX; i++) {
+        TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&extra[i], &bus, NULL, 0));
+    }
+    TEST_ASSERT_EQUAL(HV_ERR_FULL, sim_can_open(&extra[0], &bus, NULL, 0));
+}
+
+#define SWEEP 12u
+
+/* Sends SWEEP frames one by one with one fault at frame `at`; fills how often each arrived and how many were taken. */
+static uint32_t sweep(sim_can_fault_kind_t kind, uint32_t at, uint32_t arrived[SWEEP])
+{
+    const sim_can_fault_t plan = {kind, at, 1000};
+    uint32_t taken = 0;
+    can_frame_t got;
+    reopen_sim(100, &plan, 1);
+    memset(arrived, 0, SWEEP * sizeof arrived[0]);
+    for (uint32_t i = 0; i < SWEEP; i++) {
+        const can_frame_t frame = make(i, 2);
+        const hv_status_t status = hal_can_send(hal, &frame);
+        TEST_ASSERT_TRUE(status == HV_OK || status == HV_ERR_AGAIN);
+        taken += status == HV_OK;
+        sim_now_us += 200;
+        sim_can_bus_step(&bus, sim_now_us);
+    }
+    sim_can_bus_step(&bus, sim_now_us + 10000);
+    for (uint32_t last = 0; fetch_sim(&got); last = got.id) {
+        TEST_ASSERT_TRUE(got.id >= last && got.id < SWEEP);
+        arrived[got.id]++;
+    }
+    return taken;
+}
+
+static void test_sim_one_fault_at_every_step_hits_that_frame_only(void)
+{
+    static const struct {
+        sim_can_fault_kind_t kind;
+        uint32_t arrives;
+        uint32_t taken;
+    } k_rows[] = {
+        {SIM_CAN_DROP, 0, SWEEP}, {SIM_CAN_DUPLICATE, 2, SWEEP}, {SIM_CAN_DELAY, 1, SWEEP}, {SIM_CAN_FULL, 0, SWEEP - 1}};
+    for (size_t row = 0; row < sizeof k_rows / sizeof k_rows[0]; row++) {
+        for (uint32_t at = 1; at <= SWEEP; at++) {
+            uint32_t arrived[SWEEP], left;
+            TEST_ASSERT_EQUAL_UINT32(k_rows[row].taken, sweep(k_rows[row].kind, at, arrived));
+            for (uint32_t i = 0; i < SWEEP; i++) {
+                TEST_ASSERT_EQUAL_UINT32(i + 1 == at ? k_rows[row].arrives : 1, arrived[i]);
+            }
+            TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &left));
+            TEST_ASSERT_EQUAL_UINT32(0, left);
+        }
+    }
+}
+
+static void test_sim_bus_off_at_every_step_stops_everything_from_there(void)
+{
+    for (uint32_t at = 1; at <= SWEEP; at++) {
+        uint32_t arrived[SWEEP], left;
+        TEST_ASSERT_EQUAL_UINT32(SWEEP, sweep(SIM_CAN_BUS_OFF, at, arrived));
+        for (uint32_t i = 0; i < SWEEP; i++) {
+            TEST_ASSERT_EQUAL_UINT32(i + 1 < at ? 1 : 0, arrived[i]);
+        }
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &left));
+        TEST_ASSERT_EQUAL_UINT32(SWEEP + 1 - at, left);
+        TEST_ASSERT_EQUAL(HAL_CAN_BUS_OFF, state_now());
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+        settle_sim();
+        assert_nothing_fetched();
+    }
+}
+
+static void run_sim(void)
+{
+    RUN_TEST(test_sim_wire_takes_its_time_per_frame);
+    RUN_TEST(test_sim_arbitration_lowest_identifier_wins);
+    RUN_TEST(test_sim_receive_queue_overrun_is_reported_after_the_last_kept_frame);
+    RUN_TEST(test_sim_controller_in_bus_off_hears_nothing);
+    RUN_TEST(test_sim_open_too_many_is_refused);
+    RUN_TEST(test_sim_one_fault_at_every_step_hits_that_frame_only);
+    RUN_TEST(test_sim_bus_off_at_every_step_stops_everything_from_there);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    for (size_t i = 0; i < sizeof k_fixtures / sizeof k_fixtures[0]; i++) {
+        fixture = &k_fixtures[i];
+        contract_backend = fixture->name;
+        run_contract();
+    }
+    fixture = &k_fixtures[0];
+    contract_backend = fixture->name;
+    run_sim();
+    return UNITY_END();
+}

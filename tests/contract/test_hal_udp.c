@@ -1,0 +1,441 @@
+/* SPDX-License-Identifier: MIT
+ * test_hal_udp.c - the contract of hal/udp.h on every backend (Linux over loopback), and what single backends promise beyond it.
+ */
+#include "contract.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "linux_udp.h"
+#include "sim_udp.h"
+
+/** A backend under test. */
+typedef struct {
+    const char *name;
+    bool (*open)(hal_udp_t *udp); /**< false: not to be had on this machine */
+    void (*close)(void);
+    hal_udp_peer_t (*send)(const void *data, size_t length); /**< the other side sends; returns who it is */
+    void (*wait)(void);                                      /**< until something may have arrived */
+} fixture_t;
+
+static const fixture_t *fixture;
+static hal_udp_t hal;
+
+/* Simulated. */
+
+static sim_udp_t sim;
+
+static bool open_sim(hal_udp_t *udp)
+{
+    sim_udp_init(&sim);
+    *udp = sim_udp_hal(&sim);
+    return true;
+}
+
+static void do_nothing(void) {}
+
+static hal_udp_peer_t send_sim(const void *data, size_t length)
+{
+    const hal_udp_peer_t peer = {.address = {10, 1, 2, 3}, .port = 54321};
+    (void)!sim_udp_push(&sim, data, length, &peer);
+    return peer;
+}
+
+/* Linux: a socket of the backend, and a plain one that sends to it. */
+
+static linux_udp_t lin;
+static int sender = -1;
+
+static hal_udp_peer_t peer_of(const struct sockaddr_storage *address)
+{
+    hal_udp_peer_t peer;
+    memset(&peer, 0, sizeof peer);
+    if (address->ss_family == AF_INET) {
+        const struct sockaddr_in *v4 = (const struct sockaddr_in *)address;
+        memcpy(peer.address, &v4->sin_addr, 4);
+        peer.port = ntohs(v4->sin_port);
+    } else {
+        const struct sockaddr_in6 *v6 = (const struct sockaddr_in6 *)address;
+        memcpy(peer.address, &v6->sin6_addr, 16);
+        peer.port = ntohs(v6->sin6_port);
+        peer.is_ipv6 = true;
+    }
+    return peer;
+}
+
+static bool open_linux(hal_udp_t *udp, const char *bind_to, int family)
+{
+    struct sockaddr_in v4 = {.sin_family = AF_INET};
+    struct sockaddr_in6 v6 = {.sin6_family = AF_INET6, .sin6_addr = IN6ADDR_LOOPBACK_INIT};
+    if (linux_udp_open(&lin, &(linux_udp_config_t){.bind = bind_to, .receive_buffer = 4096}) != HV_OK) {
+        return false;
+    }
+    sender = socket(family, SOCK_DGRAM, 0);
+    v4.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    v4.sin_port = htons(lin.port);
+    v6.sin6_port = htons(lin.port);
+    *udp = linux_udp_hal(&lin);
+    return sender >= 0 && (family == AF_INET ? connect(sender, (struct sockaddr *)&v4, sizeof v4)
+                                             : connect(sender, (struct sockaddr *)&v6, sizeof v6)) == 0;
+}
+
+static bool open_linux4(hal_udp_t *udp)
+{
+    return open_linux(udp, "127.0.0.1", AF_INET);
+}
+
+static bool open_linux6(hal_udp_t *udp)
+{
+    return open_linux(udp, "::1", AF_INET6);
+}
+
+static bool open_linux_both(hal_udp_t *udp)
+{
+    return open_linux(udp, "::", AF_INET);
+}
+
+static void close_linux(void)
+{
+    linux_udp_close(&lin);
+    if (sender >= 0) {
+        (void)close(sender);
+        sender = -1;
+    }
+}
+
+static hal_udp_peer_t send_linux(const void *data, size_t length)
+{
+    struct sockaddr_storage address;
+    socklen_t size = sizeof address;
+    TEST_ASSERT_EQUAL((ssize_t)length, send(sender, data, length, 0));
+    TEST_ASSERT_EQUAL(0, getsockname(sender, (struct sockaddr *)&address, &size));
+    return peer_of(&address);
+}
+
+static void wait_linux(void)
+{
+    struct pollfd readable = {.fd = lin.fd, .events = POLLIN};
+    (void)poll(&readable, 1, 50);
+}
+
+static const fixture_t k_fixtures[] = {
+    {"sim", open_sim, do_nothing, send_sim, do_nothing},
+    {"linux_ipv4", open_linux4, close_linux, send_linux, wait_linux},
+    {"linux_ipv6", open_linux6, close_linux, send_linux, wait_linux},
+    {"linux_ipv4_on_ipv6", open_linux_both, close_linux, send_linux, wait_linux},
+};
+
+void setUp(void)
+{
+    if (!fixture->open(&hal)) {
+        TEST_IGNORE_MESSAGE("not to be had on this machine");
+    }
+}
+
+void tearDown(void)
+{
+    fixture->close();
+}
+
+/* recv that gives the network time; HV_ERR_AGAIN only where nothing came for seconds. */
+static hv_status_t recv_patiently(uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
+{
+    hv_status_t status = HV_ERR_AGAIN;
+    for (int i = 0; i < 100 && status == HV_ERR_AGAIN; i++) {
+        fixture->wait();
+        status = hal_udp_recv(hal, buffer, capacity, length, from);
+    }
+    return status;
+}
+
+static void assert_received(const void *data, size_t length, const hal_udp_peer_t *peer)
+{
+    uint8_t buffer[2048];
+    size_t received = SIZE_MAX;
+    hal_udp_peer_t from;
+    memset(&from, 0xEE, sizeof from);
+    TEST_ASSERT_EQUAL(HV_OK, recv_patiently(buffer, sizeof buffer, &received, &from));
+    TEST_ASSERT_EQUAL_UINT64(length, received);
+    TEST_ASSERT_TRUE(length == 0 || memcmp(data, buffer, length) == 0);
+    TEST_ASSERT_EQUAL_UINT8_ARRAY(peer->address, from.address, 16);
+    TEST_ASSERT_EQUAL_UINT16(peer->port, from.port);
+    TEST_ASSERT_EQUAL(peer->is_ipv6, from.is_ipv6);
+    TEST_ASSERT_EQUAL_UINT32(peer->scope_id, from.scope_id);
+}
+
+static void assert_none_waiting(void)
+{
+    uint8_t byte;
+    size_t length;
+    hal_udp_peer_t from;
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_udp_recv(hal, &byte, 1, &length, &from));
+}
+
+static void test_valid_complete_accepts(void)
+{
+    TEST_ASSERT_TRUE(hal_udp_valid(hal));
+}
+
+static void test_valid_recv_missing_refuses(void)
+{
+    hal_udp_ops_t ops = *hal.ops;
+    ops.recv = NULL;
+    TEST_ASSERT_FALSE(hal_udp_valid((hal_udp_t){&ops, hal.ctx}));
+    TEST_ASSERT_FALSE(hal_udp_valid((hal_udp_t){NULL, NULL}));
+}
+
+static void test_dropped_absent_says_nosup(void)
+{
+    hal_udp_ops_t ops = *hal.ops;
+    uint32_t dropped = 77;
+    ops.dropped = NULL;
+    TEST_ASSERT_TRUE(hal_udp_valid((hal_udp_t){&ops, hal.ctx}));
+    TEST_ASSERT_EQUAL(HV_ERR_NOSUP, hal_udp_dropped((hal_udp_t){&ops, hal.ctx}, &dropped));
+    TEST_ASSERT_EQUAL_UINT32(77, dropped);
+}
+
+static void test_recv_nothing_waiting_says_again_and_keeps_outputs(void)
+{
+    uint8_t buffer[4] = {1, 2, 3, 4};
+    const uint8_t before[4] = {1, 2, 3, 4};
+    size_t length = 99;
+    hal_udp_peer_t from = {.port = 1234};
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_udp_recv(hal, buffer, sizeof buffer, &length, &from));
+    TEST_ASSERT_EQUAL_UINT8_ARRAY(before, buffer, 4);
+    TEST_ASSERT_EQUAL_UINT64(99, length);
+    TEST_ASSERT_EQUAL_UINT16(1234, from.port);
+}
+
+static void test_recv_datagram_brings_bytes_and_sender(void)
+{
+    const char *frame = "@A6:5,6,0,5.5,3.0,20,F0#";
+    const hal_udp_peer_t peer = fixture->send(frame, strlen(frame));
+    assert_received(frame, strlen(frame), &peer);
+    assert_none_waiting();
+}
+
+static void test_recv_every_byte_value_passes(void)
+{
+    uint8_t data[256];
+    for (unsigned i = 0; i < sizeof data; i++) {
+        data[i] = (uint8_t)i;
+    }
+    const hal_udp_peer_t peer = fixture->send(data, sizeof data);
+    assert_received(data, sizeof data, &peer);
+}
+
+static void test_recv_several_keeps_order_and_borders(void)
+{
+    char text[4][16];
+    hal_udp_peer_t peer = {.port = 0};
+    for (int i = 0; i < 4; i++) {
+        (void)snprintf(text[i], sizeof text[i], "%.*s", i * 3, "abcdefghijklmnop");
+        peer = fixture->send(text[i], strlen(text[i]));
+    }
+    for (int i = 0; i < 4; i++) {
+        assert_received(text[i], strlen(text[i]), &peer);
+    }
+    assert_none_waiting();
+}
+
+static void test_recv_empty_datagram_is_ok_with_length_zero(void)
+{
+    const hal_udp_peer_t peer = fixture->send("", 0);
+    assert_received("", 0, &peer);
+    assert_none_waiting();
+}
+
+static void test_recv_exactly_capacity_fits(void)
+{
+    uint8_t buffer[8];
+    size_t length = 0;
+    hal_udp_peer_t from;
+    (void)fixture->send("12345678", 8);
+    TEST_ASSERT_EQUAL(HV_OK, recv_patiently(buffer, 8, &length, &from));
+    TEST_ASSERT_EQUAL_UINT64(8, length);
+    TEST_ASSERT_EQUAL_MEMORY("12345678", buffer, 8);
+}
+
+static void test_recv_longer_than_capacity_is_dropped_whole_and_told(void)
+{
+    uint8_t buffer[16];
+    for (size_t capacity = 0; capacity < 9; capacity++) {
+        size_t length = 0;
+        hal_udp_peer_t from;
+        memset(buffer, 0xCC, sizeof buffer);
+        (void)fixture->send("123456789", 9);
+        const hal_udp_peer_t peer = fixture->send("next", 4);
+        TEST_ASSERT_EQUAL(HV_ERR_RANGE, recv_patiently(buffer, capacity, &length, &from));
+        TEST_ASSERT_EQUAL_UINT64(9, length);
+        TEST_ASSERT_EQUAL_UINT16(peer.port, from.port);
+        for (size_t i = capacity; i < sizeof buffer; i++) {
+            TEST_ASSERT_EQUAL_HEX8(0xCC, buffer[i]);
+        }
+        assert_received("next", 4, &peer);
+    }
+}
+
+/* However many are lost, each is either received or counted, those received are in order, and the queue works on afterwards. */
+static void test_dropped_queue_overrun_accounts_for_every_datagram(void)
+{
+    const uint32_t sent = 500;
+    uint32_t received = 0, dropped = 0, last = 0, number;
+    size_t length;
+    hal_udp_peer_t from;
+    if (hal_udp_dropped(hal, &dropped) == HV_ERR_NOSUP) {
+        TEST_IGNORE_MESSAGE("this backend does not count");
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, dropped);
+    for (uint32_t i = 1; i <= sent; i++) {
+        (void)fixture->send(&i, sizeof i);
+    }
+    fixture->wait();
+    while (hal_udp_recv(hal, (uint8_t *)&number, sizeof number, &length, &from) == HV_OK) {
+        TEST_ASSERT_TRUE(number > last);
+        last = number;
+        received++;
+    }
+    number = sent + 1;
+    const hal_udp_peer_t peer = fixture->send(&number, sizeof number);
+    assert_received(&number, sizeof number, &peer);
+    TEST_ASSERT_EQUAL(HV_OK, hal_udp_dropped(hal, &dropped));
+    TEST_ASSERT_TRUE(dropped > 0);
+    TEST_ASSERT_EQUAL_UINT32(sent, received + dropped);
+}
+
+static void run_contract(void)
+{
+    RUN_TEST(test_valid_complete_accepts);
+    RUN_TEST(test_valid_recv_missing_refuses);
+    RUN_TEST(test_dropped_absent_says_nosup);
+    RUN_TEST(test_recv_nothing_waiting_says_again_and_keeps_outputs);
+    RUN_TEST(test_recv_datagram_brings_bytes_and_sender);
+    RUN_TEST(test_recv_every_byte_value_passes);
+    RUN_TEST(test_recv_several_keeps_order_and_borders);
+    RUN_TEST(test_recv_empty_datagram_is_ok_with_length_zero);
+    RUN_TEST(test_recv_exactly_capacity_fits);
+    RUN_TEST(test_recv_longer_than_capacity_is_dropped_whole_and_told);
+    RUN_TEST(test_dropped_queue_overrun_accounts_for_every_datagram);
+}
+
+/* An error of recv loses no datagram, wherever it comes. */
+static void test_sim_recv_failing_at_every_step_loses_nothing(void)
+{
+    for (uint32_t first = 1; first <= 10; first++) {
+        uint32_t next = 1;
+        uint8_t byte = 0;
+        size_t length;
+        hal_udp_peer_t from;
+        TEST_ASSERT_TRUE(open_sim(&hal));
+        sim.fail = (sim_fail_t){.first = first, .count = 2};
+        for (uint8_t i = 1; i <= 8; i++) {
+            (void)send_sim(&i, 1);
+        }
+        for (uint32_t call = 1; call <= 10; call++) {
+            const hv_status_t status = hal_udp_recv(hal, &byte, 1, &length, &from);
+            TEST_ASSERT_EQUAL(call >= first && call < first + 2 ? HV_ERR_IO : next <= 8 ? HV_OK : HV_ERR_AGAIN, status);
+            if (status == HV_OK) {
+                TEST_ASSERT_EQUAL_UINT32(next++, byte);
+            }
+        }
+        TEST_ASSERT_TRUE(next == 9 || first > 8);
+    }
+}
+
+static void test_sim_push_too_long_is_refused(void)
+{
+    static const uint8_t data[SIM_UDP_BYTES_MAX + 1];
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, sim_udp_push(&sim, data, sizeof data, NULL));
+    TEST_ASSERT_EQUAL(HV_OK, sim_udp_push(&sim, data, sizeof data - 1, NULL));
+}
+
+/* Opening a socket. */
+
+static void test_linux_open_port_in_use_says_so(void)
+{
+    linux_udp_t second;
+    char where[64];
+    (void)snprintf(where, sizeof where, "bind 127.0.0.1 port %u", (unsigned)lin.port);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, linux_udp_open(&second, &(linux_udp_config_t){.bind = "127.0.0.1", .port = lin.port}));
+    TEST_ASSERT_EQUAL(EADDRINUSE, second.error);
+    TEST_ASSERT_NOT_NULL(strstr(second.error_text, where));
+    TEST_ASSERT_NOT_NULL(strstr(second.error_text, strerror(EADDRINUSE)));
+    TEST_ASSERT_EQUAL(-1, second.fd);
+    linux_udp_close(&second);
+}
+
+static void test_linux_open_foreign_address_says_so(void)
+{
+    linux_udp_t other;
+    TEST_ASSERT_EQUAL(HV_ERR_IO, linux_udp_open(&other, &(linux_udp_config_t){.bind = "192.0.2.1"}));
+    TEST_ASSERT_EQUAL(EADDRNOTAVAIL, other.error);
+    TEST_ASSERT_NOT_NULL(strstr(other.error_text, "192.0.2.1"));
+}
+
+static void test_linux_open_not_an_address_is_refused(void)
+{
+    static const char *const k_wrong[] = {"", "localhost", "1.2.3.4.5", "300.1.1.1", "::1::", "fe80::1%nonesuch0"};
+    for (size_t i = 0; i < sizeof k_wrong / sizeof k_wrong[0]; i++) {
+        linux_udp_t other;
+        TEST_ASSERT_EQUAL_MESSAGE(HV_ERR_ARG, linux_udp_open(&other, &(linux_udp_config_t){.bind = k_wrong[i]}), k_wrong[i]);
+        TEST_ASSERT_TRUE(other.error < 0);
+        TEST_ASSERT_NOT_NULL(strstr(other.error_text, "not a numeric address"));
+    }
+}
+
+static void test_linux_open_receive_buffer_is_bounded(void)
+{
+    linux_udp_t other;
+    TEST_ASSERT_EQUAL(HV_OK, linux_udp_open(&other, &(linux_udp_config_t){.bind = "127.0.0.1", .receive_buffer = 4096}));
+    TEST_ASSERT_TRUE(other.receive_buffer >= 4096 && other.receive_buffer <= 16384);
+    TEST_ASSERT_EQUAL_STRING("", other.error_text);
+    linux_udp_close(&other);
+}
+
+static void test_linux_close_twice_and_recv_after_it_do_no_harm(void)
+{
+    uint8_t byte;
+    size_t length;
+    hal_udp_peer_t from;
+    linux_udp_close(&lin);
+    linux_udp_close(&lin);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_udp_recv(hal, &byte, 1, &length, &from));
+    TEST_ASSERT_EQUAL(EBADF, lin.error);
+}
+
+static void run_sim(void)
+{
+    RUN_TEST(test_sim_recv_failing_at_every_step_loses_nothing);
+    RUN_TEST(test_sim_push_too_long_is_refused);
+}
+
+static void run_linux(void)
+{
+    RUN_TEST(test_linux_open_port_in_use_says_so);
+    RUN_TEST(test_linux_open_foreign_address_says_so);
+    RUN_TEST(test_linux_open_not_an_address_is_refused);
+    RUN_TEST(test_linux_open_receive_buffer_is_bounded);
+    RUN_TEST(test_linux_close_twice_and_recv_after_it_do_no_harm);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    for (size_t i = 0; i < sizeof k_fixtures / sizeof k_fixtures[0]; i++) {
+        fixture = &k_fixtures[i];
+        contract_backend = fixture->name;
+        run_contract();
+    }
+    fixture = &k_fixtures[0];
+    contract_backend = fixture->name;
+    run_sim();
+    fixture = &k_fixtures[1];
+    contract_backend = fixture->name;
+    run_linux();
+    return UNITY_END();
+}
