@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: MIT
+ * stream.h - rebuilds a sender's motion from the samples it streams: time line from arrivals, curve through the samples.
+ * Second-order phase-locked loop on arrival times; uniform B-spline with the samples as control points, each committed on use.
+ * Owns no clock and no limits (the ramps behind it have those). One owner; not re-entrant per instance.
+ *
+ * Delay: a sample is met 2 periods (smooth) or 1.5 (fast) plus a margin after its time. The margin is 2 ms, more if the samples
+ * often come later than that, at most the larger of 2 ms and half a period. While the rate changes or the network holds samples
+ * back the delay may grow by 2 periods more; then it falls again by 6 % of the time that passes.
+ * Losses: a point that is missing when the curve needs it is extrapolated once, by the last step and its bend (not a jump: at
+ * most 4 x the larger of the two steps before); a second is put as far again beyond; nine more lead softly back to the last
+ * sample. So at the end of a stream the curve goes beyond the last sample by at most 2 such steps, and rests on it exactly
+ * 14 periods and the margin after it came.
+ */
+#ifndef HEAVE_STREAM_H
+#define HEAVE_STREAM_H
+
+#include "heave/axes.h"
+#include "heave/ramp.h"
+
+/** How a stream is rendered. */
+typedef enum {
+    STREAM_SMOOTH, /**< cubic B-spline, 2 periods + margin late: continuous acceleration (default) */
+    STREAM_FAST    /**< quadratic B-spline, 1.5 periods + margin late: continuous velocity */
+} stream_style_t;
+
+#define STREAM_PERIOD_MIN_US 4000u   /**< fastest stream recognised: 250 Hz; what comes faster is thinned out to that */
+#define STREAM_PERIOD_MAX_US 150000u /**< slowest: 6.7 Hz; samples further apart are steps */
+
+enum {
+    STREAM_GAPS = 24,  /**< intervals the period is first found from */
+    STREAM_POINTS = 16 /**< ring of points, a power of 2 */
+};
+
+/** The sender's time line; members are private to src/motion. */
+typedef struct {
+    uint64_t last_us;             /**< arrival of the newest sample */
+    int64_t late_us_q16;          /**< that arrival against the time line */
+    int64_t period_us_q16;        /**< 0 while unknown */
+    int64_t margin_us_q16;        /**< how long a sample is waited for beyond its time */
+    int64_t per_us_q46;           /**< 1 / period: periods per us, Q46 */
+    uint32_t gap_us[STREAM_GAPS]; /**< newest intervals, a ring */
+    unsigned gap_next;
+    unsigned gaps;    /**< intervals in the ring that belong to the present rate */
+    unsigned settled; /**< samples since the rate was last found, up to STREAM_GAPS */
+} stream_clock_t;
+
+/** The points of the curve, by index modulo the ring; members are private to src/motion. */
+typedef struct {
+    q32_t point_q32[STREAM_POINTS][AXES_MAX]; /**< what is known best of each index: a sample, or the guess committed */
+    bool is_sample[STREAM_POINTS];            /**< of the indices beyond head */
+    q32_t control_q32[4][AXES_MAX];           /**< as committed, oldest first */
+    q32_t last_q32[AXES_MAX];                 /**< the newest sample */
+    uint32_t head;                            /**< index of the newest point committed */
+    int32_t ahead; /**< index of the newest sample less head; negative where the curve is extrapolated */
+    unsigned axes;
+} stream_curve_t;
+
+/** What a stream is doing. */
+typedef enum {
+    STREAM_EMPTY,  /**< no sample yet */
+    STREAM_LONE,   /**< one sample: a step */
+    STREAM_RUNNING /**< a curve */
+} stream_phase_t;
+
+/** Stream state; members are private to src/motion. */
+typedef struct {
+    uint32_t cycle_us;
+    stream_style_t style;
+    stream_phase_t phase;
+    bool is_fresh; /**< no reference given since the start */
+    stream_clock_t clock;
+    stream_curve_t curve;
+    q32_t between_q32; /**< render phase behind head, [0, 1) */
+    q32_t rate_q32[2]; /**< periods per cycle behind the first and the second low-pass; the second is rendered */
+    q32_t error_q32;   /**< how far rendering is behind its time, in periods */
+    ramp_ref_t previous[AXES_MAX];
+} stream_t;
+
+/** Starts without any sample.
+ *  @param cycle_us [500, 10000]   @param axes 1 to AXES_MAX */
+void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_t style);
+
+/** Forgets the stream; the next sample starts a new one. */
+void stream_reset(stream_t *self);
+
+/** Takes a sample. Bounded time.
+ *  @param now_us     arrival, never decreasing
+ *  @param sample_q32 one value per axis, within +-2^48
+ *  A sample within STREAM_PERIOD_MAX_US of the last one (or within 3.5 periods of a stream that runs) continues or begins a
+ *  stream; any other, and one that follows a lone sample within 2 ms, is a lone sample. The same values again within a quarter of
+ *  a period are the same datagram and are dropped; other values then replace the newest sample. */
+void stream_push(stream_t *self, uint64_t now_us, const q32_t *sample_q32);
+
+/** References for the cycle at now_us, one per axis, with consistent backward differences (vel[k] = pos[k]-pos[k-1] and so on,
+ *  except in the first cycle after a start, where the differences are 0).
+ *  A lone sample is a step: position of the sample, differences 0. The curve of a stream starts at rest on its first sample; when
+ *  the stream ends, the references end at rest on its last. Equal samples give exactly equal references.
+ *  @return false while no sample has come since reset (ref unchanged). */
+bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref);
+
+/** True while samples come regularly: period known, last arrival at most STREAM_PERIOD_MAX_US or 3.5 periods ago. */
+bool stream_is_live(const stream_t *self, uint64_t now_us);
+
+/** Estimated period of the sender, 0 while unknown; and how late the samples are rendered, for display. us. */
+uint32_t stream_period_us(const stream_t *self);
+uint32_t stream_delay_us(const stream_t *self);
+
+#endif

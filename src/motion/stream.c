@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: MIT
+ * stream.c - rebuilds a sender's motion: renders the curve through its samples at the pace of its clock.
+ * The render phase advances by one cycle's share of the period, up to 6 % faster or slower so that it meets its time. That rate
+ * passes two low-pass filters: behind one, a jump of the wished rate would still be a jump of the reference's acceleration.
+ */
+#include "heave/stream.h"
+#include "stream_clock.h"
+#include "stream_curve.h"
+
+#define PACE_GAIN_DIV   8                   /* a rate correction of 1/8 per period of error ... */
+#define PACE_MAX_Q32    (Q32_ONE * 6 / 100) /* ... but at most this */
+#define PACE_FILTER_MAX (Q32_ONE / 2)       /* keeps the filters stable where a cycle is longer than a period */
+#define BEHIND_MAX_Q32  (Q32_ONE * 3 / 2)   /* further behind its time, a sample is skipped */
+#define BEFORE_MAX_Q32  (Q32_ONE / 2)       /* further before it, where it has no samples, a point is filled in */
+#define STEP_GAP_MIN_US 2000u /* two samples nearer than this do not begin a stream: the second replaces the first */
+
+void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_t style)
+{
+    HV_ASSERT(axes >= 1 && axes <= AXES_MAX && cycle_us >= 500 && cycle_us <= 10000);
+    *self = (stream_t){.cycle_us = cycle_us, .style = style, .curve = {.axes = axes}};
+}
+
+void stream_reset(stream_t *self)
+{
+    stream_init(self, self->cycle_us, self->curve.axes, self->style);
+}
+
+static void start_lone(stream_t *self, const q32_t *sample_q32)
+{
+    stream_curve_start(&self->curve, self->curve.axes, sample_q32);
+    self->phase = STREAM_LONE;
+    self->is_fresh = true;
+}
+
+static q32_t error_at(const stream_t *self, uint64_t now_us)
+{
+    return self->curve.ahead * Q32_ONE + stream_clock_periods(&self->clock, now_us) - self->between_q32;
+}
+
+static void start_running(stream_t *self, uint64_t now_us)
+{
+    self->phase = STREAM_RUNNING;
+    self->between_q32 = 0;
+    self->rate_q32[0] = self->rate_q32[1] = stream_clock_span(&self->clock, self->cycle_us);
+    self->between_q32 = fx_clamp(error_at(self, now_us), 0, Q32_ONE - 1);
+}
+
+void stream_push(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+{
+    if (self->phase == STREAM_EMPTY || !stream_clock_is_near(&self->clock, now_us)) {
+        stream_clock_start(&self->clock, now_us);
+        start_lone(self, sample_q32);
+        return;
+    }
+    if (self->phase == STREAM_LONE && stream_clock_elapsed_us(&self->clock, now_us) < STEP_GAP_MIN_US) {
+        start_lone(self, sample_q32);
+        return;
+    }
+    if (stream_clock_is_soon(&self->clock, now_us) && stream_curve_is_newest(&self->curve, sample_q32)) {
+        return; /* the same datagram twice */
+    }
+    stream_curve_append(&self->curve, stream_clock_take(&self->clock, now_us), sample_q32);
+    if (self->phase == STREAM_LONE) {
+        start_running(self, now_us);
+    } else if (error_at(self, now_us) > BEHIND_MAX_Q32) {
+        stream_curve_skip(&self->curve);
+    } else if (error_at(self, now_us) < -BEFORE_MAX_Q32) {
+        stream_curve_stretch(&self->curve);
+    }
+}
+
+/* One cycle of the render phase; commits the points it comes to. */
+static void advance(stream_t *self, uint64_t now_us)
+{
+    self->between_q32 += self->rate_q32[1];
+    while (self->between_q32 >= Q32_ONE) {
+        self->between_q32 -= Q32_ONE;
+        stream_curve_commit(&self->curve);
+    }
+    self->error_q32 = error_at(self, now_us);
+    const q32_t nominal = stream_clock_span(&self->clock, self->cycle_us);
+    const q32_t pace = fx_clamp(self->error_q32 / PACE_GAIN_DIV, -PACE_MAX_Q32, PACE_MAX_Q32);
+    const q32_t faster = nominal > self->rate_q32[1] ? nominal : self->rate_q32[1];
+    const q32_t filter = fx_clamp(faster * 2 / 3, 0, PACE_FILTER_MAX);
+    const q32_t wished = nominal + fx_mul_shift(nominal, pace, 32);
+    self->rate_q32[0] += fx_mul_shift(wished - self->rate_q32[0], filter, 32);
+    self->rate_q32[1] += fx_mul_shift(self->rate_q32[0] - self->rate_q32[1], filter, 32);
+}
+
+static ramp_ref_t difference(const ramp_ref_t *previous, q32_t pos_q32)
+{
+    ramp_ref_t ref = {.pos_q32 = pos_q32};
+    ref.vel_per_cycle_q32 = pos_q32 - previous->pos_q32;
+    ref.acc_per_cycle2_q32 = ref.vel_per_cycle_q32 - previous->vel_per_cycle_q32;
+    ref.jerk_per_cycle3_q32 = ref.acc_per_cycle2_q32 - previous->acc_per_cycle2_q32;
+    return ref;
+}
+
+bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref)
+{
+    if (self->phase == STREAM_EMPTY) {
+        return false;
+    }
+    if (self->phase == STREAM_RUNNING) {
+        advance(self, now_us);
+    }
+    q32_t pos_q32[AXES_MAX];
+    stream_curve_at(&self->curve, self->style, self->between_q32, pos_q32);
+    for (unsigned axis = 0; axis < self->curve.axes; axis++) {
+        ref[axis] = self->is_fresh ? (ramp_ref_t){.pos_q32 = pos_q32[axis]} : difference(&self->previous[axis], pos_q32[axis]);
+        self->previous[axis] = ref[axis];
+    }
+    self->is_fresh = false;
+    if (self->phase == STREAM_RUNNING && stream_curve_is_at_rest(&self->curve) && !stream_clock_is_near(&self->clock, now_us)) {
+        self->phase = STREAM_LONE;
+    }
+    return true;
+}
+
+bool stream_is_live(const stream_t *self, uint64_t now_us)
+{
+    return self->phase == STREAM_RUNNING && stream_clock_is_near(&self->clock, now_us);
+}
+
+uint32_t stream_period_us(const stream_t *self)
+{
+    return self->phase == STREAM_RUNNING ? (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16) : 0;
+}
+
+uint32_t stream_delay_us(const stream_t *self)
+{
+    if (self->phase != STREAM_RUNNING) {
+        return 0;
+    }
+    const int64_t period = self->clock.period_us_q16;
+    const int64_t spline = self->style == STREAM_FAST ? period * 3 / 2 : period * 2;
+    const int64_t behind = fx_mul_shift(period, self->error_q32, 32);
+    return (uint32_t)(fx_clamp(spline + self->clock.margin_us_q16 + behind, 0, INT64_MAX) / STREAM_US_Q16);
+}

@@ -1,0 +1,183 @@
+/* SPDX-License-Identifier: MIT
+ * stream_clock.c - the time line of a sender, found from the arrivals of its samples.
+ * Loss and jitter look alike in one interval, so the first intervals are taken together: losses count only from intervals well
+ * above the middle ones, and the period is the mean. Then each arrival moves the time line by 8 % and the period by 0.4 % of its
+ * deviation (damping 0.63). The last 8 intervals are watched for a new rate, which would take the loop too long to find.
+ */
+#include "stream_clock.h"
+
+enum {
+    WATCHED = 8,      /* intervals that tell a new rate: even, and enough that two losses among them do not */
+    WATCHED_LOST = 6, /* of these longer than a period: the rate is a fraction of what it was */
+    SETTLED_AGAIN = 4 /* after a new rate the time line is trusted as much as after this many samples */
+};
+
+#define PERIOD_MIN_Q16 ((int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16)
+#define PERIOD_MAX_Q16                                                                                                           \
+    ((int64_t)STREAM_PERIOD_MAX_US * STREAM_US_Q16 / 3 * 4) /* a running stream may be slower: no flipping at the edge */
+#define MARGIN_MIN_Q16 ((int64_t)2000 * STREAM_US_Q16)
+#define ELAPSED_MAX_US 4000000u /* far beyond the end of any curve */
+
+static void set_period(stream_clock_t *self, int64_t period_us_q16)
+{
+    self->period_us_q16 = fx_clamp(period_us_q16, PERIOD_MIN_Q16, PERIOD_MAX_Q16);
+    self->per_us_q46 = Q62_ONE / self->period_us_q16;
+}
+
+void stream_clock_start(stream_clock_t *self, uint64_t now_us)
+{
+    *self = (stream_clock_t){.last_us = now_us, .margin_us_q16 = MARGIN_MIN_Q16};
+}
+
+uint32_t stream_clock_elapsed_us(const stream_clock_t *self, uint64_t now_us)
+{
+    const uint64_t elapsed_us = now_us > self->last_us ? now_us - self->last_us : 0;
+    return elapsed_us < UINT32_MAX ? (uint32_t)elapsed_us : UINT32_MAX;
+}
+
+bool stream_clock_is_near(const stream_clock_t *self, uint64_t now_us)
+{
+    /* Three losses in a row do not end a slow stream. */
+    const int64_t near_us = self->period_us_q16 * 7 / 2 / STREAM_US_Q16;
+    return stream_clock_elapsed_us(self, now_us) <= (near_us > STREAM_PERIOD_MAX_US ? near_us : STREAM_PERIOD_MAX_US);
+}
+
+bool stream_clock_is_soon(const stream_clock_t *self, uint64_t now_us)
+{
+    return stream_clock_elapsed_us(self, now_us) * (int64_t)STREAM_US_Q16 * 4 < self->period_us_q16;
+}
+
+q32_t stream_clock_span(const stream_clock_t *self, uint32_t span_us)
+{
+    return fx_mul_shift((int64_t)span_us * STREAM_US_Q16, self->per_us_q46, 30);
+}
+
+q32_t stream_clock_periods(const stream_clock_t *self, uint64_t now_us)
+{
+    const uint32_t elapsed_us = stream_clock_elapsed_us(self, now_us);
+    const int64_t since_us_q16 = (int64_t)(elapsed_us < ELAPSED_MAX_US ? elapsed_us : ELAPSED_MAX_US) * STREAM_US_Q16;
+    return fx_mul_shift(since_us_q16 + self->late_us_q16 - self->margin_us_q16, self->per_us_q46, 30);
+}
+
+/* The i-th newest interval, 0 the newest. */
+static int64_t gap_q16(const stream_clock_t *self, unsigned i)
+{
+    return (int64_t)self->gap_us[(self->gap_next + 2 * STREAM_GAPS - 1 - i) % STREAM_GAPS] * STREAM_US_Q16;
+}
+
+static void record_gap(stream_clock_t *self, uint32_t gap_us)
+{
+    self->gap_us[self->gap_next] = gap_us;
+    self->gap_next = (self->gap_next + 1) % STREAM_GAPS;
+    self->gaps += self->gaps < STREAM_GAPS ? 1u : 0u;
+}
+
+/* Periods in one interval seen alone. A short one may be jitter down to a quarter, a long one up to 1.6. */
+static unsigned periods_in_gap(int64_t gap_us_q16, int64_t period_us_q16)
+{
+    if (gap_us_q16 * 4 < period_us_q16) {
+        return 0;
+    }
+    return gap_us_q16 * 5 < period_us_q16 * 8 ? 1u : (unsigned)((gap_us_q16 + period_us_q16 / 2) / period_us_q16);
+}
+
+/* Mean period over the newest intervals if losses are counted with the given one. */
+static int64_t mean_period(const stream_clock_t *self, unsigned gaps, int64_t period_us_q16)
+{
+    int64_t sum = 0;
+    unsigned periods = 0;
+    for (unsigned i = 0; i < gaps; i++) {
+        sum += gap_q16(self, i);
+        periods += periods_in_gap(gap_q16(self, i), period_us_q16);
+    }
+    return periods > 0 ? sum / periods : period_us_q16;
+}
+
+/* Mean of the middle half of the newest intervals: neither losses nor bursts reach it. An even number of them, as in a burst
+ * short and long ones alternate. */
+static int64_t middle_gap(const stream_clock_t *self, unsigned gaps)
+{
+    int64_t sorted[STREAM_GAPS];
+    const unsigned count = gaps > 1 ? gaps - gaps % 2 : 1;
+    for (unsigned i = 0; i < count; i++) {
+        const int64_t gap = gap_q16(self, i);
+        unsigned at = i;
+        for (; at > 0 && sorted[at - 1] > gap; at--) {
+            sorted[at] = sorted[at - 1];
+        }
+        sorted[at] = gap;
+    }
+    const unsigned cut = count / 4;
+    int64_t sum = 0;
+    for (unsigned i = cut; i < count - cut; i++) {
+        sum += sorted[i];
+    }
+    return fx_clamp(sum / (int64_t)(count - 2 * cut), PERIOD_MIN_Q16, PERIOD_MAX_Q16);
+}
+
+static bool has_new_rate(const stream_clock_t *self)
+{
+    if (self->gaps < WATCHED) {
+        return false;
+    }
+    unsigned lost = 0;
+    for (unsigned i = 0; i < WATCHED; i++) {
+        lost += periods_in_gap(gap_q16(self, i), self->period_us_q16) > 1 ? 1u : 0u;
+    }
+    const int64_t off = mean_period(self, WATCHED, self->period_us_q16) - self->period_us_q16;
+    return lost >= WATCHED_LOST || fx_abs(off) * 8 > self->period_us_q16;
+}
+
+/* Periods from the newest sample's time to an arrival that is ahead_us after it. */
+static unsigned periods_ahead(const stream_clock_t *self, int64_t ahead_us_q16, int64_t gap_us_q16)
+{
+    if (ahead_us_q16 * 4 < self->period_us_q16) {
+        return 0;
+    }
+    if (self->settled < STREAM_GAPS)
+        return gap_us_q16 * 5 < self->period_us_q16 * 8 ? 1u : periods_in_gap(gap_us_q16, self->period_us_q16);
+    const unsigned periods = (unsigned)((ahead_us_q16 * 4 + self->period_us_q16) / (self->period_us_q16 * 4));
+    return periods > 1 ? periods : 1u; /* late by more than 0.75: a loss */
+}
+
+/* Waits longer if samples come late, up to half a period, and slowly less if they do not: 1 of 64 may come too late. */
+static void adapt_margin(stream_clock_t *self)
+{
+    const int64_t step = self->period_us_q16 / 64;
+    const int64_t wished = self->margin_us_q16 + (self->late_us_q16 > self->margin_us_q16 ? step : -step / 128);
+    const int64_t half = self->period_us_q16 / 2;
+    self->margin_us_q16 = fx_clamp(wished, MARGIN_MIN_Q16, half > MARGIN_MIN_Q16 ? half : MARGIN_MIN_Q16);
+}
+
+static void find_period(stream_clock_t *self, int64_t off_us_q16)
+{
+    if (has_new_rate(self)) {
+        self->gaps = WATCHED;
+        self->settled = SETTLED_AGAIN;
+    }
+    if (self->settled < STREAM_GAPS) {
+        set_period(self, mean_period(self, self->gaps, middle_gap(self, self->gaps)));
+    } else
+        set_period(self, self->period_us_q16 + off_us_q16 / 250);
+}
+
+unsigned stream_clock_take(stream_clock_t *self, uint64_t now_us)
+{
+    const uint32_t gap_us = stream_clock_elapsed_us(self, now_us);
+    const int64_t gap_us_q16 = (int64_t)gap_us * STREAM_US_Q16;
+    record_gap(self, gap_us);
+    self->last_us = now_us;
+    if (self->period_us_q16 == 0) {
+        set_period(self, gap_us_q16);
+        self->settled = 1;
+        return 1;
+    }
+    const int64_t ahead = self->late_us_q16 + gap_us_q16;
+    const unsigned periods = periods_ahead(self, ahead, gap_us_q16);
+    const int64_t off = fx_clamp(ahead - (int64_t)periods * self->period_us_q16, -self->period_us_q16, self->period_us_q16);
+    self->settled += self->settled < STREAM_GAPS ? 1u : 0u;
+    self->late_us_q16 = off - (self->settled < 12 ? off / (int64_t)(self->settled + 1) : off * 2 / 25);
+    find_period(self, off);
+    adapt_margin(self);
+    return periods;
+}

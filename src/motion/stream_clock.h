@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: MIT
+ * stream_clock.h - the time line of a sender, found from the arrivals of its samples: period, losses, lateness.
+ * Mean interval at first, then a second-order phase-locked loop. Reads no clock; private to src/motion.
+ */
+#ifndef STREAM_CLOCK_H
+#define STREAM_CLOCK_H
+
+#include "heave/stream.h"
+
+#define STREAM_US_Q16 65536 /**< one us in the clock's Q16 */
+
+/** Forgets everything; the first sample came at now_us. */
+void stream_clock_start(stream_clock_t *self, uint64_t now_us);
+
+/** True if a sample at now_us still belongs to the stream of the last one. */
+bool stream_clock_is_near(const stream_clock_t *self, uint64_t now_us);
+
+/** True if a sample at now_us comes too soon to be of the next period, whatever the jitter. */
+bool stream_clock_is_soon(const stream_clock_t *self, uint64_t now_us);
+
+/** us since the newest sample, at most UINT32_MAX; 0 if now_us is before it. */
+uint32_t stream_clock_elapsed_us(const stream_clock_t *self, uint64_t now_us);
+
+/** Takes the arrival of a sample that is near.
+ *  @return periods of the sender since the sample before: 1, more after losses, 0 if it belongs to the same period */
+unsigned stream_clock_take(stream_clock_t *self, uint64_t now_us);
+
+/** Periods from the time of the newest sample to now_us, less the margin. Q32. Period known. */
+q32_t stream_clock_periods(const stream_clock_t *self, uint64_t now_us);
+
+/** Periods in a span. Q32. Period known. */
+q32_t stream_clock_span(const stream_clock_t *self, uint32_t span_us);
+
+#endif

@@ -1,0 +1,804 @@
+/* SPDX-License-Identifier: MIT
+ * test_stream.c - the stream reconstruction: steps, exactness, quality on motion-cue signals, hostile arrivals, ends.
+ * Signals and arrivals are made here in double precision from fixed seeds; what is measured is the reference itself.
+ */
+#include "heave/stream.h"
+#include "unity.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CYCLE_US 1000u
+#define LONG_MS  40000
+#define SAMPLES  10000
+#define CUES     20
+#define SINES    8
+
+static stream_t s_stream;
+static uint64_t s_random;
+
+void hv_assert_failed(const char *file, int line)
+{
+    printf("%s:%d: assertion\n", file, line);
+    abort();
+}
+
+void setUp(void)
+{
+    s_random = 88172645463325252u;
+    stream_init(&s_stream, CYCLE_US, 1, STREAM_SMOOTH);
+}
+
+void tearDown(void) {}
+
+/* ---- signals ---- */
+
+static double random_unit(void)
+{
+    s_random ^= s_random << 13;
+    s_random ^= s_random >> 7;
+    s_random ^= s_random << 17;
+    return (double)(s_random >> 11) / 9007199254740992.0;
+}
+
+static q32_t q32(double value)
+{
+    return (q32_t)llround(value * 65536.0) * 65536;
+}
+
+static double mm(q32_t value)
+{
+    return (double)value / 4294967296.0;
+}
+
+/* A motion cue signal: slow sines on a 100 mm axis and onsets that wash out. */
+static struct {
+    double amplitude[SINES], hz[SINES], phase[SINES], cue_at[CUES], cue[CUES];
+} s_signal;
+
+static void make_signal(unsigned seed)
+{
+    s_random = 88172645463325252u + seed * 7919u;
+    for (int i = 0; i < 20; i++) {
+        random_unit();
+    }
+    double sum = 0;
+    for (int i = 0; i < SINES; i++) {
+        s_signal.hz[i] = 0.1 * pow(20.0, (i + 0.6 * random_unit()) / (SINES - 0.4));
+        s_signal.amplitude[i] = (0.5 + random_unit()) / pow(s_signal.hz[i], 1.3);
+        s_signal.phase[i] = 6.283185307 * random_unit();
+        sum += s_signal.amplitude[i];
+    }
+    double at = 1.0;
+    for (int i = 0; i < CUES; i++) {
+        s_signal.cue_at[i] = at;
+        s_signal.cue[i] = (random_unit() < 0.5 ? -1 : 1) * (3 + 7 * random_unit());
+        at += 1.5 + 3 * random_unit();
+    }
+    for (int i = 0; i < SINES; i++) {
+        s_signal.amplitude[i] *= 45 / sum;
+    }
+}
+
+static double signal_at(double t)
+{
+    double sum = 0;
+    for (int i = 0; i < SINES; i++) {
+        sum += s_signal.amplitude[i] * sin(6.283185307 * s_signal.hz[i] * t + s_signal.phase[i]);
+    }
+    for (int i = 0; i < CUES && t > s_signal.cue_at[i]; i++) {
+        const double since = t - s_signal.cue_at[i];
+        const double x = since < 0.3 ? since / 0.3 : 1;
+        sum += s_signal.cue[i] * x * x * x * x * (35 + x * (-84 + x * (70 - 20 * x))) * exp(-since);
+    }
+    return sum;
+}
+
+/* ---- senders ---- */
+
+typedef struct {
+    double rate_hz, jitter_ms, loss;
+} network_t;
+
+/* What has been sent and when it arrives. */
+static struct {
+    int count;
+    double at[SAMPLES], value[SAMPLES];
+} s_sent;
+
+static void send(double at, double value)
+{
+    TEST_ASSERT_TRUE(s_sent.count < SAMPLES);
+    const double before = s_sent.count > 0 ? s_sent.at[s_sent.count - 1] : 0;
+    s_sent.at[s_sent.count] = at > before ? at : before;
+    s_sent.value[s_sent.count++] = round(value * 1000) / 1000; /* as text with 3 decimals */
+}
+
+/* Sends the signal from one time to another through a network that delays by 2 ms and the jitter, and loses. */
+static void send_signal(const network_t *network, double from, double to)
+{
+    for (double at = from; at < to; at += 1 / network->rate_hz) {
+        const double arrival = at + 0.002 + 0.001 * network->jitter_ms * random_unit();
+        if (random_unit() >= network->loss) {
+            send(arrival, signal_at(at));
+        }
+    }
+}
+
+static ramp_ref_t s_ref[LONG_MS];
+
+/* Pushes what was sent and steps each millisecond. */
+static void render(uint64_t origin_us, int from_ms, int to_ms)
+{
+    static int next;
+    next = from_ms == 0 ? 0 : next;
+    for (int ms = from_ms; ms < to_ms; ms++) {
+        const uint64_t now_us = origin_us + (uint64_t)ms * 1000u;
+        for (; next < s_sent.count && s_sent.at[next] * 1000 <= ms; next++) {
+            const q32_t sample = q32(s_sent.value[next]);
+            stream_push(&s_stream, now_us, &sample);
+        }
+        s_ref[ms] = (ramp_ref_t){0};
+        stream_step(&s_stream, now_us, &s_ref[ms]);
+    }
+}
+
+static void start(stream_style_t style)
+{
+    stream_init(&s_stream, CYCLE_US, 1, style);
+    s_sent.count = 0;
+}
+
+/* ---- measurements ---- */
+
+typedef struct {
+    double lag_ms, shape_um, jerk, jerk_true, worst_mm;
+} quality_t;
+
+static double shape_error(int from_ms, int to_ms, double lag_ms)
+{
+    double sum = 0;
+    int count = 0;
+    for (int ms = from_ms; ms < to_ms; ms += 29, count++) {
+        const double error = mm(s_ref[ms].pos_q32) - signal_at(0.001 * (ms - lag_ms));
+        sum += error * error;
+    }
+    return sqrt(sum / count);
+}
+
+static double best_lag(int from_ms, int to_ms, double low, double high)
+{
+    while (high - low > 0.05) { /* the error has one minimum near the lag */
+        const double third = (high - low) / 3;
+        if (shape_error(from_ms, to_ms, low + third) < shape_error(from_ms, to_ms, high - third)) {
+            high -= third;
+        } else {
+            low += third;
+        }
+    }
+    return (low + high) / 2;
+}
+
+static quality_t measure(int from_ms, int to_ms, double lag_max_ms)
+{
+    quality_t quality = {.lag_ms = best_lag(from_ms, to_ms, 0, lag_max_ms)};
+    quality.shape_um = 1000 * shape_error(from_ms, to_ms, quality.lag_ms);
+    double sum = 0, sum_true = 0, truth[4] = {0};
+    for (int ms = from_ms; ms < to_ms; ms++) {
+        memmove(&truth[1], truth, sizeof truth - sizeof truth[0]);
+        truth[0] = signal_at(0.001 * (ms - quality.lag_ms));
+        quality.worst_mm = fmax(quality.worst_mm, fabs(mm(s_ref[ms].pos_q32) - truth[0]));
+        if (ms >= from_ms + 3) {
+            sum += pow(1e9 * mm(s_ref[ms].jerk_per_cycle3_q32), 2);
+            sum_true += pow(1e9 * (truth[0] - 3 * truth[1] + 3 * truth[2] - truth[3]), 2);
+        }
+    }
+    quality.jerk = sqrt(sum / (to_ms - from_ms - 3));
+    quality.jerk_true = sqrt(sum_true / (to_ms - from_ms - 3));
+    return quality;
+}
+
+/* 40 s of a seed's signal; measured from a time on. */
+static quality_t measure_seed(unsigned seed, stream_style_t style, const network_t *network, int from_ms)
+{
+    make_signal(seed);
+    start(style);
+    send_signal(network, random_unit() / network->rate_hz, LONG_MS * 0.001);
+    render(0, 0, LONG_MS);
+    return measure(from_ms, LONG_MS, 4000 / network->rate_hz + 10);
+}
+
+static void assert_differences(const ramp_ref_t *before, const ramp_ref_t *ref)
+{
+    TEST_ASSERT_EQUAL_INT64(ref->pos_q32 - before->pos_q32, ref->vel_per_cycle_q32);
+    TEST_ASSERT_EQUAL_INT64(ref->vel_per_cycle_q32 - before->vel_per_cycle_q32, ref->acc_per_cycle2_q32);
+    TEST_ASSERT_EQUAL_INT64(ref->acc_per_cycle2_q32 - before->acc_per_cycle2_q32, ref->jerk_per_cycle3_q32);
+}
+
+static void assert_at_rest(q32_t pos_q32, const ramp_ref_t *ref)
+{
+    TEST_ASSERT_EQUAL_INT64(pos_q32, ref->pos_q32);
+    TEST_ASSERT_EQUAL_INT64(0, ref->vel_per_cycle_q32);
+    TEST_ASSERT_EQUAL_INT64(0, ref->acc_per_cycle2_q32);
+    TEST_ASSERT_EQUAL_INT64(0, ref->jerk_per_cycle3_q32);
+}
+
+/* Largest magnitude of the velocity, in mm/s. */
+static double speed_max(int from_ms, int to_ms)
+{
+    double most = 0;
+    for (int ms = from_ms; ms < to_ms; ms++) {
+        most = fmax(most, fabs(1000 * mm(s_ref[ms].vel_per_cycle_q32)));
+    }
+    return most;
+}
+
+static double signal_speed_max(double from, double to)
+{
+    double most = 0;
+    for (double t = from; t < to; t += 0.005) {
+        most = fmax(most, fabs(signal_at(t + 0.001) - signal_at(t)) * 1000);
+    }
+    return most;
+}
+
+/* ---- steps ---- */
+
+static void test_stream_step_without_sample_returns_false(void)
+{
+    ramp_ref_t ref = {1, 2, 3, 4};
+    TEST_ASSERT_FALSE(stream_step(&s_stream, 1000, &ref));
+    TEST_ASSERT_EQUAL_INT64(1, ref.pos_q32);
+    TEST_ASSERT_EQUAL_INT64(4, ref.jerk_per_cycle3_q32);
+    const q32_t sample = 77;
+    stream_push(&s_stream, 1000, &sample);
+    TEST_ASSERT_TRUE(stream_step(&s_stream, 1000, &ref));
+    stream_reset(&s_stream);
+    TEST_ASSERT_FALSE(stream_step(&s_stream, 2000, &ref));
+}
+
+static void test_stream_step_lone_sample_is_a_step(void)
+{
+    start(STREAM_SMOOTH);
+    send(0.010, 12.345);
+    send(0.010 + 0.0005 + 0.001 * STREAM_PERIOD_MAX_US / 1000 + 0.001, -50); /* too late to be a stream */
+    render(1, 0, 1000);
+    assert_at_rest(q32(12.345), &s_ref[10]);
+    assert_at_rest(q32(12.345), &s_ref[161]);
+    assert_at_rest(q32(-50), &s_ref[162]);
+    assert_at_rest(q32(-50), &s_ref[999]);
+    TEST_ASSERT_FALSE(stream_is_live(&s_stream, 1000000));
+    TEST_ASSERT_EQUAL_UINT32(0, stream_period_us(&s_stream));
+}
+
+static void test_stream_push_two_samples_at_once_steps_to_the_second(void)
+{
+    start(STREAM_SMOOTH);
+    send(0.010, 1);
+    send(0.010, 2);
+    render(0, 0, 500);
+    assert_at_rest(q32(2), &s_ref[10]);
+    assert_at_rest(q32(2), &s_ref[499]);
+}
+
+/* The curve starts at rest on the first sample, and comes to the second without a jump or an overshoot. */
+static void test_stream_step_second_sample_starts_at_the_first(void)
+{
+    start(STREAM_SMOOTH);
+    send(0.010, 10);
+    send(0.030, 20);
+    render(0, 0, 500);
+    assert_at_rest(q32(10), &s_ref[10]);
+    assert_at_rest(q32(10), &s_ref[31]);
+    for (int ms = 31; ms < 500; ms++) {
+        assert_differences(&s_ref[ms - 1], &s_ref[ms]);
+        TEST_ASSERT_TRUE(s_ref[ms].vel_per_cycle_q32 >= -2);
+        TEST_ASSERT_TRUE(s_ref[ms].pos_q32 <= q32(20) + 2);
+    }
+    TEST_ASSERT_TRUE(speed_max(31, 500) < 510); /* 10 mm in 20 ms */
+    assert_at_rest(q32(20), &s_ref[120]);
+}
+
+/* ---- exactness ---- */
+
+static void test_stream_step_constant_samples_give_a_constant_reference(void)
+{
+    const network_t network = {60, 8, 0.05};
+    const q32_t values[] = {0, 1, -1, 0x123456789ABCD, -0x7FFFFFFFFFFF, Q32_ONE / 3};
+    for (unsigned style = STREAM_SMOOTH; style <= STREAM_FAST; style++) {
+        for (unsigned i = 0; i < sizeof values / sizeof values[0]; i++) {
+            start(style);
+            send_signal(&network, 0, 2);
+            int next = 0;
+            for (int ms = 0; ms < 2000; ms++) {
+                ramp_ref_t ref;
+                for (; next < s_sent.count && s_sent.at[next] * 1000 <= ms; next++) {
+                    stream_push(&s_stream, (uint64_t)ms * 1000, &values[i]);
+                }
+                if (stream_step(&s_stream, (uint64_t)ms * 1000, &ref)) {
+                    assert_at_rest(values[i], &ref);
+                }
+            }
+        }
+    }
+}
+
+static void test_stream_step_differences_are_consistent(void)
+{
+    const network_t network = {60, 5, 0.03};
+    for (unsigned style = STREAM_SMOOTH; style <= STREAM_FAST; style++) {
+        make_signal(5);
+        start(style);
+        send_signal(&network, 0.0005, 10);
+        render(0, 0, 10000);
+        for (int ms = 10; ms < 10000; ms++) {
+            assert_differences(&s_ref[ms - 1], &s_ref[ms]);
+        }
+    }
+}
+
+/* The samples go on but do not change: exactly there, although the arrivals keep jittering. */
+static void test_stream_step_signal_that_stops_is_met_exactly(void)
+{
+    const network_t network = {60, 5, 0.01};
+    make_signal(2);
+    start(STREAM_SMOOTH);
+    send_signal(&network, 0, 4);
+    const double last = s_sent.value[s_sent.count - 1];
+    for (double at = 4.01; at < 6; at += 1 / 60.0) {
+        send(at + 0.005 * random_unit(), last);
+    }
+    render(0, 0, 6000);
+    for (int ms = 4200; ms < 6000; ms++) {
+        assert_at_rest(q32(last), &s_ref[ms]);
+    }
+}
+
+static void test_stream_step_time_near_its_end_gives_the_same_bits(void)
+{
+    static ramp_ref_t plain[5000];
+    const network_t network = {60, 5, 0.02};
+    make_signal(6);
+    start(STREAM_SMOOTH);
+    send_signal(&network, 0.003, 5);
+    render(0, 0, 5000);
+    memcpy(plain, s_ref, sizeof plain);
+    const uint64_t origins_us[] = {1, (UINT64_C(1) << 63) - 2000000, UINT64_MAX - 5000000};
+    for (int i = 0; i < 3; i++) {
+        stream_reset(&s_stream);
+        render(origins_us[i], 0, 5000);
+        TEST_ASSERT_EQUAL_MEMORY(plain, s_ref, sizeof plain);
+    }
+}
+
+static void test_stream_step_axes_share_the_clock_and_nothing_else(void)
+{
+    static stream_t seven, one[AXES_MAX];
+    stream_init(&seven, CYCLE_US, AXES_MAX, STREAM_SMOOTH);
+    for (unsigned axis = 0; axis < AXES_MAX; axis++) {
+        stream_init(&one[axis], CYCLE_US, 1, STREAM_SMOOTH);
+    }
+    for (int ms = 0; ms < 3000; ms++) {
+        const uint64_t now_us = (uint64_t)ms * 1000;
+        if (random_unit() < 0.05) {
+            q32_t sample[AXES_MAX];
+            for (unsigned axis = 0; axis < AXES_MAX; axis++) {
+                sample[axis] = q32(200 * random_unit() - 100);
+                stream_push(&one[axis], now_us, &sample[axis]);
+            }
+            stream_push(&seven, now_us, sample);
+        }
+        ramp_ref_t ref[AXES_MAX] = {{0}}, ref_one;
+        const bool is_running = stream_step(&seven, now_us, ref);
+        for (unsigned axis = 0; axis < AXES_MAX; axis++) {
+            ref_one = (ramp_ref_t){0};
+            TEST_ASSERT_EQUAL(is_running, stream_step(&one[axis], now_us, &ref_one));
+            TEST_ASSERT_EQUAL_MEMORY(&ref_one, &ref[axis], sizeof ref_one);
+        }
+    }
+}
+
+/* ---- quality ---- */
+
+static const network_t k_usual = {60, 5, 0.01};
+
+static void test_stream_smooth_on_cue_signals_keeps_its_figures(void)
+{
+    double sum = 0, sum_true = 0;
+    for (unsigned seed = 1; seed <= 10; seed++) {
+        const quality_t cold = measure_seed(seed, STREAM_SMOOTH, &k_usual, 300);
+
+        const quality_t quality = measure(2000, LONG_MS, 80);
+        TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 2.5);
+        TEST_ASSERT_TRUE(quality.shape_um <= 25);
+        TEST_ASSERT_TRUE(quality.worst_mm <= 0.2);
+        TEST_ASSERT_TRUE(quality.jerk <= 1.45 * quality.jerk_true); /* a loss at an onset weighs much in one seed */
+        sum += quality.jerk * quality.jerk;
+        sum_true += quality.jerk_true * quality.jerk_true;
+        if (getenv("STREAM_FIGURES")) {
+            printf("smooth %2u: lag %.1f ms shape %.1f um (cold %.1f) worst %.3f mm jerk %.0f = %.2f x (cold %.2f)\n", seed,
+                   quality.lag_ms, quality.shape_um, cold.shape_um, quality.worst_mm, quality.jerk,
+                   quality.jerk / quality.jerk_true, cold.jerk / cold.jerk_true);
+        }
+    }
+    TEST_ASSERT_TRUE(sqrt(sum / sum_true) <= 1.2);
+}
+
+static void test_stream_fast_on_cue_signals_keeps_its_figures(void)
+{
+    for (unsigned seed = 1; seed <= 5; seed++) {
+        const quality_t quality = measure_seed(seed, STREAM_FAST, &k_usual, 2000);
+        TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 2.0);
+        TEST_ASSERT_TRUE(quality.shape_um <= 25);
+        TEST_ASSERT_TRUE(quality.jerk <= 4.5 * quality.jerk_true);
+        if (getenv("STREAM_FIGURES")) {
+            printf("fast %2u: lag %.1f ms shape %.1f um worst %.3f mm jerk %.2f x\n", seed, quality.lag_ms, quality.shape_um,
+                   quality.worst_mm, quality.jerk / quality.jerk_true);
+        }
+    }
+}
+
+/* Jitter 30 % of the period: known to 1 % from 32 samples on; the shape near the signal: the bound grows with the distance of the
+ * samples. */
+static void test_stream_step_all_rates_converge(void)
+{
+    const int rates[] = {7, 10, 20, 30, 50, 60, 100, 200, 250};
+    for (unsigned i = 0; i < sizeof rates / sizeof rates[0]; i++) {
+        const network_t network = {rates[i], 300.0 / rates[i], 0.02};
+        make_signal(3);
+        start(STREAM_SMOOTH);
+        send_signal(&network, 0.0013, LONG_MS * 0.001);
+        const int known_ms = 32000 / rates[i] + 50;
+        render(0, 0, known_ms);
+        double off = 0;
+        for (int ms = known_ms; ms < LONG_MS; ms++) {
+            render(0, ms, ms + 1);
+            off = fmax(off, fabs(stream_period_us(&s_stream) * 1e-6 * rates[i] - 1));
+        }
+        const quality_t quality = measure(known_ms, LONG_MS, 4000.0 / rates[i] + 10);
+        if (getenv("STREAM_FIGURES")) {
+            printf("rate %3d: period off %.2f %% lag %.2f periods shape %.1f um worst %.3f mm jerk %.2f x\n", rates[i], 100 * off,
+                   quality.lag_ms * rates[i] / 1000, quality.shape_um, quality.worst_mm, quality.jerk / quality.jerk_true);
+        }
+        TEST_ASSERT_TRUE(off <= 0.01);
+        TEST_ASSERT_TRUE(quality.lag_ms <= 2500.0 / rates[i] + 4.5);
+        TEST_ASSERT_TRUE(quality.shape_um <= 25 + 35e3 / rates[i] / rates[i]);
+    }
+}
+
+/* Losses among the first samples are told from the period, in every one of 100 starts. */
+static void test_stream_step_lossy_start_finds_the_period(void)
+{
+    const network_t network = {60, 5, 0.05};
+    double early = 0, late = 0;
+    for (unsigned seed = 0; seed < 100; seed++) {
+        make_signal(seed);
+        start(STREAM_SMOOTH);
+        send_signal(&network, random_unit() / 60, 3);
+        render(0, 0, 700);
+        for (int ms = 700; ms < 3000; ms++) {
+            render(0, ms, ms + 1);
+            double *const off = ms < 1500 ? &early : &late;
+            *off = fmax(*off, fabs(stream_period_us(&s_stream) * 60e-6 - 1));
+        }
+    }
+    if (getenv("STREAM_FIGURES")) {
+        printf("start: period off %.2f %%, from 1.5 s on %.2f %%\n", 100 * early, 100 * late);
+    }
+    TEST_ASSERT_TRUE(early < 0.04);
+    TEST_ASSERT_TRUE(late < 0.01);
+}
+
+/* ---- ends ---- */
+
+/* What one period of extrapolation adds to the last sample. */
+static double lead_of_last(void)
+{
+    const double *v = &s_sent.value[s_sent.count - 1];
+    return fabs(2 * v[0] - 3 * v[-1] + v[-2]);
+}
+
+static void test_stream_step_ended_stream_rests_on_its_last_sample(void)
+{
+    double worst = 0;
+    for (int i = 0; i < 200; i++) {
+        const network_t network = {i % 2 ? 60 : 100, 4, 0};
+        make_signal((unsigned)i % 10);
+        start(i % 3 ? STREAM_SMOOTH : STREAM_FAST);
+        send_signal(&network, 0, 1.2 + 0.01 * i);
+        const int end_ms = (int)(1200 + 10 * i);
+        render(0, 0, end_ms + 350);
+        const double last = s_sent.value[s_sent.count - 1];
+        const double lead = lead_of_last(), way = last - s_sent.value[s_sent.count - 2];
+        for (int ms = end_ms; ms < end_ms + 350; ms++) {
+            assert_differences(&s_ref[ms - 1], &s_ref[ms]);
+            const double beyond = (mm(s_ref[ms].pos_q32) - last) * (way < 0 ? -1 : 1);
+            worst = fmax(worst, lead > 0.2 ? beyond / lead : 0);
+            TEST_ASSERT_TRUE(beyond <= 2 * lead + fabs(way) + 0.1);
+        }
+        assert_at_rest(q32(last), &s_ref[end_ms + 300]);
+    }
+    if (getenv("STREAM_FIGURES")) {
+        printf("end: beyond the last sample %.2f leads at most\n", worst);
+    }
+    TEST_ASSERT_TRUE(worst > 1); /* the bound was tried */
+}
+
+/* Neither from rest nor out of a slow motion of 0.05 mm a sample. */
+static void test_stream_step_jump_at_the_end_is_not_continued(void)
+{
+    for (int kind = 0; kind < 4; kind++) {
+        const double step = kind / 2 * 0.05;
+        start(STREAM_SMOOTH);
+        for (int i = 0; i < 61 + kind % 2; i++) {
+            send(0.005 + i / 60.0, i < 60 ? 10 - step * (60 - i) : 60);
+        }
+        render(0, 0, 1500);
+        for (int ms = 5; ms < 1500; ms++) {
+            TEST_ASSERT_TRUE(s_ref[ms].pos_q32 >= q32(10 - step * 60) - 2 && s_ref[ms].pos_q32 <= q32(60 + 8 * step) + 2);
+        }
+        assert_at_rest(q32(60), &s_ref[1400]);
+    }
+}
+
+static void test_stream_step_after_an_end_starts_again(void)
+{
+    make_signal(4);
+    start(STREAM_SMOOTH);
+    send_signal(&k_usual, 0, 2);
+    const double last = s_sent.value[s_sent.count - 1];
+    const int again = s_sent.count;
+    send_signal(&k_usual, 2.3, 6); /* a pause of 0.3 s */
+    render(0, 0, 6000);
+    const int again_ms = (int)ceil(s_sent.at[again] * 1000);
+    assert_at_rest(q32(last), &s_ref[again_ms - 1]);
+    assert_at_rest(q32(s_sent.value[again]), &s_ref[again_ms]);
+    assert_at_rest(q32(s_sent.value[again]), &s_ref[again_ms + 10]);
+    for (int ms = again_ms + 1; ms < 6000; ms++) {
+        assert_differences(&s_ref[ms - 1], &s_ref[ms]);
+    }
+    TEST_ASSERT_TRUE(measure(3000, 6000, 80).shape_um < 40);
+}
+
+static void test_stream_is_live_while_samples_come(void)
+{
+    const network_t network = {50, 0, 0};
+    make_signal(1);
+    start(STREAM_FAST);
+    send_signal(&network, 0, 2);
+    TEST_ASSERT_FALSE(stream_is_live(&s_stream, 0));
+    TEST_ASSERT_EQUAL_UINT32(0, stream_delay_us(&s_stream));
+    render(0, 0, 2000);
+    TEST_ASSERT_TRUE(stream_is_live(&s_stream, 1999000));
+    TEST_ASSERT_UINT32_WITHIN(100, 20000, stream_period_us(&s_stream));
+    TEST_ASSERT_UINT32_WITHIN(2500, 32500, stream_delay_us(&s_stream));
+    TEST_ASSERT_FALSE(stream_is_live(&s_stream, 2140000));
+    render(0, 2000, 3000);
+    TEST_ASSERT_FALSE(stream_is_live(&s_stream, 2999000));
+    TEST_ASSERT_EQUAL_UINT32(0, stream_period_us(&s_stream));
+}
+
+/* ---- senders and networks that misbehave ---- */
+
+/* Largest distance to what the signal was when rendered, while the delay is within the bound given in stream.h. */
+static double worst_error(int from_ms, int to_ms, double lag_ms)
+{
+    double worst = 0;
+    for (int ms = from_ms; ms < to_ms; ms++) {
+        worst = fmax(worst, fabs(mm(s_ref[ms].pos_q32) - signal_at(0.001 * (ms - lag_ms))));
+    }
+    return worst;
+}
+
+/* Renders and checks in every cycle that the delay reported stays within the bound. */
+static double delay_max_periods(int from_ms, int to_ms)
+{
+    double most = 0;
+    for (int ms = from_ms; ms < to_ms; ms++) {
+        render(0, ms, ms + 1);
+        if (stream_period_us(&s_stream) > 0) {
+            most = fmax(most, (double)stream_delay_us(&s_stream) / stream_period_us(&s_stream));
+        }
+    }
+    return most;
+}
+
+static void report(const char *what, int from_ms, int to_ms, double delay)
+{
+    if (getenv("STREAM_FIGURES")) {
+        printf("%s: speed %.0f of %.0f mm/s, worst %.2f mm, delay at most %.2f periods, period %u us\n", what,
+               speed_max(from_ms, to_ms), signal_speed_max(0.001 * from_ms, 0.001 * to_ms), worst_error(from_ms, to_ms, 45),
+               delay, (unsigned)stream_period_us(&s_stream));
+    }
+}
+
+static void test_stream_step_changing_rates_are_followed(void)
+{
+    const double rates[] = {60, 30, 100, 20, 60, 45};
+    make_signal(9);
+    start(STREAM_SMOOTH);
+    for (int i = 0; i < 6; i++) {
+        const network_t network = {rates[i], 3, 0.01};
+        send_signal(&network, 0.001 + 4 * i, 4 * (i + 1));
+    }
+    for (int i = 0; i < 6; i++) {
+        const int from_ms = 4000 * i, to_ms = from_ms + 4000;
+        const double delay = delay_max_periods(from_ms, to_ms);
+        report("rate", from_ms + 200, to_ms, delay);
+        TEST_ASSERT_TRUE(delay < 4.5);
+        TEST_ASSERT_TRUE(speed_max(from_ms + 200, to_ms) < 4 * signal_speed_max(0.001 * from_ms - 0.3, 0.001 * to_ms));
+        TEST_ASSERT_TRUE(measure(from_ms + 2000, to_ms, 4000 / rates[i]).shape_um < 50 + 40e3 / rates[i] / rates[i]);
+        TEST_ASSERT_TRUE(fabs(stream_period_us(&s_stream) * 1e-6 * rates[i] - 1) < 0.01);
+    }
+    for (int ms = 100; ms < 23000; ms++) {
+        assert_differences(&s_ref[ms - 1], &s_ref[ms]);
+    }
+}
+
+/* The acceleration stays continuous when the rate is found anew: on a straight motion all of it comes from the pace of rendering,
+ * and goes up over some cycles, not in one. */
+static void test_stream_step_new_rate_gives_no_jump_of_acceleration(void)
+{
+    start(STREAM_SMOOTH);
+    for (int i = 0; i < 100; i++) {
+        send(0.0012 + i / 30.0, 60 * i / 30.0); /* 60 mm/s */
+    }
+    for (int i = 0; i < 100; i++) {
+        send(0.0012 + 100 / 30.0 + i / 60.0, 200 + 60 * i / 60.0);
+    }
+    render(0, 0, 4800);
+    int64_t acc = 0, jerk = 0;
+    for (int ms = 3300; ms < 4800; ms++) {
+        acc = llabs(s_ref[ms].acc_per_cycle2_q32) > acc ? llabs(s_ref[ms].acc_per_cycle2_q32) : acc;
+        jerk = llabs(s_ref[ms].jerk_per_cycle3_q32) > jerk ? llabs(s_ref[ms].jerk_per_cycle3_q32) : jerk;
+    }
+    if (getenv("STREAM_FIGURES")) {
+        printf("new rate: acceleration %.0f mm/s^2, jerk %.0f mm/s^3\n", 1e6 * mm(acc), 1e9 * mm(jerk));
+    }
+    TEST_ASSERT_TRUE(jerk * 4 < acc);
+}
+
+/* A frame rate that wanders between 45 and 75 Hz, as a game's does. */
+static void test_stream_step_wandering_rate_is_followed(void)
+{
+    make_signal(8);
+    start(STREAM_SMOOTH);
+    double rate = 60;
+    for (double at = 0; at < 20; at += 1 / rate) {
+        send(at + 0.002 + 0.002 * random_unit(), signal_at(at));
+        rate = fmin(75, fmax(45, rate + 4 * (random_unit() - 0.5)));
+    }
+    const double delay = delay_max_periods(0, 20000);
+    report("wandering", 500, 20000, delay);
+    TEST_ASSERT_TRUE(delay < 4);
+    TEST_ASSERT_TRUE(speed_max(500, 20000) < 1.5 * signal_speed_max(0, 20));
+    TEST_ASSERT_TRUE(measure(1000, 20000, 80).shape_um < 400);
+}
+
+/* Every second the network holds everything back for up to 120 ms, then delivers it at once. */
+static void test_stream_step_held_back_bursts_are_sorted_in(void)
+{
+    const network_t network = {60, 3, 0};
+    make_signal(7);
+    start(STREAM_SMOOTH);
+    send_signal(&network, 0, 20);
+    for (int i = 0; i < s_sent.count; i++) {
+        const double hold = 0.005 * floor(s_sent.at[i]), within = fmod(s_sent.at[i], 1.0);
+        s_sent.at[i] = within < hold ? floor(s_sent.at[i]) + hold : s_sent.at[i];
+    }
+    const double delay = delay_max_periods(0, 19900);
+    report("bursts", 300, 19900, delay);
+    TEST_ASSERT_TRUE(delay < 5);
+    TEST_ASSERT_TRUE(speed_max(300, 19900) < 4 * signal_speed_max(0, 20));
+    TEST_ASSERT_TRUE(worst_error(300, 19900, 45) < 20);
+}
+
+static void test_stream_step_datagrams_sent_twice_change_nothing(void)
+{
+    static ramp_ref_t plain[5000];
+    make_signal(6);
+    start(STREAM_SMOOTH);
+    send_signal(&k_usual, 0.0003, 5);
+    render(0, 0, 5000);
+    memcpy(plain, s_ref, sizeof plain);
+    const int count = s_sent.count;
+    for (int i = 2 * count - 1; i >= 0; i--) {
+        s_sent.at[i] = s_sent.at[i / 2];
+        s_sent.value[i] = s_sent.value[i / 2];
+    }
+    s_sent.count = 2 * count;
+    stream_reset(&s_stream);
+    render(0, 0, 5000);
+    TEST_ASSERT_EQUAL_MEMORY(plain, s_ref, sizeof plain);
+}
+
+/* Two samples a datagram apart arrive together, always: half the rate in arrivals, all of it in samples. */
+static void test_stream_step_paired_arrivals_are_spread(void)
+{
+    make_signal(5);
+    start(STREAM_SMOOTH);
+    for (int i = 0; i < 600; i++) {
+        send((i / 2 * 2 + 1) / 60.0 + 0.003, signal_at(i / 60.0));
+    }
+    const double delay = delay_max_periods(0, 9900);
+    report("pairs", 500, 9900, delay);
+    TEST_ASSERT_TRUE(measure(1000, 9900, 90).shape_um < 200);
+}
+
+static void test_stream_step_flood_is_thinned_out(void)
+{
+    make_signal(5);
+    start(STREAM_SMOOTH);
+    for (int i = 0; i < 6000; i++) {
+        send(0.001 + 0.0005 * i, signal_at(0.0005 * i));
+    }
+    const double delay = delay_max_periods(0, 2900);
+    report("flood", 50, 2900, delay);
+    TEST_ASSERT_EQUAL_UINT32(STREAM_PERIOD_MIN_US, stream_period_us(&s_stream));
+    TEST_ASSERT_TRUE(delay < 4.5);
+    TEST_ASSERT_TRUE(speed_max(50, 2900) < 2 * signal_speed_max(0, 3));
+    TEST_ASSERT_TRUE(measure(200, 2900, 40).shape_um < 400);
+}
+
+/* Noise for samples, arrivals of every kind, cycles left out: nothing runs away, nothing is inconsistent. */
+static void test_stream_step_noise_stays_bounded(void)
+{
+    const q32_t range = 50 * Q32_ONE;
+    const uint32_t cycles_us[] = {500, 1000, 10000};
+    for (int run = 0; run < 60; run++) {
+        const uint32_t cycle_us = cycles_us[run % 3];
+        stream_init(&s_stream, cycle_us, 1, run % 2 ? STREAM_SMOOTH : STREAM_FAST);
+        ramp_ref_t ref = {0};
+        uint64_t now_us = 0;
+        q32_t low = range, high = -range;
+        for (int i = 0; i < 5000; i++) {
+            now_us += random_unit() < 0.01 ? (uint64_t)(random_unit() * 300000) : cycle_us;
+            const double chance = run < 30 ? 0.01 * (run + 1) : 0.5;
+            while (random_unit() < chance) {
+                const q32_t sample = (q32_t)((random_unit() * 2 - 1) * (double)range);
+                low = sample < low ? sample : low;
+                high = sample > high ? sample : high;
+                stream_push(&s_stream, now_us, &sample);
+            }
+            if (!stream_step(&s_stream, now_us, &ref)) {
+                continue;
+            }
+            const q32_t span = high - low; /* a guess goes at most 2 leads of 3 spans beyond */
+            TEST_ASSERT_TRUE(ref.pos_q32 >= low - 6 * span - 2 && ref.pos_q32 <= high + 6 * span + 2);
+            TEST_ASSERT_TRUE(stream_period_us(&s_stream) <= 200000);
+        }
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_stream_step_without_sample_returns_false);
+    RUN_TEST(test_stream_step_lone_sample_is_a_step);
+    RUN_TEST(test_stream_push_two_samples_at_once_steps_to_the_second);
+    RUN_TEST(test_stream_step_second_sample_starts_at_the_first);
+    RUN_TEST(test_stream_step_constant_samples_give_a_constant_reference);
+    RUN_TEST(test_stream_step_differences_are_consistent);
+    RUN_TEST(test_stream_step_signal_that_stops_is_met_exactly);
+    RUN_TEST(test_stream_step_time_near_its_end_gives_the_same_bits);
+    RUN_TEST(test_stream_step_axes_share_the_clock_and_nothing_else);
+    RUN_TEST(test_stream_smooth_on_cue_signals_keeps_its_figures);
+    RUN_TEST(test_stream_fast_on_cue_signals_keeps_its_figures);
+    RUN_TEST(test_stream_step_all_rates_converge);
+    RUN_TEST(test_stream_step_lossy_start_finds_the_period);
+    RUN_TEST(test_stream_step_ended_stream_rests_on_its_last_sample);
+    RUN_TEST(test_stream_step_jump_at_the_end_is_not_continued);
+    RUN_TEST(test_stream_step_after_an_end_starts_again);
+    RUN_TEST(test_stream_is_live_while_samples_come);
+    RUN_TEST(test_stream_step_changing_rates_are_followed);
+    RUN_TEST(test_stream_step_new_rate_gives_no_jump_of_acceleration);
+    RUN_TEST(test_stream_step_wandering_rate_is_followed);
+    RUN_TEST(test_stream_step_held_back_bursts_are_sorted_in);
+    RUN_TEST(test_stream_step_datagrams_sent_twice_change_nothing);
+    RUN_TEST(test_stream_step_paired_arrivals_are_spread);
+    RUN_TEST(test_stream_step_flood_is_thinned_out);
+    RUN_TEST(test_stream_step_noise_stays_bounded);
+    return UNITY_END();
+}
