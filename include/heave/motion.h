@@ -1,0 +1,104 @@
+/* SPDX-License-Identifier: MIT
+ * motion.h - from commands to set-points: where the platform should be this cycle, limited, cylinder by cylinder.
+ * Order: source (step, stream, timed move, path, stop) -> ramps of the pose axes -> workspace -> inverse kinematics -> take-over
+ * blend -> limiter of each cylinder. Nothing reaches an output except through a ramp (ramp.h). Owns no clock and no I/O.
+ */
+#ifndef HEAVE_MOTION_H
+#define HEAVE_MOTION_H
+
+#include "heave/kin.h"
+#include "heave/ramp.h"
+#include "heave/settings.h"
+#include "heave/stream.h"
+
+/** What a target is given in. */
+typedef enum {
+    MOTION_POSE,     /**< roll, pitch, yaw, x, y, z */
+    MOTION_CYLINDERS /**< extensions */
+} motion_space_t;
+
+/** One command of a sender, already in platform axes (signs, scales and offsets applied). */
+typedef struct {
+    motion_space_t space;
+    q32_t value_q32[POSE_AXES]; /**< pose, or extensions from cylinder 1 on [mm] */
+    bool has_angle;
+    q32_t angle_deg_q32; /**< rotation motor; else it keeps its last target */
+    bool is_timed;
+    uint32_t time_ms; /**< of a timed move; 0 = as fast as the limits allow */
+} motion_target_t;
+
+/** What held a cycle's motion back or is going on in it; flags may be combined. */
+enum {
+    MOTION_CLAMPED = 1u << 0,      /**< the pose or an extension was asked for beyond its limits and pulled in */
+    MOTION_SPEED = 1u << 1,        /**< a speed limit held it back */
+    MOTION_ACCEL = 1u << 2,        /**< an acceleration limit did */
+    MOTION_STRETCHED = 1u << 3,    /**< the running timed move takes longer than asked */
+    MOTION_TAKEOVER = 1u << 4,     /**< coming to a sender's first pose at engage speed */
+    MOTION_IN_CYLINDERS = 1u << 5, /**< moving in cylinder space: pose limits do not apply */
+    MOTION_OFF_PATH = 1u << 6,     /**< a cylinder's limiter is not on its reference: pose limits do not hold exactly */
+    MOTION_NO_POSE = 1u << 7       /**< no pose belongs to the extensions: the pose shown is the last one */
+};
+
+/** One cycle's set-points. */
+typedef struct {
+    pose_t asked; /**< what the source asked for, before any limit */
+    pose_t sent;  /**< the pose that belongs to the extensions sent */
+    q32_t extension_mm_q32[CYLINDERS_MAX];
+    q32_t angle_deg_q32;
+    unsigned flags;
+    uint8_t limiting_cylinder; /**< 1-based: the one that bounds a clamped pose, 0 where none does */
+} motion_output_t;
+
+typedef struct motion motion_t;
+
+/** Prepares a platform; everything rests at the settled extension.
+ *  @return HV_OK; HV_ERR_RANGE where a setting is outside its range or neutral and settled positions are out of reach. */
+hv_status_t motion_init(motion_t *self, const settings_t *settings) HV_MUST_CHECK;
+
+/** At rest where the cylinders actually are: before the drives are enabled, and in an e-stop. */
+void motion_place(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q32_t angle_deg_q32);
+
+/** Stops all axes together, as quickly as the limits allow, and stays there. */
+void motion_stop(motion_t *self);
+
+/** Stops if moving, then goes to the settled extension, all cylinders together at engage speed. */
+void motion_settle(motion_t *self);
+
+/** Stops if moving, then rises to the neutral pose likewise. */
+void motion_rise(motion_t *self);
+
+/** Follows targets from now on: the first one, once at rest, at engage speed. */
+void motion_follow(motion_t *self);
+
+/** Takes a target while following (else it is ignored).
+ *  @return HV_OK; HV_ERR_RANGE for extensions no pose belongs to: nothing changes. */
+hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_t now_us) HV_MUST_CHECK;
+
+/** Advances one cycle. Bounded time. */
+void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out);
+
+/** True when a stop, settle or rise has ended and everything is exactly at rest. */
+bool motion_is_done(const motion_t *self);
+
+/** True when every set-point rests. */
+bool motion_is_at_rest(const motion_t *self);
+
+/** End of the timed move that is running, us on the clock of motion_target; 0 where none is. */
+uint64_t motion_timed_end_us(const motion_t *self);
+
+/** Timed moves that had to be stretched since the start. */
+uint32_t motion_stretched_count(const motion_t *self);
+
+/** Extensions at which people board, and those of the neutral pose. */
+const q32_t *motion_settled_extension(const motion_t *self);
+const q32_t *motion_neutral_extension(const motion_t *self);
+
+/** The mechanism, for feedback. */
+const kin_t *motion_kin(const motion_t *self);
+
+/** The stream's state, for display. */
+const stream_t *motion_stream(const motion_t *self);
+
+#include "heave/motion_state.h" /* the definition of motion_t, so that the caller can own one */
+
+#endif

@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: MIT
+ * motion_state.h - definition of motion_t. Members are private to src/motion; include motion.h instead.
+ */
+#ifndef HEAVE_MOTION_STATE_H
+#define HEAVE_MOTION_STATE_H
+
+#include "heave/motion.h"
+#include "heave/profile.h"
+
+/** What moves the platform at the moment. */
+typedef enum {
+    MOTION_RESTING,  /**< nothing: it stays where it is */
+    MOTION_STOPPING, /**< a controlled stop in cylinder space */
+    MOTION_ON_PATH,  /**< an S-curve in cylinder space */
+    MOTION_STREAMED, /**< following: steps and streams */
+    MOTION_TIMED,    /**< following: a quintic */
+    MOTION_STRAIGHT  /**< following: a timed move from rest along an S-curve */
+} motion_source_t;
+
+/** What comes after a stop. */
+typedef enum { MOTION_THEN_REST, MOTION_THEN_PATH, MOTION_THEN_FOLLOW, MOTION_THEN_STRAIGHT } motion_next_t;
+
+struct motion {
+    kin_t kin;
+    unsigned cylinders;
+    uint32_t cycle_us;
+    pose_t neutral;
+    pose_t settled_pose;
+    q32_t neutral_mm_q32[CYLINDERS_MAX];
+    q32_t settled_mm_q32[CYLINDERS_MAX];
+    ramp_limits_t engage_limits; /**< of every cylinder on a path and at a take-over */
+
+    ramp_t axis[AXES_MAX];              /**< pose axes and the rotation motor */
+    ramp_t cylinder[CYLINDERS_MAX];     /**< the limiter */
+    history_t reference[CYLINDERS_MAX]; /**< what the limiter was last asked for */
+    pose_t pose;                        /**< last pose sent; where forward kinematics starts */
+    bool is_pose_stale;                 /**< the extensions were placed: the pose has to be found even at rest */
+
+    motion_source_t source;
+    motion_next_t next;
+    motion_space_t space;
+    stream_t stream;
+    quintic_t quintic;
+    scurve_t path;
+    q32_t path_from_q32[AXES_MAX];
+    q32_t path_to_q32[AXES_MAX];
+    history_t path_history[AXES_MAX];
+
+    bool is_following;
+    bool is_taking_over; /**< the take-over blend is running or still to come */
+    bool is_blend_planned;
+    scurve_t blend;
+    int64_t blend_share[3]; /**< blend.pos of the last three cycles */
+    unsigned blend_rest;    /**< cycles since the blend has arrived */
+    q32_t blend_from_q32[CYLINDERS_MAX];
+
+    bool has_pending; /**< a target that waits for the end of a stop */
+    motion_target_t pending;
+    q32_t angle_target_deg_q32;
+    uint64_t last_timed_us; /**< arrival of the last timed target, 0 before the first */
+    uint64_t timed_end_us;
+    int64_t straight_cycles; /**< left for the straight part of a timed move that begins with a stop */
+    bool is_stretched;
+    bool is_clamped;           /**< the last target was pulled in */
+    uint8_t limiting_cylinder; /**< by this cylinder, 0 where none bounds it */
+    uint32_t stretched_count;
+};
+
+#endif

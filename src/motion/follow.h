@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT
+ * follow.h - following a sender: poses or extensions, streamed or timed, and the take-over of its first pose. Private to
+ * src/motion.
+ */
+#ifndef FOLLOW_H
+#define FOLLOW_H
+
+#include "heave/motion.h"
+
+/** True if some pose has the target's extensions (pulled into the strokes): the assembly exists. */
+bool follow_can_assemble(const motion_t *self, const motion_target_t *target);
+
+/** True while a sender's target moves the platform. */
+bool follow_is_moving(const motion_t *self);
+
+/** At rest and ready to follow: takes the target that came meanwhile. */
+void follow_begin(motion_t *self, uint64_t now_us);
+
+/** Takes a target, at rest or in motion. */
+void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us);
+
+/** References of the cylinders for this cycle.
+ *  @param planned out, in pose space: the pose they belong to
+ *  @param out     asked, angle and flags are filled in */
+void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX], pose_t *planned, motion_output_t *out);
+
+/** Changes that become due at the end of a cycle. */
+void follow_end_cycle(motion_t *self);
+
+#endif

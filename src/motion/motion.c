@@ -1,0 +1,360 @@
+/* SPDX-License-Identifier: MIT
+ * motion.c - the sources of motion and their changes: resting, stopping, paths, following; one step per cycle.
+ * Stops and paths run in cylinder space, where the limiter's own state is where the platform is; following is in motion_follow.c.
+ */
+#include "heave/motion.h"
+
+#include "follow.h"
+#include "reach.h"
+
+/* Extensions of a pose, inside the stroke with its margins. */
+static bool reaches(const motion_t *self, const pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX])
+{
+    pose_t kept = *pose;
+    return reach_pull_in(self, &kept, extension_mm_q32) == 0;
+}
+
+static hv_status_t init_cylinders(motion_t *self, const settings_t *s)
+{
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        const unsigned source = i < self->cylinders ? i : 0;
+        ramp_limits_t limits;
+        const hv_status_t status =
+            ramp_limits_from_units(s->margin_mm_q16, s->stroke_mm_q16[source] - s->margin_mm_q16, s->cylinder_speed_mm_s_q16,
+                                   s->cylinder_accel_mm_s2_q16, s->cylinder_jerk_mm_s3, s->cycle_us, &limits);
+        if (status != HV_OK) {
+            return status;
+        }
+        self->settled_mm_q32[i] = q32_from_q16(s->settled_extension_mm_q16);
+        if (ramp_init(&self->cylinder[i], &limits, self->settled_mm_q32[i]) != HV_OK) {
+            return HV_ERR_RANGE;
+        }
+    }
+    return ramp_limits_from_units(0, s->stroke_mm_q16[0], s->engage_speed_mm_s_q16, s->engage_accel_mm_s2_q16,
+                                  s->cylinder_jerk_mm_s3, s->cycle_us, &self->engage_limits);
+}
+
+static hv_status_t init_axes(motion_t *self, const settings_t *s)
+{
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        const axis_settings_t *a = &s->axis[i];
+        ramp_limits_t limits;
+        const hv_status_t status =
+            ramp_limits_from_units(a->min_q16, a->max_q16, a->speed_q16, a->accel_q16, a->jerk, s->cycle_us, &limits);
+        if (status != HV_OK) {
+            return status;
+        }
+        const q32_t start_q32 = i < POSE_AXES ? q32_from_q16(s->neutral_q16[i]) : 0;
+        if (ramp_init(&self->axis[i], &limits, start_q32) != HV_OK) {
+            return HV_ERR_RANGE;
+        }
+    }
+    return HV_OK;
+}
+
+/* At the two places every ride comes back to the pose is known exactly, however the platform got there: forward kinematics from
+ * another start may end an LSB away, and a recording would not replay to the same bytes. */
+static void note_known_pose(motion_t *self, const q32_t *extension_mm_q32)
+{
+    bool is_settled = true;
+    bool is_neutral = true;
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        is_settled &= extension_mm_q32[i] == self->settled_mm_q32[i];
+        is_neutral &= extension_mm_q32[i] == self->neutral_mm_q32[i];
+    }
+    if (is_settled || is_neutral) {
+        self->pose = is_settled ? self->settled_pose : self->neutral;
+        self->is_pose_stale = false;
+    }
+}
+
+hv_status_t motion_init(motion_t *self, const settings_t *settings)
+{
+    *self = (motion_t){.cycle_us = settings->cycle_us};
+    hv_status_t status = kin_init(&self->kin, &settings->geometry);
+    self->cylinders = status == HV_OK ? kin_cylinders(&self->kin) : 0;
+    status = status == HV_OK ? init_cylinders(self, settings) : status;
+    status = status == HV_OK ? init_axes(self, settings) : status;
+    if (status != HV_OK) {
+        return status;
+    }
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        self->neutral.axis_q32[i] = q32_from_q16(settings->neutral_q16[i]);
+    }
+    kin_constrain(&self->kin, &self->neutral);
+    if (!reaches(self, &self->neutral, self->neutral_mm_q32)) {
+        return HV_ERR_RANGE;
+    }
+    stream_init(&self->stream, settings->cycle_us, AXES_MAX, settings->stream_style);
+    motion_place(self, self->settled_mm_q32, 0);
+    status = kin_forward(&self->kin, self->settled_mm_q32, &self->neutral, &self->settled_pose, NULL);
+    note_known_pose(self, self->settled_mm_q32);
+    return status;
+}
+
+/* Everything stays at the given positions. */
+static void rest_at(motion_t *self, const q32_t *extension_mm_q32, q32_t angle_deg_q32)
+{
+    self->source = MOTION_RESTING;
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        self->path_to_q32[i] = i < self->cylinders ? extension_mm_q32[i] : self->cylinder[i].state.pos_q32;
+    }
+    self->path_to_q32[AXIS_ANGLE] = angle_deg_q32;
+}
+
+void motion_place(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q32_t angle_deg_q32)
+{
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        self->cylinder[i].state = (ramp_state_t){.pos_q32 = extension_mm_q32[i]};
+        self->reference[i] = self->cylinder[i].state;
+    }
+    self->axis[AXIS_ANGLE].state = (ramp_state_t){.pos_q32 = angle_deg_q32};
+    self->angle_target_deg_q32 = angle_deg_q32;
+    self->is_following = false;
+    self->is_taking_over = false;
+    self->has_pending = false;
+    self->is_pose_stale = true;
+    note_known_pose(self, extension_mm_q32);
+    rest_at(self, extension_mm_q32, angle_deg_q32);
+}
+
+bool motion_is_at_rest(const motion_t *self)
+{
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        if (!ramp_is_at_rest(&self->cylinder[i])) {
+            return false;
+        }
+    }
+    return ramp_is_at_rest(&self->axis[AXIS_ANGLE]);
+}
+
+/* All cylinders along a straight line, at engage speed for the one with the longest way. */
+static void start_path(motion_t *self)
+{
+    path_limits_t limits = path_limits_none();
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        const ramp_t *ramp = i == AXIS_ANGLE ? &self->axis[AXIS_ANGLE] : &self->cylinder[i];
+        self->path_from_q32[i] = ramp->state.pos_q32;
+        self->path_history[i] = ramp->state;
+        path_limits_narrow(&limits, self->path_to_q32[i] - ramp->state.pos_q32,
+                           i == AXIS_ANGLE ? &ramp->limits : &self->engage_limits);
+    }
+    scurve_plan(&self->path, &limits, 1);
+    self->source = MOTION_ON_PATH;
+}
+
+/* What was to come after the stop. */
+static void go_on_after_stop(motion_t *self, uint64_t now_us)
+{
+    q32_t here_q32[CYLINDERS_MAX];
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        here_q32[i] = self->cylinder[i].state.pos_q32;
+    }
+    if (self->next == MOTION_THEN_PATH) {
+        start_path(self);
+        return;
+    }
+    rest_at(self, here_q32, self->axis[AXIS_ANGLE].state.pos_q32);
+    if (self->next == MOTION_THEN_FOLLOW) {
+        follow_begin(self, now_us);
+    }
+}
+
+/* All cylinders and the rotation motor slow down together over the same time. */
+static void begin_stop(motion_t *self, motion_next_t next)
+{
+    ramp_state_t start[AXES_MAX];
+    const ramp_limits_t *limits[AXES_MAX];
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        const ramp_t *ramp = i == AXIS_ANGLE ? &self->axis[AXIS_ANGLE] : &self->cylinder[i];
+        start[i] = ramp->state;
+        limits[i] = &ramp->limits;
+    }
+    self->next = next;
+    self->is_taking_over = false;
+    self->has_pending = false;
+    self->timed_end_us = 0;
+    self->is_stretched = false;
+    if (self->source != MOTION_STOPPING) {
+        quintic_plan_stop(&self->quintic, AXES_MAX, start, limits);
+        self->source = MOTION_STOPPING;
+    }
+}
+
+void motion_stop(motion_t *self)
+{
+    self->is_following = false;
+    begin_stop(self, MOTION_THEN_REST);
+}
+
+static void move_to(motion_t *self, const q32_t *extension_mm_q32)
+{
+    self->is_following = false;
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        self->path_to_q32[i] = i < self->cylinders ? extension_mm_q32[i] : self->cylinder[i].state.pos_q32;
+    }
+    begin_stop(self, MOTION_THEN_PATH);
+    self->path_to_q32[AXIS_ANGLE] = self->quintic.target_q32[AXIS_ANGLE];
+}
+
+void motion_settle(motion_t *self)
+{
+    move_to(self, self->settled_mm_q32);
+}
+
+void motion_rise(motion_t *self)
+{
+    move_to(self, self->neutral_mm_q32);
+}
+
+void motion_follow(motion_t *self)
+{
+    self->is_following = true;
+    begin_stop(self, MOTION_THEN_FOLLOW);
+    self->is_taking_over = true;
+    self->is_blend_planned = false;
+}
+
+hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_t now_us)
+{
+    if (!self->is_following) {
+        return HV_OK;
+    }
+    if (target->space == MOTION_CYLINDERS && !follow_can_assemble(self, target)) {
+        return HV_ERR_RANGE;
+    }
+    if (self->source == MOTION_STOPPING) {
+        self->pending = *target;
+        self->has_pending = true;
+        return HV_OK;
+    }
+    follow_target(self, target, now_us);
+    return HV_OK;
+}
+
+/* References of the cylinder-space sources. */
+static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_MAX])
+{
+    if (self->source == MOTION_STOPPING) {
+        quintic_step(&self->quintic, ref);
+        return;
+    }
+    if (self->source == MOTION_ON_PATH && !scurve_is_done(&self->path)) {
+        scurve_step(&self->path);
+        for (unsigned i = 0; i < AXES_MAX; i++) {
+            ref[i] = history_advance(&self->path_history[i],
+                                     scurve_between(&self->path, self->path_from_q32[i], self->path_to_q32[i]));
+        }
+        return;
+    }
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        ref[i] = (ramp_ref_t){.pos_q32 = self->path_to_q32[i]};
+    }
+}
+
+/* The last word: every cylinder and the rotation motor through its ramp. */
+static void limit(motion_t *self, const ramp_ref_t ref[AXES_MAX], motion_output_t *out)
+{
+    unsigned flags = 0;
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        ramp_t *ramp = &self->cylinder[i];
+        out->extension_mm_q32[i] = ramp_step(ramp, &ref[i], RAMP_FIRM);
+        flags |= ramp->flags;
+        out->flags |= out->extension_mm_q32[i] != ref[i].pos_q32 ? MOTION_OFF_PATH : 0;
+    }
+    out->flags |= ((flags & RAMP_CLAMPED) ? MOTION_CLAMPED : 0) | ((flags & RAMP_SPEED) ? MOTION_SPEED : 0) |
+                  ((flags & RAMP_ACCEL) ? MOTION_ACCEL : 0);
+}
+
+static bool are_cylinders_moving(const motion_t *self)
+{
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        if (self->cylinder[i].state.vel_per_cycle_q32 != 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* The pose of the extensions sent. */
+static void find_pose(motion_t *self, const pose_t *planned, motion_output_t *out)
+{
+    if (planned != NULL && (out->flags & (MOTION_OFF_PATH | MOTION_TAKEOVER)) == 0) {
+        self->pose = *planned;
+    } else if (!self->is_pose_stale && !are_cylinders_moving(self)) {
+        /* the pose found last is still the pose */
+    } else if (kin_forward(&self->kin, out->extension_mm_q32, &self->pose, &self->pose, NULL) != HV_OK) {
+        out->flags |= MOTION_NO_POSE;
+    }
+    self->is_pose_stale = (out->flags & MOTION_NO_POSE) != 0;
+    out->sent = self->pose;
+}
+
+/* Changes of source that become due at the end of a cycle. */
+static void end_cycle(motion_t *self, uint64_t now_us)
+{
+    if (self->source == MOTION_STOPPING && quintic_is_done(&self->quintic) && motion_is_at_rest(self)) {
+        go_on_after_stop(self, now_us);
+    } else if (self->source == MOTION_ON_PATH && scurve_is_done(&self->path) && motion_is_at_rest(self)) {
+        self->source = MOTION_RESTING;
+        note_known_pose(self, self->path_to_q32);
+    } else if (self->is_following) {
+        follow_end_cycle(self);
+    }
+}
+
+void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out)
+{
+    ramp_ref_t ref[AXES_MAX];
+    pose_t planned;
+    const bool is_posed = follow_is_moving(self) && self->space == MOTION_POSE;
+    *out = (motion_output_t){.flags = self->is_stretched ? MOTION_STRETCHED : 0};
+    if (follow_is_moving(self)) {
+        follow_step(self, now_us, ref, &planned, out);
+    } else {
+        step_in_cylinders(self, ref);
+        out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &ref[AXIS_ANGLE], RAMP_FIRM);
+        out->flags |= MOTION_IN_CYLINDERS;
+    }
+    limit(self, ref, out);
+    find_pose(self, is_posed ? &planned : NULL, out);
+    if (!is_posed) {
+        out->asked = out->sent;
+    }
+    end_cycle(self, now_us);
+}
+
+bool motion_is_done(const motion_t *self)
+{
+    return self->source == MOTION_RESTING && motion_is_at_rest(self);
+}
+
+uint64_t motion_timed_end_us(const motion_t *self)
+{
+    return self->timed_end_us;
+}
+
+uint32_t motion_stretched_count(const motion_t *self)
+{
+    return self->stretched_count;
+}
+
+const q32_t *motion_settled_extension(const motion_t *self)
+{
+    return self->settled_mm_q32;
+}
+
+const q32_t *motion_neutral_extension(const motion_t *self)
+{
+    return self->neutral_mm_q32;
+}
+
+const kin_t *motion_kin(const motion_t *self)
+{
+    return &self->kin;
+}
+
+const stream_t *motion_stream(const motion_t *self)
+{
+    return &self->stream;
+}

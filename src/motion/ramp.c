@@ -1,0 +1,353 @@
+/* SPDX-License-Identifier: MIT
+ * ramp.c - the jerk-limited ramp of one axis.
+ *
+ * Every cycle chooses the next acceleration; velocity and position are exact sums of it. The choice has two parts.
+ *
+ * 1. What the reference asks for. Errors against the reference of the cycle before: d = ref - pos, w = vel - ref vel,
+ *    b = acc - ref acc. With b' = b + u, w' = w + b', d' = d - w' the law
+ *        u = k1 d - k2 w - k3 b,   k1 = g^3, k2 = 3 g^2 - 2 g^3, k3 = 3 g - 3 g^2 + g^3
+ *    has its three poles at 1 - g exactly (derived in DESIGN.md); it works inside a boundary layer, so that no chatter arises.
+ *    g = 1 is the dead-beat law that ends a move exactly on its target. Outside the layer the next acceleration is the largest
+ * from which the quickest stop does not pass the reference (the discrete time-optimal law for a reference that rests).
+ *
+ * 2. What the limits allow. Every state kept satisfies: the velocity limit holds if the jerk turns full from now on, and so does
+ * each position bound (brake.h, exact in integers). The full counter-jerk therefore always is an answer, and the largest allowed
+ *    acceleration lies between it and what was asked for. ramp_safe_acceleration() makes the two directions compatible.
+ */
+#include "heave/ramp.h"
+
+#include "brake.h"
+#include "root.h"
+
+/* Boundary layer and gains of a grip: gains in units of 1 / 2^gain_shift, layer sizes in multiples of the jerk limit / 8. */
+typedef struct {
+    int64_t k1, k2, k3;
+    unsigned gain_shift;
+    int64_t layer_d, layer_w, layer_b;
+} grip_t;
+
+static const grip_t k_grips[] = {
+    [RAMP_SOFT] = {.k1 = 1, .k2 = 46, .k3 = 721, .gain_shift = 12, .layer_d = 8 * 4096, .layer_w = 8 * 178, .layer_b = 8 * 11},
+    [RAMP_FIRM] = {.k1 = 1, .k2 = 10, .k3 = 37, .gain_shift = 6, .layer_d = 8 * 13, .layer_w = 8 * 3, .layer_b = 7},
+};
+
+/* Steps of the root search; the chord of the last bracket is the result. */
+#define SOLVER_STEPS 10
+
+/* Errors against the reference of the cycle before. */
+typedef struct {
+    q32_t d, w, b;
+} errors_t;
+
+/* cycle^k in seconds times a value in Q16, in Q32: value * 65536 * (cycle_us / 1e6)^power. */
+static q32_t per_cycle(int64_t value_q16, uint32_t cycle_us, unsigned power)
+{
+    int64_t result = fx_mul_div(value_q16, (int64_t)65536 * cycle_us, 1000000);
+    for (unsigned i = 1; i < power; i++) {
+        result = fx_mul_div(result, cycle_us, 1000000);
+    }
+    return result;
+}
+
+hv_status_t ramp_limits_from_units(q16_t pos_min_q16, q16_t pos_max_q16, q16_t speed_q16, q16_t accel_q16, int32_t jerk,
+                                   uint32_t cycle_us, ramp_limits_t *limits)
+{
+    if (cycle_us < RAMP_CYCLE_MIN_US || cycle_us > RAMP_CYCLE_MAX_US || pos_min_q16 >= pos_max_q16 || speed_q16 <= 0 ||
+        accel_q16 <= 0 || jerk <= 0) {
+        return HV_ERR_RANGE;
+    }
+    const ramp_limits_t converted = {
+        .pos_min_q32 = q32_from_q16(pos_min_q16),
+        .pos_max_q32 = q32_from_q16(pos_max_q16),
+        .vel_per_cycle_q32 = per_cycle(speed_q16, cycle_us, 1),
+        .acc_per_cycle2_q32 = per_cycle(accel_q16, cycle_us, 2),
+        .jerk_per_cycle3_q32 = per_cycle((int64_t)jerk * Q16_ONE, cycle_us, 3),
+    };
+    ramp_t probe;
+    if (ramp_init(&probe, &converted, converted.pos_min_q32) != HV_OK) {
+        return HV_ERR_RANGE;
+    }
+    *limits = converted;
+    return HV_OK;
+}
+
+/* acc^3 <= jerk^2 * range / 2: taking acc back from full brake, and what is gained meanwhile, fits into the range. */
+static bool fits_in_range(q32_t acc_q32, q32_t jerk_q32, q32_t range_q32)
+{
+    const q32_t cycles_q16 = fx_mul_div(acc_q32, 65536, jerk_q32);
+    const q32_t swing_q32 = fx_mul_shift(fx_mul_shift(acc_q32, cycles_q16, 16), cycles_q16, 16);
+    return swing_q32 <= range_q32 / 2;
+}
+
+q32_t ramp_safe_acceleration(const ramp_limits_t *limits)
+{
+    const q32_t jerk_q32 = limits->jerk_per_cycle3_q32;
+    const q32_t cycles_q16 = (q32_t)fx_sqrt_u64((uint64_t)fx_mul_div(limits->vel_per_cycle_q32, Q32_ONE, jerk_q32));
+    q32_t acc_q32 = fx_clamp(fx_mul_shift(jerk_q32, cycles_q16, 16), 1, limits->acc_per_cycle2_q32);
+    const q32_t range_q32 = fx_sub_sat(limits->pos_max_q32, limits->pos_min_q32);
+    while (acc_q32 > 1 && !fits_in_range(acc_q32, jerk_q32, range_q32)) {
+        acc_q32 -= acc_q32 / 16 + 1;
+    }
+    return acc_q32;
+}
+
+/* Makes the acceleration a whole number of jerks, by taking a little off the acceleration or some off the jerk: the stopping
+ * distance is exact then, however few cycles the acceleration takes to rise. */
+static void make_acceleration_whole(ramp_t *self)
+{
+    const int64_t cycles = self->acc_safe_q32 / self->limits.jerk_per_cycle3_q32;
+    const q32_t whole_q32 = cycles * self->limits.jerk_per_cycle3_q32;
+    if (self->acc_safe_q32 - whole_q32 <= self->acc_safe_q32 / 64) {
+        self->acc_cycles = cycles;
+        self->acc_safe_q32 = whole_q32;
+        return;
+    }
+    self->acc_cycles = cycles + 1;
+    self->limits.jerk_per_cycle3_q32 = self->acc_safe_q32 / self->acc_cycles;
+    self->acc_safe_q32 = self->limits.jerk_per_cycle3_q32 * self->acc_cycles;
+}
+
+hv_status_t ramp_init(ramp_t *self, const ramp_limits_t *limits, q32_t pos_q32)
+{
+    const q32_t jerk_q32 = limits->jerk_per_cycle3_q32;
+    if (limits->pos_min_q32 >= limits->pos_max_q32 || limits->vel_per_cycle_q32 <= 0 || limits->acc_per_cycle2_q32 <= 0 ||
+        jerk_q32 < RAMP_JERK_MIN_Q32 || limits->vel_per_cycle_q32 / jerk_q32 > RAMP_SPEED_PER_JERK_MAX) {
+        return HV_ERR_RANGE;
+    }
+    *self = (ramp_t){.limits = *limits, .state = {.pos_q32 = pos_q32}, .acc_safe_q32 = ramp_safe_acceleration(limits)};
+    make_acceleration_whole(self);
+    self->per_jerk_q62 = Q62_ONE / self->limits.jerk_per_cycle3_q32;
+    self->per_acc_q62 = Q62_ONE / self->acc_safe_q32;
+    const q32_t vel_q32 = limits->vel_per_cycle_q32;
+    const q32_t acc_cycles_q32 = fx_mul_shift(self->acc_safe_q32, self->per_jerk_q62, 30);
+    self->brake_reach_q32 =
+        fx_mul_shift(vel_q32, fx_mul_shift(vel_q32, self->per_acc_q62, 30) + 2 * acc_cycles_q32, 32) + 4 * vel_q32;
+    return HV_OK;
+}
+
+void ramp_take_over(ramp_t *self, const ramp_state_t *state)
+{
+    const q32_t acc_q32 = fx_clamp(state->acc_per_cycle2_q32, -self->acc_safe_q32, self->acc_safe_q32);
+    const q32_t vel_max_q32 = self->limits.vel_per_cycle_q32;
+    self->state.pos_q32 = state->pos_q32;
+    self->state.acc_per_cycle2_q32 = acc_q32;
+    const q32_t gain_q32 = brake_velocity_peak(self, 0, fx_abs(acc_q32));
+    self->state.vel_per_cycle_q32 = acc_q32 >= 0 ? fx_clamp(state->vel_per_cycle_q32, -vel_max_q32, vel_max_q32 - gain_q32)
+                                                 : fx_clamp(state->vel_per_cycle_q32, gain_q32 - vel_max_q32, vel_max_q32);
+}
+
+static errors_t errors_against(const ramp_state_t *state, const ramp_ref_t *ref)
+{
+    return (errors_t){
+        .d = ref->pos_q32 - ref->vel_per_cycle_q32 - state->pos_q32,
+        .w = state->vel_per_cycle_q32 - (ref->vel_per_cycle_q32 - ref->acc_per_cycle2_q32),
+        .b = state->acc_per_cycle2_q32 - (ref->acc_per_cycle2_q32 - ref->jerk_per_cycle3_q32),
+    };
+}
+
+static bool is_within(q32_t value_q32, q32_t jerk_q32, int64_t eighths)
+{
+    return fx_abs(value_q32) / 8 <= fx_mul_shift(jerk_q32, eighths, 6);
+}
+
+/* Division by a power of two, to the nearest, ties away from zero: symmetric, so that both directions behave alike. */
+static int64_t scale_down(int64_t value, unsigned shift)
+{
+    const int64_t half = (int64_t)1 << (shift - 1);
+    const int64_t unit = (int64_t)1 << shift;
+    return value >= 0 ? (value + half) / unit : (value - half) / unit;
+}
+
+/* Signed distance by which the quickest stop after relative acceleration b' would fall short of the reference. */
+static q32_t shortfall(const ramp_t *self, const errors_t *e, q32_t b_next)
+{
+    const q32_t w_next = e->w + b_next;
+    return fx_sub_sat(e->d - w_next, brake_distance(self, w_next, b_next));
+}
+
+/* Acceleration, relative to the feed, with which the quickest stop ends on the reference; acc is the present one on the same terms. */
+static q32_t solve_upwards(const ramp_t *self, const errors_t *e, q32_t acc_q32, q32_t feed_q32)
+{
+    const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
+    bracket_t k = {.low = fx_clamp(acc_q32 - jerk_q32, -self->acc_safe_q32, self->acc_safe_q32) - feed_q32,
+                   .high = fx_clamp(acc_q32 + jerk_q32, -self->acc_safe_q32, self->acc_safe_q32) - feed_q32};
+    k.at_low = shortfall(self, e, k.low);
+    k.at_high = shortfall(self, e, k.high);
+    if (k.at_high >= 0) {
+        return k.high;
+    }
+    if (k.at_low <= 0) {
+        return k.low;
+    }
+    for (int step = 0; step < SOLVER_STEPS && k.high - k.low > 1; step++) {
+        const q32_t at = bracket_chord(&k);
+        bracket_narrow(&k, at, shortfall(self, e, at));
+    }
+    return bracket_chord(&k);
+}
+
+/* The same towards a reference on either side: downwards is the mirror image, to the bit. */
+static q32_t solve_for_stop(const ramp_t *self, const errors_t *e, q32_t feed_q32)
+{
+    const q32_t acc_q32 = self->state.acc_per_cycle2_q32;
+    const bool is_downwards = e->d != 0 ? e->d < 0 : e->w != 0 ? e->w > 0 : acc_q32 > feed_q32;
+    const errors_t mirrored = {.d = -e->d, .w = -e->w, .b = -e->b};
+    return is_downwards ? -solve_upwards(self, &mirrored, -acc_q32, -feed_q32) : solve_upwards(self, e, acc_q32, feed_q32);
+}
+
+static bool is_at_rest(const ramp_ref_t *ref)
+{
+    return ref->vel_per_cycle_q32 == 0 && ref->acc_per_cycle2_q32 == 0 && ref->jerk_per_cycle3_q32 == 0;
+}
+
+/* True if the dead-beat law (g = 1) meets the reference in three cycles without more jerk than there is. */
+static bool can_close_in_three(const errors_t *e, q32_t jerk_q32)
+{
+    return fx_abs(e->d) <= jerk_q32 && fx_abs(e->w - 2 * e->d) <= jerk_q32 && fx_abs(e->d - e->w - e->b) <= jerk_q32;
+}
+
+static bool is_in_layer(const errors_t *e, q32_t jerk_q32, const grip_t *g)
+{
+    return is_within(e->d, jerk_q32, g->layer_d) && is_within(e->w, jerk_q32, g->layer_w) &&
+           is_within(e->b, jerk_q32, g->layer_b);
+}
+
+/* The acceleration the reference asks for. */
+static q32_t wanted_acceleration(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+{
+    const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
+    const grip_t *g = &k_grips[is_at_rest(ref) ? RAMP_FIRM : grip];
+    errors_t e = errors_against(&self->state, ref);
+    if (g == &k_grips[RAMP_FIRM] && can_close_in_three(&e, jerk_q32)) {
+        return ref->acc_per_cycle2_q32 + e.d - e.w;
+    }
+    if (is_in_layer(&e, jerk_q32, g)) {
+        return ref->acc_per_cycle2_q32 + e.b + scale_down(g->k1 * e.d - g->k2 * e.w - g->k3 * e.b, g->gain_shift);
+    }
+    /* a reference far beyond the limits counts as one that is just beyond them: everything stays in range */
+    const q32_t vel_most_q32 = 4 * self->limits.vel_per_cycle_q32;
+    const q32_t feed_q32 = fx_clamp(ref->acc_per_cycle2_q32 / 2, -self->acc_safe_q32, self->acc_safe_q32);
+    e.w = fx_clamp(e.w, -vel_most_q32, vel_most_q32);
+    return feed_q32 + solve_for_stop(self, &e, feed_q32);
+}
+
+/* True if after acceleration acc the upper bound can still be kept; sign -1 asks the same of the lower one. */
+static bool keeps_bound(const ramp_t *self, q32_t acc_q32, int sign)
+{
+    const q32_t vel_q32 = self->state.vel_per_cycle_q32 + acc_q32;
+    const q32_t pos_q32 = self->state.pos_q32 + vel_q32;
+    const q32_t room_q32 = sign > 0 ? self->limits.pos_max_q32 - pos_q32 : pos_q32 - self->limits.pos_min_q32;
+    if (room_q32 >= self->brake_reach_q32) {
+        return true;
+    }
+    const bool rises = sign * vel_q32 > 0 || (sign * acc_q32 > 0 && brake_velocity_peak(self, sign * vel_q32, sign * acc_q32) > 0);
+    return !rises || brake_peak(self, sign * vel_q32, sign * acc_q32) <= room_q32; /* outside: it may come in, but never turns back */
+}
+
+/* True if after acceleration acc the ramp can come to rest, acceleration included, before the bound on the side of sign. */
+static bool can_rest_inside(const ramp_t *self, q32_t acc_q32, int sign)
+{
+    const q32_t vel_q32 = self->state.vel_per_cycle_q32 + acc_q32;
+    const q32_t pos_q32 = self->state.pos_q32 + vel_q32;
+    const q32_t room_q32 = sign > 0 ? self->limits.pos_max_q32 - pos_q32 : pos_q32 - self->limits.pos_min_q32;
+    const bool is_outside = room_q32 + sign * vel_q32 < 0;
+    return room_q32 >= self->brake_reach_q32 || is_outside || brake_distance(self, sign * vel_q32, sign * acc_q32) <= room_q32;
+}
+
+/* Acceleration towards a bound: at most what the quickest stop on the bound takes. Without this a reference that leads past the bound
+ * would only be left when nothing but the full brake helps, and that would throw the ramp back. */
+static q32_t stop_on_bound(ramp_t *self, q32_t wanted_q32, int sign)
+{
+    if (can_rest_inside(self, wanted_q32, sign)) {
+        return wanted_q32;
+    }
+    self->flags |= RAMP_BOUND;
+    const ramp_ref_t bound = {.pos_q32 = sign > 0 ? self->limits.pos_max_q32 : self->limits.pos_min_q32};
+    const q32_t stopping_q32 = wanted_acceleration(self, &bound, RAMP_FIRM);
+    return sign * stopping_q32 < sign * wanted_q32 ? stopping_q32 : wanted_q32;
+}
+
+/* Acceleration nearest to the wanted one that keeps the bound on the side of sign; safe is one that does. */
+static q32_t limit_by_bound(ramp_t *self, q32_t wanted_q32, q32_t safe_q32, int sign)
+{
+    if (keeps_bound(self, wanted_q32, sign)) {
+        return wanted_q32;
+    }
+    self->flags |= RAMP_BOUND;
+    q32_t good_q32 = safe_q32;
+    q32_t bad_q32 = wanted_q32;
+    for (int step = 0; step < 10; step++) {
+        const q32_t middle_q32 = good_q32 + (bad_q32 - good_q32) / 2;
+        if (keeps_bound(self, middle_q32, sign)) {
+            good_q32 = middle_q32;
+        } else {
+            bad_q32 = middle_q32;
+        }
+    }
+    return good_q32;
+}
+
+/* Acceleration nearest to the wanted one from which the velocity limit on the side of sign can be kept. */
+static q32_t limit_by_speed(ramp_t *self, q32_t wanted_q32, int sign)
+{
+    const q32_t room_q32 = self->limits.vel_per_cycle_q32 - sign * self->state.vel_per_cycle_q32;
+    const q32_t towards_q32 = sign * wanted_q32;
+    if (towards_q32 <= 0 || brake_velocity_peak(self, towards_q32, towards_q32) <= room_q32) {
+        return wanted_q32;
+    }
+    self->flags |= RAMP_SPEED;
+    return sign * (room_q32 > 0 ? brake_acc_for_velocity_room(self, room_q32) : 0);
+}
+
+/* The acceleration of the coming cycle: the wanted one inside everything the limits say. */
+static q32_t allowed_acceleration(ramp_t *self, q32_t wanted_q32)
+{
+    const q32_t acc_q32 = self->state.acc_per_cycle2_q32;
+    const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
+    const q32_t low_q32 = fx_clamp(acc_q32 - jerk_q32, -self->acc_safe_q32, self->acc_safe_q32);
+    const q32_t high_q32 = fx_clamp(acc_q32 + jerk_q32, -self->acc_safe_q32, self->acc_safe_q32);
+    if (fx_abs(wanted_q32) > self->acc_safe_q32) {
+        self->flags |= RAMP_ACCEL;
+    }
+    q32_t next_q32 = fx_clamp(wanted_q32, low_q32, high_q32);
+    next_q32 = stop_on_bound(self, next_q32, 1);
+    next_q32 = stop_on_bound(self, next_q32, -1);
+    next_q32 = limit_by_speed(self, next_q32, 1);
+    next_q32 = limit_by_speed(self, next_q32, -1);
+    next_q32 = fx_clamp(next_q32, low_q32, high_q32);
+    next_q32 = limit_by_bound(self, next_q32, low_q32, 1);
+    next_q32 = limit_by_bound(self, next_q32, high_q32, -1);
+    return next_q32;
+}
+
+/* Pulls a reference that lies outside the bounds onto the bound, at rest there. A ramp that is outside itself (it was placed
+ * there) may be led in at the reference's pace. */
+static ramp_ref_t reference_within_bounds(ramp_t *self, const ramp_ref_t *ref)
+{
+    const q32_t pos_q32 = self->state.pos_q32;
+    const q32_t low_q32 = pos_q32 < self->limits.pos_min_q32 ? pos_q32 : self->limits.pos_min_q32;
+    const q32_t high_q32 = pos_q32 > self->limits.pos_max_q32 ? pos_q32 : self->limits.pos_max_q32;
+    const q32_t inside_q32 = fx_clamp(ref->pos_q32, low_q32, high_q32);
+    if (inside_q32 == ref->pos_q32) {
+        return *ref;
+    }
+    self->flags |= RAMP_CLAMPED;
+    return (ramp_ref_t){.pos_q32 = inside_q32};
+}
+
+q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+{
+    self->flags = 0;
+    const ramp_ref_t inside = reference_within_bounds(self, ref);
+    const q32_t acc_q32 = allowed_acceleration(self, wanted_acceleration(self, &inside, grip));
+    self->state.acc_per_cycle2_q32 = acc_q32;
+    self->state.vel_per_cycle_q32 += acc_q32;
+    self->state.pos_q32 += self->state.vel_per_cycle_q32;
+    return self->state.pos_q32;
+}
+
+q32_t ramp_stop_position(const ramp_t *self)
+{
+    const q32_t distance_q32 = brake_distance(self, self->state.vel_per_cycle_q32, self->state.acc_per_cycle2_q32);
+    return fx_clamp(self->state.pos_q32 + distance_q32, self->limits.pos_min_q32, self->limits.pos_max_q32);
+}

@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: MIT
+ * reach.c - the workspace: the largest share of the way from neutral to a pose that keeps every cylinder in its stroke.
+ */
+#include "reach.h"
+
+#include "root.h"
+
+#define SEARCH_STEPS 14
+
+/* Room of the tightest cylinder (negative outside), and which it is; INT64_MIN where the pose is beyond all solving. */
+static q32_t tightest_room(const motion_t *motion, const pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX], unsigned *cylinder)
+{
+    if (kin_inverse(&motion->kin, pose, extension_mm_q32) != HV_OK) {
+        *cylinder = 1;
+        return INT64_MIN / 4;
+    }
+    q32_t room_q32 = INT64_MAX;
+    for (unsigned i = 0; i < motion->cylinders; i++) {
+        const ramp_limits_t *limits = &motion->cylinder[i].limits;
+        const q32_t below_q32 = extension_mm_q32[i] - limits->pos_min_q32;
+        const q32_t above_q32 = limits->pos_max_q32 - extension_mm_q32[i];
+        const q32_t least_q32 = below_q32 < above_q32 ? below_q32 : above_q32;
+        if (least_q32 < room_q32) {
+            room_q32 = least_q32;
+            *cylinder = i + 1;
+        }
+    }
+    return room_q32;
+}
+
+static pose_t between(const pose_t *from, const pose_t *to, q62_t share_q62)
+{
+    pose_t result;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        result.axis_q32[i] = from->axis_q32[i] + fx_mul_shift(to->axis_q32[i] - from->axis_q32[i], share_q62, 62);
+    }
+    return result;
+}
+
+unsigned reach_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX])
+{
+    unsigned cylinder = 0;
+    bracket_t share = {.low = 0, .high = Q62_ONE};
+    share.at_high = tightest_room(motion, pose, extension_mm_q32, &cylinder);
+    if (share.at_high >= 0) {
+        return 0;
+    }
+    const pose_t asked = *pose;
+    unsigned ignored = 0;
+    share.at_low = tightest_room(motion, &motion->neutral, extension_mm_q32, &ignored);
+    for (int step = 0; step < SEARCH_STEPS && share.high - share.low > 1; step++) {
+        const q62_t at_q62 = bracket_chord(&share);
+        const pose_t tried = between(&motion->neutral, &asked, at_q62);
+        bracket_narrow(&share, at_q62, tightest_room(motion, &tried, extension_mm_q32, &cylinder));
+    }
+    *pose = between(&motion->neutral, &asked, share.low);
+    (void)tightest_room(motion, pose, extension_mm_q32, &cylinder);
+    return cylinder;
+}

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: MIT
+ * reach.h - pulls poses that the cylinders cannot reach onto the edge of the workspace. Private to src/motion.
+ */
+#ifndef REACH_H
+#define REACH_H
+
+#include "heave/motion.h"
+
+/** Pulls a pose in along the straight way from the neutral pose until every extension is within the stroke and its margins.
+ *  The result is continuous in the pose wherever that way crosses the edge once.
+ *  @param extension_mm_q32 out: the extensions of the resulting pose
+ *  @return 0 where the pose could be kept; else 1-based, the cylinder that bounds it */
+unsigned reach_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX]);
+
+#endif
