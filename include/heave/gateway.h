@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: MIT
+ * gateway.h - the whole gateway: one cycle from datagrams and feedback to set-points and relays.
+ * Owns the motion, the states and the counters; talks to the world through the HAL handles it is given. One thread owns it
+ * (the motion thread); time is an argument. Nothing here blocks or allocates.
+ */
+#ifndef HEAVE_GATEWAY_H
+#define HEAVE_GATEWAY_H
+
+#include "heave/drives.h"
+#include "heave/hal/inputs.h"
+#include "heave/hal/log.h"
+#include "heave/hal/relays.h"
+#include "heave/hal/udp.h"
+#include "heave/motion.h"
+#include "heave/supervisor.h"
+#include "heave/telemetry.h"
+
+/** Most datagrams read in one cycle; the rest waits for the next. */
+#define GATEWAY_DATAGRAMS_PER_CYCLE 64u
+
+/** Longest datagram taken. */
+#define GATEWAY_DATAGRAM_MAX 512u
+
+/** The outside, every handle valid. Backends outlive the gateway. */
+typedef struct {
+    hal_udp_t udp;
+    drives_t drives;
+    hal_relays_t relays;
+    hal_inputs_t inputs;
+    hal_log_t log;
+} gateway_io_t;
+
+/** How far bringing up the drives has come. */
+typedef enum { BRING_UP_IDLE, BRING_UP_ENABLE, BRING_UP_HOME, BRING_UP_MOVE } bring_up_t;
+
+/** A gateway; members are private to src/gateway. */
+typedef struct {
+    settings_t settings;
+    gateway_io_t io;
+    motion_t motion;
+    motion_output_t output;
+    supervisor_t supervisor;
+    frame_scanner_t scanner;
+    snapshot_t snapshot;
+    drive_feedback_t feedback[DRIVES_MAX];
+    bring_up_t bring_up;
+    uint64_t bring_up_deadline_us;
+    bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
+    bool is_disable_due;     /**< disable the drives once at rest */
+    bool is_auto_due;        /**< the auto policy has not been used yet */
+    bool is_shutdown_asked;  /**< nothing brings the platform up any more */
+    uint32_t unsent_cycles;  /**< cycles in a row whose set-points the bus did not take */
+    uint64_t reset_until_us; /**< a reset waits for the drives until then; 0 = none */
+    uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
+    uint16_t frame_mask;     /**< what the sender asked of the relays */
+    uint16_t written_mask;
+    bool is_mask_written;
+    uint64_t reject_logged_us[FRAME_ERRORS];
+    uint32_t reject_suppressed[FRAME_ERRORS];
+    uint8_t datagram[GATEWAY_DATAGRAM_MAX];
+} gateway_t;
+
+/** Prepares a gateway in OFF. Touches no device.
+ *  @return HV_OK; HV_ERR_ARG for an invalid handle or drives whose count does not fit the platform; HV_ERR_RANGE for settings. */
+hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gateway_io_t *io) HV_MUST_CHECK;
+
+/** Offline runs: starts in SETTLED, with drives that are enabled, homed and at the settled extension. After gateway_init. */
+void gateway_start_settled(gateway_t *self);
+
+/** What an operator asks for: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET or EVENT_SHUTDOWN.
+ *  @return HV_OK; HV_ERR_STATE where the state does not allow it: nothing changes. */
+hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us) HV_MUST_CHECK;
+
+/** One cycle: receive, read feedback, supervise, plan, solve, limit, send, publish.
+ *  @param now_us one cycle_us more than the last time */
+void gateway_cycle(gateway_t *self, uint64_t now_us);
+
+/** What the last cycle did. Valid until the next one. */
+const snapshot_t *gateway_snapshot(const gateway_t *self);
+
+/** Tells the counters of cycles that were skipped because the program was late. */
+void gateway_note_late(gateway_t *self, uint32_t cycles);
+
+/** True once a shutdown has ended: OFF, or FAULT / ESTOP at rest with a shutdown asked for. */
+bool gateway_is_finished(const gateway_t *self);
+
+#endif

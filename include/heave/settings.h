@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: MIT
+ * settings.h - everything the core needs to know about one platform: plain data, filled once before the start.
+ * Ranges are checked where the values enter (the configuration file, or a port's own table) and again by each module's init.
+ */
+#ifndef HEAVE_SETTINGS_H
+#define HEAVE_SETTINGS_H
+
+#include "heave/axes.h"
+#include "heave/frame.h"
+#include "heave/kin.h"
+#include "heave/stream.h"
+
+/** Who brings the platform up. */
+typedef enum {
+    ENGAGE_MANUAL, /**< an operator's request */
+    ENGAGE_AUTO    /**< by itself, once after the start */
+} engage_policy_t;
+
+/** How the rotation motor takes an angle. */
+typedef enum {
+    ANGLE_AS_SENT, /**< the number as it is, several turns allowed */
+    ANGLE_SHORTEST /**< modulo one turn, the shorter way round */
+} angle_wrap_t;
+
+/** One pose axis or the rotation motor. Unit u is deg or mm. Asked value = sign * scale * sent value + offset, then min..max. */
+typedef struct {
+    int8_t sign;      /**< 1 or -1 */
+    q16_t scale_q16;  /**< [0, 100] */
+    q16_t offset_q16; /**< u */
+    q16_t min_q16;    /**< u */
+    q16_t max_q16;    /**< u, above min */
+    q16_t speed_q16;  /**< u/s, above 0 */
+    q16_t accel_q16;  /**< u/s^2, above 0 */
+    int32_t jerk;     /**< u/s^3, whole units, above 0 */
+} axis_settings_t;
+
+/** A platform. */
+typedef struct {
+    uint32_t cycle_us; /**< [500, 10000] */
+    engage_policy_t engage;
+
+    kin_geometry_t geometry;
+    q16_t stroke_mm_q16[CYLINDERS_MAX];
+    q16_t neutral_q16[POSE_AXES]; /**< deg, deg, deg, mm, mm, mm: the pose the platform rises to */
+    q16_t settled_extension_mm_q16;
+
+    axis_settings_t axis[AXES_MAX]; /**< the last one is the rotation motor */
+    bool has_angle;
+    angle_wrap_t angle_wrap;
+    stream_style_t stream_style;
+
+    q16_t cylinder_speed_mm_s_q16;
+    q16_t cylinder_accel_mm_s2_q16;
+    int32_t cylinder_jerk_mm_s3;
+    q16_t margin_mm_q16; /**< kept free at both ends of the stroke */
+
+    q16_t engage_speed_mm_s_q16;
+    q16_t engage_accel_mm_s2_q16;
+
+    frame_dialect_t dialect;
+    uint32_t silence_hold_ms; /**< 0 = never, as the two below; after the last valid frame or the end of its timed move */
+    uint32_t silence_neutral_ms;
+    uint32_t silence_settle_ms;
+
+    uint8_t relay_count; /**< [0, 12] */
+    uint16_t relay_safe_mask;
+} settings_t;
+
+#endif

@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: MIT
+ * telemetry.h - one plain struct per cycle that tells everything there is to see of a running platform.
+ * The motion thread fills it; readers get copies (see the hand-over of the program). No pointers inside.
+ */
+#ifndef HEAVE_TELEMETRY_H
+#define HEAVE_TELEMETRY_H
+
+#include "heave/axes.h"
+#include "heave/drives.h"
+#include "heave/frame.h"
+#include "heave/supervisor.h"
+
+/** Why the platform is in FAULT: the first reason is kept. */
+typedef enum {
+    FAULT_NONE,
+    FAULT_DRIVE,         /**< a drive reports a fault (device_code says which) */
+    FAULT_DRIVE_OFFLINE, /**< a drive does not answer */
+    FAULT_DRIVE_DROPPED, /**< a drive left the enabled state by itself */
+    FAULT_DRIVE_TIMEOUT, /**< enabling or homing took too long */
+    FAULT_BUS,           /**< the drives' bus is gone or takes no set-points */
+    FAULT_CODES
+} fault_code_t;
+
+/** A machine fault. */
+typedef struct {
+    fault_code_t code;
+    uint8_t axis;         /**< 1-based: cylinder, or cylinders + 1 for the rotation motor; 0 where none is concerned */
+    uint32_t device_code; /**< the drive's own code */
+    uint64_t at_us;
+} fault_t;
+
+/** Counters since the start; they wrap. */
+typedef struct {
+    uint32_t datagrams;
+    uint32_t oversize; /**< datagrams longer than the buffer */
+    uint32_t receive_errors;
+    uint32_t accepted[FRAME_COMMANDS];
+    uint32_t accepted_timed; /**< of those, T forms */
+    uint32_t rejected[FRAME_ERRORS];
+    uint32_t not_followed;  /**< accepted while the platform was not ENGAGED */
+    uint32_t impossible;    /**< extensions no pose belongs to */
+    uint32_t clamped;       /**< cycles that pulled a target in */
+    uint32_t stretched;     /**< timed moves that took longer than asked */
+    uint32_t relay_missing; /**< masks that set a relay this platform does not have */
+    uint32_t relay_errors;
+    uint32_t faults;
+    uint32_t late_cycles; /**< cycles skipped because the program was late */
+} counters_t;
+
+/** Everything, once per cycle. Extensions mm, angle deg, Q32. */
+typedef struct {
+    uint64_t cycle;
+    uint64_t now_us;
+    state_t state;
+    state_t goal;
+    bool is_held_by_silence;
+    bool is_estop_active;
+    fault_t fault;
+    uint8_t cylinders;
+    bool has_angle;
+    uint8_t relay_count;
+    uint16_t relay_mask;
+    pose_t asked;
+    pose_t sent;
+    pose_t actual; /**< of the plate, from feedback, valid if has_actual_pose */
+    bool has_actual_pose;
+    q32_t extension_mm_q32[CYLINDERS_MAX];
+    q32_t angle_deg_q32;
+    drive_feedback_t drive[DRIVES_MAX];
+    unsigned flags; /**< MOTION_CLAMPED ... */
+    uint8_t limiting_cylinder;
+    uint32_t stream_period_us; /**< 0 while unknown */
+    uint32_t stream_delay_us;
+    uint64_t last_frame_us; /**< 0 before the first accepted frame */
+    counters_t counters;
+} snapshot_t;
+
+/** "drive fault", ...: constant text. */
+const char *fault_name(fault_code_t code);
+
+#endif

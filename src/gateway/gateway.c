@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: MIT
+ * gateway.c - one cycle of the gateway, in the order of the picture in DESIGN.md.
+ */
+#include "heave/gateway.h"
+
+#include "intake.h"
+#include "operate.h"
+
+#define ACTUAL_POSE_CYCLES 16u /* forward kinematics of the feedback: display needs no more */
+
+static bool is_io_valid(const gateway_io_t *io)
+{
+    return hal_udp_valid(io->udp) && drives_valid(io->drives) && hal_relays_valid(io->relays) && hal_inputs_valid(io->inputs) &&
+           hal_log_valid(io->log);
+}
+
+hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gateway_io_t *io)
+{
+    if (!is_io_valid(io)) {
+        return HV_ERR_ARG;
+    }
+    *self =
+        (gateway_t){.settings = *settings, .io = *io, .is_tracking_actual = true, .is_auto_due = settings->engage == ENGAGE_AUTO};
+    const hv_status_t status = motion_init(&self->motion, settings);
+    if (status != HV_OK) {
+        return status;
+    }
+    const unsigned cylinders = kin_cylinders(motion_kin(&self->motion));
+    if (drives_count(io->drives) != cylinders + (settings->has_angle ? 1u : 0u)) {
+        return HV_ERR_ARG;
+    }
+    supervisor_init(&self->supervisor);
+    self->snapshot.cylinders = (uint8_t)cylinders;
+    self->snapshot.has_angle = settings->has_angle;
+    self->snapshot.relay_count = settings->relay_count;
+    self->snapshot.sent = self->motion.pose;
+    self->frame_mask = settings->relay_safe_mask;
+    return HV_OK;
+}
+
+void gateway_start_settled(gateway_t *self)
+{
+    supervisor_init_settled(&self->supervisor);
+    self->is_tracking_actual = false;
+    if (self->is_auto_due) {
+        self->is_auto_due = false;
+        self->supervisor.goal = STATE_ENGAGED;
+    }
+}
+
+hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)
+{
+    return operate_request(self, request, now_us);
+}
+
+void gateway_note_late(gateway_t *self, uint32_t cycles)
+{
+    self->snapshot.counters.late_cycles += cycles;
+}
+
+/* Only an engaged sender commands the relays; the safe mask holds everywhere else. */
+static void write_relays(gateway_t *self)
+{
+    const uint16_t mask = self->supervisor.state == STATE_ENGAGED ? self->frame_mask : self->settings.relay_safe_mask;
+    if (self->is_mask_written && mask == self->written_mask) {
+        return;
+    }
+    self->is_mask_written = hal_relays_write(self->io.relays, mask) == HV_OK;
+    self->snapshot.counters.relay_errors += !self->is_mask_written;
+    self->written_mask = mask;
+}
+
+static void send_setpoints(gateway_t *self, uint64_t now_us)
+{
+    q32_t setpoint_q32[DRIVES_MAX] = {0};
+    const unsigned cylinders = kin_cylinders(motion_kin(&self->motion));
+    for (unsigned i = 0; i < cylinders; i++) {
+        setpoint_q32[i] = self->output.extension_mm_q32[i];
+    }
+    setpoint_q32[cylinders] = self->output.angle_deg_q32;
+    self->unsent_cycles = drives_send(self->io.drives, now_us, setpoint_q32) == HV_OK ? 0 : self->unsent_cycles + 1;
+}
+
+/* Pose of the plate from feedback. */
+static void find_actual_pose(gateway_t *self)
+{
+    snapshot_t *s = &self->snapshot;
+    if (s->cycle % ACTUAL_POSE_CYCLES != 0) {
+        return;
+    }
+    q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
+    s->has_actual_pose = true;
+    for (unsigned i = 0; i < s->cylinders; i++) {
+        extension_mm_q32[i] = self->feedback[i].actual_mm_q32;
+        s->has_actual_pose &= self->feedback[i].has_actual;
+    }
+    s->has_actual_pose =
+        s->has_actual_pose && kin_forward(motion_kin(&self->motion), extension_mm_q32, &s->sent, &s->actual, NULL) == HV_OK;
+}
+
+static void publish(gateway_t *self, uint64_t now_us)
+{
+    snapshot_t *s = &self->snapshot;
+    s->now_us = now_us;
+    s->state = self->supervisor.state;
+    s->goal = self->supervisor.goal;
+    s->is_held_by_silence = self->supervisor.is_held_by_silence;
+    s->relay_mask = self->written_mask;
+    s->asked = self->output.asked;
+    s->sent = self->output.sent;
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        s->extension_mm_q32[i] = self->output.extension_mm_q32[i];
+    }
+    s->angle_deg_q32 = self->output.angle_deg_q32;
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        s->drive[i] = self->feedback[i];
+    }
+    s->flags = self->output.flags;
+    s->limiting_cylinder = self->output.limiting_cylinder;
+    s->stream_period_us = stream_period_us(motion_stream(&self->motion));
+    s->stream_delay_us = stream_delay_us(motion_stream(&self->motion));
+    s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
+    s->counters.stretched = motion_stretched_count(&self->motion);
+    find_actual_pose(self);
+    s->cycle++;
+}
+
+void gateway_cycle(gateway_t *self, uint64_t now_us)
+{
+    operate_before_frames(self, now_us);
+    intake_receive(self, now_us);
+    operate_after_frames(self, now_us);
+    motion_step(&self->motion, now_us, &self->output);
+    send_setpoints(self, now_us);
+    operate_after_motion(self);
+    write_relays(self);
+    publish(self, now_us);
+}
+
+const snapshot_t *gateway_snapshot(const gateway_t *self)
+{
+    return &self->snapshot;
+}
+
+bool gateway_is_finished(const gateway_t *self)
+{
+    const state_t state = self->supervisor.state;
+    return self->is_shutdown_asked && !self->is_disable_due &&
+           (state == STATE_OFF || state == STATE_FAULT || state == STATE_ESTOP);
+}

@@ -1,0 +1,220 @@
+/* SPDX-License-Identifier: MIT
+ * intake.c - frames of a sender: accepted ones become targets and relay masks, the others a count and a line in the log.
+ */
+#include "intake.h"
+
+#include "heave/text.h"
+#include "operate.h"
+
+#define REJECT_LOG_INTERVAL_US 1000000u
+#define REJECT_TEXT_BYTES      60u
+
+/* Where the values of a frame go: an axis of the platform, or a cylinder (from SLOT_CYLINDER on). */
+enum { SLOT_CYLINDER = AXES_MAX };
+
+static const uint8_t k_slots[FRAME_COMMANDS][FRAME_VALUES_MAX] = {
+    [FRAME_A3] = {AXIS_ROLL, AXIS_PITCH, AXIS_Z},
+    [FRAME_A4] = {AXIS_ROLL, AXIS_PITCH, AXIS_Z, AXIS_ANGLE},
+    [FRAME_A6] = {AXIS_ROLL, AXIS_PITCH, AXIS_YAW, AXIS_X, AXIS_Y, AXIS_Z},
+    [FRAME_A7] = {AXIS_ROLL, AXIS_PITCH, AXIS_YAW, AXIS_X, AXIS_Y, AXIS_Z, AXIS_ANGLE},
+    [FRAME_C3] = {SLOT_CYLINDER, SLOT_CYLINDER + 1, SLOT_CYLINDER + 2},
+    [FRAME_C6] = {SLOT_CYLINDER, SLOT_CYLINDER + 1, SLOT_CYLINDER + 2, SLOT_CYLINDER + 3, SLOT_CYLINDER + 4, SLOT_CYLINDER + 5},
+    [FRAME_C7] = {SLOT_CYLINDER, SLOT_CYLINDER + 1, SLOT_CYLINDER + 2, SLOT_CYLINDER + 3, SLOT_CYLINDER + 4, SLOT_CYLINDER + 5,
+                  AXIS_ANGLE},
+};
+
+/* Cylinders a command is for: 0 where poses of both kinds of platform take it. */
+static const uint8_t k_cylinders[FRAME_COMMANDS] = {
+    [FRAME_A6] = 6, [FRAME_A7] = 6, [FRAME_C3] = 3, [FRAME_C6] = 6, [FRAME_C7] = 6};
+
+static bool needs_angle(frame_command_t command)
+{
+    return command == FRAME_A4 || command == FRAME_A7 || command == FRAME_C7;
+}
+
+/* What the platform lacks for a command; NULL where it has everything. */
+static const char *missing_for(const gateway_t *self, frame_command_t command)
+{
+    const unsigned cylinders = kin_cylinders(motion_kin(&self->motion));
+    if (k_cylinders[command] != 0 && k_cylinders[command] != cylinders) {
+        return cylinders == 3
+                   ? "it is for six cylinders, this platform has three (A3, C3, and A4 with a rotation motor)"
+                   : "it is for three cylinders, this platform has six (A3, A6, C6, and A4, A7, C7 with a rotation motor)";
+    }
+    return needs_angle(command) && !self->settings.has_angle ? "it needs a rotation motor, and [angle] present is no" : NULL;
+}
+
+/* The value in the platform's own axis: sign * scale * sent + offset. */
+static q32_t to_axis(const axis_settings_t *axis, q16_t sent_q16)
+{
+    const q32_t scaled_q32 = fx_mul_shift(q32_from_q16(sent_q16), axis->scale_q16, 16);
+    return (axis->sign < 0 ? -scaled_q32 : scaled_q32) + q32_from_q16(axis->offset_q16);
+}
+
+/* Nearest angle that is whole turns away, if the motor takes the shorter way. */
+static q32_t unwrap(const gateway_t *self, q32_t angle_q32)
+{
+    if (self->settings.angle_wrap == ANGLE_AS_SENT) {
+        return angle_q32;
+    }
+    const q32_t turn_q32 = q32_from_int(360);
+    q32_t way_q32 = (angle_q32 - self->output.angle_deg_q32) % turn_q32;
+    if (way_q32 > turn_q32 / 2) {
+        way_q32 -= turn_q32;
+    } else if (way_q32 < -turn_q32 / 2) {
+        way_q32 += turn_q32;
+    }
+    return self->output.angle_deg_q32 + way_q32;
+}
+
+static motion_target_t target_of(const gateway_t *self, const frame_t *frame)
+{
+    const bool is_pose = k_slots[frame->command][0] < SLOT_CYLINDER;
+    motion_target_t target = {
+        .space = is_pose ? MOTION_POSE : MOTION_CYLINDERS, .is_timed = frame->is_timed, .time_ms = frame->time_ms};
+    q16_t axis_q16[AXES_MAX] = {0};
+    for (unsigned i = 0; i < frame->count; i++) {
+        const uint8_t slot = k_slots[frame->command][i];
+        if (slot >= SLOT_CYLINDER) {
+            target.value_q32[slot - SLOT_CYLINDER] = q32_from_q16(frame->value_q16[i]);
+        } else {
+            axis_q16[slot] = frame->value_q16[i];
+        }
+    }
+    for (unsigned i = 0; is_pose && i < POSE_AXES; i++) {
+        target.value_q32[i] = to_axis(&self->settings.axis[i], axis_q16[i]);
+    }
+    target.has_angle = needs_angle(frame->command);
+    target.angle_deg_q32 = unwrap(self, to_axis(&self->settings.axis[AXIS_ANGLE], axis_q16[AXIS_ANGLE]));
+    return target;
+}
+
+/* One line for the first reject of a burst, with what was left out since the last one. */
+static void log_reject(gateway_t *self, const char *reason, frame_error_t error, const uint8_t *bytes, size_t length,
+                       const hal_udp_peer_t *from, uint64_t now_us)
+{
+    uint64_t *logged_us = &self->reject_logged_us[error];
+    if (*logged_us != 0 && now_us - *logged_us < REJECT_LOG_INTERVAL_US) {
+        self->reject_suppressed[error]++;
+        return;
+    }
+    char line[HAL_LOG_TEXT_MAX + 1];
+    char peer[HAL_UDP_PEER_TEXT_MAX];
+    text_t text = text_start(line, sizeof line);
+    (void)hal_udp_peer_text(from, peer, sizeof peer);
+    text_put(&text, "frame from ");
+    text_put(&text, peer);
+    text_put(&text, " rejected: ");
+    text_put(&text, reason);
+    text_put(&text, ": \"");
+    text_put_escaped(&text, bytes, length < REJECT_TEXT_BYTES ? length : REJECT_TEXT_BYTES);
+    text_put(&text, "\"");
+    if (self->reject_suppressed[error] > 0) {
+        text_put(&text, "; before that ");
+        text_put_u32(&text, self->reject_suppressed[error]);
+        text_put(&text, " more");
+    }
+    hal_log_write(self->io.log, HAL_LOG_WARNING, line);
+    *logged_us = now_us;
+    self->reject_suppressed[error] = 0;
+}
+
+static void reject(gateway_t *self, const frame_reject_t *why, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    char reason[HAL_LOG_TEXT_MAX + 1];
+    self->snapshot.counters.rejected[why->error]++;
+    (void)frame_reject_describe(why, reason, sizeof reason);
+    log_reject(self, reason, why->error, &self->datagram[why->start], why->end - why->start, from, now_us);
+}
+
+/* A frame that is well formed but not for this platform. */
+static void refuse(gateway_t *self, frame_command_t command, const char *missing, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    char reason[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(reason, sizeof reason);
+    text_put(&text, frame_command_name(command));
+    text_put(&text, ": ");
+    text_put(&text, missing);
+    self->snapshot.counters.rejected[FRAME_ERR_PLATFORM]++;
+    log_reject(self, reason, FRAME_ERR_PLATFORM, (const uint8_t *)frame_command_name(command), 2, from, now_us);
+}
+
+/* What the sender asks of the relays; bits that no relay has are counted. */
+static void take_mask(gateway_t *self, const frame_t *frame)
+{
+    if (frame->is_timed || !frame->has_mask) {
+        return;
+    }
+    const uint16_t wired = (uint16_t)((1u << self->settings.relay_count) - 1u);
+    self->snapshot.counters.relay_missing += (frame->relay_mask & FRAME_RELAY_MASK & ~wired) != 0;
+    self->frame_mask = frame->relay_mask & wired;
+}
+
+static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    const char *missing = missing_for(self, frame->command);
+    if (missing != NULL) {
+        refuse(self, frame->command, missing, from, now_us);
+        return;
+    }
+    const motion_target_t target = target_of(self, frame);
+    operate_event(self, EVENT_FRAME, now_us);
+    if (self->supervisor.state == STATE_ENGAGED && motion_target(&self->motion, &target, now_us) != HV_OK) {
+        self->snapshot.counters.impossible++;
+        refuse(self, frame->command, "no pose of the platform has these extensions", from, now_us);
+        return;
+    }
+    counters_t *counters = &self->snapshot.counters;
+    counters->accepted[frame->command]++;
+    counters->accepted_timed += frame->is_timed;
+    self->snapshot.last_frame_us = now_us;
+    self->start_us = now_us;
+    if (self->supervisor.state == STATE_ENGAGED) {
+        take_mask(self, frame);
+    } else {
+        counters->not_followed++;
+    }
+}
+
+static void take_datagram(gateway_t *self, size_t length, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    frame_t frame;
+    frame_reject_t why;
+    size_t position = 0;
+    frame_scanner_init(&self->scanner, self->settings.dialect);
+    for (;;) {
+        const frame_event_t event = frame_next(&self->scanner, self->datagram, length, &position, &frame, &why);
+        if (event == FRAME_EVENT_NONE) {
+            return;
+        }
+        if (event == FRAME_EVENT_FRAME) {
+            accept(self, &frame, from, now_us);
+        } else {
+            reject(self, &why, from, now_us);
+        }
+    }
+}
+
+void intake_receive(gateway_t *self, uint64_t now_us)
+{
+    for (unsigned i = 0; i < GATEWAY_DATAGRAMS_PER_CYCLE; i++) {
+        hal_udp_peer_t from;
+        size_t length = 0;
+        const hv_status_t status = hal_udp_recv(self->io.udp, self->datagram, sizeof self->datagram, &length, &from);
+        if (status == HV_ERR_AGAIN) {
+            return;
+        }
+        if (status == HV_ERR_IO) {
+            self->snapshot.counters.receive_errors++;
+            return;
+        }
+        self->snapshot.counters.datagrams++;
+        if (status == HV_ERR_RANGE) {
+            self->snapshot.counters.oversize++;
+            log_reject(self, "datagram longer than 512 bytes, send one frame per datagram", FRAME_ERR_UNFINISHED, self->datagram,
+                       0, &from, now_us);
+        } else {
+            take_datagram(self, length, &from, now_us);
+        }
+    }
+}

@@ -1,0 +1,397 @@
+/* SPDX-License-Identifier: MIT
+ * operate.c - states in deeds: what the gateway sees becomes events, what the supervisor answers becomes motion and requests to
+ * drives. Bringing up: enable (set-points on actual), home what has no zero, then go to the settled extension at engage speed.
+ */
+#include "operate.h"
+
+#include "heave/text.h"
+
+#define ENABLE_TIMEOUT_US    10000000u
+#define HOMING_TIMEOUT_US    120000000u
+#define RESET_TIMEOUT_US     2000000u
+#define AT_SETTLED_WINDOW_MM 1
+#define UNSENT_CYCLES_MAX    3u
+
+static unsigned drive_count(const gateway_t *self)
+{
+    return drives_count(self->io.drives);
+}
+
+/* True if every drive is in the state and knows where it is. */
+static bool are_all(const gateway_t *self, drive_state_t state, bool is_zero_needed)
+{
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        const drive_feedback_t *f = &self->feedback[i];
+        if (f->state != state || !f->has_actual || (is_zero_needed && !f->is_homed)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool is_at_settled(const gateway_t *self)
+{
+    const q32_t *settled_q32 = motion_settled_extension(&self->motion);
+    for (unsigned i = 0; i < kin_cylinders(motion_kin(&self->motion)); i++) {
+        if (fx_abs(self->feedback[i].actual_mm_q32 - settled_q32[i]) > q32_from_int(AT_SETTLED_WINDOW_MM)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool is_drive_fault_present(const gateway_t *self)
+{
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        if (self->feedback[i].state == DRIVE_FAULT || self->feedback[i].state == DRIVE_OFFLINE) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static supervisor_view_t view_of(const gateway_t *self)
+{
+    return (supervisor_view_t){
+        .is_at_settled = is_at_settled(self),
+        .is_at_rest = motion_is_at_rest(&self->motion),
+        .is_fault_present = is_drive_fault_present(self),
+        .is_estop_active = self->snapshot.is_estop_active,
+    };
+}
+
+static void log_change(gateway_t *self, state_t from, event_t event)
+{
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    text_put(&text, state_name(from));
+    text_put(&text, " -> ");
+    text_put(&text, state_name(self->supervisor.state));
+    text_put(&text, " (");
+    text_put(&text, event_name(event));
+    text_put(&text, ")");
+    hal_log_write(self->io.log, supervisor_is_latched(&self->supervisor) ? HAL_LOG_ERROR : HAL_LOG_NOTICE, line);
+}
+
+/* Set-points on the actual positions. */
+static void track_actual(gateway_t *self)
+{
+    q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
+    const unsigned cylinders = kin_cylinders(motion_kin(&self->motion));
+    for (unsigned i = 0; i < cylinders; i++) {
+        extension_mm_q32[i] = self->feedback[i].actual_mm_q32;
+    }
+    motion_place(&self->motion, extension_mm_q32, self->settings.has_angle ? self->feedback[cylinders].actual_mm_q32 : 0);
+}
+
+static void begin_bring_up(gateway_t *self, uint64_t now_us)
+{
+    self->bring_up = BRING_UP_ENABLE;
+    self->bring_up_deadline_us = now_us + ENABLE_TIMEOUT_US;
+    self->is_disable_due = false;
+}
+
+static void begin_following(gateway_t *self, uint64_t now_us)
+{
+    self->start_us = now_us;
+    self->frame_mask = self->settings.relay_safe_mask;
+    motion_follow(&self->motion);
+}
+
+/* Asks the drives to go off; is_disable_due stays while they cannot be asked. */
+static void disable_drives(gateway_t *self)
+{
+    const state_t state = self->supervisor.state;
+    const bool is_quick = state == STATE_ESTOP || state == STATE_HOLD;
+    self->is_disable_due = drives_request(self->io.drives, is_quick ? DRIVES_QUICK_STOP : DRIVES_DISABLE) == HV_ERR_AGAIN;
+}
+
+/* Set-points on actual, torque off at once. */
+static void drop_drives(gateway_t *self)
+{
+    self->is_tracking_actual = true;
+    self->is_disable_due = true;
+    track_actual(self);
+}
+
+/* Stops where it is; drives that are coming up or homing by themselves are told so. */
+static void hold(gateway_t *self)
+{
+    if (self->bring_up == BRING_UP_ENABLE || self->bring_up == BRING_UP_HOME) {
+        drop_drives(self);
+    } else {
+        motion_stop(&self->motion);
+    }
+    self->bring_up = BRING_UP_IDLE;
+}
+
+static void stop_and_disable(gateway_t *self)
+{
+    self->bring_up = BRING_UP_IDLE;
+    self->is_disable_due = true;
+    if (!self->is_tracking_actual) {
+        motion_stop(&self->motion);
+    }
+}
+
+static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
+{
+    switch (action) {
+    case ACTION_HOME:
+        begin_bring_up(self, now_us);
+        break;
+    case ACTION_SETTLE:
+        motion_settle(&self->motion);
+        break;
+    case ACTION_RISE:
+        motion_rise(&self->motion);
+        break;
+    case ACTION_FOLLOW:
+        begin_following(self, now_us);
+        break;
+    case ACTION_STOP:
+        hold(self);
+        break;
+    case ACTION_OFF:
+    case ACTION_FAULT_STOP:
+        stop_and_disable(self);
+        break;
+    case ACTION_ESTOP:
+        self->bring_up = BRING_UP_IDLE;
+        drop_drives(self);
+        break;
+    case ACTION_STAY:
+    case ACTION_NONE:
+        break;
+    }
+}
+
+void operate_event(gateway_t *self, event_t event, uint64_t now_us)
+{
+    const state_t before = self->supervisor.state;
+    const supervisor_view_t view = view_of(self);
+    const action_t action = supervisor_event(&self->supervisor, event, &view);
+    if (self->supervisor.state != before) {
+        log_change(self, before, event);
+    }
+    carry_out(self, action, now_us);
+}
+
+/* Keeps the first fault and takes the platform to FAULT. */
+static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint32_t device_code, uint64_t now_us)
+{
+    if (supervisor_is_latched(&self->supervisor)) {
+        return;
+    }
+    self->snapshot.fault = (fault_t){code, (uint8_t)axis, device_code, now_us};
+    self->snapshot.counters.faults++;
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    text_put(&text, fault_name(code));
+    if (axis != 0) {
+        text_put(&text, ", axis ");
+        text_put_u32(&text, axis);
+    }
+    if (device_code != 0) {
+        text_put(&text, ", device code 0x");
+        text_put_hex(&text, device_code, 4);
+    }
+    hal_log_write(self->io.log, HAL_LOG_ERROR, line);
+    operate_event(self, EVENT_FAULT, now_us);
+}
+
+/* Nobody hears the set-points any more: a controlled stop would only make them jump when the bus is back. */
+static void lose_bus(gateway_t *self, uint64_t now_us)
+{
+    if (self->supervisor.state != STATE_OFF) {
+        raise_fault(self, FAULT_BUS, 0, 0, now_us);
+    }
+    self->is_tracking_actual = true;
+}
+
+static bool is_torque_expected(const gateway_t *self)
+{
+    const state_t state = self->supervisor.state;
+    return state != STATE_OFF && state != STATE_FAULT && state != STATE_ESTOP && self->bring_up != BRING_UP_ENABLE &&
+           self->bring_up != BRING_UP_HOME && !self->is_tracking_actual;
+}
+
+/* Drives that report a fault or are gone, in any state in which they are meant to be up; drives that dropped out. */
+static void watch_drives(gateway_t *self, uint64_t now_us)
+{
+    if (self->supervisor.state == STATE_OFF) {
+        return;
+    }
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        const drive_feedback_t *f = &self->feedback[i];
+        if (f->state == DRIVE_FAULT) {
+            raise_fault(self, FAULT_DRIVE, i + 1, f->fault_code, now_us);
+        } else if (f->state == DRIVE_OFFLINE) {
+            raise_fault(self, FAULT_DRIVE_OFFLINE, i + 1, 0, now_us);
+        } else if (f->state != DRIVE_ENABLED && is_torque_expected(self)) {
+            raise_fault(self, FAULT_DRIVE_DROPPED, i + 1, 0, now_us);
+        }
+    }
+}
+
+/* Next step of bringing up, when the last one is complete. */
+static void step_bring_up(gateway_t *self, uint64_t now_us)
+{
+    const bool is_waiting = self->bring_up == BRING_UP_ENABLE || self->bring_up == BRING_UP_HOME;
+    if (is_waiting && now_us >= self->bring_up_deadline_us) {
+        raise_fault(self, FAULT_DRIVE_TIMEOUT, 0, 0, now_us);
+        return;
+    }
+    if (self->bring_up == BRING_UP_ENABLE && !are_all(self, DRIVE_ENABLED, true)) {
+        self->is_tracking_actual = true;
+        if (!are_all(self, DRIVE_ENABLED, false)) {
+            (void)!drives_request(self->io.drives, DRIVES_ENABLE);
+        } else if (drives_request(self->io.drives, DRIVES_HOME) == HV_OK) {
+            self->bring_up = BRING_UP_HOME;
+            self->bring_up_deadline_us = now_us + HOMING_TIMEOUT_US;
+        }
+    }
+    if (is_waiting && are_all(self, DRIVE_ENABLED, true)) {
+        self->bring_up = BRING_UP_MOVE;
+        if (self->is_tracking_actual) { /* else it goes on from the motion it is in */
+            self->is_tracking_actual = false;
+            track_actual(self);
+        }
+        motion_settle(&self->motion);
+    }
+}
+
+/* The move of HOMING, RISING or SETTLING has arrived. */
+static bool is_move_done(const gateway_t *self)
+{
+    switch (self->supervisor.state) {
+    case STATE_HOMING:
+        return self->bring_up == BRING_UP_MOVE && motion_is_done(&self->motion);
+    case STATE_RISING:
+    case STATE_SETTLING:
+        return motion_is_done(&self->motion);
+    case STATE_OFF:
+    case STATE_SETTLED:
+    case STATE_NEUTRAL:
+    case STATE_ENGAGED:
+    case STATE_HOLD:
+    case STATE_FAULT:
+    case STATE_ESTOP:
+    case STATES:
+        return false;
+    }
+    return false;
+}
+
+static void read_inputs(gateway_t *self, uint64_t now_us)
+{
+    uint32_t levels = 0;
+    const hv_status_t status = hal_inputs_read(self->io.inputs, &levels);
+    self->snapshot.is_estop_active = status != HV_OK || (levels & INPUT_ESTOP) != 0;
+    if (self->snapshot.is_estop_active) {
+        operate_event(self, EVENT_ESTOP, now_us);
+    }
+}
+
+/* A reset first asks the drives; it takes effect when none of them is in fault any more. */
+static void step_reset(gateway_t *self, uint64_t now_us)
+{
+    if (self->reset_until_us == 0) {
+        return;
+    }
+    if (!is_drive_fault_present(self)) {
+        operate_event(self, EVENT_RESET, now_us);
+    }
+    if (!supervisor_is_latched(&self->supervisor)) {
+        self->reset_until_us = 0;
+        self->snapshot.fault = (fault_t){.code = FAULT_NONE};
+    } else if (now_us >= self->reset_until_us) {
+        self->reset_until_us = 0;
+        hal_log_write(self->io.log, HAL_LOG_WARNING, "reset refused: the cause of the fault or the e-stop is still there");
+    }
+}
+
+/* The auto policy, once: brings the platform up as an operator's engage would. */
+static void step_auto(gateway_t *self, uint64_t now_us)
+{
+    const bool is_ready = self->supervisor.state == STATE_OFF && !is_drive_fault_present(self);
+    if (self->is_auto_due && is_ready) {
+        self->is_auto_due = false;
+        operate_event(self, EVENT_ENGAGE, now_us);
+    }
+}
+
+void operate_before_frames(gateway_t *self, uint64_t now_us)
+{
+    operate_event(self, EVENT_TICK, now_us);
+    if (drives_poll(self->io.drives, now_us, self->feedback) != HV_OK || self->unsent_cycles > UNSENT_CYCLES_MAX) {
+        lose_bus(self, now_us);
+    }
+    watch_drives(self, now_us);
+    read_inputs(self, now_us);
+    step_reset(self, now_us);
+    step_auto(self, now_us);
+    if (self->supervisor.state == STATE_OFF && are_all(self, DRIVE_ENABLED, true) && !self->is_disable_due) {
+        operate_event(self, EVENT_DRIVES_READY, now_us);
+        self->is_tracking_actual = self->supervisor.state == STATE_OFF;
+    }
+    step_bring_up(self, now_us);
+    if (is_move_done(self)) {
+        self->bring_up = BRING_UP_IDLE;
+        operate_event(self, EVENT_MOVE_DONE, now_us);
+    }
+}
+
+static bool has_passed(uint64_t now_us, uint64_t since_us, uint32_t limit_ms)
+{
+    return limit_ms != 0 && now_us >= since_us && now_us - since_us >= (uint64_t)limit_ms * 1000;
+}
+
+void operate_after_frames(gateway_t *self, uint64_t now_us)
+{
+    const uint64_t end_us = motion_timed_end_us(&self->motion);
+    const uint64_t since_us = end_us > self->start_us ? end_us : self->start_us;
+    if (has_passed(now_us, since_us, self->settings.silence_hold_ms)) {
+        operate_event(self, EVENT_SILENCE_HOLD, now_us);
+    }
+    if (has_passed(now_us, since_us, self->settings.silence_neutral_ms)) {
+        operate_event(self, EVENT_SILENCE_NEUTRAL, now_us);
+    }
+    if (has_passed(now_us, since_us, self->settings.silence_settle_ms)) {
+        operate_event(self, EVENT_SILENCE_SETTLE, now_us);
+    }
+    if (self->is_tracking_actual) {
+        /* torque off first: a drive that follows would take the set-points' way back to actual for a jump */
+        if (self->is_disable_due) {
+            disable_drives(self);
+        }
+        track_actual(self);
+    }
+}
+
+hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us)
+{
+    if (request == EVENT_RESET) {
+        if (!supervisor_is_latched(&self->supervisor)) {
+            return HV_ERR_STATE;
+        }
+        (void)!drives_request(self->io.drives, DRIVES_RESET_FAULT);
+        self->reset_until_us = now_us + RESET_TIMEOUT_US;
+        return HV_OK;
+    }
+    self->is_shutdown_asked |= request == EVENT_SHUTDOWN;
+    const uint32_t ignored = self->supervisor.ignored[request];
+    if (self->is_shutdown_asked && request != EVENT_SHUTDOWN && request != EVENT_HOLD) {
+        return HV_ERR_STATE;
+    }
+    operate_event(self, request, now_us);
+    return self->supervisor.ignored[request] == ignored ? HV_OK : HV_ERR_STATE;
+}
+
+void operate_after_motion(gateway_t *self)
+{
+    if (self->is_disable_due && motion_is_at_rest(&self->motion)) {
+        disable_drives(self);
+        self->is_tracking_actual |= !self->is_disable_due;
+    }
+}

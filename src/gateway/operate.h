@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: MIT
+ * operate.h - states in deeds: events to the supervisor, its actions on motion, drives and relays. Private to src/gateway.
+ */
+#ifndef OPERATE_H
+#define OPERATE_H
+
+#include "heave/gateway.h"
+
+/** Offers an event and carries out the action of the transition. Logs every change of state. */
+void operate_event(gateway_t *self, event_t event, uint64_t now_us);
+
+/** Drives and inputs to events, before the frames of the cycle are read. */
+void operate_before_frames(gateway_t *self, uint64_t now_us);
+
+/** Silence of the sender to events, after them. */
+void operate_after_frames(gateway_t *self, uint64_t now_us);
+
+/** An operator's request (see gateway_request). */
+hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us);
+
+/** After the motion of the cycle: drives that are to be disabled once at rest. */
+void operate_after_motion(gateway_t *self);
+
+#endif
