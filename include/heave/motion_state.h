@@ -30,6 +30,7 @@ struct motion {
     q32_t settled_mm_q32[CYLINDERS_MAX];
     ramp_limits_t engage_limits; /**< of every cylinder on a path and at a take-over */
 
+    bool is_axis_moved[AXES_MAX];       /**< the others stay at 0 */
     ramp_t axis[AXES_MAX];              /**< pose axes and the rotation motor */
     ramp_t cylinder[CYLINDERS_MAX];     /**< the limiter */
     history_t reference[CYLINDERS_MAX]; /**< what the limiter was last asked for */

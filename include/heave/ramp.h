@@ -56,7 +56,7 @@ typedef struct {
     ramp_limits_t limits;
     ramp_state_t state;
     q32_t acc_safe_q32; /**< acceleration limit in force, u/cycle^2: at most limits.acc, and small enough that every brake fits */
-    int64_t acc_cycles;    /**< acc_safe / jerk, whole */
+    int64_t acc_cycles; /**< acc_safe / jerk, whole */
     int64_t per_jerk_q62;  /**< 1 / jerk */
     int64_t per_acc_q62;   /**< 1 / acc_safe */
     q32_t brake_reach_q32; /**< no brake from within the limits is longer, u */

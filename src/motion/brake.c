@@ -16,13 +16,15 @@ static q32_t distance_after(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32, in
     return k * vel_q32 + pairs * acc_q32 - ramp->limits.jerk_per_cycle3_q32 * (pairs * (k + 2) / 3);
 }
 
-/* The stop that holds -acc_safe for a while, summed cycle by cycle: down to -acc_safe, hold, back to 0. The sum is exact, as whatever
- * is missing in speed here counts with all the cycles of the hold. False where the stop does not get as far as -acc_safe. */
+/* The stop that holds -acc_safe for a while, summed cycle by cycle: down to -acc_safe, hold, back to 0. The sum is exact, as
+ * whatever is missing in speed here counts with all the cycles of the hold. False where the stop does not get as far as
+ * -acc_safe. */
 static bool distance_with_hold(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32, q32_t *distance_q32)
 {
     const q32_t jerk_q32 = ramp->limits.jerk_per_cycle3_q32;
     const q32_t acc_max_q32 = ramp->acc_safe_q32;
-    const int64_t down = acc_q32 > -acc_max_q32 ? (acc_q32 + acc_max_q32 + jerk_q32 - 1) / jerk_q32 : 0; /* the last one may be partial */
+    const int64_t down =
+        acc_q32 > -acc_max_q32 ? (acc_q32 + acc_max_q32 + jerk_q32 - 1) / jerk_q32 : 0; /* the last one may be partial */
     const int64_t back = ramp->acc_cycles;
     const q32_t reached_q32 = down > 0 ? velocity_after(ramp, vel_q32, acc_q32, down - 1) - acc_max_q32 : vel_q32;
     const q32_t held_q32 = reached_q32 - jerk_q32 * (back * (back - 1) / 2);

@@ -4,8 +4,8 @@
  * Model, everything per cycle: acc' = acc + jerk, vel' = vel + acc', pos' = pos + vel'. With n = acc / J the discrete sums are
  *   velocity gained until acc is 0:        J n (n - 1) / 2
  *   distance from W at acc 0 to rest:      W sqrt(W / J) where the stop does not get as far as -A
- * both exact for whole n and used for real n (derivation: sums of 1, k and k^2 over the cycles of a jerk-limited brake). A stop that
- * holds -A is summed phase by phase, exact for every acc: there an error in speed would count with every cycle of the hold.
+ * both exact for whole n and used for real n (derivation: sums of 1, k and k^2 over the cycles of a jerk-limited brake). A stop
+ * that holds -A is summed phase by phase, exact for every acc: there an error in speed would count with every cycle of the hold.
  */
 #ifndef BRAKE_H
 #define BRAKE_H

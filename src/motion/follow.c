@@ -79,10 +79,10 @@ static void enter_space(motion_t *self, motion_space_t space)
     if (space != MOTION_POSE || pose_states(self, state) != HV_OK) {
         return;
     }
+    const bool is_resting = motion_is_at_rest(self);
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        const bool is_resting = motion_is_at_rest(self);
-        ramp_take_over(&self->axis[i], &(ramp_state_t){state[i].pos_q32, is_resting ? 0 : state[i].vel_per_cycle_q32,
-                                                       is_resting ? 0 : state[i].acc_per_cycle2_q32});
+        const ramp_state_t at_rest = {.pos_q32 = self->is_axis_moved[i] ? state[i].pos_q32 : 0};
+        ramp_take_over(&self->axis[i], is_resting || !self->is_axis_moved[i] ? &at_rest : &state[i]);
     }
 }
 
@@ -114,15 +114,22 @@ static void slots_of(motion_t *self, const motion_target_t *target, q32_t slot_q
     self->is_clamped |= self->limiting_cylinder != 0;
 }
 
-/* The first target after a rest: how long its way at engage speed takes. */
-static void plan_blend(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
+/* The first target after a rest: its way at engage speed, or slower where a timed move gives it longer. The axes stand on the
+ * target at once, as it is the blend that moves the platform there. */
+static void plan_blend(motion_t *self, const q32_t slot_q32[AXES_MAX], const q32_t extension_mm_q32[CYLINDERS_MAX],
+                       int64_t cycles)
 {
     path_limits_t limits = path_limits_none();
     for (unsigned i = 0; i < self->cylinders; i++) {
         self->blend_from_q32[i] = self->cylinder[i].state.pos_q32;
         path_limits_narrow(&limits, extension_mm_q32[i] - self->blend_from_q32[i], &self->engage_limits);
+        self->reference[i] = (history_t){.pos_q32 = extension_mm_q32[i]};
     }
-    scurve_plan(&self->blend, &limits, TAKEOVER_LEAST_US / (int64_t)self->cycle_us);
+    for (unsigned i = 0; self->space == MOTION_POSE && i < POSE_AXES; i++) {
+        self->axis[i].state = (ramp_state_t){.pos_q32 = slot_q32[i]};
+    }
+    const int64_t least = TAKEOVER_LEAST_US / (int64_t)self->cycle_us;
+    scurve_plan(&self->blend, &limits, cycles > least ? cycles : least);
     self->blend_share[0] = self->blend_share[1] = self->blend_share[2] = 0;
     self->blend_rest = 0;
     self->is_blend_planned = true;
@@ -169,15 +176,14 @@ static bool plan_stop_then_straight(motion_t *self, const ramp_state_t *start, c
 
 /* Timed moves, best first: a quintic; from rest an S-curve, longer than asked if need be; a stop and an S-curve; else the step
  * law. */
-static void plan_timed(motion_t *self, const q32_t slot_q32[AXES_MAX], uint32_t time_ms, uint64_t now_us)
+static void plan_timed(motion_t *self, const q32_t slot_q32[AXES_MAX], int64_t asked, bool is_first, uint64_t now_us)
 {
     ramp_state_t start[AXES_MAX];
     const ramp_limits_t *limits[AXES_MAX];
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        start[i] = slot_ramp(self, i)->state;
+        start[i] = is_first && i != AXIS_ANGLE ? (ramp_state_t){.pos_q32 = slot_q32[i]} : slot_ramp(self, i)->state;
         limits[i] = &slot_ramp(self, i)->limits;
     }
-    const int64_t asked = ((int64_t)time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
     int64_t cycles = asked > 0 ? asked : 1;
     self->is_stretched = false;
     self->next = MOTION_THEN_REST;
@@ -191,6 +197,10 @@ static void plan_timed(motion_t *self, const q32_t slot_q32[AXES_MAX], uint32_t 
         self->next = MOTION_THEN_STRAIGHT;
     } else {
         self->source = MOTION_STREAMED; /* the lone sample that follow_target pushed: a step */
+        self->is_stretched = asked > 0;
+    }
+    if (is_first && scurve_cycles(&self->blend) > cycles) {
+        cycles = scurve_cycles(&self->blend);
         self->is_stretched = asked > 0;
     }
     self->stretched_count += self->is_stretched;
@@ -217,10 +227,12 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
         enter_space(self, target->space);
     }
     slots_of(self, target, slot_q32, extension_mm_q32);
-    if (self->is_taking_over && !self->is_blend_planned) {
-        plan_blend(self, extension_mm_q32);
-    }
     const bool is_sample = is_stream_sample(self, target, now_us);
+    const int64_t cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
+    const bool is_first = self->is_taking_over && !self->is_blend_planned;
+    if (is_first) {
+        plan_blend(self, slot_q32, extension_mm_q32, cycles);
+    }
     self->last_timed_us = target->is_timed ? now_us : 0;
     if (!is_sample) {
         stream_reset(&self->stream);
@@ -231,7 +243,7 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
     if (is_sample) {
         self->source = MOTION_STREAMED;
     } else {
-        plan_timed(self, slot_q32, target->time_ms, now_us);
+        plan_timed(self, slot_q32, cycles, is_first, now_us);
     }
 }
 
@@ -319,6 +331,7 @@ static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], pose_t *planned,
     }
     kin_constrain(&self->kin, planned);
     const unsigned cylinder = reach_pull_in(self, planned, extension_mm_q32);
+    kin_constrain(&self->kin, planned); /* what is parasitic is not on the straight way the pose was pulled along */
     out->limiting_cylinder = cylinder != 0 ? (uint8_t)cylinder : self->limiting_cylinder;
     for (unsigned i = 0; i < self->cylinders; i++) {
         ref[i] = history_advance(&self->reference[i], extension_mm_q32[i]);

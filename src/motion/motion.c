@@ -34,10 +34,23 @@ static hv_status_t init_cylinders(motion_t *self, const settings_t *s)
                                   s->cylinder_jerk_mm_s3, s->cycle_us, &self->engage_limits);
 }
 
+/* What an axis has that the platform does not move: nothing limits it, and nothing is ever asked of it. */
+static const axis_settings_t k_absent_axis = {
+    .min_q16 = -INT16_MAX * Q16_ONE, .max_q16 = INT16_MAX * Q16_ONE, .speed_q16 = Q16_ONE, .accel_q16 = Q16_ONE, .jerk = 1000000};
+
+static bool is_axis_moved(const motion_t *self, const settings_t *s, unsigned axis)
+{
+    if (axis == AXIS_ANGLE) {
+        return s->has_angle;
+    }
+    return self->cylinders == CYLINDERS_MAX || axis == AXIS_ROLL || axis == AXIS_PITCH || axis == AXIS_Z;
+}
+
 static hv_status_t init_axes(motion_t *self, const settings_t *s)
 {
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        const axis_settings_t *a = &s->axis[i];
+        self->is_axis_moved[i] = is_axis_moved(self, s, i);
+        const axis_settings_t *a = self->is_axis_moved[i] ? &s->axis[i] : &k_absent_axis;
         ramp_limits_t limits;
         const hv_status_t status =
             ramp_limits_from_units(a->min_q16, a->max_q16, a->speed_q16, a->accel_q16, a->jerk, s->cycle_us, &limits);

@@ -165,7 +165,8 @@ static q32_t shortfall(const ramp_t *self, const errors_t *e, q32_t b_next)
     return fx_sub_sat(e->d - w_next, brake_distance(self, w_next, b_next));
 }
 
-/* Acceleration, relative to the feed, with which the quickest stop ends on the reference; acc is the present one on the same terms. */
+/* Acceleration, relative to the feed, with which the quickest stop ends on the reference; acc is the present one on the same
+ * terms. */
 static q32_t solve_upwards(const ramp_t *self, const errors_t *e, q32_t acc_q32, q32_t feed_q32)
 {
     const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
@@ -240,8 +241,10 @@ static bool keeps_bound(const ramp_t *self, q32_t acc_q32, int sign)
     if (room_q32 >= self->brake_reach_q32) {
         return true;
     }
-    const bool rises = sign * vel_q32 > 0 || (sign * acc_q32 > 0 && brake_velocity_peak(self, sign * vel_q32, sign * acc_q32) > 0);
-    return !rises || brake_peak(self, sign * vel_q32, sign * acc_q32) <= room_q32; /* outside: it may come in, but never turns back */
+    const bool rises =
+        sign * vel_q32 > 0 || (sign * acc_q32 > 0 && brake_velocity_peak(self, sign * vel_q32, sign * acc_q32) > 0);
+    return !rises ||
+           brake_peak(self, sign * vel_q32, sign * acc_q32) <= room_q32; /* outside: it may come in, but never turns back */
 }
 
 /* True if after acceleration acc the ramp can come to rest, acceleration included, before the bound on the side of sign. */
@@ -251,11 +254,13 @@ static bool can_rest_inside(const ramp_t *self, q32_t acc_q32, int sign)
     const q32_t pos_q32 = self->state.pos_q32 + vel_q32;
     const q32_t room_q32 = sign > 0 ? self->limits.pos_max_q32 - pos_q32 : pos_q32 - self->limits.pos_min_q32;
     const bool is_outside = room_q32 + sign * vel_q32 < 0;
-    return room_q32 >= self->brake_reach_q32 || is_outside || brake_distance(self, sign * vel_q32, sign * acc_q32) <= room_q32;
+    const bool is_leaving = sign * vel_q32 <= 0 && sign * acc_q32 <= 0;
+    return room_q32 >= self->brake_reach_q32 || is_outside || is_leaving ||
+           brake_distance(self, sign * vel_q32, sign * acc_q32) <= room_q32;
 }
 
-/* Acceleration towards a bound: at most what the quickest stop on the bound takes. Without this a reference that leads past the bound
- * would only be left when nothing but the full brake helps, and that would throw the ramp back. */
+/* Acceleration towards a bound: at most what the quickest stop on the bound takes. Without this a reference that leads past the
+ * bound would only be left when nothing but the full brake helps, and that would throw the ramp back. */
 static q32_t stop_on_bound(ramp_t *self, q32_t wanted_q32, int sign)
 {
     if (can_rest_inside(self, wanted_q32, sign)) {

@@ -121,7 +121,8 @@ static void check_axis(rig_t *self, unsigned i, q32_t pos)
     }
     if (!is_motor && c->history > 0) {
         const double outside = outside_mm(s, i, pos);
-        max_into(&c->outside_mm, outside > outside_mm(s, i, c->last_q32[i]) ? outside : 0); /* it may come in from where homing ended */
+        max_into(&c->outside_mm,
+                 outside > outside_mm(s, i, c->last_q32[i]) ? outside : 0); /* it may come in from where homing ended */
     }
     c->last_q32[i] = pos;
     c->last_vel_q32[i] = vel;
@@ -155,7 +156,8 @@ static void watch_steps(rig_t *self, const q32_t *setpoint_q32)
 {
     const bool is_enabled = are_drives_enabled(self);
     for (unsigned i = 0; i < self->drives.count; i++) {
-        const q32_t step = setpoint_q32[i] > self->sent_q32[i] ? setpoint_q32[i] - self->sent_q32[i] : self->sent_q32[i] - setpoint_q32[i];
+        const q32_t step =
+            setpoint_q32[i] > self->sent_q32[i] ? setpoint_q32[i] - self->sent_q32[i] : self->sent_q32[i] - setpoint_q32[i];
         self->step_max_q32 = is_enabled && self->was_enabled && step > self->step_max_q32 ? step : self->step_max_q32;
         self->sent_q32[i] = setpoint_q32[i];
     }
@@ -208,19 +210,20 @@ void rig_start(rig_t *self, const settings_t *settings, bool is_settled)
     const unsigned count = cylinders + (settings->has_angle ? 1 : 0);
     for (unsigned i = 0; i < count; i++) {
         const bool is_motor = i == cylinders;
-        self->drive_config[i] =
-            (sim_drive_config_t){.start_q32 = is_motor     ? 0
-                                              : is_settled ? q32_from_q16(settings->settled_extension_mm_q16)
-                                                           : q32_from_int(20 + (int)i),
-                                 .travel_min_q32 = is_motor ? q32_from_int(-100000) : 0,
-                                 .travel_max_q32 = is_motor ? q32_from_int(100000) : q32_from_q16(settings->stroke_mm_q16[i]),
-                                 .time_constant_us = 8000,
-                                 .enable_us = 50000,
-                                 .homing_per_s_q32 = q32_from_int(30),
-                                 .step_max_q32 = Q32_ONE / 2000 * (settings->cycle_us > 2000 ? settings->cycle_us : 2000), /* 500 mm/s, at least 1 mm */
-                                 .lag_max_q32 = q32_from_int(20),
-                                 .is_homed = is_settled,
-                                 .is_enabled = is_settled};
+        self->drive_config[i] = (sim_drive_config_t){
+            .start_q32 = is_motor     ? 0
+                         : is_settled ? q32_from_q16(settings->settled_extension_mm_q16)
+                                      : q32_from_int(20 + (int)i),
+            .travel_min_q32 = is_motor ? q32_from_int(-100000) : 0,
+            .travel_max_q32 = is_motor ? q32_from_int(100000) : q32_from_q16(settings->stroke_mm_q16[i]),
+            .time_constant_us = 8000,
+            .enable_us = 50000,
+            .homing_per_s_q32 = q32_from_int(30),
+            .step_max_q32 =
+                Q32_ONE / 2000 * (settings->cycle_us > 2000 ? settings->cycle_us : 2000), /* 500 mm/s, at least 1 mm */
+            .lag_max_q32 = q32_from_int(20),
+            .is_homed = is_settled,
+            .is_enabled = is_settled};
     }
     if (sim_drives_init(&self->drives, (uint8_t)count, self->drive_config, NULL, 0) != HV_OK) {
         fail("sim_drives_init");

@@ -166,7 +166,8 @@ static void test_quintic_is_feasible_agrees_with_the_closed_form(void)
         const axis_t axis = random_axis();
         const ramp_limits_t *limits[1] = {&axis.limits};
         const double d = random_log(0.01, 2000), s = random_log(0.02, 20);
-        const double share = fmax(fmax(1.875 * d / s / axis.speed, 5.7735 * d / s / s / axis.accel), 60 * d / s / s / s / axis.jerk);
+        const double share =
+            fmax(fmax(1.875 * d / s / axis.speed, 5.7735 * d / s / s / axis.accel), 60 * d / s / s / s / axis.jerk);
         const double safe = fmin(axis.accel, sqrt(axis.speed * axis.jerk));
         const double safe_share = fmax(share, 5.7735 * d / s / s / safe);
         const ramp_state_t start = {0};
@@ -316,7 +317,8 @@ static void test_scurve_plan_random_moves_keep_limits_and_are_short(void)
     int counted = 0;
     for (int run = 0; run < 3000; run++) {
         static const uint32_t k_cycles_us[] = {500, 1000, 2000, 5000};
-        const axis_t axis = axis_of(random_log(20, 2000), random_log(100, 30000), (int32_t)random_log(2000, 500000), k_cycles_us[run % 4]);
+        const axis_t axis =
+            axis_of(random_log(20, 2000), random_log(100, 30000), (int32_t)random_log(2000, 500000), k_cycles_us[run % 4]);
         const double distance = random_log(0.001, 2000);
         const q32_t from = q32(random_unit() * 100), to = from + q32(run % 2 == 0 ? distance : -distance);
         path_limits_t limits = path_limits_none();

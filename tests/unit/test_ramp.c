@@ -171,7 +171,8 @@ static ramp_ref_t random_reference(const ramp_limits_t *limits, const ramp_ref_t
         return (ramp_ref_t){.pos_q32 = random_position(limits)};
     case 2: /* differences that have nothing to do with the position */
         return (ramp_ref_t){random_position(limits), random_around(limits->vel_per_cycle_q32, factor),
-                            random_around(limits->acc_per_cycle2_q32, factor), random_around(limits->jerk_per_cycle3_q32, factor)};
+                            random_around(limits->acc_per_cycle2_q32, factor),
+                            random_around(limits->jerk_per_cycle3_q32, factor)};
     case 3: { /* a line at any speed */
         const q32_t vel = random_around(limits->vel_per_cycle_q32, factor);
         return (ramp_ref_t){last->pos_q32 + vel, vel, 0, 0};
@@ -462,6 +463,7 @@ static q32_t track_sine(const ramp_limits_t *limits, sine_t sine, ramp_grip_t gr
     return worst;
 }
 
+/* Sines that take half of every limit: from about 0.6 on a ramp that starts from rest may go round them for ever. */
 static void test_ramp_step_feasible_sine_is_tracked_exactly(void)
 {
     const ramp_limits_t limits = usual_limits();
@@ -579,7 +581,8 @@ static void test_ramp_limits_from_units_out_of_range_is_refused(void)
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, ramp_limits_from_units(0, q16(1), q16(1), q16(1), 0, 1000, &limits));
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, ramp_limits_from_units(0, q16(1), q16(1), q16(1), 1000, RAMP_CYCLE_MIN_US - 1, &limits));
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, ramp_limits_from_units(0, q16(1), q16(1), q16(1), 1000, RAMP_CYCLE_MAX_US + 1, &limits));
-    TEST_ASSERT_EQUAL(HV_ERR_RANGE, ramp_limits_from_units(0, q16(1), q16(1), q16(1), 10, 500, &limits)); /* below the least jerk */
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE,
+                      ramp_limits_from_units(0, q16(1), q16(1), q16(1), 10, 500, &limits)); /* below the least jerk */
     TEST_ASSERT_EQUAL_INT64(77, limits.pos_min_q32);
 }
 
@@ -591,7 +594,8 @@ static void test_ramp_limits_from_units_values_are_per_cycle(void)
     TEST_ASSERT_INT64_WITHIN(1, q32(0.8), limits.vel_per_cycle_q32);
     TEST_ASSERT_INT64_WITHIN(1, q32(0.012), limits.acc_per_cycle2_q32);
     TEST_ASSERT_INT64_WITHIN(1, q32(0.0004), limits.jerk_per_cycle3_q32);
-    TEST_ASSERT_TRUE(limits.vel_per_cycle_q32 <= q32(0.8) && limits.jerk_per_cycle3_q32 <= q32(0.0004)); /* never more than asked */
+    TEST_ASSERT_TRUE(limits.vel_per_cycle_q32 <= q32(0.8) &&
+                     limits.jerk_per_cycle3_q32 <= q32(0.0004)); /* never more than asked */
 }
 
 int main(void)

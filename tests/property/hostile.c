@@ -1,0 +1,270 @@
+/* SPDX-License-Identifier: MIT
+ * hostile.c - a storm of frames, garbage, requests, e-stops and drive faults on a whole gateway over simulated hardware.
+ * What must hold: every set-point within the limits (judged on the drive interface), no following error, and after the storm the
+ * platform comes up again. Prints its seed; another one may be given as the first argument, cycles as the second.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "rig.h"
+
+#define CYCLES_DEFAULT 1000000
+
+static rig_t m_rig;
+static uint64_t m_random;
+static unsigned m_cylinders;
+
+static uint64_t random_bits(void)
+{
+    m_random ^= m_random << 13;
+    m_random ^= m_random >> 7;
+    m_random ^= m_random << 17;
+    return m_random;
+}
+
+static unsigned below(unsigned limit)
+{
+    return (unsigned)(random_bits() >> 16) % limit;
+}
+
+static bool one_in(unsigned chances)
+{
+    return below(chances) == 0;
+}
+
+static double around(double range)
+{
+    return ((double)(random_bits() >> 11) / 4503599627370496.0 - 1) * range;
+}
+
+/* ---- what senders send ---- */
+
+typedef struct {
+    double size;      /* of the values, as a share of what the platform has */
+    unsigned gap_ms;  /* between frames; 0: irregular */
+    unsigned command; /* that it keeps to; 0: any */
+    double phase;
+} mood_t;
+
+static mood_t m_mood;
+
+static void change_mood(void)
+{
+    static const unsigned k_gaps_ms[] = {0, 0, 1, 2, 3, 5, 10, 16, 20, 33, 40, 100, 250};
+    static const double k_sizes[] = {0.01, 0.1, 0.3, 0.6, 1, 1.2, 50, 30000};
+    m_mood = (mood_t){.size = k_sizes[below(8)], .gap_ms = k_gaps_ms[below(13)], .command = below(8)};
+}
+
+/* A value: noise, or something smooth that a stream may be. */
+static double value_of(unsigned axis, double range)
+{
+    if (m_mood.gap_ms != 0 && m_mood.command != 0) {
+        m_mood.phase += 0.003 * m_mood.gap_ms;
+        return range * fmin(m_mood.size, 1.2) * sin(m_mood.phase * (1 + 0.3 * axis) + axis);
+    }
+    return around(range * m_mood.size);
+}
+
+static int put_values(char *text, size_t size, bool is_pose, unsigned count)
+{
+    int used = 0;
+    for (unsigned i = 0; i < count; i++) {
+        const bool is_angle = i == 6 || (is_pose && count == 4 && i == 3);
+        const bool is_rotation = count <= 4 ? i < 2 : i < 3;
+        const double range = is_angle ? 720 : !is_pose ? 100 : is_rotation ? 25 : 120;
+        const double middle = is_pose || is_angle ? 0 : 100;
+        used += snprintf(text + used, size - (size_t)used, "%.*f,", (int)below(7), middle + value_of(i, range));
+    }
+    return used;
+}
+
+static void send_frame(void)
+{
+    static const struct {
+        const char *name;
+        bool is_pose;
+        unsigned count;
+    } k_commands[] = {{"A6", true, 6}, {"A6", true, 6},  {"C6", false, 6}, {"A3", true, 3},
+                      {"A7", true, 7}, {"C7", false, 7}, {"C3", false, 3}, {"A4", true, 4}};
+    const unsigned command = m_mood.command != 0 ? m_mood.command : below(8);
+    const bool is_timed = one_in(3);
+    char text[400];
+    int used = snprintf(text, sizeof text, "@%s%s:", k_commands[command].name, is_timed ? "T" : "");
+    used += put_values(text + used, sizeof text - (size_t)used, k_commands[command].is_pose, k_commands[command].count);
+    if (is_timed) {
+        const unsigned ms = one_in(3) ? below(3000) : m_mood.gap_ms != 0 ? m_mood.gap_ms : below(60);
+        (void)snprintf(text + used, sizeof text - (size_t)used, "%u#", ms);
+    } else {
+        (void)snprintf(text + used, sizeof text - (size_t)used, "%X#", below(0x10000));
+    }
+    rig_send(&m_rig, text);
+}
+
+static void send_garbage(void)
+{
+    static const char *const k_garbage[] = {"@A6:nan,nan,nan,nan,nan,nan,0#",
+                                            "@A6:inf,0,0,0,0,0,0#",
+                                            "@A6:1e30,0,0,0,0,0,0#",
+                                            "@A6:0,0,0,0,0,0",
+                                            "@A6T:0,0,0,0,0,0,-5#",
+                                            "@A6:0,0,0,0,0,0,12345#",
+                                            "@@@@####",
+                                            "",
+                                            "@A6:1,2,3#",
+                                            "@C6:-32768,32767,1e4,-1e4,0,0,0#",
+                                            "@A6:32767,-32768,32767,-32768,32767,32767,0#",
+                                            "@A6T:0,0,0,0,0,0,3600000#",
+                                            "@A6T:9,9,9,9,9,9,99999999#"};
+    if (one_in(2)) {
+        rig_send(&m_rig, k_garbage[below(sizeof k_garbage / sizeof k_garbage[0])]);
+        return;
+    }
+    uint8_t bytes[600];
+    const size_t length = below(sizeof bytes);
+    for (size_t i = 0; i < length; i++) {
+        bytes[i] = one_in(3) ? (uint8_t) "@A6CT:,0.5-#"[below(12)] : (uint8_t)random_bits();
+    }
+    (void)!sim_udp_push(&m_rig.udp, bytes, length, NULL);
+}
+
+/* ---- what else happens ---- */
+
+static void trouble(void)
+{
+    const uint8_t axis = (uint8_t)below(m_rig.drives.count);
+    switch (below(6)) {
+    case 0:
+        sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, true);
+        break;
+    case 1:
+        rig_break(&m_rig, SIM_DRIVES_FAULT, axis, 0x2310);
+        break;
+    case 2:
+        rig_break(&m_rig, SIM_DRIVES_BROKEN, axis, 0x7300);
+        break;
+    case 3:
+        rig_break(&m_rig, SIM_DRIVES_OFFLINE, axis, 0);
+        break;
+    case 4:
+        rig_break(&m_rig, SIM_DRIVES_OFFLINE, SIM_DRIVES_ALL, 0);
+        break;
+    default:
+        rig_break(&m_rig, SIM_DRIVES_BUSY, 0, 0);
+        break;
+    }
+}
+
+static void mend(void)
+{
+    sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, false);
+    rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+}
+
+static void operate(void)
+{
+    static const event_t k_requests[] = {EVENT_ENGAGE, EVENT_ENGAGE, EVENT_ENGAGE, EVENT_HOLD,
+                                         EVENT_RESUME, EVENT_RESUME, EVENT_PARK,   EVENT_RESET};
+    (void)!rig_request(&m_rig, k_requests[below(8)]);
+}
+
+static unsigned gap_ms(void)
+{
+    if (m_mood.gap_ms != 0) {
+        return m_mood.gap_ms + (one_in(4) ? below(3) : 0);
+    }
+    return one_in(5) ? below(400) : below(25);
+}
+
+/* ---- judgement ---- */
+
+static int m_test;
+
+static void report(bool is_ok, const char *what)
+{
+    printf("%s %d - %s, %u cylinders\n", is_ok ? "ok" : "not ok", ++m_test, what, m_cylinders);
+}
+
+/* Engages as an operator would; once more where a drive that had broken down while OFF only shows when it is asked. */
+static bool brings_up(void)
+{
+    mend();
+    rig_run_ms(&m_rig, 3000);
+    for (int attempt = 0; attempt < 2; attempt++) {
+        (void)!rig_request(&m_rig, EVENT_RESET);
+        rig_run_ms(&m_rig, 100);
+        (void)!rig_request(&m_rig, EVENT_ENGAGE);
+        if (m_rig.gateway.snapshot.state == STATE_ENGAGED || rig_run_until(&m_rig, STATE_ENGAGED, 60000)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool weather(long cycles)
+{
+    const uint64_t end_us = m_rig.now_us + (uint64_t)cycles * m_rig.settings.cycle_us;
+    long steps = 0;
+    change_mood();
+    while (m_rig.now_us < end_us) {
+        if (one_in(60)) {
+            change_mood();
+        }
+        if (one_in(12)) {
+            send_garbage();
+        } else {
+            send_frame();
+        }
+        if (one_in(150)) {
+            operate();
+        }
+        if (one_in(300)) {
+            trouble();
+            rig_run_ms(&m_rig, one_in(3) ? 1 : 5 + below(one_in(2) ? 20 : 2000));
+            mend();
+        }
+        rig_run_ms(&m_rig, gap_ms());
+        if (m_rig.gateway.snapshot.state != STATE_ENGAGED && one_in(25)) {
+            (void)!rig_request(&m_rig, one_in(3) ? EVENT_RESET : EVENT_ENGAGE);
+        }
+        steps++;
+        if (!rig_is_within_limits(&m_rig) || rig_following_errors(&m_rig) != 0) {
+            printf("# at %.3f s, state %s\n", (double)m_rig.now_us / 1e6, state_name(m_rig.gateway.snapshot.state));
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool storm(settings_t settings, long cycles)
+{
+    settings.silence_hold_ms = 1500;
+    settings.silence_neutral_ms = 4000;
+    settings.silence_settle_ms = 8000;
+    settings.angle_wrap = one_in(2) ? ANGLE_SHORTEST : ANGLE_AS_SENT;
+    m_cylinders = settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
+    rig_start(&m_rig, &settings, false);
+    m_rig.is_auto_checking = true;
+    const bool is_up = rig_run_until(&m_rig, STATE_ENGAGED, 60000);
+    report(is_up, "comes up");
+    const bool is_kept = weather(cycles);
+    report(is_kept, "limits and following errors");
+    const bool is_back = brings_up();
+    report(is_back, "engages again after the storm");
+    const counters_t *c = &m_rig.gateway.snapshot.counters;
+    printf("# judged %ld cycles; shares: speed %.4f, acceleration %.4f, jerk %.6f; %u faults, %u impossible, %u stretched\n",
+           m_rig.check.cycles, m_rig.check.speed, m_rig.check.accel, m_rig.check.jerk, c->faults, c->impossible, c->stretched);
+    return is_up && is_kept && is_back;
+}
+
+int main(int count, char **arguments)
+{
+    const uint64_t seed = count > 1 ? strtoull(arguments[1], NULL, 0) : 20261121;
+    const long cycles = count > 2 ? strtol(arguments[2], NULL, 0) : CYCLES_DEFAULT;
+    printf("TAP version 13\n1..6\n# seed %llu, %ld cycles each\n", (unsigned long long)seed, cycles);
+    m_random = seed * 0x9E3779B97F4A7C15u + 1;
+    const bool is_hexapod_ok = storm(rig_hexapod(), cycles);
+    const bool is_tripod_ok = storm(rig_tripod(), cycles);
+    return is_hexapod_ok && is_tripod_ok ? EXIT_SUCCESS : EXIT_FAILURE;
+}

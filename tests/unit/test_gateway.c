@@ -1,0 +1,873 @@
+/* SPDX-License-Identifier: MIT
+ * test_gateway.c - a whole gateway over simulated hardware: frames, relays, silence, states, faults, e-stop.
+ * Limits, steps and following errors are judged by the rig in every cycle of every test.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "rig.h"
+#include "unity.h"
+
+static rig_t m_rig;
+static settings_t m_settings;
+static bool m_is_fault_expected;
+
+void setUp(void)
+{
+    m_settings = rig_hexapod();
+    m_settings.relay_safe_mask = 0x801;
+    m_is_fault_expected = false;
+}
+
+static void start(bool is_settled)
+{
+    rig_start(&m_rig, &m_settings, is_settled);
+    m_rig.is_auto_checking = true;
+}
+
+static void engage(void)
+{
+    start(true);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 20000));
+    rig_send(&m_rig, m_settings.geometry.kind == KIN_HEXAPOD ? "@A6:0,0,0,0,0,0#" : "@A3:0,0,0#");
+    rig_run_ms(&m_rig, 1000);
+}
+
+void tearDown(void)
+{
+    TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+    TEST_ASSERT_EQUAL_UINT(0, rig_following_errors(&m_rig));
+    if (!m_is_fault_expected) {
+        TEST_ASSERT_EQUAL_UINT32(0, gateway_snapshot(&m_rig.gateway)->counters.faults);
+    }
+}
+
+static const snapshot_t *seen(void)
+{
+    return gateway_snapshot(&m_rig.gateway);
+}
+
+static const counters_t *counted(void)
+{
+    return &seen()->counters;
+}
+
+static uint32_t rejected(void)
+{
+    uint32_t sum = 0;
+    for (unsigned i = 0; i < FRAME_ERRORS; i++) {
+        sum += counted()->rejected[i];
+    }
+    return sum;
+}
+
+static void send_and_run(const char *text, unsigned ms)
+{
+    rig_send(&m_rig, text);
+    rig_run_ms(&m_rig, ms);
+}
+
+static void assert_heights(double z)
+{
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, z, rig_pose(&m_rig, AXIS_Z));
+}
+
+static double biggest_move(unsigned ms)
+{
+    double from[6], most = 0;
+    for (unsigned i = 0; i < 6; i++) {
+        from[i] = rig_cylinder_mm(&m_rig, i + 1);
+    }
+    for (unsigned k = 0; k < ms; k++) {
+        rig_run_ms(&m_rig, 1);
+        for (unsigned i = 0; i < 6; i++) {
+            most = fmax(most, fabs(rig_cylinder_mm(&m_rig, i + 1) - from[i]));
+        }
+    }
+    return most;
+}
+
+/* ---- start ---- */
+
+static void test_gateway_init_wrong_hardware_is_refused(void)
+{
+    start(true);
+    gateway_t other;
+    gateway_io_t io = m_rig.gateway.io;
+    const settings_t tripod = rig_tripod();
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, gateway_init(&other, &tripod, &io)); /* seven drives for three cylinders */
+    io.log.ops = NULL;
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, gateway_init(&other, &m_settings, &io));
+    io = m_rig.gateway.io;
+    settings_t bad = m_settings;
+    bad.axis[AXIS_Z].jerk = 0;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, gateway_init(&other, &bad, &io));
+    bad = m_settings;
+    bad.neutral_q16[AXIS_Z] = 110 * 65536; /* out of reach */
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, gateway_init(&other, &bad, &io));
+}
+
+static void test_start_unhomed_drives_are_homed_and_brought_up(void)
+{
+    start(false);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_HOMING, 100));
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_SETTLED, 30000));
+    for (unsigned i = 1; i <= 6; i++) {
+        TEST_ASSERT_EQUAL_DOUBLE(6, rig_cylinder_mm(&m_rig, i));
+    }
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_RISING, 100));
+    rig_check_reset(&m_rig);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 30000));
+    TEST_ASSERT_TRUE(m_rig.check.speed * 400 <= 50.01);
+    assert_heights(0);
+}
+
+static void test_start_drives_elsewhere_go_to_settled_first(void)
+{
+    m_settings.settled_extension_mm_q16 = 50 * 65536;
+    start(false);
+    for (unsigned i = 0; i < 7; i++) {
+        m_rig.drives.axis[i].is_homed = true;
+    }
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_HOMING, 100));
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_SETTLED, 30000));
+    TEST_ASSERT_EQUAL_DOUBLE(50, rig_cylinder_mm(&m_rig, 1));
+}
+
+static void test_start_manual_policy_waits_for_the_operator(void)
+{
+    m_settings.engage = ENGAGE_MANUAL;
+    start(false);
+    for (unsigned i = 0; i < 100; i++) {
+        send_and_run("@A6:5,5,5,20,20,20,FFF#", 20);
+    }
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[0].state);
+    TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
+}
+
+static void test_settled_manual_frames_move_nothing(void)
+{
+    static const char *const k_frames[] = {"@A6:5,5,5,20,20,20,FFF#", "@A6T:5,5,5,20,20,20,500#", "@C6:50,60,70,80,90,100,7#",
+                                           "@C7T:50,60,70,80,90,100,90,20#", "@A7:1,2,3,4,5,6,77,1#"};
+    m_settings.engage = ENGAGE_MANUAL;
+    start(true);
+    rig_run_ms(&m_rig, 10);
+    for (unsigned i = 0; i < 5; i++) {
+        rig_send(&m_rig, k_frames[i]);
+        TEST_ASSERT_EQUAL_DOUBLE(0, biggest_move(600));
+        TEST_ASSERT_EQUAL_DOUBLE(0, rig_angle_deg(&m_rig));
+    }
+    TEST_ASSERT_EQUAL(STATE_SETTLED, seen()->state);
+    TEST_ASSERT_EQUAL_UINT32(5, counted()->not_followed);
+    TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_RESUME));
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_RESET));
+}
+
+/* ---- frames ---- */
+
+static void test_frames_bad_ones_change_nothing_and_are_counted(void)
+{
+    static const char *const k_bad[] = {"@A6:9,9,9,9,9,9,G#",
+                                        "@A6:9,9,9,9,9#",
+                                        "@A6:9,9,9,9,9,9,9,9#",
+                                        "@A6:nan,9,9,9,9,9,0#",
+                                        "@A6:inf,9,9,9,9,9,0#",
+                                        "@A6:0x10,9,9,9,9,9,0#",
+                                        "@A6:,9,9,9,9,9,0#",
+                                        "@A6:9,9,9,9,9,9,FFFFF#",
+                                        "@A6T:9,9,9,9,9,9#",
+                                        "@A6T:9,9,9,9,9,9,-1#",
+                                        "@A6T:9,9,9,9,9,9,nan#",
+                                        "@A6T:9,9,9,9,9,9,3600001#",
+                                        "A6:9,9,9,9,9,9,FFF#",
+                                        "@B6:9,9,9,9,9,9,FFF#",
+                                        "@A6 9,9,9,9,9,9,FFF#",
+                                        "@A6:9,9,9,9,9,9,FFF",
+                                        "@A6:9,9,9,40000,9,9,F#",
+                                        ("@\xD0\x90"
+                                         "6:9,9,9,9,9,9,F#"),
+                                        "",
+                                        "@A6:9 9,9,9,9,9,9,F#"};
+    engage();
+    send_and_run("@A6:1,0,0,0,0,0,F0#", 1000);
+    const uint32_t accepted = counted()->accepted[FRAME_A6];
+    for (unsigned i = 0; i < sizeof k_bad / sizeof k_bad[0]; i++) {
+        const uint32_t before = rejected();
+        rig_send(&m_rig, k_bad[i]);
+        TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(0, biggest_move(120), k_bad[i]);
+        TEST_ASSERT_TRUE_MESSAGE(rejected() > before, k_bad[i]);
+        TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);
+    }
+    TEST_ASSERT_EQUAL_UINT32(accepted, counted()->accepted[FRAME_A6]);
+}
+
+static void test_frames_several_in_a_datagram_the_last_one_counts(void)
+{
+    engage();
+    send_and_run("@A6:9,0,0,0,0,0,1#@A6:zz#@A6:0,0,0,0,0,30,2#\r\n", 2000);
+    assert_heights(30);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, rig_pose(&m_rig, AXIS_ROLL));
+    TEST_ASSERT_EQUAL_HEX16(2, m_rig.relays.mask);
+    TEST_ASSERT_EQUAL_UINT32(3, counted()->accepted[FRAME_A6]); /* the first one was sent by engage() */
+    TEST_ASSERT_EQUAL_UINT32(1, rejected());
+}
+
+static void test_frames_more_than_a_cycle_takes_wait_for_the_next(void)
+{
+    engage();
+    const uint32_t before = counted()->datagrams;
+    for (int i = 0; i < 30; i++) {
+        rig_sendf(&m_rig, "@A6:0,0,0,0,0,%d#", i);
+    }
+    rig_run_ms(&m_rig, 2000);
+    TEST_ASSERT_EQUAL_UINT32(before + 30, counted()->datagrams);
+    assert_heights(29);
+}
+
+static void test_frames_oversize_datagram_is_counted_and_ignored(void)
+{
+    static char text[900];
+    engage();
+    memset(text, ' ', sizeof text - 1);
+    memcpy(text, "@A6:0,0,0,0,0,30,2#", 19);
+    rig_send(&m_rig, text);
+    TEST_ASSERT_EQUAL_DOUBLE(0, biggest_move(500));
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->oversize);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "longer than 512"));
+}
+
+static void test_frames_receive_errors_are_counted_and_passed(void)
+{
+    engage();
+    m_rig.udp.fail.first = m_rig.udp.fail.calls + 1;
+    m_rig.udp.fail.count = 5;
+    rig_send(&m_rig, "@A6:0,0,0,0,0,30#");
+    rig_run_ms(&m_rig, 2000);
+    TEST_ASSERT_EQUAL_UINT32(5, counted()->receive_errors);
+    assert_heights(30);
+}
+
+static void check_platform_error(const char *frame, const char *logged)
+{
+    const uint32_t before = counted()->rejected[FRAME_ERR_PLATFORM];
+    rig_run_ms(&m_rig, 1100); /* the log takes one line per reason and second */
+    rig_send(&m_rig, frame);
+    TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(0, biggest_move(50), frame);
+    TEST_ASSERT_EQUAL_UINT32(before + 1, counted()->rejected[FRAME_ERR_PLATFORM]);
+    TEST_ASSERT_TRUE_MESSAGE(rig_was_logged(&m_rig, logged), frame);
+}
+
+static void test_frames_for_another_platform_name_what_is_missing(void)
+{
+    m_settings.has_angle = false;
+    engage();
+    check_platform_error("@A7:1,2,3,4,5,6,7,0#", "A7: it needs a rotation motor");
+    check_platform_error("@A4:1,2,3,4,0#", "A4: it needs a rotation motor");
+    check_platform_error("@C7:1,2,3,4,5,6,7,0#", "C7: it needs a rotation motor");
+    check_platform_error("@C3:50,60,70,0#", "C3: it is for three cylinders");
+    m_settings = rig_tripod();
+    engage();
+    check_platform_error("@A6:1,2,3,4,5,6,0#", "A6: it is for six cylinders");
+    check_platform_error("@A7T:1,2,3,4,5,6,7,100#", "A7: it is for six cylinders");
+    check_platform_error("@C6:50,60,70,80,90,100,0#", "C6: it is for six cylinders");
+    check_platform_error("@A4:1,2,3,4,0#", "A4: it needs a rotation motor");
+    send_and_run("@A3:2,1,10,0#", 2000);
+    assert_heights(10);
+    send_and_run("@C3:90,100,110,0#", 2000);
+    TEST_ASSERT_EQUAL_DOUBLE(110, rig_cylinder_mm(&m_rig, 3));
+}
+
+static void test_frames_tripod_with_motor_takes_a4(void)
+{
+    m_settings = rig_tripod();
+    m_settings.has_angle = true;
+    engage();
+    send_and_run("@A4:2,1,10,33,0#", 3000);
+    assert_heights(10);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 33, rig_angle_deg(&m_rig));
+}
+
+/* A platform with strokes so long that most combinations of extensions belong to no pose. */
+static void test_frames_extensions_without_a_pose_are_counted_and_move_nothing(void)
+{
+    for (unsigned i = 0; i < 6; i++) {
+        m_settings.geometry.retracted_mm_q16[i] = 650 * 65536;
+        m_settings.stroke_mm_q16[i] = 1200 * 65536;
+    }
+    engage();
+    const uint32_t accepted = counted()->accepted[FRAME_C6];
+    unsigned impossible = 0;
+    static const char *const k_frames[] = {"@C6:1195,5,1195,5,1195,5,F#", "@C6:5,1195,5,5,5,5,F#", "@C6:1195,1195,5,5,5,5,F#"};
+    for (unsigned i = 0; i < 3; i++) {
+        const uint32_t before = counted()->impossible;
+        rig_send(&m_rig, k_frames[i]);
+        rig_run_ms(&m_rig, 1);
+        if (counted()->impossible > before) {
+            impossible++;
+            TEST_ASSERT_EQUAL_DOUBLE(0, biggest_move(500));
+            TEST_ASSERT_EQUAL_HEX16(m_settings.relay_safe_mask, m_rig.relays.mask);
+        }
+    }
+    TEST_ASSERT_TRUE(impossible > 0);
+    TEST_ASSERT_EQUAL_UINT32(accepted + 3 - impossible, counted()->accepted[FRAME_C6]);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "no pose of the platform has these extensions"));
+}
+
+static void test_frames_reject_lines_are_rate_limited_and_count_what_was_left_out(void)
+{
+    engage();
+    for (int i = 0; i < 50; i++) {
+        send_and_run("@A6:9,9#", 10);
+    }
+    rig_run_ms(&m_rig, 1000);
+    send_and_run("@A6:9,9#", 10);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "rejected"));
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "; before that 49 more"));
+    TEST_ASSERT_EQUAL_UINT32(51, counted()->rejected[FRAME_ERR_COUNT]);
+}
+
+/* ---- relays ---- */
+
+static void test_relays_follow_the_mask_only_while_engaged(void)
+{
+    engage();
+    TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask); /* no mask was sent so far */
+    send_and_run("@A6:0,0,0,0,0,0,F0#", 2);
+    TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);
+    send_and_run("@A6:0,0,0,0,0,0#", 2);
+    TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);
+    send_and_run("@A6T:0,0,0,0,0,0,500#", 2);
+    TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);
+    send_and_run("@A6:0,0,0,0,0,0,0xF00F#", 2);
+    TEST_ASSERT_EQUAL_HEX16(0x00F, m_rig.relays.mask); /* bits 12 to 15 are ignored */
+    TEST_ASSERT_EQUAL_UINT32(0, counted()->relay_missing);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_HOLD));
+    rig_run_ms(&m_rig, 2);
+    TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
+    send_and_run("@A6:0,0,0,0,0,0,0FF#", 2);
+    TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESUME));
+    rig_run_ms(&m_rig, 500);
+    TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask); /* until the sender says so again */
+    send_and_run("@A6:0,0,0,0,0,0,0FF#", 2);
+    TEST_ASSERT_EQUAL_HEX16(0x0FF, m_rig.relays.mask);
+}
+
+static void test_relays_bits_without_a_relay_are_counted(void)
+{
+    m_settings.relay_count = 4;
+    m_settings.relay_safe_mask = 0;
+    engage();
+    send_and_run("@A6:0,0,0,0,0,0,13#", 2);
+    TEST_ASSERT_EQUAL_HEX16(0x3, m_rig.relays.mask);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->relay_missing);
+}
+
+static void test_relays_failed_write_is_counted_and_tried_again(void)
+{
+    engage();
+    m_rig.relays.fail.first = m_rig.relays.fail.calls + 1;
+    m_rig.relays.fail.count = 3;
+    send_and_run("@A6:0,0,0,0,0,0,F0#", 10);
+    TEST_ASSERT_EQUAL_UINT32(3, counted()->relay_errors);
+    TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);
+}
+
+/* ---- axes ---- */
+
+static void test_axes_sign_scale_and_offset_apply(void)
+{
+    m_settings.axis[AXIS_ROLL].sign = -1;
+    m_settings.axis[AXIS_PITCH].scale_q16 = 65536 / 2;
+    m_settings.axis[AXIS_PITCH].offset_q16 = 65536;
+    m_settings.axis[AXIS_Z].offset_q16 = -20 * 65536;
+    m_settings.axis[AXIS_ANGLE].sign = -1;
+    m_settings.axis[AXIS_ANGLE].scale_q16 = 2 * 65536;
+    engage();
+    send_and_run("@A7:3,4,0,0,0,30,20,0#", 4000);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, -3, rig_pose(&m_rig, AXIS_ROLL));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 3, rig_pose(&m_rig, AXIS_PITCH));
+    assert_heights(10);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, -40, rig_angle_deg(&m_rig));
+}
+
+static void turn_to(double degrees)
+{
+    rig_sendf(&m_rig, "@A7:0,0,0,0,0,0,%f,0#", degrees);
+    rig_run_ms(&m_rig, 12000);
+}
+
+static void test_axes_shortest_angle_takes_the_shorter_way_round(void)
+{
+    m_settings.angle_wrap = ANGLE_SHORTEST;
+    engage();
+    turn_to(359);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, -1, rig_angle_deg(&m_rig));
+    turn_to(1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1, rig_angle_deg(&m_rig));
+    turn_to(-350);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 10, rig_angle_deg(&m_rig));
+    turn_to(170);
+    turn_to(-170);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 190, rig_angle_deg(&m_rig));
+}
+
+static void test_axes_angle_as_sent_is_the_number_itself(void)
+{
+    m_settings.angle_wrap = ANGLE_AS_SENT;
+    engage();
+    turn_to(359);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 359, rig_angle_deg(&m_rig));
+    turn_to(1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1, rig_angle_deg(&m_rig));
+}
+
+static void test_axes_frame_without_angle_keeps_it(void)
+{
+    engage();
+    turn_to(30);
+    send_and_run("@A6:1,0,0,0,0,0,0#", 1000);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 30, rig_angle_deg(&m_rig));
+}
+
+/* ---- silence ---- */
+
+static void test_silence_holds_then_neutral_then_settles(void)
+{
+    m_settings.silence_hold_ms = 300;
+    m_settings.silence_neutral_ms = 2000;
+    m_settings.silence_settle_ms = 12000;
+    engage();
+    send_and_run("@A6:0,0,0,0,0,30,F0#", 250);
+    TEST_ASSERT_EQUAL(STATE_ENGAGED, seen()->state);
+    rig_run_ms(&m_rig, 60);
+    TEST_ASSERT_EQUAL(STATE_HOLD, seen()->state);
+    TEST_ASSERT_TRUE(seen()->is_held_by_silence);
+    TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_NEUTRAL, 9000));
+    TEST_ASSERT_TRUE(m_rig.now_us > 2000000);
+    assert_heights(0);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_SETTLED, 30000));
+    send_and_run("@A6:0,0,0,0,0,30#", 2000);
+    TEST_ASSERT_EQUAL(STATE_SETTLED, seen()->state); /* people may be boarding: a frame does not raise it */
+}
+
+static void test_silence_returning_sender_engages_again_at_engage_speed(void)
+{
+    m_settings.silence_hold_ms = 300;
+    engage();
+    send_and_run("@A6:0,0,0,0,0,40#", 3000);
+    TEST_ASSERT_EQUAL(STATE_HOLD, seen()->state);
+    rig_check_reset(&m_rig);
+    for (int i = 0; i < 300; i++) {
+        send_and_run("@A6:0,0,0,0,0,-40#", 20);
+    }
+    TEST_ASSERT_EQUAL(STATE_ENGAGED, seen()->state);
+    assert_heights(-40);
+    TEST_ASSERT_TRUE(m_rig.check.speed * 400 <= 50.1);
+}
+
+static void test_silence_operator_hold_is_not_released_by_frames(void)
+{
+    m_settings.silence_hold_ms = 300;
+    engage();
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_HOLD));
+    rig_run_ms(&m_rig, 1000);
+    rig_send(&m_rig, "@A6:0,0,0,0,0,-40#");
+    TEST_ASSERT_EQUAL_DOUBLE(0, biggest_move(500));
+    TEST_ASSERT_EQUAL(STATE_HOLD, seen()->state);
+}
+
+static void test_silence_never_strikes_while_a_timed_move_runs(void)
+{
+    m_settings.silence_hold_ms = 200;
+    engage();
+    rig_send(&m_rig, "@A6T:0,0,0,0,0,30,5000#");
+    for (int ms = 0; ms < 5150; ms++) {
+        rig_run_ms(&m_rig, 1);
+        if (seen()->state != STATE_ENGAGED && ms > 5) {
+            TEST_FAIL_MESSAGE("held in the middle of a timed move");
+        }
+    }
+    assert_heights(30);
+    rig_run_ms(&m_rig, 100);
+    TEST_ASSERT_EQUAL(STATE_HOLD, seen()->state);
+}
+
+static void test_silence_bad_frames_do_not_count_as_a_sender(void)
+{
+    m_settings.silence_hold_ms = 300;
+    engage();
+    send_and_run("@A6:0,0,0,0,0,5#", 100);
+    for (int i = 0; i < 30; i++) {
+        send_and_run("@A6:1,2#", 10);
+        send_and_run("@C3:1,2,3#", 10);
+    }
+    TEST_ASSERT_EQUAL(STATE_HOLD, seen()->state);
+}
+
+/* ---- e-stop ---- */
+
+static void start_moving(unsigned ms)
+{
+    rig_send(&m_rig, "@A7:5,-4,3,10,20,30,60,F0#");
+    rig_run_ms(&m_rig, ms);
+}
+
+static void test_estop_in_motion_latches_and_comes_up_through_homing(void)
+{
+    for (unsigned ms = 1; ms < 600; ms += 37) {
+        engage();
+        start_moving(ms);
+        sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, true);
+        rig_run_ms(&m_rig, 1);
+        TEST_ASSERT_EQUAL(STATE_ESTOP, seen()->state);
+        TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
+        for (unsigned i = 0; i < 7; i++) {
+            TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[i].state);
+            TEST_ASSERT_EQUAL_INT64(m_rig.drives.axis[i].position_q32, m_rig.drives.axis[i].setpoint_q32);
+        }
+        rig_send(&m_rig, "@A6:0,0,0,0,0,0#");
+        TEST_ASSERT_EQUAL_DOUBLE(0, biggest_move(300));
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+        rig_run_ms(&m_rig, 3000);
+        TEST_ASSERT_EQUAL(STATE_ESTOP, seen()->state);
+        TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "reset refused"));
+        sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, false);
+        rig_run_ms(&m_rig, 100);
+        TEST_ASSERT_EQUAL(STATE_ESTOP, seen()->state);
+        TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_ENGAGE));
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+        rig_run_ms(&m_rig, 5);
+        TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+        rig_run_ms(&m_rig, 500);
+        TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+        rig_run_ms(&m_rig, 1);
+        TEST_ASSERT_EQUAL(STATE_HOMING, seen()->state);
+        TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 30000));
+        TEST_ASSERT_EQUAL_UINT(0, rig_following_errors(&m_rig));
+    }
+}
+
+static void test_estop_input_that_cannot_be_read_counts_as_active(void)
+{
+    engage();
+    m_rig.inputs.is_broken = true;
+    rig_run_ms(&m_rig, 1);
+    TEST_ASSERT_EQUAL(STATE_ESTOP, seen()->state);
+}
+
+static void test_estop_in_every_state_ends_in_estop(void)
+{
+    static const state_t k_states[] = {STATE_HOMING, STATE_SETTLED, STATE_RISING, STATE_NEUTRAL, STATE_ENGAGED};
+    for (unsigned i = 0; i < 5; i++) {
+        for (unsigned later = 0; later < 3000; later += 777) {
+            start(false);
+            TEST_ASSERT_TRUE(rig_run_until(&m_rig, k_states[i], 60000));
+            rig_run_ms(&m_rig, later);
+            sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, true);
+            rig_run_ms(&m_rig, 2);
+            TEST_ASSERT_EQUAL(STATE_ESTOP, seen()->state);
+            TEST_ASSERT_EQUAL_DOUBLE(0, biggest_move(100));
+            TEST_ASSERT_EQUAL_UINT(0, rig_following_errors(&m_rig));
+        }
+    }
+}
+
+/* ---- faults ---- */
+
+static void expect_fault(fault_code_t code, unsigned axis, uint32_t device_code)
+{
+    m_is_fault_expected = true;
+    TEST_ASSERT_EQUAL(STATE_FAULT, seen()->state);
+    TEST_ASSERT_EQUAL(code, seen()->fault.code);
+    TEST_ASSERT_EQUAL_UINT8(axis, seen()->fault.axis);
+    TEST_ASSERT_EQUAL_HEX32(device_code, seen()->fault.device_code);
+}
+
+static void test_fault_of_a_drive_stops_all_and_latches(void)
+{
+    for (unsigned ms = 1; ms < 500; ms += 29) {
+        const uint8_t axis = (uint8_t)(ms % 7);
+        engage();
+        start_moving(ms);
+        rig_break(&m_rig, SIM_DRIVES_FAULT, axis, 0x2310);
+        rig_run_ms(&m_rig, 1);
+        expect_fault(FAULT_DRIVE, axis + 1u, 0x2310);
+        TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
+        rig_run_ms(&m_rig, 50);
+        rig_break(&m_rig, SIM_DRIVES_FAULT, (uint8_t)((axis + 1) % 7), 0x9999); /* a second one */
+        rig_run_ms(&m_rig, 700);
+        expect_fault(FAULT_DRIVE, axis + 1u, 0x2310);
+        TEST_ASSERT_EQUAL_UINT32(1, counted()->faults);
+        for (unsigned i = 0; i < 7; i++) {
+            TEST_ASSERT_TRUE(m_rig.drives.axis[i].state == DRIVE_DISABLED || m_rig.drives.axis[i].state == DRIVE_FAULT);
+        }
+        TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_ENGAGE));
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+        rig_run_ms(&m_rig, 5);
+        TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+        TEST_ASSERT_EQUAL(FAULT_NONE, seen()->fault.code);
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+        TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 30000));
+        TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+        TEST_ASSERT_EQUAL_UINT(0, rig_following_errors(&m_rig));
+    }
+}
+
+static void test_fault_whose_cause_stays_cannot_be_reset(void)
+{
+    engage();
+    rig_break(&m_rig, SIM_DRIVES_BROKEN, 2, 0x7300);
+    rig_run_ms(&m_rig, 1000);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 3000);
+    expect_fault(FAULT_DRIVE, 3, 0x7300);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "reset refused"));
+    rig_break(&m_rig, SIM_DRIVES_RECOVER, 2, 0);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+}
+
+static void test_fault_drive_offline_stops_all(void)
+{
+    engage();
+    start_moving(150);
+    rig_break(&m_rig, SIM_DRIVES_OFFLINE, 4, 0);
+    rig_run_ms(&m_rig, 1);
+    expect_fault(FAULT_DRIVE_OFFLINE, 5, 0);
+    rig_run_ms(&m_rig, 1000);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[0].state);
+    rig_break(&m_rig, SIM_DRIVES_RECOVER, 4, 0);
+    rig_run_ms(&m_rig, 10);
+    expect_fault(FAULT_DRIVE_OFFLINE, 5, 0);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
+}
+
+static void test_fault_drive_that_drops_out_stops_all(void)
+{
+    engage();
+    start_moving(150);
+    m_rig.drives.axis[1].state = DRIVE_DISABLED;
+    rig_run_ms(&m_rig, 2);
+    expect_fault(FAULT_DRIVE_DROPPED, 2, 0);
+}
+
+static void test_fault_bus_busy_a_single_cycle_is_passed(void)
+{
+    engage();
+    start_moving(150);
+    rig_break(&m_rig, SIM_DRIVES_BUSY, 0, 0);
+    rig_run_ms(&m_rig, 1);
+    rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+    rig_run_ms(&m_rig, 2000);
+    TEST_ASSERT_EQUAL(STATE_ENGAGED, seen()->state);
+    assert_heights(30);
+}
+
+static void test_fault_bus_that_stays_busy_is_a_fault_and_returns_without_a_jump(void)
+{
+    for (unsigned ms = 10; ms < 500; ms += 35) {
+        engage();
+        start_moving(ms);
+        rig_break(&m_rig, SIM_DRIVES_BUSY, 0, 0);
+        rig_run_ms(&m_rig, 6);
+        expect_fault(FAULT_BUS, 0, 0);
+        rig_run_ms(&m_rig, ms);
+        rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+        rig_run_ms(&m_rig, 10);
+        expect_fault(FAULT_BUS, 0, 0);
+        TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[0].state);
+        TEST_ASSERT_EQUAL_UINT(0, rig_following_errors(&m_rig));
+    }
+}
+
+static void test_fault_bus_gone_is_a_fault_that_can_be_reset(void)
+{
+    engage();
+    start_moving(150);
+    rig_break(&m_rig, SIM_DRIVES_OFFLINE, SIM_DRIVES_ALL, 0);
+    rig_run_ms(&m_rig, 500);
+    expect_fault(FAULT_BUS, 0, 0);
+    rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
+}
+
+static void test_fault_drives_that_never_enable_time_out(void)
+{
+    start(false);
+    for (unsigned i = 0; i < 7; i++) {
+        m_rig.drive_config[i].enable_us = 60000000;
+    }
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_FAULT, 12000));
+    expect_fault(FAULT_DRIVE_TIMEOUT, 0, 0);
+}
+
+static void test_fault_in_every_phase_of_coming_up_latches(void)
+{
+    m_is_fault_expected = true;
+    for (unsigned ms = 3; ms < 14000; ms += 491) {
+        start(false);
+        rig_run_ms(&m_rig, ms);
+        rig_break(&m_rig, SIM_DRIVES_FAULT, 3, 0x1234);
+        rig_run_ms(&m_rig, 1000);
+        expect_fault(FAULT_DRIVE, 4, 0x1234);
+        TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[0].state);
+        TEST_ASSERT_EQUAL_UINT(0, rig_following_errors(&m_rig));
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+        rig_run_ms(&m_rig, 10);
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+        TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
+        TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+    }
+}
+
+/* ---- hold, resume, shutdown ---- */
+
+static void test_hold_during_coming_up_stops_and_resume_goes_on(void)
+{
+    for (unsigned ms = 5; ms < 9000; ms += 233) {
+        start(false);
+        rig_run_ms(&m_rig, ms);
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_HOLD));
+        rig_run_ms(&m_rig, ms % 3 == 0 ? 20 : 1500); /* sometimes while it still slows down */
+        TEST_ASSERT_EQUAL(STATE_HOLD, seen()->state);
+        for (unsigned i = 0; i < 7; i++) {
+            TEST_ASSERT_TRUE(m_rig.drives.axis[i].state != DRIVE_HOMING);
+        }
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESUME));
+        TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
+        TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+        TEST_ASSERT_EQUAL_UINT(0, rig_following_errors(&m_rig));
+    }
+}
+
+static void shut_down_after(unsigned ms)
+{
+    (void)!rig_request(&m_rig, EVENT_SHUTDOWN);
+    rig_run_ms(&m_rig, 2);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_ENGAGE));
+    for (unsigned t = 0; t < 60000 && !gateway_is_finished(&m_rig.gateway); t++) {
+        rig_run_ms(&m_rig, 1);
+    }
+    char text[64];
+    snprintf(text, sizeof text, "after %u ms: %s", ms, state_name(seen()->state));
+    TEST_ASSERT_TRUE_MESSAGE(gateway_is_finished(&m_rig.gateway), text);
+    TEST_ASSERT_EQUAL_MESSAGE(STATE_OFF, seen()->state, text);
+    rig_run_ms(&m_rig, 5);
+    for (unsigned i = 0; i < 7; i++) {
+        TEST_ASSERT_EQUAL_MESSAGE(DRIVE_DISABLED, m_rig.drives.axis[i].state, text);
+    }
+    TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+    TEST_ASSERT_EQUAL_UINT(0, rig_following_errors(&m_rig));
+}
+
+static void test_shutdown_from_every_moment_ends_in_off(void)
+{
+    for (unsigned ms = 0; ms < 16000; ms += 397) {
+        start(false);
+        rig_run_ms(&m_rig, ms);
+        rig_send(&m_rig, "@A6:5,-4,3,10,20,30#");
+        rig_run_ms(&m_rig, 130);
+        if (ms % 2 == 0) {
+            (void)!rig_request(&m_rig, EVENT_HOLD);
+            rig_run_ms(&m_rig, ms % 300);
+        }
+        shut_down_after(ms);
+    }
+}
+
+static void test_shutdown_in_fault_and_estop_is_finished_at_rest(void)
+{
+    engage();
+    start_moving(100);
+    rig_break(&m_rig, SIM_DRIVES_FAULT, 0, 1);
+    rig_run_ms(&m_rig, 1);
+    (void)!rig_request(&m_rig, EVENT_SHUTDOWN);
+    TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
+    rig_run_ms(&m_rig, 1000);
+    TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
+    m_is_fault_expected = true;
+    engage();
+    sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, true);
+    rig_run_ms(&m_rig, 1);
+    (void)!rig_request(&m_rig, EVENT_SHUTDOWN);
+    rig_run_ms(&m_rig, 1);
+    TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
+}
+
+static void test_telemetry_actual_pose_follows_the_feedback(void)
+{
+    engage();
+    send_and_run("@A6:5,-4,3,10,20,30#", 3000);
+    TEST_ASSERT_TRUE(seen()->has_actual_pose);
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        TEST_ASSERT_INT64_WITHIN(Q32_ONE / 1000, seen()->sent.axis_q32[i], seen()->actual.axis_q32[i]);
+    }
+    gateway_note_late(&m_rig.gateway, 3);
+    rig_run_ms(&m_rig, 1);
+    TEST_ASSERT_EQUAL_UINT32(3, counted()->late_cycles);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_gateway_init_wrong_hardware_is_refused);
+    RUN_TEST(test_start_unhomed_drives_are_homed_and_brought_up);
+    RUN_TEST(test_start_drives_elsewhere_go_to_settled_first);
+    RUN_TEST(test_start_manual_policy_waits_for_the_operator);
+    RUN_TEST(test_settled_manual_frames_move_nothing);
+    RUN_TEST(test_frames_bad_ones_change_nothing_and_are_counted);
+    RUN_TEST(test_frames_several_in_a_datagram_the_last_one_counts);
+    RUN_TEST(test_frames_more_than_a_cycle_takes_wait_for_the_next);
+    RUN_TEST(test_frames_oversize_datagram_is_counted_and_ignored);
+    RUN_TEST(test_frames_receive_errors_are_counted_and_passed);
+    RUN_TEST(test_frames_for_another_platform_name_what_is_missing);
+    RUN_TEST(test_frames_tripod_with_motor_takes_a4);
+    RUN_TEST(test_frames_extensions_without_a_pose_are_counted_and_move_nothing);
+    RUN_TEST(test_frames_reject_lines_are_rate_limited_and_count_what_was_left_out);
+    RUN_TEST(test_relays_follow_the_mask_only_while_engaged);
+    RUN_TEST(test_relays_bits_without_a_relay_are_counted);
+    RUN_TEST(test_relays_failed_write_is_counted_and_tried_again);
+    RUN_TEST(test_axes_sign_scale_and_offset_apply);
+    RUN_TEST(test_axes_shortest_angle_takes_the_shorter_way_round);
+    RUN_TEST(test_axes_angle_as_sent_is_the_number_itself);
+    RUN_TEST(test_axes_frame_without_angle_keeps_it);
+    RUN_TEST(test_silence_holds_then_neutral_then_settles);
+    RUN_TEST(test_silence_returning_sender_engages_again_at_engage_speed);
+    RUN_TEST(test_silence_operator_hold_is_not_released_by_frames);
+    RUN_TEST(test_silence_never_strikes_while_a_timed_move_runs);
+    RUN_TEST(test_silence_bad_frames_do_not_count_as_a_sender);
+    RUN_TEST(test_estop_in_motion_latches_and_comes_up_through_homing);
+    RUN_TEST(test_estop_input_that_cannot_be_read_counts_as_active);
+    RUN_TEST(test_estop_in_every_state_ends_in_estop);
+    RUN_TEST(test_fault_of_a_drive_stops_all_and_latches);
+    RUN_TEST(test_fault_whose_cause_stays_cannot_be_reset);
+    RUN_TEST(test_fault_drive_offline_stops_all);
+    RUN_TEST(test_fault_drive_that_drops_out_stops_all);
+    RUN_TEST(test_fault_bus_busy_a_single_cycle_is_passed);
+    RUN_TEST(test_fault_bus_that_stays_busy_is_a_fault_and_returns_without_a_jump);
+    RUN_TEST(test_fault_bus_gone_is_a_fault_that_can_be_reset);
+    RUN_TEST(test_fault_drives_that_never_enable_time_out);
+    RUN_TEST(test_fault_in_every_phase_of_coming_up_latches);
+    RUN_TEST(test_hold_during_coming_up_stops_and_resume_goes_on);
+    RUN_TEST(test_shutdown_from_every_moment_ends_in_off);
+    RUN_TEST(test_shutdown_in_fault_and_estop_is_finished_at_rest);
+    RUN_TEST(test_telemetry_actual_pose_follows_the_feedback);
+    return UNITY_END();
+}
