@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: MIT
+ * config.h - the configuration file of heaved: what it holds, and how it is loaded, reported on and written out.
+ * One table (config_keys.c) gives each key its type, unit, range, default and help; everything here follows from it.
+ * Used at start-up and by offline modes only; nothing here is called while the platform moves.
+ */
+#ifndef HEAVE_APP_CONFIG_H
+#define HEAVE_APP_CONFIG_H
+
+#include <stdio.h>
+
+#include "heave/settings.h"
+
+#define CONFIG_ADDRESS_MAX  64u  /**< bytes of an address as text, with its NUL */
+#define CONFIG_PATH_MAX     108u /**< bytes of a socket path, with its NUL (the size of sun_path) */
+#define CONFIG_NETWORKS_MAX 16u
+#define CONFIG_RELAYS_MAX   12u
+#define CONFIG_NONE         INT32_MIN /**< a number in whose place the file has a word ("none", "settled") */
+
+/** An address or a network of senders: the first prefix bits of address have to match. */
+typedef struct {
+    bool is_ipv6;
+    uint8_t prefix;      /**< [0, 32], or [0, 128] for IPv6 */
+    uint8_t address[16]; /**< network byte order; IPv4 uses the first four */
+} config_network_t;
+
+/** Who may send frames; no network at all means everyone who reaches the port. */
+typedef struct {
+    uint8_t count;
+    config_network_t network[CONFIG_NETWORKS_MAX];
+} config_networks_t;
+
+/** Where frames come in. */
+typedef struct {
+    char bind[CONFIG_ADDRESS_MAX]; /**< numeric IPv4 or IPv6 address */
+    uint16_t port;
+    config_networks_t allow;
+} config_udp_t;
+
+/** What drives the cylinders. */
+typedef enum { CONFIG_DRIVES_SIM } config_drives_t;
+
+/** Simulated drives. */
+typedef struct {
+    uint32_t lag_ms;              /**< time constant with which a cylinder follows its set-point */
+    uint32_t enable_delay_ms;     /**< from the enable command to enabled */
+    q16_t start_extension_mm_q16; /**< of all cylinders; CONFIG_NONE: the settled extension */
+    bool is_homed;                /**< the position is known from the start */
+} config_sim_t;
+
+/** Outputs. The number of lines is the number of relays. */
+typedef struct {
+    uint8_t count;
+    uint16_t line[CONFIG_RELAYS_MAX];
+} config_lines_t;
+
+/** What switches the relays. */
+typedef enum { CONFIG_RELAYS_SIM } config_relays_driver_t;
+
+/** Relay outputs, relay 1 first. */
+typedef struct {
+    config_relays_driver_t driver;
+    config_lines_t lines;
+    bool is_active_low;
+} config_relays_t;
+
+/** What reads the operator's switches. */
+typedef enum { CONFIG_INPUTS_SIM } config_inputs_driver_t;
+
+/** Switch inputs; a line that is CONFIG_NONE is not there. */
+typedef struct {
+    config_inputs_driver_t driver;
+    int32_t estop_line;
+    int32_t enable_line;
+    int32_t reset_line;
+} config_inputs_t;
+
+/** A whole configuration: the core's settings, and what only the hosted program needs. Plain data. */
+typedef struct {
+    settings_t settings;
+    config_udp_t udp;
+    char control_socket[CONFIG_PATH_MAX];
+    config_drives_t drives;
+    config_sim_t sim;
+    config_relays_t relays;
+    config_inputs_t inputs;
+} config_t;
+
+/** Loads and checks a file.
+ *  @param out     unchanged on errors
+ *  @param errors  takes one line per error, all of them: `FILE:LINE: [section] key: what is wrong; what is allowed`
+ *  @return 0, or the number of errors */
+int config_load(const char *path, config_t *out, FILE *errors);
+
+/** Writes what follows from a loaded configuration: reach of each axis, extensions at pose zero and at neutral, worst cylinder
+ *  speed, cycle, memory; then warnings.
+ *  @param ram_bytes of the gateway, as the program has it
+ *  @return the number of warnings */
+int config_check_report(const config_t *config, size_t ram_bytes, FILE *out);
+
+/** Writes every key with its value, unit, range and help, as a file that loads to the same configuration. */
+void config_dump(const config_t *self, FILE *out);
+
+/** Writes the reference of all keys as Markdown. */
+void config_write_reference(FILE *out);
+
+#endif

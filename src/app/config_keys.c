@@ -1,0 +1,302 @@
+/* SPDX-License-Identifier: MIT
+ * config_keys.c - the table of all sections and keys, look-up in it, and the nearest name to a misspelt one.
+ */
+#include "config_keys.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#define SUGGEST_LENGTH_MAX 40u /* longer names are not worth a suggestion */
+
+const char *const config_axis_section[AXES_MAX] = {"roll", "pitch", "yaw", "x", "y", "z", "angle"};
+
+const config_section_t config_sections[] = {
+    {"platform", "what it is and how it starts", CONFIG_NEEDS_NOTHING},
+    {"geometry", "joint centres and lengths, as measured; left-handed frame, +X forward, +Y right, +Z up", CONFIG_NEEDS_NOTHING},
+    {"pose", "where the platform waits", CONFIG_NEEDS_NOTHING},
+    {"roll", "rotation about X: asked = sign * scale * sent + offset, then min to max", CONFIG_NEEDS_NOTHING},
+    {"pitch", "rotation about Y, as [roll]", CONFIG_NEEDS_NOTHING},
+    {"yaw", "rotation about Z, as [roll]", CONFIG_NEEDS_HEXAPOD},
+    {"angle", "rotation motor, limits as [roll]", CONFIG_NEEDS_NOTHING},
+    {"x", "forward and back, as [roll]", CONFIG_NEEDS_HEXAPOD},
+    {"y", "right and left, as [roll]", CONFIG_NEEDS_HEXAPOD},
+    {"z", "up and down from pose zero, as [roll]", CONFIG_NEEDS_NOTHING},
+    {"cylinders", "limits of every cylinder: the last word over all motion", CONFIG_NEEDS_NOTHING},
+    {"engage", "limits of the cylinders while rising, settling, homing and taking over a sender's first pose",
+     CONFIG_NEEDS_NOTHING},
+    {"udp", "where frames come from", CONFIG_NEEDS_NOTHING},
+    {"control", "where heavectl reaches heaved", CONFIG_NEEDS_NOTHING},
+    {"drives", "what moves the cylinders", CONFIG_NEEDS_NOTHING},
+    {"sim", "simulated drives ([drives] driver = sim)", CONFIG_NEEDS_NOTHING},
+    {"relays", "effects outputs", CONFIG_NEEDS_NOTHING},
+    {"inputs", "switches of the operator", CONFIG_NEEDS_NOTHING},
+};
+const size_t config_section_count = sizeof config_sections / sizeof config_sections[0];
+
+/* clang-format off */ /* a row is a record: one or two lines */
+
+/* Pieces of a row. */
+#define AT(member)       .offset = offsetof(config_t, member), .size = sizeof(((const config_t *)0)->member)
+#define KEY(in, called)  .section = (in), .name = (called)
+#define RANGE(low, high) .low_milli = (int64_t)(low)*1000, .high_milli = (int64_t)(high)*1000
+#define ABOVE_ZERO(high) .low_milli = 1, .high_milli = (int64_t)(high)*1000
+#define MOST_Q16         32767 /* whole units that Q16.16 holds */
+#define MOST_INT32       2147483647
+
+/* The rows of one joint pair: base joint and plate joint. */
+#define JOINT(number, index, need)                                                                                              \
+    {KEY("geometry", "base" number "_mm"), AT(settings.geometry.base_mm_q16[index]), .type = CONFIG_DECIMAL, .count = 3,        \
+     .unit = "mm", RANGE(-4000, 4000), .needs = need,                                                                           \
+     .help = "x, y, z of the lower joint of cylinder " number ", base frame"},                                                  \
+    {KEY("geometry", "plate" number "_mm"), AT(settings.geometry.plate_mm_q16[index]), .type = CONFIG_DECIMAL, .count = 3,      \
+     .unit = "mm", RANGE(-4000, 4000), .needs = need,                                                                           \
+     .help = "x, y, z of the upper joint of cylinder " number ", plate frame"}
+
+/* The rows of one axis. */
+#define AXIS(name, u, index, need, low, high)                                                                                   \
+    {KEY(name, "sign"), AT(settings.axis[index].sign), .type = CONFIG_SIGN, .unit = "", .fallback = "1", .needs = need,         \
+     .help = "-1 turns the sense of the sent value round"},                                                                     \
+    {KEY(name, "scale"), AT(settings.axis[index].scale_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "", .fallback = "1",   \
+     RANGE(0, 100), .needs = need, .help = "factor of the sent value; 0 switches the axis off"},                                \
+    {KEY(name, "offset_" u), AT(settings.axis[index].offset_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u,                \
+     .fallback = "0", RANGE(low, high), .needs = need, .help = "added after sign and scale"},                                   \
+    {KEY(name, "min_" u), AT(settings.axis[index].min_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u, RANGE(low, high),    \
+     .needs = need, .help = "lowest value the axis goes to"},                                                                   \
+    {KEY(name, "max_" u), AT(settings.axis[index].max_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u, RANGE(low, high),    \
+     .needs = need, .help = "highest value the axis goes to"},                                                                  \
+    {KEY(name, "speed_" u "_s"), AT(settings.axis[index].speed_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u "/s",        \
+     ABOVE_ZERO(10000), .needs = need, .help = "speed limit"},                                                                  \
+    {KEY(name, "accel_" u "_s2"), AT(settings.axis[index].accel_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u "/s^2",     \
+     ABOVE_ZERO(MOST_Q16), .needs = need,                                                                                       \
+     .help = "acceleration limit; reached only where accel^2 / jerk <= speed"},                                                 \
+    {KEY(name, "jerk_" u "_s3"), AT(settings.axis[index].jerk), .type = CONFIG_INTEGER, .unit = u "/s^3",                       \
+     RANGE(1, MOST_INT32), .needs = need, .help = "jerk limit: how fast the acceleration may change"}
+
+const config_key_t config_keys[] = {
+    {KEY("platform", "kind"), AT(settings.geometry.kind), .type = CONFIG_WORD, .unit = "", .words = "hexapod|tripod|tripod-3rps",
+     .help = "six cylinders; three round a central guide; three on hinges (yaw, x and y then follow from roll and pitch)"},
+    {KEY("platform", "cycle_us"), AT(settings.cycle_us), .type = CONFIG_INTEGER, .unit = "us", .fallback = "1000",
+     RANGE(250, 10000), .help = "period of the motion cycle"},
+    {KEY("platform", "engage"), AT(settings.engage), .type = CONFIG_WORD, .unit = "", .fallback = "manual",
+     .words = "manual|auto",
+     .help = "who brings the platform up: an operator's request, or heaved by itself once after the start"},
+
+    JOINT("1", 0, CONFIG_NEEDS_NOTHING),
+    JOINT("2", 1, CONFIG_NEEDS_NOTHING),
+    JOINT("3", 2, CONFIG_NEEDS_NOTHING),
+    JOINT("4", 3, CONFIG_NEEDS_HEXAPOD),
+    JOINT("5", 4, CONFIG_NEEDS_HEXAPOD),
+    JOINT("6", 5, CONFIG_NEEDS_HEXAPOD),
+    {KEY("geometry", "retracted_length_mm"), AT(settings.geometry.retracted_mm_q16), .type = CONFIG_PER_CYLINDER, .unit = "mm",
+     ABOVE_ZERO(8000), .help = "joint to joint at extension 0"},
+    {KEY("geometry", "stroke_mm"), AT(settings.stroke_mm_q16), .type = CONFIG_PER_CYLINDER, .unit = "mm", ABOVE_ZERO(4000),
+     .help = "extension from end to end"},
+    {KEY("geometry", "zero_height_mm"), AT(settings.geometry.zero_height_mm_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "mm", RANGE(0, 8000), .help = "plate origin above base origin at pose zero"},
+    {KEY("geometry", "mrp_mm"), AT(settings.geometry.mrp_mm_q16), .type = CONFIG_DECIMAL, .count = 3, .unit = "mm",
+     .fallback = "0, 0, 0", RANGE(-4000, 4000),
+     .help = "x, y, z of the motion reference point, plate frame: poses place it and rotations turn about it"},
+
+    {KEY("pose", "neutral"), AT(settings.neutral_q16), .type = CONFIG_DECIMAL, .count = POSE_AXES, .unit = "deg and mm",
+     .fallback = "0, 0, 0, 0, 0, 0", RANGE(-4000, 4000), .help = "roll, pitch, yaw, x, y, z the platform rises to"},
+    {KEY("pose", "settled_extension_mm"), AT(settings.settled_extension_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     RANGE(0, 4000), .help = "of all cylinders, in which people board"},
+
+    AXIS("roll", "deg", AXIS_ROLL, CONFIG_NEEDS_NOTHING, -90, 90),
+    AXIS("pitch", "deg", AXIS_PITCH, CONFIG_NEEDS_NOTHING, -90, 90),
+    AXIS("yaw", "deg", AXIS_YAW, CONFIG_NEEDS_HEXAPOD, -180, 180),
+    {KEY("angle", "present"), AT(settings.has_angle), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "whether there is a rotation motor; the other keys of the section are for yes only"},
+    {KEY("angle", "wrap"), AT(settings.angle_wrap), .type = CONFIG_WORD, .unit = "", .fallback = "as-sent",
+     .words = "as-sent|shortest", .needs = CONFIG_NEEDS_ANGLE,
+     .help = "the number as it is, several turns allowed; or modulo one turn, the shorter way round"},
+    AXIS("angle", "deg", AXIS_ANGLE, CONFIG_NEEDS_ANGLE, -MOST_Q16, MOST_Q16),
+    AXIS("x", "mm", AXIS_X, CONFIG_NEEDS_HEXAPOD, -4000, 4000),
+    AXIS("y", "mm", AXIS_Y, CONFIG_NEEDS_HEXAPOD, -4000, 4000),
+    AXIS("z", "mm", AXIS_Z, CONFIG_NEEDS_NOTHING, -4000, 4000),
+
+    {KEY("cylinders", "speed_mm_s"), AT(settings.cylinder_speed_mm_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s",
+     ABOVE_ZERO(10000), .help = "speed limit"},
+    {KEY("cylinders", "accel_mm_s2"), AT(settings.cylinder_accel_mm_s2_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s^2",
+     ABOVE_ZERO(MOST_Q16), .help = "acceleration limit; reached only where accel^2 / jerk <= speed"},
+    {KEY("cylinders", "jerk_mm_s3"), AT(settings.cylinder_jerk_mm_s3), .type = CONFIG_INTEGER, .unit = "mm/s^3",
+     RANGE(1, MOST_INT32), .help = "jerk limit"},
+    {KEY("cylinders", "margin_mm"), AT(settings.margin_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm", .fallback = "2",
+     RANGE(0, 1000), .help = "kept free at both ends of the stroke"},
+
+    {KEY("engage", "speed_mm_s"), AT(settings.engage_speed_mm_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s",
+     .fallback = "30", ABOVE_ZERO(10000), .help = "speed limit, at most that of [cylinders]"},
+    {KEY("engage", "accel_mm_s2"), AT(settings.engage_accel_mm_s2_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s^2",
+     .fallback = "100", ABOVE_ZERO(MOST_Q16), .help = "acceleration limit, at most that of [cylinders]"},
+
+    {KEY("udp", "bind"), AT(udp.bind), .type = CONFIG_ADDRESS, .unit = "", .fallback = "127.0.0.1",
+     .help = "address to listen on: 0.0.0.0 or :: for every network card; as it stands, this machine alone"},
+    {KEY("udp", "port"), AT(udp.port), .type = CONFIG_INTEGER, .unit = "", .fallback = "9800", RANGE(1, 65535),
+     .help = "UDP port"},
+    {KEY("udp", "allow"), AT(udp.allow), .type = CONFIG_NETWORKS, .unit = "", .fallback = "any",
+     .help = "who may send: addresses or networks such as 192.168.7.0/24, separated by commas"},
+    {KEY("udp", "dialect"), AT(settings.dialect), .type = CONFIG_WORD, .unit = "", .fallback = "v3", .words = "v3|lenient",
+     .help = "frames as in V3.0; or also with the head # or none, and commands in lower case"},
+    {KEY("udp", "stream"), AT(settings.stream_style), .type = CONFIG_WORD, .unit = "", .fallback = "smooth",
+     .words = "smooth|fast", .help = "how a stream of poses is rendered: 2 periods late and smoother, or 1.5 periods late"},
+    {KEY("udp", "silence_hold_ms"), AT(settings.silence_hold_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "1000",
+     RANGE(0, 3600000), .help = "silence of the sender after which the platform holds; 0 = never"},
+    {KEY("udp", "silence_neutral_ms"), AT(settings.silence_neutral_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
+     RANGE(0, 3600000), .help = "silence after which it goes to neutral; 0 = never"},
+    {KEY("udp", "silence_settle_ms"), AT(settings.silence_settle_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
+     RANGE(0, 3600000), .help = "silence after which it settles; 0 = never"},
+
+    {KEY("control", "socket"), AT(control_socket), .type = CONFIG_PATH, .unit = "", .fallback = "/run/heave/heaved.sock",
+     .help = "local socket of heaved"},
+
+    {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim",
+     .absent = "cia402|can-raw|modbus-tcp|modbus-rtu", .help = "the drives in use"},
+
+    {KEY("sim", "lag_ms"), AT(sim.lag_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0", RANGE(0, 10000),
+     .help = "time constant with which a cylinder follows its set-point; 0 = at once"},
+    {KEY("sim", "enable_delay_ms"), AT(sim.enable_delay_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
+     RANGE(0, 60000), .help = "from the enable command to enabled"},
+    {KEY("sim", "start_extension_mm"), AT(sim.start_extension_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     .fallback = "settled", .words = "settled", RANGE(0, 4000), .help = "of all cylinders at the start"},
+    {KEY("sim", "homed"), AT(sim.is_homed), .type = CONFIG_YES_NO, .unit = "", .fallback = "yes",
+     .help = "whether the drives know their position from the start"},
+
+    {KEY("relays", "driver"), AT(relays.driver), .type = CONFIG_WORD, .unit = "", .fallback = "sim", .words = "sim",
+     .absent = "gpio|modbus", .help = "the outputs in use"},
+    {KEY("relays", "lines"), AT(relays.lines), .type = CONFIG_LINES, .unit = "", .fallback = "none", RANGE(0, 65535),
+     .help = "output line of relay 1, of relay 2, ...; as many relays as lines"},
+    {KEY("relays", "active_low"), AT(relays.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "whether a low level closes a relay"},
+    {KEY("relays", "safe_mask"), AT(settings.relay_safe_mask), .type = CONFIG_MASK, .unit = "", .fallback = "0", RANGE(0, 0xFFF),
+     .help = "relays that are closed in a fault or emergency stop, all others open; bit 0 = relay 1"},
+
+    {KEY("inputs", "driver"), AT(inputs.driver), .type = CONFIG_WORD, .unit = "", .fallback = "sim", .words = "sim",
+     .absent = "gpio", .help = "the inputs in use"},
+    {KEY("inputs", "estop"), AT(inputs.estop_line), .type = CONFIG_INTEGER, .unit = "", .fallback = "none", .words = "none",
+     RANGE(0, 65535), .help = "line of the emergency stop"},
+    {KEY("inputs", "enable"), AT(inputs.enable_line), .type = CONFIG_INTEGER, .unit = "", .fallback = "none", .words = "none",
+     RANGE(0, 65535), .help = "line of the enable key"},
+    {KEY("inputs", "reset"), AT(inputs.reset_line), .type = CONFIG_INTEGER, .unit = "", .fallback = "none", .words = "none",
+     RANGE(0, 65535), .help = "line of the reset button"},
+};
+/* clang-format on */
+const size_t config_key_count = sizeof config_keys / sizeof config_keys[0];
+
+int config_section_find(const char *name)
+{
+    for (size_t i = 0; i < config_section_count; i++) {
+        if (strcmp(config_sections[i].name, name) == 0) {
+            return (int)i;
+        }
+    }
+    return -1;
+}
+
+int config_key_find(const char *section, const char *name)
+{
+    for (size_t i = 0; i < config_key_count; i++) {
+        if (strcmp(config_keys[i].section, section) == 0 && strcmp(config_keys[i].name, name) == 0) {
+            return (int)i;
+        }
+    }
+    return -1;
+}
+
+static unsigned smallest(unsigned a, unsigned b, unsigned c)
+{
+    const unsigned ab = a < b ? a : b;
+    return ab < c ? ab : c;
+}
+
+/* Levenshtein distance; one row of the matrix at a time. */
+static unsigned edit_distance(const char *from, const char *to)
+{
+    unsigned row[SUGGEST_LENGTH_MAX + 1u];
+    const size_t width = strlen(to);
+    if (width > SUGGEST_LENGTH_MAX || strlen(from) > SUGGEST_LENGTH_MAX) {
+        return SUGGEST_LENGTH_MAX;
+    }
+    for (unsigned j = 0; j <= width; j++) {
+        row[j] = j;
+    }
+    for (unsigned i = 1; from[i - 1u] != '\0'; i++) {
+        unsigned diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= width; j++) {
+            const unsigned above = row[j];
+            row[j] = smallest(above + 1u, row[j - 1u] + 1u, diagonal + (from[i - 1u] != to[j - 1u]));
+            diagonal = above;
+        }
+    }
+    return row[width];
+}
+
+/* Keeps the better of two suggestions. */
+static void offer(const char *asked, const char *name, const char **best, unsigned *best_distance)
+{
+    const unsigned distance = edit_distance(asked, name);
+    if (distance < *best_distance) {
+        *best = name;
+        *best_distance = distance;
+    }
+}
+
+/* A suggestion may differ in a third of the letters. */
+static unsigned distance_limit(const char *asked)
+{
+    return (unsigned)(strlen(asked) / 3u) + 2u;
+}
+
+const char *config_section_suggest(const char *name)
+{
+    const char *best = NULL;
+    unsigned distance = distance_limit(name);
+    for (size_t i = 0; i < config_section_count; i++) {
+        offer(name, config_sections[i].name, &best, &distance);
+    }
+    return best;
+}
+
+const char *config_key_suggest(const char *section, const char *name)
+{
+    const char *best = NULL;
+    unsigned distance = distance_limit(name);
+    for (size_t i = 0; i < config_key_count; i++) {
+        if (strcmp(config_keys[i].section, section) == 0) {
+            offer(name, config_keys[i].name, &best, &distance);
+        }
+    }
+    return best;
+}
+
+bool config_is_applicable(config_needs_t needs, const config_t *config)
+{
+    switch (needs) {
+    case CONFIG_NEEDS_NOTHING:
+        return true;
+    case CONFIG_NEEDS_HEXAPOD:
+        return config->settings.geometry.kind == KIN_HEXAPOD;
+    case CONFIG_NEEDS_ANGLE:
+        return config->settings.has_angle;
+    }
+    return true;
+}
+
+const char *config_axis_unit(unsigned axis)
+{
+    return axis >= AXIS_X && axis <= AXIS_Z ? "mm" : "deg";
+}
+
+const char *config_kind_name(kin_kind_t kind)
+{
+    static const char *const names[] = {"hexapod", "tripod", "tripod-3rps"};
+    return names[kind];
+}
+
+bool config_has_axis(const config_t *config, unsigned axis)
+{
+    if (axis == AXIS_ANGLE) {
+        return config->settings.has_angle;
+    }
+    return config_is_applicable(config_sections[config_section_find(config_axis_section[axis])].needs, config);
+}

@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: MIT
+ * config_reference.c - prints docs/configuration.md as the table of keys has it.
+ */
+#include <stdlib.h>
+
+#include "config.h"
+#include "heave/status.h"
+
+void hv_assert_failed(const char *file, int line)
+{
+    fprintf(stderr, "%s:%d: assertion failed\n", file, line);
+    abort();
+}
+
+int main(void)
+{
+    config_write_reference(stdout);
+    return fflush(stdout) == 0 ? EXIT_SUCCESS : EXIT_FAILURE;
+}
