@@ -1,0 +1,465 @@
+/* SPDX-License-Identifier: MIT
+ * control.c - the control socket; see control.h.
+ */
+#include "control.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "operator.h"
+#include "say.h"
+
+#define BACKLOG         8
+#define ANSWER_US       1000000u /* the motion thread answers within a cycle or two */
+#define RESET_US        2500000u /* a reset takes effect when the drives say so */
+#define WAITING_POLL_MS 1
+
+/* --- Answers --- */
+
+static control_client_t *find_client(control_t *self, uint32_t request_id)
+{
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        if (self->client[i].fd >= 0 && self->client[i].request_id == request_id) {
+            return &self->client[i];
+        }
+    }
+    return NULL;
+}
+
+static void drop(control_client_t *client)
+{
+    (void)close(client->fd);
+    client->fd = -1;
+}
+
+/* Sends what the socket takes now. */
+static void send_out(control_client_t *client)
+{
+    if (client->out_length == 0) {
+        return;
+    }
+    const ssize_t sent = send(client->fd, client->out, client->out_length, MSG_DONTWAIT | MSG_NOSIGNAL);
+    if (sent < 0) {
+        if (errno != EAGAIN && errno != EINTR) {
+            drop(client);
+        }
+        return;
+    }
+    client->out_length -= (size_t)sent;
+    memmove(client->out, &client->out[sent], client->out_length);
+    if (client->out_length == 0 && client->is_closing) {
+        drop(client);
+    }
+}
+
+/* Queues a complete answer. A client that has not read the last ones is dropped: it would get half an answer. */
+static void answer(control_client_t *client, json_t *json)
+{
+    json_newline(json);
+    if (json->is_cut) {
+        drop(client);
+        return;
+    }
+    client->out_length += json->length;
+    send_out(client);
+}
+
+static json_t start_answer(control_client_t *client)
+{
+    json_t json;
+    json_start(&json, &client->out[client->out_length], sizeof client->out - client->out_length);
+    return json;
+}
+
+static void answer_state(control_client_t *client, state_t state)
+{
+    json_t json = start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_text(&json, "state", state_name(state));
+    json_close(&json, '}');
+    answer(client, &json);
+}
+
+static void answer_error(control_client_t *client, const char *error, const char *state)
+{
+    json_t json = start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", false);
+    json_text(&json, "error", error);
+    if (state != NULL) {
+        json_text(&json, "state", state);
+    }
+    json_close(&json, '}');
+    answer(client, &json);
+}
+
+static void answer_status(control_t *self, control_client_t *client)
+{
+    json_t json = start_answer(client);
+    status_json_write(&json, &self->view.view, self->config, &self->lost);
+    answer(client, &json);
+}
+
+/* --- Requests --- */
+
+static const snapshot_t *snapshot_of(const control_t *self)
+{
+    return &self->view.view.snapshot;
+}
+
+static void refuse(control_client_t *client, event_t request, const snapshot_t *snapshot, bool is_shutting_down)
+{
+    char error[256];
+    (void)operator_explain(request, snapshot, is_shutting_down, error, sizeof error);
+    answer_error(client, error, state_name(snapshot->state));
+}
+
+/* Hands an operator's request to the motion thread; the answer follows. */
+static void begin_request(control_t *self, control_client_t *client, event_t event, uint64_t now_us)
+{
+    self->last_id += self->last_id == UINT32_MAX ? 2 : 1; /* 0 means none */
+    const motion_request_t request = {self->last_id, (uint32_t)event};
+    if (!ring_push(&self->loop->requests, &request, sizeof request, NULL, 0)) {
+        answer_error(client, "heaved is busy: try again", NULL);
+        return;
+    }
+    client->request_id = self->last_id;
+    client->request = event;
+    client->is_accepted = false;
+    client->answer_by_us = now_us + (event == EVENT_RESET ? RESET_US : ANSWER_US);
+}
+
+static bool is_digits(const char *text)
+{
+    return text[0] != '\0' && strspn(text, "0123456789") == strlen(text) && strlen(text) <= 3;
+}
+
+/* "watch" or "watch HZ". */
+static bool begin_watch(control_client_t *client, const char *argument, uint64_t now_us)
+{
+    unsigned hz = CONTROL_WATCH_HZ;
+    if (argument[0] == ' ') {
+        argument++;
+        if (!is_digits(argument)) {
+            return false;
+        }
+        for (hz = 0; *argument != '\0'; argument++) {
+            hz = hz * 10 + (unsigned)(*argument - '0');
+        }
+    } else if (argument[0] != '\0') {
+        return false;
+    }
+    if (hz < 1 || hz > CONTROL_WATCH_MAX_HZ) {
+        return false;
+    }
+    client->watch_period_us = 1000000u / hz;
+    client->watch_next_us = now_us;
+    return true;
+}
+
+static void take_request(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+{
+    const event_t event = operator_request_find(line);
+    if (event != EVENTS) {
+        begin_request(self, client, event, now_us);
+    } else if (strcmp(line, "status") == 0) {
+        answer_status(self, client);
+    } else if (strncmp(line, "watch", 5) == 0) {
+        if (!begin_watch(client, &line[5], now_us)) {
+            answer_error(client, "watch: `watch` or `watch HZ` with 1 to 50 is allowed", NULL);
+        }
+    } else {
+        answer_error(client, "unknown request; status, watch [HZ], engage, hold, resume, park, reset and shutdown are allowed",
+                     NULL);
+    }
+}
+
+/* Carries out the complete lines of a client, one at a time: the next one waits for the answer to the last. */
+static void take_lines(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    while (client->fd >= 0 && client->request_id == 0) {
+        char *const newline = memchr(client->in, '\n', client->in_length);
+        if (newline == NULL) {
+            return;
+        }
+        *newline = '\0';
+        if (newline > client->in && newline[-1] == '\r') {
+            newline[-1] = '\0';
+        }
+        take_request(self, client, client->in, now_us);
+        client->in_length -= (size_t)(newline + 1 - client->in);
+        memmove(client->in, newline + 1, client->in_length);
+    }
+}
+
+/* A client that has said all it wants to say still gets its answer. */
+static void end_input(control_client_t *client, bool is_false_alarm)
+{
+    if (is_false_alarm) {
+        return;
+    }
+    client->is_closing = true;
+    if (client->request_id == 0 && client->out_length == 0) {
+        drop(client);
+    }
+}
+
+static void receive(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    const ssize_t received =
+        recv(client->fd, &client->in[client->in_length], sizeof client->in - client->in_length, MSG_DONTWAIT);
+    if (received <= 0) {
+        end_input(client, received < 0 && (errno == EAGAIN || errno == EINTR));
+        return;
+    }
+    client->in_length += (size_t)received;
+    take_lines(self, client, now_us);
+    if (client->fd >= 0 && client->in_length == sizeof client->in && memchr(client->in, '\n', sizeof client->in) == NULL) {
+        client->is_closing = true;
+        answer_error(client, "request too long", NULL);
+    }
+}
+
+/* --- What time brings --- */
+
+/* A reset has an effect once the platform has left FAULT or ESTOP; everything else has its answer after one cycle. */
+static void take_result(control_client_t *client, const motion_result_t *result)
+{
+    if (result->status != HV_OK) {
+        client->request_id = 0;
+        refuse(client, client->request, &result->snapshot, result->is_shutting_down);
+    } else if (client->request == EVENT_RESET) {
+        client->is_accepted = true;
+    } else {
+        client->request_id = 0;
+        answer_state(client, result->snapshot.state);
+    }
+}
+
+static void take_results(control_t *self)
+{
+    motion_result_t result;
+    while (ring_pop(&self->loop->results, &result, sizeof result) > 0) {
+        control_client_t *client = find_client(self, result.id);
+        if (result.id != 0 && client != NULL) {
+            take_result(client, &result);
+        }
+    }
+}
+
+/* Requests whose answer comes with time: a reset that took effect, or one that never got its answer. */
+static void watch_request(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    const snapshot_t *s = snapshot_of(self);
+    const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
+    if (client->is_accepted && !is_latched) {
+        client->request_id = 0;
+        answer_state(client, s->state);
+    } else if (now_us >= client->answer_by_us) {
+        client->request_id = 0;
+        if (client->is_accepted) {
+            refuse(client, client->request, s, self->view.view.is_shutting_down);
+        } else {
+            answer_error(client, "no answer from the motion thread", NULL);
+        }
+    }
+}
+
+static void serve_time(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    if (client->request_id != 0) {
+        watch_request(self, client, now_us);
+    }
+    take_lines(self, client, now_us); /* what waited for an answer */
+    if (client->fd >= 0 && client->watch_period_us != 0 && now_us >= client->watch_next_us) {
+        client->watch_next_us += client->watch_period_us * (1 + (now_us - client->watch_next_us) / client->watch_period_us);
+        answer_status(self, client);
+    }
+}
+
+int control_timeout_ms(const control_t *self, uint64_t now_us, int at_most_ms)
+{
+    int timeout_ms = at_most_ms;
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        const control_client_t *client = &self->client[i];
+        if (client->fd < 0) {
+            continue;
+        }
+        if (client->request_id != 0) {
+            return WAITING_POLL_MS;
+        }
+        if (client->watch_period_us != 0) {
+            const uint64_t left_us = client->watch_next_us > now_us ? client->watch_next_us - now_us : 0;
+            const int left_ms = (int)(left_us / 1000) + 1;
+            timeout_ms = left_ms < timeout_ms ? left_ms : timeout_ms;
+        }
+    }
+    return timeout_ms;
+}
+
+/* --- Connections --- */
+
+static void take_connection(control_t *self)
+{
+    static const char k_full[] = "{\"ok\":false,\"error\":\"too many clients\"}\n";
+    const int fd = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (fd < 0) {
+        return;
+    }
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        control_client_t *client = &self->client[i];
+        if (client->fd < 0) {
+            client->fd = fd;
+            client->in_length = 0;
+            client->out_length = 0;
+            client->is_closing = false;
+            client->request_id = 0;
+            client->watch_period_us = 0;
+            return;
+        }
+    }
+    (void)!send(fd, k_full, sizeof k_full - 1, MSG_DONTWAIT | MSG_NOSIGNAL);
+    (void)close(fd);
+}
+
+void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS])
+{
+    fds[0] = (struct pollfd){.fd = self->fd, .events = POLLIN};
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        const control_client_t *client = &self->client[i];
+        const bool is_read = !client->is_closing && client->in_length < sizeof client->in;
+        const short events = (short)((is_read ? POLLIN : 0) | (client->out_length > 0 ? POLLOUT : 0));
+        fds[i + 1] = (struct pollfd){.fd = client->fd, .events = events};
+    }
+}
+
+void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64_t now_us)
+{
+    (void)seqlock_read(&self->loop->view, self->view.word); /* the last view stays where there is no new one */
+    take_results(self);
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        control_client_t *client = &self->client[i];
+        if (client->fd >= 0 && (fds[i + 1].revents & POLLOUT) != 0) {
+            send_out(client);
+        }
+        if (client->fd >= 0 && (fds[i + 1].revents & POLLIN) != 0) {
+            receive(self, client, now_us);
+        } else if (client->fd >= 0 && (fds[i + 1].revents & (POLLHUP | POLLERR)) != 0) {
+            drop(client);
+        }
+        if (client->fd >= 0) {
+            serve_time(self, client, now_us);
+        }
+    }
+    if ((fds[0].revents & POLLIN) != 0) {
+        take_connection(self);
+    }
+}
+
+/* --- Open and close --- */
+
+/* Whether somebody answers at the path: a running daemon, or nobody any more. */
+static bool is_alive(const struct sockaddr_un *address)
+{
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const bool is_connected = fd >= 0 && connect(fd, (const struct sockaddr *)address, sizeof *address) == 0;
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+    return is_connected;
+}
+
+/* The directory of the socket, where it is missing. */
+static void make_directory(const char *path)
+{
+    char directory[CONFIG_PATH_MAX];
+    (void)snprintf(directory, sizeof directory, "%s", path);
+    char *const slash = strrchr(directory, '/');
+    if (slash != NULL && slash != directory) {
+        *slash = '\0';
+        (void)!mkdir(directory, 0755);
+    }
+}
+
+/* Makes way for the socket. */
+static int clear_path(const char *path, const struct sockaddr_un *address)
+{
+    struct stat found;
+    if (lstat(path, &found) != 0) {
+        make_directory(path);
+        return EXIT_DONE;
+    }
+    if (!S_ISSOCK(found.st_mode)) {
+        return say(EXIT_NO_OUTPUT, "control socket %s: there is something else of that name", path);
+    }
+    if (is_alive(address)) {
+        return say(EXIT_UNAVAILABLE, "control socket %s: another heaved is running; stop it, or give --socket PATH", path);
+    }
+    (void)unlink(path);
+    return EXIT_DONE;
+}
+
+static int fail(control_t *self, const char *path)
+{
+    const int error = errno;
+    if (self->fd >= 0) {
+        (void)close(self->fd);
+    }
+    self->fd = -1;
+    return say(EXIT_NO_OUTPUT, "control socket %s: %s; create its directory, or give --socket PATH", path, strerror(error));
+}
+
+int control_open(control_t *self, const char *path, const config_t *config, motion_loop_t *loop)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    self->fd = -1;
+    self->config = config;
+    self->loop = loop;
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        self->client[i].fd = -1;
+    }
+    (void)snprintf(self->path, sizeof self->path, "%s", path);
+    memcpy(address.sun_path, self->path, sizeof self->path);
+    const int code = clear_path(self->path, &address);
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (self->fd < 0 || bind(self->fd, (const struct sockaddr *)&address, sizeof address) != 0 || chmod(self->path, 0660) != 0 ||
+        stat(self->path, &self->made) != 0 || listen(self->fd, BACKLOG) != 0) {
+        return fail(self, self->path);
+    }
+    return EXIT_DONE;
+}
+
+static bool is_ours(const control_t *self)
+{
+    struct stat found;
+    return stat(self->path, &found) == 0 && found.st_dev == self->made.st_dev && found.st_ino == self->made.st_ino;
+}
+
+void control_close(control_t *self)
+{
+    if (self->fd < 0) {
+        return;
+    }
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        if (self->client[i].fd >= 0) {
+            send_out(&self->client[i]);
+        }
+        if (self->client[i].fd >= 0) {
+            drop(&self->client[i]);
+        }
+    }
+    if (is_ours(self)) {
+        (void)unlink(self->path);
+    }
+    (void)close(self->fd);
+    self->fd = -1;
+}

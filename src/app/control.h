@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: MIT
+ * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
+ * Requests: status, watch [HZ], engage, hold, resume, park, reset, shutdown. The service thread owns it; nothing blocks, nothing
+ * allocates after the open, and a client that does not read is dropped.
+ */
+#ifndef HEAVE_APP_CONTROL_H
+#define HEAVE_APP_CONTROL_H
+
+#include <poll.h>
+#include <sys/stat.h>
+
+#include "motion_loop.h"
+#include "status_json.h"
+
+#define CONTROL_CLIENTS      8u
+#define CONTROL_FDS          (CONTROL_CLIENTS + 1u)
+#define CONTROL_REQUEST_MAX  64u
+#define CONTROL_ANSWER_MAX   8192u
+#define CONTROL_OUT_BYTES    (4u * CONTROL_ANSWER_MAX)
+#define CONTROL_WATCH_HZ     20u /* where the client does not say */
+#define CONTROL_WATCH_MAX_HZ 50u
+
+/** One client; private to control.c. */
+typedef struct {
+    int fd; /**< -1: free */
+    char in[CONTROL_REQUEST_MAX];
+    size_t in_length;
+    char out[CONTROL_OUT_BYTES];
+    size_t out_length;
+    bool is_closing;     /**< nothing more is read; closed once everything is answered and sent */
+    uint32_t request_id; /**< waits for the motion thread; 0 = none */
+    event_t request;
+    bool is_accepted;         /**< by the motion thread; a reset then still has to take effect */
+    uint64_t answer_by_us;    /**< latest time of the answer */
+    uint64_t watch_period_us; /**< 0 = does not watch */
+    uint64_t watch_next_us;
+} control_client_t;
+
+/** The socket and its clients; private to control.c. */
+typedef struct {
+    int fd; /**< -1: closed */
+    char path[CONFIG_PATH_MAX];
+    struct stat made; /**< identity of the socket file, so that only ours is removed */
+    motion_loop_t *loop;
+    const config_t *config;
+    status_lost_t lost; /**< the owner keeps it up to date */
+    motion_view_words_t view;
+    uint32_t last_id;
+    control_client_t client[CONTROL_CLIENTS];
+} control_t;
+
+/** Opens the socket, in place of one that a dead daemon left behind. Says what is wrong.
+ *  @param config kept
+ *  @return EXIT_DONE; EXIT_UNAVAILABLE: a running heaved has it; EXIT_NO_OUTPUT: it cannot be created */
+int control_open(control_t *self, const char *path, const config_t *config, motion_loop_t *loop);
+
+/** Fills CONTROL_FDS entries for poll. */
+void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS]);
+
+/** How long poll may wait, in ms, not more than the given time. */
+int control_timeout_ms(const control_t *self, uint64_t now_us, int at_most_ms);
+
+/** Serves what poll found, and what time has made due. */
+void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64_t now_us);
+
+/** Sends what waits, closes, and removes the socket file; harmless on a closed one. */
+void control_close(control_t *self);
+
+#endif

@@ -1,0 +1,297 @@
+/* SPDX-License-Identifier: MIT
+ * ctl_view.c - the status as text; see ctl_view.h. Whatever an answer lacks is shown as 0 or "?": a view never fails.
+ */
+#include "ctl_view.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#define BAR_COLUMNS_MIN  8u
+#define BAR_COLUMNS_MAX  60u
+#define BAR_BESIDE       34u /* columns of a cylinder's line beside its bar */
+#define LINE_COLUMNS_MAX 512u
+
+/** A text being drawn, line by line. */
+typedef struct {
+    char *text;
+    size_t length;
+    const ctl_view_style_t *style;
+    char line[LINE_COLUMNS_MAX * 4];
+    size_t at;        /* bytes of the line */
+    unsigned columns; /* of the line, used */
+} view_t;
+
+static const cJSON *member(const cJSON *object, const char *name)
+{
+    return cJSON_GetObjectItemCaseSensitive(object, name);
+}
+
+/* What would be shown as -0.000 is 0. */
+static double number(const cJSON *object, const char *name)
+{
+    const cJSON *item = member(object, name);
+    const double value = cJSON_IsNumber(item) ? item->valuedouble : 0.0;
+    return value < 0.0 && value > -0.0005 ? 0.0 : value;
+}
+
+static const char *word(const cJSON *object, const char *name)
+{
+    const cJSON *item = member(object, name);
+    return cJSON_IsString(item) ? item->valuestring : "?";
+}
+
+/* --- Lines --- */
+
+/* Adds a character of one column, as far as the line is wide. */
+static void put_column(view_t *self, const char *bytes)
+{
+    const size_t length = strlen(bytes);
+    if (self->columns < self->style->columns && self->at + length < sizeof self->line) {
+        memcpy(&self->line[self->at], bytes, length);
+        self->at += length;
+        self->columns++;
+    }
+}
+
+static __attribute__((format(printf, 2, 3))) void put(view_t *self, const char *format, ...)
+{
+    char piece[LINE_COLUMNS_MAX];
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(piece, sizeof piece, format, arguments);
+    va_end(arguments);
+    for (const char *c = piece; *c != '\0'; c++) {
+        const char column[2] = {*c, '\0'};
+        put_column(self, column);
+    }
+}
+
+static void end_line(view_t *self)
+{
+    const size_t end = strlen(self->style->line_end);
+    if (self->length + self->at + end < CTL_VIEW_BYTES) {
+        memcpy(&self->text[self->length], self->line, self->at);
+        memcpy(&self->text[self->length + self->at], self->style->line_end, end + 1);
+        self->length += self->at + end;
+    }
+    self->at = 0;
+    self->columns = 0;
+}
+
+/* --- Parts of the table --- */
+
+static void draw_head(view_t *self, const cJSON *status)
+{
+    const double up_s = number(status, "uptime_ms") / 1000.0;
+    put(self, "%-9s goal %-9s%s%s%s", word(status, "state"), word(status, "goal"),
+        cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
+        cJSON_IsTrue(member(status, "estop_active")) ? " E-STOP" : "",
+        cJSON_IsTrue(member(status, "shutting_down")) ? " SHUTTING DOWN" : "");
+    put(self, "  cycle %.0f us  up %.0f s  late %.0f", number(status, "cycle_us"), up_s, number(status, "late_cycles"));
+    end_line(self);
+}
+
+static void draw_pose(view_t *self, const cJSON *status, const char *label, const char *name)
+{
+    static const char *const k_axes[] = {"roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm"};
+    const cJSON *pose = member(status, name);
+    put(self, "%-7s", label);
+    for (unsigned i = 0; i < sizeof k_axes / sizeof k_axes[0]; i++) {
+        if (cJSON_IsObject(pose)) {
+            put(self, " %10.3f", number(pose, k_axes[i]));
+        } else {
+            put(self, " %10s", "-");
+        }
+    }
+    end_line(self);
+}
+
+static void draw_poses(view_t *self, const cJSON *status)
+{
+    put(self, "%-7s %10s %10s %10s %10s %10s %10s", "pose", "roll deg", "pitch deg", "yaw deg", "x mm", "y mm", "z mm");
+    end_line(self);
+    draw_pose(self, status, "asked", "pose_asked");
+    draw_pose(self, status, "sent", "pose_sent");
+    draw_pose(self, status, "actual", "pose_actual");
+}
+
+static double part(double value, double whole)
+{
+    const double share = whole > 0.0 ? value / whole : 0.0;
+    return share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
+}
+
+/* A bar as far as sent, with a mark at actual where it is somewhere else. */
+static void draw_bar(view_t *self, double sent, double actual, double whole)
+{
+    const unsigned wide = self->style->columns > BAR_BESIDE ? self->style->columns - BAR_BESIDE : 0;
+    const unsigned columns = wide < BAR_COLUMNS_MIN ? BAR_COLUMNS_MIN : wide > BAR_COLUMNS_MAX ? BAR_COLUMNS_MAX : wide;
+    const unsigned filled = (unsigned)(part(sent, whole) * columns + 0.5);
+    const unsigned mark = (unsigned)(part(actual, whole) * columns + 0.5);
+    const bool is_marked = mark != filled;
+    for (unsigned i = 0; i < columns; i++) {
+        if (is_marked && i + 1 == (mark == 0 ? 1 : mark)) {
+            put_column(self, self->style->is_utf8 ? "\u2503" : "|");
+        } else if (i < filled) {
+            put_column(self, self->style->is_utf8 ? "\u2588" : "#");
+        } else {
+            put_column(self, self->style->is_utf8 ? "\u2591" : ".");
+        }
+    }
+}
+
+static void draw_drive(view_t *self, const cJSON *axis)
+{
+    const char *drive = word(axis, "drive");
+    put(self, " %s", strcmp(drive, "enabled") == 0 && !cJSON_IsTrue(member(axis, "homed")) ? "no zero" : drive);
+    end_line(self);
+}
+
+static void draw_cylinders(view_t *self, const cJSON *status)
+{
+    const cJSON *cylinder = NULL;
+    put(self, "cylinder, sent (bar) and actual, mm");
+    end_line(self);
+    cJSON_ArrayForEach(cylinder, member(status, "cylinders"))
+    {
+        const double sent = number(cylinder, "sent_mm");
+        const double actual = number(cylinder, "actual_mm");
+        put(self, " %.0f ", number(cylinder, "number"));
+        draw_bar(self, sent, actual, number(cylinder, "stroke_mm"));
+        put(self, " %9.3f %9.3f", sent, actual);
+        draw_drive(self, cylinder);
+    }
+    const cJSON *rotation = member(status, "rotation");
+    if (cJSON_IsObject(rotation)) {
+        put(self, "rotation motor %.3f deg, actual %.3f", number(rotation, "sent_deg"), number(rotation, "actual_deg"));
+        draw_drive(self, rotation);
+    }
+}
+
+static bool is_on(const cJSON *relays, unsigned relay)
+{
+    const cJSON *item = NULL;
+    cJSON_ArrayForEach(item, member(relays, "on"))
+    {
+        if (item->valuedouble == (double)relay) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void draw_relays(view_t *self, const cJSON *status)
+{
+    const cJSON *relays = member(status, "relays");
+    const unsigned count = (unsigned)number(relays, "count");
+    put(self, "relays   ");
+    for (unsigned i = 1; i <= count; i++) {
+        put(self, "%u", i);
+        if (self->style->is_utf8) {
+            put_column(self, is_on(relays, i) ? "\u25cf" : "\u25cb");
+        } else {
+            put_column(self, is_on(relays, i) ? "*" : "-");
+        }
+        put(self, " ");
+    }
+    put(self, count > 0 ? " %s" : "none", word(relays, "mask"));
+    end_line(self);
+}
+
+/* Counters that are not 0, by name. */
+static void draw_counts(view_t *self, const char *label, const cJSON *counts)
+{
+    const cJSON *item = NULL;
+    bool is_any = false;
+    put(self, "%-9s", label);
+    cJSON_ArrayForEach(item, counts)
+    {
+        if (cJSON_IsNumber(item) && item->valuedouble != 0.0) {
+            put(self, "%s%s %.0f", is_any ? ", " : "", item->string, item->valuedouble);
+            is_any = true;
+        }
+    }
+    put(self, "%s", is_any ? "" : "none");
+    end_line(self);
+}
+
+static void draw_frames(view_t *self, const cJSON *status)
+{
+    const cJSON *counters = member(status, "counters");
+    const cJSON *stream = member(status, "stream");
+    draw_counts(self, "accepted", member(counters, "accepted"));
+    draw_counts(self, "rejected", member(counters, "rejected"));
+    draw_counts(self, "other", counters);
+    put(self, "stream   period %.3f ms, delay %.3f ms", number(stream, "period_ms"), number(stream, "delay_ms"));
+    if (cJSON_IsNumber(member(stream, "last_frame_age_ms"))) {
+        put(self, ", last frame %.1f s ago", number(stream, "last_frame_age_ms") / 1000.0);
+    }
+    end_line(self);
+}
+
+static void draw_fault(view_t *self, const cJSON *status)
+{
+    const cJSON *fault = member(status, "fault");
+    const cJSON *flag = NULL;
+    put(self, "flags    ");
+    cJSON_ArrayForEach(flag, member(status, "flags"))
+    {
+        put(self, "%s ", cJSON_IsString(flag) ? flag->valuestring : "?");
+    }
+    end_line(self);
+    put(self, "fault    %s", word(fault, "name"));
+    if (number(fault, "axis") > 0.0) {
+        put(self, ", axis %.0f", number(fault, "axis"));
+    }
+    if (number(fault, "device_code") > 0.0) {
+        put(self, ", device code 0x%04X", (unsigned)number(fault, "device_code"));
+    }
+    end_line(self);
+}
+
+size_t ctl_view_table(const cJSON *status, const ctl_view_style_t *style, char text[CTL_VIEW_BYTES])
+{
+    view_t view = {.style = style};
+    view.text = text;
+    text[0] = '\0';
+    draw_head(&view, status);
+    draw_poses(&view, status);
+    draw_cylinders(&view, status);
+    draw_relays(&view, status);
+    draw_frames(&view, status);
+    draw_fault(&view, status);
+    return view.length;
+}
+
+static double total(const cJSON *counts)
+{
+    const cJSON *item = NULL;
+    double sum = 0.0;
+    cJSON_ArrayForEach(item, counts)
+    {
+        sum += cJSON_IsNumber(item) ? item->valuedouble : 0.0;
+    }
+    return sum;
+}
+
+size_t ctl_view_line(const cJSON *status, char text[CTL_VIEW_BYTES])
+{
+    static const ctl_view_style_t k_style = {.columns = LINE_COLUMNS_MAX, .line_end = ""};
+    const cJSON *pose = member(status, "pose_sent");
+    const cJSON *counters = member(status, "counters");
+    const cJSON *cylinder = NULL;
+    view_t view = {.style = &k_style};
+    view.text = text;
+    put(&view, "%s goal %s pose %.3f %.3f %.3f deg %.3f %.3f %.3f mm cylinders", word(status, "state"), word(status, "goal"),
+        number(pose, "roll_deg"), number(pose, "pitch_deg"), number(pose, "yaw_deg"), number(pose, "x_mm"), number(pose, "y_mm"),
+        number(pose, "z_mm"));
+    cJSON_ArrayForEach(cylinder, member(status, "cylinders"))
+    {
+        put(&view, " %.3f", number(cylinder, "sent_mm"));
+    }
+    put(&view, " relays %s accepted %.0f rejected %.0f fault %s", word(member(status, "relays"), "mask"),
+        total(member(counters, "accepted")), total(member(counters, "rejected")), word(member(status, "fault"), "name"));
+    end_line(&view);
+    return view.length;
+}

@@ -1,0 +1,349 @@
+/* SPDX-License-Identifier: MIT
+ * frames.c - files of frames; see frames.h.
+ */
+#include "frames.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define READ_BYTES 65536u
+
+static const char k_bad_time[] =
+    "no time at the start; a line is `<t_ms> <text>`, `<t_ms> !request`, or a comment that starts with `;`";
+static const char k_bad_decimals[] =
+    "the time has more than three decimals, or none after its point; milliseconds have up to three";
+static const char k_time_range[] = "the time is out of range; 0 to 4294967295 ms is allowed";
+static const char k_no_text[] = "nothing after the time; `<t_ms> <text>` or `<t_ms> !request` is allowed";
+static const char k_bad_escape[] = "unknown escape; \\n \\r \\t \\0 \\xNN \\\\ and \\\" are allowed";
+static const char k_bad_octal[] = "\\0 with a digit after it could be octal; write \\x00, or \\xNN";
+static const char k_too_long[] = "the text is longer than 65507 bytes, more than a datagram holds";
+static const char k_bad_request[] =
+    "unknown request; !engage !hold !resume !park !reset !shutdown, !estop on, !estop off and !late N "
+    "are allowed (a datagram that starts with ! is written \\x21)";
+
+static const struct {
+    const char *word;
+    event_t event;
+} k_requests[] = {{"engage", EVENT_ENGAGE}, {"hold", EVENT_HOLD},   {"resume", EVENT_RESUME},
+                  {"park", EVENT_PARK},     {"reset", EVENT_RESET}, {"shutdown", EVENT_SHUTDOWN}};
+
+/** A line being read. */
+typedef struct {
+    char *at;
+    const char *end;
+} cursor_t;
+
+static bool is_digit(char c)
+{
+    return c >= '0' && c <= '9';
+}
+
+static bool is_blank(char c)
+{
+    return c == ' ' || c == '\t';
+}
+
+static void skip_blanks(cursor_t *self)
+{
+    while (self->at < self->end && is_blank(*self->at)) {
+        self->at++;
+    }
+}
+
+static bool is_digit_next(const cursor_t *self)
+{
+    return self->at < self->end && is_digit(*self->at);
+}
+
+/* Whole number; false above limit. */
+static bool read_number(cursor_t *self, uint64_t limit, uint64_t *out)
+{
+    uint64_t value = 0;
+    for (; is_digit_next(self); self->at++) {
+        value = value * 10 + (uint64_t)(*self->at - '0');
+        if (value > limit) {
+            return false;
+        }
+    }
+    *out = value;
+    return true;
+}
+
+/* Up to three decimals behind the point, as microseconds. */
+static bool read_decimals(cursor_t *self, uint64_t *us)
+{
+    uint64_t weight = 100;
+    if (!is_digit_next(self)) {
+        return false;
+    }
+    for (; is_digit_next(self); self->at++, weight /= 10) {
+        if (weight == 0) {
+            return false;
+        }
+        *us += (uint64_t)(*self->at - '0') * weight;
+    }
+    return true;
+}
+
+static const char *read_time(cursor_t *self, uint64_t *us)
+{
+    uint64_t whole_ms = 0;
+    if (!is_digit_next(self)) {
+        return k_bad_time;
+    }
+    if (!read_number(self, FRAMES_TIME_MAX_MS, &whole_ms)) {
+        return k_time_range;
+    }
+    *us = whole_ms * 1000;
+    if (self->at < self->end && *self->at == '.') {
+        self->at++;
+        if (!read_decimals(self, us)) {
+            return k_bad_decimals;
+        }
+    }
+    if (self->at < self->end && !is_blank(*self->at)) {
+        return k_bad_time;
+    }
+    skip_blanks(self);
+    return self->at == self->end ? k_no_text : NULL;
+}
+
+static int hex_value(char c)
+{
+    if (is_digit(c)) {
+        return c - '0';
+    }
+    const char lower = (char)(c | 0x20);
+    return lower >= 'a' && lower <= 'f' ? lower - 'a' + 10 : -1;
+}
+
+/* The byte of an escape, behind its backslash; -1: unknown. */
+static int read_escape(cursor_t *self)
+{
+    static const char k_letters[] = "nrt0\\\"";
+    static const char k_bytes[] = "\n\r\t\0\\\"";
+    if (self->at == self->end) {
+        return -1;
+    }
+    const char letter = *self->at++;
+    if (letter == 'x' && self->end - self->at >= 2) {
+        const int high = hex_value(self->at[0]);
+        const int low = hex_value(self->at[1]);
+        self->at += 2;
+        return high < 0 || low < 0 ? -1 : high * 16 + low;
+    }
+    const char *known = letter == '\0' ? NULL : strchr(k_letters, letter);
+    return known == NULL ? -1 : (uint8_t)k_bytes[known - k_letters];
+}
+
+/* Resolves the escapes in place: the text only shrinks. */
+static const char *read_text(cursor_t *self, frames_line_t *out)
+{
+    char *to = self->at;
+    out->kind = FRAMES_DATAGRAM;
+    out->text = (const uint8_t *)to;
+    while (self->at < self->end) {
+        char c = *self->at++;
+        if (c == '\\') {
+            const bool is_zero = self->at < self->end && *self->at == '0';
+            const int byte = read_escape(self);
+            if (byte < 0) {
+                return k_bad_escape;
+            }
+            if (is_zero && is_digit_next(self)) {
+                return k_bad_octal;
+            }
+            c = (char)byte;
+        }
+        *to++ = c;
+    }
+    out->length = (uint32_t)(to - (const char *)out->text);
+    return to - (const char *)out->text > (ptrdiff_t)FRAMES_TEXT_MAX ? k_too_long : NULL;
+}
+
+/* Takes a word if it stands next, with a blank or the end behind it. */
+static bool take_word(cursor_t *self, const char *word)
+{
+    const size_t length = strlen(word);
+    const size_t left = (size_t)(self->end - self->at);
+    if (left < length || memcmp(self->at, word, length) != 0 || (left > length && !is_blank(self->at[length]))) {
+        return false;
+    }
+    self->at += length;
+    skip_blanks(self);
+    return true;
+}
+
+static bool read_request_words(cursor_t *self, frames_line_t *out)
+{
+    for (size_t i = 0; i < sizeof k_requests / sizeof k_requests[0]; i++) {
+        if (take_word(self, k_requests[i].word)) {
+            out->kind = FRAMES_REQUEST;
+            out->request = k_requests[i].event;
+            return true;
+        }
+    }
+    if (take_word(self, "estop")) {
+        out->kind = FRAMES_ESTOP;
+        out->number = take_word(self, "on");
+        return out->number == 1 || take_word(self, "off");
+    }
+    if (take_word(self, "late") && is_digit_next(self)) {
+        uint64_t cycles = 0;
+        out->kind = FRAMES_LATE;
+        const bool is_read = read_number(self, UINT32_MAX, &cycles);
+        out->number = (uint32_t)cycles;
+        return is_read;
+    }
+    return false;
+}
+
+static const char *read_request(cursor_t *self, frames_line_t *out)
+{
+    self->at++;
+    const bool is_known = read_request_words(self, out);
+    skip_blanks(self);
+    return is_known && self->at == self->end ? NULL : k_bad_request;
+}
+
+bool frames_parse_line(char *text, size_t length, frames_line_t *out, bool *is_empty, const char **why)
+{
+    cursor_t cursor = {.end = text + length};
+    cursor.at = text;
+    if (length > 0 && text[length - 1] == '\r') {
+        cursor.end--;
+    }
+    skip_blanks(&cursor);
+    *is_empty = cursor.at == cursor.end || *cursor.at == ';';
+    if (*is_empty) {
+        return true;
+    }
+    *why = read_time(&cursor, &out->t_us);
+    if (*why == NULL) {
+        *why = *cursor.at == '!' ? read_request(&cursor, out) : read_text(&cursor, out);
+    }
+    return *why == NULL;
+}
+
+/* --- Files --- */
+
+static bool read_whole(FILE *file, char **bytes, size_t *length)
+{
+    size_t capacity = 0;
+    for (;;) {
+        if (capacity - *length < READ_BYTES) {
+            capacity = capacity * 2 + 2 * READ_BYTES;
+            char *more = realloc(*bytes, capacity);
+            if (more == NULL) {
+                return false;
+            }
+            *bytes = more;
+        }
+        const size_t taken = fread(*bytes + *length, 1, READ_BYTES, file);
+        *length += taken;
+        if (taken == 0) {
+            return ferror(file) == 0;
+        }
+    }
+}
+
+static bool read_file(const char *path, char **bytes, size_t *length)
+{
+    FILE *file = strcmp(path, "-") == 0 ? stdin : fopen(path, "rb");
+    if (file == NULL) {
+        return false;
+    }
+    const bool is_read = read_whole(file, bytes, length);
+    const int error = errno;
+    if (file != stdin) {
+        (void)fclose(file);
+    }
+    errno = error;
+    return is_read;
+}
+
+static bool append(frames_t *self, const frames_line_t *line)
+{
+    if (self->count == self->capacity) {
+        const size_t capacity = self->capacity * 2 + 256;
+        frames_line_t *more = realloc(self->line, capacity * sizeof *more);
+        if (more == NULL) {
+            return false;
+        }
+        self->line = more;
+        self->capacity = capacity;
+    }
+    self->line[self->count++] = *line;
+    return true;
+}
+
+static int report(FILE *errors, const char *path, uint32_t line, const char *why)
+{
+    fprintf(errors, "%s:%u: %s\n", path, (unsigned)line, why);
+    return 1;
+}
+
+/* A line whose time is before the one in front of it. */
+static int report_order(FILE *errors, const char *path, const frames_line_t *line, const frames_line_t *before)
+{
+    fprintf(errors, "%s:%u: %llu.%03u ms is before the %llu.%03u ms of line %u; times must not decrease\n", path,
+            (unsigned)line->line, (unsigned long long)(line->t_us / 1000), (unsigned)(line->t_us % 1000),
+            (unsigned long long)(before->t_us / 1000), (unsigned)(before->t_us % 1000), (unsigned)before->line);
+    return 1;
+}
+
+/* One line into the list.
+ * Returns the number of errors, or -1 where memory ran out. */
+static int take_line(frames_t *self, char *text, size_t length, uint32_t number, const char *path, FILE *errors)
+{
+    frames_line_t line = {.line = number};
+    bool is_empty = false;
+    const char *why = NULL;
+    if (!frames_parse_line(text, length, &line, &is_empty, &why)) {
+        return report(errors, path, number, why);
+    }
+    if (is_empty) {
+        return 0;
+    }
+    if (self->count > 0 && line.t_us < self->line[self->count - 1].t_us) {
+        return report_order(errors, path, &line, &self->line[self->count - 1]);
+    }
+    return append(self, &line) ? 0 : -1;
+}
+
+/* Windows editors begin files with one. */
+static size_t byte_order_mark(const char *bytes, size_t length)
+{
+    return length >= 3 && memcmp(bytes, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
+}
+
+int frames_load(frames_t *self, const char *path, FILE *errors)
+{
+    size_t length = 0;
+    uint32_t number = 0;
+    int bad = 0;
+    *self = (frames_t){.line = NULL};
+    if (!read_file(path, &self->bytes, &length)) {
+        return -1;
+    }
+    for (size_t at = byte_order_mark(self->bytes, length); at < length;) {
+        char *const start = &self->bytes[at];
+        const char *const newline = memchr(start, '\n', length - at);
+        const size_t line_length = newline != NULL ? (size_t)(newline - start) : length - at;
+        const int result = take_line(self, start, line_length, ++number, path, errors);
+        if (result < 0) {
+            return -1;
+        }
+        bad += result;
+        at += line_length + 1;
+    }
+    return bad;
+}
+
+void frames_free(frames_t *self)
+{
+    free(self->line);
+    free(self->bytes);
+    *self = (frames_t){.line = NULL};
+}

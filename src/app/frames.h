@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: MIT
+ * frames.h - a file of frames for an offline run: datagrams and operator's requests with their times.
+ * A line is `<t_ms> <text>`, `<t_ms> !request`, empty, or a comment that starts with `;`. Text has C escapes. Times have up to
+ * three decimals and never decrease. Used before and during offline runs only; loading allocates.
+ */
+#ifndef HEAVE_APP_FRAMES_H
+#define HEAVE_APP_FRAMES_H
+
+#include <stdio.h>
+
+#include "heave/supervisor.h"
+
+#define FRAMES_TIME_MAX_MS 4294967295u /**< 49 days */
+#define FRAMES_TEXT_MAX    65507u      /**< longest datagram UDP carries */
+
+/** What a line does. */
+typedef enum {
+    FRAMES_DATAGRAM, /**< a sender sends text */
+    FRAMES_REQUEST,  /**< `!engage` ...: what heavectl would ask for */
+    FRAMES_ESTOP,    /**< `!estop on`, `!estop off` */
+    FRAMES_LATE      /**< `!late N`: N cycles are skipped and counted (recordings hold this) */
+} frames_kind_t;
+
+/** One line. */
+typedef struct {
+    uint64_t t_us;
+    frames_kind_t kind;
+    event_t request;     /**< FRAMES_REQUEST */
+    uint32_t number;     /**< FRAMES_ESTOP: 1 = on; FRAMES_LATE: cycles */
+    const uint8_t *text; /**< FRAMES_DATAGRAM: its bytes, escapes resolved */
+    uint32_t length;
+    uint32_t line; /**< number in the file, from 1 */
+} frames_line_t;
+
+/** A file in memory. */
+typedef struct {
+    frames_line_t *line; /**< without empty lines and comments */
+    size_t count;
+    size_t capacity;
+    char *bytes; /**< the file; texts point into it */
+} frames_t;
+
+/** Reads one line, without its newline.
+ *  @param text   changed: escapes are resolved in place, and the line's text points into it
+ *  @param length without newline; a CR at the end does not count
+ *  @param out    valid where true is returned and *is_empty is false; out->line is left alone
+ *  @param why    constant text where false is returned: what is wrong; what is allowed
+ *  @return false: the line is wrong */
+bool frames_parse_line(char *text, size_t length, frames_line_t *out, bool *is_empty, const char **why);
+
+/** Loads a file, "-" being standard input.
+ *  @param errors takes one line for each bad one: `FILE:LINE: what; what is allowed`
+ *  @return the number of bad lines; -1: cannot be read, errno says why. frames_free() in every case. */
+int frames_load(frames_t *self, const char *path, FILE *errors);
+
+/** Gives the memory back. */
+void frames_free(frames_t *self);
+
+#endif

@@ -1,0 +1,398 @@
+/* SPDX-License-Identifier: MIT
+ * heavectl.c - talks to a running heaved over its local socket: asks, shows, watches.
+ */
+#include <errno.h>
+#include <getopt.h>
+#include <langinfo.h>
+#include <locale.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "ctl_view.h"
+#include "say.h" // exit codes
+
+#define DEFAULT_SOCKET "/run/heave/heaved.sock"
+#define ANSWER_MS      5000
+#define WAIT_MS_MAX    1000 /* a signal between a look and a wait is seen by then */
+#define LINE_BYTES     65536u
+#define COLUMNS        80u
+#define TERMINAL_HZ    20u
+#define PLAIN_HZ       1u
+#define FOR_MAX_S      1e9
+
+enum { OPTION_JSON = 1, OPTION_SOCKET, OPTION_FOR, OPTION_HZ, OPTION_HELP, OPTION_VERSION };
+
+/** A run of the program. */
+typedef struct {
+    const char *command;
+    const char *socket;
+    bool is_json;
+    double for_s; /**< 0 = until interrupted */
+    unsigned hz;  /**< 0 = as it suits the output */
+    int fd;
+    char line[LINE_BYTES];
+    size_t length;   /**< bytes in line */
+    size_t consumed; /**< of those, given out already */
+} ctl_t;
+
+static const char *const k_commands[] = {"status", "watch", "engage", "hold", "resume", "park", "reset", "shutdown"};
+
+static const char k_help[] =
+    "heavectl - talks to a running heaved.\n"
+    "\n"
+    "  heavectl [--json] [--socket PATH] status\n"
+    "  heavectl [--json] [--socket PATH] [--for SECONDS] [--hz N] watch\n"
+    "  heavectl [--json] [--socket PATH] engage | hold | resume | park | reset | shutdown\n"
+    "\n"
+    "  engage    bring the platform up and follow the sender\n"
+    "  hold      stop where it is; resume goes on with what was interrupted\n"
+    "  park      settle: lowest position, at rest\n"
+    "  reset     leave FAULT or ESTOP, once the cause is gone\n"
+    "  shutdown  settle, drives off, end heaved\n"
+    "\n"
+    "  --json          answers as heaved gives them: one JSON object per line\n"
+    "  --socket PATH   else the environment's HEAVE_SOCKET, else " DEFAULT_SOCKET "\n"
+    "  --for SECONDS   watch ends by itself\n"
+    "  --hz N          updates per second of watch, 1 to 50; else 20, and 1 where the output is no terminal\n"
+    "  --help, --version\n"
+    "\n"
+    "Exit codes: 0 done, 1 refused, 64 usage, 69 heaved is not running.\n";
+
+static volatile sig_atomic_t is_interrupted; /* set by the signal handler, which can reach nothing else */
+
+static void on_signal(int signal_number)
+{
+    (void)signal_number;
+    is_interrupted = 1;
+}
+
+static __attribute__((format(printf, 2, 3))) int complain(int code, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    fputs("heavectl: ", stderr);
+    vfprintf(stderr, format, arguments);
+    fputc('\n', stderr);
+    va_end(arguments);
+    return code;
+}
+
+/* --- The link --- */
+
+static int not_running(const ctl_t *self, int error)
+{
+    if (error == EACCES) {
+        return complain(EXIT_UNAVAILABLE, "%s: no permission to talk to heaved; its user or group may", self->socket);
+    }
+    return complain(EXIT_UNAVAILABLE,
+                    "heaved is not running at %s (%s): start it with `heaved --config FILE`, or give --socket PATH", self->socket,
+                    strerror(error));
+}
+
+static int open_link(ctl_t *self)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    if (strlen(self->socket) >= sizeof address.sun_path) {
+        return complain(EXIT_BAD_USAGE, "%s: a socket's path has at most 107 characters", self->socket);
+    }
+    memcpy(address.sun_path, self->socket, strlen(self->socket));
+    self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (self->fd < 0 || connect(self->fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+        return not_running(self, errno);
+    }
+    return EXIT_DONE;
+}
+
+static bool send_line(const ctl_t *self, const char *request)
+{
+    char line[64];
+    const int length = snprintf(line, sizeof line, "%s\n", request);
+    return send(self->fd, line, (size_t)length, MSG_NOSIGNAL) == length;
+}
+
+static int64_t now_ms(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* Waits for bytes until the given time.
+ * Returns false: time is up, or a signal came that ends the program. */
+static bool wait_for_bytes(const ctl_t *self, int64_t until_ms)
+{
+    struct pollfd wait = {.fd = self->fd, .events = POLLIN};
+    for (;;) {
+        const int64_t left_ms = until_ms - now_ms();
+        if (left_ms <= 0 || is_interrupted != 0) {
+            return false;
+        }
+        if (poll(&wait, 1, left_ms < WAIT_MS_MAX ? (int)left_ms : WAIT_MS_MAX) > 0) {
+            return true;
+        }
+    }
+}
+
+/* More bytes into the line, until the given time.
+ * Returns false: as above, or the link is closed, or the line is longer than any answer. */
+static bool receive_more(ctl_t *self, int64_t until_ms)
+{
+    const size_t room = sizeof self->line - 1 - self->length;
+    if (room == 0 || !wait_for_bytes(self, until_ms)) {
+        return false;
+    }
+    const ssize_t received = recv(self->fd, &self->line[self->length], room, 0);
+    self->length += received > 0 ? (size_t)received : 0;
+    return received > 0;
+}
+
+/* The next answer, ended by a NUL; NULL: none came. Valid until the next call. */
+static const char *receive_line(ctl_t *self, int64_t until_ms)
+{
+    self->length -= self->consumed;
+    memmove(self->line, &self->line[self->consumed], self->length);
+    self->consumed = 0;
+    char *newline = memchr(self->line, '\n', self->length);
+    while (newline == NULL) {
+        if (!receive_more(self, until_ms)) {
+            return NULL;
+        }
+        newline = memchr(self->line, '\n', self->length);
+    }
+    *newline = '\0';
+    self->consumed = (size_t)(newline + 1 - self->line);
+    return self->line;
+}
+
+/* --- Showing --- */
+
+static bool is_utf8(void)
+{
+    return strcmp(nl_langinfo(CODESET), "UTF-8") == 0;
+}
+
+static unsigned terminal_columns(void)
+{
+    struct winsize size;
+    return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col >= 20 ? size.ws_col : COLUMNS;
+}
+
+static void show_table(const cJSON *status, bool is_watching)
+{
+    static char text[CTL_VIEW_BYTES];
+    const ctl_view_style_t style = {
+        .columns = terminal_columns(), .is_utf8 = is_utf8(), .line_end = is_watching ? "\x1b[K\r\n" : "\n"};
+    (void)ctl_view_table(status, &style, text);
+    printf("%s%s%s", is_watching ? "\x1b[H" : "", text, is_watching ? "\x1b[J" : "");
+}
+
+/* What heaved said no to.
+ * Returns the exit code. */
+static int judge(const cJSON *answer)
+{
+    const cJSON *error = cJSON_GetObjectItemCaseSensitive(answer, "error");
+    if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(answer, "ok"))) {
+        return EXIT_DONE;
+    }
+    return complain(EXIT_REFUSED, "%s", cJSON_IsString(error) ? error->valuestring : "heaved gave an answer that says nothing");
+}
+
+static void show_answer(const ctl_t *self, const cJSON *answer)
+{
+    const cJSON *state = cJSON_GetObjectItemCaseSensitive(answer, "state");
+    if (strcmp(self->command, "status") == 0) {
+        show_table(answer, false);
+    } else {
+        printf("%s: %s\n", self->command, cJSON_IsString(state) ? state->valuestring : "?");
+    }
+}
+
+static int show(const ctl_t *self, const char *line)
+{
+    cJSON *answer = cJSON_Parse(line);
+    if (self->is_json) {
+        printf("%s\n", line);
+    }
+    const int code = judge(answer);
+    if (code == EXIT_DONE && !self->is_json) {
+        show_answer(self, answer);
+    }
+    cJSON_Delete(answer);
+    return code;
+}
+
+static int ask(ctl_t *self)
+{
+    const char *line = send_line(self, self->command) ? receive_line(self, now_ms() + ANSWER_MS) : NULL;
+    return line != NULL ? show(self, line) : complain(EXIT_UNAVAILABLE, "heaved does not answer");
+}
+
+/* --- Watching --- */
+
+static void show_update(const ctl_t *self, const char *line, bool is_terminal)
+{
+    static char text[CTL_VIEW_BYTES];
+    if (self->is_json) {
+        printf("%s\n", line);
+        return;
+    }
+    cJSON *status = cJSON_Parse(line);
+    if (is_terminal) {
+        show_table(status, true);
+    } else {
+        (void)ctl_view_line(status, text);
+        printf("%s\n", text);
+    }
+    cJSON_Delete(status);
+}
+
+/* Until time is up, Ctrl-C, or the end of heaved. */
+static int follow(ctl_t *self, bool is_terminal)
+{
+    const int64_t until_ms = self->for_s > 0.0 ? now_ms() + (int64_t)(self->for_s * 1000.0) : INT64_MAX;
+    for (;;) {
+        const char *line = receive_line(self, until_ms);
+        if (line == NULL) {
+            break;
+        }
+        show_update(self, line, is_terminal);
+        if (fflush(stdout) != 0) {
+            return EXIT_IO;
+        }
+    }
+    return is_interrupted != 0 || now_ms() >= until_ms ? EXIT_DONE : EXIT_UNAVAILABLE;
+}
+
+static int watch(ctl_t *self)
+{
+    const bool is_terminal = !self->is_json && isatty(STDOUT_FILENO) != 0;
+    const unsigned hz = self->hz != 0 ? self->hz : is_terminal || self->is_json ? TERMINAL_HZ : PLAIN_HZ;
+    const struct sigaction action = {.sa_handler = on_signal};
+    char request[24];
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    (void)snprintf(request, sizeof request, "watch %u", hz);
+    if (!send_line(self, request)) {
+        return complain(EXIT_UNAVAILABLE, "heaved does not answer");
+    }
+    if (is_terminal) {
+        printf("\x1b[?1049h\x1b[?25l"); /* other screen, no cursor */
+    }
+    const int code = follow(self, is_terminal);
+    if (is_terminal) {
+        printf("\x1b[?25h\x1b[?1049l");
+        (void)fflush(stdout);
+    }
+    return code == EXIT_UNAVAILABLE ? complain(code, "heaved has ended") : code;
+}
+
+/* --- The command line --- */
+
+static bool read_seconds(const char *text, double *out)
+{
+    char *end = NULL;
+    *out = strtod(text, &end);
+    return end != text && *end == '\0' && *out > 0.0 && *out < FOR_MAX_S;
+}
+
+static bool read_hz(const char *text, unsigned *out)
+{
+    char *end = NULL;
+    const unsigned long value = strtoul(text, &end, 10);
+    *out = (unsigned)value;
+    return end != text && *end == '\0' && value >= 1 && value <= 50;
+}
+
+/* Takes an option; returns what is wrong with it, NULL if nothing is. */
+static const char *take_option(ctl_t *self, int option)
+{
+    switch (option) {
+    case OPTION_JSON:
+        self->is_json = true;
+        break;
+    case OPTION_SOCKET:
+        self->socket = optarg;
+        break;
+    case OPTION_FOR:
+        return read_seconds(optarg, &self->for_s) ? NULL : "--for needs a number of seconds above 0";
+    case OPTION_HZ:
+        return read_hz(optarg, &self->hz) ? NULL : "--hz needs a whole number from 1 to 50";
+    case OPTION_HELP:
+        self->command = "help";
+        break;
+    case OPTION_VERSION:
+        self->command = "version";
+        break;
+    default: /* getopt's own values: '?' and ':' */
+        return option == ':' ? "an option needs a value" : "unknown option";
+    }
+    return NULL;
+}
+
+static const char *take_options(ctl_t *self, int argc, char **argv)
+{
+    static const struct option k_options[] = {{"json", no_argument, NULL, OPTION_JSON},
+                                              {"socket", required_argument, NULL, OPTION_SOCKET},
+                                              {"for", required_argument, NULL, OPTION_FOR},
+                                              {"hz", required_argument, NULL, OPTION_HZ},
+                                              {"help", no_argument, NULL, OPTION_HELP},
+                                              {"version", no_argument, NULL, OPTION_VERSION},
+                                              {NULL, 0, NULL, 0}};
+    opterr = 0;
+    for (;;) {
+        const int option = getopt_long(argc, argv, ":", k_options, NULL);
+        if (option < 0) {
+            return NULL;
+        }
+        const char *wrong = take_option(self, option);
+        if (wrong != NULL) {
+            return wrong;
+        }
+    }
+}
+
+static const char *take_command(ctl_t *self, int argc, char **argv)
+{
+    if (optind + 1 != argc) {
+        return "one command is needed: status, watch, engage, hold, resume, park, reset or shutdown";
+    }
+    for (size_t i = 0; i < sizeof k_commands / sizeof k_commands[0]; i++) {
+        if (strcmp(argv[optind], k_commands[i]) == 0) {
+            self->command = k_commands[i];
+            return NULL;
+        }
+    }
+    return "unknown command; status, watch, engage, hold, resume, park, reset and shutdown are allowed";
+}
+
+int main(int argc, char **argv)
+{
+    static ctl_t ctl;
+    const char *environment = getenv("HEAVE_SOCKET");
+    ctl.socket = environment != NULL && environment[0] != '\0' ? environment : DEFAULT_SOCKET;
+    (void)setlocale(LC_CTYPE, "");
+    const char *wrong = take_options(&ctl, argc, argv);
+    if (wrong == NULL && ctl.command != NULL) {
+        printf("%s", strcmp(ctl.command, "help") == 0 ? k_help : "heavectl " HEAVE_VERSION "\n");
+        return EXIT_DONE;
+    }
+    wrong = wrong == NULL ? take_command(&ctl, argc, argv) : wrong;
+    if (wrong != NULL) {
+        return complain(EXIT_BAD_USAGE, "%s; see heavectl --help", wrong);
+    }
+    const int code = open_link(&ctl);
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    return strcmp(ctl.command, "watch") == 0 ? watch(&ctl) : ask(&ctl);
+}

@@ -1,0 +1,322 @@
+/* SPDX-License-Identifier: MIT
+ * live.c - the service thread: signals, control socket, log, recording and trace; see live.h.
+ * After the start nothing here allocates: what would (stdio, time zones) is not used.
+ */
+#include "live.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/signalfd.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "control.h"
+#include "linux_clock.h"
+#include "linux_log.h"
+#include "linux_udp.h"
+#include "motion_loop.h"
+#include "out_file.h"
+#include "record.h"
+#include "say.h"
+
+#define TICK_MS          10
+#define UDP_BUFFER_BYTES 131072 /* a few cycles of the densest stream: what waits longer is old */
+#define QUIT_WAIT_MS     1000
+#define FIRST_CYCLE_US   500000u
+#define END_WAIT_US      2000000u
+
+/** Everything of a live run. Large: from the heap, at the start. */
+typedef struct {
+    motion_loop_t loop;
+    control_t control;
+    linux_udp_t udp;
+    linux_log_t log;
+    int signal_fd;
+    bool is_thread_running;
+    unsigned signals; /**< requests to end so far */
+    const options_t *options;
+    record_writer_t writer;
+    out_file_t record;
+    out_file_t trace;
+} live_t;
+
+/* --- Files --- */
+
+static void write_records(live_t *self)
+{
+    record_t record;
+    char line[RECORD_LINE_MAX];
+    while (out_file_has_room(&self->record, sizeof line)) {
+        const size_t length = ring_pop(&self->loop.record, &record, sizeof record);
+        if (length == 0) {
+            return;
+        }
+        out_file_write(&self->record, line, record_writer_line(&self->writer, &record, length - sizeof record.head, line));
+    }
+}
+
+static void write_rows(live_t *self)
+{
+    trace_row_t row;
+    char line[TRACE_LINE_MAX];
+    while (out_file_has_room(&self->trace, sizeof line) && ring_pop(&self->loop.trace, &row, sizeof row) > 0) {
+        out_file_write(&self->trace, line, trace_format(&row, line));
+    }
+}
+
+/* What fits into the buffers, and as much of that as the files take. What has to wait stays in the rings, which count what they
+ * cannot hold. */
+static void write_files(live_t *self)
+{
+    out_file_flush(&self->record);
+    write_records(self);
+    out_file_flush(&self->record);
+    out_file_flush(&self->trace);
+    write_rows(self);
+    out_file_flush(&self->trace);
+    self->control.lost.record_lines = ring_dropped(&self->loop.record);
+    self->control.lost.trace_rows = ring_dropped(&self->loop.trace);
+    self->control.lost.log_lines = hal_log_dropped(linux_log_hal(&self->log));
+}
+
+static bool open_file(out_file_t *file, const char *path, bool *is_used)
+{
+    file->fd = -1;
+    *is_used = path != NULL;
+    return path == NULL || out_file_open(file, path, OUT_FILE_GOES_ON);
+}
+
+static void write_record_head(live_t *self, const char *config_path)
+{
+    char line[512];
+    const time_t now = time(NULL);
+    struct tm date;
+    (void)gmtime_r(&now, &date);
+    const int length = snprintf(line, sizeof line,
+                                "; heaved %s, configuration %.300s, %04d-%02d-%02d %02d:%02d:%02d UTC\n"
+                                "; before time zero: comments, in ms since the start\n",
+                                HEAVE_VERSION, config_path, date.tm_year + 1900, date.tm_mon + 1, date.tm_mday, date.tm_hour,
+                                date.tm_min, date.tm_sec);
+    out_file_write(&self->record, line, (size_t)length);
+}
+
+static int open_files(live_t *self)
+{
+    const options_t *options = self->options;
+    if (!open_file(&self->record, options->record, &self->loop.is_recording)) {
+        return say(EXIT_NO_OUTPUT, "%s: %s", options->record, strerror(self->record.error));
+    }
+    if (!open_file(&self->trace, options->trace, &self->loop.is_tracing)) {
+        return say(EXIT_NO_OUTPUT, "%s: %s", options->trace, strerror(self->trace.error));
+    }
+    if (self->loop.is_recording) {
+        write_record_head(self, options->config);
+    }
+    if (self->loop.is_tracing) {
+        char header[TRACE_LINE_MAX];
+        out_file_write(&self->trace, header, trace_header(header));
+    }
+    return EXIT_DONE;
+}
+
+/* Closes a file at the end and says what is missing in it. */
+static int close_file(out_file_t *file, const char *path, const ring_t *ring, const char *what)
+{
+    const bool is_whole = out_file_close(file);
+    if (ring_dropped(ring) > 0) {
+        (void)say(0, "%s: %" PRIu32 " %s are missing: writing was too slow", path, ring_dropped(ring), what);
+    }
+    return is_whole ? EXIT_DONE : say(EXIT_IO, "%s: %s", path, strerror(file->error));
+}
+
+/* --- Signals --- */
+
+static bool open_signals(live_t *self)
+{
+    sigset_t set;
+    (void)signal(SIGPIPE, SIG_IGN);
+    (void)sigemptyset(&set);
+    (void)sigaddset(&set, SIGTERM);
+    (void)sigaddset(&set, SIGINT);
+    (void)sigaddset(&set, SIGHUP); /* means nothing yet, and must not end the program */
+    if (sigprocmask(SIG_BLOCK, &set, NULL) != 0) {
+        return false;
+    }
+    self->signal_fd = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
+    return self->signal_fd >= 0;
+}
+
+/* The first signal settles the platform, the second one ends at once. */
+static void take_signals(live_t *self)
+{
+    struct signalfd_siginfo info;
+    while (read(self->signal_fd, &info, sizeof info) == (ssize_t)sizeof info) {
+        if (info.ssi_signo == SIGHUP) {
+            continue;
+        }
+        self->signals++;
+        if (self->signals == 1) {
+            const motion_request_t request = {0, EVENT_SHUTDOWN};
+            (void)ring_push(&self->loop.requests, &request, sizeof request, NULL, 0);
+            (void)say(0, "shutting down: the platform settles first; once more ends at once");
+        } else {
+            motion_loop_quit(&self->loop);
+        }
+    }
+}
+
+/* --- Running --- */
+
+static uint64_t now_us(const live_t *self)
+{
+    return hal_clock_now_us(self->loop.clock);
+}
+
+static void serve_once(live_t *self)
+{
+    struct pollfd fds[CONTROL_FDS + 1];
+    control_fill(&self->control, fds);
+    fds[CONTROL_FDS] = (struct pollfd){.fd = self->signal_fd, .events = POLLIN};
+    if (poll(fds, CONTROL_FDS + 1, control_timeout_ms(&self->control, now_us(self), TICK_MS)) < 0) {
+        return; /* interrupted */
+    }
+    take_signals(self);
+    control_serve(&self->control, fds, now_us(self));
+    write_files(self);
+    (void)!linux_log_flush(&self->log); /* what does not go out now goes out later */
+}
+
+/* Until the motion thread has ended; after the second signal it gets a short while.
+ * Returns false where it did not end. */
+static bool serve(live_t *self)
+{
+    uint64_t quit_us = UINT64_MAX;
+    while (!motion_loop_has_ended(&self->loop)) {
+        serve_once(self);
+        if (self->signals > 1 && quit_us == UINT64_MAX) {
+            quit_us = now_us(self) + (uint64_t)QUIT_WAIT_MS * 1000;
+        }
+        if (now_us(self) >= quit_us) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void say_ready(const live_t *self, const config_t *config)
+{
+    (void)say(0, "version %s, %u cylinders, cycle %" PRIu32 " us, UDP %s port %u, control socket %s", HEAVE_VERSION,
+              config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u, config->settings.cycle_us, config->udp.bind,
+              (unsigned)self->udp.port, self->control.path);
+}
+
+/* The rings hold more than the buffers: what a slow reader still takes within its time. */
+static void write_all(live_t *self)
+{
+    const uint64_t until_us = now_us(self) + END_WAIT_US;
+    do {
+        write_files(self);
+    } while ((!ring_is_empty(&self->loop.record) || !ring_is_empty(&self->loop.trace)) && now_us(self) < until_us);
+}
+
+static int finish(live_t *self)
+{
+    control_serve(&self->control, (const struct pollfd[CONTROL_FDS]){{.fd = -1}}, now_us(self)); /* the last answers */
+    control_close(&self->control);
+    write_all(self);
+    (void)!linux_log_flush(&self->log);
+    int code = EXIT_DONE;
+    if (self->loop.is_recording) {
+        code = close_file(&self->record, self->options->record, &self->loop.record, "lines");
+    }
+    if (self->loop.is_tracing) {
+        const int trace_code = close_file(&self->trace, self->options->trace, &self->loop.trace, "rows");
+        code = code == EXIT_DONE ? trace_code : code;
+    }
+    return code;
+}
+
+/* Clients are served from the first cycle on. */
+static void await_first_cycle(live_t *self)
+{
+    const uint64_t until_us = now_us(self) + FIRST_CYCLE_US;
+    while (!seqlock_read(&self->loop.view, self->control.view.word) && now_us(self) < until_us) {
+        (void)!hal_clock_sleep_until_us(self->loop.clock, now_us(self) + 1000);
+    }
+}
+
+static int run(live_t *self, const config_t *config)
+{
+    if (!motion_loop_start(&self->loop)) {
+        return say(EXIT_UNAVAILABLE, "cannot start the motion thread: %s", strerror(errno));
+    }
+    self->is_thread_running = true;
+    await_first_cycle(self);
+    if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+        (void)say(0, "memory is not locked (%s): cycles may be late when memory is short", strerror(errno));
+    }
+    say_ready(self, config);
+    const bool has_ended = serve(self);
+    if (has_ended) {
+        (void)pthread_join(self->loop.thread, NULL);
+        self->is_thread_running = false;
+    }
+    const int code = finish(self);
+    if (self->signals > 1) {
+        return say(EXIT_REFUSED, "ended at once by a second signal");
+    }
+    return code;
+}
+
+/* --- Start --- */
+
+static int open_udp(live_t *self, const config_t *config)
+{
+    const linux_udp_config_t udp = {.bind = config->udp.bind, .port = config->udp.port, .receive_buffer = UDP_BUFFER_BYTES};
+    return linux_udp_open(&self->udp, &udp) == HV_OK ? EXIT_DONE : say(EXIT_UNAVAILABLE, "%s", self->udp.error_text);
+}
+
+/* What can be refused comes first: a second heaved must not empty the files of the first. */
+static int open_all(live_t *self, const config_t *config)
+{
+    const char *path = self->options->socket != NULL ? self->options->socket : config->control_socket;
+    int code = open_udp(self, config);
+    code = code == EXIT_DONE ? control_open(&self->control, path, config, &self->loop) : code;
+    code = code == EXIT_DONE ? open_files(self) : code;
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    linux_log_init(&self->log, out_file_unblocked(STDERR_FILENO));
+    record_writer_init(&self->writer, config->settings.cycle_us, config->settings.engage);
+    if (!open_signals(self)) {
+        return say(EXIT_UNAVAILABLE, "signals: %s", strerror(errno));
+    }
+    if (motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->log), linux_clock_hal()) != HV_OK) {
+        return say(EXIT_BAD_CONFIG, "this platform cannot be moved: its settled or neutral position is out of reach");
+    }
+    return EXIT_DONE;
+}
+
+int live_run(const config_t *config, const options_t *options)
+{
+    live_t *self = calloc(1, sizeof *self);
+    if (self == NULL) {
+        return say(EXIT_UNAVAILABLE, "no memory");
+    }
+    self->options = options;
+    self->control.fd = -1;
+    self->udp.fd = -1;
+    int code = open_all(self, config);
+    code = code == EXIT_DONE ? run(self, config) : code;
+    control_close(&self->control);
+    if (!self->is_thread_running) { /* a stuck one may still use all this: the end of the process gives it back */
+        linux_udp_close(&self->udp);
+        free(self);
+    }
+    return code;
+}

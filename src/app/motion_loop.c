@@ -1,0 +1,187 @@
+/* SPDX-License-Identifier: MIT
+ * motion_loop.c - the motion thread; see motion_loop.h.
+ */
+#include "motion_loop.h"
+
+#include <errno.h>
+#include <sched.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "record.h"
+
+#define PRIORITY           80 /* above threaded interrupts, which have 50 */
+#define STACK_BYTES        (512u * 1024u)
+#define STACK_TOUCH        (128u * 1024u)
+#define PAGE_BYTES         4096u
+#define REQUESTS_PER_CYCLE 4u
+
+hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_udp_t udp, hal_log_t log, hal_clock_t clock)
+{
+    self->clock = clock;
+    seqlock_init(&self->view, self->view_word, MOTION_VIEW_WORDS);
+    ring_init(&self->requests, self->request_bytes, sizeof self->request_bytes);
+    ring_init(&self->results, self->result_bytes, sizeof self->result_bytes);
+    ring_init(&self->record, self->record_bytes, sizeof self->record_bytes);
+    ring_init(&self->trace, self->trace_bytes, sizeof self->trace_bytes);
+    self->tap = (udp_tap_t){.behind = udp,
+                            .allow = &config->udp.allow,
+                            .record = self->is_recording ? &self->record : NULL,
+                            .now_us = &self->session.now_us};
+    self->io = (gateway_io_t){.udp = udp_tap_hal(&self->tap), .log = log};
+    const hv_status_t status = rig_open(&self->rig, config, &self->io);
+    return status == HV_OK ? session_init(&self->session, &config->settings, &self->io) : status;
+}
+
+/* --- Hand-overs --- */
+
+static void note(motion_loop_t *self, record_kind_t kind, uint32_t value)
+{
+    if (self->is_recording) {
+        record_push(&self->record, kind, self->session.now_us, value, NULL, 0);
+    }
+}
+
+/* Requests that wait, in order, before the cycle.
+ * Returns how many; their results are complete after the cycle. */
+static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE])
+{
+    unsigned count = 0;
+    motion_request_t request;
+    while (count < REQUESTS_PER_CYCLE && ring_pop(&self->requests, &request, sizeof request) > 0) {
+        const event_t event = (event_t)request.event;
+        note(self, RECORD_REQUEST, request.event);
+        self->current.view.is_shutting_down |= event == EVENT_SHUTDOWN;
+        result[count].id = request.id;
+        result[count].status = gateway_request(&self->session.gateway, event, self->session.now_us);
+        count++;
+    }
+    return count;
+}
+
+static void answer_requests(motion_loop_t *self, motion_result_t *result, unsigned count)
+{
+    for (unsigned i = 0; i < count; i++) {
+        result[i].snapshot = *gateway_snapshot(&self->session.gateway);
+        result[i].is_shutting_down = self->current.view.is_shutting_down;
+        (void)ring_push(&self->results, &result[i], sizeof result[i], NULL, 0);
+    }
+}
+
+static void publish(motion_loop_t *self, uint64_t late_us)
+{
+    motion_view_t *view = &self->current.view;
+    view->snapshot = *gateway_snapshot(&self->session.gateway);
+    view->wakes++;
+    view->wake_sum_us += late_us;
+    view->wake_max_us = late_us > view->wake_max_us ? late_us : view->wake_max_us;
+    view->udp_refused = self->tap.refused;
+    (void)!hal_udp_dropped(self->tap.behind, &view->udp_dropped);
+    seqlock_write(&self->view, self->current.word);
+}
+
+/* What a recording and a trace need of the cycle that has just run. */
+static void write_down(motion_loop_t *self, bool is_zero)
+{
+    const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
+    if (self->is_recording && snapshot->is_estop_active != self->was_estop) {
+        record_push(&self->record, RECORD_ESTOP, snapshot->now_us, snapshot->is_estop_active, NULL, 0);
+    }
+    self->was_estop = snapshot->is_estop_active;
+    if (self->is_recording && is_zero) {
+        record_push(&self->record, RECORD_ZERO, snapshot->now_us, (uint32_t)snapshot->goal, NULL, 0);
+    }
+    if (self->is_tracing && self->session.has_zero) {
+        trace_row_t row;
+        session_row(&self->session, &row);
+        (void)ring_push(&self->trace, &row, sizeof row, NULL, 0);
+    }
+}
+
+/* --- The thread --- */
+
+static void run_cycle(motion_loop_t *self, uint64_t late_us)
+{
+    motion_result_t result[REQUESTS_PER_CYCLE];
+    const uint32_t skipped = (uint32_t)(late_us / self->session.cycle_us);
+    if (skipped > 0) {
+        note(self, RECORD_LATE, skipped);
+        gateway_note_late(&self->session.gateway, skipped);
+    }
+    const unsigned requests = take_requests(self, result);
+    const bool is_zero = session_cycle(&self->session);
+    write_down(self, is_zero);
+    publish(self, late_us);
+    answer_requests(self, result, requests);
+}
+
+/* Cycle after cycle until the end; deadlines are absolute, so that nothing adds up. */
+static void run(motion_loop_t *self)
+{
+    const uint64_t cycle_us = self->session.cycle_us;
+    uint64_t deadline_us = hal_clock_now_us(self->clock) + cycle_us;
+    while (!gateway_is_finished(&self->session.gateway)) {
+        if (hal_clock_sleep_until_us(self->clock, deadline_us) != HV_OK) {
+            break;
+        }
+        const uint64_t now_us = hal_clock_now_us(self->clock);
+        const uint64_t late_us = now_us > deadline_us ? now_us - deadline_us : 0;
+        if (__atomic_load_n(&self->is_quit, __ATOMIC_ACQUIRE) != 0) {
+            (void)!drives_request(self->io.drives, DRIVES_QUICK_STOP);
+            break;
+        }
+        run_cycle(self, late_us);
+        deadline_us += cycle_us * (1 + late_us / cycle_us);
+    }
+}
+
+/* Pages of the stack are there before the first cycle needs them. */
+static __attribute__((noinline)) void touch_stack(void)
+{
+    volatile uint8_t page[STACK_TOUCH];
+    for (size_t i = 0; i < sizeof page; i += PAGE_BYTES) {
+        page[i] = 0;
+    }
+}
+
+static void ask_for_priority(motion_loop_t *self)
+{
+    const struct sched_param parameters = {.sched_priority = PRIORITY};
+    const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+    self->current.view.is_realtime = error == 0;
+    if (error != 0) {
+        hal_log_write(self->io.log, HAL_LOG_NOTICE,
+                      "no real-time priority (SCHED_FIFO is not permitted): cycles may be late on a busy machine");
+    }
+}
+
+static void *motion_thread(void *argument)
+{
+    motion_loop_t *self = argument;
+    touch_stack();
+    ask_for_priority(self);
+    run(self);
+    __atomic_store_n(&self->is_ended, 1, __ATOMIC_RELEASE);
+    return NULL;
+}
+
+bool motion_loop_start(motion_loop_t *self)
+{
+    pthread_attr_t attributes;
+    (void)pthread_attr_init(&attributes);
+    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES);
+    const int error = pthread_create(&self->thread, &attributes, motion_thread, self);
+    (void)pthread_attr_destroy(&attributes);
+    errno = error;
+    return error == 0;
+}
+
+void motion_loop_quit(motion_loop_t *self)
+{
+    __atomic_store_n(&self->is_quit, 1, __ATOMIC_RELEASE);
+}
+
+bool motion_loop_has_ended(const motion_loop_t *self)
+{
+    return __atomic_load_n(&self->is_ended, __ATOMIC_ACQUIRE) != 0;
+}

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: MIT
+ * motion_loop.h - the motion thread: wakes up once per cycle, runs the gateway, hands everything slow over to others.
+ * Nothing here allocates or waits for another thread. Cycles that are late are skipped and counted, never caught up.
+ */
+#ifndef HEAVE_APP_MOTION_LOOP_H
+#define HEAVE_APP_MOTION_LOOP_H
+
+#include <pthread.h>
+
+#include "config.h"
+#include "heave/hal/clock.h"
+#include "rig.h"
+#include "ring.h"
+#include "seqlock.h"
+#include "session.h"
+#include "udp_tap.h"
+
+/** What the service thread sees: the newest cycle and how punctual it was. */
+typedef struct {
+    snapshot_t snapshot;
+    uint64_t wakes;       /**< cycles executed */
+    uint64_t wake_sum_us; /**< of their lateness, for a mean */
+    uint64_t wake_max_us;
+    uint32_t udp_refused; /**< datagrams of senders that are not allowed */
+    uint32_t udp_dropped; /**< datagrams the kernel lost because its queue was full */
+    bool is_realtime;     /**< scheduled before everything else */
+    bool is_shutting_down;
+} motion_view_t;
+
+#define MOTION_VIEW_WORDS ((sizeof(motion_view_t) + 7u) / 8u)
+
+/** A view with the size that the hand-over wants. */
+typedef union {
+    motion_view_t view;
+    uint64_t word[MOTION_VIEW_WORDS];
+} motion_view_words_t;
+
+/** An operator's request on its way to the motion thread. */
+typedef struct {
+    uint32_t id; /**< the asking side's */
+    uint32_t event;
+} motion_request_t;
+
+/** What became of it, after the cycle that took it. */
+typedef struct {
+    uint32_t id;
+    int32_t status; /**< hv_status_t */
+    snapshot_t snapshot;
+    bool is_shutting_down;
+} motion_result_t;
+
+#define MOTION_REQUEST_BYTES 1024u
+#define MOTION_RESULT_BYTES  32768u
+#define MOTION_RECORD_BYTES  (1u << 21)
+#define MOTION_TRACE_BYTES   (1u << 21)
+
+/** The thread and all it hands over. Large: from the heap, at the start. */
+typedef struct {
+    session_t session;
+    rig_t rig;
+    gateway_io_t io;
+    udp_tap_t tap;
+    hal_clock_t clock;
+    bool is_recording;
+    bool is_tracing;
+
+    seqlock_t view;    /**< motion_view_t to the service thread */
+    ring_t requests;   /**< motion_request_t from it */
+    ring_t results;    /**< motion_result_t to it */
+    ring_t record;     /**< record_t to it */
+    ring_t trace;      /**< trace_row_t to it */
+    uint32_t is_quit;  /**< atomic: the service thread wants an end at once */
+    uint32_t is_ended; /**< atomic: the thread has done its last cycle */
+    pthread_t thread;
+
+    motion_view_words_t current; /**< private to the motion thread */
+    bool was_estop;
+    uint64_t view_word[MOTION_VIEW_WORDS];
+    uint8_t request_bytes[MOTION_REQUEST_BYTES];
+    uint8_t result_bytes[MOTION_RESULT_BYTES];
+    uint8_t record_bytes[MOTION_RECORD_BYTES];
+    uint8_t trace_bytes[MOTION_TRACE_BYTES];
+} motion_loop_t;
+
+/** Prepares everything; starts no thread.
+ *  @param config kept
+ *  @return HV_OK; what rig_open or gateway_init return */
+hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_udp_t udp, hal_log_t log,
+                             hal_clock_t clock) HV_MUST_CHECK;
+
+/** Starts the thread. It ends by itself when a shutdown has ended, or on motion_loop_quit().
+ *  @return false: errno says why */
+bool motion_loop_start(motion_loop_t *self);
+
+/** Ends the thread after a quick stop of the drives, within a cycle. Any thread. */
+void motion_loop_quit(motion_loop_t *self);
+
+/** True once the thread has done its last cycle. Any thread. */
+bool motion_loop_has_ended(const motion_loop_t *self);
+
+#endif

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: MIT
+ * operator.h - what an operator can ask for: names of requests, and why one was refused. Pure.
+ */
+#ifndef HEAVE_APP_OPERATOR_H
+#define HEAVE_APP_OPERATOR_H
+
+#include "heave/telemetry.h"
+
+/** Requests that travel to the motion thread. */
+#define OPERATOR_REQUESTS 6u
+extern const event_t operator_requests[OPERATOR_REQUESTS];
+
+/** @return EVENTS where the name is no request */
+event_t operator_request_find(const char *name);
+
+/** Why a request was refused, and what would be possible.
+ *  @param is_shutting_down a shutdown was asked for
+ *  @return length without NUL; cut to fit */
+size_t operator_explain(event_t request, const snapshot_t *snapshot, bool is_shutting_down, char *text, size_t capacity);
+
+#endif

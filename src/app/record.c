@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: MIT
+ * record.c - recordings; see record.h.
+ */
+#include "record.h"
+
+#include "decimal.h"
+
+void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value, const uint8_t *bytes, size_t length)
+{
+    const record_head_t head = {t_us, value, (uint32_t)kind};
+    (void)ring_push(ring, &head, sizeof head, bytes, length);
+}
+
+void record_writer_init(record_writer_t *self, uint32_t cycle_us, engage_policy_t engage)
+{
+    *self = (record_writer_t){.cycle_us = cycle_us, .goal = engage == ENGAGE_AUTO ? STATE_ENGAGED : STATE_SETTLED};
+}
+
+/* Bytes that would be read as something else, or not at all: a `!` in front, blanks at both ends. */
+static bool is_plain(const uint8_t *bytes, size_t length, size_t i)
+{
+    const uint8_t byte = bytes[i];
+    const bool is_end = i == 0 || i + 1 == length;
+    return byte > ' ' && byte <= '~' ? byte != '\\' && !(i == 0 && byte == '!') : byte == ' ' && !is_end;
+}
+
+static size_t put_byte(char *to, const uint8_t *bytes, size_t length, size_t i)
+{
+    if (is_plain(bytes, length, i)) {
+        to[0] = (char)bytes[i];
+        return 1;
+    }
+    switch (bytes[i]) {
+    case '\n':
+        return decimal_put_text(to, "\\n");
+    case '\r':
+        return decimal_put_text(to, "\\r");
+    case '\\':
+        return decimal_put_text(to, "\\\\");
+    default: /* a byte, not an enum */
+        to[0] = '\\';
+        to[1] = 'x';
+        return 2 + decimal_put_hex(&to[2], bytes[i], 2);
+    }
+}
+
+static size_t put_datagram(char *to, const uint8_t *bytes, size_t length)
+{
+    size_t at = 0;
+    for (size_t i = 0; i < length; i++) {
+        at += put_byte(&to[at], bytes, length, i);
+    }
+    return at;
+}
+
+static size_t put_number(char *to, const char *before, uint32_t number, const char *after)
+{
+    size_t at = decimal_put_text(to, before);
+    at += decimal_put_u64(&to[at], number);
+    return at + decimal_put_text(&to[at], after);
+}
+
+static size_t put_request(char *to, event_t request)
+{
+    const size_t at = decimal_put_text(to, "!");
+    return at + decimal_put_text(&to[at], event_name(request));
+}
+
+/* What a record says, behind its time. */
+static size_t put_content(char *to, const record_t *record, size_t length)
+{
+    switch ((record_kind_t)record->head.kind) {
+    case RECORD_DATAGRAM:
+        return length > 0 ? put_datagram(to, record->bytes, length) : decimal_put_text(to, "empty datagram");
+    case RECORD_OVERSIZE:
+        return put_number(to, "datagram of ", record->head.value, " bytes, too long");
+    case RECORD_REQUEST:
+        return put_request(to, (event_t)record->head.value);
+    case RECORD_ESTOP:
+        return decimal_put_text(to, record->head.value != 0 ? "!estop on" : "!estop off");
+    case RECORD_LATE:
+        return put_number(to, "!late ", record->head.value, "");
+    case RECORD_ZERO:
+        break;
+    }
+    return 0;
+}
+
+/* What brings an offline run, which starts with its own goal, to the goal of this one. */
+static size_t put_zero(const record_writer_t *self, state_t goal, char *to)
+{
+    size_t at = decimal_put_text(to, "; time zero: SETTLED\n");
+    if (goal == self->goal) {
+        return at;
+    }
+    at += decimal_put_ms(&to[at], self->cycle_us);
+    at += decimal_put_text(&to[at], " ");
+    at += put_request(&to[at], goal == STATE_OFF ? EVENT_SHUTDOWN : goal == STATE_SETTLED ? EVENT_PARK : EVENT_ENGAGE);
+    return at + decimal_put_text(&to[at], "\n");
+}
+
+/* Records that frames files have no line for. */
+static bool is_comment(const record_t *record, size_t length)
+{
+    return record->head.kind == RECORD_OVERSIZE || (record->head.kind == RECORD_DATAGRAM && length == 0);
+}
+
+size_t record_writer_line(record_writer_t *self, const record_t *record, size_t length, char to[RECORD_LINE_MAX])
+{
+    if (record->head.kind == RECORD_ZERO) {
+        self->has_zero = true;
+        self->zero_us = record->head.t_us;
+        return put_zero(self, (state_t)record->head.value, to);
+    }
+    size_t at = self->has_zero && !is_comment(record, length) ? 0 : decimal_put_text(to, "; ");
+    at += decimal_put_ms(&to[at], record->head.t_us - self->zero_us);
+    at += decimal_put_text(&to[at], " ");
+    at += put_content(&to[at], record, length);
+    return at + decimal_put_text(&to[at], "\n");
+}

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT
+ * record.h - what happened from outside while running live: as records of the motion thread, then as lines of a frames file.
+ * The lines play back to the same set-points (frames.h reads them). Time zero is the cycle that first shows SETTLED; what came
+ * before it becomes comments.
+ */
+#ifndef HEAVE_APP_RECORD_H
+#define HEAVE_APP_RECORD_H
+
+#include "heave/gateway.h"
+#include "ring.h"
+
+/** What happened. */
+typedef enum {
+    RECORD_DATAGRAM,
+    RECORD_OVERSIZE, /**< a datagram longer than the gateway takes; value: its length */
+    RECORD_REQUEST,  /**< value: event_t */
+    RECORD_ESTOP,    /**< value: 1 on, 0 off */
+    RECORD_LATE,     /**< value: cycles */
+    RECORD_ZERO      /**< time zero; value: the goal, state_t */
+} record_kind_t;
+
+/** What stands before the bytes of a datagram. */
+typedef struct {
+    uint64_t t_us; /**< of the cycle, since the start of the program */
+    uint32_t value;
+    uint32_t kind;
+} record_head_t;
+
+/** A record as it comes out of the ring. */
+typedef struct {
+    record_head_t head;
+    uint8_t bytes[GATEWAY_DATAGRAM_MAX];
+} record_t;
+
+/** Bytes that hold every line. */
+#define RECORD_LINE_MAX (4u * GATEWAY_DATAGRAM_MAX + 128u)
+
+/** Turns records into lines. */
+typedef struct {
+    uint32_t cycle_us;
+    state_t goal; /**< that an offline run has at time zero */
+    bool has_zero;
+    uint64_t zero_us;
+} record_writer_t;
+
+/** Hands a record over; bytes may be NULL where length is 0. */
+void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value, const uint8_t *bytes, size_t length);
+
+/** @param engage the platform's policy: it decides what an offline run does by itself */
+void record_writer_init(record_writer_t *self, uint32_t cycle_us, engage_policy_t engage);
+
+/** Turns the next record into a line.
+ *  @param length of the bytes
+ *  @return bytes written, with the newline; 0: nothing to write */
+size_t record_writer_line(record_writer_t *self, const record_t *record, size_t length, char to[RECORD_LINE_MAX]);
+
+#endif

@@ -1,0 +1,81 @@
+/* SPDX-License-Identifier: MIT
+ * rig.c - the devices of a configuration; see rig.h.
+ */
+#include "rig.h"
+
+#define ANGLE_TRAVEL_DEG 1000000 /* a rotation motor has no stops of its own */
+
+static void describe_cylinder(sim_drive_config_t *self, const config_t *config, unsigned i)
+{
+    const q16_t asked_q16 = config->sim.start_extension_mm_q16;
+    const q16_t start_q16 = asked_q16 == CONFIG_NONE ? config->settings.settled_extension_mm_q16 : asked_q16;
+    *self = (sim_drive_config_t){
+        .travel_max_q32 = q32_from_q16(config->settings.stroke_mm_q16[i]),
+        .start_q32 = q32_from_q16(start_q16),
+        .time_constant_us = config->sim.lag_ms * 1000,
+        .enable_us = config->sim.enable_delay_ms * 1000,
+        .homing_per_s_q32 = q32_from_q16(config->settings.engage_speed_mm_s_q16),
+        .is_homed = config->sim.is_homed,
+    };
+    if (!self->is_homed) {
+        self->unhomed_offset_q32 = -self->start_q32; /* it counts from where it was switched on */
+    }
+}
+
+static void describe_angle(sim_drive_config_t *self, const config_t *config)
+{
+    *self = (sim_drive_config_t){
+        .travel_min_q32 = q32_from_int(-ANGLE_TRAVEL_DEG),
+        .travel_max_q32 = q32_from_int(ANGLE_TRAVEL_DEG),
+        .time_constant_us = config->sim.lag_ms * 1000,
+        .enable_us = config->sim.enable_delay_ms * 1000,
+        .is_homed = config->sim.is_homed,
+    };
+}
+
+/* Describes every axis and tells how many there are. */
+static uint8_t describe(rig_t *self, const config_t *config)
+{
+    const uint8_t cylinders = config->settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
+    for (unsigned i = 0; i < cylinders; i++) {
+        describe_cylinder(&self->sim_axis[i], config, i);
+    }
+    describe_angle(&self->sim_axis[cylinders], config);
+    return (uint8_t)(cylinders + (config->settings.has_angle ? 1 : 0));
+}
+
+static uint32_t inputs_present(const config_inputs_t *inputs)
+{
+    return (inputs->estop_line != CONFIG_NONE ? INPUT_ESTOP : 0u) | (inputs->enable_line != CONFIG_NONE ? INPUT_ENABLE : 0u) |
+           (inputs->reset_line != CONFIG_NONE ? INPUT_RESET : 0u);
+}
+
+static hv_status_t open_sim(rig_t *self, const config_t *config, uint8_t axes, uint32_t inputs, gateway_io_t *io)
+{
+    sim_relays_init(&self->sim_relays, config->settings.relay_count);
+    sim_inputs_init(&self->sim_inputs, inputs);
+    io->drives = sim_drives_hal(&self->sim_drives);
+    io->relays = sim_relays_hal(&self->sim_relays);
+    io->inputs = sim_inputs_hal(&self->sim_inputs);
+    return sim_drives_init(&self->sim_drives, axes, self->sim_axis, NULL, 0);
+}
+
+hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io)
+{
+    const uint8_t axes = describe(self, config);
+    return open_sim(self, config, axes, inputs_present(&config->inputs), io);
+}
+
+hv_status_t rig_open_settled(rig_t *self, const config_t *config, gateway_io_t *io)
+{
+    const uint8_t axes = describe(self, config);
+    for (unsigned i = 0; i < axes; i++) {
+        sim_drive_config_t *axis = &self->sim_axis[i];
+        const bool is_cylinder = i < (config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u);
+        axis->start_q32 = is_cylinder ? q32_from_q16(config->settings.settled_extension_mm_q16) : 0;
+        axis->unhomed_offset_q32 = 0;
+        axis->is_homed = true;
+        axis->is_enabled = true;
+    }
+    return open_sim(self, config, axes, inputs_present(&config->inputs) | INPUT_ESTOP, io);
+}

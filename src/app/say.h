@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: MIT
+ * say.h - one line to the person in front of the program, and the program's exit codes.
+ */
+#ifndef HEAVE_APP_SAY_H
+#define HEAVE_APP_SAY_H
+
+/** Exit codes, with the numbers of sysexits.h. */
+enum {
+    EXIT_DONE = 0,
+    EXIT_REFUSED = 1, /**< heavectl: heaved said no; heaved: ended by a second signal */
+    EXIT_BAD_USAGE = 64,
+    EXIT_BAD_DATA = 65,
+    EXIT_NO_INPUT = 66,
+    EXIT_UNAVAILABLE = 69, /**< a device, a port or the daemon */
+    EXIT_SOFTWARE = 70,
+    EXIT_NO_OUTPUT = 73,
+    EXIT_IO = 74,
+    EXIT_BAD_CONFIG = 78
+};
+
+/** Prints `heaved: ` and a line to standard error, in one piece. No allocation.
+ *  @return code, so that a caller can report and return at once */
+int say(int code, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+#endif

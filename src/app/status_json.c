@@ -1,0 +1,208 @@
+/* SPDX-License-Identifier: MIT
+ * status_json.c - the status as JSON; see status_json.h.
+ */
+#include "status_json.h"
+
+#include "decimal.h"
+#include "heave/motion.h" // MOTION_CLAMPED and its kin
+
+static const char *const k_pose_keys[POSE_AXES] = {"roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm"};
+
+static const char *const k_drive_states[] = {
+    [DRIVE_OFFLINE] = "offline", [DRIVE_DISABLED] = "disabled", [DRIVE_ENABLING] = "enabling",
+    [DRIVE_ENABLED] = "enabled", [DRIVE_HOMING] = "homing",     [DRIVE_FAULT] = "fault",
+};
+
+static const struct {
+    unsigned flag;
+    const char *word;
+} k_flags[] = {
+    {MOTION_CLAMPED, "clamped"},     {MOTION_SPEED, "speed"},       {MOTION_ACCEL, "accel"},
+    {MOTION_STRETCHED, "stretched"}, {MOTION_TAKEOVER, "takeover"}, {MOTION_IN_CYLINDERS, "cylinders"},
+    {MOTION_OFF_PATH, "off-path"},   {MOTION_NO_POSE, "no-pose"},
+};
+
+static void write_pose(json_t *json, const char *key, const pose_t *pose)
+{
+    json_open(json, key, '{');
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        json_q32(json, k_pose_keys[i], pose->axis_q32[i]);
+    }
+    json_close(json, '}');
+}
+
+static void write_state(json_t *json, const snapshot_t *s, bool is_shutting_down)
+{
+    json_text(json, "state", state_name(s->state));
+    json_text(json, "goal", state_name(s->goal));
+    json_bool(json, "held_by_silence", s->is_held_by_silence);
+    json_bool(json, "estop_active", s->is_estop_active);
+    json_bool(json, "shutting_down", is_shutting_down);
+    json_open(json, "fault", '{');
+    json_number(json, "code", (uint64_t)s->fault.code);
+    json_text(json, "name", fault_name(s->fault.code));
+    json_number(json, "axis", s->fault.axis);
+    json_number(json, "device_code", s->fault.device_code);
+    json_ms(json, "at_ms", s->fault.at_us);
+    json_close(json, '}');
+}
+
+static void write_poses(json_t *json, const snapshot_t *s)
+{
+    write_pose(json, "pose_asked", &s->asked);
+    write_pose(json, "pose_sent", &s->sent);
+    if (s->has_actual_pose) {
+        write_pose(json, "pose_actual", &s->actual);
+    } else {
+        json_null(json, "pose_actual");
+    }
+}
+
+/* Members that every axis has; unit is "mm" or "deg" in the keys. */
+static void write_axis(json_t *json, const snapshot_t *s, unsigned axis, q32_t sent_q32, const char *sent_key,
+                       const char *actual_key)
+{
+    const drive_feedback_t *drive = &s->drive[axis];
+    json_q32(json, sent_key, sent_q32);
+    if (drive->has_actual) {
+        json_q32(json, actual_key, drive->actual_mm_q32);
+    } else {
+        json_null(json, actual_key);
+    }
+    json_text(json, "drive", k_drive_states[drive->state]);
+    json_bool(json, "homed", drive->is_homed);
+    json_number(json, "device_code", drive->fault_code);
+}
+
+static void write_axes(json_t *json, const snapshot_t *s, const config_t *config)
+{
+    json_open(json, "cylinders", '[');
+    for (unsigned i = 0; i < s->cylinders; i++) {
+        json_open(json, NULL, '{');
+        json_number(json, "number", i + 1);
+        json_q32(json, "stroke_mm", q32_from_q16(config->settings.stroke_mm_q16[i]));
+        write_axis(json, s, i, s->extension_mm_q32[i], "sent_mm", "actual_mm");
+        json_close(json, '}');
+    }
+    json_close(json, ']');
+    if (s->has_angle) {
+        json_open(json, "rotation", '{');
+        write_axis(json, s, s->cylinders, s->angle_deg_q32, "sent_deg", "actual_deg");
+        json_close(json, '}');
+    } else {
+        json_null(json, "rotation");
+    }
+}
+
+static void write_relays(json_t *json, const snapshot_t *s)
+{
+    char mask[5] = {0};
+    (void)decimal_put_hex(mask, s->relay_mask, 4);
+    json_open(json, "relays", '{');
+    json_number(json, "count", s->relay_count);
+    json_text(json, "mask", mask);
+    json_open(json, "on", '[');
+    for (unsigned i = 0; i < s->relay_count; i++) {
+        if ((s->relay_mask >> i & 1) != 0) {
+            json_number(json, NULL, i + 1);
+        }
+    }
+    json_close(json, ']');
+    json_close(json, '}');
+}
+
+static void write_flags(json_t *json, const snapshot_t *s)
+{
+    json_open(json, "flags", '[');
+    for (size_t i = 0; i < sizeof k_flags / sizeof k_flags[0]; i++) {
+        if ((s->flags & k_flags[i].flag) != 0) {
+            json_text(json, NULL, k_flags[i].word);
+        }
+    }
+    json_close(json, ']');
+    json_number(json, "limiting_cylinder", s->limiting_cylinder);
+}
+
+static void write_stream(json_t *json, const snapshot_t *s)
+{
+    json_open(json, "stream", '{');
+    json_ms(json, "period_ms", s->stream_period_us);
+    json_ms(json, "delay_ms", s->stream_delay_us);
+    if (s->last_frame_us != 0) {
+        json_ms(json, "last_frame_age_ms", s->now_us - s->last_frame_us);
+    } else {
+        json_null(json, "last_frame_age_ms");
+    }
+    json_close(json, '}');
+}
+
+static void write_frame_counters(json_t *json, const counters_t *c)
+{
+    json_open(json, "accepted", '{');
+    for (unsigned i = 0; i < FRAME_COMMANDS; i++) {
+        json_number(json, frame_command_name((frame_command_t)i), c->accepted[i]);
+    }
+    json_close(json, '}');
+    json_number(json, "accepted_timed", c->accepted_timed);
+    json_open(json, "rejected", '{');
+    for (unsigned i = 0; i < FRAME_ERRORS; i++) {
+        json_number(json, frame_error_name((frame_error_t)i), c->rejected[i]);
+    }
+    json_close(json, '}');
+}
+
+static void write_counters(json_t *json, const motion_view_t *view)
+{
+    const counters_t *c = &view->snapshot.counters;
+    json_open(json, "counters", '{');
+    json_number(json, "datagrams", c->datagrams);
+    json_number(json, "oversize", c->oversize);
+    json_number(json, "receive_errors", c->receive_errors);
+    json_number(json, "refused_senders", view->udp_refused);
+    json_number(json, "lost_in_kernel", view->udp_dropped);
+    write_frame_counters(json, c);
+    json_number(json, "not_followed", c->not_followed);
+    json_number(json, "impossible", c->impossible);
+    json_number(json, "clamped", c->clamped);
+    json_number(json, "stretched", c->stretched);
+    json_number(json, "relay_missing", c->relay_missing);
+    json_number(json, "relay_errors", c->relay_errors);
+    json_number(json, "faults", c->faults);
+    json_close(json, '}');
+}
+
+static void write_program(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost)
+{
+    const uint64_t mean_us = view->wakes == 0 ? 0 : view->wake_sum_us / view->wakes;
+    json_number(json, "cycle", view->snapshot.cycle);
+    json_number(json, "cycle_us", config->settings.cycle_us);
+    json_ms(json, "uptime_ms", (view->snapshot.cycle + view->snapshot.counters.late_cycles) * config->settings.cycle_us);
+    json_number(json, "late_cycles", view->snapshot.counters.late_cycles);
+    json_open(json, "wake_latency", '{');
+    json_number(json, "mean_us", mean_us);
+    json_number(json, "max_us", view->wake_max_us);
+    json_bool(json, "realtime", view->is_realtime);
+    json_close(json, '}');
+    json_open(json, "lost", '{');
+    json_number(json, "trace_rows", lost->trace_rows);
+    json_number(json, "record_lines", lost->record_lines);
+    json_number(json, "log_lines", lost->log_lines);
+    json_close(json, '}');
+    json_text(json, "version", HEAVE_VERSION);
+}
+
+void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost)
+{
+    const snapshot_t *s = &view->snapshot;
+    json_open(json, NULL, '{');
+    json_bool(json, "ok", true);
+    write_state(json, s, view->is_shutting_down);
+    write_poses(json, s);
+    write_axes(json, s, config);
+    write_relays(json, s);
+    write_flags(json, s);
+    write_stream(json, s);
+    write_counters(json, view);
+    write_program(json, view, config, lost);
+    json_close(json, '}');
+}

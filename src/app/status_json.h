@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: MIT
+ * status_json.h - everything there is to see of a running platform, as one JSON object. Pure.
+ */
+#ifndef HEAVE_APP_STATUS_JSON_H
+#define HEAVE_APP_STATUS_JSON_H
+
+#include "json.h"
+#include "motion_loop.h"
+
+/** What the service thread adds to the motion thread's view. */
+typedef struct {
+    uint32_t trace_rows;   /**< lost because writing was too slow */
+    uint32_t record_lines; /**< likewise */
+    uint32_t log_lines;    /**< likewise */
+} status_lost_t;
+
+void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost);
+
+#endif

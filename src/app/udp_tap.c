@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: MIT
+ * udp_tap.c - allowed senders and recording; see udp_tap.h.
+ */
+#include "udp_tap.h"
+
+#include <string.h>
+
+#include "record.h"
+
+#define REFUSED_PER_CALL 64u /* a flood from a stranger does not hold the cycle up; what is left of it waits */
+
+static bool is_within(const config_network_t *network, const hal_udp_peer_t *peer)
+{
+    const unsigned bytes = network->prefix / 8u;
+    const unsigned bits = network->prefix % 8u;
+    if (network->is_ipv6 != peer->is_ipv6 || memcmp(network->address, peer->address, bytes) != 0) {
+        return false;
+    }
+    return bits == 0 || (uint8_t)(network->address[bytes] ^ peer->address[bytes]) >> (8u - bits) == 0;
+}
+
+bool udp_tap_is_allowed(const config_networks_t *allow, const hal_udp_peer_t *peer)
+{
+    for (unsigned i = 0; i < allow->count; i++) {
+        if (is_within(&allow->network[i], peer)) {
+            return true;
+        }
+    }
+    return allow->count == 0;
+}
+
+static hv_status_t tap_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
+{
+    udp_tap_t *self = ctx;
+    for (unsigned i = 0; i < REFUSED_PER_CALL; i++) {
+        const hv_status_t status = hal_udp_recv(self->behind, buffer, capacity, length, from);
+        if (status != HV_OK && status != HV_ERR_RANGE) {
+            return status;
+        }
+        if (udp_tap_is_allowed(self->allow, from)) {
+            if (self->record != NULL) {
+                const bool is_whole = status == HV_OK;
+                record_push(self->record, is_whole ? RECORD_DATAGRAM : RECORD_OVERSIZE, *self->now_us, (uint32_t)*length, buffer,
+                            is_whole ? *length : 0);
+            }
+            return status;
+        }
+        self->refused++;
+    }
+    return HV_ERR_AGAIN;
+}
+
+static hv_status_t tap_dropped(void *ctx, uint32_t *datagrams)
+{
+    udp_tap_t *self = ctx;
+    return hal_udp_dropped(self->behind, datagrams);
+}
+
+hal_udp_t udp_tap_hal(udp_tap_t *self)
+{
+    static const hal_udp_ops_t k_ops = {tap_recv, tap_dropped};
+    return (hal_udp_t){&k_ops, self};
+}

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: MIT
+ * udp_tap.h - stands between a UDP socket and the gateway: lets allowed senders through, and writes down what they sent.
+ * A backend of hal/udp.h itself. The motion thread alone uses it; it never blocks longer than the socket behind it.
+ */
+#ifndef HEAVE_APP_UDP_TAP_H
+#define HEAVE_APP_UDP_TAP_H
+
+#include "config.h"
+#include "heave/hal/udp.h"
+#include "ring.h"
+
+/** A tap; the caller owns it. */
+typedef struct {
+    hal_udp_t behind;
+    const config_networks_t *allow;
+    ring_t *record;         /**< NULL: nothing is written down */
+    const uint64_t *now_us; /**< of the running cycle */
+    uint32_t refused;       /**< out: datagrams of senders that are not allowed */
+} udp_tap_t;
+
+/** True where the address may send; an empty list lets everyone. */
+bool udp_tap_is_allowed(const config_networks_t *allow, const hal_udp_peer_t *peer);
+
+/** The tap as hal/udp.h wants it. */
+hal_udp_t udp_tap_hal(udp_tap_t *self);
+
+#endif

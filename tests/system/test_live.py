@@ -1,0 +1,421 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_live.py BIN [--guard LIB] - the daemon at work on the loopback interface: frames, operators, recordings, signals, trouble.
+
+--guard LIB: malloc_guard.c as a shared library; without it (instrumented builds) the case that needs it is skipped.
+"""
+import argparse
+import json
+import math
+import os
+import pty
+import re
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import heave
+import tap
+
+COMMANDS = ["engage", "hold", "resume", "park", "reset", "shutdown"]
+MANUAL = {"platform__engage": "manual"}
+ELSEWHERE = {"platform__engage": "manual", "sim__start_extension_mm": "61.7", "sim__homed": "no"}
+
+
+def wave(t):
+    return f"@A6:{6 * math.sin(2 * t):.3f},{5 * math.sin(1.7 * t):.3f},0,0,0,{20 * math.sin(1.3 * t):.3f},{int(10 * t) % 4096:X}#"
+
+
+# --- The platform follows, operators are answered ---
+
+def follows_frames(bench):
+    daemon = bench.start()
+    status = bench.wait_state("ENGAGED")
+    assert len(status["cylinders"]) == 6 and status["relays"]["count"] == 12 and status["rotation"] is not None
+    with bench.sender() as sender:
+        sender.send("@A7:4,-3,2,10,-20,30,45,0A05#")
+        heave.wait_for(lambda: abs(bench.status()["pose_sent"]["z_mm"] - 30) < 1e-6, "the pose is reached")
+        heave.wait_for(lambda: abs(bench.status()["rotation"]["sent_deg"] - 45) < 1e-6, "the angle is reached")
+        status = bench.status()
+        sender.send("@A7:1#")
+        sender.send("@A3T:1,1,1,100#")
+        counters = heave.wait_for(lambda: (lambda c: c if c["accepted"]["A3"] else None)(bench.status()["counters"]), "A3 is accepted")
+    expected = {"roll_deg": 4, "pitch_deg": -3, "yaw_deg": 2, "x_mm": 10, "y_mm": -20, "z_mm": 30}
+    assert all(abs(status["pose_sent"][name] - value) < 1e-6 for name, value in expected.items()), status["pose_sent"]
+    assert status["relays"]["mask"] == "0A05" and status["relays"]["on"] == [1, 3, 10, 12], status["relays"]
+    assert counters["accepted"]["A7"] == 1 and counters["accepted_timed"] == 1 and counters["rejected"]["count"] == 1, counters
+    assert bench.stop(daemon) == 0
+
+
+def every_command_answers(bench):
+    daemon = bench.start(config=bench.write_config("manual.ini", **MANUAL))
+    status = bench.status()
+    assert status["state"] == "OFF" and status["goal"] == "SETTLED", status["state"]
+    for request in ("hold", "resume", "reset"):
+        answer, code = bench.ask(request)
+        assert code == 1 and answer["ok"] is False and answer["state"] == "OFF" and answer["error"].startswith(request + ": "), answer
+        assert "possible: engage, park" in answer["error"], answer
+    for request, state, then in (("engage", "HOMING", "ENGAGED"), ("hold", "HOLD", "HOLD"), ("resume", "ENGAGED", "ENGAGED"),
+                                 ("park", "SETTLING", "SETTLED"), ("shutdown", "OFF", None)):
+        answer, code = bench.ask(request)
+        assert code == 0 and answer == {"ok": True, "state": state}, answer
+        if then:
+            bench.wait_state(then)
+    assert daemon.wait(timeout=heave.WAIT_S) == 0
+    assert not bench.socket.exists()
+
+
+def plain_answers_are_lines(bench):
+    daemon = bench.start(config=bench.write_config("manual.ini", **MANUAL))
+    run = bench.ctl("engage")
+    assert (run.returncode, run.stdout, run.stderr) == (0, "engage: HOMING\n", ""), run
+    run = bench.ctl("reset")
+    assert run.returncode == 1 and run.stdout == "" and re.fullmatch(r"heavectl: reset: there is nothing to reset in [^\n]*\n", run.stderr), run
+    table = bench.ctl("status", env={**os.environ, "LC_ALL": "C"}).stdout
+    assert all(len(line) <= 80 for line in table.splitlines()) and table.isascii() and "cylinder" in table, table
+    table = bench.ctl("status", env={**os.environ, "LC_ALL": "C.UTF-8"}).stdout
+    assert not table.isascii() and all(len(line) <= 80 for line in table.splitlines()), table
+    assert bench.stop(daemon) == 0
+
+
+def without_a_daemon(bench):
+    for command in COMMANDS + ["status", "watch"]:
+        run = bench.ctl(command)
+        assert run.returncode == 69 and re.fullmatch(r"heavectl: heaved is not running at [^\n]*--config FILE[^\n]*\n", run.stderr), run
+    for arguments in (["status", "now"], ["fly"], [], ["--for", "x", "watch"], ["--hz", "0", "watch"], ["--frobnicate", "status"]):
+        assert bench.ctl(*arguments).returncode == 64, arguments
+    assert subprocess.run([bench.bin / "heavectl", "--help"], stdout=subprocess.DEVNULL, check=False).returncode == 0
+
+
+# --- Watching ---
+
+def watches_by_line(bench):
+    daemon = bench.start()
+    run = bench.ctl("--for", "1.2", "watch")
+    assert run.returncode == 0 and 1 <= len(run.stdout.splitlines()) <= 3 and "\x1b" not in run.stdout, run
+    run = bench.ctl("--json", "--for", "1", "--hz", "50", "watch")
+    answers = [json.loads(line) for line in run.stdout.splitlines()]
+    cycles = [answer["cycle"] for answer in answers]
+    assert run.returncode == 0 and len(answers) > 5 and cycles == sorted(cycles), len(answers)
+    assert bench.stop(daemon) == 0
+
+
+def watches_on_a_terminal(bench):
+    daemon = bench.start()
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.environ["LC_ALL"] = "C.UTF-8"
+        os.execv(bench.bin / "heavectl", ["heavectl", "--socket", str(bench.socket), "watch"])
+    seen = b""
+    end = time.monotonic() + heave.WAIT_S
+    while seen.count(b"\x1b[H") < 5 and time.monotonic() < end:
+        if select.select([terminal], [], [], 0.5)[0]:
+            seen += os.read(terminal, 65536)
+    os.write(terminal, b"\x03")  # Ctrl-C
+    try:
+        while part := os.read(terminal, 65536):
+            seen += part
+    except OSError:
+        pass  # the terminal's other end is closed
+    code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    assert code == 0, code
+    assert seen.startswith(b"\x1b[?1049h") and seen.rstrip().endswith(b"\x1b[?25h\x1b[?1049l"), seen[-200:]
+    assert "█".encode() in seen and b"fault" in seen
+    assert bench.stop(daemon) == 0
+
+
+# --- Recordings ---
+
+def session(bench, daemon):
+    """Frames, operators, rejects, a stopped process."""
+    with bench.sender() as sender:
+        sender.stream(1.2, wave)
+        bench.ctl("engage")
+        bench.wait_state("ENGAGED")
+        sender.stream(1.0, wave)
+        bench.ctl("hold")
+        sender.send("nonsense \\ \"\n\x00\xff;")
+        sender.send(b"!engage")
+        sender.stream(0.3, wave)
+        bench.ctl("resume")
+        sender.send("")
+        sender.send("@A6:1,2,3,4,5,6,F0#" * 60)  # longer than a datagram may be
+        sender.stream(0.7, wave)
+        daemon.send_signal(signal.SIGSTOP)
+        time.sleep(0.05)
+        daemon.send_signal(signal.SIGCONT)
+        sender.stream(0.5, wave)
+        sender.send("@A6T:0,5,0,0,0,0,400#")
+        time.sleep(0.6)
+        bench.ctl("resume")
+        bench.ctl("park")
+        sender.stream(0.5, wave)
+        bench.ctl("engage")
+        sender.stream(0.5, wave)
+
+
+def replays_to_the_same_bytes(bench, **changes):
+    config = bench.write_config("recorded.ini", **changes)
+    record, trace = bench.folder / "record.txt", bench.folder / "live.csv"
+    daemon = bench.start("--record", record, "--trace", trace, config=config)
+    session(bench, daemon)
+    assert bench.stop(daemon) == 0
+    live, log, text = trace.read_bytes(), daemon.log.read_text(), record.read_text()
+    assert "missing" not in log, log
+    played = bench.play(record, config=config)
+    assert len(live.splitlines()) > 3000, "a live run worth the name"
+    length = min(len(live), len(played))
+    if live[:length] != played[:length]:
+        for ours, theirs in zip(live.splitlines(), played.splitlines()):
+            assert ours == theirs, f"live:   {ours}\nplayed: {theirs}"
+    states = {row["state"] for row in heave.rows_of(live)}
+    assert {"SETTLED", "RISING", "ENGAGED", "HOLD", "SETTLING", "OFF"} <= states, states
+    assert any("late" in row["flags"] for row in heave.rows_of(live)) and " !late " in text
+    assert text.startswith("; heaved ") and "!shutdown" in text and "\\x21engage" in text, text[:200]
+    assert bench.play(record, config=config) == played
+
+
+# --- The end ---
+
+def signal_settles(bench, number):
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    assert bench.stop(daemon, number) == 0
+    log = daemon.log.read_text()
+    for change in ("ENGAGED -> SETTLING", "SETTLING -> SETTLED", "SETTLED -> OFF"):
+        assert change in log, log
+    assert not bench.socket.exists()
+
+
+def second_signal_ends_at_once(bench):
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    daemon.send_signal(signal.SIGINT)
+    bench.wait_state("SETTLING")
+    assert bench.stop(daemon, signal.SIGINT) == 1
+    assert "second signal" in daemon.log.read_text() and not bench.socket.exists()
+
+
+def hangup_is_ignored(bench):
+    daemon = bench.start()
+    daemon.send_signal(signal.SIGHUP)
+    time.sleep(0.1)
+    assert bench.status()["ok"] and bench.stop(daemon) == 0
+
+
+# --- Trouble ---
+
+def refused(bench, *arguments, config=None):
+    return bench.heaved("--config", config or bench.config, *arguments)
+
+
+def port_in_use(bench):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", bench.port))
+        run = refused(bench)
+    assert run.returncode == 69 and re.fullmatch(rf"heaved: [^\n]*port {bench.port}: Address already in use\n", run.stderr), run
+    assert not bench.socket.exists()
+
+
+def socket_of_a_running_daemon(bench):
+    trace = bench.file("kept.csv", "kept")
+    daemon = bench.start()
+    run = refused(bench, "--trace", trace, config=bench.write_config("second.ini", udp__port=heave.free_port()))
+    assert run.returncode == 69 and "another heaved is running" in run.stderr and run.stderr.count("\n") == 1, run
+    assert trace.read_text() == "kept", "a refused start must not empty files"
+    assert bench.status()["ok"], "the first one still answers"
+    assert bench.stop(daemon) == 0
+
+
+def socket_of_a_dead_daemon(bench):
+    daemon = bench.start()
+    daemon.kill()
+    daemon.wait()
+    assert bench.socket.exists()
+    run = bench.ctl("status")
+    assert run.returncode == 69 and "not running" in run.stderr, run
+    assert bench.stop(bench.start()) == 0
+
+
+def path_of_something_else(bench):
+    bench.file("heaved.sock", "precious")
+    run = refused(bench)
+    assert run.returncode == 73 and "something else" in run.stderr, run
+    assert bench.socket.read_text() == "precious"
+
+
+def files_that_cannot_be_created(bench):
+    for option in ("--trace", "--record"):
+        run = refused(bench, option, "/nonexistent/file")
+        assert run.returncode == 73 and run.stderr.count("\n") == 1, run
+        assert not bench.socket.exists()
+    run = refused(bench, "--socket", "/proc/heaved.sock")
+    assert run.returncode == 73 and "--socket PATH" in run.stderr, run
+
+
+def full_disk(bench):
+    daemon = bench.start("--trace", "/dev/full")
+    bench.wait_state("ENGAGED")
+    assert bench.stop(daemon) == 74
+    assert "/dev/full: No space left" in daemon.log.read_text()
+
+
+def strangers_are_refused(bench):
+    daemon = bench.start(config=bench.write_config("allow.ini", udp__allow="10.0.0.0/8, 192.168.7.1"))
+    with bench.sender() as sender:
+        sender.stream(0.3, wave)
+    counters = heave.wait_for(lambda: (lambda c: c if c["refused_senders"] > 5 else None)(bench.status()["counters"]), "counted")
+    assert counters["datagrams"] == 0, counters
+    assert bench.stop(daemon) == 0
+
+
+def nobody_reads_standard_error(bench):
+    """Log lines into a full pipe must not keep the daemon from ending."""
+    daemon = subprocess.Popen([bench.bin / "heaved", "--config", str(bench.config)], stderr=subprocess.PIPE)
+    bench.running.append(daemon)
+    heave.wait_for(lambda: bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
+    with open(f"/proc/{daemon.pid}/fd/2", "wb", buffering=0, opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)) as pipe:
+        while pipe.write(b"x" * 4096):
+            pass  # None: it is full
+    assert bench.status()["ok"]
+    assert bench.stop(daemon) == 0
+    daemon.stderr.close()
+
+
+# --- Clients that misbehave ---
+
+class Client:
+    def __init__(self, bench):
+        self.link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.link.settimeout(heave.WAIT_S)
+        self.link.connect(str(bench.socket))
+        self.file = self.link.makefile("r")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.file.close()
+        self.link.close()
+
+    def ask(self, text):
+        self.link.sendall(text.encode())
+        return json.loads(self.file.readline())
+
+
+def odd_requests(bench):
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    with Client(bench) as client:
+        for text in ("fly\n", "\n", "STATUS\n", "watch 0\n", "watch 51\n", "watch x\n", "watcher\n", "\x00\xff\n"):
+            assert client.ask(text)["ok"] is False, text
+        assert client.ask("status\r\n")["ok"] is True
+        client.link.sendall(b"hold\nresume\nstatus\n")  # one after the other, each after the last one's answer
+        assert [json.loads(client.file.readline())["state"] for _ in range(3)] == ["HOLD", "ENGAGED", "ENGAGED"]
+        client.link.sendall(b"sta")
+        time.sleep(0.05)
+        assert client.ask("tus\n")["ok"] is True
+        assert client.ask("x" * 64)["error"] == "request too long"
+        assert client.file.readline() == "", "then it is closed"
+    with Client(bench) as client:
+        client.link.sendall(b"hold\n")
+        client.link.shutdown(socket.SHUT_WR)
+        assert json.loads(client.file.readline())["state"] == "HOLD"
+        assert client.file.readline() == ""
+    assert bench.stop(daemon) == 0
+
+
+def too_many_clients(bench):
+    daemon = bench.start()
+    clients = [Client(bench) for _ in range(8)]
+    assert all(client.ask("status\n")["ok"] for client in clients)
+    with Client(bench) as ninth:
+        assert "too many" in json.loads(ninth.file.readline())["error"]
+    for client in clients:
+        client.__exit__()
+    heave.wait_for(lambda: bench.ctl("status").returncode == 0, "there is room again")
+    assert bench.stop(daemon) == 0
+
+
+def a_client_that_does_not_read(bench):
+    daemon = bench.start()
+    with Client(bench) as client:
+        client.link.sendall(b"watch 50\n")
+        poll = select.poll()
+        poll.register(client.link, select.POLLHUP | select.POLLRDHUP)
+        heave.wait_for(lambda: poll.poll(100), "the client is dropped")
+        assert bench.status()["ok"], "others are served"
+    assert bench.stop(daemon) == 0
+
+
+# --- Memory ---
+
+def allocates_nothing(bench, guard):
+    if guard is None:
+        raise tap.Skip("instrumented build")
+    armed = bench.folder / "armed"
+    environment = {"LD_PRELOAD": guard, "HEAVE_MALLOC_GUARD": str(armed)}
+    daemon = bench.start("--record", bench.folder / "r.txt", "--trace", bench.folder / "t.csv", environment=environment)
+    armed.touch()
+    run = bench.ctl("status", env={**os.environ, **environment})
+    assert "malloc guard: malloc" in run.stderr, "the guard does not work"
+    with bench.sender() as sender, Client(bench) as watcher:
+        watcher.link.sendall(b"watch 20\n")
+        sender.stream(1.0, wave)
+        sender.send("nonsense")
+        for command in COMMANDS[:-1] + ["status", "engage"]:
+            bench.ctl(command)
+        sender.stream(0.5, wave)
+        watcher.file.readline()
+    daemon.send_signal(signal.SIGHUP)
+    assert bench.stop(daemon) == 0
+    assert "malloc guard" not in daemon.log.read_text(), daemon.log.read_text()
+
+
+CASES = {
+    "it follows frames and counts them": follows_frames,
+    "every command of heavectl has its answer": every_command_answers,
+    "answers for people are lines and an 80-column table": plain_answers_are_lines,
+    "heavectl without a daemon, or wrongly called": without_a_daemon,
+    "watch, not on a terminal": watches_by_line,
+    "watch on a terminal puts it back on Ctrl-C": watches_on_a_terminal,
+    "a recording plays back to the same bytes, engage = auto": replays_to_the_same_bytes,
+    "a recording plays back to the same bytes, engage = manual, homed from elsewhere": lambda bench: replays_to_the_same_bytes(bench, **ELSEWHERE),
+    "SIGTERM settles, switches off and ends with 0": lambda bench: signal_settles(bench, signal.SIGTERM),
+    "Ctrl-C does the same": lambda bench: signal_settles(bench, signal.SIGINT),
+    "a second signal ends at once": second_signal_ends_at_once,
+    "SIGHUP changes nothing": hangup_is_ignored,
+    "the port is in use": port_in_use,
+    "the socket belongs to a running daemon": socket_of_a_running_daemon,
+    "the socket of a dead daemon is replaced": socket_of_a_dead_daemon,
+    "something else has the socket's name": path_of_something_else,
+    "files that cannot be created": files_that_cannot_be_created,
+    "a full disk is told at the end": full_disk,
+    "senders that are not allowed are refused and counted": strangers_are_refused,
+    "nobody reads standard error": nobody_reads_standard_error,
+    "odd requests": odd_requests,
+    "the ninth client is turned away": too_many_clients,
+    "a client that does not read is dropped": a_client_that_does_not_read,
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("bin")
+    parser.add_argument("--guard")
+    parser.add_argument("--only", default="", help="run the cases whose name contains this")
+    arguments = parser.parse_args()
+    cases = {**CASES, "nothing is allocated after the start": lambda bench: allocates_nothing(bench, arguments.guard)}
+    suite = tap.Suite()
+    for name, check in cases.items():
+        if arguments.only in name:
+            with heave.Bench(arguments.bin) as bench, suite.case(name):
+                check(bench)
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
