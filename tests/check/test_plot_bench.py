@@ -1,0 +1,389 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_plot_bench.py - tools/plot and tools/bench: wrong arguments and files are refused, and what they compute is right.
+
+    test_plot_bench.py --heaved PROGRAM --bench-core PROGRAM
+
+Needs neither matplotlib nor Ruckig; what matplotlib draws is looked at where it is installed.
+"""
+import argparse
+import importlib.util
+import json
+import math
+import os
+import random
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import tap
+
+HERE = Path(__file__).resolve().parent
+TOP = HERE.parents[1]
+sys.path[:0] = [str(TOP / "tools/lib"), str(HERE)]
+import bench_analysis as analysis  # noqa: E402  the path above has to be set first
+import bench_cost  # noqa: E402
+import bench_signal as signals  # noqa: E402
+from bench_rivals import two_limits  # noqa: E402
+from frame_dots import dots_of  # noqa: E402
+from frames_file import Line  # noqa: E402
+from platform_ini import Platform  # noqa: E402
+from synthetic_trace import Trace, ini  # noqa: E402
+from trace_check import HEADER  # noqa: E402
+from trace_read import TraceError, Window, axes_named, thinned  # noqa: E402
+
+FOLDER = Path(tempfile.mkdtemp(prefix="plot_bench."))
+NANO = 10**9
+
+
+def run(tool, *arguments, **environment):
+    return subprocess.run([sys.executable, str(TOP / "tools" / tool), *map(str, arguments)], capture_output=True, text=True, check=False, cwd=FOLDER,
+                          env={**os.environ, **environment})
+
+
+def expect_refusal(result, status, *words):
+    assert result.returncode == status, f"status {result.returncode}, expected {status}: {result.stderr}"
+    assert "Traceback" not in result.stderr, result.stderr
+    for word in words:
+        assert word in result.stderr, f"{word!r} is not in: {result.stderr}"
+
+
+def expect_near(value, expected, within, what="value"):
+    assert abs(value - expected) <= within, f"{what} is {value}, expected {expected} within {within}"
+
+
+def has(module):
+    return importlib.util.find_spec(module) is not None
+
+
+def row(t_ms, z_nano=0, state="ENGAGED", flags=""):
+    zeros = "0.000000000"
+    sign, whole = "-" if z_nano < 0 else "", f"{abs(z_nano):010d}"
+    z = f"{sign}{whole[:-9]}.{whole[-9:]}"
+    return f"{t_ms:.3f},{state},{','.join([zeros] * 5)},{z},{','.join([zeros] * 7)},0000,{flags}\n"
+
+
+def window(rows, from_us=None, to_us=None):
+    return Window([HEADER + "\n", *rows], from_us, to_us)
+
+
+def write(name, text):
+    path = FOLDER / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+# ---- tools/plot ----
+def check_plot_arguments(suite):
+    trace = write("trace.csv", "".join([HEADER + "\n", *(row(t, t * t) for t in range(50))]))
+    refusals = {
+        "no trace": ((), 2, "TRACE"),
+        "three traces": ((trace, trace, trace), 2, "at most two"),
+        "an axis that does not exist": ((trace, "--axes", "roll,heave"), 2, "'heave'", "roll"),
+        "a time that is none": ((trace, "--from", "soon"), 2, "'soon'"),
+        "an end before the start": ((trace, "--from", "3", "--to", "2"), 2, "--to"),
+        "an unknown kind of picture": ((trace, "-o", "picture.bmp"), 2, ".png"),
+        "two configurations for one trace": ((trace, "--config", "a", "--config", "b"), 2, "--config"),
+        "a trace that is not there": (("nowhere.csv",), 1, "nowhere.csv"),
+        "a file that is no trace": ((write("other.csv", "a,b\n1,2\n"),), 1, "other.csv", "line 1"),
+        "a damaged row": ((write("damaged.csv", HEADER + "\n" + row(0) + row(1)[:40] + "\n"),), 1, "damaged.csv", "line 3"),
+        "an empty trace": ((write("empty.csv", HEADER + "\n"),), 1, "no row"),
+        "a time without rows": ((trace, "--from", "7"), 1, "no row"),
+        "a configuration that is none": ((trace, "--config", write("bad.ini", "nonsense\n")), 1, "bad.ini:1"),
+        "frames that are none": ((trace, "--frames", write("bad.frames", "nonsense\n")), 1, "bad.frames"),
+    }
+    for name, (arguments, status, *words) in refusals.items():
+        with suite.case(f"plot refuses {name}"):
+            expect_refusal(run("plot", *arguments), status, *words)
+    with suite.case("plot without matplotlib says how to install it"):
+        (FOLDER / "without").mkdir()
+        (FOLDER / "without/matplotlib.py").write_text("raise ImportError('not here')\n", encoding="ascii")
+        result = run("plot", trace, PYTHONPATH=str(FOLDER / "without"))
+        expect_refusal(result, 1, "apt-get install python3-matplotlib", "pip install matplotlib")
+        assert len(result.stderr.splitlines()) == 1, result.stderr
+    with suite.case("plot draws a PNG of two traces with limits, frames and requests"):
+        if not has("matplotlib"):
+            raise tap.Skip("matplotlib is not installed")
+        config = write("platform.ini", ini())
+        frames = write("fine.frames", "; a comment\n10 @A6:0,0,0,0,0,99999,0#\n20 !hold\n30 @C6T:1,2,3,4,5,6,500#\n")
+        result = run("plot", trace, trace, "--axes", "z,roll,c1", "--config", config, "--frames", frames, "-o", "two.png")
+        assert result.returncode == 0, result.stderr
+        assert (FOLDER / "two.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    with suite.case("plot and bench tell how they are used"):
+        for tool, arguments in (("plot", ("--help",)), ("bench", ("--help",)), ("bench", ("motion", "--help")), ("bench", ("cost", "--help"))):
+            result = run(tool, *arguments)
+            assert result.returncode == 0 and "usage:" in result.stdout, f"{tool} {arguments}: {result.stdout}{result.stderr}"
+
+
+def check_window(suite):
+    with suite.case("rates are exact differences, and a window knows the rows before it"):
+        positions = [random.Random(1).randrange(-10**12, 10**12) for _ in range(40)]
+        rows = [row(t, z) for t, z in enumerate(positions)]
+        for start in (0, 1, 2, 3, 17):
+            part = window(rows, start * 1000)
+            for order, weights in enumerate(((1,), (1, -1), (1, -2, 1), (1, -3, 3, -1))):
+                rates = part.rates("z", order)
+                for i, value in enumerate(rates):
+                    at = start + i
+                    expected = sum(w * positions[at - k] for k, w in enumerate(weights)) * 1000**order / NANO if at >= order else None
+                    is_same = value == expected or (value is not None and expected is not None and math.isclose(value, expected, rel_tol=1e-14))
+                    assert is_same, f"order {order}, row {at}: {value}, expected {expected}"
+    with suite.case("rates are unknown across missing rows, and known again behind them"):
+        times = [0, 1, 2, 3, 4, 9, 10, 11, 12, 13]
+        part = window([row(t, 7 * t**2) for t in times])
+        for order in range(4):
+            unknown = [t for t, value in zip(times, part.rates("z", order)) if value is None]
+            assert unknown == [t for run_start in (0, 9) for t in range(run_start, run_start + order)], f"order {order}: {unknown}"
+    with suite.case("states and flags become bands"):
+        texts = [("NEUTRAL", ""), ("ENGAGED", "takeover"), ("ENGAGED", "takeover|clamped"), ("ENGAGED", "clamped"), ("ENGAGED", ""),
+                 ("HOLD", "clamped")]
+        part = window([row(t, state=state, flags=flags) for t, (state, flags) in enumerate(texts)])
+        assert part.state_bands() == [("NEUTRAL", 0, 1000), ("ENGAGED", 1000, 5000), ("HOLD", 5000, 6000)], part.state_bands()
+        assert part.flag_bands() == {"takeover": [(1000, 3000)], "clamped": [(2000, 4000), (5000, 6000)]}, part.flag_bands()
+    with suite.case("a window ends where it was told to"):
+        part = window([row(t) for t in range(20)], 5000, 9000)
+        assert part.times_us == [5000, 6000, 7000, 8000, 9000], part.times_us
+    with suite.case("traces as the checker's tests make them are read"):
+        trace = Trace()
+        trace.pose("NEUTRAL", (1, 2, 3, 4, 5, 6))
+        trace.repeat(9)
+        part = Window(trace.lines())
+        assert part.column("z") == [6 * NANO] * 10 and part.is_used("roll") and not part.is_used("angle")
+    with suite.case("a header of another program is refused"):
+        try:
+            Window(["t,z\n"])
+        except TraceError as error:
+            assert "line 1" in str(error)
+        else:
+            raise AssertionError("accepted")
+    with suite.case("thinning keeps every peak, both ends and every gap"):
+        values = [math.sin(i / 500) for i in range(20000)]
+        values[7777], values[12345] = 9.0, -9.0
+        values[15000:15003] = [None] * 3
+        times, kept = thinned(list(range(20000)), values, 1000)
+        assert len(times) <= 1000 + 3, len(times)
+        assert all(values[t] == value for t, value in zip(times, kept)), "points were moved"
+        assert times == sorted(times) and times[0] == 0 and times[-1] == 19999
+        assert 9.0 in kept and -9.0 in kept and None in kept
+    with suite.case("axes are named one by one and in groups, each once"):
+        assert axes_named("z,pose") == ["z", "roll", "pitch", "yaw", "x", "y"]
+        assert axes_named("c1_mm, angle_deg") == ["c1", "angle"]
+
+
+def check_dots(suite):
+    platform = Platform(write("dots.ini", ini()))
+    frames = [Line(1000, "@A6:1,2,3,4,5,6,F0#"), Line(2000, "!hold"), Line(3000, "@C6T:1,2,3,4,5,6,500#@A3:1,2,3#\r\n"),
+              Line(4000, "@A6:1,2,x,4,5,6,0#"), Line(5000, "@A6T:1,2,3,4,5,6#"), Line(6000, "@A6:1,2#")]
+    with suite.case("well-formed frames become dots, others do not"):
+        dots = dots_of(frames)
+        assert [(dot.t_us, dot.is_timed) for dot in dots] == [(1000, False), (3000, True), (3000, False)], dots
+        assert dots[0].values == {"roll": 1, "pitch": 2, "yaw": 3, "x": 4, "y": 5, "z": 6}
+        assert dots[1].values["c6"] == 6 and dots[2].values == {"roll": 1, "pitch": 2, "z": 3}
+    with suite.case("with a platform, poses tell where the cylinders should be"):
+        dots = dots_of(frames, platform)
+        for name, extension in zip(("c1", "c2", "c3", "c4", "c5", "c6"), platform.extensions([1, 2, 3, 4, 5, 6])):
+            expect_near(dots[0].values[name], extension, 1e-12, name)
+        expect_near(dots[2].values["c1"], platform.extensions([1, 2, 0, 0, 0, 3])[0], 1e-12, "A3")
+
+
+# ---- tools/bench ----
+def check_bench_arguments(suite):
+    refusals = {
+        "no subcommand": ((), 2, "motion|cost"),
+        "an unknown one": (("speed",), 2, "speed"),
+        "a rate that is no number": (("motion", "--rates", "60,fast"), 2, "60,fast"),
+        "a rate out of range": (("motion", "--rates", "60,1"), 2, "from 10 to 200"),
+        "a record too short": (("motion", "--seconds", "5"), 2, "from 12"),
+        "no rounds": (("cost", "--rounds", "0"), 2, "from 1"),
+        "a program that is not there": (("motion", "--program", "nowhere"), 1, "nowhere"),
+        "a program that is another one": (("cost", "--program", "/bin/false"), 1, "false"),
+        "heaved that fails": (("motion", "--no-ruckig", "--seconds", "12", "--program", "/bin/false"), 1, "status 1"),
+    }
+    for name, (arguments, status, *words) in refusals.items():
+        with suite.case(f"bench refuses {name}"):
+            expect_refusal(run("bench", *arguments), status, *words)
+
+
+def sines(t):
+    return 20 * math.sin(2 * math.pi * 0.31 * t) + 3 * math.sin(2 * math.pi * 1.7 * t + 1)
+
+
+def check_analysis(suite):
+    count = 12000
+    for lag_ms in (-12.3, 0, 0.4, 40.0, 40.37, 113.9, 501.5):
+        with suite.case(f"a delay of {lag_ms} ms is found to 2 us"):
+            lag, shape = analysis.lag_and_shape([sines(k / 1000 - lag_ms / 1000) for k in range(count)], sines)
+            expect_near(1000 * lag, lag_ms, 0.002, "lag in ms")
+            assert shape < 1e-3, f"shape {shape} mm"
+    with suite.case("shape is what remains beside the delay: noise and a foreign sine"):
+        chance = random.Random(5).random
+        noisy = [sines(k / 1000 - 0.0333) + 0.2 * (chance() - 0.5) for k in range(count)]
+        lag, shape = analysis.lag_and_shape(noisy, sines)
+        expect_near(1000 * lag, 33.3, 0.2, "lag in ms")
+        expect_near(shape, 0.2 / math.sqrt(12), 0.003, "shape")
+        shaken = [sines(k / 1000 - 0.0333) + 0.5 * math.sin(2 * math.pi * 60 * k / 1000) for k in range(count)]
+        lag, shape = analysis.lag_and_shape(shaken, sines)
+        expect_near(1000 * lag, 33.3, 0.2, "lag in ms")
+        expect_near(shape, 0.5 / math.sqrt(2), 0.005, "shape")
+    with suite.case("rates of a sine are those of calculus"):
+        rate = 2 * math.pi * 1.5
+        record = [4 * math.sin(rate * k / 1000) for k in range(6000)]
+        for order in (1, 2, 3):
+            expect_near(max(analysis.rates(record, order)), 4 * rate**order, 4 * rate**order * 1e-4, f"peak of order {order}")
+            expect_near(analysis.rms(analysis.rates(record, order)), 4 * rate**order / math.sqrt(2), 4 * rate**order * 1e-3, f"RMS of order {order}")
+    with suite.case("the power of a band is that of the sines in it"):
+        sine = lambda size, hertz, k: size * math.sin(2 * math.pi * hertz * k / 1000)  # noqa: E731  a shorter name for what follows
+        mixed = [sine(1000, 0.9, k) + sine(3, 60.2, k) + sine(5, 45, k) for k in range(20000)]
+        expect_near(analysis.band_power(mixed, 56, 64), 3**2 / 2, 0.02, "60 Hz")
+        expect_near(analysis.band_power(mixed, 41, 49), 5**2 / 2, 0.05, "45 Hz")
+        expect_near(analysis.decibel(analysis.band_power(mixed, 56, 64), 4.5), 0, 0.02, "dB")
+    with suite.case("too short a record for a spectrum is refused"):
+        try:
+            analysis.band_power([0.0] * 100, 56, 64)
+        except ValueError:
+            pass
+        else:
+            raise AssertionError("accepted")
+    check_optimum(suite)
+    check_settling(suite)
+
+
+def distance_in(time, speed, accel, jerk, pieces=20000):
+    """How far from rest to rest in a time with three limits: numerically, each half of a move as steep as the limits allow."""
+    low, high = 0.0, time / 2  # of the time spent getting faster; the rest of the half cruises
+    for _ in range(60):
+        ramp = (low + high) / 2
+        peak = ramp * ramp * jerk / 4 if ramp <= 2 * accel / jerk else accel * (ramp - accel / jerk)
+        low, high = (ramp, high) if peak < speed else (low, ramp)
+    ramp, step, v, x = low, low / pieces, 0.0, 0.0
+    for i in range(pieces):
+        t = (i + 0.5) * step
+        v_next = v + min(jerk * t, accel, jerk * (ramp - t)) * step
+        x += (v + v_next) / 2 * step
+        v = v_next
+    return 2 * (x + v * (time / 2 - ramp))
+
+
+def check_optimum(suite):
+    with suite.case("the time optimum is the known one"):
+        expect_near(analysis.time_optimum(100, 400, 3000, 50000), 0.25 + 0.4 / 3 + 0.06, 1e-12, "100 mm, all limits reached")
+        expect_near(analysis.time_optimum(10, 400, 3000, 50000), 0.185664, 1e-6, "10 mm, jerk alone")
+        expect_near(analysis.time_optimum(-10, 400, 3000, 50000), 0.185664, 1e-6, "the other way")
+    with suite.case("in the time optimum the limits allow just that way"):
+        for limits in ((400, 3000, 50000), (400, 3000, 5000), (30, 3000, 50000), (400, 300, 50000)):
+            for way in (0.01, 1, 10, 21.6, 40, 77, 100, 3000):
+                time = analysis.time_optimum(way, *limits)
+                expect_near(distance_in(time, *limits) / way, 1, 2e-4, f"way in {time:.4f} s with {limits}, in {way} mm")
+    with suite.case("to within 1 um it is earlier by the last piece of full jerk"):
+        saved = analysis.time_optimum(10, 400, 3000, 50000) - analysis.time_optimum_within(10, 400, 3000, 50000)
+        expect_near(50000 * saved**3 / 6, 0.001, 1e-9, "way left")
+
+
+def check_settling(suite):
+    with suite.case("settling counts from the cycle before the first that could move"):
+        record = [0.0] * 10 + [0.5, 0.9, 0.9995, 1.0015, 1.0002, 1.0] + [1.0] * 20
+        cycles, beyond = analysis.settling(record, 10, len(record), 1.0)
+        assert cycles == 5, cycles  # 14 is the first within 1 um for good; 9 the start
+        expect_near(beyond, 0.0015, 1e-12, "overshoot")
+    with suite.case("settling downwards, and never"):
+        assert analysis.settling([0.0, 0.0, -1.0, -1.0, -1.0], 2, 5, -1.0) == (1, 0.0)
+        assert analysis.settling([0.0, 0.0, 0.5, 0.6, 0.7], 2, 5, 1.0)[0] is None
+
+
+def check_signals(suite):
+    signal = signals.Cue(30, 7)
+    values = [signal.at(k / 100) for k in range(3001)]
+    with suite.case("the signal stays on its axis, uses it, and rests at both ends"):
+        assert max(map(abs, values)) <= signals.HALF_RANGE_MM + 1 and max(map(abs, values)) > signals.HALF_RANGE_MM / 2, max(map(abs, values))
+        assert values[0] == values[-1] == 0 and abs(values[1]) < 1e-3 and abs(values[-2]) < 1e-3
+    with suite.case("the same seed gives the same arrivals, another one others"):
+        arrivals, lost = signals.stream(signal, 60, 30, 7)
+        assert (arrivals, lost) == signals.stream(signals.Cue(30, 7), 60, 30, 7)
+        assert arrivals != signals.stream(signal, 60, 30, 8)[0]
+    with suite.case("arrivals: jitter, losses and decimals are as stated"):
+        arrivals, lost = signals.stream(signal, 60, 30, 7)
+        assert len(arrivals) + lost == 30 * 60 + 1 and 3 <= lost <= 45, lost
+        late = [t_us - 1e6 / 60 * math.floor((t_us - signals.NETWORK_US + 1) * 60 / 1e6) for t_us, _ in arrivals]
+        low, high = signals.NETWORK_US, signals.NETWORK_US + signals.JITTER_US
+        assert min(late) >= low - 1 and max(late) <= high + 1 and max(late) - min(late) > 0.9 * (high - low), (min(late), max(late))
+        assert all(len(text.split(".")[1]) == 3 for _, text in arrivals)
+    with suite.case("a hold knows the newest value that has arrived, that of the cycle included"):
+        assert signals.held([(0, "1"), (1500, "2"), (3000, "3")], 5) == [1, 1, 2, 3, 3]
+    with suite.case("steps start from rest and go where they should"):
+        arrivals, moves = signals.steps((1.0, 100.0))
+        assert [(start, end) for _, start, end in moves] == [(0, 1), (-50, 50)]
+        assert [text for _, text in arrivals] == ["0.000", "1.000", "-50.000", "50.000"]
+    with suite.case("FRAMES are written as heaved reads them"):
+        signals.write_frames(FOLDER / "some.frames", [(0, "0.000"), (16667, "-1.500")], 2_500_000)
+        assert (FOLDER / "some.frames").read_text(encoding="ascii") == "2500.000 @A6:0,0,0,0,0,0.000,0#\n2516.667 @A6:0,0,0,0,0,-1.500,0#\n"
+
+
+def check_rival(suite):
+    chance = random.Random(11).random
+    targets = []
+    while len(targets) < 6000:
+        targets += [100 * (chance() - 0.5)] * (1 + int(600 * chance()))
+    record = two_limits(targets, 400, 3000, 0.001)
+    with suite.case("the limiter of two limits keeps them"):
+        assert max(map(abs, analysis.rates(record, 1))) <= 400 * (1 + 1e-9)
+        assert max(map(abs, analysis.rates(record, 2))) <= 3000 * (1 + 1e-6)
+    with suite.case("... and takes the shortest time that they allow, without overshoot to speak of"):
+        for way in (0.5, 10, 100):
+            record = two_limits([0.0] * 2 + [way] * 1500, 400, 3000, 0.001)
+            cycles, beyond = analysis.settling(record, 2, len(record), way)
+            best = 2 * math.sqrt(way / 3000) if way < 400**2 / 3000 else way / 400 + 400 / 3000
+            expect_near(cycles, 1000 * best, 3, f"ms for {way} mm")
+            assert beyond < 0.002, f"{way} mm: {beyond} mm beyond"
+
+
+def check_programs(suite, heaved, bench_core):
+    with suite.case("bench motion judges heaved"):
+        if not heaved:
+            raise tap.Skip("no --heaved")
+        result = run("bench", "motion", "--no-ruckig", "--program", heaved, "--seconds", 16, "--rates", 60, "--json")
+        assert result.returncode == 0, result.stderr
+        figures = json.loads(result.stdout)
+        methods = figures["streams"][0]["methods"]
+        assert set(methods) == {"held, no limits", "heaved smooth", "heaved fast", "two limits"}, set(methods)
+        smooth, held = methods["heaved smooth"], methods["held, no limits"]
+        assert figures["streams"][0]["cycles_judged"] == 10000
+        assert held["line_db"] == 0 and smooth["line_db"] < -40, smooth
+        assert held["lag_ms"] < smooth["lag_ms"] < 80 and smooth["shape_um"] < held["shape_um"], smooth
+        limits = figures["limits"]
+        assert smooth["jerk_peak_mm_s3"] <= limits["jerk_mm_s3"] + 4 and smooth["jerk_rms_of_true"] < held["jerk_rms_of_true"] / 100, smooth
+        assert [move["to_mm"] - move["from_mm"] for move in figures["steps"]] == [1, 10, 100]
+        assert all(move["methods"]["heaved smooth"]["settled_ms"] for move in figures["steps"]), figures["steps"]
+    with suite.case("bench cost knows every subject of its program, and runs it"):
+        if not bench_core:
+            raise tap.Skip("no --bench-core")
+        names = subprocess.run([bench_core], capture_output=True, text=True, check=True).stdout.split()
+        assert names == list(bench_cost.SUBJECTS), names
+        for name in names:
+            row_of_figures = bench_cost.timed(bench_core, name, 20, 2)
+            assert row_of_figures["ns_min"] > 0 and len(row_of_figures["single_ns"]) == 3, row_of_figures
+    with suite.case("a percentile is a value that was measured"):
+        assert bench_cost.percentile([3, 1, 2], 95) == 3
+        assert bench_cost.percentile(list(range(1, 101)), 95) == 95
+        assert bench_cost.percentile([7], 5) == 7
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--heaved")
+    parser.add_argument("--bench-core")
+    arguments = parser.parse_args()
+    suite = tap.Suite()
+    for check in (check_plot_arguments, check_window, check_dots, check_bench_arguments, check_analysis, check_signals, check_rival):
+        check(suite)
+    check_programs(suite, arguments.heaved, arguments.bench_core)
+    return suite.done()
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    finally:
+        for path in sorted(FOLDER.rglob("*"), reverse=True):
+            path.rmdir() if path.is_dir() else path.unlink()
+        FOLDER.rmdir()

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: MIT
+"""bench_build.py - the programs that tools/bench measures, built for release in a folder of their own."""
+import subprocess
+from pathlib import Path
+
+TOP = Path(__file__).resolve().parents[2]
+
+
+class BuildError(Exception):
+    """What is missing, or the end of the compiler's own words."""
+
+
+def _run(*command):
+    result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True, check=False)
+    if result.returncode != 0:
+        raise BuildError(f"{command[0]} failed:\n{result.stdout[-3000:]}")
+
+
+def build(folder, target):
+    """Builds a program and returns its path; what the machine lacks is installed as tools/demo does it."""
+    needs = ". tools/lib/deps.sh; deps_build; deps_install"
+    if subprocess.run(["bash", "-c", needs, "bench"], cwd=TOP, stdin=subprocess.DEVNULL, check=False).returncode != 0:
+        raise BuildError("not all that a build needs is installed")
+    if not (folder / "build.ninja").exists():
+        _run("cmake", "-S", str(TOP), "-B", str(folder), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DHEAVE_BENCH=ON")
+    _run("cmake", "--build", str(folder), "--target", target)
+    return folder / {"heaved": "src/app/heaved", "bench_core": "tests/bench/bench_core"}[target]

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: MIT
+"""bench_cost.py - the subcommand cost of tools/bench: time and instructions of what the gateway does, from tests/bench/bench_core.c."""
+import json
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+# name in bench_core: (runs per round, runs under callgrind, what it is)
+SUBJECTS = {
+    "cycle-rest": (4000, 2000, "cycle, engaged and at rest, no frames"),
+    "cycle-stream": (4000, 2000, "cycle, stream of A6 poses at 60 Hz"),
+    "cycle-hostile": (4000, 4000, "cycle, another kind of frame every 7 cycles, holds between"),
+    "cycle-flood": (200, 100, "cycle, 64 such frames in every cycle (the most it takes)"),
+    "frame-vendor": (4096, 4096, "frame of the vendor's document, A6 or A7, read"),
+    "frame-a6": (4096, 4096, "frame A6, three decimals, read"),
+    "frame-a7": (4096, 4096, "frame A7, six decimals, read"),
+    "inverse": (4096, 4096, "inverse kinematics of a hexapod"),
+    "forward-warm": (4096, 2048, "forward kinematics, from 0.5 mm and 0.05 deg beside"),
+    "forward-cold": (4096, 2048, "forward kinematics, from pose zero"),
+}
+SUMMARY = re.compile(r"^(?:summary|totals): (\d+)", re.MULTILINE)
+
+
+class CostError(Exception):
+    """The program could not be run."""
+
+
+def _output(*command):
+    result = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+    if result.returncode != 0:
+        raise CostError(f"{Path(command[0]).name} ended with status {result.returncode}: {result.stderr.strip()[-300:]}")
+    return result.stdout
+
+
+def percentile(values, share):
+    """The smallest value that at least this share of the values does not exceed."""
+    ordered = sorted(values)
+    return ordered[max(0, -(-len(ordered) * share // 100) - 1)]
+
+
+def timed(program, name, runs, rounds):
+    lines = _output(program, name, runs, rounds).split("\n")
+    values = [float(line) for line in lines if line and not line.startswith("single")]
+    single = [float(part) for line in lines if line.startswith("single") for part in line.split()[1:]]
+    return {"rounds": rounds, "runs_per_round": runs, "ns_median": statistics.median(values), "ns_min": min(values), "ns_p95": percentile(values, 95),
+            "single_ns": dict(zip(("p50", "p99", "p999"), single))}
+
+
+def instructions(program, name, runs):
+    """Per run, as callgrind counts them; None without valgrind."""
+    if not shutil.which("valgrind"):
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "callgrind.out"
+        _output("valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", "--toggle-collect=bench_region*", program, name, runs)
+        match = SUMMARY.search(out.read_text(encoding="utf-8", errors="replace"))
+    if not match or not int(match[1]):
+        raise CostError("callgrind's output holds no count")
+    return int(match[1]) / runs
+
+
+def processor():
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as file:
+            return next((line.split(":", 1)[1].strip() for line in file if line.startswith("model name")), "unknown")
+    except OSError:
+        return "unknown"
+
+
+def run(program, rounds, as_json, say, out=sys.stdout):
+    has_valgrind = shutil.which("valgrind") is not None
+    if not has_valgrind:
+        say("no instruction counts: valgrind is not installed (apt-get install valgrind)")
+    if not as_json:
+        print(f"processor: {processor()}. ns per run: median, least and 95th percentile of {rounds} rounds; then of runs timed one by one, "
+              "clock taken off\n"
+              f"{'':62}{'median':>9}{'min':>9}{'p95':>9}{'one: p50':>11}{'p99':>9}{'p99.9':>9}{'runs':>9}{'instructions':>14}", file=out)
+    result = {"processor": processor(), "subjects": {}}
+    for name, (runs, counted, text) in SUBJECTS.items():
+        row = timed(program, name, runs, rounds)
+        row["instructions"] = instructions(program, name, counted)
+        row["instructions_runs"] = counted if has_valgrind else 0
+        result["subjects"][name] = row
+        if not as_json:
+            one, ir = row["single_ns"], row["instructions"]
+            print(f"{text:62}{row['ns_median']:9.0f}{row['ns_min']:9.0f}{row['ns_p95']:9.0f}{one['p50']:11.0f}{one['p99']:9.0f}{one['p999']:9.0f}"
+                  f"{runs * rounds:9}{'-' if ir is None else f'{ir:.0f}':>14}", file=out, flush=True)
+    if as_json:
+        json.dump(result, out, indent=1)
+        print(file=out)
+    else:
+        print("\ninstructions: callgrind, mean over " + ", ".join(f"{counted} ({name})" for name, (_, counted, _) in SUBJECTS.items())
+              + "\nThe gateway stands between devices that do nothing; a cycle of the stream includes its share of frames.", file=out)

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""frame_dots.py - where the frames of a FRAMES file ask the platform to be, for tools/plot. Only well-formed frames of the V3.0 form give a dot."""
+import re
+from dataclasses import dataclass
+
+from platform_ini import POSE_AXES
+
+FRAME = re.compile(r"@([AC])([3467])(T?):([^@#]*)#")
+ORDER = {"A3": ["roll", "pitch", "z"], "A4": ["roll", "pitch", "z", "angle"], "A6": list(POSE_AXES), "A7": [*POSE_AXES, "angle"],
+         "C3": ["c1", "c2", "c3"], "C6": [f"c{i + 1}" for i in range(6)], "C7": [*(f"c{i + 1}" for i in range(6)), "angle"]}
+
+
+@dataclass
+class Dot:
+    t_us: int
+    is_timed: bool
+    values: dict  # axis: asked, in its own unit
+
+
+def dots_of(lines, platform=None):
+    """The dots of frames_file.Line's. With a platform, values are those of its axes, and poses give extensions too."""
+    result = []
+    for line in lines:
+        for space, number, timed, text in [] if line.is_request else FRAME.findall(line.text):
+            values = _values(ORDER.get(space + number), text, bool(timed))
+            if values:
+                result.append(Dot(line.t_us, bool(timed), _asked(values, space, platform)))
+    return result
+
+
+def _values(names, text, is_timed):
+    """{axis: number} or None; the last field is the mask or the time, a mask may be missing."""
+    fields = [field.strip() for field in text.split(",")]
+    if names is None or len(fields) not in ((len(names) + 1,) if is_timed else (len(names), len(names) + 1)):
+        return None
+    try:
+        return dict(zip(names, map(float, fields)))
+    except ValueError:
+        return None
+
+
+def _asked(values, space, platform):
+    if platform is None:
+        return values
+    if space == "A":
+        values = {**{name: 0.0 for name in POSE_AXES}, **values}
+    asked = {name: _of_axis(platform, name, value) for name, value in values.items()}
+    # the pose of a 3-RPS is not complete: what its hinges add is not known here
+    if space == "A" and platform.kind != "tripod-3rps":
+        pose = [asked[name] for name in POSE_AXES]
+        asked.update((f"c{i + 1}", extension) for i, extension in enumerate(platform.extensions(pose)))
+    return asked
+
+
+def _of_axis(platform, name, value):
+    axis = platform.axes.get(name)
+    if axis is None:
+        return value if name.startswith("c") else 0.0
+    return float(axis.sign * axis.scale) * value + float(axis.offset)

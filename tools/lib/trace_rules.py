@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: MIT
+"""trace_rules.py - the rules a trace of set-points has to keep, and what each of them found. See tools/check_trace.
+
+Positions are integers of 1e-9 mm or deg, as printed; differences of them are integers too, so no limit check involves rounding of its own.
+"""
+import math
+from dataclasses import dataclass
+
+NANO = 10**9
+ORDER_NAME = ("position", "speed", "accel", "jerk")
+ORDER_UNIT = ("", "/s", "/s^2", "/s^3")
+# A printed number is within half a unit of the ninth decimal of the true one (one unit if it was cut off), so that a k-th difference
+# is within 2^(k-1) units of the true one: 1, 2, 4. That is the whole tolerance.
+ROUNDING = (1, 1, 2, 4)
+
+
+@dataclass
+class Violation:
+    rule: str
+    column: str
+    t_us: int
+    line: int
+    value: str
+    limit: str
+
+    def __str__(self):
+        return f"t = {self.t_us / 1000:.3f} ms (line {self.line}): {self.column} {self.rule}: {self.value}, limit {self.limit}"
+
+
+class Findings:
+    """All that was found wrong; only the first ones are kept, and the first of each rule."""
+
+    def __init__(self, kept):
+        self.kept, self.count, self.first, self.by_rule = kept, 0, [], {}
+
+    def add(self, *fields):
+        self.count += 1
+        is_new = fields[0] not in self.by_rule
+        self.by_rule[fields[0]] = self.by_rule.get(fields[0], 0) + 1
+        if is_new or len(self.first) < self.kept:
+            self.first.append(Violation(*fields))
+
+
+class Block:
+    """Some consecutive rows, column-wise, with the differences up to the third of every column of numbers."""
+
+    def __init__(self, rows, tail, first_line):
+        self.times, self.states, numbers, self.relays, self.flags = zip(*rows)
+        self.count, self.first_line = len(rows), first_line
+        self.rows = numbers
+        self.columns = list(zip(*tail, *numbers))  # the three rows before stand in front of each column
+        self.magnitudes = [self._magnitudes(column) for column in self.columns]
+
+    @staticmethod
+    def _magnitudes(column):
+        """[None, |first|, |second|, |third| difference], aligned with the rows."""
+        result, skip = [None], 2
+        for _ in range(3):
+            column = list(map(int.__sub__, column[1:], column))
+            result.append(list(map(abs, column[skip:])))
+            skip -= 1
+        return result
+
+    def peak(self, columns, order):
+        """The largest magnitude among the columns, row by row."""
+        lists = [self.magnitudes[column][order] for column in columns]
+        return lists[0] if len(lists) == 1 else list(map(max, *lists))
+
+    def value(self, column, i):
+        return self.columns[column][i + 3]
+
+    def at(self, i):
+        """(t_us, line in the file) of a row."""
+        return self.times[i], self.first_line + i
+
+
+class RateRule:
+    """A limit on a difference of one or several columns."""
+
+    def __init__(self, name, columns, names, order, limit, unit, cycle_us):
+        self.name, self.columns, self.names, self.order, self.unit = name, columns, names, order, unit
+        self.stated = limit
+        self.per_cycle = limit * NANO * cycle_us**order / 10 ** (6 * order)
+        self.most = math.floor(self.per_cycle + ROUNDING[order])
+        self.worst, self.worst_t_us, self.rows = 0, None, 0
+
+    def check(self, block, peak, start, stop, findings):
+        if start >= stop:
+            return
+        self.rows += stop - start
+        top = max(peak[start:stop])
+        if top > self.worst or self.worst_t_us is None:
+            self.worst, self.worst_t_us = top, block.times[peak.index(top, start, stop)]
+        if top > self.most:
+            for i in range(start, stop):
+                if peak[i] > self.most:
+                    self._report(block, i, findings)
+
+    def _report(self, block, i, findings):
+        for column in self.columns:
+            magnitude = block.magnitudes[column][self.order][i]
+            if magnitude > self.most:
+                findings.add(self.name, self.names[column], *block.at(i), self.text(magnitude), self.limit_text())
+
+    def text(self, magnitude):
+        return f"{float(magnitude * self.stated / self.per_cycle):.6f} {self.unit}{ORDER_UNIT[self.order]}"
+
+    def limit_text(self):
+        return f"{float(self.stated):g} {self.unit}{ORDER_UNIT[self.order]}"
+
+    def summary(self):
+        """(name, limit, worst value, share of the limit, when, rows checked)"""
+        return (self.name, self.limit_text(), self.text(self.worst), float(self.worst / self.per_cycle), self.worst_t_us, self.rows)
+
+
+class RangeRule:
+    """Bounds of one column. A position may begin outside of them, where it was placed: then it may not go further out, but for slack,
+    which is the noise of a pose that was solved from extensions. One that is placed while it moves may take its stopping distance."""
+
+    def __init__(self, name, column, label, low, high, unit, slack=0):
+        self.name, self.column, self.label, self.unit, self.slack = name, column, label, unit, slack
+        self.low_stated, self.high_stated = low, high
+        self.low, self.high = math.floor(low * NANO), math.ceil(high * NANO)
+        self.least, self.most = self.low, self.high  # allowed now
+        self.stopping_rows = 0  # as long as least and most hold whatever happens
+        self.seen_low = self.seen_high = None
+        self.worst_t_us, self.rows = None, 0
+
+    def place(self, block, i, accel=None, jerk=None):
+        """The rows up to i were not checked. accel and jerk, per cycle, are those it can stop with if it moves."""
+        value = block.value(self.column, i)
+        self.least, self.most, self.stopping_rows = min(self.low, value), max(self.high, value), 0
+        if accel:
+            speed, push = block.magnitudes[self.column][1][i], block.magnitudes[self.column][2][i]
+            speed += push * push / (2 * jerk)
+            self.stopping_rows = math.ceil(speed / accel + 2 * max(accel, push) / jerk) if speed else 0
+            self.least, self.most = self.least - speed * self.stopping_rows, self.most + speed * self.stopping_rows
+
+    def check(self, block, start, stop, findings):
+        if start >= stop:
+            return
+        values = block.columns[self.column][start + 3:stop + 3]
+        low, high = min(values), max(values)
+        self.rows += len(values)
+        self._remember(block, values, low, high, start)
+        if low >= self.low and high <= self.high:
+            self.stopping_rows -= min(self.stopping_rows, len(values))
+            if not self.stopping_rows:
+                self.least, self.most = self.low, self.high
+            return
+        for i, value in enumerate(values, start):
+            if not self.low <= value <= self.high and not self.least - self.slack <= value <= self.most + self.slack:
+                findings.add(self.name, self.label, *block.at(i), self.text(value), self.limit_text())
+            if self.stopping_rows:
+                self.stopping_rows -= 1
+            else:
+                self.least, self.most = min(self.low, max(value, self.least)), max(self.high, min(value, self.most))
+
+    def _remember(self, block, values, low, high, start):
+        before = self._room() if self.seen_low is not None else None
+        self.seen_low = low if self.seen_low is None else min(low, self.seen_low)
+        self.seen_high = high if self.seen_high is None else max(high, self.seen_high)
+        if before is None or self._room() < before:
+            extreme = low if self.seen_low - self.low <= self.high - self.seen_high else high
+            self.worst_t_us = block.times[start + values.index(extreme)]
+
+    def _room(self):
+        return min(self.seen_low - self.low, self.high - self.seen_high)
+
+    def text(self, value):
+        return f"{value / NANO:.9f} {self.unit}"
+
+    def limit_text(self):
+        return f"{float(self.low_stated):g}..{float(self.high_stated):g} {self.unit}"
+
+    def summary(self):
+        if self.seen_low is None:
+            return (self.name, self.limit_text(), "", 0.0, None, 0)
+        middle, half = (self.low + self.high) / 2, max(1, (self.high - self.low) / 2)
+        share = max(self.seen_high - middle, middle - self.seen_low) / half
+        return (self.name, self.limit_text(), f"{self.seen_low / NANO:.3f}..{self.seen_high / NANO:.3f} {self.unit}", share,
+                self.worst_t_us, self.rows)
+
+
+class ErrorRule:
+    """A deviation that must stay below a tolerance."""
+
+    def __init__(self, name, tolerance, unit):
+        self.name, self.tolerance, self.unit = name, tolerance, unit
+        self.worst, self.worst_t_us, self.rows = 0.0, None, 0
+
+    def check(self, block, i, label, error, findings):
+        self.rows += 1
+        if error > self.worst or self.worst_t_us is None:
+            self.worst, self.worst_t_us = error, block.times[i]
+        if not error <= self.tolerance:
+            findings.add(self.name, label, *block.at(i), f"{error:.3g} {self.unit}", f"{self.tolerance:g} {self.unit}")
+
+    def summary(self):
+        return (self.name, f"{self.tolerance:g} {self.unit}", f"{self.worst:.3g} {self.unit}", self.worst / self.tolerance,
+                self.worst_t_us, self.rows)
