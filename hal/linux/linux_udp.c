@@ -54,6 +54,7 @@ static void keep_dropped(linux_udp_t *self, struct msghdr *message)
     }
 }
 
+/* NOLINTNEXTLINE(readability-non-const-parameter): recvmsg writes through the pointer kept in part */
 static hv_status_t udp_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
 {
     linux_udp_t *self = ctx;

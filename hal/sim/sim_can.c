@@ -304,6 +304,7 @@ void sim_can_close(sim_can_t *self)
     for (uint32_t i = 0; i < bus->nodes; i++) {
         if (bus->node[i] == self) {
             bus->nodes--;
+            /* NOLINTNEXTLINE(bugprone-sizeof-expression): the elements are pointers */
             memmove(&bus->node[i], &bus->node[i + 1], (bus->nodes - i) * sizeof bus->node[0]);
             return;
         }

@@ -76,7 +76,7 @@ const config_key_t config_keys[] = {
     {KEY("platform", "kind"), AT(settings.geometry.kind), .type = CONFIG_WORD, .unit = "", .words = "hexapod|tripod|tripod-3rps",
      .help = "six cylinders; three round a central guide; three on hinges (yaw, x and y then follow from roll and pitch)"},
     {KEY("platform", "cycle_us"), AT(settings.cycle_us), .type = CONFIG_INTEGER, .unit = "us", .fallback = "1000",
-     RANGE(250, 10000), .help = "period of the motion cycle"},
+     RANGE(500, 10000), .help = "period of the motion cycle"},
     {KEY("platform", "engage"), AT(settings.engage), .type = CONFIG_WORD, .unit = "", .fallback = "manual",
      .words = "manual|auto",
      .help = "who brings the platform up: an operator's request, or heaved by itself once after the start"},
@@ -168,7 +168,7 @@ const config_key_t config_keys[] = {
     {KEY("relays", "active_low"), AT(relays.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
      .help = "whether a low level closes a relay"},
     {KEY("relays", "safe_mask"), AT(settings.relay_safe_mask), .type = CONFIG_MASK, .unit = "", .fallback = "0", RANGE(0, 0xFFF),
-     .help = "relays that are closed in a fault or emergency stop, all others open; bit 0 = relay 1"},
+     .help = "relays that are closed whenever no sender is followed (every state but ENGAGED); bit 0 = relay 1"},
 
     {KEY("inputs", "driver"), AT(inputs.driver), .type = CONFIG_WORD, .unit = "", .fallback = "sim", .words = "sim",
      .absent = "gpio", .help = "the inputs in use"},

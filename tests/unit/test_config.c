@@ -399,9 +399,9 @@ static const spoilt_t k_spoilt[] = {
     {"platform", "kind", "kind = octopod", "[platform] kind: \"octopod\" is not known; allowed: hexapod | tripod | tripod-3rps"},
     {"platform", "kind", "kind = Hexapod", "[platform] kind: \"Hexapod\" is not known; allowed: hexapod | tripod | tripod-3rps"},
     {"platform", "cycle_us", "cycle_us = 1000.0",
-     "[platform] cycle_us: \"1000.0\" is not a whole number; allowed: a whole number from 250 to 10000 us"},
+     "[platform] cycle_us: \"1000.0\" is not a whole number; allowed: a whole number from 500 to 10000 us"},
     {"platform", "cycle_us", "cycle_us = 99999999999999999999",
-     "[platform] cycle_us: \"99999999999999999999\" is not a whole number; allowed: a whole number from 250 to 10000 us"},
+     "[platform] cycle_us: \"99999999999999999999\" is not a whole number; allowed: a whole number from 500 to 10000 us"},
     {"geometry", "base1_mm", "base1_mm = 1, 2",
      "[geometry] base1_mm: has 2 values; allowed: 3 numbers from -4000 to 4000 mm, separated by commas"},
     {"geometry", "base1_mm", "base1_mm = 1,5, 2, 3", /* a decimal comma */
