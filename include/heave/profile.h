@@ -39,6 +39,9 @@ void quintic_plan_stop(quintic_t *self, unsigned axes, const ramp_state_t *start
 /** True if every axis stays within its limits (checked at 33 points with 1/64 to spare). */
 bool quintic_is_feasible(const quintic_t *self, const ramp_limits_t *const *limits);
 
+/** Position of an axis at t, 0 to 1 of its own time. */
+q32_t quintic_position(const quintic_t *self, unsigned axis, q62_t t_q62);
+
 /** References of the next cycle. Past the end: at rest on the targets. */
 void quintic_step(quintic_t *self, ramp_ref_t *ref);
 

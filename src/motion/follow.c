@@ -9,6 +9,7 @@
 #include "follow.h"
 
 #include "reach.h"
+#include "way.h"
 
 #define TAKEOVER_LEAST_US 250000
 
@@ -145,6 +146,9 @@ static void plan_straight(motion_t *self, const q32_t slot_q32[AXES_MAX], int64_
         self->path_history[i] = ramp->state;
         path_limits_narrow(&limits, slot_q32[i] - ramp->state.pos_q32, &ramp->limits);
     }
+    if (self->space == MOTION_POSE) {
+        way_narrow(self, self->path_from_q32, slot_q32, &limits);
+    }
     scurve_plan(&self->path, &limits, cycles);
     self->source = MOTION_STRAIGHT;
 }
@@ -169,9 +173,20 @@ static bool plan_stop_then_straight(motion_t *self, const ramp_state_t *start, c
         path_limits_narrow(&path, slot_q32[i] - self->quintic.target_q32[i], limits[i]);
         self->path_to_q32[i] = slot_q32[i];
     }
+    if (self->space == MOTION_POSE) {
+        way_narrow(self, self->quintic.target_q32, slot_q32, &path);
+    }
     scurve_plan(&self->path, &path, 1);
     self->straight_cycles = cycles - self->quintic.cycles - 1;
     return scurve_cycles(&self->path) <= self->straight_cycles;
+}
+
+/* Plans the quintic; false where an axis or a cylinder would break its limits. */
+static bool is_quintic_feasible(motion_t *self, const ramp_state_t *start, const ramp_limits_t *const *limits,
+                                const q32_t slot_q32[AXES_MAX], int64_t cycles)
+{
+    return quintic_plan(&self->quintic, AXES_MAX, start, slot_q32, cycles) == HV_OK &&
+           quintic_is_feasible(&self->quintic, limits) && (self->space != MOTION_POSE || way_is_feasible(self, &self->quintic));
 }
 
 /* Timed moves, best first: a quintic; from rest an S-curve, longer than asked if need be; a stop and an S-curve; else the step
@@ -188,7 +203,8 @@ static void plan_timed(motion_t *self, const q32_t slot_q32[AXES_MAX], int64_t a
     self->is_stretched = false;
     self->next = MOTION_THEN_REST;
     self->source = MOTION_TIMED;
-    if (quintic_plan(&self->quintic, AXES_MAX, start, slot_q32, cycles) == HV_OK && quintic_is_feasible(&self->quintic, limits)) {
+    if (is_quintic_feasible(self, start, limits, slot_q32, cycles)) {
+        /* planned as it is */
     } else if (are_slots_at_rest(self)) {
         plan_straight(self, slot_q32, cycles);
         cycles = scurve_cycles(&self->path);

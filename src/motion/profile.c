@@ -129,7 +129,7 @@ static bool keeps_bounds(const quintic_t *self, unsigned axis, const bounds_t *b
     return true;
 }
 
-static q32_t position_at(const quintic_t *self, unsigned axis, q62_t t_q62)
+q32_t quintic_position(const quintic_t *self, unsigned axis, q62_t t_q62)
 {
     return self->start_q32[axis] + fx_mul_shift(polynomial(self->coefficient_q32[axis], k_factor_pos, 0, t_q62), t_q62, 62);
 }
@@ -137,7 +137,7 @@ static q32_t position_at(const quintic_t *self, unsigned axis, q62_t t_q62)
 static bool stays_inside(const quintic_t *self, unsigned axis, const ramp_limits_t *limits)
 {
     for (int64_t point = 0; point <= CHECK_POINTS; point++) {
-        const q32_t pos_q32 = position_at(self, axis, point * (Q62_ONE / CHECK_POINTS));
+        const q32_t pos_q32 = quintic_position(self, axis, point * (Q62_ONE / CHECK_POINTS));
         if (pos_q32 < limits->pos_min_q32 || pos_q32 > limits->pos_max_q32) {
             return false;
         }
@@ -220,7 +220,7 @@ static q32_t position_now(const quintic_t *self, unsigned i)
     if (self->elapsed >= self->axis_cycles[i]) {
         return self->target_q32[i];
     }
-    return position_at(self, i, fx_mul_div(self->elapsed, Q62_ONE, self->axis_cycles[i]));
+    return quintic_position(self, i, fx_mul_div(self->elapsed, Q62_ONE, self->axis_cycles[i]));
 }
 
 void quintic_step(quintic_t *self, ramp_ref_t *ref)

@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: MIT
+ * way.c - cylinder speeds, accelerations and jerks along a planned way, from differences of a few sampled extensions.
+ * On a straight way with parameter s a cylinder's acceleration is c' s'' + c'' s'^2. The bend takes a quarter of the limit at
+ * most, the rest is left for s''. The limiter stays the last word; this makes moves that it need not touch.
+ */
+#include "way.h"
+
+#define QUINTIC_PIECES  32
+#define STRAIGHT_PIECES 16
+
+/* The last three differences of one cylinder's extensions. */
+typedef struct {
+    unsigned samples;
+    q32_t pos_q32, first_q32, second_q32, third_q32;
+} differences_t;
+
+static void add_sample(differences_t *d, q32_t pos_q32)
+{
+    const q32_t first_q32 = pos_q32 - d->pos_q32;
+    const q32_t second_q32 = first_q32 - d->first_q32;
+    d->third_q32 = d->samples >= 3 ? second_q32 - d->second_q32 : 0;
+    d->second_q32 = d->samples >= 2 ? second_q32 : 0;
+    d->first_q32 = d->samples >= 1 ? first_q32 : 0;
+    d->pos_q32 = pos_q32;
+    d->samples++;
+}
+
+/* limit * (cycles per piece)^power, with 1/16 to spare. */
+static q32_t limit_per_piece(q32_t limit_q32, int64_t cycles, unsigned power)
+{
+    q32_t result_q32 = limit_q32 - limit_q32 / 16;
+    for (unsigned i = 0; i < power; i++) {
+        result_q32 = fx_mul_div(result_q32, cycles, QUINTIC_PIECES);
+    }
+    return result_q32;
+}
+
+static bool is_within(const differences_t *d, const ramp_limits_t *limits, int64_t cycles)
+{
+    return fx_abs(d->first_q32) <= limit_per_piece(limits->vel_per_cycle_q32, cycles, 1) &&
+           fx_abs(d->second_q32) <= limit_per_piece(limits->acc_per_cycle2_q32, cycles, 2) &&
+           fx_abs(d->third_q32) <= limit_per_piece(limits->jerk_per_cycle3_q32, cycles, 3);
+}
+
+bool way_is_feasible(const motion_t *motion, const quintic_t *quintic)
+{
+    differences_t d[CYLINDERS_MAX] = {{0}};
+    for (int64_t piece = 0; piece <= QUINTIC_PIECES; piece++) {
+        pose_t pose;
+        q32_t extension_mm_q32[CYLINDERS_MAX];
+        for (unsigned i = 0; i < POSE_AXES; i++) {
+            pose.axis_q32[i] = quintic_position(quintic, i, piece * (Q62_ONE / QUINTIC_PIECES));
+        }
+        if (kin_inverse(&motion->kin, &pose, extension_mm_q32) != HV_OK) {
+            return false;
+        }
+        for (unsigned i = 0; i < motion->cylinders; i++) {
+            add_sample(&d[i], extension_mm_q32[i]);
+            if (!is_within(&d[i], &motion->cylinder[i].limits, quintic->cycles)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* Speed at which the bend of the way takes a quarter of the acceleration limit. */
+static void narrow_by_bend(path_limits_t *limits, q32_t bend_q32, q32_t acc_limit_q32)
+{
+    if (bend_q32 == 0) {
+        return;
+    }
+    const int64_t square_q62 = fx_clamp(fx_mul_div(acc_limit_q32 / 4, Q62_ONE, bend_q32), 1, Q62_ONE);
+    const int64_t vel_q62 = (int64_t)fx_sqrt_u64((uint64_t)square_q62) * ((int64_t)1 << 31);
+    limits->vel_q62 = vel_q62 < limits->vel_q62 ? vel_q62 : limits->vel_q62;
+}
+
+void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q32, path_limits_t *limits)
+{
+    differences_t d[CYLINDERS_MAX] = {{0}};
+    q32_t slope_q32[CYLINDERS_MAX] = {0};
+    q32_t bend_q32[CYLINDERS_MAX] = {0};
+    for (int64_t piece = 0; piece <= STRAIGHT_PIECES; piece++) {
+        pose_t pose;
+        q32_t extension_mm_q32[CYLINDERS_MAX];
+        for (unsigned i = 0; i < POSE_AXES; i++) {
+            pose.axis_q32[i] = from_q32[i] + fx_mul_div(to_q32[i] - from_q32[i], piece, STRAIGHT_PIECES);
+        }
+        if (kin_inverse(&motion->kin, &pose, extension_mm_q32) != HV_OK) {
+            return;
+        }
+        for (unsigned i = 0; i < motion->cylinders; i++) {
+            add_sample(&d[i], extension_mm_q32[i]);
+            slope_q32[i] = fx_abs(d[i].first_q32) > slope_q32[i] ? fx_abs(d[i].first_q32) : slope_q32[i];
+            bend_q32[i] = fx_abs(d[i].second_q32) > bend_q32[i] ? fx_abs(d[i].second_q32) : bend_q32[i];
+        }
+    }
+    for (unsigned i = 0; i < motion->cylinders; i++) {
+        const ramp_limits_t *own = &motion->cylinder[i].limits;
+        path_limits_narrow(limits, slope_q32[i] * STRAIGHT_PIECES / 3 * 4, own);
+        narrow_by_bend(limits, bend_q32[i] * STRAIGHT_PIECES * STRAIGHT_PIECES, own->acc_per_cycle2_q32);
+    }
+}

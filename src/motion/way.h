@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT
+ * way.h - what a planned way of the pose asks of the cylinders: their limits are known before the move begins.
+ * Private to src/motion.
+ */
+#ifndef WAY_H
+#define WAY_H
+
+#include "heave/motion.h"
+
+/** True if every cylinder can follow the poses of a quintic (33 of them are looked at). */
+bool way_is_feasible(const motion_t *motion, const quintic_t *quintic);
+
+/** Narrows path limits so that every cylinder keeps its own on the straight way between two poses (17 of them are looked at). */
+void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q32, path_limits_t *limits);
+
+#endif
