@@ -83,7 +83,7 @@ def run_topics(suite, label, heaved, trace, is_update=False):
 
 def build(compiler, flags, folder):
     """The program, from the whole tree."""
-    for command in (["cmake", "-S", TOP, "-B", folder, f"-DCMAKE_C_COMPILER={compiler}", "-DCMAKE_BUILD_TYPE=None", f"-DCMAKE_C_FLAGS={flags}"],
+    for command in (["cmake", "-G", "Ninja", "-S", TOP, "-B", folder, f"-DCMAKE_C_COMPILER={compiler}", "-DCMAKE_BUILD_TYPE=None", f"-DCMAKE_C_FLAGS={flags}"],
                     ["cmake", "--build", folder, "--target", "heaved", "--parallel"]):
         run = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
         assert run.returncode == 0, run.stdout[-3000:]
