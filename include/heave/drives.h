@@ -81,9 +81,9 @@ static inline HV_MUST_CHECK hv_status_t drives_poll(drives_t drives, uint64_t no
  *  and buses that watch for silence stay content. Never blocks (<= 200 us). A drive takes a set-point in ENABLED only. At
  *  the moment it becomes ENABLED the set-point must equal actual; an axis that is asked to jump faults (following error).
  *  @param setpoint_q32 the caller's, read before the return
- *  @return HV_OK; HV_ERR_AGAIN: the bus has not taken the last set yet, this one is dropped whole (send the next one next
- *          cycle; drives see the step from the last set that was taken; several in a row mean a stalled bus);
- *          HV_ERR_IO: the bus is gone. */
+ *  @return HV_OK; HV_ERR_AGAIN: the bus has not taken the last set yet, this one is dropped whole: let the motion wait and
+ *          offer the same set again next cycle, so that drives see no larger step. A backend that gets nothing through for
+ *          three of its bus periods reports the bus as gone in poll; HV_ERR_IO: the bus is gone. */
 static inline HV_MUST_CHECK hv_status_t drives_send(drives_t drives, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
 {
     return drives.ops->send(drives.ctx, now_us, setpoint_q32);

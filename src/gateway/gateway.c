@@ -81,6 +81,15 @@ static void send_setpoints(gateway_t *self, uint64_t now_us)
     self->unsent_cycles = drives_send(self->io.drives, now_us, setpoint_q32) == HV_OK ? 0 : self->unsent_cycles + 1;
 }
 
+/* Motion waits for a bus that has not taken the last set: what the drives get next then follows on what they got last. Where the
+ * set-points follow the drives there is nothing to wait for. */
+static void step_motion(gateway_t *self, uint64_t now_us)
+{
+    if (self->unsent_cycles == 0 || self->is_tracking_actual) {
+        motion_step(&self->motion, now_us, &self->output);
+    }
+}
+
 /* Pose of the plate from feedback. */
 static void find_actual_pose(gateway_t *self)
 {
@@ -130,7 +139,7 @@ void gateway_cycle(gateway_t *self, uint64_t now_us)
     operate_before_frames(self, now_us);
     intake_receive(self, now_us);
     operate_after_frames(self, now_us);
-    motion_step(&self->motion, now_us, &self->output);
+    step_motion(self, now_us);
     send_setpoints(self, now_us);
     operate_after_motion(self);
     write_relays(self);

@@ -10,7 +10,7 @@
 #define HOMING_TIMEOUT_US    120000000u
 #define RESET_TIMEOUT_US     2000000u
 #define AT_SETTLED_WINDOW_MM 1
-#define UNSENT_CYCLES_MAX    3u
+#define UNSENT_MAX_US        100000u /* the drives' own watch is quicker: it knows the period of its bus */
 
 static unsigned drive_count(const gateway_t *self)
 {
@@ -209,6 +209,11 @@ static void lose_bus(gateway_t *self, uint64_t now_us)
     self->is_tracking_actual = true;
 }
 
+static bool is_bus_stalled(const gateway_t *self)
+{
+    return self->unsent_cycles * (uint64_t)self->settings.cycle_us > UNSENT_MAX_US;
+}
+
 static bool is_torque_expected(const gateway_t *self)
 {
     const state_t state = self->supervisor.state;
@@ -324,7 +329,7 @@ static void step_auto(gateway_t *self, uint64_t now_us)
 void operate_before_frames(gateway_t *self, uint64_t now_us)
 {
     operate_event(self, EVENT_TICK, now_us);
-    if (drives_poll(self->io.drives, now_us, self->feedback) != HV_OK || self->unsent_cycles > UNSENT_CYCLES_MAX) {
+    if (drives_poll(self->io.drives, now_us, self->feedback) != HV_OK || is_bus_stalled(self)) {
         lose_bus(self, now_us);
     }
     watch_drives(self, now_us);

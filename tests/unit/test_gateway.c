@@ -664,16 +664,31 @@ static void test_fault_drive_that_drops_out_stops_all(void)
     expect_fault(FAULT_DRIVE_DROPPED, 2, 0);
 }
 
-static void test_fault_bus_busy_a_single_cycle_is_passed(void)
+/* Way of cylinder 1 in the next cycle. */
+static double step_taken_mm(void)
 {
-    engage();
-    start_moving(150);
-    rig_break(&m_rig, SIM_DRIVES_BUSY, 0, 0);
+    const double from = rig_cylinder_mm(&m_rig, 1);
     rig_run_ms(&m_rig, 1);
-    rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
-    rig_run_ms(&m_rig, 2000);
-    TEST_ASSERT_EQUAL(STATE_ENGAGED, seen()->state);
-    assert_heights(30);
+    return rig_cylinder_mm(&m_rig, 1) - from;
+}
+
+/* While the bus takes nothing the motion waits: the largest step the drives see is none that they would not have seen anyway. */
+static void test_fault_bus_busy_for_some_cycles_makes_motion_wait(void)
+{
+    for (unsigned busy_ms = 1; busy_ms < 60; busy_ms += 7) {
+        engage();
+        start_moving(150);
+        const double before = fabs(step_taken_mm());
+        rig_break(&m_rig, SIM_DRIVES_BUSY, 0, 0);
+        rig_run_ms(&m_rig, busy_ms);
+        const double at = rig_cylinder_mm(&m_rig, 1);
+        rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+        rig_run_ms(&m_rig, 2);
+        TEST_ASSERT_DOUBLE_WITHIN(0.2 * before, before, fabs(rig_cylinder_mm(&m_rig, 1) - at));
+        rig_run_ms(&m_rig, 2000);
+        TEST_ASSERT_EQUAL(STATE_ENGAGED, seen()->state);
+        assert_heights(30);
+    }
 }
 
 static void test_fault_bus_that_stays_busy_is_a_fault_and_returns_without_a_jump(void)
@@ -682,7 +697,7 @@ static void test_fault_bus_that_stays_busy_is_a_fault_and_returns_without_a_jump
         engage();
         start_moving(ms);
         rig_break(&m_rig, SIM_DRIVES_BUSY, 0, 0);
-        rig_run_ms(&m_rig, 6);
+        rig_run_ms(&m_rig, 105);
         expect_fault(FAULT_BUS, 0, 0);
         rig_run_ms(&m_rig, ms);
         rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
@@ -860,7 +875,7 @@ int main(void)
     RUN_TEST(test_fault_whose_cause_stays_cannot_be_reset);
     RUN_TEST(test_fault_drive_offline_stops_all);
     RUN_TEST(test_fault_drive_that_drops_out_stops_all);
-    RUN_TEST(test_fault_bus_busy_a_single_cycle_is_passed);
+    RUN_TEST(test_fault_bus_busy_for_some_cycles_makes_motion_wait);
     RUN_TEST(test_fault_bus_that_stays_busy_is_a_fault_and_returns_without_a_jump);
     RUN_TEST(test_fault_bus_gone_is_a_fault_that_can_be_reset);
     RUN_TEST(test_fault_drives_that_never_enable_time_out);
