@@ -12,6 +12,7 @@
 #include "heave/hal/relays.h"
 #include "heave/hal/udp.h"
 #include "heave/motion.h"
+#include "heave/owner.h"
 #include "heave/supervisor.h"
 #include "heave/telemetry.h"
 
@@ -51,10 +52,13 @@ typedef struct {
     bool is_shutdown_asked;  /**< nothing brings the platform up any more */
     uint32_t unsent_cycles;  /**< cycles in a row whose set-points the bus did not take */
     uint64_t reset_until_us; /**< a reset waits for the drives until then; 0 = none */
-    uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
-    uint16_t frame_mask;     /**< what the sender asked of the relays */
+    owner_t owner;
+    uint64_t start_us;   /**< of the silence timer: last accepted frame or entry into ENGAGED */
+    uint16_t frame_mask; /**< what the sender asked of the relays */
     uint16_t written_mask;
     bool is_mask_written;
+    uint64_t other_logged_us; /**< 0 = never */
+    uint32_t other_suppressed;
     uint64_t reject_logged_us[FRAME_ERRORS];
     uint32_t reject_suppressed[FRAME_ERRORS];
     uint8_t datagram[GATEWAY_DATAGRAM_MAX];

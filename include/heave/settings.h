@@ -7,6 +7,7 @@
 
 #include "heave/axes.h"
 #include "heave/frame.h"
+#include "heave/hal/udp.h"
 #include "heave/kin.h"
 #include "heave/stream.h"
 
@@ -58,7 +59,9 @@ typedef struct {
     q16_t engage_accel_mm_s2_q16;
 
     frame_dialect_t dialect;
-    uint32_t silence_hold_ms; /**< 0 = never, as the two below; after the last valid frame or the end of its timed move */
+    uint32_t takeover_ms;        /**< silence of the sender that drives, after which another may; 0: all are heard */
+    hal_udp_networks_t priority; /**< senders that need not wait, the first one in front */
+    uint32_t silence_hold_ms;    /**< 0 = never, as the two below; after the last valid frame or the end of its timed move */
     uint32_t silence_neutral_ms;
     uint32_t silence_settle_ms;
 

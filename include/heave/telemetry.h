@@ -8,6 +8,7 @@
 #include "heave/axes.h"
 #include "heave/drives.h"
 #include "heave/frame.h"
+#include "heave/owner.h"
 #include "heave/supervisor.h"
 
 /** Why the platform is in FAULT: the first reason is kept. */
@@ -37,6 +38,8 @@ typedef struct {
     uint32_t accepted[FRAME_COMMANDS];
     uint32_t accepted_timed; /**< of those, T forms */
     uint32_t rejected[FRAME_ERRORS];
+    uint32_t other_sender;  /**< valid frames of senders that do not drive */
+    uint32_t owner_changes; /**< take-overs by another sender */
     uint32_t not_followed;  /**< accepted while the platform was not ENGAGED */
     uint32_t impossible;    /**< extensions no pose belongs to */
     uint32_t clamped;       /**< cycles that pulled a target in */
@@ -71,6 +74,8 @@ typedef struct {
     uint8_t limiting_cylinder;
     uint32_t stream_period_us; /**< 0 while unknown */
     uint32_t stream_delay_us;
+    owner_t owner;          /**< who drives */
+    owner_t other;          /**< who sent last of those who do not */
     uint64_t last_frame_us; /**< 0 before the first accepted frame */
     counters_t counters;
 } snapshot_t;

@@ -10,30 +10,16 @@
 
 #include "heave/settings.h"
 
-#define CONFIG_ADDRESS_MAX  64u  /**< bytes of an address as text, with its NUL */
-#define CONFIG_PATH_MAX     108u /**< bytes of a socket path, with its NUL (the size of sun_path) */
-#define CONFIG_NETWORKS_MAX 16u
-#define CONFIG_RELAYS_MAX   12u
-#define CONFIG_NONE         INT32_MIN /**< a number in whose place the file has a word ("none", "settled") */
-
-/** An address or a network of senders: the first prefix bits of address have to match. */
-typedef struct {
-    bool is_ipv6;
-    uint8_t prefix;      /**< [0, 32], or [0, 128] for IPv6 */
-    uint8_t address[16]; /**< network byte order; IPv4 uses the first four */
-} config_network_t;
-
-/** Who may send frames; no network at all means everyone who reaches the port. */
-typedef struct {
-    uint8_t count;
-    config_network_t network[CONFIG_NETWORKS_MAX];
-} config_networks_t;
+#define CONFIG_ADDRESS_MAX 64u  /**< bytes of an address as text, with its NUL */
+#define CONFIG_PATH_MAX    108u /**< bytes of a socket path, with its NUL (the size of sun_path) */
+#define CONFIG_RELAYS_MAX  12u
+#define CONFIG_NONE        INT32_MIN /**< a number in whose place the file has a word ("none", "settled") */
 
 /** Where frames come in. */
 typedef struct {
     char bind[CONFIG_ADDRESS_MAX]; /**< numeric IPv4 or IPv6 address */
     uint16_t port;
-    config_networks_t allow;
+    hal_udp_networks_t allow; /**< who may send; none at all means everyone who reaches the port */
 } config_udp_t;
 
 /** What drives the cylinders. */

@@ -17,7 +17,7 @@ typedef enum {
     CONFIG_WORD,         /**< one of `words`, stored as its index */
     CONFIG_YES_NO,       /**< stored as bool */
     CONFIG_ADDRESS,      /**< numeric IPv4 or IPv6 address, stored as text */
-    CONFIG_NETWORKS,     /**< `any`, or addresses and networks, stored as config_networks_t */
+    CONFIG_NETWORKS,     /**< the word for an empty list, or addresses and networks, stored as hal_udp_networks_t */
     CONFIG_PATH,         /**< absolute path, stored as text */
     CONFIG_LINES         /**< `none`, or line numbers, stored as config_lines_t */
 } config_type_t;

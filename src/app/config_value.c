@@ -296,7 +296,7 @@ static bool parse_address(const config_key_t *key, span_t item, char *field, con
 }
 
 /* True where an address has a bit set behind the first prefix bits. */
-static bool has_host_bits(const config_network_t *network)
+static bool has_host_bits(const hal_udp_network_t *network)
 {
     const unsigned bits = network->is_ipv6 ? 128u : 32u;
     for (unsigned bit = network->prefix; bit < bits; bit++) {
@@ -308,7 +308,7 @@ static bool has_host_bits(const config_network_t *network)
     return false;
 }
 
-static bool parse_network(const config_key_t *key, span_t item, config_network_t *network, config_text_t *why)
+static bool parse_network(const config_key_t *key, span_t item, hal_udp_network_t *network, config_text_t *why)
 {
     const char *slash = item.length > 0 ? memchr(item.at, '/', item.length) : NULL;
     const span_t address = {item.at, slash == NULL ? item.length : (size_t)(slash - item.at)};
@@ -331,15 +331,15 @@ static bool parse_network(const config_key_t *key, span_t item, config_network_t
     return true;
 }
 
-static bool parse_networks(const config_key_t *key, const char *text, config_networks_t *networks, config_text_t *why)
+static bool parse_networks(const config_key_t *key, const char *text, hal_udp_networks_t *networks, config_text_t *why)
 {
     const unsigned count = count_items(text);
     const char *rest = text;
     memset(networks, 0, sizeof *networks);
-    if (strcmp(text, "any") == 0) {
+    if (strcmp(text, key->words) == 0) {
         return true;
     }
-    if (count > CONFIG_NETWORKS_MAX) {
+    if (count > HAL_UDP_NETWORKS_MAX) {
         return refuse_count(key, count, why);
     }
     while (rest != NULL) {

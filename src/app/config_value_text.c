@@ -59,13 +59,13 @@ static void format_integer(const config_key_t *key, const void *field, config_te
     }
 }
 
-static void format_networks(const config_networks_t *networks, config_text_t *text)
+static void format_networks(const config_key_t *key, const hal_udp_networks_t *networks, config_text_t *text)
 {
     if (networks->count == 0) {
-        config_text_add(text, "any");
+        config_text_add(text, "%s", key->words);
     }
     for (unsigned i = 0; i < networks->count; i++) {
-        const config_network_t *network = &networks->network[i];
+        const hal_udp_network_t *network = &networks->network[i];
         char address[INET6_ADDRSTRLEN] = "";
         (void)inet_ntop(network->is_ipv6 ? AF_INET6 : AF_INET, network->address, address, sizeof address);
         config_text_add(text, "%s%s", i == 0 ? "" : ",", address); /* no blanks: never longer than what was read */
@@ -115,7 +115,7 @@ void config_value_format(const config_key_t *key, const config_t *config, config
         config_text_add(text, "%s", (const char *)field);
         break;
     case CONFIG_NETWORKS:
-        format_networks(field, text);
+        format_networks(key, field, text);
         break;
     case CONFIG_LINES:
         format_lines(field, text);
@@ -191,7 +191,7 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         config_text_add(text, "a numeric IPv4 or IPv6 address");
         break;
     case CONFIG_NETWORKS:
-        config_text_add(text, "any, or up to %u addresses or networks such as 192.168.7.0/24", CONFIG_NETWORKS_MAX);
+        config_text_add(text, "%s, or up to %u addresses or networks such as 192.168.7.0/24", key->words, HAL_UDP_NETWORKS_MAX);
         break;
     case CONFIG_PATH:
         config_text_add(text, "an absolute path of at most %u characters", (unsigned)key->size - 1u);

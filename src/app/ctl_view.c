@@ -216,6 +216,18 @@ static void draw_counts(view_t *self, const char *label, const cJSON *counts)
     end_line(self);
 }
 
+/* Who drives, and who else would like to. */
+static void draw_senders(view_t *self, const cJSON *status)
+{
+    const cJSON *sender = member(status, "sender");
+    const cJSON *other = member(status, "other_sender");
+    put(self, "sender   %s", cJSON_IsObject(sender) ? word(sender, "address") : "none yet");
+    if (cJSON_IsObject(other)) {
+        put(self, "; not followed: %s, %.1f s ago", word(other, "address"), number(other, "age_ms") / 1000.0);
+    }
+    end_line(self);
+}
+
 static void draw_frames(view_t *self, const cJSON *status)
 {
     const cJSON *counters = member(status, "counters");
@@ -259,6 +271,7 @@ size_t ctl_view_table(const cJSON *status, const ctl_view_style_t *style, char t
     draw_poses(&view, status);
     draw_cylinders(&view, status);
     draw_relays(&view, status);
+    draw_senders(&view, status);
     draw_frames(&view, status);
     draw_fault(&view, status);
     return view.length;

@@ -3,6 +3,7 @@
  */
 #include "frames.h"
 
+#include <arpa/inet.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,8 +20,8 @@ static const char k_bad_escape[] = "unknown escape; \\n \\r \\t \\0 \\xNN \\\\ a
 static const char k_bad_octal[] = "\\0 with a digit after it could be octal; write \\x00, or \\xNN";
 static const char k_too_long[] = "the text is longer than 65507 bytes, more than a datagram holds";
 static const char k_bad_request[] =
-    "unknown request; !engage !hold !resume !park !reset !shutdown, !estop on, !estop off and !late N "
-    "are allowed (a datagram that starts with ! is written \\x21)";
+    "unknown request; !engage !hold !resume !park !reset !shutdown, !estop on, !estop off, !late N and "
+    "!from ADDRESS are allowed (a datagram that starts with ! is written \\x21)";
 
 static const struct {
     const char *word;
@@ -175,6 +176,33 @@ static bool take_word(cursor_t *self, const char *word)
     return true;
 }
 
+/* An address as a recording has it: IPv4, or IPv6 with `%` and an interface's number where it is link-local. */
+static bool read_address(cursor_t *self, frames_line_t *out)
+{
+    char text[INET6_ADDRSTRLEN] = "";
+    uint64_t scope = 0;
+    out->kind = FRAMES_FROM;
+    out->from = (hal_udp_peer_t){.port = 9};
+    for (size_t i = 0; self->at < self->end && !is_blank(*self->at) && *self->at != '%'; i++) {
+        if (i + 1 >= sizeof text) {
+            return false;
+        }
+        text[i] = *self->at++;
+    }
+    if (inet_pton(AF_INET, text, out->from.address) == 1) {
+        return true;
+    }
+    out->from.is_ipv6 = inet_pton(AF_INET6, text, out->from.address) == 1;
+    if (self->at < self->end && *self->at == '%') {
+        self->at++;
+        if (!is_digit_next(self) || !read_number(self, UINT32_MAX, &scope)) {
+            return false;
+        }
+    }
+    out->from.scope_id = (uint32_t)scope;
+    return out->from.is_ipv6;
+}
+
 static bool read_request_words(cursor_t *self, frames_line_t *out)
 {
     for (size_t i = 0; i < sizeof k_requests / sizeof k_requests[0]; i++) {
@@ -196,7 +224,7 @@ static bool read_request_words(cursor_t *self, frames_line_t *out)
         out->number = (uint32_t)cycles;
         return is_read;
     }
-    return false;
+    return take_word(self, "from") && read_address(self, out);
 }
 
 static const char *read_request(cursor_t *self, frames_line_t *out)
@@ -309,6 +337,11 @@ static int take_line(frames_t *self, char *text, size_t length, uint32_t number,
     if (self->count > 0 && line.t_us < self->line[self->count - 1].t_us) {
         return report_order(errors, path, &line, &self->line[self->count - 1]);
     }
+    if (line.kind == FRAMES_FROM) {
+        self->from = line.from;
+        return 0;
+    }
+    line.from = self->from;
     return append(self, &line) ? 0 : -1;
 }
 
@@ -323,7 +356,7 @@ int frames_load(frames_t *self, const char *path, FILE *errors)
     size_t length = 0;
     uint32_t number = 0;
     int bad = 0;
-    *self = (frames_t){.line = NULL};
+    *self = (frames_t){.from = {.address = {127, 0, 0, 1}, .port = 9}};
     if (!read_file(path, &self->bytes, &length)) {
         return -1;
     }

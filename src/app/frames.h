@@ -1,13 +1,15 @@
 /* SPDX-License-Identifier: MIT
  * frames.h - a file of frames for an offline run: datagrams and operator's requests with their times.
  * A line is `<t_ms> <text>`, `<t_ms> !request`, empty, or a comment that starts with `;`. Text has C escapes. Times have up to
- * three decimals and never decrease. Used before and during offline runs only; loading allocates.
+ * three decimals and never decrease. Datagrams come from 127.0.0.1 until a line `<t_ms> !from ADDRESS` says otherwise. Used
+ * before and during offline runs only; loading allocates.
  */
 #ifndef HEAVE_APP_FRAMES_H
 #define HEAVE_APP_FRAMES_H
 
 #include <stdio.h>
 
+#include "heave/hal/udp.h"
 #include "heave/supervisor.h"
 
 #define FRAMES_TIME_MAX_MS 4294967295u /**< 49 days */
@@ -18,7 +20,8 @@ typedef enum {
     FRAMES_DATAGRAM, /**< a sender sends text */
     FRAMES_REQUEST,  /**< `!engage` ...: what heavectl would ask for */
     FRAMES_ESTOP,    /**< `!estop on`, `!estop off` */
-    FRAMES_LATE      /**< `!late N`: N cycles are skipped and counted (recordings hold this) */
+    FRAMES_LATE,     /**< `!late N`: N cycles are skipped and counted (recordings hold this) */
+    FRAMES_FROM      /**< `!from ADDRESS`: who sends the datagrams from here on */
 } frames_kind_t;
 
 /** One line. */
@@ -29,15 +32,17 @@ typedef struct {
     uint32_t number;     /**< FRAMES_ESTOP: 1 = on; FRAMES_LATE: cycles */
     const uint8_t *text; /**< FRAMES_DATAGRAM: its bytes, escapes resolved */
     uint32_t length;
-    uint32_t line; /**< number in the file, from 1 */
+    hal_udp_peer_t from; /**< FRAMES_FROM: read from it; FRAMES_DATAGRAM: set by frames_load */
+    uint32_t line;       /**< number in the file, from 1 */
 } frames_line_t;
 
 /** A file in memory. */
 typedef struct {
-    frames_line_t *line; /**< without empty lines and comments */
+    frames_line_t *line; /**< without empty lines, comments and FRAMES_FROM */
     size_t count;
     size_t capacity;
-    char *bytes; /**< the file; texts point into it */
+    hal_udp_peer_t from; /**< of the datagrams of the lines to come */
+    char *bytes;         /**< the file; texts point into it */
 } frames_t;
 
 /** Reads one line, without its newline.

@@ -38,7 +38,7 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
 static void note(motion_loop_t *self, record_kind_t kind, uint32_t value)
 {
     if (self->is_recording) {
-        record_push(&self->record, kind, self->session.now_us, value, NULL, 0);
+        record_push(&self->record, kind, self->session.now_us, value);
     }
 }
 
@@ -85,11 +85,11 @@ static void write_down(motion_loop_t *self, bool is_zero)
 {
     const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
     if (self->is_recording && snapshot->is_estop_active != self->was_estop) {
-        record_push(&self->record, RECORD_ESTOP, snapshot->now_us, snapshot->is_estop_active, NULL, 0);
+        record_push(&self->record, RECORD_ESTOP, snapshot->now_us, snapshot->is_estop_active);
     }
     self->was_estop = snapshot->is_estop_active;
     if (self->is_recording && is_zero) {
-        record_push(&self->record, RECORD_ZERO, snapshot->now_us, (uint32_t)snapshot->goal, NULL, 0);
+        record_push(&self->record, RECORD_ZERO, snapshot->now_us, (uint32_t)snapshot->goal);
     }
     if (self->is_tracing && self->session.has_zero) {
         trace_row_t row;

@@ -58,7 +58,7 @@ static const frames_line_t *take_due(play_t *self, size_t *next, bool is_datagra
     return NULL;
 }
 
-/* The next datagram whose time has come; its sender is this machine. */
+/* The next datagram whose time has come. */
 static hv_status_t play_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
 {
     play_t *self = ctx;
@@ -67,7 +67,7 @@ static hv_status_t play_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t
         return HV_ERR_AGAIN;
     }
     *length = line->length;
-    *from = (hal_udp_peer_t){.address = {127, 0, 0, 1}, .port = 9};
+    *from = line->from;
     if (line->length > capacity) {
         return HV_ERR_RANGE;
     }
@@ -118,6 +118,7 @@ static void carry_out(play_t *self, const frames_line_t *line)
         gateway_note_late(gateway, line->number);
         break;
     case FRAMES_DATAGRAM:
+    case FRAMES_FROM:
         break;
     }
 }

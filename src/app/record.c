@@ -5,15 +5,23 @@
 
 #include "decimal.h"
 
-void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value, const uint8_t *bytes, size_t length)
+void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value)
 {
-    const record_head_t head = {t_us, value, (uint32_t)kind};
-    (void)ring_push(ring, &head, sizeof head, bytes, length);
+    const record_head_t head = {.t_us = t_us, .value = value, .kind = (uint32_t)kind};
+    (void)ring_push(ring, &head, sizeof head, NULL, 0);
+}
+
+void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const hal_udp_peer_t *from, const uint8_t *bytes,
+                          size_t length)
+{
+    const record_head_t head = {.from = *from, .t_us = t_us, .value = (uint32_t)length, .kind = (uint32_t)kind};
+    (void)ring_push(ring, &head, sizeof head, bytes, kind == RECORD_DATAGRAM ? length : 0);
 }
 
 void record_writer_init(record_writer_t *self, uint32_t cycle_us, engage_policy_t engage)
 {
-    *self = (record_writer_t){.cycle_us = cycle_us, .goal = engage == ENGAGE_AUTO ? STATE_ENGAGED : STATE_SETTLED};
+    *self = (record_writer_t){
+        .cycle_us = cycle_us, .goal = engage == ENGAGE_AUTO ? STATE_ENGAGED : STATE_SETTLED, .from = {.address = {127, 0, 0, 1}}};
 }
 
 /* Bytes that would be read as something else, or not at all: a `!` in front, blanks at both ends. */
@@ -105,6 +113,20 @@ static bool is_comment(const record_t *record, size_t length)
     return record->head.kind == RECORD_OVERSIZE || (record->head.kind == RECORD_DATAGRAM && length == 0);
 }
 
+/* The line that tells of another sender, if this datagram is of one. */
+static size_t put_from(record_writer_t *self, const record_t *record, char *to)
+{
+    const hal_udp_peer_t *from = &record->head.from;
+    if (record->head.kind != RECORD_DATAGRAM || hal_udp_is_same_host(from, &self->from)) {
+        return 0;
+    }
+    self->from = *from;
+    size_t at = decimal_put_ms(to, record->head.t_us - self->zero_us);
+    at += decimal_put_text(&to[at], " !from ");
+    at += hal_udp_host_text(from, &to[at], HAL_UDP_PEER_TEXT_MAX);
+    return at + decimal_put_text(&to[at], "\n");
+}
+
 size_t record_writer_line(record_writer_t *self, const record_t *record, size_t length, char to[RECORD_LINE_MAX])
 {
     if (record->head.kind == RECORD_ZERO) {
@@ -112,7 +134,8 @@ size_t record_writer_line(record_writer_t *self, const record_t *record, size_t 
         self->zero_us = record->head.t_us;
         return put_zero(self, (state_t)record->head.value, to);
     }
-    size_t at = self->has_zero && !is_comment(record, length) ? 0 : decimal_put_text(to, "; ");
+    const bool is_line = self->has_zero && !is_comment(record, length);
+    size_t at = is_line ? put_from(self, record, to) : decimal_put_text(to, "; ");
     at += decimal_put_ms(&to[at], record->head.t_us - self->zero_us);
     at += decimal_put_text(&to[at], " ");
     at += put_content(&to[at], record, length);

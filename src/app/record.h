@@ -21,7 +21,8 @@ typedef enum {
 
 /** What stands before the bytes of a datagram. */
 typedef struct {
-    uint64_t t_us; /**< of the cycle, since the start of the program */
+    hal_udp_peer_t from; /**< of a datagram */
+    uint64_t t_us;       /**< of the cycle, since the start of the program */
     uint32_t value;
     uint32_t kind;
 } record_head_t;
@@ -32,8 +33,8 @@ typedef struct {
     uint8_t bytes[GATEWAY_DATAGRAM_MAX];
 } record_t;
 
-/** Bytes that hold every line. */
-#define RECORD_LINE_MAX (4u * GATEWAY_DATAGRAM_MAX + 128u)
+/** Bytes that hold what one record becomes. */
+#define RECORD_LINE_MAX (4u * GATEWAY_DATAGRAM_MAX + 128u + HAL_UDP_PEER_TEXT_MAX)
 
 /** Turns records into lines. */
 typedef struct {
@@ -41,15 +42,20 @@ typedef struct {
     state_t goal; /**< that an offline run has at time zero */
     bool has_zero;
     uint64_t zero_us;
+    hal_udp_peer_t from; /**< as the lines so far say */
 } record_writer_t;
 
-/** Hands a record over; bytes may be NULL where length is 0. */
-void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value, const uint8_t *bytes, size_t length);
+/** Hands a record over that is no datagram. */
+void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value);
+
+/** Hands a datagram over: RECORD_DATAGRAM, or RECORD_OVERSIZE whose bytes are not kept. */
+void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const hal_udp_peer_t *from, const uint8_t *bytes,
+                          size_t length);
 
 /** @param engage the platform's policy: it decides what an offline run does by itself */
 void record_writer_init(record_writer_t *self, uint32_t cycle_us, engage_policy_t engage);
 
-/** Turns the next record into a line.
+/** Turns the next record into a line, and one before it where the sender is another one.
  *  @param length of the bytes
  *  @return bytes written, with the newline; 0: nothing to write */
 size_t record_writer_line(record_writer_t *self, const record_t *record, size_t length, char to[RECORD_LINE_MAX]);

@@ -136,6 +136,21 @@ static void write_stream(json_t *json, const snapshot_t *s)
     json_close(json, '}');
 }
 
+/* Who drives, or who else sent last; null where nobody does. */
+static void write_owner(json_t *json, const char *key, const owner_t *owner, uint64_t now_us)
+{
+    char peer[HAL_UDP_PEER_TEXT_MAX];
+    if (!owner->is_taken) {
+        json_null(json, key);
+        return;
+    }
+    (void)hal_udp_peer_text(&owner->peer, peer, sizeof peer);
+    json_open(json, key, '{');
+    json_text(json, "address", peer);
+    json_ms(json, "age_ms", now_us - owner->last_us);
+    json_close(json, '}');
+}
+
 static void write_frame_counters(json_t *json, const counters_t *c)
 {
     json_open(json, "accepted", '{');
@@ -161,6 +176,8 @@ static void write_counters(json_t *json, const motion_view_t *view)
     json_number(json, "refused_senders", view->udp_refused);
     json_number(json, "lost_in_kernel", view->udp_dropped);
     write_frame_counters(json, c);
+    json_number(json, "other_sender", c->other_sender);
+    json_number(json, "owner_changes", c->owner_changes);
     json_number(json, "not_followed", c->not_followed);
     json_number(json, "impossible", c->impossible);
     json_number(json, "clamped", c->clamped);
@@ -202,6 +219,8 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     write_relays(json, s);
     write_flags(json, s);
     write_stream(json, s);
+    write_owner(json, "sender", &s->owner, s->now_us);
+    write_owner(json, "other_sender", &s->other, s->now_us);
     write_counters(json, view);
     write_program(json, view, config, lost);
     json_close(json, '}');

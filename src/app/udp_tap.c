@@ -9,24 +9,9 @@
 
 #define REFUSED_PER_CALL 64u /* a flood from a stranger does not hold the cycle up; what is left of it waits */
 
-static bool is_within(const config_network_t *network, const hal_udp_peer_t *peer)
+bool udp_tap_is_allowed(const hal_udp_networks_t *allow, const hal_udp_peer_t *peer)
 {
-    const unsigned bytes = network->prefix / 8u;
-    const unsigned bits = network->prefix % 8u;
-    if (network->is_ipv6 != peer->is_ipv6 || memcmp(network->address, peer->address, bytes) != 0) {
-        return false;
-    }
-    return bits == 0 || (uint8_t)(network->address[bytes] ^ peer->address[bytes]) >> (8u - bits) == 0;
-}
-
-bool udp_tap_is_allowed(const config_networks_t *allow, const hal_udp_peer_t *peer)
-{
-    for (unsigned i = 0; i < allow->count; i++) {
-        if (is_within(&allow->network[i], peer)) {
-            return true;
-        }
-    }
-    return allow->count == 0;
+    return allow->count == 0 || hal_udp_rank(allow, peer) < allow->count;
 }
 
 static hv_status_t tap_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
@@ -39,9 +24,8 @@ static hv_status_t tap_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t 
         }
         if (udp_tap_is_allowed(self->allow, from)) {
             if (self->record != NULL) {
-                const bool is_whole = status == HV_OK;
-                record_push(self->record, is_whole ? RECORD_DATAGRAM : RECORD_OVERSIZE, *self->now_us, (uint32_t)*length, buffer,
-                            is_whole ? *length : 0);
+                record_push_datagram(self->record, status == HV_OK ? RECORD_DATAGRAM : RECORD_OVERSIZE, *self->now_us, from,
+                                     buffer, *length);
             }
             return status;
         }

@@ -12,14 +12,14 @@
 /** A tap; the caller owns it. */
 typedef struct {
     hal_udp_t behind;
-    const config_networks_t *allow;
+    const hal_udp_networks_t *allow;
     ring_t *record;         /**< NULL: nothing is written down */
     const uint64_t *now_us; /**< of the running cycle */
     uint32_t refused;       /**< out: datagrams of senders that are not allowed */
 } udp_tap_t;
 
 /** True where the address may send; an empty list lets everyone. */
-bool udp_tap_is_allowed(const config_networks_t *allow, const hal_udp_peer_t *peer);
+bool udp_tap_is_allowed(const hal_udp_networks_t *allow, const hal_udp_peer_t *peer);
 
 /** The tap as hal/udp.h wants it. */
 hal_udp_t udp_tap_hal(udp_tap_t *self);

@@ -128,6 +128,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->limiting_cylinder = self->output.limiting_cylinder;
     s->stream_period_us = stream_period_us(motion_stream(&self->motion));
     s->stream_delay_us = stream_delay_us(motion_stream(&self->motion));
+    s->owner = self->owner;
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
     s->counters.stretched = motion_stretched_count(&self->motion);
     find_actual_pose(self);

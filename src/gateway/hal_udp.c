@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * hal_udp.c - text of a peer's address, IPv6 in the canonical form of RFC 5952.
+ * hal_udp.c - addresses of peers: comparison, networks, and text, IPv6 in the canonical form of RFC 5952.
  */
 #include "heave/hal/udp.h"
 
@@ -82,22 +82,68 @@ static void put_ipv6(writer_t *out, const uint8_t *address)
     }
 }
 
+static void put_host(writer_t *out, const hal_udp_peer_t *peer)
+{
+    if (!peer->is_ipv6) {
+        put_ipv4(out, peer->address);
+        return;
+    }
+    put_ipv6(out, peer->address);
+    if (peer->scope_id != 0) {
+        put(out, '%');
+        put_number(out, peer->scope_id, 10);
+    }
+}
+
+size_t hal_udp_host_text(const hal_udp_peer_t *peer, char *text, size_t capacity)
+{
+    writer_t out = {text, capacity, 0};
+    text[0] = '\0';
+    put_host(&out, peer);
+    return out.length;
+}
+
 size_t hal_udp_peer_text(const hal_udp_peer_t *peer, char *text, size_t capacity)
 {
     writer_t out = {text, capacity, 0};
     text[0] = '\0';
     if (peer->is_ipv6) {
         put(&out, '[');
-        put_ipv6(&out, peer->address);
-        if (peer->scope_id != 0) {
-            put(&out, '%');
-            put_number(&out, peer->scope_id, 10);
-        }
+    }
+    put_host(&out, peer);
+    if (peer->is_ipv6) {
         put(&out, ']');
-    } else {
-        put_ipv4(&out, peer->address);
     }
     put(&out, ':');
     put_number(&out, peer->port, 10);
     return out.length;
+}
+
+/* True where the first bits of two addresses are the same. */
+static bool are_bits_same(const uint8_t *a, const uint8_t *b, unsigned bits)
+{
+    unsigned byte = 0;
+    for (; bits >= 8; bits -= 8, byte++) {
+        if (a[byte] != b[byte]) {
+            return false;
+        }
+    }
+    return bits == 0 || (uint8_t)(a[byte] ^ b[byte]) >> (8u - bits) == 0;
+}
+
+bool hal_udp_is_same_host(const hal_udp_peer_t *a, const hal_udp_peer_t *b)
+{
+    return a->is_ipv6 == b->is_ipv6 && a->scope_id == b->scope_id && are_bits_same(a->address, b->address, 128);
+}
+
+unsigned hal_udp_rank(const hal_udp_networks_t *list, const hal_udp_peer_t *peer)
+{
+    unsigned i = 0;
+    for (; i < list->count; i++) {
+        const hal_udp_network_t *network = &list->network[i];
+        if (network->is_ipv6 == peer->is_ipv6 && are_bits_same(network->address, peer->address, network->prefix)) {
+            break;
+        }
+    }
+    return i;
 }

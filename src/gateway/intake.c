@@ -89,6 +89,16 @@ static motion_target_t target_of(const gateway_t *self, const frame_t *frame)
     return target;
 }
 
+/* What was left out since the last line of its sort. */
+static void put_suppressed(text_t *text, uint32_t lines)
+{
+    if (lines > 0) {
+        text_put(text, "; before that ");
+        text_put_u32(text, lines);
+        text_put(text, " more");
+    }
+}
+
 /* One line for the first reject of a burst, with what was left out since the last one. */
 static void log_reject(gateway_t *self, const char *reason, frame_error_t error, const uint8_t *bytes, size_t length,
                        const hal_udp_peer_t *from, uint64_t now_us)
@@ -109,11 +119,7 @@ static void log_reject(gateway_t *self, const char *reason, frame_error_t error,
     text_put(&text, ": \"");
     text_put_escaped(&text, bytes, length < REJECT_TEXT_BYTES ? length : REJECT_TEXT_BYTES);
     text_put(&text, "\"");
-    if (self->reject_suppressed[error] > 0) {
-        text_put(&text, "; before that ");
-        text_put_u32(&text, self->reject_suppressed[error]);
-        text_put(&text, " more");
-    }
+    put_suppressed(&text, self->reject_suppressed[error]);
     hal_log_write(self->io.log, HAL_LOG_WARNING, line);
     *logged_us = now_us;
     self->reject_suppressed[error] = 0;
@@ -150,11 +156,69 @@ static void take_mask(gateway_t *self, const frame_t *frame)
     self->frame_mask = frame->relay_mask & wired;
 }
 
+/* One line for the first frame of a sender that does not drive, and then at times. */
+static void log_other(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    if (self->other_logged_us != 0 && now_us - self->other_logged_us < REJECT_LOG_INTERVAL_US) {
+        self->other_suppressed++;
+        return;
+    }
+    char line[HAL_LOG_TEXT_MAX + 1];
+    char peer[HAL_UDP_PEER_TEXT_MAX];
+    text_t text = text_start(line, sizeof line);
+    text_put(&text, "frame from ");
+    (void)hal_udp_peer_text(from, peer, sizeof peer);
+    text_put(&text, peer);
+    text_put(&text, " not followed: ");
+    (void)hal_udp_peer_text(&self->owner.peer, peer, sizeof peer);
+    text_put(&text, peer);
+    text_put(&text, " drives");
+    put_suppressed(&text, self->other_suppressed);
+    hal_log_write(self->io.log, HAL_LOG_WARNING, line);
+    self->other_logged_us = now_us;
+    self->other_suppressed = 0;
+}
+
+/* A sender takes over from another: the platform stops and goes to its first pose at engage speed. */
+static void change_owner(gateway_t *self, uint64_t now_us)
+{
+    char line[HAL_LOG_TEXT_MAX + 1];
+    char peer[HAL_UDP_PEER_TEXT_MAX];
+    text_t text = text_start(line, sizeof line);
+    (void)hal_udp_peer_text(&self->owner.peer, peer, sizeof peer);
+    text_put(&text, peer);
+    text_put(&text, " drives from now on");
+    hal_log_write(self->io.log, HAL_LOG_NOTICE, line);
+    self->snapshot.counters.owner_changes++;
+    if (self->supervisor.state == STATE_ENGAGED) {
+        operate_follow(self, now_us);
+    }
+}
+
+/* Whether the frame is of the sender that drives; keeps who that is. */
+static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    const settings_t *settings = &self->settings;
+    const owner_verdict_t verdict = owner_judge(&self->owner, from, (uint64_t)settings->takeover_ms * 1000, &settings->priority,
+                                                motion_timed_end_us(&self->motion), now_us);
+    if (verdict == OWNER_OTHER) {
+        self->snapshot.counters.other_sender++;
+        self->snapshot.other = (owner_t){.is_taken = true, .peer = *from, .last_us = now_us};
+        log_other(self, from, now_us);
+    } else if (verdict == OWNER_NEW) {
+        change_owner(self, now_us);
+    }
+    return verdict != OWNER_OTHER;
+}
+
 static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *from, uint64_t now_us)
 {
     const char *missing = missing_for(self, frame->command);
     if (missing != NULL) {
         refuse(self, frame->command, missing, from, now_us);
+        return;
+    }
+    if (!is_followed(self, from, now_us)) {
         return;
     }
     const motion_target_t target = target_of(self, frame);

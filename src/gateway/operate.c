@@ -91,7 +91,7 @@ static void begin_bring_up(gateway_t *self, uint64_t now_us)
     self->is_disable_due = false;
 }
 
-static void begin_following(gateway_t *self, uint64_t now_us)
+void operate_follow(gateway_t *self, uint64_t now_us)
 {
     self->start_us = now_us;
     self->frame_mask = self->settings.relay_safe_mask;
@@ -147,7 +147,7 @@ static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
         motion_rise(&self->motion);
         break;
     case ACTION_FOLLOW:
-        begin_following(self, now_us);
+        operate_follow(self, now_us);
         break;
     case ACTION_STOP:
         hold(self);

@@ -9,6 +9,9 @@
 /** Offers an event and carries out the action of the transition. Logs every change of state. */
 void operate_event(gateway_t *self, event_t event, uint64_t now_us);
 
+/** Follows a sender from now on: its first pose at engage speed, relays safe until it says otherwise. */
+void operate_follow(gateway_t *self, uint64_t now_us);
+
 /** Drives and inputs to events, before the frames of the cycle are read. */
 void operate_before_frames(gateway_t *self, uint64_t now_us);
 

@@ -257,6 +257,14 @@ void rig_send(rig_t *self, const char *text)
     }
 }
 
+void rig_send_from(rig_t *self, uint8_t host, const char *text)
+{
+    const hal_udp_peer_t from = {.address = {10, 0, 0, host}, .port = 4000};
+    if (sim_udp_push(&self->udp, (const uint8_t *)text, strlen(text), &from) != HV_OK) {
+        fail("sim_udp_push");
+    }
+}
+
 void rig_sendf(rig_t *self, const char *format, ...)
 {
     char text[600];

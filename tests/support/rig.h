@@ -51,6 +51,9 @@ void rig_start(rig_t *self, const settings_t *settings, bool is_settled);
 /** Sends one datagram. */
 void rig_send(rig_t *self, const char *text);
 
+/** Sends one datagram from 10.0.0.host. */
+void rig_send_from(rig_t *self, uint8_t host, const char *text);
+
 /** Sends one datagram put together as by printf. */
 void rig_sendf(rig_t *self, const char *format, ...);
 

@@ -147,6 +147,12 @@ def run_manual(suite, bench):
     with suite.case("!late is counted in the flags of its row alone"):
         rows = heave.rows_of(bench.play(bench.file("late.txt", "5 !late 3\n"), config=manual))
         assert [row["t_ms"] for row in rows if "late" in row["flags"].split("|")] == ["5.000"]
+    with suite.case("!from says who sends: one at a time is followed, and bad addresses are refused"):
+        lines = "".join(f"{4000 + 20 * i} !from 192.168.7.{5 + i % 2}\n{4000 + 20 * i} @A6:{10 - 20 * (i % 2)},0,0,0,0,0,0#\n" for i in range(100))
+        rows = heave.rows_of(bench.play(bench.file("two.txt", "1 !engage\n" + lines), config=manual))
+        assert min(float(row["roll_deg"]) for row in rows) >= 0 and rows[-1]["roll_deg"] == "10.000000000", rows[-1]
+        run = bench.heaved("--config", manual, "--play", bench.file("from.txt", "1 !from somebody\n2 !from 1.2.3.4 x\n3 !from ::1\n"))
+        assert [line.split(": ")[0][-1] for line in run.stderr.splitlines()] == ["1", "2"], run.stderr
     with suite.case("the run goes on until the motion rests"):
         rows = heave.rows_of(bench.play(bench.file("one.txt", "1 !engage\n4000 @A6:10,0,0,0,0,0,0#\n"), config=manual))
         assert rows[-1]["roll_deg"] == "10.000000000" and float(rows[-1]["t_ms"]) > 4200, rows[-1]

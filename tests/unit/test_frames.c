@@ -251,6 +251,8 @@ static void test_frames_load_missing_file_is_an_error(void)
 
 /* --- Recordings: what the writer writes, the reader reads --- */
 
+static const hal_udp_peer_t k_here = {.address = {127, 0, 0, 1}};
+
 static record_writer_t started_writer(void)
 {
     record_writer_t writer;
@@ -277,7 +279,7 @@ static void test_record_writer_every_datagram_reads_back(void)
     char line[RECORD_LINE_MAX];
     uint32_t random = 1;
     for (unsigned round = 0; round < 20000; round++) {
-        record_t record = {.head = {.t_us = 5000 + round * 37, .kind = RECORD_DATAGRAM}};
+        record_t record = {.head = {.from = k_here, .t_us = 5000 + round * 37, .kind = RECORD_DATAGRAM}};
         random = random * 1664525u + 1013904223u;
         const size_t length = round % 100 == 0 ? GATEWAY_DATAGRAM_MAX : 1 + (random >> 20) % 40;
         for (size_t i = 0; i < length; i++) {
@@ -319,6 +321,38 @@ static void test_record_writer_estop_and_late_read_back(void)
     read_back(line, record_writer_line(&writer, &record, 0, line));
     TEST_ASSERT_EQUAL_INT(FRAMES_LATE, m_line.kind);
     TEST_ASSERT_EQUAL_UINT32(12, m_line.number);
+}
+
+/* Reads what the writer wrote as a file and tells the sender of its only datagram. */
+static void expect_sender(const char *lines, size_t length, const hal_udp_peer_t *from)
+{
+    char path[] = "/tmp/heave-frames-XXXXXX";
+    const int fd = mkstemp(path);
+    TEST_ASSERT_EQUAL_INT((int)length, (int)write(fd, lines, length));
+    (void)close(fd);
+    frames_t frames;
+    TEST_ASSERT_EQUAL_INT(0, frames_load(&frames, path, stderr));
+    TEST_ASSERT_EQUAL_UINT(1, frames.count);
+    TEST_ASSERT_TRUE(hal_udp_is_same_host(from, &frames.line[0].from));
+    frames_free(&frames);
+    (void)remove(path);
+}
+
+static void test_record_writer_another_sender_reads_back(void)
+{
+    static const hal_udp_peer_t k_from[] = {
+        {.address = {192, 168, 1, 5}, .port = 4000},
+        {.address = {0xfe, 0x80, [15] = 7}, .scope_id = 3, .is_ipv6 = true},
+        {.address = {0x20, 1, 0xd, 0xb8, [15] = 1}, .is_ipv6 = true},
+    };
+    for (size_t i = 0; i < sizeof k_from / sizeof k_from[0]; i++) {
+        record_writer_t writer = started_writer();
+        char line[RECORD_LINE_MAX];
+        const record_t record = {.head = {.from = k_from[i], .t_us = 6000, .kind = RECORD_DATAGRAM}, .bytes = "@A6:1#"};
+        expect_sender(line, record_writer_line(&writer, &record, 6, line), &k_from[i]);
+        read_back(line, record_writer_line(&writer, &record, 6, line)); /* the same one again: no more lines than one */
+        TEST_ASSERT_EQUAL_INT(FRAMES_DATAGRAM, m_line.kind);
+    }
 }
 
 /* What stands before time zero is a comment. */
@@ -374,6 +408,7 @@ int main(void)
     RUN_TEST(test_record_writer_every_datagram_reads_back);
     RUN_TEST(test_record_writer_requests_read_back);
     RUN_TEST(test_record_writer_estop_and_late_read_back);
+    RUN_TEST(test_record_writer_another_sender_reads_back);
     RUN_TEST(test_record_writer_before_zero_writes_comments);
     RUN_TEST(test_record_writer_zero_brings_an_offline_run_to_the_same_goal);
     return UNITY_END();

@@ -512,6 +512,75 @@ static void test_silence_bad_frames_do_not_count_as_a_sender(void)
     TEST_ASSERT_EQUAL(STATE_HOLD, seen()->state);
 }
 
+/* ---- two senders ---- */
+
+/* Two senders, poses far apart, mixed at random: only the first one moves anything. */
+static void test_senders_two_at_once_only_one_is_followed(void)
+{
+    m_settings.takeover_ms = 2500;
+    start(true);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 20000));
+    for (unsigned i = 0; i < 300; i++) {
+        rig_send_from(&m_rig, 1, "@A6:0,0,0,0,0,40,F1#");
+        rig_run_ms(&m_rig, 1 + i % 9);
+        rig_send_from(&m_rig, 2, "@A6:0,0,0,0,0,-40,F2#");
+        rig_run_ms(&m_rig, 1 + i % 7);
+    }
+    assert_heights(40);
+    TEST_ASSERT_EQUAL_HEX16(0xF1, m_rig.relays.mask);
+    TEST_ASSERT_EQUAL_UINT32(300, counted()->other_sender);
+    TEST_ASSERT_EQUAL_UINT32(300, counted()->accepted[FRAME_A6]);
+    TEST_ASSERT_EQUAL_UINT8(1, seen()->owner.peer.address[3]);
+    TEST_ASSERT_EQUAL_UINT8(2, seen()->other.peer.address[3]);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "frame from 10.0.0.2:4000 not followed: 10.0.0.1:4000 drives"));
+}
+
+/* From any moment of the first one's motion: the second takes over after the silence, at engage speed. */
+static void test_senders_take_over_after_silence_at_engage_speed(void)
+{
+    m_settings.takeover_ms = 500;
+    m_settings.silence_hold_ms = 0;
+    for (unsigned ms = 1; ms < 300; ms += 43) {
+        start(true);
+        TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 20000));
+        rig_send_from(&m_rig, 1, "@A6:0,0,0,0,0,40,F1#");
+        rig_run_ms(&m_rig, 3000);
+        rig_send_from(&m_rig, 1, "@A6:0,0,0,0,0,20,F1#");
+        rig_run_ms(&m_rig, 500);
+        rig_check_reset(&m_rig);
+        rig_send_from(&m_rig, 2, "@A6:0,0,0,0,0,-40#");
+        for (unsigned i = 0; i < 400; i++) {
+            rig_run_ms(&m_rig, 10);
+            rig_send_from(&m_rig, 2, "@A6:0,0,0,0,0,-40#");
+        }
+        assert_heights(-40);
+        TEST_ASSERT_TRUE(m_rig.check.speed * 400 <= 50.1);
+        TEST_ASSERT_EQUAL_HEX16(m_settings.relay_safe_mask, m_rig.relays.mask); /* what the first one switched is undone */
+        TEST_ASSERT_EQUAL_UINT32(1, counted()->owner_changes);
+    }
+}
+
+static void test_senders_priority_takes_over_in_motion_without_a_jump(void)
+{
+    m_settings.takeover_ms = 2500;
+    m_settings.priority = (hal_udp_networks_t){.count = 1, .network = {{.prefix = 32, .address = {10, 0, 0, 2}}}};
+    for (unsigned ms = 1; ms < 400; ms += 57) {
+        start(true);
+        TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 20000));
+        rig_send_from(&m_rig, 1, "@A6:0,0,0,0,0,0#");
+        rig_run_ms(&m_rig, 1000);
+        rig_send_from(&m_rig, 1, "@A6:0,0,0,0,0,60#");
+        rig_run_ms(&m_rig, ms);
+        for (unsigned i = 0; i < 400; i++) {
+            rig_send_from(&m_rig, 2, "@A6:0,0,0,0,0,-40#");
+            rig_send_from(&m_rig, 1, "@A6:0,0,0,0,0,60#");
+            rig_run_ms(&m_rig, 10);
+        }
+        assert_heights(-40); /* limits are judged in tearDown */
+        TEST_ASSERT_EQUAL_UINT32(1, counted()->owner_changes);
+    }
+}
+
 /* ---- e-stop ---- */
 
 static void start_moving(unsigned ms)
@@ -868,6 +937,9 @@ int main(void)
     RUN_TEST(test_silence_operator_hold_is_not_released_by_frames);
     RUN_TEST(test_silence_never_strikes_while_a_timed_move_runs);
     RUN_TEST(test_silence_bad_frames_do_not_count_as_a_sender);
+    RUN_TEST(test_senders_two_at_once_only_one_is_followed);
+    RUN_TEST(test_senders_take_over_after_silence_at_engage_speed);
+    RUN_TEST(test_senders_priority_takes_over_in_motion_without_a_jump);
     RUN_TEST(test_estop_in_motion_latches_and_comes_up_through_homing);
     RUN_TEST(test_estop_input_that_cannot_be_read_counts_as_active);
     RUN_TEST(test_estop_in_every_state_ends_in_estop);

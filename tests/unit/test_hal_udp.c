@@ -99,6 +99,51 @@ static void test_peer_text_short_buffer_is_cut_and_ended(void)
     }
 }
 
+static void test_host_text_is_the_address_alone(void)
+{
+    char text[HAL_UDP_PEER_TEXT_MAX];
+    (void)hal_udp_host_text(&(hal_udp_peer_t){.address = {192, 168, 1, 5}, .port = 9800}, text, sizeof text);
+    TEST_ASSERT_EQUAL_STRING("192.168.1.5", text);
+    const hal_udp_peer_t local = {.address = {0xfe, 0x80, [15] = 1}, .scope_id = 2, .is_ipv6 = true, .port = 7};
+    (void)hal_udp_host_text(&local, text, sizeof text);
+    TEST_ASSERT_EQUAL_STRING("fe80::1%2", text);
+}
+
+static void test_is_same_host_tells_addresses_and_widths_not_ports(void)
+{
+    const hal_udp_peer_t a = {.address = {10, 0, 0, 1}, .port = 1};
+    hal_udp_peer_t b = a;
+    b.port = 2;
+    TEST_ASSERT_TRUE(hal_udp_is_same_host(&a, &b));
+    b.address[3] = 2;
+    TEST_ASSERT_FALSE(hal_udp_is_same_host(&a, &b));
+    b = a;
+    b.is_ipv6 = true;
+    TEST_ASSERT_FALSE(hal_udp_is_same_host(&a, &b));
+    b = a;
+    b.scope_id = 3;
+    TEST_ASSERT_FALSE(hal_udp_is_same_host(&a, &b));
+}
+
+/* Against the bits one by one. */
+static void test_rank_random_networks_match_bit_by_bit(void)
+{
+    for (unsigned round = 0; round < 20000; round++) {
+        hal_udp_network_t network = {.is_ipv6 = next_random() & 1u};
+        network.prefix = (uint8_t)(next_random() % (network.is_ipv6 ? 129u : 33u));
+        hal_udp_peer_t peer = {.is_ipv6 = (next_random() & 7u) == 0 ? !network.is_ipv6 : network.is_ipv6};
+        for (unsigned i = 0; i < (network.is_ipv6 ? 16u : 4u); i++) {
+            network.address[i] = (uint8_t)next_random();
+            peer.address[i] = network.address[i];
+        }
+        const unsigned flipped = next_random() % (network.is_ipv6 ? 128u : 32u);
+        peer.address[flipped / 8] ^= (uint8_t)(0x80u >> flipped % 8);
+        const hal_udp_networks_t list = {.count = 1, .network = {network}};
+        const bool is_in = peer.is_ipv6 == network.is_ipv6 && flipped >= network.prefix;
+        TEST_ASSERT_EQUAL_UINT(is_in ? 0 : 1, hal_udp_rank(&list, &peer));
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -107,5 +152,8 @@ int main(void)
     RUN_TEST(test_peer_text_longest_fits_the_documented_size);
     RUN_TEST(test_peer_text_random_ipv6_matches_inet_ntop);
     RUN_TEST(test_peer_text_short_buffer_is_cut_and_ended);
+    RUN_TEST(test_host_text_is_the_address_alone);
+    RUN_TEST(test_is_same_host_tells_addresses_and_widths_not_ports);
+    RUN_TEST(test_rank_random_networks_match_bit_by_bit);
     return UNITY_END();
 }

@@ -83,7 +83,7 @@ static hal_udp_peer_t ipv4(uint8_t a, uint8_t b, uint8_t c, uint8_t d)
 
 static void test_udp_tap_is_allowed_without_a_list_everyone_is(void)
 {
-    const config_networks_t none = {.count = 0};
+    const hal_udp_networks_t none = {.count = 0};
     const hal_udp_peer_t peer = ipv4(1, 2, 3, 4);
     TEST_ASSERT_TRUE(udp_tap_is_allowed(&none, &peer));
 }
@@ -97,8 +97,8 @@ static void test_udp_tap_is_allowed_compares_the_first_bits(void)
         const unsigned prefix = round % 33;
         const uint32_t network = 0xC0A80780u;
         const uint32_t address = network ^ (round % 3 == 0 ? random : 1u << (random >> 27));
-        const config_networks_t allow = {.count = 1,
-                                         .network = {{.prefix = (uint8_t)prefix, .address = {0xC0, 0xA8, 0x07, 0x80}}}};
+        const hal_udp_networks_t allow = {.count = 1,
+                                          .network = {{.prefix = (uint8_t)prefix, .address = {0xC0, 0xA8, 0x07, 0x80}}}};
         const hal_udp_peer_t peer =
             ipv4((uint8_t)(address >> 24), (uint8_t)(address >> 16), (uint8_t)(address >> 8), (uint8_t)address);
         const bool is_same = prefix == 0 || (network ^ address) >> (32 - prefix) == 0;
@@ -108,7 +108,7 @@ static void test_udp_tap_is_allowed_compares_the_first_bits(void)
 
 static void test_udp_tap_is_allowed_keeps_ipv4_and_ipv6_apart(void)
 {
-    config_networks_t allow = {.count = 1, .network = {{.is_ipv6 = true, .prefix = 0}}};
+    hal_udp_networks_t allow = {.count = 1, .network = {{.is_ipv6 = true, .prefix = 0}}};
     hal_udp_peer_t peer = ipv4(1, 2, 3, 4);
     TEST_ASSERT_FALSE(udp_tap_is_allowed(&allow, &peer));
     peer.is_ipv6 = true;

@@ -16,6 +16,21 @@ typedef struct {
     bool is_ipv6;
 } hal_udp_peer_t;
 
+/** An address or a network: the first prefix bits of address have to match. */
+typedef struct {
+    bool is_ipv6;
+    uint8_t prefix;      /**< [0, 32], or [0, 128] for IPv6 */
+    uint8_t address[16]; /**< network byte order; IPv4 uses the first four */
+} hal_udp_network_t;
+
+#define HAL_UDP_NETWORKS_MAX 16u
+
+/** A list of them, the first one first. */
+typedef struct {
+    uint8_t count;
+    hal_udp_network_t network[HAL_UDP_NETWORKS_MAX];
+} hal_udp_networks_t;
+
 /** Holds every text of hal_udp_peer_text() with its NUL. */
 #define HAL_UDP_PEER_TEXT_MAX 64u
 
@@ -62,5 +77,14 @@ static inline HV_MUST_CHECK hv_status_t hal_udp_dropped(hal_udp_t udp, uint32_t 
  *          NUL.
  *  @return length without NUL */
 size_t hal_udp_peer_text(const hal_udp_peer_t *peer, char *text, size_t capacity);
+
+/** "192.168.1.5" or "fe80::1%2": the address alone. Else as hal_udp_peer_text(). */
+size_t hal_udp_host_text(const hal_udp_peer_t *peer, char *text, size_t capacity);
+
+/** True for two peers with one address, whatever their ports: a program that starts again has another port. Pure. */
+bool hal_udp_is_same_host(const hal_udp_peer_t *a, const hal_udp_peer_t *b);
+
+/** Index of the first network the peer is in; list->count where it is in none. Pure. */
+unsigned hal_udp_rank(const hal_udp_networks_t *list, const hal_udp_peer_t *peer);
 
 #endif

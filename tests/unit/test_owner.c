@@ -1,0 +1,129 @@
+/* SPDX-License-Identifier: MIT
+ * test_owner.c - who drives, against a model that keeps the whole history.
+ */
+#include <string.h>
+
+#include "unity.h"
+
+#include "heave/owner.h"
+
+#define SILENCE_US 2500000u
+
+static owner_t m_owner;
+static hal_udp_networks_t m_priority;
+
+void setUp(void)
+{
+    m_owner = (owner_t){.is_taken = false};
+    m_priority = (hal_udp_networks_t){.count = 0};
+}
+
+void tearDown(void) {}
+
+static hal_udp_peer_t host(uint8_t last)
+{
+    return (hal_udp_peer_t){.address = {10, 0, 0, last}, .port = (uint16_t)(1000 + last)};
+}
+
+static owner_verdict_t frame_from(uint8_t last, uint64_t now_us)
+{
+    const hal_udp_peer_t peer = host(last);
+    return owner_judge(&m_owner, &peer, SILENCE_US, &m_priority, 0, now_us);
+}
+
+static void test_owner_judge_first_sender_drives(void)
+{
+    TEST_ASSERT_EQUAL(OWNER_DRIVES, frame_from(1, 0));
+    TEST_ASSERT_EQUAL(OWNER_OTHER, frame_from(2, 1));
+    TEST_ASSERT_EQUAL_UINT8(1, m_owner.peer.address[3]);
+}
+
+static void test_owner_judge_same_host_with_another_port_still_drives(void)
+{
+    hal_udp_peer_t peer = host(1);
+    (void)frame_from(1, 0);
+    peer.port = 65000;
+    TEST_ASSERT_EQUAL(OWNER_DRIVES, owner_judge(&m_owner, &peer, SILENCE_US, &m_priority, 0, 5));
+    TEST_ASSERT_EQUAL_UINT16(65000, m_owner.peer.port);
+}
+
+static void test_owner_judge_silence_to_the_microsecond_lets_another_take_over(void)
+{
+    (void)frame_from(1, 1000);
+    TEST_ASSERT_EQUAL(OWNER_OTHER, frame_from(2, 1000 + SILENCE_US - 1));
+    TEST_ASSERT_EQUAL(OWNER_NEW, frame_from(2, 1000 + SILENCE_US));
+    TEST_ASSERT_EQUAL(OWNER_OTHER, frame_from(1, 1001 + SILENCE_US));
+    TEST_ASSERT_EQUAL(OWNER_DRIVES, frame_from(2, 1002 + SILENCE_US));
+}
+
+static void test_owner_judge_others_do_not_lengthen_their_own_wait(void)
+{
+    (void)frame_from(1, 0);
+    for (uint64_t t = 1; t < SILENCE_US; t += 9973) {
+        TEST_ASSERT_EQUAL(OWNER_OTHER, frame_from(2, t));
+    }
+    TEST_ASSERT_EQUAL(OWNER_NEW, frame_from(2, SILENCE_US));
+}
+
+static void test_owner_judge_running_timed_move_is_not_silence(void)
+{
+    const hal_udp_peer_t other = host(2);
+    const uint64_t end_us = 10000000;
+    (void)frame_from(1, 0);
+    TEST_ASSERT_EQUAL(OWNER_OTHER, owner_judge(&m_owner, &other, SILENCE_US, &m_priority, end_us, end_us + SILENCE_US - 1));
+    TEST_ASSERT_EQUAL(OWNER_NEW, owner_judge(&m_owner, &other, SILENCE_US, &m_priority, end_us, end_us + SILENCE_US));
+}
+
+static void test_owner_judge_without_silence_every_sender_is_followed(void)
+{
+    for (uint8_t i = 0; i < 9; i++) {
+        const hal_udp_peer_t peer = host(i);
+        TEST_ASSERT_EQUAL(OWNER_DRIVES, owner_judge(&m_owner, &peer, 0, &m_priority, 0, i));
+    }
+}
+
+static void test_owner_judge_priority_takes_over_at_once_and_never_backwards(void)
+{
+    m_priority = (hal_udp_networks_t){
+        .count = 2, .network = {{.prefix = 32, .address = {10, 0, 0, 3}}, {.prefix = 31, .address = {10, 0, 0, 4}}}};
+    TEST_ASSERT_EQUAL(OWNER_DRIVES, frame_from(1, 0));
+    TEST_ASSERT_EQUAL(OWNER_NEW, frame_from(5, 1));   /* in the network of the second row */
+    TEST_ASSERT_EQUAL(OWNER_OTHER, frame_from(4, 2)); /* of the same rank */
+    TEST_ASSERT_EQUAL(OWNER_OTHER, frame_from(1, 3));
+    TEST_ASSERT_EQUAL(OWNER_NEW, frame_from(3, 4));
+    TEST_ASSERT_EQUAL(OWNER_OTHER, frame_from(5, 5));
+    TEST_ASSERT_EQUAL(OWNER_NEW, frame_from(1, 4 + SILENCE_US)); /* silence beats rank */
+}
+
+/* Random senders and times: whoever drives has always either been first, outranked, or waited for silence. */
+static void test_owner_judge_random_senders_agree_with_the_history(void)
+{
+    uint32_t random = 7;
+    uint64_t now_us = 0;
+    uint64_t last_us[4] = {0};
+    int driver = -1;
+    for (unsigned i = 0; i < 200000; i++) {
+        random = random * 1664525u + 1013904223u;
+        const unsigned who = random >> 30;
+        now_us += (random >> 8) % 4000 == 0 ? SILENCE_US + (random >> 5) % 7 - 3 : (random >> 12) % 5000;
+        const bool was_silent = driver >= 0 && now_us - last_us[driver] >= SILENCE_US;
+        const owner_verdict_t expected = driver < 0 || driver == (int)who ? OWNER_DRIVES : was_silent ? OWNER_NEW : OWNER_OTHER;
+        TEST_ASSERT_EQUAL(expected, frame_from((uint8_t)who, now_us));
+        driver = expected == OWNER_OTHER ? driver : (int)who;
+        last_us[who] = now_us;
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_owner_judge_first_sender_drives);
+    RUN_TEST(test_owner_judge_same_host_with_another_port_still_drives);
+    RUN_TEST(test_owner_judge_silence_to_the_microsecond_lets_another_take_over);
+    RUN_TEST(test_owner_judge_others_do_not_lengthen_their_own_wait);
+    RUN_TEST(test_owner_judge_running_timed_move_is_not_silence);
+    RUN_TEST(test_owner_judge_without_silence_every_sender_is_followed);
+    RUN_TEST(test_owner_judge_priority_takes_over_at_once_and_never_backwards);
+    RUN_TEST(test_owner_judge_random_senders_agree_with_the_history);
+    return UNITY_END();
+}
