@@ -64,6 +64,7 @@ typedef struct {
 typedef struct {
     settings_t settings;
     config_udp_t udp;
+    uint32_t late_hold_cycles; /**< of the program: see motion_loop.h */
     char control_socket[CONFIG_PATH_MAX];
     config_drives_t drives;
     config_sim_t sim;

@@ -77,6 +77,8 @@ const config_key_t config_keys[] = {
      .help = "six cylinders; three round a central guide; three on hinges (yaw, x and y then follow from roll and pitch)"},
     {KEY("platform", "cycle_us"), AT(settings.cycle_us), .type = CONFIG_INTEGER, .unit = "us", .fallback = "1000",
      RANGE(500, 10000), .help = "period of the motion cycle"},
+    {KEY("platform", "late_hold_cycles"), AT(late_hold_cycles), .type = CONFIG_INTEGER, .unit = "", .fallback = "3",
+     RANGE(0, 1000), .help = "a cycle that is late by more cycles than that holds the platform; 0 = never"},
     {KEY("platform", "engage"), AT(settings.engage), .type = CONFIG_WORD, .unit = "", .fallback = "manual",
      .words = "manual|auto",
      .help = "who brings the platform up: an operator's request, or heaved by itself once after the start"},

@@ -102,7 +102,7 @@ static void answer_error(control_client_t *client, const char *error, const char
 static void answer_status(control_t *self, control_client_t *client)
 {
     json_t json = start_answer(client);
-    status_json_write(&json, &self->view.view, self->config, &self->lost);
+    status_json_write(&json, &self->view.view, self->config, &self->lost, &self->loop->times);
     answer(client, &json);
 }
 

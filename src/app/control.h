@@ -15,7 +15,7 @@
 #define CONTROL_CLIENTS      8u
 #define CONTROL_FDS          (CONTROL_CLIENTS + 1u)
 #define CONTROL_REQUEST_MAX  64u
-#define CONTROL_ANSWER_MAX   8192u
+#define CONTROL_ANSWER_MAX   16384u
 #define CONTROL_OUT_BYTES    (4u * CONTROL_ANSWER_MAX)
 #define CONTROL_WATCH_HZ     20u /* where the client does not say */
 #define CONTROL_WATCH_MAX_HZ 50u

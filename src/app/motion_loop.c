@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "heave/text.h"
 #include "record.h"
 
 #define PRIORITY           80 /* above threaded interrupts, which have 50 */
@@ -19,6 +20,7 @@
 hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_udp_t udp, hal_log_t log, hal_clock_t clock)
 {
     self->clock = clock;
+    self->late_hold_cycles = config->late_hold_cycles;
     seqlock_init(&self->view, self->view_word, MOTION_VIEW_WORDS);
     ring_init(&self->requests, self->request_bytes, sizeof self->request_bytes);
     ring_init(&self->results, self->result_bytes, sizeof self->result_bytes);
@@ -68,13 +70,10 @@ static void answer_requests(motion_loop_t *self, motion_result_t *result, unsign
     }
 }
 
-static void publish(motion_loop_t *self, uint64_t late_us)
+static void publish(motion_loop_t *self)
 {
     motion_view_t *view = &self->current.view;
     view->snapshot = *gateway_snapshot(&self->session.gateway);
-    view->wakes++;
-    view->wake_sum_us += late_us;
-    view->wake_max_us = late_us > view->wake_max_us ? late_us : view->wake_max_us;
     view->udp_refused = self->tap.refused;
     (void)!hal_udp_dropped(self->tap.behind, &view->udp_dropped);
     seqlock_write(&self->view, self->current.word);
@@ -100,6 +99,24 @@ static void write_down(motion_loop_t *self, bool is_zero)
 
 /* --- The thread --- */
 
+/* The drives have had no set-points for so long that going on as if nothing had happened would be a guess. As an operator's
+ * request, so that a recording replays it. */
+static void hold_if_too_late(motion_loop_t *self, uint32_t cycles)
+{
+    const state_t state = gateway_snapshot(&self->session.gateway)->state;
+    const bool is_leading = state == STATE_ENGAGED || state == STATE_RISING || state == STATE_NEUTRAL;
+    if (self->late_hold_cycles == 0 || cycles <= self->late_hold_cycles || !is_leading) {
+        return;
+    }
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    text_put_u32(&text, cycles);
+    text_put(&text, " cycles late: holding ([platform] late_hold_cycles)");
+    hal_log_write(self->io.log, HAL_LOG_ERROR, line);
+    note(self, RECORD_REQUEST, EVENT_HOLD);
+    (void)!gateway_request(&self->session.gateway, EVENT_HOLD, self->session.now_us);
+}
+
 static void run_cycle(motion_loop_t *self, uint64_t late_us)
 {
     motion_result_t result[REQUESTS_PER_CYCLE];
@@ -107,11 +124,12 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     if (skipped > 0) {
         note(self, RECORD_LATE, skipped);
         gateway_note_late(&self->session.gateway, skipped);
+        hold_if_too_late(self, skipped);
     }
     const unsigned requests = take_requests(self, result);
     const bool is_zero = session_cycle(&self->session);
     write_down(self, is_zero);
-    publish(self, late_us);
+    publish(self);
     answer_requests(self, result, requests);
 }
 
@@ -131,6 +149,8 @@ static void run(motion_loop_t *self)
             break;
         }
         run_cycle(self, late_us);
+        histogram_add(&self->times.wake, late_us);
+        histogram_add(&self->times.work, hal_clock_now_us(self->clock) - now_us);
         deadline_us += cycle_us * (1 + late_us / cycle_us);
     }
 }

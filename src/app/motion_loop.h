@@ -9,6 +9,7 @@
 
 #include "config.h"
 #include "heave/hal/clock.h"
+#include "histogram.h"
 #include "rig.h"
 #include "ring.h"
 #include "seqlock.h"
@@ -18,14 +19,17 @@
 /** What the service thread sees: the newest cycle and how punctual it was. */
 typedef struct {
     snapshot_t snapshot;
-    uint64_t wakes;       /**< cycles executed */
-    uint64_t wake_sum_us; /**< of their lateness, for a mean */
-    uint64_t wake_max_us;
     uint32_t udp_refused; /**< datagrams of senders that are not allowed */
     uint32_t udp_dropped; /**< datagrams the kernel lost because its queue was full */
     bool is_realtime;     /**< scheduled before everything else */
     bool is_shutting_down;
 } motion_view_t;
+
+/** How punctual and how long the cycles were. */
+typedef struct {
+    histogram_t wake; /**< from the time of a cycle to its beginning */
+    histogram_t work; /**< from its beginning to its end */
+} motion_times_t;
 
 #define MOTION_VIEW_WORDS ((sizeof(motion_view_t) + 7u) / 8u)
 
@@ -61,16 +65,18 @@ typedef struct {
     gateway_io_t io;
     udp_tap_t tap;
     hal_clock_t clock;
+    uint32_t late_hold_cycles; /**< a cycle later than that holds the platform; 0 = never */
     bool is_recording;
     bool is_tracing;
 
-    seqlock_t view;    /**< motion_view_t to the service thread */
-    ring_t requests;   /**< motion_request_t from it */
-    ring_t results;    /**< motion_result_t to it */
-    ring_t record;     /**< record_t to it */
-    ring_t trace;      /**< trace_row_t to it */
-    uint32_t is_quit;  /**< atomic: the service thread wants an end at once */
-    uint32_t is_ended; /**< atomic: the thread has done its last cycle */
+    motion_times_t times; /**< the motion thread adds, others read */
+    seqlock_t view;       /**< motion_view_t to the service thread */
+    ring_t requests;      /**< motion_request_t from it */
+    ring_t results;       /**< motion_result_t to it */
+    ring_t record;        /**< record_t to it */
+    ring_t trace;         /**< trace_row_t to it */
+    uint32_t is_quit;     /**< atomic: the service thread wants an end at once */
+    uint32_t is_ended;    /**< atomic: the thread has done its last cycle */
     pthread_t thread;
 
     motion_view_words_t current; /**< private to the motion thread */

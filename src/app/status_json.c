@@ -188,18 +188,28 @@ static void write_counters(json_t *json, const motion_view_t *view)
     json_close(json, '}');
 }
 
-static void write_program(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost)
+static void write_times(json_t *json, const char *key, const histogram_t *times)
 {
-    const uint64_t mean_us = view->wakes == 0 ? 0 : view->wake_sum_us / view->wakes;
+    json_open(json, key, '{');
+    json_number(json, "count", histogram_count(times));
+    json_number(json, "p50_us", histogram_percentile_us(times, 50000));
+    json_number(json, "p99_us", histogram_percentile_us(times, 99000));
+    json_number(json, "p99_9_us", histogram_percentile_us(times, 99900));
+    json_number(json, "p99_99_us", histogram_percentile_us(times, 99990));
+    json_number(json, "max_us", histogram_max_us(times));
+    json_close(json, '}');
+}
+
+static void write_program(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,
+                          const motion_times_t *times)
+{
     json_number(json, "cycle", view->snapshot.cycle);
     json_number(json, "cycle_us", config->settings.cycle_us);
     json_ms(json, "uptime_ms", (view->snapshot.cycle + view->snapshot.counters.late_cycles) * config->settings.cycle_us);
     json_number(json, "late_cycles", view->snapshot.counters.late_cycles);
-    json_open(json, "wake_latency", '{');
-    json_number(json, "mean_us", mean_us);
-    json_number(json, "max_us", view->wake_max_us);
     json_bool(json, "realtime", view->is_realtime);
-    json_close(json, '}');
+    write_times(json, "wake_latency", &times->wake);
+    write_times(json, "cycle_time", &times->work);
     json_open(json, "lost", '{');
     json_number(json, "trace_rows", lost->trace_rows);
     json_number(json, "record_lines", lost->record_lines);
@@ -208,7 +218,8 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
     json_text(json, "version", HEAVE_VERSION);
 }
 
-void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost)
+void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,
+                       const motion_times_t *times)
 {
     const snapshot_t *s = &view->snapshot;
     json_open(json, NULL, '{');
@@ -222,6 +233,6 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     write_owner(json, "sender", &s->owner, s->now_us);
     write_owner(json, "other_sender", &s->other, s->now_us);
     write_counters(json, view);
-    write_program(json, view, config, lost);
+    write_program(json, view, config, lost, times);
     json_close(json, '}');
 }

@@ -14,6 +14,7 @@ typedef struct {
     uint32_t log_lines;    /**< likewise */
 } status_lost_t;
 
-void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost);
+void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,
+                       const motion_times_t *times);
 
 #endif

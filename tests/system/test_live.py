@@ -183,6 +183,29 @@ def replays_to_the_same_bytes(bench, **changes):
     assert bench.play(record, config=config) == played
 
 
+def a_late_cycle_holds(bench):
+    config = bench.write_config("punctual.ini", platform__late_hold_cycles=40)
+    record, trace = bench.folder / "record.txt", bench.folder / "live.csv"
+    daemon = bench.start("--record", record, "--trace", trace, config=config)
+    bench.wait_state("ENGAGED")
+    with bench.sender() as sender:
+        sender.stream(0.5, wave)
+        daemon.send_signal(signal.SIGSTOP)
+        time.sleep(0.2)
+        daemon.send_signal(signal.SIGCONT)
+        sender.stream(0.5, wave)
+        bench.wait_state("HOLD")  # not for its silence: frames do not release it
+        assert "cycles late: holding" in daemon.log.read_text()
+        bench.ctl("resume")
+        sender.stream(0.3, wave)
+        status = bench.status()
+    assert status["late_cycles"] > 40 and status["wake_latency"]["max_us"] > 40000, status
+    assert status["wake_latency"]["count"] >= status["cycle"] - 100 and status["cycle_time"]["p50_us"] <= status["cycle_time"]["max_us"]
+    assert bench.stop(daemon) == 0
+    live = trace.read_bytes()
+    assert bench.play(record, config=config)[:len(live)] == live, "a late cycle replays"
+
+
 # --- The end ---
 
 def signal_settles(bench, number):
@@ -389,6 +412,7 @@ CASES = {
     "watch on a terminal puts it back on Ctrl-C": watches_on_a_terminal,
     "a recording plays back to the same bytes, engage = auto": replays_to_the_same_bytes,
     "a recording plays back to the same bytes, engage = manual, homed from elsewhere": lambda bench: replays_to_the_same_bytes(bench, **ELSEWHERE),
+    "a cycle that is very late holds the platform, and replays": a_late_cycle_holds,
     "SIGTERM settles, switches off and ends with 0": lambda bench: signal_settles(bench, signal.SIGTERM),
     "Ctrl-C does the same": lambda bench: signal_settles(bench, signal.SIGINT),
     "a second signal ends at once": second_signal_ends_at_once,

@@ -72,8 +72,8 @@ def print_table(status, counts):
 def print_cycles(status):
     for name, one in status.items():
         wake = one["wake_latency"]
-        print(f"{name:9}{one['cycle']} cycles, {one['late_cycles']} skipped; late by {wake['mean_us']} us on average, {wake['max_us']} us at most"
-              f"{'' if wake['realtime'] else ', no real-time priority'}")
+        print(f"{name:9}{one['cycle']} cycles, {one['late_cycles']} skipped; late by {wake['p50_us']} us (median), {wake['p99_us']} us (99 %), {wake['max_us']} us (most)"
+              f"{'' if one['realtime'] else ', no real-time priority'}")
 
 
 def main():
