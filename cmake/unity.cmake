@@ -1,4 +1,4 @@
-# unity.cmake - the library target `unity`, and how tests are declared: heave_unit_test, heave_script_test.
+# unity.cmake - the library target `unity`, and how tests are declared: heave_unit_test, heave_script_test, heave_kernel_test.
 # Unity is not part of this tree: tools/lib/unity.sh finds or fetches it, unless UNITY_DIR says where it is.
 set(UNITY_DIR "" CACHE PATH "Folder that holds unity.c and unity.h; empty: found or fetched by tools/lib/unity.sh")
 if(NOT EXISTS "${UNITY_DIR}/unity.c")
@@ -28,4 +28,15 @@ endfunction()
 function(heave_script_test name script)
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/${script} ${ARGN})
   set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib;PYTHONDONTWRITEBYTECODE=1")
+endfunction()
+
+# heave_kernel_test(NAME [VIRTUAL_TIME] COMMAND [ARG...]): a program, Unity or TAP, on a kernel that has CAN; see tests/lib/kernel.py.
+function(heave_kernel_test name)
+  cmake_parse_arguments(PARSE_ARGV 1 kernel "VIRTUAL_TIME" "" "")
+  set(options --limit 280)
+  if(kernel_VIRTUAL_TIME)
+    list(APPEND options --virtual-time)
+  endif()
+  add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/lib/kernel.py ${options} -- ${kernel_UNPARSED_ARGUMENTS})
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib;PYTHONDONTWRITEBYTECODE=1" LABELS kernel TIMEOUT 300)
 endfunction()

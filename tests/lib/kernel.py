@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""kernel.py - runs a command on a kernel that has SocketCAN, with an interface vcan0 that is up and its own.
+
+    kernel.py [--virtual-time] [--limit SECONDS] -- COMMAND [ARG...]
+        prints what the command printed and ends with its status; where no such kernel is to be had: "1..0 # SKIP reason", status 0
+
+Used where the tests need CAN, GPIO or exact times:
+- this machine's kernel, in a network name space of its own, where it has vcan and lets us;
+- else a User Mode Linux kernel (tools/lib/uml.sh keeps it in the cache), which boots in half a second, with this machine's files as its own.
+  The command is root in there, outside it has no other rights than the caller.
+--virtual-time: always User Mode Linux. Computing takes no time there and sleeps are exact, whatever the machine is doing: every time that a
+test measures can be asserted to the microsecond, and every run is the same.
+"""
+import argparse
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import tap
+
+HERE = Path(__file__).resolve().parent
+UML = HERE.parents[1] / "tools/lib/uml.sh"
+MEMORY = "512M"
+SETUP = """
+ip link set lo up
+ip link add vcan0 type vcan && ip link set vcan0 txqueuelen 16 && ip link set vcan0 up || exit 97
+"""
+
+
+class Finished:
+    """What a command came to."""
+
+    def __init__(self, returncode, output):
+        self.returncode, self.output = returncode, output
+
+
+def script_of(command, environment):
+    exports = "".join(f"export {name}={shlex.quote(value)}\n" for name, value in environment.items())
+    return f"{SETUP}{exports}cd {shlex.quote(os.getcwd())}\nexec {shlex.join(map(str, command))}\n"
+
+
+def wanted_environment(extra):
+    """The variables that a test may rely on; the host's others would only differ from machine to machine."""
+    kept = {name: value for name, value in os.environ.items() if name.startswith(("PYTHON", "HEAVE_", "LC_", "LANG", "XDG_CACHE"))}
+    return {"PATH": "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": os.path.expanduser("~"), **kept, **extra}
+
+
+def bounded(command, limit_s, **options):
+    """Runs in a process group of its own and leaves nothing behind; None for the status where it took too long."""
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True, **options)
+    try:
+        output = process.communicate(timeout=limit_s)[0]
+        return process.returncode, output.decode(errors="replace")
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        return None, process.communicate()[0].decode(errors="replace")
+
+
+def own_name_space():
+    return ["unshare", "--net"] if os.geteuid() == 0 else ["unshare", "--user", "--map-root-user", "--net"]
+
+
+def host_has_vcan():
+    try:
+        return bounded([*own_name_space(), "sh", "-c", SETUP], 20)[0] == 0
+    except OSError:
+        return False
+
+
+def run_here(command, limit_s, environment):
+    status, output = bounded([*own_name_space(), "bash", "-c", script_of(command, environment)], limit_s, env=environment)
+    return Finished(status, output)
+
+
+def read(path):
+    return path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+
+
+def run_uml(kernel, command, limit_s, environment, virtual_time):
+    with tempfile.TemporaryDirectory(prefix="heave-uml-") as folder:
+        job = Path(folder)
+        (job / "run.sh").write_text(script_of(command, environment), encoding="utf-8")
+        boot = [kernel, f"mem={MEMORY}", "rootfstype=hostfs", "rootflags=/", "rw", f"init={HERE / 'uml_init.sh'}", f"job={job}", f"uml_dir={job}/",
+                "vcan.echo=1", "quiet", "con=null", "con0=null,fd:1", *(["time-travel=inf-cpu"] if virtual_time else [])]
+        ended, console = bounded(boot, limit_s, env={**os.environ, "TMPDIR": folder})
+        output, status = read(job / "output"), read(job / "status").strip()
+    if ended is None:
+        return Finished(None, output)
+    return Finished(int(status) if status else None, output if status else f"{output}\n{console}\nthe kernel stopped before the command ended\n")
+
+
+def find_uml():
+    found = subprocess.run([UML, "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    if found.returncode != 0:
+        raise tap.Skip(found.stderr.strip() or "no User Mode Linux kernel")
+    return found.stdout.strip()
+
+
+def run(command, virtual_time=False, limit_s=300, **environment):
+    """Runs the command with these additional environment variables. Raises tap.Skip where no kernel is to be had; returncode None: killed
+    after limit_s of real time, or the kernel died."""
+    environment = wanted_environment(environment)
+    if not virtual_time and host_has_vcan():
+        return run_here(command, limit_s, environment)
+    return run_uml(find_uml(), command, limit_s, environment, virtual_time)
+
+
+def main():
+    parser = argparse.ArgumentParser(usage=__doc__.split("\n\n")[1].strip())
+    parser.add_argument("--virtual-time", action="store_true")
+    parser.add_argument("--limit", type=float, default=300)
+    parser.add_argument("command", nargs="+")
+    options = parser.parse_args()
+    try:
+        finished = run(options.command, options.virtual_time, options.limit)
+    except tap.Skip as reason:
+        print(f"1..0 # SKIP {reason}")
+        return 0
+    sys.stdout.write(finished.output)
+    if finished.returncode is None:
+        print(f"kernel.py: not finished within {options.limit:g} s, or the kernel died")
+        return 1
+    return finished.returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

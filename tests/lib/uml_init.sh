@@ -1,0 +1,20 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# uml_init.sh - first process in the User Mode Linux kernel of kernel.py: mounts what programs expect, runs the job named on the kernel's
+# command line, writes its exit status beside it, and switches off. The root file system is the host's, with the rights of who started it.
+export PATH=/usr/sbin:/usr/bin:/sbin:/bin
+mount -t proc proc /proc
+mount -t sysfs sys /sys
+mount -t devtmpfs dev /dev
+mkdir -p /dev/pts /dev/shm
+mount -t devpts -o ptmxmode=0666 pts /dev/pts
+mount -t tmpfs tmpfs /dev/shm
+mount -t tmpfs tmpfs /run
+mount -t configfs configfs /sys/kernel/config
+ln -s /proc/self/fd /dev/fd
+# A process that never waits can starve a receiver here: there is one CPU, and no preemption.
+echo 16777216 >/proc/sys/net/core/rmem_default
+job=$(sed -n 's/.*\bjob=\([^ ]*\).*/\1/p' /proc/cmdline)
+bash "$job/run.sh" >"$job/output" 2>&1 </dev/null
+echo $? >"$job/status"
+poweroff -f

@@ -1,0 +1,55 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_kernel.py - the runner of kernel.py itself: what it passes on, and that virtual time is exact. Runs on the host."""
+import sys
+import time
+
+import kernel
+import tap
+
+TICKS = """
+import time
+start = time.monotonic_ns()
+for i in range(1, 1001):
+    time.sleep(max(0, (start + i * 3600_000_000_000 // 1000 - time.monotonic_ns()) / 1e9))
+print((time.monotonic_ns() - start) // 1000)
+"""
+
+
+def passes_on_output_and_status():
+    finished = kernel.run(["sh", "-c", "echo one; echo two >&2; echo $HEAVE_X; exit 3"], HEAVE_X="a 'b' $c")
+    assert (finished.returncode, finished.output) == (3, "one\ntwo\na 'b' $c\n"), vars(finished)
+
+
+def has_vcan():
+    finished = kernel.run(["ip", "-br", "link", "show", "vcan0"])
+    assert finished.returncode == 0 and "UP" in finished.output, finished.output
+
+
+def virtual_hour_is_exact_and_short():
+    start = time.monotonic()
+    finished = kernel.run([sys.executable, "-c", TICKS], virtual_time=True)
+    assert finished.returncode == 0, finished.output
+    assert abs(int(finished.output) - 3600_000_000) < 1000, finished.output
+    assert time.monotonic() - start < 120
+
+
+def endless_command_is_ended():
+    start = time.monotonic()
+    finished = kernel.run(["sh", "-c", "echo begun; while :; do :; done"], virtual_time=True, limit_s=8)
+    assert finished.returncode is None and "begun" in finished.output, vars(finished)
+    assert time.monotonic() - start < 60
+
+
+def main():
+    suite = tap.Suite()
+    for name, case in [("output and exit status come out", passes_on_output_and_status), ("there is a vcan0", has_vcan),
+                       ("an hour of virtual time is exact and takes seconds", virtual_hour_is_exact_and_short),
+                       ("a command that never ends is ended", endless_command_is_ended)]:
+        with suite.case(name):
+            case()
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

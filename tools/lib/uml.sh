@@ -1,0 +1,97 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# uml.sh - prints the path of a User Mode Linux kernel with SocketCAN (vcan, slcan) and simulated GPIO for the system tests, after building
+# it once into the user's cache. It is an ordinary program of 4 MB that boots in half a second, for any user, on machines whose own kernel
+# has no CAN; and it can run on virtual time, where sleeps are exact whatever else the machine does.
+# Debian's own user-mode-linux package panics on CPUs with AMX, hence from the sources: the package linux-source, fetched by apt without
+# installing it.
+#
+# usage: uml.sh [--cached]     --cached: only looks, builds nothing
+# Exit status: 0 and the path; 1 and one line on stderr that says why there is none.
+set -u
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+cache=${XDG_CACHE_HOME:-$HOME/.cache}/heave
+build_limit_s=3600
+
+say() { printf 'uml: %s\n' "$*" >&2; }
+
+# The name says what the kernel is made from, so that a change of either makes another one.
+recipe_hash() { { cat "$here/uml.config" && declare -f configure; } | sha256sum | cut -c 1-12; }
+
+find_cached() {
+    local found
+    for found in "$cache"/uml-*-"$(recipe_hash)"; do
+        [ -x "$found" ] && echo "$found" && return 0
+    done
+    return 1
+}
+
+# linux-source only points to the one with the version in its name.
+source_package() { apt-cache depends linux-source 2>/dev/null | sed -n 's/^ *Depends: \(linux-source-[0-9.]*\)$/\1/p' | head -n 1; }
+
+# Needs no rights: the package is only unpacked here.
+fetch() { # WORK
+    local package deb
+    package=$(source_package)
+    [ -n "$package" ] || { echo "E: apt knows no package linux-source" >&2 && return 1; }
+    (cd "$1" && apt-get -q download "$package") || return 1
+    deb=$(compgen -G "$1/linux-source-*.deb") || return 1
+    dpkg-deb -x "$deb" "$1/deb" && rm "$deb"
+}
+
+# Sources of devices that no UML has stay packed: they are half of the tree. Their Kconfig and Makefile are read.
+unpack() { # WORK
+    local tarball
+    tarball=$(find "$1/deb/usr/src" -name 'linux-source-*.tar.*' -type f | head -n 1)
+    mkdir "$1/linux" && tar -C "$1/linux" -xf "$tarball" --strip-components=1 --exclude='*/drivers/gpu/*.[ch]' --exclude='*/sound/*.[ch]' \
+        --exclude='*/drivers/net/ethernet/*.[ch]' --exclude='*/drivers/net/wireless/*.[ch]' --exclude='*/drivers/media/*.[ch]' \
+        --exclude='*/Documentation/*.rst' --exclude='*.dts' --exclude='*.dtsi' --exclude='*/tools/testing/*' && rm -r "$1/deb"
+}
+
+configure() {
+    # CPUs with AMX have a floating-point state of 11 KiB; older kernels reserve 2696 bytes and panic. It also lives on the kernel's stack,
+    # hence KERNEL_STACK_ORDER.
+    sed -i 's/DEFINE_LONGS(HOST_FP_SIZE, 2696)/DEFINE_LONGS(HOST_FP_SIZE, 12288)/' arch/x86/um/user-offsets.c
+    make ARCH=um KCONFIG_ALLCONFIG="$here/uml.config" allnoconfig
+}
+
+# What was asked for and is not there would fail much later and far from here.
+check_config() {
+    local wanted missing=''
+    for wanted in UML_TIME_TRAVEL_SUPPORT HOSTFS CAN_RAW CAN_VCAN CAN_SLCAN NET_SCH_TBF GPIO_SIM; do
+        grep -q "^CONFIG_$wanted=y" .config || missing+=" $wanted"
+    done
+    [ -z "$missing" ] || { echo "E: this kernel source does not give$missing" >&2 && return 1; }
+}
+
+build() { # WORK
+    fetch "$1" && unpack "$1" && cd "$1/linux" && configure && check_config &&
+        timeout "$build_limit_s" make ARCH=um -j"$(nproc)" linux && strip -s -o "$1/kernel" linux &&
+        mv "$1/kernel" "$cache/uml-$(make -s ARCH=um kernelversion)-$(recipe_hash)"
+}
+
+lacking_tools() {
+    local tool
+    for tool in apt-get dpkg-deb gcc make flex bison bc xz; do command -v "$tool" >/dev/null || printf ' %s' "$tool"; done
+}
+
+main() {
+    local lacking
+    find_cached && return 0
+    [ "${1:-}" != --cached ] || { say "no kernel in $cache yet: tools/test builds one" && return 1; }
+    [ "$(uname -m)" = x86_64 ] || { say "User Mode Linux needs an x86_64 machine" && return 1; }
+    lacking=$(lacking_tools)
+    [ -z "$lacking" ] || { say "building the kernel takes these, which are not here:$lacking" && return 1; }
+    mkdir -p "$cache" || return 1
+    exec 9>"$cache/.uml.lock" && flock 9 # a second run waits and finds the kernel
+    find_cached && return 0
+    work=$(mktemp -d "$cache/.uml.XXXXXX") && trap 'rm -rf "$work"' EXIT || return 1
+    say "building a kernel with CAN for the system tests into $cache, once: some minutes, 1 GB of disk while it lasts"
+    if ! (build "$work") >"$work/log" 2>&1; then
+        say "the kernel could not be built: $(grep -m 1 -E '^E:|error:|Error [0-9]' "$work/log" || tail -n 1 "$work/log")"
+        return 1
+    fi
+    find_cached
+}
+
+main "$@"
