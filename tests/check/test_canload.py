@@ -94,7 +94,7 @@ def main():
                 identifier ^= source.getrandbits(29 if extended else 11) & source.getrandbits(29) & source.getrandbits(29)
                 data = bytes(source.choice((0x00, 0xFF, 0x87, 0x78, 0xC3, 0x3C, 0xE1, 0x1E)) for _ in range(size))
                 longest = max(longest, frame_bits(identifier & (0x1FFFFFFF if extended else 0x7FF), extended, data))
-            assert bound - 12 <= longest <= bound, f"{extended} {size}: {longest} of {bound}"
+            assert bound - 16 <= longest <= bound, f"{extended} {size}: {longest} of {bound}"
 
     return suite.done()
 
