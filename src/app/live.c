@@ -19,6 +19,7 @@
 #include "linux_clock.h"
 #include "linux_log.h"
 #include "linux_udp.h"
+#include "manager.h"
 #include "motion_loop.h"
 #include "out_file.h"
 #include "record.h"
@@ -34,6 +35,8 @@
 typedef struct {
     motion_loop_t loop;
     control_t control;
+    manager_t manager;
+    motion_view_words_t view; /**< for the manager */
     linux_udp_t udp;
     linux_log_t log;
     int signal_fd;
@@ -163,6 +166,7 @@ static void take_signals(live_t *self)
         if (self->signals == 1) {
             const motion_request_t request = {0, EVENT_SHUTDOWN};
             (void)ring_push(&self->loop.requests, &request, sizeof request, NULL, 0);
+            manager_stopping();
             (void)say(0, "shutting down: the platform settles first; once more ends at once");
         } else {
             motion_loop_quit(&self->loop);
@@ -177,6 +181,13 @@ static uint64_t now_us(const live_t *self)
     return hal_clock_now_us(self->loop.clock);
 }
 
+static void tell_manager(live_t *self)
+{
+    if (seqlock_read(&self->loop.view, self->view.word)) {
+        manager_serve(&self->manager, &self->view.view.snapshot, now_us(self));
+    }
+}
+
 static void serve_once(live_t *self)
 {
     struct pollfd fds[CONTROL_FDS + 1];
@@ -187,6 +198,7 @@ static void serve_once(live_t *self)
     }
     take_signals(self);
     control_serve(&self->control, fds, now_us(self));
+    tell_manager(self);
     write_files(self);
     (void)!linux_log_flush(&self->log); /* what does not go out now goes out later */
 }
@@ -261,6 +273,7 @@ static int run(live_t *self, const config_t *config)
         (void)say(0, "memory is not locked (%s): cycles may be late when memory is short", strerror(errno));
     }
     say_ready(self, config);
+    manager_ready(&self->manager, now_us(self));
     const bool has_ended = serve(self);
     if (has_ended) {
         (void)pthread_join(self->loop.thread, NULL);

@@ -15,6 +15,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 import heave
@@ -206,6 +207,29 @@ def a_late_cycle_holds(bench):
     assert bench.play(record, config=config)[:len(live)] == live, "a late cycle replays"
 
 
+def tells_the_service_manager(bench):
+    path = str(bench.folder / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+        manager.bind(path)
+        manager.settimeout(heave.WAIT_S)
+        heard = []
+
+        def hear_until(text):
+            while not heard or text not in heard[-1]:
+                heard.append(manager.recv(500).decode())
+
+        daemon = bench.start(environment={"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "100000"})
+        hear_until("READY=1")
+        if "STATUS=ENGAGED" not in heard:
+            hear_until("STATUS=ENGAGED")
+        for _ in range(3):
+            hear_until("WATCHDOG=1")
+        daemon.send_signal(signal.SIGTERM)
+        hear_until("STOPPING=1")
+        hear_until("STATUS=OFF")
+        assert daemon.wait(timeout=heave.WAIT_S) == 0
+
+
 # --- The end ---
 
 def signal_settles(bench, number):
@@ -385,7 +409,10 @@ def allocates_nothing(bench, guard):
     if guard is None:
         raise tap.Skip("instrumented build")
     armed = bench.folder / "armed"
-    environment = {"LD_PRELOAD": guard, "HEAVE_MALLOC_GUARD": str(armed)}
+    manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)  # what is said to it must not allocate either
+    manager.bind(str(bench.folder / "notify"))
+    threading.Thread(target=lambda: [None for _ in iter(lambda: manager.recv(500), b"")], daemon=True).start()
+    environment = {"LD_PRELOAD": guard, "HEAVE_MALLOC_GUARD": str(armed), "NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "100000"}
     daemon = bench.start("--record", bench.folder / "r.txt", "--trace", bench.folder / "t.csv", environment=environment)
     armed.touch()
     run = bench.ctl("status", env={**os.environ, **environment})
@@ -413,6 +440,7 @@ CASES = {
     "a recording plays back to the same bytes, engage = auto": replays_to_the_same_bytes,
     "a recording plays back to the same bytes, engage = manual, homed from elsewhere": lambda bench: replays_to_the_same_bytes(bench, **ELSEWHERE),
     "a cycle that is very late holds the platform, and replays": a_late_cycle_holds,
+    "the service manager is told": tells_the_service_manager,
     "SIGTERM settles, switches off and ends with 0": lambda bench: signal_settles(bench, signal.SIGTERM),
     "Ctrl-C does the same": lambda bench: signal_settles(bench, signal.SIGINT),
     "a second signal ends at once": second_signal_ends_at_once,

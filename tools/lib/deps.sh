@@ -25,6 +25,7 @@ deps_build() {
     deps_need pkg-config cmd:pkg-config
     deps_need libinih-dev pc:inih
     deps_need libcjson-dev pc:libcjson
+    deps_need libsystemd-dev pc:libsystemd
     deps_need python3 cmd:python3
 }
 

@@ -1,0 +1,55 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_service.py --build DIR - what is installed for a service manager: complete, accepted by systemd, and without privileges."""
+import argparse
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import tap
+
+EXPOSURE_MAX = 20  # tenths of systemd's measure, 100 the worst
+
+
+def installed(build, folder):
+    subprocess.run(["cmake", "--install", str(build), "--prefix", "/usr"], env={"DESTDIR": str(folder), "PATH": "/usr/bin:/bin:/usr/local/bin"},
+                   check=True, stdout=subprocess.DEVNULL)
+    return {str(path.relative_to(folder / "usr")) for path in folder.rglob("*") if path.is_file()}
+
+
+def analyze(*arguments):
+    if shutil.which("systemd-analyze") is None:
+        raise tap.Skip("systemd-analyze is not there")
+    return subprocess.run(["systemd-analyze", *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--build", type=Path, required=True)
+    build = parser.parse_args().build
+    suite = tap.Suite()
+    with tempfile.TemporaryDirectory(prefix="heave-") as name:
+        folder = Path(name)
+        with suite.case("programs, unit, user and ready-made platforms are installed"):
+            files = installed(build, folder)
+            assert {"bin/heaved", "bin/heavectl", "lib/systemd/system/heaved@.service", "lib/sysusers.d/heave.conf"} <= files, files
+            assert any(file.endswith("demo-hexapod.ini") for file in files), files
+        unit = folder / "heaved@test.service"
+        text = (build / "packaging/heaved@.service").read_text(encoding="utf-8")
+        # the programs are not where the unit will have them
+        unit.write_text(re.sub(r"(?m)^ExecStart=\S+", "ExecStart=/bin/true", text), encoding="utf-8")
+        with suite.case("systemd takes the unit without a word"):
+            run = analyze("verify", unit)
+            assert run.returncode == 0 and run.stdout.strip() == "", run.stdout
+        with suite.case(f"the service is exposed by {EXPOSURE_MAX / 10} of 10 at most, and holds no capability"):
+            run = analyze("security", "--offline=true", f"--threshold={EXPOSURE_MAX}", unit)
+            assert run.returncode == 0, run.stdout[-400:]
+            assert re.search(r"(?m)^CapabilityBoundingSet=$", text) and "NoNewPrivileges=yes" in text
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
