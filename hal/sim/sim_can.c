@@ -5,9 +5,14 @@
 
 #include <string.h>
 
+static bool has_interface(const sim_can_t *self)
+{
+    return self->state != HAL_CAN_DOWN && self->state != HAL_CAN_GONE;
+}
+
 static bool is_on_bus(const sim_can_t *self)
 {
-    return self->state != HAL_CAN_DOWN && self->state != HAL_CAN_BUS_OFF;
+    return has_interface(self) && self->state != HAL_CAN_BUS_OFF;
 }
 
 static bool has_rx_room(const sim_can_t *self, uint32_t frames)
@@ -216,7 +221,7 @@ static hv_status_t can_send(void *ctx, const can_frame_t *frame)
     }
     sim_can_tx_t tx = {.frame = clean(frame), .ready_us = self->bus->now_us, .copies = 1};
     self->bus->sends++;
-    if (self->state == HAL_CAN_DOWN) {
+    if (!has_interface(self)) {
         return HV_ERR_IO;
     }
     if (!apply_plan(self->bus, &tx) || self->tx_count == SIM_CAN_TX_FRAMES) {
@@ -230,7 +235,7 @@ static hv_status_t can_send(void *ctx, const can_frame_t *frame)
 static hv_status_t can_recv(void *ctx, can_frame_t *out, uint64_t *rx_time_us)
 {
     sim_can_t *self = ctx;
-    if (self->state == HAL_CAN_DOWN) {
+    if (!has_interface(self)) {
         return HV_ERR_IO;
     }
     if (self->rx_count == 0 && self->is_overrun) {
@@ -314,7 +319,7 @@ void sim_can_close(sim_can_t *self)
 void sim_can_unplug(sim_can_t *self)
 {
     self->is_plugged = false;
-    self->state = HAL_CAN_DOWN;
+    self->state = HAL_CAN_GONE;
     forget_queues(self);
 }
 
@@ -327,7 +332,7 @@ void sim_can_set_state(sim_can_t *self, hal_can_state_t state)
 {
     static const uint32_t k_report[] = {
         [HAL_CAN_ACTIVE] = CAN_ERROR_RESTARTED, [HAL_CAN_WARNING] = CAN_ERROR_WARNING, [HAL_CAN_PASSIVE] = CAN_ERROR_PASSIVE,
-        [HAL_CAN_BUS_OFF] = CAN_ERROR_BUS_OFF,  [HAL_CAN_DOWN] = CAN_ERROR_OTHER,
+        [HAL_CAN_BUS_OFF] = CAN_ERROR_BUS_OFF,  [HAL_CAN_DOWN] = CAN_ERROR_OTHER,      [HAL_CAN_GONE] = CAN_ERROR_OTHER,
     };
     if (self->state != state) {
         self->state = state;

@@ -93,7 +93,8 @@ void sim_can_close(sim_can_t *self);
 void sim_can_unplug(sim_can_t *self);
 void sim_can_plug(sim_can_t *self);
 
-/** The controller's errors as if the wire were bad: its state changes and is reported. For all states but HAL_CAN_DOWN. */
+/** The controller's errors as if the wire were bad: its state changes and is reported. Not for HAL_CAN_DOWN and
+ *  HAL_CAN_GONE. */
 void sim_can_set_state(sim_can_t *self, hal_can_state_t state);
 
 /** The controller as hal/can.h wants it. */

@@ -1,10 +1,26 @@
 /* SPDX-License-Identifier: MIT
- * test_hal_can.c - the contract of hal/can.h on every backend, and the simulated bus: arbitration, timing, fault plan.
+ * test_hal_can.c - the contract of hal/can.h on every backend; the simulated bus: arbitration, timing, fault plan; and what
+ * goes wrong with interfaces of Linux.
+ *
+ *     test_contract_hal_can           the simulated bus
+ *     test_contract_hal_can --linux   SocketCAN on vcan0, as root on a kernel of its own (tests/lib/kernel.py)
  */
 #include "contract.h"
 
+#include <errno.h>
+#include <linux/can.h>
+#include <linux/can/error.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
 
+#include "linux_can.h"
+#include "linux_clock.h"
 #include "sim_can.h"
 
 /** A backend under test, with a partner on the same bus that acknowledges, sends and listens to everything. */
@@ -91,8 +107,121 @@ static void bus_off_sim(void)
     sim_can_set_state(&node, HAL_CAN_BUS_OFF);
 }
 
-static const fixture_t k_fixtures[] = {
-    {"sim", open_sim, close_sim, settle_sim, inject_sim, fetch_sim, 1000, set_partner_sim, set_plugged_sim, bus_off_sim}};
+static const fixture_t k_sim = {"sim",     open_sim, close_sim,       settle_sim,      inject_sim,
+                                fetch_sim, 1000,     set_partner_sim, set_plugged_sim, bus_off_sim};
+
+/* SocketCAN on vcan0; the partner is a plain socket. The wire is stopped by a token bucket that never fills again. */
+
+static linux_can_t lin;
+static int peer = -1;
+
+static void shell(const char *command)
+{
+    TEST_ASSERT_EQUAL_MESSAGE(0, system(command), command);
+}
+
+static int open_peer(void)
+{
+    struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = (int)if_nametoindex("vcan0")};
+    const int fd = socket(AF_CAN, SOCK_RAW | SOCK_NONBLOCK, CAN_RAW);
+    TEST_ASSERT_TRUE(fd >= 0 && bind(fd, (struct sockaddr *)&address, sizeof address) == 0);
+    return fd;
+}
+
+static bool open_linux(hal_can_t *can, const hal_can_filter_t *filter, uint32_t filters)
+{
+    TEST_ASSERT_EQUAL(HV_OK, linux_can_open(&lin, &(linux_can_config_t){"vcan0", filter, filters, NULL, 0, 0}));
+    TEST_ASSERT_EQUAL_STRING("", lin.error_text);
+    peer = open_peer();
+    *can = linux_can_hal(&lin);
+    return true;
+}
+
+static void close_linux(void)
+{
+    linux_can_close(&lin);
+    close(peer);
+    shell("ip link show vcan0 >/dev/null 2>&1 || ip link add vcan0 txqueuelen 16 type vcan");
+    shell("tc qdisc del dev vcan0 root 2>/dev/null; ip link set vcan0 up");
+}
+
+static void settle_linux(void)
+{
+    (void)usleep(20000);
+}
+
+static void write_peer(const struct can_frame *frame)
+{
+    if (write(peer, frame, sizeof *frame) < 0) { /* it may have to hear first that the interface was down */
+        TEST_ASSERT_EQUAL((int)sizeof *frame, (int)write(peer, frame, sizeof *frame));
+    }
+}
+
+static void inject_linux(const can_frame_t *frame)
+{
+    struct can_frame out = {.can_id = frame->id | (frame->is_extended ? CAN_EFF_FLAG : 0u) | (frame->is_rtr ? CAN_RTR_FLAG : 0u),
+                            .can_dlc = frame->length};
+    memcpy(out.data, frame->data, 8);
+    write_peer(&out);
+}
+
+static bool fetch_linux(can_frame_t *frame)
+{
+    struct can_frame in;
+    if (read(peer, &in, sizeof in) != (ssize_t)sizeof in) {
+        return false;
+    }
+    *frame = (can_frame_t){.is_extended = (in.can_id & CAN_EFF_FLAG) != 0, .is_rtr = (in.can_id & CAN_RTR_FLAG) != 0};
+    frame->id = in.can_id & (frame->is_extended ? CAN_EFF_MASK : CAN_SFF_MASK);
+    frame->length = in.can_dlc;
+    memcpy(frame->data, in.data, 8);
+    return true;
+}
+
+/* One frame uses up what the bucket holds, and one is needed to wake it again. Both are the partner's own. */
+static void pass_by(void)
+{
+    can_frame_t got;
+    uint64_t time_us;
+    inject_linux(&(can_frame_t){.id = 0});
+    settle_linux();
+    (void)!hal_can_recv(hal, &got, &time_us);
+}
+
+static void set_partner_linux(bool is_there)
+{
+    if (is_there) {
+        shell("tc qdisc change dev vcan0 root tbf rate 1gbit burst 5000 limit 4000");
+    } else {
+        shell("tc qdisc replace dev vcan0 root tbf rate 8bit burst 16 limit 4000");
+    }
+    pass_by();
+}
+
+static void set_plugged_linux(bool is_plugged)
+{
+    if (!is_plugged) {
+        shell("ip link del vcan0");
+        return;
+    }
+    shell("ip link add vcan0 txqueuelen 16 type vcan && ip link set vcan0 up");
+    close(peer);
+    peer = open_peer();
+}
+
+static void report_linux(uint32_t what, uint8_t of_controller)
+{
+    write_peer(&(struct can_frame){.can_id = what | CAN_ERR_FLAG, .can_dlc = 8, .data = {0, of_controller, 0, 0, 0, 0, 130, 7}});
+    settle_linux();
+}
+
+static void bus_off_linux(void)
+{
+    report_linux(CAN_ERR_BUSOFF, 0);
+}
+
+static const fixture_t k_linux = {"linux",     open_linux, close_linux,       settle_linux,      inject_linux,
+                                  fetch_linux, 1000,       set_partner_linux, set_plugged_linux, bus_off_linux};
 
 void setUp(void)
 {
@@ -231,6 +360,7 @@ static void test_send_every_length_reaches_the_partner(void)
         fixture->settle();
         assert_fetched(&standard);
         assert_fetched(&extended);
+        assert_nothing_received();
     }
 }
 
@@ -400,7 +530,7 @@ static void test_unplugged_says_io_and_works_again_after_restart(void)
     for (int i = 0; i < 3; i++) {
         TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_recv(hal, &got, &time_us));
         TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_send(hal, &frame));
-        TEST_ASSERT_EQUAL(HAL_CAN_DOWN, state_now());
+        TEST_ASSERT_EQUAL(HAL_CAN_GONE, state_now());
         TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_can_restart(hal));
     }
     fixture->set_plugged(true);
@@ -623,16 +753,389 @@ static void run_sim(void)
     RUN_TEST(test_sim_bus_off_at_every_step_stops_everything_from_there);
 }
 
-int main(void)
+/* Interfaces of Linux. */
+
+/* What the kernel refuses to those who may not change interfaces. */
+static void as_plain_user(bool is_plain)
 {
-    UNITY_BEGIN();
-    for (size_t i = 0; i < sizeof k_fixtures / sizeof k_fixtures[0]; i++) {
-        fixture = &k_fixtures[i];
-        contract_backend = fixture->name;
-        run_contract();
+    TEST_ASSERT_EQUAL(0, seteuid(is_plain ? 65534 : 0));
+}
+
+static void reopen_linux(const linux_can_config_t *config, hv_status_t expected)
+{
+    linux_can_close(&lin);
+    TEST_ASSERT_EQUAL_MESSAGE(expected, linux_can_open(&lin, config), lin.error_text);
+    hal = linux_can_hal(&lin);
+}
+
+static const linux_can_config_t k_plain = {.interface = "vcan0"};
+
+static void assert_says(linux_can_trouble_t trouble, const char *text)
+{
+    TEST_ASSERT_EQUAL_MESSAGE(trouble, lin.trouble, lin.error_text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(lin.error_text, text), lin.error_text);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(lin.error_text, lin.name), lin.error_text);
+}
+
+static void assert_dead(void)
+{
+    const can_frame_t frame = make(0x201, 6);
+    can_frame_t got;
+    uint64_t time_us;
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_send(hal, &frame));
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_recv(hal, &got, &time_us));
+}
+
+static void assert_alive(void)
+{
+    const can_frame_t out = make(0x201, 6), in = make(0x181, 8);
+    send_ok(&out);
+    fixture->inject(&in);
+    settle_linux();
+    assert_fetched(&out);
+    assert_received(&in);
+    assert_nothing_received();
+}
+
+static void test_linux_open_no_such_interface_can_be_retried(void)
+{
+    reopen_linux(&(linux_can_config_t){.interface = "vcan7"}, HV_ERR_AGAIN);
+    assert_says(LINUX_CAN_NO_INTERFACE, "plugged in");
+    TEST_ASSERT_EQUAL(HAL_CAN_GONE, state_now());
+    assert_dead();
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_can_restart(hal));
+    shell("ip link add vcan7 type vcan && ip link set vcan7 up");
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    TEST_ASSERT_EQUAL(HAL_CAN_ACTIVE, state_now());
+    TEST_ASSERT_EQUAL_STRING("", lin.error_text);
+    shell("ip link del vcan7");
+}
+
+static void test_linux_open_something_else_of_that_name_is_refused(void)
+{
+    reopen_linux(&(linux_can_config_t){.interface = "lo"}, HV_ERR_ARG);
+    assert_says(LINUX_CAN_NOT_CAN, "not a CAN interface");
+    reopen_linux(&(linux_can_config_t){.interface = "a-name-of-16-chr"}, HV_ERR_ARG);
+    TEST_ASSERT_NOT_NULL(strstr(lin.error_text, "too long"));
+}
+
+static void test_linux_open_down_needs_somebody_who_may_take_it_up(void)
+{
+    shell("ip link set vcan0 down");
+    as_plain_user(true);
+    reopen_linux(&k_plain, HV_ERR_AGAIN);
+    assert_says(LINUX_CAN_IS_DOWN, "is down");
+    TEST_ASSERT_EQUAL(HAL_CAN_DOWN, state_now());
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_restart(hal));
+    assert_dead();
+    as_plain_user(false);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    assert_alive();
+}
+
+/* The kernel tells of it once only. */
+static void test_linux_taken_down_is_noticed_by_either_op_and_stays_until_restart(void)
+{
+    for (int by_send = 0; by_send <= 1; by_send++) {
+        const can_frame_t frame = make(0x201, 6);
+        can_frame_t got;
+        uint64_t time_us;
+        shell("ip link set vcan0 down");
+        TEST_ASSERT_EQUAL(HV_ERR_IO, by_send ? hal_can_send(hal, &frame) : hal_can_recv(hal, &got, &time_us));
+        TEST_ASSERT_EQUAL(HAL_CAN_DOWN, state_now());
+        assert_says(LINUX_CAN_IS_DOWN, "is down");
+        shell("ip link set vcan0 up");
+        assert_dead();
+        as_plain_user(true);
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+        as_plain_user(false);
+        assert_alive();
     }
-    fixture = &k_fixtures[0];
+}
+
+static void test_linux_unplugged_and_another_one_plugged_in_keeps_its_filters(void)
+{
+    static const hal_can_filter_t k_filter = {0x181, 0x7FF, false}, k_own = {0x201, 0x7FF, false};
+    const can_frame_t unwanted = make(0x182, 8);
+    reopen_linux(&(linux_can_config_t){"vcan0", &k_filter, 1, &k_own, 1, 0}, HV_OK);
+    set_plugged_linux(false);
+    assert_dead();
+    assert_says(LINUX_CAN_NO_INTERFACE, "plugged in");
+    shell("ip link add vcan9 type vcan"); /* takes the number that the old one had */
+    set_plugged_linux(true);
+    assert_dead();
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    fixture->inject(&unwanted);
+    assert_alive();
+    shell("ip link del vcan9");
+}
+
+static void test_linux_own_list_echoes_pass_others_do_not_and_the_rest_is_refused(void)
+{
+    static const hal_can_filter_t k_filter = {0x180, 0x780, false};
+    static const hal_can_filter_t k_own[] = {{0x200, 0x780, false}, {0x12345, CAN_ID_EXTENDED_MAX, true}};
+    const can_frame_t ours = make(0x207, 6), wide = make_extended(0x12345, 2), foreign = make(0x301, 1),
+                      twin = make_extended(0x207, 6);
+    uint32_t left = 9;
+    reopen_linux(&(linux_can_config_t){"vcan0", &k_filter, 1, k_own, 2, 0}, HV_OK);
+    send_ok(&ours);
+    send_ok(&wide);
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, hal_can_send(hal, &foreign));
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, hal_can_send(hal, &twin));
+    fixture->inject(&ours); /* somebody else has our identifier */
+    settle_linux();
+    assert_nothing_received();
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &left));
+    TEST_ASSERT_EQUAL_UINT32(0, left);
+}
+
+static void test_linux_every_report_is_passed_on_as_itself(void)
+{
+    static const struct {
+        uint32_t what;
+        uint8_t of_controller;
+        uint32_t expected;
+        hal_can_state_t state;
+    } k_rows[] = {
+        {CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING, CAN_ERROR_WARNING, HAL_CAN_WARNING},
+        {CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE, CAN_ERROR_PASSIVE, HAL_CAN_PASSIVE},
+        {CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE, CAN_ERROR_OTHER, HAL_CAN_ACTIVE},
+        {CAN_ERR_CRTL, CAN_ERR_CRTL_RX_WARNING, CAN_ERROR_WARNING, HAL_CAN_WARNING},
+        {CAN_ERR_CRTL | CAN_ERR_ACK, CAN_ERR_CRTL_RX_PASSIVE, CAN_ERROR_PASSIVE | CAN_ERROR_NO_ACK, HAL_CAN_PASSIVE},
+        {CAN_ERR_ACK, 0, CAN_ERROR_NO_ACK, HAL_CAN_PASSIVE},
+        {CAN_ERR_CRTL, CAN_ERR_CRTL_RX_OVERFLOW, CAN_ERROR_OVERRUN, HAL_CAN_PASSIVE},
+        {CAN_ERR_PROT | CAN_ERR_BUSERROR, 0, CAN_ERROR_OTHER, HAL_CAN_PASSIVE},
+        {CAN_ERR_BUSOFF, 0, CAN_ERROR_BUS_OFF, HAL_CAN_BUS_OFF},
+        {CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING, CAN_ERROR_WARNING, HAL_CAN_BUS_OFF},
+        {CAN_ERR_RESTARTED, 0, CAN_ERROR_RESTARTED, HAL_CAN_ACTIVE},
+    };
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        report_linux(k_rows[i].what, k_rows[i].of_controller);
+        TEST_ASSERT_EQUAL_HEX32(k_rows[i].expected, receive_reports());
+        TEST_ASSERT_EQUAL(k_rows[i].state, state_now());
+    }
+    TEST_ASSERT_EQUAL_UINT32(sizeof k_rows / sizeof k_rows[0], lin.reports);
+    TEST_ASSERT_EQUAL_UINT8(130, lin.tx_errors);
+    TEST_ASSERT_EQUAL_UINT8(7, lin.rx_errors);
+}
+
+/* The kernel would send again by itself: with the old frames first. */
+static void test_linux_controller_that_restarts_by_itself_stays_cut_off_until_restart(void)
+{
+    const can_frame_t frame = make(0x201, 6), in = make(0x181, 8);
+    report_linux(CAN_ERR_BUSOFF, 0);
+    report_linux(CAN_ERR_RESTARTED, 0);
+    TEST_ASSERT_EQUAL_HEX32(CAN_ERROR_BUS_OFF | CAN_ERROR_RESTARTED, receive_reports());
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_send(hal, &frame));
+    fixture->inject(&in);
+    settle_linux();
+    assert_nothing_received();
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    assert_alive();
+}
+
+static void test_linux_one_whole_set_fits_and_no_more(void)
+{
+    uint32_t left = 0;
+    set_partner_linux(false);
+    for (uint32_t i = 0; i < LINUX_CAN_QUEUE_FRAMES; i++) {
+        const can_frame_t frame = make(0x200 + i, 8);
+        send_ok(&frame);
+    }
+    const can_frame_t frame = make(0x300, 8);
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_can_send(hal, &frame));
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &left));
+    TEST_ASSERT_EQUAL_UINT32(LINUX_CAN_QUEUE_FRAMES, left);
+    TEST_ASSERT_EQUAL_UINT32(0, lin.refused);
+}
+
+static void test_linux_short_interface_queue_refuses_and_is_counted(void)
+{
+    uint32_t taken = 0, left;
+    shell("tc qdisc replace dev vcan0 root tbf rate 8bit burst 16 limit 80"); /* five frames */
+    pass_by();
+    for (uint32_t i = 0; i < 9; i++) {
+        const can_frame_t frame = make(0x200 + i, 8);
+        taken += hal_can_send(hal, &frame) == HV_OK;
+    }
+    TEST_ASSERT_EQUAL_UINT32(5, taken);
+    TEST_ASSERT_EQUAL_UINT32(4, lin.refused);
+    TEST_ASSERT_EQUAL(LINUX_CAN_FINE, lin.trouble);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &left));
+    TEST_ASSERT_EQUAL_UINT32(5, left);
+}
+
+static void leave_frames_waiting(void)
+{
+    const can_frame_t stale = make(0x201, 6);
+    set_partner_linux(false);
+    for (int i = 0; i < 7; i++) {
+        send_ok(&stale);
+    }
+}
+
+/* The wire works again: whatever still waits arrives at the partner. */
+static void assert_no_stale_frame(void)
+{
+    shell("tc qdisc replace dev vcan0 root tbf rate 1gbit burst 5000 limit 4000");
+    pass_by();
+    assert_nothing_fetched();
+    assert_alive();
+}
+
+static void test_linux_stale_frames_restart_drops_them(void)
+{
+    leave_frames_waiting();
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    assert_no_stale_frame();
+}
+
+static void test_linux_stale_frames_close_drops_them(void)
+{
+    leave_frames_waiting();
+    reopen_linux(&k_plain, HV_OK);
+    assert_no_stale_frame();
+}
+
+/* As after a crash: nobody but the interface knows of the frames. */
+static void test_linux_stale_frames_of_a_dead_program_open_drops_them(void)
+{
+    leave_frames_waiting();
+    close(lin.fd);
+    lin.fd = -1;
+    reopen_linux(&k_plain, HV_OK);
+    assert_no_stale_frame();
+}
+
+static void test_linux_stale_frames_that_may_not_be_dropped_keep_the_bus_closed(void)
+{
+    leave_frames_waiting();
+    as_plain_user(true);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_restart(hal));
+    assert_says(LINUX_CAN_FRAMES_WAIT, "old frames wait");
+    reopen_linux(&k_plain, HV_ERR_AGAIN);
+    assert_says(LINUX_CAN_FRAMES_WAIT, "old frames wait");
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_restart(hal));
+    as_plain_user(false);
+    shell("ip link set vcan0 down && ip link set vcan0 up"); /* as the text says */
+    as_plain_user(true);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    as_plain_user(false);
+    assert_no_stale_frame();
+}
+
+static void test_linux_received_too_many_is_reported_before_the_next_kept_frame(void)
+{
+    const int small = 0;
+    can_frame_t got = {.id = 0};
+    uint64_t time_us;
+    uint32_t kept = 0;
+    TEST_ASSERT_EQUAL(0, setsockopt(lin.fd, SOL_SOCKET, SO_RCVBUF, &small, sizeof small));
+    for (uint32_t i = 0; i < 20; i++) {
+        inject_linux(&(can_frame_t){.id = i});
+    }
+    settle_linux();
+    while (hal_can_recv(hal, &got, &time_us) == HV_OK) {
+        TEST_ASSERT_FALSE(got.is_error);
+        TEST_ASSERT_EQUAL_UINT32(kept++, got.id);
+    }
+    const can_frame_t next = make(0x181, 8);
+    inject_linux(&next);
+    settle_linux();
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_recv(hal, &got, &time_us));
+    TEST_ASSERT_TRUE(got.is_error);
+    TEST_ASSERT_EQUAL_HEX32(CAN_ERROR_OVERRUN, got.id);
+    assert_received(&next);
+    assert_nothing_received();
+    TEST_ASSERT_TRUE(kept > 0 && kept < 20);
+    TEST_ASSERT_EQUAL_UINT32(20 - kept, lin.lost);
+}
+
+static uint64_t time_of_a_frame(void)
+{
+    can_frame_t got;
+    uint64_t time_us = 0;
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_recv(hal, &got, &time_us));
+    return time_us;
+}
+
+static void step_wall_clock(long seconds)
+{
+    struct timespec now;
+    TEST_ASSERT_EQUAL(0, clock_gettime(CLOCK_REALTIME, &now));
+    now.tv_sec += seconds;
+    TEST_ASSERT_EQUAL(0, clock_settime(CLOCK_REALTIME, &now));
+}
+
+static void test_linux_times_are_of_the_hal_clock_whatever_the_wall_clock_does(void)
+{
+    static const long k_steps_s[] = {0, 86400, -86400};
+    const hal_clock_t clock = linux_clock_hal();
+    for (size_t i = 0; i < sizeof k_steps_s / sizeof k_steps_s[0]; i++) {
+        const uint64_t before_us = hal_clock_now_us(clock);
+        inject_linux(&(can_frame_t){.id = 0x181});
+        const uint64_t after_us = hal_clock_now_us(clock);
+        settle_linux();
+        if (k_steps_s[i] != 0) {
+            step_wall_clock(k_steps_s[i]);
+        }
+        const uint64_t time_us = time_of_a_frame();
+        TEST_ASSERT_TRUE(time_us + 1 >= before_us);
+        TEST_ASSERT_TRUE(time_us <= (k_steps_s[i] == 0 ? after_us + 1 : hal_clock_now_us(clock)));
+    }
+}
+
+static void test_linux_link_tells_what_is_there(void)
+{
+    struct mnl_socket *netlink = linux_can_link_open();
+    linux_can_link_t link;
+    TEST_ASSERT_NOT_NULL(netlink);
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, linux_can_link_look(netlink, "vcan7", &link));
+    TEST_ASSERT_EQUAL(HV_OK, linux_can_link_look(netlink, "lo", &link));
+    TEST_ASSERT_FALSE(link.is_can);
+    leave_frames_waiting();
+    TEST_ASSERT_EQUAL(HV_OK, linux_can_link_look(netlink, "vcan0", &link));
+    TEST_ASSERT_TRUE(link.is_can && link.is_up && link.has_echo);
+    TEST_ASSERT_FALSE(link.has_controller);
+    TEST_ASSERT_EQUAL_STRING("vcan", link.kind);
+    TEST_ASSERT_EQUAL_UINT32(16, link.queue_length);
+    TEST_ASSERT_EQUAL_UINT32(7, link.waiting);
+    TEST_ASSERT_EQUAL(HAL_CAN_ACTIVE, link.state);
+    shell("ip link set vcan0 down");
+    TEST_ASSERT_EQUAL(HV_OK, linux_can_link_look(netlink, "vcan0", &link));
+    TEST_ASSERT_FALSE(link.is_up);
+    TEST_ASSERT_EQUAL(HAL_CAN_DOWN, link.state);
+    linux_can_link_close(netlink);
+}
+
+static void run_linux(void)
+{
+    RUN_TEST(test_linux_open_no_such_interface_can_be_retried);
+    RUN_TEST(test_linux_open_something_else_of_that_name_is_refused);
+    RUN_TEST(test_linux_open_down_needs_somebody_who_may_take_it_up);
+    RUN_TEST(test_linux_taken_down_is_noticed_by_either_op_and_stays_until_restart);
+    RUN_TEST(test_linux_unplugged_and_another_one_plugged_in_keeps_its_filters);
+    RUN_TEST(test_linux_own_list_echoes_pass_others_do_not_and_the_rest_is_refused);
+    RUN_TEST(test_linux_every_report_is_passed_on_as_itself);
+    RUN_TEST(test_linux_controller_that_restarts_by_itself_stays_cut_off_until_restart);
+    RUN_TEST(test_linux_one_whole_set_fits_and_no_more);
+    RUN_TEST(test_linux_short_interface_queue_refuses_and_is_counted);
+    RUN_TEST(test_linux_stale_frames_restart_drops_them);
+    RUN_TEST(test_linux_stale_frames_close_drops_them);
+    RUN_TEST(test_linux_stale_frames_of_a_dead_program_open_drops_them);
+    RUN_TEST(test_linux_stale_frames_that_may_not_be_dropped_keep_the_bus_closed);
+    RUN_TEST(test_linux_received_too_many_is_reported_before_the_next_kept_frame);
+    RUN_TEST(test_linux_times_are_of_the_hal_clock_whatever_the_wall_clock_does);
+    RUN_TEST(test_linux_link_tells_what_is_there);
+}
+
+int main(int argc, char **argv)
+{
+    const bool is_linux = argc > 1 && strcmp(argv[1], "--linux") == 0;
+    fixture = is_linux ? &k_linux : &k_sim;
     contract_backend = fixture->name;
-    run_sim();
+    UNITY_BEGIN();
+    run_contract();
+    (is_linux ? run_linux : run_sim)();
     return UNITY_END();
 }

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """kernel.py - runs a command on a kernel that has SocketCAN, with an interface vcan0 that is up and its own.
 
-    kernel.py [--virtual-time] [--limit SECONDS] -- COMMAND [ARG...]
+    kernel.py [--virtual-time] [--instrumented] [--limit SECONDS] -- COMMAND [ARG...]
         prints what the command printed and ends with its status; where no such kernel is to be had: "1..0 # SKIP reason", status 0
 
 Used where the tests need CAN, GPIO or exact times:
@@ -11,6 +11,7 @@ Used where the tests need CAN, GPIO or exact times:
   The command is root in there, outside it has no other rights than the caller.
 --virtual-time: always User Mode Linux. Computing takes no time there and sleeps are exact, whatever the machine is doing: every time that a
 test measures can be asserted to the microsecond, and every run is the same.
+--instrumented: the command has the address sanitizer, which needs more addresses than a process has in User Mode Linux.
 """
 import argparse
 import os
@@ -101,23 +102,26 @@ def find_uml():
     return found.stdout.strip()
 
 
-def run(command, virtual_time=False, limit_s=300, **environment):
+def run(command, virtual_time=False, limit_s=300, is_instrumented=False, **environment):
     """Runs the command with these additional environment variables. Raises tap.Skip where no kernel is to be had; returncode None: killed
     after limit_s of real time, or the kernel died."""
     environment = wanted_environment(environment)
     if not virtual_time and host_has_vcan():
         return run_here(command, limit_s, environment)
+    if is_instrumented:
+        raise tap.Skip("the address sanitizer does not work in User Mode Linux")
     return run_uml(find_uml(), command, limit_s, environment, virtual_time)
 
 
 def main():
     parser = argparse.ArgumentParser(usage=__doc__.split("\n\n")[1].strip())
     parser.add_argument("--virtual-time", action="store_true")
+    parser.add_argument("--instrumented", action="store_true")
     parser.add_argument("--limit", type=float, default=300)
     parser.add_argument("command", nargs="+")
     options = parser.parse_args()
     try:
-        finished = run(options.command, options.virtual_time, options.limit)
+        finished = run(options.command, options.virtual_time, options.limit, options.instrumented)
     except tap.Skip as reason:
         print(f"1..0 # SKIP {reason}")
         return 0

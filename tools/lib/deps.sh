@@ -26,6 +26,7 @@ deps_build() {
     deps_need libinih-dev pc:inih
     deps_need libcjson-dev pc:libcjson
     deps_need libsystemd-dev pc:libsystemd
+    deps_need libmnl-dev pc:libmnl
     deps_need python3 cmd:python3
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * can.h - contract of one classic CAN bus: frames out, frames in, and what is known about the wire.
- * One thread calls the ops, except restart, see there. Bit rate and receive filters are given to the backend's open.
+ * One thread calls the ops; restart see there. Bit rate and receive filters are given to the backend's open.
  */
 #ifndef HEAVE_HAL_CAN_H
 #define HEAVE_HAL_CAN_H
@@ -38,7 +38,8 @@ typedef enum {
     HAL_CAN_WARNING,
     HAL_CAN_PASSIVE,
     HAL_CAN_BUS_OFF,
-    HAL_CAN_DOWN /**< interface down, or unplugged */
+    HAL_CAN_DOWN, /**< the interface is there but switched off */
+    HAL_CAN_GONE  /**< there is no such interface: unplugged, or not there yet */
 } hal_can_state_t;
 
 /** A receive filter: a frame passes where (id ^ filter.id) & mask is 0 and its width is the filter's. A backend takes a list
@@ -71,12 +72,13 @@ static inline bool hal_can_valid(hal_can_t can)
     return can.ops != NULL && can.ops->send != NULL && can.ops->recv != NULL;
 }
 
-/** Queues a frame; frames leave in the order of their sending. <= 50 us. HV_OK means queued, not sent: with no partner or in
- *  bus-off frames pile up and would go out much later. Set-points need unconfirmed().
+/** Queues a frame; frames leave in the order of their sending. <= 50 us. Call recv until HV_ERR_AGAIN before each burst: what
+ *  has left the queue is known from there. HV_OK means queued, not sent: with no partner, and
+ *  with some controllers in bus-off, frames pile up and would go out much later. Set-points need unconfirmed().
  *  @param frame the caller's, copied
  *  @return HV_OK; HV_ERR_AGAIN: the queue is full, the frame is not taken (a set-point is then worthless: drop it, do not
- *          spin); HV_ERR_ARG: id, length or is_error out of range; HV_ERR_IO: interface down or gone, the frame is not
- *          taken. */
+ *          spin); HV_ERR_ARG: id, length or is_error out of range; HV_ERR_IO: bus-off, interface down or gone, the frame is
+ *          not taken, and none will be until restart. */
 static inline HV_MUST_CHECK hv_status_t hal_can_send(hal_can_t can, const can_frame_t *frame)
 {
     return can.ops->send(can.ctx, frame);
@@ -113,10 +115,12 @@ static inline HV_MUST_CHECK hv_status_t hal_can_unconfirmed(hal_can_t can, uint3
 }
 
 /** Starts afresh after bus-off, stall or unplugging: takes the interface up again by name, discards received frames, drops
- *  the frames that wait to be sent where the system lets it, forgets unconfirmed ones. Call only while no drive is enabled:
- *  frames that the system keeps may still go out. <= 10 ms.
- *  @return HV_OK; HV_ERR_AGAIN: the interface is not there yet, try later; HV_ERR_IO: it is there but refuses; HV_ERR_NOSUP.
- *          */
+ *  the frames that wait to be sent, forgets unconfirmed ones. Call only while no drive is enabled: a frame in the controller
+ *  itself may still go out. May block for some ms, unlike the other ops, and may run in another thread while no other op
+ *  does.
+ *  @return HV_OK; HV_ERR_AGAIN: the interface is not there yet, try later; HV_ERR_IO: it is there but refuses, is still down
+ *          or bus-off, or frames wait in it that the system does not let us drop; try later, someone may have helped;
+ *          HV_ERR_NOSUP. */
 static inline HV_MUST_CHECK hv_status_t hal_can_restart(hal_can_t can)
 {
     return can.ops->restart != NULL ? can.ops->restart(can.ctx) : HV_ERR_NOSUP;
