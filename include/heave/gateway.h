@@ -34,6 +34,16 @@ typedef struct {
 /** How far bringing up the drives has come. */
 typedef enum { BRING_UP_IDLE, BRING_UP_ENABLE, BRING_UP_HOME, BRING_UP_MOVE } bring_up_t;
 
+#define AUTO_ENGAGE_FRAMES_MAX 100u
+
+/** The auto policy; members are private to src/gateway. */
+typedef struct {
+    bool is_due;     /**< not used up yet */
+    uint32_t frames; /**< within a second, that it waits for */
+    uint32_t seen;   /**< wraps: harmless, after 2^32 frames it has long been used */
+    uint64_t at_us[AUTO_ENGAGE_FRAMES_MAX];
+} auto_engage_t;
+
 /** A gateway; members are private to src/gateway. */
 typedef struct {
     settings_t settings;
@@ -48,13 +58,14 @@ typedef struct {
     uint64_t bring_up_deadline_us;
     bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
     bool is_disable_due;     /**< disable the drives once at rest */
-    bool is_auto_due;        /**< the auto policy has not been used yet */
+    auto_engage_t auto_engage;
     bool is_shutdown_asked;  /**< nothing brings the platform up any more */
     uint32_t unsent_cycles;  /**< cycles in a row whose set-points the bus did not take */
     uint64_t reset_until_us; /**< a reset waits for the drives until then; 0 = none */
     owner_t owner;
-    uint64_t start_us;   /**< of the silence timer: last accepted frame or entry into ENGAGED */
-    uint16_t frame_mask; /**< what the sender asked of the relays */
+    uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
+    uint64_t state_since_us; /**< when the state was entered */
+    uint16_t frame_mask;     /**< what the sender asked of the relays */
     uint16_t written_mask;
     bool is_mask_written;
     uint64_t other_logged_us; /**< 0 = never */
@@ -70,6 +81,9 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
 
 /** Offline runs: starts in SETTLED, with drives that are enabled, homed and at the settled extension. After gateway_init. */
 void gateway_start_settled(gateway_t *self);
+
+/** Offline runs that came up to SETTLED by a request: the auto policy is as at the start. */
+void gateway_restart_auto(gateway_t *self);
 
 /** What an operator asks for: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET or EVENT_SHUTDOWN.
  *  @return HV_OK; HV_ERR_STATE where the state does not allow it: nothing changes. */

@@ -39,6 +39,7 @@ typedef struct {
 typedef struct {
     uint32_t cycle_us; /**< [500, 10000] */
     engage_policy_t engage;
+    uint32_t auto_frames; /**< [0, 100] valid frames within a second that ENGAGE_AUTO waits for; 0 = none */
 
     kin_geometry_t geometry;
     q16_t stroke_mm_q16[CYLINDERS_MAX];
@@ -67,6 +68,7 @@ typedef struct {
 
     uint8_t relay_count; /**< [0, 12] */
     uint16_t relay_safe_mask;
+    uint32_t relay_safe_after_ms; /**< of a hold that interrupted a ride; in every other state at once */
 } settings_t;
 
 #endif

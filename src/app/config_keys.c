@@ -77,6 +77,8 @@ const config_key_t config_keys[] = {
      .help = "six cylinders; three round a central guide; three on hinges (yaw, x and y then follow from roll and pitch)"},
     {KEY("platform", "cycle_us"), AT(settings.cycle_us), .type = CONFIG_INTEGER, .unit = "us", .fallback = "1000",
      RANGE(500, 10000), .help = "period of the motion cycle"},
+    {KEY("platform", "auto_frames"), AT(settings.auto_frames), .type = CONFIG_INTEGER, .unit = "", .fallback = "0", RANGE(0, 100),
+     .help = "valid frames within a second that engage = auto waits for before it brings the platform up; 0 = none"},
     {KEY("platform", "late_hold_cycles"), AT(late_hold_cycles), .type = CONFIG_INTEGER, .unit = "", .fallback = "3",
      RANGE(0, 1000), .help = "a cycle that is late by more cycles than that holds the platform; 0 = never"},
     {KEY("platform", "engage"), AT(settings.engage), .type = CONFIG_WORD, .unit = "", .fallback = "manual",
@@ -176,6 +178,8 @@ const config_key_t config_keys[] = {
      .help = "whether a low level closes a relay"},
     {KEY("relays", "safe_mask"), AT(settings.relay_safe_mask), .type = CONFIG_MASK, .unit = "", .fallback = "0", RANGE(0, 0xFFF),
      .help = "relays that are closed whenever no sender is followed (every state but ENGAGED); bit 0 = relay 1"},
+    {KEY("relays", "safe_after_ms"), AT(settings.relay_safe_after_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
+     RANGE(0, 600000), .help = "how long a hold leaves the relays as the sender set them; every other state at once"},
 
     {KEY("inputs", "driver"), AT(inputs.driver), .type = CONFIG_WORD, .unit = "", .fallback = "sim", .words = "sim",
      .absent = "gpio", .help = "the inputs in use"},

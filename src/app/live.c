@@ -305,7 +305,8 @@ static int open_all(live_t *self, const config_t *config)
         return code;
     }
     linux_log_init(&self->log, out_file_unblocked(STDERR_FILENO));
-    record_writer_init(&self->writer, config->settings.cycle_us, config->settings.engage);
+    record_writer_init(&self->writer, config->settings.cycle_us,
+                       config->settings.engage == ENGAGE_AUTO && config->settings.auto_frames == 0);
     if (!open_signals(self)) {
         return say(EXIT_UNAVAILABLE, "signals: %s", strerror(errno));
     }

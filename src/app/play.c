@@ -193,13 +193,18 @@ static bool is_at_rest(const play_t *self)
     return is_read && self->row.t_us >= since_us + REST_US + (uint64_t)REST_PERIODS * s->stream_period_us;
 }
 
-static bool settle(play_t *self, engage_policy_t engage)
+/* Comes up to SETTLED. What the auto policy does comes after it: a platform that waits for frames is brought up by a request. */
+static bool settle(play_t *self, const settings_t *settings)
 {
-    if (engage == ENGAGE_MANUAL && gateway_request(&self->session.gateway, EVENT_PARK, self->session.now_us) != HV_OK) {
+    const bool is_asked = settings->engage == ENGAGE_MANUAL || settings->auto_frames > 0;
+    if (is_asked && gateway_request(&self->session.gateway, EVENT_PARK, self->session.now_us) != HV_OK) {
         return false;
     }
     for (unsigned i = 0; i < SETTLE_CYCLES_MAX; i++) {
         if (session_cycle(&self->session)) {
+            if (is_asked) {
+                gateway_restart_auto(&self->session.gateway);
+            }
             return true;
         }
     }
@@ -290,7 +295,7 @@ static int open_all(play_t *self, const config_t *config, const char *trace_path
 {
     gateway_io_t io = io_of(self);
     if (rig_open_settled(&self->rig, config, &io) != HV_OK || session_init(&self->session, &config->settings, &io) != HV_OK ||
-        !settle(self, config->settings.engage)) {
+        !settle(self, &config->settings)) {
         return say(EXIT_BAD_CONFIG, "this platform cannot be simulated: its settled or neutral position is out of reach");
     }
     if (!out_file_open(&self->out, trace_path != NULL ? trace_path : "/dev/null", OUT_FILE_WAITS)) {

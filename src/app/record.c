@@ -18,10 +18,10 @@ void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const
     (void)ring_push(ring, &head, sizeof head, bytes, kind == RECORD_DATAGRAM ? length : 0);
 }
 
-void record_writer_init(record_writer_t *self, uint32_t cycle_us, engage_policy_t engage)
+void record_writer_init(record_writer_t *self, uint32_t cycle_us, bool engages_alone)
 {
     *self = (record_writer_t){
-        .cycle_us = cycle_us, .goal = engage == ENGAGE_AUTO ? STATE_ENGAGED : STATE_SETTLED, .from = {.address = {127, 0, 0, 1}}};
+        .cycle_us = cycle_us, .goal = engages_alone ? STATE_ENGAGED : STATE_SETTLED, .from = {.address = {127, 0, 0, 1}}};
 }
 
 /* Bytes that would be read as something else, or not at all: a `!` in front, blanks at both ends. */

@@ -52,8 +52,8 @@ void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value
 void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const hal_udp_peer_t *from, const uint8_t *bytes,
                           size_t length);
 
-/** @param engage the platform's policy: it decides what an offline run does by itself */
-void record_writer_init(record_writer_t *self, uint32_t cycle_us, engage_policy_t engage);
+/** @param engages_alone an offline run engages at time zero by itself */
+void record_writer_init(record_writer_t *self, uint32_t cycle_us, bool engages_alone);
 
 /** Turns the next record into a line, and one before it where the sender is another one.
  *  @param length of the bytes

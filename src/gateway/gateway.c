@@ -3,6 +3,7 @@
  */
 #include "heave/gateway.h"
 
+#include "auto_engage.h"
 #include "intake.h"
 #include "operate.h"
 
@@ -19,8 +20,8 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
     if (!is_io_valid(io)) {
         return HV_ERR_ARG;
     }
-    *self =
-        (gateway_t){.settings = *settings, .io = *io, .is_tracking_actual = true, .is_auto_due = settings->engage == ENGAGE_AUTO};
+    *self = (gateway_t){.settings = *settings, .io = *io, .is_tracking_actual = true};
+    gateway_restart_auto(self);
     const hv_status_t status = motion_init(&self->motion, settings);
     if (status != HV_OK) {
         return status;
@@ -38,12 +39,17 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
     return HV_OK;
 }
 
+void gateway_restart_auto(gateway_t *self)
+{
+    auto_engage_init(&self->auto_engage, self->settings.engage == ENGAGE_AUTO, self->settings.auto_frames);
+}
+
 void gateway_start_settled(gateway_t *self)
 {
     supervisor_init_settled(&self->supervisor);
     self->is_tracking_actual = false;
-    if (self->is_auto_due) {
-        self->is_auto_due = false;
+    if (auto_engage_is_ready(&self->auto_engage, 0)) {
+        auto_engage_end(&self->auto_engage);
         self->supervisor.goal = STATE_ENGAGED;
     }
 }
@@ -58,10 +64,18 @@ void gateway_note_late(gateway_t *self, uint32_t cycles)
     self->snapshot.counters.late_cycles += cycles;
 }
 
-/* Only an engaged sender commands the relays; the safe mask holds everywhere else. */
-static void write_relays(gateway_t *self)
+/* A hold leaves a ride's relays as they are for a while, if so configured. */
+static bool is_hold_young(const gateway_t *self, uint64_t now_us)
 {
-    const uint16_t mask = self->supervisor.state == STATE_ENGAGED ? self->frame_mask : self->settings.relay_safe_mask;
+    return self->supervisor.state == STATE_HOLD && self->supervisor.interrupted == STATE_ENGAGED &&
+           now_us - self->state_since_us < (uint64_t)self->settings.relay_safe_after_ms * 1000;
+}
+
+/* Only an engaged sender commands the relays; the safe mask holds everywhere else. */
+static void write_relays(gateway_t *self, uint64_t now_us)
+{
+    const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, now_us);
+    const uint16_t mask = is_sender_heard ? self->frame_mask : self->settings.relay_safe_mask;
     if (self->is_mask_written && mask == self->written_mask) {
         return;
     }
@@ -143,7 +157,7 @@ void gateway_cycle(gateway_t *self, uint64_t now_us)
     step_motion(self, now_us);
     send_setpoints(self, now_us);
     operate_after_motion(self);
-    write_relays(self);
+    write_relays(self, now_us);
     publish(self, now_us);
 }
 

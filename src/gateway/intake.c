@@ -3,6 +3,7 @@
  */
 #include "intake.h"
 
+#include "auto_engage.h"
 #include "heave/text.h"
 #include "operate.h"
 
@@ -221,6 +222,7 @@ static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *
     if (!is_followed(self, from, now_us)) {
         return;
     }
+    auto_engage_frame(&self->auto_engage, now_us);
     const motion_target_t target = target_of(self, frame);
     operate_event(self, EVENT_FRAME, now_us);
     if (self->supervisor.state == STATE_ENGAGED && motion_target(&self->motion, &target, now_us) != HV_OK) {

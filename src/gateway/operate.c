@@ -4,6 +4,7 @@
  */
 #include "operate.h"
 
+#include "auto_engage.h"
 #include "heave/text.h"
 
 #define ENABLE_TIMEOUT_US    10000000u
@@ -172,6 +173,7 @@ void operate_event(gateway_t *self, event_t event, uint64_t now_us)
     const supervisor_view_t view = view_of(self);
     const action_t action = supervisor_event(&self->supervisor, event, &view);
     if (self->supervisor.state != before) {
+        self->state_since_us = now_us;
         log_change(self, before, event);
     }
     carry_out(self, action, now_us);
@@ -319,10 +321,13 @@ static void step_reset(gateway_t *self, uint64_t now_us)
 /* The auto policy, once: brings the platform up as an operator's engage would. */
 static void step_auto(gateway_t *self, uint64_t now_us)
 {
-    const bool is_ready = self->supervisor.state == STATE_OFF && !is_drive_fault_present(self);
-    if (self->is_auto_due && is_ready) {
-        self->is_auto_due = false;
+    const state_t state = self->supervisor.state;
+    const bool can_engage = (state == STATE_OFF && !is_drive_fault_present(self)) || state == STATE_SETTLED;
+    if (can_engage && auto_engage_is_ready(&self->auto_engage, now_us)) {
+        auto_engage_end(&self->auto_engage);
         operate_event(self, EVENT_ENGAGE, now_us);
+    } else if (supervisor_is_latched(&self->supervisor)) {
+        auto_engage_end(&self->auto_engage); /* after a fault only an operator engages */
     }
 }
 
@@ -384,6 +389,7 @@ hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us)
         self->reset_until_us = now_us + RESET_TIMEOUT_US;
         return HV_OK;
     }
+    auto_engage_end(&self->auto_engage);
     self->is_shutdown_asked |= request == EVENT_SHUTDOWN;
     const uint32_t ignored = self->supervisor.ignored[request];
     if (self->is_shutdown_asked && request != EVENT_SHUTDOWN && request != EVENT_HOLD) {

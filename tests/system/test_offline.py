@@ -133,6 +133,11 @@ def run_manual(suite, bench):
     manual = bench.write_config("manual.ini", platform__engage="manual")
     with suite.case("engage = manual: without a request it stays settled"):
         assert states_of(bench.play(bench.folder / "stream.txt", config=manual)) == ["SETTLED"]
+    with suite.case("engage = auto with auto_frames: it waits for a stream, and once only"):
+        patient = bench.file("patient.ini", bench.config.read_text().replace("engage = auto", "auto_frames = 10\nengage = auto", 1))
+        assert states_of(bench.play(bench.file("few.txt", "".join(f"{200 * i} @A6:1,0,0,0,0,0,0#\n" for i in range(50))), config=patient)) == ["SETTLED"]
+        rows = heave.rows_of(bench.play(bench.file("many.txt", "".join(f"{100 + 20 * i} @A6:1,0,0,0,0,0,0#\n" for i in range(300))), config=patient))
+        assert next(row["t_ms"] for row in rows if row["state"] == "RISING") == "281.000" and rows[-1]["state"] in ("ENGAGED", "HOLD")
     with suite.case("requests do what heavectl would"):
         text = "0.5 !engage\n4000 !hold\n5000 !resume\n6000 !park\n20000 !shutdown\n"
         states = states_of(bench.play(bench.file("requests.txt", text), config=manual))

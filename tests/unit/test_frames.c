@@ -258,7 +258,7 @@ static record_writer_t started_writer(void)
     record_writer_t writer;
     char line[RECORD_LINE_MAX];
     const record_t zero = {.head = {.t_us = 5000, .value = STATE_SETTLED, .kind = RECORD_ZERO}};
-    record_writer_init(&writer, 1000, ENGAGE_MANUAL);
+    record_writer_init(&writer, 1000, false);
     TEST_ASSERT_GREATER_THAN_UINT(0, record_writer_line(&writer, &zero, 0, line));
     return writer;
 }
@@ -361,7 +361,7 @@ static void test_record_writer_before_zero_writes_comments(void)
     record_writer_t writer;
     char line[RECORD_LINE_MAX];
     record_t record = {.head = {.t_us = 1500, .kind = RECORD_DATAGRAM}, .bytes = "@A6:1#"};
-    record_writer_init(&writer, 1000, ENGAGE_MANUAL);
+    record_writer_init(&writer, 1000, false);
     const size_t length = record_writer_line(&writer, &record, 6, line);
     TEST_ASSERT_EQUAL_UINT(strlen("; 1.500 @A6:1#\n"), length);
     TEST_ASSERT_EQUAL_MEMORY("; 1.500 @A6:1#\n", line, length);
@@ -372,7 +372,7 @@ static void expect_zero(engage_policy_t engage, state_t goal, const char *expect
     record_writer_t writer;
     char line[RECORD_LINE_MAX];
     const record_t zero = {.head = {.t_us = 5000, .value = (uint32_t)goal, .kind = RECORD_ZERO}};
-    record_writer_init(&writer, 500, engage);
+    record_writer_init(&writer, 500, engage == ENGAGE_AUTO);
     const size_t length = record_writer_line(&writer, &zero, 0, line);
     line[length] = '\0';
     TEST_ASSERT_EQUAL_STRING(expected, line);

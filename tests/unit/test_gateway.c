@@ -150,6 +150,64 @@ static void test_start_manual_policy_waits_for_the_operator(void)
     TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
 }
 
+/* Waits for as many valid frames within a second, to the frame; bad ones and slow senders do not count. */
+static void test_start_auto_waits_for_a_stream(void)
+{
+    m_settings.auto_frames = 20;
+    start(false);
+    for (unsigned i = 0; i < 40; i++) {
+        send_and_run("@A6:0,0,0,0,0,0#", 60); /* 17 in a second */
+    }
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    for (unsigned i = 0; i < 100; i++) {
+        send_and_run("@A6:0,0,0,0,0#", 10);
+    }
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    rig_run_ms(&m_rig, 1000);
+    for (unsigned i = 0; i < 19; i++) {
+        send_and_run("@A6:0,0,0,0,0,0#", 20);
+    }
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    send_and_run("@A6:0,0,0,0,0,0#", 2);
+    TEST_ASSERT_EQUAL(STATE_HOMING, seen()->state);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
+}
+
+/* Once per start, and never after a fault, an e-stop or an operator's word. */
+static void test_start_auto_is_over_after_fault_estop_and_requests(void)
+{
+    for (unsigned what = 0; what < 3; what++) {
+        m_settings.auto_frames = 5;
+        start(false);
+        rig_run_ms(&m_rig, 10);
+        if (what == 0) {
+            TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_PARK));
+            TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_SETTLED, 60000));
+        } else if (what == 1) {
+            sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, true);
+            rig_run_ms(&m_rig, 10);
+            sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, false);
+            TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+            rig_run_ms(&m_rig, 10);
+        } else {
+            m_is_fault_expected = true;
+            TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+            rig_run_ms(&m_rig, 200);
+            rig_break(&m_rig, SIM_DRIVES_FAULT, 1, 7);
+            rig_run_ms(&m_rig, 2000);
+            rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+            TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+            rig_run_ms(&m_rig, 100);
+        }
+        const state_t state = seen()->state;
+        TEST_ASSERT_EQUAL(what == 0 ? STATE_SETTLED : STATE_OFF, state);
+        for (unsigned i = 0; i < 200; i++) {
+            send_and_run("@A6:0,0,0,0,0,0#", 10);
+        }
+        TEST_ASSERT_EQUAL(state, seen()->state);
+    }
+}
+
 static void test_settled_manual_frames_move_nothing(void)
 {
     static const char *const k_frames[] = {"@A6:5,5,5,20,20,20,FFF#", "@A6T:5,5,5,20,20,20,500#", "@C6:50,60,70,80,90,100,7#",
@@ -357,6 +415,23 @@ static void test_relays_follow_the_mask_only_while_engaged(void)
     TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask); /* until the sender says so again */
     send_and_run("@A6:0,0,0,0,0,0,0FF#", 2);
     TEST_ASSERT_EQUAL_HEX16(0x0FF, m_rig.relays.mask);
+}
+
+static void test_relays_may_outlast_a_hold_for_a_while(void)
+{
+    m_settings.relay_safe_after_ms = 300;
+    m_settings.silence_hold_ms = 200;
+    engage();
+    send_and_run("@A6:0,0,0,0,0,0,F0#", 202);
+    TEST_ASSERT_EQUAL(STATE_HOLD, seen()->state);
+    rig_run_ms(&m_rig, 290);
+    TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);
+    rig_run_ms(&m_rig, 12);
+    TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
+    send_and_run("@A6:0,0,0,0,0,0,F0#", 100);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_PARK));
+    rig_run_ms(&m_rig, 2);
+    TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
 }
 
 static void test_relays_bits_without_a_relay_are_counted(void)
@@ -915,6 +990,8 @@ int main(void)
     RUN_TEST(test_start_unhomed_drives_are_homed_and_brought_up);
     RUN_TEST(test_start_drives_elsewhere_go_to_settled_first);
     RUN_TEST(test_start_manual_policy_waits_for_the_operator);
+    RUN_TEST(test_start_auto_waits_for_a_stream);
+    RUN_TEST(test_start_auto_is_over_after_fault_estop_and_requests);
     RUN_TEST(test_settled_manual_frames_move_nothing);
     RUN_TEST(test_frames_bad_ones_change_nothing_and_are_counted);
     RUN_TEST(test_frames_several_in_a_datagram_the_last_one_counts);
@@ -926,6 +1003,7 @@ int main(void)
     RUN_TEST(test_frames_extensions_without_a_pose_are_counted_and_move_nothing);
     RUN_TEST(test_frames_reject_lines_are_rate_limited_and_count_what_was_left_out);
     RUN_TEST(test_relays_follow_the_mask_only_while_engaged);
+    RUN_TEST(test_relays_may_outlast_a_hold_for_a_while);
     RUN_TEST(test_relays_bits_without_a_relay_are_counted);
     RUN_TEST(test_relays_failed_write_is_counted_and_tried_again);
     RUN_TEST(test_axes_sign_scale_and_offset_apply);
