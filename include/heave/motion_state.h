@@ -4,6 +4,7 @@
 #ifndef HEAVE_MOTION_STATE_H
 #define HEAVE_MOTION_STATE_H
 
+#include "heave/halt.h"
 #include "heave/motion.h"
 #include "heave/profile.h"
 
@@ -14,11 +15,12 @@ typedef enum {
     MOTION_ON_PATH,  /**< an S-curve in cylinder space */
     MOTION_STREAMED, /**< following: steps and streams */
     MOTION_TIMED,    /**< following: a quintic */
+    MOTION_HALTING,  /**< following: a stop, then the S-curve */
     MOTION_STRAIGHT  /**< following: a timed move from rest along an S-curve */
 } motion_source_t;
 
 /** What comes after a stop. */
-typedef enum { MOTION_THEN_REST, MOTION_THEN_PATH, MOTION_THEN_FOLLOW, MOTION_THEN_STRAIGHT } motion_next_t;
+typedef enum { MOTION_THEN_REST, MOTION_THEN_PATH, MOTION_THEN_FOLLOW } motion_next_t;
 
 struct motion {
     kin_t kin;
@@ -42,6 +44,7 @@ struct motion {
     motion_space_t space;
     stream_t stream;
     quintic_t quintic;
+    halt_t halt;
     scurve_t path;
     q32_t path_from_q32[AXES_MAX];
     q32_t path_to_q32[AXES_MAX];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * profile.h - moves planned as a whole: quintics (timed moves, controlled stops) and integer-count S-curves (moves from rest).
+ * profile.h - moves planned as a whole: quintics (timed moves) and integer-count S-curves (moves from rest).
  * All axes of a move share one duration, so they start and end together. Integer only; no clock.
  */
 #ifndef HEAVE_PROFILE_H
@@ -19,7 +19,6 @@ typedef struct {
     unsigned axes;
     int64_t cycles;
     int64_t elapsed;
-    int64_t axis_cycles[AXES_MAX]; /**< an axis may come to rest before the others */
     q32_t start_q32[AXES_MAX];
     q32_t target_q32[AXES_MAX];
     q32_t coefficient_q32[AXES_MAX][5]; /**< of t, t^2 ... t^5, t from 0 to 1 */
@@ -32,14 +31,10 @@ typedef struct {
 hv_status_t quintic_plan(quintic_t *self, unsigned axes, const ramp_state_t *start, const q32_t *target_q32,
                          int64_t cycles) HV_MUST_CHECK;
 
-/** Plans the quickest stop of all axes together that stays within the limits; every axis ends where its own speed carries it. An
- *  axis that would go too fast or too far if it took as long as the slowest one takes its own time. */
-void quintic_plan_stop(quintic_t *self, unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits);
-
 /** True if every axis stays within its limits (checked at 33 points with 1/64 to spare). */
 bool quintic_is_feasible(const quintic_t *self, const ramp_limits_t *const *limits);
 
-/** Position of an axis at t, 0 to 1 of its own time. */
+/** Position of an axis at t, 0 to 1. */
 q32_t quintic_position(const quintic_t *self, unsigned axis, q62_t t_q62);
 
 /** References of the next cycle. Past the end: at rest on the targets. */

@@ -37,7 +37,7 @@ bool follow_can_assemble(const motion_t *self, const motion_target_t *target)
 
 bool follow_is_moving(const motion_t *self)
 {
-    return self->source == MOTION_STREAMED || self->source == MOTION_TIMED || self->source == MOTION_STRAIGHT;
+    return self->source >= MOTION_STREAMED;
 }
 
 /* Position, velocity and acceleration of the plate from the cylinders' last three positions. */
@@ -167,17 +167,17 @@ static bool are_slots_at_rest(motion_t *self)
 static bool plan_stop_then_straight(motion_t *self, const ramp_state_t *start, const ramp_limits_t *const *limits,
                                     const q32_t slot_q32[AXES_MAX], int64_t cycles)
 {
-    quintic_plan_stop(&self->quintic, AXES_MAX, start, limits);
+    halt_plan(&self->halt, AXES_MAX, POSE_AXES, start, limits);
     path_limits_t path = path_limits_none();
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        path_limits_narrow(&path, slot_q32[i] - self->quintic.target_q32[i], limits[i]);
+        path_limits_narrow(&path, slot_q32[i] - self->halt.rest_q32[i], limits[i]);
         self->path_to_q32[i] = slot_q32[i];
     }
     if (self->space == MOTION_POSE) {
-        way_narrow(self, self->quintic.target_q32, slot_q32, &path);
+        way_narrow(self, self->halt.rest_q32, slot_q32, &path);
     }
     scurve_plan(&self->path, &path, 1);
-    self->straight_cycles = cycles - self->quintic.cycles - 1;
+    self->straight_cycles = cycles - self->halt.cycles - 1;
     return scurve_cycles(&self->path) <= self->straight_cycles;
 }
 
@@ -201,7 +201,6 @@ static void plan_timed(motion_t *self, const q32_t slot_q32[AXES_MAX], int64_t a
     }
     int64_t cycles = asked > 0 ? asked : 1;
     self->is_stretched = false;
-    self->next = MOTION_THEN_REST;
     self->source = MOTION_TIMED;
     if (is_quintic_feasible(self, start, limits, slot_q32, cycles)) {
         /* planned as it is */
@@ -210,7 +209,7 @@ static void plan_timed(motion_t *self, const q32_t slot_q32[AXES_MAX], int64_t a
         cycles = scurve_cycles(&self->path);
         self->is_stretched = asked > 0 && cycles > asked;
     } else if (plan_stop_then_straight(self, start, limits, slot_q32, cycles)) {
-        self->next = MOTION_THEN_STRAIGHT;
+        self->source = MOTION_HALTING;
     } else {
         self->source = MOTION_STREAMED; /* the lone sample that follow_target pushed: a step */
         self->is_stretched = asked > 0;
@@ -278,6 +277,10 @@ static void step_source(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX
 {
     if (self->source == MOTION_TIMED) {
         quintic_step(&self->quintic, ref);
+        return;
+    }
+    if (self->source == MOTION_HALTING) {
+        halt_step(&self->halt, ref);
         return;
     }
     if (self->source == MOTION_STREAMED) {
@@ -371,13 +374,11 @@ void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX], pose
 
 void follow_end_cycle(motion_t *self)
 {
-    if (self->source == MOTION_TIMED && self->next == MOTION_THEN_STRAIGHT && quintic_is_done(&self->quintic) &&
-        are_slots_at_rest(self)) {
+    if (self->source == MOTION_HALTING && halt_is_done(&self->halt) && are_slots_at_rest(self)) {
         q32_t target_q32[AXES_MAX];
         for (unsigned i = 0; i < AXES_MAX; i++) {
             target_q32[i] = self->path_to_q32[i];
         }
-        self->next = MOTION_THEN_REST;
         plan_straight(self, target_q32, self->straight_cycles);
     }
 }

@@ -10,7 +10,6 @@
 
 #define COEFFICIENT_MAX_Q32 ((q32_t)1 << 56) /* leaves room for the factor 60 of the third derivative */
 #define CHECK_POINTS        32
-#define STOP_ATTEMPTS       48
 #define ROUNDING_ATTEMPTS   64
 
 ramp_ref_t history_advance(history_t *self, q32_t pos_q32)
@@ -48,7 +47,6 @@ static bool plan_axis(quintic_t *self, unsigned i, const ramp_state_t *start, q3
     c[2] = 10 * d - 6 * c1 - 3 * c2;
     c[3] = -15 * d + 8 * c1 + 3 * c2;
     c[4] = 6 * d - 3 * c1 - c2;
-    self->axis_cycles[i] = cycles;
     self->start_q32[i] = start->pos_q32;
     self->target_q32[i] = target_q32;
     self->history[i] = *start;
@@ -97,20 +95,6 @@ static bounds_t bounds_of_move(const ramp_limits_t *limits, int64_t cycles)
     return (bounds_t){vel - vel / 64, acc - acc / 64, jerk - jerk / 64};
 }
 
-/* The same for a stop, which may not be refused for what it starts with; a cubic needs some speed above that to keep the jerk. */
-static bounds_t bounds_of_stop(const ramp_limits_t *limits, const ramp_state_t *start, int64_t cycles)
-{
-    const q32_t vel_start_q32 = fx_abs(central_velocity(start));
-    const q32_t acc_start_q32 = fx_abs(start->acc_per_cycle2_q32);
-    const q32_t acc_safe_q32 = ramp_safe_acceleration(limits);
-    const q32_t vel_q32 = vel_start_q32 > limits->vel_per_cycle_q32 ? vel_start_q32 : limits->vel_per_cycle_q32;
-    const q32_t acc_q32 = acc_start_q32 > acc_safe_q32 ? acc_start_q32 : acc_safe_q32;
-    const int64_t vel = product(vel_q32, cycles);
-    const int64_t acc = product(product(acc_q32, cycles), cycles);
-    const int64_t jerk = product(product(product(limits->jerk_per_cycle3_q32, cycles), cycles), cycles);
-    return (bounds_t){fx_add_sat(vel, vel / 8), fx_add_sat(acc, acc / 64), jerk};
-}
-
 static bool is_within_bounds_at(const quintic_t *self, unsigned axis, const bounds_t *bounds, q62_t t_q62)
 {
     const q32_t *c = self->coefficient_q32[axis];
@@ -156,71 +140,13 @@ bool quintic_is_feasible(const quintic_t *self, const ramp_limits_t *const *limi
     return true;
 }
 
-/* Least cycles in which one axis can stop: from 1.5 v / A, sqrt(6 v / J) and 4 a / J. */
-static int64_t least_stop_cycles(const ramp_state_t *state, const ramp_limits_t *limits)
-{
-    const q32_t vel_q32 = fx_abs(central_velocity(state));
-    const int64_t by_acc = fx_mul_div(vel_q32, 3, 2 * ramp_safe_acceleration(limits));
-    const int64_t by_jerk = (int64_t)fx_sqrt_u64((uint64_t)fx_mul_div(vel_q32, 6, limits->jerk_per_cycle3_q32));
-    const int64_t by_ramp = fx_mul_div(fx_abs(state->acc_per_cycle2_q32), 4, limits->jerk_per_cycle3_q32);
-    const int64_t most = by_acc > by_jerk ? by_acc : by_jerk;
-    return 1 + (most > by_ramp ? most : by_ramp);
-}
-
-/* Where velocity and acceleration carry an axis whose velocity falls to rest as a cubic: v T / 2 + a T^2 / 12. */
-static q32_t stop_target(const ramp_state_t *state, int64_t cycles)
-{
-    const q32_t by_vel_q32 = product(central_velocity(state), cycles) / 2;
-    const q32_t by_acc_q32 = product(product(state->acc_per_cycle2_q32, cycles), cycles) / 12;
-    return state->pos_q32 + by_vel_q32 + by_acc_q32;
-}
-
-/* Plans the stop of an axis in so many cycles; false where it would break acceleration or jerk. */
-static bool try_stop(quintic_t *self, unsigned i, const ramp_state_t *start, const ramp_limits_t *limits, int64_t cycles)
-{
-    bounds_t bounds = bounds_of_stop(limits, start, cycles);
-    bounds.vel = INT64_MAX;
-    return plan_axis(self, i, start, stop_target(start, cycles), cycles) && keeps_bounds(self, i, &bounds);
-}
-
-static void plan_own_stop(quintic_t *self, unsigned i, const ramp_state_t *start, const ramp_limits_t *limits)
-{
-    int64_t cycles = least_stop_cycles(start, limits);
-    for (int attempt = 0; attempt < STOP_ATTEMPTS && !try_stop(self, i, start, limits, cycles); attempt++) {
-        cycles += cycles / 16 + 1;
-    }
-}
-
-/* Lets an axis take longer than it needs; false where that would carry it too fast or too far. */
-static bool try_longer_stop(quintic_t *self, unsigned i, const ramp_state_t *start, const ramp_limits_t *limits, int64_t cycles)
-{
-    const bounds_t bounds = bounds_of_stop(limits, start, cycles);
-    return try_stop(self, i, start, limits, cycles) && keeps_bounds(self, i, &bounds) && stays_inside(self, i, limits);
-}
-
-void quintic_plan_stop(quintic_t *self, unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits)
-{
-    self->axes = axes;
-    self->cycles = 1;
-    self->elapsed = 0;
-    for (unsigned i = 0; i < axes; i++) {
-        plan_own_stop(self, i, &start[i], limits[i]);
-        self->cycles = self->axis_cycles[i] > self->cycles ? self->axis_cycles[i] : self->cycles;
-    }
-    for (unsigned i = 0; i < axes; i++) {
-        if (self->axis_cycles[i] < self->cycles && !try_longer_stop(self, i, &start[i], limits[i], self->cycles)) {
-            plan_own_stop(self, i, &start[i], limits[i]);
-        }
-    }
-}
-
 /* Position of an axis in the present cycle. */
 static q32_t position_now(const quintic_t *self, unsigned i)
 {
-    if (self->elapsed >= self->axis_cycles[i]) {
+    if (self->elapsed >= self->cycles) {
         return self->target_q32[i];
     }
-    return quintic_position(self, i, fx_mul_div(self->elapsed, Q62_ONE, self->axis_cycles[i]));
+    return quintic_position(self, i, fx_mul_div(self->elapsed, Q62_ONE, self->cycles));
 }
 
 void quintic_step(quintic_t *self, ramp_ref_t *ref)

@@ -206,70 +206,6 @@ static void test_quintic_plan_far_too_long_is_refused(void)
     TEST_ASSERT_EQUAL(HV_OK, quintic_plan(&quintic, 1, &rest, &target, 7200000));
 }
 
-static void test_quintic_plan_stop_all_axes_end_together_at_rest(void)
-{
-    judge_t worst = {0};
-    double slowest = 0;
-    for (int run = 0; run < 4000; run++) {
-        axis_t axis[AXES];
-        const ramp_limits_t *limits[AXES];
-        ramp_state_t start[AXES];
-        judge_t j[AXES];
-        double least = 1;
-        for (unsigned i = 0; i < AXES; i++) {
-            axis[i] = random_axis();
-            limits[i] = &axis[i].limits;
-            start[i] = run % 7 == 0 ? (ramp_state_t){.pos_q32 = q32(3)} : random_state(limits[i]);
-            j[i] = (judge_t){.last = start[i]};
-            const double a = (double)start[i].acc_per_cycle2_q32, acc = (double)ramp_safe_acceleration(limits[i]);
-            const double jerk = (double)limits[i]->jerk_per_cycle3_q32;
-            const double v = fabs((double)start[i].vel_per_cycle_q32 + a * fabs(a) / (2 * jerk));
-            least = fmax(least, fabs(a) / jerk + (v * jerk >= acc * acc ? v / acc + acc / jerk : 2 * sqrt(v / jerk)));
-        }
-        quintic_t quintic;
-        quintic_plan_stop(&quintic, AXES, start, limits);
-        ramp_ref_t ref[AXES];
-        while (!quintic_is_done(&quintic)) {
-            quintic_step(&quintic, ref);
-            for (unsigned i = 0; i < AXES; i++) {
-                judge(&j[i], limits[i], ref[i].pos_q32);
-            }
-        }
-        slowest = least > 100 ? fmax(slowest, (double)quintic.cycles / least) : slowest;
-        for (unsigned i = 0; i < AXES; i++) {
-            worst_of(&worst, &j[i]);
-            TEST_ASSERT_TRUE(llabs(j[i].last.vel_per_cycle_q32) <= limits[i]->acc_per_cycle2_q32);
-            TEST_ASSERT_EQUAL_INT64(quintic.target_q32[i], j[i].last.pos_q32);
-            if (run % 7 == 0) {
-                TEST_ASSERT_EQUAL_INT64(start[i].pos_q32, j[i].last.pos_q32);
-            }
-        }
-    }
-    printf("stops: shares of the limits: speed %.4f, acceleration %.4f, jerk %.4f; slowest %.2f x the quickest of one axis\n",
-           worst.speed, worst.accel, worst.jerk, slowest);
-    TEST_ASSERT_TRUE(worst.speed <= 1.2 && worst.accel <= 1.02 && worst.jerk <= 1.02);
-    TEST_ASSERT_TRUE(slowest < 4);
-}
-
-/* A heavy rotation motor takes seconds to stop; a cylinder that is accelerating must not be carried along for that long. */
-static void test_quintic_plan_stop_beside_a_slow_axis_is_not_carried_away(void)
-{
-    const axis_t cylinder = axis_of(400, 3000, 50000, 1000), motor = axis_of(60, 20, 200, 1000);
-    const ramp_limits_t *limits[2] = {&cylinder.limits, &motor.limits};
-    const ramp_state_t start[2] = {{0, q32(0.1), q32(0.003)}, {0, q32(0.06), 0}};
-    judge_t j = {.last = start[0]};
-    quintic_t quintic;
-    quintic_plan_stop(&quintic, 2, start, limits);
-    TEST_ASSERT_TRUE(quintic.cycles > 3000);
-    while (!quintic_is_done(&quintic)) {
-        ramp_ref_t ref[2];
-        quintic_step(&quintic, ref);
-        judge(&j, &cylinder.limits, ref[0].pos_q32);
-        TEST_ASSERT_TRUE(ref[0].pos_q32 < q32(80));
-    }
-    TEST_ASSERT_TRUE(j.speed <= 1.2 && j.accel <= 1.02 && j.jerk <= 1);
-}
-
 /* ---- S-curves ---- */
 
 /* Shortest time from rest to rest with limited speed, acceleration and jerk. */
@@ -443,8 +379,6 @@ int main(void)
     RUN_TEST(test_quintic_is_feasible_agrees_with_the_closed_form);
     RUN_TEST(test_quintic_is_feasible_path_outside_the_bounds_is_not);
     RUN_TEST(test_quintic_plan_far_too_long_is_refused);
-    RUN_TEST(test_quintic_plan_stop_all_axes_end_together_at_rest);
-    RUN_TEST(test_quintic_plan_stop_beside_a_slow_axis_is_not_carried_away);
     RUN_TEST(test_scurve_plan_random_moves_keep_limits_and_are_short);
     RUN_TEST(test_scurve_plan_several_axes_each_keeps_its_own_limits);
     RUN_TEST(test_scurve_plan_extreme_distances_are_covered);
