@@ -6,6 +6,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "canraw_maps.h"
+#include "canraw_slave.h"
 #include "sim_drives.h"
 
 /** A backend under test: seven axes with 300 mm of travel each, standing at 100 mm + 10 mm per axis, homed, disabled. */
@@ -82,7 +84,70 @@ static void power_sim(uint8_t axis, bool is_on)
     inject(is_on ? SIM_DRIVES_RECOVER : SIM_DRIVES_OFFLINE, axis);
 }
 
-static const fixture_t k_fixtures[] = {{"sim", open_sim, close_sim, settle_sim, fault_sim, power_sim}};
+/* Drives with frames of their own, behind the raw CAN driver. */
+
+static sim_can_bus_t canraw_bus;
+static sim_can_t canraw_node;
+static canraw_slave_t canraw_slave;
+static canraw_map_t canraw_map;
+static canraw_t canraw;
+
+static void settle_canraw(uint64_t until_us)
+{
+    canraw_slave_step(&canraw_slave, until_us);
+}
+
+/* On the bus, and long enough for the drives to say that they are homed. */
+static void start_canraw(drives_t *drives, bool is_rich)
+{
+    hal_can_filter_t filter[DRIVES_MAX];
+    sim_can_bus_init(&canraw_bus, 0, NULL, 0);
+    canraw_slave_open(&canraw_slave, &canraw_bus, is_rich);
+    canraw_map = is_rich ? canraw_maps_rich() : canraw_maps_plain();
+    canraw_map.period_us = is_rich ? CYCLE_US : 2 * CYCLE_US;
+    for (uint8_t k = 0; k < AXES; k++) {
+        const int32_t mm = 100 + 10 * k;
+        canraw_slave.drive[k].position = is_rich ? CANRAW_SLAVE_RICH_ZERO - (mm * 10000 + 1) / 3 : mm * 2000;
+    }
+    const uint32_t filters = canraw_filters(&canraw_map, filter);
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&canraw_node, &canraw_bus, filter, filters));
+    TEST_ASSERT_EQUAL(HV_OK, canraw_init(&canraw, &canraw_map, sim_can_hal(&canraw_node)));
+    *drives = canraw_hal(&canraw);
+    for (int i = 0; i < 30; i++) {
+        now_us += CYCLE_US;
+        settle_canraw(now_us);
+        (void)!drives_poll(*drives, now_us, feedback);
+        (void)!drives_send(*drives, now_us, setpoint_q32);
+    }
+}
+
+static bool open_canraw_plain(drives_t *drives)
+{
+    start_canraw(drives, false);
+    return true;
+}
+
+static bool open_canraw_rich(drives_t *drives)
+{
+    start_canraw(drives, true);
+    return true;
+}
+
+static void fault_canraw(uint8_t axis)
+{
+    canraw_slave.drive[axis].is_faulty = true;
+}
+
+static void power_canraw(uint8_t axis, bool is_on)
+{
+    canraw_slave.drive[axis].is_on = is_on;
+}
+
+static const fixture_t k_fixtures[] = {
+    {"sim", open_sim, close_sim, settle_sim, fault_sim, power_sim},
+    {"canraw-plain", open_canraw_plain, close_sim, settle_canraw, NULL, power_canraw},
+    {"canraw-rich", open_canraw_rich, close_sim, settle_canraw, fault_canraw, power_canraw},
+};
 
 static hv_status_t poll_once(void)
 {

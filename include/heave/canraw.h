@@ -1,0 +1,185 @@
+/* SPDX-License-Identifier: MIT
+ * canraw.h - drives on CAN with frames of their own (no CANopen): a map says what the bytes mean, this driver does the rest.
+ * One identifier per drive for commands, one for replies. The caller owns canraw_t; the motion thread alone calls it (drives.h).
+ *
+ * Such drives say little about themselves, so states are judged like this:
+ *   OFFLINE   no position has been received for offline_periods of the bus
+ *   ENABLING  asked for; ends with a position that is newer than the request and, where the map knows how a drive says that it is
+ *             enabled (enabled_when), with that. Where the map has an enable frame, set-points go out before it already
+ *   ENABLED   set-points go out. Without enabled_when it means just this: asked for, and heard from since
+ *   HOMING    the homing frame went out; ends when the drive says so (homing_done) and has told its position once more
+ *   DISABLED  everything else: set-points are not sent. Without disable and stop frames a drive keeps holding its last set-point
+ *   FAULT     fault_when, homing_failed, or found here, because these drives have no guard of their own: a set-point further than
+ *             step_max from the one before (at first: from actual), or further than following_max from actual. It is not sent
+ */
+#ifndef HEAVE_CANRAW_H
+#define HEAVE_CANRAW_H
+
+#include "heave/counts.h"
+#include "heave/drives.h"
+#include "heave/hal/can.h"
+
+#define CANRAW_BYTES_MAX  8u
+#define CANRAW_FIELDS_MAX 4u
+
+/** Fault codes of this driver; where the map has fault_when, the code is the status as received (1 where that is 0). */
+#define CANRAW_FAULT_FOLLOWING 0x8611u /**< following error, the number CANopen drives use */
+#define CANRAW_FAULT_HOMING    0x8613u /**< the drive says that homing failed */
+
+/** What a field carries. */
+typedef enum {
+    CANRAW_POSITION, /**< counts: the set-point, or in replies actual */
+    CANRAW_SPEED,    /**< set-points only */
+    CANRAW_STATUS    /**< replies only */
+} canraw_value_t;
+
+#define CANRAW_VALUES 3u
+
+/** A field of a frame. */
+typedef struct {
+    canraw_value_t value;
+    uint8_t at;    /**< first byte */
+    uint8_t bytes; /**< 1, 2 or 4 */
+    bool is_signed;
+    bool is_big_endian;
+} canraw_field_t;
+
+/** A frame as the map has it: constant bytes and fields; in replies also bytes that may be anything. */
+typedef struct {
+    uint8_t length;   /**< 0: the map has no such frame */
+    uint8_t constant; /**< bit i: byte i is data[i] */
+    uint8_t fields;
+    uint8_t data[CANRAW_BYTES_MAX];
+    canraw_field_t field[CANRAW_FIELDS_MAX];
+} canraw_frame_t;
+
+/** True where (status & mask) == value; a mask of 0 means that the map does not say. */
+typedef struct {
+    uint32_t value;
+    uint32_t mask;
+} canraw_when_t;
+
+/** What a drive can be told beside set-points; frames without fields, each optional. */
+typedef enum { CANRAW_STOP, CANRAW_DISABLE, CANRAW_RESET, CANRAW_ENABLE, CANRAW_HOME } canraw_command_t;
+
+#define CANRAW_COMMANDS 5u
+#define CANRAW_NOTHING  CANRAW_COMMANDS
+
+/** One drive. Unit u: mm, or deg of the rotation motor. */
+typedef struct {
+    uint32_t command_id; /**< all different, also from the reply_ids */
+    uint32_t reply_id;
+    counts_scale_t scale;    /**< counts per u, and the counts at 0 u */
+    counts_scale_t speed;    /**< speed field per u/s */
+    q32_t step_max_q32;      /**< largest step of set-points, u per bus period; > 0 */
+    q32_t following_max_q32; /**< largest distance of a set-point from actual, u; 0 = not watched */
+} canraw_axis_map_t;
+
+/** The whole map. */
+typedef struct {
+    uint8_t axes; /**< [1, DRIVES_MAX] */
+    bool is_extended;
+    bool is_on_change;        /**< a set-point that is the last one again is not sent */
+    uint32_t period_us;       /**< of the bus, a multiple of the motion cycle */
+    uint32_t query_every;     /**< each drive is asked once in so many periods, [1, 1000] */
+    uint32_t offline_periods; /**< > 2 * query_every */
+    uint32_t speed_least;     /**< what a speed field carries at least; the only speed where axis[].speed is 0 per u/s */
+    canraw_frame_t setpoint;
+    canraw_frame_t command[CANRAW_COMMANDS];
+    canraw_frame_t position_query; /**< absent: positions come unasked */
+    canraw_frame_t position_reply; /**< has a position, may have a status */
+    canraw_frame_t homing_query;
+    canraw_frame_t homing_reply; /**< has a status */
+    canraw_when_t enabled_when;  /**< of the status of position_reply */
+    canraw_when_t fault_when;    /**< of the same */
+    canraw_when_t homing_done;   /**< of the status of homing_reply; of position_reply where there is no homing_query */
+    canraw_when_t homing_failed; /**< of the same */
+    canraw_axis_map_t axis[DRIVES_MAX];
+} canraw_map_t;
+
+/** What a drive was asked last; private. */
+typedef enum { CANRAW_ASKED_NOTHING, CANRAW_ASKED_POSITION, CANRAW_ASKED_HOMING } canraw_asked_t;
+
+/** One drive at work; private. Times are those of poll. */
+typedef struct {
+    drive_state_t state; /**< never DRIVE_OFFLINE */
+    canraw_asked_t asked;
+    uint8_t pending; /**< canraw_command_t that has to go out, or CANRAW_NOTHING */
+    bool is_online;
+    bool is_begun; /**< the request that led to this state has been seen in a poll */
+    bool is_homed;
+    bool is_homing_seen; /**< the drive has said that homing goes on */
+    bool is_homing_over; /**< it has said that homing is done */
+    bool is_homing_next; /**< the next query is the one for homing */
+    bool has_actual;
+    bool has_sent;
+    uint32_t status;
+    uint32_t fault_code;
+    uint64_t mark_us;        /**< of the request, of the end of homing: actual has to be newer */
+    uint64_t told_us;        /**< the last command went out */
+    uint64_t reset_until_us; /**< until then a fault may end; 0: no reset goes on */
+    uint64_t actual_us;
+    int64_t sent_counts;
+    q32_t sent_q32;
+    q32_t actual_q32;
+} canraw_axis_t;
+
+/** The drives of a platform; private but for the counters. */
+typedef struct {
+    const canraw_map_t *map;
+    hal_can_t can;
+    bool is_gone; /**< the bus does not work */
+    bool is_due;  /**< a period has passed, the next set has not gone out */
+    bool is_free; /**< everything sent was seen on the wire */
+    bool has_time;
+    uint64_t now_us;
+    uint64_t set_us;     /**< the last set went out */
+    uint64_t query_us;   /**< the last queries went out */
+    uint64_t free_us;    /**< is_free was true */
+    uint64_t restart_us; /**< of the bus, last tried */
+    uint32_t round;      /**< of queries */
+    uint32_t sets;       /**< sent */
+    uint32_t refused;    /**< sets that had to wait for the bus */
+    uint32_t strange;    /**< frames on a reply_id that match no reply, or that nobody asked for */
+    uint32_t restarts;   /**< of the bus, that worked */
+    canraw_axis_t axis[DRIVES_MAX];
+} canraw_t;
+
+/** Starts; sends nothing yet. Drives are OFFLINE until they answer.
+ *  @param map kept
+ *  @return HV_OK; HV_ERR_ARG: no usable bus; HV_ERR_RANGE: the map contradicts itself or its ranges above. */
+hv_status_t canraw_init(canraw_t *self, const canraw_map_t *map, hal_can_t can) HV_MUST_CHECK;
+
+/** The drives as drives.h wants them. Sets go out once per period, a gate lets the next one pass only when the last was seen on
+ *  the wire; after three periods without that the bus is gone, is restarted, and drives are OFFLINE until they answer again. */
+drives_t canraw_hal(canraw_t *self);
+
+/** Receive filters for the backend's open.
+ *  @param filter out: map->axes entries
+ *  @return how many */
+uint32_t canraw_filters(const canraw_map_t *map, hal_can_filter_t filter[DRIVES_MAX]);
+
+/** Range of a field's values. */
+int64_t canraw_field_min(const canraw_field_t *field);
+int64_t canraw_field_max(const canraw_field_t *field);
+
+/** The first field of a frame that carries something.
+ *  @return NULL where there is none */
+const canraw_field_t *canraw_find(const canraw_frame_t *frame, canraw_value_t value);
+
+/** Writes a frame's bytes.
+ *  @param value one for each canraw_value_t
+ *  @return HV_OK; HV_ERR_RANGE: a value does not fit its field, out is unchanged */
+hv_status_t canraw_pack(const canraw_frame_t *frame, const int64_t value[CANRAW_VALUES],
+                        uint8_t out[CANRAW_BYTES_MAX]) HV_MUST_CHECK;
+
+/** True where received bytes are this frame: long enough, and the constant bytes as they should be. */
+bool canraw_matches(const canraw_frame_t *frame, const uint8_t *data, uint8_t length);
+
+/** Value of a field in the bytes of a frame that matches. */
+int64_t canraw_extract(const canraw_field_t *field, const uint8_t *data);
+
+/** True where some bytes would match both frames: only what was asked last tells replies apart. */
+bool canraw_is_ambiguous(const canraw_frame_t *a, const canraw_frame_t *b);
+
+#endif

@@ -1,0 +1,277 @@
+/* SPDX-License-Identifier: MIT
+ * canraw_axis.c - one drive of a raw CAN map; see canraw_axis.h.
+ */
+#include "canraw_axis.h"
+
+#define RESET_US        1000000u /* after a reset, the drive has so long to take its fault back */
+#define HOMING_BEGIN_US 500000u  /* "done" before "not done" is believed only after this: it may be that of the last homing */
+
+static bool has(const canraw_map_t *map, canraw_command_t command)
+{
+    return map->command[command].length != 0;
+}
+
+static bool is_when(canraw_when_t when, uint32_t status)
+{
+    return when.mask != 0 && (status & when.mask) == when.value;
+}
+
+static void tell(canraw_axis_t *self, const canraw_map_t *map, canraw_command_t command)
+{
+    self->pending = has(map, command) ? (uint8_t)command : CANRAW_NOTHING;
+}
+
+/* The frame that stops a drive: its own, else torque off. */
+static void tell_stop(canraw_axis_t *self, const canraw_map_t *map)
+{
+    tell(self, map, has(map, CANRAW_STOP) ? CANRAW_STOP : CANRAW_DISABLE);
+}
+
+void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map)
+{
+    *self = (canraw_axis_t){.state = DRIVE_DISABLED,
+                            .pending = CANRAW_NOTHING,
+                            .is_begun = true,
+                            .is_homed = !has(map, CANRAW_HOME),
+                            .has_actual = self->has_actual,
+                            .actual_q32 = self->actual_q32,
+                            .actual_us = self->actual_us};
+}
+
+void canraw_axis_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t code)
+{
+    self->state = DRIVE_FAULT;
+    self->fault_code = code;
+    self->reset_until_us = 0;
+    tell_stop(self, map);
+}
+
+/* --- Received --- */
+
+static void take_homing(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint64_t now_us)
+{
+    const bool is_done = is_when(map->homing_done, status);
+    if (self->state != DRIVE_HOMING) {
+        self->is_homed = is_done;
+        return;
+    }
+    if (self->pending == CANRAW_HOME || self->is_homing_over) {
+        return;
+    }
+    if (is_when(map->homing_failed, status)) {
+        canraw_axis_fault(self, map, CANRAW_FAULT_HOMING);
+    } else if (!is_done) {
+        self->is_homing_seen = true;
+    } else if (self->is_homing_seen || now_us - self->told_us >= HOMING_BEGIN_US) {
+        self->is_homing_over = true;
+        self->mark_us = now_us;
+    }
+}
+
+static void take_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t status)
+{
+    if (is_when(map->fault_when, status)) {
+        if (self->state != DRIVE_FAULT) {
+            self->state = DRIVE_FAULT;
+            self->fault_code = status != 0 ? status : 1u;
+            self->pending = CANRAW_NOTHING;
+        }
+    } else if (self->reset_until_us != 0 && self->pending != CANRAW_RESET) {
+        self->state = DRIVE_DISABLED;
+        self->fault_code = 0;
+        self->reset_until_us = 0;
+    }
+}
+
+/* The status of a position reply; the field is there where the map judges by it. */
+static void take_status(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint64_t now_us)
+{
+    self->status = status;
+    if (map->fault_when.mask != 0) {
+        take_fault(self, map, status);
+    }
+    if (map->homing_query.length == 0 && has(map, CANRAW_HOME)) {
+        take_homing(self, map, status, now_us);
+    }
+    if (self->state == DRIVE_ENABLED && map->enabled_when.mask != 0 && !is_when(map->enabled_when, status)) {
+        self->state = DRIVE_DISABLED;
+    }
+}
+
+static bool take_position(canraw_axis_t *self, const canraw_map_t *map, const counts_scale_t *scale, const uint8_t *data,
+                          uint64_t now_us)
+{
+    const canraw_field_t *position = canraw_find(&map->position_reply, CANRAW_POSITION);
+    const canraw_field_t *status = canraw_find(&map->position_reply, CANRAW_STATUS);
+    if (counts_to_units(scale, canraw_extract(position, data), &self->actual_q32) != HV_OK) {
+        return false;
+    }
+    self->is_online = true;
+    self->has_actual = true;
+    self->actual_us = now_us;
+    if (status != NULL) {
+        take_status(self, map, (uint32_t)canraw_extract(status, data), now_us);
+    }
+    return true;
+}
+
+/* Where replies look alike, only the one that was asked for counts. */
+static bool is_expected(const canraw_axis_t *self, const canraw_map_t *map, canraw_asked_t asked)
+{
+    return self->asked == asked || !canraw_is_ambiguous(&map->position_reply, &map->homing_reply);
+}
+
+bool canraw_axis_receive(canraw_axis_t *self, const canraw_map_t *map, const counts_scale_t *scale, const can_frame_t *frame,
+                         uint64_t now_us)
+{
+    if (canraw_matches(&map->homing_reply, frame->data, frame->length) && is_expected(self, map, CANRAW_ASKED_HOMING)) {
+        const canraw_field_t *status = canraw_find(&map->homing_reply, CANRAW_STATUS);
+        self->asked = CANRAW_ASKED_NOTHING;
+        take_homing(self, map, (uint32_t)canraw_extract(status, frame->data), now_us);
+        return true;
+    }
+    if (canraw_matches(&map->position_reply, frame->data, frame->length) && is_expected(self, map, CANRAW_ASKED_POSITION)) {
+        self->asked = CANRAW_ASKED_NOTHING;
+        return take_position(self, map, scale, frame->data, now_us);
+    }
+    return false;
+}
+
+/* --- Time --- */
+
+/* A position has come since the request and since the command went out. */
+static bool is_heard(const canraw_axis_t *self)
+{
+    return self->pending == CANRAW_NOTHING && self->actual_us > self->mark_us && self->actual_us > self->told_us;
+}
+
+static bool is_enabled(const canraw_axis_t *self, const canraw_map_t *map)
+{
+    return is_heard(self) && (map->enabled_when.mask == 0 || is_when(map->enabled_when, self->status));
+}
+
+void canraw_axis_step(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
+{
+    if (self->is_online && now_us - self->actual_us > (uint64_t)map->offline_periods * map->period_us) {
+        canraw_axis_lose(self, map);
+    }
+    if (self->reset_until_us != 0 && now_us > self->reset_until_us) {
+        self->reset_until_us = 0;
+    }
+    if (!self->is_begun) { /* a request is seen in one poll before it can end in the next */
+        self->is_begun = true;
+    } else if (self->state == DRIVE_ENABLING && is_enabled(self, map)) {
+        self->state = DRIVE_ENABLED;
+    } else if (self->state == DRIVE_HOMING && self->is_homing_over && is_heard(self)) {
+        self->state = DRIVE_ENABLED;
+        self->is_homed = true;
+        self->has_sent = false;
+    }
+}
+
+/* --- Requests --- */
+
+static void begin(canraw_axis_t *self, drive_state_t state, uint64_t now_us)
+{
+    self->state = state;
+    self->is_begun = false;
+    self->mark_us = now_us;
+    self->has_sent = false;
+}
+
+/* Without a homing frame the zero is where the drive has it. */
+static void begin_homing(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
+{
+    begin(self, DRIVE_HOMING, now_us);
+    tell(self, map, CANRAW_HOME);
+    self->is_homed = false;
+    self->is_homing_seen = false;
+    self->is_homing_over = !has(map, CANRAW_HOME);
+}
+
+/* A drive that says nothing of faults is believed to have none after a reset. */
+static void begin_reset(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
+{
+    tell(self, map, CANRAW_RESET);
+    if (map->fault_when.mask != 0) {
+        self->reset_until_us = now_us + RESET_US;
+    } else {
+        self->state = DRIVE_DISABLED;
+        self->fault_code = 0;
+    }
+}
+
+void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_request_t request, uint64_t now_us)
+{
+    switch (request) {
+    case DRIVES_ENABLE:
+        if (self->state == DRIVE_DISABLED) {
+            begin(self, DRIVE_ENABLING, now_us);
+            tell(self, map, CANRAW_ENABLE);
+        }
+        break;
+    case DRIVES_HOME:
+        begin_homing(self, map, now_us);
+        break;
+    case DRIVES_DISABLE:
+    case DRIVES_QUICK_STOP:
+        if (request == DRIVES_QUICK_STOP) {
+            tell_stop(self, map);
+        } else {
+            tell(self, map, CANRAW_DISABLE);
+        }
+        self->state = self->state != DRIVE_FAULT ? DRIVE_DISABLED : DRIVE_FAULT;
+        break;
+    case DRIVES_RESET_FAULT:
+        if (self->state == DRIVE_FAULT) {
+            begin_reset(self, map, now_us);
+        }
+        break;
+    }
+}
+
+/* --- To be sent --- */
+
+bool canraw_axis_is_streaming(const canraw_axis_t *self, const canraw_map_t *map)
+{
+    return self->is_online && (self->state == DRIVE_ENABLED || (self->state == DRIVE_ENABLING && has(map, CANRAW_ENABLE)));
+}
+
+void canraw_axis_watch(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, q32_t setpoint_q32)
+{
+    const q32_t from_q32 = self->has_sent ? self->sent_q32 : self->actual_q32;
+    const bool is_jump = fx_abs(fx_sub_sat(setpoint_q32, from_q32)) > axis->step_max_q32;
+    const bool is_far =
+        axis->following_max_q32 != 0 && fx_abs(fx_sub_sat(setpoint_q32, self->actual_q32)) > axis->following_max_q32;
+    if (is_jump || is_far) {
+        canraw_axis_fault(self, map, CANRAW_FAULT_FOLLOWING);
+    }
+}
+
+canraw_asked_t canraw_axis_next_query(canraw_axis_t *self, const canraw_map_t *map)
+{
+    const bool is_ambiguous = canraw_is_ambiguous(&map->position_reply, &map->homing_reply);
+    const bool is_homing_wanted = map->homing_query.length != 0 && !self->is_homed && !self->is_homing_over;
+    if (is_ambiguous && self->asked != CANRAW_ASKED_NOTHING) {
+        self->asked = CANRAW_ASKED_NOTHING; /* a round of silence: a late answer must not be taken for the next one */
+    } else if (is_homing_wanted && (self->is_homing_next || map->position_query.length == 0)) {
+        self->asked = CANRAW_ASKED_HOMING;
+        self->is_homing_next = false;
+    } else {
+        self->asked = map->position_query.length != 0 ? CANRAW_ASKED_POSITION : CANRAW_ASKED_NOTHING;
+        self->is_homing_next = true;
+    }
+    return self->asked;
+}
+
+void canraw_axis_report(const canraw_axis_t *self, drive_feedback_t *feedback)
+{
+    *feedback = (drive_feedback_t){
+        .state = self->is_online ? self->state : DRIVE_OFFLINE,
+        .is_homed = self->is_homed,
+        .has_actual = self->has_actual,
+        .actual_mm_q32 = self->actual_q32,
+        .actual_us = self->actual_us,
+        .fault_code = self->state == DRIVE_FAULT ? self->fault_code : 0,
+    };
+}

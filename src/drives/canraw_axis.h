@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: MIT
+ * canraw_axis.h - one drive of a raw CAN map: its state, judged from what it says and what it was told. Private to canraw.c.
+ * Sends nothing: what has to go out stands in `pending`, and canraw.c says when it went.
+ */
+#ifndef CANRAW_AXIS_H
+#define CANRAW_AXIS_H
+
+#include "heave/canraw.h"
+
+/** A drive of which nothing has been heard (any more). */
+void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map);
+
+/** Takes a frame on its reply_id in.
+ *  @return false where it means nothing here */
+bool canraw_axis_receive(canraw_axis_t *self, const canraw_map_t *map, const counts_scale_t *scale, const can_frame_t *frame,
+                         uint64_t now_us);
+
+/** What follows from the time and all that has been received. Once per poll. */
+void canraw_axis_step(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us);
+
+/** Carries out a request that is allowed. */
+void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_request_t request, uint64_t now_us);
+
+/** Whether set-points go out. */
+bool canraw_axis_is_streaming(const canraw_axis_t *self, const canraw_map_t *map);
+
+/** Stops following where a set-point is too far away. */
+void canraw_axis_watch(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, q32_t setpoint_q32);
+
+/** The drive stops in DRIVE_FAULT, by the map's stop frame, else its disable frame, else by hearing nothing more. */
+void canraw_axis_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t code);
+
+/** What to ask it in this round; notes it as asked. */
+canraw_asked_t canraw_axis_next_query(canraw_axis_t *self, const canraw_map_t *map);
+
+void canraw_axis_report(const canraw_axis_t *self, drive_feedback_t *feedback);
+
+#endif

@@ -1,0 +1,695 @@
+/* SPDX-License-Identifier: MIT
+ * test_canraw.c - the raw CAN driver byte by byte, against drives written from the bytes alone: set-points, homing, feedback that
+ * is lost, a bus that stalls, stop frames, maps that contradict themselves.
+ */
+#include "heave/canraw.h"
+
+#include <string.h>
+
+#include "canraw_maps.h"
+#include "canraw_slave.h"
+#include "unity.h"
+
+#define AXES     CANRAW_SLAVES
+#define CYCLE_US 1000u
+#define MM(x)    ((q32_t)(x)*Q32_ONE)
+
+static sim_can_bus_t bus;
+static sim_can_t node;
+static canraw_slave_t slave;
+static canraw_map_t map;
+static canraw_t driver;
+static drives_t hal;
+static uint64_t now_us;
+static drive_feedback_t feedback[DRIVES_MAX];
+static q32_t setpoint_q32[DRIVES_MAX];
+
+void hv_assert_failed(const char *file, int line)
+{
+    (void)file;
+    (void)line;
+    TEST_FAIL_MESSAGE("assertion");
+}
+
+static hv_status_t poll_once(void)
+{
+    now_us += CYCLE_US;
+    canraw_slave_step(&slave, now_us);
+    return drives_poll(hal, now_us, feedback);
+}
+
+static hv_status_t cycle(void)
+{
+    (void)!poll_once();
+    return drives_send(hal, now_us, setpoint_q32);
+}
+
+static void cycles(int count)
+{
+    while (count-- > 0) {
+        (void)!cycle();
+    }
+}
+
+static void follow_actual(void)
+{
+    for (unsigned k = 0; k < AXES; k++) {
+        setpoint_q32[k] = feedback[k].actual_mm_q32;
+    }
+}
+
+static bool are_all(drive_state_t state)
+{
+    for (unsigned k = 0; k < AXES; k++) {
+        if (feedback[k].state != state) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void await(drive_state_t state, int most)
+{
+    for (int i = 0; i < most && !are_all(state); i++) {
+        (void)!cycle();
+        follow_actual();
+    }
+    TEST_ASSERT_TRUE(are_all(state));
+}
+
+static void open_with(const sim_can_fault_t *plan, uint32_t planned, bool is_rich)
+{
+    hal_can_filter_t filter[DRIVES_MAX];
+    now_us = 1000000;
+    sim_can_bus_init(&bus, 0, plan, planned);
+    canraw_slave_open(&slave, &bus, is_rich);
+    for (unsigned k = 0; k < AXES; k++) {
+        const int mm = 20 + 10 * (int)k;
+        slave.drive[k].position = is_rich ? CANRAW_SLAVE_RICH_ZERO - mm * 10000 / 3 : mm * 2000;
+    }
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, filter, canraw_filters(&map, filter)));
+    TEST_ASSERT_EQUAL(HV_OK, canraw_init(&driver, &map, sim_can_hal(&node)));
+    hal = canraw_hal(&driver);
+    memset(feedback, 0, sizeof feedback);
+    memset(setpoint_q32, 0, sizeof setpoint_q32);
+}
+
+static void open_rich(void)
+{
+    map = canraw_maps_rich();
+    open_with(NULL, 0, true);
+}
+
+void setUp(void)
+{
+    map = canraw_maps_plain();
+    open_with(NULL, 0, false);
+}
+
+void tearDown(void) {}
+
+static void enable(void)
+{
+    await(DRIVE_DISABLED, 100);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    await(DRIVE_ENABLED, 100);
+}
+
+/* Frames of a leg in the slave's log that start with these two bytes. */
+static unsigned count_frames(unsigned leg, uint8_t first, uint8_t second)
+{
+    unsigned count = 0;
+    for (unsigned i = 0; i < slave.logged; i++) {
+        const can_frame_t *frame = &slave.log[i];
+        count += frame->id == 0x601 + leg && frame->data[0] == first && frame->data[1] == second;
+    }
+    return count;
+}
+
+/* ---- Bytes ---- */
+
+static void test_frames_of_the_plain_dialect_byte_for_byte(void)
+{
+    static const uint8_t k_setpoint[8] = {0x01, 0x05, 0x40, 0x9C, 0x00, 0x00, 0xB8, 0x0B}; /* 40000 = 20 mm, 3000 */
+    static const uint8_t k_home[8] = {0x01, 0x03, 0x01, 0, 0, 0, 0, 0};
+    static const uint8_t k_position[8] = {0x00, 0x15};
+    static const uint8_t k_homing[8] = {0x00, 0x12};
+    unsigned seen = 0;
+    slave.drive[0].is_homed = false;
+    enable();
+    cycles(10);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    cycles(10);
+    for (unsigned i = 0; i < slave.logged; i++) {
+        const can_frame_t *frame = &slave.log[i];
+        if (frame->id != 0x601) {
+            continue;
+        }
+        TEST_ASSERT_FALSE(frame->is_extended || frame->is_rtr);
+        if (frame->length == 2) {
+            seen |= frame->data[1] == 0x15 ? 1u : 2u;
+            TEST_ASSERT_EQUAL_HEX8_ARRAY(frame->data[1] == 0x15 ? k_position : k_homing, frame->data, 8);
+        } else {
+            seen |= frame->data[1] == 0x05 ? 4u : 8u;
+            TEST_ASSERT_EQUAL_UINT8(8, frame->length);
+            TEST_ASSERT_EQUAL_HEX8_ARRAY(frame->data[1] == 0x05 ? k_setpoint : k_home, frame->data, 8);
+        }
+    }
+    TEST_ASSERT_EQUAL_HEX(15, seen);
+    TEST_ASSERT_EQUAL_UINT(1, count_frames(0, 0x01, 0x03));
+    TEST_ASSERT_EQUAL_UINT(1, count_frames(6, 0x01, 0x03));
+}
+
+/* 300 mm are 600000 pulses: C0 27 09 00. */
+static void test_setpoint_at_full_stroke_byte_for_byte(void)
+{
+    static const uint8_t k_full[8] = {0x01, 0x05, 0xC0, 0x27, 0x09, 0x00, 0xB8, 0x0B};
+    slave.drive[2].position = 600000;
+    enable();
+    slave.logged = 0;
+    cycles(4);
+    for (unsigned i = 0; i < slave.logged; i++) {
+        if (slave.log[i].id == 0x603 && slave.log[i].length == 8) {
+            TEST_ASSERT_EQUAL_HEX8_ARRAY(k_full, slave.log[i].data, 8);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT(2, count_frames(2, 0x01, 0x05));
+}
+
+static void test_speed_field_is_that_of_the_setpoints(void)
+{
+    map.speed_least = 7;
+    for (unsigned k = 0; k < AXES; k++) {
+        map.axis[k].speed = (counts_scale_t){60, 10, 0}; /* rev/min at 10 mm per turn */
+    }
+    open_with(NULL, 0, false);
+    enable();
+    for (int i = 0; i < 40; i++) {
+        setpoint_q32[0] += MM(1) / 10;  /* per 1 ms: 100 mm/s */
+        setpoint_q32[1] -= MM(1) / 100; /* the magnitude counts */
+        cycle();
+    }
+    TEST_ASSERT_EQUAL_UINT16(600, slave.drive[0].speed);
+    TEST_ASSERT_EQUAL_UINT16(60, slave.drive[1].speed);
+    TEST_ASSERT_EQUAL_UINT16(7, slave.drive[2].speed);
+}
+
+static void test_every_query_every_period_in_turn(void)
+{
+    map.query_every = 4;
+    map.offline_periods = 20;
+    open_with(NULL, 0, false);
+    cycles(200);
+    slave.logged = 0;
+    cycles(80); /* 40 periods */
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT(10, count_frames(k, 0x00, 0x15));
+    }
+}
+
+/* ---- Sets and periods ---- */
+
+static void test_setpoints_go_out_once_per_period_and_only_while_enabled(void)
+{
+    await(DRIVE_DISABLED, 100);
+    cycles(50);
+    TEST_ASSERT_EQUAL_UINT32(0, slave.drive[0].setpoints);
+    enable();
+    const uint32_t before = slave.drive[3].setpoints;
+    cycles(100);
+    TEST_ASSERT_EQUAL_UINT32(50, slave.drive[3].setpoints - before);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+    cycle();
+    const uint32_t after = slave.drive[3].setpoints;
+    cycles(100);
+    TEST_ASSERT_EQUAL_UINT32(after, slave.drive[3].setpoints);
+}
+
+static void test_on_change_sends_nothing_twice(void)
+{
+    map.is_on_change = true;
+    open_with(NULL, 0, false);
+    enable();
+    cycles(4);
+    const uint32_t before = slave.drive[0].setpoints;
+    cycles(100);
+    TEST_ASSERT_EQUAL_UINT32(before, slave.drive[0].setpoints);
+    setpoint_q32[0] += MM(1) / 2000;
+    cycles(3);
+    TEST_ASSERT_EQUAL_UINT32(before + 1, slave.drive[0].setpoints);
+    TEST_ASSERT_EQUAL_INT32(40001, slave.drive[0].target);
+}
+
+/* A frame that hangs on the wire: the next set waits for it, and no set is ever queued behind another. */
+static void test_gate_the_next_set_waits_for_the_last(void)
+{
+    const sim_can_fault_t plan[] = {{SIM_CAN_DELAY, 300, 3500}};
+    open_with(plan, 1, false);
+    enable();
+    unsigned waits = 0;
+    for (int i = 0; i < 200; i++) {
+        const hv_status_t status = cycle();
+        waits += status == HV_ERR_AGAIN;
+        TEST_ASSERT_TRUE(status == HV_OK || status == HV_ERR_AGAIN);
+        TEST_ASSERT_TRUE(node.tx_count <= 2 * AXES);
+        for (unsigned k = 0; status == HV_OK && k < AXES; k++) {
+            setpoint_q32[k] += MM(1) / 10; /* as the gateway does: motion waits */
+        }
+    }
+    TEST_ASSERT_TRUE(waits > 0 && driver.refused == waits);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 2 * 200 + 1);
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+}
+
+/* A full queue in the middle of a set: offered again as a whole, one step late. */
+static void test_queue_full_at_every_frame_of_a_set_makes_no_larger_step(void)
+{
+    for (uint32_t at = 150; at < 150 + 2 * AXES; at++) {
+        const sim_can_fault_t plan[] = {{SIM_CAN_FULL, at, 0}};
+        open_with(plan, 1, false);
+        enable();
+        for (int i = 0; i < 100; i++) {
+            const q32_t step_q32 = cycle() == HV_OK ? MM(1) / 10 : 0;
+            for (unsigned k = 0; k < AXES; k++) {
+                setpoint_q32[k] += step_q32;
+            }
+        }
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 2 * 200 + 1);
+        }
+    }
+}
+
+static void test_bus_without_partner_is_gone_after_three_periods_and_returns(void)
+{
+    enable();
+    sim_can_close(&slave.node);
+    int polls = 0;
+    hv_status_t status = HV_OK;
+    for (; polls < 100 && status == HV_OK; polls++) {
+        now_us += CYCLE_US;
+        sim_can_bus_step(&bus, now_us);
+        status = drives_poll(hal, now_us, feedback);
+        (void)!drives_send(hal, now_us, setpoint_q32);
+    }
+    TEST_ASSERT_EQUAL(HV_ERR_IO, status);
+    TEST_ASSERT_TRUE(polls <= 2 + 4 * 2);
+    TEST_ASSERT_TRUE(are_all(DRIVE_OFFLINE));
+    TEST_ASSERT_EQUAL(HV_ERR_IO, drives_send(hal, now_us, setpoint_q32));
+    TEST_ASSERT_EQUAL(HV_ERR_IO, drives_request(hal, DRIVES_QUICK_STOP));
+    TEST_ASSERT_TRUE(driver.restarts > 0);
+    const uint32_t setpoints = slave.drive[0].setpoints;
+    const bool was_homed = slave.drive[0].is_homed;
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&slave.node, &bus, NULL, 0));
+    await(DRIVE_DISABLED, 2000);
+    TEST_ASSERT_EQUAL_UINT32(setpoints, slave.drive[0].setpoints); /* no stale set-point */
+    TEST_ASSERT_TRUE(was_homed && slave.drive[0].is_homed);
+    enable();
+}
+
+static void test_bus_off_unplugged_and_restarted_lose_every_drive(void)
+{
+    for (int i = 0; i < 3; i++) {
+        open_with(NULL, 0, false);
+        enable();
+        if (i == 0) {
+            sim_can_set_state(&node, HAL_CAN_BUS_OFF);
+        } else if (i == 1) {
+            sim_can_unplug(&node);
+        } else {
+            sim_can_set_state(&node, HAL_CAN_PASSIVE);
+            sim_can_set_state(&node, HAL_CAN_ACTIVE); /* reported as a restart */
+        }
+        (void)!poll_once();
+        TEST_ASSERT_TRUE(i == 2 ? !are_all(DRIVE_ENABLED) : are_all(DRIVE_OFFLINE));
+        sim_can_plug(&node);
+        await(DRIVE_DISABLED, 2000);
+        enable();
+    }
+}
+
+/* ---- Feedback ---- */
+
+static void test_silent_drive_is_offline_after_its_periods_and_gets_nothing_more(void)
+{
+    enable();
+    slave.drive[4].is_dumb = true;
+    int silent = 0;
+    while (feedback[4].state == DRIVE_ENABLED && silent < 1000) {
+        (void)!cycle();
+        silent++;
+    }
+    TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
+    TEST_ASSERT_TRUE(silent >= 5 * 2 - 2 && silent <= 5 * 2 + 2);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[3].state);
+    const uint32_t setpoints = slave.drive[4].setpoints;
+    cycles(20);
+    TEST_ASSERT_EQUAL_UINT32(setpoints, slave.drive[4].setpoints);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
+    slave.drive[4].is_dumb = false;
+    cycles(20);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[4].state);
+    TEST_ASSERT_TRUE(feedback[4].is_homed);
+}
+
+/* Lost frames, one at every place: no axis leaves ENABLED, no step is larger than it should be. */
+static void test_one_lost_frame_anywhere_is_survived(void)
+{
+    for (uint32_t at = 130; at < 190; at++) {
+        const sim_can_fault_t plan[] = {{SIM_CAN_DROP, at, 0}};
+        open_with(plan, 1, false);
+        enable();
+        for (int i = 0; i < 60; i++) {
+            TEST_ASSERT_EQUAL(HV_OK, cycle());
+            TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+            for (unsigned k = 0; k < AXES; k++) {
+                setpoint_q32[k] += MM(1) / 20;
+            }
+        }
+    }
+}
+
+static void test_following_error_stops_that_axis_and_it_hears_nothing_more(void)
+{
+    enable();
+    cycles(4);
+    const uint32_t setpoints = slave.drive[1].setpoints;
+    setpoint_q32[1] += MM(1) + 1;
+    cycles(3);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
+    TEST_ASSERT_EQUAL_HEX32(CANRAW_FAULT_FOLLOWING, feedback[1].fault_code);
+    TEST_ASSERT_TRUE(slave.drive[1].setpoints <= setpoints + 1);
+    TEST_ASSERT_EQUAL_INT32(60000, slave.drive[1].target);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[0].state);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+    (void)!cycle();
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    follow_actual();
+    enable();
+}
+
+/* A drive that does not move while its set-points do. */
+static void test_lag_beyond_the_window_is_a_following_error(void)
+{
+    slave.drive[2].is_on = true;
+    enable();
+    slave.drive[2].is_homing = true; /* works on, follows nothing */
+    slave.drive[2].is_failing = true;
+    int steps = 0;
+    while (feedback[2].state == DRIVE_ENABLED && steps < 1000) {
+        setpoint_q32[2] += MM(1) / 10;
+        (void)!cycle();
+        steps++;
+    }
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_TRUE(steps > 95 && steps < 110);
+}
+
+/* ---- Homing ---- */
+
+static void test_homing_ends_when_the_drive_says_so_and_the_new_position_is_known(void)
+{
+    slave.drive[5].is_homed = false;
+    enable();
+    TEST_ASSERT_FALSE(feedback[5].is_homed);
+    TEST_ASSERT_TRUE(feedback[4].is_homed);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    const uint32_t setpoints = slave.drive[5].setpoints;
+    while (slave.drive[5].is_homing || slave.drive[5].position != 0) {
+        TEST_ASSERT_EQUAL(HV_OK, cycle());
+        TEST_ASSERT_EQUAL(DRIVE_HOMING, feedback[5].state);
+    }
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_TRUE(slave.drive[k].setpoints <= setpoints + 1);
+    }
+    await(DRIVE_ENABLED, 50);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_TRUE(feedback[k].is_homed);
+        TEST_ASSERT_EQUAL_INT64(0, feedback[k].actual_mm_q32);
+        TEST_ASSERT_EQUAL_UINT(1, count_frames(k, 0x01, 0x03));
+    }
+}
+
+/* A drive that still reports the last homing as done at first. */
+static void test_homing_done_of_the_last_time_is_not_believed(void)
+{
+    slave.homing_takes_us = 400000;
+    slave.homing_stale_us = 100000;
+    enable();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    for (int i = 0; i < 400; i++) {
+        TEST_ASSERT_EQUAL(HV_OK, cycle());
+        TEST_ASSERT_TRUE(are_all(DRIVE_HOMING));
+        TEST_ASSERT_EQUAL_UINT32(slave.drive[0].setpoints, slave.drive[1].setpoints);
+    }
+    follow_actual();
+    await(DRIVE_ENABLED, 1000);
+}
+
+static void test_homing_failed_is_a_fault(void)
+{
+    map.homing_failed = (canraw_when_t){0x00, 0xFF};
+    open_with(NULL, 0, false);
+    enable();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    cycles(20);
+    TEST_ASSERT_TRUE(are_all(DRIVE_FAULT));
+    TEST_ASSERT_EQUAL_HEX32(CANRAW_FAULT_HOMING, feedback[0].fault_code);
+}
+
+static void test_homing_that_never_ends_can_be_stopped(void)
+{
+    open_rich();
+    enable();
+    slave.drive[0].is_failing = true;
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    for (int i = 0; i < 500; i++) {
+        (void)!cycle();
+        follow_actual();
+    }
+    TEST_ASSERT_EQUAL(DRIVE_HOMING, feedback[0].state);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[1].state);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+    cycles(3);
+    TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
+    TEST_ASSERT_FALSE(slave.drive[0].is_homing);
+}
+
+/* A map without a homing frame: the zero is where the drive has it, "homing" just passes. */
+static void test_homing_without_a_frame_is_homed_from_the_start(void)
+{
+    memset(&map.command[CANRAW_HOME], 0, sizeof map.command[0]);
+    open_with(NULL, 0, false);
+    enable();
+    TEST_ASSERT_TRUE(feedback[0].is_homed);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    await(DRIVE_ENABLED, 50);
+    TEST_ASSERT_TRUE(feedback[0].is_homed);
+    TEST_ASSERT_EQUAL_UINT(0, count_frames(0, 0x01, 0x03));
+}
+
+/* ---- Drives that report more ---- */
+
+static void test_rich_setpoints_stand_on_actual_before_enabling(void)
+{
+    open_rich();
+    await(DRIVE_DISABLED, 100);
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.drive[k].setpoints = 1;
+        slave.drive[k].target = 0; /* left over from before */
+    }
+    enable();
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_TRUE(slave.drive[k].is_enabled);
+        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 1);
+    }
+}
+
+static void test_rich_quick_stop_reaches_the_drives_without_another_send(void)
+{
+    open_rich();
+    enable();
+    cycles(4);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+    canraw_slave_step(&slave, now_us + CYCLE_US);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].stops);
+        TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+    }
+}
+
+static void test_rich_drive_that_drops_out_is_seen(void)
+{
+    open_rich();
+    enable();
+    slave.drive[6].is_enabled = false;
+    cycles(6);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[6].state);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[5].state);
+}
+
+static void test_rich_fault_that_stays_outlives_its_reset(void)
+{
+    open_rich();
+    enable();
+    slave.drive[0].is_faulty = true;
+    cycles(6);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state);
+    TEST_ASSERT_EQUAL_HEX32(0x07, feedback[0].fault_code);
+    slave.drive[0].is_dumb = true; /* says nothing about its reset */
+    map.offline_periods = 5000;
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    cycles(1500);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state);
+    slave.drive[0].is_dumb = false;
+    cycles(10);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state); /* too late: ask again */
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    cycles(10);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[0].state);
+}
+
+/* ---- Replies that look alike ---- */
+
+static void test_ambiguous_late_answers_are_not_taken_for_another(void)
+{
+    const uint8_t one_count[8] = {0x00, 0x15, 0x01, 0x00, 0x00, 0x00}; /* a position whose first byte reads as homed */
+    slave.drive[0].is_homed = false;
+    slave.drive[0].is_dumb = true;
+    for (int i = 0; i < 400; i++) {
+        (void)!cycle();
+        if (i % 3 == 0) { /* late by more than a period, any phase */
+            can_frame_t late = {.id = 0x581, .length = 6};
+            memcpy(late.data, one_count, 8);
+            if (driver.axis[0].asked == CANRAW_ASKED_NOTHING) {
+                TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &late));
+            }
+        }
+        TEST_ASSERT_FALSE(feedback[0].is_homed);
+    }
+    TEST_ASSERT_TRUE(driver.strange > 0);
+}
+
+/* ---- Maps ---- */
+
+static void test_init_map_that_contradicts_itself_is_refused(void)
+{
+    const canraw_map_t good = canraw_maps_plain();
+    for (int i = 0; i < 24; i++) {
+        map = good;
+        switch (i) {
+        case 0:
+            map.axes = 0;
+            break;
+        case 1:
+            map.axes = DRIVES_MAX + 1;
+            break;
+        case 2:
+            map.period_us = 0;
+            break;
+        case 3:
+            map.query_every = 0;
+            break;
+        case 4:
+            map.query_every = 1001;
+            break;
+        case 5:
+            map.offline_periods = 2;
+            break;
+        case 6:
+            map.axis[3].command_id = map.axis[2].command_id;
+            break;
+        case 7:
+            map.axis[3].reply_id = map.axis[2].reply_id;
+            break;
+        case 8:
+            map.axis[3].reply_id = map.axis[5].command_id;
+            break;
+        case 9:
+            map.axis[3].command_id = 0x800;
+            break;
+        case 10:
+            map.axis[1].scale.num = 0;
+            break;
+        case 11:
+            map.axis[1].scale.den = 0;
+            break;
+        case 12:
+            map.axis[1].step_max_q32 = 0;
+            break;
+        case 13:
+            map.axis[1].following_max_q32 = -1;
+            break;
+        case 14:
+            map.setpoint.length = 9;
+            break;
+        case 15:
+            map.setpoint.field[1].at = 5;
+            break;
+        case 16:
+            map.setpoint.field[0].bytes = 3;
+            break;
+        case 17:
+            map.setpoint.length = 7;
+            break;
+        case 18:
+            map.setpoint.constant = 0x01;
+            break;
+        case 19:
+            map.setpoint.fields = 0;
+            break;
+        case 20:
+            map.position_reply.fields = 0;
+            break;
+        case 21:
+            map.homing_done.mask = 0;
+            break;
+        case 22:
+            map.fault_when.mask = 1;
+            break;
+        case 23:
+            map.position_query.length = 0;
+            map.position_query.constant = 0;
+            break;
+        }
+        TEST_ASSERT_EQUAL(HV_ERR_RANGE, canraw_init(&driver, &map, sim_can_hal(&node)));
+    }
+    map = good;
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, canraw_init(&driver, &map, (hal_can_t){NULL, NULL}));
+    TEST_ASSERT_EQUAL(HV_OK, canraw_init(&driver, &map, sim_can_hal(&node)));
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_frames_of_the_plain_dialect_byte_for_byte);
+    RUN_TEST(test_setpoint_at_full_stroke_byte_for_byte);
+    RUN_TEST(test_speed_field_is_that_of_the_setpoints);
+    RUN_TEST(test_every_query_every_period_in_turn);
+    RUN_TEST(test_setpoints_go_out_once_per_period_and_only_while_enabled);
+    RUN_TEST(test_on_change_sends_nothing_twice);
+    RUN_TEST(test_gate_the_next_set_waits_for_the_last);
+    RUN_TEST(test_queue_full_at_every_frame_of_a_set_makes_no_larger_step);
+    RUN_TEST(test_bus_without_partner_is_gone_after_three_periods_and_returns);
+    RUN_TEST(test_bus_off_unplugged_and_restarted_lose_every_drive);
+    RUN_TEST(test_silent_drive_is_offline_after_its_periods_and_gets_nothing_more);
+    RUN_TEST(test_one_lost_frame_anywhere_is_survived);
+    RUN_TEST(test_following_error_stops_that_axis_and_it_hears_nothing_more);
+    RUN_TEST(test_lag_beyond_the_window_is_a_following_error);
+    RUN_TEST(test_homing_ends_when_the_drive_says_so_and_the_new_position_is_known);
+    RUN_TEST(test_homing_done_of_the_last_time_is_not_believed);
+    RUN_TEST(test_homing_failed_is_a_fault);
+    RUN_TEST(test_homing_that_never_ends_can_be_stopped);
+    RUN_TEST(test_homing_without_a_frame_is_homed_from_the_start);
+    RUN_TEST(test_rich_setpoints_stand_on_actual_before_enabling);
+    RUN_TEST(test_rich_quick_stop_reaches_the_drives_without_another_send);
+    RUN_TEST(test_rich_drive_that_drops_out_is_seen);
+    RUN_TEST(test_rich_fault_that_stays_outlives_its_reset);
+    RUN_TEST(test_ambiguous_late_answers_are_not_taken_for_another);
+    RUN_TEST(test_init_map_that_contradicts_itself_is_refused);
+    return UNITY_END();
+}
