@@ -48,7 +48,7 @@ ZH = {
     "states": {"OFF": "驱动器未使能", "HOMING": "驱动器上电使能、回零，再以投入速度移到回落位",
                "SETTLED": "最低位，静止；可以上下人", "RISING": "以投入速度升到中位姿态",
                "NEUTRAL": "已升起，静止，不跟随", "ENGAGED": "跟随发送端", "HOLD": "停在原处，驱动器仍使能",
-               "SETTLING": "以投入速度降到回落位", "FAULT": "锁存：受控停止，然后驱动器失能",
+               "SETTLING": "以投入速度降到回落位", "FAULT": "锁存：按故障类别停止，然后驱动器失能",
                "ESTOP": "锁存：目标立即停止，设定值跟随实际位置"},
     "events": {"engage": "投入", "hold": "暂停", "resume": "继续", "park": "回落", "reset": "复位", "shutdown": "关机",
                "frame": "收到帧", "silence-hold": "静默（暂停）", "silence-neutral": "静默（中位）",

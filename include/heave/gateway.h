@@ -54,8 +54,11 @@ typedef struct {
     frame_scanner_t scanner;
     snapshot_t snapshot;
     drive_feedback_t feedback[DRIVES_MAX];
+    fault_code_t axis_fault[DRIVES_MAX];        /**< what is wrong with each drive now */
+    uint64_t following_since_us[CYLINDERS_MAX]; /**< further from its set-point than allowed since then; 0 = it is not */
     bring_up_t bring_up;
     uint64_t bring_up_deadline_us;
+    bool is_bus_lost;        /**< so that it is counted once */
     bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
     bool is_disable_due;     /**< disable the drives once at rest */
     auto_engage_t auto_engage;

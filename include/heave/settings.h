@@ -54,7 +54,8 @@ typedef struct {
     q16_t cylinder_speed_mm_s_q16;
     q16_t cylinder_accel_mm_s2_q16;
     int32_t cylinder_jerk_mm_s3;
-    q16_t margin_mm_q16; /**< kept free at both ends of the stroke */
+    q16_t following_error_mm_q16; /**< a cylinder further from its set-point, for 20 ms, is a fault; 0 = not watched */
+    q16_t margin_mm_q16;          /**< kept free at both ends of the stroke */
 
     q16_t engage_speed_mm_s_q16;
     q16_t engage_accel_mm_s2_q16;

@@ -18,7 +18,7 @@ typedef enum {
     STATE_ENGAGED,  /**< follows the sender */
     STATE_HOLD,     /**< stopped where it is, drives enabled */
     STATE_SETTLING, /**< to the settled extension at engage speed */
-    STATE_FAULT,    /**< latched: controlled stop, then drives disabled */
+    STATE_FAULT,    /**< latched: stopped as the fault asks for, then drives disabled */
     STATE_ESTOP,    /**< latched: targets stopped, set-points follow the actual positions */
     STATES
 } state_t;
@@ -54,7 +54,7 @@ typedef enum {
     ACTION_STOP,       /**< controlled stop where it is */
     ACTION_STAY,       /**< arrived: nothing to move */
     ACTION_OFF,        /**< bring to rest what still moves, then disable the drives */
-    ACTION_FAULT_STOP, /**< controlled stop, then disable the drives; relays to the safe mask */
+    ACTION_FAULT_STOP, /**< stop as the fault's row says, disable the drives; relays to the safe mask */
     ACTION_ESTOP       /**< stop targets at once, set-points follow actual; relays to the safe mask */
 } action_t;
 

@@ -7,20 +7,10 @@
 
 #include "heave/axes.h"
 #include "heave/drives.h"
+#include "heave/fault.h"
 #include "heave/frame.h"
 #include "heave/owner.h"
 #include "heave/supervisor.h"
-
-/** Why the platform is in FAULT: the first reason is kept. */
-typedef enum {
-    FAULT_NONE,
-    FAULT_DRIVE,         /**< a drive reports a fault (device_code says which) */
-    FAULT_DRIVE_OFFLINE, /**< a drive does not answer */
-    FAULT_DRIVE_DROPPED, /**< a drive left the enabled state by itself */
-    FAULT_DRIVE_TIMEOUT, /**< enabling or homing took too long */
-    FAULT_BUS,           /**< the drives' bus is gone or takes no set-points */
-    FAULT_CODES
-} fault_code_t;
 
 /** A machine fault. */
 typedef struct {
@@ -47,7 +37,8 @@ typedef struct {
     uint32_t relay_missing; /**< masks that set a relay this platform does not have */
     uint32_t relay_errors;
     uint32_t faults;
-    uint32_t late_cycles; /**< cycles skipped because the program was late */
+    uint32_t fault[FAULT_CODES]; /**< of those, by code */
+    uint32_t late_cycles;        /**< cycles skipped because the program was late */
 } counters_t;
 
 /** Everything, once per cycle. Extensions mm, angle deg, Q32. */
@@ -58,7 +49,9 @@ typedef struct {
     state_t goal;
     bool is_held_by_silence;
     bool is_estop_active;
-    fault_t fault;
+    fault_t fault;                       /**< the first one since the last reset */
+    fault_reaction_t reaction;           /**< the worst of them */
+    uint64_t fault_last_us[FAULT_CODES]; /**< when each was last seen to begin, 0 = never */
     uint8_t cylinders;
     bool has_angle;
     uint8_t relay_count;
@@ -79,8 +72,5 @@ typedef struct {
     uint64_t last_frame_us; /**< 0 before the first accepted frame */
     counters_t counters;
 } snapshot_t;
-
-/** "drive fault", ...: constant text. */
-const char *fault_name(fault_code_t code);
 
 #endif

@@ -128,6 +128,10 @@ const config_key_t config_keys[] = {
     {KEY("cylinders", "margin_mm"), AT(settings.margin_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm", .fallback = "2",
      RANGE(0, 1000), .help = "kept free at both ends of the stroke"},
 
+    {KEY("cylinders", "following_error_mm"), AT(settings.following_error_mm_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "mm", .fallback = "20", RANGE(0, 1000),
+     .help = "a cylinder further from its set-point than that for 20 ms is a fault; 0 = not watched"},
+
     {KEY("engage", "speed_mm_s"), AT(settings.engage_speed_mm_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s",
      .fallback = "30", ABOVE_ZERO(10000), .help = "speed limit, at most that of [cylinders]"},
     {KEY("engage", "accel_mm_s2"), AT(settings.engage_accel_mm_s2_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s^2",

@@ -79,6 +79,27 @@ static void end_line(view_t *self)
     self->columns = 0;
 }
 
+/* Adds a member's words in the language of the view; what a line does not hold goes on in the next one. */
+static void put_words(view_t *self, const cJSON *object, const char *name)
+{
+    char chinese[32];
+    (void)snprintf(chinese, sizeof chinese, "%s_zh", name);
+    const char *text = word(object, self->style->is_chinese && self->style->is_utf8 ? chinese : name);
+    while (*text != '\0') {
+        char glyph[5] = {0};
+        size_t length = 0;
+        do {
+            glyph[length++] = *text++;
+        } while (length < 4 && ((unsigned char)*text & 0xC0u) == 0x80u);
+        if (self->columns + 2 > self->style->columns) {
+            end_line(self);
+            put(self, "         ");
+        }
+        put_column(self, glyph);
+        self->columns += length > 2 ? 1u : 0u; /* Chinese characters are two columns wide */
+    }
+}
+
 /* --- Parts of the table --- */
 
 static void draw_head(view_t *self, const cJSON *status)
@@ -252,7 +273,8 @@ static void draw_fault(view_t *self, const cJSON *status)
         put(self, "%s ", cJSON_IsString(flag) ? flag->valuestring : "?");
     }
     end_line(self);
-    put(self, "fault    %s", word(fault, "name"));
+    put(self, "fault    ");
+    put_words(self, fault, "text");
     if (number(fault, "axis") > 0.0) {
         put(self, ", axis %.0f", number(fault, "axis"));
     }
@@ -260,6 +282,14 @@ static void draw_fault(view_t *self, const cJSON *status)
         put(self, ", device code 0x%04X", (unsigned)number(fault, "device_code"));
     }
     end_line(self);
+    if (number(fault, "code") > 0.0) {
+        put(self, "  cause  ");
+        put_words(self, fault, "cause");
+        end_line(self);
+        put(self, "  remedy ");
+        put_words(self, fault, "remedy");
+        end_line(self);
+    }
 }
 
 size_t ctl_view_table(const cJSON *status, const ctl_view_style_t *style, char text[CTL_VIEW_BYTES])

@@ -13,6 +13,7 @@
 /** How to draw. */
 typedef struct {
     unsigned columns;     /**< lines are cut there */
+    bool is_chinese;      /**< words for faults in Chinese, else English */
     bool is_utf8;         /**< blocks for bars, else ASCII */
     const char *line_end; /**< "\n", or what clears the rest of the line as well */
 } ctl_view_style_t;

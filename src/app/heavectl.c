@@ -176,6 +176,19 @@ static const char *receive_line(ctl_t *self, int64_t until_ms)
 
 /* --- Showing --- */
 
+/* The language of messages, as the locale's variables say it. */
+static bool is_chinese(void)
+{
+    static const char *const k_names[] = {"LC_ALL", "LC_MESSAGES", "LANG"};
+    for (size_t i = 0; i < sizeof k_names / sizeof k_names[0]; i++) {
+        const char *value = getenv(k_names[i]);
+        if (value != NULL && value[0] != '\0') {
+            return strncmp(value, "zh", 2) == 0;
+        }
+    }
+    return false;
+}
+
 static bool is_utf8(void)
 {
     return strcmp(nl_langinfo(CODESET), "UTF-8") == 0;
@@ -190,8 +203,10 @@ static unsigned terminal_columns(void)
 static void show_table(const cJSON *status, bool is_watching)
 {
     static char text[CTL_VIEW_BYTES];
-    const ctl_view_style_t style = {
-        .columns = terminal_columns(), .is_utf8 = is_utf8(), .line_end = is_watching ? "\x1b[K\r\n" : "\n"};
+    const ctl_view_style_t style = {.columns = terminal_columns(),
+                                    .is_chinese = is_chinese(),
+                                    .is_utf8 = is_utf8(),
+                                    .line_end = is_watching ? "\x1b[K\r\n" : "\n"};
     (void)ctl_view_table(status, &style, text);
     printf("%s%s%s", is_watching ? "\x1b[H" : "", text, is_watching ? "\x1b[J" : "");
 }

@@ -21,7 +21,7 @@ static void tell_state(manager_t *self, const snapshot_t *snapshot)
     char text[128];
     const bool is_fault = snapshot->fault.code != FAULT_NONE;
     (void)snprintf(text, sizeof text, "STATUS=%s%s%s", state_name(snapshot->state), is_fault ? ": " : "",
-                   is_fault ? fault_name(snapshot->fault.code) : "");
+                   is_fault ? fault_text(snapshot->fault.code) : "");
     (void)sd_notify(0, text);
     self->is_told = true;
     self->state = snapshot->state;

@@ -60,7 +60,7 @@ size_t operator_explain(event_t request, const snapshot_t *snapshot, bool is_shu
     text_put(&out, state_name(snapshot->state));
     if (snapshot->state == STATE_FAULT) {
         text_put(&out, " (");
-        text_put(&out, fault_name(snapshot->fault.code));
+        text_put(&out, fault_text(snapshot->fault.code));
         text_put(&out, ")");
     }
     text_put(&out, "; possible: ");

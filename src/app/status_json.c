@@ -31,6 +31,42 @@ static void write_pose(json_t *json, const char *key, const pose_t *pose)
     json_close(json, '}');
 }
 
+static void write_fault(json_t *json, const snapshot_t *s)
+{
+    const fault_row_t *row = fault_row(s->fault.code);
+    json_open(json, "fault", '{');
+    json_number(json, "code", (uint64_t)s->fault.code);
+    json_text(json, "name", row->name);
+    json_number(json, "axis", s->fault.axis);
+    json_number(json, "device_code", s->fault.device_code);
+    json_ms(json, "at_ms", s->fault.at_us);
+    json_text(json, "reaction", fault_reaction_name(s->reaction));
+    json_text(json, "text", row->text[FAULT_ENGLISH]);
+    json_text(json, "cause", row->cause[FAULT_ENGLISH]);
+    json_text(json, "remedy", row->remedy[FAULT_ENGLISH]);
+    json_text(json, "text_zh", row->text[FAULT_CHINESE]);
+    json_text(json, "cause_zh", row->cause[FAULT_CHINESE]);
+    json_text(json, "remedy_zh", row->remedy[FAULT_CHINESE]);
+    json_close(json, '}');
+}
+
+/* How often each has been, and when last. */
+static void write_fault_counts(json_t *json, const snapshot_t *s)
+{
+    json_open(json, "fault_counts", '[');
+    for (unsigned i = 1; i < FAULT_CODES; i++) {
+        if (s->counters.fault[i] > 0) {
+            json_open(json, NULL, '{');
+            json_number(json, "code", i);
+            json_text(json, "name", fault_row((fault_code_t)i)->name);
+            json_number(json, "count", s->counters.fault[i]);
+            json_ms(json, "last_ms", s->fault_last_us[i]);
+            json_close(json, '}');
+        }
+    }
+    json_close(json, ']');
+}
+
 static void write_state(json_t *json, const snapshot_t *s, bool is_shutting_down)
 {
     json_text(json, "state", state_name(s->state));
@@ -38,13 +74,7 @@ static void write_state(json_t *json, const snapshot_t *s, bool is_shutting_down
     json_bool(json, "held_by_silence", s->is_held_by_silence);
     json_bool(json, "estop_active", s->is_estop_active);
     json_bool(json, "shutting_down", is_shutting_down);
-    json_open(json, "fault", '{');
-    json_number(json, "code", (uint64_t)s->fault.code);
-    json_text(json, "name", fault_name(s->fault.code));
-    json_number(json, "axis", s->fault.axis);
-    json_number(json, "device_code", s->fault.device_code);
-    json_ms(json, "at_ms", s->fault.at_us);
-    json_close(json, '}');
+    write_fault(json, s);
 }
 
 static void write_poses(json_t *json, const snapshot_t *s)
@@ -233,6 +263,7 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     write_owner(json, "sender", &s->owner, s->now_us);
     write_owner(json, "other_sender", &s->other, s->now_us);
     write_counters(json, view);
+    write_fault_counts(json, s);
     write_program(json, view, config, lost, times);
     json_close(json, '}');
 }

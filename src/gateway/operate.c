@@ -11,6 +11,7 @@
 #define HOMING_TIMEOUT_US    120000000u
 #define RESET_TIMEOUT_US     2000000u
 #define AT_SETTLED_WINDOW_MM 1
+#define FOLLOWING_TIME_US    20000u
 #define UNSENT_MAX_US        100000u /* the drives' own watch is quicker: it knows the period of its bus */
 
 static unsigned drive_count(const gateway_t *self)
@@ -103,7 +104,8 @@ void operate_follow(gateway_t *self, uint64_t now_us)
 static void disable_drives(gateway_t *self)
 {
     const state_t state = self->supervisor.state;
-    const bool is_quick = state == STATE_ESTOP || state == STATE_HOLD;
+    const bool is_quick = state == STATE_ESTOP || state == STATE_HOLD ||
+                          (state == STATE_FAULT && self->snapshot.reaction >= FAULT_REACT_QUICK_STOP);
     self->is_disable_due = drives_request(self->io.drives, is_quick ? DRIVES_QUICK_STOP : DRIVES_DISABLE) == HV_ERR_AGAIN;
 }
 
@@ -135,6 +137,22 @@ static void stop_and_disable(gateway_t *self)
     }
 }
 
+/* What the worst fault so far asks for. */
+static void react(gateway_t *self)
+{
+    switch (self->snapshot.reaction) {
+    case FAULT_REACT_NONE:
+    case FAULT_REACT_STOP:
+        stop_and_disable(self);
+        break;
+    case FAULT_REACT_QUICK_STOP:
+    case FAULT_REACT_SILENT:
+        self->bring_up = BRING_UP_IDLE;
+        drop_drives(self);
+        break;
+    }
+}
+
 static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
 {
     switch (action) {
@@ -154,8 +172,10 @@ static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
         hold(self);
         break;
     case ACTION_OFF:
-    case ACTION_FAULT_STOP:
         stop_and_disable(self);
+        break;
+    case ACTION_FAULT_STOP:
+        react(self);
         break;
     case ACTION_ESTOP:
         self->bring_up = BRING_UP_IDLE;
@@ -179,17 +199,11 @@ void operate_event(gateway_t *self, event_t event, uint64_t now_us)
     carry_out(self, action, now_us);
 }
 
-/* Keeps the first fault and takes the platform to FAULT. */
-static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint32_t device_code, uint64_t now_us)
+static void log_fault(gateway_t *self, fault_code_t code, unsigned axis, uint32_t device_code)
 {
-    if (supervisor_is_latched(&self->supervisor)) {
-        return;
-    }
-    self->snapshot.fault = (fault_t){code, (uint8_t)axis, device_code, now_us};
-    self->snapshot.counters.faults++;
     char line[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(line, sizeof line);
-    text_put(&text, fault_name(code));
+    text_put(&text, fault_text(code));
     if (axis != 0) {
         text_put(&text, ", axis ");
         text_put_u32(&text, axis);
@@ -199,16 +213,42 @@ static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint3
         text_put_hex(&text, device_code, 4);
     }
     hal_log_write(self->io.log, HAL_LOG_ERROR, line);
-    operate_event(self, EVENT_FAULT, now_us);
+}
+
+/* A fault begins: all are counted, the first is kept, and the worst reaction wins, also over one that is under way. */
+static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint32_t device_code, uint64_t now_us)
+{
+    snapshot_t *s = &self->snapshot;
+    const fault_reaction_t reaction = fault_row(code)->reaction;
+    if (self->supervisor.state == STATE_ESTOP) {
+        return;
+    }
+    s->counters.faults++;
+    s->counters.fault[code]++;
+    s->fault_last_us[code] = now_us;
+    log_fault(self, code, axis, device_code);
+    if (s->fault.code == FAULT_NONE) {
+        s->fault = (fault_t){code, (uint8_t)axis, device_code, now_us};
+    }
+    const bool is_worse = reaction > s->reaction;
+    s->reaction = is_worse ? reaction : s->reaction;
+    if (supervisor_is_latched(&self->supervisor)) {
+        if (is_worse) {
+            react(self);
+        }
+    } else {
+        operate_event(self, EVENT_FAULT, now_us);
+    }
 }
 
 /* Nobody hears the set-points any more: a controlled stop would only make them jump when the bus is back. */
-static void lose_bus(gateway_t *self, uint64_t now_us)
+static void watch_bus(gateway_t *self, bool is_lost, uint64_t now_us)
 {
-    if (self->supervisor.state != STATE_OFF) {
+    if (is_lost && !self->is_bus_lost && self->supervisor.state != STATE_OFF) {
         raise_fault(self, FAULT_BUS, 0, 0, now_us);
     }
-    self->is_tracking_actual = true;
+    self->is_bus_lost = is_lost && self->supervisor.state != STATE_OFF;
+    self->is_tracking_actual |= is_lost;
 }
 
 static bool is_bus_stalled(const gateway_t *self)
@@ -223,20 +263,48 @@ static bool is_torque_expected(const gateway_t *self)
            self->bring_up != BRING_UP_HOME && !self->is_tracking_actual;
 }
 
-/* Drives that report a fault or are gone, in any state in which they are meant to be up; drives that dropped out. */
+/* True where a cylinder has been further from its set-point than allowed for too long. */
+static bool is_left_behind(gateway_t *self, unsigned i, uint64_t now_us)
+{
+    const q32_t window_q32 = q32_from_q16(self->settings.following_error_mm_q16);
+    if (i >= kin_cylinders(motion_kin(&self->motion)) || window_q32 == 0) {
+        return false;
+    }
+    const bool is_far = is_torque_expected(self) && self->feedback[i].has_actual &&
+                        fx_abs(self->output.extension_mm_q32[i] - self->feedback[i].actual_mm_q32) > window_q32;
+    if (!is_far) {
+        self->following_since_us[i] = 0;
+    } else if (self->following_since_us[i] == 0) {
+        self->following_since_us[i] = now_us;
+    }
+    return is_far && now_us - self->following_since_us[i] >= FOLLOWING_TIME_US;
+}
+
+/* What is wrong with a drive, in any state in which it is meant to be up. */
+static fault_code_t judge_drive(gateway_t *self, unsigned i, uint64_t now_us)
+{
+    const drive_state_t state = self->feedback[i].state;
+    const bool is_behind = is_left_behind(self, i, now_us);
+    if (state == DRIVE_FAULT) {
+        return FAULT_DRIVE;
+    }
+    if (state == DRIVE_OFFLINE) {
+        return FAULT_DRIVE_OFFLINE;
+    }
+    if (state != DRIVE_ENABLED) {
+        return is_torque_expected(self) ? FAULT_DRIVE_DROPPED : FAULT_NONE;
+    }
+    return is_behind ? FAULT_FOLLOWING : FAULT_NONE;
+}
+
 static void watch_drives(gateway_t *self, uint64_t now_us)
 {
-    if (self->supervisor.state == STATE_OFF) {
-        return;
-    }
     for (unsigned i = 0; i < drive_count(self); i++) {
-        const drive_feedback_t *f = &self->feedback[i];
-        if (f->state == DRIVE_FAULT) {
-            raise_fault(self, FAULT_DRIVE, i + 1, f->fault_code, now_us);
-        } else if (f->state == DRIVE_OFFLINE) {
-            raise_fault(self, FAULT_DRIVE_OFFLINE, i + 1, 0, now_us);
-        } else if (f->state != DRIVE_ENABLED && is_torque_expected(self)) {
-            raise_fault(self, FAULT_DRIVE_DROPPED, i + 1, 0, now_us);
+        const fault_code_t code = self->supervisor.state == STATE_OFF ? FAULT_NONE : judge_drive(self, i, now_us);
+        const bool is_new = code != FAULT_NONE && code != self->axis_fault[i];
+        self->axis_fault[i] = code;
+        if (is_new) {
+            raise_fault(self, code, i + 1, code == FAULT_DRIVE ? self->feedback[i].fault_code : 0, now_us);
         }
     }
 }
@@ -312,6 +380,7 @@ static void step_reset(gateway_t *self, uint64_t now_us)
     if (!supervisor_is_latched(&self->supervisor)) {
         self->reset_until_us = 0;
         self->snapshot.fault = (fault_t){.code = FAULT_NONE};
+        self->snapshot.reaction = FAULT_REACT_NONE;
     } else if (now_us >= self->reset_until_us) {
         self->reset_until_us = 0;
         hal_log_write(self->io.log, HAL_LOG_WARNING, "reset refused: the cause of the fault or the e-stop is still there");
@@ -334,9 +403,8 @@ static void step_auto(gateway_t *self, uint64_t now_us)
 void operate_before_frames(gateway_t *self, uint64_t now_us)
 {
     operate_event(self, EVENT_TICK, now_us);
-    if (drives_poll(self->io.drives, now_us, self->feedback) != HV_OK || is_bus_stalled(self)) {
-        lose_bus(self, now_us);
-    }
+    const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->feedback) == HV_OK;
+    watch_bus(self, !is_bus_heard || is_bus_stalled(self), now_us);
     watch_drives(self, now_us);
     read_inputs(self, now_us);
     step_reset(self, now_us);

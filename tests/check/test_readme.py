@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """test_readme.py - what README.md, README.zh-CN.md and docs/configuration.md say is what the programs and the tree do.
 
-usage: test_readme.py --heaved PROGRAM --heavectl PROGRAM --reference PROGRAM
+usage: test_readme.py --heaved PROGRAM --heavectl PROGRAM --reference PROGRAM --faults PROGRAM
 """
 import argparse
 import functools
@@ -166,15 +166,15 @@ def same_structure():
         assert one == other, f"{what} differ: {one} and {other}"
 
 
-def reference(program):
+def reference(program, page):
     wanted = run(program).stdout
-    got = (TOP / "docs/configuration.md").read_text(encoding="utf-8")
-    assert got == wanted, f"docs/configuration.md is not up to date: {program} > docs/configuration.md"
+    got = (TOP / page).read_text(encoding="utf-8")
+    assert got == wanted, f"{page} is not up to date: {program} > {page}"
 
 
 def main():
     parser = argparse.ArgumentParser()
-    for name in ("heaved", "heavectl", "reference"):
+    for name in ("heaved", "heavectl", "reference", "faults"):
         parser.add_argument(f"--{name}", type=Path, required=True)
     arguments = parser.parse_args()
     programs = {"heaved": arguments.heaved, "heavectl": arguments.heavectl, "tools/demo": TOP / "tools/demo", "tools/test": TOP / "tools/test",
@@ -189,7 +189,9 @@ def main():
     with suite.case("both pages have the same headings, tables and code blocks"):
         same_structure()
     with suite.case("docs/configuration.md is what the table of keys says"):
-        reference(arguments.reference)
+        reference(arguments.reference, "docs/configuration.md")
+    with suite.case("docs/faults.md is what the table of faults says"):
+        reference(arguments.faults, "docs/faults.md")
     return suite.done()
 
 

@@ -736,6 +736,17 @@ static void expect_fault(fault_code_t code, unsigned axis, uint32_t device_code)
     TEST_ASSERT_EQUAL_HEX32(device_code, seen()->fault.device_code);
 }
 
+/* Every drive but one, which has stopped itself, was told to stop in the cycle that has just run. */
+static void expect_quick_stop(unsigned but)
+{
+    TEST_ASSERT_EQUAL(FAULT_REACT_QUICK_STOP, seen()->reaction);
+    for (unsigned i = 0; i < m_rig.drives.count; i++) {
+        if (i != but) {
+            TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[i].state);
+        }
+    }
+}
+
 static void test_fault_of_a_drive_stops_all_and_latches(void)
 {
     for (unsigned ms = 1; ms < 500; ms += 29) {
@@ -746,11 +757,13 @@ static void test_fault_of_a_drive_stops_all_and_latches(void)
         rig_run_ms(&m_rig, 1);
         expect_fault(FAULT_DRIVE, axis + 1u, 0x2310);
         TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
+        expect_quick_stop(axis);
         rig_run_ms(&m_rig, 50);
         rig_break(&m_rig, SIM_DRIVES_FAULT, (uint8_t)((axis + 1) % 7), 0x9999); /* a second one */
         rig_run_ms(&m_rig, 700);
         expect_fault(FAULT_DRIVE, axis + 1u, 0x2310);
-        TEST_ASSERT_EQUAL_UINT32(1, counted()->faults);
+        TEST_ASSERT_EQUAL_UINT32(2, counted()->faults);
+        TEST_ASSERT_EQUAL_UINT32(2, counted()->fault[FAULT_DRIVE]);
         for (unsigned i = 0; i < 7; i++) {
             TEST_ASSERT_TRUE(m_rig.drives.axis[i].state == DRIVE_DISABLED || m_rig.drives.axis[i].state == DRIVE_FAULT);
         }
@@ -850,6 +863,62 @@ static void test_fault_bus_that_stays_busy_is_a_fault_and_returns_without_a_jump
         TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[0].state);
         TEST_ASSERT_EQUAL_UINT(0, rig_following_errors(&m_rig));
     }
+}
+
+/* A cylinder that stands still while it is led: 20 ms after it is 4 mm behind, to the cycle, all stop. */
+static void test_fault_following_error_stops_all_in_time(void)
+{
+    m_settings.following_error_mm_q16 = 4 * Q16_ONE;
+    for (uint8_t axis = 0; axis < 6; axis++) {
+        engage();
+        send_and_run("@A6:0,0,0,0,0,60#", 100);
+        m_rig.drive_config[axis].lag_max_q32 = q32_from_int(1000); /* the drive's own watch would be quicker */
+        m_rig.drives.axis[axis].is_frozen = true;
+        unsigned far_ms = 0;
+        for (unsigned ms = 0; ms < 2000 && seen()->state == STATE_ENGAGED; ms++) {
+            rig_run_ms(&m_rig, 1);
+            const double off = rig_cylinder_mm(&m_rig, axis + 1u) - (double)seen()->drive[axis].actual_mm_q32 / 4294967296.0;
+            far_ms = seen()->state != STATE_ENGAGED ? far_ms : fabs(off) > 4 ? far_ms + 1 : 0;
+        }
+        expect_fault(FAULT_FOLLOWING, axis + 1u, 0);
+        TEST_ASSERT_UINT_WITHIN(2, 20, far_ms);
+        expect_quick_stop(axis);
+    }
+    start(true); /* the frozen drive hears no request and counts its own errors */
+}
+
+/* The first fault is shown, the worst reaction wins. */
+static void test_fault_worse_one_later_escalates_and_the_first_is_kept(void)
+{
+    engage();
+    start_moving(150);
+    rig_break(&m_rig, SIM_DRIVES_FAULT, 2, 0x2310);
+    rig_run_ms(&m_rig, 3);
+    rig_break(&m_rig, SIM_DRIVES_OFFLINE, SIM_DRIVES_ALL, 0);
+    rig_run_ms(&m_rig, 3);
+    expect_fault(FAULT_DRIVE, 3, 0x2310);
+    TEST_ASSERT_EQUAL(FAULT_REACT_SILENT, seen()->reaction);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->fault[FAULT_BUS]);
+    TEST_ASSERT_TRUE(seen()->fault_last_us[FAULT_BUS] > seen()->fault.at_us);
+}
+
+/* Every code has its words in both languages, and a reaction. */
+static void test_fault_rows_are_complete(void)
+{
+    start(true);
+    for (unsigned code = 1; code < FAULT_CODES; code++) {
+        const fault_row_t *row = fault_row((fault_code_t)code);
+        TEST_ASSERT_TRUE(row->reaction >= FAULT_REACT_STOP && row->reaction <= FAULT_REACT_SILENT);
+        TEST_ASSERT_TRUE(row->name[0] != '\0');
+        for (unsigned language = 0; language < FAULT_LANGUAGES; language++) {
+            TEST_ASSERT_TRUE(row->text[language][0] != '\0' && row->cause[language][0] != '\0' &&
+                             row->remedy[language][0] != '\0');
+        }
+        for (unsigned other = 0; other < code; other++) {
+            TEST_ASSERT_TRUE(strcmp(row->name, fault_row((fault_code_t)other)->name) != 0);
+        }
+    }
+    TEST_ASSERT_EQUAL_PTR(fault_row(FAULT_NONE), fault_row(FAULT_CODES));
 }
 
 static void test_fault_bus_gone_is_a_fault_that_can_be_reset(void)
@@ -958,8 +1027,7 @@ static void test_shutdown_in_fault_and_estop_is_finished_at_rest(void)
     rig_break(&m_rig, SIM_DRIVES_FAULT, 0, 1);
     rig_run_ms(&m_rig, 1);
     (void)!rig_request(&m_rig, EVENT_SHUTDOWN);
-    TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
-    rig_run_ms(&m_rig, 1000);
+    rig_run_ms(&m_rig, 1);
     TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
     m_is_fault_expected = true;
     engage();
@@ -1027,6 +1095,9 @@ int main(void)
     RUN_TEST(test_fault_drive_that_drops_out_stops_all);
     RUN_TEST(test_fault_bus_busy_for_some_cycles_makes_motion_wait);
     RUN_TEST(test_fault_bus_that_stays_busy_is_a_fault_and_returns_without_a_jump);
+    RUN_TEST(test_fault_following_error_stops_all_in_time);
+    RUN_TEST(test_fault_worse_one_later_escalates_and_the_first_is_kept);
+    RUN_TEST(test_fault_rows_are_complete);
     RUN_TEST(test_fault_bus_gone_is_a_fault_that_can_be_reset);
     RUN_TEST(test_fault_drives_that_never_enable_time_out);
     RUN_TEST(test_fault_in_every_phase_of_coming_up_latches);

@@ -83,7 +83,7 @@ static void test_manager_change_of_state_and_fault_are_told(void)
     serve_cycle(2, 2000);
     const char *text = heard();
     TEST_ASSERT_EQUAL_STRING_LEN("STATUS=FAULT: ", text, 14);
-    TEST_ASSERT_EQUAL_STRING(fault_name(FAULT_BUS), &text[14]);
+    TEST_ASSERT_EQUAL_STRING(fault_text(FAULT_BUS), &text[14]);
 }
 
 static void test_manager_watchdog_is_petted_twice_a_period_while_cycles_run(void)

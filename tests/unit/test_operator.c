@@ -47,8 +47,9 @@ static void test_operator_explain_says_why_and_what_else(void)
     m_snapshot.state = STATE_FAULT;
     m_snapshot.fault.code = FAULT_BUS;
     (void)operator_explain(EVENT_RESET, &m_snapshot, false, m_text, sizeof m_text);
-    TEST_ASSERT_EQUAL_STRING("reset: the cause is still there in FAULT (drive bus lost); possible: reset, once the cause is gone",
-                             m_text);
+    TEST_ASSERT_EQUAL_STRING(
+        "reset: the cause is still there in FAULT (the bus of the drives is lost); possible: reset, once the cause is gone",
+        m_text);
     (void)operator_explain(EVENT_ENGAGE, &m_snapshot, true, m_text, sizeof m_text);
     TEST_ASSERT_NOT_NULL(strstr(m_text, "shutdown is under way"));
 }

@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: MIT
+ * fault.h - machine faults: what each means, how the platform reacts and what to do, in one table (fault.c).
+ * A fault latches: only an operator's reset, with the cause gone, ends it. The first one is kept, all are counted, the worst
+ * reaction wins. docs/faults.md is made from the table. Pure and constant.
+ */
+#ifndef HEAVE_FAULT_H
+#define HEAVE_FAULT_H
+
+#include "heave/status.h"
+
+/** Codes; they keep their numbers. */
+typedef enum {
+    FAULT_NONE,
+    FAULT_DRIVE,         /**< a drive reports a fault (device_code says which) */
+    FAULT_DRIVE_OFFLINE, /**< a drive does not answer */
+    FAULT_DRIVE_DROPPED, /**< a drive left the enabled state by itself */
+    FAULT_DRIVE_TIMEOUT, /**< enabling or homing took too long */
+    FAULT_BUS,           /**< the drives' bus is gone or takes no set-points */
+    FAULT_FOLLOWING,     /**< a cylinder is too far from its set-point for too long */
+    FAULT_CODES
+} fault_code_t;
+
+/** What the platform does, the mildest first. */
+typedef enum {
+    FAULT_REACT_NONE,
+    FAULT_REACT_STOP,       /**< controlled stop of all axes together, then disable */
+    FAULT_REACT_QUICK_STOP, /**< every drive stops now by its own ramp, all in the same cycle, then disable */
+    FAULT_REACT_SILENT      /**< nobody hears the gateway: it stops talking, so that the drives' own watchdogs stop them */
+} fault_reaction_t;
+
+/** Languages of the texts. */
+typedef enum { FAULT_ENGLISH, FAULT_CHINESE, FAULT_LANGUAGES } fault_language_t;
+
+/** One row of the table; texts are UTF-8. */
+typedef struct {
+    fault_reaction_t reaction;
+    const char *name;                    /**< a word for programs */
+    const char *text[FAULT_LANGUAGES];   /**< what has happened */
+    const char *cause[FAULT_LANGUAGES];  /**< what it usually comes from */
+    const char *remedy[FAULT_LANGUAGES]; /**< what to do */
+} fault_row_t;
+
+/** The row of a code; that of FAULT_NONE outside the enum. */
+const fault_row_t *fault_row(fault_code_t code);
+
+/** Its English text: "drive fault", ... */
+const char *fault_text(fault_code_t code);
+
+/** "stop", "quick-stop", ...: constant text. */
+const char *fault_reaction_name(fault_reaction_t reaction);
+
+#endif
