@@ -30,12 +30,15 @@ function(heave_script_test name script)
   set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib;PYTHONDONTWRITEBYTECODE=1")
 endfunction()
 
-# heave_kernel_test(NAME [VIRTUAL_TIME] COMMAND [ARG...]): a program, Unity or TAP, on a kernel that has CAN; see tests/lib/kernel.py.
+# heave_kernel_test(NAME [VIRTUAL_TIME] [PYTHON] COMMAND [ARG...]): a program, Unity or TAP, on a kernel that has CAN; see tests/lib/kernel.py.
 function(heave_kernel_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 kernel "VIRTUAL_TIME" "" "")
+  cmake_parse_arguments(PARSE_ARGV 1 kernel "VIRTUAL_TIME;PYTHON" "" "")
   set(options --limit 280)
   if(kernel_VIRTUAL_TIME)
     list(APPEND options --virtual-time)
+  endif()
+  if(kernel_PYTHON)
+    list(APPEND options --python)
   endif()
   if(HEAVE_SANITIZE)
     list(APPEND options --instrumented)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """kernel.py - runs a command on a kernel that has SocketCAN, with an interface vcan0 that is up and its own.
 
-    kernel.py [--virtual-time] [--instrumented] [--limit SECONDS] -- COMMAND [ARG...]
+    kernel.py [--virtual-time] [--instrumented] [--python] [--limit SECONDS] -- COMMAND [ARG...]
         prints what the command printed and ends with its status; where no such kernel is to be had: "1..0 # SKIP reason", status 0
 
 Used where the tests need CAN, GPIO or exact times:
@@ -11,6 +11,7 @@ Used where the tests need CAN, GPIO or exact times:
   The command is root in there, outside it has no other rights than the caller.
 --virtual-time: always User Mode Linux. Computing takes no time there and sleeps are exact, whatever the machine is doing: every time that a
 test measures can be asserted to the microsecond, and every run is the same.
+--python: the command is a script for the Python of tools/lib/venv.sh, which has python-can and canopen.
 --instrumented: the command has the address sanitizer, which needs more addresses than a process has in User Mode Linux.
 """
 import argparse
@@ -25,7 +26,7 @@ from pathlib import Path
 import tap
 
 HERE = Path(__file__).resolve().parent
-UML = HERE.parents[1] / "tools/lib/uml.sh"
+TOOLS = HERE.parents[1] / "tools/lib"
 MEMORY = "512M"
 SETUP = """
 ip link set lo up
@@ -95,10 +96,11 @@ def run_uml(kernel, command, limit_s, environment, virtual_time):
     return Finished(int(status) if status else None, output if status else f"{output}\n{console}\nthe kernel stopped before the command ended\n")
 
 
-def find_uml():
-    found = subprocess.run([UML, "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+def find(tool):
+    """What tools/test has put into the cache."""
+    found = subprocess.run([TOOLS / tool, "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
     if found.returncode != 0:
-        raise tap.Skip(found.stderr.strip() or "no User Mode Linux kernel")
+        raise tap.Skip(found.stderr.strip() or f"{tool} finds nothing")
     return found.stdout.strip()
 
 
@@ -110,18 +112,20 @@ def run(command, virtual_time=False, limit_s=300, is_instrumented=False, **envir
         return run_here(command, limit_s, environment)
     if is_instrumented:
         raise tap.Skip("the address sanitizer does not work in User Mode Linux")
-    return run_uml(find_uml(), command, limit_s, environment, virtual_time)
+    return run_uml(find("uml.sh"), command, limit_s, environment, virtual_time)
 
 
 def main():
     parser = argparse.ArgumentParser(usage=__doc__.split("\n\n")[1].strip())
     parser.add_argument("--virtual-time", action="store_true")
+    parser.add_argument("--python", action="store_true")
     parser.add_argument("--instrumented", action="store_true")
     parser.add_argument("--limit", type=float, default=300)
     parser.add_argument("command", nargs="+")
     options = parser.parse_args()
     try:
-        finished = run(options.command, options.virtual_time, options.limit, options.instrumented)
+        command = [find("venv.sh"), *options.command] if options.python else options.command
+        finished = run(command, options.virtual_time, options.limit, options.instrumented)
     except tap.Skip as reason:
         print(f"1..0 # SKIP {reason}")
         return 0
