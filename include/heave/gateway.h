@@ -88,6 +88,10 @@ void gateway_start_settled(gateway_t *self);
 /** Offline runs that came up to SETTLED by a request: the auto policy is as at the start. */
 void gateway_restart_auto(gateway_t *self);
 
+/** Takes over what may change in operation: silence, take-over and priorities, dialect, safe mask and its delay, following error.
+ *  The rest of the settings is not looked at. */
+void gateway_reload(gateway_t *self, const settings_t *settings);
+
 /** What an operator asks for: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET or EVENT_SHUTDOWN.
  *  @return HV_OK; HV_ERR_STATE where the state does not allow it: nothing changes. */
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us) HV_MUST_CHECK;

@@ -7,9 +7,11 @@
 #include "config.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <ini.h>
 #include <stdarg.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "config_source.h"
 #include "config_value.h"
@@ -76,17 +78,17 @@ bool config_source_has(const config_source_t *self, const char *section, const c
  * Returns false at the end of the file; *length is the line's whole length, also where text could not hold it. */
 static bool take_line(config_source_t *self, char *text, size_t capacity, size_t *length)
 {
-    int byte = fgetc(self->file);
     *length = 0;
-    if (byte == EOF) {
+    if (self->at == self->end) {
         return false;
     }
-    for (; byte != EOF && byte != '\n'; byte = fgetc(self->file)) {
+    for (; self->at < self->end && *self->at != '\n'; self->at++) {
         if (*length < capacity - 1u) {
-            text[*length] = (char)byte;
+            text[*length] = *self->at;
         }
         ++*length;
     }
+    self->at += self->at < self->end ? 1 : 0;
     self->line++;
     text[*length < capacity ? *length : capacity - 1u] = '\0';
     return true;
@@ -336,38 +338,113 @@ static void set_defaults(config_source_t *self)
 static void read_file(config_source_t *self)
 {
     const int bad_line = ini_parse_stream(read_line, self, take_pair, self);
-    if (ferror(self->file) != 0) {
-        config_source_error(self, self->line, "cannot be read: %s; allowed: a text file", strerror(errno));
-        self->is_given_up = true;
-    } else if (bad_line != 0 && self->error_count == 0) {
+    if (bad_line != 0 && self->error_count == 0) {
         config_source_error(self, bad_line > 0 ? (unsigned)bad_line : 0u, "not understood; allowed: key = value");
+    }
+}
+
+/* The bytes of a file: nothing is allocated, so that it may be read again in operation.
+ * Returns their number, or -1: errno says why. */
+static ssize_t read_bytes(const char *path, char *bytes, size_t capacity)
+{
+    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    size_t length = 0;
+    ssize_t got = fd < 0 ? -1 : 1;
+    while (got > 0 && length < capacity) {
+        got = read(fd, &bytes[length], capacity - length);
+        length += got > 0 ? (size_t)got : 0u;
+    }
+    const int error = errno;
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+    errno = error;
+    return got < 0 ? -1 : (ssize_t)length;
+}
+
+/* Where the file is longer than what is kept of it, or cannot be read, that is the only error. */
+static bool open_bytes(config_source_t *self)
+{
+    static char bytes[CONFIG_FILE_MAX + 1u];
+    const ssize_t length = read_bytes(self->path, bytes, sizeof bytes);
+    if (length < 0) {
+        const bool is_opened = errno == EISDIR || errno == EIO;
+        config_source_error(self, 0, "cannot be %s: %s; allowed: a readable text file", is_opened ? "read" : "opened",
+                            strerror(errno));
+        return false;
+    }
+    if (length > (ssize_t)CONFIG_FILE_MAX) {
+        config_source_error(self, 0, "is larger than %u bytes; allowed: a configuration of one platform", CONFIG_FILE_MAX);
+        return false;
+    }
+    self->at = bytes;
+    self->end = &bytes[length];
+    return true;
+}
+
+/* Loads into the configuration of the source, whole or with errors. */
+static void load(config_source_t *self, const char *path, config_t *config, FILE *errors)
+{
+    HV_ASSERT(config_key_count <= CONFIG_KEYS_MAX && config_section_count <= CONFIG_SECTIONS_MAX);
+    memset(config, 0, sizeof *config);
+    memset(self, 0, sizeof *self);
+    self->path = path;
+    self->errors = errors;
+    self->config = config;
+    self->section = CONFIG_SECTION_NONE;
+    if (!open_bytes(self)) {
+        return;
+    }
+    set_defaults(self);
+    read_file(self);
+    if (!self->is_given_up) {
+        config_check(self);
     }
 }
 
 int config_load(const char *path, config_t *out, FILE *errors)
 {
-    HV_ASSERT(config_key_count <= CONFIG_KEYS_MAX && config_section_count <= CONFIG_SECTIONS_MAX);
     config_t config;
     config_source_t self;
-    memset(&config, 0, sizeof config);
-    memset(&self, 0, sizeof self);
-    self.path = path;
-    self.errors = errors;
-    self.config = &config;
-    self.section = CONFIG_SECTION_NONE;
-    self.file = fopen(path, "rb");
-    if (self.file == NULL) {
-        config_source_error(&self, 0, "cannot be opened: %s; allowed: a readable text file", strerror(errno));
-        return self.error_count;
-    }
-    set_defaults(&self);
-    read_file(&self);
-    fclose(self.file);
-    if (!self.is_given_up) {
-        config_check(&self);
-    }
+    load(&self, path, &config, errors);
     if (self.error_count == 0) {
         memcpy(out, &config, sizeof config);
+    }
+    return self.error_count;
+}
+
+/* --- Again, in operation --- */
+
+/* Takes over one key that has another value now, or says that it cannot. */
+static void take_change(const config_source_t *self, size_t i, config_t *running)
+{
+    const config_key_t *key = &config_keys[i];
+    config_text_t was, is;
+    config_text_clear(&was);
+    config_text_clear(&is);
+    config_value_format(key, running, &was);
+    config_value_format(key, self->config, &is);
+    if (strcmp(was.data, is.data) == 0) {
+        return;
+    }
+    fprintf(self->errors, "%s:%u: [%s] %s: ", self->path, line_of(self, key->section, key->name), key->section, key->name);
+    if (key->is_live) {
+        memcpy((char *)running + key->offset, (const char *)self->config + key->offset, key->size);
+        fprintf(self->errors, "%s from now on, was %s\n", is.data, was.data);
+    } else {
+        fprintf(self->errors, "%s needs a restart; %s stays\n", is.data, was.data);
+    }
+}
+
+int config_reload(const char *path, config_t *running, FILE *report)
+{
+    static config_t config;
+    static config_source_t self;
+    load(&self, path, &config, report);
+    for (size_t i = 0; self.error_count == 0 && i < config_key_count; i++) {
+        if (config_is_applicable(config_keys[i].needs, running)) {
+            take_change(&self, i, running);
+        }
     }
     return self.error_count;
 }

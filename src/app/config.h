@@ -78,6 +78,14 @@ typedef struct {
  *  @return 0, or the number of errors */
 int config_load(const char *path, config_t *out, FILE *errors);
 
+#define CONFIG_FILE_MAX 65536u /**< bytes of a configuration file */
+
+/** Loads the file once more while its platform runs, and takes over what may change in operation. Allocates nothing.
+ *  @param running  changed only where the whole file is right, and only in keys that may change
+ *  @param report   takes the errors as config_load() does, else a line per key that has changed: taken over, or needs a restart
+ *  @return 0, or the number of errors: nothing has changed */
+int config_reload(const char *path, config_t *running, FILE *report);
+
 /** Writes what follows from a loaded configuration: reach of each axis, extensions at pose zero and at neutral, worst cylinder
  *  speed, cycle, memory; then warnings.
  *  @param ram_bytes of the gateway, as the program has it

@@ -82,13 +82,15 @@ static void write_row(const config_key_t *key, FILE *out)
     fprintf(out, "| `%s` | ", key->name);
     write_cell(allowed.data, out);
     fprintf(out, "%s | ", key->fallback == NULL ? "required" : key->fallback);
-    fprintf(out, "%s%s |\n", key->help, need_text(key->needs));
+    fprintf(out, "%s%s%s |\n", key->help, need_text(key->needs), key->is_live ? " (SIGHUP)" : "");
 }
 
 void config_write_reference(FILE *out)
 {
-    fprintf(out, "# Configuration reference\n\nOne INI file. Comments start with `;`. Decimal point, no thousands separator. "
-                 "Written by the build from the table of keys in src/app/config_keys.c.\n");
+    fprintf(out,
+            "# Configuration reference\n\nOne INI file. Comments start with `;`. Decimal point, no thousands separator. "
+            "Written by the build from the table of keys in src/app/config_keys.c. Keys marked (SIGHUP) change in operation when "
+            "heaved gets that signal and the whole file is right; the others need a restart.\n");
     for (size_t i = 0; i < config_section_count; i++) {
         const config_section_t *section = &config_sections[i];
         fprintf(out, "\n## [%s]\n\n%s%s\n\n| key | allowed | default | meaning |\n| --- | --- | --- | --- |\n", section->name,

@@ -48,6 +48,7 @@ typedef struct {
     config_type_t type;
     config_needs_t needs;
     uint8_t count; /**< values of a CONFIG_DECIMAL */
+    bool is_live;  /**< may change in operation (SIGHUP); gateway_reload() or motion_loop.c take it over */
 } config_key_t;
 
 #define CONFIG_KEYS_MAX     128u /**< bound of arrays with one element per key */

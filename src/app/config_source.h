@@ -18,7 +18,8 @@ typedef struct {
 /** A file being loaded. */
 typedef struct {
     const char *path;
-    FILE *file;
+    const char *at; /**< what is left of the file's bytes */
+    const char *end;
     FILE *errors;
     config_t *config;
     int error_count;

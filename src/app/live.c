@@ -35,6 +35,7 @@
 typedef struct {
     motion_loop_t loop;
     control_t control;
+    config_t config; /**< as it was, with what reloads changed */
     manager_t manager;
     motion_view_words_t view; /**< for the manager */
     linux_udp_t udp;
@@ -146,12 +147,24 @@ static bool open_signals(live_t *self)
     (void)sigemptyset(&set);
     (void)sigaddset(&set, SIGTERM);
     (void)sigaddset(&set, SIGINT);
-    (void)sigaddset(&set, SIGHUP); /* means nothing yet, and must not end the program */
+    (void)sigaddset(&set, SIGHUP);
     if (sigprocmask(SIG_BLOCK, &set, NULL) != 0) {
         return false;
     }
     self->signal_fd = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
     return self->signal_fd >= 0;
+}
+
+/* Reads the configuration again. What may change in operation does, if the whole file is right. */
+static void reload(live_t *self)
+{
+    if (config_reload(self->options->config, &self->config, stderr) != 0) {
+        (void)say(0, "%s is not right: nothing has changed", self->options->config);
+    } else if (!motion_loop_reload(&self->loop, &self->config)) {
+        (void)say(0, "too many reloads at once: send SIGHUP again");
+    } else {
+        (void)say(0, "%s has been read again", self->options->config);
+    }
 }
 
 /* The first signal settles the platform, the second one ends at once. */
@@ -160,6 +173,7 @@ static void take_signals(live_t *self)
     struct signalfd_siginfo info;
     while (read(self->signal_fd, &info, sizeof info) == (ssize_t)sizeof info) {
         if (info.ssi_signo == SIGHUP) {
+            reload(self);
             continue;
         }
         self->signals++;
@@ -323,6 +337,7 @@ int live_run(const config_t *config, const options_t *options)
         return say(EXIT_UNAVAILABLE, "no memory");
     }
     self->options = options;
+    self->config = *config;
     self->control.fd = -1;
     self->udp.fd = -1;
     int code = open_all(self, config);

@@ -21,13 +21,15 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
 {
     self->clock = clock;
     self->late_hold_cycles = config->late_hold_cycles;
+    self->allow = config->udp.allow;
     seqlock_init(&self->view, self->view_word, MOTION_VIEW_WORDS);
     ring_init(&self->requests, self->request_bytes, sizeof self->request_bytes);
+    ring_init(&self->reloads, self->reload_bytes, sizeof self->reload_bytes);
     ring_init(&self->results, self->result_bytes, sizeof self->result_bytes);
     ring_init(&self->record, self->record_bytes, sizeof self->record_bytes);
     ring_init(&self->trace, self->trace_bytes, sizeof self->trace_bytes);
     self->tap = (udp_tap_t){.behind = udp,
-                            .allow = &config->udp.allow,
+                            .allow = &self->allow,
                             .record = self->is_recording ? &self->record : NULL,
                             .now_us = &self->session.now_us};
     self->io = (gateway_io_t){.udp = udp_tap_hal(&self->tap), .log = log};
@@ -41,6 +43,16 @@ static void note(motion_loop_t *self, record_kind_t kind, uint32_t value)
 {
     if (self->is_recording) {
         record_push(&self->record, kind, self->session.now_us, value);
+    }
+}
+
+static void take_reloads(motion_loop_t *self)
+{
+    motion_reload_t reload;
+    while (ring_pop(&self->reloads, &reload, sizeof reload) > 0) {
+        gateway_reload(&self->session.gateway, &reload.settings);
+        self->allow = reload.allow;
+        self->late_hold_cycles = reload.late_hold_cycles;
     }
 }
 
@@ -126,6 +138,7 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
         gateway_note_late(&self->session.gateway, skipped);
         hold_if_too_late(self, skipped);
     }
+    take_reloads(self);
     const unsigned requests = take_requests(self, result);
     const bool is_zero = session_cycle(&self->session);
     write_down(self, is_zero);
@@ -194,6 +207,12 @@ bool motion_loop_start(motion_loop_t *self)
     (void)pthread_attr_destroy(&attributes);
     errno = error;
     return error == 0;
+}
+
+bool motion_loop_reload(motion_loop_t *self, const config_t *config)
+{
+    const motion_reload_t reload = {config->settings, config->udp.allow, config->late_hold_cycles};
+    return ring_push(&self->reloads, &reload, sizeof reload, NULL, 0);
 }
 
 void motion_loop_quit(motion_loop_t *self)

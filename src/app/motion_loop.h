@@ -53,6 +53,14 @@ typedef struct {
     bool is_shutting_down;
 } motion_result_t;
 
+/** What a reload hands over. */
+typedef struct {
+    settings_t settings;
+    hal_udp_networks_t allow;
+    uint32_t late_hold_cycles;
+} motion_reload_t;
+
+#define MOTION_RELOAD_BYTES  8192u
 #define MOTION_REQUEST_BYTES 1024u
 #define MOTION_RESULT_BYTES  32768u
 #define MOTION_RECORD_BYTES  (1u << 21)
@@ -72,6 +80,7 @@ typedef struct {
     motion_times_t times; /**< the motion thread adds, others read */
     seqlock_t view;       /**< motion_view_t to the service thread */
     ring_t requests;      /**< motion_request_t from it */
+    ring_t reloads;       /**< motion_reload_t from it */
     ring_t results;       /**< motion_result_t to it */
     ring_t record;        /**< record_t to it */
     ring_t trace;         /**< trace_row_t to it */
@@ -82,6 +91,8 @@ typedef struct {
     motion_view_words_t current; /**< private to the motion thread */
     bool was_estop;
     uint64_t view_word[MOTION_VIEW_WORDS];
+    hal_udp_networks_t allow; /**< who may send, now */
+    uint8_t reload_bytes[MOTION_RELOAD_BYTES];
     uint8_t request_bytes[MOTION_REQUEST_BYTES];
     uint8_t result_bytes[MOTION_RESULT_BYTES];
     uint8_t record_bytes[MOTION_RECORD_BYTES];
@@ -97,6 +108,10 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
 /** Starts the thread. It ends by itself when a shutdown has ended, or on motion_loop_quit().
  *  @return false: errno says why */
 bool motion_loop_start(motion_loop_t *self);
+
+/** Hands what has changed in the configuration over. The service thread.
+ *  @return false: too many at once, try later */
+bool motion_loop_reload(motion_loop_t *self, const config_t *config);
 
 /** Ends the thread after a quick stop of the drives, within a cycle. Any thread. */
 void motion_loop_quit(motion_loop_t *self);

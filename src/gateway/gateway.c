@@ -54,6 +54,20 @@ void gateway_start_settled(gateway_t *self)
     }
 }
 
+void gateway_reload(gateway_t *self, const settings_t *settings)
+{
+    settings_t *own = &self->settings;
+    own->silence_hold_ms = settings->silence_hold_ms;
+    own->silence_neutral_ms = settings->silence_neutral_ms;
+    own->silence_settle_ms = settings->silence_settle_ms;
+    own->takeover_ms = settings->takeover_ms;
+    own->priority = settings->priority;
+    own->dialect = settings->dialect;
+    own->relay_safe_mask = settings->relay_safe_mask;
+    own->relay_safe_after_ms = settings->relay_safe_after_ms;
+    own->following_error_mm_q16 = settings->following_error_mm_q16;
+}
+
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)
 {
     return operate_request(self, request, now_us);

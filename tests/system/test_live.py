@@ -251,10 +251,31 @@ def second_signal_ends_at_once(bench):
     assert "second signal" in daemon.log.read_text() and not bench.socket.exists()
 
 
-def hangup_is_ignored(bench):
+def hangup_reads_the_configuration_again(bench):
     daemon = bench.start()
+    text = bench.config.read_text()
+    said = lambda words: heave.wait_for(lambda: words in daemon.log.read_text(), words)  # noqa: E731
+    bench.wait_state("ENGAGED")
+    # in motion: silence shortened, a stroke that would need a restart
+    bench.config.write_text(re.sub(r"(?m)^(silence_hold_ms *= *)\S+", r"\g<1>700", text.replace("stroke_mm = 200", "stroke_mm = 199")))
+    with bench.sender() as sender:
+        sender.stream(0.3, wave)
+        daemon.send_signal(signal.SIGHUP)
+        said("has been read again")
+        sender.stream(0.3, wave)
+        assert bench.status()["state"] == "ENGAGED"
+    log = daemon.log.read_text()
+    assert re.search(r"platform.ini:\d+: \[geometry\] stroke_mm: 199 needs a restart; 200 stays", log), log
+    assert re.search(r"platform.ini:\d+: \[udp\] silence_hold_ms: 700 from now on", log), log
+    bench.wait_state("HOLD")  # 700 ms later
+    # a wrong file changes nothing
+    bench.config.write_text(text.replace("stroke_mm = 200", "stroke_mm = many"))
     daemon.send_signal(signal.SIGHUP)
-    time.sleep(0.1)
+    said("nothing has changed")
+    assert re.search(r"platform.ini:\d+: \[geometry\] stroke_mm: ", daemon.log.read_text())
+    bench.config.unlink()
+    daemon.send_signal(signal.SIGHUP)
+    heave.wait_for(lambda: daemon.log.read_text().count("nothing has changed") == 2, "a missing file changes nothing")
     assert bench.status()["ok"] and bench.stop(daemon) == 0
 
 
@@ -444,7 +465,7 @@ CASES = {
     "SIGTERM settles, switches off and ends with 0": lambda bench: signal_settles(bench, signal.SIGTERM),
     "Ctrl-C does the same": lambda bench: signal_settles(bench, signal.SIGINT),
     "a second signal ends at once": second_signal_ends_at_once,
-    "SIGHUP changes nothing": hangup_is_ignored,
+    "SIGHUP reads the configuration again": hangup_reads_the_configuration_again,
     "the port is in use": port_in_use,
     "the socket belongs to a running daemon": socket_of_a_running_daemon,
     "the socket of a dead daemon is replaced": socket_of_a_dead_daemon,
