@@ -96,6 +96,10 @@ void gateway_reload(gateway_t *self, const settings_t *settings);
  *  @return HV_OK; HV_ERR_STATE where the state does not allow it: nothing changes. */
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us) HV_MUST_CHECK;
 
+/** How much of a sender's motion is made from now on, by a ramp (see motion_set_intensity). In every state.
+ *  @return HV_OK; HV_ERR_RANGE above intensity_max_percent: nothing changes. */
+hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent) HV_MUST_CHECK;
+
 /** One cycle: receive, read feedback, supervise, plan, solve, limit, send, publish.
  *  @param now_us one cycle_us more than the last time */
 void gateway_cycle(gateway_t *self, uint64_t now_us);

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT
  * motion.h - from commands to set-points: where the platform should be this cycle, limited, cylinder by cylinder.
- * Order: source (step, stream, timed move, path, stop) -> ramps of the pose axes -> workspace -> inverse kinematics -> take-over
- * blend -> limiter of each cylinder. Nothing reaches an output except through a ramp (ramp.h). Owns no clock and no I/O.
+ * Order: source (step, stream, timed move, path, stop) -> intensity -> ramps of the pose axes -> workspace -> inverse kinematics
+ * -> take-over blend -> limiter of each cylinder. Nothing reaches an output except through a ramp (ramp.h). Owns no clock and no
+ * I/O.
  */
 #ifndef HEAVE_MOTION_H
 #define HEAVE_MOTION_H
 
+#include "heave/intensity.h"
 #include "heave/kin.h"
 #include "heave/ramp.h"
 #include "heave/settings.h"
@@ -41,7 +43,7 @@ enum {
 
 /** One cycle's set-points. */
 typedef struct {
-    pose_t asked; /**< what the source asked for, before any limit */
+    pose_t asked; /**< what the source asked for, scaled by intensity, before any limit */
     pose_t sent;  /**< the pose that belongs to the extensions sent */
     q32_t extension_mm_q32[CYLINDERS_MAX];
     q32_t angle_deg_q32;
@@ -82,6 +84,17 @@ bool motion_is_done(const motion_t *self);
 
 /** True when every set-point rests. */
 bool motion_is_at_rest(const motion_t *self);
+
+/** Where the rotation motor was last asked to go; where a stop ends once one has begun. deg */
+q32_t motion_angle_target(const motion_t *self);
+
+/** How much of a sender's motion is made, about the neutral pose or the neutral extensions; the rotation motor is not scaled.
+ *  While a sender is followed it changes by a ramp, else at once, which moves nothing.
+ *  @return HV_OK; HV_ERR_RANGE above intensity_max_percent: nothing changes */
+hv_status_t motion_set_intensity(motion_t *self, unsigned percent) HV_MUST_CHECK;
+
+/** Intensity asked for and in force, for display. */
+const intensity_t *motion_intensity(const motion_t *self);
 
 /** End of the timed move that is running, us on the clock of motion_target; 0 where none is. */
 uint64_t motion_timed_end_us(const motion_t *self);

@@ -39,6 +39,7 @@ struct motion {
     pose_t pose;                        /**< last pose sent; where forward kinematics starts */
     bool is_pose_stale;                 /**< the extensions were placed: the pose has to be found even at rest */
 
+    intensity_t intensity;
     motion_source_t source;
     motion_next_t next;
     motion_space_t space;
@@ -63,7 +64,9 @@ struct motion {
     q32_t angle_target_deg_q32;
     uint64_t last_timed_us; /**< arrival of the last timed target, 0 before the first */
     uint64_t timed_end_us;
-    int64_t straight_cycles; /**< left for the straight part of a timed move that begins with a stop */
+    int64_t timed_share_q46;       /**< intensity that the timed move is planned with */
+    q32_t timed_way_q32[AXES_MAX]; /**< from neutral to where the sender wants it, before intensity */
+    int64_t straight_cycles;       /**< left for the straight part of a timed move that begins with a stop */
     bool is_stretched;
     bool is_clamped;           /**< the last target was pulled in */
     uint8_t limiting_cylinder; /**< by this cylinder, 0 where none bounds it */

@@ -60,6 +60,10 @@ typedef struct {
     q16_t engage_speed_mm_s_q16;
     q16_t engage_accel_mm_s2_q16;
 
+    int32_t intensity_start_percent; /**< [0, max] of a sender's motion about neutral */
+    uint32_t intensity_max_percent;  /**< [1, 100] */
+    uint32_t intensity_ramp_ms;      /**< [500, 10000]: from 0 to 100 % */
+
     frame_dialect_t dialect;
     uint32_t takeover_ms;        /**< silence of the sender that drives, after which another may; 0: all are heard */
     hal_udp_networks_t priority; /**< senders that need not wait, the first one in front */

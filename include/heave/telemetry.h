@@ -65,6 +65,8 @@ typedef struct {
     drive_feedback_t drive[DRIVES_MAX];
     unsigned flags; /**< MOTION_CLAMPED ... */
     uint8_t limiting_cylinder;
+    uint8_t intensity_percent; /**< asked for */
+    q32_t intensity_now_q32;   /**< in force, percent */
     uint32_t stream_period_us; /**< 0 while unknown */
     uint32_t stream_delay_us;
     owner_t owner;          /**< who drives */

@@ -323,6 +323,19 @@ static void check_silence(config_source_t *self)
     }
 }
 
+static void check_intensity(config_source_t *self)
+{
+    settings_t *settings = &self->config->settings;
+    if (settings->intensity_start_percent == CONFIG_NONE) {
+        settings->intensity_start_percent = (int32_t)settings->intensity_max_percent;
+    }
+    if (config_source_has(self, "intensity", "max_percent") && config_source_has(self, "intensity", "start_percent") &&
+        settings->intensity_start_percent > (int32_t)settings->intensity_max_percent) {
+        config_source_key_error(self, "intensity", "start_percent", "above max_percent; allowed: 0 to %u, or max",
+                                (unsigned)settings->intensity_max_percent);
+    }
+}
+
 static void check_relays(config_source_t *self)
 {
     settings_t *settings = &self->config->settings;
@@ -365,6 +378,7 @@ static void check_values(config_source_t *self)
     check_engage(self, "speed_mm_s", settings->engage_speed_mm_s_q16, settings->cylinder_speed_mm_s_q16);
     check_engage(self, "accel_mm_s2", settings->engage_accel_mm_s2_q16, settings->cylinder_accel_mm_s2_q16);
     check_silence(self);
+    check_intensity(self);
     check_relays(self);
     check_inputs(self);
 }

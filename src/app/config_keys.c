@@ -24,6 +24,7 @@ const config_section_t config_sections[] = {
     {"cylinders", "limits of every cylinder: the last word over all motion", CONFIG_NEEDS_NOTHING},
     {"engage", "limits of the cylinders while rising, settling, homing and taking over a sender's first pose",
      CONFIG_NEEDS_NOTHING},
+    {"intensity", "how much of a sender's motion is made, about neutral; the rotation motor is not scaled", CONFIG_NEEDS_NOTHING},
     {"udp", "where frames come from", CONFIG_NEEDS_NOTHING},
     {"control", "where heavectl reaches heaved", CONFIG_NEEDS_NOTHING},
     {"drives", "what moves the cylinders", CONFIG_NEEDS_NOTHING},
@@ -113,7 +114,8 @@ const config_key_t config_keys[] = {
      .help = "whether there is a rotation motor; the other keys of the section are for yes only"},
     {KEY("angle", "wrap"), AT(settings.angle_wrap), .type = CONFIG_WORD, .unit = "", .fallback = "as-sent",
      .words = "as-sent|shortest", .needs = CONFIG_NEEDS_ANGLE,
-     .help = "the number as it is, several turns allowed; or modulo one turn, the shorter way round"},
+     .help = "the number as it is, several turns allowed; or modulo one turn, the shorter way round from the last angle sent, as far as "
+             "the limits let it"},
     AXIS("angle", "deg", AXIS_ANGLE, CONFIG_NEEDS_ANGLE, -MOST_Q16, MOST_Q16),
     AXIS("x", "mm", AXIS_X, CONFIG_NEEDS_HEXAPOD, -4000, 4000),
     AXIS("y", "mm", AXIS_Y, CONFIG_NEEDS_HEXAPOD, -4000, 4000),
@@ -136,6 +138,14 @@ const config_key_t config_keys[] = {
      .fallback = "30", ABOVE_ZERO(10000), .help = "speed limit, at most that of [cylinders]"},
     {KEY("engage", "accel_mm_s2"), AT(settings.engage_accel_mm_s2_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s^2",
      .fallback = "100", ABOVE_ZERO(MOST_Q16), .help = "acceleration limit, at most that of [cylinders]"},
+
+    {KEY("intensity", "start_percent"), AT(settings.intensity_start_percent), .type = CONFIG_INTEGER, .unit = "%",
+     .fallback = "max", .words = "max", RANGE(0, 100),
+     .help = "at the start, at most max_percent; `heavectl intensity` changes it while heaved runs"},
+    {KEY("intensity", "max_percent"), AT(settings.intensity_max_percent), .type = CONFIG_INTEGER, .unit = "%",
+     .fallback = "100", RANGE(1, 100), .help = "the most that can be asked for"},
+    {KEY("intensity", "ramp_ms"), AT(settings.intensity_ramp_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "2000",
+     RANGE(500, 10000), .help = "from 0 to 100 %, jerk-limited; a change by half of that takes 0.8 of it, by a tenth 0.46"},
 
     {KEY("udp", "bind"), AT(udp.bind), .type = CONFIG_ADDRESS, .unit = "", .fallback = "127.0.0.1",
      .help = "address to listen on: 0.0.0.0 or :: for every network card; as it stands, this machine alone"},

@@ -76,12 +76,15 @@ static json_t start_answer(control_client_t *client)
     return json;
 }
 
-static void answer_state(control_client_t *client, state_t state)
+static void answer_done(control_client_t *client, const snapshot_t *snapshot)
 {
     json_t json = start_answer(client);
     json_open(&json, NULL, '{');
     json_bool(&json, "ok", true);
-    json_text(&json, "state", state_name(state));
+    json_text(&json, "state", state_name(snapshot->state));
+    if (client->request == OPERATOR_INTENSITY) {
+        json_number(&json, "intensity_percent", snapshot->intensity_percent);
+    }
     json_close(&json, '}');
     answer(client, &json);
 }
@@ -113,26 +116,41 @@ static const snapshot_t *snapshot_of(const control_t *self)
     return &self->view.view.snapshot;
 }
 
-static void refuse(control_client_t *client, event_t request, const snapshot_t *snapshot, bool is_shutting_down)
+static void refuse(const control_t *self, control_client_t *client, const snapshot_t *snapshot, bool is_shutting_down)
 {
     char error[256];
-    (void)operator_explain(request, snapshot, is_shutting_down, error, sizeof error);
+    if (client->request == OPERATOR_INTENSITY) {
+        (void)operator_explain_percent(client->number, self->config->settings.intensity_max_percent, error, sizeof error);
+    } else {
+        (void)operator_explain(client->request, snapshot, is_shutting_down, error, sizeof error);
+    }
     answer_error(client, error, state_name(snapshot->state));
 }
 
 /* Hands an operator's request to the motion thread; the answer follows. */
-static void begin_request(control_t *self, control_client_t *client, event_t event, uint64_t now_us)
+static void begin_request(control_t *self, control_client_t *client, event_t event, uint32_t number, uint64_t now_us)
 {
     self->last_id += self->last_id == UINT32_MAX ? 2 : 1; /* 0 means none */
-    const motion_request_t request = {self->last_id, (uint32_t)event};
+    const motion_request_t request = {self->last_id, (uint32_t)event, number};
     if (!ring_push(&self->loop->requests, &request, sizeof request, NULL, 0)) {
         answer_error(client, "heaved is busy: try again", NULL);
         return;
     }
     client->request_id = self->last_id;
     client->request = event;
+    client->number = number;
     client->is_accepted = false;
     client->answer_by_us = now_us + (event == EVENT_RESET ? RESET_US : ANSWER_US);
+}
+
+static void begin_intensity(control_t *self, control_client_t *client, const char *argument, uint64_t now_us)
+{
+    uint32_t percent = 0;
+    if (operator_read_percent(argument, &percent)) {
+        begin_request(self, client, OPERATOR_INTENSITY, percent, now_us);
+    } else {
+        answer_error(client, "intensity: a whole number of percent is needed, as in `intensity 50`", NULL);
+    }
 }
 
 static bool is_digits(const char *text)
@@ -163,11 +181,15 @@ static bool begin_watch(control_client_t *client, const char *argument, uint64_t
     return true;
 }
 
+static const char k_intensity[] = "intensity ";
+
 static void take_request(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
 {
     const event_t event = operator_request_find(line);
     if (event != EVENTS) {
-        begin_request(self, client, event, now_us);
+        begin_request(self, client, event, 0, now_us);
+    } else if (strncmp(line, k_intensity, strlen(k_intensity)) == 0) {
+        begin_intensity(self, client, &line[strlen(k_intensity)], now_us);
     } else if (strcmp(line, "status") == 0) {
         answer_status(self, client);
     } else if (strncmp(line, "watch", 5) == 0) {
@@ -175,7 +197,9 @@ static void take_request(control_t *self, control_client_t *client, const char *
             answer_error(client, "watch: `watch` or `watch HZ` with 1 to 50 is allowed", NULL);
         }
     } else {
-        answer_error(client, "unknown request; status, watch [HZ], engage, hold, resume, park, reset and shutdown are allowed",
+        answer_error(client,
+                     "unknown request; status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset and "
+                     "shutdown are allowed",
                      NULL);
     }
 }
@@ -229,16 +253,16 @@ static void receive(control_t *self, control_client_t *client, uint64_t now_us)
 /* --- What time brings --- */
 
 /* A reset has an effect once the platform has left FAULT or ESTOP; everything else has its answer after one cycle. */
-static void take_result(control_client_t *client, const motion_result_t *result)
+static void take_result(const control_t *self, control_client_t *client, const motion_result_t *result)
 {
     if (result->status != HV_OK) {
         client->request_id = 0;
-        refuse(client, client->request, &result->snapshot, result->is_shutting_down);
+        refuse(self, client, &result->snapshot, result->is_shutting_down);
     } else if (client->request == EVENT_RESET) {
         client->is_accepted = true;
     } else {
         client->request_id = 0;
-        answer_state(client, result->snapshot.state);
+        answer_done(client, &result->snapshot);
     }
 }
 
@@ -248,7 +272,7 @@ static void take_results(control_t *self)
     while (ring_pop(&self->loop->results, &result, sizeof result) > 0) {
         control_client_t *client = find_client(self, result.id);
         if (result.id != 0 && client != NULL) {
-            take_result(client, &result);
+            take_result(self, client, &result);
         }
     }
 }
@@ -260,11 +284,11 @@ static void watch_request(control_t *self, control_client_t *client, uint64_t no
     const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
     if (client->is_accepted && !is_latched) {
         client->request_id = 0;
-        answer_state(client, s->state);
+        answer_done(client, s);
     } else if (now_us >= client->answer_by_us) {
         client->request_id = 0;
         if (client->is_accepted) {
-            refuse(client, client->request, s, self->view.view.is_shutting_down);
+            refuse(self, client, s, self->view.view.is_shutting_down);
         } else {
             answer_error(client, "no answer from the motion thread", NULL);
         }

@@ -27,9 +27,10 @@ typedef struct {
     size_t in_length;
     char out[CONTROL_OUT_BYTES];
     size_t out_length;
-    bool is_closing;     /**< nothing more is read; closed once everything is answered and sent */
-    uint32_t request_id; /**< waits for the motion thread; 0 = none */
-    event_t request;
+    bool is_closing;          /**< nothing more is read; closed once everything is answered and sent */
+    uint32_t request_id;      /**< waits for the motion thread; 0 = none */
+    event_t request;          /**< or OPERATOR_INTENSITY */
+    uint32_t number;          /**< of that */
     bool is_accepted;         /**< by the motion thread; a reset then still has to take effect */
     uint64_t answer_by_us;    /**< latest time of the answer */
     uint64_t watch_period_us; /**< 0 = does not watch */

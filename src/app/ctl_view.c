@@ -102,6 +102,17 @@ static void put_words(view_t *self, const cJSON *object, const char *name)
 
 /* --- Parts of the table --- */
 
+/* What was asked for, and where a change has come to. */
+static void draw_intensity(view_t *self, const cJSON *intensity)
+{
+    const double percent = number(intensity, "percent");
+    const double now = number(intensity, "now_percent");
+    put(self, " intensity %.0f %%", percent);
+    if (now != percent) {
+        put(self, " (now %.1f)", now);
+    }
+}
+
 static void draw_head(view_t *self, const cJSON *status)
 {
     const double up_s = number(status, "uptime_ms") / 1000.0;
@@ -109,6 +120,7 @@ static void draw_head(view_t *self, const cJSON *status)
         cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
         cJSON_IsTrue(member(status, "estop_active")) ? " E-STOP" : "",
         cJSON_IsTrue(member(status, "shutting_down")) ? " SHUTTING DOWN" : "");
+    draw_intensity(self, member(status, "intensity"));
     put(self, "  cycle %.0f us  up %.0f s  late %.0f", number(status, "cycle_us"), up_s, number(status, "late_cycles"));
     end_line(self);
 }
@@ -333,6 +345,7 @@ size_t ctl_view_line(const cJSON *status, char text[CTL_VIEW_BYTES])
     {
         put(&view, " %.3f", number(cylinder, "sent_mm"));
     }
+    put(&view, " intensity %.0f", number(member(status, "intensity"), "percent"));
     put(&view, " relays %s accepted %.0f rejected %.0f fault %s", word(member(status, "relays"), "mask"),
         total(member(counters, "accepted")), total(member(counters, "rejected")), word(member(status, "fault"), "name"));
     end_line(&view);

@@ -8,7 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define READ_BYTES 65536u
+#define READ_BYTES  65536u
+#define PERCENT_MAX 999u /* as a recording may have it: what is too much is refused as it was then */
 
 static const char k_bad_time[] =
     "no time at the start; a line is `<t_ms> <text>`, `<t_ms> !request`, or a comment that starts with `;`";
@@ -20,8 +21,8 @@ static const char k_bad_escape[] = "unknown escape; \\n \\r \\t \\0 \\xNN \\\\ a
 static const char k_bad_octal[] = "\\0 with a digit after it could be octal; write \\x00, or \\xNN";
 static const char k_too_long[] = "the text is longer than 65507 bytes, more than a datagram holds";
 static const char k_bad_request[] =
-    "unknown request; !engage !hold !resume !park !reset !shutdown, !estop on, !estop off, !late N and "
-    "!from ADDRESS are allowed (a datagram that starts with ! is written \\x21)";
+    "unknown request; !engage !hold !resume !park !reset !shutdown, !intensity N (0 to 100), !estop on, !estop off, "
+    "!late N and !from ADDRESS are allowed (a datagram that starts with ! is written \\x21)";
 
 static const struct {
     const char *word;
@@ -203,6 +204,14 @@ static bool read_address(cursor_t *self, frames_line_t *out)
     return out->from.is_ipv6;
 }
 
+static bool read_count(cursor_t *self, uint32_t limit, uint32_t *out)
+{
+    uint64_t value = 0;
+    const bool is_read = is_digit_next(self) && read_number(self, limit, &value);
+    *out = (uint32_t)value;
+    return is_read;
+}
+
 static bool read_request_words(cursor_t *self, frames_line_t *out)
 {
     for (size_t i = 0; i < sizeof k_requests / sizeof k_requests[0]; i++) {
@@ -217,12 +226,13 @@ static bool read_request_words(cursor_t *self, frames_line_t *out)
         out->number = take_word(self, "on");
         return out->number == 1 || take_word(self, "off");
     }
-    if (take_word(self, "late") && is_digit_next(self)) {
-        uint64_t cycles = 0;
+    if (take_word(self, "intensity")) {
+        out->kind = FRAMES_INTENSITY;
+        return read_count(self, PERCENT_MAX, &out->number);
+    }
+    if (take_word(self, "late")) {
         out->kind = FRAMES_LATE;
-        const bool is_read = read_number(self, UINT32_MAX, &cycles);
-        out->number = (uint32_t)cycles;
-        return is_read;
+        return read_count(self, UINT32_MAX, &out->number);
     }
     return take_word(self, "from") && read_address(self, out);
 }

@@ -17,11 +17,12 @@
 
 /** What a line does. */
 typedef enum {
-    FRAMES_DATAGRAM, /**< a sender sends text */
-    FRAMES_REQUEST,  /**< `!engage` ...: what heavectl would ask for */
-    FRAMES_ESTOP,    /**< `!estop on`, `!estop off` */
-    FRAMES_LATE,     /**< `!late N`: N cycles are skipped and counted (recordings hold this) */
-    FRAMES_FROM      /**< `!from ADDRESS`: who sends the datagrams from here on */
+    FRAMES_DATAGRAM,  /**< a sender sends text */
+    FRAMES_REQUEST,   /**< `!engage` ...: what heavectl would ask for */
+    FRAMES_INTENSITY, /**< `!intensity N`: percent of a sender's motion */
+    FRAMES_ESTOP,     /**< `!estop on`, `!estop off` */
+    FRAMES_LATE,      /**< `!late N`: N cycles are skipped and counted (recordings hold this) */
+    FRAMES_FROM       /**< `!from ADDRESS`: who sends the datagrams from here on */
 } frames_kind_t;
 
 /** One line. */
@@ -29,7 +30,7 @@ typedef struct {
     uint64_t t_us;
     frames_kind_t kind;
     event_t request;     /**< FRAMES_REQUEST */
-    uint32_t number;     /**< FRAMES_ESTOP: 1 = on; FRAMES_LATE: cycles */
+    uint32_t number;     /**< FRAMES_INTENSITY: percent; FRAMES_ESTOP: 1 = on; FRAMES_LATE: cycles */
     const uint8_t *text; /**< FRAMES_DATAGRAM: its bytes, escapes resolved */
     uint32_t length;
     hal_udp_peer_t from; /**< FRAMES_FROM: read from it; FRAMES_DATAGRAM: set by frames_load */

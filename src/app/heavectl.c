@@ -35,6 +35,7 @@ enum { OPTION_JSON = 1, OPTION_SOCKET, OPTION_FOR, OPTION_HZ, OPTION_HELP, OPTIO
 /** A run of the program. */
 typedef struct {
     const char *command;
+    const char *argument; /**< of intensity; else NULL */
     const char *socket;
     bool is_json;
     double for_s; /**< 0 = until interrupted */
@@ -45,7 +46,7 @@ typedef struct {
     size_t consumed; /**< of those, given out already */
 } ctl_t;
 
-static const char *const k_commands[] = {"status", "watch", "engage", "hold", "resume", "park", "reset", "shutdown"};
+static const char *const k_commands[] = {"status", "watch", "engage", "hold", "resume", "park", "reset", "shutdown", "intensity"};
 
 static const char k_help[] =
     "heavectl - talks to a running heaved.\n"
@@ -53,12 +54,14 @@ static const char k_help[] =
     "  heavectl [--json] [--socket PATH] status\n"
     "  heavectl [--json] [--socket PATH] [--for SECONDS] [--hz N] watch\n"
     "  heavectl [--json] [--socket PATH] engage | hold | resume | park | reset | shutdown\n"
+    "  heavectl [--json] [--socket PATH] intensity PERCENT\n"
     "\n"
     "  engage    bring the platform up and follow the sender\n"
     "  hold      stop where it is; resume goes on with what was interrupted\n"
     "  park      settle: lowest position, at rest\n"
     "  reset     leave FAULT or ESTOP, once the cause is gone\n"
     "  shutdown  settle, drives off, end heaved\n"
+    "  intensity how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so\n"
     "\n"
     "  --json          answers as heaved gives them: one JSON object per line\n"
     "  --socket PATH   else the environment's HEAVE_SOCKET, else " DEFAULT_SOCKET "\n"
@@ -227,6 +230,9 @@ static void show_answer(const ctl_t *self, const cJSON *answer)
     const cJSON *state = cJSON_GetObjectItemCaseSensitive(answer, "state");
     if (strcmp(self->command, "status") == 0) {
         show_table(answer, false);
+    } else if (self->argument != NULL) {
+        const cJSON *percent = cJSON_GetObjectItemCaseSensitive(answer, "intensity_percent");
+        printf("intensity: %.0f %%\n", cJSON_IsNumber(percent) ? percent->valuedouble : 0.0);
     } else {
         printf("%s: %s\n", self->command, cJSON_IsString(state) ? state->valuestring : "?");
     }
@@ -248,7 +254,10 @@ static int show(const ctl_t *self, const char *line)
 
 static int ask(ctl_t *self)
 {
-    const char *line = send_line(self, self->command) ? receive_line(self, now_ms() + ANSWER_MS) : NULL;
+    char request[64];
+    (void)snprintf(request, sizeof request, "%s%s%s", self->command, self->argument != NULL ? " " : "",
+                   self->argument != NULL ? self->argument : "");
+    const char *line = send_line(self, request) ? receive_line(self, now_ms() + ANSWER_MS) : NULL;
     return line != NULL ? show(self, line) : complain(EXIT_UNAVAILABLE, "heaved does not answer");
 }
 
@@ -378,16 +387,22 @@ static const char *take_options(ctl_t *self, int argc, char **argv)
 
 static const char *take_command(ctl_t *self, int argc, char **argv)
 {
-    if (optind + 1 != argc) {
-        return "one command is needed: status, watch, engage, hold, resume, park, reset or shutdown";
+    if (optind == argc) {
+        return "a command is needed: status, watch, engage, hold, resume, park, reset, shutdown or intensity PERCENT";
     }
+    const bool is_intensity = strcmp(argv[optind], "intensity") == 0;
+    if (optind + (is_intensity ? 2 : 1) != argc) {
+        return is_intensity ? "intensity needs a whole number of percent, as in `heavectl intensity 50`"
+                            : "one command is needed";
+    }
+    self->argument = is_intensity ? argv[optind + 1] : NULL;
     for (size_t i = 0; i < sizeof k_commands / sizeof k_commands[0]; i++) {
         if (strcmp(argv[optind], k_commands[i]) == 0) {
             self->command = k_commands[i];
             return NULL;
         }
     }
-    return "unknown command; status, watch, engage, hold, resume, park, reset and shutdown are allowed";
+    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown and intensity are allowed";
 }
 
 int main(int argc, char **argv)

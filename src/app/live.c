@@ -178,7 +178,7 @@ static void take_signals(live_t *self)
         }
         self->signals++;
         if (self->signals == 1) {
-            const motion_request_t request = {0, EVENT_SHUTDOWN};
+            const motion_request_t request = {.event = EVENT_SHUTDOWN};
             (void)ring_push(&self->loop.requests, &request, sizeof request, NULL, 0);
             manager_stopping();
             (void)say(0, "shutting down: the platform settles first; once more ends at once");
@@ -319,7 +319,7 @@ static int open_all(live_t *self, const config_t *config)
         return code;
     }
     linux_log_init(&self->log, out_file_unblocked(STDERR_FILENO));
-    record_writer_init(&self->writer, config->settings.cycle_us,
+    record_writer_init(&self->writer, &config->settings,
                        config->settings.engage == ENGAGE_AUTO && config->settings.auto_frames == 0);
     if (!open_signals(self)) {
         return say(EXIT_UNAVAILABLE, "signals: %s", strerror(errno));

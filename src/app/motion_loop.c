@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "heave/text.h"
+#include "operator.h"
 #include "record.h"
 
 #define PRIORITY           80 /* above threaded interrupts, which have 50 */
@@ -56,6 +57,17 @@ static void take_reloads(motion_loop_t *self)
     }
 }
 
+static hv_status_t carry_out(motion_loop_t *self, const motion_request_t *request)
+{
+    if (request->event == OPERATOR_INTENSITY) {
+        note(self, RECORD_INTENSITY, request->number);
+        return gateway_set_intensity(&self->session.gateway, request->number);
+    }
+    note(self, RECORD_REQUEST, request->event);
+    self->current.view.is_shutting_down |= request->event == EVENT_SHUTDOWN;
+    return gateway_request(&self->session.gateway, (event_t)request->event, self->session.now_us);
+}
+
 /* Requests that wait, in order, before the cycle.
  * Returns how many; their results are complete after the cycle. */
 static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE])
@@ -63,11 +75,8 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
     unsigned count = 0;
     motion_request_t request;
     while (count < REQUESTS_PER_CYCLE && ring_pop(&self->requests, &request, sizeof request) > 0) {
-        const event_t event = (event_t)request.event;
-        note(self, RECORD_REQUEST, request.event);
-        self->current.view.is_shutting_down |= event == EVENT_SHUTDOWN;
         result[count].id = request.id;
-        result[count].status = gateway_request(&self->session.gateway, event, self->session.now_us);
+        result[count].status = carry_out(self, &request);
         count++;
     }
     return count;
@@ -100,7 +109,7 @@ static void write_down(motion_loop_t *self, bool is_zero)
     }
     self->was_estop = snapshot->is_estop_active;
     if (self->is_recording && is_zero) {
-        record_push(&self->record, RECORD_ZERO, snapshot->now_us, (uint32_t)snapshot->goal);
+        record_push(&self->record, RECORD_ZERO, snapshot->now_us, record_zero(snapshot->goal, snapshot->intensity_percent));
     }
     if (self->is_tracing && self->session.has_zero) {
         trace_row_t row;

@@ -41,8 +41,9 @@ typedef union {
 
 /** An operator's request on its way to the motion thread. */
 typedef struct {
-    uint32_t id; /**< the asking side's */
-    uint32_t event;
+    uint32_t id;     /**< the asking side's */
+    uint32_t event;  /**< event_t; OPERATOR_INTENSITY: how much of a sender's motion is made */
+    uint32_t number; /**< of OPERATOR_INTENSITY: percent */
 } motion_request_t;
 
 /** What became of it, after the cycle that took it. */

@@ -34,6 +34,27 @@ event_t operator_request_find(const char *name)
     return EVENTS;
 }
 
+bool operator_read_percent(const char *text, uint32_t *percent)
+{
+    *percent = 0;
+    const size_t length = strlen(text);
+    for (size_t i = 0; i < length; i++) {
+        *percent = *percent * 10 + (uint32_t)(uint8_t)(text[i] - '0');
+    }
+    return length > 0 && length <= 3 && strspn(text, "0123456789") == length;
+}
+
+size_t operator_explain_percent(uint32_t percent, unsigned max_percent, char *text, size_t capacity)
+{
+    text_t out = text_start(text, capacity);
+    text_put(&out, "intensity ");
+    text_put_u32(&out, percent);
+    text_put(&out, ": too much for this platform; possible: 0 to ");
+    text_put_u32(&out, max_percent);
+    text_put(&out, " % ([intensity] max_percent)");
+    return out.length;
+}
+
 /* What of a request does not fit the state. */
 static const char *reason(event_t request, const snapshot_t *s)
 {

@@ -111,6 +111,9 @@ static void carry_out(play_t *self, const frames_line_t *line)
     case FRAMES_REQUEST:
         self->refused_requests += gateway_request(gateway, line->request, self->session.now_us) != HV_OK;
         break;
+    case FRAMES_INTENSITY:
+        self->refused_requests += gateway_set_intensity(gateway, line->number) != HV_OK;
+        break;
     case FRAMES_ESTOP:
         sim_inputs_set(&self->rig.sim_inputs, INPUT_ESTOP, line->number != 0);
         break;

@@ -18,10 +18,12 @@ void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const
     (void)ring_push(ring, &head, sizeof head, bytes, kind == RECORD_DATAGRAM ? length : 0);
 }
 
-void record_writer_init(record_writer_t *self, uint32_t cycle_us, bool engages_alone)
+void record_writer_init(record_writer_t *self, const settings_t *settings, bool engages_alone)
 {
-    *self = (record_writer_t){
-        .cycle_us = cycle_us, .goal = engages_alone ? STATE_ENGAGED : STATE_SETTLED, .from = {.address = {127, 0, 0, 1}}};
+    *self = (record_writer_t){.cycle_us = settings->cycle_us,
+                              .goal = engages_alone ? STATE_ENGAGED : STATE_SETTLED,
+                              .percent = (uint32_t)settings->intensity_start_percent,
+                              .from = {.address = {127, 0, 0, 1}}};
 }
 
 /* Bytes that would be read as something else, or not at all: a `!` in front, blanks at both ends. */
@@ -86,6 +88,8 @@ static size_t put_content(char *to, const record_t *record, size_t length)
         return put_request(to, (event_t)record->head.value);
     case RECORD_ESTOP:
         return decimal_put_text(to, record->head.value != 0 ? "!estop on" : "!estop off");
+    case RECORD_INTENSITY:
+        return put_number(to, "!intensity ", record->head.value, "");
     case RECORD_LATE:
         return put_number(to, "!late ", record->head.value, "");
     case RECORD_ZERO:
@@ -94,10 +98,16 @@ static size_t put_content(char *to, const record_t *record, size_t length)
     return 0;
 }
 
-/* What brings an offline run, which starts with its own goal, to the goal of this one. */
-static size_t put_zero(const record_writer_t *self, state_t goal, char *to)
+/* What brings an offline run, which starts with its own goal and intensity, to those of this one. */
+static size_t put_zero(const record_writer_t *self, uint32_t value, char *to)
 {
+    const state_t goal = (state_t)(value & 0xFFu);
+    const uint32_t percent = value >> 8;
     size_t at = decimal_put_text(to, "; time zero: SETTLED\n");
+    if (percent != self->percent) {
+        at += decimal_put_ms(&to[at], self->cycle_us);
+        at += put_number(&to[at], " !intensity ", percent, "\n");
+    }
     if (goal == self->goal) {
         return at;
     }
@@ -132,7 +142,7 @@ size_t record_writer_line(record_writer_t *self, const record_t *record, size_t 
     if (record->head.kind == RECORD_ZERO) {
         self->has_zero = true;
         self->zero_us = record->head.t_us;
-        return put_zero(self, (state_t)record->head.value, to);
+        return put_zero(self, record->head.value, to);
     }
     const bool is_line = self->has_zero && !is_comment(record, length);
     size_t at = is_line ? put_from(self, record, to) : decimal_put_text(to, "; ");

@@ -12,11 +12,12 @@
 /** What happened. */
 typedef enum {
     RECORD_DATAGRAM,
-    RECORD_OVERSIZE, /**< a datagram longer than the gateway takes; value: its length */
-    RECORD_REQUEST,  /**< value: event_t */
-    RECORD_ESTOP,    /**< value: 1 on, 0 off */
-    RECORD_LATE,     /**< value: cycles */
-    RECORD_ZERO      /**< time zero; value: the goal, state_t */
+    RECORD_OVERSIZE,  /**< a datagram longer than the gateway takes; value: its length */
+    RECORD_REQUEST,   /**< value: event_t */
+    RECORD_ESTOP,     /**< value: 1 on, 0 off */
+    RECORD_INTENSITY, /**< value: percent */
+    RECORD_LATE,      /**< value: cycles */
+    RECORD_ZERO       /**< time zero; value: record_zero() */
 } record_kind_t;
 
 /** What stands before the bytes of a datagram. */
@@ -39,7 +40,8 @@ typedef struct {
 /** Turns records into lines. */
 typedef struct {
     uint32_t cycle_us;
-    state_t goal; /**< that an offline run has at time zero */
+    state_t goal;     /**< that an offline run has at time zero */
+    uint32_t percent; /**< and its intensity */
     bool has_zero;
     uint64_t zero_us;
     hal_udp_peer_t from; /**< as the lines so far say */
@@ -52,8 +54,14 @@ void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value
 void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const hal_udp_peer_t *from, const uint8_t *bytes,
                           size_t length);
 
+/** What the platform is to be at time zero: the value of a RECORD_ZERO. */
+static inline uint32_t record_zero(state_t goal, uint32_t intensity_percent)
+{
+    return (uint32_t)goal | intensity_percent << 8;
+}
+
 /** @param engages_alone an offline run engages at time zero by itself */
-void record_writer_init(record_writer_t *self, uint32_t cycle_us, bool engages_alone);
+void record_writer_init(record_writer_t *self, const settings_t *settings, bool engages_alone);
 
 /** Turns the next record into a line, and one before it where the sender is another one.
  *  @param length of the bytes

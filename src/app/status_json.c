@@ -153,6 +153,15 @@ static void write_flags(json_t *json, const snapshot_t *s)
     json_number(json, "limiting_cylinder", s->limiting_cylinder);
 }
 
+static void write_intensity(json_t *json, const snapshot_t *s, const config_t *config)
+{
+    json_open(json, "intensity", '{');
+    json_number(json, "percent", s->intensity_percent);
+    json_q32(json, "now_percent", s->intensity_now_q32);
+    json_number(json, "max_percent", config->settings.intensity_max_percent);
+    json_close(json, '}');
+}
+
 static void write_stream(json_t *json, const snapshot_t *s)
 {
     json_open(json, "stream", '{');
@@ -258,6 +267,7 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     write_poses(json, s);
     write_axes(json, s, config);
     write_relays(json, s);
+    write_intensity(json, s, config);
     write_flags(json, s);
     write_stream(json, s);
     write_owner(json, "sender", &s->owner, s->now_us);

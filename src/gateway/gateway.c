@@ -4,6 +4,7 @@
 #include "heave/gateway.h"
 
 #include "auto_engage.h"
+#include "heave/text.h"
 #include "intake.h"
 #include "operate.h"
 
@@ -71,6 +72,20 @@ void gateway_reload(gateway_t *self, const settings_t *settings)
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)
 {
     return operate_request(self, request, now_us);
+}
+
+hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent)
+{
+    const hv_status_t status = motion_set_intensity(&self->motion, percent);
+    if (status == HV_OK) {
+        char line[HAL_LOG_TEXT_MAX + 1];
+        text_t text = text_start(line, sizeof line);
+        text_put(&text, "intensity ");
+        text_put_u32(&text, percent);
+        text_put(&text, " %");
+        hal_log_write(self->io.log, HAL_LOG_NOTICE, line);
+    }
+    return status;
 }
 
 void gateway_note_late(gateway_t *self, uint32_t cycles)
@@ -154,6 +169,8 @@ static void publish(gateway_t *self, uint64_t now_us)
     }
     s->flags = self->output.flags;
     s->limiting_cylinder = self->output.limiting_cylinder;
+    s->intensity_percent = (uint8_t)motion_intensity(&self->motion)->percent;
+    s->intensity_now_q32 = intensity_percent_q32(motion_intensity(&self->motion));
     s->stream_period_us = stream_period_us(motion_stream(&self->motion));
     s->stream_delay_us = stream_delay_us(motion_stream(&self->motion));
     s->owner = self->owner;

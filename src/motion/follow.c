@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: MIT
  * follow.c - following a sender.
  *
- * Poses: references of the pose axes -> ramps -> workspace -> inverse kinematics -> references of the cylinders.
- * Extensions: the references go to the cylinders as they are. When the space changes, forward kinematics of the last three
- * set-points gives the pose axes their position, velocity and acceleration, so that nothing jumps. Take-over: reference = from +
- * share (wanted - from), the share rising from 0 to 1 along an S-curve whose largest speed is engage speed.
+ * Poses: references of the pose axes, scaled by intensity -> ramps -> workspace -> inverse kinematics -> references of the
+ * cylinders. Extensions: the references go to the cylinders as they are. When the space changes, forward kinematics of the last
+ * three set-points gives the pose axes their position, velocity and acceleration, so that nothing jumps. Take-over: reference =
+ * from + share (wanted - from), the share rising from 0 to 1 along an S-curve whose largest speed is engage speed.
  */
 #include "follow.h"
 
+#include "past.h"
 #include "reach.h"
+#include "slots.h"
 #include "way.h"
 
 #define TAKEOVER_LEAST_US 250000
@@ -17,22 +19,6 @@
 static ramp_t *slot_ramp(motion_t *self, unsigned i)
 {
     return self->space == MOTION_POSE || i == AXIS_ANGLE ? &self->axis[i] : &self->cylinder[i];
-}
-
-static q32_t clamp_to(const ramp_limits_t *limits, q32_t value_q32)
-{
-    return fx_clamp(value_q32, limits->pos_min_q32, limits->pos_max_q32);
-}
-
-bool follow_can_assemble(const motion_t *self, const motion_target_t *target)
-{
-    q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
-    pose_t pose;
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        extension_mm_q32[i] = clamp_to(&self->cylinder[i].limits, target->value_q32[i]);
-    }
-    return kin_forward(&self->kin, extension_mm_q32, &self->pose, &pose, NULL) == HV_OK ||
-           kin_forward(&self->kin, extension_mm_q32, &self->neutral, &pose, NULL) == HV_OK;
 }
 
 bool follow_is_moving(const motion_t *self)
@@ -87,34 +73,6 @@ static void enter_space(motion_t *self, motion_space_t space)
     }
 }
 
-/* The target as one value per slot: inside the limits, the whole pose pulled into the workspace. Notes what was pulled in. */
-static void slots_of(motion_t *self, const motion_target_t *target, q32_t slot_q32[AXES_MAX],
-                     q32_t extension_mm_q32[CYLINDERS_MAX])
-{
-    pose_t pose;
-    if (target->has_angle) {
-        self->angle_target_deg_q32 = clamp_to(&self->axis[AXIS_ANGLE].limits, target->angle_deg_q32);
-    }
-    slot_q32[AXIS_ANGLE] = self->angle_target_deg_q32;
-    self->is_clamped = target->has_angle && self->angle_target_deg_q32 != target->angle_deg_q32;
-    self->limiting_cylinder = 0;
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        const bool is_used = target->space == MOTION_POSE || i < self->cylinders;
-        const ramp_limits_t *limits = target->space == MOTION_POSE ? &self->axis[i].limits : &self->cylinder[i].limits;
-        slot_q32[i] = is_used ? clamp_to(limits, target->value_q32[i]) : self->cylinder[i].state.pos_q32;
-        self->is_clamped |= is_used && slot_q32[i] != target->value_q32[i];
-        pose.axis_q32[i] = slot_q32[i];
-        extension_mm_q32[i] = slot_q32[i];
-    }
-    if (target->space == MOTION_POSE) {
-        self->limiting_cylinder = (uint8_t)reach_pull_in(self, &pose, extension_mm_q32);
-        for (unsigned i = 0; i < POSE_AXES; i++) {
-            slot_q32[i] = pose.axis_q32[i];
-        }
-    }
-    self->is_clamped |= self->limiting_cylinder != 0;
-}
-
 /* The first target after a rest: its way at engage speed, or slower where a timed move gives it longer. The axes stand on the
  * target at once, as it is the blend that moves the platform there. */
 static void plan_blend(motion_t *self, const q32_t slot_q32[AXES_MAX], const q32_t extension_mm_q32[CYLINDERS_MAX],
@@ -134,6 +92,16 @@ static void plan_blend(motion_t *self, const q32_t slot_q32[AXES_MAX], const q32
     self->blend_share[0] = self->blend_share[1] = self->blend_share[2] = 0;
     self->blend_rest = 0;
     self->is_blend_planned = true;
+}
+
+/* The state a plan starts from: the ramp's, less what the intensity moves by itself. */
+static ramp_state_t planned_start(motion_t *self, unsigned i)
+{
+    ramp_state_t state = slot_ramp(self, i)->state;
+    const ramp_ref_t shift = intensity_shift(&self->intensity, self->timed_share_q46, self->timed_way_q32[i]);
+    state.vel_per_cycle_q32 -= shift.vel_per_cycle_q32;
+    state.acc_per_cycle2_q32 -= shift.acc_per_cycle2_q32;
+    return state;
 }
 
 static void plan_straight(motion_t *self, const q32_t slot_q32[AXES_MAX], int64_t cycles)
@@ -196,7 +164,7 @@ static void plan_timed(motion_t *self, const q32_t slot_q32[AXES_MAX], int64_t a
     ramp_state_t start[AXES_MAX];
     const ramp_limits_t *limits[AXES_MAX];
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        start[i] = is_first && i != AXIS_ANGLE ? (ramp_state_t){.pos_q32 = slot_q32[i]} : slot_ramp(self, i)->state;
+        start[i] = is_first && i != AXIS_ANGLE ? (ramp_state_t){.pos_q32 = slot_q32[i]} : planned_start(self, i);
         limits[i] = &slot_ramp(self, i)->limits;
     }
     int64_t cycles = asked > 0 ? asked : 1;
@@ -237,16 +205,18 @@ static bool is_stream_sample(const motion_t *self, const motion_target_t *target
 void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
     q32_t slot_q32[AXES_MAX];
+    q32_t scaled_q32[AXES_MAX];
     q32_t extension_mm_q32[CYLINDERS_MAX];
     if (target->space != self->space || !follow_is_moving(self)) {
         enter_space(self, target->space);
     }
-    slots_of(self, target, slot_q32, extension_mm_q32);
+    slots_take(self, target, slot_q32, extension_mm_q32);
+    slots_scale(self, target->space, slot_q32, scaled_q32);
     const bool is_sample = is_stream_sample(self, target, now_us);
     const int64_t cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
     const bool is_first = self->is_taking_over && !self->is_blend_planned;
     if (is_first) {
-        plan_blend(self, slot_q32, extension_mm_q32, cycles);
+        plan_blend(self, scaled_q32, extension_mm_q32, cycles);
     }
     self->last_timed_us = target->is_timed ? now_us : 0;
     if (!is_sample) {
@@ -258,7 +228,8 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
     if (is_sample) {
         self->source = MOTION_STREAMED;
     } else {
-        plan_timed(self, slot_q32, cycles, is_first, now_us);
+        slots_plan(self, slot_q32);
+        plan_timed(self, scaled_q32, cycles, is_first, now_us);
     }
 }
 
@@ -272,21 +243,9 @@ void follow_begin(motion_t *self, uint64_t now_us)
     }
 }
 
-/* The references of the slots from whatever source there is. */
-static void step_source(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX])
+/* The references of a move along a straight way. */
+static void step_straight(motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
-    if (self->source == MOTION_TIMED) {
-        quintic_step(&self->quintic, ref);
-        return;
-    }
-    if (self->source == MOTION_HALTING) {
-        halt_step(&self->halt, ref);
-        return;
-    }
-    if (self->source == MOTION_STREAMED) {
-        (void)stream_step(&self->stream, now_us, ref);
-        return;
-    }
     const bool was_done = scurve_is_done(&self->path);
     scurve_step(&self->path);
     for (unsigned i = 0; i < AXES_MAX; i++) {
@@ -296,24 +255,36 @@ static void step_source(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX
     }
 }
 
+/* The references of the slots from whatever source there is. */
+static void step_source(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX])
+{
+    if (self->source == MOTION_STREAMED) {
+        (void)stream_step(&self->stream, now_us, ref);
+        slots_scale_refs(self, ref);
+        return;
+    }
+    if (self->source == MOTION_TIMED) {
+        quintic_step(&self->quintic, ref);
+    } else if (self->source == MOTION_HALTING) {
+        halt_step(&self->halt, ref);
+    } else {
+        step_straight(self, ref);
+    }
+    slots_shift_refs(self, ref);
+}
+
 /* One cylinder's reference on the way from where the take-over began: the same blend of its last four positions, so that the
  * differences of a step's reference stay what they are. */
 static ramp_ref_t blended(const motion_t *self, unsigned i, const ramp_ref_t *ref)
 {
     const q32_t from_q32 = self->blend_from_q32[i];
-    const q32_t vel_q32 = ref->vel_per_cycle_q32;
-    const q32_t acc_q32 = ref->acc_per_cycle2_q32;
-    const q32_t past_q32[4] = {ref->pos_q32, ref->pos_q32 - vel_q32, ref->pos_q32 - 2 * vel_q32 + acc_q32,
-                               ref->pos_q32 - 3 * vel_q32 + 3 * acc_q32 - ref->jerk_per_cycle3_q32};
-    const int64_t share[4] = {self->blend.pos, self->blend_share[0], self->blend_share[1], self->blend_share[2]};
-    q32_t at_q32[4];
-    for (unsigned age = 0; age < 4; age++) {
-        at_q32[age] = from_q32 + fx_mul_div(past_q32[age] - from_q32, share[age], self->blend.total);
+    const int64_t share[PAST] = {self->blend.pos, self->blend_share[0], self->blend_share[1], self->blend_share[2]};
+    q32_t at_q32[PAST];
+    past_of(ref, at_q32);
+    for (unsigned age = 0; age < PAST; age++) {
+        at_q32[age] = from_q32 + fx_mul_div(at_q32[age] - from_q32, share[age], self->blend.total);
     }
-    const q32_t v0 = at_q32[0] - at_q32[1];
-    const q32_t v1 = at_q32[1] - at_q32[2];
-    const q32_t v2 = at_q32[2] - at_q32[3];
-    return (ramp_ref_t){at_q32[0], v0, v0 - v1, v0 - 2 * v1 + v2};
+    return past_ref(at_q32);
 }
 
 /* Leads the cylinders to the sender's motion at engage speed. */
@@ -349,7 +320,7 @@ static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], pose_t *planned,
         flags |= self->axis[i].flags;
     }
     kin_constrain(&self->kin, planned);
-    const unsigned cylinder = reach_pull_in(self, planned, extension_mm_q32);
+    const unsigned cylinder = reach_pull_in(self, planned, extension_mm_q32, NULL);
     kin_constrain(&self->kin, planned); /* what is parasitic is not on the straight way the pose was pulled along */
     out->limiting_cylinder = cylinder != 0 ? (uint8_t)cylinder : self->limiting_cylinder;
     for (unsigned i = 0; i < self->cylinders; i++) {
@@ -377,8 +348,10 @@ void follow_end_cycle(motion_t *self)
     if (self->source == MOTION_HALTING && halt_is_done(&self->halt) && are_slots_at_rest(self)) {
         q32_t target_q32[AXES_MAX];
         for (unsigned i = 0; i < AXES_MAX; i++) {
-            target_q32[i] = self->path_to_q32[i];
+            const ramp_ref_t by = intensity_shift(&self->intensity, self->timed_share_q46, self->timed_way_q32[i]);
+            target_q32[i] = self->path_to_q32[i] + by.pos_q32;
         }
+        self->timed_share_q46 = self->intensity.share_q46[0];
         plan_straight(self, target_q32, self->straight_cycles);
     }
 }

@@ -7,9 +7,6 @@
 
 #include "heave/motion.h"
 
-/** True if some pose has the target's extensions (pulled into the strokes): the assembly exists. */
-bool follow_can_assemble(const motion_t *self, const motion_target_t *target);
-
 /** True while a sender's target moves the platform. */
 bool follow_is_moving(const motion_t *self);
 

@@ -6,12 +6,13 @@
 
 #include "follow.h"
 #include "reach.h"
+#include "slots.h"
 
 /* Extensions of a pose, inside the stroke with its margins. */
 static bool reaches(const motion_t *self, const pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX])
 {
     pose_t kept = *pose;
-    return reach_pull_in(self, &kept, extension_mm_q32) == 0;
+    return reach_pull_in(self, &kept, extension_mm_q32, NULL) == 0;
 }
 
 static hv_status_t init_cylinders(motion_t *self, const settings_t *s)
@@ -97,6 +98,11 @@ hv_status_t motion_init(motion_t *self, const settings_t *settings)
     kin_constrain(&self->kin, &self->neutral);
     if (!reaches(self, &self->neutral, self->neutral_mm_q32)) {
         return HV_ERR_RANGE;
+    }
+    status = intensity_init(&self->intensity, (unsigned)settings->intensity_start_percent, settings->intensity_max_percent,
+                            settings->intensity_ramp_ms, settings->cycle_us);
+    if (status != HV_OK) {
+        return status;
     }
     stream_init(&self->stream, settings->cycle_us, AXES_MAX, settings->stream_style);
     motion_place(self, self->settled_mm_q32, 0);
@@ -191,6 +197,7 @@ static void begin_stop(motion_t *self, motion_next_t next)
     if (self->source != MOTION_STOPPING) {
         halt_plan(&self->halt, AXES_MAX, CYLINDERS_MAX, start, limits);
         self->source = MOTION_STOPPING;
+        self->angle_target_deg_q32 = self->halt.rest_q32[AXIS_ANGLE];
     }
 }
 
@@ -233,7 +240,7 @@ hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_
     if (!self->is_following) {
         return HV_OK;
     }
-    if (target->space == MOTION_CYLINDERS && !follow_can_assemble(self, target)) {
+    if (target->space == MOTION_CYLINDERS && !slots_can_assemble(self, target)) {
         return HV_ERR_RANGE;
     }
     if (self->source == MOTION_STOPPING) {
@@ -323,8 +330,10 @@ void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out)
     const bool is_posed = follow_is_moving(self) && self->space == MOTION_POSE;
     *out = (motion_output_t){.flags = self->is_stretched ? MOTION_STRETCHED : 0};
     if (follow_is_moving(self)) {
+        intensity_step(&self->intensity);
         follow_step(self, now_us, ref, &planned, out);
     } else {
+        intensity_place(&self->intensity);
         step_in_cylinders(self, ref);
         out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &ref[AXIS_ANGLE], RAMP_FIRM);
         out->flags |= MOTION_IN_CYLINDERS;
@@ -340,6 +349,21 @@ void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out)
 bool motion_is_done(const motion_t *self)
 {
     return self->source == MOTION_RESTING && motion_is_at_rest(self);
+}
+
+q32_t motion_angle_target(const motion_t *self)
+{
+    return self->angle_target_deg_q32;
+}
+
+hv_status_t motion_set_intensity(motion_t *self, unsigned percent)
+{
+    return intensity_set(&self->intensity, percent);
+}
+
+const intensity_t *motion_intensity(const motion_t *self)
+{
+    return &self->intensity;
 }
 
 uint64_t motion_timed_end_us(const motion_t *self)

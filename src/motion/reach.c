@@ -37,23 +37,33 @@ static pose_t between(const pose_t *from, const pose_t *to, q62_t share_q62)
     return result;
 }
 
-unsigned reach_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX])
+/* The share that can be kept, below 1. */
+static q62_t find_share(const motion_t *motion, const pose_t *asked, bracket_t share, q32_t extension_mm_q32[CYLINDERS_MAX])
 {
-    unsigned cylinder = 0;
-    bracket_t share = {.low = 0, .high = Q62_ONE};
-    share.at_high = tightest_room(motion, pose, extension_mm_q32, &cylinder);
-    if (share.at_high >= 0) {
-        return 0;
-    }
-    const pose_t asked = *pose;
     unsigned ignored = 0;
     share.at_low = tightest_room(motion, &motion->neutral, extension_mm_q32, &ignored);
     for (int step = 0; step < SEARCH_STEPS && share.high - share.low > 1; step++) {
         const q62_t at_q62 = bracket_chord(&share);
-        const pose_t tried = between(&motion->neutral, &asked, at_q62);
-        bracket_narrow(&share, at_q62, tightest_room(motion, &tried, extension_mm_q32, &cylinder));
+        const pose_t tried = between(&motion->neutral, asked, at_q62);
+        bracket_narrow(&share, at_q62, tightest_room(motion, &tried, extension_mm_q32, &ignored));
     }
-    *pose = between(&motion->neutral, &asked, share.low);
+    return share.low;
+}
+
+unsigned reach_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX], q62_t *share_q62)
+{
+    unsigned cylinder = 0;
+    bracket_t share = {.low = 0, .high = Q62_ONE};
+    share.at_high = tightest_room(motion, pose, extension_mm_q32, &cylinder);
+    const bool is_kept = share.at_high >= 0;
+    const q62_t kept_q62 = is_kept ? Q62_ONE : find_share(motion, pose, share, extension_mm_q32);
+    if (share_q62 != NULL) {
+        *share_q62 = kept_q62;
+    }
+    if (is_kept) {
+        return 0;
+    }
+    *pose = between(&motion->neutral, pose, kept_q62);
     (void)tightest_room(motion, pose, extension_mm_q32, &cylinder);
     return cylinder;
 }

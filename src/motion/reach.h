@@ -9,7 +9,8 @@
 /** Pulls a pose in along the straight way from the neutral pose until every extension is within the stroke and its margins.
  *  The result is continuous in the pose wherever that way crosses the edge once.
  *  @param extension_mm_q32 out: the extensions of the resulting pose
+ *  @param share_q62 out, may be NULL: how much of that way is left, Q62_ONE where the pose could be kept
  *  @return 0 where the pose could be kept; else 1-based, the cylinder that bounds it */
-unsigned reach_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX]);
+unsigned reach_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX], q62_t *share_q62);
 
 #endif

@@ -36,6 +36,9 @@ static settings_t common(void)
                     .cylinder_speed_mm_s_q16 = Q(400),
                     .cylinder_accel_mm_s2_q16 = Q(3000),
                     .cylinder_jerk_mm_s3 = 50000,
+                    .intensity_start_percent = 100,
+                    .intensity_max_percent = 100,
+                    .intensity_ramp_ms = 2000,
                     .engage_speed_mm_s_q16 = Q(50),
                     .engage_accel_mm_s2_q16 = Q(200),
                     .relay_count = 12};

@@ -138,6 +138,7 @@ def watches_on_a_terminal(bench):
 def session(bench, daemon):
     """Frames, operators, rejects, a stopped process."""
     with bench.sender() as sender:
+        assert bench.ctl("intensity", 80).returncode == 0
         sender.stream(1.2, wave)
         bench.ctl("engage")
         bench.wait_state("ENGAGED")
@@ -156,6 +157,8 @@ def session(bench, daemon):
         sender.stream(0.5, wave)
         sender.send("@A6T:0,5,0,0,0,0,400#")
         time.sleep(0.6)
+        assert bench.ctl("intensity", 20).stdout == "intensity: 20 %\n"
+        assert bench.ctl("intensity", 101).returncode == 1
         bench.ctl("resume")
         bench.ctl("park")
         sender.stream(0.5, wave)
@@ -180,7 +183,7 @@ def replays_to_the_same_bytes(bench, **changes):
     states = {row["state"] for row in heave.rows_of(live)}
     assert {"SETTLED", "RISING", "ENGAGED", "HOLD", "SETTLING", "OFF"} <= states, states
     assert any("late" in row["flags"] for row in heave.rows_of(live)) and " !late " in text
-    assert text.startswith("; heaved ") and "!shutdown" in text and "\\x21engage" in text, text[:200]
+    assert text.startswith("; heaved ") and "!shutdown" in text and "!intensity 20" in text and "\\x21engage" in text, text[:200]
     assert bench.play(record, config=config) == played
 
 

@@ -136,6 +136,18 @@ static void test_frames_parse_line_requests(void)
     }
 }
 
+static void test_frames_parse_line_intensity(void)
+{
+    TEST_ASSERT_TRUE(parse("1 !intensity 50"));
+    TEST_ASSERT_EQUAL_INT(FRAMES_INTENSITY, m_line.kind);
+    TEST_ASSERT_EQUAL_UINT32(50, m_line.number);
+    TEST_ASSERT_FALSE(parse("1 !intensity"));
+    TEST_ASSERT_FALSE(parse("1 !intensity -1"));
+    TEST_ASSERT_FALSE(parse("1 !intensity 50 %"));
+    TEST_ASSERT_FALSE(parse("1 !intensity 1000"));
+    TEST_ASSERT_NOT_NULL(strstr(m_why, "!intensity N"));
+}
+
 static void test_frames_parse_line_estop_and_late(void)
 {
     TEST_ASSERT_TRUE(parse("1 !estop on"));
@@ -258,7 +270,7 @@ static record_writer_t started_writer(void)
     record_writer_t writer;
     char line[RECORD_LINE_MAX];
     const record_t zero = {.head = {.t_us = 5000, .value = STATE_SETTLED, .kind = RECORD_ZERO}};
-    record_writer_init(&writer, 1000, false);
+    record_writer_init(&writer, &(settings_t){.cycle_us = 1000}, false);
     TEST_ASSERT_GREATER_THAN_UINT(0, record_writer_line(&writer, &zero, 0, line));
     return writer;
 }
@@ -361,7 +373,7 @@ static void test_record_writer_before_zero_writes_comments(void)
     record_writer_t writer;
     char line[RECORD_LINE_MAX];
     record_t record = {.head = {.t_us = 1500, .kind = RECORD_DATAGRAM}, .bytes = "@A6:1#"};
-    record_writer_init(&writer, 1000, false);
+    record_writer_init(&writer, &(settings_t){.cycle_us = 1000}, false);
     const size_t length = record_writer_line(&writer, &record, 6, line);
     TEST_ASSERT_EQUAL_UINT(strlen("; 1.500 @A6:1#\n"), length);
     TEST_ASSERT_EQUAL_MEMORY("; 1.500 @A6:1#\n", line, length);
@@ -372,10 +384,34 @@ static void expect_zero(engage_policy_t engage, state_t goal, const char *expect
     record_writer_t writer;
     char line[RECORD_LINE_MAX];
     const record_t zero = {.head = {.t_us = 5000, .value = (uint32_t)goal, .kind = RECORD_ZERO}};
-    record_writer_init(&writer, 500, engage == ENGAGE_AUTO);
+    record_writer_init(&writer, &(settings_t){.cycle_us = 500}, engage == ENGAGE_AUTO);
     const size_t length = record_writer_line(&writer, &zero, 0, line);
     line[length] = '\0';
     TEST_ASSERT_EQUAL_STRING(expected, line);
+}
+
+static void test_record_writer_zero_brings_an_offline_run_to_the_same_intensity(void)
+{
+    const settings_t settings = {.cycle_us = 500, .intensity_start_percent = 70};
+    record_writer_t writer;
+    char line[RECORD_LINE_MAX];
+    record_t zero = {.head = {.t_us = 5000, .value = record_zero(STATE_ENGAGED, 40), .kind = RECORD_ZERO}};
+    record_writer_init(&writer, &settings, false);
+    line[record_writer_line(&writer, &zero, 0, line)] = '\0';
+    TEST_ASSERT_EQUAL_STRING("; time zero: SETTLED\n0.500 !intensity 40\n0.500 !engage\n", line);
+    zero.head.value = record_zero(STATE_SETTLED, 70);
+    line[record_writer_line(&writer, &zero, 0, line)] = '\0';
+    TEST_ASSERT_EQUAL_STRING("; time zero: SETTLED\n", line);
+}
+
+static void test_record_writer_intensity_reads_back(void)
+{
+    record_writer_t writer = started_writer();
+    char line[RECORD_LINE_MAX];
+    const record_t record = {.head = {.t_us = 6000, .value = 45, .kind = RECORD_INTENSITY}};
+    read_back(line, record_writer_line(&writer, &record, 0, line));
+    TEST_ASSERT_EQUAL_INT(FRAMES_INTENSITY, m_line.kind);
+    TEST_ASSERT_EQUAL_UINT32(45, m_line.number);
 }
 
 static void test_record_writer_zero_brings_an_offline_run_to_the_same_goal(void)
@@ -396,6 +432,7 @@ int main(void)
     RUN_TEST(test_frames_parse_line_raw_bytes_stay);
     RUN_TEST(test_frames_parse_line_empty_and_comment_are_nothing);
     RUN_TEST(test_frames_parse_line_requests);
+    RUN_TEST(test_frames_parse_line_intensity);
     RUN_TEST(test_frames_parse_line_estop_and_late);
     RUN_TEST(test_frames_parse_line_bad_time_is_refused);
     RUN_TEST(test_frames_parse_line_bad_text_is_refused);
@@ -411,5 +448,7 @@ int main(void)
     RUN_TEST(test_record_writer_another_sender_reads_back);
     RUN_TEST(test_record_writer_before_zero_writes_comments);
     RUN_TEST(test_record_writer_zero_brings_an_offline_run_to_the_same_goal);
+    RUN_TEST(test_record_writer_zero_brings_an_offline_run_to_the_same_intensity);
+    RUN_TEST(test_record_writer_intensity_reads_back);
     return UNITY_END();
 }

@@ -54,6 +54,25 @@ static void test_operator_explain_says_why_and_what_else(void)
     TEST_ASSERT_NOT_NULL(strstr(m_text, "shutdown is under way"));
 }
 
+static void test_operator_read_percent_takes_whole_numbers_only(void)
+{
+    static const char *const k_wrong[] = {"", " 5", "5 ", "+5", "-5", "5.5", "5%", "1000", "0x5", "five"};
+    uint32_t percent = 0;
+    TEST_ASSERT_TRUE(operator_read_percent("0", &percent));
+    TEST_ASSERT_EQUAL_UINT32(0, percent);
+    TEST_ASSERT_TRUE(operator_read_percent("999", &percent));
+    TEST_ASSERT_EQUAL_UINT32(999, percent);
+    for (size_t i = 0; i < sizeof k_wrong / sizeof k_wrong[0]; i++) {
+        TEST_ASSERT_FALSE_MESSAGE(operator_read_percent(k_wrong[i], &percent), k_wrong[i]);
+    }
+}
+
+static void test_operator_explain_percent_says_the_cap(void)
+{
+    (void)operator_explain_percent(90, 60, m_text, sizeof m_text);
+    TEST_ASSERT_EQUAL_STRING("intensity 90: too much for this platform; possible: 0 to 60 % ([intensity] max_percent)", m_text);
+}
+
 /* What a refusal offers has to be something the states take. */
 static void test_operator_explain_offers_only_what_the_states_take(void)
 {
@@ -125,6 +144,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_operator_request_find_knows_every_request_and_no_other_event);
     RUN_TEST(test_operator_explain_says_why_and_what_else);
+    RUN_TEST(test_operator_read_percent_takes_whole_numbers_only);
+    RUN_TEST(test_operator_explain_percent_says_the_cap);
     RUN_TEST(test_operator_explain_offers_only_what_the_states_take);
     RUN_TEST(test_udp_tap_is_allowed_without_a_list_everyone_is);
     RUN_TEST(test_udp_tap_is_allowed_compares_the_first_bits);

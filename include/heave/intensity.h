@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT
+ * intensity.h - how much of a sender's motion the platform makes: 0 to 100 % about neutral, changed by a jerk-limited ramp.
+ * Scales references, never set-points: limits, workspace and take-over stand behind it. Owns no clock and no I/O.
+ */
+#ifndef HEAVE_INTENSITY_H
+#define HEAVE_INTENSITY_H
+
+#include "heave/ramp.h"
+
+#define INTENSITY_RAMP_MIN_MS 500u
+#define INTENSITY_RAMP_MAX_MS 10000u
+
+/** The share that 100 % is. */
+#define INTENSITY_SHIFT 46u
+#define INTENSITY_FULL  ((int64_t)1 << INTENSITY_SHIFT)
+
+/** Intensity; members are private to src/motion. */
+typedef struct {
+    unsigned percent; /**< asked for */
+    unsigned max_percent;
+    ramp_t ramp;          /**< of the share */
+    int64_t share_q46[4]; /**< in force in this cycle and the three before */
+} intensity_t;
+
+/** Starts at rest on a percentage.
+ *  @param percent [0, max_percent]   @param max_percent [1, 100]   @param ramp_ms [500, 10000]: from 0 to 100 %; a change by c %
+ *  takes the cube root of c/100 of that   @param cycle_us [RAMP_CYCLE_MIN_US, RAMP_CYCLE_MAX_US]
+ *  @return HV_OK; HV_ERR_RANGE */
+hv_status_t intensity_init(intensity_t *self, unsigned percent, unsigned max_percent, uint32_t ramp_ms,
+                           uint32_t cycle_us) HV_MUST_CHECK;
+
+/** Asks for another percentage; intensity_step leads there, at any moment, with continuous acceleration.
+ *  @return HV_OK; HV_ERR_RANGE above max_percent: nothing changes */
+hv_status_t intensity_set(intensity_t *self, unsigned percent) HV_MUST_CHECK;
+
+/** What was asked for is in force from now on: for when nothing moves by it. */
+void intensity_place(intensity_t *self);
+
+/** Goes on by one cycle. */
+void intensity_step(intensity_t *self);
+
+/** What is in force, in percent. */
+q32_t intensity_percent_q32(const intensity_t *self);
+
+/** Where a sender's value is with the share in force: exactly neutral at 0 %, exactly the value at 100 %. */
+q32_t intensity_scaled(const intensity_t *self, q32_t neutral_q32, q32_t value_q32);
+
+/** The value that intensity_scaled turns into this one; neutral at 0 %. */
+q32_t intensity_unscaled(const intensity_t *self, q32_t neutral_q32, q32_t scaled_q32);
+
+/** A reference that a sender's values gave, scaled; its differences contain those of the share. */
+ramp_ref_t intensity_scale(const intensity_t *self, q32_t neutral_q32, const ramp_ref_t *ref);
+
+/** What has to be added to a reference that was planned with another share, to where way is the sender's value less neutral. */
+ramp_ref_t intensity_shift(const intensity_t *self, int64_t planned_q46, q32_t way_q32);
+
+#endif

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT
+ * past.h - a reference as the last four positions, and back: what is to be scaled or blended is its positions, and the
+ * differences follow. Private to src/motion.
+ */
+#ifndef PAST_H
+#define PAST_H
+
+#include "heave/ramp.h"
+
+/** Positions that a reference consists of. */
+#define PAST 4u
+
+/** The positions of a reference, the newest first. */
+static inline void past_of(const ramp_ref_t *ref, q32_t at_q32[PAST])
+{
+    const q32_t vel_q32 = ref->vel_per_cycle_q32;
+    const q32_t acc_q32 = ref->acc_per_cycle2_q32;
+    at_q32[0] = ref->pos_q32;
+    at_q32[1] = ref->pos_q32 - vel_q32;
+    at_q32[2] = ref->pos_q32 - 2 * vel_q32 + acc_q32;
+    at_q32[3] = ref->pos_q32 - 3 * vel_q32 + 3 * acc_q32 - ref->jerk_per_cycle3_q32;
+}
+
+/** The reference of such positions. */
+static inline ramp_ref_t past_ref(const q32_t at_q32[PAST])
+{
+    const q32_t v0 = at_q32[0] - at_q32[1];
+    const q32_t v1 = at_q32[1] - at_q32[2];
+    const q32_t v2 = at_q32[2] - at_q32[3];
+    return (ramp_ref_t){at_q32[0], v0, v0 - v1, v0 - 2 * v1 + v2};
+}
+
+#endif

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: MIT
+ * slots.h - a sender's targets as one value per slot (pose axes or cylinders, then the rotation motor), and what intensity makes
+ * of them. Slots are as the sender wants them; scaled, they are what the platform makes of them. Private to src/motion.
+ */
+#ifndef SLOTS_H
+#define SLOTS_H
+
+#include "heave/motion.h"
+
+/** True if some pose has the target's extensions (with the intensity in force, pulled into the strokes): the assembly exists. */
+bool slots_can_assemble(const motion_t *self, const motion_target_t *target);
+
+/** The slots of a target; what they are scaled to is inside the limits, the whole pose in the workspace. Notes what was pulled
+ * in.
+ *  @param extension_mm_q32 out: of the scaled slots */
+void slots_take(motion_t *self, const motion_target_t *target, q32_t slot_q32[AXES_MAX], q32_t extension_mm_q32[CYLINDERS_MAX]);
+
+/** Slots with the intensity in force. */
+void slots_scale(const motion_t *self, motion_space_t space, const q32_t slot_q32[AXES_MAX], q32_t scaled_q32[AXES_MAX]);
+
+/** From here on planned moves end where these slots are with the intensity in force now ... */
+void slots_plan(motion_t *self, const q32_t slot_q32[AXES_MAX]);
+
+/** ... and this adds what the intensity has changed since to the references of such a move. */
+void slots_shift_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX]);
+
+/** The references of a stream with the intensity in force. */
+void slots_scale_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX]);
+
+#endif
