@@ -13,23 +13,10 @@
 #include <time.h>
 #include <unistd.h>
 
-#define OWN_ECHO      ((int)MSG_CONFIRM) /* how the kernel marks the echo of a frame of ours */
-#define FRAME_MEMORY  768                /* what a waiting frame counts against SO_SNDBUF on 64-bit kernels */
-#define CLOCK_STEP_US 1000000u           /* a frame that seems to have waited longer came around a change of the wall clock */
+#include "linux_can_frame.h"
 
-/** Room for the kernel's time stamp and its count of lost frames, aligned as the kernel's macros want it. */
-typedef union {
-    struct cmsghdr header;
-    uint8_t bytes[CMSG_SPACE(sizeof(struct timespec)) + CMSG_SPACE(sizeof(uint32_t))];
-} control_t;
-
-/** A frame as the kernel gives it. */
-typedef struct {
-    struct can_frame frame;
-    struct timespec stamp; /**< wall clock */
-    uint32_t lost;
-    bool is_own;
-} received_t;
+#define FRAME_MEMORY  768      /* what a waiting frame counts against SO_SNDBUF on 64-bit kernels */
+#define CLOCK_STEP_US 1000000u /* a frame that seems to have waited longer came around a change of the wall clock */
 
 /* --- What is wrong --- */
 
@@ -108,20 +95,6 @@ static bool is_sendable(const linux_can_t *self, const can_frame_t *frame)
            matches(self->own, self->owns, frame->id, frame->is_extended);
 }
 
-static struct can_frame to_kernel(const can_frame_t *frame)
-{
-    struct can_frame out = {.can_id = frame->id, .can_dlc = frame->length};
-    if (frame->is_extended) {
-        out.can_id |= CAN_EFF_FLAG;
-    }
-    if (frame->is_rtr) {
-        out.can_id |= CAN_RTR_FLAG;
-    } else {
-        memcpy(out.data, frame->data, frame->length);
-    }
-    return out;
-}
-
 static hv_status_t can_send_op(void *ctx, const can_frame_t *frame)
 {
     linux_can_t *self = ctx;
@@ -134,7 +107,7 @@ static hv_status_t can_send_op(void *ctx, const can_frame_t *frame)
     if (self->unconfirmed >= self->queue_frames) {
         return HV_ERR_AGAIN;
     }
-    const struct can_frame out = to_kernel(frame);
+    const struct can_frame out = linux_can_frame_to_kernel(frame);
     if (send(self->fd, &out, sizeof out, MSG_DONTWAIT) == (ssize_t)sizeof out) {
         self->unconfirmed++;
         return HV_OK;
@@ -151,40 +124,13 @@ static hv_status_t can_send_op(void *ctx, const can_frame_t *frame)
 
 /* --- Receiving --- */
 
-static void keep_ancillary(received_t *self, struct msghdr *message)
-{
-    for (struct cmsghdr *item = CMSG_FIRSTHDR(message); item != NULL; item = CMSG_NXTHDR(message, item)) {
-        if (item->cmsg_level == SOL_SOCKET && item->cmsg_type == SO_RXQ_OVFL) {
-            memcpy(&self->lost, CMSG_DATA(item), sizeof self->lost);
-        } else if (item->cmsg_level == SOL_SOCKET && item->cmsg_type == SCM_TIMESTAMPNS) {
-            memcpy(&self->stamp, CMSG_DATA(item), sizeof self->stamp);
-        }
-    }
-}
-
-/* False where there is none: errno says why. */
-static bool receive(int fd, received_t *out)
-{
-    control_t control;
-    struct iovec part = {&out->frame, sizeof out->frame};
-    struct msghdr message = {.msg_iov = &part, .msg_iovlen = 1, .msg_control = &control, .msg_controllen = sizeof control};
-    memset(out, 0, sizeof *out);
-    const ssize_t length = recvmsg(fd, &message, MSG_DONTWAIT);
-    if (length < 0) {
-        return false;
-    }
-    out->is_own = (message.msg_flags & OWN_ECHO) != 0;
-    keep_ancillary(out, &message);
-    return true;
-}
-
 static uint64_t us_of(const struct timespec *time)
 {
     return (uint64_t)time->tv_sec * 1000000u + (uint64_t)time->tv_nsec / 1000u;
 }
 
 /* The kernel stamps by the wall clock, we count by the other one: what both have in common is how long ago it was. */
-static uint64_t when_received_us(linux_can_t *self, const received_t *received)
+static uint64_t when_received_us(linux_can_t *self, const linux_can_received_t *received)
 {
     struct timespec wall, now;
     (void)clock_gettime(CLOCK_REALTIME, &wall);
@@ -195,62 +141,18 @@ static uint64_t when_received_us(linux_can_t *self, const received_t *received)
     return self->last_rx_us;
 }
 
-static can_frame_t from_kernel(const struct can_frame *frame)
-{
-    can_frame_t out = {.is_extended = (frame->can_id & CAN_EFF_FLAG) != 0, .is_rtr = (frame->can_id & CAN_RTR_FLAG) != 0};
-    out.id = frame->can_id & (out.is_extended ? CAN_EFF_MASK : CAN_SFF_MASK);
-    out.length = frame->can_dlc <= CAN_MAX_DLEN ? frame->can_dlc : CAN_MAX_DLEN;
-    if (!out.is_rtr) {
-        memcpy(out.data, frame->data, out.length);
-    }
-    return out;
-}
-
-/* Byte 1 of a report: what the controller says of itself. */
-static uint32_t controller_report(linux_can_t *self, uint8_t what)
-{
-    static const struct {
-        uint8_t bits;
-        uint8_t state;
-        uint32_t report;
-    } k_rows[] = {{CAN_ERR_CRTL_RX_OVERFLOW, UINT8_MAX, CAN_ERROR_OVERRUN},
-                  {CAN_ERR_CRTL_ACTIVE, HAL_CAN_ACTIVE, CAN_ERROR_OTHER},
-                  {CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING, HAL_CAN_WARNING, CAN_ERROR_WARNING},
-                  {CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE, HAL_CAN_PASSIVE, CAN_ERROR_PASSIVE}};
-    uint32_t report = 0;
-    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
-        if ((what & k_rows[i].bits) == 0) {
-            continue;
-        }
-        report |= k_rows[i].report;
-        if (k_rows[i].state != UINT8_MAX && self->state != HAL_CAN_BUS_OFF) {
-            self->state = (hal_can_state_t)k_rows[i].state;
-        }
-    }
-    return report;
-}
-
 static can_frame_t take_report(linux_can_t *self, const struct can_frame *frame)
 {
-    can_frame_t out = {.is_error = true};
+    const can_frame_t out = {.id = linux_can_frame_report(frame, &self->state), .is_error = true};
     self->reports++;
-    if ((frame->can_id & CAN_ERR_CRTL) != 0) {
-        out.id |= controller_report(self, frame->data[1]);
-    }
-    if ((frame->can_id & CAN_ERR_ACK) != 0) {
-        out.id |= CAN_ERROR_NO_ACK;
-    }
-    if ((frame->can_id & CAN_ERR_BUSOFF) != 0) {
-        out.id |= CAN_ERROR_BUS_OFF;
-        (void)say_bus_off(self);
-    }
-    if ((frame->can_id & CAN_ERR_RESTARTED) != 0) {
-        out.id |= CAN_ERROR_RESTARTED;
-        cut_off(self, HAL_CAN_ACTIVE);
-    }
     self->tx_errors = frame->data[6];
     self->rx_errors = frame->data[7];
-    out.id |= out.id == 0 ? CAN_ERROR_OTHER : 0;
+    if ((out.id & CAN_ERROR_BUS_OFF) != 0) {
+        (void)say_bus_off(self);
+    }
+    if ((out.id & CAN_ERROR_RESTARTED) != 0) {
+        cut_off(self, HAL_CAN_ACTIVE);
+    }
     return out;
 }
 
@@ -262,7 +164,7 @@ static void note_lost(linux_can_t *self, uint32_t lost)
 }
 
 /* False where the frame is not for the caller. */
-static bool take_in(linux_can_t *self, const received_t *received, can_frame_t *out)
+static bool take_in(linux_can_t *self, const linux_can_received_t *received, can_frame_t *out)
 {
     if ((received->frame.can_id & CAN_ERR_FLAG) != 0) {
         *out = take_report(self, &received->frame);
@@ -272,7 +174,7 @@ static bool take_in(linux_can_t *self, const received_t *received, can_frame_t *
         self->unconfirmed -= self->unconfirmed > 0 ? 1 : 0;
         return false;
     }
-    const can_frame_t frame = from_kernel(&received->frame);
+    const can_frame_t frame = linux_can_frame_from_kernel(&received->frame);
     if (self->is_cut || !matches(self->filter, self->filters, frame.id, frame.is_extended)) {
         return false;
     }
@@ -286,13 +188,13 @@ static bool is_off(const linux_can_t *self)
 }
 
 /* Up to the next frame for the caller, or to a gap. */
-static hv_status_t receive_next(linux_can_t *self, received_t *received, can_frame_t *out, bool *is_taken)
+static hv_status_t receive_next(linux_can_t *self, linux_can_received_t *received, can_frame_t *out, bool *is_taken)
 {
     do {
         if (is_off(self)) {
             return HV_ERR_IO;
         }
-        if (!receive(self->fd, received)) {
+        if (!linux_can_frame_receive(self->fd, received)) {
             return errno == EAGAIN || errno == EWOULDBLOCK ? HV_ERR_AGAIN : note_failure(self, errno, "receiving");
         }
         note_lost(self, received->lost);
@@ -304,7 +206,7 @@ static hv_status_t receive_next(linux_can_t *self, received_t *received, can_fra
 static hv_status_t can_recv_op(void *ctx, can_frame_t *out, uint64_t *rx_time_us)
 {
     linux_can_t *self = ctx;
-    received_t received;
+    linux_can_received_t received;
     can_frame_t frame = {.id = 0};
     if (self->has_kept) {
         self->has_kept = false;
@@ -338,6 +240,9 @@ static hv_status_t can_bus_state_op(void *ctx, hal_can_state_t *out)
 static hv_status_t can_unconfirmed_op(void *ctx, uint32_t *frames)
 {
     const linux_can_t *self = ctx;
+    if (!self->has_echo) {
+        return HV_ERR_NOSUP;
+    }
     *frames = self->unconfirmed;
     return HV_OK;
 }
@@ -461,6 +366,7 @@ static hv_status_t start(linux_can_t *self)
     }
     if (status == HV_OK) {
         self->state = link.state == HAL_CAN_WARNING || link.state == HAL_CAN_PASSIVE ? link.state : HAL_CAN_ACTIVE;
+        self->has_echo = link.has_echo;
         self->is_cut = false;
         self->trouble = LINUX_CAN_FINE;
         self->error_text[0] = '\0';
@@ -506,7 +412,7 @@ static bool may_pass(linux_can_trouble_t trouble)
 
 hv_status_t linux_can_open(linux_can_t *self, const linux_can_config_t *config)
 {
-    *self = (linux_can_t){.fd = -1, .state = HAL_CAN_DOWN, .is_cut = true};
+    *self = (linux_can_t){.fd = -1, .state = HAL_CAN_DOWN, .is_cut = true, .has_echo = true};
     hv_status_t status = keep_config(self, config);
     if (status != HV_OK) {
         return status;

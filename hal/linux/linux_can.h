@@ -65,7 +65,8 @@ typedef struct {
     uint32_t unconfirmed;
     uint64_t last_rx_us;
     hal_can_state_t state;
-    bool is_cut; /**< nothing passes until restart */
+    bool is_cut;   /**< nothing passes until restart */
+    bool has_echo; /**< the driver confirms what is on the wire */
     bool is_overrun;
     bool has_kept; /**< kept waits behind the report of a gap */
     can_frame_t kept;

@@ -1062,6 +1062,9 @@ static uint64_t time_of_a_frame(void)
 static void step_wall_clock(long seconds)
 {
     struct timespec now;
+    if (getenv("HEAVE_OWN_KERNEL") == NULL) {
+        TEST_IGNORE_MESSAGE("this machine's clock is not ours to set");
+    }
     TEST_ASSERT_EQUAL(0, clock_gettime(CLOCK_REALTIME, &now));
     now.tv_sec += seconds;
     TEST_ASSERT_EQUAL(0, clock_settime(CLOCK_REALTIME, &now));

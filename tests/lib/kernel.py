@@ -8,7 +8,7 @@
 Used where the tests need CAN, GPIO or exact times:
 - this machine's kernel, in a network name space of its own, where it has vcan and lets us;
 - else a User Mode Linux kernel (tools/lib/uml.sh keeps it in the cache), which boots in half a second, with this machine's files as its own.
-  The command is root in there, outside it has no other rights than the caller.
+  The command is root in there, outside it has no other rights than the caller; HEAVE_OWN_KERNEL=1 tells it that it may even set the clock.
 --virtual-time: always User Mode Linux. Computing takes no time there and sleeps are exact, whatever the machine is doing: every time that a
 test measures can be asserted to the microsecond, and every run is the same.
 --python: the command is a script for the Python of tools/lib/venv.sh, which has python-can and canopen.
@@ -86,7 +86,7 @@ def read(path):
 def run_uml(kernel, command, limit_s, environment, virtual_time):
     with tempfile.TemporaryDirectory(prefix="heave-uml-") as folder:
         job = Path(folder)
-        (job / "run.sh").write_text(script_of(command, environment), encoding="utf-8")
+        (job / "run.sh").write_text(script_of(command, {**environment, "HEAVE_OWN_KERNEL": "1"}), encoding="utf-8")
         boot = [kernel, f"mem={MEMORY}", "rootfstype=hostfs", "rootflags=/", "rw", f"init={HERE / 'uml_init.sh'}", f"job={job}", f"uml_dir={job}/",
                 "vcan.echo=1", "quiet", "con=null", "con0=null,fd:1", *(["time-travel=inf-cpu"] if virtual_time else [])]
         ended, console = bounded(boot, limit_s, env={**os.environ, "TMPDIR": folder})
