@@ -4,6 +4,7 @@
 #include "linux_can.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <linux/can.h>
 #include <linux/can/error.h>
 #include <linux/can/raw.h>
@@ -314,6 +315,17 @@ static hv_status_t open_socket(linux_can_t *self, int index)
     return HV_OK;
 }
 
+/* For somebody who may. */
+static void ask_for_flush(const linux_can_t *self)
+{
+    if (self->request[0] != '\0') {
+        const int fd = open(self->request, O_WRONLY | O_CREAT | O_CLOEXEC, 0660);
+        if (fd >= 0) {
+            (void)close(fd);
+        }
+    }
+}
+
 /* Fresh or not at all: what waits in the interface is dropped, be it ours or of a program before us. */
 static hv_status_t clear(linux_can_t *self, linux_can_link_t *link, bool is_suspect)
 {
@@ -325,6 +337,7 @@ static hv_status_t clear(linux_can_t *self, linux_can_link_t *link, bool is_susp
         link->is_up = true;
         return HV_OK;
     }
+    ask_for_flush(self);
     if (!link->is_up) {
         return say_down(self);
     }
@@ -391,6 +404,9 @@ static hv_status_t keep_config(linux_can_t *self, const linux_can_config_t *conf
         return HV_ERR_ARG;
     }
     memcpy(self->name, config->interface, strlen(config->interface) + 1);
+    if (config->run_dir != NULL) {
+        (void)snprintf(self->request, sizeof self->request, "%s/flush-%s", config->run_dir, config->interface);
+    }
     for (uint32_t i = 0; i < config->filters; i++) {
         self->filter[i] = config->filter[i];
     }

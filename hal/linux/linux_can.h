@@ -19,6 +19,9 @@
  *  heartbeat and a service request to each drive. The kernel's smallest send buffer would hold seven. */
 #define LINUX_CAN_QUEUE_FRAMES 16u
 
+/** Longest path of the file that asks for a flush, with its end. */
+#define LINUX_CAN_PATH_SIZE 128u
+
 /** What to open. The lists are copied. */
 typedef struct {
     const char *interface;          /**< "can0" */
@@ -28,6 +31,8 @@ typedef struct {
                                       passes neither; owns 0: anything may be sent, and we sort out what we receive */
     uint32_t owns;
     uint32_t queue_frames; /**< most frames sent and not on the wire yet; 0 = LINUX_CAN_QUEUE_FRAMES */
+    const char *run_dir; /**< where a restart that may not flush the interface asks for it: by an empty file flush-INTERFACE, see
+                              packaging/heave-can; NULL = nowhere */
 } linux_can_config_t;
 
 /** What is wrong, as far as it can be told apart. */
@@ -57,6 +62,7 @@ typedef struct {
     int fd; /**< private from here on */
     struct mnl_socket *netlink;
     char name[LINUX_CAN_NAME_SIZE];
+    char request[LINUX_CAN_PATH_SIZE];
     hal_can_filter_t filter[LINUX_CAN_FILTERS_MAX];
     hal_can_filter_t own[LINUX_CAN_FILTERS_MAX];
     uint32_t filters;

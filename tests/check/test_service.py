@@ -11,6 +11,7 @@ from pathlib import Path
 
 import tap
 
+PACKAGING = Path(__file__).resolve().parents[2] / "packaging"
 EXPOSURE_MAX = 20  # tenths of systemd's measure, 100 the worst
 
 
@@ -35,7 +36,8 @@ def main():
         folder = Path(name)
         with suite.case("programs, unit, user and ready-made platforms are installed"):
             files = installed(build, folder)
-            assert {"bin/heaved", "bin/heavectl", "lib/systemd/system/heaved@.service", "lib/sysusers.d/heave.conf"} <= files, files
+            assert {"bin/heaved", "bin/heavectl", "lib/systemd/system/heaved@.service", "lib/sysusers.d/heave.conf", "libexec/heave-can",
+                    "lib/systemd/system/heave-can@.service", "lib/systemd/system/heave-can-flush@.path"} <= files, files
             assert any(file.endswith("demo-hexapod.ini") for file in files), files
         unit = folder / "heaved@test.service"
         text = (build / "packaging/heaved@.service").read_text(encoding="utf-8")
@@ -43,6 +45,13 @@ def main():
         unit.write_text(re.sub(r"(?m)^ExecStart=\S+", "ExecStart=/bin/true", text), encoding="utf-8")
         with suite.case("systemd takes the unit without a word"):
             run = analyze("verify", unit)
+            assert run.returncode == 0 and run.stdout.strip() == "", run.stdout
+        with suite.case("systemd takes the units of the CAN interface without a word"):
+            can_units = []
+            for source in (build / "packaging/heave-can@.service", build / "packaging/heave-can-flush@.service", PACKAGING / "heave-can-flush@.path"):
+                can_units.append(folder / source.name.replace("@", "@can0"))
+                can_units[-1].write_text(re.sub(r"(?m)^ExecStart=\S+", "ExecStart=/bin/true", source.read_text(encoding="utf-8")), encoding="utf-8")
+            run = analyze("verify", *can_units)
             assert run.returncode == 0 and run.stdout.strip() == "", run.stdout
         with suite.case(f"the service is exposed by {EXPOSURE_MAX / 10} of 10 at most, and holds no capability"):
             run = analyze("security", "--offline=true", f"--threshold={EXPOSURE_MAX}", unit)

@@ -130,7 +130,8 @@ static int open_peer(void)
 
 static bool open_linux(hal_can_t *can, const hal_can_filter_t *filter, uint32_t filters)
 {
-    TEST_ASSERT_EQUAL(HV_OK, linux_can_open(&lin, &(linux_can_config_t){"vcan0", filter, filters, NULL, 0, 0}));
+    TEST_ASSERT_EQUAL(HV_OK,
+                      linux_can_open(&lin, &(linux_can_config_t){.interface = "vcan0", .filter = filter, .filters = filters}));
     TEST_ASSERT_EQUAL_STRING("", lin.error_text);
     peer = open_peer();
     *can = linux_can_hal(&lin);
@@ -857,7 +858,7 @@ static void test_linux_unplugged_and_another_one_plugged_in_keeps_its_filters(vo
 {
     static const hal_can_filter_t k_filter = {0x181, 0x7FF, false}, k_own = {0x201, 0x7FF, false};
     const can_frame_t unwanted = make(0x182, 8);
-    reopen_linux(&(linux_can_config_t){"vcan0", &k_filter, 1, &k_own, 1, 0}, HV_OK);
+    reopen_linux(&(linux_can_config_t){"vcan0", &k_filter, 1, &k_own, 1, 0, NULL}, HV_OK);
     set_plugged_linux(false);
     assert_dead();
     assert_says(LINUX_CAN_NO_INTERFACE, "plugged in");
@@ -877,7 +878,7 @@ static void test_linux_own_list_echoes_pass_others_do_not_and_the_rest_is_refuse
     const can_frame_t ours = make(0x207, 6), wide = make_extended(0x12345, 2), foreign = make(0x301, 1),
                       twin = make_extended(0x207, 6);
     uint32_t left = 9;
-    reopen_linux(&(linux_can_config_t){"vcan0", &k_filter, 1, k_own, 2, 0}, HV_OK);
+    reopen_linux(&(linux_can_config_t){"vcan0", &k_filter, 1, k_own, 2, 0, NULL}, HV_OK);
     send_ok(&ours);
     send_ok(&wide);
     TEST_ASSERT_EQUAL(HV_ERR_ARG, hal_can_send(hal, &foreign));
@@ -1024,6 +1025,24 @@ static void test_linux_stale_frames_that_may_not_be_dropped_keep_the_bus_closed(
     assert_no_stale_frame();
 }
 
+/* As the service does it: the daemon has no rights, a unit of systemd has. */
+static void test_linux_stale_frames_are_dropped_by_the_helper_on_request(void)
+{
+    shell("rm -rf /run/heave && mkdir -p -m 777 /run/heave");
+    leave_frames_waiting();
+    as_plain_user(true);
+    reopen_linux(&(linux_can_config_t){.interface = "vcan0", .run_dir = "/run/heave"}, HV_ERR_AGAIN);
+    TEST_ASSERT_EQUAL(0, access("/run/heave/flush-vcan0", F_OK));
+    as_plain_user(false);
+    shell(HEAVE_PACKAGING "/heave-can flush vcan0");
+    TEST_ASSERT_NOT_EQUAL(0, access("/run/heave/flush-vcan0", F_OK));
+    as_plain_user(true);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
+    TEST_ASSERT_NOT_EQUAL(0, access("/run/heave/flush-vcan0", F_OK));
+    as_plain_user(false);
+    assert_no_stale_frame();
+}
+
 static void test_linux_received_too_many_is_reported_before_the_next_kept_frame(void)
 {
     const int small = 0;
@@ -1127,6 +1146,7 @@ static void run_linux(void)
     RUN_TEST(test_linux_stale_frames_close_drops_them);
     RUN_TEST(test_linux_stale_frames_of_a_dead_program_open_drops_them);
     RUN_TEST(test_linux_stale_frames_that_may_not_be_dropped_keep_the_bus_closed);
+    RUN_TEST(test_linux_stale_frames_are_dropped_by_the_helper_on_request);
     RUN_TEST(test_linux_received_too_many_is_reported_before_the_next_kept_frame);
     RUN_TEST(test_linux_times_are_of_the_hal_clock_whatever_the_wall_clock_does);
     RUN_TEST(test_linux_link_tells_what_is_there);
