@@ -11,10 +11,11 @@
 
 /** Frames of one kind that the bus carries again and again. */
 typedef struct {
-    bool is_extended;     /**< 29-bit identifiers */
-    uint8_t bytes;        /**< of data, [0, CANLOAD_BYTES_MAX] */
-    uint32_t frames;      /**< per interval */
-    uint32_t interval_us; /**< above 0 */
+    bool is_extended; /**< 29-bit identifiers */
+    uint8_t bytes;    /**< of data, [0, CANLOAD_BYTES_MAX] */
+    uint32_t frames;  /**< per interval */
+    uint32_t periods; /**< the interval in bus periods, for what keeps time with them; 0: interval_us counts */
+    uint32_t interval_us;
 } canload_entry_t;
 
 /** Most bits that one data frame takes, with the three bits of intermission behind it (ISO 11898-1): start, identifier, control,
@@ -23,17 +24,16 @@ typedef struct {
 uint32_t canload_frame_bits(bool is_extended, uint8_t bytes);
 
 /** Load of all entries together, in millionths of what the bit rate carries, rounded up.
+ *  @param period_us   of the bus, above 0
  *  @param bitrate_bps above 0
  *  @return saturates at UINT32_MAX */
-uint32_t canload_ppm(const canload_entry_t *entry, size_t count, uint32_t bitrate_bps);
+uint32_t canload_ppm(const canload_entry_t *entry, size_t count, uint32_t period_us, uint32_t bitrate_bps);
 
-/** Shortest interval for which the entries whose interval is `interval_us` would keep the load within a limit, the others
- *  staying as they are. Rounded up to a multiple of step_us.
- *  @param interval_us marks the entries that may become slower or quicker
- *  @param limit_ppm   above 0
- *  @param step_us     above 0
- *  @return 0 where no interval does: the other entries alone take too much */
-uint32_t canload_fitting_interval_us(const canload_entry_t *entry, size_t count, uint32_t bitrate_bps, uint32_t interval_us,
-                                     uint32_t limit_ppm, uint32_t step_us);
+/** Shortest bus period, a multiple of step_us, that keeps the load within a limit.
+ *  @param limit_ppm above 0
+ *  @param step_us   above 0
+ *  @return 0 where none does: what does not follow the period takes too much */
+uint32_t canload_fitting_period_us(const canload_entry_t *entry, size_t count, uint32_t bitrate_bps, uint32_t limit_ppm,
+                                   uint32_t step_us);
 
 #endif

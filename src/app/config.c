@@ -72,6 +72,16 @@ bool config_source_has(const config_source_t *self, const char *section, const c
     return self->entry[key].is_valid;
 }
 
+bool config_source_has_all(const config_source_t *self, const char *section)
+{
+    for (size_t i = 0; i < config_key_count; i++) {
+        if (strcmp(config_keys[i].section, section) == 0 && !self->entry[i].is_valid) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* --- Lines --- */
 
 /* Reads one line without its end into text.

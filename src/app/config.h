@@ -8,10 +8,12 @@
 
 #include <stdio.h>
 
+#include "heave/canraw.h"
 #include "heave/settings.h"
 
 #define CONFIG_ADDRESS_MAX 64u  /**< bytes of an address as text, with its NUL */
 #define CONFIG_PATH_MAX    108u /**< bytes of a socket path, with its NUL (the size of sun_path) */
+#define CONFIG_NAME_MAX    16u  /**< bytes of the name of a network interface, with its NUL (IFNAMSIZ) */
 #define CONFIG_RELAYS_MAX  12u
 #define CONFIG_NONE        INT32_MIN /**< a number in whose place the file has a word ("none", "settled") */
 
@@ -23,7 +25,7 @@ typedef struct {
 } config_udp_t;
 
 /** What drives the cylinders. */
-typedef enum { CONFIG_DRIVES_SIM } config_drives_t;
+typedef enum { CONFIG_DRIVES_SIM, CONFIG_DRIVES_CAN_RAW } config_drives_t;
 
 /** Simulated drives. */
 typedef struct {
@@ -32,6 +34,61 @@ typedef struct {
     q16_t start_extension_mm_q16; /**< of all cylinders; CONFIG_NONE: the settled extension */
     bool is_homed;                /**< the position is known from the start */
 } config_sim_t;
+
+/** CAN identifiers: one for each drive, or the first drive's, the others following it; none where count is 0. */
+typedef struct {
+    uint8_t count;
+    uint32_t id[DRIVES_MAX];
+} config_ids_t;
+
+/** Exact ratios: one, or one for each cylinder; none where count is 0. */
+typedef struct {
+    uint8_t count;
+    int32_t num[CYLINDERS_MAX];
+    int32_t den[CYLINDERS_MAX];
+} config_ratios_t;
+
+/** Whole numbers: one, or one for each cylinder. */
+typedef struct {
+    uint8_t count;
+    int32_t value[CYLINDERS_MAX];
+} config_wholes_t;
+
+/** Width of CAN identifiers. */
+typedef enum { CONFIG_ID_11_BITS, CONFIG_ID_29_BITS } config_id_bits_t;
+
+/** When set-points are sent. */
+typedef enum { CONFIG_SEND_EVERY_PERIOD, CONFIG_SEND_ON_CHANGE } config_send_t;
+
+/** The CAN bus of the drives. */
+typedef struct {
+    char interface[CONFIG_NAME_MAX];
+    uint32_t bitrate_bps;
+} config_can_t;
+
+/** Drives with CAN frames of their own; what the frames are is in canraw.h. */
+typedef struct {
+    uint32_t period_us;
+    config_id_bits_t id_bits;
+    config_ids_t command_id;
+    config_ids_t reply_id;
+    config_ratios_t counts_per_mm;
+    config_wholes_t zero_counts;
+    config_ratios_t angle_counts_per_deg;
+    config_wholes_t angle_zero_counts;
+    config_send_t send;
+    uint32_t speed_counts;
+    config_ratios_t speed_counts_per_mm_s;
+    config_ratios_t angle_speed_counts_per_deg_s;
+    canraw_frame_t setpoint;
+    canraw_frame_t enable, disable, stop, reset, home;
+    canraw_frame_t position_query, position_reply, homing_query, homing_reply;
+    canraw_when_t enabled_when, fault_when, homing_done_when, homing_failed_when;
+    uint32_t query_every;
+    uint32_t offline_periods;
+    q16_t following_error_mm_q16;
+    q16_t angle_following_error_deg_q16;
+} config_can_raw_t;
 
 /** Outputs. The number of lines is the number of relays. */
 typedef struct {
@@ -68,6 +125,8 @@ typedef struct {
     char control_socket[CONFIG_PATH_MAX];
     config_drives_t drives;
     config_sim_t sim;
+    config_can_t can;
+    config_can_raw_t can_raw;
     config_relays_t relays;
     config_inputs_t inputs;
 } config_t;

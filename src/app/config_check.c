@@ -4,6 +4,8 @@
  */
 #include <string.h>
 
+#include "config_bus.h"
+#include "config_canraw.h"
 #include "config_source.h"
 #include "config_value.h"
 #include "heave/ramp.h"
@@ -381,6 +383,8 @@ static void check_values(config_source_t *self)
     check_intensity(self);
     check_relays(self);
     check_inputs(self);
+    config_canraw_check(self);
+    config_bus_check(self);
 }
 
 void config_check(config_source_t *self)

@@ -19,7 +19,14 @@ typedef enum {
     CONFIG_ADDRESS,      /**< numeric IPv4 or IPv6 address, stored as text */
     CONFIG_NETWORKS,     /**< the word for an empty list, or addresses and networks, stored as hal_udp_networks_t */
     CONFIG_PATH,         /**< absolute path, stored as text */
-    CONFIG_LINES         /**< `none`, or line numbers, stored as config_lines_t */
+    CONFIG_LINES,        /**< `none`, or line numbers, stored as config_lines_t */
+    CONFIG_NAME,         /**< of a network interface, stored as text */
+    CONFIG_IDS,          /**< `none`, or CAN identifiers, stored as config_ids_t */
+    CONFIG_RATIOS,       /**< `none`, or up to `count` ratios such as 20000/10, stored as config_ratios_t */
+    CONFIG_WHOLES,       /**< up to `count` whole numbers, stored as config_wholes_t */
+    CONFIG_FRAME, /**< `none`, or bytes and fields of a CAN frame, stored as canraw_frame_t; `words`: the fields it may have,
+                       in replies (`count` 1) also bytes that may be anything */
+    CONFIG_WHEN   /**< `none`, or value/mask, stored as canraw_when_t */
 } config_type_t;
 
 /** What a platform must have for a section or key to mean anything. */
@@ -47,11 +54,11 @@ typedef struct {
     size_t size;
     config_type_t type;
     config_needs_t needs;
-    uint8_t count; /**< values of a CONFIG_DECIMAL */
+    uint8_t count; /**< values of a CONFIG_DECIMAL; see also the types */
     bool is_live;  /**< may change in operation (SIGHUP); gateway_reload() or motion_loop.c take it over */
 } config_key_t;
 
-#define CONFIG_KEYS_MAX     128u /**< bound of arrays with one element per key */
+#define CONFIG_KEYS_MAX     256u /**< bound of arrays with one element per key */
 #define CONFIG_SECTIONS_MAX 24u
 
 extern const config_section_t config_sections[];

@@ -5,6 +5,7 @@
  */
 #include <string.h>
 
+#include "config_bus.h"
 #include "config_keys.h"
 #include "config_mechanism.h"
 #include "config_text.h"
@@ -209,13 +210,26 @@ static void write_settled(const report_t *self)
     fprintf(self->out, "\n");
 }
 
+/* The worst case, which no real traffic reaches. */
+static void write_bus(const report_t *self)
+{
+    config_bus_t bus;
+    config_bus_describe(self->config, &bus);
+    if (bus.section == NULL) {
+        fprintf(self->out, "%-24s  0 %% (simulated drives)\n", "bus load");
+        return;
+    }
+    fprintf(self->out, "%-24s  %.1f %% at worst (%u us period, %u bit/s)\n", "bus load", config_bus_load_ppm(&bus) / 10000.0,
+            (unsigned)bus.period_us, (unsigned)bus.bitrate_bps);
+}
+
 static void write_head(const report_t *self, size_t ram_bytes)
 {
     fprintf(self->out, "%-24s  %s, %u cylinders%s\n", "platform", config_kind_name(self->settings->geometry.kind),
             self->cylinders, self->settings->has_angle ? ", rotation motor" : "");
     fprintf(self->out, "%-24s  %u us\n", "cycle", (unsigned)self->settings->cycle_us);
     fprintf(self->out, "%-24s  %zu bytes\n", "memory of the gateway", ram_bytes);
-    fprintf(self->out, "%-24s  0 %% (simulated drives)\n", "bus load");
+    write_bus(self);
     fprintf(self->out, "%-24s  %u\n", "relays", self->settings->relay_count);
     write_settled(self);
 }
@@ -326,6 +340,22 @@ static void warn_network(report_t *self)
     }
 }
 
+static void warn_bus(report_t *self)
+{
+    config_bus_t bus;
+    config_text_t text;
+    config_bus_describe(self->config, &bus);
+    if (bus.section == NULL || config_bus_load_ppm(&bus) <= CONFIG_BUS_WARNED_PPM) {
+        return;
+    }
+    config_text_clear(&text);
+    config_text_add(
+        &text, "[%s] period_us loads the bus by %.1f %% at worst: a repeated frame makes the next ones late; %u us give %u %%",
+        bus.section, config_bus_load_ppm(&bus) / 10000.0,
+        (unsigned)config_bus_fitting_us(&bus, CONFIG_BUS_WARNED_PPM, self->settings->cycle_us), CONFIG_BUS_WARNED_PPM / 10000u);
+    warn(self, text.data);
+}
+
 static void write_warnings(report_t *self)
 {
     for (unsigned axis = 0; axis < AXES_MAX; axis++) {
@@ -339,6 +369,7 @@ static void write_warnings(report_t *self)
     }
     warn_cylinders(self);
     warn_network(self);
+    warn_bus(self);
 }
 
 int config_check_report(const config_t *config, size_t ram_bytes, FILE *out)

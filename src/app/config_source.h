@@ -42,6 +42,9 @@ void config_source_key_error(config_source_t *self, const char *section, const c
 /** True where the key has a usable value: from the file, or its default. */
 bool config_source_has(const config_source_t *self, const char *section, const char *name);
 
+/** True where every key of a section has a usable value: what was refused is reported once, not for all that follows from it. */
+bool config_source_has_all(const config_source_t *self, const char *section);
+
 /** Checks what the values mean together; reports into self. Fills in what follows from them (relay count). */
 void config_check(config_source_t *self);
 

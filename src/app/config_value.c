@@ -4,6 +4,8 @@
  */
 #include "config_value.h"
 
+#include "config_value_can.h"
+
 #include <arpa/inet.h>
 #include <string.h>
 
@@ -427,6 +429,13 @@ bool config_value_parse(const config_key_t *key, const char *text, config_t *con
         return parse_path(key, whole, field, why);
     case CONFIG_LINES:
         return parse_lines(key, text, field, why);
+    case CONFIG_NAME:
+    case CONFIG_IDS:
+    case CONFIG_RATIOS:
+    case CONFIG_WHOLES:
+    case CONFIG_FRAME:
+    case CONFIG_WHEN:
+        return config_value_can_parse(key, text, field, why);
     }
     return false;
 }

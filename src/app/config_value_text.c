@@ -3,6 +3,8 @@
  */
 #include "config_value.h"
 
+#include "config_value_can.h"
+
 #include <arpa/inet.h>
 #include <inttypes.h>
 #include <string.h>
@@ -120,6 +122,14 @@ void config_value_format(const config_key_t *key, const config_t *config, config
     case CONFIG_LINES:
         format_lines(field, text);
         break;
+    case CONFIG_NAME:
+    case CONFIG_IDS:
+    case CONFIG_RATIOS:
+    case CONFIG_WHOLES:
+    case CONFIG_FRAME:
+    case CONFIG_WHEN:
+        config_value_can_format(key, field, text);
+        break;
     }
 }
 
@@ -198,6 +208,14 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         break;
     case CONFIG_LINES:
         config_text_add(text, "none, or up to %u different whole numbers from 0 to 65535", CONFIG_RELAYS_MAX);
+        break;
+    case CONFIG_NAME:
+    case CONFIG_IDS:
+    case CONFIG_RATIOS:
+    case CONFIG_WHOLES:
+    case CONFIG_FRAME:
+    case CONFIG_WHEN:
+        config_value_can_allowed(key, text);
         break;
     }
 }

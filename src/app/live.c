@@ -324,7 +324,15 @@ static int open_all(live_t *self, const config_t *config)
     if (!open_signals(self)) {
         return say(EXIT_UNAVAILABLE, "signals: %s", strerror(errno));
     }
-    if (motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->log), linux_clock_hal()) != HV_OK) {
+    const hv_status_t status =
+        motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->log), linux_clock_hal());
+    if (rig_trouble(&self->loop.rig)[0] != '\0') {
+        (void)say(0, "%s", rig_trouble(&self->loop.rig));
+    }
+    if (status == HV_ERR_IO) {
+        return EXIT_UNAVAILABLE;
+    }
+    if (status != HV_OK) {
         return say(EXIT_BAD_CONFIG, "this platform cannot be moved: its settled or neutral position is out of reach");
     }
     return EXIT_DONE;
@@ -344,6 +352,7 @@ int live_run(const config_t *config, const options_t *options)
     code = code == EXIT_DONE ? run(self, config) : code;
     control_close(&self->control);
     if (!self->is_thread_running) { /* a stuck one may still use all this: the end of the process gives it back */
+        rig_close(&self->loop.rig);
         linux_udp_close(&self->udp);
         free(self);
     }

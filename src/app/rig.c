@@ -3,6 +3,8 @@
  */
 #include "rig.h"
 
+#include "config_canraw.h"
+
 #define ANGLE_TRAVEL_DEG 1000000 /* a rotation motor has no stops of its own */
 
 static void describe_cylinder(sim_drive_config_t *self, const config_t *config, unsigned i)
@@ -60,10 +62,57 @@ static hv_status_t open_sim(rig_t *self, const config_t *config, uint8_t axes, u
     return sim_drives_init(&self->sim_drives, axes, self->sim_axis, NULL, 0);
 }
 
+/* The interface, for the map's identifiers and no others. One that is not usable yet is restarted by the driver. */
+static hv_status_t open_can(rig_t *self, const char *interface, const canraw_map_t *map)
+{
+    hal_can_filter_t filter[DRIVES_MAX];
+    hal_can_filter_t own[DRIVES_MAX];
+    const uint32_t count = canraw_filters(map, filter);
+    for (uint32_t k = 0; k < count; k++) {
+        own[k] = filter[k];
+        own[k].id = map->axis[k].command_id;
+    }
+    const linux_can_config_t can = {.interface = interface, .filter = filter, .filters = count, .own = own, .owns = count};
+    const hv_status_t status = linux_can_open(&self->can, &can);
+    self->is_can_open = true;
+    return status == HV_OK || status == HV_ERR_AGAIN ? HV_OK : HV_ERR_IO;
+}
+
+static hv_status_t open_can_raw(rig_t *self, const config_t *config, gateway_io_t *io)
+{
+    config_canraw_map(config, &self->canraw_map);
+    const hv_status_t status = open_can(self, config->can.interface, &self->canraw_map);
+    io->drives = canraw_hal(&self->canraw);
+    return status == HV_OK ? canraw_init(&self->canraw, &self->canraw_map, linux_can_hal(&self->can)) : status;
+}
+
 hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io)
 {
     const uint8_t axes = describe(self, config);
-    return open_sim(self, config, axes, inputs_present(&config->inputs), io);
+    const hv_status_t status = open_sim(self, config, axes, inputs_present(&config->inputs), io);
+    if (status != HV_OK) {
+        return status;
+    }
+    switch (config->drives) {
+    case CONFIG_DRIVES_SIM:
+        return HV_OK;
+    case CONFIG_DRIVES_CAN_RAW:
+        return open_can_raw(self, config, io);
+    }
+    return HV_ERR_RANGE;
+}
+
+const char *rig_trouble(const rig_t *self)
+{
+    return self->is_can_open ? self->can.error_text : "";
+}
+
+void rig_close(rig_t *self)
+{
+    if (self->is_can_open) {
+        linux_can_close(&self->can);
+        self->is_can_open = false;
+    }
 }
 
 hv_status_t rig_open_settled(rig_t *self, const config_t *config, gateway_io_t *io)

@@ -7,21 +7,34 @@
 
 #include "config.h"
 #include "heave/gateway.h"
+#include "linux_can.h"
 #include "sim_drives.h"
 #include "sim_inputs.h"
 #include "sim_relays.h"
 
-/** The devices; sim_inputs is for offline runs, which press its e-stop. */
+/** The devices. What is not in use stays zero. sim_inputs is for offline runs, which press its e-stop. */
 typedef struct {
     sim_drive_config_t sim_axis[DRIVES_MAX];
     sim_drives_t sim_drives;
     sim_relays_t sim_relays;
     sim_inputs_t sim_inputs;
+    bool is_can_open;
+    linux_can_t can;
+    canraw_map_t canraw_map;
+    canraw_t canraw;
 } rig_t;
 
 /** Opens what the configuration names and puts the handles into io (its udp and log are left alone).
- *  @return HV_OK; HV_ERR_RANGE where a simulated device does not take its figures. */
+ *  @return HV_OK, also where a bus is not usable yet (drives are then offline until it is); HV_ERR_RANGE where a device does not
+ *          take its figures; HV_ERR_IO where one is not there at all. rig_trouble() says what is wrong. */
 hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io) HV_MUST_CHECK;
+
+/** What is wrong with a device of an open rig, or with the one that could not be opened.
+ *  @return "" where nothing is */
+const char *rig_trouble(const rig_t *self);
+
+/** Closes; harmless on one that is not open. What a bus has not taken by now is dropped. */
+void rig_close(rig_t *self);
 
 /** For offline runs: simulated devices whatever the configuration names, drives enabled, homed, at the settled extension. */
 hv_status_t rig_open_settled(rig_t *self, const config_t *config, gateway_io_t *io) HV_MUST_CHECK;

@@ -32,37 +32,42 @@ static uint64_t divide_up(uint64_t value, uint64_t divisor)
     return value / divisor + (value % divisor != 0);
 }
 
-/* Load of all entries but those with the interval except_us. */
-static uint64_t sum_ppm(const canload_entry_t *entry, size_t count, uint32_t bitrate_bps, uint32_t except_us)
+static uint64_t ppm_of(const canload_entry_t *entry, uint64_t interval_us, uint32_t bitrate_bps)
+{
+    return divide_up(bits_of(entry) * PPM * US_PER_S, interval_us * bitrate_bps);
+}
+
+/* The interval of an entry; as long as keeps the products inside 64 bits. */
+static uint64_t interval_of(const canload_entry_t *entry, uint32_t period_us)
+{
+    const uint64_t interval_us = entry->periods > 0 ? (uint64_t)entry->periods * period_us : entry->interval_us;
+    return interval_us < UINT32_MAX ? interval_us : UINT32_MAX;
+}
+
+uint32_t canload_ppm(const canload_entry_t *entry, size_t count, uint32_t period_us, uint32_t bitrate_bps)
 {
     uint64_t sum = 0;
     for (size_t i = 0; i < count; i++) {
-        if (entry[i].interval_us != except_us) {
-            sum += divide_up(bits_of(&entry[i]) * PPM * US_PER_S, (uint64_t)entry[i].interval_us * bitrate_bps);
-        }
+        sum += ppm_of(&entry[i], interval_of(&entry[i], period_us), bitrate_bps);
     }
-    return sum;
-}
-
-uint32_t canload_ppm(const canload_entry_t *entry, size_t count, uint32_t bitrate_bps)
-{
-    const uint64_t sum = sum_ppm(entry, count, bitrate_bps, 0);
     return sum < UINT32_MAX ? (uint32_t)sum : UINT32_MAX;
 }
 
-uint32_t canload_fitting_interval_us(const canload_entry_t *entry, size_t count, uint32_t bitrate_bps, uint32_t interval_us,
-                                     uint32_t limit_ppm, uint32_t step_us)
+uint32_t canload_fitting_period_us(const canload_entry_t *entry, size_t count, uint32_t bitrate_bps, uint32_t limit_ppm,
+                                   uint32_t step_us)
 {
-    const uint64_t fixed_ppm = sum_ppm(entry, count, bitrate_bps, interval_us);
-    uint64_t bits = 0;
-    for (size_t i = 0; i < count; i++) {
-        bits += entry[i].interval_us == interval_us ? bits_of(&entry[i]) : 0;
-    }
-    if (fixed_ppm >= limit_ppm) {
+    uint64_t low = 0; /* steps that are too few, and enough */
+    uint64_t high = UINT32_MAX / step_us;
+    if (high == 0 || canload_ppm(entry, count, (uint32_t)high * step_us, bitrate_bps) > limit_ppm) {
         return 0;
     }
-    bits = bits < BITS_MAX ? bits : BITS_MAX;
-    const uint64_t least_us = divide_up(bits * PPM * US_PER_S, (limit_ppm - fixed_ppm) * bitrate_bps);
-    const uint64_t fitting_us = divide_up(least_us, step_us) * step_us;
-    return fitting_us <= UINT32_MAX ? (uint32_t)fitting_us : 0;
+    while (high - low > 1) {
+        const uint64_t middle = low + (high - low) / 2;
+        if (canload_ppm(entry, count, (uint32_t)middle * step_us, bitrate_bps) <= limit_ppm) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    return (uint32_t)high * step_us;
 }

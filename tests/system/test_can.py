@@ -21,7 +21,7 @@ driver = cia402
 
 [can]
 interface = vcan0
-bitrate = 1000000
+bitrate_bps = 1000000
 
 [cia402]
 nodes = 1, 2, 3, 4, 5, 6, 7

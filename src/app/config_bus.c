@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: MIT
+ * config_bus.c - what a configuration puts on its CAN bus; see config_bus.h.
+ */
+#include "config_bus.h"
+
+#include "config_canraw.h"
+
+static void add(config_bus_t *bus, bool is_extended, uint8_t bytes, uint32_t frames, uint32_t periods)
+{
+    HV_ASSERT(bus->count < CONFIG_BUS_ENTRIES_MAX);
+    bus->entry[bus->count++] =
+        (canload_entry_t){.is_extended = is_extended, .bytes = bytes, .frames = frames, .periods = periods};
+}
+
+static uint8_t longer(const canraw_frame_t *a, const canraw_frame_t *b)
+{
+    return a->length > b->length ? a->length : b->length;
+}
+
+/* Each drive gets a set-point per period and answers a query every query_every periods: that for the position, or that for
+ * homing, whichever is longer. */
+static void describe_can_raw(const config_t *config, config_bus_t *bus)
+{
+    const config_can_raw_t *raw = &config->can_raw;
+    const bool is_extended = raw->id_bits == CONFIG_ID_29_BITS;
+    const uint32_t axes = config_canraw_axes(config);
+    bus->section = "can-raw";
+    bus->period_us = raw->period_us;
+    bus->bitrate_bps = config->can.bitrate_bps;
+    add(bus, is_extended, raw->setpoint.length, axes, 1);
+    if (raw->position_query.length + raw->homing_query.length > 0) {
+        add(bus, is_extended, longer(&raw->position_query, &raw->homing_query), axes, raw->query_every);
+    }
+    add(bus, is_extended, longer(&raw->position_reply, &raw->homing_reply), axes, raw->query_every);
+}
+
+void config_bus_describe(const config_t *config, config_bus_t *bus)
+{
+    *bus = (config_bus_t){.section = NULL};
+    switch (config->drives) {
+    case CONFIG_DRIVES_CAN_RAW:
+        describe_can_raw(config, bus);
+        break;
+    case CONFIG_DRIVES_SIM:
+        break;
+    }
+}
+
+uint32_t config_bus_load_ppm(const config_bus_t *bus)
+{
+    return canload_ppm(bus->entry, bus->count, bus->period_us, bus->bitrate_bps);
+}
+
+uint32_t config_bus_fitting_us(const config_bus_t *bus, uint32_t limit_ppm, uint32_t cycle_us)
+{
+    return canload_fitting_period_us(bus->entry, bus->count, bus->bitrate_bps, limit_ppm, cycle_us);
+}
+
+static void check_load(config_source_t *self, const config_bus_t *bus, uint32_t cycle_us)
+{
+    const uint32_t load_ppm = config_bus_load_ppm(bus);
+    const uint32_t fitting_us = config_bus_fitting_us(bus, CONFIG_BUS_WARNED_PPM, cycle_us);
+    if (load_ppm <= CONFIG_BUS_REFUSED_PPM) {
+        return;
+    }
+    config_source_key_error(self, bus->section, "period_us",
+                            "the bus would be loaded by %u %% at worst; allowed: at most %u %%, better %u %%, which %u us give",
+                            (unsigned)(load_ppm / 10000u), CONFIG_BUS_REFUSED_PPM / 10000u, CONFIG_BUS_WARNED_PPM / 10000u,
+                            (unsigned)fitting_us);
+}
+
+void config_bus_check(config_source_t *self)
+{
+    const uint32_t cycle_us = self->config->settings.cycle_us;
+    config_bus_t bus;
+    config_bus_describe(self->config, &bus);
+    if (bus.section == NULL || !config_source_has_all(self, bus.section) || !config_source_has_all(self, "can") ||
+        !config_source_has(self, "platform", "cycle_us") || !config_source_has(self, "platform", "kind")) {
+        return;
+    }
+    const uint32_t rest_us = bus.period_us % cycle_us;
+    if (rest_us != 0) {
+        config_source_key_error(self, bus.section, "period_us", "is no multiple of cycle_us; allowed: for instance %u or %u us",
+                                (unsigned)(bus.period_us < cycle_us ? cycle_us : bus.period_us - rest_us),
+                                (unsigned)(bus.period_us < cycle_us ? 2u * cycle_us : bus.period_us - rest_us + cycle_us));
+        return;
+    }
+    check_load(self, &bus, cycle_us);
+}

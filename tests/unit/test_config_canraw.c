@@ -1,0 +1,353 @@
+/* SPDX-License-Identifier: MIT
+ * test_config_canraw.c - [can-raw]: the preset as bytes on a bus, every message of what contradicts itself, frames to text and
+ * back.
+ */
+#define _POSIX_C_SOURCE 200809L
+
+#include <stdio.h>
+#include <string.h>
+
+#include "canraw_slave.h"
+#include "config.h"
+#include "config_bus.h"
+#include "config_canraw.h"
+#include "config_value.h"
+#include "unity.h"
+
+#define FILE_NAME "test_config_canraw.tmp.ini"
+#define PRESET    HEAVE_CONFIG_DIR "/can-raw-hexapod.ini"
+
+static config_t m_config;
+static char m_text[20000];
+static char m_errors[20000];
+
+void hv_assert_failed(const char *file, int line)
+{
+    (void)file;
+    (void)line;
+    TEST_FAIL_MESSAGE("assertion");
+}
+
+void setUp(void)
+{
+    memset(&m_config, 0, sizeof m_config);
+    m_errors[0] = '\0';
+}
+
+void tearDown(void)
+{
+    remove(FILE_NAME);
+}
+
+static int load(const char *path)
+{
+    FILE *errors = tmpfile();
+    TEST_ASSERT_NOT_NULL(errors);
+    const int count = config_load(path, &m_config, errors);
+    rewind(errors);
+    m_errors[fread(m_errors, 1, sizeof m_errors - 1, errors)] = '\0';
+    fclose(errors);
+    return count;
+}
+
+static void read_preset(void)
+{
+    FILE *file = fopen(PRESET, "rb");
+    TEST_ASSERT_NOT_NULL(file);
+    m_text[fread(m_text, 1, sizeof m_text - 1, file)] = '\0';
+    fclose(file);
+}
+
+/* Line number of `key = ` in [can-raw] of m_text, 0 where it is not there. */
+static unsigned line_of(const char *key)
+{
+    unsigned line = 1, found = 0;
+    bool is_in = false;
+    for (const char *at = m_text; *at != '\0'; at++) {
+        if (at == m_text || at[-1] == '\n') {
+            is_in = at[0] == '[' ? strncmp(at, "[can-raw]", 9) == 0 : is_in;
+            found = is_in && strncmp(at, key, strlen(key)) == 0 && at[strlen(key)] == ' ' ? line : found;
+        }
+        line += *at == '\n';
+    }
+    return found;
+}
+
+/* Replaces the line of a key of [can-raw], or adds one behind the header. */
+static void put_line(const char *key, const char *line)
+{
+    static char rest[sizeof m_text];
+    char *at = strstr(m_text, "[can-raw]\n") + 10;
+    char *end = at;
+    for (char *search = at; line_of(key) != 0 && *search != '['; search++) {
+        if (search[-1] == '\n' && strncmp(search, key, strlen(key)) == 0 && search[strlen(key)] == ' ') {
+            at = search;
+            end = strchr(search, '\n') + 1;
+            break;
+        }
+    }
+    strcpy(rest, end);
+    sprintf(at, "%s\n%s", line, rest);
+}
+
+static int load_text(void)
+{
+    FILE *file = fopen(FILE_NAME, "wb");
+    TEST_ASSERT_NOT_NULL(file);
+    fputs(m_text, file);
+    fclose(file);
+    return load(FILE_NAME);
+}
+
+static void load_preset(void)
+{
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(PRESET), m_errors);
+}
+
+/* ---- The preset ---- */
+
+static void test_preset_frames_byte_for_byte(void)
+{
+    static const uint8_t k_setpoint[8] = {0x01, 0x05, 0xC0, 0x27, 0x09, 0x00, 0xD0, 0x07}; /* 600000 pulses at 300 mm; 2000 */
+    static const uint8_t k_home[8] = {0x01, 0x03, 0x01};
+    static const uint8_t k_position[8] = {0x00, 0x15};
+    static const uint8_t k_homing[8] = {0x00, 0x12};
+    uint8_t out[8];
+    int64_t counts = 0;
+    canraw_map_t map;
+    load_preset();
+    config_canraw_map(&m_config, &map);
+    TEST_ASSERT_EQUAL_UINT8(6, map.axes);
+    for (unsigned k = 0; k < 6; k++) {
+        TEST_ASSERT_EQUAL_HEX32(0x601 + k, map.axis[k].command_id);
+        TEST_ASSERT_EQUAL_HEX32(0x581 + k, map.axis[k].reply_id);
+        TEST_ASSERT_EQUAL(HV_OK, counts_from_units(&map.axis[k].scale, q32_from_int(300), &counts));
+    }
+    const int64_t value[CANRAW_VALUES] = {counts, map.speed_least};
+    TEST_ASSERT_EQUAL(HV_OK, canraw_pack(&map.setpoint, value, out));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(k_setpoint, out, 8);
+    TEST_ASSERT_EQUAL_UINT8(8, map.setpoint.length);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(k_home, map.command[CANRAW_HOME].data, 8);
+    TEST_ASSERT_EQUAL_UINT8(8, map.command[CANRAW_HOME].length);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(k_position, map.position_query.data, 8);
+    TEST_ASSERT_EQUAL_UINT8(2, map.position_query.length);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(k_homing, map.homing_query.data, 8);
+    TEST_ASSERT_EQUAL_UINT8(2, map.homing_query.length);
+    TEST_ASSERT_EQUAL_INT64(0x00012345, canraw_extract(canraw_find(&map.position_reply, CANRAW_POSITION),
+                                                       (const uint8_t[8]){9, 9, 0x45, 0x23, 0x01, 0x00, 9, 9}));
+}
+
+/* Drives that know the bytes alone are enabled, homed and led along by the preset. */
+static void test_preset_drives_are_enabled_homed_and_led(void)
+{
+    static canraw_slave_t slave;
+    sim_can_bus_t bus;
+    sim_can_t node;
+    canraw_map_t map;
+    canraw_t driver;
+    drive_feedback_t feedback[DRIVES_MAX];
+    q32_t setpoint_q32[DRIVES_MAX] = {0};
+    load_preset();
+    config_canraw_map(&m_config, &map);
+    sim_can_bus_init(&bus, 100, NULL, 0);
+    canraw_slave_open(&slave, &bus, false);
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, NULL, 0));
+    TEST_ASSERT_EQUAL(HV_OK, canraw_init(&driver, &map, sim_can_hal(&node)));
+    const drives_t hal = canraw_hal(&driver);
+    for (unsigned k = 0; k < 6; k++) {
+        slave.drive[k].is_homed = false;
+        slave.drive[k].position = 100000;
+    }
+    for (int i = 1; i < 4000; i++) {
+        canraw_slave_step(&slave, i * 1000);
+        (void)!drives_poll(hal, i * 1000, feedback);
+        if (i == 100) {
+            TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[0].state);
+            TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+        }
+        if (i == 300) {
+            TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[0].state);
+            TEST_ASSERT_FALSE(feedback[0].is_homed);
+            TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+        }
+        for (unsigned k = 0; k < 6; k++) {
+            setpoint_q32[k] = i < 1000 ? feedback[k].actual_mm_q32 : setpoint_q32[k] + Q32_ONE / 20;
+        }
+        (void)!drives_send(hal, i * 1000, setpoint_q32);
+    }
+    for (unsigned k = 0; k < 6; k++) {
+        TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[k].state);
+        TEST_ASSERT_TRUE(feedback[k].is_homed);
+        TEST_ASSERT_INT32_WITHIN(800, 3000 * 100, slave.drive[k].position); /* 150 mm, less what is on the way */
+        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 401); /* 0.05 mm per cycle, four cycles, 2000 pulses per mm */
+        TEST_ASSERT_EQUAL_UINT16(2000, slave.drive[k].speed);
+    }
+}
+
+static void test_preset_bus_load_is_the_sum_of_its_frames(void)
+{
+    config_bus_t bus;
+    load_preset();
+    config_bus_describe(&m_config, &bus);
+    /* six set-points per period of 4 ms, and every second one six queries of two bytes and answers of six, at 1 Mbit/s */
+    TEST_ASSERT_EQUAL_UINT32((6 * 135 + 3 * 75 + 3 * 115) * 250, config_bus_load_ppm(&bus));
+}
+
+/* ---- What is wrong ---- */
+
+typedef struct {
+    const char *key;
+    const char *line;
+    const char *message; /* its start, after [can-raw] KEY: */
+} spoilt_t;
+
+static const spoilt_t k_spoilt[] = {
+    {"setpoint", "setpoint = none", "missing for driver = can-raw; allowed: "},
+    {"setpoint", "setpoint = 01 {speed:u16le}", "has no {position}; allowed: with one such as {position:u32le}"},
+    {"setpoint", "setpoint = 01 05 06 {position:u32le} {speed:u16le}", "\"{speed:u16le}\" goes beyond the 8 bytes of a frame; "},
+    {"setpoint", "setpoint = 01 05 {position:u32le} {speed:u16le} 00", "\"00\" goes beyond the 8 bytes of a frame; allowed: "},
+    {"setpoint", "setpoint = 01 {position:u32le} {position:u16le}", "\"{position:u16le}\" is there twice; allowed: "},
+    {"setpoint", "setpoint = 01 {position:u24le}", "\"{position:u24le}\" has no type that there is; allowed: "},
+    {"setpoint", "setpoint = 01 {status:u8}", "\"{status:u8}\" is no field of this frame; allowed: "},
+    {"setpoint", "setpoint = 01 {position}", "\"{position}\" is no field; allowed: "},
+    {"setpoint", "setpoint = 01 .. {position:u32le}", "\"..\" stands for any byte, which only replies can have; allowed: "},
+    {"setpoint", "setpoint = 1 {position:u32le}", "\"1\" is no byte; allowed: "},
+    {"setpoint", "setpoint = 0x01 {position:u32le}", "\"0x01\" is no byte; allowed: "},
+    {"home", "home = 01 {position:u32le}", "\"{position:u32le}\" is no field of this frame; allowed: "},
+    {"home", "home = 01 02 03 04 05 06 07 08 09", "\"09\" goes beyond the 8 bytes of a frame; allowed: "},
+    {"command_id", "command_id = none", "missing for driver = can-raw; allowed: "},
+    {"command_id", "command_id = 0x7FC", "0x800 of drive 5 has more than 11 bits; allowed: up to 0x7FF, or id_bits = 29"},
+    {"command_id", "command_id = 1, 2, 3", "has 3 values; allowed: one, or one for each of the 6 drives"},
+    {"command_id", "command_id = 1, 2, 3, 4, 5, 3", "0x3 of drive 6 is command_id of drive 3 already; allowed: "},
+    {"command_id", "command_id = 1, 2, 3, 4, 5, 6, 7, 8", "has more than 7 values; allowed: "},
+    {"reply_id", "reply_id = 0x600", "0x601 of drive 2 is command_id of drive 1 already; allowed: a different one for each"},
+    {"reply_id", "reply_id = 0x20000000", "\"0x20000000\" is no identifier; allowed: "},
+    {"counts_per_mm", "counts_per_mm = none", "missing for driver = can-raw; allowed: "},
+    {"counts_per_mm", "counts_per_mm = 0", "\"0\" is no ratio; allowed: "},
+    {"counts_per_mm", "counts_per_mm = 20000/0", "\"20000/0\" is no ratio; allowed: "},
+    {"counts_per_mm", "counts_per_mm = 2000.5", "\"2000.5\" is no ratio; allowed: "},
+    {"counts_per_mm", "counts_per_mm = 10000000",
+     "300 mm of drive 1 are 3000000000 counts, and {position} of position_reply carries -2147483648 to 2147483647; allowed: "},
+    {"counts_per_mm", "counts_per_mm = -2000",
+     "300 mm of drive 1 are -600000 counts, and {position} of setpoint carries 0 to 4294967295; allowed: "},
+    {"counts_per_mm", "counts_per_mm = 2000, 2000", "has 2 values; allowed: one, or one for each of the 6 drives"},
+    {"zero_counts", "zero_counts = 1.5", "\"1.5\" is no whole number; allowed: "},
+    {"speed_counts", "speed_counts = 0", "{speed} would always be 0; allowed: above 0, or speed_counts_per_mm_s"},
+    {"speed_counts", "speed_counts = 65536", "does not fit {speed}; allowed: up to 65535"},
+    {"speed_counts_per_mm_s", "speed_counts_per_mm_s = 1000",
+     "the speed limit is 300000 counts, and {speed} carries up to 65535; allowed: a smaller ratio"},
+    {"position_reply", "position_reply = .. .. ..", "has no {position}; allowed: with one such as {position:u32le}"},
+    {"homing_reply", "homing_reply = none", "missing for driver = can-raw; allowed: "},
+    {"homing_reply", "homing_reply = 01 ..", "has no {status}; allowed: with one such as {status:u8}"},
+    {"homing_done_when", "homing_done_when = none", "missing where there is home; allowed: value/mask"},
+    {"homing_done_when", "homing_done_when = 0x100/0x100", "the mask has bits that {status} of homing_reply does not have; "},
+    {"homing_done_when", "homing_done_when = 3/1", "\"3/1\" has a value with bits outside its mask; allowed: "},
+    {"homing_done_when", "homing_done_when = 1", "\"1\" is no value/mask; allowed: "},
+    {"fault_when", "fault_when = 1/1", "position_reply has no {status}; allowed: only where it has"},
+    {"position_query", "position_query = none", ""}, /* reported at homing_reply, see below */
+    {"period_us", "period_us = 4500", "is no multiple of cycle_us; allowed: for instance 4000 or 5000 us"},
+    {"period_us", "period_us = 500", "is no multiple of cycle_us; allowed: for instance 1000 or 2000 us"},
+    {"period_us", "period_us = 1000",
+     "the bus would be loaded by 138 % at worst; allowed: at most 90 %, better 60 %, which 3000 us give"},
+    {"query_every", "query_every = 8", ""},
+    {"offline_periods", "offline_periods = 4", "too few for query_every = 2; allowed: at least 5"},
+    {"following_error_mm", "following_error_mm = 4", "less than a cylinder moves at full speed until its position is heard; "},
+};
+
+static void test_spoilt_lines_are_one_error_at_the_key_they_concern(void)
+{
+    for (size_t i = 0; i < sizeof k_spoilt / sizeof k_spoilt[0]; i++) {
+        char expected[400];
+        read_preset();
+        put_line(k_spoilt[i].key, k_spoilt[i].line);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(1, load_text(), k_spoilt[i].line);
+        snprintf(expected, sizeof expected, "%s:%u: [can-raw] %s: %s", FILE_NAME, line_of(k_spoilt[i].key), k_spoilt[i].key,
+                 k_spoilt[i].message);
+        if (k_spoilt[i].message[0] != '\0' && strncmp(expected, m_errors, strlen(expected)) != 0) {
+            TEST_ASSERT_EQUAL_STRING(expected, m_errors);
+        }
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "; allowed: "), m_errors);
+    }
+}
+
+/* The bus has a section of its own. */
+static void test_spoilt_bus_is_reported_where_it_is_wrong(void)
+{
+    static const char *const k_lines[][2] = {
+        {"interface = can 0", "[can] interface: \"can 0\" is no name of an interface; allowed: "},
+        {"interface = abcdefghijklmnop", "[can] interface: \"abcdefghijklmnop\" is no name of an interface; allowed: "},
+        {"bitrate_bps = 1000001", "[can] bitrate_bps: \"1000001\" is out of range; allowed: "},
+        {"bitrate_bps = 125000", "[can-raw] period_us: the bus would be loaded by 276 % at worst; allowed: "},
+    };
+    for (size_t i = 0; i < sizeof k_lines / sizeof k_lines[0]; i++) {
+        read_preset();
+        char *section = strstr(m_text, "[can]\n");
+        section[0] = ';'; /* the section that was there */
+        memcpy(strstr(section, "interface"), ";nterface", 9);
+        memcpy(strstr(section, "bitrate"), ";itrate", 7);
+        sprintf(m_text + strlen(m_text), "\n[can]\n%s\n", k_lines[i][0]);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(1, load_text(), k_lines[i][0]);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, k_lines[i][1]), m_errors);
+    }
+}
+
+/* The section of drives that are not in use is read, dumped, and not asked for anything. */
+static void test_section_not_in_use_is_kept_and_not_checked(void)
+{
+    read_preset();
+    memcpy(strstr(m_text, "driver = can-raw"), "driver = sim    ", 16);
+    put_line("home", "home = none");
+    put_line("setpoint", "setpoint = none");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_text(), m_errors);
+    TEST_ASSERT_EQUAL_UINT8(2, m_config.can_raw.position_query.length);
+}
+
+/* ---- Text and back ---- */
+
+static const config_key_t *key_of(const char *name)
+{
+    return &config_keys[config_key_find(strcmp(name, "interface") == 0 ? "can" : "can-raw", name)];
+}
+
+static void expect_same(const char *name, const char *text)
+{
+    config_text_t why, out;
+    unsigned count = 0;
+    config_text_clear(&why);
+    config_text_clear(&out);
+    TEST_ASSERT_TRUE_MESSAGE(config_value_parse(key_of(name), text, &m_config, &count, &why), why.data);
+    config_value_format(key_of(name), &m_config, &out);
+    TEST_ASSERT_EQUAL_STRING(text, out.data);
+}
+
+static void test_values_are_written_as_they_were_read(void)
+{
+    static const char *const k_types[] = {"u8", "i8", "u16le", "u16be", "i16le", "i16be", "u32le", "u32be", "i32le", "i32be"};
+    for (unsigned i = 0; i < 10; i++) {
+        char text[80];
+        snprintf(text, sizeof text, "0A .. {status:%s} .. {position:u16be}", k_types[i]);
+        expect_same("position_reply", i < 6 ? text : "{position:i32le} {status:u32be}");
+        snprintf(text, sizeof text, "{position:%s} 00 FF", k_types[i]);
+        expect_same("setpoint", text);
+    }
+    expect_same("home", "none");
+    expect_same("command_id", "0x601, 0x1FFFFFFF");
+    expect_same("counts_per_mm", "20000/10, -3, 2147483647/2147483647");
+    expect_same("zero_counts", "-5, 0, 7, 1, 2, 3");
+    expect_same("fault_when", "0x8/0x4F");
+    expect_same("fault_when", "none");
+    expect_same("interface", "vcan0.1-a_b");
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_preset_frames_byte_for_byte);
+    RUN_TEST(test_preset_drives_are_enabled_homed_and_led);
+    RUN_TEST(test_preset_bus_load_is_the_sum_of_its_frames);
+    RUN_TEST(test_spoilt_lines_are_one_error_at_the_key_they_concern);
+    RUN_TEST(test_spoilt_bus_is_reported_where_it_is_wrong);
+    RUN_TEST(test_section_not_in_use_is_kept_and_not_checked);
+    RUN_TEST(test_values_are_written_as_they_were_read);
+    return UNITY_END();
+}
