@@ -21,6 +21,20 @@ def passes_on_output_and_status():
     assert (finished.returncode, finished.output) == (3, "one\ntwo\na 'b' $c\n"), vars(finished)
 
 
+def nested(*user):
+    """The runner inside itself: there the machine's own kernel has vcan, so that it runs on that one, in a name space of its own."""
+    inner = [sys.executable, kernel.__file__, "--", "sh", "-c", "ip -br link show vcan0; ip link set vcan0 down; exit 5"]
+    return kernel.run(["sh", "-c", 'ip link add outside type vcan; "$@"; status=$?; ip -br link show vcan0; exit $status', "sh", *user, *inner])
+
+
+def runs_directly_where_it_can():
+    for user in ([], ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]):
+        finished = nested(*user)
+        lines = finished.output.splitlines()
+        assert finished.returncode == 5 and "UP" in lines[0], finished.output
+        assert "UP" in lines[-1] and "DOWN" not in lines[-1], "the machine's own interface was touched: " + finished.output
+
+
 def has_vcan():
     finished = kernel.run(["ip", "-br", "link", "show", "vcan0"])
     assert finished.returncode == 0 and "UP" in finished.output, finished.output
@@ -44,6 +58,7 @@ def endless_command_is_ended():
 def main():
     suite = tap.Suite()
     for name, case in [("output and exit status come out", passes_on_output_and_status), ("there is a vcan0", has_vcan),
+                       ("a kernel with vcan is used directly, its own interfaces stay as they are", runs_directly_where_it_can),
                        ("an hour of virtual time is exact and takes seconds", virtual_hour_is_exact_and_short),
                        ("a command that never ends is ended", endless_command_is_ended)]:
         with suite.case(name):
