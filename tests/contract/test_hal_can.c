@@ -950,6 +950,25 @@ static void test_linux_one_whole_set_fits_and_no_more(void)
     TEST_ASSERT_EQUAL_UINT32(0, lin.refused);
 }
 
+/* A bus of 1 Mbit/s: 115 us a frame. What is confirmed has left, at its time and not before. */
+static void test_linux_confirmed_is_what_has_left_the_queue(void)
+{
+    shell("tc qdisc replace dev vcan0 root tbf rate 1113kbit burst 16 limit 256");
+    pass_by();
+    for (uint32_t i = 0; i < 9; i++) {
+        const can_frame_t frame = make(0x200 + i, 6);
+        send_ok(&frame);
+    }
+    for (uint32_t tenth_ms = 1; tenth_ms <= 11; tenth_ms++) {
+        uint32_t left;
+        (void)usleep(100);
+        assert_nothing_received();
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(hal, &left));
+        const uint32_t gone = 1 + tenth_ms * 100 / 115; /* the first one found the bus free */
+        TEST_ASSERT_UINT32_WITHIN(1, gone < 9 ? 9 - gone : 0, left);
+    }
+}
+
 static void test_linux_short_interface_queue_refuses_and_is_counted(void)
 {
     uint32_t taken = 0, left;
@@ -1141,6 +1160,7 @@ static void run_linux(void)
     RUN_TEST(test_linux_every_report_is_passed_on_as_itself);
     RUN_TEST(test_linux_controller_that_restarts_by_itself_stays_cut_off_until_restart);
     RUN_TEST(test_linux_one_whole_set_fits_and_no_more);
+    RUN_TEST(test_linux_confirmed_is_what_has_left_the_queue);
     RUN_TEST(test_linux_short_interface_queue_refuses_and_is_counted);
     RUN_TEST(test_linux_stale_frames_restart_drops_them);
     RUN_TEST(test_linux_stale_frames_close_drops_them);

@@ -83,6 +83,12 @@ def follows_a_stream(bench):
     assert min(spans) > 20 * MM, spans
 
 
+def follows_on_a_bus_of_finite_speed(bench):
+    bench.slow_bus()
+    follows_a_stream(bench)
+    assert all(row["missed"] == 0 for row in bench.statistics().values()), bench.statistics()
+
+
 def one_fault_stops_all(bench):
     for action in ({"do": "fault", "code": 0x2310}, {"do": "reboot"}, {"do": "off"}, {"do": "disable"}):
         with can_bench.CanBench(bench.bin) as fresh:
@@ -135,6 +141,7 @@ def missing_or_wrong_drive_is_named(bench):
 
 CASES = [
     ("rises without a jump, all drives at once", rises_without_a_jump), ("follows a stream", follows_a_stream),
+    ("follows a stream on a bus of 1 Mbit/s", follows_on_a_bus_of_finite_speed),
     ("one drive in trouble stops all of them, latched", one_fault_stops_all), ("interface down and up: fault, nothing moves again", interface_down_stops_the_drives),
     ("a killed daemon is noticed by the drives", killed_daemon_stops_the_drives), ("a missing or wrong drive is named and nothing is enabled", missing_or_wrong_drive_is_named),
 ]
