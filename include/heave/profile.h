@@ -61,7 +61,7 @@ typedef struct {
 /** No limit at all: start of a minimum over axes. */
 path_limits_t path_limits_none(void);
 
-/** Narrows path limits so that an axis that travels distance keeps its own. */
+/** Narrows path limits so that an axis that travels distance keeps its own, with 1/64 to spare for its ramp. */
 void path_limits_narrow(path_limits_t *self, q32_t distance_q32, const ramp_limits_t *limits);
 
 /** Plans the shortest move within the limits that takes at least so many cycles. */

@@ -11,6 +11,7 @@
 #define COEFFICIENT_MAX_Q32 ((q32_t)1 << 56) /* leaves room for the factor 60 of the third derivative */
 #define CHECK_POINTS        32
 #define ROUNDING_ATTEMPTS   64
+#define SPARE_DIV           64
 
 ramp_ref_t history_advance(history_t *self, q32_t pos_q32)
 {
@@ -81,6 +82,13 @@ static const int64_t k_factor_vel[5] = {1, 2, 3, 4, 5};
 static const int64_t k_factor_acc[5] = {0, 2, 6, 12, 20};
 static const int64_t k_factor_jerk[5] = {0, 0, 6, 24, 60};
 
+/* What a plan may use of a limit. A ramp needs the rest to come back onto a way that rounded positions have led it off: without
+ * it, it falls behind in the first cycles, cannot catch up, and overshoots at the end. */
+static int64_t less_spare(int64_t limit)
+{
+    return limit - limit / SPARE_DIV;
+}
+
 /* Upper bounds of the derivatives with respect to t. */
 typedef struct {
     int64_t vel, acc, jerk;
@@ -92,7 +100,7 @@ static bounds_t bounds_of_move(const ramp_limits_t *limits, int64_t cycles)
     const int64_t vel = product(limits->vel_per_cycle_q32, cycles);
     const int64_t acc = product(product(ramp_safe_acceleration(limits), cycles), cycles);
     const int64_t jerk = product(product(product(limits->jerk_per_cycle3_q32, cycles), cycles), cycles);
-    return (bounds_t){vel - vel / 64, acc - acc / 64, jerk - jerk / 64};
+    return (bounds_t){less_spare(vel), less_spare(acc), less_spare(jerk)};
 }
 
 static bool is_within_bounds_at(const quintic_t *self, unsigned axis, const bounds_t *bounds, q62_t t_q62)
@@ -182,9 +190,9 @@ void path_limits_narrow(path_limits_t *self, q32_t distance_q32, const ramp_limi
     if (length_q32 == 0) {
         return;
     }
-    narrow(&self->vel_q62, limits->vel_per_cycle_q32, length_q32);
-    narrow(&self->acc_q62, ramp_safe_acceleration(limits), length_q32);
-    narrow(&self->jerk_q62, limits->jerk_per_cycle3_q32, length_q32);
+    narrow(&self->vel_q62, less_spare(limits->vel_per_cycle_q32), length_q32);
+    narrow(&self->acc_q62, less_spare(ramp_safe_acceleration(limits)), length_q32);
+    narrow(&self->jerk_q62, less_spare(limits->jerk_per_cycle3_q32), length_q32);
 }
 
 static int64_t divide_up(int64_t a, int64_t b)

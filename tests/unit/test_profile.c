@@ -275,8 +275,9 @@ static void test_scurve_plan_random_moves_keep_limits_and_are_short(void)
     printf("S-curves over 100 cycles: time over optimum mean %.4f, worst %.4f (over 300 cycles %.4f); shares: speed %.4f,"
            " acceleration %.4f, jerk %.4f\n",
            sum / counted, longest, medium, worst.speed, worst.accel, worst.jerk);
-    TEST_ASSERT_TRUE(worst.speed <= 1.000001 && worst.accel <= 1.000001 && worst.jerk <= 1.000001);
-    TEST_ASSERT_TRUE(longest <= 1.03 && medium <= 1.01);
+    const double used = 1 - 1.0 / 64 + 1e-3; /* the rest is the ramps'; limits are whole numbers */
+    TEST_ASSERT_TRUE(worst.speed <= used && worst.accel <= used && worst.jerk <= used);
+    TEST_ASSERT_TRUE(longest <= 1.04 && medium <= 1.025);
 }
 
 static void test_scurve_plan_several_axes_each_keeps_its_own_limits(void)
