@@ -9,6 +9,7 @@
 
 #define REJECT_LOG_INTERVAL_US 1000000u
 #define REJECT_TEXT_BYTES      60u
+#define TURN_Q32               q32_from_int(360)
 
 /* Where the values of a frame go: an axis of the platform, or a cylinder (from SLOT_CYLINDER on). */
 enum { SLOT_CYLINDER = AXES_MAX };
@@ -52,20 +53,32 @@ static q32_t to_axis(const axis_settings_t *axis, q16_t sent_q16)
     return (axis->sign < 0 ? -scaled_q32 : scaled_q32) + q32_from_q16(axis->offset_q16);
 }
 
-/* Nearest angle that is whole turns away, if the motor takes the shorter way. */
+/* The same angle some whole turns nearer, if it is beyond a limit and those bring it within both. */
+static q32_t turned_into_limits(const axis_settings_t *limits, q32_t angle_q32)
+{
+    const q32_t min_q32 = q32_from_q16(limits->min_q16);
+    const q32_t max_q32 = q32_from_q16(limits->max_q16);
+    const q32_t beyond_q32 = angle_q32 > max_q32 ? angle_q32 - max_q32 : angle_q32 < min_q32 ? angle_q32 - min_q32 : 0;
+    const q32_t turns = (fx_abs(beyond_q32) + TURN_Q32 - 1) / TURN_Q32;
+    const q32_t turned_q32 = angle_q32 - (beyond_q32 < 0 ? -turns : turns) * TURN_Q32;
+    return turned_q32 >= min_q32 && turned_q32 <= max_q32 ? turned_q32 : angle_q32;
+}
+
+/* If the motor takes the shorter way: the angle that is whole turns away and nearest to the last one that was asked for. Not to
+ * where the motor is: it may be more than half a turn behind, and would change its direction with every frame. */
 static q32_t unwrap(const gateway_t *self, q32_t angle_q32)
 {
     if (self->settings.angle_wrap == ANGLE_AS_SENT) {
         return angle_q32;
     }
-    const q32_t turn_q32 = q32_from_int(360);
-    q32_t way_q32 = (angle_q32 - self->output.angle_deg_q32) % turn_q32;
-    if (way_q32 > turn_q32 / 2) {
-        way_q32 -= turn_q32;
-    } else if (way_q32 < -turn_q32 / 2) {
-        way_q32 += turn_q32;
+    const q32_t last_q32 = motion_angle_target(&self->motion);
+    q32_t way_q32 = (angle_q32 - last_q32) % TURN_Q32;
+    if (way_q32 > TURN_Q32 / 2) {
+        way_q32 -= TURN_Q32;
+    } else if (way_q32 < -TURN_Q32 / 2) {
+        way_q32 += TURN_Q32;
     }
-    return self->output.angle_deg_q32 + way_q32;
+    return turned_into_limits(&self->settings.axis[AXIS_ANGLE], last_q32 + way_q32);
 }
 
 static motion_target_t target_of(const gateway_t *self, const frame_t *frame)
