@@ -102,17 +102,6 @@ static void put_words(view_t *self, const cJSON *object, const char *name)
 
 /* --- Parts of the table --- */
 
-/* What was asked for, and where a change has come to. */
-static void draw_intensity(view_t *self, const cJSON *intensity)
-{
-    const double percent = number(intensity, "percent");
-    const double now = number(intensity, "now_percent");
-    put(self, " intensity %.0f %%", percent);
-    if (now != percent) {
-        put(self, " (now %.1f)", now);
-    }
-}
-
 static void draw_head(view_t *self, const cJSON *status)
 {
     const double up_s = number(status, "uptime_ms") / 1000.0;
@@ -120,7 +109,6 @@ static void draw_head(view_t *self, const cJSON *status)
         cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
         cJSON_IsTrue(member(status, "estop_active")) ? " E-STOP" : "",
         cJSON_IsTrue(member(status, "shutting_down")) ? " SHUTTING DOWN" : "");
-    draw_intensity(self, member(status, "intensity"));
     put(self, "  cycle %.0f us  up %.0f s  late %.0f", number(status, "cycle_us"), up_s, number(status, "late_cycles"));
     end_line(self);
 }
@@ -249,6 +237,18 @@ static void draw_counts(view_t *self, const char *label, const cJSON *counts)
     end_line(self);
 }
 
+/* What was asked for, and where a change has come to. */
+static void draw_intensity(view_t *self, const cJSON *intensity)
+{
+    const double percent = number(intensity, "percent");
+    const double now = number(intensity, "now_percent");
+    put(self, "intensity %.0f %% of the sender's motion", percent);
+    if (now != percent) {
+        put(self, ", now %.1f %%", now);
+    }
+    end_line(self);
+}
+
 /* Who drives, and who else would like to. */
 static void draw_senders(view_t *self, const cJSON *status)
 {
@@ -275,14 +275,35 @@ static void draw_frames(view_t *self, const cJSON *status)
     end_line(self);
 }
 
+/* A flag in words; the flag itself where it is not known. */
+static const char *flag_words(const char *flag)
+{
+    static const struct {
+        const char *flag, *words;
+    } k_words[] = {
+        {"clamped", "beyond the limits, pulled in"}, {"speed", "speed limited"},
+        {"accel", "acceleration limited"},           {"stretched", "timed move takes longer than asked"},
+        {"takeover", "going to the first pose"},     {"cylinders", "moving cylinder by cylinder"},
+        {"off-path", "cylinders catching up"},       {"no-pose", "extensions without a pose"},
+    };
+    for (size_t i = 0; i < sizeof k_words / sizeof k_words[0]; i++) {
+        if (strcmp(flag, k_words[i].flag) == 0) {
+            return k_words[i].words;
+        }
+    }
+    return flag;
+}
+
 static void draw_fault(view_t *self, const cJSON *status)
 {
     const cJSON *fault = member(status, "fault");
     const cJSON *flag = NULL;
+    bool is_any = false;
     put(self, "flags    ");
     cJSON_ArrayForEach(flag, member(status, "flags"))
     {
-        put(self, "%s ", cJSON_IsString(flag) ? flag->valuestring : "?");
+        put(self, "%s%s", is_any ? "; " : "", cJSON_IsString(flag) ? flag_words(flag->valuestring) : "?");
+        is_any = true;
     }
     end_line(self);
     put(self, "fault    ");
@@ -313,6 +334,7 @@ size_t ctl_view_table(const cJSON *status, const ctl_view_style_t *style, char t
     draw_poses(&view, status);
     draw_cylinders(&view, status);
     draw_relays(&view, status);
+    draw_intensity(&view, member(status, "intensity"));
     draw_senders(&view, status);
     draw_frames(&view, status);
     draw_fault(&view, status);
