@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "config.h"
+#include "dbc.h"
 #include "heave/gateway.h"
 #include "live.h"
 #include "options.h"
@@ -44,6 +45,16 @@ static int end_stdout(int code)
     return code;
 }
 
+static int dump_dbc(const options_t *options, const config_t *config)
+{
+    if (config->drives != CONFIG_DRIVES_CAN_RAW) {
+        return say(EXIT_BAD_CONFIG, "%s: [drives] driver: has no frames of its own; allowed for --dump-dbc: can-raw",
+                   options->config);
+    }
+    dbc_write(config, stdout);
+    return end_stdout(EXIT_DONE);
+}
+
 static int run(const options_t *options, const config_t *config)
 {
     switch (options->mode) {
@@ -57,6 +68,8 @@ static int run(const options_t *options, const config_t *config)
     case MODE_DUMP_CONFIG:
         config_dump(config, stdout);
         return end_stdout(EXIT_DONE);
+    case MODE_DUMP_DBC:
+        return dump_dbc(options, config);
     case MODE_HELP:
     case MODE_VERSION:
         break;

@@ -13,6 +13,7 @@ enum {
     OPTION_CONFIG = 1,
     OPTION_CHECK,
     OPTION_DUMP,
+    OPTION_DUMP_DBC,
     OPTION_PLAY,
     OPTION_TRACE,
     OPTION_RECORD,
@@ -27,6 +28,7 @@ const char options_help[] =
     "  heaved --config FILE [--socket PATH] [--record FRAMES] [--trace OUT]   run\n"
     "  heaved --config FILE --check                      validate, and print what follows from it\n"
     "  heaved --config FILE --dump-config                every key with its value, unit, range and help\n"
+    "  heaved --config FILE --dump-dbc                   the frames of [can-raw] as a DBC file\n"
     "  heaved --config FILE --play FRAMES [--trace OUT]  offline: simulated time and devices\n"
     "\n"
     "  --config FILE    the platform (INI)\n"
@@ -41,11 +43,17 @@ const char options_help[] =
     "missing, 73 output cannot be created, 74 output cannot be written, 78 configuration.\n";
 
 static const struct option k_options[] = {
-    {"config", required_argument, NULL, OPTION_CONFIG}, {"check", no_argument, NULL, OPTION_CHECK},
-    {"dump-config", no_argument, NULL, OPTION_DUMP},    {"play", required_argument, NULL, OPTION_PLAY},
-    {"trace", required_argument, NULL, OPTION_TRACE},   {"record", required_argument, NULL, OPTION_RECORD},
-    {"socket", required_argument, NULL, OPTION_SOCKET}, {"help", no_argument, NULL, OPTION_HELP},
-    {"version", no_argument, NULL, OPTION_VERSION},     {NULL, 0, NULL, 0},
+    {"config", required_argument, NULL, OPTION_CONFIG},
+    {"check", no_argument, NULL, OPTION_CHECK},
+    {"dump-config", no_argument, NULL, OPTION_DUMP},
+    {"dump-dbc", no_argument, NULL, OPTION_DUMP_DBC},
+    {"play", required_argument, NULL, OPTION_PLAY},
+    {"trace", required_argument, NULL, OPTION_TRACE},
+    {"record", required_argument, NULL, OPTION_RECORD},
+    {"socket", required_argument, NULL, OPTION_SOCKET},
+    {"help", no_argument, NULL, OPTION_HELP},
+    {"version", no_argument, NULL, OPTION_VERSION},
+    {NULL, 0, NULL, 0},
 };
 
 /* Sets the mode; two different ones contradict each other. */
@@ -58,7 +66,7 @@ static bool set_mode(options_t *self, run_mode_t mode)
 
 static const char *take_option(options_t *self, int option)
 {
-    static const char k_one_mode[] = "only one of --check, --dump-config, --play, --help, --version at a time";
+    static const char k_one_mode[] = "only one of --check, --dump-config, --dump-dbc, --play, --help, --version at a time";
     bool is_free = true;
     switch (option) {
     case OPTION_CONFIG:
@@ -69,6 +77,9 @@ static const char *take_option(options_t *self, int option)
         break;
     case OPTION_DUMP:
         is_free = set_mode(self, MODE_DUMP_CONFIG);
+        break;
+    case OPTION_DUMP_DBC:
+        is_free = set_mode(self, MODE_DUMP_DBC);
         break;
     case OPTION_PLAY:
         self->play = optarg;
