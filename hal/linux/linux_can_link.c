@@ -10,6 +10,7 @@
 #include <linux/if_arp.h>
 #include <linux/pkt_sched.h>
 #include <linux/rtnetlink.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
@@ -194,6 +195,20 @@ void linux_can_link_close(struct mnl_socket *netlink)
     errno = error;
 }
 
+/* The last part of where the system's link to the driver leads. */
+static void keep_driver(const char *name, linux_can_link_t *out)
+{
+    char path[64], target[256];
+    (void)snprintf(path, sizeof path, "/sys/class/net/%s/device/driver", name);
+    const ssize_t length = readlink(path, target, sizeof target - 1);
+    if (length <= 0) {
+        return;
+    }
+    target[length] = '\0';
+    const char *last = strrchr(target, '/');
+    (void)snprintf(out->driver, sizeof out->driver, "%.31s", last != NULL ? last + 1 : target);
+}
+
 hv_status_t linux_can_link_look(struct mnl_socket *netlink, const char *name, linux_can_link_t *out)
 {
     linux_can_link_t found = {.state = HAL_CAN_ACTIVE};
@@ -205,6 +220,7 @@ hv_status_t linux_can_link_look(struct mnl_socket *netlink, const char *name, li
         status = ask_queue(netlink, &found);
     }
     if (status == HV_OK) {
+        keep_driver(name, &found);
         *out = found;
     }
     return status;

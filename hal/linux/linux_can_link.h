@@ -14,8 +14,9 @@
 /** One interface. Interfaces without a controller (vcan, slcan) say nothing below has_controller. */
 typedef struct {
     int index;
-    char kind[16]; /**< "can" (also most USB adapters), "vcan", "vxcan", "slcan"; "" where the system does not say */
-    bool is_can;   /**< false: something else of that name, such as Ethernet */
+    char kind[16];   /**< "can" (adapters), "vcan", "vxcan"; "" where the system does not say */
+    char driver[32]; /**< of the adapter: "gs_usb", "peak_usb", "mcp251x"; "" where there is no device behind it */
+    bool is_can;     /**< false: something else of that name, such as Ethernet */
     bool is_up;
     bool has_echo;         /**< its driver confirms frames when they are on the wire; else they are confirmed when queued */
     uint32_t queue_length; /**< frames that the interface's queue takes (txqueuelen); 0 where there is no queue */
