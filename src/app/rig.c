@@ -5,6 +5,8 @@
 
 #include "config_canraw.h"
 
+#define RUN_DIR "/run/heave" /* where heave-can-flush@.path looks */
+
 #define ANGLE_TRAVEL_DEG 1000000 /* a rotation motor has no stops of its own */
 
 static void describe_cylinder(sim_drive_config_t *self, const config_t *config, unsigned i)
@@ -72,7 +74,8 @@ static hv_status_t open_can(rig_t *self, const char *interface, const canraw_map
         own[k] = filter[k];
         own[k].id = map->axis[k].command_id;
     }
-    const linux_can_config_t can = {.interface = interface, .filter = filter, .filters = count, .own = own, .owns = count};
+    const linux_can_config_t can = {
+        .interface = interface, .filter = filter, .filters = count, .own = own, .owns = count, .run_dir = RUN_DIR};
     const hv_status_t status = linux_can_open(&self->can, &can);
     self->is_can_open = true;
     return status == HV_OK || status == HV_ERR_AGAIN ? HV_OK : HV_ERR_IO;
