@@ -34,6 +34,8 @@ static const grip_t k_grips[] = {
 /* Steps of the root search; the chord of the last bracket is the result. */
 #define SOLVER_STEPS 10
 
+#define JERK_MEMORY 2048 /* cycles after which what a reference once took of the jerk counts 1/e */
+
 /* Errors against the reference of the cycle before. */
 typedef struct {
     q32_t d, w, b;
@@ -166,14 +168,14 @@ static q32_t shortfall(const ramp_t *self, const errors_t *e, q32_t b_next)
 }
 
 /* Acceleration, relative to the feed, with which the quickest stop ends on the reference; acc is the present one on the same
- * terms. */
-static q32_t solve_upwards(const ramp_t *self, const errors_t *e, q32_t acc_q32, q32_t feed_q32)
+ * terms. The stop is that of `relative`. */
+static q32_t solve_upwards(const ramp_t *self, const ramp_t *relative, const errors_t *e, q32_t acc_q32, q32_t feed_q32)
 {
     const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
     bracket_t k = {.low = fx_clamp(acc_q32 - jerk_q32, -self->acc_safe_q32, self->acc_safe_q32) - feed_q32,
                    .high = fx_clamp(acc_q32 + jerk_q32, -self->acc_safe_q32, self->acc_safe_q32) - feed_q32};
-    k.at_low = shortfall(self, e, k.low);
-    k.at_high = shortfall(self, e, k.high);
+    k.at_low = shortfall(relative, e, k.low);
+    k.at_high = shortfall(relative, e, k.high);
     if (k.at_high >= 0) {
         return k.high;
     }
@@ -182,18 +184,34 @@ static q32_t solve_upwards(const ramp_t *self, const errors_t *e, q32_t acc_q32,
     }
     for (int step = 0; step < SOLVER_STEPS && k.high - k.low > 1; step++) {
         const q32_t at = bracket_chord(&k);
-        bracket_narrow(&k, at, shortfall(self, e, at));
+        bracket_narrow(&k, at, shortfall(relative, e, at));
     }
     return bracket_chord(&k);
 }
 
 /* The same towards a reference on either side: downwards is the mirror image, to the bit. */
-static q32_t solve_for_stop(const ramp_t *self, const errors_t *e, q32_t feed_q32)
+static q32_t solve_for_stop(const ramp_t *self, const ramp_t *relative, const errors_t *e, q32_t feed_q32)
 {
     const q32_t acc_q32 = self->state.acc_per_cycle2_q32;
     const bool is_downwards = e->d != 0 ? e->d < 0 : e->w != 0 ? e->w > 0 : acc_q32 > feed_q32;
     const errors_t mirrored = {.d = -e->d, .w = -e->w, .b = -e->b};
-    return is_downwards ? -solve_upwards(self, &mirrored, -acc_q32, -feed_q32) : solve_upwards(self, e, acc_q32, feed_q32);
+    return is_downwards ? -solve_upwards(self, relative, &mirrored, -acc_q32, -feed_q32)
+                        : solve_upwards(self, relative, e, acc_q32, feed_q32);
+}
+
+/* The ramp with what a reference in motion leaves of its acceleration and jerk: so much there is for certain, whichever way the
+ * difference has to be braked. */
+static ramp_t beside(const ramp_t *self, q32_t feed_q32)
+{
+    const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
+    const q32_t left_q32 = fx_clamp(jerk_q32 - self->ref_jerk_q32, jerk_q32 / 8, jerk_q32 - jerk_q32 / 4);
+    ramp_t relative = *self;
+    relative.limits.jerk_per_cycle3_q32 = left_q32;
+    relative.acc_cycles = fx_clamp((self->acc_safe_q32 - fx_abs(feed_q32)) / left_q32, 1, self->acc_safe_q32);
+    relative.acc_safe_q32 = relative.acc_cycles * left_q32;
+    relative.per_jerk_q62 = Q62_ONE / left_q32;
+    relative.per_acc_q62 = Q62_ONE / relative.acc_safe_q32;
+    return relative;
 }
 
 static bool is_at_rest(const ramp_ref_t *ref)
@@ -227,9 +245,13 @@ static q32_t wanted_acceleration(const ramp_t *self, const ramp_ref_t *ref, ramp
     }
     /* a reference far beyond the limits counts as one that is just beyond them: everything stays in range */
     const q32_t vel_most_q32 = 4 * self->limits.vel_per_cycle_q32;
-    const q32_t feed_q32 = fx_clamp(ref->acc_per_cycle2_q32 / 2, -self->acc_safe_q32, self->acc_safe_q32);
+    const q32_t feed_q32 = fx_clamp(ref->acc_per_cycle2_q32, -self->acc_safe_q32, self->acc_safe_q32);
     e.w = fx_clamp(e.w, -vel_most_q32, vel_most_q32);
-    return feed_q32 + solve_for_stop(self, &e, feed_q32);
+    if (is_at_rest(ref)) {
+        return solve_for_stop(self, self, &e, 0);
+    }
+    const ramp_t relative = beside(self, feed_q32);
+    return feed_q32 + solve_for_stop(self, &relative, &e, feed_q32);
 }
 
 /* True if after acceleration acc the upper bound can still be kept; sign -1 asks the same of the lower one. */
@@ -340,10 +362,19 @@ static ramp_ref_t reference_within_bounds(ramp_t *self, const ramp_ref_t *ref)
     return (ramp_ref_t){.pos_q32 = inside_q32};
 }
 
+/* Remembers how much jerk the references take: a reference that has turned sharply will again. */
+static void note_jerk(ramp_t *self, q32_t ref_jerk_q32)
+{
+    const q32_t size_q32 = fx_clamp(fx_abs(ref_jerk_q32), 0, self->limits.jerk_per_cycle3_q32);
+    const q32_t faded_q32 = self->ref_jerk_q32 - self->ref_jerk_q32 / JERK_MEMORY;
+    self->ref_jerk_q32 = size_q32 > faded_q32 ? size_q32 : faded_q32;
+}
+
 q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
 {
     self->flags = 0;
     const ramp_ref_t inside = reference_within_bounds(self, ref);
+    note_jerk(self, inside.jerk_per_cycle3_q32);
     const q32_t acc_q32 = allowed_acceleration(self, wanted_acceleration(self, &inside, grip));
     self->state.acc_per_cycle2_q32 = acc_q32;
     self->state.vel_per_cycle_q32 += acc_q32;

@@ -486,6 +486,58 @@ static void test_ramp_step_feasible_sine_is_tracked_exactly(void)
     TEST_ASSERT_TRUE(worst_soft <= UM_Q32 / 100);
 }
 
+/* ---- joining a reference that is moving already ---- */
+
+typedef struct {
+    double locked, worst; /* share of the cycles from 1.5 s on within 0.01 mm; worst error then, mm */
+} joins_t;
+
+/* Random starts beside sines whose speed (power 1), acceleration (2) or jerk (3) peaks at a share of the limit. */
+static joins_t join_sines(unsigned power, double share, ramp_grip_t grip)
+{
+    static const double k_limit[] = {0, 400, 3000, 50000};
+    static const double k_omega[] = {0, 4, 9, 18};
+    const ramp_limits_t limits = limits_of(-500, 500, 400, 3000, 50000, 1000);
+    long locked = 0, cycles = 0;
+    joins_t joins = {0};
+    for (int run = 0; run < 60; run++) {
+        const double omega = k_omega[power] * (0.8 + 0.4 * random_unit());
+        sine_t sine = {
+            .amplitude = share * k_limit[power] / pow(omega, power), .rate = omega / 1000, .phase = 6.28 * random_unit()};
+        ramp_t ramp;
+        (void)sine_at(&sine, 0), (void)sine_at(&sine, 1), (void)sine_at(&sine, 2);
+        TEST_ASSERT_EQUAL(HV_OK,
+                          ramp_init(&ramp, &limits, q32(sine.amplitude * (2 * random_unit() - 1) + 40 * random_unit() - 20)));
+        for (long i = 3; i < 5000; i++) {
+            const ramp_ref_t ref = sine_at(&sine, i);
+            const double error = fabs((double)(ramp_step(&ramp, &ref, grip) - ref.pos_q32)) / 4294967296.0;
+            if (i > 1500) {
+                cycles++;
+                locked += error < 0.01;
+                joins.worst = fmax(joins.worst, error);
+            }
+        }
+    }
+    joins.locked = (double)locked / (double)cycles;
+    return joins;
+}
+
+static void test_ramp_step_running_sine_is_joined_without_hunting(void)
+{
+    static const double k_share[] = {0.3, 0.5, 0.7, 0.8, 0.9, 0.95};
+    static const char *const k_name[] = {"", "speed", "acceleration", "jerk"};
+    for (unsigned power = 1; power <= 3; power++) {
+        for (unsigned i = 0; i < sizeof k_share / sizeof k_share[0]; i++) {
+            const joins_t firm = join_sines(power, k_share[i], RAMP_FIRM), soft = join_sines(power, k_share[i], RAMP_SOFT);
+            printf("sine at %.2f of the %s limit: on it %.1f %% (firm), %.1f %% (soft) of the time from 1.5 s on; worst %.2f, "
+                   "%.2f mm\n",
+                   k_share[i], k_name[power], 100 * firm.locked, 100 * soft.locked, firm.worst, soft.worst);
+            TEST_ASSERT_TRUE(firm.locked > (k_share[i] < 0.85 ? 0.999 : 0.8) && soft.locked > (k_share[i] < 0.85 ? 0.999 : 0.8));
+            TEST_ASSERT_TRUE(firm.worst < 5 && soft.worst < 5);
+        }
+    }
+}
+
 static void test_ramp_step_infeasible_sine_keeps_limits_and_locks_when_it_calms_down(void)
 {
     const ramp_limits_t limits = usual_limits();
@@ -612,6 +664,7 @@ int main(void)
     RUN_TEST(test_ramp_step_at_rest_stays_exactly_for_a_constant_reference);
     RUN_TEST(test_ramp_step_reference_outside_ends_at_rest_on_the_bound);
     RUN_TEST(test_ramp_step_feasible_sine_is_tracked_exactly);
+    RUN_TEST(test_ramp_step_running_sine_is_joined_without_hunting);
     RUN_TEST(test_ramp_step_infeasible_sine_keeps_limits_and_locks_when_it_calms_down);
     RUN_TEST(test_ramp_step_mirrored_references_give_mirrored_positions);
     RUN_TEST(test_ramp_stop_position_is_where_the_ramp_comes_to_rest);
