@@ -13,11 +13,23 @@ typedef enum {
     MOTION_RESTING,  /**< nothing: it stays where it is */
     MOTION_STOPPING, /**< a controlled stop in cylinder space */
     MOTION_ON_PATH,  /**< an S-curve in cylinder space */
-    MOTION_STREAMED, /**< following: steps and streams */
-    MOTION_TIMED,    /**< following: a quintic */
+    MOTION_STREAMED, /**< following: a stream */
+    MOTION_TIMED,    /**< following: a quintic (timed, or a step in motion) */
     MOTION_HALTING,  /**< following: a stop, then the S-curve */
-    MOTION_STRAIGHT  /**< following: a timed move from rest along an S-curve */
+    MOTION_STRAIGHT  /**< following: a timed move or a step from rest along an S-curve */
 } motion_source_t;
+
+/** How a stream is followed. */
+typedef enum {
+    JOIN_NONE,   /**< on its curve */
+    JOIN_DUE,    /**< to be planned in the coming cycle */
+    JOIN_CURVE,  /**< the difference to the curve fades out along the quintic */
+    JOIN_SAMPLE, /**< the quintic leads to the newest sample, as the curve is beyond the limits */
+    JOIN_HALT    /**< slowing down, as no quintic keeps the limits */
+} motion_join_t;
+
+/** What the targets of a cycle ask to be planned; the newest one counts. */
+typedef enum { DUE_NOTHING, DUE_STEP, DUE_STREAM, DUE_TIMED } motion_due_t;
 
 /** What comes after a stop. */
 typedef enum { MOTION_THEN_REST, MOTION_THEN_PATH, MOTION_THEN_FOLLOW } motion_next_t;
@@ -51,6 +63,18 @@ struct motion {
     q32_t path_to_q32[AXES_MAX];
     history_t path_history[AXES_MAX];
 
+    motion_due_t due;
+    bool is_space_new;                          /**< the slots have to be found from the cylinders first */
+    q32_t slot_q32[AXES_MAX];                   /**< the newest target, before intensity */
+    q32_t goal_q32[AXES_MAX];                   /**< where it was planned to lead: with intensity, inside the limits */
+    q32_t slot_extension_mm_q32[CYLINDERS_MAX]; /**< and its extensions */
+    int64_t asked_cycles;                       /**< of a timed target */
+    unsigned planned_slots;                     /**< the first so many go along the plan, the others by themselves */
+    motion_join_t join;
+    bool has_new_sample;
+    int64_t join_cycles;     /**< since it was planned */
+    history_t led[AXES_MAX]; /**< the slots' last references, before any blend */
+
     bool is_following;
     bool is_taking_over; /**< the take-over blend is running or still to come */
     bool is_blend_planned;
@@ -64,9 +88,9 @@ struct motion {
     q32_t angle_target_deg_q32;
     uint64_t last_timed_us; /**< arrival of the last timed target, 0 before the first */
     uint64_t timed_end_us;
-    int64_t timed_share_q46;       /**< intensity that the timed move is planned with */
+    int64_t timed_share_q46;       /**< intensity that the planned move is planned with */
     q32_t timed_way_q32[AXES_MAX]; /**< from neutral to where the sender wants it, before intensity */
-    int64_t straight_cycles;       /**< left for the straight part of a timed move that begins with a stop */
+    int64_t straight_cycles;       /**< left for the straight part of a move that begins with a stop */
     bool is_stretched;
     bool is_clamped;           /**< the last target was pulled in */
     uint8_t limiting_cylinder; /**< by this cylinder, 0 where none bounds it */

@@ -31,6 +31,10 @@ typedef struct {
 hv_status_t quintic_plan(quintic_t *self, unsigned axes, const ramp_state_t *start, const q32_t *target_q32,
                          int64_t cycles) HV_MUST_CHECK;
 
+/** Adds to an axis the motion that goes on from a state while its acceleration fades to 0 over the quintic's cycles. For checks:
+ *  such a quintic is not to be stepped. */
+void quintic_add_motion(quintic_t *self, unsigned axis, const ramp_state_t *from);
+
 /** True if every axis stays within its limits (checked at 33 points with 1/64 to spare). */
 bool quintic_is_feasible(const quintic_t *self, const ramp_limits_t *const *limits);
 

@@ -8,18 +8,14 @@
  */
 #include "follow.h"
 
+#include "join.h"
 #include "past.h"
+#include "plan.h"
 #include "reach.h"
+#include "slot.h"
 #include "slots.h"
-#include "way.h"
 
 #define TAKEOVER_LEAST_US 250000
-
-/* The ramp that stands for slot i of the space that is followed in. */
-static ramp_t *slot_ramp(motion_t *self, unsigned i)
-{
-    return self->space == MOTION_POSE || i == AXIS_ANGLE ? &self->axis[i] : &self->cylinder[i];
-}
 
 bool follow_is_moving(const motion_t *self)
 {
@@ -53,141 +49,59 @@ static hv_status_t pose_states(const motion_t *self, ramp_state_t state[POSE_AXE
     return HV_OK;
 }
 
-/* Goes over to a space; the other one's set-points are where it starts. */
-static void enter_space(motion_t *self, motion_space_t space)
+void follow_adopt_pose(motion_t *self)
 {
-    self->space = space;
-    stream_reset(&self->stream);
-    self->last_timed_us = 0;
+    ramp_state_t state[POSE_AXES];
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
         self->reference[i] = self->cylinder[i].state;
     }
-    ramp_state_t state[POSE_AXES];
-    if (space != MOTION_POSE || pose_states(self, state) != HV_OK) {
+    if (pose_states(self, state) != HV_OK) {
         return;
     }
     const bool is_resting = motion_is_at_rest(self);
     for (unsigned i = 0; i < POSE_AXES; i++) {
         const ramp_state_t at_rest = {.pos_q32 = self->is_axis_moved[i] ? state[i].pos_q32 : 0};
         ramp_take_over(&self->axis[i], is_resting || !self->is_axis_moved[i] ? &at_rest : &state[i]);
+        self->led[i] = self->axis[i].state;
+    }
+}
+
+/* Goes over to a space; the other one's set-points are where it starts. */
+static void enter_space(motion_t *self)
+{
+    self->is_space_new = false;
+    self->join = JOIN_DUE;
+    if (self->space == MOTION_POSE) {
+        follow_adopt_pose(self);
+        return;
+    }
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        self->led[i] = self->cylinder[i].state;
     }
 }
 
 /* The first target after a rest: its way at engage speed, or slower where a timed move gives it longer. The axes stand on the
  * target at once, as it is the blend that moves the platform there. */
-static void plan_blend(motion_t *self, const q32_t slot_q32[AXES_MAX], const q32_t extension_mm_q32[CYLINDERS_MAX],
-                       int64_t cycles)
+static void plan_blend(motion_t *self)
 {
     path_limits_t limits = path_limits_none();
     for (unsigned i = 0; i < self->cylinders; i++) {
+        const q32_t to_q32 = self->slot_extension_mm_q32[i];
         self->blend_from_q32[i] = self->cylinder[i].state.pos_q32;
-        path_limits_narrow(&limits, extension_mm_q32[i] - self->blend_from_q32[i], &self->engage_limits);
-        self->reference[i] = (history_t){.pos_q32 = extension_mm_q32[i]};
+        path_limits_narrow(&limits, to_q32 - self->blend_from_q32[i], &self->engage_limits);
+        self->reference[i] = (history_t){.pos_q32 = to_q32};
     }
-    for (unsigned i = 0; self->space == MOTION_POSE && i < POSE_AXES; i++) {
-        self->axis[i].state = (ramp_state_t){.pos_q32 = slot_q32[i]};
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        self->led[i] = (history_t){.pos_q32 = self->goal_q32[i]};
+        if (self->space == MOTION_POSE) {
+            self->axis[i].state = self->led[i];
+        }
     }
     const int64_t least = TAKEOVER_LEAST_US / (int64_t)self->cycle_us;
-    scurve_plan(&self->blend, &limits, cycles > least ? cycles : least);
+    scurve_plan(&self->blend, &limits, self->asked_cycles > least ? self->asked_cycles : least);
     self->blend_share[0] = self->blend_share[1] = self->blend_share[2] = 0;
     self->blend_rest = 0;
     self->is_blend_planned = true;
-}
-
-/* The state a plan starts from: the ramp's, less what the intensity moves by itself. */
-static ramp_state_t planned_start(motion_t *self, unsigned i)
-{
-    ramp_state_t state = slot_ramp(self, i)->state;
-    const ramp_ref_t shift = intensity_shift(&self->intensity, self->timed_share_q46, self->timed_way_q32[i]);
-    state.vel_per_cycle_q32 -= shift.vel_per_cycle_q32;
-    state.acc_per_cycle2_q32 -= shift.acc_per_cycle2_q32;
-    return state;
-}
-
-static void plan_straight(motion_t *self, const q32_t slot_q32[AXES_MAX], int64_t cycles)
-{
-    path_limits_t limits = path_limits_none();
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        const ramp_t *ramp = slot_ramp(self, i);
-        self->path_from_q32[i] = ramp->state.pos_q32;
-        self->path_to_q32[i] = slot_q32[i];
-        self->path_history[i] = ramp->state;
-        path_limits_narrow(&limits, slot_q32[i] - ramp->state.pos_q32, &ramp->limits);
-    }
-    if (self->space == MOTION_POSE) {
-        way_narrow(self, self->path_from_q32, slot_q32, &limits);
-    }
-    scurve_plan(&self->path, &limits, cycles);
-    self->source = MOTION_STRAIGHT;
-}
-
-static bool are_slots_at_rest(motion_t *self)
-{
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        if (!ramp_is_at_rest(slot_ramp(self, i))) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* A stop first, then the straight way, where the time asked for has room for both. */
-static bool plan_stop_then_straight(motion_t *self, const ramp_state_t *start, const ramp_limits_t *const *limits,
-                                    const q32_t slot_q32[AXES_MAX], int64_t cycles)
-{
-    halt_plan(&self->halt, AXES_MAX, POSE_AXES, start, limits);
-    path_limits_t path = path_limits_none();
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        path_limits_narrow(&path, slot_q32[i] - self->halt.rest_q32[i], limits[i]);
-        self->path_to_q32[i] = slot_q32[i];
-    }
-    if (self->space == MOTION_POSE) {
-        way_narrow(self, self->halt.rest_q32, slot_q32, &path);
-    }
-    scurve_plan(&self->path, &path, 1);
-    self->straight_cycles = cycles - self->halt.cycles - 1;
-    return scurve_cycles(&self->path) <= self->straight_cycles;
-}
-
-/* Plans the quintic; false where an axis or a cylinder would break its limits. */
-static bool is_quintic_feasible(motion_t *self, const ramp_state_t *start, const ramp_limits_t *const *limits,
-                                const q32_t slot_q32[AXES_MAX], int64_t cycles)
-{
-    return quintic_plan(&self->quintic, AXES_MAX, start, slot_q32, cycles) == HV_OK &&
-           quintic_is_feasible(&self->quintic, limits) && (self->space != MOTION_POSE || way_is_feasible(self, &self->quintic));
-}
-
-/* Timed moves, best first: a quintic; from rest an S-curve, longer than asked if need be; a stop and an S-curve; else the step
- * law. */
-static void plan_timed(motion_t *self, const q32_t slot_q32[AXES_MAX], int64_t asked, bool is_first, uint64_t now_us)
-{
-    ramp_state_t start[AXES_MAX];
-    const ramp_limits_t *limits[AXES_MAX];
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        start[i] = is_first && i != AXIS_ANGLE ? (ramp_state_t){.pos_q32 = slot_q32[i]} : planned_start(self, i);
-        limits[i] = &slot_ramp(self, i)->limits;
-    }
-    int64_t cycles = asked > 0 ? asked : 1;
-    self->is_stretched = false;
-    self->source = MOTION_TIMED;
-    if (is_quintic_feasible(self, start, limits, slot_q32, cycles)) {
-        /* planned as it is */
-    } else if (are_slots_at_rest(self)) {
-        plan_straight(self, slot_q32, cycles);
-        cycles = scurve_cycles(&self->path);
-        self->is_stretched = asked > 0 && cycles > asked;
-    } else if (plan_stop_then_straight(self, start, limits, slot_q32, cycles)) {
-        self->source = MOTION_HALTING;
-    } else {
-        self->source = MOTION_STREAMED; /* the lone sample that follow_target pushed: a step */
-        self->is_stretched = asked > 0;
-    }
-    if (is_first && scurve_cycles(&self->blend) > cycles) {
-        cycles = scurve_cycles(&self->blend);
-        self->is_stretched = asked > 0;
-    }
-    self->stretched_count += self->is_stretched;
-    self->timed_end_us = now_us + (uint64_t)cycles * self->cycle_us;
 }
 
 /* A timed target is a sample of a stream if its time is about the time between targets. */
@@ -202,34 +116,69 @@ static bool is_stream_sample(const motion_t *self, const motion_target_t *target
            gap_us * 2 <= time_us * 5 && time_us * 2 <= gap_us * 5;
 }
 
+/* The slots are those of a space from now on. */
+static void change_space(motion_t *self, motion_space_t space)
+{
+    self->space = space;
+    self->is_space_new = true;
+    self->last_timed_us = 0;
+    self->source = MOTION_STREAMED;
+    stream_reset(&self->stream);
+}
+
 void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
-    q32_t slot_q32[AXES_MAX];
-    q32_t scaled_q32[AXES_MAX];
-    q32_t extension_mm_q32[CYLINDERS_MAX];
     if (target->space != self->space || !follow_is_moving(self)) {
-        enter_space(self, target->space);
+        change_space(self, target->space);
     }
-    slots_take(self, target, slot_q32, extension_mm_q32);
-    slots_scale(self, target->space, slot_q32, scaled_q32);
+    slots_take(self, target, self->slot_q32, self->slot_extension_mm_q32);
     const bool is_sample = is_stream_sample(self, target, now_us);
-    const int64_t cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
-    const bool is_first = self->is_taking_over && !self->is_blend_planned;
-    if (is_first) {
-        plan_blend(self, scaled_q32, extension_mm_q32, cycles);
-    }
+    self->asked_cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
     self->last_timed_us = target->is_timed ? now_us : 0;
+    self->timed_end_us = is_sample ? 0 : now_us + (uint64_t)self->asked_cycles * self->cycle_us;
+    self->is_stretched = false;
     if (!is_sample) {
         stream_reset(&self->stream);
     }
-    stream_push(&self->stream, now_us, slot_q32);
-    self->timed_end_us = 0;
-    self->is_stretched = false;
-    if (is_sample) {
+    stream_push(&self->stream, now_us, self->slot_q32);
+    self->due = !is_sample ? DUE_TIMED : self->stream.phase == STREAM_RUNNING ? DUE_STREAM : DUE_STEP;
+}
+
+/* A step to where the plan leads anyway. */
+static bool is_on_the_way(const motion_t *self)
+{
+    const q32_t *to_q32 = self->source == MOTION_TIMED ? self->quintic.target_q32 : self->path_to_q32;
+    unsigned i = 0;
+    while (i < self->planned_slots && to_q32[i] == self->goal_q32[i]) {
+        i++;
+    }
+    return i == self->planned_slots && self->source != MOTION_STREAMED;
+}
+
+/* Plans what the targets of this cycle ask for. */
+static void plan_what_is_due(motion_t *self, uint64_t now_us)
+{
+    const motion_due_t due = self->due;
+    const bool is_first = self->is_taking_over && !self->is_blend_planned;
+    self->due = DUE_NOTHING;
+    if (due != DUE_NOTHING && self->is_space_new) {
+        enter_space(self);
+    }
+    if (due != DUE_NOTHING) {
+        slots_scale(self, self->space, self->slot_q32, self->goal_q32);
+    }
+    if (due != DUE_NOTHING && is_first) {
+        plan_blend(self);
+    }
+    if (due == DUE_TIMED) {
+        plan_timed(self, self->asked_cycles, is_first, now_us);
+    } else if (due == DUE_STEP && (is_first || !is_on_the_way(self))) {
+        plan_step(self);
+    } else if (due == DUE_STREAM && self->source != MOTION_STREAMED) {
         self->source = MOTION_STREAMED;
-    } else {
-        slots_plan(self, slot_q32);
-        plan_timed(self, scaled_q32, cycles, is_first, now_us);
+        join_begin(self);
+    } else if (due == DUE_STREAM) {
+        join_sample(self);
     }
 }
 
@@ -243,32 +192,24 @@ void follow_begin(motion_t *self, uint64_t now_us)
     }
 }
 
-/* The references of a move along a straight way. */
-static void step_straight(motion_t *self, ramp_ref_t ref[AXES_MAX])
+/* The references of the slots along a plan. */
+static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
-    const bool was_done = scurve_is_done(&self->path);
-    scurve_step(&self->path);
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        ref[i] = was_done ? (ramp_ref_t){.pos_q32 = self->path_to_q32[i]}
-                          : history_advance(&self->path_history[i],
-                                            scurve_between(&self->path, self->path_from_q32[i], self->path_to_q32[i]));
-    }
-}
-
-/* The references of the slots from whatever source there is. */
-static void step_source(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX])
-{
-    if (self->source == MOTION_STREAMED) {
-        (void)stream_step(&self->stream, now_us, ref);
-        slots_scale_refs(self, ref);
-        return;
-    }
     if (self->source == MOTION_TIMED) {
         quintic_step(&self->quintic, ref);
     } else if (self->source == MOTION_HALTING) {
         halt_step(&self->halt, ref);
     } else {
-        step_straight(self, ref);
+        const bool was_done = scurve_is_done(&self->path);
+        scurve_step(&self->path);
+        for (unsigned i = 0; i < AXES_MAX; i++) {
+            ref[i] = was_done ? (ramp_ref_t){.pos_q32 = self->path_to_q32[i]}
+                              : history_advance(&self->path_history[i],
+                                                scurve_between(&self->path, self->path_from_q32[i], self->path_to_q32[i]));
+        }
+    }
+    for (unsigned i = self->planned_slots; i < AXES_MAX; i++) {
+        ref[i] = (ramp_ref_t){.pos_q32 = self->slot_q32[i]};
     }
     slots_shift_refs(self, ref);
 }
@@ -308,8 +249,8 @@ static void take_over(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t 
     self->is_taking_over = self->blend_rest < 3;
 }
 
-/* Pose axes through their ramps, into the workspace, to cylinders. */
-static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+/* Pose axes through their ramps, into the workspace, to cylinders. True if the pose had to be pulled in. */
+static bool step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], pose_t *planned, motion_output_t *out)
 {
     const ramp_grip_t grip = self->source == MOTION_STREAMED ? RAMP_SOFT : RAMP_FIRM;
     q32_t extension_mm_q32[CYLINDERS_MAX];
@@ -328,30 +269,91 @@ static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], pose_t *planned,
     }
     out->flags |= ((flags & RAMP_CLAMPED) ? MOTION_CLAMPED : 0) | ((flags & RAMP_SPEED) ? MOTION_SPEED : 0) |
                   ((flags & RAMP_ACCEL) ? MOTION_ACCEL : 0) | (cylinder != 0 ? MOTION_CLAMPED : 0);
+    return cylinder != 0;
 }
 
-void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+/* From the slots' references to the cylinders'. True if the pose had to be pulled in. */
+static bool step_slots(motion_t *self, const ramp_ref_t slot_ref[AXES_MAX], ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned,
+                       motion_output_t *out)
 {
-    step_source(self, now_us, ref);
-    out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &ref[AXIS_ANGLE], RAMP_FIRM);
-    if (self->space == MOTION_POSE) {
-        step_pose(self, ref, planned, out);
-    } else {
-        out->flags |= MOTION_IN_CYLINDERS;
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        cylinder_ref[i] = slot_ref[i];
+        self->led[i] = (history_t){slot_ref[i].pos_q32, slot_ref[i].vel_per_cycle_q32, slot_ref[i].acc_per_cycle2_q32};
     }
-    take_over(self, ref, out);
+    if (self->space == MOTION_POSE) {
+        return step_pose(self, cylinder_ref, planned, out);
+    }
+    out->flags |= MOTION_IN_CYLINDERS;
+    return false;
+}
+
+/* What a cycle changes on the way from the slots' references to the cylinders'. */
+typedef struct {
+    ramp_state_t axis[POSE_AXES];
+    history_t reference[CYLINDERS_MAX];
+} moment_t;
+
+static void keep(const motion_t *self, moment_t *moment)
+{
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        moment->axis[i] = self->axis[i].state;
+        moment->reference[i] = self->reference[i];
+    }
+}
+
+static void go_back(motion_t *self, const moment_t *moment)
+{
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        self->axis[i].state = moment->axis[i];
+        self->reference[i] = moment->reference[i];
+    }
+}
+
+/* A stream's references, as one body: where a cylinder could not follow them the cycle is planned anew for all. */
+static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+{
+    ramp_ref_t curve[AXES_MAX];
+    ramp_ref_t slot_ref[AXES_MAX];
+    moment_t moment;
+    (void)stream_step(&self->stream, now_us, curve);
+    slots_scale_refs(self, curve);
+    keep(self, &moment);
+    join_step(self, curve, false, slot_ref);
+    if (!step_slots(self, slot_ref, cylinder_ref, planned, out) && join_is_beyond(self, slot_ref, cylinder_ref)) {
+        go_back(self, &moment);
+        join_step(self, curve, true, slot_ref);
+        (void)step_slots(self, slot_ref, cylinder_ref, planned, out);
+    }
+    out->flags |= join_flags(self, curve);
+}
+
+/* A step on its way at a speed limit. */
+static bool is_step_cruising(const motion_t *self)
+{
+    return self->source == MOTION_STRAIGHT && self->planned_slots == POSE_AXES && self->path.acc == 0 && self->path.vel != 0;
+}
+
+void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+{
+    plan_what_is_due(self, now_us);
+    out->flags |= self->is_stretched ? MOTION_STRETCHED : 0;
+    if (self->source == MOTION_STREAMED) {
+        step_stream(self, now_us, cylinder_ref, planned, out);
+    } else {
+        ramp_ref_t slot_ref[AXES_MAX];
+        step_source(self, slot_ref);
+        (void)step_slots(self, slot_ref, cylinder_ref, planned, out);
+        out->flags |= is_step_cruising(self) ? MOTION_SPEED : 0;
+    }
+    out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &cylinder_ref[AXIS_ANGLE], RAMP_FIRM);
+    take_over(self, cylinder_ref, out);
     out->flags |= self->is_clamped ? MOTION_CLAMPED : 0;
 }
 
 void follow_end_cycle(motion_t *self)
 {
-    if (self->source == MOTION_HALTING && halt_is_done(&self->halt) && are_slots_at_rest(self)) {
-        q32_t target_q32[AXES_MAX];
-        for (unsigned i = 0; i < AXES_MAX; i++) {
-            const ramp_ref_t by = intensity_shift(&self->intensity, self->timed_share_q46, self->timed_way_q32[i]);
-            target_q32[i] = self->path_to_q32[i] + by.pos_q32;
-        }
-        self->timed_share_q46 = self->intensity.share_q46[0];
-        plan_straight(self, target_q32, self->straight_cycles);
+    if (self->source == MOTION_HALTING && halt_is_done(&self->halt) && slot_all_at_rest(self, self->planned_slots)) {
+        slots_scale(self, self->space, self->slot_q32, self->goal_q32);
+        plan_straight(self, self->planned_slots, self->straight_cycles);
     }
 }

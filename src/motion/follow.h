@@ -13,13 +13,16 @@ bool follow_is_moving(const motion_t *self);
 /** At rest and ready to follow: takes the target that came meanwhile. */
 void follow_begin(motion_t *self, uint64_t now_us);
 
-/** Takes a target, at rest or in motion. */
+/** Takes a target, at rest or in motion. Planned is in the next cycle, for the newest one. */
 void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us);
+
+/** In pose space: the pose axes go on from where the cylinders are. */
+void follow_adopt_pose(motion_t *self);
 
 /** References of the cylinders for this cycle.
  *  @param planned out, in pose space: the pose they belong to
  *  @param out     asked, angle and flags are filled in */
-void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX], pose_t *planned, motion_output_t *out);
+void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned, motion_output_t *out);
 
 /** Changes that become due at the end of a cycle. */
 void follow_end_cycle(motion_t *self);

@@ -243,6 +243,9 @@ hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_
     if (target->space == MOTION_CYLINDERS && !slots_can_assemble(self, target)) {
         return HV_ERR_RANGE;
     }
+    if (self->is_taking_over && self->is_blend_planned && target->space != self->space) {
+        motion_follow(self); /* a blend ends where it was planned to, or not at all */
+    }
     if (self->source == MOTION_STOPPING) {
         self->pending = *target;
         self->has_pending = true;
@@ -328,7 +331,7 @@ void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out)
     ramp_ref_t ref[AXES_MAX];
     pose_t planned;
     const bool is_posed = follow_is_moving(self) && self->space == MOTION_POSE;
-    *out = (motion_output_t){.flags = self->is_stretched ? MOTION_STRETCHED : 0};
+    *out = (motion_output_t){0};
     if (follow_is_moving(self)) {
         intensity_step(&self->intensity);
         follow_step(self, now_us, ref, &planned, out);

@@ -67,6 +67,15 @@ hv_status_t quintic_plan(quintic_t *self, unsigned axes, const ramp_state_t *sta
     return HV_OK;
 }
 
+void quintic_add_motion(quintic_t *self, unsigned axis, const ramp_state_t *from)
+{
+    const q32_t bend_q32 = product(product(from->acc_per_cycle2_q32, self->cycles), self->cycles);
+    self->start_q32[axis] += from->pos_q32;
+    self->coefficient_q32[axis][0] += product(central_velocity(from), self->cycles);
+    self->coefficient_q32[axis][1] += bend_q32 / 2;
+    self->coefficient_q32[axis][2] -= bend_q32 / 6;
+}
+
 /* c[first] + c[first + 1] t + ..., each coefficient times its factor. */
 static q32_t polynomial(const q32_t *c, const int64_t *factor, unsigned first, q62_t t_q62)
 {
@@ -141,7 +150,7 @@ bool quintic_is_feasible(const quintic_t *self, const ramp_limits_t *const *limi
 {
     for (unsigned axis = 0; axis < self->axes; axis++) {
         const bounds_t bounds = bounds_of_move(limits[axis], self->cycles);
-        if (!stays_inside(self, axis, limits[axis]) || !keeps_bounds(self, axis, &bounds)) {
+        if (!keeps_bounds(self, axis, &bounds) || !stays_inside(self, axis, limits[axis])) {
             return false;
         }
     }

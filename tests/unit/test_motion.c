@@ -392,6 +392,120 @@ static void test_stream_end_comes_to_rest_on_the_last_sample(void)
     assert_pose(round(8000 * sin(980 * 0.006)) / 1000, 0, 0, 0, 0, round(30000 * sin(980 * 0.005)) / 1000);
 }
 
+/* ---- one body ---- */
+
+/* The pose in mm at a lever of 500 mm, so that degrees and mm can be compared. */
+static void body_now(double at[POSE_AXES])
+{
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        at[i] = rig_pose(&m_rig, i) * (i < AXIS_X ? 500 * acos(-1) / 180 : 1);
+    }
+}
+
+static double length(const double v[POSE_AXES])
+{
+    double sum = 0;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        sum += v[i] * v[i];
+    }
+    return sqrt(sum);
+}
+
+/* Distance of a pose from the straight line through the origin. */
+static double beside(const double at[POSE_AXES], const double direction[POSE_AXES], double *along)
+{
+    double off[POSE_AXES];
+    *along = 0;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        *along += at[i] * direction[i] / length(direction);
+    }
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        off[i] = at[i] - *along * direction[i] / length(direction);
+    }
+    return length(off);
+}
+
+static void test_body_step_from_rest_goes_straight(void)
+{
+    double worst = 0;
+    for (int run = 0; run < 60; run++) {
+        m_rig = m_ready;
+        rig_sendf(&m_rig, "@A6:%d,%d,%d,%d,%d,%d#", (int)random_below(11) - 5, (int)random_below(11) - 5,
+                  (int)random_below(17) - 8, (int)random_below(41) - 20, (int)random_below(41) - 20, (int)random_below(61) - 30);
+        double at[250][POSE_AXES], along;
+        for (unsigned k = 0; k < 250; k++) {
+            rig_run_ms(&m_rig, 2);
+            body_now(at[k]);
+        }
+        rig_run_ms(&m_rig, 500);
+        TEST_ASSERT_TRUE(is_resting());
+        double there[POSE_AXES];
+        body_now(there);
+        for (unsigned k = 0; k < 250 && length(there) > 1; k++) {
+            worst = fmax(worst, beside(at[k], there, &along) / length(there));
+        }
+        check_kept();
+    }
+    printf("steps from rest: at most %.4f %% of the step beside the straight line\n", 100 * worst);
+    TEST_ASSERT_TRUE(worst < 1e-4);
+}
+
+/* A stream along one direction, far quicker than the limits: slower, but in its direction. */
+static void test_body_stream_beyond_the_limits_keeps_its_direction(void)
+{
+    static const double k_direction[POSE_AXES] = {0.5, -0.4, 0.3, 2, 1.5, 1};
+    double direction[POSE_AXES];
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        direction[i] = k_direction[i] * (i < AXIS_X ? 500 * acos(-1) / 180 : 1);
+    }
+    for (unsigned size = 4; size <= 10; size += 2) {
+        double worst = 0, farthest = 0;
+        m_rig = m_ready;
+        for (unsigned t = 0; t < 6000; t += 16) {
+            const double a = size * sin(t * 0.0095);
+            rig_sendf(&m_rig, "@A6:%.4f,%.4f,%.4f,%.4f,%.4f,%.4f#", a * k_direction[0], a * k_direction[1], a * k_direction[2],
+                      a * k_direction[3], a * k_direction[4], a * k_direction[5]);
+            for (unsigned ms = 0; ms < 16; ms++) {
+                double at[POSE_AXES], along;
+                rig_run_ms(&m_rig, 1);
+                body_now(at);
+                worst = fmax(worst, beside(at, direction, &along));
+                farthest = fmax(farthest, fabs(along));
+            }
+        }
+        printf("stream of +-%.0f mm: went %.1f mm, at most %.3f mm (%.2f %%) beside its direction\n", size * length(direction),
+               farthest, worst, 100 * worst / farthest);
+        TEST_ASSERT_TRUE(worst < (size < 10 ? 0.01 : 0.05) * farthest);
+        TEST_ASSERT_TRUE(farthest < 1.15 * size * length(direction));
+        check_kept();
+    }
+}
+
+/* A running sine jumps aside: the body joins it again and stays on it. */
+static void test_body_stream_that_jumps_is_joined_again(void)
+{
+    double latest = 0;
+    for (unsigned run = 0; run < 12; run++) {
+        m_rig = m_ready;
+        const double rate = 0.006 + 0.0005 * run, z = 36 - 2.0 * run, phase = 0.5 * run;
+        unsigned last_off = 0;
+        for (unsigned t = 0; t < 4000; t += 16) {
+            const double aside = t >= 2000 ? 6 : 0;
+            rig_sendf(&m_rig, "@A6T:%.4f,%.4f,0,%.4f,0,%.4f,16#", aside / 2, 0.5 * sin(rate * t), aside,
+                      z * sin(rate * t + phase));
+            rig_run_ms(&m_rig, 16);
+            const double late = rate * 1e-3 * stream_delay_us(motion_stream(&m_rig.gateway.motion));
+            const double off =
+                fabs(rig_pose(&m_rig, AXIS_Z) - z * sin(rate * (t + 16) + phase - late)) + fabs(rig_pose(&m_rig, AXIS_X) - aside);
+            last_off = t >= 2000 && off > 0.5 + 0.02 * z ? t : last_off;
+        }
+        latest = fmax(latest, (double)last_off - 2000);
+        TEST_ASSERT_TRUE(last_off < 2000 + 700);
+        check_kept();
+    }
+    printf("streams that jump: joined again after %.0f ms at most\n", latest);
+}
+
 /* ---- take-over ---- */
 
 static void test_follow_far_first_pose_is_reached_at_engage_speed(void)
@@ -454,6 +568,24 @@ static void test_follow_moving_stream_is_taken_over_smoothly(void)
         }
         TEST_ASSERT_EQUAL_UINT(0, seen()->flags & MOTION_TAKEOVER);
         TEST_ASSERT_DOUBLE_WITHIN(6, 20 * sin((phase + 6000) * 0.005), rig_pose(&m_rig, AXIS_Z));
+        check_kept();
+    }
+}
+
+static void test_follow_space_changed_in_the_take_over_stops_first(void)
+{
+    const settings_t settings = rig_hexapod();
+    for (unsigned ms = 20; ms < 900; ms += 110) {
+        rig_start(&m_rig, &settings, true);
+        TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 20000));
+        rig_check_reset(&m_rig);
+        rig_send(&m_rig, "@A6:5,-4,3,10,20,30#");
+        rig_run_ms(&m_rig, ms);
+        rig_send(&m_rig, "@C6:120,80,100,90,110,70#");
+        rig_run_ms(&m_rig, 5000);
+        TEST_ASSERT_EQUAL_DOUBLE(120, rig_cylinder_mm(&m_rig, 1));
+        TEST_ASSERT_TRUE(m_rig.check.speed * 400 <= 50.1); /* engage speed all the way */
+        TEST_ASSERT_TRUE(m_rig.check.accel < 0.5);
         check_kept();
     }
 }
@@ -552,9 +684,13 @@ int main(void)
     RUN_TEST(test_timed_cylinders_are_kept_to_the_cycle);
     RUN_TEST(test_stream_constant_rate_never_stutters);
     RUN_TEST(test_stream_end_comes_to_rest_on_the_last_sample);
+    RUN_TEST(test_body_step_from_rest_goes_straight);
+    RUN_TEST(test_body_stream_beyond_the_limits_keeps_its_direction);
+    RUN_TEST(test_body_stream_that_jumps_is_joined_again);
     RUN_TEST(test_follow_far_first_pose_is_reached_at_engage_speed);
     RUN_TEST(test_follow_first_timed_move_arrives_in_its_time_at_engage_speed_at_most);
     RUN_TEST(test_follow_moving_stream_is_taken_over_smoothly);
+    RUN_TEST(test_follow_space_changed_in_the_take_over_stops_first);
     RUN_TEST(test_reach_pose_outside_is_pulled_in_as_a_whole);
     RUN_TEST(test_reach_stream_in_and_out_of_the_workspace_is_continuous);
     RUN_TEST(test_axis_limits_clamp_the_axis);

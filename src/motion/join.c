@@ -1,0 +1,245 @@
+/* SPDX-License-Identifier: MIT
+ * join.c - one body follows a stream.
+ *
+ * While the stream keeps within the limits its curve is the reference. Where an axis or a cylinder is thrown off it, the whole
+ * body leaves the curve and joins it again: the difference to the curve fades out along a quintic, the same time for all axes,
+ * while the stream moves on. Where the curve itself is beyond the limits, or no such quintic keeps them, the body heads for the
+ * newest sample, planned anew with every sample, until the curve can be joined.
+ */
+#include "join.h"
+
+#include "brake.h"
+#include "follow.h"
+#include "plan.h"
+#include "slot.h"
+#include "slots.h"
+
+#define LEAST_CYCLES 4  /* between plans because of limits */
+#define JERK_FACTOR  4  /* a lost sample may take so much more jerk than there is for a moment: the ramps absorb it */
+#define RETRY_CYCLES 16 /* between attempts to leave a sample for the curve */
+
+/* On its reference as far as the soft grip works without using all of the jerk (see ramp.c). */
+static bool is_near(const ramp_state_t *state, const history_t *reference, q32_t jerk_q32)
+{
+    return fx_abs(state->pos_q32 - reference->pos_q32) <= 4096 * jerk_q32 &&
+           fx_abs(state->vel_per_cycle_q32 - reference->vel_per_cycle_q32) <= 178 * jerk_q32 &&
+           fx_abs(state->acc_per_cycle2_q32 - reference->acc_per_cycle2_q32) <= 11 * jerk_q32;
+}
+
+static bool are_cylinders_off(const motion_t *self)
+{
+    if (self->space != MOTION_POSE || self->is_taking_over) {
+        return false;
+    }
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        const ramp_t *ramp = &self->cylinder[i];
+        if (!is_near(&ramp->state, &self->reference[i], ramp->limits.jerk_per_cycle3_q32)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool are_slots_near(const motion_t *self, const ramp_state_t *reference)
+{
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        if (!is_near(slot_state(self, i), &reference[i], slot_limits(self, i)->jerk_per_cycle3_q32)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool is_within_limits(const motion_t *self, const ramp_ref_t *ref)
+{
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        const ramp_limits_t *limits = slot_limits(self, i);
+        if (fx_abs(ref[i].vel_per_cycle_q32) > limits->vel_per_cycle_q32 ||
+            fx_abs(ref[i].acc_per_cycle2_q32) > ramp_safe_acceleration(limits)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* The reference of the cycle before. */
+static ramp_state_t before(const ramp_ref_t *ref)
+{
+    return (ramp_state_t){ref->pos_q32 - ref->vel_per_cycle_q32, ref->vel_per_cycle_q32 - ref->acc_per_cycle2_q32,
+                          ref->acc_per_cycle2_q32 - ref->jerk_per_cycle3_q32};
+}
+
+static int64_t cycles_left(const motion_t *self)
+{
+    return self->quintic.cycles - self->quintic.elapsed;
+}
+
+/* Plans the way to the stream's curve; false where the limits do not allow any. */
+static bool join_curve(motion_t *self, const ramp_ref_t *ref)
+{
+    static const q32_t k_no_error_q32[AXES_MAX] = {0};
+    ramp_state_t curve[AXES_MAX];
+    ramp_state_t error[AXES_MAX];
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        const ramp_state_t *state = slot_state(self, i);
+        curve[i] = before(&ref[i]);
+        error[i] = (ramp_state_t){state->pos_q32 - curve[i].pos_q32, state->vel_per_cycle_q32 - curve[i].vel_per_cycle_q32,
+                                  state->acc_per_cycle2_q32 - curve[i].acc_per_cycle2_q32};
+    }
+    return plan_shortest(self, error, k_no_error_q32, curve, 1);
+}
+
+/* Plans the way to the newest sample, or at least a stop. */
+static motion_join_t head_for_sample(motion_t *self)
+{
+    ramp_state_t start[AXES_MAX];
+    const ramp_limits_t *limits[AXES_MAX];
+    q32_t newest_q32[AXES_MAX];
+    slots_scale(self, self->space, self->stream.curve.last_q32, newest_q32);
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        start[i] = *slot_state(self, i);
+        limits[i] = slot_limits(self, i);
+    }
+    if (plan_shortest(self, start, newest_q32, NULL, 1)) {
+        return JOIN_SAMPLE;
+    }
+    halt_plan(&self->halt, POSE_AXES, POSE_AXES, start, limits);
+    return JOIN_HALT;
+}
+
+/* Plans anew from where the body is. */
+static void replan(motion_t *self, const ramp_ref_t *ref, bool is_curve_beyond)
+{
+    ramp_state_t curve[AXES_MAX];
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        curve[i] = before(&ref[i]);
+    }
+    self->join_cycles = 0;
+    if (is_curve_beyond || !is_within_limits(self, ref)) {
+        self->join = head_for_sample(self);
+    } else if (are_slots_near(self, curve)) {
+        self->join = JOIN_NONE;
+    } else {
+        self->join = join_curve(self, ref) ? JOIN_CURVE : head_for_sample(self);
+    }
+}
+
+/* On the way to the curve: plans anew only where that makes the way a good deal shorter. */
+static void shorten(motion_t *self, const ramp_ref_t *ref)
+{
+    const quintic_t kept = self->quintic;
+    if (!is_within_limits(self, ref) || !join_curve(self, ref) || self->quintic.cycles * 8 > (kept.cycles - kept.elapsed) * 7) {
+        self->quintic = kept;
+    }
+}
+
+void join_begin(motion_t *self)
+{
+    self->join = JOIN_DUE;
+}
+
+void join_sample(motion_t *self)
+{
+    self->has_new_sample = true;
+}
+
+static bool is_off_curve(const motion_t *self)
+{
+    return self->join == JOIN_SAMPLE || self->join == JOIN_HALT;
+}
+
+static void plan_where_due(motion_t *self, const ramp_ref_t *ref)
+{
+    const bool is_off = are_cylinders_off(self);
+    if (is_off) {
+        follow_adopt_pose(self);
+    }
+    if (is_off || self->join == JOIN_DUE || !are_slots_near(self, self->led) ||
+        (is_off_curve(self) && (self->has_new_sample || self->join_cycles >= RETRY_CYCLES))) {
+        replan(self, ref, false);
+    } else if (self->join == JOIN_CURVE && self->has_new_sample && cycles_left(self) > RETRY_CYCLES) {
+        shorten(self, ref);
+    }
+    self->has_new_sample = false;
+}
+
+static ramp_ref_t sum(const ramp_ref_t *a, const ramp_ref_t *b)
+{
+    return (ramp_ref_t){a->pos_q32 + b->pos_q32, a->vel_per_cycle_q32 + b->vel_per_cycle_q32,
+                        a->acc_per_cycle2_q32 + b->acc_per_cycle2_q32, a->jerk_per_cycle3_q32 + b->jerk_per_cycle3_q32};
+}
+
+/* One cycle along the plan. */
+static void step_plan(motion_t *self, const ramp_ref_t *curve, ramp_ref_t *ref)
+{
+    ramp_ref_t planned[AXES_MAX];
+    self->join_cycles++;
+    if (self->join == JOIN_HALT) {
+        halt_step(&self->halt, planned);
+    } else {
+        quintic_step(&self->quintic, planned);
+    }
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        ref[i] = self->join == JOIN_CURVE ? sum(&curve[i], &planned[i]) : planned[i];
+    }
+    if (self->join == JOIN_CURVE && quintic_is_done(&self->quintic)) {
+        self->join = JOIN_NONE;
+    }
+}
+
+void join_step(motion_t *self, const ramp_ref_t curve[AXES_MAX], bool is_again, ramp_ref_t ref[AXES_MAX])
+{
+    if (is_again) {
+        replan(self, curve, true);
+    } else {
+        plan_where_due(self, curve);
+    }
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        ref[i] = curve[i];
+    }
+    if (self->join != JOIN_NONE) {
+        step_plan(self, curve, ref);
+    }
+}
+
+/* True if after this reference speed and acceleration can still be kept, and its jerk is not far beyond what can be absorbed. */
+static bool is_viable(const ramp_t *ramp, const ramp_ref_t *ref)
+{
+    const int sign = ref->acc_per_cycle2_q32 < 0 ? -1 : 1;
+    const q32_t acc_q32 = sign * ref->acc_per_cycle2_q32;
+    const q32_t vel_q32 = sign * ref->vel_per_cycle_q32;
+    return acc_q32 <= ramp->acc_safe_q32 && vel_q32 >= -ramp->limits.vel_per_cycle_q32 &&
+           brake_velocity_peak(ramp, vel_q32, acc_q32) <= ramp->limits.vel_per_cycle_q32 &&
+           fx_abs(ref->jerk_per_cycle3_q32) / JERK_FACTOR <= ramp->limits.jerk_per_cycle3_q32;
+}
+
+bool join_is_beyond(const motion_t *self, const ramp_ref_t slot_ref[AXES_MAX], const ramp_ref_t cylinder_ref[AXES_MAX])
+{
+    if (self->is_taking_over || (self->join != JOIN_NONE && self->join_cycles < LEAST_CYCLES)) {
+        return false;
+    }
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        if (!is_viable(&self->cylinder[i], &cylinder_ref[i])) {
+            return true;
+        }
+    }
+    for (unsigned i = 0; self->space == MOTION_POSE && i < POSE_AXES; i++) {
+        if (!is_viable(&self->axis[i], &slot_ref[i])) {
+            return true;
+        }
+    }
+    return false;
+}
+
+unsigned join_flags(const motion_t *self, const ramp_ref_t curve[AXES_MAX])
+{
+    if (self->join == JOIN_NONE) {
+        return 0;
+    }
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        if (fx_abs(curve[i].vel_per_cycle_q32) > slot_limits(self, i)->vel_per_cycle_q32) {
+            return MOTION_SPEED;
+        }
+    }
+    return MOTION_ACCEL;
+}
