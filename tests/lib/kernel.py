@@ -61,6 +61,9 @@ def bounded(command, limit_s, **options):
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
         return None, process.communicate()[0].decode(errors="replace")
+    except BaseException:  # Ctrl-C, SIGTERM: a kernel of which nobody knows would stay
+        os.killpg(process.pid, signal.SIGKILL)
+        raise
 
 
 def own_name_space():
@@ -123,6 +126,7 @@ def main():
     parser.add_argument("--limit", type=float, default=300)
     parser.add_argument("command", nargs="+")
     options = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
         command = [find("venv.sh"), *options.command] if options.python else options.command
         finished = run(command, options.virtual_time, options.limit, options.instrumented)
