@@ -1,0 +1,180 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_canraw.py BIN - the daemon on drives with CAN frames of their own, on vcan, on virtual time. Runs inside kernel.py.
+
+What is on the bus is judged by the DBC file of the same configuration and cantools, never by code of the driver."""
+import math
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import cantools
+import heave
+import tap
+
+PRESET = heave.TOP / "config/can-raw-hexapod.ini"
+PEER = heave.TOP / "tests/peers/raw_drives.py"
+CYLINDERS = 6
+COUNTS_PER_MM = 2000
+FIRST_ID = 0x601
+PERIOD_US = 4000
+JITTER_US = 100
+STARTS = 3
+SETPOINT = b"\x01\x05"
+LIMITS = (300.0, 3000.0, 50000.0)  # speed_mm_s, accel_mm_s2, jerk_mm_s3 of the preset
+
+
+class RawBench(heave.Bench):
+    """The preset on vcan0, rising by itself, with its drives."""
+
+    def __init__(self, bin_dir, start):
+        super().__init__(bin_dir)
+        text = PRESET.read_text(encoding="utf-8")
+        for pattern, by in (("interface = can0", "interface = vcan0"), ("engage = manual", "engage = auto"), ("port = 9800", f"port = {self.port}")):
+            assert text.count(pattern) == 1, pattern
+            text = text.replace(pattern, by)
+        self.config = self.file("raw.ini", f"{text}\n[control]\nsocket = {self.socket}\n")
+        self.log = self.folder / "bus.log"
+        self.drives = subprocess.Popen([sys.executable, PEER, self.log, *map(str, start)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self.drives.stdout.readline() == "ready\n"
+
+    def __exit__(self, *exception):
+        self.end_drives()
+        super().__exit__(*exception)
+
+    def end_drives(self):
+        if self.drives.stdin:
+            self.drives.stdin.close()
+            code = self.drives.wait(timeout=heave.WAIT_S)
+            self.drives.stdout.close()
+            self.drives.stdin = None
+            assert code == 0, "the drives heard a frame that is none of theirs"
+
+    def setpoints(self):
+        """Of each drive, after end_drives(): where it stood, and (time_us, mm) of each set-point as cantools reads it."""
+        database = cantools.database.load_string(self.heaved("--config", self.config, "--dump-dbc").stdout, "dbc")
+        starts, rows = {}, {FIRST_ID + k: [] for k in range(CYLINDERS)}
+        for line in self.log.read_text(encoding="ascii").splitlines():
+            what, identifier, rest = line.split()
+            if what == "start":
+                starts[int(identifier, 16)] = int(rest) / COUNTS_PER_MM
+            elif bytes.fromhex(rest)[:2] == SETPOINT:
+                signals = database.decode_message(int(identifier, 16), bytes.fromhex(rest))
+                assert str(signals["kind"]) == "setpoint" and signals["speed"] == 2000, signals
+                rows[int(identifier, 16)].append((int(what), signals["position"]))
+        return [(starts[identifier], rows[identifier]) for identifier in sorted(rows)]
+
+
+def wave(t):
+    return f"@A6:{6 * math.sin(2 * t):.3f},{5 * math.sin(1.7 * t):.3f},0,0,0,{100 + 20 * math.sin(1.3 * t):.3f},0#"
+
+
+def random_start(source):
+    """A platform that somebody left anywhere: cylinders within a few mm of each other, as a rigid plate allows."""
+    middle = source.uniform(20, 250)
+    return [round((middle + source.uniform(-3, 3)) * COUNTS_PER_MM) for _ in range(CYLINDERS)]
+
+
+def check_limits(start_mm, rows):
+    """Differences per bus period, first to third, within the limits and what rounding to counts may add."""
+    values = [start_mm] * 3 + [mm for _, mm in rows]
+    period_s = PERIOD_US / 1e6
+    for order, limit in enumerate(LIMITS, 1):
+        values = [after - before for before, after in zip(values, values[1:])]
+        most = limit * period_s**order + 2 ** (order - 1) / COUNTS_PER_MM + 1e-9
+        worst = max(map(abs, values))
+        assert worst <= most, f"difference {order}: {worst:.5f} mm, allowed {most:.5f} mm"
+
+
+# --- Cases ---
+
+def follows_and_keeps_its_limits(bench, source):
+    trace = bench.folder / "trace.csv"
+    daemon = bench.start("--trace", trace)
+    bench.wait_state("ENGAGED")
+    with bench.sender() as sender:
+        sender.stream(3, wave)
+    assert bench.status()["state"] == "ENGAGED"
+    assert bench.stop(daemon) == 0
+    bench.end_drives()
+    columns = [[float(row[f"c{k + 1}_mm"]) for row in heave.rows_of(trace.read_bytes())] for k in range(CYLINDERS)]
+    for k, (start_mm, rows) in enumerate(bench.setpoints()):
+        assert abs(rows[0][1] - start_mm) <= 1 / COUNTS_PER_MM, f"first set-point {rows[0][1]}, the drive stood at {start_mm}"
+        gaps = {after - before for (before, _), (after, _) in zip(rows, rows[1:])}
+        assert min(gaps) > PERIOD_US - JITTER_US and max(gaps) < PERIOD_US + JITTER_US, f"periods of {min(gaps)} to {max(gaps)} us"
+        check_limits(start_mm, rows)
+        sent = {round(mm * COUNTS_PER_MM) for _, mm in rows}
+        assert max(sent) - min(sent) > 30 * COUNTS_PER_MM, "hardly moved"
+        # the last rows of the trace, every fourth one: the same numbers in the same order
+        asked = [[round(mm * COUNTS_PER_MM) for mm in columns[k][phase::4]] for phase in range(4)]
+        tail = [round(mm * COUNTS_PER_MM) for _, mm in rows][-700:-200]
+        text = ",".join(map(str, tail))
+        assert any(text in ",".join(map(str, phase)) for phase in asked), "what was sent is not what was traced"
+
+
+def is_not_moved_by_enabling(bench, source):
+    """From anywhere: the first set-point is where the drive stands."""
+    daemon = bench.start()
+    bench.wait_state("ENGAGED", "RISING", "HOMING")
+    time.sleep(source.uniform(0.1, 2))
+    bench.stop(daemon, signal.SIGKILL)
+    bench.end_drives()
+    for start_mm, rows in bench.setpoints():
+        assert rows and abs(rows[0][1] - start_mm) <= 1 / COUNTS_PER_MM, rows[:1]
+        check_limits(start_mm, rows)
+
+
+def comes_back_after_a_kill(bench, source):
+    for _ in range(STARTS):
+        daemon = bench.start()
+        with bench.sender() as sender:
+            sender.stream(source.uniform(0.5, 6), wave)
+        bench.stop(daemon, signal.SIGKILL)
+        time.sleep(source.uniform(0.01, 0.5))
+        bench.socket.unlink(missing_ok=True)
+    bench.end_drives()
+    most_mm = LIMITS[0] * PERIOD_US / 1e6 + 1 / COUNTS_PER_MM
+    for start_mm, rows in bench.setpoints():
+        values = [start_mm, *(mm for _, mm in rows)]
+        pauses = sum(after - before > 2 * PERIOD_US for (before, _), (after, _) in zip(rows, rows[1:]))
+        assert pauses >= STARTS - 1, f"{pauses} pauses"
+        assert max(abs(after - before) for before, after in zip(values, values[1:])) <= most_mm
+        for index, ((before_us, before), (after_us, after)) in enumerate(zip(rows, rows[1:])):
+            if after_us - before_us > 2 * PERIOD_US:
+                assert abs(after - before) <= 1 / COUNTS_PER_MM, f"set-point {index}: {after - before:.4f} mm after a restart"
+
+
+def silent_drives_stop_the_platform(bench, source):
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    bench.drives.send_signal(signal.SIGSTOP)
+    bench.wait_state("FAULT")
+    bench.drives.send_signal(signal.SIGCONT)
+    time.sleep(1)
+    assert bench.status()["state"] == "FAULT"
+    assert re.search("offline|bus", daemon.log.read_text(encoding="utf-8")), daemon.log.read_text(encoding="utf-8")
+
+
+CASES = [
+    ("follows a stream: the bytes on the bus are the set-points, within every limit", follows_and_keeps_its_limits, 1),
+    ("is not moved by enabling, wherever it stands", is_not_moved_by_enabling, 2),
+    ("is killed at any moment and comes back without a jump", comes_back_after_a_kill, 1),
+    ("drives that fall silent stop the platform", silent_drives_stop_the_platform, 1),
+]
+
+
+def main():
+    suite = tap.Suite()
+    for name, case, times in CASES:
+        for seed in range(times):
+            source = random.Random(seed)
+            with suite.case(name if times == 1 else f"{name}, {seed + 1}"), RawBench(sys.argv[1], random_start(source)) as bench:
+                case(bench, source)
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
