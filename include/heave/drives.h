@@ -28,8 +28,20 @@ typedef struct {
     bool has_actual;     /**< actual_mm_q32 and actual_us are valid (since the drive first reported) */
     q32_t actual_mm_q32; /**< extension [mm], or angle [deg] of the rotation motor; jumps when homing ends */
     uint64_t actual_us;  /**< when actual was measured or received; an old value means stale feedback */
-    uint32_t fault_code; /**< the device's own code, 0 = none; valid in DRIVE_FAULT */
+    uint32_t fault_code; /**< the device's own code (16 bits), or the driver's (more), 0 = none; in DRIVE_FAULT, DRIVE_OFFLINE */
 } drive_feedback_t;
+
+/** What one drive is at, in words for people. Constant texts, "" where there is nothing to say; never NULL. */
+typedef struct {
+    uint8_t address;      /**< on the bus; 0 = has none */
+    const char *phase;    /**< "missing", "configuring", "ready", "enabled", "fault", or what it waits for */
+    const char *trouble;  /**< what is or was wrong with it */
+    const char *detail;   /**< more about that */
+    uint32_t code;        /**< number of trouble, 0 = none */
+    uint32_t object;      /**< of the device, index << 8 | sub-index: what is being set, or what the trouble is about; 0 = none */
+    uint32_t detail_code; /**< of the protocol, or the value found; 0 = none */
+    uint64_t since_us;    /**< of the trouble, else of the phase */
+} drive_report_t;
 
 /** Requests to all axes together: all or none, because one leg that stops alone racks the platform. */
 typedef enum {
@@ -40,12 +52,13 @@ typedef enum {
     DRIVES_RESET_FAULT /**< FAULT -> DISABLED where the cause is gone, else FAULT stays */
 } drives_request_t;
 
-/** Every op is mandatory. */
+/** Every op is mandatory but report. */
 typedef struct {
     hv_status_t (*poll)(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX]);
     hv_status_t (*send)(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX]);
     hv_status_t (*request)(void *ctx, drives_request_t request);
     uint8_t (*count)(void *ctx);
+    void (*report)(void *ctx, uint8_t axis, drive_report_t *out); /* optional */
 } drives_ops_t;
 
 /** Passed by value; ctx belongs to the backend and lives until its close. */
@@ -98,6 +111,19 @@ static inline HV_MUST_CHECK hv_status_t drives_send(drives_t drives, uint64_t no
 static inline HV_MUST_CHECK hv_status_t drives_request(drives_t drives, drives_request_t request)
 {
     return drives.ops->request(drives.ctx, request);
+}
+
+/** What a drive is at, for people. Never blocks.
+ *  @param axis [0, drives_count())
+ *  @return false where the backend has nothing to say; out is then all "" and 0 */
+static inline bool drives_report(drives_t drives, uint8_t axis, drive_report_t *out)
+{
+    *out = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
+    if (drives.ops->report == NULL) {
+        return false;
+    }
+    drives.ops->report(drives.ctx, axis, out);
+    return true;
 }
 
 #endif

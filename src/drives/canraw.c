@@ -320,6 +320,6 @@ static uint8_t canraw_count(void *ctx)
 
 drives_t canraw_hal(canraw_t *self)
 {
-    static const drives_ops_t k_ops = {canraw_poll, canraw_send, canraw_request, canraw_count};
+    static const drives_ops_t k_ops = {canraw_poll, canraw_send, canraw_request, canraw_count, NULL};
     return (drives_t){&k_ops, self};
 }

@@ -4,10 +4,13 @@
 #include "contract.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "canraw_maps.h"
 #include "canraw_slave.h"
+#include "cia402_slave.h"
+#include "heave/cia402.h"
 #include "sim_drives.h"
 
 /** A backend under test: seven axes with 300 mm of travel each, standing at 100 mm + 10 mm per axis, homed, disabled. */
@@ -143,10 +146,122 @@ static void power_canraw(uint8_t axis, bool is_on)
     canraw_slave.drive[axis].is_on = is_on;
 }
 
+/* CANopen drives, behind the CiA 402 driver. */
+
+void hv_assert_failed(const char *file, int line)
+{
+    (void)printf("%s:%d: assertion failed\n", file, line);
+    abort();
+}
+
+static sim_can_bus_t cia402_bus;
+static sim_can_t cia402_node;
+static cia402_slave_t cia402_slave;
+static cia402_config_t cia402_config;
+static cia402_t cia402;
+
+static void settle_cia402(uint64_t until_us)
+{
+    cia402_slave_step(&cia402_slave, until_us);
+}
+
+static void configure_cia402(cia402_mode_t mode, uint32_t period_us)
+{
+    cia402_config = (cia402_config_t){.axes = AXES,
+                                      .master_node = 127,
+                                      .mode = mode,
+                                      .period_us = period_us,
+                                      .heartbeat_ms = 50,
+                                      .heartbeat_timeout_ms = 150,
+                                      .sdo_timeout_ms = 100,
+                                      .boot_timeout_ms = 1000,
+                                      .power_timeout_ms = 2000,
+                                      .window_ms = 20,
+                                      .abort_option = 1,
+                                      .is_reset_wanted = true};
+    for (uint8_t k = 0; k < AXES; k++) {
+        cia402_config.axis[k] = (cia402_axis_config_t){.node = (uint8_t)(k + 1),
+                                                       .scale = {k % 2 ? -1000 : 1000, 1, 5000 * k},
+                                                       .step_max_q32 = MM(2),
+                                                       .following_max_q32 = MM(10),
+                                                       .window_counts = 10000,
+                                                       .profile_speed = 100000,
+                                                       .profile_accel = 1000000};
+    }
+}
+
+/* On the bus, and long enough for the drives to be set up. */
+static bool start_cia402(drives_t *drives, cia402_mode_t mode, uint32_t period_us)
+{
+    hal_can_filter_t filter[CIA402_FILTERS_MAX];
+    drive_state_t last = DRIVE_OFFLINE;
+    sim_can_bus_init(&cia402_bus, 0, NULL, 0);
+    cia402_slave_open(&cia402_slave, &cia402_bus);
+    configure_cia402(mode, period_us);
+    for (uint8_t k = 0; k < AXES; k++) {
+        cia402_slave.drive[k].position = 5000 * k + (k % 2 ? -1000 : 1000) * (100 + 10 * k);
+    }
+    const uint32_t filters = cia402_filters(&cia402_config, filter);
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&cia402_node, &cia402_bus, filter, filters));
+    TEST_ASSERT_EQUAL(HV_OK, cia402_init(&cia402, &cia402_config, sim_can_hal(&cia402_node)));
+    *drives = cia402_hal(&cia402);
+    for (int i = 0; i < 5000 && last != DRIVE_DISABLED; i++) {
+        now_us += CYCLE_US;
+        settle_cia402(now_us);
+        (void)!drives_poll(*drives, now_us, feedback);
+        (void)!drives_send(*drives, now_us, setpoint_q32);
+        last = DRIVE_DISABLED;
+        for (uint8_t k = 0; k < AXES; k++) {
+            last = feedback[k].state != DRIVE_DISABLED ? feedback[k].state : last;
+        }
+    }
+    return true;
+}
+
+static bool open_cia402_csp(drives_t *drives)
+{
+    return start_cia402(drives, CIA402_MODE_CSP, CYCLE_US);
+}
+
+static bool open_cia402_slow(drives_t *drives)
+{
+    return start_cia402(drives, CIA402_MODE_CSP, 4 * CYCLE_US);
+}
+
+static bool open_cia402_ip(drives_t *drives)
+{
+    return start_cia402(drives, CIA402_MODE_IP, CYCLE_US);
+}
+
+static bool open_cia402_pp(drives_t *drives)
+{
+    return start_cia402(drives, CIA402_MODE_PP, CYCLE_US);
+}
+
+static void fault_cia402(uint8_t axis)
+{
+    cia402_slave_fault(&cia402_slave, axis, 0x2310);
+    for (uint32_t i = 0; i < cia402_config.period_us / CYCLE_US; i++) { /* the next SYNC tells */
+        now_us += CYCLE_US;
+        settle_cia402(now_us);
+        (void)!drives_poll(hal, now_us, feedback);
+        (void)!drives_send(hal, now_us, setpoint_q32);
+    }
+}
+
+static void power_cia402(uint8_t axis, bool is_on)
+{
+    cia402_slave_power(&cia402_slave, axis, is_on);
+}
+
 static const fixture_t k_fixtures[] = {
     {"sim", open_sim, close_sim, settle_sim, fault_sim, power_sim},
     {"canraw-plain", open_canraw_plain, close_sim, settle_canraw, NULL, power_canraw},
     {"canraw-rich", open_canraw_rich, close_sim, settle_canraw, fault_canraw, power_canraw},
+    {"cia402-csp", open_cia402_csp, close_sim, settle_cia402, fault_cia402, power_cia402},
+    {"cia402-slow", open_cia402_slow, close_sim, settle_cia402, fault_cia402, power_cia402},
+    {"cia402-ip", open_cia402_ip, close_sim, settle_cia402, fault_cia402, power_cia402},
+    {"cia402-pp", open_cia402_pp, close_sim, settle_cia402, fault_cia402, power_cia402},
 };
 
 static hv_status_t poll_once(void)

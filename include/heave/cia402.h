@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: MIT
+ * cia402.h - CANopen drives with the profile CiA 402, behind drives.h: the gateway is their master.
+ * It produces SYNC and a heartbeat, sets every drive up by SDO (nodes in parallel) and reads back what matters, then sends one
+ * set of set-points per bus period. All drives are switched on together and get their torque together, with the target on the
+ * actual position; a drive that is not perfectly well is not enabled. The caller owns cia402_t; the motion thread alone calls it.
+ *
+ * Order in a bus period: SYNC when the period begins (in poll), RPDOs in the send of the same cycle; they act at the next SYNC.
+ * Everything else (heartbeat, NMT, SDO) goes out in cycles in which no period begins, if there are any. Nothing of a new period
+ * is sent before everything of the last one was seen on the wire; three periods of that are the loss of the bus. The gateway then
+ * keeps silent until the drives' watch over its heartbeat has run out, restarts the bus and sets all drives up again.
+ *
+ * A drive is OFFLINE until it is set up and its first TPDO has come, and again as soon as one of these says that it is lost: no
+ * TPDO for three SYNCs, no heartbeat for heartbeat_timeout_ms, another NMT state than operational, a boot-up message. It is set
+ * up again from the beginning; its position must be found again unless it is absolute.
+ */
+#ifndef HEAVE_CIA402_H
+#define HEAVE_CIA402_H
+
+#include "heave/cia402_state.h"
+#include "heave/counts.h"
+#include "heave/drives.h"
+#include "heave/hal/can.h"
+#include "heave/sdo.h"
+
+/** Modes of operation (6060h) that set-points are sent in, and homing. */
+typedef enum { CIA402_MODE_PP = 1, CIA402_MODE_HOMING = 6, CIA402_MODE_IP = 7, CIA402_MODE_CSP = 8 } cia402_mode_t;
+
+/** Why a drive is not there, or has been stopped by this driver: the numbers of feedback.fault_code beyond 16 bits. Codes of the
+ *  drives themselves have 16 bits. */
+typedef enum {
+    CIA402_TROUBLE_NONE,
+    CIA402_SILENT = 0x10001,    /**< does not answer */
+    CIA402_LOST_TPDO = 0x10002, /**< no TPDO for three SYNCs */
+    CIA402_LOST_HEARTBEAT = 0x10003,
+    CIA402_LEFT_OPERATIONAL = 0x10004,
+    CIA402_REBOOTED = 0x10005, /**< booted without being asked to */
+    CIA402_LOST_BUS = 0x10006,
+    CIA402_NOT_402 = 0x10007, /**< 1000h names another profile */
+    CIA402_WRONG_IDENTITY = 0x10008,
+    CIA402_NOT_TAKEN = 0x10009,    /**< an object was refused, or does not hold what was written */
+    CIA402_UNGUARDED = 0x1000A,    /**< a guard of the drive is off: it would not stop by itself */
+    CIA402_NO_HEARTBEAT = 0x1000B, /**< never sends one */
+    CIA402_NO_MODE = 0x1000C,      /**< 6061h does not show the mode */
+    CIA402_NO_START = 0x1000D,     /**< does not become operational, or its TPDO is not what was mapped */
+    CIA402_NO_POWER = 0x1000E,     /**< does not switch on in time */
+    CIA402_NO_TORQUE = 0x1000F,    /**< does not enable operation, or does not follow, in time */
+    CIA402_REMOTE_OFF = 0x10010,   /**< under local control (bit 9 of 6041h) */
+    CIA402_FELL_OUT = 0x10011      /**< left operation enabled by itself */
+} cia402_trouble_t;
+
+/** One drive. Counts are those of the drive (6064h). Unit u: mm, or deg of the rotation motor. */
+typedef struct {
+    uint8_t node;                 /**< [1, 127], all different, also from the master's */
+    counts_scale_t scale;         /**< counts per u, and the counts at 0 u */
+    q32_t step_max_q32;           /**< largest step of set-points, u per bus period; > 0 */
+    q32_t following_max_q32;      /**< largest distance of a set-point from actual, u; 0 = not watched here */
+    uint32_t window_counts;       /**< 6065h */
+    int8_t homing_method;         /**< 6098h; 0: the position is absolute, there is nothing to find */
+    uint32_t homing_speed[2];     /**< 6099h, counts/s: towards the switch, and to the zero */
+    uint32_t homing_accel;        /**< 609Ah, counts/s^2 */
+    int32_t homing_offset_counts; /**< 607Ch */
+    uint32_t quick_stop_accel;    /**< 6085h, counts/s^2; 0 = as it is */
+    uint32_t profile_speed;       /**< 6081h, mode PP only */
+    uint32_t profile_accel;       /**< 6083h, 6084h, mode PP only */
+    uint32_t identity[4];         /**< 1018h sub 1 to 4: vendor, product, revision, serial number; 0 = any */
+} cia402_axis_config_t;
+
+/** The drives of a platform. */
+typedef struct {
+    uint8_t axes;                  /**< [1, DRIVES_MAX] */
+    uint8_t master_node;           /**< [1, 127]: whose heartbeat the drives watch */
+    cia402_mode_t mode;            /**< CSP, IP or PP */
+    uint32_t period_us;            /**< of the bus: cia402_is_period() */
+    uint16_t heartbeat_ms;         /**< of both sides; > 0 */
+    uint16_t heartbeat_timeout_ms; /**< of both sides; > heartbeat_ms */
+    uint16_t sdo_timeout_ms;       /**< > 0 */
+    uint16_t boot_timeout_ms;      /**< after reset communication */
+    uint16_t power_timeout_ms;     /**< to switch on, and to enable operation */
+    uint16_t window_ms;            /**< 6066h */
+    int16_t abort_option;          /**< 6007h: 1 fault, 2 disable voltage, 3 quick stop */
+    uint8_t sync_counter;          /**< 1019h: 0 = none, or [2, 240] */
+    bool is_sync_watched;          /**< 1006h holds the period: drives may stop where SYNC is late */
+    bool is_reset_wanted;          /**< reset communication before setting up */
+    bool is_unguarded_allowed;     /**< drives without guards are taken all the same */
+    bool is_homing_in_turn;        /**< one drive after the other */
+    cia402_axis_config_t axis[DRIVES_MAX];
+} cia402_config_t;
+
+/** How far a drive has come; private. */
+typedef enum {
+    CIA402_MISSING,
+    CIA402_RESETTING,
+    CIA402_CONFIGURING,
+    CIA402_STARTING,
+    CIA402_UP,
+    CIA402_LEAVING, /**< lost, is told to stop for a while */
+    CIA402_REFUSED  /**< cannot be used; until it boots or the operator resets */
+} cia402_phase_t;
+
+/** What runs through the table of objects; private. */
+typedef enum { CIA402_JOB_NONE, CIA402_JOB_SETUP, CIA402_JOB_MODE, CIA402_JOB_ERROR } cia402_job_t;
+
+/** A walk through some rows of the table of objects; private. */
+typedef struct {
+    cia402_job_t job;
+    uint8_t row;
+    uint8_t step;
+    uint8_t tries;
+    bool is_asked;     /* an SDO of this step is under way */
+    uint8_t mode;      /* of CIA402_JOB_MODE and at the end of CIA402_JOB_SETUP */
+    uint32_t value;    /* read in an earlier step */
+    uint64_t since_us; /* of the row */
+    uint64_t pause_us; /* nothing is done before */
+} cia402_setup_t;
+
+/** How homing stands; private. */
+typedef enum {
+    CIA402_HOMING_NO,
+    CIA402_HOMING_WAITING,
+    CIA402_HOMING_STARTED,
+    CIA402_HOMING_RUNNING,
+    CIA402_HOMING_DONE
+} cia402_homing_t;
+
+/** One drive at work; private. */
+typedef struct {
+    cia402_phase_t phase;
+    uint64_t phase_us;
+    uint32_t trouble; /* cia402_trouble_t of the last loss or refusal */
+    uint64_t trouble_us;
+    uint32_t trouble_object; /* index << 8 | sub */
+    uint32_t trouble_code;   /* SDO abort code, or the value found */
+    uint32_t warned_object;  /* a guard that is off and was allowed to be */
+    sdo_t sdo;
+    cia402_setup_t setup;
+    uint8_t nmt;         /* last heard */
+    uint8_t nmt_command; /* waits to be sent, 0 = none */
+    uint8_t starts;      /* attempts to become operational */
+    bool is_boot_expected;
+    bool is_reset_done;
+    bool has_heartbeat;
+    uint64_t heartbeat_us;
+
+    bool has_actual; /* since it was set up last */
+    bool was_heard;  /* has_actual at any time */
+    uint16_t statusword;
+    int8_t mode_shown;
+    int32_t actual_counts;
+    int64_t position_counts; /* without the wrap-around of 32 bits */
+    q32_t actual_q32;
+    uint64_t actual_us;
+    uint32_t silent_syncs;
+    uint32_t wrong_length;
+
+    cia402_goal_t goal;
+    bool is_in; /* takes part in what the drives do together */
+    uint16_t word;
+    uint8_t word_syncs;  /* since it changed, saturates */
+    uint8_t reset_syncs; /* of the way through a fault reset, 0 = none */
+    uint64_t reset_until_us;
+    uint64_t operating_us; /* operation enabled since, 0 = not */
+    uint64_t stopping_us;  /* quick stop since, 0 = not */
+    uint32_t own_fault;    /* found by this driver: cia402_trouble_t or a number of the standard; 0 = none */
+    uint16_t error_code;   /* the drive's own */
+    uint8_t error_register;
+    bool is_error_read;
+    bool was_faulty;
+    cia402_homing_t homing;
+    bool is_homed;
+    int32_t target_counts;
+    q32_t sent_q32;
+    bool has_sent;
+} cia402_axis_t;
+
+/** What the drives do together; private. */
+typedef enum {
+    CIA402_STAGE_OFF,
+    CIA402_STAGE_WITHDRAW, /**< no torque, for a change of mode */
+    CIA402_STAGE_MODE,
+    CIA402_STAGE_SWITCH_ON,
+    CIA402_STAGE_OPERATE,
+    CIA402_STAGE_HOMING,
+    CIA402_STAGE_FOLLOW
+} cia402_stage_t;
+
+/** The drives of a platform; private but for the counters. */
+typedef struct {
+    const cia402_config_t *config;
+    hal_can_t can;
+    cia402_stage_t stage;
+    uint64_t stage_us;
+    uint32_t stage_syncs;
+    bool is_begun;  /* the request that led here has been seen in a poll */
+    bool is_homing; /* on the way through homing, rather than to enabled */
+    bool is_homing_asked;
+    bool is_gone;          /* the bus does not work */
+    bool is_due;           /* a period has begun, its SYNC has not gone out */
+    bool is_open;          /* SYNC has gone out, the set-points have not */
+    bool was_period_begin; /* in the last poll */
+    bool is_free;          /* everything sent was seen on the wire */
+    bool has_time;
+    bool is_preop_due; /* all nodes have to be told to leave operational */
+    uint8_t pp_step;   /* of the handshake in PP */
+    uint8_t sync_count;
+    uint64_t now_us;
+    uint64_t sync_us;
+    uint64_t free_us;
+    uint64_t gone_us;
+    uint64_t restart_us;
+    uint64_t heartbeat_us;
+    uint32_t syncs;
+    uint32_t sets;     /**< sent */
+    uint32_t refused;  /**< sets that had to wait for the bus */
+    uint32_t restarts; /**< of the bus, that worked */
+    uint32_t emergencies;
+    cia402_axis_t axis[DRIVES_MAX];
+} cia402_t;
+
+/** Starts; sends nothing yet.
+ *  @param config kept
+ *  @return HV_OK; HV_ERR_ARG: no usable bus; HV_ERR_RANGE: the configuration contradicts itself or the ranges above. */
+hv_status_t cia402_init(cia402_t *self, const cia402_config_t *config, hal_can_t can) HV_MUST_CHECK;
+
+/** The drives as drives.h wants them. */
+drives_t cia402_hal(cia402_t *self);
+
+/** True where 60C2h can hold this period: whole ms up to 255, or up to 255 of 100 us. */
+bool cia402_is_period(uint32_t period_us);
+
+#define CIA402_FILTERS_MAX (4u * DRIVES_MAX)
+#define CIA402_OWNS_MAX    (3u + 2u * DRIVES_MAX)
+
+/** What is received, and what is sent, for the backend's open.
+ *  @param filter out
+ *  @return how many */
+uint32_t cia402_filters(const cia402_config_t *config, hal_can_filter_t filter[CIA402_FILTERS_MAX]);
+uint32_t cia402_owns(const cia402_config_t *config, hal_can_filter_t filter[CIA402_OWNS_MAX]);
+
+#endif

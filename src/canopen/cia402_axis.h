@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: MIT
+ * cia402_axis.h - one drive: from missing to up, what it sends, whether it is lost, and its next controlword.
+ */
+#ifndef CIA402_AXIS_H
+#define CIA402_AXIS_H
+
+#include "heave/cia402.h"
+
+/** Bytes of the PDOs. */
+#define CIA402_TPDO_BYTES 7u
+#define CIA402_RPDO_BYTES 6u
+
+/** Number of the fault that the driver itself finds: like the drives' own. */
+#define CIA402_FOLLOWING_ERROR 0x8611u
+#define CIA402_HOMING_ERROR    0x8613u
+#define CIA402_GENERIC_ERROR   0x1000u
+
+/** One drive with what it is configured to be, for the functions below. */
+typedef struct {
+    cia402_axis_t *axis;
+    const cia402_config_t *config;
+    const cia402_axis_config_t *own; /**< its entry of the configuration */
+    uint64_t now_us;
+} cia402_drive_t;
+
+/** Starts from nothing: nobody has answered yet. */
+void cia402_axis_init(cia402_drive_t drive);
+
+/** Received: by the kind of identifier. */
+void cia402_axis_take_tpdo(cia402_drive_t drive, const can_frame_t *frame);
+void cia402_axis_take_emergency(cia402_drive_t drive, const can_frame_t *frame);
+void cia402_axis_take_heartbeat(cia402_drive_t drive, const can_frame_t *frame);
+
+/** SYNC went out: a TPDO is due. */
+void cia402_axis_note_sync(cia402_axis_t *self);
+
+/** Once per poll, behind what was received: goes on with setting up, finds out whether the drive is lost or fell out. */
+void cia402_axis_step(cia402_drive_t drive);
+
+/** The drive is lost; it is set up again, after a while in which it is told to stop where it may still hear. */
+void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why);
+
+/** Stops the drive and holds it as faulty until a reset.
+ *  @param code cia402_trouble_t, or a number of the standard */
+void cia402_axis_fail(cia402_drive_t drive, uint32_t code);
+
+/** Begins to take a fault back, the drive's and ours; a refused drive is tried again. */
+void cia402_axis_reset(cia402_drive_t drive);
+
+/** True where its set-points are sent. */
+bool cia402_axis_is_heard(const cia402_axis_t *self);
+
+/** Chooses the controlword of the next RPDO; called once for each.
+ *  @param mode_bits for operation enabled */
+void cia402_axis_next_word(cia402_drive_t drive, uint16_t mode_bits);
+
+/** State by the last statusword. */
+cia402_state_t cia402_axis_state(const cia402_axis_t *self);
+
+/** True where operation is enabled and set-points are followed. */
+bool cia402_axis_is_operating(cia402_drive_t drive);
+
+#endif

@@ -1,0 +1,104 @@
+/* SPDX-License-Identifier: MIT
+ * cia402_objects.h - every object that is written to or checked in a drive, in order: one constant table.
+ */
+#ifndef CIA402_OBJECTS_H
+#define CIA402_OBJECTS_H
+
+#include "heave/cia402.h"
+
+/** What is done with an object. */
+typedef enum {
+    CIA402_WRITE,         /**< written; "read only" is no trouble, a later row checks */
+    CIA402_SET,           /**< written and read back */
+    CIA402_CHECK,         /**< read and compared */
+    CIA402_AWAIT,         /**< read until it holds the value */
+    CIA402_PDO_OFF,       /**< bit 31 of the COB-ID set, the rest as it is */
+    CIA402_PDO_ON,        /**< COB-ID with bit 31 clear and bit 30 as it is, read back */
+    CIA402_READ,          /**< read */
+    CIA402_PREOPERATIONAL /**< no object: the drive's heartbeat says pre-operational */
+} cia402_deed_t;
+
+/** What follows from a refusal. */
+typedef enum {
+    CIA402_MUST,     /**< the drive cannot be used */
+    CIA402_IF_THERE, /**< nothing */
+    CIA402_GUARD     /**< the drive would not stop by itself: refused unless the configuration allows that */
+} cia402_need_t;
+
+/** Which configurations a row is for. */
+typedef enum {
+    CIA402_ALWAYS,
+    CIA402_IF_CYCLIC, /**< CSP and IP */
+    CIA402_IF_IP,
+    CIA402_IF_PP,
+    CIA402_IF_HOMING,
+    CIA402_IF_NONZERO, /**< where the value is not 0 */
+    CIA402_IF_COUNTER
+} cia402_when_t;
+
+/** Where a value comes from. */
+typedef enum {
+    CIA402_CONSTANT,
+    CIA402_IDENTITY, /**< constant: which */
+    CIA402_CONSUMER,
+    CIA402_HEARTBEAT,
+    CIA402_SYNC_PERIOD,
+    CIA402_COUNTER,
+    CIA402_RPDO_COB,
+    CIA402_TPDO_COB,
+    CIA402_TARGET_MAPPING,
+    CIA402_ABORT_OPTION,
+    CIA402_WINDOW,
+    CIA402_WINDOW_TIME,
+    CIA402_QUICK_STOP_ACCEL,
+    CIA402_PERIOD_VALUE,
+    CIA402_PERIOD_EXPONENT,
+    CIA402_HOMING_METHOD,
+    CIA402_HOMING_SPEED, /**< constant: which */
+    CIA402_HOMING_ACCEL,
+    CIA402_HOMING_OFFSET,
+    CIA402_PROFILE_SPEED,
+    CIA402_PROFILE_ACCEL,
+    CIA402_MODE
+} cia402_source_t;
+
+/** One row. */
+typedef struct {
+    uint16_t index;
+    uint8_t sub;
+    uint8_t bytes;
+    cia402_deed_t deed;
+    cia402_need_t need;
+    cia402_when_t when;
+    cia402_source_t source;
+    uint32_t constant;
+    uint32_t trouble; /**< cia402_trouble_t where it fails */
+} cia402_object_t;
+
+extern const cia402_object_t cia402_objects[];
+
+/** The rows: the first is the one that asks whether anybody is there; the modes' rows come last of those for setting up. */
+extern const uint8_t cia402_objects_setup_end;
+extern const uint8_t cia402_objects_mode_begin;
+extern const uint8_t cia402_objects_error_begin;
+extern const uint8_t cia402_objects_error_end;
+
+/** True where the row means something for this drive. */
+bool cia402_object_applies(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis);
+
+/** What the object shall hold.
+ *  @param setup for values read before, and the mode */
+uint32_t cia402_object_value(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis,
+                             const cia402_setup_t *setup);
+
+/** Bits of the object that are compared. */
+uint32_t cia402_object_mask(const cia402_object_t *row);
+
+/** True where a guard holds another value than we wrote, but is on. */
+bool cia402_object_is_guarding(const cia402_object_t *row, const cia402_config_t *config, uint32_t value);
+
+/** Period as 60C2h has it: value * 10^exponent seconds.
+ *  @return false where it cannot be had */
+bool cia402_period_parts(uint32_t period_us, uint8_t *value, int8_t *exponent);
+
+#endif

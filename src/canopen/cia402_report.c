@@ -1,0 +1,178 @@
+/* SPDX-License-Identifier: MIT
+ * cia402_report.c - what a drive is at; see cia402_report.h.
+ */
+#include "cia402_report.h"
+
+#include "cia402_axis.h"
+#include "cia402_objects.h"
+#include "heave/canopen_text.h"
+
+static bool is_faulty(const cia402_axis_t *axis)
+{
+    const cia402_state_t state = cia402_axis_state(axis);
+    return axis->own_fault != 0 || state == CIA402_FAULT || state == CIA402_FAULT_REACTION;
+}
+
+drive_state_t cia402_report_state(const cia402_t *self, uint8_t index)
+{
+    const cia402_axis_t *axis = &self->axis[index];
+    if (axis->phase != CIA402_UP) {
+        return DRIVE_OFFLINE;
+    }
+    if (is_faulty(axis)) {
+        return DRIVE_FAULT;
+    }
+    if (!axis->is_in || self->stage == CIA402_STAGE_OFF) {
+        return DRIVE_DISABLED;
+    }
+    if (self->stage == CIA402_STAGE_FOLLOW) {
+        return DRIVE_ENABLED;
+    }
+    return self->is_homing_asked ? DRIVE_HOMING : DRIVE_ENABLING;
+}
+
+static uint32_t fault_code(const cia402_axis_t *axis, drive_state_t state)
+{
+    if (state == DRIVE_OFFLINE) {
+        return axis->trouble;
+    }
+    if (state != DRIVE_FAULT) {
+        return 0;
+    }
+    if (axis->own_fault != 0) {
+        return axis->own_fault;
+    }
+    return axis->error_code != 0 ? axis->error_code : CIA402_GENERIC_ERROR;
+}
+
+void cia402_report_feedback(const cia402_t *self, uint8_t index, drive_feedback_t *out)
+{
+    const cia402_axis_t *axis = &self->axis[index];
+    const drive_state_t state = cia402_report_state(self, index);
+    *out = (drive_feedback_t){
+        .state = state,
+        .is_homed = axis->is_homed,
+        .has_actual = axis->was_heard,
+        .actual_mm_q32 = axis->actual_q32,
+        .actual_us = axis->actual_us,
+        .fault_code = fault_code(axis, state),
+    };
+}
+
+/* --- In words --- */
+
+static const struct {
+    uint32_t code;
+    const char *text;
+} k_troubles[] = {
+    {CIA402_SILENT, "does not answer: supply, cable, termination, node id, bit rate?"},
+    {CIA402_LOST_TPDO, "sent no position for three SYNCs"},
+    {CIA402_LOST_HEARTBEAT, "sent no heartbeat in time"},
+    {CIA402_LEFT_OPERATIONAL, "left the NMT state operational"},
+    {CIA402_REBOOTED, "started again by itself: supply?"},
+    {CIA402_LOST_BUS, "the bus does not work"},
+    {CIA402_NOT_402, "is no CiA 402 drive"},
+    {CIA402_WRONG_IDENTITY, "is not the device that the configuration names"},
+    {CIA402_NOT_TAKEN, "does not take what it has to be set to"},
+    {CIA402_UNGUARDED, "would not stop by itself: a guard is off"},
+    {CIA402_NO_HEARTBEAT, "sends no heartbeat"},
+    {CIA402_NO_MODE, "does not go to the mode of operation"},
+    {CIA402_NO_START, "does not become operational, or sends another TPDO than was mapped"},
+    {CIA402_NO_POWER, "does not switch on: power stage, enable input?"},
+    {CIA402_NO_TORQUE, "does not enable operation: brake, safe torque off?"},
+    {CIA402_REMOTE_OFF, "is under local control, not under that of the bus"},
+    {CIA402_FELL_OUT, "left operation enabled by itself: enable input, safe torque off?"},
+};
+
+static const char *code_text(uint32_t code)
+{
+    for (size_t i = 0; i < sizeof k_troubles / sizeof k_troubles[0]; i++) {
+        if (k_troubles[i].code == code) {
+            return k_troubles[i].text;
+        }
+    }
+    return code <= UINT16_MAX ? canopen_error_text((uint16_t)code) : "";
+}
+
+static const char *stage_text(cia402_stage_t stage)
+{
+    static const char *const k_texts[] = {
+        [CIA402_STAGE_OFF] = "ready",
+        [CIA402_STAGE_WITHDRAW] = "waits for all drives to have no torque",
+        [CIA402_STAGE_MODE] = "waits for the mode of operation of all drives",
+        [CIA402_STAGE_SWITCH_ON] = "waits for all drives to be switched on",
+        [CIA402_STAGE_OPERATE] = "waits for operation enabled of all drives",
+        [CIA402_STAGE_HOMING] = "homing",
+        [CIA402_STAGE_FOLLOW] = "enabled",
+    };
+    return k_texts[stage];
+}
+
+static const char *up_text(const cia402_t *self, uint8_t index)
+{
+    const cia402_axis_t *axis = &self->axis[index];
+    if (is_faulty(axis)) {
+        return "fault";
+    }
+    if (axis->is_in) {
+        return stage_text(self->stage);
+    }
+    return cia402_has_torque(cia402_axis_state(axis)) ? "stopping" : "ready";
+}
+
+static const char *phase_text(const cia402_t *self, uint8_t index)
+{
+    switch (self->axis[index].phase) {
+    case CIA402_MISSING:
+        return "missing";
+    case CIA402_RESETTING:
+        return "booting";
+    case CIA402_CONFIGURING:
+        return "configuring";
+    case CIA402_STARTING:
+        return "starting";
+    case CIA402_UP:
+        return up_text(self, index);
+    case CIA402_LEAVING:
+        return "lost";
+    case CIA402_REFUSED:
+        return "refused";
+    }
+    return "";
+}
+
+/* The object that a drive is being set up with, or that it does not take. */
+static uint32_t object_of(const cia402_axis_t *axis)
+{
+    if (axis->phase == CIA402_CONFIGURING && axis->setup.row < cia402_objects_setup_end) {
+        const cia402_object_t *row = &cia402_objects[axis->setup.row];
+        return (uint32_t)row->index << 8 | row->sub;
+    }
+    return axis->phase == CIA402_REFUSED ? axis->trouble_object : axis->warned_object;
+}
+
+/* A value below 2^24 is one that was found; abort codes are above. */
+static const char *detail_text(const cia402_axis_t *axis)
+{
+    if (axis->phase != CIA402_REFUSED || axis->trouble_object == 0) {
+        return axis->warned_object != 0 && axis->phase == CIA402_UP ? "its guard is off, which the configuration allows" : "";
+    }
+    return axis->trouble_code >= 0x05000000u ? canopen_abort_text(axis->trouble_code) : "it holds another value";
+}
+
+void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *out)
+{
+    const cia402_axis_t *axis = &self->axis[index];
+    const uint32_t fault = fault_code(axis, cia402_report_state(self, index));
+    const uint32_t code = fault != 0 ? fault : axis->trouble;
+    *out = (drive_report_t){
+        .address = self->config->axis[index].node,
+        .phase = phase_text(self, index),
+        .trouble = code_text(code),
+        .code = code,
+        .object = object_of(axis),
+        .detail = detail_text(axis),
+        .detail_code = axis->phase == CIA402_REFUSED && axis->trouble_object != 0 ? axis->trouble_code : 0,
+        .since_us = code != 0 ? axis->trouble_us : axis->phase_us,
+    };
+}

@@ -1,0 +1,364 @@
+/* SPDX-License-Identifier: MIT
+ * cia402_stage.c - what the drives do together; see cia402_stage.h.
+ * A mode is changed only without torque. Drives are switched on together and get their torque together; where one of them does
+ * not come along, all are led back and that one is faulty.
+ */
+#include "cia402_stage.h"
+
+#include "cia402_setup.h"
+
+#define SWITCHED_ON_SYNCS 3u /* set-points that lie on actual before the torque comes */
+#define MODE_TIMEOUT_US   6000000u
+#define HOMING_BEGIN_US   500000u /* "done" before "not done" is believed only after this: it may be that of the last homing */
+#define HOMING_BITS       (CIA402_STATUS_BIT12 | CIA402_STATUS_REACHED)
+
+cia402_drive_t cia402_drive(cia402_t *self, unsigned axis)
+{
+    return (cia402_drive_t){&self->axis[axis], self->config, &self->config->axis[axis], self->now_us};
+}
+
+static void enter(cia402_t *self, cia402_stage_t stage)
+{
+    self->stage = stage;
+    self->stage_us = self->now_us;
+    self->stage_syncs = 0;
+}
+
+static void set_goals(cia402_t *self, cia402_goal_t goal)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        self->axis[k].goal = goal;
+    }
+}
+
+static bool needs_homing(const cia402_t *self, unsigned k)
+{
+    return self->config->axis[k].homing_method != 0;
+}
+
+static bool is_any_to_home(const cia402_t *self)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        if (needs_homing(self, k)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool is_in_state(const cia402_t *self, cia402_state_t state)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        if (cia402_axis_state(&self->axis[k]) != state) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Down to no torque; what is switched on may stay so. */
+static void withdraw(cia402_t *self)
+{
+    enter(self, CIA402_STAGE_WITHDRAW);
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        const cia402_state_t state = cia402_axis_state(&self->axis[k]);
+        const bool is_on = state == CIA402_SWITCHED_ON || state == CIA402_OPERATION_ENABLED;
+        self->axis[k].goal = is_on ? CIA402_GOAL_ON : CIA402_GOAL_OFF;
+    }
+}
+
+void cia402_stage_begin(cia402_t *self, bool is_homing)
+{
+    self->is_begun = false;
+    self->is_homing = is_homing;
+    self->is_homing_asked = is_homing;
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        self->axis[k].is_in = true;
+        self->axis[k].trouble = CIA402_TROUBLE_NONE;
+        self->axis[k].homing = is_homing && needs_homing(self, k) ? CIA402_HOMING_WAITING : CIA402_HOMING_NO;
+    }
+    if (is_homing && !is_any_to_home(self)) {
+        enter(self, CIA402_STAGE_HOMING); /* which then is over */
+    } else {
+        withdraw(self);
+    }
+}
+
+void cia402_stage_end(cia402_t *self, cia402_goal_t goal)
+{
+    enter(self, CIA402_STAGE_OFF);
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        cia402_axis_t *axis = &self->axis[k];
+        axis->is_in = false;
+        axis->homing = CIA402_HOMING_NO;
+        if (axis->setup.job == CIA402_JOB_MODE) {
+            axis->setup.job = CIA402_JOB_NONE;
+        }
+        if (axis->phase == CIA402_UP && axis->goal != CIA402_GOAL_STOP) { /* a quick stop goes on to its end */
+            axis->goal = goal;
+        }
+    }
+}
+
+static cia402_mode_t mode_of(const cia402_t *self, unsigned k)
+{
+    return self->is_homing && needs_homing(self, k) ? CIA402_MODE_HOMING : self->config->mode;
+}
+
+/* --- Towards enabled --- */
+
+static void step_withdraw(cia402_t *self)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        if (cia402_has_torque(cia402_axis_state(&self->axis[k]))) {
+            return;
+        }
+    }
+    enter(self, CIA402_STAGE_MODE);
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        cia402_setup_begin(&self->axis[k], CIA402_JOB_MODE, mode_of(self, k), self->now_us);
+    }
+}
+
+static bool is_in_mode(const cia402_axis_t *axis)
+{
+    return axis->setup.job == CIA402_JOB_NONE && axis->mode_shown == (int8_t)axis->setup.mode;
+}
+
+/* Those that have not come along in time. */
+static void fail_where(cia402_t *self, bool (*is_there)(cia402_t *self, unsigned k), cia402_trouble_t why)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        const bool is_local = (self->axis[k].statusword & CIA402_STATUS_REMOTE) == 0;
+        if (!is_there(self, k)) {
+            cia402_axis_fail(cia402_drive(self, k), is_local && why != CIA402_NO_MODE ? CIA402_REMOTE_OFF : why);
+        }
+    }
+}
+
+static bool has_mode(cia402_t *self, unsigned k)
+{
+    return is_in_mode(&self->axis[k]);
+}
+
+static bool is_switched_on(cia402_t *self, unsigned k)
+{
+    return cia402_axis_state(&self->axis[k]) == CIA402_SWITCHED_ON;
+}
+
+static bool is_operating(cia402_t *self, unsigned k)
+{
+    return cia402_axis_is_operating(cia402_drive(self, k));
+}
+
+static bool are_all(cia402_t *self, bool (*is_there)(cia402_t *self, unsigned k))
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        if (!is_there(self, k)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static uint64_t power_timeout_us(const cia402_t *self)
+{
+    return self->config->power_timeout_ms * (uint64_t)1000u;
+}
+
+static bool is_late(const cia402_t *self, uint64_t limit_us)
+{
+    return self->now_us - self->stage_us >= limit_us;
+}
+
+static void step_mode(cia402_t *self)
+{
+    if (are_all(self, has_mode)) {
+        enter(self, CIA402_STAGE_SWITCH_ON);
+        set_goals(self, CIA402_GOAL_ON);
+    } else if (is_late(self, MODE_TIMEOUT_US)) {
+        fail_where(self, has_mode, CIA402_NO_MODE);
+    }
+}
+
+static void step_switch_on(cia402_t *self)
+{
+    if (!is_in_state(self, CIA402_SWITCHED_ON)) {
+        self->stage_syncs = 0;
+    } else if (self->stage_syncs >= SWITCHED_ON_SYNCS) {
+        enter(self, CIA402_STAGE_OPERATE);
+        set_goals(self, CIA402_GOAL_OPERATE);
+        return;
+    }
+    if (is_late(self, power_timeout_us(self))) {
+        fail_where(self, is_switched_on, CIA402_NO_POWER);
+    }
+}
+
+static void begin_following(cia402_t *self)
+{
+    enter(self, CIA402_STAGE_FOLLOW);
+    self->pp_step = 0;
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        self->axis[k].has_sent = false;
+    }
+}
+
+static void step_operate(cia402_t *self)
+{
+    if (are_all(self, is_operating)) {
+        if (self->is_homing) {
+            enter(self, CIA402_STAGE_HOMING);
+        } else {
+            begin_following(self);
+        }
+    } else if (is_late(self, power_timeout_us(self))) {
+        fail_where(self, is_operating, CIA402_NO_TORQUE);
+    }
+}
+
+/* --- Homing --- */
+
+/* Alone, or when all before it have arrived. */
+static bool may_start(const cia402_t *self, unsigned k)
+{
+    for (unsigned i = 0; self->config->is_homing_in_turn && i < k; i++) {
+        if (self->axis[i].homing != CIA402_HOMING_NO && self->axis[i].homing != CIA402_HOMING_DONE) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void step_homing_axis(cia402_t *self, unsigned k)
+{
+    cia402_axis_t *axis = &self->axis[k];
+    const uint16_t bits = axis->statusword & HOMING_BITS;
+    if (axis->homing == CIA402_HOMING_WAITING && may_start(self, k)) {
+        axis->homing = CIA402_HOMING_STARTED;
+        axis->phase_us = self->now_us;
+        return;
+    }
+    if (axis->homing != CIA402_HOMING_STARTED && axis->homing != CIA402_HOMING_RUNNING) {
+        return;
+    }
+    const bool has_begun = axis->homing == CIA402_HOMING_RUNNING || self->now_us - axis->phase_us >= HOMING_BEGIN_US;
+    if ((axis->statusword & CIA402_STATUS_BIT13) != 0 && has_begun) {
+        cia402_axis_fail(cia402_drive(self, k), CIA402_HOMING_ERROR);
+    } else if (bits == HOMING_BITS && has_begun) {
+        axis->homing = CIA402_HOMING_DONE;
+        axis->is_homed = true;
+    } else if (bits != HOMING_BITS && axis->word_syncs > 0) {
+        axis->homing = CIA402_HOMING_RUNNING;
+    }
+}
+
+/* Then back to the mode of the set-points, on the new zero. */
+static void step_homing(cia402_t *self)
+{
+    bool is_over = true;
+    bool is_any = false;
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        step_homing_axis(self, k);
+        is_any |= self->axis[k].homing != CIA402_HOMING_NO;
+        is_over &= self->axis[k].homing == CIA402_HOMING_NO || self->axis[k].homing == CIA402_HOMING_DONE;
+    }
+    if (!is_over) {
+        return;
+    }
+    self->is_homing = false;
+    if (is_any) {
+        withdraw(self);
+    } else {
+        begin_following(self);
+    }
+}
+
+/* --- Following --- */
+
+/* A drive that leaves the enabled state without being asked to, or that says that it cannot follow. */
+static void watch_operation(cia402_t *self)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        cia402_axis_t *axis = &self->axis[k];
+        const cia402_state_t state = cia402_axis_state(axis);
+        const bool is_watched = self->config->mode != CIA402_MODE_IP && self->stage == CIA402_STAGE_FOLLOW;
+        if (!axis->is_in) {
+            continue;
+        }
+        if (state != CIA402_OPERATION_ENABLED) {
+            axis->is_in = false;
+            axis->goal = CIA402_GOAL_STOP;
+            axis->trouble = CIA402_FELL_OUT;
+            axis->trouble_us = self->now_us;
+        } else if (is_watched && (axis->statusword & CIA402_STATUS_BIT13) != 0) {
+            cia402_axis_fail(cia402_drive(self, k), CIA402_FOLLOWING_ERROR);
+        }
+    }
+}
+
+static bool are_all_in(const cia402_t *self)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        if (!self->axis[k].is_in) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void step(cia402_t *self)
+{
+    switch (self->stage) {
+    case CIA402_STAGE_WITHDRAW:
+        step_withdraw(self);
+        break;
+    case CIA402_STAGE_MODE:
+        step_mode(self);
+        break;
+    case CIA402_STAGE_SWITCH_ON:
+        step_switch_on(self);
+        break;
+    case CIA402_STAGE_OPERATE:
+        step_operate(self);
+        break;
+    case CIA402_STAGE_HOMING:
+        watch_operation(self);
+        step_homing(self);
+        break;
+    case CIA402_STAGE_FOLLOW:
+        watch_operation(self);
+        break;
+    case CIA402_STAGE_OFF:
+        break;
+    }
+}
+
+void cia402_stage_step(cia402_t *self)
+{
+    if (self->stage == CIA402_STAGE_OFF) {
+        return;
+    }
+    if (!self->is_begun) { /* a request is seen in one poll before it goes on in the next */
+        self->is_begun = true;
+        return;
+    }
+    if (are_all_in(self)) {
+        step(self);
+    }
+    if (!are_all_in(self) && self->stage != CIA402_STAGE_FOLLOW) { /* when following, the gateway decides */
+        cia402_stage_end(self, CIA402_GOAL_STOP);
+    }
+}
+
+uint16_t cia402_stage_mode_bits(const cia402_t *self, unsigned k)
+{
+    const cia402_axis_t *axis = &self->axis[k];
+    if (axis->homing != CIA402_HOMING_NO && self->is_homing) {
+        return axis->homing == CIA402_HOMING_WAITING ? 0 : CIA402_WORD_BIT4;
+    }
+    if (self->config->mode == CIA402_MODE_PP) {
+        return CIA402_WORD_AT_ONCE | (self->pp_step == 1u ? CIA402_WORD_BIT4 : 0);
+    }
+    return self->config->mode == CIA402_MODE_IP ? CIA402_WORD_BIT4 : 0;
+}
