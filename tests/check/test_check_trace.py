@@ -249,6 +249,10 @@ def z_of(extension):
     return math.sqrt((synthetic.RETRACTED + extension)**2 - synthetic.LEAN**2) - synthetic.ZERO_HEIGHT
 
 
+def extension_of(z):
+    return synthetic.extensions((0, 0, 0, 0, 0, z))[0]
+
+
 def slide(trace, state_name, start, end, cycles=2000):
     """All cylinders from one extension to another."""
     for i in range(cycles + 1):
@@ -281,6 +285,15 @@ def check_stroke(suite):
         slide(trace, "ENGAGED", 0.2, 0.5)
         slide(trace, "ENGAGED", 0.5, 0.4)
         expect(rules_broken(trace.lines()), *STROKES)
+    for text, end, rules in (("clamped", 94.0, set()), ("clamped", 95.001, {"z position"}), ("", 94.0, {"z position"})):
+        with suite.case(f"an axis placed at 95 mm, bounds of 90, in to 80 and out to {end} is {'found' if rules else 'fine'}, flags {text or 'none'}"):
+            trace = Trace()
+            slide(trace, "ENGAGED", extension_of(0), extension_of(95))
+            for start, stop in ((95, 80), (80, end)):
+                for i in range(1001):
+                    trace.pose("ENGAGED", (0, 0, 0, 0, 0, start + (stop - start) * synthetic.smooth(i / 1000)), flags=text)
+            trace.pose("ENGAGED", (0, 0, 0, 0, 0, end), flags=text)
+            expect(rules_broken(trace.lines()), *rules)
     with suite.case("bounds of a pose axis: 0.001 mm beyond is found, unless in cylinder space"):
         for text, rules in (("", {"z position"}), ("clamped", {"z position"}), ("cylinders", set())):
             trace = Trace()

@@ -22,6 +22,7 @@ LATCHED = {"FAULT": {"FAULT", "ESTOP", "OFF"}, "ESTOP": {"ESTOP", "FAULT", "OFF"
 FLAGS = {"clamped", "speed", "accel", "stretched", "takeover", "cylinders", "off-path", "no-pose", "late", "fault", "estop", "silent"}
 NO_POSE_BOUNDS = {"cylinders", "off-path", "takeover", "no-pose"}
 NO_POSE_LIMITS = NO_POSE_BOUNDS | {"clamped"}
+POSE_ANYWHERE = NO_POSE_BOUNDS - {"off-path"}  # the pose axes take over where such a row leaves them
 
 POSE_COLUMNS = [f"{axis}_{UNIT[axis]}" for axis in POSE_AXES]
 ANGLE = len(POSE_AXES)
@@ -38,13 +39,13 @@ POSE_NOISE = 10  # a pose at rest may be solved anew from the same extensions, i
 
 
 class FlagTable(dict):
-    """flags as printed -> (has pose limits, has pose bounds, has a pose, is well-formed); filled when asked."""
+    """flags as printed -> (has pose limits, has pose bounds, has a pose, is well-formed, pose axes are led elsewhere); filled when asked."""
 
     def __missing__(self, text):
         words = text.split("|") if text else []
         known = set(words)
         fine = known <= FLAGS and len(known) == len(words)
-        self[text] = result = (not known & NO_POSE_LIMITS, not known & NO_POSE_BOUNDS, "no-pose" not in known, fine)
+        self[text] = result = (not known & NO_POSE_LIMITS, not known & NO_POSE_BOUNDS, "no-pose" not in known, fine, known & POSE_ANYWHERE != set())
         return result
 
 
@@ -271,15 +272,16 @@ class Checker:
         return self.strokes + ([self.angle_range] if self.angle_range else [])
 
     def _check_pose(self, block, start, stop):
-        """Limits and bounds of the pose axes, over the rows whose flags say that they hold."""
+        """Limits and bounds of the pose axes, over the rows whose flags say that they hold. An axis that came in from outside its bounds may
+        be pulled in further with the others (clamped), and then go back out to where it would have been."""
         i = start
         for facts, group in groupby(self.flag_facts[start:stop]):
             end = i + sum(1 for _ in group)
             if facts[1]:
                 for rule in self.pose_ranges:
-                    rule.check(block, i, end, self.findings)
+                    rule.check(block, i, end, self.findings, keeps=not facts[0])
             else:
-                self._place_pose(block, end - 1)
+                self._place_pose(block, end - 1, keeps=not facts[4])
             if facts[0]:
                 self._check_pose_rates(block, i, end)
             else:
@@ -298,9 +300,9 @@ class Checker:
         self.age = self.pose_age = 0
         self._place_pose(block, stop - 1)
 
-    def _place_pose(self, block, i):
+    def _place_pose(self, block, i, keeps=False):
         for rule, rates in zip(self.pose_ranges, self.pose_rates):
-            rule.place(block, i, rates[1].per_cycle, rates[2].per_cycle)
+            rule.place(block, i, rates[1].per_cycle, rates[2].per_cycle, keeps)
 
     # ---- rest, engage speed, relays ----
     def _check_rest(self, block, state, start, stop):

@@ -126,17 +126,21 @@ class RangeRule:
         self.seen_low = self.seen_high = None
         self.worst_t_us, self.rows = None, 0
 
-    def place(self, block, i, accel=None, jerk=None):
-        """The rows up to i were not checked. accel and jerk, per cycle, are those it can stop with if it moves."""
-        value = block.value(self.column, i)
+    def place(self, block, i, accel=None, jerk=None, keeps=False):
+        """The rows up to i were not checked. accel and jerk, per cycle, are those it can stop with if it moves. keeps: what was allowed before
+        still is."""
+        value, before = block.value(self.column, i), (self.least, self.most)
         self.least, self.most, self.stopping_rows = min(self.low, value), max(self.high, value), 0
         if accel:
             speed, push = block.magnitudes[self.column][1][i], block.magnitudes[self.column][2][i]
             speed += push * push / (2 * jerk)
             self.stopping_rows = math.ceil(speed / accel + 2 * max(accel, push) / jerk) if speed else 0
             self.least, self.most = self.least - speed * self.stopping_rows, self.most + speed * self.stopping_rows
+        if keeps:
+            self.least, self.most = min(self.least, before[0]), max(self.most, before[1])
 
-    def check(self, block, start, stop, findings):
+    def check(self, block, start, stop, findings, keeps=False):
+        """keeps: whatever was allowed at first still is at the end."""
         if start >= stop:
             return
         values = block.columns[self.column][start + 3:stop + 3]
@@ -145,7 +149,7 @@ class RangeRule:
         self._remember(block, values, low, high, start)
         if low >= self.low and high <= self.high:
             self.stopping_rows -= min(self.stopping_rows, len(values))
-            if not self.stopping_rows:
+            if not self.stopping_rows and not keeps:
                 self.least, self.most = self.low, self.high
             return
         for i, value in enumerate(values, start):
@@ -153,7 +157,7 @@ class RangeRule:
                 findings.add(self.name, self.label, *block.at(i), self.text(value), self.limit_text())
             if self.stopping_rows:
                 self.stopping_rows -= 1
-            else:
+            elif not keeps:
                 self.least, self.most = min(self.low, max(value, self.least)), max(self.high, min(value, self.most))
 
     def _remember(self, block, values, low, high, start):
