@@ -102,6 +102,9 @@ def main():
             result = run_tests.judge(lines, verdict)
             got = (result.passed, len(result.failures), len(result.skips))
             assert got == expected, f"counted {got}, must be {expected}: {result.failures}"
+    with suite.case("counting, figures of the same name are added up"):
+        result = run_tests.judge(["# figure 5 cycles", "ok 1 - a", "# figure 7 cycles", "# figure 1 seed", "1..1"], "Passed")
+        assert (result.figures, result.passed) == ({"cycles": 12, "seed": 1}, 1), result.figures
     with suite.case("counting, ctest's own lines are no output of the test"):
         assert run_tests.after_preamble(["Test command: /t", "Working Directory: /", "Test timeout computed to be: 9", "ok 1 - a"]) == ["ok 1 - a"]
         assert run_tests.after_preamble(["Test command: /t", "Test timeout computed to be: 9", "ok 1 - a"]) == ["ok 1 - a"]

@@ -7,6 +7,7 @@ usage: run_tests.py BUILD_DIR [REGEX]
 Two kinds of output are understood: Unity's ("file:12:test_name:PASS", "3 Tests 0 Failures 0 Ignored") and TAP
 ("ok 1 - name", "not ok 2 - name", "ok 3 - name # SKIP reason", "1..3"). Anything else counts as one case.
 Nothing may pass by silence: a test that fails, crashes, stops before its summary or runs no case is a failed case.
+A comment "# figure N TEXT" says how much was tried: figures with the same text are added up over all tests and printed above the last line.
 Output: one line per test, below a failing one what it printed (except its passing cases), then the skipped and the failed cases, then "N passed, N failed, N skipped".
 Exit status 0 only if something passed and nothing failed.
 """
@@ -22,6 +23,7 @@ CTEST_RESULT = re.compile(r"^\s*\d+/\d+ Test +#(\d+): (.+?) \.*\s*(.*?)\s+([\d.]
 UNITY_CASE = re.compile(r"([^\s:][^:]*:\d+):([^:]+):(PASS|FAIL|IGNORE)(?:: ?(.*))?$")
 UNITY_SUMMARY = re.compile(r"^(\d+) Tests (\d+) Failures (\d+) Ignored\s*$")
 TAP_CASE = re.compile(r"^(not )?ok\b *\d* *(?:- *)?(.*?)(?: *# *(SKIP)\b *(.*))?$", re.IGNORECASE)
+FIGURE = re.compile(r"^# figure (\d+) (.+)$")
 TAP_PLAN = re.compile(r"^1\.\.(\d+)(?: *# *(.*))?$")
 
 
@@ -32,6 +34,11 @@ class Result:
         self.passed = 0
         self.failures = []
         self.skips = []
+        self.figures = {}
+
+    def count_figures(self, lines):
+        for number, text in (match.groups() for match in map(FIGURE.match, lines) if match):
+            self.figures[text] = self.figures.get(text, 0) + int(number)
 
     def count_unity(self, lines):
         summaries = [match for match in map(UNITY_SUMMARY.match, lines) if match]
@@ -78,6 +85,7 @@ class Result:
 def judge(lines, verdict):
     """The result of one test from what it printed and from what ctest says of it."""
     result = Result()
+    result.count_figures(lines)
     if any(UNITY_SUMMARY.match(line) for line in lines):
         result.count_unity(lines)
     elif any(TAP_PLAN.match(line) or TAP_CASE.match(line) for line in lines):
@@ -142,6 +150,11 @@ def main():
         cases = [f"  {name}: {case}" for name, result in results for case in getattr(result, kind)]
         if cases:
             print(title, *cases, sep="\n")
+    figures = {}
+    for text, number in (figure for _, result in results for figure in result.figures.items()):
+        figures[text] = figures.get(text, 0) + number
+    for text, number in figures.items():
+        print(f"{number:,} {text}")
     passed = sum(result.passed for _, result in results)
     failed = sum(len(result.failures) for _, result in results)
     if passed + failed == 0:
