@@ -90,7 +90,9 @@ class Maker:
         return numbers + ([angle] if command in ("A4", "A7", "C7") else [])
 
     def random_pose(self, share):
-        pose = [self.between(-a, a) * share for a in AMPLITUDES]
+        """On all axes, where cylinders limit most, or on one of them, whose own limits count then."""
+        one = self.whole(0, 5) if self.chance(0.3) else None
+        pose = [self.between(-a, a) * share if one in (None, i) else 0.0 for i, a in enumerate(AMPLITUDES)]
         pose[5] += self.centre
         return pose
 
@@ -99,7 +101,7 @@ class Maker:
         return [self.stroke * (middle + self.between(-0.6, 0.6) * share) for _ in range(self.cylinders)]
 
     def random_frame(self, share, time_ms=None):
-        command = self.command("C" if self.chance(0.3) else "A")
+        command = self.command("C" if self.chance(0.15) else "A")
         numbers = self.values(command, self.random_pose(share), self.random_extensions(share), self.between(-1, 1) * ANGLE_AMPLITUDE * share)
         last = self.mask() if time_ms is None else str(time_ms)
         return self.frame(command + ("" if time_ms is None else "T"), [self.number(v) for v in numbers], last)
@@ -110,8 +112,8 @@ class Maker:
         period = 1000 / self.pick(RATES_HZ)
         jitter = period * self.pick((0, 0, 0.1, 0.3, 0.9))
         loss, spikes = self.pick((0, 0.01, 0.2)), self.pick((0, 0, 0.02))
-        share = self.pick((0.05, 0.3, 0.3, 0.7, 1.5))
-        space = "C" if self.chance(0.3) else "A"
+        share = self.pick((0.05, 0.15, 0.3, 0.7, 1.5))
+        space = "C" if self.chance(0.2) else "A"
         command = self.command(space)
         is_timed = self.chance(0.3)
         waves = [(self.between(0.05, 3), self.between(0, 6.28), self.between(0, share)) for _ in range(7)]
@@ -124,6 +126,8 @@ class Maker:
             pose = [a * w for a, w in zip(AMPLITUDES, wave)]
             pose[5] += self.centre
             extensions = [self.stroke * (0.5 + 0.5 * w) for w in wave[:self.cylinders]]
+            if self.chance(0.01):
+                clock += period * self.pick((1, 2, 3, 5, 20))  # the sender pauses
             if self.chance(spikes):
                 pose = self.random_pose(3)
             texts = [style.format(v) for v in self.values(command, pose, extensions, ANGLE_AMPLITUDE * wave[6])]
@@ -135,7 +139,7 @@ class Maker:
 
     def steps(self):
         """Targets far apart at any time."""
-        share = self.pick((0.1, 0.5, 1, 2))
+        share = self.pick((0.1, 0.2, 0.5, 1, 2))
         for _ in range(self.whole(3, 40)):
             self.put(self.random_frame(share))
             self.wait(self.pick((0, 1, 3, 20, 150, 700, 1500)) * self.between(0.5, 1.5))
@@ -210,6 +214,28 @@ class Maker:
             self.put(self.random_frame(0.5))
             self.wait(self.pick(choices))
 
+    def senders(self):
+        """Two senders at once, then one alone for long enough to be followed; in the end the first one again."""
+        for _ in range(self.whole(4, 30)):
+            self.request(f"from 10.0.0.{self.whole(1, 2)}")
+            self.put(self.random_frame(0.4, self.whole(0, 600) if self.chance(0.2) else None))
+            self.wait(self.pick((0, 5, 16.667, 40)))
+        self.wait(self.pick((100, 2600)))
+        for _ in range(self.whole(5, 60)):
+            self.put(self.random_frame(0.3))
+            self.wait(16.667)
+        self.request("from 127.0.0.1", 2600)
+
+    def intensity(self):
+        """More or less of the motion while it is on; all of it again in the end."""
+        share, period = self.pick((0.1, 0.5, 1)), self.pick((5, 16.667, 50))
+        for _ in range(self.whole(2, 6)):
+            self.request(f"intensity {self.whole(0, 100)}")
+            for _ in range(self.whole(1, 40)):
+                self.put(self.random_frame(share, self.whole(0, 800) if self.chance(0.1) else None))
+                self.wait(period)
+        self.request("intensity 100", self.pick((0, 2100)))
+
     def operator(self):
         """Requests in the middle of motion."""
         self.put(self.random_frame(0.6, self.whole(100, 1500) if self.chance(0.5) else None))
@@ -243,7 +269,8 @@ class Maker:
 
     def make(self, count):
         scenes = [self.stream] * 5 + [self.operator] * 4
-        scenes += [self.steps, self.timed, self.isolated, self.switching, self.extremes, self.garbage, self.several, self.silence]
+        scenes += [self.steps, self.timed, self.isolated, self.switching, self.extremes, self.garbage, self.several, self.silence, self.senders,
+                   self.intensity]
         self.left = count
         self.out.write("; hostile input made by make_frames.py\n")
         self.request("engage", self.pick((0, 100, 4000)))

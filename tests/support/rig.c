@@ -302,9 +302,10 @@ bool rig_was_logged(rig_t *self, const char *text)
 bool rig_is_within_limits(const rig_t *self)
 {
     const rig_check_t *c = &self->check;
-    const bool is_within = c->speed <= 1 + 1e-6 && c->accel <= 1 + 1e-6 && c->jerk <= 1 + 1e-6 && c->outside_mm <= 1e-9;
+    const bool is_within = c->speed <= 1 + 1e-9 && c->accel <= 1 + 1e-9 && c->jerk <= 1 + 1e-9 && c->outside_mm <= 1e-9;
     if (!is_within) {
-        printf("limits: speed %.7f, acceleration %.7f, jerk %.7f, outside %.9f mm\n", c->speed, c->accel, c->jerk, c->outside_mm);
+        printf("limits: speed %.10f, acceleration %.10f, jerk %.10f, outside %.9f mm\n", c->speed, c->accel, c->jerk,
+               c->outside_mm);
     }
     return is_within;
 }
