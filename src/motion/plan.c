@@ -54,12 +54,11 @@ static bool try_quintic(motion_t *self, unsigned slots, const ramp_state_t *star
 }
 
 static bool find_shortest(motion_t *self, unsigned slots, const ramp_state_t *start, const q32_t *target_q32,
-                          const ramp_state_t *base, int64_t least)
+                          const ramp_state_t *base, int64_t least, int64_t most)
 {
     plan_limits_t limits;
     limits_beside(self, slots, base, &limits);
     int64_t cycles = least > SHORTEST_CYCLES ? least : SHORTEST_CYCLES;
-    const int64_t most = base != NULL ? JOIN_MAX_US / (int64_t)self->cycle_us : INT64_MAX;
     for (int attempt = 0; attempt < ATTEMPTS && cycles <= most; attempt++) {
         if (try_quintic(self, slots, start, target_q32, base, &limits, cycles)) {
             return true;
@@ -71,7 +70,8 @@ static bool find_shortest(motion_t *self, unsigned slots, const ramp_state_t *st
 
 bool plan_shortest(motion_t *self, const ramp_state_t *start, const q32_t *target_q32, const ramp_state_t *base, int64_t least)
 {
-    return find_shortest(self, POSE_AXES, start, target_q32, base, least);
+    const int64_t most = base != NULL ? JOIN_MAX_US / (int64_t)self->cycle_us : INT64_MAX;
+    return find_shortest(self, POSE_AXES, start, target_q32, base, least, most);
 }
 
 /* The straight way between two points of the slots, as a path with the limits of axes and cylinders. */
@@ -119,7 +119,8 @@ static int64_t plan_quickest(motion_t *self, unsigned slots, const ramp_state_t 
 {
     const int64_t in_two_parts = plan_stop_then_straight(self, slots, start);
     self->source = MOTION_TIMED;
-    if (find_shortest(self, slots, start, self->goal_q32, NULL, least) && self->quintic.cycles <= in_two_parts) {
+    const int64_t from = least > in_two_parts / 4 ? least : in_two_parts / 4; /* none is shorter than that */
+    if (find_shortest(self, slots, start, self->goal_q32, NULL, from, in_two_parts)) {
         return self->quintic.cycles;
     }
     self->source = MOTION_HALTING;

@@ -10,6 +10,7 @@
 
 #define COEFFICIENT_MAX_Q32 ((q32_t)1 << 56) /* leaves room for the factor 60 of the third derivative */
 #define CHECK_POINTS        32
+#define COARSE_STRIDE       8
 #define ROUNDING_ATTEMPTS   64
 #define SPARE_DIV           64
 
@@ -25,7 +26,8 @@ ramp_ref_t history_advance(history_t *self, q32_t pos_q32)
 /* Product that saturates: for bounds that may be far beyond what they bound. */
 static int64_t product(int64_t a, int64_t b)
 {
-    return fx_mul_div(a, b, 1);
+    const int64_t half = fx_mul_shift(a, b, 1);
+    return half >= INT64_MAX / 2 ? INT64_MAX : half <= INT64_MIN / 2 ? INT64_MIN : a * b;
 }
 
 /* Velocity as the derivative at the cycle itself: the backward difference lies half a cycle earlier. */
@@ -120,9 +122,9 @@ static bool is_within_bounds_at(const quintic_t *self, unsigned axis, const boun
            fx_abs(polynomial(c, k_factor_jerk, 2, t_q62)) <= bounds->jerk;
 }
 
-static bool keeps_bounds(const quintic_t *self, unsigned axis, const bounds_t *bounds)
+static bool keeps_bounds(const quintic_t *self, unsigned axis, const bounds_t *bounds, int64_t stride)
 {
-    for (int64_t point = 0; point <= CHECK_POINTS; point++) {
+    for (int64_t point = 0; point <= CHECK_POINTS; point += stride) {
         if (!is_within_bounds_at(self, axis, bounds, point * (Q62_ONE / CHECK_POINTS))) {
             return false;
         }
@@ -148,9 +150,15 @@ static bool stays_inside(const quintic_t *self, unsigned axis, const ramp_limits
 
 bool quintic_is_feasible(const quintic_t *self, const ramp_limits_t *const *limits)
 {
+    bounds_t bounds[AXES_MAX];
+    for (unsigned axis = 0; axis < self->axes; axis++) { /* a few points of all axes first: most of what is tried fails there */
+        bounds[axis] = bounds_of_move(limits[axis], self->cycles);
+        if (!keeps_bounds(self, axis, &bounds[axis], COARSE_STRIDE)) {
+            return false;
+        }
+    }
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        const bounds_t bounds = bounds_of_move(limits[axis], self->cycles);
-        if (!keeps_bounds(self, axis, &bounds) || !stays_inside(self, axis, limits[axis])) {
+        if (!keeps_bounds(self, axis, &bounds[axis], 1) || !stays_inside(self, axis, limits[axis])) {
             return false;
         }
     }
