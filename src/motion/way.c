@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * way.c - cylinder speeds, accelerations and jerks along a planned way, from differences of a few sampled extensions.
  * On a straight way with parameter s a cylinder's acceleration is c' s'' + c'' s'^2. The bend takes a quarter of the limit at
- * most, the rest is left for s''. The limiter stays the last word; this makes moves that it need not touch.
+ * most, what it does not take is left for s''. The limiter stays the last word; this makes moves that it need not touch.
  */
 #include "way.h"
 
@@ -75,6 +75,22 @@ static void narrow_by_bend(path_limits_t *limits, q32_t bend_q32, q32_t acc_limi
     limits->vel_q62 = vel_q62 < limits->vel_q62 ? vel_q62 : limits->vel_q62;
 }
 
+static void narrow_by_speed(path_limits_t *limits, q32_t slope_q32, q32_t vel_limit_q32)
+{
+    const int64_t vel_q62 = slope_q32 > 0 ? fx_mul_div(vel_limit_q32 - vel_limit_q32 / 64, Q62_ONE, slope_q32) : Q62_ONE;
+    limits->vel_q62 = vel_q62 < limits->vel_q62 ? vel_q62 : limits->vel_q62;
+}
+
+/* What the bend leaves of a cylinder's acceleration, c'' s'^2, and jerk, 3 c'' s' s'', at the most that the path allows. */
+static ramp_limits_t less_bend(const ramp_limits_t *own, q32_t bend_q32, const path_limits_t *limits)
+{
+    const q32_t by_vel_q32 = fx_mul_shift(bend_q32, limits->vel_q62, 62);
+    ramp_limits_t left = *own;
+    left.acc_per_cycle2_q32 -= fx_clamp(fx_mul_shift(by_vel_q32, limits->vel_q62, 62), 0, own->acc_per_cycle2_q32 / 4);
+    left.jerk_per_cycle3_q32 -= fx_clamp(3 * fx_mul_shift(by_vel_q32, limits->acc_q62, 62), 0, own->jerk_per_cycle3_q32 / 4);
+    return left;
+}
+
 void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q32, path_limits_t *limits)
 {
     differences_t d[CYLINDERS_MAX] = {{0}};
@@ -97,7 +113,13 @@ void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q
     }
     for (unsigned i = 0; i < motion->cylinders; i++) {
         const ramp_limits_t *own = &motion->cylinder[i].limits;
-        path_limits_narrow(limits, slope_q32[i] * STRAIGHT_PIECES / 3 * 4, own);
-        narrow_by_bend(limits, bend_q32[i] * STRAIGHT_PIECES * STRAIGHT_PIECES, own->acc_per_cycle2_q32);
+        slope_q32[i] *= STRAIGHT_PIECES;
+        bend_q32[i] *= STRAIGHT_PIECES * STRAIGHT_PIECES;
+        narrow_by_speed(limits, slope_q32[i], own->vel_per_cycle_q32);
+        narrow_by_bend(limits, bend_q32[i], own->acc_per_cycle2_q32);
+    }
+    for (unsigned i = 0; i < motion->cylinders; i++) {
+        const ramp_limits_t left = less_bend(&motion->cylinder[i].limits, bend_q32[i], limits);
+        path_limits_narrow(limits, slope_q32[i], &left);
     }
 }

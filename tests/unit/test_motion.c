@@ -102,6 +102,13 @@ static long run_until_rest(long most_ms)
     return -1;
 }
 
+/* The same after some ms on the way; counts those too. */
+static long run_until_rest_after(unsigned ms, long most_ms)
+{
+    rig_run_ms(&m_rig, ms);
+    return (long)ms + run_until_rest(most_ms);
+}
+
 static void assert_pose(double roll, double pitch, double yaw, double x, double y, double z)
 {
     const double expected[POSE_AXES] = {roll, pitch, yaw, x, y, z};
@@ -333,6 +340,70 @@ static void test_timed_cylinders_are_kept_to_the_cycle(void)
     check_arrives_after(2000);
     TEST_ASSERT_EQUAL_DOUBLE(120, rig_cylinder_mm(&m_rig, 1));
     TEST_ASSERT_EQUAL_DOUBLE(30, rig_angle_deg(&m_rig));
+}
+
+/* Shortest time from rest to rest with limited speed, acceleration and jerk, ms. */
+static double optimal_ms(double distance, double v, double a, double j)
+{
+    const double most = fmin(a, sqrt(j * v)), rise = v / most + most / j;
+    if (distance >= v * rise) {
+        return 1000 * (distance / v + rise);
+    }
+    const double peak = distance >= 2 * a * a * a / (j * j) ? a / j / 2 : 0;
+    return 1000 * (peak > 0 ? 2 * (peak + sqrt(peak * peak + distance / a)) : 4 * cbrt(distance / (2 * j)));
+}
+
+static void test_timed_infeasible_time_is_stretched_to_hardly_more_than_the_shortest(void)
+{
+    double worst = 0;
+    for (int mm = 5; mm <= 90; mm += 5) {
+        m_rig = m_ready;
+        rig_sendf(&m_rig, "@A6T:0,0,0,0,0,%d,5#", mm);
+        const double ms = (double)run_until_rest_after(5, 2000);
+        worst = fmax(worst, ms / optimal_ms(mm, 400, 3000, 50000));
+        TEST_ASSERT_EQUAL_UINT32(1, seen()->counters.stretched);
+        assert_pose(0, 0, 0, 0, 0, mm);
+        check_kept();
+    }
+    printf("timed moves that are too quick: at most %.3f times the shortest\n", worst);
+    TEST_ASSERT_TRUE(worst <= 1.02);
+}
+
+/* From any motion, for any time: what is not flagged as stretched is there, at rest, to the cycle. */
+static void test_timed_from_random_motion_arrives_in_its_time_or_says_so(void)
+{
+    unsigned in_time = 0, stretched = 0;
+    double latest = 0;
+    for (int run = 0; run < 200; run++) {
+        m_rig = m_ready;
+        if (run % 2 == 0) {
+            start_moving();
+        } else {
+            run_mode(MODE_STREAM, 100 + random_below(700));
+        }
+        const int at[POSE_AXES] = {(int)random_below(9) - 4,   (int)random_below(9) - 4,   (int)random_below(13) - 6,
+                                   (int)random_below(41) - 20, (int)random_below(41) - 20, (int)random_below(61) - 30};
+        const unsigned ms = 200 + random_below(2500);
+        rig_run_ms(&m_rig, 200); /* the stream is over: a frame with a time is a move */
+        rig_sendf(&m_rig, "@A6T:%d,%d,%d,%d,%d,%d,%u#", at[0], at[1], at[2], at[3], at[4], at[5], ms);
+        rig_run_ms(&m_rig, ms);
+        if (seen()->counters.stretched != 0) {
+            stretched++;
+            (void)run_until_rest(3000);
+            assert_pose(at[0], at[1], at[2], at[3], at[4], at[5]);
+        } else {
+            in_time++;
+            for (unsigned i = 0; i < POSE_AXES; i++) {
+                TEST_ASSERT_DOUBLE_WITHIN(1e-3, at[i], rig_pose(&m_rig, i));
+            }
+            latest = fmax(latest, (double)run_until_rest(60)); /* a cylinder's limiter may be a hair behind */
+            assert_pose(at[0], at[1], at[2], at[3], at[4], at[5]);
+        }
+        check_kept();
+    }
+    printf("timed moves from random motion: %u in time (exactly at rest %.0f ms later at most), %u stretched\n", in_time, latest,
+           stretched);
+    TEST_ASSERT_TRUE(in_time > 100 && stretched > 5);
 }
 
 /* ---- streams ---- */
@@ -682,6 +753,8 @@ int main(void)
     RUN_TEST(test_timed_zero_is_as_fast_as_the_limits_allow_and_not_stretched);
     RUN_TEST(test_timed_in_motion_with_room_ends_in_time);
     RUN_TEST(test_timed_cylinders_are_kept_to_the_cycle);
+    RUN_TEST(test_timed_infeasible_time_is_stretched_to_hardly_more_than_the_shortest);
+    RUN_TEST(test_timed_from_random_motion_arrives_in_its_time_or_says_so);
     RUN_TEST(test_stream_constant_rate_never_stutters);
     RUN_TEST(test_stream_end_comes_to_rest_on_the_last_sample);
     RUN_TEST(test_body_step_from_rest_goes_straight);
