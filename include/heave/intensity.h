@@ -51,6 +51,9 @@ q32_t intensity_unscaled(const intensity_t *self, q32_t neutral_q32, q32_t scale
 /** A reference that a sender's values gave, scaled; its differences contain those of the share. */
 ramp_ref_t intensity_scale(const intensity_t *self, q32_t neutral_q32, const ramp_ref_t *ref);
 
+/** True while intensity_shift() for this planned share is 0 whatever the way. */
+bool intensity_is_still(const intensity_t *self, int64_t planned_q46);
+
 /** What has to be added to a reference that was planned with another share, to where way is the sender's value less neutral. */
 ramp_ref_t intensity_shift(const intensity_t *self, int64_t planned_q46, q32_t way_q32);
 

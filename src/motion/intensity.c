@@ -83,6 +83,15 @@ ramp_ref_t intensity_scale(const intensity_t *self, q32_t neutral_q32, const ram
     return past_ref(at_q32);
 }
 
+bool intensity_is_still(const intensity_t *self, int64_t planned_q46)
+{
+    unsigned age = 0;
+    while (age < PAST && self->share_q46[age] == planned_q46) {
+        age++;
+    }
+    return age == PAST;
+}
+
 ramp_ref_t intensity_shift(const intensity_t *self, int64_t planned_q46, q32_t way_q32)
 {
     q32_t at_q32[PAST];

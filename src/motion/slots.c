@@ -119,6 +119,9 @@ void slots_scale_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX])
 
 void slots_shift_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
+    if (intensity_is_still(&self->intensity, self->timed_share_q46)) {
+        return;
+    }
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const ramp_ref_t by = intensity_shift(&self->intensity, self->timed_share_q46, self->timed_way_q32[i]);
         ref[i].pos_q32 += by.pos_q32;
