@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * telemetry.h - one plain struct per cycle that tells everything there is to see of a running platform.
- * The motion thread fills it; readers get copies (see the hand-over of the program). No pointers inside.
+ * The motion thread fills it; readers get copies (see the hand-over of the program). No pointers inside but those to constant
+ * texts.
  */
 #ifndef HEAVE_TELEMETRY_H
 #define HEAVE_TELEMETRY_H
@@ -63,7 +64,8 @@ typedef struct {
     q32_t extension_mm_q32[CYLINDERS_MAX];
     q32_t angle_deg_q32;
     drive_feedback_t drive[DRIVES_MAX];
-    unsigned flags; /**< MOTION_CLAMPED ... */
+    drive_report_t report[DRIVES_MAX]; /**< the same in words; "" where the driver has none */
+    unsigned flags;                    /**< MOTION_CLAMPED ... */
     uint8_t limiting_cylinder;
     uint8_t intensity_percent; /**< asked for */
     q32_t intensity_now_q32;   /**< in force, percent */

@@ -25,7 +25,7 @@ typedef struct {
 } config_udp_t;
 
 /** What drives the cylinders. */
-typedef enum { CONFIG_DRIVES_SIM, CONFIG_DRIVES_CAN_RAW } config_drives_t;
+typedef enum { CONFIG_DRIVES_SIM, CONFIG_DRIVES_CIA402, CONFIG_DRIVES_CAN_RAW } config_drives_t;
 
 /** Simulated drives. */
 typedef struct {
@@ -90,6 +90,55 @@ typedef struct {
     q16_t angle_following_error_deg_q16;
 } config_can_raw_t;
 
+/** Mode of operation of CANopen drives. */
+typedef enum { CONFIG_MODE_CSP, CONFIG_MODE_IP, CONFIG_MODE_PP } config_mode_t;
+
+/** What CANopen drives do when the gateway falls silent: 6007h less 1. */
+typedef enum { CONFIG_LOST_FAULT, CONFIG_LOST_DISABLE_VOLTAGE, CONFIG_LOST_QUICK_STOP } config_lost_t;
+
+/** In which order CANopen drives home. */
+typedef enum { CONFIG_HOMING_TOGETHER, CONFIG_HOMING_IN_TURN } config_homing_order_t;
+
+/** How drives home; unit u is mm or deg. */
+typedef struct {
+    config_wholes_t method;
+    q16_t speed_q16;      /**< u/s, towards the switch */
+    q16_t zero_speed_q16; /**< u/s, to the zero */
+    q16_t accel_q16;      /**< u/s^2 */
+} config_homing_t;
+
+/** CANopen drives; what it means is in cia402.h. */
+typedef struct {
+    config_ids_t nodes;
+    uint8_t gateway_node;
+    config_mode_t mode;
+    uint32_t period_us;
+    config_ratios_t counts_per_mm;
+    config_wholes_t zero_counts;
+    config_ratios_t angle_counts_per_deg;
+    config_wholes_t angle_zero_counts;
+    config_homing_t homing;
+    config_homing_t angle_homing;
+    config_homing_order_t homing_order;
+    q16_t following_error_mm_q16;
+    q16_t angle_following_error_deg_q16;
+    uint16_t following_error_ms;
+    q16_t quick_stop_mm_s2_q16;
+    q16_t angle_quick_stop_deg_s2_q16;
+    config_lost_t when_gateway_lost;
+    uint16_t heartbeat_ms;
+    uint16_t heartbeat_timeout_ms;
+    uint16_t sdo_timeout_ms;
+    uint16_t boot_timeout_ms;
+    uint16_t power_timeout_ms;
+    uint8_t sync_counter;
+    bool is_sync_watched;
+    bool is_reset_wanted;
+    bool is_no_watchdog_allowed;
+    uint32_t vendor_id;
+    uint32_t product_code;
+} config_cia402_t;
+
 /** Outputs. The number of lines is the number of relays. */
 typedef struct {
     uint8_t count;
@@ -127,6 +176,7 @@ typedef struct {
     config_sim_t sim;
     config_can_t can;
     config_can_raw_t can_raw;
+    config_cia402_t cia402;
     config_relays_t relays;
     config_inputs_t inputs;
 } config_t;

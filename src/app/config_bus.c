@@ -5,6 +5,8 @@
 
 #include "config_canraw.h"
 
+#define SDO_EVERY_US 20000u /* service requests while drives move: next to none */
+
 static void add(config_bus_t *bus, bool is_extended, uint8_t bytes, uint32_t frames, uint32_t periods)
 {
     HV_ASSERT(bus->count < CONFIG_BUS_ENTRIES_MAX);
@@ -34,12 +36,36 @@ static void describe_can_raw(const config_t *config, config_bus_t *bus)
     add(bus, is_extended, longer(&raw->position_reply, &raw->homing_reply), axes, raw->query_every);
 }
 
+static uint32_t periods_of(uint32_t time_us, uint32_t period_us)
+{
+    return time_us > period_us ? time_us / period_us : 1u;
+}
+
+/* SYNC, a command and an answer of each drive per period; heartbeats of all, and a service request with its answer now and then.
+ */
+static void describe_cia402(const config_t *config, config_bus_t *bus)
+{
+    const config_cia402_t *cia402 = &config->cia402;
+    const uint32_t axes = config_canraw_axes(config);
+    bus->section = "cia402";
+    bus->period_us = cia402->period_us;
+    bus->bitrate_bps = config->can.bitrate_bps;
+    add(bus, false, cia402->sync_counter != 0 ? 1 : 0, 1, 1);
+    add(bus, false, 6, axes, 1);
+    add(bus, false, 7, axes, 1);
+    add(bus, false, 1, axes + 1u, periods_of(cia402->heartbeat_ms * 1000u, cia402->period_us));
+    add(bus, false, 8, 2, periods_of(SDO_EVERY_US, cia402->period_us));
+}
+
 void config_bus_describe(const config_t *config, config_bus_t *bus)
 {
     *bus = (config_bus_t){.section = NULL};
     switch (config->drives) {
     case CONFIG_DRIVES_CAN_RAW:
         describe_can_raw(config, bus);
+        break;
+    case CONFIG_DRIVES_CIA402:
+        describe_cia402(config, bus);
         break;
     case CONFIG_DRIVES_SIM:
         break;

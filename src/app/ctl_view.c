@@ -162,11 +162,33 @@ static void draw_bar(view_t *self, double sent, double actual, double whole)
     }
 }
 
+/* A second line where the drive is not simply as it should be: what it is at, since when, and what is wrong. */
+static void draw_report(view_t *self, const cJSON *report, const char *drive)
+{
+    const bool is_usual = strcmp(word(report, "phase"), drive) == 0 || strcmp(word(report, "phase"), "ready") == 0;
+    if (!cJSON_IsObject(report) || (is_usual && number(report, "code") <= 0.0)) {
+        return;
+    }
+    put(self, "   node %.0f: %s", number(report, "node"), word(report, "phase"));
+    if (number(report, "object") > 0.0) {
+        put(self, ", object %04X:%02X", (unsigned)number(report, "object"), (unsigned)number(report, "sub_index"));
+    }
+    if (number(report, "code") > 0.0) {
+        put(self, "; %s (0x%04X)", word(report, "trouble"), (unsigned)number(report, "code"));
+    }
+    if (word(report, "detail")[0] != '\0') {
+        put(self, "; %s (0x%04X)", word(report, "detail"), (unsigned)number(report, "detail_code"));
+    }
+    put(self, ", %.1f s", number(report, "age_ms") / 1000.0);
+    end_line(self);
+}
+
 static void draw_drive(view_t *self, const cJSON *axis)
 {
     const char *drive = word(axis, "drive");
     put(self, " %s", strcmp(drive, "enabled") == 0 && !cJSON_IsTrue(member(axis, "homed")) ? "no zero" : drive);
     end_line(self);
+    draw_report(self, member(axis, "report"), drive);
 }
 
 static void draw_cylinders(view_t *self, const cJSON *status)
@@ -313,6 +335,9 @@ static void draw_fault(view_t *self, const cJSON *status)
     }
     if (number(fault, "device_code") > 0.0) {
         put(self, ", device code 0x%04X", (unsigned)number(fault, "device_code"));
+        if (word(fault, "device_text")[0] != '\0') {
+            put(self, " (%s)", word(fault, "device_text"));
+        }
     }
     end_line(self);
     if (number(fault, "code") > 0.0) {

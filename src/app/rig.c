@@ -4,6 +4,7 @@
 #include "rig.h"
 
 #include "config_canraw.h"
+#include "config_cia402.h"
 
 #define RUN_DIR "/run/heave" /* where heave-can-flush@.path looks */
 
@@ -64,18 +65,12 @@ static hv_status_t open_sim(rig_t *self, const config_t *config, uint8_t axes, u
     return sim_drives_init(&self->sim_drives, axes, self->sim_axis, NULL, 0);
 }
 
-/* The interface, for the map's identifiers and no others. One that is not usable yet is restarted by the driver. */
-static hv_status_t open_can(rig_t *self, const char *interface, const canraw_map_t *map)
+/* The interface, for these identifiers and no others. One that is not usable yet is restarted by the driver. */
+static hv_status_t open_can(rig_t *self, const char *interface, const hal_can_filter_t *filter, uint32_t filters,
+                            const hal_can_filter_t *own, uint32_t owns)
 {
-    hal_can_filter_t filter[DRIVES_MAX];
-    hal_can_filter_t own[DRIVES_MAX];
-    const uint32_t count = canraw_filters(map, filter);
-    for (uint32_t k = 0; k < count; k++) {
-        own[k] = filter[k];
-        own[k].id = map->axis[k].command_id;
-    }
     const linux_can_config_t can = {
-        .interface = interface, .filter = filter, .filters = count, .own = own, .owns = count, .run_dir = RUN_DIR};
+        .interface = interface, .filter = filter, .filters = filters, .own = own, .owns = owns, .run_dir = RUN_DIR};
     const hv_status_t status = linux_can_open(&self->can, &can);
     self->is_can_open = true;
     return status == HV_OK || status == HV_ERR_AGAIN ? HV_OK : HV_ERR_IO;
@@ -83,10 +78,29 @@ static hv_status_t open_can(rig_t *self, const char *interface, const canraw_map
 
 static hv_status_t open_can_raw(rig_t *self, const config_t *config, gateway_io_t *io)
 {
+    hal_can_filter_t filter[DRIVES_MAX];
+    hal_can_filter_t own[DRIVES_MAX];
     config_canraw_map(config, &self->canraw_map);
-    const hv_status_t status = open_can(self, config->can.interface, &self->canraw_map);
+    const uint32_t count = canraw_filters(&self->canraw_map, filter);
+    for (uint32_t k = 0; k < count; k++) {
+        own[k] = filter[k];
+        own[k].id = self->canraw_map.axis[k].command_id;
+    }
+    const hv_status_t status = open_can(self, config->can.interface, filter, count, own, count);
     io->drives = canraw_hal(&self->canraw);
     return status == HV_OK ? canraw_init(&self->canraw, &self->canraw_map, linux_can_hal(&self->can)) : status;
+}
+
+static hv_status_t open_cia402(rig_t *self, const config_t *config, gateway_io_t *io)
+{
+    hal_can_filter_t filter[CIA402_FILTERS_MAX];
+    hal_can_filter_t own[CIA402_OWNS_MAX];
+    config_cia402(config, &self->cia402_config);
+    const uint32_t filters = cia402_filters(&self->cia402_config, filter);
+    const uint32_t owns = cia402_owns(&self->cia402_config, own);
+    const hv_status_t status = open_can(self, config->can.interface, filter, filters, own, owns);
+    io->drives = cia402_hal(&self->cia402);
+    return status == HV_OK ? cia402_init(&self->cia402, &self->cia402_config, linux_can_hal(&self->can)) : status;
 }
 
 hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io)
@@ -99,6 +113,8 @@ hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io)
     switch (config->drives) {
     case CONFIG_DRIVES_SIM:
         return HV_OK;
+    case CONFIG_DRIVES_CIA402:
+        return open_cia402(self, config, io);
     case CONFIG_DRIVES_CAN_RAW:
         return open_can_raw(self, config, io);
     }

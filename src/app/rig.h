@@ -6,6 +6,7 @@
 #define HEAVE_APP_RIG_H
 
 #include "config.h"
+#include "heave/cia402.h"
 #include "heave/gateway.h"
 #include "linux_can.h"
 #include "sim_drives.h"
@@ -22,6 +23,8 @@ typedef struct {
     linux_can_t can;
     canraw_map_t canraw_map;
     canraw_t canraw;
+    cia402_config_t cia402_config;
+    cia402_t cia402;
 } rig_t;
 
 /** Opens what the configuration names and puts the handles into io (its udp and log are left alone).

@@ -31,6 +31,14 @@ static void write_pose(json_t *json, const char *key, const pose_t *pose)
     json_close(json, '}');
 }
 
+/* What the device code of the fault means, as long as the drive still says so. */
+static const char *device_text(const snapshot_t *s)
+{
+    const fault_t *fault = &s->fault;
+    const bool is_told = fault->axis != 0 && fault->device_code != 0 && s->report[fault->axis - 1u].code == fault->device_code;
+    return is_told ? s->report[fault->axis - 1u].trouble : "";
+}
+
 static void write_fault(json_t *json, const snapshot_t *s)
 {
     const fault_row_t *row = fault_row(s->fault.code);
@@ -39,6 +47,7 @@ static void write_fault(json_t *json, const snapshot_t *s)
     json_text(json, "name", row->name);
     json_number(json, "axis", s->fault.axis);
     json_number(json, "device_code", s->fault.device_code);
+    json_text(json, "device_text", device_text(s));
     json_ms(json, "at_ms", s->fault.at_us);
     json_text(json, "reaction", fault_reaction_name(s->reaction));
     json_text(json, "text", row->text[FAULT_ENGLISH]);
@@ -88,6 +97,26 @@ static void write_poses(json_t *json, const snapshot_t *s)
     }
 }
 
+/* What the drive is at, in words; null where its driver has none. */
+static void write_report(json_t *json, const drive_report_t *report, uint64_t now_us)
+{
+    if (report->phase[0] == '\0') {
+        json_null(json, "report");
+        return;
+    }
+    json_open(json, "report", '{');
+    json_number(json, "node", report->address);
+    json_text(json, "phase", report->phase);
+    json_text(json, "trouble", report->trouble);
+    json_number(json, "code", report->code);
+    json_number(json, "object", report->object >> 8);
+    json_number(json, "sub_index", report->object & 0xFFu);
+    json_text(json, "detail", report->detail);
+    json_number(json, "detail_code", report->detail_code);
+    json_ms(json, "age_ms", now_us >= report->since_us ? now_us - report->since_us : 0);
+    json_close(json, '}');
+}
+
 /* Members that every axis has; unit is "mm" or "deg" in the keys. */
 static void write_axis(json_t *json, const snapshot_t *s, unsigned axis, q32_t sent_q32, const char *sent_key,
                        const char *actual_key)
@@ -102,6 +131,7 @@ static void write_axis(json_t *json, const snapshot_t *s, unsigned axis, q32_t s
     json_text(json, "drive", k_drive_states[drive->state]);
     json_bool(json, "homed", drive->is_homed);
     json_number(json, "device_code", drive->fault_code);
+    write_report(json, &s->report[axis], s->now_us);
 }
 
 static void write_axes(json_t *json, const snapshot_t *s, const config_t *config)

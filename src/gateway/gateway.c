@@ -7,6 +7,7 @@
 #include "heave/text.h"
 #include "intake.h"
 #include "operate.h"
+#include "reports.h"
 
 #define ACTUAL_POSE_CYCLES 16u /* forward kinematics of the feedback: display needs no more */
 
@@ -22,6 +23,9 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
         return HV_ERR_ARG;
     }
     *self = (gateway_t){.settings = *settings, .io = *io, .is_tracking_actual = true};
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        self->snapshot.report[i] = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
+    }
     gateway_restart_auto(self);
     const hv_status_t status = motion_init(&self->motion, settings);
     if (status != HV_OK) {
@@ -167,6 +171,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
         s->drive[i] = self->feedback[i];
     }
+    reports_take(self);
     s->flags = self->output.flags;
     s->limiting_cylinder = self->output.limiting_cylinder;
     s->intensity_percent = (uint8_t)motion_intensity(&self->motion)->percent;

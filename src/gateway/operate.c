@@ -304,7 +304,7 @@ static void watch_drives(gateway_t *self, uint64_t now_us)
         const bool is_new = code != FAULT_NONE && code != self->axis_fault[i];
         self->axis_fault[i] = code;
         if (is_new) {
-            raise_fault(self, code, i + 1, code == FAULT_DRIVE ? self->feedback[i].fault_code : 0, now_us);
+            raise_fault(self, code, i + 1, code == FAULT_FOLLOWING ? 0 : self->feedback[i].fault_code, now_us);
         }
     }
 }

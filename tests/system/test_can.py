@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_can.py BIN - the daemon on CANopen drives: simulated ones, strict ones, on vcan, on virtual time. Runs inside kernel.py."""
+"""test_can.py BIN [PART OF A NAME] - the daemon on CANopen drives: simulated ones, strict ones, on vcan, on virtual time. Runs inside kernel.py."""
 import math
 import re
 import signal
@@ -26,6 +26,7 @@ bitrate_bps = 1000000
 [cia402]
 nodes = 1, 2, 3, 4, 5, 6, 7
 counts_per_mm = {MM}
+angle_counts_per_deg = {MM}
 """
 
 
@@ -149,7 +150,10 @@ CASES = [
 
 def main():
     suite = tap.Suite()
+    wanted = sys.argv[2] if len(sys.argv) > 2 else ""
     for name, case in CASES:
+        if wanted not in name:
+            continue
         with suite.case(name), can_bench.CanBench(sys.argv[1]) as bench:
             case(bench)
     return suite.done()

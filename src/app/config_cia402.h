@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: MIT
+ * config_cia402.h - the section [cia402] as the driver wants it, and what is checked of it.
+ */
+#ifndef HEAVE_APP_CONFIG_CIA402_H
+#define HEAVE_APP_CONFIG_CIA402_H
+
+#include "config_source.h"
+#include "heave/cia402.h"
+
+/** Counts of a drive per mm (deg); usable only where the lists have the right lengths. */
+counts_scale_t config_cia402_scale(const config_t *config, unsigned axis);
+
+/** Node of a drive. */
+uint32_t config_cia402_node(const config_t *config, unsigned axis);
+
+/** The drives of a configuration whose drives are CONFIG_DRIVES_CIA402 and that config_load() accepted. */
+void config_cia402(const config_t *config, cia402_config_t *out);
+
+/** Checks the section, where it is in use; reports into self. */
+void config_cia402_check(config_source_t *self);
+
+#endif

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: MIT
+ * reports.c - what the drives are at, in words; see reports.h.
+ */
+#include "reports.h"
+
+#include "heave/text.h"
+
+static void put_object(text_t *text, uint32_t object)
+{
+    text_put(text, ", object ");
+    text_put_hex(text, object >> 8, 4);
+    text_put(text, ":");
+    text_put_hex(text, object & 0xFFu, 2);
+}
+
+static void put_detail(text_t *text, const drive_report_t *report)
+{
+    if (report->detail[0] != '\0') {
+        text_put(text, ": ");
+        text_put(text, report->detail);
+    }
+    if (report->detail_code != 0) {
+        text_put(text, " (0x");
+        text_put_hex(text, report->detail_code, 4);
+        text_put(text, ")");
+    }
+}
+
+static void log_report(const gateway_t *self, unsigned axis, const drive_report_t *report)
+{
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    text_put(&text, "axis ");
+    text_put_u32(&text, axis + 1u);
+    text_put(&text, ", node ");
+    text_put_u32(&text, report->address);
+    text_put(&text, ", ");
+    text_put(&text, report->phase);
+    if (report->trouble[0] != '\0') {
+        text_put(&text, ": ");
+        text_put(&text, report->trouble);
+        text_put(&text, " (0x");
+        text_put_hex(&text, report->code, 4);
+        text_put(&text, ")");
+    }
+    if (report->object != 0) {
+        put_object(&text, report->object);
+    }
+    put_detail(&text, report);
+    hal_log_write(self->io.log, report->code != 0 ? HAL_LOG_WARNING : HAL_LOG_NOTICE, line);
+}
+
+/* Worth a line: another trouble, the end of one, or a refusal with its reason. */
+static bool is_news(const drive_report_t *was, const drive_report_t *is)
+{
+    const bool is_other = was->code != is->code || (is->code != 0 && was->detail_code != is->detail_code);
+    return is->address != 0 && is_other;
+}
+
+void reports_take(gateway_t *self)
+{
+    for (uint8_t i = 0; i < drives_count(self->io.drives); i++) {
+        drive_report_t report;
+        (void)drives_report(self->io.drives, i, &report);
+        if (is_news(&self->snapshot.report[i], &report)) {
+            log_report(self, i, &report);
+        }
+        self->snapshot.report[i] = report;
+    }
+}
