@@ -57,7 +57,9 @@ static ramp_limits_t limits_of(double speed, double accel, int32_t jerk)
 
 static ramp_limits_t random_limits(void)
 {
-    return limits_of(random_log(50, 1500), random_log(300, 20000), (int32_t)random_log(5000, 500000));
+    const int32_t jerk = (int32_t)random_log(5000, 500000); /* one after the other: arguments come in any order */
+    const double accel = random_log(300, 20000);
+    return limits_of(random_log(50, 1500), accel, jerk);
 }
 
 /* Cycles of the quickest stop of one axis, continuous. */

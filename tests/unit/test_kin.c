@@ -8,6 +8,7 @@
 #include "unity.h"
 
 #include <inttypes.h>
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -259,6 +260,9 @@ static void test_inverse_reference_poses_give_reference_lengths(void)
     }
 }
 
+/* Half a unit and the model's own error, which is larger where a long double has the 53 bits of a double. */
+static const long double k_model_bar_lsb = LDBL_MANT_DIG >= 64 ? 0.51L : 0.6L;
+
 static void test_inverse_random_mechanisms_match_the_model(void)
 {
     long double worst = 0;
@@ -271,7 +275,7 @@ static void test_inverse_random_mechanisms_match_the_model(void)
         }
     }
     printf("inverse of random hexapods: worst difference from the model %.3Lf LSB of Q32\n", worst);
-    TEST_ASSERT_TRUE(worst < 0.51L);
+    TEST_ASSERT_TRUE(worst < k_model_bar_lsb);
 }
 
 static void test_inverse_largest_values_match_the_model(void)
@@ -292,7 +296,7 @@ static void test_inverse_largest_values_match_the_model(void)
         for (unsigned axis = AXIS_X; axis < POSE_AXES; axis++) {
             pose.axis_q32[axis] = pose.axis_q32[axis] < 0 ? -8000 * Q32_ONE : 8000 * Q32_ONE;
         }
-        TEST_ASSERT_TRUE(inverse_error_lsb(&s_kin, &s_geometry, &pose) < 0.51L);
+        TEST_ASSERT_TRUE(inverse_error_lsb(&s_kin, &s_geometry, &pose) < k_model_bar_lsb);
     }
 }
 
