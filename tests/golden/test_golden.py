@@ -30,7 +30,8 @@ def config_of(frames):
 
 
 def play(heaved, frames, trace):
-    run = subprocess.run([heaved, "--config", config_of(frames), "--play", frames, "--trace", trace], stdout=subprocess.DEVNULL,
+    program = heaved if isinstance(heaved, list) else [heaved]
+    run = subprocess.run([*program, "--config", config_of(frames), "--play", frames, "--trace", trace], stdout=subprocess.DEVNULL,
                          stderr=subprocess.PIPE, text=True, check=False)
     assert run.returncode == 0, f"heaved ended with {run.returncode}:\n{run.stderr}"
 
