@@ -6,10 +6,12 @@
  * Delay: a sample is met 2 periods (smooth) or 1.5 (fast) plus a margin after its time. The margin is 2 ms, more if the samples
  * often come later than that, at most the larger of 2 ms and half a period. While the rate changes or the network holds samples
  * back the delay may grow by 2 periods more; then it falls again by 6 % of the time that passes.
- * Losses: a point that is missing when the curve needs it is extrapolated once, by the last step and its bend (not a jump: at
- * most 4 x the larger of the two steps before); a second is put as far again beyond; nine more lead softly back to the last
- * sample. So at the end of a stream the curve goes beyond the last sample by at most 2 such steps, and rests on it exactly
- * 14 periods and the margin after it came.
+ * Losses: where a point is missing when the curve needs it, the motion goes on, by the last step and its bend (not a jump: at
+ * most 4 x the larger of the two steps before), then ever more slowly, no further than the axis takes to stop
+ * (stream_set_stop()), or 36 ms. When samples are back, or after 150 ms without, the curve comes back to the samples, or to the
+ * last one, softly: position and velocity of the control points go on as they were. So an ended stream rests exactly on its last
+ * sample, within 2 s. A stream that is known may be away for a second and goes on; a new rate gives a new grid, on which the
+ * curve goes on.
  */
 #ifndef HEAVE_STREAM_H
 #define HEAVE_STREAM_H
@@ -33,25 +35,51 @@ enum {
 
 /** The sender's time line; members are private to src/motion. */
 typedef struct {
-    uint64_t last_us;             /**< arrival of the newest sample */
-    int64_t late_us_q16;          /**< that arrival against the time line */
-    int64_t period_us_q16;        /**< 0 while unknown */
-    int64_t margin_us_q16;        /**< how long a sample is waited for beyond its time */
-    int64_t per_us_q46;           /**< 1 / period: periods per us, Q46 */
-    uint32_t gap_us[STREAM_GAPS]; /**< newest intervals, a ring */
+    uint64_t last_us;                 /**< arrival of the newest sample */
+    int64_t late_us_q16;              /**< that arrival against the time line */
+    int64_t period_us_q16;            /**< 0 while unknown */
+    int64_t margin_us_q16;            /**< how long a sample is waited for beyond its time */
+    int64_t per_us_q46;               /**< 1 / period: periods per us, Q46 */
+    uint32_t gap_us[STREAM_GAPS];     /**< newest intervals, a ring */
+    uint8_t gap_periods[STREAM_GAPS]; /**< periods each was taken for */
     unsigned gap_next;
     unsigned gaps;    /**< intervals in the ring that belong to the present rate */
     unsigned settled; /**< samples since the rate was last found, up to STREAM_GAPS */
 } stream_clock_t;
 
+/** How quickly an axis can stop: its limits. */
+typedef struct {
+    q32_t acc_per_cycle2_q32;
+    q32_t jerk_per_cycle3_q32; /**< 0: not told, the shortest reach */
+} stream_stop_t;
+
+/** How a motion goes on where samples are missing; private to src/motion. */
+typedef struct {
+    q32_t first_q32;   /**< in the first period */
+    q32_t go_q32;      /**< in the later ones, if it did not fade */
+    q32_t beyond_q32;  /**< how far it has gone */
+    int32_t reach_q16; /**< how far it goes, in periods */
+} stream_lead_t;
+
 /** The points of the curve, by index modulo the ring; members are private to src/motion. */
 typedef struct {
     q32_t point_q32[STREAM_POINTS][AXES_MAX]; /**< what is known best of each index: a sample, or the guess committed */
     bool is_sample[STREAM_POINTS];            /**< of the indices beyond head */
-    q32_t control_q32[4][AXES_MAX];           /**< as committed, oldest first */
-    q32_t last_q32[AXES_MAX];                 /**< the newest sample */
-    uint32_t head;                            /**< index of the newest point committed */
-    int32_t ahead; /**< index of the newest sample less head; negative where the curve is extrapolated */
+    q32_t control_q32[4][AXES_MAX];           /**< as committed, oldest first: points and what is still off them */
+    q32_t off_q32[AXES_MAX][3];               /**< control less point at head, and how that changes per period and period^2 */
+    stream_stop_t stop[AXES_MAX];
+    stream_lead_t lead[AXES_MAX];
+    int32_t guesses;           /**< since the newest sample */
+    int64_t period_cycles_q16; /**< cycles in a period */
+    int32_t reach_min_q16;     /**< periods that a motion is kept up where samples are missing */
+    int32_t reach_max_q16;
+    bool is_off;              /**< on some axis */
+    int64_t grip_q32;         /**< how firmly off is taken back, per period */
+    int64_t softest_q32;      /**< the least grip */
+    int32_t patience;         /**< guesses before the stream is taken for ended */
+    q32_t last_q32[AXES_MAX]; /**< the newest sample */
+    uint32_t head;            /**< index of the newest point committed */
+    int32_t ahead;            /**< index of the newest sample less head; negative where the curve is extrapolated */
     unsigned axes;
 } stream_curve_t;
 
@@ -79,6 +107,10 @@ typedef struct {
 /** Starts without any sample.
  *  @param cycle_us [500, 10000]   @param axes 1 to AXES_MAX */
 void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_t style);
+
+/** Tells the limits of an axis: where samples are missing, the motion goes no further than the axis takes to stop (but at least
+ *  one period, or 20 ms). Kept by stream_reset(). */
+void stream_set_stop(stream_t *self, unsigned axis, stream_stop_t stop);
 
 /** Forgets the stream; the next sample starts a new one. */
 void stream_reset(stream_t *self);

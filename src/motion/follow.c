@@ -124,6 +124,10 @@ static void change_space(motion_t *self, motion_space_t space)
     self->last_timed_us = 0;
     self->source = MOTION_STREAMED;
     stream_reset(&self->stream);
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        const ramp_limits_t *limits = slot_limits(self, i);
+        stream_set_stop(&self->stream, i, (stream_stop_t){limits->acc_per_cycle2_q32, limits->jerk_per_cycle3_q32});
+    }
 }
 
 void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us)

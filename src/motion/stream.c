@@ -12,6 +12,7 @@
 #define PACE_FILTER_MAX (Q32_ONE / 2)       /* keeps the filters stable where a cycle is longer than a period */
 #define BEHIND_MAX_Q32  (Q32_ONE * 3 / 2)   /* further behind its time, a sample is skipped */
 #define BEFORE_MAX_Q32  (Q32_ONE / 2)       /* further before it, where it has no samples, a point is filled in */
+#define AMBIGUOUS_Q32   (Q32_ONE * 13 / 20) /* a sample may belong to a period this far from its time */
 #define STEP_GAP_MIN_US 2000u /* two samples nearer than this do not begin a stream: the second replaces the first */
 
 void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_t style)
@@ -20,9 +21,15 @@ void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_
     *self = (stream_t){.cycle_us = cycle_us, .style = style, .curve = {.axes = axes}};
 }
 
+void stream_set_stop(stream_t *self, unsigned axis, stream_stop_t stop)
+{
+    HV_ASSERT(axis < self->curve.axes);
+    self->curve.stop[axis] = stop;
+}
+
 void stream_reset(stream_t *self)
 {
-    stream_init(self, self->cycle_us, self->curve.axes, self->style);
+    self->phase = STREAM_EMPTY; /* everything else begins with the next sample */
 }
 
 static void start_lone(stream_t *self, const q32_t *sample_q32)
@@ -45,6 +52,27 @@ static void start_running(stream_t *self, uint64_t now_us)
     self->between_q32 = fx_clamp(error_at(self, now_us), 0, Q32_ONE - 1);
 }
 
+/* Periods from the newest sample to this one. A loss and a late arrival look alike to the clock; where the signal moves, the
+ * value tells them apart. */
+static unsigned judge_periods(const stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+{
+    q32_t ahead_q32, step_q32;
+    const unsigned expected = stream_clock_expect(&self->clock, now_us, &ahead_q32);
+    unsigned best = expected;
+    q32_t least_q32 = INT64_MAX;
+    for (unsigned periods = expected > 1 ? expected - 1 : 1; expected >= 1 && expected <= 3 && periods <= expected + 1;
+         periods++) {
+        const q32_t misfit_q32 = stream_curve_misfit(&self->curve, sample_q32, periods, &step_q32);
+        const q32_t untimely_q32 = fx_abs(ahead_q32 - periods * Q32_ONE);
+        const q32_t cost_q32 = misfit_q32 + fx_mul_shift(step_q32, untimely_q32 / 2, 32);
+        if (untimely_q32 < AMBIGUOUS_Q32 && (cost_q32 < least_q32 || (cost_q32 == least_q32 && periods == expected))) {
+            least_q32 = cost_q32;
+            best = periods;
+        }
+    }
+    return best;
+}
+
 void stream_push(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
 {
     if (self->phase == STREAM_EMPTY || !stream_clock_is_near(&self->clock, now_us)) {
@@ -59,7 +87,16 @@ void stream_push(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
     if (stream_clock_is_soon(&self->clock, now_us) && stream_curve_is_newest(&self->curve, sample_q32)) {
         return; /* the same datagram twice */
     }
-    stream_curve_append(&self->curve, stream_clock_take(&self->clock, now_us), sample_q32);
+    const unsigned periods = judge_periods(self, now_us, sample_q32);
+    const bool is_new_rate = stream_clock_take(&self->clock, now_us, periods) && self->phase == STREAM_RUNNING;
+    stream_curve_pace(&self->curve, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us);
+    if (is_new_rate) {
+        stream_curve_regrid(&self->curve, self->style, self->previous, sample_q32);
+        self->between_q32 = 0;
+        self->rate_q32[0] = self->rate_q32[1] = stream_clock_span(&self->clock, self->cycle_us);
+        return;
+    }
+    stream_curve_append(&self->curve, periods, sample_q32);
     if (self->phase == STREAM_LONE) {
         start_running(self, now_us);
     } else if (error_at(self, now_us) > BEHIND_MAX_Q32) {
@@ -119,7 +156,7 @@ bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref)
 
 bool stream_is_live(const stream_t *self, uint64_t now_us)
 {
-    return self->phase == STREAM_RUNNING && stream_clock_is_near(&self->clock, now_us);
+    return self->phase == STREAM_RUNNING && stream_clock_is_live(&self->clock, now_us);
 }
 
 uint32_t stream_period_us(const stream_t *self)

@@ -9,13 +9,16 @@
 enum {
     WATCHED = 8,      /* intervals that tell a new rate: even, and enough that two losses among them do not */
     WATCHED_LOST = 6, /* of these longer than a period: the rate is a fraction of what it was */
+    KNOWN = 12,       /* samples after which a stream is one */
     SETTLED_AGAIN = 4 /* after a new rate the time line is trusted as much as after this many samples */
 };
 
 #define PERIOD_MIN_Q16 ((int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16)
 #define PERIOD_MAX_Q16                                                                                                           \
     ((int64_t)STREAM_PERIOD_MAX_US * STREAM_US_Q16 / 3 * 4) /* a running stream may be slower: no flipping at the edge */
+#define NETWORK_Q16    ((int64_t)15000 * STREAM_US_Q16)     /* jitter at both ends of a span */
 #define MARGIN_MIN_Q16 ((int64_t)2000 * STREAM_US_Q16)
+#define AWAY_US        1000000u
 #define ELAPSED_MAX_US 4000000u /* far beyond the end of any curve */
 
 static void set_period(stream_clock_t *self, int64_t period_us_q16)
@@ -35,11 +38,21 @@ uint32_t stream_clock_elapsed_us(const stream_clock_t *self, uint64_t now_us)
     return elapsed_us < UINT32_MAX ? (uint32_t)elapsed_us : UINT32_MAX;
 }
 
+/* True up to so long after the newest sample, or three losses of a slow stream. */
+static bool is_within(const stream_clock_t *self, uint64_t now_us, uint32_t least_us)
+{
+    const int64_t slow_us = self->period_us_q16 * 7 / 2 / STREAM_US_Q16;
+    return stream_clock_elapsed_us(self, now_us) <= (slow_us > least_us ? slow_us : least_us);
+}
+
+bool stream_clock_is_live(const stream_clock_t *self, uint64_t now_us)
+{
+    return is_within(self, now_us, STREAM_PERIOD_MAX_US);
+}
+
 bool stream_clock_is_near(const stream_clock_t *self, uint64_t now_us)
 {
-    /* Three losses in a row do not end a slow stream. */
-    const int64_t near_us = self->period_us_q16 * 7 / 2 / STREAM_US_Q16;
-    return stream_clock_elapsed_us(self, now_us) <= (near_us > STREAM_PERIOD_MAX_US ? near_us : STREAM_PERIOD_MAX_US);
+    return is_within(self, now_us, self->settled >= KNOWN ? AWAY_US : STREAM_PERIOD_MAX_US);
 }
 
 bool stream_clock_is_soon(const stream_clock_t *self, uint64_t now_us)
@@ -65,9 +78,10 @@ static int64_t gap_q16(const stream_clock_t *self, unsigned i)
     return (int64_t)self->gap_us[(self->gap_next + 2 * STREAM_GAPS - 1 - i) % STREAM_GAPS] * STREAM_US_Q16;
 }
 
-static void record_gap(stream_clock_t *self, uint32_t gap_us)
+static void record_gap(stream_clock_t *self, uint32_t gap_us, unsigned periods)
 {
     self->gap_us[self->gap_next] = gap_us;
+    self->gap_periods[self->gap_next] = (uint8_t)(periods < UINT8_MAX ? periods : UINT8_MAX);
     self->gap_next = (self->gap_next + 1) % STREAM_GAPS;
     self->gaps += self->gaps < STREAM_GAPS ? 1u : 0u;
 }
@@ -115,17 +129,32 @@ static int64_t middle_gap(const stream_clock_t *self, unsigned gaps)
     return fx_clamp(sum / (int64_t)(count - 2 * cut), PERIOD_MIN_Q16, PERIOD_MAX_Q16);
 }
 
+/* True where a mean over so many intervals is off by more than an eighth, and their sum by more than a network makes it. */
+static bool is_rate_off(const stream_clock_t *self, int64_t mean_us_q16, unsigned gaps)
+{
+    const int64_t off = fx_abs(mean_us_q16 - self->period_us_q16);
+    return off * 8 > self->period_us_q16 && off * gaps > NETWORK_Q16;
+}
+
 static bool has_new_rate(const stream_clock_t *self)
 {
-    if (self->gaps < WATCHED) {
-        return false;
-    }
     unsigned lost = 0;
     for (unsigned i = 0; i < WATCHED; i++) {
         lost += periods_in_gap(gap_q16(self, i), self->period_us_q16) > 1 ? 1u : 0u;
     }
-    const int64_t off = mean_period(self, WATCHED, self->period_us_q16) - self->period_us_q16;
-    return lost >= WATCHED_LOST || fx_abs(off) * 8 > self->period_us_q16;
+    return lost >= WATCHED_LOST || is_rate_off(self, mean_period(self, WATCHED, self->period_us_q16), WATCHED);
+}
+
+/* Mean period over all intervals, with the periods that each was taken for. */
+static int64_t taken_period(const stream_clock_t *self)
+{
+    int64_t sum = 0;
+    unsigned periods = 0;
+    for (unsigned i = 0; i < self->gaps; i++) {
+        sum += gap_q16(self, i);
+        periods += self->gap_periods[(self->gap_next + 2 * STREAM_GAPS - 1 - i) % STREAM_GAPS];
+    }
+    return periods > 0 ? sum / periods : self->period_us_q16;
 }
 
 /* Periods from the newest sample's time to an arrival that is ahead_us after it. */
@@ -149,35 +178,53 @@ static void adapt_margin(stream_clock_t *self)
     self->margin_us_q16 = fx_clamp(wished, MARGIN_MIN_Q16, half > MARGIN_MIN_Q16 ? half : MARGIN_MIN_Q16);
 }
 
-static void find_period(stream_clock_t *self, int64_t off_us_q16)
+/* Returns true where the sender's rate is found to be another one. */
+static bool find_period(stream_clock_t *self, int64_t off_us_q16)
 {
-    if (has_new_rate(self)) {
+    const int64_t before = self->period_us_q16;
+    const bool is_new = self->gaps >= WATCHED && has_new_rate(self);
+    if (is_new) {
         self->gaps = WATCHED;
         self->settled = SETTLED_AGAIN;
     }
+    const int64_t taken = taken_period(self);
     if (self->settled < STREAM_GAPS) {
         set_period(self, mean_period(self, self->gaps, middle_gap(self, self->gaps)));
-    } else
+    } else if (is_rate_off(self, taken, self->gaps)) {
+        set_period(self, taken);
+    } else {
         set_period(self, self->period_us_q16 + off_us_q16 / 250);
+    }
+    return is_new && fx_abs(self->period_us_q16 - before) * 8 > before;
 }
 
-unsigned stream_clock_take(stream_clock_t *self, uint64_t now_us)
+unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t *ahead_q32)
+{
+    const int64_t gap_us_q16 = (int64_t)stream_clock_elapsed_us(self, now_us) * STREAM_US_Q16;
+    const int64_t ahead_us_q16 = self->late_us_q16 + gap_us_q16;
+    *ahead_q32 = self->period_us_q16 > 0 ? fx_mul_shift(ahead_us_q16, self->per_us_q46, 30) : Q32_ONE;
+    return self->period_us_q16 > 0 ? periods_ahead(self, ahead_us_q16, gap_us_q16) : 1;
+}
+
+bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods)
 {
     const uint32_t gap_us = stream_clock_elapsed_us(self, now_us);
     const int64_t gap_us_q16 = (int64_t)gap_us * STREAM_US_Q16;
-    record_gap(self, gap_us);
+    record_gap(self, gap_us, periods);
     self->last_us = now_us;
     if (self->period_us_q16 == 0) {
         set_period(self, gap_us_q16);
         self->settled = 1;
-        return 1;
+        return false;
     }
     const int64_t ahead = self->late_us_q16 + gap_us_q16;
-    const unsigned periods = periods_ahead(self, ahead, gap_us_q16);
     const int64_t off = fx_clamp(ahead - (int64_t)periods * self->period_us_q16, -self->period_us_q16, self->period_us_q16);
     self->settled += self->settled < STREAM_GAPS ? 1u : 0u;
     self->late_us_q16 = off - (self->settled < 12 ? off / (int64_t)(self->settled + 1) : off * 2 / 25);
-    find_period(self, off);
+    const bool is_new_rate = find_period(self, off);
+    if (is_new_rate) {
+        self->late_us_q16 = 0;
+    }
     adapt_margin(self);
-    return periods;
+    return is_new_rate;
 }

@@ -12,7 +12,10 @@
 /** Forgets everything; the first sample came at now_us. */
 void stream_clock_start(stream_clock_t *self, uint64_t now_us);
 
-/** True if a sample at now_us still belongs to the stream of the last one. */
+/** True while samples come regularly: the newest is 150 ms or 3.5 periods old at most. */
+bool stream_clock_is_live(const stream_clock_t *self, uint64_t now_us);
+
+/** True if a sample at now_us still belongs to the stream of the last one: one that is known may be away for a second. */
 bool stream_clock_is_near(const stream_clock_t *self, uint64_t now_us);
 
 /** True if a sample at now_us comes too soon to be of the next period, whatever the jitter. */
@@ -21,9 +24,12 @@ bool stream_clock_is_soon(const stream_clock_t *self, uint64_t now_us);
 /** us since the newest sample, at most UINT32_MAX; 0 if now_us is before it. */
 uint32_t stream_clock_elapsed_us(const stream_clock_t *self, uint64_t now_us);
 
-/** Takes the arrival of a sample that is near.
- *  @return periods of the sender since the sample before: 1, more after losses, 0 if it belongs to the same period */
-unsigned stream_clock_take(stream_clock_t *self, uint64_t now_us);
+/** Periods from the newest sample to one that arrives now, judged by time alone, and that time in periods. */
+unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t *ahead_q32);
+
+/** Takes the arrival of a sample that is so many periods after the newest.
+ *  @return true where the sender has another rate now: its time line begins anew with this sample */
+bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods);
 
 /** Periods from the time of the newest sample to now_us, less the margin. Q32. Period known. */
 q32_t stream_clock_periods(const stream_clock_t *self, uint64_t now_us);

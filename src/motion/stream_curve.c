@@ -1,18 +1,24 @@
 /* SPDX-License-Identifier: MIT
  * stream_curve.c - the curve through the samples of a stream.
  * Evaluated as oldest control point + differences x cumulative weights: equal points give exactly that point, and the curve stays
- * within its control points. Where a sample is missing and a later one is here, the point is interpolated; else the motion is
- * extrapolated once, goes as far again, and returns to the last sample in a soft S: right for one loss, bounded for an end.
+ * within its control points. Where a sample is missing and a later one is here, the point is interpolated; else it is guessed:
+ * the motion of the last samples goes on for a while, fades, and waits. When samples come back, or do not, the curve is off the
+ * points that are known now. What it is off is kept and taken back by a triple-pole filter, so that position and velocity of the
+ * control points go on as they were.
  */
 #include "stream_curve.h"
 
 enum {
-    AHEAD_MAX = 8, /* samples kept that are not committed; their guesses look at most 3 further back */
-    LEADS = 11     /* guesses until the curve is back on the last sample */
+    AHEAD_MAX = 8,     /* samples kept that are not committed */
+    SHIFT_GUESSES = 4, /* a shifted time line is come over to as softly as after so many guesses */
+    BEHIND_MAX = 4,    /* points before head that corrections and guesses look back at */
 };
 
-/* The guesses beyond the last sample, in 1/256 of the first: 1, 2, then 2 x a quintic S over 9 points. */
-static const int16_t k_lead_256[LEADS] = {256, 512, 506, 473, 405, 309, 203, 107, 39, 6, 0};
+#define REACH_MIN_US 36000  /* a motion is kept up for that long; longer only as far as the axis takes to stop ... */
+#define REACH_MAX_US 100000 /* ... and not longer than this */
+#define OFF_US       80000  /* time constant with which the curve comes back to the samples */
+#define PATIENCE_US  150000
+#define OFF_NOTHING  (Q32_ONE / 2000) /* 0.5 um: what is less is given up */
 
 /* Where the ring has an index; indices wrap. */
 static unsigned slot(uint32_t index)
@@ -35,7 +41,14 @@ static void copy_point(const stream_curve_t *self, q32_t *to_q32, const q32_t *f
 
 void stream_curve_start(stream_curve_t *self, unsigned axes, const q32_t *sample_q32)
 {
+    stream_stop_t stop[AXES_MAX];
+    for (unsigned axis = 0; axis < axes; axis++) {
+        stop[axis] = self->stop[axis];
+    }
     *self = (stream_curve_t){.axes = axes};
+    for (unsigned axis = 0; axis < axes; axis++) {
+        self->stop[axis] = stop[axis];
+    }
     copy_point(self, self->last_q32, sample_q32);
     for (unsigned i = 0; i < STREAM_POINTS; i++) {
         copy_point(self, self->point_q32[i], sample_q32);
@@ -45,79 +58,66 @@ void stream_curve_start(stream_curve_t *self, unsigned axes, const q32_t *sample
     }
 }
 
-/* Keeps the newest sample as the point of its index, unless a newer index has taken the place in the ring. */
-static void put_newest(stream_curve_t *self)
+void stream_curve_pace(stream_curve_t *self, uint32_t period_us, uint32_t cycle_us)
 {
-    if (self->ahead > -LEADS) {
-        copy_point(self, self->point_q32[slot(newest(self))], self->last_q32);
-        self->is_sample[slot(newest(self))] = true;
+    self->period_cycles_q16 = (int64_t)period_us * Q16_ONE / cycle_us;
+    self->reach_min_q16 = (int32_t)((int64_t)REACH_MIN_US * Q16_ONE / period_us);
+    self->reach_max_q16 = (int32_t)((int64_t)REACH_MAX_US * Q16_ONE / period_us);
+    self->softest_q32 = fx_clamp((int64_t)period_us * Q32_ONE / OFF_US, Q32_ONE / 32, Q32_ONE / 2);
+    self->patience = (int32_t)(PATIENCE_US / period_us) + 3;
+}
+
+/* Periods that a motion may be kept up so that it does not go further than the axis takes to stop: of v = step / period, the time
+ * is sqrt(v / J), or half of v / A + A / J where the acceleration binds. */
+static int32_t reach(const stream_curve_t *self, unsigned axis, q32_t step_q32)
+{
+    const stream_stop_t *stop = &self->stop[axis];
+    const q32_t vel_q32 = fx_mul_div(step_q32, Q16_ONE, self->period_cycles_q16);
+    int64_t cycles_q16;
+    if (stop->jerk_per_cycle3_q32 <= 0 || vel_q32 == 0) {
+        return self->reach_min_q16;
+    }
+    const int64_t rise_q16 = fx_mul_div(stop->acc_per_cycle2_q32, Q16_ONE, stop->jerk_per_cycle3_q32); /* A / J */
+    if (fx_mul_shift(stop->acc_per_cycle2_q32, rise_q16, 16) > vel_q32) {
+        cycles_q16 =
+            (int64_t)fx_sqrt_u64((uint64_t)fx_clamp(fx_mul_div(vel_q32, Q32_ONE, stop->jerk_per_cycle3_q32), 0, INT64_MAX));
+    } else {
+        cycles_q16 = (fx_mul_div(vel_q32, Q16_ONE, stop->acc_per_cycle2_q32) + rise_q16) / 2;
+    }
+    return (int32_t)fx_clamp(fx_mul_div(cycles_q16, Q16_ONE, self->period_cycles_q16), self->reach_min_q16, self->reach_max_q16);
+}
+
+/* The last three points of the curve, newest first. */
+static void points_at_head(const stream_curve_t *self, q32_t point_q32[3][AXES_MAX])
+{
+    for (uint32_t back = 0; back < 3; back++) {
+        copy_point(self, point_q32[back], self->point_q32[slot(self->head - back)]);
     }
 }
 
-/* The point after last: of one that is missing on the parabola through before, last, and next; of more on the straight line, as
- * a parabola could swing out. */
-static q32_t point_between(q32_t before_q32, q32_t last_q32, q32_t next_q32, int32_t periods)
+/* The more was guessed, the more softly the curve comes back; what is still off from before keeps its softer way.
+ * Returns the share of a velocity that may be added: the same velocity swings further out in a softer way. */
+static q32_t soften(stream_curve_t *self, int32_t guessed)
 {
-    return periods == 2 ? last_q32 + (next_q32 - before_q32) / 3 : last_q32 + (next_q32 - last_q32) / periods;
+    const int64_t wished_q32 = fx_clamp(Q32_ONE / (guessed + 2), self->softest_q32, Q32_ONE / 2);
+    self->grip_q32 = self->is_off && self->grip_q32 < wished_q32 ? self->grip_q32 : wished_q32;
+    self->is_off = true;
+    return fx_mul_div(self->grip_q32, Q32_ONE, wished_q32);
 }
 
-/* Replaces what was guessed since the sample before, now that the newest is known: guesses made from guesses would swing up.
- * The curve keeps them. */
-static void correct_guesses(stream_curve_t *self, int32_t periods, const q32_t *before_q32)
+/* The points at head are others now: what the curve is off them, and how that changes, so that it goes on as it was. The change
+ * is taken over two periods, as the first of them may be the error of a single guess. */
+static void keep_going(stream_curve_t *self, q32_t was_q32[3][AXES_MAX], int32_t guessed)
 {
-    const int32_t in_ring = self->ahead + LEADS;
-    const q32_t *const two_before_q32 = self->point_q32[slot(newest(self) - 3)];
-    for (int32_t back = self->ahead > 1 ? self->ahead : 1; back < periods && back < in_ring; back++) {
-        q32_t *const point_q32 = self->point_q32[slot(newest(self) - (uint32_t)back)];
-        for (unsigned axis = 0; axis < self->axes; axis++) {
-            const q32_t way = self->last_q32[axis] - before_q32[axis];
-            point_q32[axis] = periods == 2 ? point_between(two_before_q32[axis], before_q32[axis], self->last_q32[axis], 2)
-                                           : self->last_q32[axis] - way / periods * back;
-        }
-    }
-}
-
-void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32)
-{
-    q32_t before_q32[AXES_MAX];
-    copy_point(self, before_q32, self->last_q32);
-    copy_point(self, self->last_q32, sample_q32);
-    unsigned added = 0;
-    for (; added < periods && self->ahead < AHEAD_MAX; added++) {
-        self->ahead++;
-        self->is_sample[slot(newest(self))] = false;
-    }
-    put_newest(self);
-    correct_guesses(self, (int32_t)added, before_q32);
-}
-
-bool stream_curve_is_newest(const stream_curve_t *self, const q32_t *sample_q32)
-{
-    unsigned axis = 0;
-    while (axis < self->axes && self->last_q32[axis] == sample_q32[axis]) {
-        axis++;
-    }
-    return axis == self->axes;
-}
-
-void stream_curve_skip(stream_curve_t *self)
-{
-    if (self->ahead < 2) {
-        return;
-    }
-    for (uint32_t index = self->head + 1; index != newest(self); index++) {
-        copy_point(self, self->point_q32[slot(index)], self->point_q32[slot(index + 1)]);
-        self->is_sample[slot(index)] = self->is_sample[slot(index + 1)];
-    }
-    self->ahead--;
-}
-
-void stream_curve_stretch(stream_curve_t *self)
-{
-    if (self->ahead < AHEAD_MAX) {
-        self->is_sample[slot(newest(self))] = false;
-        self->ahead++;
-        put_newest(self);
+    q32_t is_q32[3][AXES_MAX];
+    const q32_t share_q32 = soften(self, guessed);
+    points_at_head(self, is_q32);
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        const q32_t here_q32 = was_q32[0][axis] - is_q32[0][axis];
+        const q32_t most_q32 = 4 * fx_abs(self->lead[axis].first_q32) + fx_abs(here_q32) / 16;
+        const q32_t change_q32 = fx_clamp((here_q32 - (was_q32[2][axis] - is_q32[2][axis])) / 2, -most_q32, most_q32);
+        self->off_q32[axis][0] += here_q32;
+        self->off_q32[axis][1] += fx_mul_shift(change_q32, share_q32, 32);
     }
 }
 
@@ -138,16 +138,131 @@ static q32_t lead(const stream_curve_t *self, unsigned axis)
     return fx_clamp(step[0] + fx_clamp(bend, -bend_max, bend_max), -4 * before, 4 * before);
 }
 
-static void extrapolate(stream_curve_t *self, q32_t *point_q32)
+static void begin_guessing(stream_curve_t *self)
 {
-    const int32_t periods = 1 - self->ahead;
+    self->guesses = 0;
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        const q32_t beyond = periods <= LEADS ? lead(self, axis) * k_lead_256[periods - 1] / 256 : 0;
-        point_q32[axis] = self->last_q32[axis] + beyond;
+        stream_lead_t *on = &self->lead[axis];
+        const q32_t step_q32 = fx_abs(self->last_q32[axis] - self->point_q32[slot(newest(self) - 1)][axis]);
+        on->first_q32 = lead(self, axis);
+        on->go_q32 = fx_clamp(on->first_q32, -step_q32, step_q32);
+        on->reach_q16 = reach(self, axis, fx_abs(on->go_q32));
+        on->beyond_q32 = 0;
     }
 }
 
-/* Between the last points committed and the next sample. */
+/* Share of a step that a guess goes beyond the one before: a cubic S from 1 to 0, as long as the shares add up to the reach. */
+static int32_t share_q16(int32_t reach_q16, int64_t i)
+{
+    if (i == 0) {
+        return reach_q16 < Q16_ONE ? reach_q16 : Q16_ONE;
+    }
+    const int64_t length_q16 = 2 * (int64_t)reach_q16 - Q16_ONE;
+    if (i * Q16_ONE >= length_q16) {
+        return 0;
+    }
+    const int64_t u_q16 = i * Q16_ONE * Q16_ONE / length_q16;
+    return (int32_t)(Q16_ONE - u_q16 * u_q16 / Q16_ONE * (3 * Q16_ONE - 2 * u_q16) / Q16_ONE);
+}
+
+/* The next point beyond the newest sample: the motion goes on, more slowly with each guess. */
+static void guess(stream_curve_t *self, q32_t *point_q32)
+{
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        stream_lead_t *on = &self->lead[axis];
+        const q32_t step_q32 = self->guesses == 0 ? on->first_q32 : on->go_q32;
+        on->beyond_q32 += fx_mul_shift(step_q32, share_q16(on->reach_q16, self->guesses), 16);
+        point_q32[axis] = self->last_q32[axis] + on->beyond_q32;
+    }
+    self->guesses++;
+}
+
+/* Guesses again what is committed beyond the newest sample. */
+static void guess_again(stream_curve_t *self)
+{
+    begin_guessing(self);
+    for (int32_t behind = -self->ahead; behind > 0; behind--) {
+        guess(self, self->point_q32[slot(self->head + 1 - (uint32_t)behind)]);
+    }
+}
+
+/* The point after last: of one that is missing on the parabola through before, last, and next; of more on the straight line, as
+ * a parabola could swing out. */
+static q32_t point_between(q32_t before_q32, q32_t last_q32, q32_t next_q32, int32_t periods)
+{
+    return periods == 2 ? last_q32 + (next_q32 - before_q32) / 3 : last_q32 + (next_q32 - last_q32) / periods;
+}
+
+/* Points between the sample before, so many periods ago, and the newest, as far as they are committed: now they can be
+ * interpolated. */
+static void fill_gap(stream_curve_t *self, int32_t periods, const q32_t *before_q32)
+{
+    const q32_t *const two_before_q32 = self->point_q32[slot(newest(self) - 3)];
+    for (int32_t back = self->ahead > 1 ? self->ahead : 1; back < periods && back < self->ahead + BEHIND_MAX; back++) {
+        q32_t *const point_q32 = self->point_q32[slot(newest(self) - (uint32_t)back)];
+        for (unsigned axis = 0; axis < self->axes; axis++) {
+            const q32_t way = self->last_q32[axis] - before_q32[axis];
+            point_q32[axis] = periods == 2 ? point_between(two_before_q32[axis], before_q32[axis], self->last_q32[axis], 2)
+                                           : self->last_q32[axis] - fx_mul_div(way, back, periods);
+        }
+    }
+}
+
+void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32)
+{
+    q32_t was_q32[3][AXES_MAX];
+    q32_t before_q32[AXES_MAX];
+    const int32_t guessed = -self->ahead;
+    points_at_head(self, was_q32);
+    copy_point(self, before_q32, self->last_q32);
+    copy_point(self, self->last_q32, sample_q32);
+    const int32_t ahead = self->ahead + (int32_t)periods;
+    const int32_t kept = (int32_t)fx_clamp(ahead, -BEHIND_MAX, AHEAD_MAX);
+    for (int32_t i = self->ahead > 0 ? self->ahead + 1 : 1; i < kept; i++) {
+        self->is_sample[slot(self->head + (uint32_t)i)] = false;
+    }
+    self->ahead = kept;
+    copy_point(self, self->point_q32[slot(newest(self))], self->last_q32);
+    self->is_sample[slot(newest(self))] = true;
+    fill_gap(self, (int32_t)periods, before_q32);
+    if (self->ahead < 0) {
+        guess_again(self);
+    }
+    if (guessed == 1) { /* an error of one point, and of no velocity: half of it is taken back at once */
+        for (unsigned axis = 0; axis < self->axes; axis++) {
+            self->off_q32[axis][0] += (was_q32[0][axis] - self->point_q32[slot(self->head)][axis]) / 2;
+        }
+        (void)soften(self, 0);
+    } else if (guessed > 1) {
+        keep_going(self, was_q32, guessed);
+    }
+}
+
+q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *sample_q32, unsigned periods, q32_t *step_q32)
+{
+    const int64_t n = periods;
+    q32_t misfit_q32 = 0;
+    *step_q32 = 0;
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        const q32_t before_q32 = self->point_q32[slot(newest(self) - 1)][axis];
+        const q32_t step = self->last_q32[axis] - before_q32;
+        const q32_t bend = step - (before_q32 - self->point_q32[slot(newest(self) - 2)][axis]);
+        misfit_q32 += fx_abs(sample_q32[axis] - self->last_q32[axis] - n * step - n * (n + 1) / 2 * bend);
+        *step_q32 += fx_abs(step);
+    }
+    return misfit_q32;
+}
+
+bool stream_curve_is_newest(const stream_curve_t *self, const q32_t *sample_q32)
+{
+    unsigned axis = 0;
+    while (axis < self->axes && self->last_q32[axis] == sample_q32[axis]) {
+        axis++;
+    }
+    return axis == self->axes;
+}
+
+/* Between the last point committed and the next sample. */
 static void interpolate(stream_curve_t *self, q32_t *point_q32)
 {
     int32_t periods = 2;
@@ -162,25 +277,148 @@ static void interpolate(stream_curve_t *self, q32_t *point_q32)
     }
 }
 
-void stream_curve_commit(stream_curve_t *self)
+/* No sample has come for so long that none is expected: the curve goes back to the last one. */
+static void give_up(stream_curve_t *self)
+{
+    const q32_t *const point_q32 = self->point_q32[slot(self->head)];
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        self->off_q32[axis][0] += point_q32[axis] - self->last_q32[axis];
+        self->lead[axis] = (stream_lead_t){.reach_q16 = 0};
+    }
+    (void)soften(self, self->patience);
+}
+
+/* Settles the point after head. */
+static void find_next(stream_curve_t *self)
 {
     q32_t *const point_q32 = self->point_q32[slot(self->head + 1)];
-    if (self->ahead <= 0) {
-        extrapolate(self, point_q32);
-    } else if (!self->is_sample[slot(self->head + 1)]) {
-        interpolate(self, point_q32);
+    if (self->ahead > 0) {
+        if (!self->is_sample[slot(self->head + 1)]) {
+            interpolate(self, point_q32);
+        }
+        return;
     }
+    if (self->ahead == 0) {
+        begin_guessing(self);
+    } else if (-self->ahead == self->patience) {
+        give_up(self);
+    }
+    guess(self, point_q32);
+}
+
+void stream_curve_skip(stream_curve_t *self)
+{
+    q32_t was_q32[3][AXES_MAX];
+    if (self->ahead < 2) {
+        return;
+    }
+    points_at_head(self, was_q32);
+    find_next(self);
+    self->head++;
+    self->ahead--;
+    keep_going(self, was_q32, SHIFT_GUESSES);
+}
+
+void stream_curve_stretch(stream_curve_t *self)
+{
+    q32_t was_q32[3][AXES_MAX];
+    if (self->ahead >= AHEAD_MAX || self->ahead <= -BEHIND_MAX) {
+        return;
+    }
+    points_at_head(self, was_q32);
+    self->is_sample[slot(self->head)] = true; /* as it stands, whatever it was made from */
+    self->head--;
+    self->ahead++;
+    if (self->ahead < 0) {
+        guess_again(self);
+    }
+    keep_going(self, was_q32, SHIFT_GUESSES);
+}
+
+/* One period of the filter that takes back what the curve is off: q^3 with q = 1 - grip, see the ramp in DESIGN.md. */
+static void take_back(const stream_curve_t *self, q32_t off_q32[3])
+{
+    const int64_t g = self->grip_q32;
+    const int64_t g2 = fx_mul_shift(g, g, 32);
+    const int64_t g3 = fx_mul_shift(g2, g, 32);
+    off_q32[2] -= fx_mul_shift(off_q32[0], g3, 32) + fx_mul_shift(off_q32[1], 3 * g2 - 2 * g3, 32) +
+                  fx_mul_shift(off_q32[2], 3 * g - 3 * g2 + g3, 32);
+    off_q32[1] += off_q32[2];
+    off_q32[0] += off_q32[1];
+    if (fx_abs(off_q32[0]) < OFF_NOTHING && fx_abs(off_q32[1]) < OFF_NOTHING && fx_abs(off_q32[2]) < OFF_NOTHING) {
+        off_q32[0] = off_q32[1] = off_q32[2] = 0;
+    }
+}
+
+/* The point at head becomes a control point, with what the curve is still off it. */
+static void put_control(stream_curve_t *self)
+{
+    self->is_off = false;
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        take_back(self, self->off_q32[axis]);
+        self->control_q32[3][axis] = self->point_q32[slot(self->head)][axis] + self->off_q32[axis][0];
+        self->is_off |= self->off_q32[axis][0] != 0 || self->off_q32[axis][1] != 0;
+    }
+}
+
+void stream_curve_commit(stream_curve_t *self)
+{
+    find_next(self);
     for (unsigned i = 0; i < 3; i++) {
         copy_point(self, self->control_q32[i], self->control_q32[i + 1]);
     }
-    copy_point(self, self->control_q32[3], point_q32);
     self->head++;
     self->ahead--;
+    put_control(self);
+}
+
+/* Control points of a curve that is here, moving so, at the beginning of a segment: of the cubic three count, of the quadratic
+ * two. p = (c0 + 4 c1 + c2) / 6, p' = (c2 - c0) / 2, p'' = c0 - 2 c1 + c2, or p = (c1 + c2) / 2, p' = c2 - c1. */
+static void control_from(stream_style_t style, q32_t pos_q32, q32_t vel_q32, q32_t acc_q32, q32_t control_q32[3])
+{
+    const q32_t acc = style == STREAM_FAST ? 0 : acc_q32;
+    const q32_t middle_q32 = style == STREAM_FAST ? pos_q32 - vel_q32 / 2 : pos_q32 - acc / 6;
+    control_q32[0] = middle_q32 - vel_q32 + acc / 2;
+    control_q32[1] = middle_q32;
+    control_q32[2] = middle_q32 + vel_q32 + acc / 2;
+}
+
+void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const ramp_ref_t *now, const q32_t *sample_q32)
+{
+    const int64_t n_q16 = self->period_cycles_q16;
+    self->ahead = 0;
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        const q32_t step_q32 = sample_q32[axis] - self->last_q32[axis];
+        for (int32_t back = 0; back < STREAM_POINTS / 2; back++) {
+            self->point_q32[slot(self->head - (uint32_t)back)][axis] = sample_q32[axis] - back * step_q32;
+        }
+        const q32_t acc_q32 = fx_mul_shift(fx_mul_shift(now[axis].acc_per_cycle2_q32, n_q16, 16), n_q16, 16);
+        const q32_t vel_q32 = fx_mul_shift(now[axis].vel_per_cycle_q32 + now[axis].acc_per_cycle2_q32 / 2, n_q16, 16);
+        q32_t control_q32[3];
+        control_from(style, now[axis].pos_q32, vel_q32, acc_q32, control_q32);
+        q32_t *const off_q32 = self->off_q32[axis];
+        off_q32[0] = control_q32[2] - (sample_q32[axis] - step_q32);
+        const q32_t most_q32 = fx_abs(vel_q32) + fx_abs(off_q32[0]) / 16;
+        off_q32[1] = fx_clamp(control_q32[2] - control_q32[1] - step_q32, -most_q32, most_q32);
+        off_q32[2] = 0;
+        for (unsigned i = 0; i < 3; i++) {
+            self->control_q32[i][axis] = control_q32[i];
+        }
+    }
+    copy_point(self, self->last_q32, sample_q32);
+    (void)soften(self, self->patience);
+    put_control(self);
 }
 
 bool stream_curve_is_at_rest(const stream_curve_t *self)
 {
-    return self->ahead <= -(LEADS + 3);
+    bool is_resting = -self->ahead > self->patience;
+    for (unsigned i = 0; i < 4; i++) {
+        for (unsigned axis = 0; axis < self->axes; axis++) {
+            is_resting &= self->control_q32[i][axis] == self->last_q32[axis];
+        }
+    }
+    return is_resting;
 }
 
 /* Weights of the differences between the last control points, each from 0 to 1 in time. Q60: sums up to 5 occur. */

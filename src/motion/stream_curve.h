@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * stream_curve.h - the curve through the samples of a stream: a uniform B-spline with the samples as control points.
- * A control point is committed when the curve first needs it and never changed afterwards. Knows no time; private to src/motion.
+ * A control point is committed when the curve first needs it and never changed afterwards. Knows no time but the period; private
+ * to src/motion.
  */
 #ifndef STREAM_CURVE_H
 #define STREAM_CURVE_H
@@ -10,14 +11,26 @@
 /** A curve that has always rested on the sample. */
 void stream_curve_start(stream_curve_t *self, unsigned axes, const q32_t *sample_q32);
 
+/** Tells the period: how long a motion is kept up where samples are missing, and how firmly the curve comes back to them. */
+void stream_curve_pace(stream_curve_t *self, uint32_t period_us, uint32_t cycle_us);
+
 /** Adds a sample the given number of periods after the newest; 0: in the place of the newest. */
 void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32);
+
+/** The sender has another rate, and the curve another grid, which begins with this sample at head. The curve goes on as it was
+ * and comes over to the samples softly. After stream_curve_pace(); the phase behind head is 0 then.
+ *  @param now where the curve is: position, velocity and acceleration of each axis */
+void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const ramp_ref_t *now, const q32_t *sample_q32);
+
+/** How far a sample is from where the motion of the last ones would be so many periods later; and the way of the last period.
+ * Sums over all axes. */
+q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *sample_q32, unsigned periods, q32_t *step_q32);
 
 /** True if the sample equals the newest one in all axes. */
 bool stream_curve_is_newest(const stream_curve_t *self, const q32_t *sample_q32);
 
-/** Makes the newest sample's index one less or one more, dropping or guessing a point that is not committed: for a time line
- *  that was found to be wrong. Dropping needs two samples ahead, else nothing is changed. */
+/** Makes the newest sample's index one less or one more: for a time line that was found to be wrong. The curve comes over to the
+ *  other time line softly. Nothing is changed where there is no point to go to. */
 void stream_curve_skip(stream_curve_t *self);
 void stream_curve_stretch(stream_curve_t *self);
 

@@ -145,9 +145,13 @@ static void render(uint64_t origin_us, int from_ms, int to_ms)
     }
 }
 
+/* An axis of 3000 mm/s^2 and 50000 mm/s^3. */
+static const stream_stop_t k_stop = {.acc_per_cycle2_q32 = 12884902, .jerk_per_cycle3_q32 = 214748};
+
 static void start(stream_style_t style)
 {
     stream_init(&s_stream, CYCLE_US, 1, style);
+    stream_set_stop(&s_stream, 0, k_stop);
     s_sent.count = 0;
 }
 
@@ -373,29 +377,28 @@ static void test_stream_step_time_near_its_end_gives_the_same_bits(void)
     }
 }
 
-static void test_stream_step_axes_share_the_clock_and_nothing_else(void)
+/* Axes that are multiples of one signal give multiples of one curve: nothing but the clock and what is lost couples them. */
+static void test_stream_step_axes_of_one_signal_move_as_one(void)
 {
-    static stream_t seven, one[AXES_MAX];
+    static stream_t seven;
+    make_signal(2);
+    start(STREAM_SMOOTH);
+    stream_set_stop(&s_stream, 0, (stream_stop_t){.jerk_per_cycle3_q32 = 0});
     stream_init(&seven, CYCLE_US, AXES_MAX, STREAM_SMOOTH);
-    for (unsigned axis = 0; axis < AXES_MAX; axis++) {
-        stream_init(&one[axis], CYCLE_US, 1, STREAM_SMOOTH);
-    }
-    for (int ms = 0; ms < 3000; ms++) {
+    for (int ms = 0; ms < 20000; ms++) {
         const uint64_t now_us = (uint64_t)ms * 1000;
-        if (random_unit() < 0.05) {
+        if (ms % 16 == 3 && random_unit() > 0.1) {
             q32_t sample[AXES_MAX];
             for (unsigned axis = 0; axis < AXES_MAX; axis++) {
-                sample[axis] = q32(200 * random_unit() - 100);
-                stream_push(&one[axis], now_us, &sample[axis]);
+                sample[axis] = q32(signal_at(0.001 * ms)) / 8 * (q32_t)axis;
             }
             stream_push(&seven, now_us, sample);
+            stream_push(&s_stream, now_us, &sample[AXES_MAX - 1]);
         }
-        ramp_ref_t ref[AXES_MAX] = {{0}}, ref_one;
-        const bool is_running = stream_step(&seven, now_us, ref);
+        ramp_ref_t ref[AXES_MAX] = {{0}}, one = {0};
+        TEST_ASSERT_EQUAL(stream_step(&s_stream, now_us, &one), stream_step(&seven, now_us, ref));
         for (unsigned axis = 0; axis < AXES_MAX; axis++) {
-            ref_one = (ramp_ref_t){0};
-            TEST_ASSERT_EQUAL(is_running, stream_step(&one[axis], now_us, &ref_one));
-            TEST_ASSERT_EQUAL_MEMORY(&ref_one, &ref[axis], sizeof ref_one);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-3, mm(one.pos_q32) * axis / (AXES_MAX - 1), mm(ref[axis].pos_q32));
         }
     }
 }
@@ -407,14 +410,10 @@ static const network_t k_usual = {60, 5, 0.01};
 static void test_stream_smooth_on_cue_signals_keeps_its_figures(void)
 {
     double sum = 0, sum_true = 0;
-    for (unsigned seed = 1; seed <= 10; seed++) {
+    for (unsigned seed = 1; seed <= 24; seed++) {
         const quality_t cold = measure_seed(seed, STREAM_SMOOTH, &k_usual, 300);
 
         const quality_t quality = measure(2000, LONG_MS, 80);
-        TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 2.5);
-        TEST_ASSERT_TRUE(quality.shape_um <= 25);
-        TEST_ASSERT_TRUE(quality.worst_mm <= 0.2);
-        TEST_ASSERT_TRUE(quality.jerk <= 1.45 * quality.jerk_true); /* a loss at an onset weighs much in one seed */
         sum += quality.jerk * quality.jerk;
         sum_true += quality.jerk_true * quality.jerk_true;
         if (getenv("STREAM_FIGURES")) {
@@ -422,21 +421,25 @@ static void test_stream_smooth_on_cue_signals_keeps_its_figures(void)
                    quality.lag_ms, quality.shape_um, cold.shape_um, quality.worst_mm, quality.jerk,
                    quality.jerk / quality.jerk_true, cold.jerk / cold.jerk_true);
         }
+        TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 2.5);
+        TEST_ASSERT_TRUE(quality.shape_um <= 50);
+        TEST_ASSERT_TRUE(quality.worst_mm <= 1.0);                 /* two losses in a row */
+        TEST_ASSERT_TRUE(quality.jerk <= 1.4 * quality.jerk_true); /* two at an onset */
     }
-    TEST_ASSERT_TRUE(sqrt(sum / sum_true) <= 1.2);
+    TEST_ASSERT_TRUE(sqrt(sum / sum_true) <= 1.15);
 }
 
 static void test_stream_fast_on_cue_signals_keeps_its_figures(void)
 {
     for (unsigned seed = 1; seed <= 5; seed++) {
         const quality_t quality = measure_seed(seed, STREAM_FAST, &k_usual, 2000);
-        TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 2.0);
-        TEST_ASSERT_TRUE(quality.shape_um <= 25);
-        TEST_ASSERT_TRUE(quality.jerk <= 4.5 * quality.jerk_true);
         if (getenv("STREAM_FIGURES")) {
             printf("fast %2u: lag %.1f ms shape %.1f um worst %.3f mm jerk %.2f x\n", seed, quality.lag_ms, quality.shape_um,
                    quality.worst_mm, quality.jerk / quality.jerk_true);
         }
+        TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 2.0);
+        TEST_ASSERT_TRUE(quality.shape_um <= 40);
+        TEST_ASSERT_TRUE(quality.jerk <= 5.5 * quality.jerk_true);
     }
 }
 
@@ -464,7 +467,7 @@ static void test_stream_step_all_rates_converge(void)
         }
         TEST_ASSERT_TRUE(off <= 0.01);
         TEST_ASSERT_TRUE(quality.lag_ms <= 2500.0 / rates[i] + 4.5);
-        TEST_ASSERT_TRUE(quality.shape_um <= 25 + 35e3 / rates[i] / rates[i]);
+        TEST_ASSERT_TRUE(quality.shape_um <= 25 + 85e3 / rates[i] / rates[i]);
     }
 }
 
@@ -491,39 +494,100 @@ static void test_stream_step_lossy_start_finds_the_period(void)
     TEST_ASSERT_TRUE(late < 0.01);
 }
 
-/* ---- ends ---- */
-
-/* What one period of extrapolation adds to the last sample. */
-static double lead_of_last(void)
+/* Largest distance to what the signal was when rendered, while the delay is within the bound given in stream.h. */
+static double worst_error(int from_ms, int to_ms, double lag_ms)
 {
-    const double *v = &s_sent.value[s_sent.count - 1];
-    return fabs(2 * v[0] - 3 * v[-1] + v[-2]);
+    double worst = 0;
+    for (int ms = from_ms; ms < to_ms; ms++) {
+        worst = fmax(worst, fabs(mm(s_ref[ms].pos_q32) - signal_at(0.001 * (ms - lag_ms))));
+    }
+    return worst;
 }
 
+/* ---- ends ---- */
+
+/* How far an axis of k_stop goes on from a velocity and an acceleration towards it, mm and s. */
+static double stop_distance(double velocity, double acceleration)
+{
+    const double jerk = 50000, at_zero = velocity + acceleration * acceleration / 2 / jerk;
+    const double rise = velocity * acceleration / jerk + pow(acceleration, 3) / 3 / jerk / jerk;
+    return rise + (at_zero < 180 ? at_zero * sqrt(at_zero / jerk) : at_zero / 2 * (at_zero / 3000 + 0.06));
+}
+
+/* From any moment and speed: no further beyond the last sample than the axis takes to stop, or 36 ms of its speed, or one more
+ * step; and at rest exactly on it after two seconds. */
 static void test_stream_step_ended_stream_rests_on_its_last_sample(void)
 {
     double worst = 0;
-    for (int i = 0; i < 200; i++) {
-        const network_t network = {i % 2 ? 60 : 100, 4, 0};
+    for (int i = 0; i < 300; i++) {
+        const double rate = i % 2 ? 60 : i % 4 ? 100 : 30;
+        const network_t network = {rate, 4, 0};
         make_signal((unsigned)i % 10);
         start(i % 3 ? STREAM_SMOOTH : STREAM_FAST);
         send_signal(&network, 0, 1.2 + 0.01 * i);
         const int end_ms = (int)(1200 + 10 * i);
-        render(0, 0, end_ms + 350);
-        const double last = s_sent.value[s_sent.count - 1];
-        const double lead = lead_of_last(), way = last - s_sent.value[s_sent.count - 2];
-        for (int ms = end_ms; ms < end_ms + 350; ms++) {
+        render(0, 0, end_ms + 2100);
+        const double *v = &s_sent.value[s_sent.count - 1];
+        const double way = v[0] - v[-1] < 0 ? -1 : 1;
+        const double velocity = fabs(v[0] - v[-1]) * rate, acceleration = fmax(0, (v[0] - 2 * v[-1] + v[-2]) * rate * rate * way);
+        const double allowed = fmax(stop_distance(velocity, acceleration), 0.036 * velocity) + acceleration / rate / rate + 0.05;
+        double beyond = 0;
+        for (int ms = end_ms; ms < end_ms + 2100; ms++) {
             assert_differences(&s_ref[ms - 1], &s_ref[ms]);
-            const double beyond = (mm(s_ref[ms].pos_q32) - last) * (way < 0 ? -1 : 1);
-            worst = fmax(worst, lead > 0.2 ? beyond / lead : 0);
-            TEST_ASSERT_TRUE(beyond <= 2 * lead + fabs(way) + 0.1);
+            beyond = fmax(beyond, (mm(s_ref[ms].pos_q32) - v[0]) * way);
         }
-        assert_at_rest(q32(last), &s_ref[end_ms + 300]);
+        worst = fmax(worst, beyond / allowed);
+        TEST_ASSERT_TRUE(beyond <= allowed);
+        assert_at_rest(q32(v[0]), &s_ref[end_ms + 2050]);
     }
     if (getenv("STREAM_FIGURES")) {
-        printf("end: beyond the last sample %.2f leads at most\n", worst);
+        printf("end: beyond the last sample %.2f of what is allowed at most\n", worst);
     }
-    TEST_ASSERT_TRUE(worst > 1); /* the bound was tried */
+    TEST_ASSERT_TRUE(worst > 0.7); /* the bound was tried */
+}
+
+/* Takes samples away, from a time on. */
+static void lose(double from, int samples)
+{
+    int first = 0;
+    while (s_sent.at[first] < from) {
+        first++;
+    }
+    s_sent.count -= samples;
+    memmove(&s_sent.at[first], &s_sent.at[first + samples], (size_t)(s_sent.count - first) * sizeof s_sent.at[0]);
+    memmove(&s_sent.value[first], &s_sent.value[first + samples], (size_t)(s_sent.count - first) * sizeof s_sent.value[0]);
+}
+
+/* Bursts of losses at random phases: the acceleration stays near the signal's own, and the curve is back on it. */
+static void test_stream_step_bursts_of_losses_are_bridged_softly(void)
+{
+    for (int lost = 1; lost <= 12; lost++) {
+        double ratio = 0, worst = 0;
+        for (unsigned seed = 0; seed < 40; seed++) {
+            const network_t network = {60, 3, 0};
+            make_signal(seed);
+            start(STREAM_SMOOTH);
+            const double from = 3 + 0.5 * random_unit();
+            send_signal(&network, 0, 6);
+            lose(from, lost);
+            render(0, 0, 5900);
+            double most = 0, most_true = 0;
+            for (int ms = 2950; ms < 4700; ms++) {
+                assert_differences(&s_ref[ms - 1], &s_ref[ms]);
+                const double t = 0.001 * ms - 0.037;
+                most = fmax(most, fabs(1e6 * mm(s_ref[ms].acc_per_cycle2_q32)));
+                most_true = fmax(most_true, fabs(1e6 * (signal_at(t + 0.001) - 2 * signal_at(t) + signal_at(t - 0.001))));
+            }
+            ratio += most / most_true / 40;
+            worst = fmax(worst, most);
+            TEST_ASSERT_TRUE(worst_error(5000, 5900, 38) < 0.3);
+        }
+        if (getenv("STREAM_FIGURES")) {
+            printf("%2d lost: acceleration %.2f x the signal's, %.0f mm/s^2 at most\n", lost, ratio, worst);
+        }
+        TEST_ASSERT_TRUE(ratio < (lost == 1 ? 1.05 : 1.5 + 0.18 * lost));
+        TEST_ASSERT_TRUE(worst < 3000);
+    }
 }
 
 /* Neither from rest nor out of a slow motion of 0.05 mm a sample. */
@@ -535,12 +599,27 @@ static void test_stream_step_jump_at_the_end_is_not_continued(void)
         for (int i = 0; i < 61 + kind % 2; i++) {
             send(0.005 + i / 60.0, i < 60 ? 10 - step * (60 - i) : 60);
         }
-        render(0, 0, 1500);
-        for (int ms = 5; ms < 1500; ms++) {
-            TEST_ASSERT_TRUE(s_ref[ms].pos_q32 >= q32(10 - step * 60) - 2 && s_ref[ms].pos_q32 <= q32(60 + 8 * step) + 2);
+        render(0, 0, 4000);
+        for (int ms = 5; ms < 4000; ms++) {
+            TEST_ASSERT_TRUE(s_ref[ms].pos_q32 >= q32(10 - step * 60) - 2 && s_ref[ms].pos_q32 <= q32(60 + 10 * step) + 2);
         }
-        assert_at_rest(q32(60), &s_ref[1400]);
+        assert_at_rest(q32(60), &s_ref[3900]);
     }
+}
+
+/* A pause of 0.3 s is a loss: the same stream goes on, without a step. */
+static void test_stream_step_after_a_pause_goes_on(void)
+{
+    make_signal(4);
+    start(STREAM_SMOOTH);
+    send_signal(&k_usual, 0, 2);
+    send_signal(&k_usual, 2.3, 6);
+    render(0, 0, 6000);
+    for (int ms = 100; ms < 6000; ms++) {
+        assert_differences(&s_ref[ms - 1], &s_ref[ms]);
+    }
+    TEST_ASSERT_TRUE(speed_max(2000, 3500) < 2 * signal_speed_max(0, 6));
+    TEST_ASSERT_TRUE(measure(3500, 6000, 80).shape_um < 40);
 }
 
 static void test_stream_step_after_an_end_starts_again(void)
@@ -550,16 +629,16 @@ static void test_stream_step_after_an_end_starts_again(void)
     send_signal(&k_usual, 0, 2);
     const double last = s_sent.value[s_sent.count - 1];
     const int again = s_sent.count;
-    send_signal(&k_usual, 2.3, 6); /* a pause of 0.3 s */
-    render(0, 0, 6000);
+    send_signal(&k_usual, 4.3, 8); /* a pause of 2.3 s */
+    render(0, 0, 8000);
     const int again_ms = (int)ceil(s_sent.at[again] * 1000);
     assert_at_rest(q32(last), &s_ref[again_ms - 1]);
     assert_at_rest(q32(s_sent.value[again]), &s_ref[again_ms]);
     assert_at_rest(q32(s_sent.value[again]), &s_ref[again_ms + 10]);
-    for (int ms = again_ms + 1; ms < 6000; ms++) {
+    for (int ms = again_ms + 1; ms < 8000; ms++) {
         assert_differences(&s_ref[ms - 1], &s_ref[ms]);
     }
-    TEST_ASSERT_TRUE(measure(3000, 6000, 80).shape_um < 40);
+    TEST_ASSERT_TRUE(measure(5000, 8000, 80).shape_um < 40);
 }
 
 static void test_stream_is_live_while_samples_come(void)
@@ -575,22 +654,12 @@ static void test_stream_is_live_while_samples_come(void)
     TEST_ASSERT_UINT32_WITHIN(100, 20000, stream_period_us(&s_stream));
     TEST_ASSERT_UINT32_WITHIN(2500, 32500, stream_delay_us(&s_stream));
     TEST_ASSERT_FALSE(stream_is_live(&s_stream, 2140000));
-    render(0, 2000, 3000);
-    TEST_ASSERT_FALSE(stream_is_live(&s_stream, 2999000));
+    render(0, 2000, 3200);
+    TEST_ASSERT_FALSE(stream_is_live(&s_stream, 3199000));
     TEST_ASSERT_EQUAL_UINT32(0, stream_period_us(&s_stream));
 }
 
 /* ---- senders and networks that misbehave ---- */
-
-/* Largest distance to what the signal was when rendered, while the delay is within the bound given in stream.h. */
-static double worst_error(int from_ms, int to_ms, double lag_ms)
-{
-    double worst = 0;
-    for (int ms = from_ms; ms < to_ms; ms++) {
-        worst = fmax(worst, fabs(mm(s_ref[ms].pos_q32) - signal_at(0.001 * (ms - lag_ms))));
-    }
-    return worst;
-}
 
 /* Renders and checks in every cycle that the delay reported stays within the bound. */
 static double delay_max_periods(int from_ms, int to_ms)
@@ -628,8 +697,8 @@ static void test_stream_step_changing_rates_are_followed(void)
         const double delay = delay_max_periods(from_ms, to_ms);
         report("rate", from_ms + 200, to_ms, delay);
         TEST_ASSERT_TRUE(delay < 4.5);
-        TEST_ASSERT_TRUE(speed_max(from_ms + 200, to_ms) < 4 * signal_speed_max(0.001 * from_ms - 0.3, 0.001 * to_ms));
-        TEST_ASSERT_TRUE(measure(from_ms + 2000, to_ms, 4000 / rates[i]).shape_um < 50 + 40e3 / rates[i] / rates[i]);
+        TEST_ASSERT_TRUE(speed_max(from_ms + 200, to_ms) < 1.3 * signal_speed_max(0.001 * from_ms - 0.3, 0.001 * to_ms));
+        TEST_ASSERT_TRUE(measure(from_ms + 2000, to_ms, 4000 / rates[i]).shape_um < 50 + 120e3 / rates[i] / rates[i]);
         TEST_ASSERT_TRUE(fabs(stream_period_us(&s_stream) * 1e-6 * rates[i] - 1) < 0.01);
     }
     for (int ms = 100; ms < 23000; ms++) {
@@ -765,8 +834,8 @@ static void test_stream_step_noise_stays_bounded(void)
             if (!stream_step(&s_stream, now_us, &ref)) {
                 continue;
             }
-            const q32_t span = high - low; /* a guess goes at most 2 leads of 3 spans beyond */
-            TEST_ASSERT_TRUE(ref.pos_q32 >= low - 6 * span - 2 && ref.pos_q32 <= high + 6 * span + 2);
+            const q32_t span = high - low; /* noise as fast as this swings the curve about: not out of all bounds */
+            TEST_ASSERT_TRUE(ref.pos_q32 >= low - 100 * span - 2 && ref.pos_q32 <= high + 100 * span + 2);
             TEST_ASSERT_TRUE(stream_period_us(&s_stream) <= 200000);
         }
     }
@@ -783,13 +852,15 @@ int main(void)
     RUN_TEST(test_stream_step_differences_are_consistent);
     RUN_TEST(test_stream_step_signal_that_stops_is_met_exactly);
     RUN_TEST(test_stream_step_time_near_its_end_gives_the_same_bits);
-    RUN_TEST(test_stream_step_axes_share_the_clock_and_nothing_else);
+    RUN_TEST(test_stream_step_axes_of_one_signal_move_as_one);
     RUN_TEST(test_stream_smooth_on_cue_signals_keeps_its_figures);
     RUN_TEST(test_stream_fast_on_cue_signals_keeps_its_figures);
     RUN_TEST(test_stream_step_all_rates_converge);
     RUN_TEST(test_stream_step_lossy_start_finds_the_period);
     RUN_TEST(test_stream_step_ended_stream_rests_on_its_last_sample);
     RUN_TEST(test_stream_step_jump_at_the_end_is_not_continued);
+    RUN_TEST(test_stream_step_bursts_of_losses_are_bridged_softly);
+    RUN_TEST(test_stream_step_after_a_pause_goes_on);
     RUN_TEST(test_stream_step_after_an_end_starts_again);
     RUN_TEST(test_stream_is_live_while_samples_come);
     RUN_TEST(test_stream_step_changing_rates_are_followed);
