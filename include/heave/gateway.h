@@ -73,6 +73,8 @@ typedef struct {
     bool is_mask_written;
     uint64_t other_logged_us; /**< 0 = never */
     uint32_t other_suppressed;
+    uint64_t spike_logged_us;
+    uint32_t spikes_logged; /**< of all spikes, those that a line told of */
     uint64_t reject_logged_us[FRAME_ERRORS];
     uint32_t reject_suppressed[FRAME_ERRORS];
     uint8_t datagram[GATEWAY_DATAGRAM_MAX];
@@ -88,8 +90,8 @@ void gateway_start_settled(gateway_t *self);
 /** Offline runs that came up to SETTLED by a request: the auto policy is as at the start. */
 void gateway_restart_auto(gateway_t *self);
 
-/** Takes over what may change in operation: silence, take-over and priorities, dialect, safe mask and its delay, following error.
- *  The rest of the settings is not looked at. */
+/** Takes over what may change in operation: silence, take-over and priorities, dialect, safe mask and its delay, following error,
+ *  spike gate. The rest of the settings is not looked at. */
 void gateway_reload(gateway_t *self, const settings_t *settings);
 
 /** What an operator asks for: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET or EVENT_SHUTDOWN.

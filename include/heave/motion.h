@@ -7,6 +7,7 @@
 #ifndef HEAVE_MOTION_H
 #define HEAVE_MOTION_H
 
+#include "heave/gate.h"
 #include "heave/intensity.h"
 #include "heave/kin.h"
 #include "heave/ramp.h"
@@ -108,6 +109,12 @@ const q32_t *motion_neutral_extension(const motion_t *self);
 
 /** The mechanism, for feedback. */
 const kin_t *motion_kin(const motion_t *self);
+
+/** Another factor of the gate in front of the stream (see gate.h): [0, GATE_FACTOR_MAX], 0 = off. */
+void motion_set_spike_gate(motion_t *self, uint32_t factor);
+
+/** The gate's state, for display. */
+const gate_t *motion_gate(const motion_t *self);
 
 /** The stream's state, for display. */
 const stream_t *motion_stream(const motion_t *self);

@@ -4,6 +4,7 @@
 #ifndef HEAVE_MOTION_STATE_H
 #define HEAVE_MOTION_STATE_H
 
+#include "heave/gate.h"
 #include "heave/halt.h"
 #include "heave/motion.h"
 #include "heave/profile.h"
@@ -56,6 +57,8 @@ struct motion {
     motion_next_t next;
     motion_space_t space;
     stream_t stream;
+    gate_t gate;
+    motion_target_t withheld; /**< what the gate holds back */
     quintic_t quintic;
     halt_t halt;
     scurve_t path;

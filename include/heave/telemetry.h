@@ -33,6 +33,7 @@ typedef struct {
     uint32_t owner_changes; /**< take-overs by another sender */
     uint32_t not_followed;  /**< accepted while the platform was not ENGAGED */
     uint32_t impossible;    /**< extensions no pose belongs to */
+    uint32_t spikes;        /**< samples of a stream that were not followed (see gate.h) */
     uint32_t clamped;       /**< cycles that pulled a target in */
     uint32_t stretched;     /**< timed moves that took longer than asked */
     uint32_t relay_missing; /**< masks that set a relay this platform does not have */

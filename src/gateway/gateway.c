@@ -71,6 +71,8 @@ void gateway_reload(gateway_t *self, const settings_t *settings)
     own->relay_safe_mask = settings->relay_safe_mask;
     own->relay_safe_after_ms = settings->relay_safe_after_ms;
     own->following_error_mm_q16 = settings->following_error_mm_q16;
+    own->spike_gate = settings->spike_gate;
+    motion_set_spike_gate(&self->motion, settings->spike_gate);
 }
 
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)
@@ -180,6 +182,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->stream_delay_us = stream_delay_us(motion_stream(&self->motion));
     s->owner = self->owner;
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
+    s->counters.spikes = gate_spikes(motion_gate(&self->motion));
     s->counters.stretched = motion_stretched_count(&self->motion);
     find_actual_pose(self);
     s->cycle++;

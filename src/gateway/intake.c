@@ -170,6 +170,44 @@ static void take_mask(gateway_t *self, const frame_t *frame)
     self->frame_mask = frame->relay_mask & wired;
 }
 
+/* To the nearest tenth. */
+static void put_tenths(text_t *text, q32_t value_q32)
+{
+    const q32_t tenths = fx_mul_shift(fx_abs(value_q32), 10, 32);
+    text_put(text, value_q32 < 0 ? "-" : "");
+    text_put_u32(text, (uint32_t)(tenths / 10));
+    text_put(text, ".");
+    text_put_u32(text, (uint32_t)(tenths % 10));
+}
+
+/* One line for the first spike of a burst; what is left out is told with a later one. */
+static void log_spikes(gateway_t *self, uint64_t now_us)
+{
+    static const char *const k_axes[POSE_AXES] = {"roll", "pitch", "yaw", "x", "y", "z"};
+    const gate_t *gate = motion_gate(&self->motion);
+    const uint32_t unlogged = gate_spikes(gate) - self->spikes_logged;
+    if (unlogged == 0 || (self->spike_logged_us != 0 && now_us - self->spike_logged_us < REJECT_LOG_INTERVAL_US)) {
+        return;
+    }
+    const gate_spike_t *spike = gate_last_spike(gate);
+    char line[HAL_LOG_TEXT_MAX + 1];
+    char peer[HAL_UDP_PEER_TEXT_MAX];
+    text_t text = text_start(line, sizeof line);
+    (void)hal_udp_peer_text(&self->owner.peer, peer, sizeof peer);
+    text_put(&text, "sample from ");
+    text_put(&text, peer);
+    text_put(&text, " not followed, a spike: ");
+    text_put(&text, k_axes[spike->axis]);
+    text_put(&text, " ");
+    put_tenths(&text, spike->value_q32);
+    text_put(&text, " after ");
+    put_tenths(&text, spike->before_q32);
+    put_suppressed(&text, unlogged - 1);
+    hal_log_write(self->io.log, HAL_LOG_WARNING, line);
+    self->spike_logged_us = now_us;
+    self->spikes_logged += unlogged;
+}
+
 /* One line for the first frame of a sender that does not drive, and then at times. */
 static void log_other(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
 {
@@ -243,6 +281,7 @@ static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *
         refuse(self, frame->command, "no pose of the platform has these extensions", from, now_us);
         return;
     }
+    log_spikes(self, now_us);
     counters_t *counters = &self->snapshot.counters;
     counters->accepted[frame->command]++;
     counters->accepted_timed += frame->is_timed;

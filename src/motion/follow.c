@@ -128,6 +128,33 @@ static void change_space(motion_t *self, motion_space_t space)
         const ramp_limits_t *limits = slot_limits(self, i);
         stream_set_stop(&self->stream, i, (stream_stop_t){limits->acc_per_cycle2_q32, limits->jerk_per_cycle3_q32});
     }
+    gate_reset(&self->gate);
+}
+
+/* True if the sample of a stream of poses is held back for the next one to confirm. */
+static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t now_us)
+{
+    const uint32_t period_us = stream_is_live(&self->stream, now_us) ? stream_period_us(&self->stream) : 0;
+    if (target->space != MOTION_POSE || gate_passes(&self->gate, now_us, period_us, target->value_q32)) {
+        return false;
+    }
+    self->withheld = *target;
+    return true;
+}
+
+/* A sample, or a target by itself. */
+static void take_target(motion_t *self, const motion_target_t *target, bool is_sample, uint64_t now_us)
+{
+    slots_take(self, target, self->slot_q32, self->slot_extension_mm_q32);
+    self->asked_cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
+    self->timed_end_us = is_sample ? 0 : now_us + (uint64_t)self->asked_cycles * self->cycle_us;
+    self->is_stretched = false;
+    if (!is_sample) {
+        stream_reset(&self->stream);
+        gate_reset(&self->gate);
+    }
+    stream_push(&self->stream, now_us, self->slot_q32);
+    self->due = !is_sample ? DUE_TIMED : self->stream.phase == STREAM_RUNNING ? DUE_STREAM : DUE_STEP;
 }
 
 void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us)
@@ -135,17 +162,20 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
     if (target->space != self->space || !follow_is_moving(self)) {
         change_space(self, target->space);
     }
-    slots_take(self, target, self->slot_q32, self->slot_extension_mm_q32);
     const bool is_sample = is_stream_sample(self, target, now_us);
-    self->asked_cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
     self->last_timed_us = target->is_timed ? now_us : 0;
-    self->timed_end_us = is_sample ? 0 : now_us + (uint64_t)self->asked_cycles * self->cycle_us;
-    self->is_stretched = false;
-    if (!is_sample) {
-        stream_reset(&self->stream);
+    if (!is_sample || !is_withheld(self, target, now_us)) {
+        take_target(self, target, is_sample, now_us);
     }
-    stream_push(&self->stream, now_us, self->slot_q32);
-    self->due = !is_sample ? DUE_TIMED : self->stream.phase == STREAM_RUNNING ? DUE_STREAM : DUE_STEP;
+}
+
+/* A stream that ended with a sample that is withheld rests there. */
+static void take_last_word(motion_t *self, uint64_t now_us)
+{
+    if (gate_is_overdue(&self->gate, now_us)) {
+        gate_reset(&self->gate);
+        take_target(self, &self->withheld, true, now_us);
+    }
 }
 
 /* A step to where the plan leads anyway. */
@@ -339,6 +369,7 @@ static bool is_step_cruising(const motion_t *self)
 
 void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned, motion_output_t *out)
 {
+    take_last_word(self, now_us);
     plan_what_is_due(self, now_us);
     out->flags |= self->is_stretched ? MOTION_STRETCHED : 0;
     if (self->source == MOTION_STREAMED) {

@@ -82,6 +82,15 @@ static void note_known_pose(motion_t *self, const q32_t *extension_mm_q32)
     }
 }
 
+static hv_status_t init_gate(motion_t *self, const settings_t *s)
+{
+    q16_t accel_q16[POSE_AXES];
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        accel_q16[i] = s->axis[i].accel_q16;
+    }
+    return gate_init(&self->gate, accel_q16, s->spike_gate);
+}
+
 hv_status_t motion_init(motion_t *self, const settings_t *settings)
 {
     *self = (motion_t){.cycle_us = settings->cycle_us};
@@ -89,6 +98,7 @@ hv_status_t motion_init(motion_t *self, const settings_t *settings)
     self->cylinders = status == HV_OK ? kin_cylinders(&self->kin) : 0;
     status = status == HV_OK ? init_cylinders(self, settings) : status;
     status = status == HV_OK ? init_axes(self, settings) : status;
+    status = status == HV_OK ? init_gate(self, settings) : status;
     if (status != HV_OK) {
         return status;
     }
@@ -392,6 +402,16 @@ const q32_t *motion_neutral_extension(const motion_t *self)
 const kin_t *motion_kin(const motion_t *self)
 {
     return &self->kin;
+}
+
+void motion_set_spike_gate(motion_t *self, uint32_t factor)
+{
+    gate_set_factor(&self->gate, factor);
+}
+
+const gate_t *motion_gate(const motion_t *self)
+{
+    return &self->gate;
 }
 
 const stream_t *motion_stream(const motion_t *self)

@@ -41,6 +41,7 @@ static settings_t common(void)
                     .intensity_ramp_ms = 2000,
                     .engage_speed_mm_s_q16 = Q(50),
                     .engage_accel_mm_s2_q16 = Q(200),
+                    .spike_gate = 10,
                     .relay_count = 12};
     axes_of(&s);
     return s;

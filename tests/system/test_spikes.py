@@ -1,0 +1,163 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_spikes.py BIN - single wild samples in a stream: what heaved makes of it is, byte by byte, what it makes of the stream without them."""
+import json
+import math
+import random
+import subprocess
+import sys
+
+import heave
+import tap
+
+T0 = 15000  # up and following by then
+PATIENT = {"udp__silence_hold_ms": 0}  # a lone pose stays
+RATES_HZ = (15, 30, 60, 100, 200)
+
+
+def frame(pose, timed=None):
+    return f"@A6{'T' if timed else ''}:{','.join(f'{value:.3f}' for value in pose)},{timed or 0}#"
+
+
+def wave(t):
+    return [6 * math.sin(3 * t), 4 * math.cos(3 * t), 2 * math.sin(4 * t), 15 * math.sin(2 * t), 9 * math.cos(t), 20 * math.sin(2.5 * t)]
+
+
+def stream(rate_hz, samples=300, jitter_ms=0.0, loss=0.0, seed=1):
+    """What the network brings of a stream: (arrival in ms, pose)."""
+    dice = random.Random(seed)
+    lines, at = [], 0.0
+    for i in range(samples):
+        at = max(at, T0 + 1000 * i / rate_hz + jitter_ms * dice.random())
+        if dice.random() >= loss:
+            lines.append((at, wave(i / rate_hz)))
+    return lines
+
+
+def with_spikes(lines, seed=2):
+    """One axis of single samples far away; the places."""
+    dice = random.Random(seed)
+    lines, places, at = list(lines), [], 15
+    while at < len(lines) - 3:
+        pose = list(lines[at][1])
+        axis = dice.randrange(6)
+        pose[axis] += dice.choice((-1, 1)) * dice.uniform(300, 3000)
+        lines[at] = (lines[at][0], pose)
+        places.append(at)
+        at += dice.randrange(4, 40)
+    return lines, places
+
+
+def play(bench, lines, timed=None, config=None):
+    frames = bench.file("frames.txt", "".join(f"{t:.3f} {frame(pose, timed)}\n" for t, pose in lines))
+    return bench.play(frames, config=config)
+
+
+def without(lines, places):
+    return [line for i, line in enumerate(lines) if i not in places]
+
+
+def check_limits(bench, config=None):
+    check = subprocess.run([sys.executable, heave.TOP / "tools/check_trace", "--json", config or bench.config, bench.folder / "played.csv"],
+                           stdout=subprocess.PIPE, text=True, check=False)
+    assert check.returncode == 0 and json.loads(check.stdout)["violations"] == 0, check.stdout
+
+
+def spikes_are_lost_samples(bench):
+    for rate in RATES_HZ:
+        for jitter_ms, loss in ((0, 0), (min(5, 300 / rate), 0.02)):
+            lines, places = with_spikes(stream(rate, jitter_ms=jitter_ms, loss=loss))
+            assert len(places) > 8
+            assert play(bench, lines) == play(bench, without(lines, places)), f"{rate} Hz, jitter {jitter_ms} ms"
+            check_limits(bench)
+
+
+def spikes_in_a_timed_stream(bench):
+    lines, places = with_spikes(stream(50))
+    assert play(bench, lines, 20) == play(bench, without(lines, places), 20)
+
+
+def a_step_comes_one_sample_later(bench):
+    lines = stream(60)
+    stepped = [(t, pose if i < 100 else [value + 8 for value in pose]) for i, (t, pose) in enumerate(lines)]
+    assert play(bench, stepped) == play(bench, without(stepped, [100]), config=configured(bench, "off.ini", 0))
+    check_limits(bench)
+
+
+def the_last_frame_counts(bench):
+    """A sender that stops with zeros, far from where it was."""
+    lines = stream(50, 225)
+    assert max(map(abs, lines[-1][1])) > 15
+    rows = heave.rows_of(play(bench, [*lines, (lines[-1][0] + 20, [0] * 6)]))
+    check_limits(bench)
+    assert all(float(rows[-1][name]) == 0 for name in ("roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm")), rows[-1]
+
+
+def lone_frames_are_followed_at_once(bench):
+    lines = [(T0 + 1000 * i, [0, 0, 0, 0, 0, (-1) ** i * 60]) for i in range(5)]
+    off = configured(bench, "lone.ini", 0)
+    assert play(bench, lines) == play(bench, lines, config=off)
+
+
+def configured(bench, name, factor):
+    config = bench.write_config(name, **PATIENT)
+    config.write_text(config.read_text().replace("[udp]", f"[udp]\nspike_gate = {factor}"), encoding="utf-8")
+    return config
+
+
+def the_gate_is_configured(bench):
+    """At 60 Hz, 10 times 2500 mm/s^2 are 7 mm in a sample, 2 times are 1.4 mm."""
+    lines = [(T0 + i * 1000 / 60, [0, 0, 0, 0, 0, 3 if i == 100 else 0]) for i in range(200)]
+    heights = [max(float(row["z_mm"]) for row in heave.rows_of(play(bench, lines, config=config)))
+               for config in (None, configured(bench, "two.ini", 2), configured(bench, "off.ini", 0))]
+    assert heights[0] > 0.1 and heights[1] == 0 and heights[2] > 0.1, heights
+    refused = bench.heaved("--config", configured(bench, "wrong.ini", 1001), "--check")
+    assert refused.returncode == 78 and "spike_gate" in refused.stderr, refused.stderr
+
+
+def spikes_are_counted_and_told(bench):
+    lines = [(T0 + i * 20, [0, 0, 0, 0, 0, 95.25 if i in (100, 110, 120) else 0]) for i in range(200)]
+    frames = bench.file("frames.txt", "".join(f"{t} {frame(pose)}\n" for t, pose in lines))
+    told = bench.heaved("--config", bench.config, "--play", frames).stderr
+    assert "sample from 127.0.0.1" in told and "not followed, a spike: z 95.3 after 0.0\n" in told, told
+    assert "before that 1 more" in told, told
+
+
+def spikes_live(bench):
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    with bench.sender() as sender:
+
+        def count_after_a_spike():
+            sender.stream(0.5, lambda t: frame([0, 0, 0, 0, 0, 5 * math.sin(t)]), 0.02)
+            sender.send(frame([0, 0, 0, 0, 0, 95]))
+            sender.stream(0.1, lambda t: frame([0, 0, 0, 0, 0, 0]), 0.02)
+            return bench.status()["counters"]["spikes"]
+
+        heave.wait_for(count_after_a_spike, "a spike is counted")
+    assert "spikes" in bench.ctl("status").stdout
+    heave.wait_for(lambda: "a spike: z 95.0" in daemon.log.read_text(), "a spike is logged")
+
+
+CASES = {
+    "spikes at all rates, with jitter and losses, are samples that were lost": spikes_are_lost_samples,
+    "spikes in a stream of T frames too": spikes_in_a_timed_stream,
+    "a real step comes one sample later": a_step_comes_one_sample_later,
+    "a step in the last frame of a stream is where it comes to rest": the_last_frame_counts,
+    "lone frames are followed at once": lone_frames_are_followed_at_once,
+    "the gate is as wide as configured, or off": the_gate_is_configured,
+    "spikes are counted, and told once a second": spikes_are_counted_and_told,
+    "spikes of a live sender show in the status and the log": spikes_live,
+}
+
+
+def main():
+    suite = tap.Suite()
+    for name, case in CASES.items():
+        with suite.case(name), heave.Bench(sys.argv[1], **PATIENT) as bench:
+            case(bench)
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
