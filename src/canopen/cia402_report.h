@@ -7,12 +7,12 @@
 #include "heave/cia402.h"
 
 /** State of a drive towards the gateway. */
-drive_state_t cia402_report_state(const cia402_t *self, uint8_t axis);
+drive_state_t cia402_report_state(const cia402_t *self, uint8_t index);
 
 /** Feedback of a drive. */
-void cia402_report_feedback(const cia402_t *self, uint8_t axis, drive_feedback_t *out);
+void cia402_report_feedback(const cia402_t *self, uint8_t index, drive_feedback_t *out);
 
 /** The same for people. */
-void cia402_report_words(const cia402_t *self, uint8_t axis, drive_report_t *out);
+void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *out);
 
 #endif

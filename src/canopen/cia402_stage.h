@@ -19,6 +19,6 @@ void cia402_stage_end(cia402_t *self, cia402_goal_t goal);
 void cia402_stage_step(cia402_t *self);
 
 /** Bits of the controlword that the mode asks for while operation is enabled. */
-uint16_t cia402_stage_mode_bits(const cia402_t *self, unsigned axis);
+uint16_t cia402_stage_mode_bits(const cia402_t *self, unsigned k);
 
 #endif

@@ -457,11 +457,11 @@ static const spoilt_t k_spoilt[] = {
      "[udp] silence_hold_ms: \"-1\" is out of range; allowed: a whole number from 0 to 3600000 ms"},
     {"control", "socket", "socket = heaved.sock",
      "[control] socket: \"heaved.sock\" is not an absolute path; allowed: an absolute path of at most 107 characters"},
-    {"drives", "driver", "driver = cia402",
-     "[drives] driver: driver cia402 is not built into this heaved; allowed: sim | can-raw"},
+    {"drives", "driver", "driver = modbus-tcp",
+     "[drives] driver: driver modbus-tcp is not built into this heaved; allowed: sim | cia402 | can-raw"},
     {"drives", "driver", "driver = modbus-rtu",
-     "[drives] driver: driver modbus-rtu is not built into this heaved; allowed: sim | can-raw"},
-    {"drives", "driver", "driver = cia", "[drives] driver: \"cia\" is not known; allowed: sim | can-raw"},
+     "[drives] driver: driver modbus-rtu is not built into this heaved; allowed: sim | cia402 | can-raw"},
+    {"drives", "driver", "driver = cia", "[drives] driver: \"cia\" is not known; allowed: sim | cia402 | can-raw"},
     {"sim", "start_extension_mm", "start_extension_mm = 200.5",
      "[sim] start_extension_mm: 200.5 mm is above the stroke; allowed: 0 to 200 mm, or settled"},
     {"sim", "start_extension_mm", "start_extension_mm = up",
@@ -514,7 +514,7 @@ static void test_load_all_errors_are_reported_at_once(void)
     take_good_file();
     set_key("roll", "min_deg", "x");
     set_key("udp", "port", "99999");
-    set_key("drives", "driver", "cia402");
+    set_key("drives", "driver", "modbus-tcp");
     delete_line(find_key("pose", "settled_extension_mm"));
     set_key("engage", "speed_mm_s", "9000");
     TEST_ASSERT_EQUAL_INT(5, load_lines());
@@ -698,7 +698,7 @@ static void test_load_angle_keys_without_motor_are_errors(void)
 {
     take_good_file();
     set_key("angle", "present", "no");
-    TEST_ASSERT_EQUAL_INT(9 + 4, load_lines()); /* those of [angle] and those of [can-raw] */
+    TEST_ASSERT_EQUAL_INT(9 + 4 + 8, load_lines()); /* those of [angle], of [can-raw] and of [cia402] */
     expect_contains(prefix(find_key("angle", "speed_deg_s") + 1, "angle", "speed_deg_s"));
     expect_contains("means nothing on this platform; allowed: with [angle] present = yes only");
 }
