@@ -159,6 +159,7 @@ typedef struct {
     uint8_t reset_syncs; /* of the way through a fault reset, 0 = none */
     uint64_t reset_until_us;
     uint64_t operating_us; /* operation enabled since, 0 = not */
+    bool has_operated;     /* since the stage began in which all get there */
     uint64_t stopping_us;  /* quick stop since, 0 = not */
     uint32_t own_fault;    /* found by this driver: cia402_trouble_t or a number of the standard; 0 = none */
     uint16_t error_code;   /* the drive's own */

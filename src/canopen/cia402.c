@@ -414,14 +414,16 @@ static bool are_all_in(const cia402_t *self)
     return true;
 }
 
-/* Goes out at once: it acts one SYNC earlier than with the next set. */
+/* Goes out at once where the period's set has gone already: it acts one SYNC earlier than with the next one. */
 static void stop_now(cia402_t *self)
 {
     cia402_stage_end(self, CIA402_GOAL_STOP);
-    for (unsigned k = 0; k < self->config->axes; k++) {
+    for (unsigned k = 0; k < self->config->axes && !self->is_open; k++) {
         cia402_axis_next_word(cia402_drive(self, k), 0);
     }
-    (void)!send_words(self);
+    if (!self->is_open) {
+        (void)!send_words(self);
+    }
 }
 
 static hv_status_t cia402_request(void *ctx, drives_request_t request)

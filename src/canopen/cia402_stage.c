@@ -188,6 +188,9 @@ static void step_switch_on(cia402_t *self)
     } else if (self->stage_syncs >= SWITCHED_ON_SYNCS) {
         enter(self, CIA402_STAGE_OPERATE);
         set_goals(self, CIA402_GOAL_OPERATE);
+        for (unsigned k = 0; k < self->config->axes; k++) {
+            self->axis[k].has_operated = false;
+        }
         return;
     }
     if (is_late(self, power_timeout_us(self))) {
@@ -204,8 +207,22 @@ static void begin_following(cia402_t *self)
     }
 }
 
+/* A drive that had its torque and lost it again is not given it once more. */
+static void watch_relapse(cia402_t *self)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        cia402_axis_t *axis = &self->axis[k];
+        const bool is_there = axis->operating_us != 0;
+        if (axis->has_operated && !is_there) {
+            cia402_axis_fail(cia402_drive(self, k), CIA402_FELL_OUT);
+        }
+        axis->has_operated |= is_there;
+    }
+}
+
 static void step_operate(cia402_t *self)
 {
+    watch_relapse(self);
     if (are_all(self, is_operating)) {
         if (self->is_homing) {
             enter(self, CIA402_STAGE_HOMING);

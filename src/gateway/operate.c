@@ -450,11 +450,12 @@ void operate_after_frames(gateway_t *self, uint64_t now_us)
 hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us)
 {
     if (request == EVENT_RESET) {
-        if (!supervisor_is_latched(&self->supervisor)) {
+        const bool is_latched = supervisor_is_latched(&self->supervisor);
+        if (!is_latched && (self->supervisor.state != STATE_OFF || !is_drive_fault_present(self))) {
             return HV_ERR_STATE;
         }
         (void)!drives_request(self->io.drives, DRIVES_RESET_FAULT);
-        self->reset_until_us = now_us + RESET_TIMEOUT_US;
+        self->reset_until_us = is_latched ? now_us + RESET_TIMEOUT_US : 0;
         return HV_OK;
     }
     auto_engage_end(&self->auto_engage);

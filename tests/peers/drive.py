@@ -493,7 +493,8 @@ class Drive:
         return round(self.motor.actual) - self.origin
 
     def target(self):
-        return self.od[0x60C1, 1] if self.active_mode == IP else self.od[0x607A]
+        entry = self.od.entries.get((0x60C1, 1) if self.active_mode == IP else (0x607A, 0))
+        return entry.value if entry else 0
 
     def operate(self, word):
         """Bit 4 means something else in every mode."""

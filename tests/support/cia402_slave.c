@@ -270,12 +270,12 @@ static void advance(cia402_slave_t *self, cia402_slave_drive_t *d)
 static void take_target(cia402_slave_t *self, cia402_slave_drive_t *d, int32_t target)
 {
     const int32_t from = d->has_target ? d->last_target : d->position;
-    const int32_t step = abs(target - from);
+    const int32_t step = abs((int32_t)((uint32_t)target - (uint32_t)from)); /* wraps round */
     d->largest_step = step > d->largest_step ? step : d->largest_step;
     d->has_target = true;
     d->last_target = target;
     d->setpoints++;
-    if (abs(target - d->position) > JUMP_COUNTS) {
+    if (abs((int32_t)((uint32_t)target - (uint32_t)d->position)) > JUMP_COUNTS) {
         cia402_slave_fault(self, (unsigned)(d - self->drive), 0x8611);
         return;
     }

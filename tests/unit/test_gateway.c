@@ -227,6 +227,24 @@ static void test_settled_manual_frames_move_nothing(void)
     TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_RESET));
 }
 
+/* A drive that is in fault when the gateway comes to it can be reset before anything is engaged. */
+static void test_off_reset_takes_back_the_faults_of_drives(void)
+{
+    m_settings.engage = ENGAGE_MANUAL;
+    m_is_fault_expected = true;
+    start(false);
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_RESET));
+    rig_break(&m_rig, SIM_DRIVES_FAULT, 1, 0x8130);
+    rig_run_ms(&m_rig, 100);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, seen()->drive[1].state);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 100);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, seen()->drive[1].state);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+}
+
 /* ---- frames ---- */
 
 static void test_frames_bad_ones_change_nothing_and_are_counted(void)
@@ -1061,6 +1079,7 @@ int main(void)
     RUN_TEST(test_start_auto_waits_for_a_stream);
     RUN_TEST(test_start_auto_is_over_after_fault_estop_and_requests);
     RUN_TEST(test_settled_manual_frames_move_nothing);
+    RUN_TEST(test_off_reset_takes_back_the_faults_of_drives);
     RUN_TEST(test_frames_bad_ones_change_nothing_and_are_counted);
     RUN_TEST(test_frames_several_in_a_datagram_the_last_one_counts);
     RUN_TEST(test_frames_more_than_a_cycle_takes_wait_for_the_next);

@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: MIT
+ * test_config_cia402.c - [cia402]: what the driver gets from the ready-made platform, and every message of what contradicts
+ * itself.
+ */
+#define _POSIX_C_SOURCE 200809L
+
+#include <stdio.h>
+#include <string.h>
+
+#include "config.h"
+#include "config_bus.h"
+#include "config_cia402.h"
+#include "unity.h"
+
+#define FILE_NAME "test_config_cia402.tmp.ini"
+#define PRESET    HEAVE_CONFIG_DIR "/hexapod-cia402.ini"
+
+static config_t m_config;
+static char m_text[40000];
+static char m_errors[20000];
+
+void hv_assert_failed(const char *file, int line)
+{
+    (void)file;
+    (void)line;
+    TEST_FAIL_MESSAGE("assertion");
+}
+
+void setUp(void)
+{
+    FILE *file = fopen(PRESET, "rb");
+    TEST_ASSERT_NOT_NULL(file);
+    m_text[fread(m_text, 1, sizeof m_text - 1, file)] = '\0';
+    fclose(file);
+    memset(&m_config, 0, sizeof m_config);
+}
+
+void tearDown(void)
+{
+    remove(FILE_NAME);
+}
+
+static int load(void)
+{
+    FILE *file = fopen(FILE_NAME, "wb");
+    FILE *errors = tmpfile();
+    TEST_ASSERT_NOT_NULL(file);
+    TEST_ASSERT_NOT_NULL(errors);
+    fputs(m_text, file);
+    fclose(file);
+    const int count = config_load(FILE_NAME, &m_config, errors);
+    rewind(errors);
+    m_errors[fread(m_errors, 1, sizeof m_errors - 1, errors)] = '\0';
+    fclose(errors);
+    return count;
+}
+
+/* Puts a line right behind the header of a section, in place of that key's own line.
+ * Returns its number. */
+static unsigned put(const char *section, const char *line)
+{
+    static char rest[20000];
+    char key[64] = "\n";
+    strncat(key, line, strcspn(line, "="));
+    char *at = strstr(m_text, section);
+    TEST_ASSERT_NOT_NULL(at);
+    at = strchr(at, '\n') + 1;
+    char *old = strstr(at - 1, key);
+    char *next = strstr(at, "\n[");
+    if (old != NULL && (next == NULL || old < next)) {
+        memmove(old + 1, strchr(old + 1, '\n') + 1, strlen(strchr(old + 1, '\n') + 1) + 1);
+    }
+    snprintf(rest, sizeof rest, "%s\n%s", line, at);
+    memcpy(at, rest, strlen(rest) + 1);
+    unsigned number = 1;
+    for (const char *c = m_text; c < at; c++) {
+        number += *c == '\n';
+    }
+    return number;
+}
+
+/* One wrong line, one error at it, with these words. */
+static void refuse(const char *line, const char *words)
+{
+    char place[160];
+    setUp();
+    const unsigned number = put("[cia402]", line);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(1, load(), m_errors);
+    sprintf(place, "%s:%u: [cia402] ", FILE_NAME, number);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, place), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, words), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "; allowed: "), m_errors);
+}
+
+static void test_load_preset_gives_what_the_driver_takes(void)
+{
+    cia402_config_t drives;
+    cia402_t driver;
+    static const hal_can_ops_t k_ops = {(hv_status_t(*)(void *, const can_frame_t *))1,
+                                        (hv_status_t(*)(void *, can_frame_t *, uint64_t *))1, NULL, NULL, NULL};
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    TEST_ASSERT_EQUAL(CONFIG_DRIVES_CIA402, m_config.drives);
+    config_cia402(&m_config, &drives);
+    TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &drives, (hal_can_t){&k_ops, NULL}));
+    TEST_ASSERT_EQUAL_UINT8(6, drives.axes);
+    TEST_ASSERT_EQUAL(CIA402_MODE_CSP, drives.mode);
+    TEST_ASSERT_EQUAL_INT16(1, drives.abort_option);
+    for (unsigned k = 0; k < 6; k++) {
+        TEST_ASSERT_EQUAL_UINT8(k + 1, drives.axis[k].node);
+        TEST_ASSERT_EQUAL_INT32(131072, drives.axis[k].scale.num);
+        TEST_ASSERT_EQUAL_INT32(10, drives.axis[k].scale.den);
+        TEST_ASSERT_EQUAL_UINT32(131072, drives.axis[k].window_counts);            /* 10 mm */
+        TEST_ASSERT_EQUAL_UINT32(52428800, drives.axis[k].quick_stop_accel);       /* 4000 mm/s^2 */
+        TEST_ASSERT_EQUAL_INT64(q32_from_int(4) + 1, drives.axis[k].step_max_q32); /* twice 500 mm/s in 4 ms */
+    }
+}
+
+static void test_load_lists_and_signs_reach_their_drives(void)
+{
+    cia402_config_t drives;
+    put("[cia402]", "nodes = 11, 12, 13, 24, 25, 26");
+    put("[cia402]", "counts_per_mm = 1000, -1000, 1000, -1000, 1000/3, 7");
+    put("[cia402]", "zero_counts = 0, 500, -500, 1, 2, 3");
+    put("[cia402]", "homing_method = 0, 17, -3, 35, 0, 1");
+    put("[cia402]", "mode = ip");
+    put("[cia402]", "when_gateway_lost = quick-stop");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_cia402(&m_config, &drives);
+    TEST_ASSERT_EQUAL_UINT8(24, drives.axis[3].node);
+    TEST_ASSERT_EQUAL_INT32(-1000, drives.axis[1].scale.num);
+    TEST_ASSERT_EQUAL_INT32(500, drives.axis[1].scale.zero);
+    TEST_ASSERT_EQUAL_INT32(3, drives.axis[4].scale.den);
+    TEST_ASSERT_EQUAL_INT8(-3, drives.axis[2].homing_method);
+    TEST_ASSERT_EQUAL_UINT32(10000, drives.axis[1].window_counts);
+    TEST_ASSERT_EQUAL_UINT32(10000, drives.axis[1].homing_speed[0]);
+    TEST_ASSERT_EQUAL(CIA402_MODE_IP, drives.mode);
+    TEST_ASSERT_EQUAL_INT16(3, drives.abort_option);
+}
+
+static void test_load_what_contradicts_itself_is_refused_at_its_line(void)
+{
+    refuse("nodes = 0", "0 of drive 1 is no node id; allowed: 1 to 127");
+    refuse("nodes = 1, 2, 3, 4, 5, 128", "128 of drive 6 is no node id");
+    refuse("nodes = 1, 2, 3, 4, 5, 2", "2 of drive 6 is that of drive 2 already");
+    refuse("nodes = 122", "127 of drive 6 is gateway_node");
+    refuse("nodes = 1, 2", "has 2 values");
+    refuse("nodes = none", "missing for driver = cia402");
+    refuse("counts_per_mm = none", "missing for driver = cia402");
+    refuse("counts_per_mm = 1, 2", "has 2 values");
+    refuse("counts_per_mm = 5400000", "400 mm of drive 1 are 2160000000 counts");
+    refuse("counts_per_mm = 5000000, 1, 1, 1, 1, -5400000", "of drive 6 are -2160000000 counts");
+    refuse("zero_counts = 1, 2, 3", "has 3 values");
+    refuse("homing_method = 128", "128 is no method; allowed: -128 to 127");
+    refuse("period_us = 4500", "is no multiple of cycle_us");
+    refuse("period_us = 1000", "the bus would be loaded by");
+    refuse("heartbeat_timeout_ms = 99", "allowed: at least 100 ms");
+    refuse("sync_counter = 1", "allowed: 0, or 2 to 240");
+    refuse("following_error_mm = 5.9", "at least 6.00");
+}
+
+static void test_load_period_that_60c2h_cannot_hold_is_refused(void)
+{
+    put("[platform]", "cycle_us = 650");
+    const unsigned line = put("[cia402]", "period_us = 3250");
+    char place[160];
+    sprintf(place, "%s:%u: [cia402] period_us: 60C2h cannot hold it", FILE_NAME, line);
+    TEST_ASSERT_TRUE(load() > 0);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, place), m_errors);
+}
+
+static void test_load_section_not_in_use_may_be_anything(void)
+{
+    put("[cia402]", "nodes = 1, 1");
+    put("[drives]", "driver = sim");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+}
+
+/* The figures of the standard's worst-case table: SYNC 55 bits, 6 commands of 115, 6 answers of 125, per 4 ms; and what is rare.
+ */
+static void test_describe_bus_load_is_that_of_the_frames(void)
+{
+    config_bus_t bus;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_bus_describe(&m_config, &bus);
+    const double period_bits = 55 + 6 * 115 + 6 * 125 + 7 * 65 / 12.0 + 2 * 135 / 5.0;
+    TEST_ASSERT_DOUBLE_WITHIN(2e-5, period_bits / 4000.0, config_bus_load_ppm(&bus) / 1e6);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_load_preset_gives_what_the_driver_takes);
+    RUN_TEST(test_load_lists_and_signs_reach_their_drives);
+    RUN_TEST(test_load_what_contradicts_itself_is_refused_at_its_line);
+    RUN_TEST(test_load_period_that_60c2h_cannot_hold_is_refused);
+    RUN_TEST(test_load_section_not_in_use_may_be_anything);
+    RUN_TEST(test_describe_bus_load_is_that_of_the_frames);
+    return UNITY_END();
+}
