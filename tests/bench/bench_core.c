@@ -32,6 +32,7 @@ typedef struct {
     unsigned texts; /**< in use: a power of 2 */
     unsigned next_text;
     unsigned due; /**< datagrams that wait */
+    motion_target_t target[TEXTS];
     kin_t kin;
     pose_t pose[POSES];
     pose_t guess[POSES];
@@ -273,6 +274,21 @@ static void set_up_stream(bench_t *b)
     make_stream_texts(b, 60);
 }
 
+/* The same stream for motion alone, and the rotation motor turns too. */
+static void set_up_motion(bench_t *b)
+{
+    static const double k_size[POSE_AXES] = {3, 3, 5, 30, 30, 30};
+    start_gateway(b);
+    for (unsigned n = 0; n < TEXTS; n++) {
+        motion_target_t *target = &b->target[n];
+        *target = (motion_target_t){.space = MOTION_POSE, .has_angle = true};
+        for (unsigned i = 0; i < POSE_AXES; i++) {
+            target->value_q32[i] = llround(k_size[i] * sin(2 * PI * (0.2 + 0.1 * i) * n / 60) * 4294967296.0);
+        }
+        target->angle_deg_q32 = llround(20 * sin(2 * PI * 0.15 * n / 60) * 4294967296.0);
+    }
+}
+
 static void set_up_hostile(bench_t *b)
 {
     start_gateway(b);
@@ -314,6 +330,18 @@ static void run_stream(bench_t *b, unsigned n)
 {
     b->due = n * 60 / 1000 != (n + 1) * 60 / 1000;
     gateway_cycle(&b->gateway, b->now_us += 1000);
+}
+
+static void run_motion(bench_t *b, unsigned n)
+{
+    motion_t *motion = &b->gateway.motion;
+    motion_output_t output;
+    b->now_us += 1000;
+    if (n * 60 / 1000 != (n + 1) * 60 / 1000) {
+        b->sum += (uint64_t)motion_target(motion, &b->target[b->next_text++ % TEXTS], b->now_us);
+    }
+    motion_step(motion, b->now_us, &output);
+    b->sum += (uint64_t)output.extension_mm_q32[0];
 }
 
 /* A frame of another kind every 7 cycles, a hold and its end every 256. */
@@ -375,15 +403,11 @@ typedef struct {
 } subject_t;
 
 static const subject_t k_subjects[] = {
-    {"cycle-rest", set_up_rest, run_rest},
-    {"cycle-stream", set_up_stream, run_stream},
-    {"cycle-hostile", set_up_hostile, run_hostile},
-    {"cycle-flood", set_up_hostile, run_flood},
-    {"frame-vendor", set_up_vendor_frames, run_frame},
-    {"frame-a6", set_up_a6_frames, run_frame},
-    {"frame-a7", set_up_a7_frames, run_frame},
-    {"inverse", make_poses, run_inverse},
-    {"forward-warm", make_poses, run_forward},
+    {"cycle-rest", set_up_rest, run_rest},          {"cycle-stream", set_up_stream, run_stream},
+    {"motion-stream", set_up_motion, run_motion},   {"cycle-hostile", set_up_hostile, run_hostile},
+    {"cycle-flood", set_up_hostile, run_flood},     {"frame-vendor", set_up_vendor_frames, run_frame},
+    {"frame-a6", set_up_a6_frames, run_frame},      {"frame-a7", set_up_a7_frames, run_frame},
+    {"inverse", make_poses, run_inverse},           {"forward-warm", make_poses, run_forward},
     {"forward-cold", make_poses, run_forward_cold},
 };
 

@@ -13,6 +13,7 @@ from pathlib import Path
 SUBJECTS = {
     "cycle-rest": (4000, 2000, "cycle, engaged and at rest, no frames"),
     "cycle-stream": (4000, 2000, "cycle, stream of A6 poses at 60 Hz"),
+    "motion-stream": (4000, 2000, "of it planning, kinematics, limiting of 6+1 axes, all moving"),
     "cycle-hostile": (4000, 4000, "cycle, another kind of frame every 7 cycles, holds between"),
     "cycle-flood": (200, 100, "cycle, 64 such frames in every cycle (the most it takes)"),
     "frame-vendor": (4096, 4096, "frame of the vendor's document, A6 or A7, read"),
@@ -22,6 +23,8 @@ SUBJECTS = {
     "forward-warm": (4096, 2048, "forward kinematics, from 0.5 mm and 0.05 deg beside"),
     "forward-cold": (4096, 2048, "forward kinematics, from pose zero"),
 }
+CYCLE_NS = 1_000_000
+GOAL_NS = 5000  # of motion-stream
 SUMMARY = re.compile(r"^(?:summary|totals): (\d+)", re.MULTILINE)
 
 
@@ -89,9 +92,13 @@ def run(program, rounds, as_json, say, out=sys.stdout):
             one, ir = row["single_ns"], row["instructions"]
             print(f"{text:62}{row['ns_median']:9.0f}{row['ns_min']:9.0f}{row['ns_p95']:9.0f}{one['p50']:11.0f}{one['p99']:9.0f}{one['p999']:9.0f}"
                   f"{runs * rounds:9}{'-' if ir is None else f'{ir:.0f}':>14}", file=out, flush=True)
+    motion = result["subjects"]["motion-stream"]
     if as_json:
         json.dump(result, out, indent=1)
         print(file=out)
     else:
-        print("\ninstructions: callgrind, mean over " + ", ".join(f"{counted} ({name})" for name, (_, counted, _) in SUBJECTS.items())
+        counted = "" if motion["instructions"] is None else f", {motion['instructions']:.0f} instructions"
+        print(f"\nplanning, kinematics and limiting of 6+1 axes: {motion['ns_median']:.0f} ns a cycle, {motion['ns_median'] / CYCLE_NS:.2%} of 1 ms, "
+              f"{motion['ns_median'] / GOAL_NS:.0%} of the {GOAL_NS / 1000:.0f} us aimed at{counted}", file=out)
+        print("instructions: callgrind, mean over " + ", ".join(f"{counted} ({name})" for name, (_, counted, _) in SUBJECTS.items())
               + "\nThe gateway stands between devices that do nothing; a cycle of the stream includes its share of frames.", file=out)
