@@ -225,6 +225,10 @@ hv_status_t cia402_init(cia402_t *self, const cia402_config_t *config, hal_can_t
 /** The drives as drives.h wants them. */
 drives_t cia402_hal(cia402_t *self);
 
+/** Last word to the drives when the program ends in an orderly way: the communication of those without torque is reset, so that
+ *  they do not take the silence for a loss and are not in fault at the next start. The others are left to their watchdogs. */
+void cia402_leave(cia402_t *self);
+
 /** True where 60C2h can hold this period: whole ms up to 255, or up to 255 of 100 us. */
 bool cia402_is_period(uint32_t period_us);
 

@@ -3,10 +3,13 @@
  */
 #include "rig.h"
 
+#include <time.h>
+
 #include "config_canraw.h"
 #include "config_cia402.h"
 
-#define RUN_DIR "/run/heave" /* where heave-can-flush@.path looks */
+#define LEAVE_NS 5000000      /* seven frames, even at 125 kbit/s */
+#define RUN_DIR  "/run/heave" /* where heave-can-flush@.path looks */
 
 #define ANGLE_TRAVEL_DEG 1000000 /* a rotation motor has no stops of its own */
 
@@ -126,9 +129,20 @@ const char *rig_trouble(const rig_t *self)
     return self->is_can_open ? self->can.error_text : "";
 }
 
+/* The last frames get their time on the wire: closing drops what waits. */
+static void leave_cia402(rig_t *self)
+{
+    const struct timespec pause = {.tv_nsec = LEAVE_NS};
+    cia402_leave(&self->cia402);
+    (void)nanosleep(&pause, NULL);
+}
+
 void rig_close(rig_t *self)
 {
     if (self->is_can_open) {
+        if (self->cia402.config != NULL) {
+            leave_cia402(self);
+        }
         linux_can_close(&self->can);
         self->is_can_open = false;
     }

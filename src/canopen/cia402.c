@@ -20,6 +20,7 @@
 #define COB_HEARTBEAT    0x700u
 #define COB_FUNCTION     0x780u
 #define NMT_PREOP        0x80u
+#define NMT_RESET        0x82u
 #define NMT_OPERATIONAL  0x05u
 #define COUNTER_FIRST    1u
 
@@ -474,6 +475,16 @@ drives_t cia402_hal(cia402_t *self)
 {
     static const drives_ops_t k_ops = {cia402_poll, cia402_send, cia402_request, cia402_count, cia402_report};
     return (drives_t){&k_ops, self};
+}
+
+void cia402_leave(cia402_t *self)
+{
+    for (unsigned k = 0; k < self->config->axes && !self->is_gone; k++) {
+        const cia402_axis_t *axis = &self->axis[k];
+        if (axis->phase == CIA402_UP && !cia402_has_torque(cia402_axis_state(axis))) {
+            (void)!send_nmt(self, NMT_RESET, self->config->axis[k].node);
+        }
+    }
 }
 
 /* --- Configuration --- */

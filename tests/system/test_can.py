@@ -135,6 +135,8 @@ def missing_or_wrong_drive_is_named(bench):
             daemon = fresh.start(config=config)
             time.sleep(15)
             assert fresh.status()["state"] != "ENGAGED"
+            report = fresh.status()["cylinders"][3]["report"]
+            assert report["node"] == 4 and report["phase"] in ("missing", "refused") and report["trouble"] and report["code"], report
             assert re.search(r"\b4\b", daemon.log.read_text(encoding="utf-8")), daemon.log.read_text(encoding="utf-8")
             fresh.stop_drives()
             assert not fresh.events("enabled"), "all or none"

@@ -529,6 +529,39 @@ static void test_request_reset_is_one_edge_and_only_when_asked(void)
     TEST_ASSERT_EQUAL_UINT32(0, slave.drive[3].resets);
 }
 
+static void listen_to_silence(unsigned ms)
+{
+    while (ms-- > 0) {
+        now_us += CYCLE_US;
+        cia402_slave_step(&slave, now_us);
+    }
+}
+
+static void test_leave_drives_without_torque_forget_the_gateway(void)
+{
+    come_up();
+    cia402_leave(&driver);
+    listen_to_silence(1000);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(2, slave.drive[k].boots);
+        TEST_ASSERT_EQUAL_HEX32(0, cia402_slave_row(&slave, k, 0x603F, 0)->value); /* no 8130h */
+    }
+}
+
+static void test_leave_drives_with_torque_are_left_to_their_watchdogs(void)
+{
+    come_up();
+    enable();
+    cia402_leave(&driver);
+    listen_to_silence(90); /* the last heartbeat is up to 50 ms old */
+    TEST_ASSERT_EQUAL_HEX16(0x27, slave.drive[0].status);
+    listen_to_silence(70);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].boots);
+        TEST_ASSERT_EQUAL_HEX16(0x08, slave.drive[k].status);
+    }
+}
+
 /* --- The bus --- */
 
 static void test_bus_off_keeps_silent_until_the_drives_have_stopped(void)
@@ -750,6 +783,8 @@ int main(void)
     RUN_TEST(test_poll_fault_has_the_code_of_its_emergency);
     RUN_TEST(test_poll_fault_without_emergency_is_looked_up);
     RUN_TEST(test_request_reset_is_one_edge_and_only_when_asked);
+    RUN_TEST(test_leave_drives_without_torque_forget_the_gateway);
+    RUN_TEST(test_leave_drives_with_torque_are_left_to_their_watchdogs);
     RUN_TEST(test_bus_off_keeps_silent_until_the_drives_have_stopped);
     RUN_TEST(test_bus_that_echoes_nothing_is_gone_after_three_periods);
     RUN_TEST(test_send_slow_bus_refuses_instead_of_queueing);
