@@ -84,6 +84,7 @@ static int32_t reach(const stream_curve_t *self, unsigned axis, q32_t step_q32)
     } else {
         cycles_q16 = (fx_mul_div(vel_q32, Q16_ONE, stop->acc_per_cycle2_q32) + rise_q16) / 2;
     }
+    cycles_q16 -= cycles_q16 / 16; /* what follows the curve is a little behind it */
     return (int32_t)fx_clamp(fx_mul_div(cycles_q16, Q16_ONE, self->period_cycles_q16), self->reach_min_q16, self->reach_max_q16);
 }
 
