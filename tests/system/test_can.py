@@ -90,19 +90,22 @@ def follows_on_a_bus_of_finite_speed(bench):
     assert all(row["missed"] == 0 for row in bench.statistics().values()), bench.statistics()
 
 
-def one_fault_stops_all(bench):
-    for action in ({"do": "fault", "code": 0x2310}, {"do": "reboot"}, {"do": "off"}, {"do": "disable"}):
-        with can_bench.CanBench(bench.bin) as fresh:
-            up(fresh, can_config(fresh), plan=[{"after_enabled": 8, "drive": 3, **action}])
-            with fresh.sender() as sender:
-                sender.stream(10, wave)
-            fresh.wait_state("FAULT")
-            time.sleep(1)
-            assert fresh.status()["state"] == "FAULT", action
-            fresh.stop_drives()
-            when = [row["t"] for row in fresh.events("plan")][0]
-            left = [row for row in fresh.events("state") if row["t"] >= when and row["node"] != 3]
-            assert {row["node"] for row in left if row["t"] < when + 0.5} == {1, 2, 4, 5, 6, 7}, left
+TROUBLES = ({"do": "fault", "code": 0x2310}, {"do": "reboot"}, {"do": "off"}, {"do": "disable"})
+
+
+def one_in_trouble_stops_all(action):
+    def case(bench):
+        up(bench, can_config(bench), plan=[{"after_enabled": 8, "drive": 3, **action}])
+        with bench.sender() as sender:
+            sender.stream(10, wave)
+        bench.wait_state("FAULT")
+        time.sleep(1)
+        assert bench.status()["state"] == "FAULT", action
+        bench.stop_drives()
+        when = [row["t"] for row in bench.events("plan")][0]
+        left = [row for row in bench.events("state") if row["t"] >= when and row["node"] != 3]
+        assert {row["node"] for row in left if row["t"] < when + 0.5} == {1, 2, 4, 5, 6, 7}, left
+    return case
 
 
 def interface_down_stops_the_drives(bench):
@@ -145,7 +148,8 @@ def missing_or_wrong_drive_is_named(bench):
 CASES = [
     ("rises without a jump, all drives at once", rises_without_a_jump), ("follows a stream", follows_a_stream),
     ("follows a stream on a bus of 1 Mbit/s", follows_on_a_bus_of_finite_speed),
-    ("one drive in trouble stops all of them, latched", one_fault_stops_all), ("interface down and up: fault, nothing moves again", interface_down_stops_the_drives),
+    *((f"one drive in trouble-{action['do']} stops all of them, latched", one_in_trouble_stops_all(action)) for action in TROUBLES),
+    ("interface down and up: fault, nothing moves again", interface_down_stops_the_drives),
     ("a killed daemon is noticed by the drives", killed_daemon_stops_the_drives), ("a missing or wrong drive is named and nothing is enabled", missing_or_wrong_drive_is_named),
 ]
 
