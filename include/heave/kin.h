@@ -80,4 +80,23 @@ void kin_constrain(const kin_t *self, pose_t *pose);
 hv_status_t kin_forward(const kin_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], const pose_t *guess, pose_t *pose,
                         unsigned *iterations) HV_MUST_CHECK;
 
+/** Below this singularity margin, 0.1, a platform is not to be brought: cylinder forces, and what play and elasticity of the
+ *  cylinders let the plate do, have grown tenfold, and beyond it they grow without end. Ordinary platforms have 0.2 to 1. */
+#define KIN_MARGIN_LEAST_Q32 ((q32_t)429496730)
+
+/** Singularity margin of a pose, 0 to 1: the smallest of
+ *      (root mean square of the speeds of the cylinders) / (root mean square of the speeds of the plate joints)
+ *  over all motions of the plate that the mechanism allows. It is the smallest singular value of the inverse Jacobian (cylinder
+ *  speeds per plate motion) with the joints' speeds as the measure of a motion: free of units, and the same for every choice of
+ *  scale, frame and motion reference point. At 0 the plate can move although every cylinder stands still. Its inverse is the
+ *  largest factor from the cylinders' play to the joints' play. A characteristic length is not needed, as the speeds of points
+ *  measure rotations and translations alike (Gosselin, "Dexterity indices for planar and spatial robotic manipulators", 1990;
+ *  Voglewede and Ebert-Uphoff, "Overarching framework for measuring closeness to singularities of parallel manipulators", 2005).
+ *  @return Q32, to 2^-16; 0 for a pose that kin_inverse() refuses and where a cylinder is shorter than 1 mm */
+q32_t kin_margin(const kin_t *self, const pose_t *pose);
+
+/** Whether the singularity margin of a pose is above a value; the same as comparing kin_margin() at a tenth of its cost.
+ *  @param margin_q32 0 to 1 */
+bool kin_has_margin(const kin_t *self, const pose_t *pose, q32_t margin_q32);
+
 #endif

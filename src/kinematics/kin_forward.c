@@ -14,97 +14,21 @@
  */
 #include "kin_internal.h"
 
-#define ERROR_LAST_STEP_Q32 INT64_C(2147484)   /* 0.5 um */
-#define LENGTH_MIN_Q44      (INT64_C(1) << 44) /* a leg shorter than 1 mm has no direction to speak of */
+#define ERROR_LAST_STEP_Q32 INT64_C(2147484) /* 0.5 um */
 #define LENGTH_MAX_Q32      (INT64_C(65536) * Q32_ONE)
 
 /* The unknown axes, in the order of the columns of J. */
 static const uint8_t k_free_axes[] = {AXIS_ROLL, AXIS_PITCH, AXIS_YAW, AXIS_X, AXIS_Y, AXIS_Z};
 static const uint8_t k_tripod_axes[] = {AXIS_ROLL, AXIS_PITCH, AXIS_Z};
 
-/* What a change of roll and of pitch does: the plate turns about an axis and slides (mm per rad, over 2^reach_shift). */
-typedef struct {
-    int64_t turn_q28[2][3];
-    int64_t slide_q28[2][3];
-} rates_t;
-
-/* a . b in Q28, for |a| |b| < 64. */
-static int64_t dot_q28(const int64_t a_q28[3], const int64_t b_q28[3])
-{
-    return fx_shift_down(a_q28[0] * b_q28[0] + a_q28[1] * b_q28[1] + a_q28[2] * b_q28[2], 28);
-}
-
-/* a x b in Q28, for |a| |b| < 64. */
-static void cross_q28(const int64_t a[3], const int64_t b[3], int64_t result[3])
-{
-    result[0] = fx_shift_down(a[1] * b[2] - a[2] * b[1], 28);
-    result[1] = fx_shift_down(a[2] * b[0] - a[0] * b[2], 28);
-    result[2] = fx_shift_down(a[0] * b[1] - a[1] * b[0], 28);
-}
-
-/* A column of the rotation. */
-static void rotation_column(const kin_placement_t *at, unsigned column, int64_t result_q28[3])
-{
-    for (unsigned row = 0; row < 3; row++) {
-        result_q28[row] = fx_shift_down(at->rotation_q62[row][column], 34);
-    }
-}
-
-/* The slide of a 3-RPS that goes with a turn: the rate of x = r (R11 - R22) / 2, y = -r R21 and of the turned offset. */
-static void set_hinged_slide(const kin_t *self, const kin_placement_t *at, const int64_t turn_q28[3], int64_t slide_q28[3])
-{
-    int64_t first[3], second[3], offset[3] = {0, 0, 0}, first_rate[3], second_rate[3], offset_rate[3];
-    rotation_column(at, 0, first);
-    rotation_column(at, 1, second);
-    for (unsigned axis = 0; axis < 3; axis++) {
-        for (unsigned i = 0; i < 3; i++) {
-            const int64_t turned_q44 = fx_mul_high(at->rotation_q62[axis][i], self->hinge_offset_mm_q46[i]);
-            offset[axis] += fx_shift_down(turned_q44, 16u + self->reach_shift);
-        }
-    }
-    cross_q28(turn_q28, first, first_rate);
-    cross_q28(turn_q28, second, second_rate);
-    cross_q28(turn_q28, offset, offset_rate);
-    const int64_t radius_q28 = fx_shift_down(self->hinge_radius_mm_q46, 18u + self->reach_shift);
-    slide_q28[0] = offset_rate[0] + fx_shift_down(radius_q28 * (first_rate[0] - second_rate[1]), 29);
-    slide_q28[1] = offset_rate[1] - fx_shift_down(radius_q28 * first_rate[1], 28);
-    slide_q28[2] = 0;
-}
-
-/* Adds to the turns of roll and pitch what the hinges make of them. */
-static void add_hinged_rates(const kin_t *self, const kin_placement_t *at, rates_t *rates)
-{
-    const q62_t *sine = at->sine_q62, *cosine = at->cosine_q62;
-    const int64_t divisor_q28 = (INT64_C(1) << 28) + fx_shift_down(fx_mul_high(cosine[AXIS_PITCH], cosine[AXIS_ROLL]), 32);
-    rates->turn_q28[AXIS_ROLL][2] += fx_shift_down(sine[AXIS_PITCH], 6) / divisor_q28;
-    rates->turn_q28[AXIS_PITCH][2] += fx_shift_down(sine[AXIS_ROLL], 6) / divisor_q28;
-    set_hinged_slide(self, at, rates->turn_q28[AXIS_ROLL], rates->slide_q28[AXIS_ROLL]);
-    set_hinged_slide(self, at, rates->turn_q28[AXIS_PITCH], rates->slide_q28[AXIS_PITCH]);
-}
-
-static void set_rates(const kin_t *self, const kin_placement_t *at, rates_t *rates)
-{
-    *rates = (rates_t){{{0}}, {{0}}};
-    rotation_column(at, 0, rates->turn_q28[AXIS_ROLL]);
-    rates->turn_q28[AXIS_PITCH][0] = -fx_shift_down(at->sine_q62[AXIS_YAW], 34);
-    rates->turn_q28[AXIS_PITCH][1] = fx_shift_down(at->cosine_q62[AXIS_YAW], 34);
-    if (self->kind == KIN_TRIPOD_3RPS) {
-        add_hinged_rates(self, at, rates);
-    }
-}
-
 /* The row of J of one leg, of at least LENGTH_MIN: the angles, then the translations. */
-static void set_row(const kin_t *self, const rates_t *rates, const kin_leg_t *leg, int64_t row_q28[])
+static void set_row(const kin_t *self, const kin_rates_t *rates, const kin_leg_t *leg, int64_t row_q28[])
 {
-    const int64_t inverse_q48 = (INT64_C(1) << 62) / fx_shift_down(leg->length_mm_q44, 30);
     int64_t direction_q28[3], arm_q28[3], moment_q28[3];
-    for (unsigned axis = 0; axis < 3; axis++) {
-        direction_q28[axis] = fx_mul_high(leg->vector_mm_q44[axis], inverse_q48);
-        arm_q28[axis] = fx_shift_down(leg->arm_mm_q44[axis], 16u + self->reach_shift);
-    }
-    cross_q28(arm_q28, direction_q28, moment_q28);
-    row_q28[0] = dot_q28(rates->turn_q28[AXIS_ROLL], moment_q28);
-    row_q28[1] = dot_q28(rates->turn_q28[AXIS_PITCH], moment_q28);
+    kin_leg_direction(self, leg, direction_q28, arm_q28);
+    kin_cross_q28(arm_q28, direction_q28, moment_q28);
+    row_q28[0] = kin_dot_q28(rates->turn_q28[AXIS_ROLL], moment_q28);
+    row_q28[1] = kin_dot_q28(rates->turn_q28[AXIS_PITCH], moment_q28);
     switch (self->kind) {
     case KIN_HEXAPOD:
         row_q28[2] = moment_q28[2];
@@ -116,8 +40,8 @@ static void set_row(const kin_t *self, const rates_t *rates, const kin_leg_t *le
         row_q28[2] = direction_q28[2];
         break;
     case KIN_TRIPOD_3RPS:
-        row_q28[0] += dot_q28(rates->slide_q28[AXIS_ROLL], direction_q28);
-        row_q28[1] += dot_q28(rates->slide_q28[AXIS_PITCH], direction_q28);
+        row_q28[0] += kin_dot_q28(rates->slide_q28[AXIS_ROLL], direction_q28);
+        row_q28[1] += kin_dot_q28(rates->slide_q28[AXIS_PITCH], direction_q28);
         row_q28[2] = direction_q28[2];
         break;
     }
@@ -128,16 +52,16 @@ static hv_status_t linearise(const kin_t *self, const q32_t length_q32[], const 
                              q32_t error_q32[])
 {
     kin_placement_t at;
-    rates_t rates;
+    kin_rates_t rates;
     const hv_status_t status = kin_place(self, pose, &at);
     if (status != HV_OK) {
         return status;
     }
-    set_rates(self, &at, &rates);
+    kin_rates(self, &at, &rates);
     for (unsigned i = 0; i < self->cylinders; i++) {
         kin_leg_t leg;
         kin_leg(self, &at, i, &leg);
-        if (leg.length_mm_q44 < LENGTH_MIN_Q44) {
+        if (leg.length_mm_q44 < KIN_LENGTH_MIN_Q44) {
             return HV_ERR_RANGE;
         }
         set_row(self, &rates, &leg, matrix_q28[i]);

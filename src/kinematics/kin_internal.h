@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * kin_internal.h - what the inverse and the forward solution share: a placed plate, a leg, the linear solver.
+ * kin_internal.h - what the solutions share: a placed plate, a leg, rates of change, the linear solver.
  * Private to src/kinematics.
  */
 #ifndef HEAVE_KIN_INTERNAL_H
@@ -12,6 +12,9 @@
 
 /** Lengths carry 12 bits below Q32, so that only the last rounding of an extension counts. |value| < 2^17 mm. */
 #define KIN_GUARD_BITS 12u
+
+/** A leg shorter than 1 mm has no direction to speak of. */
+#define KIN_LENGTH_MIN_Q44 (INT64_C(1) << 44)
 
 /** A pose worked out: the attitude of the plate and where its motion reference point is, base frame. */
 typedef struct {
@@ -34,6 +37,33 @@ hv_status_t kin_place(const kin_t *self, const pose_t *pose, kin_placement_t *pl
 
 /** The leg of one cylinder. */
 void kin_leg(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, kin_leg_t *leg);
+
+/** What a change of roll and of pitch does: the plate turns about an axis and its motion reference point slides (per rad, over
+ *  2^reach_shift mm). */
+typedef struct {
+    int64_t turn_q28[2][3];
+    int64_t slide_q28[2][3];
+} kin_rates_t;
+
+/** The true rates of roll and pitch at a placed plate; on a 3-RPS with what its hinges make of them. */
+void kin_rates(const kin_t *self, const kin_placement_t *at, kin_rates_t *rates);
+
+/** Direction of a leg of at least KIN_LENGTH_MIN_Q44, and its turned arm over 2^reach_shift mm. */
+void kin_leg_direction(const kin_t *self, const kin_leg_t *leg, int64_t direction_q28[3], int64_t arm_q28[3]);
+
+/** a . b, for |a| |b| < 64. */
+static inline int64_t kin_dot_q28(const int64_t a_q28[3], const int64_t b_q28[3])
+{
+    return fx_shift_down(a_q28[0] * b_q28[0] + a_q28[1] * b_q28[1] + a_q28[2] * b_q28[2], 28);
+}
+
+/** a x b, for |a| |b| < 64. */
+static inline void kin_cross_q28(const int64_t a_q28[3], const int64_t b_q28[3], int64_t result_q28[3])
+{
+    result_q28[0] = fx_shift_down(a_q28[1] * b_q28[2] - a_q28[2] * b_q28[1], 28);
+    result_q28[1] = fx_shift_down(a_q28[2] * b_q28[0] - a_q28[0] * b_q28[2], 28);
+    result_q28[2] = fx_shift_down(a_q28[0] * b_q28[1] - a_q28[1] * b_q28[0], 28);
+}
 
 /** Solves matrix * x = rhs by elimination with partial pivoting; both are used up, x replaces rhs.
  *  @param matrix_q28 elements below 2 for six unknowns, below 2^3 for three

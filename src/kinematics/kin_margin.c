@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: MIT
+ * kin_margin.c - the singularity margin of a pose; see kin.h for what it means.
+ *
+ * With V_i the velocity of plate joint i per free motion (3 rows, one column per motion) and u_i the direction of its cylinder,
+ * the margin is the largest t for which the sum over all cylinders of
+ *     V_i' (u_i u_i' - t^2 I) V_i
+ * has no negative eigenvalue: the cylinders' speeds are u_i' V_i x, those of the joints V_i x. By Sylvester's law of inertia it
+ * has none as long as all pivots of its elimination are positive, so that one small elimination tells whether the margin is above
+ * a value, without iteration and whatever the free motions are (any basis will do). The value itself is found by halving.
+ */
+#include "kin_internal.h"
+
+#define BISECT_STEPS  16u
+#define PIVOT_MIN_Q44 (INT64_C(1) << 14) /* 2^-30: below rounding */
+
+/* The sums over all cylinders of V' u u' V and of V' V. */
+typedef struct {
+    int64_t held_q44[POSE_AXES][POSE_AXES];
+    int64_t all_q44[POSE_AXES][POSE_AXES];
+} sums_t;
+
+/* One free motion of the plate: it turns about an axis through its motion reference point, which slides. */
+typedef struct {
+    int64_t turn_q28[3];
+    int64_t slide_q28[3];
+} free_motion_t;
+
+/* The free motions; as many as cylinders. */
+static void set_motions(const kin_t *self, const kin_placement_t *at, free_motion_t motion[])
+{
+    kin_rates_t rates;
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        motion[i] = (free_motion_t){{0}, {0}};
+    }
+    if (self->kind == KIN_HEXAPOD) {
+        for (unsigned axis = 0; axis < 3; axis++) {
+            motion[axis].turn_q28[axis] = INT64_C(1) << 28;
+            motion[3 + axis].slide_q28[axis] = INT64_C(1) << 28;
+        }
+        return;
+    }
+    kin_rates(self, at, &rates);
+    for (unsigned i = 0; i < 2; i++) {
+        for (unsigned axis = 0; axis < 3; axis++) {
+            motion[i].turn_q28[axis] = rates.turn_q28[i][axis];
+            motion[i].slide_q28[axis] = rates.slide_q28[i][axis];
+        }
+    }
+    motion[2].slide_q28[2] = INT64_C(1) << 28;
+}
+
+/* Adds a cylinder's part to the lower triangles of the sums. */
+static void add_leg(const kin_t *self, const free_motion_t motion[], const kin_leg_t *leg, sums_t *sums)
+{
+    int64_t direction_q28[3], arm_q28[3], velocity_q28[POSE_AXES][3], speed_q28[POSE_AXES];
+    kin_leg_direction(self, leg, direction_q28, arm_q28);
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        kin_cross_q28(motion[i].turn_q28, arm_q28, velocity_q28[i]);
+        for (unsigned axis = 0; axis < 3; axis++) {
+            velocity_q28[i][axis] += motion[i].slide_q28[axis];
+        }
+        speed_q28[i] = kin_dot_q28(velocity_q28[i], direction_q28);
+        for (unsigned j = 0; j <= i; j++) {
+            sums->held_q44[i][j] += fx_shift_down(speed_q28[i] * speed_q28[j], 12);
+            sums->all_q44[i][j] += kin_dot_q28(velocity_q28[i], velocity_q28[j]) * (1 << 16);
+        }
+    }
+}
+
+static bool set_sums(const kin_t *self, const pose_t *pose, sums_t *sums)
+{
+    kin_placement_t at;
+    free_motion_t motion[POSE_AXES];
+    *sums = (sums_t){{{0}}, {{0}}};
+    if (kin_place(self, pose, &at) != HV_OK) {
+        return false;
+    }
+    set_motions(self, &at, motion);
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        kin_leg_t leg;
+        kin_leg(self, &at, i, &leg);
+        if (leg.length_mm_q44 < KIN_LENGTH_MIN_Q44) {
+            return false;
+        }
+        add_leg(self, motion, &leg, sums);
+    }
+    return true;
+}
+
+/* Whether all pivots of a symmetric matrix, given by its lower triangle, are positive. Uses it up. */
+static bool is_positive(unsigned size, int64_t matrix_q44[][POSE_AXES])
+{
+    for (unsigned column = 0; column < size; column++) {
+        const int64_t pivot_q44 = matrix_q44[column][column];
+        if (pivot_q44 < PIVOT_MIN_Q44) {
+            return false;
+        }
+        const int64_t inverse_q30 = fx_mul_div(Q62_ONE, 1 << 12, pivot_q44);
+        for (unsigned row = size; row-- > column + 1;) {
+            const int64_t factor_q30 = fx_mul_shift(matrix_q44[row][column], inverse_q30, 44);
+            for (unsigned i = column + 1; i <= row; i++) {
+                const int64_t part_q44 = fx_mul_shift(factor_q30, matrix_q44[i][column], 30);
+                matrix_q44[row][i] = fx_sub_sat(matrix_q44[row][i], part_q44);
+            }
+        }
+    }
+    return true;
+}
+
+static bool is_above(unsigned size, const sums_t *sums, q32_t margin_q32)
+{
+    int64_t matrix_q44[POSE_AXES][POSE_AXES] = {{0}};
+    const int64_t square_q62 = fx_mul_shift_fit(margin_q32, margin_q32, 2);
+    for (unsigned i = 0; i < size; i++) {
+        for (unsigned j = 0; j <= i; j++) {
+            matrix_q44[i][j] = sums->held_q44[i][j] - fx_mul_shift_fit(sums->all_q44[i][j], square_q62, 62);
+        }
+    }
+    return is_positive(size, matrix_q44);
+}
+
+bool kin_has_margin(const kin_t *self, const pose_t *pose, q32_t margin_q32)
+{
+    sums_t sums;
+    return set_sums(self, pose, &sums) && is_above(self->cylinders, &sums, margin_q32);
+}
+
+q32_t kin_margin(const kin_t *self, const pose_t *pose)
+{
+    sums_t sums;
+    q32_t margin_q32 = 0;
+    if (!set_sums(self, pose, &sums)) {
+        return 0;
+    }
+    for (unsigned i = 1; i <= BISECT_STEPS; i++) {
+        const q32_t higher_q32 = margin_q32 + fx_shift_down(Q32_ONE, i);
+        margin_q32 = is_above(self->cylinders, &sums, higher_q32) ? higher_q32 : margin_q32;
+    }
+    return margin_q32;
+}
