@@ -71,7 +71,8 @@ typedef struct {
     uint16_t frame_mask;     /**< what the sender asked of the relays */
     uint16_t written_mask;
     bool is_mask_written;
-    uint64_t other_logged_us; /**< 0 = never */
+    uint64_t other_logged_us;    /**< 0 = never */
+    uint64_t singular_logged_us; /**< 0 = never */
     uint32_t other_suppressed;
     uint64_t spike_logged_us;
     uint32_t spikes_logged; /**< of all spikes, those that a line told of */

@@ -74,7 +74,8 @@ void motion_rise(motion_t *self);
 void motion_follow(motion_t *self);
 
 /** Takes a target while following (else it is ignored).
- *  @return HV_OK; HV_ERR_RANGE for extensions no pose belongs to: nothing changes. */
+ *  @return HV_OK; HV_ERR_RANGE for extensions no pose belongs to, or one that the cylinders hardly hold (KIN_MARGIN_LEAST_Q32):
+ *          nothing changes. */
 hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_t now_us) HV_MUST_CHECK;
 
 /** Advances one cycle. Bounded time. */
@@ -102,6 +103,10 @@ uint64_t motion_timed_end_us(const motion_t *self);
 
 /** Timed moves that had to be stretched since the start. */
 uint32_t motion_stretched_count(const motion_t *self);
+
+/** Stops, since the start, because extensions given one by one led to where the cylinders would not hold the plate: the platform
+ *  stops before that and goes to the next target that it can hold, at engage speed. */
+uint32_t motion_singular_stops(const motion_t *self);
 
 /** Extensions at which people board, and those of the neutral pose. */
 const q32_t *motion_settled_extension(const motion_t *self);

@@ -98,6 +98,7 @@ struct motion {
     bool is_clamped;           /**< the last target was pulled in */
     uint8_t limiting_cylinder; /**< by this cylinder, 0 where none bounds it */
     uint32_t stretched_count;
+    uint32_t singular_stops;
 };
 
 #endif

@@ -29,14 +29,15 @@ typedef struct {
     uint32_t accepted[FRAME_COMMANDS];
     uint32_t accepted_timed; /**< of those, T forms */
     uint32_t rejected[FRAME_ERRORS];
-    uint32_t other_sender;  /**< valid frames of senders that do not drive */
-    uint32_t owner_changes; /**< take-overs by another sender */
-    uint32_t not_followed;  /**< accepted while the platform was not ENGAGED */
-    uint32_t impossible;    /**< extensions no pose belongs to */
-    uint32_t spikes;        /**< samples of a stream that were not followed (see gate.h) */
-    uint32_t clamped;       /**< cycles that pulled a target in */
-    uint32_t stretched;     /**< timed moves that took longer than asked */
-    uint32_t relay_missing; /**< masks that set a relay this platform does not have */
+    uint32_t other_sender;   /**< valid frames of senders that do not drive */
+    uint32_t owner_changes;  /**< take-overs by another sender */
+    uint32_t not_followed;   /**< accepted while the platform was not ENGAGED */
+    uint32_t impossible;     /**< extensions no pose belongs to, or one near a singularity */
+    uint32_t singular_stops; /**< stops before a singularity on the way from one set of extensions to another */
+    uint32_t spikes;         /**< samples of a stream that were not followed (see gate.h) */
+    uint32_t clamped;        /**< cycles that pulled a target in */
+    uint32_t stretched;      /**< timed moves that took longer than asked */
+    uint32_t relay_missing;  /**< masks that set a relay this platform does not have */
     uint32_t relay_errors;
     uint32_t faults;
     uint32_t fault[FAULT_CODES]; /**< of those, by code */

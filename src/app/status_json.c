@@ -249,6 +249,7 @@ static void write_counters(json_t *json, const motion_view_t *view)
     json_number(json, "owner_changes", c->owner_changes);
     json_number(json, "not_followed", c->not_followed);
     json_number(json, "impossible", c->impossible);
+    json_number(json, "singular_stops", c->singular_stops);
     json_number(json, "spikes", c->spikes);
     json_number(json, "clamped", c->clamped);
     json_number(json, "stretched", c->stretched);

@@ -9,7 +9,8 @@
 #include "operate.h"
 #include "reports.h"
 
-#define ACTUAL_POSE_CYCLES 16u /* forward kinematics of the feedback: display needs no more */
+#define ACTUAL_POSE_CYCLES 16u     /* forward kinematics of the feedback: display needs no more */
+#define SINGULAR_LOG_US    1000000 /* lines about the same thing are no closer */
 
 static bool is_io_valid(const gateway_io_t *io)
 {
@@ -139,6 +140,19 @@ static void step_motion(gateway_t *self, uint64_t now_us)
     }
 }
 
+/* One line for the first such stop of a burst. */
+static void note_singular_stops(gateway_t *self, uint64_t now_us)
+{
+    const uint32_t stops = motion_singular_stops(&self->motion);
+    if (stops != self->snapshot.counters.singular_stops &&
+        (self->singular_logged_us == 0 || now_us - self->singular_logged_us >= SINGULAR_LOG_US)) {
+        hal_log_write(self->io.log, HAL_LOG_WARNING,
+                      "stopped: the extensions sent lead too near a singularity; send ones that go round it");
+        self->singular_logged_us = now_us;
+    }
+    self->snapshot.counters.singular_stops = stops;
+}
+
 /* Pose of the plate from feedback. */
 static void find_actual_pose(gateway_t *self)
 {
@@ -183,6 +197,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->owner = self->owner;
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
     s->counters.spikes = gate_spikes(motion_gate(&self->motion));
+    note_singular_stops(self, now_us);
     s->counters.stretched = motion_stretched_count(&self->motion);
     find_actual_pose(self);
     s->cycle++;

@@ -278,7 +278,7 @@ static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *
     operate_event(self, EVENT_FRAME, now_us);
     if (self->supervisor.state == STATE_ENGAGED && motion_target(&self->motion, &target, now_us) != HV_OK) {
         self->snapshot.counters.impossible++;
-        refuse(self, frame->command, "no pose of the platform has these extensions", from, now_us);
+        refuse(self, frame->command, "no pose has these extensions, or one too near a singularity", from, now_us);
         return;
     }
     log_spikes(self, now_us);

@@ -4,6 +4,7 @@
  */
 #include "heave/motion.h"
 
+#include "assembly.h"
 #include "follow.h"
 #include "reach.h"
 #include "slots.h"
@@ -172,6 +173,12 @@ static void start_path(motion_t *self)
     self->source = MOTION_ON_PATH;
 }
 
+/* Whether the platform can be where a target leads. */
+static bool is_possible(const motion_t *self, const motion_target_t *target)
+{
+    return target->space == MOTION_POSE || slots_can_assemble(self, target);
+}
+
 /* What was to come after the stop. */
 static void go_on_after_stop(motion_t *self, uint64_t now_us)
 {
@@ -185,6 +192,7 @@ static void go_on_after_stop(motion_t *self, uint64_t now_us)
     }
     rest_at(self, here_q32, self->axis[AXIS_ANGLE].state.pos_q32);
     if (self->next == MOTION_THEN_FOLLOW) {
+        self->has_pending = self->has_pending && is_possible(self, &self->pending);
         follow_begin(self, now_us);
     }
 }
@@ -250,7 +258,7 @@ hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_
     if (!self->is_following) {
         return HV_OK;
     }
-    if (target->space == MOTION_CYLINDERS && !slots_can_assemble(self, target)) {
+    if (!is_possible(self, target)) {
         return HV_ERR_RANGE;
     }
     if (self->is_taking_over && self->is_blend_planned && target->space != self->space) {
@@ -323,6 +331,12 @@ static void find_pose(motion_t *self, const pose_t *planned, motion_output_t *ou
     out->sent = self->pose;
 }
 
+/* Whether extensions given one by one lead to where the cylinders would not hold the plate. */
+static bool is_led_astray(const motion_t *self)
+{
+    return follow_is_moving(self) && self->space == MOTION_CYLINDERS && are_cylinders_moving(self) && !assembly_can_stop(self);
+}
+
 /* Changes of source that become due at the end of a cycle. */
 static void end_cycle(motion_t *self, uint64_t now_us)
 {
@@ -331,6 +345,9 @@ static void end_cycle(motion_t *self, uint64_t now_us)
     } else if (self->source == MOTION_ON_PATH && scurve_is_done(&self->path) && motion_is_at_rest(self)) {
         self->source = MOTION_RESTING;
         note_known_pose(self, self->path_to_q32);
+    } else if (is_led_astray(self)) {
+        self->singular_stops++;
+        motion_follow(self);
     } else if (self->is_following) {
         follow_end_cycle(self);
     }
@@ -387,6 +404,11 @@ uint64_t motion_timed_end_us(const motion_t *self)
 uint32_t motion_stretched_count(const motion_t *self)
 {
     return self->stretched_count;
+}
+
+uint32_t motion_singular_stops(const motion_t *self)
+{
+    return self->singular_stops;
 }
 
 const q32_t *motion_settled_extension(const motion_t *self)

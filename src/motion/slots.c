@@ -3,6 +3,7 @@
  */
 #include "slots.h"
 
+#include "assembly.h"
 #include "reach.h"
 
 #define SLOT_MAX_Q32 q32_from_int(32768) /* no limit is beyond it */
@@ -27,13 +28,11 @@ static q32_t centre_of(const motion_t *self, motion_space_t space, unsigned i)
 bool slots_can_assemble(const motion_t *self, const motion_target_t *target)
 {
     q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
-    pose_t pose;
     for (unsigned i = 0; i < self->cylinders; i++) {
         const q32_t scaled_q32 = intensity_scaled(&self->intensity, self->neutral_mm_q32[i], target->value_q32[i]);
         extension_mm_q32[i] = clamp_to(&self->cylinder[i].limits, scaled_q32);
     }
-    return kin_forward(&self->kin, extension_mm_q32, &self->pose, &pose, NULL) == HV_OK ||
-           kin_forward(&self->kin, extension_mm_q32, &self->neutral, &pose, NULL) == HV_OK;
+    return assembly_is_held(self, extension_mm_q32);
 }
 
 /* A sender's value, before intensity, so that what it is scaled to is inside the limits. */

@@ -7,7 +7,7 @@
 
 #include "heave/motion.h"
 
-/** True if some pose has the target's extensions (with the intensity in force, pulled into the strokes): the assembly exists. */
+/** True if an assembly of the target's extensions (with the intensity in force, pulled into the strokes) exists and is held. */
 bool slots_can_assemble(const motion_t *self, const motion_target_t *target);
 
 /** The slots of a target; what they are scaled to is inside the limits, the whole pose in the workspace. Notes what was pulled

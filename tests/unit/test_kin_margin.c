@@ -428,6 +428,27 @@ static void test_margin_extreme_mechanisms_stays_within_0_and_1(void)
     }
 }
 
+/* Recorded once, anew only where a formula changes. */
+static void test_margin_has_the_same_bits_on_every_build(void)
+{
+    uint64_t digest = UINT64_C(14695981039346656037);
+    for (unsigned n = 0; n < 300; n++) {
+        s_geometry.kind = KIN_HEXAPOD;
+        for (unsigned i = 0; i < 6; i++) {
+            for (unsigned k = 0; k < 3; k++) {
+                s_geometry.base_mm_q16[i][k] = to_q16(between(-800, 800));
+                s_geometry.plate_mm_q16[i][k] = to_q16(between(-600, 600));
+            }
+            s_geometry.retracted_mm_q16[i] = 500 * Q16_ONE;
+        }
+        s_geometry.zero_height_mm_q16 = 1000 * Q16_ONE;
+        TEST_ASSERT_EQUAL_INT(HV_OK, kin_init(&s_kin, &s_geometry));
+        const pose_t pose = any_pose(30, 200);
+        digest = (digest ^ (uint64_t)kin_margin(&s_kin, &pose)) * UINT64_C(1099511628211);
+    }
+    TEST_ASSERT_EQUAL_HEX64(UINT64_C(0x242C10A16AF04315), digest);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -441,5 +462,6 @@ int main(void)
     RUN_TEST(test_margin_tripod_upright_is_one_and_flat_is_zero);
     RUN_TEST(test_margin_poses_that_cannot_be_is_zero);
     RUN_TEST(test_margin_extreme_mechanisms_stays_within_0_and_1);
+    RUN_TEST(test_margin_has_the_same_bits_on_every_build);
     return UNITY_END();
 }

@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: MIT
+ * assembly.c - the plate that belongs to extensions given one by one; see assembly.h.
+ */
+#include "assembly.h"
+
+#define AHEAD_Q32 q32_from_int(5)
+
+/* The pose of extensions near where the platform is, and whether it has the margin. */
+static bool find_held(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], const pose_t *guess, pose_t *pose)
+{
+    return kin_forward(&self->kin, extension_mm_q32, guess, pose, NULL) == HV_OK &&
+           kin_has_margin(&self->kin, pose, KIN_MARGIN_LEAST_Q32);
+}
+
+/* A little way from the set-points towards extensions, straight. */
+static void look_ahead(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q32_t ahead_mm_q32[CYLINDERS_MAX])
+{
+    q32_t longest_q32 = AHEAD_Q32;
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        const q32_t way_q32 = fx_abs(extension_mm_q32[i] - self->cylinder[i].state.pos_q32);
+        longest_q32 = way_q32 > longest_q32 ? way_q32 : longest_q32;
+    }
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        const q32_t here_q32 = self->cylinder[i].state.pos_q32;
+        ahead_mm_q32[i] = here_q32 + fx_mul_div(extension_mm_q32[i] - here_q32, AHEAD_Q32, longest_q32);
+    }
+}
+
+/* Whether that is held, or better held than here. */
+static bool is_better_ahead(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
+{
+    q32_t ahead_mm_q32[CYLINDERS_MAX] = {0};
+    pose_t pose = {{0}};
+    look_ahead(self, extension_mm_q32, ahead_mm_q32);
+    return find_held(self, ahead_mm_q32, &self->pose, &pose) ||
+           kin_margin(&self->kin, &pose) > kin_margin(&self->kin, &self->pose);
+}
+
+bool assembly_is_held(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
+{
+    pose_t pose;
+    if (self->is_taking_over && !is_better_ahead(self, extension_mm_q32)) {
+        return false;
+    }
+    return find_held(self, extension_mm_q32, &self->pose, &pose) || find_held(self, extension_mm_q32, &self->neutral, &pose);
+}
+
+bool assembly_can_stop(const motion_t *self)
+{
+    ramp_state_t start[CYLINDERS_MAX];
+    const ramp_limits_t *limits[CYLINDERS_MAX];
+    pose_t pose = {{0}};
+    halt_t halt;
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        const ramp_state_t *now = &self->cylinder[i].state;
+        const q32_t vel_q32 = now->vel_per_cycle_q32 + now->acc_per_cycle2_q32;
+        start[i] = (ramp_state_t){now->pos_q32 + vel_q32, vel_q32, now->acc_per_cycle2_q32};
+        limits[i] = &self->cylinder[i].limits;
+    }
+    halt_plan(&halt, CYLINDERS_MAX, CYLINDERS_MAX, start, limits);
+    return find_held(self, halt.rest_q32, &self->pose, &pose) ||
+           kin_margin(&self->kin, &pose) > kin_margin(&self->kin, &self->pose);
+}
