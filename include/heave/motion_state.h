@@ -89,7 +89,8 @@ struct motion {
     bool has_pending; /**< a target that waits for the end of a stop */
     motion_target_t pending;
     q32_t angle_target_deg_q32;
-    uint64_t last_timed_us; /**< arrival of the last timed target, 0 before the first */
+    uint64_t last_us;        /**< arrival of the last target */
+    uint32_t last_stated_us; /**< the period it stated, 0 = none */
     uint64_t timed_end_us;
     int64_t timed_share_q46;       /**< intensity that the planned move is planned with */
     q32_t timed_way_q32[AXES_MAX]; /**< from neutral to where the sender wants it, before intensity */

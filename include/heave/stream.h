@@ -10,8 +10,10 @@
  * most 4 x the larger of the two steps before), then ever more slowly, no further than the axis takes to stop
  * (stream_set_stop()), or 36 ms. When samples are back, or after 150 ms without, the curve comes back to the samples, or to the
  * last one, softly: position and velocity of the control points go on as they were. So an ended stream rests exactly on its last
- * sample, within 2 s. A stream that is known may be away for a second and goes on; a new rate gives a new grid, on which the
- * curve goes on.
+ * sample, within 2 s, or 24 periods of a slow one. A stream that is known may be away for a second and goes on; a new rate gives
+ * a new grid, on which the curve goes on.
+ * Hints: a sender that states its period may be slower, and tells from its second sample on what is late and what is lost. The
+ * margin is then an eighth of the period at least, as a guess at so slow a stream is poor.
  */
 #ifndef HEAVE_STREAM_H
 #define HEAVE_STREAM_H
@@ -26,7 +28,9 @@ typedef enum {
 } stream_style_t;
 
 #define STREAM_PERIOD_MIN_US 4000u   /**< fastest stream recognised: 250 Hz; what comes faster is thinned out to that */
-#define STREAM_PERIOD_MAX_US 150000u /**< slowest: 6.7 Hz; samples further apart are steps */
+#define STREAM_PERIOD_MAX_US 150000u /**< slowest: 6.7 Hz; samples further apart are steps, but for hints */
+#define STREAM_HINT_MIN_US   50000u  /**< a hint of less says nothing: senders' timers step by up to 16 ms */
+#define STREAM_HINT_MAX_US   500000u /**< slowest with a hint: 2 Hz */
 
 enum {
     STREAM_GAPS = 24,  /**< intervals the period is first found from */
@@ -45,6 +49,7 @@ typedef struct {
     unsigned gap_next;
     unsigned gaps;    /**< intervals in the ring that belong to the present rate */
     unsigned settled; /**< samples since the rate was last found, up to STREAM_GAPS */
+    uint32_t hint_us; /**< the period the sender states, 0 = none */
 } stream_clock_t;
 
 /** How quickly an axis can stop: its limits. */
@@ -114,6 +119,15 @@ void stream_set_stop(stream_t *self, unsigned axis, stream_stop_t stop);
 
 /** Forgets the stream; the next sample starts a new one. */
 void stream_reset(stream_t *self);
+
+/** What the sender states as its period with the next sample, at most STREAM_HINT_MAX_US; 0 = nothing, as after stream_init().
+ * With it, a stream may be slower than STREAM_PERIOD_MAX_US, and its second sample may be late. Without, a stream so slow is
+ * over. */
+void stream_hint_period(stream_t *self, uint32_t period_us);
+
+/** True if a sample at now_us would be the next one of the stream that runs: it may be away for a second once 12 samples have
+ *  come, else for STREAM_PERIOD_MAX_US, and for 3.5 periods. */
+bool stream_goes_on(const stream_t *self, uint64_t now_us);
 
 /** Takes a sample. Bounded time.
  *  @param now_us     arrival, never decreasing

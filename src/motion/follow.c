@@ -104,16 +104,29 @@ static void plan_blend(motion_t *self)
     self->is_blend_planned = true;
 }
 
-/* A timed target is a sample of a stream if its time is about the time between targets. */
+/* The time of a target that could be a stream's period, else 0. */
+static uint32_t period_stated(const motion_target_t *target)
+{
+    return target->is_timed && target->time_ms <= STREAM_HINT_MAX_US / 1000 ? target->time_ms * 1000 : 0;
+}
+
+/* Two times are about the same if neither is more than 2.5 times the other. */
+static bool is_about(uint64_t a_us, uint64_t b_us)
+{
+    return a_us * 2 <= b_us * 5 && b_us * 2 <= a_us * 5;
+}
+
+/* A timed target is a sample of a stream if its time is about the period of the one that runs, or two follow each other in about
+ * the time of both. */
 static bool is_stream_sample(const motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
-    if (!target->is_timed) {
-        return true;
+    const uint32_t stated_us = period_stated(target);
+    const uint64_t gap_us = now_us - self->last_us;
+    if (!target->is_timed || stated_us == 0) {
+        return !target->is_timed;
     }
-    const uint64_t time_us = (uint64_t)target->time_ms * 1000;
-    const uint64_t gap_us = now_us - self->last_timed_us;
-    return self->last_timed_us != 0 && time_us != 0 && time_us <= STREAM_PERIOD_MAX_US && gap_us <= STREAM_PERIOD_MAX_US &&
-           gap_us * 2 <= time_us * 5 && time_us * 2 <= gap_us * 5;
+    return stream_goes_on(&self->stream, now_us) ? is_about(stated_us, stream_period_us(&self->stream))
+                                                 : is_about(gap_us, stated_us) && is_about(gap_us, self->last_stated_us);
 }
 
 /* The slots are those of a space from now on. */
@@ -121,7 +134,7 @@ static void change_space(motion_t *self, motion_space_t space)
 {
     self->space = space;
     self->is_space_new = true;
-    self->last_timed_us = 0;
+    self->last_stated_us = 0;
     self->source = MOTION_STREAMED;
     stream_reset(&self->stream);
     for (unsigned i = 0; i < AXES_MAX; i++) {
@@ -153,6 +166,7 @@ static void take_target(motion_t *self, const motion_target_t *target, bool is_s
         stream_reset(&self->stream);
         gate_reset(&self->gate);
     }
+    stream_hint_period(&self->stream, period_stated(target));
     stream_push(&self->stream, now_us, self->slot_q32);
     self->due = !is_sample ? DUE_TIMED : self->stream.phase == STREAM_RUNNING ? DUE_STREAM : DUE_STEP;
 }
@@ -163,7 +177,8 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
         change_space(self, target->space);
     }
     const bool is_sample = is_stream_sample(self, target, now_us);
-    self->last_timed_us = target->is_timed ? now_us : 0;
+    self->last_us = now_us;
+    self->last_stated_us = period_stated(target);
     if (!is_sample || !is_withheld(self, target, now_us)) {
         take_target(self, target, is_sample, now_us);
     }

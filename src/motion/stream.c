@@ -7,13 +7,14 @@
 #include "stream_clock.h"
 #include "stream_curve.h"
 
-#define PACE_GAIN_DIV   8                   /* a rate correction of 1/8 per period of error ... */
-#define PACE_MAX_Q32    (Q32_ONE * 6 / 100) /* ... but at most this */
-#define PACE_FILTER_MAX (Q32_ONE / 2)       /* keeps the filters stable where a cycle is longer than a period */
-#define BEHIND_MAX_Q32  (Q32_ONE * 3 / 2)   /* further behind its time, a sample is skipped */
-#define BEFORE_MAX_Q32  (Q32_ONE / 2)       /* further before it, where it has no samples, a point is filled in */
-#define AMBIGUOUS_Q32   (Q32_ONE * 13 / 20) /* a sample may belong to a period this far from its time */
-#define STEP_GAP_MIN_US 2000u /* two samples nearer than this do not begin a stream: the second replaces the first */
+#define PACE_GAIN_DIV        8                   /* a rate correction of 1/8 per period of error ... */
+#define PACE_GAIN_DIV_HINTED 2                   /* ... 1/2 where the period is stated, and often a long one */
+#define PACE_MAX_Q32         (Q32_ONE * 6 / 100) /* ... but at most this */
+#define PACE_FILTER_MAX      (Q32_ONE / 2)       /* keeps the filters stable where a cycle is longer than a period */
+#define BEHIND_MAX_Q32       (Q32_ONE * 3 / 2)   /* further behind its time, a sample is skipped */
+#define BEFORE_MAX_Q32       (Q32_ONE / 2)       /* further before it, where it has no samples, a point is filled in */
+#define AMBIGUOUS_Q32        (Q32_ONE * 13 / 20) /* a sample may belong to a period this far from its time */
+#define STEP_GAP_MIN_US      2000u /* two samples nearer than this do not begin a stream: the second replaces the first */
 
 void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_t style)
 {
@@ -30,6 +31,14 @@ void stream_set_stop(stream_t *self, unsigned axis, stream_stop_t stop)
 void stream_reset(stream_t *self)
 {
     self->phase = STREAM_EMPTY; /* everything else begins with the next sample */
+}
+
+void stream_hint_period(stream_t *self, uint32_t period_us)
+{
+    HV_ASSERT(period_us <= STREAM_HINT_MAX_US);
+    if (stream_clock_hint(&self->clock, period_us > STREAM_HINT_MIN_US ? period_us : 0)) {
+        self->phase = STREAM_EMPTY;
+    }
 }
 
 static void start_lone(stream_t *self, const q32_t *sample_q32)
@@ -116,7 +125,8 @@ static void advance(stream_t *self, uint64_t now_us)
     }
     self->error_q32 = error_at(self, now_us);
     const q32_t nominal = stream_clock_span(&self->clock, self->cycle_us);
-    const q32_t pace = fx_clamp(self->error_q32 / PACE_GAIN_DIV, -PACE_MAX_Q32, PACE_MAX_Q32);
+    const q32_t gain = self->clock.hint_us > 0 ? PACE_GAIN_DIV_HINTED : PACE_GAIN_DIV;
+    const q32_t pace = fx_clamp(self->error_q32 / gain, -PACE_MAX_Q32, PACE_MAX_Q32);
     const q32_t faster = nominal > self->rate_q32[1] ? nominal : self->rate_q32[1];
     const q32_t filter = fx_clamp(faster * 2 / 3, 0, PACE_FILTER_MAX);
     const q32_t wished = nominal + fx_mul_shift(nominal, pace, 32);
@@ -152,6 +162,11 @@ bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref)
         self->phase = STREAM_LONE;
     }
     return true;
+}
+
+bool stream_goes_on(const stream_t *self, uint64_t now_us)
+{
+    return self->phase == STREAM_RUNNING && stream_clock_is_near(&self->clock, now_us);
 }
 
 bool stream_is_live(const stream_t *self, uint64_t now_us)

@@ -14,22 +14,50 @@ enum {
 };
 
 #define PERIOD_MIN_Q16 ((int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16)
-#define PERIOD_MAX_Q16                                                                                                           \
-    ((int64_t)STREAM_PERIOD_MAX_US * STREAM_US_Q16 / 3 * 4) /* a running stream may be slower: no flipping at the edge */
-#define NETWORK_Q16    ((int64_t)15000 * STREAM_US_Q16)     /* jitter at both ends of a span */
+#define NETWORK_Q16    ((int64_t)15000 * STREAM_US_Q16) /* jitter at both ends of a span */
 #define MARGIN_MIN_Q16 ((int64_t)2000 * STREAM_US_Q16)
 #define AWAY_US        1000000u
 #define ELAPSED_MAX_US 4000000u /* far beyond the end of any curve */
 
+/* A running stream may be slower than what it may begin with: no flipping at the edge. */
+static int64_t period_max_q16(const stream_clock_t *self)
+{
+    const uint32_t slowest_us = self->hint_us > STREAM_PERIOD_MAX_US ? self->hint_us : STREAM_PERIOD_MAX_US;
+    return (int64_t)slowest_us * STREAM_US_Q16 / 3 * 4;
+}
+
+/* Senders that state their period are programs that wait that long, and wake late by a share of it. */
+static int64_t margin_min_q16(const stream_clock_t *self)
+{
+    const int64_t share = self->hint_us > 0 ? self->period_us_q16 / 8 : 0;
+    return share > MARGIN_MIN_Q16 ? share : MARGIN_MIN_Q16;
+}
+
 static void set_period(stream_clock_t *self, int64_t period_us_q16)
 {
-    self->period_us_q16 = fx_clamp(period_us_q16, PERIOD_MIN_Q16, PERIOD_MAX_Q16);
+    self->period_us_q16 = fx_clamp(period_us_q16, PERIOD_MIN_Q16, period_max_q16(self));
     self->per_us_q46 = Q62_ONE / self->period_us_q16;
 }
 
 void stream_clock_start(stream_clock_t *self, uint64_t now_us)
 {
-    *self = (stream_clock_t){.last_us = now_us, .margin_us_q16 = MARGIN_MIN_Q16};
+    const uint32_t hint_us = self->hint_us;
+    *self = (stream_clock_t){.last_us = now_us};
+    (void)stream_clock_hint(self, hint_us);
+}
+
+bool stream_clock_hint(stream_clock_t *self, uint32_t hint_us)
+{
+    self->hint_us = hint_us;
+    if (self->settled == 0) {
+        self->period_us_q16 = 0;
+        self->margin_us_q16 = MARGIN_MIN_Q16;
+    }
+    if (self->settled == 0 && hint_us > 0) {
+        set_period(self, (int64_t)hint_us * STREAM_US_Q16);
+        self->margin_us_q16 = margin_min_q16(self);
+    }
+    return self->period_us_q16 > period_max_q16(self);
 }
 
 uint32_t stream_clock_elapsed_us(const stream_clock_t *self, uint64_t now_us)
@@ -126,7 +154,7 @@ static int64_t middle_gap(const stream_clock_t *self, unsigned gaps)
     for (unsigned i = cut; i < count - cut; i++) {
         sum += sorted[i];
     }
-    return fx_clamp(sum / (int64_t)(count - 2 * cut), PERIOD_MIN_Q16, PERIOD_MAX_Q16);
+    return fx_clamp(sum / (int64_t)(count - 2 * cut), PERIOD_MIN_Q16, period_max_q16(self));
 }
 
 /* True where a mean over so many intervals is off by more than an eighth, and their sum by more than a network makes it. */
@@ -136,13 +164,20 @@ static bool is_rate_off(const stream_clock_t *self, int64_t mean_us_q16, unsigne
     return off * 8 > self->period_us_q16 && off * gaps > NETWORK_Q16;
 }
 
-static bool has_new_rate(const stream_clock_t *self)
+/* Of the newest intervals, those longer than the given period. */
+static unsigned lost_gaps(const stream_clock_t *self, unsigned gaps, int64_t period_us_q16)
 {
     unsigned lost = 0;
-    for (unsigned i = 0; i < WATCHED; i++) {
-        lost += periods_in_gap(gap_q16(self, i), self->period_us_q16) > 1 ? 1u : 0u;
+    for (unsigned i = 0; i < gaps; i++) {
+        lost += periods_in_gap(gap_q16(self, i), period_us_q16) > 1 ? 1u : 0u;
     }
-    return lost >= WATCHED_LOST || is_rate_off(self, mean_period(self, WATCHED, self->period_us_q16), WATCHED);
+    return lost;
+}
+
+static bool has_new_rate(const stream_clock_t *self)
+{
+    return lost_gaps(self, WATCHED, self->period_us_q16) >= WATCHED_LOST ||
+           is_rate_off(self, mean_period(self, WATCHED, self->period_us_q16), WATCHED);
 }
 
 /* Mean period over all intervals, with the periods that each was taken for. */
@@ -173,9 +208,42 @@ static unsigned periods_ahead(const stream_clock_t *self, int64_t ahead_us_q16, 
 static void adapt_margin(stream_clock_t *self)
 {
     const int64_t step = self->period_us_q16 / 64;
-    const int64_t wished = self->margin_us_q16 + (self->late_us_q16 > self->margin_us_q16 ? step : -step / 128);
+    const int64_t free = self->hint_us > 0 ? 4 * step : 0; /* guesses at slow streams are poor: rather wait */
+    const int64_t wished = self->margin_us_q16 + (self->late_us_q16 + free > self->margin_us_q16 ? step : -step / 128);
     const int64_t half = self->period_us_q16 / 2;
-    self->margin_us_q16 = fx_clamp(wished, MARGIN_MIN_Q16, half > MARGIN_MIN_Q16 ? half : MARGIN_MIN_Q16);
+    const int64_t least = margin_min_q16(self);
+    self->margin_us_q16 = fx_clamp(wished, least, half > least ? half : least);
+}
+
+/* A program's first frame is often late: the interval after it is left out where the others agree better with what the sender
+ * states. */
+static void leave_out_first(stream_clock_t *self)
+{
+    const int64_t stated = (int64_t)self->hint_us * STREAM_US_Q16;
+    if (stated == 0 || self->gaps < 3 || self->settled >= STREAM_GAPS) {
+        return;
+    }
+    const int64_t all = mean_period(self, self->gaps, stated);
+    const int64_t others = mean_period(self, self->gaps - 1, stated);
+    const bool is_odd = fx_abs(gap_q16(self, self->gaps - 1) - others) > NETWORK_Q16 / 2;
+    self->gaps -= is_odd && fx_abs(others - stated) < fx_abs(all - stated) ? 1u : 0u;
+}
+
+/* Period over the intervals so far. What the sender states tells losses from late arrivals better than the first intervals do, if
+ * it is what they are about; against it speak two alike, not two unlike ones. */
+static int64_t first_period(const stream_clock_t *self)
+{
+    const int64_t stated = (int64_t)self->hint_us * STREAM_US_Q16;
+    if (stated > 0 && self->gaps < 3) {
+        const int64_t newest = gap_q16(self, 0);
+        const int64_t oldest = gap_q16(self, self->gaps - 1);
+        return self->gaps == 2 && fx_abs(newest - oldest) * 8 <= oldest ? (newest + oldest) / 2 : stated;
+    }
+    const int64_t mean = stated > 0 ? mean_period(self, self->gaps, stated) : 0;
+    if (stated > 0 && fx_abs(mean - stated) * 4 <= stated && lost_gaps(self, self->gaps, stated) * 2 <= self->gaps) {
+        return mean;
+    }
+    return mean_period(self, self->gaps, middle_gap(self, self->gaps));
 }
 
 /* Returns true where the sender's rate is found to be another one. */
@@ -189,7 +257,8 @@ static bool find_period(stream_clock_t *self, int64_t off_us_q16)
     }
     const int64_t taken = taken_period(self);
     if (self->settled < STREAM_GAPS) {
-        set_period(self, mean_period(self, self->gaps, middle_gap(self, self->gaps)));
+        leave_out_first(self);
+        set_period(self, first_period(self));
     } else if (is_rate_off(self, taken, self->gaps)) {
         set_period(self, taken);
     } else {
@@ -221,7 +290,7 @@ bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods)
     const int64_t off = fx_clamp(ahead - (int64_t)periods * self->period_us_q16, -self->period_us_q16, self->period_us_q16);
     self->settled += self->settled < STREAM_GAPS ? 1u : 0u;
     self->late_us_q16 = off - (self->settled < 12 ? off / (int64_t)(self->settled + 1) : off * 2 / 25);
-    const bool is_new_rate = find_period(self, off);
+    const bool is_new_rate = self->settled > 1 && find_period(self, off); /* one interval says less than a hint */
     if (is_new_rate) {
         self->late_us_q16 = 0;
     }
