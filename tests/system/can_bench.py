@@ -13,12 +13,15 @@ import json
 import subprocess
 import sys
 
+import can_judge
 import heave
 
 DRIVES = heave.TOP / "tests/peers/can_drives.py"
+RECORDER = heave.TOP / "tests/peers/can_record.py"
 COUNTS_PER_MM = 1000
 SETTLED_MM = 5
 CYLINDERS = 6
+NODES = range(1, CYLINDERS + 2)  # the last one is the rotation motor
 
 
 class CanBench(heave.Bench):
@@ -46,7 +49,7 @@ class CanBench(heave.Bench):
     def start_drives(self, plan=(), each=None, only=None):
         """each: keys of all drives; only: {node: keys} of single ones. Positions are those of a settled platform."""
         entries = [{"node": node, "position": SETTLED_MM * COUNTS_PER_MM if node <= CYLINDERS else 0, **(each or {}), **(only or {}).get(node, {})}
-                   for node in range(1, CYLINDERS + 2)]
+                   for node in NODES]
         config = self.file("drives.json", json.dumps({"log": str(self.log), "trace": str(self.trace), "drives": entries, "plan": list(plan)}))
         self.drives = subprocess.Popen([sys.executable, DRIVES, config, "--follow"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         assert self.drives.stdout.readline() == "ready\n", "the simulated drives do not start"
@@ -77,3 +80,30 @@ class CanBench(heave.Bench):
             time_us, *values = [int(value) if value else None for value in line.split(",")]
             rows.append((time_us, values[0::2], values[1::2]))
         return rows
+
+
+class RecordedBench(CanBench):
+    """The same with a recorder beside it."""
+
+    def __init__(self, bin_dir, **changes):
+        super().__init__(bin_dir, **changes)
+        self.recording = self.folder / "bus.log"
+        self.recorder = subprocess.Popen([sys.executable, RECORDER, "vcan0", self.recording], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self.recorder.stdout.readline() == "ready\n", "the recorder does not start"
+
+    def __exit__(self, *exception):
+        self.end_recorder()
+        super().__exit__(*exception)
+
+    def end_recorder(self):
+        if self.recorder:
+            self.recorder.stdin.close()
+            self.recorder.wait(timeout=heave.WAIT_S)
+            self.recorder.stdout.close()
+            self.recorder = None
+
+    def record(self):
+        """What was on the bus; ends the drives and the recorder."""
+        self.stop_drives()
+        self.end_recorder()
+        return can_judge.Record(self.recording, NODES)

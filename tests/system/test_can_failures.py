@@ -1,0 +1,269 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_can_failures.py BIN [PART OF A NAME] - what goes wrong on a CANopen bus while the platform moves: seen in time, and all drives stop together.
+
+On vcan and virtual time, inside kernel.py --virtual-time --python; judged on the recorded frames by can_judge. docs/failures.md names these cases."""
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import can_bench
+import can_judge
+import heave
+import tap
+import test_can
+
+PERIOD_US, CYCLE_US = 4000, 1000
+HEARTBEAT_TIMEOUT_US = 150000
+VICTIM = 3
+MOVING_S = 0.6         # after all have torque: in the middle of the rise
+REACTION_US = 2 * CYCLE_US
+WINDOW_COUNTS = 10 * can_bench.COUNTS_PER_MM
+STEP_COUNTS = 0.3 * can_bench.COUNTS_PER_MM  # more than a period of the rise
+
+
+def in_motion(bench, **drives):
+    """Rises, until MOVING_S after all drives have torque."""
+    bench.start_drives(**drives)
+    daemon = bench.start(config=test_can.can_config(bench))
+    heave.wait_for(lambda: bench.events("all enabled"), "torque")
+    time.sleep(MOVING_S)
+    return daemon
+
+
+def now_us():
+    return time.monotonic_ns() // 1000
+
+
+def stop_times(record, since_us, but=()):
+    stops = record.stops(since_us, but)
+    assert None not in stops.values(), f"never told to stop: {stops}"
+    assert max(stops.values()) - min(stops.values()) < PERIOD_US, f"not together: {stops}"
+    return stops
+
+
+# --- Drives in trouble ---
+# do: an action of faults.py on drive 3. seen: where on the bus it can be seen first, of (record, time of the action). within_us: from there to
+# the first quick stop. fault, code: what the operator reads.
+
+def sees_emergency(record, when_us):
+    return next(when for when, _ in record.of(can_judge.EMERGENCY + VICTIM) if when >= when_us)
+
+
+def sees_lag(record, when_us):
+    """The set-point is about to leave the window of the configuration; such a one is not sent."""
+    return next(when for when, target, actual in record.lags(VICTIM) if when > when_us and abs(target - actual) > WINDOW_COUNTS - STEP_COUNTS)
+
+
+def sees_boot(record, when_us):
+    return next(when for when in record.boots(VICTIM) if when > when_us)
+
+
+def sees_last_beat(record, when_us):
+    return [when for when in record.beats(VICTIM) if when <= when_us][-1]
+
+
+def sees_last_status(record, when_us):
+    return [when for when, _, _ in record.statuses(VICTIM) if when <= when_us][-1]
+
+
+def sees_no_torque(record, when_us):
+    return next(when for when, word, _ in record.statuses(VICTIM) if when > when_us and word & can_judge.FIRST_DRIVE_STATE != can_judge.ENABLED)
+
+
+def sees_pre_operational(record, when_us):
+    return next(when for when, data in record.of(can_judge.HEARTBEAT + VICTIM) if when > when_us and data == b"\x7f")
+
+
+SILENT_US = 4 * PERIOD_US + CYCLE_US  # three SYNCs after the last answer, and the end of the third's period
+ROWS = [
+    # name, action, drive's keys, seen, within_us, fault, code
+    ("a fault with its EMCY", {"do": "fault", "code": 0x2310}, {}, sees_emergency, PERIOD_US + REACTION_US, "drive-fault", 0x2310),
+    ("a blocked axis: following error", {"do": "jam"}, {}, sees_lag, 2 * PERIOD_US + REACTION_US, "drive-fault", 0x8611),
+    ("a drive loses its torque", {"do": "disable"}, {}, sees_no_torque, REACTION_US, "drive-dropped", None),
+    ("a drive reboots", {"do": "reboot"}, {"boot_us": 2000}, sees_boot, REACTION_US, "drive-offline", 0x10005),
+    ("a drive loses its power", {"do": "off"}, {}, sees_last_status, SILENT_US, "drive-offline", 0x10002),
+    ("a drive's heartbeat ends", {"do": "heartbeat off"}, {}, sees_last_beat, HEARTBEAT_TIMEOUT_US + REACTION_US, "drive-offline", 0x10003),
+    ("a drive leaves operational", {"do": "nmt", "state": 0x7F}, {}, sees_pre_operational, REACTION_US, "drive-offline", 0x10004),
+    ("5 answers lost", {"do": "tpdo drop", "count": 5}, {}, sees_last_status, SILENT_US, "drive-offline", 0x10002),
+    ("50 answers lost", {"do": "tpdo drop", "count": 50}, {}, sees_last_status, SILENT_US, "drive-offline", 0x10002),
+]
+
+
+def stops_all_drives(action, keys, seen, within_us, fault, code):
+    def case(bench):
+        in_motion(bench, only={VICTIM: keys})
+        when_us = now_us()
+        bench.do(drive=VICTIM, action=action["do"], **{key: value for key, value in action.items() if key != "do"})
+        time.sleep(1 if action["do"] == "jam" else 0.25)
+        status = bench.status()
+        record = bench.record()
+        cause_us = seen(record, when_us)
+        stops = stop_times(record, when_us, but=(VICTIM,))
+        late_us = max(stops.values()) - cause_us
+        assert status["state"] == "FAULT" and status["fault"]["name"] == fault and code in (None, status["fault"]["device_code"]), status["fault"]
+        assert 0 <= late_us <= within_us, f"stopped {late_us} us after it was to be seen, allowed {within_us}"
+        can_judge.check_order(record, record.first_status(1, can_judge.ENABLED), when_us, PERIOD_US)
+        can_judge.check_start(record)
+    return case
+
+
+def harmless(*actions):
+    """Nothing stops, and nothing is said."""
+    def case(bench):
+        in_motion(bench)
+        begin_us = now_us()
+        for action, arguments in actions:
+            bench.do(action, VICTIM, **arguments)
+            time.sleep(0.2)
+        end_us = now_us()
+        status = bench.status()
+        record = bench.record()
+        assert status["state"] in ("RISING", "ENGAGED"), status["state"]
+        assert set(record.stops(begin_us).values()) == {None} or min(filter(None, record.stops(begin_us).values())) >= end_us
+        can_judge.check_order(record, begin_us, end_us, PERIOD_US)
+    return case
+
+
+# --- The bus in trouble ---
+
+def link(*arguments):
+    subprocess.run(["ip", "link", *arguments], check=True)
+
+
+def link_down():
+    link("set", "vcan0", "down")
+
+
+def link_up():
+    link("set", "vcan0", "up")
+
+
+def link_gone():
+    link("del", "vcan0")
+
+
+def link_back():
+    link("add", "vcan0", "type", "vcan")
+    link("set", "vcan0", "txqueuelen", "16")
+    link_up()
+
+
+def stall():
+    """A bus on which nothing moves any more: the queue fills up, ENOBUFS."""
+    subprocess.run("tc qdisc replace dev vcan0 root tbf rate 8bit burst 16 limit 160".split(), check=True)
+
+
+def bus_off():
+    """What the driver of a controller says that has given up."""
+    subprocess.run([sys.executable, "-c", "import socket,struct; s = socket.socket(29, 3, 1); s.bind(('vcan0',)); s.send(struct.pack('=IB3x8s', "
+                    "0x20000040, 8, bytes(8)))"], check=True)
+
+
+def nothing():
+    pass
+
+
+BUS_ROWS = [("interface down", link_down, link_up, 2 * CYCLE_US), ("interface gone and back", link_gone, link_back, 2 * CYCLE_US),
+            ("a queue that stays full", stall, can_bench.CanBench.fast_bus, 4 * PERIOD_US), ("bus-off", bus_off, nothing, 2 * CYCLE_US)]
+
+
+def bus_lost(breaks, mends, within_us):
+    """No set-point after within_us, also when the bus is back; the drives' own watch over the heartbeat has stopped them before we speak again."""
+    def case(bench):
+        in_motion(bench)
+        begin_us = now_us()
+        breaks()
+        time.sleep(0.3)
+        status = bench.status()
+        mends()
+        time.sleep(1.5)
+        after = bench.status()
+        record = bench.record()
+        assert status["state"] == after["state"] == "FAULT" and status["fault"]["name"] == "bus-lost", status["fault"]
+        late = [(when - begin_us, f"{what:x}") for when, what, data in record.frames
+                if what - can_judge.RPDO in can_bench.NODES and when > begin_us + within_us and data[0] & 0x0F == can_judge.ENABLE_OPERATION]
+        assert not late, f"set-points long after the loss: {late[:3]}, {len(late)} of them"
+        own = [when for when, _ in record.of(can_judge.HEARTBEAT + 127) if when > begin_us + within_us]
+        assert not own or own[0] - begin_us > HEARTBEAT_TIMEOUT_US, f"heard again {own[0] - begin_us} us after the loss"
+    return case
+
+
+# --- Setting up ---
+
+BAD = {2: ({"is_there": False}, "missing", None), 3: ({"defaults": {"1000": 0x00020191}}, "refused", (0x1000, 0)),
+       4: ({"refuse": {"6060": 0x06090030}}, "refused", (0x6060, 0)), 5: ({"read_only": ["6007"], "defaults": {"6007": 0}}, "refused", (0x6007, 0)),
+       6: ({"refuse": {"1016:1": 0x06010002}}, "refused", (0x1016, 1)), 7: ({"missing_objects": ["607A"]}, "refused", None)}
+
+
+def bad_drives_are_named(bench):
+    """Six of seven, each in another way: each is named with its object, and nobody is given torque."""
+    bench.start_drives(only={node: keys for node, (keys, _, _) in BAD.items()})
+    bench.start(config=test_can.can_config(bench))
+    time.sleep(6)
+    status = bench.status()
+    reports = {drive["report"]["node"]: drive["report"] for drive in [*status["cylinders"], status["rotation"]] if "report" in drive}
+    for node, (_, phase, where) in BAD.items():
+        assert reports[node]["phase"] == phase and reports[node]["trouble"], reports[node]
+        assert where in (None, (reports[node]["object"], reports[node]["sub_index"])), reports[node]
+    assert status["state"] != "ENGAGED" and not bench.events("enabled")
+
+
+# --- The gateway in trouble ---
+
+KILLS = 4
+
+
+def killed_anywhere(bench):
+    """kill -9 at random phases and a new start: the drives stop by themselves, nothing old is sent, no step at enabling."""
+    source = random.Random(1)
+    config = test_can.can_config(bench)
+    bench.start_drives()
+    deaths = []
+    for turn in range(KILLS):
+        daemon = bench.start(config=config)
+        if turn:  # after the crash the drives are in fault, by their watch over the heartbeat: that is for the operator to take back
+            time.sleep(2)
+            assert bench.ctl("reset").returncode == 0
+            time.sleep(0.5)
+            assert bench.ctl("engage").returncode == 0, bench.status()["state"]
+        heave.wait_for(lambda turn=turn: len(bench.events("enabled")) >= 7 * (turn + 1), "torque")
+        time.sleep(source.uniform(0, 0.8))
+        bench.stop(daemon, signal.SIGKILL)
+        deaths.append(now_us())
+        bench.socket.unlink()
+        time.sleep(source.uniform(0.2, 0.5))
+        assert len(bench.events("master lost")) >= 7 * (turn + 1), "the drives have not noticed"
+    for row in bench.events("enabled"):
+        assert abs(row["value"]["target"] - row["value"]["actual"]) <= 1, row
+    record = bench.record()
+    assert not bench.events("jump")
+    can_judge.check_start(record)
+    for death_us in deaths:
+        left = [when - death_us for when, what, _ in record.frames if what - can_judge.RPDO in can_bench.NODES and death_us < when < death_us + 150000]
+        assert not left, f"frames of a dead gateway: {left}"
+
+
+CASES = [(f"{name}: all stop together", stops_all_drives(*row)) for name, *row in ROWS]
+CASES += [
+    ("lost answers, 1, 2 and 3: nothing stops", harmless(*(("tpdo drop", {"count": count}) for count in (1, 2, 3)))),
+    ("an EMCY without a fault: nothing stops", harmless(("emergency", {"code": 0xFF00}))),
+]
+CASES += [(f"{name}: silence, latched", bus_lost(*row)) for name, *row in BUS_ROWS]
+CASES += [("drives missing or wrong are named, nobody is enabled", bad_drives_are_named), ("killed at random moments and started again", killed_anywhere)]
+
+
+def main():
+    suite = tap.Suite()
+    wanted = sys.argv[2] if len(sys.argv) > 2 else ""
+    for name, case in CASES:
+        if wanted in name:
+            with suite.case(name), can_bench.RecordedBench(sys.argv[1]) as bench:
+                case(bench)
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
