@@ -140,7 +140,7 @@ def comes_back_after_a_kill(bench, source):
     for start_mm, rows in bench.setpoints():
         values = [start_mm, *(mm for _, mm in rows)]
         pauses = sum(after - before > 2 * PERIOD_US for (before, _), (after, _) in zip(rows, rows[1:]))
-        assert pauses >= STARTS - 1, f"{pauses} pauses"
+        assert pauses == STARTS - 1, f"{pauses} pauses, {STARTS - 1} of them for a restart"
         assert max(abs(after - before) for before, after in zip(values, values[1:])) <= most_mm
         for index, ((before_us, before), (after_us, after)) in enumerate(zip(rows, rows[1:])):
             if after_us - before_us > 2 * PERIOD_US:
