@@ -10,6 +10,7 @@
 
 #include "config.h"
 #include "dbc.h"
+#include "doctor.h"
 #include "heave/gateway.h"
 #include "live.h"
 #include "options.h"
@@ -65,6 +66,8 @@ static int run(const options_t *options, const config_t *config)
     case MODE_CHECK:
         (void)config_check_report(config, sizeof(gateway_t), stdout);
         return end_stdout(EXIT_DONE);
+    case MODE_DOCTOR:
+        return end_stdout(doctor_run(config, stdout) ? EXIT_DONE : EXIT_REFUSED);
     case MODE_DUMP_CONFIG:
         config_dump(config, stdout);
         return end_stdout(EXIT_DONE);

@@ -12,6 +12,7 @@
 enum {
     OPTION_CONFIG = 1,
     OPTION_CHECK,
+    OPTION_DOCTOR,
     OPTION_DUMP,
     OPTION_DUMP_DBC,
     OPTION_PLAY,
@@ -27,6 +28,7 @@ const char options_help[] =
     "\n"
     "  heaved --config FILE [--socket PATH] [--record FRAMES] [--trace OUT]   run\n"
     "  heaved --config FILE --check                      validate, and print what follows from it\n"
+    "  heaved --config FILE --doctor                     look at machine, CAN interface and drives: what is wrong, what helps\n"
     "  heaved --config FILE --dump-config                every key with its value, unit, range and help\n"
     "  heaved --config FILE --dump-dbc                   the frames of [can-raw] as a DBC file\n"
     "  heaved --config FILE --play FRAMES [--trace OUT]  offline: simulated time and devices\n"
@@ -39,21 +41,16 @@ const char options_help[] =
     "  --help, --version\n"
     "\n"
     "SIGTERM or Ctrl-C settles the platform, switches the drives off and ends; a second one ends at once.\n"
-    "Exit codes: 0 done, 1 ended by a second signal, 64 usage, 65 bad FRAMES, 66 no input, 69 port or socket in use or device\n"
-    "missing, 73 output cannot be created, 74 output cannot be written, 78 configuration.\n";
+    "Exit codes: 0 done, 1 ended by a second signal or --doctor found something wrong, 64 usage, 65 bad FRAMES, 66 no input,\n"
+    "69 port or socket in use or device missing, 73 output cannot be created, 74 output cannot be written, 78 configuration.\n";
 
 static const struct option k_options[] = {
-    {"config", required_argument, NULL, OPTION_CONFIG},
-    {"check", no_argument, NULL, OPTION_CHECK},
-    {"dump-config", no_argument, NULL, OPTION_DUMP},
-    {"dump-dbc", no_argument, NULL, OPTION_DUMP_DBC},
-    {"play", required_argument, NULL, OPTION_PLAY},
-    {"trace", required_argument, NULL, OPTION_TRACE},
-    {"record", required_argument, NULL, OPTION_RECORD},
-    {"socket", required_argument, NULL, OPTION_SOCKET},
-    {"help", no_argument, NULL, OPTION_HELP},
-    {"version", no_argument, NULL, OPTION_VERSION},
-    {NULL, 0, NULL, 0},
+    {"config", required_argument, NULL, OPTION_CONFIG}, {"check", no_argument, NULL, OPTION_CHECK},
+    {"doctor", no_argument, NULL, OPTION_DOCTOR},       {"dump-config", no_argument, NULL, OPTION_DUMP},
+    {"dump-dbc", no_argument, NULL, OPTION_DUMP_DBC},   {"play", required_argument, NULL, OPTION_PLAY},
+    {"trace", required_argument, NULL, OPTION_TRACE},   {"record", required_argument, NULL, OPTION_RECORD},
+    {"socket", required_argument, NULL, OPTION_SOCKET}, {"help", no_argument, NULL, OPTION_HELP},
+    {"version", no_argument, NULL, OPTION_VERSION},     {NULL, 0, NULL, 0},
 };
 
 /* Sets the mode; two different ones contradict each other. */
@@ -66,7 +63,8 @@ static bool set_mode(options_t *self, run_mode_t mode)
 
 static const char *take_option(options_t *self, int option)
 {
-    static const char k_one_mode[] = "only one of --check, --dump-config, --dump-dbc, --play, --help, --version at a time";
+    static const char k_one_mode[] =
+        "only one of --check, --doctor, --dump-config, --dump-dbc, --play, --help, --version at a time";
     bool is_free = true;
     switch (option) {
     case OPTION_CONFIG:
@@ -74,6 +72,9 @@ static const char *take_option(options_t *self, int option)
         break;
     case OPTION_CHECK:
         is_free = set_mode(self, MODE_CHECK);
+        break;
+    case OPTION_DOCTOR:
+        is_free = set_mode(self, MODE_DOCTOR);
         break;
     case OPTION_DUMP:
         is_free = set_mode(self, MODE_DUMP_CONFIG);

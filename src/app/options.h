@@ -7,7 +7,16 @@
 #include <stdbool.h>
 
 /** What to do. */
-typedef enum { MODE_RUN, MODE_CHECK, MODE_DUMP_CONFIG, MODE_DUMP_DBC, MODE_PLAY, MODE_HELP, MODE_VERSION } run_mode_t;
+typedef enum {
+    MODE_RUN,
+    MODE_CHECK,
+    MODE_DOCTOR,
+    MODE_DUMP_CONFIG,
+    MODE_DUMP_DBC,
+    MODE_PLAY,
+    MODE_HELP,
+    MODE_VERSION
+} run_mode_t;
 
 /** A command line; texts point into argv, NULL where an option is not there. */
 typedef struct {

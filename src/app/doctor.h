@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT
+ * doctor.h - heaved --doctor: looks at the machine, the CAN interface and the drives of a stopped daemon, and names each problem
+ * with what helps. Changes nothing: it reads objects, sends the position query of [can-raw], and listens.
+ */
+#ifndef HEAVE_APP_DOCTOR_H
+#define HEAVE_APP_DOCTOR_H
+
+#include <stdio.h>
+
+#include "config.h"
+
+/** Looks and prints. Takes some seconds.
+ *  @return true where nothing is wrong */
+bool doctor_run(const config_t *config, FILE *out);
+
+#endif

@@ -1,0 +1,223 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_doctor.py BIN - heaved --doctor on simulated drives, one fault at a time, on vcan, on virtual time. Runs inside kernel.py."""
+import re
+import socket
+import subprocess
+import sys
+
+import can
+import can_bench
+import heave
+import tap
+from test_can import can_config
+
+RAW_PRESET = heave.TOP / "config/can-raw-hexapod.ini"
+RAW_PEER = heave.TOP / "tests/peers/raw_drives.py"
+
+
+def link(*arguments):
+    subprocess.run(["ip", "link", "set", "vcan0", *arguments], check=True)
+
+
+def doctor(bench, config, code, *expected):
+    """Findings of a run: (level, text with its remedy). Each expected text is in exactly one of the bad ones, and no other FAIL is there."""
+    result = bench.heaved("--config", config, "--doctor")
+    assert result.returncode == code, f"{result.returncode}\n{result.stdout}{result.stderr}"
+    *lines, total = result.stdout.rstrip("\n").split("\n")
+    rows = re.findall(r"^(ok|warn|FAIL)\s+(.*)$", re.sub(r"\n +->", " ->", "\n".join(lines)), re.MULTILINE)
+    count = {level: sum(row[0] == level for row in rows) for level in ("ok", "warn", "FAIL")}
+    assert total == f"{count['ok']} ok, {count['warn']} to look at, {count['FAIL']} wrong", total
+    assert all(" -> " in text for level, text in rows if level != "ok"), result.stdout
+    for text in expected:
+        assert sum(text in row for level, row in rows if level != "ok") == 1, f"{text}\n{result.stdout}"
+    fails = [text for level, text in rows if level == "FAIL"]
+    assert all(any(text in row for text in expected) for row in fails), result.stdout
+    return rows
+
+
+def with_keys(bench, config, **keys):
+    text = config.read_text(encoding="utf-8")
+    for key, value in keys.items():
+        text = text.replace("[cia402]\n", f"[cia402]\n{key} = {value}\n")
+    return bench.file("changed.ini", text)
+
+
+# --- Cases ---
+
+def sound(bench, config):
+    bench.start_drives()
+    rows = doctor(bench, config, 0)
+    assert sum(level == "ok" and "switch on disabled" in text for level, text in rows) == 7, rows
+    assert all(level == "ok" for level, _ in rows), rows
+
+
+def writes_nothing(bench, config):
+    bench.start_drives()
+    with can.Bus(interface="socketcan", channel="vcan0") as bus:
+        doctor(bench, config, 0)
+        heard = []
+        while (message := bus.recv(0)) is not None:
+            heard.append(message)
+    sent = [message for message in heard if 0x600 <= message.arbitration_id < 0x680]
+    assert len(sent) > 100 and all(message.data[0] == 0x40 for message in sent), "something else than reading"
+    own = {message.arbitration_id for message in heard} - {base + node for base in (0x600, 0x580, 0x700, 0x180, 0x280, 0x80) for node in range(1, 8)}
+    assert not own, own
+
+
+def missing_interface(bench, config):
+    text = config.read_text(encoding="utf-8").replace("interface = vcan0", "interface = can7")
+    doctor(bench, bench.file("other.ini", text), 1, "there is no interface can7", "have not been asked")
+
+
+def no_can_interface(bench, config):
+    text = config.read_text(encoding="utf-8").replace("interface = vcan0", "interface = lo")
+    doctor(bench, bench.file("other.ini", text), 1, "lo is not a CAN interface", "have not been asked")
+
+
+def interface_down(bench, config):
+    link("down")
+    try:
+        doctor(bench, config, 1, "ip link set vcan0 up", "have not been asked")
+    finally:
+        link("up")
+
+
+def short_queue(bench, config):
+    bench.start_drives()
+    link("txqueuelen", "10")
+    try:
+        doctor(bench, config, 0, "txqueuelen is 10, not 16 -> ip link set vcan0 txqueuelen 16")
+    finally:
+        link("txqueuelen", "16")
+
+
+def missing_node(bench, config):
+    bench.start_drives(only={4: {"is_there": False}})
+    doctor(bench, config, 1, "node 4 (drive 4) does not answer")
+
+
+def no_drive_at_all(bench, config):
+    doctor(bench, config, 1, *(f"node {node} (drive {node}) does not answer" for node in range(1, 8)))
+
+
+def wrong_identity(bench, config):
+    bench.start_drives(only={2: {"identity": [0x9A, 0x402, 1, 1]}})
+    doctor(bench, with_keys(bench, config, vendor_id=0x2E5), 1, "node 2: vendor_id is 154 (0x9A), configured 741")
+
+
+def not_402(bench, config):
+    bench.start_drives(only={5: {"defaults": {"1000": 0x00020191}}})
+    doctor(bench, config, 1, "node 5 is no CiA 402 drive (1000h = 0x20191)")
+
+
+def missing_watchdog(bench, config):
+    bench.start_drives(only={6: {"missing_objects": ["6007"]}})
+    doctor(bench, config, 1, "node 6 has no watchdog 6007h")
+    doctor(bench, with_keys(bench, config, allow_no_watchdog="yes"), 0, "node 6 has no watchdog 6007h")
+
+
+def watchdogs_off(bench, config):
+    bench.start_drives(only={1: {"defaults": {"6007": 0, "605A": 0}}})
+    rows = doctor(bench, config, 0)
+    assert any("node 1: watchdogs off until heaved sets them" in text and "6007h 605Ah" in text for level, text in rows), rows
+
+
+def no_such_mode(bench, config):
+    bench.start_drives(only={3: {"defaults": {"6502": 0x61}}})
+    doctor(bench, config, 1, "node 3 does not have mode csp (6502h = 0x61) -> [cia402] mode = ip")
+
+
+def no_mapping(bench, config):
+    bench.start_drives(only={3: {"refuse": {"1A00:0": 0x06020000}}})
+    doctor(bench, config, 1, "node 3: 1A00h cannot be read: there is no such object")
+
+
+def drive_in_fault(bench, config):
+    bench.start_drives(plan=[{"at": 0.4, "drive": 7, "do": "fault", "code": 0x2310}])
+    doctor(bench, config, 1, "node 7 is in fault, 603Fh = 2310h: continuous over-current")
+
+
+def two_drives_with_one_number(bench, config):
+    bench.start_drives(only={2: {"node": 1, "identity": [0x2E5, 0x402, 0x10000, 2]}})
+    doctor(bench, config, 1, "two drives have this number", "node 2 (drive 2) does not answer")
+
+
+def another_master(bench, config):
+    bench.start_drives()
+    with can.Bus(interface="socketcan", channel="vcan0") as bus:
+        sync = bus.send_periodic(can.Message(arbitration_id=0x80, data=b"", is_extended_id=False), 0.01)
+        doctor(bench, config, 1, "another master")
+        sync.stop()
+
+
+def unknown_node(bench, config):
+    bench.start_drives()
+    with can.Bus(interface="socketcan", channel="vcan0") as bus:
+        beat = bus.send_periodic(can.Message(arbitration_id=0x70C, data=b"\x7f", is_extended_id=False), 0.1)
+        doctor(bench, config, 0, "node 12 is on the bus and not in [cia402] nodes")
+        beat.stop()
+
+
+def port_in_use(bench, config):
+    bench.start_drives()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", bench.port))
+        doctor(bench, config, 1, "ss -ulpn")
+
+
+def running_daemon(bench, config):
+    bench.start_drives()
+    daemon = bench.start(config=config)
+    result = bench.heaved("--config", config, "--doctor")
+    assert result.returncode == 1 and "heaved is running" in result.stdout and "heavectl status" in result.stdout, result.stdout
+    assert bench.stop(daemon) == 0
+
+
+def raw_drives(bench, _config):
+    text = RAW_PRESET.read_text(encoding="utf-8").replace("interface = can0", "interface = vcan0").replace("port = 9800", f"port = {bench.port}")
+    config = bench.file("raw.ini", f"{text}\n[control]\nsocket = {bench.socket}\n")
+    drives = subprocess.Popen([sys.executable, RAW_PEER, bench.folder / "raw.log", *["10000"] * 5], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    assert drives.stdout.readline() == "ready\n"
+    rows = doctor(bench, config, 1, "drive 6: nothing with identifier 586h")
+    assert [text for level, text in rows if "answers with" in text] == [f"drive {k + 1} answers with identifier {0x581 + k:X}h" for k in range(5)], rows
+    drives.stdin.close()
+    assert drives.wait(timeout=heave.WAIT_S) == 0
+    drives.stdout.close()
+
+
+CASES = [
+    ("sound drives: nothing is wrong", sound),
+    ("reads, and sends nothing else", writes_nothing),
+    ("an interface that is not there", missing_interface),
+    ("an interface of another kind", no_can_interface),
+    ("an interface that is down", interface_down),
+    ("a queue of another length", short_queue),
+    ("a node that does not answer", missing_node),
+    ("no drive at all", no_drive_at_all),
+    ("a drive of another maker", wrong_identity),
+    ("a node that is no CiA 402 drive", not_402),
+    ("a drive without a watchdog", missing_watchdog),
+    ("a drive whose watchdogs are off", watchdogs_off),
+    ("a drive without the mode", no_such_mode),
+    ("a drive without mapping", no_mapping),
+    ("a drive in fault", drive_in_fault),
+    ("two drives with one number", two_drives_with_one_number),
+    ("another master on the bus", another_master),
+    ("a node that nobody has configured", unknown_node),
+    ("a UDP port in use", port_in_use),
+    ("a daemon that runs", running_daemon),
+    ("drives with frames of their own, one of them missing", raw_drives),
+]
+
+
+def main():
+    suite = tap.Suite()
+    for name, case in CASES:
+        with suite.case(name), can_bench.CanBench(sys.argv[1]) as bench:
+            case(bench, can_config(bench))
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
