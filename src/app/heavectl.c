@@ -238,13 +238,27 @@ static void show_answer(const ctl_t *self, const cJSON *answer)
     }
 }
 
+/* True where a request that brings the platform up has ended in FAULT or ESTOP at once: a script has to see that. */
+static bool has_failed(const ctl_t *self, const cJSON *answer)
+{
+    const cJSON *state = cJSON_GetObjectItemCaseSensitive(answer, "state");
+    const bool is_up =
+        strcmp(self->command, "engage") == 0 || strcmp(self->command, "resume") == 0 || strcmp(self->command, "park") == 0;
+    return is_up && cJSON_IsString(state) &&
+           (strcmp(state->valuestring, "FAULT") == 0 || strcmp(state->valuestring, "ESTOP") == 0);
+}
+
 static int show(const ctl_t *self, const char *line)
 {
     cJSON *answer = cJSON_Parse(line);
     if (self->is_json) {
         printf("%s\n", line);
     }
-    const int code = judge(answer);
+    int code = judge(answer);
+    if (code == EXIT_DONE && has_failed(self, answer)) {
+        code = complain(EXIT_REFUSED, "%s: the platform is in %s; heavectl status says why", self->command,
+                        cJSON_GetObjectItemCaseSensitive(answer, "state")->valuestring);
+    }
     if (code == EXIT_DONE && !self->is_json) {
         show_answer(self, answer);
     }

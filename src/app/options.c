@@ -42,7 +42,7 @@ const char options_help[] =
     "\n"
     "SIGTERM or Ctrl-C settles the platform, switches the drives off and ends; a second one ends at once.\n"
     "Exit codes: 0 done, 1 ended by a second signal or --doctor found something wrong, 64 usage, 65 bad FRAMES, 66 no input,\n"
-    "69 port or socket in use or device missing, 73 output cannot be created, 74 output cannot be written, 78 configuration.\n";
+    "69 port or socket in use, 73 output cannot be created, 74 output cannot be written, 78 configuration.\n";
 
 static const struct option k_options[] = {
     {"config", required_argument, NULL, OPTION_CONFIG}, {"check", no_argument, NULL, OPTION_CHECK},
