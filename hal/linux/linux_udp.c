@@ -89,11 +89,26 @@ static hv_status_t udp_dropped(void *ctx, uint32_t *datagrams)
     return HV_OK;
 }
 
+/* What helps, where that is known. */
+static const char *remedy(int error)
+{
+    switch (error) {
+    case EADDRINUSE:
+        return "; another program receives there: end it (`ss -lunp` names it), or set another [udp] port";
+    case EADDRNOTAVAIL:
+        return "; no interface of this machine has this address: see `ip address`, or set [udp] bind = 0.0.0.0";
+    case EACCES:
+        return "; ports below 1024 take root: set [udp] port to 1024 or more";
+    default:
+        return "";
+    }
+}
+
 static hv_status_t fail(linux_udp_t *self, const linux_udp_config_t *config, const char *what)
 {
     self->error = errno;
-    (void)snprintf(self->error_text, sizeof self->error_text, "udp: %s %s port %u: %s", what, config->bind,
-                   (unsigned)config->port, strerror(self->error));
+    (void)snprintf(self->error_text, sizeof self->error_text, "udp: %s %s port %u: %s%s", what, config->bind,
+                   (unsigned)config->port, strerror(self->error), remedy(self->error));
     linux_udp_close(self);
     return HV_ERR_IO;
 }

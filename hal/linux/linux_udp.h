@@ -22,7 +22,7 @@ typedef struct {
     int receive_buffer; /**< bytes granted by the kernel */
     uint32_t dropped;
     int error;            /**< errno of the last failure, 0 = none; getaddrinfo's negative code where the address is wrong */
-    char error_text[160]; /**< of a failed open: what, where, why; empty otherwise */
+    char error_text[256]; /**< of a failed open: what, where, why, what helps where that is known; empty otherwise */
 } linux_udp_t;
 
 /** Opens and binds. May block for milliseconds and allocate: before the loop starts.

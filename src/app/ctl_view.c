@@ -79,12 +79,16 @@ static void end_line(view_t *self)
     self->columns = 0;
 }
 
-/* Adds a member's words in the language of the view; what a line does not hold goes on in the next one. */
-static void put_words(view_t *self, const cJSON *object, const char *name)
+/* Goes on in the next line, under what stands behind a label. */
+static void wrap(view_t *self)
 {
-    char chinese[32];
-    (void)snprintf(chinese, sizeof chinese, "%s_zh", name);
-    const char *text = word(object, self->style->is_chinese && self->style->is_utf8 ? chinese : name);
+    end_line(self);
+    put(self, "         ");
+}
+
+/* Adds words; what a line does not hold goes on in the next one. */
+static void put_text(view_t *self, const char *text)
+{
     while (*text != '\0') {
         char glyph[5] = {0};
         size_t length = 0;
@@ -92,12 +96,33 @@ static void put_words(view_t *self, const cJSON *object, const char *name)
             glyph[length++] = *text++;
         } while (length < 4 && ((unsigned char)*text & 0xC0u) == 0x80u);
         if (self->columns + 2 > self->style->columns) {
-            end_line(self);
-            put(self, "         ");
+            wrap(self);
         }
         put_column(self, glyph);
         self->columns += length > 2 ? 1u : 0u; /* Chinese characters are two columns wide */
     }
+}
+
+/* Adds a member's words in the language of the view. */
+static void put_words(view_t *self, const cJSON *object, const char *name)
+{
+    char chinese[32];
+    (void)snprintf(chinese, sizeof chinese, "%s_zh", name);
+    put_text(self, word(object, self->style->is_chinese && self->style->is_utf8 ? chinese : name));
+}
+
+/* Adds what belongs together, in the next line where this one does not hold it. */
+static __attribute__((format(printf, 2, 3))) void put_piece(view_t *self, const char *format, ...)
+{
+    char piece[LINE_COLUMNS_MAX];
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(piece, sizeof piece, format, arguments);
+    va_end(arguments);
+    if (self->columns + strlen(piece) > self->style->columns) {
+        wrap(self);
+    }
+    put_text(self, piece);
 }
 
 /* --- Parts of the table --- */
@@ -109,7 +134,7 @@ static void draw_head(view_t *self, const cJSON *status)
         cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
         cJSON_IsTrue(member(status, "estop_active")) ? " E-STOP" : "",
         cJSON_IsTrue(member(status, "shutting_down")) ? " SHUTTING DOWN" : "");
-    put(self, "  cycle %.0f us  up %.0f s  late %.0f", number(status, "cycle_us"), up_s, number(status, "late_cycles"));
+    put_piece(self, "  cycle %.0f us  up %.0f s  late %.0f", number(status, "cycle_us"), up_s, number(status, "late_cycles"));
     end_line(self);
 }
 
@@ -171,15 +196,15 @@ static void draw_report(view_t *self, const cJSON *report, const char *drive)
     }
     put(self, "   node %.0f: %s", number(report, "node"), word(report, "phase"));
     if (number(report, "object") > 0.0) {
-        put(self, ", object %04X:%02X", (unsigned)number(report, "object"), (unsigned)number(report, "sub_index"));
+        put_piece(self, ", object %04X:%02X", (unsigned)number(report, "object"), (unsigned)number(report, "sub_index"));
     }
     if (number(report, "code") > 0.0) {
-        put(self, "; %s (0x%04X)", word(report, "trouble"), (unsigned)number(report, "code"));
+        put_piece(self, "; %s (0x%04X)", word(report, "trouble"), (unsigned)number(report, "code"));
     }
     if (word(report, "detail")[0] != '\0') {
-        put(self, "; %s (0x%04X)", word(report, "detail"), (unsigned)number(report, "detail_code"));
+        put_piece(self, "; %s (0x%04X)", word(report, "detail"), (unsigned)number(report, "detail_code"));
     }
-    put(self, ", %.1f s", number(report, "age_ms") / 1000.0);
+    put_piece(self, ", %.1f s", number(report, "age_ms") / 1000.0);
     end_line(self);
 }
 
@@ -191,6 +216,16 @@ static void draw_drive(view_t *self, const cJSON *axis)
     draw_report(self, member(axis, "report"), drive);
 }
 
+/* A drive that has told no position is nowhere, not at 0. */
+static void draw_actual(view_t *self, const cJSON *axis, const char *name)
+{
+    if (cJSON_IsNumber(member(axis, name))) {
+        put(self, " %9.3f", number(axis, name));
+    } else {
+        put(self, " %9s", "-");
+    }
+}
+
 static void draw_cylinders(view_t *self, const cJSON *status)
 {
     const cJSON *cylinder = NULL;
@@ -199,17 +234,35 @@ static void draw_cylinders(view_t *self, const cJSON *status)
     cJSON_ArrayForEach(cylinder, member(status, "cylinders"))
     {
         const double sent = number(cylinder, "sent_mm");
-        const double actual = number(cylinder, "actual_mm");
+        const double actual = cJSON_IsNumber(member(cylinder, "actual_mm")) ? number(cylinder, "actual_mm") : sent;
         put(self, " %.0f ", number(cylinder, "number"));
         draw_bar(self, sent, actual, number(cylinder, "stroke_mm"));
-        put(self, " %9.3f %9.3f", sent, actual);
+        put(self, " %9.3f", sent);
+        draw_actual(self, cylinder, "actual_mm");
         draw_drive(self, cylinder);
     }
     const cJSON *rotation = member(status, "rotation");
     if (cJSON_IsObject(rotation)) {
-        put(self, "rotation motor %.3f deg, actual %.3f", number(rotation, "sent_deg"), number(rotation, "actual_deg"));
+        put(self, "rotation motor %.3f deg, actual", number(rotation, "sent_deg"));
+        draw_actual(self, rotation, "actual_deg");
         draw_drive(self, rotation);
     }
+}
+
+/* What keeps the bus from working, or did last. */
+static void draw_bus(view_t *self, const cJSON *bus)
+{
+    const char *now = word(bus, "trouble");
+    const char *before = word(bus, "last_trouble");
+    if (!cJSON_IsObject(bus)) {
+        return;
+    }
+    put(self, "bus      ");
+    put_piece(self, "%s", now[0] != '\0' ? now : "works");
+    if (now[0] == '\0' && before[0] != '\0') {
+        put_piece(self, "; last trouble: %s", before);
+    }
+    end_line(self);
 }
 
 static bool is_on(const cJSON *relays, unsigned relay)
@@ -251,7 +304,7 @@ static void draw_counts(view_t *self, const char *label, const cJSON *counts)
     cJSON_ArrayForEach(item, counts)
     {
         if (cJSON_IsNumber(item) && item->valuedouble != 0.0) {
-            put(self, "%s%s %.0f", is_any ? ", " : "", item->string, item->valuedouble);
+            put_piece(self, "%s%s %.0f", is_any ? ", " : "", item->string, item->valuedouble);
             is_any = true;
         }
     }
@@ -278,7 +331,7 @@ static void draw_senders(view_t *self, const cJSON *status)
     const cJSON *other = member(status, "other_sender");
     put(self, "sender   %s", cJSON_IsObject(sender) ? word(sender, "address") : "none yet");
     if (cJSON_IsObject(other)) {
-        put(self, "; not followed: %s, %.1f s ago", word(other, "address"), number(other, "age_ms") / 1000.0);
+        put_piece(self, "; not followed: %s, %.1f s ago", word(other, "address"), number(other, "age_ms") / 1000.0);
     }
     end_line(self);
 }
@@ -292,7 +345,7 @@ static void draw_frames(view_t *self, const cJSON *status)
     draw_counts(self, "other", counters);
     put(self, "stream   period %.3f ms, delay %.3f ms", number(stream, "period_ms"), number(stream, "delay_ms"));
     if (cJSON_IsNumber(member(stream, "last_frame_age_ms"))) {
-        put(self, ", last frame %.1f s ago", number(stream, "last_frame_age_ms") / 1000.0);
+        put_piece(self, ", last frame %.1f s ago", number(stream, "last_frame_age_ms") / 1000.0);
     }
     end_line(self);
 }
@@ -324,7 +377,7 @@ static void draw_fault(view_t *self, const cJSON *status)
     put(self, "flags    ");
     cJSON_ArrayForEach(flag, member(status, "flags"))
     {
-        put(self, "%s%s", is_any ? "; " : "", cJSON_IsString(flag) ? flag_words(flag->valuestring) : "?");
+        put_piece(self, "%s%s", is_any ? "; " : "", cJSON_IsString(flag) ? flag_words(flag->valuestring) : "?");
         is_any = true;
     }
     end_line(self);
@@ -336,7 +389,7 @@ static void draw_fault(view_t *self, const cJSON *status)
     if (number(fault, "device_code") > 0.0) {
         put(self, ", device code 0x%04X", (unsigned)number(fault, "device_code"));
         if (word(fault, "device_text")[0] != '\0') {
-            put(self, " (%s)", word(fault, "device_text"));
+            put_piece(self, " (%s)", word(fault, "device_text"));
         }
     }
     end_line(self);
@@ -358,6 +411,7 @@ size_t ctl_view_table(const cJSON *status, const ctl_view_style_t *style, char t
     draw_head(&view, status);
     draw_poses(&view, status);
     draw_cylinders(&view, status);
+    draw_bus(&view, member(status, "bus"));
     draw_relays(&view, status);
     draw_intensity(&view, member(status, "intensity"));
     draw_senders(&view, status);

@@ -20,6 +20,11 @@ static const char k_no_text[] = "nothing after the time; `<t_ms> <text>` or `<t_
 static const char k_bad_escape[] = "unknown escape; \\n \\r \\t \\0 \\xNN \\\\ and \\\" are allowed";
 static const char k_bad_octal[] = "\\0 with a digit after it could be octal; write \\x00, or \\xNN";
 static const char k_too_long[] = "the text is longer than 65507 bytes, more than a datagram holds";
+static const char k_words_behind[] = "there is more on the line than the request takes; a comment has a line of its own";
+static const char k_bad_estop[] = "!estop without its word; on and off are allowed";
+static const char k_bad_intensity[] = "!intensity without its percent; whole numbers from 0 to 100 are allowed";
+static const char k_bad_late[] = "!late without its number of cycles; 0 to 4294967295 is allowed";
+static const char k_bad_from[] = "!from without a numeric address; 192.168.1.20, ::1 and fe80::1%2 show what is allowed";
 static const char k_bad_request[] =
     "unknown request; !engage !hold !resume !park !reset !shutdown, !intensity N (0 to 100), !estop on, !estop off, "
     "!late N and !from ADDRESS are allowed (a datagram that starts with ! is written \\x21)";
@@ -212,37 +217,42 @@ static bool read_count(cursor_t *self, uint32_t limit, uint32_t *out)
     return is_read;
 }
 
-static bool read_request_words(cursor_t *self, frames_line_t *out)
+/* Reads the words behind the exclamation mark.
+ * Returns what is wrong with them, NULL = nothing. */
+static const char *read_request_words(cursor_t *self, frames_line_t *out)
 {
     for (size_t i = 0; i < sizeof k_requests / sizeof k_requests[0]; i++) {
         if (take_word(self, k_requests[i].word)) {
             out->kind = FRAMES_REQUEST;
             out->request = k_requests[i].event;
-            return true;
+            return NULL;
         }
     }
     if (take_word(self, "estop")) {
         out->kind = FRAMES_ESTOP;
         out->number = take_word(self, "on");
-        return out->number == 1 || take_word(self, "off");
+        return out->number == 1 || take_word(self, "off") ? NULL : k_bad_estop;
     }
     if (take_word(self, "intensity")) {
         out->kind = FRAMES_INTENSITY;
-        return read_count(self, PERCENT_MAX, &out->number);
+        return read_count(self, PERCENT_MAX, &out->number) ? NULL : k_bad_intensity;
     }
     if (take_word(self, "late")) {
         out->kind = FRAMES_LATE;
-        return read_count(self, UINT32_MAX, &out->number);
+        return read_count(self, UINT32_MAX, &out->number) ? NULL : k_bad_late;
     }
-    return take_word(self, "from") && read_address(self, out);
+    if (take_word(self, "from")) {
+        return read_address(self, out) ? NULL : k_bad_from;
+    }
+    return k_bad_request;
 }
 
 static const char *read_request(cursor_t *self, frames_line_t *out)
 {
     self->at++;
-    const bool is_known = read_request_words(self, out);
+    const char *why = read_request_words(self, out);
     skip_blanks(self);
-    return is_known && self->at == self->end ? NULL : k_bad_request;
+    return why == NULL && self->at < self->end ? k_words_behind : why;
 }
 
 bool frames_parse_line(char *text, size_t length, frames_line_t *out, bool *is_empty, const char **why)

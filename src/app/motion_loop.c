@@ -91,12 +91,22 @@ static void answer_requests(motion_loop_t *self, motion_result_t *result, unsign
     }
 }
 
+/* The bus' reason, in the words of its backend, which only this thread may read. */
+static void note_bus(motion_view_t *view, const rig_t *rig)
+{
+    (void)snprintf(view->bus_trouble, sizeof view->bus_trouble, "%s", rig_trouble(rig));
+    if (view->bus_trouble[0] != '\0') {
+        memcpy(view->bus_last_trouble, view->bus_trouble, sizeof view->bus_last_trouble);
+    }
+}
+
 static void publish(motion_loop_t *self)
 {
     motion_view_t *view = &self->current.view;
     view->snapshot = *gateway_snapshot(&self->session.gateway);
     view->udp_refused = self->tap.refused;
     (void)!hal_udp_dropped(self->tap.behind, &view->udp_dropped);
+    note_bus(view, &self->rig);
     seqlock_write(&self->view, self->current.word);
 }
 

@@ -23,6 +23,8 @@ typedef struct {
     uint32_t udp_dropped; /**< datagrams the kernel lost because its queue was full */
     bool is_realtime;     /**< scheduled before everything else */
     bool is_shutting_down;
+    char bus_trouble[RIG_TROUBLE_SIZE];      /**< what is wrong with the drives' bus now, "" = nothing */
+    char bus_last_trouble[RIG_TROUBLE_SIZE]; /**< what was last, "" = nothing so far */
 } motion_view_t;
 
 /** How punctual and how long the cycles were. */

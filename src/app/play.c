@@ -75,18 +75,22 @@ static hv_status_t play_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t
     return HV_OK;
 }
 
-static void play_log(void *ctx, hal_log_level_t level, const char *text)
+static void take_note(play_t *self, const char *text)
 {
-    play_t *self = ctx;
-    if (level > HAL_LOG_WARNING) {
-        return;
-    }
     if (self->notes < NOTES) {
         note_t *note = &self->note[self->notes];
         note->t_us = self->session.now_us - self->session.zero_us;
         (void)hal_log_copy(note->text, text);
     }
     self->notes++;
+}
+
+static void play_log(void *ctx, hal_log_level_t level, const char *text)
+{
+    play_t *self = ctx;
+    if (level <= HAL_LOG_WARNING) {
+        take_note(self, text);
+    }
 }
 
 static uint32_t play_log_dropped(void *ctx)
@@ -104,15 +108,26 @@ static gateway_io_t io_of(play_t *self)
 
 /* --- Running --- */
 
+static void note_refused(play_t *self, const frames_line_t *line, hv_status_t status, const char *what)
+{
+    char text[HAL_LOG_TEXT_MAX + 1];
+    if (status != HV_OK) {
+        (void)snprintf(text, sizeof text, "line %" PRIu32 ": %s is refused in %s", line->line, what,
+                       state_name(gateway_snapshot(&self->session.gateway)->state));
+        take_note(self, text);
+        self->refused_requests++;
+    }
+}
+
 static void carry_out(play_t *self, const frames_line_t *line)
 {
     gateway_t *gateway = &self->session.gateway;
     switch (line->kind) {
     case FRAMES_REQUEST:
-        self->refused_requests += gateway_request(gateway, line->request, self->session.now_us) != HV_OK;
+        note_refused(self, line, gateway_request(gateway, line->request, self->session.now_us), event_name(line->request));
         break;
     case FRAMES_INTENSITY:
-        self->refused_requests += gateway_set_intensity(gateway, line->number) != HV_OK;
+        note_refused(self, line, gateway_set_intensity(gateway, line->number), "intensity beyond [motion] intensity_max_percent");
         break;
     case FRAMES_ESTOP:
         sim_inputs_set(&self->rig.sim_inputs, INPUT_ESTOP, line->number != 0);

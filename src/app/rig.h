@@ -13,6 +13,9 @@
 #include "sim_inputs.h"
 #include "sim_relays.h"
 
+/** Longest text of rig_trouble(), with its end. */
+#define RIG_TROUBLE_SIZE 160u
+
 /** The devices. What is not in use stays zero. sim_inputs is for offline runs, which press its e-stop. */
 typedef struct {
     sim_drive_config_t sim_axis[DRIVES_MAX];
@@ -32,7 +35,7 @@ typedef struct {
  *          take its figures; HV_ERR_IO where one is not there at all. rig_trouble() says what is wrong. */
 hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io) HV_MUST_CHECK;
 
-/** What is wrong with a device of an open rig, or with the one that could not be opened.
+/** What is wrong with a device of an open rig, or with the one that could not be opened. The thread that runs the drives.
  *  @return "" where nothing is */
 const char *rig_trouble(const rig_t *self);
 

@@ -183,6 +183,19 @@ static void write_flags(json_t *json, const snapshot_t *s)
     json_number(json, "limiting_cylinder", s->limiting_cylinder);
 }
 
+/* The drives' bus; null where there is none. */
+static void write_bus(json_t *json, const motion_view_t *view, const config_t *config)
+{
+    if (config->drives == CONFIG_DRIVES_SIM) {
+        json_null(json, "bus");
+        return;
+    }
+    json_open(json, "bus", '{');
+    json_text(json, "trouble", view->bus_trouble);
+    json_text(json, "last_trouble", view->bus_last_trouble);
+    json_close(json, '}');
+}
+
 static void write_intensity(json_t *json, const snapshot_t *s, const config_t *config)
 {
     json_open(json, "intensity", '{');
@@ -298,6 +311,7 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     write_state(json, s, view->is_shutting_down);
     write_poses(json, s);
     write_axes(json, s, config);
+    write_bus(json, view, config);
     write_relays(json, s);
     write_intensity(json, s, config);
     write_flags(json, s);

@@ -82,6 +82,20 @@ def plain_answers_are_lines(bench):
     assert bench.stop(daemon) == 0
 
 
+def a_bus_that_does_not_work_says_why(bench):
+    text = (heave.TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8").replace("can0", "nosuch0").replace("port = 9800", f"port = {bench.port}")
+    text += f"\n[control]\nsocket = {bench.socket}\n"
+    daemon = bench.start(config=bench.file("bus.ini", text))
+    bus = heave.wait_for(lambda: bench.status()["bus"], "the bus is in the status")
+    assert bus["trouble"].startswith("can: nosuch0: ") and bus["trouble"] == bus["last_trouble"], bus
+    assert all(cylinder["actual_mm"] is None for cylinder in bench.status()["cylinders"])
+    table = bench.ctl("status", env={**os.environ, "LC_ALL": "C"}).stdout
+    assert all(len(line) <= 80 for line in table.splitlines()), table
+    assert bus["trouble"].replace(" ", "") in re.sub(r"\s", "", table), "words of the bus are cut: " + table
+    assert len(re.findall(r"^ [1-6] .* - offline$", table, re.MULTILINE)) == 6, table
+    assert bench.stop(daemon) == 0
+
+
 def without_a_daemon(bench):
     for command in COMMANDS + ["status", "watch"]:
         run = bench.ctl(command)
@@ -299,7 +313,7 @@ def port_in_use(bench):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", bench.port))
         run = refused(bench)
-    assert run.returncode == 69 and re.fullmatch(rf"heaved: [^\n]*port {bench.port}: Address already in use\n", run.stderr), run
+    assert run.returncode == 69 and re.fullmatch(rf"heaved: [^\n]*port {bench.port}: Address already in use; [^\n]*ss -lunp[^\n]*\n", run.stderr), run
     assert not bench.socket.exists()
 
 
@@ -465,6 +479,7 @@ CASES = {
     "it follows frames and counts them": follows_frames,
     "every command of heavectl has its answer": every_command_answers,
     "answers for people are lines and an 80-column table": plain_answers_are_lines,
+    "a bus that does not work says why in the status": a_bus_that_does_not_work_says_why,
     "heavectl without a daemon, or wrongly called": without_a_daemon,
     "watch, not on a terminal": watches_by_line,
     "watch on a terminal puts it back on Ctrl-C": watches_on_a_terminal,

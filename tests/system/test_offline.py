@@ -149,6 +149,9 @@ def run_manual(suite, bench):
         rows = heave.rows_of(trace)
         assert rows[499]["state"] == "RISING" and rows[500]["state"] == "ESTOP" and "estop" in rows[500]["flags"].split("|")
         assert rows[4099]["state"] == "ESTOP" and rows[4101]["state"] == "OFF"
+    with suite.case("a request that is refused is named, with its line and the state"):
+        run = bench.heaved("--config", manual, "--play", bench.file("refused.txt", "1 !resume\n2 !park\n3 !intensity 100\n"))
+        assert "1 requests refused" in run.stderr and "line 1: resume is refused in SETTLED" in run.stderr, run.stderr
     with suite.case("!late is counted in the flags of its row alone"):
         rows = heave.rows_of(bench.play(bench.file("late.txt", "5 !late 3\n"), config=manual))
         assert [row["t_ms"] for row in rows if "late" in row["flags"].split("|")] == ["5.000"]

@@ -141,11 +141,10 @@ static void test_frames_parse_line_intensity(void)
     TEST_ASSERT_TRUE(parse("1 !intensity 50"));
     TEST_ASSERT_EQUAL_INT(FRAMES_INTENSITY, m_line.kind);
     TEST_ASSERT_EQUAL_UINT32(50, m_line.number);
-    TEST_ASSERT_FALSE(parse("1 !intensity"));
-    TEST_ASSERT_FALSE(parse("1 !intensity -1"));
-    TEST_ASSERT_FALSE(parse("1 !intensity 50 %"));
-    TEST_ASSERT_FALSE(parse("1 !intensity 1000"));
-    TEST_ASSERT_NOT_NULL(strstr(m_why, "!intensity N"));
+    expect_wrong("1 !intensity", "!intensity without its percent");
+    expect_wrong("1 !intensity -1", "!intensity without its percent");
+    expect_wrong("1 !intensity 1000", "!intensity without its percent");
+    expect_wrong("1 !intensity 50 %", "more on the line");
 }
 
 static void test_frames_parse_line_estop_and_late(void)
@@ -192,11 +191,24 @@ static void test_frames_parse_line_bad_text_is_refused(void)
 
 static void test_frames_parse_line_bad_request_is_refused(void)
 {
-    static const char *const k_lines[] = {"1 !",        "1 !Engage",  "1 !engage now",      "1 !engaged",
-                                          "1 ! engage", "1 !estop",   "1 !estop maybe",     "1 !estop on off",
-                                          "1 !late",    "1 !late -1", "1 !late 4294967296", "1 !late 1x"};
-    for (size_t i = 0; i < sizeof k_lines / sizeof k_lines[0]; i++) {
-        expect_wrong(k_lines[i], "unknown request");
+    static const struct {
+        const char *line, *why;
+    } k_wrong[] = {{"1 !", "unknown request; !engage"},
+                   {"1 !Engage", "unknown request"},
+                   {"1 !engaged", "unknown request"},
+                   {"1 ! engage", "unknown request"},
+                   {"1 !engage now", "more on the line"},
+                   {"1 !estop", "!estop without"},
+                   {"1 !estop maybe", "!estop without"},
+                   {"1 !estop on off", "more on the line"},
+                   {"1 !late", "!late without"},
+                   {"1 !late -1", "!late without"},
+                   {"1 !late 4294967296", "!late without"},
+                   {"1 !late 1x", "more on the line"},
+                   {"1 !from", "!from without a numeric address"},
+                   {"1 !from somewhere", "!from without a numeric address"}};
+    for (size_t i = 0; i < sizeof k_wrong / sizeof k_wrong[0]; i++) {
+        expect_wrong(k_wrong[i].line, k_wrong[i].why);
     }
 }
 
