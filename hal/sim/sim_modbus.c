@@ -5,41 +5,6 @@
 
 #include <string.h>
 
-/** What a function code does. */
-typedef struct {
-    modbus_function_t function;
-    bool is_write;
-    uint8_t count_max;
-} function_row_t;
-
-static const function_row_t k_functions[] = {
-    {MODBUS_READ_COILS, false, HAL_MODBUS_VALUES_MAX},
-    {MODBUS_READ_DISCRETE_INPUTS, false, HAL_MODBUS_VALUES_MAX},
-    {MODBUS_READ_HOLDING, false, HAL_MODBUS_VALUES_MAX},
-    {MODBUS_READ_INPUT, false, HAL_MODBUS_VALUES_MAX},
-    {MODBUS_WRITE_COIL, true, 1},
-    {MODBUS_WRITE_REGISTER, true, 1},
-    {MODBUS_WRITE_COILS, true, HAL_MODBUS_VALUES_MAX},
-    {MODBUS_WRITE_REGISTERS, true, HAL_MODBUS_VALUES_MAX},
-};
-
-static const function_row_t *find_function(modbus_function_t function)
-{
-    for (size_t i = 0; i < sizeof k_functions / sizeof k_functions[0]; i++) {
-        if (k_functions[i].function == function) {
-            return &k_functions[i];
-        }
-    }
-    return NULL;
-}
-
-static bool is_request_valid(const modbus_request_t *request)
-{
-    const function_row_t *row = find_function(request->function);
-    return row != NULL && request->count >= 1 && request->count <= row->count_max &&
-           (request->unit <= 247 || request->unit == 255) && (request->unit != HAL_MODBUS_BROADCAST || row->is_write);
-}
-
 /* Reads or writes one register or coil. */
 static void access_value(sim_modbus_device_t *device, modbus_function_t function, size_t address, uint16_t sent, uint16_t *got)
 {
@@ -76,7 +41,7 @@ static void serve(sim_modbus_device_t *device, const modbus_request_t *request, 
         return;
     }
     result->status = HV_OK;
-    result->count = find_function(request->function)->is_write ? 0 : request->count;
+    result->count = modbus_is_write(request->function) ? 0 : request->count;
     for (size_t i = 0; i < request->count; i++) {
         access_value(device, request->function, request->address + i, request->value[i], &result->value[i]);
     }
@@ -175,7 +140,7 @@ static void finish(sim_modbus_t *self)
 static hv_status_t modbus_submit(void *ctx, unsigned slot, const modbus_request_t *request)
 {
     sim_modbus_t *self = ctx;
-    if (slot >= HAL_MODBUS_SLOTS || !is_request_valid(request)) {
+    if (slot >= HAL_MODBUS_SLOTS || !modbus_is_valid(request)) {
         return HV_ERR_ARG;
     }
     self->replaced += self->slot[slot].is_waiting;

@@ -4,7 +4,10 @@
 #include "contract.h"
 
 #include <string.h>
+#include <time.h>
 
+#include "linux_modbus.h"
+#include "modbus_server.h"
 #include "sim_modbus.h"
 
 /** Kinds of values a device has. */
@@ -84,7 +87,68 @@ static uint16_t get_sim(uint8_t unit, bank_t bank, uint16_t address)
     return values[bank];
 }
 
-static const fixture_t k_fixtures[] = {{"sim", open_sim, close_sim, settle_sim, set_sim, get_sim}};
+/* The backend of Linux, against a server made from libmodbus' other side. Generous times, so that a busy machine changes nothing.
+ */
+#define TIMEOUT_US 900000u
+#define LIMIT_S    60
+
+static linux_modbus_t line;
+static modbus_server_t server;
+
+static hal_modbus_t open_linux(const linux_modbus_config_t *config)
+{
+    if (linux_modbus_open(&line, config) != HV_OK) {
+        TEST_FAIL_MESSAGE(linux_modbus_text(&line));
+    }
+    return linux_modbus_hal(&line);
+}
+
+static void settle_linux(void)
+{
+    linux_modbus_status_t status;
+    const time_t limit = time(NULL) + LIMIT_S;
+    do {
+        static const struct timespec k_pause = {.tv_nsec = 200000};
+        (void)nanosleep(&k_pause, NULL);
+        linux_modbus_status(&line, &status);
+        TEST_ASSERT_TRUE_MESSAGE(time(NULL) < limit, "the worker does not come to an end");
+    } while (status.waiting != 0 || status.count.transactions != modbus_server_frames(&server));
+}
+
+static void close_linux(void)
+{
+    linux_modbus_close(&line);
+    modbus_server_stop(&server);
+}
+
+static hal_modbus_t open_tcp(void)
+{
+    TEST_ASSERT_TRUE(modbus_server_start_tcp(&server));
+    return open_linux(&(linux_modbus_config_t){.host = "127.0.0.1", .port = server.port, .timeout_us = TIMEOUT_US});
+}
+
+static hal_modbus_t open_serial(void)
+{
+    TEST_ASSERT_TRUE(modbus_server_start_serial(&server, 0));
+    return open_linux(&(linux_modbus_config_t){
+        .device = server.path, .baud_bps = 115200, .parity = 'N', .stop_bits = 1, .timeout_us = TIMEOUT_US});
+}
+
+static void set_server(uint8_t unit, bank_t bank, uint16_t address, uint16_t value)
+{
+    modbus_server_set(&server, unit, (modbus_server_bank_t)bank, address, value);
+}
+
+static uint16_t get_server(uint8_t unit, bank_t bank, uint16_t address)
+{
+    return modbus_server_get(&server, unit, (modbus_server_bank_t)bank, address);
+}
+
+static const fixture_t k_fixtures[] = {
+    {"sim", open_sim, close_sim, settle_sim, set_sim, get_sim},
+    {"linux tcp", open_tcp, close_linux, settle_linux, set_server, get_server},
+    {"linux serial", open_serial, close_linux, settle_linux, set_server, get_server},
+};
 
 void setUp(void)
 {

@@ -9,10 +9,11 @@
 set -u
 
 arch=${1:?usage: foreign.sh ARCHITECTURE}
-packages=(libinih-dev libinih1 libcjson-dev libcjson1 libmnl-dev libmnl0)
+packages=(libinih-dev libinih1 libcjson-dev libcjson1 libmnl-dev libmnl0 libmodbus-dev libmodbus5)
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/heave
 release=$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-release 2>/dev/null)
-root=$cache/foreign-${release:-unknown}-$arch
+wanted=$(sha256sum <<<"${packages[*]}" | cut -c 1-8) # a change of the list makes another root
+root=$cache/foreign-${release:-unknown}-$arch-$wanted
 
 say() { printf 'foreign: %s\n' "$*" >&2; }
 

@@ -39,6 +39,23 @@ typedef struct {
     uint16_t value[HAL_MODBUS_VALUES_MAX]; /**< writes: registers, or coils as 0 / 1 */
 } modbus_request_t;
 
+/** True for the functions that write. */
+static inline bool modbus_is_write(modbus_function_t function)
+{
+    return function == MODBUS_WRITE_COIL || function == MODBUS_WRITE_REGISTER || function == MODBUS_WRITE_COILS ||
+           function == MODBUS_WRITE_REGISTERS;
+}
+
+/** True for a request that a line can carry: what submit asks of one, but for unit 255, which only TCP has. */
+static inline bool modbus_is_valid(const modbus_request_t *request)
+{
+    const bool is_write = modbus_is_write(request->function);
+    const bool is_read = request->function >= MODBUS_READ_COILS && request->function <= MODBUS_READ_INPUT;
+    const bool is_single = request->function == MODBUS_WRITE_COIL || request->function == MODBUS_WRITE_REGISTER;
+    return (is_read || is_write) && request->count >= 1 && request->count <= (is_single ? 1u : HAL_MODBUS_VALUES_MAX) &&
+           (request->unit <= 247 || request->unit == 255) && (request->unit != HAL_MODBUS_BROADCAST || is_write);
+}
+
 /** What became of it. */
 typedef struct {
     hv_status_t
