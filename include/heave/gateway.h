@@ -13,6 +13,7 @@
 #include "heave/hal/udp.h"
 #include "heave/motion.h"
 #include "heave/owner.h"
+#include "heave/relay_policy.h"
 #include "heave/supervisor.h"
 #include "heave/telemetry.h"
 
@@ -69,6 +70,7 @@ typedef struct {
     uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
     uint64_t state_since_us; /**< when the state was entered */
     uint16_t frame_mask;     /**< what the sender asked of the relays */
+    relay_policy_t relay_policy;
     uint16_t written_mask;
     bool is_mask_written;
     uint64_t other_logged_us;    /**< 0 = never */

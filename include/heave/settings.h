@@ -7,6 +7,7 @@
 
 #include "heave/axes.h"
 #include "heave/frame.h"
+#include "heave/hal/relays.h"
 #include "heave/hal/udp.h"
 #include "heave/kin.h"
 #include "heave/stream.h"
@@ -74,7 +75,9 @@ typedef struct {
 
     uint8_t relay_count; /**< [0, 12] */
     uint16_t relay_safe_mask;
-    uint32_t relay_safe_after_ms; /**< of a hold that interrupted a ride; in every other state at once */
+    uint32_t relay_safe_after_ms;                 /**< of a hold that interrupted a ride; in every other state at once */
+    uint32_t relay_max_on_ms[HAL_RELAYS_MAX];     /**< see relay_policy.h; 0 = none */
+    uint32_t relay_min_toggle_ms[HAL_RELAYS_MAX]; /**< 0 = none */
 } settings_t;
 
 #endif

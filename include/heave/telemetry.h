@@ -38,7 +38,9 @@ typedef struct {
     uint32_t clamped;        /**< cycles that pulled a target in */
     uint32_t stretched;      /**< timed moves that took longer than asked */
     uint32_t relay_missing;  /**< masks that set a relay this platform does not have */
-    uint32_t relay_errors;
+    uint32_t relay_errors;   /**< cycles that could not write the mask */
+    uint32_t relay_cut;      /**< relays opened because they were closed for max_on_ms */
+    uint32_t relay_delayed;  /**< changes of relays that had to wait for min_toggle_ms */
     uint32_t faults;
     uint32_t fault[FAULT_CODES]; /**< of those, by code */
     uint32_t late_cycles;        /**< cycles skipped because the program was late */
@@ -59,6 +61,7 @@ typedef struct {
     bool has_angle;
     uint8_t relay_count;
     uint16_t relay_mask;
+    bool is_relays_unknown; /**< they could not be written, or not be looked at: relay_mask is what they were to be */
     pose_t asked;
     pose_t sent;
     pose_t actual; /**< of the plate, from feedback, valid if has_actual_pose */

@@ -15,6 +15,7 @@
 #define CONFIG_PATH_MAX    108u /**< bytes of a socket path, with its NUL (the size of sun_path) */
 #define CONFIG_NAME_MAX    16u  /**< bytes of the name of a network interface, with its NUL (IFNAMSIZ) */
 #define CONFIG_RELAYS_MAX  12u
+#define CONFIG_LABEL_MAX   32u       /**< bytes of the name of a GPIO line or chip, with its NUL (GPIO_MAX_NAME_SIZE) */
 #define CONFIG_NONE        INT32_MIN /**< a number in whose place the file has a word ("none", "settled") */
 
 /** Where frames come in. */
@@ -139,10 +140,15 @@ typedef struct {
     uint32_t product_code;
 } config_cia402_t;
 
+/** A line, or a chip, as the file names it; "" where it says none. */
+typedef struct {
+    char text[CONFIG_LABEL_MAX];
+} config_label_t;
+
 /** Outputs. The number of lines is the number of relays. */
 typedef struct {
     uint8_t count;
-    uint16_t line[CONFIG_RELAYS_MAX];
+    config_label_t line[CONFIG_RELAYS_MAX];
 } config_lines_t;
 
 /** What switches the relays. */
@@ -158,12 +164,12 @@ typedef struct {
 /** What reads the operator's switches. */
 typedef enum { CONFIG_INPUTS_SIM } config_inputs_driver_t;
 
-/** Switch inputs; a line that is CONFIG_NONE is not there. */
+/** Switch inputs; a line without a name is not there. */
 typedef struct {
     config_inputs_driver_t driver;
-    int32_t estop_line;
-    int32_t enable_line;
-    int32_t reset_line;
+    config_label_t estop_line;
+    config_label_t enable_line;
+    config_label_t reset_line;
 } config_inputs_t;
 
 /** A whole configuration: the core's settings, and what only the hosted program needs. Plain data. */

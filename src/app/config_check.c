@@ -339,11 +339,50 @@ static void check_intensity(config_source_t *self)
     }
 }
 
+static void check_per_relay(config_source_t *self, const char *name)
+{
+    const unsigned given = self->entry[config_key_find("relays", name)].count;
+    const unsigned count = self->config->relays.lines.count;
+    if (config_source_has(self, "relays", name) && given > 1u && given != count) {
+        config_source_key_error(self, "relays", name, "has %u values; allowed: one, or one for each of the %u relays in lines",
+                                given, count);
+    }
+}
+
+/* What each relay may do has to leave it a way to do it. */
+static void check_relay_times(config_source_t *self)
+{
+    const settings_t *settings = settings_of(self);
+    if (!config_source_has_all(self, "relays")) {
+        return;
+    }
+    for (unsigned i = 0; i < settings->relay_count; i++) {
+        const unsigned on_ms = settings->relay_max_on_ms[i];
+        const unsigned toggle_ms = settings->relay_min_toggle_ms[i];
+        if (on_ms != 0 && (settings->relay_safe_mask >> i & 1u) != 0) {
+            config_source_key_error(self, "relays", "max_on_ms", "relay %u is closed by safe_mask; allowed: 0 for it", i + 1u);
+        } else if (on_ms != 0 && on_ms < toggle_ms) {
+            config_source_key_error(self, "relays", "max_on_ms",
+                                    "%u ms is below min_toggle_ms of relay %u; allowed: 0, or at least %u ms", on_ms, i + 1u,
+                                    toggle_ms);
+        }
+    }
+}
+
 static void check_relays(config_source_t *self)
 {
     settings_t *settings = &self->config->settings;
     const unsigned count = self->config->relays.lines.count;
     settings->relay_count = (uint8_t)count;
+    for (unsigned i = count; i < CONFIG_RELAYS_MAX; i++) {
+        settings->relay_max_on_ms[i] = 0;
+        settings->relay_min_toggle_ms[i] = 0;
+    }
+    if (config_source_has(self, "relays", "lines")) {
+        check_per_relay(self, "max_on_ms");
+        check_per_relay(self, "min_toggle_ms");
+        check_relay_times(self);
+    }
     if (config_source_has(self, "relays", "lines") && (settings->relay_safe_mask >> count) != 0) {
         config_source_key_error(self, "relays", "safe_mask", "names relays above the %u in lines; allowed: 0 to %X", count,
                                 (1u << count) - 1u);
@@ -354,12 +393,12 @@ static void check_inputs(config_source_t *self)
 {
     static const char *const names[] = {"estop", "enable", "reset"};
     const config_inputs_t *inputs = &self->config->inputs;
-    const int32_t lines[] = {inputs->estop_line, inputs->enable_line, inputs->reset_line};
+    const char *const lines[] = {inputs->estop_line.text, inputs->enable_line.text, inputs->reset_line.text};
     for (unsigned later = 1; later < 3u; later++) {
         for (unsigned earlier = 0; earlier < later; earlier++) {
-            if (lines[later] != CONFIG_NONE && lines[later] == lines[earlier]) {
+            if (lines[later][0] != '\0' && strcmp(lines[later], lines[earlier]) == 0) {
                 config_source_key_error(self, "inputs", names[later],
-                                        "line %d is %s already; allowed: a line of its own, or none", (int)lines[later],
+                                        "line %s is %s already; allowed: a line of its own, or none", lines[later],
                                         names[earlier]);
             }
         }

@@ -328,7 +328,7 @@ const config_key_t config_keys[] = {
 
     {KEY("relays", "driver"), AT(relays.driver), .type = CONFIG_WORD, .unit = "", .fallback = "sim", .words = "sim",
      .absent = "gpio|modbus", .help = "the outputs in use"},
-    {KEY("relays", "lines"), AT(relays.lines), .type = CONFIG_LINES, .unit = "", .fallback = "none", RANGE(0, 65535),
+    {KEY("relays", "lines"), AT(relays.lines), .type = CONFIG_LINES, .unit = "", .fallback = "none",
      .help = "output line of relay 1, of relay 2, ...; as many relays as lines"},
     {KEY("relays", "active_low"), AT(relays.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
      .help = "whether a low level closes a relay"},
@@ -336,15 +336,19 @@ const config_key_t config_keys[] = {
      .is_live = true, .help = "relays that are closed whenever no sender is followed (every state but ENGAGED); bit 0 = relay 1"},
     {KEY("relays", "safe_after_ms"), AT(settings.relay_safe_after_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
      RANGE(0, 600000), .is_live = true, .help = "how long a hold leaves the relays as the sender set them; every other state at once"},
+    {KEY("relays", "max_on_ms"), AT(settings.relay_max_on_ms), .type = CONFIG_PER_RELAY, .unit = "ms", .fallback = "0",
+     RANGE(0, 86400000), .help = "a relay that has been closed for so long opens, until a sender has asked for open; 0 = never"},
+    {KEY("relays", "min_toggle_ms"), AT(settings.relay_min_toggle_ms), .type = CONFIG_PER_RELAY, .unit = "ms", .fallback = "0",
+     RANGE(0, 60000), .help = "a relay that has changed stays so for this time at least; safe_mask and max_on_ms do not wait for it"},
 
     {KEY("inputs", "driver"), AT(inputs.driver), .type = CONFIG_WORD, .unit = "", .fallback = "sim", .words = "sim",
      .absent = "gpio", .help = "the inputs in use"},
-    {KEY("inputs", "estop"), AT(inputs.estop_line), .type = CONFIG_INTEGER, .unit = "", .fallback = "none", .words = "none",
-     RANGE(0, 65535), .help = "line of the emergency stop"},
-    {KEY("inputs", "enable"), AT(inputs.enable_line), .type = CONFIG_INTEGER, .unit = "", .fallback = "none", .words = "none",
-     RANGE(0, 65535), .help = "line of the enable key"},
-    {KEY("inputs", "reset"), AT(inputs.reset_line), .type = CONFIG_INTEGER, .unit = "", .fallback = "none", .words = "none",
-     RANGE(0, 65535), .help = "line of the reset button"},
+    {KEY("inputs", "estop"), AT(inputs.estop_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "line of the emergency stop"},
+    {KEY("inputs", "enable"), AT(inputs.enable_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "line of the enable key"},
+    {KEY("inputs", "reset"), AT(inputs.reset_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "line of the reset button"},
 };
 /* clang-format on */
 const size_t config_key_count = sizeof config_keys / sizeof config_keys[0];

@@ -19,7 +19,9 @@ typedef enum {
     CONFIG_ADDRESS,      /**< numeric IPv4 or IPv6 address, stored as text */
     CONFIG_NETWORKS,     /**< the word for an empty list, or addresses and networks, stored as hal_udp_networks_t */
     CONFIG_PATH,         /**< absolute path, stored as text */
-    CONFIG_LINES,        /**< `none`, or line numbers, stored as config_lines_t */
+    CONFIG_LABEL,        /**< `none`, or the name or number of a line, or the name of a chip; stored as config_label_t */
+    CONFIG_LINES,        /**< `none`, or names or numbers of lines, stored as config_lines_t */
+    CONFIG_PER_RELAY,    /**< one whole number for all relays, or one for each; stored as uint32_t[CONFIG_RELAYS_MAX] */
     CONFIG_NAME,         /**< of a network interface, stored as text */
     CONFIG_IDS,          /**< `none`, or CAN identifiers, stored as config_ids_t */
     CONFIG_RATIOS,       /**< `none`, or up to `count` ratios such as 20000/10, stored as config_ratios_t */

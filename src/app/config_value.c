@@ -366,10 +366,35 @@ static bool parse_path(const config_key_t *key, span_t item, char *field, config
     return true;
 }
 
-static bool has_line(const config_lines_t *lines, int64_t line)
+/* Bytes that names of GPIO lines and chips are made of. */
+static bool is_label_byte(char byte)
+{
+    const bool is_letter = (byte >= 'a' && byte <= 'z') || (byte >= 'A' && byte <= 'Z');
+    return is_letter || (byte >= '0' && byte <= '9') || (byte != '\0' && strchr(" _-+./:#()[]&*~", byte) != NULL);
+}
+
+static bool parse_label(const config_key_t *key, span_t item, config_label_t *label, config_text_t *why)
+{
+    memset(label, 0, sizeof *label);
+    if (is_word(item, "none")) {
+        return true;
+    }
+    if (item.length == 0 || item.length >= sizeof label->text) {
+        return refuse(key, item, item.length == 0 ? "has no name" : "is too long", why);
+    }
+    for (size_t i = 0; i < item.length; i++) {
+        if (!is_label_byte(item.at[i])) {
+            return refuse(key, item, "is no name", why);
+        }
+        label->text[i] = item.at[i];
+    }
+    return true;
+}
+
+static bool has_line(const config_lines_t *lines, const config_label_t *line)
 {
     for (unsigned i = 0; i < lines->count; i++) {
-        if (lines->line[i] == line) {
+        if (strcmp(lines->line[i].text, line->text) == 0) {
             return true;
         }
     }
@@ -389,14 +414,34 @@ static bool parse_lines(const config_key_t *key, const char *text, config_lines_
     }
     while (rest != NULL) {
         const span_t item = next_item(&rest);
-        int64_t line = 0;
-        if (!parse_whole(key, item, &line, why)) {
+        config_label_t line;
+        if (!parse_label(key, item, &line, why)) {
             return false;
         }
-        if (has_line(lines, line)) {
-            return refuse(key, item, "is listed twice", why);
+        if (line.text[0] == '\0' || has_line(lines, &line)) {
+            return refuse(key, item, line.text[0] == '\0' ? "is no line" : "is listed twice", why);
         }
-        lines->line[lines->count++] = (uint16_t)line;
+        lines->line[lines->count++] = line;
+    }
+    return true;
+}
+
+static bool parse_per_relay(const config_key_t *key, const char *text, uint32_t *values, unsigned count, config_text_t *why)
+{
+    const char *rest = text;
+    if (count > CONFIG_RELAYS_MAX) {
+        return refuse_count(key, count, why);
+    }
+    memset(values, 0, key->size);
+    for (unsigned i = 0; i < count; i++) {
+        int64_t value = 0;
+        if (!parse_whole(key, next_item(&rest), &value, why)) {
+            return false;
+        }
+        values[i] = (uint32_t)value;
+    }
+    for (unsigned i = 1; count == 1u && i < CONFIG_RELAYS_MAX; i++) {
+        values[i] = values[0];
     }
     return true;
 }
@@ -427,8 +472,12 @@ bool config_value_parse(const config_key_t *key, const char *text, config_t *con
         return parse_networks(key, text, field, why);
     case CONFIG_PATH:
         return parse_path(key, whole, field, why);
+    case CONFIG_LABEL:
+        return parse_label(key, whole, field, why);
     case CONFIG_LINES:
         return parse_lines(key, text, field, why);
+    case CONFIG_PER_RELAY:
+        return parse_per_relay(key, text, field, *count, why);
     case CONFIG_NAME:
     case CONFIG_IDS:
     case CONFIG_RATIOS:

@@ -83,8 +83,26 @@ static void format_lines(const config_lines_t *lines, config_text_t *text)
         config_text_add(text, "none");
     }
     for (unsigned i = 0; i < lines->count; i++) {
-        config_text_add(text, "%s%u", i == 0 ? "" : ", ", lines->line[i]);
+        config_text_add(text, "%s%s", i == 0 ? "" : ", ", lines->line[i].text);
     }
+}
+
+/* One number where all relays have the same. */
+static void format_per_relay(const config_t *config, const uint32_t *values, config_text_t *text)
+{
+    const unsigned relays = config->relays.lines.count;
+    bool is_same = true;
+    for (unsigned i = 1; i < relays; i++) {
+        is_same = is_same && values[i] == values[0];
+    }
+    for (unsigned i = 0; i < (is_same ? 1u : relays); i++) {
+        config_text_add(text, "%s%" PRIu32, i == 0 ? "" : ", ", values[i]);
+    }
+}
+
+static const char *label_text(const config_label_t *label)
+{
+    return label->text[0] == '\0' ? "none" : label->text;
 }
 
 void config_value_format(const config_key_t *key, const config_t *config, config_text_t *text)
@@ -119,8 +137,14 @@ void config_value_format(const config_key_t *key, const config_t *config, config
     case CONFIG_NETWORKS:
         format_networks(key, field, text);
         break;
+    case CONFIG_LABEL:
+        config_text_add(text, "%s", label_text(field));
+        break;
     case CONFIG_LINES:
         format_lines(field, text);
+        break;
+    case CONFIG_PER_RELAY:
+        format_per_relay(config, field, text);
         break;
     case CONFIG_NAME:
     case CONFIG_IDS:
@@ -206,8 +230,16 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
     case CONFIG_PATH:
         config_text_add(text, "an absolute path of at most %u characters", (unsigned)key->size - 1u);
         break;
+    case CONFIG_LABEL:
+        config_text_add(text, "none, or a name of at most %u characters", CONFIG_LABEL_MAX - 1u);
+        break;
     case CONFIG_LINES:
-        config_text_add(text, "none, or up to %u different whole numbers from 0 to 65535", CONFIG_RELAYS_MAX);
+        config_text_add(text, "none, or up to %u different lines, by name or number", CONFIG_RELAYS_MAX);
+        break;
+    case CONFIG_PER_RELAY:
+        config_text_add(text, "a whole number");
+        add_range(key, text);
+        config_text_add(text, ", or one for each relay");
         break;
     case CONFIG_NAME:
     case CONFIG_IDS:

@@ -160,6 +160,7 @@ static void write_relays(json_t *json, const snapshot_t *s)
     (void)decimal_put_hex(mask, s->relay_mask, 4);
     json_open(json, "relays", '{');
     json_number(json, "count", s->relay_count);
+    json_bool(json, "known", !s->is_relays_unknown);
     json_text(json, "mask", mask);
     json_open(json, "on", '[');
     for (unsigned i = 0; i < s->relay_count; i++) {
@@ -268,6 +269,8 @@ static void write_counters(json_t *json, const motion_view_t *view)
     json_number(json, "stretched", c->stretched);
     json_number(json, "relay_missing", c->relay_missing);
     json_number(json, "relay_errors", c->relay_errors);
+    json_number(json, "relay_cut", c->relay_cut);
+    json_number(json, "relay_delayed", c->relay_delayed);
     json_number(json, "faults", c->faults);
     json_close(json, '}');
 }

@@ -107,17 +107,31 @@ static bool is_hold_young(const gateway_t *self, uint64_t now_us)
            now_us - self->state_since_us < (uint64_t)self->settings.relay_safe_after_ms * 1000;
 }
 
+/* Relays that can no longer be written or looked at are written again in every cycle, and told of once. */
+static void watch_relays(gateway_t *self)
+{
+    uint16_t mask = 0;
+    const bool was_unknown = self->snapshot.is_relays_unknown;
+    self->is_mask_written = self->is_mask_written && hal_relays_read_back(self->io.relays, &mask) != HV_ERR_IO;
+    self->snapshot.is_relays_unknown = !self->is_mask_written;
+    if (self->snapshot.is_relays_unknown != was_unknown) {
+        hal_log_write(self->io.log, was_unknown ? HAL_LOG_NOTICE : HAL_LOG_ERROR,
+                      was_unknown ? "relays: switched again" : "relays: cannot be switched, their state is not known");
+    }
+}
+
 /* Only an engaged sender commands the relays; the safe mask holds everywhere else. */
 static void write_relays(gateway_t *self, uint64_t now_us)
 {
     const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, now_us);
-    const uint16_t mask = is_sender_heard ? self->frame_mask : self->settings.relay_safe_mask;
-    if (self->is_mask_written && mask == self->written_mask) {
-        return;
+    const uint16_t asked = is_sender_heard ? self->frame_mask : self->settings.relay_safe_mask;
+    const uint16_t mask = relay_policy_step(&self->relay_policy, &self->settings, asked, !is_sender_heard, now_us);
+    if (!self->is_mask_written || mask != self->written_mask) {
+        self->is_mask_written = hal_relays_write(self->io.relays, mask) == HV_OK;
+        self->snapshot.counters.relay_errors += !self->is_mask_written;
+        self->written_mask = mask;
     }
-    self->is_mask_written = hal_relays_write(self->io.relays, mask) == HV_OK;
-    self->snapshot.counters.relay_errors += !self->is_mask_written;
-    self->written_mask = mask;
+    watch_relays(self);
 }
 
 static void send_setpoints(gateway_t *self, uint64_t now_us)
@@ -196,6 +210,8 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->stream_delay_us = stream_delay_us(motion_stream(&self->motion));
     s->owner = self->owner;
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
+    s->counters.relay_cut = self->relay_policy.cut_count;
+    s->counters.relay_delayed = self->relay_policy.delay_count;
     s->counters.spikes = gate_spikes(motion_gate(&self->motion));
     note_singular_stops(self, now_us);
     s->counters.stretched = motion_stretched_count(&self->motion);

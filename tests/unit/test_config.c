@@ -467,14 +467,26 @@ static const spoilt_t k_spoilt[] = {
     {"sim", "start_extension_mm", "start_extension_mm = up",
      "[sim] start_extension_mm: \"up\" is not a number; allowed: a number from 0 to 4000 mm, or settled"},
     {"relays", "lines", "lines = 1, 2, 1",
-     "[relays] lines: \"1\" is listed twice; allowed: none, or up to 12 different whole numbers from 0 to 65535"},
+     "[relays] lines: \"1\" is listed twice; allowed: none, or up to 12 different lines, by name or number"},
     {"relays", "lines", "lines = 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13",
-     "[relays] lines: has 13 values; allowed: none, or up to 12 different whole numbers from 0 to 65535"},
+     "[relays] lines: has 13 values; allowed: none, or up to 12 different lines, by name or number"},
+    {"relays", "lines", "lines = a, none",
+     "[relays] lines: \"none\" is no line; allowed: none, or up to 12 different lines, by name or number"},
+    {"relays", "lines", "lines = a,, b",
+     "[relays] lines: \"\" has no name; allowed: none, or up to 12 different lines, by name or number"},
+    {"relays", "max_on_ms", "max_on_ms = 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13",
+     "[relays] max_on_ms: has 13 values; allowed: a whole number from 0 to 86400000 ms, or one for each relay"},
+    {"relays", "max_on_ms", "max_on_ms = 5, 6",
+     "[relays] max_on_ms: has 2 values; allowed: one, or one for each of the 12 relays in lines"},
+    {"relays", "min_toggle_ms", "min_toggle_ms = 60001",
+     "[relays] min_toggle_ms: \"60001\" is out of range; allowed: a whole number from 0 to 60000 ms, or one for each relay"},
     {"relays", "safe_mask", "safe_mask = 1000", "[relays] safe_mask: \"1000\" is out of range; allowed: hexadecimal 0 to FFF"},
     {"relays", "safe_mask", "safe_mask = 0x", "[relays] safe_mask: \"0x\" is not a mask; allowed: hexadecimal 0 to FFF"},
     {"inputs", "driver", "driver = gpio", "[inputs] driver: driver gpio is not built into this heaved; allowed: sim"},
-    {"inputs", "estop", "estop = 70000",
-     "[inputs] estop: \"70000\" is out of range; allowed: a whole number from 0 to 65535, or none"},
+    {"inputs", "estop", "estop = A name that is longer than any line's",
+     "[inputs] estop: \"A name that is longer than any line's\" is too long; allowed: none, or a name of at most 31 characters"},
+    {"inputs", "estop", "estop = \xC2\xB5",
+     "[inputs] estop: \"\\xC2\\xB5\" is no name; allowed: none, or a name of at most 31 characters"},
     /* lines that are no pair */
     {"roll", "scale", "scale 1", "stray text \"scale 1\"; allowed: key = value, [section], ; comment"},
     {"roll", "scale", "scale ; = 1", "stray text \"scale\"; allowed: key = value, [section], ; comment"},
@@ -626,7 +638,7 @@ static void test_load_last_line_without_newline_is_taken(void)
     (void)load_lines();
     m_text[strlen(m_text) - 1] = '\0';
     TEST_ASSERT_EQUAL_INT(0, load_text(m_text));
-    strcat(m_text, "x");
+    strcat(m_text, "!");
     TEST_ASSERT_EQUAL_INT(1, load_text(m_text));
 }
 
@@ -658,7 +670,7 @@ static void test_load_error_leaves_the_configuration_alone(void)
     take_good_file();
     memset(&m_config, 0x5A, sizeof m_config);
     before = m_config;
-    set_key("inputs", "reset", "x");
+    set_key("inputs", "reset", "x!");
     TEST_ASSERT_EQUAL_INT(1, load_lines());
     TEST_ASSERT_EQUAL_MEMORY(&before, &m_config, sizeof before);
 }
@@ -780,6 +792,18 @@ static void test_load_safe_mask_above_the_relays_is_an_error(void)
     expect_contains("[relays] safe_mask: names relays above the 2 in lines; allowed: 0 to 3\n");
 }
 
+static void test_load_relay_times_that_contradict_each_other_are_errors(void)
+{
+    take_good_file();
+    set_key("relays", "lines", "7, 9");
+    set_key("relays", "safe_mask", "2");
+    set_key("relays", "max_on_ms", "400, 500");
+    set_key("relays", "min_toggle_ms", "500, 0");
+    TEST_ASSERT_EQUAL_INT(2, load_lines());
+    expect_contains("[relays] max_on_ms: 400 ms is below min_toggle_ms of relay 1; allowed: 0, or at least 500 ms\n");
+    expect_contains("[relays] max_on_ms: relay 2 is closed by safe_mask; allowed: 0 for it\n");
+}
+
 static void test_load_input_line_used_twice_is_an_error(void)
 {
     take_good_file();
@@ -811,10 +835,12 @@ static void test_load_values_arrive_where_they_belong(void)
     set_key("control", "socket", "/tmp/h.sock");
     set_key("sim", "start_extension_mm", "12.5");
     set_key("sim", "homed", "no");
-    set_key("relays", "lines", "17, 27, 22");
+    set_key("relays", "lines", "17, GPIO27 , RELAY 3");
     set_key("relays", "active_low", "yes");
-    set_key("relays", "safe_mask", "0x5");
-    set_key("inputs", "estop", "65535");
+    set_key("relays", "safe_mask", "0x3");
+    set_key("relays", "max_on_ms", "0, 0, 7000");
+    set_key("relays", "min_toggle_ms", "250");
+    set_key("inputs", "estop", "[E-STOP]");
     const int count = load_lines();
     TEST_ASSERT_EQUAL_STRING("", m_errors);
     TEST_ASSERT_EQUAL_INT(0, count);
@@ -840,7 +866,7 @@ static void test_load_values_arrive_where_they_belong(void)
     TEST_ASSERT_EQUAL_UINT32(10000, settings->silence_hold_ms);
     TEST_ASSERT_EQUAL_UINT32(3600000, settings->silence_settle_ms);
     TEST_ASSERT_EQUAL_UINT8(3, settings->relay_count);
-    TEST_ASSERT_EQUAL_HEX16(5, settings->relay_safe_mask);
+    TEST_ASSERT_EQUAL_HEX16(3, settings->relay_safe_mask);
 
     static const uint8_t v6[16] = {0xFD, 0, 0, 1};
     static const uint8_t v4[16] = {192, 168, 7, 0};
@@ -855,10 +881,13 @@ static void test_load_values_arrive_where_they_belong(void)
     TEST_ASSERT_EQUAL_STRING("/tmp/h.sock", m_config.control_socket);
     TEST_ASSERT_EQUAL_INT32(12 * 65536 + 32768, m_config.sim.start_extension_mm_q16);
     TEST_ASSERT_FALSE(m_config.sim.is_homed);
-    TEST_ASSERT_EQUAL_UINT16(22, m_config.relays.lines.line[2]);
+    TEST_ASSERT_EQUAL_STRING("RELAY 3", m_config.relays.lines.line[2].text);
+    TEST_ASSERT_EQUAL_UINT32(0, settings->relay_max_on_ms[1]);
+    TEST_ASSERT_EQUAL_UINT32(7000, settings->relay_max_on_ms[2]);
+    TEST_ASSERT_EQUAL_UINT32(250, settings->relay_min_toggle_ms[2]);
     TEST_ASSERT_TRUE(m_config.relays.is_active_low);
-    TEST_ASSERT_EQUAL_INT32(65535, m_config.inputs.estop_line);
-    TEST_ASSERT_EQUAL_INT32(CONFIG_NONE, m_config.inputs.reset_line);
+    TEST_ASSERT_EQUAL_STRING("[E-STOP]", m_config.inputs.estop_line.text);
+    TEST_ASSERT_EQUAL_STRING("", m_config.inputs.reset_line.text);
 }
 
 static void test_load_every_field_is_written_by_one_key_only(void)
@@ -949,7 +978,9 @@ static void test_dump_of_unusual_values_loads_to_the_same(void)
     set_key("udp", "allow", "::1,0.0.0.0/0,fe80::/10,fd00::/32,10.0.0.0/8,2001:db8:0:0:0:0:0:1");
     set_key("udp", "silence_hold_ms", "0");
     set_key("sim", "start_extension_mm", "0");
-    set_key("relays", "lines", "none");
+    set_key("relays", "lines", "7, a b, P9_12");
+    set_key("relays", "max_on_ms", "1, 2, 3");
+    set_key("relays", "min_toggle_ms", "1");
     set_key("inputs", "enable", "0");
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_lines(), m_errors);
     expect_round_trip("unusual values");
@@ -1299,6 +1330,7 @@ int main(void)
     RUN_TEST(test_load_neutral_counts_the_stroke_of_each_cylinder);
     RUN_TEST(test_load_hinges_that_do_not_fit_are_an_error);
     RUN_TEST(test_load_safe_mask_above_the_relays_is_an_error);
+    RUN_TEST(test_load_relay_times_that_contradict_each_other_are_errors);
     RUN_TEST(test_load_input_line_used_twice_is_an_error);
     RUN_TEST(test_load_values_arrive_where_they_belong);
     RUN_TEST(test_load_every_field_is_written_by_one_key_only);

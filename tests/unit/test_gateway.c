@@ -472,6 +472,39 @@ static void test_relays_failed_write_is_counted_and_tried_again(void)
     TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);
 }
 
+static void test_relays_that_cannot_be_switched_are_shown_and_told_once(void)
+{
+    engage();
+    m_rig.relays.fail.first = m_rig.relays.fail.calls + 1;
+    m_rig.relays.fail.count = 5;
+    send_and_run("@A6:0,0,0,0,0,0,F0#", 3);
+    TEST_ASSERT_TRUE(seen()->is_relays_unknown);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "relays: cannot be switched, their state is not known"));
+    send_and_run("@A6:0,0,0,0,0,0,F0#", 10);
+    TEST_ASSERT_FALSE(seen()->is_relays_unknown);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "relays: switched again"));
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "relays: cannot"));
+    TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);
+}
+
+static void test_relays_limits_of_time_apply_to_the_sender_not_to_the_safe_mask(void)
+{
+    m_settings.relay_max_on_ms[4] = 20;
+    m_settings.relay_min_toggle_ms[5] = 500;
+    engage();
+    send_and_run("@A6:0,0,0,0,0,0,F0#", 10);
+    TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);
+    send_and_run("@A6:0,0,0,0,0,0,F0#", 20);
+    TEST_ASSERT_EQUAL_HEX16(0xE0, m_rig.relays.mask);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->relay_cut);
+    send_and_run("@A6:0,0,0,0,0,0,00#", 5);
+    TEST_ASSERT_EQUAL_HEX16(0x20, m_rig.relays.mask);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->relay_delayed);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_HOLD));
+    rig_run_ms(&m_rig, 2);
+    TEST_ASSERT_EQUAL_HEX16(0x801, m_rig.relays.mask);
+}
+
 /* ---- axes ---- */
 
 static void test_axes_sign_scale_and_offset_apply(void)
@@ -1093,6 +1126,8 @@ int main(void)
     RUN_TEST(test_relays_may_outlast_a_hold_for_a_while);
     RUN_TEST(test_relays_bits_without_a_relay_are_counted);
     RUN_TEST(test_relays_failed_write_is_counted_and_tried_again);
+    RUN_TEST(test_relays_that_cannot_be_switched_are_shown_and_told_once);
+    RUN_TEST(test_relays_limits_of_time_apply_to_the_sender_not_to_the_safe_mask);
     RUN_TEST(test_axes_sign_scale_and_offset_apply);
     RUN_TEST(test_axes_shortest_angle_takes_the_shorter_way_round);
     RUN_TEST(test_axes_angle_as_sent_is_the_number_itself);
