@@ -41,6 +41,8 @@ typedef struct {
     uint32_t object;      /**< of the device, index << 8 | sub-index: what is being set, or what the trouble is about; 0 = none */
     uint32_t detail_code; /**< of the protocol, or the value found; 0 = none */
     uint64_t since_us;    /**< of the trouble, else of the phase */
+    uint32_t period_us;   /**< measured, from one set-point that the drive took to the next; 0 = unknown */
+    uint64_t setpoint_us; /**< when it took the newest one; 0 = none, or not known */
 } drive_report_t;
 
 /** Requests to all axes together: all or none, because one leg that stops alone racks the platform. */

@@ -11,6 +11,8 @@
 #include "canraw_slave.h"
 #include "cia402_slave.h"
 #include "heave/cia402.h"
+#include "modbus_maps.h"
+#include "modbus_slave.h"
 #include "sim_drives.h"
 
 /** A backend under test: seven axes with 300 mm of travel each, standing at 100 mm + 10 mm per axis, homed, disabled. */
@@ -254,6 +256,72 @@ static void power_cia402(uint8_t axis, bool is_on)
     cia402_slave_power(&cia402_slave, axis, is_on);
 }
 
+/* Drives behind Modbus lines: one each (TCP), or one for all (RTU). */
+
+static modbus_slave_t modbus_slave;
+static modbus_drive_map_t modbus_map;
+static modbus_drive_t modbus_drive;
+
+static void settle_modbus(uint64_t until_us)
+{
+    modbus_slave_step(&modbus_slave, until_us);
+}
+
+static void cycles_modbus(drives_t drives, int count)
+{
+    while (count-- > 0) {
+        now_us += CYCLE_US;
+        settle_modbus(now_us);
+        (void)!drives_poll(drives, now_us, feedback);
+        (void)!drives_send(drives, now_us, setpoint_q32);
+    }
+}
+
+/* On the lines, and long enough for the drives to be started up. */
+static void start_modbus(drives_t *drives, bool is_small, bool is_shared)
+{
+    hal_modbus_t line[DRIVES_MAX];
+    modbus_slave_open(&modbus_slave, is_small, is_shared, is_shared ? 150 : 300, 20000, NULL, 0);
+    modbus_map = is_small ? modbus_maps_small(is_shared) : modbus_maps_wide(is_shared);
+    for (unsigned k = 0; k < AXES; k++) {
+        const int32_t mm = 100 + 10 * (int32_t)k;
+        modbus_slave_place(&modbus_slave, k, is_small ? mm * 100 : MODBUS_SLAVE_WIDE_ZERO - (mm * 10000 + 1) / 3);
+    }
+    modbus_slave_lines(&modbus_slave, line);
+    TEST_ASSERT_EQUAL(HV_OK, modbus_drive_init(&modbus_drive, &modbus_map, line));
+    *drives = modbus_drive_hal(&modbus_drive);
+    cycles_modbus(*drives, 100);
+}
+
+static bool open_modbus_tcp(drives_t *drives)
+{
+    start_modbus(drives, false, false);
+    return true;
+}
+
+static bool open_modbus_rtu(drives_t *drives)
+{
+    start_modbus(drives, false, true);
+    return true;
+}
+
+static bool open_modbus_small(drives_t *drives)
+{
+    start_modbus(drives, true, true);
+    return true;
+}
+
+static void fault_modbus(uint8_t axis)
+{
+    modbus_slave.drive[axis].is_faulty = true;
+    cycles_modbus(hal, 20); /* the next feedback tells */
+}
+
+static void power_modbus(uint8_t axis, bool is_on)
+{
+    modbus_slave.drive[axis].is_on = is_on;
+}
+
 static const fixture_t k_fixtures[] = {
     {"sim", open_sim, close_sim, settle_sim, fault_sim, power_sim},
     {"canraw-plain", open_canraw_plain, close_sim, settle_canraw, NULL, power_canraw},
@@ -262,6 +330,9 @@ static const fixture_t k_fixtures[] = {
     {"cia402-slow", open_cia402_slow, close_sim, settle_cia402, fault_cia402, power_cia402},
     {"cia402-ip", open_cia402_ip, close_sim, settle_cia402, fault_cia402, power_cia402},
     {"cia402-pp", open_cia402_pp, close_sim, settle_cia402, fault_cia402, power_cia402},
+    {"modbus-tcp", open_modbus_tcp, close_sim, settle_modbus, fault_modbus, power_modbus},
+    {"modbus-rtu", open_modbus_rtu, close_sim, settle_modbus, fault_modbus, power_modbus},
+    {"modbus-small", open_modbus_small, close_sim, settle_modbus, fault_modbus, power_modbus},
 };
 
 static hv_status_t poll_once(void)

@@ -1,0 +1,276 @@
+/* SPDX-License-Identifier: MIT
+ * modbus_drive.c - drives on Modbus: who uses which slot of which line, and what the motion asks, as the lines can carry it; see
+ * modbus_drive.h.
+ */
+#include "heave/modbus_drive.h"
+
+#include "modbus_drive_axis.h"
+
+#define SHARE_ONE   (INT64_C(1) << 30)
+#define SEND_GAP_US 100000u /* a longer gap between set-points is not made up for */
+
+static unsigned write_slot(unsigned k)
+{
+    return 2u * k;
+}
+
+static unsigned read_slot(unsigned k)
+{
+    return 2u * k + 1u;
+}
+
+static hal_modbus_t line_of(const modbus_drive_t *self, unsigned k)
+{
+    return self->line[self->map->axis[k].line];
+}
+
+hv_status_t modbus_drive_init(modbus_drive_t *self, const modbus_drive_map_t *map, const hal_modbus_t line[DRIVES_MAX])
+{
+    if (!modbus_drive_map_is_valid(map)) {
+        return HV_ERR_RANGE;
+    }
+    *self = (modbus_drive_t){.map = map};
+    for (unsigned k = 0; k < map->axes; k++) {
+        if (!hal_modbus_valid(line[map->axis[k].line])) {
+            return HV_ERR_ARG;
+        }
+        self->line[map->axis[k].line] = line[map->axis[k].line];
+        modbus_drive_axis_init(&self->axis[k], map);
+    }
+    return HV_OK;
+}
+
+static bool is_offline(const modbus_drive_t *self, unsigned k)
+{
+    return modbus_drive_axis_state(&self->axis[k]) == DRIVE_OFFLINE;
+}
+
+static bool is_any_online(const modbus_drive_t *self)
+{
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        if (!is_offline(self, k)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* --- Lines --- */
+
+/* One has gone out on a line: nobody else on it has to send another. */
+static void end_broadcasts(modbus_drive_t *self, uint8_t line)
+{
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        if (self->map->axis[k].line == line) {
+            modbus_drive_axis_end_broadcast(&self->axis[k]);
+        }
+    }
+}
+
+static void receive(modbus_drive_t *self, unsigned k)
+{
+    modbus_drive_axis_t *axis = &self->axis[k];
+    modbus_result_t result;
+    if (hal_modbus_poll(line_of(self, k), write_slot(k), &result) == HV_OK) {
+        if (axis->is_broadcast && result.tag == axis->write.tag) {
+            end_broadcasts(self, self->map->axis[k].line);
+        }
+        self->setpoints += modbus_drive_axis_take_write(axis, self->map, &result, self->now_us);
+        self->failures += result.status != HV_OK;
+    }
+    if (hal_modbus_poll(line_of(self, k), read_slot(k), &result) == HV_OK) {
+        modbus_drive_axis_take_read(axis, self->map, &self->map->axis[k].scale, &result, self->now_us);
+        self->failures += result.status != HV_OK;
+    }
+}
+
+static void submit_write(modbus_drive_t *self, unsigned k)
+{
+    modbus_request_t request;
+    if (modbus_drive_axis_next_write(&self->axis[k], self->map, self->map->axis[k].unit, self->now_us, &request)) {
+        (void)!hal_modbus_submit(line_of(self, k), write_slot(k), &request);
+    }
+}
+
+static void submit_read(modbus_drive_t *self, unsigned k)
+{
+    modbus_request_t request;
+    if (modbus_drive_axis_next_read(&self->axis[k], self->map, self->map->axis[k].unit, self->now_us, &request)) {
+        (void)!hal_modbus_submit(line_of(self, k), read_slot(k), &request);
+    }
+}
+
+/* --- Set-points --- */
+
+/* Nobody follows before everybody has torque. */
+static void begin_together(modbus_drive_t *self)
+{
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        const modbus_drive_phase_t phase = self->axis[k].phase;
+        if (phase != MODBUS_DRIVE_HOLDING && phase != MODBUS_DRIVE_ENABLED) {
+            return;
+        }
+    }
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        if (self->axis[k].phase == MODBUS_DRIVE_HOLDING) {
+            modbus_drive_axis_begin(&self->axis[k], &self->map->axis[k].scale, self->now_us);
+        }
+    }
+}
+
+static bool is_following(const modbus_drive_t *self, unsigned k)
+{
+    return self->axis[k].phase == MODBUS_DRIVE_ENABLED;
+}
+
+static uint32_t slowest_period_us(const modbus_drive_t *self)
+{
+    uint32_t slowest_us = self->map->period_us;
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        if (is_following(self, k) && self->axis[k].period_us > slowest_us) {
+            slowest_us = self->axis[k].period_us;
+        }
+    }
+    return slowest_us;
+}
+
+/* The share of their way that all axes can go in this cycle, in SHARE_ONE. */
+static int64_t share_of(const modbus_drive_t *self, const q32_t setpoint_q32[DRIVES_MAX], uint32_t passed_us)
+{
+    const uint32_t period_us = slowest_period_us(self);
+    int64_t share = SHARE_ONE;
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        const q32_t carry_q32 = self->map->axis[k].carry_q32;
+        if (!is_following(self, k) || carry_q32 == 0) {
+            continue;
+        }
+        const q32_t way_q32 = fx_abs(fx_sub_sat(setpoint_q32[k], self->axis[k].paced_q32));
+        const q32_t allowed_q32 = fx_mul_div(carry_q32, passed_us, period_us);
+        if (way_q32 > allowed_q32) {
+            const int64_t own = fx_mul_div(allowed_q32, SHARE_ONE, way_q32);
+            share = own < share ? own : share;
+        }
+    }
+    return share;
+}
+
+static void pace(modbus_drive_t *self, const q32_t setpoint_q32[DRIVES_MAX], uint32_t passed_us)
+{
+    const int64_t share = share_of(self, setpoint_q32, passed_us);
+    self->paced += share < SHARE_ONE;
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        modbus_drive_axis_t *axis = &self->axis[k];
+        if (!is_following(self, k)) {
+            continue;
+        }
+        const q32_t way_q32 = fx_sub_sat(setpoint_q32[k], axis->paced_q32);
+        axis->paced_q32 = fx_add_sat(axis->paced_q32, fx_mul_div(way_q32, share, SHARE_ONE));
+        modbus_drive_axis_offer(axis, self->map, &self->map->axis[k], self->now_us);
+    }
+}
+
+static bool is_watched(modbus_drive_phase_t phase)
+{
+    return phase == MODBUS_DRIVE_ENABLED || phase == MODBUS_DRIVE_PLACING || phase == MODBUS_DRIVE_ENABLING ||
+           phase == MODBUS_DRIVE_CONFIRMING || phase == MODBUS_DRIVE_HOLDING;
+}
+
+/* --- drives.h --- */
+
+static hv_status_t drive_poll(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
+{
+    modbus_drive_t *self = ctx;
+    self->now_us = now_us;
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        receive(self, k);
+        modbus_drive_axis_step(&self->axis[k], self->map, now_us);
+    }
+    begin_together(self);
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        modbus_drive_axis_feedback(&self->axis[k], &feedback[k]);
+        submit_write(self, k);
+        submit_read(self, k);
+    }
+    return is_any_online(self) ? HV_OK : HV_ERR_IO;
+}
+
+static hv_status_t drive_send(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
+{
+    modbus_drive_t *self = ctx;
+    if (!is_any_online(self)) {
+        return HV_ERR_IO;
+    }
+    const uint64_t passed_us = self->sent_us != 0 ? now_us - self->sent_us : 0;
+    self->sent_us = now_us;
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        if (is_watched(self->axis[k].phase)) {
+            modbus_drive_axis_watch(&self->axis[k], self->map, &self->map->axis[k], setpoint_q32[k], self->now_us);
+        }
+    }
+    pace(self, setpoint_q32, (uint32_t)(passed_us < SEND_GAP_US ? passed_us : SEND_GAP_US));
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        submit_write(self, k);
+    }
+    return HV_OK;
+}
+
+/* States an axis may be in when a request comes, as bits (1 << drive_state_t). */
+static unsigned states_allowed(drives_request_t request)
+{
+    switch (request) {
+    case DRIVES_ENABLE:
+        return 1u << DRIVE_DISABLED | 1u << DRIVE_ENABLING | 1u << DRIVE_ENABLED;
+    case DRIVES_HOME:
+        return 1u << DRIVE_ENABLED;
+    case DRIVES_DISABLE:
+    case DRIVES_QUICK_STOP:
+    case DRIVES_RESET_FAULT:
+        break;
+    }
+    return ~0u;
+}
+
+static bool is_allowed(const modbus_drive_t *self, drives_request_t request)
+{
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        if ((states_allowed(request) >> modbus_drive_axis_state(&self->axis[k]) & 1u) == 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* What stops drives is handed over at once and replaces set-points that wait: there may be no other cycle. */
+static hv_status_t drive_request(void *ctx, drives_request_t request)
+{
+    modbus_drive_t *self = ctx;
+    if (!is_any_online(self)) {
+        return HV_ERR_IO;
+    }
+    if (!is_allowed(self, request)) {
+        return HV_ERR_STATE;
+    }
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        modbus_drive_axis_request(&self->axis[k], self->map, request, self->now_us);
+        submit_write(self, k);
+    }
+    return HV_OK;
+}
+
+static uint8_t drive_count(void *ctx)
+{
+    const modbus_drive_t *self = ctx;
+    return self->map->axes;
+}
+
+static void drive_report(void *ctx, uint8_t axis, drive_report_t *out)
+{
+    const modbus_drive_t *self = ctx;
+    modbus_drive_axis_words(&self->axis[axis], self->map, self->map->axis[axis].unit, out);
+}
+
+drives_t modbus_drive_hal(modbus_drive_t *self)
+{
+    static const drives_ops_t k_ops = {drive_poll, drive_send, drive_request, drive_count, drive_report};
+    return (drives_t){&k_ops, self};
+}
