@@ -1,47 +1,38 @@
 /* SPDX-License-Identifier: MIT
- * config_report.c - what follows from a configuration: where the platform can go, and how fast its cylinders would have to be.
- * Reach is found by walking each axis from neutral until a cylinder leaves its stroke; cylinder speeds from differences of the
- * inverse solution over a grid of poses within that reach. Figures for people: the limits themselves are kept elsewhere.
+ * config_report.c - what follows from a configuration: where the platform can go, how fast its cylinders would have to be, what
+ * limits would suit it, and warnings where it asks for what it cannot have. Figures for people: the limits themselves are kept
+ * elsewhere.
  */
+#include <math.h>
 #include <string.h>
 
 #include "config_bus.h"
 #include "config_keys.h"
-#include "config_mechanism.h"
 #include "config_text.h"
+#include "envelope.h"
 #include "heave/ramp.h"
 
-#define WALK_STEPS    256 /* from neutral to a limit; finer than any fold of the workspace */
-#define BISECT_STEPS  24
-#define GRID_POINTS   5u             /* per axis: low, half, neutral, half, high */
-#define SLOPE_STEP    (Q32_ONE / 64) /* of a pose axis, to each side */
-#define SLOPE_INVERSE 32             /* 1 / (2 * step) */
-
-/* How far an axis goes alone, and what ends it: a cylinder, or at_limit where it is the axis' own limit. */
-typedef struct {
-    q32_t low_q32, high_q32;
-    unsigned low_end, high_end;
-} reach_t;
+#define EDGE_TOLERANCE 0.001 /* deg or mm: a limit on the edge itself is fine */
+#define DIAGONALS      4u    /* of a pair: both axes as far as each other, in every combination of senses */
 
 /* A report in the making. */
 typedef struct {
     const config_t *config;
     const settings_t *settings;
     FILE *out;
-    kin_t kin;
-    unsigned cylinders;
-    pose_t neutral;
-    reach_t reach[POSE_AXES];
-    q32_t alone_mm_s_q32[POSE_AXES]; /* worst speed of a cylinder while one axis moves */
-    q32_t all_mm_s_q32;              /* while all do */
-    unsigned poses;                  /* of the grid, within the stroke */
+    envelope_t envelope;
     int warnings;
 } report_t;
 
 /* What rounds to 0.000 is 0: no "-0.000". */
+static double zero_free(double value)
+{
+    return fabs(value) < 0.0005 ? 0.0 : value;
+}
+
 static double number(q32_t value_q32)
 {
-    return fx_abs(value_q32) < Q32_ONE / 2048 ? 0.0 : (double)value_q32 / (double)Q32_ONE;
+    return zero_free((double)value_q32 / (double)Q32_ONE);
 }
 
 static double number_q16(q16_t value_q16)
@@ -55,138 +46,14 @@ static void warn(report_t *self, const char *text)
     self->warnings++;
 }
 
-/* First cylinder that a pose takes out of its usable stroke; the number of cylinders where it takes none. */
-static unsigned find_outside(const report_t *self, const pose_t *pose)
-{
-    q32_t extension_q32;
-    return config_mechanism_find_outside(self->settings, &self->kin, pose, self->settings->margin_mm_q16, &extension_q32);
-}
-
-/* Halves the gap between a pose inside and one outside. */
-static q32_t find_edge(const report_t *self, unsigned axis, q32_t inside_q32, q32_t outside_q32, unsigned *cylinder)
-{
-    pose_t pose = self->neutral;
-    for (unsigned i = 0; i < BISECT_STEPS; i++) {
-        pose.axis_q32[axis] = inside_q32 / 2 + outside_q32 / 2;
-        const unsigned found = find_outside(self, &pose);
-        if (found < self->cylinders) {
-            outside_q32 = pose.axis_q32[axis];
-            *cylinder = found;
-        } else {
-            inside_q32 = pose.axis_q32[axis];
-        }
-    }
-    return inside_q32;
-}
-
-/* Walks one axis from neutral towards its limit. */
-static q32_t walk(const report_t *self, unsigned axis, q16_t limit_q16, unsigned *end)
-{
-    const q32_t start_q32 = self->neutral.axis_q32[axis];
-    const q32_t step_q32 = (q32_from_q16(limit_q16) - start_q32) / WALK_STEPS;
-    pose_t pose = self->neutral;
-    for (int i = 1; i <= WALK_STEPS; i++) {
-        pose.axis_q32[axis] = i == WALK_STEPS ? q32_from_q16(limit_q16) : start_q32 + i * step_q32;
-        *end = find_outside(self, &pose);
-        if (*end < self->cylinders) {
-            return find_edge(self, axis, start_q32 + (i - 1) * step_q32, pose.axis_q32[axis], end);
-        }
-    }
-    return q32_from_q16(limit_q16);
-}
-
-static void find_reach(report_t *self)
-{
-    for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-        const axis_settings_t *limits = &self->settings->axis[axis];
-        reach_t *reach = &self->reach[axis];
-        if (!config_has_axis(self->config, axis)) {
-            continue;
-        }
-        reach->low_q32 = walk(self, axis, limits->min_q16, &reach->low_end);
-        reach->high_q32 = walk(self, axis, limits->max_q16, &reach->high_end);
-    }
-}
-
-/* mm of each cylinder per unit of an axis, at a pose, as magnitudes. */
-static bool find_slopes(const report_t *self, const pose_t *pose, unsigned axis, q32_t slope_q32[CYLINDERS_MAX])
-{
-    q32_t above_q32[CYLINDERS_MAX], below_q32[CYLINDERS_MAX];
-    pose_t moved = *pose;
-    moved.axis_q32[axis] = pose->axis_q32[axis] + SLOPE_STEP;
-    if (kin_inverse(&self->kin, &moved, above_q32) != HV_OK) {
-        return false;
-    }
-    moved.axis_q32[axis] = pose->axis_q32[axis] - SLOPE_STEP;
-    if (kin_inverse(&self->kin, &moved, below_q32) != HV_OK) {
-        return false;
-    }
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        slope_q32[i] = fx_abs(above_q32[i] - below_q32[i]) * SLOPE_INVERSE;
-    }
-    return true;
-}
-
-/* Takes a pose into the worst cases. */
-static void take_speeds(report_t *self, const pose_t *pose)
-{
-    q32_t sum_q32[CYLINDERS_MAX] = {0};
-    for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-        q32_t slope_q32[CYLINDERS_MAX];
-        if (!config_has_axis(self->config, axis) || !find_slopes(self, pose, axis, slope_q32)) {
-            continue;
-        }
-        for (unsigned i = 0; i < self->cylinders; i++) {
-            const q32_t speed_q32 = fx_mul_shift(slope_q32[i], self->settings->axis[axis].speed_q16, 16);
-            sum_q32[i] += speed_q32;
-            self->alone_mm_s_q32[axis] = speed_q32 > self->alone_mm_s_q32[axis] ? speed_q32 : self->alone_mm_s_q32[axis];
-            self->all_mm_s_q32 = sum_q32[i] > self->all_mm_s_q32 ? sum_q32[i] : self->all_mm_s_q32;
-        }
-    }
-}
-
-/* The value of an axis at a point of the grid. */
-static q32_t grid_value(const report_t *self, unsigned axis, unsigned point)
-{
-    const q32_t neutral_q32 = self->neutral.axis_q32[axis];
-    const reach_t *reach = &self->reach[axis];
-    const q32_t values_q32[GRID_POINTS] = {reach->low_q32, (reach->low_q32 + neutral_q32) / 2, neutral_q32,
-                                           (reach->high_q32 + neutral_q32) / 2, reach->high_q32};
-    return values_q32[point];
-}
-
-static void find_speeds(report_t *self)
-{
-    unsigned count = 1;
-    for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-        count *= config_has_axis(self->config, axis) ? GRID_POINTS : 1u;
-    }
-    for (unsigned index = 0; index < count; index++) {
-        pose_t pose = self->neutral;
-        unsigned rest = index;
-        for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-            if (!config_has_axis(self->config, axis)) {
-                continue;
-            }
-            pose.axis_q32[axis] = grid_value(self, axis, rest % GRID_POINTS);
-            rest /= GRID_POINTS;
-        }
-        if (find_outside(self, &pose) < self->cylinders) {
-            continue;
-        }
-        take_speeds(self, &pose);
-        self->poses++;
-    }
-}
-
 static void write_extensions(const report_t *self, const char *name, const pose_t *pose)
 {
     q32_t extension_q32[CYLINDERS_MAX] = {0};
     fprintf(self->out, "%-24s", name);
-    if (kin_inverse(&self->kin, pose, extension_q32) != HV_OK) {
+    if (kin_inverse(&self->envelope.kin, pose, extension_q32) != HV_OK) {
         return;
     }
-    for (unsigned i = 0; i < self->cylinders; i++) {
+    for (unsigned i = 0; i < self->envelope.cylinders; i++) {
         fprintf(self->out, "  c%u %.3f", i + 1u, number(extension_q32[i]));
     }
     fprintf(self->out, " mm\n");
@@ -197,11 +64,11 @@ static void write_settled(const report_t *self)
     const pose_t guess = {{0}};
     pose_t pose;
     q32_t extension_q32[CYLINDERS_MAX] = {0};
-    for (unsigned i = 0; i < self->cylinders; i++) {
+    for (unsigned i = 0; i < self->envelope.cylinders; i++) {
         extension_q32[i] = q32_from_q16(self->settings->settled_extension_mm_q16);
     }
     fprintf(self->out, "%-24s  %.3f mm of all cylinders", "settled", number_q16(self->settings->settled_extension_mm_q16));
-    if (kin_forward(&self->kin, extension_q32, &guess, &pose, NULL) == HV_OK) {
+    if (kin_forward(&self->envelope.kin, extension_q32, &guess, &pose, NULL) == HV_OK) {
         fprintf(self->out, ":");
         for (unsigned axis = 0; axis < POSE_AXES; axis++) {
             fprintf(self->out, " %s %.3f", config_axis_section[axis], number(pose.axis_q32[axis]));
@@ -226,7 +93,7 @@ static void write_bus(const report_t *self)
 static void write_head(const report_t *self, size_t ram_bytes)
 {
     fprintf(self->out, "%-24s  %s, %u cylinders%s\n", "platform", config_kind_name(self->settings->geometry.kind),
-            self->cylinders, self->settings->has_angle ? ", rotation motor" : "");
+            self->envelope.cylinders, self->settings->has_angle ? ", rotation motor" : "");
     fprintf(self->out, "%-24s  %u us\n", "cycle", (unsigned)self->settings->cycle_us);
     fprintf(self->out, "%-24s  %zu bytes\n", "memory of the gateway", ram_bytes);
     write_bus(self);
@@ -234,32 +101,34 @@ static void write_head(const report_t *self, size_t ram_bytes)
     write_settled(self);
 }
 
-/* "cylinder 3", or "the axis limit". */
-static const char *end_text(const report_t *self, unsigned end, config_text_t *text)
+/* "cylinder 3", or what else ends a reach. */
+static const char *cause_text(unsigned cause, config_text_t *text)
 {
     config_text_clear(text);
-    if (end < self->cylinders) {
-        config_text_add(text, "cylinder %u", end + 1u);
+    if (cause < CYLINDERS_MAX) {
+        config_text_add(text, "cylinder %u", cause + 1u);
     } else {
-        config_text_add(text, "limit");
+        config_text_add(text, "%s", cause == ENVELOPE_SINGULAR ? "singularity" : "range");
     }
     return text->data;
 }
 
 static void write_axis(const report_t *self, unsigned axis)
 {
-    const reach_t *reach = &self->reach[axis];
+    const envelope_t *envelope = &self->envelope;
+    const double slope = envelope->limits.rate[axis].slope;
     config_text_t low, high;
-    fprintf(self->out, "  %-6s %9.3f to %9.3f %-3s  ends at %s and %s; up to %.1f mm/s of a cylinder at full speed\n",
-            config_axis_section[axis], number(reach->low_q32), number(reach->high_q32), config_axis_unit(axis),
-            end_text(self, reach->low_end, &low), end_text(self, reach->high_end, &high), number(self->alone_mm_s_q32[axis]));
+    fprintf(self->out, "  %-6s %9.3f to %9.3f %-3s  ends at %s and %s; %.3f mm of a cylinder per %s, %.1f mm/s at full speed\n",
+            config_axis_section[axis], zero_free(envelope->low[axis].value), zero_free(envelope->high[axis].value),
+            config_axis_unit(axis), cause_text(envelope->low[axis].cause, &low), cause_text(envelope->high[axis].cause, &high),
+            slope, config_axis_unit(axis), slope * number_q16(self->settings->axis[axis].speed_q16));
 }
 
 static void write_axes(const report_t *self)
 {
-    fprintf(self->out, "reach of each axis alone, the others at neutral\n");
+    fprintf(self->out, "reach of each axis alone from neutral, its limits aside\n");
     for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-        if (config_has_axis(self->config, axis)) {
+        if (self->envelope.has_axis[axis]) {
             write_axis(self, axis);
         }
     }
@@ -267,22 +136,121 @@ static void write_axes(const report_t *self)
         fprintf(self->out, "  %-6s %9.3f to %9.3f deg  ends at limit and limit\n", config_axis_section[AXIS_ANGLE],
                 number_q16(self->settings->axis[AXIS_ANGLE].min_q16), number_q16(self->settings->axis[AXIS_ANGLE].max_q16));
     }
-    fprintf(self->out, "%-24s  %.1f mm/s with all axes at full speed at once (%u poses); limit %.1f mm/s\n",
-            "worst cylinder speed", number(self->all_mm_s_q32), self->poses, number_q16(self->settings->cylinder_speed_mm_s_q16));
 }
 
-/* An axis whose limits lie where the cylinders cannot follow. */
+/* How much of what two axes reach alone they reach both at once, in the worst combination of senses. */
+static double pair_share(const report_t *self, unsigned axis, unsigned other)
+{
+    double least = 1;
+    for (unsigned i = 0; i < DIAGONALS; i++) {
+        const unsigned direction = (2 * i + 1) * ENVELOPE_DIRECTIONS / (2 * DIAGONALS);
+        least = fmin(least, envelope_pair(&self->envelope, axis, other, direction).share * sqrt(0.5));
+    }
+    return least;
+}
+
+static void write_pairs(const report_t *self)
+{
+    fprintf(self->out, "reach of two axes at once: so much of the reach of each, in the worst combination of senses\n        ");
+    for (unsigned axis = AXIS_PITCH; axis < POSE_AXES; axis++) {
+        if (self->envelope.has_axis[axis]) {
+            fprintf(self->out, "%8s", config_axis_section[axis]);
+        }
+    }
+    fprintf(self->out, "\n");
+    for (unsigned axis = 0; axis < POSE_AXES - 1; axis++) {
+        if (!self->envelope.has_axis[axis]) {
+            continue;
+        }
+        fprintf(self->out, "  %-6s", config_axis_section[axis]);
+        for (unsigned other = AXIS_PITCH; other < POSE_AXES; other++) {
+            if (self->envelope.has_axis[other] && other > axis) {
+                fprintf(self->out, "%6.0f %%", 100 * pair_share(self, axis, other));
+            } else if (self->envelope.has_axis[other]) {
+                fprintf(self->out, "%8s", "");
+            }
+        }
+        fprintf(self->out, "\n");
+    }
+}
+
+static const char *pose_text(const report_t *self, const pose_t *pose, config_text_t *text)
+{
+    config_text_clear(text);
+    for (unsigned axis = 0; axis < POSE_AXES; axis++) {
+        if (self->envelope.has_axis[axis]) {
+            config_text_add(text, "%s%s %.1f", text->length > 0 ? " " : "", config_axis_section[axis],
+                            fabs(number(pose->axis_q32[axis])) < 0.05 ? 0.0 : number(pose->axis_q32[axis]));
+        }
+    }
+    return text->data;
+}
+
+static void write_worst(const report_t *self)
+{
+    const envelope_box_t *box = &self->envelope.limits;
+    config_text_t pose;
+    fprintf(self->out, "%-24s  %.1f mm/s with all axes at full speed at once (%u poses); limit %.1f mm/s\n",
+            "worst cylinder speed", box->all_mm_s, box->poses, number_q16(self->settings->cylinder_speed_mm_s_q16));
+    fprintf(self->out, "%-24s  %.3f at neutral; %.3f at least within the limits, at %s; %.1f is too little\n",
+            "singularity margin", self->envelope.margin_at_neutral, box->margin, pose_text(self, &box->margin_pose, &pose),
+            number(KIN_MARGIN_LEAST_Q32));
+}
+
+static void write_suggestions(const report_t *self)
+{
+    fprintf(self->out, "limits that each axis alone can have with these cylinders (%.5g mm/s, %.5g mm/s^2, %d mm/s^3)\n",
+            number_q16(self->settings->cylinder_speed_mm_s_q16), number_q16(self->settings->cylinder_accel_mm_s2_q16),
+            (int)self->settings->cylinder_jerk_mm_s3);
+    for (unsigned axis = 0; axis < POSE_AXES; axis++) {
+        const envelope_limits_t *limits = &self->envelope.suggested[axis];
+        const char *unit = config_axis_unit(axis);
+        if (self->envelope.has_axis[axis]) {
+            fprintf(self->out, "  %-6s min_%s %.6g  max_%s %.6g  speed_%s_s %.6g  accel_%s_s2 %.6g  jerk_%s_s3 %.0f\n",
+                    config_axis_section[axis], unit, limits->min, unit, limits->max, unit, limits->speed, unit, limits->accel,
+                    unit, limits->jerk);
+        }
+    }
+}
+
+/* An axis whose limits lie where the platform cannot or should not go. */
 static void warn_reach(report_t *self, unsigned axis)
 {
-    const reach_t *reach = &self->reach[axis];
-    config_text_t text;
-    if (reach->low_end >= self->cylinders && reach->high_end >= self->cylinders) {
+    const axis_settings_t *limits = &self->settings->axis[axis];
+    const envelope_t *envelope = &self->envelope;
+    const char *unit = config_axis_unit(axis);
+    const bool is_low = number_q16(limits->min_q16) < envelope->low[axis].value - EDGE_TOLERANCE;
+    const bool is_high = number_q16(limits->max_q16) > envelope->high[axis].value + EDGE_TOLERANCE;
+    config_text_t text, cause;
+    if (!is_low && !is_high) {
         return;
     }
     config_text_clear(&text);
-    config_text_add(&text, "[%s] limits %.3f to %.3f %s go beyond the reach: poses there are clamped", config_axis_section[axis],
-                    number_q16(self->settings->axis[axis].min_q16), number_q16(self->settings->axis[axis].max_q16),
-                    config_axis_unit(axis));
+    config_text_add(&text, "[%s] limits %.3f to %.3f %s go beyond the reach:", config_axis_section[axis],
+                    number_q16(limits->min_q16), number_q16(limits->max_q16), unit);
+    if (is_low) {
+        config_text_add(&text, " %s ends it at %.3f, set min_%s = %.6g%s", cause_text(envelope->low[axis].cause, &cause),
+                        envelope->low[axis].value, unit, envelope->suggested[axis].min, is_high ? ";" : "");
+    }
+    if (is_high) {
+        config_text_add(&text, " %s ends it at %.3f, set max_%s = %.6g", cause_text(envelope->high[axis].cause, &cause),
+                        envelope->high[axis].value, unit, envelope->suggested[axis].max);
+    }
+    warn(self, text.data);
+}
+
+static void warn_singularity(report_t *self)
+{
+    const envelope_box_t *box = &self->envelope.limits;
+    config_text_t text, pose;
+    if (box->margin >= number(KIN_MARGIN_LEAST_Q32)) {
+        return;
+    }
+    config_text_clear(&text);
+    config_text_add(&text,
+                    "poses within the limits are near a singularity: a margin of %.3f at %s, below %.1f: make the limits of "
+                    "these axes narrower",
+                    box->margin, pose_text(self, &box->margin_pose, &pose), number(KIN_MARGIN_LEAST_Q32));
     warn(self, text.data);
 }
 
@@ -307,7 +275,7 @@ static void warn_acceleration(report_t *self, const char *section, const char *u
 static void warn_cylinders(report_t *self)
 {
     const settings_t *settings = self->settings;
-    for (unsigned i = 0; i < self->cylinders; i++) {
+    for (unsigned i = 0; i < self->envelope.cylinders; i++) {
         const axis_settings_t cylinder = {.min_q16 = settings->margin_mm_q16,
                                           .max_q16 = settings->stroke_mm_q16[i] - settings->margin_mm_q16,
                                           .speed_q16 = settings->cylinder_speed_mm_s_q16,
@@ -317,17 +285,61 @@ static void warn_cylinders(report_t *self)
             warn_acceleration(self, "cylinders", "mm", &cylinder);
         }
     }
-    for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-        config_text_t text;
-        if (!config_has_axis(self->config, axis) ||
-            self->alone_mm_s_q32[axis] <= q32_from_q16(settings->cylinder_speed_mm_s_q16)) {
-            continue;
-        }
-        config_text_clear(&text);
-        config_text_add(&text, "[%s] its speed alone asks a cylinder for %.1f mm/s, above speed_mm_s of [cylinders]",
-                        config_axis_section[axis], number(self->alone_mm_s_q32[axis]));
-        warn(self, text.data);
+}
+
+/* The acceleration that the ramp of an axis comes to. */
+static double accel_in_force(const report_t *self, const axis_settings_t *axis)
+{
+    ramp_limits_t limits;
+    const double accel = number_q16(axis->accel_q16);
+    if (ramp_limits_from_units(axis->min_q16, axis->max_q16, axis->speed_q16, axis->accel_q16, axis->jerk,
+                               self->settings->cycle_us, &limits) != HV_OK) {
+        return accel;
     }
+    return accel * fmin((double)ramp_safe_acceleration(&limits) / (double)limits.acc_per_cycle2_q32, 1);
+}
+
+static void add_demand(config_text_t *text, const char *what, double asked, double limit, const char *unit, const char *key)
+{
+    if (asked > limit) {
+        config_text_add(text, "%s its %s alone asks a cylinder for %.1f %s, above %s of [cylinders], %.1f",
+                        text->length > 0 ? ";" : "", what, asked, unit, key, limit);
+    }
+}
+
+static void add_lower(config_text_t *text, const char *key, const char *unit, const char *per, double now, double lower)
+{
+    if (lower < now) {
+        config_text_add(text, "%s %s_%s_%s = %.6g", text->data[text->length - 1] == 't' ? "" : ",", key, unit, per, lower);
+    }
+}
+
+/* An axis whose limits its cylinders cannot serve even while it moves alone. */
+static void warn_demand(report_t *self, unsigned axis)
+{
+    const settings_t *settings = self->settings;
+    const axis_settings_t *asked = &settings->axis[axis];
+    const envelope_rate_t *rate = &self->envelope.limits.rate[axis];
+    const envelope_limits_t now = {number_q16(asked->min_q16), number_q16(asked->max_q16), number_q16(asked->speed_q16),
+                                   accel_in_force(self, asked), asked->jerk};
+    const envelope_demand_t demand = envelope_demand(rate, &now);
+    envelope_limits_t lower = now;
+    config_text_t text, whole;
+    config_text_clear(&text);
+    config_text_clear(&whole);
+    add_demand(&text, "speed", demand.speed_mm_s, number_q16(settings->cylinder_speed_mm_s_q16), "mm/s", "speed_mm_s");
+    add_demand(&text, "acceleration", demand.accel_mm_s2, number_q16(settings->cylinder_accel_mm_s2_q16), "mm/s^2",
+               "accel_mm_s2");
+    add_demand(&text, "jerk", demand.jerk_mm_s3, settings->cylinder_jerk_mm_s3, "mm/s^3", "jerk_mm_s3");
+    if (text.length == 0) {
+        return;
+    }
+    envelope_suggest(settings, rate, &lower);
+    config_text_add(&whole, "[%s]%s: set", config_axis_section[axis], text.data);
+    add_lower(&whole, "speed", config_axis_unit(axis), "s", now.speed, lower.speed);
+    add_lower(&whole, "accel", config_axis_unit(axis), "s2", now.accel, lower.accel);
+    add_lower(&whole, "jerk", config_axis_unit(axis), "s3", now.jerk, lower.jerk);
+    warn(self, whole.data);
 }
 
 /* Frames carry no password: an open port lets any machine of the network move the platform. */
@@ -366,7 +378,11 @@ static void write_warnings(report_t *self)
             warn_reach(self, axis);
         }
         warn_acceleration(self, config_axis_section[axis], config_axis_unit(axis), &self->settings->axis[axis]);
+        if (axis < POSE_AXES) {
+            warn_demand(self, axis);
+        }
     }
+    warn_singularity(self);
     warn_cylinders(self);
     warn_network(self);
     warn_bus(self);
@@ -380,19 +396,16 @@ int config_check_report(const config_t *config, size_t ram_bytes, FILE *out)
     self.config = config;
     self.settings = &config->settings;
     self.out = out;
-    if (kin_init(&self.kin, &config->settings.geometry) != HV_OK) {
+    if (!envelope_find(&self.envelope, self.settings)) {
         return 1; /* not a configuration that config_load() accepted */
     }
-    self.cylinders = kin_cylinders(&self.kin);
-    for (unsigned axis = 0; axis < POSE_AXES; axis++) {
-        self.neutral.axis_q32[axis] = q32_from_q16(config->settings.neutral_q16[axis]);
-    }
-    find_reach(&self);
-    find_speeds(&self);
     write_head(&self, ram_bytes);
     write_extensions(&self, "extension at pose zero", &zero);
-    write_extensions(&self, "extension at neutral", &self.neutral);
+    write_extensions(&self, "extension at neutral", &self.envelope.neutral);
     write_axes(&self);
+    write_pairs(&self);
+    write_worst(&self);
+    write_suggestions(&self);
     write_warnings(&self);
     return self.warnings;
 }

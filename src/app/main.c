@@ -11,11 +11,13 @@
 #include "config.h"
 #include "dbc.h"
 #include "doctor.h"
+#include "envelope_csv.h"
 #include "heave/gateway.h"
 #include "live.h"
 #include "options.h"
 #include "play.h"
 #include "say.h"
+#include "whole_file.h"
 
 void hv_assert_failed(const char *file, int line)
 {
@@ -56,6 +58,23 @@ static int dump_dbc(const options_t *options, const config_t *config)
     return end_stdout(EXIT_DONE);
 }
 
+static int write_envelope(const char *path, const config_t *config)
+{
+    static envelope_t envelope;
+    static whole_file_t file;
+    if (!envelope_find(&envelope, &config->settings)) {
+        return EXIT_SOFTWARE; /* not a configuration that config_load() accepted */
+    }
+    if (!whole_file_open(&file, path)) {
+        return say(EXIT_NO_OUTPUT, "%s: %s", path, strerror(errno));
+    }
+    envelope_csv_write(&envelope, file.stream);
+    if (!whole_file_close(&file)) {
+        return say(EXIT_IO, "%s: %s", path, strerror(errno));
+    }
+    return EXIT_DONE;
+}
+
 static int run(const options_t *options, const config_t *config)
 {
     switch (options->mode) {
@@ -66,6 +85,8 @@ static int run(const options_t *options, const config_t *config)
     case MODE_CHECK:
         (void)config_check_report(config, sizeof(gateway_t), stdout);
         return end_stdout(EXIT_DONE);
+    case MODE_ENVELOPE:
+        return write_envelope(options->envelope, config);
     case MODE_DOCTOR:
         return end_stdout(doctor_run(config, stdout) ? EXIT_DONE : EXIT_REFUSED);
     case MODE_DUMP_CONFIG:

@@ -12,6 +12,7 @@
 enum {
     OPTION_CONFIG = 1,
     OPTION_CHECK,
+    OPTION_ENVELOPE,
     OPTION_DOCTOR,
     OPTION_DUMP,
     OPTION_DUMP_DBC,
@@ -28,6 +29,7 @@ const char options_help[] =
     "\n"
     "  heaved --config FILE [--socket PATH] [--record FRAMES] [--trace OUT]   run\n"
     "  heaved --config FILE --check                      validate, and print what follows from it\n"
+    "  heaved --config FILE --envelope OUT               what the geometry can do, as CSV (docs/envelope.md)\n"
     "  heaved --config FILE --doctor                     look at machine, CAN interface and drives: what is wrong, what helps\n"
     "  heaved --config FILE --dump-config                every key with its value, unit, range and help\n"
     "  heaved --config FILE --dump-dbc                   the frames of [can-raw] as a DBC file\n"
@@ -36,6 +38,7 @@ const char options_help[] =
     "  --config FILE    the platform (INI)\n"
     "  --record FRAMES  log every datagram and request, so that --play repeats the run\n"
     "  --trace OUT      the set-points of every cycle (CSV); - is standard output\n"
+    "  --envelope OUT   a file, there as a whole or not at all; - is standard output\n"
     "  --play FRAMES    lines `<t_ms> <text>`, `<t_ms> !engage` ...; - is standard input\n"
     "  --socket PATH    for heavectl, instead of [control] socket\n"
     "  --help, --version\n"
@@ -45,12 +48,19 @@ const char options_help[] =
     "69 port or socket in use, 73 output cannot be created, 74 output cannot be written, 78 configuration.\n";
 
 static const struct option k_options[] = {
-    {"config", required_argument, NULL, OPTION_CONFIG}, {"check", no_argument, NULL, OPTION_CHECK},
-    {"doctor", no_argument, NULL, OPTION_DOCTOR},       {"dump-config", no_argument, NULL, OPTION_DUMP},
-    {"dump-dbc", no_argument, NULL, OPTION_DUMP_DBC},   {"play", required_argument, NULL, OPTION_PLAY},
-    {"trace", required_argument, NULL, OPTION_TRACE},   {"record", required_argument, NULL, OPTION_RECORD},
-    {"socket", required_argument, NULL, OPTION_SOCKET}, {"help", no_argument, NULL, OPTION_HELP},
-    {"version", no_argument, NULL, OPTION_VERSION},     {NULL, 0, NULL, 0},
+    {"config", required_argument, NULL, OPTION_CONFIG},
+    {"check", no_argument, NULL, OPTION_CHECK},
+    {"envelope", required_argument, NULL, OPTION_ENVELOPE},
+    {"doctor", no_argument, NULL, OPTION_DOCTOR},
+    {"dump-config", no_argument, NULL, OPTION_DUMP},
+    {"dump-dbc", no_argument, NULL, OPTION_DUMP_DBC},
+    {"play", required_argument, NULL, OPTION_PLAY},
+    {"trace", required_argument, NULL, OPTION_TRACE},
+    {"record", required_argument, NULL, OPTION_RECORD},
+    {"socket", required_argument, NULL, OPTION_SOCKET},
+    {"help", no_argument, NULL, OPTION_HELP},
+    {"version", no_argument, NULL, OPTION_VERSION},
+    {NULL, 0, NULL, 0},
 };
 
 /* Sets the mode; two different ones contradict each other. */
@@ -64,7 +74,7 @@ static bool set_mode(options_t *self, run_mode_t mode)
 static const char *take_option(options_t *self, int option)
 {
     static const char k_one_mode[] =
-        "only one of --check, --doctor, --dump-config, --dump-dbc, --play, --help, --version at a time";
+        "only one of --check, --envelope, --doctor, --dump-config, --dump-dbc, --play, --help, --version at a time";
     bool is_free = true;
     switch (option) {
     case OPTION_CONFIG:
@@ -72,6 +82,10 @@ static const char *take_option(options_t *self, int option)
         break;
     case OPTION_CHECK:
         is_free = set_mode(self, MODE_CHECK);
+        break;
+    case OPTION_ENVELOPE:
+        self->envelope = optarg;
+        is_free = set_mode(self, MODE_ENVELOPE);
         break;
     case OPTION_DOCTOR:
         is_free = set_mode(self, MODE_DOCTOR);

@@ -10,6 +10,7 @@
 typedef enum {
     MODE_RUN,
     MODE_CHECK,
+    MODE_ENVELOPE,
     MODE_DOCTOR,
     MODE_DUMP_CONFIG,
     MODE_DUMP_DBC,
@@ -23,6 +24,7 @@ typedef struct {
     run_mode_t mode;
     const char *config;
     const char *play;
+    const char *envelope;
     const char *trace;
     const char *record;
     const char *socket;
