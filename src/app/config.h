@@ -178,6 +178,7 @@ typedef struct {
     config_udp_t udp;
     uint32_t late_hold_cycles; /**< of the program: see motion_loop.h */
     char control_socket[CONFIG_PATH_MAX];
+    char metrics_file[CONFIG_PATH_MAX]; /**< "none" = none */
     config_drives_t drives;
     config_sim_t sim;
     config_can_t can;

@@ -178,6 +178,9 @@ const config_key_t config_keys[] = {
 
     {KEY("control", "socket"), AT(control_socket), .type = CONFIG_PATH, .unit = "", .fallback = "/run/heave/heaved.sock",
      .help = "local socket of heaved"},
+    {KEY("control", "metrics"), AT(metrics_file), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "file for Prometheus (node_exporter's textfile collector: a name that ends in .prom), renewed every second; removed at "
+             "the end"},
 
     {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim|cia402|can-raw",
      .absent = "modbus-tcp|modbus-rtu", .help = "the drives in use"},
