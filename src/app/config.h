@@ -65,6 +65,7 @@ typedef enum { CONFIG_SEND_EVERY_PERIOD, CONFIG_SEND_ON_CHANGE } config_send_t;
 typedef struct {
     char interface[CONFIG_NAME_MAX];
     uint32_t bitrate_bps;
+    uint32_t passive_stop_ms;
 } config_can_t;
 
 /** Drives with CAN frames of their own; what the frames are is in canraw.h. */
