@@ -22,6 +22,7 @@
 #define RTU_FRAME_MAX   256u
 #define QUESTION_HEAD   9u /* characters of the longest question without its values, and of an answer likewise */
 #define ANSWER_HEAD     8u
+#define TIMEOUT_MOST_US 10000000u
 #define SERIAL_BITS     8
 
 /* --- Time --- */
@@ -172,6 +173,11 @@ static bool set_up(linux_modbus_link_t *self)
     return ioctl(fd, TIOCEXCL) == 0 && set_direction(self);
 }
 
+static void set_timeout(linux_modbus_link_t *self, uint64_t us)
+{
+    (void)modbus_set_response_timeout(self->modbus, (uint32_t)(us / 1000000u), (uint32_t)(us % 1000000u));
+}
+
 static void fail_to_link(linux_modbus_link_t *self, linux_modbus_trouble_t trouble, int error)
 {
     set_trouble(self, trouble, error);
@@ -183,7 +189,7 @@ void linux_modbus_link_mend(linux_modbus_link_t *self)
     if (self->is_linked || linux_modbus_now_us() < self->retry_us) {
         return;
     }
-    (void)modbus_set_response_timeout(self->modbus, 0, self->timeout_us);
+    set_timeout(self, self->timeout_us);
     if (modbus_connect(self->modbus) != 0) {
         const int error = errno;
         fail_to_link(self, self->is_serial ? trouble_of_serial(error) : trouble_of_tcp(error), error);
@@ -361,8 +367,7 @@ static hv_status_t converse(linux_modbus_link_t *self, const modbus_request_t *r
     if (!make_ready(self)) {
         return HV_ERR_IO;
     }
-    const uint64_t wait_us = self->timeout_us + characters_us(self, characters_of(request));
-    (void)modbus_set_response_timeout(self->modbus, (uint32_t)(wait_us / 1000000u), (uint32_t)(wait_us % 1000000u));
+    set_timeout(self, self->timeout_us + characters_us(self, characters_of(request)));
     (void)modbus_set_slave(self->modbus, request->unit);
     const int got = ask(self->modbus, request, result->value);
     const hv_status_t status = got < 0 ? judge(self, errno, &result->exception) : HV_OK;
@@ -552,8 +557,8 @@ static const char *wrong_in_tcp(const linux_modbus_config_t *config)
 
 static const char *wrong_in(const linux_modbus_config_t *config)
 {
-    if (config->timeout_us < 1000 || config->timeout_us > 999999) {
-        return "the timeout has to be within 1000 and 999999 us";
+    if (config->timeout_us < 1000 || config->timeout_us > TIMEOUT_MOST_US) {
+        return "the timeout has to be within 1000 and 10000000 us";
     }
     if (config->broadcast_pause_us > 999999) {
         return "the pause after a broadcast has to be within 0 and 999999 us";

@@ -31,7 +31,7 @@ typedef struct {
     uint8_t stop_bits;  /**< serial: 1 or 2 */
     linux_modbus_direction_t direction; /**< serial */
     uint32_t direction_delay_us;        /**< serial: between RTS and the first bit, and the last bit and RTS; [0, 10000] */
-    uint32_t timeout_us; /**< for an answer, and for a connection; [1000, 999999], usually 20000 to 50000. On a serial line it
+    uint32_t timeout_us; /**< for an answer, and for a connection; [1000, 10000000], usually 20000 to 50000. On a serial line it
                             begins when the question is out and ends with the longest answer's own time added */
     uint32_t broadcast_pause_us; /**< after a broadcast, for the devices to act; [0, 999999] */
 } linux_modbus_config_t;

@@ -20,7 +20,6 @@
 #include "linux_log.h"
 #include "linux_udp.h"
 #include "manager.h"
-#include "metrics.h"
 #include "motion_loop.h"
 #include "out_file.h"
 #include "record.h"
@@ -38,8 +37,7 @@ typedef struct {
     control_t control;
     config_t config; /**< as it was, with what reloads changed */
     manager_t manager;
-    metrics_t metrics;
-    motion_view_words_t view; /**< for the manager and the metrics */
+    motion_view_words_t view; /**< for the manager */
     linux_udp_t udp;
     linux_log_t log;
     int signal_fd;
@@ -197,12 +195,10 @@ static uint64_t now_us(const live_t *self)
     return hal_clock_now_us(self->loop.clock);
 }
 
-/* The service manager, and whoever collects metrics. */
-static void tell_others(live_t *self)
+static void tell_manager(live_t *self)
 {
     if (seqlock_read(&self->loop.view, self->view.word)) {
         manager_serve(&self->manager, &self->view.view.snapshot, now_us(self));
-        metrics_serve(&self->metrics, &self->view.view, &self->config, &self->loop.times, now_us(self));
     }
 }
 
@@ -216,7 +212,7 @@ static void serve_once(live_t *self)
     }
     take_signals(self);
     control_serve(&self->control, fds, now_us(self));
-    tell_others(self);
+    tell_manager(self);
     write_files(self);
     (void)!linux_log_flush(&self->log); /* what does not go out now goes out later */
 }
@@ -258,7 +254,6 @@ static int finish(live_t *self)
 {
     control_serve(&self->control, (const struct pollfd[CONTROL_FDS]){{.fd = -1}}, now_us(self)); /* the last answers */
     control_close(&self->control);
-    metrics_remove(&self->metrics);
     write_all(self);
     (void)!linux_log_flush(&self->log);
     int code = EXIT_DONE;
@@ -293,7 +288,6 @@ static int run(live_t *self, const config_t *config)
     }
     say_ready(self, config);
     manager_ready(&self->manager, now_us(self));
-    metrics_init(&self->metrics, strcmp(self->config.metrics_file, "none") == 0 ? "" : self->config.metrics_file);
     const bool has_ended = serve(self);
     if (has_ended) {
         (void)pthread_join(self->loop.thread, NULL);

@@ -87,9 +87,9 @@ static uint16_t get_sim(uint8_t unit, bank_t bank, uint16_t address)
     return values[bank];
 }
 
-/* The backend of Linux, against a server made from libmodbus' other side. Generous times, so that a busy machine changes nothing.
- */
-#define TIMEOUT_US 900000u
+/* The backend of Linux, against a server made from libmodbus' other side. Generous times, since on a busy machine a pseudo
+ * terminal may hold bytes back for seconds. */
+#define TIMEOUT_US 5000000u
 #define LIMIT_S    60
 
 static linux_modbus_t line;

@@ -30,7 +30,7 @@ main() {
         return 0
     fi
     rm -rf "$venv"
-    say "the Python packages for the CAN tests could not be installed: $(grep -m 1 -iE 'error' "$log" || tail -n 1 "$log")"
+    say "the Python packages for the CAN and Modbus tests could not be installed: $(grep -m 1 -iE 'error' "$log" || tail -n 1 "$log")"
     return 1
 }
 
