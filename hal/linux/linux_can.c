@@ -238,6 +238,21 @@ static hv_status_t can_bus_state_op(void *ctx, hal_can_state_t *out)
     return HV_OK;
 }
 
+/* What only a restart takes back stays; an interface without a controller (vcan) knows nothing better than its reports. */
+static hv_status_t can_ask_state_op(void *ctx, hal_can_state_t *out)
+{
+    linux_can_t *self = ctx;
+    linux_can_link_t link;
+    if (linux_can_link_look(self->netlink, self->name, &link) != HV_OK) {
+        return HV_ERR_IO;
+    }
+    if (!self->is_cut && link.has_controller && link.is_up && link.state != HAL_CAN_BUS_OFF) {
+        self->state = link.state;
+    }
+    *out = self->state;
+    return HV_OK;
+}
+
 static hv_status_t can_unconfirmed_op(void *ctx, uint32_t *frames)
 {
     const linux_can_t *self = ctx;
@@ -454,6 +469,7 @@ void linux_can_close(linux_can_t *self)
 
 hal_can_t linux_can_hal(linux_can_t *self)
 {
-    static const hal_can_ops_t k_ops = {can_send_op, can_recv_op, can_bus_state_op, can_unconfirmed_op, can_restart_op};
+    static const hal_can_ops_t k_ops = {can_send_op,        can_recv_op,    can_bus_state_op,
+                                        can_unconfirmed_op, can_restart_op, can_ask_state_op};
     return (hal_can_t){&k_ops, self};
 }

@@ -331,17 +331,23 @@ void sim_can_plug(sim_can_t *self)
 void sim_can_set_state(sim_can_t *self, hal_can_state_t state)
 {
     static const uint32_t k_report[] = {
-        [HAL_CAN_ACTIVE] = CAN_ERROR_RESTARTED, [HAL_CAN_WARNING] = CAN_ERROR_WARNING, [HAL_CAN_PASSIVE] = CAN_ERROR_PASSIVE,
-        [HAL_CAN_BUS_OFF] = CAN_ERROR_BUS_OFF,  [HAL_CAN_DOWN] = CAN_ERROR_OTHER,      [HAL_CAN_GONE] = CAN_ERROR_OTHER,
+        [HAL_CAN_ACTIVE] = CAN_ERROR_OTHER,    [HAL_CAN_WARNING] = CAN_ERROR_WARNING, [HAL_CAN_PASSIVE] = CAN_ERROR_PASSIVE,
+        [HAL_CAN_BUS_OFF] = CAN_ERROR_BUS_OFF, [HAL_CAN_DOWN] = CAN_ERROR_OTHER,      [HAL_CAN_GONE] = CAN_ERROR_OTHER,
     };
     if (self->state != state) {
+        const bool is_restart = self->state == HAL_CAN_BUS_OFF && state == HAL_CAN_ACTIVE;
         self->state = state;
-        push_report(self, k_report[state], self->bus->now_us);
+        sim_can_report(self, is_restart ? (uint32_t)CAN_ERROR_RESTARTED : k_report[state]);
     }
+}
+
+void sim_can_report(sim_can_t *self, uint32_t error)
+{
+    push_report(self, error, self->bus->now_us);
 }
 
 hal_can_t sim_can_hal(sim_can_t *self)
 {
-    static const hal_can_ops_t k_ops = {can_send, can_recv, can_bus_state, can_unconfirmed, can_restart};
+    static const hal_can_ops_t k_ops = {can_send, can_recv, can_bus_state, can_unconfirmed, can_restart, NULL};
     return (hal_can_t){&k_ops, self};
 }

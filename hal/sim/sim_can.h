@@ -97,6 +97,9 @@ void sim_can_plug(sim_can_t *self);
  *  HAL_CAN_GONE. */
 void sim_can_set_state(sim_can_t *self, hal_can_state_t state);
 
+/** A report of the controller beside those of its own: CAN_ERROR_*. */
+void sim_can_report(sim_can_t *self, uint32_t error);
+
 /** The controller as hal/can.h wants it. */
 hal_can_t sim_can_hal(sim_can_t *self);
 

@@ -379,6 +379,6 @@ hv_status_t sim_drives_init(sim_drives_t *self, uint8_t count, const sim_drive_c
 
 drives_t sim_drives_hal(sim_drives_t *self)
 {
-    static const drives_ops_t k_ops = {drives_sim_poll, drives_sim_send, drives_sim_request, drives_sim_count, NULL};
+    static const drives_ops_t k_ops = {drives_sim_poll, drives_sim_send, drives_sim_request, drives_sim_count, NULL, NULL};
     return (drives_t){&k_ops, self};
 }

@@ -15,6 +15,7 @@
 #ifndef HEAVE_CANRAW_H
 #define HEAVE_CANRAW_H
 
+#include "heave/canpassive.h"
 #include "heave/counts.h"
 #include "heave/drives.h"
 #include "heave/hal/can.h"
@@ -83,6 +84,7 @@ typedef struct {
     uint32_t period_us;       /**< of the bus, a multiple of the motion cycle */
     uint32_t query_every;     /**< each drive is asked once in so many periods, [1, 1000] */
     uint32_t offline_periods; /**< > 2 * query_every */
+    uint32_t passive_stop_ms; /**< error-passive for so long: the bus is failing; 0 = never */
     uint32_t speed_least;     /**< what a speed field carries at least; the only speed where axis[].speed is 0 per u/s */
     canraw_frame_t setpoint;
     canraw_frame_t command[CANRAW_COMMANDS];
@@ -128,10 +130,12 @@ typedef struct {
 typedef struct {
     const canraw_map_t *map;
     hal_can_t can;
-    bool is_gone; /**< the bus does not work */
-    bool is_due;  /**< a period has passed, the next set has not gone out */
-    bool is_free; /**< everything sent was seen on the wire */
+    bool is_gone;    /**< the bus does not work */
+    bool is_due;     /**< a period has passed, the next set has not gone out */
+    bool is_free;    /**< everything sent was seen on the wire */
+    bool is_refused; /**< the last set, by a queue that is full */
     bool has_time;
+    canpassive_t passive;
     uint64_t now_us;
     uint64_t set_us;     /**< the last set went out */
     uint64_t query_us;   /**< the last queries went out */

@@ -16,6 +16,7 @@
 #ifndef HEAVE_CIA402_H
 #define HEAVE_CIA402_H
 
+#include "heave/canpassive.h"
 #include "heave/cia402_state.h"
 #include "heave/counts.h"
 #include "heave/drives.h"
@@ -77,6 +78,7 @@ typedef struct {
     uint16_t boot_timeout_ms;      /**< after reset communication */
     uint16_t power_timeout_ms;     /**< to switch on, and to enable operation */
     uint16_t window_ms;            /**< 6066h */
+    uint32_t passive_stop_ms;      /**< error-passive for so long: the bus is failing; 0 = never */
     int16_t abort_option;          /**< 6007h: 1 fault, 2 disable voltage, 3 quick stop */
     uint8_t sync_counter;          /**< 1019h: 0 = none, or [2, 240] */
     bool is_sync_watched;          /**< 1006h holds the period: drives may stop where SYNC is late */
@@ -199,9 +201,11 @@ typedef struct {
     bool is_open;          /* SYNC has gone out, the set-points have not */
     bool was_period_begin; /* in the last poll */
     bool is_free;          /* everything sent was seen on the wire */
+    bool is_refused;       /* the last SYNC, by a queue that is full */
     bool has_time;
     bool is_preop_due; /* all nodes have to be told to leave operational */
-    uint8_t pp_step;   /* of the handshake in PP */
+    canpassive_t passive;
+    uint8_t pp_step; /* of the handshake in PP */
     uint8_t sync_count;
     uint64_t now_us;
     uint64_t sync_us;

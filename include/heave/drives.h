@@ -54,13 +54,14 @@ typedef enum {
     DRIVES_RESET_FAULT /**< FAULT -> DISABLED where the cause is gone, else FAULT stays */
 } drives_request_t;
 
-/** Every op is mandatory but report. */
+/** Every op is mandatory but report and is_failing. */
 typedef struct {
     hv_status_t (*poll)(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX]);
     hv_status_t (*send)(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX]);
     hv_status_t (*request)(void *ctx, drives_request_t request);
     uint8_t (*count)(void *ctx);
     void (*report)(void *ctx, uint8_t axis, drive_report_t *out); /* optional */
+    bool (*is_failing)(void *ctx);                                /* optional: never */
 } drives_ops_t;
 
 /** Passed by value; ctx belongs to the backend and lives until its close. */
@@ -126,6 +127,13 @@ static inline bool drives_report(drives_t drives, uint8_t axis, drive_report_t *
     }
     drives.ops->report(drives.ctx, axis, out);
     return true;
+}
+
+/** True while the bus still works but is likely to be lost soon (a CAN controller that stays error-passive): there is time for a
+ *  controlled stop. As of the last poll; never blocks. */
+static inline bool drives_is_failing(drives_t drives)
+{
+    return drives.ops->is_failing != NULL && drives.ops->is_failing(drives.ctx);
 }
 
 #endif

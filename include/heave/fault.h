@@ -17,6 +17,7 @@ typedef enum {
     FAULT_DRIVE_TIMEOUT, /**< enabling or homing took too long */
     FAULT_BUS,           /**< the drives' bus is gone or takes no set-points */
     FAULT_FOLLOWING,     /**< a cylinder is too far from its set-point for too long */
+    FAULT_BUS_FAILING,   /**< the drives' bus still works, but may be lost at any moment */
     FAULT_CODES
 } fault_code_t;
 

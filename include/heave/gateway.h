@@ -60,6 +60,7 @@ typedef struct {
     bring_up_t bring_up;
     uint64_t bring_up_deadline_us;
     bool is_bus_lost;        /**< so that it is counted once */
+    bool is_bus_failing;     /**< the same */
     bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
     bool is_disable_due;     /**< disable the drives once at rest */
     auto_engage_t auto_engage;

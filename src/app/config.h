@@ -65,6 +65,7 @@ typedef enum { CONFIG_SEND_EVERY_PERIOD, CONFIG_SEND_ON_CHANGE } config_send_t;
 typedef struct {
     char interface[CONFIG_NAME_MAX];
     uint32_t bitrate_bps;
+    uint32_t passive_stop_ms;
 } config_can_t;
 
 /** Drives with CAN frames of their own; what the frames are is in canraw.h. */
@@ -178,6 +179,7 @@ typedef struct {
     config_udp_t udp;
     uint32_t late_hold_cycles; /**< of the program: see motion_loop.h */
     char control_socket[CONFIG_PATH_MAX];
+    char metrics_file[CONFIG_PATH_MAX]; /**< "none" = none */
     config_drives_t drives;
     config_sim_t sim;
     config_can_t can;

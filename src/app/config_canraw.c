@@ -62,6 +62,7 @@ void config_canraw_map(const config_t *config, canraw_map_t *map)
         .period_us = raw->period_us,
         .query_every = raw->query_every,
         .offline_periods = raw->offline_periods,
+        .passive_stop_ms = config->can.passive_stop_ms,
         .speed_least = raw->speed_counts,
         .setpoint = raw->setpoint,
         .command = {[CANRAW_STOP] = raw->stop,

@@ -100,6 +100,7 @@ void config_cia402(const config_t *config, cia402_config_t *out)
         .boot_timeout_ms = cia402->boot_timeout_ms,
         .power_timeout_ms = cia402->power_timeout_ms,
         .window_ms = cia402->following_error_ms,
+        .passive_stop_ms = config->can.passive_stop_ms,
         .abort_option = (int16_t)((int)cia402->when_gateway_lost + 1),
         .sync_counter = cia402->sync_counter,
         .is_sync_watched = cia402->is_sync_watched,

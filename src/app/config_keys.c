@@ -178,6 +178,9 @@ const config_key_t config_keys[] = {
 
     {KEY("control", "socket"), AT(control_socket), .type = CONFIG_PATH, .unit = "", .fallback = "/run/heave/heaved.sock",
      .help = "local socket of heaved"},
+    {KEY("control", "metrics"), AT(metrics_file), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "file for Prometheus (node_exporter's textfile collector: a name that ends in .prom), renewed every second; removed at "
+             "the end"},
 
     {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim|cia402|can-raw",
      .absent = "modbus-tcp|modbus-rtu", .help = "the drives in use"},
@@ -195,6 +198,8 @@ const config_key_t config_keys[] = {
      .help = "CAN interface of the system, set up with the bit rate below"},
     {KEY("can", "bitrate_bps"), AT(can.bitrate_bps), .type = CONFIG_INTEGER, .unit = "bit/s", .fallback = "1000000",
      RANGE(10000, 1000000), .help = "bit rate of the bus, for its load"},
+    {KEY("can", "passive_stop_ms"), AT(can.passive_stop_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "1000",
+     RANGE(0, 60000), .help = "error-passive for so long, the platform stops (fault bus-failing); 0 = never"},
 
     {KEY("cia402", "nodes"), AT(cia402.nodes), .type = CONFIG_IDS, .unit = "", .fallback = "1",
      .help = "node id of drive 1, the next ones follow; or one for each drive. The rotation motor is the last"},

@@ -355,7 +355,8 @@ static bool parse_networks(const config_key_t *key, const char *text, hal_udp_ne
 
 static bool parse_path(const config_key_t *key, span_t item, char *field, config_text_t *why)
 {
-    if (item.length == 0 || item.at[0] != '/') {
+    const bool is_none = key->words != NULL && is_word(item, key->words);
+    if (!is_none && (item.length == 0 || item.at[0] != '/')) {
         return refuse(key, item, "is not an absolute path", why);
     }
     if (item.length >= key->size) {

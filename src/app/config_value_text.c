@@ -228,7 +228,8 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         config_text_add(text, "%s, or up to %u addresses or networks such as 192.168.7.0/24", key->words, HAL_UDP_NETWORKS_MAX);
         break;
     case CONFIG_PATH:
-        config_text_add(text, "an absolute path of at most %u characters", (unsigned)key->size - 1u);
+        config_text_add(text, "%s%san absolute path of at most %u characters", key->words != NULL ? key->words : "",
+                        key->words != NULL ? ", or " : "", (unsigned)key->size - 1u);
         break;
     case CONFIG_LABEL:
         config_text_add(text, "none, or a name of at most %u characters", CONFIG_LABEL_MAX - 1u);

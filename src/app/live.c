@@ -20,6 +20,7 @@
 #include "linux_log.h"
 #include "linux_udp.h"
 #include "manager.h"
+#include "metrics.h"
 #include "motion_loop.h"
 #include "out_file.h"
 #include "record.h"
@@ -37,7 +38,8 @@ typedef struct {
     control_t control;
     config_t config; /**< as it was, with what reloads changed */
     manager_t manager;
-    motion_view_words_t view; /**< for the manager */
+    metrics_t metrics;
+    motion_view_words_t view; /**< for the manager and the metrics */
     linux_udp_t udp;
     linux_log_t log;
     int signal_fd;
@@ -195,10 +197,12 @@ static uint64_t now_us(const live_t *self)
     return hal_clock_now_us(self->loop.clock);
 }
 
-static void tell_manager(live_t *self)
+/* The service manager, and whoever collects metrics. */
+static void tell_others(live_t *self)
 {
     if (seqlock_read(&self->loop.view, self->view.word)) {
         manager_serve(&self->manager, &self->view.view.snapshot, now_us(self));
+        metrics_serve(&self->metrics, &self->view.view, &self->config, &self->loop.times, now_us(self));
     }
 }
 
@@ -212,7 +216,7 @@ static void serve_once(live_t *self)
     }
     take_signals(self);
     control_serve(&self->control, fds, now_us(self));
-    tell_manager(self);
+    tell_others(self);
     write_files(self);
     (void)!linux_log_flush(&self->log); /* what does not go out now goes out later */
 }
@@ -254,6 +258,7 @@ static int finish(live_t *self)
 {
     control_serve(&self->control, (const struct pollfd[CONTROL_FDS]){{.fd = -1}}, now_us(self)); /* the last answers */
     control_close(&self->control);
+    metrics_remove(&self->metrics);
     write_all(self);
     (void)!linux_log_flush(&self->log);
     int code = EXIT_DONE;
@@ -288,6 +293,7 @@ static int run(live_t *self, const config_t *config)
     }
     say_ready(self, config);
     manager_ready(&self->manager, now_us(self));
+    metrics_init(&self->metrics, strcmp(self->config.metrics_file, "none") == 0 ? "" : self->config.metrics_file);
     const bool has_ended = serve(self);
     if (has_ended) {
         (void)pthread_join(self->loop.thread, NULL);

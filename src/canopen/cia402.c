@@ -113,6 +113,7 @@ static uint64_t silence_us(const cia402_t *self)
 static void come_back(cia402_t *self)
 {
     self->is_gone = false;
+    self->is_refused = false;
     self->is_preop_due = true;
     self->free_us = self->now_us;
     self->sync_us = self->now_us;
@@ -132,12 +133,12 @@ static void try_restart(cia402_t *self, bool is_bad)
     }
 }
 
-/* Whether the bus works: up, and what was sent has been seen on the wire not long ago. */
+/* Whether the bus works: up, and not long ago there was room and what was sent has been seen on the wire. */
 static void watch_bus(cia402_t *self, bool is_up)
 {
     uint32_t waiting = 0;
     self->is_free = hal_can_unconfirmed(self->can, &waiting) != HV_OK || waiting == 0;
-    self->free_us = self->is_free ? self->now_us : self->free_us;
+    self->free_us = self->is_free && !self->is_refused ? self->now_us : self->free_us;
     const bool is_stalled = self->now_us - self->free_us >= (uint64_t)STALLED_PERIODS * self->config->period_us;
     const bool is_bad = !is_up || is_stalled || !is_controller_up(self);
     if (is_bad && !self->is_gone) {
@@ -171,7 +172,8 @@ static void send_sync(cia402_t *self)
         frame.length = 1;
         frame.data[0] = self->sync_count;
     }
-    if (!send_frame(self, &frame)) {
+    self->is_refused = !send_frame(self, &frame);
+    if (self->is_refused) {
         return;
     }
     self->sync_count = self->sync_count < self->config->sync_counter ? (uint8_t)(self->sync_count + 1u) : COUNTER_FIRST;
@@ -353,6 +355,7 @@ static hv_status_t cia402_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
     take_time(self, now_us);
     const bool is_up = receive(self);
     watch_bus(self, is_up);
+    canpassive_step(&self->passive, self->can, now_us, self->config->passive_stop_ms);
     if (!self->is_gone) {
         work(self);
     }
@@ -471,9 +474,15 @@ static void cia402_report(void *ctx, uint8_t axis, drive_report_t *out)
     cia402_report_words(ctx, axis, out);
 }
 
+static bool cia402_is_failing(void *ctx)
+{
+    const cia402_t *self = ctx;
+    return self->passive.is_failing;
+}
+
 drives_t cia402_hal(cia402_t *self)
 {
-    static const drives_ops_t k_ops = {cia402_poll, cia402_send, cia402_request, cia402_count, cia402_report};
+    static const drives_ops_t k_ops = {cia402_poll, cia402_send, cia402_request, cia402_count, cia402_report, cia402_is_failing};
     return (drives_t){&k_ops, self};
 }
 

@@ -8,7 +8,7 @@
 
 #define STALLED_PERIODS 3u      /* without an echo: the bus is gone */
 #define RESTART_US      500000u /* between attempts to restart the bus */
-#define FRAMES_PER_POLL 64u
+#define FRAMES_PER_POLL 128u
 
 static bool is_any_online(const canraw_t *self)
 {
@@ -77,15 +77,16 @@ static void restart_bus(canraw_t *self)
     if (hal_can_restart(self->can) == HV_OK) {
         self->restarts++;
         self->free_us = self->now_us;
+        self->is_refused = false;
     }
 }
 
-/* Whether the bus works: up, and what was sent has been seen on the wire not long ago. */
+/* Whether the bus works: up, and not long ago there was room and what was sent has been seen on the wire. */
 static void watch_bus(canraw_t *self, bool is_up)
 {
     uint32_t waiting = 0;
     self->is_free = hal_can_unconfirmed(self->can, &waiting) != HV_OK || waiting == 0;
-    self->free_us = self->is_free ? self->now_us : self->free_us;
+    self->free_us = self->is_free && !self->is_refused ? self->now_us : self->free_us;
     const bool is_stalled = self->now_us - self->free_us >= (uint64_t)STALLED_PERIODS * self->map->period_us;
     const bool is_gone = !is_up || is_stalled || !is_controller_up(self);
     if (is_gone && !self->is_gone) {
@@ -232,6 +233,7 @@ static hv_status_t canraw_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
     take_time(self, now_us);
     const bool is_up = receive(self);
     watch_bus(self, is_up);
+    canpassive_step(&self->passive, self->can, now_us, self->map->passive_stop_ms);
     for (unsigned k = 0; k < self->map->axes; k++) {
         canraw_axis_step(&self->axis[k], self->map, now_us);
         canraw_axis_report(&self->axis[k], &feedback[k]);
@@ -254,6 +256,7 @@ static hv_status_t canraw_send(void *ctx, uint64_t now_us, const q32_t setpoint_
         return HV_OK;
     }
     const hv_status_t status = self->is_free ? send_set(self, setpoint_q32) : HV_ERR_AGAIN;
+    self->is_refused = self->is_free && status != HV_OK;
     if (status != HV_OK) {
         self->refused++;
         return status;
@@ -318,8 +321,14 @@ static uint8_t canraw_count(void *ctx)
     return self->map->axes;
 }
 
+static bool canraw_is_failing(void *ctx)
+{
+    const canraw_t *self = ctx;
+    return self->passive.is_failing;
+}
+
 drives_t canraw_hal(canraw_t *self)
 {
-    static const drives_ops_t k_ops = {canraw_poll, canraw_send, canraw_request, canraw_count, NULL};
+    static const drives_ops_t k_ops = {canraw_poll, canraw_send, canraw_request, canraw_count, NULL, canraw_is_failing};
     return (drives_t){&k_ops, self};
 }

@@ -271,6 +271,6 @@ static void drive_report(void *ctx, uint8_t axis, drive_report_t *out)
 
 drives_t modbus_drive_hal(modbus_drive_t *self)
 {
-    static const drives_ops_t k_ops = {drive_poll, drive_send, drive_request, drive_count, drive_report};
+    static const drives_ops_t k_ops = {drive_poll, drive_send, drive_request, drive_count, drive_report, NULL};
     return (drives_t){&k_ops, self};
 }

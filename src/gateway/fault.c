@@ -48,6 +48,14 @@ static const fault_row_t k_rows[FAULT_CODES] = {
          "卡阻或过载、比例或方向设置错误，或跟随误差窗口过窄"},
         {"check the mechanics and the load, scaling and sign; [cylinders] following_error_mm is the window; then heavectl reset",
          "检查机械和负载、比例与方向；窗口由 [cylinders] following_error_mm 设定；然后执行 heavectl reset"}},
+    [FAULT_BUS_FAILING] = {
+        FAULT_REACT_STOP, "bus-failing",
+        {"the bus of the drives is about to be lost", "与驱动器的总线通信即将中断"},
+        {"too many frames are disturbed: the CAN controller has been error-passive for longer than [can] passive_stop_ms",
+         "受干扰的帧过多：CAN 控制器处于 error-passive 状态的时间超过 [can] passive_stop_ms"},
+        {"check cable, connectors, termination (120 ohm at both ends), grounding and bit rate; ip -s -d link show counts the errors; "
+         "then heavectl reset",
+         "检查电缆、接头、终端电阻（两端各 120 欧姆）、接地和波特率；ip -s -d link show 显示错误计数；然后执行 heavectl reset"}},
 };
 /* clang-format on */
 

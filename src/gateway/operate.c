@@ -42,8 +42,12 @@ static bool is_at_settled(const gateway_t *self)
     return true;
 }
 
+/* What a reset would come too early for. */
 static bool is_drive_fault_present(const gateway_t *self)
 {
+    if (drives_is_failing(self->io.drives)) {
+        return true;
+    }
     for (unsigned i = 0; i < drive_count(self); i++) {
         if (self->feedback[i].state == DRIVE_FAULT || self->feedback[i].state == DRIVE_OFFLINE) {
             return true;
@@ -251,6 +255,16 @@ static void watch_bus(gateway_t *self, bool is_lost, uint64_t now_us)
     self->is_tracking_actual |= is_lost;
 }
 
+/* The set-points are still heard. */
+static void watch_failing(gateway_t *self, uint64_t now_us)
+{
+    const bool is_failing = drives_is_failing(self->io.drives) && self->supervisor.state != STATE_OFF;
+    if (is_failing && !self->is_bus_failing) {
+        raise_fault(self, FAULT_BUS_FAILING, 0, 0, now_us);
+    }
+    self->is_bus_failing = is_failing;
+}
+
 static bool is_bus_stalled(const gateway_t *self)
 {
     return self->unsent_cycles * (uint64_t)self->settings.cycle_us > UNSENT_MAX_US;
@@ -405,6 +419,7 @@ void operate_before_frames(gateway_t *self, uint64_t now_us)
     operate_event(self, EVENT_TICK, now_us);
     const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->feedback) == HV_OK;
     watch_bus(self, !is_bus_heard || is_bus_stalled(self), now_us);
+    watch_failing(self, now_us);
     watch_drives(self, now_us);
     read_inputs(self, now_us);
     step_reset(self, now_us);

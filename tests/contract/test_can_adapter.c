@@ -228,6 +228,25 @@ static void test_controller_states_are_reported_and_counted(void)
     TEST_ASSERT_EQUAL_UINT32(1, link.bus_offs);
 }
 
+/* Before any report was taken in; what only a restart takes back is left to the reports. */
+static void test_ask_state_is_the_controllers_own(void)
+{
+    hal_can_state_t state = HAL_CAN_GONE;
+    say("sp000128\r");
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_ask_state(hal, &state));
+    TEST_ASSERT_EQUAL(HAL_CAN_PASSIVE, state);
+    (void)receive_reports();
+    say("sw000100\r");
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_ask_state(hal, &state));
+    TEST_ASSERT_EQUAL(HAL_CAN_WARNING, state);
+    say("sb000256\r");
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_ask_state(hal, &state));
+    TEST_ASSERT_EQUAL(HAL_CAN_WARNING, state);
+    TEST_ASSERT_EQUAL_HEX32(CAN_ERROR_BUS_OFF, receive_reports() & CAN_ERROR_BUS_OFF);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_ask_state(hal, &state));
+    TEST_ASSERT_EQUAL(HAL_CAN_BUS_OFF, state);
+}
+
 static void test_bus_off_nothing_is_sent_until_restart_brings_the_controller_back(void)
 {
     say("sb000256\r");
@@ -291,6 +310,7 @@ int main(void)
     RUN_TEST(test_unconfirmed_without_echo_says_so);
     RUN_TEST(test_send_reaches_the_wire);
     RUN_TEST(test_controller_states_are_reported_and_counted);
+    RUN_TEST(test_ask_state_is_the_controllers_own);
     RUN_TEST(test_bus_off_nothing_is_sent_until_restart_brings_the_controller_back);
     RUN_TEST(test_stalled_wire_old_frames_are_bounded_and_a_flush_drops_them);
     RUN_TEST(test_unplugged_and_plugged_in_again_works_after_restart);

@@ -201,7 +201,13 @@ static uint8_t spy_count(void *ctx)
     return drives_count(((rig_t *)ctx)->inner);
 }
 
-static const drives_ops_t k_spy = {.poll = spy_poll, .send = spy_send, .request = spy_request, .count = spy_count};
+static bool spy_is_failing(void *ctx)
+{
+    return ((rig_t *)ctx)->is_failing;
+}
+
+static const drives_ops_t k_spy = {
+    .poll = spy_poll, .send = spy_send, .request = spy_request, .count = spy_count, .is_failing = spy_is_failing};
 
 static void fail(const char *what)
 {

@@ -30,6 +30,7 @@ typedef struct {
     sim_inputs_t inputs;
     sim_log_t log;
     drives_t inner;
+    bool is_failing; /**< of the drives' bus */
     uint64_t now_us;
     rig_check_t check;
     bool is_checking;      /**< off while the drives are not enabled: set-points then follow the actual positions */

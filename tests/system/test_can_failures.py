@@ -5,6 +5,8 @@
 On vcan and virtual time, inside kernel.py --virtual-time --python; judged on the recorded frames by can_judge. docs/failures.md names these cases."""
 import random
 import signal
+import socket
+import struct
 import subprocess
 import sys
 import time
@@ -151,15 +153,31 @@ def link_back():
     link_up()
 
 
+def cable_off():
+    """Nobody acknowledges: what is sent waits in the interface, and no echo comes."""
+    subprocess.run("tc qdisc replace dev vcan0 root tbf rate 8bit burst 16 limit 1600".split(), check=True)
+
+
 def stall():
-    """A bus on which nothing moves any more: the queue fills up, ENOBUFS."""
-    subprocess.run("tc qdisc replace dev vcan0 root tbf rate 8bit burst 16 limit 160".split(), check=True)
+    """Nothing moves any more, and there is no room for a single frame: ENOBUFS."""
+    subprocess.run("tc qdisc replace dev vcan0 root tbf rate 8bit burst 16 limit 16".split(), check=True)
+
+
+ERROR_CONTROLLER, ERROR_BUS_OFF, ERROR_ON_THE_WIRE = 0x004, 0x040, 0x088  # linux/can/error.h; the last one: protocol violation, bus error
+ACTIVE, PASSIVE = 0x40, 0x20
+
+
+def report(what, of_controller=0, times=1):
+    """What the driver of a controller says, as error frames."""
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as link_of_driver:
+        link_of_driver.bind(("vcan0",))
+        for _ in range(times):
+            link_of_driver.send(struct.pack("=IB3x8s", 0x20000000 | what, 8, bytes([0, of_controller, 0, 0, 0, 0, 130, 0])))
 
 
 def bus_off():
-    """What the driver of a controller says that has given up."""
-    subprocess.run([sys.executable, "-c", "import socket,struct; s = socket.socket(29, 3, 1); s.bind(('vcan0',)); s.send(struct.pack('=IB3x8s', "
-                    "0x20000040, 8, bytes(8)))"], check=True)
+    """The controller has given up."""
+    report(ERROR_BUS_OFF)
 
 
 def nothing():
@@ -167,6 +185,7 @@ def nothing():
 
 
 BUS_ROWS = [("interface down", link_down, link_up, 2 * CYCLE_US), ("interface gone and back", link_gone, link_back, 2 * CYCLE_US),
+            ("cable off, nobody acknowledges", cable_off, can_bench.CanBench.fast_bus, 4 * PERIOD_US),
             ("a queue that stays full", stall, can_bench.CanBench.fast_bus, 4 * PERIOD_US), ("bus-off", bus_off, nothing, 2 * CYCLE_US)]
 
 
@@ -189,6 +208,63 @@ def bus_lost(breaks, mends, within_us):
         own = [when for when, _ in record.of(can_judge.HEARTBEAT + 127) if when > begin_us + within_us]
         assert not own or own[0] - begin_us > HEARTBEAT_TIMEOUT_US, f"heard again {own[0] - begin_us} us after the loss"
     return case
+
+
+PASSIVE_STOP_US = 1000000  # [can] passive_stop_ms
+
+
+def passive_stops(bench):
+    """A second after the report, in the middle of the rise: all come to rest by their set-points, within every limit, and lose their torque then."""
+    in_motion(bench)
+    when_us = now_us()
+    report(ERROR_CONTROLLER, PASSIVE)
+    time.sleep(PASSIVE_STOP_US / 1e6 - 0.02)
+    before = bench.status()["state"]
+    time.sleep(1)
+    status = bench.status()
+    refused = bench.ctl("reset")
+    time.sleep(2.5)
+    latched = bench.status()["state"]
+    report(ERROR_CONTROLLER, ACTIVE)
+    time.sleep(0.1)
+    bench.ctl("reset")
+    time.sleep(0.1)
+    after = bench.status()["state"]
+    config, record = bench.folder / "can.ini", bench.record()
+    assert before == "RISING" and status["state"] == latched == "FAULT" and after == "OFF", (before, latched, after, refused)
+    assert status["fault"]["name"] == "bus-failing" and status["fault"]["reaction"] == "stop", status["fault"]
+    stops = stop_times(record, when_us)
+    for node in can_bench.NODES:
+        rows = record.enabled_span(node, stops[node])
+        can_judge.check_limits([rows[0][1]] * 3 + [target for _, target in rows], can_judge.limits_of(config, node, can_bench.CYLINDERS), PERIOD_US,
+                               can_bench.COUNTS_PER_MM, f"node {node}")
+        ways = [(when, abs(target - last)) for (_, last), (when, target) in zip(rows, rows[1:])]
+        assert node > can_bench.CYLINDERS or brakes_at(ways, when_us + PASSIVE_STOP_US), f"node {node}: {ways[-120:]}"
+
+
+def brakes_at(ways, begin_us):
+    """At the speed of the rise until then, at rest within half a second."""
+    speed = max(way for when, way in ways if begin_us - 100000 < when <= begin_us)
+    slower_us = next(when for when, way in ways if when > begin_us - 100000 and way < 0.9 * speed)
+    return speed > 50 and begin_us < slower_us < begin_us + 100000 and ways[-1][1] <= 1 and ways[-1][0] < begin_us + 500000
+
+
+def disturbed(bench):
+    """Error-passive for less than a second, and 10 000 error frames in a second: motion goes on, period by period."""
+    in_motion(bench)
+    begin_us = now_us()
+    report(ERROR_CONTROLLER, PASSIVE)
+    time.sleep(PASSIVE_STOP_US / 1e6 - 0.1)
+    report(ERROR_CONTROLLER, ACTIVE)
+    for _ in range(300):
+        report(ERROR_ON_THE_WIRE, times=10)
+        time.sleep(0.001)
+    end_us = now_us()
+    status = bench.status()
+    record = bench.record()
+    assert status["state"] in ("RISING", "ENGAGED") and status["fault"]["name"] == "none", status["fault"]
+    can_judge.check_order(record, begin_us, end_us, PERIOD_US)
+    assert set(record.stops(begin_us).values()) == {None} or min(filter(None, record.stops(begin_us).values())) >= end_us
 
 
 # --- Setting up ---
@@ -252,6 +328,8 @@ CASES += [
     ("an EMCY without a fault: nothing stops", harmless(("emergency", {"code": 0xFF00}))),
 ]
 CASES += [(f"{name}: silence, latched", bus_lost(*row)) for name, *row in BUS_ROWS]
+CASES += [("error-passive for more than a second: a controlled stop, latched", passive_stops),
+          ("error-passive for less, and a storm of error frames: nothing stops", disturbed)]
 CASES += [("drives missing or wrong are named, nobody is enabled", bad_drives_are_named), ("killed at random moments and started again", killed_anywhere)]
 
 

@@ -458,7 +458,9 @@ def allocates_nothing(bench, guard):
     manager.bind(str(bench.folder / "notify"))
     threading.Thread(target=lambda: [None for _ in iter(lambda: manager.recv(500), b"")], daemon=True).start()
     environment = {"LD_PRELOAD": guard, "HEAVE_MALLOC_GUARD": str(armed), "NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "100000"}
-    daemon = bench.start("--record", bench.folder / "r.txt", "--trace", bench.folder / "t.csv", environment=environment)
+    metrics = bench.folder / "heave.prom"
+    config = bench.file("metrics.ini", bench.config.read_text(encoding="utf-8").replace("[control]\n", f"[control]\nmetrics = {metrics}\n"))
+    daemon = bench.start("--record", bench.folder / "r.txt", "--trace", bench.folder / "t.csv", config=config, environment=environment)
     armed.touch()
     run = bench.ctl("status", env={**os.environ, **environment})
     assert "malloc guard: malloc" in run.stderr, "the guard does not work"
@@ -470,6 +472,7 @@ def allocates_nothing(bench, guard):
             bench.ctl(command)
         sender.stream(0.5, wave)
         watcher.file.readline()
+    heave.wait_for(metrics.exists, "metrics are written")
     daemon.send_signal(signal.SIGHUP)
     assert bench.stop(daemon) == 0
     assert "malloc guard" not in daemon.log.read_text(), daemon.log.read_text()

@@ -320,7 +320,7 @@ static void test_bus_off_unplugged_and_restarted_lose_every_drive(void)
         } else if (i == 1) {
             sim_can_unplug(&node);
         } else {
-            sim_can_set_state(&node, HAL_CAN_PASSIVE);
+            sim_can_set_state(&node, HAL_CAN_BUS_OFF);
             sim_can_set_state(&node, HAL_CAN_ACTIVE); /* reported as a restart */
         }
         (void)!poll_once();
@@ -329,6 +329,77 @@ static void test_bus_off_unplugged_and_restarted_lose_every_drive(void)
         await(DRIVE_DISABLED, 2000);
         enable();
     }
+}
+
+static hv_status_t take_nothing(void *ctx, const can_frame_t *frame)
+{
+    (void)ctx;
+    (void)frame;
+    return HV_ERR_AGAIN;
+}
+
+/* Somebody else's frames fill the queue: nothing of ours waits for an echo. */
+static void test_bus_whose_queue_stays_full_is_gone_after_three_periods(void)
+{
+    const unsigned period = map.period_us / CYCLE_US;
+    enable();
+    hal_can_ops_t full = *sim_can_hal(&node).ops;
+    full.send = take_nothing;
+    driver.can.ops = &full;
+    unsigned count = 0;
+    while (!are_all(DRIVE_OFFLINE) && count++ < 100) {
+        (void)!cycle();
+    }
+    TEST_ASSERT_UINT_WITHIN(period / 2, 3 * period + period / 2, count);
+    driver.can.ops = sim_can_hal(&node).ops;
+    await(DRIVE_DISABLED, 2000);
+}
+
+/* ---- Disturbed frames ---- */
+
+static void test_error_passive_is_failing_after_its_time_and_stops_nothing_here(void)
+{
+    map.passive_stop_ms = 1000;
+    open_with(NULL, 0, false);
+    enable();
+    sim_can_set_state(&node, HAL_CAN_PASSIVE);
+    cycles(1000);
+    TEST_ASSERT_FALSE(drives_is_failing(hal));
+    cycles(1);
+    TEST_ASSERT_TRUE(drives_is_failing(hal));
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    sim_can_set_state(&node, HAL_CAN_ACTIVE);
+    cycles(1);
+    TEST_ASSERT_FALSE(drives_is_failing(hal));
+}
+
+static unsigned received;
+
+/* A controller that has a report at any time. */
+static hv_status_t flood(void *ctx, can_frame_t *out, uint64_t *rx_time_us)
+{
+    (void)ctx;
+    received++;
+    *out = (can_frame_t){.id = CAN_ERROR_OTHER, .is_error = true};
+    *rx_time_us = now_us;
+    return HV_OK;
+}
+
+static void test_storm_of_error_frames_is_bounded_and_stops_nothing(void)
+{
+    hal_can_ops_t endless = *sim_can_hal(&node).ops;
+    endless.recv = flood;
+    enable();
+    for (unsigned i = 0; i < 1000; i++) {
+        for (unsigned k = 0; k < 20; k++) {
+            sim_can_report(&node, CAN_ERROR_OTHER);
+        }
+        (void)!cycle();
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    }
+    driver.can.ops = &endless;
+    cycles(1);
+    TEST_ASSERT_EQUAL_UINT(128, received);
 }
 
 /* ---- Feedback ---- */
@@ -676,6 +747,9 @@ int main(void)
     RUN_TEST(test_queue_full_at_every_frame_of_a_set_makes_no_larger_step);
     RUN_TEST(test_bus_without_partner_is_gone_after_three_periods_and_returns);
     RUN_TEST(test_bus_off_unplugged_and_restarted_lose_every_drive);
+    RUN_TEST(test_bus_whose_queue_stays_full_is_gone_after_three_periods);
+    RUN_TEST(test_error_passive_is_failing_after_its_time_and_stops_nothing_here);
+    RUN_TEST(test_storm_of_error_frames_is_bounded_and_stops_nothing);
     RUN_TEST(test_silent_drive_is_offline_after_its_periods_and_gets_nothing_more);
     RUN_TEST(test_one_lost_frame_anywhere_is_survived);
     RUN_TEST(test_following_error_stops_that_axis_and_it_hears_nothing_more);

@@ -603,6 +603,78 @@ static void test_bus_that_echoes_nothing_is_gone_after_three_periods(void)
     TEST_ASSERT_TRUE(count <= 4 * PERIOD + 1);
 }
 
+static void test_error_passive_is_failing_after_its_time_and_stops_nothing_here(void)
+{
+    config.passive_stop_ms = 1000;
+    come_up();
+    enable();
+    sim_can_set_state(&node, HAL_CAN_PASSIVE);
+    cycles(1000);
+    TEST_ASSERT_FALSE(drives_is_failing(hal));
+    cycles(1);
+    TEST_ASSERT_TRUE(drives_is_failing(hal));
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    sim_can_set_state(&node, HAL_CAN_ACTIVE);
+    cycles(1);
+    TEST_ASSERT_FALSE(drives_is_failing(hal));
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+}
+
+static unsigned received;
+
+/* A controller that has a report at any time. */
+static hv_status_t flood(void *ctx, can_frame_t *out, uint64_t *rx_time_us)
+{
+    (void)ctx;
+    received++;
+    *out = (can_frame_t){.id = CAN_ERROR_OTHER, .is_error = true};
+    *rx_time_us = now_us;
+    return HV_OK;
+}
+
+/* 20 000 a second are more than 1 Mbit/s has room for beside the drives' frames. */
+static void test_storm_of_error_frames_is_bounded_and_stops_nothing(void)
+{
+    come_up();
+    enable();
+    for (unsigned i = 0; i < 1000; i++) {
+        for (unsigned k = 0; k < 20; k++) {
+            sim_can_report(&node, CAN_ERROR_OTHER);
+        }
+        (void)!cycle();
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    }
+    hal_can_ops_t endless = *sim_can_hal(&node).ops;
+    endless.recv = flood;
+    driver.can.ops = &endless;
+    (void)!cycle();
+    TEST_ASSERT_EQUAL_UINT(128, received);
+}
+
+static hv_status_t take_nothing(void *ctx, const can_frame_t *frame)
+{
+    (void)ctx;
+    (void)frame;
+    return HV_ERR_AGAIN;
+}
+
+/* Somebody else's frames fill the queue: nothing of ours waits for an echo. */
+static void test_bus_whose_queue_stays_full_is_gone_after_three_periods(void)
+{
+    come_up();
+    enable();
+    hal_can_ops_t full = *sim_can_hal(&node).ops;
+    full.send = take_nothing;
+    driver.can.ops = &full;
+    unsigned count = 0;
+    while (!are_all(DRIVE_OFFLINE) && count++ < 100) {
+        (void)!cycle();
+    }
+    TEST_ASSERT_UINT_WITHIN(PERIOD / 2, 3 * PERIOD + PERIOD / 2, count);
+    driver.can.ops = sim_can_hal(&node).ops;
+    await(DRIVE_FAULT, 10000); /* by their watch over the heartbeat */
+}
+
 static void test_send_slow_bus_refuses_instead_of_queueing(void)
 {
     come_up();
@@ -787,7 +859,10 @@ int main(void)
     RUN_TEST(test_leave_drives_with_torque_are_left_to_their_watchdogs);
     RUN_TEST(test_bus_off_keeps_silent_until_the_drives_have_stopped);
     RUN_TEST(test_bus_that_echoes_nothing_is_gone_after_three_periods);
+    RUN_TEST(test_bus_whose_queue_stays_full_is_gone_after_three_periods);
     RUN_TEST(test_send_slow_bus_refuses_instead_of_queueing);
+    RUN_TEST(test_error_passive_is_failing_after_its_time_and_stops_nothing_here);
+    RUN_TEST(test_storm_of_error_frames_is_bounded_and_stops_nothing);
     RUN_TEST(test_request_home_finds_the_zero_of_all_and_returns_without_a_jump);
     RUN_TEST(test_request_home_one_failure_stops_all);
     RUN_TEST(test_request_home_again_is_not_over_before_it_begins);

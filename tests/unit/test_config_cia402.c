@@ -97,7 +97,11 @@ static void test_load_preset_gives_what_the_driver_takes(void)
     cia402_config_t drives;
     cia402_t driver;
     static const hal_can_ops_t k_ops = {(hv_status_t(*)(void *, const can_frame_t *))1,
-                                        (hv_status_t(*)(void *, can_frame_t *, uint64_t *))1, NULL, NULL, NULL};
+                                        (hv_status_t(*)(void *, can_frame_t *, uint64_t *))1,
+                                        NULL,
+                                        NULL,
+                                        NULL,
+                                        NULL};
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
     TEST_ASSERT_EQUAL(CONFIG_DRIVES_CIA402, m_config.drives);
     config_cia402(&m_config, &drives);

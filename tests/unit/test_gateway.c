@@ -987,6 +987,55 @@ static void test_fault_bus_gone_is_a_fault_that_can_be_reset(void)
     TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
 }
 
+/* The drives still hear: all come to rest together within every limit, and lose their torque then, not before. */
+static void test_fault_bus_failing_is_a_controlled_stop(void)
+{
+    for (unsigned ms = 10; ms < 500; ms += 35) {
+        engage();
+        start_moving(ms);
+        rig_check_reset(&m_rig);
+        m_rig.is_failing = true;
+        rig_run_ms(&m_rig, 1);
+        expect_fault(FAULT_BUS_FAILING, 0, 0);
+        TEST_ASSERT_EQUAL(FAULT_REACT_STOP, seen()->reaction);
+        while (m_rig.drives.axis[0].state == DRIVE_ENABLED) {
+            const double before = rig_cylinder_mm(&m_rig, 1);
+            rig_run_ms(&m_rig, 1);
+            TEST_ASSERT_TRUE(m_rig.drives.axis[0].state == DRIVE_ENABLED || fabs(rig_cylinder_mm(&m_rig, 1) - before) < 1e-3);
+            TEST_ASSERT_TRUE(seen()->now_us - seen()->fault.at_us < 1000000);
+        }
+        TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+        TEST_ASSERT_EQUAL_UINT(0, rig_following_errors(&m_rig));
+        for (unsigned i = 0; i < 7; i++) {
+            TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[i].state);
+        }
+        TEST_ASSERT_EQUAL_UINT32(1, counted()->fault[FAULT_BUS_FAILING]);
+    }
+}
+
+static void test_fault_bus_failing_is_latched_until_it_has_recovered(void)
+{
+    engage();
+    m_rig.is_failing = true;
+    rig_run_ms(&m_rig, 1000);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 3000);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "reset refused"));
+    expect_fault(FAULT_BUS_FAILING, 0, 0);
+    m_rig.is_failing = false;
+    rig_run_ms(&m_rig, 10);
+    expect_fault(FAULT_BUS_FAILING, 0, 0);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    m_rig.is_failing = true; /* while nobody is on it: said as soon as somebody wants to */
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+    rig_run_ms(&m_rig, 2);
+    expect_fault(FAULT_BUS_FAILING, 0, 0);
+}
+
 static void test_fault_drives_that_never_enable_time_out(void)
 {
     start(false);
@@ -1153,6 +1202,8 @@ int main(void)
     RUN_TEST(test_fault_worse_one_later_escalates_and_the_first_is_kept);
     RUN_TEST(test_fault_rows_are_complete);
     RUN_TEST(test_fault_bus_gone_is_a_fault_that_can_be_reset);
+    RUN_TEST(test_fault_bus_failing_is_a_controlled_stop);
+    RUN_TEST(test_fault_bus_failing_is_latched_until_it_has_recovered);
     RUN_TEST(test_fault_drives_that_never_enable_time_out);
     RUN_TEST(test_fault_in_every_phase_of_coming_up_latches);
     RUN_TEST(test_hold_during_coming_up_stops_and_resume_goes_on);

@@ -58,6 +58,7 @@ typedef struct {
     hv_status_t (*bus_state)(void *ctx, hal_can_state_t *out); /* optional: always active */
     hv_status_t (*unconfirmed)(void *ctx, uint32_t *frames);   /* optional */
     hv_status_t (*restart)(void *ctx);                         /* optional */
+    hv_status_t (*ask_state)(void *ctx, hal_can_state_t *out); /* optional: bus_state */
 } hal_can_ops_t;
 
 /** Passed by value; ctx belongs to the backend and lives until its close. */
@@ -103,6 +104,14 @@ static inline HV_MUST_CHECK hv_status_t hal_can_bus_state(hal_can_t can, hal_can
     }
     *out = HAL_CAN_ACTIVE;
     return HV_OK;
+}
+
+/** The state of the controller, asked afresh: some controllers report that they have become error-passive and never that they
+ * have recovered. May take some ms where the system is busy with its interfaces: not every cycle. What bus_state tells follows.
+ *  @return HV_OK; HV_ERR_IO: no answer, out is unchanged. A backend without the op has nothing newer than bus_state. */
+static inline HV_MUST_CHECK hv_status_t hal_can_ask_state(hal_can_t can, hal_can_state_t *out)
+{
+    return can.ops->ask_state != NULL ? can.ops->ask_state(can.ctx, out) : hal_can_bus_state(can, out);
 }
 
 /** Frames taken by send of which no echo has come: not seen on the wire. Up to date once recv has returned HV_ERR_AGAIN. The

@@ -1,0 +1,263 @@
+/* SPDX-License-Identifier: MIT
+ * metrics.c - the status for Prometheus; see metrics.h. Names and units follow its conventions: base units, _total for counters.
+ */
+#include "metrics.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "decimal.h"
+#include "say.h"
+
+#define NUMBER_MAX 32u
+
+/** A text being written. What does not fit sets is_cut. */
+typedef struct {
+    char *at;
+    size_t capacity;
+    size_t length;
+    bool is_cut;
+} sheet_t;
+
+static __attribute__((format(printf, 2, 3))) void put(sheet_t *self, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    const int length = vsnprintf(&self->at[self->length], self->capacity - self->length, format, arguments);
+    va_end(arguments);
+    if (length < 0 || (size_t)length >= self->capacity - self->length) {
+        self->is_cut = true;
+    } else {
+        self->length += (size_t)length;
+    }
+}
+
+/* What the samples that follow are. */
+static void head(sheet_t *self, const char *name, const char *type, const char *help)
+{
+    put(self, "# HELP heave_%s %s\n# TYPE heave_%s %s\n", name, help, name, type);
+}
+
+/* A sample without labels, with its head. */
+static void whole(sheet_t *self, const char *name, const char *type, const char *help, uint64_t value)
+{
+    head(self, name, type, help);
+    put(self, "heave_%s %" PRIu64 "\n", name, value);
+}
+
+static const char *q32_text(q32_t value_q32, char text[NUMBER_MAX])
+{
+    text[decimal_put_q32(text, value_q32, 6)] = '\0';
+    return text;
+}
+
+/* Microseconds as seconds. */
+static const char *seconds_text(uint64_t us, char text[NUMBER_MAX])
+{
+    (void)snprintf(text, NUMBER_MAX, "%" PRIu64 ".%06u", us / 1000000u, (unsigned)(us % 1000000u));
+    return text;
+}
+
+/* --- Parts --- */
+
+static void put_state(sheet_t *self, const snapshot_t *s)
+{
+    head(self, "state", "gauge", "1 for the state the platform is in");
+    for (unsigned i = 0; i < STATES; i++) {
+        put(self, "heave_state{state=\"%s\"} %u\n", state_name((state_t)i), s->state == (state_t)i ? 1u : 0u);
+    }
+    whole(self, "estop_active", "gauge", "1 while the e-stop is pressed", s->is_estop_active);
+    whole(self, "held_by_silence", "gauge", "1 while it holds because no frames come", s->is_held_by_silence);
+    whole(self, "fault_code", "gauge", "the first fault since the last reset, 0 = none", (uint64_t)s->fault.code);
+    head(self, "faults_total", "counter", "faults since the start, those that have been");
+    for (unsigned i = 1; i < FAULT_CODES; i++) {
+        if (s->counters.fault[i] > 0) {
+            put(self, "heave_faults_total{fault=\"%s\"} %" PRIu32 "\n", fault_row((fault_code_t)i)->name, s->counters.fault[i]);
+        }
+    }
+}
+
+static void put_frames(sheet_t *self, const motion_view_t *view)
+{
+    const counters_t *c = &view->snapshot.counters;
+    whole(self, "udp_datagrams_total", "counter", "datagrams read", c->datagrams);
+    whole(self, "udp_dropped_total", "counter", "datagrams the kernel lost because its queue was full", view->udp_dropped);
+    whole(self, "udp_refused_total", "counter", "datagrams of senders that are not allowed", view->udp_refused);
+    whole(self, "udp_other_sender_total", "counter", "valid frames of senders that do not drive", c->other_sender);
+    whole(self, "owner_changes_total", "counter", "take-overs by another sender", c->owner_changes);
+    head(self, "udp_frames_total", "counter", "frames by what became of them");
+    for (unsigned i = 0; i < FRAME_COMMANDS; i++) {
+        put(self, "heave_udp_frames_total{result=\"accepted\",what=\"%s\"} %" PRIu32 "\n", frame_command_name((frame_command_t)i),
+            c->accepted[i]);
+    }
+    for (unsigned i = 0; i < FRAME_ERRORS; i++) {
+        put(self, "heave_udp_frames_total{result=\"rejected\",what=\"%s\"} %" PRIu32 "\n", frame_error_name((frame_error_t)i),
+            c->rejected[i]);
+    }
+    whole(self, "spikes_total", "counter", "samples that were not followed", c->spikes);
+    whole(self, "clamped_cycles_total", "counter", "cycles that pulled a target in", c->clamped);
+    whole(self, "stretched_total", "counter", "timed moves that took longer than asked", c->stretched);
+    whole(self, "singular_stops_total", "counter", "stops before a singularity", c->singular_stops);
+}
+
+static void put_stream(sheet_t *self, const snapshot_t *s)
+{
+    char text[NUMBER_MAX];
+    head(self, "stream_period_seconds", "gauge", "the sender's period as estimated, 0 = unknown");
+    put(self, "heave_stream_period_seconds %s\n", seconds_text(s->stream_period_us, text));
+    head(self, "stream_delay_seconds", "gauge", "how late the motion follows the sender");
+    put(self, "heave_stream_delay_seconds %s\n", seconds_text(s->stream_delay_us, text));
+    if (s->last_frame_us != 0) {
+        head(self, "last_frame_age_seconds", "gauge", "since the last accepted frame");
+        put(self, "heave_last_frame_age_seconds %s\n", seconds_text(s->now_us - s->last_frame_us, text));
+    }
+    whole(self, "intensity_percent", "gauge", "how much of the sender's motion is asked for", s->intensity_percent);
+}
+
+static q32_t sent_q32(const snapshot_t *s, unsigned axis)
+{
+    return axis < s->cylinders ? s->extension_mm_q32[axis] : s->angle_deg_q32;
+}
+
+/* Axes are numbered from 1; the rotation motor is the last one and in degrees, so its unit is a label. */
+static void put_axis_value(sheet_t *self, const snapshot_t *s, const char *name, unsigned axis, q32_t value_q32)
+{
+    char text[NUMBER_MAX];
+    put(self, "heave_axis_%s{axis=\"%u\",unit=\"%s\"} %s\n", name, axis + 1, axis < s->cylinders ? "mm" : "deg",
+        q32_text(value_q32, text));
+}
+
+static void put_axes(sheet_t *self, const snapshot_t *s)
+{
+    const unsigned axes = s->cylinders + (s->has_angle ? 1u : 0u);
+    head(self, "axis_sent", "gauge", "set-point of the axis");
+    for (unsigned i = 0; i < axes; i++) {
+        put_axis_value(self, s, "sent", i, sent_q32(s, i));
+    }
+    head(self, "axis_actual", "gauge", "position the drive reports, missing while it reports none");
+    for (unsigned i = 0; i < axes; i++) {
+        if (s->drive[i].has_actual) {
+            put_axis_value(self, s, "actual", i, s->drive[i].actual_mm_q32);
+        }
+    }
+    head(self, "axis_following_error", "gauge", "set-point minus actual position");
+    for (unsigned i = 0; i < axes; i++) {
+        if (s->drive[i].has_actual) {
+            put_axis_value(self, s, "following_error", i, sent_q32(s, i) - s->drive[i].actual_mm_q32);
+        }
+    }
+    head(self, "drive_enabled", "gauge", "1 while the drive holds its position");
+    for (unsigned i = 0; i < axes; i++) {
+        put(self, "heave_drive_enabled{axis=\"%u\"} %u\n", i + 1, s->drive[i].state == DRIVE_ENABLED ? 1u : 0u);
+    }
+}
+
+static void put_relays(sheet_t *self, const snapshot_t *s)
+{
+    head(self, "relay_on", "gauge", "1 while the relay is closed");
+    for (unsigned i = 0; i < s->relay_count; i++) {
+        put(self, "heave_relay_on{relay=\"%u\"} %u\n", i + 1, s->relay_mask >> i & 1u);
+    }
+    whole(self, "relay_missing_total", "counter", "masks that set a relay this platform does not have",
+          s->counters.relay_missing);
+    whole(self, "relay_errors_total", "counter", "masks that could not be written", s->counters.relay_errors);
+}
+
+/* Percentiles, as a summary: the bins are finer than anything a collector wants to store. */
+static void put_times(sheet_t *self, const char *name, const char *help, const histogram_t *times)
+{
+    static const struct {
+        const char *quantile;
+        uint32_t of_100000;
+    } k_quantiles[] = {{"0.5", 50000}, {"0.99", 99000}, {"0.999", 99900}, {"0.9999", 99990}, {"1", 100000}};
+    char text[NUMBER_MAX];
+    head(self, name, "summary", help);
+    for (size_t i = 0; i < sizeof k_quantiles / sizeof k_quantiles[0]; i++) {
+        put(self, "heave_%s{quantile=\"%s\"} %s\n", name, k_quantiles[i].quantile,
+            seconds_text(histogram_percentile_us(times, k_quantiles[i].of_100000), text));
+    }
+    put(self, "heave_%s_count %" PRIu64 "\n", name, histogram_count(times));
+}
+
+static void put_program(sheet_t *self, const motion_view_t *view, const config_t *config, const motion_times_t *times)
+{
+    const snapshot_t *s = &view->snapshot;
+    char text[NUMBER_MAX];
+    head(self, "build_info", "gauge", "the version of heaved");
+    put(self, "heave_build_info{version=\"%s\"} 1\n", HEAVE_VERSION);
+    head(self, "uptime_seconds", "gauge", "since the start");
+    put(self, "heave_uptime_seconds %s\n", seconds_text((s->cycle + s->counters.late_cycles) * config->settings.cycle_us, text));
+    whole(self, "cycles_total", "counter", "motion cycles", s->cycle);
+    whole(self, "late_cycles_total", "counter", "motion cycles that were skipped because the program was late",
+          s->counters.late_cycles);
+    whole(self, "realtime", "gauge", "1 with real-time priority", view->is_realtime);
+    put_times(self, "wake_latency_seconds", "from the time of a cycle to its beginning, since the start", &times->wake);
+    put_times(self, "cycle_time_seconds", "from the beginning of a cycle to its end, since the start", &times->work);
+}
+
+size_t metrics_text(const motion_view_t *view, const config_t *config, const motion_times_t *times, char *text, size_t capacity)
+{
+    const snapshot_t *s = &view->snapshot;
+    sheet_t sheet = {.at = text, .capacity = capacity};
+    put_program(&sheet, view, config, times);
+    put_state(&sheet, s);
+    put_axes(&sheet, s);
+    put_relays(&sheet, s);
+    put_frames(&sheet, view);
+    put_stream(&sheet, s);
+    return sheet.is_cut ? 0 : sheet.length;
+}
+
+/* --- The file --- */
+
+void metrics_init(metrics_t *self, const char *path)
+{
+    self->path = path;
+    self->next_us = 0;
+    self->error = 0;
+    (void)snprintf(self->temporary, sizeof self->temporary, "%s.new", path);
+}
+
+/* Writes the text beside the file and puts it in its place.
+ * Returns errno, 0 = done. */
+static int replace(const metrics_t *self, size_t length)
+{
+    const int fd = open(self->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    if (fd < 0) {
+        return errno;
+    }
+    errno = ENOSPC; /* what a write that is too short means */
+    int error = write(fd, self->text, length) == (ssize_t)length ? 0 : errno;
+    error = close(fd) != 0 && error == 0 ? errno : error;
+    error = error == 0 && rename(self->temporary, self->path) != 0 ? errno : error;
+    if (error != 0) {
+        (void)unlink(self->temporary);
+    }
+    return error;
+}
+
+void metrics_serve(metrics_t *self, const motion_view_t *view, const config_t *config, const motion_times_t *times,
+                   uint64_t now_us)
+{
+    if (self->path[0] == '\0' || now_us < self->next_us) {
+        return;
+    }
+    self->next_us = now_us + METRICS_PERIOD_US;
+    const int error = replace(self, metrics_text(view, config, times, self->text, sizeof self->text));
+    if (error != 0 && error != self->error) {
+        (void)say(0, "metrics %s: %s; tried again every second", self->path, strerror(error));
+    }
+    self->error = error;
+}
+
+void metrics_remove(metrics_t *self)
+{
+    if (self->path != NULL && self->path[0] != '\0') {
+        (void)unlink(self->path);
+    }
+}
