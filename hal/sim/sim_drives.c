@@ -377,6 +377,24 @@ hv_status_t sim_drives_init(sim_drives_t *self, uint8_t count, const sim_drive_c
     return HV_OK;
 }
 
+void sim_drives_place(sim_drives_t *self, uint64_t now_us, const drive_feedback_t feedback[DRIVES_MAX],
+                      const q32_t setpoint_q32[DRIVES_MAX])
+{
+    self->has_time = true;
+    self->now_us = now_us;
+    for (uint8_t k = 0; k < self->count; k++) {
+        sim_drive_t *axis = &self->axis[k];
+        axis->is_offline = feedback[k].state == DRIVE_OFFLINE;
+        axis->state = axis->is_offline ? DRIVE_DISABLED : feedback[k].state;
+        axis->is_homed = feedback[k].is_homed;
+        axis->fault_code = feedback[k].fault_code;
+        axis->position_q32 = fx_clamp(feedback[k].actual_mm_q32, self->config[k].travel_min_q32, self->config[k].travel_max_q32);
+        axis->setpoint_q32 = setpoint_q32[k];
+        axis->has_setpoint = true;
+        axis->feedback = feedback[k];
+    }
+}
+
 drives_t sim_drives_hal(sim_drives_t *self)
 {
     static const drives_ops_t k_ops = {drives_sim_poll, drives_sim_send, drives_sim_request, drives_sim_count, NULL, NULL};

@@ -97,6 +97,12 @@ typedef struct {
 hv_status_t sim_drives_init(sim_drives_t *self, uint8_t count, const sim_drive_config_t *config, const sim_drives_fault_t *plan,
                             uint32_t planned) HV_MUST_CHECK;
 
+/** Offline runs that go on from elsewhere: the drives are where they were, and do what they did.
+ *  @param feedback last heard of each of them at now_us
+ *  @param setpoint_q32 in force */
+void sim_drives_place(sim_drives_t *self, uint64_t now_us, const drive_feedback_t feedback[DRIVES_MAX],
+                      const q32_t setpoint_q32[DRIVES_MAX]);
+
 /** Makes something go wrong now; at_step and at_us are ignored. */
 void sim_drives_inject(sim_drives_t *self, const sim_drives_fault_t *fault);
 

@@ -94,6 +94,15 @@ void gateway_start_settled(gateway_t *self);
 /** Offline runs that came up to SETTLED by a request: the auto policy is as at the start. */
 void gateway_restart_auto(gateway_t *self);
 
+/** Everything a gateway knows but its handles, so that an offline run can go on from there. Plain data: the same bytes mean the
+ *  same to a program built from the same sources for a machine of the same kind.
+ *  @param out not a gateway that runs: gateway_resume() makes one of it */
+void gateway_save(const gateway_t *self, gateway_t *out);
+
+/** Goes on from what was saved, with other handles.
+ *  @return HV_OK; HV_ERR_ARG as gateway_init, or for the drives of another platform */
+hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io) HV_MUST_CHECK;
+
 /** Takes over what may change in operation: silence, take-over and priorities, dialect, safe mask and its delay, following error,
  *  spike gate. The rest of the settings is not looked at. */
 void gateway_reload(gateway_t *self, const settings_t *settings);

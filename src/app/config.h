@@ -173,6 +173,13 @@ typedef struct {
     config_label_t reset_line;
 } config_inputs_t;
 
+/** The black box: what it keeps, and where it is written to. */
+typedef struct {
+    char directory[CONFIG_PATH_MAX]; /**< "none" = there is none */
+    uint32_t seconds;                /**< kept at least, of an ordinary stream */
+    uint32_t incidents;              /**< most folders kept in the directory */
+} config_black_box_t;
+
 /** A whole configuration: the core's settings, and what only the hosted program needs. Plain data. */
 typedef struct {
     settings_t settings;
@@ -180,6 +187,7 @@ typedef struct {
     uint32_t late_hold_cycles; /**< of the program: see motion_loop.h */
     char control_socket[CONFIG_PATH_MAX];
     char metrics_file[CONFIG_PATH_MAX]; /**< "none" = none */
+    config_black_box_t black_box;
     config_drives_t drives;
     config_sim_t sim;
     config_can_t can;

@@ -27,6 +27,8 @@ const config_section_t config_sections[] = {
     {"intensity", "how much of a sender's motion is made, about neutral; the rotation motor is not scaled", CONFIG_NEEDS_NOTHING},
     {"udp", "where frames come from", CONFIG_NEEDS_NOTHING},
     {"control", "where heavectl reaches heaved", CONFIG_NEEDS_NOTHING},
+    {"black-box", "the last minutes, kept in memory; written on every fault and e-stop, and by `heavectl dump`",
+     CONFIG_NEEDS_NOTHING},
     {"drives", "what moves the cylinders", CONFIG_NEEDS_NOTHING},
     {"sim", "simulated drives ([drives] driver = sim)", CONFIG_NEEDS_NOTHING},
     {"can", "the CAN bus of the drives, for every driver that uses one", CONFIG_NEEDS_NOTHING},
@@ -181,6 +183,13 @@ const config_key_t config_keys[] = {
     {KEY("control", "metrics"), AT(metrics_file), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
      .help = "file for Prometheus (node_exporter's textfile collector: a name that ends in .prom), renewed every second; removed at "
              "the end"},
+
+    {KEY("black-box", "directory"), AT(black_box.directory), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "takes one folder per incident; none: nothing is kept or written, unless a service manager has given a state directory"},
+    {KEY("black-box", "seconds"), AT(black_box.seconds), .type = CONFIG_INTEGER, .unit = "s", .fallback = "120", RANGE(10, 600),
+     .help = "kept at least, of every cycle: up to 1 MB of memory and of disk space a second, at 1000 cycles a second"},
+    {KEY("black-box", "incidents"), AT(black_box.incidents), .type = CONFIG_INTEGER, .unit = "", .fallback = "10", RANGE(1, 100),
+     .help = "folders kept in the directory; the oldest one makes way"},
 
     {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim|cia402|can-raw",
      .absent = "modbus-tcp|modbus-rtu", .help = "the drives in use"},

@@ -15,8 +15,9 @@
 #include "say.h"
 
 #define BACKLOG         8
-#define ANSWER_US       1000000u /* the motion thread answers within a cycle or two */
-#define RESET_US        2500000u /* a reset takes effect when the drives say so */
+#define ANSWER_US       1000000u  /* the motion thread answers within a cycle or two */
+#define DUMP_US         50000000u /* heavectl waits a little longer */
+#define RESET_US        2500000u  /* a reset takes effect when the drives say so */
 #define WAITING_POLL_MS 1
 
 /* --- Answers --- */
@@ -181,6 +182,16 @@ static bool begin_watch(control_client_t *client, const char *argument, uint64_t
     return true;
 }
 
+/* The answer follows when everything is on the disk. */
+static void begin_dump(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    client->dump_ticket = blackbox_ask(self->blackbox);
+    client->answer_by_us = now_us + DUMP_US;
+    if (client->dump_ticket == 0) {
+        answer_error(client, "dump: there is no black box; [black-box] directory says where it writes to", NULL);
+    }
+}
+
 static const char k_intensity[] = "intensity ";
 
 static void take_request(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
@@ -190,6 +201,8 @@ static void take_request(control_t *self, control_client_t *client, const char *
         begin_request(self, client, event, 0, now_us);
     } else if (strncmp(line, k_intensity, strlen(k_intensity)) == 0) {
         begin_intensity(self, client, &line[strlen(k_intensity)], now_us);
+    } else if (strcmp(line, "dump") == 0) {
+        begin_dump(self, client, now_us);
     } else if (strcmp(line, "status") == 0) {
         answer_status(self, client);
     } else if (strncmp(line, "watch", 5) == 0) {
@@ -198,16 +211,21 @@ static void take_request(control_t *self, control_client_t *client, const char *
         }
     } else {
         answer_error(client,
-                     "unknown request; status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset and "
-                     "shutdown are allowed",
+                     "unknown request; status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, "
+                     "shutdown and dump are allowed",
                      NULL);
     }
+}
+
+static bool is_waiting(const control_client_t *client)
+{
+    return client->request_id != 0 || client->dump_ticket != 0;
 }
 
 /* Carries out the complete lines of a client, one at a time: the next one waits for the answer to the last. */
 static void take_lines(control_t *self, control_client_t *client, uint64_t now_us)
 {
-    while (client->fd >= 0 && client->request_id == 0) {
+    while (client->fd >= 0 && !is_waiting(client)) {
         char *const newline = memchr(client->in, '\n', client->in_length);
         if (newline == NULL) {
             return;
@@ -229,7 +247,7 @@ static void end_input(control_client_t *client, bool is_false_alarm)
         return;
     }
     client->is_closing = true;
-    if (client->request_id == 0 && client->out_length == 0) {
+    if (!is_waiting(client) && client->out_length == 0) {
         drop(client);
     }
 }
@@ -295,10 +313,41 @@ static void watch_request(control_t *self, control_client_t *client, uint64_t no
     }
 }
 
+static void answer_dumped(control_client_t *client, const char *folder)
+{
+    json_t json = start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_text(&json, "folder", folder);
+    json_close(&json, '}');
+    answer(client, &json);
+}
+
+static void watch_dump(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    char text[BLACKBOX_TEXT_MAX];
+    char error[BLACKBOX_TEXT_MAX + 8];
+    bool is_good = false;
+    if (blackbox_answer(self->blackbox, client->dump_ticket, &is_good, text)) {
+        client->dump_ticket = 0;
+        (void)snprintf(error, sizeof error, "dump: %s", text);
+        if (is_good) {
+            answer_dumped(client, text);
+        } else {
+            answer_error(client, error, NULL);
+        }
+    } else if (now_us >= client->answer_by_us) {
+        client->dump_ticket = 0;
+        answer_error(client, "dump: the disk has not taken it yet; heaved goes on trying", NULL);
+    }
+}
+
 static void serve_time(control_t *self, control_client_t *client, uint64_t now_us)
 {
     if (client->request_id != 0) {
         watch_request(self, client, now_us);
+    } else if (client->dump_ticket != 0) {
+        watch_dump(self, client, now_us);
     }
     take_lines(self, client, now_us); /* what waited for an answer */
     if (client->fd >= 0 && client->watch_period_us != 0 && now_us >= client->watch_next_us) {
@@ -344,6 +393,7 @@ static void take_connection(control_t *self)
             client->out_length = 0;
             client->is_closing = false;
             client->request_id = 0;
+            client->dump_ticket = 0;
             client->watch_period_us = 0;
             return;
         }
@@ -439,12 +489,13 @@ static int fail(control_t *self, const char *path)
     return say(EXIT_NO_OUTPUT, "control socket %s: %s; create its directory, or give --socket PATH", path, strerror(error));
 }
 
-int control_open(control_t *self, const char *path, const config_t *config, motion_loop_t *loop)
+int control_open(control_t *self, const char *path, const config_t *config, motion_loop_t *loop, blackbox_t *blackbox)
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     self->fd = -1;
     self->config = config;
     self->loop = loop;
+    self->blackbox = blackbox;
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         self->client[i].fd = -1;
     }

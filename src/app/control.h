@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
- * Requests: status, watch [HZ], engage, hold, resume, park, reset, shutdown. The service thread owns it; nothing blocks, nothing
- * allocates after the open, and a client that does not read is dropped.
+ * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump. The service thread owns it;
+ * nothing blocks, nothing allocates after the open, and a client that does not read is dropped.
  */
 #ifndef HEAVE_APP_CONTROL_H
 #define HEAVE_APP_CONTROL_H
@@ -33,6 +33,7 @@ typedef struct {
     uint32_t number;          /**< of that */
     bool is_accepted;         /**< by the motion thread; a reset then still has to take effect */
     uint64_t answer_by_us;    /**< latest time of the answer */
+    uint32_t dump_ticket;     /**< waits for the black box; 0 = does not */
     uint64_t watch_period_us; /**< 0 = does not watch */
     uint64_t watch_next_us;
 } control_client_t;
@@ -44,6 +45,7 @@ typedef struct {
     struct stat made; /**< identity of the socket file, so that only ours is removed */
     motion_loop_t *loop;
     const config_t *config;
+    blackbox_t *blackbox;
     status_lost_t lost; /**< the owner keeps it up to date */
     motion_view_words_t view;
     uint32_t last_id;
@@ -51,9 +53,9 @@ typedef struct {
 } control_t;
 
 /** Opens the socket, in place of one that a dead daemon left behind. Says what is wrong.
- *  @param config kept
+ *  @param config, blackbox kept
  *  @return EXIT_DONE; EXIT_UNAVAILABLE: a running heaved has it; EXIT_NO_OUTPUT: it cannot be created */
-int control_open(control_t *self, const char *path, const config_t *config, motion_loop_t *loop);
+int control_open(control_t *self, const char *path, const config_t *config, motion_loop_t *loop, blackbox_t *blackbox);
 
 /** Fills CONTROL_FDS entries for poll. */
 void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS]);

@@ -25,9 +25,12 @@ static const char k_bad_estop[] = "!estop without its word; on and off are allow
 static const char k_bad_intensity[] = "!intensity without its percent; whole numbers from 0 to 100 are allowed";
 static const char k_bad_late[] = "!late without its number of cycles; 0 to 4294967295 is allowed";
 static const char k_bad_from[] = "!from without a numeric address; 192.168.1.20, ::1 and fe80::1%2 show what is allowed";
+static const char k_bad_drive[] =
+    "!drive without its number from 1 to 7 and what it did; N fault CODE (hexadecimal), N offline and N back are allowed";
 static const char k_bad_request[] =
     "unknown request; !engage !hold !resume !park !reset !shutdown, !intensity N (0 to 100), !estop on, !estop off, "
-    "!late N and !from ADDRESS are allowed (a datagram that starts with ! is written \\x21)";
+    "!late N, !drive N fault CODE, !drive N offline, !drive N back and !from ADDRESS are allowed (a datagram that starts with ! "
+    "is written \\x21)";
 
 static const struct {
     const char *word;
@@ -217,6 +220,30 @@ static bool read_count(cursor_t *self, uint32_t limit, uint32_t *out)
     return is_read;
 }
 
+/* `N fault CODE`, `N offline`, `N back`. */
+static bool read_drive(cursor_t *self, frames_line_t *out)
+{
+    uint32_t drive = 0;
+    if (!read_count(self, DRIVES_MAX, &drive) || drive == 0) {
+        return false;
+    }
+    skip_blanks(self);
+    out->kind = FRAMES_DRIVE;
+    out->drive = (uint8_t)drive;
+    if (!take_word(self, "fault")) {
+        const bool is_offline = take_word(self, "offline");
+        out->state = is_offline ? DRIVE_OFFLINE : DRIVE_DISABLED;
+        return is_offline || take_word(self, "back");
+    }
+    out->state = DRIVE_FAULT;
+    out->number = 0;
+    unsigned digits = 0;
+    for (; digits < 8 && self->at < self->end && hex_value(*self->at) >= 0; digits++) {
+        out->number = out->number << 4 | (uint32_t)hex_value(*self->at++);
+    }
+    return digits > 0;
+}
+
 /* Reads the words behind the exclamation mark.
  * Returns what is wrong with them, NULL = nothing. */
 static const char *read_request_words(cursor_t *self, frames_line_t *out)
@@ -240,6 +267,16 @@ static const char *read_request_words(cursor_t *self, frames_line_t *out)
     if (take_word(self, "late")) {
         out->kind = FRAMES_LATE;
         return read_count(self, UINT32_MAX, &out->number) ? NULL : k_bad_late;
+    }
+    if (take_word(self, "drive")) {
+        return read_drive(self, out) ? NULL : k_bad_drive;
+    }
+    if (take_word(self, "state")) {
+        out->kind = FRAMES_STATE;
+        out->text = (const uint8_t *)self->at;
+        out->length = (uint32_t)(self->end - self->at);
+        self->at += out->length;
+        return NULL;
     }
     if (take_word(self, "from")) {
         return read_address(self, out) ? NULL : k_bad_from;
@@ -356,6 +393,9 @@ static int take_line(frames_t *self, char *text, size_t length, uint32_t number,
     }
     if (self->count > 0 && line.t_us < self->line[self->count - 1].t_us) {
         return report_order(errors, path, &line, &self->line[self->count - 1]);
+    }
+    if (line.kind == FRAMES_STATE && self->count > 0) {
+        return report(errors, path, number, "!state is not the first line; a run can only begin with one");
     }
     if (line.kind == FRAMES_FROM) {
         self->from = line.from;

@@ -23,7 +23,8 @@
 
 #define DEFAULT_SOCKET "/run/heave/heaved.sock"
 #define ANSWER_MS      5000
-#define WAIT_MS_MAX    1000 /* a signal between a look and a wait is seen by then */
+#define DUMP_MS        60000 /* a slow disk */
+#define WAIT_MS_MAX    1000  /* a signal between a look and a wait is seen by then */
 #define LINE_BYTES     65536u
 #define COLUMNS        80u
 #define TERMINAL_HZ    20u
@@ -46,14 +47,15 @@ typedef struct {
     size_t consumed; /**< of those, given out already */
 } ctl_t;
 
-static const char *const k_commands[] = {"status", "watch", "engage", "hold", "resume", "park", "reset", "shutdown", "intensity"};
+static const char *const k_commands[] = {"status", "watch", "engage",   "hold", "resume",
+                                         "park",   "reset", "shutdown", "dump", "intensity"};
 
 static const char k_help[] =
     "heavectl - talks to a running heaved.\n"
     "\n"
     "  heavectl [--json] [--socket PATH] status\n"
     "  heavectl [--json] [--socket PATH] [--for SECONDS] [--hz N] watch\n"
-    "  heavectl [--json] [--socket PATH] engage | hold | resume | park | reset | shutdown\n"
+    "  heavectl [--json] [--socket PATH] engage | hold | resume | park | reset | shutdown | dump\n"
     "  heavectl [--json] [--socket PATH] intensity PERCENT\n"
     "\n"
     "  engage    bring the platform up and follow the sender\n"
@@ -61,6 +63,7 @@ static const char k_help[] =
     "  park      settle: lowest position, at rest\n"
     "  reset     leave FAULT or ESTOP, once the cause is gone\n"
     "  shutdown  settle, drives off, end heaved\n"
+    "  dump      write the last minutes down now, as after a fault; says where\n"
     "  intensity how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so\n"
     "\n"
     "  --json          answers as heaved gives them: one JSON object per line\n"
@@ -228,7 +231,10 @@ static int judge(const cJSON *answer)
 static void show_answer(const ctl_t *self, const cJSON *answer)
 {
     const cJSON *state = cJSON_GetObjectItemCaseSensitive(answer, "state");
-    if (strcmp(self->command, "status") == 0) {
+    const cJSON *folder = cJSON_GetObjectItemCaseSensitive(answer, "folder");
+    if (cJSON_IsString(folder)) {
+        printf("%s: %s\n", self->command, folder->valuestring);
+    } else if (strcmp(self->command, "status") == 0) {
         show_table(answer, false);
     } else if (self->argument != NULL) {
         const cJSON *percent = cJSON_GetObjectItemCaseSensitive(answer, "intensity_percent");
@@ -271,7 +277,8 @@ static int ask(ctl_t *self)
     char request[64];
     (void)snprintf(request, sizeof request, "%s%s%s", self->command, self->argument != NULL ? " " : "",
                    self->argument != NULL ? self->argument : "");
-    const char *line = send_line(self, request) ? receive_line(self, now_ms() + ANSWER_MS) : NULL;
+    const int64_t until_ms = now_ms() + (strcmp(self->command, "dump") == 0 ? DUMP_MS : ANSWER_MS);
+    const char *line = send_line(self, request) ? receive_line(self, until_ms) : NULL;
     return line != NULL ? show(self, line) : complain(EXIT_UNAVAILABLE, "heaved does not answer");
 }
 
@@ -402,7 +409,7 @@ static const char *take_options(ctl_t *self, int argc, char **argv)
 static const char *take_command(ctl_t *self, int argc, char **argv)
 {
     if (optind == argc) {
-        return "a command is needed: status, watch, engage, hold, resume, park, reset, shutdown or intensity PERCENT";
+        return "a command is needed: status, watch, engage, hold, resume, park, reset, shutdown, dump or intensity PERCENT";
     }
     const bool is_intensity = strcmp(argv[optind], "intensity") == 0;
     if (optind + (is_intensity ? 2 : 1) != argc) {
@@ -416,7 +423,7 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
             return NULL;
         }
     }
-    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown and intensity are allowed";
+    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump and intensity are allowed";
 }
 
 int main(int argc, char **argv)

@@ -39,6 +39,7 @@ typedef struct {
     config_t config; /**< as it was, with what reloads changed */
     manager_t manager;
     metrics_t metrics;
+    blackbox_t blackbox;
     motion_view_words_t view; /**< for the manager and the metrics */
     linux_udp_t udp;
     linux_log_t log;
@@ -261,6 +262,7 @@ static int finish(live_t *self)
     metrics_remove(&self->metrics);
     write_all(self);
     (void)!linux_log_flush(&self->log);
+    (void)blackbox_close(&self->blackbox); /* what has just happened is written now */
     int code = EXIT_DONE;
     if (self->loop.is_recording) {
         code = close_file(&self->record, self->options->record, &self->loop.record, "lines");
@@ -287,6 +289,9 @@ static int run(live_t *self, const config_t *config)
         return say(EXIT_UNAVAILABLE, "cannot start the motion thread: %s", strerror(errno));
     }
     self->is_thread_running = true;
+    if (!blackbox_start(&self->blackbox)) {
+        (void)say(0, "cannot start the black box: %s", strerror(errno));
+    }
     await_first_cycle(self);
     if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
         (void)say(0, "memory is not locked (%s): cycles may be late when memory is short", strerror(errno));
@@ -314,16 +319,27 @@ static int open_udp(live_t *self, const config_t *config)
     return linux_udp_open(&self->udp, &udp) == HV_OK ? EXIT_DONE : say(EXIT_UNAVAILABLE, "%s", self->udp.error_text);
 }
 
+/* A platform without a black box moves as well: it only says so. */
+static void open_blackbox(live_t *self, const config_t *config)
+{
+    const char *trouble = blackbox_open(&self->blackbox, self->options->config, config);
+    if (trouble != NULL) {
+        (void)say(0, "%s", trouble);
+    }
+    self->loop.blackbox = blackbox_feed(&self->blackbox);
+}
+
 /* What can be refused comes first: a second heaved must not empty the files of the first. */
 static int open_all(live_t *self, const config_t *config)
 {
     const char *path = self->options->socket != NULL ? self->options->socket : config->control_socket;
     int code = open_udp(self, config);
-    code = code == EXIT_DONE ? control_open(&self->control, path, config, &self->loop) : code;
+    code = code == EXIT_DONE ? control_open(&self->control, path, config, &self->loop, &self->blackbox) : code;
     code = code == EXIT_DONE ? open_files(self) : code;
     if (code != EXIT_DONE) {
         return code;
     }
+    open_blackbox(self, config);
     linux_log_init(&self->log, out_file_unblocked(STDERR_FILENO));
     record_writer_init(&self->writer, &config->settings,
                        config->settings.engage == ENGAGE_AUTO && config->settings.auto_frames == 0);
@@ -356,8 +372,10 @@ int live_run(const config_t *config, const options_t *options)
     self->udp.fd = -1;
     int code = open_all(self, config);
     code = code == EXIT_DONE ? run(self, config) : code;
+    const bool has_blackbox_ended = blackbox_close(&self->blackbox);
     control_close(&self->control);
-    if (!self->is_thread_running) { /* a stuck one may still use all this: the end of the process gives it back */
+    if (!self->is_thread_running &&
+        has_blackbox_ended) { /* a stuck one may still use all this: the end of the process gives it back */
         rig_close(&self->loop.rig);
         linux_udp_close(&self->udp);
         free(self);

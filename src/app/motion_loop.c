@@ -29,10 +29,11 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
     ring_init(&self->results, self->result_bytes, sizeof self->result_bytes);
     ring_init(&self->record, self->record_bytes, sizeof self->record_bytes);
     ring_init(&self->trace, self->trace_bytes, sizeof self->trace_bytes);
-    self->tap = (udp_tap_t){.behind = udp,
-                            .allow = &self->allow,
-                            .record = self->is_recording ? &self->record : NULL,
-                            .now_us = &self->session.now_us};
+    self->tap = (udp_tap_t){
+        .behind = udp,
+        .allow = &self->allow,
+        .record = {self->is_recording ? &self->record : NULL, self->blackbox != NULL ? &self->blackbox->records : NULL},
+        .now_us = &self->session.now_us};
     self->io = (gateway_io_t){.udp = udp_tap_hal(&self->tap), .log = log};
     const hv_status_t status = rig_open(&self->rig, config, &self->io);
     return status == HV_OK ? session_init(&self->session, &config->settings, &self->io) : status;
@@ -40,17 +41,26 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
 
 /* --- Hand-overs --- */
 
-static void note(motion_loop_t *self, record_kind_t kind, uint32_t value)
+static void note_at(motion_loop_t *self, record_kind_t kind, uint64_t t_us, uint32_t value)
 {
     if (self->is_recording) {
-        record_push(&self->record, kind, self->session.now_us, value);
+        record_push(&self->record, kind, t_us, value);
     }
+    if (self->blackbox != NULL) {
+        blackbox_note(self->blackbox, kind, t_us, value);
+    }
+}
+
+static void note(motion_loop_t *self, record_kind_t kind, uint32_t value)
+{
+    note_at(self, kind, self->session.now_us, value);
 }
 
 static void take_reloads(motion_loop_t *self)
 {
     motion_reload_t reload;
     while (ring_pop(&self->reloads, &reload, sizeof reload) > 0) {
+        note(self, RECORD_RELOAD, 0);
         gateway_reload(&self->session.gateway, &reload.settings);
         self->allow = reload.allow;
         self->late_hold_cycles = reload.late_hold_cycles;
@@ -110,21 +120,43 @@ static void publish(motion_loop_t *self)
     seqlock_write(&self->view, self->current.word);
 }
 
+static void note_drives(motion_loop_t *self, const snapshot_t *snapshot)
+{
+    if (self->is_recording) {
+        record_push_drives(&self->record, snapshot->now_us, self->was_drive, snapshot->drive);
+    }
+    if (self->blackbox != NULL) {
+        record_push_drives(&self->blackbox->records, snapshot->now_us, self->was_drive, snapshot->drive);
+    }
+    memcpy(self->was_drive, snapshot->drive, sizeof self->was_drive);
+}
+
+static void write_row(motion_loop_t *self)
+{
+    trace_row_t row;
+    session_row(&self->session, &row);
+    if (self->is_tracing) {
+        (void)ring_push(&self->trace, &row, sizeof row, NULL, 0);
+    }
+    if (self->blackbox != NULL) {
+        blackbox_cycle(self->blackbox, &self->session, &row);
+    }
+}
+
 /* What a recording and a trace need of the cycle that has just run. */
 static void write_down(motion_loop_t *self, bool is_zero)
 {
     const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
-    if (self->is_recording && snapshot->is_estop_active != self->was_estop) {
-        record_push(&self->record, RECORD_ESTOP, snapshot->now_us, snapshot->is_estop_active);
+    if (snapshot->is_estop_active != self->was_estop) {
+        note_at(self, RECORD_ESTOP, snapshot->now_us, snapshot->is_estop_active);
     }
     self->was_estop = snapshot->is_estop_active;
-    if (self->is_recording && is_zero) {
-        record_push(&self->record, RECORD_ZERO, snapshot->now_us, record_zero(snapshot->goal, snapshot->intensity_percent));
+    note_drives(self, snapshot);
+    if (is_zero) {
+        note_at(self, RECORD_ZERO, snapshot->now_us, record_zero(snapshot->goal, snapshot->intensity_percent));
     }
-    if (self->is_tracing && self->session.has_zero) {
-        trace_row_t row;
-        session_row(&self->session, &row);
-        (void)ring_push(&self->trace, &row, sizeof row, NULL, 0);
+    if (self->session.has_zero) {
+        write_row(self);
     }
 }
 

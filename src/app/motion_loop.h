@@ -7,6 +7,7 @@
 
 #include <pthread.h>
 
+#include "blackbox.h"
 #include "config.h"
 #include "heave/hal/clock.h"
 #include "histogram.h"
@@ -79,6 +80,7 @@ typedef struct {
     uint32_t late_hold_cycles; /**< a cycle later than that holds the platform; 0 = never */
     bool is_recording;
     bool is_tracing;
+    blackbox_feed_t *blackbox; /**< NULL: there is none */
 
     motion_times_t times; /**< the motion thread adds, others read */
     seqlock_t view;       /**< motion_view_t to the service thread */
@@ -93,6 +95,7 @@ typedef struct {
 
     motion_view_words_t current; /**< private to the motion thread */
     bool was_estop;
+    drive_feedback_t was_drive[DRIVES_MAX];
     uint64_t view_word[MOTION_VIEW_WORDS];
     hal_udp_networks_t allow; /**< who may send, now */
     uint8_t reload_bytes[MOTION_RELOAD_BYTES];

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "checkpoint.h"
 #include "frames.h"
 #include "out_file.h"
 #include "rig.h"
@@ -119,6 +120,17 @@ static void note_refused(play_t *self, const frames_line_t *line, hv_status_t st
     }
 }
 
+/* What a drive did; one that this platform does not have did nothing. */
+static void inject(play_t *self, const frames_line_t *line)
+{
+    const sim_drives_fault_t fault = {.kind = line->state == DRIVE_FAULT     ? SIM_DRIVES_FAULT
+                                              : line->state == DRIVE_OFFLINE ? SIM_DRIVES_OFFLINE
+                                                                             : SIM_DRIVES_RECOVER,
+                                      .axis = (uint8_t)(line->drive - 1),
+                                      .code = line->number};
+    sim_drives_inject(&self->rig.sim_drives, &fault);
+}
+
 static void carry_out(play_t *self, const frames_line_t *line)
 {
     gateway_t *gateway = &self->session.gateway;
@@ -135,8 +147,12 @@ static void carry_out(play_t *self, const frames_line_t *line)
     case FRAMES_LATE:
         gateway_note_late(gateway, line->number);
         break;
+    case FRAMES_DRIVE:
+        inject(self, line);
+        break;
     case FRAMES_DATAGRAM:
     case FRAMES_FROM:
+    case FRAMES_STATE:
         break;
     }
 }
@@ -229,13 +245,50 @@ static bool settle(play_t *self, const settings_t *settings)
     return false;
 }
 
-/* From time zero to rest.
+/* Whether the file says where to go on from, instead of time zero. */
+static bool has_state(const play_t *self)
+{
+    return self->frames.count > 0 && self->frames.line[0].kind == FRAMES_STATE;
+}
+
+/* Goes on from a saved state, the drives included.
+ * Returns NULL; or what is wrong. */
+static const char *resume(play_t *self, const config_t *config, const gateway_io_t *io)
+{
+    static session_t saved;
+    q32_t setpoint_q32[DRIVES_MAX] = {0};
+    const char *wrong = checkpoint_parse(self->frames.line[0].text, self->frames.line[0].length, &saved);
+    if (wrong != NULL) {
+        return wrong;
+    }
+    if (saved.cycle_us != config->settings.cycle_us || gateway_resume(&self->session.gateway, &saved.gateway, io) != HV_OK) {
+        return "the !state is of another platform; play it with the platform.ini beside it";
+    }
+    self->session.cycle_us = saved.cycle_us;
+    self->session.now_us = saved.now_us;
+    self->session.has_zero = saved.has_zero;
+    self->session.zero_us = saved.zero_us;
+    self->session.late_cycles = saved.late_cycles;
+    const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
+    for (unsigned i = 0; i < snapshot->cylinders; i++) {
+        setpoint_q32[i] = snapshot->extension_mm_q32[i];
+    }
+    setpoint_q32[snapshot->cylinders] = snapshot->angle_deg_q32;
+    sim_drives_place(&self->rig.sim_drives, snapshot->now_us, snapshot->drive, setpoint_q32);
+    sim_inputs_set(&self->rig.sim_inputs, INPUT_ESTOP, snapshot->is_estop_active);
+    return NULL;
+}
+
+/* From time zero, or where it goes on from, to rest.
  * Returns false where it did not come to rest. */
 static bool run(play_t *self)
 {
     session_row(&self->session, &self->row);
-    write_row(self);
-    self->rows = 1;
+    if (!has_state(self)) { /* that row is of the cycle before */
+        write_row(self);
+        self->rows = 1;
+    }
+    self->still_since_us = self->row.t_us;
     while (!is_at_rest(self) && self->out.error == 0) {
         const trace_row_t before = self->row;
         if (before.t_us > last_line_us(self) + EXTRA_MAX_US) {
@@ -313,8 +366,12 @@ static int open_all(play_t *self, const config_t *config, const char *trace_path
 {
     gateway_io_t io = io_of(self);
     if (rig_open_settled(&self->rig, config, &io) != HV_OK || session_init(&self->session, &config->settings, &io) != HV_OK ||
-        !settle(self, &config->settings)) {
+        (!has_state(self) && !settle(self, &config->settings))) {
         return say(EXIT_BAD_CONFIG, "this platform cannot be simulated: its settled or neutral position is out of reach");
+    }
+    const char *wrong = has_state(self) ? resume(self, config, &io) : NULL;
+    if (wrong != NULL) {
+        return say(EXIT_BAD_DATA, "line %u: %s", (unsigned)self->frames.line[0].line, wrong);
     }
     if (!out_file_open(&self->out, trace_path != NULL ? trace_path : "/dev/null", OUT_FILE_WAITS)) {
         return say(EXIT_NO_OUTPUT, "%s: %s", trace_path, strerror(self->out.error));

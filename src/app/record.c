@@ -18,6 +18,19 @@ void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const
     (void)ring_push(ring, &head, sizeof head, bytes, kind == RECORD_DATAGRAM ? length : 0);
 }
 
+void record_push_drives(ring_t *ring, uint64_t t_us, const drive_feedback_t was[DRIVES_MAX],
+                        const drive_feedback_t is[DRIVES_MAX])
+{
+    for (uint32_t i = 0; i < DRIVES_MAX; i++) {
+        const bool is_news = is[i].state == DRIVE_FAULT || is[i].state == DRIVE_OFFLINE || was[i].state == DRIVE_OFFLINE;
+        if (is[i].state != was[i].state && is_news) {
+            const record_head_t head = {
+                .t_us = t_us, .value = is[i].fault_code, .kind = RECORD_DRIVE, .detail = (i + 1) << 8 | (uint32_t)is[i].state};
+            (void)ring_push(ring, &head, sizeof head, NULL, 0);
+        }
+    }
+}
+
 void record_writer_init(record_writer_t *self, const settings_t *settings, bool engages_alone)
 {
     *self = (record_writer_t){.cycle_us = settings->cycle_us,
@@ -76,6 +89,17 @@ static size_t put_request(char *to, event_t request)
     return at + decimal_put_text(&to[at], event_name(request));
 }
 
+static size_t put_drive(char *to, uint32_t detail, uint32_t code)
+{
+    const drive_state_t state = (drive_state_t)(detail & 0xFFu);
+    size_t at = put_number(to, "!drive ", detail >> 8, "");
+    if (state == DRIVE_FAULT) {
+        at += decimal_put_text(&to[at], " fault ");
+        return at + decimal_put_hex(&to[at], code, 8);
+    }
+    return at + decimal_put_text(&to[at], state == DRIVE_OFFLINE ? " offline" : " back");
+}
+
 /* What a record says, behind its time. */
 static size_t put_content(char *to, const record_t *record, size_t length)
 {
@@ -92,6 +116,10 @@ static size_t put_content(char *to, const record_t *record, size_t length)
         return put_number(to, "!intensity ", record->head.value, "");
     case RECORD_LATE:
         return put_number(to, "!late ", record->head.value, "");
+    case RECORD_DRIVE:
+        return put_drive(to, record->head.detail, record->head.value);
+    case RECORD_RELOAD:
+        return decimal_put_text(to, "the configuration was read again: what changed with it does not replay");
     case RECORD_ZERO:
         break;
     }
@@ -120,7 +148,8 @@ static size_t put_zero(const record_writer_t *self, uint32_t value, char *to)
 /* Records that frames files have no line for. */
 static bool is_comment(const record_t *record, size_t length)
 {
-    return record->head.kind == RECORD_OVERSIZE || (record->head.kind == RECORD_DATAGRAM && length == 0);
+    return record->head.kind == RECORD_OVERSIZE || record->head.kind == RECORD_RELOAD ||
+           (record->head.kind == RECORD_DATAGRAM && length == 0);
 }
 
 /* The line that tells of another sender, if this datagram is of one. */

@@ -17,6 +17,9 @@ typedef enum {
     RECORD_ESTOP,     /**< value: 1 on, 0 off */
     RECORD_INTENSITY, /**< value: percent */
     RECORD_LATE,      /**< value: cycles */
+    RECORD_DRIVE,     /**< a drive went into DRIVE_FAULT, went DRIVE_OFFLINE or came back; detail: number, from 1, << 8 |
+                         drive_state_t;     value: its code */
+    RECORD_RELOAD,    /**< the configuration was read again */
     RECORD_ZERO       /**< time zero; value: record_zero() */
 } record_kind_t;
 
@@ -26,6 +29,7 @@ typedef struct {
     uint64_t t_us;       /**< of the cycle, since the start of the program */
     uint32_t value;
     uint32_t kind;
+    uint32_t detail;
 } record_head_t;
 
 /** A record as it comes out of the ring. */
@@ -53,6 +57,12 @@ void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value
 /** Hands a datagram over: RECORD_DATAGRAM, or RECORD_OVERSIZE whose bytes are not kept. */
 void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const hal_udp_peer_t *from, const uint8_t *bytes,
                           size_t length);
+
+/** Hands over what has become of the drives in a cycle, where that is to be played back: faults, and drives that are gone or
+ * back.
+ *  @param was of the cycle before */
+void record_push_drives(ring_t *ring, uint64_t t_us, const drive_feedback_t was[DRIVES_MAX],
+                        const drive_feedback_t is[DRIVES_MAX]);
 
 /** What the platform is to be at time zero: the value of a RECORD_ZERO. */
 static inline uint32_t record_zero(state_t goal, uint32_t intensity_percent)

@@ -14,6 +14,16 @@ bool udp_tap_is_allowed(const hal_udp_networks_t *allow, const hal_udp_peer_t *p
     return allow->count == 0 || hal_udp_rank(allow, peer) < allow->count;
 }
 
+static void write_down(const udp_tap_t *self, hv_status_t status, const hal_udp_peer_t *from, const uint8_t *bytes, size_t length)
+{
+    for (unsigned i = 0; i < sizeof self->record / sizeof self->record[0]; i++) {
+        if (self->record[i] != NULL) {
+            record_push_datagram(self->record[i], status == HV_OK ? RECORD_DATAGRAM : RECORD_OVERSIZE, *self->now_us, from, bytes,
+                                 length);
+        }
+    }
+}
+
 static hv_status_t tap_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
 {
     udp_tap_t *self = ctx;
@@ -23,10 +33,7 @@ static hv_status_t tap_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t 
             return status;
         }
         if (udp_tap_is_allowed(self->allow, from)) {
-            if (self->record != NULL) {
-                record_push_datagram(self->record, status == HV_OK ? RECORD_DATAGRAM : RECORD_OVERSIZE, *self->now_us, from,
-                                     buffer, *length);
-            }
+            write_down(self, status, from, buffer, *length);
             return status;
         }
         self->refused++;

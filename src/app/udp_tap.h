@@ -13,7 +13,7 @@
 typedef struct {
     hal_udp_t behind;
     const hal_udp_networks_t *allow;
-    ring_t *record;         /**< NULL: nothing is written down */
+    ring_t *record[2];      /**< NULL: nothing is written down there */
     const uint64_t *now_us; /**< of the running cycle */
     uint32_t refused;       /**< out: datagrams of senders that are not allowed */
 } udp_tap_t;

@@ -18,15 +18,21 @@ static bool is_io_valid(const gateway_io_t *io)
            hal_log_valid(io->log);
 }
 
+/* Texts of drives that have said nothing yet. */
+static void clear_reports(gateway_t *self)
+{
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        self->snapshot.report[i] = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
+    }
+}
+
 hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gateway_io_t *io)
 {
     if (!is_io_valid(io)) {
         return HV_ERR_ARG;
     }
     *self = (gateway_t){.settings = *settings, .io = *io, .is_tracking_actual = true};
-    for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        self->snapshot.report[i] = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
-    }
+    clear_reports(self);
     gateway_restart_auto(self);
     const hv_status_t status = motion_init(&self->motion, settings);
     if (status != HV_OK) {
@@ -48,6 +54,27 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
 void gateway_restart_auto(gateway_t *self)
 {
     auto_engage_init(&self->auto_engage, self->settings.engage == ENGAGE_AUTO, self->settings.auto_frames);
+}
+
+void gateway_save(const gateway_t *self, gateway_t *out)
+{
+    *out = *self;
+    out->io = (gateway_io_t){.udp = {NULL, NULL}};
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        out->snapshot.report[i] = (drive_report_t){.phase = NULL};
+    }
+}
+
+hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io)
+{
+    const unsigned drives = kin_cylinders(motion_kin(&saved->motion)) + (saved->settings.has_angle ? 1u : 0u);
+    if (!is_io_valid(io) || drives_count(io->drives) != drives) {
+        return HV_ERR_ARG;
+    }
+    *self = *saved;
+    self->io = *io;
+    clear_reports(self);
+    return HV_OK;
 }
 
 void gateway_start_settled(gateway_t *self)

@@ -231,6 +231,42 @@ def a_late_cycle_holds(bench):
     assert bench.play(record, config=config)[:len(live)] == live, "a late cycle replays"
 
 
+def with_black_box(bench):
+    """A configuration with a black box, and its directory."""
+    directory = bench.folder / "incidents"
+    config = bench.write_config("boxed.ini")
+    config.write_text(f"{config.read_text()}\n[black-box]\ndirectory = {directory}\nseconds = 10\n")
+    return config, directory
+
+
+def dumps_the_black_box(bench):
+    config, directory = with_black_box(bench)
+    daemon = bench.start(config=config)
+    bench.wait_state("ENGAGED")
+    with bench.sender() as sender:
+        sender.stream(1.0, wave)
+        run = bench.ctl("dump")
+        assert run.returncode == 0 and run.stdout.startswith(f"dump: {directory}/incident-000001-"), run
+        sender.stream(0.3, wave)
+    answer, code = bench.ask("dump")
+    assert code == 0 and answer == {"ok": True, "folder": answer["folder"]}, answer
+    assert bench.stop(daemon) == 0
+    folders = sorted(directory.iterdir())
+    assert [str(folder) for folder in folders] == [run.stdout[len("dump: "):].strip(), answer["folder"]], folders
+    for folder in folders:
+        trace = (folder / "trace.csv").read_bytes()
+        assert len(trace.splitlines()) > 1000
+        played = bench.play(folder / "frames", config=folder / "platform.ini")
+        assert played[:len(trace)] == trace, f"{folder.name} plays back otherwise"
+
+
+def dumps_nothing(bench):
+    daemon = bench.start()
+    answer, code = bench.ask("dump")
+    assert code == 1 and "[black-box] directory" in answer["error"], answer
+    assert bench.stop(daemon) == 0
+
+
 def tells_the_service_manager(bench):
     path = str(bench.folder / "notify")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
@@ -459,7 +495,8 @@ def allocates_nothing(bench, guard):
     threading.Thread(target=lambda: [None for _ in iter(lambda: manager.recv(500), b"")], daemon=True).start()
     environment = {"LD_PRELOAD": guard, "HEAVE_MALLOC_GUARD": str(armed), "NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "100000"}
     metrics = bench.folder / "heave.prom"
-    config = bench.file("metrics.ini", bench.config.read_text(encoding="utf-8").replace("[control]\n", f"[control]\nmetrics = {metrics}\n"))
+    config, _ = with_black_box(bench)
+    config.write_text(config.read_text(encoding="utf-8").replace("[control]\n", f"[control]\nmetrics = {metrics}\n"))
     daemon = bench.start("--record", bench.folder / "r.txt", "--trace", bench.folder / "t.csv", config=config, environment=environment)
     armed.touch()
     run = bench.ctl("status", env={**os.environ, **environment})
@@ -468,7 +505,7 @@ def allocates_nothing(bench, guard):
         watcher.link.sendall(b"watch 20\n")
         sender.stream(1.0, wave)
         sender.send("nonsense")
-        for command in COMMANDS[:-1] + ["status", "engage"]:
+        for command in COMMANDS[:-1] + ["status", "dump", "engage"]:
             bench.ctl(command)
         sender.stream(0.5, wave)
         watcher.file.readline()
@@ -489,6 +526,8 @@ CASES = {
     "a recording plays back to the same bytes, engage = auto": replays_to_the_same_bytes,
     "a recording plays back to the same bytes, engage = manual, homed from elsewhere": lambda bench: replays_to_the_same_bytes(bench, **ELSEWHERE),
     "a cycle that is very late holds the platform, and replays": a_late_cycle_holds,
+    "the black box is written on request, and replays": dumps_the_black_box,
+    "without a directory there is no black box": dumps_nothing,
     "the service manager is told": tells_the_service_manager,
     "SIGTERM settles, switches off and ends with 0": lambda bench: signal_settles(bench, signal.SIGTERM),
     "Ctrl-C does the same": lambda bench: signal_settles(bench, signal.SIGINT),

@@ -457,6 +457,11 @@ static const spoilt_t k_spoilt[] = {
      "[udp] silence_hold_ms: \"-1\" is out of range; allowed: a whole number from 0 to 3600000 ms"},
     {"control", "socket", "socket = heaved.sock",
      "[control] socket: \"heaved.sock\" is not an absolute path; allowed: an absolute path of at most 107 characters"},
+    {"black-box", "directory", "directory = incidents",
+     "[black-box] directory: \"incidents\" is not an absolute path; allowed: none, or an absolute path of at most 107 "
+     "characters"},
+    {"black-box", "incidents", "incidents = 0",
+     "[black-box] incidents: \"0\" is out of range; allowed: a whole number from 1 to 100"},
     {"drives", "driver", "driver = modbus-tcp",
      "[drives] driver: driver modbus-tcp is not built into this heaved; allowed: sim | cia402 | can-raw"},
     {"drives", "driver", "driver = modbus-rtu",
@@ -833,6 +838,7 @@ static void test_load_values_arrive_where_they_belong(void)
     set_key("udp", "stream", "fast");
     set_key("udp", "silence_settle_ms", "3600000");
     set_key("control", "socket", "/tmp/h.sock");
+    set_key("black-box", "directory", "/var/lib/heave");
     set_key("sim", "start_extension_mm", "12.5");
     set_key("sim", "homed", "no");
     set_key("relays", "lines", "17, GPIO27 , RELAY 3");
@@ -879,6 +885,7 @@ static void test_load_values_arrive_where_they_belong(void)
     TEST_ASSERT_TRUE(m_config.udp.allow.network[2].is_ipv6);
     TEST_ASSERT_EQUAL_MEMORY(v6, m_config.udp.allow.network[2].address, 16);
     TEST_ASSERT_EQUAL_STRING("/tmp/h.sock", m_config.control_socket);
+    TEST_ASSERT_EQUAL_STRING("/var/lib/heave", m_config.black_box.directory);
     TEST_ASSERT_EQUAL_INT32(12 * 65536 + 32768, m_config.sim.start_extension_mm_q16);
     TEST_ASSERT_FALSE(m_config.sim.is_homed);
     TEST_ASSERT_EQUAL_STRING("RELAY 3", m_config.relays.lines.line[2].text);

@@ -206,7 +206,13 @@ static void test_frames_parse_line_bad_request_is_refused(void)
                    {"1 !late 4294967296", "!late without"},
                    {"1 !late 1x", "more on the line"},
                    {"1 !from", "!from without a numeric address"},
-                   {"1 !from somewhere", "!from without a numeric address"}};
+                   {"1 !from somewhere", "!from without a numeric address"},
+                   {"1 !drive 0 back", "!drive without"},
+                   {"1 !drive 8 back", "!drive without"},
+                   {"1 !drive 1", "!drive without"},
+                   {"1 !drive 1 fault", "!drive without"},
+                   {"1 !drive 1 gone", "!drive without"},
+                   {"1 !drive 1 fault 123456789", "more on the line"}};
     for (size_t i = 0; i < sizeof k_wrong / sizeof k_wrong[0]; i++) {
         expect_wrong(k_wrong[i].line, k_wrong[i].why);
     }

@@ -1,0 +1,403 @@
+/* SPDX-License-Identifier: MIT
+ * blackbox_files.c - the folders of the black box; see blackbox_files.h.
+ */
+#include "blackbox_files.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "decimal.h"
+#include "heave/text.h"
+#include "say.h"
+
+#define PREFIX          "incident-"
+#define PART            ".incident.part"
+#define ITEMS_PER_TAKE  1000u /* written before what is fed meanwhile is taken over */
+#define FEEDBACK_PLACES 6u
+
+static const char *const k_files[] = {"frames", "trace.csv", "feedback.csv", "platform.ini"};
+enum { FILE_FRAMES, FILE_TRACE, FILE_FEEDBACK, FILE_PLATFORM, FILES };
+
+/** Where a replay begins. */
+typedef enum {
+    START_NEVER, /**< what led here is older than what is kept */
+    START_ZERO,  /**< time zero of the run */
+    START_STATE  /**< read.state */
+} start_t;
+
+/* --- Names --- */
+
+static const char *path_of(blackbox_t *self, const char *folder, const char *file)
+{
+    text_t text = text_start(self->path, sizeof self->path);
+    text_put(&text, self->directory);
+    text_put(&text, "/");
+    text_put(&text, folder);
+    text_put(&text, file[0] != '\0' ? "/" : "");
+    text_put(&text, file);
+    return self->path;
+}
+
+static int by_name(const void *a, const void *b)
+{
+    return strcmp(((const blackbox_folder_t *)a)->name, ((const blackbox_folder_t *)b)->name);
+}
+
+/* Removes a folder with what is known to be in it. */
+static void remove_folder(blackbox_t *self, const char *name)
+{
+    for (unsigned i = 0; i < FILES; i++) {
+        (void)unlink(path_of(self, name, k_files[i]));
+    }
+    (void)rmdir(path_of(self, name, ""));
+}
+
+static void drop_oldest(blackbox_t *self)
+{
+    remove_folder(self, self->folder[0].name);
+    self->folders--;
+    memmove(&self->folder[0], &self->folder[1], self->folders * sizeof self->folder[0]);
+}
+
+static void add_folder(blackbox_t *self, const char *name)
+{
+    if (self->folders == BLACKBOX_INCIDENTS_MAX + 1u) {
+        return;
+    }
+    (void)snprintf(self->folder[self->folders].name, BLACKBOX_NAME_MAX, "%s", name);
+    self->folders++;
+}
+
+/* An incident's number; 0 where the name is none. Six digits, so that names sort as numbers do. */
+static uint32_t number_of(const char *name)
+{
+    const size_t prefix = strlen(PREFIX);
+    if (strncmp(name, PREFIX, prefix) != 0 || strspn(&name[prefix], "0123456789") != 6 || strlen(name) >= BLACKBOX_NAME_MAX) {
+        return 0;
+    }
+    return (uint32_t)strtoul(&name[prefix], NULL, 10);
+}
+
+const char *blackbox_find_folders(blackbox_t *self)
+{
+    static char text[BLACKBOX_TEXT_MAX];
+    (void)mkdir(self->directory, 0750);
+    DIR *directory = opendir(self->directory);
+    for (const struct dirent *entry = NULL; directory != NULL && (entry = readdir(directory)) != NULL;) {
+        const uint32_t number = number_of(entry->d_name);
+        if (number != 0) {
+            add_folder(self, entry->d_name);
+            self->number = number > self->number ? number : self->number;
+        }
+    }
+    const int error = errno;
+    if (directory != NULL) {
+        (void)closedir(directory);
+    }
+    qsort(self->folder, self->folders, sizeof self->folder[0], by_name);
+    const time_t now = 0;
+    struct tm date;
+    (void)gmtime_r(&now, &date); /* what it allocates, it allocates here */
+    if (directory != NULL && access(self->directory, W_OK | X_OK) == 0) {
+        remove_folder(self, PART);
+        return NULL;
+    }
+    (void)snprintf(text, sizeof text, "black box: %s: %s; until that changes, no incident can be written", self->directory,
+                   strerror(directory == NULL ? error : errno));
+    return text;
+}
+
+/* --- Where a replay begins --- */
+
+static void start_reading(blackbox_lane_t *lane)
+{
+    lane->reader = lane->kept;
+    lane->is_reading = true;
+}
+
+static bool read_next(blackbox_t *self, blackbox_lane_t *lane, size_t *length)
+{
+    *length = ring_pop(&lane->reader, &self->read, sizeof self->read);
+    return *length > 0;
+}
+
+/* The oldest place since when nothing is missing. */
+static start_t find_start(blackbox_t *self, uint64_t *start_us)
+{
+    const uint64_t lost_us =
+        self->records.lost_until_us > self->rows.lost_until_us ? self->records.lost_until_us : self->rows.lost_until_us;
+    size_t length = 0;
+    *start_us = 0;
+    if (self->records.is_gap || self->rows.is_gap) {
+        return START_NEVER;
+    }
+    if (self->zero_us != 0 && self->zero_us > lost_us) {
+        *start_us = self->zero_us;
+        return START_ZERO;
+    }
+    while (read_next(self, &self->states, &length)) {
+        if (self->read.state.now_us > lost_us) {
+            *start_us = self->read.state.now_us;
+            return START_STATE;
+        }
+    }
+    return START_NEVER;
+}
+
+/* --- Files --- */
+
+static bool open_file(blackbox_t *self, unsigned file)
+{
+    return out_file_open(&self->file, path_of(self, PART, k_files[file]), OUT_FILE_WAITS);
+}
+
+/* On the disk, not only on its way: power may go next. */
+static bool close_file(blackbox_t *self)
+{
+    out_file_flush(&self->file);
+    if (self->file.error == 0 && fsync(self->file.fd) != 0) {
+        self->file.error = errno;
+    }
+    return out_file_close(&self->file);
+}
+
+static void write_text(blackbox_t *self, const char *text)
+{
+    out_file_write(&self->file, text, strlen(text));
+}
+
+/* Now and then, and where the file takes no more.
+ * Returns whether to go on. */
+static bool go_on(blackbox_t *self, uint32_t *items)
+{
+    if (++*items % ITEMS_PER_TAKE == 0) {
+        blackbox_take(self);
+    }
+    return self->file.error == 0;
+}
+
+static void write_head(blackbox_t *self, const blackbox_row_t *cause, const char *name, start_t start)
+{
+    static const char *const k_starts[] = {
+        [START_NEVER] = "; NO REPLAY: what led here is older than what was kept\n",
+        [START_ZERO] = "; replay: heaved --config platform.ini --play frames --trace OUT repeats trace.csv\n",
+        [START_STATE] =
+            "; replay, by the same version of heaved: heaved --config platform.ini --play frames --trace OUT repeats trace.csv\n",
+    };
+    char text[640];
+    const bool is_fault = cause != NULL && cause->fault != FAULT_NONE;
+    (void)snprintf(text, sizeof text, "; heaved %s, configuration %.300s, %s\n; %s", HEAVE_VERSION, self->config_path, name,
+                   cause == NULL ? "asked for by an operator"
+                   : is_fault    ? fault_text((fault_code_t)cause->fault)
+                                 : "e-stop");
+    write_text(self, text);
+    if (is_fault && cause->fault_axis != 0) {
+        (void)snprintf(text, sizeof text, ", axis %u", (unsigned)cause->fault_axis);
+        write_text(self, text);
+    }
+    if (cause != NULL && self->zero_us != 0) {
+        (void)snprintf(text, sizeof text, ", at %" PRIu64 ".%03u ms", (cause->now_us - self->zero_us) / 1000,
+                       (unsigned)((cause->now_us - self->zero_us) % 1000));
+        write_text(self, text);
+    }
+    write_text(self, "\n");
+    write_text(self, k_starts[start]);
+}
+
+/* Turns the records from where the replay begins into lines; all of them where it cannot begin, as comments. */
+static void write_records(blackbox_t *self, record_writer_t *writer, uint64_t from_us)
+{
+    char line[RECORD_LINE_MAX];
+    uint32_t items = 0;
+    size_t length = 0;
+    while (go_on(self, &items) && read_next(self, &self->records, &length)) {
+        const record_t *record = &self->read.record;
+        if (record->head.t_us >= from_us) {
+            out_file_write(&self->file, line, record_writer_line(writer, record, length - sizeof record->head, line));
+        }
+    }
+}
+
+static bool write_frames(blackbox_t *self, const blackbox_row_t *cause, const char *name, start_t start, uint64_t start_us)
+{
+    record_writer_t writer;
+    record_writer_init(&writer, self->settings, self->settings->engage == ENGAGE_AUTO && self->settings->auto_frames == 0);
+    if (!open_file(self, FILE_FRAMES)) {
+        return false;
+    }
+    write_head(self, cause, name, start);
+    if (start == START_STATE) {
+        writer.has_zero = true;
+        writer.zero_us = self->zero_us;
+        out_file_write(&self->file, self->line, checkpoint_format(&self->read.state, self->line));
+    }
+    write_records(self, &writer, start == START_STATE ? start_us : 0);
+    return close_file(self);
+}
+
+static void put_feedback_head(const settings_t *settings, char *to, size_t capacity)
+{
+    const unsigned cylinders = settings->geometry.kind == KIN_HEXAPOD ? 6u : 3u;
+    text_t text = text_start(to, capacity);
+    text_put(&text, "t_ms");
+    for (unsigned i = 1; i <= cylinders; i++) {
+        text_put(&text, ",c");
+        text_put_u32(&text, i);
+        text_put(&text, "_state,c");
+        text_put_u32(&text, i);
+        text_put(&text, "_actual_mm,c");
+        text_put_u32(&text, i);
+        text_put(&text, "_code");
+    }
+    text_put(&text, settings->has_angle ? ",angle_state,angle_actual_deg,angle_code,fault\n" : ",fault\n");
+}
+
+static size_t format_feedback(const blackbox_row_t *row, char *to)
+{
+    static const char *const k_drives[] = {"offline", "disabled", "enabling", "enabled", "homing", "fault"};
+    size_t at = decimal_put_ms(to, row->row.t_us);
+    for (unsigned i = 0; i < row->drives; i++) {
+        at += decimal_put_text(&to[at], ",");
+        at += decimal_put_text(&to[at], row->drive[i] <= DRIVE_FAULT ? k_drives[row->drive[i]] : "?");
+        at += decimal_put_text(&to[at], ",");
+        at += decimal_put_q32(&to[at], row->actual_q32[i], FEEDBACK_PLACES);
+        at += decimal_put_text(&to[at], ",");
+        at += decimal_put_hex(&to[at], row->code[i], 8);
+    }
+    at += decimal_put_text(&to[at], ",");
+    at += decimal_put_text(&to[at], row->fault == FAULT_NONE ? "" : fault_row((fault_code_t)row->fault)->name);
+    return at + decimal_put_text(&to[at], "\n");
+}
+
+static size_t format_row(const blackbox_row_t *row, char *to)
+{
+    return trace_format(&row->row, to);
+}
+
+static bool write_rows(blackbox_t *self, unsigned file, const char *head, size_t (*format)(const blackbox_row_t *, char *),
+                       uint64_t from_us)
+{
+    char line[2 * TRACE_LINE_MAX];
+    uint32_t items = 0;
+    size_t length = 0;
+    if (!open_file(self, file)) {
+        return false;
+    }
+    write_text(self, head);
+    while (go_on(self, &items) && read_next(self, &self->rows, &length)) {
+        if (self->read.row.now_us >= from_us && self->read.row.now_us <= self->until_us) {
+            out_file_write(&self->file, line, format(&self->read.row, line));
+        }
+    }
+    return close_file(self);
+}
+
+static bool write_platform(blackbox_t *self)
+{
+    if (!open_file(self, FILE_PLATFORM)) {
+        return false;
+    }
+    for (size_t at = 0; at < self->platform_length && self->file.error == 0;) {
+        const size_t left = self->platform_length - at;
+        const size_t piece = left < OUT_FILE_BYTES ? left : OUT_FILE_BYTES;
+        out_file_write(&self->file, &self->platform[at], piece);
+        at += piece;
+    }
+    return close_file(self);
+}
+
+/* --- An incident --- */
+
+static bool write_files(blackbox_t *self, const blackbox_row_t *cause, const char *name)
+{
+    char feedback_head[2 * TRACE_LINE_MAX];
+    char trace_head[TRACE_LINE_MAX];
+    trace_head[trace_header(trace_head)] = '\0';
+    put_feedback_head(self->settings, feedback_head, sizeof feedback_head);
+    blackbox_take(self);
+    self->until_us = self->newest_us;
+    blackbox_take(self); /* every record of the cycles up to then has come now */
+    start_reading(&self->states);
+    start_reading(&self->records);
+    start_reading(&self->rows);
+    uint64_t start_us = 0;
+    const start_t start = find_start(self, &start_us);
+    bool is_good =
+        write_frames(self, cause, name, start, start_us) && write_rows(self, FILE_TRACE, trace_head, format_row, start_us);
+    start_reading(&self->rows); /* once more */
+    is_good = is_good && write_rows(self, FILE_FEEDBACK, feedback_head, format_feedback, start_us) && write_platform(self);
+    self->states.is_reading = false;
+    self->records.is_reading = false;
+    self->rows.is_reading = false;
+    return is_good;
+}
+
+/* The folder with what has been written gets its name; the directory is on the disk with it. */
+static bool name_folder(blackbox_t *self, const char *name)
+{
+    char part[sizeof self->path];
+    (void)snprintf(part, sizeof part, "%s", path_of(self, PART, ""));
+    if (rename(part, path_of(self, name, "")) != 0) {
+        return false;
+    }
+    const int directory = open(self->directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (directory >= 0) {
+        (void)fsync(directory);
+        (void)close(directory);
+    }
+    return true;
+}
+
+static void make_name(blackbox_t *self, char name[BLACKBOX_NAME_MAX])
+{
+    const time_t now = time(NULL);
+    struct tm date;
+    (void)gmtime_r(&now, &date);
+    (void)snprintf(name, BLACKBOX_NAME_MAX, PREFIX "%06u-%04d%02d%02dT%02d%02d%02dZ", (unsigned)(self->number % 1000000u),
+                   date.tm_year + 1900, date.tm_mon + 1, date.tm_mday, date.tm_hour, date.tm_min, date.tm_sec);
+}
+
+static int make_incident(blackbox_t *self, const blackbox_row_t *cause, const char *name)
+{
+    remove_folder(self, PART);
+    (void)mkdir(self->directory, 0750);
+    if (mkdir(path_of(self, PART, ""), 0750) != 0) {
+        return errno;
+    }
+    self->file.error = 0;
+    if (write_files(self, cause, name) && name_folder(self, name)) {
+        return 0;
+    }
+    const int error = self->file.error != 0 ? self->file.error : errno;
+    remove_folder(self, PART);
+    return error;
+}
+
+bool blackbox_write(blackbox_t *self, const blackbox_row_t *cause, char text[BLACKBOX_TEXT_MAX])
+{
+    char name[BLACKBOX_NAME_MAX];
+    self->number++;
+    make_name(self, name);
+    const int error = make_incident(self, cause, name);
+    if (error != 0) {
+        self->number--;
+        (void)snprintf(text, BLACKBOX_TEXT_MAX, "%s: %s", self->directory, strerror(error));
+        (void)say(0, "black box: %s: no incident written", text);
+        return false;
+    }
+    add_folder(self, name);
+    while (self->folders > self->folders_max) {
+        drop_oldest(self);
+    }
+    (void)snprintf(text, BLACKBOX_TEXT_MAX, "%s", path_of(self, name, ""));
+    (void)say(0, "black box: %s", text);
+    return true;
+}

@@ -1,0 +1,380 @@
+/* SPDX-License-Identifier: MIT
+ * test_blackbox.c - the black box behind a real motion loop in virtual time: what it writes plays back to the same bytes.
+ * The clock of the loop is the test: every sleep is a cycle in which things happen.
+ */
+#include <errno.h>
+#include <ftw.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "blackbox.h"
+#include "motion_loop.h"
+#include "play.h"
+#include "sim_log.h"
+#include "sim_udp.h"
+#include "unity.h"
+
+#define STEP_CYCLES 10u /* the thread of the black box would come as often */
+#define FRAME_US    16000u
+#define FILE_BYTES  (64u << 20)
+
+void hv_assert_failed(const char *file, int line)
+{
+    (void)file;
+    (void)line;
+    TEST_FAIL_MESSAGE("assertion failed");
+}
+
+/* What happens in a run; times in us since its start, 0 = never. */
+typedef struct {
+    uint64_t end_us;
+    uint64_t ask_us;
+    uint64_t fault_us;
+    uint64_t estop_us;
+    uint64_t deaf_us, hearing_us; /* the black box does not get a turn in between */
+} story_t;
+
+static config_t m_config;
+static motion_loop_t m_loop;
+static blackbox_t m_box;
+static sim_udp_t m_udp;
+static sim_log_t m_log;
+static story_t m_story;
+static uint64_t m_now_us;
+static char m_home[64];
+static char m_folder[BLACKBOX_PATH_MAX];
+static char m_path[BLACKBOX_PATH_MAX + 64];
+
+/* --- The world --- */
+
+static void send_frame(void)
+{
+    static const hal_udp_peer_t k_from = {.address = {192, 168, 7, 3}, .port = 5000};
+    char text[96];
+    const double t = (double)m_now_us * 1e-6;
+    const int length =
+        snprintf(text, sizeof text, "@A6:%.3f,%.3f,0,0,0,%.3f,00#", 6 * sin(2 * t), 5 * sin(1.7 * t), 20 * sin(1.3 * t));
+    (void)!sim_udp_push(&m_udp, (const uint8_t *)text, (size_t)length, &k_from);
+}
+
+static bool is_due(uint64_t at_us)
+{
+    return at_us != 0 && m_now_us >= at_us && m_now_us < at_us + m_config.settings.cycle_us;
+}
+
+static void live(void)
+{
+    if (m_now_us % FRAME_US < m_config.settings.cycle_us) {
+        send_frame();
+    }
+    if (is_due(m_story.fault_us)) {
+        sim_drives_inject(&m_loop.rig.sim_drives, &(sim_drives_fault_t){.kind = SIM_DRIVES_FAULT, .axis = 2, .code = 0x7305});
+    }
+    if (is_due(m_story.estop_us)) {
+        sim_inputs_set(&m_loop.rig.sim_inputs, INPUT_ESTOP, true);
+    }
+    if (is_due(m_story.ask_us)) {
+        (void)blackbox_ask(&m_box);
+    }
+    const bool is_deaf = m_now_us >= m_story.deaf_us && m_now_us < m_story.hearing_us;
+    if (m_now_us / m_config.settings.cycle_us % STEP_CYCLES == 0 && !is_deaf) {
+        blackbox_step(&m_box, false);
+    }
+    if (m_now_us >= m_story.end_us) {
+        motion_loop_quit(&m_loop);
+    }
+}
+
+static uint64_t clock_now_us(void *ctx)
+{
+    (void)ctx;
+    return m_now_us;
+}
+
+static hv_status_t clock_sleep(void *ctx, uint64_t deadline_us)
+{
+    (void)ctx;
+    m_now_us = deadline_us;
+    live();
+    return HV_OK;
+}
+
+static void run(story_t story)
+{
+    static const hal_clock_ops_t k_ops = {clock_now_us, clock_sleep};
+    m_story = story;
+    sim_udp_init(&m_udp);
+    sim_log_init(&m_log);
+    TEST_ASSERT_NULL(blackbox_open(&m_box, "test.ini", &m_config));
+    m_loop.blackbox = blackbox_feed(&m_box);
+    TEST_ASSERT_EQUAL(
+        HV_OK, motion_loop_init(&m_loop, &m_config, sim_udp_hal(&m_udp), sim_log_hal(&m_log), (hal_clock_t){&k_ops, NULL}));
+    TEST_ASSERT_TRUE(motion_loop_start(&m_loop));
+    TEST_ASSERT_EQUAL(0, pthread_join(m_loop.thread, NULL));
+    blackbox_step(&m_box, true);
+}
+
+/* --- What was written --- */
+
+static const char *file_of(const char *name)
+{
+    (void)snprintf(m_path, sizeof m_path, "%s/%s", m_folder, name);
+    return m_path;
+}
+
+static char *contents(const char *path)
+{
+    FILE *file = fopen(path, "rb");
+    TEST_ASSERT_NOT_NULL_MESSAGE(file, path);
+    char *bytes = malloc(FILE_BYTES);
+    const size_t length = fread(bytes, 1, FILE_BYTES - 1, file);
+    bytes[length] = '\0';
+    (void)fclose(file);
+    return bytes;
+}
+
+/* The newest folder. */
+static void find_folder(void)
+{
+    TEST_ASSERT_GREATER_THAN_UINT32(0, m_box.folders);
+    (void)snprintf(m_folder, sizeof m_folder, "%s/%s", m_config.black_box.directory, m_box.folder[m_box.folders - 1].name);
+}
+
+/* Plays the incident; what it says it was has to be what comes out, byte for byte.
+ * Returns the frames. */
+static char *expect_replay(unsigned rows_min)
+{
+    char played_path[96];
+    config_t config;
+    find_folder();
+    (void)snprintf(played_path, sizeof played_path, "%s/played.csv", m_home);
+    TEST_ASSERT_EQUAL(0, config_load(file_of("platform.ini"), &config, stderr));
+    TEST_ASSERT_EQUAL(0, play_run(&config, file_of("frames"), played_path));
+    char *played = contents(played_path);
+    char *trace = contents(file_of("trace.csv"));
+    unsigned rows = 0;
+    for (const char *at = trace; (at = strchr(at, '\n')) != NULL; at++) {
+        rows++;
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(rows_min, rows);
+    size_t same = 0;
+    while (trace[same] != '\0' && trace[same] == played[same]) {
+        same++;
+    }
+    char around[120] = "";
+    (void)snprintf(around, sizeof around, "%.100s", &trace[same > 60 ? same - 60 : 0]);
+    TEST_ASSERT_TRUE_MESSAGE(trace[same] == 0, around);
+    free(played);
+    free(trace);
+    return contents(file_of("frames"));
+}
+
+static void expect_in(const char *text, const char *part)
+{
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, part), part);
+}
+
+void setUp(void)
+{
+    memset(&m_loop, 0, sizeof m_loop);
+    memset(&m_box, 0, sizeof m_box);
+    m_now_us = 0;
+    TEST_ASSERT_EQUAL(0, config_load(HEAVE_CONFIG_DIR "/demo-hexapod.ini", &m_config, stderr));
+    (void)snprintf(m_home, sizeof m_home, "/tmp/heave-blackbox-XXXXXX");
+    TEST_ASSERT_NOT_NULL(mkdtemp(m_home));
+    (void)snprintf(m_config.black_box.directory, sizeof m_config.black_box.directory, "%s/box", m_home);
+    m_config.black_box.seconds = 10;
+    m_config.inputs.estop_line.text[0] = '5';
+    m_config.settings.engage = ENGAGE_AUTO;
+    m_config.settings.auto_frames = 0;
+}
+
+static int remove_one(const char *path, const struct stat *about, int kind, struct FTW *walk)
+{
+    (void)about;
+    (void)kind;
+    (void)walk;
+    return remove(path);
+}
+
+void tearDown(void)
+{
+    (void)blackbox_close(&m_box);
+    TEST_ASSERT_EQUAL(0, nftw(m_home, remove_one, 8, FTW_DEPTH | FTW_PHYS));
+}
+
+/* --- Cases --- */
+
+static void test_blackbox_short_run_replays_from_time_zero(void)
+{
+    run((story_t){.end_us = 6000000, .ask_us = 5000000});
+    char *frames = expect_replay(4000);
+    TEST_ASSERT_NULL(strstr(frames, "!state"));
+    expect_in(frames, "; asked for by an operator\n");
+    expect_in(frames, "!from 192.168.7.3\n");
+    char *feedback = contents(file_of("feedback.csv"));
+    expect_in(feedback, "t_ms,c1_state,c1_actual_mm,c1_code,");
+    expect_in(feedback, "enabled");
+    free(feedback);
+    free(frames);
+}
+
+static void test_blackbox_long_ride_replays_from_the_middle(void)
+{
+    run((story_t){.end_us = 42000000, .ask_us = 41000000});
+    char *frames = expect_replay(10000);
+    expect_in(frames, " !state ");
+    free(frames);
+}
+
+static void test_blackbox_drive_fault_is_written_by_itself_and_replays(void)
+{
+    run((story_t){.end_us = 45000000, .fault_us = 40123000});
+    TEST_ASSERT_EQUAL_UINT32(1, m_box.folders);
+    char *frames = expect_replay(10000);
+    expect_in(frames, ", axis 3, at ");
+    expect_in(frames, " !drive 3 fault 00007305\n");
+    char *trace = contents(file_of("trace.csv"));
+    expect_in(trace, ",FAULT,");
+    free(trace);
+    free(frames);
+}
+
+static void test_blackbox_estop_is_written_at_the_end_at_the_latest(void)
+{
+    run((story_t){.end_us = 8000000, .estop_us = 7000000});
+    char *frames = expect_replay(6000);
+    expect_in(frames, "; e-stop, at ");
+    expect_in(frames, " !estop on\n");
+    free(frames);
+}
+
+static void test_blackbox_what_was_not_handed_over_is_not_replayed(void)
+{
+    run((story_t){.end_us = 32000000, .deaf_us = 8000000, .hearing_us = 20000000, .ask_us = 31000000});
+    char *frames = expect_replay(3000);
+    expect_in(frames, " !state ");
+    free(frames);
+}
+
+static void test_blackbox_nothing_to_begin_with_is_said(void)
+{
+    run((story_t){.end_us = 20100000, .deaf_us = 8000000, .hearing_us = 20000000, .ask_us = 20050000});
+    find_folder();
+    char *frames = contents(file_of("frames"));
+    expect_in(frames, "; NO REPLAY: ");
+    free(frames);
+}
+
+static void test_blackbox_folders_are_bounded_and_a_part_is_removed(void)
+{
+    char path[BLACKBOX_PATH_MAX + 64];
+    m_config.black_box.incidents = 2;
+    (void)mkdir(m_config.black_box.directory, 0700);
+    (void)snprintf(path, sizeof path, "%s/incident-000041-20200101T000000Z", m_config.black_box.directory);
+    TEST_ASSERT_EQUAL(0, mkdir(path, 0700));
+    (void)snprintf(m_folder, sizeof m_folder, "%s/.incident.part", m_config.black_box.directory);
+    TEST_ASSERT_EQUAL(0, mkdir(m_folder, 0700));
+    for (unsigned i = 0; i < 3; i++) {
+        if (i > 0) {
+            (void)blackbox_close(&m_box);
+            memset(&m_loop, 0, sizeof m_loop);
+            memset(&m_box, 0, sizeof m_box);
+            m_now_us = 0;
+        }
+        run((story_t){.end_us = 1000000, .ask_us = 900000});
+        TEST_ASSERT_EQUAL_UINT32(2, m_box.folders);
+        TEST_ASSERT_EQUAL_UINT32(42 + i, m_box.number);
+        TEST_ASSERT_EQUAL(i == 0 ? 0 : -1, access(path, F_OK));
+        TEST_ASSERT_EQUAL(-1, access(m_folder, F_OK));
+        (void)snprintf(m_folder, sizeof m_folder, "%s/.incident.part", m_config.black_box.directory);
+    }
+}
+
+static void expect_refusal(const char *why)
+{
+    bool is_good = true;
+    char text[BLACKBOX_TEXT_MAX];
+    TEST_ASSERT_TRUE(blackbox_answer(&m_box, 1, &is_good, text));
+    TEST_ASSERT_FALSE(is_good);
+    expect_in(text, why);
+    TEST_ASSERT_EQUAL_UINT32(0, m_box.folders);
+}
+
+static void test_blackbox_full_disk_leaves_nothing_behind(void)
+{
+    struct rlimit before;
+    (void)signal(SIGXFSZ, SIG_IGN);
+    TEST_ASSERT_EQUAL(0, getrlimit(RLIMIT_FSIZE, &before));
+    const struct rlimit small = {.rlim_cur = 200000, .rlim_max = before.rlim_max};
+    TEST_ASSERT_EQUAL(0, setrlimit(RLIMIT_FSIZE, &small));
+    run((story_t){.end_us = 3000000, .ask_us = 2900000});
+    TEST_ASSERT_EQUAL(0, setrlimit(RLIMIT_FSIZE, &before));
+    expect_refusal(strerror(EFBIG));
+    TEST_ASSERT_EQUAL_MESSAGE(0, rmdir(m_config.black_box.directory), "an empty directory");
+}
+
+static void test_blackbox_directory_that_cannot_be_is_said_at_the_start(void)
+{
+    (void)fclose(fopen(m_config.black_box.directory, "w"));
+    const char *why = blackbox_open(&m_box, "test.ini", &m_config);
+    TEST_ASSERT_NOT_NULL(why);
+    expect_in(why, "Not a directory");
+    (void)blackbox_ask(&m_box);
+    blackbox_step(&m_box, false);
+    expect_refusal("Not a directory");
+}
+
+static void test_blackbox_without_directory_there_is_none(void)
+{
+    (void)strcpy(m_config.black_box.directory, "none");
+    TEST_ASSERT_NULL(blackbox_open(&m_box, "test.ini", &m_config));
+    TEST_ASSERT_NULL(blackbox_feed(&m_box));
+    TEST_ASSERT_EQUAL_UINT32(0, blackbox_ask(&m_box));
+    TEST_ASSERT_TRUE(blackbox_start(&m_box));
+}
+
+static void test_checkpoint_damaged_text_is_refused(void)
+{
+    static char line[CHECKPOINT_LINE_MAX];
+    static session_t session, out;
+    sim_log_init(&m_log);
+    const size_t length = checkpoint_format(&session, line);
+    char *text = strstr(line, "!state ") + strlen("!state ");
+    const size_t rest = length - 1 - (size_t)(text - line);
+    TEST_ASSERT_NULL(checkpoint_parse((const uint8_t *)text, rest, &out));
+    TEST_ASSERT_EQUAL_MEMORY(&session, &out, sizeof out);
+    for (size_t i = 0; i < rest; i += 97) {
+        const char was = text[i];
+        text[i] = was == '1' ? '2' : '1';
+        TEST_ASSERT_NOT_NULL(checkpoint_parse((const uint8_t *)text, rest, &out));
+        text[i] = was;
+    }
+    for (size_t i = 0; i < rest; i += 997) {
+        TEST_ASSERT_NOT_NULL(checkpoint_parse((const uint8_t *)text, i, &out));
+    }
+}
+
+int main(void)
+{
+    (void)unsetenv("STATE_DIRECTORY"); // NOLINT(concurrency-mt-unsafe): before any thread
+    UNITY_BEGIN();
+    RUN_TEST(test_blackbox_short_run_replays_from_time_zero);
+    RUN_TEST(test_blackbox_long_ride_replays_from_the_middle);
+    RUN_TEST(test_blackbox_drive_fault_is_written_by_itself_and_replays);
+    RUN_TEST(test_blackbox_estop_is_written_at_the_end_at_the_latest);
+    RUN_TEST(test_blackbox_what_was_not_handed_over_is_not_replayed);
+    RUN_TEST(test_blackbox_nothing_to_begin_with_is_said);
+    RUN_TEST(test_blackbox_folders_are_bounded_and_a_part_is_removed);
+    RUN_TEST(test_blackbox_full_disk_leaves_nothing_behind);
+    RUN_TEST(test_blackbox_directory_that_cannot_be_is_said_at_the_start);
+    RUN_TEST(test_blackbox_without_directory_there_is_none);
+    RUN_TEST(test_checkpoint_damaged_text_is_refused);
+    return UNITY_END();
+}
