@@ -3,6 +3,12 @@
  */
 #include "contract.h"
 
+#include <time.h>
+
+#include "heave/coil_relays.h"
+#include "linux_modbus.h"
+#include "modbus_server.h"
+#include "sim_modbus.h"
 #include "sim_relays.h"
 
 /** A backend under test. */
@@ -31,7 +37,100 @@ static uint16_t sim_contacts(void)
     return sim.mask;
 }
 
-static const fixture_t k_fixtures[] = {{"sim", open_sim, do_nothing, do_nothing, sim_contacts}};
+/* Coils of a Modbus board: coil FIRST_COIL is relay 1. */
+#define FIRST_COIL 16u
+#define UNIT       3u
+#define LOOK_CALLS 50u
+
+static coil_relays_t coils;
+static sim_modbus_t sim_line;
+static sim_modbus_device_t board;
+static uint64_t sim_now_us;
+static linux_modbus_t line;
+static modbus_server_t server;
+
+static hal_relays_t open_coils_on(hal_modbus_t on, uint8_t count)
+{
+    const coil_relays_config_t config = {
+        .line = on, .slot = 5, .unit = UNIT, .first_coil = FIRST_COIL, .count = count, .look_calls = LOOK_CALLS};
+    TEST_ASSERT_EQUAL(HV_OK, coil_relays_init(&coils, &config));
+    return coil_relays_hal(&coils);
+}
+
+static hal_relays_t open_coils(uint8_t count)
+{
+    board = (sim_modbus_device_t){.unit = UNIT};
+    sim_now_us = 0;
+    sim_modbus_init(&sim_line, &board, 1, 3000, 20000, NULL, 0);
+    return open_coils_on(sim_modbus_hal(&sim_line), count);
+}
+
+/* A cycle of the gateway. */
+static hv_status_t cycle(void)
+{
+    uint16_t mask;
+    sim_now_us += 1000;
+    sim_modbus_step(&sim_line, sim_now_us);
+    return hal_relays_read_back(coil_relays_hal(&coils), &mask);
+}
+
+static void settle_coils(void)
+{
+    for (unsigned i = 0; i < 40; i++) {
+        (void)cycle();
+    }
+}
+
+static uint16_t coil_contacts(void)
+{
+    uint16_t mask = 0;
+    for (unsigned i = 0; i < HAL_RELAYS_MAX; i++) {
+        mask |= (uint16_t)(board.coil[FIRST_COIL + i] << i);
+    }
+    return mask;
+}
+
+static hal_relays_t open_linux_coils(uint8_t count)
+{
+    TEST_ASSERT_TRUE(modbus_server_start_tcp(&server));
+    const linux_modbus_config_t config = {.host = "127.0.0.1", .port = server.port, .timeout_us = 5000000};
+    TEST_ASSERT_EQUAL(HV_OK, linux_modbus_open(&line, &config));
+    return open_coils_on(linux_modbus_hal(&line), count);
+}
+
+static void close_linux_coils(void)
+{
+    linux_modbus_close(&line);
+    modbus_server_stop(&server);
+}
+
+static void settle_linux_coils(void)
+{
+    static const struct timespec k_pause = {.tv_nsec = 200000};
+    const time_t limit = time(NULL) + 60;
+    linux_modbus_status_t status;
+    uint16_t mask;
+    do {
+        TEST_ASSERT_TRUE_MESSAGE(time(NULL) < limit, "the mask is not carried out");
+        (void)nanosleep(&k_pause, NULL);
+        linux_modbus_status(&line, &status);
+    } while (hal_relays_read_back(coil_relays_hal(&coils), &mask) != HV_OK || status.waiting != 0);
+}
+
+static uint16_t linux_coil_contacts(void)
+{
+    uint16_t mask = 0;
+    for (unsigned i = 0; i < HAL_RELAYS_MAX; i++) {
+        mask |= (uint16_t)(modbus_server_get(&server, UNIT, MODBUS_SERVER_COIL, FIRST_COIL + i) << i);
+    }
+    return mask;
+}
+
+static const fixture_t k_fixtures[] = {
+    {"sim", open_sim, do_nothing, do_nothing, sim_contacts},
+    {"coils", open_coils, do_nothing, settle_coils, coil_contacts},
+    {"coils linux", open_linux_coils, close_linux_coils, settle_linux_coils, linux_coil_contacts},
+};
 
 #define COUNT 8u
 
@@ -156,6 +255,160 @@ static void test_sim_write_failing_at_every_step_recovers(void)
     }
 }
 
+/* --- Coils, what the contract does not say --- */
+
+static hal_relays_t open_faulty(const sim_modbus_fault_t *plan, uint32_t planned, const coil_relays_config_t *changes)
+{
+    coil_relays_config_t config = *changes;
+    board = (sim_modbus_device_t){.unit = UNIT};
+    sim_now_us = 0;
+    sim_modbus_init(&sim_line, &board, 1, 3000, 20000, plan, planned);
+    config.line = sim_modbus_hal(&sim_line);
+    config.unit = UNIT;
+    config.first_coil = FIRST_COIL;
+    config.count = COUNT;
+    config.look_calls = LOOK_CALLS;
+    TEST_ASSERT_EQUAL(HV_OK, coil_relays_init(&coils, &config));
+    return coil_relays_hal(&coils);
+}
+
+static const coil_relays_config_t k_plain = {.slot = 0};
+
+static void test_coils_start_at_the_start_mask(void)
+{
+    hal = open_faulty(NULL, 0, &(coil_relays_config_t){.start_mask = 0xF0A});
+    assert_relays(0x00A);
+}
+
+static void test_coils_active_low_are_inverted(void)
+{
+    hal = open_faulty(NULL, 0, &(coil_relays_config_t){.is_active_low = true});
+    settle_coils();
+    TEST_ASSERT_EQUAL_HEX16(0xFF, coil_contacts());
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x05));
+    settle_coils();
+    TEST_ASSERT_EQUAL_HEX16(0xFA, coil_contacts());
+    uint16_t mask = 0;
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_read_back(hal, &mask));
+    TEST_ASSERT_EQUAL_HEX16(0x05, mask);
+}
+
+static void test_coils_not_yet_written_are_not_reported(void)
+{
+    uint16_t mask = 0x5A;
+    hal = open_faulty(NULL, 0, &k_plain);
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_relays_read_back(hal, &mask));
+    settle_coils();
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x01));
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_relays_read_back(hal, &mask));
+    TEST_ASSERT_EQUAL_HEX16(0x5A, mask);
+}
+
+static void test_coils_one_fault_at_every_step_is_made_good(void)
+{
+    static const sim_modbus_fault_kind_t k_kinds[] = {SIM_MODBUS_EXCEPTION, SIM_MODBUS_SILENT, SIM_MODBUS_LATE,
+                                                      SIM_MODBUS_DAMAGED, SIM_MODBUS_NO_LINK};
+    for (size_t kind = 0; kind < sizeof k_kinds / sizeof k_kinds[0]; kind++) {
+        for (uint32_t at = 1; at <= 10; at++) {
+            const sim_modbus_fault_t plan = {k_kinds[kind], at, 6};
+            hal = open_faulty(&plan, 1, &k_plain);
+            for (uint16_t mask = 1; mask <= 6; mask++) {
+                TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, mask));
+                settle_coils();
+                assert_relays(mask);
+            }
+        }
+    }
+}
+
+static void test_coils_three_failures_are_unknown_until_one_works(void)
+{
+    sim_modbus_fault_t plan[COIL_RELAYS_TRIES];
+    for (uint32_t i = 0; i < COIL_RELAYS_TRIES; i++) {
+        plan[i] = (sim_modbus_fault_t){SIM_MODBUS_SILENT, i + 2, 0};
+    }
+    hal = open_faulty(plan, COIL_RELAYS_TRIES, &k_plain);
+    unsigned unknown = 0;
+    settle_coils();
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x3C));
+    for (unsigned i = 0; i < 200; i++) {
+        unknown += cycle() == HV_ERR_IO;
+    }
+    TEST_ASSERT_TRUE(unknown > 0 && unknown < 10);
+    assert_relays(0x3C);
+}
+
+/* Its power came and went: every relay open, nobody told us. */
+static void test_coils_a_board_that_forgot_is_told_again(void)
+{
+    hal = open_faulty(NULL, 0, &k_plain);
+    settle_coils();
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x81));
+    settle_coils();
+    board = (sim_modbus_device_t){.unit = UNIT};
+    for (unsigned i = 0; i < 2 * LOOK_CALLS + 20; i++) {
+        (void)cycle();
+    }
+    assert_relays(0x81);
+}
+
+static void test_coils_a_stuck_worker_makes_them_unknown(void)
+{
+    uint16_t mask;
+    hal = open_faulty(NULL, 0, &k_plain);
+    hv_status_t status = HV_ERR_AGAIN;
+    for (unsigned i = 0; i <= LOOK_CALLS; i++) {
+        status = hal_relays_read_back(hal, &mask); /* and the line does not move */
+    }
+    TEST_ASSERT_EQUAL(HV_ERR_IO, status);
+    settle_coils();
+    assert_relays(0);
+}
+
+static void test_coils_quiet_bank_asks_once_per_look(void)
+{
+    hal = open_faulty(NULL, 0, &k_plain);
+    settle_coils();
+    const uint32_t before = sim_line.transactions;
+    for (unsigned i = 0; i < 10 * LOOK_CALLS; i++) {
+        (void)cycle();
+    }
+    TEST_ASSERT_TRUE(sim_line.transactions - before <= 10 && sim_line.transactions - before >= 7);
+}
+
+static void test_coils_wrong_figures_are_refused(void)
+{
+    const coil_relays_config_t good = {.line = sim_modbus_hal(&sim_line), .unit = UNIT, .count = COUNT, .look_calls = 1};
+    coil_relays_config_t config = good;
+    config.count = HAL_RELAYS_MAX + 1;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, coil_relays_init(&coils, &config));
+    config = good;
+    config.look_calls = 0;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, coil_relays_init(&coils, &config));
+    config = good;
+    config.first_coil = 0xFFFF;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, coil_relays_init(&coils, &config));
+    config = good;
+    config.slot = HAL_MODBUS_SLOTS;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, coil_relays_init(&coils, &config));
+    config = good;
+    config.unit = 248;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, coil_relays_init(&coils, &config));
+}
+
+static void run_coils(void)
+{
+    RUN_TEST(test_coils_start_at_the_start_mask);
+    RUN_TEST(test_coils_active_low_are_inverted);
+    RUN_TEST(test_coils_not_yet_written_are_not_reported);
+    RUN_TEST(test_coils_one_fault_at_every_step_is_made_good);
+    RUN_TEST(test_coils_three_failures_are_unknown_until_one_works);
+    RUN_TEST(test_coils_a_board_that_forgot_is_told_again);
+    RUN_TEST(test_coils_a_stuck_worker_makes_them_unknown);
+    RUN_TEST(test_coils_quiet_bank_asks_once_per_look);
+    RUN_TEST(test_coils_wrong_figures_are_refused);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -167,5 +420,8 @@ int main(void)
     fixture = &k_fixtures[0];
     contract_backend = fixture->name;
     RUN_TEST(test_sim_write_failing_at_every_step_recovers);
+    fixture = &k_fixtures[1];
+    contract_backend = fixture->name;
+    run_coils();
     return UNITY_END();
 }
