@@ -13,6 +13,7 @@
 #include "heave/hal/udp.h"
 #include "heave/motion.h"
 #include "heave/owner.h"
+#include "heave/plate.h"
 #include "heave/relay_policy.h"
 #include "heave/supervisor.h"
 #include "heave/telemetry.h"
@@ -68,6 +69,7 @@ typedef struct {
     uint32_t unsent_cycles;  /**< cycles in a row whose set-points the bus did not take */
     uint64_t reset_until_us; /**< a reset waits for the drives until then; 0 = none */
     owner_t owner;
+    plate_t plate;
     uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
     uint64_t state_since_us; /**< when the state was entered */
     uint16_t frame_mask;     /**< what the sender asked of the relays */

@@ -66,6 +66,9 @@ typedef struct {
     pose_t sent;
     pose_t actual; /**< of the plate, from feedback, valid if has_actual_pose */
     bool has_actual_pose;
+    pose_t actual_per_s;  /**< speed and acceleration of its axes, deg and mm per s and s^2, from feedback (see plate.h), */
+    pose_t actual_per_s2; /**< valid if has_actual_rates */
+    bool has_actual_rates;
     q32_t extension_mm_q32[CYLINDERS_MAX];
     q32_t angle_deg_q32;
     drive_feedback_t drive[DRIVES_MAX];

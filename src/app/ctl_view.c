@@ -138,14 +138,17 @@ static void draw_head(view_t *self, const cJSON *status)
     end_line(self);
 }
 
-static void draw_pose(view_t *self, const cJSON *status, const char *label, const char *name)
+/* A row of six axes; per is what the keys have behind the unit. */
+static void draw_pose(view_t *self, const cJSON *status, const char *label, const char *name, const char *per)
 {
     static const char *const k_axes[] = {"roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm"};
     const cJSON *pose = member(status, name);
     put(self, "%-7s", label);
     for (unsigned i = 0; i < sizeof k_axes / sizeof k_axes[0]; i++) {
         if (cJSON_IsObject(pose)) {
-            put(self, " %10.3f", number(pose, k_axes[i]));
+            char key[16];
+            (void)snprintf(key, sizeof key, "%s%s", k_axes[i], per);
+            put(self, " %10.3f", number(pose, key));
         } else {
             put(self, " %10s", "-");
         }
@@ -157,9 +160,11 @@ static void draw_poses(view_t *self, const cJSON *status)
 {
     put(self, "%-7s %10s %10s %10s %10s %10s %10s", "pose", "roll deg", "pitch deg", "yaw deg", "x mm", "y mm", "z mm");
     end_line(self);
-    draw_pose(self, status, "asked", "pose_asked");
-    draw_pose(self, status, "sent", "pose_sent");
-    draw_pose(self, status, "actual", "pose_actual");
+    draw_pose(self, status, "asked", "pose_asked", "");
+    draw_pose(self, status, "sent", "pose_sent", "");
+    draw_pose(self, status, "actual", "pose_actual", "");
+    draw_pose(self, status, " per s", "speed_actual", "_s");
+    draw_pose(self, status, " per s2", "accel_actual", "_s2");
 }
 
 static double part(double value, double whole)

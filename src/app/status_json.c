@@ -7,6 +7,8 @@
 #include "heave/motion.h" // MOTION_CLAMPED and its kin
 
 static const char *const k_pose_keys[POSE_AXES] = {"roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm"};
+static const char *const k_speed_keys[POSE_AXES] = {"roll_deg_s", "pitch_deg_s", "yaw_deg_s", "x_mm_s", "y_mm_s", "z_mm_s"};
+static const char *const k_accel_keys[POSE_AXES] = {"roll_deg_s2", "pitch_deg_s2", "yaw_deg_s2", "x_mm_s2", "y_mm_s2", "z_mm_s2"};
 
 static const char *const k_drive_states[] = {
     [DRIVE_OFFLINE] = "offline", [DRIVE_DISABLED] = "disabled", [DRIVE_ENABLING] = "enabling",
@@ -22,13 +24,23 @@ static const struct {
     {MOTION_OFF_PATH, "off-path"},   {MOTION_NO_POSE, "no-pose"},
 };
 
-static void write_pose(json_t *json, const char *key, const pose_t *pose)
+static void write_pose(json_t *json, const char *key, const char *const axis_keys[POSE_AXES], const pose_t *pose)
 {
     json_open(json, key, '{');
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        json_q32(json, k_pose_keys[i], pose->axis_q32[i]);
+        json_q32(json, axis_keys[i], pose->axis_q32[i]);
     }
     json_close(json, '}');
+}
+
+/* What feedback tells of the plate; null where it does not. */
+static void write_actual(json_t *json, const char *key, const char *const axis_keys[POSE_AXES], const pose_t *pose, bool is_known)
+{
+    if (is_known) {
+        write_pose(json, key, axis_keys, pose);
+    } else {
+        json_null(json, key);
+    }
 }
 
 /* What the device code of the fault means, as long as the drive still says so. */
@@ -88,13 +100,11 @@ static void write_state(json_t *json, const snapshot_t *s, bool is_shutting_down
 
 static void write_poses(json_t *json, const snapshot_t *s)
 {
-    write_pose(json, "pose_asked", &s->asked);
-    write_pose(json, "pose_sent", &s->sent);
-    if (s->has_actual_pose) {
-        write_pose(json, "pose_actual", &s->actual);
-    } else {
-        json_null(json, "pose_actual");
-    }
+    write_pose(json, "pose_asked", k_pose_keys, &s->asked);
+    write_pose(json, "pose_sent", k_pose_keys, &s->sent);
+    write_actual(json, "pose_actual", k_pose_keys, &s->actual, s->has_actual_pose);
+    write_actual(json, "speed_actual", k_speed_keys, &s->actual_per_s, s->has_actual_rates);
+    write_actual(json, "accel_actual", k_accel_keys, &s->actual_per_s2, s->has_actual_rates);
 }
 
 /* What the drive is at, in words; null where its driver has none. */

@@ -9,8 +9,7 @@
 #include "operate.h"
 #include "reports.h"
 
-#define ACTUAL_POSE_CYCLES 16u     /* forward kinematics of the feedback: display needs no more */
-#define SINGULAR_LOG_US    1000000 /* lines about the same thing are no closer */
+#define SINGULAR_LOG_US 1000000 /* lines about the same thing are no closer */
 
 static bool is_io_valid(const gateway_io_t *io)
 {
@@ -194,21 +193,16 @@ static void note_singular_stops(gateway_t *self, uint64_t now_us)
     self->snapshot.counters.singular_stops = stops;
 }
 
-/* Pose of the plate from feedback. */
-static void find_actual_pose(gateway_t *self)
+/* The plate as feedback tells it. */
+static void publish_plate(gateway_t *self, uint64_t now_us)
 {
     snapshot_t *s = &self->snapshot;
-    if (s->cycle % ACTUAL_POSE_CYCLES != 0) {
-        return;
-    }
-    q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
-    s->has_actual_pose = true;
-    for (unsigned i = 0; i < s->cylinders; i++) {
-        extension_mm_q32[i] = self->feedback[i].actual_mm_q32;
-        s->has_actual_pose &= self->feedback[i].has_actual;
-    }
-    s->has_actual_pose =
-        s->has_actual_pose && kin_forward(motion_kin(&self->motion), extension_mm_q32, &s->sent, &s->actual, NULL) == HV_OK;
+    plate_take(&self->plate, motion_kin(&self->motion), self->feedback, &s->sent, now_us);
+    s->has_actual_pose = self->plate.has_pose;
+    s->has_actual_rates = self->plate.has_rates;
+    s->actual = self->plate.pose;
+    s->actual_per_s = self->plate.speed_per_s;
+    s->actual_per_s2 = self->plate.accel_per_s2;
 }
 
 static void publish(gateway_t *self, uint64_t now_us)
@@ -242,7 +236,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->counters.spikes = gate_spikes(motion_gate(&self->motion));
     note_singular_stops(self, now_us);
     s->counters.stretched = motion_stretched_count(&self->motion);
-    find_actual_pose(self);
+    publish_plate(self, now_us);
     s->cycle++;
 }
 

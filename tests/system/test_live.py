@@ -40,12 +40,13 @@ def follows_frames(bench):
         sender.send("@A7:4,-3,2,10,-20,30,45,0A05#")
         heave.wait_for(lambda: abs(bench.status()["pose_sent"]["z_mm"] - 30) < 1e-6, "the pose is reached")
         heave.wait_for(lambda: abs(bench.status()["rotation"]["sent_deg"] - 45) < 1e-6, "the angle is reached")
-        status = bench.status()
+        status = heave.wait_for(lambda: (lambda s: s if s["speed_actual"] and abs(s["speed_actual"]["z_mm_s"]) < 0.1 else None)(bench.status()), "at rest")
         sender.send("@A7:1#")
         sender.send("@A3T:1,1,1,100#")
         counters = heave.wait_for(lambda: (lambda c: c if c["accepted"]["A3"] else None)(bench.status()["counters"]), "A3 is accepted")
     expected = {"roll_deg": 4, "pitch_deg": -3, "yaw_deg": 2, "x_mm": 10, "y_mm": -20, "z_mm": 30}
     assert all(abs(status["pose_sent"][name] - value) < 1e-6 for name, value in expected.items()), status["pose_sent"]
+    assert list(status["speed_actual"]) == [f"{name}_s" for name in expected] and list(status["accel_actual"]) == [f"{name}_s2" for name in expected], status
     assert status["relays"]["mask"] == "0A05" and status["relays"]["on"] == [1, 3, 10, 12], status["relays"]
     assert counters["accepted"]["A7"] == 1 and counters["accepted_timed"] == 1 and counters["rejected"]["count"] == 1, counters
     assert bench.stop(daemon) == 0
