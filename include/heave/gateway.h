@@ -21,6 +21,10 @@
 /** Most datagrams read in one cycle; the rest waits for the next. */
 #define GATEWAY_DATAGRAMS_PER_CYCLE 64u
 
+/** Most targets in one cycle that motion is told of one by one, in order: a sender's frames that the network has bunched. Of
+ * more, only the newest one counts: nobody rides by several frames a cycle, and what each of them costs has to fit into it. */
+#define GATEWAY_TARGETS_PER_CYCLE 4u
+
 /** Longest datagram taken. */
 #define GATEWAY_DATAGRAM_MAX 512u
 
@@ -74,6 +78,11 @@ typedef struct {
     uint64_t state_since_us; /**< when the state was entered */
     uint16_t frame_mask;     /**< what the sender asked of the relays */
     relay_policy_t relay_policy;
+    unsigned targets; /**< of this cycle */
+    bool has_newest;  /**< newest is of this cycle and motion has not been told of it */
+    motion_target_t newest;
+    frame_command_t newest_command;
+    hal_udp_peer_t newest_from;
     uint16_t written_mask;
     bool is_mask_written;
     uint64_t other_logged_us;    /**< 0 = never */

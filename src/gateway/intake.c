@@ -263,6 +263,35 @@ static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t no
     return verdict != OWNER_OTHER;
 }
 
+/* Tells motion of a target.
+ * Returns false: it is impossible, and has been refused. */
+static bool tell_motion(gateway_t *self, const motion_target_t *target, frame_command_t command, const hal_udp_peer_t *from,
+                        uint64_t now_us)
+{
+    if (self->supervisor.state == STATE_ENGAGED && motion_target(&self->motion, target, now_us) != HV_OK) {
+        self->snapshot.counters.impossible++;
+        refuse(self, command, "no pose has these extensions, or one too near a singularity", from, now_us);
+        return false;
+    }
+    log_spikes(self, now_us);
+    return true;
+}
+
+/* The first ones of a cycle at once; then the newest one waits until there is no newer one, and counts as possible. */
+static bool take_target(gateway_t *self, const motion_target_t *target, frame_command_t command, const hal_udp_peer_t *from,
+                        uint64_t now_us)
+{
+    self->targets++;
+    if (self->targets <= GATEWAY_TARGETS_PER_CYCLE) {
+        return tell_motion(self, target, command, from, now_us);
+    }
+    self->has_newest = true;
+    self->newest = *target;
+    self->newest_command = command;
+    self->newest_from = *from;
+    return true;
+}
+
 static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *from, uint64_t now_us)
 {
     const char *missing = missing_for(self, frame->command);
@@ -276,12 +305,9 @@ static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *
     auto_engage_frame(&self->auto_engage, now_us);
     const motion_target_t target = target_of(self, frame);
     operate_event(self, EVENT_FRAME, now_us);
-    if (self->supervisor.state == STATE_ENGAGED && motion_target(&self->motion, &target, now_us) != HV_OK) {
-        self->snapshot.counters.impossible++;
-        refuse(self, frame->command, "no pose has these extensions, or one too near a singularity", from, now_us);
+    if (!take_target(self, &target, frame->command, from, now_us)) {
         return;
     }
-    log_spikes(self, now_us);
     counters_t *counters = &self->snapshot.counters;
     counters->accepted[frame->command]++;
     counters->accepted_timed += frame->is_timed;
@@ -313,7 +339,8 @@ static void take_datagram(gateway_t *self, size_t length, const hal_udp_peer_t *
     }
 }
 
-void intake_receive(gateway_t *self, uint64_t now_us)
+/* What has arrived, as far as it fits into a cycle. */
+static void receive(gateway_t *self, uint64_t now_us)
 {
     for (unsigned i = 0; i < GATEWAY_DATAGRAMS_PER_CYCLE; i++) {
         hal_udp_peer_t from;
@@ -334,5 +361,15 @@ void intake_receive(gateway_t *self, uint64_t now_us)
         } else {
             take_datagram(self, length, &from, now_us);
         }
+    }
+}
+
+void intake_receive(gateway_t *self, uint64_t now_us)
+{
+    self->targets = 0;
+    receive(self, now_us);
+    if (self->has_newest) {
+        self->has_newest = false;
+        (void)tell_motion(self, &self->newest, self->newest_command, &self->newest_from, now_us);
     }
 }

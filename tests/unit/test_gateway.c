@@ -306,6 +306,43 @@ static void test_frames_more_than_a_cycle_takes_wait_for_the_next(void)
     assert_heights(29);
 }
 
+/* Frames that come in one cycle in the middle of a motion: the first few, many between if so asked, and the last one. Where the
+ * cylinders are in every one of the cycles after it. */
+static void run_burst(unsigned between, double mm[][CYLINDERS_MAX], unsigned cycles)
+{
+    engage();
+    for (unsigned i = 0; i < 30; i++) {
+        rig_sendf(&m_rig, "@A6:0,0,0,0,0,%u#", i / 3);
+        rig_run_ms(&m_rig, 16);
+    }
+    for (unsigned i = 0; i < GATEWAY_TARGETS_PER_CYCLE; i++) {
+        rig_send(&m_rig, "@A6:0,0,0,0,0,10#");
+    }
+    for (unsigned i = 0; i < between; i++) {
+        rig_sendf(&m_rig, i % 2 == 0 ? "@A6:0,0,0,0,0,1%u.%u#" : "@C6:%u,63,60,%u,60,60#", i % 4, i % 7);
+    }
+    rig_send(&m_rig, "@A6:0,0,0,0,0,11#");
+    for (unsigned k = 0; k < cycles; k++) {
+        rig_run_ms(&m_rig, 1);
+        for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+            mm[k][i] = rig_cylinder_mm(&m_rig, i + 1);
+        }
+    }
+}
+
+static void test_frames_of_many_in_a_cycle_only_the_newest_costs_motion(void)
+{
+    enum { CYCLES = 1200, BETWEEN = 26 };
+    static double few_mm[CYCLES][CYLINDERS_MAX], many_mm[CYCLES][CYLINDERS_MAX];
+    run_burst(0, few_mm, CYCLES);
+    const uint32_t few = counted()->accepted[FRAME_A6] + counted()->accepted[FRAME_C6];
+    TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+    run_burst(BETWEEN, many_mm, CYCLES);
+    TEST_ASSERT_EQUAL_MEMORY(few_mm, many_mm, sizeof few_mm);
+    TEST_ASSERT_EQUAL_UINT32(few + BETWEEN, counted()->accepted[FRAME_A6] + counted()->accepted[FRAME_C6]);
+    assert_heights(11);
+}
+
 static void test_frames_oversize_datagram_is_counted_and_ignored(void)
 {
     static char text[900];
@@ -1182,6 +1219,7 @@ int main(void)
     RUN_TEST(test_frames_bad_ones_change_nothing_and_are_counted);
     RUN_TEST(test_frames_several_in_a_datagram_the_last_one_counts);
     RUN_TEST(test_frames_more_than_a_cycle_takes_wait_for_the_next);
+    RUN_TEST(test_frames_of_many_in_a_cycle_only_the_newest_costs_motion);
     RUN_TEST(test_frames_oversize_datagram_is_counted_and_ignored);
     RUN_TEST(test_frames_receive_errors_are_counted_and_passed);
     RUN_TEST(test_frames_for_another_platform_name_what_is_missing);
