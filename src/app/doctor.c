@@ -121,6 +121,9 @@ static void check_cia402(doctor_report_t *report, const config_t *config, doctor
     doctor_probe_listen(probe, LISTEN_MS);
     for (unsigned k = 0; k < drives.axes; k++) {
         doctor_probe_node(probe, drives.axis[k].node, drives.sdo_timeout_ms, &node);
+        if (doctor_judge_wire(report, &config->can, doctor_probe_wire(probe))) {
+            return;
+        }
         doctor_judge_node(report, &drives, k, &node);
         if (probe->can.trouble != LINUX_CAN_FINE) {
             doctor_say(report, DOCTOR_FAIL, "%s -> docs/can.md", probe->can.error_text);
@@ -136,6 +139,9 @@ static void check_can_raw(doctor_report_t *report, const config_t *config, docto
     bool is_heard[DRIVES_MAX];
     config_canraw_map(config, &map);
     doctor_probe_raw(probe, &map, RAW_MS, is_heard);
+    if (doctor_judge_wire(report, &config->can, doctor_probe_wire(probe))) {
+        return;
+    }
     for (unsigned k = 0; k < map.axes; k++) {
         if (is_heard[k]) {
             doctor_say(report, DOCTOR_OK, "drive %u answers with identifier %Xh", k + 1u, (unsigned)map.axis[k].reply_id);

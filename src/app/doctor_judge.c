@@ -12,16 +12,13 @@
 #define IDENTITY_ANY 0u
 
 const doctor_address_t doctor_address[DOCTOR_OBJECTS] = {
-    [DOCTOR_TYPE] = {0x1000, 0},         [DOCTOR_VENDOR] = {0x1018, 1},
-    [DOCTOR_PRODUCT] = {0x1018, 2},      [DOCTOR_SERIAL] = {0x1018, 4},
-    [DOCTOR_SERIAL_2] = {0x1018, 4},     [DOCTOR_MODES] = {0x6502, 0},
-    [DOCTOR_STATUS] = {0x6041, 0},       [DOCTOR_ERROR] = {0x603F, 0},
-    [DOCTOR_RPDO] = {0x1400, 1},         [DOCTOR_RPDO_MAP] = {0x1600, 0},
-    [DOCTOR_TPDO] = {0x1800, 1},         [DOCTOR_TPDO_MAP] = {0x1A00, 0},
-    [DOCTOR_PERIOD_VALUE] = {0x60C2, 1}, [DOCTOR_PERIOD_EXPONENT] = {0x60C2, 2},
-    [DOCTOR_SYNC_PERIOD] = {0x1006, 0},  [DOCTOR_CONSUMER] = {0x1016, 1},
-    [DOCTOR_PRODUCER] = {0x1017, 0},     [DOCTOR_ABORT_OPTION] = {0x6007, 0},
-    [DOCTOR_QUICK_STOP] = {0x605A, 0},   [DOCTOR_FAULT_REACTION] = {0x605E, 0},
+    [DOCTOR_TYPE] = {0x1000, 0},         [DOCTOR_VENDOR] = {0x1018, 1},       [DOCTOR_PRODUCT] = {0x1018, 2},
+    [DOCTOR_REVISION] = {0x1018, 3},     [DOCTOR_SERIAL] = {0x1018, 4},       [DOCTOR_SERIAL_2] = {0x1018, 4},
+    [DOCTOR_MODES] = {0x6502, 0},        [DOCTOR_STATUS] = {0x6041, 0},       [DOCTOR_ERROR] = {0x603F, 0},
+    [DOCTOR_RPDO] = {0x1400, 1},         [DOCTOR_RPDO_MAP] = {0x1600, 0},     [DOCTOR_TPDO] = {0x1800, 1},
+    [DOCTOR_TPDO_MAP] = {0x1A00, 0},     [DOCTOR_PERIOD_VALUE] = {0x60C2, 1}, [DOCTOR_PERIOD_EXPONENT] = {0x60C2, 2},
+    [DOCTOR_SYNC_PERIOD] = {0x1006, 0},  [DOCTOR_CONSUMER] = {0x1016, 1},     [DOCTOR_PRODUCER] = {0x1017, 0},
+    [DOCTOR_ABORT_OPTION] = {0x6007, 0}, [DOCTOR_QUICK_STOP] = {0x605A, 0},   [DOCTOR_FAULT_REACTION] = {0x605E, 0},
     [DOCTOR_WINDOW] = {0x6065, 0},
 };
 
@@ -136,6 +133,23 @@ bool doctor_judge_link(doctor_report_t *report, const config_can_t *config, cons
     return is_on;
 }
 
+bool doctor_judge_wire(doctor_report_t *report, const config_can_t *config, const doctor_wire_t *wire)
+{
+    const char *name = config->interface;
+    const bool is_disturbed = wire->state == HAL_CAN_PASSIVE || wire->state == HAL_CAN_BUS_OFF;
+    if (wire->is_heard || (wire->unconfirmed == 0 && !wire->is_unacknowledged && !is_disturbed)) {
+        return false;
+    }
+    doctor_say(
+        report, DOCTOR_FAIL,
+        "nobody acknowledges on %s (%s, errors tx %u rx %u): no drive is on, or none hears us -> supply of the drives, cable, "
+        "120 ohm at both ends, CAN-H and CAN-L not exchanged, the drives set to [can] bitrate_bps = %" PRIu32
+        "; then ip link set %s down && ip link set %s up",
+        name, is_disturbed ? wire->state == HAL_CAN_PASSIVE ? "error-passive" : "bus-off" : "what was sent never left",
+        wire->tx_errors, wire->rx_errors, config->bitrate_bps, name, name);
+    return true;
+}
+
 /* --- Drives --- */
 
 /** A drive being judged. */
@@ -157,7 +171,10 @@ static void judge_identity(const patient_t *self)
         doctor_object_t object;
         unsigned at;
         const char *key;
-    } k_parts[] = {{DOCTOR_VENDOR, 0, "vendor_id"}, {DOCTOR_PRODUCT, 1, "product_code"}};
+    } k_parts[] = {{DOCTOR_VENDOR, 0, "vendor_id"},
+                   {DOCTOR_PRODUCT, 1, "product_code"},
+                   {DOCTOR_REVISION, 2, "revision_number"},
+                   {DOCTOR_SERIAL, 3, "serial_numbers"}};
     for (unsigned i = 0; i < sizeof k_parts / sizeof k_parts[0]; i++) {
         const uint32_t wanted = self->axis->identity[k_parts[i].at];
         const uint32_t found = self->node->value[k_parts[i].object];

@@ -22,6 +22,7 @@ typedef enum {
     DOCTOR_TYPE,     /**< 1000h */
     DOCTOR_VENDOR,   /**< 1018h */
     DOCTOR_PRODUCT,  /**< */
+    DOCTOR_REVISION, /**< */
     DOCTOR_SERIAL,   /**< */
     DOCTOR_SERIAL_2, /**< once more: two drives on one node may take turns */
     DOCTOR_MODES,    /**< 6502h */
@@ -61,10 +62,24 @@ typedef struct {
     int nmt;                        /**< state in its heartbeat, -1 = none heard */
 } doctor_node_t;
 
+/** What became of what was sent. */
+typedef struct {
+    bool is_heard;          /**< anybody has sent anything */
+    uint32_t unconfirmed;   /**< frames of ours that never were on the wire */
+    bool is_unacknowledged; /**< the controller says that nobody acknowledges */
+    hal_can_state_t state;
+    uint8_t tx_errors;
+    uint8_t rx_errors;
+} doctor_wire_t;
+
 /** The interface.
  *  @return true where the bus can be used */
 bool doctor_judge_link(doctor_report_t *report, const config_can_t *config, const linux_can_link_t *link,
                        const doctor_host_t *host);
+
+/** Whether there is anybody at all.
+ *  @return true where nobody is, and it has been said: asking single drives would only repeat it */
+bool doctor_judge_wire(doctor_report_t *report, const config_can_t *config, const doctor_wire_t *wire);
 
 /** What the machine permits. */
 void doctor_judge_host(doctor_report_t *report, const doctor_host_t *host);

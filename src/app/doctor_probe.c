@@ -31,6 +31,7 @@ bool doctor_probe_open(doctor_probe_t *self, const char *interface)
 {
     const linux_can_config_t config = {.interface = interface};
     self->is_synced = false;
+    self->wire = (doctor_wire_t){.is_heard = false};
     for (unsigned i = 0; i < DOCTOR_NODES; i++) {
         self->nmt[i] = -1;
     }
@@ -51,7 +52,12 @@ static bool hear(doctor_probe_t *self, can_frame_t *frame)
 {
     uint64_t time_us;
     while (hal_can_recv(linux_can_hal(&self->can), frame, &time_us) == HV_OK) {
-        if (frame->is_error || frame->is_rtr) {
+        if (frame->is_error) {
+            self->wire.is_unacknowledged |= (frame->id & CAN_ERROR_NO_ACK) != 0;
+            continue;
+        }
+        self->wire.is_heard = true;
+        if (frame->is_rtr) {
             continue;
         }
         if (!frame->is_extended && frame->id > HEARTBEAT && frame->id < HEARTBEAT + DOCTOR_NODES && frame->length == 1) {
@@ -61,6 +67,17 @@ static bool hear(doctor_probe_t *self, can_frame_t *frame)
         return true;
     }
     return false;
+}
+
+const doctor_wire_t *doctor_probe_wire(doctor_probe_t *self)
+{
+    can_frame_t frame;
+    while (hear(self, &frame)) {}
+    (void)!hal_can_bus_state(linux_can_hal(&self->can), &self->wire.state);
+    (void)!hal_can_unconfirmed(linux_can_hal(&self->can), &self->wire.unconfirmed);
+    self->wire.tx_errors = self->can.tx_errors;
+    self->wire.rx_errors = self->can.rx_errors;
+    return &self->wire;
 }
 
 void doctor_probe_listen(doctor_probe_t *self, unsigned ms)

@@ -15,12 +15,16 @@ typedef struct {
     linux_can_t can;
     int nmt[DOCTOR_NODES]; /**< in heartbeats, -1 = none heard */
     bool is_synced;        /**< somebody sends SYNC */
+    doctor_wire_t wire;    /**< by doctor_probe_wire() */
 } doctor_probe_t;
 
 /** Opens the bus.
  *  @return false: self->can.error_text says why */
 bool doctor_probe_open(doctor_probe_t *self, const char *interface);
 void doctor_probe_close(doctor_probe_t *self);
+
+/** What became of what was sent so far. */
+const doctor_wire_t *doctor_probe_wire(doctor_probe_t *self);
 
 /** Listens without a word. */
 void doctor_probe_listen(doctor_probe_t *self, unsigned ms);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_doctor.py BIN - heaved --doctor on simulated drives, one fault at a time, on vcan, on virtual time. Runs inside kernel.py."""
+"""test_doctor.py BIN [PART OF A NAME] - heaved --doctor on simulated drives, one fault at a time, on vcan, on virtual time. Runs inside kernel.py."""
 import re
 import socket
 import subprocess
@@ -101,6 +101,15 @@ def no_drive_at_all(bench, config):
     doctor(bench, config, 1, *(f"node {node} (drive {node}) does not answer" for node in range(1, 8)))
 
 
+def nobody_acknowledges(bench, config):
+    """Cable off: one finding, not one for each drive."""
+    subprocess.run("tc qdisc replace dev vcan0 root tbf rate 8bit burst 16 limit 1600".split(), check=True)
+    try:
+        doctor(bench, config, 1, "nobody acknowledges on vcan0 (what was sent never left")
+    finally:
+        bench.fast_bus()
+
+
 def wrong_identity(bench, config):
     bench.start_drives(only={2: {"identity": [0x9A, 0x402, 1, 1]}})
     doctor(bench, with_keys(bench, config, vendor_id=0x2E5), 1, "node 2: vendor_id is 154 (0x9A), configured 741")
@@ -195,6 +204,7 @@ CASES = [
     ("a queue of another length", short_queue),
     ("a node that does not answer", missing_node),
     ("no drive at all", no_drive_at_all),
+    ("a bus on which nobody acknowledges", nobody_acknowledges),
     ("a drive of another maker", wrong_identity),
     ("a node that is no CiA 402 drive", not_402),
     ("a drive without a watchdog", missing_watchdog),
@@ -213,7 +223,10 @@ CASES = [
 
 def main():
     suite = tap.Suite()
+    wanted = sys.argv[2] if len(sys.argv) > 2 else ""
     for name, case in CASES:
+        if wanted not in name:
+            continue
         with suite.case(name), can_bench.CanBench(sys.argv[1]) as bench:
             case(bench, can_config(bench))
     return suite.done()

@@ -229,6 +229,48 @@ static void test_judge_node_identity_names_found_and_wanted(void)
     expect(1, 0, "vendor_id is 154 (0x9A), configured 741");
 }
 
+static void test_judge_node_revision_and_serial_are_compared_where_configured(void)
+{
+    set(DOCTOR_REVISION, 7);
+    judge_node();
+    expect(0, 0, "");
+    s_drives.axis[0].identity[2] = 6;
+    judge_node();
+    expect(1, 0, "revision_number is 7 (0x7), configured 6");
+    s_drives.axis[0].identity[2] = 0;
+    s_drives.axis[0].identity[3] = 5;
+    judge_node();
+    expect(2, 0, "configured 5");
+}
+
+static void start_anew(void)
+{
+    tearDown();
+    setUp();
+}
+
+/* One line instead of one for each drive; anybody heard means that somebody acknowledges. */
+static void test_judge_wire_nobody_acknowledges_is_named_as_such(void)
+{
+    static const doctor_wire_t k_alone[] = {{.unconfirmed = 1},
+                                            {.is_unacknowledged = true},
+                                            {.state = HAL_CAN_PASSIVE, .tx_errors = 128},
+                                            {.state = HAL_CAN_BUS_OFF}};
+    for (size_t i = 0; i < sizeof k_alone / sizeof k_alone[0]; i++) {
+        doctor_wire_t wire = k_alone[i];
+        start_anew();
+        TEST_ASSERT_TRUE(doctor_judge_wire(&s_report, &s_can, &wire));
+        expect(1, 0, "nobody acknowledges on can0");
+        start_anew();
+        wire.is_heard = true;
+        TEST_ASSERT_FALSE(doctor_judge_wire(&s_report, &s_can, &wire));
+        expect(0, 0, "");
+    }
+    start_anew();
+    TEST_ASSERT_FALSE(doctor_judge_wire(&s_report, &s_can, &(doctor_wire_t){.state = HAL_CAN_WARNING}));
+    expect(0, 0, "");
+}
+
 static void test_judge_node_answering_twice_fails(void)
 {
     s_node.extra_answers = 1;
@@ -352,6 +394,8 @@ int main(void)
     RUN_TEST(test_judge_node_silent_says_only_that);
     RUN_TEST(test_judge_node_other_profile_fails);
     RUN_TEST(test_judge_node_identity_names_found_and_wanted);
+    RUN_TEST(test_judge_node_revision_and_serial_are_compared_where_configured);
+    RUN_TEST(test_judge_wire_nobody_acknowledges_is_named_as_such);
     RUN_TEST(test_judge_node_answering_twice_fails);
     RUN_TEST(test_judge_node_alternating_serials_fail);
     RUN_TEST(test_judge_node_mode_names_one_it_has);
