@@ -63,6 +63,8 @@ typedef struct {
     uint32_t quick_stop_accel;    /**< 6085h, counts/s^2; 0 = as it is */
     uint32_t profile_speed;       /**< 6081h, mode PP only */
     uint32_t profile_accel;       /**< 6083h, 6084h, mode PP only */
+    bool has_limits;              /**< 607Dh is written */
+    int32_t limit_counts[2];      /**< 607Dh: least and greatest position */
     uint32_t identity[4];         /**< 1018h sub 1 to 4: vendor, product, revision, serial number; 0 = any */
 } cia402_axis_config_t;
 

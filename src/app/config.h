@@ -137,8 +137,11 @@ typedef struct {
     bool is_sync_watched;
     bool is_reset_wanted;
     bool is_no_watchdog_allowed;
+    q16_t software_limit_mm_q16;
     uint32_t vendor_id;
     uint32_t product_code;
+    uint32_t revision_number;
+    config_ids_t serial_numbers;
 } config_cia402_t;
 
 /** A line, or a chip, as the file names it; "" where it says none. */

@@ -47,6 +47,22 @@ static uint32_t magnitude(const counts_scale_t *scale, q16_t units_q16)
     return (uint32_t)fx_clamp(fx_abs(counts), 1, (int64_t)UINT32_MAX - 1); /* all ones: a window that is off */
 }
 
+/* A second line of defence in the drive, just outside of what heaved sends. Drives that run backwards have their least position
+ * where the cylinder is out. */
+static void describe_limits(const config_t *config, unsigned k, cia402_axis_config_t *axis)
+{
+    const q32_t beyond_q32 = q32_from_q16(config->cia402.software_limit_mm_q16);
+    int64_t in = 0;
+    int64_t out = 0;
+    if (beyond_q32 == 0 || k >= cylinders_of(config) || counts_from_units(&axis->scale, -beyond_q32, &in) != HV_OK ||
+        counts_from_units(&axis->scale, q32_from_q16(config->settings.stroke_mm_q16[k]) + beyond_q32, &out) != HV_OK) {
+        return;
+    }
+    axis->has_limits = true;
+    axis->limit_counts[0] = (int32_t)fx_clamp(in < out ? in : out, INT32_MIN, INT32_MAX);
+    axis->limit_counts[1] = (int32_t)fx_clamp(in < out ? out : in, INT32_MIN, INT32_MAX);
+}
+
 static void describe_axis(const config_t *config, unsigned k, cia402_axis_config_t *axis)
 {
     const config_cia402_t *cia402 = &config->cia402;
@@ -69,8 +85,10 @@ static void describe_axis(const config_t *config, unsigned k, cia402_axis_config
         .quick_stop_accel = magnitude(&scale, is_angle ? cia402->angle_quick_stop_deg_s2_q16 : cia402->quick_stop_mm_s2_q16),
         .profile_speed = magnitude(&scale, speed_q16),
         .profile_accel = magnitude(&scale, accel_q16),
-        .identity = {cia402->vendor_id, cia402->product_code, 0, 0},
+        .identity = {cia402->vendor_id, cia402->product_code, cia402->revision_number,
+                     cia402->serial_numbers.count == 0 ? 0 : cia402->serial_numbers.id[k]},
     };
+    describe_limits(config, k, axis);
 }
 
 static cia402_mode_t mode_of(config_mode_t mode)

@@ -68,6 +68,15 @@ static void check_nodes(config_source_t *self, unsigned axes)
     }
 }
 
+static void check_serials(config_source_t *self, unsigned axes)
+{
+    const unsigned count = self->config->cia402.serial_numbers.count;
+    if (count != 0 && count != axes) {
+        config_source_key_error(self, SECTION, "serial_numbers", "has %u values; allowed: none, or one for each of the %u drives",
+                                count, axes);
+    }
+}
+
 /* --- Counts --- */
 
 /* A position as the 32 bits of 607Ah and 6064h have it.
@@ -181,6 +190,7 @@ void config_cia402_check(config_source_t *self)
         return;
     }
     check_nodes(self, config_canraw_axes(self->config));
+    check_serials(self, config_canraw_axes(self->config));
     check_scales(self, cylinders_of(self));
     check_methods(self, "homing_method", &cia402->homing.method, cylinders_of(self));
     check_period(self);

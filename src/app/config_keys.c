@@ -278,6 +278,12 @@ const config_key_t config_keys[] = {
      RANGE(0, 4294967295), .help = "1018h:1 that every drive must have; 0 = any"},
     {KEY("cia402", "product_code"), AT(cia402.product_code), .type = CONFIG_INTEGER, .unit = "", .fallback = "0",
      RANGE(0, 4294967295), .help = "1018h:2 that every drive must have; 0 = any"},
+    {KEY("cia402", "revision_number"), AT(cia402.revision_number), .type = CONFIG_INTEGER, .unit = "", .fallback = "0",
+     RANGE(0, 4294967295), .help = "1018h:3 that every drive must have; 0 = any"},
+    {KEY("cia402", "serial_numbers"), AT(cia402.serial_numbers), .type = CONFIG_IDS, .unit = "", .fallback = "none",
+     RANGE(0, 4294967295), .help = "1018h:4 of each drive, the rotation motor last, so that none is exchanged unnoticed; 0 = any; none: not checked"},
+    {KEY("cia402", "software_limit_mm"), AT(cia402.software_limit_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     .fallback = "5", RANGE(0, 1000), .help = "a cylinder's own position limits (607Dh) are set so far outside its stroke, where it has them; 0 = left as they are"},
 
     {KEY("can-raw", "period_us"), AT(can_raw.period_us), .type = CONFIG_INTEGER, .unit = "us", .fallback = "4000",
      RANGE(500, 1000000), .help = "period of the set-points, a multiple of cycle_us"},

@@ -84,15 +84,17 @@ static bool parse_name(const config_key_t *key, const char *text, char *name, co
     return true;
 }
 
+/* Of a key with a range: numbers of another kind. */
 static bool parse_ids(const config_key_t *key, const char *text, config_ids_t *ids, config_text_t *why)
 {
+    const int64_t most = key->high_milli > 0 ? key->high_milli / 1000 : (int64_t)CAN_ID_EXTENDED_MAX;
     char item[ITEM_BYTES];
     memset(ids, 0, sizeof *ids);
     for (const char *rest = text; rest != NULL;) {
         int64_t value = 0;
-        const char *end = read_number(take_item(&rest, item), 0, CAN_ID_EXTENDED_MAX, &value);
+        const char *end = read_number(take_item(&rest, item), 0, most, &value);
         if (end == NULL || *end != '\0') {
-            return refuse(key, item, strlen(item), "is no identifier", why);
+            return refuse(key, item, strlen(item), key->high_milli > 0 ? "is no such number" : "is no identifier", why);
         }
         if (ids->count == DRIVES_MAX) {
             return refuse_many(key, DRIVES_MAX, why);
@@ -372,6 +374,8 @@ void config_value_can_allowed(const config_key_t *key, config_text_t *text)
 {
     if (key->type == CONFIG_NAME) {
         config_text_add(text, "a name of up to %u letters, digits and . _ -", (unsigned)key->size - 1u);
+    } else if (key->type == CONFIG_IDS && key->high_milli > 0) {
+        config_text_add(text, "none, or whole numbers up to %" PRId64 ", one for each drive", key->high_milli / 1000);
     } else if (key->type == CONFIG_IDS) {
         config_text_add(text, "none, or an identifier such as 0x601, or one for each drive");
     } else if (key->type == CONFIG_RATIOS) {

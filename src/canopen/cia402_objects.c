@@ -23,6 +23,8 @@
      .need = CIA402_GUARD, .source = (from), .constant = (number), .trouble = CIA402_UNGUARDED}
 #define ONLY(when_, at, sub_, size, deed_, from, number) {.index = (at), .sub = (sub_), .bytes = (size), .deed = (deed_), \
      .need = CIA402_MUST, .when = (when_), .source = (from), .constant = (number), .trouble = CIA402_NOT_TAKEN}
+#define LIMIT(sub_) {.index = 0x607D, .sub = (sub_), .bytes = 4, .deed = CIA402_WRITE, .need = CIA402_IF_THERE, \
+     .when = CIA402_IF_LIMITED, .source = CIA402_POSITION_LIMIT, .constant = (sub_) - 1u}
 #define IDENTITY(sub_) {.index = 0x1018, .sub = (sub_), .bytes = 4, .deed = CIA402_CHECK, .when = CIA402_IF_NONZERO, \
      .source = CIA402_IDENTITY, .constant = (sub_) - 1u, .trouble = CIA402_WRONG_IDENTITY}
 
@@ -84,6 +86,7 @@ const cia402_object_t cia402_objects[] = {
      .trouble = CIA402_NOT_TAKEN},
     GUARD(0x6065, 0, 4, CIA402_WINDOW, 0),
     IF_THERE(0x6066, 0, 2, CIA402_WRITE, CIA402_WINDOW_TIME, 0),
+    LIMIT(1), LIMIT(2),
     ONLY(CIA402_IF_CYCLIC, 0x60C2, 2, 1, CIA402_SET, CIA402_PERIOD_EXPONENT, 0),
     ONLY(CIA402_IF_CYCLIC, 0x60C2, 1, 1, CIA402_SET, CIA402_PERIOD_VALUE, 0),
     {.index = 0x60C0, .bytes = 2, .deed = CIA402_WRITE, .need = CIA402_IF_THERE, .when = CIA402_IF_IP},
@@ -168,6 +171,8 @@ static uint32_t source_value(const cia402_object_t *row, const cia402_config_t *
         return axis->window_counts;
     case CIA402_WINDOW_TIME:
         return config->window_ms;
+    case CIA402_POSITION_LIMIT:
+        return (uint32_t)axis->limit_counts[row->constant];
     case CIA402_QUICK_STOP_ACCEL:
         return axis->quick_stop_accel;
     case CIA402_PERIOD_VALUE:
@@ -237,6 +242,8 @@ bool cia402_object_applies(const cia402_object_t *row, const cia402_config_t *co
         return cia402_object_value(row, config, axis, &(cia402_setup_t){.job = CIA402_JOB_NONE}) != 0;
     case CIA402_IF_COUNTER:
         return config->sync_counter != 0;
+    case CIA402_IF_LIMITED:
+        return axis->has_limits;
     }
     return false;
 }

@@ -33,7 +33,8 @@ typedef enum {
     CIA402_IF_PP,
     CIA402_IF_HOMING,
     CIA402_IF_NONZERO, /**< where the value is not 0 */
-    CIA402_IF_COUNTER
+    CIA402_IF_COUNTER,
+    CIA402_IF_LIMITED
 } cia402_when_t;
 
 /** Where a value comes from. */
@@ -50,6 +51,7 @@ typedef enum {
     CIA402_ABORT_OPTION,
     CIA402_WINDOW,
     CIA402_WINDOW_TIME,
+    CIA402_POSITION_LIMIT, /**< constant: which */
     CIA402_QUICK_STOP_ACCEL,
     CIA402_PERIOD_VALUE,
     CIA402_PERIOD_EXPONENT,

@@ -71,6 +71,8 @@ static const cia402_slave_row_t k_rows[] = {
     {.index = 0x6061, .sub = 0, .bytes = 1, .is_read_only = true},
     {.index = 0x6065, .sub = 0, .bytes = 4, .value = 0xFFFFFFFF},
     {.index = 0x6066, .sub = 0, .bytes = 2},
+    {.index = 0x607D, .sub = 1, .bytes = 4},
+    {.index = 0x607D, .sub = 2, .bytes = 4},
     {.index = 0x6085, .sub = 0, .bytes = 4, .value = 1000},
     {.index = 0x60C0, .sub = 0, .bytes = 2},
     {.index = 0x60C1, .sub = 1, .bytes = 4},

@@ -242,6 +242,28 @@ static void test_setup_wrong_identity_is_refused(void)
     TEST_ASSERT_EQUAL_HEX32(CIA402_WRONG_IDENTITY, refusal_of(2).code);
 }
 
+static void test_setup_wrong_revision_and_serial_number_are_refused(void)
+{
+    for (unsigned k = 0; k < AXES; k++) {
+        config.axis[k].identity[2] = 1;
+        config.axis[k].identity[3] = k == 4 ? 98 : 99;
+    }
+    const drive_report_t r = refusal_of(4);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_WRONG_IDENTITY, r.code);
+    TEST_ASSERT_EQUAL_HEX32(0x101804, r.object);
+}
+
+static void test_setup_position_limits_are_written_where_wanted(void)
+{
+    config.axis[1].has_limits = true;
+    config.axis[1].limit_counts[0] = -5000;
+    config.axis[1].limit_counts[1] = 205000;
+    cia402_slave_row(&slave, 1, 0x607D, 2)->refusal = 0x06090036; /* a second line of defence: no reason to refuse a drive */
+    come_up();
+    TEST_ASSERT_EQUAL_INT32(-5000, (int32_t)cia402_slave_row(&slave, 1, 0x607D, 1)->value);
+    TEST_ASSERT_EQUAL_INT32(0, (int32_t)cia402_slave_row(&slave, 0, 0x607D, 1)->value);
+}
+
 static void test_setup_other_profile_is_refused(void)
 {
     cia402_slave_row(&slave, 0, 0x1000, 0)->value = 0x00020191;
@@ -833,6 +855,8 @@ int main(void)
     RUN_TEST(test_setup_drives_that_are_up_already_are_reset_first);
     RUN_TEST(test_setup_object_refused_names_drive_object_and_reason);
     RUN_TEST(test_setup_wrong_identity_is_refused);
+    RUN_TEST(test_setup_wrong_revision_and_serial_number_are_refused);
+    RUN_TEST(test_setup_position_limits_are_written_where_wanted);
     RUN_TEST(test_setup_other_profile_is_refused);
     RUN_TEST(test_setup_missing_guard_is_refused_unless_allowed);
     RUN_TEST(test_setup_guard_that_cannot_be_written_but_is_on_is_taken);

@@ -128,6 +128,8 @@ static void test_load_lists_and_signs_reach_their_drives(void)
     put("[cia402]", "homing_method = 0, 17, -3, 35, 0, 1");
     put("[cia402]", "mode = ip");
     put("[cia402]", "when_gateway_lost = quick-stop");
+    put("[cia402]", "revision_number = 3");
+    put("[cia402]", "serial_numbers = 1, 2, 0, 4, 5, 4294967295");
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
     config_cia402(&m_config, &drives);
     TEST_ASSERT_EQUAL_UINT8(24, drives.axis[3].node);
@@ -137,6 +139,10 @@ static void test_load_lists_and_signs_reach_their_drives(void)
     TEST_ASSERT_EQUAL_INT8(-3, drives.axis[2].homing_method);
     TEST_ASSERT_EQUAL_UINT32(10000, drives.axis[1].window_counts);
     TEST_ASSERT_EQUAL_UINT32(10000, drives.axis[1].homing_speed[0]);
+    TEST_ASSERT_EQUAL_UINT32(3, drives.axis[5].identity[2]);
+    TEST_ASSERT_EQUAL_UINT32(4294967295, drives.axis[5].identity[3]);
+    TEST_ASSERT_EQUAL_INT32(-5000, drives.axis[0].limit_counts[0]);
+    TEST_ASSERT_TRUE(drives.axis[1].has_limits && drives.axis[1].limit_counts[1] == 500 + 5000); /* it runs backwards */
     TEST_ASSERT_EQUAL(CIA402_MODE_IP, drives.mode);
     TEST_ASSERT_EQUAL_INT16(3, drives.abort_option);
 }
@@ -148,6 +154,8 @@ static void test_load_what_contradicts_itself_is_refused_at_its_line(void)
     refuse("nodes = 1, 2, 3, 4, 5, 2", "2 of drive 6 is that of drive 2 already");
     refuse("nodes = 122", "127 of drive 6 is gateway_node");
     refuse("nodes = 1, 2", "has 2 values");
+    refuse("serial_numbers = 1, 2", "has 2 values");
+    refuse("serial_numbers = 1, 2, 3, 4, 5, 4294967296", "is no such number");
     refuse("nodes = none", "missing for driver = cia402");
     refuse("counts_per_mm = none", "missing for driver = cia402");
     refuse("counts_per_mm = 1, 2", "has 2 values");
