@@ -24,4 +24,4 @@ def build(folder, target):
     if not (folder / "build.ninja").exists():
         _run("cmake", "-S", str(TOP), "-B", str(folder), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DHEAVE_BENCH=ON")
     _run("cmake", "--build", str(folder), "--target", target)
-    return folder / {"heaved": "src/app/heaved", "bench_core": "tests/bench/bench_core"}[target]
+    return folder / {"heaved": "src/app/heaved", "bench_core": "tests/bench/bench_core", "bench_modbus": "tests/bench/bench_modbus"}[target]
