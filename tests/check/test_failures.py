@@ -18,7 +18,7 @@ def rows():
 
 def tests_there():
     """The text of all suites, without the part of a name that a table of cases adds."""
-    return "\n".join(path.read_text(encoding="utf-8") for suite in SUITES for path in sorted((TOP / "tests" / suite).glob("test_*.*")))
+    return "\n".join(path.read_text(encoding="utf-8") for suite in SUITES for path in sorted((TOP / "tests" / suite).glob("*.[cp]*")))
 
 
 def is_there(name, text):

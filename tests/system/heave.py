@@ -12,6 +12,7 @@ from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[2]
 WAIT_S = 20  # for anything that has to happen; a loaded machine may take seconds
+LOOK_S = 0.01  # between two looks whether it has
 
 
 def free_port():
@@ -26,7 +27,7 @@ def wait_for(condition, what):
         value = condition()
         if value:
             return value
-        time.sleep(0.01)
+        time.sleep(LOOK_S)
     raise AssertionError(f"{what}: not within {WAIT_S} s")
 
 
