@@ -183,7 +183,7 @@ static void take_signals(live_t *self)
         if (self->signals == 1) {
             const motion_request_t request = {.event = EVENT_SHUTDOWN};
             (void)ring_push(&self->loop.requests, &request, sizeof request, NULL, 0);
-            manager_stopping();
+            manager_stopping(&self->manager);
             (void)say(0, "shutting down: the platform settles first; once more ends at once");
         } else {
             motion_loop_quit(&self->loop);
@@ -369,11 +369,13 @@ int live_run(const config_t *config, const options_t *options)
     self->options = options;
     self->config = *config;
     self->control.fd = -1;
+    self->manager.fd = -1;
     self->udp.fd = -1;
     int code = open_all(self, config);
     code = code == EXIT_DONE ? run(self, config) : code;
     const bool has_blackbox_ended = blackbox_close(&self->blackbox);
     control_close(&self->control);
+    manager_close(&self->manager);
     if (!self->is_thread_running &&
         has_blackbox_ended) { /* a stuck one may still use all this: the end of the process gives it back */
         rig_close(&self->loop.rig);

@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: MIT
- * manager.h - what heaved tells the service manager that started it (sd_notify of systemd): that it is ready, what it is doing,
- * that its motion thread still runs, that it is about to end. Without a manager all of it does nothing. The service thread calls
- * it; nothing blocks, nothing allocates.
+ * manager.h - what heaved tells the service manager that started it (the protocol of sd_notify): that it is ready, what it is
+ * doing, that its motion thread still runs, that it is about to end. Without a manager all of it does nothing. The service thread
+ * calls it; nothing blocks, also where the manager does not read (libsystemd's own call would wait), nothing allocates.
  */
 #ifndef HEAVE_APP_MANAGER_H
 #define HEAVE_APP_MANAGER_H
+
+#include <sys/socket.h>
+#include <sys/un.h>
 
 #include "heave/telemetry.h"
 
@@ -13,18 +16,26 @@ typedef struct {
     uint64_t watchdog_us; /**< how often the manager wants to hear of it, halved; 0 = it does not */
     uint64_t next_us;
     uint64_t cycle; /**< of the motion thread, when told last */
+    bool is_ready_told;
     bool is_told;
     state_t state;
     fault_code_t fault;
+    int fd; /**< -1 = there is no manager; private, as the address */
+    socklen_t address_bytes;
+    struct sockaddr_un address;
 } manager_t;
 
-/** After everything has been opened and the first cycle has run. */
+/** After everything has been opened and the first cycle has run. What the manager does not take is told again by manager_serve.
+ */
 void manager_ready(manager_t *self, uint64_t now_us);
 
 /** Often: tells changes of state, and pets the watchdog if the motion thread has run a cycle since the last time. */
 void manager_serve(manager_t *self, const snapshot_t *snapshot, uint64_t now_us);
 
 /** Once, when a shutdown has been asked for. */
-void manager_stopping(void);
+void manager_stopping(const manager_t *self);
+
+/** Once, at the end. */
+void manager_close(manager_t *self);
 
 #endif

@@ -36,11 +36,11 @@ def main():
         folder = Path(name)
         with suite.case("programs, unit, user and ready-made platforms are installed"):
             files = installed(build, folder)
-            assert {"bin/heaved", "bin/heavectl", "lib/systemd/system/heaved@.service", "lib/sysusers.d/heave.conf", "libexec/heave-can",
+            assert {"bin/heaved", "bin/heavectl", "lib/systemd/system/heave@.service", "lib/sysusers.d/heave.conf", "libexec/heave-can",
                     "lib/systemd/system/heave-can@.service", "lib/systemd/system/heave-can-flush@.path"} <= files, files
             assert any(file.endswith("demo-hexapod.ini") for file in files), files
-        unit = folder / "heaved@test.service"
-        text = (build / "packaging/heaved@.service").read_text(encoding="utf-8")
+        unit = folder / "heave@test.service"
+        text = (build / "packaging/heave@.service").read_text(encoding="utf-8")
         # the programs are not where the unit will have them
         unit.write_text(re.sub(r"(?m)^ExecStart=\S+", "ExecStart=/bin/true", text), encoding="utf-8")
         with suite.case("systemd takes the unit without a word"):

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * test_manager.c - what the service manager gets to hear, on a socket like its own.
  */
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,7 +13,7 @@
 #include "unity.h"
 
 static int m_fd = -1;
-static manager_t m_manager;
+static manager_t m_manager = {.fd = -1};
 static snapshot_t m_snapshot;
 
 void hv_assert_failed(const char *file, int line)
@@ -24,9 +25,6 @@ void hv_assert_failed(const char *file, int line)
 
 void setUp(void)
 {
-#ifndef HEAVE_SYSTEMD
-    TEST_IGNORE_MESSAGE("built without libsystemd");
-#endif
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     (void)snprintf(address.sun_path, sizeof address.sun_path, "/tmp/heave-notify-%ld", (long)getpid());
     (void)unlink(address.sun_path);
@@ -45,6 +43,8 @@ void tearDown(void)
     }
     (void)unsetenv("NOTIFY_SOCKET");
     (void)unsetenv("WATCHDOG_USEC");
+    (void)unsetenv("WATCHDOG_PID");
+    manager_close(&m_manager);
 }
 
 /* The next message; "" where there is none. */
@@ -128,7 +128,73 @@ static void test_manager_without_one_nothing_is_told(void)
         TEST_ASSERT_EQUAL_STRING("", heard());
     }
     TEST_ASSERT_EQUAL_INT(0, setenv("NOTIFY_SOCKET", "/tmp/heave-notify-gone", 1));
-    manager_stopping(); /* nobody is there: no harm */
+}
+
+static void test_manager_that_is_not_there_does_no_harm(void)
+{
+    manager_ready(&m_manager, 0);
+    (void)close(m_fd);
+    m_fd = -1;
+    serve_cycle(1, 1000);
+    manager_stopping(&m_manager);
+    manager_close(&m_manager);
+    TEST_ASSERT_EQUAL_INT(0, setenv("NOTIFY_SOCKET", "/tmp/heave-notify-gone", 1));
+    manager_ready(&m_manager, 0);
+    manager_stopping(&m_manager);
+    manager_close(&m_manager);
+    TEST_ASSERT_EQUAL_INT(0, unsetenv("NOTIFY_SOCKET"));
+    manager_ready(&m_manager, 0);
+    serve_cycle(2, 2000);
+    manager_stopping(&m_manager);
+}
+
+/* A manager that reads nothing for a while: nobody waits for it, and it hears all that still counts afterwards. */
+static void test_manager_that_does_not_read_is_told_later(void)
+{
+    unsigned taken = 0;
+    const int filler = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0);
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", getenv("NOTIFY_SOCKET"));
+    while (sendto(filler, "x", 1, 0, (const struct sockaddr *)&address, sizeof address) == 1) {
+        taken++;
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(0, taken);
+    manager_ready(&m_manager, 0);
+    serve_cycle(1, 1000);
+    serve_cycle(2, 200000);
+    for (unsigned i = 0; i < taken; i++) {
+        TEST_ASSERT_EQUAL_STRING("x", heard());
+    }
+    TEST_ASSERT_EQUAL_STRING("", heard());
+    serve_cycle(3, 201000);
+    TEST_ASSERT_EQUAL_STRING("READY=1", heard());
+    TEST_ASSERT_EQUAL_STRING("STATUS=ENGAGED", heard());
+    TEST_ASSERT_EQUAL_STRING("WATCHDOG=1", heard());
+    (void)close(filler);
+}
+
+static void test_manager_on_an_abstract_socket(void)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int length = snprintf(&address.sun_path[1], sizeof address.sun_path - 1, "heave-notify-%ld", (long)getpid());
+    const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK, 0);
+    char name[sizeof address.sun_path + 1], text[16] = "";
+    TEST_ASSERT_EQUAL_INT(
+        0, bind(fd, (const struct sockaddr *)&address, (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1 + (size_t)length)));
+    (void)unlink(getenv("NOTIFY_SOCKET"));
+    (void)snprintf(name, sizeof name, "@%s", &address.sun_path[1]);
+    TEST_ASSERT_EQUAL_INT(0, setenv("NOTIFY_SOCKET", name, 1));
+    manager_ready(&m_manager, 0);
+    TEST_ASSERT_EQUAL_INT(7, recv(fd, text, sizeof text, 0));
+    TEST_ASSERT_EQUAL_STRING("READY=1", text);
+    (void)close(fd);
+}
+
+static void test_manager_watchdog_of_another_process_is_not_petted(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, setenv("WATCHDOG_PID", "1", 1));
+    manager_ready(&m_manager, 0);
+    TEST_ASSERT_EQUAL_UINT64(0, m_manager.watchdog_us);
 }
 
 int main(void)
@@ -139,5 +205,9 @@ int main(void)
     RUN_TEST(test_manager_watchdog_is_petted_twice_a_period_while_cycles_run);
     RUN_TEST(test_manager_watchdog_is_not_petted_for_a_thread_that_stands_still);
     RUN_TEST(test_manager_without_one_nothing_is_told);
+    RUN_TEST(test_manager_that_is_not_there_does_no_harm);
+    RUN_TEST(test_manager_that_does_not_read_is_told_later);
+    RUN_TEST(test_manager_on_an_abstract_socket);
+    RUN_TEST(test_manager_watchdog_of_another_process_is_not_petted);
     return UNITY_END();
 }

@@ -25,7 +25,6 @@ deps_build() {
     deps_need pkg-config cmd:pkg-config
     deps_need libinih-dev pc:inih
     deps_need libcjson-dev pc:libcjson
-    deps_need libsystemd-dev pc:libsystemd
     deps_need libmnl-dev pc:libmnl
     deps_need libmodbus-dev pc:libmodbus
     deps_need python3 cmd:python3
