@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: MIT
+ * frames_line.h - one line of a file of frames, read.
+ */
+#ifndef HEAVE_APP_FRAMES_LINE_H
+#define HEAVE_APP_FRAMES_LINE_H
+
+#include "heave/drives.h"
+#include "heave/hal/udp.h"
+#include "heave/supervisor.h"
+
+/** What a line does. */
+typedef enum {
+    FRAMES_DATAGRAM,  /**< a sender sends text */
+    FRAMES_REQUEST,   /**< `!engage` ...: what heavectl would ask for */
+    FRAMES_INTENSITY, /**< `!intensity N`: percent of a sender's motion */
+    FRAMES_ESTOP,     /**< `!estop on`, `!estop off` */
+    FRAMES_LATE,      /**< `!late N`: N cycles are skipped and counted (recordings hold this) */
+    FRAMES_FROM,      /**< `!from ADDRESS`: who sends the datagrams from here on */
+    FRAMES_DRIVE,     /**< `!drive N fault CODE`, `!drive N offline`, `!drive N back`: what a drive did (recordings hold this) */
+    FRAMES_STATE      /**< `!state ...`, the first line: the run goes on from there (incidents hold this; checkpoint.h) */
+} frames_kind_t;
+
+/** One line. */
+typedef struct {
+    uint64_t t_us;
+    frames_kind_t kind;
+    event_t request;     /**< FRAMES_REQUEST */
+    uint8_t drive;       /**< FRAMES_DRIVE: from 1 */
+    drive_state_t state; /**< FRAMES_DRIVE: DRIVE_FAULT, DRIVE_OFFLINE, else it is back */
+    uint32_t number; /**< FRAMES_INTENSITY: percent; FRAMES_ESTOP: 1 = on; FRAMES_LATE: cycles; FRAMES_DRIVE: a fault's code */
+    const uint8_t *text; /**< FRAMES_DATAGRAM: its bytes, escapes resolved; FRAMES_STATE: what stands behind the word */
+    uint32_t length;
+    hal_udp_peer_t from; /**< FRAMES_FROM: read from it; FRAMES_DATAGRAM: set by frames_load */
+    uint32_t line;       /**< number in the file, from 1 */
+} frames_line_t;
+
+#endif
