@@ -156,11 +156,12 @@ typedef struct {
 } config_lines_t;
 
 /** What switches the relays. */
-typedef enum { CONFIG_RELAYS_SIM } config_relays_driver_t;
+typedef enum { CONFIG_RELAYS_SIM, CONFIG_RELAYS_GPIO } config_relays_driver_t;
 
 /** Relay outputs, relay 1 first. */
 typedef struct {
     config_relays_driver_t driver;
+    config_label_t chip; /**< of GPIO lines; where there is none, whichever chip has lines of these names */
     config_lines_t lines;
     bool is_active_low;
 } config_relays_t;

@@ -7,6 +7,7 @@
 #include "config_bus.h"
 #include "config_canraw.h"
 #include "config_cia402.h"
+#include "config_gpio.h"
 #include "config_source.h"
 #include "config_value.h"
 #include "heave/ramp.h"
@@ -423,6 +424,7 @@ static void check_values(config_source_t *self)
     check_intensity(self);
     check_relays(self);
     check_inputs(self);
+    config_gpio_check(self);
     config_cia402_check(self);
     config_canraw_check(self);
     config_bus_check(self);

@@ -297,7 +297,7 @@ static void draw_relays(view_t *self, const cJSON *status)
         put(self, " ");
     }
     put(self, count > 0 ? " %s" : "none", word(relays, "mask"));
-    put(self, "%s", cJSON_IsFalse(member(relays, "known")) ? ", not known: cannot be switched" : "");
+    put(self, "%s", cJSON_IsFalse(member(relays, "known")) ? ", not known" : "");
     end_line(self);
 }
 

@@ -376,10 +376,11 @@ int live_run(const config_t *config, const options_t *options)
     const bool has_blackbox_ended = blackbox_close(&self->blackbox);
     control_close(&self->control);
     manager_close(&self->manager);
-    if (!self->is_thread_running &&
-        has_blackbox_ended) { /* a stuck one may still use all this: the end of the process gives it back */
-        rig_close(&self->loop.rig);
+    if (!self->is_thread_running) { /* a stuck one may still use all this: the end of the process gives it back */
+        rig_close(&self->loop.rig, self->config.settings.relay_safe_mask);
         linux_udp_close(&self->udp);
+    }
+    if (!self->is_thread_running && has_blackbox_ended) {
         free(self);
     }
     return code;

@@ -12,6 +12,7 @@
 #include "dbc.h"
 #include "doctor.h"
 #include "envelope_csv.h"
+#include "gpio_setup.h"
 #include "heave/gateway.h"
 #include "live.h"
 #include "options.h"
@@ -84,6 +85,7 @@ static int run(const options_t *options, const config_t *config)
         return play_run(config, options->play, options->trace);
     case MODE_CHECK:
         (void)config_check_report(config, sizeof(gateway_t), stdout);
+        (void)gpio_setup_check(config, stdout);
         return end_stdout(EXIT_DONE);
     case MODE_ENVELOPE:
         return write_envelope(options->envelope, config);

@@ -7,6 +7,7 @@
 
 #include "config_canraw.h"
 #include "config_cia402.h"
+#include "gpio_setup.h"
 
 #define LEAVE_NS 5000000      /* seven frames, even at 125 kbit/s */
 #define RUN_DIR  "/run/heave" /* where heave-can-flush@.path looks */
@@ -106,10 +107,22 @@ static hv_status_t open_cia402(rig_t *self, const config_t *config, gateway_io_t
     return status == HV_OK ? cia402_init(&self->cia402, &self->cia402_config, linux_can_hal(&self->can)) : status;
 }
 
+/* Relays first: from here on they are at the safe mask. */
+static hv_status_t open_relays(rig_t *self, const config_t *config, gateway_io_t *io)
+{
+    if (config->relays.driver != CONFIG_RELAYS_GPIO) {
+        return HV_OK;
+    }
+    const linux_gpio_relays_config_t relays = gpio_setup_relays(config);
+    io->relays = linux_gpio_relays_hal(&self->gpio_relays);
+    return linux_gpio_relays_open(&self->gpio_relays, &relays);
+}
+
 hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io)
 {
     const uint8_t axes = describe(self, config);
-    const hv_status_t status = open_sim(self, config, axes, inputs_present(&config->inputs), io);
+    hv_status_t status = open_sim(self, config, axes, inputs_present(&config->inputs), io);
+    status = status == HV_OK ? open_relays(self, config, io) : status;
     if (status != HV_OK) {
         return status;
     }
@@ -126,6 +139,9 @@ hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io)
 
 const char *rig_trouble(const rig_t *self)
 {
+    if (self->gpio_relays.error_text[0] != '\0') {
+        return self->gpio_relays.error_text;
+    }
     return self->is_can_open ? self->can.error_text : "";
 }
 
@@ -137,8 +153,9 @@ static void leave_cia402(rig_t *self)
     (void)nanosleep(&pause, NULL);
 }
 
-void rig_close(rig_t *self)
+void rig_close(rig_t *self, uint16_t safe_mask)
 {
+    linux_gpio_relays_close(&self->gpio_relays, safe_mask);
     if (self->is_can_open) {
         if (self->cia402.config != NULL) {
             leave_cia402(self);

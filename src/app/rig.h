@@ -9,6 +9,7 @@
 #include "heave/cia402.h"
 #include "heave/gateway.h"
 #include "linux_can.h"
+#include "linux_gpio_relays.h"
 #include "sim_drives.h"
 #include "sim_inputs.h"
 #include "sim_relays.h"
@@ -22,6 +23,7 @@ typedef struct {
     sim_drives_t sim_drives;
     sim_relays_t sim_relays;
     sim_inputs_t sim_inputs;
+    linux_gpio_relays_t gpio_relays;
     bool is_can_open;
     linux_can_t can;
     canraw_map_t canraw_map;
@@ -39,8 +41,9 @@ hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io) HV_M
  *  @return "" where nothing is */
 const char *rig_trouble(const rig_t *self);
 
-/** Closes; harmless on one that is not open. What a bus has not taken by now is dropped. */
-void rig_close(rig_t *self);
+/** Closes; harmless on one that is not open. What a bus has not taken by now is dropped.
+ *  @param safe_mask where the relays end */
+void rig_close(rig_t *self, uint16_t safe_mask);
 
 /** For offline runs: simulated devices whatever the configuration names, drives enabled, homed, at the settled extension. */
 hv_status_t rig_open_settled(rig_t *self, const config_t *config, gateway_io_t *io) HV_MUST_CHECK;

@@ -1,11 +1,19 @@
 /* SPDX-License-Identifier: MIT
- * test_hal_relays.c - the contract of hal/relays.h on every backend, and the fault plan of the simulated one.
+ * test_hal_relays.c - the contract of hal/relays.h on every backend; the fault plan of the simulated one, and what there is to
+ * GPIO lines and who has them.
+ *
+ *     test_contract_hal_relays          the simulated bank, coils of Modbus boards
+ *     test_contract_hal_relays --gpio   GPIO lines, as root on a kernel of its own with gpio-sim (tests/lib/kernel.py)
  */
 #include "contract.h"
 
+#include <string.h>
 #include <time.h>
+#include <unistd.h>
 
+#include "gpio_sim.h"
 #include "heave/coil_relays.h"
+#include "linux_gpio_relays.h"
 #include "linux_modbus.h"
 #include "modbus_server.h"
 #include "sim_modbus.h"
@@ -131,6 +139,74 @@ static const fixture_t k_fixtures[] = {
     {"coils", open_coils, do_nothing, settle_coils, coil_contacts},
     {"coils linux", open_linux_coils, close_linux_coils, settle_linux_coils, linux_coil_contacts},
 };
+
+/* --- GPIO lines: line n + 2 is relay n + 1 --- */
+
+#define CHIP_LINES 16u
+#define FIRST_LINE 2u
+
+static linux_gpio_relays_t gpio;
+static gpio_sim_t chip;
+static uint32_t levels_at_close; /**< of all lines, when they were given back */
+
+static const char *const k_named[] = {"EFFECT2", "EFFECT3", "EFFECT4",  "EFFECT5",  "EFFECT6",  "EFFECT7",
+                                      "EFFECT8", "EFFECT9", "EFFECT10", "EFFECT11", "EFFECT12", "EFFECT13"};
+static const char *const k_numbered[] = {"2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13"};
+
+static uint32_t levels(void)
+{
+    uint32_t seen = 0;
+    for (unsigned i = 0; i < CHIP_LINES; i++) {
+        seen |= gpio_sim_level(&chip, i) ? 1u << i : 0u;
+    }
+    return seen;
+}
+
+void __real_linux_gpio_chip_close(linux_gpio_chip_t *self);
+void __wrap_linux_gpio_chip_close(linux_gpio_chip_t *self);
+
+void __wrap_linux_gpio_chip_close(linux_gpio_chip_t *self)
+{
+    levels_at_close = levels();
+    __real_linux_gpio_chip_close(self);
+}
+
+static linux_gpio_relays_config_t bank(const char *label, const char *const lines[], unsigned count)
+{
+    linux_gpio_relays_config_t config = {.names = {.chip = label, .count = count}};
+    memcpy(config.names.line, lines, count * sizeof lines[0]);
+    return config;
+}
+
+static hal_relays_t open_gpio(uint8_t count)
+{
+    const linux_gpio_relays_config_t config = bank(NULL, k_named, count);
+    TEST_ASSERT_EQUAL_MESSAGE(HV_OK, linux_gpio_relays_open(&gpio, &config), gpio.error_text);
+    return linux_gpio_relays_hal(&gpio);
+}
+
+static void close_gpio(void)
+{
+    linux_gpio_relays_close(&gpio, 0);
+}
+
+static void pass(unsigned ms)
+{
+    const struct timespec time = {.tv_sec = ms / 1000, .tv_nsec = ms % 1000 * 1000000L};
+    (void)nanosleep(&time, NULL);
+}
+
+static void settle_gpio(void)
+{
+    pass(2);
+}
+
+static uint16_t gpio_contacts(void)
+{
+    return (uint16_t)(levels() >> FIRST_LINE);
+}
+
+static const fixture_t k_gpio = {"gpio", open_gpio, close_gpio, settle_gpio, gpio_contacts};
 
 #define COUNT 8u
 
@@ -409,13 +485,190 @@ static void run_coils(void)
     RUN_TEST(test_coils_wrong_figures_are_refused);
 }
 
-int main(void)
+/* --- What only GPIO lines have --- */
+
+static void reopen(const linux_gpio_relays_config_t *config)
 {
-    UNITY_BEGIN();
+    close_gpio();
+    TEST_ASSERT_EQUAL_MESSAGE(HV_OK, linux_gpio_relays_open(&gpio, config), gpio.error_text);
+    hal = linux_gpio_relays_hal(&gpio);
+}
+
+static void assert_refused(const linux_gpio_relays_config_t *config, const char *text)
+{
+    static linux_gpio_relays_t other;
+    TEST_ASSERT_EQUAL(HV_ERR_IO, linux_gpio_relays_open(&other, config));
+    TEST_ASSERT_EQUAL_STRING(text, other.error_text);
+    linux_gpio_relays_close(&other, 0);
+}
+
+/* Writes a mask and looks at all lines of the chip, those of nobody included. */
+static void assert_mask_on_lines(unsigned mask, bool is_active_low)
+{
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, (uint16_t)mask));
+    settle_gpio();
+    TEST_ASSERT_EQUAL_HEX32((is_active_low ? ~mask & 0xFFFu : mask) << FIRST_LINE, levels());
+}
+
+static void test_gpio_masks_reach_exactly_their_lines(void)
+{
+    static const uint16_t k_document[] = {0x0F, 0xF0, 0x01, 0x0100, 0x00, 0x02, 0x04, 0x0A}; /* the vendor's document */
+    for (unsigned low = 0; low < 2; low++) {
+        linux_gpio_relays_config_t config = bank("effects", k_numbered, 12);
+        config.is_active_low = low != 0;
+        reopen(&config);
+        for (unsigned i = 0; i < sizeof k_document / sizeof k_document[0]; i++) {
+            assert_mask_on_lines(k_document[i], low != 0);
+        }
+        for (unsigned i = 0; i < 12; i++) {
+            assert_mask_on_lines(1u << i, low != 0);
+            assert_mask_on_lines(~(1u << i) & 0xFFFu, low != 0);
+        }
+        for (unsigned mask = 0; mask < 0x1000; mask += 37) {
+            assert_mask_on_lines(mask, low != 0);
+        }
+    }
+}
+
+static void test_gpio_lines_stand_at_the_safe_mask_from_the_start_to_the_end(void)
+{
+    linux_gpio_relays_config_t config = bank(NULL, k_named, 12);
+    uint16_t mask = 0;
+    config.safe_mask = 0x801;
+    config.is_active_low = true;
+    reopen(&config);
+    TEST_ASSERT_EQUAL_HEX32((~0x801u & 0xFFFu) << FIRST_LINE, levels()); /* no worker has run yet */
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_read_back(hal, &mask));
+    TEST_ASSERT_EQUAL_HEX16(0x801, mask);
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x0F0));
+    settle_gpio();
+    TEST_ASSERT_EQUAL_HEX32((~0x0F0u & 0xFFFu) << FIRST_LINE, levels());
+    linux_gpio_relays_close(&gpio, 0x402);
+    TEST_ASSERT_EQUAL_HEX32((~0x402u & 0xFFFu) << FIRST_LINE, levels_at_close);
+}
+
+static void test_gpio_mask_written_just_before_the_end_does_not_stay(void)
+{
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0xFF));
+    linux_gpio_relays_close(&gpio, 0);
+    TEST_ASSERT_EQUAL_HEX32(0, levels_at_close);
+}
+
+static void test_gpio_newest_of_many_masks_wins(void)
+{
+    for (unsigned i = 0; i <= 5000; i++) {
+        TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, (uint16_t)(i & 0xFF)));
+    }
+    assert_relays(5000 & 0xFF);
+}
+
+static void test_gpio_names_that_lead_nowhere_say_why(void)
+{
+    static const char *const k_missing[] = {"EFFECT2", "EFECT3"};
+    static const char *const k_beyond[] = {"2", "16"};
+    linux_gpio_relays_config_t config = bank(NULL, k_missing, 2);
+    close_gpio();
+    assert_refused(&config, "gpio: no chip has a line EFECT3 (gpioinfo lists what there is)");
+    config = bank("effects", k_missing, 2);
+    assert_refused(&config, "gpio: chip effects has no line EFECT3 (gpioinfo lists what there is)");
+    config = bank("effects", k_beyond, 2);
+    assert_refused(&config, "gpio: chip effects has no line 16 (gpioinfo lists what there is)");
+    config = bank("efects", k_named, 2);
+    assert_refused(&config, "gpio: no chip has the label efects; there are: effects");
+    config = bank(NULL, k_numbered, 2);
+    assert_refused(&config, "gpio: 2 alone is no line: it takes the label of its chip");
+    config = bank("gpiochip0", k_numbered, 2);
+    assert_refused(&config, "gpio: no chip has the label gpiochip0; there are: effects");
+}
+
+static void test_gpio_lines_of_two_chips_are_told_apart_or_refused(void)
+{
+    static const char *const k_mixed[] = {"EFFECT2", "SPARE3"};
+    gpio_sim_t second, third;
+    close_gpio();
+    TEST_ASSERT_TRUE(gpio_sim_make(&second, "second", "second", 16, "EFFECT"));
+    TEST_ASSERT_TRUE(gpio_sim_make(&third, "third", "third", 8, "SPARE"));
+    linux_gpio_relays_config_t config = bank(NULL, k_named, 2);
+    assert_refused(&config, "gpio: 2 chips have these lines: say which one by its label");
+    config = bank(NULL, k_mixed, 2);
+    assert_refused(&config, "gpio: the lines are not all on one chip, as they have to be");
+    config = bank("second", k_named, 12);
+    TEST_ASSERT_EQUAL_MESSAGE(HV_OK, linux_gpio_relays_open(&gpio, &config), gpio.error_text);
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(linux_gpio_relays_hal(&gpio), 0x101));
+    settle_gpio();
+    TEST_ASSERT_EQUAL_HEX32(0, levels());
+    TEST_ASSERT_TRUE(gpio_sim_level(&second, 2) && !gpio_sim_level(&second, 3) && gpio_sim_level(&second, 10));
+    close_gpio();
+    gpio_sim_drop(&second);
+    gpio_sim_drop(&third);
+}
+
+static void test_gpio_line_in_use_names_who_has_it(void)
+{
+    linux_gpio_chip_t other;
+    linux_gpio_request_t request = {.consumer = "fountain", .count = 1, .offset = {5}, .is_output = true};
+    const linux_gpio_names_t names = {.chip = "effects", .count = 1, .line = {"5"}};
+    const linux_gpio_relays_config_t config = bank(NULL, k_named, 12);
+    char text[LINUX_GPIO_TEXT_SIZE];
+    close_gpio();
+    TEST_ASSERT_EQUAL(HV_OK, linux_gpio_request(&other, &names, &request, text));
+    assert_refused(&config, "gpio: line EFFECT5 of chip effects is in use by \"fountain\"");
+    linux_gpio_chip_close(&other);
+    TEST_ASSERT_EQUAL(HV_OK, linux_gpio_relays_open(&gpio, &config));
+    assert_refused(&config, "gpio: line EFFECT2 of chip effects is in use by \"heaved relays\"");
+}
+
+static void test_gpio_without_permission_says_so(void)
+{
+    const linux_gpio_relays_config_t config = bank(NULL, k_named, 2);
+    close_gpio();
+    TEST_ASSERT_EQUAL_INT(0, seteuid(65534));
+    assert_refused(&config, "gpio: not allowed to open /dev/gpiochip*: this user has to be in their group (see docs/gpio.md)");
+    TEST_ASSERT_EQUAL_INT(0, seteuid(0));
+}
+
+static void test_gpio_chip_that_goes_is_noticed_and_the_end_is_orderly(void)
+{
+    uint16_t mask = 0x5A;
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x11));
+    settle_gpio();
+    gpio_sim_unplug(&chip);
+    pass(250); /* nobody writes: the worker looks by itself */
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_relays_read_back(hal, &mask));
+    TEST_ASSERT_EQUAL_HEX16(0x5A, mask);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_relays_write(hal, 0x12));
+    close_gpio();
+    gpio_sim_drop(&chip);
+    const linux_gpio_relays_config_t config = bank(NULL, k_named, 2);
+    assert_refused(&config, "gpio: this machine has no GPIO chip (/dev/gpiochip*)");
+    TEST_ASSERT_TRUE(gpio_sim_make(&chip, "effects", "effects", CHIP_LINES, "EFFECT"));
+}
+
+static void run_contract_on(const fixture_t *on)
+{
+    fixture = on;
+    contract_backend = fixture->name;
+    run_contract();
+}
+
+static void run_gpio(void)
+{
+    RUN_TEST(test_gpio_masks_reach_exactly_their_lines);
+    RUN_TEST(test_gpio_lines_stand_at_the_safe_mask_from_the_start_to_the_end);
+    RUN_TEST(test_gpio_mask_written_just_before_the_end_does_not_stay);
+    RUN_TEST(test_gpio_newest_of_many_masks_wins);
+    RUN_TEST(test_gpio_names_that_lead_nowhere_say_why);
+    RUN_TEST(test_gpio_lines_of_two_chips_are_told_apart_or_refused);
+    RUN_TEST(test_gpio_line_in_use_names_who_has_it);
+    RUN_TEST(test_gpio_without_permission_says_so);
+    RUN_TEST(test_gpio_chip_that_goes_is_noticed_and_the_end_is_orderly);
+}
+
+/* All that runs on the machine's own kernel. */
+static void run_portable(void)
+{
     for (size_t i = 0; i < sizeof k_fixtures / sizeof k_fixtures[0]; i++) {
-        fixture = &k_fixtures[i];
-        contract_backend = fixture->name;
-        run_contract();
+        run_contract_on(&k_fixtures[i]);
     }
     fixture = &k_fixtures[0];
     contract_backend = fixture->name;
@@ -423,5 +676,22 @@ int main(void)
     fixture = &k_fixtures[1];
     contract_backend = fixture->name;
     run_coils();
+}
+
+int main(int argc, char **argv)
+{
+    const bool is_gpio = argc > 1 && strcmp(argv[1], "--gpio") == 0;
+    if (is_gpio && !gpio_sim_make(&chip, "effects", "effects", CHIP_LINES, "EFFECT")) {
+        printf("1..0 # SKIP this kernel has no gpio-sim\n");
+        return 0;
+    }
+    UNITY_BEGIN();
+    if (is_gpio) {
+        run_contract_on(&k_gpio);
+        run_gpio();
+        gpio_sim_drop(&chip);
+    } else {
+        run_portable();
+    }
     return UNITY_END();
 }

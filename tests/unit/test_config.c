@@ -481,6 +481,7 @@ static const spoilt_t k_spoilt[] = {
      "[relays] lines: \"\" has no name; allowed: none, or up to 12 different lines, by name or number"},
     {"relays", "max_on_ms", "max_on_ms = 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13",
      "[relays] max_on_ms: has 13 values; allowed: a whole number from 0 to 86400000 ms, or one for each relay"},
+    {"relays", "driver", "driver = modbus", "[relays] driver: driver modbus is not built into this heaved; allowed: sim | gpio"},
     {"relays", "max_on_ms", "max_on_ms = 5, 6",
      "[relays] max_on_ms: has 2 values; allowed: one, or one for each of the 12 relays in lines"},
     {"relays", "min_toggle_ms", "min_toggle_ms = 60001",
@@ -795,6 +796,30 @@ static void test_load_safe_mask_above_the_relays_is_an_error(void)
     set_key("relays", "safe_mask", "7");
     TEST_ASSERT_EQUAL_INT(1, load_lines());
     expect_contains("[relays] safe_mask: names relays above the 2 in lines; allowed: 0 to 3\n");
+}
+
+static void test_load_gpio_relays_need_lines_that_a_chip_can_be_found_by(void)
+{
+    static const struct {
+        const char *chip, *lines, *error;
+    } k_cases[] = {
+        {"none", "GPIO17, GPIO27", ""},
+        {"pinctrl-bcm2711", "17, 27, GPIO22", ""},
+        {"none", "GPIO17, 27", "[relays] lines: 27 alone is no line; allowed: the name of a line, or its number with chip\n"},
+        {"none", "none", "[relays] lines: driver gpio switches none; allowed: the lines of 1 to 12 relays\n"},
+        {"a chip", "7, 07", "[relays] lines: 07 is relay 1 already; allowed: a line of its own for each\n"},
+        {"gpiochip0", "7, 9",
+         "[relays] chip: gpiochip0 is a number that changes; allowed: the chip's label (gpiodetect shows it)\n"},
+    };
+    for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {
+        take_good_file();
+        set_key("relays", "driver", "gpio");
+        set_key("relays", "safe_mask", "0");
+        set_key("relays", "chip", k_cases[i].chip);
+        set_key("relays", "lines", k_cases[i].lines);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(k_cases[i].error[0] != '\0', load_lines(), m_errors);
+        expect_contains(k_cases[i].error);
+    }
 }
 
 static void test_load_relay_times_that_contradict_each_other_are_errors(void)
@@ -1337,6 +1362,7 @@ int main(void)
     RUN_TEST(test_load_neutral_counts_the_stroke_of_each_cylinder);
     RUN_TEST(test_load_hinges_that_do_not_fit_are_an_error);
     RUN_TEST(test_load_safe_mask_above_the_relays_is_an_error);
+    RUN_TEST(test_load_gpio_relays_need_lines_that_a_chip_can_be_found_by);
     RUN_TEST(test_load_relay_times_that_contradict_each_other_are_errors);
     RUN_TEST(test_load_input_line_used_twice_is_an_error);
     RUN_TEST(test_load_values_arrive_where_they_belong);

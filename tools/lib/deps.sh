@@ -27,6 +27,7 @@ deps_build() {
     deps_need libcjson-dev pc:libcjson
     deps_need libmnl-dev pc:libmnl
     deps_need libmodbus-dev pc:libmodbus
+    deps_need libgpiod-dev pc:libgpiod
     deps_need python3 cmd:python3
 }
 

@@ -9,7 +9,7 @@
 set -u
 
 arch=${1:?usage: foreign.sh ARCHITECTURE}
-packages=(libinih-dev libinih1 libcjson-dev libcjson1 libmnl-dev libmnl0 libmodbus-dev libmodbus5)
+packages=(libinih-dev libinih1 libcjson-dev libcjson1 libmnl-dev libmnl0 libmodbus-dev libmodbus5 libgpiod-dev libgpiod2)
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/heave
 release=$(sed -n 's/^VERSION_CODENAME=//p' /etc/os-release 2>/dev/null)
 wanted=$(sha256sum <<<"${packages[*]}" | cut -c 1-8) # a change of the list makes another root

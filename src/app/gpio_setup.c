@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: MIT
+ * gpio_setup.c - GPIO lines of a configuration as the Linux backends want them; see gpio_setup.h.
+ */
+#include "gpio_setup.h"
+
+linux_gpio_relays_config_t gpio_setup_relays(const config_t *config)
+{
+    const config_relays_t *relays = &config->relays;
+    linux_gpio_relays_config_t out = {.names = {.chip = relays->chip.text, .count = relays->lines.count},
+                                      .is_active_low = relays->is_active_low,
+                                      .safe_mask = config->settings.relay_safe_mask};
+    for (unsigned i = 0; i < relays->lines.count; i++) {
+        out.names.line[i] = relays->lines.line[i].text;
+    }
+    return out;
+}
+
+/* Finds lines and says what is wrong with them. Returns the number of warnings. */
+static unsigned look(const linux_gpio_names_t *names, const char *section, linux_gpio_place_t *place, FILE *out)
+{
+    char text[LINUX_GPIO_TEXT_SIZE];
+    const hv_status_t status = linux_gpio_find(names, place, text);
+    if (status == HV_ERR_NOSUP) {
+        fprintf(out, "%-24s  not looked at: %s\n", section, text);
+    } else if (status != HV_OK) {
+        fprintf(out, "warning: [%s] %s\n", section, text);
+    } else {
+        fprintf(out, "%-24s  %u line%s on chip %s\n", section, place->count, place->count == 1u ? "" : "s", place->label);
+    }
+    return status != HV_OK && status != HV_ERR_NOSUP;
+}
+
+unsigned gpio_setup_check(const config_t *config, FILE *out)
+{
+    linux_gpio_place_t relays = {.count = 0};
+    unsigned warnings = 0;
+    if (config->relays.driver == CONFIG_RELAYS_GPIO) {
+        const linux_gpio_relays_config_t setup = gpio_setup_relays(config);
+        warnings += look(&setup.names, "relays", &relays, out);
+    }
+    return warnings;
+}

@@ -1,0 +1,206 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_gpio.py BIN masks|lines - the daemon on GPIO lines that the kernel simulates, on virtual time. Runs inside kernel.py.
+
+What the relays do is read from the other side of the lines, as a multimeter at the terminals would."""
+import signal
+import sys
+import time
+
+import gpio_sim
+import heave
+import tap
+
+RELAYS = 12
+FIRST = 2  # line of relay 1
+LINES = ", ".join(f"FX{FIRST + n}" for n in range(RELAYS))
+SAFE = 0x800
+EXIT_UNAVAILABLE = 69
+CYCLE_US = 5000  # what is tested here does not depend on it, and simulating a second takes a fifth
+DOCUMENT = [("@A3:5.5,3.0,20,0F#", 0x00F), ("@A4:5.5,3.0,20,45,0F#", 0x00F), ("@A6:5,6,0,5.5,3.0,20,F0#", 0x0F0),
+            ("@A7:5,6,0,5.5,3.0,20,-30,F0#", 0x0F0), ("@C6:55,33,25,20,20,50,0100#", 0x100), ("@C7:55,33,25,20,20,50,25.5,0100#", 0x100),
+            ("@A6:2.5,3.5,6,10,5,40,2#", 0x002), ("@A7:3.5,1.5,12,8,5,30,20,4#", 0x004), ("@A6:0,0,0,0,0,20,0A#", 0x00A),
+            ("@A6:0,0,0,0,0,20,0#", 0x000), ("@A6:0,0,0,0,0,20,FFF#", 0xFFF)]
+
+
+class GpioBench(heave.Bench):
+    """The demonstration platform with its relays on lines of a chip that is called effects."""
+
+    def __init__(self, bin_dir, relays="", **changes):
+        super().__init__(bin_dir, **{"platform__cycle_us": CYCLE_US, "relays__lines": LINES, "relays__safe_mask": f"{SAFE:X}", **changes})
+        self.edit("[relays]\ndriver = sim\n", f"[relays]\ndriver = gpio\n{relays}")
+
+    def edit(self, old, new):
+        text = self.config.read_text(encoding="utf-8")
+        assert text.count(old) == 1, f"{old!r} found {text.count(old)} times"
+        self.config.write_text(text.replace(old, new), encoding="utf-8")
+
+    def wait_status(self, condition, what):
+        """Asks five times a second: each question is a process, and starting one costs far more here than simulating a second."""
+        for _ in range(5 * heave.WAIT_S):
+            status = self.status()
+            if condition(status):
+                return status
+            time.sleep(0.2)
+        raise AssertionError(f"{what}: not within {heave.WAIT_S} s")
+
+    def wait_state(self, *states):
+        return self.wait_status(lambda status: status["state"] in states, f"state {' or '.join(states)}")
+
+    def refused(self):
+        """What heaved says that does not start."""
+        run = self.heaved("--config", self.config)
+        assert run.returncode == EXIT_UNAVAILABLE, (run.returncode, run.stderr)
+        return run.stderr
+
+
+def relays(chip):
+    return chip.mask(FIRST, RELAYS)
+
+
+def wait_relays(chip, mask, what):
+    heave.wait_for(lambda: relays(chip) == mask, f"{what}: relays {mask:03X}, they are {relays(chip):03X}")
+
+
+def switch(bench, chip, mask=0x0F0):
+    """Engaged, and a sender that has closed some."""
+    bench.wait_state("ENGAGED")
+    sender = bench.sender()
+    sender.send(f"@A6:0,0,0,0,0,20,{mask:X}#")
+    wait_relays(chip, mask, "sent")
+    return sender
+
+
+def document(bin_dir):
+    with gpio_sim.Chip("effects", 16, "FX") as chip, GpioBench(bin_dir) as bench:
+        bench.start()
+        wait_relays(chip, SAFE, "before anyone sends")
+        bench.wait_state("ENGAGED")
+        with bench.sender() as sender:
+            for frame, mask in DOCUMENT:
+                sender.send(frame)
+                wait_relays(chip, mask, frame)
+                assert chip.level(0) == chip.level(1) == chip.level(14) == chip.level(15) == 0, "a line of nobody"
+        assert bench.status()["relays"]["known"] is True
+        assert bench.stop(bench.running[0]) == 0
+
+
+def fewer(bin_dir):
+    with gpio_sim.Chip("effects", 16, "FX") as chip, GpioBench(bin_dir, "chip = effects\nactive_low = yes\n", relays__lines="2, 3, 4, 5",
+                                                          relays__safe_mask="8") as bench:
+        bench.start()
+        bench.wait_state("ENGAGED")
+        heave.wait_for(lambda: chip.mask(FIRST, 4) == 0x7, "active low: only relay 4 is closed")
+        with bench.sender() as sender:
+            sender.send("@A6:0,0,0,0,0,20,F5#")
+            heave.wait_for(lambda: chip.mask(FIRST, 4) == 0xA, "relays 1 and 3 are closed")
+        assert bench.status()["counters"]["relay_missing"] == 1
+        assert "relay_missing 1" in bench.ctl("status").stdout
+
+
+def every_way_out(bin_dir):
+    """A sender that dies, a hold, a park, a fault, SIGTERM: watched while heaved has the lines."""
+    with gpio_sim.Chip("effects", 16, "FX") as chip, GpioBench(bin_dir, udp__silence_hold_ms=300) as bench:
+        daemon = bench.start()
+        switch(bench, chip).link.close()
+        wait_relays(chip, SAFE, "the sender has died")
+        assert bench.status()["state"] == "HOLD"
+        switch_again = [("hold", "resume"), ("park", "engage")]
+        for request, back in switch_again:
+            assert bench.ctl("resume" if request == "hold" else "engage").returncode == 0
+            switch(bench, chip)
+            assert bench.ctl(request).returncode == 0
+            wait_relays(chip, SAFE, request)
+            assert bench.ctl(back).returncode == 0
+        switch(bench, chip)
+        daemon.send_signal(signal.SIGTERM)
+        wait_relays(chip, SAFE, "SIGTERM")
+        assert daemon.poll() is None, "it settles first"
+        assert daemon.wait(timeout=heave.WAIT_S) == 0
+
+
+def fault(bin_dir):
+    with gpio_sim.Chip("effects", 16, "FX") as chip, GpioBench(bin_dir, sim__lag_ms=300) as bench:
+        bench.edit("[cylinders]\n", "[cylinders]\nfollowing_error_mm = 20\n")
+        bench.start()
+        with switch(bench, chip) as sender:
+            sender.send("@A6:0,0,0,0,0,90,0F#")
+            bench.wait_state("FAULT")
+        wait_relays(chip, SAFE, "FAULT")
+
+
+def killed(bin_dir):
+    """The kernel takes the lines back: on this chip they fall to what pulls them, on others they stay as they were."""
+    with gpio_sim.Chip("effects", 16, "FX") as chip, GpioBench(bin_dir) as bench:
+        chip.pull(FIRST + 11, True)
+        daemon = bench.start()
+        switch(bench, chip)
+        assert bench.stop(daemon, signal.SIGKILL) == -signal.SIGKILL
+        wait_relays(chip, 0x800, "the lines fall to what pulls them")
+        bench.socket.unlink(missing_ok=True)
+        bench.start()
+        wait_relays(chip, SAFE, "started again")
+
+
+def taken(bin_dir):
+    with gpio_sim.Chip("effects", 16, "FX"), GpioBench(bin_dir) as bench:
+        other = GpioBench(bin_dir)
+        with other:
+            daemon = bench.start()
+            said = other.refused()
+            assert 'gpio: line FX2 of chip effects is in use by "heaved relays"' in said, said
+            assert bench.stop(daemon) == 0
+            other.start()
+
+
+def missing(bin_dir):
+    with gpio_sim.Chip("effects", 16, "FX") as chip:
+        with GpioBench(bin_dir, relays__lines="FX2, FX3, FOG", relays__safe_mask="0") as bench:
+            wrong = "gpio: no chip has a line FOG (gpioinfo lists what there is)"
+            check = bench.heaved("--config", bench.config, "--check")
+            assert check.returncode == 0 and f"warning: [relays] {wrong}\n" in check.stdout, check.stdout
+            assert wrong in bench.refused()
+        with GpioBench(bin_dir) as bench:
+            assert "12 lines on chip effects" in bench.heaved("--config", bench.config, "--check").stdout
+            chip.unplug()
+            check = bench.heaved("--config", bench.config, "--check")
+            assert check.returncode == 0 and "not looked at: gpio: this machine has no GPIO chip" in check.stdout, check.stdout
+            assert "this machine has no GPIO chip" in bench.refused()
+            chip.plug()
+            bench.start()
+
+
+def unplugged(bin_dir):
+    """The motion goes on; what is not known any more is shown."""
+    with gpio_sim.Chip("effects", 16, "FX") as chip, GpioBench(bin_dir) as bench:
+        daemon = bench.start()
+        with switch(bench, chip) as sender:
+            chip.unplug()
+            bench.wait_status(lambda status: status["relays"]["known"] is False, "the relays are not known")
+            sender.send("@A6:0,0,0,0,0,30,0F#")
+            bench.wait_status(lambda status: abs(status["pose_sent"]["z_mm"] - 30) < 0.01, "the motion goes on")
+        status = bench.status()
+        assert status["state"] == "ENGAGED" and status["late_cycles"] == 0, status
+        assert "000F, not known\n" in bench.ctl("status").stdout
+        assert bench.stop(daemon) == 0
+        assert daemon.log.read_text(encoding="utf-8").count("relays: cannot be switched") == 1
+
+
+def main():
+    suite = tap.Suite()
+    if not gpio_sim.is_there():
+        print("1..0 # SKIP this kernel has no gpio-sim")
+        return 0
+    masks = [("every mask of the vendor's document reaches its lines", document),
+             ("fewer relays, active low, by chip and number; masks without a relay are counted", fewer),
+             ("safe mask: sender dies, hold, park, SIGTERM", every_way_out), ("safe mask: fault", fault)]
+    lines = [("kill -9: the lines fall back", killed), ("a line that another has is named with its owner", taken),
+             ("a line that is not there, a chip that is not there", missing), ("the chip goes while running", unplugged)]
+    for name, case in {"masks": masks, "lines": lines}[sys.argv[2]]:
+        with suite.case(name):
+            case(sys.argv[1])
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
