@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[2]
-WAIT_S = 20  # for anything that has to happen; a loaded machine may take seconds
+WAIT_S = 60  # for anything that has to happen: says that it never will, not that it was slow
 LOOK_S = 0.01  # between two looks whether it has
 
 

@@ -16,7 +16,7 @@ import re
 import subprocess
 import sys
 
-TEST_LIMIT_S = 600
+TEST_LIMIT_S = 900
 
 CTEST_OUTPUT = re.compile(r"^(\d+): ?(.*)$")
 CTEST_RESULT = re.compile(r"^\s*\d+/\d+ Test +#(\d+): (.+?) \.*\s*(.*?)\s+([\d.]+) sec\s*$")
