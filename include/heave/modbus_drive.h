@@ -226,6 +226,9 @@ hv_status_t modbus_drive_init(modbus_drive_t *self, const modbus_drive_map_t *ma
 /** The drives as drives.h wants them. send never says HV_ERR_AGAIN: the newest set-point wins. */
 drives_t modbus_drive_hal(modbus_drive_t *self);
 
+/** True where no drive is still to be written something that stops, resets or starts it: at the end, polls lead there. */
+bool modbus_drive_is_told(const modbus_drive_t *self);
+
 /** Range of a field's values. */
 int64_t modbus_drive_field_min(const modbus_drive_field_t *field);
 int64_t modbus_drive_field_max(const modbus_drive_field_t *field);

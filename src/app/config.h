@@ -9,6 +9,7 @@
 #include <stdio.h>
 
 #include "heave/canraw.h"
+#include "heave/modbus_drive.h"
 #include "heave/settings.h"
 
 #define CONFIG_ADDRESS_MAX 64u  /**< bytes of an address as text, with its NUL */
@@ -26,7 +27,13 @@ typedef struct {
 } config_udp_t;
 
 /** What drives the cylinders. */
-typedef enum { CONFIG_DRIVES_SIM, CONFIG_DRIVES_CIA402, CONFIG_DRIVES_CAN_RAW } config_drives_t;
+typedef enum {
+    CONFIG_DRIVES_SIM,
+    CONFIG_DRIVES_CIA402,
+    CONFIG_DRIVES_CAN_RAW,
+    CONFIG_DRIVES_MODBUS_TCP,
+    CONFIG_DRIVES_MODBUS_RTU
+} config_drives_t;
 
 /** Simulated drives. */
 typedef struct {
@@ -91,6 +98,79 @@ typedef struct {
     q16_t following_error_mm_q16;
     q16_t angle_following_error_deg_q16;
 } config_can_raw_t;
+
+/** A Modbus server: an IPv4 address as text, and its port. */
+typedef struct {
+    char address[16];
+    uint16_t port;
+} config_host_t;
+
+/** One for each drive, or one for all; none where count is 0. */
+typedef struct {
+    uint8_t count;
+    config_host_t host[DRIVES_MAX];
+} config_hosts_t;
+
+#define CONFIG_ITEMS_MAX 12u /**< two lists of a map */
+
+/** What registers have to hold. */
+typedef struct {
+    uint8_t count;
+    modbus_drive_item_t item[CONFIG_ITEMS_MAX];
+} config_items_t;
+
+/** Which registers are read, how single ones are written, what the characters of a line have. */
+typedef enum { CONFIG_READ_HOLDING, CONFIG_READ_INPUT } config_read_t;
+typedef enum { CONFIG_WRITE_MULTIPLE, CONFIG_WRITE_SINGLE } config_write_t;
+typedef enum { CONFIG_PARITY_NONE, CONFIG_PARITY_EVEN, CONFIG_PARITY_ODD } config_parity_t;
+
+/** Who turns a serial line around; in the order of linux_modbus_direction_t. */
+typedef enum { CONFIG_RS485_AUTOMATIC, CONFIG_RS485_KERNEL, CONFIG_RS485_RTS_HIGH, CONFIG_RS485_RTS_LOW } config_rs485_t;
+
+/** Drives on Modbus; what the registers are is in modbus_drive.h. */
+typedef struct {
+    config_ids_t units;
+    uint32_t period_us;
+    uint32_t timeout_ms;
+    uint32_t turnaround_us;
+    uint8_t retries;
+    uint32_t feedback_timeout_ms;
+    config_read_t read;
+    config_write_t write;
+    bool is_broadcast;
+    config_ratios_t counts_per_mm;
+    config_wholes_t zero_counts;
+    config_ratios_t angle_counts_per_deg;
+    config_wholes_t angle_zero_counts;
+    uint32_t speed_counts;
+    config_ratios_t speed_counts_per_mm_s;
+    config_ratios_t angle_speed_counts_per_deg_s;
+    modbus_drive_blocks_t setpoint, feedback;
+    modbus_drive_blocks_t enable, disable, stop, reset, home;
+    canraw_when_t enabled_when, fault_when, homing_done_when, homing_failed_when;
+    config_items_t startup;
+    config_items_t drive_timeout;
+    bool is_drive_timeout_confirmed;
+    q16_t step_mm_q16;
+    q16_t angle_step_deg_q16;
+    q16_t following_error_mm_q16;
+    q16_t angle_following_error_deg_q16;
+} config_modbus_t;
+
+/** Their lines on TCP. */
+typedef struct {
+    config_hosts_t hosts;
+} config_modbus_tcp_t;
+
+/** Their serial line. */
+typedef struct {
+    char device[CONFIG_PATH_MAX];
+    uint32_t baud_bps;
+    config_parity_t parity;
+    uint8_t stop_bits;
+    config_rs485_t rs485;
+    uint32_t rs485_delay_us;
+} config_modbus_rtu_t;
 
 /** Mode of operation of CANopen drives. */
 typedef enum { CONFIG_MODE_CSP, CONFIG_MODE_IP, CONFIG_MODE_PP } config_mode_t;
@@ -197,6 +277,9 @@ typedef struct {
     config_can_t can;
     config_can_raw_t can_raw;
     config_cia402_t cia402;
+    config_modbus_t modbus;
+    config_modbus_tcp_t modbus_tcp;
+    config_modbus_rtu_t modbus_rtu;
     config_relays_t relays;
     config_inputs_t inputs;
 } config_t;
@@ -207,7 +290,7 @@ typedef struct {
  *  @return 0, or the number of errors */
 int config_load(const char *path, config_t *out, FILE *errors);
 
-#define CONFIG_FILE_MAX 65536u /**< bytes of a configuration file */
+#define CONFIG_FILE_MAX 131072u /**< bytes of a configuration file */
 
 /** Loads the file once more while its platform runs, and takes over what may change in operation. Allocates nothing.
  *  @param running  changed only where the whole file is right, and only in keys that may change

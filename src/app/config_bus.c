@@ -68,6 +68,8 @@ void config_bus_describe(const config_t *config, config_bus_t *bus)
         describe_cia402(config, bus);
         break;
     case CONFIG_DRIVES_SIM:
+    case CONFIG_DRIVES_MODBUS_TCP:
+    case CONFIG_DRIVES_MODBUS_RTU:
         break;
     }
 }

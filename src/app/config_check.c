@@ -8,6 +8,7 @@
 #include "config_canraw.h"
 #include "config_cia402.h"
 #include "config_gpio.h"
+#include "config_modbus.h"
 #include "config_source.h"
 #include "config_value.h"
 #include "heave/ramp.h"
@@ -427,6 +428,7 @@ static void check_values(config_source_t *self)
     config_gpio_check(self);
     config_cia402_check(self);
     config_canraw_check(self);
+    config_modbus_check(self);
     config_bus_check(self);
 }
 

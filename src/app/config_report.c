@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "config_bus.h"
+#include "config_modbus.h"
 #include "config_keys.h"
 #include "config_text.h"
 #include "envelope.h"
@@ -82,6 +83,10 @@ static void write_bus(const report_t *self)
 {
     config_bus_t bus;
     config_bus_describe(self->config, &bus);
+    if (config_modbus_is_used(self->config)) {
+        config_modbus_report(self->config, self->out);
+        return;
+    }
     if (bus.section == NULL) {
         fprintf(self->out, "%-24s  0 %% (simulated drives)\n", "bus load");
         return;

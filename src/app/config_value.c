@@ -5,6 +5,7 @@
 #include "config_value.h"
 
 #include "config_value_can.h"
+#include "config_value_modbus.h"
 
 #include <arpa/inet.h>
 #include <string.h>
@@ -486,6 +487,10 @@ bool config_value_parse(const config_key_t *key, const char *text, config_t *con
     case CONFIG_FRAME:
     case CONFIG_WHEN:
         return config_value_can_parse(key, text, field, why);
+    case CONFIG_HOSTS:
+    case CONFIG_BLOCKS:
+    case CONFIG_ITEMS:
+        return config_value_modbus_parse(key, text, field, why);
     }
     return false;
 }

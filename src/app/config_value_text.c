@@ -4,6 +4,7 @@
 #include "config_value.h"
 
 #include "config_value_can.h"
+#include "config_value_modbus.h"
 
 #include <arpa/inet.h>
 #include <inttypes.h>
@@ -154,6 +155,11 @@ void config_value_format(const config_key_t *key, const config_t *config, config
     case CONFIG_WHEN:
         config_value_can_format(key, field, text);
         break;
+    case CONFIG_HOSTS:
+    case CONFIG_BLOCKS:
+    case CONFIG_ITEMS:
+        config_value_modbus_format(key, field, text);
+        break;
     }
 }
 
@@ -249,6 +255,11 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
     case CONFIG_FRAME:
     case CONFIG_WHEN:
         config_value_can_allowed(key, text);
+        break;
+    case CONFIG_HOSTS:
+    case CONFIG_BLOCKS:
+    case CONFIG_ITEMS:
+        config_value_modbus_allowed(key, text);
         break;
     }
 }

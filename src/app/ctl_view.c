@@ -213,11 +213,23 @@ static void draw_report(view_t *self, const cJSON *report, const char *drive)
     end_line(self);
 }
 
+/* A line for drives that share a slow bus: how often each is served. */
+static void draw_service(view_t *self, const cJSON *axis)
+{
+    if (!cJSON_IsNumber(member(axis, "period_ms"))) {
+        return;
+    }
+    put(self, "   %.1f Hz, newest set-point %.0f ms ago", 1000.0 / number(axis, "period_ms"), number(axis, "setpoint_age_ms"));
+    put_piece(self, ", feedback %.0f ms ago", number(axis, "feedback_age_ms"));
+    end_line(self);
+}
+
 static void draw_drive(view_t *self, const cJSON *axis)
 {
     const char *drive = word(axis, "drive");
     put(self, " %s", strcmp(drive, "enabled") == 0 && !cJSON_IsTrue(member(axis, "homed")) ? "no zero" : drive);
     end_line(self);
+    draw_service(self, axis);
     draw_report(self, member(axis, "report"), drive);
 }
 

@@ -102,7 +102,7 @@ static void answer_requests(motion_loop_t *self, motion_result_t *result, unsign
 }
 
 /* The bus' reason, in the words of its backend, which only this thread may read. */
-static void note_bus(motion_view_t *view, const rig_t *rig)
+static void note_bus(motion_view_t *view, rig_t *rig)
 {
     (void)snprintf(view->bus_trouble, sizeof view->bus_trouble, "%s", rig_trouble(rig));
     if (view->bus_trouble[0] != '\0') {

@@ -7,10 +7,14 @@
 
 #include "config_canraw.h"
 #include "config_cia402.h"
+#include "config_modbus.h"
 #include "gpio_setup.h"
 
-#define LEAVE_NS 5000000      /* seven frames, even at 125 kbit/s */
-#define RUN_DIR  "/run/heave" /* where heave-can-flush@.path looks */
+#define LEAVE_NS      5000000 /* seven frames, even at 125 kbit/s */
+#define LEAVE_POLL_NS 1000000 /* between looks whether drives on Modbus have taken what stops them */
+#define LEAVE_POLLS   500u
+#define BROADCAST_US  20000u       /* after a broadcast, for drives to act */
+#define RUN_DIR       "/run/heave" /* where heave-can-flush@.path looks */
 
 #define ANGLE_TRAVEL_DEG 1000000 /* a rotation motor has no stops of its own */
 
@@ -118,6 +122,44 @@ static hv_status_t open_relays(rig_t *self, const config_t *config, gateway_io_t
     return linux_gpio_relays_open(&self->gpio_relays, &relays);
 }
 
+/* A line of Modbus drives: the host of one drive, or of all; or the serial port. */
+static linux_modbus_config_t modbus_line_of(const config_t *config, unsigned line)
+{
+    static const char k_parities[] = {'N', 'E', 'O'};
+    const config_modbus_rtu_t *rtu = &config->modbus_rtu;
+    linux_modbus_config_t modbus = {.timeout_us = config->modbus.timeout_ms * 1000u, .broadcast_pause_us = BROADCAST_US};
+    if (config->drives == CONFIG_DRIVES_MODBUS_TCP) {
+        modbus.host = config->modbus_tcp.hosts.host[line].address;
+        modbus.port = config->modbus_tcp.hosts.host[line].port;
+        return modbus;
+    }
+    modbus.device = rtu->device;
+    modbus.baud_bps = rtu->baud_bps;
+    modbus.parity = k_parities[rtu->parity];
+    modbus.stop_bits = rtu->stop_bits;
+    modbus.direction = (linux_modbus_direction_t)rtu->rs485;
+    modbus.direction_delay_us = rtu->rs485_delay_us;
+    return modbus;
+}
+
+/* A line that cannot be opened stays last, so that it can say why. */
+static hv_status_t open_modbus(rig_t *self, const config_t *config, gateway_io_t *io)
+{
+    hal_modbus_t line[DRIVES_MAX] = {{NULL, NULL}};
+    config_modbus_map(config, &self->modbus_map);
+    for (unsigned i = 0; i < config_modbus_lines(config); i++) {
+        const linux_modbus_config_t modbus = modbus_line_of(config, i);
+        const hv_status_t status = linux_modbus_open(&self->modbus_line[i], &modbus);
+        self->modbus_lines++;
+        if (status != HV_OK) {
+            return status == HV_ERR_ARG ? HV_ERR_RANGE : HV_ERR_IO;
+        }
+        line[i] = linux_modbus_hal(&self->modbus_line[i]);
+    }
+    io->drives = modbus_drive_hal(&self->modbus_drive);
+    return modbus_drive_init(&self->modbus_drive, &self->modbus_map, line);
+}
+
 hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io)
 {
     const uint8_t axes = describe(self, config);
@@ -133,16 +175,46 @@ hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io)
         return open_cia402(self, config, io);
     case CONFIG_DRIVES_CAN_RAW:
         return open_can_raw(self, config, io);
+    case CONFIG_DRIVES_MODBUS_TCP:
+    case CONFIG_DRIVES_MODBUS_RTU:
+        return open_modbus(self, config, io);
     }
     return HV_ERR_RANGE;
 }
 
-const char *rig_trouble(const rig_t *self)
+const char *rig_trouble(rig_t *self)
 {
     if (self->gpio_relays.error_text[0] != '\0') {
         return self->gpio_relays.error_text;
     }
-    return self->is_can_open ? self->can.error_text : "";
+    const char *text = self->is_can_open ? self->can.error_text : "";
+    for (unsigned i = 0; i < self->modbus_lines && text[0] == '\0'; i++) {
+        text = linux_modbus_text(&self->modbus_line[i]);
+    }
+    return text;
+}
+
+/* What stops the drives may be several writes: the driver goes on until all have taken it, or do not answer. */
+static void leave_modbus(rig_t *self)
+{
+    const struct timespec pause = {.tv_nsec = LEAVE_POLL_NS};
+    const drives_t drives = modbus_drive_hal(&self->modbus_drive);
+    drive_feedback_t feedback[DRIVES_MAX];
+    for (unsigned i = 0; i < LEAVE_POLLS && !modbus_drive_is_told(&self->modbus_drive); i++) {
+        (void)nanosleep(&pause, NULL);
+        (void)!drives_poll(drives, self->modbus_drive.now_us + LEAVE_POLL_NS / 1000, feedback);
+    }
+}
+
+static void close_modbus(rig_t *self)
+{
+    if (self->modbus_drive.map != NULL) {
+        leave_modbus(self);
+    }
+    for (unsigned i = 0; i < self->modbus_lines; i++) {
+        linux_modbus_close(&self->modbus_line[i]);
+    }
+    self->modbus_lines = 0;
 }
 
 /* The last frames get their time on the wire: closing drops what waits. */
@@ -156,6 +228,7 @@ static void leave_cia402(rig_t *self)
 void rig_close(rig_t *self, uint16_t safe_mask)
 {
     linux_gpio_relays_close(&self->gpio_relays, safe_mask);
+    close_modbus(self);
     if (self->is_can_open) {
         if (self->cia402.config != NULL) {
             leave_cia402(self);

@@ -8,8 +8,10 @@
 #include "config.h"
 #include "heave/cia402.h"
 #include "heave/gateway.h"
+#include "heave/modbus_drive.h"
 #include "linux_can.h"
 #include "linux_gpio_relays.h"
+#include "linux_modbus.h"
 #include "sim_drives.h"
 #include "sim_inputs.h"
 #include "sim_relays.h"
@@ -30,6 +32,10 @@ typedef struct {
     canraw_t canraw;
     cia402_config_t cia402_config;
     cia402_t cia402;
+    uint8_t modbus_lines; /**< open */
+    linux_modbus_t modbus_line[DRIVES_MAX];
+    modbus_drive_map_t modbus_map;
+    modbus_drive_t modbus_drive;
 } rig_t;
 
 /** Opens what the configuration names and puts the handles into io (its udp and log are left alone).
@@ -39,7 +45,7 @@ hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io) HV_M
 
 /** What is wrong with a device of an open rig, or with the one that could not be opened. The thread that runs the drives.
  *  @return "" where nothing is */
-const char *rig_trouble(const rig_t *self);
+const char *rig_trouble(rig_t *self);
 
 /** Closes; harmless on one that is not open. What a bus has not taken by now is dropped.
  *  @param safe_mask where the relays end */

@@ -127,6 +127,27 @@ static void write_report(json_t *json, const drive_report_t *report, uint64_t no
     json_close(json, '}');
 }
 
+static void write_age(json_t *json, const char *key, uint64_t at_us, uint64_t now_us)
+{
+    if (at_us == 0 || at_us > now_us) {
+        json_null(json, key);
+    } else {
+        json_ms(json, key, now_us - at_us);
+    }
+}
+
+/* How a drive is served; null where its bus has a period of its own, or nothing is known yet. */
+static void write_service(json_t *json, const drive_feedback_t *drive, const drive_report_t *report, uint64_t now_us)
+{
+    if (report->period_us != 0) {
+        json_ms(json, "period_ms", report->period_us);
+    } else {
+        json_null(json, "period_ms");
+    }
+    write_age(json, "setpoint_age_ms", report->setpoint_us, now_us);
+    write_age(json, "feedback_age_ms", drive->has_actual ? drive->actual_us : 0, now_us);
+}
+
 /* Members that every axis has; unit is "mm" or "deg" in the keys. */
 static void write_axis(json_t *json, const snapshot_t *s, unsigned axis, q32_t sent_q32, const char *sent_key,
                        const char *actual_key)
@@ -141,6 +162,7 @@ static void write_axis(json_t *json, const snapshot_t *s, unsigned axis, q32_t s
     json_text(json, "drive", k_drive_states[drive->state]);
     json_bool(json, "homed", drive->is_homed);
     json_number(json, "device_code", drive->fault_code);
+    write_service(json, drive, &s->report[axis], s->now_us);
     write_report(json, &s->report[axis], s->now_us);
 }
 

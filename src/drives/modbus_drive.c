@@ -269,6 +269,16 @@ static void drive_report(void *ctx, uint8_t axis, drive_report_t *out)
     modbus_drive_axis_words(&self->axis[axis], self->map, self->map->axis[axis].unit, out);
 }
 
+bool modbus_drive_is_told(const modbus_drive_t *self)
+{
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        if (self->axis[k].job == MODBUS_DRIVE_JOB_COMMAND) {
+            return false;
+        }
+    }
+    return true;
+}
+
 drives_t modbus_drive_hal(modbus_drive_t *self)
 {
     static const drives_ops_t k_ops = {drive_poll, drive_send, drive_request, drive_count, drive_report, NULL};
