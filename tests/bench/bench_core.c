@@ -4,9 +4,11 @@
  *
  *   bench_core                    the names of all subjects, one a line
  *   bench_core NAME COUNT ROUNDS  ns per run, one line a round, each over COUNT runs; then `single P50 P99 P999`: ns of runs
- * timed one by one, the clock's own time taken off bench_core NAME COUNT         COUNT runs in bench_region(), for callgrind
- * --toggle-collect=bench_region*
+ *                                 timed one by one, the clock's own time taken off; of CAN `frames N`: on the bus in one run
+ *   bench_core NAME COUNT         COUNT runs in bench_region(), for callgrind --toggle-collect=bench_region*
  */
+#include "cia402_slave.h"
+#include "heave/cia402.h"
 #include "rig.h"
 
 #include <math.h>
@@ -21,6 +23,16 @@
 #define RISE_CYCLES 20000u
 #define FLOOD       GATEWAY_DATAGRAMS_PER_CYCLE
 #define PI          3.14159265358979
+
+/* of the CAN subjects */
+#define BUS_CYCLES     4u /* in a period of the bus */
+#define BUS_CYCLE_US   1000u
+#define BEAT_PERIODS   12u /* 48 ms */
+#define COME_UP_CYCLES 5000u
+#define RPDO           0x200u
+#define TPDO           0x180u
+#define HEARTBEAT      0x700u
+#define SYNC           0x080u
 
 /** Everything a subject may need. */
 typedef struct {
@@ -37,6 +49,13 @@ typedef struct {
     pose_t pose[POSES];
     pose_t guess[POSES];
     q32_t extension_mm_q32[POSES][CYLINDERS_MAX];
+    sim_can_bus_t bus;
+    sim_can_t master;
+    cia402_config_t can_config;
+    cia402_t can;
+    cia402_slave_t drives; /**< brings the driver up; afterwards the bench answers for it, at less cost */
+    drive_feedback_t feedback[DRIVES_MAX];
+    can_frame_t answer[DRIVES_MAX]; /**< what each drive says to SYNC */
     uint64_t random;
     uint64_t sum; /**< of results, so that none is computed in vain */
 } bench_t;
@@ -318,7 +337,175 @@ static void set_up_a7_frames(bench_t *b)
     }
 }
 
+/* --- Drives on CAN --- */
+
+static void configure_can(bench_t *b)
+{
+    b->can_config = (cia402_config_t){.axes = DRIVES_MAX,
+                                      .master_node = 127,
+                                      .mode = CIA402_MODE_CSP,
+                                      .period_us = BUS_CYCLES * BUS_CYCLE_US,
+                                      .heartbeat_ms = 50,
+                                      .heartbeat_timeout_ms = 150,
+                                      .sdo_timeout_ms = 50,
+                                      .boot_timeout_ms = 500,
+                                      .power_timeout_ms = 300,
+                                      .window_ms = 20,
+                                      .abort_option = 1};
+    for (unsigned k = 0; k < DRIVES_MAX; k++) {
+        b->can_config.axis[k] = (cia402_axis_config_t){.node = (uint8_t)(k + 1),
+                                                       .scale = {131072, 10, 0},
+                                                       .step_max_q32 = 2 * Q32_ONE,
+                                                       .following_max_q32 = 10 * Q32_ONE,
+                                                       .window_counts = 131072};
+    }
+}
+
+static bool are_all(const bench_t *b, drive_state_t state)
+{
+    for (unsigned k = 0; k < DRIVES_MAX; k++) {
+        if (b->feedback[k].state != state) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void drive_cycle(bench_t *b)
+{
+    const drives_t can = cia402_hal(&b->can);
+    (void)!drives_poll(can, b->now_us, b->feedback);
+    (void)!drives_send(can, b->now_us, b->setpoint_q32);
+}
+
+static void come_up_cycle(bench_t *b)
+{
+    cia402_slave_step(&b->drives, b->now_us += BUS_CYCLE_US);
+    drive_cycle(b);
+}
+
+/* With set-points on the actual positions. */
+static void await(bench_t *b, drive_state_t state)
+{
+    for (unsigned i = 0; i < COME_UP_CYCLES && !are_all(b, state); i++) {
+        come_up_cycle(b);
+        for (unsigned k = 0; k < DRIVES_MAX; k++) {
+            b->setpoint_q32[k] = b->feedback[k].actual_mm_q32;
+        }
+    }
+    if (!are_all(b, state)) {
+        fail("the drives on CAN do not come up");
+    }
+}
+
+/* The next cycle begins a period, so that each run is a whole one. */
+static void reach_period(bench_t *b)
+{
+    const uint32_t before = b->can.syncs;
+    while (b->can.syncs == before) {
+        come_up_cycle(b);
+    }
+    for (unsigned cycle = 1; cycle < BUS_CYCLES; cycle++) {
+        come_up_cycle(b);
+    }
+}
+
+static void set_up_can(bench_t *b)
+{
+    hal_can_filter_t filter[CIA402_FILTERS_MAX];
+    configure_can(b);
+    sim_can_bus_init(&b->bus, 0, NULL, 0);
+    cia402_slave_open(&b->drives, &b->bus);
+    const uint32_t filters = cia402_filters(&b->can_config, filter);
+    if (sim_can_open(&b->master, &b->bus, filter, filters) != HV_OK ||
+        cia402_init(&b->can, &b->can_config, sim_can_hal(&b->master)) != HV_OK) {
+        fail("the drives on CAN do not start");
+    }
+    await(b, DRIVE_DISABLED);
+    if (drives_request(cia402_hal(&b->can), DRIVES_ENABLE) != HV_OK) {
+        fail("the drives on CAN cannot be enabled");
+    }
+    await(b, DRIVE_ENABLED);
+    reach_period(b);
+    for (unsigned k = 0; k < DRIVES_MAX; k++) {
+        const cia402_axis_t *axis = &b->can.axis[k];
+        const uint32_t at = (uint32_t)axis->actual_counts;
+        b->answer[k] = (can_frame_t){.id = TPDO + k + 1,
+                                     .length = 7,
+                                     .data = {(uint8_t)axis->statusword, (uint8_t)(axis->statusword >> 8), (uint8_t)at,
+                                              (uint8_t)(at >> 8), (uint8_t)(at >> 16), (uint8_t)(at >> 24), CIA402_MODE_CSP}};
+    }
+    b->bus.frames = 0;
+}
+
+static void say_as_drives(bench_t *b, const can_frame_t *frame)
+{
+    if (hal_can_send(sim_can_hal(&b->drives.node), frame) != HV_OK) {
+        fail("no room for the drives' answers");
+    }
+}
+
+/* What seven drives without any lag say: positions to SYNC, and heartbeats. */
+static void answer_as_drives(bench_t *b, unsigned n)
+{
+    can_frame_t frame;
+    uint64_t at_us = 0;
+    while (hal_can_recv(sim_can_hal(&b->drives.node), &frame, &at_us) == HV_OK) {
+        if (frame.id == SYNC) {
+            for (unsigned k = 0; k < DRIVES_MAX; k++) {
+                say_as_drives(b, &b->answer[k]);
+            }
+        } else if (frame.id - RPDO - 1 < DRIVES_MAX) {
+            memcpy(&b->answer[frame.id - RPDO - 1].data[2], &frame.data[2], 4);
+        }
+    }
+    for (unsigned k = 0; k < DRIVES_MAX && n % BEAT_PERIODS == 0; k++) {
+        const can_frame_t beat = {.id = HEARTBEAT + k + 1, .length = 1, .data = {5}};
+        say_as_drives(b, &beat);
+    }
+}
+
 /* --- One run of each subject; n counts them --- */
+
+/* Four cycles: a SYNC, seven set-points of a slow movement, their echoes, seven answers, and now and then heartbeats. */
+static void run_can(bench_t *b, unsigned n)
+{
+    for (unsigned cycle = 0; cycle < BUS_CYCLES; cycle++) {
+        b->now_us += BUS_CYCLE_US;
+        for (unsigned k = 0; k < DRIVES_MAX; k++) {
+            b->setpoint_q32[k] += (n & 1024u) != 0 ? -Q32_ONE / 50 : Q32_ONE / 50;
+        }
+        sim_can_bus_step(&b->bus, b->now_us);
+        drive_cycle(b);
+        sim_can_bus_step(&b->bus, b->now_us);
+        if (cycle == 0) {
+            answer_as_drives(b, n);
+        }
+    }
+}
+
+/* The same frames on the same bus without the driver. */
+static void run_wire(bench_t *b, unsigned n)
+{
+    const hal_can_t master = sim_can_hal(&b->master);
+    can_frame_t frame = {.id = SYNC};
+    uint64_t at_us = 0;
+    for (unsigned cycle = 0; cycle < BUS_CYCLES; cycle++) {
+        b->now_us += BUS_CYCLE_US;
+        sim_can_bus_step(&b->bus, b->now_us);
+        while (hal_can_recv(master, &frame, &at_us) == HV_OK) {
+            b->sum += frame.data[2];
+        }
+        for (unsigned k = 0; k <= DRIVES_MAX && cycle == 0; k++) {
+            frame = (can_frame_t){.id = k == 0 ? SYNC : RPDO + k, .length = k == 0 ? 0 : 6, .data = {0x1F, 0, (uint8_t)n}};
+            b->sum += (uint64_t)hal_can_send(master, &frame);
+        }
+        sim_can_bus_step(&b->bus, b->now_us);
+        if (cycle == 0) {
+            answer_as_drives(b, n);
+        }
+    }
+}
 
 static void run_rest(bench_t *b, unsigned n)
 {
@@ -403,12 +590,19 @@ typedef struct {
 } subject_t;
 
 static const subject_t k_subjects[] = {
-    {"cycle-rest", set_up_rest, run_rest},          {"cycle-stream", set_up_stream, run_stream},
-    {"motion-stream", set_up_motion, run_motion},   {"cycle-hostile", set_up_hostile, run_hostile},
-    {"cycle-flood", set_up_hostile, run_flood},     {"frame-vendor", set_up_vendor_frames, run_frame},
-    {"frame-a6", set_up_a6_frames, run_frame},      {"frame-a7", set_up_a7_frames, run_frame},
-    {"inverse", make_poses, run_inverse},           {"forward-warm", make_poses, run_forward},
+    {"cycle-rest", set_up_rest, run_rest},
+    {"cycle-stream", set_up_stream, run_stream},
+    {"motion-stream", set_up_motion, run_motion},
+    {"cycle-hostile", set_up_hostile, run_hostile},
+    {"cycle-flood", set_up_hostile, run_flood},
+    {"frame-vendor", set_up_vendor_frames, run_frame},
+    {"frame-a6", set_up_a6_frames, run_frame},
+    {"frame-a7", set_up_a7_frames, run_frame},
+    {"inverse", make_poses, run_inverse},
+    {"forward-warm", make_poses, run_forward},
     {"forward-cold", make_poses, run_forward_cold},
+    {"can-period", set_up_can, run_can},
+    {"can-wire", set_up_can, run_wire},
 };
 
 /* --- Measuring --- */
@@ -464,6 +658,17 @@ static void time_singles(const subject_t *subject, bench_t *b, unsigned first, u
     free(took);
 }
 
+/* Nothing has been measured that was not at work. */
+static void print_frames(const subject_t *subject, const bench_t *b, unsigned runs)
+{
+    if (subject->set_up == set_up_can) {
+        printf("frames %.3f\n", (double)b->bus.frames / runs);
+    }
+    if (subject->run == run_can && !are_all(b, DRIVE_ENABLED)) {
+        fail("the drives on CAN have been lost");
+    }
+}
+
 static void time_rounds(const subject_t *subject, bench_t *b, unsigned count, unsigned rounds)
 {
     bench_region(subject, b, 0, count); /* warms up */
@@ -473,6 +678,7 @@ static void time_rounds(const subject_t *subject, bench_t *b, unsigned count, un
         printf("%.3f\n", (clock_ns() - start) / count);
     }
     time_singles(subject, b, (rounds + 1) * count, count);
+    print_frames(subject, b, (rounds + 2) * count);
 }
 
 static const subject_t *find_subject(const char *name)

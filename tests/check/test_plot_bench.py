@@ -362,6 +362,13 @@ def check_programs(suite, heaved, bench_core):
         for name in names:
             row_of_figures = bench_cost.timed(bench_core, name, 20, 2)
             assert row_of_figures["ns_min"] > 0 and len(row_of_figures["single_ns"]) == 3, row_of_figures
+    with suite.case("what the driver of CANopen drives costs is the bus period without the bus"):
+        period = {"single_ns": {"p50": 5000}, "frames": 16, "instructions": 20000}
+        wire = {"single_ns": {"p50": 1000}, "frames": 16, "instructions": 4000}
+        line = bench_cost.can_summary(period, wire)
+        for part in ("4000 ns", "0.10% of 4 ms", "250 ns, 1000 instructions a frame", "4.00 million frames/s", "carries 4000 frames/s"):
+            assert part in line, line
+        assert "instructions" not in bench_cost.can_summary({**period, "instructions": None}, {**wire, "instructions": None})
     with suite.case("a percentile is a value that was measured"):
         assert bench_cost.percentile([3, 1, 2], 95) == 3
         assert bench_cost.percentile(list(range(1, 101)), 95) == 95

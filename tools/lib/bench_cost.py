@@ -22,6 +22,8 @@ SUBJECTS = {
     "inverse": (4096, 4096, "inverse kinematics of a hexapod"),
     "forward-warm": (4096, 2048, "forward kinematics, from 0.5 mm and 0.05 deg beside"),
     "forward-cold": (4096, 2048, "forward kinematics, from pose zero"),
+    "can-period": (2000, 2000, "bus period (4 cycles) of 6+1 CiA 402 drives, simulated bus"),
+    "can-wire": (2000, 2000, "of it the simulated bus and its peers"),
 }
 CYCLE_NS = 1_000_000
 GOAL_NS = 5000  # of motion-stream
@@ -47,10 +49,10 @@ def percentile(values, share):
 
 def timed(program, name, runs, rounds):
     lines = _output(program, name, runs, rounds).split("\n")
-    values = [float(line) for line in lines if line and not line.startswith("single")]
-    single = [float(part) for line in lines if line.startswith("single") for part in line.split()[1:]]
+    values = [float(line) for line in lines if line[:1].isdigit()]
+    words = {line.split()[0]: [float(part) for part in line.split()[1:]] for line in lines if line[:1].isalpha()}
     return {"rounds": rounds, "runs_per_round": runs, "ns_median": statistics.median(values), "ns_min": min(values), "ns_p95": percentile(values, 95),
-            "single_ns": dict(zip(("p50", "p99", "p999"), single))}
+            "single_ns": dict(zip(("p50", "p99", "p999"), words["single"])), **({"frames": words["frames"][0]} if "frames" in words else {})}
 
 
 def instructions(program, name, runs):
@@ -72,6 +74,15 @@ def processor():
             return next((line.split(":", 1)[1].strip() for line in file if line.startswith("model name")), "unknown")
     except OSError:
         return "unknown"
+
+
+def can_summary(period, wire):
+    """What the driver does for each frame: the period without what only simulates its surroundings. Of runs timed one by one, which other work disturbs least."""
+    driver_ns, frames = period["single_ns"]["p50"] - wire["single_ns"]["p50"], period["frames"]
+    counted = "" if period["instructions"] is None else f", {(period['instructions'] - wire['instructions']) / frames:.0f} instructions"
+    return (f"driver of 6+1 CiA 402 drives: {driver_ns:.0f} ns a bus period of {frames:.1f} frames, {driver_ns / (4 * CYCLE_NS):.2%} of 4 ms; "
+            f"{driver_ns / frames:.0f} ns{counted} a frame, {1e9 * frames / driver_ns / 1e6:.2f} million frames/s where nothing else were to do; "
+            f"the bus carries {frames / 0.004:.0f} frames/s")
 
 
 def run(program, rounds, as_json, say, out=sys.stdout):
@@ -100,5 +111,7 @@ def run(program, rounds, as_json, say, out=sys.stdout):
         counted = "" if motion["instructions"] is None else f", {motion['instructions']:.0f} instructions"
         print(f"\nplanning, kinematics and limiting of 6+1 axes: {motion['ns_median']:.0f} ns a cycle, {motion['ns_median'] / CYCLE_NS:.2%} of 1 ms, "
               f"{motion['ns_median'] / GOAL_NS:.0%} of the {GOAL_NS / 1000:.0f} us aimed at{counted}", file=out)
+        print(can_summary(result["subjects"]["can-period"], result["subjects"]["can-wire"]), file=out)
         print("instructions: callgrind, mean over " + ", ".join(f"{counted} ({name})" for name, (_, counted, _) in SUBJECTS.items())
-              + "\nThe gateway stands between devices that do nothing; a cycle of the stream includes its share of frames.", file=out)
+              + "\nThe gateway stands between devices that do nothing; a cycle of the stream includes its share of frames. A bus period: SYNC, seven set-points, "
+              "their echoes, seven answers, heartbeats.", file=out)
