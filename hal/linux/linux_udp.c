@@ -4,6 +4,7 @@
 #include "linux_udp.h"
 
 #include <errno.h>
+#include <linux/sock_diag.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <stdio.h>
@@ -84,7 +85,13 @@ static hv_status_t udp_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t 
 
 static hv_status_t udp_dropped(void *ctx, uint32_t *datagrams)
 {
-    const linux_udp_t *self = ctx;
+    linux_udp_t *self = ctx;
+    uint32_t info[SK_MEMINFO_VARS];
+    socklen_t size = sizeof info;
+    /* also where nothing comes through any more that could tell it */
+    if (getsockopt(self->fd, SOL_SOCKET, SO_MEMINFO, info, &size) == 0 && size > SK_MEMINFO_DROPS * sizeof info[0]) {
+        self->dropped = info[SK_MEMINFO_DROPS];
+    }
     *datagrams = self->dropped;
     return HV_OK;
 }

@@ -16,9 +16,11 @@
 #include <unistd.h>
 
 #include "control.h"
+#include "flood.h"
 #include "linux_clock.h"
 #include "linux_log.h"
 #include "linux_udp.h"
+#include "linux_udp_filter.h"
 #include "manager.h"
 #include "metrics.h"
 #include "motion_loop.h"
@@ -39,8 +41,9 @@ typedef struct {
     config_t config; /**< as it was, with what reloads changed */
     manager_t manager;
     metrics_t metrics;
+    flood_t flood;
     blackbox_t blackbox;
-    motion_view_words_t view; /**< for the manager and the metrics */
+    motion_view_words_t view; /**< for the manager, the metrics and the watch over floods */
     linux_udp_t udp;
     linux_log_t log;
     int signal_fd;
@@ -141,6 +144,56 @@ static int close_file(out_file_t *file, const char *path, const ring_t *ring, co
     return is_whole ? EXIT_DONE : say(EXIT_IO, "%s: %s", path, strerror(file->error));
 }
 
+/* --- Floods --- */
+
+/* Only what no frame begins with: the scanner passes over blanks and ends of lines. */
+static linux_udp_filter_t filter_of(const config_t *config)
+{
+    static const uint8_t k_v3[] = {'@', ' ', '\t', '\r', '\n', '\0'};
+    static const uint8_t k_lenient[] = {'@', '#', 'A', 'C', 'a', 'c', ' ', '\t', '\r', '\n', '\0'};
+    const bool is_lenient = config->settings.dialect == FRAME_LENIENT;
+    return (linux_udp_filter_t){.heads = is_lenient ? k_lenient : k_v3,
+                                .head_count = is_lenient ? sizeof k_lenient : sizeof k_v3,
+                                .bytes_max = GATEWAY_DATAGRAM_MAX,
+                                .allow = config->udp.allow};
+}
+
+/* Says what becomes of useless datagrams from now on. */
+static void set_filter(live_t *self)
+{
+    if (!self->flood.is_on) {
+        linux_udp_filter_off(&self->udp);
+        (void)say(0, "the flood is over: rejected frames are told again");
+        return;
+    }
+    const linux_udp_filter_t filter = filter_of(&self->config);
+    if (linux_udp_filter_on(&self->udp, &filter) == HV_OK) {
+        (void)say(0,
+                  "a flood of useless datagrams: what cannot be a frame, or comes from a sender that is not allowed, is dropped "
+                  "in the kernel and counted as lost there until it is over");
+    } else {
+        (void)say(0, "a flood of useless datagrams, and the kernel takes no filter against it: %s", strerror(errno));
+    }
+}
+
+static uint32_t useless(const motion_view_t *view)
+{
+    const counters_t *counters = &view->snapshot.counters;
+    uint32_t count = view->udp_refused + view->udp_dropped + counters->oversize;
+    for (unsigned i = 0; i < FRAME_ERRORS; i++) {
+        count += counters->rejected[i];
+    }
+    return count;
+}
+
+static void watch_floods(live_t *self, uint64_t now)
+{
+    if (flood_judge(&self->flood, useless(&self->view.view), now)) {
+        set_filter(self);
+        self->control.lost.is_flood = self->flood.is_on;
+    }
+}
+
 /* --- Signals --- */
 
 static bool open_signals(live_t *self)
@@ -167,6 +220,9 @@ static void reload(live_t *self)
         (void)say(0, "too many reloads at once: send SIGHUP again");
     } else {
         (void)say(0, "%s has been read again", self->options->config);
+        if (self->flood.is_on) {
+            set_filter(self);
+        }
     }
 }
 
@@ -202,6 +258,7 @@ static uint64_t now_us(const live_t *self)
 static void tell_others(live_t *self)
 {
     if (seqlock_read(&self->loop.view, self->view.word)) {
+        watch_floods(self, now_us(self));
         manager_serve(&self->manager, &self->view.view.snapshot, now_us(self));
         metrics_serve(&self->metrics, &self->view.view, &self->config, &self->loop.times, now_us(self));
     }

@@ -86,7 +86,8 @@ static void put_frames(sheet_t *self, const motion_view_t *view)
 {
     const counters_t *c = &view->snapshot.counters;
     whole(self, "udp_datagrams_total", "counter", "datagrams read", c->datagrams);
-    whole(self, "udp_dropped_total", "counter", "datagrams the kernel lost because its queue was full", view->udp_dropped);
+    whole(self, "udp_dropped_total", "counter", "datagrams the kernel lost: its queue was full, or there was a flood",
+          view->udp_dropped);
     whole(self, "udp_refused_total", "counter", "datagrams of senders that are not allowed", view->udp_refused);
     whole(self, "udp_other_sender_total", "counter", "valid frames of senders that do not drive", c->other_sender);
     whole(self, "owner_changes_total", "counter", "take-overs by another sender", c->owner_changes);
@@ -166,6 +167,9 @@ static void put_relays(sheet_t *self, const snapshot_t *s)
     whole(self, "relay_missing_total", "counter", "masks that set a relay this platform does not have",
           s->counters.relay_missing);
     whole(self, "relay_errors_total", "counter", "masks that could not be written", s->counters.relay_errors);
+    whole(self, "relay_cut_total", "counter", "relays opened because they were closed for max_on_ms", s->counters.relay_cut);
+    whole(self, "relay_delayed_total", "counter", "changes of relays that had to wait for min_toggle_ms",
+          s->counters.relay_delayed);
 }
 
 /* Percentiles, as a summary: the bins are finer than anything a collector wants to store. */

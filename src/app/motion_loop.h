@@ -21,7 +21,7 @@
 typedef struct {
     snapshot_t snapshot;
     uint32_t udp_refused; /**< datagrams of senders that are not allowed */
-    uint32_t udp_dropped; /**< datagrams the kernel lost because its queue was full */
+    uint32_t udp_dropped; /**< datagrams the kernel lost because its queue was full, or dropped in a flood */
     bool is_realtime;     /**< scheduled before everything else */
     bool is_shutting_down;
     char bus_trouble[RIG_TROUBLE_SIZE];      /**< what is wrong with the drives' bus now, "" = nothing */

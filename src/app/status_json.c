@@ -353,6 +353,7 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     write_stream(json, s);
     write_owner(json, "sender", &s->owner, s->now_us);
     write_owner(json, "other_sender", &s->other, s->now_us);
+    json_bool(json, "flood", lost->is_flood);
     write_counters(json, view);
     write_fault_counts(json, s);
     write_program(json, view, config, lost, times);

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "linux_udp.h"
+#include "linux_udp_filter.h"
 #include "sim_udp.h"
 
 /** A backend under test. */
@@ -408,6 +409,154 @@ static void test_linux_close_twice_and_recv_after_it_do_no_harm(void)
     TEST_ASSERT_EQUAL(EBADF, lin.error);
 }
 
+/* Filters, on sockets of both families. */
+
+static const uint8_t k_heads[] = {'@', ' ', 0};
+
+static linux_udp_filter_t filter_of(const hal_udp_network_t *networks, uint8_t count)
+{
+    linux_udp_filter_t filter = {.heads = k_heads, .head_count = sizeof k_heads, .bytes_max = 100, .allow = {.count = count}};
+    memcpy(filter.allow.network, networks, count * sizeof networks[0]);
+    return filter;
+}
+
+/* Sends it, and then what shows that it would have come. */
+static void assert_comes(const void *data, size_t length, bool does_come)
+{
+    uint32_t before, after;
+    TEST_ASSERT_EQUAL(HV_OK, hal_udp_dropped(hal, &before));
+    const hal_udp_peer_t peer = send_linux(data, length);
+    if (does_come) {
+        assert_received(data, length, &peer);
+    }
+    (void)send_linux("@", 1);
+    assert_received("@", 1, &peer);
+    TEST_ASSERT_EQUAL(HV_OK, hal_udp_dropped(hal, &after));
+    TEST_ASSERT_EQUAL_UINT32(does_come ? 0 : 1, after - before);
+}
+
+static void test_filter_head_byte_decides(void)
+{
+    const linux_udp_filter_t filter = filter_of(NULL, 0);
+    TEST_ASSERT_EQUAL(HV_OK, linux_udp_filter_on(&lin, &filter));
+    for (unsigned byte = 0; byte < 256; byte++) {
+        const uint8_t data[2] = {(uint8_t)byte, '@'};
+        assert_comes(data, sizeof data, memchr(k_heads, (int)byte, sizeof k_heads) != NULL);
+    }
+    assert_comes("", 0, false);
+    linux_udp_filter_off(&lin);
+    linux_udp_filter_off(&lin);
+    assert_comes("x", 1, true);
+    assert_comes("", 0, true);
+}
+
+static void test_filter_length_decides(void)
+{
+    static const uint8_t k_data[1400] = {'@'};
+    const linux_udp_filter_t filter = filter_of(NULL, 0);
+    TEST_ASSERT_EQUAL(HV_OK, linux_udp_filter_on(&lin, &filter));
+    assert_comes(k_data, 99, true);
+    assert_comes(k_data, 100, true);
+    assert_comes(k_data, 101, false);
+    assert_comes(k_data, sizeof k_data, false);
+}
+
+/* So many are dropped from now on, and nothing comes through; known although nothing does. */
+static void assert_dropped(uint32_t before, uint32_t count)
+{
+    uint32_t dropped = before;
+    for (unsigned i = 0; i < 100 && dropped - before < count; i++) {
+        if (i > 0) {
+            wait_linux();
+        }
+        TEST_ASSERT_EQUAL(HV_OK, hal_udp_dropped(hal, &dropped));
+    }
+    TEST_ASSERT_EQUAL_UINT32(count, dropped - before);
+    assert_none_waiting();
+}
+
+static void test_filter_drops_are_counted_at_once(void)
+{
+    const linux_udp_filter_t filter = filter_of(NULL, 0);
+    TEST_ASSERT_EQUAL(HV_OK, linux_udp_filter_on(&lin, &filter));
+    for (unsigned i = 0; i < 7; i++) {
+        (void)send_linux("junk", 4);
+    }
+    assert_dropped(0, 7);
+}
+
+/* The sender's own network of every length, alone, behind others, and with each of its bits wrong. */
+static void test_filter_networks_decide(void)
+{
+    const hal_udp_peer_t me = send_linux("@", 1);
+    const unsigned bits = me.is_ipv6 ? 128 : 32;
+    assert_received("@", 1, &me);
+    for (unsigned prefix = 0; prefix <= bits; prefix++) {
+        hal_udp_network_t list[HAL_UDP_NETWORKS_MAX];
+        for (unsigned i = 0; i < HAL_UDP_NETWORKS_MAX - 1u; i++) { /* nobody's, of both families */
+            list[i] = (hal_udp_network_t){.is_ipv6 = i % 2 != 0, .prefix = (uint8_t)(8u + i), .address = {0xFE, 0x77}};
+        }
+        hal_udp_network_t *mine = &list[HAL_UDP_NETWORKS_MAX - 1u];
+        *mine = (hal_udp_network_t){.is_ipv6 = me.is_ipv6, .prefix = (uint8_t)prefix};
+        memcpy(mine->address, me.address, sizeof me.address);
+        if (prefix < bits) { /* a bit that does not count */
+            mine->address[prefix / 8] ^= (uint8_t)(0x80u >> prefix % 8);
+        }
+        linux_udp_filter_t filter = filter_of(list, HAL_UDP_NETWORKS_MAX);
+        TEST_ASSERT_EQUAL(HV_OK, linux_udp_filter_on(&lin, &filter));
+        assert_comes("@x", 2, true);
+        assert_comes("x", 1, false);
+        if (prefix > 0) { /* the last bit that counts: nobody comes through */
+            uint32_t before;
+            mine->address[(prefix - 1) / 8] ^= (uint8_t)(0x80u >> (prefix - 1) % 8);
+            filter = filter_of(list, HAL_UDP_NETWORKS_MAX);
+            TEST_ASSERT_EQUAL(HV_OK, hal_udp_dropped(hal, &before));
+            TEST_ASSERT_EQUAL(HV_OK, linux_udp_filter_on(&lin, &filter));
+            (void)send_linux("@", 1);
+            assert_dropped(before, 1);
+        }
+    }
+}
+
+static void test_filter_other_family_does_not_come(void)
+{
+    const hal_udp_peer_t me = send_linux("@", 1);
+    assert_received("@", 1, &me);
+    const hal_udp_network_t list[] = {{.is_ipv6 = !me.is_ipv6, .prefix = 0}};
+    const linux_udp_filter_t filter = filter_of(list, 1);
+    TEST_ASSERT_EQUAL(HV_OK, linux_udp_filter_on(&lin, &filter));
+    (void)send_linux("@", 1);
+    assert_dropped(0, 1);
+}
+
+static void test_filter_what_is_out_of_range_is_refused(void)
+{
+    const hal_udp_network_t too_long = {.prefix = 33};
+    linux_udp_filter_t filter = filter_of(&too_long, 1);
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, linux_udp_filter_on(&lin, &filter));
+    filter = filter_of(NULL, 0);
+    filter.head_count = 0;
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, linux_udp_filter_on(&lin, &filter));
+    filter.head_count = LINUX_UDP_FILTER_HEADS_MAX + 1u;
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, linux_udp_filter_on(&lin, &filter));
+    filter = filter_of(NULL, 0);
+    filter.allow.count = HAL_UDP_NETWORKS_MAX + 1u;
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, linux_udp_filter_on(&lin, &filter));
+    linux_udp_close(&lin);
+    filter = filter_of(NULL, 0);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, linux_udp_filter_on(&lin, &filter));
+}
+
+static void run_filter(void)
+{
+    RUN_TEST(test_filter_head_byte_decides);
+    RUN_TEST(test_filter_length_decides);
+    RUN_TEST(test_filter_drops_are_counted_at_once);
+    RUN_TEST(test_filter_networks_decide);
+    RUN_TEST(test_filter_other_family_does_not_come);
+    RUN_TEST(test_filter_what_is_out_of_range_is_refused);
+}
+
 static void run_sim(void)
 {
     RUN_TEST(test_sim_recv_failing_at_every_step_loses_nothing);
@@ -437,5 +586,10 @@ int main(void)
     fixture = &k_fixtures[1];
     contract_backend = fixture->name;
     run_linux();
+    for (size_t i = 1; i < sizeof k_fixtures / sizeof k_fixtures[0]; i++) {
+        fixture = &k_fixtures[i];
+        contract_backend = fixture->name;
+        run_filter();
+    }
     return UNITY_END();
 }

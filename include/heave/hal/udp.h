@@ -65,7 +65,8 @@ static inline HV_MUST_CHECK hv_status_t hal_udp_recv(hal_udp_t udp, uint8_t *buf
     return udp.ops->recv(udp.ctx, buffer, capacity, length, from);
 }
 
-/** Datagrams lost since the open because the receive queue was full; as known at the last successful recv. Never blocks.
+/** Datagrams lost since the open because the receive queue was full, or dropped by a filter in front of it; as known at the last
+ *  successful recv, or later. Never blocks.
  *  @return HV_OK; HV_ERR_NOSUP where the backend cannot know. */
 static inline HV_MUST_CHECK hv_status_t hal_udp_dropped(hal_udp_t udp, uint32_t *datagrams)
 {

@@ -1,0 +1,173 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_flood.py BIN - useless datagrams as fast as a process can send them, beside a good stream: the stream is followed within the limits, and what
+is useless is kept from the program until it is over."""
+import argparse
+import contextlib
+import math
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import heave
+import tap
+
+# Sends blocks until it has sent enough and its standard input is closed; then says how many that were.
+FLOOD = """
+import select, socket, sys
+source, port, least = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+payloads = [bytes.fromhex(text) for text in sys.argv[4:]]
+link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+link.bind((source, 0))
+link.connect(("127.0.0.1", port))
+sent = 0
+while sent < least or not select.select([sys.stdin], [], [], 0)[0]:
+    for _ in range(1000 // len(payloads)):
+        for payload in payloads:
+            link.send(payload)
+            sent += 1
+print(sent)
+"""
+GARBAGE = [b"\x80\x21" * 30, b"hello", bytes(range(1, 9)), b"{\"speed\": 1}", b"@A6:1" * 200]
+STRANGER = [b"@A6:9,9,9,50,50,50,FFF#", b"@A6T:9,9,9,50,50,50,0#"]
+
+
+def wave(t):
+    return f"@A6:{3 * math.sin(t):.3f},{2 * math.sin(1.3 * t):.3f},0,0,0,{10 * math.sin(0.7 * t):.3f},0#"
+
+
+class Stream(threading.Thread):
+    """The good sender, at 50 Hz until the end."""
+
+    def __init__(self, bench):
+        super().__init__()
+        self.sender = bench.sender()
+        self.sent = 0
+        self.is_over = threading.Event()
+
+    def run(self):
+        while not self.is_over.is_set():
+            self.sender.send(wave(0.02 * self.sent))
+            self.sent += 1
+            time.sleep(0.02)
+
+    def end(self):
+        if self.is_alive():
+            self.is_over.set()
+            self.join()
+        self.sender.link.close()
+
+
+@contextlib.contextmanager
+def streaming(bench):
+    stream = Stream(bench)
+    stream.start()
+    try:
+        yield stream
+    finally:
+        stream.end()
+
+
+@contextlib.contextmanager
+def flooding(bench, source, at_least, payloads):
+    command = [sys.executable, "-c", FLOOD, source, str(bench.port), str(at_least), *(payload.hex() for payload in payloads)]
+    child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    try:
+        yield child
+    finally:
+        child.kill()
+        child.communicate()
+
+
+def counted(counters):
+    """(followed frames, useless datagrams that the program has seen)"""
+    followed = sum(counters["accepted"].values())
+    return followed, counters["datagrams"] - followed + counters["refused_senders"]
+
+
+def settled(bench):
+    """The counters, once nothing useless comes through any more."""
+    def look():
+        before = counted(bench.status()["counters"])[1]
+        time.sleep(0.2)
+        now = bench.status()["counters"]
+        return now if counted(now)[1] == before else None
+    return heave.wait_for(look, "the program sees no more of the flood")
+
+
+def lost_on_the_way():
+    """What the kernel has lost before it came to any socket."""
+    return [line.split()[1] for line in Path("/proc/net/softnet_stat").read_text(encoding="ascii").splitlines()]
+
+
+def check_limits(config, trace):
+    run = subprocess.run([sys.executable, heave.TOP / "tools/check_trace", config, trace], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    assert run.returncode == 0, run.stdout
+
+
+def is_kept_out(bench, source, at_least, payloads, **changes):
+    config, trace = bench.write_config("flood.ini", **changes), bench.folder / "live.csv"
+    daemon = bench.start("--trace", trace, config=config)
+    bench.wait_state("ENGAGED")
+    with streaming(bench) as stream:
+        heave.wait_for(lambda: counted(bench.status()["counters"])[0] > 10, "the stream is followed")
+        assert bench.status()["flood"] is False
+        on_the_way = lost_on_the_way()
+        with flooding(bench, source, at_least, payloads) as child:
+            heave.wait_for(lambda: bench.status()["flood"], "the flood is noticed")
+            first, sent = settled(bench), stream.sent
+            heave.wait_for(lambda: stream.sent >= sent + 100, "the stream goes on in the flood")
+            useless = int(child.communicate(input="")[0])
+        last = settled(bench)
+        was_kept_out = "is over" not in daemon.log.read_text()
+        stream.end()
+        is_all_there = on_the_way == lost_on_the_way()
+        if was_kept_out and is_all_there:  # the queue was the stream's alone
+            heave.wait_for(lambda: counted(bench.status()["counters"])[0] - counted(first)[0] >= stream.sent - sent - 1, "every frame sent since then")
+        end = bench.status()["counters"]
+        followed, seen = counted(end)
+        assert followed <= stream.sent and useless >= at_least, (useless, stream.sent, end)
+        assert seen + followed + end["lost_in_kernel"] <= useless + stream.sent, (useless, stream.sent, end)
+        assert end["lost_in_kernel"] > at_least / 2 or not is_all_there, (useless, end)
+        assert not was_kept_out or counted(first)[1] == counted(last)[1], (first, last)  # else the flood paused for seconds
+        assert "a flood of useless datagrams" in daemon.log.read_text()
+    is_told_again(bench, daemon)
+    assert bench.stop(daemon) == 0
+    check_limits(config, trace)
+
+
+def is_told_again(bench, daemon):
+    """Single wrong frames are, once it is over."""
+    heave.wait_for(lambda: not bench.status()["flood"], "it is over")
+    assert "the flood is over" in daemon.log.read_text()
+    if bench.status()["counters"]["refused_senders"] > 0:
+        return  # to all but this one
+    before = bench.status()["counters"]["rejected"]["no_head"]
+    with bench.sender() as sender:
+        sender.send("nonsense")
+        heave.wait_for(lambda: bench.status()["counters"]["rejected"]["no_head"] == before + 1, "a wrong frame is counted by its reason")
+
+
+CASES = {
+    "a flood beside a good stream is kept from the program": lambda bench: is_kept_out(bench, "127.0.0.1", 200_000, GARBAGE),
+    "a flood of valid frames from a sender that is not allowed": lambda bench: is_kept_out(bench, "127.0.0.2", 50_000, STRANGER, udp__allow="127.0.0.1"),
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("bin")
+    parser.add_argument("--only", default="", help="run the cases whose name contains this")
+    arguments = parser.parse_args()
+    suite = tap.Suite()
+    for name, check in CASES.items():
+        if arguments.only in name:
+            with heave.Bench(arguments.bin) as bench, suite.case(name):
+                check(bench)
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
