@@ -10,12 +10,15 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <time.h>
 #include <unistd.h>
 
-/** Room for the kernel's count of lost datagrams, aligned as the kernel's macros want it. */
+#define WAITED_MAX_US 60000000
+
+/** Room for the kernel's count of lost datagrams and the time of arrival, aligned as the kernel's macros want it. */
 typedef union {
     struct cmsghdr header;
-    uint8_t bytes[CMSG_SPACE(sizeof(uint32_t))];
+    uint8_t bytes[CMSG_SPACE(sizeof(uint32_t)) + CMSG_SPACE(sizeof(struct timespec))];
 } control_t;
 
 static void keep_ipv4(hal_udp_peer_t *peer, const void *address)
@@ -46,11 +49,26 @@ static hal_udp_peer_t peer_from(const struct sockaddr_storage *from)
     return peer;
 }
 
-static void keep_dropped(linux_udp_t *self, struct msghdr *message)
+/* The kernel stamps with the time of day; only the difference to now is of use beside a clock that never jumps. */
+static uint32_t since_us(const void *stamp)
 {
+    struct timespec then;
+    struct timespec now;
+    memcpy(&then, stamp, sizeof then);
+    (void)clock_gettime(CLOCK_REALTIME, &now); /* cannot fail: a valid clock and a valid address */
+    const int64_t us = ((int64_t)now.tv_sec - then.tv_sec) * 1000000 + (now.tv_nsec - then.tv_nsec) / 1000;
+    return us < 0 || us > WAITED_MAX_US ? 0 : (uint32_t)us;
+}
+
+static void keep_details(linux_udp_t *self, struct msghdr *message)
+{
+    self->waited_us = 0;
     for (struct cmsghdr *item = CMSG_FIRSTHDR(message); item != NULL; item = CMSG_NXTHDR(message, item)) {
         if (item->cmsg_level == SOL_SOCKET && item->cmsg_type == SO_RXQ_OVFL) {
             memcpy(&self->dropped, CMSG_DATA(item), sizeof self->dropped);
+        } else if (item->cmsg_level == SOL_SOCKET && item->cmsg_type == SCM_TIMESTAMPNS &&
+                   item->cmsg_len == CMSG_LEN(sizeof(struct timespec))) {
+            self->waited_us = since_us(CMSG_DATA(item));
         }
     }
 }
@@ -77,7 +95,7 @@ static hv_status_t udp_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t 
         self->error = errno;
         return HV_ERR_IO;
     }
-    keep_dropped(self, &message);
+    keep_details(self, &message);
     *length = (size_t)received;
     *from = peer_from(&address);
     return *length > capacity ? HV_ERR_RANGE : HV_OK;
@@ -93,6 +111,13 @@ static hv_status_t udp_dropped(void *ctx, uint32_t *datagrams)
         self->dropped = info[SK_MEMINFO_DROPS];
     }
     *datagrams = self->dropped;
+    return HV_OK;
+}
+
+static hv_status_t udp_waited(void *ctx, uint32_t *us)
+{
+    const linux_udp_t *self = ctx;
+    *us = self->waited_us;
     return HV_OK;
 }
 
@@ -156,6 +181,9 @@ static hv_status_t set_up(linux_udp_t *self, const linux_udp_config_t *config, c
     if (!set_option(self->fd, SOL_SOCKET, SO_RXQ_OVFL, 1)) {
         return fail(self, config, "overflow count of");
     }
+    if (!set_option(self->fd, SOL_SOCKET, SO_TIMESTAMPNS, 1)) {
+        return fail(self, config, "times of arrival of");
+    }
     if (bind(self->fd, address->ai_addr, address->ai_addrlen) != 0) {
         return fail(self, config, "bind");
     }
@@ -199,6 +227,6 @@ void linux_udp_close(linux_udp_t *self)
 
 hal_udp_t linux_udp_hal(linux_udp_t *self)
 {
-    static const hal_udp_ops_t k_ops = {udp_recv, udp_dropped};
+    static const hal_udp_ops_t k_ops = {udp_recv, udp_dropped, udp_waited};
     return (hal_udp_t){&k_ops, self};
 }

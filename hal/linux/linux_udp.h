@@ -21,6 +21,7 @@ typedef struct {
     uint16_t port;      /**< bound to */
     int receive_buffer; /**< bytes granted by the kernel */
     uint32_t dropped;
+    uint32_t waited_us;   /**< by the datagram received last */
     int error;            /**< errno of the last failure, 0 = none; getaddrinfo's negative code where the address is wrong */
     char error_text[256]; /**< of a failed open: what, where, why, what helps where that is known; empty otherwise */
 } linux_udp_t;

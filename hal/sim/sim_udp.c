@@ -62,6 +62,6 @@ hv_status_t sim_udp_push(sim_udp_t *self, const uint8_t *data, size_t length, co
 
 hal_udp_t sim_udp_hal(sim_udp_t *self)
 {
-    static const hal_udp_ops_t k_ops = {udp_recv, udp_dropped};
+    static const hal_udp_ops_t k_ops = {.recv = udp_recv, .dropped = udp_dropped};
     return (hal_udp_t){&k_ops, self};
 }

@@ -350,7 +350,9 @@ static int run(live_t *self, const config_t *config)
         (void)say(0, "cannot start the black box: %s", strerror(errno));
     }
     await_first_cycle(self);
-    if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+    const bool is_locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+    motion_loop_memory(&self->loop, is_locked ? MOTION_MEMORY_LOCKED : MOTION_MEMORY_UNLOCKED);
+    if (!is_locked) {
         (void)say(0, "memory is not locked (%s): cycles may be late when memory is short", strerror(errno));
     }
     say_ready(self, config);

@@ -158,6 +158,27 @@ static void put_axes(sheet_t *self, const snapshot_t *s)
     }
 }
 
+/* Turns are in degrees, ways in millimetres. */
+static void put_rates(sheet_t *self, const char *name, const char *help, const char *per, const pose_t *rates)
+{
+    static const char *const k_axes[POSE_AXES] = {"roll", "pitch", "yaw", "x", "y", "z"};
+    char text[NUMBER_MAX];
+    head(self, name, "gauge", help);
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        put(self, "heave_%s{axis=\"%s\",unit=\"%s/%s\"} %s\n", name, k_axes[i], i < AXIS_X ? "deg" : "mm", per,
+            q32_text(rates->axis_q32[i], text));
+    }
+}
+
+/* Missing while feedback does not tell. */
+static void put_plate(sheet_t *self, const snapshot_t *s)
+{
+    if (s->has_actual_rates) {
+        put_rates(self, "plate_speed", "speed of the plate from feedback", "s", &s->actual_per_s);
+        put_rates(self, "plate_acceleration", "acceleration of the plate from feedback", "s2", &s->actual_per_s2);
+    }
+}
+
 static void put_relays(sheet_t *self, const snapshot_t *s)
 {
     head(self, "relay_on", "gauge", "1 while the relay is closed");
@@ -202,6 +223,10 @@ static void put_program(sheet_t *self, const motion_view_t *view, const config_t
     whole(self, "realtime", "gauge", "1 with real-time priority", view->is_realtime);
     put_times(self, "wake_latency_seconds", "from the time of a cycle to its beginning, since the start", &times->wake);
     put_times(self, "cycle_time_seconds", "from the beginning of a cycle to its end, since the start", &times->work);
+    put_times(self, "frame_latency_seconds",
+              "from the arrival of a frame to the end of the cycle that follows it, since the start", &times->frame);
+    whole(self, "memory_locked", "gauge", "1 where memory is locked", view->is_memory_locked);
+    whole(self, "page_faults_total", "counter", "page faults of the motion thread since the start", view->page_faults);
 }
 
 size_t metrics_text(const motion_view_t *view, const config_t *config, const motion_times_t *times, char *text, size_t capacity)
@@ -211,6 +236,7 @@ size_t metrics_text(const motion_view_t *view, const config_t *config, const mot
     put_program(&sheet, view, config, times);
     put_state(&sheet, s);
     put_axes(&sheet, s);
+    put_plate(&sheet, s);
     put_relays(&sheet, s);
     put_frames(&sheet, view);
     put_stream(&sheet, s);

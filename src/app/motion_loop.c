@@ -7,6 +7,7 @@
 #include <sched.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/resource.h>
 
 #include "heave/text.h"
 #include "operator.h"
@@ -33,7 +34,8 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
         .behind = udp,
         .allow = &self->allow,
         .record = {self->is_recording ? &self->record : NULL, self->blackbox != NULL ? &self->blackbox->records : NULL},
-        .now_us = &self->session.now_us};
+        .now_us = &self->session.now_us,
+        .clock = clock};
     self->io = (gateway_io_t){.udp = udp_tap_hal(&self->tap), .log = log};
     const hv_status_t status = rig_open(&self->rig, config, &self->io);
     return status == HV_OK ? session_init(&self->session, &config->settings, &self->io) : status;
@@ -110,6 +112,23 @@ static void note_bus(motion_view_t *view, rig_t *rig)
     }
 }
 
+/* Page faults of this thread, once it is known whether there should be any. */
+static void note_page_faults(motion_loop_t *self, motion_view_t *view)
+{
+    struct rusage used;
+    const uint32_t memory = __atomic_load_n(&self->memory, __ATOMIC_ACQUIRE);
+    if (memory == MOTION_MEMORY_UNKNOWN || getrusage(RUSAGE_THREAD, &used) != 0) {
+        return;
+    }
+    const uint32_t faults = (uint32_t)used.ru_minflt + (uint32_t)used.ru_majflt;
+    if (!self->has_first_faults) {
+        self->has_first_faults = true;
+        self->first_faults = faults;
+    }
+    view->is_memory_locked = memory == MOTION_MEMORY_LOCKED;
+    view->page_faults = faults - self->first_faults;
+}
+
 static void publish(motion_loop_t *self)
 {
     motion_view_t *view = &self->current.view;
@@ -117,6 +136,7 @@ static void publish(motion_loop_t *self)
     view->udp_refused = self->tap.refused;
     (void)!hal_udp_dropped(self->tap.behind, &view->udp_dropped);
     note_bus(view, &self->rig);
+    note_page_faults(self, view);
     seqlock_write(&self->view, self->current.word);
 }
 
@@ -180,6 +200,17 @@ static void hold_if_too_late(motion_loop_t *self, uint32_t cycles)
     (void)!gateway_request(&self->session.gateway, EVENT_HOLD, self->session.now_us);
 }
 
+/* How long a frame took to the drives. Measured beside the motion: nothing depends on it. */
+static void note_latency(motion_loop_t *self)
+{
+    const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
+    const uint64_t now_us = hal_clock_now_us(self->clock);
+    const bool is_followed = snapshot->state == STATE_ENGAGED && snapshot->last_frame_us == snapshot->now_us;
+    if (is_followed && self->tap.arrival_us != 0 && self->tap.arrival_us <= now_us) {
+        histogram_add(&self->times.frame, now_us - self->tap.arrival_us);
+    }
+}
+
 static void run_cycle(motion_loop_t *self, uint64_t late_us)
 {
     motion_result_t result[REQUESTS_PER_CYCLE];
@@ -191,7 +222,9 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     }
     take_reloads(self);
     const unsigned requests = take_requests(self, result);
+    self->tap.arrival_us = 0;
     const bool is_zero = session_cycle(&self->session);
+    note_latency(self);
     write_down(self, is_zero);
     publish(self);
     answer_requests(self, result, requests);
@@ -264,6 +297,11 @@ bool motion_loop_reload(motion_loop_t *self, const config_t *config)
 {
     const motion_reload_t reload = {config->settings, config->udp.allow, config->late_hold_cycles};
     return ring_push(&self->reloads, &reload, sizeof reload, NULL, 0);
+}
+
+void motion_loop_memory(motion_loop_t *self, motion_memory_t memory)
+{
+    __atomic_store_n(&self->memory, (uint32_t)memory, __ATOMIC_RELEASE);
 }
 
 void motion_loop_quit(motion_loop_t *self)

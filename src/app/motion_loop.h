@@ -23,6 +23,8 @@ typedef struct {
     uint32_t udp_refused; /**< datagrams of senders that are not allowed */
     uint32_t udp_dropped; /**< datagrams the kernel lost because its queue was full, or dropped in a flood */
     bool is_realtime;     /**< scheduled before everything else */
+    bool is_memory_locked;
+    uint32_t page_faults; /**< of the motion thread, since it was known whether memory is locked */
     bool is_shutting_down;
     char bus_trouble[RIG_TROUBLE_SIZE];      /**< what is wrong with the drives' bus now, "" = nothing */
     char bus_last_trouble[RIG_TROUBLE_SIZE]; /**< what was last, "" = nothing so far */
@@ -30,8 +32,9 @@ typedef struct {
 
 /** How punctual and how long the cycles were. */
 typedef struct {
-    histogram_t wake; /**< from the time of a cycle to its beginning */
-    histogram_t work; /**< from its beginning to its end */
+    histogram_t wake;  /**< from the time of a cycle to its beginning */
+    histogram_t work;  /**< from its beginning to its end */
+    histogram_t frame; /**< of cycles that follow a frame: from the arrival of the first datagram to the end of the set-points */
 } motion_times_t;
 
 #define MOTION_VIEW_WORDS ((sizeof(motion_view_t) + 7u) / 8u)
@@ -41,6 +44,9 @@ typedef union {
     motion_view_t view;
     uint64_t word[MOTION_VIEW_WORDS];
 } motion_view_words_t;
+
+/** What has become of locking memory. */
+typedef enum { MOTION_MEMORY_UNKNOWN, MOTION_MEMORY_LOCKED, MOTION_MEMORY_UNLOCKED } motion_memory_t;
 
 /** An operator's request on its way to the motion thread. */
 typedef struct {
@@ -91,10 +97,13 @@ typedef struct {
     ring_t trace;         /**< trace_row_t to it */
     uint32_t is_quit;     /**< atomic: the service thread wants an end at once */
     uint32_t is_ended;    /**< atomic: the thread has done its last cycle */
+    uint32_t memory;      /**< atomic: motion_memory_t */
     pthread_t thread;
 
     motion_view_words_t current; /**< private to the motion thread */
     bool was_estop;
+    bool has_first_faults;
+    uint32_t first_faults; /**< page faults of the thread before they count */
     drive_feedback_t was_drive[DRIVES_MAX];
     uint64_t view_word[MOTION_VIEW_WORDS];
     hal_udp_networks_t allow; /**< who may send, now */
@@ -118,6 +127,9 @@ bool motion_loop_start(motion_loop_t *self);
 /** Hands what has changed in the configuration over. The service thread.
  *  @return false: too many at once, try later */
 bool motion_loop_reload(motion_loop_t *self, const config_t *config);
+
+/** Tells whether memory could be locked: from the next cycle on page faults count. Any thread. */
+void motion_loop_memory(motion_loop_t *self, motion_memory_t memory);
 
 /** Ends the thread after a quick stop of the drives, within a cycle. Any thread. */
 void motion_loop_quit(motion_loop_t *self);

@@ -329,6 +329,9 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
     json_bool(json, "realtime", view->is_realtime);
     write_times(json, "wake_latency", &times->wake);
     write_times(json, "cycle_time", &times->work);
+    write_times(json, "frame_latency", &times->frame);
+    json_bool(json, "memory_locked", view->is_memory_locked);
+    json_number(json, "page_faults", view->page_faults);
     json_open(json, "lost", '{');
     json_number(json, "trace_rows", lost->trace_rows);
     json_number(json, "record_lines", lost->record_lines);

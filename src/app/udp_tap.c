@@ -24,6 +24,16 @@ static void write_down(const udp_tap_t *self, hv_status_t status, const hal_udp_
     }
 }
 
+/* When the oldest datagram of the cycle came, for those who measure. */
+static void note_arrival(udp_tap_t *self)
+{
+    uint32_t waited_us = 0;
+    if (self->arrival_us == 0) {
+        (void)!hal_udp_waited(self->behind, &waited_us); /* not known: it comes now */
+        self->arrival_us = hal_clock_now_us(self->clock) - waited_us;
+    }
+}
+
 static hv_status_t tap_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
 {
     udp_tap_t *self = ctx;
@@ -33,6 +43,7 @@ static hv_status_t tap_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t 
             return status;
         }
         if (udp_tap_is_allowed(self->allow, from)) {
+            note_arrival(self);
             write_down(self, status, from, buffer, *length);
             return status;
         }
@@ -49,6 +60,6 @@ static hv_status_t tap_dropped(void *ctx, uint32_t *datagrams)
 
 hal_udp_t udp_tap_hal(udp_tap_t *self)
 {
-    static const hal_udp_ops_t k_ops = {tap_recv, tap_dropped};
+    static const hal_udp_ops_t k_ops = {.recv = tap_recv, .dropped = tap_dropped};
     return (hal_udp_t){&k_ops, self};
 }

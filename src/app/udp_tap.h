@@ -6,6 +6,7 @@
 #define HEAVE_APP_UDP_TAP_H
 
 #include "config.h"
+#include "heave/hal/clock.h"
 #include "heave/hal/udp.h"
 #include "ring.h"
 
@@ -15,7 +16,9 @@ typedef struct {
     const hal_udp_networks_t *allow;
     ring_t *record[2];      /**< NULL: nothing is written down there */
     const uint64_t *now_us; /**< of the running cycle */
-    uint32_t refused;       /**< out: datagrams of senders that are not allowed */
+    hal_clock_t clock;
+    uint64_t arrival_us; /**< out: when the first datagram came since it was set to 0; by that clock; 0 = none did */
+    uint32_t refused;    /**< out: datagrams of senders that are not allowed */
 } udp_tap_t;
 
 /** True where the address may send; an empty list lets everyone. */

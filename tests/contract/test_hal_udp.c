@@ -200,6 +200,16 @@ static void test_dropped_absent_says_nosup(void)
     TEST_ASSERT_EQUAL_UINT32(77, dropped);
 }
 
+static void test_waited_absent_says_nosup(void)
+{
+    hal_udp_ops_t ops = *hal.ops;
+    uint32_t waited_us = 77;
+    ops.waited = NULL;
+    TEST_ASSERT_TRUE(hal_udp_valid((hal_udp_t){&ops, hal.ctx}));
+    TEST_ASSERT_EQUAL(HV_ERR_NOSUP, hal_udp_waited((hal_udp_t){&ops, hal.ctx}, &waited_us));
+    TEST_ASSERT_EQUAL_UINT32(77, waited_us);
+}
+
 static void test_recv_nothing_waiting_says_again_and_keeps_outputs(void)
 {
     uint8_t buffer[4] = {1, 2, 3, 4};
@@ -314,6 +324,7 @@ static void run_contract(void)
     RUN_TEST(test_valid_complete_accepts);
     RUN_TEST(test_valid_recv_missing_refuses);
     RUN_TEST(test_dropped_absent_says_nosup);
+    RUN_TEST(test_waited_absent_says_nosup);
     RUN_TEST(test_recv_nothing_waiting_says_again_and_keeps_outputs);
     RUN_TEST(test_recv_datagram_brings_bytes_and_sender);
     RUN_TEST(test_recv_every_byte_value_passes);
@@ -409,7 +420,20 @@ static void test_linux_close_twice_and_recv_after_it_do_no_harm(void)
     TEST_ASSERT_EQUAL(EBADF, lin.error);
 }
 
-/* Filters, on sockets of both families. */
+/* At least as long as it was left there: how much longer is the machine's business. */
+static void test_waited_is_since_the_arrival(void)
+{
+    uint32_t waited_us = 0;
+    for (unsigned i = 0; i < 2; i++) {
+        const hal_udp_peer_t peer = send_linux("@", 1);
+        (void)usleep(20000);
+        assert_received("@", 1, &peer);
+        TEST_ASSERT_EQUAL(HV_OK, hal_udp_waited(hal, &waited_us));
+        TEST_ASSERT_TRUE(waited_us >= 19000);
+    }
+}
+
+/* Filters. */
 
 static const uint8_t k_heads[] = {'@', ' ', 0};
 
@@ -547,8 +571,10 @@ static void test_filter_what_is_out_of_range_is_refused(void)
     TEST_ASSERT_EQUAL(HV_ERR_IO, linux_udp_filter_on(&lin, &filter));
 }
 
-static void run_filter(void)
+/* On sockets of both families. */
+static void run_sockets(void)
 {
+    RUN_TEST(test_waited_is_since_the_arrival);
     RUN_TEST(test_filter_head_byte_decides);
     RUN_TEST(test_filter_length_decides);
     RUN_TEST(test_filter_drops_are_counted_at_once);
@@ -589,7 +615,7 @@ int main(void)
     for (size_t i = 1; i < sizeof k_fixtures / sizeof k_fixtures[0]; i++) {
         fixture = &k_fixtures[i];
         contract_backend = fixture->name;
-        run_filter();
+        run_sockets();
     }
     return UNITY_END();
 }

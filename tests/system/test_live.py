@@ -17,6 +17,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import heave
 import tap
@@ -487,6 +488,39 @@ def a_client_that_does_not_read(bench):
 
 # --- Memory ---
 
+def pages_moved():
+    """What the kernel has done to pages by itself, locked ones too."""
+    names = ("pgmigrate_success ", "thp_collapse_alloc ", "thp_split_pmd ", "numa_hint_faults ")
+    lines = Path("/proc/vmstat").read_text(encoding="ascii").splitlines()
+    return [line for line in lines if line.startswith(names)]
+
+
+def faults_no_pages(bench, guard):
+    if guard is None:
+        raise tap.Skip("instrumented build")
+    config, _ = with_black_box(bench)
+    moved = pages_moved()
+    daemon = bench.start("--record", bench.folder / "r.txt", "--trace", bench.folder / "t.csv", config=config)
+    with bench.sender() as sender:
+        sender.stream(0.3, wave)
+        bench.wait_state("ENGAGED")
+        for order in ("hold", "resume", "dump"):
+            bench.ctl(order)
+            sender.stream(0.3, wave)
+        sender.send("nonsense")
+        sender.send("@A6T:0,5,0,0,0,0,400#")
+        sender.stream(0.5, wave)
+        heave.wait_for(lambda: (sender.send(wave(0)), bench.status()["frame_latency"]["count"] > 0)[1], "frames are measured")
+        bench.ctl("park")
+        status = bench.wait_state("SETTLED")
+    assert bench.stop(daemon) == 0
+    latency = status["frame_latency"]
+    assert 0 < latency["p50_us"] <= latency["p99_us"] <= latency["max_us"] and latency["count"] <= sum(status["counters"]["accepted"].values()), latency
+    if not status["memory_locked"]:
+        raise tap.Skip("memory cannot be locked here")
+    assert status["page_faults"] == 0 or pages_moved() != moved, status["page_faults"]
+
+
 def allocates_nothing(bench, guard):
     if guard is None:
         raise tap.Skip("instrumented build")
@@ -554,7 +588,8 @@ def main():
     parser.add_argument("--guard")
     parser.add_argument("--only", default="", help="run the cases whose name contains this")
     arguments = parser.parse_args()
-    cases = {**CASES, "nothing is allocated after the start": lambda bench: allocates_nothing(bench, arguments.guard)}
+    cases = {**CASES, "no page fault in the motion thread once memory is locked": lambda bench: faults_no_pages(bench, arguments.guard),
+             "nothing is allocated after the start": lambda bench: allocates_nothing(bench, arguments.guard)}
     suite = tap.Suite()
     for name, check in cases.items():
         if arguments.only in name:

@@ -57,10 +57,13 @@ def says_what_the_status_says(bench):
         told = got[f"heave_axis_{name}"]
         assert [told[(("axis", str(i + 1)), ("unit", "mm" if i < 6 else "deg"))] for i in range(7)] == values, (told, values)
     assert len(got["heave_axis_following_error"]) == 7 and all(abs(e) < 1e-5 for e in got["heave_axis_following_error"].values())
+    for name, key in (("speed", "speed_actual"), ("acceleration", "accel_actual")):  # the same axes, at rest
+        told = {f"{dict(labels)['axis']}_{dict(labels)['unit'].replace('/', '_')}": value for labels, value in got[f"heave_plate_{name}"].items()}
+        assert told.keys() == status[key].keys() and all(abs(value) < 1 for value in told.values()), (told, status[key])
     assert {int(dict(key)["relay"]) for key, on in got["heave_relay_on"].items() if on} == set(status["relays"]["on"]) and len(got["heave_relay_on"]) == 12
     assert got["heave_build_info"] == {(("version", status["version"]),): 1}
     assert got["heave_last_frame_age_seconds"][()] > 0 and got["heave_fault_code"][()] == 0 and got["heave_drive_enabled"][(("axis", "7"),)] == 1
-    for name in ("heave_wake_latency_seconds", "heave_cycle_time_seconds"):
+    for name in ("heave_wake_latency_seconds", "heave_cycle_time_seconds", "heave_frame_latency_seconds"):
         shares = [got[name][(("quantile", q),)] for q in ("0.5", "0.99", "0.999", "0.9999", "1")]
         assert shares == sorted(shares) and 0 < shares[-1] < 60, shares
     assert bench.stop(daemon) == 0 and not path.exists(), "a gateway that has ended has no values"

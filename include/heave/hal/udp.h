@@ -34,10 +34,11 @@ typedef struct {
 /** Holds every text of hal_udp_peer_text() with its NUL. */
 #define HAL_UDP_PEER_TEXT_MAX 64u
 
-/** dropped is optional, the rest mandatory. */
+/** recv is mandatory, the rest optional. */
 typedef struct {
     hv_status_t (*recv)(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from);
     hv_status_t (*dropped)(void *ctx, uint32_t *datagrams); /* optional */
+    hv_status_t (*waited)(void *ctx, uint32_t *us);         /* optional */
 } hal_udp_ops_t;
 
 /** Passed by value; ctx belongs to the backend and lives until its close. */
@@ -71,6 +72,14 @@ static inline HV_MUST_CHECK hv_status_t hal_udp_recv(hal_udp_t udp, uint8_t *buf
 static inline HV_MUST_CHECK hv_status_t hal_udp_dropped(hal_udp_t udp, uint32_t *datagrams)
 {
     return udp.ops->dropped != NULL ? udp.ops->dropped(udp.ctx, datagrams) : HV_ERR_NOSUP;
+}
+
+/** How long the datagram of the last successful recv had waited since its arrival, in us. For measurements only: a clock that is
+ *  set meanwhile spoils it, beyond a minute it is told as 0. Never blocks.
+ *  @return HV_OK; HV_ERR_NOSUP where the backend cannot know. */
+static inline HV_MUST_CHECK hv_status_t hal_udp_waited(hal_udp_t udp, uint32_t *us)
+{
+    return udp.ops->waited != NULL ? udp.ops->waited(udp.ctx, us) : HV_ERR_NOSUP;
 }
 
 /** "192.168.1.5:9800" or "[fe80::1%2]:9800" (shortest form, lower case). Pure.
