@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_can_failures.py BIN [PART OF A NAME [KILLS]] - what goes wrong on a CANopen bus while the platform moves: seen in time, and all drives stop together.
+"""test_can_failures.py BIN [PART OF A NAME [KILLS [SEED]]] - what goes wrong on a CANopen bus while the platform moves: seen in time, and all drives stop together.
 
+It strikes at a moment of the rise, and so at a phase of cycle and bus period, that is drawn for each case from SEED and the case's name.
 On vcan and virtual time, inside kernel.py --virtual-time --python; judged on the recorded frames by can_judge. docs/failures.md names these cases."""
 import random
 import signal
@@ -20,18 +21,22 @@ import test_can
 PERIOD_US, CYCLE_US = 4000, 1000
 HEARTBEAT_TIMEOUT_US = 150000
 VICTIM = 3
-MOVING_S = 0.6         # after all have torque: in the middle of the rise
+RISE_S = (0.05, 1.5)   # after all have torque: cylinders move, and have more than the window of the following error to go yet
+RISE_FOR_A_SECOND_S = (0.05, 0.6)
+SEED = 1
 REACTION_US = 2 * CYCLE_US
 WINDOW_COUNTS = 10 * can_bench.COUNTS_PER_MM
 STEP_COUNTS = 0.3 * can_bench.COUNTS_PER_MM  # more than a period of the rise
 
 
-def in_motion(bench, **drives):
-    """Rises, until MOVING_S after all drives have torque."""
+def in_motion(bench, source, during_s=RISE_S, **drives):
+    """Rises, until a moment of during_s after all drives have torque."""
+    moment_s = source.uniform(*during_s)
+    print(f"# strikes {moment_s:.6f} s after all have torque", flush=True)
     bench.start_drives(**drives)
     daemon = bench.start(config=test_can.can_config(bench))
     heave.wait_for(lambda: bench.events("all enabled"), "torque")
-    time.sleep(MOVING_S)
+    time.sleep(moment_s)
     return daemon
 
 
@@ -63,12 +68,17 @@ def sees_boot(record, when_us):
     return next(when for when in record.boots(VICTIM) if when > when_us)
 
 
+def last_before_silence(times, when_us, silence_us):
+    """Of times, the last one before nothing comes for longer than silence_us: what was under way when the drive was struck still comes."""
+    return next(when for when, after in zip(times, [*times[1:], float("inf")]) if after > when_us and after - when > silence_us)
+
+
 def sees_last_beat(record, when_us):
-    return [when for when in record.beats(VICTIM) if when <= when_us][-1]
+    return last_before_silence(record.beats(VICTIM), when_us, HEARTBEAT_TIMEOUT_US / 2)
 
 
 def sees_last_status(record, when_us):
-    return [when for when, _, _ in record.statuses(VICTIM) if when <= when_us][-1]
+    return last_before_silence([when for when, _, _ in record.statuses(VICTIM)], when_us, 2 * PERIOD_US)
 
 
 def sees_no_torque(record, when_us):
@@ -95,8 +105,8 @@ ROWS = [
 
 
 def stops_all_drives(action, keys, seen, within_us, fault, code):
-    def case(bench):
-        in_motion(bench, only={VICTIM: keys})
+    def case(bench, source):
+        in_motion(bench, source, only={VICTIM: keys})
         when_us = now_us()
         bench.do(drive=VICTIM, action=action["do"], **{key: value for key, value in action.items() if key != "do"})
         time.sleep(1 if action["do"] == "jam" else 0.25)
@@ -114,8 +124,8 @@ def stops_all_drives(action, keys, seen, within_us, fault, code):
 
 def harmless(*actions):
     """Nothing stops, and nothing is said."""
-    def case(bench):
-        in_motion(bench)
+    def case(bench, source):
+        in_motion(bench, source)
         begin_us = now_us()
         for action, arguments in actions:
             bench.do(action, VICTIM, **arguments)
@@ -191,8 +201,8 @@ BUS_ROWS = [("interface down", link_down, link_up, 2 * CYCLE_US), ("interface go
 
 def bus_lost(breaks, mends, within_us):
     """No set-point after within_us, also when the bus is back; the drives' own watch over the heartbeat has stopped them before we speak again."""
-    def case(bench):
-        in_motion(bench)
+    def case(bench, source):
+        in_motion(bench, source)
         begin_us = now_us()
         breaks()
         time.sleep(0.3)
@@ -213,9 +223,9 @@ def bus_lost(breaks, mends, within_us):
 PASSIVE_STOP_US = 1000000  # [can] passive_stop_ms
 
 
-def passive_stops(bench):
-    """A second after the report, in the middle of the rise: all come to rest by their set-points, within every limit, and lose their torque then."""
-    in_motion(bench)
+def passive_stops(bench, source):
+    """A second after the report, still in the rise: all come to rest by their set-points, within every limit, and lose their torque then."""
+    in_motion(bench, source, RISE_FOR_A_SECOND_S)
     when_us = now_us()
     report(ERROR_CONTROLLER, PASSIVE)
     time.sleep(PASSIVE_STOP_US / 1e6 - 0.02)
@@ -249,9 +259,9 @@ def brakes_at(ways, begin_us):
     return speed > 50 and begin_us < slower_us < begin_us + 100000 and ways[-1][1] <= 1 and ways[-1][0] < begin_us + 500000
 
 
-def disturbed(bench):
+def disturbed(bench, source):
     """Error-passive for less than a second, and 10 000 error frames in a second: motion goes on, period by period."""
-    in_motion(bench)
+    in_motion(bench, source)
     begin_us = now_us()
     report(ERROR_CONTROLLER, PASSIVE)
     time.sleep(PASSIVE_STOP_US / 1e6 - 0.1)
@@ -274,7 +284,7 @@ BAD = {2: ({"is_there": False}, "missing", None), 3: ({"defaults": {"1000": 0x00
        6: ({"refuse": {"1016:1": 0x06010002}}, "refused", (0x1016, 1)), 7: ({"missing_objects": ["607A"]}, "refused", None)}
 
 
-def bad_drives_are_named(bench):
+def bad_drives_are_named(bench, _):
     """Six of seven, each in another way: each is named with its object, and nobody is given torque."""
     bench.start_drives(only={node: keys for node, (keys, _, _) in BAD.items()})
     bench.start(config=test_can.can_config(bench))
@@ -293,9 +303,8 @@ KILLS = 6
 SET_UP_S = 1.3  # from the start until all drives are ready, or in the fault that the crash has left them in
 
 
-def killed_anywhere(bench):
+def killed_anywhere(bench, source):
     """kill -9 at random phases and a new start: the drives stop by themselves, nothing old is sent, no step at enabling."""
-    source = random.Random(1)
     kills = int(sys.argv[3]) if len(sys.argv) > 3 else KILLS
     config = test_can.can_config(bench)
     bench.start_drives()
@@ -339,10 +348,12 @@ CASES += [("drives missing or wrong are named, nobody is enabled", bad_drives_ar
 def main():
     suite = tap.Suite()
     wanted = sys.argv[2] if len(sys.argv) > 2 else ""
+    seed = int(sys.argv[4]) if len(sys.argv) > 4 else SEED
+    print(f"# seed {seed}")
     for name, case in CASES:
         if wanted in name:
             with suite.case(name), can_bench.RecordedBench(sys.argv[1]) as bench:
-                case(bench)
+                case(bench, random.Random(f"{seed} {name}"))
     return suite.done()
 
 
