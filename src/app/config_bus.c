@@ -81,7 +81,9 @@ uint32_t config_bus_load_ppm(const config_bus_t *bus)
 
 uint32_t config_bus_fitting_us(const config_bus_t *bus, uint32_t limit_ppm, uint32_t cycle_us)
 {
-    return canload_fitting_period_us(bus->entry, bus->count, bus->bitrate_bps, limit_ppm, cycle_us);
+    const uint32_t fitting_us = canload_fitting_period_us(bus->entry, bus->count, bus->bitrate_bps, limit_ppm, cycle_us);
+    const int64_t most_us = config_keys[config_key_find(bus->section, "period_us")].high_milli / 1000;
+    return fitting_us <= most_us ? fitting_us : 0;
 }
 
 static void check_load(config_source_t *self, const config_bus_t *bus, uint32_t cycle_us)
@@ -89,6 +91,13 @@ static void check_load(config_source_t *self, const config_bus_t *bus, uint32_t 
     const uint32_t load_ppm = config_bus_load_ppm(bus);
     const uint32_t fitting_us = config_bus_fitting_us(bus, CONFIG_BUS_WARNED_PPM, cycle_us);
     if (load_ppm <= CONFIG_BUS_REFUSED_PPM) {
+        return;
+    }
+    if (fitting_us == 0) {
+        config_source_key_error(self, bus->section, "period_us",
+                                "the bus would be loaded by %u %% at worst, and by too much with any period; allowed: with a "
+                                "higher bitrate_bps, or fewer drives on this bus",
+                                (unsigned)(load_ppm / 10000u));
         return;
     }
     config_source_key_error(self, bus->section, "period_us",

@@ -28,7 +28,8 @@ void config_bus_describe(const config_t *config, config_bus_t *bus);
 /** Worst case, in millionths of the bit rate. */
 uint32_t config_bus_load_ppm(const config_bus_t *bus);
 
-/** Shortest period, a multiple of the motion cycle, with no more than this load; 0 where there is none. */
+/** Shortest period, a multiple of the motion cycle, with no more than this load; 0 where there is none, or where its key takes
+ * none so long. */
 uint32_t config_bus_fitting_us(const config_bus_t *bus, uint32_t limit_ppm, uint32_t cycle_us);
 
 /** Refuses a period that is no multiple of the cycle, and a load that the bus cannot carry; reports into self. */

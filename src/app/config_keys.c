@@ -214,7 +214,7 @@ const config_key_t config_keys[] = {
     {KEY("can", "passive_stop_ms"), AT(can.passive_stop_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "1000",
      RANGE(0, 60000), .help = "error-passive for so long, the platform stops (fault bus-failing); 0 = never"},
 
-    {KEY("cia402", "nodes"), AT(cia402.nodes), .type = CONFIG_IDS, .unit = "", .fallback = "1",
+    {KEY("cia402", "nodes"), AT(cia402.nodes), .type = CONFIG_IDS, .unit = "", .fallback = "1", .words = "a node id from 1 to 127",
      .help = "node id of drive 1, the next ones follow; or one for each drive. The rotation motor is the last"},
     {KEY("cia402", "gateway_node"), AT(cia402.gateway_node), .type = CONFIG_INTEGER, .unit = "", .fallback = "127", RANGE(1, 127),
      .help = "node id of this gateway, whose heartbeat the drives watch"},

@@ -23,7 +23,7 @@ typedef enum {
     CONFIG_LINES,        /**< `none`, or names or numbers of lines, stored as config_lines_t */
     CONFIG_PER_RELAY,    /**< one whole number for all relays, or one for each; stored as uint32_t[CONFIG_RELAYS_MAX] */
     CONFIG_NAME,         /**< of a network interface, stored as text */
-    CONFIG_IDS,          /**< `none`, or CAN identifiers, stored as config_ids_t */
+    CONFIG_IDS,          /**< `none`, or CAN identifiers, stored as config_ids_t; `words`: what they are called instead */
     CONFIG_RATIOS,       /**< `none`, or up to `count` ratios such as 20000/10, stored as config_ratios_t */
     CONFIG_WHOLES,       /**< up to `count` whole numbers, stored as config_wholes_t */
     CONFIG_FRAME,  /**< `none`, or bytes and fields of a CAN frame, stored as canraw_frame_t; `words`: the fields it may have,

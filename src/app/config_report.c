@@ -365,11 +365,15 @@ static void warn_bus(report_t *self)
     if (bus.section == NULL || config_bus_load_ppm(&bus) <= CONFIG_BUS_WARNED_PPM) {
         return;
     }
+    const uint32_t fitting_us = config_bus_fitting_us(&bus, CONFIG_BUS_WARNED_PPM, self->settings->cycle_us);
     config_text_clear(&text);
-    config_text_add(
-        &text, "[%s] period_us loads the bus by %.1f %% at worst: a repeated frame makes the next ones late; %u us give %u %%",
-        bus.section, config_bus_load_ppm(&bus) / 10000.0,
-        (unsigned)config_bus_fitting_us(&bus, CONFIG_BUS_WARNED_PPM, self->settings->cycle_us), CONFIG_BUS_WARNED_PPM / 10000u);
+    config_text_add(&text, "[%s] period_us loads the bus by %.1f %% at worst: a repeated frame makes the next ones late; ",
+                    bus.section, config_bus_load_ppm(&bus) / 10000.0);
+    if (fitting_us == 0) {
+        config_text_add(&text, "a higher bitrate_bps helps");
+    } else {
+        config_text_add(&text, "%u us give %u %%", (unsigned)fitting_us, CONFIG_BUS_WARNED_PPM / 10000u);
+    }
     warn(self, text.data);
 }
 

@@ -94,7 +94,8 @@ static bool parse_ids(const config_key_t *key, const char *text, config_ids_t *i
         int64_t value = 0;
         const char *end = read_number(take_item(&rest, item), 0, most, &value);
         if (end == NULL || *end != '\0') {
-            return refuse(key, item, strlen(item), key->high_milli > 0 ? "is no such number" : "is no identifier", why);
+            const bool is_identifier = key->high_milli == 0 && key->words == NULL;
+            return refuse(key, item, strlen(item), is_identifier ? "is no identifier" : "is no such number", why);
         }
         if (ids->count == DRIVES_MAX) {
             return refuse_many(key, DRIVES_MAX, why);
@@ -377,7 +378,8 @@ void config_value_can_allowed(const config_key_t *key, config_text_t *text)
     } else if (key->type == CONFIG_IDS && key->high_milli > 0) {
         config_text_add(text, "none, or whole numbers up to %" PRId64 ", one for each drive", key->high_milli / 1000);
     } else if (key->type == CONFIG_IDS) {
-        config_text_add(text, "none, or an identifier such as 0x601, or one for each drive");
+        config_text_add(text, "%s, or one for each drive",
+                        key->words != NULL ? key->words : "none, or an identifier such as 0x601");
     } else if (key->type == CONFIG_RATIOS) {
         config_text_add(text, "none, or a ratio of whole numbers such as 20000/10 or 2000%s",
                         key->count > 1 ? ", or one for each cylinder" : "");

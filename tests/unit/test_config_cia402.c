@@ -154,6 +154,7 @@ static void test_load_what_contradicts_itself_is_refused_at_its_line(void)
     refuse("nodes = 1, 2, 3, 4, 5, 2", "2 of drive 6 is that of drive 2 already");
     refuse("nodes = 122", "127 of drive 6 is gateway_node");
     refuse("nodes = 1, 2", "has 2 values");
+    refuse("nodes = -1", "\"-1\" is no such number; allowed: a node id from 1 to 127, or one for each drive");
     refuse("serial_numbers = 1, 2", "has 2 values");
     refuse("serial_numbers = 1, 2, 3, 4, 5, 4294967296", "is no such number");
     refuse("nodes = none", "missing for driver = cia402");
@@ -178,6 +179,13 @@ static void test_load_period_that_60c2h_cannot_hold_is_refused(void)
     sprintf(place, "%s:%u: [cia402] period_us: 60C2h cannot hold it", FILE_NAME, line);
     TEST_ASSERT_TRUE(load() > 0);
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, place), m_errors);
+}
+
+static void test_load_bus_too_slow_for_any_period_is_told_to_be_faster(void)
+{
+    put("[can]", "bitrate_bps = 10000");
+    TEST_ASSERT_TRUE(load() > 0);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "by too much with any period; allowed: with a higher bitrate_bps"), m_errors);
 }
 
 static void test_load_section_not_in_use_may_be_anything(void)
@@ -205,6 +213,7 @@ int main(void)
     RUN_TEST(test_load_lists_and_signs_reach_their_drives);
     RUN_TEST(test_load_what_contradicts_itself_is_refused_at_its_line);
     RUN_TEST(test_load_period_that_60c2h_cannot_hold_is_refused);
+    RUN_TEST(test_load_bus_too_slow_for_any_period_is_told_to_be_faster);
     RUN_TEST(test_load_section_not_in_use_may_be_anything);
     RUN_TEST(test_describe_bus_load_is_that_of_the_frames);
     return UNITY_END();
