@@ -229,6 +229,7 @@ static void put_program(sheet_t *self, const motion_view_t *view, const config_t
     whole(self, "page_faults_total", "counter", "page faults of the motion thread since the start", view->page_faults);
 }
 
+/* NOLINTNEXTLINE(readability-non-const-parameter): the sheet writes through it */
 size_t metrics_text(const motion_view_t *view, const config_t *config, const motion_times_t *times, char *text, size_t capacity)
 {
     const snapshot_t *s = &view->snapshot;
