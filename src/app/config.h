@@ -247,14 +247,16 @@ typedef struct {
 } config_relays_t;
 
 /** What reads the operator's switches. */
-typedef enum { CONFIG_INPUTS_SIM } config_inputs_driver_t;
+typedef enum { CONFIG_INPUTS_SIM, CONFIG_INPUTS_GPIO } config_inputs_driver_t;
 
 /** Switch inputs; a line without a name is not there. */
 typedef struct {
     config_inputs_driver_t driver;
+    config_label_t chip; /**< as of the relays */
     config_label_t estop_line;
     config_label_t enable_line;
     config_label_t reset_line;
+    bool is_active_low; /**< a closed contact pulls its line low */
 } config_inputs_t;
 
 /** The black box: what it keeps, and where it is written to. */

@@ -391,22 +391,6 @@ static void check_relays(config_source_t *self)
     }
 }
 
-static void check_inputs(config_source_t *self)
-{
-    static const char *const names[] = {"estop", "enable", "reset"};
-    const config_inputs_t *inputs = &self->config->inputs;
-    const char *const lines[] = {inputs->estop_line.text, inputs->enable_line.text, inputs->reset_line.text};
-    for (unsigned later = 1; later < 3u; later++) {
-        for (unsigned earlier = 0; earlier < later; earlier++) {
-            if (lines[later][0] != '\0' && strcmp(lines[later], lines[earlier]) == 0) {
-                config_source_key_error(self, "inputs", names[later],
-                                        "line %s is %s already; allowed: a line of its own, or none", lines[later],
-                                        names[earlier]);
-            }
-        }
-    }
-}
-
 static void check_values(config_source_t *self)
 {
     settings_t *settings = &self->config->settings;
@@ -424,7 +408,6 @@ static void check_values(config_source_t *self)
     check_silence(self);
     check_intensity(self);
     check_relays(self);
-    check_inputs(self);
     config_gpio_check(self);
     config_cia402_check(self);
     config_canraw_check(self);

@@ -61,7 +61,79 @@ static void check_relays(config_source_t *self)
     }
 }
 
+/* --- Inputs --- */
+
+#define INPUTS 3u
+
+static const char *const k_input_keys[INPUTS] = {"estop", "enable", "reset"};
+
+static void list_inputs(const config_inputs_t *inputs, const config_label_t *line[INPUTS])
+{
+    line[0] = &inputs->estop_line;
+    line[1] = &inputs->enable_line;
+    line[2] = &inputs->reset_line;
+}
+
+static void check_inputs_apart(config_source_t *self, const config_label_t *const line[INPUTS])
+{
+    for (unsigned later = 1; later < INPUTS; later++) {
+        for (unsigned earlier = 0; earlier < later; earlier++) {
+            if (is_same_line(line[later], line[earlier])) {
+                config_source_key_error(self, "inputs", k_input_keys[later],
+                                        "line %s is %s already; allowed: a line of its own, or none", line[later]->text,
+                                        k_input_keys[earlier]);
+            }
+        }
+    }
+}
+
+/* A number is a line of its own chip; a name may be on any where no chip is given. */
+static bool is_same_chip(const config_label_t *a, const config_label_t *b)
+{
+    return a->text[0] == '\0' || b->text[0] == '\0' || strcmp(a->text, b->text) == 0;
+}
+
+static void check_against_relays(config_source_t *self, unsigned input, const config_label_t *line)
+{
+    const config_relays_t *relays = &self->config->relays;
+    if (relays->driver != CONFIG_RELAYS_GPIO || !is_same_chip(&relays->chip, &self->config->inputs.chip)) {
+        return;
+    }
+    for (unsigned i = 0; i < relays->lines.count; i++) {
+        if (is_same_line(&relays->lines.line[i], line)) {
+            config_source_key_error(self, "inputs", k_input_keys[input],
+                                    "line %s is relay %u already; allowed: a line of its own, or none", line->text, i + 1u);
+        }
+    }
+}
+
+static void check_inputs(config_source_t *self)
+{
+    const config_inputs_t *inputs = &self->config->inputs;
+    const config_label_t *line[INPUTS];
+    unsigned count = 0;
+    list_inputs(inputs, line);
+    check_inputs_apart(self, line);
+    if (inputs->driver != CONFIG_INPUTS_GPIO) {
+        return;
+    }
+    check_chip(self, "inputs", &inputs->chip);
+    for (unsigned i = 0; i < INPUTS; i++) {
+        count += line[i]->text[0] != '\0';
+        check_line(self, "inputs", k_input_keys[i], &inputs->chip, line[i]);
+        check_against_relays(self, i, line[i]);
+    }
+    if (count == 0) {
+        config_source_key_error(self, "inputs", "estop", "driver gpio reads none; allowed: a line for estop, enable or reset");
+    }
+    if (inputs->enable_line.text[0] != '\0' && self->config->settings.engage == ENGAGE_AUTO) {
+        config_source_key_error(self, "inputs", "enable",
+                                "engage = auto does not wait for a key; allowed: none, or engage = manual");
+    }
+}
+
 void config_gpio_check(config_source_t *self)
 {
     check_relays(self);
+    check_inputs(self);
 }

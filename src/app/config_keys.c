@@ -452,14 +452,18 @@ const config_key_t config_keys[] = {
     {KEY("relays", "min_toggle_ms"), AT(settings.relay_min_toggle_ms), .type = CONFIG_PER_RELAY, .unit = "ms", .fallback = "0",
      RANGE(0, 60000), .help = "a relay that has changed stays so for this time at least; safe_mask and max_on_ms do not wait for it"},
 
-    {KEY("inputs", "driver"), AT(inputs.driver), .type = CONFIG_WORD, .unit = "", .fallback = "sim", .words = "sim",
-     .absent = "gpio", .help = "the inputs in use"},
+    {KEY("inputs", "driver"), AT(inputs.driver), .type = CONFIG_WORD, .unit = "", .fallback = "sim", .words = "sim|gpio",
+     .help = "the inputs in use: simulated, or GPIO lines (docs/gpio.md)"},
+    {KEY("inputs", "chip"), AT(inputs.chip), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "GPIO: label of the chip that has the lines; none: whichever has lines of these names"},
     {KEY("inputs", "estop"), AT(inputs.estop_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
-     .help = "line of the emergency stop"},
+     .help = "line of a normally closed contact of the emergency stop: open, or a broken wire, stops"},
     {KEY("inputs", "enable"), AT(inputs.enable_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
-     .help = "line of the enable key"},
+     .help = "line of the enable key, closed when on: off parks, and nobody engages"},
     {KEY("inputs", "reset"), AT(inputs.reset_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
-     .help = "line of the reset button"},
+     .help = "line of the reset button, closed when pressed"},
+    {KEY("inputs", "active_low"), AT(inputs.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "yes",
+     .help = "whether a closed contact pulls its line low (contacts to ground); no: high (contacts to supply)"},
 };
 /* clang-format on */
 const size_t config_key_count = sizeof config_keys / sizeof config_keys[0];

@@ -273,7 +273,10 @@ static void receive(control_t *self, control_client_t *client, uint64_t now_us)
 /* A reset has an effect once the platform has left FAULT or ESTOP; everything else has its answer after one cycle. */
 static void take_result(const control_t *self, control_client_t *client, const motion_result_t *result)
 {
-    if (result->status != HV_OK) {
+    if (result->is_key_off) {
+        client->request_id = 0;
+        answer_error(client, "the enable key is off: turn it on first", state_name(result->snapshot.state));
+    } else if (result->status != HV_OK) {
         client->request_id = 0;
         refuse(self, client, &result->snapshot, result->is_shutting_down);
     } else if (client->request == EVENT_RESET) {

@@ -3,6 +3,8 @@
  */
 #include "gpio_setup.h"
 
+#include <string.h>
+
 linux_gpio_relays_config_t gpio_setup_relays(const config_t *config)
 {
     const config_relays_t *relays = &config->relays;
@@ -11,6 +13,21 @@ linux_gpio_relays_config_t gpio_setup_relays(const config_t *config)
                                       .safe_mask = config->settings.relay_safe_mask};
     for (unsigned i = 0; i < relays->lines.count; i++) {
         out.names.line[i] = relays->lines.line[i].text;
+    }
+    return out;
+}
+
+linux_gpio_inputs_config_t gpio_setup_inputs(const config_t *config)
+{
+    const config_inputs_t *inputs = &config->inputs;
+    const config_label_t *const line[] = {&inputs->estop_line, &inputs->enable_line, &inputs->reset_line};
+    static const uint32_t k_input[] = {INPUT_ESTOP, INPUT_ENABLE, INPUT_RESET};
+    linux_gpio_inputs_config_t out = {.names = {.chip = inputs->chip.text}, .is_active_low = inputs->is_active_low};
+    for (unsigned i = 0; i < LINUX_GPIO_INPUTS_MAX; i++) {
+        if (line[i]->text[0] != '\0') {
+            out.names.line[out.names.count] = line[i]->text;
+            out.input[out.names.count++] = k_input[i];
+        }
     }
     return out;
 }
@@ -30,13 +47,37 @@ static unsigned look(const linux_gpio_names_t *names, const char *section, linux
     return status != HV_OK && status != HV_ERR_NOSUP;
 }
 
+/* A name and a number may be one line: only the chip knows. Returns the number of warnings. */
+static unsigned compare(const config_t *config, const linux_gpio_place_t *relays, const linux_gpio_place_t *inputs, FILE *out)
+{
+    const linux_gpio_inputs_config_t setup = gpio_setup_inputs(config);
+    unsigned warnings = 0;
+    if (strcmp(relays->path, inputs->path) != 0) {
+        return 0;
+    }
+    for (unsigned i = 0; i < inputs->count; i++) {
+        for (unsigned k = 0; k < relays->count; k++) {
+            if (inputs->offset[i] == relays->offset[k]) {
+                fprintf(out, "warning: [inputs] gpio: line %s is relay %u already\n", setup.names.line[i], k + 1u);
+                warnings++;
+            }
+        }
+    }
+    return warnings;
+}
+
 unsigned gpio_setup_check(const config_t *config, FILE *out)
 {
     linux_gpio_place_t relays = {.count = 0};
+    linux_gpio_place_t inputs = {.count = 0};
     unsigned warnings = 0;
     if (config->relays.driver == CONFIG_RELAYS_GPIO) {
         const linux_gpio_relays_config_t setup = gpio_setup_relays(config);
         warnings += look(&setup.names, "relays", &relays, out);
+    }
+    if (config->inputs.driver == CONFIG_INPUTS_GPIO) {
+        const linux_gpio_inputs_config_t setup = gpio_setup_inputs(config);
+        warnings += look(&setup.names, "inputs", &inputs, out) + compare(config, &relays, &inputs, out);
     }
     return warnings;
 }

@@ -5,10 +5,14 @@
 #define HEAVE_APP_GPIO_SETUP_H
 
 #include "config.h"
+#include "linux_gpio_inputs.h"
 #include "linux_gpio_relays.h"
 
 /** The relays; points into config. */
 linux_gpio_relays_config_t gpio_setup_relays(const config_t *config);
+
+/** The inputs; points into config. */
+linux_gpio_inputs_config_t gpio_setup_inputs(const config_t *config);
 
 /** Writes a warning for what is not there, or a note where nothing can be looked at; requests nothing.
  *  @return the number of warnings */

@@ -38,7 +38,12 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
         .clock = clock};
     self->io = (gateway_io_t){.udp = udp_tap_hal(&self->tap), .log = log};
     const hv_status_t status = rig_open(&self->rig, config, &self->io);
-    return status == HV_OK ? session_init(&self->session, &config->settings, &self->io) : status;
+    if (status != HV_OK) {
+        return status;
+    }
+    switches_init(&self->switches, self->io.inputs);
+    self->io.inputs = switches_hal(&self->switches);
+    return session_init(&self->session, &config->settings, &self->io);
 }
 
 /* --- Hand-overs --- */
@@ -69,6 +74,21 @@ static void take_reloads(motion_loop_t *self)
     }
 }
 
+/* --- The operator: requests, switches --- */
+
+/* A hold of drives that were coming up has disabled them. */
+static bool is_down(const motion_loop_t *self)
+{
+    const state_t state = gateway_snapshot(&self->session.gateway)->state;
+    return state == STATE_OFF || (state == STATE_HOLD && self->before_hold == STATE_HOMING);
+}
+
+/* Without the key nothing goes up, and drives stay off. */
+static bool is_for_the_key(const motion_loop_t *self, uint32_t event)
+{
+    return event == EVENT_ENGAGE || event == EVENT_RESUME || (event == EVENT_PARK && is_down(self));
+}
+
 static hv_status_t carry_out(motion_loop_t *self, const motion_request_t *request)
 {
     if (request->event == OPERATOR_INTENSITY) {
@@ -88,10 +108,45 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
     motion_request_t request;
     while (count < REQUESTS_PER_CYCLE && ring_pop(&self->requests, &request, sizeof request) > 0) {
         result[count].id = request.id;
-        result[count].status = carry_out(self, &request);
+        result[count].is_key_off = switches_is_key_off(&self->switches) && is_for_the_key(self, request.event);
+        result[count].status = result[count].is_key_off ? HV_ERR_STATE : carry_out(self, &request);
         count++;
     }
     return count;
+}
+
+static void turn_off(motion_loop_t *self)
+{
+    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
+    const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
+    if (!is_latched && !is_down(self) && (s->goal == STATE_NEUTRAL || s->goal == STATE_ENGAGED)) {
+        hal_log_write(self->io.log, HAL_LOG_NOTICE, "the enable key was turned off: parking");
+        (void)!carry_out(self, &(motion_request_t){.event = EVENT_PARK});
+    }
+}
+
+static void tell_blind(motion_loop_t *self)
+{
+    const bool is_blind = switches_is_lost(&self->switches);
+    if (is_blind != self->was_blind) {
+        hal_log_write(self->io.log, is_blind ? HAL_LOG_ERROR : HAL_LOG_NOTICE,
+                      is_blind ? "inputs: cannot be read, which counts as an e-stop" : "inputs: read again");
+    }
+    self->was_blind = is_blind;
+}
+
+/* Key and button as requests, so that a recording replays them. The e-stop is the gateway's. */
+static void take_switches(motion_loop_t *self)
+{
+    const switches_change_t change = switches_step(&self->switches, self->session.now_us);
+    tell_blind(self);
+    if ((change.off & INPUT_ENABLE) != 0) {
+        turn_off(self);
+    }
+    if ((change.on & INPUT_RESET) != 0) {
+        hal_log_write(self->io.log, HAL_LOG_NOTICE, "the reset button was pressed");
+        (void)!carry_out(self, &(motion_request_t){.event = EVENT_RESET});
+    }
 }
 
 static void answer_requests(motion_loop_t *self, motion_result_t *result, unsigned count)
@@ -211,6 +266,12 @@ static void note_latency(motion_loop_t *self)
     }
 }
 
+static void note_hold(motion_loop_t *self)
+{
+    const state_t state = gateway_snapshot(&self->session.gateway)->state;
+    self->before_hold = state == STATE_HOLD ? self->before_hold : state;
+}
+
 static void run_cycle(motion_loop_t *self, uint64_t late_us)
 {
     motion_result_t result[REQUESTS_PER_CYCLE];
@@ -221,10 +282,12 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
         hold_if_too_late(self, skipped);
     }
     take_reloads(self);
+    take_switches(self);
     const unsigned requests = take_requests(self, result);
     self->tap.arrival_us = 0;
     const bool is_zero = session_cycle(&self->session);
     note_latency(self);
+    note_hold(self);
     write_down(self, is_zero);
     publish(self);
     answer_requests(self, result, requests);

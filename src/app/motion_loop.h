@@ -10,6 +10,7 @@
 #include "blackbox.h"
 #include "config.h"
 #include "heave/hal/clock.h"
+#include "heave/switches.h"
 #include "histogram.h"
 #include "rig.h"
 #include "ring.h"
@@ -61,6 +62,7 @@ typedef struct {
     int32_t status; /**< hv_status_t */
     snapshot_t snapshot;
     bool is_shutting_down;
+    bool is_key_off; /**< refused because of that */
 } motion_result_t;
 
 /** What a reload hands over. */
@@ -82,6 +84,9 @@ typedef struct {
     rig_t rig;
     gateway_io_t io;
     udp_tap_t tap;
+    switches_t switches; /**< between the inputs and the gateway */
+    bool was_blind;      /**< the inputs could not be read */
+    state_t before_hold; /**< newest state but HOLD */
     hal_clock_t clock;
     uint32_t late_hold_cycles; /**< a cycle later than that holds the platform; 0 = never */
     bool is_recording;

@@ -122,6 +122,16 @@ static hv_status_t open_relays(rig_t *self, const config_t *config, gateway_io_t
     return linux_gpio_relays_open(&self->gpio_relays, &relays);
 }
 
+static hv_status_t open_inputs(rig_t *self, const config_t *config, gateway_io_t *io)
+{
+    if (config->inputs.driver != CONFIG_INPUTS_GPIO) {
+        return HV_OK;
+    }
+    const linux_gpio_inputs_config_t inputs = gpio_setup_inputs(config);
+    io->inputs = linux_gpio_inputs_hal(&self->gpio_inputs);
+    return linux_gpio_inputs_open(&self->gpio_inputs, &inputs);
+}
+
 /* A line of Modbus drives: the host of one drive, or of all; or the serial port. */
 static linux_modbus_config_t modbus_line_of(const config_t *config, unsigned line)
 {
@@ -165,6 +175,7 @@ hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io)
     const uint8_t axes = describe(self, config);
     hv_status_t status = open_sim(self, config, axes, inputs_present(&config->inputs), io);
     status = status == HV_OK ? open_relays(self, config, io) : status;
+    status = status == HV_OK ? open_inputs(self, config, io) : status;
     if (status != HV_OK) {
         return status;
     }
@@ -186,6 +197,9 @@ const char *rig_trouble(rig_t *self)
 {
     if (self->gpio_relays.error_text[0] != '\0') {
         return self->gpio_relays.error_text;
+    }
+    if (self->gpio_inputs.error_text[0] != '\0') {
+        return self->gpio_inputs.error_text;
     }
     const char *text = self->is_can_open ? self->can.error_text : "";
     for (unsigned i = 0; i < self->modbus_lines && text[0] == '\0'; i++) {
@@ -228,6 +242,7 @@ static void leave_cia402(rig_t *self)
 void rig_close(rig_t *self, uint16_t safe_mask)
 {
     linux_gpio_relays_close(&self->gpio_relays, safe_mask);
+    linux_gpio_inputs_close(&self->gpio_inputs);
     close_modbus(self);
     if (self->is_can_open) {
         if (self->cia402.config != NULL) {

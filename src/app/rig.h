@@ -10,6 +10,7 @@
 #include "heave/gateway.h"
 #include "heave/modbus_drive.h"
 #include "linux_can.h"
+#include "linux_gpio_inputs.h"
 #include "linux_gpio_relays.h"
 #include "linux_modbus.h"
 #include "sim_drives.h"
@@ -26,6 +27,7 @@ typedef struct {
     sim_relays_t sim_relays;
     sim_inputs_t sim_inputs;
     linux_gpio_relays_t gpio_relays;
+    linux_gpio_inputs_t gpio_inputs;
     bool is_can_open;
     linux_can_t can;
     canraw_map_t canraw_map;

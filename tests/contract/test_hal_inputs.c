@@ -1,8 +1,18 @@
 /* SPDX-License-Identifier: MIT
- * test_hal_inputs.c - the contract of hal/inputs.h on every backend, and the fault plan of the simulated one.
+ * test_hal_inputs.c - the contract of hal/inputs.h on every backend; the fault plan of the simulated one, and what there is to
+ * contacts on GPIO lines.
+ *
+ *     test_contract_hal_inputs          the simulated switches
+ *     test_contract_hal_inputs --gpio   GPIO lines, as root on a kernel of its own with gpio-sim (tests/lib/kernel.py)
  */
 #include "contract.h"
 
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "gpio_sim.h"
+#include "linux_gpio_inputs.h"
 #include "sim_inputs.h"
 
 #define ALL_INPUTS (INPUT_ESTOP | INPUT_ENABLE | INPUT_RESET)
@@ -13,6 +23,7 @@ typedef struct {
     hal_inputs_t (*open)(uint32_t present);
     void (*close)(void);
     void (*set)(uint32_t input, bool is_active); /**< someone moves a switch */
+    void (*settle)(void);                        /**< until a slow backend has seen it */
     void (*set_broken)(bool is_broken);          /**< the lines cannot be read; NULL: not to be had here */
 } fixture_t;
 
@@ -38,7 +49,80 @@ static void break_sim(bool is_broken)
     sim.is_broken = is_broken;
 }
 
-static const fixture_t k_fixtures[] = {{"sim", open_sim, close_sim, set_sim, break_sim}};
+static void do_nothing(void) {}
+
+static const fixture_t k_sim = {"sim", open_sim, close_sim, set_sim, do_nothing, break_sim};
+
+/* --- Contacts on GPIO lines: DESK1 is the e-stop, DESK2 the key, DESK3 the button --- */
+
+#define CHIP_LINES 5u
+
+static linux_gpio_inputs_t gpio;
+static gpio_sim_t chip;
+static bool is_active_low = true;
+
+static linux_gpio_inputs_config_t desk(uint32_t present)
+{
+    static const char *const k_line[] = {"DESK1", "DESK2", "DESK3"};
+    linux_gpio_inputs_config_t config = {.is_active_low = is_active_low};
+    for (unsigned i = 0; i < 3; i++) {
+        if ((present >> i & 1u) != 0) {
+            config.names.line[config.names.count] = k_line[i];
+            config.input[config.names.count++] = 1u << i;
+        }
+    }
+    return config;
+}
+
+static void pass(unsigned ms)
+{
+    const struct timespec time = {.tv_sec = ms / 1000, .tv_nsec = ms % 1000 * 1000000L};
+    (void)nanosleep(&time, NULL);
+}
+
+/* A contact: between its line and ground, or supply. Open, the line is where its pull has it. */
+static void set_contact(unsigned line, bool is_closed)
+{
+    gpio_sim_pull(&chip, line, is_closed != is_active_low);
+}
+
+/* Key and button close when active, the e-stop opens. */
+static void set_gpio(uint32_t input, bool is_active)
+{
+    const unsigned line = input == INPUT_ESTOP ? 1 : input == INPUT_ENABLE ? 2 : 3;
+    set_contact(line, is_active != (input == INPUT_ESTOP));
+}
+
+/* The worker looks, and what was pressed before is told of. */
+static void settle_gpio(void)
+{
+    uint32_t levels;
+    pass(12);
+    (void)!hal_inputs_read(hal, &levels);
+}
+
+/* Every wire is broken: the lines are where the request has pulled them. */
+static hal_inputs_t open_gpio_broken(uint32_t present)
+{
+    const linux_gpio_inputs_config_t config = desk(present);
+    TEST_ASSERT_EQUAL_MESSAGE(HV_OK, linux_gpio_inputs_open(&gpio, &config), gpio.error_text);
+    return linux_gpio_inputs_hal(&gpio);
+}
+
+static hal_inputs_t open_gpio(uint32_t present)
+{
+    hal = open_gpio_broken(present);
+    set_gpio(INPUT_ESTOP, false);
+    settle_gpio();
+    return hal;
+}
+
+static void close_gpio(void)
+{
+    linux_gpio_inputs_close(&gpio);
+}
+
+static const fixture_t k_gpio = {"gpio", open_gpio, close_gpio, set_gpio, settle_gpio, NULL};
 
 void setUp(void)
 {
@@ -62,6 +146,7 @@ static void set_all(uint32_t levels)
     for (uint32_t input = INPUT_ESTOP; input <= INPUT_RESET; input <<= 1) {
         fixture->set(input, (levels & input) != 0);
     }
+    fixture->settle();
 }
 
 static void test_valid_complete_accepts(void)
@@ -141,16 +226,237 @@ static void test_sim_read_failing_at_every_step_recovers(void)
     }
 }
 
-int main(void)
+/* --- What only contacts have --- */
+
+static uint32_t read_now(void)
 {
-    UNITY_BEGIN();
-    for (size_t i = 0; i < sizeof k_fixtures / sizeof k_fixtures[0]; i++) {
-        fixture = &k_fixtures[i];
-        contract_backend = fixture->name;
-        run_contract();
+    uint32_t levels = 0xDEAD;
+    TEST_ASSERT_EQUAL(HV_OK, hal_inputs_read(hal, &levels));
+    return levels;
+}
+
+static void test_gpio_broken_wires_are_an_estop_and_nothing_else(void)
+{
+    close_gpio();
+    hal = open_gpio_broken(ALL_INPUTS);
+    TEST_ASSERT_EQUAL_HEX32(INPUT_ESTOP, read_now()); /* from the first read on */
+    pass(30);
+    TEST_ASSERT_EQUAL_HEX32(INPUT_ESTOP, read_now());
+}
+
+static void test_gpio_edge_is_seen_within_a_millisecond(void)
+{
+    for (unsigned i = 0; i < 20; i++) {
+        pass(i % 10);
+        TEST_ASSERT_EQUAL_HEX32(0, read_now());
+        set_contact(1, false);
+        pass(1);
+        TEST_ASSERT_EQUAL_HEX32(INPUT_ESTOP, read_now());
+        set_contact(1, true);
+        settle_gpio();
     }
-    fixture = &k_fixtures[0];
-    contract_backend = fixture->name;
-    RUN_TEST(test_sim_read_failing_at_every_step_recovers);
+}
+
+static void test_gpio_chip_that_goes_is_an_error_and_stays_one(void)
+{
+    uint32_t levels = 0xDEAD;
+    gpio_sim_unplug(&chip);
+    pass(15);
+    for (unsigned i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL(HV_ERR_IO, hal_inputs_read(hal, &levels));
+        TEST_ASSERT_EQUAL_HEX32(0xDEAD, levels);
+        pass(300);
+    }
+    close_gpio();
+    gpio_sim_drop(&chip);
+    TEST_ASSERT_TRUE(gpio_sim_make(&chip, "desk", "desk", CHIP_LINES, "DESK"));
+}
+
+static void test_gpio_lines_in_use_or_missing_are_named(void)
+{
+    static linux_gpio_inputs_t other;
+    linux_gpio_inputs_config_t config = desk(INPUT_ESTOP | INPUT_RESET);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, linux_gpio_inputs_open(&other, &config));
+    TEST_ASSERT_EQUAL_STRING("gpio: line DESK1 of chip desk is in use by \"heaved inputs\"", other.error_text);
+    config.names.line[1] = "DESK9";
+    TEST_ASSERT_EQUAL(HV_ERR_IO, linux_gpio_inputs_open(&other, &config));
+    TEST_ASSERT_EQUAL_STRING("gpio: no chip has a line DESK9 (gpioinfo lists what there is)", other.error_text);
+    linux_gpio_inputs_close(&other);
+}
+
+static void run_gpio(void)
+{
+    RUN_TEST(test_gpio_broken_wires_are_an_estop_and_nothing_else);
+    RUN_TEST(test_gpio_edge_is_seen_within_a_millisecond);
+    RUN_TEST(test_gpio_lines_in_use_or_missing_are_named);
+    RUN_TEST(test_gpio_chip_that_goes_is_an_error_and_stays_one);
+}
+
+/* --- Edges: the simulated chip tells of none in User Mode Linux, so these come from a pipe --- */
+
+enum { ROSE = 0x80 };
+
+static struct {
+    bool is_used;
+    int pipe[2];
+    uint32_t closed; /**< contacts */
+    int error;       /**< of reading them */
+} m_fake;
+
+hv_status_t __real_linux_gpio_request(linux_gpio_chip_t *self, const linux_gpio_names_t *names, linux_gpio_request_t *request,
+                                      char text[LINUX_GPIO_TEXT_SIZE]);
+hv_status_t __wrap_linux_gpio_request(linux_gpio_chip_t *self, const linux_gpio_names_t *names, linux_gpio_request_t *request,
+                                      char text[LINUX_GPIO_TEXT_SIZE]);
+int __real_linux_gpio_chip_get(linux_gpio_chip_t *self, uint32_t *values);
+int __wrap_linux_gpio_chip_get(linux_gpio_chip_t *self, uint32_t *values);
+unsigned __real_linux_gpio_chip_fds(const linux_gpio_chip_t *self, int fd[LINUX_GPIO_LINES_MAX]);
+unsigned __wrap_linux_gpio_chip_fds(const linux_gpio_chip_t *self, int fd[LINUX_GPIO_LINES_MAX]);
+int __real_linux_gpio_chip_edges(linux_gpio_chip_t *self, unsigned index, uint32_t *rose, uint32_t *fell);
+int __wrap_linux_gpio_chip_edges(linux_gpio_chip_t *self, unsigned index, uint32_t *rose, uint32_t *fell);
+
+hv_status_t __wrap_linux_gpio_request(linux_gpio_chip_t *self, const linux_gpio_names_t *names, linux_gpio_request_t *request,
+                                      char text[LINUX_GPIO_TEXT_SIZE])
+{
+    if (!m_fake.is_used) {
+        return __real_linux_gpio_request(self, names, request, text);
+    }
+    memset(self, 0, sizeof *self);
+    return HV_OK;
+}
+
+int __wrap_linux_gpio_chip_get(linux_gpio_chip_t *self, uint32_t *values)
+{
+    if (!m_fake.is_used) {
+        return __real_linux_gpio_chip_get(self, values);
+    }
+    *values = __atomic_load_n(&m_fake.closed, __ATOMIC_ACQUIRE);
+    return __atomic_load_n(&m_fake.error, __ATOMIC_ACQUIRE);
+}
+
+unsigned __wrap_linux_gpio_chip_fds(const linux_gpio_chip_t *self, int fd[LINUX_GPIO_LINES_MAX])
+{
+    fd[0] = m_fake.pipe[0];
+    return m_fake.is_used ? 1 : __real_linux_gpio_chip_fds(self, fd);
+}
+
+int __wrap_linux_gpio_chip_edges(linux_gpio_chip_t *self, unsigned index, uint32_t *rose, uint32_t *fell)
+{
+    uint8_t edge = 0;
+    if (!m_fake.is_used) {
+        return __real_linux_gpio_chip_edges(self, index, rose, fell);
+    }
+    TEST_ASSERT_EQUAL_INT(1, (int)read(m_fake.pipe[0], &edge, 1));
+    *((edge & ROSE) != 0 ? rose : fell) |= edge & 7u;
+    return 0;
+}
+
+static void start_fake(void)
+{
+    const linux_gpio_inputs_config_t config = desk(ALL_INPUTS);
+    linux_gpio_inputs_close(&gpio);
+    m_fake.is_used = true;
+    m_fake.closed = INPUT_ESTOP;
+    m_fake.error = 0;
+    TEST_ASSERT_EQUAL_INT(0, pipe(m_fake.pipe));
+    TEST_ASSERT_EQUAL(HV_OK, linux_gpio_inputs_open(&gpio, &config));
+    hal = linux_gpio_inputs_hal(&gpio);
+}
+
+static void end_fake(void)
+{
+    linux_gpio_inputs_close(&gpio);
+    (void)close(m_fake.pipe[0]);
+    m_fake.is_used = false;
+}
+
+static void tell_edge(uint8_t edge)
+{
+    TEST_ASSERT_EQUAL_INT(1, (int)write(m_fake.pipe[1], &edge, 1));
+}
+
+/* Reads until it says so: the worker comes when it comes. A worker that was not let run for long is an error of its own. */
+static void await(hv_status_t status, uint32_t expected)
+{
+    const time_t limit = time(NULL) + 60;
+    uint32_t levels;
+    for (;;) {
+        levels = 0xDEAD;
+        const hv_status_t now = hal_inputs_read(hal, &levels);
+        if (now == status && (status != HV_OK || levels == expected)) {
+            return;
+        }
+        TEST_ASSERT_TRUE_MESSAGE(time(NULL) < limit, "never");
+        pass(1);
+    }
+}
+
+/* The contact is closed whenever anybody looks: only the edge tells. */
+static void test_edges_short_opening_is_told_of(void)
+{
+    static const uint8_t k_edges[] = {INPUT_ESTOP, INPUT_ESTOP | ROSE};
+    start_fake();
+    await(HV_OK, 0);
+    for (unsigned i = 0; i < 20; i++) {
+        tell_edge(k_edges[i % 2]);
+        await(HV_OK, INPUT_ESTOP);
+        await(HV_OK, 0);
+    }
+    (void)close(m_fake.pipe[1]);
+    end_fake();
+}
+
+static void test_edges_that_break_are_replaced_by_looking(void)
+{
+    start_fake();
+    (void)close(m_fake.pipe[1]); /* ready for ever, with nothing to read */
+    await(HV_OK, 0);
+    __atomic_store_n(&m_fake.closed, INPUT_ESTOP | INPUT_RESET, __ATOMIC_RELEASE);
+    await(HV_OK, INPUT_RESET);
+    __atomic_store_n(&m_fake.closed, 0, __ATOMIC_RELEASE);
+    await(HV_OK, INPUT_ESTOP);
+    end_fake();
+}
+
+static void test_edges_lines_that_cannot_be_read_for_a_while(void)
+{
+    start_fake();
+    __atomic_store_n(&m_fake.error, 5, __ATOMIC_RELEASE);
+    await(HV_ERR_IO, 0);
+    __atomic_store_n(&m_fake.error, 0, __ATOMIC_RELEASE);
+    await(HV_OK, 0);
+    (void)close(m_fake.pipe[1]);
+    end_fake();
+}
+
+static void run_contract_on(const fixture_t *on, const char *name)
+{
+    fixture = on;
+    contract_backend = name;
+    run_contract();
+}
+
+int main(int argc, char **argv)
+{
+    const bool is_gpio = argc > 1 && strcmp(argv[1], "--gpio") == 0;
+    if (is_gpio && !gpio_sim_make(&chip, "desk", "desk", CHIP_LINES, "DESK")) {
+        printf("1..0 # SKIP this kernel has no gpio-sim\n");
+        return 0;
+    }
+    UNITY_BEGIN();
+    if (!is_gpio) {
+        run_contract_on(&k_sim, "sim");
+        RUN_TEST(test_sim_read_failing_at_every_step_recovers);
+        contract_backend = "gpio";
+        RUN_TEST(test_edges_short_opening_is_told_of);
+        RUN_TEST(test_edges_that_break_are_replaced_by_looking);
+        RUN_TEST(test_edges_lines_that_cannot_be_read_for_a_while);
+        return UNITY_END();
+    }
+    run_contract_on(&k_gpio, "gpio, contacts to ground");
+    run_gpio();
+    is_active_low = false;
+    run_contract_on(&k_gpio, "gpio, contacts to supply");
+    run_gpio();
+    gpio_sim_drop(&chip);
     return UNITY_END();
 }

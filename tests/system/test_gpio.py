@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_gpio.py BIN masks|lines - the daemon on GPIO lines that the kernel simulates, on virtual time. Runs inside kernel.py.
+"""test_gpio.py BIN masks|lines|inputs - the daemon on GPIO lines that the kernel simulates, on virtual time. Runs inside kernel.py.
 
 What the relays do is read from the other side of the lines, as a multimeter at the terminals would."""
 import signal
@@ -186,6 +186,144 @@ def unplugged(bin_dir):
         assert daemon.log.read_text(encoding="utf-8").count("relays: cannot be switched") == 1
 
 
+# --- Inputs: contacts to ground on a chip that is called desk. A broken wire and an open contact are the same: nothing pulls down ---
+
+ESTOP, KEY, BUTTON = 1, 2, 3
+INPUTS = "\n[inputs]\ndriver = gpio\nestop = DESK1\nreset = DESK3\n"
+MANUAL = {"platform__engage": "manual"}
+
+
+class Desk(gpio_sim.Chip):
+    def __init__(self):
+        super().__init__("desk", 5, "DESK")
+
+    def close(self, line):
+        self.pull(line, False)
+
+    def open(self, line):
+        self.pull(line, True)
+
+    def press(self, line):
+        self.close(line)
+        time.sleep(0.2)
+        self.open(line)
+
+
+class DeskBench(GpioBench):
+    """Started, with an e-stop that is released and was reset: heaved pulls the lines up, so at first every wire is broken."""
+
+    def __init__(self, bin_dir, desk, key="", **changes):
+        super().__init__(bin_dir, **{"engage__speed_mm_s": 150, "engage__accel_mm_s2": 1000, **MANUAL, **changes})
+        self.desk = desk
+        self.config.write_text(self.config.read_text(encoding="utf-8") + INPUTS + key, encoding="utf-8")
+
+    def start(self, *arguments, **options):
+        """Ends in OFF."""
+        daemon = super().start(*arguments, **options)
+        self.wait_state("ESTOP")
+        self.desk.close(ESTOP)
+        self.wait_status(lambda status: status["estop_active"] is False, "released")
+        assert self.status()["state"] == "ESTOP", "latched"
+        self.desk.press(BUTTON)
+        self.wait_state("OFF")
+        return daemon
+
+
+def engage(bench):
+    assert bench.ctl("engage").returncode == 0
+    bench.wait_state("ENGAGED")
+
+
+def estop(bin_dir):
+    """Latched in the cycle after the next at the latest, relays safe; the button resets once it is released; a recording replays it."""
+    with gpio_sim.Chip("effects", 16, "FX") as chip, Desk() as desk, DeskBench(bin_dir, desk) as bench:
+        record, trace = bench.folder / "record.txt", bench.folder / "live.csv"
+        daemon = bench.start("--record", record, "--trace", trace)
+        engage(bench)
+        with switch(bench, chip):
+            desk.open(ESTOP)
+            time.sleep(2 * CYCLE_US / 1e6)
+            assert relays(chip) == SAFE, f"two cycles later: {relays(chip):03X}"
+        assert bench.status()["state"] == "ESTOP" and bench.status()["estop_active"] is True
+        desk.press(BUTTON)
+        time.sleep(3)  # a reset waits for two
+        assert bench.status()["state"] == "ESTOP", "the e-stop is still pressed"
+        desk.close(ESTOP)
+        time.sleep(1)
+        assert bench.status()["state"] == "ESTOP", "latched"
+        desk.press(BUTTON)
+        bench.wait_state("OFF")
+        assert bench.stop(daemon) == 0
+        said = daemon.log.read_text(encoding="utf-8")
+        assert "ENGAGED -> ESTOP (estop)" in said and "the reset button was pressed" in said and "reset refused" in said, said
+        assert "!estop on" in record.read_text(encoding="utf-8") and "!reset" in record.read_text(encoding="utf-8")
+        live = trace.read_bytes()
+        assert bench.play(record)[:len(live)] == live, "a recording replays switches"
+
+
+def desk_unplugged(bin_dir):
+    """Whoever cannot see the e-stop has to stop."""
+    with gpio_sim.Chip("effects", 16, "FX") as chip, Desk() as desk, DeskBench(bin_dir, desk) as bench:
+        daemon = bench.start()
+        engage(bench)
+        with switch(bench, chip):
+            desk.unplug()
+            bench.wait_state("ESTOP")
+            wait_relays(chip, SAFE, "the inputs are gone")
+        assert bench.ctl("reset").returncode != 0
+        assert bench.stop(daemon) == 0
+        assert daemon.log.read_text(encoding="utf-8").count("inputs: cannot be read, which counts as an e-stop") == 1
+
+
+def key(bin_dir):
+    """Off: nobody engages, and who is up parks; never anything that brings drives up."""
+    with gpio_sim.Chip("effects", 16, "FX"), Desk() as desk, DeskBench(bin_dir, desk, "enable = DESK2\n", sim__enable_delay_ms=2000,
+                                                                       sim__homed="no") as bench:
+        def is_refused(*requests):
+            for request in requests:
+                run = bench.ctl(request)
+                assert run.returncode != 0 and "the enable key is off" in run.stderr + run.stdout, (request, run)
+
+        def turn(is_on):
+            (desk.close if is_on else desk.open)(KEY)
+            time.sleep(0.2)
+
+        bench.start()
+        is_refused("engage", "park", "resume")
+        turn(True)
+        assert bench.status()["state"] == "OFF", "a key moves nobody"
+        assert bench.ctl("engage").returncode == 0
+        bench.wait_state("HOMING")
+        assert bench.ctl("hold").returncode == 0
+        turn(False)
+        time.sleep(1)
+        assert bench.status()["state"] == "HOLD", "the drives stay off"
+        is_refused("engage", "park", "resume")
+        turn(True)
+        engage(bench)
+        turn(False)
+        bench.wait_state("SETTLED")
+        is_refused("engage")
+        turn(True)
+        assert bench.status()["state"] == "SETTLED"
+
+
+def inputs_missing(bin_dir):
+    with gpio_sim.Chip("effects", 16, "FX"), Desk() as desk:
+        with DeskBench(bin_dir, desk) as bench, DeskBench(bin_dir, desk) as other:
+            check = bench.heaved("--config", bench.config, "--check").stdout
+            assert "2 lines on chip desk" in check and "12 lines on chip effects" in check, check
+            other.edit("driver = gpio\nlines", "driver = sim\nlines")
+            bench.start()
+            assert 'gpio: line DESK1 of chip desk is in use by "heaved inputs"' in other.refused()
+        with DeskBench(bin_dir, desk) as bench:
+            bench.edit("reset = DESK3", "reset = DESC3")
+            assert "gpio: no chip has a line DESC3" in bench.refused()
+        with DeskBench(bin_dir, desk) as bench:
+            bench.edit("estop = DESK1\nreset = DESK3", "chip = effects\nestop = 2")
+            assert "warning: [inputs] gpio: line 2 is relay 1 already" in bench.heaved("--config", bench.config, "--check").stdout
+
+
 def main():
     suite = tap.Suite()
     if not gpio_sim.is_there():
@@ -196,7 +334,10 @@ def main():
              ("safe mask: sender dies, hold, park, SIGTERM", every_way_out), ("safe mask: fault", fault)]
     lines = [("kill -9: the lines fall back", killed), ("a line that another has is named with its owner", taken),
              ("a line that is not there, a chip that is not there", missing), ("the chip goes while running", unplugged)]
-    for name, case in {"masks": masks, "lines": lines}[sys.argv[2]]:
+    inputs = [("e-stop: relays safe within two cycles, latched, reset button, replay", estop),
+              ("the chip of the inputs goes while running: e-stop", desk_unplugged), ("enable key", key),
+              ("an input line that is not there, is in use, or is a relay", inputs_missing)]
+    for name, case in {"masks": masks, "lines": lines, "inputs": inputs}[sys.argv[2]]:
         with suite.case(name):
             case(sys.argv[1])
     return suite.done()

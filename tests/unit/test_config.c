@@ -485,7 +485,6 @@ static const spoilt_t k_spoilt[] = {
      "[relays] min_toggle_ms: \"60001\" is out of range; allowed: a whole number from 0 to 60000 ms, or one for each relay"},
     {"relays", "safe_mask", "safe_mask = 1000", "[relays] safe_mask: \"1000\" is out of range; allowed: hexadecimal 0 to FFF"},
     {"relays", "safe_mask", "safe_mask = 0x", "[relays] safe_mask: \"0x\" is not a mask; allowed: hexadecimal 0 to FFF"},
-    {"inputs", "driver", "driver = gpio", "[inputs] driver: driver gpio is not built into this heaved; allowed: sim"},
     {"inputs", "estop", "estop = A name that is longer than any line's",
      "[inputs] estop: \"A name that is longer than any line's\" is too long; allowed: none, or a name of at most 31 characters"},
     {"inputs", "estop", "estop = \xC2\xB5",
@@ -839,6 +838,45 @@ static void test_load_input_line_used_twice_is_an_error(void)
     set_key("inputs", "reset", "3");
     TEST_ASSERT_EQUAL_INT(1, load_lines());
     expect_contains("[inputs] reset: line 3 is estop already; allowed: a line of its own, or none\n");
+}
+
+static void test_load_gpio_inputs_need_lines_of_their_own_that_a_chip_can_be_found_by(void)
+{
+    static const struct {
+        const char *chip, *estop, *enable, *reset, *engage, *error;
+    } k_cases[] = {
+        {"none", "GPIO17", "GPIO27", "none", "manual", ""},
+        {"none", "none", "none", "GPIO17", "auto", ""},
+        {"a chip", "17", "none", "GPIO27", "auto", ""},
+        {"another", "9", "none", "7", "auto", ""},
+        {"none", "17", "none", "none", "auto",
+         "[inputs] estop: 17 alone is no line; allowed: the name of a line, or its number with chip\n"},
+        {"none", "none", "none", "none", "auto",
+         "[inputs] estop: driver gpio reads none; allowed: a line for estop, enable or reset\n"},
+        {"a chip", "17", "none", "017", "auto",
+         "[inputs] reset: line 017 is estop already; allowed: a line of its own, or none\n"},
+        {"a chip", "17", "none", "09", "auto",
+         "[inputs] reset: line 09 is relay 2 already; allowed: a line of its own, or none\n"},
+        {"/dev/gpiochip0", "17", "none", "none", "auto",
+         "[inputs] chip: /dev/gpiochip0 is a number that changes; allowed: the chip's label (gpiodetect shows it)\n"},
+        {"a chip", "17", "18", "none", "auto",
+         "[inputs] enable: engage = auto does not wait for a key; allowed: none, or engage = manual\n"},
+    };
+    for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {
+        take_good_file();
+        set_key("relays", "driver", "gpio");
+        set_key("relays", "safe_mask", "0");
+        set_key("relays", "chip", "a chip");
+        set_key("relays", "lines", "7, 9");
+        set_key("platform", "engage", k_cases[i].engage);
+        set_key("inputs", "driver", "gpio");
+        set_key("inputs", "chip", k_cases[i].chip);
+        set_key("inputs", "estop", k_cases[i].estop);
+        set_key("inputs", "enable", k_cases[i].enable);
+        set_key("inputs", "reset", k_cases[i].reset);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(k_cases[i].error[0] != '\0', load_lines(), m_errors);
+        expect_contains(k_cases[i].error);
+    }
 }
 
 /* ---- Values ---- */
@@ -1361,6 +1399,7 @@ int main(void)
     RUN_TEST(test_load_hinges_that_do_not_fit_are_an_error);
     RUN_TEST(test_load_safe_mask_above_the_relays_is_an_error);
     RUN_TEST(test_load_gpio_relays_need_lines_that_a_chip_can_be_found_by);
+    RUN_TEST(test_load_gpio_inputs_need_lines_of_their_own_that_a_chip_can_be_found_by);
     RUN_TEST(test_load_relay_times_that_contradict_each_other_are_errors);
     RUN_TEST(test_load_input_line_used_twice_is_an_error);
     RUN_TEST(test_load_values_arrive_where_they_belong);

@@ -39,7 +39,7 @@ static inline uint32_t hal_inputs_present(hal_inputs_t inputs)
     return inputs.ops->present(inputs.ctx);
 }
 
-/** Levels as they are now, not debounced. <= 100 us.
+/** Levels as they are now, not debounced; an e-stop that was active since the last read is active once. <= 100 us.
  *  @param levels out: INPUT_ESTOP | ...; the bit of an absent input is 0; unchanged on error
  *  @return HV_OK; HV_ERR_IO: the levels are not known (line gone, or the last reading is stale): treat it as an active
  *          e-stop. */

@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: MIT
+ * switches.h - the operator's switches without their bouncing. An e-stop acts at once; its release, and both ways of the other
+ * switches, count once they have stood still for SWITCHES_SETTLE_US. Stands in front of a gateway, so that its recordings hold
+ * what came of it and replay without it. The caller owns switches_t, which must not move; one thread; time is an argument.
+ */
+#ifndef HEAVE_SWITCHES_H
+#define HEAVE_SWITCHES_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "heave/hal/inputs.h"
+
+/** Contacts bounce for less than 10 ms; a finger presses for more than 80 ms. */
+#define SWITCHES_SETTLE_US 50000u
+
+#define SWITCHES_INPUTS 3u
+
+/** The switches; private. */
+typedef struct {
+    hal_inputs_t behind;
+    uint32_t seen;   /**< levels last read */
+    uint32_t levels; /**< those that count */
+    uint64_t since_us[SWITCHES_INPUTS];
+    bool is_started;
+    bool is_lost;
+} switches_t;
+
+/** Inputs that have just changed, INPUT_ENABLE | INPUT_RESET; never both bits of one. */
+typedef struct {
+    uint32_t on;
+    uint32_t off;
+} switches_change_t;
+
+/** Starts; the first levels read count as they are and are no change.
+ *  @param behind valid */
+void switches_init(switches_t *self, hal_inputs_t behind);
+
+/** Reads once; in every cycle, before the gateway's.
+ *  @param now_us never less than the last time */
+switches_change_t switches_step(switches_t *self, uint64_t now_us);
+
+/** True while the inputs cannot be read. */
+bool switches_is_lost(const switches_t *self);
+
+/** True where there is an enable key and it is off. */
+bool switches_is_key_off(const switches_t *self);
+
+/** The levels that count, as of the last step. Its read returns HV_ERR_IO while the inputs cannot be read. */
+hal_inputs_t switches_hal(switches_t *self);
+
+#endif
