@@ -98,6 +98,27 @@ def a_bus_that_does_not_work_says_why(bench):
     assert bench.stop(daemon) == 0
 
 
+def names_of(value):
+    """Of all members, at any depth."""
+    if isinstance(value, dict):
+        return set(value) | set().union(*map(names_of, value.values()))
+    return set().union(*map(names_of, value)) if isinstance(value, list) else set()
+
+
+def every_member_is_documented(bench):
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    status = bench.status()
+    for counts in ("accepted", "rejected"):
+        status["counters"][counts] = None  # members are commands and reasons there
+    rows = re.findall(r"^\|.*$", (heave.TOP / "docs/status-json.md").read_text(encoding="utf-8"), re.MULTILINE)
+    known = {word for row in rows for piece in re.findall(r"`([^`]+)`", row) for word in re.split(r"[.\[\]]+", piece)}
+    promised = {re.split(r"[.\[]", piece)[0] for row in rows for piece in re.findall(r"`([^`]+)`", row.split("|")[1]) if piece[0] != "."}
+    assert not names_of(status) - known, f"not in docs/status-json.md: {sorted(names_of(status) - known)}"
+    assert not promised - set(status), f"documented and not there: {sorted(promised - set(status))}"
+    assert bench.stop(daemon) == 0
+
+
 def without_a_daemon(bench):
     for command in COMMANDS + ["status", "watch"]:
         run = bench.ctl(command)
@@ -555,6 +576,7 @@ CASES = {
     "every command of heavectl has its answer": every_command_answers,
     "answers for people are lines and an 80-column table": plain_answers_are_lines,
     "a bus that does not work says why in the status": a_bus_that_does_not_work_says_why,
+    "every member of the status is documented": every_member_is_documented,
     "heavectl without a daemon, or wrongly called": without_a_daemon,
     "watch, not on a terminal": watches_by_line,
     "watch on a terminal puts it back on Ctrl-C": watches_on_a_terminal,
