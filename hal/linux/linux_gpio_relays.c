@@ -125,15 +125,17 @@ hv_status_t linux_gpio_relays_open(linux_gpio_relays_t *self, const linux_gpio_r
     return HV_OK;
 }
 
-void linux_gpio_relays_close(linux_gpio_relays_t *self, uint16_t safe_mask)
+bool linux_gpio_relays_close(linux_gpio_relays_t *self, uint16_t safe_mask)
 {
     if (!self->is_open) {
-        return;
+        return true;
     }
     self->is_open = false;
     self->safe_mask = safe_mask;
     __atomic_store_n(&self->is_ending, 1, __ATOMIC_RELEASE);
-    if (linux_gpio_thread_end(self->thread, self->wake)) {
-        linux_gpio_chip_close(&self->chip);
+    if (!linux_gpio_thread_end(self->thread, self->wake)) {
+        return false;
     }
+    linux_gpio_chip_close(&self->chip);
+    return true;
 }

@@ -41,8 +41,9 @@ typedef struct {
 hv_status_t linux_gpio_relays_open(linux_gpio_relays_t *self, const linux_gpio_relays_config_t *config) HV_MUST_CHECK;
 
 /** Sets this mask, ends the worker and gives the lines back. Takes at most a second, where a chip hangs. Harmless on one that
- *  is not open. */
-void linux_gpio_relays_close(linux_gpio_relays_t *self, uint16_t safe_mask);
+ *  is not open.
+ *  @return false: the chip hangs, and the worker may still use self */
+bool linux_gpio_relays_close(linux_gpio_relays_t *self, uint16_t safe_mask);
 
 /** The bank as hal/relays.h wants it. */
 hal_relays_t linux_gpio_relays_hal(linux_gpio_relays_t *self);

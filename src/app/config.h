@@ -236,7 +236,7 @@ typedef struct {
 } config_lines_t;
 
 /** What switches the relays. */
-typedef enum { CONFIG_RELAYS_SIM, CONFIG_RELAYS_GPIO } config_relays_driver_t;
+typedef enum { CONFIG_RELAYS_SIM, CONFIG_RELAYS_GPIO, CONFIG_RELAYS_MODBUS } config_relays_driver_t;
 
 /** Relay outputs, relay 1 first. */
 typedef struct {
@@ -245,6 +245,14 @@ typedef struct {
     config_lines_t lines;
     bool is_active_low;
 } config_relays_t;
+
+/** The board of relays on Modbus and the line it has to itself: TCP, or serial where there is no host. */
+typedef struct {
+    config_hosts_t hosts;       /**< at most one */
+    config_modbus_rtu_t serial; /**< device "none": there is none */
+    uint32_t unit;
+    uint32_t timeout_ms;
+} config_relays_modbus_t;
 
 /** What reads the operator's switches. */
 typedef enum { CONFIG_INPUTS_SIM, CONFIG_INPUTS_GPIO } config_inputs_driver_t;
@@ -283,6 +291,7 @@ typedef struct {
     config_modbus_tcp_t modbus_tcp;
     config_modbus_rtu_t modbus_rtu;
     config_relays_t relays;
+    config_relays_modbus_t relays_modbus;
     config_inputs_t inputs;
 } config_t;
 

@@ -7,6 +7,7 @@
 #include "config_bus.h"
 #include "config_canraw.h"
 #include "config_cia402.h"
+#include "config_coils.h"
 #include "config_gpio.h"
 #include "config_modbus.h"
 #include "config_source.h"
@@ -408,6 +409,7 @@ static void check_values(config_source_t *self)
     check_silence(self);
     check_intensity(self);
     check_relays(self);
+    config_coils_check(self);
     config_gpio_check(self);
     config_cia402_check(self);
     config_canraw_check(self);

@@ -319,7 +319,9 @@ static int finish(live_t *self)
     metrics_remove(&self->metrics);
     write_all(self);
     (void)!linux_log_flush(&self->log);
-    (void)blackbox_close(&self->blackbox); /* what has just happened is written now */
+    if (!self->is_thread_running) {
+        (void)blackbox_close(&self->blackbox); /* what has just happened is written now */
+    }
     int code = EXIT_DONE;
     if (self->loop.is_recording) {
         code = close_file(&self->record, self->options->record, &self->loop.record, "lines");
@@ -432,15 +434,15 @@ int live_run(const config_t *config, const options_t *options)
     self->udp.fd = -1;
     int code = open_all(self, config);
     code = code == EXIT_DONE ? run(self, config) : code;
-    const bool has_blackbox_ended = blackbox_close(&self->blackbox);
     control_close(&self->control);
     manager_close(&self->manager);
-    if (!self->is_thread_running) { /* a stuck one may still use all this: the end of the process gives it back */
-        rig_close(&self->loop.rig, self->config.settings.relay_safe_mask);
+    if (!self->is_thread_running) { /* a stuck thread may still use all this: the end of the process gives it back */
+        const bool has_blackbox_ended = blackbox_close(&self->blackbox);
+        const bool has_rig_ended = rig_close(&self->loop.rig, self->config.settings.relay_safe_mask);
         linux_udp_close(&self->udp);
-    }
-    if (!self->is_thread_running && has_blackbox_ended) {
-        free(self);
+        if (has_blackbox_ended && has_rig_ended) {
+            free(self);
+        }
     }
     return code;
 }

@@ -7,6 +7,7 @@
 
 #include "config_canraw.h"
 #include "config_cia402.h"
+#include "config_coils.h"
 #include "config_modbus.h"
 #include "gpio_setup.h"
 
@@ -14,6 +15,7 @@
 #define LEAVE_POLL_NS 1000000 /* between looks whether drives on Modbus have taken what stops them */
 #define LEAVE_POLLS   500u
 #define BROADCAST_US  20000u       /* after a broadcast, for drives to act */
+#define COIL_LOOK_US  1000000u     /* a board of relays is looked at so often */
 #define RUN_DIR       "/run/heave" /* where heave-can-flush@.path looks */
 
 #define ANGLE_TRAVEL_DEG 1000000 /* a rotation motor has no stops of its own */
@@ -111,11 +113,57 @@ static hv_status_t open_cia402(rig_t *self, const config_t *config, gateway_io_t
     return status == HV_OK ? cia402_init(&self->cia402, &self->cia402_config, linux_can_hal(&self->can)) : status;
 }
 
+/* The serial line of a section. */
+static void add_serial(linux_modbus_config_t *modbus, const config_modbus_rtu_t *serial)
+{
+    static const char k_parities[] = {'N', 'E', 'O'};
+    modbus->device = serial->device;
+    modbus->baud_bps = serial->baud_bps;
+    modbus->parity = k_parities[serial->parity];
+    modbus->stop_bits = serial->stop_bits;
+    modbus->direction = (linux_modbus_direction_t)serial->rs485;
+    modbus->direction_delay_us = serial->rs485_delay_us;
+}
+
+static void add_host(linux_modbus_config_t *modbus, const config_host_t *host)
+{
+    modbus->host = host->address;
+    modbus->port = host->port;
+}
+
+/* The board has a line of its own, so that it waits for no drive and no drive for it. */
+static hv_status_t open_coils(rig_t *self, const config_t *config, gateway_io_t *io)
+{
+    const config_relays_modbus_t *board = &config->relays_modbus;
+    linux_modbus_config_t modbus = {.timeout_us = board->timeout_ms * 1000u};
+    if (board->hosts.count != 0) {
+        add_host(&modbus, &board->hosts.host[0]);
+    } else {
+        add_serial(&modbus, &board->serial);
+    }
+    const hv_status_t status = linux_modbus_open(&self->coil_line, &modbus);
+    if (status != HV_OK) {
+        return status == HV_ERR_ARG ? HV_ERR_RANGE : HV_ERR_IO;
+    }
+    const coil_relays_config_t relays = {.line = linux_modbus_hal(&self->coil_line),
+                                         .unit = (uint8_t)board->unit,
+                                         .first_coil = config_coils_first(config),
+                                         .count = config->relays.lines.count,
+                                         .is_active_low = config->relays.is_active_low,
+                                         .start_mask = config->settings.relay_safe_mask,
+                                         .look_calls = COIL_LOOK_US / config->settings.cycle_us};
+    io->relays = coil_relays_hal(&self->coil_relays);
+    return coil_relays_init(&self->coil_relays, &relays);
+}
+
 /* Relays first: from here on they are at the safe mask. */
 static hv_status_t open_relays(rig_t *self, const config_t *config, gateway_io_t *io)
 {
-    if (config->relays.driver != CONFIG_RELAYS_GPIO) {
+    if (config->relays.driver == CONFIG_RELAYS_SIM) {
         return HV_OK;
+    }
+    if (config->relays.driver == CONFIG_RELAYS_MODBUS) {
+        return open_coils(self, config, io);
     }
     const linux_gpio_relays_config_t relays = gpio_setup_relays(config);
     io->relays = linux_gpio_relays_hal(&self->gpio_relays);
@@ -135,20 +183,12 @@ static hv_status_t open_inputs(rig_t *self, const config_t *config, gateway_io_t
 /* A line of Modbus drives: the host of one drive, or of all; or the serial port. */
 static linux_modbus_config_t modbus_line_of(const config_t *config, unsigned line)
 {
-    static const char k_parities[] = {'N', 'E', 'O'};
-    const config_modbus_rtu_t *rtu = &config->modbus_rtu;
     linux_modbus_config_t modbus = {.timeout_us = config->modbus.timeout_ms * 1000u, .broadcast_pause_us = BROADCAST_US};
     if (config->drives == CONFIG_DRIVES_MODBUS_TCP) {
-        modbus.host = config->modbus_tcp.hosts.host[line].address;
-        modbus.port = config->modbus_tcp.hosts.host[line].port;
-        return modbus;
+        add_host(&modbus, &config->modbus_tcp.hosts.host[line]);
+    } else {
+        add_serial(&modbus, &config->modbus_rtu);
     }
-    modbus.device = rtu->device;
-    modbus.baud_bps = rtu->baud_bps;
-    modbus.parity = k_parities[rtu->parity];
-    modbus.stop_bits = rtu->stop_bits;
-    modbus.direction = (linux_modbus_direction_t)rtu->rs485;
-    modbus.direction_delay_us = rtu->rs485_delay_us;
     return modbus;
 }
 
@@ -205,7 +245,7 @@ const char *rig_trouble(rig_t *self)
     for (unsigned i = 0; i < self->modbus_lines && text[0] == '\0'; i++) {
         text = linux_modbus_text(&self->modbus_line[i]);
     }
-    return text;
+    return text[0] == '\0' && self->coil_line.is_open ? linux_modbus_text(&self->coil_line) : text;
 }
 
 /* What stops the drives may be several writes: the driver goes on until all have taken it, or do not answer. */
@@ -239,10 +279,20 @@ static void leave_cia402(rig_t *self)
     (void)nanosleep(&pause, NULL);
 }
 
-void rig_close(rig_t *self, uint16_t safe_mask)
+/* Closing the line serves what waits. */
+static void close_coils(rig_t *self, uint16_t safe_mask)
 {
-    linux_gpio_relays_close(&self->gpio_relays, safe_mask);
+    if (self->coil_relays.config.line.ops != NULL) {
+        (void)!hal_relays_write(coil_relays_hal(&self->coil_relays), safe_mask);
+    }
+    linux_modbus_close(&self->coil_line);
+}
+
+bool rig_close(rig_t *self, uint16_t safe_mask)
+{
+    const bool has_ended = linux_gpio_relays_close(&self->gpio_relays, safe_mask);
     linux_gpio_inputs_close(&self->gpio_inputs);
+    close_coils(self, safe_mask);
     close_modbus(self);
     if (self->is_can_open) {
         if (self->cia402.config != NULL) {
@@ -251,6 +301,7 @@ void rig_close(rig_t *self, uint16_t safe_mask)
         linux_can_close(&self->can);
         self->is_can_open = false;
     }
+    return has_ended;
 }
 
 hv_status_t rig_open_settled(rig_t *self, const config_t *config, gateway_io_t *io)

@@ -7,6 +7,7 @@
 
 #include "config.h"
 #include "heave/cia402.h"
+#include "heave/coil_relays.h"
 #include "heave/gateway.h"
 #include "heave/modbus_drive.h"
 #include "linux_can.h"
@@ -34,6 +35,8 @@ typedef struct {
     canraw_t canraw;
     cia402_config_t cia402_config;
     cia402_t cia402;
+    linux_modbus_t coil_line;
+    coil_relays_t coil_relays;
     uint8_t modbus_lines; /**< open */
     linux_modbus_t modbus_line[DRIVES_MAX];
     modbus_drive_map_t modbus_map;
@@ -50,8 +53,9 @@ hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io) HV_M
 const char *rig_trouble(rig_t *self);
 
 /** Closes; harmless on one that is not open. What a bus has not taken by now is dropped.
- *  @param safe_mask where the relays end */
-void rig_close(rig_t *self, uint16_t safe_mask);
+ *  @param safe_mask where the relays end
+ *  @return false: a device hangs, and may still use self */
+bool rig_close(rig_t *self, uint16_t safe_mask);
 
 /** For offline runs: simulated devices whatever the configuration names, drives enabled, homed, at the settled extension. */
 hv_status_t rig_open_settled(rig_t *self, const config_t *config, gateway_io_t *io) HV_MUST_CHECK;

@@ -216,10 +216,10 @@ static void write_flags(json_t *json, const snapshot_t *s)
     json_number(json, "limiting_cylinder", s->limiting_cylinder);
 }
 
-/* The drives' bus; null where there is none. */
+/* The buses of drives and relays; null where there is none, or only one that has always worked. */
 static void write_bus(json_t *json, const motion_view_t *view, const config_t *config)
 {
-    if (config->drives == CONFIG_DRIVES_SIM) {
+    if (config->drives == CONFIG_DRIVES_SIM && view->bus_last_trouble[0] == '\0') {
         json_null(json, "bus");
         return;
     }

@@ -138,7 +138,9 @@ static void watch_relays(gateway_t *self)
 {
     uint16_t mask = 0;
     const bool was_unknown = self->snapshot.is_relays_unknown;
-    self->is_mask_written = self->is_mask_written && hal_relays_read_back(self->io.relays, &mask) != HV_ERR_IO;
+    const bool is_answered =
+        hal_relays_read_back(self->io.relays, &mask) != HV_ERR_IO; /* slow banks go on with it: every cycle */
+    self->is_mask_written = self->is_mask_written && is_answered;
     self->snapshot.is_relays_unknown = !self->is_mask_written;
     if (self->snapshot.is_relays_unknown != was_unknown) {
         hal_log_write(self->io.log, was_unknown ? HAL_LOG_NOTICE : HAL_LOG_ERROR,

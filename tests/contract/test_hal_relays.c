@@ -187,7 +187,7 @@ static hal_relays_t open_gpio(uint8_t count)
 
 static void close_gpio(void)
 {
-    linux_gpio_relays_close(&gpio, 0);
+    (void)linux_gpio_relays_close(&gpio, 0);
 }
 
 static void pass(unsigned ms)
@@ -499,7 +499,7 @@ static void assert_refused(const linux_gpio_relays_config_t *config, const char 
     static linux_gpio_relays_t other;
     TEST_ASSERT_EQUAL(HV_ERR_IO, linux_gpio_relays_open(&other, config));
     TEST_ASSERT_EQUAL_STRING(text, other.error_text);
-    linux_gpio_relays_close(&other, 0);
+    (void)linux_gpio_relays_close(&other, 0);
 }
 
 /* Writes a mask and looks at all lines of the chip, those of nobody included. */
@@ -543,14 +543,14 @@ static void test_gpio_lines_stand_at_the_safe_mask_from_the_start_to_the_end(voi
     TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x0F0));
     settle_gpio();
     TEST_ASSERT_EQUAL_HEX32((~0x0F0u & 0xFFFu) << FIRST_LINE, levels());
-    linux_gpio_relays_close(&gpio, 0x402);
+    (void)linux_gpio_relays_close(&gpio, 0x402);
     TEST_ASSERT_EQUAL_HEX32((~0x402u & 0xFFFu) << FIRST_LINE, levels_at_close);
 }
 
 static void test_gpio_mask_written_just_before_the_end_does_not_stay(void)
 {
     TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0xFF));
-    linux_gpio_relays_close(&gpio, 0);
+    (void)linux_gpio_relays_close(&gpio, 0);
     TEST_ASSERT_EQUAL_HEX32(0, levels_at_close);
 }
 
