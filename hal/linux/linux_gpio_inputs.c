@@ -160,14 +160,16 @@ hv_status_t linux_gpio_inputs_open(linux_gpio_inputs_t *self, const linux_gpio_i
     return HV_OK;
 }
 
-void linux_gpio_inputs_close(linux_gpio_inputs_t *self)
+bool linux_gpio_inputs_close(linux_gpio_inputs_t *self)
 {
     if (!self->is_open) {
-        return;
+        return true;
     }
     self->is_open = false;
     __atomic_store_n(&self->is_ending, 1, __ATOMIC_RELEASE);
-    if (linux_gpio_thread_end(self->thread, self->wake)) {
-        linux_gpio_chip_close(&self->chip);
+    if (!linux_gpio_thread_end(self->thread, self->wake)) {
+        return false;
     }
+    linux_gpio_chip_close(&self->chip);
+    return true;
 }

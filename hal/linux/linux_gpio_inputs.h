@@ -45,8 +45,9 @@ typedef struct {
  *  @return HV_OK; HV_ERR_IO: error_text says what is wrong */
 hv_status_t linux_gpio_inputs_open(linux_gpio_inputs_t *self, const linux_gpio_inputs_config_t *config) HV_MUST_CHECK;
 
-/** Ends the worker and gives the lines back. Takes at most a second, where a chip hangs. Harmless on ones that are not open. */
-void linux_gpio_inputs_close(linux_gpio_inputs_t *self);
+/** Ends the worker and gives the lines back. Takes at most a second, where a chip hangs. Harmless on ones that are not open.
+ *  @return false: the chip hangs, and the worker may still use self */
+bool linux_gpio_inputs_close(linux_gpio_inputs_t *self);
 
 /** The switches as hal/inputs.h wants them. */
 hal_inputs_t linux_gpio_inputs_hal(linux_gpio_inputs_t *self);

@@ -20,6 +20,7 @@
 #define KEPT_MAX_BYTES   (1u << 30)
 #define PAUSE_NS         10000000
 #define END_WAIT_S       5
+#define STACK_BYTES      262144
 
 /* --- The motion thread --- */
 
@@ -330,7 +331,11 @@ bool blackbox_start(blackbox_t *self)
     if (self->memory == NULL) {
         return true;
     }
-    const int error = pthread_create(&self->thread, NULL, run, self);
+    pthread_attr_t attributes;
+    (void)pthread_attr_init(&attributes);
+    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES); /* locked into memory whole */
+    const int error = pthread_create(&self->thread, &attributes, run, self);
+    (void)pthread_attr_destroy(&attributes);
     self->is_running = error == 0;
     errno = error;
     return self->is_running;

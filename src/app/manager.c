@@ -31,7 +31,9 @@ static void open_socket(manager_t *self)
     }
     self->address.sun_family = AF_UNIX;
     memcpy(self->address.sun_path, name, length);
-    self->address.sun_path[0] = name[0] == '@' ? '\0' : name[0];
+    if (name[0] == '@') {
+        self->address.sun_path[0] = '\0';
+    }
     self->address_bytes = (socklen_t)(offsetof(struct sockaddr_un, sun_path) + length);
     self->fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
 }

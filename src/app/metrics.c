@@ -233,7 +233,8 @@ static void put_program(sheet_t *self, const motion_view_t *view, const config_t
 size_t metrics_text(const motion_view_t *view, const config_t *config, const motion_times_t *times, char *text, size_t capacity)
 {
     const snapshot_t *s = &view->snapshot;
-    sheet_t sheet = {.at = text, .capacity = capacity};
+    sheet_t sheet = {.capacity = capacity};
+    sheet.at = text;
     put_program(&sheet, view, config, times);
     put_state(&sheet, s);
     put_axes(&sheet, s);
@@ -258,6 +259,9 @@ void metrics_init(metrics_t *self, const char *path)
  * Returns errno, 0 = done. */
 static int replace(const metrics_t *self, size_t length)
 {
+    if (length == 0) {
+        return EMSGSIZE;
+    }
     const int fd = open(self->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
     if (fd < 0) {
         return errno;

@@ -290,8 +290,8 @@ static void close_coils(rig_t *self, uint16_t safe_mask)
 
 bool rig_close(rig_t *self, uint16_t safe_mask)
 {
-    const bool has_ended = linux_gpio_relays_close(&self->gpio_relays, safe_mask);
-    linux_gpio_inputs_close(&self->gpio_inputs);
+    bool has_ended = linux_gpio_relays_close(&self->gpio_relays, safe_mask);
+    has_ended = linux_gpio_inputs_close(&self->gpio_inputs) && has_ended;
     close_coils(self, safe_mask);
     close_modbus(self);
     if (self->is_can_open) {

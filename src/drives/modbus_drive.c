@@ -6,8 +6,9 @@
 
 #include "modbus_drive_axis.h"
 
-#define SHARE_ONE   (INT64_C(1) << 30)
-#define SEND_GAP_US 100000u /* a longer gap between set-points is not made up for */
+#define SHARE_ONE     (INT64_C(1) << 30)
+#define PERIOD_MAX_US 10000000u
+#define SEND_GAP_US   100000u /* a longer gap between set-points is not made up for */
 
 static unsigned write_slot(unsigned k)
 {
@@ -123,12 +124,20 @@ static bool is_following(const modbus_drive_t *self, unsigned k)
     return self->axis[k].phase == MODBUS_DRIVE_ENABLED;
 }
 
+/* How long this axis' set-points take: as measured, or longer while the newest one is waited for. */
+static uint32_t present_period_us(const modbus_drive_t *self, const modbus_drive_axis_t *axis)
+{
+    const uint64_t waited_us = axis->setpoint_us != 0 ? self->now_us - axis->setpoint_us : 0;
+    return waited_us > axis->period_us ? (uint32_t)(waited_us < PERIOD_MAX_US ? waited_us : PERIOD_MAX_US) : axis->period_us;
+}
+
 static uint32_t slowest_period_us(const modbus_drive_t *self)
 {
     uint32_t slowest_us = self->map->period_us;
     for (unsigned k = 0; k < self->map->axes; k++) {
-        if (is_following(self, k) && self->axis[k].period_us > slowest_us) {
-            slowest_us = self->axis[k].period_us;
+        const uint32_t period_us = present_period_us(self, &self->axis[k]);
+        if (is_following(self, k) && period_us > slowest_us) {
+            slowest_us = period_us;
         }
     }
     return slowest_us;

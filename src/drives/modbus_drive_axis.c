@@ -145,6 +145,12 @@ static uint32_t own_code(const modbus_drive_axis_t *self)
     return code != 0 ? code : 1u;
 }
 
+/* What stops the drive is on its way: nothing replaces that. */
+static bool is_stopping(const modbus_drive_axis_t *self)
+{
+    return self->job == MODBUS_DRIVE_JOB_COMMAND && (self->command == MODBUS_DRIVE_STOP || self->command == MODBUS_DRIVE_DISABLE);
+}
+
 static void take_fault(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     if (is_faulty(self, map)) {
@@ -152,7 +158,9 @@ static void take_fault(modbus_drive_axis_t *self, const modbus_drive_map_t *map,
             enter(self, MODBUS_DRIVE_FAULT, now_us);
             note_trouble(self, own_code(self), 0, now_us);
             self->reset_until_us = 0;
-            start_job(self, MODBUS_DRIVE_NO_JOB);
+            if (!is_stopping(self)) {
+                start_job(self, MODBUS_DRIVE_NO_JOB);
+            }
         }
     } else if (self->phase == MODBUS_DRIVE_FAULT && self->reset_until_us != 0 && self->job == MODBUS_DRIVE_NO_JOB &&
                self->read_us >= self->mark_us) {
@@ -582,7 +590,7 @@ void modbus_drive_axis_request(modbus_drive_axis_t *self, const modbus_drive_map
         stop(self, map, request == DRIVES_QUICK_STOP, now_us);
         break;
     case DRIVES_RESET_FAULT:
-        if (self->phase == MODBUS_DRIVE_FAULT) {
+        if (self->phase == MODBUS_DRIVE_FAULT && !is_stopping(self)) {
             begin_reset(self, map, now_us);
         }
         break;

@@ -119,7 +119,7 @@ static hal_inputs_t open_gpio(uint32_t present)
 
 static void close_gpio(void)
 {
-    linux_gpio_inputs_close(&gpio);
+    (void)linux_gpio_inputs_close(&gpio);
 }
 
 static const fixture_t k_gpio = {"gpio", open_gpio, close_gpio, set_gpio, settle_gpio, NULL};
@@ -281,7 +281,7 @@ static void test_gpio_lines_in_use_or_missing_are_named(void)
     config.names.line[1] = "DESK9";
     TEST_ASSERT_EQUAL(HV_ERR_IO, linux_gpio_inputs_open(&other, &config));
     TEST_ASSERT_EQUAL_STRING("gpio: no chip has a line DESK9 (gpioinfo lists what there is)", other.error_text);
-    linux_gpio_inputs_close(&other);
+    (void)linux_gpio_inputs_close(&other);
 }
 
 static void run_gpio(void)
@@ -353,7 +353,7 @@ int __wrap_linux_gpio_chip_edges(linux_gpio_chip_t *self, unsigned index, uint32
 static void start_fake(void)
 {
     const linux_gpio_inputs_config_t config = desk(ALL_INPUTS);
-    linux_gpio_inputs_close(&gpio);
+    (void)linux_gpio_inputs_close(&gpio);
     m_fake.is_used = true;
     m_fake.closed = INPUT_ESTOP;
     m_fake.error = 0;
@@ -364,7 +364,7 @@ static void start_fake(void)
 
 static void end_fake(void)
 {
-    linux_gpio_inputs_close(&gpio);
+    (void)linux_gpio_inputs_close(&gpio);
     (void)close(m_fake.pipe[0]);
     m_fake.is_used = false;
 }

@@ -22,7 +22,7 @@ TOP = Path(__file__).resolve().parents[2]
 # Debian's name: (triplet, qemu's name, what it stands for)
 KINDS = {"arm64": ("aarch64-linux-gnu", "aarch64", "64 bits, little-endian"), "armhf": ("arm-linux-gnueabihf", "arm", "32 bits, little-endian"),
          "s390x": ("s390x-linux-gnu", "s390x", "64 bits, big-endian")}
-TEST_LIMIT_S = 400
+TEST_LIMIT_S = 1500
 
 
 class Foreign:

@@ -7,6 +7,7 @@ import kernel
 import tap
 
 TICKS = """
+import time
 start = time.monotonic_ns()
 for i in range(1, 1001):
     time.sleep(max(0, (start + i * 3600_000_000_000 // 1000 - time.monotonic_ns()) / 1e9))

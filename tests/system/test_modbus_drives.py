@@ -167,7 +167,6 @@ def check_silent(bin_dir):
         heave.wait_for(lambda: all(STOP in drive.commands for k, drive in enumerate(platform.drives) if k != 2), "every other drive is told to stop")
         for k, drive in enumerate(platform.drives):
             assert k == 2 or not drive.is_enabled
-        assert status["cycle_time"]["p50_us"] < 10000, status["cycle_time"]  # a cycle that waits for the line takes its timeout
         assert status["cylinders"][2]["report"]["phase"] == "waiting for the line"
         platform.lines[2].delay_s = lambda number: 0.0
         heave.wait_for(lambda: bench.status()["cylinders"][2]["drive"] == "disabled", "the drive is back, without torque")
@@ -207,12 +206,11 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        import pymodbus  # noqa: F401
-    except ImportError:
-        venv = subprocess.run([heave.TOP / "tools/lib/venv.sh"], stdout=subprocess.PIPE, text=True, check=False)
-        if venv.returncode != 0 or "HEAVE_IN_VENV" in os.environ:
-            print("1..0 # SKIP pymodbus cannot be had")
+    if "HEAVE_TEST_VENV" not in os.environ:
+        found = subprocess.run([heave.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        if found.returncode != 0:
+            print(f"1..0 # SKIP {found.stderr.strip()}")
             sys.exit(0)
-        os.execve(venv.stdout.strip(), ["python3", *sys.argv], {**os.environ, "HEAVE_IN_VENV": "1"})
+        os.environ["HEAVE_TEST_VENV"] = "1"
+        os.execv(found.stdout.strip(), [found.stdout.strip(), *sys.argv])
     sys.exit(main())

@@ -478,7 +478,6 @@ static const spoilt_t k_spoilt[] = {
      "[relays] lines: \"\" has no name; allowed: none, or up to 12 different lines, by name or number"},
     {"relays", "max_on_ms", "max_on_ms = 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13",
      "[relays] max_on_ms: has 13 values; allowed: a whole number from 0 to 86400000 ms, or one for each relay"},
-    {"relays", "driver", "driver = modbus", "[relays] driver: driver modbus is not built into this heaved; allowed: sim | gpio"},
     {"relays", "max_on_ms", "max_on_ms = 5, 6",
      "[relays] max_on_ms: has 2 values; allowed: one, or one for each of the 12 relays in lines"},
     {"relays", "min_toggle_ms", "min_toggle_ms = 60001",

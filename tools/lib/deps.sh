@@ -87,7 +87,8 @@ deps_install() {
         [ -z "$deps_lacking" ] || deps_say "installing $deps_lacking${deps_extra:+and, if there is one, $deps_extra}"
         deps_log=$(mktemp)
         # The lists may be absent (fresh containers) or stale: update them only if the first attempt fails.
-        deps_apt_install || { deps_apt update; deps_apt_install; }
+        # What is only wanted keeps nothing that is needed from being installed.
+        deps_apt_install || { deps_apt update; deps_apt_install; } || { deps_extra=''; deps_apt_install; }
         reason="apt-get could not install them ($(deps_reason <"$deps_log"))"
         rm -f "$deps_log"
         deps_lacking=$(deps_missing "${deps_required[@]}" | tr '\n' ' ')
