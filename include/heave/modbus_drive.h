@@ -169,6 +169,7 @@ typedef struct {
     uint8_t read_step; /**< block of the feedback */
     bool is_checking;  /**< the item is being read back */
     bool is_broadcast; /**< the stop goes to all drives of the line first; whichever slot has its turn carries it */
+    bool is_reset_due; /**< asked for while a stop was on its way */
     bool is_begun;     /**< the request that led here has been seen in a poll */
     bool is_homed;
     bool is_after_homing; /**< placed once more, torque is on */

@@ -80,6 +80,7 @@ static void lose(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint3
     self->period_us = map->expected_us;
     self->setpoint_us = 0;
     self->reset_until_us = 0;
+    self->is_reset_due = false;
     self->next_read_us = now_us + PROBE_US;
 }
 
@@ -88,6 +89,7 @@ static void fail(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint3
     enter(self, MODBUS_DRIVE_FAULT, now_us);
     note_trouble(self, code, 0, now_us);
     self->reset_until_us = 0;
+    self->is_reset_due = false;
     tell_stop(self, map);
 }
 
@@ -410,6 +412,13 @@ bool modbus_drive_axis_take_write(modbus_drive_axis_t *self, const modbus_drive_
 
 /* --- Time --- */
 
+static void begin_reset(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+{
+    tell(self, map, MODBUS_DRIVE_RESET);
+    self->mark_us = now_us;
+    self->reset_until_us = now_us + RESET_US;
+}
+
 /* Where a drive was after it was asked to be enabled is where its target goes. */
 static void step_placing(modbus_drive_axis_t *self)
 {
@@ -435,6 +444,10 @@ void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t 
     }
     if (self->phase == MODBUS_DRIVE_STARTING && self->job == MODBUS_DRIVE_JOB_STARTUP && self->step >= map->items) {
         end_startup(self, now_us);
+    }
+    if (self->is_reset_due && !is_stopping(self)) {
+        self->is_reset_due = false;
+        begin_reset(self, map, now_us);
     }
     if (self->phase == MODBUS_DRIVE_PLACING) {
         step_placing(self);
@@ -535,13 +548,6 @@ bool modbus_drive_axis_next_write(modbus_drive_axis_t *self, const modbus_drive_
 
 /* --- Requests --- */
 
-static void begin_reset(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
-{
-    tell(self, map, MODBUS_DRIVE_RESET);
-    self->mark_us = now_us;
-    self->reset_until_us = now_us + RESET_US;
-}
-
 static void begin_homing(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     enter(self, MODBUS_DRIVE_HOMING, now_us);
@@ -564,6 +570,7 @@ static void stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map, bool 
         enter(self, MODBUS_DRIVE_READY, now_us);
     }
     self->reset_until_us = 0;
+    self->is_reset_due = false;
 }
 
 void modbus_drive_axis_request(modbus_drive_axis_t *self, const modbus_drive_map_t *map, drives_request_t request,
@@ -590,9 +597,7 @@ void modbus_drive_axis_request(modbus_drive_axis_t *self, const modbus_drive_map
         stop(self, map, request == DRIVES_QUICK_STOP, now_us);
         break;
     case DRIVES_RESET_FAULT:
-        if (self->phase == MODBUS_DRIVE_FAULT && !is_stopping(self)) {
-            begin_reset(self, map, now_us);
-        }
+        self->is_reset_due = self->phase == MODBUS_DRIVE_FAULT; /* as soon as it has been told to stop */
         break;
     }
 }
