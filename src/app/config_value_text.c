@@ -199,6 +199,21 @@ static void allowed_decimals(const config_key_t *key, config_text_t *text)
     add_number_word(key, text);
 }
 
+static void allowed_path(const config_key_t *key, config_text_t *text)
+{
+    if (key->words != NULL) {
+        config_text_add(text, "%s, or ", key->words);
+    }
+    config_text_add(text, "an absolute path of at most %u characters", (unsigned)key->size - 1u);
+}
+
+static void allowed_each(const config_key_t *key, const char *number, const char *each, config_text_t *text)
+{
+    config_text_add(text, "%s", number);
+    add_range(key, text);
+    config_text_add(text, ", or one for each %s", each);
+}
+
 void config_value_allowed(const config_key_t *key, config_text_t *text)
 {
     switch (key->type) {
@@ -206,9 +221,7 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         allowed_decimals(key, text);
         break;
     case CONFIG_PER_CYLINDER:
-        config_text_add(text, "a number");
-        add_range(key, text);
-        config_text_add(text, ", or one for each cylinder");
+        allowed_each(key, "a number", "cylinder", text);
         break;
     case CONFIG_INTEGER:
         config_text_add(text, "a whole number");
@@ -234,8 +247,7 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         config_text_add(text, "%s, or up to %u addresses or networks such as 192.168.7.0/24", key->words, HAL_UDP_NETWORKS_MAX);
         break;
     case CONFIG_PATH:
-        config_text_add(text, "%s%san absolute path of at most %u characters", key->words != NULL ? key->words : "",
-                        key->words != NULL ? ", or " : "", (unsigned)key->size - 1u);
+        allowed_path(key, text);
         break;
     case CONFIG_LABEL:
         config_text_add(text, "none, or a name of at most %u characters", CONFIG_LABEL_MAX - 1u);
@@ -244,9 +256,7 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         config_text_add(text, "none, or up to %u different lines, by name or number", CONFIG_RELAYS_MAX);
         break;
     case CONFIG_PER_RELAY:
-        config_text_add(text, "a whole number");
-        add_range(key, text);
-        config_text_add(text, ", or one for each relay");
+        allowed_each(key, "a whole number", "relay", text);
         break;
     case CONFIG_NAME:
     case CONFIG_IDS:
