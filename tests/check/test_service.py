@@ -37,7 +37,9 @@ def main():
         with suite.case("programs, unit, user and ready-made platforms are installed"):
             files = installed(build, folder)
             assert {"bin/heaved", "bin/heavectl", "lib/systemd/system/heave@.service", "lib/sysusers.d/heave.conf", "libexec/heave-can",
-                    "lib/systemd/system/heave-can@.service", "lib/systemd/system/heave-can-flush@.path"} <= files, files
+                    "lib/systemd/system/heave-can@.service", "lib/systemd/system/heave-can-flush@.path",
+                    "lib/modules-load.d/heave.conf", "lib/udev/rules.d/60-heave.rules", "share/doc/heave/examples/70-heave-can.link",
+                    "share/doc/heave/examples/70-heave-can.network"} <= files, files
             assert any(file.endswith("demo-hexapod.ini") for file in files), files
         unit = folder / "heave@test.service"
         text = (build / "packaging/heave@.service").read_text(encoding="utf-8")

@@ -1,0 +1,219 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_package.py - the Debian package: the same bytes from another folder, accepted by lintian, and what it leaves when it comes and goes.
+
+usage: test_package.py                      packed without optimisation, twice; into an empty root of dpkg, with this machine's libraries
+       test_package.py --root DIR           the package as tools/package makes it, into a copy of a system (debootstrap --variant=minbase), in chroot
+"""
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import tap
+
+TOP = Path(__file__).resolve().parents[2]
+QUICK = ["-DCMAKE_BUILD_TYPE=None"]  # no optimisation
+CONFIG = "etc/heave/demo.ini"
+SOURCES = ("CMakeLists.txt", "CMakePresets.json", "README.md", "README.zh-CN.md", "cmake", "config", "docs", "hal", "include", "packaging", "src", "tools")
+
+
+def run(*command, **more):
+    result = subprocess.run(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                            check=False, **more)
+    return result.returncode, result.stdout
+
+
+def checked(*command, **more):
+    code, text = run(*command, **more)
+    assert code == 0, f"{' '.join(map(str, command))}: exit status {code}\n{text[-3000:]}"
+    return text
+
+
+def pack(source, build):
+    """A package, quickly made: without SOURCE_DATE_EPOCH and ccache, whose answers would be the same anyway."""
+    environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"} | {"CCACHE_DISABLE": "1"}
+    checked("cmake", "--preset", "package", "-B", build, *QUICK, cwd=source, env=environment)
+    checked("cmake", "--build", build, env=environment)
+    checked("cpack", "--config", build / "CPackConfig.cmake", "-B", build, env=environment)
+    return next(build.glob("heave_*.deb"))
+
+
+def copy_sources(folder):
+    """The sources as a later download has them: other folder, other times."""
+    folder.mkdir()
+    for name in SOURCES:
+        place = TOP / name
+        if place.is_dir():
+            shutil.copytree(place, folder / name, copy_function=shutil.copy)
+        else:
+            shutil.copy(place, folder / name)
+
+
+def later(deb, folder):
+    """The same package with a higher version and another /etc/heave/demo.ini."""
+    unpacked = folder / "later"
+    checked("dpkg-deb", "-R", deb, unpacked)
+    control = unpacked / "DEBIAN/control"
+    control.write_text(re.sub(r"(?m)^(Version: .*)$", r"\g<1>+later", control.read_text(encoding="utf-8")), encoding="utf-8")
+    with (unpacked / CONFIG).open("a", encoding="utf-8") as file:
+        file.write("; a later version\n")
+    built = folder / "later.deb"
+    checked("dpkg-deb", "--root-owner-group", "-b", unpacked, built)
+    return built
+
+
+class EmptyRoot:
+    """A folder that dpkg takes for the root: no chroot, programs run with the machine's own libraries."""
+
+    def __init__(self, folder):
+        self.folder = folder
+        (folder / "var/lib/dpkg/info").mkdir(parents=True)
+        (folder / "var/lib/dpkg/updates").mkdir()
+        (folder / "var/lib/dpkg/status").touch()
+        (folder / "etc").mkdir()
+
+    def dpkg(self, *arguments):
+        return checked("dpkg", f"--root={self.folder}", "--force-script-chrootless", "--force-depends", "--force-not-root", *arguments)
+
+    def program(self, name, *arguments):
+        return run(self.folder / "usr/bin" / name, *(self.folder / word[1:] if word.startswith("/") else word for word in arguments))
+
+    def bring(self, deb):
+        return deb
+
+
+class Chroot:
+    """A real system: scripts and programs find only what is in it."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def dpkg(self, *arguments):
+        return checked("chroot", self.folder, "env", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "dpkg", *arguments)
+
+    def program(self, name, *arguments):
+        return run("chroot", self.folder, f"/usr/bin/{name}", *arguments)
+
+    def bring(self, deb):
+        shutil.copy(deb, self.folder / "tmp")
+        return f"/tmp/{deb.name}"
+
+
+class Life:
+    """Of the package on a machine, in this order."""
+
+    def __init__(self, machine, deb, next_deb):
+        self.machine, self.deb, self.next_deb = machine, machine.bring(deb), machine.bring(next_deb)
+        self.root = machine.folder
+        self.config = self.root / CONFIG
+        self.own = self.root / "etc/heave/ride.ini"
+
+    def installs(self):
+        self.machine.dpkg("-i", self.deb)
+        for name in ("heaved", "heavectl"):
+            code, text = self.machine.program(name, "--version")
+            assert code == 0 and re.fullmatch(rf"{name} \d+\.\d+\.\d+\n", text), text
+        code, text = self.machine.program("heaved", "--config", f"/{CONFIG}", "--check")
+        assert code == 0 and "singularity" in text, text
+        code, text = self.machine.program("heavectl", "status")
+        assert code == 69, text
+        groups = (self.root / "etc/group").read_text(encoding="ascii")
+        assert re.search(r"(?m)^heave:", groups), groups
+
+    def upgrades(self):
+        """A changed configuration stays without a question; a changed one that is new as well stays where the operator says so."""
+        self.config.write_text(self.config.read_text(encoding="utf-8") + "; mine\n", encoding="utf-8")
+        self.own.write_text("; my platform\n", encoding="utf-8")
+        self.machine.dpkg("-i", self.deb)
+        assert self.config.read_text(encoding="utf-8").endswith("; mine\n")
+        self.machine.dpkg("--force-confold", "-i", self.next_deb)
+        assert self.config.read_text(encoding="utf-8").endswith("; mine\n")
+        assert Path(f"{self.config}.dpkg-dist").read_text(encoding="utf-8").endswith("; a later version\n")
+        code, text = self.machine.program("heaved", "--version")
+        assert code == 0, text
+
+    def removes(self):
+        incidents = self.root / "var/lib/private/heave/demo/incident-000001"
+        incidents.mkdir(parents=True)
+        self.machine.dpkg("-r", "heave")
+        assert self.config.exists() and self.own.exists() and incidents.exists()
+        left = [path for path in (self.root / "usr").rglob("*heave*") if not path.is_dir()]
+        assert not left, f"left behind: {left}"
+
+    def purges(self):
+        enabled = self.root / "etc/systemd/system/multi-user.target.wants/heave@demo.service"
+        enabled.parent.mkdir(parents=True, exist_ok=True)
+        enabled.symlink_to("/usr/lib/systemd/system/heave@.service")
+        self.machine.dpkg("--purge", "heave")
+        assert self.own.read_text(encoding="utf-8") == "; my platform\n", "a platform of the operator's own"
+        assert list(self.own.parent.iterdir()) == [self.own], list(self.own.parent.iterdir())
+        assert not enabled.is_symlink() and not (self.root / "var/lib/private/heave").exists()
+
+
+def life(suite, machine, deb, folder):
+    told = Life(machine, deb, later(deb, folder))
+    for what, case in (("is installed: programs start, the platform for trying out is valid, the group is there", told.installs),
+                       ("is upgraded: a configuration that was changed stays", told.upgrades),
+                       ("is removed: configurations and incidents stay", told.removes),
+                       ("is purged: what is of the package goes, a platform of the operator's own stays", told.purges)):
+        with suite.case(what):
+            case()
+
+
+def accepted_by_lintian(deb):
+    if shutil.which("lintian") is None:
+        raise tap.Skip("lintian is not there")
+    code, text = run("lintian", "--allow-root", "--fail-on", "error", deb)
+    assert code == 0, text
+
+
+def in_a_system(system, folder):
+    """tools/package into a copy of a debootstrapped system."""
+    suite = tap.Suite()
+    with suite.case("tools/package makes it"):
+        deb = Path(checked(TOP / "tools/package", "--build-dir", folder / "build").splitlines()[-1])
+        accepted_by_lintian(deb)
+        checked("cp", "-a", "--reflink=auto", system, folder / "root")
+    life(suite, Chroot(folder / "root"), deb, folder)
+    return suite.done()
+
+
+def quickly(folder):
+    suite = tap.Suite()
+    deb = None
+    with suite.case("has the same bytes when its sources are copied and built in another folder, later"):
+        copy_sources(folder / "copy")
+        deb, other = pack(TOP, folder / "one"), pack(folder / "copy", folder / "elsewhere/two")
+        assert deb.read_bytes() == other.read_bytes(), f"{deb.stat().st_size} and {other.stat().st_size} bytes"
+    with suite.case("lintian finds nothing to say"):
+        accepted_by_lintian(deb)
+    with suite.case("is refused where the units would name programs that are not there"):
+        (folder / "local").mkdir()
+        text = (folder / "one/CPackConfig.cmake").read_text(encoding="utf-8").replace('CPACK_HEAVE_PREFIX "/usr"', 'CPACK_HEAVE_PREFIX "/usr/local"')
+        (folder / "local/CPackConfig.cmake").write_text(text, encoding="utf-8")
+        code, text = run("cpack", "--config", folder / "local/CPackConfig.cmake", "-B", folder / "local")
+        assert code != 0 and "-DCMAKE_INSTALL_PREFIX=/usr" in text and not list((folder / "local").glob("*.deb")), text
+    life(suite, EmptyRoot(folder / "root"), deb, folder)
+    return suite.done()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--root", type=Path)
+    root = parser.parse_args().root
+    for tool in ("dpkg", "dpkg-shlibdeps", "systemd-sysusers", "gzip"):
+        if shutil.which(tool) is None:
+            print(f"1..0 # SKIP {tool} is not there")
+            return 0
+    with tempfile.TemporaryDirectory(prefix="heave-") as name:
+        folder = Path(name)
+        return in_a_system(root, folder) if root else quickly(folder)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
