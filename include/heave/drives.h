@@ -33,6 +33,7 @@ typedef struct {
 
 /** What one drive is at, in words for people. Constant texts, "" where there is nothing to say; never NULL. */
 typedef struct {
+    bool is_modbus;       /**< address is a unit, object a register << 8 */
     uint8_t address;      /**< on the bus; 0 = has none */
     const char *phase;    /**< "missing", "configuring", "ready", "enabled", "fault", or what it waits for */
     const char *trouble;  /**< what is or was wrong with it */

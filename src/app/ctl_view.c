@@ -199,8 +199,14 @@ static void draw_report(view_t *self, const cJSON *report, const char *drive)
     if (!cJSON_IsObject(report) || (is_usual && number(report, "code") <= 0.0)) {
         return;
     }
-    put(self, "   node %.0f: %s", number(report, "node"), word(report, "phase"));
-    if (number(report, "object") > 0.0) {
+    if (member(report, "unit") != NULL) {
+        put(self, "   unit %.0f: %s", number(report, "unit"), word(report, "phase"));
+    } else {
+        put(self, "   node %.0f: %s", number(report, "node"), word(report, "phase"));
+    }
+    if (number(report, "register") > 0.0) {
+        put_piece(self, ", register 0x%04X", (unsigned)number(report, "register"));
+    } else if (number(report, "object") > 0.0) {
         put_piece(self, ", object %04X:%02X", (unsigned)number(report, "object"), (unsigned)number(report, "sub_index"));
     }
     if (number(report, "code") > 0.0) {

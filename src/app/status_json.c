@@ -121,6 +121,10 @@ static void write_report(json_t *json, const drive_report_t *report, uint64_t no
     json_number(json, "code", report->code);
     json_number(json, "object", report->object >> 8);
     json_number(json, "sub_index", report->object & 0xFFu);
+    if (report->is_modbus) {
+        json_number(json, "unit", report->address);
+        json_number(json, "register", report->object >> 8);
+    }
     json_text(json, "detail", report->detail);
     json_number(json, "detail_code", report->detail_code);
     json_ms(json, "age_ms", now_us >= report->since_us ? now_us - report->since_us : 0);

@@ -103,6 +103,7 @@ void modbus_drive_axis_words(const modbus_drive_axis_t *self, const modbus_drive
 {
     const bool is_exception = self->trouble == MODBUS_DRIVE_EXCEPTION;
     *out = (drive_report_t){
+        .is_modbus = true,
         .address = unit,
         .phase = phase_text(self),
         .trouble = trouble_text(self->trouble),

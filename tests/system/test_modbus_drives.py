@@ -185,7 +185,8 @@ def check_refusal(bin_dir):
         bench.config.write_text(text, encoding="utf-8")
         bench.start()
         leg = heave.wait_for(lambda: (lambda leg: leg if leg["report"]["phase"] == "refused" else None)(bench.status()["cylinders"][0]), "refused")
-        assert leg["drive"] == "offline" and leg["report"]["object"] == WATCHDOG, leg
+        assert leg["drive"] == "offline" and leg["report"]["register"] == WATCHDOG and leg["report"]["unit"] == UNIT, leg
+        assert f"unit {UNIT}: refused, register 0x{WATCHDOG:04X}; a register holds another value" in bench.ctl("status").stdout
         assert all(not drive.targets for drive in platform.drives)
 
 
