@@ -87,6 +87,7 @@ typedef struct {
     counts_scale_t scale;
     counts_scale_t speed;    /**< speed field per u/s */
     q32_t step_max_q32;      /**< largest step of set-points, u per motion cycle; > 0 */
+    q32_t speed_max_q32;     /**< what the speed field carries at most, u/s; > 0 */
     q32_t carry_q32;         /**< largest way of a set-point that is written, u; 0 = as the motion has it */
     q32_t following_max_q32; /**< largest distance of a set-point from actual, u; 0 = not watched */
 } modbus_drive_axis_map_t;
@@ -97,6 +98,7 @@ typedef struct {
     bool is_input;                  /**< feedback is read from input registers, else from holding registers */
     bool is_single;                 /**< blocks of one register are written by function 6, else by 16 */
     bool is_broadcast;              /**< the first block of a stop goes to all drives of a line at once, then the stop to each */
+    bool is_target_last;            /**< a drive is placed after it has torque, as writing its target starts it; else before */
     uint32_t period_us;             /**< set-points and reads of a drive are no closer; > 0 */
     uint32_t expected_us;           /**< period to assume before it is measured; > 0 */
     uint32_t feedback_timeout_us;   /**< a drive whose newest feedback is older is gone; > period_us */
@@ -173,6 +175,7 @@ typedef struct {
     bool is_begun;     /**< the request that led here has been seen in a poll */
     bool is_homed;
     bool is_after_homing; /**< placed once more, torque is on */
+    bool is_placed;       /**< the target is where the drive was when it was last asked to follow */
     bool is_homing_seen;
     bool has_actual;
     bool has_sent;     /**< asked_q32 is the last set-point that came */

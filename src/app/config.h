@@ -138,6 +138,7 @@ typedef struct {
     config_read_t read;
     config_write_t write;
     bool is_broadcast;
+    bool is_target_last;
     config_ratios_t counts_per_mm;
     config_wholes_t zero_counts;
     config_ratios_t angle_counts_per_deg;

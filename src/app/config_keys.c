@@ -352,7 +352,7 @@ const config_key_t config_keys[] = {
     {KEY("can-raw", "angle_following_error_deg"), AT(can_raw.angle_following_error_deg_q16), .type = CONFIG_DECIMAL, .count = 1,
      .unit = "deg", .fallback = "20", RANGE(0, 1000), .needs = CONFIG_NEEDS_ANGLE, .help = "the same of the rotation motor"},
 
-    {KEY("modbus", "units"), AT(modbus.units), .type = CONFIG_IDS, .unit = "",
+    {KEY("modbus", "units"), AT(modbus.units), .type = CONFIG_IDS, .unit = "", .words = "a unit id from 1 to 247",
      .fallback = "1", .help = "unit id of drive 1, the next ones follow; with a host for each drive the same for all; or one for each. The rotation motor is the last"},
     {KEY("modbus", "period_us"), AT(modbus.period_us), .type = CONFIG_INTEGER, .unit = "us",
      .fallback = "10000", RANGE(500, 1000000), .help = "set-points and questions to a drive are no closer; a slow line takes the time it needs"},
@@ -396,6 +396,8 @@ const config_key_t config_keys[] = {
      .fallback = "none", .help = "stop now, for e-stop and faults; without it disable, else no more set-points"},
     {KEY("modbus", "reset"), AT(modbus.reset), .type = CONFIG_BLOCKS, .unit = "",
      .fallback = "none", .help = "take a fault back"},
+    {KEY("modbus", "target_after_enable"), AT(modbus.is_target_last), .type = CONFIG_YES_NO, .unit = "",
+     .fallback = "no", .help = "no: a drive's target is set to where it is before enable; yes: right after it, for drives that writing a target starts"},
     {KEY("modbus", "home"), AT(modbus.home), .type = CONFIG_BLOCKS, .unit = "",
      .fallback = "none", .help = "find the zero; without it drives are taken to know it"},
     {KEY("modbus", "enabled_when"), AT(modbus.enabled_when), .type = CONFIG_WHEN, .unit = "",

@@ -70,6 +70,7 @@ static void describe_axis(const config_t *config, unsigned k, modbus_drive_axis_
         .scale = config_modbus_scale(config, k),
         .speed = is_motor ? ratio_of(&modbus->angle_speed_counts_per_deg_s, 0) : ratio_of(&modbus->speed_counts_per_mm_s, k),
         .step_max_q32 = fx_mul_div(q32_from_q16(speed_q16), STEP_FACTOR * (int64_t)config->settings.cycle_us, 1000000) + 1,
+        .speed_max_q32 = q32_from_q16(speed_q16) * 9 / 8 + 1,
         .carry_q32 = q32_from_q16(is_motor ? modbus->angle_step_deg_q16 : modbus->step_mm_q16),
         .following_max_q32 = q32_from_q16(is_motor ? modbus->angle_following_error_deg_q16 : modbus->following_error_mm_q16),
     };
@@ -91,6 +92,7 @@ void config_modbus_map(const config_t *config, modbus_drive_map_t *map)
         .is_input = modbus->read == CONFIG_READ_INPUT,
         .is_single = modbus->write == CONFIG_WRITE_SINGLE,
         .is_broadcast = modbus->is_broadcast,
+        .is_target_last = modbus->is_target_last,
         .period_us = modbus->period_us,
         .feedback_timeout_us = modbus->feedback_timeout_ms * 1000u,
         .retries = modbus->retries,

@@ -172,12 +172,10 @@ static void take_fault(modbus_drive_axis_t *self, const modbus_drive_map_t *map,
     }
 }
 
-/* Its target is set to where it is, before torque, and once more after homing. */
-static void place(modbus_drive_axis_t *self, bool is_after_homing, uint64_t now_us)
+/* Its target is set to where it is: before torque or right after it, and once more after homing. */
+static void place(modbus_drive_axis_t *self, uint64_t now_us)
 {
     enter(self, MODBUS_DRIVE_PLACING, now_us);
-    self->is_after_homing = is_after_homing;
-    self->has_sent = false;
     self->mark_us = now_us;
     if (self->job != MODBUS_DRIVE_JOB_COMMAND) { /* a stop ends first */
         start_job(self, MODBUS_DRIVE_NO_JOB);
@@ -200,7 +198,9 @@ static void take_homing(modbus_drive_axis_t *self, const modbus_drive_map_t *map
         self->is_homing_seen = true;
     } else if (!has(map, MODBUS_DRIVE_HOME) || self->is_homing_seen || now_us - self->mark_us >= HOMING_BEGIN_US) {
         self->is_homed = true;
-        place(self, true, now_us);
+        self->is_after_homing = true;
+        self->has_sent = false;
+        place(self, now_us);
     }
 }
 
@@ -209,7 +209,11 @@ static void take_enabling(modbus_drive_axis_t *self, const modbus_drive_map_t *m
 {
     const bool has_torque = map->enabled_when.mask == 0 || is_when(map->enabled_when, self->status);
     if (self->phase == MODBUS_DRIVE_CONFIRMING && self->read_us >= self->mark_us && has_torque) {
-        enter(self, MODBUS_DRIVE_HOLDING, now_us);
+        if (self->is_placed) {
+            enter(self, MODBUS_DRIVE_HOLDING, now_us);
+        } else {
+            place(self, now_us);
+        }
     } else if ((self->phase == MODBUS_DRIVE_ENABLED || self->phase == MODBUS_DRIVE_HOLDING) && !has_torque) {
         enter(self, MODBUS_DRIVE_READY, now_us); /* it has left by itself */
         start_job(self, MODBUS_DRIVE_NO_JOB);
@@ -323,6 +327,15 @@ static void note_setpoint(modbus_drive_axis_t *self, uint64_t now_us)
     self->written_q32 = self->offered_q32;
 }
 
+static void begin_enabling(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+{
+    enter(self, MODBUS_DRIVE_ENABLING, now_us);
+    tell(self, map, MODBUS_DRIVE_ENABLE);
+    if (self->job == MODBUS_DRIVE_NO_JOB) {
+        end_command(self, now_us);
+    }
+}
+
 /* A whole set-point is in the drive. */
 static void end_setpoint(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
@@ -331,16 +344,15 @@ static void end_setpoint(modbus_drive_axis_t *self, const modbus_drive_map_t *ma
         note_setpoint(self, now_us);
         self->sum_q32 = 0;
         self->sums = 0;
-    } else if (self->is_after_homing) {
+        return;
+    }
+    self->is_placed = true;
+    if (self->is_after_homing || map->is_target_last) {
         enter(self, MODBUS_DRIVE_CONFIRMING, now_us);
         start_job(self, MODBUS_DRIVE_NO_JOB);
         self->mark_us = now_us;
     } else {
-        enter(self, MODBUS_DRIVE_ENABLING, now_us);
-        tell(self, map, MODBUS_DRIVE_ENABLE);
-        if (self->job == MODBUS_DRIVE_NO_JOB) {
-            end_command(self, now_us);
-        }
+        begin_enabling(self, map, now_us);
     }
 }
 
@@ -420,11 +432,11 @@ static void begin_reset(modbus_drive_axis_t *self, const modbus_drive_map_t *map
 }
 
 /* Where a drive was after it was asked to be enabled is where its target goes. */
-static void step_placing(modbus_drive_axis_t *self)
+static void step_placing(modbus_drive_axis_t *self, const modbus_drive_map_t *map)
 {
     if (self->job == MODBUS_DRIVE_NO_JOB && self->read_us >= self->mark_us && self->actual_us > self->read_us) {
         self->target_counts = self->actual_counts;
-        self->target_speed = 0;
+        self->target_speed = (int64_t)map->speed_least;
         start_job(self, MODBUS_DRIVE_JOB_SETPOINT);
     }
 }
@@ -450,7 +462,7 @@ void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t 
         begin_reset(self, map, now_us);
     }
     if (self->phase == MODBUS_DRIVE_PLACING) {
-        step_placing(self);
+        step_placing(self, map);
     }
     self->is_begun = true; /* a request is seen in one poll before it can end in the next */
 }
@@ -558,6 +570,18 @@ static void begin_homing(modbus_drive_axis_t *self, const modbus_drive_map_t *ma
     self->is_homing_seen = false;
 }
 
+static void begin_following(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+{
+    self->is_after_homing = false;
+    self->is_placed = false;
+    self->has_sent = false;
+    if (map->is_target_last) {
+        begin_enabling(self, map, now_us);
+    } else {
+        place(self, now_us);
+    }
+}
+
 static void stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map, bool is_quick, uint64_t now_us)
 {
     if (is_quick) {
@@ -586,7 +610,7 @@ void modbus_drive_axis_request(modbus_drive_axis_t *self, const modbus_drive_map
     switch (request) {
     case DRIVES_ENABLE:
         if (self->phase == MODBUS_DRIVE_READY) {
-            place(self, false, now_us);
+            begin_following(self, map, now_us);
         }
         break;
     case DRIVES_HOME:
@@ -638,7 +662,8 @@ static int64_t speed_of(const modbus_drive_axis_t *self, const modbus_drive_map_
     if (field == NULL) {
         return 0;
     }
-    const q32_t per_s_q32 = fx_mul_div(fx_add_sat(way_q32, way_q32 / 8), 1000000, self->period_us);
+    const q32_t asked_q32 = fx_mul_div(fx_add_sat(way_q32, way_q32 / 8), 1000000, self->period_us);
+    const q32_t per_s_q32 = fx_clamp(asked_q32, -axis->speed_max_q32, axis->speed_max_q32);
     if (counts_from_units(&axis->speed, per_s_q32, &speed) != HV_OK) {
         speed = per_s_q32 < 0 ? INT64_MIN : INT64_MAX;
     }

@@ -186,8 +186,8 @@ static bool is_axis_valid(const modbus_drive_map_t *map, unsigned k)
         }
     }
     return axis->line < DRIVES_MAX && axis->unit != HAL_MODBUS_BROADCAST && (axis->unit <= 247 || axis->unit == 255) &&
-           counts_is_valid(&axis->scale) && axis->speed.den > 0 && axis->step_max_q32 > 0 && axis->carry_q32 >= 0 &&
-           axis->following_max_q32 >= 0;
+           counts_is_valid(&axis->scale) && axis->speed.den > 0 && axis->step_max_q32 > 0 && axis->speed_max_q32 > 0 &&
+           axis->carry_q32 >= 0 && axis->following_max_q32 >= 0;
 }
 
 bool modbus_drive_map_is_valid(const modbus_drive_map_t *map)

@@ -51,10 +51,11 @@ def terminal():
 
 
 class Devices:
-    """pymodbus servers in a thread of their own: units with 128 values of each kind, exception 2 above."""
+    """pymodbus servers in a thread of their own: units with 128 values of each kind, or holding registers at [(first, count)]; exception 2
+    elsewhere."""
 
-    def __init__(self, kind, units=(1, 2)):
-        self.kind, self.units, self.written, self.lock = kind, units, [], threading.Lock()
+    def __init__(self, kind, units=(1, 2), holding=((0, VALUES),)):
+        self.kind, self.units, self.holding, self.written, self.lock = kind, units, holding, [], threading.Lock()
         self.loop = asyncio.new_event_loop()
         self.thread = threading.Thread(target=self.loop.run_forever, daemon=True)
         self.ours = None
@@ -78,9 +79,9 @@ class Devices:
         return asyncio.run_coroutine_threadsafe(coroutine, self.loop).result(ANSWER_S)
 
     async def start(self):
-        def block(kind):
-            return [SimData(0, count=VALUES, values=False if kind is DataType.BITS else 0, datatype=kind)]
-        devices = [SimDevice(unit, simdata=(block(DataType.BITS), block(DataType.BITS), block(DataType.REGISTERS), block(DataType.REGISTERS)))
+        def block(kind, places=((0, VALUES),)):
+            return [SimData(first, count=count, values=False if kind is DataType.BITS else 0, datatype=kind) for first, count in places]
+        devices = [SimDevice(unit, simdata=(block(DataType.BITS), block(DataType.BITS), block(DataType.REGISTERS, self.holding), block(DataType.REGISTERS)))
                    for unit in self.units]
         common = {"ignore_missing_devices": True, "broadcast_enable": self.kind == "serial", "trace_pdu": self.trace}
         if self.kind == "serial":
@@ -98,8 +99,8 @@ class Devices:
                 self.written.append((pdu.dev_id, pdu.address, list(values)))
         return pdu
 
-    def set(self, unit, function, address, value):
-        self.run(self.server.async_setValues(unit, function, address, [value]))
+    def set(self, unit, function, address, *values):
+        self.run(self.server.async_setValues(unit, function, address, list(values)))
 
     def get(self, unit, function, address):
         return self.run(self.server.async_getValues(unit, function, address, 1))[0]
@@ -130,6 +131,7 @@ class FaultyLine:
     def __init__(self, devices):
         self.devices, self.plan, self.asked, self.held = devices, {}, 0, []
         self.delay_s = lambda number: 0.0
+        self.silent = set()  # units that hear nothing
         self.is_serial = devices.kind == "serial"
         self.is_ending, self.is_unplugged = False, False
         self.client = None
@@ -306,10 +308,10 @@ class FaultyLine:
         if fault is Fault.EXCEPTION:
             self.send(self.client, self.exception_to(question))
             return
-        if fault is Fault.LOST:
+        unit = question[0] if self.is_serial else question[6]
+        if fault is Fault.LOST or unit in self.silent:
             return
         self.send(self.devices.ours if self.is_serial else self.server_side, question)
-        unit = question[0] if self.is_serial else question[6]
         answer = self.read_answer(question) if unit in self.devices.units else b""
         if time.monotonic() - asked_s > TOO_LATE_S:
             return

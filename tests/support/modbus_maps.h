@@ -34,6 +34,7 @@ static inline void modbus_maps_axes(modbus_drive_map_t *map, bool is_shared, cou
                                                  .scale = scale,
                                                  .speed = speed,
                                                  .step_max_q32 = Q32_ONE,
+                                                 .speed_max_q32 = q32_from_int(1000),
                                                  .carry_q32 = q32_from_int(4),
                                                  .following_max_q32 = q32_from_int(10)};
     }

@@ -179,6 +179,7 @@ static void test_units_and_hosts_have_to_tell_drives_apart(void)
 {
     refuse("units = 1 ", "units = 0 ", "[modbus] units", "is no unit id; allowed: 1 to 247");
     refuse("units = 1 ", "units = 248 ", "[modbus] units", "is no unit id; allowed: 1 to 247");
+    refuse("units = 1 ", "units = one ", "[modbus] units", "allowed: a unit id from 1 to 247, or one for each drive");
     refuse("units = 1 ", "units = 1, 2, 3 ", "[modbus] units", "has 3 values; allowed: one, or one for each of the 6 drives");
     refuse("192.168.1.16", "192.168.1.13", "[modbus-tcp] hosts", "is of drive 3 and of drive 6");
     refuse(", 192.168.1.16", "", "[modbus-tcp] hosts", "has 5 values");

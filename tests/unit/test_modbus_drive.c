@@ -282,6 +282,47 @@ static void test_enable_one_drive_without_torque_keeps_all_waiting(void)
     TEST_ASSERT_FALSE(slave.drive[3].is_enabled);
 }
 
+/* The register holds an old target, which must neither be touched before torque nor be the first that is written. */
+static void test_enable_target_last_writes_it_after_torque_only(void)
+{
+    map.is_target_last = true;
+    await(DRIVE_DISABLED, 100);
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.drive[k].is_frozen = true;
+        slave.device[k].holding[10] = 7;
+        slave.device[k].holding[11] = 7;
+    }
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    for (int i = 0; i < 300 && !are_all(DRIVE_ENABLED); i++) {
+        bool had_torque[AXES];
+        for (unsigned k = 0; k < AXES; k++) {
+            had_torque[k] = slave.drive[k].is_enabled;
+        }
+        (void)!cycle();
+        follow_actual();
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_TRUE(had_torque[k] || slave.device[k].holding[11] == 7);
+        }
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), slave.drive[k].target);
+    }
+}
+
+static void test_enable_target_last_waits_for_torque(void)
+{
+    map.is_target_last = true;
+    slave.drive[3].is_frozen = true; /* else it follows the old target */
+    slave.drive[4].is_weak = true;
+    await(DRIVE_DISABLED, 100);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    cycles(500);
+    TEST_ASSERT_EQUAL_STRING("waits for its torque", report_of(4).phase);
+    TEST_ASSERT_EQUAL_STRING("waits for all drives", report_of(3).phase);
+    TEST_ASSERT_EQUAL_UINT16(0, slave.device[4].holding[11]);
+}
+
 static void test_torque_lost_is_disabled(void)
 {
     enable();
@@ -311,6 +352,27 @@ static void move(q32_t per_cycle_q32, int more, int count)
         }
         TEST_ASSERT_EQUAL(HV_OK, cycle());
     }
+}
+
+/* A drive that was moved by hand since it last followed. */
+static void test_enable_target_last_begins_where_the_drive_is_now(void)
+{
+    map.is_target_last = true;
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.device[k].holding[10] = (uint16_t)((uint32_t)wide_counts(START_MM) >> 16);
+        slave.device[k].holding[11] = (uint16_t)wide_counts(START_MM);
+    }
+    enable();
+    move(MM(1) / 50, 0, 50);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+    await(DRIVE_DISABLED, 200);
+    for (unsigned k = 0; k < AXES; k++) {
+        modbus_slave_place(&slave, k, slave.drive[k].position - 10000);
+        slave.drive[k].is_frozen = true;
+    }
+    cycles(20);
+    follow_actual();
+    enable();
 }
 
 static void test_slow_line_gets_the_newest_setpoint_and_no_backlog(void)
@@ -391,6 +453,21 @@ static void test_speed_register_fits_the_period_of_the_line(void)
     }
     cycles(200);
     TEST_ASSERT_EQUAL_UINT16(0, slave.drive[0].speed);
+}
+
+/* 50 mm/s again, but a drive that takes more than 40 mm/s for an alarm. */
+static void test_speed_register_keeps_below_its_limit(void)
+{
+    open_shared(2000);
+    for (unsigned k = 0; k < AXES; k++) {
+        map.axis[k].speed_max_q32 = MM(40);
+    }
+    enable();
+    cycles(500);
+    move(MM(1) / 20, 0, 600);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT16(400, slave.drive[k].speed);
+    }
 }
 
 /* A wave that is quicker than the line: what is written is its mean, not samples of it. */
@@ -650,6 +727,9 @@ static void refuse(int row)
     case 18:
         map.item[0].is_checked = false; /* neither written nor looked at */
         break;
+    case 19:
+        map.axis[3].speed_max_q32 = 0;
+        break;
     default:
         map.items = MODBUS_DRIVE_STARTUP_MAX + 1;
         break;
@@ -658,7 +738,7 @@ static void refuse(int row)
 
 static void test_init_map_that_contradicts_itself_is_refused(void)
 {
-    for (int row = 0; row < 20; row++) {
+    for (int row = 0; row < 21; row++) {
         refuse(row);
         TEST_ASSERT_EQUAL_MESSAGE(HV_ERR_RANGE, init_status(), "row");
     }
@@ -690,6 +770,9 @@ int main(void)
     RUN_TEST(test_startup_drive_that_comes_late_is_found);
     RUN_TEST(test_enable_with_an_old_target_in_the_register_makes_no_step);
     RUN_TEST(test_enable_one_drive_without_torque_keeps_all_waiting);
+    RUN_TEST(test_enable_target_last_writes_it_after_torque_only);
+    RUN_TEST(test_enable_target_last_begins_where_the_drive_is_now);
+    RUN_TEST(test_enable_target_last_waits_for_torque);
     RUN_TEST(test_torque_lost_is_disabled);
     RUN_TEST(test_alarm_is_the_fault_code);
     RUN_TEST(test_slow_line_gets_the_newest_setpoint_and_no_backlog);
@@ -697,6 +780,7 @@ int main(void)
     RUN_TEST(test_slow_line_paces_all_axes_alike);
     RUN_TEST(test_pace_unlimited_where_carry_is_none);
     RUN_TEST(test_speed_register_fits_the_period_of_the_line);
+    RUN_TEST(test_speed_register_keeps_below_its_limit);
     RUN_TEST(test_smoothing_takes_out_what_the_line_cannot_carry);
     RUN_TEST(test_failures_within_the_retries_are_borne);
     RUN_TEST(test_failures_beyond_the_retries_are_offline_with_their_reason);
