@@ -8,7 +8,7 @@
 #include "heave/drives.h"
 #include "heave/kin.h"
 
-#define PLATE_PERIOD_US 10000u  /**< least time of the feedback from one sample to the next */
+#define PLATE_PERIOD_US 10000u  /**< least time of the feedback from one sample to the next, where no pose is found too */
 #define PLATE_GAP_US    100000u /**< feedback that is older tells no speed; after it the filter starts anew */
 #define PLATE_SAMPLES   24u     /**< from a start of the filter until its speed and acceleration are told */
 
@@ -20,6 +20,7 @@ typedef struct {
     uint64_t at_us;      /**< time of the oldest cylinder's feedback in the pose */
     bool has_pose;       /**< every cylinder has told its extension, and a pose has these */
     bool has_rates;
+    bool was_sought;  /**< private: a pose, at at_us */
     pose_t filtered;  /**< private */
     uint32_t samples; /**< private: since the filter has started */
 } plate_t;

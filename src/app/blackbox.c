@@ -208,6 +208,9 @@ uint32_t blackbox_ask(blackbox_t *self)
     self->asked += self->asked == UINT32_MAX ? 2 : 1;
     const uint32_t ticket = self->asked;
     (void)pthread_mutex_unlock(&self->mutex);
+    if (self->has_no_thread) {
+        answer(self, ticket, false, "its thread could not be started, see the log; restart heaved");
+    }
     return ticket;
 }
 
@@ -337,6 +340,7 @@ bool blackbox_start(blackbox_t *self)
     const int error = pthread_create(&self->thread, &attributes, run, self);
     (void)pthread_attr_destroy(&attributes);
     self->is_running = error == 0;
+    self->has_no_thread = error != 0;
     errno = error;
     return self->is_running;
 }

@@ -105,8 +105,9 @@ typedef struct {
 
     pthread_t thread;
     bool is_running;
-    uint32_t is_quit;  /**< atomic */
-    uint32_t is_ended; /**< atomic */
+    bool has_no_thread; /**< it could not be started: nobody writes anything */
+    uint32_t is_quit;   /**< atomic */
+    uint32_t is_ended;  /**< atomic */
 } blackbox_t;
 
 /** Prepares it. Without a directory, configured or given by a service manager, there is none, which is no error.

@@ -64,10 +64,38 @@ void gateway_save(const gateway_t *self, gateway_t *out)
     }
 }
 
+static bool is_state(unsigned value)
+{
+    return value < STATES;
+}
+
+/* What else is used as an index, or in a table. */
+static bool are_numbers_sound(const gateway_t *saved)
+{
+    const snapshot_t *s = &saved->snapshot;
+    const supervisor_t *v = &saved->supervisor;
+    bool is_sound = is_state(v->state) && is_state(v->goal) && is_state(v->interrupted) && is_state(s->state) &&
+                    is_state(s->goal) && (unsigned)saved->bring_up <= BRING_UP_MOVE && (unsigned)s->fault.code < FAULT_CODES &&
+                    (unsigned)s->reaction <= FAULT_REACT_SILENT && s->relay_count <= HAL_RELAYS_MAX;
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        is_sound = is_sound && (unsigned)saved->axis_fault[i] < FAULT_CODES && (unsigned)s->drive[i].state <= DRIVE_FAULT &&
+                   (unsigned)saved->feedback[i].state <= DRIVE_FAULT;
+    }
+    return is_sound;
+}
+
+/* True for something that a gateway with so many drives may have saved. */
+static bool is_saved_sound(const gateway_t *saved, unsigned drives)
+{
+    const unsigned cylinders = saved->snapshot.cylinders;
+    return (cylinders == 3 || cylinders == CYLINDERS_MAX) && cylinders == kin_cylinders(motion_kin(&saved->motion)) &&
+           saved->snapshot.has_angle == saved->settings.has_angle &&
+           drives == cylinders + (saved->settings.has_angle ? 1u : 0u) && are_numbers_sound(saved);
+}
+
 hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io)
 {
-    const unsigned drives = kin_cylinders(motion_kin(&saved->motion)) + (saved->settings.has_angle ? 1u : 0u);
-    if (!is_io_valid(io) || drives_count(io->drives) != drives) {
+    if (!is_io_valid(io) || !is_saved_sound(saved, drives_count(io->drives))) {
         return HV_ERR_ARG;
     }
     *self = *saved;

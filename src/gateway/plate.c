@@ -78,19 +78,20 @@ void plate_take(plate_t *self, const kin_t *kin, const drive_feedback_t feedback
         plate_init(self);
         return;
     }
-    const bool is_new = !self->has_pose || at_us < self->at_us || at_us - self->at_us >= PLATE_PERIOD_US;
+    const bool is_new = !self->was_sought || at_us < self->at_us || at_us - self->at_us >= PLATE_PERIOD_US;
     if (is_new) {
         pose_t pose;
         const bool is_found = (self->has_pose && kin_forward(kin, extension_mm_q32, &self->pose, &pose, NULL) == HV_OK) ||
                               kin_forward(kin, extension_mm_q32, guess, &pose, NULL) == HV_OK;
-        if (!is_found) {
-            plate_init(self);
+        if (!is_found) { /* a search that finds nothing takes longest: not in every cycle */
+            *self = (plate_t){.at_us = at_us, .was_sought = true};
             return;
         }
         self->pose = pose;
         filter(self, at_us - self->at_us); /* a time that goes back is a large step: a gap */
         self->at_us = at_us;
         self->has_pose = true;
+        self->was_sought = true;
     }
     self->has_rates = self->samples >= PLATE_SAMPLES && now_us - self->at_us <= PLATE_GAP_US;
 }

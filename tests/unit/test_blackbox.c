@@ -340,6 +340,14 @@ static void test_blackbox_without_directory_there_is_none(void)
     TEST_ASSERT_TRUE(blackbox_start(&m_box));
 }
 
+static void test_blackbox_whose_thread_could_not_be_started_says_so_at_once(void)
+{
+    TEST_ASSERT_NULL(blackbox_open(&m_box, "test.ini", &m_config));
+    m_box.has_no_thread = true;
+    TEST_ASSERT_EQUAL_UINT32(1, blackbox_ask(&m_box));
+    expect_refusal("could not be started");
+}
+
 static void test_checkpoint_damaged_text_is_refused(void)
 {
     static char line[CHECKPOINT_LINE_MAX];
@@ -375,6 +383,7 @@ int main(void)
     RUN_TEST(test_blackbox_full_disk_leaves_nothing_behind);
     RUN_TEST(test_blackbox_directory_that_cannot_be_is_said_at_the_start);
     RUN_TEST(test_blackbox_without_directory_there_is_none);
+    RUN_TEST(test_blackbox_whose_thread_could_not_be_started_says_so_at_once);
     RUN_TEST(test_checkpoint_damaged_text_is_refused);
     return UNITY_END();
 }

@@ -1205,6 +1205,48 @@ static void test_telemetry_actual_pose_follows_the_feedback(void)
     TEST_ASSERT_EQUAL_UINT32(3, counted()->late_cycles);
 }
 
+/* ---- what was saved ---- */
+
+static hv_status_t resume(const gateway_t *saved)
+{
+    static gateway_t other;
+    const gateway_t before = other;
+    const hv_status_t status = gateway_resume(&other, saved, &m_rig.gateway.io);
+    TEST_ASSERT_TRUE(status == HV_OK || memcmp(&before, &other, sizeof other) == 0);
+    return status;
+}
+
+static void test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves(void)
+{
+    static gateway_t saved, spoiled;
+    engage();
+    gateway_save(&m_rig.gateway, &saved);
+    TEST_ASSERT_EQUAL(HV_OK, resume(&saved));
+#define SPOIL(member, value)                                                                                                     \
+    do {                                                                                                                         \
+        spoiled = saved;                                                                                                         \
+        spoiled.member = (value);                                                                                                \
+        TEST_ASSERT_EQUAL_MESSAGE(HV_ERR_ARG, resume(&spoiled), #member);                                                        \
+    } while (0)
+    SPOIL(supervisor.state, STATES);
+    SPOIL(supervisor.goal, STATES);
+    SPOIL(supervisor.interrupted, STATES);
+    SPOIL(snapshot.state, STATES);
+    SPOIL(snapshot.goal, STATES);
+    SPOIL(bring_up, (bring_up_t)(BRING_UP_MOVE + 1));
+    SPOIL(snapshot.fault.code, FAULT_CODES);
+    SPOIL(snapshot.reaction, (fault_reaction_t)(FAULT_REACT_SILENT + 1));
+    SPOIL(snapshot.relay_count, HAL_RELAYS_MAX + 1);
+    SPOIL(axis_fault[6], FAULT_CODES);
+    SPOIL(snapshot.drive[0].state, (drive_state_t)(DRIVE_FAULT + 1));
+    SPOIL(feedback[3].state, (drive_state_t)(DRIVE_FAULT + 1));
+    SPOIL(snapshot.cylinders, 3);
+    SPOIL(snapshot.cylinders, 200);
+    SPOIL(settings.has_angle, false);
+    SPOIL(snapshot.has_angle, false);
+#undef SPOIL
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -1262,6 +1304,7 @@ int main(void)
     RUN_TEST(test_fault_drives_that_never_enable_time_out);
     RUN_TEST(test_fault_in_every_phase_of_coming_up_latches);
     RUN_TEST(test_hold_during_coming_up_stops_and_resume_goes_on);
+    RUN_TEST(test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves);
     RUN_TEST(test_shutdown_from_every_moment_ends_in_off);
     RUN_TEST(test_shutdown_in_fault_and_estop_is_finished_at_rest);
     RUN_TEST(test_telemetry_actual_speed_is_that_of_the_plate);
