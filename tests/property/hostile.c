@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT
  * hostile.c - a storm of frames, garbage, requests, e-stops and drive faults on a whole gateway over simulated hardware.
  * Several platforms and cycle times.
- * What must hold: every set-point within the limits (judged on the drive interface), no following error, and after the storm the
- * platform comes up again. Prints its seed; another one may be given as the first argument, cycles as the second.
+ * What must hold in every cycle: every set-point within the limits (judged on the drive interface), no following error, and what
+ * supervision.h looks at: all drives stop together, relays are safe, silence, one sender at a time, nothing un-latches itself.
+ * After the storm the platform comes up again. Prints its seed; another one may be given as the first argument, cycles as the
+ * second.
  */
 #include <math.h>
 #include <stdio.h>
@@ -10,13 +12,15 @@
 #include <string.h>
 
 #include "rig.h"
+#include "supervision.h"
 
 #define CYCLES_DEFAULT 1500000 /* of each storm */
 
 static rig_t m_rig;
+static supervision_t m_supervision;
 static uint64_t m_random;
 static unsigned m_cylinders;
-static long m_judged, m_faults;
+static long m_judged, m_faults, m_cycles, m_together, m_estops, m_silences, m_owners;
 
 static uint64_t random_bits(void)
 {
@@ -42,6 +46,21 @@ static double around(double range)
 }
 
 /* ---- what senders send ---- */
+
+static unsigned m_host; /* the one that sends most */
+
+static void send_bytes(const uint8_t *bytes, size_t length, uint64_t timed_ms)
+{
+    const unsigned host = one_in(30) ? 1 - m_host : m_host;
+    const hal_udp_peer_t from = supervision_peer(host);
+    supervision_sent(&m_supervision, host, timed_ms);
+    (void)!sim_udp_push(&m_rig.udp, bytes, length, &from);
+}
+
+static void send_text(const char *text, uint64_t timed_ms)
+{
+    send_bytes((const uint8_t *)text, strlen(text), timed_ms);
+}
 
 typedef struct {
     double size;      /* of the values, as a share of what the platform has */
@@ -98,10 +117,11 @@ static void send_frame(void)
     if (is_timed) {
         const unsigned ms = one_in(3) ? below(3000) : m_mood.gap_ms != 0 ? m_mood.gap_ms : below(60);
         (void)snprintf(text + used, sizeof text - (size_t)used, "%u#", ms);
+        send_text(text, ms == 0 ? 1 : ms);
     } else {
         (void)snprintf(text + used, sizeof text - (size_t)used, "%X#", below(0x10000));
+        send_text(text, 0);
     }
-    rig_send(&m_rig, text);
 }
 
 static void send_garbage(void)
@@ -117,10 +137,13 @@ static void send_garbage(void)
                                             "@A6:1,2,3#",
                                             "@C6:-32768,32767,1e4,-1e4,0,0,0#",
                                             "@A6:32767,-32768,32767,-32768,32767,32767,0#",
-                                            "@A6T:0,0,0,0,0,0,3600000#",
                                             "@A6T:9,9,9,9,9,9,99999999#"};
+    if (one_in(100)) {
+        send_text("@A6T:0,0,0,0,0,0,3600000#", 3600000);
+        return;
+    }
     if (one_in(2)) {
-        rig_send(&m_rig, k_garbage[below(sizeof k_garbage / sizeof k_garbage[0])]);
+        send_text(k_garbage[below(sizeof k_garbage / sizeof k_garbage[0])], 0);
         return;
     }
     uint8_t bytes[600];
@@ -128,7 +151,7 @@ static void send_garbage(void)
     for (size_t i = 0; i < length; i++) {
         bytes[i] = one_in(3) ? (uint8_t) "@A6CT:,0.5-#"[below(12)] : (uint8_t)random_bits();
     }
-    (void)!sim_udp_push(&m_rig.udp, bytes, length, NULL);
+    send_bytes(bytes, length, 60000); /* it may happen to be anything */
 }
 
 /* ---- what else happens ---- */
@@ -164,11 +187,17 @@ static void mend(void)
     rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
 }
 
+static void ask(event_t request)
+{
+    supervision_asked(&m_supervision, request);
+    (void)!rig_request(&m_rig, request);
+}
+
 static void operate(void)
 {
     static const event_t k_requests[] = {EVENT_ENGAGE, EVENT_ENGAGE, EVENT_ENGAGE, EVENT_HOLD,
                                          EVENT_RESUME, EVENT_RESUME, EVENT_PARK,   EVENT_RESET};
-    (void)!rig_request(&m_rig, k_requests[below(8)]);
+    ask(k_requests[below(8)]);
 }
 
 static unsigned gap_ms(void)
@@ -195,9 +224,9 @@ static bool brings_up(void)
     mend();
     rig_run_ms(&m_rig, 3000);
     for (int attempt = 0; attempt < 2; attempt++) {
-        (void)!rig_request(&m_rig, EVENT_RESET);
+        ask(EVENT_RESET);
         rig_run_ms(&m_rig, 100);
-        (void)!rig_request(&m_rig, EVENT_ENGAGE);
+        ask(EVENT_ENGAGE);
         if (m_rig.gateway.snapshot.state == STATE_ENGAGED || rig_run_until(&m_rig, STATE_ENGAGED, 60000)) {
             return true;
         }
@@ -205,35 +234,68 @@ static bool brings_up(void)
     return false;
 }
 
+static void judge_cycle(void *ctx)
+{
+    (void)ctx;
+    m_cycles++;
+    supervision_judge(&m_supervision);
+}
+
+static bool is_kept(void)
+{
+    if (m_supervision.wrong == NULL && rig_is_within_limits(&m_rig) && rig_following_errors(&m_rig) == 0) {
+        return true;
+    }
+    const bool is_supervision = m_supervision.wrong != NULL;
+    printf("# at %.3f s, now in %s: %s\n", (double)(is_supervision ? m_supervision.wrong_us : m_rig.now_us) / 1e6,
+           state_name(m_rig.gateway.snapshot.state), is_supervision ? m_supervision.wrong : "a limit, or a following error");
+    return false;
+}
+
+/* What the senders do next. */
+static void traffic(void)
+{
+    if (one_in(60)) {
+        change_mood();
+    }
+    if (one_in(400)) {
+        m_host = 1 - m_host;
+    }
+    if (one_in(200)) { /* nobody sends */
+        rig_run_ms(&m_rig, below(10000));
+    }
+    if (one_in(12)) {
+        send_garbage();
+    } else {
+        send_frame();
+    }
+}
+
+/* What operators and drives do. */
+static void events(void)
+{
+    if (one_in(150)) {
+        operate();
+    }
+    if (one_in(100)) {
+        trouble();
+        rig_run_ms(&m_rig, one_in(3) ? 1 : 5 + below(one_in(2) ? 20 : 2000));
+        mend();
+    }
+}
+
 static bool weather(long cycles)
 {
     const uint64_t end_us = m_rig.now_us + (uint64_t)cycles * m_rig.settings.cycle_us;
-    long steps = 0;
     change_mood();
     while (m_rig.now_us < end_us) {
-        if (one_in(60)) {
-            change_mood();
-        }
-        if (one_in(12)) {
-            send_garbage();
-        } else {
-            send_frame();
-        }
-        if (one_in(150)) {
-            operate();
-        }
-        if (one_in(100)) {
-            trouble();
-            rig_run_ms(&m_rig, one_in(3) ? 1 : 5 + below(one_in(2) ? 20 : 2000));
-            mend();
-        }
+        traffic();
+        events();
         rig_run_ms(&m_rig, gap_ms());
         if (m_rig.gateway.snapshot.state != STATE_ENGAGED && one_in(25)) {
-            (void)!rig_request(&m_rig, one_in(3) ? EVENT_RESET : EVENT_ENGAGE);
+            ask(one_in(3) ? EVENT_RESET : EVENT_ENGAGE);
         }
-        steps++;
-        if (!rig_is_within_limits(&m_rig) || rig_following_errors(&m_rig) != 0) {
-            printf("# at %.3f s, state %s\n", (double)m_rig.now_us / 1e6, state_name(m_rig.gateway.snapshot.state));
+        if (!is_kept()) {
             return false;
         }
     }
@@ -245,22 +307,31 @@ static bool storm(settings_t settings, long cycles)
     settings.silence_hold_ms = 1500;
     settings.silence_neutral_ms = 4000;
     settings.silence_settle_ms = 8000;
+    settings.takeover_ms = 2500;
+    settings.relay_safe_mask = 0x805;
+    settings.relay_safe_after_ms = below(3) * 700;
     settings.angle_wrap = one_in(2) ? ANGLE_SHORTEST : ANGLE_AS_SENT;
     m_cylinders = settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
     rig_start(&m_rig, &settings, false);
     m_rig.is_auto_checking = true;
+    supervision_init(&m_supervision, &m_rig);
+    m_rig.after_cycle = judge_cycle;
     const bool is_up = rig_run_until(&m_rig, STATE_ENGAGED, 60000);
     report(is_up, "comes up");
-    const bool is_kept = weather(cycles);
-    report(is_kept, "limits and following errors");
-    const bool is_back = brings_up();
+    const bool is_good = weather(cycles);
+    report(is_good, "limits, following errors and supervision");
+    const bool is_back = brings_up() && is_kept();
     report(is_back, "engages again after the storm");
     const counters_t *c = &m_rig.gateway.snapshot.counters;
     printf("# shares: speed %.9f, acceleration %.9f, jerk %.9f; %u faults, %u impossible, %u stretched\n", m_rig.check.speed,
            m_rig.check.accel, m_rig.check.jerk, c->faults, c->impossible, c->stretched);
     m_judged += m_rig.check.cycles;
     m_faults += c->faults;
-    return is_up && is_kept && is_back;
+    m_together += m_supervision.faults;
+    m_estops += m_supervision.estops;
+    m_silences += m_supervision.holds;
+    m_owners += m_supervision.owners;
+    return is_up && is_good && is_back;
 }
 
 static settings_t with(settings_t settings, bool has_angle, uint32_t cycle_us)
@@ -294,5 +365,8 @@ int main(int count, char **arguments)
     }
     printf("# figure %ld cycles judged at the drives, with faults of drives and e-stops\n# figure %ld faults in them\n", m_judged,
            m_faults);
+    printf("# figure %ld cycles in which supervision was judged: stops together, relays, silence, senders\n", m_cycles);
+    printf("# %ld times a drive went bad, %ld e-stops, %ld holds by silence, %ld changes of the sender\n", m_together, m_estops,
+           m_silences, m_owners);
     return is_ok ? EXIT_SUCCESS : EXIT_FAILURE;
 }

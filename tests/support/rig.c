@@ -330,6 +330,9 @@ static void cycle(rig_t *self)
 {
     gateway_cycle(&self->gateway, self->now_us);
     self->now_us += self->settings.cycle_us;
+    if (self->after_cycle != NULL) {
+        self->after_cycle(self->after_cycle_ctx);
+    }
 }
 
 void rig_run_ms(rig_t *self, unsigned ms)

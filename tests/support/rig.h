@@ -38,6 +38,8 @@ typedef struct {
     q32_t step_max_q32;    /**< largest step of any set-point between two cycles in which every drive was enabled */
     q32_t sent_q32[DRIVES_MAX];
     bool was_enabled;
+    void (*after_cycle)(void *ctx); /**< NULL: nobody looks; set after rig_start() */
+    void *after_cycle_ctx;
 } rig_t;
 
 /** A symmetrical hexapod with a rotation motor: 200 mm stroke, 400 mm/s, 3000 mm/s^2, 50000 mm/s^3. */
