@@ -322,4 +322,7 @@ void config_dump(const config_t *self, FILE *out);
 /** Writes the reference of all keys as Markdown. */
 void config_write_reference(FILE *out);
 
+/** Writes it as sections of a manual page. */
+void config_write_manual(FILE *out);
+
 #endif

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "config_value.h"
+#include "roff.h"
 
 /* "required", or the default. */
 static void add_default(const config_key_t *key, config_text_t *text)
@@ -98,6 +99,40 @@ void config_write_reference(FILE *out)
         for (size_t k = 0; k < config_key_count; k++) {
             if (strcmp(config_keys[k].section, section->name) == 0) {
                 write_row(&config_keys[k], out);
+            }
+        }
+    }
+}
+
+static void write_item(const config_key_t *key, FILE *out)
+{
+    config_text_t allowed, head;
+    config_text_clear(&head);
+    config_text_add(&head, "%s =", key->name);
+    roff_item(head.data, out);
+    config_text_clear(&allowed);
+    config_value_allowed(key, &allowed);
+    config_text_add(&allowed, "; ");
+    add_default(key, &allowed);
+    roff_text(allowed.data, out);
+    fputs(".br\n", out);
+    config_text_clear(&allowed);
+    config_text_add(&allowed, "%s%s%s", key->help, need_text(key->needs), key->is_live ? " (SIGHUP)" : "");
+    roff_text(allowed.data, out);
+}
+
+void config_write_manual(FILE *out)
+{
+    for (size_t i = 0; i < config_section_count; i++) {
+        const config_section_t *section = &config_sections[i];
+        fprintf(out, ".SH SECTION [%s]\n", section->name);
+        config_text_t text;
+        config_text_clear(&text);
+        config_text_add(&text, "%s%s", section->help, need_text(section->needs));
+        roff_text(text.data, out);
+        for (size_t k = 0; k < config_key_count; k++) {
+            if (strcmp(config_keys[k].section, section->name) == 0) {
+                write_item(&config_keys[k], out);
             }
         }
     }

@@ -2,7 +2,6 @@
  * heavectl.c - talks to a running heaved over its local socket: asks, shows, watches.
  */
 #include <errno.h>
-#include <getopt.h>
 #include <langinfo.h>
 #include <locale.h>
 #include <poll.h>
@@ -18,20 +17,19 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "ctl_usage.h"
 #include "ctl_view.h"
 #include "say.h" // exit codes
+#include "usage.h"
 
-#define DEFAULT_SOCKET "/run/heave/heaved.sock"
-#define ANSWER_MS      5000
-#define DUMP_MS        60000 /* a slow disk */
-#define WAIT_MS_MAX    1000  /* a signal between a look and a wait is seen by then */
-#define LINE_BYTES     65536u
-#define COLUMNS        80u
-#define TERMINAL_HZ    20u
-#define PLAIN_HZ       1u
-#define FOR_MAX_S      1e9
-
-enum { OPTION_JSON = 1, OPTION_SOCKET, OPTION_FOR, OPTION_HZ, OPTION_HELP, OPTION_VERSION };
+#define ANSWER_MS   5000
+#define DUMP_MS     60000 /* a slow disk */
+#define WAIT_MS_MAX 1000  /* a signal between a look and a wait is seen by then */
+#define LINE_BYTES  65536u
+#define COLUMNS     80u
+#define TERMINAL_HZ 20u
+#define PLAIN_HZ    1u
+#define FOR_MAX_S   1e9
 
 /** A run of the program. */
 typedef struct {
@@ -46,33 +44,6 @@ typedef struct {
     size_t length;   /**< bytes in line */
     size_t consumed; /**< of those, given out already */
 } ctl_t;
-
-static const char *const k_commands[] = {"status", "watch", "engage",   "hold", "resume",
-                                         "park",   "reset", "shutdown", "dump", "intensity"};
-
-static const char k_help[] =
-    "heavectl - talks to a running heaved.\n"
-    "\n"
-    "  heavectl [--json] [--socket PATH] status\n"
-    "  heavectl [--json] [--socket PATH] [--for SECONDS] [--hz N] watch\n"
-    "  heavectl [--json] [--socket PATH] engage | hold | resume | park | reset | shutdown | dump\n"
-    "  heavectl [--json] [--socket PATH] intensity PERCENT\n"
-    "\n"
-    "  engage    bring the platform up and follow the sender\n"
-    "  hold      stop where it is; resume goes on with what was interrupted\n"
-    "  park      settle: lowest position, at rest\n"
-    "  reset     leave FAULT or ESTOP, once the cause is gone\n"
-    "  shutdown  settle, drives off, end heaved\n"
-    "  dump      write the last minutes down now, as after a fault; says where\n"
-    "  intensity how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so\n"
-    "\n"
-    "  --json          answers as heaved gives them: one JSON object per line\n"
-    "  --socket PATH   else the environment's HEAVE_SOCKET, else " DEFAULT_SOCKET "\n"
-    "  --for SECONDS   watch ends by itself\n"
-    "  --hz N          updates per second of watch, 1 to 50; else 20, and 1 where the output is no terminal\n"
-    "  --help, --version\n"
-    "\n"
-    "Exit codes: 0 done, 1 refused, 64 usage, 69 heaved is not running.\n";
 
 static volatile sig_atomic_t is_interrupted; /* set by the signal handler, which can reach nothing else */
 
@@ -90,6 +61,15 @@ static __attribute__((format(printf, 2, 3))) int complain(int code, const char *
     vfprintf(stderr, format, arguments);
     fputc('\n', stderr);
     va_end(arguments);
+    return code;
+}
+
+/* Standard output that took everything. */
+static int end_stdout(int code)
+{
+    if (fflush(stdout) != 0 || ferror(stdout) != 0) {
+        return complain(EXIT_IO, "standard output: %s", strerror(errno));
+    }
     return code;
 }
 
@@ -386,16 +366,11 @@ static const char *take_option(ctl_t *self, int option)
 
 static const char *take_options(ctl_t *self, int argc, char **argv)
 {
-    static const struct option k_options[] = {{"json", no_argument, NULL, OPTION_JSON},
-                                              {"socket", required_argument, NULL, OPTION_SOCKET},
-                                              {"for", required_argument, NULL, OPTION_FOR},
-                                              {"hz", required_argument, NULL, OPTION_HZ},
-                                              {"help", no_argument, NULL, OPTION_HELP},
-                                              {"version", no_argument, NULL, OPTION_VERSION},
-                                              {NULL, 0, NULL, 0}};
+    struct option known[USAGE_OPTIONS_MAX + 1];
+    usage_options(&heavectl_usage, known);
     opterr = 0;
     for (;;) {
-        const int option = getopt_long(argc, argv, ":", k_options, NULL);
+        const int option = getopt_long(argc, argv, ":", known, NULL);
         if (option < 0) {
             return NULL;
         }
@@ -417,9 +392,9 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
                             : "one command is needed";
     }
     self->argument = is_intensity ? argv[optind + 1] : NULL;
-    for (size_t i = 0; i < sizeof k_commands / sizeof k_commands[0]; i++) {
-        if (strcmp(argv[optind], k_commands[i]) == 0) {
-            self->command = k_commands[i];
+    for (const usage_row_t *row = heavectl_usage.commands; row->name != NULL; row++) {
+        if (strcmp(argv[optind], row->name) == 0) {
+            self->command = row->name;
             return NULL;
         }
     }
@@ -430,12 +405,16 @@ int main(int argc, char **argv)
 {
     static ctl_t ctl;
     const char *environment = getenv("HEAVE_SOCKET");
-    ctl.socket = environment != NULL && environment[0] != '\0' ? environment : DEFAULT_SOCKET;
+    ctl.socket = environment != NULL && environment[0] != '\0' ? environment : CTL_SOCKET;
     (void)setlocale(LC_CTYPE, "");
     const char *wrong = take_options(&ctl, argc, argv);
     if (wrong == NULL && ctl.command != NULL) {
-        printf("%s", strcmp(ctl.command, "help") == 0 ? k_help : "heavectl " HEAVE_VERSION "\n");
-        return EXIT_DONE;
+        if (strcmp(ctl.command, "help") == 0) {
+            usage_print(&heavectl_usage, stdout);
+        } else {
+            printf("heavectl " HEAVE_VERSION "\n");
+        }
+        return end_stdout(EXIT_DONE);
     }
     wrong = wrong == NULL ? take_command(&ctl, argc, argv) : wrong;
     if (wrong != NULL) {
@@ -445,5 +424,5 @@ int main(int argc, char **argv)
     if (code != EXIT_DONE) {
         return code;
     }
-    return strcmp(ctl.command, "watch") == 0 ? watch(&ctl) : ask(&ctl);
+    return end_stdout(strcmp(ctl.command, "watch") == 0 ? watch(&ctl) : ask(&ctl));
 }

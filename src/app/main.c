@@ -18,6 +18,7 @@
 #include "options.h"
 #include "play.h"
 #include "say.h"
+#include "usage.h"
 #include "whole_file.h"
 
 void hv_assert_failed(const char *file, int line)
@@ -112,7 +113,11 @@ int main(int argc, char **argv)
         return code;
     }
     if (options.mode == MODE_HELP || options.mode == MODE_VERSION) {
-        printf("%s", options.mode == MODE_HELP ? options_help : "heaved " HEAVE_VERSION "\n");
+        if (options.mode == MODE_HELP) {
+            usage_print(&heaved_usage, stdout);
+        } else {
+            printf("heaved " HEAVE_VERSION "\n");
+        }
         return end_stdout(EXIT_DONE);
     }
     if (!is_readable(options.config)) {

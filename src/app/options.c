@@ -3,11 +3,11 @@
  */
 #include "options.h"
 
-#include <getopt.h>
 #include <string.h>
 
 #include "config.h"
 #include "say.h"
+#include "usage.h"
 
 enum {
     OPTION_CONFIG = 1,
@@ -24,43 +24,85 @@ enum {
     OPTION_VERSION
 };
 
-const char options_help[] =
-    "heaved - motion platform gateway: takes UDP frames, moves the cylinders.\n"
-    "\n"
-    "  heaved --config FILE [--socket PATH] [--record FRAMES] [--trace OUT]   run\n"
-    "  heaved --config FILE --check                      validate, and print what follows from it\n"
-    "  heaved --config FILE --envelope OUT               what the geometry can do, as CSV (docs/envelope.md)\n"
-    "  heaved --config FILE --doctor                     look at machine, CAN interface and drives: what is wrong, what helps\n"
-    "  heaved --config FILE --dump-config                every key with its value, unit, range and help\n"
-    "  heaved --config FILE --dump-dbc                   the frames of [can-raw] as a DBC file\n"
-    "  heaved --config FILE --play FRAMES [--trace OUT]  offline: simulated time and devices\n"
-    "\n"
-    "  --config FILE    the platform (INI)\n"
-    "  --record FRAMES  log every datagram and request, so that --play repeats the run\n"
-    "  --trace OUT      the set-points of every cycle (CSV); - is standard output\n"
-    "  --envelope OUT   a file, there as a whole or not at all; - is standard output\n"
-    "  --play FRAMES    lines `<t_ms> <text>`, `<t_ms> !engage` ...; - is standard input\n"
-    "  --socket PATH    for heavectl, instead of [control] socket\n"
-    "  --help, --version\n"
-    "\n"
-    "SIGTERM or Ctrl-C settles the platform, switches the drives off and ends; a second one ends at once.\n"
-    "Exit codes: 0 done, 1 ended by a second signal or --doctor found something wrong, 64 usage, 65 bad FRAMES, 66 no input,\n"
-    "69 port or socket in use, 73 output cannot be created, 74 output cannot be written, 78 configuration.\n";
+static const usage_row_t k_forms[] = {
+    {.argument = "[--socket PATH] [--record FRAMES] [--trace OUT]", .help = "run"},
+    {.argument = "--check", .help = "validate, and print what follows from it"},
+    {.argument = "--envelope OUT", .help = "what the geometry can do, as CSV (docs/envelope.md)"},
+    {.argument = "--doctor", .help = "look at machine, CAN interface and drives: what is wrong, what helps"},
+    {.argument = "--dump-config", .help = "every key with its value, unit, range and help"},
+    {.argument = "--dump-dbc", .help = "the frames of [can-raw] as a DBC file"},
+    {.argument = "--play FRAMES [--trace OUT]", .help = "offline: simulated time and devices"},
+    {0},
+};
 
-static const struct option k_options[] = {
-    {"config", required_argument, NULL, OPTION_CONFIG},
-    {"check", no_argument, NULL, OPTION_CHECK},
-    {"envelope", required_argument, NULL, OPTION_ENVELOPE},
-    {"doctor", no_argument, NULL, OPTION_DOCTOR},
-    {"dump-config", no_argument, NULL, OPTION_DUMP},
-    {"dump-dbc", no_argument, NULL, OPTION_DUMP_DBC},
-    {"play", required_argument, NULL, OPTION_PLAY},
-    {"trace", required_argument, NULL, OPTION_TRACE},
-    {"record", required_argument, NULL, OPTION_RECORD},
-    {"socket", required_argument, NULL, OPTION_SOCKET},
-    {"help", no_argument, NULL, OPTION_HELP},
-    {"version", no_argument, NULL, OPTION_VERSION},
-    {NULL, 0, NULL, 0},
+static const usage_row_t k_options[] = {
+    {"config", "FILE", "the platform (INI)", OPTION_CONFIG},
+    {"check", NULL, "say whether the platform is valid, what it can reach, what it costs the bus, and what would suit it better",
+     OPTION_CHECK},
+    {"envelope", "OUT", "a file, there as a whole or not at all; - is standard output", OPTION_ENVELOPE},
+    {"doctor", NULL, "a line for each finding; writes nothing into a drive", OPTION_DOCTOR},
+    {"dump-config", NULL, "as a file that --config takes", OPTION_DUMP},
+    {"dump-dbc", NULL, "for tools that show CAN frames", OPTION_DUMP_DBC},
+    {"play", "FRAMES", "lines `<t_ms> <text>`, `<t_ms> !engage` ...; - is standard input", OPTION_PLAY},
+    {"trace", "OUT", "the set-points of every cycle (CSV); - is standard output", OPTION_TRACE},
+    {"record", "FRAMES", "log every datagram and request, so that --play repeats the run", OPTION_RECORD},
+    {"socket", "PATH", "for heavectl, instead of [control] socket", OPTION_SOCKET},
+    {"help", NULL, "print this", OPTION_HELP},
+    {"version", NULL, "print the version", OPTION_VERSION},
+    {0},
+};
+
+static const usage_exit_t k_exits[] = {
+    {EXIT_DONE, "done"},
+    {EXIT_REFUSED, "ended by a second signal or --doctor found something wrong"},
+    {EXIT_BAD_USAGE, "usage"},
+    {EXIT_BAD_DATA, "bad FRAMES"},
+    {EXIT_NO_INPUT, "no input"},
+    {EXIT_UNAVAILABLE, "port or socket in use"},
+    {EXIT_SOFTWARE, "a bug"},
+    {EXIT_NO_OUTPUT, "output cannot be created"},
+    {EXIT_IO, "output cannot be written"},
+    {EXIT_BAD_CONFIG, "configuration"},
+    {0},
+};
+
+static const usage_section_t k_manual[] = {
+    {"DESCRIPTION",
+     "`heaved` takes a motion platform's UDP frames (protocol V3.0), works out where each cylinder has to be, and drives "
+     "cylinders and relays "
+     "itself. `heavectl(1)` talks to it. As a service it is `heave@NAME`, which runs /etc/heave/NAME.ini.\n\n"
+     "It is no safety function: the e-stop chain has to take the power from the drives by itself, whatever heaved does.\n"},
+    {"SIGNALS",
+     "SIGTERM and SIGINT settle the platform, switch the drives off and end; a second one ends at once. SIGHUP reads the "
+     "configuration again: "
+     "what may change in operation does, the rest is named with its line and needs a restart; a wrong file changes nothing.\n"},
+    {"ENVIRONMENT",
+     "`NOTIFY_SOCKET` and `WATCHDOG_USEC` are those of systemd: it is told when the platform is ready and what state it is in, "
+     "and that the "
+     "motion thread advances. `STATE_DIRECTORY` is where the black box goes if the configuration names no directory.\n"},
+    {"FILES", " /etc/heave/NAME.ini        the platform of heave@NAME; see heave.ini(5)\n"
+              " /etc/heave/demo.ini        a simulated one, to try things out\n"
+              " /run/heave/heaved.sock     for heavectl; members of group heave may\n"
+              " /var/lib/heave/NAME/       incidents of the black box\n"},
+    {"EXAMPLES", "Is a platform valid, and what does it come to?\n"
+                 " heaved --config /etc/heave/demo.ini --check\n"
+                 "What would a frame do? Three seconds after the start a pose, then down:\n"
+                 " printf '%s\\n' '3000 @A6:5,6,0,5.5,3.0,20,F0#' '5000 !park' |\n"
+                 "     heaved --config /etc/heave/demo.ini --play - --trace /tmp/trace.csv\n"},
+    {0},
+};
+
+const usage_t heaved_usage = {
+    .program = "heaved",
+    .manual_section = "8",
+    .summary = "motion platform gateway: takes UDP frames, moves the cylinders",
+    .common = "--config FILE",
+    .forms = k_forms,
+    .options = k_options,
+    .notes = "SIGTERM or Ctrl-C settles the platform, switches the drives off and ends; a second one ends at once.",
+    .exits = k_exits,
+    .manual = k_manual,
+    .see_also = "heavectl(1), heave.ini(5)",
 };
 
 /* Sets the mode; two different ones contradict each other. */
@@ -150,10 +192,12 @@ static int complain(const char *what, const char *about)
 int options_read(options_t *self, int argc, char **argv)
 {
     *self = (options_t){.mode = MODE_RUN};
+    struct option known[USAGE_OPTIONS_MAX + 1];
+    usage_options(&heaved_usage, known);
     opterr = 0;
     for (;;) {
         const int at = optind;
-        const int option = getopt_long(argc, argv, ":", k_options, NULL);
+        const int option = getopt_long(argc, argv, ":", known, NULL);
         if (option < 0) {
             break;
         }

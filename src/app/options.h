@@ -34,7 +34,4 @@ typedef struct {
  *  @return EXIT_DONE or EXIT_BAD_USAGE */
 int options_read(options_t *self, int argc, char **argv);
 
-/** The text of --help. */
-extern const char options_help[];
-
 #endif

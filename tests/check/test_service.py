@@ -34,11 +34,12 @@ def main():
     suite = tap.Suite()
     with tempfile.TemporaryDirectory(prefix="heave-") as name:
         folder = Path(name)
-        with suite.case("programs, unit, user and ready-made platforms are installed"):
+        with suite.case("programs, manual, completion, units, user and ready-made platforms are installed"):
             files = installed(build, folder)
             assert {"bin/heaved", "bin/heavectl", "lib/systemd/system/heave@.service", "lib/sysusers.d/heave.conf", "libexec/heave-can",
                     "lib/systemd/system/heave-can@.service", "lib/systemd/system/heave-can-flush@.path",
-                    "lib/modules-load.d/heave.conf", "lib/udev/rules.d/60-heave.rules", "share/doc/heave/examples/70-heave-can.link",
+                    "share/man/man8/heaved.8.gz", "share/man/man1/heavectl.1.gz", "share/man/man5/heave.ini.5.gz",
+                    "share/bash-completion/completions/heaved", "share/bash-completion/completions/heavectl", "lib/modules-load.d/heave.conf", "lib/udev/rules.d/60-heave.rules", "share/doc/heave/examples/70-heave-can.link",
                     "share/doc/heave/examples/70-heave-can.network"} <= files, files
             assert any(file.endswith("demo-hexapod.ini") for file in files), files
         unit = folder / "heave@test.service"

@@ -1,0 +1,146 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_manual.py --build DIR - manual pages and completion: well-formed, and with everything that --help and the configuration know."""
+import argparse
+import gzip
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import tap
+
+TOP = Path(__file__).resolve().parents[2]
+PAGES = ("heaved.8", "heavectl.1", "heave.ini.5")
+COMPLETION = Path("/usr/share/bash-completion/bash_completion")
+WORD_LIST = re.compile(r"(?m)^  (?!heave)(--)?([a-z][a-z-]*)")
+
+
+def output(*command, **more):
+    result = subprocess.run(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                            check=False, **more)
+    return result.returncode, result.stdout
+
+
+class Built:
+    def __init__(self, build):
+        self.bin = build / "src/app"
+        self.pages = build / "packaging"
+
+    def help(self, program):
+        code, text = output(self.bin / program, "--help")
+        assert code == 0, text
+        return text
+
+    def words(self, program):
+        """Options and commands of its --help."""
+        found = WORD_LIST.findall(self.help(program))
+        return sorted(word for dashes, word in found if dashes), sorted(word for dashes, word in found if not dashes)
+
+    def roff(self, page):
+        text = (self.pages / page).read_text(encoding="utf-8")
+        assert gzip.decompress((self.pages / f"{page}.gz").read_bytes()).decode() == text, f"{page}.gz is another one"
+        return text
+
+    def items(self, page, heading):
+        """What the list of a section defines, in the words of the page."""
+        section = re.search(rf"(?ms)^\.SH {heading}\n(.*?)(?=^\.SH |\Z)", self.roff(page))
+        assert section, f"{page} has no {heading}"
+        return [item.replace(r"\-", "-") for item in re.findall(r"(?m)^\.TP\n\\fB(.*)\\fR$", section[1])]
+
+
+def lint(built):
+    if shutil.which("mandoc") is None:
+        raise tap.Skip("mandoc is not there")
+    for page in PAGES:
+        code, text = output("mandoc", "-Tlint", "-Wall", built.pages / page)
+        assert code == 0 and text == "", text
+
+
+def man_warnings(built):
+    if shutil.which("man") is None:
+        raise tap.Skip("man is not there")
+    for page in PAGES:
+        run = subprocess.run(["man", "--warnings", "-E", "UTF-8", "-Tutf8", "-Z", "-l", str(built.pages / page)], stdin=subprocess.DEVNULL,
+                             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False, env={"LC_ALL": "C.UTF-8", "PATH": "/usr/bin:/bin"})
+        assert run.returncode == 0 and run.stderr == "", run.stderr
+
+
+def options_and_commands(built):
+    for program, page in (("heaved", "heaved.8"), ("heavectl", "heavectl.1")):
+        options, commands = built.words(program)
+        assert len(options) > 5, options
+        named = sorted(item.split()[0][2:] for item in built.items(page, "OPTIONS"))
+        assert named == options, f"{page} has {named}, --help {options}"
+        if commands:
+            named = sorted(item.split()[0] for item in built.items(page, "COMMANDS"))
+            assert named == commands, f"{page} has {named}, --help {commands}"
+
+
+def exit_codes(built):
+    in_header = set(re.findall(r"EXIT_\w+ = (\d+)", (TOP / "src/app/say.h").read_text(encoding="ascii")))
+    everywhere = set()
+    for program, page in (("heaved", "heaved.8"), ("heavectl", "heavectl.1")):
+        listed = re.search(r"(?s)Exit codes: (.*)\.\n", built.help(program))[1]
+        codes = re.findall(r"(?:^|[ \n])(\d+) ", listed)
+        assert built.items(page, "EXIT STATUS") == codes and codes, f"{page}, and --help {codes}"
+        everywhere |= set(codes)
+    assert everywhere == in_header, f"{everywhere} documented, {in_header} in use"
+
+
+def keys(built):
+    reference = (TOP / "docs/configuration.md").read_text(encoding="utf-8")
+    count = 0
+    for section, text in re.findall(r"(?ms)^## \[([\w-]+)\]$(.*?)(?=^## |\Z)", reference):
+        wanted = re.findall(r"(?m)^\| `(\w+)` \|", text)
+        named = [item.split()[0] for item in built.items("heave.ini.5", rf"SECTION \[{section}\]")]
+        assert named == wanted, f"[{section}]: {named}, and {wanted}"
+        count += len(wanted)
+    assert count > 150, count
+
+
+def complete(built, *words):
+    """What bash offers for the last word."""
+    if not COMPLETION.exists():
+        raise tap.Skip("bash-completion is not there")
+    script = TOP / "packaging/completions" / words[0]
+    program = built.bin / words[0]
+    text = f"""source {COMPLETION}; source {script}
+COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); COMP_LINE="$*"; COMP_POINT=${{#COMP_LINE}}
+_{words[0]} {program} "${{COMP_WORDS[COMP_CWORD]}}" "${{COMP_WORDS[COMP_CWORD-1]}}"
+printf '%s\\n' "${{COMPREPLY[@]}}" """
+    code, found = output("bash", "--norc", "-c", text, "bash", *words, cwd=TOP / "config")
+    assert code == 0, found
+    return sorted(found.split())
+
+
+def completion(built):
+    for program in ("heaved", "heavectl"):
+        options, commands = built.words(program)
+        assert complete(built, program, "--") == sorted(f"--{option}" for option in options), complete(built, program, "--")
+        if commands:
+            assert complete(built, program, "") == commands, complete(built, program, "")
+    assert complete(built, "heaved", "--d") == ["--doctor", "--dump-config", "--dump-dbc"]
+    assert complete(built, "heaved", "--config", "demo") == ["demo-hexapod.ini"]
+    assert complete(built, "heavectl", "--json", "s") == ["shutdown", "status"]
+    assert complete(built, "heavectl", "--hz", "") == []
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--build", type=Path, required=True)
+    built = Built(parser.parse_args().build.resolve())
+    suite = tap.Suite()
+    for what, case in (("mandoc finds nothing to say about the pages", lint), ("man formats them without a warning", man_warnings),
+                       ("a page has the options and commands of --help, and no others", options_and_commands),
+                       ("exit codes are those of --help, and all that there are", exit_codes),
+                       ("heave.ini(5) has every section and key, and no others", keys),
+                       ("bash completes what --help names, files where they belong, and nothing else", completion)):
+        with suite.case(what):
+            case(built)
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
