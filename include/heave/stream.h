@@ -3,15 +3,15 @@
  * Second-order phase-locked loop on arrival times; uniform B-spline with the samples as control points, each committed on use.
  * Owns no clock and no limits (the ramps behind it have those). One owner; not re-entrant per instance.
  *
- * Delay: a sample is met 2 periods (smooth) or 1.5 (fast) plus a margin after its time. The margin is 2 ms, more if the samples
+ * Delay: a sample is met 2 periods (smooth) or 0.9 (fast) plus a margin after its time. The margin is 2 ms, more if the samples
  * often come later than that, at most the larger of 2 ms and half a period. While the rate changes or the network holds samples
  * back the delay may grow by 2 periods more; then it falls again by 6 % of the time that passes.
  * Losses: where a point is missing when the curve needs it, the motion goes on, by the last step and its bend (not a jump: at
  * most 4 x the larger of the two steps before), then ever more slowly, no further than the axis takes to stop
- * (stream_set_stop()), or 36 ms. When samples are back, or after 150 ms without, the curve comes back to the samples, or to the
- * last one, softly: position and velocity of the control points go on as they were. So an ended stream rests exactly on its last
- * sample, within 2 s, or 24 periods of a slow one. A stream that is known may be away for a second and goes on; a new rate gives
- * a new grid, on which the curve goes on.
+ * (stream_set_stop()), or 36 ms (fast: and its lead). When samples are back, or after 150 ms without, the curve comes back to
+ * the samples, or to the last one, softly: position and velocity of the control points go on as they were. So an ended stream
+ * rests exactly on its last sample, within 2 s, or 24 periods of a slow one. A stream that is known may be away for a second and
+ * goes on; a new rate gives a new grid, on which the curve goes on.
  * Hints: a sender that states its period may be slower, and tells from its second sample on what is late and what is lost. The
  * margin is then an eighth of the period at least, as a guess at so slow a stream is poor.
  */
@@ -24,7 +24,7 @@
 /** How a stream is rendered. */
 typedef enum {
     STREAM_SMOOTH, /**< cubic B-spline, 2 periods + margin late: continuous acceleration (default) */
-    STREAM_FAST    /**< quadratic B-spline, 1.5 periods + margin late: continuous velocity */
+    STREAM_FAST    /**< quadratic B-spline, led 0.6 periods ahead, 0.9 periods + margin late: continuous velocity */
 } stream_style_t;
 
 #define STREAM_PERIOD_MIN_US 4000u   /**< fastest stream recognised: 250 Hz; what comes faster is thinned out to that */
@@ -76,6 +76,8 @@ typedef struct {
     stream_lead_t lead[AXES_MAX];
     int32_t guesses;           /**< since the newest sample */
     int64_t period_cycles_q16; /**< cycles in a period */
+    int64_t lead_q32;          /**< of the step of the last period, that a control point is ahead of its point */
+    int64_t bend_q32;          /**< of the step's change, likewise */
     int32_t reach_min_q16;     /**< periods that a motion is kept up where samples are missing */
     int32_t reach_max_q16;
     bool is_off;              /**< on some axis */

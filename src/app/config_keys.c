@@ -172,7 +172,7 @@ const config_key_t config_keys[] = {
     {KEY("udp", "dialect"), AT(settings.dialect), .type = CONFIG_WORD, .unit = "", .fallback = "v3", .words = "v3|lenient",
      .is_live = true, .help = "frames as in V3.0; or also with the head # or none, and commands in lower case"},
     {KEY("udp", "stream"), AT(settings.stream_style), .type = CONFIG_WORD, .unit = "", .fallback = "smooth",
-     .words = "smooth|fast", .help = "how a stream of poses is rendered: 2 periods late and smoother, or 1.5 periods late"},
+     .words = "smooth|fast", .help = "how a stream of poses is rendered: 2 periods late and smoother, or 0.9 periods late"},
     {KEY("udp", "spike_gate"), AT(settings.spike_gate), .type = CONFIG_INTEGER, .unit = "", .fallback = "10",
      RANGE(0, 1000), .is_live = true,
      .help = "a sample of a stream that would take more than so many times an axis' acceleration limit waits for the next one to confirm "

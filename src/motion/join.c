@@ -14,9 +14,10 @@
 #include "slot.h"
 #include "slots.h"
 
-#define LEAST_CYCLES 4  /* between plans because of limits */
-#define JERK_FACTOR  4  /* a lost sample may take so much more jerk than there is for a moment: the ramps absorb it */
-#define RETRY_CYCLES 16 /* between attempts to leave a sample for the curve */
+#define LEAST_CYCLES     4  /* between plans because of limits */
+#define JERK_FACTOR      4  /* a lost sample may take so much more jerk than there is for a moment: the ramps absorb it ... */
+#define JERK_FACTOR_FAST 16 /* ... and so the steps of a quadratic curve's acceleration, of a cycle or two each */
+#define RETRY_CYCLES     16 /* between attempts to leave a sample for the curve */
 
 /* On its reference as far as the soft grip works without using all of the jerk (see ramp.c). */
 static bool is_near(const ramp_state_t *state, const history_t *reference, q32_t jerk_q32)
@@ -203,14 +204,14 @@ void join_step(motion_t *self, const ramp_ref_t curve[AXES_MAX], bool is_again, 
 }
 
 /* True if after this reference speed and acceleration can still be kept, and its jerk is not far beyond what can be absorbed. */
-static bool is_viable(const ramp_t *ramp, const ramp_ref_t *ref)
+static bool is_viable(const ramp_t *ramp, const ramp_ref_t *ref, int jerk_factor)
 {
     const int sign = ref->acc_per_cycle2_q32 < 0 ? -1 : 1;
     const q32_t acc_q32 = sign * ref->acc_per_cycle2_q32;
     const q32_t vel_q32 = sign * ref->vel_per_cycle_q32;
     return acc_q32 <= ramp->acc_safe_q32 && vel_q32 >= -ramp->limits.vel_per_cycle_q32 &&
            brake_velocity_peak(ramp, vel_q32, acc_q32) <= ramp->limits.vel_per_cycle_q32 &&
-           fx_abs(ref->jerk_per_cycle3_q32) / JERK_FACTOR <= ramp->limits.jerk_per_cycle3_q32;
+           fx_abs(ref->jerk_per_cycle3_q32) / jerk_factor <= ramp->limits.jerk_per_cycle3_q32;
 }
 
 bool join_is_beyond(const motion_t *self, const ramp_ref_t slot_ref[AXES_MAX], const ramp_ref_t cylinder_ref[AXES_MAX])
@@ -218,13 +219,14 @@ bool join_is_beyond(const motion_t *self, const ramp_ref_t slot_ref[AXES_MAX], c
     if (self->is_taking_over || (self->join != JOIN_NONE && self->join_cycles < LEAST_CYCLES)) {
         return false;
     }
+    const int jerk_factor = self->stream.style == STREAM_FAST ? JERK_FACTOR_FAST : JERK_FACTOR;
     for (unsigned i = 0; i < self->cylinders; i++) {
-        if (!is_viable(&self->cylinder[i], &cylinder_ref[i])) {
+        if (!is_viable(&self->cylinder[i], &cylinder_ref[i], jerk_factor)) {
             return true;
         }
     }
     for (unsigned i = 0; self->space == MOTION_POSE && i < POSE_AXES; i++) {
-        if (!is_viable(&self->axis[i], &slot_ref[i])) {
+        if (!is_viable(&self->axis[i], &slot_ref[i], jerk_factor)) {
             return true;
         }
     }

@@ -13,7 +13,9 @@
 #define PACE_FILTER_MAX      (Q32_ONE / 2)       /* keeps the filters stable where a cycle is longer than a period */
 #define BEHIND_MAX_Q32       (Q32_ONE * 3 / 2)   /* further behind its time, a sample is skipped */
 #define BEFORE_MAX_Q32       (Q32_ONE / 2)       /* further before it, where it has no samples, a point is filled in */
-#define AMBIGUOUS_Q32        (Q32_ONE * 13 / 20) /* a sample may belong to a period this far from its time */
+#define AMBIGUOUS_Q32        (Q32_ONE * 13 / 20) /* a sample may belong to a period this far from its time, or ... */
+#define AMBIGUOUS_MAX_Q32    (Q32_ONE * 9 / 10)  /* ... this far, where that is no more than ... */
+#define AMBIGUOUS_US         15000u              /* ... networks make it */
 #define STEP_GAP_MIN_US      2000u /* two samples nearer than this do not begin a stream: the second replaces the first */
 
 void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_t style)
@@ -61,20 +63,31 @@ static void start_running(stream_t *self, uint64_t now_us)
     self->between_q32 = fx_clamp(error_at(self, now_us), 0, Q32_ONE - 1);
 }
 
-/* Periods from the newest sample to this one. A loss and a late arrival look alike to the clock; where the signal moves, the
- * value tells them apart. */
+/* Faster streams are thinned out, not taken for jitter. */
+static bool is_fastest(const stream_t *self)
+{
+    return self->clock.period_us_q16 * 10 < (int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16 * 11;
+}
+
+/* Periods from the newest sample to this one. A loss, a late and an early arrival look alike to the clock; where the signal
+ * moves, the value tells them apart: if the motion so far goes on to within a quarter of its step. Where it hardly moves, or
+ * bends, the time tells. */
 static unsigned judge_periods(const stream_t *self, uint64_t now_us, const q32_t *sample_q32)
 {
     q32_t ahead_q32, step_q32;
     const unsigned expected = stream_clock_expect(&self->clock, now_us, &ahead_q32);
+    if (expected > 3 || (expected == 0 && is_fastest(self))) {
+        return expected;
+    }
+    const q32_t ambiguous_q32 = fx_clamp(stream_clock_span(&self->clock, AMBIGUOUS_US), AMBIGUOUS_Q32, AMBIGUOUS_MAX_Q32);
     unsigned best = expected;
     q32_t least_q32 = INT64_MAX;
-    for (unsigned periods = expected > 1 ? expected - 1 : 1; expected >= 1 && expected <= 3 && periods <= expected + 1;
-         periods++) {
+    for (unsigned periods = expected > 1 ? expected - 1 : expected; periods <= expected + 1; periods++) {
         const q32_t misfit_q32 = stream_curve_misfit(&self->curve, sample_q32, periods, &step_q32);
         const q32_t untimely_q32 = fx_abs(ahead_q32 - periods * Q32_ONE);
         const q32_t cost_q32 = misfit_q32 + fx_mul_shift(step_q32, untimely_q32 / 2, 32);
-        if (untimely_q32 < AMBIGUOUS_Q32 && (cost_q32 < least_q32 || (cost_q32 == least_q32 && periods == expected))) {
+        const bool is_telling = untimely_q32 < ambiguous_q32 && misfit_q32 * 4 < step_q32;
+        if ((is_telling || periods == expected) && (cost_q32 < least_q32 || (cost_q32 == least_q32 && periods == expected))) {
             least_q32 = cost_q32;
             best = periods;
         }
@@ -98,7 +111,7 @@ void stream_push(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
     }
     const unsigned periods = judge_periods(self, now_us, sample_q32);
     const bool is_new_rate = stream_clock_take(&self->clock, now_us, periods) && self->phase == STREAM_RUNNING;
-    stream_curve_pace(&self->curve, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us);
+    stream_curve_pace(&self->curve, self->style, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us);
     if (is_new_rate) {
         stream_curve_regrid(&self->curve, self->style, self->previous, sample_q32);
         self->between_q32 = 0;
@@ -185,7 +198,8 @@ uint32_t stream_delay_us(const stream_t *self)
         return 0;
     }
     const int64_t period = self->clock.period_us_q16;
-    const int64_t spline = self->style == STREAM_FAST ? period * 3 / 2 : period * 2;
+    const int64_t spline =
+        self->style == STREAM_FAST ? period * 3 / 2 - fx_mul_shift(period, STREAM_FAST_LEAD_Q32, 32) : period * 2;
     const int64_t behind = fx_mul_shift(period, self->error_q32, 32);
     return (uint32_t)(fx_clamp(spline + self->clock.margin_us_q16 + behind, 0, INT64_MAX) / STREAM_US_Q16);
 }

@@ -123,14 +123,21 @@ static unsigned periods_in_gap(int64_t gap_us_q16, int64_t period_us_q16)
     return gap_us_q16 * 5 < period_us_q16 * 8 ? 1u : (unsigned)((gap_us_q16 + period_us_q16 / 2) / period_us_q16);
 }
 
-/* Mean period over the newest intervals if losses are counted with the given one. */
+/* Mean period over the newest intervals if losses are counted with the given one. An interval too short to be a period belongs to
+ * the one before it, which was so much too long. */
 static int64_t mean_period(const stream_clock_t *self, unsigned gaps, int64_t period_us_q16)
 {
     int64_t sum = 0;
+    int64_t gap = 0;
     unsigned periods = 0;
     for (unsigned i = 0; i < gaps; i++) {
-        sum += gap_q16(self, i);
-        periods += periods_in_gap(gap_q16(self, i), period_us_q16);
+        gap += gap_q16(self, i);
+        const unsigned in_gap = periods_in_gap(gap, period_us_q16);
+        if (in_gap > 0) {
+            periods += in_gap;
+            sum += gap;
+            gap = 0;
+        }
     }
     return periods > 0 ? sum / periods : period_us_q16;
 }

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT
  * stream_curve.c - the curve through the samples of a stream.
  * Evaluated as oldest control point + differences x cumulative weights: equal points give exactly that point, and the curve stays
- * within its control points. Where a sample is missing and a later one is here, the point is interpolated; else it is guessed:
- * the motion of the last samples goes on for a while, fades, and waits. When samples come back, or do not, the curve is off the
- * points that are known now. What it is off is kept and taken back by a triple-pole filter, so that position and velocity of the
- * control points go on as they were.
+ * within its control points. Those are the points, or (fast) led ahead of them so that the curve is less late. Where a sample is
+ * missing and a later one is here, the point is interpolated; else it is guessed: the motion of the last samples goes on for a
+ * while, fades, and waits. When samples come back, or do not, the curve is off the points that are known now. What it is off is
+ * kept and taken back by a triple-pole filter, so that position and velocity of the control points go on as they were.
  */
 #include "stream_curve.h"
 
@@ -58,8 +58,10 @@ void stream_curve_start(stream_curve_t *self, unsigned axes, const q32_t *sample
     }
 }
 
-void stream_curve_pace(stream_curve_t *self, uint32_t period_us, uint32_t cycle_us)
+void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us)
 {
+    self->lead_q32 = style == STREAM_FAST ? STREAM_FAST_LEAD_Q32 : 0;
+    self->bend_q32 = style == STREAM_FAST ? STREAM_FAST_BEND_Q32 : 0;
     self->period_cycles_q16 = (int64_t)period_us * Q16_ONE / cycle_us;
     self->reach_min_q16 = (int32_t)((int64_t)REACH_MIN_US * Q16_ONE / period_us);
     self->reach_max_q16 = (int32_t)((int64_t)REACH_MAX_US * Q16_ONE / period_us);
@@ -85,14 +87,28 @@ static int32_t reach(const stream_curve_t *self, unsigned axis, q32_t step_q32)
         cycles_q16 = (fx_mul_div(vel_q32, Q16_ONE, stop->acc_per_cycle2_q32) + rise_q16) / 2;
     }
     cycles_q16 -= cycles_q16 / 16; /* what follows the curve is a little behind it */
-    return (int32_t)fx_clamp(fx_mul_div(cycles_q16, Q16_ONE, self->period_cycles_q16), self->reach_min_q16, self->reach_max_q16);
+    const int64_t periods_q16 = fx_mul_div(cycles_q16, Q16_ONE, self->period_cycles_q16) - self->lead_q32 / (Q32_ONE / Q16_ONE);
+    return (int32_t)fx_clamp(periods_q16, self->reach_min_q16, self->reach_max_q16);
 }
 
-/* The last three points of the curve, newest first. */
+/* Where a control point for the point of that index belongs: on the point, or led ahead of it. Forward in time by L periods is
+ * 1 + L D + ..., D the backward difference; the share of D^2 also undoes some of what the quadratic spline smooths away. */
+static q32_t led_point(const stream_curve_t *self, unsigned axis, uint32_t index)
+{
+    const q32_t here_q32 = self->point_q32[slot(index)][axis];
+    const q32_t before_q32 = self->point_q32[slot(index - 1)][axis];
+    const q32_t step_q32 = here_q32 - before_q32;
+    const q32_t bend_q32 = step_q32 - (before_q32 - self->point_q32[slot(index - 2)][axis]);
+    return here_q32 + fx_mul_shift(step_q32, self->lead_q32, 32) + fx_mul_shift(bend_q32, self->bend_q32, 32);
+}
+
+/* Where the last three control points belong, newest first. */
 static void points_at_head(const stream_curve_t *self, q32_t point_q32[3][AXES_MAX])
 {
     for (uint32_t back = 0; back < 3; back++) {
-        copy_point(self, point_q32[back], self->point_q32[slot(self->head - back)]);
+        for (unsigned axis = 0; axis < self->axes; axis++) {
+            point_q32[back][axis] = led_point(self, axis, self->head - back);
+        }
     }
 }
 
@@ -231,7 +247,7 @@ void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sa
     }
     if (guessed == 1) { /* an error of one point, and of no velocity: half of it is taken back at once */
         for (unsigned axis = 0; axis < self->axes; axis++) {
-            self->off_q32[axis][0] += (was_q32[0][axis] - self->point_q32[slot(self->head)][axis]) / 2;
+            self->off_q32[axis][0] += (was_q32[0][axis] - led_point(self, axis, self->head)) / 2;
         }
         (void)soften(self, 0);
     } else if (guessed > 1) {
@@ -357,7 +373,7 @@ static void put_control(stream_curve_t *self)
     self->is_off = false;
     for (unsigned axis = 0; axis < self->axes; axis++) {
         take_back(self, self->off_q32[axis]);
-        self->control_q32[3][axis] = self->point_q32[slot(self->head)][axis] + self->off_q32[axis][0];
+        self->control_q32[3][axis] = led_point(self, axis, self->head) + self->off_q32[axis][0];
         self->is_off |= self->off_q32[axis][0] != 0 || self->off_q32[axis][1] != 0;
     }
 }
@@ -398,7 +414,7 @@ void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const ramp_
         q32_t control_q32[3];
         control_from(style, now[axis].pos_q32, vel_q32, acc_q32, control_q32);
         q32_t *const off_q32 = self->off_q32[axis];
-        off_q32[0] = control_q32[2] - (sample_q32[axis] - step_q32);
+        off_q32[0] = control_q32[2] - led_point(self, axis, self->head - 1);
         const q32_t most_q32 = fx_abs(vel_q32) + fx_abs(off_q32[0]) / 16;
         off_q32[1] = fx_clamp(control_q32[2] - control_q32[1] - step_q32, -most_q32, most_q32);
         off_q32[2] = 0;

@@ -1,18 +1,22 @@
 /* SPDX-License-Identifier: MIT
- * stream_curve.h - the curve through the samples of a stream: a uniform B-spline with the samples as control points.
- * A control point is committed when the curve first needs it and never changed afterwards. Knows no time but the period; private
- * to src/motion.
+ * stream_curve.h - the curve through the samples of a stream: a uniform B-spline with the samples, or points led ahead of them,
+ * as control points. A control point is committed when the curve first needs it and never changed afterwards. Knows no time but
+ * the period; private to src/motion.
  */
 #ifndef STREAM_CURVE_H
 #define STREAM_CURVE_H
 
 #include "heave/stream.h"
 
+#define STREAM_FAST_LEAD_Q32 (Q32_ONE * 6 / 10) /**< periods that a control point is led ahead of its point, if fast ... */
+#define STREAM_FAST_BEND_Q32 (Q32_ONE / 4)      /**< ... and the share of the second difference */
+
 /** A curve that has always rested on the sample. */
 void stream_curve_start(stream_curve_t *self, unsigned axes, const q32_t *sample_q32);
 
-/** Tells the period: how long a motion is kept up where samples are missing, and how firmly the curve comes back to them. */
-void stream_curve_pace(stream_curve_t *self, uint32_t period_us, uint32_t cycle_us);
+/** Tells the period: how long a motion is kept up where samples are missing, and how firmly the curve comes back to them; and
+ * the style: how far control points are led ahead of the points. */
+void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us);
 
 /** Adds a sample the given number of periods after the newest; 0: in the place of the newest. */
 void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32);

@@ -437,9 +437,24 @@ static void test_stream_fast_on_cue_signals_keeps_its_figures(void)
             printf("fast %2u: lag %.1f ms shape %.1f um worst %.3f mm jerk %.2f x\n", seed, quality.lag_ms, quality.shape_um,
                    quality.worst_mm, quality.jerk / quality.jerk_true);
         }
-        TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 2.0);
+        TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 1.4); /* 4.5 ms of the network in it */
+        TEST_ASSERT_TRUE(quality.shape_um <= 60);
+        TEST_ASSERT_TRUE(quality.jerk <= 7.5 * quality.jerk_true);
+    }
+}
+
+/* Jitter of a whole period: an early, a late and a lost frame look alike in time, and frames come two at once. */
+static void test_stream_jitter_of_a_period_is_told_from_losses(void)
+{
+    const network_t network = {200, 5, 0.01};
+    for (unsigned seed = 1; seed <= 10; seed++) {
+        const quality_t quality = measure_seed(seed, seed % 2 ? STREAM_SMOOTH : STREAM_FAST, &network, 4000);
+        if (getenv("STREAM_FIGURES")) {
+            printf("jitter %2u: lag %.1f ms shape %.1f um worst %.3f mm jerk %.2f x\n", seed, quality.lag_ms, quality.shape_um,
+                   quality.worst_mm, quality.jerk / quality.jerk_true);
+        }
+        TEST_ASSERT_TRUE(quality.lag_ms <= (seed % 2 ? 19 : 14));
         TEST_ASSERT_TRUE(quality.shape_um <= 40);
-        TEST_ASSERT_TRUE(quality.jerk <= 5.5 * quality.jerk_true);
     }
 }
 
@@ -514,8 +529,8 @@ static double stop_distance(double velocity, double acceleration)
     return rise + (at_zero < 180 ? at_zero * sqrt(at_zero / jerk) : at_zero / 2 * (at_zero / 3000 + 0.06));
 }
 
-/* From any moment and speed: no further beyond the last sample than the axis takes to stop, or 36 ms of its speed, or one more
- * step; and at rest exactly on it after two seconds. */
+/* From any moment and speed: no further beyond the last sample than the axis takes to stop, or 36 ms of its speed and what a fast
+ * curve is led ahead, or one more step; and at rest exactly on it after two seconds. */
 static void test_stream_step_ended_stream_rests_on_its_last_sample(void)
 {
     double worst = 0;
@@ -530,7 +545,9 @@ static void test_stream_step_ended_stream_rests_on_its_last_sample(void)
         const double *v = &s_sent.value[s_sent.count - 1];
         const double way = v[0] - v[-1] < 0 ? -1 : 1;
         const double velocity = fabs(v[0] - v[-1]) * rate, acceleration = fmax(0, (v[0] - 2 * v[-1] + v[-2]) * rate * rate * way);
-        const double allowed = fmax(stop_distance(velocity, acceleration), 0.036 * velocity) + acceleration / rate / rate + 0.05;
+        const double led = i % 3 ? 0 : 0.6 / rate;
+        const double allowed = fmax(stop_distance(velocity, acceleration), (0.036 + led) * velocity) +
+                               (1 + led * rate) * acceleration / rate / rate + 0.05;
         double beyond = 0;
         for (int ms = end_ms; ms < end_ms + 2100; ms++) {
             assert_differences(&s_ref[ms - 1], &s_ref[ms]);
@@ -652,7 +669,7 @@ static void test_stream_is_live_while_samples_come(void)
     render(0, 0, 2000);
     TEST_ASSERT_TRUE(stream_is_live(&s_stream, 1999000));
     TEST_ASSERT_UINT32_WITHIN(100, 20000, stream_period_us(&s_stream));
-    TEST_ASSERT_UINT32_WITHIN(2500, 32500, stream_delay_us(&s_stream));
+    TEST_ASSERT_UINT32_WITHIN(2500, 20500, stream_delay_us(&s_stream));
     TEST_ASSERT_FALSE(stream_is_live(&s_stream, 2140000));
     render(0, 2000, 3200);
     TEST_ASSERT_FALSE(stream_is_live(&s_stream, 3199000));
@@ -855,6 +872,7 @@ int main(void)
     RUN_TEST(test_stream_step_axes_of_one_signal_move_as_one);
     RUN_TEST(test_stream_smooth_on_cue_signals_keeps_its_figures);
     RUN_TEST(test_stream_fast_on_cue_signals_keeps_its_figures);
+    RUN_TEST(test_stream_jitter_of_a_period_is_told_from_losses);
     RUN_TEST(test_stream_step_all_rates_converge);
     RUN_TEST(test_stream_step_lossy_start_finds_the_period);
     RUN_TEST(test_stream_step_ended_stream_rests_on_its_last_sample);
