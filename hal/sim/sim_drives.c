@@ -257,29 +257,12 @@ static hv_status_t drives_sim_send(void *ctx, uint64_t now_us, const q32_t setpo
     return HV_OK;
 }
 
-/* States an axis may be in when a request comes, as bits (1 << drive_state_t); 0 = any. */
-static unsigned states_needed(drives_request_t request)
-{
-    switch (request) {
-    case DRIVES_ENABLE:
-        return 1u << DRIVE_DISABLED | 1u << DRIVE_ENABLING | 1u << DRIVE_ENABLED;
-    case DRIVES_HOME:
-        return 1u << DRIVE_ENABLED;
-    case DRIVES_DISABLE:
-    case DRIVES_QUICK_STOP:
-    case DRIVES_RESET_FAULT:
-        break;
-    }
-    return 0;
-}
-
 static bool is_allowed(const sim_drives_t *self, drives_request_t request)
 {
-    const unsigned needed = states_needed(request);
     for (uint8_t k = 0; k < self->count; k++) {
         const bool is_known = !self->axis[k].is_offline && self->axis[k].feedback.has_actual;
         const drive_state_t state = is_known ? self->axis[k].state : DRIVE_OFFLINE;
-        if (needed != 0 && (needed >> state & 1u) == 0) {
+        if (!drives_allow(request, state)) {
             return false;
         }
     }

@@ -55,6 +55,15 @@ typedef enum {
     DRIVES_RESET_FAULT /**< FAULT -> DISABLED where the cause is gone, else FAULT stays */
 } drives_request_t;
 
+/** True where an axis may be in a state when a request comes: a backend refuses a request unless that is so of all its axes. */
+static inline bool drives_allow(drives_request_t request, drive_state_t state)
+{
+    if (request == DRIVES_ENABLE) {
+        return state == DRIVE_DISABLED || state == DRIVE_ENABLING || state == DRIVE_ENABLED;
+    }
+    return request != DRIVES_HOME || state == DRIVE_ENABLED;
+}
+
 /** Every op is mandatory but report and is_failing. */
 typedef struct {
     hv_status_t (*poll)(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX]);

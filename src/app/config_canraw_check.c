@@ -3,30 +3,19 @@
  * field at full stroke, identifiers used twice. Each error is reported at the key it concerns.
  */
 #include "config_canraw.h"
-#include "config_value.h"
+#include "config_drives_check.h"
 
 #define SECTION "can-raw"
+#define USED_BY "driver = can-raw"
 
-/* A key that has to be there where the section is in use. */
 static bool is_given(config_source_t *self, const char *name, unsigned size)
 {
-    config_text_t allowed;
-    if (size > 0 || !config_source_has(self, SECTION, name)) {
-        return size > 0;
-    }
-    config_text_clear(&allowed);
-    config_value_allowed(&config_keys[config_key_find(SECTION, name)], &allowed);
-    config_source_key_error(self, SECTION, name, "missing for driver = can-raw; allowed: %s, but not none", allowed.data);
-    return false;
+    return config_drives_is_given(self, SECTION, name, USED_BY, size);
 }
 
 static bool is_length(config_source_t *self, const char *name, unsigned count, unsigned wanted)
 {
-    if (count == 1 || count == wanted) {
-        return true;
-    }
-    config_source_key_error(self, SECTION, name, "has %u values; allowed: one, or one for each of the %u drives", count, wanted);
-    return false;
+    return config_drives_is_length(self, SECTION, name, count, wanted);
 }
 
 /* --- Identifiers --- */
@@ -79,99 +68,33 @@ static void check_ids(config_source_t *self, unsigned axes)
 
 /* --- Numbers in their fields --- */
 
-/* A position in counts that a frame has to carry. Returns false after an error. */
-static bool is_carried(config_source_t *self, unsigned axis, q32_t at_q32, const canraw_frame_t *frame, const char *frame_name)
+static config_drives_field_t field_of(const canraw_frame_t *frame, canraw_value_t value, const char *name)
 {
-    const bool is_angle = axis >= (self->config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u);
-    const canraw_field_t *field = canraw_find(frame, CANRAW_POSITION);
-    const counts_scale_t scale = config_canraw_scale(self->config, axis);
-    int64_t counts = 0;
-    config_text_t at;
-    const bool is_number = counts_from_units(&scale, at_q32, &counts) == HV_OK;
-    if (field == NULL || (is_number && counts >= canraw_field_min(field) && counts <= canraw_field_max(field))) {
-        return true;
-    }
-    config_text_clear(&at);
-    config_text_add_q16(&at, q16_from_q32(at_q32));
-    config_source_key_error(self, SECTION, is_angle ? "angle_counts_per_deg" : "counts_per_mm",
-                            "%s %s of drive %u are %lld counts, and {position} of %s carries %lld to %lld; allowed: a wider or "
-                            "signed field, other zero counts, fewer counts",
-                            at.data, is_angle ? "deg" : "mm", axis + 1u, (long long)counts, frame_name,
-                            (long long)canraw_field_min(field), (long long)canraw_field_max(field));
-    return false;
+    const canraw_field_t *field = canraw_find(frame, value);
+    return field != NULL ? (config_drives_field_t){name, canraw_field_min(field), canraw_field_max(field)}
+                         : (config_drives_field_t){NULL, 0, 0};
 }
 
-static bool is_reach_carried(config_source_t *self, unsigned axis, q32_t low_q32, q32_t high_q32)
+static void check_numbers(config_source_t *self, unsigned cylinders)
 {
     const config_can_raw_t *raw = &self->config->can_raw;
-    return is_carried(self, axis, low_q32, &raw->setpoint, "setpoint") &&
-           is_carried(self, axis, high_q32, &raw->setpoint, "setpoint") &&
-           is_carried(self, axis, low_q32, &raw->position_reply, "position_reply") &&
-           is_carried(self, axis, high_q32, &raw->position_reply, "position_reply");
-}
-
-/* The first drive that does not fit speaks for the others. */
-static void check_scales(config_source_t *self, unsigned cylinders)
-{
-    const config_can_raw_t *raw = &self->config->can_raw;
-    const settings_t *settings = &self->config->settings;
-    const axis_settings_t *angle = &settings->axis[AXIS_ANGLE];
-    const bool is_zero = is_length(self, "zero_counts", raw->zero_counts.count, cylinders);
-    bool is_scale = is_given(self, "counts_per_mm", raw->counts_per_mm.count) &&
-                    is_length(self, "counts_per_mm", raw->counts_per_mm.count, cylinders);
-    for (unsigned i = 0; is_zero && is_scale && i < cylinders; i++) {
-        is_scale = is_reach_carried(self, i, 0, q32_from_q16(settings->stroke_mm_q16[i]));
-    }
-    if (settings->has_angle && is_given(self, "angle_counts_per_deg", raw->angle_counts_per_deg.count)) {
-        (void)is_reach_carried(self, cylinders, q32_from_q16(angle->min_q16), q32_from_q16(angle->max_q16));
-    }
-}
-
-/* The highest speed of an axis in its field. */
-static void check_speed_ratio(config_source_t *self, const char *name, const config_ratios_t *ratios, q16_t speed_q16)
-{
-    const canraw_field_t *field = canraw_find(&self->config->can_raw.setpoint, CANRAW_SPEED);
-    for (unsigned i = 0; field != NULL && i < ratios->count; i++) {
-        const counts_scale_t scale = {ratios->num[i], ratios->den[i], 0};
-        int64_t counts = INT64_MAX;
-        const bool is_number = counts_from_units(&scale, q32_from_q16(speed_q16), &counts) == HV_OK;
-        if (!is_number || fx_abs(counts) > canraw_field_max(field)) {
-            config_source_key_error(self, SECTION, name,
-                                    "the speed limit is %lld counts, and {speed} carries up to %lld; allowed: a smaller ratio",
-                                    (long long)counts, (long long)canraw_field_max(field));
-            return;
-        }
-    }
-}
-
-static void check_speed(config_source_t *self, unsigned cylinders)
-{
-    const config_can_raw_t *raw = &self->config->can_raw;
-    const canraw_field_t *field = canraw_find(&raw->setpoint, CANRAW_SPEED);
-    const bool is_ratio = raw->speed_counts_per_mm_s.count > 0;
-    if (raw->setpoint.length == 0) {
-        return; /* reported already */
-    }
-    if (field == NULL) {
-        if (is_ratio || raw->speed_counts > 0) {
-            config_source_key_error(self, SECTION, is_ratio ? "speed_counts_per_mm_s" : "speed_counts",
-                                    "setpoint has no {speed}; allowed: only where it has");
-        }
-        return;
-    }
-    if (!is_ratio && raw->speed_counts == 0) {
-        config_source_key_error(self, SECTION, "speed_counts",
-                                "{speed} would always be 0; allowed: above 0, or speed_counts_per_mm_s");
-    } else if (raw->speed_counts > canraw_field_max(field)) {
-        config_source_key_error(self, SECTION, "speed_counts", "does not fit {speed}; allowed: up to %lld",
-                                (long long)canraw_field_max(field));
-    }
-    if (is_ratio && is_length(self, "speed_counts_per_mm_s", raw->speed_counts_per_mm_s.count, cylinders)) {
-        check_speed_ratio(self, "speed_counts_per_mm_s", &raw->speed_counts_per_mm_s,
-                          self->config->settings.cylinder_speed_mm_s_q16);
-    }
-    check_speed_ratio(self, "angle_speed_counts_per_deg_s", &raw->angle_speed_counts_per_deg_s,
-                      self->config->settings.axis[AXIS_ANGLE].speed_q16);
+    const config_drives_numbers_t numbers = {
+        .section = SECTION,
+        .used_by = USED_BY,
+        .counts_per_mm = &raw->counts_per_mm,
+        .angle_counts_per_deg = &raw->angle_counts_per_deg,
+        .zero_counts = &raw->zero_counts,
+        .scale = config_canraw_scale,
+        .position = {field_of(&raw->setpoint, CANRAW_POSITION, "setpoint"),
+                     field_of(&raw->position_reply, CANRAW_POSITION, "position_reply")},
+        .speed = field_of(&raw->setpoint, CANRAW_SPEED, "setpoint"),
+        .speed_eighths = 8,
+        .speed_counts = raw->speed_counts,
+        .speed_counts_per_mm_s = &raw->speed_counts_per_mm_s,
+        .angle_speed_counts_per_deg_s = &raw->angle_speed_counts_per_deg_s,
+    };
+    config_drives_check_scales(self, &numbers, cylinders);
+    config_drives_check_speed(self, &numbers, cylinders);
 }
 
 /* --- Frames --- */
@@ -266,7 +189,6 @@ void config_canraw_check(config_source_t *self)
     const unsigned cylinders = self->config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u;
     check_ids(self, config_canraw_axes(self->config));
     check_frames(self);
-    check_scales(self, cylinders);
-    check_speed(self, cylinders);
+    check_numbers(self, cylinders);
     check_times(self);
 }

@@ -6,10 +6,11 @@
 #include <string.h>
 
 #include "config_canraw.h"
+#include "config_drives_check.h"
 #include "config_modbus.h"
-#include "config_value.h"
 
 #define SECTION     "modbus"
+#define USED_BY     "drives on Modbus"
 #define LAG_PERIODS 3 /* turn of the set-point, its mean, the age of the feedback */
 
 static const config_modbus_t *modbus_of(const config_source_t *self)
@@ -19,23 +20,7 @@ static const config_modbus_t *modbus_of(const config_source_t *self)
 
 static bool is_given(config_source_t *self, const char *section, const char *name, unsigned size)
 {
-    config_text_t allowed;
-    if (size > 0 || !config_source_has(self, section, name)) {
-        return size > 0;
-    }
-    config_text_clear(&allowed);
-    config_value_allowed(&config_keys[config_key_find(section, name)], &allowed);
-    config_source_key_error(self, section, name, "missing for drives on Modbus; allowed: %s, but not none", allowed.data);
-    return false;
-}
-
-static bool is_length(config_source_t *self, const char *section, const char *name, unsigned count, unsigned wanted)
-{
-    if (count == 1 || count == wanted) {
-        return true;
-    }
-    config_source_key_error(self, section, name, "has %u values; allowed: one, or one for each of the %u drives", count, wanted);
-    return false;
+    return config_drives_is_given(self, section, name, USED_BY, size);
 }
 
 /* --- Lines and units --- */
@@ -84,12 +69,12 @@ static void check_lines(config_source_t *self, unsigned axes)
     const config_hosts_t *hosts = &self->config->modbus_tcp.hosts;
     const bool is_tcp = self->config->drives == CONFIG_DRIVES_MODBUS_TCP;
     bool is_right = !is_tcp || (is_given(self, "modbus-tcp", "hosts", hosts->count) &&
-                                is_length(self, "modbus-tcp", "hosts", hosts->count, axes));
+                                config_drives_is_length(self, "modbus-tcp", "hosts", hosts->count, axes));
     for (unsigned k = 0; is_right && is_tcp && k < hosts->count; k++) {
         is_right = is_host_free(self, k);
     }
     is_right = is_right && is_given(self, SECTION, "units", modbus_of(self)->units.count) &&
-               is_length(self, SECTION, "units", modbus_of(self)->units.count, axes);
+               config_drives_is_length(self, SECTION, "units", modbus_of(self)->units.count, axes);
     for (unsigned k = 0; is_right && k < axes; k++) {
         is_right = is_unit(self, k) && is_unit_free(self, k);
     }
@@ -100,97 +85,33 @@ static void check_lines(config_source_t *self, unsigned axes)
 
 /* --- Numbers in their fields --- */
 
-static bool is_carried(config_source_t *self, unsigned axis, q32_t at_q32, const modbus_drive_blocks_t *blocks, const char *name)
+static config_drives_field_t field_of(const modbus_drive_blocks_t *blocks, modbus_drive_value_t value, const char *name)
 {
-    const bool is_angle = axis >= (self->config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u);
-    const modbus_drive_field_t *field = modbus_drive_find(blocks, MODBUS_DRIVE_POSITION, NULL);
-    const counts_scale_t scale = config_modbus_scale(self->config, axis);
-    int64_t counts = 0;
-    config_text_t at;
-    const bool is_number = counts_from_units(&scale, at_q32, &counts) == HV_OK;
-    if (field == NULL || (is_number && counts >= modbus_drive_field_min(field) && counts <= modbus_drive_field_max(field))) {
-        return true;
-    }
-    config_text_clear(&at);
-    config_text_add_q16(&at, q16_from_q32(at_q32));
-    config_source_key_error(self, SECTION, is_angle ? "angle_counts_per_deg" : "counts_per_mm",
-                            "%s %s of drive %u are %lld counts, and {position} of %s carries %lld to %lld; allowed: a wider or "
-                            "signed field, other zero counts, fewer counts",
-                            at.data, is_angle ? "deg" : "mm", axis + 1u, (long long)counts, name,
-                            (long long)modbus_drive_field_min(field), (long long)modbus_drive_field_max(field));
-    return false;
+    const modbus_drive_field_t *field = modbus_drive_find(blocks, value, NULL);
+    return field != NULL ? (config_drives_field_t){name, modbus_drive_field_min(field), modbus_drive_field_max(field)}
+                         : (config_drives_field_t){NULL, 0, 0};
 }
 
-static bool is_reach_carried(config_source_t *self, unsigned axis, q32_t low_q32, q32_t high_q32)
+static void check_numbers(config_source_t *self, unsigned cylinders)
 {
     const config_modbus_t *modbus = modbus_of(self);
-    return is_carried(self, axis, low_q32, &modbus->setpoint, "setpoint") &&
-           is_carried(self, axis, high_q32, &modbus->setpoint, "setpoint") &&
-           is_carried(self, axis, low_q32, &modbus->feedback, "feedback") &&
-           is_carried(self, axis, high_q32, &modbus->feedback, "feedback");
-}
-
-static void check_scales(config_source_t *self, unsigned cylinders)
-{
-    const config_modbus_t *modbus = modbus_of(self);
-    const settings_t *settings = &self->config->settings;
-    const axis_settings_t *angle = &settings->axis[AXIS_ANGLE];
-    const bool is_zero = is_length(self, SECTION, "zero_counts", modbus->zero_counts.count, cylinders);
-    bool is_scale = is_given(self, SECTION, "counts_per_mm", modbus->counts_per_mm.count) &&
-                    is_length(self, SECTION, "counts_per_mm", modbus->counts_per_mm.count, cylinders);
-    for (unsigned i = 0; is_zero && is_scale && i < cylinders; i++) {
-        is_scale = is_reach_carried(self, i, 0, q32_from_q16(settings->stroke_mm_q16[i]));
-    }
-    if (settings->has_angle && is_given(self, SECTION, "angle_counts_per_deg", modbus->angle_counts_per_deg.count)) {
-        (void)is_reach_carried(self, cylinders, q32_from_q16(angle->min_q16), q32_from_q16(angle->max_q16));
-    }
-}
-
-static void check_speed_ratio(config_source_t *self, const char *name, const config_ratios_t *ratios, q16_t speed_q16)
-{
-    const modbus_drive_field_t *field = modbus_drive_find(&modbus_of(self)->setpoint, MODBUS_DRIVE_SPEED, NULL);
-    for (unsigned i = 0; field != NULL && i < ratios->count; i++) {
-        const counts_scale_t scale = {ratios->num[i], ratios->den[i], 0};
-        int64_t counts = INT64_MAX;
-        const bool is_number = counts_from_units(&scale, q32_from_q16(speed_q16) * 9 / 8, &counts) == HV_OK;
-        if (!is_number || fx_abs(counts) > modbus_drive_field_max(field)) {
-            config_source_key_error(self, SECTION, name,
-                                    "the speed limit and an eighth are %lld counts, and {speed} carries up to %lld; allowed: a "
-                                    "smaller ratio",
-                                    (long long)counts, (long long)modbus_drive_field_max(field));
-            return;
-        }
-    }
-}
-
-static void check_speed(config_source_t *self, unsigned cylinders)
-{
-    const config_modbus_t *modbus = modbus_of(self);
-    const modbus_drive_field_t *field = modbus_drive_find(&modbus->setpoint, MODBUS_DRIVE_SPEED, NULL);
-    const bool is_ratio = modbus->speed_counts_per_mm_s.count > 0;
-    if (modbus->setpoint.count == 0) {
-        return; /* reported already */
-    }
-    if (field == NULL) {
-        if (is_ratio || modbus->speed_counts > 0) {
-            config_source_key_error(self, SECTION, is_ratio ? "speed_counts_per_mm_s" : "speed_counts",
-                                    "setpoint has no {speed}; allowed: only where it has");
-        }
-        return;
-    }
-    if (!is_ratio && modbus->speed_counts == 0) {
-        config_source_key_error(self, SECTION, "speed_counts",
-                                "{speed} would always be 0; allowed: above 0, or speed_counts_per_mm_s");
-    } else if (modbus->speed_counts > modbus_drive_field_max(field)) {
-        config_source_key_error(self, SECTION, "speed_counts", "does not fit {speed}; allowed: up to %lld",
-                                (long long)modbus_drive_field_max(field));
-    }
-    if (is_ratio && is_length(self, SECTION, "speed_counts_per_mm_s", modbus->speed_counts_per_mm_s.count, cylinders)) {
-        check_speed_ratio(self, "speed_counts_per_mm_s", &modbus->speed_counts_per_mm_s,
-                          self->config->settings.cylinder_speed_mm_s_q16);
-    }
-    check_speed_ratio(self, "angle_speed_counts_per_deg_s", &modbus->angle_speed_counts_per_deg_s,
-                      self->config->settings.axis[AXIS_ANGLE].speed_q16);
+    const config_drives_numbers_t numbers = {
+        .section = SECTION,
+        .used_by = USED_BY,
+        .counts_per_mm = &modbus->counts_per_mm,
+        .angle_counts_per_deg = &modbus->angle_counts_per_deg,
+        .zero_counts = &modbus->zero_counts,
+        .scale = config_modbus_scale,
+        .position = {field_of(&modbus->setpoint, MODBUS_DRIVE_POSITION, "setpoint"),
+                     field_of(&modbus->feedback, MODBUS_DRIVE_POSITION, "feedback")},
+        .speed = field_of(&modbus->setpoint, MODBUS_DRIVE_SPEED, "setpoint"),
+        .speed_eighths = 9, /* what the driver asks for at most */
+        .speed_counts = modbus->speed_counts,
+        .speed_counts_per_mm_s = &modbus->speed_counts_per_mm_s,
+        .angle_speed_counts_per_deg_s = &modbus->angle_speed_counts_per_deg_s,
+    };
+    config_drives_check_scales(self, &numbers, cylinders);
+    config_drives_check_speed(self, &numbers, cylinders);
 }
 
 /* --- Registers --- */
@@ -373,8 +294,7 @@ void config_modbus_check(config_source_t *self)
     check_lines(self, config_canraw_axes(self->config));
     check_registers(self);
     check_drive_timeout(self);
-    check_scales(self, cylinders);
-    check_speed(self, cylinders);
+    check_numbers(self, cylinders);
     if (self->error_count == errors) {
         check_times(self);
     }

@@ -382,26 +382,10 @@ static hv_status_t cia402_send(void *ctx, uint64_t now_us, const q32_t setpoint_
     return is_any_up(self) ? status : HV_ERR_IO;
 }
 
-/* States an axis may be in when a request comes, as bits (1 << drive_state_t). */
-static unsigned states_allowed(drives_request_t request)
-{
-    switch (request) {
-    case DRIVES_ENABLE:
-        return 1u << DRIVE_DISABLED | 1u << DRIVE_ENABLING | 1u << DRIVE_ENABLED;
-    case DRIVES_HOME:
-        return 1u << DRIVE_ENABLED;
-    case DRIVES_DISABLE:
-    case DRIVES_QUICK_STOP:
-    case DRIVES_RESET_FAULT:
-        break;
-    }
-    return ~0u;
-}
-
 static bool is_allowed(const cia402_t *self, drives_request_t request)
 {
     for (uint8_t k = 0; k < self->config->axes; k++) {
-        if ((states_allowed(request) >> cia402_report_state(self, k) & 1u) == 0) {
+        if (!drives_allow(request, cia402_report_state(self, k))) {
             return false;
         }
     }

@@ -223,26 +223,10 @@ static hv_status_t drive_send(void *ctx, uint64_t now_us, const q32_t setpoint_q
     return HV_OK;
 }
 
-/* States an axis may be in when a request comes, as bits (1 << drive_state_t). */
-static unsigned states_allowed(drives_request_t request)
-{
-    switch (request) {
-    case DRIVES_ENABLE:
-        return 1u << DRIVE_DISABLED | 1u << DRIVE_ENABLING | 1u << DRIVE_ENABLED;
-    case DRIVES_HOME:
-        return 1u << DRIVE_ENABLED;
-    case DRIVES_DISABLE:
-    case DRIVES_QUICK_STOP:
-    case DRIVES_RESET_FAULT:
-        break;
-    }
-    return ~0u;
-}
-
 static bool is_allowed(const modbus_drive_t *self, drives_request_t request)
 {
     for (unsigned k = 0; k < self->map->axes; k++) {
-        if ((states_allowed(request) >> modbus_drive_axis_state(&self->axis[k]) & 1u) == 0) {
+        if (!drives_allow(request, modbus_drive_axis_state(&self->axis[k]))) {
             return false;
         }
     }
