@@ -10,6 +10,7 @@
 #include "heave/profile.h"
 
 #define NONE_CYCLES     ((int64_t)1 << 40)
+#define FURTHEST_Q32    ((q32_t)1 << 52) /* a million mm or degrees */
 #define ROUNDS_PER_STEP 8
 
 /* What a stop of one axis needs: limits with a little to spare for rounding. */
@@ -148,15 +149,26 @@ static q32_t distance(const ramp_state_t *start, const halt_times_t *t)
     const int64_t by_acc = 3 * n1 * (n1 + 1) - (n1 + 1) * (n1 + 2) + 3 * (n1 - 1) * (n2 + n3);
     const int64_t by_plateau =
         (n1 + 1) * (n1 + 2) + 3 * (n1 + 1) * (n2 + n3) + 3 * n2 * (n2 + 1) + 6 * n2 * n3 + 2 * (n3 * n3 - 1);
-    return start->vel_per_cycle_q32 * (n1 + n2 + n3) + fx_mul_div(start->acc_per_cycle2_q32, by_acc, 6) -
-           fx_mul_div(push_of(start, t), by_plateau, 6 * divisor_of(t));
+    const q32_t free_q32 =
+        fx_add_sat(fx_mul_div(start->vel_per_cycle_q32, n1 + n2 + n3, 1), fx_mul_div(start->acc_per_cycle2_q32, by_acc, 6));
+    if (free_q32 == INT64_MAX || free_q32 == INT64_MIN) {
+        return free_q32; /* what the brake takes off it is beyond all bounds as well */
+    }
+    return fx_sub_sat(free_q32, fx_mul_div(push_of(start, t), by_plateau, 6 * divisor_of(t)));
+}
+
+/* Where an axis comes to rest. The state that forward kinematics finds near a singularity can be hundreds of times beyond the
+ * limits, and a stop from there further away than anything is: it must not wrap around and look near. */
+static q32_t rest_of(const ramp_state_t *start, const halt_times_t *t)
+{
+    return fx_clamp(fx_add_sat(start->pos_q32, distance(start, t)), -FURTHEST_Q32, FURTHEST_Q32);
 }
 
 static void set_axis(halt_t *self, unsigned i, const halt_times_t *times)
 {
     const int64_t cycles = times->change + times->hold + times->back;
     self->times[i] = *times;
-    self->rest_q32[i] = self->start[i].pos_q32 + distance(&self->start[i], times);
+    self->rest_q32[i] = rest_of(&self->start[i], times);
     self->cycles = cycles > self->cycles ? cycles : self->cycles;
 }
 
@@ -167,13 +179,13 @@ static q32_t fastest(const ramp_state_t *start, const halt_times_t *t)
     const q32_t fall_q32 = fx_abs(acc_q32 + push_of(start, t) / divisor_of(t));
     const bool is_speeding_up = (start->vel_per_cycle_q32 > 0) == (acc_q32 > 0);
     const q32_t gain_q32 = is_speeding_up ? fx_mul_div(fx_mul_div(acc_q32, t->change, 2), fx_abs(acc_q32), fall_q32) : 0;
-    return fx_abs(start->vel_per_cycle_q32 + gain_q32);
+    return fx_abs(fx_add_sat(start->vel_per_cycle_q32, gain_q32));
 }
 
 /* An axis that goes along with the others would leave its bounds or go too fast. */
 static bool is_carried_away(const halt_t *self, unsigned i, const halt_times_t *common, const ramp_limits_t *limits)
 {
-    const q32_t rest_q32 = self->start[i].pos_q32 + distance(&self->start[i], common);
+    const q32_t rest_q32 = rest_of(&self->start[i], common);
     return rest_q32 < limits->pos_min_q32 || rest_q32 > limits->pos_max_q32 ||
            fastest(&self->start[i], common) > limits->vel_per_cycle_q32;
 }

@@ -256,6 +256,25 @@ static void test_halt_plan_near_a_bound_takes_its_own_time(void)
     TEST_ASSERT_TRUE(halt.rest_q32[1] < limits[1].pos_max_q32);
 }
 
+/* Found by fuzzing: what forward kinematics makes of a jump of the cylinders near a singularity. */
+static void test_halt_plan_far_beyond_the_limits_does_not_wrap_around(void)
+{
+    const ramp_limits_t limits = limits_of(400, 3000, 50000);
+    const ramp_limits_t *const list[2] = {&limits, &limits};
+    const ramp_state_t start[2] = {{0, INT64_C(4628414351), INT64_C(709253659)}, {0, INT64_C(20861527538), INT64_C(3196799946)}};
+    for (int sign = 1; sign >= -1; sign -= 2) {
+        ramp_state_t turned[2];
+        halt_t halt;
+        for (unsigned i = 0; i < 2; i++) {
+            turned[i] = (ramp_state_t){0, sign * start[i].vel_per_cycle_q32, sign * start[i].acc_per_cycle2_q32};
+        }
+        halt_plan(&halt, 2, 2, turned, list);
+        for (unsigned i = 0; i < 2; i++) {
+            TEST_ASSERT_TRUE(sign * halt.rest_q32[i] > q32(100) && sign * halt.rest_q32[i] <= q32(1 << 20));
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -265,5 +284,6 @@ int main(void)
     RUN_TEST(test_halt_plan_at_rest_stays_where_it_is);
     RUN_TEST(test_halt_plan_axis_apart_takes_its_own_time);
     RUN_TEST(test_halt_plan_near_a_bound_takes_its_own_time);
+    RUN_TEST(test_halt_plan_far_beyond_the_limits_does_not_wrap_around);
     return UNITY_END();
 }
