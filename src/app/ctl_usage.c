@@ -59,7 +59,7 @@ static const usage_section_t k_manual[] = {
      "are within a major version. An answer with `ok` false says in `error` why.\n"},
     {"ENVIRONMENT", "`HEAVE_SOCKET` is the socket where no `--socket` is given. `LC_ALL`, `LC_MESSAGES` and `LANG`: faults are "
                     "told in Chinese where they begin "
-                    "with zh.\n"},
+                    "with zh. `NO_COLOR`: no colours, which there are on terminals only.\n"},
     {"EXAMPLES", "Bring the platform up, halve the motion, look on for ten seconds, and down again:\n"
                  " heavectl engage\n"
                  " heavectl intensity 50\n"

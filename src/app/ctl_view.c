@@ -11,6 +11,11 @@
 #define BAR_COLUMNS_MAX  60u
 #define BAR_BESIDE       34u /* columns of a cylinder's line beside its bar */
 #define LINE_COLUMNS_MAX 512u
+#define BOLD             "\x1b[1m"
+#define RED              "\x1b[1;31m"
+#define GREEN            "\x1b[1;32m"
+#define YELLOW           "\x1b[1;33m"
+#define PLAIN            "\x1b[0m"
 
 /** A text being drawn, line by line. */
 typedef struct {
@@ -64,6 +69,16 @@ static __attribute__((format(printf, 2, 3))) void put(view_t *self, const char *
     for (const char *c = piece; *c != '\0'; c++) {
         const char column[2] = {*c, '\0'};
         put_column(self, column);
+    }
+}
+
+/* A colour takes no column. */
+static void put_colour(view_t *self, const char *sequence)
+{
+    const size_t length = strlen(sequence);
+    if (self->style->is_coloured && self->at + length < sizeof self->line) {
+        memcpy(&self->line[self->at], sequence, length);
+        self->at += length;
     }
 }
 
@@ -127,11 +142,24 @@ static __attribute__((format(printf, 2, 3))) void put_piece(view_t *self, const 
 
 /* --- Parts of the table --- */
 
+static const char *state_colour(const char *state)
+{
+    if (strcmp(state, "FAULT") == 0 || strcmp(state, "ESTOP") == 0) {
+        return RED;
+    }
+    if (strcmp(state, "HOLD") == 0) {
+        return YELLOW;
+    }
+    return strcmp(state, "ENGAGED") == 0 ? GREEN : BOLD;
+}
+
 static void draw_head(view_t *self, const cJSON *status)
 {
     const double up_s = number(status, "uptime_ms") / 1000.0;
-    put(self, "%-9s goal %-9s%s%s%s", word(status, "state"), word(status, "goal"),
-        cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
+    put_colour(self, state_colour(word(status, "state")));
+    put(self, "%-9s", word(status, "state"));
+    put_colour(self, PLAIN);
+    put(self, " goal %-9s%s%s%s", word(status, "goal"), cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
         cJSON_IsTrue(member(status, "estop_active")) ? " E-STOP" : "",
         cJSON_IsTrue(member(status, "shutting_down")) ? " SHUTTING DOWN" : "");
     put_piece(self, "  cycle %.0f us  up %.0f s  late %.0f", number(status, "cycle_us"), up_s, number(status, "late_cycles"));
@@ -405,6 +433,8 @@ static void draw_fault(view_t *self, const cJSON *status)
         is_any = true;
     }
     end_line(self);
+    const bool is_faulty = number(fault, "code") > 0.0;
+    put_colour(self, is_faulty ? RED : "");
     put(self, "fault    ");
     put_words(self, fault, "text");
     if (number(fault, "axis") > 0.0) {
@@ -416,8 +446,9 @@ static void draw_fault(view_t *self, const cJSON *status)
             put_piece(self, " (%s)", word(fault, "device_text"));
         }
     }
+    put_colour(self, is_faulty ? PLAIN : "");
     end_line(self);
-    if (number(fault, "code") > 0.0) {
+    if (is_faulty) {
         put(self, "  cause  ");
         put_words(self, fault, "cause");
         end_line(self);

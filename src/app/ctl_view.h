@@ -15,6 +15,7 @@ typedef struct {
     unsigned columns;     /**< lines are cut there */
     bool is_chinese;      /**< words for faults in Chinese, else English */
     bool is_utf8;         /**< blocks for bars, else ASCII */
+    bool is_coloured;     /**< the state and a fault in colours of a terminal */
     const char *line_end; /**< "\n", or what clears the rest of the line as well */
 } ctl_view_style_t;
 

@@ -180,6 +180,15 @@ static bool is_utf8(void)
     return strcmp(nl_langinfo(CODESET), "UTF-8") == 0;
 }
 
+/* On a terminal that knows them, unless NO_COLOR says otherwise (no-color.org). */
+static bool is_coloured(void)
+{
+    const char *refused = getenv("NO_COLOR");
+    const char *terminal = getenv("TERM");
+    return isatty(STDOUT_FILENO) != 0 && (refused == NULL || refused[0] == '\0') &&
+           (terminal == NULL || strcmp(terminal, "dumb") != 0);
+}
+
 static unsigned terminal_columns(void)
 {
     struct winsize size;
@@ -192,6 +201,7 @@ static void show_table(const cJSON *status, bool is_watching)
     const ctl_view_style_t style = {.columns = terminal_columns(),
                                     .is_chinese = is_chinese(),
                                     .is_utf8 = is_utf8(),
+                                    .is_coloured = is_coloured(),
                                     .line_end = is_watching ? "\x1b[K\r\n" : "\n"};
     (void)ctl_view_table(status, &style, text);
     printf("%s%s%s", is_watching ? "\x1b[H" : "", text, is_watching ? "\x1b[J" : "");

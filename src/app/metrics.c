@@ -9,6 +9,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "decimal.h"
@@ -266,7 +267,8 @@ static int replace(const metrics_t *self, size_t length)
     if (fd < 0) {
         return errno;
     }
-    errno = ENOSPC; /* what a write that is too short means */
+    (void)fchmod(fd, 0644); /* whatever the umask: node_exporter reads it, and is in no group of ours */
+    errno = ENOSPC;         /* what a write that is too short means */
     int error = write(fd, self->text, length) == (ssize_t)length ? 0 : errno;
     error = close(fd) != 0 && error == 0 ? errno : error;
     error = error == 0 && rename(self->temporary, self->path) != 0 ? errno : error;

@@ -141,17 +141,50 @@ def watches_by_line(bench):
     assert bench.stop(daemon) == 0
 
 
-def watches_on_a_terminal(bench):
+def ctl_on_terminal(bench, *arguments, **environment):
+    """heavectl as a person starts it: process and terminal."""
     try:
         for end in os.openpty():
             os.close(end)
     except OSError as error:
         raise tap.Skip(f"no terminal to be had here: {error}") from error
-    daemon = bench.start()
     pid, terminal = pty.fork()
     if pid == 0:
-        os.environ["LC_ALL"] = "C.UTF-8"
-        os.execv(bench.bin / "heavectl", ["heavectl", "--socket", str(bench.socket), "watch"])
+        os.environ.update({"LC_ALL": "C.UTF-8", "TERM": "xterm", "NO_COLOR": "", **environment})
+        os.execv(bench.bin / "heavectl", ["heavectl", "--socket", str(bench.socket), *arguments])
+    return pid, terminal
+
+
+def shown_on_terminal(bench, *arguments, **environment):
+    """All that it shows until it ends by itself."""
+    pid, terminal = ctl_on_terminal(bench, *arguments, **environment)
+    seen = b""
+    try:
+        while part := os.read(terminal, 65536):
+            seen += part
+    except OSError:
+        pass  # the terminal's other end is closed
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0, seen
+    os.close(terminal)
+    return seen
+
+
+def has_colours_on_a_terminal_only(bench):
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    plain = bench.ctl("status").stdout
+    assert plain.startswith("ENGAGED ") and "\x1b" not in plain, plain[:80]
+    shown = shown_on_terminal(bench, "status")
+    assert shown.startswith(b"\x1b[1;32mENGAGED  \x1b[0m goal"), shown[:80]
+    for environment in ({"NO_COLOR": "1"}, {"TERM": "dumb"}):
+        assert b"\x1b" not in shown_on_terminal(bench, "status", **environment), environment
+    assert b"\x1b" not in shown_on_terminal(bench, "--json", "status")
+    assert bench.stop(daemon) == 0
+
+
+def watches_on_a_terminal(bench):
+    daemon = bench.start()
+    pid, terminal = ctl_on_terminal(bench, "watch")
     seen = b""
     end = time.monotonic() + heave.WAIT_S
     while seen.count(b"\x1b[H") < 5 and time.monotonic() < end:
@@ -415,6 +448,10 @@ def files_that_cannot_be_created(bench):
 def full_disk(bench):
     daemon = bench.start("--trace", "/dev/full")
     bench.wait_state("ENGAGED")
+    for arguments in (["status"], ["--json", "status"], ["--help"]):
+        with open("/dev/full", "w", encoding="ascii") as full:
+            run = subprocess.run([bench.bin / "heavectl", "--socket", str(bench.socket), *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        assert run.returncode == 74 and run.stderr == "heavectl: standard output: No space left on device\n", run
     assert bench.stop(daemon) == 74
     assert "/dev/full: No space left" in daemon.log.read_text()
 
@@ -486,6 +523,7 @@ def odd_requests(bench):
 
 def too_many_clients(bench):
     daemon = bench.start()
+    assert bench.socket.stat().st_mode & 0o777 == 0o660, "its user and its group, nobody else"
     clients = [Client(bench) for _ in range(8)]
     assert all(client.ask("status\n")["ok"] for client in clients)
     with Client(bench) as ninth:
@@ -580,6 +618,7 @@ CASES = {
     "heavectl without a daemon, or wrongly called": without_a_daemon,
     "watch, not on a terminal": watches_by_line,
     "watch on a terminal puts it back on Ctrl-C": watches_on_a_terminal,
+    "status has colours on a terminal only, and not with NO_COLOR": has_colours_on_a_terminal_only,
     "a recording plays back to the same bytes, engage = auto": replays_to_the_same_bytes,
     "a recording plays back to the same bytes, engage = manual, homed from elsewhere": lambda bench: replays_to_the_same_bytes(bench, **ELSEWHERE),
     "a cycle that is very late holds the platform, and replays": a_late_cycle_holds,

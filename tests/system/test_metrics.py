@@ -88,6 +88,19 @@ def is_never_seen_in_part(bench):
     assert bench.stop(daemon) == 0
 
 
+def is_readable_by_anybody(bench):
+    """node_exporter is in no group of heaved's."""
+    path = bench.folder / "heave.prom"
+    before = os.umask(0o077)
+    try:
+        daemon = bench.start(config=with_metrics(bench, path))
+    finally:
+        os.umask(before)
+    heave.wait_for(path.exists, "it is written")
+    assert path.stat().st_mode & 0o777 == 0o644, oct(path.stat().st_mode)
+    assert bench.stop(daemon) == 0
+
+
 def goes_on_without_its_directory(bench):
     path = bench.folder / "later" / "heave.prom"
     daemon = bench.start(config=with_metrics(bench, path))
@@ -105,6 +118,7 @@ def a_relative_path_is_refused(bench):
 CASES = {
     "what it says is what the status says": says_what_the_status_says,
     "it is never seen in part": is_never_seen_in_part,
+    "anybody may read it, whatever the umask": is_readable_by_anybody,
     "a directory that is missing is said once, and used once it is there": goes_on_without_its_directory,
     "a relative path is refused": a_relative_path_is_refused,
 }
