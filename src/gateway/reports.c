@@ -5,8 +5,13 @@
 
 #include "heave/text.h"
 
-static void put_object(text_t *text, uint32_t object)
+static void put_object(text_t *text, bool is_register, uint32_t object)
 {
+    if (is_register) {
+        text_put(text, ", register 0x");
+        text_put_hex(text, object >> 8, 4);
+        return;
+    }
     text_put(text, ", object ");
     text_put_hex(text, object >> 8, 4);
     text_put(text, ":");
@@ -32,7 +37,7 @@ static void log_report(const gateway_t *self, unsigned axis, const drive_report_
     text_t text = text_start(line, sizeof line);
     text_put(&text, "axis ");
     text_put_u32(&text, axis + 1u);
-    text_put(&text, ", node ");
+    text_put(&text, report->is_modbus ? ", unit " : ", node ");
     text_put_u32(&text, report->address);
     text_put(&text, ", ");
     text_put(&text, report->phase);
@@ -44,7 +49,7 @@ static void log_report(const gateway_t *self, unsigned axis, const drive_report_
         text_put(&text, ")");
     }
     if (report->object != 0) {
-        put_object(&text, report->object);
+        put_object(&text, report->is_modbus, report->object);
     }
     put_detail(&text, report);
     hal_log_write(self->io.log, report->code != 0 ? HAL_LOG_WARNING : HAL_LOG_NOTICE, line);

@@ -183,11 +183,14 @@ def check_refusal(bin_dir):
     with Platform() as platform, ModbusBench(bin_dir, platform) as bench:
         text = bench.config.read_text(encoding="utf-8").replace(f"0x{WATCHDOG:04X} = 100", f"0x{WATCHDOG:04X} is 77")
         bench.config.write_text(text, encoding="utf-8")
-        bench.start()
+        daemon = bench.start()
         leg = heave.wait_for(lambda: (lambda leg: leg if leg["report"]["phase"] == "refused" else None)(bench.status()["cylinders"][0]), "refused")
         assert leg["drive"] == "offline" and leg["report"]["register"] == WATCHDOG and leg["report"]["unit"] == UNIT, leg
         assert f"unit {UNIT}: refused, register 0x{WATCHDOG:04X}; a register holds another value" in bench.ctl("status").stdout
         assert all(not drive.targets for drive in platform.drives)
+        assert bench.stop(daemon) == 0
+        said = f"axis 1, unit {UNIT}, refused: a register holds another value (0x10005), register 0x{WATCHDOG:04X}"
+        assert said in daemon.log.read_text(encoding="utf-8"), daemon.log.read_text(encoding="utf-8")
 
 
 def main():

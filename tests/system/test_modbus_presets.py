@@ -10,6 +10,7 @@ import contextlib
 import math
 import os
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -210,7 +211,7 @@ class PresetBench(heave.Bench):
         text = text.replace("engage = manual\n", "engage = manual\nlate_hold_cycles = 0\n")
         text = text.replace("margin_mm = 2\n", "margin_mm = 2\nfollowing_error_mm = 0\n")
         changes = {"port": self.port, "device": line.address[0], "timeout_ms": 900, r"feedback_timeout_ms = 900\b": 9500, r"following_error_mm = [23]": 0,
-                   "drive_timeout_confirmed": "yes", "speed_mm_s = 15": 35}
+                   "drive_timeout_confirmed": "yes", "speed_mm_s = 15": 35, "parity": "none"}  # pseudo terminals have no parity
         for key, value in changes.items():
             key, _, was = key.partition(" = ")
             text, count = re.subn(rf"^{key} = {was}[^;\n]*", f"{key} = {value} ", text, flags=re.MULTILINE)
@@ -328,6 +329,25 @@ def check_alarm(bin_dir, preset, kind):
         check_registers(platform)
 
 
+def check_killed(bin_dir, preset, kind):
+    """Killed in motion and started again: placed anew where the drives have come to, whatever was asked before."""
+    with Line(kind) as platform, PresetBench(bin_dir, preset, platform.line) as bench:
+        daemon = bench.start()
+        engage(bench)
+        ride(bench, 0.5)
+        bench.stop(daemon, signal.SIGKILL)
+        heave.wait_for(lambda: all(drive.position == drive.target for drive in platform.drives), "they come to rest at their last set-point")
+        before = [len(drive.targets) for drive in platform.drives]
+        bench.socket.unlink(missing_ok=True)
+        daemon = bench.start()
+        engage(bench)
+        for drive, count in zip(platform.drives, before):
+            position, target, _ = drive.targets[count]
+            assert position == target, f"begins at {target} where the drive is at {position}"
+        assert bench.stop(daemon) == 0
+        check_registers(platform)
+
+
 def main():
     bin_dir = Path(sys.argv[1])
     only = sys.argv[sys.argv.index("--only") + 1] if "--only" in sys.argv else ""
@@ -338,6 +358,7 @@ def main():
         ("iai-robo-cylinder: one silent on the line: the others go on, then all stop; a reset leads back", check_silent, RoboCylinder),
         ("oriental-motor-az: the adapter is unplugged and back", check_unplugged, Az),
         ("iai-robo-cylinder: an alarm of a drive stops all", check_alarm, RoboCylinder),
+        ("oriental-motor-az: killed in motion and started again: no step", check_killed, Az),
     ]
     chosen = [row for row in cases if only in row[0]]
     with concurrent.futures.ThreadPoolExecutor(3) as pool:  # they mostly wait
