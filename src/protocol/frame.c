@@ -8,6 +8,7 @@
  * behind it.
  */
 #include "heave/frame.h"
+#include "frame_quick.h"
 
 typedef enum {
     PHASE_IDLE,
@@ -154,18 +155,25 @@ static void take_letter(frame_scanner_t *self, uint8_t byte)
     }
 }
 
+frame_command_t frame_find_command(char letter, uint8_t digit)
+{
+    unsigned command = 0;
+    while (command < FRAME_COMMANDS && (k_commands[command].name[0] != letter || (uint8_t)k_commands[command].name[1] != digit)) {
+        command++;
+    }
+    return (frame_command_t)command;
+}
+
 static void take_digit(frame_scanner_t *self, uint8_t byte)
 {
-    for (unsigned command = 0; command < FRAME_COMMANDS; command++) {
-        const char *name = k_commands[command].name;
-        if (name[0] == self->letter && (uint8_t)name[1] == byte) {
-            self->frame.command = (frame_command_t)command;
-            self->frame.count = k_commands[command].value_count;
-            self->phase = PHASE_SUFFIX;
-            return;
-        }
+    const frame_command_t command = frame_find_command(self->letter, byte);
+    if (command == FRAME_COMMANDS) {
+        fail_command(self, byte);
+        return;
     }
-    fail_command(self, byte);
+    self->frame.command = command;
+    self->frame.count = k_commands[command].value_count;
+    self->phase = PHASE_SUFFIX;
 }
 
 static void take_suffix(frame_scanner_t *self, uint8_t byte)
@@ -471,10 +479,28 @@ frame_event_t frame_scanner_end(frame_scanner_t *self, frame_reject_t *reject)
     return event;
 }
 
+/* A plain frame where the scanner stands between frames; returns its bytes, 0: no such frame. */
+static size_t take_plain_frame(frame_scanner_t *self, const uint8_t *text, size_t length, frame_t *frame)
+{
+    const size_t used = self->phase == PHASE_IDLE && text[0] == '@' ? frame_quick(text, length, frame) : 0;
+    if (used > 0) {
+        self->start = self->offset;
+        self->offset += (uint32_t)used;
+        self->may_be_headless = false;
+        self->has_event = true;
+    }
+    return used;
+}
+
 frame_event_t frame_next(frame_scanner_t *self, const uint8_t *datagram, size_t length, size_t *position, frame_t *frame,
                          frame_reject_t *reject)
 {
     for (size_t i = *position; i < length; i++) {
+        const size_t used = take_plain_frame(self, datagram + i, length - i, frame);
+        if (used > 0) {
+            *position = i + used;
+            return FRAME_EVENT_FRAME;
+        }
         const frame_event_t event = frame_scanner_feed(self, datagram[i], frame, reject);
         if (event != FRAME_EVENT_NONE) {
             *position = i + 1;

@@ -177,6 +177,27 @@ static int64_t effective_point(const number_t *self)
     return self->is_exponent_negative ? self->point - self->exponent : self->point + self->exponent;
 }
 
+/* By a constant where that can be: a multiplication instead. */
+static uint64_t divided_by_pow10(uint64_t value, unsigned power)
+{
+    switch (power) {
+    case 1:
+        return value / 10u;
+    case 2:
+        return value / 100u;
+    case 3:
+        return value / 1000u;
+    case 4:
+        return value / 10000u;
+    case 5:
+        return value / 100000u;
+    case 6:
+        return value / 1000000u;
+    default:
+        return value / k_pow10[power];
+    }
+}
+
 /* Up to 13 digits, as nearly all numbers have: one division at most. fraction_digits is in [-9, 19]. */
 static halves_t short_halves(uint64_t lead, int64_t fraction_digits, format_t format)
 {
@@ -185,7 +206,8 @@ static halves_t short_halves(uint64_t lead, int64_t fraction_digits, format_t fo
         return (halves_t){scaled * k_pow10[-fraction_digits], false};
     }
     const uint64_t divisor = k_pow10[fraction_digits];
-    return (halves_t){scaled / divisor, scaled % divisor != 0};
+    const uint64_t floor = divided_by_pow10(scaled, (unsigned)fraction_digits);
+    return (halves_t){floor, floor * divisor != scaled};
 }
 
 /* Any digits: the integer part, then exactly format.bits decimals, then whether there is a rest. point <= format.integer_digits.
@@ -239,17 +261,27 @@ static uint64_t magnitude(const number_t *self, format_t format)
     return round_halves(long_halves(self, point, format));
 }
 
+/* The result with its sign, if it has room. */
+static number_error_t put_q16(uint64_t value, bool is_negative, q16_t *value_q16)
+{
+    if (value > (uint64_t)INT32_MAX + is_negative) {
+        return NUMBER_OVERFLOW;
+    }
+    *value_q16 = (q16_t)(is_negative ? -(int64_t)value : (int64_t)value);
+    return NUMBER_OK;
+}
+
+number_error_t number_short(uint64_t digits, unsigned fraction_digits, bool is_negative, q16_t *value_q16)
+{
+    return put_q16(round_halves(short_halves(digits, (int64_t)fraction_digits, k_q16)), is_negative, value_q16);
+}
+
 number_error_t number_finish(const number_t *self, q16_t *value_q16)
 {
     if (k_finish[self->phase] != NUMBER_OK) {
         return k_finish[self->phase];
     }
-    const uint64_t value = magnitude(self, k_q16);
-    if (value > (uint64_t)INT32_MAX + self->is_negative) {
-        return NUMBER_OVERFLOW;
-    }
-    *value_q16 = (q16_t)(self->is_negative ? -(int64_t)value : (int64_t)value);
-    return NUMBER_OK;
+    return put_q16(magnitude(self, k_q16), self->is_negative, value_q16);
 }
 
 number_error_t number_finish_natural(const number_t *self, uint32_t *value)

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT
+ * frame_quick.h - the short way through a frame as nearly all senders write it. Private to src/protocol.
+ */
+#ifndef FRAME_QUICK_H
+#define FRAME_QUICK_H
+
+#include "heave/frame.h"
+
+/** Reads a frame from its `@` on if it is a plain one: capital letters, no blanks, values of up to 13 digits
+ * without exponents, a mask of hex digits or a time of digits. Says nothing about any other: that is for the scanner.
+ *  @param frame out, unchanged if this is no plain frame
+ *  @return bytes of the frame up to and with its `#`; 0: no plain frame */
+size_t frame_quick(const uint8_t *text, size_t length, frame_t *frame);
+
+/** FRAME_COMMANDS where there is none of that name. */
+frame_command_t frame_find_command(char letter, uint8_t digit);
+
+#endif
