@@ -60,6 +60,14 @@ def main():
             run = analyze("security", "--offline=true", f"--threshold={EXPOSURE_MAX}", unit)
             assert run.returncode == 0, run.stdout[-400:]
             assert re.search(r"(?m)^CapabilityBoundingSet=$", text) and "NoNewPrivileges=yes" in text
+        with suite.case("a wrong configuration or command line is no reason to start again; a crash and a port in use are"):
+            final = set(re.search(r"(?m)^RestartPreventExitStatus=(.*)$", text)[1].split())
+            assert {"64", "66", "78"} <= final and not {"1", "69", "70", "74"} & final, final
+        with suite.case("user, real time, devices and address families are as narrow as they can be"):
+            for line in ("Type=notify", "WatchdogSec=2", "DynamicUser=yes", "Group=heave", "LimitRTPRIO=90", "LimitMEMLOCK=infinity", "DevicePolicy=closed",
+                         "DeviceAllow=char-gpiochip rw", "RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_CAN AF_NETLINK"):
+                assert re.search(rf"(?m)^{line}$", text), f"{line} is missing"
+            assert (PACKAGING / "heave.sysusers").read_text(encoding="ascii").splitlines()[-1] == "g heave -", "the group that the unit runs with"
     return suite.done()
 
 

@@ -1,0 +1,192 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# service_guest.sh - runs in the emulated machine of test_service_vm.py: the installed package under systemd, as an integrator and an operator
+# meet it. Reports in TAP on the second serial line, then switches the machine off. No time is judged: the machine is slow.
+report=/dev/ttyS1
+number=0
+unit=heave@demo
+
+say() { printf '%s\n' "$*" >$report; }
+
+# check NAME FUNCTION: each line of the function has to succeed; so none has an && or a !, which would be passed over
+check() {
+    local log
+    say "# $(cut -d ' ' -f 1 /proc/uptime) s: $2"
+    log=$(set -e; exec 2>&1; set -x; "$2")
+    if [ $? = 0 ]; then
+        say "ok $((++number)) - $1"
+    else
+        say "not ok $((++number)) - $1"
+        { printf '%s\n' "$log" | tail -n 12; journalctl -u "$unit" -n 15 --no-pager -o cat; } | sed 's/^/# /' >$report
+    fi
+}
+
+fails() { if "$@"; then return 1; fi; }
+
+property() { systemctl show -p "$1" --value "${2:-$unit}"; }
+
+# until COMMAND...: tries until it succeeds
+until_true() {
+    local tries
+    for ((tries = 0; tries < 100; tries++)); do
+        "$@" >/dev/null 2>&1 && return 0
+        sleep 0.2
+    done
+    echo "never: $*"
+    return 1
+}
+
+state() { runuser -u keeper -- heavectl --json status | sed 's/.*"state":"\([A-Z]*\)".*/\1/'; }
+is_state() { [ "$(state)" = "$1" ]; }
+restarts() { property NRestarts; }
+is_restarted() { [ "$(restarts)" = "$1" ] && [ "$(property ActiveState)" = active ]; }
+log_has() { journalctl -u "$unit" --no-pager -o cat | grep -q -- "$1"; }
+
+starts() {
+    systemctl enable --now $unit # returns when heaved says that it is ready
+    [ "$(property ActiveState)/$(property SubState)/$(property Type)" = active/running/notify ]
+    [ "$(systemctl is-enabled $unit)" = enabled ]
+    until_true is_state ENGAGED
+    [ "$(property StatusText)" = ENGAGED ]
+}
+
+has_no_privilege() {
+    local pid status
+    pid=$(property MainPID)
+    status=/proc/$pid/status
+    [ "$(stat -c %u /proc/$pid)" -ge 61184 ] # systemd.io/UIDS-GIDS: dynamic users
+    fails grep -q '^heaved:' /etc/passwd
+    [ "$(stat -c %G /proc/$pid)" = heave ]
+    grep -q '^CapEff:[[:space:]]*0*$' $status
+    grep -q '^CapBnd:[[:space:]]*0*$' $status
+    grep -q '^NoNewPrivs:[[:space:]]*1$' $status
+}
+
+is_real_time() {
+    local pid
+    pid=$(property MainPID)
+    chrt -a -p "$pid" | grep -q SCHED_FIFO
+    [ "$(sed -n 's/^VmLck:[^0-9]*\([0-9]*\) kB/\1/p' /proc/$pid/status)" -gt 1000 ]
+    heavectl --json status | grep -q '"realtime":true'
+}
+
+may_be_used_by_its_group() {
+    runuser -u keeper -- heavectl status | grep -q ENGAGED
+    local code=0 said
+    said=$(runuser -u nobody -- heavectl status 2>&1) || code=$?
+    [ $code = 69 ]
+    [[ $said == *"no permission"* ]]
+    runuser -u nobody -- grep -q '^heave_' /run/heave/heave.prom # node_exporter is a stranger, too
+}
+
+follows_frames() {
+    for _ in 1 2 3; do printf '@A6T:5,6,0,5.5,3.0,20,500#' >/dev/udp/127.0.0.1/9800; done
+    until_true sh -c 'heavectl --json status | grep -q "\"accepted_timed\":[1-9]"'
+}
+
+keeps_incidents() {
+    local folder
+    folder=$(runuser -u keeper -- heavectl dump)
+    test -s "${folder#dump: }/trace.csv"
+    [ "$(ls /var/lib/heave/demo | wc -l)" -ge 1 ]
+}
+
+is_fed() {
+    [ "$(property WatchdogUSec)" = 2s ]
+    local pid
+    pid=$(property MainPID)
+    sleep 10
+    [ "$(property MainPID)" = "$pid" ]
+    [ "$(restarts)" = 0 ]
+}
+
+is_ended_when_it_hangs() {
+    kill -STOP "$(property MainPID)"
+    until_true is_restarted 1
+    until_true is_state ENGAGED
+    journalctl --no-pager -o cat | grep -q 'Watchdog timeout'
+}
+
+is_started_again_when_killed() {
+    local pid
+    pid=$(property MainPID)
+    kill -9 "$pid"
+    until_true is_restarted 2
+    [ "$(property MainPID)" != "$pid" ]
+    until_true is_state ENGAGED
+}
+
+reads_its_configuration_again() {
+    sed -i 's/^silence_hold_ms *=.*/silence_hold_ms = 60000/' /etc/heave/demo.ini
+    systemctl reload $unit
+    until_true log_has "silence_hold_ms: 60000 from now on"
+}
+
+is_the_only_one() {
+    cp /etc/heave/demo.ini /etc/heave/second.ini
+    fails systemctl start heave@second
+    heavectl status | grep -q ENGAGED
+}
+
+stays_down_when_misconfigured() {
+    sed 's/^stroke_mm.*/stroke_mm = many/' /etc/heave/demo.ini >/etc/heave/broken.ini
+    fails systemctl start heave@broken
+    [ "$(property ExecMainStatus heave@broken)" = 78 ]
+    sleep 4
+    [ "$(property NRestarts heave@broken)/$(property ActiveState heave@broken)" = 0/failed ]
+    fails systemctl start heave@nobody # no such file
+    [ "$(property ExecMainStatus heave@nobody)/$(property NRestarts heave@nobody)" = 66/0 ]
+}
+
+goes_on_through_an_upgrade() {
+    local pid
+    pid=$(property MainPID)
+    dpkg --force-confold -i /later.deb
+    [ "$(property MainPID)" = "$pid" ]
+    heavectl status
+}
+
+settles_when_stopped() {
+    systemctl stop $unit
+    [ "$(property Result)/$(property ExecMainCode)/$(property ExecMainStatus)" = success/1/0 ]
+    log_has 'SETTLING -> SETTLED'
+    log_has 'SETTLED -> OFF'
+    [ ! -e /run/heave ]
+}
+
+settles_when_removed() {
+    systemctl start $unit
+    until_true is_state ENGAGED
+    dpkg -r heave
+    [ "$(property ActiveState)" != active ]
+    [ "$(journalctl -u $unit --no-pager -o cat | grep -c 'SETTLED -> OFF')" = 2 ]
+    dpkg --purge heave
+    [ ! -e /etc/heave/demo.ini ]
+    [ ! -e /var/lib/private/heave ]
+    [ ! -L /etc/systemd/system/multi-user.target.wants/$unit.service ]
+}
+
+dpkg -i /heave.deb >/tmp/install 2>&1 || { say "Bail out! $(tail -n 1 /tmp/install)"; systemctl poweroff -ff; }
+sed -i 's/^cycle_us *=.*/cycle_us = 10000/' /etc/heave/demo.ini # leaves something to others here
+sed -i 's/^silence_hold_ms *=.*/silence_hold_ms = 0/' /etc/heave/demo.ini # nobody sends all the time
+sed -i '/^\[control\]/a metrics = /run/heave/heave.prom' /etc/heave/demo.ini
+useradd -G heave keeper
+ip link set lo up
+check "systemctl enable --now returns when the platform is ready, and shows its state" starts
+check "runs as a user of its own making, without a capability" has_no_privilege
+check "has real-time priority and locked memory all the same" is_real_time
+check "members of group heave may use heavectl, others are told that they may not; anybody reads the metrics" may_be_used_by_its_group
+check "follows frames from the network" follows_frames
+check "writes incidents" keeps_incidents
+check "feeds the watchdog" is_fed
+check "is ended by the watchdog when it hangs, and started again" is_ended_when_it_hangs
+check "is started again after kill -9" is_started_again_when_killed
+check "systemctl reload reads the configuration again" reads_its_configuration_again
+check "a second platform is not started, and takes nothing from the first" is_the_only_one
+check "an upgrade of the package does not touch it" goes_on_through_an_upgrade
+check "systemctl stop settles the platform; exit 0" settles_when_stopped
+check "wrong or missing configuration: exit 78 or 66, and no restart" stays_down_when_misconfigured
+check "removing the package settles it first; purging takes what is the package's" settles_when_removed
+say "1..$number"
+sync
+systemctl poweroff -ff
