@@ -159,6 +159,7 @@ static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t 
 static void take_target(motion_t *self, const motion_target_t *target, bool is_sample, uint64_t now_us)
 {
     slots_take(self, target, self->slot_q32, self->slot_extension_mm_q32);
+    self->pending = *target; /* has_pending: where it has to wait for a stop after all */
     self->asked_cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
     self->timed_end_us = is_sample ? 0 : now_us + (uint64_t)self->asked_cycles * self->cycle_us;
     self->is_stretched = false;
@@ -204,11 +205,39 @@ static bool is_on_the_way(const motion_t *self)
     return i == self->planned_slots && self->source != MOTION_STREAMED;
 }
 
+/* During a take-over nothing but the blend bounds what extensions ask for: a stream of jumps is far beyond what the cylinders can
+ * do, and a plan that went on from there would take hours to come back. A little more than the limits is only rounding. */
+static bool is_led_beyond(const motion_t *self)
+{
+    if (!self->is_taking_over || !self->is_blend_planned || self->space != MOTION_CYLINDERS) {
+        return false;
+    }
+    bool is_beyond = false;
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        const ramp_limits_t *limits = &self->cylinder[i].limits;
+        is_beyond = is_beyond || fx_abs(self->led[i].vel_per_cycle_q32) > 2 * limits->vel_per_cycle_q32 ||
+                    fx_abs(self->led[i].acc_per_cycle2_q32) > 2 * limits->acc_per_cycle2_q32;
+    }
+    return is_beyond;
+}
+
+/* The take-over begins anew, from where the cylinders are. */
+static void take_over_again(motion_t *self)
+{
+    self->due = DUE_NOTHING;
+    motion_follow(self);
+    self->has_pending = true;
+}
+
 /* Plans what the targets of this cycle ask for. */
 static void plan_what_is_due(motion_t *self, uint64_t now_us)
 {
     const motion_due_t due = self->due;
     const bool is_first = self->is_taking_over && !self->is_blend_planned;
+    if ((due == DUE_TIMED || due == DUE_STEP) && is_led_beyond(self)) {
+        take_over_again(self);
+        return;
+    }
     self->due = DUE_NOTHING;
     if (due != DUE_NOTHING && self->is_space_new) {
         enter_space(self);
@@ -382,10 +411,14 @@ static bool is_step_cruising(const motion_t *self)
     return self->source == MOTION_STRAIGHT && self->planned_slots == POSE_AXES && self->path.acc == 0 && self->path.vel != 0;
 }
 
-void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+void follow_plan(motion_t *self, uint64_t now_us)
 {
     take_last_word(self, now_us);
     plan_what_is_due(self, now_us);
+}
+
+void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+{
     out->flags |= self->is_stretched ? MOTION_STRETCHED : 0;
     if (self->source == MOTION_STREAMED) {
         step_stream(self, now_us, cylinder_ref, planned, out);

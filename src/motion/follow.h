@@ -19,7 +19,10 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
 /** In pose space: the pose axes go on from where the cylinders are. */
 void follow_adopt_pose(motion_t *self);
 
-/** References of the cylinders for this cycle.
+/** Plans what the targets of this cycle ask for, while moving; may find that the platform has to stop first. */
+void follow_plan(motion_t *self, uint64_t now_us);
+
+/** References of the cylinders for this cycle, while moving.
  *  @param planned out, in pose space: the pose they belong to
  *  @param out     asked, angle and flags are filled in */
 void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned, motion_output_t *out);

@@ -353,17 +353,26 @@ static void end_cycle(motion_t *self, uint64_t now_us)
     }
 }
 
+static void begin_cycle(motion_t *self, uint64_t now_us)
+{
+    if (follow_is_moving(self)) {
+        intensity_step(&self->intensity);
+        follow_plan(self, now_us);
+    } else {
+        intensity_place(&self->intensity);
+    }
+}
+
 void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out)
 {
     ramp_ref_t ref[AXES_MAX];
     pose_t planned;
-    const bool is_posed = follow_is_moving(self) && self->space == MOTION_POSE;
     *out = (motion_output_t){0};
+    begin_cycle(self, now_us);
+    const bool is_posed = follow_is_moving(self) && self->space == MOTION_POSE;
     if (follow_is_moving(self)) {
-        intensity_step(&self->intensity);
         follow_step(self, now_us, ref, &planned, out);
     } else {
-        intensity_place(&self->intensity);
         step_in_cylinders(self, ref);
         out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &ref[AXIS_ANGLE], RAMP_FIRM);
         out->flags |= MOTION_IN_CYLINDERS;

@@ -313,6 +313,7 @@ static bool storm(settings_t settings, long cycles)
     settings.angle_wrap = one_in(2) ? ANGLE_SHORTEST : ANGLE_AS_SENT;
     m_cylinders = settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
     rig_start(&m_rig, &settings, false);
+    m_rig.now_us = one_in(3) ? 0 : random_bits() >> (2 + below(40)); /* up for years, or for longer than anything lasts */
     m_rig.is_auto_checking = true;
     supervision_init(&m_supervision, &m_rig);
     m_rig.after_cycle = judge_cycle;

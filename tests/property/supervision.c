@@ -41,6 +41,7 @@ void supervision_asked(supervision_t *self, event_t request)
 {
     self->reset_us = request == EVENT_RESET ? self->rig->now_us : self->reset_us;
     self->is_up_asked |= request == EVENT_ENGAGE || request == EVENT_PARK;
+    self->asked_us = self->rig->now_us; /* held and resumed between two cycles: silence counts from there */
 }
 
 static uint32_t accepted(const snapshot_t *s)
@@ -145,10 +146,8 @@ static void take_frames(supervision_t *self, const snapshot_t *s)
     const unsigned other = 1u - self->owner;
     if (count != self->accepted) {
         self->frame_us = self->now_us;
-        if (self->has_sent[other] && !self->has_sent[self->owner]) {
-            self->heard_us[other] = self->now_us;
-        } else {
-            self->heard_us[self->owner] = self->now_us;
+        if (self->has_sent[0] != self->has_sent[1]) { /* else nobody knows whose it was */
+            self->heard_us[self->has_sent[other] ? other : self->owner] = self->now_us;
         }
         self->timed_until_us = self->has_next && !self->is_next_timed ? 0 : self->timed_until_us;
     }
@@ -174,6 +173,7 @@ static void judge_owner(supervision_t *self, const snapshot_t *s)
         self->owners++;
         self->owner = owner;
         self->heard_us[owner] = self->now_us;
+        self->frame_us = self->now_us; /* perhaps by a frame that it could not follow */
     }
 }
 
@@ -195,7 +195,8 @@ static void judge_silence(supervision_t *self, const snapshot_t *s)
 {
     const uint64_t hold_us = self->rig->settings.silence_hold_ms * UINT64_C(1000);
     const uint64_t heard_us = latest(self->frame_us, self->engaged_us);
-    const uint64_t due_us = latest(latest(heard_us, self->timed_until_us), self->moved_us) + hold_us;
+    const uint64_t busy_until_us = latest(self->timed_until_us, self->moved_us);
+    const uint64_t due_us = latest(latest(heard_us, self->asked_us), busy_until_us) + hold_us;
     if (self->state == STATE_ENGAGED && s->state == STATE_HOLD && s->is_held_by_silence) {
         self->holds++;
         if (self->now_us < heard_us + hold_us) {

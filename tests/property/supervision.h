@@ -17,7 +17,7 @@ typedef struct {
     uint64_t now_us;
     state_t state, before_hold;
     uint64_t hold_us;
-    uint64_t bad_us, busy_us, moved_us, frame_us, engaged_us, timed_until_us, reset_us;
+    uint64_t bad_us, busy_us, moved_us, frame_us, engaged_us, timed_until_us, reset_us, asked_us;
     uint64_t heard_us[SUPERVISION_HOSTS]; /* last frame of each that was taken */
     bool has_sent[SUPERVISION_HOSTS];     /* in the coming cycle */
     bool is_next_timed, has_next;

@@ -1205,6 +1205,30 @@ static void test_telemetry_actual_pose_follows_the_feedback(void)
     TEST_ASSERT_EQUAL_UINT32(3, counted()->late_cycles);
 }
 
+/* ---- what a take-over cannot follow ---- */
+
+/* During a take-over only the blend bounds what extensions ask for. A timed move after a stream of jumps was planned from a speed
+ * that no cylinder has, and took hours, in which silence did not count. */
+static void test_takeover_timed_move_after_a_stream_of_wild_extensions_ends_in_time(void)
+{
+    m_settings.silence_hold_ms = 1000;
+    start(true);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 20000));
+    for (unsigned i = 0; i < 60; i++) {
+        const int a = i % 4 < 2 ? 10 : 190;
+        rig_sendf(&m_rig, "@C6:%d,%d,%d,%d,%d,%d#", a, 200 - a, a, 200 - a, a, 200 - a);
+        rig_run_ms(&m_rig, 10);
+    }
+    TEST_ASSERT_BITS_HIGH(MOTION_TAKEOVER, seen()->flags);
+    rig_send(&m_rig, "@C6T:60,60,60,60,60,60,500#");
+    rig_run_ms(&m_rig, 500);
+    TEST_ASSERT_TRUE(motion_timed_end_us(&m_rig.gateway.motion) < m_rig.now_us + 20000000);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_HOLD, 20000));
+    for (unsigned i = 0; i < 6; i++) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 60, seen()->extension_mm_q32[i] / 4294967296.0);
+    }
+}
+
 /* ---- what was saved ---- */
 
 static hv_status_t resume(const gateway_t *saved)
@@ -1304,6 +1328,7 @@ int main(void)
     RUN_TEST(test_fault_drives_that_never_enable_time_out);
     RUN_TEST(test_fault_in_every_phase_of_coming_up_latches);
     RUN_TEST(test_hold_during_coming_up_stops_and_resume_goes_on);
+    RUN_TEST(test_takeover_timed_move_after_a_stream_of_wild_extensions_ends_in_time);
     RUN_TEST(test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves);
     RUN_TEST(test_shutdown_from_every_moment_ends_in_off);
     RUN_TEST(test_shutdown_in_fault_and_estop_is_finished_at_rest);
