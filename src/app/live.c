@@ -49,6 +49,7 @@ typedef struct {
     int signal_fd;
     bool is_thread_running;
     unsigned signals; /**< requests to end so far */
+    FILE *errors;     /**< standard error for what a reload has to say; never blocks on a pipe or a terminal */
     const options_t *options;
     record_writer_t writer;
     out_file_t record;
@@ -214,7 +215,7 @@ static bool open_signals(live_t *self)
 /* Reads the configuration again. What may change in operation does, if the whole file is right. */
 static void reload(live_t *self)
 {
-    if (config_reload(self->options->config, &self->config, stderr) != 0) {
+    if (config_reload(self->options->config, &self->config, self->errors) != 0) {
         (void)say(0, "%s is not right: nothing has changed", self->options->config);
     } else if (!motion_loop_reload(&self->loop, &self->config)) {
         (void)say(0, "too many reloads at once: send SIGHUP again");
@@ -390,6 +391,14 @@ static void open_blackbox(live_t *self, const config_t *config)
     self->loop.blackbox = blackbox_feed(&self->blackbox);
 }
 
+/* Without a buffer: what is not taken at once is lost. */
+static void open_errors(live_t *self, int fd)
+{
+    self->errors = fd != STDERR_FILENO ? fdopen(fd, "w") : stderr;
+    self->errors = self->errors != NULL ? self->errors : stderr;
+    (void)setvbuf(self->errors, NULL, _IONBF, 0);
+}
+
 /* What can be refused comes first: a second heaved must not empty the files of the first. */
 static int open_all(live_t *self, const config_t *config)
 {
@@ -401,7 +410,9 @@ static int open_all(live_t *self, const config_t *config)
         return code;
     }
     open_blackbox(self, config);
-    linux_log_init(&self->log, out_file_unblocked(STDERR_FILENO));
+    const int errors = out_file_unblocked(STDERR_FILENO);
+    linux_log_init(&self->log, errors);
+    open_errors(self, errors);
     record_writer_init(&self->writer, &config->settings,
                        config->settings.engage == ENGAGE_AUTO && config->settings.auto_frames == 0);
     if (!open_signals(self)) {

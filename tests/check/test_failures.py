@@ -8,7 +8,7 @@ from pathlib import Path
 import tap
 
 TOP = Path(__file__).resolve().parents[2]
-SUITES = ("unit", "contract", "system")
+SUITES = ("unit", "contract", "system", "property")
 
 
 def rows():

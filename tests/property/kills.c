@@ -378,8 +378,8 @@ int main(int count, char **arguments)
         be_dead();
         suffer();
     }
-    printf("%s 1 - killed at any moment and started again: nothing steps, nothing old is followed, all stop together\n",
-           m_wrong == NULL ? "ok" : "not ok");
+    printf("%s 1 - %s\n", m_wrong == NULL ? "ok" : "not ok",
+           "killed at any moment, a thousand times: nothing steps, nothing old is followed, all stop by themselves");
     if (m_wrong == NULL) {
         start();
         come_up();
