@@ -38,6 +38,11 @@ static void drop(control_client_t *client)
     client->fd = -1;
 }
 
+static bool is_waiting(const control_client_t *client)
+{
+    return client->request_id != 0 || client->dump_ticket != 0;
+}
+
 /* Sends what the socket takes now. */
 static void send_out(control_client_t *client)
 {
@@ -53,7 +58,7 @@ static void send_out(control_client_t *client)
     }
     client->out_length -= (size_t)sent;
     memmove(client->out, &client->out[sent], client->out_length);
-    if (client->out_length == 0 && client->is_closing) {
+    if (client->out_length == 0 && client->is_closing && !is_waiting(client)) {
         drop(client);
     }
 }
@@ -215,11 +220,6 @@ static void take_request(control_t *self, control_client_t *client, const char *
                      "shutdown and dump are allowed",
                      NULL);
     }
-}
-
-static bool is_waiting(const control_client_t *client)
-{
-    return client->request_id != 0 || client->dump_ticket != 0;
 }
 
 /* Carries out the complete lines of a client, one at a time: the next one waits for the answer to the last. */
