@@ -1,0 +1,247 @@
+/* SPDX-License-Identifier: MIT
+ * fuzz_control.c - requests on the control socket. Input: records: what happens, to which of two clients, length, bytes; see
+ * step(). What must hold: everything a client gets is lines of one JSON object each; every line it sends gets one answer, in the
+ * end, but a `watch`, which gets the status again and again; the motion thread is asked for just what the lines ask for.
+ */
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cjson/cJSON.h>
+
+#include "control.h"
+#include "fuzz.h"
+#include "operator.h"
+
+#define CLIENTS     2u
+#define RECORDS_MAX 40u
+#define PATIENCE    2000u    /* rounds at the end until everything has been answered */
+#define ROUND_US    3000000u /* longer than anything waits but for a disk */
+
+typedef struct {
+    int fd;                         /* our end */
+    char line[CONTROL_REQUEST_MAX]; /* being sent */
+    size_t length;
+    bool is_over; /* nothing it sends counts any more */
+    bool is_watching;
+    long due;      /* answers */
+    long requests; /* of the motion thread */
+    long answers;
+    char got[CONTROL_OUT_BYTES * 4];
+    size_t got_length;
+} client_t;
+
+static config_t m_config;
+static motion_loop_t m_loop;
+static blackbox_t m_blackbox; /* there is none */
+static control_t m_control;
+static client_t m_client[CLIENTS];
+static uint64_t m_now_us;
+static long m_asked; /* of the motion thread */
+
+/* --- What the lines ask for, read anew --- */
+
+static bool is_number(const char *text, long least, long most)
+{
+    const size_t digits = strspn(text, "0123456789");
+    return digits >= 1 && digits <= 3 && text[digits] == '\0' && atol(text) >= least && atol(text) <= most;
+}
+
+static void expect_line(client_t *client, const char *line)
+{
+    static const char *const k_requests[] = {"engage", "hold", "resume", "park", "reset", "shutdown"};
+    if (strcmp(line, "watch") == 0 || (strncmp(line, "watch ", 6) == 0 && is_number(line + 6, 1, CONTROL_WATCH_MAX_HZ))) {
+        client->is_watching = true;
+        return;
+    }
+    client->due++;
+    for (unsigned i = 0; i < sizeof k_requests / sizeof k_requests[0]; i++) {
+        client->requests += strcmp(line, k_requests[i]) == 0;
+    }
+    client->requests += strncmp(line, "intensity ", 10) == 0 && is_number(line + 10, 0, 999);
+}
+
+static void expect(client_t *client, const uint8_t *bytes, size_t length)
+{
+    for (size_t i = 0; i < length && !client->is_over; i++) {
+        if (bytes[i] == '\n') {
+            client->length -= client->length > 0 && client->line[client->length - 1] == '\r';
+            client->line[client->length] = '\0';
+            client->length = 0;
+            expect_line(client, client->line);
+        } else {
+            client->line[client->length++] = (char)bytes[i];
+            client->is_over = client->length == CONTROL_REQUEST_MAX; /* told once that it is too long */
+            client->due += client->is_over;
+        }
+    }
+}
+
+/* --- What the clients get --- */
+
+static void check_line(client_t *client, const char *line, size_t length)
+{
+    cJSON *json = cJSON_ParseWithLength(line, length);
+    FUZZ_REQUIRE(cJSON_IsObject(json));
+    const cJSON *ok = cJSON_GetObjectItemCaseSensitive(json, "ok");
+    const bool is_status = cJSON_GetObjectItemCaseSensitive(json, "counters") != NULL;
+    FUZZ_REQUIRE(is_status || cJSON_IsTrue(ok) || cJSON_IsString(cJSON_GetObjectItemCaseSensitive(json, "error")));
+    client->answers += !(is_status && client->is_watching);
+    cJSON_Delete(json);
+}
+
+static void take_output(client_t *client)
+{
+    const ssize_t got = recv(client->fd, client->got + client->got_length, sizeof client->got - client->got_length, MSG_DONTWAIT);
+    char *newline = NULL;
+    client->got_length += got > 0 ? (size_t)got : 0;
+    while ((newline = memchr(client->got, '\n', client->got_length)) != NULL) {
+        const size_t length = (size_t)(newline - client->got);
+        check_line(client, client->got, length);
+        client->got_length -= length + 1;
+        memmove(client->got, newline + 1, client->got_length);
+    }
+}
+
+/* --- What happens --- */
+
+static void serve(uint64_t us)
+{
+    struct pollfd fds[CONTROL_FDS];
+    m_now_us += us;
+    control_fill(&m_control, fds);
+    FUZZ_REQUIRE(control_timeout_ms(&m_control, m_now_us, 100) <= 100);
+    (void)poll(fds, CONTROL_FDS, 0);
+    control_serve(&m_control, fds, m_now_us);
+    for (unsigned i = 0; i < CLIENTS; i++) {
+        take_output(&m_client[i]);
+        FUZZ_REQUIRE(m_control.client[i].out_length <= CONTROL_OUT_BYTES);
+    }
+}
+
+/* The motion thread takes its requests and answers them. */
+static void answer_requests(uint8_t how)
+{
+    static const hv_status_t k_status[] = {HV_OK, HV_ERR_STATE, HV_ERR_RANGE, HV_OK};
+    motion_request_t request;
+    while (ring_pop(&m_loop.requests, &request, sizeof request) > 0) {
+        static motion_result_t result;
+        FUZZ_REQUIRE(request.event <= OPERATOR_INTENSITY && request.number <= 999);
+        m_asked++;
+        result = (motion_result_t){.id = request.id, .status = k_status[how % 4], .is_key_off = how >= 0xF0};
+        result.snapshot.state = (state_t)(how % STATES);
+        (void)ring_push(&m_loop.results, &result, sizeof result, NULL, 0);
+    }
+}
+
+static void change_state(uint8_t how)
+{
+    static motion_view_words_t view;
+    view.view.snapshot.state = (state_t)(how % STATES);
+    view.view.is_shutting_down = how >= 0x80;
+    seqlock_write(&m_loop.view, view.word);
+}
+
+static void step(fuzz_input_t *in)
+{
+    const uint8_t op = fuzz_u8(in), which = fuzz_u8(in);
+    client_t *client = &m_client[which % CLIENTS];
+    size_t length = fuzz_u8(in);
+    const uint8_t *bytes = NULL;
+    switch (op % 4) {
+    case 0:
+    case 1:
+        bytes = fuzz_bytes(in, &length);
+        if (length > 0 && send(client->fd, bytes, length, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)length) {
+            expect(client, bytes, length);
+        }
+        break;
+    case 2:
+        answer_requests((uint8_t)length);
+        break;
+    default:
+        change_state((uint8_t)length);
+        break;
+    }
+    serve(op >= 0x80 ? (uint64_t)which * 10000 : 1000);
+}
+
+/* --- Once per input --- */
+
+static void start(void)
+{
+    if (m_config.settings.cycle_us == 0) {
+        FUZZ_REQUIRE(config_load(HEAVE_CONFIG_DIR "/demo-hexapod.ini", &m_config, stderr) == 0);
+    }
+    seqlock_init(&m_loop.view, m_loop.view_word, MOTION_VIEW_WORDS);
+    ring_init(&m_loop.requests, m_loop.request_bytes, sizeof m_loop.request_bytes);
+    ring_init(&m_loop.results, m_loop.result_bytes, sizeof m_loop.result_bytes);
+    memset(&m_control, 0, sizeof m_control);
+    m_control.fd = -1;
+    m_control.loop = &m_loop;
+    m_control.config = &m_config;
+    m_control.blackbox = &m_blackbox;
+    m_now_us = 1000000;
+    m_asked = 0;
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        m_control.client[i].fd = -1;
+    }
+    for (unsigned i = 0; i < CLIENTS; i++) {
+        int ends[2];
+        FUZZ_REQUIRE(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends) == 0);
+        m_client[i].fd = ends[0];
+        m_client[i].length = m_client[i].got_length = 0;
+        m_client[i].is_over = m_client[i].is_watching = false;
+        m_client[i].due = m_client[i].requests = m_client[i].answers = 0;
+        m_control.client[i].fd = ends[1];
+    }
+    change_state(0);
+}
+
+static long requests_of_all(void)
+{
+    long requests = 0;
+    for (unsigned i = 0; i < CLIENTS; i++) {
+        requests += m_client[i].requests;
+    }
+    return requests;
+}
+
+static bool is_answer_due(void)
+{
+    bool is_due = m_asked < requests_of_all();
+    for (unsigned i = 0; i < CLIENTS; i++) {
+        is_due |= m_client[i].answers < m_client[i].due && !m_client[i].is_watching;
+    }
+    return is_due;
+}
+
+static void finish(void)
+{
+    for (unsigned round = 0; round < PATIENCE && (round == 0 || is_answer_due()); round++) {
+        answer_requests(0);
+        serve(ROUND_US);
+    }
+    for (unsigned i = 0; i < CLIENTS; i++) {
+        client_t *client = &m_client[i];
+        FUZZ_REQUIRE(client->got_length == 0); /* whole lines */
+        FUZZ_REQUIRE(client->answers == client->due || (client->is_watching && client->answers <= client->due));
+        (void)close(client->fd);
+        if (m_control.client[i].fd >= 0) {
+            (void)close(m_control.client[i].fd);
+        }
+    }
+    FUZZ_REQUIRE(m_asked == requests_of_all());
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    fuzz_input_t in = {data, size};
+    start();
+    for (unsigned i = 0; i < RECORDS_MAX && in.left > 0; i++) {
+        step(&in);
+    }
+    finish();
+    return 0;
+}
