@@ -137,7 +137,8 @@ const snapshot_t *gateway_snapshot(const gateway_t *self);
 /** Tells the counters of cycles that were skipped because the program was late. */
 void gateway_note_late(gateway_t *self, uint32_t cycles);
 
-/** True once a shutdown has ended: OFF, or FAULT / ESTOP at rest with a shutdown asked for. */
+/** True once a shutdown has ended: OFF, or FAULT / ESTOP with a shutdown asked for and the drives told, where their bus tells
+ * them anything. */
 bool gateway_is_finished(const gateway_t *self);
 
 #endif

@@ -1205,6 +1205,21 @@ static void test_telemetry_actual_pose_follows_the_feedback(void)
     TEST_ASSERT_EQUAL_UINT32(3, counted()->late_cycles);
 }
 
+/* ---- an end on a bus that takes nothing ---- */
+
+static void test_shutdown_on_a_bus_that_takes_nothing_ends_all_the_same(void)
+{
+    m_is_fault_expected = true;
+    engage();
+    rig_break(&m_rig, SIM_DRIVES_BUSY, 0, 0);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
+    rig_run_ms(&m_rig, 50);
+    TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
+    rig_run_ms(&m_rig, 1000);
+    TEST_ASSERT_EQUAL(STATE_FAULT, seen()->state);
+    TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
+}
+
 /* ---- what a take-over cannot follow ---- */
 
 /* During a take-over only the blend bounds what extensions ask for. A timed move after a stream of jumps was planned from a speed
@@ -1328,6 +1343,7 @@ int main(void)
     RUN_TEST(test_fault_drives_that_never_enable_time_out);
     RUN_TEST(test_fault_in_every_phase_of_coming_up_latches);
     RUN_TEST(test_hold_during_coming_up_stops_and_resume_goes_on);
+    RUN_TEST(test_shutdown_on_a_bus_that_takes_nothing_ends_all_the_same);
     RUN_TEST(test_takeover_timed_move_after_a_stream_of_wild_extensions_ends_in_time);
     RUN_TEST(test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves);
     RUN_TEST(test_shutdown_from_every_moment_ends_in_off);
