@@ -52,6 +52,8 @@ configure() {
     # CPUs with AMX have a floating-point state of 11 KiB; older kernels reserve 2696 bytes and panic. It also lives on the kernel's stack,
     # hence KERNEL_STACK_ORDER.
     sed -i 's/DEFINE_LONGS(HOST_FP_SIZE, 2696)/DEFINE_LONGS(HOST_FP_SIZE, 12288)/' arch/x86/um/user-offsets.c
+    # All interrupts are UML's own, so that simulated GPIO lines would have none for their edges. A few more: tests use them up.
+    sed -i 's/define NR_IRQS\t\t\tUM_LAST_SIGNAL_IRQ$/define NR_IRQS (UM_LAST_SIGNAL_IRQ + 8)/' arch/um/include/asm/irq.h
     make ARCH=um KCONFIG_ALLCONFIG="$here/uml.config" allnoconfig
 }
 
