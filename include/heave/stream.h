@@ -27,7 +27,7 @@ typedef enum {
     STREAM_FAST    /**< quadratic B-spline, led 0.6 periods ahead, 0.9 periods + margin late: continuous velocity */
 } stream_style_t;
 
-#define STREAM_PERIOD_MIN_US 4000u   /**< fastest stream recognised: 250 Hz; what comes faster is thinned out to that */
+#define STREAM_PERIOD_MIN_US 4000u   /**< fastest stream followed: 250 Hz; of what comes faster every so manyth sample is taken */
 #define STREAM_PERIOD_MAX_US 150000u /**< slowest: 6.7 Hz; samples further apart are steps, but for hints */
 #define STREAM_HINT_MIN_US   50000u  /**< a hint of less says nothing: senders' timers step by up to 16 ms */
 #define STREAM_HINT_MAX_US   500000u /**< slowest with a hint: 2 Hz */
@@ -97,11 +97,22 @@ typedef enum {
     STREAM_RUNNING /**< a curve */
 } stream_phase_t;
 
+/** Which samples of a sender are taken; members are private to src/motion. */
+typedef struct {
+    uint64_t last_us;          /**< newest arrival, taken or not */
+    uint32_t gaps_us;          /**< mean interval of arrivals, times 16 */
+    uint32_t each;             /**< one of so many samples is taken */
+    uint32_t passed;           /**< samples not taken since the last that was */
+    bool has_spare;            /**< the newest sample is not taken */
+    q32_t spare_q32[AXES_MAX]; /**< that sample */
+} stream_thin_t;
+
 /** Stream state; members are private to src/motion. */
 typedef struct {
     uint32_t cycle_us;
     stream_style_t style;
     stream_phase_t phase;
+    stream_thin_t thin;
     bool is_fresh; /**< no reference given since the start */
     stream_clock_t clock;
     stream_curve_t curve;

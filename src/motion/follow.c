@@ -16,6 +16,8 @@
 #include "slots.h"
 
 #define TAKEOVER_LEAST_US 250000
+#define INSTANT_MS        5     /* no move is as short: frames with such a T ... */
+#define INSTANT_GAP_US    20000 /* ... that follow each other so closely are a stream like frames without T */
 
 bool follow_is_moving(const motion_t *self)
 {
@@ -122,8 +124,11 @@ static bool is_stream_sample(const motion_t *self, const motion_target_t *target
 {
     const uint32_t stated_us = period_stated(target);
     const uint64_t gap_us = now_us - self->last_us;
-    if (!target->is_timed || stated_us == 0) {
-        return !target->is_timed;
+    if (!target->is_timed || (target->time_ms <= INSTANT_MS && gap_us <= INSTANT_GAP_US)) {
+        return true;
+    }
+    if (stated_us == 0) {
+        return false;
     }
     return stream_goes_on(&self->stream, now_us) ? is_about(stated_us, stream_period_us(&self->stream))
                                                  : is_about(gap_us, stated_us) && is_about(gap_us, self->last_stated_us);

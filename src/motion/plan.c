@@ -12,8 +12,10 @@
 #include "way.h"
 
 #define SHORTEST_CYCLES 32
-#define ATTEMPTS        34     /* each an eighth longer: up to 50 times the first */
-#define JOIN_MAX_US     600000 /* a longer quintic swings out further than it is worth */
+#define ATTEMPTS        34               /* each an eighth longer: up to 50 times the first ... */
+#define ATTEMPTS_POSE   48               /* ... 250 times where a stream of poses can be met in no other way */
+#define START_SLACK_Q32 (Q32_ONE / 1000) /* rounding of a quintic's first points */
+#define JOIN_MAX_US     600000           /* a longer quintic swings out further than it is worth */
 
 /* Limits of a quintic's slots, less what a moving base takes of them. */
 typedef struct {
@@ -21,12 +23,21 @@ typedef struct {
     const ramp_limits_t *list[AXES_MAX];
 } plan_limits_t;
 
-static void limits_beside(const motion_t *self, unsigned slots, const ramp_state_t *base, plan_limits_t *limits)
+/* Where cylinders led beyond an axis' range, the way back begins there. */
+static void include_start(ramp_limits_t *limits, q32_t start_q32)
+{
+    limits->pos_min_q32 = fx_clamp(start_q32 - START_SLACK_Q32, INT64_MIN, limits->pos_min_q32);
+    limits->pos_max_q32 = fx_clamp(start_q32 + START_SLACK_Q32, limits->pos_max_q32, INT64_MAX);
+}
+
+static void limits_beside(const motion_t *self, unsigned slots, const ramp_state_t *start, const ramp_state_t *base,
+                          plan_limits_t *limits)
 {
     for (unsigned i = 0; i < slots; i++) {
         ramp_limits_t *own = &limits->own[i];
         *own = *slot_limits(self, i);
         limits->list[i] = own;
+        include_start(own, start[i].pos_q32);
         if (base != NULL) {
             own->jerk_per_cycle3_q32 -= own->jerk_per_cycle3_q32 / 4;
             own->pos_min_q32 = INT64_MIN / 4; /* where the base will be is not known: the ramps keep the bounds */
@@ -54,12 +65,12 @@ static bool try_quintic(motion_t *self, unsigned slots, const ramp_state_t *star
 }
 
 static bool find_shortest(motion_t *self, unsigned slots, const ramp_state_t *start, const q32_t *target_q32,
-                          const ramp_state_t *base, int64_t least, int64_t most)
+                          const ramp_state_t *base, int64_t least, int64_t most, int attempts)
 {
     plan_limits_t limits;
-    limits_beside(self, slots, base, &limits);
+    limits_beside(self, slots, start, base, &limits);
     int64_t cycles = least > SHORTEST_CYCLES ? least : SHORTEST_CYCLES;
-    for (int attempt = 0; attempt < ATTEMPTS && cycles <= most; attempt++) {
+    for (int attempt = 0; attempt < attempts && cycles <= most; attempt++) {
         if (try_quintic(self, slots, start, target_q32, base, &limits, cycles)) {
             return true;
         }
@@ -71,7 +82,8 @@ static bool find_shortest(motion_t *self, unsigned slots, const ramp_state_t *st
 bool plan_shortest(motion_t *self, const ramp_state_t *start, const q32_t *target_q32, const ramp_state_t *base, int64_t least)
 {
     const int64_t most = base != NULL ? JOIN_MAX_US / (int64_t)self->cycle_us : INT64_MAX;
-    return find_shortest(self, POSE_AXES, start, target_q32, base, least, most);
+    const int attempts = self->space == MOTION_POSE ? ATTEMPTS_POSE : ATTEMPTS;
+    return find_shortest(self, POSE_AXES, start, target_q32, base, least, most, attempts);
 }
 
 /* The straight way between two points of the slots, as a path with the limits of axes and cylinders. */
@@ -120,7 +132,7 @@ static int64_t plan_quickest(motion_t *self, unsigned slots, const ramp_state_t 
     const int64_t in_two_parts = plan_stop_then_straight(self, slots, start);
     self->source = MOTION_TIMED;
     const int64_t from = least > in_two_parts / 4 ? least : in_two_parts / 4; /* none is shorter than that */
-    if (find_shortest(self, slots, start, self->goal_q32, NULL, from, in_two_parts)) {
+    if (find_shortest(self, slots, start, self->goal_q32, NULL, from, in_two_parts, ATTEMPTS)) {
         return self->quintic.cycles;
     }
     self->source = MOTION_HALTING;
@@ -143,7 +155,7 @@ static int64_t plan_timed_cycles(motion_t *self, int64_t cycles)
     ramp_state_t start[AXES_MAX];
     plan_limits_t limits;
     copy_states(self, AXES_MAX, start);
-    limits_beside(self, AXES_MAX, NULL, &limits);
+    limits_beside(self, AXES_MAX, start, NULL, &limits);
     self->source = MOTION_TIMED;
     if (try_quintic(self, AXES_MAX, start, self->goal_q32, NULL, &limits, cycles)) {
         return cycles;

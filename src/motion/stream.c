@@ -18,10 +18,21 @@
 #define AMBIGUOUS_US         15000u              /* ... networks make it */
 #define STEP_GAP_MIN_US      2000u /* two samples nearer than this do not begin a stream: the second replaces the first */
 
+/* Thinning out. Counted, not timed: every so manyth sample of an even stream is an even stream. */
+#define THIN_GAP_FIRST_US 10000u /* a few short intervals at a start, or in a burst, say nothing */
+#define THIN_GAP_MAX_US   20000u
+#define THIN_GAPS         16 /* intervals that the mean is taken over */
+#define THIN_BELOW_US     (STREAM_PERIOD_MIN_US * 39 / 40)
+#define THIN_ABOVE_US     (STREAM_PERIOD_MIN_US * 11 / 10)
+#define THIN_WAIT_US      (STREAM_PERIOD_MIN_US * 2) /* then a sample passed by was the last */
+
 void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_t style)
 {
     HV_ASSERT(axes >= 1 && axes <= AXES_MAX && cycle_us >= 500 && cycle_us <= 10000);
-    *self = (stream_t){.cycle_us = cycle_us, .style = style, .curve = {.axes = axes}};
+    *self = (stream_t){.cycle_us = cycle_us,
+                       .style = style,
+                       .thin = {.gaps_us = THIN_GAP_FIRST_US * THIN_GAPS, .each = 1},
+                       .curve = {.axes = axes}};
 }
 
 void stream_set_stop(stream_t *self, unsigned axis, stream_stop_t stop)
@@ -33,6 +44,7 @@ void stream_set_stop(stream_t *self, unsigned axis, stream_stop_t stop)
 void stream_reset(stream_t *self)
 {
     self->phase = STREAM_EMPTY; /* everything else begins with the next sample */
+    self->thin.has_spare = false;
 }
 
 void stream_hint_period(stream_t *self, uint32_t period_us)
@@ -95,8 +107,34 @@ static unsigned judge_periods(const stream_t *self, uint64_t now_us, const q32_t
     return best;
 }
 
-void stream_push(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+/* Which of the samples are taken, from the mean interval of all of them. */
+static void find_thinning(stream_thin_t *thin, uint64_t now_us)
 {
+    const uint64_t gap_us = now_us - thin->last_us < THIN_GAP_MAX_US ? now_us - thin->last_us : THIN_GAP_MAX_US;
+    thin->last_us = now_us;
+    thin->gaps_us += (uint32_t)gap_us - thin->gaps_us / THIN_GAPS;
+    const uint32_t mean_us = thin->gaps_us / THIN_GAPS + 1;
+    if (thin->each * mean_us < THIN_BELOW_US || (thin->each - 1) * mean_us > THIN_ABOVE_US) {
+        thin->each = (THIN_BELOW_US + mean_us - 1) / mean_us;
+    }
+}
+
+/* True if the sample is passed by; it is kept, as it may be the last one. */
+static bool is_passed_by(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+{
+    stream_thin_t *const thin = &self->thin;
+    find_thinning(thin, now_us);
+    thin->passed++;
+    thin->has_spare = self->phase == STREAM_RUNNING && thin->passed < thin->each;
+    for (unsigned axis = 0; axis < self->curve.axes && thin->has_spare; axis++) {
+        thin->spare_q32[axis] = sample_q32[axis];
+    }
+    return thin->has_spare;
+}
+
+static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+{
+    self->thin.passed = 0;
     if (self->phase == STREAM_EMPTY || !stream_clock_is_near(&self->clock, now_us)) {
         stream_clock_start(&self->clock, now_us);
         start_lone(self, sample_q32);
@@ -125,6 +163,13 @@ void stream_push(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
         stream_curve_skip(&self->curve);
     } else if (error_at(self, now_us) < -BEFORE_MAX_Q32) {
         stream_curve_stretch(&self->curve);
+    }
+}
+
+void stream_push(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+{
+    if (!is_passed_by(self, now_us, sample_q32)) {
+        take_sample(self, now_us, sample_q32);
     }
 }
 
@@ -160,6 +205,10 @@ bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref)
 {
     if (self->phase == STREAM_EMPTY) {
         return false;
+    }
+    if (self->thin.has_spare && now_us - self->thin.last_us >= THIN_WAIT_US) {
+        self->thin.has_spare = false;
+        take_sample(self, now_us, self->thin.spare_q32);
     }
     if (self->phase == STREAM_RUNNING) {
         advance(self, now_us);

@@ -181,10 +181,23 @@ static unsigned lost_gaps(const stream_clock_t *self, unsigned gaps, int64_t per
     return lost;
 }
 
+/* Mean interval, whatever was lost. */
+static int64_t mean_gap(const stream_clock_t *self, unsigned gaps)
+{
+    int64_t sum = 0;
+    for (unsigned i = 0; i < gaps; i++) {
+        sum += gap_q16(self, i);
+    }
+    return sum / (int64_t)gaps;
+}
+
+/* A faster rate shows in the sum of the intervals too: losses only make that longer. Where it does not, late arrivals were taken
+ * for losses. */
 static bool has_new_rate(const stream_clock_t *self)
 {
-    return lost_gaps(self, WATCHED, self->period_us_q16) >= WATCHED_LOST ||
-           is_rate_off(self, mean_period(self, WATCHED, self->period_us_q16), WATCHED);
+    const int64_t mean = mean_period(self, WATCHED, self->period_us_q16);
+    const bool is_plausible = mean > self->period_us_q16 || mean_gap(self, WATCHED) * 16 < self->period_us_q16 * 15;
+    return lost_gaps(self, WATCHED, self->period_us_q16) >= WATCHED_LOST || (is_rate_off(self, mean, WATCHED) && is_plausible);
 }
 
 /* Mean period over all intervals, with the periods that each was taken for. */

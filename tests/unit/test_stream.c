@@ -822,7 +822,7 @@ static void test_stream_step_flood_is_thinned_out(void)
     }
     const double delay = delay_max_periods(0, 2900);
     report("flood", 50, 2900, delay);
-    TEST_ASSERT_EQUAL_UINT32(STREAM_PERIOD_MIN_US, stream_period_us(&s_stream));
+    TEST_ASSERT_UINT32_WITHIN(501, STREAM_PERIOD_MIN_US, stream_period_us(&s_stream)); /* every 8th or 9th */
     TEST_ASSERT_TRUE(delay < 4.5);
     TEST_ASSERT_TRUE(speed_max(50, 2900) < 2 * signal_speed_max(0, 3));
     TEST_ASSERT_TRUE(measure(200, 2900, 40).shape_um < 400);

@@ -1,0 +1,99 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_follow.py BIN - a platform does not only keep its limits, it goes where it is sent: senders of odd rates, jitter and times, and back
+from beyond an axis' range."""
+import math
+import random
+import sys
+
+import heave
+import tap
+
+T0 = 15000  # ms: up and ready by then
+PATIENT = {"udp__silence_hold_ms": 0}
+SETTLED_MS = 2500  # a stream is followed as it should be so long after its start
+LAG_MAX_MS = 120
+
+
+def height(t_ms):
+    return 20 * math.sin(math.pi * t_ms / 1000)
+
+
+def arrivals(rate_hz, jitter_ms=0.0, seconds=7.0):
+    """(arrival, time of the sample), in ms from the start of the stream."""
+    dice = random.Random(5)
+    at = 0.0
+    for i in range(int(seconds * rate_hz)):
+        at = max(at, 1000 * i / rate_hz + jitter_ms * dice.random())
+        yield at, 1000 * i / rate_hz
+
+
+def play(bench, lines, config=None):
+    frames = bench.file("frames.txt", "".join(f"{t:.3f} {text}\n" for t, text in lines))
+    return heave.rows_of(bench.play(frames, config=config))
+
+
+def worst_error(rows, end_ms):
+    """Largest distance to the signal, at the delay that suits best."""
+    judged = [(float(row["t_ms"]) - T0, float(row["z_mm"])) for row in rows]
+    judged = [(t, z) for t, z in judged if SETTLED_MS <= t < end_ms][::7]
+    assert len(judged) > 500
+    return min(max(abs(z - height(t - lag)) for t, z in judged) for lag in range(0, LAG_MAX_MS, 2))
+
+
+def follows(bench, rate_hz, most_mm, jitter_ms=0.0, timed=None):
+    head, tail = ("A6", 0) if timed is None else ("A6T", timed)
+    lines = [(T0 + at, f"@{head}:0,0,0,0,0,{height(t):.3f},{tail}#") for at, t in arrivals(rate_hz, jitter_ms)]
+    error = worst_error(play(bench, lines), lines[-1][0] - T0)
+    assert error <= most_mm, f"{rate_hz} Hz, jitter {jitter_ms} ms, T {timed}: {error:.2f} mm"
+
+
+def usual_rates(bench):
+    for rate in (20, 60, 200):
+        follows(bench, rate, 0.7)
+
+
+def rates_beyond_what_is_followed(bench):
+    for rate in (251, 270, 333, 500, 600, 800, 1000, 2000):
+        follows(bench, rate, 1)
+
+
+def jitter_of_most_of_a_period(bench):
+    for rate, jitter_ms in ((60, 11), (60, 13), (60, 16), (100, 9)):
+        follows(bench, rate, 3.5, jitter_ms=jitter_ms)
+
+
+def times_too_short_to_mean_any(bench):
+    for rate, timed in ((200, 0), (333, 0), (1000, 0), (200, 1), (1000, 4)):
+        follows(bench, rate, 1, timed=timed)
+
+
+def back_from_beyond_an_axis(bench):
+    """Cylinders may lead where no pose axis is allowed to go; the next stream of poses leads back."""
+    lines = [(0, "!engage"), (T0, "@C6:200,200,200,200,200,200,0#")]
+    lines += [(T0 + 400 * i, "@C6:10,10,390,390,390,390,0#") for i in range(1, 6)]
+    lines += [(T0 + 2400 + 1000 * i / 60, "@A6:0,0,0,0,0,0,0#") for i in range(240)]
+    rows = [row for row in play(bench, lines, heave.TOP / "config/hexapod-400.ini") if float(row["t_ms"]) <= lines[-1][0]]
+    assert max(float(row["x_mm"]) for row in rows) > 305, "the cylinders did not lead beyond the range"
+    assert all(float(rows[-1][axis]) == 0 for axis in ("roll_deg", "pitch_deg", "x_mm", "z_mm")), rows[-1]
+
+
+CASES = {
+    "streams of usual rates": usual_rates,
+    "streams faster than what is followed": rates_beyond_what_is_followed,
+    "jitter of most of a period": jitter_of_most_of_a_period,
+    "streams of frames whose time is too short to mean any": times_too_short_to_mean_any,
+    "poses after cylinders led beyond an axis' range": back_from_beyond_an_axis,
+}
+
+
+def main():
+    suite = tap.Suite()
+    for name, case in CASES.items():
+        with suite.case(name), heave.Bench(sys.argv[1], **PATIENT) as bench:
+            case(bench)
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
