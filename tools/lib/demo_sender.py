@@ -194,8 +194,9 @@ class Show:
         deadline = time.monotonic() + UP_TIMEOUT_S
         waiting = list(self.ports)
         while waiting:
-            state = self.status(waiting[0])["state"]
-            if state == "ENGAGED":
+            status = self.status(waiting[0])
+            state = status["state"]
+            if state == "ENGAGED" or (state == "HOLD" and status["held_by_silence"]):  # it was, and has waited for the other one
                 waiting.pop(0)
             elif time.monotonic() > deadline:
                 raise NoAnswer(f"the {waiting[0]} is not ENGAGED after {UP_TIMEOUT_S} s, but {state}")
