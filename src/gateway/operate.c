@@ -367,7 +367,7 @@ static bool is_move_done(const gateway_t *self)
     case STATE_FAULT:
     case STATE_ESTOP:
     case STATES:
-        return false;
+        break;
     }
     return false;
 }
