@@ -14,6 +14,11 @@ target_compile_definitions(unity PUBLIC UNITY_INCLUDE_DOUBLE= UNITY_SUPPORT_64 U
 
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 
+# Tests are run side by side by weight (PROCESSORS): HEAVE_COMPUTES takes a processor as long as it runs, HEAVE_WAITS half of one, because it
+# mostly waits for real time to pass. tools/lib/run_tests.py hands out two for each processor.
+set(HEAVE_COMPUTES 2)
+set(HEAVE_WAITS 1)
+
 # heave_unit_test(NAME [SOURCE...]): one executable per module, tests/unit/test_NAME.c, linked with the core.
 function(heave_unit_test name)
   add_executable(test_${name} test_${name}.c ${ARGN})
@@ -22,12 +27,14 @@ function(heave_unit_test name)
   # on the file, because a target's own options stand before those of heave_options and would lose
   set_source_files_properties(test_${name}.c PROPERTIES COMPILE_OPTIONS "-Wno-conversion;-Wno-sign-conversion")
   add_test(NAME unit.${name} COMMAND test_${name})
+  set_tests_properties(unit.${name} PROPERTIES PROCESSORS ${HEAVE_COMPUTES})
 endfunction()
 
 # heave_script_test(NAME SCRIPT [ARG...]): a Python script that reports its cases in TAP (tests/lib/tap.py, importable as `tap`).
 function(heave_script_test name script)
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/${script} ${ARGN})
-  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib;PYTHONDONTWRITEBYTECODE=1")
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib;PYTHONDONTWRITEBYTECODE=1" PROCESSORS
+                                               ${HEAVE_COMPUTES})
 endfunction()
 
 # heave_kernel_test(NAME [VIRTUAL_TIME] [PYTHON] COMMAND [ARG...]): a program, Unity or TAP, on a kernel that has CAN; see tests/lib/kernel.py.
@@ -44,5 +51,6 @@ function(heave_kernel_test name)
     list(APPEND options --instrumented)
   endif()
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/lib/kernel.py ${options} -- ${kernel_UNPARSED_ARGUMENTS})
-  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib;PYTHONDONTWRITEBYTECODE=1" LABELS kernel TIMEOUT 900)
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib;PYTHONDONTWRITEBYTECODE=1" LABELS kernel TIMEOUT 900
+                                               PROCESSORS ${HEAVE_COMPUTES})
 endfunction()
