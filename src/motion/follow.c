@@ -177,6 +177,20 @@ static void take_target(motion_t *self, const motion_target_t *target, bool is_s
     self->due = !is_sample ? DUE_TIMED : self->stream.phase == STREAM_RUNNING ? DUE_STREAM : DUE_STEP;
 }
 
+/* The timed move that is under way once more: planned anew with each frame of a sender that repeats itself it would never arrive,
+ * and swing where the limits stretch it. */
+static bool is_under_way(const motion_t *self, const motion_target_t *target)
+{
+    const motion_target_t *last = &self->pending;
+    bool is_same = self->source > MOTION_STREAMED && self->due == DUE_NOTHING && last->is_timed && target->is_timed &&
+                   target->time_ms == last->time_ms && target->has_angle == last->has_angle &&
+                   (!target->has_angle || target->angle_deg_q32 == last->angle_deg_q32);
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        is_same = is_same && target->value_q32[i] == last->value_q32[i];
+    }
+    return is_same;
+}
+
 void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
     if (target->space != self->space || !follow_is_moving(self)) {
@@ -185,6 +199,9 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
     const bool is_sample = is_stream_sample(self, target, now_us);
     self->last_us = now_us;
     self->last_stated_us = period_stated(target);
+    if (!is_sample && is_under_way(self, target)) {
+        return;
+    }
     if (!is_sample || !is_withheld(self, target, now_us)) {
         take_target(self, target, is_sample, now_us);
     }
