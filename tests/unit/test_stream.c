@@ -105,6 +105,7 @@ typedef struct {
 /* What has been sent and when it arrives. */
 static struct {
     int count;
+    int in_a_row; /* most samples lost one after the other, beyond the first 2 s */
     double at[SAMPLES], value[SAMPLES];
 } s_sent;
 
@@ -119,10 +120,15 @@ static void send(double at, double value)
 /* Sends the signal from one time to another through a network that delays by 2 ms and the jitter, and loses. */
 static void send_signal(const network_t *network, double from, double to)
 {
+    int lost = 0;
     for (double at = from; at < to; at += 1 / network->rate_hz) {
         const double arrival = at + 0.002 + 0.001 * network->jitter_ms * random_unit();
         if (random_unit() >= network->loss) {
             send(arrival, signal_at(at));
+            lost = 0;
+        } else {
+            lost += at > 2;
+            s_sent.in_a_row = lost > s_sent.in_a_row ? lost : s_sent.in_a_row;
         }
     }
 }
@@ -152,7 +158,7 @@ static void start(stream_style_t style)
 {
     stream_init(&s_stream, CYCLE_US, 1, style);
     stream_set_stop(&s_stream, 0, k_stop);
-    s_sent.count = 0;
+    s_sent.count = s_sent.in_a_row = 0;
 }
 
 /* ---- measurements ---- */
@@ -417,14 +423,16 @@ static void test_stream_smooth_on_cue_signals_keeps_its_figures(void)
         sum += quality.jerk * quality.jerk;
         sum_true += quality.jerk_true * quality.jerk_true;
         if (getenv("STREAM_FIGURES")) {
-            printf("smooth %2u: lag %.1f ms shape %.1f um (cold %.1f) worst %.3f mm jerk %.0f = %.2f x (cold %.2f)\n", seed,
-                   quality.lag_ms, quality.shape_um, cold.shape_um, quality.worst_mm, quality.jerk,
-                   quality.jerk / quality.jerk_true, cold.jerk / cold.jerk_true);
+            printf("smooth %2u: lag %.1f ms shape %.1f um (cold %.1f) worst %.3f mm jerk %.0f = %.2f x (cold %.2f), %d lost in a "
+                   "row\n",
+                   seed, quality.lag_ms, quality.shape_um, cold.shape_um, quality.worst_mm, quality.jerk,
+                   quality.jerk / quality.jerk_true, cold.jerk / cold.jerk_true, s_sent.in_a_row);
         }
         TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 2.5);
         TEST_ASSERT_TRUE(quality.shape_um <= 50);
-        TEST_ASSERT_TRUE(quality.worst_mm <= 1.0);                 /* two losses in a row */
-        TEST_ASSERT_TRUE(quality.jerk <= 1.4 * quality.jerk_true); /* two at an onset */
+        TEST_ASSERT_TRUE(quality.worst_mm <= 1.0); /* two losses in a row */
+        /* two in a row at an onset: the second guess is as far off as the onset's jerk makes it, and is taken back */
+        TEST_ASSERT_TRUE(quality.jerk <= (s_sent.in_a_row > 1 ? 1.4 : 1.3) * quality.jerk_true);
     }
     TEST_ASSERT_TRUE(sqrt(sum / sum_true) <= 1.15);
 }
