@@ -6,6 +6,7 @@
 #ifndef HEAVE_GATEWAY_H
 #define HEAVE_GATEWAY_H
 
+#include "heave/confirm.h"
 #include "heave/drives.h"
 #include "heave/hal/inputs.h"
 #include "heave/hal/log.h"
@@ -76,7 +77,8 @@ typedef struct {
     plate_t plate;
     uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
     uint64_t state_since_us; /**< when the state was entered */
-    uint16_t frame_mask;     /**< what the sender asked of the relays */
+    confirm_t confirm;
+    uint16_t frame_mask; /**< what the sender asked of the relays */
     relay_policy_t relay_policy;
     unsigned targets; /**< of this cycle */
     bool has_newest;  /**< newest is of this cycle and motion has not been told of it */
@@ -90,6 +92,8 @@ typedef struct {
     uint32_t other_suppressed;
     uint64_t spike_logged_us;
     uint32_t spikes_logged; /**< of all spikes, those that a line told of */
+    uint64_t jump_logged_us;
+    uint32_t jumps_logged; /**< likewise */
     uint64_t reject_logged_us[FRAME_ERRORS];
     uint32_t reject_suppressed[FRAME_ERRORS];
     uint8_t datagram[GATEWAY_DATAGRAM_MAX];
@@ -116,7 +120,7 @@ void gateway_save(const gateway_t *self, gateway_t *out);
 hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io) HV_MUST_CHECK;
 
 /** Takes over what may change in operation: silence, take-over and priorities, dialect, safe mask and its delay, following error,
- *  spike gate. The rest of the settings is not looked at. */
+ *  spike gate, confirmation of far jumps. The rest of the settings is not looked at. */
 void gateway_reload(gateway_t *self, const settings_t *settings);
 
 /** What an operator asks for: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET or EVENT_SHUTDOWN.

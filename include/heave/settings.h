@@ -67,6 +67,8 @@ typedef struct {
     uint32_t intensity_ramp_ms;      /**< [500, 10000]: from 0 to 100 % */
 
     frame_dialect_t dialect;
+    q16_t confirm_jump_mm_q16;   /**< targets further than that from the last one wait for a second frame; 0 = none do */
+    q16_t confirm_jump_deg_q16;  /**< the same of rotations and the rotation motor */
     uint32_t takeover_ms;        /**< silence of the sender that drives, after which another may; 0: all are heard */
     hal_udp_networks_t priority; /**< senders that need not wait, the first one in front */
     uint32_t silence_hold_ms;    /**< 0 = never, as the two below; after the last valid frame or the end of its timed move */

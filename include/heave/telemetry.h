@@ -35,6 +35,7 @@ typedef struct {
     uint32_t impossible;     /**< extensions no pose belongs to, or one near a singularity */
     uint32_t singular_stops; /**< stops before a singularity on the way from one set of extensions to another */
     uint32_t spikes;         /**< samples of a stream that were not followed (see gate.h) */
+    uint32_t unconfirmed;    /**< far jumps that no second frame confirmed (see confirm.h) */
     uint32_t clamped;        /**< cycles that pulled a target in */
     uint32_t stretched;      /**< timed moves that took longer than asked */
     uint32_t relay_missing;  /**< masks that set a relay this platform does not have */

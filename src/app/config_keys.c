@@ -177,6 +177,12 @@ const config_key_t config_keys[] = {
      RANGE(0, 1000), .is_live = true,
      .help = "a sample of a stream that would take more than so many times an axis' acceleration limit waits for the next one to confirm "
              "it; 0 = off"},
+    {KEY("udp", "confirm_jump_mm"), AT(settings.confirm_jump_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     .fallback = "0", RANGE(0, 4000), .is_live = true,
+     .help = "a frame whose x, y, z or extension is further than that from the last one followed is followed only once a second frame "
+             "within a second is as near to it; 0 = every frame is followed"},
+    {KEY("udp", "confirm_jump_deg"), AT(settings.confirm_jump_deg_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg",
+     .fallback = "0", RANGE(0, 360), .is_live = true, .help = "the same of roll, pitch, yaw and the rotation motor"},
     {KEY("udp", "silence_hold_ms"), AT(settings.silence_hold_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "1000",
      RANGE(0, 3600000), .is_live = true, .help = "silence of the sender after which the platform holds; 0 = never"},
     {KEY("udp", "silence_neutral_ms"), AT(settings.silence_neutral_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",

@@ -102,6 +102,7 @@ static void put_frames(sheet_t *self, const motion_view_t *view)
             c->rejected[i]);
     }
     whole(self, "spikes_total", "counter", "samples that were not followed", c->spikes);
+    whole(self, "unconfirmed_jumps_total", "counter", "far jumps that no second frame confirmed", c->unconfirmed);
     whole(self, "clamped_cycles_total", "counter", "cycles that pulled a target in", c->clamped);
     whole(self, "stretched_total", "counter", "timed moves that took longer than asked", c->stretched);
     whole(self, "singular_stops_total", "counter", "stops before a singularity", c->singular_stops);

@@ -301,6 +301,7 @@ static void write_counters(json_t *json, const motion_view_t *view)
     json_number(json, "impossible", c->impossible);
     json_number(json, "singular_stops", c->singular_stops);
     json_number(json, "spikes", c->spikes);
+    json_number(json, "unconfirmed", c->unconfirmed);
     json_number(json, "clamped", c->clamped);
     json_number(json, "stretched", c->stretched);
     json_number(json, "relay_missing", c->relay_missing);

@@ -126,6 +126,8 @@ void gateway_reload(gateway_t *self, const settings_t *settings)
     own->relay_safe_mask = settings->relay_safe_mask;
     own->relay_safe_after_ms = settings->relay_safe_after_ms;
     own->following_error_mm_q16 = settings->following_error_mm_q16;
+    own->confirm_jump_mm_q16 = settings->confirm_jump_mm_q16;
+    own->confirm_jump_deg_q16 = settings->confirm_jump_deg_q16;
     own->spike_gate = settings->spike_gate;
     motion_set_spike_gate(&self->motion, settings->spike_gate);
 }
@@ -265,6 +267,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->counters.relay_delayed = self->relay_policy.delay_count;
     s->counters.spikes = gate_spikes(motion_gate(&self->motion));
     note_singular_stops(self, now_us);
+    s->counters.unconfirmed = self->confirm.dropped;
     s->counters.stretched = motion_stretched_count(&self->motion);
     publish_plate(self, now_us);
     s->cycle++;

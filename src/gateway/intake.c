@@ -180,32 +180,62 @@ static void put_tenths(text_t *text, q32_t value_q32)
     text_put_u32(text, (uint32_t)(tenths % 10));
 }
 
+/* Axes of a pose and the rotation motor, or cylinders. */
+static const char *axis_text(motion_space_t space, unsigned axis)
+{
+    static const char *const k_axes[AXES_MAX] = {"roll", "pitch", "yaw", "x", "y", "z", "angle"};
+    static const char *const k_cylinders_1_to_6[CYLINDERS_MAX] = {"cylinder 1", "cylinder 2", "cylinder 3",
+                                                                  "cylinder 4", "cylinder 5", "cylinder 6"};
+    return space == MOTION_CYLINDERS && axis < CYLINDERS_MAX ? k_cylinders_1_to_6[axis] : k_axes[axis];
+}
+
+/* One line about a value of the sender that drives. */
+static void log_not_followed(gateway_t *self, const char *what, const char *why, const confirm_jump_t *jump, uint32_t suppressed)
+{
+    char line[HAL_LOG_TEXT_MAX + 1];
+    char peer[HAL_UDP_PEER_TEXT_MAX];
+    text_t text = text_start(line, sizeof line);
+    (void)hal_udp_peer_text(&self->owner.peer, peer, sizeof peer);
+    text_put(&text, what);
+    text_put(&text, " from ");
+    text_put(&text, peer);
+    text_put(&text, " not followed, ");
+    text_put(&text, why);
+    text_put(&text, ": ");
+    text_put(&text, axis_text(jump->space, jump->axis));
+    text_put(&text, " ");
+    put_tenths(&text, jump->value_q32);
+    text_put(&text, " after ");
+    put_tenths(&text, jump->from_q32);
+    put_suppressed(&text, suppressed);
+    hal_log_write(self->io.log, HAL_LOG_WARNING, line);
+}
+
 /* One line for the first spike of a burst; what is left out is told with a later one. */
 static void log_spikes(gateway_t *self, uint64_t now_us)
 {
-    static const char *const k_axes[POSE_AXES] = {"roll", "pitch", "yaw", "x", "y", "z"};
     const gate_t *gate = motion_gate(&self->motion);
     const uint32_t unlogged = gate_spikes(gate) - self->spikes_logged;
     if (unlogged == 0 || (self->spike_logged_us != 0 && now_us - self->spike_logged_us < REJECT_LOG_INTERVAL_US)) {
         return;
     }
     const gate_spike_t *spike = gate_last_spike(gate);
-    char line[HAL_LOG_TEXT_MAX + 1];
-    char peer[HAL_UDP_PEER_TEXT_MAX];
-    text_t text = text_start(line, sizeof line);
-    (void)hal_udp_peer_text(&self->owner.peer, peer, sizeof peer);
-    text_put(&text, "sample from ");
-    text_put(&text, peer);
-    text_put(&text, " not followed, a spike: ");
-    text_put(&text, k_axes[spike->axis]);
-    text_put(&text, " ");
-    put_tenths(&text, spike->value_q32);
-    text_put(&text, " after ");
-    put_tenths(&text, spike->before_q32);
-    put_suppressed(&text, unlogged - 1);
-    hal_log_write(self->io.log, HAL_LOG_WARNING, line);
+    const confirm_jump_t jump = {MOTION_POSE, spike->axis, spike->value_q32, spike->before_q32};
+    log_not_followed(self, "sample", "a spike", &jump, unlogged - 1);
     self->spike_logged_us = now_us;
     self->spikes_logged += unlogged;
+}
+
+/* The same of far jumps. */
+static void log_jumps(gateway_t *self, uint64_t now_us)
+{
+    const uint32_t unlogged = self->confirm.dropped - self->jumps_logged;
+    if (unlogged == 0 || (self->jump_logged_us != 0 && now_us - self->jump_logged_us < REJECT_LOG_INTERVAL_US)) {
+        return;
+    }
+    log_not_followed(self, "frame", "a far jump that no second one confirmed", &self->confirm.drop, unlogged - 1);
+    self->jump_logged_us = now_us;
+    self->jumps_logged += unlogged;
 }
 
 /* One line for the first frame of a sender that does not drive, and then at times. */
@@ -242,6 +272,7 @@ static void change_owner(gateway_t *self, uint64_t now_us)
     text_put(&text, " drives from now on");
     hal_log_write(self->io.log, HAL_LOG_NOTICE, line);
     self->snapshot.counters.owner_changes++;
+    confirm_restart(&self->confirm); /* what waits is another sender's */
     if (self->supervisor.state == STATE_ENGAGED) {
         operate_follow(self, now_us);
     }
@@ -292,6 +323,41 @@ static bool take_target(gateway_t *self, const motion_target_t *target, frame_co
     return true;
 }
 
+/* Where the platform is, as a target of that space. */
+static motion_target_t here(const gateway_t *self, motion_space_t space)
+{
+    motion_target_t target = {.space = space, .has_angle = self->settings.has_angle, .angle_deg_q32 = self->output.angle_deg_q32};
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        target.value_q32[i] = space == MOTION_POSE ? self->output.sent.axis_q32[i] : self->output.extension_mm_q32[i];
+    }
+    return target;
+}
+
+/* False for a far jump that waits for a second frame. */
+static bool is_confirmed(gateway_t *self, const motion_target_t *target, uint64_t now_us)
+{
+    const bool is_asked_for = self->settings.confirm_jump_mm_q16 != 0 || self->settings.confirm_jump_deg_q16 != 0;
+    if (!is_asked_for || self->supervisor.state != STATE_ENGAGED) {
+        return true;
+    }
+    const confirm_distance_t distance = {q32_from_q16(self->settings.confirm_jump_mm_q16),
+                                         q32_from_q16(self->settings.confirm_jump_deg_q16)};
+    const motion_target_t from = here(self, target->space);
+    return confirm_passes(&self->confirm, &distance, &from, target, now_us);
+}
+
+/* Follows a target that nothing is to be waited for.
+ * Returns false: it is impossible, and has been refused. */
+static bool follow(gateway_t *self, const motion_target_t *target, frame_command_t command, const hal_udp_peer_t *from,
+                   uint64_t now_us)
+{
+    const bool is_taken = take_target(self, target, command, from, now_us);
+    if (is_taken) {
+        confirm_followed(&self->confirm, target);
+    }
+    return is_taken;
+}
+
 static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *from, uint64_t now_us)
 {
     const char *missing = missing_for(self, frame->command);
@@ -305,7 +371,8 @@ static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *
     auto_engage_frame(&self->auto_engage, now_us);
     const motion_target_t target = target_of(self, frame);
     operate_event(self, EVENT_FRAME, now_us);
-    if (!take_target(self, &target, frame->command, from, now_us)) {
+    const bool is_waiting = !is_confirmed(self, &target, now_us);
+    if (!is_waiting && !follow(self, &target, frame->command, from, now_us)) {
         return;
     }
     counters_t *counters = &self->snapshot.counters;
@@ -313,10 +380,10 @@ static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *
     counters->accepted_timed += frame->is_timed;
     self->snapshot.last_frame_us = now_us;
     self->start_us = now_us;
-    if (self->supervisor.state == STATE_ENGAGED) {
-        take_mask(self, frame);
-    } else {
+    if (self->supervisor.state != STATE_ENGAGED) {
         counters->not_followed++;
+    } else if (!is_waiting) {
+        take_mask(self, frame);
     }
 }
 
@@ -367,9 +434,11 @@ static void receive(gateway_t *self, uint64_t now_us)
 void intake_receive(gateway_t *self, uint64_t now_us)
 {
     self->targets = 0;
+    confirm_cycle(&self->confirm, now_us);
     receive(self, now_us);
     if (self->has_newest) {
         self->has_newest = false;
         (void)tell_motion(self, &self->newest, self->newest_command, &self->newest_from, now_us);
     }
+    log_jumps(self, now_us);
 }

@@ -101,6 +101,7 @@ void operate_follow(gateway_t *self, uint64_t now_us)
 {
     self->start_us = now_us;
     self->frame_mask = self->settings.relay_safe_mask;
+    confirm_restart(&self->confirm);
     motion_follow(&self->motion);
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * fuzz_gateway.c - datagrams through a whole gateway that follows. Input: platform and dialect, then records: cycles to wait,
- * sender, length, datagram. What must hold: a second gateway that only gets the good frames, printed anew, is in the same state
- * all the time (what was rejected has changed nothing but counters and log); accepted, rejected and other senders' frames add up
- * to what came; set-points stay within the limits and no drive finds a following error.
+ * fuzz_gateway.c - datagrams through a whole gateway that follows. Input: platform, dialect and confirmation of jumps, then
+ * records: cycles to wait, sender, length, datagram. What must hold: a second gateway that only gets the good frames, printed
+ * anew, is in the same state all the time (what was rejected has changed nothing but counters and log); accepted, rejected and
+ * other senders' frames add up to what came; set-points stay within the limits and no drive finds a following error.
  */
 #include <string.h>
 
@@ -48,7 +48,9 @@ static void start(uint8_t choice)
     }
     m_pair = m_start[choice % PLATFORMS];
     const frame_dialect_t dialect = (choice & 2) != 0 ? FRAME_LENIENT : FRAME_V3;
+    const q16_t confirm_mm_q16 = (choice & 4) != 0 ? 20 * 65536 : 0;
     m_pair.all.gateway.settings.dialect = m_pair.good.gateway.settings.dialect = dialect;
+    m_pair.all.gateway.settings.confirm_jump_mm_q16 = m_pair.good.gateway.settings.confirm_jump_mm_q16 = confirm_mm_q16;
 }
 
 static void push(rig_t *rig, unsigned host, const void *bytes, size_t length)

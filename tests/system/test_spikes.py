@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_spikes.py BIN - single wild samples in a stream: what heaved makes of it is, byte by byte, what it makes of the stream without them."""
+"""test_spikes.py BIN - single wild samples in a stream, and far jumps that nothing confirms: what heaved makes of it is, byte by byte, what it makes of
+the stream without them."""
 import json
 import math
 import random
+import signal
 import subprocess
 import sys
 
@@ -139,6 +141,56 @@ def spikes_live(bench):
     heave.wait_for(lambda: "a spike: z 95.0" in daemon.log.read_text(), "a spike is logged")
 
 
+# --- Far jumps that wait for a second frame ---
+
+def confirming(bench, mm=20, deg=5, name="confirm.ini"):
+    config = bench.write_config(name, **PATIENT)
+    config.write_text(config.read_text().replace("[udp]", f"[udp]\nspike_gate = 0\nconfirm_jump_mm = {mm}\nconfirm_jump_deg = {deg}"), encoding="utf-8")
+    return config
+
+
+def lone_jumps_are_not_followed(bench):
+    config = confirming(bench)
+    lines, places = with_spikes(stream(50))
+    assert play(bench, lines, config=config) == play(bench, without(lines, places), config=config)
+    check_limits(bench, config)
+    jumps = [(T0, [0, 0, 0, 0, 0, 15]), (T0 + 1000, [0, 6, 0, 0, 0, 0]), (T0 + 3000, [0, 0, 0, 0, 21, 0]), (T0 + 6000, [0, 0, 0, 0, 0, 14])]
+    assert play(bench, jumps, config=config) == play(bench, without(jumps, [1, 2]), config=config)
+
+
+def confirmed_jumps_are_followed(bench):
+    """As if the first frame had never been: the second one tells where to, and how quickly."""
+    off, config = configured(bench, "off.ini", 0), confirming(bench)
+    for timed in (None, 1500):
+        first, second = (T0, [0, 0, 0, 0, 0, 60]), (T0 + 300, [0, 0, 0, 0, 0, 58])
+        assert play(bench, [first, second], timed, config) == play(bench, [second], timed, off), f"T {timed}"
+    for twice_ms, is_followed in ((4, False), (5, True), (1000, True), (1001, False)):
+        again = [(T0, [0, 0, 0, 0, 0, 60]), (T0 + twice_ms, [0, 0, 0, 0, 0, 60])]
+        highest = max(float(row["z_mm"]) for row in heave.rows_of(play(bench, again, config=config)))
+        assert (highest > 1) == is_followed, f"the same frame {twice_ms} ms later: {highest} mm"
+
+
+def jumps_live(bench):
+    """Switched on in the ride; told, counted, and played back to the same bytes."""
+    record, trace, off = bench.folder / "record.txt", bench.folder / "live.csv", bench.config.read_text()
+    daemon = bench.start("--record", record, "--trace", trace, config=confirming(bench, 0, 0, "platform.ini"))
+    said = lambda words: heave.wait_for(lambda: words in daemon.log.read_text(), words)  # noqa: E731
+    bench.wait_state("ENGAGED")
+    confirming(bench, name="platform.ini")
+    daemon.send_signal(signal.SIGHUP)
+    said("[udp] confirm_jump_mm: 20 from now on")
+    with bench.sender() as sender:
+        sender.send(frame([0, 0, 0, 0, 0, 60]))
+        heave.wait_for(lambda: bench.status()["counters"]["unconfirmed"] == 1, "the jump is dropped")
+        said("not followed, a far jump that no second one confirmed: z 60.0 after 0.0\n")
+        assert bench.status()["pose_sent"]["z_mm"] == 0
+        sender.stream(0.3, lambda t: frame([0, 0, 0, 0, 0, 60]))
+        heave.wait_for(lambda: bench.status()["pose_sent"]["z_mm"] > 59, "a confirmed one is followed")
+    assert bench.stop(daemon) == 0 and "confirm" not in off
+    live, played = trace.read_bytes(), bench.play(record)
+    assert played[:len(live)] == live, "the recording plays back otherwise"
+
+
 CASES = {
     "spikes at all rates, with jitter and losses, are samples that were lost": spikes_are_lost_samples,
     "spikes in a stream of T frames too": spikes_in_a_timed_stream,
@@ -147,6 +199,9 @@ CASES = {
     "lone frames are followed at once": lone_frames_are_followed_at_once,
     "the gate is as wide as configured, or off": the_gate_is_configured,
     "spikes are counted, and told once a second": spikes_are_counted_and_told,
+    "far jumps that nothing confirms are as frames that never came": lone_jumps_are_not_followed,
+    "far jumps are followed by their second frame, with its time": confirmed_jumps_are_followed,
+    "far jumps of a live sender: on by a reload, told, counted, replayed": jumps_live,
     "spikes of a live sender show in the status and the log": spikes_live,
 }
 

@@ -744,6 +744,89 @@ static void test_senders_priority_takes_over_in_motion_without_a_jump(void)
     }
 }
 
+/* ---- far jumps ---- */
+
+static void expect_unconfirmed(uint32_t jumps, double z)
+{
+    assert_heights(z);
+    TEST_ASSERT_EQUAL_UINT32(jumps, counted()->unconfirmed);
+}
+
+static void test_jumps_lone_far_frame_moves_nothing_relays_neither(void)
+{
+    m_settings.confirm_jump_mm_q16 = 20 * 65536;
+    engage();
+    send_and_run("@A6:0,0,0,0,0,10,1#", 1000);
+    send_and_run("@A6:0,0,0,0,0,60,FF#", 1500);
+    expect_unconfirmed(1, 10);
+    TEST_ASSERT_EQUAL_HEX16(0x1, m_rig.relays.mask);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "not followed, a far jump that no second one confirmed: z 60.0 after 10.0"));
+    send_and_run("@A6:0,0,0,0,0,-60,FF#", 100);
+    send_and_run("@A6:0,0,0,0,0,11,3#", 1000);
+    expect_unconfirmed(2, 11);
+    TEST_ASSERT_EQUAL_HEX16(0x3, m_rig.relays.mask);
+    TEST_ASSERT_EQUAL_UINT32(5, counted()->accepted[FRAME_A6]); /* good frames all of them, that of engage() too */
+}
+
+/* The move takes the second frame's time, from the second frame on. */
+static void test_jumps_second_frame_is_followed_with_its_own_time(void)
+{
+    m_settings.confirm_jump_mm_q16 = 20 * 65536;
+    engage();
+    send_and_run("@A6T:0,0,0,0,0,60,500#", 100);
+    expect_unconfirmed(0, 0);
+    send_and_run("@A6T:0,0,0,0,0,50,2000#", 1900);
+    TEST_ASSERT_TRUE(rig_pose(&m_rig, AXIS_Z) < 49.99 && rig_pose(&m_rig, AXIS_Z) > 45);
+    rig_run_ms(&m_rig, 101);
+    expect_unconfirmed(0, 50);
+}
+
+static void test_jumps_hold_by_silence_comes_when_it_would(void)
+{
+    m_settings.confirm_jump_mm_q16 = 20 * 65536;
+    m_settings.silence_hold_ms = 700;
+    engage();
+    TEST_ASSERT_EQUAL(STATE_HOLD, seen()->state);
+    send_and_run("@A6:0,0,0,0,0,60#", 699); /* ends the hold as any frame would, and is one for the silence */
+    TEST_ASSERT_EQUAL(STATE_ENGAGED, seen()->state);
+    rig_run_ms(&m_rig, 2);
+    TEST_ASSERT_EQUAL(STATE_HOLD, seen()->state);
+    expect_unconfirmed(0, 0);
+    rig_run_ms(&m_rig, 400);
+    expect_unconfirmed(1, 0);
+}
+
+static void test_jumps_of_the_sender_before_confirm_nothing(void)
+{
+    m_settings.confirm_jump_mm_q16 = 20 * 65536;
+    m_settings.takeover_ms = 2500;
+    m_settings.priority = (hal_udp_networks_t){.count = 1, .network = {{.prefix = 32, .address = {10, 0, 0, 2}}}};
+    start(true);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 20000));
+    rig_send_from(&m_rig, 1, "@A6:0,0,0,0,0,60#");
+    rig_run_ms(&m_rig, 20);
+    rig_send_from(&m_rig, 2, "@A6:0,0,0,0,0,60#");
+    rig_run_ms(&m_rig, 500);
+    assert_heights(0);
+    rig_send_from(&m_rig, 2, "@A6:0,0,0,0,0,61#");
+    rig_run_ms(&m_rig, 5000);
+    expect_unconfirmed(0, 61);
+}
+
+static void test_jumps_every_frame_is_followed_where_it_is_off(void)
+{
+    engage();
+    send_and_run("@A6:0,0,0,0,0,60#", 2000);
+    expect_unconfirmed(0, 60);
+    settings_t settings = m_settings;
+    settings.confirm_jump_mm_q16 = 20 * 65536;
+    gateway_reload(&m_rig.gateway, &settings); /* from now on, measured from what was followed before */
+    send_and_run("@A6:0,0,0,0,0,45#", 2000);
+    expect_unconfirmed(0, 45);
+    send_and_run("@A6:0,0,0,0,0,0#", 2000);
+    expect_unconfirmed(1, 45);
+}
+
 /* ---- e-stop ---- */
 
 static void start_moving(unsigned ms)
@@ -1325,6 +1408,11 @@ int main(void)
     RUN_TEST(test_senders_two_at_once_only_one_is_followed);
     RUN_TEST(test_senders_take_over_after_silence_at_engage_speed);
     RUN_TEST(test_senders_priority_takes_over_in_motion_without_a_jump);
+    RUN_TEST(test_jumps_lone_far_frame_moves_nothing_relays_neither);
+    RUN_TEST(test_jumps_second_frame_is_followed_with_its_own_time);
+    RUN_TEST(test_jumps_hold_by_silence_comes_when_it_would);
+    RUN_TEST(test_jumps_of_the_sender_before_confirm_nothing);
+    RUN_TEST(test_jumps_every_frame_is_followed_where_it_is_off);
     RUN_TEST(test_estop_in_motion_latches_and_comes_up_through_homing);
     RUN_TEST(test_estop_input_that_cannot_be_read_counts_as_active);
     RUN_TEST(test_estop_in_every_state_ends_in_estop);
