@@ -7,9 +7,9 @@
  *                                 timed one by one, the clock's own time taken off; of CAN `frames N`: on the bus in one run
  *   bench_core NAME COUNT         COUNT runs in bench_region(), for callgrind --toggle-collect=bench_region*
  */
+#include "bench_gateway.h"
 #include "cia402_slave.h"
 #include "heave/cia402.h"
-#include "rig.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -17,12 +17,11 @@
 #include <string.h>
 #include <time.h>
 
-#define POSES       512u  /* a power of 2 */
-#define TEXTS       4096u /* a power of 2 */
-#define TEXT_MAX    128u
-#define RISE_CYCLES 20000u
-#define FLOOD       GATEWAY_DATAGRAMS_PER_CYCLE
-#define PI          3.14159265358979
+#define POSES    512u /* a power of 2 */
+#define TEXTS    BENCH_TEXTS
+#define TEXT_MAX BENCH_TEXT_MAX
+#define FLOOD    GATEWAY_DATAGRAMS_PER_CYCLE
+#define PI       3.14159265358979
 
 /* of the CAN subjects */
 #define BUS_CYCLES     4u /* in a period of the bus */
@@ -36,14 +35,10 @@
 
 /** Everything a subject may need. */
 typedef struct {
-    gateway_t gateway;
-    uint64_t now_us;
+    bench_gateway_t at;
+    bench_texts_t texts;
+    uint64_t now_us; /**< of the CAN subjects */
     q32_t setpoint_q32[DRIVES_MAX];
-    char text[TEXTS][TEXT_MAX]; /**< datagrams */
-    size_t length[TEXTS];
-    unsigned texts; /**< in use: a power of 2 */
-    unsigned next_text;
-    unsigned due; /**< datagrams that wait */
     motion_target_t target[TEXTS];
     kin_t kin;
     pose_t pose[POSES];
@@ -75,132 +70,12 @@ static double between(bench_t *b, double low, double high)
     return low + (high - low) * chance(b);
 }
 
-/* --- Devices that do nothing --- */
-
-static hv_status_t take_text(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
-{
-    bench_t *b = ctx;
-    if (b->due == 0) {
-        return HV_ERR_AGAIN;
-    }
-    const unsigned i = b->next_text++ % b->texts;
-    b->due--;
-    *length = b->length[i] < capacity ? b->length[i] : capacity;
-    memcpy(buffer, b->text[i], *length);
-    *from = (hal_udp_peer_t){.port = 9};
-    return HV_OK;
-}
-
-static hv_status_t poll_drives(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
-{
-    const bench_t *b = ctx;
-    for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        feedback[i] = (drive_feedback_t){.state = DRIVE_ENABLED,
-                                         .is_homed = true,
-                                         .has_actual = true,
-                                         .actual_mm_q32 = b->setpoint_q32[i],
-                                         .actual_us = now_us};
-    }
-    return HV_OK;
-}
-
-static hv_status_t send_drives(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
-{
-    bench_t *b = ctx;
-    (void)now_us;
-    memcpy(b->setpoint_q32, setpoint_q32, sizeof b->setpoint_q32);
-    return HV_OK;
-}
-
-static hv_status_t request_drives(void *ctx, drives_request_t request)
-{
-    (void)ctx;
-    (void)request;
-    return HV_OK;
-}
-
-static uint8_t count_drives(void *ctx)
-{
-    (void)ctx;
-    return DRIVES_MAX;
-}
-
-static hv_status_t write_relays(void *ctx, uint16_t mask)
-{
-    (void)ctx;
-    (void)mask;
-    return HV_OK;
-}
-
-static uint8_t count_relays(void *ctx)
-{
-    (void)ctx;
-    return 12;
-}
-
-static hv_status_t read_inputs(void *ctx, uint32_t *levels)
-{
-    (void)ctx;
-    *levels = 0;
-    return HV_OK;
-}
-
-static uint32_t present_inputs(void *ctx)
-{
-    (void)ctx;
-    return 0;
-}
-
-static void write_log(void *ctx, hal_log_level_t level, const char *text)
-{
-    bench_t *b = ctx;
-    b->sum += (uint64_t)level + (uint8_t)text[0];
-}
-
-static uint32_t dropped_log(void *ctx)
-{
-    (void)ctx;
-    return 0;
-}
-
-static gateway_io_t io_of(bench_t *b)
-{
-    static const hal_udp_ops_t k_udp = {.recv = take_text};
-    static const drives_ops_t k_drives = {poll_drives, send_drives, request_drives, count_drives, NULL, NULL};
-    static const hal_relays_ops_t k_relays = {write_relays, NULL, count_relays};
-    static const hal_inputs_ops_t k_inputs = {read_inputs, present_inputs};
-    static const hal_log_ops_t k_log = {write_log, dropped_log};
-    return (gateway_io_t){{&k_udp, b}, {&k_drives, b}, {&k_relays, b}, {&k_inputs, b}, {&k_log, b}};
-}
-
 /* --- Inputs --- */
-
-static void put_text(bench_t *b, unsigned i, const char *text)
-{
-    b->length[i] = strlen(text);
-    memcpy(b->text[i], text, b->length[i] + 1);
-}
-
-/* Poses of a smooth stream, one a frame. */
-static void make_stream_texts(bench_t *b, double rate_hz)
-{
-    static const double k_size[POSE_AXES] = {3, 3, 5, 30, 30, 30};
-    b->texts = TEXTS;
-    for (unsigned n = 0; n < TEXTS; n++) {
-        double v[POSE_AXES];
-        for (unsigned i = 0; i < POSE_AXES; i++) {
-            v[i] = k_size[i] * sin(2 * PI * (0.2 + 0.1 * i) * n / rate_hz);
-        }
-        char text[TEXT_MAX];
-        (void)snprintf(text, sizeof text, "@A6:%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,F0#", v[0], v[1], v[2], v[3], v[4], v[5]);
-        put_text(b, n, text);
-    }
-}
 
 /* Frames of all kinds, each at odds with the one before. */
 static void make_hostile_texts(bench_t *b)
 {
-    b->texts = TEXTS;
+    b->texts.count = TEXTS;
     for (unsigned n = 0; n < TEXTS; n++) {
         double p[POSE_AXES], c[CYLINDERS_MAX];
         for (unsigned i = 0; i < POSE_AXES; i++) {
@@ -229,37 +104,14 @@ static void make_hostile_texts(bench_t *b)
             (void)snprintf(text, sizeof text, "@A6:%.3f,%.3f,%.3f,%.3f,x,%.3f,F0#", p[0], p[1], p[2], p[3], p[5]);
             break;
         }
-        put_text(b, n, text);
+        bench_put_text(&b->texts, n, text);
     }
 }
 
-static void fail(const char *what)
-{
-    fprintf(stderr, "bench_core: %s\n", what);
-    exit(1);
-}
-
-/* Up and engaged, the first pose taken over. */
 static void start_gateway(bench_t *b)
 {
-    const settings_t settings = rig_hexapod();
-    const gateway_io_t io = io_of(b);
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        b->setpoint_q32[i] = q32_from_q16(settings.settled_extension_mm_q16);
-    }
-    if (gateway_init(&b->gateway, &settings, &io) != HV_OK) {
-        fail("the gateway does not start");
-    }
-    gateway_start_settled(&b->gateway);
-    put_text(b, 0, "@A6:0,0,0,0,0,0,0#");
-    b->texts = 1;
-    for (unsigned i = 0; i < RISE_CYCLES; i++) {
-        b->due = i == RISE_CYCLES / 2;
-        gateway_cycle(&b->gateway, b->now_us += settings.cycle_us);
-    }
-    if (b->gateway.snapshot.state != STATE_ENGAGED || !motion_is_at_rest(&b->gateway.motion)) {
-        fail("the gateway is not engaged and at rest");
-    }
+    bench_gateway_start(&b->at);
+    b->at.texts = &b->texts;
 }
 
 static void make_poses(bench_t *b)
@@ -267,7 +119,7 @@ static void make_poses(bench_t *b)
     static const double k_size[POSE_AXES] = {6, 6, 8, 30, 30, 40};
     const settings_t settings = rig_hexapod();
     if (kin_init(&b->kin, &settings.geometry) != HV_OK) {
-        fail("kin_init");
+        bench_fail("kin_init");
     }
     for (unsigned n = 0; n < POSES; n++) {
         for (unsigned i = 0; i < POSE_AXES; i++) {
@@ -277,7 +129,7 @@ static void make_poses(bench_t *b)
             b->guess[n].axis_q32[i] = llround((value + off) * 4294967296.0);
         }
         if (kin_inverse(&b->kin, &b->pose[n], b->extension_mm_q32[n]) != HV_OK) {
-            fail("kin_inverse");
+            bench_fail("kin_inverse");
         }
     }
 }
@@ -290,19 +142,20 @@ static void set_up_rest(bench_t *b)
 static void set_up_stream(bench_t *b)
 {
     start_gateway(b);
-    make_stream_texts(b, 60);
+    bench_make_stream(&b->texts, 60, 3);
 }
 
 /* The same stream for motion alone, and the rotation motor turns too. */
 static void set_up_motion(bench_t *b)
 {
-    static const double k_size[POSE_AXES] = {3, 3, 5, 30, 30, 30};
     start_gateway(b);
     for (unsigned n = 0; n < TEXTS; n++) {
+        double pose[POSE_AXES];
         motion_target_t *target = &b->target[n];
+        bench_stream_pose(n / 60.0, pose);
         *target = (motion_target_t){.space = MOTION_POSE, .has_angle = true};
         for (unsigned i = 0; i < POSE_AXES; i++) {
-            target->value_q32[i] = llround(k_size[i] * sin(2 * PI * (0.2 + 0.1 * i) * n / 60) * 4294967296.0);
+            target->value_q32[i] = llround(pose[i] * 4294967296.0);
         }
         target->angle_deg_q32 = llround(20 * sin(2 * PI * 0.15 * n / 60) * 4294967296.0);
     }
@@ -316,24 +169,24 @@ static void set_up_hostile(bench_t *b)
 
 static void set_up_vendor_frames(bench_t *b)
 {
-    put_text(b, 0, "@A6:5,6,0,5.5,3.0,20,F0#");
-    put_text(b, 1, "@A7:5,6,0,5.5,3.0,20,-30,F0#");
-    b->texts = 2;
+    bench_put_text(&b->texts, 0, "@A6:5,6,0,5.5,3.0,20,F0#");
+    bench_put_text(&b->texts, 1, "@A7:5,6,0,5.5,3.0,20,-30,F0#");
+    b->texts.count = 2;
 }
 
 static void set_up_a6_frames(bench_t *b)
 {
-    make_stream_texts(b, 60);
+    bench_make_stream(&b->texts, 60, 3);
 }
 
 static void set_up_a7_frames(bench_t *b)
 {
-    b->texts = POSES;
+    b->texts.count = POSES;
     for (unsigned n = 0; n < POSES; n++) {
         char text[TEXT_MAX];
         (void)snprintf(text, sizeof text, "@A7:%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,F0#", between(b, -20, 20), between(b, -20, 20),
                        between(b, -20, 20), between(b, -99, 99), between(b, -99, 99), between(b, -99, 99), between(b, -300, 300));
-        put_text(b, n, text);
+        bench_put_text(&b->texts, n, text);
     }
 }
 
@@ -394,7 +247,7 @@ static void await(bench_t *b, drive_state_t state)
         }
     }
     if (!are_all(b, state)) {
-        fail("the drives on CAN do not come up");
+        bench_fail("the drives on CAN do not come up");
     }
 }
 
@@ -419,11 +272,11 @@ static void set_up_can(bench_t *b)
     const uint32_t filters = cia402_filters(&b->can_config, filter);
     if (sim_can_open(&b->master, &b->bus, filter, filters) != HV_OK ||
         cia402_init(&b->can, &b->can_config, sim_can_hal(&b->master)) != HV_OK) {
-        fail("the drives on CAN do not start");
+        bench_fail("the drives on CAN do not start");
     }
     await(b, DRIVE_DISABLED);
     if (drives_request(cia402_hal(&b->can), DRIVES_ENABLE) != HV_OK) {
-        fail("the drives on CAN cannot be enabled");
+        bench_fail("the drives on CAN cannot be enabled");
     }
     await(b, DRIVE_ENABLED);
     reach_period(b);
@@ -441,7 +294,7 @@ static void set_up_can(bench_t *b)
 static void say_as_drives(bench_t *b, const can_frame_t *frame)
 {
     if (hal_can_send(sim_can_hal(&b->drives.node), frame) != HV_OK) {
-        fail("no room for the drives' answers");
+        bench_fail("no room for the drives' answers");
     }
 }
 
@@ -510,53 +363,53 @@ static void run_wire(bench_t *b, unsigned n)
 static void run_rest(bench_t *b, unsigned n)
 {
     (void)n;
-    gateway_cycle(&b->gateway, b->now_us += 1000);
+    gateway_cycle(&b->at.gateway, b->at.now_us += 1000);
 }
 
 static void run_stream(bench_t *b, unsigned n)
 {
-    b->due = n * 60 / 1000 != (n + 1) * 60 / 1000;
-    gateway_cycle(&b->gateway, b->now_us += 1000);
+    bench_gateway_stream_cycle(&b->at, n);
 }
 
 static void run_motion(bench_t *b, unsigned n)
 {
-    motion_t *motion = &b->gateway.motion;
+    motion_t *motion = &b->at.gateway.motion;
     motion_output_t output;
-    b->now_us += 1000;
+    b->at.now_us += 1000;
     if (n * 60 / 1000 != (n + 1) * 60 / 1000) {
-        b->sum += (uint64_t)motion_target(motion, &b->target[b->next_text++ % TEXTS], b->now_us);
+        b->sum += (uint64_t)motion_target(motion, &b->target[b->at.next_text++ % TEXTS], b->at.now_us);
     }
-    motion_step(motion, b->now_us, &output);
+    motion_step(motion, b->at.now_us, &output);
     b->sum += (uint64_t)output.extension_mm_q32[0];
 }
 
 /* A frame of another kind every 7 cycles, a hold and its end every 256. */
 static void run_hostile(bench_t *b, unsigned n)
 {
-    b->due = n % 7 == 0;
+    b->at.due = n % 7 == 0;
     if (n % 128 == 0) {
-        (void)!gateway_request(&b->gateway, n % 256 == 0 ? EVENT_HOLD : EVENT_RESUME, b->now_us);
+        (void)!gateway_request(&b->at.gateway, n % 256 == 0 ? EVENT_HOLD : EVENT_RESUME, b->at.now_us);
     }
-    gateway_cycle(&b->gateway, b->now_us += 1000);
+    gateway_cycle(&b->at.gateway, b->at.now_us += 1000);
 }
 
 static void run_flood(bench_t *b, unsigned n)
 {
     (void)n;
-    b->due = FLOOD;
-    gateway_cycle(&b->gateway, b->now_us += 1000);
+    b->at.due = FLOOD;
+    gateway_cycle(&b->at.gateway, b->at.now_us += 1000);
 }
 
 static void run_frame(bench_t *b, unsigned n)
 {
-    const unsigned i = n % b->texts;
+    const unsigned i = n % b->texts.count;
     frame_scanner_t scanner;
     frame_t frame;
     frame_reject_t why;
     size_t position = 0;
     frame_scanner_init(&scanner, FRAME_V3);
-    while (frame_next(&scanner, (const uint8_t *)b->text[i], b->length[i], &position, &frame, &why) == FRAME_EVENT_FRAME) {
+    while (frame_next(&scanner, (const uint8_t *)b->texts.text[i], b->texts.length[i], &position, &frame, &why) ==
+           FRAME_EVENT_FRAME) {
         b->sum += (uint64_t)(int64_t)frame.value_q16[5];
     }
 }
@@ -645,7 +498,7 @@ static void time_singles(const subject_t *subject, bench_t *b, unsigned first, u
 {
     double *took = malloc(count * sizeof *took);
     if (took == NULL) {
-        fail("no memory");
+        bench_fail("no memory");
     }
     const double cost = clock_cost_ns();
     for (unsigned n = 0; n < count; n++) {
@@ -665,7 +518,7 @@ static void print_frames(const subject_t *subject, const bench_t *b, unsigned ru
         printf("frames %.3f\n", (double)b->bus.frames / runs);
     }
     if (subject->run == run_can && !are_all(b, DRIVE_ENABLED)) {
-        fail("the drives on CAN have been lost");
+        bench_fail("the drives on CAN have been lost");
     }
 }
 
@@ -688,7 +541,7 @@ static const subject_t *find_subject(const char *name)
             return &k_subjects[i];
         }
     }
-    fail("no such subject");
+    bench_fail("no such subject");
     return NULL;
 }
 
@@ -703,7 +556,7 @@ int main(int argc, char **argv)
     const long count = argc == 3 || argc == 4 ? strtol(argv[2], NULL, 10) : 0;
     const long rounds = argc == 4 ? strtol(argv[3], NULL, 10) : 0;
     if (count < 1 || count > 1000000 || rounds < 0 || rounds > 1000) {
-        fail("usage: bench_core [NAME COUNT [ROUNDS]]");
+        bench_fail("usage: bench_core [NAME COUNT [ROUNDS]]");
     }
     const subject_t *subject = find_subject(argv[1]);
     s_bench.random = 88172645463325252u;

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """test_plot_bench.py - tools/plot and tools/bench: wrong arguments and files are refused, and what they compute is right.
 
-    test_plot_bench.py --heaved PROGRAM --bench-core PROGRAM
+    test_plot_bench.py --heaved PROGRAM --bench-core PROGRAM --bench-peers PROGRAM
 
 Needs neither matplotlib nor Ruckig; what matplotlib draws is looked at where it is installed.
 """
@@ -24,6 +24,7 @@ TOP = HERE.parents[1]
 sys.path[:0] = [str(TOP / "tools/lib"), str(HERE)]
 import bench_analysis as analysis  # noqa: E402  the path above has to be set first
 import bench_cost  # noqa: E402
+import bench_peers  # noqa: E402
 import bench_signal as signals  # noqa: E402
 from bench_rivals import two_limits  # noqa: E402
 from frame_dots import dots_of  # noqa: E402
@@ -190,7 +191,12 @@ def check_dots(suite):
 # ---- tools/bench ----
 def check_bench_arguments(suite):
     refusals = {
-        "no subcommand": ((), 2, "motion|cost"),
+        "an option of no subcommand": (("--speed",), 2, "--speed"),
+        "a part that is none": (("--only", "inverse,backward"), 2, "'backward'", "parse-document"),
+        "too few rounds": (("peers", "--rounds", "4"), 2, "from 5"),
+        "an older result that is not there": (("--compare", "nowhere.json"), 1, "nowhere.json"),
+        "an older result that is another file": (("peers", "--compare", write("other.json", '{"rates": []}')), 1, "other.json", "tools/bench peers --json"),
+        "an older result that is no JSON": (("peers", "--compare", write("bad.json", "ratio")), 1, "bad.json"),
         "an unknown one": (("speed",), 2, "speed"),
         "a rate that is no number": (("motion", "--rates", "60,fast"), 2, "60,fast"),
         "a rate out of range": (("motion", "--rates", "60,1"), 2, "from 10 to 200"),
@@ -337,6 +343,79 @@ def check_rival(suite):
             assert beyond < 0.002, f"{way} mm: {beyond} mm beyond"
 
 
+def times_of(own, peer, rounds=101):
+    """Rounds of two candidates: their time with its noise in both, as on a machine whose speed drifts."""
+    chance = random.Random(3).random
+    drift = [1 + 0.5 * chance() for _ in range(rounds)]
+    return {"heave": [own * part for part in drift], "sscanf": [peer * part * (1 + 0.02 * chance()) for part in drift]}
+
+
+def subject_of(times, stolen=0.0, instructions=100):
+    row = {"stolen": stolen, "candidates": bench_peers.judge(list(times), {"sscanf": {"off": 3, "of": 70}}, times)}
+    for candidate in row["candidates"].values():
+        candidate["instructions"] = instructions
+    return row
+
+
+def result_of(times, **options):
+    return {"date": "2026-11-01 10:00", "processor": "a processor", "subjects": {"parse-3": subject_of(times, **options)}}
+
+
+def check_peers(suite):
+    with suite.case("bench peers judges by the ratios of rounds: a machine whose speed drifts does not matter"):
+        row = subject_of(times_of(100, 810))
+        ratio = row["candidates"]["sscanf"]["ratio"]
+        expect_near(ratio["median"], 8.1 * 1.01, 0.05, "ratio")
+        assert bench_peers.spread(row["candidates"]["heave"]["ns"]) > 0.15, "the times themselves drift"
+        lines = bench_peers.subject_lines("parse-3", row)
+        assert lines[1].split()[:2] == [f"{ratio['median']:.2f}", "x"] and "goal 8: met" in lines[1] and "3 of 70 values not the nearest" in lines[1], lines
+        assert "goal 8: missed" in bench_peers.subject_lines("parse-3", subject_of(times_of(100, 700)))[1]
+    with suite.case("bench peers gives no figure where the spread is too wide, and says why"):
+        times = times_of(100, 800)
+        times["sscanf"] = [value * (1 if i % 2 else 1.3) for i, value in enumerate(times["sscanf"])]
+        line = bench_peers.subject_lines("parse-3", subject_of(times))[1]
+        assert "spread too wide (quartiles" in line and "goal" not in line and "ns" not in line.split(";")[0].split("instructions")[0], line
+        line = bench_peers.subject_lines("parse-3", subject_of(times_of(100, 800), stolen=0.06))[1]
+        assert "6% of the CPU stolen" in line and "goal" not in line, line
+        assert bench_peers.doubt({"q25": 93.0, "median": 100.0, "q75": 107.0}, 0.05) is None
+    with suite.case("bench peers tells the time of platforms and how many fit, or that it cannot"):
+        steady = {f"of-{count}": [2000.0 * count + i for i in range(20)] for count in (1, 2, 64)}
+        lines = bench_peers.platform_lines({"stolen": 0, "candidates": bench_peers.judge(list(steady), {}, steady)})
+        assert "goal below 5000 ns: met" in lines[1] and lines[-1].split()[0] == "500", lines
+        steady["of-64"] = [100000.0 * (1 + i % 2) for i in range(20)]
+        lines = bench_peers.platform_lines({"stolen": 0, "candidates": bench_peers.judge(list(steady), {}, steady)})
+        assert "no figure" in lines[-1] and "fit" not in " ".join(lines), lines
+    with suite.case("bench --compare tells changes beyond the spread from others"):
+        old = result_of(times_of(100, 800))
+        text = "\n".join(bench_peers.comparison(old, result_of(times_of(80, 800))))
+        assert "x before" in text and "(+25%, beyond the spread)" in text and "as many instructions" in text, text
+        assert "within the spread" in "\n".join(bench_peers.comparison(old, result_of(times_of(100, 801))))
+        assert "too wide to compare" in "\n".join(bench_peers.comparison(old, result_of(times_of(80, 800), stolen=0.5)))
+        assert "100 instructions before, 90 now (-10.0%)" in "\n".join(bench_peers.comparison(old, result_of(times_of(80, 800), instructions=90)))
+        del old["subjects"]["parse-3"]["candidates"]["sscanf"]
+        assert "sscanf: not in the older result" in "\n".join(bench_peers.comparison(old, result_of(times_of(80, 800))))
+    with suite.case("what was stolen counts against all time"):
+        expect_near(bench_peers.stolen_share((10, 1000), (15, 1100)), 0.05, 1e-12, "share")
+        assert bench_peers.stolen_share((0, 0), (0, 0)) == 0
+
+
+def check_peers_program(suite, program):
+    with suite.case("bench peers compares all results before it times them"):
+        if not program:
+            raise tap.Skip("no --bench-peers")
+        subjects = bench_peers.listed(program)
+        assert list(subjects) == list(bench_peers.SUBJECTS), subjects
+        for name, candidates in subjects.items():
+            if name != bench_peers.PLATFORMS:  # takes long to come up
+                row = bench_peers.measured(program, name, candidates, 5, False)
+                assert all(figures["ns"]["median"] > 0 for figures in row["candidates"].values()), row
+        result = run("bench", "--program", program, "--rounds", 5, "--only", "inverse", "--json")
+        figures = json.loads(result.stdout)
+        assert list(figures["subjects"]) == ["inverse"] and "double" in figures["subjects"]["inverse"]["candidates"], figures
+        compared = run("bench", "--program", program, "--rounds", 5, "--only", "inverse", "--compare", write("figures.json", result.stdout))
+        assert compared.returncode == 0 and "against 20" in compared.stdout, compared.stderr
+
+
 def check_programs(suite, heaved, bench_core):
     with suite.case("bench motion judges heaved"):
         if not heaved:
@@ -379,11 +458,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--heaved")
     parser.add_argument("--bench-core")
+    parser.add_argument("--bench-peers")
     arguments = parser.parse_args()
     suite = tap.Suite()
-    for check in (check_plot_arguments, check_window, check_dots, check_bench_arguments, check_analysis, check_signals, check_rival):
+    for check in (check_plot_arguments, check_window, check_dots, check_bench_arguments, check_analysis, check_signals, check_rival, check_peers):
         check(suite)
     check_programs(suite, arguments.heaved, arguments.bench_core)
+    check_peers_program(suite, arguments.bench_peers)
     return suite.done()
 
 

@@ -16,12 +16,19 @@ def _run(*command):
         raise BuildError(f"{command[0]} failed:\n{result.stdout[-3000:]}")
 
 
-def build(folder, target):
-    """Builds a program and returns its path; what the machine lacks is installed as tools/demo does it."""
+def _lacks_cxx(folder):
+    """Whether the folder was set up while there was no C++ compiler, which CMake remembers."""
+    return "CMAKE_CXX_COMPILER:" in (cache := (folder / "CMakeCache.txt").read_text(encoding="utf-8")) and "CMAKE_CXX_COMPILER-NOTFOUND" in cache
+
+
+def build(folder, target, *options):
+    """Builds a program and returns its path; what the machine lacks is installed as tools/demo does it. Options are CMake's."""
     needs = ". tools/lib/deps.sh; deps_build; deps_install"
     if subprocess.run(["bash", "-c", needs, "bench"], cwd=TOP, stdin=subprocess.DEVNULL, check=False).returncode != 0:
         raise BuildError("not all that a build needs is installed")
     if not (folder / "build.ninja").exists():
-        _run("cmake", "-S", str(TOP), "-B", str(folder), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DHEAVE_BENCH=ON")
+        _run("cmake", "-S", str(TOP), "-B", str(folder), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DHEAVE_BENCH=ON", *options)
+    elif options:
+        _run("cmake", str(folder), *options, *(["-U", "CMAKE_CXX_COMPILER"] if _lacks_cxx(folder) else []))
     _run("cmake", "--build", str(folder), "--target", target)
-    return folder / {"heaved": "src/app/heaved", "bench_core": "tests/bench/bench_core", "bench_modbus": "tests/bench/bench_modbus"}[target]
+    return folder / {"heaved": "src/app/heaved"}.get(target, f"tests/bench/{target}")

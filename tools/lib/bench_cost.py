@@ -34,7 +34,7 @@ class CostError(Exception):
     """The program could not be run."""
 
 
-def _output(*command):
+def output_of(*command):
     result = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
     if result.returncode != 0:
         raise CostError(f"{Path(command[0]).name} ended with status {result.returncode}: {result.stderr.strip()[-300:]}")
@@ -48,20 +48,20 @@ def percentile(values, share):
 
 
 def timed(program, name, runs, rounds):
-    lines = _output(program, name, runs, rounds).split("\n")
+    lines = output_of(program, name, runs, rounds).split("\n")
     values = [float(line) for line in lines if line[:1].isdigit()]
     words = {line.split()[0]: [float(part) for part in line.split()[1:]] for line in lines if line[:1].isalpha()}
     return {"rounds": rounds, "runs_per_round": runs, "ns_median": statistics.median(values), "ns_min": min(values), "ns_p95": percentile(values, 95),
             "single_ns": dict(zip(("p50", "p99", "p999"), words["single"])), **({"frames": words["frames"][0]} if "frames" in words else {})}
 
 
-def instructions(program, name, runs):
+def instructions_of(program, name, runs, *others):
     """Per run, as callgrind counts them; None without valgrind."""
     if not shutil.which("valgrind"):
         return None
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "callgrind.out"
-        _output("valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", "--toggle-collect=bench_region*", program, name, runs)
+        output_of("valgrind", "--tool=callgrind", f"--callgrind-out-file={out}", "--toggle-collect=bench_region*", program, name, runs, *others)
         match = SUMMARY.search(out.read_text(encoding="utf-8", errors="replace"))
     if not match or not int(match[1]):
         raise CostError("callgrind's output holds no count")
@@ -96,7 +96,7 @@ def run(program, rounds, as_json, say, out=sys.stdout):
     result = {"processor": processor(), "subjects": {}}
     for name, (runs, counted, text) in SUBJECTS.items():
         row = timed(program, name, runs, rounds)
-        row["instructions"] = instructions(program, name, counted)
+        row["instructions"] = instructions_of(program, name, counted)
         row["instructions_runs"] = counted if has_valgrind else 0
         result["subjects"][name] = row
         if not as_json:

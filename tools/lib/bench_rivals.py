@@ -4,10 +4,13 @@ import json
 import math
 import os
 import subprocess
+import tarfile
+import tempfile
 import venv
 from pathlib import Path
 
 PACKAGES = ("ruckig",)
+SOURCE = "ruckig-0.19.4"
 
 
 def two_limits(targets, speed, accel, cycle_s):
@@ -30,11 +33,36 @@ class NoRuckig(Exception):
     """Why there is no Ruckig to compare with."""
 
 
+def cache():
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "heave"
+
+
+def ruckig_source(say):
+    """The folder of Ruckig's C++ source, as its package on PyPI has it; fetched once into the user's cache."""
+    folder = cache() / SOURCE
+    if (folder / "include" / "ruckig" / "ruckig.hpp").exists():
+        return folder
+    python = Ruckig(say).python
+    say(f"fetching {SOURCE} from PyPI into {folder}")
+    with tempfile.TemporaryDirectory(dir=cache()) as scratch:
+        command = [str(python), "-m", "pip", "download", "-q", "--disable-pip-version-check", "--no-deps", "--no-binary", "ruckig", "-d", scratch,
+                   SOURCE.replace("-", "==")]
+        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        archive = Path(scratch) / f"{SOURCE}.tar.gz"
+        if not archive.exists():
+            raise NoRuckig(f"pip could not fetch its source: {(result.stderr.strip().splitlines() or ['no reason given'])[-1]}")
+        with tarfile.open(archive) as tar:
+            tar.extractall(scratch, members=[member for member in tar.getmembers() if member.isfile() and member.name.startswith(f"{SOURCE}/")
+                                             and ".." not in member.name])
+        (Path(scratch) / SOURCE).rename(folder)
+    return folder
+
+
 class Ruckig:
     """Ruckig, one axis, given each new target as it comes, to be reached at rest; runs in a virtual environment."""
 
     def __init__(self, say):
-        self.folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "heave" / "bench-venv"
+        self.folder = cache() / "bench-venv"
         self.python = self.folder / "bin" / "python"
         if not self._answers():
             self._install(say)
