@@ -26,6 +26,7 @@ typedef struct {
 typedef struct {
     uint32_t factor; /**< 0 = everything passes */
     q32_t accel_q32[POSE_AXES];
+    q32_t grain_q32[POSE_AXES];
     unsigned settled; /**< samples in a row since the start or a long gap, up to what a judgement needs */
     uint32_t period_us;
     uint64_t last_us; /**< arrival of the newest sample that passed */
@@ -49,6 +50,9 @@ void gate_set_factor(gate_t *self, uint32_t factor);
 
 /** Forgets the stream, and a sample that is withheld. */
 void gate_reset(gate_t *self);
+
+/** Tells what an axis' values are multiples of, 0 = of nothing: a step of that much is no spike. Kept by gate_reset(). */
+void gate_set_grain(gate_t *self, unsigned axis, q32_t grain_q32);
 
 /** Judges a sample. Bounded time.
  *  @param now_us    arrival, never decreasing

@@ -6,14 +6,15 @@
  * Delay: a sample is met 2 periods (smooth) or 0.9 (fast) plus a margin after its time. The margin is 2 ms, more if the samples
  * often come later than that, at most the larger of 2 ms and half a period. While the rate changes or the network holds samples
  * back the delay may grow by 2 periods more; then it falls again by 6 % of the time that passes.
- * Losses: where a point is missing when the curve needs it, the motion goes on, by the last step and its bend (not a jump: at
- * most 4 x the larger of the two steps before), then ever more slowly, no further than the axis takes to stop
- * (stream_set_stop()), or 36 ms (fast: and its lead). When samples are back, or after 150 ms without, the curve comes back to
- * the samples, or to the last one, softly: position and velocity of the control points go on as they were. So an ended stream
- * rests exactly on its last sample, within 2 s, or 24 periods of a slow one. A stream that is known may be away for a second and
- * goes on; a new rate gives a new grid, on which the curve goes on.
- * Hints: a sender that states its period may be slower, and tells from its second sample on what is late and what is lost. The
- * margin is then an eighth of the period at least, as a guess at so slow a stream is poor.
+ * Coarse values, whose steps ask for more than the axes can do (stream_set_stop()), are smoothed: a mean of up to 16 points,
+ * taken thrice, 1.5 periods later for each point of it but the first. Losses: where a point is missing when the curve needs it,
+ * the motion goes on, by the last step and its bend (not a jump: at most 4 x the larger of the two steps before), then ever more
+ * slowly, no further than the axis takes to stop (stream_set_stop()), or 36 ms (fast: and its lead). When samples are back, or
+ * after 150 ms without, the curve comes back to the samples, or to the last one, softly: position and velocity of the control
+ * points go on as they were. So an ended stream rests exactly on its last sample, within 2 s, or 24 periods of a slow one. A
+ * stream that is known may be away for a second and goes on; a new rate gives a new grid, on which the curve goes on. Hints: a
+ * sender that states its period may be slower, and tells from its second sample on what is late and what is lost. The margin is
+ * then an eighth of the period at least, as a guess at so slow a stream is poor.
  */
 #ifndef HEAVE_STREAM_H
 #define HEAVE_STREAM_H
@@ -33,8 +34,10 @@ typedef enum {
 #define STREAM_HINT_MAX_US   500000u /**< slowest with a hint: 2 Hz */
 
 enum {
-    STREAM_GAPS = 24,  /**< intervals the period is first found from */
-    STREAM_POINTS = 16 /**< ring of points, a power of 2 */
+    STREAM_GAPS = 24,       /**< intervals the period is first found from */
+    STREAM_POINTS = 64,     /**< ring of points, a power of 2 */
+    STREAM_WINDOW_MAX = 16, /**< points in the longest mean of coarse values; the ring has room for three of them */
+    STREAM_WEIGHTS = 3 * STREAM_WINDOW_MAX - 2 /**< points that a control point is made from then */
 };
 
 /** The sender's time line; members are private to src/motion. */
@@ -66,6 +69,15 @@ typedef struct {
     int32_t reach_q16; /**< how far it goes, in periods */
 } stream_lead_t;
 
+/** What a sender's values are multiples of, on one axis; private to src/motion. */
+typedef struct {
+    q32_t grain_q32; /**< 0: nothing, or nothing that could be told from a smooth motion */
+    q32_t found_q32; /**< of the steps since the watch began, 0 = there were none */
+    q32_t step_q32;  /**< the newest step, of one period */
+    bool is_up;      /**< the newest change of the step was upwards */
+    uint8_t turns;   /**< changes of the step, up and down in turn, since the watch began */
+} stream_grain_t;
+
 /** The points of the curve, by index modulo the ring; members are private to src/motion. */
 typedef struct {
     q32_t point_q32[STREAM_POINTS][AXES_MAX]; /**< what is known best of each index: a sample, or the guess committed */
@@ -74,11 +86,15 @@ typedef struct {
     q32_t off_q32[AXES_MAX][3];               /**< control less point at head, and how that changes per period and period^2 */
     stream_stop_t stop[AXES_MAX];
     stream_lead_t lead[AXES_MAX];
-    int32_t guesses;           /**< since the newest sample */
-    int64_t period_cycles_q16; /**< cycles in a period */
-    int64_t lead_q32;          /**< of the step of the last period, that a control point is ahead of its point */
-    int64_t bend_q32;          /**< of the step's change, likewise */
-    int32_t reach_min_q16;     /**< periods that a motion is kept up where samples are missing */
+    stream_grain_t grain[AXES_MAX];
+    uint32_t watched;               /**< samples since the watch for a grain began */
+    int32_t window;                 /**< each control point is a mean of so many points, thrice; 1: the point */
+    int32_t weight[STREAM_WEIGHTS]; /**< of the points in that mean, the newest first */
+    int32_t guesses;                /**< since the newest sample */
+    int64_t period_cycles_q16;      /**< cycles in a period */
+    int64_t lead_q32;               /**< of the step of the last period, that a control point is ahead of its point */
+    int64_t bend_q32;               /**< of the step's change, likewise */
+    int32_t reach_min_q16;          /**< periods that a motion is kept up where samples are missing */
     int32_t reach_max_q16;
     bool is_off;              /**< on some axis */
     int64_t grip_q32;         /**< how firmly off is taken back, per period */

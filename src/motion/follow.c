@@ -153,6 +153,9 @@ static void change_space(motion_t *self, motion_space_t space)
 static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
     const uint32_t period_us = stream_is_live(&self->stream, now_us) ? stream_period_us(&self->stream) : 0;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        gate_set_grain(&self->gate, i, self->stream.curve.grain[i].grain_q32);
+    }
     if (target->space != MOTION_POSE || gate_passes(&self->gate, now_us, period_us, target->value_q32)) {
         return false;
     }

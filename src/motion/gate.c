@@ -92,7 +92,7 @@ static unsigned beyond_axis(const gate_t *self, int64_t periods, const q32_t val
     unsigned worst = POSE_AXES;
     int64_t worst_share = 0;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        const q32_t allowed_q32 = allowance(self, i, periods);
+        const q32_t allowed_q32 = allowance(self, i, periods) + self->grain_q32[i];
         const q32_t off_q32 = off_course(self, i, periods, value_q32[i]);
         const int64_t share = off_q32 / (allowed_q32 / 256 + 1);
         if (off_q32 > allowed_q32 && share >= worst_share) {
@@ -129,6 +129,12 @@ static void settle_withheld(gate_t *self, int64_t periods, const q32_t value_q32
         self->spikes++;
         self->spike = self->withheld;
     }
+}
+
+void gate_set_grain(gate_t *self, unsigned axis, q32_t grain_q32)
+{
+    HV_ASSERT(axis < POSE_AXES);
+    self->grain_q32[axis] = grain_q32;
 }
 
 bool gate_passes(gate_t *self, uint64_t now_us, uint32_t period_us, const q32_t value_q32[POSE_AXES])

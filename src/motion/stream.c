@@ -249,6 +249,7 @@ uint32_t stream_delay_us(const stream_t *self)
     const int64_t period = self->clock.period_us_q16;
     const int64_t spline =
         self->style == STREAM_FAST ? period * 3 / 2 - fx_mul_shift(period, STREAM_FAST_LEAD_Q32, 32) : period * 2;
+    const int64_t mean = (self->curve.window - 1) * period * 3 / 2;
     const int64_t behind = fx_mul_shift(period, self->error_q32, 32);
-    return (uint32_t)(fx_clamp(spline + self->clock.margin_us_q16 + behind, 0, INT64_MAX) / STREAM_US_Q16);
+    return (uint32_t)(fx_clamp(spline + mean + self->clock.margin_us_q16 + behind, 0, INT64_MAX) / STREAM_US_Q16);
 }

@@ -8,10 +8,15 @@
  */
 #include "stream_curve.h"
 
+#include "stream_grain.h"
+
 enum {
     AHEAD_MAX = 8,     /* samples kept that are not committed */
     SHIFT_GUESSES = 4, /* a shifted time line is come over to as softly as after so many guesses */
     BEHIND_MAX = 4,    /* points before head that corrections and guesses look back at */
+    COARSE_ACC = 4,    /* of the accelerations that coarse steps can make, half is to be left to the motion ... */
+    COARSE_JERK = 6,   /* ... and the ramps follow poorly where the jerk is often used up */
+    COARSE_FAST = 2,   /* control points that are led swing so many times further */
 };
 
 #define REACH_MIN_US 36000  /* a motion is kept up for that long; longer only as far as the axis takes to stop ... */
@@ -45,7 +50,7 @@ void stream_curve_start(stream_curve_t *self, unsigned axes, const q32_t *sample
     for (unsigned axis = 0; axis < axes; axis++) {
         stop[axis] = self->stop[axis];
     }
-    *self = (stream_curve_t){.axes = axes};
+    *self = (stream_curve_t){.axes = axes, .window = 1};
     for (unsigned axis = 0; axis < axes; axis++) {
         self->stop[axis] = stop[axis];
     }
@@ -56,17 +61,6 @@ void stream_curve_start(stream_curve_t *self, unsigned axes, const q32_t *sample
     for (unsigned i = 0; i < 4; i++) {
         copy_point(self, self->control_q32[i], sample_q32);
     }
-}
-
-void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us)
-{
-    self->lead_q32 = style == STREAM_FAST ? STREAM_FAST_LEAD_Q32 : 0;
-    self->bend_q32 = style == STREAM_FAST ? STREAM_FAST_BEND_Q32 : 0;
-    self->period_cycles_q16 = (int64_t)period_us * Q16_ONE / cycle_us;
-    self->reach_min_q16 = (int32_t)((int64_t)REACH_MIN_US * Q16_ONE / period_us);
-    self->reach_max_q16 = (int32_t)((int64_t)REACH_MAX_US * Q16_ONE / period_us);
-    self->softest_q32 = fx_clamp((int64_t)period_us * Q32_ONE / OFF_US, Q32_ONE / 32, Q32_ONE / 2);
-    self->patience = (int32_t)(PATIENCE_US / period_us) + 3;
 }
 
 /* Periods that a motion may be kept up so that it does not go further than the axis takes to stop: of v = step / period, the time
@@ -91,14 +85,31 @@ static int32_t reach(const stream_curve_t *self, unsigned axis, q32_t step_q32)
     return (int32_t)fx_clamp(periods_q16, self->reach_min_q16, self->reach_max_q16);
 }
 
+/* The point of that index; of coarse values, a mean of the points up to it. */
+static q32_t mean_point(const stream_curve_t *self, unsigned axis, uint32_t index)
+{
+    const int32_t window = self->window;
+    int64_t sum_q32 = 0;
+    if (window == 1) {
+        return self->point_q32[slot(index)][axis];
+    }
+    for (int32_t back = 0; back < 3 * window - 2; back++) {
+        sum_q32 += self->weight[back] * self->point_q32[slot(index - (uint32_t)back)][axis];
+    }
+    return sum_q32 / (window * window * window);
+}
+
 /* Where a control point for the point of that index belongs: on the point, or led ahead of it. Forward in time by L periods is
  * 1 + L D + ..., D the backward difference; the share of D^2 also undoes some of what the quadratic spline smooths away. */
 static q32_t led_point(const stream_curve_t *self, unsigned axis, uint32_t index)
 {
-    const q32_t here_q32 = self->point_q32[slot(index)][axis];
-    const q32_t before_q32 = self->point_q32[slot(index - 1)][axis];
+    const q32_t here_q32 = mean_point(self, axis, index);
+    if (self->lead_q32 == 0) {
+        return here_q32;
+    }
+    const q32_t before_q32 = mean_point(self, axis, index - 1);
     const q32_t step_q32 = here_q32 - before_q32;
-    const q32_t bend_q32 = step_q32 - (before_q32 - self->point_q32[slot(index - 2)][axis]);
+    const q32_t bend_q32 = step_q32 - (before_q32 - mean_point(self, axis, index - 2));
     return here_q32 + fx_mul_shift(step_q32, self->lead_q32, 32) + fx_mul_shift(bend_q32, self->bend_q32, 32);
 }
 
@@ -136,6 +147,73 @@ static void keep_going(stream_curve_t *self, q32_t was_q32[3][AXES_MAX], int32_t
         self->off_q32[axis][0] += here_q32;
         self->off_q32[axis][1] += fx_mul_shift(change_q32, share_q32, 32);
     }
+}
+
+/* How many points a control point is to be the mean of, thrice. Values in steps of q are off by up to q / 2. Of that a mean of m
+ * points makes second differences of up to 2 q / m^2 and third ones of up to 4 q / m^3, to be held against what the axis can do.
+ */
+static int32_t window_of_axis(const stream_curve_t *self, unsigned axis)
+{
+    const stream_stop_t *stop = &self->stop[axis];
+    const int64_t n_q16 = self->period_cycles_q16;
+    const q32_t grain_q32 = self->grain[axis].grain_q32;
+    if (grain_q32 == 0 || stop->jerk_per_cycle3_q32 <= 0) {
+        return 1;
+    }
+    const q32_t acc_q32 = fx_mul_shift(fx_mul_shift(stop->acc_per_cycle2_q32, n_q16, 16), n_q16, 16);
+    const q32_t jerk_q32 = fx_mul_shift(fx_mul_shift(fx_mul_shift(stop->jerk_per_cycle3_q32, n_q16, 16), n_q16, 16), n_q16, 16);
+    const int64_t one_q16 = self->lead_q32 == 0 ? Q16_ONE : COARSE_FAST * Q16_ONE;
+    const int64_t by_acc_q16 = fx_mul_div(grain_q32, COARSE_ACC * one_q16, acc_q32);
+    const int64_t by_jerk_q16 = fx_mul_div(grain_q32, COARSE_JERK * one_q16, jerk_q32);
+    int64_t m = 1;
+    while (m <= STREAM_WINDOW_MAX && (m * m * Q16_ONE < by_acc_q16 || m * m * m * Q16_ONE < by_jerk_q16)) {
+        m++;
+    }
+    return m <= STREAM_WINDOW_MAX ? (int32_t)m : 1; /* half a mean is worse than none */
+}
+
+/* The same for all axes, so that they are late together. */
+static int32_t find_window(const stream_curve_t *self)
+{
+    int32_t window = 1;
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        const int32_t of_axis = window_of_axis(self, axis);
+        window = of_axis > window ? of_axis : window;
+    }
+    return window;
+}
+
+static int32_t pairs(int32_t n)
+{
+    return n > 1 ? n * (n - 1) / 2 : 0;
+}
+
+/* Other control points belong to the same samples: the curve comes over to them softly. A window is kept where one less would do:
+ * no to and fro with the period. */
+static void set_window(stream_curve_t *self, int32_t window)
+{
+    q32_t was_q32[3][AXES_MAX];
+    if (window == self->window || (window > 1 && window + 1 == self->window)) {
+        return;
+    }
+    points_at_head(self, was_q32);
+    self->window = window;
+    for (int32_t k = 0; k < 3 * window - 2; k++) { /* ways to write k as a sum of three numbers below the window */
+        self->weight[k] = pairs(k + 2) - 3 * pairs(k + 2 - window) + 3 * pairs(k + 2 - 2 * window);
+    }
+    keep_going(self, was_q32, SHIFT_GUESSES);
+}
+
+void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us)
+{
+    self->lead_q32 = style == STREAM_FAST ? STREAM_FAST_LEAD_Q32 : 0;
+    self->bend_q32 = style == STREAM_FAST ? STREAM_FAST_BEND_Q32 : 0;
+    self->period_cycles_q16 = (int64_t)period_us * Q16_ONE / cycle_us;
+    self->reach_min_q16 = (int32_t)((int64_t)REACH_MIN_US * Q16_ONE / period_us);
+    self->reach_max_q16 = (int32_t)((int64_t)REACH_MAX_US * Q16_ONE / period_us);
+    self->softest_q32 = fx_clamp((int64_t)period_us * Q32_ONE / OFF_US, Q32_ONE / 32, Q32_ONE / 2);
+    self->patience = (int32_t)(PATIENCE_US / period_us) + 3;
+    set_window(self, find_window(self));
 }
 
 /* Where the motion of the last samples goes in one period. A jump is not taken for a motion: one just made would go on (hence at
@@ -230,8 +308,11 @@ void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sa
     q32_t was_q32[3][AXES_MAX];
     q32_t before_q32[AXES_MAX];
     const int32_t guessed = -self->ahead;
-    points_at_head(self, was_q32);
+    if (guessed > 0) {
+        points_at_head(self, was_q32);
+    }
     copy_point(self, before_q32, self->last_q32);
+    stream_grain_watch(self, periods, sample_q32);
     copy_point(self, self->last_q32, sample_q32);
     const int32_t ahead = self->ahead + (int32_t)periods;
     const int32_t kept = (int32_t)fx_clamp(ahead, -BEHIND_MAX, AHEAD_MAX);
@@ -265,6 +346,7 @@ q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *sample_q32, u
         const q32_t step = self->last_q32[axis] - before_q32;
         const q32_t bend = step - (before_q32 - self->point_q32[slot(newest(self) - 2)][axis]);
         misfit_q32 += fx_abs(sample_q32[axis] - self->last_q32[axis] - n * step - n * (n + 1) / 2 * bend);
+        misfit_q32 += 2 * self->grain[axis].grain_q32; /* what rounding may make of it */
         *step_q32 += fx_abs(step);
     }
     return misfit_q32;
@@ -294,15 +376,19 @@ static void interpolate(stream_curve_t *self, q32_t *point_q32)
     }
 }
 
-/* No sample has come for so long that none is expected: the curve goes back to the last one. */
+/* No sample has come for so long that none is expected: as if the last one had come again and again, the curve goes back to it.
+ */
 static void give_up(stream_curve_t *self)
 {
-    const q32_t *const point_q32 = self->point_q32[slot(self->head)];
+    q32_t was_q32[3][AXES_MAX];
+    points_at_head(self, was_q32);
+    for (int32_t back = 0; back < self->patience && back < STREAM_POINTS; back++) {
+        copy_point(self, self->point_q32[slot(self->head - (uint32_t)back)], self->last_q32);
+    }
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        self->off_q32[axis][0] += point_q32[axis] - self->last_q32[axis];
         self->lead[axis] = (stream_lead_t){.reach_q16 = 0};
     }
-    (void)soften(self, self->patience);
+    keep_going(self, was_q32, self->patience);
 }
 
 /* Settles the point after head. */
@@ -406,7 +492,7 @@ void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const ramp_
     self->ahead = 0;
     for (unsigned axis = 0; axis < self->axes; axis++) {
         const q32_t step_q32 = sample_q32[axis] - self->last_q32[axis];
-        for (int32_t back = 0; back < STREAM_POINTS / 2; back++) {
+        for (int32_t back = 0; back < STREAM_POINTS - AHEAD_MAX; back++) {
             self->point_q32[slot(self->head - (uint32_t)back)][axis] = sample_q32[axis] - back * step_q32;
         }
         const q32_t acc_q32 = fx_mul_shift(fx_mul_shift(now[axis].acc_per_cycle2_q32, n_q16, 16), n_q16, 16);

@@ -632,6 +632,58 @@ static void test_stream_step_jump_at_the_end_is_not_continued(void)
     }
 }
 
+/* A sway of 20 mm in steps, at 60 Hz through the usual network: the largest acceleration of its curve, and the delay shown. */
+static double coarse_sway(stream_style_t style, double step_mm, unsigned *delay_us)
+{
+    start(style);
+    for (double at = 0; at < 9; at += 1 / 60.0) {
+        if (random_unit() >= 0.01) {
+            send(at + 0.002 + 0.005 * random_unit(), step_mm * round(20 * sin(3.14159265 * at) / step_mm));
+        }
+    }
+    render(0, 0, 9000);
+    double worst = 0;
+    for (int ms = 2000; ms < 9000; ms++) {
+        worst = fmax(worst, 1e6 * fabs(mm(s_ref[ms].acc_per_cycle2_q32)));
+    }
+    *delay_us = stream_delay_us(&s_stream);
+    if (getenv("STREAM_FIGURES")) {
+        printf("steps of %.2f mm: %.0f mm/s^2, %u us late\n", step_mm, worst, *delay_us);
+    }
+    return worst;
+}
+
+/* The sway itself takes 197 mm/s^2; whole millimetres make steps of 3600. What need not be smoothed does not come later. */
+static void test_stream_coarse_values_come_out_as_the_motion_that_was_rounded(void)
+{
+    for (stream_style_t style = STREAM_SMOOTH; style <= STREAM_FAST; style++) {
+        unsigned fine_us, tenths_us, coarse_us;
+        TEST_ASSERT_TRUE(coarse_sway(style, 0.01, &fine_us) < 600);
+        TEST_ASSERT_TRUE(coarse_sway(style, 0.1, &tenths_us) < 700);
+        TEST_ASSERT_TRUE(coarse_sway(style, 1, &coarse_us) < 900);
+        TEST_ASSERT_TRUE(fine_us < 45000 && tenths_us < fine_us + 26000 && coarse_us < fine_us + 101000);
+        for (int ms = 2000; ms < 9000; ms++) {
+            const double error = mm(s_ref[ms].pos_q32) - 20 * sin(3.14159265e-3 * (ms - (int)coarse_us / 1000 - 4));
+            TEST_ASSERT_TRUE(fabs(error) < 1);
+        }
+    }
+}
+
+/* Even ramps and jumps now and then are multiples of something too. */
+static void test_stream_even_ramps_and_jumps_are_not_coarse(void)
+{
+    for (int kind = 0; kind < 2; kind++) {
+        start(STREAM_SMOOTH);
+        for (int i = 0; i < 500; i++) {
+            send(0.003 + i / 60.0, kind == 0 ? 2.5 * abs(i % 80 - 40) : 10 * (i / 45 % 3));
+        }
+        for (int ms = 0; ms < 8000; ms++) {
+            render(0, ms, ms + 1);
+            TEST_ASSERT_TRUE(stream_delay_us(&s_stream) < 70000);
+        }
+    }
+}
+
 /* A pause of 0.3 s is a loss: the same stream goes on, without a step. */
 static void test_stream_step_after_a_pause_goes_on(void)
 {
@@ -886,6 +938,8 @@ int main(void)
     RUN_TEST(test_stream_step_ended_stream_rests_on_its_last_sample);
     RUN_TEST(test_stream_step_jump_at_the_end_is_not_continued);
     RUN_TEST(test_stream_step_bursts_of_losses_are_bridged_softly);
+    RUN_TEST(test_stream_coarse_values_come_out_as_the_motion_that_was_rounded);
+    RUN_TEST(test_stream_even_ramps_and_jumps_are_not_coarse);
     RUN_TEST(test_stream_step_after_a_pause_goes_on);
     RUN_TEST(test_stream_step_after_an_end_starts_again);
     RUN_TEST(test_stream_is_live_while_samples_come);

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: MIT
+ * stream_grain.c - what the values of a sender are multiples of.
+ * The grain is the greatest common divisor of all steps since the watch began. An even ramp has one too, and a jump: values count
+ * as coarse only where the step itself changes up and down in turn, as it does where a motion is rounded.
+ */
+#include "stream_grain.h"
+
+enum {
+    WATCH = 64, /* samples after which the watch begins anew: a sender may have become finer, or coarser */
+    TURNS = 4   /* a jump makes one, or two where a sample is withheld */
+};
+
+#define NOTHING_Q32 (Q32_ONE / 1024) /* values are rounded to 2^-16, and maybe scaled: what is less says nothing */
+#define FINEST_Q32  (Q32_ONE / 256)  /* finer grains cannot be told */
+
+/* By Euclid; to the nearest multiple, so that the remainder halves in every step. 0 = nothing yet. */
+static q32_t common_divisor(q32_t a_q32, q32_t b_q32)
+{
+    for (int step = 0; step < 32 && b_q32 > NOTHING_Q32; step++) {
+        const q32_t over_q32 = a_q32 % b_q32;
+        a_q32 = b_q32;
+        b_q32 = over_q32 < b_q32 - over_q32 ? over_q32 : b_q32 - over_q32;
+    }
+    return a_q32;
+}
+
+/* A change of the step. */
+static void watch_turn(stream_grain_t *grain, q32_t change_q32)
+{
+    const bool is_up = change_q32 > 0;
+    if (fx_abs(change_q32) > NOTHING_Q32) {
+        if (is_up != grain->is_up && grain->turns < TURNS) {
+            grain->turns++;
+        }
+        grain->is_up = is_up;
+    }
+}
+
+static void watch_step(stream_grain_t *grain, int32_t periods, q32_t step_q32)
+{
+    if (grain->found_q32 == 0 || grain->found_q32 >= FINEST_Q32) {
+        grain->found_q32 = common_divisor(grain->found_q32, fx_abs(step_q32));
+    }
+    const q32_t of_period_q32 = periods > 1 ? step_q32 / periods : step_q32;
+    watch_turn(grain, of_period_q32 - grain->step_q32);
+    grain->step_q32 = of_period_q32;
+}
+
+/* A finer step than the grain refutes it at once; a coarser grain has to last for a whole watch. */
+static void judge(stream_grain_t *grain, bool is_over)
+{
+    const bool is_coarse = grain->turns == TURNS;
+    const bool is_finer = grain->found_q32 > 0 && grain->found_q32 < grain->grain_q32;
+    if ((is_coarse && (is_over || grain->grain_q32 == 0)) || is_finer) {
+        grain->grain_q32 = grain->found_q32 < FINEST_Q32 ? 0 : grain->found_q32;
+    }
+    if (is_over) {
+        grain->found_q32 = 0;
+        grain->turns = 0;
+    }
+}
+
+void stream_grain_watch(stream_curve_t *self, unsigned periods, const q32_t *sample_q32)
+{
+    self->watched = self->watched < WATCH ? self->watched + 1 : 0;
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        watch_step(&self->grain[axis], (int32_t)periods, sample_q32[axis] - self->last_q32[axis]);
+        judge(&self->grain[axis], self->watched == WATCH);
+    }
+}
