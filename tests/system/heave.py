@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""heave.py - what the system tests share: a platform in a temporary folder, the programs as child processes, a sender of frames."""
+"""heave.py - what the system tests share: a platform in a temporary folder, the programs as child processes, a sender of frames.
+
+Every heaved that a Bench starts live runs under malloc_guard.c, where that was built (not with sanitizers, which have an allocator of their own): it is
+ended where it allocates after its start, and must have no page fault in its motion thread where memory is locked. stop() and the Bench's end say so.
+"""
+import atexit
 import json
+import mmap
 import os
 import re
 import signal
 import socket
+import struct
 import subprocess
 import tempfile
 import time
@@ -31,6 +38,52 @@ def wait_for(condition, what):
     raise AssertionError(f"{what}: not within {WAIT_S} s")
 
 
+def pages_moved():
+    """What the kernel has done to pages by itself, locked ones too: touching such a page is a fault."""
+    names = ("pgmigrate_success ", "thp_collapse_alloc ", "thp_split_pmd ", "numa_hint_faults ")
+    lines = Path("/proc/vmstat").read_text(encoding="ascii").splitlines()
+    return [line for line in lines if line.startswith(names)]
+
+
+class Guard:
+    """malloc_guard.c around one heaved, and what it found."""
+
+    cycles = {True: 0, False: 0}  # of all heaved so far, by whether page faults are judged
+    has_own_faults = "HEAVE_OWN_KERNEL" in os.environ  # User Mode Linux learns by faults what a processor reads in its tables, locked or not
+
+    def __init__(self, library, environment):
+        self.report_fd = os.memfd_create("guard")
+        os.ftruncate(self.report_fd, mmap.PAGESIZE)
+        self.report = mmap.mmap(self.report_fd, mmap.PAGESIZE)
+        self.moved = pages_moved()
+        self.options = {"env": {**environment, "LD_PRELOAD": str(library), "HEAVE_GUARD_REPORT": str(self.report_fd)}, "pass_fds": (self.report_fd,)}
+
+    def started(self):
+        os.close(self.report_fd)
+
+    def judge(self, daemon):
+        """Once, when heaved has ended."""
+        if self.report is None:
+            return
+        log = daemon.log.read_text(errors="replace") if daemon.log else "(its standard error is the test's)"
+        cycles, page_faults, is_locked, refused = struct.unpack_from("4Q", self.report)
+        self.report.close()
+        self.report = None
+        is_judged = is_locked and not Guard.has_own_faults
+        assert not refused, f"heaved was ended where it allocates after its start: {log}"
+        assert not page_faults or not is_judged or pages_moved() != self.moved, f"{page_faults} page faults of the motion thread in {cycles} cycles: {log}"
+        Guard.cycles[bool(is_judged)] += cycles
+
+    @staticmethod
+    def sum_up():
+        for is_judged, text in ((True, "without an allocation or a page fault"), (False, "without an allocation, page faults not judged (User Mode Linux, memory not locked)")):
+            if Guard.cycles[is_judged]:
+                print(f"# figure {Guard.cycles[is_judged]} cycles of heaved {text}", flush=True)
+
+
+atexit.register(Guard.sum_up)
+
+
 class Bench:
     """A folder with a configuration of its own port and socket; ends what it started."""
 
@@ -42,6 +95,8 @@ class Bench:
         self.socket = self.folder / "heaved.sock"
         self.config = self.write_config("platform.ini", **changes)
         self.running = []
+        library = self.bin.resolve().parents[1] / "tests/system/libmalloc_guard.so"
+        self.guard = library if library.exists() else None
 
     def __enter__(self):
         return self
@@ -51,7 +106,10 @@ class Bench:
             if daemon.poll() is None:
                 daemon.kill()
             daemon.wait()
-        self.temporary.cleanup()
+        try:
+            self.judge_ended()
+        finally:
+            self.temporary.cleanup()
 
     def write_config(self, name, source="demo-hexapod.ini", **changes):
         """The demonstration platform; a change is section__key="value"."""
@@ -82,14 +140,32 @@ class Bench:
         assert run.returncode == 0, f"exit {run.returncode}: {run.stderr}"
         return trace.read_bytes()
 
-    def start(self, *arguments, config=None, environment=None):
+    def judge_ended(self):
+        """What the guard has to say of all that have ended so far."""
+        for daemon in self.running:
+            if daemon.poll() is not None:
+                daemon.judge(daemon)
+
+    def spawn(self, *arguments, config=None, environment=None, **options):
+        """Starts heaved live, under guard."""
+        self.judge_ended()
+        environment = {**os.environ, **(environment or {})}
+        guard = Guard(self.guard, environment) if self.guard else None
+        daemon = subprocess.Popen([self.bin / "heaved", "--config", str(config or self.config), *map(str, arguments)],
+                                  **(guard.options if guard else {"env": environment}), **options)
+        if guard:
+            guard.started()
+        daemon.log = None
+        daemon.judge = guard.judge if guard else lambda _: None
+        self.running.append(daemon)
+        return daemon
+
+    def start(self, *arguments, **options):
         """Starts heaved live and waits until it answers."""
         log = open(self.folder / f"log{len(self.running)}", "w+b")
-        daemon = subprocess.Popen([self.bin / "heaved", "--config", str(config or self.config), *map(str, arguments)], stdout=log, stderr=log,
-                                  env={**os.environ, **(environment or {})})
+        daemon = self.spawn(*arguments, stdout=log, stderr=log, **options)
         daemon.log = Path(log.name)
         log.close()
-        self.running.append(daemon)
         wait_for(lambda: daemon.poll() is not None or self.socket.exists() and self.ctl("--json", "status").returncode == 0, "heaved answers")
         assert daemon.poll() is None, f"heaved ended with {daemon.returncode}: {daemon.log.read_text()}"
         return daemon
@@ -97,7 +173,9 @@ class Bench:
     def stop(self, daemon, number=signal.SIGTERM):
         """Signals and waits; the exit code."""
         daemon.send_signal(number)
-        return daemon.wait(timeout=WAIT_S)
+        code = daemon.wait(timeout=WAIT_S)
+        daemon.judge(daemon)
+        return code
 
     def ctl(self, *arguments, **options):
         return subprocess.run([self.bin / "heavectl", "--socket", str(self.socket), *map(str, arguments)], stdout=subprocess.PIPE,

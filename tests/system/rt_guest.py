@@ -317,6 +317,7 @@ def main():
             if not is_done:
                 print(bench.story())
                 break
+    heave.Guard.sum_up()  # there is no end of the interpreter
     suite.done()
 
 

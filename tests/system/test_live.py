@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """test_live.py BIN [--guard LIB] - the daemon at work on the loopback interface: frames, operators, recordings, signals, trouble.
 
---guard LIB: malloc_guard.c as a shared library; without it (instrumented builds) the case that needs it is skipped.
+--guard LIB: malloc_guard.c as a shared library; without it (instrumented builds) the cases about it are skipped.
 """
 import argparse
 import json
@@ -467,8 +467,7 @@ def strangers_are_refused(bench):
 
 def nobody_reads_standard_error(bench):
     """Log lines into a full pipe must not keep the daemon from ending."""
-    daemon = subprocess.Popen([bench.bin / "heaved", "--config", str(bench.config)], stderr=subprocess.PIPE)
-    bench.running.append(daemon)
+    daemon = bench.spawn(stderr=subprocess.PIPE)
     heave.wait_for(lambda: bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
     with open(f"/proc/{daemon.pid}/fd/2", "wb", buffering=0, opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)) as pipe:
         while pipe.write(b"x" * 4096):
@@ -547,66 +546,61 @@ def a_client_that_does_not_read(bench):
 
 # --- Memory ---
 
-def pages_moved():
-    """What the kernel has done to pages by itself, locked ones too."""
-    names = ("pgmigrate_success ", "thp_collapse_alloc ", "thp_split_pmd ", "numa_hint_faults ")
-    lines = Path("/proc/vmstat").read_text(encoding="ascii").splitlines()
-    return [line for line in lines if line.startswith(names)]
-
-
-def faults_no_pages(bench, guard):
-    if guard is None:
-        raise tap.Skip("instrumented build")
+def busy_session(bench):
+    """Everything that may happen to it, with everything that it writes; the last status."""
+    manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)  # what is said to it must not allocate either
+    manager.bind(str(bench.folder / "notify"))
+    threading.Thread(target=lambda: [None for _ in iter(lambda: manager.recv(500), b"")], daemon=True).start()
+    metrics = bench.folder / "heave.prom"
     config, _ = with_black_box(bench)
-    moved = pages_moved()
-    daemon = bench.start("--record", bench.folder / "r.txt", "--trace", bench.folder / "t.csv", config=config)
-    with bench.sender() as sender:
+    config.write_text(config.read_text(encoding="utf-8").replace("[control]\n", f"[control]\nmetrics = {metrics}\n"))
+    daemon = bench.start("--record", bench.folder / "r.txt", "--trace", bench.folder / "t.csv", config=config,
+                         environment={"NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "100000"})
+    with bench.sender() as sender, Client(bench) as watcher:
+        watcher.link.sendall(b"watch 20\n")
         sender.stream(0.3, wave)
         bench.wait_state("ENGAGED")
-        for order in ("hold", "resume", "dump"):
-            bench.ctl(order)
-            sender.stream(0.3, wave)
+        for command in COMMANDS[:-1] + ["status", "dump", "engage"]:
+            bench.ctl(command)
+            sender.stream(0.2, wave)
         sender.send("nonsense")
         sender.send("@A6T:0,5,0,0,0,0,400#")
         sender.stream(0.5, wave)
+        bench.wait_state("ENGAGED")
         heave.wait_for(lambda: (sender.send(wave(0)), bench.status()["frame_latency"]["count"] > 0)[1], "frames are measured")
         bench.ctl("park")
         status = bench.wait_state("SETTLED")
-    assert bench.stop(daemon) == 0
+        watcher.file.readline()
+    heave.wait_for(metrics.exists, "metrics are written")
+    daemon.send_signal(signal.SIGHUP)
+    heave.wait_for(lambda: "has been read again" in daemon.log.read_text(), "the configuration is read again")
+    assert bench.stop(daemon) == 0  # and says what the guard has found
+    return status
+
+
+def faults_no_pages_and_allocates_nothing(bench, guard):
+    if guard is None:
+        raise tap.Skip("instrumented build")
+    assert Path(guard).samefile(bench.guard), f"heaved runs under {bench.guard}"
+    moved = heave.pages_moved()
+    status = busy_session(bench)
     latency = status["frame_latency"]
     assert 0 < latency["p50_us"] <= latency["p99_us"] <= latency["max_us"] and latency["count"] <= sum(status["counters"]["accepted"].values()), latency
     if not status["memory_locked"]:
         raise tap.Skip("memory cannot be locked here")
-    assert status["page_faults"] == 0 or pages_moved() != moved, status["page_faults"]
+    assert heave.Guard.cycles[True] > 1000 and (status["page_faults"] == 0 or heave.pages_moved() != moved), (heave.Guard.cycles, status["page_faults"])
 
 
-def allocates_nothing(bench, guard):
+def guard_ends_a_program(bench, guard):
+    """That it says so is what all other tests rely on."""
     if guard is None:
         raise tap.Skip("instrumented build")
-    armed = bench.folder / "armed"
-    manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)  # what is said to it must not allocate either
-    manager.bind(str(bench.folder / "notify"))
-    threading.Thread(target=lambda: [None for _ in iter(lambda: manager.recv(500), b"")], daemon=True).start()
-    environment = {"LD_PRELOAD": guard, "HEAVE_MALLOC_GUARD": str(armed), "NOTIFY_SOCKET": manager.getsockname(), "WATCHDOG_USEC": "100000"}
-    metrics = bench.folder / "heave.prom"
-    config, _ = with_black_box(bench)
-    config.write_text(config.read_text(encoding="utf-8").replace("[control]\n", f"[control]\nmetrics = {metrics}\n"))
-    daemon = bench.start("--record", bench.folder / "r.txt", "--trace", bench.folder / "t.csv", config=config, environment=environment)
-    armed.touch()
-    run = bench.ctl("status", env={**os.environ, **environment})
-    assert "malloc guard: malloc" in run.stderr, "the guard does not work"
-    with bench.sender() as sender, Client(bench) as watcher:
-        watcher.link.sendall(b"watch 20\n")
-        sender.stream(1.0, wave)
-        sender.send("nonsense")
-        for command in COMMANDS[:-1] + ["status", "dump", "engage"]:
-            bench.ctl(command)
-        sender.stream(0.5, wave)
-        watcher.file.readline()
-    heave.wait_for(metrics.exists, "metrics are written")
-    daemon.send_signal(signal.SIGHUP)
-    assert bench.stop(daemon) == 0
-    assert "malloc guard" not in daemon.log.read_text(), daemon.log.read_text()
+    lines = {"": "", "libc.mlockall(1)": "malloc guard: .*, after the start, in an ordinary thread ",
+             "libc.pthread_setschedparam(libc.pthread_self(), 1, bytes(8))": "malloc guard: .*, after the start, in a real-time thread "}
+    for line, said in lines.items():
+        program = f"import ctypes; libc = ctypes.CDLL(None); libc.pthread_self.restype = ctypes.c_void_p\nlibc.pthread_setschedparam.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p]\n{line}\nx = bytearray(100000)"
+        run = subprocess.run([sys.executable, "-c", program], env={**os.environ, "LD_PRELOAD": guard}, stderr=subprocess.PIPE, text=True, check=False)
+        assert run.returncode == (-signal.SIGABRT if line else 0) and re.match(said, run.stderr), (line, run)
 
 
 CASES = {
@@ -649,8 +643,9 @@ def main():
     parser.add_argument("--guard")
     parser.add_argument("--only", default="", help="run the cases whose name contains this")
     arguments = parser.parse_args()
-    cases = {**CASES, "no page fault in the motion thread once memory is locked": lambda bench: faults_no_pages(bench, arguments.guard),
-             "nothing is allocated after the start": lambda bench: allocates_nothing(bench, arguments.guard)}
+    cases = {**CASES, "the guard against allocation ends a program, and says where": lambda bench: guard_ends_a_program(bench, arguments.guard),
+             "nothing is allocated after the start, and no page fault in the motion thread once memory is locked":
+                 lambda bench: faults_no_pages_and_allocates_nothing(bench, arguments.guard)}
     suite = tap.Suite()
     for name, check in cases.items():
         if arguments.only in name:

@@ -137,8 +137,7 @@ def say_much(bench):
 def standard_error_is_full(bench, _):
     """Log lines are lost and counted; frames, operators, reloads of wrong files and the end go on as ever."""
     good = bench.config.read_text(encoding="utf-8")
-    daemon = subprocess.Popen([bench.bin / "heaved", "--config", bench.config, "--trace", bench.trace], stderr=subprocess.PIPE)
-    bench.running.append(daemon)
+    daemon = bench.spawn("--trace", bench.trace, stderr=subprocess.PIPE)
     with open(f"/proc/{daemon.pid}/fd/2", "wb", buffering=0, opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)) as pipe:
         while pipe.write(b"x" * 4096):
             pass  # None: it is full
