@@ -33,6 +33,7 @@
 #define QUIT_WAIT_MS     1000
 #define FIRST_CYCLE_US   500000u
 #define END_WAIT_US      2000000u
+#define SHUTDOWN_REST_US 15000000u /* a stop before settling, the drives going off, files */
 
 /** Everything of a live run. Large: from the heap, at the start. */
 typedef struct {
@@ -227,6 +228,19 @@ static void reload(live_t *self)
     }
 }
 
+/* The longest that a shutdown takes: a stop, the longest cylinder's whole stroke at engage speed, and the drives going off. */
+static uint64_t shutdown_most_us(const settings_t *settings)
+{
+    int64_t stroke_mm_q16 = 0;
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        stroke_mm_q16 = settings->stroke_mm_q16[i] > stroke_mm_q16 ? settings->stroke_mm_q16[i] : stroke_mm_q16;
+    }
+    const int64_t speed_q16 = settings->engage_speed_mm_s_q16;
+    const int64_t way_us = stroke_mm_q16 * 1000000 / speed_q16;
+    const int64_t ramps_us = 2 * speed_q16 * 1000000 / settings->engage_accel_mm_s2_q16;
+    return (uint64_t)(way_us + ramps_us) + SHUTDOWN_REST_US;
+}
+
 /* The first signal settles the platform, the second one ends at once. */
 static void take_signals(live_t *self)
 {
@@ -240,7 +254,7 @@ static void take_signals(live_t *self)
         if (self->signals == 1) {
             const motion_request_t request = {.event = EVENT_SHUTDOWN};
             (void)ring_push(&self->loop.requests, &request, sizeof request, NULL, 0);
-            manager_stopping(&self->manager);
+            manager_stopping(&self->manager, shutdown_most_us(&self->config.settings));
             (void)say(0, "shutting down: the platform settles first; once more ends at once");
         } else {
             motion_loop_quit(&self->loop);

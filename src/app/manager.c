@@ -83,9 +83,11 @@ void manager_serve(manager_t *self, const snapshot_t *snapshot, uint64_t now_us)
     }
 }
 
-void manager_stopping(const manager_t *self)
+void manager_stopping(const manager_t *self, uint64_t within_us)
 {
-    (void)tell(self, "STOPPING=1");
+    char text[64];
+    (void)snprintf(text, sizeof text, "STOPPING=1\nEXTEND_TIMEOUT_USEC=%llu", (unsigned long long)within_us);
+    (void)tell(self, text);
 }
 
 void manager_close(manager_t *self)

@@ -32,8 +32,9 @@ void manager_ready(manager_t *self, uint64_t now_us);
 /** Often: tells changes of state, and pets the watchdog if the motion thread has run a cycle since the last time. */
 void manager_serve(manager_t *self, const snapshot_t *snapshot, uint64_t now_us);
 
-/** Once, when a shutdown has been asked for. */
-void manager_stopping(const manager_t *self);
+/** Once, when a shutdown has been asked for.
+ *  @param within_us the longest that it takes: the manager waits as long, also where its unit says less */
+void manager_stopping(const manager_t *self, uint64_t within_us);
 
 /** Once, at the end. */
 void manager_close(manager_t *self);

@@ -10,6 +10,7 @@
 #define ENABLE_TIMEOUT_US    10000000u
 #define HOMING_TIMEOUT_US    120000000u
 #define RESET_TIMEOUT_US     2000000u
+#define ABANDON_TIMEOUT_US   3000000u
 #define AT_SETTLED_WINDOW_MM 1
 #define FOLLOWING_TIME_US    20000u
 #define UNSENT_MAX_US        100000u /* the drives' own watch is quicker: it knows the period of its bus */
@@ -122,10 +123,16 @@ static void drop_drives(gateway_t *self)
     track_actual(self);
 }
 
+/* The drives are coming up, or home by themselves: no set-point leads them. */
+static bool is_coming_up(const gateway_t *self)
+{
+    return self->bring_up == BRING_UP_ENABLE || self->bring_up == BRING_UP_HOME;
+}
+
 /* Stops where it is; drives that are coming up or homing by themselves are told so. */
 static void hold(gateway_t *self)
 {
-    if (self->bring_up == BRING_UP_ENABLE || self->bring_up == BRING_UP_HOME) {
+    if (is_coming_up(self)) {
         drop_drives(self);
     } else {
         motion_stop(&self->motion);
@@ -327,7 +334,7 @@ static void watch_drives(gateway_t *self, uint64_t now_us)
 /* Next step of bringing up, when the last one is complete. */
 static void step_bring_up(gateway_t *self, uint64_t now_us)
 {
-    const bool is_waiting = self->bring_up == BRING_UP_ENABLE || self->bring_up == BRING_UP_HOME;
+    const bool is_waiting = is_coming_up(self);
     if (is_waiting && now_us >= self->bring_up_deadline_us) {
         raise_fault(self, FAULT_DRIVE_TIMEOUT, 0, 0, now_us);
         return;
@@ -402,6 +409,29 @@ static void step_reset(gateway_t *self, uint64_t now_us)
     }
 }
 
+/* A drive that is at rest for good, as far as it can be told. */
+static bool is_down(const drive_feedback_t *drive)
+{
+    return drive->state == DRIVE_DISABLED || drive->state == DRIVE_FAULT || drive->state == DRIVE_OFFLINE;
+}
+
+/* A shutdown that interrupted homing ends once the drives have stopped, or do not within a few seconds: their own watch has to.
+ */
+static void step_abandoned(gateway_t *self, uint64_t now_us)
+{
+    const bool is_abandoned = self->is_shutdown_asked && self->supervisor.state == STATE_HOLD && self->is_tracking_actual;
+    if (!is_abandoned || self->is_disable_due) {
+        return;
+    }
+    unsigned down = 0;
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        down += is_down(&self->feedback[i]);
+    }
+    if (down == drive_count(self) || now_us - self->state_since_us >= ABANDON_TIMEOUT_US) {
+        operate_event(self, EVENT_SHUTDOWN, now_us);
+    }
+}
+
 /* The auto policy, once: brings the platform up as an operator's engage would. */
 static void step_auto(gateway_t *self, uint64_t now_us)
 {
@@ -424,6 +454,7 @@ void operate_before_frames(gateway_t *self, uint64_t now_us)
     watch_drives(self, now_us);
     read_inputs(self, now_us);
     step_reset(self, now_us);
+    step_abandoned(self, now_us);
     step_auto(self, now_us);
     if (self->supervisor.state == STATE_OFF && are_all(self, DRIVE_ENABLED, true) && !self->is_disable_due) {
         operate_event(self, EVENT_DRIVES_READY, now_us);
@@ -479,6 +510,10 @@ hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us)
     const uint32_t ignored = self->supervisor.ignored[request];
     if (self->is_shutdown_asked && request != EVENT_SHUTDOWN && request != EVENT_HOLD) {
         return HV_ERR_STATE;
+    }
+    if (request == EVENT_SHUTDOWN && is_coming_up(self)) {
+        operate_event(self, EVENT_HOLD, now_us); /* homing may take minutes, and who ends heaved has less patience */
+        return HV_OK;
     }
     operate_event(self, request, now_us);
     return self->supervisor.ignored[request] == ignored ? HV_OK : HV_ERR_STATE;

@@ -11,7 +11,11 @@ from pathlib import Path
 
 import tap
 
-PACKAGING = Path(__file__).resolve().parents[2] / "packaging"
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools/lib"))
+from platform_ini import read_ini  # noqa: E402  the path above has to be set first
+
+TOP = Path(__file__).resolve().parents[2]
+PACKAGING = TOP / "packaging"
 EXPOSURE_MAX = 20  # tenths of systemd's measure, 100 the worst
 
 
@@ -25,6 +29,13 @@ def analyze(*arguments):
     if shutil.which("systemd-analyze") is None:
         raise tap.Skip("systemd-analyze is not there")
     return subprocess.run(["systemd-analyze", *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+
+
+def settling_s(config):
+    """The longest stroke at engage speed, and both ramps."""
+    ini = read_ini(config)
+    speed, accel = (float(ini.get("engage", {}).get(key, default)) for key, default in (("speed_mm_s", 30), ("accel_mm_s2", 100)))
+    return max(map(float, ini["geometry"]["stroke_mm"].split(","))) / speed + 2 * speed / accel
 
 
 def main():
@@ -63,6 +74,11 @@ def main():
         with suite.case("a wrong configuration or command line is no reason to start again; a crash and a port in use are"):
             final = set(re.search(r"(?m)^RestartPreventExitStatus=(.*)$", text)[1].split())
             assert {"64", "66", "78"} <= final and not {"1", "69", "70", "74"} & final, final
+        with suite.case("every ready-made platform settles in less time than a stop is given"):
+            given_s = int(re.search(r"(?m)^TimeoutStopSec=(\d+)$", text)[1])
+            for config in sorted((TOP / "config").glob("*.ini")):
+                needed_s = settling_s(config)
+                assert needed_s + 15 < given_s, f"{config.name}: {needed_s:.0f} s, {given_s} s are given"  # 15: drives that do not obey
         with suite.case("user, real time, devices and address families are as narrow as they can be"):
             for line in ("Type=notify", "WatchdogSec=2", "DynamicUser=yes", "Group=heave", "LimitRTPRIO=90", "LimitMEMLOCK=infinity", "DevicePolicy=closed",
                          "DeviceAllow=char-gpiochip rw", "RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_CAN AF_NETLINK"):

@@ -341,7 +341,9 @@ def tells_the_service_manager(bench):
         for _ in range(3):
             hear_until("WATCHDOG=1")
         daemon.send_signal(signal.SIGTERM)
-        hear_until("STOPPING=1")
+        hear_until("STOPPING=1\nEXTEND_TIMEOUT_USEC=")
+        within_s = int(heard[-1].rpartition("=")[2]) / 1e6
+        assert 200 / 50 < within_s < 30, f"{within_s} s for a stroke of 200 mm at 50 mm/s"
         hear_until("STATUS=OFF")
         assert daemon.wait(timeout=heave.WAIT_S) == 0
 

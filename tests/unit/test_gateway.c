@@ -1240,6 +1240,55 @@ static void test_shutdown_from_every_moment_ends_in_off(void)
     }
 }
 
+/* Homing takes seconds, here and minutes elsewhere: nobody waits for its end, and no drive goes on with it. */
+static void test_shutdown_while_the_drives_come_up_ends_at_once(void)
+{
+    unsigned homing = 0;
+    for (unsigned ms = 1; ms < 4000; ms += 113) {
+        start(false);
+        rig_run_ms(&m_rig, ms);
+        const bool is_homing = m_rig.drives.axis[0].state == DRIVE_HOMING;
+        const bool is_enabling = m_rig.drives.axis[0].state == DRIVE_ENABLING;
+        if (seen()->state != STATE_HOMING || !(is_homing || is_enabling)) {
+            continue;
+        }
+        homing += is_homing;
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
+        rig_run_ms(&m_rig, 1);
+        const q32_t stopped_q32 = m_rig.drives.axis[0].position_q32;
+        rig_run_ms(&m_rig, 4);
+        TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
+        TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+        for (unsigned i = 0; i < 7; i++) {
+            TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[i].state);
+        }
+        TEST_ASSERT_EQUAL_INT64(stopped_q32, m_rig.drives.axis[0].position_q32);
+        TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "HOMING -> HOLD"));
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(3, homing);
+}
+
+/* A drive that does not obey, and a bus that takes nothing: bounded all the same. */
+static void test_shutdown_while_a_drive_homes_for_ever_is_bounded(void)
+{
+    static const struct {
+        sim_drives_fault_kind_t kind;
+        unsigned most_ms;
+    } k_cases[] = {{SIM_DRIVES_FREEZE, 3010}, {SIM_DRIVES_BUSY, 200}};
+    for (unsigned n = 0; n < 2; n++) {
+        start(false);
+        while (m_rig.drives.axis[2].state != DRIVE_HOMING) {
+            rig_run_ms(&m_rig, 1);
+        }
+        rig_break(&m_rig, k_cases[n].kind, 2, 0);
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
+        rig_run_ms(&m_rig, k_cases[n].most_ms);
+        TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
+        TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_ENGAGE));
+    }
+    m_is_fault_expected = true;
+}
+
 static void test_shutdown_in_fault_and_estop_is_finished_at_rest(void)
 {
     engage();
@@ -1435,6 +1484,8 @@ int main(void)
     RUN_TEST(test_takeover_timed_move_after_a_stream_of_wild_extensions_ends_in_time);
     RUN_TEST(test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves);
     RUN_TEST(test_shutdown_from_every_moment_ends_in_off);
+    RUN_TEST(test_shutdown_while_the_drives_come_up_ends_at_once);
+    RUN_TEST(test_shutdown_while_a_drive_homes_for_ever_is_bounded);
     RUN_TEST(test_shutdown_in_fault_and_estop_is_finished_at_rest);
     RUN_TEST(test_telemetry_actual_speed_is_that_of_the_plate);
     RUN_TEST(test_telemetry_actual_pose_follows_the_feedback);

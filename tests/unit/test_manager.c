@@ -116,6 +116,14 @@ static void test_manager_watchdog_is_not_petted_for_a_thread_that_stands_still(v
     TEST_ASSERT_EQUAL_STRING("WATCHDOG=1", heard());
 }
 
+static void test_manager_stopping_says_how_long_it_may_take(void)
+{
+    manager_ready(&m_manager, 0);
+    (void)heard();
+    manager_stopping(&m_manager, 7000000);
+    TEST_ASSERT_EQUAL_STRING("STOPPING=1\nEXTEND_TIMEOUT_USEC=7000000", heard());
+}
+
 static void test_manager_without_one_nothing_is_told(void)
 {
     TEST_ASSERT_EQUAL_INT(0, unsetenv("WATCHDOG_USEC"));
@@ -136,16 +144,16 @@ static void test_manager_that_is_not_there_does_no_harm(void)
     (void)close(m_fd);
     m_fd = -1;
     serve_cycle(1, 1000);
-    manager_stopping(&m_manager);
+    manager_stopping(&m_manager, 7000000);
     manager_close(&m_manager);
     TEST_ASSERT_EQUAL_INT(0, setenv("NOTIFY_SOCKET", "/tmp/heave-notify-gone", 1));
     manager_ready(&m_manager, 0);
-    manager_stopping(&m_manager);
+    manager_stopping(&m_manager, 7000000);
     manager_close(&m_manager);
     TEST_ASSERT_EQUAL_INT(0, unsetenv("NOTIFY_SOCKET"));
     manager_ready(&m_manager, 0);
     serve_cycle(2, 2000);
-    manager_stopping(&m_manager);
+    manager_stopping(&m_manager, 7000000);
 }
 
 /* A manager that reads nothing for a while: nobody waits for it, and it hears all that still counts afterwards. */
@@ -204,6 +212,7 @@ int main(void)
     RUN_TEST(test_manager_change_of_state_and_fault_are_told);
     RUN_TEST(test_manager_watchdog_is_petted_twice_a_period_while_cycles_run);
     RUN_TEST(test_manager_watchdog_is_not_petted_for_a_thread_that_stands_still);
+    RUN_TEST(test_manager_stopping_says_how_long_it_may_take);
     RUN_TEST(test_manager_without_one_nothing_is_told);
     RUN_TEST(test_manager_that_is_not_there_does_no_harm);
     RUN_TEST(test_manager_that_does_not_read_is_told_later);
