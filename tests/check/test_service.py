@@ -74,6 +74,11 @@ def main():
         with suite.case("a wrong configuration or command line is no reason to start again; a crash and a port in use are"):
             final = set(re.search(r"(?m)^RestartPreventExitStatus=(.*)$", text)[1].split())
             assert {"64", "66", "78"} <= final and not {"1", "69", "70", "74"} & final, final
+        with suite.case("a program that ends again and again is left alone in the end"):
+            seconds = {name: int(re.search(rf"(?m)^{name}=(\d+)$", text)[1]) for name in ("StartLimitIntervalSec", "StartLimitBurst", "RestartSec", "WatchdogSec")}
+            longest_s = seconds["RestartSec"] + 2 * seconds["WatchdogSec"]  # from one start to the next, also where it hangs
+            assert 2 <= seconds["StartLimitBurst"] and seconds["StartLimitBurst"] * longest_s < seconds["StartLimitIntervalSec"], seconds
+            assert re.search(r"(?m)^Restart=on-failure$", text)
         with suite.case("every ready-made platform settles in less time than a stop is given"):
             given_s = int(re.search(r"(?m)^TimeoutStopSec=(\d+)$", text)[1])
             for config in sorted((TOP / "config").glob("*.ini")):

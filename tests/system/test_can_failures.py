@@ -308,11 +308,12 @@ def bad_drives_are_named(bench, _):
 # --- The gateway in trouble ---
 
 KILLS = 6
+ENDS = (signal.SIGKILL, signal.SIGABRT, signal.SIGSEGV)  # from outside, by an assertion, by a wrong address
 SET_UP_S = 1.3  # from the start until all drives are ready, or in the fault that the crash has left them in
 
 
 def killed_anywhere(bench, source):
-    """kill -9 at random phases and a new start: the drives stop by themselves, nothing old is sent, no step at enabling."""
+    """kill -9 or a crash at random phases and a new start: the drives stop by themselves, nothing old is sent, no step at enabling."""
     kills = int(sys.argv[3]) if len(sys.argv) > 3 else KILLS
     config = test_can.can_config(bench)
     bench.start_drives()
@@ -326,7 +327,8 @@ def killed_anywhere(bench, source):
             assert bench.ctl("engage").returncode == 0, bench.status()["state"]
         heave.wait_for(lambda turn=turn: len(bench.events("enabled")) >= 7 * (turn + 1), "torque")
         time.sleep(source.uniform(0, 0.8))
-        bench.stop(daemon, signal.SIGKILL)
+        number = ENDS[turn % len(ENDS)]
+        assert bench.stop(daemon, number) == -number
         deaths.append(now_us())
         bench.socket.unlink()
         time.sleep(source.uniform(0.2, 0.5))
