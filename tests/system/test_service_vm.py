@@ -6,7 +6,7 @@ usage: test_service_vm.py [--deb FILE] [--root DIR]
   --deb   the package; default: what tools/package makes
   --root  a debootstrapped Debian 12 with the packages of PACKAGES; default: made once in the user's cache (root, network)
 
-Takes minutes, so tools/test leaves it out; run it by hand, as it is. Needs root (to unpack a system), qemu-system-x86_64, cpio, and the kernel of tools/lib/rt.sh.
+Takes minutes, so tools/test leaves it out; tools/nightly runs it, or run it by hand, as it is. Needs root (to unpack a system), qemu-system-x86_64, cpio, and the kernel of tools/lib/rt.sh.
 """
 import argparse
 import os
