@@ -49,15 +49,6 @@ number_error_t number_finish(const number_t *self, q16_t *value_q16);
  *  @return NUMBER_OVERFLOW also for any value below zero, even one that would round to zero; -0 is zero. */
 number_error_t number_finish_natural(const number_t *self, uint32_t *value);
 
-#define NUMBER_SHORT_DIGITS 13u /**< of number_short() */
-
-/** The nearest Q16.16, ties to even, of digits that are already a whole number: digits / 10^fraction_digits.
- *  @param digits          below 10^NUMBER_SHORT_DIGITS
- *  @param fraction_digits of them behind the point, up to NUMBER_SHORT_DIGITS
- *  @param value_q16       out; unchanged on error
- *  @return NUMBER_OK or NUMBER_OVERFLOW */
-number_error_t number_short(uint64_t digits, unsigned fraction_digits, bool is_negative, q16_t *value_q16);
-
 /** number_init, number_feed and number_finish over a text of known length. */
 number_error_t number_parse(const char *text, size_t length, q16_t *value_q16);
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * fx_root.c - exact integer square roots of 64 and 128 bits.
  * 64 bits: a table of 1/sqrt with 8 bits, two Newton steps on it (15, then 29 bits), a product, one correction by the remainder.
- * 128 bits: the root of the upper half, then its lower half from one division of the remainder (P. Zimmermann, "Karatsuba
- * Square Root", 1999). Bounded time, no loop.
+ * 128 bits: the same inverse, a product, two corrections by the remainder, and one to the nearest. Bounded time: no loop, no
+ * division.
  */
 #include "heave/fx.h"
 
@@ -68,21 +68,18 @@ static fx_u128_t shift_left(fx_u128_t value, unsigned shift)
     return (fx_u128_t){(value.hi << shift) | (value.lo >> (64 - shift)), value.lo << shift};
 }
 
-/* floor(sqrt(value)) and its remainder for value of [2^122, 2^124): upper 32 bits, then the lower 30 from a division. The root
- * is at most 1 too large, because quotient^2 <= 2^60 is below 2 * root. All terms stay within 63 bits. */
-static uint64_t root_wide_normalised(fx_u128_t value, int64_t *rest)
+/* sqrt of a value of [2^124, 2^126), at most 1.01 too small and 0.01 too large: 31 bits from the inverse, and two corrections by
+ * what is left over remainder / (2 root). The first one is below 2^35 and leaves its square over 2^64, below 2^7. */
+static uint64_t root_wide_normalised(fx_u128_t value)
 {
-    const uint64_t low_mask = (UINT64_C(1) << 30) - 1;
-    const uint64_t head = (value.hi << 4) | (value.lo >> 60);
-    const uint64_t upper = root_normalised(head);
-    const uint64_t numerator = ((head - upper * upper) << 30) | (value.lo >> 30 & low_mask);
-    const uint64_t quotient = numerator / (2 * upper);
-    const uint64_t root = (upper << 30) + quotient;
-    const uint64_t numerator_rest = numerator - quotient * (2 * upper);
-    const int64_t remainder = (int64_t)((numerator_rest << 30) | (value.lo & low_mask)) - (int64_t)(quotient * quotient);
-    const bool is_one_too_large = remainder < 0;
-    *rest = is_one_too_large ? remainder + (int64_t)(2 * root - 1) : remainder;
-    return root - is_one_too_large;
+    const int64_t inverse_q31 = (int64_t)inverse_root_q31((value.hi << 2) | (value.lo >> 62));
+    const uint64_t upper = ((value.hi >> 30) * (uint64_t)inverse_q31) >> 32;
+    const int64_t upper_rest = (int64_t)(value.hi - upper * upper);
+    const uint64_t root = (upper << 32) + (uint64_t)fx_mul_high(upper_rest * (1 << 27), inverse_q31 * (1 << 6));
+    const fx_u128_t square = fx_square_u64(root);
+    const uint64_t rest_hi = value.hi - square.hi - (value.lo < square.lo);
+    const int64_t rest = (int64_t)((rest_hi << 33) | ((value.lo - square.lo) >> 31)); /* in 2^31 */
+    return root + (uint64_t)fx_mul_high(rest, inverse_q31);
 }
 
 uint64_t fx_sqrt_u128(fx_u128_t value)
@@ -91,11 +88,10 @@ uint64_t fx_sqrt_u128(fx_u128_t value)
         return 0;
     }
     const unsigned zeros = value.hi != 0 ? fx_leading_zeros(value.hi) : 64 + fx_leading_zeros(value.lo);
-    const unsigned half_shift = (zeros - 4) / 2;
-    int64_t rest;
-    const uint64_t root = root_wide_normalised(shift_left(value, 2 * half_shift), &rest);
-    if (half_shift == 0) {
-        return root + (rest > (int64_t)root);
-    }
-    return ((root >> (half_shift - 1)) + 1) >> 1;
+    const unsigned half_shift = (zeros - 2) / 2;
+    const uint64_t wide = root_wide_normalised(shift_left(value, 2 * half_shift));
+    const int64_t root = (int64_t)((wide + (UINT64_C(1) << (half_shift - 1))) >> half_shift);
+    const int64_t rest =
+        (int64_t)(value.lo - (uint64_t)root * (uint64_t)root); /* below 2^63: root is the nearest or next to it */
+    return (uint64_t)(root + (rest > root) - (rest <= -root));
 }

@@ -448,7 +448,12 @@ static frame_event_t take_other(frame_scanner_t *self, uint8_t byte, frame_rejec
 
 void frame_scanner_init(frame_scanner_t *self, frame_dialect_t dialect)
 {
-    *self = (frame_scanner_t){.dialect = dialect, .phase = PHASE_IDLE, .may_be_headless = dialect == FRAME_LENIENT};
+    /* copied, as clearing so many bytes is slow on some CPUs: `rep stos` takes a quarter of the time of a short frame */
+    static const frame_scanner_t k_start[] = {
+        [FRAME_V3] = {.dialect = FRAME_V3, .phase = PHASE_IDLE},
+        [FRAME_LENIENT] = {.dialect = FRAME_LENIENT, .phase = PHASE_IDLE, .may_be_headless = true},
+    };
+    *self = k_start[dialect];
 }
 
 frame_event_t frame_scanner_feed(frame_scanner_t *self, uint8_t byte, frame_t *frame, frame_reject_t *reject)

@@ -5,73 +5,113 @@
  */
 #include "frame_quick.h"
 
-enum { DIGITS_MAX = NUMBER_SHORT_DIGITS, MASK_DIGITS_MAX = 4, TIME_DIGITS_MAX = 7 };
+enum { DIGITS_MAX = 13, MASK_DIGITS_MAX = 4, TIME_DIGITS_MAX = 7 };
 
+/* By powers of ten from 1, for up to 12 decimals: 2^(63 + shift) / power, rounded up and of 64 bits. What it is too large by,
+ * less than the power in all, times a value below 10^13 * 2^17 stays below 2^(63 + shift), so the quotient of such a value is
+ * exact. */
+static const struct {
+    uint64_t reciprocal;
+    uint8_t shift;
+} k_tens[DIGITS_MAX] = {
+    {UINT64_C(0x8000000000000000), 0},  {UINT64_C(0xCCCCCCCCCCCCCCCD), 4},  {UINT64_C(0xA3D70A3D70A3D70B), 7},
+    {UINT64_C(0x83126E978D4FDF3C), 10}, {UINT64_C(0xD1B71758E219652C), 14}, {UINT64_C(0xA7C5AC471B478424), 17},
+    {UINT64_C(0x8637BD05AF6C69B6), 20}, {UINT64_C(0xD6BF94D5E57A42BD), 24}, {UINT64_C(0xABCC77118461CEFD), 27},
+    {UINT64_C(0x89705F4136B4A598), 30}, {UINT64_C(0xDBE6FECEBDEDD5BF), 34}, {UINT64_C(0xAFEBFF0BCB24AAFF), 37},
+    {UINT64_C(0x8CBCCC096F5088CC), 40},
+};
+
+/* digits / 10^fraction in Q16, to the nearest. There is no tie to decide: the middle between two values has 17 decimals. */
+static inline uint64_t rounded_q16(uint64_t digits, size_t fraction)
+{
+    const fx_u128_t product = FX_WIDE_PRODUCT(digits << 18, k_tens[fraction].reciprocal);
+    const uint64_t floor_halves = product.hi >> k_tens[fraction].shift;
+    return (floor_halves + 1) >> 1;
+}
+
+/* What is left to read. end is never read. */
 typedef struct {
     const uint8_t *at;
     const uint8_t *end;
 } reader_t;
 
 /* Takes the byte if it is the next one. */
-static bool take(reader_t *reader, uint8_t byte)
+static inline bool take(reader_t *reader, uint8_t byte)
 {
     const bool is_next = reader->at < reader->end && *reader->at == byte;
     reader->at += is_next;
     return is_next;
 }
 
-/* Appends all digits that follow to the number; it wraps where there are too many. Returns how many. */
-static size_t take_digits(reader_t *reader, uint64_t *number)
+/* Appends all digits that follow to the number; it wraps where there are too many. */
+static inline uint64_t take_digits(reader_t *reader, uint64_t number)
 {
     const uint8_t *at = reader->at;
-    uint64_t sum = *number;
-    for (; at < reader->end && (uint8_t)(*at - '0') <= 9; at++) {
-        sum = sum * 10u + (uint8_t)(*at - '0');
+    for (; at < reader->end; at++) {
+        const unsigned digit = *at - (unsigned)'0';
+        if (digit > 9) {
+            break;
+        }
+        number = number * 10u + digit;
     }
-    const size_t count = (size_t)(at - reader->at);
     reader->at = at;
-    *number = sum;
-    return count;
+    return number;
 }
 
-static bool take_value(reader_t *reader, q16_t *value_q16)
+/* false where digits are missing or too many, or Q16.16 cannot hold the value. */
+static inline bool take_value(reader_t *reader, q16_t *value_q16)
 {
-    uint64_t digits = 0;
     const bool is_negative = take(reader, '-');
-    const size_t integer = take_digits(reader, &digits);
-    const bool has_point = take(reader, '.');
-    const size_t fraction = has_point ? take_digits(reader, &digits) : 0;
-    if (integer == 0 || (has_point && fraction == 0) || integer + fraction > DIGITS_MAX) {
+    const uint8_t *const start = reader->at;
+    uint64_t digits = take_digits(reader, 0);
+    uint64_t value = digits << 16;
+    size_t count = (size_t)(reader->at - start);
+    if (count == 0 || count > DIGITS_MAX) {
         return false;
     }
-    return number_short(digits, (unsigned)fraction, is_negative, value_q16) == NUMBER_OK;
+    if (take(reader, '.')) {
+        const uint8_t *const point = reader->at;
+        digits = take_digits(reader, digits);
+        const size_t fraction = (size_t)(reader->at - point);
+        count += fraction;
+        if (fraction == 0 || count > DIGITS_MAX) {
+            return false;
+        }
+        value = rounded_q16(digits, fraction);
+    }
+    *value_q16 = (q16_t)(is_negative ? -(int64_t)value : (int64_t)value);
+    return value <= (uint64_t)INT32_MAX + is_negative;
 }
 
-/* 0 to 15, or 16 where the byte is no hex digit. */
-static unsigned hex_value(uint8_t byte)
+/* 0 to 15, or more where the byte is no hex digit. */
+static inline unsigned hex_value(uint8_t byte)
 {
-    const unsigned digit = (uint8_t)(byte - '0');
-    const unsigned letter = (uint8_t)((byte | 0x20u) - 'a');
+    const unsigned digit = byte - (unsigned)'0';
+    const unsigned letter = (byte | 0x20u) - 'a';
     return digit <= 9 ? digit : letter < 6 ? letter + 10u : 16u;
 }
 
-static bool take_mask(reader_t *reader, frame_t *frame)
+static inline bool take_mask(reader_t *reader, frame_t *frame)
 {
+    const uint8_t *const start = reader->at;
     unsigned mask = 0;
-    unsigned count = 0;
-    for (; reader->at < reader->end && hex_value(*reader->at) < 16 && count <= MASK_DIGITS_MAX; count++) {
-        mask = mask << 4 | hex_value(*reader->at++);
+    for (; reader->at < reader->end; reader->at++) {
+        const unsigned digit = hex_value(*reader->at);
+        if (digit > 15) {
+            break;
+        }
+        mask = mask << 4 | digit;
     }
     frame->relay_mask = (uint16_t)(mask & FRAME_RELAY_MASK);
     frame->has_mask = true;
-    return count > 0 && count <= MASK_DIGITS_MAX;
+    return reader->at > start && reader->at - start <= MASK_DIGITS_MAX;
 }
 
-static bool take_time(reader_t *reader, frame_t *frame)
+static inline bool take_time(reader_t *reader, frame_t *frame)
 {
-    uint64_t time_ms = 0;
-    const size_t count = take_digits(reader, &time_ms);
-    if (count == 0 || count > TIME_DIGITS_MAX || time_ms > FRAME_TIME_MAX_MS) {
+    const uint8_t *const start = reader->at;
+    const uint64_t time_ms = take_digits(reader, 0);
+    if (reader->at == start || reader->at - start > TIME_DIGITS_MAX || time_ms > FRAME_TIME_MAX_MS) {
         return false;
     }
     frame->time_ms = (uint32_t)time_ms;
@@ -79,7 +119,7 @@ static bool take_time(reader_t *reader, frame_t *frame)
 }
 
 /* Head, command, T and colon. */
-static bool take_command(reader_t *reader, frame_t *frame)
+static inline bool take_command(reader_t *reader, frame_t *frame)
 {
     if (reader->end - reader->at < 3 || reader->at[0] != '@') {
         return false;
@@ -91,7 +131,7 @@ static bool take_command(reader_t *reader, frame_t *frame)
 }
 
 /* A comma and what belongs behind the values, or in the untimed form nothing at all. */
-static bool take_last_field(reader_t *reader, frame_t *frame)
+static inline bool take_last_field(reader_t *reader, frame_t *frame)
 {
     const bool has_field = take(reader, ',');
     if (frame->is_timed) {

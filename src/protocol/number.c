@@ -271,11 +271,6 @@ static number_error_t put_q16(uint64_t value, bool is_negative, q16_t *value_q16
     return NUMBER_OK;
 }
 
-number_error_t number_short(uint64_t digits, unsigned fraction_digits, bool is_negative, q16_t *value_q16)
-{
-    return put_q16(round_halves(short_halves(digits, (int64_t)fraction_digits, k_q16)), is_negative, value_q16);
-}
-
 number_error_t number_finish(const number_t *self, q16_t *value_q16)
 {
     if (k_finish[self->phase] != NUMBER_OK) {

@@ -869,6 +869,47 @@ static void test_error_name_every_reason_has_its_own(void)
     TEST_ASSERT_EQUAL_STRING("value_overflow", frame_error_name(FRAME_ERR_VALUE_OVERFLOW));
 }
 
+/* By division, where digits / unit is below 2^15 and digits below 2^46. */
+static int64_t nearest_q16(uint64_t digits, uint64_t unit)
+{
+    const uint64_t floor_halves = (digits << 17) / unit;
+    const bool is_above_half = (floor_halves & 1) != 0 && (digits << 17) % unit != 0;
+    const bool is_tie_to_odd = (floor_halves & 3) == 3;
+    return (int64_t)((floor_halves >> 1) + (is_above_half || is_tie_to_odd));
+}
+
+static void test_next_values_of_every_number_of_decimals_are_rounded_to_the_nearest(void)
+{
+    uint64_t unit = 1;
+    for (unsigned decimals = 0; decimals <= 12; decimals++, unit *= 10) {
+        for (unsigned n = 0; n < 3000; n++) {
+            /* beside or on the middle between two values of Q16.16 */
+            const uint64_t end = unit < 1000000 ? (UINT64_C(32767) << 17) : UINT64_C(9000000000000000000) / unit;
+            const uint64_t middle = next_random() % end | 1u;
+            const uint64_t digits = (middle * unit >> 17) % (UINT64_C(32767) * unit) % UINT64_C(9999999999999) + below(2);
+            const bool is_negative = below(2) != 0;
+            char text[80];
+            (void)snprintf(text, sizeof text, "@C3:%s%llu", is_negative ? "-" : "", (unsigned long long)(digits / unit));
+            if (decimals > 0) {
+                const size_t length = strlen(text);
+                (void)snprintf(text + length, sizeof text - length, ".%0*llu", (int)decimals,
+                               (unsigned long long)(digits % unit));
+            }
+            (void)strcat(text, ",1.5,2,F0#");
+            frame_scanner_t scanner;
+            frame_t frame = {.count = 0};
+            frame_reject_t reject;
+            size_t position = 0;
+            frame_scanner_init(&scanner, FRAME_V3);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(
+                FRAME_EVENT_FRAME, frame_next(&scanner, (const uint8_t *)text, strlen(text), &position, &frame, &reject), text);
+            const int64_t nearest = nearest_q16(digits, unit);
+            TEST_ASSERT_EQUAL_INT64_MESSAGE(is_negative ? -nearest : nearest, frame.value_q16[0], text);
+            TEST_ASSERT_EQUAL_INT64_MESSAGE(Q16_ONE * 3 / 2, frame.value_q16[1], text);
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -891,6 +932,7 @@ int main(void)
     RUN_TEST(test_next_lenient_bad_text_does_not_spoil_the_frame_behind_it);
     RUN_TEST(test_feed_serial_line_without_tails_counts_its_rejects);
     RUN_TEST(test_next_values_of_thousands_of_digits_are_legal);
+    RUN_TEST(test_next_values_of_every_number_of_decimals_are_rounded_to_the_nearest);
     RUN_TEST(test_next_random_frames_come_back_exactly);
     RUN_TEST(test_next_good_frames_among_bad_text_are_all_delivered);
     RUN_TEST(test_next_damaged_frames_deliver_what_the_oracle_delivers);
