@@ -7,14 +7,17 @@
  * often come later than that, at most the larger of 2 ms and half a period. While the rate changes or the network holds samples
  * back the delay may grow by 2 periods more; then it falls again by 6 % of the time that passes.
  * Coarse values, whose steps ask for more than the axes can do (stream_set_stop()), are smoothed: a mean of up to 16 points,
- * taken thrice, 1.5 periods later for each point of it but the first. Losses: where a point is missing when the curve needs it,
- * the motion goes on, by the last step and its bend (not a jump: at most 4 x the larger of the two steps before), then ever more
- * slowly, no further than the axis takes to stop (stream_set_stop()), or 36 ms (fast: and its lead). When samples are back, or
- * after 150 ms without, the curve comes back to the samples, or to the last one, softly: position and velocity of the control
- * points go on as they were. So an ended stream rests exactly on its last sample, within 2 s, or 24 periods of a slow one. A
- * stream that is known may be away for a second and goes on; a new rate gives a new grid, on which the curve goes on. Hints: a
- * sender that states its period may be slower, and tells from its second sample on what is late and what is lost. The margin is
- * then an eighth of the period at least, as a guess at so slow a stream is poor.
+ * taken thrice, 1.5 periods later for each point of it but the first.
+ *
+ * Losses: where a point is missing when the curve needs it, the motion goes on, by the last step and its bend (not a jump: at
+ * most 4 x the larger of the two steps before), then ever more slowly, no further than the axis takes to stop
+ * (stream_set_stop()), or 36 ms (fast: and its lead). When samples are back, or after 150 ms without, the curve
+ * comes back to the samples, or to the last one, softly: position and velocity of the control points go on as they were. So an
+ * ended stream rests exactly on its last sample, within 2 s, or 24 periods of a slow one. A stream that is known may be away for
+ * a second and goes on; a new rate gives a new grid, on which the curve goes on.
+ *
+ * Hints: a sender that states its period may be slower, and tells from its second sample on what is late and what is lost. The
+ * margin is then an eighth of the period at least, as a guess at so slow a stream is poor.
  */
 #ifndef HEAVE_STREAM_H
 #define HEAVE_STREAM_H
