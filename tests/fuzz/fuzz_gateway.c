@@ -112,6 +112,28 @@ static void tidy_owner(owner_t *owner)
     owner->peer.is_ipv6 = was.peer.is_ipv6;
 }
 
+static void tidy_target(motion_target_t *target)
+{
+    const motion_target_t was = *target;
+    memset(target, 0, sizeof *target);
+    target->space = was.space;
+    memcpy(target->value_q32, was.value_q32, sizeof was.value_q32);
+    target->has_angle = was.has_angle;
+    target->angle_deg_q32 = was.angle_deg_q32;
+    target->is_timed = was.is_timed;
+    target->time_ms = was.time_ms;
+}
+
+static void tidy_jump(confirm_jump_t *jump)
+{
+    const confirm_jump_t was = *jump;
+    memset(jump, 0, sizeof *jump);
+    jump->space = was.space;
+    jump->axis = was.axis;
+    jump->value_q32 = was.value_q32;
+    jump->from_q32 = was.from_q32;
+}
+
 /* All a gateway knows but what is said and counted of rejects. */
 static void forget_rejects(const gateway_t *gateway, gateway_t *out)
 {
@@ -128,6 +150,10 @@ static void forget_rejects(const gateway_t *gateway, gateway_t *out)
     tidy_owner(&out->owner);
     tidy_owner(&out->snapshot.owner);
     tidy_owner(&out->snapshot.other);
+    tidy_target(&out->confirm.last);
+    tidy_target(&out->confirm.waiting);
+    tidy_jump(&out->confirm.jump);
+    tidy_jump(&out->confirm.drop);
 }
 
 static void compare(void)
