@@ -29,6 +29,14 @@ typedef enum {
 #define HV_MUST_CHECK
 #endif
 
+/** Marks a function whose unsigned arithmetic is modulo 2^N on purpose (counters that wrap, two's complement by hand): clang's
+ * check for unsigned overflow, which all other code of the core passes, leaves it out. */
+#if defined(__clang__)
+#define HV_WRAPS __attribute__((no_sanitize("unsigned-integer-overflow")))
+#else
+#define HV_WRAPS
+#endif
+
 /** Called when an HV_ASSERT fails: supplied by the program (hosted: print and abort; firmware: fail silent). Never returns. */
 void hv_assert_failed(const char *file, int line);
 

@@ -116,7 +116,7 @@ static void come_back(cia402_t *self)
     self->is_refused = false;
     self->is_preop_due = true;
     self->free_us = self->now_us;
-    self->sync_us = self->now_us;
+    self->sync_us = self->now_us - self->config->period_us; /* the next one is due now */
     self->is_due = true;
     self->restarts++;
 }

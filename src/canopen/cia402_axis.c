@@ -121,7 +121,7 @@ static int32_t i32_of(uint32_t bits)
 }
 
 /* The position goes on where the 32 bits of the drive wrap round. */
-static void take_position(cia402_drive_t drive, uint32_t bits)
+HV_WRAPS static void take_position(cia402_drive_t drive, uint32_t bits)
 {
     cia402_axis_t *self = drive.axis;
     const int32_t moved = i32_of(bits - (uint32_t)self->actual_counts);

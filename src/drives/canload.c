@@ -46,11 +46,12 @@ static uint64_t interval_of(const canload_entry_t *entry, uint32_t period_us)
 
 uint32_t canload_ppm(const canload_entry_t *entry, size_t count, uint32_t period_us, uint32_t bitrate_bps)
 {
-    uint64_t sum = 0;
+    uint32_t sum = 0;
     for (size_t i = 0; i < count; i++) {
-        sum += ppm_of(&entry[i], interval_of(&entry[i], period_us), bitrate_bps);
+        const uint64_t ppm = ppm_of(&entry[i], interval_of(&entry[i], period_us), bitrate_bps);
+        sum = ppm < UINT32_MAX - sum ? sum + (uint32_t)ppm : UINT32_MAX;
     }
-    return sum < UINT32_MAX ? (uint32_t)sum : UINT32_MAX;
+    return sum;
 }
 
 uint32_t canload_fitting_period_us(const canload_entry_t *entry, size_t count, uint32_t bitrate_bps, uint32_t limit_ppm,

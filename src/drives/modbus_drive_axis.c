@@ -131,7 +131,7 @@ static void take_failure(modbus_drive_axis_t *self, const modbus_drive_map_t *ma
 }
 
 /* True where a result is of what goes on now; the slot is free where nothing newer waits in it. */
-static bool is_current(modbus_drive_slot_t *slot, const modbus_result_t *result)
+HV_WRAPS static bool is_current(modbus_drive_slot_t *slot, const modbus_result_t *result)
 {
     if ((int32_t)(result->tag - slot->first) < 0) {
         return false;

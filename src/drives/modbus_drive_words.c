@@ -79,8 +79,8 @@ static const char *trouble_text(uint32_t trouble)
     if (trouble == MODBUS_DRIVE_NO_TROUBLE) {
         return "";
     }
-    const uint32_t index = trouble - MODBUS_DRIVE_NO_LINK;
-    return index < sizeof k_texts / sizeof k_texts[0] ? k_texts[index] : "its own alarm";
+    const bool is_ours = trouble >= MODBUS_DRIVE_NO_LINK && trouble - MODBUS_DRIVE_NO_LINK < sizeof k_texts / sizeof k_texts[0];
+    return is_ours ? k_texts[trouble - MODBUS_DRIVE_NO_LINK] : "its own alarm";
 }
 
 static const char *exception_text(uint8_t exception)

@@ -40,7 +40,7 @@ int64_t fx_sub_sat(int64_t a, int64_t b)
 
 /* One digit of the long division below: the largest q < 2^32 with q * divisor <= remainder * 2^32 + digit.
  * divisor has its top bit set and remainder < divisor; the guess from the top half is at most 2 too large. */
-static uint64_t divide_digit(uint64_t *remainder, uint64_t digit, uint64_t divisor)
+HV_WRAPS static uint64_t divide_digit(uint64_t *remainder, uint64_t digit, uint64_t divisor)
 {
     const uint64_t top = divisor >> 32, bottom = divisor & UINT32_MAX;
     uint64_t quotient = *remainder / top;
@@ -71,12 +71,12 @@ static uint64_t divide_u128(fx_u128_t value, uint64_t divisor)
 }
 
 /* |value| as unsigned, exact for INT64_MIN too. */
-static uint64_t magnitude(int64_t value)
+HV_WRAPS static uint64_t magnitude(int64_t value)
 {
     return value < 0 ? 0 - (uint64_t)value : (uint64_t)value;
 }
 
-int64_t fx_mul_div(int64_t a, int64_t b, int64_t divisor)
+HV_WRAPS int64_t fx_mul_div(int64_t a, int64_t b, int64_t divisor)
 {
     const bool is_negative = ((a < 0) != (b < 0)) != (divisor < 0);
     const fx_u128_t product = FX_WIDE_PRODUCT(magnitude(a), magnitude(b));

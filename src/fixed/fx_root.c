@@ -33,7 +33,7 @@ static uint64_t inverse_root_q31(uint64_t x_q64)
 }
 
 /* floor(sqrt(value)) for value >= 2^62. */
-static uint32_t root_normalised(uint64_t value)
+HV_WRAPS static uint32_t root_normalised(uint64_t value)
 {
     const uint64_t inverse_q31 = inverse_root_q31(value);
     const uint64_t product = ((value >> 32) * inverse_q31) >> 31;

@@ -82,7 +82,7 @@ static const q62_t k_sine_q62[STEPS_PER_QUADRANT + 1] = {
 };
 
 /* Sine of any step of the turn. Arithmetic instead of branches: signs of small angles are as good as random. */
-static q62_t step_sine(unsigned step)
+HV_WRAPS static q62_t step_sine(unsigned step)
 {
     const unsigned in_quadrant = step % STEPS_PER_QUADRANT;
     const unsigned is_falling = step / STEPS_PER_QUADRANT & 1u;

@@ -166,7 +166,7 @@ static void take_mask(gateway_t *self, const frame_t *frame)
         return;
     }
     const uint16_t wired = (uint16_t)((1u << self->settings.relay_count) - 1u);
-    self->snapshot.counters.relay_missing += (frame->relay_mask & FRAME_RELAY_MASK & ~wired) != 0;
+    self->snapshot.counters.relay_missing += (frame->relay_mask & FRAME_RELAY_MASK & ~(unsigned)wired) != 0;
     self->frame_mask = frame->relay_mask & wired;
 }
 

@@ -49,7 +49,8 @@ static void eliminate(unsigned size, unsigned column, int64_t inverse_q28, int64
 /* Finds the unknowns from the last to the first; false if one is out of all proportion. */
 static bool substitute_back(unsigned size, const int64_t inverse_q28[], int64_t matrix_q28[][POSE_AXES], q32_t rhs_q32[])
 {
-    for (unsigned row = size; row-- > 0;) {
+    for (unsigned row = size; row > 0;) {
+        row--;
         q32_t sum = rhs_q32[row];
         for (unsigned i = row + 1; i < size; i++) {
             sum -= fx_mul_shift_fit(matrix_q28[row][i], rhs_q32[i], 28);

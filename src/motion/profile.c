@@ -82,7 +82,8 @@ void quintic_add_motion(quintic_t *self, unsigned axis, const ramp_state_t *from
 static q32_t polynomial(const q32_t *c, const int64_t *factor, unsigned first, q62_t t_q62)
 {
     q32_t sum_q32 = 0;
-    for (unsigned i = 5; i-- > first;) {
+    for (unsigned i = 5; i > first;) {
+        i--;
         sum_q32 = fx_mul_shift(sum_q32, t_q62, 62) + factor[i] * c[i];
     }
     return sum_q32;

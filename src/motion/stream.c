@@ -108,11 +108,11 @@ static unsigned judge_periods(const stream_t *self, uint64_t now_us, const q32_t
 }
 
 /* Which of the samples are taken, from the mean interval of all of them. */
-static void find_thinning(stream_thin_t *thin, uint64_t now_us)
+HV_WRAPS static void find_thinning(stream_thin_t *thin, uint64_t now_us)
 {
     const uint64_t gap_us = now_us - thin->last_us < THIN_GAP_MAX_US ? now_us - thin->last_us : THIN_GAP_MAX_US;
     thin->last_us = now_us;
-    thin->gaps_us += (uint32_t)gap_us - thin->gaps_us / THIN_GAPS;
+    thin->gaps_us = thin->gaps_us - thin->gaps_us / THIN_GAPS + (uint32_t)gap_us;
     const uint32_t mean_us = thin->gaps_us / THIN_GAPS + 1;
     if (thin->each * mean_us < THIN_BELOW_US || (thin->each - 1) * mean_us > THIN_ABOVE_US) {
         thin->each = (THIN_BELOW_US + mean_us - 1) / mean_us;

@@ -32,7 +32,7 @@ static unsigned slot(uint32_t index)
 }
 
 /* Index of the newest sample. */
-static uint32_t newest(const stream_curve_t *self)
+HV_WRAPS static uint32_t newest(const stream_curve_t *self)
 {
     return self->head + (uint32_t)self->ahead;
 }
@@ -86,7 +86,7 @@ static int32_t reach(const stream_curve_t *self, unsigned axis, q32_t step_q32)
 }
 
 /* The point of that index; of coarse values, a mean of the points up to it. */
-static q32_t mean_point(const stream_curve_t *self, unsigned axis, uint32_t index)
+HV_WRAPS static q32_t mean_point(const stream_curve_t *self, unsigned axis, uint32_t index)
 {
     const int32_t window = self->window;
     int64_t sum_q32 = 0;
@@ -101,7 +101,7 @@ static q32_t mean_point(const stream_curve_t *self, unsigned axis, uint32_t inde
 
 /* Where a control point for the point of that index belongs: on the point, or led ahead of it. Forward in time by L periods is
  * 1 + L D + ..., D the backward difference; the share of D^2 also undoes some of what the quadratic spline smooths away. */
-static q32_t led_point(const stream_curve_t *self, unsigned axis, uint32_t index)
+HV_WRAPS static q32_t led_point(const stream_curve_t *self, unsigned axis, uint32_t index)
 {
     const q32_t here_q32 = mean_point(self, axis, index);
     if (self->lead_q32 == 0) {
@@ -114,7 +114,7 @@ static q32_t led_point(const stream_curve_t *self, unsigned axis, uint32_t index
 }
 
 /* Where the last three control points belong, newest first. */
-static void points_at_head(const stream_curve_t *self, q32_t point_q32[3][AXES_MAX])
+HV_WRAPS static void points_at_head(const stream_curve_t *self, q32_t point_q32[3][AXES_MAX])
 {
     for (uint32_t back = 0; back < 3; back++) {
         for (unsigned axis = 0; axis < self->axes; axis++) {
@@ -219,7 +219,7 @@ void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t peri
 /* Where the motion of the last samples goes in one period. A jump is not taken for a motion: one just made would go on (hence at
  * most 4 x the larger of the two steps before), one made before would be undone (hence the bend, where it turned, at most the
  * step). */
-static q32_t lead(const stream_curve_t *self, unsigned axis)
+HV_WRAPS static q32_t lead(const stream_curve_t *self, unsigned axis)
 {
     const uint32_t last = newest(self);
     q32_t step[3];
@@ -233,7 +233,7 @@ static q32_t lead(const stream_curve_t *self, unsigned axis)
     return fx_clamp(step[0] + fx_clamp(bend, -bend_max, bend_max), -4 * before, 4 * before);
 }
 
-static void begin_guessing(stream_curve_t *self)
+HV_WRAPS static void begin_guessing(stream_curve_t *self)
 {
     self->guesses = 0;
     for (unsigned axis = 0; axis < self->axes; axis++) {
@@ -273,7 +273,7 @@ static void guess(stream_curve_t *self, q32_t *point_q32)
 }
 
 /* Guesses again what is committed beyond the newest sample. */
-static void guess_again(stream_curve_t *self)
+HV_WRAPS static void guess_again(stream_curve_t *self)
 {
     begin_guessing(self);
     for (int32_t behind = -self->ahead; behind > 0; behind--) {
@@ -290,7 +290,7 @@ static q32_t point_between(q32_t before_q32, q32_t last_q32, q32_t next_q32, int
 
 /* Points between the sample before, so many periods ago, and the newest, as far as they are committed: now they can be
  * interpolated. */
-static void fill_gap(stream_curve_t *self, int32_t periods, const q32_t *before_q32)
+HV_WRAPS static void fill_gap(stream_curve_t *self, int32_t periods, const q32_t *before_q32)
 {
     const q32_t *const two_before_q32 = self->point_q32[slot(newest(self) - 3)];
     for (int32_t back = self->ahead > 1 ? self->ahead : 1; back < periods && back < self->ahead + BEHIND_MAX; back++) {
@@ -303,7 +303,7 @@ static void fill_gap(stream_curve_t *self, int32_t periods, const q32_t *before_
     }
 }
 
-void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32)
+HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32)
 {
     q32_t was_q32[3][AXES_MAX];
     q32_t before_q32[AXES_MAX];
@@ -336,7 +336,7 @@ void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sa
     }
 }
 
-q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *sample_q32, unsigned periods, q32_t *step_q32)
+HV_WRAPS q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *sample_q32, unsigned periods, q32_t *step_q32)
 {
     const int64_t n = periods;
     q32_t misfit_q32 = 0;
@@ -362,7 +362,7 @@ bool stream_curve_is_newest(const stream_curve_t *self, const q32_t *sample_q32)
 }
 
 /* Between the last point committed and the next sample. */
-static void interpolate(stream_curve_t *self, q32_t *point_q32)
+HV_WRAPS static void interpolate(stream_curve_t *self, q32_t *point_q32)
 {
     int32_t periods = 2;
     while (!self->is_sample[slot(self->head + (uint32_t)periods)]) {
@@ -378,7 +378,7 @@ static void interpolate(stream_curve_t *self, q32_t *point_q32)
 
 /* No sample has come for so long that none is expected: as if the last one had come again and again, the curve goes back to it.
  */
-static void give_up(stream_curve_t *self)
+HV_WRAPS static void give_up(stream_curve_t *self)
 {
     q32_t was_q32[3][AXES_MAX];
     points_at_head(self, was_q32);
@@ -392,7 +392,7 @@ static void give_up(stream_curve_t *self)
 }
 
 /* Settles the point after head. */
-static void find_next(stream_curve_t *self)
+HV_WRAPS static void find_next(stream_curve_t *self)
 {
     q32_t *const point_q32 = self->point_q32[slot(self->head + 1)];
     if (self->ahead > 0) {
@@ -422,7 +422,7 @@ void stream_curve_skip(stream_curve_t *self)
     keep_going(self, was_q32, SHIFT_GUESSES);
 }
 
-void stream_curve_stretch(stream_curve_t *self)
+HV_WRAPS void stream_curve_stretch(stream_curve_t *self)
 {
     q32_t was_q32[3][AXES_MAX];
     if (self->ahead >= AHEAD_MAX || self->ahead <= -BEHIND_MAX) {
@@ -464,7 +464,7 @@ static void put_control(stream_curve_t *self)
     }
 }
 
-void stream_curve_commit(stream_curve_t *self)
+HV_WRAPS void stream_curve_commit(stream_curve_t *self)
 {
     find_next(self);
     for (unsigned i = 0; i < 3; i++) {
@@ -486,7 +486,7 @@ static void control_from(stream_style_t style, q32_t pos_q32, q32_t vel_q32, q32
     control_q32[2] = middle_q32 + vel_q32 + acc / 2;
 }
 
-void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const ramp_ref_t *now, const q32_t *sample_q32)
+HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const ramp_ref_t *now, const q32_t *sample_q32)
 {
     const int64_t n_q16 = self->period_cycles_q16;
     self->ahead = 0;

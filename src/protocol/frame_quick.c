@@ -44,7 +44,7 @@ static inline bool take(reader_t *reader, uint8_t byte)
 }
 
 /* Appends all digits that follow to the number; it wraps where there are too many. */
-static inline uint64_t take_digits(reader_t *reader, uint64_t number)
+HV_WRAPS static inline uint64_t take_digits(reader_t *reader, uint64_t number)
 {
     const uint8_t *at = reader->at;
     for (; at < reader->end; at++) {
@@ -84,7 +84,7 @@ static inline bool take_value(reader_t *reader, q16_t *value_q16)
 }
 
 /* 0 to 15, or more where the byte is no hex digit. */
-static inline unsigned hex_value(uint8_t byte)
+HV_WRAPS static inline unsigned hex_value(uint8_t byte)
 {
     const unsigned digit = byte - (unsigned)'0';
     const unsigned letter = (byte | 0x20u) - 'a';

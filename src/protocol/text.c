@@ -40,7 +40,8 @@ void text_put_u32(text_t *self, uint32_t number)
 void text_put_hex(text_t *self, uint32_t number, unsigned digits_min)
 {
     static const char k_digits[] = "0123456789ABCDEF";
-    for (unsigned digit = 8; digit-- > 0;) {
+    for (unsigned digit = 8; digit > 0;) {
+        digit--;
         if (digit < digits_min || digit == 0 || number >> (4 * digit) != 0) {
             text_put_char(self, k_digits[(number >> (4 * digit)) & 0xFu]);
         }

@@ -586,6 +586,24 @@ static void test_leave_drives_with_torque_are_left_to_their_watchdogs(void)
 
 /* --- The bus --- */
 
+static void test_bus_off_ended_syncs_go_on_at_their_period(void)
+{
+    come_up();
+    sim_can_set_state(&node, HAL_CAN_BUS_OFF);
+    const uint32_t restarts = driver.restarts;
+    for (unsigned n = 0; n < 4000 && driver.restarts == restarts; n++) {
+        (void)!cycle();
+    }
+    TEST_ASSERT_EQUAL_UINT32(restarts + 1, driver.restarts);
+    const uint32_t syncs = driver.syncs; /* the first of them left in the cycle of the restart */
+    cycles(PERIOD - 1);
+    TEST_ASSERT_EQUAL_UINT32(syncs, driver.syncs);
+    for (unsigned n = 1; n <= 5; n++) {
+        cycles(PERIOD);
+        TEST_ASSERT_EQUAL_UINT32(syncs + n, driver.syncs);
+    }
+}
+
 static void test_bus_off_keeps_silent_until_the_drives_have_stopped(void)
 {
     come_up();
@@ -881,6 +899,7 @@ int main(void)
     RUN_TEST(test_request_reset_is_one_edge_and_only_when_asked);
     RUN_TEST(test_leave_drives_without_torque_forget_the_gateway);
     RUN_TEST(test_leave_drives_with_torque_are_left_to_their_watchdogs);
+    RUN_TEST(test_bus_off_ended_syncs_go_on_at_their_period);
     RUN_TEST(test_bus_off_keeps_silent_until_the_drives_have_stopped);
     RUN_TEST(test_bus_that_echoes_nothing_is_gone_after_three_periods);
     RUN_TEST(test_bus_whose_queue_stays_full_is_gone_after_three_periods);
