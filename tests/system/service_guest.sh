@@ -91,6 +91,18 @@ keeps_incidents() {
     [ "$(ls /var/lib/heave/demo | wc -l)" -ge 1 ]
 }
 
+metric() { sed -n "s/^$1 //p" /run/heave/heave.prom; }
+has_advanced() { [ "$(metric heave_cycles_total)" -gt "$1" ]; }
+
+writes_metrics() {
+    local cycles
+    until_true test -s /run/heave/heave.prom
+    [ "$(stat -c %u /run/heave/heave.prom)" = "$(stat -c %u "/proc/$(property MainPID)")" ]
+    cycles=$(metric heave_cycles_total)
+    until_true has_advanced "$cycles"
+    [ "$(find /run/heave -name '*.part' -mmin +1 | wc -l)" = 0 ]
+}
+
 is_fed() {
     [ "$(property WatchdogUSec)" = 2s ]
     local pid
@@ -154,6 +166,43 @@ settles_when_stopped() {
     [ ! -e /run/heave ]
 }
 
+chip_label() { cat /sys/class/gpio/gpiochip*/label | head -n 1; }
+
+gives_chips_to_its_group() {
+    insmod /gpio-amd-fch.ko
+    insmod /pcengines-apuv2.ko
+    until_true test -e /dev/gpiochip0
+    until_true test "$(stat -c %G:%a /dev/gpiochip0)" = heave:660
+    fails runuser -u nobody -- test -r /dev/gpiochip0
+}
+
+has_incident() { compgen -G "/var/lib/heave/gpio/incident-*/trace.csv"; }
+
+# Nothing is behind the lines: all are low, which is a closed e-stop.
+uses_lines() {
+    sed "/^\[relays\]/,/^driver/ s/^driver.*/driver = gpio\nchip = $(chip_label)/; s/^lines *=.*/lines = 0, 1, 2/" /etc/heave/demo.ini >/etc/heave/gpio.ini
+    printf '[inputs]\ndriver = gpio\nchip = %s\nestop = 4\nactive_low = yes\n[black-box]\nseconds = 10\n' "$(chip_label)" >>/etc/heave/gpio.ini
+    systemctl start $unit
+    [ "$(stat -c %u "/proc/$(property MainPID)")" -ge 61184 ]
+    until_true is_state ENGAGED
+    mountpoint -q /sys/kernel/debug || mount -t debugfs none /sys/kernel/debug
+    [ "$(grep -c '|heaved relays' /sys/kernel/debug/gpio)" = 3 ]
+    [ "$(grep -c '|heaved inputs' /sys/kernel/debug/gpio)" = 1 ]
+    heavectl --json status | grep -q '"realtime":true'
+}
+
+keeps_the_incident_of_a_fault() {
+    local device
+    device=$(dirname "$(readlink -f /sys/bus/gpio/devices/gpiochip0)")
+    basename "$device" >"$device/driver/unbind"
+    until_true is_state ESTOP
+    until_true has_incident
+    [ "$(stat -c %u /var/lib/heave/gpio/incident-*/trace.csv)" = "$(stat -c %u "/proc/$(property MainPID)")" ]
+    grep -q ESTOP /var/lib/heave/gpio/incident-*/trace.csv
+    systemctl stop $unit
+    [ "$(property Result)" = success ]
+}
+
 settles_when_removed() {
     systemctl start $unit
     until_true is_state ENGAGED
@@ -178,6 +227,7 @@ check "has real-time priority and locked memory all the same" is_real_time
 check "members of group heave may use heavectl, others are told that they may not; anybody reads the metrics" may_be_used_by_its_group
 check "follows frames from the network" follows_frames
 check "writes incidents" keeps_incidents
+check "writes metrics, again and again, as its own user" writes_metrics
 check "feeds the watchdog" is_fed
 check "is ended by the watchdog when it hangs, and started again" is_ended_when_it_hangs
 check "is started again after kill -9" is_started_again_when_killed
@@ -186,6 +236,16 @@ check "a second platform is not started, and takes nothing from the first" is_th
 check "an upgrade of the package does not touch it" goes_on_through_an_upgrade
 check "systemctl stop settles the platform; exit 0" settles_when_stopped
 check "wrong or missing configuration: exit 78 or 66, and no restart" stays_down_when_misconfigured
+if [ -e /pcengines-apuv2.ko ]; then
+    check "GPIO chips are the group's, by the rule of udev, and nobody else's" gives_chips_to_its_group
+    unit=heave@gpio
+    check "uses lines of a chip as the user of its own making" uses_lines
+    check "the chip goes: an e-stop, and its incident is in the state directory" keeps_the_incident_of_a_fault
+    systemctl stop $unit
+    unit=heave@demo
+else
+    say "ok $((++number)) - GPIO # SKIP the modules are not to be had"
+fi
 check "removing the package settles it first; purging takes what is the package's" settles_when_removed
 say "1..$number"
 sync

@@ -30,6 +30,9 @@ LIMIT_S = 1500
 TOLERANT = "no_timer_check nowatchdog rcupdate.rcu_cpu_stall_suppress=1"
 UNNEEDED = ("usr/share/doc", "usr/share/man", "usr/share/locale", "usr/share/info", "usr/share/zoneinfo", "var/cache/apt", "var/lib/apt/lists", "usr/lib/udev/hwdb.bin", "usr/lib/udev/hwdb.d")
 MASKED = ("systemd-modules-load.service", "systemd-logind.service", "getty.target", "e2scrub_reap.service", "systemd-udev-trigger.service", "timers.target")
+# A chip that Debian's kernel has a driver for, which asks no more than the board's name (/drivers/platform/x86/pcengines-apuv2.c); there is nothing behind its lines.
+MODULES = ("gpio-amd-fch", "pcengines-apuv2")
+BOARD = ("-smbios", "type=1,manufacturer=PC Engines,product=apu2", "-smbios", "type=2,manufacturer=PC Engines,product=apu2")
 UNIT = """[Unit]
 After=multi-user.target
 [Service]
@@ -58,7 +61,25 @@ def find_root():
     return root
 
 
-def make_initramfs(system, deb, folder):
+def find_modules(kernel_dir):
+    """MODULES of the kernel's own package, in the cache; empty where it is not to be had."""
+    release = Path(kernel_dir).name.removeprefix("rt-").rpartition("-")[0]
+    cache = Path(kernel_dir).parent / f"gpio-{release}"
+    files = [cache / f"{name}.ko" for name in MODULES]
+    if not all(file.exists() for file in files):
+        with tempfile.TemporaryDirectory(prefix="heave-modules-") as name:
+            unpack = "tar -x --wildcards --no-anchored --transform='s,.*/,,' " + " ".join(f"'{module}.ko'" for module in MODULES)
+            run = subprocess.run(f"apt-get -q download linux-image-{release} && dpkg-deb --fsys-tarfile linux-image-*.deb | {unpack}", shell=True, cwd=name,
+                                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+            if run.returncode != 0:
+                return []
+            cache.mkdir(exist_ok=True)
+            for file in files:
+                shutil.copy(Path(name) / file.name, file)
+    return files
+
+
+def make_initramfs(system, deb, modules, folder):
     root = folder / "root"
     subprocess.run(["cp", "-a", system, root], check=True)
     for name in UNNEEDED:
@@ -66,6 +87,8 @@ def make_initramfs(system, deb, folder):
     shutil.copy(deb, root / "heave.deb")
     shutil.copy(test_package.later(deb, folder), root / "later.deb")
     shutil.copy(HERE / "service_guest.sh", root / "guest.sh")
+    for module in modules:
+        shutil.copy(module, root / module.name)
     (root / "etc/systemd/system/guest.service").write_text(UNIT, encoding="ascii")
     for name in MASKED:
         (root / "etc/systemd/system" / name).symlink_to("/dev/null")
@@ -83,11 +106,11 @@ def boot(system, deb):
     kernel_dir = kernel.find("rt.sh")
     with tempfile.TemporaryDirectory(prefix="heave-vm-") as name:
         folder = Path(name)
-        initramfs = make_initramfs(system, deb, folder)
+        initramfs = make_initramfs(system, deb, find_modules(kernel_dir), folder)
         command_line = f"console=ttyS0 quiet panic=-1 {TOLERANT} systemd.show_status=0 TERM=dumb"
         status, console = kernel.bounded(
             ["setpriv", "--pdeathsig", "KILL", QEMU, "-nodefaults", "-no-user-config", "-display", "none", "-no-reboot", "-accel", "tcg", "-cpu",
-             "qemu64,+rdrand", "-smp", "2", "-m", "1024", "-kernel", f"{kernel_dir}/vmlinux", "-initrd", initramfs, "-append", command_line,
+             "qemu64,+rdrand", *BOARD, "-smp", "2", "-m", "1024", "-kernel", f"{kernel_dir}/vmlinux", "-initrd", initramfs, "-append", command_line,
              "-serial", "stdio", "-serial", f"file:{folder}/report"], LIMIT_S)
         return status, console, kernel.read(folder / "report").replace("\r", "")
 
