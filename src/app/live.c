@@ -381,6 +381,9 @@ static int run(live_t *self, const config_t *config)
         self->is_thread_running = false;
     }
     const int code = finish(self);
+    if (has_ended && self->loop.has_lost_clock) {
+        return say(EXIT_SOFTWARE, "the system does not wait for the next cycle: all drives were told to stop now");
+    }
     if (self->signals > 1) {
         return say(EXIT_REFUSED, "ended at once by a second signal");
     }

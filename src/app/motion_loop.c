@@ -300,6 +300,8 @@ static void run(motion_loop_t *self)
     uint64_t deadline_us = hal_clock_now_us(self->clock) + cycle_us;
     while (!gateway_is_finished(&self->session.gateway)) {
         if (hal_clock_sleep_until_us(self->clock, deadline_us) != HV_OK) {
+            (void)!drives_request(self->io.drives, DRIVES_QUICK_STOP);
+            self->has_lost_clock = true;
             break;
         }
         const uint64_t now_us = hal_clock_now_us(self->clock);

@@ -102,6 +102,7 @@ typedef struct {
     ring_t trace;         /**< trace_row_t to it */
     uint32_t is_quit;     /**< atomic: the service thread wants an end at once */
     uint32_t is_ended;    /**< atomic: the thread has done its last cycle */
+    bool has_lost_clock;  /**< once it has ended: because it could not wait for its next cycle */
     uint32_t memory;      /**< atomic: motion_memory_t */
     pthread_t thread;
 

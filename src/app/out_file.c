@@ -32,6 +32,7 @@ bool out_file_open(out_file_t *self, const char *path, out_file_patience_t patie
     const int flags = O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | (patience == OUT_FILE_WAITS ? 0 : O_NONBLOCK);
     const bool is_stdout = strcmp(path, "-") == 0;
     self->length = 0;
+    self->patience = patience;
     self->fd = is_stdout ? STDOUT_FILENO : open(path, flags, 0666);
     self->error = self->fd < 0 ? errno : 0;
     if (is_stdout && patience == OUT_FILE_GOES_ON) {
@@ -45,6 +46,19 @@ bool out_file_has_room(const out_file_t *self, size_t length)
     return OUT_FILE_BYTES - self->length >= length;
 }
 
+/* Standard output may have been set not to block by another program that has it, too. False where what is left has to wait. */
+static bool waits_for_room(out_file_t *self)
+{
+    struct pollfd wait = {.fd = self->fd, .events = POLLOUT};
+    if (self->patience != OUT_FILE_WAITS) {
+        return false;
+    }
+    if (poll(&wait, 1, -1) < 0 && errno != EINTR) {
+        self->error = errno;
+    }
+    return true;
+}
+
 void out_file_flush(out_file_t *self)
 {
     size_t done = 0;
@@ -53,7 +67,9 @@ void out_file_flush(out_file_t *self)
         if (written >= 0) {
             done += (size_t)written;
         } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
-            break;
+            if (!waits_for_room(self)) {
+                break;
+            }
         } else if (errno != EINTR) {
             self->error = errno;
         }

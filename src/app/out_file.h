@@ -9,19 +9,20 @@
 
 #define OUT_FILE_BYTES 65536u
 
-/** An open file. */
-typedef struct {
-    int fd;    /**< -1: closed */
-    int error; /**< errno of the first failed write, 0 = none; from then on everything is thrown away */
-    size_t length;
-    char bytes[OUT_FILE_BYTES];
-} out_file_t;
-
 /** What to do when the other end of a pipe does not read. */
 typedef enum {
     OUT_FILE_WAITS,  /**< for it */
     OUT_FILE_GOES_ON /**< keep what waits in the buffer, as far as it has room */
 } out_file_patience_t;
+
+/** An open file. */
+typedef struct {
+    int fd; /**< -1: closed */
+    out_file_patience_t patience;
+    int error; /**< errno of the first failed write, 0 = none; from then on everything is thrown away */
+    size_t length;
+    char bytes[OUT_FILE_BYTES];
+} out_file_t;
 
 /** Creates or empties a file, "-" being standard output.
  *  @return false: error says why */

@@ -1,0 +1,667 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_syscalls.py BIN JUDGE MODBUS_LINE [PART OF A NAME] - every place in src/app and hal/linux that asks the system for something is refused.
+
+The places are read from the programs themselves (objdump, addr2line), so that a new one is tried, or named here as not reached, or fails the test;
+a new function that is called has to be put into a list. failing_calls.c, preloaded, makes one place at a time fail with each errno that
+matters for its function, and malloc_guard.c watches the paths that this opens. What must hold, whatever fails:
+- nothing crashes, nothing hangs, the exit code is a documented one, and one that is not 0 comes with a line that says why;
+- a platform that runs goes on, or ends as documented; its set-points keep every limit, judged by JUDGE (tests/judge).
+BIN: of heaved and heavectl; MODBUS_LINE: tests/peers, the Modbus backend on its own.
+"""
+import collections
+import errno
+import logging
+import mmap
+import os
+import re
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import heave
+import tap
+
+SANE_EXITS = {0, 1, 64, 65, 66, 69, 70, 73, 74, 78}
+FOR_EVER = 1 << 40
+TIMES = 3  # for what is tried again
+PASSING = {"EINTR", "EAGAIN"}  # the system never goes on saying so
+LIMIT_S = 60
+
+# What cannot fail, or asks nobody, or only looks into memory.
+HARMLESS = set("""
+bcmp sin cos strcpy stpcpy strnlen __ctype_b_loc __cxa_finalize __errno_location __stack_chk_fail abort fmax fmin llround lround log10 pow sqrt sincos memchr memcmp memcpy memmove memset strchr strcmp
+strcspn strerror strlen strncmp strncpy strpbrk strrchr strspn strstr strtod strtoll strtoul strtoull snprintf vsnprintf gmtime_r inet_ntop inet_pton qsort
+getenv getopt_long gai_strerror ferror fileno free freeaddrinfo pthread_self pthread_attr_destroy pthread_attr_init pthread_attr_setinheritsched
+pthread_attr_setschedparam pthread_attr_setschedpolicy pthread_attr_setstacksize pthread_equal pthread_mutex_init pthread_mutex_lock pthread_mutex_unlock
+pthread_join pthread_sigmask sigaction sigaddset sigemptyset sigfillset signal getpid time clock_gettime setvbuf setlocale nl_langinfo isatty munlockall ini_parse_stream
+mnl_attr_get_payload mnl_attr_get_payload_len mnl_attr_get_type mnl_attr_parse mnl_attr_parse_nested mnl_attr_put_strz mnl_nlmsg_get_payload
+mnl_nlmsg_put_extra_header mnl_nlmsg_put_header mnl_cb_run mnl_socket_get_portid modbus_free modbus_get_socket modbus_set_byte_timeout
+modbus_set_response_timeout modbus_set_slave modbus_rtu_set_rts_delay gpiod_chip_label gpiod_chip_num_lines gpiod_line_consumer gpiod_line_is_used gpiod_line_name
+""".split())
+# Whose result nobody could do anything with: the file is gone, the pause was short. Formatted output fails into its stream, which is asked at its end.
+UNUSED = set("close closedir nanosleep gpiod_chip_close mnl_socket_close modbus_close fprintf vfprintf printf fputc putchar fputs puts fwrite".split())
+
+# Not tried here, by file, or file and function, and why.
+OTHERS = ("linux_can", "linux_gpio")  # takes a kernel with CAN or GPIO: what that makes fail is tried by tests/contract and by system tests on such a kernel
+ELSEWHERE = {("metrics.c", "unlink"): "tidies up after another failure; the next second tries again",
+             ("whole_file.c", "unlink"): "tidies up after another failure, which is what is told",
+             ("out_file.c", "poll"): "when a pipe is full at the end",
+             ("linux_modbus_link.c", "read"): "of what nobody asked for: comes as it comes",
+             ("linux_modbus_link.c", "tcflush"): "after an answer that does not come, and at the end, whose result is not used",
+             ("linux_modbus.c", "write"): "an eventfd that is never read beyond its end takes a 1",
+             ("linux_modbus_link.c", "modbus_rtu_set_serial_mode"): "takes a real UART",
+             ("linux_modbus_link.c", "modbus_rtu_set_rts"): "takes a real UART"}
+
+MEMORY, FILES = ["ENOMEM"], ["EACCES", "ENOENT", "EMFILE", "EIO"]
+DISK = ["ENOSPC", "EIO", "EDQUOT"]
+MODBUS = ["ETIMEDOUT", "ECONNRESET", "EIO", "EBADF", 112345688 + 11]  # the last one: EMBXGTAR, an exception of the device
+ERRNOS = {
+    "accept4": ["EMFILE", "ECONNABORTED", "EINTR", "EAGAIN"], "access": ["EACCES", "EROFS"], "bind": ["EADDRINUSE", "EACCES", "EADDRNOTAVAIL", "ENODEV"],
+    "calloc": MEMORY, "malloc": MEMORY, "realloc": MEMORY, "chmod": ["EPERM", "EROFS"], "clock_nanosleep": ["EINTR", "EINVAL"],
+    "connect": ["ECONNREFUSED", "EACCES", "ENOENT", "EAGAIN"], "eventfd": ["EMFILE", "ENOMEM"], "fchmod": ["EPERM", "EIO"], "fclose": DISK, "fflush": DISK,
+    "fdopen": MEMORY, "fopen": FILES, "fread": ["EIO"], "fstat": ["EIO"], "fsync": DISK, "getaddrinfo": [-3, -10], "getrusage": ["EINVAL"],
+    "getsockname": ["ENOBUFS"], "getsockopt": ["ENOBUFS"], "ioctl": ["EIO", "ENODEV", "ENOTTY", "EBUSY", "EPERM"], "listen": ["EADDRINUSE"],
+    "lstat": ["EACCES", "ENOENT"], "mkdir": ["EACCES", "ENOSPC", "EROFS"], "mlockall": ["EPERM", "ENOMEM"], "open": [*FILES, "ENOSPC", "EROFS", "EINTR"],
+    "open_memstream": MEMORY, "opendir": FILES, "poll": ["EINTR", "ENOMEM"], "ppoll": ["EINTR", "ENOMEM"], "pthread_create": ["EAGAIN", "EPERM"],
+    "pthread_setschedparam": ["EPERM"], "pthread_timedjoin_np": ["ETIMEDOUT"], "read": ["EINTR", "EAGAIN", "EIO"], "readdir": ["EIO"], "readlink": ["EACCES", "ENOENT"],
+    "realpath": ["EACCES", "ENOENT", "ELOOP"], "recv": ["ECONNRESET", "EINTR", "EAGAIN"],
+    "recvmsg": ["EINTR", "EAGAIN", "ENETDOWN", "ENOMEM", "ENODEV", "ENOBUFS", "ECONNREFUSED"], "rename": ["ENOSPC", "EACCES", "EIO"], "rmdir": ["ENOTEMPTY", "EACCES"],
+    "sched_setscheduler": ["EPERM"], "send": ["EPIPE", "EAGAIN", "EINTR", "ENOBUFS", "ENETDOWN", "ENXIO", "EIO"], "sendto": ["ENOENT", "ECONNREFUSED", "EAGAIN", "EINTR", "ENOBUFS"],
+    "setsockopt": ["ENOMEM", "EPERM", "ENOPROTOOPT"], "signalfd": ["EMFILE", "ENOMEM"], "sigprocmask": ["EINVAL"], "socket": ["EMFILE", "ENOMEM", "EACCES", "EAFNOSUPPORT"],
+    "stat": ["EACCES", "ENOENT"], "tcflush": ["EIO"], "uname": ["EFAULT"], "unlink": ["EACCES", "EROFS", "EBUSY"], "write": ["EINTR", "EAGAIN", *DISK, "EPIPE"],
+    "gpiod_chip_get_line": ["EINVAL"], "gpiod_chip_open": ["EACCES", "ENODEV", "EMFILE"], "gpiod_line_event_get_fd": ["EPERM"],
+    "gpiod_line_event_read_multiple": ["EIO", "ENODEV", "EAGAIN"], "gpiod_line_get_value_bulk": ["EIO", "ENODEV"], "gpiod_line_request_bulk": ["EBUSY", "EINVAL", "ENOMEM"],
+    "gpiod_line_set_value_bulk": ["EIO", "ENODEV"], "mnl_socket_bind": ["ENOMEM"], "mnl_socket_open2": ["EMFILE", "EAFNOSUPPORT"],
+    "mnl_socket_recvfrom": ["ENOBUFS", "EINTR", "EAGAIN"], "mnl_socket_sendto": ["ENOBUFS", "EPERM"],
+    "modbus_connect": ["ECONNREFUSED", "ETIMEDOUT", "EHOSTUNREACH", "EMFILE", "ENOENT", "EACCES", "EBUSY"], "modbus_flush": ["EIO"], "modbus_new_rtu": MEMORY,
+    "modbus_new_tcp": MEMORY, "modbus_read_bits": MODBUS, "modbus_read_input_bits": MODBUS, "modbus_read_input_registers": MODBUS, "modbus_read_registers": MODBUS,
+    "modbus_rtu_set_rts": ["EIO"], "modbus_rtu_set_serial_mode": ["ENOTTY"], "modbus_send_raw_request": MODBUS, "modbus_write_bit": MODBUS, "modbus_write_bits": MODBUS,
+    "modbus_write_register": MODBUS, "modbus_write_registers": MODBUS,
+}
+
+
+def number_of(error):
+    return error if isinstance(error, int) else getattr(errno, error)
+
+
+# --- The places ---
+
+Place = collections.namedtuple("Place", "file line function returns")
+
+
+def tool(*command):
+    return subprocess.run(list(map(str, command)), stdout=subprocess.PIPE, text=True, check=True).stdout
+
+
+def instructions(program):
+    """Of objdump: (start of the function, address of the next instruction, call or jump, target, name of the target)"""
+    start, held = 0, None
+    for line in tool("objdump", "-d", "--no-show-raw-insn", program).splitlines():
+        head = re.match(r"([0-9a-f]+) <[^>]+>:$", line)
+        code = re.match(r"\s+([0-9a-f]+):\s+(\S+)(?:\s+([0-9a-f]+) <([^>+]+)>)?", line)
+        if code and held:
+            yield (held[0], int(code[1], 16), *held[1:])
+        held = None
+        if head:
+            start = int(head[1], 16)
+        elif code and code[4] and (code[2] in ("call", "bl", "b") or code[2].startswith("jmp")):
+            held = start, "call" if code[2] in ("call", "bl") else "jump", int(code[3], 16), code[4]
+
+
+def places_of(program, wanted):
+    """Every call of these functions in our sources; and the names of all others that are called from there."""
+    callers, found, others = collections.defaultdict(list), [], set()
+    for start, following, kind, target, name in instructions(program):
+        if kind == "call":
+            callers[target].append(following)
+        function = name.removesuffix("@plt")
+        if function != name:
+            if function in wanted:
+                found.append((start, following, kind, function))
+            else:
+                others.add(function)
+    lines = [line.split(" ")[0] for line in tool("addr2line", "-e", program, *(hex(following - 1) for _, following, _, _ in found)).splitlines()]
+    places = collections.defaultdict(list)
+    for (start, following, kind, function), where in zip(found, lines):
+        ours = re.search(r"/(src/app|hal/linux)/([^/]+):(\d+)$", where)
+        if ours:  # of what a function ends with, the caller hears
+            places[ours[2], int(ours[3]), function] += [following] if kind == "call" else callers[start]
+    return [Place(*key, tuple(returns)) for key, returns in sorted(places.items())], others
+
+
+class Page:
+    """The memory shared with failing_calls.c."""
+
+    HEAD, NAME, MOST = "<QQQQ48s", 48, 64
+    SEEN_AT = 32 + 48 + 64 * 8
+    SIZE = 4 * mmap.PAGESIZE
+
+    def __init__(self, bench):
+        folder = bench.bin.resolve().parents[1] / "tests/system"
+        self.fd = os.memfd_create("failures")
+        os.ftruncate(self.fd, Page.SIZE)
+        self.memory = mmap.mmap(self.fd, Page.SIZE)
+        self.options = {"pass_fds": (self.fd,), "env": {**os.environ, "LC_ALL": "C", "HEAVE_FAILURES": str(self.fd),
+                                                         "LD_PRELOAD": f"{folder}/libfailing_calls.so:{folder}/libmalloc_guard.so"}}
+
+    def close(self):
+        self.memory.close()
+        os.close(self.fd)
+
+    def set(self, place, error):
+        self.clear()
+        assert len(place.returns) <= Page.MOST, place
+        struct.pack_into("<QQQ", self.memory, 8, 0, number_of(error) & 0xFFFFFFFFFFFFFFFF, len(place.returns))
+        self.memory[32:32 + 48] = place.function.encode().ljust(48, b"\0")
+        struct.pack_into(f"<{len(place.returns)}Q", self.memory, 80, *place.returns)
+        struct.pack_into("<Q", self.memory, 0, TIMES if error in PASSING else FOR_EVER)
+
+    def clear(self):
+        struct.pack_into("<Q", self.memory, 0, 0)
+
+    def failed(self):
+        return struct.unpack_from("<Q", self.memory, 8)[0]
+
+    def seen(self, forget=False):
+        count = struct.unpack_from("<Q", self.memory, Page.SEEN_AT)[0]
+        assert count <= 900, "more places than failing_calls.c has room for"
+        seen = set(struct.unpack_from(f"<{count}Q", self.memory, Page.SEEN_AT + 8))
+        if forget:
+            struct.pack_into("<Q", self.memory, Page.SEEN_AT, 0)
+        return seen
+
+
+class Story:
+    """What was tried at which place, over all cases."""
+
+    def __init__(self):
+        self.tried = set()
+        self.count = 0
+
+    def note(self, place, page):
+        if page.failed():
+            self.tried.add(place[:3])
+            self.count += 1
+
+
+STORY = Story()
+
+
+def trials(places, seen, but=()):
+    """Each place that was reached, with each error."""
+    for place in places:
+        is_wanted = place[:3] not in but and (place.file, place.function) not in ELSEWHERE
+        if is_wanted and seen & set(place.returns):
+            for error in ERRNOS[place.function]:
+                yield place, error
+
+
+def name_of(place, error):
+    return f"{place.file}:{place.line}: {place.function}: {error}"
+
+
+class Troubles(list):
+    """What was not as it should be; all of it is told."""
+
+    def judge(self, condition, text):
+        if not condition:
+            self.append(text)
+
+    def done(self):
+        assert not self, f"{len(self)}: " + "\n".join(self)
+
+
+# --- Programs that run to their end ---
+
+def run_into_a_full_pipe(page, command):
+    """Standard output does not block, and is read slowly."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with subprocess.Popen(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=writing, stderr=subprocess.PIPE, text=True, **page.options) as process:
+        os.close(writing)
+        time.sleep(0.2)
+        with open(reading, "rb") as pipe:
+            while pipe.read(1 << 16):
+                pass
+        return process.wait(LIMIT_S), "", process.stderr.read()
+
+
+def run_to_end(page, command, **options):
+    if command[-1] == "-":
+        return run_into_a_full_pipe(page, command)
+    run = subprocess.run(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=LIMIT_S,
+                         check=False, **page.options, **options)
+    return run.returncode, run.stdout, run.stderr
+
+
+def judge_end(troubles, what, code, stderr, is_silent=False):
+    troubles.judge(code in SANE_EXITS and (code == 0 or is_silent or stderr.strip()), f"{what}: exit {code}: {stderr.strip()[-600:]}")
+
+
+def commands_of(bench):
+    frames = bench.file("frames.txt", "0 !engage\n3000 @A6:0,0,0,0,0,5,0#\n3500 !park\n")
+    raw = heave.TOP / "config/can-raw-hexapod.ini"
+    head = [bench.bin / "heaved", "--config"]
+    return [[*head, bench.config, "--check"], [*head, bench.config, "--dump-config"], [*head, raw, "--dump-dbc"],
+            [*head, bench.config, "--envelope", bench.file("old.csv", "old")], [*head, bench.config, "--envelope", bench.folder / "new.csv"],
+            [*head, bench.config, "--envelope", "/dev/null"],
+            [*head, bench.config, "--play", frames, "--trace", bench.folder / "played.csv"],
+            [*head, bench.config, "--play", frames, "--trace", "-"], [*head, bench.config, "--doctor"],
+            [*head, heave.TOP / "config/hexapod-cia402.ini", "--doctor"]]
+
+
+def offline(bench, places, _judge):
+    page, troubles = Page(bench), Troubles()
+    for command in commands_of(bench):
+        page.clear()
+        page.seen(forget=True)
+        run_to_end(page, command)
+        for place, error in trials(places, page.seen(), STORY.tried):
+            page.set(place, error)
+            code, stdout, stderr = run_to_end(page, command)
+            judge_end(troubles, f"{name_of(place, error)}: {command[3]}", code, stderr, is_silent="--doctor" in command and stdout.strip())
+            STORY.note(place, page)
+    page.close()
+    troubles.done()
+
+
+# --- The daemon ---
+
+class Daemon:
+    def __init__(self, bench, page, config=None, arguments=(), is_after_a_crash=False):
+        self.bench, self.page = bench, page
+        bench.socket.unlink(missing_ok=True)
+        if is_after_a_crash:
+            with socket.socket(socket.AF_UNIX) as dead:
+                dead.bind(str(bench.socket))
+        self.said = []
+        self.process = subprocess.Popen([bench.bin / "heaved", "--config", config or bench.config, *map(str, arguments)], stdout=subprocess.DEVNULL,
+                                        stderr=subprocess.PIPE, text=True, errors="replace", **page.options)
+        bench.running.append(self.process)
+        self.process.judge = lambda _: None
+        self.reader = threading.Thread(target=lambda: self.said.extend(self.process.stderr), daemon=True)
+        self.reader.start()
+
+    def text(self):
+        if self.has_ended():
+            self.reader.join(LIMIT_S)
+        return "".join(list(self.said))
+
+    def ask(self, request="status"):
+        """The answer; nothing where there is none."""
+        with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
+            link.settimeout(1)
+            try:
+                link.connect(str(self.bench.socket))
+                link.sendall(f"{request}\n".encode())
+                return link.recv(65536).decode()
+            except OSError:
+                return ""
+
+    def has_ended(self):
+        return self.process.poll() is not None
+
+    def wait_for(self, condition, limit_s=LIMIT_S):
+        """False where it never comes true."""
+        end = time.monotonic() + limit_s
+        while not condition() and time.monotonic() < end:
+            time.sleep(0.005)
+        return bool(condition())
+
+    def is_ready(self):
+        """It says so, for nobody else may be able to."""
+        return self.wait_for(lambda: self.has_ended() or "heaved: version " in self.text() or self.ask()) and not self.has_ended()
+
+    def end(self):
+        """The exit code; None where it does not end."""
+        if not self.has_ended():
+            self.process.send_signal(signal.SIGTERM)
+        if not self.wait_for(self.has_ended):
+            self.process.kill()
+            self.process.wait()
+            return None
+        self.text()
+        self.process.stderr.close()
+        return self.process.wait()
+
+
+def outputs(bench):
+    return ["--record", bench.folder / "record.txt", "--trace", bench.folder / "trace.csv"]
+
+
+def busy_config(bench, engage):
+    config = bench.write_config(f"{engage}.ini", platform__engage=engage)
+    text = config.read_text(encoding="utf-8").replace("[control]\n", f"[control]\nmetrics = {bench.folder}/heave.prom\n")
+    config.write_text(f"{text}\n[black-box]\ndirectory = {bench.folder}/incidents\nseconds = 10\nincidents = 2\n", encoding="utf-8")
+    return config
+
+
+def notified(bench, page):
+    """A service manager that nobody listens to."""
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    listener.bind(str(bench.folder / "notify"))
+    threading.Thread(target=lambda: [None for _ in iter(lambda: listener.recv(500), b"")], daemon=True).start()
+    page.options["env"].update(NOTIFY_SOCKET=listener.getsockname(), WATCHDOG_USEC="100000")
+    return listener
+
+
+def start_and_end(bench, places, is_after_a_crash):
+    page, troubles = Page(bench), Troubles()
+    config, listener = busy_config(bench, "manual"), notified(bench, page)
+    new = lambda: Daemon(bench, page, config, outputs(bench), is_after_a_crash)  # noqa: E731
+    daemon = new()
+    assert daemon.is_ready(), daemon.text()
+    starting = page.seen(forget=True)
+    assert daemon.end() == 0, daemon.text()
+    ending = page.seen() - starting
+    for place, error in trials(places, starting, STORY.tried):
+        page.set(place, error)
+        daemon = new()
+        troubles.judge(daemon.is_ready() or daemon.has_ended(), f"{name_of(place, error)}: neither ready nor ended")
+        STORY.note(place, page)
+        page.clear()
+        judge_end(troubles, name_of(place, error), daemon.end(), daemon.text())
+    for place, error in trials(places, ending, STORY.tried):
+        page.clear()
+        daemon = new()
+        troubles.judge(daemon.is_ready(), f"{name_of(place, error)}: not ready")
+        page.set(place, error)
+        code = daemon.end()
+        STORY.note(place, page)
+        judge_end(troubles, name_of(place, error), code, daemon.text())
+    listener.close()
+    page.close()
+    troubles.done()
+
+
+class Day:
+    """All that happens to a running platform, again and again."""
+
+    def __init__(self, bench, daemon):
+        self.bench, self.daemon = bench, daemon
+        self.is_over = False
+        self.watch = None
+        self.thread = threading.Thread(target=self.send)
+        self.thread.start()
+
+    def send(self):
+        with self.bench.sender() as sender:
+            start = time.monotonic()
+            while not self.is_over:
+                t = time.monotonic() - start
+                try:
+                    sender.send(f"@A6:{3 * (t % 4 > 2)},0,0,0,0,{20 * ((t % 2) > 1):.3f},0#")
+                except OSError:
+                    pass  # the daemon is not there just now
+                time.sleep(0.01)
+
+    def hour(self):
+        crowd = [socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) for _ in range(9)]  # one more than there is room for
+        for client in crowd:
+            try:
+                client.connect(str(self.bench.socket))
+                client.sendall(b"watch 50\n")
+            except OSError:
+                pass
+        for client in crowd:
+            client.settimeout(1)
+            try:
+                client.recv(65536)  # it has been let in, or turned away
+            except OSError:
+                pass
+        for client in crowd:
+            client.close()
+        for request in ("status", "dump", "intensity 90", "nonsense"):
+            self.daemon.ask(request)
+        if not self.daemon.has_ended():
+            self.daemon.process.send_signal(signal.SIGHUP)
+        with self.bench.sender() as sender:
+            for _ in range(3):
+                sender.send("nonsense") if not self.daemon.has_ended() else None
+
+    def flood(self):
+        """More than anybody reads: the filter of the kernel comes, and goes. False where it did not."""
+        for condition in (lambda: "a flood of" in self.daemon.text(), lambda: "the flood is over" in self.daemon.text()):
+            end = time.monotonic() + LIMIT_S
+            while not self.daemon.has_ended() and not condition() and time.monotonic() < end:
+                self.pour() if "a flood of" not in self.daemon.text() else time.sleep(0.1)
+        return "the flood is over" in self.daemon.text()
+
+    def pour(self):
+        with self.bench.sender() as sender:
+            for _ in range(2000):
+                try:
+                    sender.send("nonsense")
+                except OSError:
+                    break
+
+    def end(self):
+        self.is_over = True
+        self.thread.join()
+
+
+def pieces(trace, cycle_us):
+    """Where the service thread could not write, rows are missing, and counted: what is between is whole."""
+    head, *rows = trace.splitlines(keepends=True)
+    piece, due = [], None
+    for row in rows:
+        t_us = round(float(row.split(b",", 1)[0]) * 1000)
+        if due not in (None, t_us):
+            yield b"".join([head, *piece])
+            piece = []
+        piece.append(row)
+        due = t_us + cycle_us
+    yield b"".join([head, *piece])
+
+
+def judged(bench, judge, config):
+    """What is wrong with the set-points."""
+    trace = (bench.folder / "trace.csv").read_bytes()
+    trace = trace[:trace.rindex(b"\n") + 1]
+    for piece in pieces(trace, 1000):
+        run = subprocess.run([judge, config], input=piece, stdout=subprocess.PIPE, check=False)
+        if run.returncode != 0:
+            return run.stdout.decode()[-500:]
+    return "" if trace.count(b"\n") > 1000 else "a trace of nothing"
+
+
+def is_engaged(daemon):
+    """A busy machine may have held it."""
+    answer = daemon.ask()
+    if '"HOLD"' in answer:
+        daemon.ask("resume")
+    return '"state":"ENGAGED"' in answer
+
+
+def in_operation(bench, places, judge):
+    page, troubles = Page(bench), Troubles()
+    config, listener = busy_config(bench, "auto"), notified(bench, page)
+
+    def new():
+        daemon = Daemon(bench, page, config, outputs(bench))
+        assert daemon.is_ready() and daemon.wait_for(lambda: is_engaged(daemon)), daemon.text()
+        return daemon, Day(bench, daemon)
+
+    def close(daemon, day, what):
+        day.end()
+        page.clear()
+        code = daemon.end()
+        judge_end(troubles, what, code, daemon.text())
+        spoilt = ("out_file.c" in what)
+        troubles.judge(spoilt or not (wrong := judged(bench, judge, config)), f"{what}: {wrong if not spoilt else ''}")
+
+    def flood():
+        """Takes 5 s to be over, so once: both places with one error, and then without."""
+        daemon, day = new()
+        filters = [place for place in places if place.file == "linux_udp_filter.c"]
+        for place in filters[:1]:
+            page.set(place, "ENOMEM")
+            day.pour()
+            troubles.judge(daemon.wait_for(lambda: page.failed() or day.pour(), 20) or True, "no flood")
+            STORY.note(place, page)
+            page.clear()
+        for place in filters[1:]:
+            page.set(place, "ENOMEM")
+            troubles.judge(day.flood(), f"{name_of(place, 'ENOMEM')}: no flood, or it never ends")
+            STORY.note(place, page)
+        close(daemon, day, "floods")
+
+    flood()
+    page.seen(forget=True)
+    daemon, day = new()
+    page.seen(forget=True)
+    day.hour()
+    time.sleep(0.5)
+    day.hour()
+    seen, what = page.seen(), "all day"
+    for place, error in trials(places, seen, STORY.tried):
+        if place.file == "out_file.c":
+            continue
+        what = name_of(place, error)
+        page.set(place, error)
+        end = time.monotonic() + LIMIT_S / 3
+        while not page.failed() and not daemon.has_ended() and time.monotonic() < end:
+            day.hour()
+        time.sleep(0.03)
+        STORY.note(place, page)
+        page.clear()
+        if daemon.wait_for(lambda: daemon.has_ended() or is_engaged(daemon)) and not daemon.has_ended():
+            continue
+        troubles.judge(daemon.has_ended() and daemon.process.poll() != 0, f"{what}: exit {daemon.process.poll()}, {daemon.ask()[:200]}: {daemon.text()[-300:]}")
+        print(f"# {what}: ended it with {daemon.process.poll()}: {daemon.text().strip().splitlines()[-1:]}")
+        close(daemon, day, what)
+        daemon, day = new()
+    close(daemon, day, what)
+    listener.close()
+    page.close()
+    troubles.done()
+
+
+# --- Lines of Modbus ---
+
+FUNCTIONS = (1, 2, 3, 4, 5, 6, 15, 16)
+BROADCAST = 0
+
+
+class Line:
+    """modbus_line at a device, with a page."""
+
+    def __init__(self, program, kind, address, page):
+        self.process = subprocess.Popen([program, kind, *address, "150000"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **page.options)
+
+    def ask(self, unit, function):
+        """The status; nothing where the program has ended."""
+        try:
+            self.process.stdin.write(f"ask 0 {function} {unit} 7 1{' 1' if function in (5, 6, 15, 16) else ''}\n")
+            self.process.stdin.flush()
+            return self.process.stdout.readline().split(" ")[0]
+        except OSError:
+            return ""
+
+    def ask_all(self):
+        self.ask(BROADCAST, 6)
+        self.ask(1, 3)  # pymodbus answers broadcasts, which the next question is taken to have heard
+        return [self.ask(1, function) for function in FUNCTIONS]
+
+    def end(self):
+        _, stderr = self.process.communicate(timeout=LIMIT_S)
+        return self.process.returncode, stderr
+
+
+def try_line(program, kind, address, page, place, error):
+    """It starts, or says why not; what fails is told of, and works when the system does again."""
+    what, wrong = f"{name_of(place, error)}, {kind}", Troubles()
+    page.set(place, error)
+    line = Line(program, kind, address, page)
+    end = time.monotonic() + LIMIT_S
+    said = line.ask_all()
+    if page.failed():  # else it is where the line is closed
+        page.clear()
+    while line.process.poll() is None and set(said) != {"ok"} and time.monotonic() < end:
+        said = line.ask_all()
+    is_refused = line.process.poll() is not None
+    code, stderr = line.end()
+    STORY.note(place, page)
+    wrong.judge(page.failed(), f"{what}: not reached")
+    wrong.judge(code == 1 and stderr.strip() if is_refused else code == 0 and set(said) == {"ok"}, f"{what}: exit {code}, {said}: {stderr.strip()[-300:]}")
+    return wrong
+
+
+def lines(bench, _places, _judge):
+    if "HEAVE_TEST_VENV" not in os.environ:
+        raise tap.Skip("no pymodbus: tools/lib/venv.sh")
+    peer = __import__("modbus_peer")
+    logging.disable(logging.CRITICAL)  # of what pymodbus thinks of broadcasts
+    troubles, places = Troubles(), [place for place in places_of(sys.argv[3], wrapped(bench))[0] if place.file.startswith("linux_modbus")]
+    for kind in ("tcp", "serial"):
+        with peer.Devices(kind) as devices, peer.FaultyLine(devices) as line:
+            page = Page(bench)
+            first = Line(sys.argv[3], kind, line.address, page)
+            while set(first.ask_all()) != {"ok"}:
+                pass
+            assert first.end()[0] == 0
+            seen = page.seen()
+            for place, error in trials(places, seen, STORY.tried):
+                troubles += try_line(sys.argv[3], kind, line.address, page, place, error)
+            page.close()
+    troubles.done()
+
+
+CASES = {"programs that run to their end": offline,
+         "heaved starts and ends": lambda bench, places, _: start_and_end(bench, places, False),
+         "heaved starts after a crash": lambda bench, places, _: start_and_end(bench, places, True),
+         "heaved in operation": in_operation,
+         "lines of Modbus": lines}
+
+
+def wrapped(bench):
+    library = bench.bin.resolve().parents[1] / "tests/system/libfailing_calls.so"
+    return {line.split()[-1] for line in tool("nm", "-D", "--defined-only", library).splitlines() if " T " in line}
+
+
+def missing(places):
+    return [place for place in places
+            if place[:3] not in STORY.tried and not place.file.startswith(OTHERS) and (place.file, place.function) not in ELSEWHERE]
+
+
+def main():
+    if "HEAVE_TEST_VENV" not in os.environ:
+        found = subprocess.run([heave.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False)
+        if found.returncode == 0:
+            os.environ["HEAVE_TEST_VENV"] = "1"
+            os.execv(found.stdout.strip(), [found.stdout.strip(), *sys.argv])
+    sys.path.insert(0, str(heave.TOP / "tests/peers"))
+    suite = tap.Suite()
+    with heave.Bench(sys.argv[1]) as bench:
+        can_fail = wrapped(bench)
+        places, others = places_of(bench.bin / "heaved", can_fail)
+    if not places:
+        print("1..0 # SKIP a build without debug information does not tell where its calls are")
+        return 0
+    only = sys.argv[4] if len(sys.argv) > 4 else ""
+    for name, check in CASES.items():
+        if only in name:
+            with heave.Bench(sys.argv[1]) as bench, suite.case(name):
+                check(bench, places, sys.argv[2])
+    if not only:
+        with suite.case("every function that is called can be made to fail, or cannot fail"):
+            assert not others - HARMLESS - UNUSED, sorted(others - HARMLESS - UNUSED)
+            assert can_fail == set(ERRNOS), can_fail ^ set(ERRNOS)
+        with suite.case("every place has failed"):
+            for check in CASES.values():  # what was missed on a busy machine
+                if missing(places):
+                    with heave.Bench(sys.argv[1]) as bench:
+                        check(bench, missing(places), sys.argv[2])
+            assert not missing(places), "\n".join(f"{place.file}:{place.line}: {place.function}" for place in missing(places))
+    print(f"# figure {STORY.count} failures of system calls injected")
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
