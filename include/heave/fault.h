@@ -44,6 +44,9 @@ typedef struct {
 /** The row of a code; that of FAULT_NONE outside the enum. */
 const fault_row_t *fault_row(fault_code_t code);
 
+/** Whether it is of one axis: of a drive, or of what hangs on it. */
+bool fault_is_of_axis(fault_code_t code);
+
 /** Its English text: "drive fault", ... */
 const char *fault_text(fault_code_t code);
 

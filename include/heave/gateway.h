@@ -62,6 +62,7 @@ typedef struct {
     snapshot_t snapshot;
     drive_feedback_t feedback[DRIVES_MAX];
     fault_code_t axis_fault[DRIVES_MAX];        /**< what is wrong with each drive now */
+    uint32_t told[DRIVES_MAX + 1u];             /**< faults that the coming cycle is to find, as snapshot.begun */
     uint64_t following_since_us[CYLINDERS_MAX]; /**< further from its set-point than allowed since then; 0 = it is not */
     bring_up_t bring_up;
     uint64_t bring_up_deadline_us;
@@ -140,6 +141,10 @@ const snapshot_t *gateway_snapshot(const gateway_t *self);
 
 /** Tells the counters of cycles that were skipped because the program was late. */
 void gateway_note_late(gateway_t *self, uint32_t cycles);
+
+/** Offline runs: the coming cycle finds this fault, whatever the drives do; where it finds it by itself, nothing is added.
+ *  @param axis as in fault_t; one that this platform does not have, or that does not go with the code, finds nothing */
+void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis);
 
 /** True once a shutdown has ended: OFF, or FAULT / ESTOP with a shutdown asked for and the drives told, where their bus tells
  * them anything. */

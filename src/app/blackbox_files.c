@@ -220,10 +220,19 @@ static void write_records(blackbox_t *self, record_writer_t *writer, uint64_t fr
     size_t length = 0;
     while (go_on(self, &items) && read_next(self, &self->records, &length)) {
         const record_t *record = &self->read.record;
-        if (record->head.t_us >= from_us) {
+        if (record->head.t_us >= from_us && record->head.t_us <= self->until_us) {
             out_file_write(&self->file, line, record_writer_line(writer, record, length - sizeof record->head, line));
         }
     }
+}
+
+/* Where trace.csv ends, a replay does. */
+static void write_end(blackbox_t *self, const record_writer_t *writer)
+{
+    char line[64];
+    size_t length = decimal_put_ms(line, self->until_us - writer->zero_us);
+    length += decimal_put_text(&line[length], " !end\n");
+    out_file_write(&self->file, line, length);
 }
 
 static bool write_frames(blackbox_t *self, const blackbox_row_t *cause, const char *name, start_t start, uint64_t start_us)
@@ -240,6 +249,9 @@ static bool write_frames(blackbox_t *self, const blackbox_row_t *cause, const ch
         out_file_write(&self->file, self->line, checkpoint_format(&self->read.state, self->line));
     }
     write_records(self, &writer, start == START_STATE ? start_us : 0);
+    if (start != START_NEVER) {
+        write_end(self, &writer);
+    }
     return close_file(self);
 }
 

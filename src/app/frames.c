@@ -27,9 +27,14 @@ static const char k_bad_late[] = "!late without its number of cycles; 0 to 42949
 static const char k_bad_from[] = "!from without a numeric address; 192.168.1.20, ::1 and fe80::1%2 show what is allowed";
 static const char k_bad_drive[] =
     "!drive without its number from 1 to 7 and what it did; N fault CODE (hexadecimal), N offline and N back are allowed";
+static const char k_bad_fault[] = "!fault without its code; drive-fault N, drive-offline N, drive-dropped N and following-error "
+                                  "N (N from 1 to 7), drive-timeout, "
+                                  "bus-lost and bus-failing are allowed";
 static const char k_bad_request[] =
     "unknown request; !engage !hold !resume !park !reset !shutdown, !intensity N (0 to 100), !estop on, !estop off, "
-    "!late N, !drive N fault CODE, !drive N offline, !drive N back and !from ADDRESS are allowed (a datagram that starts with ! "
+    "!late N, !drive N fault CODE, !drive N offline, !drive N back, !fault CODE, !fault CODE N, !end and !from ADDRESS are "
+    "allowed (a "
+    "datagram that starts with ! "
     "is written \\x21)";
 
 static const struct {
@@ -244,6 +249,22 @@ static bool read_drive(cursor_t *self, frames_line_t *out)
     return digits > 0;
 }
 
+/* `CODE N` where the fault is of an axis, else `CODE`. */
+static bool read_fault(cursor_t *self, frames_line_t *out)
+{
+    uint32_t axis = 0;
+    out->kind = FRAMES_FAULT;
+    for (unsigned i = FAULT_NONE + 1u; i < FAULT_CODES; i++) {
+        if (take_word(self, fault_row((fault_code_t)i)->name)) {
+            out->fault = (fault_code_t)i;
+            const bool is_good = !fault_is_of_axis(out->fault) || (read_count(self, DRIVES_MAX, &axis) && axis != 0);
+            out->drive = (uint8_t)axis;
+            return is_good;
+        }
+    }
+    return false;
+}
+
 /* Reads the words behind the exclamation mark.
  * Returns what is wrong with them, NULL = nothing. */
 static const char *read_request_words(cursor_t *self, frames_line_t *out)
@@ -270,6 +291,13 @@ static const char *read_request_words(cursor_t *self, frames_line_t *out)
     }
     if (take_word(self, "drive")) {
         return read_drive(self, out) ? NULL : k_bad_drive;
+    }
+    if (take_word(self, "fault")) {
+        return read_fault(self, out) ? NULL : k_bad_fault;
+    }
+    if (take_word(self, "end")) {
+        out->kind = FRAMES_END;
+        return NULL;
     }
     if (take_word(self, "state")) {
         out->kind = FRAMES_STATE;

@@ -195,6 +195,16 @@ static void publish(motion_loop_t *self)
     seqlock_write(&self->view, self->current.word);
 }
 
+static void note_faults(motion_loop_t *self, const snapshot_t *snapshot)
+{
+    if (self->is_recording) {
+        record_push_faults(&self->record, snapshot);
+    }
+    if (self->blackbox != NULL) {
+        record_push_faults(&self->blackbox->records, snapshot);
+    }
+}
+
 static void note_drives(motion_loop_t *self, const snapshot_t *snapshot)
 {
     if (self->is_recording) {
@@ -227,6 +237,7 @@ static void write_down(motion_loop_t *self, bool is_zero)
     }
     self->was_estop = snapshot->is_estop_active;
     note_drives(self, snapshot);
+    note_faults(self, snapshot);
     if (is_zero) {
         note_at(self, RECORD_ZERO, snapshot->now_us, record_zero(snapshot->goal, snapshot->intensity_percent));
     }

@@ -88,6 +88,12 @@ static void carry_out(player_t *self, const frames_line_t *line)
     case FRAMES_DRIVE:
         inject(self, line);
         break;
+    case FRAMES_FAULT:
+        gateway_tell_fault(gateway, line->fault, line->drive);
+        break;
+    case FRAMES_END:
+        self->is_ended = true;
+        break;
     case FRAMES_DATAGRAM:
     case FRAMES_FROM:
     case FRAMES_STATE:
@@ -155,7 +161,7 @@ bool player_is_at_rest(const player_t *self)
     const uint64_t last_us = last_line_us(self);
     const uint64_t since_us = self->still_since_us > last_us ? self->still_since_us : last_us;
     const bool is_read = self->next_datagram == self->lines && self->next_request == self->lines;
-    return is_read && self->row.t_us >= since_us + REST_US + (uint64_t)REST_PERIODS * s->stream_period_us;
+    return self->is_ended || (is_read && self->row.t_us >= since_us + REST_US + (uint64_t)REST_PERIODS * s->stream_period_us);
 }
 
 bool player_is_endless(const player_t *self)

@@ -23,6 +23,7 @@ typedef struct {
     session_t session;
     size_t next_datagram; /**< line from which on to look for one */
     size_t next_request;  /**< the same for everything else */
+    bool is_ended;        /**< a line has said so: the last cycle was the last one */
     uint64_t still_since_us;
     trace_row_t row; /**< of the last cycle */
 } player_t;
@@ -40,7 +41,7 @@ void player_begin(player_t *self);
 /** One cycle, with what is due before it, and its row. */
 void player_cycle(player_t *self);
 
-/** Nothing has moved for a while, and nothing more comes. */
+/** Nothing has moved for a while, and nothing more comes; or a line says that this is the end. */
 bool player_is_at_rest(const player_t *self);
 
 /** Two hours after the last line. */

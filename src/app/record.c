@@ -31,6 +31,18 @@ void record_push_drives(ring_t *ring, uint64_t t_us, const drive_feedback_t was[
     }
 }
 
+void record_push_faults(ring_t *ring, const snapshot_t *snapshot)
+{
+    for (uint32_t axis = 0; axis <= DRIVES_MAX; axis++) {
+        for (uint32_t code = FAULT_NONE + 1u; snapshot->begun[axis] >> code != 0; code++) {
+            if ((snapshot->begun[axis] >> code & 1u) != 0) {
+                const record_head_t head = {.t_us = snapshot->now_us, .value = code, .kind = RECORD_FAULT, .detail = axis};
+                (void)ring_push(ring, &head, sizeof head, NULL, 0);
+            }
+        }
+    }
+}
+
 void record_writer_init(record_writer_t *self, const settings_t *settings, bool engages_alone)
 {
     *self = (record_writer_t){.cycle_us = settings->cycle_us,
@@ -100,6 +112,13 @@ static size_t put_drive(char *to, uint32_t detail, uint32_t code)
     return at + decimal_put_text(&to[at], state == DRIVE_OFFLINE ? " offline" : " back");
 }
 
+static size_t put_fault(char *to, fault_code_t code, uint32_t axis)
+{
+    size_t at = decimal_put_text(to, "!fault ");
+    at += decimal_put_text(&to[at], fault_row(code)->name);
+    return at + (axis != 0 ? put_number(&to[at], " ", axis, "") : 0);
+}
+
 /* What a record says, behind its time. */
 static size_t put_content(char *to, const record_t *record, size_t length)
 {
@@ -118,6 +137,8 @@ static size_t put_content(char *to, const record_t *record, size_t length)
         return put_number(to, "!late ", record->head.value, "");
     case RECORD_DRIVE:
         return put_drive(to, record->head.detail, record->head.value);
+    case RECORD_FAULT:
+        return put_fault(to, (fault_code_t)record->head.value, record->head.detail);
     case RECORD_RELOAD:
         return decimal_put_text(to, "the configuration was read again: what changed with it does not replay");
     case RECORD_ZERO:

@@ -19,6 +19,7 @@ typedef enum {
     RECORD_LATE,      /**< value: cycles */
     RECORD_DRIVE,     /**< a drive went into DRIVE_FAULT, went DRIVE_OFFLINE or came back; detail: number, from 1, << 8 |
                          drive_state_t;     value: its code */
+    RECORD_FAULT,     /**< a fault began; value: fault_code_t, detail: its axis as in fault_t */
     RECORD_RELOAD,    /**< the configuration was read again */
     RECORD_ZERO       /**< time zero; value: record_zero() */
 } record_kind_t;
@@ -63,6 +64,9 @@ void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const
  *  @param was of the cycle before */
 void record_push_drives(ring_t *ring, uint64_t t_us, const drive_feedback_t was[DRIVES_MAX],
                         const drive_feedback_t is[DRIVES_MAX]);
+
+/** Hands over the faults that began in a cycle: drives that only a replay has do not bring them about. */
+void record_push_faults(ring_t *ring, const snapshot_t *snapshot);
 
 /** What the platform is to be at time zero: the value of a RECORD_ZERO. */
 static inline uint32_t record_zero(state_t goal, uint32_t intensity_percent)

@@ -64,6 +64,11 @@ const fault_row_t *fault_row(fault_code_t code)
     return &k_rows[(unsigned)code < FAULT_CODES ? code : FAULT_NONE];
 }
 
+bool fault_is_of_axis(fault_code_t code)
+{
+    return code == FAULT_DRIVE || code == FAULT_DRIVE_OFFLINE || code == FAULT_DRIVE_DROPPED || code == FAULT_FOLLOWING;
+}
+
 const char *fault_text(fault_code_t code)
 {
     return fault_row(code)->text[FAULT_ENGLISH];

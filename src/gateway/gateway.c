@@ -156,6 +156,13 @@ void gateway_note_late(gateway_t *self, uint32_t cycles)
     self->snapshot.counters.late_cycles += cycles;
 }
 
+void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
+{
+    if ((unsigned)code < FAULT_CODES && axis <= DRIVES_MAX) {
+        self->told[axis] |= 1u << (unsigned)code;
+    }
+}
+
 /* A hold leaves a ride's relays as they are for a while, if so configured. */
 static bool is_hold_young(const gateway_t *self, uint64_t now_us)
 {

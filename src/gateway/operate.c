@@ -227,6 +227,12 @@ static void log_fault(gateway_t *self, fault_code_t code, unsigned axis, uint32_
     hal_log_write(self->io.log, HAL_LOG_ERROR, line);
 }
 
+/* A replay says that the fault was found in this cycle. */
+static bool is_told(const gateway_t *self, fault_code_t code, unsigned axis)
+{
+    return self->supervisor.state != STATE_OFF && (self->told[axis] >> (unsigned)code & 1u) != 0;
+}
+
 /* A fault begins: all are counted, the first is kept, and the worst reaction wins, also over one that is under way. */
 static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint32_t device_code, uint64_t now_us)
 {
@@ -235,6 +241,7 @@ static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint3
     if (self->supervisor.state == STATE_ESTOP) {
         return;
     }
+    s->begun[axis] |= 1u << (unsigned)code;
     s->counters.faults++;
     s->counters.fault[code]++;
     s->fault_last_us[code] = now_us;
@@ -256,7 +263,8 @@ static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint3
 /* Nobody hears the set-points any more: a controlled stop would only make them jump when the bus is back. */
 static void watch_bus(gateway_t *self, bool is_lost, uint64_t now_us)
 {
-    if (is_lost && !self->is_bus_lost && self->supervisor.state != STATE_OFF) {
+    const bool is_new = is_lost && !self->is_bus_lost && self->supervisor.state != STATE_OFF;
+    if (is_new || is_told(self, FAULT_BUS, 0)) {
         raise_fault(self, FAULT_BUS, 0, 0, now_us);
     }
     self->is_bus_lost = is_lost && self->supervisor.state != STATE_OFF;
@@ -267,7 +275,7 @@ static void watch_bus(gateway_t *self, bool is_lost, uint64_t now_us)
 static void watch_failing(gateway_t *self, uint64_t now_us)
 {
     const bool is_failing = drives_is_failing(self->io.drives) && self->supervisor.state != STATE_OFF;
-    if (is_failing && !self->is_bus_failing) {
+    if ((is_failing && !self->is_bus_failing) || is_told(self, FAULT_BUS_FAILING, 0)) {
         raise_fault(self, FAULT_BUS_FAILING, 0, 0, now_us);
     }
     self->is_bus_failing = is_failing;
@@ -319,10 +327,22 @@ static fault_code_t judge_drive(gateway_t *self, unsigned i, uint64_t now_us)
     return is_behind ? FAULT_FOLLOWING : FAULT_NONE;
 }
 
+/* What a replay says was wrong with a drive, or else what is. */
+static fault_code_t find_fault(gateway_t *self, unsigned i, uint64_t now_us)
+{
+    const fault_code_t judged = judge_drive(self, i, now_us);
+    for (unsigned code = FAULT_NONE + 1u; code < FAULT_CODES; code++) {
+        if (fault_is_of_axis((fault_code_t)code) && is_told(self, (fault_code_t)code, i + 1)) {
+            return (fault_code_t)code;
+        }
+    }
+    return judged;
+}
+
 static void watch_drives(gateway_t *self, uint64_t now_us)
 {
     for (unsigned i = 0; i < drive_count(self); i++) {
-        const fault_code_t code = self->supervisor.state == STATE_OFF ? FAULT_NONE : judge_drive(self, i, now_us);
+        const fault_code_t code = self->supervisor.state == STATE_OFF ? FAULT_NONE : find_fault(self, i, now_us);
         const bool is_new = code != FAULT_NONE && code != self->axis_fault[i];
         self->axis_fault[i] = code;
         if (is_new) {
@@ -334,8 +354,8 @@ static void watch_drives(gateway_t *self, uint64_t now_us)
 /* Next step of bringing up, when the last one is complete. */
 static void step_bring_up(gateway_t *self, uint64_t now_us)
 {
-    const bool is_waiting = is_coming_up(self);
-    if (is_waiting && now_us >= self->bring_up_deadline_us) {
+    const bool is_late = is_coming_up(self) && now_us >= self->bring_up_deadline_us;
+    if (is_late || is_told(self, FAULT_DRIVE_TIMEOUT, 0)) {
         raise_fault(self, FAULT_DRIVE_TIMEOUT, 0, 0, now_us);
         return;
     }
@@ -348,7 +368,7 @@ static void step_bring_up(gateway_t *self, uint64_t now_us)
             self->bring_up_deadline_us = now_us + HOMING_TIMEOUT_US;
         }
     }
-    if (is_waiting && are_all(self, DRIVE_ENABLED, true)) {
+    if (is_coming_up(self) && are_all(self, DRIVE_ENABLED, true)) {
         self->bring_up = BRING_UP_MOVE;
         if (self->is_tracking_actual) { /* else it goes on from the motion it is in */
             self->is_tracking_actual = false;
@@ -445,8 +465,17 @@ static void step_auto(gateway_t *self, uint64_t now_us)
     }
 }
 
+/* Those of a cycle. */
+static void clear_faults(uint32_t by_axis[DRIVES_MAX + 1u])
+{
+    for (unsigned i = 0; i <= DRIVES_MAX; i++) {
+        by_axis[i] = 0;
+    }
+}
+
 void operate_before_frames(gateway_t *self, uint64_t now_us)
 {
+    clear_faults(self->snapshot.begun);
     operate_event(self, EVENT_TICK, now_us);
     const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->feedback) == HV_OK;
     watch_bus(self, !is_bus_heard || is_bus_stalled(self), now_us);
@@ -465,6 +494,7 @@ void operate_before_frames(gateway_t *self, uint64_t now_us)
         self->bring_up = BRING_UP_IDLE;
         operate_event(self, EVENT_MOVE_DONE, now_us);
     }
+    clear_faults(self->told);
 }
 
 static bool has_passed(uint64_t now_us, uint64_t since_us, uint32_t limit_ms)

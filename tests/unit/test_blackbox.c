@@ -37,6 +37,9 @@ typedef struct {
     uint64_t ask_us;
     uint64_t fault_us;
     uint64_t estop_us;
+    uint64_t narrow_us; /**< a reload makes the following error's window too narrow for the drives' lag */
+    uint64_t break_us;  /**< what of a drive, or of all, in a way that no line of `!drive` tells */
+    sim_drives_fault_t broken;
     uint64_t deaf_us, hearing_us; /* the black box does not get a turn in between */
 } story_t;
 
@@ -78,6 +81,14 @@ static void live(void)
     }
     if (is_due(m_story.estop_us)) {
         sim_inputs_set(&m_loop.rig.sim_inputs, INPUT_ESTOP, true);
+    }
+    if (is_due(m_story.narrow_us)) {
+        config_t config = m_config;
+        config.settings.following_error_mm_q16 = 655; /* 0.01 mm */
+        TEST_ASSERT_TRUE(motion_loop_reload(&m_loop, &config));
+    }
+    if (is_due(m_story.break_us)) {
+        sim_drives_inject(&m_loop.rig.sim_drives, &m_story.broken);
     }
     if (is_due(m_story.ask_us)) {
         (void)blackbox_ask(&m_box);
@@ -169,7 +180,7 @@ static char *expect_replay(unsigned rows_min)
     }
     char around[120] = "";
     (void)snprintf(around, sizeof around, "%.100s", &trace[same > 60 ? same - 60 : 0]);
-    TEST_ASSERT_TRUE_MESSAGE(trace[same] == 0, around);
+    TEST_ASSERT_TRUE_MESSAGE(trace[same] == 0 && played[same] == 0, around);
     free(played);
     free(trace);
     return contents(file_of("frames"));
@@ -244,6 +255,60 @@ static void test_blackbox_drive_fault_is_written_by_itself_and_replays(void)
     expect_in(trace, ",FAULT,");
     free(trace);
     free(frames);
+}
+
+/* The replay shows the same rows up to the first one in FAULT: its set-points are where the drives are, and those of a replay
+ * know nothing of what these have been through. */
+static void expect_same_fault(const char *frames_line)
+{
+    char played_path[96];
+    config_t config;
+    find_folder();
+    (void)snprintf(played_path, sizeof played_path, "%s/played.csv", m_home);
+    char *frames = contents(file_of("frames"));
+    expect_in(frames, frames_line);
+    free(frames);
+    TEST_ASSERT_EQUAL(0, config_load(file_of("platform.ini"), &config, stderr));
+    TEST_ASSERT_EQUAL(0, play_run(&config, file_of("frames"), played_path));
+    char *played = contents(played_path);
+    char *trace = contents(file_of("trace.csv"));
+    const char *fault = strstr(trace, ",FAULT,");
+    TEST_ASSERT_NOT_NULL(fault);
+    TEST_ASSERT_EQUAL_MEMORY(trace, played, (size_t)(fault - trace) + strlen(",FAULT,"));
+    free(played);
+    free(trace);
+}
+
+static void test_blackbox_following_error_after_a_reload_replays(void)
+{
+    run((story_t){.end_us = 8000000, .narrow_us = 6000000});
+    char *frames = expect_replay(5000);
+    expect_in(frames, " !fault following-error ");
+    free(frames);
+    char *trace = contents(file_of("trace.csv"));
+    expect_in(trace, ",FAULT,");
+    free(trace);
+}
+
+static void test_blackbox_following_error_in_the_middle_replays(void)
+{
+    run((story_t){.end_us = 44000000, .narrow_us = 40000000});
+    char *frames = expect_replay(5000);
+    expect_in(frames, " !state ");
+    expect_in(frames, " !fault following-error ");
+    free(frames);
+}
+
+static void test_blackbox_lost_bus_replays(void)
+{
+    run((story_t){.end_us = 8000000, .break_us = 6000000, .broken = {.kind = SIM_DRIVES_OFFLINE, .axis = SIM_DRIVES_ALL}});
+    expect_same_fault(" !fault bus-lost\n");
+}
+
+static void test_blackbox_frozen_drive_replays(void)
+{
+    run((story_t){.end_us = 8000000, .break_us = 6000000, .broken = {.kind = SIM_DRIVES_FREEZE, .axis = 1}});
+    expect_same_fault(" !fault ");
 }
 
 static void test_blackbox_estop_is_written_at_the_end_at_the_latest(void)
@@ -376,6 +441,10 @@ int main(void)
     RUN_TEST(test_blackbox_short_run_replays_from_time_zero);
     RUN_TEST(test_blackbox_long_ride_replays_from_the_middle);
     RUN_TEST(test_blackbox_drive_fault_is_written_by_itself_and_replays);
+    RUN_TEST(test_blackbox_following_error_after_a_reload_replays);
+    RUN_TEST(test_blackbox_following_error_in_the_middle_replays);
+    RUN_TEST(test_blackbox_lost_bus_replays);
+    RUN_TEST(test_blackbox_frozen_drive_replays);
     RUN_TEST(test_blackbox_estop_is_written_at_the_end_at_the_latest);
     RUN_TEST(test_blackbox_what_was_not_handed_over_is_not_replayed);
     RUN_TEST(test_blackbox_nothing_to_begin_with_is_said);

@@ -159,6 +159,19 @@ static void test_frames_parse_line_estop_and_late(void)
     TEST_ASSERT_EQUAL_UINT32(4294967295u, m_line.number);
 }
 
+static void test_frames_parse_line_faults_and_the_end(void)
+{
+    TEST_ASSERT_TRUE(parse("1 !fault following-error 3"));
+    TEST_ASSERT_EQUAL_INT(FRAMES_FAULT, m_line.kind);
+    TEST_ASSERT_EQUAL_INT(FAULT_FOLLOWING, m_line.fault);
+    TEST_ASSERT_EQUAL_UINT8(3, m_line.drive);
+    TEST_ASSERT_TRUE(parse("1 !fault bus-lost"));
+    TEST_ASSERT_EQUAL_INT(FAULT_BUS, m_line.fault);
+    TEST_ASSERT_EQUAL_UINT8(0, m_line.drive);
+    TEST_ASSERT_TRUE(parse("1 !end"));
+    TEST_ASSERT_EQUAL_INT(FRAMES_END, m_line.kind);
+}
+
 static void test_frames_parse_line_bad_time_is_refused(void)
 {
     expect_wrong("@A6:1#", "no time");
@@ -212,7 +225,15 @@ static void test_frames_parse_line_bad_request_is_refused(void)
                    {"1 !drive 1", "!drive without"},
                    {"1 !drive 1 fault", "!drive without"},
                    {"1 !drive 1 gone", "!drive without"},
-                   {"1 !drive 1 fault 123456789", "more on the line"}};
+                   {"1 !drive 1 fault 123456789", "more on the line"},
+                   {"1 !fault", "!fault without its code"},
+                   {"1 !fault none", "!fault without its code"},
+                   {"1 !fault bus", "!fault without its code"},
+                   {"1 !fault drive-dropped", "!fault without its code"},
+                   {"1 !fault drive-dropped 0", "!fault without its code"},
+                   {"1 !fault drive-dropped 8", "!fault without its code"},
+                   {"1 !fault bus-lost 1", "more on the line"},
+                   {"1 !end now", "more on the line"}};
     for (size_t i = 0; i < sizeof k_wrong / sizeof k_wrong[0]; i++) {
         expect_wrong(k_wrong[i].line, k_wrong[i].why);
     }
@@ -452,6 +473,7 @@ int main(void)
     RUN_TEST(test_frames_parse_line_requests);
     RUN_TEST(test_frames_parse_line_intensity);
     RUN_TEST(test_frames_parse_line_estop_and_late);
+    RUN_TEST(test_frames_parse_line_faults_and_the_end);
     RUN_TEST(test_frames_parse_line_bad_time_is_refused);
     RUN_TEST(test_frames_parse_line_bad_text_is_refused);
     RUN_TEST(test_frames_parse_line_bad_request_is_refused);

@@ -1058,6 +1058,51 @@ static void test_fault_following_error_stops_all_in_time(void)
     start(true); /* the frozen drive hears no request and counts its own errors */
 }
 
+/* What a replay is told was found is found, as if the drives had brought it about. */
+static void test_fault_told_is_found_in_the_next_cycle(void)
+{
+    for (unsigned code = FAULT_NONE + 1u; code < FAULT_CODES; code++) {
+        const unsigned axis = fault_is_of_axis((fault_code_t)code) ? 5 : 0;
+        engage();
+        start_moving(150);
+        const uint32_t faults = seen()->counters.faults;
+        gateway_tell_fault(&m_rig.gateway, (fault_code_t)code, axis == 0 ? 1 : 0); /* it does not go with that axis */
+        rig_run_ms(&m_rig, 1);
+        TEST_ASSERT_EQUAL(STATE_ENGAGED, seen()->state);
+        gateway_tell_fault(&m_rig.gateway, (fault_code_t)code, axis);
+        rig_run_ms(&m_rig, 1);
+        expect_fault((fault_code_t)code, axis, 0);
+        TEST_ASSERT_EQUAL(fault_row((fault_code_t)code)->reaction, seen()->reaction);
+        TEST_ASSERT_EQUAL_HEX32(1u << code, seen()->begun[axis]);
+        rig_run_ms(&m_rig, 1);
+        TEST_ASSERT_EQUAL_HEX32(0, seen()->begun[axis]);
+        TEST_ASSERT_EQUAL_UINT32(faults + 1, seen()->counters.faults);
+    }
+}
+
+static void test_fault_told_that_is_there_counts_once(void)
+{
+    engage();
+    const uint32_t faults = seen()->counters.faults;
+    rig_break(&m_rig, SIM_DRIVES_FAULT, 2, 0x2310);
+    gateway_tell_fault(&m_rig.gateway, FAULT_DRIVE, 3);
+    rig_run_ms(&m_rig, 1);
+    expect_fault(FAULT_DRIVE, 3, 0x2310);
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL_UINT32(faults + 1, seen()->counters.faults);
+}
+
+static void test_fault_told_in_off_is_none(void)
+{
+    start(false);
+    gateway_tell_fault(&m_rig.gateway, FAULT_BUS, 0);
+    gateway_tell_fault(&m_rig.gateway, FAULT_CODES, 0);
+    gateway_tell_fault(&m_rig.gateway, FAULT_DRIVE, DRIVES_MAX + 1u);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    rig_run_ms(&m_rig, 2);
+    TEST_ASSERT_EQUAL_UINT32(0, seen()->counters.faults);
+}
+
 /* The first fault is shown, the worst reaction wins. */
 static void test_fault_worse_one_later_escalates_and_the_first_is_kept(void)
 {
@@ -1474,6 +1519,9 @@ int main(void)
     RUN_TEST(test_fault_bus_busy_for_some_cycles_makes_motion_wait);
     RUN_TEST(test_fault_bus_that_stays_busy_is_a_fault_and_returns_without_a_jump);
     RUN_TEST(test_fault_following_error_stops_all_in_time);
+    RUN_TEST(test_fault_told_is_found_in_the_next_cycle);
+    RUN_TEST(test_fault_told_that_is_there_counts_once);
+    RUN_TEST(test_fault_told_in_off_is_none);
     RUN_TEST(test_fault_worse_one_later_escalates_and_the_first_is_kept);
     RUN_TEST(test_fault_rows_are_complete);
     RUN_TEST(test_fault_bus_gone_is_a_fault_that_can_be_reset);
