@@ -20,6 +20,8 @@
 #define RESET_US        2500000u  /* a reset takes effect when the drives say so */
 #define WAITING_POLL_MS 1
 
+static const char k_dump_later[] = "dump: the disk has not taken it yet; heaved goes on trying";
+
 /* --- Answers --- */
 
 static control_client_t *find_client(control_t *self, uint32_t request_id)
@@ -234,6 +236,7 @@ static void take_lines(control_t *self, control_client_t *client, uint64_t now_u
         if (newline > client->in && newline[-1] == '\r') {
             newline[-1] = '\0';
         }
+        client->asked_us = now_us;
         take_request(self, client, client->in, now_us);
         client->in_length -= (size_t)(newline + 1 - client->in);
         memmove(client->in, newline + 1, client->in_length);
@@ -250,6 +253,12 @@ static void end_input(control_client_t *client, bool is_false_alarm)
     if (!is_waiting(client) && client->out_length == 0) {
         drop(client);
     }
+}
+
+/* A closing client is read no more, nor one whose next requests wait for the answer to the last. */
+static bool is_read(const control_client_t *client)
+{
+    return client->fd >= 0 && !client->is_closing && client->in_length < sizeof client->in;
 }
 
 static void receive(control_t *self, control_client_t *client, uint64_t now_us)
@@ -341,7 +350,7 @@ static void watch_dump(control_t *self, control_client_t *client, uint64_t now_u
         }
     } else if (now_us >= client->answer_by_us) {
         client->dump_ticket = 0;
-        answer_error(client, "dump: the disk has not taken it yet; heaved goes on trying", NULL);
+        answer_error(client, k_dump_later, NULL);
     }
 }
 
@@ -381,37 +390,106 @@ int control_timeout_ms(const control_t *self, uint64_t now_us, int at_most_ms)
 
 /* --- Connections --- */
 
-static void take_connection(control_t *self)
+/* In the order in which clients give way. */
+typedef enum { IDLE, WATCHES, TALKS, WAITS_FOR_DISK, STAYS } standing_t;
+
+/* Who waits for the motion thread stays, for a moment. Not so for the disk: that may take a minute. */
+static standing_t standing(const control_client_t *client, uint64_t now_us)
 {
-    static const char k_full[] = "{\"ok\":false,\"error\":\"too many clients\"}\n";
-    const int fd = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
-    if (fd < 0) {
-        return;
+    if (client->request_id != 0 || now_us - client->came_us < CONTROL_GRACE_US) {
+        return STAYS;
     }
+    if (client->dump_ticket != 0) {
+        return WAITS_FOR_DISK;
+    }
+    if (client->watch_period_us != 0) {
+        return WATCHES;
+    }
+    return now_us - client->asked_us >= CONTROL_IDLE_US ? IDLE : TALKS;
+}
+
+/* Of those that matter least, the one that has not asked for longest; NULL: all stay. */
+static control_client_t *find_least(control_t *self, uint64_t now_us)
+{
+    control_client_t *least = NULL;
+    standing_t least_standing = STAYS;
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         control_client_t *client = &self->client[i];
-        if (client->fd < 0) {
-            client->fd = fd;
-            client->in_length = 0;
-            client->out_length = 0;
-            client->is_closing = false;
-            client->request_id = 0;
-            client->dump_ticket = 0;
-            client->watch_period_us = 0;
-            return;
+        const standing_t its = standing(client, now_us);
+        if (its < least_standing || (its == least_standing && least != NULL && client->asked_us < least->asked_us)) {
+            least = client;
+            least_standing = its;
         }
     }
-    (void)!send(fd, k_full, sizeof k_full - 1, MSG_DONTWAIT | MSG_NOSIGNAL);
-    (void)close(fd);
+    return least;
+}
+
+static void give_way(control_client_t *client)
+{
+    const bool is_dumping = client->dump_ticket != 0;
+    answer_error(client, is_dumping ? k_dump_later : "too many clients: this one had to give way to a newer one", NULL);
+    if (client->fd >= 0) {
+        drop(client);
+    }
+}
+
+static control_client_t *find_free(control_t *self)
+{
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        if (self->client[i].fd < 0) {
+            return &self->client[i];
+        }
+    }
+    return NULL;
+}
+
+/* A place for a newcomer; NULL: there is none yet. */
+static control_client_t *make_room(control_t *self, uint64_t now_us)
+{
+    control_client_t *client = find_free(self);
+    if (client != NULL) {
+        return client;
+    }
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) { /* who has asked, or gone, since the poll */
+        if (is_read(&self->client[i])) {
+            receive(self, &self->client[i], now_us);
+        }
+    }
+    client = find_free(self);
+    if (client == NULL) {
+        client = find_least(self, now_us);
+        if (client != NULL) {
+            give_way(client);
+        }
+    }
+    return client;
+}
+
+/* A newcomer for whom there is no room yet stays in the queue of the socket. */
+static void take_connection(control_t *self, uint64_t now_us)
+{
+    control_client_t *client = make_room(self, now_us);
+    self->is_full = client == NULL;
+    if (client == NULL) {
+        return;
+    }
+    client->fd = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    client->in_length = 0;
+    client->out_length = 0;
+    client->is_closing = false;
+    client->request_id = 0;
+    client->dump_ticket = 0;
+    client->watch_period_us = 0;
+    client->came_us = client->asked_us = now_us;
 }
 
 void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS])
 {
-    fds[0] = (struct pollfd){.fd = self->fd, .events = POLLIN};
+    fds[0] =
+        (struct pollfd){.fd = self->is_full ? -1 : self->fd, .events = POLLIN}; /* poll would not wait while nobody is let in */
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         const control_client_t *client = &self->client[i];
-        const bool is_read = !client->is_closing && client->in_length < sizeof client->in;
-        const short events = (short)((is_read ? POLLIN : 0) | (client->out_length > 0 ? POLLOUT : 0));
+        const short events = (short)((is_read(client) ? POLLIN : 0) | (client->out_length > 0 ? POLLOUT : 0));
         fds[i + 1] = (struct pollfd){.fd = client->fd, .events = events};
     }
 }
@@ -434,8 +512,8 @@ void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64
             serve_time(self, client, now_us);
         }
     }
-    if ((fds[0].revents & POLLIN) != 0) {
-        take_connection(self);
+    if ((fds[0].revents & POLLIN) != 0 || self->is_full) {
+        take_connection(self, now_us);
     }
 }
 
@@ -496,6 +574,7 @@ int control_open(control_t *self, const char *path, const config_t *config, moti
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     self->fd = -1;
+    self->is_full = false;
     self->config = config;
     self->loop = loop;
     self->blackbox = blackbox;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
  * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump. The service thread owns it;
- * nothing blocks, nothing allocates after the open, and a client that does not read is dropped.
+ * nothing blocks, nothing allocates after the open, and a client that does not read is dropped. Nobody keeps an operator out:
+ * where all places are taken, a newcomer gets that of the client that matters least, which is told so.
  */
 #ifndef HEAVE_APP_CONTROL_H
 #define HEAVE_APP_CONTROL_H
@@ -19,6 +20,8 @@
 #define CONTROL_OUT_BYTES    (4u * CONTROL_ANSWER_MAX)
 #define CONTROL_WATCH_HZ     20u /* where the client does not say */
 #define CONTROL_WATCH_MAX_HZ 50u
+#define CONTROL_IDLE_US      2000000u /* has asked nothing for so long: the first to give way */
+#define CONTROL_GRACE_US     100000u  /* after it came: time to ask something before it has to give way */
 
 /** One client; private to control.c. */
 typedef struct {
@@ -36,11 +39,14 @@ typedef struct {
     uint32_t dump_ticket;     /**< waits for the black box; 0 = does not */
     uint64_t watch_period_us; /**< 0 = does not watch */
     uint64_t watch_next_us;
+    uint64_t came_us;
+    uint64_t asked_us; /**< its last request, else when it came */
 } control_client_t;
 
 /** The socket and its clients; private to control.c. */
 typedef struct {
-    int fd; /**< -1: closed */
+    int fd;       /**< -1: closed */
+    bool is_full; /**< somebody waits outside, and nobody can give way yet */
     char path[CONFIG_PATH_MAX];
     struct stat made; /**< identity of the socket file, so that only ours is removed */
     motion_loop_t *loop;

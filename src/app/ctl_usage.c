@@ -42,7 +42,7 @@ static const usage_row_t k_options[] = {
 
 static const usage_exit_t k_exits[] = {
     {EXIT_DONE, "done"},
-    {EXIT_REFUSED, "refused or ended in FAULT or ESTOP at once"},
+    {EXIT_REFUSED, "refused, ended in FAULT or ESTOP at once, or gave way to a newer client"},
     {EXIT_BAD_USAGE, "usage"},
     {EXIT_UNAVAILABLE, "heaved is not running or may not be asked"},
     {EXIT_IO, "output cannot be written"},
@@ -53,7 +53,9 @@ static const usage_section_t k_manual[] = {
     {"DESCRIPTION",
      "`heavectl` asks a running `heaved(8)` over its local socket. A request that the state does not allow is refused with the "
      "reason and "
-     "changes nothing. Members of the socket's group (`heave`, where heaved is a service) may ask; several at a time.\n\n"
+     "changes nothing. Members of the socket's group (`heave`, where heaved is a service) may ask; eight at a time. A ninth gets "
+     "the place of one that "
+     "has asked nothing for 2 s, else that of the oldest `watch`, which ends and says so.\n\n"
      "With `--json` every answer is an object of one line: /usr/share/doc/heave/docs/status-json.md has all its members, which "
      "stay what they "
      "are within a major version. An answer with `ok` false says in `error` why.\n"},

@@ -99,11 +99,12 @@ static int open_link(ctl_t *self)
     return EXIT_DONE;
 }
 
-static bool send_line(const ctl_t *self, const char *request)
+/* Where it fails, what heaved said before it closed is still to be read. */
+static void send_line(const ctl_t *self, const char *request)
 {
     char line[64];
     const int length = snprintf(line, sizeof line, "%s\n", request);
-    return send(self->fd, line, (size_t)length, MSG_NOSIGNAL) == length;
+    (void)!send(self->fd, line, (size_t)length, MSG_NOSIGNAL);
 }
 
 static int64_t now_ms(void)
@@ -268,30 +269,34 @@ static int ask(ctl_t *self)
     (void)snprintf(request, sizeof request, "%s%s%s", self->command, self->argument != NULL ? " " : "",
                    self->argument != NULL ? self->argument : "");
     const int64_t until_ms = now_ms() + (strcmp(self->command, "dump") == 0 ? DUMP_MS : ANSWER_MS);
-    const char *line = send_line(self, request) ? receive_line(self, until_ms) : NULL;
+    send_line(self, request);
+    const char *line = receive_line(self, until_ms);
     return line != NULL ? show(self, line) : complain(EXIT_UNAVAILABLE, "heaved does not answer");
 }
 
 /* --- Watching --- */
 
-static void show_update(const ctl_t *self, const char *line, bool is_terminal)
+/* Returns false: heaved says no, which is left to show. */
+static bool show_update(const ctl_t *self, const char *line, bool is_terminal)
 {
     static char text[CTL_VIEW_BYTES];
-    if (self->is_json) {
-        printf("%s\n", line);
-        return;
-    }
     cJSON *status = cJSON_Parse(line);
-    if (is_terminal) {
+    const bool is_refused = cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(status, "ok"));
+    if (is_refused) {
+        /* not here: the terminal's other screen goes away */
+    } else if (self->is_json) {
+        printf("%s\n", line);
+    } else if (is_terminal) {
         show_table(status, true);
     } else {
         (void)ctl_view_line(status, text);
         printf("%s\n", text);
     }
     cJSON_Delete(status);
+    return !is_refused;
 }
 
-/* Until time is up, Ctrl-C, or the end of heaved. */
+/* Until time is up, Ctrl-C, the end of heaved, or a line in which it says no; that is left to show. */
 static int follow(ctl_t *self, bool is_terminal)
 {
     const int64_t until_ms = self->for_s > 0.0 ? now_ms() + (int64_t)(self->for_s * 1000.0) : INT64_MAX;
@@ -300,7 +305,9 @@ static int follow(ctl_t *self, bool is_terminal)
         if (line == NULL) {
             break;
         }
-        show_update(self, line, is_terminal);
+        if (!show_update(self, line, is_terminal)) {
+            return EXIT_REFUSED;
+        }
         if (fflush(stdout) != 0) {
             return EXIT_IO;
         }
@@ -317,9 +324,7 @@ static int watch(ctl_t *self)
     (void)sigaction(SIGINT, &action, NULL);
     (void)sigaction(SIGTERM, &action, NULL);
     (void)snprintf(request, sizeof request, "watch %u", hz);
-    if (!send_line(self, request)) {
-        return complain(EXIT_UNAVAILABLE, "heaved does not answer");
-    }
+    send_line(self, request);
     if (is_terminal) {
         printf("\x1b[?1049h\x1b[?25l"); /* other screen, no cursor */
     }
@@ -327,6 +332,9 @@ static int watch(ctl_t *self)
     if (is_terminal) {
         printf("\x1b[?25h\x1b[?1049l");
         (void)fflush(stdout);
+    }
+    if (code == EXIT_REFUSED) {
+        return show(self, self->line);
     }
     return code == EXIT_UNAVAILABLE ? complain(code, "heaved has ended") : code;
 }

@@ -545,16 +545,38 @@ def odd_requests(bench):
     assert bench.stop(daemon) == 0
 
 
-def too_many_clients(bench):
+def idle_clients_keep_nobody_out(bench):
     daemon = bench.start()
+    bench.wait_state("ENGAGED")
     assert bench.socket.stat().st_mode & 0o777 == 0o660, "its user and its group, nobody else"
     clients = [Client(bench) for _ in range(8)]
-    assert all(client.ask("status\n")["ok"] for client in clients)
-    with Client(bench) as ninth:
-        assert "too many" in json.loads(ninth.file.readline())["error"]
+    for request, state in (("hold", "HOLD"), ("resume", "ENGAGED"), ("park", "SETTLING")):
+        answer, code = bench.ask(request)
+        assert code == 0 and answer == {"ok": True, "state": state}, (answer, code)
+    told = json.loads(clients[0].file.readline())
+    assert told["ok"] is False and "too many clients" in told["error"] and clients[0].file.readline() == "", told
+    assert clients[7].ask("status\n")["ok"], "one place was enough"
     for client in clients:
         client.__exit__()
-    heave.wait_for(lambda: bench.ctl("status").returncode == 0, "there is room again")
+    assert bench.stop(daemon) == 0
+
+
+def watchers_keep_nobody_out(bench, *options):
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    with subprocess.Popen([bench.bin / "heavectl", "--socket", bench.socket, *options, "--for", str(heave.WAIT_S), "watch"],
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as oldest:
+        assert oldest.stdout.readline()
+        clients = [Client(bench) for _ in range(7)]
+        assert all(client.ask("watch 1\n")["ok"] for client in clients)  # so rarely that they need not be read soon
+        answer, code = bench.ask("hold")
+        assert code == 0 and answer == {"ok": True, "state": "HOLD"}, (answer, code)
+        out, said = oldest.communicate(timeout=heave.WAIT_S)
+        assert oldest.returncode == 1 and re.fullmatch(r"heavectl: too many clients: [^\n]*\n", said), (oldest.returncode, said)
+        assert (json.loads(out.splitlines()[-1])["ok"] is False) if options else "too many" not in out, out
+    assert all(json.loads(client.file.readline())["ok"] for client in clients), "the others go on"
+    for client in clients:
+        client.__exit__()
     assert bench.stop(daemon) == 0
 
 
@@ -658,7 +680,9 @@ CASES = {
     "senders that are not allowed are refused and counted": strangers_are_refused,
     "nobody reads standard error": nobody_reads_standard_error,
     "odd requests": odd_requests,
-    "the ninth client is turned away": too_many_clients,
+    "eight clients that ask nothing do not keep an operator out": idle_clients_keep_nobody_out,
+    "eight that watch do not either, and the oldest ends and says why": watchers_keep_nobody_out,
+    "eight that watch do not either, --json": lambda bench: watchers_keep_nobody_out(bench, "--json"),
     "a client that does not read is dropped": a_client_that_does_not_read,
 }
 
