@@ -132,6 +132,8 @@ static void take_records(blackbox_t *self)
     for (; length > 0; length = ring_pop(self->records.from, &self->item, sizeof self->item)) {
         if (self->item.record.head.kind == RECORD_ZERO) {
             self->zero_us = self->item.record.head.t_us;
+        } else if (self->item.record.head.kind == RECORD_RELOAD) {
+            self->reloaded_us = self->item.record.head.t_us;
         }
         keep(self, &self->records, length);
     }

@@ -86,6 +86,7 @@ typedef struct {
     uint32_t folders_max;
     uint64_t newest_us;   /**< time of the newest row */
     uint64_t zero_us;     /**< 0 = not yet */
+    uint64_t reloaded_us; /**< the configuration was last read again then; 0 = never */
     uint64_t until_us;    /**< newest row of the incident being written */
     uint64_t due_us;      /**< an incident is written then; 0 = none */
     uint8_t last_state;   /**< of the newest row */

@@ -212,6 +212,17 @@ static void write_head(blackbox_t *self, const blackbox_row_t *cause, const char
     write_text(self, k_starts[start]);
 }
 
+/* A state to begin with has what changed before it; platform.ini has nothing of it. */
+static void write_reload(blackbox_t *self, start_t start, uint64_t start_us)
+{
+    if (self->reloaded_us != 0) {
+        write_text(self, "; the configuration was read again: platform.ini is as it was at the start of heaved\n");
+        write_text(self, start == START_STATE && self->reloaded_us < start_us
+                             ? "; what changed is part of the replay\n"
+                             : "; what changed does not replay, but for faults: the rows are the same up to there\n");
+    }
+}
+
 /* Turns the records from where the replay begins into lines; all of them where it cannot begin, as comments. */
 static void write_records(blackbox_t *self, record_writer_t *writer, uint64_t from_us)
 {
@@ -243,6 +254,7 @@ static bool write_frames(blackbox_t *self, const blackbox_row_t *cause, const ch
         return false;
     }
     write_head(self, cause, name, start);
+    write_reload(self, start, start_us);
     if (start == START_STATE) {
         writer.has_zero = true;
         writer.zero_us = self->zero_us;

@@ -140,7 +140,7 @@ static size_t put_content(char *to, const record_t *record, size_t length)
     case RECORD_FAULT:
         return put_fault(to, (fault_code_t)record->head.value, record->head.detail);
     case RECORD_RELOAD:
-        return decimal_put_text(to, "the configuration was read again: what changed with it does not replay");
+        return decimal_put_text(to, "the configuration was read again: what changed with it does not replay, but for faults");
     case RECORD_ZERO:
         break;
     }

@@ -283,6 +283,8 @@ static void test_blackbox_following_error_after_a_reload_replays(void)
 {
     run((story_t){.end_us = 8000000, .narrow_us = 6000000});
     char *frames = expect_replay(5000);
+    expect_in(frames,
+              "; the configuration was read again: platform.ini is as it was at the start of heaved\n; what changed does not");
     expect_in(frames, " !fault following-error ");
     free(frames);
     char *trace = contents(file_of("trace.csv"));
@@ -296,6 +298,14 @@ static void test_blackbox_following_error_in_the_middle_replays(void)
     char *frames = expect_replay(5000);
     expect_in(frames, " !state ");
     expect_in(frames, " !fault following-error ");
+    free(frames);
+}
+
+static void test_blackbox_reload_before_the_replay_is_said(void)
+{
+    run((story_t){.end_us = 60000000, .narrow_us = 5000000, .ask_us = 59000000});
+    char *frames = expect_replay(5000);
+    expect_in(frames, "; what changed is part of the replay\n");
     free(frames);
 }
 
@@ -443,6 +453,7 @@ int main(void)
     RUN_TEST(test_blackbox_drive_fault_is_written_by_itself_and_replays);
     RUN_TEST(test_blackbox_following_error_after_a_reload_replays);
     RUN_TEST(test_blackbox_following_error_in_the_middle_replays);
+    RUN_TEST(test_blackbox_reload_before_the_replay_is_said);
     RUN_TEST(test_blackbox_lost_bus_replays);
     RUN_TEST(test_blackbox_frozen_drive_replays);
     RUN_TEST(test_blackbox_estop_is_written_at_the_end_at_the_latest);
