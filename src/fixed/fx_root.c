@@ -70,7 +70,7 @@ static fx_u128_t shift_left(fx_u128_t value, unsigned shift)
 
 /* sqrt of a value of [2^124, 2^126), at most 1.01 too small and 0.01 too large: 31 bits from the inverse, and two corrections by
  * what is left over remainder / (2 root). The first one is below 2^35 and leaves its square over 2^64, below 2^7. */
-static uint64_t root_wide_normalised(fx_u128_t value)
+HV_WRAPS static uint64_t root_wide_normalised(fx_u128_t value)
 {
     const int64_t inverse_q31 = (int64_t)inverse_root_q31((value.hi << 2) | (value.lo >> 62));
     const uint64_t upper = ((value.hi >> 30) * (uint64_t)inverse_q31) >> 32;
@@ -82,7 +82,7 @@ static uint64_t root_wide_normalised(fx_u128_t value)
     return root + (uint64_t)fx_mul_high(rest, inverse_q31);
 }
 
-uint64_t fx_sqrt_u128(fx_u128_t value)
+HV_WRAPS uint64_t fx_sqrt_u128(fx_u128_t value)
 {
     if ((value.hi | value.lo) == 0) {
         return 0;
