@@ -509,6 +509,7 @@ HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, co
         }
     }
     copy_point(self, self->last_q32, sample_q32);
+    self->is_off = false; /* what it was off was per period of the old grid, and so was the grip */
     (void)soften(self, self->patience);
     put_control(self);
 }

@@ -807,6 +807,28 @@ static void test_stream_step_new_rate_gives_no_jump_of_acceleration(void)
 }
 
 /* A frame rate that wanders between 45 and 75 Hz, as a game's does. */
+/* A sender that falls from a fast rate to a slow one: what the curve was off is taken back in the new one's time, and the end is
+ * met. */
+static void test_stream_step_much_slower_rate_does_not_swing(void)
+{
+    for (unsigned fast_hz = 60; fast_hz <= 240; fast_hz += 60) {
+        start(STREAM_SMOOTH);
+        double at = 0.001;
+        for (; at < 3.2; at += 1.0 / fast_hz) {
+            send(at, 10 * sin(3.0 * at));
+        }
+        for (; at < 6.2; at += 0.1) {
+            send(at, 10 * sin(3.0 * at));
+        }
+        const double last = s_sent.value[s_sent.count - 1];
+        render(0, 0, 10000);
+        for (int ms = 0; ms < 10000; ms++) {
+            TEST_ASSERT_DOUBLE_WITHIN(15, 0, mm(s_ref[ms].pos_q32));
+        }
+        assert_at_rest(q32(last), &s_ref[9999]);
+    }
+}
+
 static void test_stream_step_wandering_rate_is_followed(void)
 {
     make_signal(8);
@@ -945,6 +967,7 @@ int main(void)
     RUN_TEST(test_stream_is_live_while_samples_come);
     RUN_TEST(test_stream_step_changing_rates_are_followed);
     RUN_TEST(test_stream_step_new_rate_gives_no_jump_of_acceleration);
+    RUN_TEST(test_stream_step_much_slower_rate_does_not_swing);
     RUN_TEST(test_stream_step_wandering_rate_is_followed);
     RUN_TEST(test_stream_step_held_back_bursts_are_sorted_in);
     RUN_TEST(test_stream_step_datagrams_sent_twice_change_nothing);
