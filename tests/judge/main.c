@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * main.c - judges a trace of set-points, fast enough for tens of millions of cycles.
  *
- *   trace_judge CONFIG <TRACE        what was judged, one figure a line; then what was broken, and the first of it
+ *   trace_judge CONFIG [FRAMES] <TRACE        what was judged, one figure a line; then what was broken, and the first of it
+ *
+ * With the frames that were played it is also judged whether they were followed.
  *
  * Exit status: 0 nothing broken, 1 something, 2 a configuration that cannot be read.
  * What tools/check_trace does more: relays, states, engage and rest times, timed moves, and being readable. test_judge.py lets
@@ -10,6 +12,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "following.h"
 #include "rules.h"
 
 #define LINE_BYTES 1024u
@@ -26,9 +29,12 @@ int main(int argc, char **argv)
 {
     static mechanism_t s_mechanism;
     static rules_t s_rules;
+    static following_t s_following;
     char line[LINE_BYTES];
-    if (argc != 2 || !mechanism_read(&s_mechanism, argv[1])) {
-        fputs("usage: trace_judge CONFIG <TRACE\n", stderr);
+    const bool has_frames = argc == 3;
+    if (argc < 2 || argc > 3 || !mechanism_read(&s_mechanism, argv[1]) ||
+        (has_frames && !following_read(&s_following, &s_mechanism, argv[2]))) {
+        fputs("usage: trace_judge CONFIG [FRAMES] <TRACE\n", stderr);
         return 2;
     }
     rules_init(&s_rules, &s_mechanism);
@@ -40,6 +46,9 @@ int main(int argc, char **argv)
         row_t row;
         if (line[length - 1] == '\n' && row_read(&row, line, length - 1)) {
             rules_row(&s_rules, &row);
+            if (has_frames) {
+                following_row(&s_following, &row, stdout);
+            }
         } else {
             rules_bad_line(&s_rules);
         }
@@ -48,5 +57,6 @@ int main(int argc, char **argv)
         rules_bad_line(&s_rules);
     }
     rules_report(&s_rules, stdout);
-    return rules_broken(&s_rules) == 0 ? 0 : 1;
+    const uint64_t not_followed = has_frames ? following_report(&s_following, stdout) : 0;
+    return rules_broken(&s_rules) + not_followed == 0 ? 0 : 1;
 }
