@@ -79,7 +79,8 @@ typedef struct {
     uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
     uint64_t state_since_us; /**< when the state was entered */
     confirm_t confirm;
-    uint16_t frame_mask; /**< what the sender asked of the relays */
+    unsigned stream_frames; /**< in quick succession so far, at most as many as make a stream */
+    uint16_t frame_mask;    /**< what the sender asked of the relays */
     relay_policy_t relay_policy;
     unsigned targets; /**< of this cycle */
     bool has_newest;  /**< newest is of this cycle and motion has not been told of it */

@@ -95,7 +95,8 @@ const config_key_t config_keys[] = {
      RANGE(0, 1000), .is_live = true, .help = "a cycle that is late by more cycles than that holds the platform; 0 = never"},
     {KEY("platform", "engage"), AT(settings.engage), .type = CONFIG_WORD, .unit = "", .fallback = "manual",
      .words = "manual|auto",
-     .help = "who brings the platform up: an operator's request, or heaved by itself once after the start"},
+     .help = "who brings the platform up: an operator's request, or heaved by itself once after each start, also where a service manager "
+             "starts it again after a crash"},
 
     JOINT("1", 0, CONFIG_NEEDS_NOTHING),
     JOINT("2", 1, CONFIG_NEEDS_NOTHING),

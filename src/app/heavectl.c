@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -163,22 +164,31 @@ static const char *receive_line(ctl_t *self, int64_t until_ms)
 
 /* --- Showing --- */
 
-/* The language of messages, as the locale's variables say it. */
-static bool is_chinese(void)
+/* What the locale's variables say of a category. */
+static const char *locale_of(const char *category)
 {
-    static const char *const k_names[] = {"LC_ALL", "LC_MESSAGES", "LANG"};
-    for (size_t i = 0; i < sizeof k_names / sizeof k_names[0]; i++) {
-        const char *value = getenv(k_names[i]);
+    const char *const names[] = {"LC_ALL", category, "LANG"};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        const char *value = getenv(names[i]);
         if (value != NULL && value[0] != '\0') {
-            return strncmp(value, "zh", 2) == 0;
+            return value;
         }
     }
-    return false;
+    return "";
 }
 
+/* The language of messages. */
+static bool is_chinese(void)
+{
+    return strncmp(locale_of("LC_MESSAGES"), "zh", 2) == 0;
+}
+
+/* Also where the locale that is asked for was never made on this box: the terminal is what it is. */
 static bool is_utf8(void)
 {
-    return strcmp(nl_langinfo(CODESET), "UTF-8") == 0;
+    const char *codeset = strchr(locale_of("LC_CTYPE"), '.');
+    return strcmp(nl_langinfo(CODESET), "UTF-8") == 0 ||
+           (codeset != NULL && (strcasecmp(codeset, ".UTF-8") == 0 || strcasecmp(codeset, ".utf8") == 0));
 }
 
 /* On a terminal that knows them, unless NO_COLOR says otherwise (no-color.org). */

@@ -44,11 +44,33 @@ static void put_escaped(json_t *self, char c)
     }
 }
 
+/* Bytes of the character of more than one byte that begins here, as RFC 3629 has them; 0 where none does. */
+static size_t utf8_bytes(const char *text)
+{
+    const unsigned char lead = (unsigned char)text[0], second = (unsigned char)text[1];
+    const size_t bytes = lead >= 0xf5 || lead < 0xc2 ? 0 : lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
+    const bool is_beyond = (lead == 0xe0 && second < 0xa0) || (lead == 0xed && second > 0x9f) ||
+                           (lead == 0xf0 && second < 0x90) ||
+                           (lead == 0xf4 && second > 0x8f); /* too long a form, half a pair of UTF-16, more than U+10FFFF */
+    for (size_t i = 1; i < bytes; i++) {
+        if (((unsigned char)text[i] & 0xc0u) != 0x80) {
+            return 0;
+        }
+    }
+    return is_beyond ? 0 : bytes;
+}
+
 static void put_quoted(json_t *self, const char *text)
 {
     put_char(self, '"');
-    for (; *text != '\0'; text++) {
-        put_escaped(self, *text);
+    while (*text != '\0') {
+        const size_t bytes = utf8_bytes(text);
+        if (bytes == 0) {
+            put_escaped(self, *text++);
+        } else {
+            put_bytes(self, text, bytes);
+            text += bytes;
+        }
     }
     put_char(self, '"');
 }

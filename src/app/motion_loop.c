@@ -145,7 +145,10 @@ static void take_switches(motion_loop_t *self)
     }
     if ((change.on & INPUT_RESET) != 0) {
         hal_log_write(self->io.log, HAL_LOG_NOTICE, "the reset button was pressed");
-        (void)!carry_out(self, &(motion_request_t){.event = EVENT_RESET});
+        if (carry_out(self, &(motion_request_t){.event = EVENT_RESET}) != HV_OK) {
+            hal_log_write(self->io.log, HAL_LOG_WARNING,
+                          "reset refused: the e-stop is still active, or there is nothing to reset");
+        }
     }
 }
 

@@ -73,7 +73,9 @@ size_t operator_explain(event_t request, const snapshot_t *snapshot, bool is_shu
     text_put(&out, event_name(request));
     text_put(&out, ": ");
     if (is_shutting_down && request != EVENT_RESET) {
-        text_put(&out, "a shutdown is under way; start heaved again once it has ended");
+        text_put(&out, "a shutdown is under way; ");
+        text_put(&out, snapshot->state == STATE_HOLD ? "shutdown goes on with it, a second signal ends at once"
+                                                     : "start heaved again once it has ended");
         return out.length;
     }
     text_put(&out, reason(request, snapshot));

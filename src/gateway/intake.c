@@ -9,6 +9,9 @@
 
 #define REJECT_LOG_INTERVAL_US 1000000u
 #define REJECT_TEXT_BYTES      60u
+#define STREAM_FRAMES          10u      /* as many are a stream, */
+#define STREAM_PERIOD_US       250000u  /* when each comes within that after the last one, */
+#define STREAM_GAP_US          1000000u /* and over when none has for that */
 #define TURN_Q32               q32_from_int(360)
 
 /* Where the values of a frame go: an axis of the platform, or a cylinder (from SLOT_CYLINDER on). */
@@ -358,6 +361,21 @@ static bool follow(gateway_t *self, const motion_target_t *target, frame_command
     return is_taken;
 }
 
+/* A stream that comes back after a gap, as of a sender that was started again, is taken over like a new sender's: nothing says
+ * that it goes on where it ended. Where silence leads to HOLD within the gap that has happened already. Poses sent one by one are
+ * no stream. */
+static void watch_gap(gateway_t *self, uint64_t now_us)
+{
+    const uint64_t end_us = motion_timed_end_us(&self->motion);
+    const uint64_t since_us = end_us > self->start_us ? end_us : self->start_us;
+    const bool is_gap = now_us > since_us && now_us - since_us >= STREAM_GAP_US;
+    if (is_gap && self->stream_frames >= STREAM_FRAMES && self->supervisor.state == STATE_ENGAGED) {
+        operate_follow(self, now_us);
+    }
+    const bool is_next = !is_gap && now_us - self->snapshot.last_frame_us < STREAM_PERIOD_US;
+    self->stream_frames = !is_next ? 0 : self->stream_frames < STREAM_FRAMES ? self->stream_frames + 1 : STREAM_FRAMES;
+}
+
 static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *from, uint64_t now_us)
 {
     const char *missing = missing_for(self, frame->command);
@@ -371,6 +389,7 @@ static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *
     auto_engage_frame(&self->auto_engage, now_us);
     const motion_target_t target = target_of(self, frame);
     operate_event(self, EVENT_FRAME, now_us);
+    watch_gap(self, now_us);
     const bool is_waiting = !is_confirmed(self, &target, now_us);
     if (!is_waiting && !follow(self, &target, frame->command, from, now_us)) {
         return;

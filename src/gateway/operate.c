@@ -233,6 +233,15 @@ static bool is_told(const gateway_t *self, fault_code_t code, unsigned axis)
     return self->supervisor.state != STATE_OFF && (self->told[axis] >> (unsigned)code & 1u) != 0;
 }
 
+/* Who asked for a reset did not know of what came after it. */
+static void give_up_reset(gateway_t *self)
+{
+    if (self->reset_until_us != 0) {
+        self->reset_until_us = 0;
+        hal_log_write(self->io.log, HAL_LOG_WARNING, "reset refused: a new fault or the e-stop came after it");
+    }
+}
+
 /* A fault begins: all are counted, the first is kept, and the worst reaction wins, also over one that is under way. */
 static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint32_t device_code, uint64_t now_us)
 {
@@ -265,6 +274,7 @@ static void watch_bus(gateway_t *self, bool is_lost, uint64_t now_us)
 {
     const bool is_new = is_lost && !self->is_bus_lost && self->supervisor.state != STATE_OFF;
     if (is_new || is_told(self, FAULT_BUS, 0)) {
+        give_up_reset(self);
         raise_fault(self, FAULT_BUS, 0, 0, now_us);
     }
     self->is_bus_lost = is_lost && self->supervisor.state != STATE_OFF;
@@ -276,6 +286,7 @@ static void watch_failing(gateway_t *self, uint64_t now_us)
 {
     const bool is_failing = drives_is_failing(self->io.drives) && self->supervisor.state != STATE_OFF;
     if ((is_failing && !self->is_bus_failing) || is_told(self, FAULT_BUS_FAILING, 0)) {
+        give_up_reset(self);
         raise_fault(self, FAULT_BUS_FAILING, 0, 0, now_us);
     }
     self->is_bus_failing = is_failing;
@@ -344,6 +355,9 @@ static void watch_drives(gateway_t *self, uint64_t now_us)
     for (unsigned i = 0; i < drive_count(self); i++) {
         const fault_code_t code = self->supervisor.state == STATE_OFF ? FAULT_NONE : find_fault(self, i, now_us);
         const bool is_new = code != FAULT_NONE && code != self->axis_fault[i];
+        if (is_new && self->axis_fault[i] == FAULT_NONE) { /* else a drive on its way out of the fault that is reset */
+            give_up_reset(self);
+        }
         self->axis_fault[i] = code;
         if (is_new) {
             raise_fault(self, code, i + 1, code == FAULT_FOLLOWING ? 0 : self->feedback[i].fault_code, now_us);
@@ -406,6 +420,7 @@ static void read_inputs(gateway_t *self, uint64_t now_us)
     const hv_status_t status = hal_inputs_read(self->io.inputs, &levels);
     self->snapshot.is_estop_active = status != HV_OK || (levels & INPUT_ESTOP) != 0;
     if (self->snapshot.is_estop_active) {
+        give_up_reset(self);
         operate_event(self, EVENT_ESTOP, now_us);
     }
 }
@@ -528,7 +543,8 @@ hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us)
 {
     if (request == EVENT_RESET) {
         const bool is_latched = supervisor_is_latched(&self->supervisor);
-        if (!is_latched && (self->supervisor.state != STATE_OFF || !is_drive_fault_present(self))) {
+        const bool is_for_drives = self->supervisor.state == STATE_OFF && is_drive_fault_present(self);
+        if (self->snapshot.is_estop_active || (!is_latched && !is_for_drives)) {
             return HV_ERR_STATE;
         }
         (void)!drives_request(self->io.drives, DRIVES_RESET_FAULT);

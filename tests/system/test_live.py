@@ -77,6 +77,8 @@ def plain_answers_are_lines(bench):
     assert (run.returncode, run.stdout, run.stderr) == (0, "engage: HOMING\n", ""), run
     run = bench.ctl("reset")
     assert run.returncode == 1 and run.stdout == "" and re.fullmatch(r"heavectl: reset: there is nothing to reset in [^\n]*\n", run.stderr), run
+    fault = json.loads(bench.ctl("--json", "status").stdout)["fault"]
+    assert (fault["text"], fault["text_zh"]) == ("none", "\u65e0"), fault
     table = bench.ctl("status", env={**os.environ, "LC_ALL": "C"}).stdout
     assert all(len(line) <= 80 for line in table.splitlines()) and table.isascii() and "cylinder" in table, table
     table = bench.ctl("status", env={**os.environ, "LC_ALL": "C.UTF-8"}).stdout

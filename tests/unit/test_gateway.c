@@ -187,6 +187,7 @@ static void test_start_auto_is_over_after_fault_estop_and_requests(void)
             sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, true);
             rig_run_ms(&m_rig, 10);
             sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, false);
+            rig_run_ms(&m_rig, 1);
             TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
             rig_run_ms(&m_rig, 10);
         } else {
@@ -723,6 +724,43 @@ static void test_senders_take_over_after_silence_at_engage_speed(void)
     }
 }
 
+/* 60 Hz at that height; returns the highest speed of a cylinder meanwhile. */
+static double stream_height(const char *frame, unsigned frames)
+{
+    rig_check_reset(&m_rig);
+    for (unsigned i = 0; i < frames; i++) {
+        rig_send(&m_rig, frame);
+        rig_run_ms(&m_rig, i % 3 == 0 ? 16 : 17);
+    }
+    return m_rig.check.speed * 400;
+}
+
+static void test_senders_stream_that_returns_after_a_gap_is_taken_over_at_engage_speed(void)
+{
+    m_settings.silence_hold_ms = 0;
+    engage();
+    (void)stream_height("@A6:0,0,0,0,0,-40#", 200);
+    TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,40#", 200) > 100); /* no gap: a step of the stream */
+    rig_run_ms(&m_rig, 900);
+    TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,-40#", 200) > 100); /* shorter than what counts */
+    rig_run_ms(&m_rig, 1100);
+    TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,40#", 250) <= 50.1);
+    assert_heights(40);
+    TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,-40#", 200) > 100); /* and then as ever */
+    assert_heights(-40);
+}
+
+static void test_senders_poses_one_by_one_are_at_full_speed_whatever_is_between(void)
+{
+    m_settings.silence_hold_ms = 0;
+    engage();
+    for (unsigned i = 0; i < 20; i++) {
+        rig_check_reset(&m_rig);
+        send_and_run(i % 2 == 0 ? "@A6:0,0,0,0,0,40#" : "@A6:0,0,0,0,0,-40#", 1500);
+        TEST_ASSERT_TRUE(i == 0 || m_rig.check.speed * 400 > 100);
+    }
+}
+
 static void test_senders_priority_takes_over_in_motion_without_a_jump(void)
 {
     m_settings.takeover_ms = 2500;
@@ -850,10 +888,9 @@ static void test_estop_in_motion_latches_and_comes_up_through_homing(void)
         }
         rig_send(&m_rig, "@A6:0,0,0,0,0,0#");
         TEST_ASSERT_EQUAL_DOUBLE(0, biggest_move(300));
-        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
-        rig_run_ms(&m_rig, 3000);
+        TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_RESET));
+        rig_run_ms(&m_rig, 500);
         TEST_ASSERT_EQUAL(STATE_ESTOP, seen()->state);
-        TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "reset refused"));
         sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, false);
         rig_run_ms(&m_rig, 100);
         TEST_ASSERT_EQUAL(STATE_ESTOP, seen()->state);
@@ -963,6 +1000,38 @@ static void test_fault_whose_cause_stays_cannot_be_reset(void)
     TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
     rig_run_ms(&m_rig, 10);
     TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+}
+
+/* Who resets does not know yet of what comes after it. */
+static void test_reset_is_given_up_for_what_comes_after_it(void)
+{
+    for (unsigned what = 0; what < 3; what++) {
+        engage();
+        m_is_fault_expected = true;
+        rig_break(&m_rig, SIM_DRIVES_OFFLINE, 1, 0);
+        rig_run_ms(&m_rig, 1000);
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+        rig_run_ms(&m_rig, 300);
+        if (what == 0) {
+            sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, true);
+            rig_run_ms(&m_rig, 100);
+            sim_inputs_set(&m_rig.inputs, INPUT_ESTOP, false);
+        } else if (what == 1) {
+            rig_break(&m_rig, SIM_DRIVES_OFFLINE, 2, 0);
+        } else {
+            m_rig.is_failing = true;
+            rig_run_ms(&m_rig, 100);
+            m_rig.is_failing = false;
+        }
+        rig_run_ms(&m_rig, 100);
+        rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+        rig_run_ms(&m_rig, 3000);
+        TEST_ASSERT_EQUAL(what == 0 ? STATE_ESTOP : STATE_FAULT, seen()->state);
+        TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "reset refused: a new fault or the e-stop came after it"));
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+        rig_run_ms(&m_rig, 10);
+        TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    }
 }
 
 static void test_fault_drive_offline_stops_all(void)
@@ -1503,6 +1572,8 @@ int main(void)
     RUN_TEST(test_silence_bad_frames_do_not_count_as_a_sender);
     RUN_TEST(test_senders_two_at_once_only_one_is_followed);
     RUN_TEST(test_senders_take_over_after_silence_at_engage_speed);
+    RUN_TEST(test_senders_stream_that_returns_after_a_gap_is_taken_over_at_engage_speed);
+    RUN_TEST(test_senders_poses_one_by_one_are_at_full_speed_whatever_is_between);
     RUN_TEST(test_senders_priority_takes_over_in_motion_without_a_jump);
     RUN_TEST(test_jumps_lone_far_frame_moves_nothing_relays_neither);
     RUN_TEST(test_jumps_second_frame_is_followed_with_its_own_time);
@@ -1514,6 +1585,7 @@ int main(void)
     RUN_TEST(test_estop_in_every_state_ends_in_estop);
     RUN_TEST(test_fault_of_a_drive_stops_all_and_latches);
     RUN_TEST(test_fault_whose_cause_stays_cannot_be_reset);
+    RUN_TEST(test_reset_is_given_up_for_what_comes_after_it);
     RUN_TEST(test_fault_drive_offline_stops_all);
     RUN_TEST(test_fault_drive_that_drops_out_stops_all);
     RUN_TEST(test_fault_bus_busy_for_some_cycles_makes_motion_wait);

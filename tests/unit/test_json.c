@@ -67,6 +67,22 @@ static void test_json_text_escapes_what_json_does_not_allow(void)
     expect("\"a\\\"b\\\\c\\u000A\\u0001\\u007F\\u00E9\"");
 }
 
+static void test_json_text_of_other_scripts_stays_as_it_is(void)
+{
+    json_text(&m_json, NULL,
+              "\xe7\x94\xb5\xe6\xba\x90, 20 \xc2\xb0"
+              "C, \xf0\x9f\x99\x82");
+    expect("\"\xe7\x94\xb5\xe6\xba\x90, 20 \xc2\xb0"
+           "C, \xf0\x9f\x99\x82\"");
+}
+
+static void test_json_bytes_that_are_no_utf8_are_escaped_one_by_one(void)
+{
+    json_text(&m_json, NULL, "\xe7\x94|\xc0\xaf|\xe0\x9f\xbf|\xed\xa0\x80|\xf4\x90\x80\x80|\xf5|\x80|\xe7");
+    expect("\"\\u00E7\\u0094|\\u00C0\\u00AF|\\u00E0\\u009F\\u00BF|\\u00ED\\u00A0\\u0080|\\u00F4\\u0090\\u0080\\u0080|\\u00F5|"
+           "\\u0080|\\u00E7\"");
+}
+
 static void test_json_numbers(void)
 {
     json_open(&m_json, NULL, '[');
@@ -97,6 +113,8 @@ int main(void)
     RUN_TEST(test_json_nested_objects_and_arrays_have_their_commas);
     RUN_TEST(test_json_lines_follow_each_other_without_comma);
     RUN_TEST(test_json_text_escapes_what_json_does_not_allow);
+    RUN_TEST(test_json_text_of_other_scripts_stays_as_it_is);
+    RUN_TEST(test_json_bytes_that_are_no_utf8_are_escaped_one_by_one);
     RUN_TEST(test_json_numbers);
     RUN_TEST(test_json_what_does_not_fit_is_cut_and_nothing_is_overwritten);
     return UNITY_END();
