@@ -175,7 +175,7 @@ static void essence(motion_t *motion)
     for (unsigned i = 0; i < AXES_MAX; i++) {
         curve->lead[i] = (stream_lead_t){0};
     }
-    curve->head = 0;
+    curve->head = curve->watched = 0;
     curve->ahead = curve->guesses = curve->patience = 0;
     curve->period_cycles_q16 = curve->grip_q32 = curve->softest_q32 = 0;
     curve->reach_min_q16 = curve->reach_max_q16 = 0;
