@@ -6,6 +6,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "socket_path.h"
+
 #define SUGGEST_LENGTH_MAX 40u /* longer names are not worth a suggestion */
 
 const char *const config_axis_section[AXES_MAX] = {"roll", "pitch", "yaw", "x", "y", "z", "angle"};
@@ -191,8 +193,8 @@ const config_key_t config_keys[] = {
     {KEY("udp", "silence_settle_ms"), AT(settings.silence_settle_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
      RANGE(0, 3600000), .is_live = true, .help = "silence after which it settles; 0 = never"},
 
-    {KEY("control", "socket"), AT(control_socket), .type = CONFIG_PATH, .unit = "", .fallback = "/run/heave/heaved.sock",
-     .help = "local socket of heaved"},
+    {KEY("control", "socket"), AT(control_socket), .type = CONFIG_PATH, .unit = "", .fallback = SOCKET_DEFAULT,
+     .help = "local socket of heaved; as the service heave@NAME, this default stands for /run/heave/NAME/heaved.sock"},
     {KEY("control", "metrics"), AT(metrics_file), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
      .help = "file for Prometheus (node_exporter's textfile collector: a name that ends in .prom), renewed every second; removed at "
              "the end"},

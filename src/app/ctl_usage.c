@@ -4,6 +4,7 @@
 #include "ctl_usage.h"
 
 #include "say.h" // exit codes
+#include "socket_path.h"
 #include "usage.h"
 
 static const usage_row_t k_forms[] = {
@@ -32,7 +33,9 @@ static const usage_row_t k_commands[] = {
 
 static const usage_row_t k_options[] = {
     {"json", NULL, "answers as heaved gives them: one JSON object per line", OPTION_JSON},
-    {"socket", "PATH", "else the environment's HEAVE_SOCKET, else " CTL_SOCKET, OPTION_SOCKET},
+    {"socket", "PATH", "else the environment's HEAVE_SOCKET, else " SOCKET_DEFAULT ", else that of the only service",
+     OPTION_SOCKET},
+    {"platform", "NAME", "the service heave@NAME: " SOCKET_DIRECTORY "/NAME/heaved.sock", OPTION_PLATFORM},
     {"for", "SECONDS", "watch ends by itself", OPTION_FOR},
     {"hz", "N", "updates per second of watch, 1 to 50; else 20, and 1 where the output is no terminal", OPTION_HZ},
     {"help", NULL, "print this", OPTION_HELP},
@@ -53,13 +56,15 @@ static const usage_section_t k_manual[] = {
     {"DESCRIPTION",
      "`heavectl` asks a running `heaved(8)` over its local socket. A request that the state does not allow is refused with the "
      "reason and "
-     "changes nothing. Members of the socket's group (`heave`, where heaved is a service) may ask; eight at a time. A ninth gets "
+     "changes nothing. Where several platforms run on one box, `--platform` says which. Members of the socket's group (`heave`, "
+     "where heaved is a service) may ask; eight at a time. A ninth gets "
      "the place of one that "
      "has asked nothing for 2 s, else that of the oldest `watch`, which ends and says so.\n\n"
      "With `--json` every answer is an object of one line: /usr/share/doc/heave/docs/status-json.md has all its members, which "
      "stay what they "
      "are within a major version. An answer with `ok` false says in `error` why.\n"},
-    {"ENVIRONMENT", "`HEAVE_SOCKET` is the socket where no `--socket` is given. `LC_ALL`, `LC_MESSAGES` and `LANG`: faults are "
+    {"ENVIRONMENT", "`HEAVE_SOCKET` is the socket where none is named. `LC_ALL`, `LC_MESSAGES` "
+                    "and `LANG`: faults are "
                     "told in Chinese where they begin "
                     "with zh. `NO_COLOR`: no colours, which there are on terminals only.\n"},
     {"EXAMPLES", "Bring the platform up, halve the motion, look on for ten seconds, and down again:\n"
@@ -76,7 +81,7 @@ const usage_t heavectl_usage = {
     .program = "heavectl",
     .manual_section = "1",
     .summary = "talks to a running heaved",
-    .common = "[--json] [--socket PATH]",
+    .common = "[--json] [--socket PATH | --platform NAME]",
     .forms = k_forms,
     .commands = k_commands,
     .options = k_options,

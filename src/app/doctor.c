@@ -18,6 +18,7 @@
 #include "doctor_judge.h"
 #include "doctor_probe.h"
 #include "linux_udp.h"
+#include "socket_path.h"
 
 #define LISTEN_MS 500u
 #define RAW_MS    500u
@@ -173,12 +174,28 @@ static void check_bus(doctor_report_t *report, const config_t *config, const doc
     doctor_probe_close(&probe);
 }
 
-bool doctor_run(const config_t *config, FILE *out)
+/* Where the service that has this file listens, if it may have the default: called by hand, the doctor has no directory of it. */
+static bool is_service(char path[SOCKET_PATH_MAX], const config_t *config, const char *file)
+{
+    const char *slash = strrchr(file, '/');
+    const char *name = slash != NULL ? slash + 1 : file;
+    const char *dot = strrchr(name, '.');
+    char platform[SOCKET_PATH_MAX];
+    const int length = (int)(dot != NULL ? (size_t)(dot - name) : strlen(name));
+    return strcmp(config->control_socket, SOCKET_DEFAULT) == 0 &&
+           snprintf(platform, sizeof platform, "%.*s", length, name) < (int)sizeof platform &&
+           socket_path_of_platform(path, SOCKET_DIRECTORY, platform);
+}
+
+bool doctor_run(const config_t *config, const char *file, FILE *out)
 {
     doctor_report_t report = {.out = out};
-    if (is_daemon_running(config->control_socket)) {
+    char of_service[SOCKET_PATH_MAX];
+    const bool is_asked = is_service(of_service, config, file) && is_daemon_running(of_service);
+    const char *path = is_asked ? of_service : config->control_socket;
+    if (is_asked || is_daemon_running(path)) {
         doctor_say(&report, DOCTOR_FAIL, "heaved is running (%s): the drives are its own -> heavectl status; or stop it first",
-                   config->control_socket);
+                   path);
         return false;
     }
     const doctor_host_t host = look_at_host();

@@ -10,7 +10,8 @@
 #include "config.h"
 
 /** Looks and prints. Takes some seconds.
+ *  @param file of the configuration: as NAME.ini it is that of the service heave@NAME, which is not to run
  *  @return true where nothing is wrong */
-bool doctor_run(const config_t *config, FILE *out);
+bool doctor_run(const config_t *config, const char *file, FILE *out);
 
 #endif

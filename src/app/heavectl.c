@@ -18,6 +18,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "ctl_socket.h"
 #include "ctl_usage.h"
 #include "ctl_view.h"
 #include "say.h" // exit codes
@@ -36,7 +37,9 @@
 typedef struct {
     const char *command;
     const char *argument; /**< of intensity; else NULL */
-    const char *socket;
+    const char *socket;   /**< NULL = not named */
+    const char *platform; /**< NULL = not named */
+    char path[SOCKET_PATH_MAX];
     bool is_json;
     double for_s; /**< 0 = until interrupted */
     unsigned hz;  /**< 0 = as it suits the output */
@@ -376,6 +379,11 @@ static const char *take_option(ctl_t *self, int option)
     case OPTION_SOCKET:
         self->socket = optarg;
         break;
+    case OPTION_PLATFORM:
+        self->platform = optarg;
+        return socket_path_of_platform(self->path, SOCKET_DIRECTORY, optarg)
+                   ? NULL
+                   : "--platform needs the NAME of a service heave@NAME, without a /";
     case OPTION_FOR:
         return read_seconds(optarg, &self->for_s) ? NULL : "--for needs a number of seconds above 0";
     case OPTION_HZ:
@@ -429,11 +437,31 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
     return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump and intensity are allowed";
 }
 
+/* Whom to ask: what the command line names, then the environment, then what is there. */
+static int choose_socket(ctl_t *self)
+{
+    const char *environment = getenv("HEAVE_SOCKET");
+    char platforms[512];
+    if (self->socket != NULL) {
+        return self->platform == NULL ? EXIT_DONE : complain(EXIT_BAD_USAGE, "--socket or --platform, not both");
+    }
+    self->socket = self->path;
+    if (self->platform != NULL) {
+        return EXIT_DONE;
+    }
+    if (environment != NULL && environment[0] != '\0') {
+        self->socket = environment;
+        return EXIT_DONE;
+    }
+    if (!ctl_socket_find(self->path, SOCKET_DIRECTORY, platforms, sizeof platforms)) {
+        return complain(EXIT_BAD_USAGE, "several platforms run here: %s; say which: --platform NAME or --socket PATH", platforms);
+    }
+    return EXIT_DONE;
+}
+
 int main(int argc, char **argv)
 {
     static ctl_t ctl;
-    const char *environment = getenv("HEAVE_SOCKET");
-    ctl.socket = environment != NULL && environment[0] != '\0' ? environment : CTL_SOCKET;
     (void)setlocale(LC_CTYPE, "");
     const char *wrong = take_options(&ctl, argc, argv);
     if (wrong == NULL && ctl.command != NULL) {
@@ -448,7 +476,8 @@ int main(int argc, char **argv)
     if (wrong != NULL) {
         return complain(EXIT_BAD_USAGE, "%s; see heavectl --help", wrong);
     }
-    const int code = open_link(&ctl);
+    int code = choose_socket(&ctl);
+    code = code == EXIT_DONE ? open_link(&ctl) : code;
     if (code != EXIT_DONE) {
         return code;
     }

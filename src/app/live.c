@@ -27,6 +27,7 @@
 #include "out_file.h"
 #include "record.h"
 #include "say.h"
+#include "socket_path.h"
 
 #define TICK_MS          10
 #define UDP_BUFFER_BYTES 131072 /* a few cycles of the densest stream: what waits longer is old */
@@ -419,7 +420,9 @@ static void open_errors(live_t *self, int fd)
 /* What can be refused comes first: a second heaved must not empty the files of the first. */
 static int open_all(live_t *self, const config_t *config)
 {
-    const char *path = self->options->socket != NULL ? self->options->socket : config->control_socket;
+    char in_directory[SOCKET_PATH_MAX];
+    const char *path =
+        self->options->socket != NULL ? self->options->socket : socket_path_of_daemon(in_directory, config->control_socket);
     int code = open_udp(self, config);
     code = code == EXIT_DONE ? control_open(&self->control, path, config, &self->loop, &self->blackbox) : code;
     code = code == EXIT_DONE ? open_files(self) : code;

@@ -91,7 +91,7 @@ static int run(const options_t *options, const config_t *config)
     case MODE_ENVELOPE:
         return write_envelope(options->envelope, config);
     case MODE_DOCTOR:
-        return end_stdout(doctor_run(config, stdout) ? EXIT_DONE : EXIT_REFUSED);
+        return end_stdout(doctor_run(config, options->config, stdout) ? EXIT_DONE : EXIT_REFUSED);
     case MODE_DUMP_CONFIG:
         config_dump(config, stdout);
         return end_stdout(EXIT_DONE);

@@ -79,11 +79,13 @@ static const usage_section_t k_manual[] = {
     {"ENVIRONMENT",
      "`NOTIFY_SOCKET` and `WATCHDOG_USEC` are those of systemd: it is told when the platform is ready and what state it is in, "
      "and that the "
-     "motion thread advances. `STATE_DIRECTORY` is where the black box goes if the configuration names no directory.\n"},
-    {"FILES", " /etc/heave/NAME.ini        the platform of heave@NAME; see heave.ini(5)\n"
-              " /etc/heave/demo.ini        a simulated one, to try things out\n"
-              " /run/heave/heaved.sock     for heavectl; members of group heave may\n"
-              " /var/lib/heave/NAME/       incidents of the black box\n"},
+     "motion thread advances. `STATE_DIRECTORY` is where the black box goes if the configuration names no directory, "
+     "`RUNTIME_DIRECTORY` where the socket is if it names no other.\n"},
+    {"FILES", " /etc/heave/NAME.ini          the platform of heave@NAME; see heave.ini(5)\n"
+              " /etc/heave/demo.ini          a simulated one, to try things out\n"
+              " /run/heave/NAME/heaved.sock  of heave@NAME, for heavectl; members of group heave may\n"
+              " /run/heave/heaved.sock       of a heaved started by hand\n"
+              " /var/lib/heave/NAME/         incidents of the black box\n"},
     {"EXAMPLES", "Is a platform valid, and what does it come to?\n"
                  " heaved --config /etc/heave/demo.ini --check\n"
                  "What would a frame do? Three seconds after the start a pose, then down:\n"

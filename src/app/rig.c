@@ -14,9 +14,9 @@
 #define LEAVE_NS      5000000 /* seven frames, even at 125 kbit/s */
 #define LEAVE_POLL_NS 1000000 /* between looks whether drives on Modbus have taken what stops them */
 #define LEAVE_POLLS   500u
-#define BROADCAST_US  20000u       /* after a broadcast, for drives to act */
-#define COIL_LOOK_US  1000000u     /* a board of relays is looked at so often */
-#define RUN_DIR       "/run/heave" /* where heave-can-flush@.path looks */
+#define BROADCAST_US  20000u           /* after a broadcast, for drives to act */
+#define COIL_LOOK_US  1000000u         /* a board of relays is looked at so often */
+#define RUN_DIR       "/run/heave-can" /* where heave-can-flush@.path looks */
 
 #define ANGLE_TRAVEL_DEG 1000000 /* a rotation motor has no stops of its own */
 

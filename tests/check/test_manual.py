@@ -125,6 +125,7 @@ def completion(built):
     assert complete(built, "heaved", "--config", "demo") == ["demo-hexapod.ini"]
     assert complete(built, "heavectl", "--json", "s") == ["shutdown", "status"]
     assert complete(built, "heavectl", "--hz", "") == []
+    assert not any(word.startswith("-") for word in complete(built, "heavectl", "--platform", "")), "names of platforms, where some run"
 
 
 def main():

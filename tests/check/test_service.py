@@ -89,6 +89,16 @@ def main():
                          "DeviceAllow=char-gpiochip rw", "RestrictAddressFamilies=AF_UNIX AF_INET AF_INET6 AF_CAN AF_NETLINK"):
                 assert re.search(rf"(?m)^{line}$", text), f"{line} is missing"
             assert (PACKAGING / "heave.sysusers").read_text(encoding="ascii").splitlines()[-1] == "g heave -", "the group that the unit runs with"
+        with suite.case("what a platform has beside its configuration is its own: it may run beside others"):
+            for line in ("RuntimeDirectory=heave/%i", "StateDirectory=heave/%i"):
+                assert re.search(rf"(?m)^{line}$", text), f"{line} is missing"
+            assert "/heaved.sock" not in re.sub(r"(?m)^#.*$", "", text), "a path that all of them share"
+        with suite.case("heaved may ask for a flush where the path unit looks, and the flush may take the request away"):
+            asked = re.search(r'(?m)^#define RUN_DIR +"([^"]+)"', (TOP / "src/app/rig.c").read_text(encoding="utf-8"))[1]
+            assert f"PathExists={asked}/flush-%i\n" in (PACKAGING / "heave-can-flush@.path").read_text(encoding="utf-8")
+            assert f"ReadWritePaths=-{asked}\n" in (PACKAGING / "heave-can-flush@.service.in").read_text(encoding="utf-8")
+            assert f"HEAVE_RUN:-{asked}}}/flush-" in (PACKAGING / "heave-can").read_text(encoding="utf-8")
+            assert f"ReadWritePaths=-{asked}\n" in text and re.search(rf"(?m)^ExecStartPre=\+/usr/bin/install .* {asked}$", text)
     return suite.done()
 
 

@@ -1047,17 +1047,17 @@ static void test_linux_stale_frames_that_may_not_be_dropped_keep_the_bus_closed(
 /* As the service does it: the daemon has no rights, a unit of systemd has. */
 static void test_linux_stale_frames_are_dropped_by_the_helper_on_request(void)
 {
-    shell("rm -rf /run/heave && mkdir -p -m 777 /run/heave");
+    shell("rm -rf /run/heave-can && mkdir -p -m 777 /run/heave-can");
     leave_frames_waiting();
     as_plain_user(true);
-    reopen_linux(&(linux_can_config_t){.interface = "vcan0", .run_dir = "/run/heave"}, HV_ERR_AGAIN);
-    TEST_ASSERT_EQUAL(0, access("/run/heave/flush-vcan0", F_OK));
+    reopen_linux(&(linux_can_config_t){.interface = "vcan0", .run_dir = "/run/heave-can"}, HV_ERR_AGAIN);
+    TEST_ASSERT_EQUAL(0, access("/run/heave-can/flush-vcan0", F_OK));
     as_plain_user(false);
     shell(HEAVE_PACKAGING "/heave-can flush vcan0");
-    TEST_ASSERT_NOT_EQUAL(0, access("/run/heave/flush-vcan0", F_OK));
+    TEST_ASSERT_NOT_EQUAL(0, access("/run/heave-can/flush-vcan0", F_OK));
     as_plain_user(true);
     TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(hal));
-    TEST_ASSERT_NOT_EQUAL(0, access("/run/heave/flush-vcan0", F_OK));
+    TEST_ASSERT_NOT_EQUAL(0, access("/run/heave-can/flush-vcan0", F_OK));
     as_plain_user(false);
     assert_no_stale_frame();
 }

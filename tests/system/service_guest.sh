@@ -76,7 +76,7 @@ may_be_used_by_its_group() {
     said=$(runuser -u nobody -- heavectl status 2>&1) || code=$?
     [ $code = 69 ]
     [[ $said == *"no permission"* ]]
-    runuser -u nobody -- grep -q '^heave_' /run/heave/heave.prom # node_exporter is a stranger, too
+    runuser -u nobody -- grep -q '^heave_' /run/heave/demo/heave.prom # node_exporter is a stranger, too
 }
 
 follows_frames() {
@@ -91,16 +91,16 @@ keeps_incidents() {
     [ "$(ls /var/lib/heave/demo | wc -l)" -ge 1 ]
 }
 
-metric() { sed -n "s/^$1 //p" /run/heave/heave.prom; }
+metric() { sed -n "s/^$1 //p" /run/heave/demo/heave.prom; }
 has_advanced() { [ "$(metric heave_cycles_total)" -gt "$1" ]; }
 
 writes_metrics() {
     local cycles
-    until_true test -s /run/heave/heave.prom
-    [ "$(stat -c %u /run/heave/heave.prom)" = "$(stat -c %u "/proc/$(property MainPID)")" ]
+    until_true test -s /run/heave/demo/heave.prom
+    [ "$(stat -c %u /run/heave/demo/heave.prom)" = "$(stat -c %u "/proc/$(property MainPID)")" ]
     cycles=$(metric heave_cycles_total)
     until_true has_advanced "$cycles"
-    [ "$(find /run/heave -name '*.part' -mmin +1 | wc -l)" = 0 ]
+    [ "$(find /run/heave/demo -name '*.part' -mmin +1 | wc -l)" = 0 ]
 }
 
 is_fed() {
@@ -134,10 +134,47 @@ reads_its_configuration_again() {
     until_true log_has "silence_hold_ms: 60000 from now on"
 }
 
-is_the_only_one() {
-    cp /etc/heave/demo.ini /etc/heave/second.ini
-    fails systemctl start heave@second
-    heavectl status | grep -q ENGAGED
+ctl() { runuser -u keeper -- heavectl "$@"; }
+
+# Same user, same group; port, socket, metrics and incidents of its own.
+runs_beside_another() {
+    local pid code=0 said
+    pid=$(property MainPID)
+    sed 's/^port *=.*/port = 9801/; s,/run/heave/demo/,/run/heave/second/,' /etc/heave/demo.ini >/etc/heave/second.ini
+    systemctl start heave@second
+    [ "$(property MainPID)" = "$pid" ]
+    [ "$(stat -c %u "/proc/$pid")" = "$(stat -c %u "/proc/$(property MainPID heave@second)")" ]
+    said=$(ctl status 2>&1) || code=$?
+    [ $code = 64 ]
+    [[ $said == *"demo, second"*"--platform NAME"*"--socket PATH"* ]]
+    until_true platform_is second ENGAGED
+    ctl --platform demo hold
+    until_true platform_is demo HOLD
+    platform_is second ENGAGED
+    until_true test -s /run/heave/second/heave.prom
+    said=$(fails heaved --config /etc/heave/second.ini --doctor)
+    [[ $said == *"heaved is running (/run/heave/second/heaved.sock)"* ]]
+    ctl --socket /run/heave/second/heaved.sock dump
+    [ "$(ls /var/lib/heave/second | wc -l)" -ge 1 ]
+    ctl --platform demo resume
+}
+
+platform_is() { ctl --platform "$1" --json status | grep -q "\"state\":\"$2\""; }
+
+# It takes nothing from the first; a third with its port does not even start.
+ends_beside_another() {
+    fails platform_is nobody ENGAGED
+    sed 's,/run/heave/demo/,/run/heave/third/,' /etc/heave/demo.ini >/etc/heave/third.ini
+    fails systemctl start heave@third
+    until_true sh -c 'journalctl -u heave@third --no-pager -o cat | grep -q "9800"'
+    systemctl stop heave@third heave@second
+    [ "$(property Result heave@second)" = success ]
+    fails test -e /run/heave/second
+    fails test -e /run/heave/third
+    test -S /run/heave/demo/heaved.sock
+    test -s /run/heave/demo/heave.prom
+    [ "$(stat -c %G:%a /run/heave-can)" = heave:770 ]
+    until_true is_state ENGAGED # the only one again: needs no name
 }
 
 stays_down_when_misconfigured() {
@@ -163,7 +200,7 @@ settles_when_stopped() {
     [ "$(property Result)/$(property ExecMainCode)/$(property ExecMainStatus)" = success/1/0 ]
     log_has 'SETTLING -> SETTLED'
     log_has 'SETTLED -> OFF'
-    [ ! -e /run/heave ]
+    [ ! -e /run/heave/demo ]
 }
 
 chip_label() { cat /sys/class/gpio/gpiochip*/label | head -n 1; }
@@ -180,7 +217,7 @@ has_incident() { compgen -G "/var/lib/heave/gpio/incident-*/trace.csv"; }
 
 # Nothing is behind the lines: all are low, which is a closed e-stop.
 uses_lines() {
-    sed "/^\[relays\]/,/^driver/ s/^driver.*/driver = gpio\nchip = $(chip_label)/; s/^lines *=.*/lines = 0, 1, 2/" /etc/heave/demo.ini >/etc/heave/gpio.ini
+    sed "/^\[relays\]/,/^driver/ s/^driver.*/driver = gpio\nchip = $(chip_label)/; s/^lines *=.*/lines = 0, 1, 2/; s,/run/heave/demo/,/run/heave/gpio/," /etc/heave/demo.ini >/etc/heave/gpio.ini
     printf '[inputs]\ndriver = gpio\nchip = %s\nestop = 4\nactive_low = yes\n[black-box]\nseconds = 10\n' "$(chip_label)" >>/etc/heave/gpio.ini
     systemctl start $unit
     [ "$(stat -c %u "/proc/$(property MainPID)")" -ge 61184 ]
@@ -218,7 +255,7 @@ settles_when_removed() {
 dpkg -i /heave.deb >/tmp/install 2>&1 || { say "Bail out! $(tail -n 1 /tmp/install)"; systemctl poweroff -ff; }
 sed -i 's/^cycle_us *=.*/cycle_us = 10000/' /etc/heave/demo.ini # leaves something to others here
 sed -i 's/^silence_hold_ms *=.*/silence_hold_ms = 0/' /etc/heave/demo.ini # nobody sends all the time
-sed -i '/^\[control\]/a metrics = /run/heave/heave.prom' /etc/heave/demo.ini
+sed -i '/^\[control\]/a metrics = /run/heave/demo/heave.prom' /etc/heave/demo.ini
 useradd -G heave keeper
 ip link set lo up
 check "systemctl enable --now returns when the platform is ready, and shows its state" starts
@@ -232,7 +269,8 @@ check "feeds the watchdog" is_fed
 check "is ended by the watchdog when it hangs, and started again" is_ended_when_it_hangs
 check "is started again after kill -9" is_started_again_when_killed
 check "systemctl reload reads the configuration again" reads_its_configuration_again
-check "a second platform is not started, and takes nothing from the first" is_the_only_one
+check "a second platform runs beside the first; heavectl asks which" runs_beside_another
+check "and takes nothing from the first when it ends; one with a port in use does not start" ends_beside_another
 check "an upgrade of the package does not touch it" goes_on_through_an_upgrade
 check "systemctl stop settles the platform; exit 0" settles_when_stopped
 check "wrong or missing configuration: exit 78 or 66, and no restart" stays_down_when_misconfigured

@@ -463,6 +463,35 @@ def path_of_something_else(bench):
     assert bench.socket.read_text() == "precious"
 
 
+def directory_of_a_service_manager(bench):
+    """What is not set is in the directory of the service; what is set stays where it is."""
+    directory = bench.folder / "run"
+    directory.mkdir()
+    own = bench.socket
+    bench.socket = directory / "heaved.sock"
+    daemon = bench.start(config=bench.write_config("unset.ini", control__socket="/run/heave/heaved.sock"), environment={"RUNTIME_DIRECTORY": directory})
+    assert bench.status()["ok"]
+    assert bench.stop(daemon) == 0 and not bench.socket.exists()
+    bench.socket = own
+    daemon = bench.start(environment={"RUNTIME_DIRECTORY": directory})
+    assert own.exists() and not list(directory.iterdir())
+    assert bench.stop(daemon) == 0
+
+
+def platform_by_its_name(bench):
+    def ctl(*arguments):
+        run = subprocess.run([bench.bin / "heavectl", *arguments, "status"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        assert run.stderr.count("\n") == 1, run
+        return run.returncode, run.stderr
+    code, text = ctl("--platform", "nobody-has-this-one")
+    assert code == 69 and "/run/heave/nobody-has-this-one/heaved.sock" in text, text
+    for name in ("", "..", "a/b", "/run", "n" * 200):
+        code, text = ctl("--platform", name)
+        assert code == 64 and "--platform needs the NAME of a service" in text, text
+    code, text = ctl("--platform", "ride", "--socket", str(bench.socket))
+    assert code == 64 and "not both" in text, text
+
+
 def files_that_cannot_be_created(bench):
     for option in ("--trace", "--record"):
         run = refused(bench, option, "/nonexistent/file")
@@ -677,6 +706,8 @@ CASES = {
     "the socket belongs to a running daemon": socket_of_a_running_daemon,
     "the socket of a dead daemon is replaced": socket_of_a_dead_daemon,
     "something else has the socket's name": path_of_something_else,
+    "a service manager's directory takes the socket that is not set": directory_of_a_service_manager,
+    "heavectl --platform: where a service listens; no other names": platform_by_its_name,
     "files that cannot be created": files_that_cannot_be_created,
     "a full disk is told at the end": full_disk,
     "senders that are not allowed are refused and counted": strangers_are_refused,
