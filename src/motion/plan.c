@@ -64,14 +64,12 @@ static bool try_quintic(motion_t *self, unsigned slots, const ramp_state_t *star
     return quintic_is_feasible(&whole, limits->list) && (self->space != MOTION_POSE || way_is_feasible(self, &whole));
 }
 
-static bool find_shortest(motion_t *self, unsigned slots, const ramp_state_t *start, const q32_t *target_q32,
-                          const ramp_state_t *base, int64_t least, int64_t most, int attempts)
+static bool find_shortest(motion_t *self, const plan_limits_t *limits, unsigned slots, const ramp_state_t *start,
+                          const q32_t *target_q32, const ramp_state_t *base, int64_t least, int64_t most, int attempts)
 {
-    plan_limits_t limits;
-    limits_beside(self, slots, start, base, &limits);
     int64_t cycles = least > SHORTEST_CYCLES ? least : SHORTEST_CYCLES;
     for (int attempt = 0; attempt < attempts && cycles <= most; attempt++) {
-        if (try_quintic(self, slots, start, target_q32, base, &limits, cycles)) {
+        if (try_quintic(self, slots, start, target_q32, base, limits, cycles)) {
             return true;
         }
         cycles += cycles / 8;
@@ -79,11 +77,32 @@ static bool find_shortest(motion_t *self, unsigned slots, const ramp_state_t *st
     return false;
 }
 
+/* The longer a quintic is, the further the acceleration it starts with carries it: planned anew with each sample such ways swing
+ * out ever further. Where none stays between start and target, or where the quickest stop ends, that stop is the better way. */
+static void stay_near(motion_t *self, const ramp_state_t *start, const q32_t *target_q32, plan_limits_t *limits)
+{
+    halt_plan(&self->halt, POSE_AXES, POSE_AXES, start, limits->list);
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        const q32_t from_q32 = start[i].pos_q32;
+        const q32_t rest_q32 = self->halt.rest_q32[i];
+        const q32_t low_q32 = fx_clamp(target_q32[i], INT64_MIN, from_q32 < rest_q32 ? from_q32 : rest_q32);
+        const q32_t high_q32 = fx_clamp(target_q32[i], from_q32 > rest_q32 ? from_q32 : rest_q32, INT64_MAX);
+        ramp_limits_t *own = &limits->own[i];
+        own->pos_min_q32 = fx_clamp(low_q32 - START_SLACK_Q32, own->pos_min_q32, INT64_MAX);
+        own->pos_max_q32 = fx_clamp(high_q32 + START_SLACK_Q32, INT64_MIN, own->pos_max_q32);
+    }
+}
+
 bool plan_shortest(motion_t *self, const ramp_state_t *start, const q32_t *target_q32, const ramp_state_t *base, int64_t least)
 {
     const int64_t most = base != NULL ? JOIN_MAX_US / (int64_t)self->cycle_us : INT64_MAX;
     const int attempts = self->space == MOTION_POSE ? ATTEMPTS_POSE : ATTEMPTS;
-    return find_shortest(self, POSE_AXES, start, target_q32, base, least, most, attempts);
+    plan_limits_t limits;
+    limits_beside(self, POSE_AXES, start, base, &limits);
+    if (base == NULL && self->space == MOTION_CYLINDERS) { /* of poses a stop need not be what the cylinders can do */
+        stay_near(self, start, target_q32, &limits);
+    }
+    return find_shortest(self, &limits, POSE_AXES, start, target_q32, base, least, most, attempts);
 }
 
 /* The straight way between two points of the slots, as a path with the limits of axes and cylinders. */
@@ -132,7 +151,9 @@ static int64_t plan_quickest(motion_t *self, unsigned slots, const ramp_state_t 
     const int64_t in_two_parts = plan_stop_then_straight(self, slots, start);
     self->source = MOTION_TIMED;
     const int64_t from = least > in_two_parts / 4 ? least : in_two_parts / 4; /* none is shorter than that */
-    if (find_shortest(self, slots, start, self->goal_q32, NULL, from, in_two_parts, ATTEMPTS)) {
+    plan_limits_t limits;
+    limits_beside(self, slots, start, NULL, &limits);
+    if (find_shortest(self, &limits, slots, start, self->goal_q32, NULL, from, in_two_parts, ATTEMPTS)) {
         return self->quintic.cycles;
     }
     self->source = MOTION_HALTING;

@@ -87,8 +87,28 @@ def back_from_beyond_an_axis(bench):
     assert all(float(rows[-1][axis]) == 0 for axis in ("roll_deg", "pitch_deg", "x_mm", "z_mm")), rows[-1]
 
 
+def extensions_at_a_new_rate(bench):
+    """Where gentle extensions go over from 750 Hz, which jitters, to 1 kHz, the way back to them is planned anew with every frame: it must
+    not swing out further and further."""
+    text = (heave.TOP / "config/tripod.ini").read_text(encoding="utf-8")
+    config = bench.file("new-rate.ini", text.replace("silence_hold_ms = 1000", "silence_hold_ms = 0"))
+    dice = random.Random(1)
+    at, lines = 0.0, [(0, "!engage"), (T0 - 4000, "@C3:120,105,105,0#")]
+    for i in range(2250 + 1800):
+        t = i / 0.75 if i < 2250 else 3000 + i - 2249
+        at = max(at, t + 1.2 * dice.random()) if i < 2250 else at + 1
+        height_mm = [110 + 12 * math.sin(t * 0.0018850), 105 - 2 * math.cos(t * 0.0015), 105 + 4 * math.sin(t * 0.0012)]
+        lines.append((T0 + at, "@C3:{:.3f},{:.3f},{:.3f},0#".format(*height_mm)))
+    rows = [row for row in play(bench, [*lines, (T0 + at + 500, "!hold")], config) if T0 + 1000 < float(row["t_ms"]) < T0 + at]
+    assert len(rows) > 3500
+    for name, low, high in (("c1_mm", 98, 122), ("c2_mm", 103, 107), ("c3_mm", 101, 109)):
+        beyond = max(max(low - float(row[name]), float(row[name]) - high) for row in rows)
+        assert beyond < 5, f"{name}: {beyond:.2f} mm beyond where it is sent"
+
+
 CASES = {
     "streams of usual rates": usual_rates,
+    "extensions that go over to a new rate": extensions_at_a_new_rate,
     "values in coarse steps": coarse_values,
     "streams faster than what is followed": rates_beyond_what_is_followed,
     "jitter of most of a period": jitter_of_most_of_a_period,
