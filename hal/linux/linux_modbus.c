@@ -57,8 +57,8 @@ static void *worker(void *argument)
     linux_modbus_t *self = argument;
     for (;;) {
         uint64_t woken;
-        const bool is_ending = __atomic_load_n(&self->is_ending, __ATOMIC_ACQUIRE) != 0;
         (void)!read(self->wake, &woken, sizeof woken); /* before looking, so that nothing asked after is slept through */
+        const bool is_ending = __atomic_load_n(&self->is_ending, __ATOMIC_ACQUIRE) != 0;
         linux_modbus_link_mend(&self->link);
         if (take_next(self)) {
             serve(self);
