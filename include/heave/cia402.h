@@ -140,7 +140,6 @@ typedef struct {
     uint8_t nmt;         /* last heard */
     uint8_t nmt_command; /* waits to be sent, 0 = none */
     uint8_t starts;      /* attempts to become operational */
-    bool is_boot_expected;
     bool is_reset_done;
     bool has_heartbeat;
     uint64_t heartbeat_us;
@@ -154,7 +153,6 @@ typedef struct {
     q32_t actual_q32;
     uint64_t actual_us;
     uint32_t silent_syncs;
-    uint32_t wrong_length;
 
     cia402_goal_t goal;
     bool is_in; /* takes part in what the drives do together */

@@ -138,11 +138,7 @@ void cia402_axis_take_tpdo(cia402_drive_t drive, const can_frame_t *frame)
 {
     cia402_axis_t *self = drive.axis;
     const uint8_t *data = frame->data;
-    if (frame->length != CIA402_TPDO_BYTES) {
-        self->wrong_length++;
-        return;
-    }
-    if (self->phase != CIA402_UP && self->phase != CIA402_STARTING) {
+    if (frame->length != CIA402_TPDO_BYTES || (self->phase != CIA402_UP && self->phase != CIA402_STARTING)) {
         return;
     }
     self->silent_syncs = 0;
@@ -233,7 +229,6 @@ static void step_configuring(cia402_drive_t drive)
         break;
     case CIA402_SETUP_DONE:
         self->nmt_command = NMT_START;
-        self->wrong_length = 0;
         self->silent_syncs = 0;
         enter(drive, CIA402_STARTING);
         break;

@@ -22,7 +22,7 @@ drive_state_t cia402_report_state(const cia402_t *self, uint8_t index)
     if (is_faulty(axis)) {
         return DRIVE_FAULT;
     }
-    if (!axis->is_in || self->stage == CIA402_STAGE_OFF) {
+    if (!axis->is_in) {
         return DRIVE_DISABLED;
     }
     if (self->stage == CIA402_STAGE_FOLLOW) {
@@ -91,7 +91,7 @@ static const char *code_text(uint32_t code)
             return k_troubles[i].text;
         }
     }
-    return code <= UINT16_MAX ? canopen_error_text((uint16_t)code) : "";
+    return canopen_error_text((uint16_t)code);
 }
 
 static const char *stage_text(cia402_stage_t stage)
@@ -122,39 +122,34 @@ static const char *up_text(const cia402_t *self, uint8_t index)
 
 static const char *phase_text(const cia402_t *self, uint8_t index)
 {
-    switch (self->axis[index].phase) {
-    case CIA402_MISSING:
-        return "missing";
-    case CIA402_RESETTING:
-        return "booting";
-    case CIA402_CONFIGURING:
-        return "configuring";
-    case CIA402_STARTING:
-        return "starting";
-    case CIA402_UP:
-        return up_text(self, index);
-    case CIA402_LEAVING:
-        return "lost";
-    case CIA402_REFUSED:
-        return "refused";
-    }
-    return "";
+    static const char *const k_texts[] = {
+        [CIA402_MISSING] = "missing",   [CIA402_RESETTING] = "booting", [CIA402_CONFIGURING] = "configuring",
+        [CIA402_STARTING] = "starting", [CIA402_LEAVING] = "lost",      [CIA402_REFUSED] = "refused",
+    };
+    const cia402_phase_t phase = self->axis[index].phase;
+    return phase == CIA402_UP ? up_text(self, index) : k_texts[phase];
+}
+
+/* It does not take an object: while it is set up, or at a change of mode. */
+static bool is_refusing(const cia402_axis_t *axis)
+{
+    return axis->phase == CIA402_REFUSED || (axis->own_fault != 0 && axis->own_fault == axis->trouble);
 }
 
 /* The object that a drive is being set up with, or that it does not take. */
 static uint32_t object_of(const cia402_axis_t *axis)
 {
-    if (axis->phase == CIA402_CONFIGURING && axis->setup.row < cia402_objects_setup_end) {
+    if (axis->phase == CIA402_CONFIGURING) {
         const cia402_object_t *row = &cia402_objects[axis->setup.row];
         return (uint32_t)row->index << 8 | row->sub;
     }
-    return axis->phase == CIA402_REFUSED ? axis->trouble_object : axis->warned_object;
+    return is_refusing(axis) ? axis->trouble_object : axis->warned_object;
 }
 
 /* A value below 2^24 is one that was found; abort codes are above. */
 static const char *detail_text(const cia402_axis_t *axis)
 {
-    if (axis->phase != CIA402_REFUSED || axis->trouble_object == 0) {
+    if (!is_refusing(axis) || axis->trouble_object == 0) {
         return axis->warned_object != 0 && axis->phase == CIA402_UP ? "its guard is off, which the configuration allows" : "";
     }
     return axis->trouble_code >= 0x05000000u ? canopen_abort_text(axis->trouble_code) : "it holds another value";
@@ -172,7 +167,7 @@ void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *ou
         .code = code,
         .object = object_of(axis),
         .detail = detail_text(axis),
-        .detail_code = axis->phase == CIA402_REFUSED && axis->trouble_object != 0 ? axis->trouble_code : 0,
+        .detail_code = is_refusing(axis) && axis->trouble_object != 0 ? axis->trouble_code : 0,
         .since_us = code != 0 ? axis->trouble_us : axis->phase_us,
     };
 }

@@ -19,7 +19,7 @@
 #define ABORT_LOCAL     0x08000021u
 #define ABORT_STATE     0x08000022u
 
-/* What a deed is made of, in order. */
+/* What a deed is made of, in order; STEP_END is the last of each. */
 typedef enum { STEP_END, STEP_WRITE, STEP_COMPARE, STEP_KEEP, STEP_POLL, STEP_LISTEN } step_t;
 
 #define STEPS_MAX 4u
@@ -47,16 +47,10 @@ static uint8_t end_of(cia402_job_t job)
 
 static uint8_t begin_of(cia402_job_t job)
 {
-    switch (job) {
-    case CIA402_JOB_MODE:
-        return cia402_objects_mode_begin;
-    case CIA402_JOB_ERROR:
+    if (job == CIA402_JOB_ERROR) {
         return cia402_objects_error_begin;
-    case CIA402_JOB_NONE:
-    case CIA402_JOB_SETUP:
-        break;
     }
-    return 0;
+    return job == CIA402_JOB_MODE ? cia402_objects_mode_begin : 0;
 }
 
 void cia402_setup_begin(cia402_axis_t *self, cia402_job_t job, cia402_mode_t mode, uint64_t now_us)
@@ -80,7 +74,7 @@ static void next_step(cia402_axis_t *self, uint64_t now_us)
     cia402_setup_t *setup = &self->setup;
     setup->step++;
     setup->is_asked = false;
-    if (setup->step == STEPS_MAX || step_of(setup) == STEP_END) {
+    if (step_of(setup) == STEP_END) {
         next_row(self, now_us);
     }
 }
@@ -136,8 +130,7 @@ static void ask(cia402_axis_t *self, const cia402_config_t *config, const cia402
 static bool is_left_to_check(const cia402_axis_t *self, const cia402_object_t *row)
 {
     const bool is_write = step_of(&self->setup) == STEP_WRITE;
-    return is_write && (self->sdo.abort_code == ABORT_READ_ONLY || (row->need == CIA402_GUARD && row->deed == CIA402_SET)) &&
-           row->need != CIA402_IF_THERE;
+    return is_write && row->need != CIA402_IF_THERE && (self->sdo.abort_code == ABORT_READ_ONLY || row->need == CIA402_GUARD);
 }
 
 static bool is_worth_another_try(const cia402_axis_t *self)
@@ -182,17 +175,12 @@ static cia402_setup_result_t compare(cia402_axis_t *self, const cia402_config_t 
 static cia402_setup_result_t take_answer(cia402_axis_t *self, const cia402_config_t *config, const cia402_axis_config_t *axis,
                                          uint64_t now_us)
 {
-    switch (step_of(&self->setup)) {
-    case STEP_COMPARE:
-    case STEP_POLL:
+    const step_t step = step_of(&self->setup);
+    if (step == STEP_COMPARE || step == STEP_POLL) {
         return compare(self, config, axis, now_us);
-    case STEP_KEEP:
+    }
+    if (step == STEP_KEEP) {
         self->setup.value = sdo_value_u32(&self->sdo);
-        break;
-    case STEP_WRITE:
-    case STEP_LISTEN:
-    case STEP_END:
-        break;
     }
     next_step(self, now_us);
     return CIA402_SETUP_BUSY;
@@ -225,17 +213,15 @@ static cia402_setup_result_t go_on(cia402_axis_t *self, const cia402_config_t *c
         ask(self, config, axis);
         return CIA402_SETUP_BUSY;
     }
-    switch (self->sdo.state) {
-    case SDO_DONE:
+    if (self->sdo.state == SDO_DONE) {
         return take_answer(self, config, axis, now_us);
-    case SDO_ABORTED:
+    }
+    if (self->sdo.state == SDO_ABORTED) {
         return take_abort(self, config, now_us);
-    case SDO_SILENT:
+    }
+    if (self->sdo.state == SDO_SILENT) {
         self->setup.job = CIA402_JOB_NONE;
         return CIA402_SETUP_SILENT;
-    case SDO_IDLE:
-    case SDO_BUSY:
-        break;
     }
     return CIA402_SETUP_BUSY;
 }

@@ -9,8 +9,9 @@
 
 #define SWITCHED_ON_SYNCS 3u /* set-points that lie on actual before the torque comes */
 #define MODE_TIMEOUT_US   6000000u
-#define HOMING_BEGIN_US   500000u /* "done" before "not done" is believed only after this: it may be that of the last homing */
-#define HOMING_BITS       (CIA402_STATUS_BIT12 | CIA402_STATUS_REACHED)
+#define HOMING_BEGIN_US                                                                                                          \
+    500000u /* "done" or "failed" from the start is believed only after this: it may be that of the last homing */
+#define HOMING_BITS (CIA402_STATUS_BIT12 | CIA402_STATUS_REACHED)
 
 cia402_drive_t cia402_drive(cia402_t *self, unsigned axis)
 {
@@ -259,13 +260,14 @@ static void step_homing_axis(cia402_t *self, unsigned k)
     if (axis->homing != CIA402_HOMING_STARTED && axis->homing != CIA402_HOMING_RUNNING) {
         return;
     }
+    const bool is_error = (axis->statusword & CIA402_STATUS_BIT13) != 0;
     const bool has_begun = axis->homing == CIA402_HOMING_RUNNING || self->now_us - axis->phase_us >= HOMING_BEGIN_US;
-    if ((axis->statusword & CIA402_STATUS_BIT13) != 0 && has_begun) {
+    if (is_error && has_begun) {
         cia402_axis_fail(cia402_drive(self, k), CIA402_HOMING_ERROR);
     } else if (bits == HOMING_BITS && has_begun) {
         axis->homing = CIA402_HOMING_DONE;
         axis->is_homed = true;
-    } else if (bits != HOMING_BITS && axis->word_syncs > 0) {
+    } else if (bits != HOMING_BITS && !is_error && axis->word_syncs > 0) {
         axis->homing = CIA402_HOMING_RUNNING;
     }
 }
@@ -343,10 +345,9 @@ static void step(cia402_t *self)
         watch_operation(self);
         step_homing(self);
         break;
+    case CIA402_STAGE_OFF:
     case CIA402_STAGE_FOLLOW:
         watch_operation(self);
-        break;
-    case CIA402_STAGE_OFF:
         break;
     }
 }
@@ -360,7 +361,7 @@ void cia402_stage_step(cia402_t *self)
         self->is_begun = true;
         return;
     }
-    if (are_all_in(self)) {
+    if (are_all_in(self) || self->stage == CIA402_STAGE_FOLLOW) {
         step(self);
     }
     if (!are_all_in(self) && self->stage != CIA402_STAGE_FOLLOW) { /* when following, the gateway decides */

@@ -331,7 +331,7 @@ static uint32_t mapped_value(cia402_slave_drive_t *d, uint32_t entry)
 {
     switch (entry >> 8) {
     case 0x604100:
-        return status_of(d);
+        return (uint16_t)((status_of(d) | d->status_set) & ~d->status_clear);
     case 0x606400:
         return (uint32_t)d->position;
     case 0x606100:
@@ -360,7 +360,7 @@ static void send_tpdo(cia402_slave_t *self, cia402_slave_drive_t *d)
             data[at++] = (uint8_t)(now >> (8 * i));
         }
     }
-    out(self, d, cob & 0x7FF, at, data);
+    out(self, d, cob & 0x7FF, (uint8_t)(at - d->tpdo_cut), data);
 }
 
 static void take_sync(cia402_slave_t *self, cia402_slave_drive_t *d, uint8_t length)

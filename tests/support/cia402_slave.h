@@ -36,6 +36,8 @@ typedef struct {
     uint16_t stuck_at;
     bool is_homing_failing;
     bool is_answering_late;                 /**< each SDO answer comes with the next request */
+    uint16_t status_set, status_clear;      /**< bits of the statusword that it shows as 1, as 0, whatever it does */
+    uint8_t tpdo_cut;                       /**< bytes that its TPDOs are too short by */
     uint32_t tpdo_drop;                     /**< so many TPDOs are not sent */
     uint32_t power_us, brake_us, homing_us; /**< how long it takes */
 

@@ -109,6 +109,7 @@ static void test_read_segments_are_put_together(void)
     TEST_ASSERT_EQUAL(SDO_DONE, sdo.state);
     TEST_ASSERT_EQUAL_UINT8(16, sdo.size);
     TEST_ASSERT_EQUAL_MEMORY("ABCDEFGHIJKLMNOP", sdo.value, 16);
+    TEST_ASSERT_EQUAL_HEX32(0x44434241, sdo_value_u32(&sdo)); /* of a longer value the first four bytes */
 }
 
 static void test_write_segments_are_taken_apart(void)
@@ -213,6 +214,43 @@ static void test_receive_about_something_else_is_dropped(void)
     TEST_ASSERT_EQUAL_HEX32(7, sdo_value_u32(&sdo));
 }
 
+static void test_receive_before_the_question_has_gone_is_dropped(void)
+{
+    sdo_read(&sdo, 0x6064, 0, 1);
+    answer("\x4F\x64\x60\x00\x07\0\0\0");
+    TEST_ASSERT_EQUAL(SDO_BUSY, sdo.state);
+    expect("\x40\x64\x60\x00\0\0\0\0");
+    answer("\x4F\x64\x60\x00\x08\0\0\0");
+    TEST_ASSERT_EQUAL_HEX32(8, sdo_value_u32(&sdo));
+}
+
+static void test_receive_remote_frame_is_dropped(void)
+{
+    sdo_read(&sdo, 0x6064, 0, 1);
+    expect("\x40\x64\x60\x00\0\0\0\0");
+    sdo_receive(&sdo, &(can_frame_t){.id = 0x585, .is_rtr = true, .length = 8, .data = {0x4F, 0x64, 0x60, 0}});
+    TEST_ASSERT_EQUAL(SDO_BUSY, sdo.state);
+}
+
+/* Between segments the answer to the first question once more is no segment; an abort counts, whatever object it names. */
+static void test_receive_between_segments_segments_and_aborts_alone_count(void)
+{
+    sdo_read(&sdo, 0x1008, 0, 1);
+    expect("\x40\x08\x10\x00\0\0\0\0");
+    answer("\x41\x08\x10\x00\x0A\0\0\0");
+    expect("\x60\0\0\0\0\0\0\0");
+    answer("\x41\x08\x10\x00\x0A\0\0\0");
+    expect_nothing();
+    answer("\x00"
+           "ABCDEFG");
+    expect("\x70\0\0\0\0\0\0\0");
+    TEST_ASSERT_EQUAL(SDO_BUSY, sdo.state);
+    answer("\x80\0\0\0\x00\x00\x00\x08");
+    TEST_ASSERT_EQUAL(SDO_ABORTED, sdo.state);
+    TEST_ASSERT_EQUAL_HEX32(0x08000000, sdo.abort_code);
+    expect_nothing();
+}
+
 static void test_step_no_answer_aborts_waits_and_tries_again(void)
 {
     sdo_read(&sdo, 0x6064, 0, 3);
@@ -290,6 +328,9 @@ int main(void)
     RUN_TEST(test_read_more_than_there_is_room_for_is_refused);
     RUN_TEST(test_receive_abort_ends_the_transfer_with_its_code);
     RUN_TEST(test_receive_about_something_else_is_dropped);
+    RUN_TEST(test_receive_before_the_question_has_gone_is_dropped);
+    RUN_TEST(test_receive_remote_frame_is_dropped);
+    RUN_TEST(test_receive_between_segments_segments_and_aborts_alone_count);
     RUN_TEST(test_step_no_answer_aborts_waits_and_tries_again);
     RUN_TEST(test_step_second_attempt_that_is_answered_is_as_good);
     RUN_TEST(test_step_bus_that_takes_nothing_is_offered_the_same_again);
