@@ -128,6 +128,10 @@ uint32_t fx_sqrt_u64(uint64_t value);
  *  The square root of a sum of Q32 squares (a Q64 value) is the length in Q32. */
 uint64_t fx_sqrt_u128(fx_u128_t value);
 
+/** sqrt of a Q88 value below 2^124 in Q32: fx_sqrt_u128() of it, which is Q44, rounded half up. At half the cost for roots of
+ *  [2^-12, 2^14), where one value in 800 needs all bits of the root in Q44 to be worked out. */
+q32_t fx_root_q32(fx_u128_t square_q88);
+
 /** Largest error of fx_sincos_deg in LSB of Q62 (2.2e-19 each). */
 #define FX_SINCOS_MAX_ERROR_Q62 2
 

@@ -37,6 +37,13 @@ typedef enum {
 #define HV_WRAPS
 #endif
 
+/** A condition that hardly ever holds: the way without it is kept short. */
+#if defined(__GNUC__)
+#define HV_RARELY(condition) __builtin_expect((condition), 0)
+#else
+#define HV_RARELY(condition) (condition)
+#endif
+
 /** Called when an HV_ASSERT fails: supplied by the program (hosted: print and abort; firmware: fail silent). Never returns. */
 void hv_assert_failed(const char *file, int line);
 

@@ -1,35 +1,35 @@
 /* SPDX-License-Identifier: MIT
  * fx_root.c - exact integer square roots of 64 and 128 bits.
- * 64 bits: a table of 1/sqrt with 8 bits, two Newton steps on it (15, then 29 bits), a product, one correction by the remainder.
- * 128 bits: the same inverse, a product, two corrections by the remainder, and one to the nearest. Bounded time: no loop, no
- * division.
+ * All begin with 1/sqrt to 31 bits: straight lines of a table (16 bits) and one Newton step. 64 bits: a product, one correction
+ * by the remainder. 128 bits: a product, two corrections by the remainder, and one to the nearest; where the last bits of the
+ * root are not asked for, the first correction is as a rule enough to know the others. Bounded time: no loop, no division.
  */
 #include "heave/fx.h"
 
-/* 2^15 / sqrt(x) at the middle of [i, i + 1) / 256, for i from 64. */
-static const uint16_t k_inverse_root_q15[192] = {
-    65281, 64781, 64292, 63814, 63347, 62889, 62442, 62004, 61575, 61154, 60742, 60339, 59943, 59555, 59175, 58801, 58435, 58075,
-    57722, 57376, 57035, 56700, 56372, 56049, 55731, 55419, 55112, 54810, 54513, 54221, 53933, 53650, 53371, 53097, 52826, 52560,
-    52298, 52040, 51785, 51535, 51288, 51044, 50804, 50567, 50333, 50103, 49876, 49652, 49430, 49212, 48997, 48784, 48574, 48367,
-    48163, 47961, 47761, 47564, 47370, 47178, 46988, 46800, 46615, 46432, 46251, 46072, 45895, 45720, 45547, 45376, 45207, 45040,
-    44875, 44711, 44550, 44390, 44232, 44075, 43920, 43767, 43615, 43465, 43316, 43169, 43024, 42879, 42737, 42595, 42456, 42317,
-    42180, 42044, 41910, 41776, 41644, 41514, 41384, 41256, 41129, 41003, 40878, 40754, 40631, 40510, 40390, 40270, 40152, 40035,
-    39919, 39803, 39689, 39576, 39464, 39352, 39242, 39133, 39024, 38916, 38810, 38704, 38599, 38494, 38391, 38289, 38187, 38086,
-    37986, 37887, 37788, 37690, 37593, 37497, 37401, 37307, 37213, 37119, 37027, 36935, 36843, 36753, 36663, 36573, 36485, 36397,
-    36309, 36222, 36136, 36051, 35966, 35882, 35798, 35715, 35632, 35550, 35469, 35388, 35307, 35228, 35148, 35070, 34991, 34914,
-    34837, 34760, 34684, 34608, 34533, 34458, 34384, 34310, 34237, 34164, 34092, 34020, 33949, 33878, 33807, 33737, 33668, 33599,
-    33530, 33461, 33393, 33326, 33259, 33192, 33126, 33060, 32994, 32929, 32864, 32800,
+/* 1 / sqrt(i / 256) - 1 in Q16, for i from 64; less what makes straight lines between them too large and too small by as much. */
+static const uint16_t k_inverse_root_q16[193] = {
+    65535, 64522, 63533, 62567, 61621, 60696, 59792, 58906, 58039, 57189, 56357, 55542, 54743, 53959, 53191, 52437, 51698, 50972,
+    50259, 49559, 48872, 48197, 47534, 46882, 46242, 45612, 44993, 44384, 43785, 43196, 42616, 42045, 41483, 40930, 40386, 39849,
+    39321, 38801, 38288, 37783, 37285, 36794, 36310, 35833, 35363, 34899, 34441, 33990, 33545, 33105, 32672, 32244, 31821, 31405,
+    30993, 30586, 30185, 29789, 29397, 29011, 28629, 28251, 27878, 27510, 27146, 26786, 26430, 26078, 25731, 25387, 25047, 24711,
+    24378, 24050, 23724, 23403, 23085, 22770, 22458, 22150, 21845, 21543, 21245, 20949, 20656, 20367, 20080, 19796, 19515, 19236,
+    18960, 18687, 18417, 18149, 17884, 17621, 17361, 17103, 16848, 16595, 16344, 16095, 15849, 15605, 15363, 15124, 14886, 14650,
+    14417, 14186, 13956, 13729, 13503, 13280, 13058, 12838, 12620, 12404, 12190, 11977, 11766, 11557, 11349, 11143, 10939, 10737,
+    10536, 10336, 10138, 9942,  9747,  9554,  9362,  9172,  8983,  8795,  8609,  8425,  8241,  8060,  7879,  7700,  7522,  7345,
+    7170,  6995,  6823,  6651,  6480,  6311,  6143,  5976,  5810,  5646,  5482,  5320,  5159,  4999,  4840,  4682,  4525,  4369,
+    4214,  4060,  3908,  3756,  3605,  3455,  3306,  3158,  3011,  2865,  2720,  2576,  2433,  2291,  2149,  2009,  1869,  1730,
+    1592,  1455,  1319,  1183,  1049,  915,   782,   649,   518,   387,   257,   128,   0,
 };
 
-/* 1 / sqrt(x) in Q31 for x of [1/4, 1) in Q64, to about 2^-29. A Newton step is y (3 - x y^2) / 2. */
-static uint64_t inverse_root_q31(uint64_t x_q64)
+/* 1 / sqrt(x) in Q31 for x of [1/4, 1) in Q64, to about 2^-31. The excess x y^2 - 1 of the first guess y is below 2^-15, so that
+ * it does not matter that the 1 is lost above; y - y * excess / 2 is better. */
+HV_WRAPS static uint64_t inverse_root_q31(uint64_t x_q64)
 {
-    const uint64_t x_q32 = x_q64 >> 32;
-    const uint64_t seed_q15 = k_inverse_root_q15[(x_q64 >> 56) - 64];
-    const uint64_t seed_defect_q62 = 3 * (UINT64_C(1) << 62) - x_q32 * (seed_q15 * seed_q15);
-    const uint64_t better_q30 = (seed_q15 * (seed_defect_q62 >> 32) + (UINT64_C(1) << 15)) >> 16;
-    const uint64_t defect_q62 = 3 * (UINT64_C(1) << 62) - x_q32 * (better_q30 * better_q30 >> 30);
-    return better_q30 * (defect_q62 >> 31) >> 31;
+    const uint16_t *low = &k_inverse_root_q16[(x_q64 >> 56) - 64];
+    const uint64_t slope_q24 = ((uint64_t)low[0] - low[1]) * (uint16_t)(x_q64 >> 40);
+    const uint64_t guess_q20 = (UINT64_C(1) << 20) + ((((uint64_t)low[0] << 16) - slope_q24) >> 12);
+    const int64_t excess_q72 = (int64_t)((x_q64 >> 32) * (guess_q20 * guess_q20));
+    return (guess_q20 << 11) - (uint64_t)(((int64_t)guess_q20 * (excess_q72 >> 24)) >> 38);
 }
 
 /* floor(sqrt(value)) for value >= 2^62. */
@@ -94,4 +94,31 @@ HV_WRAPS uint64_t fx_sqrt_u128(fx_u128_t value)
     const int64_t rest =
         (int64_t)(value.lo - (uint64_t)root * (uint64_t)root); /* below 2^63: root is the nearest or next to it */
     return (uint64_t)(root + (rest > root) - (rest <= -root));
+}
+
+/* sqrt(value) * 2^31 for value >= 2^62, at most 64 off: 31 bits from the inverse, and one correction by remainder / (2 root). */
+HV_WRAPS static uint64_t root_q31(uint64_t value)
+{
+    const uint64_t inverse_q31 = inverse_root_q31(value);
+    const uint64_t upper = ((value >> 32) * inverse_q31) >> 31;
+    const int64_t rest = (int64_t)(value - upper * upper); /* upper is within 5: |rest| * inverse is below 2^67 */
+    return (upper << 31) + (uint64_t)(((rest >> 5) * (int64_t)inverse_q31) >> 28);
+}
+
+/* Roots of [2^-12, 2^14) in Q45 are known to 5: 64 / 2^4, and 1 for what is cut off. */
+#define SQUARE_HI_MAX  (UINT64_C(1) << 52)
+#define ROOT_ERROR_Q45 5u
+
+HV_WRAPS q32_t fx_root_q32(fx_u128_t square_q88)
+{
+    if (!HV_RARELY(square_q88.hi - 1 >= SQUARE_HI_MAX - 1)) {
+        const unsigned zeros = fx_leading_zeros(square_q88.hi) & ~1u; /* 12 at least */
+        const uint64_t root = root_q31((square_q88.hi << zeros) | (square_q88.lo >> (64 - zeros)));
+        const uint64_t with_halves_q45 = (root >> (zeros / 2 - 2)) + (1u << 12) + 1; /* of both roundings */
+        const uint64_t low_q32 = (with_halves_q45 - ROOT_ERROR_Q45) >> 13;
+        if (!HV_RARELY(low_q32 != (with_halves_q45 + ROOT_ERROR_Q45) >> 13)) {
+            return (q32_t)low_q32;
+        }
+    }
+    return fx_shift_round((int64_t)fx_sqrt_u128(square_q88), 12);
 }

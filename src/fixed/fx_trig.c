@@ -9,7 +9,8 @@
 
 #define STEPS_PER_QUADRANT 64u
 #define TURN_Q32           (360 * Q32_ONE)
-#define STEP_Q32           (TURN_Q32 / (4 * STEPS_PER_QUADRANT)) /* 1.40625 degrees: exact */
+#define STEP_Q32           ((uint64_t)TURN_Q32 / (4 * STEPS_PER_QUADRANT)) /* 1.40625 degrees: exact */
+#define INVERSE_45_Q64     INT64_C(409927646082434481)
 #define RAD_PER_DEG_Q68    INT64_C(5151302725743731799)
 
 /* sin(i * 90 / 64 degrees) in Q62. */
@@ -81,14 +82,24 @@ static const q62_t k_sine_q62[STEPS_PER_QUADRANT + 1] = {
     INT64_C(4611686018427387904),
 };
 
-/* Sine of any step of the turn. Arithmetic instead of branches: signs of small angles are as good as random. */
-HV_WRAPS static q62_t step_sine(unsigned step)
+/* The step nearest to an angle, and whole turns of them. STEP_Q32 is 45 * 2^27; 2^37 steps, which make the quotient positive, are
+ * a multiple of 2^64 in Q32, so that step * STEP_Q32 does without them. */
+static uint64_t nearest_step(q32_t angle_deg_q32)
 {
-    const unsigned in_quadrant = step % STEPS_PER_QUADRANT;
-    const unsigned is_falling = step / STEPS_PER_QUADRANT & 1u;
-    const unsigned is_negative = step / STEPS_PER_QUADRANT / 2 & 1u;
-    const unsigned mirror = is_falling * (STEPS_PER_QUADRANT - 2 * in_quadrant);
-    return k_sine_q62[in_quadrant + mirror] * (1 - 2 * (q62_t)is_negative);
+    const int64_t halves = fx_shift_down(angle_deg_q32, 26) + 45;
+    return (uint64_t)fx_mul_high(fx_shift_down(halves, 1) + 45 * (INT64_C(1) << 37), INVERSE_45_Q64);
+}
+
+/* -1 where a bit of a number is set, else 0. */
+HV_WRAPS static int64_t mask_of_bit(uint64_t number, unsigned bit)
+{
+    return fx_shift_down((int64_t)(number << (63 - bit)), 63);
+}
+
+/* value, or -value if the mask is -1. */
+static q62_t negate_if(int64_t mask, q62_t value)
+{
+    return (value ^ mask) - mask;
 }
 
 /* x - sin(x) for |x| <= 0.0123, in Q67: the next term, x^9 / 9!, is below 2^-75. */
@@ -107,21 +118,23 @@ static int64_t cosine_deficit_q68(int64_t square_q70)
     return fx_mul_high(square_q70, outer_q62);
 }
 
-void fx_sincos_deg(q32_t angle_deg_q32, q62_t *sin_q62, q62_t *cos_q62)
+HV_WRAPS void fx_sincos_deg(q32_t angle_deg_q32, q62_t *sin_q62, q62_t *cos_q62)
 {
-    const uint64_t positive = (uint64_t)(angle_deg_q32 % TURN_Q32 + TURN_Q32);
-    const unsigned step = (unsigned)((positive + STEP_Q32 / 2) / STEP_Q32);
-    const q32_t rest_deg_q32 = (q32_t)positive - (q32_t)step * STEP_Q32;
+    const uint64_t step = nearest_step(angle_deg_q32);
+    const q32_t rest_deg_q32 = (q32_t)((uint64_t)angle_deg_q32 - step * STEP_Q32);
 
     const int64_t rest_q67 = fx_mul_high(rest_deg_q32 * (INT64_C(1) << 31), RAD_PER_DEG_Q68); /* from Q63 degrees */
     const int64_t square_q70 = fx_mul_high(rest_q67, rest_q67);
     const int64_t rest_sin_q67 = rest_q67 - sine_deficit_q67(rest_q67, square_q70);
     const int64_t deficit_q68 = cosine_deficit_q68(square_q70);
 
-    const q62_t sine = step_sine(step);
-    const q62_t cosine = step_sine(step + STEPS_PER_QUADRANT);
+    /* Masks instead of branches: signs of small angles are as good as random. */
+    const int64_t falling = mask_of_bit(step, 6);
+    const int64_t index = ((int64_t)(step % STEPS_PER_QUADRANT) ^ falling) + (falling & (int64_t)(STEPS_PER_QUADRANT + 1));
+    const q62_t sine = negate_if(mask_of_bit(step, 7), k_sine_q62[index]);
+    const q62_t cosine = negate_if(mask_of_bit(step + STEPS_PER_QUADRANT, 7), k_sine_q62[(int64_t)STEPS_PER_QUADRANT - index]);
     const int64_t sine_change_q66 = 2 * fx_mul_high(cosine, rest_sin_q67) - fx_mul_high(sine, deficit_q68);
     const int64_t cosine_change_q66 = 2 * fx_mul_high(sine, rest_sin_q67) + fx_mul_high(cosine, deficit_q68);
-    *sin_q62 = sine + fx_shift_round(sine_change_q66, 4);
-    *cos_q62 = cosine - fx_shift_round(cosine_change_q66, 4);
+    *sin_q62 = sine + ((sine_change_q66 + 8) >> 4);
+    *cos_q62 = cosine - ((cosine_change_q66 + 8) >> 4);
 }

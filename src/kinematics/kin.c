@@ -135,22 +135,27 @@ hv_status_t kin_init(kin_t *self, const kin_geometry_t *geometry)
     return HV_OK;
 }
 
+static bool is_between(q32_t value_q32, q32_t limit_q32)
+{
+    return value_q32 >= -limit_q32 && value_q32 <= limit_q32;
+}
+
 /* Whether the axes that the mechanism uses are in the range that the widths above allow. */
 static bool is_pose_in_range(const kin_t *self, const pose_t *pose)
 {
     const q32_t limit = q32_from_int(TRANSLATION_MAX_MM);
     const q32_t angle_limit = q32_from_int(HINGE_ANGLE_MAX_DEG);
     const q32_t *axis = pose->axis_q32;
-    if (fx_abs(axis[AXIS_Z]) > limit) {
+    if (!is_between(axis[AXIS_Z], limit)) {
         return false;
     }
     switch (self->kind) {
     case KIN_HEXAPOD:
-        return fx_abs(axis[AXIS_X]) <= limit && fx_abs(axis[AXIS_Y]) <= limit;
+        return is_between(axis[AXIS_X], limit) && is_between(axis[AXIS_Y], limit);
     case KIN_TRIPOD:
         return true;
     case KIN_TRIPOD_3RPS:
-        return fx_abs(axis[AXIS_ROLL]) <= angle_limit && fx_abs(axis[AXIS_PITCH]) <= angle_limit;
+        return is_between(axis[AXIS_ROLL], angle_limit) && is_between(axis[AXIS_PITCH], angle_limit);
     }
     return false;
 }
@@ -265,13 +270,19 @@ hv_status_t kin_place(const kin_t *self, const pose_t *pose, kin_placement_t *pl
     return HV_OK;
 }
 
-void kin_leg(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, kin_leg_t *leg)
+/* Turned arm and vector of a leg. */
+static inline void set_leg(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, int64_t arm_mm_q44[3],
+                           int64_t vector_mm_q44[3])
 {
     for (unsigned axis = 0; axis < 3; axis++) {
-        const int64_t arm = rotate_q44(placement->rotation_q62[axis], self->arm_mm_q46[cylinder]);
-        leg->arm_mm_q44[axis] = arm;
-        leg->vector_mm_q44[axis] = placement->mrp_mm_q44[axis] + arm - self->base_mm_q44[cylinder][axis];
+        arm_mm_q44[axis] = rotate_q44(placement->rotation_q62[axis], self->arm_mm_q46[cylinder]);
+        vector_mm_q44[axis] = placement->mrp_mm_q44[axis] + arm_mm_q44[axis] - self->base_mm_q44[cylinder][axis];
     }
+}
+
+void kin_leg(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, kin_leg_t *leg)
+{
+    set_leg(self, placement, cylinder, leg->arm_mm_q44, leg->vector_mm_q44);
     leg->length_mm_q44 = (int64_t)fx_sqrt_u128(fx_square3(leg->vector_mm_q44));
 }
 
@@ -282,10 +293,11 @@ hv_status_t kin_inverse(const kin_t *self, const pose_t *pose, q32_t extension_m
     if (status != HV_OK) {
         return status;
     }
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        kin_leg_t leg;
-        kin_leg(self, &placement, i, &leg);
-        extension_mm_q32[i] = fx_shift_round(leg.length_mm_q44, KIN_GUARD_BITS) - self->retracted_mm_q32[i];
+    const unsigned cylinders = self->cylinders;
+    for (unsigned i = 0; i < cylinders; i++) {
+        int64_t arm_mm_q44[3], vector_mm_q44[3];
+        set_leg(self, &placement, i, arm_mm_q44, vector_mm_q44);
+        extension_mm_q32[i] = fx_root_q32(fx_square3(vector_mm_q44)) - self->retracted_mm_q32[i];
     }
     return HV_OK;
 }

@@ -356,6 +356,37 @@ static void test_sqrt_u128_every_kind_of_value_is_the_nearest(void)
     TEST_ASSERT_EQUAL_UINT64(UINT64_C(1) << 62, fx_sqrt_u128((fx_u128_t){(UINT64_C(1) << 60) - 1, UINT64_MAX}));
 }
 
+/* Whether the root in Q32 is that in Q44, which the test above has judged, rounded half up. */
+static int is_rounded_root(fx_u128_t square)
+{
+    return fx_root_q32(square) == (q32_t)((fx_sqrt_u128(square) + 2048) >> 12);
+}
+
+static void test_root_q32_every_kind_of_value_is_the_root_rounded_twice(void)
+{
+    unsigned wrong = 0;
+    for (int i = 0; i < 500000; i++) {
+        const unsigned width = (unsigned)(next_random() % 124);
+        fx_u128_t value = {next_random() >> 4, next_random()};
+        value = width < 64 ? (fx_u128_t){0, value.lo >> (63 - width)} : (fx_u128_t){value.hi >> (123 - width), value.lo};
+        wrong += !is_rounded_root(value);
+        /* Q32 changes where Q44 does from 2047 to 2048 parts, at a root of 2047.5: the squares right there and one below and
+         * above. */
+        const uint64_t root = ((next_random() >> (3 + next_random() % 49)) & ~UINT64_C(4095)) | 2047;
+        const fx_u128_t tie = fx_add_u128(fx_square_u64(root), (fx_u128_t){0, root});
+        wrong += fx_root_q32(tie) != (q32_t)(root >> 12);
+        wrong += fx_root_q32(fx_add_u128(tie, (fx_u128_t){0, 1})) != (q32_t)(root >> 12) + 1;
+        const fx_u128_t near = fx_add_u128(tie, (fx_u128_t){0, next_random() % (2 * root)});
+        const fx_u128_t below = {tie.hi - (tie.lo < root), tie.lo - root};
+        wrong += !is_rounded_root(near) || !is_rounded_root(below);
+    }
+    TEST_ASSERT_EQUAL_UINT(0, wrong);
+    TEST_ASSERT_EQUAL_INT64(0, fx_root_q32((fx_u128_t){0, 0}));
+    TEST_ASSERT_EQUAL_INT64(1, fx_root_q32((fx_u128_t){0, UINT64_C(1) << 24}));
+    TEST_ASSERT_EQUAL_INT64(Q32_ONE << 14, fx_root_q32((fx_u128_t){UINT64_C(1) << 52, 0}));
+    TEST_ASSERT_EQUAL_INT64(Q32_ONE << 14, fx_root_q32((fx_u128_t){(UINT64_C(1) << 52) - 1, UINT64_MAX}));
+}
+
 static int64_t distance(int64_t a, int64_t b)
 {
     return a > b ? a - b : b - a;
@@ -441,6 +472,32 @@ static void test_sincos_whole_turns_change_no_bit(void)
     }
 }
 
+static void add_to_digest(uint64_t *digest, q32_t angle)
+{
+    q62_t sine, cosine;
+    fx_sincos_deg(angle, &sine, &cosine);
+    *digest = (*digest ^ (uint64_t)sine) * UINT64_C(0x100000001B3);
+    *digest = (*digest ^ (uint64_t)cosine) * UINT64_C(0x100000001B3);
+}
+
+/* Recorded motion replays to the same bytes in every version, so that not even the last bit may change: half way between steps of
+ * the table either of them would be within the stated error. */
+static void test_sincos_every_bit_is_as_it_has_always_been(void)
+{
+    uint64_t digest = UINT64_C(0xCBF29CE484222325);
+    for (q32_t half_step = -2048; half_step <= 2048; half_step++) {
+        for (q32_t offset = -2; offset <= 2; offset++) {
+            add_to_digest(&digest, half_step * 45 * (INT64_C(1) << 26) + offset);
+        }
+    }
+    for (int i = 0; i < 100000; i++) {
+        add_to_digest(&digest, next_spread());
+    }
+    add_to_digest(&digest, INT64_MAX);
+    add_to_digest(&digest, INT64_MIN);
+    TEST_ASSERT_EQUAL_HEX64(UINT64_C(0x060F65AB7E493F8B), digest);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -462,9 +519,11 @@ int main(void)
     RUN_TEST(test_leading_zeros_every_width_is_counted);
     RUN_TEST(test_sqrt_u64_every_kind_of_value_is_the_exact_floor);
     RUN_TEST(test_sqrt_u128_every_kind_of_value_is_the_nearest);
+    RUN_TEST(test_root_q32_every_kind_of_value_is_the_root_rounded_twice);
     RUN_TEST(test_sincos_reference_angles_are_within_the_stated_error);
     RUN_TEST(test_sincos_dense_sweep_is_within_the_stated_error);
     RUN_TEST(test_sincos_multiples_of_90_degrees_are_exact);
     RUN_TEST(test_sincos_whole_turns_change_no_bit);
+    RUN_TEST(test_sincos_every_bit_is_as_it_has_always_been);
     return UNITY_END();
 }
