@@ -10,11 +10,11 @@
  * taken thrice, 1.5 periods later for each point of it but the first.
  *
  * Losses: where a point is missing when the curve needs it, the motion goes on, by the last step and its bend (not a jump: at
- * most 4 x the larger of the two steps before), then ever more slowly, no further than the axis takes to stop
- * (stream_set_stop()), or 36 ms (fast: and its lead). When samples are back, or after 150 ms without, the curve
- * comes back to the samples, or to the last one, softly: position and velocity of the control points go on as they were. So an
- * ended stream rests exactly on its last sample, within 2 s, or 24 periods of a slow one. A stream that is known may be away for
- * a second and goes on; a new rate gives a new grid, on which the curve goes on.
+ * most 4 x the larger of the two steps before), and slows down as the quickest stop of the axis does (stream_set_stop(); a slow
+ * motion in 72 ms, over 36 ms of its way; `fast` after a full step, and its lead beyond). When samples are back, or after 150 ms
+ * without, the curve comes back to the samples, or to the last one, softly: position and velocity of the control points go on as
+ * they were. So an ended stream rests exactly on its last sample, within 2 s, or 24 periods of a slow one. A stream that is known
+ * may be away for a second and goes on; a new rate gives a new grid, on which the curve goes on.
  *
  * Hints: a sender that states its period may be slower, and tells from its second sample on what is late and what is lost. The
  * margin is then an eighth of the period at least, as a guess at so slow a stream is poor.
@@ -68,7 +68,7 @@ typedef struct {
 typedef struct {
     q32_t first_q32;   /**< in the first period */
     q32_t go_q32;      /**< in the later ones, if it did not fade */
-    q32_t beyond_q32;  /**< how far it has gone */
+    q32_t rise_q32;    /**< share of its time in which the acceleration builds up, [0, 0.5] */
     int32_t reach_q16; /**< how far it goes, in periods */
 } stream_lead_t;
 
@@ -93,7 +93,6 @@ typedef struct {
     uint32_t watched;               /**< samples since the watch for a grain began */
     int32_t window;                 /**< each control point is a mean of so many points, thrice; 1: the point */
     int32_t weight[STREAM_WEIGHTS]; /**< of the points in that mean, the newest first */
-    int32_t guesses;                /**< since the newest sample */
     int64_t period_cycles_q16;      /**< cycles in a period */
     int64_t lead_q32;               /**< of the step of the last period, that a control point is ahead of its point */
     int64_t bend_q32;               /**< of the step's change, likewise */
@@ -145,8 +144,8 @@ typedef struct {
  *  @param cycle_us [500, 10000]   @param axes 1 to AXES_MAX */
 void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_t style);
 
-/** Tells the limits of an axis: where samples are missing, the motion goes no further than the axis takes to stop (but at least
- *  one period, or 20 ms). Kept by stream_reset(). */
+/** Tells the limits of an axis: where samples are missing, the motion goes no further than the axis takes to stop, or 36 ms. Kept
+ *  by stream_reset(). */
 void stream_set_stop(stream_t *self, unsigned axis, stream_stop_t stop);
 
 /** Forgets the stream; the next sample starts a new one. */

@@ -13,11 +13,15 @@
 #include "plan.h"
 #include "slot.h"
 #include "slots.h"
+#include "stream_curve.h"
 
 #define LEAST_CYCLES     4  /* between plans because of limits */
 #define JERK_FACTOR      4  /* a lost sample may take so much more jerk than there is for a moment: the ramps absorb it ... */
 #define JERK_FACTOR_FAST 16 /* ... and so the steps of a quadratic curve's acceleration, of a cycle or two each */
+#define OVERSHOOT_DIV    8  /* a stop goes beyond the samples if it does by this share of its way ... */
 #define RETRY_CYCLES     16 /* between attempts to leave a sample for the curve */
+
+#define OVERSHOOT_LEAST_Q32 (Q32_ONE / 100) /* ... and by that much */
 
 /* On its reference as far as the soft grip works without using all of the jerk (see ramp.c). */
 static bool is_near(const ramp_state_t *state, const history_t *reference, q32_t jerk_q32)
@@ -90,33 +94,79 @@ static bool join_curve(motion_t *self, const ramp_ref_t *ref)
     return plan_shortest(self, error, k_no_error_q32, curve, 1);
 }
 
+/* The slots now, and the newest sample. */
+static void prepare(const motion_t *self, ramp_state_t start[AXES_MAX], q32_t newest_q32[AXES_MAX])
+{
+    slots_scale(self, self->space, self->stream.curve.last_q32, newest_q32);
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        start[i] = *slot_state(self, i);
+    }
+}
+
+static void plan_halt(motion_t *self, const ramp_state_t start[AXES_MAX])
+{
+    const ramp_limits_t *limits[AXES_MAX];
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        limits[i] = slot_limits(self, i);
+    }
+    halt_plan(&self->halt, POSE_AXES, POSE_AXES, start, limits);
+}
+
 /* Plans the way to the newest sample, or at least a stop. */
 static motion_join_t head_for_sample(motion_t *self)
 {
     ramp_state_t start[AXES_MAX];
-    const ramp_limits_t *limits[AXES_MAX];
     q32_t newest_q32[AXES_MAX];
-    slots_scale(self, self->space, self->stream.curve.last_q32, newest_q32);
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        start[i] = *slot_state(self, i);
-        limits[i] = slot_limits(self, i);
-    }
+    prepare(self, start, newest_q32);
     if (plan_shortest(self, start, newest_q32, NULL, 1)) {
         return JOIN_SAMPLE;
     }
-    halt_plan(&self->halt, POSE_AXES, POSE_AXES, start, limits);
+    plan_halt(self, start);
     return JOIN_HALT;
 }
 
+/* True if a quintic leads there already. */
+static bool is_heading_for(const motion_t *self, const q32_t target_q32[AXES_MAX])
+{
+    bool is_same = self->join == JOIN_SAMPLE;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        is_same &= self->quintic.target_q32[i] == target_q32[i];
+    }
+    return is_same;
+}
+
+/* Plans a stop where the samples stand and even the quickest one goes beyond them: a quintic that comes back would go further.
+ * What cylinders cannot follow is no such stop: of a quintic that is known beforehand. */
+static bool has_to_overshoot(motion_t *self)
+{
+    ramp_state_t start[AXES_MAX];
+    q32_t newest_q32[AXES_MAX];
+    prepare(self, start, newest_q32);
+    if (!stream_curve_is_standing(&self->stream.curve) || is_heading_for(self, newest_q32)) {
+        return false;
+    }
+    plan_halt(self, start);
+    bool is_beyond = false;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        const int sign = start[i].vel_per_cycle_q32 < 0 ? -1 : 1;
+        const q32_t way_q32 = sign * (self->halt.rest_q32[i] - start[i].pos_q32);
+        const q32_t beyond_q32 = sign * (self->halt.rest_q32[i] - newest_q32[i]);
+        is_beyond |= start[i].vel_per_cycle_q32 != 0 && beyond_q32 > way_q32 / OVERSHOOT_DIV + OVERSHOOT_LEAST_Q32;
+    }
+    return is_beyond;
+}
+
 /* Plans anew from where the body is. */
-static void replan(motion_t *self, const ramp_ref_t *ref, bool is_curve_beyond)
+static void replan(motion_t *self, const ramp_ref_t *ref, bool is_curve_beyond, bool may_stop)
 {
     ramp_state_t curve[AXES_MAX];
     for (unsigned i = 0; i < POSE_AXES; i++) {
         curve[i] = before(&ref[i]);
     }
     self->join_cycles = 0;
-    if (is_curve_beyond || !is_within_limits(self, ref)) {
+    if (may_stop && has_to_overshoot(self)) {
+        self->join = JOIN_HALT;
+    } else if (is_curve_beyond || !is_within_limits(self, ref)) {
         self->join = head_for_sample(self);
     } else if (are_slots_near(self, curve)) {
         self->join = JOIN_NONE;
@@ -157,7 +207,7 @@ static void plan_where_due(motion_t *self, const ramp_ref_t *ref)
     }
     if (is_off || self->join == JOIN_DUE || !are_slots_near(self, self->led) ||
         (is_off_curve(self) && (self->has_new_sample || self->join_cycles >= RETRY_CYCLES))) {
-        replan(self, ref, false);
+        replan(self, ref, false, !is_off);
     } else if (self->join == JOIN_CURVE && self->has_new_sample && cycles_left(self) > RETRY_CYCLES) {
         shorten(self, ref);
     }
@@ -191,7 +241,7 @@ static void step_plan(motion_t *self, const ramp_ref_t *curve, ramp_ref_t *ref)
 void join_step(motion_t *self, const ramp_ref_t curve[AXES_MAX], bool is_again, ramp_ref_t ref[AXES_MAX])
 {
     if (is_again) {
-        replan(self, curve, true);
+        replan(self, curve, true, self->join != JOIN_HALT);
     } else {
         plan_where_due(self, curve);
     }

@@ -14,6 +14,7 @@ enum {
     AHEAD_MAX = 8,     /* samples kept that are not committed */
     SHIFT_GUESSES = 4, /* a shifted time line is come over to as softly as after so many guesses */
     BEHIND_MAX = 4,    /* points before head that corrections and guesses look back at */
+    GONE = 2,          /* guesses after which a sample is not just late */
     COARSE_ACC = 4,    /* of the accelerations that coarse steps can make, half is to be left to the motion ... */
     COARSE_JERK = 6,   /* ... and the ramps follow poorly where the jerk is often used up */
     COARSE_FAST = 2,   /* control points that are led swing so many times further */
@@ -64,14 +65,16 @@ void stream_curve_start(stream_curve_t *self, unsigned axes, const q32_t *sample
 }
 
 /* Periods that a motion may be kept up so that it does not go further than the axis takes to stop: of v = step / period, the time
- * is sqrt(v / J), or half of v / A + A / J where the acceleration binds. */
-static int32_t reach(const stream_curve_t *self, unsigned axis, q32_t step_q32)
+ * is sqrt(v / J), or half of v / A + A / J where the acceleration binds. Also the share of such a stop in which A builds up. */
+static void find_reach(const stream_curve_t *self, unsigned axis, q32_t step_q32, stream_lead_t *on)
 {
     const stream_stop_t *stop = &self->stop[axis];
     const q32_t vel_q32 = fx_mul_div(step_q32, Q16_ONE, self->period_cycles_q16);
     int64_t cycles_q16;
+    on->reach_q16 = self->reach_min_q16;
+    on->rise_q32 = Q32_ONE / 2;
     if (stop->jerk_per_cycle3_q32 <= 0 || vel_q32 == 0) {
-        return self->reach_min_q16;
+        return;
     }
     const int64_t rise_q16 = fx_mul_div(stop->acc_per_cycle2_q32, Q16_ONE, stop->jerk_per_cycle3_q32); /* A / J */
     if (fx_mul_shift(stop->acc_per_cycle2_q32, rise_q16, 16) > vel_q32) {
@@ -82,7 +85,9 @@ static int32_t reach(const stream_curve_t *self, unsigned axis, q32_t step_q32)
     }
     cycles_q16 -= cycles_q16 / 16; /* what follows the curve is a little behind it */
     const int64_t periods_q16 = fx_mul_div(cycles_q16, Q16_ONE, self->period_cycles_q16) - self->lead_q32 / (Q32_ONE / Q16_ONE);
-    return (int32_t)fx_clamp(periods_q16, self->reach_min_q16, self->reach_max_q16);
+    on->reach_q16 = (int32_t)fx_clamp(periods_q16, self->reach_min_q16, self->reach_max_q16);
+    const int64_t rise_periods_q16 = fx_mul_div(rise_q16, Q16_ONE, self->period_cycles_q16);
+    on->rise_q32 = fx_clamp(fx_mul_div(rise_periods_q16, Q32_ONE, 2 * (int64_t)on->reach_q16), 0, Q32_ONE / 2);
 }
 
 /* The point of that index; of coarse values, a mean of the points up to it. */
@@ -235,49 +240,60 @@ HV_WRAPS static q32_t lead(const stream_curve_t *self, unsigned axis)
 
 HV_WRAPS static void begin_guessing(stream_curve_t *self)
 {
-    self->guesses = 0;
     for (unsigned axis = 0; axis < self->axes; axis++) {
         stream_lead_t *on = &self->lead[axis];
         const q32_t step_q32 = fx_abs(self->last_q32[axis] - self->point_q32[slot(newest(self) - 1)][axis]);
         on->first_q32 = lead(self, axis);
         on->go_q32 = fx_clamp(on->first_q32, -step_q32, step_q32);
-        on->reach_q16 = reach(self, axis, fx_abs(on->go_q32));
-        on->beyond_q32 = 0;
+        find_reach(self, axis, fx_abs(on->go_q32), on);
     }
 }
 
-/* Share of a step that a guess goes beyond the one before: a cubic S from 1 to 0, as long as the shares add up to the reach. */
-static int32_t share_q16(int32_t reach_q16, int64_t i)
+/* What a stop has lost so far against a motion that goes on, up to the middle of it: the acceleration rises, then stays. Time and
+ * way are in stops, of which each goes half as far as that motion. */
+static q32_t lost_q32(q32_t time_q32, q32_t rise_q32)
 {
-    if (i == 0) {
-        return reach_q16 < Q16_ONE ? reach_q16 : Q16_ONE;
-    }
-    const int64_t length_q16 = 2 * (int64_t)reach_q16 - Q16_ONE;
-    if (i * Q16_ONE >= length_q16) {
-        return 0;
-    }
-    const int64_t u_q16 = i * Q16_ONE * Q16_ONE / length_q16;
-    return (int32_t)(Q16_ONE - u_q16 * u_q16 / Q16_ONE * (3 * Q16_ONE - 2 * u_q16) / Q16_ONE);
+    const q32_t square_q32 = fx_mul_shift(time_q32, time_q32, 32);
+    const q32_t lost = time_q32 < rise_q32
+                           ? fx_mul_div(square_q32, time_q32, 6 * rise_q32)
+                           : square_q32 / 2 - fx_mul_shift(rise_q32, time_q32, 33) + fx_mul_shift(rise_q32, rise_q32, 32) / 6;
+    return fx_mul_div(lost, Q32_ONE, Q32_ONE - rise_q32);
 }
 
-/* The next point beyond the newest sample: the motion goes on, more slowly with each guess. */
-static void guess(stream_curve_t *self, q32_t *point_q32)
+/* Steps that so many periods go: the way of the quickest stop, whose second half is its first reversed. In its first period that
+ * loses next to nothing, but `fast` would leave its curve for it: it goes a full step first. */
+static int64_t way_q16(const stream_lead_t *on, int64_t full_q16, int64_t periods)
 {
+    const int64_t stop_q16 = 2 * (on->reach_q16 - full_q16);
+    const int64_t time_q16 = periods * Q16_ONE - full_q16;
+    if (time_q16 <= 0 || time_q16 >= stop_q16) {
+        return time_q16 <= 0 ? periods * Q16_ONE : on->reach_q16;
+    }
+    const q32_t time_q32 = fx_mul_div(time_q16, Q32_ONE, stop_q16);
+    const q32_t way_q32 = time_q32 <= Q32_ONE / 2 ? time_q32 - lost_q32(time_q32, on->rise_q32)
+                                                  : Q32_ONE / 2 - lost_q32(Q32_ONE - time_q32, on->rise_q32);
+    return full_q16 + fx_mul_shift(way_q32, stop_q16, 32);
+}
+
+/* The point so many periods beyond the newest sample: the motion goes on, ever more slowly. */
+HV_WRAPS static void guess(stream_curve_t *self, int32_t periods)
+{
+    q32_t *const point_q32 = self->point_q32[slot(newest(self) + (uint32_t)periods)];
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        stream_lead_t *on = &self->lead[axis];
-        const q32_t step_q32 = self->guesses == 0 ? on->first_q32 : on->go_q32;
-        on->beyond_q32 += fx_mul_shift(step_q32, share_q16(on->reach_q16, self->guesses), 16);
-        point_q32[axis] = self->last_q32[axis] + on->beyond_q32;
+        const stream_lead_t *on = &self->lead[axis];
+        const int64_t full_q16 = self->lead_q32 == 0 ? 0 : on->reach_q16 < Q16_ONE ? on->reach_q16 : Q16_ONE;
+        const int64_t first_q16 = way_q16(on, full_q16, 1);
+        point_q32[axis] = self->last_q32[axis] + fx_mul_shift(on->first_q32, first_q16, 16) +
+                          fx_mul_shift(on->go_q32, way_q16(on, full_q16, periods) - first_q16, 16);
     }
-    self->guesses++;
 }
 
 /* Guesses again what is committed beyond the newest sample. */
-HV_WRAPS static void guess_again(stream_curve_t *self)
+static void guess_again(stream_curve_t *self)
 {
     begin_guessing(self);
-    for (int32_t behind = -self->ahead; behind > 0; behind--) {
-        guess(self, self->point_q32[slot(self->head + 1 - (uint32_t)behind)]);
+    for (int32_t periods = 1; periods <= -self->ahead; periods++) {
+        guess(self, periods);
     }
 }
 
@@ -386,7 +402,7 @@ HV_WRAPS static void give_up(stream_curve_t *self)
         copy_point(self, self->point_q32[slot(self->head - (uint32_t)back)], self->last_q32);
     }
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        self->lead[axis] = (stream_lead_t){.reach_q16 = 0};
+        self->lead[axis] = (stream_lead_t){.rise_q32 = 0};
     }
     keep_going(self, was_q32, self->patience);
 }
@@ -394,10 +410,9 @@ HV_WRAPS static void give_up(stream_curve_t *self)
 /* Settles the point after head. */
 HV_WRAPS static void find_next(stream_curve_t *self)
 {
-    q32_t *const point_q32 = self->point_q32[slot(self->head + 1)];
     if (self->ahead > 0) {
         if (!self->is_sample[slot(self->head + 1)]) {
-            interpolate(self, point_q32);
+            interpolate(self, self->point_q32[slot(self->head + 1)]);
         }
         return;
     }
@@ -406,7 +421,7 @@ HV_WRAPS static void find_next(stream_curve_t *self)
     } else if (-self->ahead == self->patience) {
         give_up(self);
     }
-    guess(self, point_q32);
+    guess(self, 1 - self->ahead);
 }
 
 void stream_curve_skip(stream_curve_t *self)
@@ -512,6 +527,15 @@ HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, co
     self->is_off = false; /* what it was off was per period of the old grid, and so was the grip */
     (void)soften(self, self->patience);
     put_control(self);
+}
+
+bool stream_curve_is_standing(const stream_curve_t *self)
+{
+    bool is_standing = true;
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        is_standing &= self->point_q32[slot(newest(self))][axis] == self->point_q32[slot(newest(self) - 1)][axis];
+    }
+    return is_standing || self->ahead <= -GONE;
 }
 
 bool stream_curve_is_at_rest(const stream_curve_t *self)

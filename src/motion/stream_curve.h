@@ -41,6 +41,9 @@ void stream_curve_stretch(stream_curve_t *self);
 /** Commits the next point: the sample, or what is guessed in its place. */
 void stream_curve_commit(stream_curve_t *self);
 
+/** True where the samples stand, or none has come for two periods: there is nothing to follow but the newest one. */
+bool stream_curve_is_standing(const stream_curve_t *self);
+
 /** True once the curve rests exactly on the newest sample. */
 bool stream_curve_is_at_rest(const stream_curve_t *self);
 

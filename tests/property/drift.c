@@ -176,7 +176,7 @@ static void essence(motion_t *motion)
         curve->lead[i] = (stream_lead_t){0};
     }
     curve->head = curve->watched = 0;
-    curve->ahead = curve->guesses = curve->patience = 0;
+    curve->ahead = curve->patience = 0;
     curve->period_cycles_q16 = curve->grip_q32 = curve->softest_q32 = 0;
     curve->reach_min_q16 = curve->reach_max_q16 = 0;
     curve->is_off = false; /* off_q32 says how far, and is compared */

@@ -57,6 +57,33 @@ def coarse_values(bench):
         assert error <= most_mm, f"{rate} Hz, steps of {step_mm} mm: {error:.2f} mm"
 
 
+def beyond_an_end(bench, rate, speed, style, stands):
+    """How far a ramp that ends is overshot, in mm; and how far what comes back goes beyond the last sample again."""
+    text = (heave.TOP / "config/hexapod-400.ini").read_text(encoding="utf-8")
+    config = bench.file("ends.ini", text.replace("stream = smooth", f"stream = {style}").replace("silence_hold_ms = 500", "silence_hold_ms = 0"))
+    count = int(min(1.2 * rate + 2, 100 * rate / speed))
+    heights = [speed * min(i, count - 1) / rate for i in range(count + (rate if stands else 0))]
+    lines = [(0, "!engage"), (T0 - 3000, "@A6:0,0,0,0,0,0,0#")] + [(T0 + 1000 * i / rate, f"@A6:0,0,0,0,0,{z:.3f},0#") for i, z in enumerate(heights)]
+    rows = play(bench, lines + [(lines[-1][0] + 3000, "!hold")], config)
+    course = [float(row["z_mm"]) - round(heights[-1], 3) for row in rows if float(row["t_ms"]) >= T0]
+    top = course.index(max(course))
+    assert abs(course[-1]) < 1e-4, (rate, speed, style, stands, course[-1])
+    return course[top], -min(course[top:])
+
+
+def ends(bench):
+    """Not beyond the last sample by more than the axis takes to stop; where no sample comes, 36 ms are bridged. `fast`: its lead more."""
+    for style, stands in (("smooth", False), ("smooth", True), ("fast", True), ("fast", False)):
+        for rate in (10, 60, 200):
+            for speed in (5, 150):
+                stop_mm = speed * math.sqrt(speed / 40000)  # up to 3000 * 3000 / 40000 mm/s
+                lead_mm = {"smooth": 0, "fast": (0.4 if stands else 1.6) * speed / rate}[style]
+                most_mm = max(1.02 * stop_mm, 0 if stands else 0.036 * speed) + lead_mm + 0.01
+                over, back = beyond_an_end(bench, rate, speed, style, stands)
+                assert over <= most_mm, f"{style}, {rate} Hz, {speed} mm/s, {stands}: {over:.3f} mm, not {most_mm:.3f}"
+                assert style == "fast" or back < 0.05, f"{style}, {rate} Hz, {speed} mm/s, {stands}: {back:.3f} mm back"
+
+
 def usual_rates(bench):
     for rate in (20, 60, 200):
         follows(bench, rate, 0.7)
@@ -110,6 +137,7 @@ CASES = {
     "streams of usual rates": usual_rates,
     "extensions that go over to a new rate": extensions_at_a_new_rate,
     "values in coarse steps": coarse_values,
+    "ends are not overshot by more than the axis takes to stop": ends,
     "streams faster than what is followed": rates_beyond_what_is_followed,
     "jitter of most of a period": jitter_of_most_of_a_period,
     "streams of frames whose time is too short to mean any": times_too_short_to_mean_any,
