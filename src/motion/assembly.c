@@ -5,11 +5,21 @@
 
 #define AHEAD_Q32 q32_from_int(5)
 
-/* The pose of extensions near where the platform is, and whether it has the margin. */
-static bool find_held(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], const pose_t *guess, pose_t *pose)
+/* Whether extensions have a pose near another one, with the margin. */
+static bool is_held_near(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], const pose_t *guess)
 {
-    return kin_forward(&self->kin, extension_mm_q32, guess, pose, NULL) == HV_OK &&
-           kin_has_margin(&self->kin, pose, KIN_MARGIN_LEAST_Q32);
+    pose_t pose;
+    return kin_forward(&self->kin, extension_mm_q32, guess, &pose, NULL) == HV_OK &&
+           kin_has_margin(&self->kin, &pose, KIN_MARGIN_LEAST_Q32);
+}
+
+/* Whether extensions have a pose near where the platform is, with the margin or with more than there is here. */
+static bool is_held_or_better(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
+{
+    pose_t pose;
+    return kin_forward(&self->kin, extension_mm_q32, &self->pose, &pose, NULL) == HV_OK &&
+           (kin_has_margin(&self->kin, &pose, KIN_MARGIN_LEAST_Q32) ||
+            kin_margin(&self->kin, &pose) > kin_margin(&self->kin, &self->pose));
 }
 
 /* A little way from the set-points towards extensions, straight. */
@@ -26,30 +36,26 @@ static void look_ahead(const motion_t *self, const q32_t extension_mm_q32[CYLIND
     }
 }
 
-/* Whether that is held, or better held than here. */
-static bool is_better_ahead(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
+/* Whether the first step there is possible. */
+static bool is_held_ahead(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
 {
     q32_t ahead_mm_q32[CYLINDERS_MAX] = {0};
-    pose_t pose = {{0}};
     look_ahead(self, extension_mm_q32, ahead_mm_q32);
-    return find_held(self, ahead_mm_q32, &self->pose, &pose) ||
-           kin_margin(&self->kin, &pose) > kin_margin(&self->kin, &self->pose);
+    return is_held_or_better(self, ahead_mm_q32);
 }
 
 bool assembly_is_held(const motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX])
 {
-    pose_t pose;
-    if (self->is_taking_over && !is_better_ahead(self, extension_mm_q32)) {
+    if (self->is_taking_over && !is_held_ahead(self, extension_mm_q32)) {
         return false;
     }
-    return find_held(self, extension_mm_q32, &self->pose, &pose) || find_held(self, extension_mm_q32, &self->neutral, &pose);
+    return is_held_near(self, extension_mm_q32, &self->pose) || is_held_near(self, extension_mm_q32, &self->neutral);
 }
 
 bool assembly_can_stop(const motion_t *self)
 {
     ramp_state_t start[CYLINDERS_MAX];
     const ramp_limits_t *limits[CYLINDERS_MAX];
-    pose_t pose = {{0}};
     halt_t halt;
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
         const ramp_state_t *now = &self->cylinder[i].state;
@@ -58,6 +64,5 @@ bool assembly_can_stop(const motion_t *self)
         limits[i] = &self->cylinder[i].limits;
     }
     halt_plan(&halt, CYLINDERS_MAX, CYLINDERS_MAX, start, limits);
-    return find_held(self, halt.rest_q32, &self->pose, &pose) ||
-           kin_margin(&self->kin, &pose) > kin_margin(&self->kin, &self->pose);
+    return is_held_or_better(self, halt.rest_q32);
 }

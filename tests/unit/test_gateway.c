@@ -433,6 +433,48 @@ static void test_frames_extensions_without_a_pose_are_counted_and_move_nothing(v
     TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "no pose has these extensions, or one too near a singularity"));
 }
 
+/* Both ends of the way are held by their cylinders, the middle is not: 842 and 891 are reached through a plate on edge. */
+static void engage_where_ways_lead_astray(void)
+{
+    m_settings = rig_tripod();
+    for (unsigned i = 0; i < 3; i++) {
+        m_settings.geometry.retracted_mm_q16[i] = 260 * 65536;
+        m_settings.stroke_mm_q16[i] = 1000 * 65536;
+    }
+    engage();
+    send_and_run("@C3:260,842,891#", 1500);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->singular_stops);
+    TEST_ASSERT_EQUAL_UINT32(0, counted()->impossible);
+}
+
+static void test_frames_extensions_that_lead_near_a_singularity_stop_the_platform(void)
+{
+    engage_where_ways_lead_astray();
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "stopped: the extensions sent lead too near a singularity"));
+    TEST_ASSERT_TRUE(kin_margin(motion_kin(&m_rig.gateway.motion), &seen()->sent) >= KIN_MARGIN_LEAST_Q32 * 99 / 100);
+    rig_send(&m_rig, "@C3:260,842,891#"); /* a sender that insists does not make it try again */
+    TEST_ASSERT_EQUAL_DOUBLE(0, biggest_move(500));
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->impossible);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "C3: no pose has these extensions, or one too near a singularity"));
+    send_and_run("@A3:0,0,0#", 20000); /* and goes round it */
+    assert_heights(0);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->singular_stops);
+}
+
+static void test_frames_that_lead_astray_again_and_again_are_told_once_a_second(void)
+{
+    engage_where_ways_lead_astray();
+    unsigned lines = 0;
+    for (unsigned i = 0; i < 100; i++) {
+        send_and_run("@C3:360,360,360#", 50);
+        send_and_run("@C3:260,842,891#", 50);
+        lines += rig_was_logged(&m_rig, "stopped: the extensions sent lead too near a singularity");
+    }
+    TEST_ASSERT_GREATER_THAN_UINT32(20, counted()->singular_stops);
+    TEST_ASSERT_UINT_WITHIN(5, 10, lines); /* of 10 s */
+    TEST_ASSERT_TRUE(kin_margin(motion_kin(&m_rig.gateway.motion), &seen()->sent) >= KIN_MARGIN_LEAST_Q32 * 99 / 100);
+}
+
 static void test_frames_reject_lines_are_rate_limited_and_count_what_was_left_out(void)
 {
     engage();
@@ -1554,6 +1596,8 @@ int main(void)
     RUN_TEST(test_frames_for_another_platform_name_what_is_missing);
     RUN_TEST(test_frames_tripod_with_motor_takes_a4);
     RUN_TEST(test_frames_extensions_without_a_pose_are_counted_and_move_nothing);
+    RUN_TEST(test_frames_extensions_that_lead_near_a_singularity_stop_the_platform);
+    RUN_TEST(test_frames_that_lead_astray_again_and_again_are_told_once_a_second);
     RUN_TEST(test_frames_reject_lines_are_rate_limited_and_count_what_was_left_out);
     RUN_TEST(test_relays_follow_the_mask_only_while_engaged);
     RUN_TEST(test_relays_may_outlast_a_hold_for_a_while);
