@@ -300,7 +300,7 @@ const snapshot_t *gateway_snapshot(const gateway_t *self)
 bool gateway_is_finished(const gateway_t *self)
 {
     const state_t state = self->supervisor.state;
-    const bool can_be_told =
-        self->is_disable_due && !self->is_bus_lost; /* a lost bus tells drives nothing: their own watch has to */
+    const bool can_be_told = self->is_disable_due && !self->is_bus_lost &&
+                             !operate_is_bus_stalled(self); /* a lost bus tells drives nothing: their own watch has to */
     return self->is_shutdown_asked && !can_be_told && (state == STATE_OFF || state == STATE_FAULT || state == STATE_ESTOP);
 }

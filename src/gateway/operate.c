@@ -152,16 +152,11 @@ static void stop_and_disable(gateway_t *self)
 /* What the worst fault so far asks for. */
 static void react(gateway_t *self)
 {
-    switch (self->snapshot.reaction) {
-    case FAULT_REACT_NONE:
-    case FAULT_REACT_STOP:
-        stop_and_disable(self);
-        break;
-    case FAULT_REACT_QUICK_STOP:
-    case FAULT_REACT_SILENT:
+    if (self->snapshot.reaction >= FAULT_REACT_QUICK_STOP) {
         self->bring_up = BRING_UP_IDLE;
         drop_drives(self);
-        break;
+    } else {
+        stop_and_disable(self);
     }
 }
 
@@ -292,16 +287,17 @@ static void watch_failing(gateway_t *self, uint64_t now_us)
     self->is_bus_failing = is_failing;
 }
 
-static bool is_bus_stalled(const gateway_t *self)
+bool operate_is_bus_stalled(const gateway_t *self)
 {
     return self->unsent_cycles * (uint64_t)self->settings.cycle_us > UNSENT_MAX_US;
 }
 
+/* In a state that is not OFF. */
 static bool is_torque_expected(const gateway_t *self)
 {
     const state_t state = self->supervisor.state;
-    return state != STATE_OFF && state != STATE_FAULT && state != STATE_ESTOP && self->bring_up != BRING_UP_ENABLE &&
-           self->bring_up != BRING_UP_HOME && !self->is_tracking_actual;
+    return state != STATE_FAULT && state != STATE_ESTOP && self->bring_up != BRING_UP_ENABLE && self->bring_up != BRING_UP_HOME &&
+           !self->is_tracking_actual;
 }
 
 /* True where a cylinder has been further from its set-point than allowed for too long. */
@@ -311,8 +307,8 @@ static bool is_left_behind(gateway_t *self, unsigned i, uint64_t now_us)
     if (i >= kin_cylinders(motion_kin(&self->motion)) || window_q32 == 0) {
         return false;
     }
-    const bool is_far = is_torque_expected(self) && self->feedback[i].has_actual &&
-                        fx_abs(self->output.extension_mm_q32[i] - self->feedback[i].actual_mm_q32) > window_q32;
+    const bool is_far =
+        is_torque_expected(self) && fx_abs(self->output.extension_mm_q32[i] - self->feedback[i].actual_mm_q32) > window_q32;
     if (!is_far) {
         self->following_since_us[i] = 0;
     } else if (self->following_since_us[i] == 0) {
@@ -444,12 +440,6 @@ static void step_reset(gateway_t *self, uint64_t now_us)
     }
 }
 
-/* A drive that is at rest for good, as far as it can be told. */
-static bool is_down(const drive_feedback_t *drive)
-{
-    return drive->state == DRIVE_DISABLED || drive->state == DRIVE_FAULT || drive->state == DRIVE_OFFLINE;
-}
-
 /* A shutdown that interrupted homing ends once the drives have stopped, or do not within a few seconds: their own watch has to.
  */
 static void step_abandoned(gateway_t *self, uint64_t now_us)
@@ -460,7 +450,7 @@ static void step_abandoned(gateway_t *self, uint64_t now_us)
     }
     unsigned down = 0;
     for (unsigned i = 0; i < drive_count(self); i++) {
-        down += is_down(&self->feedback[i]);
+        down += self->feedback[i].state == DRIVE_DISABLED; /* one that cannot tell would be a fault */
     }
     if (down == drive_count(self) || now_us - self->state_since_us >= ABANDON_TIMEOUT_US) {
         operate_event(self, EVENT_SHUTDOWN, now_us);
@@ -493,7 +483,7 @@ void operate_before_frames(gateway_t *self, uint64_t now_us)
     clear_faults(self->snapshot.begun);
     operate_event(self, EVENT_TICK, now_us);
     const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->feedback) == HV_OK;
-    watch_bus(self, !is_bus_heard || is_bus_stalled(self), now_us);
+    watch_bus(self, !is_bus_heard || operate_is_bus_stalled(self), now_us);
     watch_failing(self, now_us);
     watch_drives(self, now_us);
     read_inputs(self, now_us);
@@ -501,6 +491,7 @@ void operate_before_frames(gateway_t *self, uint64_t now_us)
     step_abandoned(self, now_us);
     step_auto(self, now_us);
     if (self->supervisor.state == STATE_OFF && are_all(self, DRIVE_ENABLED, true) && !self->is_disable_due) {
+        track_actual(self); /* they may have told where they are in this cycle only */
         operate_event(self, EVENT_DRIVES_READY, now_us);
         self->is_tracking_actual = self->supervisor.state == STATE_OFF;
     }

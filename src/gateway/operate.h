@@ -24,4 +24,7 @@ hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us);
 /** After the motion of the cycle: drives that are to be disabled once at rest. */
 void operate_after_motion(gateway_t *self);
 
+/** True where the bus has taken no set of set-points for so long that none can be expected to get through. */
+bool operate_is_bus_stalled(const gateway_t *self);
+
 #endif

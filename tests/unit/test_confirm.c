@@ -101,6 +101,30 @@ static void test_confirm_passes_same_frame_at_once_confirms_nothing(void)
     TEST_ASSERT_TRUE(take_z(101, 0)); /* another frame */
 }
 
+/* Copies of a datagram are the same in everything; another time, another space, or a word on the motor make another frame. */
+static void test_confirm_passes_only_a_copy_counts_as_one(void)
+{
+    motion_target_t first = angle(0);
+    first.value_q32[AXIS_Z] = q32_from_int(100);
+    first.is_timed = true;
+    first.time_ms = 500;
+    for (unsigned what = 0; what < 4; what++) {
+        motion_target_t second = first;
+        second.is_timed = what != 1;
+        second.time_ms = what == 2 ? 400 : 500;
+        second.has_angle = what != 3;
+        setUp();
+        TEST_ASSERT_FALSE(take(first, 0));
+        TEST_ASSERT_EQUAL(what != 0, take(second, 1));
+    }
+    setUp();
+    TEST_ASSERT_FALSE(take(first, 0));
+    first.space = MOTION_CYLINDERS; /* as numbers the same */
+    m_here.space = MOTION_CYLINDERS;
+    TEST_ASSERT_FALSE(take(first, 1));
+    TEST_ASSERT_EQUAL_UINT32(1, m_confirm.dropped);
+}
+
 static void test_confirm_cycle_drops_what_waits_too_long(void)
 {
     TEST_ASSERT_FALSE(take_z(100, 0));
@@ -179,6 +203,7 @@ int main(void)
     RUN_TEST(test_confirm_passes_lone_jump_is_dropped_by_the_next_frame);
     RUN_TEST(test_confirm_passes_jump_elsewhere_waits_itself);
     RUN_TEST(test_confirm_passes_same_frame_at_once_confirms_nothing);
+    RUN_TEST(test_confirm_passes_only_a_copy_counts_as_one);
     RUN_TEST(test_confirm_cycle_drops_what_waits_too_long);
     RUN_TEST(test_confirm_passes_first_one_is_measured_from_the_platform);
     RUN_TEST(test_confirm_passes_extensions_are_measured_from_extensions);

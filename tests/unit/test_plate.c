@@ -251,6 +251,22 @@ static void test_take_stale_feedback_tells_no_speed_and_the_filter_starts_anew(v
     TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, real(m_plate.speed_per_s.axis_q32[AXIS_Z]));
 }
 
+/* A drive that was started anew counts its time from an earlier moment on: nothing is divided by that. */
+static void test_take_time_that_goes_back_is_a_gap(void)
+{
+    double value[POSE_AXES], ignored[POSE_AXES];
+    (void)run(swing, 1.0, 1000, 0, 0, 0);
+    TEST_ASSERT_TRUE(m_plate.has_rates);
+    hang(0, value, ignored, ignored);
+    for (unsigned i = 0; i < PLATE_SAMPLES; i++) {
+        feed(value, 500000 + i * PLATE_PERIOD_US, 0);
+        take(1000000 + i * PLATE_PERIOD_US);
+        TEST_ASSERT_TRUE(m_plate.has_pose);
+        TEST_ASSERT_EQUAL_UINT64(500000 + i * PLATE_PERIOD_US, m_plate.at_us);
+        TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, real(m_plate.speed_per_s.axis_q32[AXIS_Z]));
+    }
+}
+
 static void test_take_jump_of_the_feedback_is_no_speed(void)
 {
     double value[POSE_AXES], ignored[POSE_AXES];
@@ -299,6 +315,7 @@ int main(void)
     RUN_TEST(test_take_counts_of_a_micrometre_do_not_shake_it);
     RUN_TEST(test_take_without_feedback_of_every_cylinder_there_is_nothing);
     RUN_TEST(test_take_stale_feedback_tells_no_speed_and_the_filter_starts_anew);
+    RUN_TEST(test_take_time_that_goes_back_is_a_gap);
     RUN_TEST(test_take_jump_of_the_feedback_is_no_speed);
     RUN_TEST(test_take_extensions_of_no_pose_are_told_as_none_and_it_recovers);
     return UNITY_END();
