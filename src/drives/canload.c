@@ -59,7 +59,7 @@ uint32_t canload_fitting_period_us(const canload_entry_t *entry, size_t count, u
 {
     uint64_t low = 0; /* steps that are too few, and enough */
     uint64_t high = UINT32_MAX / step_us;
-    if (high == 0 || canload_ppm(entry, count, (uint32_t)high * step_us, bitrate_bps) > limit_ppm) {
+    if (canload_ppm(entry, count, (uint32_t)high * step_us, bitrate_bps) > limit_ppm) {
         return 0;
     }
     while (high - low > 1) {

@@ -68,7 +68,8 @@ static bool receive(canraw_t *self)
 static bool is_controller_up(const canraw_t *self)
 {
     hal_can_state_t state = HAL_CAN_DOWN;
-    return hal_can_bus_state(self->can, &state) == HV_OK && state != HAL_CAN_BUS_OFF && state != HAL_CAN_DOWN;
+    return hal_can_bus_state(self->can, &state) == HV_OK && state != HAL_CAN_BUS_OFF && state != HAL_CAN_DOWN &&
+           state != HAL_CAN_GONE;
 }
 
 static void restart_bus(canraw_t *self)
@@ -109,12 +110,12 @@ static hv_status_t send_bytes(const canraw_t *self, unsigned k, uint8_t length, 
     return hal_can_send(self->can, &frame);
 }
 
-/* Commands that wait, of the kinds from first to last; what the bus does not take waits on. */
-static void send_commands(canraw_t *self, canraw_command_t first, canraw_command_t last)
+/* Commands that wait, of the kinds up to last; what the bus does not take waits on. */
+static void send_commands(canraw_t *self, canraw_command_t last)
 {
     for (unsigned k = 0; k < self->map->axes; k++) {
         canraw_axis_t *axis = &self->axis[k];
-        if (axis->pending < first || axis->pending > last) {
+        if (axis->pending > last) {
             continue;
         }
         const canraw_frame_t *command = &self->map->command[axis->pending];
@@ -147,13 +148,14 @@ static void send_queries(canraw_t *self)
 static int64_t speed_of(const canraw_t *self, unsigned k, q32_t way_q32)
 {
     const canraw_field_t *field = canraw_find(&self->map->setpoint, CANRAW_SPEED);
+    const counts_scale_t *scale = &self->map->axis[k].speed;
     int64_t speed = 0;
     if (field == NULL) {
         return 0;
     }
     const q32_t per_s_q32 = fx_mul_div(way_q32, 1000000, self->map->period_us);
-    if (counts_from_units(&self->map->axis[k].speed, per_s_q32, &speed) != HV_OK) {
-        speed = per_s_q32 < 0 ? INT64_MIN : INT64_MAX;
+    if (counts_from_units(scale, per_s_q32, &speed) != HV_OK) {
+        speed = (per_s_q32 < 0) == (scale->num < 0) ? INT64_MAX : INT64_MIN;
     }
     const int64_t magnitude = fx_clamp(fx_abs(speed), self->map->speed_least, INT64_MAX);
     return fx_clamp(field->is_signed && speed < 0 ? -magnitude : magnitude, canraw_field_min(field), canraw_field_max(field));
@@ -169,7 +171,7 @@ static hv_status_t pack_setpoint(const canraw_t *self, unsigned k, q32_t setpoin
         return HV_ERR_RANGE;
     }
     value[CANRAW_POSITION] = *counts;
-    value[CANRAW_SPEED] = speed_of(self, k, axis->has_sent ? setpoint_q32 - axis->sent_q32 : 0);
+    value[CANRAW_SPEED] = speed_of(self, k, axis->has_sent ? fx_sub_sat(setpoint_q32, axis->sent_q32) : 0);
     return canraw_pack(&self->map->setpoint, value, data);
 }
 
@@ -201,7 +203,7 @@ static hv_status_t send_setpoint(canraw_t *self, unsigned k, q32_t setpoint_q32)
 /* A set that breaks off is offered again as a whole: the same set-point twice moves nothing. */
 static hv_status_t send_set(canraw_t *self, const q32_t setpoint_q32[DRIVES_MAX])
 {
-    send_commands(self, CANRAW_STOP, CANRAW_RESET);
+    send_commands(self, CANRAW_RESET);
     for (unsigned k = 0; k < self->map->axes; k++) {
         const bool is_streaming = canraw_axis_is_streaming(&self->axis[k], self->map);
         const hv_status_t status = is_streaming ? send_setpoint(self, k, setpoint_q32[k]) : HV_OK;
@@ -209,7 +211,7 @@ static hv_status_t send_set(canraw_t *self, const q32_t setpoint_q32[DRIVES_MAX]
             return status;
         }
     }
-    send_commands(self, CANRAW_STOP, CANRAW_HOME);
+    send_commands(self, CANRAW_HOME);
     return HV_OK;
 }
 
@@ -295,7 +297,7 @@ static hv_status_t canraw_request(void *ctx, drives_request_t request)
             canraw_axis_request(&self->axis[k], self->map, request, self->now_us);
         }
     }
-    send_commands(self, CANRAW_STOP, CANRAW_RESET);
+    send_commands(self, CANRAW_RESET);
     return HV_OK;
 }
 

@@ -79,9 +79,9 @@ static bool is_axis_sound(const canraw_map_t *map, unsigned k)
     const uint32_t id_max = map->is_extended ? CAN_ID_EXTENDED_MAX : CAN_ID_MAX;
     const canraw_axis_map_t *axis = &map->axis[k];
     for (unsigned i = 0; i < map->axes; i++) {
-        const bool is_other = i != k;
-        if (axis->command_id == map->axis[i].reply_id || (is_other && axis->command_id == map->axis[i].command_id) ||
-            (is_other && axis->reply_id == map->axis[i].reply_id)) {
+        const canraw_axis_map_t *other = &map->axis[i];
+        if (axis->command_id == other->reply_id ||
+            (i != k && (axis->command_id == other->command_id || axis->reply_id == other->reply_id))) {
             return false;
         }
     }

@@ -44,7 +44,7 @@ static hv_status_t submit_look(coil_relays_t *self)
 static uint16_t mask_of(const coil_relays_t *self, const modbus_result_t *result)
 {
     uint16_t mask = 0;
-    for (unsigned i = 0; i < result->count && i < self->config.count; i++) {
+    for (unsigned i = 0; i < self->config.count; i++) {
         if ((result->value[i] != 0) != self->config.is_active_low) {
             mask = (uint16_t)(mask | 1u << i);
         }
@@ -69,7 +69,7 @@ static void take_result(coil_relays_t *self)
         return; /* nothing new, or of a mask that a newer one has replaced */
     }
     self->is_asking = false;
-    if (result.status == HV_OK) {
+    if (result.status == HV_OK && (result.count == 0 || result.count == self->config.count)) {
         take_answer(self, &result);
     } else if (self->failures < COIL_RELAYS_TRIES) {
         self->failures++;
@@ -100,12 +100,9 @@ static hv_status_t relays_write(void *ctx, uint16_t mask)
     if ((mask & ~(unsigned)all_relays(self)) != 0) {
         return HV_ERR_RANGE;
     }
-    if (self->config.count == 0 || (mask == self->wanted && (self->is_written || self->is_asking))) {
-        return is_known(self) ? HV_OK : HV_ERR_IO;
-    }
-    self->wanted = mask;
-    if (submit_write(self) != HV_OK) {
-        return HV_ERR_IO;
+    if (mask != self->wanted) { /* else it is written, or on its way */
+        self->wanted = mask;
+        (void)!submit_write(self); /* taken before with other values */
     }
     return is_known(self) ? HV_OK : HV_ERR_IO;
 }

@@ -414,6 +414,84 @@ static void test_coils_three_failures_are_unknown_until_one_works(void)
     assert_relays(0x3C);
 }
 
+/* A board that is gone for good: nothing said of it is believed until it answers again. */
+static void test_coils_a_dead_board_is_unknown_for_as_long_as_it_is(void)
+{
+    sim_modbus_fault_t plan[3 * COIL_RELAYS_TRIES];
+    for (uint32_t i = 0; i < 3 * COIL_RELAYS_TRIES; i++) {
+        plan[i] = (sim_modbus_fault_t){SIM_MODBUS_SILENT, i + 2, 0};
+    }
+    hal = open_faulty(plan, 3 * COIL_RELAYS_TRIES, &k_plain);
+    settle_coils();
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x3C));
+    for (unsigned i = 0; i < 200 && cycle() != HV_ERR_IO; i++) {}
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_relays_write(hal, 0x3C));
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_relays_write(hal, 0x3D));
+    for (unsigned i = 0; i < 60; i++) {
+        TEST_ASSERT_EQUAL(HV_ERR_IO, cycle());
+    }
+    for (unsigned i = 0; i < 200 && cycle() != HV_OK; i++) {}
+    assert_relays(0x3D);
+}
+
+/* The answer to a mask that was replaced while it was on the wire says nothing about the new one. */
+static void test_coils_the_end_of_an_older_write_confirms_nothing(void)
+{
+    hal = open_faulty(NULL, 0, &k_plain);
+    settle_coils();
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x11));
+    (void)cycle();
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x22));
+    for (unsigned i = 0; i < 5; i++) {
+        if (cycle() == HV_OK) {
+            TEST_ASSERT_EQUAL_HEX16(0x22, coil_contacts());
+        }
+    }
+    settle_coils();
+    assert_relays(0x22);
+}
+
+static void test_coils_the_same_mask_is_not_sent_again(void)
+{
+    hal = open_faulty(NULL, 0, &k_plain);
+    TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x11));
+    settle_coils();
+    const uint32_t before = sim_line.transactions;
+    for (unsigned i = 0; i < LOOK_CALLS / 2; i++) {
+        TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x11));
+        TEST_ASSERT_EQUAL(HV_OK, cycle());
+    }
+    TEST_ASSERT_TRUE(sim_line.transactions - before <= 1); /* a look */
+}
+
+static uint8_t answered;
+
+/* A worker that hands over fewer or more coils than it was asked for. */
+static hv_status_t poll_other_count(void *ctx, unsigned slot, modbus_result_t *result)
+{
+    const hv_status_t status = sim_modbus_hal(&sim_line).ops->poll(ctx, slot, result);
+    if (status == HV_OK && result->count != 0) {
+        result->count = answered;
+    }
+    return status;
+}
+
+static void test_coils_an_answer_of_another_length_is_a_failure(void)
+{
+    hal_modbus_ops_t odd = *sim_modbus_hal(&sim_line).ops;
+    odd.poll = poll_other_count;
+    for (answered = COUNT - 1; answered <= COUNT + 1; answered++) {
+        hal = open_faulty(NULL, 0, &k_plain);
+        coils.config.line.ops = &odd;
+        TEST_ASSERT_EQUAL(HV_OK, hal_relays_write(hal, 0x11));
+        unsigned unknown = 0;
+        for (unsigned i = 0; i < 3 * LOOK_CALLS; i++) {
+            unknown += cycle() == HV_ERR_IO;
+        }
+        TEST_ASSERT_EQUAL(answered != COUNT, unknown != 0);
+    }
+}
+
 /* Its power came and went: every relay open, nobody told us. */
 static void test_coils_a_board_that_forgot_is_told_again(void)
 {
@@ -479,6 +557,10 @@ static void run_coils(void)
     RUN_TEST(test_coils_not_yet_written_are_not_reported);
     RUN_TEST(test_coils_one_fault_at_every_step_is_made_good);
     RUN_TEST(test_coils_three_failures_are_unknown_until_one_works);
+    RUN_TEST(test_coils_a_dead_board_is_unknown_for_as_long_as_it_is);
+    RUN_TEST(test_coils_the_end_of_an_older_write_confirms_nothing);
+    RUN_TEST(test_coils_the_same_mask_is_not_sent_again);
+    RUN_TEST(test_coils_an_answer_of_another_length_is_a_failure);
     RUN_TEST(test_coils_a_board_that_forgot_is_told_again);
     RUN_TEST(test_coils_a_stuck_worker_makes_them_unknown);
     RUN_TEST(test_coils_quiet_bank_asks_once_per_look);

@@ -11,6 +11,7 @@
 static canpassive_t m_passive;
 static hal_can_state_t m_reported;
 static hal_can_state_t m_true;
+static hv_status_t m_report;
 static hv_status_t m_answer;
 static unsigned m_asked;
 
@@ -25,7 +26,7 @@ static hv_status_t report(void *ctx, hal_can_state_t *out)
 {
     (void)ctx;
     *out = m_reported;
-    return HV_OK;
+    return m_report;
 }
 
 static hv_status_t ask(void *ctx, hal_can_state_t *out)
@@ -56,7 +57,7 @@ void setUp(void)
 {
     m_passive = (canpassive_t){.is_failing = false};
     m_reported = m_true = HAL_CAN_PASSIVE;
-    m_answer = HV_OK;
+    m_answer = m_report = HV_OK;
     m_asked = 0;
 }
 
@@ -119,6 +120,15 @@ static void test_step_limit_0_never(void)
     TEST_ASSERT_FALSE(look_at(&k_ops, UINT64_MAX, 0));
 }
 
+/* A backend that knows no state says nothing of it either way: other watches see to a bus that is gone. */
+static void test_step_state_that_is_not_known_is_not_passive(void)
+{
+    m_report = HV_ERR_IO;
+    TEST_ASSERT_FALSE(look(5));
+    TEST_ASSERT_FALSE(look(5 + 2 * LIMIT_US));
+    TEST_ASSERT_EQUAL_UINT(0, m_asked);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -127,5 +137,6 @@ int main(void)
     RUN_TEST(test_step_recovery_that_is_never_reported_is_found_by_asking);
     RUN_TEST(test_step_report_stands_where_nobody_can_be_asked);
     RUN_TEST(test_step_limit_0_never);
+    RUN_TEST(test_step_state_that_is_not_known_is_not_passive);
     return UNITY_END();
 }

@@ -194,6 +194,46 @@ static void test_speed_field_is_that_of_the_setpoints(void)
     TEST_ASSERT_EQUAL_UINT16(7, slave.drive[2].speed);
 }
 
+static void test_speed_field_with_a_sign_has_the_direction(void)
+{
+    map.setpoint.field[1].is_signed = true;
+    map.speed_least = 7;
+    for (unsigned k = 0; k < AXES; k++) {
+        map.axis[k].speed = (counts_scale_t){60, 10, 0};
+    }
+    open_with(NULL, 0, false);
+    enable();
+    for (int i = 0; i < 40; i++) {
+        setpoint_q32[0] += MM(1) / 10;
+        setpoint_q32[1] -= MM(1) / 100;
+        cycle();
+    }
+    TEST_ASSERT_EQUAL_INT16(600, (int16_t)slave.drive[0].speed);
+    TEST_ASSERT_EQUAL_INT16(-60, (int16_t)slave.drive[1].speed);
+    TEST_ASSERT_EQUAL_INT16(7, (int16_t)slave.drive[2].speed);
+}
+
+/* Beyond all numbers there and back, with a drive that counts the other way round. */
+static void test_speed_that_no_number_tells_is_at_the_end_of_its_field(void)
+{
+    static const int16_t k_speeds[] = {INT16_MAX, INT16_MIN};
+    map.setpoint.field[0].is_signed = map.setpoint.field[1].is_signed = true;
+    map.axis[3].scale = (counts_scale_t){1, 1000, 0};
+    map.axis[3].speed = (counts_scale_t){INT32_MIN, 1, -1};
+    map.axis[3].step_max_q32 = INT64_MAX;
+    map.axis[3].following_max_q32 = 0;
+    open_with(NULL, 0, false);
+    enable();
+    setpoint_q32[3] = MM(1 << 30);
+    cycles(4);
+    for (unsigned i = 0; i < 2; i++) {
+        setpoint_q32[3] = -setpoint_q32[3];
+        cycles(2);
+        canraw_slave_step(&slave, now_us);
+        TEST_ASSERT_EQUAL_INT16(k_speeds[i], (int16_t)slave.drive[3].speed);
+    }
+}
+
 static void test_every_query_every_period_in_turn(void)
 {
     map.query_every = 4;
@@ -331,6 +371,50 @@ static void test_bus_off_unplugged_and_restarted_lose_every_drive(void)
     }
 }
 
+static hal_can_state_t told_state;
+static hv_status_t told_status;
+
+static hv_status_t tell_state(void *ctx, hal_can_state_t *out)
+{
+    (void)ctx;
+    *out = told_state;
+    return told_status;
+}
+
+/* Whatever else works: a controller that is not on the bus carries nothing. */
+static void test_bus_whose_controller_is_not_on_it_is_gone_at_once(void)
+{
+    static const struct {
+        hal_can_state_t state;
+        hv_status_t status;
+        hv_status_t expected;
+    } k_rows[] = {{HAL_CAN_ACTIVE, HV_OK, HV_OK},   {HAL_CAN_PASSIVE, HV_OK, HV_OK},  {HAL_CAN_BUS_OFF, HV_OK, HV_ERR_IO},
+                  {HAL_CAN_DOWN, HV_OK, HV_ERR_IO}, {HAL_CAN_GONE, HV_OK, HV_ERR_IO}, {HAL_CAN_ACTIVE, HV_ERR_IO, HV_ERR_IO}};
+    hal_can_ops_t telling = *sim_can_hal(&node).ops;
+    telling.bus_state = tell_state;
+    for (size_t i = 0; i < 6; i++) {
+        setUp();
+        await(DRIVE_DISABLED, 100);
+        driver.can.ops = &telling;
+        told_state = k_rows[i].state;
+        told_status = k_rows[i].status;
+        TEST_ASSERT_EQUAL(k_rows[i].expected, poll_once());
+        TEST_ASSERT_TRUE(are_all(k_rows[i].expected == HV_OK ? DRIVE_DISABLED : DRIVE_OFFLINE));
+    }
+}
+
+static void test_bus_without_echoes_is_trusted(void)
+{
+    hal_can_ops_t blind = *sim_can_hal(&node).ops;
+    blind.unconfirmed = NULL;
+    driver.can.ops = &blind;
+    enable();
+    const uint32_t before = slave.drive[3].setpoints;
+    cycles(100);
+    TEST_ASSERT_EQUAL_UINT32(50, slave.drive[3].setpoints - before);
+    driver.can.ops = sim_can_hal(&node).ops;
+}
+
 static hv_status_t take_nothing(void *ctx, const can_frame_t *frame)
 {
     (void)ctx;
@@ -402,6 +486,61 @@ static void test_storm_of_error_frames_is_bounded_and_stops_nothing(void)
     TEST_ASSERT_EQUAL_UINT(128, received);
 }
 
+static void say(uint32_t id, bool is_extended, uint8_t length, const uint8_t *data)
+{
+    can_frame_t frame = {.id = id, .is_extended = is_extended, .length = length};
+    memcpy(frame.data, data, length);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+}
+
+/* On a backend without filters: other identifiers, other widths and remote requests mean nothing; what comes on a reply_id and is
+ * no reply is counted. */
+static void test_frames_that_are_no_replies_change_nothing(void)
+{
+    static const uint8_t k_far[8] = {0x30, 0x01, 0, 0, 0, 0};
+    open_rich();
+    node.filters = 0;
+    await(DRIVE_DISABLED, 100);
+    const q32_t actual_q32 = feedback[2].actual_mm_q32;
+    for (unsigned i = 0; i < 20; i++) {
+        say(0x18FF0300, true, 6, k_far);
+        say(0x202, false, 6, k_far);
+        TEST_ASSERT_EQUAL(HV_OK,
+                          hal_can_send(sim_can_hal(&slave.node),
+                                       &(can_frame_t){.id = 0x18FF0202, .is_extended = true, .is_rtr = true, .length = 6}));
+        cycles(1);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, driver.strange);
+    say(0x18FF0202, true, 5, k_far); /* too short */
+    say(0x18FF0202, true, 6, (const uint8_t[6]){0x31});
+    cycles(1);
+    TEST_ASSERT_EQUAL_UINT32(2, driver.strange);
+    TEST_ASSERT_EQUAL_INT64(actual_q32, feedback[2].actual_mm_q32);
+    TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
+    setUp();
+    node.filters = 0;
+    slave.drive[2].is_dumb = true;
+    for (unsigned i = 0; i < 20; i++) {
+        say(0x583, true, 6, k_far);
+        cycles(1);
+    }
+    TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[2].state);
+    TEST_ASSERT_EQUAL_UINT32(0, driver.strange);
+}
+
+/* A position that has no place in millimetres is none: the drive is not there. */
+static void test_position_beyond_all_millimetres_is_not_taken(void)
+{
+    map.axis[4].scale = (counts_scale_t){1, 1, 0};
+    open_with(NULL, 0, false);
+    slave.drive[4].position = INT32_MAX;
+    cycles(50);
+    TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
+    TEST_ASSERT_FALSE(feedback[4].has_actual);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[3].state);
+    TEST_ASSERT_TRUE(driver.strange > 0);
+}
+
 /* ---- Feedback ---- */
 
 static void test_silent_drive_is_offline_after_its_periods_and_gets_nothing_more(void)
@@ -463,6 +602,29 @@ static void test_following_error_stops_that_axis_and_it_hears_nothing_more(void)
     enable();
 }
 
+/* Below the field's first number, or beyond all counts: a fault, and no frame. */
+static void test_setpoint_that_no_frame_can_carry_is_a_fault_and_is_not_sent(void)
+{
+    for (unsigned i = 0; i < 2; i++) {
+        setUp();
+        map.axis[1].step_max_q32 = INT64_MAX;
+        map.axis[1].following_max_q32 = 0;
+        map.axis[1].scale = i == 0 ? (counts_scale_t){2000, 1, 0} : (counts_scale_t){INT32_MIN, 1, 0};
+        open_with(NULL, 0, false);
+        slave.drive[1].position = 0;
+        enable();
+        cycles(4);
+        const uint32_t setpoints = slave.drive[1].setpoints;
+        setpoint_q32[1] = i == 0 ? -MM(1) : INT64_MIN;
+        cycles(4);
+        TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
+        TEST_ASSERT_EQUAL_HEX32(CANRAW_FAULT_FOLLOWING, feedback[1].fault_code);
+        TEST_ASSERT_TRUE(slave.drive[1].setpoints <= setpoints + 1);
+        TEST_ASSERT_EQUAL_INT32(0, slave.drive[1].target);
+        TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[0].state);
+    }
+}
+
 /* A drive that does not move while its set-points do. */
 static void test_lag_beyond_the_window_is_a_following_error(void)
 {
@@ -478,6 +640,19 @@ static void test_lag_beyond_the_window_is_a_following_error(void)
     }
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_TRUE(steps > 95 && steps < 110);
+}
+
+static void test_lag_that_is_not_watched_is_no_fault(void)
+{
+    map.axis[2].following_max_q32 = 0;
+    open_with(NULL, 0, false);
+    enable();
+    slave.drive[2].is_homing = slave.drive[2].is_failing = true;
+    for (int i = 0; i < 300; i++) {
+        setpoint_q32[2] += MM(1) / 10;
+        TEST_ASSERT_EQUAL(HV_OK, cycle());
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
 }
 
 /* ---- Homing ---- */
@@ -519,6 +694,35 @@ static void test_homing_done_of_the_last_time_is_not_believed(void)
     }
     follow_actual();
     await(DRIVE_ENABLED, 1000);
+}
+
+/* A drive that is at its zero already never says "not done": believed after half a second. */
+static void test_homing_done_from_the_start_is_believed_after_a_while(void)
+{
+    slave.homing_takes_us = 0;
+    slave.homing_stale_us = 1;
+    enable();
+    const uint64_t begin_us = now_us;
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    cycles(1);
+    TEST_ASSERT_TRUE(are_all(DRIVE_HOMING));
+    await(DRIVE_ENABLED, 1000);
+    TEST_ASSERT_TRUE(now_us - begin_us >= 500000 && now_us - begin_us < 520000);
+}
+
+/* A status in the positions says nothing of homing where there is a query for that. */
+static void test_homing_is_judged_by_its_own_query_where_there_is_one(void)
+{
+    map.position_reply.fields = 2;
+    map.position_reply.field[1] = (canraw_field_t){CANRAW_STATUS, 1, 1, false, false}; /* 15h, always: done would be 1 */
+    open_with(NULL, 0, false);
+    enable();
+    TEST_ASSERT_TRUE(feedback[0].is_homed);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    cycles(1);
+    TEST_ASSERT_TRUE(are_all(DRIVE_HOMING) && !feedback[0].is_homed);
+    await(DRIVE_ENABLED, 200);
+    TEST_ASSERT_TRUE(feedback[0].is_homed);
 }
 
 static void test_homing_failed_is_a_fault(void)
@@ -624,6 +828,120 @@ static void test_rich_fault_that_stays_outlives_its_reset(void)
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[0].state);
 }
 
+/* Where the map knows nothing of a drive's state, it is what it was asked to be. */
+static void test_rich_status_that_the_map_does_not_judge_means_nothing(void)
+{
+    map = canraw_maps_rich();
+    map.enabled_when.mask = map.fault_when.mask = 0;
+    memset(&map.command[CANRAW_HOME], 0, sizeof map.command[0]);
+    open_with(NULL, 0, true);
+    slave.drive[6].is_homed = false;
+    enable();
+    TEST_ASSERT_TRUE(feedback[6].is_homed);
+    slave.drive[5].is_enabled = false;
+    slave.drive[6].is_faulty = true;
+    cycles(20);
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    setpoint_q32[6] += MM(2); /* found here: a reset ends it at once, as the drive says nothing */
+    cycles(4);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[6].state);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    (void)!poll_once();
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[6].state);
+}
+
+/* A code is never 0, as that would be no fault. */
+static void test_rich_fault_whose_status_is_nothing_has_a_code(void)
+{
+    map = canraw_maps_rich();
+    map.fault_when = (canraw_when_t){0x00, 0xFF};
+    open_with(NULL, 0, true);
+    slave.drive[2].is_homed = false;
+    cycles(20);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_EQUAL_HEX32(1, feedback[2].fault_code);
+}
+
+/* What a drive says before its reset has gone out is of before. */
+static void test_rich_reset_that_has_not_gone_out_ends_no_fault(void)
+{
+    hal_can_ops_t full = *sim_can_hal(&node).ops;
+    full.send = take_nothing;
+    open_rich();
+    enable();
+    slave.drive[0].is_faulty = true;
+    cycles(6);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state);
+    slave.drive[0].is_faulty = false;
+    driver.can.ops = &full;
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    say(0x18FF0200, true, 6, (const uint8_t[6]){0x30, 0x04, 0, 0x3D, 0x09, 0});
+    (void)!poll_once();
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[0].state);
+    driver.can.ops = sim_can_hal(&node).ops;
+    cycles(10);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[0].state);
+}
+
+/* The others are stopped; the one that is not there is DISABLED when it comes back. */
+static void test_rich_quick_stop_with_a_drive_that_is_gone(void)
+{
+    open_rich();
+    enable();
+    slave.drive[4].is_dumb = true;
+    cycles(20);
+    TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+    cycles(4);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(k != 4, slave.drive[k].stops);
+    }
+    slave.drive[4].is_dumb = false;
+    cycles(10);
+    TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
+}
+
+static void test_rich_enable_again_is_for_those_that_are_not(void)
+{
+    open_rich();
+    enable();
+    slave.drive[6].is_enabled = false;
+    cycles(6);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[6].state);
+    follow_actual();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    (void)!poll_once();
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[5].state);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLING, feedback[6].state);
+    await(DRIVE_ENABLED, 20);
+}
+
+/* ---- Drives that are not asked ---- */
+
+static void test_positions_that_come_unasked(void)
+{
+    map.position_query = (canraw_frame_t){0};
+    map.position_reply.constant = map.homing_reply.constant = 0x03;
+    map.position_reply.data[1] = 0x15;
+    map.homing_reply.data[1] = 0x12;
+    open_with(NULL, 0, false);
+    slave.drive[3].is_homed = false;
+    for (int i = 0; i < 100; i++) {
+        for (unsigned k = 0; k < AXES; k++) {
+            say(0x581 + k, false, 6, (const uint8_t[6]){0x00, 0x15, 0x40, 0x9C});
+        }
+        cycles(1);
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
+    TEST_ASSERT_EQUAL_INT64(MM(20), feedback[0].actual_mm_q32);
+    TEST_ASSERT_FALSE(feedback[3].is_homed); /* asked again and again */
+    TEST_ASSERT_TRUE(feedback[2].is_homed);  /* once is enough */
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT(0, count_frames(k, 0x00, 0x15));
+    }
+    TEST_ASSERT_TRUE(count_frames(3, 0x00, 0x12) > 40 && count_frames(2, 0x00, 0x12) < 5);
+}
+
 /* ---- Replies that look alike ---- */
 
 static void test_ambiguous_late_answers_are_not_taken_for_another(void)
@@ -650,7 +968,7 @@ static void test_ambiguous_late_answers_are_not_taken_for_another(void)
 static void test_init_map_that_contradicts_itself_is_refused(void)
 {
     const canraw_map_t good = canraw_maps_plain();
-    for (int i = 0; i < 24; i++) {
+    for (int i = 0; i < 38; i++) {
         map = good;
         switch (i) {
         case 0:
@@ -726,6 +1044,51 @@ static void test_init_map_that_contradicts_itself_is_refused(void)
             map.position_query.length = 0;
             map.position_query.constant = 0;
             break;
+        case 24:
+            map.setpoint.fields = CANRAW_FIELDS_MAX + 1;
+            break;
+        case 25:
+            map.position_query.constant = 0x07; /* of two bytes */
+            break;
+        case 26:
+            map.command[CANRAW_HOME].constant = 0x7F; /* a byte is open */
+            break;
+        case 27:
+            map.command[CANRAW_HOME].constant = 0xFC;
+            map.command[CANRAW_HOME].fields = 1;
+            map.command[CANRAW_HOME].field[0] = (canraw_field_t){CANRAW_POSITION, 0, 2, false, false};
+            break;
+        case 28:
+            map.command[CANRAW_HOME].length = 9;
+            break;
+        case 29:
+            map.position_query.constant = 0x01;
+            break;
+        case 30:
+            map.homing_query.constant = 0x01;
+            break;
+        case 31:
+            map.position_reply.field[0].at = 3;
+            break;
+        case 32:
+            map.homing_reply.field[0].bytes = 3;
+            break;
+        case 33:
+            map.setpoint.field[0].value = CANRAW_SPEED;
+            break;
+        case 34:
+            map.homing_query = map.homing_reply = (canraw_frame_t){0}; /* nothing to judge homing by */
+            break;
+        case 35:
+            map.command[CANRAW_HOME] = map.homing_query = (canraw_frame_t){0};
+            map.homing_reply.field[0].value = CANRAW_POSITION;
+            break;
+        case 36:
+            map.axis[3].reply_id = 0x800;
+            break;
+        case 37:
+            map.axis[1].speed.den = 0;
+            break;
         }
         TEST_ASSERT_EQUAL(HV_ERR_RANGE, canraw_init(&driver, &map, sim_can_hal(&node)));
     }
@@ -740,6 +1103,8 @@ int main(void)
     RUN_TEST(test_frames_of_the_plain_dialect_byte_for_byte);
     RUN_TEST(test_setpoint_at_full_stroke_byte_for_byte);
     RUN_TEST(test_speed_field_is_that_of_the_setpoints);
+    RUN_TEST(test_speed_field_with_a_sign_has_the_direction);
+    RUN_TEST(test_speed_that_no_number_tells_is_at_the_end_of_its_field);
     RUN_TEST(test_every_query_every_period_in_turn);
     RUN_TEST(test_setpoints_go_out_once_per_period_and_only_while_enabled);
     RUN_TEST(test_on_change_sends_nothing_twice);
@@ -747,15 +1112,23 @@ int main(void)
     RUN_TEST(test_queue_full_at_every_frame_of_a_set_makes_no_larger_step);
     RUN_TEST(test_bus_without_partner_is_gone_after_three_periods_and_returns);
     RUN_TEST(test_bus_off_unplugged_and_restarted_lose_every_drive);
+    RUN_TEST(test_bus_whose_controller_is_not_on_it_is_gone_at_once);
+    RUN_TEST(test_bus_without_echoes_is_trusted);
     RUN_TEST(test_bus_whose_queue_stays_full_is_gone_after_three_periods);
     RUN_TEST(test_error_passive_is_failing_after_its_time_and_stops_nothing_here);
     RUN_TEST(test_storm_of_error_frames_is_bounded_and_stops_nothing);
+    RUN_TEST(test_frames_that_are_no_replies_change_nothing);
+    RUN_TEST(test_position_beyond_all_millimetres_is_not_taken);
     RUN_TEST(test_silent_drive_is_offline_after_its_periods_and_gets_nothing_more);
     RUN_TEST(test_one_lost_frame_anywhere_is_survived);
     RUN_TEST(test_following_error_stops_that_axis_and_it_hears_nothing_more);
+    RUN_TEST(test_setpoint_that_no_frame_can_carry_is_a_fault_and_is_not_sent);
     RUN_TEST(test_lag_beyond_the_window_is_a_following_error);
+    RUN_TEST(test_lag_that_is_not_watched_is_no_fault);
     RUN_TEST(test_homing_ends_when_the_drive_says_so_and_the_new_position_is_known);
     RUN_TEST(test_homing_done_of_the_last_time_is_not_believed);
+    RUN_TEST(test_homing_done_from_the_start_is_believed_after_a_while);
+    RUN_TEST(test_homing_is_judged_by_its_own_query_where_there_is_one);
     RUN_TEST(test_homing_failed_is_a_fault);
     RUN_TEST(test_homing_that_never_ends_can_be_stopped);
     RUN_TEST(test_homing_without_a_frame_is_homed_from_the_start);
@@ -763,6 +1136,12 @@ int main(void)
     RUN_TEST(test_rich_quick_stop_reaches_the_drives_without_another_send);
     RUN_TEST(test_rich_drive_that_drops_out_is_seen);
     RUN_TEST(test_rich_fault_that_stays_outlives_its_reset);
+    RUN_TEST(test_rich_status_that_the_map_does_not_judge_means_nothing);
+    RUN_TEST(test_rich_fault_whose_status_is_nothing_has_a_code);
+    RUN_TEST(test_rich_reset_that_has_not_gone_out_ends_no_fault);
+    RUN_TEST(test_rich_quick_stop_with_a_drive_that_is_gone);
+    RUN_TEST(test_rich_enable_again_is_for_those_that_are_not);
+    RUN_TEST(test_positions_that_come_unasked);
     RUN_TEST(test_ambiguous_late_answers_are_not_taken_for_another);
     RUN_TEST(test_init_map_that_contradicts_itself_is_refused);
     return UNITY_END();

@@ -140,6 +140,14 @@ static void test_is_ambiguous_means_that_some_bytes_match_both(void)
     }
 }
 
+static void test_is_ambiguous_with_a_frame_that_is_not_there_is_nothing(void)
+{
+    const canraw_frame_t any = {.length = 2};
+    TEST_ASSERT_TRUE(canraw_is_ambiguous(&any, &any));
+    TEST_ASSERT_FALSE(canraw_is_ambiguous(&any, &(canraw_frame_t){0}));
+    TEST_ASSERT_FALSE(canraw_is_ambiguous(&(canraw_frame_t){0}, &any));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -147,5 +155,6 @@ int main(void)
     RUN_TEST(test_pack_value_that_does_not_fit_is_refused_and_changes_nothing);
     RUN_TEST(test_matches_constants_and_length_decide);
     RUN_TEST(test_is_ambiguous_means_that_some_bytes_match_both);
+    RUN_TEST(test_is_ambiguous_with_a_frame_that_is_not_there_is_nothing);
     return UNITY_END();
 }

@@ -107,6 +107,38 @@ static void test_out_of_range_is_reported_and_changes_nothing(void)
     TEST_ASSERT_EQUAL_INT64(43, units_q32);
 }
 
+/* The ends of what 62 bits hold, from both sides. */
+static void test_from_units_beyond_the_counts_there_are_is_refused_and_changes_nothing(void)
+{
+    static const struct {
+        counts_scale_t scale;
+        q32_t units_q32;
+    } k_rows[] = {{{INT32_MIN, 1, 0}, INT64_MIN}, {{INT32_MIN, 1, -1}, INT64_MAX}};
+    for (size_t i = 0; i < 2; i++) {
+        int64_t counts = 42;
+        TEST_ASSERT_EQUAL(HV_ERR_RANGE, counts_from_units(&k_rows[i].scale, k_rows[i].units_q32, &counts));
+        TEST_ASSERT_EQUAL_INT64(42, counts);
+    }
+    TEST_ASSERT_EQUAL_INT64(-(INT64_C(1) << 62), counts_of((counts_scale_t){INT32_MIN, 1, 0}, INT64_MAX));
+}
+
+static void test_to_units_beyond_the_units_there_are_is_refused_and_changes_nothing(void)
+{
+    static const struct {
+        counts_scale_t scale;
+        int64_t counts;
+    } k_rows[] = {{{1, 1, 0}, INT64_C(1) << 31},
+                  {{1, 1, 0}, -(INT64_C(1) << 31)},
+                  {{-1, INT32_MAX, 0}, 2},
+                  {{1, 1, 0}, (INT64_C(1) << 61) + 1}};
+    for (size_t i = 0; i < 4; i++) {
+        q32_t units_q32 = 42;
+        TEST_ASSERT_EQUAL(HV_ERR_RANGE, counts_to_units(&k_rows[i].scale, k_rows[i].counts, &units_q32));
+        TEST_ASSERT_EQUAL_INT64(42, units_q32);
+    }
+    TEST_ASSERT_EQUAL_INT64(-(INT64_C(1) << 62) + Q32_ONE, units_of((counts_scale_t){1, 1, 0}, -(1 << 30) + 1));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -116,5 +148,7 @@ int main(void)
     RUN_TEST(test_there_and_back_is_the_same_count);
     RUN_TEST(test_from_units_random_scales_are_nearest);
     RUN_TEST(test_out_of_range_is_reported_and_changes_nothing);
+    RUN_TEST(test_from_units_beyond_the_counts_there_are_is_refused_and_changes_nothing);
+    RUN_TEST(test_to_units_beyond_the_units_there_are_is_refused_and_changes_nothing);
     return UNITY_END();
 }
