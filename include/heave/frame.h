@@ -86,7 +86,7 @@ typedef enum { FRAME_EVENT_NONE, FRAME_EVENT_FRAME, FRAME_EVENT_REJECT } frame_e
 typedef struct {
     frame_dialect_t dialect;
     uint8_t phase;
-    uint8_t field;     /**< 1-based, being read */
+    uint8_t value;     /**< being read, or read last; from 0 */
     uint8_t utf8_left; /**< bytes still to come of reject.look_alike */
     char letter;       /**< first of the command */
     uint8_t mask_digits;
@@ -109,14 +109,20 @@ void frame_scanner_init(frame_scanner_t *self, frame_dialect_t dialect);
 /** Takes one byte; at most one event a byte.
  *  @param frame  out: valid on FRAME_EVENT_FRAME, else unchanged
  *  @param reject out: valid on FRAME_EVENT_REJECT, else unchanged */
+/*@ requires \valid(self) && \valid(frame) && \valid(reject);
+    assigns *self, *frame, *reject, \result; */
 frame_event_t frame_scanner_feed(frame_scanner_t *self, uint8_t byte, frame_t *frame, frame_reject_t *reject);
 
 /** Ends a datagram: an unfinished frame, stray bytes, or a datagram that led to no event at all become a reject.
  *  The scanner is then ready for the next datagram. */
+/*@ requires \valid(self) && \valid(reject);
+    assigns *self, *reject, \result; */
 frame_event_t frame_scanner_end(frame_scanner_t *self, frame_reject_t *reject);
 
 /** Reads a datagram in place, its end included: call until FRAME_EVENT_NONE. The scanner is then ready for the next one.
  *  @param position in/out: 0 at first; length + 1 once the end has been read. The scanner must have been initialised. */
+/*@ requires length == 0 || \valid_read(datagram + (0 .. length - 1));
+    requires \valid(self) && \valid(position) && \valid(frame) && \valid(reject); */
 frame_event_t frame_next(frame_scanner_t *self, const uint8_t *datagram, size_t length, size_t *position, frame_t *frame,
                          frame_reject_t *reject);
 

@@ -18,9 +18,17 @@ typedef struct {
 text_t text_start(char *buffer, size_t capacity);
 
 /** Appends a character, a string, a decimal number, a hexadecimal number with at least so many digits. */
+/*@ requires \valid(self);
+    assigns *self \from *self; */
 void text_put_char(text_t *self, char c);
+/*@ requires \valid(self) && \valid_read(string);
+    assigns *self \from *self; */
 void text_put(text_t *self, const char *string);
+/*@ requires \valid(self);
+    assigns *self \from *self; */
 void text_put_u32(text_t *self, uint32_t number);
+/*@ requires \valid(self);
+    assigns *self \from *self; */
 void text_put_hex(text_t *self, uint32_t number, unsigned digits_min);
 
 /** Appends bytes that came from outside: printable ASCII as it is, the rest (and the backslash) as C escapes. */

@@ -128,20 +128,35 @@ static void begin_frame(frame_scanner_t *self, bool is_headless)
     self->phase = PHASE_LETTER;
 }
 
-/* Starts the field behind the separator being read. */
-static void begin_field(frame_scanner_t *self, uint8_t field)
+/* What a value is in messages: values count from 1 there. */
+static uint8_t value_field(const frame_scanner_t *self)
 {
-    const bool is_value = field <= self->frame.count;
-    self->field = field;
+    return (uint8_t)(self->value + 1);
+}
+
+/* The mask or the time. */
+static uint8_t last_field(const frame_scanner_t *self)
+{
+    return (uint8_t)(self->frame.count + 1);
+}
+
+/* Starts a value, or what belongs behind the values, behind the separator being read. */
+static void begin_field(frame_scanner_t *self, unsigned value)
+{
     self->field_start = self->offset + 1;
-    self->phase = is_value ? PHASE_VALUE : self->frame.is_timed ? PHASE_TIME : PHASE_MASK;
-    if (self->phase == PHASE_MASK) {
+    if (value < self->frame.count) {
+        self->value = (uint8_t)value;
+        self->phase = PHASE_VALUE;
+        number_init(&self->number);
+    } else if (self->frame.is_timed) {
+        self->phase = PHASE_TIME;
+        number_init(&self->number);
+    } else {
+        self->phase = PHASE_MASK;
         self->frame.relay_mask = 0;
         self->mask_digits = 0;
         self->is_mask_prefixed = false;
         self->is_mask_ended = false;
-    } else {
-        number_init(&self->number);
     }
 }
 
@@ -179,7 +194,7 @@ static void take_digit(frame_scanner_t *self, uint8_t byte)
 static void take_suffix(frame_scanner_t *self, uint8_t byte)
 {
     if (byte == ':') {
-        begin_field(self, 1);
+        begin_field(self, 0);
     } else if (self->phase == PHASE_SUFFIX && command_byte(self, byte) == 'T') {
         self->frame.is_timed = true;
         self->phase = PHASE_COLON;
@@ -191,17 +206,17 @@ static void take_suffix(frame_scanner_t *self, uint8_t byte)
 /* The separator behind a value came. */
 static void finish_value(frame_scanner_t *self, uint8_t separator)
 {
-    switch (number_finish(&self->number, &self->frame.value_q16[self->field - 1])) {
+    switch (number_finish(&self->number, &self->frame.value_q16[self->value])) {
     case NUMBER_OK:
         break;
     case NUMBER_EMPTY:
-        fail(self, FRAME_ERR_VALUE_EMPTY, separator, self->field);
+        fail(self, FRAME_ERR_VALUE_EMPTY, separator, value_field(self));
         break;
     case NUMBER_SYNTAX:
-        fail(self, FRAME_ERR_VALUE_SYNTAX, separator, self->field);
+        fail(self, FRAME_ERR_VALUE_SYNTAX, separator, value_field(self));
         break;
     case NUMBER_OVERFLOW:
-        fail_at(self, FRAME_ERR_VALUE_OVERFLOW, self->field_start, self->field);
+        fail_at(self, FRAME_ERR_VALUE_OVERFLOW, self->field_start, value_field(self));
         break;
     }
 }
@@ -211,10 +226,10 @@ static void take_value(frame_scanner_t *self, uint8_t byte)
     if (byte == ',') {
         finish_value(self, byte);
         if (self->phase != PHASE_REJECTED) {
-            begin_field(self, (uint8_t)(self->field + 1));
+            begin_field(self, self->value + 1u);
         }
     } else if (number_feed(&self->number, byte) != NUMBER_OK) {
-        fail(self, FRAME_ERR_VALUE_SYNTAX, byte, self->field);
+        fail(self, FRAME_ERR_VALUE_SYNTAX, byte, value_field(self));
     }
 }
 
@@ -224,7 +239,7 @@ static void take_mask_digit(frame_scanner_t *self, uint8_t byte)
     const bool is_prefix =
         (byte | 0x20u) == 'x' && !self->is_mask_prefixed && self->mask_digits == 1 && self->frame.relay_mask == 0;
     if (self->is_mask_ended || (digit > 15 && !is_prefix) || (digit <= 15 && self->mask_digits == MASK_DIGITS_MAX)) {
-        fail(self, FRAME_ERR_MASK, byte, self->field);
+        fail(self, FRAME_ERR_MASK, byte, last_field(self));
     } else if (is_prefix) {
         self->is_mask_prefixed = true;
         self->mask_digits = 0;
@@ -248,7 +263,7 @@ static void take_mask(frame_scanner_t *self, uint8_t byte)
 static void finish_mask(frame_scanner_t *self, uint8_t tail)
 {
     if (self->mask_digits == 0) {
-        fail(self, FRAME_ERR_MASK, tail, self->field);
+        fail(self, FRAME_ERR_MASK, tail, last_field(self));
         return;
     }
     self->frame.relay_mask &= FRAME_RELAY_MASK;
@@ -260,7 +275,7 @@ static void take_time(frame_scanner_t *self, uint8_t byte)
     if (byte == ',') {
         fail_count(self, byte, self->frame.count + 2u);
     } else if (number_feed(&self->number, byte) != NUMBER_OK) {
-        fail(self, FRAME_ERR_TIME, byte, self->field);
+        fail(self, FRAME_ERR_TIME, byte, last_field(self));
     }
 }
 
@@ -268,11 +283,11 @@ static void finish_time(frame_scanner_t *self, uint8_t tail)
 {
     const number_error_t error = number_finish_natural(&self->number, &self->frame.time_ms);
     if (error == NUMBER_EMPTY || error == NUMBER_SYNTAX) {
-        fail(self, FRAME_ERR_TIME, tail, self->field);
+        fail(self, FRAME_ERR_TIME, tail, last_field(self));
     } else if (error == NUMBER_OVERFLOW && self->number.is_negative) {
-        fail_at(self, FRAME_ERR_TIME, self->field_start, self->field);
+        fail_at(self, FRAME_ERR_TIME, self->field_start, last_field(self));
     } else if (error == NUMBER_OVERFLOW || self->frame.time_ms > FRAME_TIME_MAX_MS) {
-        fail_at(self, FRAME_ERR_TIME_RANGE, self->field_start, self->field);
+        fail_at(self, FRAME_ERR_TIME_RANGE, self->field_start, last_field(self));
     }
 }
 
@@ -353,7 +368,7 @@ static frame_event_t report_unfinished(frame_scanner_t *self, uint32_t end, fram
 static void finish_at_value(frame_scanner_t *self, uint8_t tail)
 {
     q16_t ignored;
-    if (self->field == 1 && number_finish(&self->number, &ignored) == NUMBER_EMPTY) {
+    if (self->value == 0 && number_finish(&self->number, &ignored) == NUMBER_EMPTY) {
         fail_count(self, tail, 0);
         return;
     }
@@ -361,10 +376,10 @@ static void finish_at_value(frame_scanner_t *self, uint8_t tail)
     if (self->phase == PHASE_REJECTED) {
         return;
     }
-    if (self->field < self->frame.count) {
-        fail_count(self, tail, self->field);
+    if (value_field(self) < self->frame.count) {
+        fail_count(self, tail, value_field(self));
     } else if (self->frame.is_timed) {
-        fail(self, FRAME_ERR_TIME, tail, (uint8_t)(self->field + 1));
+        fail(self, FRAME_ERR_TIME, tail, last_field(self));
     }
 }
 
@@ -485,9 +500,9 @@ frame_event_t frame_scanner_end(frame_scanner_t *self, frame_reject_t *reject)
 }
 
 /* A plain frame where the scanner stands between frames; returns its bytes, 0: no such frame. */
-static size_t take_plain_frame(frame_scanner_t *self, const uint8_t *text, size_t length, frame_t *frame)
+static size_t take_plain_frame(frame_scanner_t *self, const uint8_t *text, const uint8_t *end, frame_t *frame)
 {
-    const size_t used = self->phase == PHASE_IDLE && text[0] == '@' ? frame_quick(text, length, frame) : 0;
+    const size_t used = self->phase == PHASE_IDLE && text[0] == '@' ? frame_quick(text, end, frame) : 0;
     if (used > 0) {
         self->start = self->offset;
         self->offset += (uint32_t)used;
@@ -501,7 +516,7 @@ frame_event_t frame_next(frame_scanner_t *self, const uint8_t *datagram, size_t 
                          frame_reject_t *reject)
 {
     for (size_t i = *position; i < length; i++) {
-        const size_t used = take_plain_frame(self, datagram + i, length - i, frame);
+        const size_t used = take_plain_frame(self, datagram + i, datagram + length, frame);
         if (used > 0) {
             *position = i + used;
             return FRAME_EVENT_FRAME;

@@ -65,7 +65,7 @@ static inline bool take_value(reader_t *reader, q16_t *value_q16)
     const uint8_t *const start = reader->at;
     uint64_t digits = take_digits(reader, 0);
     uint64_t value = digits << 16;
-    size_t count = (size_t)(reader->at - start);
+    const size_t count = (size_t)(reader->at - start);
     if (count == 0 || count > DIGITS_MAX) {
         return false;
     }
@@ -73,14 +73,16 @@ static inline bool take_value(reader_t *reader, q16_t *value_q16)
         const uint8_t *const point = reader->at;
         digits = take_digits(reader, digits);
         const size_t fraction = (size_t)(reader->at - point);
-        count += fraction;
-        if (fraction == 0 || count > DIGITS_MAX) {
+        if (fraction == 0 || fraction > DIGITS_MAX - count) {
             return false;
         }
         value = rounded_q16(digits, fraction);
     }
+    if (value > (uint64_t)INT32_MAX + is_negative) {
+        return false;
+    }
     *value_q16 = (q16_t)(is_negative ? -(int64_t)value : (int64_t)value);
-    return value <= (uint64_t)INT32_MAX + is_negative;
+    return true;
 }
 
 /* 0 to 15, or more where the byte is no hex digit. */
@@ -124,10 +126,14 @@ static inline bool take_command(reader_t *reader, frame_t *frame)
     if (reader->end - reader->at < 3 || reader->at[0] != '@') {
         return false;
     }
-    frame->command = frame_find_command((char)reader->at[1], reader->at[2]);
+    const frame_command_t command = frame_find_command((char)reader->at[1], reader->at[2]);
+    if (command == FRAME_COMMANDS) {
+        return false;
+    }
     reader->at += 3;
+    frame->command = command;
     frame->is_timed = take(reader, 'T');
-    return frame->command < FRAME_COMMANDS && take(reader, ':');
+    return take(reader, ':');
 }
 
 /* A comma and what belongs behind the values, or in the untimed form nothing at all. */
@@ -140,10 +146,10 @@ static inline bool take_last_field(reader_t *reader, frame_t *frame)
     return !has_field || take_mask(reader, frame);
 }
 
-size_t frame_quick(const uint8_t *text, size_t length, frame_t *frame)
+size_t frame_quick(const uint8_t *text, const uint8_t *end, frame_t *frame)
 {
-    frame_t plain = {.command = FRAME_COMMANDS};
-    reader_t reader = {text, text + length};
+    frame_t plain = {.count = 0};
+    reader_t reader = {text, end};
     if (!take_command(&reader, &plain)) {
         return 0;
     }

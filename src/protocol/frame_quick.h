@@ -8,9 +8,12 @@
 
 /** Reads a frame from its `@` on if it is a plain one: capital letters, no blanks, values of up to 13 digits
  * without exponents, a mask of hex digits or a time of digits. Says nothing about any other: that is for the scanner.
+ *  @param end   of what can be read, never read itself
  *  @param frame out, unchanged if this is no plain frame
  *  @return bytes of the frame up to and with its `#`; 0: no plain frame */
-size_t frame_quick(const uint8_t *text, size_t length, frame_t *frame);
+/*@ requires text < end && \valid_read(text) && \valid_read(end - 1) && \valid(frame);
+    assigns *frame, \result \from text[..]; */
+size_t frame_quick(const uint8_t *text, const uint8_t *end, frame_t *frame);
 
 /** FRAME_COMMANDS where there is none of that name. */
 frame_command_t frame_find_command(char letter, uint8_t digit);

@@ -107,7 +107,7 @@ static void put_look_alike(text_t *line, uint32_t code_point)
         text_put(line, " is invisible; leave it out");
         return;
     }
-    const char ascii = (char)(row->ascii + (int)(code_point - row->first));
+    const char ascii = (char)(row->ascii + (uint8_t)(code_point - row->first));
     text_put(line, " looks like ");
     if (ascii == ' ') {
         text_put(line, "a blank");

@@ -9,7 +9,8 @@
 enum { LEAD_DIGITS = 19, TAIL_DIGITS = 3 };
 
 #define EXPONENT_SATURATED INT64_C(100000000000000000)
-#define SHORT_LEAD_END     ((uint64_t)1 << 46) /* times 2^17 stays below 2^63 */
+#define POINT_SATURATED    INT64_C(1000000000000000000) /* more digits than any text has */
+#define SHORT_LEAD_END     ((uint64_t)1 << 46)          /* times 2^17 stays below 2^63 */
 
 /* What number_feed can meet, and where the text stands. */
 enum { CLASS_DIGIT, CLASS_POINT, CLASS_EXPONENT, CLASS_SIGN, CLASS_BLANK, CLASSES };
@@ -113,9 +114,9 @@ static void take_digit(number_t *self, uint8_t digit, bool is_integer)
 {
     if (self->lead != 0 || digit != 0) {
         keep_digit(self, digit);
-        self->point += is_integer;
+        self->point += is_integer && self->point < POINT_SATURATED;
     } else {
-        self->point -= !is_integer;
+        self->point -= !is_integer && self->point > -POINT_SATURATED;
     }
 }
 

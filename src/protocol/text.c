@@ -28,6 +28,7 @@ void text_put_u32(text_t *self, uint32_t number)
 {
     char digits[10];
     unsigned count = 0;
+    //@ loop unroll 10;
     do {
         digits[count++] = (char)('0' + number % 10);
         number /= 10;

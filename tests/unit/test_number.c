@@ -267,6 +267,28 @@ static void test_feed_refuses_at_the_first_byte_that_cannot_continue(void)
     }
 }
 
+/* Nobody waits for so many digits, so they are put there. */
+static void test_feed_counts_more_digits_than_any_text_has(void)
+{
+    static const char *const k_texts[] = {"1", "0.0"};
+    static const int64_t k_points[] = {INT64_C(1000000000000000000), INT64_C(-1000000000000000000)};
+    static const char k_next[] = {'1', '0'};
+    static const number_error_t k_errors[] = {NUMBER_OVERFLOW, NUMBER_OK};
+    for (unsigned i = 0; i < 2; i++) {
+        q16_t value = VALUE_UNTOUCHED;
+        number_t number;
+        number_init(&number);
+        for (const char *at = k_texts[i]; *at != '\0'; at++) {
+            TEST_ASSERT_EQUAL_INT(NUMBER_OK, number_feed(&number, (uint8_t)*at));
+        }
+        number.point = k_points[i];
+        TEST_ASSERT_EQUAL_INT(NUMBER_OK, number_feed(&number, (uint8_t)k_next[i]));
+        TEST_ASSERT_EQUAL_INT64(k_points[i], number.point);
+        TEST_ASSERT_EQUAL_INT(k_errors[i], number_finish(&number, &value));
+        TEST_ASSERT_EQUAL_INT32(k_errors[i] == NUMBER_OK ? 0 : VALUE_UNTOUCHED, value);
+    }
+}
+
 static void test_finish_natural_rounds_to_even_and_refuses_what_is_below_zero(void)
 {
     check_natural("0", NUMBER_OK, 0);
@@ -393,6 +415,7 @@ int main(void)
     RUN_TEST(test_parse_zeros_and_exponent_that_cancel_are_exact);
     RUN_TEST(test_feed_after_a_refused_byte_stays_refused);
     RUN_TEST(test_feed_refuses_at_the_first_byte_that_cannot_continue);
+    RUN_TEST(test_feed_counts_more_digits_than_any_text_has);
     RUN_TEST(test_finish_natural_rounds_to_even_and_refuses_what_is_below_zero);
     RUN_TEST(test_parse_random_numbers_match_the_model);
     RUN_TEST(test_parse_ties_and_their_neighbours_match_the_model);
