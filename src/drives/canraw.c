@@ -90,7 +90,7 @@ static void watch_bus(canraw_t *self, bool is_up)
     self->free_us = self->is_free && !self->is_refused ? self->now_us : self->free_us;
     const bool is_stalled = self->now_us - self->free_us >= (uint64_t)STALLED_PERIODS * self->map->period_us;
     const bool is_gone = !is_up || is_stalled || !is_controller_up(self);
-    if (is_gone && !self->is_gone) {
+    if (is_gone) { /* also who is heard meanwhile: nothing reaches it */
         lose_all(self);
     }
     if (is_gone && (!self->is_gone || self->now_us - self->restart_us >= RESTART_US)) {

@@ -415,6 +415,26 @@ static void test_bus_without_echoes_is_trusted(void)
     driver.can.ops = sim_can_hal(&node).ops;
 }
 
+/* It cannot be told anything, so it is not there. */
+static void test_drive_that_is_heard_while_the_bus_is_gone_stays_offline(void)
+{
+    hal_can_ops_t deaf = *sim_can_hal(&node).ops;
+    deaf.bus_state = tell_state;
+    told_state = HAL_CAN_BUS_OFF;
+    told_status = HV_OK;
+    await(DRIVE_DISABLED, 100);
+    driver.can.ops = &deaf;
+    for (int i = 0; i < 10; i++) {
+        const can_frame_t told = {.id = 0x581, .length = 6, .data = {0x00, 0x15}};
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &told));
+        driver.axis[0].asked = CANRAW_ASKED_POSITION;
+        TEST_ASSERT_EQUAL(HV_ERR_IO, poll_once());
+        TEST_ASSERT_TRUE(are_all(DRIVE_OFFLINE));
+    }
+    driver.can.ops = sim_can_hal(&node).ops;
+    await(DRIVE_DISABLED, 2000);
+}
+
 static hv_status_t take_nothing(void *ctx, const can_frame_t *frame)
 {
     (void)ctx;
@@ -1114,6 +1134,7 @@ int main(void)
     RUN_TEST(test_bus_off_unplugged_and_restarted_lose_every_drive);
     RUN_TEST(test_bus_whose_controller_is_not_on_it_is_gone_at_once);
     RUN_TEST(test_bus_without_echoes_is_trusted);
+    RUN_TEST(test_drive_that_is_heard_while_the_bus_is_gone_stays_offline);
     RUN_TEST(test_bus_whose_queue_stays_full_is_gone_after_three_periods);
     RUN_TEST(test_error_passive_is_failing_after_its_time_and_stops_nothing_here);
     RUN_TEST(test_storm_of_error_frames_is_bounded_and_stops_nothing);
