@@ -7,7 +7,8 @@
  *   ENABLING  asked for; ends with a position that is newer than the request and, where the map knows how a drive says that it is
  *             enabled (enabled_when), with that. Where the map has an enable frame, set-points go out before it already
  *   ENABLED   set-points go out. Without enabled_when it means just this: asked for, and heard from since
- *   HOMING    the homing frame went out; ends when the drive says so (homing_done) and has told its position once more
+ *   HOMING    the homing frame went out; ends when the drive says so (homing_done), has told its position once more and, as
+ *             above, says that it is enabled
  *   DISABLED  everything else: set-points are not sent. Without disable and stop frames a drive keeps holding its last set-point
  *   FAULT     fault_when, homing_failed, or found here, because these drives have no guard of their own: a set-point further than
  *             step_max from the one before (at first: from actual), or further than following_max from actual. It is not sent

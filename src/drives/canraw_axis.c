@@ -162,7 +162,7 @@ void canraw_axis_step(canraw_axis_t *self, const canraw_map_t *map, uint64_t now
         self->is_begun = true;
     } else if (self->state == DRIVE_ENABLING && is_enabled(self, map)) {
         self->state = DRIVE_ENABLED;
-    } else if (self->state == DRIVE_HOMING && self->is_homing_over && is_heard(self)) {
+    } else if (self->state == DRIVE_HOMING && self->is_homing_over && is_enabled(self, map)) {
         self->state = DRIVE_ENABLED;
         self->is_homed = true;
         self->has_sent = false;

@@ -827,6 +827,23 @@ static void test_rich_drive_that_drops_out_is_seen(void)
     TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[5].state);
 }
 
+static void test_rich_homing_does_not_end_without_torque(void)
+{
+    open_rich();
+    enable();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    slave.drive[6].is_enabled = false;
+    for (int i = 0; i < 100; i++) {
+        (void)!cycle();
+        follow_actual();
+    }
+    TEST_ASSERT_TRUE(slave.drive[6].is_homed);
+    TEST_ASSERT_EQUAL(DRIVE_HOMING, feedback[6].state);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[5].state);
+    slave.drive[6].is_enabled = true;
+    await(DRIVE_ENABLED, 6);
+}
+
 static void test_rich_fault_that_stays_outlives_its_reset(void)
 {
     open_rich();
@@ -1156,6 +1173,7 @@ int main(void)
     RUN_TEST(test_rich_setpoints_stand_on_actual_before_enabling);
     RUN_TEST(test_rich_quick_stop_reaches_the_drives_without_another_send);
     RUN_TEST(test_rich_drive_that_drops_out_is_seen);
+    RUN_TEST(test_rich_homing_does_not_end_without_torque);
     RUN_TEST(test_rich_fault_that_stays_outlives_its_reset);
     RUN_TEST(test_rich_status_that_the_map_does_not_judge_means_nothing);
     RUN_TEST(test_rich_fault_whose_status_is_nothing_has_a_code);
