@@ -279,11 +279,13 @@ void modbus_drive_axis_take_read(modbus_drive_axis_t *self, const modbus_drive_m
 
 /* --- What was written --- */
 
-static void end_startup(modbus_drive_axis_t *self, uint64_t now_us)
+/* Ready, unless it has said already that it is not. */
+static void end_startup(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     enter(self, MODBUS_DRIVE_READY, now_us);
     note_trouble(self, MODBUS_DRIVE_NO_TROUBLE, 0, now_us);
     start_job(self, MODBUS_DRIVE_NO_JOB);
+    take_fault(self, map, now_us);
 }
 
 static void refuse(modbus_drive_axis_t *self, uint32_t trouble, uint16_t object, uint64_t now_us)
@@ -455,7 +457,7 @@ void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t 
         start_job(self, MODBUS_DRIVE_JOB_STARTUP);
     }
     if (self->phase == MODBUS_DRIVE_STARTING && self->job == MODBUS_DRIVE_JOB_STARTUP && self->step >= map->items) {
-        end_startup(self, now_us);
+        end_startup(self, map, now_us);
     }
     if (self->is_reset_due && !is_stopping(self)) {
         self->is_reset_due = false;

@@ -251,6 +251,18 @@ static void test_startup_drive_that_comes_late_is_found(void)
     await(DRIVE_DISABLED, 1000);
 }
 
+static void test_startup_drive_with_an_alarm_is_never_ready(void)
+{
+    slave.drive[4].is_faulty = true;
+    for (int i = 0; i < 100; i++) {
+        (void)!cycle();
+        TEST_ASSERT_TRUE(feedback[4].state == DRIVE_OFFLINE || feedback[4].state == DRIVE_FAULT);
+    }
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[4].state);
+    TEST_ASSERT_EQUAL_HEX32(0x0E21, feedback[4].fault_code);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[5].state);
+}
+
 /* --- Enabling --- */
 
 static void test_enable_with_an_old_target_in_the_register_makes_no_step(void)
@@ -768,6 +780,7 @@ int main(void)
     RUN_TEST(test_startup_missing_register_is_refused_with_the_exception);
     RUN_TEST(test_startup_item_that_is_not_checked_may_read_as_it_likes);
     RUN_TEST(test_startup_drive_that_comes_late_is_found);
+    RUN_TEST(test_startup_drive_with_an_alarm_is_never_ready);
     RUN_TEST(test_enable_with_an_old_target_in_the_register_makes_no_step);
     RUN_TEST(test_enable_one_drive_without_torque_keeps_all_waiting);
     RUN_TEST(test_enable_target_last_writes_it_after_torque_only);
