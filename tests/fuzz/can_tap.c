@@ -21,17 +21,27 @@ static hv_status_t tap_send(void *ctx, const can_frame_t *frame)
     return status;
 }
 
-static hv_status_t tap_recv(void *ctx, can_frame_t *out, uint64_t *rx_time_us)
+static void take_first(can_tap_t *self, can_frame_t *out, uint64_t *rx_time_us)
 {
-    can_tap_t *self = ctx;
-    if (self->count == 0) {
-        return hal_can_recv(self->inner, out, rx_time_us);
-    }
     *out = self->frame[self->first];
     *rx_time_us = 0;
     self->first = (self->first + 1u) % CAN_TAP_FRAMES;
     self->count--;
-    return HV_OK;
+}
+
+static hv_status_t tap_recv(void *ctx, can_frame_t *out, uint64_t *rx_time_us)
+{
+    can_tap_t *self = ctx;
+    hv_status_t status = HV_OK;
+    if (self->count == 0) {
+        status = hal_can_recv(self->inner, out, rx_time_us);
+    } else {
+        take_first(self, out, rx_time_us);
+    }
+    if (status == HV_OK && self->received != NULL) {
+        self->received(self->watcher, out);
+    }
+    return status;
 }
 
 static hv_status_t tap_bus_state(void *ctx, hal_can_state_t *out)

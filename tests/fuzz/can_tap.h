@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * can_tap.h - between a driver and its simulated bus: frames that nobody sent are slipped in, and what the driver sends is shown.
+ * can_tap.h - between a driver and its simulated bus: frames that nobody sent are slipped in, and what the driver sends and
+ * receives is shown.
  */
 #ifndef CAN_TAP_H
 #define CAN_TAP_H
@@ -15,7 +16,8 @@ typedef struct {
     unsigned first;
     unsigned count;
     void *watcher;
-    void (*sent)(void *watcher, const can_frame_t *frame); /**< told of each frame that the bus took */
+    void (*sent)(void *watcher, const can_frame_t *frame);     /**< told of each frame that the bus took */
+    void (*received)(void *watcher, const can_frame_t *frame); /**< told of each frame that the driver gets; may be NULL */
 } can_tap_t;
 
 /** Slips a frame in; one more than fit is left out. */

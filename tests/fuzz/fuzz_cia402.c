@@ -10,7 +10,7 @@
 
 #include "can_tap.h"
 #include "cia402_slave.h"
-#include "fuzz.h"
+#include "drive_run.h"
 #include "heave/cia402.h"
 
 #define CYCLE_US      1000u
@@ -28,9 +28,7 @@ typedef struct {
     cia402_slave_t slave;
     can_tap_t tap;
     cia402_t driver;
-    uint64_t now_us;
-    drive_feedback_t feedback[DRIVES_MAX];
-    q32_t setpoint_q32[DRIVES_MAX];
+    drive_run_t run;
     bool was_enabled[DRIVES_MAX]; /* when its last target was sent */
     int32_t target[DRIVES_MAX];
     uint8_t asked[DRIVES_MAX][8]; /* newest SDO request */
@@ -47,7 +45,7 @@ static void watch_target(world_t *self, unsigned k, const can_frame_t *frame)
     const uint8_t *data = frame->data;
     const int32_t target =
         (int32_t)((uint32_t)data[2] | (uint32_t)data[3] << 8 | (uint32_t)data[4] << 16 | (uint32_t)data[5] << 24);
-    const bool is_enabled = self->feedback[k].state == DRIVE_ENABLED && self->driver.stage == CIA402_STAGE_FOLLOW;
+    const bool is_enabled = self->run.feedback[k].state == DRIVE_ENABLED && self->driver.stage == CIA402_STAGE_FOLLOW;
     FUZZ_REQUIRE(frame->length == 6);
     if (is_enabled && self->was_enabled[k]) {
         const int64_t step = llabs((int64_t)target - self->target[k]);
@@ -89,54 +87,29 @@ static void see_sent(void *watcher, const can_frame_t *frame)
 static void check_report(const world_t *self, hv_status_t status)
 {
     for (uint8_t k = 0; k < DRIVES_MAX; k++) {
-        const drive_feedback_t *feedback = &self->feedback[k];
+        const drive_feedback_t *feedback = &self->run.feedback[k];
         drive_report_t report;
         FUZZ_REQUIRE(feedback->state <= DRIVE_FAULT && (status == HV_OK || feedback->state == DRIVE_OFFLINE));
         FUZZ_REQUIRE(feedback->state == DRIVE_FAULT || feedback->state == DRIVE_OFFLINE || feedback->fault_code == 0);
-        FUZZ_REQUIRE(!feedback->has_actual || feedback->actual_us <= self->now_us);
-        FUZZ_REQUIRE(drives_report(cia402_hal((cia402_t *)&self->driver), k, &report));
+        FUZZ_REQUIRE(!feedback->has_actual || feedback->actual_us <= self->run.now_us);
+        FUZZ_REQUIRE(drives_report(self->run.drives, k, &report));
         FUZZ_REQUIRE(report.phase != NULL && report.trouble != NULL && report.detail != NULL && report.address == k + 1u);
         FUZZ_REQUIRE(self->driver.axis[k].sdo.size <= SDO_BYTES_MAX && self->driver.axis[k].sdo.at <= SDO_BYTES_MAX);
     }
 }
 
-static void cycle(world_t *self)
+static void cycle(void *world)
 {
-    const drives_t drives = cia402_hal(&self->driver);
-    self->now_us += CYCLE_US;
-    cia402_slave_step(&self->slave, self->now_us);
-    const hv_status_t status = drives_poll(drives, self->now_us, self->feedback);
+    world_t *self = world;
+    drive_run_t *run = &self->run;
+    run->now_us += CYCLE_US;
+    cia402_slave_step(&self->slave, run->now_us);
+    const hv_status_t status = drives_poll(run->drives, run->now_us, run->feedback);
     FUZZ_REQUIRE(status == HV_OK || status == HV_ERR_IO);
     check_report(self, status);
     const uint32_t sets = self->driver.sets + self->driver.refused;
-    (void)!drives_send(drives, self->now_us, self->setpoint_q32);
+    (void)!drives_send(run->drives, run->now_us, run->setpoint_q32);
     FUZZ_REQUIRE(self->driver.sets + self->driver.refused - sets <= 1);
-}
-
-static bool are_all(const world_t *self, drive_state_t state)
-{
-    for (unsigned k = 0; k < DRIVES_MAX; k++) {
-        if (self->feedback[k].state != state) {
-            return false;
-        }
-    }
-    return true;
-}
-
-static void follow_actual(world_t *self)
-{
-    for (unsigned k = 0; k < DRIVES_MAX; k++) {
-        self->setpoint_q32[k] = self->feedback[k].actual_mm_q32;
-    }
-}
-
-static void await(world_t *self, drive_state_t state)
-{
-    for (unsigned i = 0; i < 10000 && !are_all(self, state); i++) {
-        cycle(self);
-        follow_actual(self);
-    }
-    FUZZ_REQUIRE(are_all(self, state));
 }
 
 /* --- Coming up --- */
@@ -169,35 +142,21 @@ static void bring_up(unsigned i)
     world_t *self = &m_world[i];
     hal_can_filter_t filter[CIA402_FILTERS_MAX];
     memset(self, 0, sizeof *self);
-    self->now_us = 5000000;
+    self->run.now_us = 5000000;
     sim_can_bus_init(&self->bus, 0, NULL, 0);
     cia402_slave_open(&self->slave, &self->bus);
     FUZZ_REQUIRE(sim_can_open(&self->node, &self->bus, filter, cia402_filters(&m_config, filter)) == HV_OK);
     self->tap = (can_tap_t){.inner = sim_can_hal(&self->node), .watcher = self, .sent = see_sent};
     FUZZ_REQUIRE(cia402_init(&self->driver, &m_config, can_tap_hal(&self->tap)) == HV_OK);
-    await(self, DRIVE_DISABLED);
+    self->run.drives = cia402_hal(&self->driver);
+    drive_run_await(&self->run, DRIVE_DISABLED, cycle, self);
     m_start[i][0] = *self;
-    FUZZ_REQUIRE(drives_request(cia402_hal(&self->driver), DRIVES_ENABLE) == HV_OK);
-    await(self, DRIVE_ENABLED);
+    FUZZ_REQUIRE(drives_request(self->run.drives, DRIVES_ENABLE) == HV_OK);
+    drive_run_await(&self->run, DRIVE_ENABLED, cycle, self);
     m_start[i][1] = *self;
 }
 
 /* --- Records --- */
-
-typedef struct {
-    uint8_t op, kind, drive, length, data[8];
-} record_t;
-
-static record_t read_record(fuzz_input_t *in)
-{
-    record_t record = {.op = fuzz_u8(in), .kind = fuzz_u8(in), .drive = fuzz_u8(in), .length = fuzz_u8(in)};
-    for (unsigned i = 0; i < 8; i++) {
-        record.data[i] = fuzz_u8(in);
-    }
-    record.drive %= DRIVES_MAX;
-    record.length %= 9;
-    return record;
-}
 
 static can_frame_t frame_of(const record_t *record, uint32_t function)
 {
@@ -324,20 +283,6 @@ static void disturb_bus(world_t *self, const record_t *record)
     }
 }
 
-static void ask(world_t *self, const record_t *record)
-{
-    (void)!drives_request(cia402_hal(&self->driver), (drives_request_t)(record->kind % (DRIVES_RESET_FAULT + 1u)));
-    if (record->data[0] % 2 != 0) {
-        follow_actual(self);
-    }
-}
-
-static void move(world_t *self, const record_t *record)
-{
-    const int32_t way = (int32_t)((uint32_t)record->data[0] | (uint32_t)record->data[1] << 8 | (uint32_t)record->data[2] << 16);
-    self->setpoint_q32[record->drive] += (record->kind % 2 != 0 ? 1 : -1) * ((q32_t)way << (record->kind / 2 % 24));
-}
-
 /* One record in a world; is_all: the one that gets everything. */
 static void step(world_t *self, const record_t *record, bool is_all)
 {
@@ -370,10 +315,10 @@ static void step(world_t *self, const record_t *record, bool is_all)
         disturb_bus(self, record);
         break;
     case 6:
-        ask(self, record);
+        (void)!drive_run_ask(&self->run, record);
         break;
     default:
-        move(self, record);
+        drive_run_move(&self->run, record);
         cycle(self);
         break;
     }
@@ -400,7 +345,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     m_world[0] = m_start[0][is_enabled];
     m_world[1] = m_start[1][is_enabled];
     for (unsigned i = 0; i < RECORDS_MAX && in.left > 0; i++) {
-        const record_t record = read_record(&in);
+        const record_t record = record_read(&in);
         step(&m_world[0], &record, true);
         step(&m_world[1], &record, false);
         compare();

@@ -40,6 +40,13 @@ static bool is_following(const canraw_slave_t *self, const canraw_slave_drive_t 
     return !drive->is_homing && !drive->is_faulty && (drive->is_enabled || !self->is_rich);
 }
 
+/* A way of any length. */
+static int32_t step_between(int32_t from, int32_t to)
+{
+    const int64_t way = llabs((int64_t)to - from);
+    return way < INT32_MAX ? (int32_t)way : INT32_MAX;
+}
+
 static void take_target(canraw_slave_t *self, canraw_slave_drive_t *drive, int32_t target)
 {
     const int32_t from = drive->setpoints == 0 ? drive->position : drive->target;
@@ -47,8 +54,9 @@ static void take_target(canraw_slave_t *self, canraw_slave_drive_t *drive, int32
     if (drive->is_homing) {
         return;
     }
-    if (is_following(self, drive) && abs(target - from) > drive->largest_step) {
-        drive->largest_step = abs(target - from);
+    const int32_t step = step_between(from, target);
+    if (is_following(self, drive) && step > drive->largest_step) {
+        drive->largest_step = step;
     }
     drive->target = target;
 }
@@ -108,7 +116,7 @@ static void answer_rich(canraw_slave_t *self, unsigned k)
 /* A target left from before is a step now. */
 static void enable(canraw_slave_drive_t *drive)
 {
-    const int32_t step = drive->setpoints > 0 ? abs(drive->target - drive->position) : 0;
+    const int32_t step = drive->setpoints > 0 ? step_between(drive->position, drive->target) : 0;
     if (drive->is_faulty || drive->is_enabled) {
         return;
     }
@@ -179,8 +187,8 @@ static void move(canraw_slave_t *self, canraw_slave_drive_t *drive)
         drive->position = self->is_rich ? CANRAW_SLAVE_RICH_ZERO : 0;
         drive->setpoints = 0;
     } else if (is_following(self, drive) && drive->setpoints > 0) {
-        const int32_t left = drive->target - drive->position;
-        drive->position += abs(left) < 4 ? left : left / 2;
+        const int64_t left = (int64_t)drive->target - drive->position;
+        drive->position += (int32_t)(llabs(left) < 4 ? left : left / 2);
     }
 }
 

@@ -56,11 +56,18 @@ void modbus_slave_lines(modbus_slave_t *self, hal_modbus_t line[DRIVES_MAX])
     }
 }
 
+/* A way of any length. */
+static int32_t step_between(int32_t from, int32_t to)
+{
+    const int64_t way = llabs((int64_t)to - from);
+    return way < INT32_MAX ? (int32_t)way : INT32_MAX;
+}
+
 static void set_target(modbus_slave_drive_t *drive, int32_t target)
 {
     const int32_t from = drive->is_target_set ? drive->target : drive->position;
     if (drive->is_enabled && target != drive->target) {
-        const int32_t step = abs(target - from);
+        const int32_t step = step_between(from, target);
         drive->largest_step = step > drive->largest_step ? step : drive->largest_step;
         drive->targets++;
     }
@@ -71,7 +78,7 @@ static void set_target(modbus_slave_drive_t *drive, int32_t target)
 /* A target left from before is a step now. */
 static void enable(modbus_slave_drive_t *drive)
 {
-    const int32_t step = drive->is_target_set ? abs(drive->target - drive->position) : 0;
+    const int32_t step = drive->is_target_set ? step_between(drive->position, drive->target) : 0;
     if (drive->is_faulty || drive->is_enabled || drive->is_weak) {
         return;
     }
@@ -156,8 +163,8 @@ static void move(modbus_slave_drive_t *drive, sim_modbus_device_t *device, uint6
     if (drive->is_homing && now_us >= drive->homing_us) {
         end_homing(drive, device);
     } else if (drive->is_enabled && !drive->is_faulty && !drive->is_homing && drive->is_target_set && !drive->is_frozen) {
-        const int32_t left = drive->target - drive->position;
-        drive->position += abs(left) < 4 ? left : left / 2;
+        const int64_t left = (int64_t)drive->target - drive->position;
+        drive->position += (int32_t)(llabs(left) < 4 ? left : left / 2);
     }
 }
 
