@@ -227,6 +227,16 @@ static uint32_t field_of(const modbus_drive_axis_t *self, const modbus_drive_map
     return field != NULL ? (uint32_t)modbus_drive_extract(field, self->got[block]) : 0;
 }
 
+/* Torque off first, whatever came of it the last time. */
+static void begin_startup(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+{
+    enter(self, MODBUS_DRIVE_STARTING, now_us);
+    tell(self, map, MODBUS_DRIVE_DISABLE);
+    if (self->job == MODBUS_DRIVE_NO_JOB) {
+        start_job(self, MODBUS_DRIVE_JOB_STARTUP);
+    }
+}
+
 /* All blocks of the feedback are there. */
 static void take_feedback(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const counts_scale_t *scale, uint64_t now_us)
 {
@@ -242,11 +252,7 @@ static void take_feedback(modbus_drive_axis_t *self, const modbus_drive_map_t *m
     self->status = field_of(self, map, MODBUS_DRIVE_STATUS);
     self->alarm = field_of(self, map, MODBUS_DRIVE_ALARM);
     if (self->phase == MODBUS_DRIVE_WAITING) {
-        enter(self, MODBUS_DRIVE_STARTING, now_us);
-        tell(self, map, MODBUS_DRIVE_DISABLE);
-        if (self->job == MODBUS_DRIVE_NO_JOB) {
-            start_job(self, MODBUS_DRIVE_JOB_STARTUP);
-        }
+        begin_startup(self, map, now_us);
     }
     if (is_up(self)) {
         take_fault(self, map, now_us);
@@ -293,6 +299,7 @@ static void refuse(modbus_drive_axis_t *self, uint32_t trouble, uint16_t object,
     enter(self, MODBUS_DRIVE_REFUSED, now_us);
     note_trouble(self, trouble, object, now_us);
     start_job(self, MODBUS_DRIVE_NO_JOB);
+    self->write.failures = 0; /* the next start is judged by itself */
 }
 
 /* An item was written, or read back. */
@@ -453,8 +460,7 @@ void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t 
         self->reset_until_us = 0;
     }
     if (self->phase == MODBUS_DRIVE_REFUSED && now_us - self->since_us >= REFUSED_US) {
-        enter(self, MODBUS_DRIVE_STARTING, now_us);
-        start_job(self, MODBUS_DRIVE_JOB_STARTUP);
+        begin_startup(self, map, now_us);
     }
     if (self->phase == MODBUS_DRIVE_STARTING && self->job == MODBUS_DRIVE_JOB_STARTUP && self->step >= map->items) {
         end_startup(self, map, now_us);
@@ -604,8 +610,7 @@ void modbus_drive_axis_request(modbus_drive_axis_t *self, const modbus_drive_map
 {
     if (!is_up(self)) {
         if (request == DRIVES_RESET_FAULT && self->phase == MODBUS_DRIVE_REFUSED) {
-            enter(self, MODBUS_DRIVE_STARTING, now_us);
-            start_job(self, MODBUS_DRIVE_JOB_STARTUP);
+            begin_startup(self, map, now_us);
         }
         return;
     }

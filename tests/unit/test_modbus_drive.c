@@ -251,6 +251,19 @@ static void test_startup_drive_that_comes_late_is_found(void)
     await(DRIVE_DISABLED, 1000);
 }
 
+static void test_startup_torque_off_that_was_refused_is_tried_again(void)
+{
+    map.command[MODBUS_DRIVE_DISABLE].block[0].address = 5000;
+    slave.drive[3].is_enabled = true;
+    cycles(100);
+    TEST_ASSERT_EQUAL_STRING("refused", report_of(3).phase);
+    TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_EXCEPTION, feedback[3].fault_code);
+    TEST_ASSERT_EQUAL_UINT8(0, driver.axis[3].write.failures);
+    map.command[MODBUS_DRIVE_DISABLE].block[0].address = 0;
+    await(DRIVE_DISABLED, 3000);
+    TEST_ASSERT_FALSE(slave.drive[3].is_enabled);
+}
+
 static void test_startup_drive_with_an_alarm_is_never_ready(void)
 {
     slave.drive[4].is_faulty = true;
@@ -780,6 +793,7 @@ int main(void)
     RUN_TEST(test_startup_missing_register_is_refused_with_the_exception);
     RUN_TEST(test_startup_item_that_is_not_checked_may_read_as_it_likes);
     RUN_TEST(test_startup_drive_that_comes_late_is_found);
+    RUN_TEST(test_startup_torque_off_that_was_refused_is_tried_again);
     RUN_TEST(test_startup_drive_with_an_alarm_is_never_ready);
     RUN_TEST(test_enable_with_an_old_target_in_the_register_makes_no_step);
     RUN_TEST(test_enable_one_drive_without_torque_keeps_all_waiting);
