@@ -172,7 +172,6 @@ typedef struct {
     bool is_checking;  /**< the item is being read back */
     bool is_broadcast; /**< the stop goes to all drives of the line first; whichever slot has its turn carries it */
     bool is_reset_due; /**< asked for while a stop was on its way */
-    bool is_begun;     /**< the request that led here has been seen in a poll */
     bool is_homed;
     bool is_after_homing; /**< placed once more, torque is on */
     bool is_placed;       /**< the target is where the drive was when it was last asked to follow */

@@ -64,7 +64,7 @@ static void note_trouble(modbus_drive_axis_t *self, uint32_t trouble, uint16_t o
 void modbus_drive_axis_init(modbus_drive_axis_t *self, const modbus_drive_map_t *map)
 {
     *self = (modbus_drive_axis_t){
-        .phase = MODBUS_DRIVE_WAITING, .is_begun = true, .is_homed = !has(map, MODBUS_DRIVE_HOME), .period_us = map->expected_us};
+        .phase = MODBUS_DRIVE_WAITING, .is_homed = !has(map, MODBUS_DRIVE_HOME), .period_us = map->expected_us};
 }
 
 static void lose(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint32_t trouble, uint64_t now_us)
@@ -189,7 +189,7 @@ static void take_homing(modbus_drive_axis_t *self, const modbus_drive_map_t *map
         self->is_homed = is_done;
         return;
     }
-    if (self->job != MODBUS_DRIVE_NO_JOB || self->read_us < self->mark_us || !self->is_begun) {
+    if (self->job != MODBUS_DRIVE_NO_JOB || self->read_us < self->mark_us) {
         return;
     }
     if (is_when(map->homing_failed, self->status)) {
@@ -374,7 +374,7 @@ static const modbus_drive_blocks_t *blocks_of(const modbus_drive_axis_t *self, c
 static uint16_t address_of(const modbus_drive_axis_t *self, const modbus_drive_map_t *map)
 {
     if (self->job == MODBUS_DRIVE_JOB_STARTUP) {
-        return self->step < map->items ? map->item[self->step].address : 0;
+        return map->item[self->step].address;
     }
     return blocks_of(self, map)->block[self->step].address;
 }
@@ -407,11 +407,7 @@ void modbus_drive_axis_end_broadcast(modbus_drive_axis_t *self)
 bool modbus_drive_axis_take_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_result_t *result,
                                   uint64_t now_us)
 {
-    if (!is_current(&self->write, result) || self->job == MODBUS_DRIVE_NO_JOB) {
-        return false;
-    }
-    if (self->is_broadcast) {
-        modbus_drive_axis_end_broadcast(self);
+    if (!is_current(&self->write, result)) { /* nor is one where there is no job: its start has forgotten them all */
         return false;
     }
     if (result->status == HV_ERR_STATE && self->phase == MODBUS_DRIVE_STARTING && self->write.failures >= map->retries) {
@@ -472,7 +468,6 @@ void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t 
     if (self->phase == MODBUS_DRIVE_PLACING) {
         step_placing(self, map);
     }
-    self->is_begun = true; /* a request is seen in one poll before it can end in the next */
 }
 
 /* --- What goes out --- */
@@ -508,11 +503,8 @@ static void write_one(const modbus_drive_map_t *map, modbus_request_t *out)
     out->function = map->is_single && out->count == 1 ? MODBUS_WRITE_REGISTER : MODBUS_WRITE_REGISTERS;
 }
 
-static bool next_item(const modbus_drive_axis_t *self, const modbus_drive_map_t *map, modbus_request_t *out)
+static void next_item(const modbus_drive_axis_t *self, const modbus_drive_map_t *map, modbus_request_t *out)
 {
-    if (self->step >= map->items || self->phase != MODBUS_DRIVE_STARTING) {
-        return false;
-    }
     const modbus_drive_item_t *item = &map->item[self->step];
     out->address = item->address;
     out->count = 1;
@@ -521,7 +513,6 @@ static bool next_item(const modbus_drive_axis_t *self, const modbus_drive_map_t 
     if (item->is_written && !self->is_checking) {
         write_one(map, out);
     }
-    return true;
 }
 
 /* False where the target does not fit its field, which is then a fault. */
@@ -554,8 +545,9 @@ bool modbus_drive_axis_next_write(modbus_drive_axis_t *self, const modbus_drive_
         return false;
     }
     *out = (modbus_request_t){.unit = self->is_broadcast ? HAL_MODBUS_BROADCAST : unit};
-    const bool is_there = self->job == MODBUS_DRIVE_JOB_STARTUP ? next_item(self, map, out) : next_block(self, map, now_us, out);
-    if (!is_there) {
+    if (self->job == MODBUS_DRIVE_JOB_STARTUP) {
+        next_item(self, map, out);
+    } else if (!next_block(self, map, now_us, out)) {
         return false;
     }
     if (!self->write.is_out) {
@@ -573,7 +565,6 @@ static void begin_homing(modbus_drive_axis_t *self, const modbus_drive_map_t *ma
     enter(self, MODBUS_DRIVE_HOMING, now_us);
     tell(self, map, MODBUS_DRIVE_HOME);
     self->mark_us = now_us;
-    self->is_begun = false;
     self->is_homed = false;
     self->is_homing_seen = false;
 }
@@ -672,7 +663,7 @@ static int64_t speed_of(const modbus_drive_axis_t *self, const modbus_drive_map_
     const q32_t asked_q32 = fx_mul_div(fx_add_sat(way_q32, way_q32 / 8), 1000000, self->period_us);
     const q32_t per_s_q32 = fx_clamp(asked_q32, -axis->speed_max_q32, axis->speed_max_q32);
     if (counts_from_units(&axis->speed, per_s_q32, &speed) != HV_OK) {
-        speed = per_s_q32 < 0 ? INT64_MIN : INT64_MAX;
+        speed = (per_s_q32 < 0) == (axis->speed.num < 0) ? INT64_MAX : INT64_MIN;
     }
     const int64_t magnitude = fx_clamp(fx_abs(speed), map->speed_least, INT64_MAX);
     return fx_clamp(field->is_signed && speed < 0 ? -magnitude : magnitude, modbus_drive_field_min(field),

@@ -96,7 +96,7 @@ static const char *exception_text(uint8_t exception)
 static uint32_t object_of(const modbus_drive_axis_t *self, const modbus_drive_map_t *map)
 {
     const bool is_item = self->phase == MODBUS_DRIVE_STARTING && self->job == MODBUS_DRIVE_JOB_STARTUP;
-    return (uint32_t)(is_item && self->step < map->items ? map->item[self->step].address : self->object) << 8;
+    return (uint32_t)(is_item ? map->item[self->step].address : self->object) << 8;
 }
 
 void modbus_drive_axis_words(const modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint8_t unit, drive_report_t *out)

@@ -577,7 +577,11 @@ static void test_setup_drive_whose_position_cannot_be_read_is_refused(void)
         TEST_ASSERT_EQUAL_HEX32(CIA402_NO_START, r.code);
         TEST_ASSERT_EQUAL_HEX32(0, r.object);
         TEST_ASSERT_FALSE(feedback[5].has_actual);
-        TEST_ASSERT_TRUE(slave.drive[5].boots > 1); /* tried from the beginning twice */
+        TEST_ASSERT_EQUAL_UINT32(2, slave.drive[5].boots); /* tried from the beginning twice */
+        cia402_slave_power(&slave, 5, true);
+        cycles(3000);
+        TEST_ASSERT_EQUAL_STRING("refused", report(5).phase);
+        TEST_ASSERT_EQUAL_UINT32(4, slave.drive[5].boots); /* and again when it boots */
         slave.drive[5].tpdo_cut = 0;
         slave.drive[5].position = 0;
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));

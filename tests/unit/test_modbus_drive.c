@@ -191,6 +191,18 @@ static void test_round_us_is_all_drives_of_a_line_and_no_less_than_the_period(vo
     TEST_ASSERT_EQUAL_UINT32(50000, modbus_drive_round_us(&map, &tcp, 6));
 }
 
+/* Of function 6 and of input registers: the other dialect. */
+static void test_round_us_knows_what_is_read_and_written_how(void)
+{
+    const modbus_drive_timing_t line = {19200, 10, 0};
+    const uint32_t bits = (16 + 8 + 5 + 2 * 2) * 10;
+    const uint32_t silences_us = 2 * 35 * 1000000 / 19200;
+    modbus_drive_map_t small = modbus_maps_small(true);
+    TEST_ASSERT_UINT32_WITHIN(4, bits * 10000 / 192 + silences_us, modbus_drive_round_us(&small, &line, 1));
+    small.setpoint.block[0].count = 2; /* two at once go by function 16 */
+    TEST_ASSERT_UINT32_WITHIN(4, (bits + 50) * 10000 / 192 + silences_us, modbus_drive_round_us(&small, &line, 1));
+}
+
 /* --- Start-up --- */
 
 static void test_startup_writes_and_reads_back_before_a_drive_is_ready(void)
@@ -239,6 +251,101 @@ static void test_startup_item_that_is_not_checked_may_read_as_it_likes(void)
     await(DRIVE_DISABLED, 100);
 }
 
+static void test_startup_names_the_register_it_is_at(void)
+{
+    open_shared(4000);
+    for (int i = 0; i < 500 && report_of(0).object == 0; i++) {
+        (void)!cycle();
+    }
+    TEST_ASSERT_EQUAL_STRING("starting up", report_of(0).phase);
+    TEST_ASSERT_EQUAL_HEX32(21 << 8, report_of(0).object);
+}
+
+static void test_startup_refused_drive_begins_again_at_once_by_a_reset_and_by_nothing_else(void)
+{
+    await(DRIVE_DISABLED, 100);
+    map.item[1].address = 5000;
+    slave.drive[2].is_on = false;
+    cycles(500);
+    slave.drive[2].is_on = true;
+    for (int i = 0; i < 1000 && strcmp(report_of(2).phase, "refused") != 0; i++) {
+        (void)!cycle();
+    }
+    TEST_ASSERT_EQUAL_STRING("refused", report_of(2).phase);
+    map.item[1].address = 20;
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+    cycles(50);
+    TEST_ASSERT_EQUAL_STRING("refused", report_of(2).phase);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    await(DRIVE_DISABLED, 50);
+}
+
+static void test_startup_without_anything_to_switch_off_or_to_write(void)
+{
+    map.command[MODBUS_DRIVE_DISABLE].count = 0;
+    await(DRIVE_DISABLED, 100);
+    TEST_ASSERT_EQUAL_UINT16(50, slave.device[3].holding[20]);
+    setUp();
+    map.items = 0;
+    await(DRIVE_DISABLED, 100);
+    TEST_ASSERT_EQUAL_UINT16(0, slave.device[3].holding[20]);
+}
+
+static void test_startup_exception_that_is_none_of_the_known(void)
+{
+    static const sim_modbus_fault_t k_plan[] = {{SIM_MODBUS_EXCEPTION, 1, 11}};
+    slave.line[4].plan = k_plan;
+    slave.line[4].planned = 1;
+    cycles(50);
+    TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_EXCEPTION, feedback[4].fault_code);
+    TEST_ASSERT_EQUAL_STRING("another code", report_of(4).detail);
+    TEST_ASSERT_EQUAL_UINT32(11, report_of(4).detail_code);
+}
+
+static hal_modbus_ops_t odd_ops;
+static uint8_t odd_count; /* of the answers of line 2; 0: as it is */
+static bool is_write_lost;
+
+static hv_status_t odd_poll(void *ctx, unsigned slot, modbus_result_t *result)
+{
+    const hv_status_t status = sim_modbus_hal(ctx).ops->poll(ctx, slot, result);
+    if (status == HV_OK && result->status == HV_OK && ctx == &slave.line[2] && odd_count != 0 && result->count != 0) {
+        result->count = odd_count;
+    }
+    return status;
+}
+
+static hv_status_t odd_submit(void *ctx, unsigned slot, const modbus_request_t *request)
+{
+    const bool is_lost = is_write_lost && modbus_is_write(request->function);
+    return is_lost ? HV_OK : sim_modbus_hal(ctx).ops->submit(ctx, slot, request);
+}
+
+/* A line whose answers are too short, or that loses what is written. */
+static void make_odd(void)
+{
+    odd_ops = (hal_modbus_ops_t){odd_submit, odd_poll};
+    odd_count = 0;
+    is_write_lost = false;
+    for (unsigned k = 0; k < AXES; k++) {
+        driver.line[k].ops = &odd_ops;
+    }
+}
+
+static void test_answers_of_another_length_are_damaged(void)
+{
+    make_odd();
+    odd_count = 2; /* of feedback */
+    cycles(100);
+    TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_DAMAGED, feedback[2].fault_code);
+    TEST_ASSERT_FALSE(feedback[2].has_actual);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[3].state);
+    odd_count = 4; /* right for feedback, not for what is read back */
+    cycles(600);
+    TEST_ASSERT_TRUE(feedback[2].has_actual);
+    TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_VALUE, feedback[2].fault_code);
+}
+
 static void test_startup_drive_that_comes_late_is_found(void)
 {
     slave.drive[6].is_on = false;
@@ -247,6 +354,8 @@ static void test_startup_drive_that_comes_late_is_found(void)
     TEST_ASSERT_EQUAL_STRING("no answer", report_of(6).trouble);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[5].state);
     TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT)); /* there is nothing to begin again yet */
+    TEST_ASSERT_EQUAL_STRING("waiting for the line", report_of(6).phase);
     slave.drive[6].is_on = true;
     await(DRIVE_DISABLED, 1000);
 }
@@ -354,6 +463,141 @@ static void test_torque_lost_is_disabled(void)
     slave.drive[2].is_enabled = false;
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[2].state);
+}
+
+/* While it waits for the others. */
+static void test_torque_lost_before_all_have_it_is_disabled(void)
+{
+    slave.drive[4].is_weak = true;
+    await(DRIVE_DISABLED, 100);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    cycles(200);
+    TEST_ASSERT_EQUAL_STRING("waits for all drives", report_of(3).phase);
+    slave.drive[3].is_enabled = false;
+    cycles(20);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[3].state);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLING, feedback[2].state);
+}
+
+static void test_enable_again_is_for_those_that_are_not(void)
+{
+    enable();
+    slave.drive[2].is_enabled = false;
+    cycles(20);
+    follow_actual();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    (void)!cycle();
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[1].state);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLING, feedback[2].state);
+    await(DRIVE_ENABLED, 200);
+    TEST_ASSERT_EQUAL_INT32(0, slave.drive[2].largest_step);
+}
+
+/* Nothing to switch it on with, and nothing that tells: torque is believed of a drive that answers. */
+static void test_enable_where_the_map_knows_no_torque(void)
+{
+    map.command[MODBUS_DRIVE_ENABLE].count = 0;
+    map.enabled_when.mask = 0;
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.device[k].holding[11] = 7;
+    }
+    await(DRIVE_DISABLED, 100);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    await(DRIVE_ENABLED, 100);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), slave.drive[k].target);
+    }
+}
+
+static void test_alarm_is_a_fault_where_no_status_tells(void)
+{
+    map.fault_when.mask = 0;
+    enable();
+    slave.drive[2].is_faulty = true;
+    cycles(20);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_EQUAL_HEX32(0x0E21, feedback[2].fault_code);
+}
+
+/* A code is never 0, as that would be no fault; and a large one is still the drive's own. */
+static void test_fault_code_of_the_drive_may_be_any(void)
+{
+    map.fault_when = (canraw_when_t){0, 0xFFFF};
+    slave.drive[2].is_homed = false;
+    cycles(100);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_EQUAL_HEX32(1, feedback[2].fault_code);
+    setUp();
+    map.feedback.block[0].field[2] = (modbus_drive_field_t){MODBUS_DRIVE_ALARM, 2, 2, false, false};
+    slave.drive[2].is_faulty = true;
+    cycles(100);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_EQUAL_HEX32((uint32_t)slave.device[2].holding[3] << 16 | 0x0E21, feedback[2].fault_code);
+    TEST_ASSERT_EQUAL_STRING("its own alarm", report_of(2).trouble);
+}
+
+/* Whatever was to be written but a stop is forgotten with a fault. */
+static void test_fault_while_being_enabled_gets_no_torque_later(void)
+{
+    open_shared(4000);
+    await(DRIVE_DISABLED, 3000);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    while (!slave.line[0].is_busy || slave.line[0].on_wire != 2 * 2 || driver.axis[2].phase != MODBUS_DRIVE_PLACING) {
+        (void)!cycle();
+    }
+    slave.drive[2].is_faulty = true; /* its target is on the wire */
+    for (int i = 0; i < 10 && driver.axis[2].phase == MODBUS_DRIVE_PLACING; i++) {
+        (void)!cycle();
+    }
+    TEST_ASSERT_EQUAL_STRING("being enabled", report_of(2).phase);
+    for (int i = 0; i < 100 && feedback[2].state != DRIVE_FAULT; i++) {
+        (void)!cycle();
+    }
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_EQUAL(MODBUS_DRIVE_NO_JOB, driver.axis[2].job);
+    cycles(200);
+    slave.drive[2].is_faulty = false;
+    cycles(200);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
+}
+
+static bool has_any_torque(void)
+{
+    for (unsigned k = 0; k < AXES; k++) {
+        if (slave.drive[k].is_enabled) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Wherever the line is with its turns. */
+static void test_fault_while_a_stop_is_on_its_way_does_not_hold_it_up(void)
+{
+    for (int i = 0; i < 56; i++) {
+        open_shared(4000);
+        enable();
+        cycles(i / 2);
+        for (unsigned k = 0; k < AXES; k++) {
+            slave.drive[k].is_faulty = true;
+        }
+        cycles(1);
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, i % 2 == 0 ? DRIVES_QUICK_STOP : DRIVES_DISABLE));
+        TEST_ASSERT_FALSE(modbus_drive_is_told(&driver));
+        (void)!drives_poll(hal, now_us, feedback);
+        TEST_ASSERT_TRUE(feedback[6].state == DRIVE_FAULT || strcmp(report_of(6).phase, "stopping") == 0);
+        for (int n = 0; n < 150; n++) {
+            (void)!cycle();
+            TEST_ASSERT_TRUE(!modbus_drive_is_told(&driver) || !has_any_torque());
+        }
+        TEST_ASSERT_TRUE(are_all(DRIVE_FAULT));
+        TEST_ASSERT_TRUE(modbus_drive_is_told(&driver));
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_EQUAL_UINT32(i % 2 == 0 ? 1 : 0, slave.drive[k].stops);
+            TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+        }
+    }
 }
 
 static void test_alarm_is_the_fault_code(void)
@@ -514,6 +758,193 @@ static void test_smoothing_takes_out_what_the_line_cannot_carry(void)
     TEST_ASSERT_TRUE(high - low < 10000 / 3 / 8); /* 0.5 mm from top to bottom, sampled: now less than a quarter of it */
 }
 
+/* Registers that are not neighbours: position and speed, status and alarm, each in a block of its own. */
+static void test_blocks_of_a_setpoint_go_out_whole(void)
+{
+    map.setpoint = (modbus_drive_blocks_t){2,
+                                           {{10, 2, 1, 0, {0}, {{MODBUS_DRIVE_POSITION, 0, 2, true, false}}},
+                                            {12, 1, 1, 0, {0}, {{MODBUS_DRIVE_SPEED, 0, 1, false, false}}}}};
+    map.feedback = (modbus_drive_blocks_t){
+        2,
+        {{1, 1, 1, 0, {0}, {{MODBUS_DRIVE_STATUS, 0, 1, false, false}}},
+         {2, 3, 2, 0, {0}, {{MODBUS_DRIVE_POSITION, 0, 2, true, false}, {MODBUS_DRIVE_ALARM, 2, 1, false, false}}}}};
+    open_slaves(false, false, 300);
+    enable();
+    move(MM(1) / 20, 0, 400);
+    cycles(100);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM + 20), slave.drive[k].target);
+    }
+    move(MM(1) / 20, 0, 200);
+    TEST_ASSERT_UINT16_WITHIN(60, 562, slave.drive[3].speed);
+    slave.drive[2].is_faulty = true;
+    cycles(20);
+    TEST_ASSERT_EQUAL_HEX32(0x0E21, feedback[2].fault_code);
+}
+
+/* Of which one is constant: both in one transaction, by function 16 where single ones go by 6. */
+static void test_setpoint_of_two_registers_on_drives_that_take_single_ones(void)
+{
+    map = modbus_maps_small(false);
+    map.setpoint.block[0].count = 2;
+    map.setpoint.block[0].data[1] = 1; /* torque stays on */
+    open_slaves(true, false, 300);
+    enable();
+    move(-MM(1) / 20, 0, 400);
+    cycles(100);
+    TEST_ASSERT_EQUAL_INT32((START_MM - 20) * 100, slave.drive[5].target);
+}
+
+/* On both sides of zero. */
+static void test_mean_of_positions_below_zero(void)
+{
+    map = modbus_maps_small(true);
+    open_slaves(true, true, 300);
+    for (unsigned k = 0; k < AXES; k++) {
+        modbus_slave_place(&slave, k, -1000);
+    }
+    enable();
+    move(MM(1) / 50, 0, 1000);
+    cycles(200);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_INT32(1000, slave.drive[k].target);
+    }
+}
+
+/* Of a drive that counts the other way round, beyond all numbers. */
+static void test_speed_that_no_number_tells_is_at_the_end_of_its_field(void)
+{
+    for (unsigned i = 0; i < 2; i++) {
+        map = modbus_maps_wide(false);
+        map.setpoint.block[0].field[1].is_signed = true;
+        map.axis[3].scale = (counts_scale_t){1, 1000, MODBUS_SLAVE_WIDE_ZERO};
+        map.axis[3].speed = (counts_scale_t){INT32_MIN, 1, -1};
+        map.axis[3].step_max_q32 = map.axis[3].speed_max_q32 = INT64_MAX;
+        map.axis[3].following_max_q32 = map.axis[3].carry_q32 = 0;
+        open_slaves(false, false, 300);
+        modbus_slave_place(&slave, 3, MODBUS_SLAVE_WIDE_ZERO);
+        enable();
+        cycles(20);
+        setpoint_q32[3] = i == 0 ? MM(1 << 30) : -MM(1 << 30);
+        cycles(3);
+        TEST_ASSERT_EQUAL_INT16(i == 0 ? INT16_MIN : INT16_MAX, (int16_t)slave.drive[3].speed);
+    }
+}
+
+/* The sign is that of the way. */
+static void test_speed_with_a_sign_has_the_direction(void)
+{
+    map.setpoint.block[0].field[1].is_signed = true;
+    open_shared(2000);
+    map.setpoint.block[0].field[1].is_signed = true;
+    enable();
+    cycles(500);
+    move(-MM(1) / 20, 0, 600);
+    TEST_ASSERT_INT16_WITHIN(60, -562, (int16_t)slave.drive[3].speed);
+}
+
+/* Nobody asks for anything for a while: what comes then is taken up, and no faster than a line so slow could carry. */
+static void test_setpoints_that_pause_are_taken_up_without_a_step(void)
+{
+    enable();
+    cycles(100);
+    for (int i = 0; i < 12000; i++) {
+        now_us += CYCLE_US;
+        modbus_slave_step(&slave, now_us);
+        (void)!drives_poll(hal, now_us, feedback);
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    move(MM(1) / 2, 0, 1);
+    TEST_ASSERT_TRUE(driver.paced > 0);
+    cycles(500);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM) - 5000 / 3, slave.drive[k].target);
+        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 5000 / 3 + 1);
+    }
+}
+
+/* The worker loses what is written for five seconds, while the platform is ridden to and fro: the mean stays one. */
+static void test_setpoints_that_nobody_takes_are_no_step_when_somebody_does(void)
+{
+    make_odd();
+    enable();
+    cycles(100);
+    is_write_lost = true;
+    for (int i = 0; i < 5000; i++) {
+        move(i / 100 % 2 == 0 ? MM(1) / 50 : -MM(1) / 50, 0, 1);
+    }
+    is_write_lost = false;
+    cycles(3000);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_INT32_WITHIN(1, wide_counts(START_MM), slave.drive[k].target);
+        TEST_ASSERT_TRUE(slave.drive[k].largest_step <= 3 * 10000 / 3);
+    }
+}
+
+/* --- Homing --- */
+
+static void home(void)
+{
+    enable();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    (void)!cycle();
+    TEST_ASSERT_TRUE(are_all(DRIVE_HOMING));
+}
+
+static void test_homing_on_a_slow_line_ends_at_the_zero(void)
+{
+    open_shared(4000);
+    home();
+    await(DRIVE_ENABLED, 2000);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_TRUE(feedback[k].is_homed);
+        TEST_ASSERT_EQUAL_INT32(MODBUS_SLAVE_WIDE_ZERO, slave.drive[k].target);
+    }
+}
+
+/* "Done" that never was "not done" may be that of the last homing: it is believed after a while. */
+static void test_homing_done_from_the_start_is_believed_after_a_while(void)
+{
+    map.homing_done = (canraw_when_t){0, 8}; /* a bit that is never set */
+    home();
+    const uint64_t begin_us = now_us;
+    await(DRIVE_ENABLED, 2000);
+    TEST_ASSERT_TRUE(now_us - begin_us >= 499000 && now_us - begin_us < 560000);
+}
+
+static void test_homing_failed_is_a_fault(void)
+{
+    map.homing_failed = (canraw_when_t){0, 4}; /* not homed */
+    home();
+    for (int i = 0; i < 100 && !are_all(DRIVE_FAULT); i++) {
+        (void)!cycle();
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_FAULT));
+    TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_HOMING_FAILED, feedback[0].fault_code);
+    TEST_ASSERT_EQUAL_STRING("homing failed", report_of(0).trouble);
+    cycles(20);
+    TEST_ASSERT_FALSE(slave.drive[0].is_homing);
+}
+
+/* Without blocks for it the zero is where the drive has it: seen to begin, and over. */
+static void test_homing_without_blocks_is_homed_from_the_start(void)
+{
+    map.command[MODBUS_DRIVE_HOME].count = 0;
+    map.homing_done.mask = 0;
+    open_slaves(false, false, 300);
+    slave.drive[2].is_homed = false;
+    enable();
+    for (int i = 0; i < 4; i++) { /* just before and behind feedback that is newer */
+        cycles(20 + i);
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+        (void)!cycle();
+        TEST_ASSERT_TRUE(are_all(DRIVE_HOMING));
+        await(DRIVE_ENABLED, 100);
+        TEST_ASSERT_TRUE(feedback[2].is_homed);
+        TEST_ASSERT_EQUAL_INT32(wide_counts(START_MM), slave.drive[2].target);
+    }
+}
+
 /* --- What goes wrong --- */
 
 static sim_modbus_fault_t plan[40];
@@ -637,6 +1068,113 @@ static void test_quick_stop_by_broadcast_reaches_all_drives_at_once(void)
     }
 }
 
+/* Whenever it comes: also behind a set-point that is on the wire. A drive that is not there holds nobody up. */
+static void test_quick_stop_by_broadcast_at_any_time(void)
+{
+    for (int shift = 0; shift < 30; shift++) {
+        open_shared(4000);
+        map.is_broadcast = true;
+        enable();
+        slave.drive[5].is_on = false;
+        for (int i = 0; i < 2000 && feedback[5].state != DRIVE_OFFLINE; i++) {
+            (void)!cycle();
+        }
+        move(MM(1) / 50, 0, 20 + shift);
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+        cycles(36); /* at worst one that waits for the drive that is gone */
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+        }
+        cycles(150);
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_TRUE(k == 5 || slave.drive[k].stops >= 2);
+        }
+    }
+}
+
+static void test_quick_stop_by_broadcast_goes_out_on_every_line(void)
+{
+    map.is_broadcast = true;
+    enable();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+    cycles(20);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(2, slave.drive[k].stops);
+    }
+}
+
+/* A drive that knows no stop loses its torque; one that knows neither hears nothing more. */
+static void test_quick_stop_where_the_map_has_none(void)
+{
+    for (unsigned i = 0; i < 2; i++) {
+        map = modbus_maps_wide(false);
+        map.is_broadcast = true;
+        map.command[MODBUS_DRIVE_STOP].count = 0;
+        map.command[MODBUS_DRIVE_DISABLE].count = i == 0 ? 1 : 0;
+        open_slaves(false, false, 300);
+        enable();
+        move(MM(1) / 50, 0, 50);
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+        const uint32_t targets = slave.drive[3].targets;
+        setpoint_q32[3] += MM(1);
+        cycles(20);
+        TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
+        TEST_ASSERT_EQUAL(i != 0, slave.drive[3].is_enabled);
+        TEST_ASSERT_TRUE(slave.drive[3].targets <= targets + 1); /* what was on the wire */
+        TEST_ASSERT_EQUAL_UINT32(0, slave.drive[3].stops);
+    }
+}
+
+/* Drives are told to stop first; the reset comes behind that, and counts once it was written. */
+static void test_reset_waits_for_the_stop(void)
+{
+    open_shared(4000);
+    map.axis[2].following_max_q32 = MM(3);
+    enable();
+    slave.drive[2].is_frozen = true;
+    for (int i = 0; i < 1000 && feedback[2].state != DRIVE_FAULT; i++) {
+        move(MM(1) / 50, 0, 1);
+    }
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    bool was_reset = false;
+    for (int i = 0; i < 300 && feedback[2].state == DRIVE_FAULT; i++) {
+        was_reset |= driver.axis[2].job == MODBUS_DRIVE_JOB_COMMAND && driver.axis[2].command == MODBUS_DRIVE_RESET;
+        TEST_ASSERT_TRUE(!was_reset || slave.drive[2].stops == 1);
+        (void)!cycle();
+    }
+    TEST_ASSERT_TRUE(was_reset);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[2].state);
+    TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
+}
+
+/* A position that has no place in millimetres is none. */
+static void test_position_beyond_all_millimetres_is_not_taken(void)
+{
+    map.axis[2].scale = (counts_scale_t){1, 1, INT32_MIN};
+    modbus_slave_place(&slave, 2, INT32_MAX);
+    cycles(100);
+    TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[2].state);
+    TEST_ASSERT_FALSE(feedback[2].has_actual);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[3].state);
+}
+
+static void test_setpoint_that_has_no_counts_is_a_fault(void)
+{
+    map.axis[2].scale = (counts_scale_t){INT32_MIN, 1, MODBUS_SLAVE_WIDE_ZERO};
+    map.axis[2].step_max_q32 = INT64_MAX;
+    map.axis[2].following_max_q32 = map.axis[2].carry_q32 = 0;
+    modbus_slave_place(&slave, 2, MODBUS_SLAVE_WIDE_ZERO);
+    enable();
+    cycles(20);
+    const int32_t target = slave.drive[2].target;
+    setpoint_q32[2] = INT64_MIN;
+    cycles(20);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_FOLLOWING, feedback[2].fault_code);
+    TEST_ASSERT_EQUAL_INT32(target, slave.drive[2].target);
+    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].stops);
+}
+
 static void test_setpoint_far_from_a_drive_that_hangs_is_a_fault(void)
 {
     map.axis[2].following_max_q32 = MM(3);
@@ -755,19 +1293,57 @@ static void refuse(int row)
     case 19:
         map.axis[3].speed_max_q32 = 0;
         break;
-    default:
+    case 20:
         map.items = MODBUS_DRIVE_STARTUP_MAX + 1;
+        break;
+    case 21:
+        map.expected_us = 0;
+        break;
+    case 22:
+        map.setpoint.count = MODBUS_DRIVE_BLOCKS_MAX + 1;
+        break;
+    case 23:
+        map.setpoint.block[0].count = 0;
+        map.setpoint.block[0].fields = 0;
+        break;
+    case 24:
+        map.feedback.block[0].count = MODBUS_DRIVE_REGISTERS_MAX + 1;
+        break;
+    case 25:
+        map.feedback.block[0].fields = MODBUS_DRIVE_FIELDS_MAX + 1;
+        break;
+    case 26:
+        map.setpoint.block[0].field[1].registers = 3;
+        map.setpoint.block[0].count = 6;
+        break;
+    case 27:
+        map.feedback.block[0].field[0].value = MODBUS_DRIVE_SPEED;
+        break;
+    case 28:
+        map.axis[3].speed.den = 0;
+        break;
+    case 29:
+        map.axis[3].carry_q32 = -1;
+        break;
+    default:
+        map.axis[3].following_max_q32 = -1;
         break;
     }
 }
 
 static void test_init_map_that_contradicts_itself_is_refused(void)
 {
-    for (int row = 0; row < 21; row++) {
+    for (int row = 0; row < 31; row++) {
         refuse(row);
         TEST_ASSERT_EQUAL_MESSAGE(HV_ERR_RANGE, init_status(), "row");
     }
     map = modbus_maps_wide(false);
+    TEST_ASSERT_EQUAL(HV_OK, init_status());
+    map.axis[3].unit = 255; /* of TCP */
+    TEST_ASSERT_EQUAL(HV_OK, init_status());
+    map.enabled_when.mask = map.fault_when.mask = map.homing_done.mask = 0; /* nothing to judge, no status */
+    map.command[MODBUS_DRIVE_HOME].count = 0;
+    map.feedback.block[0].field[0].value = MODBUS_DRIVE_ALARM;
     TEST_ASSERT_EQUAL(HV_OK, init_status());
 }
 
@@ -787,21 +1363,34 @@ int main(void)
     RUN_TEST(test_pack_out_of_range_changes_nothing);
     RUN_TEST(test_transaction_us_is_what_bytes_and_silence_take);
     RUN_TEST(test_round_us_is_all_drives_of_a_line_and_no_less_than_the_period);
+    RUN_TEST(test_round_us_knows_what_is_read_and_written_how);
     RUN_TEST(test_startup_writes_and_reads_back_before_a_drive_is_ready);
     RUN_TEST(test_startup_takes_torque_off_a_drive_that_was_left_with_it);
     RUN_TEST(test_startup_wrong_value_is_refused_by_name_and_taken_when_mended);
     RUN_TEST(test_startup_missing_register_is_refused_with_the_exception);
     RUN_TEST(test_startup_item_that_is_not_checked_may_read_as_it_likes);
+    RUN_TEST(test_startup_names_the_register_it_is_at);
+    RUN_TEST(test_startup_refused_drive_begins_again_at_once_by_a_reset_and_by_nothing_else);
+    RUN_TEST(test_startup_without_anything_to_switch_off_or_to_write);
+    RUN_TEST(test_startup_exception_that_is_none_of_the_known);
+    RUN_TEST(test_answers_of_another_length_are_damaged);
     RUN_TEST(test_startup_drive_that_comes_late_is_found);
     RUN_TEST(test_startup_torque_off_that_was_refused_is_tried_again);
     RUN_TEST(test_startup_drive_with_an_alarm_is_never_ready);
     RUN_TEST(test_enable_with_an_old_target_in_the_register_makes_no_step);
     RUN_TEST(test_enable_one_drive_without_torque_keeps_all_waiting);
     RUN_TEST(test_enable_target_last_writes_it_after_torque_only);
-    RUN_TEST(test_enable_target_last_begins_where_the_drive_is_now);
     RUN_TEST(test_enable_target_last_waits_for_torque);
     RUN_TEST(test_torque_lost_is_disabled);
+    RUN_TEST(test_torque_lost_before_all_have_it_is_disabled);
+    RUN_TEST(test_enable_again_is_for_those_that_are_not);
+    RUN_TEST(test_enable_where_the_map_knows_no_torque);
+    RUN_TEST(test_alarm_is_a_fault_where_no_status_tells);
+    RUN_TEST(test_fault_code_of_the_drive_may_be_any);
+    RUN_TEST(test_fault_while_being_enabled_gets_no_torque_later);
+    RUN_TEST(test_fault_while_a_stop_is_on_its_way_does_not_hold_it_up);
     RUN_TEST(test_alarm_is_the_fault_code);
+    RUN_TEST(test_enable_target_last_begins_where_the_drive_is_now);
     RUN_TEST(test_slow_line_gets_the_newest_setpoint_and_no_backlog);
     RUN_TEST(test_slow_line_is_measured);
     RUN_TEST(test_slow_line_paces_all_axes_alike);
@@ -809,12 +1398,29 @@ int main(void)
     RUN_TEST(test_speed_register_fits_the_period_of_the_line);
     RUN_TEST(test_speed_register_keeps_below_its_limit);
     RUN_TEST(test_smoothing_takes_out_what_the_line_cannot_carry);
+    RUN_TEST(test_blocks_of_a_setpoint_go_out_whole);
+    RUN_TEST(test_setpoint_of_two_registers_on_drives_that_take_single_ones);
+    RUN_TEST(test_mean_of_positions_below_zero);
+    RUN_TEST(test_speed_that_no_number_tells_is_at_the_end_of_its_field);
+    RUN_TEST(test_speed_with_a_sign_has_the_direction);
+    RUN_TEST(test_setpoints_that_pause_are_taken_up_without_a_step);
+    RUN_TEST(test_setpoints_that_nobody_takes_are_no_step_when_somebody_does);
+    RUN_TEST(test_homing_on_a_slow_line_ends_at_the_zero);
+    RUN_TEST(test_homing_done_from_the_start_is_believed_after_a_while);
+    RUN_TEST(test_homing_failed_is_a_fault);
+    RUN_TEST(test_homing_without_blocks_is_homed_from_the_start);
     RUN_TEST(test_failures_within_the_retries_are_borne);
     RUN_TEST(test_failures_beyond_the_retries_are_offline_with_their_reason);
     RUN_TEST(test_feedback_too_old_is_offline);
     RUN_TEST(test_silent_drive_on_a_shared_line_leaves_the_others_alive);
     RUN_TEST(test_quick_stop_replaces_the_setpoint_that_waits);
     RUN_TEST(test_quick_stop_by_broadcast_reaches_all_drives_at_once);
+    RUN_TEST(test_quick_stop_by_broadcast_at_any_time);
+    RUN_TEST(test_quick_stop_by_broadcast_goes_out_on_every_line);
+    RUN_TEST(test_quick_stop_where_the_map_has_none);
+    RUN_TEST(test_reset_waits_for_the_stop);
+    RUN_TEST(test_position_beyond_all_millimetres_is_not_taken);
+    RUN_TEST(test_setpoint_that_has_no_counts_is_a_fault);
     RUN_TEST(test_setpoint_far_from_a_drive_that_hangs_is_a_fault);
     RUN_TEST(test_reset_of_a_drive_that_stays_faulty_ends_in_fault);
     RUN_TEST(test_setpoint_that_does_not_fit_its_register_is_a_fault);
