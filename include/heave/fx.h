@@ -52,10 +52,10 @@ static inline int64_t fx_mul_high(int64_t a, int64_t b)
     return FX_WIDE_MUL_HIGH(a, b);
 }
 
-/** The exact sum of the squares of three values below 2^62. */
+/** The exact sum of the squares of three values from -2^61 to 2^61. */
 static inline fx_u128_t fx_square3(const int64_t v[3])
 {
-    return FX_WIDE_DOT3(v, v);
+    return FX_WIDE_SQUARE3(v);
 }
 
 /** value / 2^shift, rounded down.

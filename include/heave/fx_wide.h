@@ -60,17 +60,31 @@ static inline int64_t fx_wide_mul_shift_portable(int64_t a, int64_t b, unsigned 
     return fx_wide_shift_portable(fx_wide_signed_product_portable(a, b), shift);
 }
 
-/** The exact a . b in two's complement. */
-static inline fx_u128_t fx_wide_dot3_portable(const int64_t a[3], const int64_t b[3])
+/** fx_square3(), from sums of the products of halves: with values of at most 2^61 none of them is above 2^64. */
+static inline fx_u128_t fx_wide_square3_portable(const int64_t v[3])
 {
-    return fx_wide_add(fx_wide_add(fx_wide_signed_product_portable(a[0], b[0]), fx_wide_signed_product_portable(a[1], b[1])),
-                       fx_wide_signed_product_portable(a[2], b[2]));
+    uint64_t high = 0, middle = 0, low_hi = 0, low_lo = 0;
+    for (unsigned i = 0; i < 3; i++) {
+        const uint64_t magnitude = (uint64_t)(v[i] < 0 ? -v[i] : v[i]);
+        const uint32_t hi = (uint32_t)(magnitude >> 32), lo = (uint32_t)magnitude;
+        const uint64_t low = (uint64_t)lo * lo;
+        high += (uint64_t)hi * hi;
+        middle += (uint64_t)hi * lo;
+        low_hi += low >> 32;
+        low_lo += low & UINT32_MAX;
+    }
+    middle = 2 * middle + low_hi + (low_lo >> 32);
+    return (fx_u128_t){high + (middle >> 32), (middle << 32) | (low_lo & UINT32_MAX)};
 }
 
-/** fx_mul_high(). */
+/** fx_mul_high(): halves with their signs, so that nothing has to be taken off for signs afterwards. */
 static inline int64_t fx_wide_mul_high_portable(int64_t a, int64_t b)
 {
-    return (int64_t)fx_wide_signed_product_portable(a, b).hi;
+    const int32_t a_hi = (int32_t)(a >> 32), b_hi = (int32_t)(b >> 32);
+    const uint32_t a_lo = (uint32_t)a, b_lo = (uint32_t)b;
+    const int64_t middle = a_hi * (int64_t)b_lo + (int64_t)(((uint64_t)a_lo * b_lo) >> 32);
+    const int64_t carry = b_hi * (int64_t)a_lo + (int64_t)(uint32_t)middle;
+    return (int64_t)a_hi * b_hi + (middle >> 32) + (carry >> 32);
 }
 
 #if defined(__SIZEOF_INT128__)
@@ -112,10 +126,10 @@ static inline int64_t fx_wide_mul_shift_fit_native(int64_t a, int64_t b, unsigne
     return fx_wide_shift_fit_native((fx_wide_int_t)a * b, shift);
 }
 
-/** The exact a . b in two's complement. */
-static inline fx_u128_t fx_wide_dot3_native(const int64_t a[3], const int64_t b[3])
+/** fx_square3() by 128-bit integers. */
+static inline fx_u128_t fx_wide_square3_native(const int64_t v[3])
 {
-    const fx_wide_int_t sum = (fx_wide_int_t)a[0] * b[0] + (fx_wide_int_t)a[1] * b[1] + (fx_wide_int_t)a[2] * b[2];
+    const fx_wide_int_t sum = (fx_wide_int_t)v[0] * v[0] + (fx_wide_int_t)v[1] * v[1] + (fx_wide_int_t)v[2] * v[2];
     return (fx_u128_t){(uint64_t)(sum >> 64), (uint64_t)sum};
 }
 
@@ -131,13 +145,13 @@ static inline int64_t fx_wide_mul_high_native(int64_t a, int64_t b)
 #define FX_WIDE_PRODUCT       fx_wide_product_native
 #define FX_WIDE_MUL_SHIFT     fx_wide_mul_shift_native
 #define FX_WIDE_MUL_SHIFT_FIT fx_wide_mul_shift_fit_native
-#define FX_WIDE_DOT3          fx_wide_dot3_native
+#define FX_WIDE_SQUARE3       fx_wide_square3_native
 #define FX_WIDE_MUL_HIGH      fx_wide_mul_high_native
 #else
 #define FX_WIDE_PRODUCT       fx_wide_product_portable
 #define FX_WIDE_MUL_SHIFT     fx_wide_mul_shift_portable
 #define FX_WIDE_MUL_SHIFT_FIT fx_wide_mul_shift_portable
-#define FX_WIDE_DOT3          fx_wide_dot3_portable
+#define FX_WIDE_SQUARE3       fx_wide_square3_portable
 #define FX_WIDE_MUL_HIGH      fx_wide_mul_high_portable
 #endif
 

@@ -26,10 +26,10 @@ static const uint16_t k_inverse_root_q16[193] = {
 HV_WRAPS static uint64_t inverse_root_q31(uint64_t x_q64)
 {
     const uint16_t *low = &k_inverse_root_q16[(x_q64 >> 56) - 64];
-    const uint64_t slope_q24 = ((uint64_t)low[0] - low[1]) * (uint16_t)(x_q64 >> 40);
-    const uint64_t guess_q20 = (UINT64_C(1) << 20) + ((((uint64_t)low[0] << 16) - slope_q24) >> 12);
-    const int64_t excess_q72 = (int64_t)((x_q64 >> 32) * (guess_q20 * guess_q20));
-    return (guess_q20 << 11) - (uint64_t)(((int64_t)guess_q20 * (excess_q72 >> 24)) >> 38);
+    const uint32_t slope_q24 = ((uint32_t)low[0] - low[1]) * (uint16_t)(x_q64 >> 40);
+    const uint32_t guess_q20 = (UINT32_C(1) << 20) + ((((uint32_t)low[0] << 16) - slope_q24) >> 12);
+    const int64_t excess_q72 = (int64_t)((x_q64 >> 32) * ((uint64_t)guess_q20 * guess_q20));
+    return ((uint64_t)guess_q20 << 11) - (uint64_t)(((int64_t)guess_q20 * (excess_q72 >> 24)) >> 38);
 }
 
 /* floor(sqrt(value)) for value >= 2^62. */

@@ -23,6 +23,7 @@ HERE = Path(__file__).resolve().parent
 TOP = HERE.parents[1]
 sys.path[:0] = [str(TOP / "tools/lib"), str(HERE)]
 import bench_analysis as analysis  # noqa: E402  the path above has to be set first
+import bench_cortex  # noqa: E402
 import bench_cost  # noqa: E402
 import bench_peers  # noqa: E402
 import bench_signal as signals  # noqa: E402
@@ -189,6 +190,22 @@ def check_dots(suite):
 
 
 # ---- tools/bench ----
+def check_cortex(suite):
+    with suite.case("bench cortex: ticks are counted in those of a million instructions, without the loop's own"):
+        program = Path(write("emulator", ""))
+        said = "runs 64\\ncalibration 25000\\nnothing 16\\ninverse-heave 816\\ninverse-double 8016\\nforward-heave 32\\nforward-double 48\\n"
+        emulator = Path(write("qemu-system-arm", f"#!/bin/sh\nprintf '{said}'\n"))
+        emulator.chmod(0o755)
+        before = os.environ["PATH"]
+        os.environ["PATH"] = f"{emulator.parent}:{before}"
+        try:
+            rows = bench_cortex.count(program)
+        finally:
+            os.environ["PATH"] = before
+        expect_near(rows["inverse"]["heave"], 800 * 40 / 64, 1e-9, "instructions")
+        assert "500 instructions; 10.0 x as many in double, 5000; goal 10: met" in bench_cortex.line_of("cortex-m3", "inverse", rows["inverse"])
+
+
 def check_bench_arguments(suite):
     refusals = {
         "an option of no subcommand": (("--speed",), 2, "--speed"),
@@ -202,6 +219,7 @@ def check_bench_arguments(suite):
         "a rate out of range": (("motion", "--rates", "60,1"), 2, "from 10 to 200"),
         "a record too short": (("motion", "--seconds", "5"), 2, "from 12"),
         "no rounds": (("cost", "--rounds", "0"), 2, "from 1"),
+        "rounds where instructions are counted": (("cortex", "--rounds", "5"), 2, "--rounds"),
         "a program that is not there": (("motion", "--program", "nowhere"), 1, "nowhere"),
         "a program that is another one": (("cost", "--program", "/bin/false"), 1, "false"),
         "heaved that fails": (("motion", "--no-ruckig", "--seconds", "12", "--program", "/bin/false"), 1, "status 1"),
@@ -461,7 +479,8 @@ def main():
     parser.add_argument("--bench-peers")
     arguments = parser.parse_args()
     suite = tap.Suite()
-    for check in (check_plot_arguments, check_window, check_dots, check_bench_arguments, check_analysis, check_signals, check_rival, check_peers):
+    for check in (check_plot_arguments, check_window, check_dots, check_bench_arguments, check_cortex, check_analysis, check_signals, check_rival,
+                  check_peers):
         check(suite)
     check_programs(suite, arguments.heaved, arguments.bench_core)
     check_peers_program(suite, arguments.bench_peers)

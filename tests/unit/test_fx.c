@@ -159,9 +159,9 @@ static void test_wide_forms_random_values_give_the_same_bits(void)
         const unsigned shift = 1 + (unsigned)(next_random() % 126);
         differences += fx_wide_mul_shift_native(a, b, shift) != fx_wide_mul_shift_portable(a, b, shift);
         differences += fx_wide_mul_high_native(a, b) != fx_wide_mul_high_portable(a, b);
-        const int64_t v[3] = {a >> 2, b >> 2, a ^ b}, w[3] = {b >> 1, a >> 2, b >> 3};
-        const fx_u128_t dot = fx_wide_dot3_native(v, w), other_dot = fx_wide_dot3_portable(v, w);
-        differences += dot.hi != other_dot.hi || dot.lo != other_dot.lo;
+        const int64_t v[3] = {a >> 2, b >> 2, (a ^ b) >> 2};
+        const fx_u128_t sum = fx_wide_square3_native(v), other_sum = fx_wide_square3_portable(v);
+        differences += sum.hi != other_sum.hi || sum.lo != other_sum.lo;
         const fx_u128_t p = fx_wide_product_native((uint64_t)a, (uint64_t)b);
         const fx_u128_t q = fx_wide_product_portable((uint64_t)a, (uint64_t)b);
         differences += p.hi != q.hi || p.lo != q.lo;
@@ -264,9 +264,9 @@ static void test_square3_sums_are_exact(void)
 {
     const int64_t v[3] = {3, -4, 12};
     TEST_ASSERT_EQUAL_UINT64(169, fx_square3(v).lo);
-    const int64_t wide[3] = {-Q62_ONE, Q62_ONE, Q62_ONE - 1}; /* 3 * 2^124 - 2^63 + 1 */
-    TEST_ASSERT_EQUAL_HEX64((UINT64_C(3) << 60) - 1, fx_square3(wide).hi);
-    TEST_ASSERT_EQUAL_HEX64((UINT64_C(1) << 63) + 1, fx_square3(wide).lo);
+    const int64_t wide[3] = {-Q62_ONE / 2, Q62_ONE / 2, Q62_ONE / 2 - 1}; /* 3 * 2^122 - 2^62 + 1 */
+    TEST_ASSERT_EQUAL_HEX64((UINT64_C(3) << 58) - 1, fx_square3(wide).hi);
+    TEST_ASSERT_EQUAL_HEX64((UINT64_C(3) << 62) + 1, fx_square3(wide).lo);
 }
 
 static void test_shift_down_rounds_to_minus_infinity(void)

@@ -10,7 +10,7 @@ class BuildError(Exception):
     """What is missing, or the end of the compiler's own words."""
 
 
-def _run(*command):
+def run_tool(*command):
     result = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, text=True, check=False)
     if result.returncode != 0:
         raise BuildError(f"{command[0]} failed:\n{result.stdout[-3000:]}")
@@ -27,8 +27,8 @@ def build(folder, target, *options):
     if subprocess.run(["bash", "-c", needs, "bench"], cwd=TOP, stdin=subprocess.DEVNULL, check=False).returncode != 0:
         raise BuildError("not all that a build needs is installed")
     if not (folder / "build.ninja").exists():
-        _run("cmake", "-S", str(TOP), "-B", str(folder), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DHEAVE_BENCH=ON", *options)
+        run_tool("cmake", "-S", str(TOP), "-B", str(folder), "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DHEAVE_BENCH=ON", *options)
     elif options:
-        _run("cmake", str(folder), *options, *(["-U", "CMAKE_CXX_COMPILER"] if _lacks_cxx(folder) else []))
-    _run("cmake", "--build", str(folder), "--target", target)
+        run_tool("cmake", str(folder), *options, *(["-U", "CMAKE_CXX_COMPILER"] if _lacks_cxx(folder) else []))
+    run_tool("cmake", "--build", str(folder), "--target", target)
     return folder / {"heaved": "src/app/heaved"}.get(target, f"tests/bench/{target}")
