@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """test_nightly.py - tools/nightly counts what its runs print, fails when one fails, and says what it has left out; on programs that only pretend."""
+import importlib.machinery
+import importlib.util
 import subprocess
 import sys
 import tempfile
+import types
 from pathlib import Path
 
 import tap
@@ -59,9 +62,23 @@ def options():
     assert code == 0 and "--bus-kills" in text, text
 
 
+def kinds():
+    loader = importlib.machinery.SourceFileLoader("nightly", str(TOP / "tools/nightly"))
+    sys.dont_write_bytecode = True
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("nightly", loader))
+    loader.exec_module(module)
+    few = types.SimpleNamespace(cycles=6, kills=1, bus_kills=1, days=1, seed=7)
+    for kind, make in module.MAKERS.items():
+        assert f"\n  {kind} " in module.__doc__, kind
+        for job in make(few, Path("/build")):
+            assert job.kind == kind, job.command
+            programs = [Path(word) for word in job.command if word.startswith(str(TOP / "t"))]
+            assert all(program.is_file() for program in programs), programs
+
+
 CASES = {"figures and cases are summed up, each run has a seed of its own": all_pass, "a run that fails is shown with its command": one_fails,
          "a run that dies, ends early or says nothing fails": one_dies, "what there was no time for is skipped and said": time_is_over,
-         "wrong options, and help": options}
+         "each kind is in the help, and what it runs is there": kinds, "wrong options, and help": options}
 
 
 def main():
