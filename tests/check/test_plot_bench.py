@@ -12,6 +12,7 @@ import json
 import math
 import os
 import random
+import re
 import subprocess
 import sys
 import tempfile
@@ -25,6 +26,7 @@ sys.path[:0] = [str(TOP / "tools/lib"), str(HERE)]
 import bench_analysis as analysis  # noqa: E402  the path above has to be set first
 import bench_cortex  # noqa: E402
 import bench_cost  # noqa: E402
+import bench_latency  # noqa: E402
 import bench_peers  # noqa: E402
 import bench_signal as signals  # noqa: E402
 from bench_rivals import two_limits  # noqa: E402
@@ -206,6 +208,19 @@ def check_cortex(suite):
         assert "500 instructions; 10.0 x as many in double, 5000; goal 10: met" in bench_cortex.line_of("cortex-m3", "inverse", rows["inverse"])
 
 
+def check_latency(suite):
+    rows = [(1000 + n, 2000 + n, 50.0) for n in range(1000)]
+    with suite.case("bench latency: percentiles are of the frames, first drive and last"):
+        result = bench_latency.judge(rows, 0)
+        assert result["first_us"] == {"p50": 1499, "p99": 1989, "p99.9": 1998, "max": 1999}, result["first_us"]
+        assert result["last_us"]["max"] == 2999 and result["doubt"] is None, result
+        assert re.search(r"last of six +2499 +2989 +2998 +2999", "\n".join(bench_latency.lines_of(result)))
+    with suite.case("bench latency: where the sender is woken late, or the CPU is stolen, there is no figure"):
+        for result in (bench_latency.judge(rows[:980] + [(1, 2, 1500.0)] * 20, 0), bench_latency.judge(rows, 0.06)):
+            (line,) = bench_latency.lines_of(result)
+            assert "no figure" in line and ("1.5 ms" in line or "6%" in line), line
+
+
 def check_bench_arguments(suite):
     refusals = {
         "an option of no subcommand": (("--speed",), 2, "--speed"),
@@ -219,6 +234,7 @@ def check_bench_arguments(suite):
         "a rate out of range": (("motion", "--rates", "60,1"), 2, "from 10 to 200"),
         "a record too short": (("motion", "--seconds", "5"), 2, "from 12"),
         "no rounds": (("cost", "--rounds", "0"), 2, "from 1"),
+        "too few frames": (("latency", "--frames", "9"), 2, "from 10"),
         "rounds where instructions are counted": (("cortex", "--rounds", "5"), 2, "--rounds"),
         "a program that is not there": (("motion", "--program", "nowhere"), 1, "nowhere"),
         "a program that is another one": (("cost", "--program", "/bin/false"), 1, "false"),
@@ -479,7 +495,7 @@ def main():
     parser.add_argument("--bench-peers")
     arguments = parser.parse_args()
     suite = tap.Suite()
-    for check in (check_plot_arguments, check_window, check_dots, check_bench_arguments, check_cortex, check_analysis, check_signals, check_rival,
+    for check in (check_plot_arguments, check_window, check_dots, check_bench_arguments, check_cortex, check_latency, check_analysis, check_signals, check_rival,
                   check_peers):
         check(suite)
     check_programs(suite, arguments.heaved, arguments.bench_core)
