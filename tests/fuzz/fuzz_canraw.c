@@ -198,6 +198,7 @@ static void lose_all(world_t *self)
 {
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         self->seen[k].is_heard = false;
+        self->seen[k].was_faulty = false; /* it may come back without */
     }
 }
 
