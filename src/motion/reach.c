@@ -6,13 +6,14 @@
 #include "root.h"
 
 #define SEARCH_STEPS 14
+#define FAR_OUT_Q32  q32_from_int(8000) /* a room that leads the search on: with one without end it would stay at neutral */
 
-/* Room of the tightest cylinder (negative outside), and which it is; INT64_MIN where the pose is beyond all solving. */
+/* Room of the tightest cylinder (negative outside), and which it is; far out where the pose is beyond all solving. */
 static q32_t tightest_room(const motion_t *motion, const pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX], unsigned *cylinder)
 {
     if (kin_inverse(&motion->kin, pose, extension_mm_q32) != HV_OK) {
         *cylinder = 1;
-        return INT64_MIN / 4;
+        return -FAR_OUT_Q32;
     }
     q32_t room_q32 = INT64_MAX;
     for (unsigned i = 0; i < motion->cylinders; i++) {

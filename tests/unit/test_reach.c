@@ -124,6 +124,25 @@ static void test_reach_pull_in_result_is_inside_on_the_way_and_bounded_by_the_na
     }
 }
 
+/* Beyond what kinematics takes at all, as beyond the strokes: pulled in on the way there. */
+static void test_reach_pull_in_pose_beyond_all_solving_comes_in_too(void)
+{
+    load(0);
+    pose_t asked = m_motion.neutral, pose;
+    asked.axis_q32[AXIS_Z] += q32_from_int(12000);
+    pose = asked;
+    q32_t extension[CYLINDERS_MAX];
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, kin_inverse(&m_motion.kin, &asked, extension));
+    const unsigned cylinder = reach_pull_in(&m_motion, &pose, extension, NULL);
+    TEST_ASSERT_EQUAL(HV_OK, kin_inverse(&m_motion.kin, &pose, extension));
+    double least = 1e9;
+    for (unsigned i = 0; i < m_motion.cylinders; i++) {
+        least = fmin(least, room_mm(extension, i));
+    }
+    TEST_ASSERT_TRUE(cylinder != 0 && pose.axis_q32[AXIS_Z] > m_motion.neutral.axis_q32[AXIS_Z]);
+    TEST_ASSERT_TRUE(least >= 0 && least < 1);
+}
+
 /* A pose asked for a little differently is answered a little differently. */
 static void test_reach_pull_in_is_continuous(void)
 {
@@ -154,6 +173,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_reach_pull_in_result_is_inside_on_the_way_and_bounded_by_the_named_cylinder);
+    RUN_TEST(test_reach_pull_in_pose_beyond_all_solving_comes_in_too);
     RUN_TEST(test_reach_pull_in_is_continuous);
     return UNITY_END();
 }
