@@ -17,7 +17,7 @@ typedef struct {
 /** Starts an empty line. */
 text_t text_start(char *buffer, size_t capacity);
 
-/** Appends a character, a string, a decimal number, a hexadecimal number with at least so many digits. */
+/** Appends a character, a string, a decimal number, a hexadecimal number with at least so many digits (1 to 8). */
 /*@ requires \valid(self);
     assigns *self \from *self; */
 void text_put_char(text_t *self, char c);

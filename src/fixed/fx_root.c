@@ -56,14 +56,11 @@ uint32_t fx_sqrt_u64(uint64_t value)
     return root_normalised(value << (2 * half_shift)) >> half_shift;
 }
 
-/* Shifts left by less than 128. */
+/* Shifts left by 1 to 127. */
 static fx_u128_t shift_left(fx_u128_t value, unsigned shift)
 {
     if (shift >= 64) {
         return (fx_u128_t){value.lo << (shift - 64), 0};
-    }
-    if (shift == 0) {
-        return value;
     }
     return (fx_u128_t){(value.hi << shift) | (value.lo >> (64 - shift)), value.lo << shift};
 }

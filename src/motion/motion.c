@@ -21,15 +21,13 @@ static hv_status_t init_cylinders(motion_t *self, const settings_t *s)
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
         const unsigned source = i < self->cylinders ? i : 0;
         ramp_limits_t limits;
-        const hv_status_t status =
+        hv_status_t status =
             ramp_limits_from_units(s->margin_mm_q16, s->stroke_mm_q16[source] - s->margin_mm_q16, s->cylinder_speed_mm_s_q16,
                                    s->cylinder_accel_mm_s2_q16, s->cylinder_jerk_mm_s3, s->cycle_us, &limits);
+        self->settled_mm_q32[i] = q32_from_q16(s->settled_extension_mm_q16);
+        status = status == HV_OK ? ramp_init(&self->cylinder[i], &limits, self->settled_mm_q32[i]) : status;
         if (status != HV_OK) {
             return status;
-        }
-        self->settled_mm_q32[i] = q32_from_q16(s->settled_extension_mm_q16);
-        if (ramp_init(&self->cylinder[i], &limits, self->settled_mm_q32[i]) != HV_OK) {
-            return HV_ERR_RANGE;
         }
     }
     return ramp_limits_from_units(0, s->stroke_mm_q16[0], s->engage_speed_mm_s_q16, s->engage_accel_mm_s2_q16,
@@ -54,14 +52,12 @@ static hv_status_t init_axes(motion_t *self, const settings_t *s)
         self->is_axis_moved[i] = is_axis_moved(self, s, i);
         const axis_settings_t *a = self->is_axis_moved[i] ? &s->axis[i] : &k_absent_axis;
         ramp_limits_t limits;
-        const hv_status_t status =
+        hv_status_t status =
             ramp_limits_from_units(a->min_q16, a->max_q16, a->speed_q16, a->accel_q16, a->jerk, s->cycle_us, &limits);
+        const q32_t start_q32 = i < POSE_AXES ? q32_from_q16(s->neutral_q16[i]) : 0;
+        status = status == HV_OK ? ramp_init(&self->axis[i], &limits, start_q32) : status;
         if (status != HV_OK) {
             return status;
-        }
-        const q32_t start_q32 = i < POSE_AXES ? q32_from_q16(s->neutral_q16[i]) : 0;
-        if (ramp_init(&self->axis[i], &limits, start_q32) != HV_OK) {
-            return HV_ERR_RANGE;
         }
     }
     return HV_OK;
@@ -280,7 +276,7 @@ static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_MAX])
         halt_step(&self->halt, ref);
         return;
     }
-    if (self->source == MOTION_ON_PATH && !scurve_is_done(&self->path)) {
+    if (self->source == MOTION_ON_PATH) {
         scurve_step(&self->path);
         for (unsigned i = 0; i < AXES_MAX; i++) {
             ref[i] = history_advance(&self->path_history[i],

@@ -11,7 +11,6 @@
 #define COEFFICIENT_MAX_Q32 ((q32_t)1 << 56) /* leaves room for the factor 60 of the third derivative */
 #define CHECK_POINTS        32
 #define COARSE_STRIDE       8
-#define ROUNDING_ATTEMPTS   64
 #define SPARE_DIV           64
 
 ramp_ref_t history_advance(history_t *self, q32_t pos_q32)
@@ -273,19 +272,14 @@ static int64_t cruise_cycles(const path_limits_t *limits, const scurve_t *s)
     return fx_clamp(divide_up(Q62_ONE, limits->vel_q62) - 2 * s->nj - s->na, 0, INT32_MAX);
 }
 
-static bool is_allowed(const path_limits_t *limits, const scurve_t *s)
-{
-    return jerk_needed_q62(s) <= limits->jerk_q62 && acc_needed_q62(s) <= limits->acc_q62 &&
-           divide_up(Q62_ONE, 2 * s->nj + s->na + s->nv) <= limits->vel_q62;
-}
-
-/* One cycle of jerk counts four times; up to three cycles of cruise instead may do. */
+/* One cycle of jerk counts four times; up to three cycles of cruise instead may do. Where the jerk is enough, so are acceleration
+ * and speed: one cycle of jerk less takes no more of either than there is. */
 static void trade_jerk_for_cruise(scurve_t *self, const path_limits_t *limits)
 {
     scurve_t traded = *self;
     traded.nj--;
     for (int more = 0; more < 4 && traded.nj > 0; more++) {
-        if (is_allowed(limits, &traded)) {
+        if (jerk_needed_q62(&traded) <= limits->jerk_q62) {
             *self = traded;
             return;
         }
@@ -293,21 +287,12 @@ static void trade_jerk_for_cruise(scurve_t *self, const path_limits_t *limits)
     }
 }
 
+/* Each count is rounded up on what those before it leave, in whole numbers: together they need no more than the limits. */
 void scurve_plan(scurve_t *self, const path_limits_t *limits, int64_t least_cycles)
 {
     *self = (scurve_t){.nj = jerk_cycles(limits)};
     self->na = acceleration_cycles(limits, self->nj);
     self->nv = cruise_cycles(limits, self);
-    for (int attempt = 0; attempt < ROUNDING_ATTEMPTS; attempt++) {
-        if (jerk_needed_q62(self) > limits->jerk_q62) {
-            self->nj++;
-        } else if (acc_needed_q62(self) > limits->acc_q62) {
-            self->na++;
-        } else {
-            break;
-        }
-        self->nv = cruise_cycles(limits, self);
-    }
     trade_jerk_for_cruise(self, limits);
     if (scurve_cycles(self) < least_cycles) {
         self->nv += least_cycles - scurve_cycles(self);

@@ -123,7 +123,7 @@ static inline bool take_time(reader_t *reader, frame_t *frame)
 /* Head, command, T and colon. */
 static inline bool take_command(reader_t *reader, frame_t *frame)
 {
-    if (reader->end - reader->at < 3 || reader->at[0] != '@') {
+    if (reader->end - reader->at < 3) {
         return false;
     }
     const frame_command_t command = frame_find_command((char)reader->at[1], reader->at[2]);
@@ -159,7 +159,7 @@ size_t frame_quick(const uint8_t *text, const uint8_t *end, frame_t *frame)
             return 0;
         }
     }
-    if (!take_last_field(&reader, &plain) || !take(&reader, '#') || reader.at - text > (ptrdiff_t)FRAME_LENGTH_MAX) {
+    if (!take_last_field(&reader, &plain) || !take(&reader, '#')) {
         return 0;
     }
     *frame = plain;

@@ -83,12 +83,13 @@ static const look_alike_t *look_alike_find(uint32_t code_point)
     return NULL;
 }
 
+/* Of those of the table: none is behind the letters. */
 static const char *kind_of(char ascii)
 {
     if (ascii >= '0' && ascii <= '9') {
         return "digit";
     }
-    return (ascii >= 'A' && ascii <= 'Z') || (ascii >= 'a' && ascii <= 'z') ? "letter" : "character";
+    return (ascii >= 'A' && ascii <= 'Z') || ascii >= 'a' ? "letter" : "character";
 }
 
 /* "U+0410 CYRILLIC CAPITAL LETTER A looks like A; type the ASCII letter" */

@@ -43,7 +43,7 @@ void text_put_hex(text_t *self, uint32_t number, unsigned digits_min)
     static const char k_digits[] = "0123456789ABCDEF";
     for (unsigned digit = 8; digit > 0;) {
         digit--;
-        if (digit < digits_min || digit == 0 || number >> (4 * digit) != 0) {
+        if (digit < digits_min || number >> (4 * digit) != 0) {
             text_put_char(self, k_digits[(number >> (4 * digit)) & 0xFu]);
         }
     }

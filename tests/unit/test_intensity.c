@@ -116,6 +116,7 @@ static void test_intensity_init_out_of_range_is_refused(void)
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, intensity_init(&m_intensity, 0, 100, INTENSITY_RAMP_MIN_MS - 1, CYCLE_US));
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, intensity_init(&m_intensity, 0, 100, INTENSITY_RAMP_MAX_MS + 1, CYCLE_US));
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, intensity_init(&m_intensity, 0, 100, RAMP_MS, 499));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, intensity_init(&m_intensity, 0, 100, RAMP_MS, RAMP_CYCLE_MAX_US + 1));
 }
 
 static void test_intensity_set_above_the_cap_changes_nothing(void)

@@ -650,6 +650,25 @@ static void test_forward_singular_mechanism_is_refused(void)
     check_forward_refuses(extension, &k_zero);
 }
 
+/* Where a cylinder has no length it has no direction: Newton's method does not begin there. */
+static void test_forward_guess_that_puts_a_joint_on_its_other_one_is_refused(void)
+{
+    for (size_t m = 0; m < MECHANISM_COUNT; m++) {
+        load_mechanism(&k_mechanisms[m]);
+        if (s_kin.kind != KIN_HEXAPOD) {
+            continue;
+        }
+        pose_t guess = {{0}};
+        for (unsigned k = 0; k < 2; k++) {
+            guess.axis_q32[AXIS_X + k] = q32_from_q16(s_geometry.base_mm_q16[0][k] - s_geometry.plate_mm_q16[0][k]);
+        }
+        const q16_t height_q16 = s_geometry.base_mm_q16[0][2] - s_geometry.plate_mm_q16[0][2] - s_geometry.zero_height_mm_q16;
+        guess.axis_q32[AXIS_Z] = q32_from_q16(height_q16);
+        const q32_t extension[CYLINDERS_MAX] = {0};
+        check_forward_refuses(extension, &guess);
+    }
+}
+
 /* Whatever comes back as a solution gives the lengths asked for, and nothing makes it hang or overflow. */
 static void test_forward_random_lengths_solve_or_fail_cleanly(void)
 {
@@ -808,6 +827,7 @@ int main(void)
     RUN_TEST(test_forward_unreachable_lengths_are_refused_and_change_nothing);
     RUN_TEST(test_forward_guess_out_of_range_is_refused);
     RUN_TEST(test_forward_singular_mechanism_is_refused);
+    RUN_TEST(test_forward_guess_that_puts_a_joint_on_its_other_one_is_refused);
     RUN_TEST(test_forward_random_lengths_solve_or_fail_cleanly);
     RUN_TEST(test_init_values_beyond_their_limits_are_refused);
     RUN_TEST(test_init_joints_beyond_those_of_a_tripod_are_ignored);

@@ -720,6 +720,85 @@ static void test_cylinders_beyond_the_stroke_stop_at_the_margin(void)
     TEST_ASSERT_TRUE(is_resting());
 }
 
+/* A share that changes in a planned move is added to it: the end is where the scaled pose is, in the time asked for. */
+static void test_intensity_changed_in_a_timed_move_ends_at_the_scaled_pose(void)
+{
+    static const unsigned k_percent[] = {50, 100, 0, 100};
+    for (unsigned i = 0; i < sizeof k_percent / sizeof k_percent[0]; i++) {
+        rig_sendf(&m_rig, "@A7T:0,4,0,10,0,%d,30,5000#", i % 2 == 0 ? 40 : -40);
+        rig_run_ms(&m_rig, 700);
+        TEST_ASSERT_EQUAL(HV_OK, gateway_set_intensity(&m_rig.gateway, k_percent[i]));
+        rig_run_ms(&m_rig, 4310);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-4, (i % 2 == 0 ? 0.4 : -0.4) * k_percent[i], rig_pose(&m_rig, AXIS_Z));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.04 * k_percent[i], rig_pose(&m_rig, AXIS_PITCH));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 30, rig_angle_deg(&m_rig)); /* turns from its zero are not scaled */
+        TEST_ASSERT_TRUE(is_resting());
+    }
+}
+
+/* A value that no limit reaches is told as clamped even where nothing is left of it. */
+static void test_intensity_0_values_beyond_all_limits_are_told(void)
+{
+    settings_t settings = rig_hexapod();
+    settings.axis[AXIS_Z].scale_q16 = 2 * Q16_ONE;
+    settings.intensity_start_percent = 0;
+    engage(&settings);
+    rig_send(&m_rig, "@A6:0,0,0,0,0,30000#");
+    rig_run_ms(&m_rig, 500);
+    TEST_ASSERT_BITS_HIGH(MOTION_CLAMPED, seen()->flags);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, rig_pose(&m_rig, AXIS_Z));
+}
+
+/* Drives that have not found their zero tell positions that no plate has. */
+static void test_place_positions_without_a_pose_are_told_as_such(void)
+{
+    settings_t settings = rig_hexapod();
+    rig_start(&m_rig, &settings, false);
+    for (unsigned i = 0; i < 6; i++) {
+        m_rig.drive_config[i].unhomed_offset_q32 = q32_from_int(i % 2 == 0 ? 9000 : -600);
+    }
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_BITS_HIGH(MOTION_NO_POSE, seen()->flags);
+    TEST_ASSERT_FALSE(seen()->has_actual_pose);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_SETTLED, 60000));
+    TEST_ASSERT_BITS_LOW(MOTION_NO_POSE, seen()->flags);
+    TEST_ASSERT_TRUE(seen()->has_actual_pose);
+}
+
+static void test_target_is_nothing_to_a_motion_that_follows_nobody(void)
+{
+    const motion_target_t target = {.space = MOTION_POSE, .value_q32 = {[AXIS_Z] = q32_from_int(40)}};
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_HOLD));
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(HV_OK, motion_target(&m_rig.gateway.motion, &target, m_rig.now_us));
+    rig_run_ms(&m_rig, 500);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, rig_pose(&m_rig, AXIS_Z));
+}
+
+static void test_init_settings_that_no_platform_moves_with_are_refused(void)
+{
+    static motion_t motion;
+    settings_t good = rig_hexapod();
+    TEST_ASSERT_EQUAL(HV_OK, motion_init(&motion, &good));
+#define SPOIL(member, value)                                                                                                     \
+    do {                                                                                                                         \
+        settings_t bad = good;                                                                                                   \
+        bad.member = (value);                                                                                                    \
+        TEST_ASSERT_EQUAL_MESSAGE(HV_ERR_RANGE, motion_init(&motion, &bad), #member);                                            \
+    } while (0)
+    SPOIL(geometry.retracted_mm_q16[2], 0);
+    SPOIL(stroke_mm_q16[5], good.margin_mm_q16 * 2);
+    SPOIL(cylinder_jerk_mm_s3, 0);
+    SPOIL(engage_speed_mm_s_q16, 0);
+    SPOIL(axis[AXIS_YAW].accel_q16, 0);
+    SPOIL(axis[AXIS_ANGLE].jerk, 0);
+    SPOIL(spike_gate, GATE_FACTOR_MAX + 1);
+    SPOIL(neutral_q16[AXIS_Z], 110 * Q16_ONE);
+    SPOIL(intensity_start_percent, 101);
+    SPOIL(settled_extension_mm_q16, -700 * Q16_ONE);
+#undef SPOIL
+}
+
 static void test_cycle_times_and_tripod_keep_limits(void)
 {
     static const uint32_t k_cycles_us[] = {500, 2000, 5000, 10000};
@@ -768,6 +847,11 @@ int main(void)
     RUN_TEST(test_reach_stream_in_and_out_of_the_workspace_is_continuous);
     RUN_TEST(test_axis_limits_clamp_the_axis);
     RUN_TEST(test_cylinders_beyond_the_stroke_stop_at_the_margin);
+    RUN_TEST(test_intensity_changed_in_a_timed_move_ends_at_the_scaled_pose);
+    RUN_TEST(test_intensity_0_values_beyond_all_limits_are_told);
+    RUN_TEST(test_place_positions_without_a_pose_are_told_as_such);
+    RUN_TEST(test_target_is_nothing_to_a_motion_that_follows_nobody);
+    RUN_TEST(test_init_settings_that_no_platform_moves_with_are_refused);
     RUN_TEST(test_cycle_times_and_tripod_keep_limits);
     return UNITY_END();
 }

@@ -202,8 +202,13 @@ static void test_quintic_plan_far_too_long_is_refused(void)
     const q32_t target = q32(10);
     quintic_t quintic;
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, quintic_plan(&quintic, 1, &start, &target, 3600000));
+    const ramp_state_t back = {0, -q32(0.4), -q32(0.003)};
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, quintic_plan(&quintic, 1, &back, &target, 3600000));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, quintic_plan(&quintic, 1, &back, &target, INT32_MAX)); /* products that saturate */
+    const q32_t far = INT64_MAX / 2;
     const ramp_state_t rest = {0};
     TEST_ASSERT_EQUAL(HV_OK, quintic_plan(&quintic, 1, &rest, &target, 7200000));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, quintic_plan(&quintic, 1, &rest, &far, 1000));
 }
 
 /* ---- S-curves ---- */
@@ -321,6 +326,17 @@ static void test_scurve_plan_extreme_distances_are_covered(void)
     }
 }
 
+/* Limits of nearly nothing on a way without end are still more than nothing: nothing is divided by zero. */
+static void test_path_limits_narrow_leaves_something(void)
+{
+    const ramp_limits_t least = {0, 1, 1, 1, RAMP_JERK_MIN_Q32};
+    path_limits_t limits = path_limits_none();
+    path_limits_narrow(&limits, INT64_MAX, &least);
+    TEST_ASSERT_EQUAL_INT64(1, limits.vel_q62);
+    TEST_ASSERT_EQUAL_INT64(1, limits.acc_q62);
+    TEST_ASSERT_GREATER_OR_EQUAL_INT64(1, limits.jerk_q62);
+}
+
 static void test_scurve_plan_no_distance_takes_the_least_cycles_without_moving(void)
 {
     path_limits_t limits = path_limits_none();
@@ -383,6 +399,7 @@ int main(void)
     RUN_TEST(test_scurve_plan_random_moves_keep_limits_and_are_short);
     RUN_TEST(test_scurve_plan_several_axes_each_keeps_its_own_limits);
     RUN_TEST(test_scurve_plan_extreme_distances_are_covered);
+    RUN_TEST(test_path_limits_narrow_leaves_something);
     RUN_TEST(test_scurve_plan_no_distance_takes_the_least_cycles_without_moving);
     RUN_TEST(test_scurve_plan_least_cycles_is_exact);
     RUN_TEST(test_scurve_plan_an_hour_is_exact);

@@ -638,6 +638,32 @@ static void test_ramp_limits_from_units_out_of_range_is_refused(void)
     TEST_ASSERT_EQUAL_INT64(77, limits.pos_min_q32);
 }
 
+static void test_ramp_init_limits_that_no_brake_ends_in_are_refused(void)
+{
+    const ramp_limits_t good = {0, q32(100), q32(0.4), q32(0.003), q32(0.00005)};
+    ramp_t ramp = {.state = {.pos_q32 = 77}};
+    for (unsigned i = 0; i < 6; i++) {
+        ramp_limits_t bad = good;
+        bad.pos_max_q32 = i == 0 ? 0 : bad.pos_max_q32;
+        bad.vel_per_cycle_q32 = i == 1 ? 0 : i == 2 ? RAMP_JERK_MIN_Q32 * (RAMP_SPEED_PER_JERK_MAX + 1) : bad.vel_per_cycle_q32;
+        bad.acc_per_cycle2_q32 = i == 3 ? 0 : bad.acc_per_cycle2_q32;
+        bad.jerk_per_cycle3_q32 = i == 4   ? 0
+                                  : i == 5 ? RAMP_JERK_MIN_Q32 - 1
+                                  : i == 2 ? RAMP_JERK_MIN_Q32
+                                           : bad.jerk_per_cycle3_q32;
+        TEST_ASSERT_EQUAL(HV_ERR_RANGE, ramp_init(&ramp, &bad, 0));
+        TEST_ASSERT_EQUAL_INT64(77, ramp.state.pos_q32);
+    }
+    TEST_ASSERT_EQUAL(HV_OK, ramp_init(&ramp, &good, 0));
+}
+
+/* A range of next to nothing leaves next to no acceleration, but some. */
+static void test_ramp_safe_acceleration_is_never_nothing(void)
+{
+    const ramp_limits_t narrow = {0, 1, q32(0.4), q32(0.003), 1};
+    TEST_ASSERT_EQUAL_INT64(1, ramp_safe_acceleration(&narrow));
+}
+
 static void test_ramp_limits_from_units_values_are_per_cycle(void)
 {
     const ramp_limits_t limits = limits_of(-1, 3, 400, 3000, 50000, 2000);
@@ -669,6 +695,8 @@ int main(void)
     RUN_TEST(test_ramp_step_mirrored_references_give_mirrored_positions);
     RUN_TEST(test_ramp_stop_position_is_where_the_ramp_comes_to_rest);
     RUN_TEST(test_ramp_limits_from_units_out_of_range_is_refused);
+    RUN_TEST(test_ramp_init_limits_that_no_brake_ends_in_are_refused);
+    RUN_TEST(test_ramp_safe_acceleration_is_never_nothing);
     RUN_TEST(test_ramp_limits_from_units_values_are_per_cycle);
     return UNITY_END();
 }
