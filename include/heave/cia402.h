@@ -201,7 +201,7 @@ typedef struct {
     bool is_open;          /* SYNC has gone out, the set-points have not */
     bool was_period_begin; /* in the last poll */
     bool is_free;          /* everything sent was seen on the wire */
-    bool is_refused;       /* the last SYNC, by a queue that is full */
+    bool is_refused;       /* the last SYNC, or some of the last set, by a queue that is full */
     bool has_time;
     bool is_preop_due; /* all nodes have to be told to leave operational */
     canpassive_t passive;

@@ -375,7 +375,7 @@ static hv_status_t cia402_send(void *ctx, uint64_t now_us, const q32_t setpoint_
     hv_status_t status = self->is_due ? HV_ERR_AGAIN : HV_OK;
     if (self->is_open) {
         status = send_set(self, setpoint_q32);
-        self->is_open = status != HV_OK;
+        self->is_open = self->is_refused = status != HV_OK;
         self->sets += status == HV_OK;
     }
     self->refused += status != HV_OK;

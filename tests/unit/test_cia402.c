@@ -1453,6 +1453,23 @@ static void test_bus_whose_queue_stays_full_is_gone_after_three_periods(void)
     await(DRIVE_FAULT, 10000); /* by their watch over the heartbeat */
 }
 
+/* A queue that is one frame too short for a set: each begins and none is whole. */
+static void test_bus_that_never_takes_a_whole_set_is_gone_after_three_periods(void)
+{
+    come_up();
+    enable();
+    spy();
+    refused_id = 0x207;
+    unsigned count = 0;
+    while (!are_all(DRIVE_OFFLINE) && count++ < 100) {
+        (void)!cycle();
+    }
+    TEST_ASSERT_UINT_WITHIN(PERIOD / 2, 3 * PERIOD + PERIOD / 2, count);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_LOST_BUS, feedback[0].fault_code);
+    refused_id = UINT32_MAX;
+    await(DRIVE_FAULT, 10000); /* by their watch over the heartbeat */
+}
+
 /* No room for every eleventh frame of anybody: what found none is sent again, or asked for again. */
 static void test_bus_whose_queue_is_full_now_and_then_hinders_nothing(void)
 {
@@ -1836,6 +1853,7 @@ int main(void)
     RUN_TEST(test_error_passive_is_failing_after_its_time_and_stops_nothing_here);
     RUN_TEST(test_storm_of_error_frames_is_bounded_and_stops_nothing);
     RUN_TEST(test_bus_whose_queue_stays_full_is_gone_after_three_periods);
+    RUN_TEST(test_bus_that_never_takes_a_whole_set_is_gone_after_three_periods);
     RUN_TEST(test_bus_whose_queue_is_full_now_and_then_hinders_nothing);
     RUN_TEST(test_request_quick_stop_goes_with_the_set_that_is_due);
     RUN_TEST(test_send_slow_bus_refuses_instead_of_queueing);
