@@ -148,11 +148,20 @@ static inline int64_t fx_wide_mul_high_native(int64_t a, int64_t b)
 #define FX_WIDE_SQUARE3       fx_wide_square3_native
 #define FX_WIDE_MUL_HIGH      fx_wide_mul_high_native
 #else
-#define FX_WIDE_PRODUCT       fx_wide_product_portable
+#define FX_WIDE_PRODUCT fx_wide_product_portable
+#define FX_WIDE_SQUARE3 fx_wide_square3_portable
+#if defined(__OPTIMIZE_SIZE__)
+/** One copy for all files, in fx.c: each is called in a dozen. */
+int64_t fx_wide_mul_shift(int64_t a, int64_t b, unsigned shift);
+int64_t fx_wide_mul_high(int64_t a, int64_t b);
+#define FX_WIDE_MUL_SHIFT     fx_wide_mul_shift
+#define FX_WIDE_MUL_SHIFT_FIT fx_wide_mul_shift
+#define FX_WIDE_MUL_HIGH      fx_wide_mul_high
+#else
 #define FX_WIDE_MUL_SHIFT     fx_wide_mul_shift_portable
 #define FX_WIDE_MUL_SHIFT_FIT fx_wide_mul_shift_portable
-#define FX_WIDE_SQUARE3       fx_wide_square3_portable
 #define FX_WIDE_MUL_HIGH      fx_wide_mul_high_portable
+#endif
 #endif
 
 #endif

@@ -8,6 +8,18 @@
 typedef char fx_assert_arithmetic_right_shift[((int64_t)-3 >> 1) == -2 ? 1 : -1];
 typedef char fx_assert_wrapping_conversion[(int64_t)UINT64_MAX == -1 ? 1 : -1];
 
+#if defined(__OPTIMIZE_SIZE__) && (!defined(__SIZEOF_INT128__) || defined(HEAVE_FX_PORTABLE))
+int64_t fx_wide_mul_shift(int64_t a, int64_t b, unsigned shift)
+{
+    return fx_wide_mul_shift_portable(a, b, shift);
+}
+
+int64_t fx_wide_mul_high(int64_t a, int64_t b)
+{
+    return fx_wide_mul_high_portable(a, b);
+}
+#endif
+
 q16_t q16_from_q32(q32_t value_q32)
 {
     const int64_t floor_q16 = value_q32 >> 16;
