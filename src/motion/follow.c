@@ -118,13 +118,22 @@ static bool is_about(uint64_t a_us, uint64_t b_us)
     return a_us * 2 <= b_us * 5 && b_us * 2 <= a_us * 5;
 }
 
+/* A target without a time, or with one too short for a move, after so short a gap that it is none, or where a stream runs that is
+ * so quick: a frame of it may be late or lost. */
+static bool is_instant(const motion_t *self, const motion_target_t *target, uint64_t now_us)
+{
+    const uint64_t period_us = stream_goes_on(&self->stream, now_us) ? stream_period_us(&self->stream) : now_us - self->last_us;
+    return !target->is_timed ||
+           (target->time_ms <= INSTANT_MS && (now_us - self->last_us <= INSTANT_GAP_US || period_us <= INSTANT_GAP_US));
+}
+
 /* A timed target is a sample of a stream if its time is about the period of the one that runs, or two follow each other in about
  * the time of both. */
 static bool is_stream_sample(const motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
     const uint32_t stated_us = period_stated(target);
     const uint64_t gap_us = now_us - self->last_us;
-    if (!target->is_timed || (target->time_ms <= INSTANT_MS && gap_us <= INSTANT_GAP_US)) {
+    if (is_instant(self, target, now_us)) {
         return true;
     }
     if (stated_us == 0) {

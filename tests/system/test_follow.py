@@ -102,6 +102,7 @@ def jitter_of_most_of_a_period(bench):
 def times_too_short_to_mean_any(bench):
     for rate, timed in ((200, 0), (333, 0), (1000, 0), (200, 1), (1000, 4)):
         follows(bench, rate, 1, timed=timed)
+    follows(bench, 60, 1, jitter_ms=8, timed=0)  # gaps of more than 20 ms among shorter ones
 
 
 def back_from_beyond_an_axis(bench):
