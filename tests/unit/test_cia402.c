@@ -1284,10 +1284,49 @@ static void test_heartbeat_that_finds_no_room_is_sent_as_soon_as_there_is(void)
     TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
 }
 
-/* Remote requests, and identifiers of 29 bits that look alike, are other people's. */
+static void test_bus_that_is_unplugged_is_gone_at_once_and_comes_back(void)
+{
+    come_up();
+    enable();
+    sim_can_unplug(&node);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, cycle());
+    TEST_ASSERT_TRUE(are_all(DRIVE_OFFLINE));
+    cycles(1000);
+    TEST_ASSERT_TRUE(are_all(DRIVE_OFFLINE));
+    sim_can_plug(&node);
+    await(DRIVE_FAULT, 10000); /* by their watch over the heartbeat */
+}
+
+/* A drive is not asked for anything before it has been told to leave operational, or to reset. */
+static void test_setup_waits_for_room_for_its_nmt_commands(void)
+{
+    start();
+    spy();
+    refused_id = 0;
+    cycles(1000);
+    TEST_ASSERT_EQUAL_UINT(0, count_sent(0x601, (const uint8_t[8]){0x40, 0x00, 0x10, 0x00}, 8));
+    refused_id = UINT32_MAX;
+    for (unsigned i = 0; i < 1000 && driver.axis[0].nmt_command == 0; i++) {
+        (void)!cycle();
+        refused_id = driver.is_preop_due ? UINT32_MAX : 0;
+    }
+    sents = 0;
+    cycles(500);
+    TEST_ASSERT_TRUE(driver.axis[0].nmt_command != 0);
+    for (unsigned i = 0; i < sents; i++) {
+        TEST_ASSERT_TRUE(sent[i].id != 0x601);
+    }
+    refused_id = UINT32_MAX;
+    await(DRIVE_DISABLED, 5000);
+}
+
+/* Remote requests, and identifiers of 29 bits that look alike, are other people's; a boot-up message has one byte. */
 static void test_frames_for_others_are_not_heard(void)
 {
-    const can_frame_t boots[] = {{.id = 0x703, .length = 1, .is_rtr = true}, {.id = 0x703, .length = 1, .is_extended = true}};
+    const can_frame_t boots[] = {{.id = 0x703, .length = 1, .is_rtr = true},
+                                 {.id = 0x703, .length = 1, .is_extended = true},
+                                 {.id = 0x703, .length = 2},
+                                 {.id = 0x283, .length = 8}};
     const hal_can_t others = sim_can_hal(&slave.node);
     sim_can_bus_init(&bus, 0, NULL, 0);
     cia402_slave_open(&slave, &bus);
@@ -1295,7 +1334,7 @@ static void test_frames_for_others_are_not_heard(void)
     TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &config, sim_can_hal(&node)));
     hal = cia402_hal(&driver);
     await(DRIVE_DISABLED, 5000);
-    for (unsigned i = 0; i < 2; i++) {
+    for (unsigned i = 0; i < 4; i++) {
         TEST_ASSERT_EQUAL(HV_OK, hal_can_send(others, &boots[i]));
         cycles(3);
         TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
@@ -1845,6 +1884,8 @@ int main(void)
     RUN_TEST(test_sync_counter_goes_round_without_a_gap);
     RUN_TEST(test_sync_that_comes_late_begins_a_new_time);
     RUN_TEST(test_heartbeat_that_finds_no_room_is_sent_as_soon_as_there_is);
+    RUN_TEST(test_bus_that_is_unplugged_is_gone_at_once_and_comes_back);
+    RUN_TEST(test_setup_waits_for_room_for_its_nmt_commands);
     RUN_TEST(test_frames_for_others_are_not_heard);
     RUN_TEST(test_owns_covers_every_frame_that_is_sent);
     RUN_TEST(test_bus_off_ended_syncs_go_on_at_their_period);

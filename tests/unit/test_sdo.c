@@ -222,6 +222,8 @@ static void test_receive_before_the_question_has_gone_is_dropped(void)
     expect("\x40\x64\x60\x00\0\0\0\0");
     answer("\x4F\x64\x60\x00\x08\0\0\0");
     TEST_ASSERT_EQUAL_HEX32(8, sdo_value_u32(&sdo));
+    answer("\x4F\x64\x60\x00\x09\0\0\0"); /* nor when it was answered */
+    TEST_ASSERT_EQUAL_HEX32(8, sdo_value_u32(&sdo));
 }
 
 static void test_receive_remote_frame_is_dropped(void)
