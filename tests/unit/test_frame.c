@@ -808,6 +808,7 @@ static void test_describe_names_look_alikes(void)
         {"\xEF\xBC\xA0"
          "A3:1,2,3,0#",
          "U+FF20 FULLWIDTH COMMERCIAL AT looks like @; type the ASCII character"},
+        {"@A3:1,2,3,\xD0\xB0#", "U+0430 CYRILLIC SMALL LETTER A looks like a; type the ASCII letter"},
         {"@A3:\xEF\xBC\x95,2,3,0#", "U+FF15 FULLWIDTH DIGIT looks like 5; type the ASCII digit"},
         {"@\xEF\xBC\xA1"
          "3:1#",

@@ -1026,6 +1026,9 @@ static void test_jumps_are_named_by_cylinder_and_motor(void)
     rig_run_ms(&m_rig, 1100);
     TEST_ASSERT_EQUAL_UINT32(1, counted()->unconfirmed);
     TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "a far jump that no second one confirmed: cylinder 3 "));
+    rig_sendf(&m_rig, "@C7:%.1f,%.1f,%.1f,%.1f,%.1f,%.1f,40#", at, at, at, at, at, at);
+    rig_run_ms(&m_rig, 1100);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "a far jump that no second one confirmed: angle 40.0 after 0.0"));
     m_settings.confirm_jump_mm_q16 = 0; /* and the motor's alone */
     engage();
     send_and_run("@A7:0,0,0,0,0,60,10#", 2000);
@@ -1667,6 +1670,7 @@ static void test_shutdown_in_fault_and_estop_is_finished_at_rest(void)
     start_moving(100);
     rig_break(&m_rig, SIM_DRIVES_FAULT, 0, 1);
     rig_run_ms(&m_rig, 1);
+    TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway)); /* nobody has asked for an end */
     (void)!rig_request(&m_rig, EVENT_SHUTDOWN);
     rig_run_ms(&m_rig, 1);
     TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
