@@ -18,12 +18,17 @@ typedef int64_t q62_t; /**< Q1.62: +-2, step 2^-62. Sines, cosines, rotation mat
 #define Q62_ONE ((q62_t)1 << 62)
 
 /** Exact: every Q16.16 value has a Q32 value. */
+/*@ assigns \nothing;
+    ensures \result == value_q16 * 65536; */
 static inline q32_t q32_from_q16(q16_t value_q16)
 {
     return (q32_t)value_q16 * 65536;
 }
 
 /** Exact for |value| < 2^31. */
+/*@ requires -INT32_MAX <= value;
+    assigns \nothing;
+    ensures \result == value * Q32_ONE; */
 static inline q32_t q32_from_int(int32_t value)
 {
     return (q32_t)value * Q32_ONE;
@@ -47,6 +52,8 @@ static inline int64_t fx_mul_shift_fit(int64_t a, int64_t b, unsigned shift)
 }
 
 /** a * b / 2^64, rounded down: the cheapest wide product there is. Formats are chosen so that the 64 comes out right. */
+/*@ assigns \result \from a, b;
+    ensures \result == (a * b) >> 64; */
 static inline int64_t fx_mul_high(int64_t a, int64_t b)
 {
     return FX_WIDE_MUL_HIGH(a, b);
@@ -75,19 +82,29 @@ static inline int64_t fx_shift_round(int64_t value, unsigned shift)
 /** a * b / divisor, truncated towards zero, from the exact 128-bit product.
  *  Saturates where the result does not fit; a divisor of 0 saturates by the signs of a and b.
  *  Slower than fx_mul_shift: not for the inner loops of a cycle. */
+/*@ assigns \result \from a, b, divisor; */
 int64_t fx_mul_div(int64_t a, int64_t b, int64_t divisor);
 
 /** a + b and a - b, saturating. */
+/*@ assigns \nothing;
+    ensures \result == (a + b > INT64_MAX ? INT64_MAX : a + b < INT64_MIN ? INT64_MIN : a + b); */
 int64_t fx_add_sat(int64_t a, int64_t b);
+/*@ assigns \nothing;
+    ensures \result == (a - b > INT64_MAX ? INT64_MAX : a - b < INT64_MIN ? INT64_MIN : a - b); */
 int64_t fx_sub_sat(int64_t a, int64_t b);
 
 /** Limits value to [low, high]; low <= high. */
+/*@ requires low <= high;
+    assigns \nothing;
+    ensures \result == (value < low ? low : value > high ? high : value); */
 static inline int64_t fx_clamp(int64_t value, int64_t low, int64_t high)
 {
     return value < low ? low : value > high ? high : value;
 }
 
 /** |value|; INT64_MIN gives INT64_MAX. */
+/*@ assigns \nothing;
+    ensures \result == (value == INT64_MIN ? INT64_MAX : \abs(value)); */
 static inline int64_t fx_abs(int64_t value)
 {
     return value >= 0 ? value : value == INT64_MIN ? INT64_MAX : -value;

@@ -126,7 +126,7 @@ HV_WRAPS static void take_position(cia402_drive_t drive, uint32_t bits)
     cia402_axis_t *self = drive.axis;
     const int32_t moved = i32_of(bits - (uint32_t)self->actual_counts);
     self->actual_counts = i32_of(bits);
-    self->position_counts = self->has_actual ? self->position_counts + moved : self->actual_counts;
+    self->position_counts = self->has_actual ? fx_add_sat(self->position_counts, moved) : self->actual_counts;
     if (counts_to_units(&drive.own->scale, self->position_counts, &self->actual_q32) == HV_OK) {
         self->has_actual = true;
         self->was_heard = true;

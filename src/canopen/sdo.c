@@ -89,7 +89,8 @@ static void compose_write_segment(sdo_t *self)
     const unsigned now = left < SEGMENT_MAX ? left : SEGMENT_MAX;
     self->request[0] = (uint8_t)(REQUEST_WRITE_SEGMENT | toggle_bit(self) | (SEGMENT_MAX - now) << 1 | (now == left ? 1u : 0u));
     for (unsigned i = 0; i < SEGMENT_MAX; i++) {
-        self->request[1u + i] = i < now ? self->value[self->at + i] : 0;
+        const unsigned at = self->at + i;
+        self->request[1u + i] = at < self->size ? self->value[at] : 0;
     }
     self->at = (uint8_t)(self->at + now);
     self->has_request = true;
@@ -207,6 +208,7 @@ static void take_write_initiate(sdo_t *self, const uint8_t *data)
 static void take_read_segment(sdo_t *self, const uint8_t *data)
 {
     const unsigned bytes = SEGMENT_MAX - (data[0] >> 1 & 7u);
+    //@ split bytes;
     if (self->at + bytes > SDO_BYTES_MAX) {
         refuse(self, ABORT_TOO_LONG);
         return;

@@ -29,7 +29,7 @@ hv_status_t counts_from_units(const counts_scale_t *self, q32_t units_q32, int64
 
 hv_status_t counts_to_units(const counts_scale_t *self, int64_t counts, q32_t *units_q32)
 {
-    if (fx_abs(counts) > COUNTS_MAX) {
+    if (counts < -COUNTS_MAX || counts > COUNTS_MAX) {
         return HV_ERR_RANGE;
     }
     const int64_t doubled = fx_mul_div(2 * (counts - self->zero), self->den * Q32_PER_UNIT, self->num);

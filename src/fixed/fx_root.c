@@ -25,7 +25,9 @@ static const uint16_t k_inverse_root_q16[193] = {
  * it does not matter that the 1 is lost above; y - y * excess / 2 is better. */
 HV_WRAPS static uint64_t inverse_root_q31(uint64_t x_q64)
 {
-    const uint16_t *low = &k_inverse_root_q16[(x_q64 >> 56) - 64];
+    const unsigned line = (unsigned)(x_q64 >> 56) - 64;
+    //@ split line;
+    const uint16_t *low = &k_inverse_root_q16[line];
     const uint32_t slope_q24 = ((uint32_t)low[0] - low[1]) * (uint16_t)(x_q64 >> 40);
     const uint32_t guess_q20 = (UINT32_C(1) << 20) + ((((uint32_t)low[0] << 16) - slope_q24) >> 12);
     const int64_t excess_q72 = (int64_t)((x_q64 >> 32) * ((uint64_t)guess_q20 * guess_q20));
@@ -39,7 +41,7 @@ HV_WRAPS static uint32_t root_normalised(uint64_t value)
     const uint64_t product = ((value >> 32) * inverse_q31) >> 31;
     const uint64_t guess = product > UINT32_MAX ? UINT32_MAX : product;
     const int64_t guess_rest = (int64_t)(value - guess * guess); /* |.| < 2^38: the guess is within 2^5 */
-    const uint64_t root = guess + (uint64_t)((guess_rest * (int64_t)(inverse_q31 >> 8)) >> 56);
+    const uint64_t root = guess + (uint64_t)((int64_t)((uint64_t)guess_rest * (inverse_q31 >> 8)) >> 56);
     const int64_t rest = (int64_t)(value - root * root);
     if (rest < 0) {
         return (uint32_t)(root - 1);
@@ -72,7 +74,8 @@ HV_WRAPS static uint64_t root_wide_normalised(fx_u128_t value)
     const int64_t inverse_q31 = (int64_t)inverse_root_q31((value.hi << 2) | (value.lo >> 62));
     const uint64_t upper = ((value.hi >> 30) * (uint64_t)inverse_q31) >> 32;
     const int64_t upper_rest = (int64_t)(value.hi - upper * upper);
-    const uint64_t root = (upper << 32) + (uint64_t)fx_mul_high(upper_rest * (1 << 27), inverse_q31 * (1 << 6));
+    const uint64_t root =
+        (upper << 32) + (uint64_t)fx_mul_high((int64_t)((uint64_t)upper_rest << 27), (int64_t)((uint64_t)inverse_q31 << 6));
     const fx_u128_t square = fx_square_u64(root);
     const uint64_t rest_hi = value.hi - square.hi - (value.lo < square.lo);
     const int64_t rest = (int64_t)((rest_hi << 33) | ((value.lo - square.lo) >> 31)); /* in 2^31 */
@@ -90,7 +93,7 @@ HV_WRAPS uint64_t fx_sqrt_u128(fx_u128_t value)
     const int64_t root = (int64_t)((wide + (UINT64_C(1) << (half_shift - 1))) >> half_shift);
     const int64_t rest =
         (int64_t)(value.lo - (uint64_t)root * (uint64_t)root); /* below 2^63: root is the nearest or next to it */
-    return (uint64_t)(root + (rest > root) - (rest <= -root));
+    return (uint64_t)root + (rest > root) - (rest <= -root);
 }
 
 /* sqrt(value) * 2^31 for value >= 2^62, at most 64 off: 31 bits from the inverse, and one correction by remainder / (2 root). */
@@ -99,7 +102,7 @@ HV_WRAPS static uint64_t root_q31(uint64_t value)
     const uint64_t inverse_q31 = inverse_root_q31(value);
     const uint64_t upper = ((value >> 32) * inverse_q31) >> 31;
     const int64_t rest = (int64_t)(value - upper * upper); /* upper is within 5: |rest| * inverse is below 2^67 */
-    return (upper << 31) + (uint64_t)(((rest >> 5) * (int64_t)inverse_q31) >> 28);
+    return (upper << 31) + (uint64_t)((int64_t)((uint64_t)(rest >> 5) * inverse_q31) >> 28);
 }
 
 /* Roots of [2^-12, 2^14) in Q45 are known to 5: 64 / 2^4, and 1 for what is cut off. */

@@ -122,6 +122,7 @@ HV_WRAPS void fx_sincos_deg(q32_t angle_deg_q32, q62_t *sin_q62, q62_t *cos_q62)
 {
     const uint64_t step = nearest_step(angle_deg_q32);
     const q32_t rest_deg_q32 = (q32_t)((uint64_t)angle_deg_q32 - step * STEP_Q32);
+    //@ assert nearest: -STEP_Q32 / 2 <= rest_deg_q32 <= STEP_Q32 / 2;
 
     const int64_t rest_q67 = fx_mul_high(rest_deg_q32 * (INT64_C(1) << 31), RAD_PER_DEG_Q68); /* from Q63 degrees */
     const int64_t square_q70 = fx_mul_high(rest_q67, rest_q67);
@@ -130,6 +131,7 @@ HV_WRAPS void fx_sincos_deg(q32_t angle_deg_q32, q62_t *sin_q62, q62_t *cos_q62)
 
     /* Masks instead of branches: signs of small angles are as good as random. */
     const int64_t falling = mask_of_bit(step, 6);
+    //@ split falling;
     const int64_t index = ((int64_t)(step % STEPS_PER_QUADRANT) ^ falling) + (falling & (int64_t)(STEPS_PER_QUADRANT + 1));
     const q62_t sine = negate_if(mask_of_bit(step, 7), k_sine_q62[index]);
     const q62_t cosine = negate_if(mask_of_bit(step + STEPS_PER_QUADRANT, 7), k_sine_q62[(int64_t)STEPS_PER_QUADRANT - index]);

@@ -443,6 +443,11 @@ static void test_sincos_dense_sweep_is_within_the_stated_error(void)
             worst = fmaxl(worst, library_error(boundary * Q32_ONE + offset));
         }
     }
+    for (int64_t step = -768; step <= 768; step++) { /* where the nearest step changes */
+        for (q32_t offset = -2; offset <= 2; offset++) {
+            worst = fmaxl(worst, library_error((2 * step + 1) * (45 * Q32_ONE / 64) + offset));
+        }
+    }
     printf("sincos: worst difference from the C library %.2Lf LSB of Q62\n", worst);
     TEST_ASSERT_TRUE(worst <= FX_SINCOS_MAX_ERROR_Q62 + judge);
 }
