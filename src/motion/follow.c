@@ -236,7 +236,7 @@ static bool is_on_the_way(const motion_t *self)
     while (i < self->planned_slots && to_q32[i] == self->goal_q32[i]) {
         i++;
     }
-    return i == self->planned_slots && self->source != MOTION_STREAMED;
+    return i == self->planned_slots && self->source != MOTION_STREAMED && slots_is_planned(self, self->slot_q32);
 }
 
 /* During a take-over nothing but the blend bounds what extensions ask for: a stream of jumps is far beyond what the cylinders can

@@ -99,12 +99,27 @@ void slots_take(motion_t *self, const motion_target_t *target, q32_t slot_q32[AX
     self->is_clamped |= self->limiting_cylinder != 0;
 }
 
+/* From neutral to where a slot is, before intensity. */
+static q32_t whole_way(const motion_t *self, unsigned slot, q32_t slot_q32)
+{
+    return is_scaled(self, self->space, slot) ? slot_q32 - centre_of(self, self->space, slot) : 0;
+}
+
 void slots_plan(motion_t *self, const q32_t slot_q32[AXES_MAX])
 {
     self->timed_share_q46 = self->intensity.share_q46[0];
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        self->timed_way_q32[i] = is_scaled(self, self->space, i) ? slot_q32[i] - centre_of(self, self->space, i) : 0;
+        self->timed_way_q32[i] = whole_way(self, i, slot_q32[i]);
     }
+}
+
+bool slots_is_planned(const motion_t *self, const q32_t slot_q32[AXES_MAX])
+{
+    bool is_planned = true;
+    for (unsigned i = 0; i < self->planned_slots; i++) {
+        is_planned &= self->timed_way_q32[i] == whole_way(self, i, slot_q32[i]);
+    }
+    return is_planned;
 }
 
 void slots_scale_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX])

@@ -24,6 +24,9 @@ void slots_plan(motion_t *self, const q32_t slot_q32[AXES_MAX]);
 /** ... and this adds what the intensity has changed since to the references of such a move. */
 void slots_shift_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX]);
 
+/** True if the planned move ends at these slots: at an intensity of 0 all of them look alike. */
+bool slots_is_planned(const motion_t *self, const q32_t slot_q32[AXES_MAX]);
+
 /** The references of a stream with the intensity in force. */
 void slots_scale_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX]);
 

@@ -736,6 +736,23 @@ static void test_intensity_changed_in_a_timed_move_ends_at_the_scaled_pose(void)
     }
 }
 
+/* At an intensity of 0 every pose is neutral; with the intensity the platform goes to the one that was sent last. */
+static void test_intensity_0_a_pose_is_kept_for_later(void)
+{
+    settings_t settings = rig_hexapod();
+    settings.intensity_start_percent = 0;
+    engage(&settings);
+    for (int z = 10; z <= 20; z += 10) {
+        rig_sendf(&m_rig, "@A6:0,0,0,0,0,%d#", z);
+        rig_run_ms(&m_rig, 2000);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, rig_pose(&m_rig, AXIS_Z));
+    }
+    TEST_ASSERT_EQUAL(HV_OK, gateway_set_intensity(&m_rig.gateway, 100));
+    rig_run_ms(&m_rig, 10000);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, 20, rig_pose(&m_rig, AXIS_Z));
+    TEST_ASSERT_TRUE(is_resting());
+}
+
 /* A value that no limit reaches is told as clamped even where nothing is left of it. */
 static void test_intensity_0_values_beyond_all_limits_are_told(void)
 {
@@ -848,6 +865,7 @@ int main(void)
     RUN_TEST(test_axis_limits_clamp_the_axis);
     RUN_TEST(test_cylinders_beyond_the_stroke_stop_at_the_margin);
     RUN_TEST(test_intensity_changed_in_a_timed_move_ends_at_the_scaled_pose);
+    RUN_TEST(test_intensity_0_a_pose_is_kept_for_later);
     RUN_TEST(test_intensity_0_values_beyond_all_limits_are_told);
     RUN_TEST(test_place_positions_without_a_pose_are_told_as_such);
     RUN_TEST(test_target_is_nothing_to_a_motion_that_follows_nobody);
