@@ -182,14 +182,18 @@ static const row_t *find_row(const supervisor_t *self, event_t event, const supe
 
 static void take(supervisor_t *self, const row_t *row)
 {
-    if (row->to == STATE_HOLD)
+    if (row->to == STATE_HOLD) {
         self->interrupted = self->state;
-    if (row->to != STAY)
+    }
+    if (row->to != STAY) {
         self->state = row->to;
-    if (row->goal != KEEP)
+    }
+    if (row->goal != KEEP) {
         self->goal = row->goal;
-    if (row->by_silence != SAME)
+    }
+    if (row->by_silence != SAME) {
         self->is_held_by_silence = row->by_silence == SET;
+    }
 }
 
 void supervisor_init(supervisor_t *self)

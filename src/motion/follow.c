@@ -315,9 +315,9 @@ static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
         const bool was_done = scurve_is_done(&self->path);
         scurve_step(&self->path);
         for (unsigned i = 0; i < AXES_MAX; i++) {
-            ref[i] = was_done ? (ramp_ref_t){.pos_q32 = self->path_to_q32[i]}
-                              : history_advance(&self->path_history[i],
-                                                scurve_between(&self->path, self->path_from_q32[i], self->path_to_q32[i]));
+            const ramp_ref_t rest = {.pos_q32 = self->path_to_q32[i]};
+            const q32_t pos_q32 = scurve_between(&self->path, self->path_from_q32[i], self->path_to_q32[i]);
+            ref[i] = was_done ? rest : history_advance(&self->path_history[i], pos_q32);
         }
     }
     for (unsigned i = self->planned_slots; i < AXES_MAX; i++) {

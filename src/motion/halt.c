@@ -233,6 +233,7 @@ void halt_step(halt_t *self, ramp_ref_t *ref)
         const halt_times_t *t = &self->times[i];
         const bool is_ending = self->elapsed >= t->change + t->hold + t->back;
         const q32_t pos_q32 = is_ending ? self->rest_q32[i] : self->now[i].pos_q32 + velocity_after(self, i, self->elapsed);
-        ref[i] = was_done ? (ramp_ref_t){.pos_q32 = pos_q32} : history_advance(&self->now[i], pos_q32);
+        const ramp_ref_t rest = {.pos_q32 = pos_q32};
+        ref[i] = was_done ? rest : history_advance(&self->now[i], pos_q32);
     }
 }

@@ -216,7 +216,8 @@ bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref)
     q32_t pos_q32[AXES_MAX];
     stream_curve_at(&self->curve, self->style, self->between_q32, pos_q32);
     for (unsigned axis = 0; axis < self->curve.axes; axis++) {
-        ref[axis] = self->is_fresh ? (ramp_ref_t){.pos_q32 = pos_q32[axis]} : difference(&self->previous[axis], pos_q32[axis]);
+        const ramp_ref_t rest = {.pos_q32 = pos_q32[axis]};
+        ref[axis] = self->is_fresh ? rest : difference(&self->previous[axis], pos_q32[axis]);
         self->previous[axis] = ref[axis];
     }
     self->is_fresh = false;

@@ -218,8 +218,9 @@ static unsigned periods_ahead(const stream_clock_t *self, int64_t ahead_us_q16, 
     if (ahead_us_q16 * 4 < self->period_us_q16) {
         return 0;
     }
-    if (self->settled < STREAM_GAPS)
+    if (self->settled < STREAM_GAPS) {
         return gap_us_q16 * 5 < self->period_us_q16 * 8 ? 1u : periods_in_gap(gap_us_q16, self->period_us_q16);
+    }
     const unsigned periods = (unsigned)((ahead_us_q16 * 4 + self->period_us_q16) / (self->period_us_q16 * 4));
     return periods > 1 ? periods : 1u; /* late by more than 0.75: a loss */
 }
