@@ -108,9 +108,8 @@ uint32_t motion_stretched_count(const motion_t *self);
  *  stops before that and goes to the next target that it can hold, at engage speed. */
 uint32_t motion_singular_stops(const motion_t *self);
 
-/** Extensions at which people board, and those of the neutral pose. */
+/** Extensions at which people board. */
 const q32_t *motion_settled_extension(const motion_t *self);
-const q32_t *motion_neutral_extension(const motion_t *self);
 
 /** The mechanism, for feedback. */
 const kin_t *motion_kin(const motion_t *self);

@@ -421,11 +421,6 @@ const q32_t *motion_settled_extension(const motion_t *self)
     return self->settled_mm_q32;
 }
 
-const q32_t *motion_neutral_extension(const motion_t *self)
-{
-    return self->neutral_mm_q32;
-}
-
 const kin_t *motion_kin(const motion_t *self)
 {
     return &self->kin;

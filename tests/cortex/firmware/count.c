@@ -47,20 +47,6 @@ static void require(bool is_good, const char *what)
     }
 }
 
-static void say_number(const char *what, uint32_t number)
-{
-    char digits[12] = {0};
-    size_t at = sizeof digits - 2;
-    digits[at] = '\n';
-    do {
-        digits[--at] = (char)('0' + number % 10);
-        number /= 10;
-    } while (number > 0);
-    semihost_say(what);
-    semihost_say(" ");
-    semihost_say(&digits[at]);
-}
-
 static q32_t between(uint32_t *random, q32_t size_q32)
 {
     *random ^= *random << 13;
@@ -174,13 +160,13 @@ int main(void)
     SYSTICK_RELOAD = SYSTICK_MASK;
     SYSTICK_VALUE = 0;
     SYSTICK_CONTROL = SYSTICK_RUNNING;
-    say_number("runs", POSES);
-    say_number("calibration", ticks_of_calibration());
-    say_number("nothing", ticks_of(run_nothing));
-    say_number("inverse-heave", ticks_of(run_inverse));
-    say_number("inverse-double", ticks_of(run_inverse_double));
-    say_number("forward-heave", ticks_of(run_forward));
-    say_number("forward-double", ticks_of(run_forward_double));
+    semihost_say_number("runs", POSES);
+    semihost_say_number("calibration", ticks_of_calibration());
+    semihost_say_number("nothing", ticks_of(run_nothing));
+    semihost_say_number("inverse-heave", ticks_of(run_inverse));
+    semihost_say_number("inverse-double", ticks_of(run_inverse_double));
+    semihost_say_number("forward-heave", ticks_of(run_forward));
+    semihost_say_number("forward-double", ticks_of(run_forward_double));
     semihost_exit(true);
     return 0;
 }

@@ -84,20 +84,6 @@ static uint32_t stack_used(void)
     return (uint32_t)((uintptr_t)start_stack_end - (uintptr_t)at);
 }
 
-static void say_number(const char *what, uint32_t number)
-{
-    char digits[12] = {0};
-    size_t at = sizeof digits - 1;
-    do {
-        digits[--at] = (char)('0' + number % 10);
-        number /= 10;
-    } while (number > 0);
-    semihost_say(what);
-    semihost_say(" ");
-    semihost_say(&digits[at]);
-    semihost_say("\n");
-}
-
 /* --- Input --- */
 
 static const table_t *load(const char *path)
@@ -218,7 +204,7 @@ int main(void)
     require(file >= 0, "the trace cannot be opened");
     open_all(table);
     run(file);
-    say_number("stack", stack_used());
+    semihost_say_number("stack", stack_used());
     semihost_exit(true);
     return 0;
 }

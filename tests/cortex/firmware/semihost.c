@@ -57,6 +57,20 @@ void semihost_say(const char *text)
     (void)call(SYS_WRITE0, (uintptr_t)text);
 }
 
+void semihost_say_number(const char *what, uint32_t number)
+{
+    char digits[12] = {0};
+    size_t at = sizeof digits - 2;
+    digits[at] = '\n';
+    do {
+        digits[--at] = (char)('0' + number % 10);
+        number /= 10;
+    } while (number > 0);
+    semihost_say(what);
+    semihost_say(" ");
+    semihost_say(&digits[at]);
+}
+
 void semihost_exit(bool is_good)
 {
     (void)call(SYS_EXIT, is_good ? STOPPED_APPLICATION_EXIT : STOPPED_RUNTIME_ERROR);

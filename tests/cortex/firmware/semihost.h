@@ -26,6 +26,9 @@ bool semihost_write(int file, const void *from, size_t bytes);
 /** Onto the emulator's standard error. */
 void semihost_say(const char *text);
 
+/** A line of its own: what, a blank, the number. */
+void semihost_say_number(const char *what, uint32_t number);
+
 /** Never returns. */
 void semihost_exit(bool is_good);
 
