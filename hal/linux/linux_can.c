@@ -314,10 +314,10 @@ static hv_status_t open_socket(linux_can_t *self, int index)
 {
     const struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = index};
     close_socket(self);
+    cut_off(self, HAL_CAN_DOWN);
     self->unconfirmed = 0;
     self->lost = 0;
     self->is_overrun = false;
-    self->has_kept = false;
     self->fd = socket(AF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
     if (self->fd < 0 && (errno == EAFNOSUPPORT || errno == EPROTONOSUPPORT)) {
         return report_trouble(self, LINUX_CAN_NO_SUPPORT, errno, "this kernel has no SocketCAN (modules can and can_raw)");
@@ -341,31 +341,6 @@ static void ask_for_flush(const linux_can_t *self)
     }
 }
 
-/* Fresh or not at all: what waits in the interface is dropped, be it ours or of a program before us. */
-static hv_status_t clear(linux_can_t *self, linux_can_link_t *link, bool is_suspect)
-{
-    const bool must = link->waiting > 0 || link->state == HAL_CAN_BUS_OFF || !link->is_up;
-    if (!must && !is_suspect) {
-        return HV_OK;
-    }
-    if (linux_can_link_flush(self->name) == HV_OK) {
-        link->is_up = true;
-        return HV_OK;
-    }
-    ask_for_flush(self);
-    if (!link->is_up) {
-        return say_down(self);
-    }
-    if (link->state == HAL_CAN_BUS_OFF) {
-        return say_bus_off(self);
-    }
-    if (link->waiting > 0) {
-        return report_trouble(self, LINUX_CAN_FRAMES_WAIT, 0,
-                              "old frames wait in it; dropping them takes CAP_NET_ADMIN (as root: ip link set it down, then up)");
-    }
-    return HV_OK;
-}
-
 static hv_status_t look(linux_can_t *self, linux_can_link_t *link)
 {
     const hv_status_t status = linux_can_link_look(self->netlink, self->name, link);
@@ -378,6 +353,35 @@ static hv_status_t look(linux_can_t *self, linux_can_link_t *link)
     if (!link->is_can) {
         (void)report_trouble(self, LINUX_CAN_NOT_CAN, 0, "this is not a CAN interface (ip -br link show type can)");
         return HV_ERR_ARG;
+    }
+    return HV_OK;
+}
+
+/* Fresh or not at all: what waits in the interface is dropped, be it ours or of a program before us. */
+static hv_status_t clear(linux_can_t *self, linux_can_link_t *link, bool is_suspect)
+{
+    const bool must = link->waiting > 0 || link->state == HAL_CAN_BUS_OFF || !link->is_up;
+    if (!must && !is_suspect) {
+        return HV_OK;
+    }
+    if (linux_can_link_flush(self->name) == HV_OK) {
+        link->is_up = true;
+        return HV_OK;
+    }
+    ask_for_flush(self);
+    const hv_status_t status = look(self, link); /* it may have gone down, and not up again */
+    if (status != HV_OK) {
+        return status;
+    }
+    if (!link->is_up) {
+        return say_down(self);
+    }
+    if (link->state == HAL_CAN_BUS_OFF) {
+        return say_bus_off(self);
+    }
+    if (link->waiting > 0) {
+        return report_trouble(self, LINUX_CAN_FRAMES_WAIT, 0,
+                              "old frames wait in it; dropping them takes CAP_NET_ADMIN (as root: ip link set it down, then up)");
     }
     return HV_OK;
 }

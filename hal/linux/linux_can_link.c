@@ -16,6 +16,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#define TRIES    3u  /* where others change interfaces meanwhile, the system says so instead of telling all of them */
+#define LEFT_MAX 64u /* more than any answer that was given up has left behind */
+
 /** Attributes of one level, by number; NULL = absent. */
 typedef struct {
     const struct nlattr *at[64];
@@ -135,11 +138,23 @@ static int keep_queue(const struct nlmsghdr *message, void *data)
     return MNL_CB_OK;
 }
 
+/* What has been left of an answer that could not be read to its end would be taken for the next one, for ever. */
+static void forget_answers(struct mnl_socket *netlink)
+{
+    char buffer[8192];
+    for (unsigned i = 0; i < LEFT_MAX; i++) {
+        if (recv(mnl_socket_get_fd(netlink), buffer, sizeof buffer, MSG_DONTWAIT) < 0 && errno == EAGAIN) {
+            return;
+        }
+    }
+}
+
 static hv_status_t ask(struct mnl_socket *netlink, struct nlmsghdr *request, mnl_cb_t keep, linux_can_link_t *out)
 {
     char buffer[8192];
     int more = MNL_CB_OK;
     request->nlmsg_seq = request->nlmsg_type;
+    forget_answers(netlink);
     if (mnl_socket_sendto(netlink, request, request->nlmsg_len) < 0) {
         return HV_ERR_IO;
     }
@@ -209,15 +224,22 @@ static void keep_driver(const char *name, linux_can_link_t *out)
     (void)snprintf(out->driver, sizeof out->driver, "%.31s", last != NULL ? last + 1 : target);
 }
 
+static hv_status_t look(struct mnl_socket *netlink, const char *name, linux_can_link_t *out)
+{
+    *out = (linux_can_link_t){.state = HAL_CAN_ACTIVE};
+    const hv_status_t status = ask_link(netlink, name, out);
+    return status == HV_OK ? ask_queue(netlink, out) : status;
+}
+
 hv_status_t linux_can_link_look(struct mnl_socket *netlink, const char *name, linux_can_link_t *out)
 {
-    linux_can_link_t found = {.state = HAL_CAN_ACTIVE};
+    linux_can_link_t found;
     if (strlen(name) >= LINUX_CAN_NAME_SIZE) {
         return HV_ERR_AGAIN;
     }
-    hv_status_t status = ask_link(netlink, name, &found);
-    if (status == HV_OK) {
-        status = ask_queue(netlink, &found);
+    hv_status_t status = look(netlink, name, &found);
+    for (unsigned i = 1; status == HV_ERR_IO && errno == EINTR && i < TRIES; i++) {
+        status = look(netlink, name, &found);
     }
     if (status == HV_OK) {
         keep_driver(name, &found);
