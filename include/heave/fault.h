@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * fault.h - machine faults: what each means, how the platform reacts and what to do, in one table (fault.c).
+ * fault.h - machine faults: how the platform reacts to each (fault.c), what it means and what to do (fault_help.c).
  * A fault latches: only an operator's reset, with the cause gone, ends it. The first one is kept, all are counted, the worst
- * reaction wins. docs/faults.md is made from the table. Pure and constant.
+ * reaction wins. docs/faults.md is made from both. Pure and constant.
  */
 #ifndef HEAVE_FAULT_H
 #define HEAVE_FAULT_H
@@ -29,28 +29,30 @@ typedef enum {
     FAULT_REACT_SILENT      /**< nobody hears the gateway: it stops talking, so that the drives' own watchdogs stop them */
 } fault_reaction_t;
 
-/** Languages of the texts. */
-typedef enum { FAULT_ENGLISH, FAULT_CHINESE, FAULT_LANGUAGES } fault_language_t;
+/** The reaction to a code; that to FAULT_NONE outside the enum. */
+fault_reaction_t fault_reaction(fault_code_t code);
 
-/** One row of the table; texts are UTF-8. */
-typedef struct {
-    fault_reaction_t reaction;
-    const char *name;                    /**< a word for programs */
-    const char *text[FAULT_LANGUAGES];   /**< what has happened */
-    const char *cause[FAULT_LANGUAGES];  /**< what it usually comes from */
-    const char *remedy[FAULT_LANGUAGES]; /**< what to do */
-} fault_row_t;
-
-/** The row of a code; that of FAULT_NONE outside the enum. */
-const fault_row_t *fault_row(fault_code_t code);
+/** What has happened, in English: constant text. */
+const char *fault_text(fault_code_t code);
 
 /** Whether it is of one axis: of a drive, or of what hangs on it. */
 bool fault_is_of_axis(fault_code_t code);
 
-/** Its English text: "drive fault", ... */
-const char *fault_text(fault_code_t code);
-
 /** "stop", "quick-stop", ...: constant text. */
 const char *fault_reaction_name(fault_reaction_t reaction);
+
+/** Languages of the help. */
+typedef enum { FAULT_ENGLISH, FAULT_CHINESE, FAULT_LANGUAGES } fault_language_t;
+
+/** More about a fault; texts are UTF-8. */
+typedef struct {
+    const char *name;                    /**< a word for programs */
+    const char *text_zh;                 /**< fault_text() in Chinese */
+    const char *cause[FAULT_LANGUAGES];  /**< what it usually comes from */
+    const char *remedy[FAULT_LANGUAGES]; /**< what to do */
+} fault_help_t;
+
+/** That of a code; of FAULT_NONE outside the enum. */
+const fault_help_t *fault_help(fault_code_t code);
 
 #endif

@@ -47,8 +47,9 @@ typedef enum { BRING_UP_IDLE, BRING_UP_ENABLE, BRING_UP_HOME, BRING_UP_MOVE } br
 typedef struct {
     bool is_due;     /**< not used up yet */
     uint32_t frames; /**< within a second, that it waits for */
-    uint32_t seen;   /**< wraps: harmless, after 2^32 frames it has long been used */
-    uint64_t at_us[AUTO_ENGAGE_FRAMES_MAX];
+    uint32_t seen;   /**< since a gap of more than a second; wraps: harmless, after 2^32 frames it has long been used */
+    uint64_t last_us;
+    uint32_t at_us[AUTO_ENGAGE_FRAMES_MAX]; /**< low half of the time: no more than that many gaps lie between */
 } auto_engage_t;
 
 /** A gateway; members are private to src/gateway. */
@@ -60,7 +61,6 @@ typedef struct {
     supervisor_t supervisor;
     frame_scanner_t scanner;
     snapshot_t snapshot;
-    drive_feedback_t feedback[DRIVES_MAX];
     fault_code_t axis_fault[DRIVES_MAX];        /**< what is wrong with each drive now */
     uint32_t told[DRIVES_MAX + 1u];             /**< faults that the coming cycle is to find, as snapshot.begun */
     uint64_t following_since_us[CYLINDERS_MAX]; /**< further from its set-point than allowed since then; 0 = it is not */

@@ -297,7 +297,7 @@ static size_t format_feedback(const blackbox_row_t *row, char *to)
         at += decimal_put_hex(&to[at], row->code[i], 8);
     }
     at += decimal_put_text(&to[at], ",");
-    at += decimal_put_text(&to[at], row->fault == FAULT_NONE ? "" : fault_row((fault_code_t)row->fault)->name);
+    at += decimal_put_text(&to[at], row->fault == FAULT_NONE ? "" : fault_help((fault_code_t)row->fault)->name);
     return at + decimal_put_text(&to[at], "\n");
 }
 

@@ -255,7 +255,7 @@ static bool read_fault(cursor_t *self, frames_line_t *out)
     uint32_t axis = 0;
     out->kind = FRAMES_FAULT;
     for (unsigned i = FAULT_NONE + 1u; i < FAULT_CODES; i++) {
-        if (take_word(self, fault_row((fault_code_t)i)->name)) {
+        if (take_word(self, fault_help((fault_code_t)i)->name)) {
             out->fault = (fault_code_t)i;
             const bool is_good = !fault_is_of_axis(out->fault) || (read_count(self, DRIVES_MAX, &axis) && axis != 0);
             out->drive = (uint8_t)axis;

@@ -78,7 +78,7 @@ static void put_state(sheet_t *self, const snapshot_t *s)
     head(self, "faults_total", "counter", "faults since the start, those that have been");
     for (unsigned i = 1; i < FAULT_CODES; i++) {
         if (s->counters.fault[i] > 0) {
-            put(self, "heave_faults_total{fault=\"%s\"} %" PRIu32 "\n", fault_row((fault_code_t)i)->name, s->counters.fault[i]);
+            put(self, "heave_faults_total{fault=\"%s\"} %" PRIu32 "\n", fault_help((fault_code_t)i)->name, s->counters.fault[i]);
         }
     }
 }

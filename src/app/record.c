@@ -115,7 +115,7 @@ static size_t put_drive(char *to, uint32_t detail, uint32_t code)
 static size_t put_fault(char *to, fault_code_t code, uint32_t axis)
 {
     size_t at = decimal_put_text(to, "!fault ");
-    at += decimal_put_text(&to[at], fault_row(code)->name);
+    at += decimal_put_text(&to[at], fault_help(code)->name);
     return at + (axis != 0 ? put_number(&to[at], " ", axis, "") : 0);
 }
 

@@ -53,21 +53,21 @@ static const char *device_text(const snapshot_t *s)
 
 static void write_fault(json_t *json, const snapshot_t *s)
 {
-    const fault_row_t *row = fault_row(s->fault.code);
+    const fault_help_t *help = fault_help(s->fault.code);
     json_open(json, "fault", '{');
     json_number(json, "code", (uint64_t)s->fault.code);
-    json_text(json, "name", row->name);
+    json_text(json, "name", help->name);
     json_number(json, "axis", s->fault.axis);
     json_number(json, "device_code", s->fault.device_code);
     json_text(json, "device_text", device_text(s));
     json_ms(json, "at_ms", s->fault.at_us);
     json_text(json, "reaction", fault_reaction_name(s->reaction));
-    json_text(json, "text", row->text[FAULT_ENGLISH]);
-    json_text(json, "cause", row->cause[FAULT_ENGLISH]);
-    json_text(json, "remedy", row->remedy[FAULT_ENGLISH]);
-    json_text(json, "text_zh", row->text[FAULT_CHINESE]);
-    json_text(json, "cause_zh", row->cause[FAULT_CHINESE]);
-    json_text(json, "remedy_zh", row->remedy[FAULT_CHINESE]);
+    json_text(json, "text", fault_text(s->fault.code));
+    json_text(json, "cause", help->cause[FAULT_ENGLISH]);
+    json_text(json, "remedy", help->remedy[FAULT_ENGLISH]);
+    json_text(json, "text_zh", help->text_zh);
+    json_text(json, "cause_zh", help->cause[FAULT_CHINESE]);
+    json_text(json, "remedy_zh", help->remedy[FAULT_CHINESE]);
     json_close(json, '}');
 }
 
@@ -79,7 +79,7 @@ static void write_fault_counts(json_t *json, const snapshot_t *s)
         if (s->counters.fault[i] > 0) {
             json_open(json, NULL, '{');
             json_number(json, "code", i);
-            json_text(json, "name", fault_row((fault_code_t)i)->name);
+            json_text(json, "name", fault_help((fault_code_t)i)->name);
             json_number(json, "count", s->counters.fault[i]);
             json_ms(json, "last_ms", s->fault_last_us[i]);
             json_close(json, '}');

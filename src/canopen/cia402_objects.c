@@ -146,7 +146,7 @@ static uint32_t source_value(const cia402_object_t *row, const cia402_config_t *
     uint8_t period = 0;
     int8_t exponent = 0;
     (void)cia402_period_parts(config->period_us, &period, &exponent);
-    switch (row->source) {
+    switch ((cia402_source_t)row->source) {
     case CIA402_CONSTANT:
         return row->constant;
     case CIA402_IDENTITY:
@@ -227,7 +227,7 @@ bool cia402_object_is_guarding(const cia402_object_t *row, const cia402_config_t
 
 bool cia402_object_applies(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis)
 {
-    switch (row->when) {
+    switch ((cia402_when_t)row->when) {
     case CIA402_ALWAYS:
         return true;
     case CIA402_IF_CYCLIC:

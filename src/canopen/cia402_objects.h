@@ -64,17 +64,17 @@ typedef enum {
     CIA402_MODE
 } cia402_source_t;
 
-/** One row. */
+/** One row, in bytes: an enumeration may take four. */
 typedef struct {
+    uint32_t constant;
+    uint32_t trouble; /**< cia402_trouble_t where it fails */
     uint16_t index;
     uint8_t sub;
     uint8_t bytes;
-    cia402_deed_t deed;
-    cia402_need_t need;
-    cia402_when_t when;
-    cia402_source_t source;
-    uint32_t constant;
-    uint32_t trouble; /**< cia402_trouble_t where it fails */
+    uint8_t deed;   /**< cia402_deed_t */
+    uint8_t need;   /**< cia402_need_t */
+    uint8_t when;   /**< cia402_when_t */
+    uint8_t source; /**< cia402_source_t */
 } cia402_object_t;
 
 extern const cia402_object_t cia402_objects[];

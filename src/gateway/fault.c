@@ -1,77 +1,42 @@
 /* SPDX-License-Identifier: MIT
- * fault.c - the table of machine faults; see fault.h.
+ * fault.c - how the platform reacts to each machine fault; see fault.h. Their causes and remedies are in fault_help.c.
  */
 #include "heave/fault.h"
 
-/* clang-format off */ /* a row is a record */
-static const fault_row_t k_rows[FAULT_CODES] = {
-    [FAULT_NONE] = {
-        FAULT_REACT_NONE, "none", {"none", "无"}, {"", ""}, {"", ""}},
-    [FAULT_DRIVE] = {
-        FAULT_REACT_QUICK_STOP, "drive-fault",
-        {"a drive reports a fault", "驱动器报告故障"},
-        {"the drive itself: overload, supply, encoder, following error; its code says which",
-         "驱动器自身：过载、供电、编码器、跟随误差；具体见其故障码"},
-        {"look the device code up in the drive's manual, mend the cause, then heavectl reset",
-         "在驱动器手册中查找设备故障码，排除原因后执行 heavectl reset"}},
-    [FAULT_DRIVE_OFFLINE] = {
-        FAULT_REACT_QUICK_STOP, "drive-offline",
-        {"a drive does not answer", "驱动器无应答"},
-        {"its supply or its cable is off, its address is wrong, or it has started again",
-         "供电或通信电缆断开、地址错误，或驱动器重新启动"},
-        {"check supply, cable, termination and address of this drive; heavectl status shows when it is back; then heavectl reset",
-         "检查该驱动器的供电、电缆、终端电阻和地址；heavectl status 显示恢复后执行 heavectl reset"}},
-    [FAULT_DRIVE_DROPPED] = {
-        FAULT_REACT_QUICK_STOP, "drive-dropped",
-        {"a drive left the enabled state by itself", "驱动器自行退出使能状态"},
-        {"its enable input, its safe-torque-off or its own supervision took the torque away",
-         "使能输入、安全转矩关断（STO）或驱动器自身的监控切断了转矩"},
-        {"check enable and safety inputs of the drive, then heavectl reset",
-         "检查驱动器的使能和安全输入，然后执行 heavectl reset"}},
-    [FAULT_DRIVE_TIMEOUT] = {
-        FAULT_REACT_QUICK_STOP, "drive-timeout",
-        {"the drives were not ready in time", "驱动器未在规定时间内就绪"},
-        {"a drive does not enable, or does not find its zero", "某个驱动器无法使能，或找不到零点"},
-        {"heavectl status shows which drive waits for what; mend that, then heavectl reset",
-         "heavectl status 显示哪个驱动器在等待什么；排除后执行 heavectl reset"}},
-    [FAULT_BUS] = {
-        FAULT_REACT_SILENT, "bus-lost",
-        {"the bus of the drives is lost", "与驱动器的总线通信中断"},
-        {"the interface is down, unplugged or bus-off, or nobody acknowledges on it",
-         "接口关闭、被拔出或处于 bus-off，或总线上无人应答"},
-        {"check interface, cable and termination; bring the interface up again, then heavectl reset",
-         "检查接口、电缆和终端电阻；重新启用接口后执行 heavectl reset"}},
-    [FAULT_FOLLOWING] = {
-        FAULT_REACT_QUICK_STOP, "following-error",
-        {"a cylinder does not follow its set-points", "电动缸未跟随设定值"},
-        {"it is blocked or overloaded, its scaling or sign is wrong, or the window is too narrow",
-         "卡阻或过载、比例或方向设置错误，或跟随误差窗口过窄"},
-        {"check the mechanics and the load, scaling and sign; [cylinders] following_error_mm is the window; then heavectl reset",
-         "检查机械和负载、比例与方向；窗口由 [cylinders] following_error_mm 设定；然后执行 heavectl reset"}},
-    [FAULT_BUS_FAILING] = {
-        FAULT_REACT_STOP, "bus-failing",
-        {"the bus of the drives is about to be lost", "与驱动器的总线通信即将中断"},
-        {"too many frames are disturbed: the CAN controller has been error-passive for longer than [can] passive_stop_ms",
-         "受干扰的帧过多：CAN 控制器处于 error-passive 状态的时间超过 [can] passive_stop_ms"},
-        {"check cable, connectors, termination (120 ohm at both ends), grounding and bit rate; ip -s -d link show counts the errors; "
-         "then heavectl reset",
-         "检查电缆、接头、终端电阻（两端各 120 欧姆）、接地和波特率；ip -s -d link show 显示错误计数；然后执行 heavectl reset"}},
-};
-/* clang-format on */
+typedef struct {
+    fault_reaction_t reaction;
+    const char *text;
+} row_t;
 
-const fault_row_t *fault_row(fault_code_t code)
+static const row_t k_rows[FAULT_CODES] = {
+    [FAULT_NONE] = {FAULT_REACT_NONE, "none"},
+    [FAULT_DRIVE] = {FAULT_REACT_QUICK_STOP, "a drive reports a fault"},
+    [FAULT_DRIVE_OFFLINE] = {FAULT_REACT_QUICK_STOP, "a drive does not answer"},
+    [FAULT_DRIVE_DROPPED] = {FAULT_REACT_QUICK_STOP, "a drive left the enabled state by itself"},
+    [FAULT_DRIVE_TIMEOUT] = {FAULT_REACT_QUICK_STOP, "the drives were not ready in time"},
+    [FAULT_BUS] = {FAULT_REACT_SILENT, "the bus of the drives is lost"},
+    [FAULT_FOLLOWING] = {FAULT_REACT_QUICK_STOP, "a cylinder does not follow its set-points"},
+    [FAULT_BUS_FAILING] = {FAULT_REACT_STOP, "the bus of the drives is about to be lost"},
+};
+
+static const row_t *row_of(fault_code_t code)
 {
     return &k_rows[(unsigned)code < FAULT_CODES ? code : FAULT_NONE];
+}
+
+fault_reaction_t fault_reaction(fault_code_t code)
+{
+    return row_of(code)->reaction;
+}
+
+const char *fault_text(fault_code_t code)
+{
+    return row_of(code)->text;
 }
 
 bool fault_is_of_axis(fault_code_t code)
 {
     return code == FAULT_DRIVE || code == FAULT_DRIVE_OFFLINE || code == FAULT_DRIVE_DROPPED || code == FAULT_FOLLOWING;
-}
-
-const char *fault_text(fault_code_t code)
-{
-    return fault_row(code)->text[FAULT_ENGLISH];
 }
 
 const char *fault_reaction_name(fault_reaction_t reaction)

@@ -78,8 +78,7 @@ static bool are_numbers_sound(const gateway_t *saved)
                     is_state(s->goal) && (unsigned)saved->bring_up <= BRING_UP_MOVE && (unsigned)s->fault.code < FAULT_CODES &&
                     (unsigned)s->reaction <= FAULT_REACT_SILENT && s->relay_count <= HAL_RELAYS_MAX;
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        is_sound = is_sound && (unsigned)saved->axis_fault[i] < FAULT_CODES && (unsigned)s->drive[i].state <= DRIVE_FAULT &&
-                   (unsigned)saved->feedback[i].state <= DRIVE_FAULT;
+        is_sound = is_sound && (unsigned)saved->axis_fault[i] < FAULT_CODES && (unsigned)s->drive[i].state <= DRIVE_FAULT;
     }
     return is_sound;
 }
@@ -236,7 +235,7 @@ static void note_singular_stops(gateway_t *self, uint64_t now_us)
 static void publish_plate(gateway_t *self, uint64_t now_us)
 {
     snapshot_t *s = &self->snapshot;
-    plate_take(&self->plate, motion_kin(&self->motion), self->feedback, &s->sent, now_us);
+    plate_take(&self->plate, motion_kin(&self->motion), s->drive, &s->sent, now_us);
     s->has_actual_pose = self->plate.has_pose;
     s->has_actual_rates = self->plate.has_rates;
     s->actual = self->plate.pose;
@@ -258,9 +257,6 @@ static void publish(gateway_t *self, uint64_t now_us)
         s->extension_mm_q32[i] = self->output.extension_mm_q32[i];
     }
     s->angle_deg_q32 = self->output.angle_deg_q32;
-    for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        s->drive[i] = self->feedback[i];
-    }
     reports_take(self);
     s->flags = self->output.flags;
     s->limiting_cylinder = self->output.limiting_cylinder;

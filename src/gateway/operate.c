@@ -24,7 +24,7 @@ static unsigned drive_count(const gateway_t *self)
 static bool are_all(const gateway_t *self, drive_state_t state, bool is_zero_needed)
 {
     for (unsigned i = 0; i < drive_count(self); i++) {
-        const drive_feedback_t *f = &self->feedback[i];
+        const drive_feedback_t *f = &self->snapshot.drive[i];
         if (f->state != state || !f->has_actual || (is_zero_needed && !f->is_homed)) {
             return false;
         }
@@ -36,7 +36,7 @@ static bool is_at_settled(const gateway_t *self)
 {
     const q32_t *settled_q32 = motion_settled_extension(&self->motion);
     for (unsigned i = 0; i < kin_cylinders(motion_kin(&self->motion)); i++) {
-        if (fx_abs(self->feedback[i].actual_mm_q32 - settled_q32[i]) > q32_from_int(AT_SETTLED_WINDOW_MM)) {
+        if (fx_abs(self->snapshot.drive[i].actual_mm_q32 - settled_q32[i]) > q32_from_int(AT_SETTLED_WINDOW_MM)) {
             return false;
         }
     }
@@ -50,7 +50,7 @@ static bool is_drive_fault_present(const gateway_t *self)
         return true;
     }
     for (unsigned i = 0; i < drive_count(self); i++) {
-        if (self->feedback[i].state == DRIVE_FAULT || self->feedback[i].state == DRIVE_OFFLINE) {
+        if (self->snapshot.drive[i].state == DRIVE_FAULT || self->snapshot.drive[i].state == DRIVE_OFFLINE) {
             return true;
         }
     }
@@ -86,9 +86,9 @@ static void track_actual(gateway_t *self)
     q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
     const unsigned cylinders = kin_cylinders(motion_kin(&self->motion));
     for (unsigned i = 0; i < cylinders; i++) {
-        extension_mm_q32[i] = self->feedback[i].actual_mm_q32;
+        extension_mm_q32[i] = self->snapshot.drive[i].actual_mm_q32;
     }
-    motion_place(&self->motion, extension_mm_q32, self->settings.has_angle ? self->feedback[cylinders].actual_mm_q32 : 0);
+    motion_place(&self->motion, extension_mm_q32, self->settings.has_angle ? self->snapshot.drive[cylinders].actual_mm_q32 : 0);
 }
 
 static void begin_bring_up(gateway_t *self, uint64_t now_us)
@@ -241,7 +241,7 @@ static void give_up_reset(gateway_t *self)
 static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint32_t device_code, uint64_t now_us)
 {
     snapshot_t *s = &self->snapshot;
-    const fault_reaction_t reaction = fault_row(code)->reaction;
+    const fault_reaction_t reaction = fault_reaction(code);
     if (self->supervisor.state == STATE_ESTOP) {
         return;
     }
@@ -308,7 +308,7 @@ static bool is_left_behind(gateway_t *self, unsigned i, uint64_t now_us)
         return false;
     }
     const bool is_far =
-        is_torque_expected(self) && fx_abs(self->output.extension_mm_q32[i] - self->feedback[i].actual_mm_q32) > window_q32;
+        is_torque_expected(self) && fx_abs(self->output.extension_mm_q32[i] - self->snapshot.drive[i].actual_mm_q32) > window_q32;
     if (!is_far) {
         self->following_since_us[i] = 0;
     } else if (self->following_since_us[i] == 0) {
@@ -320,7 +320,7 @@ static bool is_left_behind(gateway_t *self, unsigned i, uint64_t now_us)
 /* What is wrong with a drive, in any state in which it is meant to be up. */
 static fault_code_t judge_drive(gateway_t *self, unsigned i, uint64_t now_us)
 {
-    const drive_state_t state = self->feedback[i].state;
+    const drive_state_t state = self->snapshot.drive[i].state;
     const bool is_behind = is_left_behind(self, i, now_us);
     if (state == DRIVE_FAULT) {
         return FAULT_DRIVE;
@@ -356,7 +356,7 @@ static void watch_drives(gateway_t *self, uint64_t now_us)
         }
         self->axis_fault[i] = code;
         if (is_new) {
-            raise_fault(self, code, i + 1, code == FAULT_FOLLOWING ? 0 : self->feedback[i].fault_code, now_us);
+            raise_fault(self, code, i + 1, code == FAULT_FOLLOWING ? 0 : self->snapshot.drive[i].fault_code, now_us);
         }
     }
 }
@@ -450,7 +450,7 @@ static void step_abandoned(gateway_t *self, uint64_t now_us)
     }
     unsigned down = 0;
     for (unsigned i = 0; i < drive_count(self); i++) {
-        down += self->feedback[i].state == DRIVE_DISABLED; /* one that cannot tell would be a fault */
+        down += self->snapshot.drive[i].state == DRIVE_DISABLED; /* one that cannot tell would be a fault */
     }
     if (down == drive_count(self) || now_us - self->state_since_us >= ABANDON_TIMEOUT_US) {
         operate_event(self, EVENT_SHUTDOWN, now_us);
@@ -482,7 +482,7 @@ void operate_before_frames(gateway_t *self, uint64_t now_us)
 {
     clear_faults(self->snapshot.begun);
     operate_event(self, EVENT_TICK, now_us);
-    const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->feedback) == HV_OK;
+    const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->snapshot.drive) == HV_OK;
     watch_bus(self, !is_bus_heard || operate_is_bus_stalled(self), now_us);
     watch_failing(self, now_us);
     watch_drives(self, now_us);

@@ -33,14 +33,15 @@ typedef enum { SAME, SET, CLEAR } mark_t;
 #define STAY STATES /* to: the state it is in */
 #define KEEP STATES /* goal: as it was */
 
+/** A row, in bytes: an enumeration may take four. */
 typedef struct {
-    state_t from;
-    event_t event;
-    guard_t guard;
-    state_t to;
-    state_t goal;
-    mark_t by_silence;
-    action_t action;
+    uint8_t from;       /**< state_t */
+    uint8_t event;      /**< event_t */
+    uint8_t guard;      /**< guard_t */
+    uint8_t to;         /**< state_t */
+    uint8_t goal;       /**< state_t */
+    uint8_t by_silence; /**< mark_t */
+    uint8_t action;     /**< action_t */
 } row_t;
 
 /* clang-format off */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * fault_reference.c - prints docs/faults.md from the table of faults; a check compares the two.
+ * fault_reference.c - prints docs/faults.md from the tables of faults; a check compares the two.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,15 +16,17 @@ static void print_language(fault_language_t language, const char *title, const c
 {
     printf("\n## %s\n\n%s\n| --- | --- | --- | --- | --- | --- |\n", title, head);
     for (unsigned code = 1; code < FAULT_CODES; code++) {
-        const fault_row_t *row = fault_row((fault_code_t)code);
-        printf("| %u | `%s` | %s | %s | %s | %s |\n", code, row->name, row->text[language], row->cause[language],
-               fault_reaction_name(row->reaction), row->remedy[language]);
+        const fault_help_t *help = fault_help((fault_code_t)code);
+        const char *text = language == FAULT_ENGLISH ? fault_text((fault_code_t)code) : help->text_zh;
+        printf("| %u | `%s` | %s | %s | %s | %s |\n", code, help->name, text, help->cause[language],
+               fault_reaction_name(fault_reaction((fault_code_t)code)), help->remedy[language]);
     }
 }
 
 int main(void)
 {
-    printf("# Faults\n\nMade from the table in `src/gateway/fault.c`. Every fault latches: the platform goes to `FAULT` and "
+    printf("# Faults\n\nMade from the tables in `src/gateway/fault.c` and `fault_help.c`. Every fault latches: the platform goes "
+           "to `FAULT` and "
            "stays there until\n"
            "`heavectl reset` with the cause gone. The first one is shown, all are counted, and the worst reaction wins.\n\n"
            "Reactions: `stop` is a controlled stop of all axes together, then the drives are disabled. `quick-stop` lets every "

@@ -1383,7 +1383,7 @@ static void test_fault_told_is_found_in_the_next_cycle(void)
         gateway_tell_fault(&m_rig.gateway, (fault_code_t)code, axis);
         rig_run_ms(&m_rig, 1);
         expect_fault((fault_code_t)code, axis, 0);
-        TEST_ASSERT_EQUAL(fault_row((fault_code_t)code)->reaction, seen()->reaction);
+        TEST_ASSERT_EQUAL(fault_reaction((fault_code_t)code), seen()->reaction);
         TEST_ASSERT_EQUAL_HEX32(1u << code, seen()->begun[axis]);
         rig_run_ms(&m_rig, 1);
         TEST_ASSERT_EQUAL_HEX32(0, seen()->begun[axis]);
@@ -1430,22 +1430,24 @@ static void test_fault_worse_one_later_escalates_and_the_first_is_kept(void)
 }
 
 /* Every code has its words in both languages, and a reaction. */
-static void test_fault_rows_are_complete(void)
+static void test_fault_tables_are_complete(void)
 {
     start(true);
     for (unsigned code = 1; code < FAULT_CODES; code++) {
-        const fault_row_t *row = fault_row((fault_code_t)code);
-        TEST_ASSERT_TRUE(row->reaction >= FAULT_REACT_STOP && row->reaction <= FAULT_REACT_SILENT);
-        TEST_ASSERT_TRUE(row->name[0] != '\0');
+        const fault_help_t *help = fault_help((fault_code_t)code);
+        const fault_reaction_t reaction = fault_reaction((fault_code_t)code);
+        TEST_ASSERT_TRUE(reaction >= FAULT_REACT_STOP && reaction <= FAULT_REACT_SILENT);
+        TEST_ASSERT_TRUE(help->name[0] != '\0' && fault_text((fault_code_t)code)[0] != '\0' && help->text_zh[0] != '\0');
         for (unsigned language = 0; language < FAULT_LANGUAGES; language++) {
-            TEST_ASSERT_TRUE(row->text[language][0] != '\0' && row->cause[language][0] != '\0' &&
-                             row->remedy[language][0] != '\0');
+            TEST_ASSERT_TRUE(help->cause[language][0] != '\0' && help->remedy[language][0] != '\0');
         }
         for (unsigned other = 0; other < code; other++) {
-            TEST_ASSERT_TRUE(strcmp(row->name, fault_row((fault_code_t)other)->name) != 0);
+            TEST_ASSERT_TRUE(strcmp(help->name, fault_help((fault_code_t)other)->name) != 0);
         }
     }
-    TEST_ASSERT_EQUAL_PTR(fault_row(FAULT_NONE), fault_row(FAULT_CODES));
+    TEST_ASSERT_EQUAL_PTR(fault_help(FAULT_NONE), fault_help(FAULT_CODES));
+    TEST_ASSERT_EQUAL_STRING("none", fault_text(FAULT_CODES));
+    TEST_ASSERT_EQUAL(FAULT_REACT_NONE, fault_reaction(FAULT_CODES));
     TEST_ASSERT_EQUAL_STRING("silent", fault_reaction_name(FAULT_REACT_SILENT));
     TEST_ASSERT_EQUAL_STRING("?", fault_reaction_name((fault_reaction_t)(FAULT_REACT_SILENT + 1)));
 }
@@ -1855,7 +1857,6 @@ static void test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves(v
     SPOIL(snapshot.relay_count, HAL_RELAYS_MAX + 1);
     SPOIL(axis_fault[6], FAULT_CODES);
     SPOIL(snapshot.drive[0].state, (drive_state_t)(DRIVE_FAULT + 1));
-    SPOIL(feedback[3].state, (drive_state_t)(DRIVE_FAULT + 1));
     SPOIL(snapshot.cylinders, 3);
     SPOIL(snapshot.cylinders, 200);
     SPOIL(settings.has_angle, false);
@@ -1938,7 +1939,7 @@ static void run_supervision(void)
     RUN_TEST(test_fault_told_that_is_there_counts_once);
     RUN_TEST(test_fault_told_in_off_is_none);
     RUN_TEST(test_fault_worse_one_later_escalates_and_the_first_is_kept);
-    RUN_TEST(test_fault_rows_are_complete);
+    RUN_TEST(test_fault_tables_are_complete);
     RUN_TEST(test_fault_bus_gone_is_a_fault_that_can_be_reset);
     RUN_TEST(test_fault_bus_failing_is_a_controlled_stop);
     RUN_TEST(test_fault_bus_failing_is_latched_until_it_has_recovered);

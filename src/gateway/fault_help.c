@@ -1,0 +1,59 @@
+/* SPDX-License-Identifier: MIT
+ * fault_help.c - what programs and people are told about machine faults beyond a line of log; see fault.h. Apart from fault.c,
+ * so that firmware which shows none of it does not carry it.
+ */
+#include "heave/fault.h"
+
+/* clang-format off */ /* a row is a record */
+static const fault_help_t k_help[FAULT_CODES] = {
+    [FAULT_NONE] = {
+        "none", "无", {"", ""}, {"", ""}},
+    [FAULT_DRIVE] = {
+        "drive-fault", "驱动器报告故障",
+        {"the drive itself: overload, supply, encoder, following error; its code says which",
+         "驱动器自身：过载、供电、编码器、跟随误差；具体见其故障码"},
+        {"look the device code up in the drive's manual, mend the cause, then heavectl reset",
+         "在驱动器手册中查找设备故障码，排除原因后执行 heavectl reset"}},
+    [FAULT_DRIVE_OFFLINE] = {
+        "drive-offline", "驱动器无应答",
+        {"its supply or its cable is off, its address is wrong, or it has started again",
+         "供电或通信电缆断开、地址错误，或驱动器重新启动"},
+        {"check supply, cable, termination and address of this drive; heavectl status shows when it is back; then heavectl reset",
+         "检查该驱动器的供电、电缆、终端电阻和地址；heavectl status 显示恢复后执行 heavectl reset"}},
+    [FAULT_DRIVE_DROPPED] = {
+        "drive-dropped", "驱动器自行退出使能状态",
+        {"its enable input, its safe-torque-off or its own supervision took the torque away",
+         "使能输入、安全转矩关断（STO）或驱动器自身的监控切断了转矩"},
+        {"check enable and safety inputs of the drive, then heavectl reset",
+         "检查驱动器的使能和安全输入，然后执行 heavectl reset"}},
+    [FAULT_DRIVE_TIMEOUT] = {
+        "drive-timeout", "驱动器未在规定时间内就绪",
+        {"a drive does not enable, or does not find its zero", "某个驱动器无法使能，或找不到零点"},
+        {"heavectl status shows which drive waits for what; mend that, then heavectl reset",
+         "heavectl status 显示哪个驱动器在等待什么；排除后执行 heavectl reset"}},
+    [FAULT_BUS] = {
+        "bus-lost", "与驱动器的总线通信中断",
+        {"the interface is down, unplugged or bus-off, or nobody acknowledges on it",
+         "接口关闭、被拔出或处于 bus-off，或总线上无人应答"},
+        {"check interface, cable and termination; bring the interface up again, then heavectl reset",
+         "检查接口、电缆和终端电阻；重新启用接口后执行 heavectl reset"}},
+    [FAULT_FOLLOWING] = {
+        "following-error", "电动缸未跟随设定值",
+        {"it is blocked or overloaded, its scaling or sign is wrong, or the window is too narrow",
+         "卡阻或过载、比例或方向设置错误，或跟随误差窗口过窄"},
+        {"check the mechanics and the load, scaling and sign; [cylinders] following_error_mm is the window; then heavectl reset",
+         "检查机械和负载、比例与方向；窗口由 [cylinders] following_error_mm 设定；然后执行 heavectl reset"}},
+    [FAULT_BUS_FAILING] = {
+        "bus-failing", "与驱动器的总线通信即将中断",
+        {"too many frames are disturbed: the CAN controller has been error-passive for longer than [can] passive_stop_ms",
+         "受干扰的帧过多：CAN 控制器处于 error-passive 状态的时间超过 [can] passive_stop_ms"},
+        {"check cable, connectors, termination (120 ohm at both ends), grounding and bit rate; ip -s -d link show counts the errors; "
+         "then heavectl reset",
+         "检查电缆、接头、终端电阻（两端各 120 欧姆）、接地和波特率；ip -s -d link show 显示错误计数；然后执行 heavectl reset"}},
+};
+/* clang-format on */
+
+const fault_help_t *fault_help(fault_code_t code)
+{
+    return &k_help[(unsigned)code < FAULT_CODES ? code : FAULT_NONE];
+}
