@@ -17,7 +17,7 @@ typedef struct {
     const linux_gpio_names_t *names;
     linux_gpio_place_t *place; /**< the first chip that has them all */
     unsigned chips;            /**< that could be looked at */
-    unsigned refused;          /**< that could not */
+    unsigned refused;          /**< that could not, or are not known of */
     int error;                 /**< of the last one refused */
     unsigned labelled;         /**< of those with the right label */
     unsigned complete;         /**< of these, with all lines */
@@ -63,7 +63,7 @@ static uint32_t find_lines(linux_gpio_chip_t *chip, unsigned lines, const linux_
             continue;
         }
         for (unsigned i = 0; i < names->count; i++) {
-            if (strcmp(info.name, names->line[i]) == 0 && (found >> i & 1u) == 0) {
+            if (info.name[0] != '\0' && strcmp(info.name, names->line[i]) == 0 && (found >> i & 1u) == 0) {
                 offset[i] = at;
                 found |= 1u << i;
             }
@@ -95,14 +95,19 @@ static void note_label(search_t *search, const char *label)
     (void)snprintf(&search->labels[used], sizeof search->labels - used, "%s%s", used == 0 ? "" : ", ", label);
 }
 
+static void note_refused(search_t *search, int error)
+{
+    search->refused++;
+    search->error = error;
+}
+
 static void look_at_chip(search_t *search, const char *path)
 {
     linux_gpio_chip_t chip;
     linux_gpio_chip_info_t info;
     const int error = linux_gpio_chip_open(&chip, path, &info);
     if (error != 0) {
-        search->refused++;
-        search->error = error;
+        note_refused(search, error);
         return;
     }
     search->chips++;
@@ -113,20 +118,33 @@ static void look_at_chip(search_t *search, const char *path)
     linux_gpio_chip_close(&chip);
 }
 
+/* The next entry; NULL at the end, or where the folder cannot be read any further. */
+static const struct dirent *next_entry(search_t *search, DIR *folder)
+{
+    errno = 0;
+    const struct dirent *entry = readdir(folder);
+    if (entry == NULL && errno != 0) {
+        note_refused(search, errno);
+    }
+    return entry;
+}
+
 static void look_at_all(search_t *search)
 {
     DIR *folder = opendir("/dev");
     const struct dirent *entry;
-    while (folder != NULL && (entry = readdir(folder)) != NULL) {
+    if (folder == NULL) {
+        note_refused(search, errno);
+        return;
+    }
+    while ((entry = next_entry(search, folder)) != NULL) {
         char path[LINUX_GPIO_NAME_SIZE];
         if (strncmp(entry->d_name, "gpiochip", 8) == 0 &&
-            snprintf(path, sizeof path, "/dev/%.20s", entry->d_name) < (int)sizeof path) {
+            snprintf(path, sizeof path, "/dev/%s", entry->d_name) < (int)sizeof path) {
             look_at_chip(search, path);
         }
     }
-    if (folder != NULL) {
-        (void)closedir(folder);
-    }
+    (void)closedir(folder);
 }
 
 /* --- What came of it, in words --- */
@@ -193,7 +211,13 @@ hv_status_t linux_gpio_find(const linux_gpio_names_t *names, linux_gpio_place_t 
         }
     }
     look_at_all(&search);
-    return tell(&search, text);
+    const hv_status_t status = tell(&search, text);
+    if (search.chips > 0 && search.complete == 0 && search.refused > 0) {
+        const size_t used = strlen(text);
+        (void)snprintf(&text[used], LINUX_GPIO_TEXT_SIZE - used, "; not every chip could be looked at: %s",
+                       strerror(search.error));
+    }
+    return status;
 }
 
 /* --- Requesting --- */

@@ -133,6 +133,9 @@ unsigned linux_gpio_chip_fds(const linux_gpio_chip_t *self, int fd[LINUX_GPIO_LI
     const unsigned count = self->has_edges ? self->count : 0;
     for (unsigned i = 0; i < count; i++) {
         fd[i] = gpiod_line_event_get_fd(self->line[i]);
+        if (fd[i] < 0) {
+            return 0; /* then it takes looking */
+        }
     }
     return count;
 }

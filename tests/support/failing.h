@@ -4,7 +4,8 @@
  * Each such function asks failing_error() first, with the address that it returns to: that is the place in the sources, and a
  * place fails, not a function. failing_sweep() runs a trial as it is, and then again and again with one place failing with one of
  * the errors of its function, once or from then on. HEAVE_FAILED_PLACES names a file which the places that failed are added to,
- * for tests/system/test_syscalls.py. Threads may ask at any time; all else is the test's.
+ * for tests/system/test_syscalls.py, which knows whether that is all of them. Threads may ask at any time; all else is the
+ * test's.
  */
 #ifndef FAILING_H
 #define FAILING_H
@@ -59,10 +60,7 @@ bool failing_is(const char *function);
 /** Runs the trial with each place that it reaches, each error, once and for ever. A function that is not in the list is a failure
  * of the test.
  *  @param errors  ends with function NULL
- *  @return how many calls have failed */
+ *  @return how many trials met their failure */
 unsigned failing_sweep(const failing_errors_t *errors, void (*trial)(void));
-
-/** A place that was reached and has failed in no sweep; NULL for none. */
-const char *failing_missed(void);
 
 #endif
