@@ -30,6 +30,9 @@ typedef struct {
  *                  beyond its speed; that one and the axes behind take their own */
 void halt_plan(halt_t *self, unsigned axes, unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits);
 
+/** Where such a stop of axes that all go together would end, without planning it. */
+void halt_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits, q32_t *rest_q32);
+
 /** References of the next cycle. Past the end: at rest. */
 void halt_step(halt_t *self, ramp_ref_t *ref);
 

@@ -35,6 +35,12 @@ typedef enum { DUE_NOTHING, DUE_STEP, DUE_STREAM, DUE_TIMED } motion_due_t;
 /** What comes after a stop. */
 typedef enum { MOTION_THEN_REST, MOTION_THEN_PATH, MOTION_THEN_FOLLOW } motion_next_t;
 
+/** What is never needed at the same time. */
+typedef union {
+    halt_t halt;    /**< a stop that is under way, or tried */
+    quintic_t kept; /**< the way to a stream's curve while a shorter one is looked for, which takes no stop */
+} motion_aside_t;
+
 struct motion {
     kin_t kin;
     unsigned cylinders;
@@ -60,7 +66,7 @@ struct motion {
     gate_t gate;
     motion_target_t withheld; /**< what the gate holds back */
     quintic_t quintic;
-    halt_t halt;
+    motion_aside_t aside;
     scurve_t path;
     q32_t path_from_q32[AXES_MAX];
     q32_t path_to_q32[AXES_MAX];

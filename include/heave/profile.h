@@ -32,8 +32,9 @@ hv_status_t quintic_plan(quintic_t *self, unsigned axes, const ramp_state_t *sta
                          int64_t cycles) HV_MUST_CHECK;
 
 /** Adds to an axis the motion that goes on from a state while its acceleration fades to 0 over the quintic's cycles. For checks:
- *  such a quintic is not to be stepped. */
-void quintic_add_motion(quintic_t *self, unsigned axis, const ramp_state_t *from);
+ *  such a quintic is not to be stepped.
+ *  @param sign 1; -1 takes it off again, exactly */
+void quintic_add_motion(quintic_t *self, unsigned axis, const ramp_state_t *from, int sign);
 
 /** True if every axis stays within its limits (checked at 33 points with 1/64 to spare). */
 bool quintic_is_feasible(const quintic_t *self, const ramp_limits_t *const *limits);

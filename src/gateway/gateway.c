@@ -30,7 +30,8 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
     if (!is_io_valid(io)) {
         return HV_ERR_ARG;
     }
-    *self = (gateway_t){.settings = *settings, .io = *io, .is_tracking_actual = true};
+    *self = (gateway_t){.io = *io, .is_tracking_actual = true};
+    self->settings = *settings;
     clear_reports(self);
     gateway_restart_auto(self);
     const hv_status_t status = motion_init(&self->motion, settings);

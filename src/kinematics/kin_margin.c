@@ -13,10 +13,13 @@
 #define BISECT_STEPS  16u
 #define PIVOT_MIN_Q44 (INT64_C(1) << 14) /* 2^-30: below rounding */
 
+/* Elements of the lower triangle of a symmetric matrix, row by row. */
+#define TRIANGLE (POSE_AXES * (POSE_AXES + 1) / 2)
+
 /* The sums over all cylinders of V' u u' V and of V' V. */
 typedef struct {
-    int64_t held_q44[POSE_AXES][POSE_AXES];
-    int64_t all_q44[POSE_AXES][POSE_AXES];
+    int64_t held_q44[TRIANGLE];
+    int64_t all_q44[TRIANGLE];
 } sums_t;
 
 /* One free motion of the plate: it turns about an axis through its motion reference point, which slides. */
@@ -49,7 +52,13 @@ static void set_motions(const kin_t *self, const kin_placement_t *at, free_motio
     motion[2].slide_q28[2] = INT64_C(1) << 28;
 }
 
-/* Adds a cylinder's part to the lower triangles of the sums. */
+/* Where a matrix has an element; column <= row. */
+static unsigned element(unsigned row, unsigned column)
+{
+    return row * (row + 1) / 2 + column;
+}
+
+/* Adds a cylinder's part to the sums. */
 static void add_leg(const kin_t *self, const free_motion_t motion[], const kin_leg_t *leg, sums_t *sums)
 {
     int64_t direction_q28[3], arm_q28[3], velocity_q28[POSE_AXES][3], speed_q28[POSE_AXES];
@@ -61,8 +70,8 @@ static void add_leg(const kin_t *self, const free_motion_t motion[], const kin_l
         }
         speed_q28[i] = kin_dot_q28(velocity_q28[i], direction_q28);
         for (unsigned j = 0; j <= i; j++) {
-            sums->held_q44[i][j] += fx_shift_down(speed_q28[i] * speed_q28[j], 12);
-            sums->all_q44[i][j] += kin_dot_q28(velocity_q28[i], velocity_q28[j]) * (1 << 16);
+            sums->held_q44[element(i, j)] += fx_shift_down(speed_q28[i] * speed_q28[j], 12);
+            sums->all_q44[element(i, j)] += kin_dot_q28(velocity_q28[i], velocity_q28[j]) * (1 << 16);
         }
     }
 }
@@ -71,7 +80,7 @@ static bool set_sums(const kin_t *self, const pose_t *pose, sums_t *sums)
 {
     kin_placement_t at;
     free_motion_t motion[POSE_AXES];
-    *sums = (sums_t){{{0}}, {{0}}};
+    *sums = (sums_t){{0}, {0}};
     if (kin_place(self, pose, &at) != HV_OK) {
         return false;
     }
@@ -87,20 +96,20 @@ static bool set_sums(const kin_t *self, const pose_t *pose, sums_t *sums)
     return true;
 }
 
-/* Whether all pivots of a symmetric matrix, given by its lower triangle, are positive. Uses it up. */
-static bool is_positive(unsigned size, int64_t matrix_q44[][POSE_AXES])
+/* Whether all pivots of a symmetric matrix are positive. Uses it up. */
+static bool is_positive(unsigned size, int64_t matrix_q44[TRIANGLE])
 {
     for (unsigned column = 0; column < size; column++) {
-        const int64_t pivot_q44 = matrix_q44[column][column];
+        const int64_t pivot_q44 = matrix_q44[element(column, column)];
         if (pivot_q44 < PIVOT_MIN_Q44) {
             return false;
         }
         const int64_t inverse_q30 = fx_mul_div(Q62_ONE, 1 << 12, pivot_q44);
         for (unsigned row = size; row-- > column + 1;) {
-            const int64_t factor_q30 = fx_mul_shift(matrix_q44[row][column], inverse_q30, 44);
+            const int64_t factor_q30 = fx_mul_shift(matrix_q44[element(row, column)], inverse_q30, 44);
             for (unsigned i = column + 1; i <= row; i++) {
-                const int64_t part_q44 = fx_mul_shift(factor_q30, matrix_q44[i][column], 30);
-                matrix_q44[row][i] = fx_sub_sat(matrix_q44[row][i], part_q44);
+                const int64_t part_q44 = fx_mul_shift(factor_q30, matrix_q44[element(i, column)], 30);
+                matrix_q44[element(row, i)] = fx_sub_sat(matrix_q44[element(row, i)], part_q44);
             }
         }
     }
@@ -109,12 +118,10 @@ static bool is_positive(unsigned size, int64_t matrix_q44[][POSE_AXES])
 
 static bool is_above(unsigned size, const sums_t *sums, q32_t margin_q32)
 {
-    int64_t matrix_q44[POSE_AXES][POSE_AXES] = {{0}};
+    int64_t matrix_q44[TRIANGLE];
     const int64_t square_q62 = fx_mul_shift_fit(margin_q32, margin_q32, 2);
-    for (unsigned i = 0; i < size; i++) {
-        for (unsigned j = 0; j <= i; j++) {
-            matrix_q44[i][j] = sums->held_q44[i][j] - fx_mul_shift_fit(sums->all_q44[i][j], square_q62, 62);
-        }
+    for (unsigned i = 0; i < element(size, 0); i++) {
+        matrix_q44[i] = sums->held_q44[i] - fx_mul_shift_fit(sums->all_q44[i], square_q62, 62);
     }
     return is_positive(size, matrix_q44);
 }

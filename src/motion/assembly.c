@@ -56,13 +56,13 @@ bool assembly_can_stop(const motion_t *self)
 {
     ramp_state_t start[CYLINDERS_MAX];
     const ramp_limits_t *limits[CYLINDERS_MAX];
-    halt_t halt;
+    q32_t rest_q32[CYLINDERS_MAX];
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
         const ramp_state_t *now = &self->cylinder[i].state;
         const q32_t vel_q32 = now->vel_per_cycle_q32 + now->acc_per_cycle2_q32;
         start[i] = (ramp_state_t){now->pos_q32 + vel_q32, vel_q32, now->acc_per_cycle2_q32};
         limits[i] = &self->cylinder[i].limits;
     }
-    halt_plan(&halt, CYLINDERS_MAX, CYLINDERS_MAX, start, limits);
-    return is_held_or_better(self, halt.rest_q32);
+    halt_rests(CYLINDERS_MAX, start, limits, rest_q32);
+    return is_held_or_better(self, rest_q32);
 }

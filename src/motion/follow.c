@@ -310,7 +310,7 @@ static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
     if (self->source == MOTION_TIMED) {
         quintic_step(&self->quintic, ref);
     } else if (self->source == MOTION_HALTING) {
-        halt_step(&self->halt, ref);
+        halt_step(&self->aside.halt, ref);
     } else {
         const bool was_done = scurve_is_done(&self->path);
         scurve_step(&self->path);
@@ -385,15 +385,13 @@ static bool step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], pose_t *planned,
 }
 
 /* From the slots' references to the cylinders'. True if the pose had to be pulled in. */
-static bool step_slots(motion_t *self, const ramp_ref_t slot_ref[AXES_MAX], ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned,
-                       motion_output_t *out)
+static bool step_slots(motion_t *self, ramp_ref_t ref[AXES_MAX], pose_t *planned, motion_output_t *out)
 {
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        cylinder_ref[i] = slot_ref[i];
-        self->led[i] = (history_t){slot_ref[i].pos_q32, slot_ref[i].vel_per_cycle_q32, slot_ref[i].acc_per_cycle2_q32};
+        self->led[i] = (history_t){ref[i].pos_q32, ref[i].vel_per_cycle_q32, ref[i].acc_per_cycle2_q32};
     }
     if (self->space == MOTION_POSE) {
-        return step_pose(self, cylinder_ref, planned, out);
+        return step_pose(self, ref, planned, out);
     }
     out->flags |= MOTION_IN_CYLINDERS;
     return false;
@@ -422,19 +420,19 @@ static void go_back(motion_t *self, const moment_t *moment)
 }
 
 /* A stream's references, as one body: where a cylinder could not follow them the cycle is planned anew for all. */
-static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX], pose_t *planned, motion_output_t *out)
 {
     ramp_ref_t curve[AXES_MAX];
-    ramp_ref_t slot_ref[AXES_MAX];
     moment_t moment;
     (void)stream_step(&self->stream, now_us, curve);
     slots_scale_refs(self, curve);
     keep(self, &moment);
-    join_step(self, curve, false, slot_ref);
-    if (!step_slots(self, slot_ref, cylinder_ref, planned, out) && join_is_beyond(self, slot_ref, cylinder_ref)) {
+    join_step(self, curve, false, ref);
+    const bool is_beyond = join_are_slots_beyond(self, ref);
+    if (!step_slots(self, ref, planned, out) && (is_beyond || join_are_cylinders_beyond(self, ref))) {
         go_back(self, &moment);
-        join_step(self, curve, true, slot_ref);
-        (void)step_slots(self, slot_ref, cylinder_ref, planned, out);
+        join_step(self, curve, true, ref);
+        (void)step_slots(self, ref, planned, out);
     }
     out->flags |= join_flags(self, curve);
 }
@@ -457,9 +455,8 @@ void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_M
     if (self->source == MOTION_STREAMED) {
         step_stream(self, now_us, cylinder_ref, planned, out);
     } else {
-        ramp_ref_t slot_ref[AXES_MAX];
-        step_source(self, slot_ref);
-        (void)step_slots(self, slot_ref, cylinder_ref, planned, out);
+        step_source(self, cylinder_ref);
+        (void)step_slots(self, cylinder_ref, planned, out);
         out->flags |= is_step_cruising(self) ? MOTION_SPEED : 0;
     }
     out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &cylinder_ref[AXIS_ANGLE], RAMP_FIRM);
@@ -469,7 +466,7 @@ void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_M
 
 void follow_end_cycle(motion_t *self)
 {
-    if (self->source == MOTION_HALTING && halt_is_done(&self->halt) && slot_all_at_rest(self, self->planned_slots)) {
+    if (self->source == MOTION_HALTING && halt_is_done(&self->aside.halt) && slot_all_at_rest(self, self->planned_slots)) {
         slots_scale(self, self->space, self->slot_q32, self->goal_q32);
         plan_straight(self, self->planned_slots, self->straight_cycles);
     }

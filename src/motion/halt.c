@@ -164,14 +164,6 @@ static q32_t rest_of(const ramp_state_t *start, const halt_times_t *t)
     return fx_clamp(fx_add_sat(start->pos_q32, distance(start, t)), -FURTHEST_Q32, FURTHEST_Q32);
 }
 
-static void set_axis(halt_t *self, unsigned i, const halt_times_t *times)
-{
-    const int64_t cycles = times->change + times->hold + times->back;
-    self->times[i] = *times;
-    self->rest_q32[i] = rest_of(&self->start[i], times);
-    self->cycles = cycles > self->cycles ? cycles : self->cycles;
-}
-
 /* Fastest an axis gets while its acceleration is taken back: v + a^2 / 2 over the slope of the change. */
 static q32_t fastest(const ramp_state_t *start, const halt_times_t *t)
 {
@@ -183,26 +175,52 @@ static q32_t fastest(const ramp_state_t *start, const halt_times_t *t)
 }
 
 /* An axis that goes along with the others would leave its bounds or go too fast. */
-static bool is_carried_away(const halt_t *self, unsigned i, const halt_times_t *common, const ramp_limits_t *limits)
+static bool is_carried_away(const ramp_state_t *start, const halt_times_t *common, const ramp_limits_t *limits)
 {
-    const q32_t rest_q32 = rest_of(&self->start[i], common);
-    return rest_q32 < limits->pos_min_q32 || rest_q32 > limits->pos_max_q32 ||
-           fastest(&self->start[i], common) > limits->vel_per_cycle_q32;
+    const q32_t rest_q32 = rest_of(start, common);
+    return rest_q32 < limits->pos_min_q32 || rest_q32 > limits->pos_max_q32 || fastest(start, common) > limits->vel_per_cycle_q32;
+}
+
+/* The times of the axes that stop together. */
+static halt_times_t common_times(unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits)
+{
+    need_t need[AXES_MAX];
+    for (unsigned i = 0; i < together; i++) {
+        need[i] = need_of(&start[i], limits[i]);
+    }
+    return shortest(need, together);
+}
+
+/* The times of one axis. */
+static halt_times_t own_times(const halt_times_t *common, bool is_apart, const ramp_state_t *start, const ramp_limits_t *limits)
+{
+    if (!is_apart && !is_carried_away(start, common, limits)) {
+        return *common;
+    }
+    const need_t need = need_of(start, limits);
+    return shortest(&need, 1);
 }
 
 void halt_plan(halt_t *self, unsigned axes, unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits)
 {
-    need_t need[AXES_MAX] = {{0}};
+    const halt_times_t common = common_times(together, start, limits);
     *self = (halt_t){.axes = axes};
     for (unsigned i = 0; i < axes; i++) {
-        need[i] = need_of(&start[i], limits[i]);
+        halt_times_t *times = &self->times[i];
+        *times = own_times(&common, i >= together, &start[i], limits[i]);
+        const int64_t cycles = times->change + times->hold + times->back;
         self->start[i] = self->now[i] = start[i];
+        self->rest_q32[i] = rest_of(&start[i], times);
+        self->cycles = cycles > self->cycles ? cycles : self->cycles;
     }
-    const halt_times_t common = shortest(need, together);
+}
+
+void halt_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits, q32_t *rest_q32)
+{
+    const halt_times_t common = common_times(axes, start, limits);
     for (unsigned i = 0; i < axes; i++) {
-        const bool is_apart = i >= together || is_carried_away(self, i, &common, limits[i]);
-        const halt_times_t times = is_apart ? shortest(&need[i], 1) : common;
-        set_axis(self, i, &times);
+        const halt_times_t times = own_times(&common, false, &start[i], limits[i]);
+        rest_q32[i] = rest_of(&start[i], &times);
     }
 }
 

@@ -45,10 +45,16 @@ static bool are_cylinders_off(const motion_t *self)
     return false;
 }
 
-static bool are_slots_near(const motion_t *self, const ramp_state_t *reference)
+static bool is_slot_near(const motion_t *self, unsigned i, const ramp_state_t *reference)
+{
+    return is_near(slot_state(self, i), reference, slot_limits(self, i)->jerk_per_cycle3_q32);
+}
+
+/* Near what they were last led to. */
+static bool are_slots_near(const motion_t *self)
 {
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        if (!is_near(slot_state(self, i), &reference[i], slot_limits(self, i)->jerk_per_cycle3_q32)) {
+        if (!is_slot_near(self, i, &self->led[i])) {
             return false;
         }
     }
@@ -74,6 +80,18 @@ static ramp_state_t before(const ramp_ref_t *ref)
                           ref->acc_per_cycle2_q32 - ref->jerk_per_cycle3_q32};
 }
 
+/* Near where the curve was in the cycle before. */
+static bool is_on_curve(const motion_t *self, const ramp_ref_t *ref)
+{
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        const ramp_state_t curve = before(&ref[i]);
+        if (!is_slot_near(self, i, &curve)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 static int64_t cycles_left(const motion_t *self)
 {
     return self->quintic.cycles - self->quintic.elapsed;
@@ -82,9 +100,9 @@ static int64_t cycles_left(const motion_t *self)
 /* Plans the way to the stream's curve; false where the limits do not allow any. */
 static bool join_curve(motion_t *self, const ramp_ref_t *ref)
 {
-    static const q32_t k_no_error_q32[AXES_MAX] = {0};
-    ramp_state_t curve[AXES_MAX];
-    ramp_state_t error[AXES_MAX];
+    static const q32_t k_no_error_q32[POSE_AXES] = {0};
+    ramp_state_t curve[POSE_AXES];
+    ramp_state_t error[POSE_AXES];
     for (unsigned i = 0; i < POSE_AXES; i++) {
         const ramp_state_t *state = slot_state(self, i);
         curve[i] = before(&ref[i]);
@@ -95,7 +113,7 @@ static bool join_curve(motion_t *self, const ramp_ref_t *ref)
 }
 
 /* The slots now, and the newest sample. */
-static void prepare(const motion_t *self, ramp_state_t start[AXES_MAX], q32_t newest_q32[AXES_MAX])
+static void prepare(const motion_t *self, ramp_state_t start[POSE_AXES], q32_t newest_q32[AXES_MAX])
 {
     slots_scale(self, self->space, self->stream.curve.last_q32, newest_q32);
     for (unsigned i = 0; i < POSE_AXES; i++) {
@@ -103,19 +121,19 @@ static void prepare(const motion_t *self, ramp_state_t start[AXES_MAX], q32_t ne
     }
 }
 
-static void plan_halt(motion_t *self, const ramp_state_t start[AXES_MAX])
+static void plan_halt(motion_t *self, const ramp_state_t start[POSE_AXES])
 {
-    const ramp_limits_t *limits[AXES_MAX];
+    const ramp_limits_t *limits[POSE_AXES];
     for (unsigned i = 0; i < POSE_AXES; i++) {
         limits[i] = slot_limits(self, i);
     }
-    halt_plan(&self->halt, POSE_AXES, POSE_AXES, start, limits);
+    halt_plan(&self->aside.halt, POSE_AXES, POSE_AXES, start, limits);
 }
 
 /* Plans the way to the newest sample, or at least a stop. */
 static motion_join_t head_for_sample(motion_t *self)
 {
-    ramp_state_t start[AXES_MAX];
+    ramp_state_t start[POSE_AXES];
     q32_t newest_q32[AXES_MAX];
     prepare(self, start, newest_q32);
     if (plan_shortest(self, start, newest_q32, NULL, 1)) {
@@ -139,7 +157,7 @@ static bool is_heading_for(const motion_t *self, const q32_t target_q32[AXES_MAX
  * What cylinders cannot follow is no such stop: of a quintic that is known beforehand. */
 static bool has_to_overshoot(motion_t *self)
 {
-    ramp_state_t start[AXES_MAX];
+    ramp_state_t start[POSE_AXES];
     q32_t newest_q32[AXES_MAX];
     prepare(self, start, newest_q32);
     if (!stream_curve_is_standing(&self->stream.curve) || is_heading_for(self, newest_q32)) {
@@ -149,8 +167,8 @@ static bool has_to_overshoot(motion_t *self)
     bool is_beyond = false;
     for (unsigned i = 0; i < POSE_AXES; i++) {
         const int sign = start[i].vel_per_cycle_q32 < 0 ? -1 : 1;
-        const q32_t way_q32 = sign * (self->halt.rest_q32[i] - start[i].pos_q32);
-        const q32_t beyond_q32 = sign * (self->halt.rest_q32[i] - newest_q32[i]);
+        const q32_t way_q32 = sign * (self->aside.halt.rest_q32[i] - start[i].pos_q32);
+        const q32_t beyond_q32 = sign * (self->aside.halt.rest_q32[i] - newest_q32[i]);
         is_beyond |= start[i].vel_per_cycle_q32 != 0 && beyond_q32 > way_q32 / OVERSHOOT_DIV + OVERSHOOT_LEAST_Q32;
     }
     return is_beyond;
@@ -159,16 +177,12 @@ static bool has_to_overshoot(motion_t *self)
 /* Plans anew from where the body is. */
 static void replan(motion_t *self, const ramp_ref_t *ref, bool is_curve_beyond, bool may_stop)
 {
-    ramp_state_t curve[AXES_MAX];
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        curve[i] = before(&ref[i]);
-    }
     self->join_cycles = 0;
     if (may_stop && has_to_overshoot(self)) {
         self->join = JOIN_HALT;
     } else if (is_curve_beyond || !is_within_limits(self, ref)) {
         self->join = head_for_sample(self);
-    } else if (are_slots_near(self, curve)) {
+    } else if (is_on_curve(self, ref)) {
         self->join = JOIN_NONE;
     } else {
         self->join = join_curve(self, ref) ? JOIN_CURVE : head_for_sample(self);
@@ -178,9 +192,10 @@ static void replan(motion_t *self, const ramp_ref_t *ref, bool is_curve_beyond, 
 /* On the way to the curve: plans anew only where that makes the way a good deal shorter. */
 static void shorten(motion_t *self, const ramp_ref_t *ref)
 {
-    const quintic_t kept = self->quintic;
-    if (!is_within_limits(self, ref) || !join_curve(self, ref) || self->quintic.cycles * 8 > (kept.cycles - kept.elapsed) * 7) {
-        self->quintic = kept;
+    const int64_t left = cycles_left(self);
+    self->aside.kept = self->quintic;
+    if (!is_within_limits(self, ref) || !join_curve(self, ref) || self->quintic.cycles * 8 > left * 7) {
+        self->quintic = self->aside.kept;
     }
 }
 
@@ -205,7 +220,7 @@ static void plan_where_due(motion_t *self, const ramp_ref_t *ref)
     if (is_off) {
         follow_adopt_pose(self);
     }
-    if (is_off || self->join == JOIN_DUE || !are_slots_near(self, self->led) ||
+    if (is_off || self->join == JOIN_DUE || !are_slots_near(self) ||
         (is_off_curve(self) && (self->has_new_sample || self->join_cycles >= RETRY_CYCLES))) {
         replan(self, ref, false, !is_off);
     } else if (self->join == JOIN_CURVE && self->has_new_sample && cycles_left(self) > RETRY_CYCLES) {
@@ -223,15 +238,14 @@ static ramp_ref_t sum(const ramp_ref_t *a, const ramp_ref_t *b)
 /* One cycle along the plan. */
 static void step_plan(motion_t *self, const ramp_ref_t *curve, ramp_ref_t *ref)
 {
-    ramp_ref_t planned[AXES_MAX];
     self->join_cycles++;
     if (self->join == JOIN_HALT) {
-        halt_step(&self->halt, planned);
+        halt_step(&self->aside.halt, ref);
     } else {
-        quintic_step(&self->quintic, planned);
+        quintic_step(&self->quintic, ref);
     }
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        ref[i] = self->join == JOIN_CURVE ? sum(&curve[i], &planned[i]) : planned[i];
+    for (unsigned i = 0; self->join == JOIN_CURVE && i < POSE_AXES; i++) {
+        ref[i] = sum(&curve[i], &ref[i]);
     }
     if (self->join == JOIN_CURVE && quintic_is_done(&self->quintic)) {
         self->join = JOIN_NONE;
@@ -264,23 +278,31 @@ static bool is_viable(const ramp_t *ramp, const ramp_ref_t *ref, int jerk_factor
            fx_abs(ref->jerk_per_cycle3_q32) / jerk_factor <= ramp->limits.jerk_per_cycle3_q32;
 }
 
-bool join_is_beyond(const motion_t *self, const ramp_ref_t slot_ref[AXES_MAX], const ramp_ref_t cylinder_ref[AXES_MAX])
+/* A plan is given a few cycles before the next one, and a take-over goes its own way. */
+static bool is_new_plan_due(const motion_t *self)
 {
-    if (self->is_taking_over || (self->join != JOIN_NONE && self->join_cycles < LEAST_CYCLES)) {
-        return false;
-    }
+    return !self->is_taking_over && (self->join == JOIN_NONE || self->join_cycles >= LEAST_CYCLES);
+}
+
+/* True if one of these ramps could not follow its reference. */
+static bool is_any_beyond(const motion_t *self, const ramp_t *ramps, unsigned count, const ramp_ref_t *ref)
+{
     const int jerk_factor = self->stream.style == STREAM_FAST ? JERK_FACTOR_FAST : JERK_FACTOR;
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        if (!is_viable(&self->cylinder[i], &cylinder_ref[i], jerk_factor)) {
-            return true;
-        }
+    unsigned i = 0;
+    while (i < count && is_viable(&ramps[i], &ref[i], jerk_factor)) {
+        i++;
     }
-    for (unsigned i = 0; self->space == MOTION_POSE && i < POSE_AXES; i++) {
-        if (!is_viable(&self->axis[i], &slot_ref[i], jerk_factor)) {
-            return true;
-        }
-    }
-    return false;
+    return i < count;
+}
+
+bool join_are_slots_beyond(const motion_t *self, const ramp_ref_t ref[AXES_MAX])
+{
+    return self->space == MOTION_POSE && is_new_plan_due(self) && is_any_beyond(self, self->axis, POSE_AXES, ref);
+}
+
+bool join_are_cylinders_beyond(const motion_t *self, const ramp_ref_t ref[AXES_MAX])
+{
+    return is_new_plan_due(self) && is_any_beyond(self, self->cylinder, self->cylinders, ref);
 }
 
 unsigned join_flags(const motion_t *self, const ramp_ref_t curve[AXES_MAX])

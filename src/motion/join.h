@@ -14,11 +14,13 @@ void join_sample(motion_t *self);
 
 /** The body's references.
  *  @param curve of the stream, this cycle
- *  @param is_again the cycle is planned anew, as join_is_beyond() found it beyond the limits */
+ *  @param is_again the cycle is planned anew, as it was found beyond the limits */
 void join_step(motion_t *self, const ramp_ref_t curve[AXES_MAX], bool is_again, ramp_ref_t ref[AXES_MAX]);
 
-/** True if these references of the slots and the cylinders could not be followed within the limits, and another plan may help. */
-bool join_is_beyond(const motion_t *self, const ramp_ref_t slot_ref[AXES_MAX], const ramp_ref_t cylinder_ref[AXES_MAX]);
+/** True if these references of the slots, or those of the cylinders, could not be followed within the limits, and another plan
+ *  may help. */
+bool join_are_slots_beyond(const motion_t *self, const ramp_ref_t ref[AXES_MAX]);
+bool join_are_cylinders_beyond(const motion_t *self, const ramp_ref_t ref[AXES_MAX]);
 
 /** MOTION_SPEED or MOTION_ACCEL while the body is not on the stream's curve. */
 unsigned join_flags(const motion_t *self, const ramp_ref_t curve[AXES_MAX]);

@@ -209,9 +209,9 @@ static void begin_stop(motion_t *self, motion_next_t next)
     self->timed_end_us = 0;
     self->is_stretched = false;
     if (self->source != MOTION_STOPPING) {
-        halt_plan(&self->halt, AXES_MAX, CYLINDERS_MAX, start, limits);
+        halt_plan(&self->aside.halt, AXES_MAX, CYLINDERS_MAX, start, limits);
         self->source = MOTION_STOPPING;
-        self->angle_target_deg_q32 = self->halt.rest_q32[AXIS_ANGLE];
+        self->angle_target_deg_q32 = self->aside.halt.rest_q32[AXIS_ANGLE];
     }
 }
 
@@ -228,7 +228,7 @@ static void move_to(motion_t *self, const q32_t *extension_mm_q32)
         self->path_to_q32[i] = i < self->cylinders ? extension_mm_q32[i] : self->cylinder[i].state.pos_q32;
     }
     begin_stop(self, MOTION_THEN_PATH);
-    self->path_to_q32[AXIS_ANGLE] = self->halt.rest_q32[AXIS_ANGLE];
+    self->path_to_q32[AXIS_ANGLE] = self->aside.halt.rest_q32[AXIS_ANGLE];
 }
 
 void motion_settle(motion_t *self)
@@ -273,7 +273,7 @@ hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_
 static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
     if (self->source == MOTION_STOPPING) {
-        halt_step(&self->halt, ref);
+        halt_step(&self->aside.halt, ref);
         return;
     }
     if (self->source == MOTION_ON_PATH) {
@@ -336,7 +336,7 @@ static bool is_led_astray(const motion_t *self)
 /* Changes of source that become due at the end of a cycle. */
 static void end_cycle(motion_t *self, uint64_t now_us)
 {
-    if (self->source == MOTION_STOPPING && halt_is_done(&self->halt) && motion_is_at_rest(self)) {
+    if (self->source == MOTION_STOPPING && halt_is_done(&self->aside.halt) && motion_is_at_rest(self)) {
         go_on_after_stop(self, now_us);
     } else if (self->source == MOTION_ON_PATH && scurve_is_done(&self->path) && motion_is_at_rest(self)) {
         self->source = MOTION_RESTING;

@@ -46,22 +46,24 @@ static void limits_beside(const motion_t *self, unsigned slots, const ramp_state
     }
 }
 
-/* Plans self->quintic; false where an axis or a cylinder would break its limits. */
+/* Plans self->quintic; false where an axis or a cylinder would break its limits, with what its base adds where it has one. */
 static bool try_quintic(motion_t *self, unsigned slots, const ramp_state_t *start, const q32_t *target_q32,
                         const ramp_state_t *base, const plan_limits_t *limits, int64_t cycles)
 {
-    if (quintic_plan(&self->quintic, slots, start, target_q32, cycles) != HV_OK) {
+    quintic_t *quintic = &self->quintic;
+    if (quintic_plan(quintic, slots, start, target_q32, cycles) != HV_OK) {
         return false;
     }
-    if (base == NULL) {
-        return quintic_is_feasible(&self->quintic, limits->list) &&
-               (self->space != MOTION_POSE || way_is_feasible(self, &self->quintic));
+    for (unsigned i = 0; base != NULL && i < slots; i++) {
+        quintic_add_motion(quintic, i, &base[i], 1);
     }
-    quintic_t whole = self->quintic;
-    for (unsigned i = 0; i < slots; i++) {
-        quintic_add_motion(&whole, i, &base[i]);
+    if (!quintic_is_feasible(quintic, limits->list) || (self->space == MOTION_POSE && !way_is_feasible(self, quintic))) {
+        return false;
     }
-    return quintic_is_feasible(&whole, limits->list) && (self->space != MOTION_POSE || way_is_feasible(self, &whole));
+    for (unsigned i = 0; base != NULL && i < slots; i++) {
+        quintic_add_motion(quintic, i, &base[i], -1);
+    }
+    return true;
 }
 
 static bool find_shortest(motion_t *self, const plan_limits_t *limits, unsigned slots, const ramp_state_t *start,
@@ -81,10 +83,10 @@ static bool find_shortest(motion_t *self, const plan_limits_t *limits, unsigned 
  * out ever further. Where none stays between start and target, or where the quickest stop ends, that stop is the better way. */
 static void stay_near(motion_t *self, const ramp_state_t *start, const q32_t *target_q32, plan_limits_t *limits)
 {
-    halt_plan(&self->halt, POSE_AXES, POSE_AXES, start, limits->list);
+    halt_plan(&self->aside.halt, POSE_AXES, POSE_AXES, start, limits->list);
     for (unsigned i = 0; i < POSE_AXES; i++) {
         const q32_t from_q32 = start[i].pos_q32;
-        const q32_t rest_q32 = self->halt.rest_q32[i];
+        const q32_t rest_q32 = self->aside.halt.rest_q32[i];
         const q32_t low_q32 = fx_clamp(target_q32[i], INT64_MIN, from_q32 < rest_q32 ? from_q32 : rest_q32);
         const q32_t high_q32 = fx_clamp(target_q32[i], from_q32 > rest_q32 ? from_q32 : rest_q32, INT64_MAX);
         ramp_limits_t *own = &limits->own[i];
@@ -138,22 +140,21 @@ static int64_t plan_stop_then_straight(motion_t *self, unsigned slots, const ram
     for (unsigned i = 0; i < slots; i++) {
         limits[i] = slot_limits(self, i);
     }
-    halt_plan(&self->halt, slots, POSE_AXES, start, limits);
-    const path_limits_t path = limits_of_straight(self, slots, self->halt.rest_q32);
+    halt_plan(&self->aside.halt, slots, POSE_AXES, start, limits);
+    const path_limits_t path = limits_of_straight(self, slots, self->aside.halt.rest_q32);
     scurve_plan(&self->path, &path, 1);
     self->straight_cycles = scurve_cycles(&self->path);
-    return self->halt.cycles + 1 + self->straight_cycles;
+    return self->aside.halt.cycles + 1 + self->straight_cycles;
 }
 
 /* In motion: the shorter one of a quintic of at least so many cycles and a stop with a straight way. The cycles it takes. */
-static int64_t plan_quickest(motion_t *self, unsigned slots, const ramp_state_t *start, int64_t least)
+static int64_t plan_quickest(motion_t *self, unsigned slots, const ramp_state_t *start, const plan_limits_t *limits,
+                             int64_t least)
 {
     const int64_t in_two_parts = plan_stop_then_straight(self, slots, start);
     self->source = MOTION_TIMED;
     const int64_t from = least > in_two_parts / 4 ? least : in_two_parts / 4; /* none is shorter than that */
-    plan_limits_t limits;
-    limits_beside(self, slots, start, NULL, &limits);
-    if (find_shortest(self, &limits, slots, start, self->goal_q32, NULL, from, in_two_parts, ATTEMPTS)) {
+    if (find_shortest(self, limits, slots, start, self->goal_q32, NULL, from, in_two_parts, ATTEMPTS)) {
         return self->quintic.cycles;
     }
     self->source = MOTION_HALTING;
@@ -187,10 +188,10 @@ static int64_t plan_timed_cycles(motion_t *self, int64_t cycles)
     }
     if (plan_stop_then_straight(self, AXES_MAX, start) <= cycles) {
         self->source = MOTION_HALTING;
-        self->straight_cycles = cycles - self->halt.cycles - 1;
+        self->straight_cycles = cycles - self->aside.halt.cycles - 1;
         return cycles;
     }
-    return plan_quickest(self, AXES_MAX, start, cycles);
+    return plan_quickest(self, AXES_MAX, start, &limits, cycles);
 }
 
 void plan_timed(motion_t *self, int64_t asked, bool is_first, uint64_t now_us)
@@ -215,6 +216,8 @@ void plan_step(motion_t *self)
         return;
     }
     ramp_state_t start[AXES_MAX];
+    plan_limits_t limits;
     copy_states(self, POSE_AXES, start);
-    (void)plan_quickest(self, POSE_AXES, start, 1);
+    limits_beside(self, POSE_AXES, start, NULL, &limits);
+    (void)plan_quickest(self, POSE_AXES, start, &limits, 1);
 }

@@ -10,19 +10,18 @@
 
 /* The last three differences of one cylinder's extensions. */
 typedef struct {
-    unsigned samples;
     q32_t pos_q32, first_q32, second_q32, third_q32;
 } differences_t;
 
-static void add_sample(differences_t *d, q32_t pos_q32)
+/* @param samples added before */
+static void add_sample(differences_t *d, int64_t samples, q32_t pos_q32)
 {
     const q32_t first_q32 = pos_q32 - d->pos_q32;
     const q32_t second_q32 = first_q32 - d->first_q32;
-    d->third_q32 = d->samples >= 3 ? second_q32 - d->second_q32 : 0;
-    d->second_q32 = d->samples >= 2 ? second_q32 : 0;
-    d->first_q32 = d->samples >= 1 ? first_q32 : 0;
+    d->third_q32 = samples >= 3 ? second_q32 - d->second_q32 : 0;
+    d->second_q32 = samples >= 2 ? second_q32 : 0;
+    d->first_q32 = samples >= 1 ? first_q32 : 0;
     d->pos_q32 = pos_q32;
-    d->samples++;
 }
 
 /* limit * (cycles per piece)^power, with 1/16 to spare. */
@@ -55,7 +54,7 @@ bool way_is_feasible(const motion_t *motion, const quintic_t *quintic)
             return false;
         }
         for (unsigned i = 0; i < motion->cylinders; i++) {
-            add_sample(&d[i], extension_mm_q32[i]);
+            add_sample(&d[i], piece, extension_mm_q32[i]);
             if (!is_within(&d[i], &motion->cylinder[i].limits, quintic->cycles)) {
                 return false;
             }
@@ -106,7 +105,7 @@ void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q
             return;
         }
         for (unsigned i = 0; i < motion->cylinders; i++) {
-            add_sample(&d[i], extension_mm_q32[i]);
+            add_sample(&d[i], piece, extension_mm_q32[i]);
             slope_q32[i] = fx_abs(d[i].first_q32) > slope_q32[i] ? fx_abs(d[i].first_q32) : slope_q32[i];
             bend_q32[i] = fx_abs(d[i].second_q32) > bend_q32[i] ? fx_abs(d[i].second_q32) : bend_q32[i];
         }
