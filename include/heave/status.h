@@ -44,6 +44,13 @@ typedef enum {
 #define HV_RARELY(condition) (condition)
 #endif
 
+/** A function that is hardly ever called, kept out of its callers: they need not save registers for it. */
+#if defined(__GNUC__)
+#define HV_OUT_OF_LINE __attribute__((noinline))
+#else
+#define HV_OUT_OF_LINE
+#endif
+
 /** Called when an HV_ASSERT fails: supplied by the program (hosted: print and abort; firmware: fail silent). Never returns. */
 void hv_assert_failed(const char *file, int line);
 

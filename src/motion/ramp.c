@@ -34,7 +34,7 @@ static const grip_t k_grips[] = {
 /* Steps of the root search; the chord of the last bracket is the result. */
 #define SOLVER_STEPS 10
 
-#define JERK_MEMORY 2048 /* cycles after which what a reference once took of the jerk counts 1/e */
+#define JERK_MEMORY_SHIFT 11 /* 2^11 cycles after which what a reference once took of the jerk counts 1/e */
 
 /* Errors against the reference of the cycle before. */
 typedef struct {
@@ -124,6 +124,8 @@ hv_status_t ramp_init(ramp_t *self, const ramp_limits_t *limits, q32_t pos_q32)
     const q32_t acc_cycles_q32 = fx_mul_shift(self->acc_safe_q32, self->per_jerk_q62, 30);
     self->brake_reach_q32 =
         fx_mul_shift(vel_q32, fx_mul_shift(vel_q32, self->per_acc_q62, 30) + 2 * acc_cycles_q32, 32) + 4 * vel_q32;
+    const int64_t cycles = vel_q32 / self->acc_safe_q32 / 2 + 2 * self->acc_cycles + 8; /* 8 for roundings */
+    self->brake_cycles = cycles <= UINT32_MAX && cycles <= INT64_MAX / vel_q32 ? (uint32_t)cycles : 0;
     return HV_OK;
 }
 
@@ -147,17 +149,16 @@ static errors_t errors_against(const ramp_state_t *state, const ramp_ref_t *ref)
     };
 }
 
-static bool is_within(q32_t value_q32, q32_t jerk_q32, int64_t eighths)
+static bool is_within(q32_t value_q32, q32_t limit_q32)
 {
-    return fx_abs(value_q32) / 8 <= fx_mul_shift(jerk_q32, eighths, 6);
+    return value_q32 <= limit_q32 && value_q32 >= -limit_q32;
 }
 
 /* Division by a power of two, to the nearest, ties away from zero: symmetric, so that both directions behave alike. */
 static int64_t scale_down(int64_t value, unsigned shift)
 {
     const int64_t half = (int64_t)1 << (shift - 1);
-    const int64_t unit = (int64_t)1 << shift;
-    return value >= 0 ? (value + half) / unit : (value - half) / unit;
+    return fx_shift_down(value + half + fx_shift_down(value, 63), shift); /* one less where negative: then down is away */
 }
 
 /* Signed distance by which the quickest stop after relative acceleration b' would fall short of the reference. */
@@ -222,27 +223,43 @@ static bool is_at_rest(const ramp_ref_t *ref)
 /* True if the dead-beat law (g = 1) meets the reference in three cycles without more jerk than there is. */
 static bool can_close_in_three(const errors_t *e, q32_t jerk_q32)
 {
-    return fx_abs(e->d) <= jerk_q32 && fx_abs(e->w - 2 * e->d) <= jerk_q32 && fx_abs(e->d - e->w - e->b) <= jerk_q32;
+    return is_within(e->d, jerk_q32) && is_within(e->w - 2 * e->d, jerk_q32) && is_within(e->d - e->w - e->b, jerk_q32);
+}
+
+/* So many eighths of the jerk, which is below 2^43 (ramp_limits_from_units()): a little more, so that all of the last eighth of
+ * an eighth is in. */
+static q32_t layer_size(q32_t jerk_q32, int64_t eighths)
+{
+    return fx_shift_down(jerk_q32 * eighths + 32, 3) | 7;
 }
 
 static bool is_in_layer(const errors_t *e, q32_t jerk_q32, const grip_t *g)
 {
-    return is_within(e->d, jerk_q32, g->layer_d) && is_within(e->w, jerk_q32, g->layer_w) &&
-           is_within(e->b, jerk_q32, g->layer_b);
+    return is_within(e->d, layer_size(jerk_q32, g->layer_d)) && is_within(e->w, layer_size(jerk_q32, g->layer_w)) &&
+           is_within(e->b, layer_size(jerk_q32, g->layer_b));
 }
 
-/* The acceleration the reference asks for. */
-static q32_t wanted_acceleration(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+/* The acceleration that a linear law takes to the reference; false if the reference is too far away for them. */
+static bool find_by_law(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *acc_q32)
 {
     const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
     const grip_t *g = &k_grips[is_at_rest(ref) ? RAMP_FIRM : grip];
-    errors_t e = errors_against(&self->state, ref);
+    const errors_t e = errors_against(&self->state, ref);
     if (g == &k_grips[RAMP_FIRM] && can_close_in_three(&e, jerk_q32)) {
-        return ref->acc_per_cycle2_q32 + e.d - e.w;
+        *acc_q32 = ref->acc_per_cycle2_q32 + e.d - e.w;
+        return true;
     }
-    if (is_in_layer(&e, jerk_q32, g)) {
-        return ref->acc_per_cycle2_q32 + e.b + scale_down(g->k1 * e.d - g->k2 * e.w - g->k3 * e.b, g->gain_shift);
+    if (!is_in_layer(&e, jerk_q32, g)) {
+        return false;
     }
+    *acc_q32 = ref->acc_per_cycle2_q32 + e.b + scale_down(g->k1 * e.d - g->k2 * e.w - g->k3 * e.b, g->gain_shift);
+    return true;
+}
+
+/* The acceleration that the quickest stop on the reference begins with. */
+static q32_t acceleration_to_stop(const ramp_t *self, const ramp_ref_t *ref)
+{
+    errors_t e = errors_against(&self->state, ref);
     /* a reference far beyond the limits counts as one that is just beyond them: everything stays in range */
     const q32_t vel_most_q32 = 4 * self->limits.vel_per_cycle_q32;
     const q32_t feed_q32 = fx_clamp(ref->acc_per_cycle2_q32, -self->acc_safe_q32, self->acc_safe_q32);
@@ -252,6 +269,38 @@ static q32_t wanted_acceleration(const ramp_t *self, const ramp_ref_t *ref, ramp
     }
     const ramp_t relative = beside(self, feed_q32);
     return feed_q32 + solve_for_stop(self, &relative, &e, feed_q32);
+}
+
+/* The acceleration the reference asks for. */
+static q32_t wanted_acceleration(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+{
+    q32_t acc_q32;
+    return find_by_law(self, ref, grip, &acc_q32) ? acc_q32 : acceleration_to_stop(self, ref);
+}
+
+/* True if the wanted acceleration is within the limits and leads to none of them, whatever comes then: as can be told without
+ * working a brake out. With A = acc_safe = N J:
+ * - What an acceleration gains until it is taken back, brake_velocity_peak(), is the largest of the straight lines
+ *   acc + k acc - J k (k + 1) / 2, and so at most the chord from 0 to A, acc (N + 1) / 2. No speed of a brake is above `peak`.
+ * - Taking acc back takes at most N cycles at the peak. The quickest stop from there is symmetric, so that its mean speed is half
+ * of the peak, and takes peak / A + N cycles if it gets as far as -A, else at most 2 N. Together that is no farther than 2 N + V
+ * / 2 A cycles at the peak; a brake that does not take -A back ends earlier. */
+static bool is_free(const ramp_t *self, q32_t wanted_q32)
+{
+    const ramp_state_t *at = &self->state;
+    const ramp_limits_t *limits = &self->limits;
+    if (!is_within(wanted_q32, self->acc_safe_q32) ||
+        !is_within(wanted_q32 - at->acc_per_cycle2_q32, limits->jerk_per_cycle3_q32)) {
+        return false;
+    }
+    const q32_t speed_q32 = at->vel_per_cycle_q32 >= 0 ? at->vel_per_cycle_q32 : -at->vel_per_cycle_q32;
+    const q32_t peak_q32 = speed_q32 + fx_shift_down(fx_abs(wanted_q32) * (self->acc_cycles + 1), 1);
+    if (peak_q32 > limits->vel_per_cycle_q32 || self->brake_cycles == 0) {
+        return false;
+    }
+    const q32_t reach_q32 = self->brake_cycles * peak_q32;
+    const q32_t pos_q32 = at->pos_q32 + at->vel_per_cycle_q32 + wanted_q32;
+    return limits->pos_max_q32 - pos_q32 >= reach_q32 && pos_q32 - limits->pos_min_q32 >= reach_q32;
 }
 
 /* True if after acceleration acc the upper bound can still be kept; sign -1 asks the same of the lower one. */
@@ -365,24 +414,37 @@ static ramp_ref_t reference_within_bounds(ramp_t *self, const ramp_ref_t *ref)
 /* Remembers how much jerk the references take: a reference that has turned sharply will again. */
 static void note_jerk(ramp_t *self, q32_t ref_jerk_q32)
 {
-    const q32_t size_q32 = fx_clamp(fx_abs(ref_jerk_q32), 0, self->limits.jerk_per_cycle3_q32);
-    const q32_t faded_q32 = self->ref_jerk_q32 - self->ref_jerk_q32 / JERK_MEMORY;
-    self->ref_jerk_q32 = size_q32 > faded_q32 ? size_q32 : faded_q32;
+    const q32_t faded_q32 = self->ref_jerk_q32 - fx_shift_down(self->ref_jerk_q32, JERK_MEMORY_SHIFT);
+    self->ref_jerk_q32 =
+        is_within(ref_jerk_q32, faded_q32) ? faded_q32 : fx_clamp(fx_abs(ref_jerk_q32), 0, self->limits.jerk_per_cycle3_q32);
 }
 
-q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+static q32_t advance(ramp_t *self, q32_t acc_q32)
 {
-    self->flags = 0;
-    const ramp_ref_t inside = reference_within_bounds(self, ref);
-    note_jerk(self, inside.jerk_per_cycle3_q32);
-    if (ramp_is_at_rest(self) && is_at_rest(&inside) && inside.pos_q32 == self->state.pos_q32) {
-        return self->state.pos_q32; /* what the law would find, at a tenth of the cost */
-    }
-    const q32_t acc_q32 = allowed_acceleration(self, wanted_acceleration(self, &inside, grip));
     self->state.acc_per_cycle2_q32 = acc_q32;
     self->state.vel_per_cycle_q32 += acc_q32;
     self->state.pos_q32 += self->state.vel_per_cycle_q32;
     return self->state.pos_q32;
+}
+
+/* A cycle in which a limit may bind, or the reference is far away. */
+HV_OUT_OF_LINE static q32_t step_with_care(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+{
+    const ramp_ref_t inside = reference_within_bounds(self, ref);
+    note_jerk(self, inside.jerk_per_cycle3_q32);
+    return advance(self, allowed_acceleration(self, wanted_acceleration(self, &inside, grip)));
+}
+
+q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+{
+    const bool is_inside = ref->pos_q32 >= self->limits.pos_min_q32 && ref->pos_q32 <= self->limits.pos_max_q32;
+    q32_t acc_q32;
+    self->flags = 0;
+    if (!is_inside || !find_by_law(self, ref, grip, &acc_q32) || !is_free(self, acc_q32)) {
+        return step_with_care(self, ref, grip);
+    }
+    note_jerk(self, ref->jerk_per_cycle3_q32);
+    return advance(self, acc_q32);
 }
 
 q32_t ramp_stop_position(const ramp_t *self)

@@ -541,7 +541,7 @@ bool stream_curve_is_standing(const stream_curve_t *self)
 bool stream_curve_is_at_rest(const stream_curve_t *self)
 {
     bool is_resting = -self->ahead > self->patience;
-    for (unsigned i = 0; i < 4; i++) {
+    for (unsigned i = 0; i < 4 && is_resting; i++) {
         for (unsigned axis = 0; axis < self->axes; axis++) {
             is_resting &= self->control_q32[i][axis] == self->last_q32[axis];
         }
@@ -549,33 +549,39 @@ bool stream_curve_is_at_rest(const stream_curve_t *self)
     return is_resting;
 }
 
-/* Weights of the differences between the last control points, each from 0 to 1 in time. Q60: sums up to 5 occur. */
-static unsigned weigh(stream_style_t style, q32_t between_q32, int64_t *weight_q60)
+/* Weights of the differences between the last four control points, each from 0 to 1 in time. Q60: sums up to 5 occur. The
+ * quadratic begins at the second of the points: its first weight is 1, which is exact. */
+static void weigh(stream_style_t style, q32_t between_q32, int64_t weight_q60[3])
 {
     const int64_t one = Q62_ONE / 4;
     const int64_t u = between_q32 * (one / Q32_ONE);
-    const int64_t u2 = fx_mul_shift(u, u, 60);
+    const int64_t u2 = fx_mul_shift_fit(u, u, 60);
     if (style == STREAM_FAST) {
-        weight_q60[0] = (one + 2 * u - u2) / 2;
-        weight_q60[1] = u2 / 2;
-        return 2;
+        weight_q60[0] = one;
+        weight_q60[1] = (one + 2 * u - u2) / 2;
+        weight_q60[2] = u2 / 2;
+        return;
     }
-    const int64_t u3 = fx_mul_shift(u2, u, 60);
+    const int64_t u3 = fx_mul_shift_fit(u2, u, 60);
     weight_q60[0] = (5 * one + 3 * (u - u2) + u3) / 6;
     weight_q60[1] = (one + 3 * (u + u2) - 2 * u3) / 6;
     weight_q60[2] = u3 / 6;
-    return 3;
+}
+
+/* Of a difference of control points, which are far below 2^58; by 2^64, which costs no shifts. */
+static q32_t share(q32_t difference_q32, int64_t weight_q60)
+{
+    return fx_mul_shift_fit(difference_q32 * 16, weight_q60, 64);
 }
 
 void stream_curve_at(const stream_curve_t *self, stream_style_t style, q32_t between_q32, q32_t *pos_q32)
 {
     int64_t weight_q60[3];
-    const unsigned degree = weigh(style, between_q32, weight_q60);
-    const q32_t(*const control)[AXES_MAX] = &self->control_q32[3 - degree];
+    const q32_t(*const control)[AXES_MAX] = self->control_q32;
+    weigh(style, between_q32, weight_q60);
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        pos_q32[axis] = control[0][axis];
-        for (unsigned i = 0; i < degree; i++) {
-            pos_q32[axis] += fx_mul_shift(control[i + 1][axis] - control[i][axis], weight_q60[i], 60);
-        }
+        pos_q32[axis] = control[0][axis] + share(control[1][axis] - control[0][axis], weight_q60[0]) +
+                        share(control[2][axis] - control[1][axis], weight_q60[1]) +
+                        share(control[3][axis] - control[2][axis], weight_q60[2]);
     }
 }

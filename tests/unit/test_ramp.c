@@ -249,6 +249,43 @@ static void test_ramp_step_turning_before_the_bound_keeps_every_limit(void)
     }
 }
 
+/* Any state, now and then near where a brake of it ends on a bound, and a reference beside it that the law can follow. */
+static ramp_ref_t place_anywhere(ramp_t *ramp)
+{
+    const ramp_limits_t *l = &ramp->limits;
+    const double share = random_bits() % 2 == 0 ? 1 : 0.01;
+    const q32_t vel = random_around(l->vel_per_cycle_q32, share), acc = random_around(ramp->acc_safe_q32, share);
+    const q32_t jerk = l->jerk_per_cycle3_q32;
+    const q32_t reach = (q32_t)(random_unit() * 4 * (double)llabs(ramp_stop_position(ramp) - ramp->state.pos_q32));
+    const q32_t near = random_bits() % 2 == 0 ? l->pos_max_q32 - reach : l->pos_min_q32 + reach;
+    ramp->state = (ramp_state_t){random_bits() % 2 == 0 ? near : random_position(l), vel, acc};
+    return (ramp_ref_t){ramp->state.pos_q32 + vel + random_around(jerk, 20), vel + random_around(jerk, 3),
+                        acc + random_around(jerk, 1), random_around(jerk, 1)};
+}
+
+/* Where nothing can bind a cycle works no brake out. The same ramp, told that it cannot know that, does so in every cycle. */
+static void test_ramp_step_without_working_brakes_out_is_the_same(void)
+{
+    long alike = 0;
+    for (int setting = 0; setting < 1500; setting++) {
+        const ramp_limits_t limits = random_limits();
+        ramp_t quick = ramp_of(&limits, limits.pos_min_q32);
+        for (int i = 0; i < 600; i++) {
+            const ramp_grip_t grip = random_bits() % 2 == 0 ? RAMP_SOFT : RAMP_FIRM;
+            ramp_ref_t ref =
+                i % 3 == 0 ? place_anywhere(&quick) : random_reference(&limits, &(ramp_ref_t){.pos_q32 = quick.state.pos_q32});
+            ramp_t careful = quick;
+            careful.brake_cycles = 0;
+            TEST_ASSERT_EQUAL_INT64(ramp_step(&careful, &ref, grip), ramp_step(&quick, &ref, grip));
+            careful.brake_cycles = quick.brake_cycles;
+            TEST_ASSERT_EQUAL_MEMORY(&careful, &quick, sizeof quick);
+            alike += quick.flags == 0;
+        }
+    }
+    TEST_ASSERT_GREATER_THAN(200000, alike);
+    printf("the same without working brakes out: 900000 cycles, %ld where nothing bound\n", alike);
+}
+
 static void test_ramp_take_over_own_state_keeps_every_limit(void)
 {
     for (int setting = 0; setting < 100; setting++) {
@@ -682,6 +719,7 @@ int main(void)
     RUN_TEST(test_ramp_step_hostile_references_keep_every_limit);
     RUN_TEST(test_ramp_step_alternating_bounds_keep_every_limit);
     RUN_TEST(test_ramp_step_turning_before_the_bound_keeps_every_limit);
+    RUN_TEST(test_ramp_step_without_working_brakes_out_is_the_same);
     RUN_TEST(test_ramp_take_over_own_state_keeps_every_limit);
     RUN_TEST(test_ramp_take_over_any_state_keeps_differences_and_comes_in);
     RUN_TEST(test_ramp_step_from_outside_never_goes_further_out);
