@@ -12,7 +12,7 @@
 
 #include <stdbool.h>
 
-#define FAILING_ERRORS_MAX 8
+#define FAILING_ERRORS_MAX 16
 
 /** What a function can fail with; 0 ends the list where it is shorter. */
 typedef struct {
