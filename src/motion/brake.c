@@ -103,9 +103,9 @@ q32_t brake_peak(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32)
     const int64_t ramp_cycles = (acc_q32 + acc_max_q32) / ramp->limits.jerk_per_cycle3_q32;
     const int64_t k = last_rising_cycle(ramp, vel_q32, acc_q32, ramp_cycles);
     q32_t peak_q32 = distance_after(ramp, vel_q32, acc_q32, k);
-    if (k == ramp_cycles) {
-        const q32_t left_q32 = k > 0 ? velocity_after(ramp, vel_q32, acc_q32, k) : vel_q32;
-        const int64_t more = left_q32 > 0 ? (left_q32 - 1) / acc_max_q32 : 0;
+    if (k == ramp_cycles) { /* still rising: of k = 0 too, as then acc < 0 */
+        const q32_t left_q32 = velocity_after(ramp, vel_q32, acc_q32, k);
+        const int64_t more = (left_q32 - 1) / acc_max_q32;
         peak_q32 += more * left_q32 - acc_max_q32 * (more * (more + 1) / 2);
     }
     return peak_q32 > 0 ? peak_q32 : 0;

@@ -194,7 +194,7 @@ static void take_target(motion_t *self, const motion_target_t *target, bool is_s
 static bool is_under_way(const motion_t *self, const motion_target_t *target)
 {
     const motion_target_t *last = &self->pending;
-    bool is_same = self->source > MOTION_STREAMED && self->due == DUE_NOTHING && last->is_timed && target->is_timed &&
+    bool is_same = self->source > MOTION_STREAMED && self->due == DUE_NOTHING && last->is_timed &&
                    target->time_ms == last->time_ms && target->has_angle == last->has_angle &&
                    (!target->has_angle || target->angle_deg_q32 == last->angle_deg_q32);
     for (unsigned i = 0; i < POSE_AXES; i++) {

@@ -122,7 +122,7 @@ static halt_times_t shortest(const need_t *need, unsigned axes)
     halt_times_t best = longest_ends(need, axes);
     int64_t step = 1;
     (void)cycles_with(need, axes, &best);
-    while (step < best.change || step < best.back) {
+    while (step < best.change) { /* of the longest ends, the change is the longer one */
         step *= 2;
     }
     for (; step > 0; step /= 2) {
@@ -224,15 +224,12 @@ void halt_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *c
     }
 }
 
-/* Velocity of an axis k cycles after the start: v + a c + plateau w, with the sums c and w of the shape; 0 at the end. */
+/* Velocity of an axis k cycles after the start, before the end: v + a c + plateau w, with the sums c and w of the shape. */
 static q32_t velocity_after(const halt_t *self, unsigned i, int64_t k)
 {
     const halt_times_t *t = &self->times[i];
     const ramp_state_t *start = &self->start[i];
     const int64_t n1 = t->change, n2 = t->hold, n3 = t->back;
-    if (k >= n1 + n2 + n3) {
-        return 0;
-    }
     const int64_t in_change = k < n1 ? k : n1;
     const int64_t in_hold = fx_clamp(k - n1, 0, n2);
     const int64_t in_back = k > n1 + n2 ? k - n1 - n2 : 0;

@@ -81,26 +81,39 @@ static bool is_fastest(const stream_t *self)
     return self->clock.period_us_q16 * 10 < (int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16 * 11;
 }
 
+/* What speaks against a sample that is so many periods after the newest: how far it is off the motion so far, and off its time.
+ */
+typedef struct {
+    q32_t cost_q32;
+    bool is_telling; /* it is where that motion would be, and about in time */
+} guess_t;
+
+static guess_t guess_of(const stream_t *self, const q32_t *sample_q32, unsigned periods, q32_t ahead_q32)
+{
+    q32_t step_q32;
+    const q32_t misfit_q32 = stream_curve_misfit(&self->curve, sample_q32, periods, &step_q32);
+    const q32_t untimely_q32 = fx_abs(ahead_q32 - periods * Q32_ONE);
+    const q32_t ambiguous_q32 = fx_clamp(stream_clock_span(&self->clock, AMBIGUOUS_US), AMBIGUOUS_Q32, AMBIGUOUS_MAX_Q32);
+    return (guess_t){.cost_q32 = misfit_q32 + fx_mul_shift(step_q32, untimely_q32 / 2, 32),
+                     .is_telling = untimely_q32 < ambiguous_q32 && misfit_q32 * 4 < step_q32};
+}
+
 /* Periods from the newest sample to this one. A loss, a late and an early arrival look alike to the clock; where the signal
  * moves, the value tells them apart: if the motion so far goes on to within a quarter of its step. Where it hardly moves, or
  * bends, the time tells. */
 static unsigned judge_periods(const stream_t *self, uint64_t now_us, const q32_t *sample_q32)
 {
-    q32_t ahead_q32, step_q32;
+    q32_t ahead_q32;
     const unsigned expected = stream_clock_expect(&self->clock, now_us, &ahead_q32);
     if (expected > 3 || (expected == 0 && is_fastest(self))) {
         return expected;
     }
-    const q32_t ambiguous_q32 = fx_clamp(stream_clock_span(&self->clock, AMBIGUOUS_US), AMBIGUOUS_Q32, AMBIGUOUS_MAX_Q32);
     unsigned best = expected;
-    q32_t least_q32 = INT64_MAX;
-    for (unsigned periods = expected > 1 ? expected - 1 : expected; periods <= expected + 1; periods++) {
-        const q32_t misfit_q32 = stream_curve_misfit(&self->curve, sample_q32, periods, &step_q32);
-        const q32_t untimely_q32 = fx_abs(ahead_q32 - periods * Q32_ONE);
-        const q32_t cost_q32 = misfit_q32 + fx_mul_shift(step_q32, untimely_q32 / 2, 32);
-        const bool is_telling = untimely_q32 < ambiguous_q32 && misfit_q32 * 4 < step_q32;
-        if ((is_telling || periods == expected) && (cost_q32 < least_q32 || (cost_q32 == least_q32 && periods == expected))) {
-            least_q32 = cost_q32;
+    q32_t least_q32 = guess_of(self, sample_q32, expected, ahead_q32).cost_q32;
+    for (unsigned periods = expected > 1 ? expected - 1 : expected + 1; periods <= expected + 1; periods += 2) {
+        const guess_t guess = guess_of(self, sample_q32, periods, ahead_q32);
+        if (guess.is_telling && guess.cost_q32 < least_q32) {
+            least_q32 = guess.cost_q32;
             best = periods;
         }
     }
@@ -148,7 +161,7 @@ static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32
         return; /* the same datagram twice */
     }
     const unsigned periods = judge_periods(self, now_us, sample_q32);
-    const bool is_new_rate = stream_clock_take(&self->clock, now_us, periods) && self->phase == STREAM_RUNNING;
+    const bool is_new_rate = stream_clock_take(&self->clock, now_us, periods);
     stream_curve_pace(&self->curve, self->style, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us);
     if (is_new_rate) {
         stream_curve_regrid(&self->curve, self->style, self->previous, sample_q32);

@@ -143,11 +143,12 @@ static int64_t mean_period(const stream_clock_t *self, unsigned gaps, int64_t pe
 }
 
 /* Mean of the middle half of the newest intervals: neither losses nor bursts reach it. An even number of them, as in a burst
- * short and long ones alternate. */
+ * short and long ones alternate.
+ * @param gaps at least 2 */
 static int64_t middle_gap(const stream_clock_t *self, unsigned gaps)
 {
     int64_t sorted[STREAM_GAPS];
-    const unsigned count = gaps > 1 ? gaps - gaps % 2 : 1;
+    const unsigned count = gaps - gaps % 2;
     for (unsigned i = 0; i < count; i++) {
         const int64_t gap = gap_q16(self, i);
         unsigned at = i;
@@ -241,7 +242,7 @@ static void adapt_margin(stream_clock_t *self)
 static void leave_out_first(stream_clock_t *self)
 {
     const int64_t stated = (int64_t)self->hint_us * STREAM_US_Q16;
-    if (stated == 0 || self->gaps < 3 || self->settled >= STREAM_GAPS) {
+    if (stated == 0 || self->gaps < 3) {
         return;
     }
     const int64_t all = mean_period(self, self->gaps, stated);
@@ -250,15 +251,15 @@ static void leave_out_first(stream_clock_t *self)
     self->gaps -= is_odd && fx_abs(others - stated) < fx_abs(all - stated) ? 1u : 0u;
 }
 
-/* Period over the intervals so far. What the sender states tells losses from late arrivals better than the first intervals do, if
- * it is what they are about; against it speak two alike, not two unlike ones. */
+/* Period over the intervals so far, two or more. What the sender states tells losses from late arrivals better than the first
+ * intervals do, if it is what they are about; against it speak two alike, not two unlike ones. */
 static int64_t first_period(const stream_clock_t *self)
 {
     const int64_t stated = (int64_t)self->hint_us * STREAM_US_Q16;
     if (stated > 0 && self->gaps < 3) {
         const int64_t newest = gap_q16(self, 0);
         const int64_t oldest = gap_q16(self, self->gaps - 1);
-        return self->gaps == 2 && fx_abs(newest - oldest) * 8 <= oldest ? (newest + oldest) / 2 : stated;
+        return fx_abs(newest - oldest) * 8 <= oldest ? (newest + oldest) / 2 : stated;
     }
     const int64_t mean = stated > 0 ? mean_period(self, self->gaps, stated) : 0;
     if (stated > 0 && fx_abs(mean - stated) * 4 <= stated && lost_gaps(self, self->gaps, stated) * 2 <= self->gaps) {

@@ -398,7 +398,7 @@ HV_WRAPS static void give_up(stream_curve_t *self)
 {
     q32_t was_q32[3][AXES_MAX];
     points_at_head(self, was_q32);
-    for (int32_t back = 0; back < self->patience && back < STREAM_POINTS; back++) {
+    for (int32_t back = 0; back < self->patience; back++) { /* 40 at most: the ring is longer */
         copy_point(self, self->point_q32[slot(self->head - (uint32_t)back)], self->last_q32);
     }
     for (unsigned axis = 0; axis < self->axes; axis++) {

@@ -13,10 +13,10 @@ enum {
 #define NOTHING_Q32 (Q32_ONE / 1024) /* values are rounded to 2^-16, and maybe scaled: what is less says nothing */
 #define FINEST_Q32  (Q32_ONE / 256)  /* finer grains cannot be told */
 
-/* By Euclid; to the nearest multiple, so that the remainder halves in every step. 0 = nothing yet. */
+/* By Euclid; to the nearest multiple, so that the remainder halves in every step: 28 for the longest. 0 = nothing yet. */
 static q32_t common_divisor(q32_t a_q32, q32_t b_q32)
 {
-    for (int step = 0; step < 32 && b_q32 > NOTHING_Q32; step++) {
+    while (b_q32 > NOTHING_Q32) {
         const q32_t over_q32 = a_q32 % b_q32;
         a_q32 = b_q32;
         b_q32 = over_q32 < b_q32 - over_q32 ? over_q32 : b_q32 - over_q32;

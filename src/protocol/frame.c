@@ -238,7 +238,7 @@ static void take_mask_digit(frame_scanner_t *self, uint8_t byte)
     const unsigned digit = hex_value(byte);
     const bool is_prefix =
         (byte | 0x20u) == 'x' && !self->is_mask_prefixed && self->mask_digits == 1 && self->frame.relay_mask == 0;
-    if (self->is_mask_ended || (digit > 15 && !is_prefix) || (digit <= 15 && self->mask_digits == MASK_DIGITS_MAX)) {
+    if (self->is_mask_ended || (digit > 15 && !is_prefix) || self->mask_digits == MASK_DIGITS_MAX) {
         fail(self, FRAME_ERR_MASK, byte, last_field(self));
     } else if (is_prefix) {
         self->is_mask_prefixed = true;

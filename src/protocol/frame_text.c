@@ -83,13 +83,13 @@ static const look_alike_t *look_alike_find(uint32_t code_point)
     return NULL;
 }
 
-/* Of those of the table: none is behind the letters. */
+/* Of those of the table: none is between the capital and the small letters, or behind these. */
 static const char *kind_of(char ascii)
 {
     if (ascii >= '0' && ascii <= '9') {
         return "digit";
     }
-    return (ascii >= 'A' && ascii <= 'Z') || ascii >= 'a' ? "letter" : "character";
+    return ascii >= 'A' ? "letter" : "character";
 }
 
 /* "U+0410 CYRILLIC CAPITAL LETTER A looks like A; type the ASCII letter" */
