@@ -1866,6 +1866,18 @@ static void test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves(v
 #undef SPOIL
 }
 
+static void test_resume_of_three_cylinders_takes_what_they_saved(void)
+{
+    static gateway_t saved;
+    m_settings = rig_tripod();
+    start(true);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 20000));
+    gateway_save(&m_rig.gateway, &saved);
+    TEST_ASSERT_EQUAL(HV_OK, resume(&saved));
+    saved.motion.kin.cylinders = 6; /* everything else says three */
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, resume(&saved));
+}
+
 static void run_driving(void)
 {
     RUN_TEST(test_gateway_init_wrong_hardware_is_refused);
@@ -1959,6 +1971,7 @@ static void run_supervision(void)
     RUN_TEST(test_shutdown_from_settled_waits_until_the_bus_has_taken_it);
     RUN_TEST(test_takeover_timed_move_after_a_stream_of_wild_extensions_ends_in_time);
     RUN_TEST(test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves);
+    RUN_TEST(test_resume_of_three_cylinders_takes_what_they_saved);
 }
 
 int main(void)

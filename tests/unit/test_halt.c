@@ -228,6 +228,22 @@ static void test_halt_plan_at_rest_stays_where_it_is(void)
 }
 
 /* A heavy rotation motor takes seconds to stop; the cylinders need not wait for it. */
+/* All that is left of a motion is an acceleration that one cycle takes back: it is over before it moves. */
+static void test_halt_plan_acceleration_of_one_cycle_ends_where_it_is(void)
+{
+    const ramp_limits_t limits = limits_of(400, 3000, 50000);
+    const ramp_limits_t *const list[1] = {&limits};
+    const q32_t jerk_q32 = limits.jerk_per_cycle3_q32;
+    const ramp_state_t start = {.pos_q32 = q32(20), .acc_per_cycle2_q32 = jerk_q32 - jerk_q32 / 128 - 4};
+    judge_t j = {.last = start};
+    halt_t halt;
+    halt_plan(&halt, 1, 1, &start, list);
+    TEST_ASSERT_EQUAL_INT64(2, halt.cycles);
+    walk(&halt, &limits, &j);
+    TEST_ASSERT_EQUAL_INT64(start.pos_q32, halt.rest_q32[0]);
+    TEST_ASSERT_TRUE(j.jerk <= 1);
+}
+
 static void test_halt_plan_axis_apart_takes_its_own_time(void)
 {
     const ramp_limits_t limits[3] = {limits_of(400, 3000, 50000), limits_of(400, 3000, 50000), limits_of(60, 20, 200)};
@@ -282,6 +298,7 @@ int main(void)
     RUN_TEST(test_halt_plan_one_body_ends_together_within_ten_percent_of_the_slowest);
     RUN_TEST(test_halt_plan_proportional_axes_keep_their_direction);
     RUN_TEST(test_halt_plan_at_rest_stays_where_it_is);
+    RUN_TEST(test_halt_plan_acceleration_of_one_cycle_ends_where_it_is);
     RUN_TEST(test_halt_plan_axis_apart_takes_its_own_time);
     RUN_TEST(test_halt_plan_near_a_bound_takes_its_own_time);
     RUN_TEST(test_halt_plan_far_beyond_the_limits_does_not_wrap_around);

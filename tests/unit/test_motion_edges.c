@@ -1,0 +1,280 @@
+/* SPDX-License-Identifier: MIT
+ * test_motion_edges.c - what a platform seldom or never gets into, made by hand: positions without a pose, cylinders thrown off
+ * their path, ways beyond all solving; and what `fast` asks of one body.
+ */
+#include <math.h>
+#include <stdlib.h>
+
+#include "../../src/motion/join.h"
+#include "../../src/motion/way.h"
+#include "rig.h"
+#include "unity.h"
+
+#define CYCLE_US 1000u
+
+static motion_t m_motion;
+static motion_output_t m_out;
+static uint64_t m_now_us;
+
+static void init(settings_t settings)
+{
+    m_now_us = 1000000;
+    TEST_ASSERT_EQUAL(HV_OK, motion_init(&m_motion, &settings));
+}
+
+void setUp(void)
+{
+    init(rig_hexapod());
+}
+
+void tearDown(void) {}
+
+/* One cycle; no cylinder may move faster than so. */
+static void step(double most_mm_s)
+{
+    q32_t before_q32[CYLINDERS_MAX];
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        before_q32[i] = m_motion.cylinder[i].state.pos_q32;
+    }
+    m_now_us += CYCLE_US;
+    motion_step(&m_motion, m_now_us, &m_out);
+    for (unsigned i = 0; i < m_motion.cylinders; i++) {
+        TEST_ASSERT_TRUE((double)llabs(m_out.extension_mm_q32[i] - before_q32[i]) / 4294967.296 <= most_mm_s);
+    }
+}
+
+static void run_ms(unsigned ms, double most_mm_s)
+{
+    for (unsigned i = 0; i < ms; i++) {
+        step(most_mm_s);
+    }
+}
+
+static void take(const motion_target_t *target)
+{
+    TEST_ASSERT_EQUAL(HV_OK, motion_target(&m_motion, target, m_now_us));
+}
+
+static double mm(q32_t value_q32)
+{
+    return (double)value_q32 / 4294967296.0;
+}
+
+static void assert_extensions(const q32_t *expected_q32)
+{
+    for (unsigned i = 0; i < m_motion.cylinders; i++) {
+        TEST_ASSERT_EQUAL_INT64(expected_q32[i], m_out.extension_mm_q32[i]);
+    }
+}
+
+/* ---- at rest is done, and nothing else ---- */
+
+static void test_done_is_not_before_the_last_cylinder_rests(void)
+{
+    TEST_ASSERT_TRUE(motion_is_done(&m_motion));
+    m_motion.cylinder[4].state.pos_q32 += Q32_ONE / 10;
+    m_motion.cylinder[4].state.vel_per_cycle_q32 = Q32_ONE / 100;
+    TEST_ASSERT_FALSE(motion_is_done(&m_motion));
+    run_ms(500, 50);
+    TEST_ASSERT_TRUE(motion_is_done(&m_motion));
+    assert_extensions(m_motion.settled_mm_q32);
+}
+
+static void test_path_is_not_over_before_a_cylinder_thrown_off_is_back(void)
+{
+    motion_rise(&m_motion);
+    run_ms(10, 50);
+    TEST_ASSERT_EQUAL(MOTION_ON_PATH, m_motion.source);
+    while (!scurve_is_done(&m_motion.path)) {
+        TEST_ASSERT_FALSE(motion_is_done(&m_motion));
+        m_motion.cylinder[2].state.pos_q32 -= Q32_ONE / 1000; /* pushed down all the way */
+        step(400);
+    }
+    for (unsigned i = 0; i < 3; i++) {
+        TEST_ASSERT_FALSE(motion_is_done(&m_motion));
+        TEST_ASSERT_EQUAL(MOTION_ON_PATH, m_motion.source);
+        step(400);
+    }
+    run_ms(500, 400);
+    TEST_ASSERT_TRUE(motion_is_done(&m_motion));
+    assert_extensions(m_motion.neutral_mm_q32);
+}
+
+/* ---- targets that cannot be ---- */
+
+/* Strokes so long that not all extensions belong to a pose; these do not. */
+static motion_target_t start_askew(void)
+{
+    settings_t settings = rig_hexapod();
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        settings.geometry.retracted_mm_q16[i] = 650 * Q16_ONE;
+        settings.stroke_mm_q16[i] = 1200 * Q16_ONE;
+    }
+    init(settings);
+    motion_target_t target = {.space = MOTION_CYLINDERS};
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        target.value_q32[i] = q32_from_int(i % 2 == 0 ? 1195 : 5);
+    }
+    return target;
+}
+
+/* Of extensions that can be at a tenth of the way, but not where the intensity has risen until their turn comes. */
+static void test_target_that_intensity_makes_impossible_while_it_waits_is_dropped(void)
+{
+    const motion_target_t target = start_askew();
+    const motion_target_t pose = {.space = MOTION_POSE, .value_q32 = {[AXIS_Z] = q32_from_int(10)}};
+    motion_rise(&m_motion);
+    run_ms(10000, 50);
+    motion_follow(&m_motion);
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, motion_target(&m_motion, &target, m_now_us));
+    TEST_ASSERT_EQUAL(HV_OK, motion_set_intensity(&m_motion, 10));
+    step(0);
+    motion_follow(&m_motion);
+    take(&target);
+    TEST_ASSERT_EQUAL(HV_OK, motion_set_intensity(&m_motion, 100));
+    run_ms(1000, 0);
+    assert_extensions(m_motion.neutral_mm_q32);
+    take(&pose); /* what comes then is followed */
+    run_ms(5000, 50);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 10, mm(m_out.sent.axis_q32[AXIS_Z]));
+}
+
+/* The axes have nowhere to begin then; the cylinders are led to the pose all the same, at engage speed. */
+static void test_follow_a_pose_from_positions_without_one(void)
+{
+    const motion_target_t target = {.space = MOTION_POSE, .value_q32 = {[AXIS_ROLL] = q32_from_int(3)}};
+    const motion_target_t from = start_askew();
+    motion_place(&m_motion, from.value_q32, 0);
+    step(0);
+    TEST_ASSERT_BITS_HIGH(MOTION_NO_POSE, m_out.flags);
+    motion_follow(&m_motion);
+    step(0);
+    take(&target);
+    run_ms(10, 50);
+    TEST_ASSERT_BITS_HIGH(MOTION_TAKEOVER, m_out.flags);
+    run_ms(30000, 50.1);
+    TEST_ASSERT_EQUAL_UINT(0, m_out.flags);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 3, mm(m_out.sent.axis_q32[AXIS_ROLL]));
+    TEST_ASSERT_TRUE(motion_is_at_rest(&m_motion));
+}
+
+/* What a tripod does not move is not scaled either: it stays at what a slot can be, whatever the intensity. */
+static void test_axis_that_is_not_moved_is_pulled_in_as_it_is(void)
+{
+    const motion_target_t target = {.space = MOTION_POSE,
+                                    .value_q32 = {[AXIS_X] = q32_from_int(40000), [AXIS_Z] = q32_from_int(20)}};
+    init(rig_tripod());
+    TEST_ASSERT_EQUAL(HV_OK, motion_set_intensity(&m_motion, 50));
+    motion_rise(&m_motion);
+    run_ms(10000, 50);
+    motion_follow(&m_motion);
+    step(0);
+    take(&target);
+    run_ms(5000, 50);
+    TEST_ASSERT_BITS_HIGH(MOTION_CLAMPED, m_out.flags);
+    TEST_ASSERT_EQUAL_INT64(q32_from_int(INT16_MAX), m_motion.slot_q32[AXIS_X]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 10, mm(m_out.sent.axis_q32[AXIS_Z]));
+}
+
+/* ---- ways ---- */
+
+static void test_way_where_nothing_can_be_solved_is_not_feasible(void)
+{
+    const q32_t beyond_q32[POSE_AXES] = {[AXIS_X] = q32_from_int(20000)};
+    const ramp_state_t rest[POSE_AXES] = {[AXIS_X] = {.pos_q32 = beyond_q32[AXIS_X]}};
+    const ramp_state_t start[POSE_AXES] = {{.pos_q32 = 0}};
+    const q32_t near_q32[POSE_AXES] = {[AXIS_X] = q32_from_int(10)};
+    quintic_t quintic;
+    TEST_ASSERT_EQUAL(HV_OK, quintic_plan(&quintic, POSE_AXES, start, near_q32, 1000));
+    TEST_ASSERT_TRUE(way_is_feasible(&m_motion, &quintic));
+    TEST_ASSERT_EQUAL(HV_OK, quintic_plan(&quintic, POSE_AXES, rest, beyond_q32, 1000));
+    TEST_ASSERT_FALSE(way_is_feasible(&m_motion, &quintic));
+}
+
+static void test_way_where_nothing_can_be_solved_narrows_nothing(void)
+{
+    const q32_t from_q32[POSE_AXES] = {0};
+    const q32_t near_q32[POSE_AXES] = {[AXIS_X] = q32_from_int(10)};
+    const q32_t beyond_q32[POSE_AXES] = {[AXIS_X] = q32_from_int(20000)};
+    const path_limits_t none = path_limits_none();
+    path_limits_t limits = none;
+    way_narrow(&m_motion, from_q32, beyond_q32, &limits);
+    TEST_ASSERT_EQUAL_MEMORY(&none, &limits, sizeof limits);
+    way_narrow(&m_motion, from_q32, near_q32, &limits);
+    TEST_ASSERT_TRUE(limits.vel_q62 < none.vel_q62 && limits.acc_q62 < none.acc_q62 && limits.jerk_q62 < none.jerk_q62);
+}
+
+/* ---- one body ---- */
+
+/* True for a reference of the third cylinder with these shares of its limits, everything else at rest. */
+static bool is_beyond(double speed, double accel, double jerk)
+{
+    const ramp_limits_t *limits = &m_motion.cylinder[2].limits;
+    ramp_ref_t ref[AXES_MAX] = {{.pos_q32 = 0}};
+    ref[2] = (ramp_ref_t){.vel_per_cycle_q32 = (q32_t)(speed * (double)limits->vel_per_cycle_q32),
+                          .acc_per_cycle2_q32 = (q32_t)(accel * (double)m_motion.cylinder[2].acc_safe_q32),
+                          .jerk_per_cycle3_q32 = (q32_t)(jerk * (double)limits->jerk_per_cycle3_q32)};
+    return join_are_cylinders_beyond(&m_motion, ref);
+}
+
+static void test_join_is_beyond_by_speed_acceleration_and_jerk_in_both_directions(void)
+{
+    for (int sign = -1; sign <= 1; sign += 2) {
+        TEST_ASSERT_FALSE(is_beyond(sign * 0.9, 0, 0));
+        TEST_ASSERT_FALSE(is_beyond(sign * 0.2, sign * 0.9, 0));
+        TEST_ASSERT_FALSE(is_beyond(sign * 0.9, sign * -0.9, sign * 3.9)); /* slowing down */
+        TEST_ASSERT_TRUE(is_beyond(sign * 1.1, 0, 0));
+        TEST_ASSERT_TRUE(is_beyond(sign * 1.1, sign * -0.9, 0));
+        TEST_ASSERT_TRUE(is_beyond(sign * 0.9, sign * 0.9, 0)); /* it would get too fast before that is taken back */
+        TEST_ASSERT_TRUE(is_beyond(0, sign * 1.1, 0));
+        TEST_ASSERT_TRUE(is_beyond(0, 0, sign * 5.1));
+    }
+}
+
+/* The steps of a quadratic curve's acceleration are for the ramps to absorb. */
+static void test_join_is_beyond_of_a_fast_stream_by_more_jerk(void)
+{
+    settings_t settings = rig_hexapod();
+    settings.stream_style = STREAM_FAST;
+    init(settings);
+    TEST_ASSERT_FALSE(is_beyond(0, 0, 15.9));
+    TEST_ASSERT_FALSE(is_beyond(0, 0, -15.9));
+    TEST_ASSERT_TRUE(is_beyond(0, 0, 17.1));
+    TEST_ASSERT_TRUE(is_beyond(0, 0, -17.1));
+}
+
+/* A swing of 20 mm and 1.6 Hz at 50 Hz: its steps of acceleration take more than four times the jerk there is. */
+static void test_join_a_fast_stream_within_the_limits_stays_on_its_curve(void)
+{
+    settings_t settings = rig_hexapod();
+    settings.stream_style = STREAM_FAST;
+    init(settings);
+    motion_rise(&m_motion);
+    run_ms(10000, 50);
+    motion_follow(&m_motion);
+    for (unsigned ms = 0; ms < 8000; ms++) {
+        motion_target_t target = {.space = MOTION_POSE};
+        if (ms % 20 == 0) {
+            target.value_q32[AXIS_Z] = (q32_t)(20 * sin(ms * 1.6 * 6.283185307 / 1000) * 4294967296.0);
+            take(&target);
+        }
+        step(400);
+        TEST_ASSERT_TRUE(ms < 2000 || m_motion.join == JOIN_NONE); /* after the take-over */
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_done_is_not_before_the_last_cylinder_rests);
+    RUN_TEST(test_path_is_not_over_before_a_cylinder_thrown_off_is_back);
+    RUN_TEST(test_target_that_intensity_makes_impossible_while_it_waits_is_dropped);
+    RUN_TEST(test_follow_a_pose_from_positions_without_one);
+    RUN_TEST(test_axis_that_is_not_moved_is_pulled_in_as_it_is);
+    RUN_TEST(test_way_where_nothing_can_be_solved_is_not_feasible);
+    RUN_TEST(test_way_where_nothing_can_be_solved_narrows_nothing);
+    RUN_TEST(test_join_is_beyond_by_speed_acceleration_and_jerk_in_both_directions);
+    RUN_TEST(test_join_is_beyond_of_a_fast_stream_by_more_jerk);
+    RUN_TEST(test_join_a_fast_stream_within_the_limits_stays_on_its_curve);
+    return UNITY_END();
+}
