@@ -71,6 +71,9 @@ HV_WRAPS static uint64_t divide_digit(uint64_t *remainder, uint64_t digit, uint6
 /* floor(value / divisor) for value.hi < divisor, in two digits of 32 bits. */
 static uint64_t divide_u128(fx_u128_t value, uint64_t divisor)
 {
+    if (value.hi == 0) {
+        return value.lo / divisor; /* most of them: no digit to guess */
+    }
     const unsigned shift = fx_leading_zeros(divisor);
     if (shift != 0) {
         divisor <<= shift;

@@ -117,6 +117,13 @@ q32_t brake_velocity_peak(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32)
     return vel_q32 + n * acc_q32 - ramp->limits.jerk_per_cycle3_q32 * (n * (n + 1) / 2);
 }
 
+/* The gain is the largest of the straight lines k acc - J k (k + 1) / 2, so at most their chord from 0 to acc_safe. */
+bool brake_keeps_velocity(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32, q32_t most_q32)
+{
+    const q32_t chord_q32 = fx_shift_down(acc_q32 * (ramp->acc_cycles - 1), 1);
+    return vel_q32 + chord_q32 <= most_q32 || brake_velocity_peak(ramp, vel_q32, acc_q32) <= most_q32;
+}
+
 q32_t brake_acc_for_velocity_room(const ramp_t *ramp, q32_t room_q32)
 {
     const q32_t jerk_q32 = ramp->limits.jerk_per_cycle3_q32;

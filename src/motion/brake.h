@@ -22,6 +22,9 @@ q32_t brake_peak(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32);
 /** Velocity the axis still reaches when acc is taken back to 0 with full jerk, exact in integers; acc >= 0. */
 q32_t brake_velocity_peak(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32);
 
+/** brake_velocity_peak() is at or below `most`; acc in [0, acc_safe]. As a rule without a division. */
+bool brake_keeps_velocity(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32, q32_t most_q32);
+
 /** Largest acceleration for the next cycle from which the velocity can be kept at or below vel + room; room >= 0. */
 q32_t brake_acc_for_velocity_room(const ramp_t *ramp, q32_t room_q32);
 

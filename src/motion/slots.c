@@ -124,6 +124,9 @@ bool slots_is_planned(const motion_t *self, const q32_t slot_q32[AXES_MAX])
 
 void slots_scale_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
+    if (intensity_is_still(&self->intensity, INTENSITY_FULL)) {
+        return; /* what has always been whole is not changed by a bit */
+    }
     for (unsigned i = 0; i < AXES_MAX; i++) {
         if (is_scaled(self, self->space, i)) {
             ref[i] = intensity_scale(&self->intensity, centre_of(self, self->space, i), &ref[i]);

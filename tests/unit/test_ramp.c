@@ -4,6 +4,8 @@
  */
 #include "heave/ramp.h"
 
+#include "../../src/motion/brake.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -284,6 +286,21 @@ static void test_ramp_step_without_working_brakes_out_is_the_same(void)
     }
     TEST_ASSERT_GREATER_THAN(200000, alike);
     printf("the same without working brakes out: 900000 cycles, %ld where nothing bound\n", alike);
+}
+
+static void test_brake_keeps_velocity_is_by_the_peak(void)
+{
+    for (int setting = 0; setting < 2000; setting++) {
+        const ramp_limits_t limits = random_limits();
+        const ramp_t ramp = ramp_of(&limits, limits.pos_min_q32);
+        for (int i = 0; i < 200; i++) {
+            const q32_t vel = random_around(limits.vel_per_cycle_q32, 1), acc = llabs(random_around(ramp.acc_safe_q32, 1));
+            const q32_t peak = brake_velocity_peak(&ramp, vel, acc);
+            const q32_t beside = (q32_t)random_log(1, (double)limits.vel_per_cycle_q32);
+            TEST_ASSERT_TRUE(brake_keeps_velocity(&ramp, vel, acc, peak) && brake_keeps_velocity(&ramp, vel, acc, peak + beside));
+            TEST_ASSERT_FALSE(brake_keeps_velocity(&ramp, vel, acc, peak - beside));
+        }
+    }
 }
 
 static void test_ramp_take_over_own_state_keeps_every_limit(void)
@@ -720,6 +737,7 @@ int main(void)
     RUN_TEST(test_ramp_step_alternating_bounds_keep_every_limit);
     RUN_TEST(test_ramp_step_turning_before_the_bound_keeps_every_limit);
     RUN_TEST(test_ramp_step_without_working_brakes_out_is_the_same);
+    RUN_TEST(test_brake_keeps_velocity_is_by_the_peak);
     RUN_TEST(test_ramp_take_over_own_state_keeps_every_limit);
     RUN_TEST(test_ramp_take_over_any_state_keeps_differences_and_comes_in);
     RUN_TEST(test_ramp_step_from_outside_never_goes_further_out);
