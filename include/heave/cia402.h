@@ -126,53 +126,53 @@ typedef enum {
     CIA402_HOMING_DONE
 } cia402_homing_t;
 
-/** One drive at work; private. */
+/** One drive at work; private. In an order that leaves no holes. */
 typedef struct {
     cia402_phase_t phase;
-    uint64_t phase_us;
     uint32_t trouble; /* cia402_trouble_t of the last loss or refusal */
+    uint64_t phase_us;
     uint64_t trouble_us;
     uint32_t trouble_object; /* index << 8 | sub */
     uint32_t trouble_code;   /* SDO abort code, or the value found */
     uint32_t warned_object;  /* a guard that is off and was allowed to be */
+    uint8_t nmt;             /* last heard */
+    uint8_t nmt_command;     /* waits to be sent, 0 = none */
+    uint8_t starts;          /* attempts to become operational */
+    bool is_reset_done;
     sdo_t sdo;
     cia402_setup_t setup;
-    uint8_t nmt;         /* last heard */
-    uint8_t nmt_command; /* waits to be sent, 0 = none */
-    uint8_t starts;      /* attempts to become operational */
-    bool is_reset_done;
-    bool has_heartbeat;
     uint64_t heartbeat_us;
 
-    bool has_actual; /* since it was set up last */
-    bool was_heard;  /* has_actual at any time */
-    uint16_t statusword;
-    int8_t mode_shown;
-    int32_t actual_counts;
     int64_t position_counts; /* without the wrap-around of 32 bits */
     q32_t actual_q32;
     uint64_t actual_us;
+    int32_t actual_counts;
     uint32_t silent_syncs;
+    uint16_t statusword;
+    int8_t mode_shown;
+    bool has_heartbeat;
+    bool has_actual; /* since it was set up last */
+    bool was_heard;  /* has_actual at any time */
 
+    bool is_in;        /* takes part in what the drives do together */
+    bool has_operated; /* since the stage began in which all get there */
     cia402_goal_t goal;
-    bool is_in; /* takes part in what the drives do together */
     uint16_t word;
     uint8_t word_syncs;  /* since it changed, saturates */
     uint8_t reset_syncs; /* of the way through a fault reset, 0 = none */
     uint64_t reset_until_us;
     uint64_t operating_us; /* operation enabled since, 0 = not */
-    bool has_operated;     /* since the stage began in which all get there */
     uint64_t stopping_us;  /* quick stop since, 0 = not */
     uint32_t own_fault;    /* found by this driver: cia402_trouble_t or a number of the standard; 0 = none */
     uint16_t error_code;   /* the drive's own */
     uint8_t error_register;
     bool is_error_read;
-    bool was_faulty;
+    q32_t sent_q32;
+    int32_t target_counts;
     cia402_homing_t homing;
     bool is_homed;
-    int32_t target_counts;
-    q32_t sent_q32;
     bool has_sent;
+    bool was_faulty;
 } cia402_axis_t;
 
 /** What the drives do together; private. */

@@ -93,11 +93,20 @@ int64_t fx_add_sat(int64_t a, int64_t b);
     ensures \result == (a - b > INT64_MAX ? INT64_MAX : a - b < INT64_MIN ? INT64_MIN : a - b); */
 int64_t fx_sub_sat(int64_t a, int64_t b);
 
+/* The next two are used in a hundred places: where size counts they are called, and the linker keeps one copy. */
+#if defined(__OPTIMIZE_SIZE__) && defined(__GNUC__)
+#define FX_OFTEN __attribute__((weak))
+FX_OFTEN int64_t fx_clamp(int64_t value, int64_t low, int64_t high);
+FX_OFTEN int64_t fx_abs(int64_t value);
+#else
+#define FX_OFTEN static inline
+#endif
+
 /** Limits value to [low, high]; low <= high. */
 /*@ requires low <= high;
     assigns \nothing;
     ensures \result == (value < low ? low : value > high ? high : value); */
-static inline int64_t fx_clamp(int64_t value, int64_t low, int64_t high)
+FX_OFTEN int64_t fx_clamp(int64_t value, int64_t low, int64_t high)
 {
     return value < low ? low : value > high ? high : value;
 }
@@ -105,7 +114,7 @@ static inline int64_t fx_clamp(int64_t value, int64_t low, int64_t high)
 /** |value|; INT64_MIN gives INT64_MAX. */
 /*@ assigns \nothing;
     ensures \result == (value == INT64_MIN ? INT64_MAX : \abs(value)); */
-static inline int64_t fx_abs(int64_t value)
+FX_OFTEN int64_t fx_abs(int64_t value)
 {
     return value >= 0 ? value : value == INT64_MIN ? INT64_MAX : -value;
 }
