@@ -68,10 +68,10 @@ static __attribute__((format(printf, 2, 3))) int complain(int code, const char *
     return code;
 }
 
-/* Standard output that took everything. */
+/* Standard output that took everything; EXIT_IO: it has not, and that was said. */
 static int end_stdout(int code)
 {
-    if (fflush(stdout) != 0 || ferror(stdout) != 0) {
+    if (code != EXIT_IO && (fflush(stdout) != 0 || ferror(stdout) != 0)) {
         return complain(EXIT_IO, "standard output: %s", strerror(errno));
     }
     return code;
@@ -103,12 +103,19 @@ static int open_link(ctl_t *self)
     return EXIT_DONE;
 }
 
-/* Where it fails, what heaved said before it closed is still to be read. */
-static void send_line(const ctl_t *self, const char *request)
+/* Where heaved has closed the link, what it said before is still to be read. */
+static int send_line(const ctl_t *self, const char *request)
 {
     char line[64];
     const int length = snprintf(line, sizeof line, "%s\n", request);
-    (void)!send(self->fd, line, (size_t)length, MSG_NOSIGNAL);
+    ssize_t sent;
+    do {
+        sent = send(self->fd, line, (size_t)length, MSG_NOSIGNAL);
+    } while (sent < 0 && errno == EINTR && is_interrupted == 0);
+    if (sent < 0 && errno != EPIPE && errno != ECONNRESET) {
+        return complain(EXIT_UNAVAILABLE, "heaved cannot be asked: %s", strerror(errno));
+    }
+    return EXIT_DONE;
 }
 
 static int64_t now_ms(void)
@@ -119,7 +126,7 @@ static int64_t now_ms(void)
 }
 
 /* Waits for bytes until the given time.
- * Returns false: time is up, or a signal came that ends the program. */
+ * Returns false: time is up, a signal came that ends the program, or the system refuses to wait. */
 static bool wait_for_bytes(const ctl_t *self, int64_t until_ms)
 {
     struct pollfd wait = {.fd = self->fd, .events = POLLIN};
@@ -128,8 +135,9 @@ static bool wait_for_bytes(const ctl_t *self, int64_t until_ms)
         if (left_ms <= 0 || is_interrupted != 0) {
             return false;
         }
-        if (poll(&wait, 1, left_ms < WAIT_MS_MAX ? (int)left_ms : WAIT_MS_MAX) > 0) {
-            return true;
+        const int ready = poll(&wait, 1, left_ms < WAIT_MS_MAX ? (int)left_ms : WAIT_MS_MAX);
+        if (ready > 0 || (ready < 0 && errno != EINTR)) {
+            return ready > 0;
         }
     }
 }
@@ -144,7 +152,7 @@ static bool receive_more(ctl_t *self, int64_t until_ms)
     }
     const ssize_t received = recv(self->fd, &self->line[self->length], room, 0);
     self->length += received > 0 ? (size_t)received : 0;
-    return received > 0;
+    return received > 0 || (received < 0 && errno == EINTR);
 }
 
 /* The next answer, ended by a NUL; NULL: none came. Valid until the next call. */
@@ -282,7 +290,10 @@ static int ask(ctl_t *self)
     (void)snprintf(request, sizeof request, "%s%s%s", self->command, self->argument != NULL ? " " : "",
                    self->argument != NULL ? self->argument : "");
     const int64_t until_ms = now_ms() + (strcmp(self->command, "dump") == 0 ? DUMP_MS : ANSWER_MS);
-    send_line(self, request);
+    const int code = send_line(self, request);
+    if (code != EXIT_DONE) {
+        return code;
+    }
     const char *line = receive_line(self, until_ms);
     return line != NULL ? show(self, line) : complain(EXIT_UNAVAILABLE, "heaved does not answer");
 }
@@ -322,7 +333,7 @@ static int follow(ctl_t *self, bool is_terminal)
             return EXIT_REFUSED;
         }
         if (fflush(stdout) != 0) {
-            return EXIT_IO;
+            return complain(EXIT_IO, "standard output: %s", strerror(errno));
         }
     }
     return is_interrupted != 0 || now_ms() >= until_ms ? EXIT_DONE : EXIT_UNAVAILABLE;
@@ -337,11 +348,14 @@ static int watch(ctl_t *self)
     (void)sigaction(SIGINT, &action, NULL);
     (void)sigaction(SIGTERM, &action, NULL);
     (void)snprintf(request, sizeof request, "watch %u", hz);
-    send_line(self, request);
+    int code = send_line(self, request);
+    if (code != EXIT_DONE) {
+        return code;
+    }
     if (is_terminal) {
         printf("\x1b[?1049h\x1b[?25l"); /* other screen, no cursor */
     }
-    const int code = follow(self, is_terminal);
+    code = follow(self, is_terminal);
     if (is_terminal) {
         printf("\x1b[?25h\x1b[?1049l");
         (void)fflush(stdout);

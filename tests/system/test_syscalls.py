@@ -1,17 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_syscalls.py BIN JUDGE MODBUS_LINE [PART OF A NAME] - every place in src/app and hal/linux that asks the system for something is refused.
+"""test_syscalls.py BIN JUDGE [PART OF A NAME] - every place in src/app and hal/linux that asks the system for something is refused.
 
 The places are read from the programs themselves (objdump, addr2line), so that a new one is tried, or named here as not reached, or fails the test;
 a new function that is called has to be put into a list. failing_calls.c, preloaded, makes one place at a time fail with each errno that
 matters for its function, and malloc_guard.c watches the paths that this opens. What must hold, whatever fails:
 - nothing crashes, nothing hangs, the exit code is a documented one, and one that is not 0 comes with a line that says why;
 - a platform that runs goes on, or ends as documented; its set-points keep every limit, judged by JUDGE (tests/judge).
-BIN: of heaved and heavectl; MODBUS_LINE: tests/peers, the Modbus backend on its own.
+What hal/linux asks for has failed with every errno already in tests/contract/test_*_failures, where the system is played: these are run first, and
+say which places that were. Here one errno is left for each that heaved reaches. BIN: of heaved and heavectl.
 """
 import collections
+import contextlib
 import errno
-import logging
 import mmap
 import os
 import re
@@ -41,22 +42,17 @@ getenv getopt_long gai_strerror ferror fileno free freeaddrinfo pthread_self pth
 pthread_attr_setschedparam pthread_attr_setschedpolicy pthread_attr_setstacksize pthread_equal pthread_mutex_init pthread_mutex_lock pthread_mutex_unlock
 pthread_join pthread_sigmask sigaction sigaddset sigemptyset sigfillset signal getpid time clock_gettime setvbuf setlocale nl_langinfo isatty munlockall ini_parse_stream
 mnl_attr_get_payload mnl_attr_get_payload_len mnl_attr_get_type mnl_attr_parse mnl_attr_parse_nested mnl_attr_put_strz mnl_nlmsg_get_payload
-mnl_nlmsg_put_extra_header mnl_nlmsg_put_header mnl_cb_run mnl_socket_get_portid modbus_free modbus_get_socket modbus_set_byte_timeout
+mnl_nlmsg_put_extra_header mnl_nlmsg_put_header mnl_cb_run mnl_socket_get_fd mnl_socket_get_portid modbus_free modbus_get_socket modbus_set_byte_timeout
 modbus_set_response_timeout modbus_set_slave modbus_rtu_set_rts_delay gpiod_chip_label gpiod_chip_num_lines gpiod_line_consumer gpiod_line_is_used gpiod_line_name
 """.split())
 # Whose result nobody could do anything with: the file is gone, the pause was short. Formatted output fails into its stream, which is asked at its end.
 UNUSED = set("close closedir nanosleep gpiod_chip_close mnl_socket_close modbus_close fprintf vfprintf printf fputc putchar fputs puts fwrite".split())
 
-# Not tried here, by file, or file and function, and why.
-OTHERS = ("linux_can", "linux_gpio")  # takes a kernel with CAN or GPIO: what that makes fail is tried by tests/contract and by system tests on such a kernel
+# Not tried here, by file and function, and why.
 ELSEWHERE = {("metrics.c", "unlink"): "tidies up after another failure; the next second tries again",
              ("whole_file.c", "unlink"): "tidies up after another failure, which is what is told",
              ("out_file.c", "poll"): "when a pipe is full at the end",
-             ("linux_modbus_link.c", "read"): "of what nobody asked for: comes as it comes",
-             ("linux_modbus_link.c", "tcflush"): "after an answer that does not come, and at the end, whose result is not used",
-             ("linux_modbus.c", "write"): "an eventfd that is never read beyond its end takes a 1",
-             ("linux_modbus_link.c", "modbus_rtu_set_serial_mode"): "takes a real UART",
-             ("linux_modbus_link.c", "modbus_rtu_set_rts"): "takes a real UART"}
+             ("linux_modbus_link.c", "tcflush"): "its result is not used"}
 
 MEMORY, FILES = ["ENOMEM"], ["EACCES", "ENOENT", "EMFILE", "EIO"]
 DISK = ["ENOSPC", "EIO", "EDQUOT"]
@@ -181,7 +177,7 @@ class Story:
     """What was tried at which place, over all cases."""
 
     def __init__(self):
-        self.tried = set()
+        self.tried, self.played = set(), set()
         self.count = 0
 
     def note(self, place, page):
@@ -198,7 +194,7 @@ def trials(places, seen, but=()):
     for place in places:
         is_wanted = place[:3] not in but and (place.file, place.function) not in ELSEWHERE
         if is_wanted and seen & set(place.returns):
-            for error in ERRNOS[place.function]:
+            for error in ERRNOS[place.function][:1 if place[:3] in STORY.played else None]:
                 yield place, error
 
 
@@ -269,6 +265,44 @@ def offline(bench, places, _judge):
             STORY.note(place, page)
     page.close()
     troubles.done()
+
+
+# --- heavectl ---
+
+def run_on_a_terminal(page, command):
+    ours, its = os.openpty()
+    shown = b""
+    with subprocess.Popen(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=its, stderr=subprocess.PIPE, text=True, **page.options) as process:
+        os.close(its)
+        with contextlib.suppress(OSError), open(ours, "rb", buffering=0) as terminal:  # an error is its end
+            while more := terminal.read(1 << 16):
+                shown += more
+        return process.wait(LIMIT_S), shown.decode(errors="replace"), process.stderr.read()
+
+
+def control(bench, _places, _judge):
+    """What fails is told of with an exit code that is not 0, or does not matter: then the answer is there all the same."""
+    page, troubles = Page(bench), Troubles()
+    places = places_of(bench.bin / "heavectl", wrapped(bench))[0]
+    named = ["--socket", bench.socket]
+    bench.start()
+    for run, *arguments in ((run_to_end, "status", *named), (run_to_end, "status", "--json", *named), (run_to_end, "watch", "--for", "0.2", *named),
+                            (run_on_a_terminal, "watch", "--for", "0.2", *named), (run_to_end, "intensity", "50", *named), (run_to_end, "--help"),
+                            (run_to_end, "--version"), (run_to_end, "status")):
+        command = [bench.bin / "heavectl", *arguments]
+        page.clear()
+        page.seen(forget=True)
+        expected = run(page, command)[0]
+        for place, error in trials(places, page.seen(), STORY.tried):
+            page.set(place, error)
+            code, stdout, stderr = run(page, command)
+            is_told = code in SANE_EXITS - {0} and stderr.startswith("heavectl: ")
+            troubles.judge(is_told or (code == expected == 0 and stdout), f"{name_of(place, error)}: {arguments[0]}: exit {code}: {stderr.strip()[-300:]}")
+            STORY.note(place, page)
+    page.close()
+    troubles.done()
+    left = missing(places)
+    assert not left, "\n".join(f"{place.file}:{place.line}: {place.function}" for place in left)
 
 
 # --- The daemon ---
@@ -375,6 +409,7 @@ def start_and_end(bench, places, is_after_a_crash):
         code = daemon.end()
         STORY.note(place, page)
         judge_end(troubles, name_of(place, error), code, daemon.text())
+    listener.shutdown(socket.SHUT_RDWR)  # ends the thread that reads it
     listener.close()
     page.close()
     troubles.done()
@@ -538,86 +573,36 @@ def in_operation(bench, places, judge):
         close(daemon, day, what)
         daemon, day = new()
     close(daemon, day, what)
+    listener.shutdown(socket.SHUT_RDWR)  # ends the thread that reads it
     listener.close()
     page.close()
     troubles.done()
 
 
-# --- Lines of Modbus ---
+# --- The backends, whose system is played ---
 
-FUNCTIONS = (1, 2, 3, 4, 5, 6, 15, 16)
-BROADCAST = 0
-
-
-class Line:
-    """modbus_line at a device, with a page."""
-
-    def __init__(self, program, kind, address, page):
-        self.process = subprocess.Popen([program, kind, *address, "150000"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **page.options)
-
-    def ask(self, unit, function):
-        """The status; nothing where the program has ended."""
-        try:
-            self.process.stdin.write(f"ask 0 {function} {unit} 7 1{' 1' if function in (5, 6, 15, 16) else ''}\n")
-            self.process.stdin.flush()
-            return self.process.stdout.readline().split(" ")[0]
-        except OSError:
-            return ""
-
-    def ask_all(self):
-        self.ask(BROADCAST, 6)
-        self.ask(1, 3)  # pymodbus answers broadcasts, which the next question is taken to have heard
-        return [self.ask(1, function) for function in FUNCTIONS]
-
-    def end(self):
-        _, stderr = self.process.communicate(timeout=LIMIT_S)
-        return self.process.returncode, stderr
+PLAYED = ("can", "gpio", "modbus", "udp")
 
 
-def try_line(program, kind, address, page, place, error):
-    """It starts, or says why not; what fails is told of, and works when the system does again."""
-    what, wrong = f"{name_of(place, error)}, {kind}", Troubles()
-    page.set(place, error)
-    line = Line(program, kind, address, page)
-    end = time.monotonic() + LIMIT_S
-    said = line.ask_all()
-    if page.failed():  # else it is where the line is closed
-        page.clear()
-    while line.process.poll() is None and set(said) != {"ok"} and time.monotonic() < end:
-        said = line.ask_all()
-    is_refused = line.process.poll() is not None
-    code, stderr = line.end()
-    STORY.note(place, page)
-    wrong.judge(page.failed(), f"{what}: not reached")
-    wrong.judge(code == 1 and stderr.strip() if is_refused else code == 0 and set(said) == {"ok"}, f"{what}: exit {code}, {said}: {stderr.strip()[-300:]}")
-    return wrong
+def backends(bench, _places, _judge):
+    folder = bench.bin.resolve().parents[1] / "tests/contract"
+    for name in PLAYED:
+        program, failed = folder / f"test_{name}_failures", bench.folder / f"{name}.places"
+        run = subprocess.run([program], stdout=subprocess.PIPE, text=True, check=False, env={**os.environ, "HEAVE_FAILED_PLACES": str(failed)})
+        assert run.returncode == 0, run.stdout
+        returns, functions = zip(*(line.split() for line in failed.read_text(encoding="utf-8").splitlines()))
+        lines = tool("addr2line", "-e", program, *(hex(int(place, 16) - 1) for place in returns)).splitlines()
+        for where, function in zip(lines, functions):
+            ours = re.search(r"/hal/linux/([^/]+):(\d+)", where)
+            STORY.played |= {(ours[1], int(ours[2]), function)} if ours else set()
 
 
-def lines(bench, _places, _judge):
-    if "HEAVE_TEST_VENV" not in os.environ:
-        raise tap.Skip("no pymodbus: tools/lib/venv.sh")
-    peer = __import__("modbus_peer")
-    logging.disable(logging.CRITICAL)  # of what pymodbus thinks of broadcasts
-    troubles, places = Troubles(), [place for place in places_of(sys.argv[3], wrapped(bench))[0] if place.file.startswith("linux_modbus")]
-    for kind in ("tcp", "serial"):
-        with peer.Devices(kind) as devices, peer.FaultyLine(devices) as line:
-            page = Page(bench)
-            first = Line(sys.argv[3], kind, line.address, page)
-            while set(first.ask_all()) != {"ok"}:
-                pass
-            assert first.end()[0] == 0
-            seen = page.seen()
-            for place, error in trials(places, seen, STORY.tried):
-                troubles += try_line(sys.argv[3], kind, line.address, page, place, error)
-            page.close()
-    troubles.done()
-
-
-CASES = {"programs that run to their end": offline,
+CASES = {"backends": backends,
+         "programs that run to their end": offline,
+         "heavectl": control,
          "heaved starts and ends": lambda bench, places, _: start_and_end(bench, places, False),
          "heaved starts after a crash": lambda bench, places, _: start_and_end(bench, places, True),
-         "heaved in operation": in_operation,
-         "lines of Modbus": lines}
+         "heaved in operation": in_operation}
 
 
 def wrapped(bench):
@@ -627,16 +612,10 @@ def wrapped(bench):
 
 def missing(places):
     return [place for place in places
-            if place[:3] not in STORY.tried and not place.file.startswith(OTHERS) and (place.file, place.function) not in ELSEWHERE]
+            if place[:3] not in STORY.tried | STORY.played and (place.file, place.function) not in ELSEWHERE]
 
 
 def main():
-    if "HEAVE_TEST_VENV" not in os.environ:
-        found = subprocess.run([heave.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False)
-        if found.returncode == 0:
-            os.environ["HEAVE_TEST_VENV"] = "1"
-            os.execv(found.stdout.strip(), [found.stdout.strip(), *sys.argv])
-    sys.path.insert(0, str(heave.TOP / "tests/peers"))
     suite = tap.Suite()
     with heave.Bench(sys.argv[1]) as bench:
         can_fail = wrapped(bench)
@@ -644,9 +623,9 @@ def main():
     if not places:
         print("1..0 # SKIP a build without debug information does not tell where its calls are")
         return 0
-    only = sys.argv[4] if len(sys.argv) > 4 else ""
+    only = sys.argv[3] if len(sys.argv) > 3 else ""
     for name, check in CASES.items():
-        if only in name:
+        if only in name or check is backends:
             with heave.Bench(sys.argv[1]) as bench, suite.case(name):
                 check(bench, places, sys.argv[2])
     if not only:
@@ -659,6 +638,7 @@ def main():
                     with heave.Bench(sys.argv[1]) as bench:
                         check(bench, missing(places), sys.argv[2])
             assert not missing(places), "\n".join(f"{place.file}:{place.line}: {place.function}" for place in missing(places))
+    print(f"# {len(STORY.tried)} places tried here, {len(STORY.played)} where the system is played")
     print(f"# figure {STORY.count} failures of system calls injected")
     return suite.done()
 
