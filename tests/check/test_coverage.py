@@ -127,10 +127,24 @@ def table():
     assert "9/10" in text and "90.0 %" in text and "1/2" in text and "50.0 %" in text, text
 
 
+def backends():
+    def of(name, missed, exclusions=""):
+        def check(file, listed):
+            file.name = name
+            for column in range(10):
+                file.add_branch([4, 9 + column, 4, 10 + column, 1, 0 if column < missed else 1, 0, 0, 4])
+            return list(coverage_report.thin([coverage_report.Judged(file, listed)]))
+        return with_file(check, exclusions)
+    is_(of("hal/linux/a.c", 2), [])
+    is_(of("hal/linux/a.c", 3), ["hal/linux/a.c: 85.0 % of its branches are reached, it must be 90 %"])
+    is_(of("hal/linux/a.c", 3, "hal/linux/a.c a: return 3;\n    Nobody can.\n"), [])
+    is_(of("src/app/a.c", 3), [])
+
+
 CASES = {"what is reached is not told of": all_reached, "lines in a row are one": lines, "each way that was not taken": branches,
          "what another build takes counts": builds, "a switch needs no case for no name": switches, "MC/DC names the condition": conditions,
          "an exclusion is for one line of one function": excluded, "an exclusion that is stale, double or has no reason is wrong": wrong_exclusions,
-         "the table has totals": table}
+         "the table has totals": table, "backends have to reach 90 % of the branches of each file": backends}
 
 
 def main():

@@ -77,6 +77,12 @@ def host_has_vcan():
         return False
 
 
+def profile_of(folder):
+    """Where a command that counts what it reaches (tools/coverage) leaves that: a file of its own, for the lock of a shared one ends at this kernel."""
+    shared = os.environ.get("LLVM_PROFILE_FILE")
+    return {"LLVM_PROFILE_FILE": str(Path(shared).with_name(f"{folder.name}-%p.profraw"))} if shared else {}
+
+
 def run_here(command, limit_s, environment):
     status, output = bounded([*own_name_space(), "bash", "-c", script_of(command, environment)], limit_s, env=environment)
     return Finished(status, output)
@@ -89,7 +95,7 @@ def read(path):
 def run_uml(kernel, command, limit_s, environment, virtual_time):
     with tempfile.TemporaryDirectory(prefix="heave-uml-") as folder:
         job = Path(folder)
-        (job / "run.sh").write_text(script_of(command, {**environment, "HEAVE_OWN_KERNEL": "1"}), encoding="utf-8")
+        (job / "run.sh").write_text(script_of(command, {**environment, **profile_of(job), "HEAVE_OWN_KERNEL": "1"}), encoding="utf-8")
         boot = [kernel, f"mem={MEMORY}", "rootfstype=hostfs", "rootflags=/", "rw", f"init={HERE / 'uml_init.sh'}", f"job={job}", f"uml_dir={job}/",
                 "vcan.echo=1", "quiet", "con=null", "con0=null,fd:1", *(["time-travel=inf-cpu"] if virtual_time else [])]
         ended, console = bounded(boot, limit_s, env={**os.environ, "TMPDIR": folder})

@@ -5,7 +5,8 @@
 usage: coverage_report.py BUILD_DIR VERSION [--html DIR] [--missing PATH]     VERSION is the suffix of llvm-cov, "-19" or nothing
 
 tests/coverage-exclusions.txt: "PATH FUNCTION: the whole line of code", and below it, indented, the reason. Blank lines and lines with # are skipped.
-Exit status: 0 lines and branches of the core are covered but for the exclusions, 1 they are not, or an exclusion is wrong.
+Exit status: 0 lines and branches of the core are covered but for the exclusions, and BACKENDS_PERCENT of the branches of each backend; 1 they are
+not, or an exclusion is wrong.
 """
 import argparse
 import json
@@ -20,6 +21,7 @@ FUNCTION_HEAD = re.compile(r"[a-z][^;=#]*?\b(\w+)\(")
 GROUPS = (("Core", lambda name: name.startswith("src/") and not name.startswith("src/app/")),
           ("Programs", lambda name: name.startswith("src/app/")),
           ("Backends", lambda name: name.startswith("hal/")))
+BACKENDS_PERCENT = 90
 
 
 class Exclusions:
@@ -207,6 +209,15 @@ def gaps(file):
     return [f"{file.name}:{first}{'' if first == last else f'-{last}'}: {what}" for first, last, what in found]
 
 
+def thin(judged):
+    """Backends of which too few branches are reached or excluded."""
+    for file in judged:
+        total = file.totals[1]
+        reached = total - len(file.missing[1])
+        if GROUPS[2][1](file.name) and 100 * reached < BACKENDS_PERCENT * total:
+            yield f"{file.name}: {100 * reached / total:.1f} % of its branches are reached, it must be {BACKENDS_PERCENT} %"
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("build", type=Path)
@@ -224,7 +235,7 @@ def main():
     for file in judged:
         if file.name.startswith(options.missing) if options.missing is not None else is_core(file.name):
             print("".join(f"{line}\n" for line in gaps(file)), end="")
-    wrong = exclusions.errors + exclusions.stale()
+    wrong = [*exclusions.errors, *exclusions.stale(), *thin(judged)]
     print(*wrong, sep="\n", end="\n" if wrong else "")
     left = sum(len(items) for file in judged if is_core(file.name) for items in file.missing[:2])
     print(f"{left} lines and branches of the core are neither reached nor excluded")
