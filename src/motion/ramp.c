@@ -122,8 +122,8 @@ hv_status_t ramp_init(ramp_t *self, const ramp_limits_t *limits, q32_t pos_q32)
     self->per_acc_q62 = Q62_ONE / self->acc_safe_q32;
     const q32_t vel_q32 = limits->vel_per_cycle_q32;
     const q32_t acc_cycles_q32 = fx_mul_shift(self->acc_safe_q32, self->per_jerk_q62, 30);
-    self->brake_reach_q32 =
-        fx_mul_shift(vel_q32, fx_mul_shift(vel_q32, self->per_acc_q62, 30) + 2 * acc_cycles_q32, 32) + 4 * vel_q32;
+    const q32_t cycles_q32 = fx_add_sat(fx_mul_shift(vel_q32, self->per_acc_q62, 30), 2 * acc_cycles_q32);
+    self->brake_reach_q32 = fx_add_sat(fx_mul_shift(vel_q32, cycles_q32, 32), 4 * vel_q32);
     const int64_t cycles = vel_q32 / self->acc_safe_q32 / 2 + 2 * self->acc_cycles + 8; /* 8 for roundings */
     self->brake_cycles = cycles <= UINT32_MAX && cycles <= INT64_MAX / vel_q32 ? (uint32_t)cycles : 0;
     return HV_OK;

@@ -132,6 +132,35 @@ static void test_brake_acc_for_velocity_room_of_a_jerk_beyond_all_platforms_is_t
     }
 }
 
+/* ---- brakes too long to reckon with ---- */
+
+/* Cycles that do not fit: taken for few, they would lead the ramp past its bound. */
+static void test_ramp_with_brakes_of_more_cycles_than_it_counts_stops_on_its_bound(void)
+{
+    const q32_t acc_q32 = 16, bound_q32 = (q32_t)1 << 24;
+    const ramp_limits_t limits = {.pos_max_q32 = bound_q32,
+                                  .vel_per_cycle_q32 = (q32_t)1 << 38,
+                                  .acc_per_cycle2_q32 = acc_q32,
+                                  .jerk_per_cycle3_q32 = (q32_t)1 << 12};
+    const ramp_ref_t beyond = {.pos_q32 = 2 * bound_q32};
+    ramp_t ramp;
+    TEST_ASSERT_EQUAL(HV_OK, ramp_init(&ramp, &limits, 0));
+    TEST_ASSERT_EQUAL_UINT32(0, ramp.brake_cycles);
+    for (unsigned cycle = 0; cycle < 5000; cycle++) {
+        TEST_ASSERT_TRUE(ramp_step(&ramp, &beyond, RAMP_FIRM) <= bound_q32);
+        TEST_ASSERT_INT64_WITHIN(acc_q32, 0, ramp.state.acc_per_cycle2_q32);
+    }
+    TEST_ASSERT_EQUAL_INT64(bound_q32, ramp.state.pos_q32);
+    TEST_ASSERT_TRUE(ramp_is_at_rest(&ramp));
+}
+
+static void test_ramp_with_brakes_of_a_way_beyond_all_numbers_does_not_reckon_with_them(void)
+{
+    const q32_t jerk_q32 = (q32_t)1 << 16;
+    TEST_ASSERT_EQUAL_UINT32(0, ramp_of((q32_t)1 << 42, (q32_t)1 << 12, jerk_q32).brake_cycles);
+    TEST_ASSERT_TRUE(ramp_of((q32_t)1 << 34, (q32_t)1 << 17, jerk_q32).brake_cycles > 1u << 16);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -140,5 +169,7 @@ int main(void)
     RUN_TEST(test_brake_peak_fall_that_is_just_taken_back_does_not_rise);
     RUN_TEST(test_brake_acc_for_velocity_room_is_the_largest);
     RUN_TEST(test_brake_acc_for_velocity_room_of_a_jerk_beyond_all_platforms_is_the_largest);
+    RUN_TEST(test_ramp_with_brakes_of_more_cycles_than_it_counts_stops_on_its_bound);
+    RUN_TEST(test_ramp_with_brakes_of_a_way_beyond_all_numbers_does_not_reckon_with_them);
     return UNITY_END();
 }
