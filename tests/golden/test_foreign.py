@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """test_foreign.py - on another kind of processor the same frames give the same set-points, bit for bit: 32 bits, big-endian, ARM.
 
-usage: test_foreign.py --arch arm64|armhf|s390x --build-dir DIR --unity DIR [--tests NAME...]
+usage: test_foreign.py --arch arm64|armhf|s390x --build-dir DIR [--unity DIR] [--slow]
 
 The program and some unit tests are built by Debian's cross compiler and run by qemu's user mode. What that takes is skipped by name where it
 cannot be had; tools/test installs it.
@@ -22,6 +22,8 @@ TOP = Path(__file__).resolve().parents[2]
 # Debian's name: (triplet, qemu's name, what it stands for)
 KINDS = {"arm64": ("aarch64-linux-gnu", "aarch64", "64 bits, little-endian"), "armhf": ("arm-linux-gnueabihf", "arm", "32 bits, little-endian"),
          "s390x": ("s390x-linux-gnu", "s390x", "64 bits, big-endian")}
+TESTS = ("fx", "kin", "number", "counts", "intensity")
+SLOW_TESTS = ("halt", "ramp")  # minutes on an emulated processor; the traces go through the same code
 TEST_LIMIT_S = 1500
 
 
@@ -46,11 +48,12 @@ class Foreign:
         return Path(run.stdout.strip())
 
     def make(self, root, unity, tests):
+        """Where Unity is not told, the build looks for it."""
         libraries = root / "usr/lib" / self.triplet
         environment = {**os.environ, "PKG_CONFIG_LIBDIR": str(libraries / "pkgconfig"), "PKG_CONFIG_SYSROOT_DIR": str(root)}
         for command in (["cmake", "-G", "Ninja", "-S", TOP, "-B", self.build, "-DCMAKE_SYSTEM_NAME=Linux", f"-DCMAKE_SYSTEM_PROCESSOR={self.cpu}",
                          f"-DCMAKE_C_COMPILER={self.triplet}-gcc", f"-DCMAKE_EXE_LINKER_FLAGS=-Wl,-rpath,{libraries}", "-DHEAVE_TESTS=ON",
-                         "-DHEAVE_WERROR=ON", f"-DUNITY_DIR={unity}"],
+                         "-DHEAVE_WERROR=ON", *([f"-DUNITY_DIR={unity}"] if unity else [])],
                         ["cmake", "--build", self.build, "--parallel", "--target", "heaved", *(f"test_{name}" for name in tests)]):
             run = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
             assert run.returncode == 0, run.stdout[-3000:]
@@ -66,17 +69,18 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--arch", choices=KINDS, required=True)
     parser.add_argument("--build-dir", type=Path, required=True)
-    parser.add_argument("--unity", required=True, metavar="DIR")
-    parser.add_argument("--tests", nargs="*", default=[], metavar="NAME", help="unit tests to run too")
+    parser.add_argument("--unity", metavar="DIR")
+    parser.add_argument("--slow", action="store_true", help="the slow unit tests too")
     arguments = parser.parse_args()
+    tests = TESTS + (SLOW_TESTS if arguments.slow else ())
     suite, foreign, is_built = tap.Suite(), Foreign(arguments.arch, arguments.build_dir), False
     with suite.case(f"{arguments.arch} ({KINDS[arguments.arch][2]}) builds without a warning"):
-        foreign.make(foreign.find_tools(), arguments.unity, arguments.tests)
+        foreign.make(foreign.find_tools(), arguments.unity, tests)
         is_built = True
     if is_built:
         with tempfile.TemporaryDirectory() as folder:
             test_golden.run_topics(suite, f", {arguments.arch}", foreign.command("src/app/heaved"), Path(folder) / "trace.csv")
-        for name in arguments.tests:
+        for name in tests:
             with suite.case(f"unit.{name}, {arguments.arch}"):
                 foreign.run_unit_test(name)
     return suite.done()

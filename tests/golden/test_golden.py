@@ -3,7 +3,7 @@
 """test_golden.py - the same frames give the same set-points, bit for bit, whatever compiled the program.
 
 usage: test_golden.py --heaved PROGRAM [--update]
-       test_golden.py --build COMPILER           builds the program without and with all optimisation, and compares each
+       test_golden.py --build COMPILER --build-dir DIR      builds the program without and with all optimisation, and compares each
 
 Beside each TOPIC.frames, whose first line names its configuration in config/, stands TOPIC.expected: the SHA-256 of the whole trace, its
 rows, and every 200th row of it, so that a difference can be read. --update writes them anew, which is right only where a change of the
@@ -96,19 +96,21 @@ def main():
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument("--heaved")
     what.add_argument("--build", metavar="COMPILER")
+    parser.add_argument("--build-dir", type=Path, metavar="DIR")
     parser.add_argument("--update", action="store_true", help="write the expected files anew")
     arguments = parser.parse_args()
+    if arguments.build and not arguments.build_dir:
+        parser.error("--build needs --build-dir")
     suite = tap.Suite()
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        trace = folder / "trace.csv"
+        trace = Path(name) / "trace.csv"
         if arguments.heaved:
             run_topics(suite, "", arguments.heaved, trace, arguments.update)
         else:
             for flags in ("-O0", "-O3"):
                 program = None
                 with suite.case(f"{arguments.build} {flags} builds"):
-                    program = build(arguments.build, flags, folder / flags[1:])
+                    program = build(arguments.build, flags, arguments.build_dir / flags[1:])
                 if program:
                     run_topics(suite, f", {flags}", program, trace)
     return suite.done()
