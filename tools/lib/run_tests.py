@@ -17,7 +17,7 @@ import subprocess
 import sys
 
 TEST_LIMIT_S = 900
-WEIGHTS = 2  # for each processor, see cmake/unity.cmake
+WEIGHTS, MORE = 3, 2  # for each processor, and in all: see cmake/unity.cmake
 
 CTEST_OUTPUT = re.compile(r"^(\d+): ?(.*)$")
 CTEST_RESULT = re.compile(r"^\s*\d+/\d+ Test +#(\d+): (.+?) \.*\s*(.*?)\s+([\d.]+) sec\s*$")
@@ -121,7 +121,7 @@ def show(name, result, seconds, lines):
 
 def run_ctest(build_dir, regex):
     """Yields (name, result) for each finished test, and one more that failed if ctest itself went wrong."""
-    command = ["ctest", "--test-dir", build_dir, "-V", "-j", str(WEIGHTS * (os.cpu_count() or 1)), "--timeout", str(TEST_LIMIT_S)]
+    command = ["ctest", "--test-dir", build_dir, "-V", "-j", str(WEIGHTS * (os.cpu_count() or 1) + MORE), "--timeout", str(TEST_LIMIT_S)]
     command += ["-R", regex] if regex else []
     ctest = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
     printed, other, any_failed = {}, [], False
