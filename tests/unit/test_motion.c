@@ -218,8 +218,8 @@ static void test_park_in_motion_ends_at_the_settled_extension_at_engage_speed(vo
 
 typedef enum { MODE_POSE, MODE_CYLINDERS, MODE_TIMED, MODE_TIMED_CYLINDERS, MODE_STREAM, MODE_MOTOR, MODES } mode_t;
 
-/* Goes on in a mode for so many ms. */
-static void run_mode(mode_t mode, unsigned ms)
+/* The ms from begin to end of a mode. */
+static void run_part(mode_t mode, unsigned begin, unsigned end)
 {
     static const char *const k_frames[MODES] = {
         [MODE_POSE] = "@A6:6,-4,8,20,-30,25#",       [MODE_CYLINDERS] = "@C6:120,80,100,90,110,70#",
@@ -227,25 +227,40 @@ static void run_mode(mode_t mode, unsigned ms)
         [MODE_MOTOR] = "@A7:2,3,4,10,20,10,45#",
     };
     if (mode != MODE_STREAM) {
-        rig_send(&m_rig, k_frames[mode]);
-        rig_run_ms(&m_rig, ms);
+        if (begin == 0) {
+            rig_send(&m_rig, k_frames[mode]);
+        }
+        rig_run_ms(&m_rig, end - begin);
         return;
     }
-    for (unsigned t = 0; t < ms; t += 20) {
-        rig_sendf(&m_rig, "@A6T:%.3f,%.3f,0,0,0,%.3f,20#", 5 * sin(t * 0.006), 4 * sin(t * 0.004), 20 * sin(t * 0.005));
-        rig_run_ms(&m_rig, ms - t < 20 ? ms - t : 20);
+    for (unsigned t = begin; t < end; t++) {
+        if (t % 20 == 0) {
+            rig_sendf(&m_rig, "@A6T:%.3f,%.3f,0,0,0,%.3f,20#", 5 * sin(t * 0.006), 4 * sin(t * 0.004), 20 * sin(t * 0.005));
+        }
+        rig_run_ms(&m_rig, 1);
     }
 }
 
+/* Goes on in a mode for so many ms. */
+static void run_mode(mode_t mode, unsigned ms)
+{
+    run_part(mode, 0, ms);
+}
+
+/* From each mode to each other, for every 19th ms to every other one of them. */
 static void test_modes_change_at_every_phase_is_continuous(void)
 {
+    static rig_t s_before; /* the change */
     double jerk = 0;
     for (unsigned from = 0; from < MODES; from++) {
-        for (unsigned to = 0; to < MODES; to++) {
-            for (unsigned ms = 1; ms < 900; ms += from == MODE_STREAM ? 31 : 19) {
-                m_rig = m_ready;
-                rig_check_reset(&m_rig);
-                run_mode((mode_t)from, ms);
+        s_before = m_ready;
+        rig_check_reset(&s_before);
+        for (unsigned ms = 1, last = 0, turn = 0; ms < 900; last = ms, ms += from == MODE_STREAM ? 31 : 19, turn++) {
+            m_rig = s_before;
+            run_part((mode_t)from, last, ms);
+            s_before = m_rig;
+            for (unsigned to = turn % 2; to < MODES; to += 2) {
+                m_rig = s_before;
                 run_mode((mode_t)to, 700);
                 check_kept();
                 jerk = fmax(jerk, m_rig.check.jerk);
