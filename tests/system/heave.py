@@ -20,6 +20,7 @@ from pathlib import Path
 TOP = Path(__file__).resolve().parents[2]
 WAIT_S = 60  # for anything that has to happen: says that it never will, not that it was slow
 LOOK_S = 0.01  # between two looks whether it has
+STATUS_LOOK_S = 0.1 if "HEAVE_OWN_KERNEL" in os.environ else LOOK_S  # each starts a program, which takes long there, and no virtual time
 
 
 def free_port():
@@ -28,13 +29,13 @@ def free_port():
         return probe.getsockname()[1]
 
 
-def wait_for(condition, what):
+def wait_for(condition, what, look_s=None):
     end = time.monotonic() + WAIT_S
     while time.monotonic() < end:
         value = condition()
         if value:
             return value
-        time.sleep(LOOK_S)
+        time.sleep(LOOK_S if look_s is None else look_s)
     raise AssertionError(f"{what}: not within {WAIT_S} s")
 
 
@@ -192,7 +193,8 @@ class Bench:
         return answer
 
     def wait_state(self, *states):
-        return wait_for(lambda: (lambda status: status if status["state"] in states else None)(self.status()), f"state {' or '.join(states)}")
+        return wait_for(lambda: (lambda status: status if status["state"] in states else None)(self.status()), f"state {' or '.join(states)}",
+                        STATUS_LOOK_S)
 
     def sender(self):
         return Sender(self.port)

@@ -304,7 +304,7 @@ def judge(case, bench):
 
 def main():
     prepare()
-    heave.WAIT_S, heave.LOOK_S = WAIT_S, LOOK_S
+    heave.WAIT_S, heave.LOOK_S, heave.STATUS_LOOK_S = WAIT_S, LOOK_S, LOOK_S
     os.nice(10)  # the test itself; the kernel's work for slcan is not nice
     sys.stdout = open(REPORT, "w", encoding="utf-8")
     suite = tap.Suite()
