@@ -275,7 +275,7 @@ static bool is_viable(const ramp_t *ramp, const ramp_ref_t *ref, int jerk_factor
     const q32_t vel_q32 = sign * ref->vel_per_cycle_q32;
     return acc_q32 <= ramp->acc_safe_q32 && vel_q32 >= -ramp->limits.vel_per_cycle_q32 &&
            brake_keeps_velocity(ramp, vel_q32, acc_q32, ramp->limits.vel_per_cycle_q32) &&
-           fx_abs(ref->jerk_per_cycle3_q32) / jerk_factor <= ramp->limits.jerk_per_cycle3_q32;
+           fx_abs(ref->jerk_per_cycle3_q32) < jerk_factor * (ramp->limits.jerk_per_cycle3_q32 + 1);
 }
 
 /* A plan is given a few cycles before the next one, and a take-over goes its own way. */

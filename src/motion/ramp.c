@@ -243,9 +243,10 @@ static bool is_in_layer(const errors_t *e, q32_t jerk_q32, const grip_t *g)
 static bool find_by_law(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *acc_q32)
 {
     const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
-    const grip_t *g = &k_grips[is_at_rest(ref) ? RAMP_FIRM : grip];
+    const bool is_firm = grip == RAMP_FIRM || is_at_rest(ref);
+    const grip_t *g = &k_grips[is_firm ? RAMP_FIRM : RAMP_SOFT];
     const errors_t e = errors_against(&self->state, ref);
-    if (g == &k_grips[RAMP_FIRM] && can_close_in_three(&e, jerk_q32)) {
+    if (is_firm && can_close_in_three(&e, jerk_q32)) {
         *acc_q32 = ref->acc_per_cycle2_q32 + e.d - e.w;
         return true;
     }

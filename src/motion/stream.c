@@ -196,8 +196,8 @@ static void advance(stream_t *self, uint64_t now_us)
     }
     self->error_q32 = error_at(self, now_us);
     const q32_t nominal = stream_clock_span(&self->clock, self->cycle_us);
-    const q32_t gain = self->clock.hint_us > 0 ? PACE_GAIN_DIV_HINTED : PACE_GAIN_DIV;
-    const q32_t pace = fx_clamp(self->error_q32 / gain, -PACE_MAX_Q32, PACE_MAX_Q32);
+    const q32_t wanted = self->clock.hint_us > 0 ? self->error_q32 / PACE_GAIN_DIV_HINTED : self->error_q32 / PACE_GAIN_DIV;
+    const q32_t pace = fx_clamp(wanted, -PACE_MAX_Q32, PACE_MAX_Q32);
     const q32_t faster = nominal > self->rate_q32[1] ? nominal : self->rate_q32[1];
     const q32_t filter = fx_clamp(faster * 2 / 3, 0, PACE_FILTER_MAX);
     const q32_t wished = nominal + fx_mul_shift(nominal, pace, 32);

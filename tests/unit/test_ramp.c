@@ -712,6 +712,22 @@ static void test_ramp_init_limits_that_no_brake_ends_in_are_refused(void)
 }
 
 /* A range of next to nothing leaves next to no acceleration, but some. */
+/* Brakes of hours or years: how far they go is not reckoned in cycles. */
+static void test_ramp_init_brakes_beyond_all_counting_are_not_counted(void)
+{
+    static const q32_t k_accelerations_q32[] = {64, 65536};
+    for (unsigned i = 0; i < 2; i++) {
+        const ramp_limits_t limits = {.pos_min_q32 = -q32_from_int(1000),
+                                      .pos_max_q32 = q32_from_int(1000),
+                                      .vel_per_cycle_q32 = q32_from_int(1000),
+                                      .acc_per_cycle2_q32 = k_accelerations_q32[i],
+                                      .jerk_per_cycle3_q32 = 65536};
+        ramp_t ramp = ramp_of(&limits, 0);
+        TEST_ASSERT_EQUAL_UINT32(0, ramp.brake_cycles);
+        TEST_ASSERT_EQUAL_INT64(0, ramp_step(&ramp, &(ramp_ref_t){0}, RAMP_FIRM));
+    }
+}
+
 static void test_ramp_safe_acceleration_is_never_nothing(void)
 {
     const ramp_limits_t narrow = {0, 1, q32(0.4), q32(0.003), 1};
@@ -752,6 +768,7 @@ int main(void)
     RUN_TEST(test_ramp_stop_position_is_where_the_ramp_comes_to_rest);
     RUN_TEST(test_ramp_limits_from_units_out_of_range_is_refused);
     RUN_TEST(test_ramp_init_limits_that_no_brake_ends_in_are_refused);
+    RUN_TEST(test_ramp_init_brakes_beyond_all_counting_are_not_counted);
     RUN_TEST(test_ramp_safe_acceleration_is_never_nothing);
     RUN_TEST(test_ramp_limits_from_units_values_are_per_cycle);
     return UNITY_END();
