@@ -23,7 +23,7 @@
 
 #define LIMIT_S    60
 #define POLL_MS    2 /* the longest that a worker sleeps here */
-#define FDS_MAX    64
+#define FDS_MAX    4096
 #define SAFE       1u
 #define ALL_INPUTS (INPUT_ESTOP | INPUT_ENABLE | INPUT_RESET)
 

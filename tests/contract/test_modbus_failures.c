@@ -27,7 +27,7 @@
 #define TRIES   40  /* seconds that a line may take to be itself again */
 #define ROUNDS  100 /* of the worker */
 #define SECOND  1000000u
-#define FDS_MAX 64
+#define FDS_MAX 4096
 #define ANSWERED                                                                                                                 \
     {                                                                                                                            \
         ETIMEDOUT, EAGAIN, ECONNRESET, EPIPE, EIO, EBADF, EMBXILVAL, EMBXGTAR, EMBBADCRC, EMBBADSLAVE                            \

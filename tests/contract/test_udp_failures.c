@@ -23,7 +23,7 @@
 #include "linux_udp_filter.h"
 
 #define LIMIT_MS 60000
-#define FDS_MAX  64
+#define FDS_MAX  4096
 
 static const failing_errors_t k_errors[] = {
     {"getaddrinfo", {EAI_AGAIN, EAI_MEMORY, EAI_SYSTEM}},
