@@ -263,6 +263,37 @@ static void test_join_a_fast_stream_within_the_limits_stays_on_its_curve(void)
     }
 }
 
+/* ---- intensity ---- */
+
+/* A sine of 20 mm and 0.5 Hz for so many ms; how far it leads. */
+static double stream_swing_mm(unsigned ms)
+{
+    double most = 0;
+    for (unsigned at = 0; at < ms; at++) {
+        motion_target_t target = {.space = MOTION_POSE};
+        if (at % 20 == 0) {
+            target.value_q32[AXIS_Z] = (q32_t)(20 * sin(at * 0.5 * 6.283185307 / 1000) * 4294967296.0);
+            take(&target);
+        }
+        step(400);
+        most = at >= 4000 ? fmax(most, fabs(mm(m_out.sent.axis_q32[AXIS_Z]))) : most; /* after take-over and change */
+    }
+    return most;
+}
+
+static void test_stream_is_scaled_by_the_intensity(void)
+{
+    TEST_ASSERT_EQUAL(HV_OK, motion_set_intensity(&m_motion, 50));
+    motion_rise(&m_motion);
+    run_ms(10000, 50);
+    motion_follow(&m_motion);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 10, stream_swing_mm(8000));
+    TEST_ASSERT_EQUAL(HV_OK, motion_set_intensity(&m_motion, 100));
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 20, stream_swing_mm(8000));
+    TEST_ASSERT_EQUAL(HV_OK, motion_set_intensity(&m_motion, 0));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, stream_swing_mm(8000));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -276,5 +307,6 @@ int main(void)
     RUN_TEST(test_join_is_beyond_by_speed_acceleration_and_jerk_in_both_directions);
     RUN_TEST(test_join_is_beyond_of_a_fast_stream_by_more_jerk);
     RUN_TEST(test_join_a_fast_stream_within_the_limits_stays_on_its_curve);
+    RUN_TEST(test_stream_is_scaled_by_the_intensity);
     return UNITY_END();
 }
