@@ -49,11 +49,13 @@ class Block:
         self.count, self.first_line = len(rows), first_line
         self.rows = numbers
         self.columns = list(zip(*tail, *numbers))  # the three rows before stand in front of each column
+        self.zeros = [0] * self.count
         self.magnitudes = [self._magnitudes(column) for column in self.columns]
 
-    @staticmethod
-    def _magnitudes(column):
+    def _magnitudes(self, column):
         """[None, |first|, |second|, |third| difference], aligned with the rows."""
+        if column.count(column[0]) == len(column):
+            return [None] + [self.zeros] * 3
         result, skip = [None], 2
         for _ in range(3):
             column = list(map(int.__sub__, column[1:], column))
@@ -63,7 +65,7 @@ class Block:
 
     def peak(self, columns, order):
         """The largest magnitude among the columns, row by row."""
-        lists = [self.magnitudes[column][order] for column in columns]
+        lists = [self.magnitudes[column][order] for column in columns if self.magnitudes[column][order] is not self.zeros] or [self.zeros]
         return lists[0] if len(lists) == 1 else list(map(max, *lists))
 
     def value(self, column, i):
