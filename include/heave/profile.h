@@ -12,7 +12,14 @@
 typedef ramp_state_t history_t;
 
 /** The reference for the next position; the history then ends in it. */
-ramp_ref_t history_advance(history_t *self, q32_t pos_q32);
+static inline ramp_ref_t history_advance(history_t *self, q32_t pos_q32)
+{
+    const q32_t vel_q32 = pos_q32 - self->pos_q32;
+    const q32_t acc_q32 = vel_q32 - self->vel_per_cycle_q32;
+    const ramp_ref_t ref = {pos_q32, vel_q32, acc_q32, acc_q32 - self->acc_per_cycle2_q32};
+    *self = (history_t){pos_q32, vel_q32, acc_q32};
+    return ref;
+}
 
 /** One fifth-order polynomial per axis over a common number of cycles. */
 typedef struct {

@@ -22,8 +22,7 @@
 #ifndef HEAVE_STREAM_H
 #define HEAVE_STREAM_H
 
-#include "heave/axes.h"
-#include "heave/ramp.h"
+#include "heave/profile.h"
 
 /** How a stream is rendered. */
 typedef enum {
@@ -137,7 +136,7 @@ typedef struct {
     q32_t between_q32; /**< render phase behind head, [0, 1) */
     q32_t rate_q32[2]; /**< periods per cycle behind the first and the second low-pass; the second is rendered */
     q32_t error_q32;   /**< how far rendering is behind its time, in periods */
-    ramp_ref_t previous[AXES_MAX];
+    history_t previous[AXES_MAX];
 } stream_t;
 
 /** Starts without any sample.

@@ -13,15 +13,6 @@
 #define COARSE_STRIDE       8
 #define SPARE_DIV           64
 
-ramp_ref_t history_advance(history_t *self, q32_t pos_q32)
-{
-    const q32_t vel_q32 = pos_q32 - self->pos_q32;
-    const q32_t acc_q32 = vel_q32 - self->vel_per_cycle_q32;
-    const ramp_ref_t ref = {pos_q32, vel_q32, acc_q32, acc_q32 - self->acc_per_cycle2_q32};
-    *self = (history_t){pos_q32, vel_q32, acc_q32};
-    return ref;
-}
-
 /* Product that saturates: for bounds that may be far beyond what they bound. */
 static int64_t product(int64_t a, int64_t b)
 {

@@ -205,15 +205,6 @@ static void advance(stream_t *self, uint64_t now_us)
     self->rate_q32[1] += fx_mul_shift(self->rate_q32[0] - self->rate_q32[1], filter, 32);
 }
 
-static ramp_ref_t difference(const ramp_ref_t *previous, q32_t pos_q32)
-{
-    ramp_ref_t ref = {.pos_q32 = pos_q32};
-    ref.vel_per_cycle_q32 = pos_q32 - previous->pos_q32;
-    ref.acc_per_cycle2_q32 = ref.vel_per_cycle_q32 - previous->vel_per_cycle_q32;
-    ref.jerk_per_cycle3_q32 = ref.acc_per_cycle2_q32 - previous->acc_per_cycle2_q32;
-    return ref;
-}
-
 bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref)
 {
     if (self->phase == STREAM_EMPTY) {
@@ -229,9 +220,10 @@ bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref)
     q32_t pos_q32[AXES_MAX];
     stream_curve_at(&self->curve, self->style, self->between_q32, pos_q32);
     for (unsigned axis = 0; axis < self->curve.axes; axis++) {
-        const ramp_ref_t rest = {.pos_q32 = pos_q32[axis]};
-        ref[axis] = self->is_fresh ? rest : difference(&self->previous[axis], pos_q32[axis]);
-        self->previous[axis] = ref[axis];
+        if (self->is_fresh) {
+            self->previous[axis] = (history_t){.pos_q32 = pos_q32[axis]};
+        }
+        ref[axis] = history_advance(&self->previous[axis], pos_q32[axis]);
     }
     self->is_fresh = false;
     if (self->phase == STREAM_RUNNING && stream_curve_is_at_rest(&self->curve) && !stream_clock_is_near(&self->clock, now_us)) {

@@ -501,7 +501,7 @@ static void control_from(stream_style_t style, q32_t pos_q32, q32_t vel_q32, q32
     control_q32[2] = middle_q32 + vel_q32 + acc / 2;
 }
 
-HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const ramp_ref_t *now, const q32_t *sample_q32)
+HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const history_t *now, const q32_t *sample_q32)
 {
     const int64_t n_q16 = self->period_cycles_q16;
     self->ahead = 0;
