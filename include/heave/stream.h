@@ -119,6 +119,7 @@ typedef struct {
     uint64_t last_us;          /**< newest arrival, taken or not */
     uint32_t gaps_us;          /**< mean interval of arrivals, times 16 */
     uint32_t each;             /**< one of so many samples is taken */
+    uint32_t each_taken;       /**< so it was when the last one was taken */
     uint32_t passed;           /**< samples not taken since the last that was */
     bool has_spare;            /**< the newest sample is not taken */
     q32_t spare_q32[AXES_MAX]; /**< that sample */

@@ -31,7 +31,7 @@ void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_
     HV_ASSERT(axes >= 1 && axes <= AXES_MAX && cycle_us >= 500 && cycle_us <= 10000);
     *self = (stream_t){.cycle_us = cycle_us,
                        .style = style,
-                       .thin = {.gaps_us = THIN_GAP_FIRST_US * THIN_GAPS, .each = 1},
+                       .thin = {.gaps_us = THIN_GAP_FIRST_US * THIN_GAPS, .each = 1, .each_taken = 1},
                        .curve = {.axes = axes}};
 }
 
@@ -145,6 +145,16 @@ static bool is_passed_by(stream_t *self, uint64_t now_us, const q32_t *sample_q3
     return thin->has_spare;
 }
 
+/* True where the samples of a running stream are further apart from now on, or nearer, as another share of them is taken. */
+static bool is_thinned_anew(stream_t *self)
+{
+    stream_thin_t *const thin = &self->thin;
+    const bool is_other = thin->each != thin->each_taken;
+    thin->each_taken = thin->each;
+    return is_other && self->phase == STREAM_RUNNING &&
+           stream_clock_set_period(&self->clock, thin->each * (thin->gaps_us / THIN_GAPS));
+}
+
 static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
 {
     self->thin.passed = 0;
@@ -160,8 +170,9 @@ static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32
     if (stream_clock_is_soon(&self->clock, now_us) && stream_curve_is_newest(&self->curve, sample_q32)) {
         return; /* the same datagram twice */
     }
+    const bool is_thinned = is_thinned_anew(self);
     const unsigned periods = judge_periods(self, now_us, sample_q32);
-    const bool is_new_rate = stream_clock_take(&self->clock, now_us, periods);
+    const bool is_new_rate = stream_clock_take(&self->clock, now_us, periods) || is_thinned;
     stream_curve_pace(&self->curve, self->style, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us);
     if (is_new_rate) {
         stream_curve_regrid(&self->curve, self->style, self->previous, sample_q32);

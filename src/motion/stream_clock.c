@@ -192,25 +192,39 @@ static int64_t mean_gap(const stream_clock_t *self, unsigned gaps)
     return sum / (int64_t)gaps;
 }
 
-/* A faster rate shows in the sum of the intervals too: losses only make that longer. Where it does not, late arrivals were taken
- * for losses. */
-static bool has_new_rate(const stream_clock_t *self)
-{
-    const int64_t mean = mean_period(self, WATCHED, self->period_us_q16);
-    const bool is_plausible = mean > self->period_us_q16 || mean_gap(self, WATCHED) * 16 < self->period_us_q16 * 15;
-    return lost_gaps(self, WATCHED, self->period_us_q16) >= WATCHED_LOST || (is_rate_off(self, mean, WATCHED) && is_plausible);
-}
-
-/* Mean period over all intervals, with the periods that each was taken for. */
-static int64_t taken_period(const stream_clock_t *self)
+/* Mean period over the newest intervals, with the periods that each was taken for. */
+static int64_t taken_period(const stream_clock_t *self, unsigned gaps)
 {
     int64_t sum = 0;
     unsigned periods = 0;
-    for (unsigned i = 0; i < self->gaps; i++) {
+    for (unsigned i = 0; i < gaps; i++) {
         sum += gap_q16(self, i);
         periods += self->gap_periods[(self->gap_next + 2 * STREAM_GAPS - 1 - i) % STREAM_GAPS];
     }
     return periods > 0 ? sum / periods : self->period_us_q16;
+}
+
+/* The sum of the intervals tells too, as losses only make it longer: of a slower rate it has grown, of a faster one it is less.
+ * Else late arrivals were taken for losses, or two at once for one. Late arrivals beside losses still look like a slower rate for
+ * a while: where the samples' values tell otherwise, it has to last. */
+static bool is_slower(const stream_clock_t *self)
+{
+    const unsigned longer = self->gaps < 2 * WATCHED ? self->gaps : 2 * WATCHED;
+    return mean_gap(self, WATCHED) * 16 > self->period_us_q16 * 17 &&
+           (is_rate_off(self, taken_period(self, WATCHED), WATCHED) ||
+            is_rate_off(self, mean_period(self, longer, self->period_us_q16), longer));
+}
+
+static bool is_faster(const stream_clock_t *self)
+{
+    return mean_gap(self, WATCHED) * 16 < self->period_us_q16 * 15;
+}
+
+static bool has_new_rate(const stream_clock_t *self)
+{
+    const int64_t mean = mean_period(self, WATCHED, self->period_us_q16);
+    return lost_gaps(self, WATCHED, self->period_us_q16) >= WATCHED_LOST ||
+           (is_rate_off(self, mean, WATCHED) && (mean > self->period_us_q16 ? is_slower(self) : is_faster(self)));
 }
 
 /* Periods from the newest sample's time to an arrival that is ahead_us after it. */
@@ -268,6 +282,15 @@ static int64_t first_period(const stream_clock_t *self)
     return mean_period(self, self->gaps, middle_gap(self, self->gaps));
 }
 
+/* At a new rate the intervals were so many other periods. */
+static void retake_gaps(stream_clock_t *self)
+{
+    for (unsigned i = 0; i < self->gaps; i++) {
+        const unsigned periods = periods_in_gap(gap_q16(self, i), self->period_us_q16);
+        self->gap_periods[(self->gap_next + 2 * STREAM_GAPS - 1 - i) % STREAM_GAPS] = (uint8_t)periods;
+    }
+}
+
 /* Returns true where the sender's rate is found to be another one. */
 static bool find_period(stream_clock_t *self, int64_t off_us_q16)
 {
@@ -277,16 +300,34 @@ static bool find_period(stream_clock_t *self, int64_t off_us_q16)
         self->gaps = WATCHED;
         self->settled = SETTLED_AGAIN;
     }
-    const int64_t taken = taken_period(self);
+    const int64_t taken = taken_period(self, self->gaps);
     if (self->settled < STREAM_GAPS) {
         leave_out_first(self);
         set_period(self, first_period(self));
+        if (is_new) {
+            retake_gaps(self);
+        }
     } else if (is_rate_off(self, taken, self->gaps)) {
         set_period(self, taken);
     } else {
         set_period(self, self->period_us_q16 + off_us_q16 / 250);
     }
     return is_new && fx_abs(self->period_us_q16 - before) * 8 > before;
+}
+
+bool stream_clock_set_period(stream_clock_t *self, uint32_t period_us)
+{
+    const int64_t period_us_q16 = (int64_t)period_us * STREAM_US_Q16;
+    if (self->settled < STREAM_GAPS) {
+        return false;
+    }
+    for (unsigned i = 0; i < STREAM_GAPS; i++) {
+        const int64_t gap_us = fx_mul_div(self->gap_us[i], period_us_q16, self->period_us_q16);
+        self->gap_us[i] = (uint32_t)fx_clamp(gap_us, 0, ELAPSED_MAX_US);
+    }
+    set_period(self, period_us_q16);
+    self->settled = SETTLED_AGAIN;
+    return true;
 }
 
 unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t *ahead_q32)

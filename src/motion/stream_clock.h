@@ -28,6 +28,10 @@ bool stream_clock_is_soon(const stream_clock_t *self, uint64_t now_us);
 /** us since the newest sample, at most UINT32_MAX; 0 if now_us is before it. */
 uint32_t stream_clock_elapsed_us(const stream_clock_t *self, uint64_t now_us);
 
+/** Another share of a sender's samples is taken from now on: they are so far apart, and those so far count as if they had been.
+ *  @return false where the rate was not known for long: nothing is changed */
+bool stream_clock_set_period(stream_clock_t *self, uint32_t period_us);
+
 /** Periods from the newest sample to one that arrives now, judged by time alone, and that time in periods. */
 unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t *ahead_q32);
 

@@ -89,11 +89,14 @@ class Writer:
         """Frames with jitter and losses; the last one always arrives."""
         period_ms, loss = 1000 / rate_hz, self.one_of(LOSSES) if rate_hz <= 250 or self.is_odd else 0
         jitter_ms = self.one_of((0, 0.2, 0.5)) * period_ms
-        count, before = int(duration_ms / period_ms), 0.0
+        count, before, lost = int(duration_ms / period_ms), 0.0, 0
+        lost_most = 2 if rate_hz >= 20 else 1  # in a row: more of so slow a stream is a turn of what it says, or its end
         for i in range(count + 1):
             before = max(before, self.t_ms + i * period_ms + jitter_ms * self.chance())
-            if self.chance() >= loss or i == count:
-                self.send(before, space, values_at(i * period_ms), time_ms)
+            lost = lost + 1 if self.chance() < loss else 0
+            if 0 < lost <= lost_most and i < count:
+                continue
+            self.send(before, space, values_at(i * period_ms), time_ms)
         begin, self.t_ms = self.t_ms, before
         return begin
 

@@ -466,6 +466,26 @@ static void test_stream_jitter_of_a_period_is_told_from_losses(void)
     }
 }
 
+/* Late arrivals beside losses: for eight intervals or so they look like a slower rate. */
+static void test_stream_step_late_arrivals_and_losses_are_no_new_rate(void)
+{
+    for (unsigned seed = 1; seed <= 40; seed++) {
+        const network_t network = {45, 11, 0.05};
+        make_signal(seed);
+        start(STREAM_SMOOTH);
+        send_signal(&network, 0, LONG_MS * 0.001);
+        double off = 0;
+        for (int ms = 0; ms < LONG_MS; ms++) {
+            render(0, ms, ms + 1);
+            off = ms > 2000 ? fmax(off, fabs(stream_period_us(&s_stream) * 45e-6 - 1)) : 0;
+        }
+        if (getenv("STREAM_FIGURES")) {
+            printf("late %2u: period off %.1f %%\n", seed, 100 * off);
+        }
+        TEST_ASSERT_TRUE(off < 0.1);
+    }
+}
+
 /* Jitter 30 % of the period: known to 1 % from 32 samples on; the shape near the signal: the bound grows with the distance of the
  * samples. */
 static void test_stream_step_all_rates_converge(void)
@@ -910,6 +930,30 @@ static void test_stream_step_flood_is_thinned_out(void)
     TEST_ASSERT_TRUE(measure(200, 2900, 40).shape_um < 400);
 }
 
+/* Where another share of the samples is taken the rate is another one at once: neither in between for seconds, nor a loss for
+ * each sample that is further away. */
+static void test_stream_step_other_share_of_a_flood_is_another_rate(void)
+{
+    for (unsigned seed = 1; seed <= 10; seed++) {
+        make_signal(seed);
+        start(STREAM_SMOOTH);
+        for (int i = 0; i < 9900; i++) {
+            send(0.001 + (i + 0.5 * random_unit()) / 750, signal_at(i / 750.0));
+        }
+        int off_ms = 0;
+        for (int ms = 0; ms < 13100; ms++) {
+            render(0, ms, ms + 1);
+            const double samples = stream_period_us(&s_stream) * 750e-6; /* every third or fourth one */
+            off_ms += ms > 200 && fabs(samples - round(samples)) > 0.25;
+        }
+        if (getenv("STREAM_FIGURES")) {
+            printf("share %2u: off for %d ms, shape %.1f um\n", seed, off_ms, measure(200, 13100, 40).shape_um);
+        }
+        TEST_ASSERT_TRUE(off_ms < 400);
+        TEST_ASSERT_TRUE(measure(200, 13100, 40).shape_um < 40);
+    }
+}
+
 /* Noise for samples, arrivals of every kind, cycles left out: nothing runs away, nothing is inconsistent. */
 static void test_stream_step_noise_stays_bounded(void)
 {
@@ -955,6 +999,7 @@ int main(void)
     RUN_TEST(test_stream_smooth_on_cue_signals_keeps_its_figures);
     RUN_TEST(test_stream_fast_on_cue_signals_keeps_its_figures);
     RUN_TEST(test_stream_jitter_of_a_period_is_told_from_losses);
+    RUN_TEST(test_stream_step_late_arrivals_and_losses_are_no_new_rate);
     RUN_TEST(test_stream_step_all_rates_converge);
     RUN_TEST(test_stream_step_lossy_start_finds_the_period);
     RUN_TEST(test_stream_step_ended_stream_rests_on_its_last_sample);
@@ -973,6 +1018,7 @@ int main(void)
     RUN_TEST(test_stream_step_datagrams_sent_twice_change_nothing);
     RUN_TEST(test_stream_step_paired_arrivals_are_spread);
     RUN_TEST(test_stream_step_flood_is_thinned_out);
+    RUN_TEST(test_stream_step_other_share_of_a_flood_is_another_rate);
     RUN_TEST(test_stream_step_noise_stays_bounded);
     return UNITY_END();
 }
