@@ -16,6 +16,9 @@
  * they were. So an ended stream rests exactly on its last sample, within 2 s, or 24 periods of a slow one. A stream that is known
  * may be away for a second and goes on; a new rate gives a new grid, on which the curve goes on.
  *
+ * Repeats: a sender that sends each value up to 8 times (a loop beside a slower game) is followed at the rate of its values, once
+ * some 12 of them have told.
+ *
  * Hints: a sender that states its period may be slower, and tells from its second sample on what is late and what is lost. The
  * margin is then an eighth of the period at least, as a guess at so slow a stream is poor.
  */
@@ -125,12 +128,23 @@ typedef struct {
     q32_t spare_q32[AXES_MAX]; /**< that sample */
 } stream_thin_t;
 
+/** How often a sender repeats each value; members are private to src/motion. */
+typedef struct {
+    uint32_t run;     /**< equal samples so far */
+    uint32_t each;    /**< a value comes so many times; 1: the sender does not repeat them */
+    uint32_t frames;  /**< in the newest runs that were counted */
+    uint32_t runs;    /**< these */
+    uint32_t telling; /**< of these, by a step that is no rounding */
+    uint32_t longest; /**< of these */
+} stream_repeat_t;
+
 /** Stream state; members are private to src/motion. */
 typedef struct {
     uint32_t cycle_us;
     stream_style_t style;
     stream_phase_t phase;
     stream_thin_t thin;
+    stream_repeat_t repeat;
     bool is_fresh; /**< no reference given since the start */
     stream_clock_t clock;
     stream_curve_t curve;

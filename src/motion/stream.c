@@ -6,6 +6,7 @@
 #include "heave/stream.h"
 #include "stream_clock.h"
 #include "stream_curve.h"
+#include "stream_repeat.h"
 
 #define PACE_GAIN_DIV        8                   /* a rate correction of 1/8 per period of error ... */
 #define PACE_GAIN_DIV_HINTED 2                   /* ... 1/2 where the period is stated, and often a long one */
@@ -58,6 +59,7 @@ void stream_hint_period(stream_t *self, uint32_t period_us)
 static void start_lone(stream_t *self, const q32_t *sample_q32)
 {
     stream_curve_start(&self->curve, self->curve.axes, sample_q32);
+    stream_repeat_reset(&self->repeat);
     self->phase = STREAM_LONE;
     self->is_fresh = true;
 }
@@ -149,10 +151,17 @@ static bool is_passed_by(stream_t *self, uint64_t now_us, const q32_t *sample_q3
 static bool is_thinned_anew(stream_t *self)
 {
     stream_thin_t *const thin = &self->thin;
+    const uint32_t frame_us = thin->each * (thin->gaps_us / THIN_GAPS);
     const bool is_other = thin->each != thin->each_taken;
     thin->each_taken = thin->each;
-    return is_other && self->phase == STREAM_RUNNING &&
-           stream_clock_set_period(&self->clock, thin->each * (thin->gaps_us / THIN_GAPS));
+    if (self->phase != STREAM_RUNNING) {
+        return false;
+    }
+    if (is_other) {
+        stream_repeat_reset(&self->repeat);
+    }
+    const uint32_t of_values_us = stream_repeat_period_us(self, frame_us);
+    return (is_other || of_values_us > 0) && stream_clock_set_period(&self->clock, of_values_us > 0 ? of_values_us : frame_us);
 }
 
 static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
@@ -169,6 +178,9 @@ static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32
     }
     if (stream_clock_is_soon(&self->clock, now_us) && stream_curve_is_newest(&self->curve, sample_q32)) {
         return; /* the same datagram twice */
+    }
+    if (self->phase == STREAM_RUNNING && stream_repeat_watch(self, now_us, sample_q32)) {
+        return;
     }
     const bool is_thinned = is_thinned_anew(self);
     const unsigned periods = judge_periods(self, now_us, sample_q32);

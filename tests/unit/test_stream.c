@@ -954,6 +954,49 @@ static void test_stream_step_other_share_of_a_flood_is_another_rate(void)
     }
 }
 
+/* A loop that sends the newest value of a slower game, again and again. */
+static void test_stream_step_repeated_values_are_followed_at_their_own_rate(void)
+{
+    const double rates[][2] = {{100, 50}, {200, 50}, {100, 60}, {120, 30}, {100, 33.3}, {144, 60}};
+    for (unsigned i = 0; i < sizeof rates / sizeof rates[0]; i++) {
+        const double rate = rates[i][1];
+        make_signal(i + 1);
+        start(i % 2 ? STREAM_FAST : STREAM_SMOOTH);
+        for (double at = 0; at < 20; at += 1 / rates[i][0]) {
+            if (random_unit() > 0.01) {
+                send(at + 0.002 + 0.002 * random_unit(), signal_at(floor(at * rate + 1e-9) / rate));
+            }
+        }
+        const quality_t quality = (render(0, 0, 20000), measure(2000, 19900, 5000 / rate));
+        if (getenv("STREAM_FIGURES")) {
+            printf("repeats %3.0f of %3.0f Hz: lag %.1f periods, shape %.1f um, worst %.3f mm, jerk %.2f x\n", rates[i][0], rate,
+                   quality.lag_ms * rate / 1000, quality.shape_um, quality.worst_mm, quality.jerk / quality.jerk_true);
+        }
+        TEST_ASSERT_TRUE(quality.lag_ms * rate <= (i % 2 ? 1700 : 2500) + 500 * rate / rates[i][0]);
+        TEST_ASSERT_TRUE(quality.shape_um <= 10 + 90e3 / rate / rate);
+        TEST_ASSERT_TRUE(quality.jerk <= (i % 2 ? 7.5 : 1.3) * quality.jerk_true);
+    }
+}
+
+/* A slow motion in whole or tenths of millimetres has equal values too, of its own making; and a sender that stands. */
+static void test_stream_step_slow_coarse_motion_repeats_nothing(void)
+{
+    const double grains[] = {0.1, 1};
+    for (unsigned i = 0; i < 2; i++) {
+        double off = 0;
+        start(STREAM_SMOOTH);
+        for (double at = 0; at < 30; at += 0.01) {
+            const double value = fmod(at, 7) < 4 ? sin(at) + 0.5 * sin(2.3 * at) : 0.3;
+            send(at + 0.002 + 0.002 * random_unit(), grains[i] * round(20 * value));
+        }
+        for (int ms = 0; ms < 30000; ms++) {
+            render(0, ms, ms + 1);
+            off = ms > 500 ? fmax(off, fabs(stream_period_us(&s_stream) * 1e-4 - 1)) : 0;
+        }
+        TEST_ASSERT_TRUE(off < 0.05);
+    }
+}
+
 /* Noise for samples, arrivals of every kind, cycles left out: nothing runs away, nothing is inconsistent. */
 static void test_stream_step_noise_stays_bounded(void)
 {
@@ -1018,6 +1061,8 @@ int main(void)
     RUN_TEST(test_stream_step_datagrams_sent_twice_change_nothing);
     RUN_TEST(test_stream_step_paired_arrivals_are_spread);
     RUN_TEST(test_stream_step_flood_is_thinned_out);
+    RUN_TEST(test_stream_step_repeated_values_are_followed_at_their_own_rate);
+    RUN_TEST(test_stream_step_slow_coarse_motion_repeats_nothing);
     RUN_TEST(test_stream_step_other_share_of_a_flood_is_another_rate);
     RUN_TEST(test_stream_step_noise_stays_bounded);
     return UNITY_END();

@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: MIT
+ * stream_repeat.c - which samples only say the last one again.
+ * The values of such a sender are a stream of their own rate, and its frames a staircase that no platform is to follow. How often
+ * a value comes is the mean length of a run of equal samples. A motion that is rounded makes such runs where it is slow, but its
+ * steps are then of one grain, or two: they tell nothing. Nor does a run that is long: the sender stands.
+ */
+#include "stream_repeat.h"
+
+#include "stream_clock.h"
+#include "stream_curve.h"
+
+enum {
+    RUN_MAX = 8,    /* a value that comes more often stands */
+    RUNS_LEAST = 8, /* that tell */
+    RUNS_MOST = 16, /* what is older counts half */
+    TELLING = 4     /* grains in a step that is not the rounding of a slow motion */
+};
+
+#define NEXT_DUE_Q32 (Q32_ONE * 3 / 4) /* of a period after the newest sample, one that stands is the next */
+
+void stream_repeat_reset(stream_repeat_t *self)
+{
+    *self = (stream_repeat_t){.run = 1, .each = 1};
+}
+
+static bool is_telling(const stream_curve_t *curve, const q32_t *sample_q32)
+{
+    bool is_far = false;
+    for (unsigned axis = 0; axis < curve->axes; axis++) {
+        const q32_t step_q32 = fx_abs(sample_q32[axis] - curve->last_q32[axis]);
+        is_far |= curve->grain[axis].found_q32 > 0 && step_q32 >= TELLING * curve->grain[axis].found_q32;
+    }
+    return is_far;
+}
+
+/* A run is over. Of a sender that is known to repeat, a longer one is two that happen to be of one value. */
+static void count_run(stream_repeat_t *self, bool tells)
+{
+    const uint32_t run = self->each > 1 && self->run > self->each ? self->each + 1 : self->run;
+    if (self->run > RUN_MAX) {
+        return;
+    }
+    self->longest = run > self->longest ? run : self->longest;
+    self->frames += run;
+    self->telling += tells ? 1u : 0u;
+    self->runs++;
+    if (self->runs == RUNS_MOST) {
+        self->frames /= 2;
+        self->telling /= 2;
+        self->runs /= 2;
+        self->longest = 0;
+    }
+}
+
+bool stream_repeat_watch(stream_t *stream, uint64_t now_us, const q32_t *sample_q32)
+{
+    stream_repeat_t *const self = &stream->repeat;
+    q32_t ahead_q32;
+    if (!stream_curve_is_newest(&stream->curve, sample_q32)) {
+        count_run(self, is_telling(&stream->curve, sample_q32));
+        self->run = 1;
+        return false;
+    }
+    self->run += self->run <= RUN_MAX ? 1u : 0u;
+    (void)stream_clock_expect(&stream->clock, now_us, &ahead_q32);
+    return self->each > 1 && (self->run <= self->each || ahead_q32 < NEXT_DUE_Q32);
+}
+
+/* How often the sender sends each value at most; as it was where that cannot be told, or is a little less: losses make it
+ * so. */
+static unsigned find_each(const stream_repeat_t *self)
+{
+    const bool is_known = self->runs >= RUNS_LEAST && self->telling * 2 >= self->runs;
+    const bool is_even = self->longest * self->runs <= 2 * self->frames;
+    const unsigned each = (self->frames * 4 + self->runs * 3) / (self->runs * 4 + 1);
+    const bool is_less = each == 1 || self->frames * 2 + 3 * self->runs < 2 * self->each * self->runs;
+    return is_known && (each > self->each ? is_even : is_less) ? each : self->each;
+}
+
+uint32_t stream_repeat_period_us(stream_t *stream, uint32_t frame_us)
+{
+    stream_repeat_t *const self = &stream->repeat;
+    const unsigned each = find_each(self);
+    if (self->run != 1 || each == self->each || stream->clock.hint_us > 0 || stream->clock.settled < STREAM_GAPS) {
+        return 0;
+    }
+    self->each = each;
+    return (uint32_t)((uint64_t)frame_us * self->frames / self->runs);
+}
