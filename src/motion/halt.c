@@ -184,7 +184,7 @@ static bool is_carried_away(const ramp_state_t *start, const halt_times_t *commo
 /* The times of the axes that stop together. */
 static halt_times_t common_times(unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits)
 {
-    need_t need[AXES_MAX];
+    need_t need[AXES_MAX] = {{0}};
     for (unsigned i = 0; i < together; i++) {
         need[i] = need_of(&start[i], limits[i]);
     }

@@ -978,6 +978,28 @@ static void test_stream_step_repeated_values_are_followed_at_their_own_rate(void
     }
 }
 
+/* A game that becomes quicker, until each frame has a value of its own. */
+static void test_stream_step_values_repeated_less_often_are_followed_too(void)
+{
+    const double rates[] = {50, 100, 200};
+    make_signal(3);
+    start(STREAM_SMOOTH);
+    for (double at = 0; at < 24; at += 0.005) {
+        const double rate = rates[(int)(at / 8)];
+        send(at + 0.002 + 0.001 * random_unit(), signal_at(floor(at * rate + 1e-9) / rate));
+    }
+    render(0, 0, 24000);
+    for (int i = 0; i < 3; i++) {
+        const quality_t quality = measure(8000 * i + 2000, 8000 * i + 7900, 5000 / rates[i]);
+        if (getenv("STREAM_FIGURES")) {
+            printf("repeats less, %3.0f Hz: lag %.1f periods, shape %.1f um\n", rates[i], quality.lag_ms * rates[i] / 1000,
+                   quality.shape_um);
+        }
+        TEST_ASSERT_TRUE(quality.lag_ms * rates[i] <= 2500 + 4.5 * rates[i]);
+        TEST_ASSERT_TRUE(quality.shape_um <= 60);
+    }
+}
+
 /* A slow motion in whole or tenths of millimetres has equal values too, of its own making; and a sender that stands. */
 static void test_stream_step_slow_coarse_motion_repeats_nothing(void)
 {
@@ -1062,6 +1084,7 @@ int main(void)
     RUN_TEST(test_stream_step_paired_arrivals_are_spread);
     RUN_TEST(test_stream_step_flood_is_thinned_out);
     RUN_TEST(test_stream_step_repeated_values_are_followed_at_their_own_rate);
+    RUN_TEST(test_stream_step_values_repeated_less_often_are_followed_too);
     RUN_TEST(test_stream_step_slow_coarse_motion_repeats_nothing);
     RUN_TEST(test_stream_step_other_share_of_a_flood_is_another_rate);
     RUN_TEST(test_stream_step_noise_stays_bounded);
