@@ -49,7 +49,7 @@ class Writer:
     def rest(self, period_ms):
         """Nothing more is sent for a while; the last frame is reached."""
         pause_ms = max(PAUSE_MS, PAUSE_PERIODS * period_ms)
-        self.lines.append(f"; rest {self.t_ms + pause_ms:.3f} {self.t_ms + pause_ms + 500:.3f}")
+        self.lines.append(f"; rest {self.t_ms + pause_ms:.3f} {self.t_ms + pause_ms + 499:.3f}")  # the next frame may come at 500
         self.t_ms += pause_ms + 500
 
     # ---- signals ----
