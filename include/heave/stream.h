@@ -130,12 +130,14 @@ typedef struct {
 
 /** How often a sender repeats each value; members are private to src/motion. */
 typedef struct {
-    uint32_t run;     /**< equal samples so far */
-    uint32_t each;    /**< a value comes so many times; 1: the sender does not repeat them */
-    uint32_t frames;  /**< in the newest runs that were counted */
-    uint32_t runs;    /**< these */
-    uint32_t telling; /**< of these, by a step that is no rounding */
-    uint32_t longest; /**< of these */
+    uint64_t began_us; /**< the first of these came */
+    uint32_t run;      /**< equal samples so far */
+    uint32_t each;     /**< a value comes so many times; 1: the sender does not repeat them */
+    uint32_t frames;   /**< in the newest runs that were counted */
+    uint32_t span_us;  /**< these took */
+    uint32_t runs;     /**< these */
+    uint32_t telling;  /**< of these, by a step that is no rounding */
+    uint32_t longest;  /**< of these */
 } stream_repeat_t;
 
 /** Stream state; members are private to src/motion. */
@@ -194,6 +196,9 @@ bool stream_is_live(const stream_t *self, uint64_t now_us);
 
 /** Estimated period of the sender, 0 while unknown; and how late the samples are rendered, for display. us. */
 uint32_t stream_period_us(const stream_t *self);
+
+/** Mean interval of the sender's samples: the period, or less where it sends each value several times. 0 = no stream runs. */
+uint32_t stream_frame_us(const stream_t *self);
 uint32_t stream_delay_us(const stream_t *self);
 
 #endif

@@ -122,7 +122,7 @@ static bool is_about(uint64_t a_us, uint64_t b_us)
  * so quick: a frame of it may be late or lost. */
 static bool is_instant(const motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
-    const uint64_t period_us = stream_goes_on(&self->stream, now_us) ? stream_period_us(&self->stream) : now_us - self->last_us;
+    const uint64_t period_us = stream_goes_on(&self->stream, now_us) ? stream_frame_us(&self->stream) : now_us - self->last_us;
     return !target->is_timed ||
            (target->time_ms <= INSTANT_MS && (now_us - self->last_us <= INSTANT_GAP_US || period_us <= INSTANT_GAP_US));
 }
@@ -139,8 +139,9 @@ static bool is_stream_sample(const motion_t *self, const motion_target_t *target
     if (stated_us == 0) {
         return false;
     }
-    return stream_goes_on(&self->stream, now_us) ? is_about(stated_us, stream_period_us(&self->stream))
-                                                 : is_about(gap_us, stated_us) && is_about(gap_us, self->last_stated_us);
+    return stream_goes_on(&self->stream, now_us)
+               ? is_about(stated_us, stream_period_us(&self->stream)) || is_about(stated_us, stream_frame_us(&self->stream))
+               : is_about(gap_us, stated_us) && is_about(gap_us, self->last_stated_us);
 }
 
 /* The slots are those of a space from now on. */

@@ -56,10 +56,10 @@ void stream_hint_period(stream_t *self, uint32_t period_us)
     }
 }
 
-static void start_lone(stream_t *self, const q32_t *sample_q32)
+static void start_lone(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
 {
     stream_curve_start(&self->curve, self->curve.axes, sample_q32);
-    stream_repeat_reset(&self->repeat);
+    stream_repeat_reset(&self->repeat, now_us);
     self->phase = STREAM_LONE;
     self->is_fresh = true;
 }
@@ -148,20 +148,19 @@ static bool is_passed_by(stream_t *self, uint64_t now_us, const q32_t *sample_q3
 }
 
 /* True where the samples of a running stream are further apart from now on, or nearer, as another share of them is taken. */
-static bool is_thinned_anew(stream_t *self)
+static bool is_thinned_anew(stream_t *self, uint64_t now_us)
 {
     stream_thin_t *const thin = &self->thin;
-    const uint32_t frame_us = thin->each * (thin->gaps_us / THIN_GAPS);
     const bool is_other = thin->each != thin->each_taken;
     thin->each_taken = thin->each;
     if (self->phase != STREAM_RUNNING) {
         return false;
     }
     if (is_other) {
-        stream_repeat_reset(&self->repeat);
+        stream_repeat_reset(&self->repeat, now_us);
     }
-    const uint32_t of_values_us = stream_repeat_period_us(self, frame_us);
-    return (is_other || of_values_us > 0) && stream_clock_set_period(&self->clock, of_values_us > 0 ? of_values_us : frame_us);
+    const uint32_t period_us = is_other ? thin->each * (thin->gaps_us / THIN_GAPS) : stream_repeat_period_us(self);
+    return period_us > 0 && stream_clock_set_period(&self->clock, period_us);
 }
 
 static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
@@ -169,11 +168,11 @@ static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32
     self->thin.passed = 0;
     if (self->phase == STREAM_EMPTY || !stream_clock_is_near(&self->clock, now_us)) {
         stream_clock_start(&self->clock, now_us);
-        start_lone(self, sample_q32);
+        start_lone(self, now_us, sample_q32);
         return;
     }
     if (self->phase == STREAM_LONE && stream_clock_elapsed_us(&self->clock, now_us) < STEP_GAP_MIN_US) {
-        start_lone(self, sample_q32);
+        start_lone(self, now_us, sample_q32);
         return;
     }
     if (stream_clock_is_soon(&self->clock, now_us) && stream_curve_is_newest(&self->curve, sample_q32)) {
@@ -182,7 +181,7 @@ static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32
     if (self->phase == STREAM_RUNNING && stream_repeat_watch(self, now_us, sample_q32)) {
         return;
     }
-    const bool is_thinned = is_thinned_anew(self);
+    const bool is_thinned = is_thinned_anew(self, now_us);
     const unsigned periods = judge_periods(self, now_us, sample_q32);
     const bool is_new_rate = stream_clock_take(&self->clock, now_us, periods) || is_thinned;
     stream_curve_pace(&self->curve, self->style, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us);

@@ -16,11 +16,11 @@ enum {
     TELLING = 4     /* grains in a step that is not the rounding of a slow motion */
 };
 
-#define NEXT_DUE_Q32 (Q32_ONE * 3 / 4) /* of a period after the newest sample, one that stands is the next */
+#define NEXT_DUE_Q32 (Q32_ONE * 7 / 8) /* of a period after the newest sample, one that stands is the next */
 
-void stream_repeat_reset(stream_repeat_t *self)
+void stream_repeat_reset(stream_repeat_t *self, uint64_t now_us)
 {
-    *self = (stream_repeat_t){.run = 1, .each = 1};
+    *self = (stream_repeat_t){.began_us = now_us, .run = 1, .each = 1};
 }
 
 static bool is_telling(const stream_curve_t *curve, const q32_t *sample_q32)
@@ -34,18 +34,21 @@ static bool is_telling(const stream_curve_t *curve, const q32_t *sample_q32)
 }
 
 /* A run is over. Of a sender that is known to repeat, a longer one is two that happen to be of one value. */
-static void count_run(stream_repeat_t *self, bool tells)
+HV_WRAPS static void count_run(stream_repeat_t *self, uint64_t now_us, bool tells)
 {
     const uint32_t run = self->each > 1 && self->run > self->each ? self->each + 1 : self->run;
+    const uint32_t took_us = (uint32_t)(now_us - self->began_us);
     if (self->run > RUN_MAX) {
         return;
     }
     self->longest = run > self->longest ? run : self->longest;
     self->frames += run;
+    self->span_us += took_us / self->run * run;
     self->telling += tells ? 1u : 0u;
     self->runs++;
     if (self->runs == RUNS_MOST) {
         self->frames /= 2;
+        self->span_us /= 2;
         self->telling /= 2;
         self->runs /= 2;
         self->longest = 0;
@@ -57,8 +60,9 @@ bool stream_repeat_watch(stream_t *stream, uint64_t now_us, const q32_t *sample_
     stream_repeat_t *const self = &stream->repeat;
     q32_t ahead_q32;
     if (!stream_curve_is_newest(&stream->curve, sample_q32)) {
-        count_run(self, is_telling(&stream->curve, sample_q32));
+        count_run(self, now_us, is_telling(&stream->curve, sample_q32));
         self->run = 1;
+        self->began_us = now_us;
         return false;
     }
     self->run += self->run <= RUN_MAX ? 1u : 0u;
@@ -77,13 +81,23 @@ static unsigned find_each(const stream_repeat_t *self)
     return is_known && (each > self->each ? is_even : is_less) ? each : self->each;
 }
 
-uint32_t stream_repeat_period_us(stream_t *stream, uint32_t frame_us)
+uint32_t stream_repeat_period_us(stream_t *stream)
 {
     stream_repeat_t *const self = &stream->repeat;
     const unsigned each = find_each(self);
-    if (self->run != 1 || each == self->each || stream->clock.hint_us > 0 || stream->clock.settled < STREAM_GAPS) {
+    const uint32_t period_us = self->runs > 0 ? self->span_us / self->runs : 0;
+    if (self->run != 1 || each == self->each || period_us > STREAM_PERIOD_MAX_US || stream->clock.hint_us > 0 ||
+        stream->clock.settled < STREAM_GAPS) {
         return 0;
     }
     self->each = each;
-    return (uint32_t)((uint64_t)frame_us * self->frames / self->runs);
+    const int64_t is_us_q16 = stream->clock.period_us_q16;
+    const int64_t off_us_q16 = fx_abs((int64_t)period_us * STREAM_US_Q16 - is_us_q16);
+    return off_us_q16 * 8 > is_us_q16 ? period_us : 0; /* else the stream is at that rate already */
+}
+
+uint32_t stream_frame_us(const stream_t *self)
+{
+    return self->phase == STREAM_RUNNING && self->repeat.each > 1 ? self->repeat.span_us / self->repeat.frames
+                                                                  : stream_period_us(self);
 }

@@ -7,14 +7,13 @@
 #include "heave/stream.h"
 
 /** Forgets what was seen of a sender. */
-void stream_repeat_reset(stream_repeat_t *self);
+void stream_repeat_reset(stream_repeat_t *self, uint64_t now_us);
 
 /** Looks at the next sample. The stream runs.
  *  @return true if it only repeats the newest one, as this sender does; a sample that stands for longer is none of these */
 bool stream_repeat_watch(stream_t *stream, uint64_t now_us, const q32_t *sample_q32);
 
-/** The period of the values, where it is just found that the sender repeats them, or how often; else 0.
- *  @param frame_us mean interval of all samples */
-uint32_t stream_repeat_period_us(stream_t *stream, uint32_t frame_us);
+/** The period of the values, where it is just found that the sender repeats them, or how often; else 0. */
+uint32_t stream_repeat_period_us(stream_t *stream);
 
 #endif

@@ -957,7 +957,8 @@ static void test_stream_step_other_share_of_a_flood_is_another_rate(void)
 /* A loop that sends the newest value of a slower game, again and again. */
 static void test_stream_step_repeated_values_are_followed_at_their_own_rate(void)
 {
-    const double rates[][2] = {{100, 50}, {200, 50}, {100, 60}, {120, 30}, {100, 33.3}, {144, 60}};
+    const double rates[][2] = {{100, 50}, {200, 50}, {100, 60}, {120, 30}, {100, 33.3}, {144, 60},
+                               {40, 20},  {200, 60}, {30, 15},  {120, 60}, {20, 10}};
     for (unsigned i = 0; i < sizeof rates / sizeof rates[0]; i++) {
         const double rate = rates[i][1];
         make_signal(i + 1);
@@ -967,7 +968,7 @@ static void test_stream_step_repeated_values_are_followed_at_their_own_rate(void
                 send(at + 0.002 + 0.002 * random_unit(), signal_at(floor(at * rate + 1e-9) / rate));
             }
         }
-        const quality_t quality = (render(0, 0, 20000), measure(2000, 19900, 5000 / rate));
+        const quality_t quality = (render(0, 0, 20000), measure(3000, 19900, 5000 / rate));
         if (getenv("STREAM_FIGURES")) {
             printf("repeats %3.0f of %3.0f Hz: lag %.1f periods, shape %.1f um, worst %.3f mm, jerk %.2f x\n", rates[i][0], rate,
                    quality.lag_ms * rate / 1000, quality.shape_um, quality.worst_mm, quality.jerk / quality.jerk_true);

@@ -345,6 +345,29 @@ static void test_timed_frame_unlike_the_period_of_a_stream_is_a_move(void)
     check_arrives_after(450, 20);
 }
 
+/* A loop that states its own period and sends each value of a slower game three or four times: neither a move each time nor, once
+ * it is known to repeat, a stream that is told by the values' period alone. */
+static void test_timed_stream_of_repeated_values_stays_a_stream(void)
+{
+    const unsigned times_ms[] = {4, 10, 20};
+    for (unsigned i = 0; i < sizeof times_ms / sizeof times_ms[0]; i++) {
+        setUp();
+        const unsigned time_ms = times_ms[i], value_ms = 10 * time_ms / 3;
+        unsigned streamed_ms = 0;
+        for (unsigned ms = 0; ms < 8000; ms++) {
+            if (ms % time_ms == 0) {
+                char text[64];
+                snprintf(text, sizeof text, "@A6T:0,0,0,0,0,%.3f,%u#", 15 * sin(0.005 * (ms / value_ms * value_ms)), time_ms);
+                rig_send(&m_rig, text);
+            }
+            rig_run_ms(&m_rig, 1);
+            streamed_ms += ms >= 1000 && m_rig.gateway.motion.source == MOTION_STREAMED ? 1u : 0u;
+        }
+        TEST_ASSERT_EQUAL_UINT(7000, streamed_ms);
+        check_kept();
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -359,5 +382,6 @@ int main(void)
     RUN_TEST(test_lone_frames_far_apart_stay_steps);
     RUN_TEST(test_lone_frames_after_a_timed_stream_as_slow_are_steps_again);
     RUN_TEST(test_timed_frame_unlike_the_period_of_a_stream_is_a_move);
+    RUN_TEST(test_timed_stream_of_repeated_values_stays_a_stream);
     return UNITY_END();
 }
