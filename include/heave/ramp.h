@@ -32,10 +32,11 @@ typedef struct {
     q32_t jerk_per_cycle3_q32;
 } ramp_ref_t;
 
-#define RAMP_JERK_MIN_Q32       64                 /**< least jerk limit: below it a ramp could not come to rest exactly */
-#define RAMP_SPEED_PER_JERK_MAX ((int64_t)1 << 26) /**< cycles^2: keeps every brake below 2^14 cycles */
-#define RAMP_CYCLE_MIN_US       500u
-#define RAMP_CYCLE_MAX_US       10000u
+#define RAMP_JERK_MIN_Q32 64 /**< least jerk limit: below it a ramp could not come to rest exactly */
+#define RAMP_SPEED_PER_JERK_MAX                                                                                                  \
+    ((int64_t)1 << 26) /**< cycles^2: an acceleration is built up and taken back in less than 2^14 cycles */
+#define RAMP_CYCLE_MIN_US 500u
+#define RAMP_CYCLE_MAX_US 10000u
 
 /** How sharply the boundary layer follows; see ramp.c. */
 typedef enum {

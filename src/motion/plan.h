@@ -19,9 +19,9 @@ void plan_straight(motion_t *self, unsigned slots, int64_t least_cycles);
 
 /** Plans the shortest quintic (self->quintic) of the first POSE_AXES slots that leads from start to target within the limits.
  *  @param base  the target moves with this reference: what it uses of the limits is left to it, and speeds add; NULL where it
- * rests: extensions then go no further beyond it than their quickest stop does (which is left in self->halt)
+ * rests: extensions then go no further beyond it than their quickest stop does (which is left in self->aside.halt)
  *  @param least cycles at least
- *  @return false where none of those looked at keeps the limits; self->quintic is then the longest of them */
+ *  @return false where none of those looked at keeps the limits; self->quintic is then of no use */
 bool plan_shortest(motion_t *self, const ramp_state_t *start, const q32_t *target_q32, const ramp_state_t *base, int64_t least);
 
 #endif

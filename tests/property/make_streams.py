@@ -4,8 +4,8 @@
 
 usage: make_streams.py CONFIG SEED RIDES [--odd]      to standard output
 
-Streams of 10 to 1000 Hz with jitter, losses (up to 250 Hz), T of their own period or of 0, one after the other with and without a pause, and
-steps between them. --odd: also noise, streams that change their rate, and losses at any rate. These are not followed as they should be:
+Streams of 10 to 1000 Hz with jitter, losses (up to 250 Hz, one or two in a row), T of their own period or of 0, one after the other with and without a pause, and
+steps between them. --odd: also noise, streams that change their rate, and losses at any rate and in any number. These are not followed as they should be:
 swings of up to 94 mm beyond the samples were found, as a way back to the curve that is planned anew with each sample swings out further each
 time. The same arguments give the same bytes everywhere: only random() is used.
 """
@@ -90,7 +90,8 @@ class Writer:
         period_ms, loss = 1000 / rate_hz, self.one_of(LOSSES) if rate_hz <= 250 or self.is_odd else 0
         jitter_ms = self.one_of((0, 0.2, 0.5)) * period_ms
         count, before, lost = int(duration_ms / period_ms), 0.0, 0
-        lost_most = 2 if rate_hz >= 20 else 1  # in a row: more of so slow a stream is a turn of what it says, or its end
+        # lost in a row: more is a turn of what a slow stream says, or its end
+        lost_most = count if self.is_odd else 2 if rate_hz >= 20 else 1
         for i in range(count + 1):
             before = max(before, self.t_ms + i * period_ms + jitter_ms * self.chance())
             lost = lost + 1 if self.chance() < loss else 0

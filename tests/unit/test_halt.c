@@ -227,7 +227,6 @@ static void test_halt_plan_at_rest_stays_where_it_is(void)
     TEST_ASSERT_EQUAL_INT64(start[1].pos_q32, halt.rest_q32[1]);
 }
 
-/* A heavy rotation motor takes seconds to stop; the cylinders need not wait for it. */
 /* All that is left of a motion is an acceleration that one cycle takes back: it is over before it moves. */
 static void test_halt_plan_acceleration_of_one_cycle_ends_where_it_is(void)
 {
@@ -244,6 +243,7 @@ static void test_halt_plan_acceleration_of_one_cycle_ends_where_it_is(void)
     TEST_ASSERT_TRUE(j.jerk <= 1);
 }
 
+/* A heavy rotation motor takes seconds to stop; the cylinders need not wait for it. */
 static void test_halt_plan_axis_apart_takes_its_own_time(void)
 {
     const ramp_limits_t limits[3] = {limits_of(400, 3000, 50000), limits_of(400, 3000, 50000), limits_of(60, 20, 200)};

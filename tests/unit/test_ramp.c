@@ -711,7 +711,6 @@ static void test_ramp_init_limits_that_no_brake_ends_in_are_refused(void)
     TEST_ASSERT_EQUAL(HV_OK, ramp_init(&ramp, &good, 0));
 }
 
-/* A range of next to nothing leaves next to no acceleration, but some. */
 /* Brakes of hours or years: how far they go is not reckoned in cycles. */
 static void test_ramp_init_brakes_beyond_all_counting_are_not_counted(void)
 {
@@ -728,6 +727,7 @@ static void test_ramp_init_brakes_beyond_all_counting_are_not_counted(void)
     }
 }
 
+/* A range of next to nothing leaves next to no acceleration, but some. */
 static void test_ramp_safe_acceleration_is_never_nothing(void)
 {
     const ramp_limits_t narrow = {0, 1, q32(0.4), q32(0.003), 1};
