@@ -27,10 +27,10 @@ import test_golden  # noqa: E402  the path above has to be set first
 TOOLS = {"arm-none-eabi-gcc": "gcc-arm-none-eabi", "qemu-system-arm": "qemu-system-arm"}
 RUN_LIMIT_S = 300
 START = ("core", "CMakeFiles/heave_start.dir")
-# Processor: topics it plays, and what must not be exceeded, in bytes: what it takes, and 2 to 5 % for the next change. What is aimed at: docs/firmware.md.
+# Processor: topics it plays, and what must not be exceeded, in bytes: what it takes, and some 5 % for the next change and another gcc. What is aimed at: docs/firmware.md.
 KINDS = {
-    "cortex-m3": (("mode-changes", "out-of-reach", "stream-60hz", "stream-timed", "tripod-out-of-reach"), {"flash": 92 * 1024, "ram": 18 * 1024, "stack": 3328}),
-    "cortex-m0plus": (("mode-changes",), {"flash": 99 * 1024, "ram": 18 * 1024, "stack": 3456}),
+    "cortex-m3": (("mode-changes", "out-of-reach", "stream-60hz", "stream-timed", "tripod-out-of-reach"), {"flash": 96 * 1024, "ram": 19 * 1024, "stack": 3584}),
+    "cortex-m0plus": (("mode-changes",), {"flash": 103 * 1024, "ram": 19 * 1024, "stack": 3712}),
 }
 
 
