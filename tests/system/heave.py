@@ -8,6 +8,7 @@ import atexit
 import json
 import mmap
 import os
+import random
 import re
 import signal
 import socket
@@ -23,10 +24,24 @@ LOOK_S = 0.01  # between two looks whether it has
 STATUS_LOOK_S = 0.1 if "HEAVE_OWN_KERNEL" in os.environ else LOOK_S  # each starts a program, which takes long there, and no virtual time
 
 
+PORTS = range(20000, 32000)  # below those that the kernel gives to whoever asks for any
+held_ports = []
+
+
 def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    """A UDP port that nobody has and no other test takes before this process ends: a name that one alone can bind stands for it."""
+    for port in random.sample(PORTS, len(PORTS)):
+        claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            try:
+                claim.bind(f"\0heave-test-port-{port}")
+                probe.bind(("127.0.0.1", port))
+            except OSError:
+                claim.close()
+                continue
+        held_ports.append(claim)
+        return port
+    raise AssertionError(f"no UDP port is free from {PORTS.start} to {PORTS.stop - 1}")
 
 
 def wait_for(condition, what, look_s=None):
