@@ -373,11 +373,15 @@ static void set_up_platforms(bench_t *b)
     }
 }
 
-/* Every platform gets its frames at other times; n of the cycle. */
+/* As many cycles whatever the number of platforms, so that each candidate is timed as long: all of them in turn, PLATFORMS_MAX in
+ * all. Every platform gets its frames at other times. */
 static void run_platforms(bench_t *b, unsigned platforms, unsigned n)
 {
-    for (unsigned i = 0; i < platforms; i++) {
-        bench_gateway_stream_cycle(&b->platform[i], n + i);
+    const unsigned cycles = PLATFORMS_MAX / platforms;
+    for (unsigned cycle = n * cycles; cycle < (n + 1) * cycles; cycle++) {
+        for (unsigned i = 0; i < platforms; i++) {
+            bench_gateway_stream_cycle(&b->platform[i], cycle + i);
+        }
     }
 }
 

@@ -413,10 +413,15 @@ def check_peers(suite):
         assert "6% of the CPU stolen" in line and "goal" not in line, line
         assert bench_peers.doubt({"q25": 93.0, "median": 100.0, "q75": 107.0}, 0.05) is None
     with suite.case("bench peers tells the time of platforms and how many fit, or that it cannot"):
-        steady = {f"of-{count}": [2000.0 * count + i for i in range(20)] for count in (1, 2, 64)}
+        cycles = bench_peers.CYCLES
+        drifting = [1 + i / 20 for i in range(20)]  # the machine's speed
+        steady = {f"of-{count}": [2000.0 * cycles * (1 + count / 640) * drift for drift in drifting] for count in (1, 2, 64)}
         lines = bench_peers.platform_lines({"stolen": 0, "candidates": bench_peers.judge(list(steady), {}, steady)})
-        assert "goal below 5000 ns: met" in lines[1] and lines[-1].split()[0] == "500", lines
-        steady["of-64"] = [100000.0 * (1 + i % 2) for i in range(20)]
+        assert "goal below 5000 ns: met" in lines[1] and lines[3].split()[1:3] == ["1.10", "x"] and lines[-1].split()[:3] == ["265", "to", "367"], lines
+        slow = {name: [2 * value for value in values] for name, values in steady.items()}
+        assert "goal below 5000 ns: missed" in bench_peers.platform_lines({"stolen": 0, "candidates": bench_peers.judge(list(slow), {}, slow)})[1]
+        assert "no figure" in bench_peers.platform_lines({"stolen": 0.06, "candidates": bench_peers.judge(list(slow), {}, slow)})[1]
+        steady["of-64"] = [value * (1 + i % 2) for i, value in enumerate(steady["of-64"])]
         lines = bench_peers.platform_lines({"stolen": 0, "candidates": bench_peers.judge(list(steady), {}, steady)})
         assert "no figure" in lines[-1] and "fit" not in " ".join(lines), lines
     with suite.case("bench --compare tells changes beyond the spread from others"):
