@@ -60,6 +60,15 @@ static double mm(q32_t value_q32)
     return (double)value_q32 / 4294967296.0;
 }
 
+/* At neutral, following; no target yet. */
+static void start_following(void)
+{
+    motion_rise(&m_motion);
+    run_ms(10000, 400);
+    motion_follow(&m_motion);
+    step(0);
+}
+
 static void assert_extensions(const q32_t *expected_q32)
 {
     for (unsigned i = 0; i < m_motion.cylinders; i++) {
@@ -174,6 +183,82 @@ static void test_axis_that_is_not_moved_is_pulled_in_as_it_is(void)
     TEST_ASSERT_BITS_HIGH(MOTION_CLAMPED, m_out.flags);
     TEST_ASSERT_EQUAL_INT64(q32_from_int(INT16_MAX), m_motion.slot_q32[AXIS_X]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 10, mm(m_out.sent.axis_q32[AXIS_Z]));
+}
+
+/* The frame of a timed move once more, at half of its time: the same goes on, one with another angle is a move of its own. */
+static void test_timed_move_told_again_begins_anew_only_for_another_angle(void)
+{
+    static const struct {
+        motion_target_t first, again;
+        bool is_same;
+    } k_moves[] = {
+        {{.has_angle = false}, {.has_angle = false}, true},
+        {{.has_angle = false}, {.has_angle = true}, false},
+        {{.has_angle = true, .angle_deg_q32 = 10 * Q32_ONE}, {.has_angle = true, .angle_deg_q32 = 10 * Q32_ONE}, true},
+        {{.has_angle = true, .angle_deg_q32 = 10 * Q32_ONE}, {.has_angle = true, .angle_deg_q32 = 11 * Q32_ONE}, false},
+    };
+    for (unsigned i = 0; i < sizeof k_moves / sizeof k_moves[0]; i++) {
+        const motion_target_t rest = {.space = MOTION_POSE};
+        motion_target_t first = k_moves[i].first, again = k_moves[i].again;
+        first.is_timed = again.is_timed = true;
+        first.time_ms = again.time_ms = 2000;
+        first.value_q32[AXIS_Z] = again.value_q32[AXIS_Z] = q32_from_int(20);
+        start_following();
+        take(&rest);
+        run_ms(1000, 400);
+        take(&first);
+        run_ms(1000, 400);
+        take(&again);
+        run_ms(1005, 400);
+        TEST_ASSERT_EQUAL(k_moves[i].is_same, fabs(mm(m_out.sent.axis_q32[AXIS_Z]) - 20) < 1e-6);
+        run_ms(1000, 400);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, 20, mm(m_out.sent.axis_q32[AXIS_Z]));
+    }
+}
+
+/* ---- take-over ---- */
+
+static void take_extensions(double all_mm, bool is_timed)
+{
+    motion_target_t target = {.space = MOTION_CYLINDERS, .is_timed = is_timed, .time_ms = is_timed ? 3000 : 0};
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        target.value_q32[i] = (q32_t)(all_mm * 4294967296.0);
+    }
+    take(&target);
+}
+
+/* Extensions that jump to and fro by so much in a take-over, until they ask for more than twice the acceleration there is, at
+ * hardly any speed; then a timed move, or a lone frame behind it in the same cycle. The platform goes there, at engage speed all
+ * the way. */
+static void check_jumps_are_left(double jump_mm, bool is_timed)
+{
+    const ramp_limits_t *limits = &m_motion.cylinder[0].limits;
+    init(rig_hexapod());
+    start_following();
+    for (unsigned ms = 0; llabs(m_motion.led[0].acc_per_cycle2_q32) <= 2 * limits->acc_per_cycle2_q32; ms++) {
+        TEST_ASSERT_TRUE(ms < 100);
+        if (ms % 10 == 0) {
+            take_extensions(150 + (ms / 10 % 2 ? jump_mm : -jump_mm), false);
+        }
+        step(50.1);
+    }
+    TEST_ASSERT_TRUE(llabs(m_motion.led[0].vel_per_cycle_q32) < limits->vel_per_cycle_q32);
+    take_extensions(120, true);
+    if (!is_timed) {
+        take_extensions(120, false);
+    }
+    run_ms(4000, 50.1);
+    TEST_ASSERT_TRUE(motion_is_at_rest(&m_motion));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 120, mm(m_out.extension_mm_q32[0]));
+}
+
+static void test_take_over_that_was_led_beyond_the_limits_begins_anew(void)
+{
+    for (unsigned i = 0; i < 2; i++) {
+        check_jumps_are_left(0.1, i > 0);
+        check_jumps_are_left(1, i > 0);
+        check_jumps_are_left(10, i > 0);
+    }
 }
 
 /* ---- ways ---- */
@@ -302,6 +387,8 @@ int main(void)
     RUN_TEST(test_target_that_intensity_makes_impossible_while_it_waits_is_dropped);
     RUN_TEST(test_follow_a_pose_from_positions_without_one);
     RUN_TEST(test_axis_that_is_not_moved_is_pulled_in_as_it_is);
+    RUN_TEST(test_timed_move_told_again_begins_anew_only_for_another_angle);
+    RUN_TEST(test_take_over_that_was_led_beyond_the_limits_begins_anew);
     RUN_TEST(test_way_where_nothing_can_be_solved_is_not_feasible);
     RUN_TEST(test_way_where_nothing_can_be_solved_narrows_nothing);
     RUN_TEST(test_join_is_beyond_by_speed_acceleration_and_jerk_in_both_directions);

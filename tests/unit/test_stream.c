@@ -1020,6 +1020,32 @@ static void test_stream_step_slow_coarse_motion_repeats_nothing(void)
     }
 }
 
+/* Each value twice, where the values by themselves are too rare for a stream, and where the sender states the period of its
+ * frames. */
+static void test_stream_step_repeats_are_samples_where_values_are_rare_or_the_period_is_stated(void)
+{
+    const struct {
+        uint32_t frame_us, stated_us, period_us;
+    } senders[] = {{60000, 0, 120000}, {60000, 60000, 60000}, {100000, 0, 100000}};
+    for (unsigned i = 0; i < sizeof senders / sizeof senders[0]; i++) {
+        ramp_ref_t ref;
+        uint64_t now_us = 1000000;
+        stream_init(&s_stream, CYCLE_US, 1, STREAM_SMOOTH);
+        for (unsigned frame = 0; frame < 100; frame++) {
+            const q32_t sample = q32(round(50000 * sin(0.15 * (frame - frame % 2))) / 1000);
+            stream_hint_period(&s_stream, senders[i].stated_us);
+            stream_push(&s_stream, now_us, &sample);
+            for (const uint64_t next_us = now_us + senders[i].frame_us; now_us < next_us; now_us += CYCLE_US) {
+                TEST_ASSERT_TRUE(stream_step(&s_stream, now_us, &ref));
+            }
+        }
+        TEST_ASSERT_UINT32_WITHIN(senders[i].period_us / 50, senders[i].period_us, stream_period_us(&s_stream));
+        TEST_ASSERT_UINT32_WITHIN(senders[i].frame_us / 10, senders[i].frame_us, stream_frame_us(&s_stream));
+        stream_reset(&s_stream);
+        TEST_ASSERT_EQUAL_UINT32(0, stream_frame_us(&s_stream));
+    }
+}
+
 /* Noise for samples, arrivals of every kind, cycles left out: nothing runs away, nothing is inconsistent. */
 static void test_stream_step_noise_stays_bounded(void)
 {
@@ -1087,6 +1113,7 @@ int main(void)
     RUN_TEST(test_stream_step_repeated_values_are_followed_at_their_own_rate);
     RUN_TEST(test_stream_step_values_repeated_less_often_are_followed_too);
     RUN_TEST(test_stream_step_slow_coarse_motion_repeats_nothing);
+    RUN_TEST(test_stream_step_repeats_are_samples_where_values_are_rare_or_the_period_is_stated);
     RUN_TEST(test_stream_step_other_share_of_a_flood_is_another_rate);
     RUN_TEST(test_stream_step_noise_stays_bounded);
     return UNITY_END();

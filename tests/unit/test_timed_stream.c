@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "rig.h"
 #include "unity.h"
@@ -345,6 +346,21 @@ static void test_timed_frame_unlike_the_period_of_a_stream_is_a_move(void)
     check_arrives_after(450, 20);
 }
 
+/* A time that says nothing, and a gap that a quick stream alone explains: it goes on as if there were no times. */
+static void test_stream_with_times_of_1_ms_is_one_without_also_where_a_frame_is_lost(void)
+{
+    static double plain_z[LONGEST_MS + 1];
+    sender_t s = sender(16);
+    s.lost = 60;
+    s.format = "@A6:0,0,0,0,0,%.4f#";
+    const unsigned total = run(&s);
+    memcpy(plain_z, m_z, sizeof plain_z);
+    s.format = "@A6T:0,0,0,0,0,%.4f,1#";
+    TEST_ASSERT_EQUAL_UINT(total, run(&s));
+    TEST_ASSERT_EQUAL_MEMORY(plain_z, m_z, (total + 1) * sizeof m_z[0]);
+    TEST_ASSERT_EQUAL(MOTION_STREAMED, m_rig.gateway.motion.source);
+}
+
 /* A loop that states its own period and sends each value of a slower game three or four times: neither a move each time nor, once
  * it is known to repeat, a stream that is told by the values' period alone. */
 static void test_timed_stream_of_repeated_values_stays_a_stream(void)
@@ -382,6 +398,7 @@ int main(void)
     RUN_TEST(test_lone_frames_far_apart_stay_steps);
     RUN_TEST(test_lone_frames_after_a_timed_stream_as_slow_are_steps_again);
     RUN_TEST(test_timed_frame_unlike_the_period_of_a_stream_is_a_move);
+    RUN_TEST(test_stream_with_times_of_1_ms_is_one_without_also_where_a_frame_is_lost);
     RUN_TEST(test_timed_stream_of_repeated_values_stays_a_stream);
     return UNITY_END();
 }
