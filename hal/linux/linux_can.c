@@ -19,11 +19,22 @@
 #define FRAME_MEMORY  768      /* what a waiting frame counts against SO_SNDBUF on 64-bit kernels */
 #define CLOCK_STEP_US 1000000u /* a frame that seems to have waited longer came around a change of the wall clock */
 
+static const char k_sending[] = "sending";
+static const char k_receiving[] = "receiving";
+
 /* --- What is wrong --- */
+
+static void forget_trouble(linux_can_t *self)
+{
+    self->trouble = LINUX_CAN_FINE;
+    self->failing = NULL;
+    self->error_text[0] = '\0';
+}
 
 static hv_status_t report_trouble(linux_can_t *self, linux_can_trouble_t trouble, int error, const char *what)
 {
     self->trouble = trouble;
+    self->failing = NULL;
     self->error = error;
     (void)snprintf(self->error_text, sizeof self->error_text, "can: %s: %s%s%s", self->name, what, error != 0 ? ": " : "",
                    error != 0 ? strerror(error) : "");
@@ -69,11 +80,19 @@ static hv_status_t note_failure(linux_can_t *self, int error, const char *what)
     case ENXIO:
         (void)say_gone(self);
         return HV_ERR_IO;
-    case EPERM:
-    case EACCES:
-        return report_trouble(self, LINUX_CAN_NOT_ALLOWED, error, what);
     default:
-        return report_trouble(self, LINUX_CAN_SYSTEM_ERROR, error, what);
+        (void)report_trouble(self, error == EPERM || error == EACCES ? LINUX_CAN_NOT_ALLOWED : LINUX_CAN_SYSTEM_ERROR, error,
+                             what);
+        self->failing = what;
+        return HV_ERR_IO;
+    }
+}
+
+/* That call works; what was wrong with it has passed. */
+static void note_success(linux_can_t *self, const char *what)
+{
+    if (self->failing == what) {
+        forget_trouble(self);
     }
 }
 
@@ -111,6 +130,7 @@ static hv_status_t can_send_op(void *ctx, const can_frame_t *frame)
     const struct can_frame out = linux_can_frame_to_kernel(frame);
     if (send(self->fd, &out, sizeof out, MSG_DONTWAIT) == (ssize_t)sizeof out) {
         self->unconfirmed++;
+        note_success(self, k_sending);
         return HV_OK;
     }
     if (errno == ENOBUFS) {
@@ -120,7 +140,7 @@ static hv_status_t can_send_op(void *ctx, const can_frame_t *frame)
     if (errno == EAGAIN || errno == EWOULDBLOCK) {
         return HV_ERR_AGAIN;
     }
-    return note_failure(self, errno, "sending");
+    return note_failure(self, errno, k_sending);
 }
 
 /* --- Receiving --- */
@@ -195,8 +215,13 @@ static hv_status_t receive_next(linux_can_t *self, linux_can_received_t *receive
         if (is_off(self)) {
             return HV_ERR_IO;
         }
-        if (!linux_can_frame_receive(self->fd, received)) {
-            return errno == EAGAIN || errno == EWOULDBLOCK ? HV_ERR_AGAIN : note_failure(self, errno, "receiving");
+        const bool has_come = linux_can_frame_receive(self->fd, received);
+        if (!has_come && errno != EAGAIN && errno != EWOULDBLOCK) {
+            return note_failure(self, errno, k_receiving);
+        }
+        note_success(self, k_receiving);
+        if (!has_come) {
+            return HV_ERR_AGAIN;
         }
         note_lost(self, received->lost);
         *is_taken = take_in(self, received, out);
@@ -386,9 +411,11 @@ static hv_status_t clear(linux_can_t *self, linux_can_link_t *link, bool is_susp
     return HV_OK;
 }
 
+/* Where it fails nothing passes until one succeeds, whatever there was before. */
 static hv_status_t start(linux_can_t *self)
 {
     linux_can_link_t link;
+    cut_off(self, is_off(self) || self->state == HAL_CAN_BUS_OFF ? self->state : HAL_CAN_DOWN);
     hv_status_t status = look(self, &link);
     if (status == HV_OK) {
         status = clear(self, &link, self->unconfirmed > 0);
@@ -400,8 +427,7 @@ static hv_status_t start(linux_can_t *self)
         self->state = link.state == HAL_CAN_WARNING || link.state == HAL_CAN_PASSIVE ? link.state : HAL_CAN_ACTIVE;
         self->has_echo = link.has_echo;
         self->is_cut = false;
-        self->trouble = LINUX_CAN_FINE;
-        self->error_text[0] = '\0';
+        forget_trouble(self);
     }
     return status;
 }

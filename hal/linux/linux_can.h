@@ -35,7 +35,7 @@ typedef struct {
                               packaging/heave-can; NULL = nowhere */
 } linux_can_config_t;
 
-/** What is wrong, as far as it can be told apart. */
+/** What is wrong, as far as it can be told apart; until a restart, or until the call that failed works again. */
 typedef enum {
     LINUX_CAN_FINE,
     LINUX_CAN_NO_SUPPORT,   /**< the kernel has no SocketCAN */
@@ -71,8 +71,9 @@ typedef struct {
     uint32_t unconfirmed;
     uint64_t last_rx_us;
     hal_can_state_t state;
-    bool is_cut;   /**< nothing passes until restart */
-    bool has_echo; /**< the driver confirms what is on the wire */
+    const char *failing; /**< the call that trouble is about, where it may pass by itself; NULL = none */
+    bool is_cut;         /**< nothing passes until restart */
+    bool has_echo;       /**< the driver confirms what is on the wire */
     bool is_overrun;
     bool has_kept; /**< kept waits behind the report of a gap */
     can_frame_t kept;
