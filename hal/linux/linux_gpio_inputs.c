@@ -4,17 +4,17 @@
 #include "linux_gpio_inputs.h"
 
 #include <errno.h>
-#include <poll.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "linux_gpio_thread.h"
 
-#define LOOK_MS  10  /* with edges: the kernel forgets some where there are very many */
-#define POLL_MS  1   /* without */
-#define LOST_MS  100 /* what has gone hardly ever comes back */
-#define STALE_MS 250 /* lines that were not read for so long: the worker hangs in the kernel */
+#define LOOK_MS 10  /* with edges: the kernel forgets some where there are very many */
+#define POLL_MS 1   /* without */
+#define LOST_MS 100 /* what has gone hardly ever comes back */
+#define STALE_MS                                                                                                                 \
+    250 /* lines that were not read for so long: the worker hangs in the kernel; or edges that were not listened to */
 
 static uint32_t now_ms(void)
 {
@@ -41,8 +41,9 @@ static void note_pressed(linux_gpio_inputs_t *self, uint32_t levels)
     }
 }
 
-/* Reads the lines. Returns 0 or an error number. */
-static int look(linux_gpio_inputs_t *self)
+/* Reads the lines. Returns 0 or an error number.
+ * @param is_deaf of edges that come meanwhile nothing is heard: a short opening could be lost */
+static int look(linux_gpio_inputs_t *self, bool is_deaf)
 {
     uint32_t closed = 0;
     const int error = linux_gpio_chip_get(&self->chip, &closed);
@@ -52,7 +53,7 @@ static int look(linux_gpio_inputs_t *self)
         note_pressed(self, levels);
         __atomic_store_n(&self->read_ms, now_ms(), __ATOMIC_RELEASE);
     }
-    __atomic_store_n(&self->is_lost, error != 0, __ATOMIC_RELEASE);
+    __atomic_store_n(&self->is_lost, error != 0 || is_deaf, __ATOMIC_RELEASE);
     return error;
 }
 
@@ -73,23 +74,33 @@ static void take_edges(linux_gpio_inputs_t *self, const struct pollfd *edge, uns
     }
 }
 
+/* Sleeps until an edge, or until it is time to look again. Returns false: edges could not be listened to. */
+static bool await_edges(linux_gpio_inputs_t *self, bool is_lost)
+{
+    struct pollfd poll_fd[1 + LINUX_GPIO_LINES_MAX] = {{.fd = self->wake, .events = POLLIN}};
+    int fd[LINUX_GPIO_LINES_MAX];
+    const unsigned edges = self->has_edges ? linux_gpio_chip_fds(&self->chip, fd) : 0;
+    for (unsigned i = 0; i < edges; i++) {
+        poll_fd[1 + i] = (struct pollfd){.fd = fd[i], .events = POLLIN};
+    }
+    const int ready = linux_gpio_thread_wait(poll_fd, 1 + edges, is_lost ? LOST_MS : edges > 0 ? LOOK_MS : POLL_MS);
+    if (ready > 0) {
+        take_edges(self, &poll_fd[1], edges);
+    }
+    return ready >= 0 || edges == 0;
+}
+
 static void *worker(void *argument)
 {
     linux_gpio_inputs_t *self = argument;
-    struct pollfd poll_fd[1 + LINUX_GPIO_LINES_MAX];
-    int fd[LINUX_GPIO_LINES_MAX];
+    uint32_t heard_ms = now_ms();
     int error = 0;
     linux_gpio_thread_ask_for_priority();
     while (__atomic_load_n(&self->is_ending, __ATOMIC_ACQUIRE) == 0) {
-        const unsigned edges = self->has_edges ? linux_gpio_chip_fds(&self->chip, fd) : 0;
-        poll_fd[0] = (struct pollfd){.fd = self->wake, .events = POLLIN};
-        for (unsigned i = 0; i < edges; i++) {
-            poll_fd[1 + i] = (struct pollfd){.fd = fd[i], .events = POLLIN};
+        if (await_edges(self, error != 0)) {
+            heard_ms = now_ms();
         }
-        if (poll(poll_fd, 1 + edges, error != 0 ? LOST_MS : edges > 0 ? LOOK_MS : POLL_MS) > 0) {
-            take_edges(self, &poll_fd[1], edges);
-        }
-        error = look(self);
+        error = look(self, now_ms() - heard_ms > STALE_MS);
     }
     return NULL;
 }
@@ -129,7 +140,7 @@ hal_inputs_t linux_gpio_inputs_hal(linux_gpio_inputs_t *self)
 /* Reads for the first time, and hands the lines to the worker. Returns 0 or an error number. */
 static int start(linux_gpio_inputs_t *self)
 {
-    const int error = look(self);
+    const int error = look(self, false);
     return error != 0 ? error : linux_gpio_thread_start(&self->thread, &self->wake, worker, self);
 }
 

@@ -3,8 +3,8 @@
  * supply (pulled down). The e-stop's contact is normally closed: open, or a broken wire, is an e-stop. Key and button close when
  * they are active. A thread of its own reads the lines, since a chip may take its time or hang: at every edge and every 10 ms, or
  * every millisecond where the chip tells of no edges. An e-stop that was active between two reads is told of by the next one.
- * Lines that cannot be read, or were not read for a quarter of a second, are HV_ERR_IO. The caller owns linux_gpio_inputs_t,
- * which must not move while open; nothing is allocated after open.
+ * Lines that cannot be read, were not read for a quarter of a second, or whose edges could not be listened to for as long, are
+ * HV_ERR_IO. The caller owns linux_gpio_inputs_t, which must not move while open; nothing is allocated after open.
  */
 #ifndef LINUX_GPIO_INPUTS_H
 #define LINUX_GPIO_INPUTS_H

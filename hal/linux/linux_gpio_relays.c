@@ -4,7 +4,6 @@
 #include "linux_gpio_relays.h"
 
 #include <errno.h>
-#include <poll.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/eventfd.h>
@@ -45,7 +44,7 @@ static void *worker(void *argument)
     while (__atomic_load_n(&self->is_ending, __ATOMIC_ACQUIRE) == 0) {
         struct pollfd wake = {.fd = self->wake, .events = POLLIN};
         uint64_t woken;
-        (void)poll(&wake, 1, CHECK_MS);
+        (void)linux_gpio_thread_wait(&wake, 1, CHECK_MS);
         (void)!read(self->wake, &woken, sizeof woken);
         serve(self);
     }

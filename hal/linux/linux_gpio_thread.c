@@ -13,6 +13,7 @@
 #define PRIORITY    60             /* below motion, which has 80, above threaded interrupts, which have 50 */
 #define STACK_BYTES (128u * 1024u) /* locked into memory, so no more than needed */
 #define END_S       1
+#define PAUSE_NS    1000000 /* as between two looks at a chip that tells of no edges */
 
 int linux_gpio_thread_start(pthread_t *thread, int *wake, void *(*function)(void *), void *argument)
 {
@@ -43,6 +44,16 @@ void linux_gpio_thread_ask_for_priority(void)
 {
     const struct sched_param parameters = {.sched_priority = PRIORITY};
     (void)pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+}
+
+int linux_gpio_thread_wait(struct pollfd *fds, unsigned count, int ms)
+{
+    static const struct timespec k_pause = {.tv_nsec = PAUSE_NS};
+    const int ready = poll(fds, count, ms);
+    if (ready < 0) {
+        (void)nanosleep(&k_pause, NULL);
+    }
+    return ready;
 }
 
 void linux_gpio_thread_wake(int wake)

@@ -5,6 +5,7 @@
 #ifndef LINUX_GPIO_THREAD_H
 #define LINUX_GPIO_THREAD_H
 
+#include <poll.h>
 #include <pthread.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -16,6 +17,11 @@ int linux_gpio_thread_start(pthread_t *thread, int *wake, void *(*function)(void
 
 /** Called by the thread: real-time priority where that is permitted. */
 void linux_gpio_thread_ask_for_priority(void);
+
+/** Called by the thread: as poll(2). Where the system refuses to wait, a millisecond passes all the same, so that nothing spins
+ * at that priority.
+ *  @return how many are ready; -1: refused, and whether one is ready is not known */
+int linux_gpio_thread_wait(struct pollfd *fds, unsigned count, int ms);
 
 /** Wakes it. Never blocks. */
 void linux_gpio_thread_wake(int wake);
