@@ -44,6 +44,7 @@ typedef struct {
     double for_s; /**< 0 = until interrupted */
     unsigned hz;  /**< 0 = as it suits the output */
     int fd;
+    int error; /**< why the system does not let it hear heaved, an errno; 0 = it does */
     char line[LINE_BYTES];
     size_t length;   /**< bytes in line */
     size_t consumed; /**< of those, given out already */
@@ -103,7 +104,8 @@ static int open_link(ctl_t *self)
     return EXIT_DONE;
 }
 
-/* Where heaved has closed the link, what it said before is still to be read. */
+/* Where heaved has closed the link, what it said before is still to be read. A signal that ends the program is the reader's to
+ * see. */
 static int send_line(const ctl_t *self, const char *request)
 {
     char line[64];
@@ -112,7 +114,7 @@ static int send_line(const ctl_t *self, const char *request)
     do {
         sent = send(self->fd, line, (size_t)length, MSG_NOSIGNAL);
     } while (sent < 0 && errno == EINTR && is_interrupted == 0);
-    if (sent < 0 && errno != EPIPE && errno != ECONNRESET) {
+    if (sent < 0 && errno != EPIPE && errno != ECONNRESET && errno != EINTR) {
         return complain(EXIT_UNAVAILABLE, "heaved cannot be asked: %s", strerror(errno));
     }
     return EXIT_DONE;
@@ -127,7 +129,7 @@ static int64_t now_ms(void)
 
 /* Waits for bytes until the given time.
  * Returns false: time is up, a signal came that ends the program, or the system refuses to wait. */
-static bool wait_for_bytes(const ctl_t *self, int64_t until_ms)
+static bool wait_for_bytes(ctl_t *self, int64_t until_ms)
 {
     struct pollfd wait = {.fd = self->fd, .events = POLLIN};
     for (;;) {
@@ -136,8 +138,12 @@ static bool wait_for_bytes(const ctl_t *self, int64_t until_ms)
             return false;
         }
         const int ready = poll(&wait, 1, left_ms < WAIT_MS_MAX ? (int)left_ms : WAIT_MS_MAX);
-        if (ready > 0 || (ready < 0 && errno != EINTR)) {
-            return ready > 0;
+        if (ready < 0 && errno != EINTR) {
+            self->error = errno;
+            return false;
+        }
+        if (ready > 0) {
+            return true;
         }
     }
 }
@@ -152,6 +158,9 @@ static bool receive_more(ctl_t *self, int64_t until_ms)
     }
     const ssize_t received = recv(self->fd, &self->line[self->length], room, 0);
     self->length += received > 0 ? (size_t)received : 0;
+    if (received < 0 && errno != EINTR && errno != ECONNRESET) {
+        self->error = errno;
+    }
     return received > 0 || (received < 0 && errno == EINTR);
 }
 
@@ -171,6 +180,14 @@ static const char *receive_line(ctl_t *self, int64_t until_ms)
     *newline = '\0';
     self->consumed = (size_t)(newline + 1 - self->line);
     return self->line;
+}
+
+/* No answer, or no more of them.
+ * Returns the exit code. */
+static int not_heard(const ctl_t *self, const char *why)
+{
+    return self->error != 0 ? complain(EXIT_UNAVAILABLE, "heaved cannot be heard: %s", strerror(self->error))
+                            : complain(EXIT_UNAVAILABLE, "%s", why);
 }
 
 /* --- Showing --- */
@@ -295,7 +312,7 @@ static int ask(ctl_t *self)
         return code;
     }
     const char *line = receive_line(self, until_ms);
-    return line != NULL ? show(self, line) : complain(EXIT_UNAVAILABLE, "heaved does not answer");
+    return line != NULL ? show(self, line) : not_heard(self, "heaved does not answer");
 }
 
 /* --- Watching --- */
@@ -363,7 +380,7 @@ static int watch(ctl_t *self)
     if (code == EXIT_REFUSED) {
         return show(self, self->line);
     }
-    return code == EXIT_UNAVAILABLE ? complain(code, "heaved has ended") : code;
+    return code == EXIT_UNAVAILABLE ? not_heard(self, "heaved has ended") : code;
 }
 
 /* --- The command line --- */

@@ -150,13 +150,13 @@ class Page:
         self.memory.close()
         os.close(self.fd)
 
-    def set(self, place, error):
+    def set(self, place, error, times=None):
         self.clear()
         assert len(place.returns) <= Page.MOST, place
         struct.pack_into("<QQQ", self.memory, 8, 0, number_of(error) & 0xFFFFFFFFFFFFFFFF, len(place.returns))
         self.memory[32:32 + 48] = place.function.encode().ljust(48, b"\0")
         struct.pack_into(f"<{len(place.returns)}Q", self.memory, 80, *place.returns)
-        struct.pack_into("<Q", self.memory, 0, TIMES if error in PASSING else FOR_EVER)
+        struct.pack_into("<Q", self.memory, 0, times or (TIMES if error in PASSING else FOR_EVER))
 
     def clear(self):
         struct.pack_into("<Q", self.memory, 0, 0)
@@ -280,6 +280,18 @@ def run_on_a_terminal(page, command):
         return process.wait(LIMIT_S), shown.decode(errors="replace"), process.stderr.read()
 
 
+def interrupt(troubles, page, sends, command):
+    """Ctrl-C while a request that signals interrupt is sent anew ends it as Ctrl-C does at any other time."""
+    assert sends
+    for place in sends:
+        page.set(place, "EINTR", FOR_EVER)
+        with subprocess.Popen(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **page.options) as process:
+            heave.wait_for(lambda: page.failed() > TIMES, "the request is sent anew")
+            process.send_signal(signal.SIGINT)
+            _, stderr = process.communicate(timeout=LIMIT_S)
+        troubles.judge(process.returncode == 0 and not stderr, f"Ctrl-C in {name_of(place, 'EINTR')}: exit {process.returncode}: {stderr.strip()[-300:]}")
+
+
 def control(bench, _places, _judge):
     """What fails is told of with an exit code that is not 0, or does not matter: then the answer is there all the same."""
     page, troubles = Page(bench), Troubles()
@@ -297,8 +309,11 @@ def control(bench, _places, _judge):
             page.set(place, error)
             code, stdout, stderr = run(page, command)
             is_told = code in SANE_EXITS - {0} and stderr.startswith("heavectl: ")
-            troubles.judge(is_told or (code == expected == 0 and stdout), f"{name_of(place, error)}: {arguments[0]}: exit {code}: {stderr.strip()[-300:]}")
+            is_named = place.function not in ("poll", "recv") or error == "ECONNRESET" or os.strerror(number_of(error)) in stderr
+            troubles.judge((is_told and is_named) or (code == expected == 0 and stdout),
+                           f"{name_of(place, error)}: {arguments[0]}: exit {code}: {stderr.strip()[-300:]}")
             STORY.note(place, page)
+    interrupt(troubles, page, [place for place in places if place.function == "send"], [bench.bin / "heavectl", "watch", *named])
     page.close()
     troubles.done()
     left = missing(places)
