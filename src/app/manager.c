@@ -66,10 +66,21 @@ static void tell_state(manager_t *self, const snapshot_t *snapshot)
     self->fault = snapshot->fault.code;
 }
 
+/* Without it the manager ends what takes longer than its unit says. */
+static void tell_stopping(manager_t *self)
+{
+    char text[64];
+    (void)snprintf(text, sizeof text, "STOPPING=1\nEXTEND_TIMEOUT_USEC=%llu", (unsigned long long)self->untold_us);
+    self->untold_us = tell(self, text) ? 0 : self->untold_us;
+}
+
 void manager_serve(manager_t *self, const snapshot_t *snapshot, uint64_t now_us)
 {
     if (!self->is_ready_told) {
         self->is_ready_told = tell(self, "READY=1");
+    }
+    if (self->untold_us != 0) {
+        tell_stopping(self);
     }
     if (!self->is_told || self->state != snapshot->state || self->fault != snapshot->fault.code) {
         tell_state(self, snapshot);
@@ -83,11 +94,10 @@ void manager_serve(manager_t *self, const snapshot_t *snapshot, uint64_t now_us)
     }
 }
 
-void manager_stopping(const manager_t *self, uint64_t within_us)
+void manager_stopping(manager_t *self, uint64_t within_us)
 {
-    char text[64];
-    (void)snprintf(text, sizeof text, "STOPPING=1\nEXTEND_TIMEOUT_USEC=%llu", (unsigned long long)within_us);
-    (void)tell(self, text);
+    self->untold_us = within_us;
+    tell_stopping(self);
 }
 
 void manager_close(manager_t *self)

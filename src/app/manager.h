@@ -15,7 +15,8 @@
 typedef struct {
     uint64_t watchdog_us; /**< how often the manager wants to hear of it, halved; 0 = it does not */
     uint64_t next_us;
-    uint64_t cycle; /**< of the motion thread, when told last */
+    uint64_t cycle;     /**< of the motion thread, when told last */
+    uint64_t untold_us; /**< how long the shutdown may take, not told yet; 0 = told, or there is none */
     bool is_ready_told;
     bool is_told;
     state_t state;
@@ -32,9 +33,9 @@ void manager_ready(manager_t *self, uint64_t now_us);
 /** Often: tells changes of state, and pets the watchdog if the motion thread has run a cycle since the last time. */
 void manager_serve(manager_t *self, const snapshot_t *snapshot, uint64_t now_us);
 
-/** Once, when a shutdown has been asked for.
- *  @param within_us the longest that it takes: the manager waits as long, also where its unit says less */
-void manager_stopping(const manager_t *self, uint64_t within_us);
+/** Once, when a shutdown has been asked for. What the manager does not take is told again by manager_serve.
+ *  @param within_us above 0, the longest that it takes: the manager waits as long, also where its unit says less */
+void manager_stopping(manager_t *self, uint64_t within_us);
 
 /** Once, at the end. */
 void manager_close(manager_t *self);

@@ -170,14 +170,18 @@ static void test_manager_that_does_not_read_is_told_later(void)
     manager_ready(&m_manager, 0);
     serve_cycle(1, 1000);
     serve_cycle(2, 200000);
+    manager_stopping(&m_manager, 7000000);
     for (unsigned i = 0; i < taken; i++) {
         TEST_ASSERT_EQUAL_STRING("x", heard());
     }
     TEST_ASSERT_EQUAL_STRING("", heard());
     serve_cycle(3, 201000);
     TEST_ASSERT_EQUAL_STRING("READY=1", heard());
+    TEST_ASSERT_EQUAL_STRING("STOPPING=1\nEXTEND_TIMEOUT_USEC=7000000", heard());
     TEST_ASSERT_EQUAL_STRING("STATUS=ENGAGED", heard());
     TEST_ASSERT_EQUAL_STRING("WATCHDOG=1", heard());
+    serve_cycle(4, 202000);
+    TEST_ASSERT_EQUAL_STRING("", heard());
     (void)close(filler);
 }
 
