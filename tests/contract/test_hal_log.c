@@ -362,7 +362,7 @@ static void test_linux_flush_partly_taken_line_is_finished_later(void)
         status = linux_log_flush(&lin);
         TEST_ASSERT_TRUE(status == HV_OK || status == HV_ERR_AGAIN);
         struct pollfd readable = {.fd = master, .events = POLLIN};
-        TEST_ASSERT_EQUAL_MESSAGE(1, poll(&readable, 1, 5000), "bytes are missing");
+        TEST_ASSERT_EQUAL_MESSAGE(1, poll(&readable, 1, 60000), "bytes are missing");
         const ssize_t got = read(master, text_in + text_length, sizeof text_in - 1 - text_length);
         TEST_ASSERT_TRUE(got > 0);
         text_length += (size_t)got;

@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <netinet/in.h>
 #include <poll.h>
+#include <sched.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -143,11 +144,11 @@ void tearDown(void)
     fixture->close();
 }
 
-/* recv that gives the network time; HV_ERR_AGAIN only where nothing came for seconds. */
+/* recv that gives the network time; HV_ERR_AGAIN only where nothing came for a minute. */
 static hv_status_t recv_patiently(uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
 {
     hv_status_t status = HV_ERR_AGAIN;
-    for (int i = 0; i < 100 && status == HV_ERR_AGAIN; i++) {
+    for (int i = 0; i < 1200 && status == HV_ERR_AGAIN; i++) {
         fixture->wait();
         status = hal_udp_recv(hal, buffer, capacity, length, from);
     }
@@ -291,29 +292,41 @@ static void test_recv_longer_than_capacity_is_dropped_whole_and_told(void)
     }
 }
 
-/* However many are lost, each is either received or counted, those received are in order, and the queue works on afterwards. */
-static void test_dropped_queue_overrun_accounts_for_every_datagram(void)
+/* Numbers in order, until there is none at the moment; counts them, and keeps the last one. */
+static uint32_t receive_numbers(uint32_t *last)
 {
-    const uint32_t sent = 500;
-    uint32_t received = 0, dropped = 0, last = 0, number;
+    uint32_t count = 0, number;
     size_t length;
     hal_udp_peer_t from;
+    fixture->wait();
+    while (hal_udp_recv(hal, (uint8_t *)&number, sizeof number, &length, &from) == HV_OK) {
+        TEST_ASSERT_TRUE(number > *last);
+        *last = number;
+        count++;
+    }
+    return count;
+}
+
+/* However many are lost, each is either received or counted, those received are in order, and the queue works on afterwards:
+ * one more comes through once a busy kernel has brought all that was on its way. */
+static void test_dropped_queue_overrun_accounts_for_every_datagram(void)
+{
+    uint32_t sent = 0, received = 0, dropped = 0, last = 0;
     if (hal_udp_dropped(hal, &dropped) == HV_ERR_NOSUP) {
         TEST_IGNORE_MESSAGE("this backend does not count");
     }
     TEST_ASSERT_EQUAL_UINT32(0, dropped);
-    for (uint32_t i = 1; i <= sent; i++) {
-        (void)fixture->send(&i, sizeof i);
+    while (sent < 500) {
+        sent++;
+        (void)fixture->send(&sent, sizeof sent);
     }
-    fixture->wait();
-    while (hal_udp_recv(hal, (uint8_t *)&number, sizeof number, &length, &from) == HV_OK) {
-        TEST_ASSERT_TRUE(number > last);
-        last = number;
-        received++;
+    received += receive_numbers(&last);
+    for (int i = 0; i < 1200 && (last != sent || sent == 500); i++) {
+        sent++;
+        (void)fixture->send(&sent, sizeof sent);
+        received += receive_numbers(&last);
     }
-    number = sent + 1;
-    const hal_udp_peer_t peer = fixture->send(&number, sizeof number);
-    assert_received(&number, sizeof number, &peer);
+    TEST_ASSERT_EQUAL_UINT32(sent, last);
     TEST_ASSERT_EQUAL(HV_OK, hal_udp_dropped(hal, &dropped));
     TEST_ASSERT_TRUE(dropped > 0);
     TEST_ASSERT_EQUAL_UINT32(sent, received + dropped);
@@ -426,7 +439,7 @@ static uint32_t waited_of_20_ms(void)
     uint32_t waited_us = 0;
     const hal_udp_peer_t peer = send_linux("@", 1);
     struct pollfd arrival = {.fd = lin.fd, .events = POLLIN};
-    TEST_ASSERT_EQUAL_INT(1, poll(&arrival, 1, 10000)); /* a busy kernel takes its time from one socket to the other */
+    TEST_ASSERT_EQUAL_INT(1, poll(&arrival, 1, 60000)); /* a busy kernel takes its time from one socket to the other */
     (void)usleep(20000);
     assert_received("@", 1, &peer);
     TEST_ASSERT_EQUAL(HV_OK, hal_udp_waited(hal, &waited_us));
@@ -499,7 +512,7 @@ static void test_filter_length_decides(void)
 static void assert_dropped(uint32_t before, uint32_t count)
 {
     uint32_t dropped = before;
-    for (unsigned i = 0; i < 100 && dropped - before < count; i++) {
+    for (unsigned i = 0; i < 1200 && dropped - before < count; i++) {
         if (i > 0) {
             wait_linux();
         }
@@ -608,9 +621,19 @@ static void run_linux(void)
     RUN_TEST(test_linux_close_twice_and_recv_after_it_do_no_harm);
 }
 
+/* Datagrams that one processor sends arrive in their order: a busy kernel leaves them in a queue of each processor's own. */
+static void stay_on_this_processor(void)
+{
+    cpu_set_t here;
+    CPU_ZERO(&here);
+    CPU_SET((size_t)sched_getcpu(), &here);
+    (void)sched_setaffinity(0, sizeof here, &here);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    stay_on_this_processor();
     for (size_t i = 0; i < sizeof k_fixtures / sizeof k_fixtures[0]; i++) {
         fixture = &k_fixtures[i];
         contract_backend = fixture->name;
