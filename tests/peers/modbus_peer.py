@@ -5,7 +5,7 @@
         line.plan[5] = Fault.LATE          # the fifth question from now
         devices.set(1, 3, 40, 4711)        # unit, function that reads it, address, value
         ... a master on line.address ...
-        devices.written                    # [(unit, address, [values])] as they came in
+        devices.written                    # [(unit, address, [values])] as they came in, and when: devices.written_s
 
 Faults are events, not times: what comes late comes after the next question.
 """
@@ -55,7 +55,8 @@ class Devices:
     elsewhere."""
 
     def __init__(self, kind, units=(1, 2), holding=((0, VALUES),)):
-        self.kind, self.units, self.holding, self.written, self.lock = kind, units, holding, [], threading.Lock()
+        self.kind, self.units, self.holding, self.lock = kind, units, holding, threading.Lock()
+        self.written, self.written_s = [], []
         self.loop = asyncio.new_event_loop()
         self.thread = threading.Thread(target=self.loop.run_forever, daemon=True)
         self.ours = None
@@ -97,6 +98,7 @@ class Devices:
             values = pdu.bits if pdu.function_code in (5, 15) else pdu.registers
             with self.lock:
                 self.written.append((pdu.dev_id, pdu.address, list(values)))
+                self.written_s.append(time.monotonic())
         return pdu
 
     def set(self, unit, function, address, *values):
@@ -105,9 +107,21 @@ class Devices:
     def get(self, unit, function, address):
         return self.run(self.server.async_getValues(unit, function, address, 1))[0]
 
+    def written_since(self, count):
+        """What came in after the first so many: [(when, unit, address, [values])]."""
+        with self.lock:
+            return [(at_s, *what) for at_s, what in zip(self.written_s[count:], self.written[count:])]
+
     def values_written(self, unit, address):
         with self.lock:
             return [values[0] for at, where, values in self.written if (at, where) == (unit, address)]
+
+
+def steps(setpoints):
+    """[(step, s)] from each set-point to the next, of [(when it came in, set-point)]: how far, and within what time the gateway has asked for both at most.
+    When it asked for one is not known; the one before that had come in by then."""
+    for before, (_, last), (at_s, now) in zip([setpoints[0], *setpoints], setpoints, setpoints[1:]):
+        yield abs(now - last), at_s - before[0]
 
 
 class Fault(enum.Enum):

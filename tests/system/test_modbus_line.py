@@ -23,7 +23,7 @@ TOP = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(TOP / "tests/peers"))
 LONG_US, SHORT_US = 500000, 50000
 TRIES = 10
-PATIENCE_S = 30
+PATIENCE_S = 60
 FINE, NO_DEVICE, REFUSED, UNREACHABLE = 0, 2, 7, 8
 HOLDING, INPUT = 3, 4
 KINDS = ("tcp", "serial")
