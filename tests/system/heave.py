@@ -20,8 +20,9 @@ from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[2]
 WAIT_S = 60  # for anything that has to happen: says that it never will, not that it was slow
-LOOK_S = 0.01  # between two looks whether it has
-STATUS_LOOK_S = 0.1 if "HEAVE_OWN_KERNEL" in os.environ else LOOK_S  # each starts a program, which takes long there, and no virtual time
+HAS_OWN_KERNEL = "HEAVE_OWN_KERNEL" in os.environ  # where to start a program takes long, and mostly no time
+LOOK_S = 0.01 if HAS_OWN_KERNEL else 0.05  # between two looks whether it has: most of them start a program
+STATUS_LOOK_S = 0.1 if HAS_OWN_KERNEL else LOOK_S
 
 
 PORTS = range(20000, 32000)  # below those that the kernel gives to whoever asks for any
@@ -65,7 +66,7 @@ class Guard:
     """malloc_guard.c around one heaved, and what it found."""
 
     cycles = {True: 0, False: 0}  # of all heaved so far, by whether page faults are judged
-    has_own_faults = "HEAVE_OWN_KERNEL" in os.environ  # User Mode Linux learns by faults what a processor reads in its tables, locked or not
+    has_own_faults = HAS_OWN_KERNEL  # User Mode Linux learns by faults what a processor reads in its tables, locked or not
 
     def __init__(self, library, environment):
         self.report_fd = os.memfd_create("guard")
@@ -210,6 +211,10 @@ class Bench:
     def wait_state(self, *states):
         return wait_for(lambda: (lambda status: status if status["state"] in states else None)(self.status()), f"state {' or '.join(states)}",
                         STATUS_LOOK_S)
+
+    def reset(self):
+        """Until it leads back: it is given up after two seconds, which a busy machine may need for the line of the drives alone."""
+        wait_for(lambda: (self.ctl("reset"), self.status()["state"] == "OFF")[1], "a reset leads back", 0.5)
 
     def sender(self):
         return Sender(self.port)

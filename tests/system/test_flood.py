@@ -90,10 +90,9 @@ def counted(counters):
 def settled(bench):
     """The counters, once nothing useless comes through any more."""
     def look():
-        before = counted(bench.status()["counters"])[1]
-        time.sleep(0.2)
-        now = bench.status()["counters"]
-        return now if counted(now)[1] == before else None
+        before = bench.status()
+        now = heave.wait_for(lambda: (lambda status: status if status["cycle"] > before["cycle"] + 200 else None)(bench.status()), "it has looked often")
+        return now["counters"] if counted(now["counters"])[1] == counted(before["counters"])[1] else None
     return heave.wait_for(look, "the program sees no more of the flood")
 
 

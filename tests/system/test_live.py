@@ -22,6 +22,7 @@ from pathlib import Path
 import heave
 import tap
 
+TRIES = 5  # for what has to be done within seconds
 COMMANDS = ["engage", "hold", "resume", "park", "reset", "shutdown"]
 MANUAL = {"platform__engage": "manual"}
 ELSEWHERE = {"platform__engage": "manual", "sim__start_extension_mm": "61.7", "sim__homed": "no"}
@@ -134,12 +135,19 @@ def without_a_daemon(bench):
 
 def watches_by_line(bench):
     daemon = bench.start()
-    run = bench.ctl("--for", "1.2", "watch")
-    assert run.returncode == 0 and 1 <= len(run.stdout.splitlines()) <= 3 and "\x1b" not in run.stdout, run
-    run = bench.ctl("--json", "--for", "1", "--hz", "50", "watch")
-    answers = [json.loads(line) for line in run.stdout.splitlines()]
-    cycles = [answer["cycle"] for answer in answers]
-    assert run.returncode == 0 and len(answers) > 5 and cycles == sorted(cycles), len(answers)
+
+    def watch(least, *options):
+        """As many lines as a busy machine brings only after some tries; and how long the last one took."""
+        started_s = time.monotonic()
+        run = bench.ctl(*options, "watch")
+        assert run.returncode == 0, run
+        return (run.stdout.splitlines(), time.monotonic() - started_s) if run.stdout.count("\n") >= least else None
+
+    lines, took_s = heave.wait_for(lambda: watch(1, "--for", "1.2"), "a line")
+    assert took_s >= 1.2 and len(lines) <= took_s + 2 and "\x1b" not in "".join(lines), (took_s, lines)
+    lines, _ = heave.wait_for(lambda: watch(6, "--json", "--for", "1", "--hz", "50"), "more than one a second")
+    cycles = [json.loads(line)["cycle"] for line in lines]
+    assert cycles == sorted(cycles), cycles
     assert bench.stop(daemon) == 0
 
 
@@ -359,7 +367,7 @@ def tells_the_service_manager(bench):
             while not heard or text not in heard[-1]:
                 heard.append(manager.recv(500).decode())
 
-        daemon = bench.start(environment={"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "100000"})
+        daemon = bench.start(environment={"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "500000"})  # ten fit into the socket, where a busy machine leaves them
         hear_until("READY=1")
         if "STATUS=ENGAGED" not in heard:
             hear_until("STATUS=ENGAGED")
@@ -386,12 +394,17 @@ def signal_settles(bench, number):
 
 
 def second_signal_ends_at_once(bench):
-    daemon = bench.start()
-    bench.wait_state("ENGAGED")
-    daemon.send_signal(signal.SIGINT)
-    bench.wait_state("SETTLING")
-    assert bench.stop(daemon, signal.SIGINT) == 1
-    assert "second signal" in daemon.log.read_text() and not bench.socket.exists()
+    for _ in range(TRIES):
+        daemon = bench.start()
+        bench.wait_state("ENGAGED")
+        daemon.send_signal(signal.SIGINT)
+        heave.wait_for(lambda: "-> SETTLING" in daemon.log.read_text(), "it settles")
+        code, log = bench.stop(daemon, signal.SIGINT), daemon.log.read_text()
+        assert not bench.socket.exists()
+        if "SETTLED -> OFF" not in log:
+            break
+        assert code in (0, 1), log  # the signal came too late on a busy machine
+    assert code == 1 and "second signal" in log, log
 
 
 def hangup_reads_the_configuration_again(bench):
@@ -405,8 +418,7 @@ def hangup_reads_the_configuration_again(bench):
         sender.stream(0.3, wave)
         daemon.send_signal(signal.SIGHUP)
         said("has been read again")
-        sender.stream(0.3, wave)
-        assert bench.status()["state"] == "ENGAGED"
+        heave.wait_for(lambda: sender.stream(0.3, wave) or bench.status()["state"] == "ENGAGED", "ENGAGED as long as there are frames")
     log = daemon.log.read_text()
     assert re.search(r"platform.ini:\d+: \[geometry\] stroke_mm: 199 needs a restart; 200 stays", log), log
     assert re.search(r"platform.ini:\d+: \[udp\] silence_hold_ms: 700 from now on", log), log
@@ -515,9 +527,10 @@ def full_disk(bench):
 def strangers_are_refused(bench):
     daemon = bench.start(config=bench.write_config("allow.ini", udp__allow="10.0.0.0/8, 192.168.7.1"))
     with bench.sender() as sender:
-        sender.stream(0.3, wave)
-    counters = heave.wait_for(lambda: (lambda c: c if c["refused_senders"] > 5 else None)(bench.status()["counters"]), "counted")
-    assert counters["datagrams"] == 0, counters
+        for i in range(10):
+            sender.send(wave(i * 0.02))
+    counters = heave.wait_for(lambda: (lambda c: c if c["refused_senders"] >= 10 else None)(bench.status()["counters"]), "counted")
+    assert counters["datagrams"] == 0 and counters["refused_senders"] == 10, counters
     assert bench.stop(daemon) == 0
 
 

@@ -22,6 +22,7 @@ HEAVED, FIRST, SECOND, STRANGER = "10.77.0.1", "10.77.0.2", "10.77.0.3", "10.77.
 MOVED = "10.77.0.66"  # what a lease may change FIRST to
 OUTSIDE = "192.0.2.7"
 TAKEOVER_MS, SILENCE_MS, ENGAGE_MM_S = 2500, 1000, 150
+PATIENCE_MS = 60000  # where nobody is to take over, however late a busy machine lets its driver be
 PERIOD_S = 0.02
 PROBE = "ip link set lo up && ip link add br0 type bridge && ip link add e0 type veth peer name e1"
 FAR = "@A6:0,0,0,0,0,40,0#"
@@ -270,7 +271,7 @@ def two_senders(net):
 def spoofed(net):
     """Addresses outside `allow`, in any number, change nothing; who takes the driver's address can do what the driver can, within the limits."""
     first, second, stranger = net.host(FIRST), net.host(SECOND), net.host(STRANGER)
-    net.set_udp(allow=f"{FIRST}, 10.77.0.128/25")
+    net.set_udp(allow=f"{FIRST}, 10.77.0.128/25", takeover_ms=PATIENCE_MS)
     net.up()
     first.stream(port=net.port, texts=[wave(i * PERIOD_S) for i in range(400)])
     net.wait_more(10, "accepted", "A6")
@@ -311,6 +312,7 @@ def spoofed(net):
 def odd_datagrams(net):
     """Broadcast and fragments are as any others, what is not for this machine is not heard."""
     first, stranger = net.host(FIRST), net.host(STRANGER)
+    net.set_udp(takeover_ms=PATIENCE_MS)
     net.up()
     first.stream(port=net.port, texts=[FAR])
     net.wait_height(40)
