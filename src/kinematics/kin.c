@@ -171,8 +171,9 @@ static void set_hinged_yaw(kin_placement_t *at)
     at->sine_q62[AXIS_YAW] = fx_mul_div(sine_product_q61, Q62_ONE, divisor_q61);
 }
 
-/* Sines and cosines of roll, pitch and the yaw that is commanded or follows. */
-static void set_angles(const kin_t *self, const pose_t *pose, kin_placement_t *at)
+/* Sines and cosines of roll, pitch and the yaw that is commanded or follows. Out of line: where gcc sees that the yaw comes from
+ * three places it takes its sign apart there, and then needs three multiplications for each product with it. */
+HV_OUT_OF_LINE static void set_angles(const kin_t *self, const pose_t *pose, kin_placement_t *at)
 {
     fx_sincos_deg(pose->axis_q32[AXIS_ROLL], &at->sine_q62[AXIS_ROLL], &at->cosine_q62[AXIS_ROLL]);
     fx_sincos_deg(pose->axis_q32[AXIS_PITCH], &at->sine_q62[AXIS_PITCH], &at->cosine_q62[AXIS_PITCH]);
@@ -239,23 +240,27 @@ static void hinged_translation(const kin_t *self, const kin_placement_t *at, int
     translation_q44[1] -= fx_mul_high(r[1][0], self->hinge_radius_mm_q46);
 }
 
-/* Where the motion reference point is. */
+/* Where the motion reference point is. Added up in each case: values that are stored one by one and then read two at a time, as
+ * an array of translations would be, wait for all stores before them. */
 static void set_mrp(const kin_t *self, const pose_t *pose, kin_placement_t *at)
 {
-    int64_t translation_q44[3] = {0, 0, q44_from_q32(pose->axis_q32[AXIS_Z])};
+    const int64_t *centre_q44 = self->centre_mm_q44;
+    int64_t *mrp_q44 = at->mrp_mm_q44;
+    mrp_q44[2] = centre_q44[2] + q44_from_q32(pose->axis_q32[AXIS_Z]);
     switch (self->kind) {
     case KIN_HEXAPOD:
-        translation_q44[0] = q44_from_q32(pose->axis_q32[AXIS_X]);
-        translation_q44[1] = q44_from_q32(pose->axis_q32[AXIS_Y]);
+        mrp_q44[0] = centre_q44[0] + q44_from_q32(pose->axis_q32[AXIS_X]);
+        mrp_q44[1] = centre_q44[1] + q44_from_q32(pose->axis_q32[AXIS_Y]);
         break;
     case KIN_TRIPOD:
+        mrp_q44[0] = centre_q44[0];
+        mrp_q44[1] = centre_q44[1];
         break;
     case KIN_TRIPOD_3RPS:
-        hinged_translation(self, at, translation_q44);
+        hinged_translation(self, at, mrp_q44);
+        mrp_q44[0] += centre_q44[0];
+        mrp_q44[1] += centre_q44[1];
         break;
-    }
-    for (unsigned axis = 0; axis < 3; axis++) {
-        at->mrp_mm_q44[axis] = self->centre_mm_q44[axis] + translation_q44[axis];
     }
 }
 
@@ -270,20 +275,54 @@ hv_status_t kin_place(const kin_t *self, const pose_t *pose, kin_placement_t *pl
     return HV_OK;
 }
 
-/* Turned arm and vector of a leg. */
-static inline void set_leg(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, int64_t arm_mm_q44[3],
-                           int64_t vector_mm_q44[3])
+/* The point of the plate that is straight above its motion reference point, at the height of a joint. */
+static void set_hub(const kin_placement_t *placement, int64_t height_mm_q46, int64_t hub_mm_q44[3])
 {
     for (unsigned axis = 0; axis < 3; axis++) {
-        arm_mm_q44[axis] = rotate_q44(placement->rotation_q62[axis], self->arm_mm_q46[cylinder]);
-        vector_mm_q44[axis] = placement->mrp_mm_q44[axis] + arm_mm_q44[axis] - self->base_mm_q44[cylinder][axis];
+        hub_mm_q44[axis] = placement->mrp_mm_q44[axis] + fx_mul_high(placement->rotation_q62[axis][2], height_mm_q46);
+    }
+}
+
+/* The vector of a leg, whose arm is turned as by rotate_q44(). */
+static inline void set_vector(const kin_t *self, const kin_placement_t *placement, const int64_t hub_mm_q44[3], unsigned cylinder,
+                              int64_t vector_mm_q44[3])
+{
+    const int64_t *arm_q46 = self->arm_mm_q46[cylinder];
+    for (unsigned axis = 0; axis < 3; axis++) {
+        const q62_t *row_q62 = placement->rotation_q62[axis];
+        const int64_t aside_q44 = fx_mul_high(row_q62[0], arm_q46[0]) + fx_mul_high(row_q62[1], arm_q46[1]);
+        vector_mm_q44[axis] = hub_mm_q44[axis] + aside_q44 - self->base_mm_q44[cylinder][axis];
     }
 }
 
 void kin_leg(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, kin_leg_t *leg)
 {
-    set_leg(self, placement, cylinder, leg->arm_mm_q44, leg->vector_mm_q44);
+    int64_t hub_mm_q44[3];
+    set_hub(placement, self->arm_mm_q46[cylinder][2], hub_mm_q44);
+    set_vector(self, placement, hub_mm_q44, cylinder, leg->vector_mm_q44);
+    for (unsigned axis = 0; axis < 3; axis++) {
+        leg->arm_mm_q44[axis] = leg->vector_mm_q44[axis] + self->base_mm_q44[cylinder][axis] - placement->mrp_mm_q44[axis];
+    }
     leg->length_mm_q44 = (int64_t)fx_sqrt_u128(fx_square3(leg->vector_mm_q44));
+}
+
+/* Squares of the lengths of all legs. Joints of a plate mostly are at one height: then a third of the products is worked out
+ * once. */
+static void square_legs(const kin_t *self, const kin_placement_t *placement, fx_u128_t square_q88[CYLINDERS_MAX])
+{
+    const unsigned cylinders = self->cylinders;
+    int64_t height_mm_q46 = self->arm_mm_q46[0][2];
+    int64_t hub_mm_q44[3];
+    set_hub(placement, height_mm_q46, hub_mm_q44);
+    for (unsigned i = 0; i < cylinders; i++) {
+        int64_t vector_mm_q44[3];
+        if (HV_RARELY(self->arm_mm_q46[i][2] != height_mm_q46)) {
+            height_mm_q46 = self->arm_mm_q46[i][2];
+            set_hub(placement, height_mm_q46, hub_mm_q44);
+        }
+        set_vector(self, placement, hub_mm_q44, i, vector_mm_q44);
+        square_q88[i] = fx_square3(vector_mm_q44);
+    }
 }
 
 hv_status_t kin_inverse(const kin_t *self, const pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX])
@@ -293,11 +332,11 @@ hv_status_t kin_inverse(const kin_t *self, const pose_t *pose, q32_t extension_m
     if (status != HV_OK) {
         return status;
     }
+    fx_u128_t square_q88[CYLINDERS_MAX];
+    square_legs(self, &placement, square_q88);
     const unsigned cylinders = self->cylinders;
     for (unsigned i = 0; i < cylinders; i++) {
-        int64_t arm_mm_q44[3], vector_mm_q44[3];
-        set_leg(self, &placement, i, arm_mm_q44, vector_mm_q44);
-        extension_mm_q32[i] = fx_root_q32(fx_square3(vector_mm_q44)) - self->retracted_mm_q32[i];
+        extension_mm_q32[i] = fx_root_q32(square_q88[i]) - self->retracted_mm_q32[i];
     }
     return HV_OK;
 }
