@@ -181,12 +181,14 @@ static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32
     if (self->phase == STREAM_RUNNING && stream_repeat_watch(self, now_us, sample_q32)) {
         return;
     }
+    const uint32_t interval_us = stream_clock_elapsed_us(&self->clock, now_us);
     const bool is_thinned = is_thinned_anew(self, now_us);
     const unsigned periods = judge_periods(self, now_us, sample_q32);
     const bool is_new_rate = stream_clock_take(&self->clock, now_us, periods) || is_thinned;
     stream_curve_pace(&self->curve, self->style, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us);
     if (is_new_rate) {
-        stream_curve_regrid(&self->curve, self->style, self->previous, sample_q32);
+        stream_curve_regrid(&self->curve, self->style, self->previous, stream_clock_periods_in(&self->clock, interval_us),
+                            sample_q32);
         self->between_q32 = 0;
         self->rate_q32[0] = self->rate_q32[1] = stream_clock_span(&self->clock, self->cycle_us);
         return;

@@ -123,6 +123,11 @@ static unsigned periods_in_gap(int64_t gap_us_q16, int64_t period_us_q16)
     return gap_us_q16 * 5 < period_us_q16 * 8 ? 1u : (unsigned)((gap_us_q16 + period_us_q16 / 2) / period_us_q16);
 }
 
+unsigned stream_clock_periods_in(const stream_clock_t *self, uint32_t interval_us)
+{
+    return (unsigned)fx_clamp(periods_in_gap((int64_t)interval_us * STREAM_US_Q16, self->period_us_q16), 1, INT32_MAX);
+}
+
 /* Mean period over the newest intervals if losses are counted with the given one. An interval too short to be a period belongs to
  * the one before it, which was so much too long. */
 static int64_t mean_period(const stream_clock_t *self, unsigned gaps, int64_t period_us_q16)

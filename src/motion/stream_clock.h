@@ -25,6 +25,9 @@ bool stream_clock_is_near(const stream_clock_t *self, uint64_t now_us);
 /** True if a sample at now_us comes too soon to be of the next period, whatever the jitter. */
 bool stream_clock_is_soon(const stream_clock_t *self, uint64_t now_us);
 
+/** Periods that so long an interval between two samples is, seen alone: at least 1. The period is known. */
+unsigned stream_clock_periods_in(const stream_clock_t *self, uint32_t interval_us);
+
 /** us since the newest sample, at most UINT32_MAX; 0 if now_us is before it. */
 uint32_t stream_clock_elapsed_us(const stream_clock_t *self, uint64_t now_us);
 

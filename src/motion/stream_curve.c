@@ -138,6 +138,13 @@ static q32_t soften(stream_curve_t *self, int32_t guessed)
     return fx_mul_div(self->grip_q32, Q32_ONE, wished_q32);
 }
 
+/* How fast the curve may leave a way that may have been a jump: the softer it comes back, the further it swings out by that. At
+ * 60 Hz a sixteenth of the way in a period. */
+static q32_t jump_speed(const stream_curve_t *self, q32_t off_q32)
+{
+    return fx_mul_shift(fx_abs(off_q32), fx_clamp(self->grip_q32 * 5 / 16, 0, Q32_ONE / 16), 32);
+}
+
 /* The points at head are others now: what the curve is off them, and how that changes, so that it goes on as it was. The change
  * is taken over two periods, as the first of them may be the error of a single guess. */
 static void keep_going(stream_curve_t *self, q32_t was_q32[3][AXES_MAX], int32_t guessed)
@@ -147,7 +154,7 @@ static void keep_going(stream_curve_t *self, q32_t was_q32[3][AXES_MAX], int32_t
     points_at_head(self, is_q32);
     for (unsigned axis = 0; axis < self->axes; axis++) {
         const q32_t here_q32 = was_q32[0][axis] - is_q32[0][axis];
-        const q32_t most_q32 = 4 * fx_abs(self->lead[axis].first_q32) + fx_abs(here_q32) / 16;
+        const q32_t most_q32 = 4 * fx_abs(self->lead[axis].first_q32) + jump_speed(self, here_q32);
         const q32_t change_q32 = fx_clamp((here_q32 - (was_q32[2][axis] - is_q32[2][axis])) / 2, -most_q32, most_q32);
         self->off_q32[axis][0] += here_q32;
         self->off_q32[axis][1] += fx_mul_shift(change_q32, share_q32, 32);
@@ -501,12 +508,16 @@ static void control_from(stream_style_t style, q32_t pos_q32, q32_t vel_q32, q32
     control_q32[2] = middle_q32 + vel_q32 + acc / 2;
 }
 
-HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const history_t *now, const q32_t *sample_q32)
+HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const history_t *now, unsigned periods,
+                                  const q32_t *sample_q32)
 {
     const int64_t n_q16 = self->period_cycles_q16;
     self->ahead = 0;
+    self->is_off = false; /* what it was off was per period of the old grid, and so was the grip */
+    (void)soften(self, self->patience);
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        const q32_t step_q32 = sample_q32[axis] - self->last_q32[axis];
+        const q32_t way_q32 = sample_q32[axis] - self->last_q32[axis];
+        const q32_t step_q32 = (int32_t)periods > self->patience ? 0 : way_q32 / (int32_t)periods;
         for (int32_t back = 0; back < STREAM_POINTS - AHEAD_MAX; back++) {
             self->point_q32[slot(self->head - (uint32_t)back)][axis] = sample_q32[axis] - back * step_q32;
         }
@@ -516,7 +527,7 @@ HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, co
         control_from(style, now[axis].pos_q32, vel_q32, acc_q32, control_q32);
         q32_t *const off_q32 = self->off_q32[axis];
         off_q32[0] = control_q32[2] - led_point(self, axis, self->head - 1);
-        const q32_t most_q32 = fx_abs(vel_q32) + fx_abs(off_q32[0]) / 16;
+        const q32_t most_q32 = fx_abs(vel_q32) + jump_speed(self, off_q32[0]);
         off_q32[1] = fx_clamp(control_q32[2] - control_q32[1] - step_q32, -most_q32, most_q32);
         off_q32[2] = 0;
         for (unsigned i = 0; i < 3; i++) {
@@ -524,8 +535,6 @@ HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, co
         }
     }
     copy_point(self, self->last_q32, sample_q32);
-    self->is_off = false; /* what it was off was per period of the old grid, and so was the grip */
-    (void)soften(self, self->patience);
     put_control(self);
 }
 

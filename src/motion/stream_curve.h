@@ -23,8 +23,10 @@ void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sa
 
 /** The sender has another rate, and the curve another grid, which begins with this sample at head. The curve goes on as it was
  * and comes over to the samples softly. After stream_curve_pace(); the phase behind head is 0 then.
- *  @param now where the curve is: position, velocity and acceleration of each axis */
-void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const history_t *now, const q32_t *sample_q32);
+ *  @param now where the curve is: position, velocity and acceleration of each axis
+ *  @param periods of the new grid since the sample before, at least 1: after a gap its step is not the way of one period */
+void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const history_t *now, unsigned periods,
+                         const q32_t *sample_q32);
 
 /** How far a sample is from where the motion of the last ones would be so many periods later; and the way of the last period.
  * Sums over all axes. */

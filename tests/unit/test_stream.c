@@ -954,6 +954,35 @@ static void test_stream_step_other_share_of_a_flood_is_another_rate(void)
     }
 }
 
+/* A flood stands, falls silent, and goes on at a common rate from somewhere else: what it was away is no period of the new rate,
+ * and the way between no speed. */
+static void test_stream_step_flood_that_pauses_and_jumps_does_not_swing(void)
+{
+    for (unsigned n = 0; n < 40; n++) {
+        const double flood_hz = 450 + 150 * (n % 5), pause_s = 0.1 + 0.2 * (n / 5 % 4), rate_hz = n < 20 ? 50 : 100;
+        start(n % 2 == 0 ? STREAM_SMOOTH : STREAM_FAST);
+        double at = 0.001, lowest = 0, highest = 0;
+        for (; at < 2; at += 1 / flood_hz) {
+            send(at, 22.6);
+        }
+        for (at += pause_s; at < 5; at += 1 / rate_hz) {
+            send(at + 0.005 * random_unit(), 0);
+        }
+        render(0, 0, 6000);
+        for (int ms = 0; ms < 6000; ms++) {
+            lowest = fmin(lowest, mm(s_ref[ms].pos_q32));
+            highest = fmax(highest, mm(s_ref[ms].pos_q32));
+        }
+        if (getenv("STREAM_FIGURES")) {
+            printf("flood of %3.0f Hz, pause of %.1f s, %3.0f Hz: from %.2f to %.2f mm\n", flood_hz, pause_s, rate_hz, lowest,
+                   highest);
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(0.1, 0, lowest);
+        TEST_ASSERT_DOUBLE_WITHIN(8.5, 22.6, highest); /* a way in so short a time may have been a motion */
+        assert_at_rest(0, &s_ref[5999]);
+    }
+}
+
 /* A loop that sends the newest value of a slower game, again and again. */
 static void test_stream_step_repeated_values_are_followed_at_their_own_rate(void)
 {
@@ -1115,6 +1144,7 @@ int main(void)
     RUN_TEST(test_stream_step_slow_coarse_motion_repeats_nothing);
     RUN_TEST(test_stream_step_repeats_are_samples_where_values_are_rare_or_the_period_is_stated);
     RUN_TEST(test_stream_step_other_share_of_a_flood_is_another_rate);
+    RUN_TEST(test_stream_step_flood_that_pauses_and_jumps_does_not_swing);
     RUN_TEST(test_stream_step_noise_stays_bounded);
     return UNITY_END();
 }
