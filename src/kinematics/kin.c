@@ -275,6 +275,15 @@ hv_status_t kin_place(const kin_t *self, const pose_t *pose, kin_placement_t *pl
     return HV_OK;
 }
 
+void kin_leg(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, kin_leg_t *leg)
+{
+    for (unsigned axis = 0; axis < 3; axis++) {
+        leg->arm_mm_q44[axis] = rotate_q44(placement->rotation_q62[axis], self->arm_mm_q46[cylinder]);
+        leg->vector_mm_q44[axis] = placement->mrp_mm_q44[axis] + leg->arm_mm_q44[axis] - self->base_mm_q44[cylinder][axis];
+    }
+    leg->length_mm_q44 = (int64_t)fx_sqrt_u128(fx_square3(leg->vector_mm_q44));
+}
+
 /* The point of the plate that is straight above its motion reference point, at the height of a joint. */
 static void set_hub(const kin_placement_t *placement, int64_t height_mm_q46, int64_t hub_mm_q44[3])
 {
@@ -283,7 +292,7 @@ static void set_hub(const kin_placement_t *placement, int64_t height_mm_q46, int
     }
 }
 
-/* The vector of a leg, whose arm is turned as by rotate_q44(). */
+/* The vector of a leg, as kin_leg() has it. */
 static inline void set_vector(const kin_t *self, const kin_placement_t *placement, const int64_t hub_mm_q44[3], unsigned cylinder,
                               int64_t vector_mm_q44[3])
 {
@@ -293,17 +302,6 @@ static inline void set_vector(const kin_t *self, const kin_placement_t *placemen
         const int64_t aside_q44 = fx_mul_high(row_q62[0], arm_q46[0]) + fx_mul_high(row_q62[1], arm_q46[1]);
         vector_mm_q44[axis] = hub_mm_q44[axis] + aside_q44 - self->base_mm_q44[cylinder][axis];
     }
-}
-
-void kin_leg(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, kin_leg_t *leg)
-{
-    int64_t hub_mm_q44[3];
-    set_hub(placement, self->arm_mm_q46[cylinder][2], hub_mm_q44);
-    set_vector(self, placement, hub_mm_q44, cylinder, leg->vector_mm_q44);
-    for (unsigned axis = 0; axis < 3; axis++) {
-        leg->arm_mm_q44[axis] = leg->vector_mm_q44[axis] + self->base_mm_q44[cylinder][axis] - placement->mrp_mm_q44[axis];
-    }
-    leg->length_mm_q44 = (int64_t)fx_sqrt_u128(fx_square3(leg->vector_mm_q44));
 }
 
 /* Squares of the lengths of all legs. Joints of a plate mostly are at one height: then a third of the products is worked out
