@@ -22,14 +22,20 @@ void hv_assert_failed(const char *file, int line)
     start_fail();
 }
 
-int main(void)
+/* Not in main(), whose variables take room on the stack for ever. */
+HV_OWN_FRAME static void prepare(void)
 {
     const gateway_io_t io = {port_udp(), cia402_hal(&drives), port_relays(), port_inputs(), port_log()};
-    event_t request;
-    uint64_t now_us = k_platform.cycle_us; /* 0 means "never" */
     if (cia402_init(&drives, &k_platform_drives, port_can()) != HV_OK || gateway_init(&gateway, &k_platform, &io) != HV_OK) {
         start_fail(); /* the tables are wrong */
     }
+}
+
+int main(void)
+{
+    event_t request;
+    uint64_t now_us = k_platform.cycle_us; /* 0 means "never" */
+    prepare();
     for (;;) {
         const uint32_t late = port_wait(k_platform.cycle_us);
         if (late > 0) {

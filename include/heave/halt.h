@@ -26,6 +26,7 @@ typedef struct {
 } halt_t;
 
 /** Plans the quickest stop within acceleration and jerk limits.
+ *  @param start may be self->start
  *  @param together so many axes, from the first on, take the same cycles, except one that this would carry out of its bounds or
  *                  beyond its speed; that one and the axes behind take their own */
 void halt_plan(halt_t *self, unsigned axes, unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits);

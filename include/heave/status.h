@@ -51,6 +51,14 @@ typedef enum {
 #define HV_OUT_OF_LINE
 #endif
 
+/** A function whose variables are apart from its callers', where memory is short: they take no room on the stack while its
+ * callers call others. */
+#if defined(__GNUC__) && defined(__OPTIMIZE_SIZE__)
+#define HV_OWN_FRAME __attribute__((noinline))
+#else
+#define HV_OWN_FRAME
+#endif
+
 /** Called when an HV_ASSERT fails: supplied by the program (hosted: print and abort; firmware: fail silent). Never returns. */
 void hv_assert_failed(const char *file, int line);
 

@@ -142,7 +142,7 @@ static void log_reject(gateway_t *self, const char *reason, frame_error_t error,
     self->reject_suppressed[error] = 0;
 }
 
-static void reject(gateway_t *self, const frame_reject_t *why, const hal_udp_peer_t *from, uint64_t now_us)
+HV_OWN_FRAME static void reject(gateway_t *self, const frame_reject_t *why, const hal_udp_peer_t *from, uint64_t now_us)
 {
     char reason[HAL_LOG_TEXT_MAX + 1];
     self->snapshot.counters.rejected[why->error]++;
@@ -151,7 +151,8 @@ static void reject(gateway_t *self, const frame_reject_t *why, const hal_udp_pee
 }
 
 /* A frame that is well formed but not for this platform. */
-static void refuse(gateway_t *self, frame_command_t command, const char *missing, const hal_udp_peer_t *from, uint64_t now_us)
+HV_OWN_FRAME static void refuse(gateway_t *self, frame_command_t command, const char *missing, const hal_udp_peer_t *from,
+                                uint64_t now_us)
 {
     char reason[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(reason, sizeof reason);
@@ -242,7 +243,7 @@ static void log_jumps(gateway_t *self, uint64_t now_us)
 }
 
 /* One line for the first frame of a sender that does not drive, and then at times. */
-static void log_other(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
+HV_OWN_FRAME static void log_other(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
 {
     if (self->other_logged_us != 0 && now_us - self->other_logged_us < REJECT_LOG_INTERVAL_US) {
         self->other_suppressed++;
@@ -265,7 +266,7 @@ static void log_other(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_
 }
 
 /* A sender takes over from another: the platform stops and goes to its first pose at engage speed. */
-static void change_owner(gateway_t *self, uint64_t now_us)
+HV_OWN_FRAME static void change_owner(gateway_t *self, uint64_t now_us)
 {
     char line[HAL_LOG_TEXT_MAX + 1];
     char peer[HAL_UDP_PEER_TEXT_MAX];
@@ -337,7 +338,7 @@ static motion_target_t here(const gateway_t *self, motion_space_t space)
 }
 
 /* False for a far jump that waits for a second frame. */
-static bool is_confirmed(gateway_t *self, const motion_target_t *target, uint64_t now_us)
+HV_OWN_FRAME static bool is_confirmed(gateway_t *self, const motion_target_t *target, uint64_t now_us)
 {
     const bool is_asked_for = self->settings.confirm_jump_mm_q16 != 0 || self->settings.confirm_jump_deg_q16 != 0;
     if (!is_asked_for || self->supervisor.state != STATE_ENGAGED) {

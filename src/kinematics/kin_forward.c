@@ -21,12 +21,12 @@
 static const uint8_t k_free_axes[] = {AXIS_ROLL, AXIS_PITCH, AXIS_YAW, AXIS_X, AXIS_Y, AXIS_Z};
 static const uint8_t k_tripod_axes[] = {AXIS_ROLL, AXIS_PITCH, AXIS_Z};
 
-/* The row of J of one leg, of at least LENGTH_MIN: the angles, then the translations. */
-static void set_row(const kin_t *self, const kin_rates_t *rates, const kin_leg_t *leg, int64_t row_q28[])
+/* The row of J of one leg: the angles, then the translations. */
+HV_OWN_FRAME static void set_row(const kin_t *self, const kin_rates_t *rates, const kin_direction_t *leg, int64_t row_q28[])
 {
-    int64_t direction_q28[3], arm_q28[3], moment_q28[3];
-    kin_leg_direction(self, leg, direction_q28, arm_q28);
-    kin_cross_q28(arm_q28, direction_q28, moment_q28);
+    const int64_t *direction_q28 = leg->direction_q28;
+    int64_t moment_q28[3];
+    kin_cross_q28(leg->arm_q28, direction_q28, moment_q28);
     row_q28[0] = kin_dot_q28(rates->turn_q28[AXIS_ROLL], moment_q28);
     row_q28[1] = kin_dot_q28(rates->turn_q28[AXIS_PITCH], moment_q28);
     switch (self->kind) {
@@ -47,27 +47,30 @@ static void set_row(const kin_t *self, const kin_rates_t *rates, const kin_leg_t
     }
 }
 
-/* J and the errors of the lengths at a pose. */
-static hv_status_t linearise(const kin_t *self, const q32_t length_q32[], const pose_t *pose, int64_t matrix_q28[][POSE_AXES],
-                             q32_t error_q32[])
+/* J and the errors of the lengths at a placed plate, for extensions whose lengths are in range. */
+HV_OWN_FRAME static hv_status_t set_rows(const kin_t *self, const q32_t extension_mm_q32[], const kin_placement_t *at,
+                                         int64_t matrix_q28[][POSE_AXES], q32_t error_q32[])
 {
-    kin_placement_t at;
     kin_rates_t rates;
-    const hv_status_t status = kin_place(self, pose, &at);
-    if (status != HV_OK) {
-        return status;
-    }
-    kin_rates(self, &at, &rates);
+    kin_rates(self, at, &rates);
     for (unsigned i = 0; i < self->cylinders; i++) {
-        kin_leg_t leg;
-        kin_leg(self, &at, i, &leg);
-        if (leg.length_mm_q44 < KIN_LENGTH_MIN_Q44) {
+        kin_direction_t leg;
+        if (!kin_leg_direction(self, at, i, &leg)) {
             return HV_ERR_RANGE;
         }
         set_row(self, &rates, &leg, matrix_q28[i]);
-        error_q32[i] = length_q32[i] - fx_shift_round(leg.length_mm_q44, KIN_GUARD_BITS);
+        error_q32[i] = extension_mm_q32[i] + self->retracted_mm_q32[i] - fx_shift_round(leg.length_mm_q44, KIN_GUARD_BITS);
     }
     return HV_OK;
+}
+
+/* J and the errors of the lengths at a pose. */
+static hv_status_t linearise(const kin_t *self, const q32_t extension_mm_q32[], const pose_t *pose,
+                             int64_t matrix_q28[][POSE_AXES], q32_t error_q32[])
+{
+    kin_placement_t at;
+    const hv_status_t status = kin_place(self, pose, &at);
+    return status == HV_OK ? set_rows(self, extension_mm_q32, &at, matrix_q28, error_q32) : status;
 }
 
 static q32_t find_largest(unsigned count, const q32_t values_q32[])
@@ -90,13 +93,13 @@ static void take_step(const kin_t *self, const q32_t step_q32[], const uint8_t a
 }
 
 /* Newton's method from *pose on. */
-static hv_status_t iterate(const kin_t *self, const q32_t length_q32[], pose_t *pose, unsigned *iterations)
+static hv_status_t iterate(const kin_t *self, const q32_t extension_mm_q32[], pose_t *pose, unsigned *iterations)
 {
     const uint8_t *axes = self->kind == KIN_HEXAPOD ? k_free_axes : k_tripod_axes;
     while (*iterations < KIN_FORWARD_ITERATIONS_MAX) {
         int64_t matrix_q28[CYLINDERS_MAX][POSE_AXES];
         q32_t step_q32[CYLINDERS_MAX];
-        const hv_status_t status = linearise(self, length_q32, pose, matrix_q28, step_q32);
+        const hv_status_t status = linearise(self, extension_mm_q32, pose, matrix_q28, step_q32);
         if (status != HV_OK) {
             return status;
         }
@@ -116,18 +119,17 @@ static hv_status_t iterate(const kin_t *self, const q32_t length_q32[], pose_t *
 hv_status_t kin_forward(const kin_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], const pose_t *guess, pose_t *pose,
                         unsigned *iterations)
 {
-    q32_t length_q32[CYLINDERS_MAX];
     unsigned steps = 0;
     hv_status_t status = HV_OK;
     for (unsigned i = 0; i < self->cylinders; i++) {
-        length_q32[i] = fx_add_sat(extension_mm_q32[i], self->retracted_mm_q32[i]);
-        if (length_q32[i] <= 0 || length_q32[i] > LENGTH_MAX_Q32) {
+        const q32_t length_q32 = fx_add_sat(extension_mm_q32[i], self->retracted_mm_q32[i]);
+        if (length_q32 <= 0 || length_q32 > LENGTH_MAX_Q32) {
             status = HV_ERR_RANGE;
         }
     }
     pose_t solution = *guess;
     if (status == HV_OK) {
-        status = iterate(self, length_q32, &solution, &steps);
+        status = iterate(self, extension_mm_q32, &solution, &steps);
     }
     if (status == HV_OK) {
         kin_constrain(self, &solution);

@@ -48,8 +48,16 @@ typedef struct {
 /** The true rates of roll and pitch at a placed plate; on a 3-RPS with what its hinges make of them. */
 void kin_rates(const kin_t *self, const kin_placement_t *at, kin_rates_t *rates);
 
-/** Direction of a leg of at least KIN_LENGTH_MIN_Q44, and its turned arm over 2^reach_shift mm. */
-void kin_leg_direction(const kin_t *self, const kin_leg_t *leg, int64_t direction_q28[3], int64_t arm_q28[3]);
+/** Where a leg points. */
+typedef struct {
+    int64_t direction_q28[3];
+    int64_t arm_q28[3]; /**< turned, over 2^reach_shift mm */
+    int64_t length_mm_q44;
+} kin_direction_t;
+
+/** Where the leg of one cylinder points.
+ *  @return false for a leg shorter than KIN_LENGTH_MIN_Q44 */
+bool kin_leg_direction(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, kin_direction_t *direction);
 
 /** a . b, for |a| |b| < 64. */
 static inline int64_t kin_dot_q28(const int64_t a_q28[3], const int64_t b_q28[3])

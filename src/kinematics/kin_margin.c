@@ -22,34 +22,24 @@ typedef struct {
     int64_t all_q44[TRIANGLE];
 } sums_t;
 
-/* One free motion of the plate: it turns about an axis through its motion reference point, which slides. */
-typedef struct {
-    int64_t turn_q28[3];
-    int64_t slide_q28[3];
-} free_motion_t;
-
-/* The free motions; as many as cylinders. */
-static void set_motions(const kin_t *self, const kin_placement_t *at, free_motion_t motion[])
+/* How a plate joint moves in one of the free motions, of which there are as many as cylinders. A hexapod's are turns about the
+ * three axes and slides along them; the other plates have roll, pitch and a slide upwards.
+ * @param rates of roll and pitch, of no use to a hexapod */
+HV_OWN_FRAME static void joint_velocity(const kin_t *self, const kin_rates_t *rates, unsigned motion, const int64_t arm_q28[3],
+                                        int64_t velocity_q28[3])
 {
-    kin_rates_t rates;
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        motion[i] = (free_motion_t){{0}, {0}};
+    const bool is_tilt = self->kind != KIN_HEXAPOD && motion < 2;
+    int64_t unit_q28[3] = {0};
+    unit_q28[motion % 3] = INT64_C(1) << 28;
+    for (unsigned axis = 0; axis < 3; axis++) {
+        velocity_q28[axis] = unit_q28[axis];
     }
-    if (self->kind == KIN_HEXAPOD) {
-        for (unsigned axis = 0; axis < 3; axis++) {
-            motion[axis].turn_q28[axis] = INT64_C(1) << 28;
-            motion[3 + axis].slide_q28[axis] = INT64_C(1) << 28;
-        }
-        return;
+    if (is_tilt || (self->kind == KIN_HEXAPOD && motion < 3)) {
+        kin_cross_q28(is_tilt ? rates->turn_q28[motion] : unit_q28, arm_q28, velocity_q28);
     }
-    kin_rates(self, at, &rates);
-    for (unsigned i = 0; i < 2; i++) {
-        for (unsigned axis = 0; axis < 3; axis++) {
-            motion[i].turn_q28[axis] = rates.turn_q28[i][axis];
-            motion[i].slide_q28[axis] = rates.slide_q28[i][axis];
-        }
+    for (unsigned axis = 0; is_tilt && axis < 3; axis++) {
+        velocity_q28[axis] += rates->slide_q28[motion][axis];
     }
-    motion[2].slide_q28[2] = INT64_C(1) << 28;
 }
 
 /* Where a matrix has an element; column <= row. */
@@ -59,16 +49,12 @@ static unsigned element(unsigned row, unsigned column)
 }
 
 /* Adds a cylinder's part to the sums. */
-static void add_leg(const kin_t *self, const free_motion_t motion[], const kin_leg_t *leg, sums_t *sums)
+HV_OWN_FRAME static void add_leg(const kin_t *self, const kin_rates_t *rates, const kin_direction_t *leg, sums_t *sums)
 {
-    int64_t direction_q28[3], arm_q28[3], velocity_q28[POSE_AXES][3], speed_q28[POSE_AXES];
-    kin_leg_direction(self, leg, direction_q28, arm_q28);
+    int64_t velocity_q28[POSE_AXES][3], speed_q28[POSE_AXES];
     for (unsigned i = 0; i < self->cylinders; i++) {
-        kin_cross_q28(motion[i].turn_q28, arm_q28, velocity_q28[i]);
-        for (unsigned axis = 0; axis < 3; axis++) {
-            velocity_q28[i][axis] += motion[i].slide_q28[axis];
-        }
-        speed_q28[i] = kin_dot_q28(velocity_q28[i], direction_q28);
+        joint_velocity(self, rates, i, leg->arm_q28, velocity_q28[i]);
+        speed_q28[i] = kin_dot_q28(velocity_q28[i], leg->direction_q28);
         for (unsigned j = 0; j <= i; j++) {
             sums->held_q44[element(i, j)] += fx_shift_down(speed_q28[i] * speed_q28[j], 12);
             sums->all_q44[element(i, j)] += kin_dot_q28(velocity_q28[i], velocity_q28[j]) * (1 << 16);
@@ -79,19 +65,20 @@ static void add_leg(const kin_t *self, const free_motion_t motion[], const kin_l
 static bool set_sums(const kin_t *self, const pose_t *pose, sums_t *sums)
 {
     kin_placement_t at;
-    free_motion_t motion[POSE_AXES];
+    kin_rates_t rates;
     *sums = (sums_t){{0}, {0}};
     if (kin_place(self, pose, &at) != HV_OK) {
         return false;
     }
-    set_motions(self, &at, motion);
+    if (self->kind != KIN_HEXAPOD) {
+        kin_rates(self, &at, &rates);
+    }
     for (unsigned i = 0; i < self->cylinders; i++) {
-        kin_leg_t leg;
-        kin_leg(self, &at, i, &leg);
-        if (leg.length_mm_q44 < KIN_LENGTH_MIN_Q44) {
+        kin_direction_t leg;
+        if (!kin_leg_direction(self, &at, i, &leg)) {
             return false;
         }
-        add_leg(self, motion, &leg, sums);
+        add_leg(self, &rates, &leg, sums);
     }
     return true;
 }

@@ -55,11 +55,18 @@ void kin_rates(const kin_t *self, const kin_placement_t *at, kin_rates_t *rates)
     }
 }
 
-void kin_leg_direction(const kin_t *self, const kin_leg_t *leg, int64_t direction_q28[3], int64_t arm_q28[3])
+bool kin_leg_direction(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, kin_direction_t *direction)
 {
-    const int64_t inverse_q48 = (INT64_C(1) << 62) / fx_shift_down(leg->length_mm_q44, 30);
-    for (unsigned axis = 0; axis < 3; axis++) {
-        direction_q28[axis] = fx_mul_high(leg->vector_mm_q44[axis], inverse_q48);
-        arm_q28[axis] = fx_shift_down(leg->arm_mm_q44[axis], 16u + self->reach_shift);
+    kin_leg_t leg;
+    kin_leg(self, placement, cylinder, &leg);
+    if (leg.length_mm_q44 < KIN_LENGTH_MIN_Q44) {
+        return false;
     }
+    const int64_t inverse_q48 = (INT64_C(1) << 62) / fx_shift_down(leg.length_mm_q44, 30);
+    for (unsigned axis = 0; axis < 3; axis++) {
+        direction->direction_q28[axis] = fx_mul_high(leg.vector_mm_q44[axis], inverse_q48);
+        direction->arm_q28[axis] = fx_shift_down(leg.arm_mm_q44[axis], 16u + self->reach_shift);
+    }
+    direction->length_mm_q44 = leg.length_mm_q44;
+    return true;
 }

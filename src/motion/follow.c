@@ -24,10 +24,9 @@ bool follow_is_moving(const motion_t *self)
     return self->source >= MOTION_STREAMED;
 }
 
-/* Position, velocity and acceleration of the plate from the cylinders' last three positions. */
-static hv_status_t pose_states(const motion_t *self, ramp_state_t state[POSE_AXES])
+/* The poses of the cylinders' last three positions, the newest first. */
+static hv_status_t last_poses(const motion_t *self, pose_t pose[3])
 {
-    pose_t pose[3];
     const pose_t *guess = &self->pose;
     for (unsigned age = 0; age < 3; age++) {
         q32_t extension_mm_q32[CYLINDERS_MAX];
@@ -43,27 +42,31 @@ static hv_status_t pose_states(const motion_t *self, ramp_state_t state[POSE_AXE
         }
         guess = &pose[age];
     }
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        const q32_t now_q32 = pose[0].axis_q32[i];
-        const q32_t vel_q32 = now_q32 - pose[1].axis_q32[i];
-        state[i] = (ramp_state_t){now_q32, vel_q32, vel_q32 - (pose[1].axis_q32[i] - pose[2].axis_q32[i])};
-    }
     return HV_OK;
+}
+
+/* Position, velocity and acceleration of an axis. */
+static ramp_state_t state_from(const pose_t pose[3], unsigned axis)
+{
+    const q32_t now_q32 = pose[0].axis_q32[axis];
+    const q32_t vel_q32 = now_q32 - pose[1].axis_q32[axis];
+    return (ramp_state_t){now_q32, vel_q32, vel_q32 - (pose[1].axis_q32[axis] - pose[2].axis_q32[axis])};
 }
 
 void follow_adopt_pose(motion_t *self)
 {
-    ramp_state_t state[POSE_AXES];
+    pose_t pose[3];
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
         self->reference[i] = self->cylinder[i].state;
     }
-    if (pose_states(self, state) != HV_OK) {
+    if (last_poses(self, pose) != HV_OK) {
         return;
     }
     const bool is_resting = motion_is_at_rest(self);
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        const ramp_state_t at_rest = {.pos_q32 = self->is_axis_moved[i] ? state[i].pos_q32 : 0};
-        ramp_take_over(&self->axis[i], is_resting || !self->is_axis_moved[i] ? &at_rest : &state[i]);
+        const ramp_state_t state = state_from(pose, i);
+        const ramp_state_t at_rest = {.pos_q32 = self->is_axis_moved[i] ? state.pos_q32 : 0};
+        ramp_take_over(&self->axis[i], is_resting || !self->is_axis_moved[i] ? &at_rest : &state);
         self->led[i] = self->axis[i].state;
     }
 }
@@ -84,7 +87,7 @@ static void enter_space(motion_t *self)
 
 /* The first target after a rest: its way at engage speed, or slower where a timed move gives it longer. The axes stand on the
  * target at once, as it is the blend that moves the platform there. */
-static void plan_blend(motion_t *self)
+HV_OWN_FRAME static void plan_blend(motion_t *self)
 {
     path_limits_t limits = path_limits_none();
     for (unsigned i = 0; i < self->cylinders; i++) {
@@ -363,10 +366,11 @@ static void take_over(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t 
 }
 
 /* Pose axes through their ramps, into the workspace, to cylinders. True if the pose had to be pulled in. */
-static bool step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+static bool step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
     const ramp_grip_t grip = self->source == MOTION_STREAMED ? RAMP_SOFT : RAMP_FIRM;
     q32_t extension_mm_q32[CYLINDERS_MAX];
+    pose_t *planned = &out->sent;
     unsigned flags = 0;
     for (unsigned i = 0; i < POSE_AXES; i++) {
         out->asked.axis_q32[i] = ref[i].pos_q32;
@@ -386,56 +390,68 @@ static bool step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], pose_t *planned,
 }
 
 /* From the slots' references to the cylinders'. True if the pose had to be pulled in. */
-static bool step_slots(motion_t *self, ramp_ref_t ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+static bool step_slots(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
     for (unsigned i = 0; i < AXES_MAX; i++) {
         self->led[i] = (history_t){ref[i].pos_q32, ref[i].vel_per_cycle_q32, ref[i].acc_per_cycle2_q32};
     }
     if (self->space == MOTION_POSE) {
-        return step_pose(self, ref, planned, out);
+        return step_pose(self, ref, out);
     }
     out->flags |= MOTION_IN_CYLINDERS;
     return false;
 }
 
-/* What a cycle changes on the way from the slots' references to the cylinders'. */
-typedef struct {
-    ramp_state_t axis[POSE_AXES];
-    history_t reference[CYLINDERS_MAX];
-} moment_t;
-
-static void keep(const motion_t *self, moment_t *moment)
+/* Takes back what a cycle has changed on the way from the slots' references to the cylinders': their differences tell all of
+ * it but the accelerations of the axes. */
+static void go_back(motion_t *self, const q32_t acc_q32[POSE_AXES], const ramp_ref_t ref[AXES_MAX])
 {
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        moment->axis[i] = self->axis[i].state;
-        moment->reference[i] = self->reference[i];
+    for (unsigned i = 0; self->space == MOTION_POSE && i < POSE_AXES; i++) {
+        ramp_state_t *state = &self->axis[i].state;
+        state->pos_q32 -= state->vel_per_cycle_q32;
+        state->vel_per_cycle_q32 -= state->acc_per_cycle2_q32;
+        state->acc_per_cycle2_q32 = acc_q32[i];
+    }
+    for (unsigned i = 0; self->space == MOTION_POSE && i < self->cylinders; i++) {
+        self->reference[i] = past_state(&ref[i]);
     }
 }
 
-static void go_back(motion_t *self, const moment_t *moment)
+/* From the stream's references to the cylinders', as planned. False where a cylinder could not follow them and another plan may
+ * help, unless this is the last one: then it is as if nothing had been tried. */
+HV_OWN_FRAME static bool try_cycle(motion_t *self, bool is_last, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        self->axis[i].state = moment->axis[i];
-        self->reference[i] = moment->reference[i];
+    ramp_ref_t curve[AXES_MAX];
+    q32_t acc_q32[POSE_AXES];
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        curve[i] = ref[i];
     }
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        acc_q32[i] = self->axis[i].state.acc_per_cycle2_q32;
+    }
+    join_step(self, curve, ref);
+    const bool is_beyond = !is_last && join_are_slots_beyond(self, ref);
+    if (!step_slots(self, ref, out) && !is_last && (is_beyond || join_are_cylinders_beyond(self, ref))) {
+        go_back(self, acc_q32, ref);
+        for (unsigned i = 0; i < AXES_MAX; i++) {
+            ref[i] = curve[i];
+        }
+        return false;
+    }
+    out->flags |= join_flags(self, curve);
+    return true;
 }
 
 /* A stream's references, as one body: where a cylinder could not follow them the cycle is planned anew for all. */
-static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
-    ramp_ref_t curve[AXES_MAX];
-    moment_t moment;
-    (void)stream_step(&self->stream, now_us, curve);
-    slots_scale_refs(self, curve);
-    keep(self, &moment);
-    join_step(self, curve, false, ref);
-    const bool is_beyond = join_are_slots_beyond(self, ref);
-    if (!step_slots(self, ref, planned, out) && (is_beyond || join_are_cylinders_beyond(self, ref))) {
-        go_back(self, &moment);
-        join_step(self, curve, true, ref);
-        (void)step_slots(self, ref, planned, out);
+    (void)stream_step(&self->stream, now_us, ref);
+    slots_scale_refs(self, ref);
+    join_plan(self, ref);
+    if (!try_cycle(self, false, ref, out)) {
+        join_plan_again(self, ref);
+        (void)try_cycle(self, true, ref, out);
     }
-    out->flags |= join_flags(self, curve);
 }
 
 /* A step on its way at a speed limit. */
@@ -450,14 +466,14 @@ void follow_plan(motion_t *self, uint64_t now_us)
     plan_what_is_due(self, now_us);
 }
 
-void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned, motion_output_t *out)
+void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], motion_output_t *out)
 {
     out->flags |= self->is_stretched ? MOTION_STRETCHED : 0;
     if (self->source == MOTION_STREAMED) {
-        step_stream(self, now_us, cylinder_ref, planned, out);
+        step_stream(self, now_us, cylinder_ref, out);
     } else {
         step_source(self, cylinder_ref);
-        (void)step_slots(self, cylinder_ref, planned, out);
+        (void)step_slots(self, cylinder_ref, out);
         out->flags |= is_step_cruising(self) ? MOTION_SPEED : 0;
     }
     out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &cylinder_ref[AXIS_ANGLE], RAMP_FIRM);

@@ -23,9 +23,8 @@ void follow_adopt_pose(motion_t *self);
 void follow_plan(motion_t *self, uint64_t now_us);
 
 /** References of the cylinders for this cycle, while moving.
- *  @param planned out, in pose space: the pose they belong to
- *  @param out     asked, angle and flags are filled in */
-void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], pose_t *planned, motion_output_t *out);
+ *  @param out asked, angle and flags are filled in, and in pose space sent: the pose that the references belong to */
+void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], motion_output_t *out);
 
 /** Changes that become due at the end of a cycle. */
 void follow_end_cycle(motion_t *self);

@@ -204,7 +204,9 @@ static halt_times_t own_times(const halt_times_t *common, bool is_apart, const r
 void halt_plan(halt_t *self, unsigned axes, unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits)
 {
     const halt_times_t common = common_times(together, start, limits);
-    *self = (halt_t){.axes = axes};
+    self->axes = axes;
+    self->cycles = 0;
+    self->elapsed = 0;
     for (unsigned i = 0; i < axes; i++) {
         halt_times_t *times = &self->times[i];
         *times = own_times(&common, i >= together, &start[i], limits[i]);

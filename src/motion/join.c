@@ -10,6 +10,7 @@
 
 #include "brake.h"
 #include "follow.h"
+#include "past.h"
 #include "plan.h"
 #include "slot.h"
 #include "slots.h"
@@ -73,18 +74,11 @@ static bool is_within_limits(const motion_t *self, const ramp_ref_t *ref)
     return true;
 }
 
-/* The reference of the cycle before. */
-static ramp_state_t before(const ramp_ref_t *ref)
-{
-    return (ramp_state_t){ref->pos_q32 - ref->vel_per_cycle_q32, ref->vel_per_cycle_q32 - ref->acc_per_cycle2_q32,
-                          ref->acc_per_cycle2_q32 - ref->jerk_per_cycle3_q32};
-}
-
 /* Near where the curve was in the cycle before. */
 static bool is_on_curve(const motion_t *self, const ramp_ref_t *ref)
 {
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        const ramp_state_t curve = before(&ref[i]);
+        const ramp_state_t curve = past_state(&ref[i]);
         if (!is_slot_near(self, i, &curve)) {
             return false;
         }
@@ -97,49 +91,21 @@ static int64_t cycles_left(const motion_t *self)
     return self->quintic.cycles - self->quintic.elapsed;
 }
 
-/* Plans the way to the stream's curve; false where the limits do not allow any. */
-static bool join_curve(motion_t *self, const ramp_ref_t *ref)
-{
-    static const q32_t k_no_error_q32[POSE_AXES] = {0};
-    ramp_state_t curve[POSE_AXES];
-    ramp_state_t error[POSE_AXES];
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        const ramp_state_t *state = slot_state(self, i);
-        curve[i] = before(&ref[i]);
-        error[i] = (ramp_state_t){state->pos_q32 - curve[i].pos_q32, state->vel_per_cycle_q32 - curve[i].vel_per_cycle_q32,
-                                  state->acc_per_cycle2_q32 - curve[i].acc_per_cycle2_q32};
-    }
-    return plan_shortest(self, error, k_no_error_q32, curve, 1);
-}
-
-/* The slots now, and the newest sample. */
-static void prepare(const motion_t *self, ramp_state_t start[POSE_AXES], q32_t newest_q32[AXES_MAX])
+/* The newest sample, as it is followed. */
+static void find_newest(const motion_t *self, q32_t newest_q32[AXES_MAX])
 {
     slots_scale(self, self->space, self->stream.curve.last_q32, newest_q32);
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        start[i] = *slot_state(self, i);
-    }
-}
-
-static void plan_halt(motion_t *self, const ramp_state_t start[POSE_AXES])
-{
-    const ramp_limits_t *limits[POSE_AXES];
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        limits[i] = slot_limits(self, i);
-    }
-    halt_plan(&self->aside.halt, POSE_AXES, POSE_AXES, start, limits);
 }
 
 /* Plans the way to the newest sample, or at least a stop. */
 static motion_join_t head_for_sample(motion_t *self)
 {
-    ramp_state_t start[POSE_AXES];
     q32_t newest_q32[AXES_MAX];
-    prepare(self, start, newest_q32);
-    if (plan_shortest(self, start, newest_q32, NULL, 1)) {
+    find_newest(self, newest_q32);
+    if (plan_shortest(self, newest_q32)) {
         return JOIN_SAMPLE;
     }
-    plan_halt(self, start);
+    plan_halt(self);
     return JOIN_HALT;
 }
 
@@ -157,19 +123,19 @@ static bool is_heading_for(const motion_t *self, const q32_t target_q32[AXES_MAX
  * What cylinders cannot follow is no such stop: of a quintic that is known beforehand. */
 static bool has_to_overshoot(motion_t *self)
 {
-    ramp_state_t start[POSE_AXES];
     q32_t newest_q32[AXES_MAX];
-    prepare(self, start, newest_q32);
+    find_newest(self, newest_q32);
     if (!stream_curve_is_standing(&self->stream.curve) || is_heading_for(self, newest_q32)) {
         return false;
     }
-    plan_halt(self, start);
+    plan_halt(self);
     bool is_beyond = false;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        const int sign = start[i].vel_per_cycle_q32 < 0 ? -1 : 1;
-        const q32_t way_q32 = sign * (self->aside.halt.rest_q32[i] - start[i].pos_q32);
+        const ramp_state_t *start = slot_state(self, i);
+        const int sign = start->vel_per_cycle_q32 < 0 ? -1 : 1;
+        const q32_t way_q32 = sign * (self->aside.halt.rest_q32[i] - start->pos_q32);
         const q32_t beyond_q32 = sign * (self->aside.halt.rest_q32[i] - newest_q32[i]);
-        is_beyond |= start[i].vel_per_cycle_q32 != 0 && beyond_q32 > way_q32 / OVERSHOOT_DIV + OVERSHOOT_LEAST_Q32;
+        is_beyond |= start->vel_per_cycle_q32 != 0 && beyond_q32 > way_q32 / OVERSHOOT_DIV + OVERSHOOT_LEAST_Q32;
     }
     return is_beyond;
 }
@@ -185,7 +151,7 @@ static void replan(motion_t *self, const ramp_ref_t *ref, bool is_curve_beyond, 
     } else if (is_on_curve(self, ref)) {
         self->join = JOIN_NONE;
     } else {
-        self->join = join_curve(self, ref) ? JOIN_CURVE : head_for_sample(self);
+        self->join = plan_join(self, ref) ? JOIN_CURVE : head_for_sample(self);
     }
 }
 
@@ -194,7 +160,7 @@ static void shorten(motion_t *self, const ramp_ref_t *ref)
 {
     const int64_t left = cycles_left(self);
     self->aside.kept = self->quintic;
-    if (!is_within_limits(self, ref) || !join_curve(self, ref) || self->quintic.cycles * 8 > left * 7) {
+    if (!is_within_limits(self, ref) || !plan_join(self, ref) || self->quintic.cycles * 8 > left * 7) {
         self->quintic = self->aside.kept;
     }
 }
@@ -214,7 +180,7 @@ static bool is_off_curve(const motion_t *self)
     return self->join == JOIN_SAMPLE || self->join == JOIN_HALT;
 }
 
-static void plan_where_due(motion_t *self, const ramp_ref_t *ref)
+void join_plan(motion_t *self, const ramp_ref_t ref[AXES_MAX])
 {
     const bool is_off = are_cylinders_off(self);
     if (is_off) {
@@ -252,16 +218,13 @@ static void step_plan(motion_t *self, const ramp_ref_t *curve, ramp_ref_t *ref)
     }
 }
 
-void join_step(motion_t *self, const ramp_ref_t curve[AXES_MAX], bool is_again, ramp_ref_t ref[AXES_MAX])
+void join_plan_again(motion_t *self, const ramp_ref_t curve[AXES_MAX])
 {
-    if (is_again) {
-        replan(self, curve, true, self->join != JOIN_HALT);
-    } else {
-        plan_where_due(self, curve);
-    }
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        ref[i] = curve[i];
-    }
+    replan(self, curve, true, self->join != JOIN_HALT);
+}
+
+void join_step(motion_t *self, const ramp_ref_t curve[AXES_MAX], ramp_ref_t ref[AXES_MAX])
+{
     if (self->join != JOIN_NONE) {
         step_plan(self, curve, ref);
     }

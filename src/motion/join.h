@@ -12,10 +12,16 @@ void join_begin(motion_t *self);
 /** A sample of the stream has come: a better plan may be possible. */
 void join_sample(motion_t *self);
 
-/** The body's references.
- *  @param curve of the stream, this cycle
- *  @param is_again the cycle is planned anew, as it was found beyond the limits */
-void join_step(motion_t *self, const ramp_ref_t curve[AXES_MAX], bool is_again, ramp_ref_t ref[AXES_MAX]);
+/** Plans what this cycle needs, before it is made. Planning takes most of the stack: its callers hold as little as they can.
+ *  @param curve references of the stream, this cycle */
+void join_plan(motion_t *self, const ramp_ref_t curve[AXES_MAX]);
+
+/** Plans the cycle anew, as it was found beyond the limits. */
+void join_plan_again(motion_t *self, const ramp_ref_t curve[AXES_MAX]);
+
+/** The body's references as planned.
+ *  @param ref out: a copy of curve when this is called */
+void join_step(motion_t *self, const ramp_ref_t curve[AXES_MAX], ramp_ref_t ref[AXES_MAX]);
 
 /** True if these references of the slots, or those of the cylinders, could not be followed within the limits, and another plan
  *  may help. */

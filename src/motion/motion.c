@@ -118,14 +118,14 @@ hv_status_t motion_init(motion_t *self, const settings_t *settings)
     return status;
 }
 
-/* Everything stays at the given positions. */
-static void rest_at(motion_t *self, const q32_t *extension_mm_q32, q32_t angle_deg_q32)
+/* Everything stays where it is. */
+static void rest_here(motion_t *self)
 {
     self->source = MOTION_RESTING;
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        self->path_to_q32[i] = i < self->cylinders ? extension_mm_q32[i] : self->cylinder[i].state.pos_q32;
+        self->path_to_q32[i] = self->cylinder[i].state.pos_q32;
     }
-    self->path_to_q32[AXIS_ANGLE] = angle_deg_q32;
+    self->path_to_q32[AXIS_ANGLE] = self->axis[AXIS_ANGLE].state.pos_q32;
 }
 
 void motion_place(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q32_t angle_deg_q32)
@@ -141,7 +141,7 @@ void motion_place(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q
     self->has_pending = false;
     self->is_pose_stale = true;
     note_known_pose(self, extension_mm_q32);
-    rest_at(self, extension_mm_q32, angle_deg_q32);
+    rest_here(self);
 }
 
 bool motion_is_at_rest(const motion_t *self)
@@ -176,17 +176,13 @@ static bool is_possible(const motion_t *self, const motion_target_t *target)
 }
 
 /* What was to come after the stop. */
-static void go_on_after_stop(motion_t *self, uint64_t now_us)
+HV_OWN_FRAME static void go_on_after_stop(motion_t *self, uint64_t now_us)
 {
-    q32_t here_q32[CYLINDERS_MAX];
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        here_q32[i] = self->cylinder[i].state.pos_q32;
-    }
     if (self->next == MOTION_THEN_PATH) {
         start_path(self);
         return;
     }
-    rest_at(self, here_q32, self->axis[AXIS_ANGLE].state.pos_q32);
+    rest_here(self);
     if (self->next == MOTION_THEN_FOLLOW) {
         self->has_pending = self->has_pending && is_possible(self, &self->pending);
         follow_begin(self, now_us);
@@ -194,24 +190,29 @@ static void go_on_after_stop(motion_t *self, uint64_t now_us)
 }
 
 /* All cylinders and the rotation motor slow down together over the same time. */
-static void begin_stop(motion_t *self, motion_next_t next)
+static void plan_stop(motion_t *self)
 {
-    ramp_state_t start[AXES_MAX];
+    halt_t *halt = &self->aside.halt;
     const ramp_limits_t *limits[AXES_MAX];
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const ramp_t *ramp = i == AXIS_ANGLE ? &self->axis[AXIS_ANGLE] : &self->cylinder[i];
-        start[i] = ramp->state;
+        halt->start[i] = ramp->state;
         limits[i] = &ramp->limits;
     }
+    halt_plan(halt, AXES_MAX, CYLINDERS_MAX, halt->start, limits);
+    self->source = MOTION_STOPPING;
+    self->angle_target_deg_q32 = halt->rest_q32[AXIS_ANGLE];
+}
+
+static void begin_stop(motion_t *self, motion_next_t next)
+{
     self->next = next;
     self->is_taking_over = false;
     self->has_pending = false;
     self->timed_end_us = 0;
     self->is_stretched = false;
     if (self->source != MOTION_STOPPING) {
-        halt_plan(&self->aside.halt, AXES_MAX, CYLINDERS_MAX, start, limits);
-        self->source = MOTION_STOPPING;
-        self->angle_target_deg_q32 = self->aside.halt.rest_q32[AXIS_ANGLE];
+        plan_stop(self);
     }
 }
 
@@ -270,7 +271,7 @@ hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_
 }
 
 /* References of the cylinder-space sources. */
-static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_MAX])
+HV_OWN_FRAME static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
     if (self->source == MOTION_STOPPING) {
         halt_step(&self->aside.halt, ref);
@@ -313,11 +314,12 @@ static bool are_cylinders_moving(const motion_t *self)
     return false;
 }
 
-/* The pose of the extensions sent. */
-static void find_pose(motion_t *self, const pose_t *planned, motion_output_t *out)
+/* The pose of the extensions sent.
+ * @param is_planned it is out->sent, if they are what was planned */
+HV_OWN_FRAME static void find_pose(motion_t *self, bool is_planned, motion_output_t *out)
 {
-    if (planned != NULL && (out->flags & (MOTION_OFF_PATH | MOTION_TAKEOVER)) == 0) {
-        self->pose = *planned;
+    if (is_planned && (out->flags & (MOTION_OFF_PATH | MOTION_TAKEOVER)) == 0) {
+        self->pose = out->sent;
     } else if (!self->is_pose_stale && !are_cylinders_moving(self)) {
         /* the pose found last is still the pose */
     } else if (kin_forward(&self->kin, out->extension_mm_q32, &self->pose, &self->pose, NULL) != HV_OK) {
@@ -362,19 +364,18 @@ static void begin_cycle(motion_t *self, uint64_t now_us)
 void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out)
 {
     ramp_ref_t ref[AXES_MAX];
-    pose_t planned;
     *out = (motion_output_t){0};
     begin_cycle(self, now_us);
     const bool is_posed = follow_is_moving(self) && self->space == MOTION_POSE;
     if (follow_is_moving(self)) {
-        follow_step(self, now_us, ref, &planned, out);
+        follow_step(self, now_us, ref, out);
     } else {
         step_in_cylinders(self, ref);
         out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &ref[AXIS_ANGLE], RAMP_FIRM);
         out->flags |= MOTION_IN_CYLINDERS;
     }
     limit(self, ref, out);
-    find_pose(self, is_posed ? &planned : NULL, out);
+    find_pose(self, is_posed, out);
     if (!is_posed) {
         out->asked = out->sent;
     }

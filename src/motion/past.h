@@ -21,6 +21,13 @@ static inline void past_of(const ramp_ref_t *ref, q32_t at_q32[PAST])
     at_q32[3] = ref->pos_q32 - 3 * vel_q32 + 3 * acc_q32 - ref->jerk_per_cycle3_q32;
 }
 
+/** The reference of the cycle before. */
+static inline ramp_state_t past_state(const ramp_ref_t *ref)
+{
+    return (ramp_state_t){ref->pos_q32 - ref->vel_per_cycle_q32, ref->vel_per_cycle_q32 - ref->acc_per_cycle2_q32,
+                          ref->acc_per_cycle2_q32 - ref->jerk_per_cycle3_q32};
+}
+
 /** The reference of such positions. */
 static inline ramp_ref_t past_ref(const q32_t at_q32[PAST])
 {

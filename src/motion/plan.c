@@ -7,6 +7,7 @@
  */
 #include "plan.h"
 
+#include "past.h"
 #include "slot.h"
 #include "slots.h"
 #include "way.h"
@@ -17,11 +18,33 @@
 #define START_SLACK_Q32 (Q32_ONE / 1000) /* rounding of a quintic's first points */
 #define JOIN_MAX_US     600000           /* a longer quintic swings out further than it is worth */
 
-/* Limits of a quintic's slots, less what a moving base takes of them. */
+/* What a quintic is looked for. Where it starts is worked out where it is needed: it would lie on the stack under everything that
+ * an attempt calls. */
 typedef struct {
-    ramp_limits_t own[AXES_MAX];
-    const ramp_limits_t *list[AXES_MAX];
-} plan_limits_t;
+    unsigned slots;
+    bool is_shifted; /* the intensity moves slots by itself, which is not for the plan to do */
+    const q32_t *target_q32;
+    const ramp_ref_t *curve; /* what the target moves with, NULL where it rests */
+    bool stays_near;         /* goes no further than the stop in self->aside.halt */
+} task_t;
+
+/* Where a slot starts, seen from what the target moves with. */
+static ramp_state_t start_of(const motion_t *self, const task_t *task, unsigned i)
+{
+    ramp_state_t start = *slot_state(self, i);
+    if (task->is_shifted && !intensity_is_still(&self->intensity, self->timed_share_q46)) {
+        const ramp_ref_t shift = intensity_shift(&self->intensity, self->timed_share_q46, self->timed_way_q32[i]);
+        start.vel_per_cycle_q32 -= shift.vel_per_cycle_q32;
+        start.acc_per_cycle2_q32 -= shift.acc_per_cycle2_q32;
+    }
+    if (task->curve != NULL) {
+        const ramp_state_t base = past_state(&task->curve[i]);
+        start.pos_q32 -= base.pos_q32;
+        start.vel_per_cycle_q32 -= base.vel_per_cycle_q32;
+        start.acc_per_cycle2_q32 -= base.acc_per_cycle2_q32;
+    }
+    return start;
+}
 
 /* Where cylinders led beyond an axis' range, the way back begins there. */
 static void include_start(ramp_limits_t *limits, q32_t start_q32)
@@ -30,48 +53,88 @@ static void include_start(ramp_limits_t *limits, q32_t start_q32)
     limits->pos_max_q32 = fx_clamp(start_q32 + START_SLACK_Q32, limits->pos_max_q32, INT64_MAX);
 }
 
-static void limits_beside(const motion_t *self, unsigned slots, const ramp_state_t *start, const ramp_state_t *base,
-                          plan_limits_t *limits)
+/* The longer a quintic is, the further the acceleration it starts with carries it: planned anew with each sample such ways swing
+ * out ever further. Where none stays between start and target, or where the quickest stop ends, that stop is the better way. */
+static void stay_near(ramp_limits_t *limits, q32_t from_q32, q32_t to_q32, q32_t rest_q32)
 {
-    for (unsigned i = 0; i < slots; i++) {
-        ramp_limits_t *own = &limits->own[i];
-        *own = *slot_limits(self, i);
-        limits->list[i] = own;
-        include_start(own, start[i].pos_q32);
-        if (base != NULL) {
-            own->jerk_per_cycle3_q32 -= own->jerk_per_cycle3_q32 / 4;
-            own->pos_min_q32 = INT64_MIN / 4; /* where the base will be is not known: the ramps keep the bounds */
-            own->pos_max_q32 = INT64_MAX / 4;
-        }
+    const q32_t low_q32 = fx_clamp(to_q32, INT64_MIN, from_q32 < rest_q32 ? from_q32 : rest_q32);
+    const q32_t high_q32 = fx_clamp(to_q32, from_q32 > rest_q32 ? from_q32 : rest_q32, INT64_MAX);
+    limits->pos_min_q32 = fx_clamp(low_q32 - START_SLACK_Q32, limits->pos_min_q32, INT64_MAX);
+    limits->pos_max_q32 = fx_clamp(high_q32 + START_SLACK_Q32, INT64_MIN, limits->pos_max_q32);
+}
+
+/* The limits of a slot, less what a target that moves takes of them. */
+static ramp_limits_t limits_of(const motion_t *self, const task_t *task, unsigned i)
+{
+    const q32_t start_q32 = slot_state(self, i)->pos_q32;
+    ramp_limits_t limits = *slot_limits(self, i);
+    if (task->curve != NULL) {
+        limits.jerk_per_cycle3_q32 -= limits.jerk_per_cycle3_q32 / 4;
+        limits.pos_min_q32 = INT64_MIN / 4; /* where the target will be is not known: the ramps keep the bounds */
+        limits.pos_max_q32 = INT64_MAX / 4;
+        return limits;
+    }
+    include_start(&limits, start_q32);
+    if (task->stays_near) {
+        stay_near(&limits, start_q32, task->target_q32[i], self->aside.halt.rest_q32[i]);
+    }
+    return limits;
+}
+
+/* The limits of all slots. */
+typedef struct {
+    ramp_limits_t own[AXES_MAX];
+    const ramp_limits_t *list[AXES_MAX];
+} limits_t;
+
+static void set_limits(const motion_t *self, const task_t *task, limits_t *limits)
+{
+    for (unsigned i = 0; i < task->slots; i++) {
+        limits->own[i] = limits_of(self, task, i);
+        limits->list[i] = &limits->own[i];
     }
 }
 
-/* Plans self->quintic; false where an axis or a cylinder would break its limits, with what its base adds where it has one. */
-static bool try_quintic(motion_t *self, unsigned slots, const ramp_state_t *start, const q32_t *target_q32,
-                        const ramp_state_t *base, const plan_limits_t *limits, int64_t cycles)
+HV_OWN_FRAME static bool plan_slots(motion_t *self, const task_t *task, int64_t cycles)
 {
-    quintic_t *quintic = &self->quintic;
-    if (quintic_plan(quintic, slots, start, target_q32, cycles) != HV_OK) {
+    ramp_state_t start[AXES_MAX];
+    for (unsigned i = 0; i < task->slots; i++) {
+        start[i] = start_of(self, task, i);
+    }
+    return quintic_plan(&self->quintic, task->slots, start, task->target_q32, cycles) == HV_OK;
+}
+
+/* Adds what the target moves with, or takes it off again. */
+static void add_curve(motion_t *self, const task_t *task, int sign)
+{
+    for (unsigned i = 0; task->curve != NULL && i < task->slots; i++) {
+        const ramp_state_t base = past_state(&task->curve[i]);
+        quintic_add_motion(&self->quintic, i, &base, sign);
+    }
+}
+
+/* Plans self->quintic; false where an axis or a cylinder would break its limits, with what its target moves with. */
+static bool try_quintic(motion_t *self, const task_t *task, const limits_t *limits, int64_t cycles)
+{
+    if (!plan_slots(self, task, cycles)) {
         return false;
     }
-    for (unsigned i = 0; base != NULL && i < slots; i++) {
-        quintic_add_motion(quintic, i, &base[i], 1);
-    }
-    if (!quintic_is_feasible(quintic, limits->list) || (self->space == MOTION_POSE && !way_is_feasible(self, quintic))) {
+    add_curve(self, task, 1);
+    if (!quintic_is_feasible(&self->quintic, limits->list) ||
+        (self->space == MOTION_POSE && !way_is_feasible(self, &self->quintic))) {
         return false;
     }
-    for (unsigned i = 0; base != NULL && i < slots; i++) {
-        quintic_add_motion(quintic, i, &base[i], -1);
-    }
+    add_curve(self, task, -1);
     return true;
 }
 
-static bool find_shortest(motion_t *self, const plan_limits_t *limits, unsigned slots, const ramp_state_t *start,
-                          const q32_t *target_q32, const ramp_state_t *base, int64_t least, int64_t most, int attempts)
+static bool find_shortest(motion_t *self, const task_t *task, int64_t least, int64_t most, int attempts)
 {
+    limits_t limits;
+    set_limits(self, task, &limits);
     int64_t cycles = least > SHORTEST_CYCLES ? least : SHORTEST_CYCLES;
     for (int attempt = 0; attempt < attempts && cycles <= most; attempt++) {
-        if (try_quintic(self, slots, start, target_q32, base, limits, cycles)) {
+        if (try_quintic(self, task, &limits, cycles)) {
             return true;
         }
         cycles += cycles / 8;
@@ -79,32 +142,60 @@ static bool find_shortest(motion_t *self, const plan_limits_t *limits, unsigned 
     return false;
 }
 
-/* The longer a quintic is, the further the acceleration it starts with carries it: planned anew with each sample such ways swing
- * out ever further. Where none stays between start and target, or where the quickest stop ends, that stop is the better way. */
-static void stay_near(motion_t *self, const ramp_state_t *start, const q32_t *target_q32, plan_limits_t *limits)
+static int attempts_in(const motion_t *self)
 {
-    halt_plan(&self->aside.halt, POSE_AXES, POSE_AXES, start, limits->list);
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        const q32_t from_q32 = start[i].pos_q32;
-        const q32_t rest_q32 = self->aside.halt.rest_q32[i];
-        const q32_t low_q32 = fx_clamp(target_q32[i], INT64_MIN, from_q32 < rest_q32 ? from_q32 : rest_q32);
-        const q32_t high_q32 = fx_clamp(target_q32[i], from_q32 > rest_q32 ? from_q32 : rest_q32, INT64_MAX);
-        ramp_limits_t *own = &limits->own[i];
-        own->pos_min_q32 = fx_clamp(low_q32 - START_SLACK_Q32, own->pos_min_q32, INT64_MAX);
-        own->pos_max_q32 = fx_clamp(high_q32 + START_SLACK_Q32, INT64_MIN, own->pos_max_q32);
-    }
+    return self->space == MOTION_POSE ? ATTEMPTS_POSE : ATTEMPTS;
 }
 
-bool plan_shortest(motion_t *self, const ramp_state_t *start, const q32_t *target_q32, const ramp_state_t *base, int64_t least)
+bool plan_join(motion_t *self, const ramp_ref_t *curve)
 {
-    const int64_t most = base != NULL ? JOIN_MAX_US / (int64_t)self->cycle_us : INT64_MAX;
-    const int attempts = self->space == MOTION_POSE ? ATTEMPTS_POSE : ATTEMPTS;
-    plan_limits_t limits;
-    limits_beside(self, POSE_AXES, start, base, &limits);
-    if (base == NULL && self->space == MOTION_CYLINDERS) { /* of poses a stop need not be what the cylinders can do */
-        stay_near(self, start, target_q32, &limits);
+    static const q32_t k_no_difference_q32[POSE_AXES] = {0};
+    const task_t task = {.slots = POSE_AXES, .target_q32 = k_no_difference_q32, .curve = curve};
+    return find_shortest(self, &task, 1, JOIN_MAX_US / (int64_t)self->cycle_us, attempts_in(self));
+}
+
+/* A stop from where a task starts. */
+static void halt_within(motion_t *self, const task_t *task, const ramp_limits_t *const *limits)
+{
+    halt_t *halt = &self->aside.halt;
+    for (unsigned i = 0; i < task->slots; i++) {
+        halt->start[i] = start_of(self, task, i);
     }
-    return find_shortest(self, &limits, POSE_AXES, start, target_q32, base, least, most, attempts);
+    halt_plan(halt, task->slots, POSE_AXES, halt->start, limits);
+}
+
+/* Within the task's own limits. */
+HV_OWN_FRAME static void halt_task(motion_t *self, const task_t *task)
+{
+    limits_t limits;
+    set_limits(self, task, &limits);
+    halt_within(self, task, limits.list);
+}
+
+/* Within those of the slots. */
+HV_OWN_FRAME static void halt_slots(motion_t *self, const task_t *task)
+{
+    const ramp_limits_t *limits[AXES_MAX];
+    for (unsigned i = 0; i < task->slots; i++) {
+        limits[i] = slot_limits(self, i);
+    }
+    halt_within(self, task, limits);
+}
+
+void plan_halt(motion_t *self)
+{
+    const task_t task = {.slots = POSE_AXES};
+    halt_slots(self, &task);
+}
+
+bool plan_shortest(motion_t *self, const q32_t target_q32[AXES_MAX])
+{
+    task_t task = {.slots = POSE_AXES, .target_q32 = target_q32};
+    if (self->space == MOTION_CYLINDERS) { /* of poses a stop need not be what the cylinders can do */
+        halt_task(self, &task);
+        task.stays_near = true;
+    }
+    return find_shortest(self, &task, 1, INT64_MAX, attempts_in(self));
 }
 
 /* The straight way between two points of the slots, as a path with the limits of axes and cylinders. */
@@ -134,64 +225,53 @@ void plan_straight(motion_t *self, unsigned slots, int64_t least_cycles)
 }
 
 /* A stop first, then the straight way; the cycles of both. */
-static int64_t plan_stop_then_straight(motion_t *self, unsigned slots, const ramp_state_t *start)
+static int64_t plan_stop_then_straight(motion_t *self, const task_t *task)
 {
-    const ramp_limits_t *limits[AXES_MAX];
-    for (unsigned i = 0; i < slots; i++) {
-        limits[i] = slot_limits(self, i);
-    }
-    halt_plan(&self->aside.halt, slots, POSE_AXES, start, limits);
-    const path_limits_t path = limits_of_straight(self, slots, self->aside.halt.rest_q32);
+    halt_slots(self, task);
+    const path_limits_t path = limits_of_straight(self, task->slots, self->aside.halt.rest_q32);
     scurve_plan(&self->path, &path, 1);
     self->straight_cycles = scurve_cycles(&self->path);
     return self->aside.halt.cycles + 1 + self->straight_cycles;
 }
 
 /* In motion: the shorter one of a quintic of at least so many cycles and a stop with a straight way. The cycles it takes. */
-static int64_t plan_quickest(motion_t *self, unsigned slots, const ramp_state_t *start, const plan_limits_t *limits,
-                             int64_t least)
+static int64_t plan_quickest(motion_t *self, const task_t *task, int64_t least)
 {
-    const int64_t in_two_parts = plan_stop_then_straight(self, slots, start);
+    const int64_t in_two_parts = plan_stop_then_straight(self, task);
     self->source = MOTION_TIMED;
     const int64_t from = least > in_two_parts / 4 ? least : in_two_parts / 4; /* none is shorter than that */
-    if (find_shortest(self, limits, slots, start, self->goal_q32, NULL, from, in_two_parts, ATTEMPTS)) {
+    if (find_shortest(self, task, from, in_two_parts, ATTEMPTS)) {
         return self->quintic.cycles;
     }
     self->source = MOTION_HALTING;
     return in_two_parts;
 }
 
-/* The states a plan starts from: less what the intensity moves by itself. */
-static void copy_states(const motion_t *self, unsigned slots, ramp_state_t *state)
+/* One attempt. */
+HV_OWN_FRAME static bool is_possible_in(motion_t *self, const task_t *task, int64_t cycles)
 {
-    for (unsigned i = 0; i < slots; i++) {
-        const ramp_ref_t shift = intensity_shift(&self->intensity, self->timed_share_q46, self->timed_way_q32[i]);
-        state[i] = *slot_state(self, i);
-        state[i].vel_per_cycle_q32 -= shift.vel_per_cycle_q32;
-        state[i].acc_per_cycle2_q32 -= shift.acc_per_cycle2_q32;
-    }
+    limits_t limits;
+    set_limits(self, task, &limits);
+    return try_quintic(self, task, &limits, cycles);
 }
 
 static int64_t plan_timed_cycles(motion_t *self, int64_t cycles)
 {
-    ramp_state_t start[AXES_MAX];
-    plan_limits_t limits;
-    copy_states(self, AXES_MAX, start);
-    limits_beside(self, AXES_MAX, start, NULL, &limits);
+    const task_t task = {.slots = AXES_MAX, .is_shifted = true, .target_q32 = self->goal_q32};
     self->source = MOTION_TIMED;
-    if (try_quintic(self, AXES_MAX, start, self->goal_q32, NULL, &limits, cycles)) {
+    if (is_possible_in(self, &task, cycles)) {
         return cycles;
     }
     if (slot_all_at_rest(self, AXES_MAX)) {
         plan_straight(self, AXES_MAX, cycles);
         return scurve_cycles(&self->path);
     }
-    if (plan_stop_then_straight(self, AXES_MAX, start) <= cycles) {
+    if (plan_stop_then_straight(self, &task) <= cycles) {
         self->source = MOTION_HALTING;
         self->straight_cycles = cycles - self->aside.halt.cycles - 1;
         return cycles;
     }
-    return plan_quickest(self, AXES_MAX, start, &limits, cycles);
+    return plan_quickest(self, &task, cycles);
 }
 
 void plan_timed(motion_t *self, int64_t asked, bool is_first, uint64_t now_us)
@@ -215,9 +295,6 @@ void plan_step(motion_t *self)
         plan_straight(self, POSE_AXES, 1);
         return;
     }
-    ramp_state_t start[AXES_MAX];
-    plan_limits_t limits;
-    copy_states(self, POSE_AXES, start);
-    limits_beside(self, POSE_AXES, start, NULL, &limits);
-    (void)plan_quickest(self, POSE_AXES, start, &limits, 1);
+    const task_t task = {.slots = POSE_AXES, .is_shifted = true, .target_q32 = self->goal_q32};
+    (void)plan_quickest(self, &task, 1);
 }

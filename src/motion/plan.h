@@ -17,11 +17,18 @@ void plan_step(motion_t *self);
 /** Plans the straight S-curve to self->goal_q32 for slots at rest. */
 void plan_straight(motion_t *self, unsigned slots, int64_t least_cycles);
 
-/** Plans the shortest quintic (self->quintic) of the first POSE_AXES slots that leads from start to target within the limits.
- *  @param base  the target moves with this reference: what it uses of the limits is left to it, and speeds add; NULL where it
- * rests: extensions then go no further beyond it than their quickest stop does (which is left in self->aside.halt)
- *  @param least cycles at least
+/** Plans the shortest quintic (self->quintic) by which the difference of the first POSE_AXES slots to a stream's curve fades out
+ * within the limits, while the curve moves on: what it uses of the limits is left to it, and speeds add.
+ *  @param curve this cycle's references of the stream
  *  @return false where none of those looked at keeps the limits; self->quintic is then of no use */
-bool plan_shortest(motion_t *self, const ramp_state_t *start, const q32_t *target_q32, const ramp_state_t *base, int64_t least);
+bool plan_join(motion_t *self, const ramp_ref_t *curve);
+
+/** Plans the shortest quintic that leads those slots to rest on a target. Extensions go no further beyond it than their quickest
+ * stop does (which is left in self->aside.halt).
+ *  @return as plan_join() */
+bool plan_shortest(motion_t *self, const q32_t target_q32[AXES_MAX]);
+
+/** Plans the quickest stop of those slots, in self->aside.halt. */
+void plan_halt(motion_t *self);
 
 #endif

@@ -202,17 +202,16 @@ static q32_t solve_for_stop(const ramp_t *self, const ramp_t *relative, const er
 
 /* The ramp with what a reference in motion leaves of its acceleration and jerk: so much there is for certain, whichever way the
  * difference has to be braked. */
-static ramp_t beside(const ramp_t *self, q32_t feed_q32)
+static void beside(const ramp_t *self, q32_t feed_q32, ramp_t *relative)
 {
     const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
     const q32_t left_q32 = fx_clamp(jerk_q32 - self->ref_jerk_q32, jerk_q32 / 8, jerk_q32 - jerk_q32 / 4);
-    ramp_t relative = *self;
-    relative.limits.jerk_per_cycle3_q32 = left_q32;
-    relative.acc_cycles = fx_clamp((self->acc_safe_q32 - fx_abs(feed_q32)) / left_q32, 1, self->acc_safe_q32);
-    relative.acc_safe_q32 = relative.acc_cycles * left_q32;
-    relative.per_jerk_q62 = Q62_ONE / left_q32;
-    relative.per_acc_q62 = Q62_ONE / relative.acc_safe_q32;
-    return relative;
+    *relative = *self;
+    relative->limits.jerk_per_cycle3_q32 = left_q32;
+    relative->acc_cycles = fx_clamp((self->acc_safe_q32 - fx_abs(feed_q32)) / left_q32, 1, self->acc_safe_q32);
+    relative->acc_safe_q32 = relative->acc_cycles * left_q32;
+    relative->per_jerk_q62 = Q62_ONE / left_q32;
+    relative->per_acc_q62 = Q62_ONE / relative->acc_safe_q32;
 }
 
 static bool is_at_rest(const ramp_ref_t *ref)
@@ -268,7 +267,8 @@ static q32_t acceleration_to_stop(const ramp_t *self, const ramp_ref_t *ref)
     if (is_at_rest(ref)) {
         return solve_for_stop(self, self, &e, 0);
     }
-    const ramp_t relative = beside(self, feed_q32);
+    ramp_t relative;
+    beside(self, feed_q32, &relative);
     return feed_q32 + solve_for_stop(self, &relative, &e, feed_q32);
 }
 

@@ -9,20 +9,22 @@
 #define QUINTIC_PIECES  (1 << QUINTIC_SHIFT)
 #define STRAIGHT_PIECES 16
 
-/* The last three differences of one cylinder's extensions. */
+/* The last differences of one cylinder's extensions. */
 typedef struct {
-    q32_t pos_q32, first_q32, second_q32, third_q32;
+    q32_t pos_q32, first_q32, second_q32;
 } differences_t;
 
-/* @param samples added before */
-static void add_sample(differences_t *d, int64_t samples, q32_t pos_q32)
+/* @param samples added before
+ * @return the third difference */
+static q32_t add_sample(differences_t *d, int64_t samples, q32_t pos_q32)
 {
     const q32_t first_q32 = pos_q32 - d->pos_q32;
     const q32_t second_q32 = first_q32 - d->first_q32;
-    d->third_q32 = samples >= 3 ? second_q32 - d->second_q32 : 0;
+    const q32_t third_q32 = samples >= 3 ? second_q32 - d->second_q32 : 0;
     d->second_q32 = samples >= 2 ? second_q32 : 0;
     d->first_q32 = samples >= 1 ? first_q32 : 0;
     d->pos_q32 = pos_q32;
+    return third_q32;
 }
 
 /* limit * (cycles per piece)^power, with 1/16 to spare. */
@@ -35,11 +37,11 @@ static q32_t limit_per_piece(q32_t limit_q32, int64_t cycles, unsigned power)
     return result_q32;
 }
 
-static bool is_within(const differences_t *d, const ramp_limits_t *limits, int64_t cycles)
+static bool is_within(const differences_t *d, q32_t third_q32, const ramp_limits_t *limits, int64_t cycles)
 {
     return fx_abs(d->first_q32) <= limit_per_piece(limits->vel_per_cycle_q32, cycles, 1) &&
            fx_abs(d->second_q32) <= limit_per_piece(limits->acc_per_cycle2_q32, cycles, 2) &&
-           fx_abs(d->third_q32) <= limit_per_piece(limits->jerk_per_cycle3_q32, cycles, 3);
+           fx_abs(third_q32) <= limit_per_piece(limits->jerk_per_cycle3_q32, cycles, 3);
 }
 
 bool way_is_feasible(const motion_t *motion, const quintic_t *quintic)
@@ -55,8 +57,8 @@ bool way_is_feasible(const motion_t *motion, const quintic_t *quintic)
             return false;
         }
         for (unsigned i = 0; i < motion->cylinders; i++) {
-            add_sample(&d[i], piece, extension_mm_q32[i]);
-            if (!is_within(&d[i], &motion->cylinder[i].limits, quintic->cycles)) {
+            const q32_t third_q32 = add_sample(&d[i], piece, extension_mm_q32[i]);
+            if (!is_within(&d[i], third_q32, &motion->cylinder[i].limits, quintic->cycles)) {
                 return false;
             }
         }
@@ -106,7 +108,7 @@ void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q
             return;
         }
         for (unsigned i = 0; i < motion->cylinders; i++) {
-            add_sample(&d[i], piece, extension_mm_q32[i]);
+            (void)add_sample(&d[i], piece, extension_mm_q32[i]);
             slope_q32[i] = fx_abs(d[i].first_q32) > slope_q32[i] ? fx_abs(d[i].first_q32) : slope_q32[i];
             bend_q32[i] = fx_abs(d[i].second_q32) > bend_q32[i] ? fx_abs(d[i].second_q32) : bend_q32[i];
         }
