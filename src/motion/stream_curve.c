@@ -138,13 +138,6 @@ static q32_t soften(stream_curve_t *self, int32_t guessed)
     return fx_mul_div(self->grip_q32, Q32_ONE, wished_q32);
 }
 
-/* How fast the curve may leave a way that may have been a jump: the softer it comes back, the further it swings out by that. At
- * 60 Hz a sixteenth of the way in a period. */
-static q32_t jump_speed(const stream_curve_t *self, q32_t off_q32)
-{
-    return fx_mul_shift(fx_abs(off_q32), fx_clamp(self->grip_q32 * 5 / 16, 0, Q32_ONE / 16), 32);
-}
-
 /* The points at head are others now: what the curve is off them, and how that changes, so that it goes on as it was. The change
  * is taken over two periods, as the first of them may be the error of a single guess. */
 static void keep_going(stream_curve_t *self, q32_t was_q32[3][AXES_MAX], int32_t guessed)
@@ -154,7 +147,7 @@ static void keep_going(stream_curve_t *self, q32_t was_q32[3][AXES_MAX], int32_t
     points_at_head(self, is_q32);
     for (unsigned axis = 0; axis < self->axes; axis++) {
         const q32_t here_q32 = was_q32[0][axis] - is_q32[0][axis];
-        const q32_t most_q32 = 4 * fx_abs(self->lead[axis].first_q32) + jump_speed(self, here_q32);
+        const q32_t most_q32 = 4 * fx_abs(self->lead[axis].first_q32) + fx_abs(here_q32) / 16;
         const q32_t change_q32 = fx_clamp((here_q32 - (was_q32[2][axis] - is_q32[2][axis])) / 2, -most_q32, most_q32);
         self->off_q32[axis][0] += here_q32;
         self->off_q32[axis][1] += fx_mul_shift(change_q32, share_q32, 32);
@@ -506,6 +499,13 @@ static void control_from(stream_style_t style, q32_t pos_q32, q32_t vel_q32, q32
     control_q32[0] = middle_q32 - vel_q32 + acc / 2;
     control_q32[1] = middle_q32;
     control_q32[2] = middle_q32 + vel_q32 + acc / 2;
+}
+
+/* How fast the curve may leave a way that may have been a jump: the softer it comes back, the further it swings out by that. At
+ * 60 Hz a sixteenth of the way in a period. */
+static q32_t jump_speed(const stream_curve_t *self, q32_t off_q32)
+{
+    return fx_mul_shift(fx_abs(off_q32), fx_clamp(self->grip_q32 * 5 / 16, 0, Q32_ONE / 16), 32);
 }
 
 HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const history_t *now, unsigned periods,

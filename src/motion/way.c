@@ -5,7 +5,7 @@
  */
 #include "way.h"
 
-#define QUINTIC_SHIFT   5 /* a division for each limit of each piece took half of the time of a plan */
+#define QUINTIC_SHIFT   5 /* a division for each limit of each piece took a sixth of the time of a plan */
 #define QUINTIC_PIECES  (1 << QUINTIC_SHIFT)
 #define STRAIGHT_PIECES 16
 

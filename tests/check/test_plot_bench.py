@@ -414,12 +414,15 @@ def check_peers(suite):
         assert bench_peers.doubt({"q25": 93.0, "median": 100.0, "q75": 107.0}, 0.05) is None
     with suite.case("bench peers tells the time of platforms and how many fit, or that it cannot"):
         cycles = bench_peers.CYCLES
-        drifting = [1 + i / 20 for i in range(20)]  # the machine's speed
+        drifting = [1 + i / 100 for i in range(20)]  # the machine's speed
         steady = {f"of-{count}": [2000.0 * cycles * (1 + count / 640) * drift for drift in drifting] for count in (1, 2, 64)}
         lines = bench_peers.platform_lines({"stolen": 0, "candidates": bench_peers.judge(list(steady), {}, steady)})
-        assert "goal below 5000 ns: met" in lines[1] and lines[3].split()[1:3] == ["1.10", "x"] and lines[-1].split()[:3] == ["265", "to", "367"], lines
-        slow = {name: [2 * value for value in values] for name, values in steady.items()}
+        assert "goal below 5000 ns: met" in lines[1] and lines[3].split()[1:3] == ["1.10", "x"] and lines[-1].split()[:3] == ["398", "to", "434"], lines
+        slow = {name: [3 * value for value in values] for name, values in steady.items()}
         assert "goal below 5000 ns: missed" in bench_peers.platform_lines({"stolen": 0, "candidates": bench_peers.judge(list(slow), {}, slow)})[1]
+        unsteady = {name: [value * (1 + i % 4 / 5) for i, value in enumerate(values)] for name, values in steady.items()}
+        lines = bench_peers.platform_lines({"stolen": 0, "candidates": bench_peers.judge(list(unsteady), {}, unsteady)})
+        assert "goal" not in lines[1] and lines[3].split()[1:3] == ["1.10", "x"], lines
         assert "no figure" in bench_peers.platform_lines({"stolen": 0.06, "candidates": bench_peers.judge(list(slow), {}, slow)})[1]
         steady["of-64"] = [value * (1 + i % 2) for i, value in enumerate(steady["of-64"])]
         lines = bench_peers.platform_lines({"stolen": 0, "candidates": bench_peers.judge(list(steady), {}, steady)})
