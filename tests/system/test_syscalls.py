@@ -635,6 +635,8 @@ def main():
     with heave.Bench(sys.argv[1]) as bench:
         can_fail = wrapped(bench)
         places, others = places_of(bench.bin / "heaved", can_fail)
+        if "__llvm_profile_runtime" in tool("nm", bench.bin / "heaved"):
+            others = set()  # those of the library that counts what is reached are among them
     if not places:
         print("1..0 # SKIP a build without debug information does not tell where its calls are")
         return 0
