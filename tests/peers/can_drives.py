@@ -19,11 +19,9 @@ import signal
 import sys
 import time
 
-import can
-import canopen
-
 import faults
 from drive import Drive
+from wire import Wire
 
 LOOK_US = 1000  # how often an axis with torque is looked at
 
@@ -47,10 +45,8 @@ class Drives:
     def __init__(self, config):
         self.start_us = now_us()
         self.log = Log(config.get("log"), self.start_us)
-        self.bus = can.Bus(interface="socketcan", channel=config.get("interface", "vcan0"))
-        self.network = canopen.Network()
-        self.network.bus = self.bus
-        self.drives = [Drive(entry, self.network, self.log, self.start_us) for entry in config["drives"]]
+        self.wire = Wire(config.get("interface", "vcan0"))
+        self.drives = [Drive(entry, self.wire, self.log, self.start_us) for entry in config["drives"]]
         self.trace = open(config["trace"], "w", encoding="utf-8") if config.get("trace") else None
         self.plan = list(config.get("plan", []))
         self.enabled_us = None
@@ -60,21 +56,20 @@ class Drives:
 
     # --- Time ---
 
-    def next_due_us(self):
+    def next_due_us(self, now):
         dues = [due for due in (drive.next_due_us() for drive in self.drives) if due is not None]
         dues += [entry["due_us"] for entry in self.plan if entry["due_us"] is not None]
-        dues.append(now_us() + (LOOK_US if any(drive.is_busy() for drive in self.drives) else 100000))
+        dues.append(now + (LOOK_US if any(drive.is_busy() for drive in self.drives) else 100000))
         return min(dues)
 
-    def advance(self):
-        now = now_us()
+    def advance(self, now):
         for drive in self.drives:
             drive.advance(now)
         self.note_enabled(now)
         due = [entry for entry in self.plan if entry["due_us"] is not None and entry["due_us"] <= now]
         self.plan = [entry for entry in self.plan if entry not in due]
         for entry in due:
-            self.act(entry)
+            self.act(entry, now)
 
     def note_enabled(self, now):
         if self.enabled_us is None and all(drive.is_powered and drive.machine.state == "operation enabled" for drive in self.drives):
@@ -84,30 +79,25 @@ class Drives:
                 if "after_enabled" in entry:
                     entry["due_us"] = now + round(entry["after_enabled"] * 1e6)
 
-    def act(self, entry):
+    def act(self, entry, now):
         arguments = {key: value for key, value in entry.items() if key not in ("at", "after_enabled", "due_us", "drive", "do")}
         for drive in self.drives:
             if entry["drive"] in ("all", drive.node):
-                drive.now_us = now_us()
+                drive.now_us = now
                 faults.act(drive, entry["do"], arguments)
 
     # --- The bus ---
 
-    def hear(self):
+    def hear(self, now):
         try:
-            message = self.bus.recv(0)
-        except can.CanError as error:
-            self.log(now_us(), 0, "bus", str(error))
-            return False
-        if message is None or message.is_error_frame or message.is_extended_id:
-            return message is not None
-        now = now_us()
-        for drive in self.drives:
-            drive.now_us = now
-            drive.hear(message.arbitration_id, bytes(message.data), message.is_remote_frame)
-        if message.arbitration_id == 0x80:
-            self.trace_row(now)
-        return True
+            for identifier, is_remote, data in self.wire.heard():
+                for drive in self.drives:
+                    drive.now_us = now
+                    drive.hear(identifier, data, is_remote)
+                if identifier == 0x80:
+                    self.trace_row(now)
+        except OSError as error:
+            self.log(now, 0, "bus", str(error))
 
     def trace_row(self, now):
         if self.trace:
@@ -117,21 +107,20 @@ class Drives:
     # --- Life ---
 
     def run(self, follow):
-        watched = [self.bus.fileno()] + ([sys.stdin.fileno()] if follow else [])
-        waiting = b""
+        watched = [self.wire.fileno()] + ([sys.stdin.fileno()] if follow else [])
+        waiting, now = b"", now_us()
         while not self.is_ended:
-            wait_s = max(0, self.next_due_us() - now_us()) / 1e6
-            ready, _, _ = select.select(watched, [], [], wait_s)
-            if self.bus.fileno() in ready:
-                while self.hear():
-                    pass
+            ready, _, _ = select.select(watched, [], [], max(0, self.next_due_us(now) - now) / 1e6)
+            now = now_us()
+            if self.wire.fileno() in ready:
+                self.hear(now)
             if follow and sys.stdin.fileno() in ready:
                 heard = os.read(sys.stdin.fileno(), 65536)
                 self.is_ended |= not heard
                 *lines, waiting = (waiting + heard).split(b"\n")
                 for line in lines:
-                    self.act(json.loads(line))
-            self.advance()
+                    self.act(json.loads(line), now)
+            self.advance(now)
         self.end()
 
     def end(self):
@@ -139,7 +128,7 @@ class Drives:
             self.log(now_us(), drive.node, "statistics", drive.stats)
         if self.trace:
             self.trace.close()
-        self.bus.shutdown()
+        self.wire.close()
 
 
 def main():

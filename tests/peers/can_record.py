@@ -19,10 +19,14 @@ def listener(interface):
     return link
 
 
-def note(log, link):
-    identifier, length, data = FRAME.unpack(link.recv(FRAME.size))
-    kind = "x" if identifier & EXTENDED else ""
-    log.write(f"{time.monotonic_ns() // 1000} {kind}{identifier & 0x1FFFFFFF:x} {data[:length].hex()}\n")
+def note_all(log, link):
+    """What waits; that is of now, for on virtual time nobody hears late."""
+    now_us = None
+    while True:
+        identifier, length, data = FRAME.unpack(link.recv(FRAME.size))
+        now_us = now_us or time.monotonic_ns() // 1000
+        kind = "x" if identifier & EXTENDED else ""
+        log.write(f"{now_us} {kind}{identifier & 0x1FFFFFFF:x} {data[:length].hex()}\n")
 
 
 def main():
@@ -35,8 +39,7 @@ def main():
                 return
             try:
                 link = link or listener(sys.argv[1])
-                while True:
-                    note(log, link)
+                note_all(log, link)
             except BlockingIOError:
                 continue
             except OSError:  # down: told once; gone: never again

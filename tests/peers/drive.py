@@ -4,7 +4,6 @@
 The SDO protocol is the package canopen's; everything else is written from the standards' rules, strict where real drives are: an object that
 several stacks refuse is refused. Times are microseconds of whoever calls.
 """
-import can
 import canopen
 from canopen.sdo import SdoServer
 from canopen.sdo.exceptions import SdoAbortedError
@@ -49,12 +48,12 @@ def where_of(text):
 
 
 class Drive:
-    def __init__(self, config, network, log, now_us):
+    def __init__(self, config, wire, log, now_us):
         unknown = set(config) - set(DEFAULTS)
         assert not unknown, f"unknown keys {unknown}"
         self.config = {**DEFAULTS, **config}
         self.config["delays_us"] = {**DEFAULTS["delays_us"], **self.config["delays_us"]}
-        self.node, self.network, self.log = self.config["node"], network, log
+        self.node, self.wire, self.log = self.config["node"], wire, log
         self.object_dictionary = canopen.ObjectDictionary()
         self.timers = {}                # name -> (due_us, call)
         self.now_us = now_us
@@ -127,7 +126,7 @@ class Drive:
             if not name.startswith("plan"):
                 del self.timers[name]
         self.sdo = SdoServer(0x600 + self.node, 0x580 + self.node, self)
-        self.sdo.network = self
+        self.sdo.network = self  # that it sends by send_message
         self.received = {}              # of synchronous RPDOs, until the next SYNC
         self.last_sync_us = self.sync_period_us = None
         self.sync_count = {}            # of TPDOs with a rate
@@ -161,8 +160,8 @@ class Drive:
         if self.is_mute:
             return
         try:
-            self.network.send_message(cob_id, bytes(data))
-        except can.CanError as error:
+            self.wire.send(cob_id, bytes(data))
+        except OSError as error:
             self.say("not sent", str(error))
 
     def send_message(self, cob_id, data):

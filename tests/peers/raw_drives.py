@@ -10,34 +10,27 @@ import select
 import sys
 import time
 
-import can
-
 from raw_drive import FIRST_ID, FIRST_REPLY, Drive
+from wire import Wire
 
 
 def main():
     drives = [Drive(int(position)) for position in sys.argv[2:]]
-    filters = [{"can_id": FIRST_ID + i, "can_mask": 0x7FF, "extended": False} for i in range(len(drives))]
-    with can.Bus(interface="socketcan", channel="vcan0", can_filters=filters) as bus, open(sys.argv[1], "w", encoding="ascii") as log:
+    with Wire("vcan0", range(FIRST_ID, FIRST_ID + len(drives))) as wire, open(sys.argv[1], "w", encoding="ascii") as log:
         for i, drive in enumerate(drives):
             log.write(f"start {FIRST_ID + i:x} {drive.position}\n")
         print("ready", flush=True)
         while True:
-            readable = select.select([bus.fileno(), sys.stdin], [], [])[0]
+            readable = select.select([wire, sys.stdin], [], [])[0]
             if sys.stdin in readable:
                 return
-            try:
-                message = bus.recv(0)
-            except can.CanOperationError:
-                continue  # interface down: told once, then it is silent until it is up again
-            if message is None:
-                continue
             now = time.monotonic()
-            log.write(f"{round(now * 1e6)} {message.arbitration_id:x} {message.data.hex()}\n")
-            answer = drives[message.arbitration_id - FIRST_ID].hear(bytes(message.data), now)
-            if answer is not None:
-                with contextlib.suppress(can.CanOperationError):
-                    bus.send(can.Message(arbitration_id=message.arbitration_id - FIRST_ID + FIRST_REPLY, data=answer, is_extended_id=False))
+            with contextlib.suppress(OSError):  # interface down: told once, then it is silent until it is up again
+                for identifier, _, data in wire.heard():
+                    log.write(f"{round(now * 1e6)} {identifier:x} {data.hex()}\n")
+                    answer = drives[identifier - FIRST_ID].hear(data, now)
+                    if answer is not None:
+                        wire.send(identifier - FIRST_ID + FIRST_REPLY, answer)
 
 
 if __name__ == "__main__":

@@ -14,10 +14,13 @@ import subprocess
 import sys
 
 import can_judge
+import forked
 import heave
 
-DRIVES = heave.TOP / "tests/peers/can_drives.py"
-RECORDER = heave.TOP / "tests/peers/can_record.py"
+sys.path.append(str(heave.TOP / "tests/peers"))
+import can_drives  # noqa: E402  the path above has to be set first
+import can_record  # noqa: E402
+
 COUNTS_PER_MM = 1000
 SETTLED_MM = 5
 CYLINDERS = 6
@@ -51,7 +54,7 @@ class CanBench(heave.Bench):
         entries = [{"node": node, "position": SETTLED_MM * COUNTS_PER_MM if node <= CYLINDERS else 0, **(each or {}), **(only or {}).get(node, {})}
                    for node in NODES]
         config = self.file("drives.json", json.dumps({"log": str(self.log), "trace": str(self.trace), "drives": entries, "plan": list(plan)}))
-        self.drives = subprocess.Popen([sys.executable, DRIVES, config, "--follow"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.drives = forked.Forked(can_drives.main, config, "--follow")
         assert self.drives.stdout.readline() == "ready\n", "the simulated drives do not start"
 
     def stop_drives(self):
@@ -88,7 +91,7 @@ class RecordedBench(CanBench):
     def __init__(self, bin_dir, **changes):
         super().__init__(bin_dir, **changes)
         self.recording = self.folder / "bus.log"
-        self.recorder = subprocess.Popen([sys.executable, RECORDER, "vcan0", self.recording], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.recorder = forked.Forked(can_record.main, "vcan0", self.recording)
         assert self.recorder.stdout.readline() == "ready\n", "the recorder does not start"
 
     def __exit__(self, *exception):

@@ -6,16 +6,18 @@ What is on the bus is judged by the DBC file of the same configuration and canto
 import math
 import random
 import signal
-import subprocess
 import sys
 import time
 
 import cantools
+import forked
 import heave
 import tap
 
+sys.path.append(str(heave.TOP / "tests/peers"))
+import raw_drives  # noqa: E402  the path above has to be set first
+
 PRESET = heave.TOP / "config/can-raw-hexapod.ini"
-PEER = heave.TOP / "tests/peers/raw_drives.py"
 CYLINDERS = 6
 COUNTS_PER_MM = 2000
 FIRST_ID = 0x601
@@ -37,7 +39,7 @@ class RawBench(heave.Bench):
             text = text.replace(pattern, by)
         self.config = self.file("raw.ini", f"{text}\n[control]\nsocket = {self.socket}\n")
         self.log = self.folder / "bus.log"
-        self.drives = subprocess.Popen([sys.executable, PEER, self.log, *map(str, start)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.drives = forked.Forked(raw_drives.main, self.log, *start)
         assert self.drives.stdout.readline() == "ready\n"
 
     def __exit__(self, *exception):

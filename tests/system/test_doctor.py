@@ -8,12 +8,13 @@ import sys
 
 import can
 import can_bench
+import forked
 import heave
+import raw_drives
 import tap
 from test_can import can_config
 
 RAW_PRESET = heave.TOP / "config/can-raw-hexapod.ini"
-RAW_PEER = heave.TOP / "tests/peers/raw_drives.py"
 
 
 def link(*arguments):
@@ -183,10 +184,10 @@ def running_daemon(bench, config):
     assert bench.stop(daemon) == 0
 
 
-def raw_drives(bench, _config):
+def drives_with_frames_of_their_own(bench, _config):
     text = RAW_PRESET.read_text(encoding="utf-8").replace("interface = can0", "interface = vcan0").replace("port = 9800", f"port = {bench.port}")
     config = bench.file("raw.ini", f"{text}\n[control]\nsocket = {bench.socket}\n")
-    drives = subprocess.Popen([sys.executable, RAW_PEER, bench.folder / "raw.log", *["10000"] * 5], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    drives = forked.Forked(raw_drives.main, bench.folder / "raw.log", *[10000] * 5)
     assert drives.stdout.readline() == "ready\n"
     rows = doctor(bench, config, 1, "drive 6: nothing with identifier 586h")
     assert [text for level, text in rows if "answers with" in text] == [f"drive {k + 1} answers with identifier {0x581 + k:X}h" for k in range(5)], rows
@@ -217,7 +218,7 @@ CASES = [
     ("a node that nobody has configured", unknown_node),
     ("a UDP port in use", port_in_use),
     ("a daemon that runs", running_daemon),
-    ("drives with frames of their own, one of them missing", raw_drives),
+    ("drives with frames of their own, one of them missing", drives_with_frames_of_their_own),
 ]
 
 
