@@ -157,6 +157,13 @@ class Bench:
         assert run.returncode == 0, f"exit {run.returncode}: {run.stderr}"
         return trace.read_bytes()
 
+    def check_limits(self, config=None):
+        """Of what was played last: tests/judge, which takes a twentieth of check_trace's time. (What check_trace has more: relays, states, timed moves.)"""
+        with open(self.folder / "played.csv", "rb") as trace:
+            run = subprocess.run([self.bin.resolve().parents[1] / "tests/judge/trace_judge", config or self.config], stdin=trace,
+                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=WAIT_S, check=False)
+        assert run.returncode == 0, run.stdout
+
     def judge_ended(self):
         """What the guard has to say of all that have ended so far."""
         for daemon in self.running:

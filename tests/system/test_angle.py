@@ -16,12 +16,18 @@ SHORTEST = {"angle__wrap": "shortest", "angle__min_deg": -32000, "angle__max_deg
 
 
 class Play:
-    """A run of lines on the demonstration platform, patient with silent senders, and what check_trace says of it."""
+    """A run of lines on the demonstration platform, patient with silent senders, within every limit; timed moves end in time."""
 
     def __init__(self, bench, lines, **changes):
         config = bench.write_config("angle.ini", udp__silence_hold_ms=0, **changes)
         frames = bench.file("frames.txt", "".join(f"{t} {what}\n" for t, what in sorted(lines, key=lambda line: line[0])))
         self.rows = heave.rows_of(bench.play(frames, config=config))
+        bench.check_limits(config)
+        if any("T:" in what for _, what in lines):
+            self.check_timed_moves(bench, config, frames)
+
+    @staticmethod
+    def check_timed_moves(bench, config, frames):
         check = subprocess.run([sys.executable, heave.TOP / "tools/check_trace", "--json", "--frames", frames, config, bench.folder / "played.csv"],
                                stdout=subprocess.PIPE, text=True, check=False)
         assert check.returncode == 0, check.stdout

@@ -2,11 +2,9 @@
 # SPDX-License-Identifier: MIT
 """test_spikes.py BIN - single wild samples in a stream, and far jumps that nothing confirms: what heaved makes of it is, byte by byte, what it makes of
 the stream without them."""
-import json
 import math
 import random
 import signal
-import subprocess
 import sys
 
 import heave
@@ -59,19 +57,13 @@ def without(lines, places):
     return [line for i, line in enumerate(lines) if i not in places]
 
 
-def check_limits(bench, config=None):
-    check = subprocess.run([sys.executable, heave.TOP / "tools/check_trace", "--json", config or bench.config, bench.folder / "played.csv"],
-                           stdout=subprocess.PIPE, text=True, check=False)
-    assert check.returncode == 0 and json.loads(check.stdout)["violations"] == 0, check.stdout
-
-
 def spikes_are_lost_samples(bench):
     for rate in RATES_HZ:
         for jitter_ms, loss in ((0, 0), (min(5, 300 / rate), 0.02)):
             lines, places = with_spikes(stream(rate, jitter_ms=jitter_ms, loss=loss))
             assert len(places) > 8
             assert play(bench, lines) == play(bench, without(lines, places)), f"{rate} Hz, jitter {jitter_ms} ms"
-            check_limits(bench)
+            bench.check_limits()
 
 
 def spikes_in_a_timed_stream(bench):
@@ -83,7 +75,7 @@ def a_step_comes_one_sample_later(bench):
     lines = stream(60)
     stepped = [(t, pose if i < 100 else [value + 8 for value in pose]) for i, (t, pose) in enumerate(lines)]
     assert play(bench, stepped) == play(bench, without(stepped, [100]), config=configured(bench, "off.ini", 0))
-    check_limits(bench)
+    bench.check_limits()
 
 
 def the_last_frame_counts(bench):
@@ -91,7 +83,7 @@ def the_last_frame_counts(bench):
     lines = stream(50, 225)
     assert max(map(abs, lines[-1][1])) > 15
     rows = heave.rows_of(play(bench, [*lines, (lines[-1][0] + 20, [0] * 6)]))
-    check_limits(bench)
+    bench.check_limits()
     assert all(float(rows[-1][name]) == 0 for name in ("roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm")), rows[-1]
 
 
@@ -153,7 +145,7 @@ def lone_jumps_are_not_followed(bench):
     config = confirming(bench)
     lines, places = with_spikes(stream(50))
     assert play(bench, lines, config=config) == play(bench, without(lines, places), config=config)
-    check_limits(bench, config)
+    bench.check_limits(config)
     jumps = [(T0, [0, 0, 0, 0, 0, 15]), (T0 + 1000, [0, 6, 0, 0, 0, 0]), (T0 + 3000, [0, 0, 0, 0, 21, 0]), (T0 + 6000, [0, 0, 0, 0, 0, 14])]
     assert play(bench, jumps, config=config) == play(bench, without(jumps, [1, 2]), config=config)
 
