@@ -223,10 +223,10 @@ def check_lint(suite, root, args):
         if not shutil.which(CLANG_TIDY):
             raise tap.Skip(f"{CLANG_TIDY} is not installed")
         commands = json.loads((args.build / "compile_commands.json").read_text(encoding="utf-8"))
-        paths = [command["file"] for command in commands if re.match(r"(src|hal)/", os.path.relpath(command["file"], root))]
+        paths = {command["file"] for command in commands if re.match(r"(src|hal)/", os.path.relpath(command["file"], root))}  # once: with all its commands
         assert paths, "no source found"
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-            findings = pool.map(lambda path: lint_findings(root, args.build, path), paths)
+            findings = pool.map(lambda path: lint_findings(root, args.build, path), sorted(paths))
         none_of(sorted({line for found in findings for line in found}), "findings")
 
 

@@ -29,7 +29,7 @@ RUN_LIMIT_S = 300
 START = ("core", "CMakeFiles/heave_start.dir")
 # Processor: topics it plays, and what must not be exceeded, in bytes: what it takes, and some 5 % for the next change and another gcc. What is aimed at: docs/firmware.md.
 KINDS = {
-    "cortex-m3": (("mode-changes", "out-of-reach", "stream-60hz", "stream-timed", "tripod-out-of-reach"), {"flash": 96 * 1024, "ram": 19 * 1024, "stack": 2048}),
+    "cortex-m3": (test_golden.TELLING, {"flash": 96 * 1024, "ram": 19 * 1024, "stack": 2048}),
     "cortex-m0plus": (("mode-changes",), {"flash": 103 * 1024, "ram": 19 * 1024, "stack": 2176}),
 }
 
@@ -86,8 +86,7 @@ def run_sizes(suite, firmware, limits):
 def run_traces(suite, firmware, topics):
     used = 0
     with tempfile.TemporaryDirectory() as name, concurrent.futures.ThreadPoolExecutor(2) as pool:
-        runs = {frames: pool.submit(firmware.play, frames, Path(name)) for frames in sorted((TOP / "tests/golden").glob("*.frames"))
-                if topics is None or frames.stem in topics}
+        runs = {frames: pool.submit(firmware.play, frames, Path(name)) for frames in test_golden.topics(topics)}
         for frames, run in runs.items():
             with suite.case(f"{frames.stem}, {firmware.cpu}: the trace is the expected one"):
                 got, stack = run.result()

@@ -4,8 +4,8 @@
 
 usage: test_foreign.py --arch arm64|armhf|s390x --build-dir DIR [--unity DIR] [--slow]
 
-The program and some unit tests are built by Debian's cross compiler and run by qemu's user mode. What that takes is skipped by name where it
-cannot be had; tools/test installs it.
+The program and some unit tests are built by Debian's cross compiler and run by qemu's user mode: the traces and tests that say most for their time,
+with --slow all. What that takes is skipped by name where it cannot be had; tools/test installs it.
 """
 import argparse
 import os
@@ -22,8 +22,8 @@ TOP = Path(__file__).resolve().parents[2]
 # Debian's name: (triplet, qemu's name, what it stands for)
 KINDS = {"arm64": ("aarch64-linux-gnu", "aarch64", "64 bits, little-endian"), "armhf": ("arm-linux-gnueabihf", "arm", "32 bits, little-endian"),
          "s390x": ("s390x-linux-gnu", "s390x", "64 bits, big-endian")}
-TESTS = ("fx", "kin", "number", "counts", "intensity")
-SLOW_TESTS = ("halt", "ramp")  # minutes on an emulated processor; the traces go through the same code
+TESTS = ("fx", "kin", "number", "counts")
+SLOW_TESTS = ("intensity", "halt", "ramp")  # minutes on an emulated processor; the traces go through the same code
 TEST_LIMIT_S = 1500
 
 
@@ -70,7 +70,7 @@ def main():
     parser.add_argument("--arch", choices=KINDS, required=True)
     parser.add_argument("--build-dir", type=Path, required=True)
     parser.add_argument("--unity", metavar="DIR")
-    parser.add_argument("--slow", action="store_true", help="the slow unit tests too")
+    parser.add_argument("--slow", action="store_true", help="all traces, and the slow unit tests too")
     arguments = parser.parse_args()
     tests = TESTS + (SLOW_TESTS if arguments.slow else ())
     suite, foreign, is_built = tap.Suite(), Foreign(arguments.arch, arguments.build_dir), False
@@ -79,7 +79,8 @@ def main():
         is_built = True
     if is_built:
         with tempfile.TemporaryDirectory() as folder:
-            test_golden.run_topics(suite, f", {arguments.arch}", foreign.command("src/app/heaved"), Path(folder) / "trace.csv")
+            test_golden.run_topics(suite, f", {arguments.arch}", foreign.command("src/app/heaved"), Path(folder) / "trace.csv",
+                                   only=None if arguments.slow else test_golden.TELLING)
         for name in tests:
             with suite.case(f"unit.{name}, {arguments.arch}"):
                 foreign.run_unit_test(name)
