@@ -180,7 +180,7 @@ static bool is_off_curve(const motion_t *self)
     return self->join == JOIN_SAMPLE || self->join == JOIN_HALT;
 }
 
-void join_plan(motion_t *self, const ramp_ref_t ref[AXES_MAX])
+void join_plan(motion_t *self, const ramp_ref_t curve[AXES_MAX])
 {
     const bool is_off = are_cylinders_off(self);
     if (is_off) {
@@ -188,9 +188,9 @@ void join_plan(motion_t *self, const ramp_ref_t ref[AXES_MAX])
     }
     if (is_off || self->join == JOIN_DUE || !are_slots_near(self) ||
         (is_off_curve(self) && (self->has_new_sample || self->join_cycles >= RETRY_CYCLES))) {
-        replan(self, ref, false, !is_off);
+        replan(self, curve, false, !is_off);
     } else if (self->join == JOIN_CURVE && self->has_new_sample && cycles_left(self) > RETRY_CYCLES) {
-        shorten(self, ref);
+        shorten(self, curve);
     }
     self->has_new_sample = false;
 }
