@@ -28,22 +28,23 @@ typedef struct {
     bool stays_near;         /* goes no further than the stop in self->aside.halt */
 } task_t;
 
+/* A state of the cycle before, less what something else adds to the plan: its reference is that of this cycle already. */
+static ramp_state_t seen_from(const ramp_state_t *state, const ramp_ref_t *ref)
+{
+    const ramp_state_t base = past_state(ref);
+    return (ramp_state_t){state->pos_q32 - base.pos_q32, state->vel_per_cycle_q32 - base.vel_per_cycle_q32,
+                          state->acc_per_cycle2_q32 - base.acc_per_cycle2_q32};
+}
+
 /* Where a slot starts, seen from what the target moves with. */
 static ramp_state_t start_of(const motion_t *self, const task_t *task, unsigned i)
 {
     ramp_state_t start = *slot_state(self, i);
-    if (task->is_shifted && !intensity_is_still(&self->intensity, self->timed_share_q46)) {
+    if (task->is_shifted) {
         const ramp_ref_t shift = intensity_shift(&self->intensity, self->timed_share_q46, self->timed_way_q32[i]);
-        start.vel_per_cycle_q32 -= shift.vel_per_cycle_q32;
-        start.acc_per_cycle2_q32 -= shift.acc_per_cycle2_q32;
+        start = seen_from(&start, &shift);
     }
-    if (task->curve != NULL) {
-        const ramp_state_t base = past_state(&task->curve[i]);
-        start.pos_q32 -= base.pos_q32;
-        start.vel_per_cycle_q32 -= base.vel_per_cycle_q32;
-        start.acc_per_cycle2_q32 -= base.acc_per_cycle2_q32;
-    }
-    return start;
+    return task->curve != NULL ? seen_from(&start, &task->curve[i]) : start;
 }
 
 /* Where cylinders led beyond an axis' range, the way back begins there. */
@@ -66,7 +67,6 @@ static void stay_near(ramp_limits_t *limits, q32_t from_q32, q32_t to_q32, q32_t
 /* The limits of a slot, less what a target that moves takes of them. */
 static ramp_limits_t limits_of(const motion_t *self, const task_t *task, unsigned i)
 {
-    const q32_t start_q32 = slot_state(self, i)->pos_q32;
     ramp_limits_t limits = *slot_limits(self, i);
     if (task->curve != NULL) {
         limits.jerk_per_cycle3_q32 -= limits.jerk_per_cycle3_q32 / 4;
@@ -74,6 +74,7 @@ static ramp_limits_t limits_of(const motion_t *self, const task_t *task, unsigne
         limits.pos_max_q32 = INT64_MAX / 4;
         return limits;
     }
+    const q32_t start_q32 = start_of(self, task, i).pos_q32;
     include_start(&limits, start_q32);
     if (task->stays_near) {
         stay_near(&limits, start_q32, task->target_q32[i], self->aside.halt.rest_q32[i]);

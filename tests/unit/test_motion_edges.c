@@ -379,6 +379,30 @@ static void test_stream_is_scaled_by_the_intensity(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, stream_swing_mm(8000));
 }
 
+/* What the intensity adds to a timed move is not planned twice: else the axes are led faster than they go, and lag. */
+static void test_timed_move_planned_while_the_intensity_changes_starts_where_the_axes_are(void)
+{
+    start_following();
+    motion_target_t target = {.space = MOTION_POSE, .is_timed = true, .time_ms = 3000};
+    take(&target);
+    run_ms(4000, 400); /* the first one is taken over, from rest */
+    target.value_q32[AXIS_Z] = q32_from_int(60);
+    take(&target);
+    run_ms(1200, 400);
+    TEST_ASSERT_EQUAL(HV_OK, motion_set_intensity(&m_motion, 40));
+    run_ms(400, 400);
+    TEST_ASSERT_FALSE(intensity_is_still(&m_motion.intensity, m_motion.intensity.share_q46[0]));
+    target.value_q32[AXIS_Z] = q32_from_int(-30);
+    take(&target);
+    for (unsigned ms = 0; ms < 3000; ms++) {
+        step(400);
+        TEST_ASSERT_EQUAL(MOTION_TIMED, m_motion.source);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-4, mm(m_out.asked.axis_q32[AXIS_Z]), mm(m_out.sent.axis_q32[AXIS_Z]));
+    }
+    run_ms(10, 400);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, -12, mm(m_out.sent.axis_q32[AXIS_Z]));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -395,5 +419,6 @@ int main(void)
     RUN_TEST(test_join_is_beyond_of_a_fast_stream_by_more_jerk);
     RUN_TEST(test_join_a_fast_stream_within_the_limits_stays_on_its_curve);
     RUN_TEST(test_stream_is_scaled_by_the_intensity);
+    RUN_TEST(test_timed_move_planned_while_the_intensity_changes_starts_where_the_axes_are);
     return UNITY_END();
 }
