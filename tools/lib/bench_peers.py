@@ -13,7 +13,7 @@ import time
 
 from bench_cost import CostError, instructions_of, output_of, processor
 
-# name in bench_peers: (runs per turn, runs under callgrind, what it is, [(peer, ratio aimed at)])
+# name in bench_peers: (runs per turn, of a signal all of it, runs under callgrind, what it is, [(peer, ratio aimed at)])
 SUBJECTS = {
     "parse-document": (512, 4096, "a frame of the vendor's document read", {"sscanf": 7, "from_chars": 1.3}),
     "parse-3": (512, 4096, "a frame A6 with three decimals read", {"sscanf": 8, "from_chars": 1.6}),
@@ -21,7 +21,7 @@ SUBJECTS = {
     "inverse": (512, 4096, "inverse kinematics of a hexapod", {"double": 1 / 1.5}),
     "forward-warm": (128, 1024, "forward kinematics, from 0.5 mm and 0.05 deg beside", {}),
     "forward-cold": (128, 1024, "forward kinematics, from pose zero", {}),
-    "stream": (64, 2000, "a stream rebuilt and limited, 7 axes, one cycle", {"ruckig": 80}),
+    "stream": (10000, 2000, "a stream rebuilt and limited, 7 axes, one cycle", {"ruckig": 80}),
     "platforms": (50, 1000, "a cycle of each of so many platforms in one process, all streaming", {}),
 }
 PLATFORMS = "platforms"
