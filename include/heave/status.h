@@ -39,7 +39,7 @@ typedef enum {
 
 /** A condition that hardly ever holds: the way without it is kept short. */
 #if defined(__GNUC__)
-#define HV_RARELY(condition) __builtin_expect((condition), 0)
+#define HV_RARELY(condition) (__builtin_expect((condition), 0) != 0)
 #else
 #define HV_RARELY(condition) (condition)
 #endif
