@@ -199,7 +199,7 @@ static void write_relays(gateway_t *self, uint64_t now_us)
     watch_relays(self);
 }
 
-static void send_setpoints(gateway_t *self, uint64_t now_us)
+HV_OWN_FRAME static void send_setpoints(gateway_t *self, uint64_t now_us)
 {
     q32_t setpoint_q32[DRIVES_MAX] = {0};
     const unsigned cylinders = kin_cylinders(motion_kin(&self->motion));

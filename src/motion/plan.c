@@ -18,8 +18,8 @@
 #define START_SLACK_Q32 (Q32_ONE / 1000) /* rounding of a quintic's first points */
 #define JOIN_MAX_US     600000           /* a longer quintic swings out further than it is worth */
 
-/* What a quintic is looked for. Where it starts is worked out where it is needed: it would lie on the stack under everything that
- * an attempt calls. */
+/* What a quintic is looked for. Where it starts and what limits it are worked out where they are needed: they would lie on the
+ * stack under everything that an attempt calls. */
 typedef struct {
     unsigned slots;
     bool is_shifted; /* the intensity moves slots by itself, which is not for the plan to do */
@@ -114,15 +114,22 @@ static void add_curve(motion_t *self, const task_t *task, int sign)
     }
 }
 
+/* Whether every slot keeps its limits along self->quintic. */
+HV_OWN_FRAME static bool keeps_limits(const motion_t *self, const task_t *task)
+{
+    limits_t limits;
+    set_limits(self, task, &limits);
+    return quintic_is_feasible(&self->quintic, limits.list);
+}
+
 /* Plans self->quintic; false where an axis or a cylinder would break its limits, with what its target moves with. */
-static bool try_quintic(motion_t *self, const task_t *task, const limits_t *limits, int64_t cycles)
+static bool try_quintic(motion_t *self, const task_t *task, int64_t cycles)
 {
     if (!plan_slots(self, task, cycles)) {
         return false;
     }
     add_curve(self, task, 1);
-    if (!quintic_is_feasible(&self->quintic, limits->list) ||
-        (self->space == MOTION_POSE && !way_is_feasible(self, &self->quintic))) {
+    if (!keeps_limits(self, task) || (self->space == MOTION_POSE && !way_is_feasible(self, &self->quintic))) {
         return false;
     }
     add_curve(self, task, -1);
@@ -131,11 +138,9 @@ static bool try_quintic(motion_t *self, const task_t *task, const limits_t *limi
 
 static bool find_shortest(motion_t *self, const task_t *task, int64_t least, int64_t most, int attempts)
 {
-    limits_t limits;
-    set_limits(self, task, &limits);
     int64_t cycles = least > SHORTEST_CYCLES ? least : SHORTEST_CYCLES;
     for (int attempt = 0; attempt < attempts && cycles <= most; attempt++) {
-        if (try_quintic(self, task, &limits, cycles)) {
+        if (try_quintic(self, task, cycles)) {
             return true;
         }
         cycles += cycles / 8;
@@ -248,19 +253,11 @@ static int64_t plan_quickest(motion_t *self, const task_t *task, int64_t least)
     return in_two_parts;
 }
 
-/* One attempt. */
-HV_OWN_FRAME static bool is_possible_in(motion_t *self, const task_t *task, int64_t cycles)
-{
-    limits_t limits;
-    set_limits(self, task, &limits);
-    return try_quintic(self, task, &limits, cycles);
-}
-
 static int64_t plan_timed_cycles(motion_t *self, int64_t cycles)
 {
     const task_t task = {.slots = AXES_MAX, .is_shifted = true, .target_q32 = self->goal_q32};
     self->source = MOTION_TIMED;
-    if (is_possible_in(self, &task, cycles)) {
+    if (try_quintic(self, &task, cycles)) {
         return cycles;
     }
     if (slot_all_at_rest(self, AXES_MAX)) {
