@@ -208,7 +208,7 @@ typedef struct {
     uint8_t pp_step; /* of the handshake in PP */
     uint8_t sync_count;
     uint64_t now_us;
-    uint64_t sync_us;
+    uint64_t due_us; /* the next SYNC */
     uint64_t free_us;
     uint64_t gone_us;
     uint64_t restart_us;

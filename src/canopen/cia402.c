@@ -116,7 +116,7 @@ static void come_back(cia402_t *self)
     self->is_refused = false;
     self->is_preop_due = true;
     self->free_us = self->now_us;
-    self->sync_us = self->now_us - self->config->period_us; /* the next one is due now */
+    self->due_us = self->now_us;
     self->is_due = true;
     self->restarts++;
 }
@@ -181,8 +181,8 @@ static void send_sync(cia402_t *self)
     self->is_open = true;
     self->syncs++;
     self->stage_syncs++;
-    const bool is_late = self->now_us - self->sync_us >= 2u * (uint64_t)self->config->period_us;
-    self->sync_us = is_late ? self->now_us : self->sync_us + self->config->period_us;
+    const bool is_late = self->now_us >= self->due_us + self->config->period_us;
+    self->due_us = (is_late ? self->now_us : self->due_us) + self->config->period_us;
     for (unsigned k = 0; k < self->config->axes; k++) {
         cia402_axis_note_sync(&self->axis[k]);
     }
@@ -325,12 +325,12 @@ static void take_time(cia402_t *self, uint64_t now_us)
         self->has_time = true;
         self->is_preop_due = true;
         self->free_us = now_us;
-        self->sync_us = now_us - self->config->period_us;
+        self->due_us = now_us;
         for (unsigned k = 0; k < self->config->axes; k++) {
             cia402_axis_init(cia402_drive(self, k));
         }
     }
-    self->is_due |= now_us - self->sync_us >= self->config->period_us;
+    self->is_due |= now_us >= self->due_us;
 }
 
 static void work(cia402_t *self)

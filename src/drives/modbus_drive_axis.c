@@ -630,7 +630,7 @@ void modbus_drive_axis_request(modbus_drive_axis_t *self, const modbus_drive_map
 static q32_t mean_of(int64_t sum_q32, uint32_t count)
 {
     const int64_t half = sum_q32 < 0 ? -(int64_t)(count / 2u) : (int64_t)(count / 2u);
-    return (sum_q32 + half) / (int64_t)count;
+    return fx_add_sat(sum_q32, half) / (int64_t)count;
 }
 
 void modbus_drive_axis_begin(modbus_drive_axis_t *self, const counts_scale_t *scale, uint64_t now_us)
@@ -677,7 +677,7 @@ void modbus_drive_axis_offer(modbus_drive_axis_t *self, const modbus_drive_map_t
         self->sum_q32 /= 2;
         self->sums /= 2u;
     }
-    self->sum_q32 += self->paced_q32;
+    self->sum_q32 = fx_add_sat(self->sum_q32, self->paced_q32);
     self->sums++;
     if (self->step != 0) {
         return; /* a set-point of several blocks goes out whole */

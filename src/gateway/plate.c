@@ -58,11 +58,13 @@ static bool filter_axis(plate_t *self, unsigned axis, int64_t step_us)
     return fx_abs(off_q32) <= JUMP_Q32;
 }
 
-static void filter(plate_t *self, uint64_t step_us)
+/* A time that goes back is a gap. */
+static void filter(plate_t *self, uint64_t at_us)
 {
-    bool is_smooth = self->has_pose && step_us <= PLATE_GAP_US;
+    const int64_t step_us = (int64_t)at_us - (int64_t)self->at_us;
+    bool is_smooth = self->has_pose && step_us > 0 && step_us <= PLATE_GAP_US;
     for (unsigned axis = 0; axis < POSE_AXES && is_smooth; axis++) {
-        is_smooth = filter_axis(self, axis, (int64_t)step_us);
+        is_smooth = filter_axis(self, axis, step_us);
     }
     if (!is_smooth) {
         start_filter(self);
@@ -88,7 +90,7 @@ void plate_take(plate_t *self, const kin_t *kin, const drive_feedback_t feedback
             return;
         }
         self->pose = pose;
-        filter(self, at_us - self->at_us); /* a time that goes back is a large step: a gap */
+        filter(self, at_us);
         self->at_us = at_us;
         self->has_pose = true;
         self->was_sought = true;

@@ -463,7 +463,9 @@ static const uint8_t k_heads[] = {'@', ' ', 0};
 static linux_udp_filter_t filter_of(const hal_udp_network_t *networks, uint8_t count)
 {
     linux_udp_filter_t filter = {.heads = k_heads, .head_count = sizeof k_heads, .bytes_max = 100, .allow = {.count = count}};
-    memcpy(filter.allow.network, networks, count * sizeof networks[0]);
+    for (unsigned i = 0; i < count; i++) {
+        filter.allow.network[i] = networks[i];
+    }
     return filter;
 }
 
