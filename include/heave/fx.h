@@ -51,12 +51,24 @@ static inline int64_t fx_mul_shift_fit(int64_t a, int64_t b, unsigned shift)
     return FX_WIDE_MUL_SHIFT_FIT(a, b, shift);
 }
 
-/** a * b / 2^64, rounded down: the cheapest wide product there is. Formats are chosen so that the 64 comes out right. */
+/** What fx_mul_high() takes is below this: 2^63 - 2^31. */
+#define FX_HIGH_LIMIT (INT64_MAX - INT32_MAX)
+
+/** a * b / 2^64, rounded down: the cheapest wide product there is. Formats are chosen so that the 64 comes out right.
+ *  @param a,b below FX_HIGH_LIMIT */
 /*@ assigns \result \from a, b;
-    ensures \result == (a * b) >> 64; */
+    ensures a < FX_HIGH_LIMIT && b < FX_HIGH_LIMIT ==> \result == (a * b) >> 64; */
 static inline int64_t fx_mul_high(int64_t a, int64_t b)
 {
     return FX_WIDE_MUL_HIGH(a, b);
+}
+
+/** fx_mul_high(a[0], b[0]) + fx_mul_high(a[1], b[1]), at half the cost where a word has 32 bits.
+ *  @param a below FX_HIGH_LIMIT
+ *  @param b whole multiples of 2^32, -2^61 to 2^61 */
+static inline int64_t fx_dot2_high(const int64_t a[2], const int64_t b[2])
+{
+    return FX_WIDE_DOT2_HIGH(a, b);
 }
 
 /** The exact sum of the squares of three values from -2^61 to 2^61. */

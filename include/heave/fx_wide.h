@@ -6,7 +6,7 @@
 #ifndef HEAVE_FX_WIDE_H
 #define HEAVE_FX_WIDE_H
 
-#include <stdint.h>
+#include "heave/status.h"
 
 /** An unsigned 128-bit value, for sums of squares. */
 typedef struct {
@@ -60,31 +60,63 @@ static inline int64_t fx_wide_mul_shift_portable(int64_t a, int64_t b, unsigned 
     return fx_wide_shift_portable(fx_wide_signed_product_portable(a, b), shift);
 }
 
-/** fx_square3(), from sums of the products of halves: with values of at most 2^61 none of them is above 2^64. */
-static inline fx_u128_t fx_wide_square3_portable(const int64_t v[3])
+/** A value below 2^63 - 2^31 is high * 2^32 + low with both signed: products of such halves need nothing taken off for signs.
+ * Sums of them are unsigned, as the ends of their ranges meet nowhere but on paper. */
+static inline int32_t fx_wide_low(int64_t value)
 {
-    uint64_t high = 0, middle = 0, low_hi = 0, low_lo = 0;
-    for (unsigned i = 0; i < 3; i++) {
-        const uint64_t magnitude = (uint64_t)(v[i] < 0 ? -v[i] : v[i]);
-        const uint32_t hi = (uint32_t)(magnitude >> 32), lo = (uint32_t)magnitude;
-        const uint64_t low = (uint64_t)lo * lo;
-        high += (uint64_t)hi * hi;
-        middle += (uint64_t)hi * lo;
-        low_hi += low >> 32;
-        low_lo += low & UINT32_MAX;
-    }
-    middle = 2 * middle + low_hi + (low_lo >> 32);
-    return (fx_u128_t){high + (middle >> 32), (middle << 32) | (low_lo & UINT32_MAX)};
+    return (int32_t)(uint32_t)value;
 }
 
-/** fx_mul_high(): halves with their signs, so that nothing has to be taken off for signs afterwards. */
-static inline int64_t fx_wide_mul_high_portable(int64_t a, int64_t b)
+HV_WRAPS static inline int32_t fx_wide_high(int64_t value)
 {
-    const int32_t a_hi = (int32_t)(a >> 32), b_hi = (int32_t)(b >> 32);
-    const uint32_t a_lo = (uint32_t)a, b_lo = (uint32_t)b;
-    const int64_t middle = a_hi * (int64_t)b_lo + (int64_t)(((uint64_t)a_lo * b_lo) >> 32);
-    const int64_t carry = b_hi * (int64_t)a_lo + (int64_t)(uint32_t)middle;
-    return (int64_t)a_hi * b_hi + (middle >> 32) + (carry >> 32);
+    return (int32_t)((uint32_t)(value >> 32) + ((uint32_t)value >> 31));
+}
+
+/** The product of two halves. */
+static inline uint64_t fx_wide_halves(int32_t a, int32_t b)
+{
+    return (uint64_t)((int64_t)a * b);
+}
+
+/** The upper half of a sum of such products. */
+static inline int64_t fx_wide_upper(uint64_t sum)
+{
+    return (int64_t)sum >> 32;
+}
+
+/** fx_square3(), from sums of the products of halves: with values of at most 2^61 none of them leaves 64 bits. */
+HV_WRAPS static inline fx_u128_t fx_wide_square3_portable(const int64_t v[3])
+{
+    uint64_t high = 0, middle = 0, low = 0;
+    for (unsigned i = 0; i < 3; i++) {
+        const int32_t hi = fx_wide_high(v[i]), lo = fx_wide_low(v[i]);
+        high += fx_wide_halves(hi, hi);
+        middle += fx_wide_halves(hi, lo);
+        low += fx_wide_halves(lo, lo);
+    }
+    middle = 2 * middle + (low >> 32);
+    return (fx_u128_t){high + (uint64_t)fx_wide_upper(middle), (middle << 32) | (low & UINT32_MAX)};
+}
+
+/** fx_mul_high(). */
+HV_WRAPS static inline int64_t fx_wide_mul_high_portable(int64_t a, int64_t b)
+{
+    const int32_t a_hi = fx_wide_high(a), a_lo = fx_wide_low(a), b_hi = fx_wide_high(b), b_lo = fx_wide_low(b);
+    const uint64_t carry = (uint64_t)fx_wide_upper(fx_wide_halves(a_lo, b_lo));
+    const uint64_t middle = fx_wide_halves(a_hi, b_lo) + fx_wide_halves(a_lo, b_hi) + carry;
+    return (int64_t)(fx_wide_halves(a_hi, b_hi) + (uint64_t)fx_wide_upper(middle));
+}
+
+/** fx_dot2_high(): half the multiplications, as half of each factor b is 0. Its other half is taken unsigned, as gcc takes a
+ * product with a signed one for one of 64 by 64 bits. */
+HV_WRAPS static inline int64_t fx_wide_dot2_high_portable(const int64_t a[2], const int64_t b[2])
+{
+    const int32_t b_0 = (int32_t)(uint32_t)((uint64_t)b[0] >> 32), b_1 = (int32_t)(uint32_t)((uint64_t)b[1] >> 32);
+    const int64_t low_0 = fx_wide_upper(fx_wide_halves(fx_wide_low(a[0]), b_0));
+    const int64_t low_1 = fx_wide_upper(fx_wide_halves(fx_wide_low(a[1]), b_1));
+    const int32_t low = (int32_t)((uint32_t)low_0 + (uint32_t)low_1);
+    const uint64_t high = fx_wide_halves(fx_wide_high(a[0]), b_0) + fx_wide_halves(fx_wide_high(a[1]), b_1);
+    return (int64_t)(high + (uint64_t)(int64_t)low);
 }
 
 #if defined(__SIZEOF_INT128__)
@@ -139,6 +171,12 @@ static inline int64_t fx_wide_mul_high_native(int64_t a, int64_t b)
     return (int64_t)(((fx_wide_int_t)a * b) >> 64);
 }
 
+/** fx_dot2_high() by 128-bit integers. */
+static inline int64_t fx_wide_dot2_high_native(const int64_t a[2], const int64_t b[2])
+{
+    return fx_wide_mul_high_native(a[0], b[0]) + fx_wide_mul_high_native(a[1], b[1]);
+}
+
 #endif
 
 #if defined(__SIZEOF_INT128__) && !defined(HEAVE_FX_PORTABLE)
@@ -147,9 +185,11 @@ static inline int64_t fx_wide_mul_high_native(int64_t a, int64_t b)
 #define FX_WIDE_MUL_SHIFT_FIT fx_wide_mul_shift_fit_native
 #define FX_WIDE_SQUARE3       fx_wide_square3_native
 #define FX_WIDE_MUL_HIGH      fx_wide_mul_high_native
+#define FX_WIDE_DOT2_HIGH     fx_wide_dot2_high_native
 #else
-#define FX_WIDE_PRODUCT fx_wide_product_portable
-#define FX_WIDE_SQUARE3 fx_wide_square3_portable
+#define FX_WIDE_PRODUCT   fx_wide_product_portable
+#define FX_WIDE_SQUARE3   fx_wide_square3_portable
+#define FX_WIDE_DOT2_HIGH fx_wide_dot2_high_portable
 #if defined(__OPTIMIZE_SIZE__)
 /** One copy for all files, in fx.c: each is called in a dozen. */
 int64_t fx_wide_mul_shift(int64_t a, int64_t b, unsigned shift);

@@ -38,11 +38,11 @@ typedef struct {
     uint8_t cylinders;
     uint8_t reach_shift; /**< 2^reach_shift mm is at least the longest arm */
     int64_t base_mm_q44[CYLINDERS_MAX][3];
-    int64_t arm_mm_q46[CYLINDERS_MAX][3]; /**< plate joint minus motion reference point */
+    int64_t arm_mm_q48[CYLINDERS_MAX][3]; /**< plate joint minus motion reference point; whole multiples of 2^32 */
     q32_t retracted_mm_q32[CYLINDERS_MAX];
-    int64_t centre_mm_q44[3];       /**< motion reference point at pose zero, base frame */
-    int64_t hinge_radius_mm_q46;    /**< 3-RPS: of the circle of plate joints */
-    int64_t hinge_offset_mm_q46[3]; /**< 3-RPS: motion reference point minus centre of that circle, plate frame */
+    int64_t centre_mm_q44[3];         /**< motion reference point at pose zero, base frame */
+    int64_t hinge_half_radius_mm_q48; /**< 3-RPS: half of that of the circle of plate joints */
+    int64_t hinge_offset_mm_q48[3];   /**< 3-RPS: motion reference point minus centre of that circle, plate frame */
 } kin_t;
 
 /** Prepares a mechanism.

@@ -9,8 +9,8 @@
  * the circle's centre at x = r (R11 - R22) / 2, y = -r R21, which in roll and pitch is
  *     cos(yaw) = (cos p + cos r) / (1 + cos p cos r),   sin(yaw) = sin p sin r / (1 + cos p cos r).
  *
- * Widths: rotation elements Q62; arms Q46, so that the upper half of a product is Q44; coordinates Q44 below 2^16 mm, so that
- * squares stay below 2^120 and their sum below 2^122.
+ * Widths: sines and cosines Q62; rotation elements Q60; arms Q48, so that the upper half of a product is Q44; coordinates Q44
+ * below 2^16 mm, so that squares stay below 2^120 and their sum below 2^122.
  */
 #include "kin_internal.h"
 
@@ -87,13 +87,13 @@ static bool is_hinged(const kin_geometry_t *geometry)
 /* The smallest power of two of mm that no arm exceeds. */
 static uint8_t find_reach_shift(const kin_t *self)
 {
-    uint64_t longest_q46 = 0;
+    uint64_t longest_q48 = 0;
     for (unsigned i = 0; i < self->cylinders; i++) {
-        const uint64_t length_q46 = fx_sqrt_u128(fx_square3(self->arm_mm_q46[i]));
-        longest_q46 = length_q46 > longest_q46 ? length_q46 : longest_q46;
+        const uint64_t length_q48 = fx_sqrt_u128(fx_square3(self->arm_mm_q48[i]));
+        longest_q48 = length_q48 > longest_q48 ? length_q48 : longest_q48;
     }
     uint8_t shift = 0;
-    while ((UINT64_C(1) << (46 + shift)) < longest_q46) {
+    while ((UINT64_C(1) << (48 + shift)) < longest_q48) {
         shift++;
     }
     return shift;
@@ -104,9 +104,9 @@ static int64_t q44_from_q16(int64_t value_q16)
     return value_q16 * (INT64_C(1) << 28);
 }
 
-static int64_t q46_from_q16(int64_t value_q16)
+static int64_t q48_from_q16(int64_t value_q16)
 {
-    return value_q16 * (INT64_C(1) << 30);
+    return value_q16 * (INT64_C(1) << 32);
 }
 
 hv_status_t kin_init(kin_t *self, const kin_geometry_t *geometry)
@@ -121,16 +121,16 @@ hv_status_t kin_init(kin_t *self, const kin_geometry_t *geometry)
         const int64_t mrp_q16 = geometry->mrp_mm_q16[axis];
         const bool is_height = axis == 2;
         self->centre_mm_q44[axis] = q44_from_q16(mrp_q16 + (is_height ? geometry->zero_height_mm_q16 : 0));
-        self->hinge_offset_mm_q46[axis] = q46_from_q16(mrp_q16 - (is_height ? geometry->plate_mm_q16[0][2] : 0));
+        self->hinge_offset_mm_q48[axis] = q48_from_q16(mrp_q16 - (is_height ? geometry->plate_mm_q16[0][2] : 0));
         for (unsigned i = 0; i < cylinders; i++) {
             self->base_mm_q44[i][axis] = q44_from_q16(geometry->base_mm_q16[i][axis]);
-            self->arm_mm_q46[i][axis] = q46_from_q16(geometry->plate_mm_q16[i][axis] - mrp_q16);
+            self->arm_mm_q48[i][axis] = q48_from_q16(geometry->plate_mm_q16[i][axis] - mrp_q16);
         }
     }
     for (unsigned i = 0; i < cylinders; i++) {
         self->retracted_mm_q32[i] = q32_from_q16(geometry->retracted_mm_q16[i]);
     }
-    self->hinge_radius_mm_q46 = q46_from_q16(geometry->plate_mm_q16[0][0]);
+    self->hinge_half_radius_mm_q48 = geometry->plate_mm_q16[0][0] * (INT64_C(1) << 31);
     self->reach_shift = find_reach_shift(self);
     return HV_OK;
 }
@@ -191,35 +191,30 @@ HV_OUT_OF_LINE static void set_angles(const kin_t *self, const pose_t *pose, kin
     }
 }
 
-/* a * b, at most 4 LSB too small: 1e-14 mm on the longest arm. */
-static q62_t mul_q62(q62_t a, q62_t b)
-{
-    return fx_mul_high(a, b) * 4;
-}
-
-/* R = Rz(yaw) Ry(pitch) Rx(roll). */
+/* R = Rz(yaw) Ry(pitch) Rx(roll). An upper half of a product of Q62 is Q60, at most 1 LSB too small: 1e-14 mm on the longest
+ * arm. */
 static void set_rotation(kin_placement_t *at)
 {
     const q62_t sr = at->sine_q62[AXIS_ROLL], cr = at->cosine_q62[AXIS_ROLL];
     const q62_t sp = at->sine_q62[AXIS_PITCH], cp = at->cosine_q62[AXIS_PITCH];
     const q62_t sy = at->sine_q62[AXIS_YAW], cy = at->cosine_q62[AXIS_YAW];
-    const q62_t sp_sr = mul_q62(sp, sr), sp_cr = mul_q62(sp, cr);
-    q62_t(*r)[3] = at->rotation_q62;
-    r[0][0] = mul_q62(cy, cp);
-    r[0][1] = mul_q62(cy, sp_sr) - mul_q62(sy, cr);
-    r[0][2] = mul_q62(cy, sp_cr) + mul_q62(sy, sr);
-    r[1][0] = mul_q62(sy, cp);
-    r[1][1] = mul_q62(sy, sp_sr) + mul_q62(cy, cr);
-    r[1][2] = mul_q62(sy, sp_cr) - mul_q62(cy, sr);
-    r[2][0] = -sp;
-    r[2][1] = mul_q62(cp, sr);
-    r[2][2] = mul_q62(cp, cr);
+    const q62_t sp_sr = fx_mul_high(sp, sr) * 4, sp_cr = fx_mul_high(sp, cr) * 4;
+    int64_t(*r)[3] = at->rotation_q60;
+    r[0][0] = fx_mul_high(cy, cp);
+    r[0][1] = fx_mul_high(cy, sp_sr) - fx_mul_high(sy, cr);
+    r[0][2] = fx_mul_high(cy, sp_cr) + fx_mul_high(sy, sr);
+    r[1][0] = fx_mul_high(sy, cp);
+    r[1][1] = fx_mul_high(sy, sp_sr) + fx_mul_high(cy, cr);
+    r[1][2] = fx_mul_high(sy, sp_cr) - fx_mul_high(cy, sr);
+    r[2][0] = -fx_shift_round(sp, 2);
+    r[2][1] = fx_mul_high(cp, sr);
+    r[2][2] = fx_mul_high(cp, cr);
 }
 
 /* One coordinate of R * v, at most 3 LSB too small. */
-static int64_t rotate_q44(const q62_t row_q62[3], const int64_t v_q46[3])
+static int64_t rotate_q44(const int64_t row_q60[3], const int64_t v_q48[3])
 {
-    return fx_mul_high(row_q62[0], v_q46[0]) + fx_mul_high(row_q62[1], v_q46[1]) + fx_mul_high(row_q62[2], v_q46[2]);
+    return fx_dot2_high(row_q60, v_q48) + fx_mul_high(row_q60[2], v_q48[2]);
 }
 
 static int64_t q44_from_q32(q32_t value_q32)
@@ -230,14 +225,13 @@ static int64_t q44_from_q32(q32_t value_q32)
 /* x and y of the motion reference point of a 3-RPS against pose zero. */
 static void hinged_translation(const kin_t *self, const kin_placement_t *at, int64_t translation_q44[2])
 {
-    const q62_t(*r)[3] = at->rotation_q62;
-    const q62_t half_difference = fx_shift_round(r[0][0], 1) - fx_shift_round(r[1][1], 1);
+    const int64_t(*r)[3] = at->rotation_q60;
     for (unsigned axis = 0; axis < 2; axis++) {
-        const int64_t *offset_q46 = self->hinge_offset_mm_q46;
-        translation_q44[axis] = rotate_q44(r[axis], offset_q46) - fx_shift_down(offset_q46[axis], 2);
+        const int64_t *offset_q48 = self->hinge_offset_mm_q48;
+        translation_q44[axis] = rotate_q44(r[axis], offset_q48) - fx_shift_down(offset_q48[axis], 4);
     }
-    translation_q44[0] += fx_mul_high(half_difference, self->hinge_radius_mm_q46);
-    translation_q44[1] -= fx_mul_high(r[1][0], self->hinge_radius_mm_q46);
+    translation_q44[0] += fx_mul_high(r[0][0] - r[1][1], self->hinge_half_radius_mm_q48);
+    translation_q44[1] -= fx_mul_high(2 * r[1][0], self->hinge_half_radius_mm_q48);
 }
 
 /* Where the motion reference point is. Added up in each case: values that are stored one by one and then read two at a time, as
@@ -278,17 +272,17 @@ hv_status_t kin_place(const kin_t *self, const pose_t *pose, kin_placement_t *pl
 void kin_leg(const kin_t *self, const kin_placement_t *placement, unsigned cylinder, kin_leg_t *leg)
 {
     for (unsigned axis = 0; axis < 3; axis++) {
-        leg->arm_mm_q44[axis] = rotate_q44(placement->rotation_q62[axis], self->arm_mm_q46[cylinder]);
+        leg->arm_mm_q44[axis] = rotate_q44(placement->rotation_q60[axis], self->arm_mm_q48[cylinder]);
         leg->vector_mm_q44[axis] = placement->mrp_mm_q44[axis] + leg->arm_mm_q44[axis] - self->base_mm_q44[cylinder][axis];
     }
     leg->length_mm_q44 = (int64_t)fx_sqrt_u128(fx_square3(leg->vector_mm_q44));
 }
 
 /* The point of the plate that is straight above its motion reference point, at the height of a joint. */
-static void set_hub(const kin_placement_t *placement, int64_t height_mm_q46, int64_t hub_mm_q44[3])
+static void set_hub(const kin_placement_t *placement, int64_t height_mm_q48, int64_t hub_mm_q44[3])
 {
     for (unsigned axis = 0; axis < 3; axis++) {
-        hub_mm_q44[axis] = placement->mrp_mm_q44[axis] + fx_mul_high(placement->rotation_q62[axis][2], height_mm_q46);
+        hub_mm_q44[axis] = placement->mrp_mm_q44[axis] + fx_mul_high(placement->rotation_q60[axis][2], height_mm_q48);
     }
 }
 
@@ -296,10 +290,9 @@ static void set_hub(const kin_placement_t *placement, int64_t height_mm_q46, int
 static inline void set_vector(const kin_t *self, const kin_placement_t *placement, const int64_t hub_mm_q44[3], unsigned cylinder,
                               int64_t vector_mm_q44[3])
 {
-    const int64_t *arm_q46 = self->arm_mm_q46[cylinder];
+    const int64_t *arm_q48 = self->arm_mm_q48[cylinder];
     for (unsigned axis = 0; axis < 3; axis++) {
-        const q62_t *row_q62 = placement->rotation_q62[axis];
-        const int64_t aside_q44 = fx_mul_high(row_q62[0], arm_q46[0]) + fx_mul_high(row_q62[1], arm_q46[1]);
+        const int64_t aside_q44 = fx_dot2_high(placement->rotation_q60[axis], arm_q48);
         vector_mm_q44[axis] = hub_mm_q44[axis] + aside_q44 - self->base_mm_q44[cylinder][axis];
     }
 }
@@ -309,14 +302,14 @@ static inline void set_vector(const kin_t *self, const kin_placement_t *placemen
 static void square_legs(const kin_t *self, const kin_placement_t *placement, fx_u128_t square_q88[CYLINDERS_MAX])
 {
     const unsigned cylinders = self->cylinders;
-    int64_t height_mm_q46 = self->arm_mm_q46[0][2];
+    int64_t height_mm_q48 = self->arm_mm_q48[0][2];
     int64_t hub_mm_q44[3];
-    set_hub(placement, height_mm_q46, hub_mm_q44);
+    set_hub(placement, height_mm_q48, hub_mm_q44);
     for (unsigned i = 0; i < cylinders; i++) {
         int64_t vector_mm_q44[3];
-        if (HV_RARELY(self->arm_mm_q46[i][2] != height_mm_q46)) {
-            height_mm_q46 = self->arm_mm_q46[i][2];
-            set_hub(placement, height_mm_q46, hub_mm_q44);
+        if (HV_RARELY(self->arm_mm_q48[i][2] != height_mm_q48)) {
+            height_mm_q48 = self->arm_mm_q48[i][2];
+            set_hub(placement, height_mm_q48, hub_mm_q44);
         }
         set_vector(self, placement, hub_mm_q44, i, vector_mm_q44);
         square_q88[i] = fx_square3(vector_mm_q44);

@@ -20,7 +20,7 @@
 typedef struct {
     q62_t sine_q62[3]; /**< of roll, pitch, yaw */
     q62_t cosine_q62[3];
-    q62_t rotation_q62[3][3];
+    int64_t rotation_q60[3][3];
     int64_t mrp_mm_q44[3];
 } kin_placement_t;
 

@@ -8,7 +8,7 @@
 static void rotation_column(const kin_placement_t *at, unsigned column, int64_t result_q28[3])
 {
     for (unsigned row = 0; row < 3; row++) {
-        result_q28[row] = fx_shift_down(at->rotation_q62[row][column], 34);
+        result_q28[row] = fx_shift_down(at->rotation_q60[row][column], 32);
     }
 }
 
@@ -20,14 +20,14 @@ static void set_hinged_slide(const kin_t *self, const kin_placement_t *at, const
     rotation_column(at, 1, second);
     for (unsigned axis = 0; axis < 3; axis++) {
         for (unsigned i = 0; i < 3; i++) {
-            const int64_t turned_q44 = fx_mul_high(at->rotation_q62[axis][i], self->hinge_offset_mm_q46[i]);
+            const int64_t turned_q44 = fx_mul_high(at->rotation_q60[axis][i], self->hinge_offset_mm_q48[i]);
             offset[axis] += fx_shift_down(turned_q44, 16u + self->reach_shift);
         }
     }
     kin_cross_q28(turn_q28, first, first_rate);
     kin_cross_q28(turn_q28, second, second_rate);
     kin_cross_q28(turn_q28, offset, offset_rate);
-    const int64_t radius_q28 = fx_shift_down(self->hinge_radius_mm_q46, 18u + self->reach_shift);
+    const int64_t radius_q28 = fx_shift_down(self->hinge_half_radius_mm_q48, 19u + self->reach_shift);
     slide_q28[0] = offset_rate[0] + fx_shift_down(radius_q28 * (first_rate[0] - second_rate[1]), 29);
     slide_q28[1] = offset_rate[1] - fx_shift_down(radius_q28 * first_rate[1], 28);
     slide_q28[2] = 0;

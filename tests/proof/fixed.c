@@ -28,12 +28,13 @@ void proof_rounding(void)
 
 void proof_wide(void)
 {
-    const int64_t below = INT64_C(1) << 62;
-    const int64_t v[3] = {ANY_I64(), ANY_I64(), ANY_I64()};
-    const int64_t side[3] = {ANY_OF(1 - below, below - 1), ANY_OF(1 - below, below - 1), ANY_OF(1 - below, below - 1)};
+    const int64_t most = INT64_C(1) << 61;
+    const int64_t v[2] = {ANY_I64(), ANY_I64()};
+    const int64_t side[3] = {ANY_OF(-most, most), ANY_OF(-most, most), ANY_OF(-most, most)};
     (void)fx_mul_shift(v[0], v[1], (unsigned)ANY_OF(1, 126));
     (void)fx_mul_shift_fit(v[0], v[1], (unsigned)ANY_OF(1, 126));
     (void)fx_mul_high(v[0], v[1]);
+    (void)fx_dot2_high(v, side);
     (void)fx_square3(side);
     (void)fx_add_u128(fx_square_u64(ANY_U64()), fx_square_u64(ANY_U64()));
 }

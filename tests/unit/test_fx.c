@@ -150,6 +150,41 @@ static void test_mul_shift_random_values_match_bit_by_bit_product(void)
     }
 }
 
+static int64_t below_high_limit(int64_t value)
+{
+    return value < FX_HIGH_LIMIT ? value : FX_HIGH_LIMIT - 1;
+}
+
+/* A whole multiple of 2^32 from -2^61 to 2^61. */
+static int64_t coarse_factor(int64_t value)
+{
+    const int64_t coarse = (int64_t)((uint64_t)value & ~(uint64_t)UINT32_MAX);
+    return coarse > Q62_ONE / 2 ? Q62_ONE / 2 : coarse < -Q62_ONE / 2 ? -Q62_ONE / 2 : coarse;
+}
+
+/* floor(a * b / 2^64), from a * b / 2^64 rounded half up. */
+static int64_t mul_high_by_digits(int64_t a, int64_t b)
+{
+    const int64_t nearest = mul_shift_by_digits(a, b, 64);
+    return nearest - (int64_t)(((uint64_t)a * (uint64_t)b) >> 63);
+}
+
+static void test_mul_high_hostile_values_match_bit_by_bit_product(void)
+{
+    for (size_t i = 0; i < HOSTILE_COUNT; i++) {
+        for (size_t j = 0; j < HOSTILE_COUNT; j++) {
+            const int64_t a[2] = {below_high_limit(k_hostile[i]), below_high_limit(k_hostile[j])};
+            const int64_t expected = mul_high_by_digits(a[0], a[1]);
+            TEST_ASSERT_EQUAL_INT64(expected, fx_mul_high(a[0], a[1]));
+            TEST_ASSERT_EQUAL_INT64(expected, fx_wide_mul_high_portable(a[0], a[1]));
+            const int64_t b[2] = {coarse_factor(k_hostile[j]), coarse_factor(k_hostile[i])};
+            const int64_t dot = mul_high_by_digits(a[0], b[0]) + mul_high_by_digits(a[1], b[1]);
+            TEST_ASSERT_EQUAL_INT64(dot, fx_dot2_high(a, b));
+            TEST_ASSERT_EQUAL_INT64(dot, fx_wide_dot2_high_portable(a, b));
+        }
+    }
+}
+
 #if defined(__SIZEOF_INT128__)
 static void test_wide_forms_random_values_give_the_same_bits(void)
 {
@@ -158,7 +193,10 @@ static void test_wide_forms_random_values_give_the_same_bits(void)
         const int64_t a = next_spread(), b = next_spread();
         const unsigned shift = 1 + (unsigned)(next_random() % 126);
         differences += fx_wide_mul_shift_native(a, b, shift) != fx_wide_mul_shift_portable(a, b, shift);
-        differences += fx_wide_mul_high_native(a, b) != fx_wide_mul_high_portable(a, b);
+        const int64_t factor[2] = {below_high_limit(a), below_high_limit(b)};
+        differences += fx_wide_mul_high_native(factor[0], factor[1]) != fx_wide_mul_high_portable(factor[0], factor[1]);
+        const int64_t coarse[2] = {coarse_factor(a ^ b), coarse_factor(a - b / 2)};
+        differences += fx_wide_dot2_high_native(factor, coarse) != fx_wide_dot2_high_portable(factor, coarse);
         const int64_t v[3] = {a >> 2, b >> 2, (a ^ b) >> 2};
         const fx_u128_t sum = fx_wide_square3_native(v), other_sum = fx_wide_square3_portable(v);
         differences += sum.hi != other_sum.hi || sum.lo != other_sum.lo;
@@ -254,10 +292,10 @@ static void test_mul_shift_fit_results_that_fit_equal_mul_shift(void)
 static void test_mul_high_known_products_round_down(void)
 {
     TEST_ASSERT_EQUAL_INT64(Q62_ONE / 4, fx_mul_high(Q62_ONE, Q62_ONE));
-    TEST_ASSERT_EQUAL_INT64(0, fx_mul_high(INT64_MAX, 1));
+    TEST_ASSERT_EQUAL_INT64(0, fx_mul_high(FX_HIGH_LIMIT - 1, 1));
     TEST_ASSERT_EQUAL_INT64(-1, fx_mul_high(-1, 1));
     TEST_ASSERT_EQUAL_INT64(Q62_ONE, fx_mul_high(INT64_MIN, INT64_MIN));
-    TEST_ASSERT_EQUAL_INT64(-Q62_ONE, fx_mul_high(INT64_MIN, INT64_MAX));
+    TEST_ASSERT_EQUAL_INT64(-Q62_ONE + Q32_ONE / 2, fx_mul_high(INT64_MIN, FX_HIGH_LIMIT - Q32_ONE / 2));
 }
 
 static void test_square3_sums_are_exact(void)
@@ -509,6 +547,7 @@ int main(void)
     RUN_TEST(test_mul_shift_known_products_round_half_up);
     RUN_TEST(test_mul_shift_hostile_values_match_bit_by_bit_product);
     RUN_TEST(test_mul_shift_random_values_match_bit_by_bit_product);
+    RUN_TEST(test_mul_high_hostile_values_match_bit_by_bit_product);
 #if defined(__SIZEOF_INT128__)
     RUN_TEST(test_wide_forms_random_values_give_the_same_bits);
     RUN_TEST(test_mul_div_hostile_and_random_values_match_128_bit_division);
