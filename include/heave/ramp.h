@@ -91,6 +91,11 @@ void ramp_take_over(ramp_t *self, const ramp_state_t *state);
  *  @return the new position */
 q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip);
 
+/** ramp_step() of several ramps, one after the other, each towards its own reference.
+ *  @param pos_q32 out, the new position of each
+ *  @return the flags of all together */
+unsigned ramp_step_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *pos_q32);
+
 /** Where the ramp comes to rest if it starts to brake now (within the bounds): the reference of a controlled stop. */
 q32_t ramp_stop_position(const ramp_t *self);
 

@@ -371,11 +371,9 @@ static bool step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t 
     const ramp_grip_t grip = self->source == MOTION_STREAMED ? RAMP_SOFT : RAMP_FIRM;
     q32_t extension_mm_q32[CYLINDERS_MAX];
     pose_t *planned = &out->sent;
-    unsigned flags = 0;
+    const unsigned flags = ramp_step_all(self->axis, POSE_AXES, ref, grip, planned->axis_q32);
     for (unsigned i = 0; i < POSE_AXES; i++) {
         out->asked.axis_q32[i] = ref[i].pos_q32;
-        planned->axis_q32[i] = ramp_step(&self->axis[i], &ref[i], grip);
-        flags |= self->axis[i].flags;
     }
     kin_constrain(&self->kin, planned);
     const unsigned cylinder = reach_pull_in(self, planned, extension_mm_q32, NULL);

@@ -293,11 +293,8 @@ HV_OWN_FRAME static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_M
 /* The last word: every cylinder and the rotation motor through its ramp. */
 static void limit(motion_t *self, const ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
-    unsigned flags = 0;
+    const unsigned flags = ramp_step_all(self->cylinder, self->cylinders, ref, RAMP_FIRM, out->extension_mm_q32);
     for (unsigned i = 0; i < self->cylinders; i++) {
-        ramp_t *ramp = &self->cylinder[i];
-        out->extension_mm_q32[i] = ramp_step(ramp, &ref[i], RAMP_FIRM);
-        flags |= ramp->flags;
         out->flags |= out->extension_mm_q32[i] != ref[i].pos_q32 ? MOTION_OFF_PATH : 0;
     }
     out->flags |= ((flags & RAMP_CLAMPED) ? MOTION_CLAMPED : 0) | ((flags & RAMP_SPEED) ? MOTION_SPEED : 0) |

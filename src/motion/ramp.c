@@ -238,21 +238,44 @@ static bool is_in_layer(const errors_t *e, q32_t jerk_q32, const grip_t *g)
            is_within(e->b, layer_size(jerk_q32, g->layer_b));
 }
 
+/* |value|, or one less where it is negative. */
+static uint64_t size_of(q32_t value_q32)
+{
+    return (uint64_t)value_q32 ^ (uint64_t)fx_shift_down(value_q32, 63);
+}
+
+/* Well inside the layer of the soft grip, as nearly all cycles of a stream are: one test for all three errors, as none is above
+ * what their bits are together. */
+static bool is_deep_in_soft_layer(const errors_t *e, q32_t jerk_q32)
+{
+    return ((size_of(e->d) >> 12) | (size_of(e->w) >> 7) | (size_of(e->b) >> 3)) < (uint64_t)jerk_q32;
+}
+
+/* The acceleration by the law of a grip. */
+static inline q32_t by_law(const errors_t *e, const ramp_ref_t *ref, const grip_t *g)
+{
+    return ref->acc_per_cycle2_q32 + e->b + scale_down(g->k1 * e->d - g->k2 * e->w - g->k3 * e->b, g->gain_shift);
+}
+
 /* The acceleration that a linear law takes to the reference; false if the reference is too far away for them. */
-static bool find_by_law(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *acc_q32)
+static inline bool find_by_law(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *acc_q32)
 {
     const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
     const bool is_firm = grip == RAMP_FIRM || is_at_rest(ref);
-    const grip_t *g = &k_grips[is_firm ? RAMP_FIRM : RAMP_SOFT];
     const errors_t e = errors_against(&self->state, ref);
+    if (!is_firm && is_deep_in_soft_layer(&e, jerk_q32)) {
+        *acc_q32 = by_law(&e, ref, &k_grips[RAMP_SOFT]);
+        return true;
+    }
     if (is_firm && can_close_in_three(&e, jerk_q32)) {
         *acc_q32 = ref->acc_per_cycle2_q32 + e.d - e.w;
         return true;
     }
+    const grip_t *g = &k_grips[is_firm ? RAMP_FIRM : RAMP_SOFT];
     if (!is_in_layer(&e, jerk_q32, g)) {
         return false;
     }
-    *acc_q32 = ref->acc_per_cycle2_q32 + e.b + scale_down(g->k1 * e.d - g->k2 * e.w - g->k3 * e.b, g->gain_shift);
+    *acc_q32 = by_law(&e, ref, g);
     return true;
 }
 
@@ -290,12 +313,12 @@ static bool is_free(const ramp_t *self, q32_t wanted_q32)
 {
     const ramp_state_t *at = &self->state;
     const ramp_limits_t *limits = &self->limits;
-    if (!is_within(wanted_q32, self->acc_safe_q32) ||
-        !is_within(wanted_q32 - at->acc_per_cycle2_q32, limits->jerk_per_cycle3_q32)) {
+    const q32_t size_q32 = wanted_q32 >= 0 ? wanted_q32 : -wanted_q32;
+    if (size_q32 > self->acc_safe_q32 || !is_within(wanted_q32 - at->acc_per_cycle2_q32, limits->jerk_per_cycle3_q32)) {
         return false;
     }
     const q32_t speed_q32 = at->vel_per_cycle_q32 >= 0 ? at->vel_per_cycle_q32 : -at->vel_per_cycle_q32;
-    const q32_t peak_q32 = speed_q32 + fx_shift_down(fx_abs(wanted_q32) * (self->acc_cycles + 1), 1);
+    const q32_t peak_q32 = speed_q32 + fx_shift_down(size_q32 * (self->acc_cycles + 1), 1);
     if (peak_q32 > limits->vel_per_cycle_q32 || self->brake_cycles == 0) {
         return false;
     }
@@ -428,6 +451,11 @@ static q32_t advance(ramp_t *self, q32_t acc_q32)
     return self->state.pos_q32;
 }
 
+static bool is_reference_inside(const ramp_t *self, const ramp_ref_t *ref)
+{
+    return ref->pos_q32 >= self->limits.pos_min_q32 && ref->pos_q32 <= self->limits.pos_max_q32;
+}
+
 /* A cycle in which a limit may bind, or the reference is far away. */
 HV_OUT_OF_LINE static q32_t step_with_care(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
 {
@@ -436,16 +464,30 @@ HV_OUT_OF_LINE static q32_t step_with_care(ramp_t *self, const ramp_ref_t *ref, 
     return advance(self, allowed_acceleration(self, wanted_acceleration(self, &inside, grip)));
 }
 
-q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+static inline q32_t step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
 {
-    const bool is_inside = ref->pos_q32 >= self->limits.pos_min_q32 && ref->pos_q32 <= self->limits.pos_max_q32;
     q32_t acc_q32;
     self->flags = 0;
-    if (!is_inside || !find_by_law(self, ref, grip, &acc_q32) || !is_free(self, acc_q32)) {
+    if (!is_reference_inside(self, ref) || !find_by_law(self, ref, grip, &acc_q32) || !is_free(self, acc_q32)) {
         return step_with_care(self, ref, grip);
     }
     note_jerk(self, ref->jerk_per_cycle3_q32);
     return advance(self, acc_q32);
+}
+
+q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+{
+    return step(self, ref, grip);
+}
+
+unsigned ramp_step_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *pos_q32)
+{
+    unsigned flags = 0;
+    for (unsigned i = 0; i < count; i++) {
+        pos_q32[i] = step(&ramp[i], &ref[i], grip);
+        flags |= ramp[i].flags;
+    }
+    return flags;
 }
 
 q32_t ramp_stop_position(const ramp_t *self)

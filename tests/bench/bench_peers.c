@@ -323,9 +323,11 @@ static void run_ramps(bench_t *b, unsigned n)
     if (n * 60 / 1000 != (n + 1) * 60 / 1000) {
         stream_push(&b->stream, b->now_us, b->signal_q32[n % SIGNAL_CYCLES]);
     }
+    q32_t position_q32[AXES];
     (void)stream_step(&b->stream, b->now_us, ref);
+    (void)ramp_step_all(b->ramp, AXES, ref, RAMP_SOFT, position_q32);
     for (unsigned i = 0; i < AXES; i++) {
-        b->position[i] = (double)ramp_step(&b->ramp[i], &ref[i], RAMP_SOFT) / 4294967296.0;
+        b->position[i] = (double)position_q32[i] / 4294967296.0;
     }
 }
 

@@ -288,6 +288,63 @@ static void test_ramp_step_without_working_brakes_out_is_the_same(void)
     printf("the same without working brakes out: 900000 cycles, %ld where nothing bound\n", alike);
 }
 
+/* The first acceleration where only one of the errors is not 0, beside a reference that turns the other way. */
+static q32_t acceleration_for(const ramp_t *resting, q32_t d, q32_t w, q32_t b, q32_t turn)
+{
+    ramp_t ramp = *resting;
+    const ramp_ref_t ref = {ramp.state.pos_q32 + d - w + b + turn, -w + b + turn, -b + turn, turn};
+    (void)ramp_step(&ramp, &ref, RAMP_SOFT);
+    return ramp.state.acc_per_cycle2_q32;
+}
+
+/* The soft law is asked up to the edge of its layer, and not beyond: there the stop asks for all the jerk. */
+static void test_ramp_step_soft_law_holds_up_to_the_edge_of_its_layer(void)
+{
+    const ramp_limits_t limits = {.pos_min_q32 = q32(-1000),
+                                  .pos_max_q32 = q32(1000),
+                                  .vel_per_cycle_q32 = q32(1),
+                                  .acc_per_cycle2_q32 = q32(0.01),
+                                  .jerk_per_cycle3_q32 = q32(0.00005)};
+    const ramp_t ramp = ramp_of(&limits, 0);
+    const q32_t jerk = ramp.limits.jerk_per_cycle3_q32, turn = jerk / 4;
+    const q32_t edge = (4096 * jerk + 4) | 7;
+    for (q32_t beside = -5000; beside <= 5000; beside++) {
+        const q32_t d = edge + beside, law = turn - llround((double)d / 4096);
+        TEST_ASSERT_EQUAL_INT64(beside <= 0 ? law : -jerk, acceleration_for(&ramp, -d, 0, 0, turn));
+        TEST_ASSERT_EQUAL_INT64(beside <= 0 ? -law : jerk, acceleration_for(&ramp, d, 0, 0, -turn));
+    }
+}
+
+static void test_ramp_step_all_is_each_by_itself(void)
+{
+    enum { RAMPS = 5 };
+    for (int setting = 0; setting < 2000; setting++) {
+        ramp_t one[RAMPS], all[RAMPS];
+        ramp_ref_t ref[RAMPS];
+        q32_t pos[RAMPS + 1];
+        unsigned flags = 0;
+        const unsigned count = (unsigned)(random_bits() % (RAMPS + 1));
+        const ramp_grip_t grip = random_bits() % 2 == 0 ? RAMP_SOFT : RAMP_FIRM;
+        for (unsigned i = 0; i < RAMPS; i++) {
+            const ramp_limits_t limits = random_limits();
+            one[i] = ramp_of(&limits, limits.pos_min_q32);
+            ref[i] =
+                i % 2 == 0 ? place_anywhere(&one[i]) : random_reference(&limits, &(ramp_ref_t){.pos_q32 = one[i].state.pos_q32});
+            all[i] = one[i];
+            pos[i] = 42;
+        }
+        pos[RAMPS] = 42;
+        const unsigned all_flags = ramp_step_all(all, count, ref, grip, pos);
+        for (unsigned i = 0; i < count; i++) {
+            TEST_ASSERT_EQUAL_INT64(ramp_step(&one[i], &ref[i], grip), pos[i]);
+            flags |= one[i].flags;
+        }
+        TEST_ASSERT_EQUAL_MEMORY(one, all, sizeof one);
+        TEST_ASSERT_EQUAL_UINT(flags, all_flags);
+        TEST_ASSERT_EQUAL_INT64(42, pos[count]);
+    }
+}
+
 static void test_brake_keeps_velocity_is_by_the_peak(void)
 {
     for (int setting = 0; setting < 2000; setting++) {
@@ -753,6 +810,8 @@ int main(void)
     RUN_TEST(test_ramp_step_alternating_bounds_keep_every_limit);
     RUN_TEST(test_ramp_step_turning_before_the_bound_keeps_every_limit);
     RUN_TEST(test_ramp_step_without_working_brakes_out_is_the_same);
+    RUN_TEST(test_ramp_step_soft_law_holds_up_to_the_edge_of_its_layer);
+    RUN_TEST(test_ramp_step_all_is_each_by_itself);
     RUN_TEST(test_brake_keeps_velocity_is_by_the_peak);
     RUN_TEST(test_ramp_take_over_own_state_keeps_every_limit);
     RUN_TEST(test_ramp_take_over_any_state_keeps_differences_and_comes_in);
