@@ -128,6 +128,7 @@ static void report(sim_drive_t *axis, const sim_drive_config_t *config, uint64_t
             .state = axis->state,
             .is_homed = axis->is_homed,
             .has_actual = true,
+            .is_energized = axis->state != DRIVE_DISABLED && axis->state != DRIVE_FAULT,
             .actual_mm_q32 = reported(axis, config),
             .actual_us = now_us,
             .fault_code = axis->state == DRIVE_FAULT ? axis->fault_code : 0,

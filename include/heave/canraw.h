@@ -114,6 +114,7 @@ typedef struct {
     bool is_homing_seen; /**< the drive has said that homing goes on */
     bool is_homing_over; /**< it has said that homing is done */
     bool is_homing_next; /**< the next query is the one for homing */
+    bool is_energized;   /**< torque was asked for, and that it is off has not been confirmed since */
     bool has_actual;
     bool has_sent;
     uint32_t status;

@@ -173,6 +173,7 @@ typedef struct {
     bool is_homed;
     bool has_sent;
     bool was_faulty;
+    uint8_t down_syncs; /* since a controlword that leads up to power or torque, as far as it matters */
 } cia402_axis_t;
 
 /** What the drives do together; private. */

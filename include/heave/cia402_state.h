@@ -31,6 +31,7 @@ typedef enum {
 } cia402_goal_t;
 
 /** Bits of the controlword whose meaning depends on the mode. */
+#define CIA402_WORD_SWITCH_ON  0x0001u
 #define CIA402_WORD_BIT4       0x0010u /**< IP: interpolate; HM: start; PP: new set-point */
 #define CIA402_WORD_AT_ONCE    0x0020u /**< PP: do not wait for the end of the last one */
 #define CIA402_WORD_RESET      0x0080u /**< its rising edge takes a fault back */

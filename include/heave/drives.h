@@ -26,6 +26,8 @@ typedef struct {
     drive_state_t state;
     bool is_homed;       /**< actual counts from the true zero */
     bool has_actual;     /**< actual_mm_q32 and actual_us are valid (since the drive first reported) */
+    bool is_energized;   /**< its torque is on, as far as is known: it says so, or has not confirmed yet that it is off. A drive
+                            that   cannot say has confirmed by taking what it was told. While OFFLINE: as it was heard last */
     q32_t actual_mm_q32; /**< extension [mm], or angle [deg] of the rotation motor; jumps when homing ends */
     uint64_t actual_us;  /**< when actual was measured or received; an old value means stale feedback */
     uint32_t fault_code; /**< the device's own code (16 bits), or the driver's (more), 0 = none; in DRIVE_FAULT, DRIVE_OFFLINE */
@@ -49,7 +51,8 @@ typedef struct {
 /** Requests to all axes together: all or none, because one leg that stops alone racks the platform. */
 typedef enum {
     DRIVES_ENABLE,     /**< DISABLED -> ENABLING -> ENABLED; the set-points sent must equal actual until every axis is ENABLED */
-    DRIVES_DISABLE,    /**< any -> DISABLED (torque off by the drives' own ramps and brakes); FAULT and OFFLINE stay */
+    DRIVES_DISABLE,    /**< any -> DISABLED (torque off by the drives' own ramps and brakes: is_energized tells when it is);
+                          FAULT and OFFLINE stay */
     DRIVES_HOME,       /**< ENABLED -> HOMING -> ENABLED and is_homed. Afterwards the set-points must start at actual again */
     DRIVES_QUICK_STOP, /**< stop now by the drives' own ramps, then DISABLED; also ends ENABLING and HOMING */
     DRIVES_RESET_FAULT /**< FAULT -> DISABLED where the cause is gone, else FAULT stays */

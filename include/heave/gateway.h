@@ -72,8 +72,10 @@ typedef struct {
     bool is_disable_due;     /**< disable the drives once at rest */
     auto_engage_t auto_engage;
     bool is_shutdown_asked;  /**< nothing brings the platform up any more */
+    bool is_end_overdue;     /**< drives that have not confirmed that their torque is off are not waited for any more */
     uint32_t unsent_cycles;  /**< cycles in a row whose set-points the bus did not take */
     uint64_t reset_until_us; /**< a reset waits for the drives until then; 0 = none */
+    uint64_t end_since_us;   /**< a shutdown has come to OFF, FAULT or ESTOP, and the drives were told; 0 = not yet */
     owner_t owner;
     plate_t plate;
     uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
@@ -147,8 +149,12 @@ void gateway_note_late(gateway_t *self, uint32_t cycles);
  *  @param axis as in fault_t; one that this platform does not have, or that does not go with the code, finds nothing */
 void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis);
 
-/** True once a shutdown has ended: OFF, or FAULT / ESTOP with a shutdown asked for and the drives told, where their bus tells
- * them anything. */
+/** True once a shutdown has ended: OFF, or FAULT / ESTOP with a shutdown asked for, the drives told, where their bus tells them
+ *  anything, and no drive energized as far as is known. Drives that do not confirm that are waited for for 3 s, for 1 s where
+ *  none of them answers; then a line of the log names them. */
 bool gateway_is_finished(const gateway_t *self);
+
+/** Drives whose torque is on as far as is known: bit i for axis i + 1. Drives that are lost, as they were heard last. */
+uint32_t gateway_energized(const gateway_t *self);
 
 #endif

@@ -176,6 +176,7 @@ typedef struct {
     bool is_after_homing; /**< placed once more, torque is on */
     bool is_placed;       /**< the target is where the drive was when it was last asked to follow */
     bool is_homing_seen;
+    bool is_energized; /**< torque was on or asked for, and that it is off has not been confirmed since */
     bool has_actual;
     bool has_sent;     /**< asked_q32 is the last set-point that came */
     bool is_fresh;     /**< a set-point has come since the last was handed over */

@@ -388,6 +388,9 @@ static int run(live_t *self, const config_t *config)
     if (self->signals > 1) {
         return say(EXIT_REFUSED, "ended at once by a second signal");
     }
+    if (has_ended && gateway_energized(&self->loop.session.gateway) != 0) {
+        return say(EXIT_REFUSED, "ended, but not every drive has confirmed that its torque is off");
+    }
     return code;
 }
 

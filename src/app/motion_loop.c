@@ -18,6 +18,7 @@
 #define STACK_TOUCH        (128u * 1024u)
 #define PAGE_BYTES         4096u
 #define REQUESTS_PER_CYCLE 4u
+#define QUIT_MOST_US       100000u /* for drives to take their last word; a brake and a ramp may take longer */
 
 hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_udp_t udp, hal_log_t log, hal_clock_t clock)
 {
@@ -307,6 +308,38 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     answer_requests(self, result, requests);
 }
 
+/* One cycle of the drives alone, with the set-points of the last one.
+ * Returns false once no drive has torque any more, as far as is known. */
+static bool run_drives(motion_loop_t *self)
+{
+    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
+    q32_t setpoint_q32[DRIVES_MAX] = {0};
+    drive_feedback_t feedback[DRIVES_MAX];
+    bool is_energized = false;
+    memcpy(setpoint_q32, s->extension_mm_q32, s->cylinders * sizeof setpoint_q32[0]);
+    setpoint_q32[s->cylinders] = s->angle_deg_q32;
+    (void)!drives_poll(self->io.drives, self->session.now_us, feedback);
+    (void)!drives_send(self->io.drives, self->session.now_us, setpoint_q32);
+    for (unsigned i = 0; i < drives_count(self->io.drives); i++) {
+        is_energized |= feedback[i].is_energized;
+    }
+    self->session.now_us += self->session.cycle_us;
+    return is_energized;
+}
+
+/* All drives stop now by their own ramps. What tells them may need some cycles: room on the bus, a SYNC behind it, a second try.
+ */
+static void quit(motion_loop_t *self, uint64_t deadline_us)
+{
+    const uint64_t until_us = deadline_us + QUIT_MOST_US;
+    hv_status_t told = drives_request(self->io.drives, DRIVES_QUICK_STOP);
+    while (run_drives(self) && deadline_us < until_us) {
+        told = told == HV_ERR_AGAIN ? drives_request(self->io.drives, DRIVES_QUICK_STOP) : told;
+        deadline_us += self->session.cycle_us;
+        (void)!hal_clock_sleep_until_us(self->clock, deadline_us);
+    }
+}
+
 /* Cycle after cycle until the end; deadlines are absolute, so that nothing adds up. */
 static void run(motion_loop_t *self)
 {
@@ -321,7 +354,7 @@ static void run(motion_loop_t *self)
         const uint64_t now_us = hal_clock_now_us(self->clock);
         const uint64_t late_us = now_us > deadline_us ? now_us - deadline_us : 0;
         if (__atomic_load_n(&self->is_quit, __ATOMIC_ACQUIRE) != 0) {
-            (void)!drives_request(self->io.drives, DRIVES_QUICK_STOP);
+            quit(self, deadline_us);
             break;
         }
         run_cycle(self, late_us);

@@ -54,7 +54,7 @@ static const usage_row_t k_options[] = {
 
 static const usage_exit_t k_exits[] = {
     {EXIT_DONE, "done"},
-    {EXIT_REFUSED, "ended by a second signal or --doctor found something wrong"},
+    {EXIT_REFUSED, "ended by a second signal, torque not confirmed off, or --doctor found something wrong"},
     {EXIT_BAD_USAGE, "usage"},
     {EXIT_BAD_DATA, "bad FRAMES"},
     {EXIT_NO_INPUT, "no input"},

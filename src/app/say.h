@@ -7,7 +7,8 @@
 /** Exit codes, with the numbers of sysexits.h. */
 enum {
     EXIT_DONE = 0,
-    EXIT_REFUSED = 1, /**< heavectl: heaved said no; heaved: ended by a second signal, or --doctor found a fault */
+    EXIT_REFUSED = 1, /**< heavectl: heaved said no; heaved: ended by a second signal, or before every drive confirmed that its
+                         torque is off; or --doctor found a fault */
     EXIT_BAD_USAGE = 64,
     EXIT_BAD_DATA = 65,
     EXIT_NO_INPUT = 66,

@@ -46,6 +46,7 @@ static void look_for(cia402_drive_t drive)
     self->has_actual = false;
     self->goal = CIA402_GOAL_OFF;
     self->word = 0;
+    self->down_syncs = WORD_SYNCS_MIN;
     sdo_read(&self->sdo, 0x1000, 0, 1);
 }
 
@@ -165,6 +166,7 @@ static void take_boot(cia402_drive_t drive)
     }
     self->starts = self->phase == CIA402_REFUSED ? 0 : self->starts;
     self->is_reset_done = true; /* it has just begun anew */
+    self->statusword = 0;       /* without torque */
     look_for(drive);
 }
 
@@ -419,7 +421,7 @@ static bool next_reset_word(cia402_axis_t *self)
     return true;
 }
 
-void cia402_axis_next_word(cia402_drive_t drive, uint16_t mode_bits)
+static void choose_word(cia402_drive_t drive, uint16_t mode_bits)
 {
     const uint16_t bits = CIA402_WORD_BIT4 | CIA402_WORD_AT_ONCE;
     cia402_axis_t *self = drive.axis;
@@ -435,6 +437,24 @@ void cia402_axis_next_word(cia402_drive_t drive, uint16_t mode_bits)
     } else if (self->word_syncs < UINT8_MAX) {
         self->word_syncs++;
     }
+}
+
+void cia402_axis_next_word(cia402_drive_t drive, uint16_t mode_bits)
+{
+    cia402_axis_t *self = drive.axis;
+    choose_word(drive, mode_bits);
+    if ((self->word & CIA402_WORD_SWITCH_ON) != 0) {
+        self->down_syncs = 0;
+    } else if (self->down_syncs < WORD_SYNCS_MIN) {
+        self->down_syncs++;
+    }
+}
+
+/* What leads up acts at the next SYNC and shows at the one after: until then the statusword is of what was before. */
+bool cia402_axis_is_energized(const cia402_axis_t *self)
+{
+    const cia402_state_t state = cia402_axis_state(self);
+    return cia402_has_torque(state) || state == CIA402_SWITCHED_ON || self->down_syncs < WORD_SYNCS_MIN;
 }
 
 bool cia402_axis_is_operating(cia402_drive_t drive)

@@ -57,6 +57,9 @@ void cia402_axis_next_word(cia402_drive_t drive, uint16_t mode_bits);
 /** State by the last statusword. */
 cia402_state_t cia402_axis_state(const cia402_axis_t *self);
 
+/** True until a statusword says that the power stage is off, and what the drive was told last cannot switch it on any more. */
+bool cia402_axis_is_energized(const cia402_axis_t *self);
+
 /** True where operation is enabled and set-points are followed. */
 bool cia402_axis_is_operating(cia402_drive_t drive);
 

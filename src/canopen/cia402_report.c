@@ -53,6 +53,7 @@ void cia402_report_feedback(const cia402_t *self, uint8_t index, drive_feedback_
         .state = state,
         .is_homed = axis->is_homed,
         .has_actual = axis->was_heard,
+        .is_energized = cia402_axis_is_energized(axis),
         .actual_mm_q32 = axis->actual_q32,
         .actual_us = axis->actual_us,
         .fault_code = fault_code(axis, state),

@@ -238,6 +238,9 @@ static hv_status_t canraw_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
     canpassive_step(&self->passive, self->can, now_us, self->map->passive_stop_ms);
     for (unsigned k = 0; k < self->map->axes; k++) {
         canraw_axis_step(&self->axis[k], self->map, now_us);
+        if (self->is_free) {
+            canraw_axis_note_off(&self->axis[k], self->map);
+        }
         canraw_axis_report(&self->axis[k], &feedback[k]);
     }
     /* send asks once per period; where nobody calls it, or nobody answers, this does */

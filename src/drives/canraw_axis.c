@@ -33,6 +33,7 @@ void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map)
                             .pending = CANRAW_NOTHING,
                             .is_begun = true,
                             .is_homed = !has(map, CANRAW_HOME),
+                            .is_energized = self->is_energized,
                             .has_actual = self->has_actual,
                             .actual_q32 = self->actual_q32,
                             .actual_us = self->actual_us};
@@ -106,6 +107,9 @@ static bool take_position(canraw_axis_t *self, const canraw_map_t *map, const co
     if (counts_to_units(scale, canraw_extract(position, data), &self->actual_q32) != HV_OK) {
         return false;
     }
+    if (!self->is_online && self->is_energized) { /* lost under torque, and what stopped the others may not have reached it */
+        tell(self, map, CANRAW_DISABLE);
+    }
     self->is_online = true;
     self->has_actual = true;
     self->actual_us = now_us;
@@ -148,6 +152,14 @@ static bool is_heard(const canraw_axis_t *self)
 static bool is_enabled(const canraw_axis_t *self, const canraw_map_t *map)
 {
     return is_heard(self) && (map->enabled_when.mask == 0 || is_when(map->enabled_when, self->status));
+}
+
+void canraw_axis_note_off(canraw_axis_t *self, const canraw_map_t *map)
+{
+    const bool is_down = self->state == DRIVE_DISABLED || self->state == DRIVE_FAULT;
+    if (self->is_online && is_down && is_heard(self) && !is_when(map->enabled_when, self->status)) {
+        self->is_energized = false;
+    }
 }
 
 void canraw_axis_step(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
@@ -208,6 +220,7 @@ void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_re
         if (self->state == DRIVE_DISABLED) {
             begin(self, DRIVE_ENABLING, now_us);
             tell(self, map, CANRAW_ENABLE);
+            self->is_energized = has(map, CANRAW_DISABLE);
         }
         break;
     case DRIVES_HOME:
@@ -270,6 +283,7 @@ void canraw_axis_report(const canraw_axis_t *self, drive_feedback_t *feedback)
         .state = self->is_online ? self->state : DRIVE_OFFLINE,
         .is_homed = self->is_homed,
         .has_actual = self->has_actual,
+        .is_energized = self->is_energized,
         .actual_mm_q32 = self->actual_q32,
         .actual_us = self->actual_us,
         .fault_code = self->state == DRIVE_FAULT ? self->fault_code : 0,

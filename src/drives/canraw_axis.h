@@ -18,6 +18,10 @@ bool canraw_axis_receive(canraw_axis_t *self, const canraw_map_t *map, const cou
 /** What follows from the time and all that has been received. Once per poll. */
 void canraw_axis_step(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us);
 
+/** All that was sent is on the wire: a drive that has answered since, and does not say otherwise, has taken it that its torque is
+ *  to be off. Once per poll, where it is so. */
+void canraw_axis_note_off(canraw_axis_t *self, const canraw_map_t *map);
+
 /** Carries out a request that is allowed. */
 void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_request_t request, uint64_t now_us);
 

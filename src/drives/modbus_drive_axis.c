@@ -237,6 +237,19 @@ static void begin_startup(modbus_drive_axis_t *self, const modbus_drive_map_t *m
     }
 }
 
+/* Torque that can be taken away. Where a drive says whether it has torque, off is what it says when it was asked after the last
+ * command; else it was asked for, and is off once the drive has taken what stops it. */
+static void note_torque(modbus_drive_axis_t *self, const modbus_drive_map_t *map)
+{
+    const bool is_down = !is_up(self) || self->phase == MODBUS_DRIVE_READY || self->phase == MODBUS_DRIVE_FAULT;
+    const bool is_newer = self->job != MODBUS_DRIVE_JOB_COMMAND && self->read_us >= self->mark_us;
+    if (is_when(map->enabled_when, self->status)) {
+        self->is_energized = has(map, MODBUS_DRIVE_DISABLE);
+    } else if (map->enabled_when.mask != 0 && is_down && is_newer) {
+        self->is_energized = false;
+    }
+}
+
 /* All blocks of the feedback are there. */
 static void take_feedback(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const counts_scale_t *scale, uint64_t now_us)
 {
@@ -259,6 +272,7 @@ static void take_feedback(modbus_drive_axis_t *self, const modbus_drive_map_t *m
         take_homing(self, map, now_us);
         take_enabling(self, map, now_us);
     }
+    note_torque(self, map);
 }
 
 void modbus_drive_axis_take_read(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const counts_scale_t *scale,
@@ -316,8 +330,9 @@ static void take_item(modbus_drive_axis_t *self, const modbus_drive_map_t *map, 
     self->step = (uint8_t)(self->step + (self->is_checking ? 0u : 1u));
 }
 
-static void end_command(modbus_drive_axis_t *self, uint64_t now_us)
+static void end_command(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
+    self->is_energized = self->is_energized && !(is_stopping(self) && map->enabled_when.mask == 0);
     start_job(self, self->phase == MODBUS_DRIVE_STARTING ? MODBUS_DRIVE_JOB_STARTUP : MODBUS_DRIVE_NO_JOB);
     self->mark_us = now_us;
     if (self->phase == MODBUS_DRIVE_ENABLING) {
@@ -340,8 +355,9 @@ static void begin_enabling(modbus_drive_axis_t *self, const modbus_drive_map_t *
 {
     enter(self, MODBUS_DRIVE_ENABLING, now_us);
     tell(self, map, MODBUS_DRIVE_ENABLE);
+    self->is_energized = has(map, MODBUS_DRIVE_DISABLE);
     if (self->job == MODBUS_DRIVE_NO_JOB) {
-        end_command(self, now_us);
+        end_command(self, map, now_us);
     }
 }
 
@@ -391,7 +407,7 @@ static bool take_block(modbus_drive_axis_t *self, const modbus_drive_map_t *map,
         end_setpoint(self, map, now_us);
         return is_setpoint;
     }
-    end_command(self, now_us);
+    end_command(self, map, now_us);
     return false;
 }
 

@@ -39,6 +39,7 @@ void modbus_drive_axis_feedback(const modbus_drive_axis_t *self, drive_feedback_
         .state = modbus_drive_axis_state(self),
         .is_homed = self->is_homed,
         .has_actual = self->has_actual,
+        .is_energized = self->is_energized,
         .actual_mm_q32 = self->actual_q32,
         .actual_us = self->actual_us,
         .fault_code = code_of(self),

@@ -285,6 +285,7 @@ void gateway_cycle(gateway_t *self, uint64_t now_us)
     step_motion(self, now_us);
     send_setpoints(self, now_us);
     operate_after_motion(self);
+    operate_watch_end(self, now_us);
     write_relays(self, now_us);
     publish(self, now_us);
 }
@@ -296,8 +297,10 @@ const snapshot_t *gateway_snapshot(const gateway_t *self)
 
 bool gateway_is_finished(const gateway_t *self)
 {
-    const state_t state = self->supervisor.state;
-    const bool can_be_told = self->is_disable_due && !self->is_bus_lost &&
-                             !operate_is_bus_stalled(self); /* a lost bus tells drives nothing: their own watch has to */
-    return self->is_shutdown_asked && !can_be_told && (state == STATE_OFF || state == STATE_FAULT || state == STATE_ESTOP);
+    return self->end_since_us != 0 && (gateway_energized(self) == 0 || self->is_end_overdue);
+}
+
+uint32_t gateway_energized(const gateway_t *self)
+{
+    return operate_energized(self, false);
 }

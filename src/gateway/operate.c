@@ -11,6 +11,8 @@
 #define HOMING_TIMEOUT_US    120000000u
 #define RESET_TIMEOUT_US     2000000u
 #define ABANDON_TIMEOUT_US   3000000u
+#define ENERGIZED_TIMEOUT_US 3000000u /* ramps, brakes, a line that has to try again */
+#define LOST_TIMEOUT_US      1000000u /* in which a drive may come back and be told */
 #define AT_SETTLED_WINDOW_MM 1
 #define FOLLOWING_TIME_US    20000u
 #define UNSENT_MAX_US        100000u /* the drives' own watch is quicker: it knows the period of its bus */
@@ -561,5 +563,58 @@ void operate_after_motion(gateway_t *self)
     if (self->is_disable_due && motion_is_at_rest(&self->motion)) {
         disable_drives(self);
         self->is_tracking_actual |= !self->is_disable_due;
+    }
+}
+
+/* --- The end --- */
+
+uint32_t operate_energized(const gateway_t *self, bool is_answering)
+{
+    uint32_t axes = 0;
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        const drive_feedback_t *f = &self->snapshot.drive[i];
+        if (f->is_energized && (!is_answering || f->state != DRIVE_OFFLINE)) {
+            axes |= 1u << i;
+        }
+    }
+    return axes;
+}
+
+/* A lost bus tells drives nothing: their own watch has to. */
+static bool are_drives_told(const gateway_t *self)
+{
+    return !self->is_disable_due || self->is_bus_lost || operate_is_bus_stalled(self);
+}
+
+static void log_energized(const gateway_t *self, uint32_t axes)
+{
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    text_put(&text, "not confirmed that the torque is off: axis");
+    const char *before = " ";
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        if ((axes >> i & 1u) != 0) {
+            text_put(&text, before);
+            text_put_u32(&text, i + 1u);
+            before = ", ";
+        }
+    }
+    hal_log_write(self->io.log, HAL_LOG_ERROR, line);
+}
+
+void operate_watch_end(gateway_t *self, uint64_t now_us)
+{
+    const bool is_down = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor);
+    if (!self->is_shutdown_asked || !is_down || !are_drives_told(self)) {
+        self->end_since_us = 0;
+        return;
+    }
+    self->end_since_us = self->end_since_us != 0 ? self->end_since_us : now_us;
+    const uint32_t axes = operate_energized(self, false);
+    const bool can_confirm = !self->is_disable_due && operate_energized(self, true) != 0;
+    const uint32_t most_us = can_confirm ? ENERGIZED_TIMEOUT_US : LOST_TIMEOUT_US;
+    if (axes != 0 && !self->is_end_overdue && now_us - self->end_since_us >= most_us) {
+        self->is_end_overdue = true;
+        log_energized(self, axes);
     }
 }

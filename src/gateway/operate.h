@@ -24,6 +24,14 @@ hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us);
 /** After the motion of the cycle: drives that are to be disabled once at rest. */
 void operate_after_motion(gateway_t *self);
 
+/** A shutdown that has come to its end waits for drives that have not confirmed yet that their torque is off, but not for ever.
+ */
+void operate_watch_end(gateway_t *self, uint64_t now_us);
+
+/** As gateway_energized().
+ *  @param is_answering only drives that answer */
+uint32_t operate_energized(const gateway_t *self, bool is_answering);
+
 /** True where the bus has taken no set of set-points for so long that none can be expected to get through. */
 bool operate_is_bus_stalled(const gateway_t *self);
 

@@ -489,6 +489,39 @@ static void test_request_enable_comes_up_without_motion(void)
     assert_all(DRIVE_ENABLED);
 }
 
+static unsigned energized(void)
+{
+    unsigned count = 0;
+    for (uint8_t k = 0; k < AXES; k++) {
+        count += feedback[k].is_energized;
+    }
+    return count;
+}
+
+/* Drives that no command of their map takes torque from are never said to have any. */
+static void test_request_off_tells_when_the_torque_is_off(void)
+{
+    static const drives_request_t k_requests[] = {DRIVES_DISABLE, DRIVES_QUICK_STOP};
+    for (int i = 0; i < 20; i++) {
+        cycle();
+    }
+    TEST_ASSERT_EQUAL_UINT(0, energized());
+    for (int i = 0; i < 2; i++) {
+        enable();
+        const unsigned can_tell = energized();
+        TEST_ASSERT_TRUE(can_tell == 0 || can_tell == AXES);
+        request_ok(k_requests[i]);
+        for (int n = 0; n < 10000 && energized() > 0; n++) {
+            cycle();
+        }
+        for (int n = 0; n < 100; n++) {
+            cycle();
+            TEST_ASSERT_EQUAL_UINT(0, energized());
+        }
+        assert_all(DRIVE_DISABLED);
+    }
+}
+
 static void test_send_while_enabled_is_followed_to_the_end(void)
 {
     q32_t goal_q32[DRIVES_MAX];
@@ -649,6 +682,7 @@ static void run_contract(void)
     RUN_TEST(test_poll_after_start_tells_where_the_axes_are);
     RUN_TEST(test_send_while_disabled_moves_nothing);
     RUN_TEST(test_request_enable_comes_up_without_motion);
+    RUN_TEST(test_request_off_tells_when_the_torque_is_off);
     RUN_TEST(test_send_while_enabled_is_followed_to_the_end);
     RUN_TEST(test_send_jump_while_enabled_faults_that_axis);
     RUN_TEST(test_send_elsewhere_while_enabling_faults_instead_of_jumping);

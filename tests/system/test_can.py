@@ -3,6 +3,7 @@
 """test_can.py BIN [PART OF A NAME] - the daemon on CANopen drives: simulated ones, strict ones, on vcan, on virtual time. Runs inside kernel.py."""
 import random
 import re
+import signal
 import sys
 import time
 
@@ -56,7 +57,10 @@ def up(bench, config, **drives):
 
 def rises_without_a_jump(bench):
     daemon = up(bench, can_config(bench))
+    bench.do("tpdo late", drive=2, us=3000)
     assert bench.stop(daemon) == 0
+    assert "not confirmed" not in daemon.log.read_text(encoding="utf-8")
+    assert_asked_to_go_off(bench)
     bench.stop_drives()
     enabled = bench.events("enabled")
     assert len(enabled) == 7 and max(row["t"] for row in enabled) - min(row["t"] for row in enabled) < 0.02, enabled
@@ -139,10 +143,51 @@ def follows_on_a_bus_of_finite_speed(bench):
     assert all(row["missed"] == 0 for row in bench.statistics().values()), bench.statistics()
 
 
+# --- The end ---
+
+def states(bench, node):
+    return [row["value"] for row in bench.events("state", node)]
+
+
+def assert_asked_to_go_off(bench):
+    """By their controlwords, not because nobody led them any more: they wait for the gateway's heartbeat for 150 ms."""
+    time.sleep(0.5)
+    assert not bench.events("connection lost"), bench.events("connection lost")
+    assert all(states(bench, node)[-1] in ("ready", "switch on disabled") for node in can_bench.NODES), [states(bench, node)[-3:] for node in can_bench.NODES]
+
+
+def ends_and_names_who_keeps_torque(bench):
+    """One drive that answers, and acts on nothing; one that has lost its power, of which nobody knows."""
+    bench.start_drives()
+    daemon = bench.start(config=can_config(bench, platform__engage="manual"))
+    heave.wait_for(lambda: all(leg["drive"] == "disabled" for leg in bench.status()["cylinders"]), "the drives are set up")
+    assert bench.ctl("park").returncode == 0
+    bench.wait_state("SETTLED")
+    bench.do("stuck", drive=3)
+    bench.do("off", drive=5)
+    bench.wait_state("FAULT")
+    since = time.monotonic()
+    assert bench.stop(daemon) == 1
+    assert time.monotonic() - since < 5
+    log = daemon.log.read_text(encoding="utf-8")
+    assert "not confirmed that the torque is off: axis 3, 5\n" in log, log
+    assert all(states(bench, node)[-1] == "switch on disabled" for node in can_bench.NODES if node not in (3, 5))
+
+
+def second_signal_stops_the_drives(bench):
+    daemon = up(bench, can_config(bench))
+    daemon.send_signal(signal.SIGTERM)
+    time.sleep(0.3)
+    assert bench.stop(daemon) == 1
+    assert all("quick stop" in states(bench, node) for node in can_bench.NODES), [states(bench, node)[-3:] for node in can_bench.NODES]
+
+
 CASES = [
-    ("rises without a jump, all drives at once", rises_without_a_jump),
+    ("rises without a jump, all drives at once; the torque is off before the end", rises_without_a_jump),
     ("follows the demonstration, CSP", follows("csp", demo, 1)), ("follows streams, IP", follows("ip", streams, 2)), ("follows poses, PP", follows("pp", poses, 3)),
     ("follows a stream on a bus of 1 Mbit/s", follows_on_a_bus_of_finite_speed),
+    ("ends with 1 and names the drives that have not confirmed that their torque is off", ends_and_names_who_keeps_torque),
+    ("ends at a second signal when the drives have taken their quick stop", second_signal_stops_the_drives),
 ]
 
 

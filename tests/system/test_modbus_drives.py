@@ -44,12 +44,20 @@ class Drive:
         self.devices, self.seen, self.is_enabled = devices, 0, False
         self.position = start_mm * COUNTS_PER_MM
         self.commands, self.targets, self.events = [], [], []
+        self.brake_s, self.off_s = 0, math.inf  # it has torque for so long after it was told not to; until when
         self.tell()
 
     def tell(self):
         high, low = (self.position & 0xFFFFFFFF) >> 16, self.position & 0xFFFF
         for address, value in ((POSITION, high), (POSITION + 1, low), (STATUS, 1 if self.is_enabled else 0)):
             self.devices.set(UNIT, HOLDING, address, value)
+
+    def control(self, command, at_s):
+        self.commands.append(command)
+        if command in (DISABLE, STOP):
+            self.off_s = min(self.off_s, at_s + self.brake_s)
+        elif command == ENABLE:
+            self.is_enabled, self.off_s = True, math.inf
 
     def obey(self):
         fresh = self.devices.written_since(self.seen)
@@ -61,10 +69,11 @@ class Drive:
                 if self.is_enabled:
                     self.position = target
             elif address == CONTROL:
-                self.is_enabled = values[0] == ENABLE or self.is_enabled and values[0] not in (DISABLE, STOP)
-                self.commands.append(values[0])
+                self.control(values[0], at_s)
             self.events.append(address)
-        if fresh:
+        is_off = self.is_enabled and time.monotonic() >= self.off_s
+        self.is_enabled &= not is_off
+        if fresh or is_off:
             self.tell()
 
 
@@ -174,8 +183,34 @@ def check_ride(bin_dir):
         assert bench.ctl("park").returncode == 0
         bench.wait_state("OFF", "SETTLED")
         assert bench.stop(daemon) == 0
-        heave.wait_for(lambda: all(not drive.is_enabled for drive in platform.drives), "torque is off")
+        assert not any(drive.is_enabled for drive in platform.drives), "heaved has ended, and there is torque"
         check_registers(platform)
+
+
+def settle(bench):
+    daemon = bench.start()
+    heave.wait_for(lambda: all(leg["drive"] == "disabled" for leg in bench.status()["cylinders"]), "the drives are started up")
+    assert bench.ctl("park").returncode == 0
+    status = bench.wait_state("SETTLED", "FAULT")
+    assert status["state"] == "SETTLED", f"{status['fault']} {status['cylinders']}"
+    return daemon
+
+
+def check_end(bin_dir):
+    """A drive that closes its brake first, one whose line loses what it is told, one that keeps its torque whatever it is told."""
+    from modbus_peer import Fault
+    with Platform() as platform, ModbusBench(bin_dir, platform, timeout_ms=300) as bench:
+        daemon = settle(bench)
+        platform.drives[2].brake_s = 0.4
+        lossy = platform.lines[4]
+        lossy.plan = {lossy.asked + number: Fault.LOST for number in (1, 2, 3)}
+        assert bench.stop(daemon) == 0, daemon.log.read_text(encoding="utf-8")
+        assert not any(drive.is_enabled for drive in platform.drives), "heaved has ended, and there is torque"
+        daemon = settle(bench)
+        platform.drives[2].brake_s = math.inf
+        assert bench.stop(daemon) == 1
+        assert "not confirmed that the torque is off: axis 3\n" in daemon.log.read_text(encoding="utf-8"), daemon.log.read_text(encoding="utf-8")
+        assert [drive.is_enabled for drive in platform.drives] == [False, False, True, False, False, False]
 
 
 def check_silent(bin_dir):
@@ -222,6 +257,7 @@ def main():
     suite = tap.Suite()
     cases = [
         ("six drives on TCP ride within what the line carries, and end without torque", check_ride),
+        ("ends when each drive has confirmed that its torque is off; with 1 and its name where one does not", check_end),
         ("one drive too late: all are told to stop, the cycle goes on, only a reset leads back", check_silent),
         ("a register that does not hold what it has to: the drive is refused by name", check_refusal),
     ]

@@ -1134,6 +1134,86 @@ static void test_init_map_that_contradicts_itself_is_refused(void)
     TEST_ASSERT_EQUAL(HV_OK, canraw_init(&driver, &map, sim_can_hal(&node)));
 }
 
+/* ---- Whether the torque is off ---- */
+
+static unsigned energized(void)
+{
+    unsigned count = 0;
+    for (unsigned k = 0; k < AXES; k++) {
+        count += feedback[k].is_energized;
+    }
+    return count;
+}
+
+/* What a drive is said to be without stays off, whenever it was asked to go off. */
+static void test_off_is_told_once_it_is_so_whenever_it_is_asked_for(void)
+{
+    for (int i = 0; i < 80; i++) {
+        map = canraw_maps_rich();
+        map.enabled_when.mask = i % 4 < 2 ? 1 : 0; /* it says whether it has torque, or not */
+        map.enabled_when.value = map.enabled_when.mask;
+        open_with(NULL, 0, true);
+        await(DRIVE_DISABLED, 100);
+        TEST_ASSERT_EQUAL_UINT(0, energized());
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+        for (int n = 0; n < i / 4; n++) {
+            (void)!cycle();
+            follow_actual();
+        }
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, i % 2 == 0 ? DRIVES_DISABLE : DRIVES_QUICK_STOP));
+        for (int n = 0; n < 100; n++) {
+            (void)!cycle();
+            for (unsigned k = 0; k < AXES; k++) {
+                TEST_ASSERT_TRUE(feedback[k].is_energized || !slave.drive[k].is_enabled);
+            }
+        }
+        TEST_ASSERT_EQUAL_UINT(0, energized());
+    }
+}
+
+/* A drive that was lost while the others were told is told when it is back. */
+static void test_off_is_told_again_to_a_drive_that_was_lost(void)
+{
+    for (unsigned can_tell = 0; can_tell < 2; can_tell++) {
+        map = canraw_maps_rich();
+        map.enabled_when.mask = map.enabled_when.value = can_tell;
+        open_with(NULL, 0, true);
+        enable();
+        slave.drive[3].is_on = false;
+        cycles(30);
+        TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[3].state);
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+        cycles(30);
+        TEST_ASSERT_EQUAL_UINT(1, energized());
+        TEST_ASSERT_TRUE(feedback[3].is_energized && slave.drive[3].is_enabled);
+        slave.drive[3].is_on = true;
+        cycles(30);
+        TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[3].state);
+        TEST_ASSERT_EQUAL_UINT(0, energized());
+        TEST_ASSERT_FALSE(slave.drive[3].is_enabled);
+        slave.drive[3].is_on = false;
+        cycles(30);
+        slave.drive[3].is_on = true;
+        slave.logged = 0;
+        cycles(30);
+        for (unsigned i = 0; i < slave.logged; i++) {
+            TEST_ASSERT_TRUE(slave.log[i].data[0] != 0x21); /* it was without torque when it was lost */
+        }
+    }
+}
+
+/* It hears what takes its torque away, and keeps it; or what was sent is not on the wire. */
+static void test_off_that_is_not_confirmed_is_not_told(void)
+{
+    open_rich();
+    enable();
+    map.command[CANRAW_DISABLE].data[0] = 0x23; /* to this drive, a reset */
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+    cycles(200);
+    TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
+    TEST_ASSERT_EQUAL_UINT(AXES, energized());
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -1183,5 +1263,8 @@ int main(void)
     RUN_TEST(test_positions_that_come_unasked);
     RUN_TEST(test_ambiguous_late_answers_are_not_taken_for_another);
     RUN_TEST(test_init_map_that_contradicts_itself_is_refused);
+    RUN_TEST(test_off_is_told_once_it_is_so_whenever_it_is_asked_for);
+    RUN_TEST(test_off_is_told_again_to_a_drive_that_was_lost);
+    RUN_TEST(test_off_that_is_not_confirmed_is_not_told);
     return UNITY_END();
 }

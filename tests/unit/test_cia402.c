@@ -1079,6 +1079,82 @@ static void listen_to_silence(unsigned ms)
     }
 }
 
+/* --- Whether the torque is off --- */
+
+static bool has_power(unsigned k)
+{
+    const uint16_t status = slave.drive[k].status;
+    return status == 0x27 || status == 0x07 || status == 0x23;
+}
+
+static unsigned energized(void)
+{
+    unsigned count = 0;
+    for (unsigned k = 0; k < AXES; k++) {
+        count += feedback[k].is_energized;
+    }
+    return count;
+}
+
+/* What a drive is said to be without stays off, whatever it was at when it was asked to go off; and it is not said late. */
+static void test_off_is_told_once_it_is_so_whenever_it_is_asked_for(void)
+{
+    for (unsigned i = 0; i < 260; i++) {
+        setUp();
+        come_up();
+        cycles(5 * PERIOD);
+        TEST_ASSERT_EQUAL_UINT(0, energized());
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+        for (unsigned n = 0; n < i; n++) {
+            (void)!cycle();
+            follow_actual();
+        }
+        slave.drive[3].tpdo_drop = i % 3; /* its answer is late */
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, i % 2 == 0 ? DRIVES_DISABLE : DRIVES_QUICK_STOP));
+        unsigned since = 0;
+        for (unsigned n = 0; n < 400; n++) {
+            (void)!cycle();
+            bool is_any = false;
+            for (unsigned k = 0; k < AXES; k++) {
+                TEST_ASSERT_TRUE(feedback[k].is_energized || !has_power(k));
+                is_any |= has_power(k);
+            }
+            since = is_any ? 0 : since + 1u;
+            TEST_ASSERT_TRUE(since < 8 * PERIOD || energized() == 0);
+        }
+        TEST_ASSERT_EQUAL_UINT(0, energized());
+    }
+}
+
+/* Nobody knows of a drive that was lost; one that has started again has no torque. */
+static void test_off_of_a_drive_that_is_lost_is_as_it_was_heard_last(void)
+{
+    start();
+    cycles(1);
+    TEST_ASSERT_EQUAL_UINT(0, energized());
+    await(DRIVE_DISABLED, 5000);
+    enable();
+    slave.drive[2].is_mute = true;
+    cia402_slave_power(&slave, 4, false);
+    cycles(1000);
+    TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[2].state);
+    TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
+    TEST_ASSERT_TRUE(feedback[2].is_energized && feedback[4].is_energized);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+    cycles(500);
+    TEST_ASSERT_EQUAL_UINT(2, energized());
+    slave.drive[2].is_mute = false;
+    cia402_slave_power(&slave, 4, true);
+    while (feedback[4].is_energized) {
+        (void)!cycle();
+        TEST_ASSERT_TRUE(now_us < 60000000);
+    }
+    TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
+    await(DRIVE_DISABLED, 5000);
+    cycles(5 * PERIOD);
+    TEST_ASSERT_EQUAL_UINT(0, energized());
+}
+
 static void test_leave_drives_without_torque_forget_the_gateway(void)
 {
     come_up();
@@ -1872,6 +1948,8 @@ int main(void)
     RUN_TEST(test_request_reset_twice_is_one_edge);
     RUN_TEST(test_request_reset_of_a_fault_that_goes_by_itself);
     RUN_TEST(test_request_reset_is_one_edge_and_only_when_asked);
+    RUN_TEST(test_off_is_told_once_it_is_so_whenever_it_is_asked_for);
+    RUN_TEST(test_off_of_a_drive_that_is_lost_is_as_it_was_heard_last);
     RUN_TEST(test_leave_drives_without_torque_forget_the_gateway);
     RUN_TEST(test_leave_drives_with_torque_are_left_to_their_watchdogs);
     RUN_TEST(test_leave_says_nothing_to_drives_that_are_not_there);

@@ -1634,7 +1634,7 @@ static void test_shutdown_while_a_drive_homes_for_ever_is_bounded(void)
     static const struct {
         sim_drives_fault_kind_t kind;
         unsigned most_ms;
-    } k_cases[] = {{SIM_DRIVES_FREEZE, 3010}, {SIM_DRIVES_BUSY, 200}};
+    } k_cases[] = {{SIM_DRIVES_FREEZE, 6010}, {SIM_DRIVES_BUSY, 1200}};
     for (unsigned n = 0; n < 2; n++) {
         start(false);
         while (m_rig.drives.axis[2].state != DRIVE_HOMING) {
@@ -1773,7 +1773,10 @@ static void test_shutdown_on_a_bus_that_takes_nothing_ends_all_the_same(void)
     TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
     rig_run_ms(&m_rig, 1000);
     TEST_ASSERT_EQUAL(STATE_FAULT, seen()->state);
+    TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway)); /* a bus may come back */
+    rig_run_ms(&m_rig, 100);
     TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "not confirmed that the torque is off: axis 1, 2, 3, 4, 5, 6, 7"));
 }
 
 /* Off already, but the drives have not been told: that is waited for, as long as there is hope. */
@@ -1788,13 +1791,88 @@ static void test_shutdown_from_settled_waits_until_the_bus_has_taken_it(void)
         rig_run_ms(&m_rig, busy_ms);
         TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
         TEST_ASSERT_EQUAL(DRIVE_ENABLED, m_rig.drives.axis[0].state);
-        TEST_ASSERT_EQUAL(busy_ms > 100, gateway_is_finished(&m_rig.gateway)); /* the drives' own watch has to stop them */
+        TEST_ASSERT_EQUAL(busy_ms > 1100, gateway_is_finished(&m_rig.gateway)); /* the drives' own watch has to stop them */
         rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
         rig_run_ms(&m_rig, 2);
         TEST_ASSERT_EQUAL(STATE_OFF, seen()->state); /* drives that are still enabled do not bring it up again */
         TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[0].state);
         TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
     }
+}
+
+/* ---- an end that drives do not confirm ---- */
+
+static void settled_with_a_frozen_drive(unsigned axis)
+{
+    m_settings.engage = ENGAGE_MANUAL;
+    start(true);
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL_HEX32(0x7F, gateway_energized(&m_rig.gateway));
+    rig_break(&m_rig, SIM_DRIVES_FREEZE, axis, 0);
+    TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
+}
+
+static void test_end_waits_until_each_drive_has_confirmed_and_no_longer(void)
+{
+    for (unsigned late_ms = 0; late_ms < 3000; late_ms += 700) {
+        settled_with_a_frozen_drive(5);
+        if (late_ms == 0) {
+            rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+        }
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
+        rig_run_ms(&m_rig, 1);
+        TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+        TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway)); /* asked, not answered */
+        for (unsigned t = 0; t < late_ms; t++) {
+            rig_run_ms(&m_rig, 1);
+            TEST_ASSERT_EQUAL_HEX32(0x20, gateway_energized(&m_rig.gateway));
+            TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
+        }
+        rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+        m_rig.drives.axis[5].state = DRIVE_DISABLED; /* what it was told is only now obeyed */
+        rig_run_ms(&m_rig, 1);
+        TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
+        TEST_ASSERT_EQUAL_HEX32(0, gateway_energized(&m_rig.gateway));
+        TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "not confirmed"));
+    }
+}
+
+static void test_end_names_the_drive_that_does_not_confirm(void)
+{
+    settled_with_a_frozen_drive(2);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
+    rig_run_ms(&m_rig, 3000);
+    TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "not confirmed"));
+    rig_run_ms(&m_rig, 1);
+    TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "not confirmed that the torque is off: axis 3"));
+    TEST_ASSERT_EQUAL_HEX32(0x04, gateway_energized(&m_rig.gateway));
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "not confirmed")); /* said once */
+}
+
+/* Lost while it was under torque: nobody knows. Lost without: there is nothing to wait for. */
+static void test_end_does_not_wait_for_long_for_a_drive_that_is_lost(void)
+{
+    m_is_fault_expected = true;
+    engage();
+    rig_break(&m_rig, SIM_DRIVES_OFFLINE, 6, 0);
+    rig_run_ms(&m_rig, 5000);
+    TEST_ASSERT_EQUAL(STATE_FAULT, seen()->state);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
+    rig_run_ms(&m_rig, 1000);
+    TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
+    rig_run_ms(&m_rig, 1);
+    TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "not confirmed that the torque is off: axis 7"));
+    m_settings.engage = ENGAGE_MANUAL;
+    start(false);
+    rig_run_ms(&m_rig, 10);
+    rig_break(&m_rig, SIM_DRIVES_OFFLINE, 6, 0);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
+    rig_run_ms(&m_rig, 1);
+    TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
 }
 
 /* ---- what a take-over cannot follow ---- */
@@ -1969,6 +2047,9 @@ static void run_supervision(void)
     RUN_TEST(test_intensity_is_taken_within_its_range_and_told);
     RUN_TEST(test_shutdown_on_a_bus_that_takes_nothing_ends_all_the_same);
     RUN_TEST(test_shutdown_from_settled_waits_until_the_bus_has_taken_it);
+    RUN_TEST(test_end_waits_until_each_drive_has_confirmed_and_no_longer);
+    RUN_TEST(test_end_names_the_drive_that_does_not_confirm);
+    RUN_TEST(test_end_does_not_wait_for_long_for_a_drive_that_is_lost);
     RUN_TEST(test_takeover_timed_move_after_a_stream_of_wild_extensions_ends_in_time);
     RUN_TEST(test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves);
     RUN_TEST(test_resume_of_three_cylinders_takes_what_they_saved);

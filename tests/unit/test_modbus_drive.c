@@ -600,6 +600,95 @@ static void test_fault_while_a_stop_is_on_its_way_does_not_hold_it_up(void)
     }
 }
 
+/* --- Whether the torque is off --- */
+
+static unsigned energized(void)
+{
+    unsigned count = 0;
+    for (unsigned k = 0; k < AXES; k++) {
+        count += feedback[k].is_energized;
+    }
+    return count;
+}
+
+/* What a drive is said to be without stays off: whatever it was at when it was asked to go off. */
+static void assert_off_is_off(drives_request_t request)
+{
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, request));
+    for (int n = 0; n < 400; n++) {
+        (void)!cycle();
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_TRUE(feedback[k].is_energized || !slave.drive[k].is_enabled);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT(0, energized());
+    TEST_ASSERT_FALSE(has_any_torque());
+}
+
+static void test_off_is_told_once_it_is_so_whenever_it_is_asked_for(void)
+{
+    for (int i = 0; i < 240; i++) {
+        open_shared(1000);
+        map.enabled_when.mask = i % 4 < 2 ? 1 : 0; /* it says whether it has torque, or not */
+        map.enabled_when.value = map.enabled_when.mask;
+        map.is_target_last = i % 8 < 4;
+        await(DRIVE_DISABLED, 3000);
+        cycles(50);
+        TEST_ASSERT_EQUAL_UINT(0, energized());
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+        for (int n = 0; n < i; n++) {
+            (void)!cycle();
+            follow_actual();
+        }
+        assert_off_is_off(i % 2 == 0 ? DRIVES_DISABLE : DRIVES_QUICK_STOP);
+    }
+}
+
+/* Where its line fails for longer than is borne, a drive is lost: what was heard last counts until it is back, and told again. */
+static void test_off_that_is_lost_is_told_again_when_the_drive_is_back(void)
+{
+    for (unsigned is_silent = 0; is_silent < 2; is_silent++) {
+        map.enabled_when.mask = map.enabled_when.value = (uint32_t)is_silent;
+        open_slaves(false, false, 300);
+        enable();
+        cycles(20);
+        TEST_ASSERT_EQUAL_UINT(AXES, energized());
+        slave.line[2].device = &slave.device[3]; /* nothing of it arrives */
+        slave.line[2].devices = 0;
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+        cycles(300);
+        TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[2].state);
+        TEST_ASSERT_EQUAL_UINT(1, energized());
+        TEST_ASSERT_TRUE(feedback[2].is_energized && slave.drive[2].is_enabled);
+        slave.line[2].device = &slave.device[2];
+        slave.line[2].devices = 1;
+        cycles(900);
+        TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[2].state);
+        TEST_ASSERT_EQUAL_UINT(0, energized());
+        TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
+    }
+}
+
+/* It takes what takes its torque away, and keeps it. */
+static void test_off_of_a_drive_that_says_otherwise_is_never_told(void)
+{
+    map.command[MODBUS_DRIVE_DISABLE].block[0].data[0] = 0x5A5A; /* nothing to this drive */
+    enable();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+    cycles(1000);
+    TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
+    TEST_ASSERT_EQUAL_UINT(AXES, energized());
+    TEST_ASSERT_TRUE(modbus_drive_is_told(&driver));
+}
+
+static void test_off_of_drives_that_no_command_takes_torque_from_is_not_waited_for(void)
+{
+    map.command[MODBUS_DRIVE_DISABLE].count = 0;
+    enable();
+    cycles(20);
+    TEST_ASSERT_EQUAL_UINT(0, energized());
+}
+
 static void test_alarm_is_the_fault_code(void)
 {
     enable();
@@ -1389,6 +1478,10 @@ int main(void)
     RUN_TEST(test_fault_code_of_the_drive_may_be_any);
     RUN_TEST(test_fault_while_being_enabled_gets_no_torque_later);
     RUN_TEST(test_fault_while_a_stop_is_on_its_way_does_not_hold_it_up);
+    RUN_TEST(test_off_is_told_once_it_is_so_whenever_it_is_asked_for);
+    RUN_TEST(test_off_that_is_lost_is_told_again_when_the_drive_is_back);
+    RUN_TEST(test_off_of_a_drive_that_says_otherwise_is_never_told);
+    RUN_TEST(test_off_of_drives_that_no_command_takes_torque_from_is_not_waited_for);
     RUN_TEST(test_alarm_is_the_fault_code);
     RUN_TEST(test_enable_target_last_begins_where_the_drive_is_now);
     RUN_TEST(test_slow_line_gets_the_newest_setpoint_and_no_backlog);
