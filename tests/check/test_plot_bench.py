@@ -29,6 +29,7 @@ import bench_cost  # noqa: E402
 import bench_latency  # noqa: E402
 import bench_peers  # noqa: E402
 import bench_signal as signals  # noqa: E402
+import latency_run as latency_runs  # noqa: E402
 from bench_rivals import two_limits  # noqa: E402
 from frame_dots import dots_of  # noqa: E402
 from frames_file import Line  # noqa: E402
@@ -208,17 +209,90 @@ def check_cortex(suite):
         assert "500 instructions; 10.0 x as many in double, 5000; goal 10: met" in bench_cortex.line_of("cortex-m3", "inverse", rows["inverse"])
 
 
+def latency_run(count, stalls=(), **odd):
+    """A run of bench_latency: frames 400 ms apart, the nth one 2000 + n us to the first set-point; odd: columns of the first so many frames."""
+    frames = []
+    for n in range(count):
+        sent = 1e6 + 400_000 * n
+        frame = [sent, sent + 30, sent + 2000 + n, sent + 3000 + n, sent + 1500, sent + 5500, 50.0]
+        for column, (many, change) in odd.items():
+            at = getattr(bench_latency, column)
+            frame[at] = frame[at] + change if n < many else frame[at]
+        frames.append(frame)
+    return {"frames": frames, "stalls": [[1e6 + 400_000 * n + after, 1e6 + 400_000 * n + until] for n, after, until in stalls], "is_urgent": True, "is_realtime": True,
+            "heaved_us": {"count": count, "p50_us": 500, "p99_us": 990, "max_us": 1000}}
+
+
+def latency_of(*runs, kind="can", stolen=0, stops=(), is_uml=False, is_virtual=False):
+    return {"is_virtual": is_virtual, **bench_latency.judge(kind, {"runs": [*runs], "stops": [*stops], "is_uml": is_uml}, stolen)}
+
+
 def check_latency(suite):
-    rows = [(1000 + n, 2000 + n, 50.0) for n in range(1000)]
-    with suite.case("bench latency: percentiles are of the frames, first drive and last"):
-        result = bench_latency.judge(rows, 0)
-        assert result["first_us"] == {"p50": 1499, "p99": 1989, "p99.9": 1998, "max": 1999}, result["first_us"]
-        assert result["last_us"]["max"] == 2999 and result["doubt"] is None, result
-        assert re.search(r"last of six +2499 +2989 +2998 +2999", "\n".join(bench_latency.lines_of(result)))
-    with suite.case("bench latency: where the sender is woken late, or the CPU is stolen, there is no figure"):
-        for result in (bench_latency.judge(rows[:980] + [(1, 2, 1500.0)] * 20, 0), bench_latency.judge(rows, 0.06)):
-            (line,) = bench_latency.lines_of(result)
-            assert "no figure" in line and ("1.5 ms" in line or "6%" in line), line
+    whole, first = "on the bus: to the last of six set-points", "of it from there to the first set-point"
+    with suite.case("bench latency: mean and percentiles of each part of the way"):
+        result = latency_of(latency_run(1000))
+        assert result["us"][whole] == {"mean": 3499.5, "p50": 3499, "p99": 3989, "p99.9": 3998, "max": 3999}, result["us"]
+        assert result["us"][first]["p50"] == 999 and result["doubt"] is None and result["left_out"] == 0, result
+        assert re.search(r"six set-points +3500 +3499 +3989 +3998 +3999", "\n".join(bench_latency.lines_of("can", result)))
+    with suite.case("bench latency: on the bus adds up from its parts, frame by frame"):
+        result = latency_of(latency_run(10, BEGUN=(10, -1600)))  # the SYNC went 100 us before the frame: it has not waited
+        means = [figures["mean"] for figures in result["us"].values()]
+        assert means[1] == 0 and means[0] == sum(means[1:4]), means
+    with suite.case("bench latency: frames beside a stall, and those whose sender was held up, are left out and counted"):
+        stalls = [(5, -500, 100), (7, 11_000, 13_000), (9, 2000, 2600), (11, 12_500, 20_000), (13, -9000, -1500)]  # the last two are far enough
+        result = latency_of(latency_run(100, stalls, LATE=(2, 1000)), latency_run(100, RETURNED=(3, 600)))
+        assert (result["frames"], result["left_out"], result["doubt"]) == (200, 8, None), result
+        assert "192 frames, 8 left out" in "\n".join(bench_latency.lines_of("can", result))
+    with suite.case("bench latency: a stall counts for the run that it was in alone"):
+        assert latency_of(latency_run(20, [(3, 0, 600)]), latency_run(20))["left_out"] == 1
+    with suite.case("bench latency: what was left out is in no percentile"):
+        result = latency_of(latency_run(1000, [(990, 0, 1000)], LAST=(1, 90_000), LATE=(1, 5000)))
+        assert result["us"][whole]["max"] == 3999 and result["left_out"] == 2, result
+    with suite.case("bench latency: no percentile of fewer frames than it takes"):
+        for count, known in ((99, ["mean", "p50", "max"]), (300, ["mean", "p50", "p99", "max"]), (999, ["mean", "p50", "p99", "max"]), (1000, ["mean", *bench_latency.PER_MILLE])):
+            result = latency_of(latency_run(count))
+            assert [*result["us"][whole]] == known, (count, result["us"][whole])
+        assert re.search(r"six set-points +3049 +3049 +- +- +3098", "\n".join(bench_latency.lines_of("can", latency_of(latency_run(99)))))
+    with suite.case("bench latency: where too many frames were left out, or the CPU was stolen, there is no figure"):
+        for result in (latency_of(latency_run(100, LATE=(11, 1500))), latency_of(latency_run(100, LATE=(100, 1500))), latency_of(latency_run(100), stolen=0.06)):
+            (_, line) = bench_latency.lines_of("can", result)
+            assert "spread too wide" in line and "no figure" in line and re.search(r"\b(11|100|6)%", line), line
+        assert latency_of(latency_run(100, LATE=(10, 1500)))["doubt"] is None
+    with suite.case("bench latency: says what has to be known of the figures"):
+        assert not bench_latency.notes_of(latency_of(latency_run(10)))
+        for result, word in ((latency_of(latency_run(10), is_uml=True), "upper bounds"), (latency_of(latency_run(10), stops=["bus-lost"]), "bus-lost"),
+                             (latency_of({**latency_run(10), "is_realtime": False}), "as root")):
+            (note,) = bench_latency.notes_of(result)
+            assert word in note, note
+        assert not bench_latency.notes_of(latency_of({**latency_run(10), "is_urgent": False}, is_uml=True, is_virtual=True))
+    with suite.case("bench latency: a drive that is missing is named"):
+        status = {"state": "OFF", "fault": {"name": "none"}, "cylinders": [{"drive": "offline" if number == 3 else "disabled"} for number in range(1, 7)]}
+        assert "drive 3 is offline, the others are disabled" in latency_runs.trouble_of("drives", status)
+    with suite.case("bench latency: heaved that stops is excused by a machine that stood alone"):
+        status = {"state": "FAULT", "fault": {"name": "bus-lost"}, "cylinders": [{"drive": "fault"}] * 6}
+        lines = ["frame 1000000 1 2 3 4 5 6", "lost 1400000"]
+        assert latency_runs.excuse([*lines, "stall 1405000.0 1420000.0"], status) == "bus-lost"
+        for stalls in ([], ["stall 900000.0 999000.0"], ["stall 9900000.0 9901000.0"]):
+            try:
+                latency_runs.excuse([*lines, *stalls], status)
+            except latency_runs.LatencyError as error:
+                assert "bus-lost" in str(error) and "did not stand" in str(error), error
+            else:
+                raise AssertionError(f"excused by {stalls}")
+    with suite.case("bench latency: without a kernel that has CAN it says what to do"):
+        before = os.environ.get("XDG_CACHE_HOME")
+        os.environ["XDG_CACHE_HOME"] = str(FOLDER / "no-cache")
+        try:
+            bench_latency.run_part("can-design", "heaved", "drives", 1)
+        except bench_latency.LatencyError as error:
+            assert "tools/lib/uml.sh" in str(error) and "modprobe vcan" in str(error), error
+        else:
+            raise AssertionError("measured without a kernel")
+        finally:
+            if before is None:
+                del os.environ["XDG_CACHE_HOME"]
+            else:
+                os.environ["XDG_CACHE_HOME"] = before
 
 
 def check_bench_arguments(suite):
@@ -235,6 +309,7 @@ def check_bench_arguments(suite):
         "a record too short": (("motion", "--seconds", "5"), 2, "from 12"),
         "no rounds": (("cost", "--rounds", "0"), 2, "from 1"),
         "too few frames": (("latency", "--frames", "9"), 2, "from 10"),
+        "a part of the latency that is none": (("latency", "--only", "can,lin"), 2, "'lin'", "modbus-design"),
         "rounds where instructions are counted": (("cortex", "--rounds", "5"), 2, "--rounds"),
         "a program that is not there": (("motion", "--program", "nowhere"), 1, "nowhere"),
         "a program that is another one": (("cost", "--program", "/bin/false"), 1, "false"),

@@ -30,6 +30,7 @@ HERE = Path(__file__).resolve().parent
 TOOLS = HERE.parents[1] / "tools/lib"
 MEMORY = "512M"
 NICE = 5  # a third of the time beside one that computes too
+AHEAD = -15  # nearly all of it
 SETUP = """
 ip link set lo up
 ip link add vcan0 type vcan && ip link set vcan0 txqueuelen 16 && ip link set vcan0 up || exit 97
@@ -94,20 +95,21 @@ def read(path):
     return path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
 
 
-def give_way():
-    """On virtual time nobody minds to wait; tests on real time beside this one do. Linux may weigh by sessions, and this is one (autogroup)."""
-    os.nice(NICE)
+def weigh(nice):
+    """Where that is permitted. On virtual time nobody minds to wait; tests on real time beside this one do. Linux may weigh by sessions, and this is one (autogroup)."""
     with contextlib.suppress(OSError):
-        Path("/proc/self/autogroup").write_text(str(NICE), encoding="ascii")
+        os.nice(nice)
+        Path("/proc/self/autogroup").write_text(str(nice), encoding="ascii")
 
 
-def run_uml(kernel, command, limit_s, environment, virtual_time):
+def run_uml(kernel, command, limit_s, environment, virtual_time, is_ahead):
     with tempfile.TemporaryDirectory(prefix="heave-uml-") as folder:
         job = Path(folder)
         (job / "run.sh").write_text(script_of(command, {**environment, **profile_of(job), "HEAVE_OWN_KERNEL": "1"}), encoding="utf-8")
         boot = [kernel, f"mem={MEMORY}", "rootfstype=hostfs", "rootflags=/", "rw", f"init={HERE / 'uml_init.sh'}", f"job={job}", f"uml_dir={job}/",
                 "vcan.echo=1", "quiet", "con=null", "con0=null,fd:1", *(["time-travel=inf-cpu"] if virtual_time else [])]
-        ended, console = bounded(boot, limit_s, env={**os.environ, "TMPDIR": folder}, preexec_fn=give_way if virtual_time else None)
+        nice = NICE if virtual_time else AHEAD if is_ahead else 0
+        ended, console = bounded(boot, limit_s, env={**os.environ, "TMPDIR": folder}, preexec_fn=(lambda: weigh(nice)) if nice else None)
         output, status = read(job / "output"), read(job / "status").strip()
     if ended is None:
         return Finished(None, output)
@@ -122,15 +124,15 @@ def find(tool):
     return found.stdout.strip()
 
 
-def run(command, virtual_time=False, limit_s=300, is_instrumented=False, **environment):
-    """Runs the command with these additional environment variables. Raises tap.Skip where no kernel is to be had; returncode None: killed
-    after limit_s of real time, or the kernel died."""
+def run(command, virtual_time=False, limit_s=300, is_instrumented=False, is_ahead=False, **environment):
+    """Runs the command with these additional environment variables; is_ahead: a kernel of its own goes before other programs. Raises tap.Skip
+    where no kernel is to be had; returncode None: killed after limit_s of real time, or the kernel died."""
     environment = wanted_environment(environment)
     if not virtual_time and host_has_vcan():
         return run_here(command, limit_s, environment)
     if is_instrumented:
         raise tap.Skip("the address sanitizer does not work in User Mode Linux")
-    return run_uml(find("uml.sh"), command, limit_s, environment, virtual_time)
+    return run_uml(find("uml.sh"), command, limit_s, environment, virtual_time, is_ahead)
 
 
 def main():

@@ -277,7 +277,7 @@ static void take_target(cia402_slave_t *self, cia402_slave_drive_t *d, int32_t t
     d->has_target = true;
     d->last_target = target;
     d->setpoints++;
-    if (abs((int32_t)((uint32_t)target - (uint32_t)d->position)) > JUMP_COUNTS) {
+    if (abs((int32_t)((uint32_t)target - (uint32_t)d->position)) > d->jump_counts) {
         cia402_slave_fault(self, (unsigned)(d - self->drive), 0x8611);
         return;
     }
@@ -655,6 +655,7 @@ void cia402_slave_open(cia402_slave_t *self, sim_can_bus_t *bus)
         d->power_us = 5000;
         d->brake_us = 8000 + 1000 * k;
         d->homing_us = 50000;
+        d->jump_counts = JUMP_COUNTS;
         d->rows = sizeof k_rows / sizeof k_rows[0];
         memcpy(d->row, k_rows, sizeof k_rows);
         for (uint32_t i = 0; i < d->rows; i++) {

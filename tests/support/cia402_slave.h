@@ -40,6 +40,7 @@ typedef struct {
     uint8_t tpdo_cut;                       /**< bytes that its TPDOs are too short by */
     uint32_t tpdo_drop;                     /**< so many TPDOs are not sent */
     uint32_t power_us, brake_us, homing_us; /**< how long it takes */
+    int32_t jump_counts;                    /**< a target further away than this is a fault */
 
     uint8_t nmt;     /**< 0 = not booted */
     uint16_t status; /**< state bits alone */

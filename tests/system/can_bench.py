@@ -10,12 +10,12 @@
         bench.positions()                         one row per SYNC: time, targets, actuals
 """
 import json
-import subprocess
 import sys
 
 import can_judge
 import forked
 import heave
+import vcan
 
 sys.path.append(str(heave.TOP / "tests/peers"))
 import can_drives  # noqa: E402  the path above has to be set first
@@ -39,15 +39,8 @@ class CanBench(heave.Bench):
         self.fast_bus()
         super().__exit__(*exception)
 
-    @staticmethod
-    def slow_bus(frame_us=115):
-        """vcan as a wire: each frame takes its time (115: six bytes at 1 Mbit/s, at worst), and the queue has an end, as on real interfaces."""
-        rate = round(16 * 8 * 1e6 / frame_us)
-        subprocess.run(f"tc qdisc replace dev vcan0 root tbf rate {rate}bit burst 16 limit {100 * 16}".split(), check=True)
-
-    @staticmethod
-    def fast_bus():
-        subprocess.run("tc qdisc del dev vcan0 root".split(), check=False, stderr=subprocess.DEVNULL)
+    slow_bus = staticmethod(vcan.slow)
+    fast_bus = staticmethod(vcan.fast)
 
     def start_drives(self, plan=(), each=None, only=None):
         """each: keys of all drives; only: {node: keys} of single ones. Positions are those of a settled platform."""

@@ -1,130 +1,174 @@
 # SPDX-License-Identifier: MIT
-"""bench_latency.py - the subcommand latency of tools/bench: from a datagram to the set-points on the bus, heaved as it runs on a platform,
-with the drives of tests/bench/bench_latency.c."""
+"""bench_latency.py - the subcommand latency of tools/bench: from a datagram to the set-points on the bus, heaved as it runs on a platform, measured by
+latency_run.py; here what is measured where, and what of it counts."""
 import json
 import os
-import re
-import socket
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 from bench_build import TOP
 from bench_cost import processor
 from bench_peers import STOLEN_MAX, stolen_share, stolen_ticks
+from latency_run import LatencyError, kind_of
 
-CONFIG = TOP / "config/modbus-tcp-hexapod.ini"
-WAIT_S = 60
-WAKE_MAX_US = 1000  # of the sender's pauses, one in 100 may last so much too long: else the machine is not free to serve anybody in time
+sys.path.append(str(TOP / "tests/lib"))
+import kernel  # noqa: E402  the path above has to be set first
+import tap  # noqa: E402
+
+# name: (bus of latency_run.py, whether on virtual time, what it is)
+PARTS = {
+    "can-design": ("slow-can", True, "six CiA 402 drives on a CAN bus of 1 Mbit/s, by design: virtual time, computing takes none"),
+    "modbus-design": ("modbus", True, "six drives on Modbus TCP, by design: virtual time, computing takes none"),
+    "can": ("can", False, "six CiA 402 drives on vcan, which has no bus time, real time"),
+    "modbus": ("modbus", False, "six drives on Modbus TCP over loopback, real time"),
+}
+# Of a frame, us: what latency_run.py tells.
+SENT, RETURNED, FIRST, LAST, BEGUN, ACTING, LATE = range(7)
+# A frame counts where the machine did what it was asked to around it, which is looked at for the same time whatever came of the frame.
+BEFORE_US = 1000
+AFTER_US = 12000   # longer than the longest way by design
+SENDING_MAX_US = 500
+WAKE_MAX_US = 1000
+LEFT_OUT_MAX = 0.1
+FRAME_S = 0.4
+START_S = 120
+VIRTUAL_S = 3      # at most, for a frame and 200 s
 PER_MILLE = {"p50": 500, "p99": 990, "p99.9": 999, "max": 1000}
 
 
-class LatencyError(Exception):
-    """heaved did not do what the measurement needs."""
+# --- What counts ---
 
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-def config_for(folder, ports, port):
-    """The preset with these drives, which tell a nanometre."""
-    changes = {"hosts": ", ".join(f"127.0.0.1:{one}" for one in ports), "port": str(port), "counts_per_mm": "1000000/1", "timeout_ms": "900",
-               "engage": "manual\nlate_hold_cycles = 0", "step_mm": "5\nfeedback_timeout_ms = 6000"}
-    text = CONFIG.read_text(encoding="utf-8")
-    for key, value in changes.items():
-        text, count = re.subn(rf"^{key} = [^;\n]*", f"{key} = {value} ", text, flags=re.MULTILINE)
-        assert count == 1, key
-    path = folder / "latency.ini"
-    path.write_text(f"{text}\n[control]\nsocket = {folder}/heaved.sock\n", encoding="utf-8")
-    return path
-
-
-def wait_for(condition, what, daemon):
-    end = time.monotonic() + WAIT_S
-    while time.monotonic() < end:
-        if daemon.poll() is not None:
-            raise LatencyError(f"heaved ended with status {daemon.returncode}: {daemon.stderr.read()[-500:]}")
-        if condition():
-            return
-        time.sleep(0.05)
-    raise LatencyError(f"{what}: not within {WAIT_S} s")
-
-
-def engage(heaved, folder, daemon):
-    def ctl(*words):
-        return subprocess.run([str(heaved.parent / "heavectl"), "--socket", f"{folder}/heaved.sock", *words], capture_output=True, text=True, check=False)
-
-    def status():
-        answer = ctl("--json", "status")
-        return json.loads(answer.stdout) if answer.returncode == 0 else {"state": "", "cylinders": [{"drive": ""}]}
-
-    wait_for(lambda: all(leg["drive"] == "disabled" for leg in status()["cylinders"]), "the drives are started up", daemon)
-    if ctl("engage").returncode != 0:
-        raise LatencyError("heaved does not engage")
-    wait_for(lambda: status()["state"] == "ENGAGED", "the platform is engaged", daemon)
-
-
-def rows_of(heaved, drives, frames):
-    """Of each frame: us until the first drive's set-point, until the last one's, and how much too long the sender's pause was."""
-    with tempfile.TemporaryDirectory(prefix="heave-latency.") as name, \
-            subprocess.Popen([str(drives)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as peer:
-        folder, port = Path(name), free_port()
-        config = config_for(folder, peer.stdout.readline().split(), port)
-        with subprocess.Popen([str(heaved), "--config", str(config)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as daemon:
-            try:
-                engage(heaved, folder, daemon)
-                said, error = peer.communicate(f"{port} {frames + 1}\n")
-            finally:
-                peer.kill()
-                daemon.terminate()
-    if peer.returncode != 0:
-        raise LatencyError(f"{drives.name} ended with status {peer.returncode}: {error.strip()[-300:]}")
-    return [tuple(map(float, line.split())) for line in said.splitlines()]
+def is_valid(frame, stalls):
+    """Neither was the sender held up, nor did a processor stand."""
+    start, end = frame[SENT] - BEFORE_US, max(frame[SENT] + AFTER_US, frame[LAST])
+    is_held_up = frame[RETURNED] - frame[SENT] > SENDING_MAX_US or frame[LATE] > WAKE_MAX_US
+    return not is_held_up and not any(begin < end and stop > start for begin, stop in stalls)
 
 
 def tail_of(values):
+    """Mean, percentiles beyond which there is a frame, and the largest; of nothing, nothing."""
+    if not values:
+        return {}
     ordered = sorted(values)
-    return {name: ordered[-(-len(ordered) * share // 1000) - 1] for name, share in PER_MILLE.items()}
+    count = len(ordered)
+    known = {name: ordered[-(-count * share // 1000) - 1] for name, share in PER_MILLE.items() if share == 1000 or count * (1000 - share) >= 1000}
+    return {"mean": sum(ordered) / count, **known}
 
 
-def doubt(wake_p99_us, stolen):
+def parts_of(kind, frames):
+    """What the way is made of; a datagram that came while the cycle of its period ran has not waited."""
+    ways = {"on the bus: to the last of six set-points": [frame[LAST] - frame[SENT] for frame in frames]}
+    if kind != "can":
+        return {**ways, "of it to the first one": [frame[FIRST] - frame[SENT] for frame in frames]}
+    begun = [max(frame[BEGUN], frame[SENT]) for frame in frames]
+    return {**ways, "of it to the SYNC of its period (waiting)": [at - frame[SENT] for at, frame in zip(begun, frames)],
+            "of it from there to the first set-point": [frame[FIRST] - at for at, frame in zip(begun, frames)],
+            "of it from there to the last one": [frame[LAST] - frame[FIRST] for frame in frames],
+            "acting: to the SYNC after the last one": [frame[ACTING] - frame[SENT] for frame in frames]}
+
+
+def doubt(all_frames, valid, stolen):
     """Why the figures do not count; None where they do."""
-    if wake_p99_us > WAKE_MAX_US:
-        return f"the machine is busy: one in 100 pauses of the sender was {wake_p99_us / 1000:.1f} ms too long"
+    left_out = 1 - valid / all_frames
+    if left_out > LEFT_OUT_MAX:
+        return f"the machine stood, or held the sender up, during {left_out:.0%} of the frames"
     return f"{stolen:.0%} of the CPU stolen" if stolen > STOLEN_MAX else None
 
 
-def judge(rows, stolen):
-    first, last, late = zip(*rows)
-    return {"frames": len(rows), "first_us": tail_of(first), "last_us": tail_of(last), "sender_late_us": tail_of(late), "stolen": stolen,
-            "doubt": doubt(tail_of(late)["p99"], stolen)}
+def judge(kind, found, stolen):
+    frames = [frame for run in found["runs"] for frame in run["frames"]]
+    valid = [frame for run in found["runs"] for frame in run["frames"] if is_valid(frame, run["stalls"])]
+    return {"frames": len(frames), "left_out": len(frames) - len(valid), "stops": found["stops"], "stolen": stolen, "doubt": doubt(len(frames), len(valid), stolen),
+            "is_uml": found["is_uml"], "is_urgent": all(run["is_urgent"] for run in found["runs"]), "is_realtime": all(run["is_realtime"] for run in found["runs"]),
+            "us": {name: tail_of(values) for name, values in parts_of(kind, valid).items()}, "heaved_us": found["runs"][-1]["heaved_us"]}
 
 
-def line_of(what, figures):
-    return f"{what:44}" + "".join(f"{figures[name]:10.0f}" for name in figures)
+# --- What is told ---
+
+def line_of(what, figures, names):
+    return f"  {what:44}" + "".join(f"{figures[name]:10.0f}" if name in figures else f"{'-':>10}" for name in names)
 
 
-def lines_of(result):
+def notes_of(result):
+    """What has to be known of the figures."""
+    notes = []
+    if result["is_uml"] and not result["is_virtual"]:
+        notes.append("in User Mode Linux, as this machine's kernel gives no vcan: its system calls cost more, so that these are upper bounds")
+    if result["stops"]:
+        notes.append(f"started again {len(result['stops'])} times, for what the machine did: {'; '.join(result['stops'])}")
+    if not result["is_virtual"] and not (result["is_urgent"] and result["is_realtime"]):
+        notes.append("without real-time priority, which was not permitted: as root, or with a limit rtprio, heaved is in time also beside other work")
+    return notes
+
+
+def lines_of(name, result):
+    head = f"{PARTS[name][2]}"
     if result["doubt"]:
-        return [f"spread too wide ({result['doubt']}): no figure. Measure again on an idle machine; --json has what was measured"]
-    return [f"{result['frames']} frames, us from sending a datagram" + "".join(f"{name:>10}" for name in result["first_us"]),
-            line_of("to the first drive's set-point", result["first_us"]), line_of("to that of the last of six", result["last_us"]),
-            line_of("by how much the sender's own pauses were late", result["sender_late_us"])]
+        return [head, f"  spread too wide ({result['doubt']}): no figure. Measure again on an idle machine; --json has what was measured"]
+    names = ["mean", *PER_MILLE]
+    heaved = {name: result["heaved_us"].get(key) for name, key in (("p50", "p50_us"), ("p99", "p99_us"), ("max", "max_us"))}
+    return [head, f"  {result['frames'] - result['left_out']} frames, {result['left_out']} left out; us from sending a datagram".ljust(46) + "".join(f"{each:>10}" for each in names),
+            *(line_of(what, figures, names) for what, figures in result["us"].items()),
+            line_of("heaved's own count: kernel to end of cycle", heaved, names), *(f"  {note}" for note in notes_of(result))]
 
 
-def run(heaved, drives, frames, as_json, say, out=sys.stdout):
-    say(f"{frames} frames, {frames * 0.33:.0f} s")
+# --- Measuring ---
+
+def missing_kernel(reason):
+    return (f"{reason}. Either a kernel of one's own (tools/lib/uml.sh builds it once, some minutes; User Mode Linux, any x86_64 machine, no rights needed), "
+            "or on real time vcan of this machine's kernel: modprobe vcan as root (Debian's package linux-image-amd64 has it), and run this as root or where users "
+            "may make name spaces")
+
+
+def run_part(name, heaved, drives, frames):
+    """What latency_run.py leaves."""
+    bus, is_virtual, _ = PARTS[name]
+    with tempfile.TemporaryDirectory(prefix="heave-latency.") as folder:
+        result = Path(folder) / "result.json"
+        command = [sys.executable, TOP / "tools/lib/latency_run.py", heaved, drives, bus, str(frames), str(int(not is_virtual)), result]
+        if name == "modbus":
+            output = subprocess.run(list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False).stdout
+        else:
+            limit_s = START_S + (VIRTUAL_S if is_virtual else 2 * FRAME_S) * frames + 200
+            try:
+                output = kernel.run(command, virtual_time=is_virtual, limit_s=limit_s, is_ahead=True).output
+            except tap.Skip as reason:
+                raise LatencyError(missing_kernel(reason)) from reason
+        if not result.exists():
+            raise LatencyError(f"no result: {output.strip()[-500:]}")
+        found = json.loads(result.read_text(encoding="utf-8"))
+    if "error" in found:
+        raise LatencyError(found["error"])
+    return found
+
+
+def measured(name, heaved, drives, frames):
     before = stolen_ticks()
-    load = os.getloadavg()[0]
-    rows = rows_of(heaved, drives, frames)
-    result = {"processor": processor(), "load": load, **judge(rows, stolen_share(before, stolen_ticks()))}
+    found = run_part(name, heaved, drives, frames)
+    is_virtual = PARTS[name][1]
+    stolen = 0 if is_virtual else stolen_share(before, stolen_ticks())
+    return {"is_virtual": is_virtual, **judge(kind_of(PARTS[name][0]), found, stolen)}
+
+
+def run(heaved, drives, frames, only, as_json, say, out=sys.stdout):
+    result = {"processor": processor(), "load": os.getloadavg()[0], "parts": {}}
+    failed = None
+    if not as_json:
+        print(f"{result['processor']}, load {result['load']:.1f}", file=out, flush=True)
+    for name in only or PARTS:
+        say(f"{name}: {frames} frames, about {frames * FRAME_S + 10:.0f} s")
+        try:
+            result["parts"][name] = measured(name, heaved, drives, frames)
+        except LatencyError as error:
+            failed = LatencyError(f"{name}: {error}")
+            say(failed)
+            continue
+        if not as_json:
+            print(*lines_of(name, result["parts"][name]), sep="\n", file=out, flush=True)
     if as_json:
         json.dump(result, out, indent=1)
         print(file=out)
-    else:
-        print(f"{result['processor']}, load {load:.1f}", *lines_of(result), sep="\n", file=out)
+    if failed:
+        raise LatencyError("not all could be measured")
