@@ -87,8 +87,9 @@ typedef struct {
 typedef struct {
     q32_t point_q32[STREAM_POINTS][AXES_MAX]; /**< what is known best of each index: a sample, or the guess committed */
     bool is_sample[STREAM_POINTS];            /**< of the indices beyond head */
-    q32_t control_q32[4][AXES_MAX];           /**< as committed, oldest first: points and what is still off them */
-    q32_t off_q32[AXES_MAX][3];               /**< control less point at head, and how that changes per period and period^2 */
+    q32_t control_q32[AXES_MAX];  /**< the oldest of four control points, as committed: points and what was still off them */
+    int64_t way_q36[3][AXES_MAX]; /**< from each of the four to the next */
+    q32_t off_q32[AXES_MAX][3];   /**< control less point at head, and how that changes per period and period^2 */
     stream_stop_t stop[AXES_MAX];
     stream_lead_t lead[AXES_MAX];
     stream_grain_t grain[AXES_MAX];

@@ -251,31 +251,31 @@ static bool is_deep_in_soft_layer(const errors_t *e, q32_t jerk_q32)
     return ((size_of(e->d) >> 12) | (size_of(e->w) >> 7) | (size_of(e->b) >> 3)) < (uint64_t)jerk_q32;
 }
 
-/* The acceleration by the law of a grip. */
+/* The jerk by the law of a grip. */
 static inline q32_t by_law(const errors_t *e, const ramp_ref_t *ref, const grip_t *g)
 {
-    return ref->acc_per_cycle2_q32 + e->b + scale_down(g->k1 * e->d - g->k2 * e->w - g->k3 * e->b, g->gain_shift);
+    return ref->jerk_per_cycle3_q32 + scale_down(g->k1 * e->d - g->k2 * e->w - g->k3 * e->b, g->gain_shift);
 }
 
-/* The acceleration that a linear law takes to the reference; false if the reference is too far away for them. */
-static inline bool find_by_law(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *acc_q32)
+/* The jerk that a linear law takes to the reference; false if the reference is too far away for them. */
+static inline bool find_by_law(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *to_take_q32)
 {
     const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
     const bool is_firm = grip == RAMP_FIRM || is_at_rest(ref);
     const errors_t e = errors_against(&self->state, ref);
     if (!is_firm && is_deep_in_soft_layer(&e, jerk_q32)) {
-        *acc_q32 = by_law(&e, ref, &k_grips[RAMP_SOFT]);
+        *to_take_q32 = by_law(&e, ref, &k_grips[RAMP_SOFT]);
         return true;
     }
     if (is_firm && can_close_in_three(&e, jerk_q32)) {
-        *acc_q32 = ref->acc_per_cycle2_q32 + e.d - e.w;
+        *to_take_q32 = ref->acc_per_cycle2_q32 + e.d - e.w - self->state.acc_per_cycle2_q32;
         return true;
     }
     const grip_t *g = &k_grips[is_firm ? RAMP_FIRM : RAMP_SOFT];
     if (!is_in_layer(&e, jerk_q32, g)) {
         return false;
     }
-    *acc_q32 = by_law(&e, ref, g);
+    *to_take_q32 = by_law(&e, ref, g);
     return true;
 }
 
@@ -298,23 +298,24 @@ static q32_t acceleration_to_stop(const ramp_t *self, const ramp_ref_t *ref)
 /* The acceleration the reference asks for. */
 static q32_t wanted_acceleration(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
 {
-    q32_t acc_q32;
-    return find_by_law(self, ref, grip, &acc_q32) ? acc_q32 : acceleration_to_stop(self, ref);
+    q32_t jerk_q32;
+    return find_by_law(self, ref, grip, &jerk_q32) ? self->state.acc_per_cycle2_q32 + jerk_q32 : acceleration_to_stop(self, ref);
 }
 
-/* True if the wanted acceleration is within the limits and leads to none of them, whatever comes then: as can be told without
+/* True if the wanted jerk is within the limits and leads to none of them, whatever comes then: as can be told without
  * working a brake out. With A = acc_safe = N J:
  * - What an acceleration gains until it is taken back, brake_velocity_peak(), is the largest of the straight lines
  *   acc + k acc - J k (k + 1) / 2, and so at most the chord from 0 to A, acc (N + 1) / 2. No speed of a brake is above `peak`.
  * - Taking acc back takes at most N cycles at the peak. The quickest stop from there is symmetric, so that its mean speed is half
  * of the peak, and takes peak / A + N cycles if it gets as far as -A, else at most 2 N. Together that is no farther than 2 N + V
  * / 2 A cycles at the peak; a brake that does not take -A back ends earlier. */
-static bool is_free(const ramp_t *self, q32_t wanted_q32)
+static bool is_free(const ramp_t *self, q32_t jerk_q32)
 {
     const ramp_state_t *at = &self->state;
     const ramp_limits_t *limits = &self->limits;
-    const q32_t size_q32 = wanted_q32 >= 0 ? wanted_q32 : -wanted_q32;
-    if (size_q32 > self->acc_safe_q32 || !is_within(wanted_q32 - at->acc_per_cycle2_q32, limits->jerk_per_cycle3_q32)) {
+    const q32_t acc_q32 = at->acc_per_cycle2_q32 + jerk_q32;
+    const q32_t size_q32 = acc_q32 >= 0 ? acc_q32 : -acc_q32;
+    if (size_q32 > self->acc_safe_q32 || !is_within(jerk_q32, limits->jerk_per_cycle3_q32)) {
         return false;
     }
     const q32_t speed_q32 = at->vel_per_cycle_q32 >= 0 ? at->vel_per_cycle_q32 : -at->vel_per_cycle_q32;
@@ -323,7 +324,7 @@ static bool is_free(const ramp_t *self, q32_t wanted_q32)
         return false;
     }
     const q32_t reach_q32 = self->brake_cycles * peak_q32;
-    const q32_t pos_q32 = at->pos_q32 + at->vel_per_cycle_q32 + wanted_q32;
+    const q32_t pos_q32 = at->pos_q32 + at->vel_per_cycle_q32 + acc_q32;
     return limits->pos_max_q32 - pos_q32 >= reach_q32 && pos_q32 - limits->pos_min_q32 >= reach_q32;
 }
 
@@ -466,13 +467,13 @@ HV_OUT_OF_LINE static q32_t step_with_care(ramp_t *self, const ramp_ref_t *ref, 
 
 static inline q32_t step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
 {
-    q32_t acc_q32;
+    q32_t jerk_q32;
     self->flags = 0;
-    if (!is_reference_inside(self, ref) || !find_by_law(self, ref, grip, &acc_q32) || !is_free(self, acc_q32)) {
+    if (!is_reference_inside(self, ref) || !find_by_law(self, ref, grip, &jerk_q32) || !is_free(self, jerk_q32)) {
         return step_with_care(self, ref, grip);
     }
     note_jerk(self, ref->jerk_per_cycle3_q32);
-    return advance(self, acc_q32);
+    return advance(self, self->state.acc_per_cycle2_q32 + jerk_q32);
 }
 
 q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)

@@ -90,14 +90,18 @@ typedef struct {
     bool is_telling; /* it is where that motion would be, and about in time */
 } guess_t;
 
+static q32_t ambiguous(const stream_t *self)
+{
+    return fx_clamp(stream_clock_span(&self->clock, AMBIGUOUS_US), AMBIGUOUS_Q32, AMBIGUOUS_MAX_Q32);
+}
+
 static guess_t guess_of(const stream_t *self, const q32_t *sample_q32, unsigned periods, q32_t ahead_q32)
 {
     q32_t step_q32;
     const q32_t misfit_q32 = stream_curve_misfit(&self->curve, sample_q32, periods, &step_q32);
     const q32_t untimely_q32 = fx_abs(ahead_q32 - periods * Q32_ONE);
-    const q32_t ambiguous_q32 = fx_clamp(stream_clock_span(&self->clock, AMBIGUOUS_US), AMBIGUOUS_Q32, AMBIGUOUS_MAX_Q32);
     return (guess_t){.cost_q32 = misfit_q32 + fx_mul_shift(step_q32, untimely_q32 / 2, 32),
-                     .is_telling = untimely_q32 < ambiguous_q32 && misfit_q32 * 4 < step_q32};
+                     .is_telling = untimely_q32 < ambiguous(self) && misfit_q32 * 4 < step_q32};
 }
 
 /* Periods from the newest sample to this one. A loss, a late and an early arrival look alike to the clock; where the signal
@@ -109,6 +113,9 @@ static unsigned judge_periods(const stream_t *self, uint64_t now_us, const q32_t
     const unsigned expected = stream_clock_expect(&self->clock, now_us, &ahead_q32);
     if (expected > 3 || (expected == 0 && is_fastest(self))) {
         return expected;
+    }
+    if (fx_abs(ahead_q32 - expected * Q32_ONE) <= Q32_ONE - ambiguous(self)) {
+        return expected; /* so well in time that no other period comes into question */
     }
     unsigned best = expected;
     q32_t least_q32 = guess_of(self, sample_q32, expected, ahead_q32).cost_q32;
@@ -224,9 +231,9 @@ static void advance(stream_t *self, uint64_t now_us)
     const q32_t pace = fx_clamp(wanted, -PACE_MAX_Q32, PACE_MAX_Q32);
     const q32_t faster = nominal > self->rate_q32[1] ? nominal : self->rate_q32[1];
     const q32_t filter = fx_clamp(faster * 2 / 3, 0, PACE_FILTER_MAX);
-    const q32_t wished = nominal + fx_mul_shift(nominal, pace, 32);
-    self->rate_q32[0] += fx_mul_shift(wished - self->rate_q32[0], filter, 32);
-    self->rate_q32[1] += fx_mul_shift(self->rate_q32[0] - self->rate_q32[1], filter, 32);
+    const q32_t wished = nominal + fx_mul_shift_fit(nominal, pace, 32);
+    self->rate_q32[0] += fx_mul_shift_fit(wished - self->rate_q32[0], filter, 32);
+    self->rate_q32[1] += fx_mul_shift_fit(self->rate_q32[0] - self->rate_q32[1], filter, 32);
 }
 
 bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref)
@@ -241,13 +248,16 @@ bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref)
     if (self->phase == STREAM_RUNNING) {
         advance(self, now_us);
     }
-    q32_t pos_q32[AXES_MAX];
-    stream_curve_at(&self->curve, self->style, self->between_q32, pos_q32);
-    for (unsigned axis = 0; axis < self->curve.axes; axis++) {
-        if (self->is_fresh) {
-            self->previous[axis] = (history_t){.pos_q32 = pos_q32[axis]};
+    const unsigned axes = self->curve.axes;
+    const bool is_fresh = self->is_fresh;
+    int64_t weight_q60[3];
+    stream_curve_weigh(self->style, self->between_q32, weight_q60);
+    for (unsigned axis = 0; axis < axes; axis++) {
+        const q32_t pos_q32 = stream_curve_at(&self->curve, axis, weight_q60);
+        if (is_fresh) {
+            self->previous[axis] = (history_t){.pos_q32 = pos_q32};
         }
-        ref[axis] = history_advance(&self->previous[axis], pos_q32[axis]);
+        ref[axis] = history_advance(&self->previous[axis], pos_q32);
     }
     self->is_fresh = false;
     if (self->phase == STREAM_RUNNING && stream_curve_is_at_rest(&self->curve) && !stream_clock_is_near(&self->clock, now_us)) {

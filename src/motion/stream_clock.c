@@ -90,27 +90,33 @@ bool stream_clock_is_soon(const stream_clock_t *self, uint64_t now_us)
 
 q32_t stream_clock_span(const stream_clock_t *self, uint32_t span_us)
 {
-    return fx_mul_shift((int64_t)span_us * STREAM_US_Q16, self->per_us_q46, 30);
+    return fx_mul_shift_fit((int64_t)span_us * STREAM_US_Q16, self->per_us_q46, 30);
 }
 
 q32_t stream_clock_periods(const stream_clock_t *self, uint64_t now_us)
 {
     const uint32_t elapsed_us = stream_clock_elapsed_us(self, now_us);
     const int64_t since_us_q16 = (int64_t)(elapsed_us < ELAPSED_MAX_US ? elapsed_us : ELAPSED_MAX_US) * STREAM_US_Q16;
-    return fx_mul_shift(since_us_q16 + self->late_us_q16 - self->margin_us_q16, self->per_us_q46, 30);
+    return fx_mul_shift_fit(since_us_q16 + self->late_us_q16 - self->margin_us_q16, self->per_us_q46, 30);
 }
 
-/* The i-th newest interval, 0 the newest. */
+/* Where the ring has the i-th newest interval, 0 the newest. */
+static unsigned gap_at(const stream_clock_t *self, unsigned i)
+{
+    const unsigned at = self->gap_next + STREAM_GAPS - 1 - i;
+    return at < STREAM_GAPS ? at : at - STREAM_GAPS;
+}
+
 static int64_t gap_q16(const stream_clock_t *self, unsigned i)
 {
-    return (int64_t)self->gap_us[(self->gap_next + 2 * STREAM_GAPS - 1 - i) % STREAM_GAPS] * STREAM_US_Q16;
+    return (int64_t)self->gap_us[gap_at(self, i)] * STREAM_US_Q16;
 }
 
 static void record_gap(stream_clock_t *self, uint32_t gap_us, unsigned periods)
 {
     self->gap_us[self->gap_next] = gap_us;
     self->gap_periods[self->gap_next] = (uint8_t)(periods < UINT8_MAX ? periods : UINT8_MAX);
-    self->gap_next = (self->gap_next + 1) % STREAM_GAPS;
+    self->gap_next = self->gap_next + 1 < STREAM_GAPS ? self->gap_next + 1 : 0;
     self->gaps += self->gaps < STREAM_GAPS ? 1u : 0u;
 }
 
@@ -204,7 +210,7 @@ static int64_t taken_period(const stream_clock_t *self, unsigned gaps)
     unsigned periods = 0;
     for (unsigned i = 0; i < gaps; i++) {
         sum += gap_q16(self, i);
-        periods += self->gap_periods[(self->gap_next + 2 * STREAM_GAPS - 1 - i) % STREAM_GAPS];
+        periods += self->gap_periods[gap_at(self, i)];
     }
     return periods > 0 ? sum / periods : self->period_us_q16;
 }
@@ -292,7 +298,7 @@ static void retake_gaps(stream_clock_t *self)
 {
     for (unsigned i = 0; i < self->gaps; i++) {
         const unsigned periods = periods_in_gap(gap_q16(self, i), self->period_us_q16);
-        self->gap_periods[(self->gap_next + 2 * STREAM_GAPS - 1 - i) % STREAM_GAPS] = (uint8_t)periods;
+        self->gap_periods[gap_at(self, i)] = (uint8_t)periods;
     }
 }
 

@@ -24,6 +24,7 @@ enum {
 #define REACH_MAX_US 100000 /* ... and not longer than this */
 #define OFF_US       80000  /* time constant with which the curve comes back to the samples */
 #define PATIENCE_US  150000
+#define WAY_SHIFT    4                /* from Q32 to Q36 */
 #define OFF_NOTHING  (Q32_ONE / 2000) /* 0.5 um: what is less is given up */
 
 /* Where the ring has an index; indices wrap. */
@@ -59,9 +60,7 @@ void stream_curve_start(stream_curve_t *self, unsigned axes, const q32_t *sample
     for (unsigned i = 0; i < STREAM_POINTS; i++) {
         copy_point(self, self->point_q32[i], sample_q32);
     }
-    for (unsigned i = 0; i < 4; i++) {
-        copy_point(self, self->control_q32[i], sample_q32);
-    }
+    copy_point(self, self->control_q32, sample_q32);
 }
 
 /* Periods that a motion may be kept up so that it does not go further than the axis takes to stop: of v = step / period, the time
@@ -456,6 +455,9 @@ HV_WRAPS void stream_curve_stretch(stream_curve_t *self)
 /* One period of the filter that takes back what the curve is off: q^3 with q = 1 - grip, see the ramp in DESIGN.md. */
 static void take_back(const stream_curve_t *self, q32_t off_q32[3])
 {
+    if (((uint64_t)off_q32[0] | (uint64_t)off_q32[1] | (uint64_t)off_q32[2]) == 0) {
+        return;
+    }
     const int64_t g = self->grip_q32;
     const int64_t g2 = fx_mul_shift(g, g, 32);
     const int64_t g3 = fx_mul_shift(g2, g, 32);
@@ -468,13 +470,21 @@ static void take_back(const stream_curve_t *self, q32_t off_q32[3])
     }
 }
 
-/* The point at head becomes a control point, with what the curve is still off it. */
+/* The way between two control points, which are far below 2^58. */
+static int64_t way_between(q32_t from_q32, q32_t to_q32)
+{
+    return (to_q32 - from_q32) * ((int64_t)1 << WAY_SHIFT);
+}
+
+/* The point at head becomes the last control point, with what the curve is still off it. */
 static void put_control(stream_curve_t *self)
 {
     self->is_off = false;
     for (unsigned axis = 0; axis < self->axes; axis++) {
+        const q32_t before_q32 =
+            self->control_q32[axis] + fx_shift_down(self->way_q36[0][axis] + self->way_q36[1][axis], WAY_SHIFT);
         take_back(self, self->off_q32[axis]);
-        self->control_q32[3][axis] = led_point(self, axis, self->head) + self->off_q32[axis][0];
+        self->way_q36[2][axis] = way_between(before_q32, led_point(self, axis, self->head) + self->off_q32[axis][0]);
         self->is_off |= self->off_q32[axis][0] != 0 || self->off_q32[axis][1] != 0;
     }
 }
@@ -482,8 +492,10 @@ static void put_control(stream_curve_t *self)
 HV_WRAPS void stream_curve_commit(stream_curve_t *self)
 {
     find_next(self);
-    for (unsigned i = 0; i < 3; i++) {
-        copy_point(self, self->control_q32[i], self->control_q32[i + 1]);
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        self->control_q32[axis] += fx_shift_down(self->way_q36[0][axis], WAY_SHIFT);
+        self->way_q36[0][axis] = self->way_q36[1][axis];
+        self->way_q36[1][axis] = self->way_q36[2][axis];
     }
     self->head++;
     self->ahead--;
@@ -530,9 +542,9 @@ HV_WRAPS void stream_curve_regrid(stream_curve_t *self, stream_style_t style, co
         const q32_t most_q32 = fx_abs(vel_q32) + jump_speed(self, off_q32[0]);
         off_q32[1] = fx_clamp(control_q32[2] - control_q32[1] - step_q32, -most_q32, most_q32);
         off_q32[2] = 0;
-        for (unsigned i = 0; i < 3; i++) {
-            self->control_q32[i][axis] = control_q32[i];
-        }
+        self->control_q32[axis] = control_q32[0];
+        self->way_q36[0][axis] = way_between(control_q32[0], control_q32[1]);
+        self->way_q36[1][axis] = way_between(control_q32[1], control_q32[2]);
     }
     copy_point(self, self->last_q32, sample_q32);
     put_control(self);
@@ -550,21 +562,27 @@ bool stream_curve_is_standing(const stream_curve_t *self)
 bool stream_curve_is_at_rest(const stream_curve_t *self)
 {
     bool is_resting = -self->ahead > self->patience;
-    for (unsigned i = 0; i < 4 && is_resting; i++) {
-        for (unsigned axis = 0; axis < self->axes; axis++) {
-            is_resting &= self->control_q32[i][axis] == self->last_q32[axis];
+    for (unsigned axis = 0; axis < self->axes && is_resting; axis++) {
+        is_resting = self->control_q32[axis] == self->last_q32[axis];
+        for (unsigned i = 0; i < 3; i++) {
+            is_resting &= self->way_q36[i][axis] == 0;
         }
     }
     return is_resting;
 }
 
-/* Weights of the differences between the last four control points, each from 0 to 1 in time. Q60: sums up to 5 occur. The
- * quadratic begins at the second of the points: its first weight is 1, which is exact. */
-static void weigh(stream_style_t style, q32_t between_q32, int64_t weight_q60[3])
+/* Of what is not negative: four instructions instead of ten. */
+static int64_t sixth(int64_t value)
+{
+    return (int64_t)((uint64_t)value / 6);
+}
+
+/* Q60: sums up to 5 occur. The quadratic begins at the second of the points: its first weight is 1, which is exact. */
+void stream_curve_weigh(stream_style_t style, q32_t between_q32, int64_t weight_q60[3])
 {
     const int64_t one = Q62_ONE / 4;
     const int64_t u = between_q32 * (one / Q32_ONE);
-    const int64_t u2 = fx_mul_shift_fit(u, u, 60);
+    const int64_t u2 = (int64_t)(((uint64_t)between_q32 * (uint64_t)between_q32 + 8) / 16); /* Q64, rounded to Q60 */
     if (style == STREAM_FAST) {
         weight_q60[0] = one;
         weight_q60[1] = (one + 2 * u - u2) / 2;
@@ -572,25 +590,7 @@ static void weigh(stream_style_t style, q32_t between_q32, int64_t weight_q60[3]
         return;
     }
     const int64_t u3 = fx_mul_shift_fit(u2, u, 60);
-    weight_q60[0] = (5 * one + 3 * (u - u2) + u3) / 6;
-    weight_q60[1] = (one + 3 * (u + u2) - 2 * u3) / 6;
-    weight_q60[2] = u3 / 6;
-}
-
-/* Of a difference of control points, which are far below 2^58; by 2^64, which costs no shifts. */
-static q32_t share(q32_t difference_q32, int64_t weight_q60)
-{
-    return fx_mul_shift_fit(difference_q32 * 16, weight_q60, 64);
-}
-
-void stream_curve_at(const stream_curve_t *self, stream_style_t style, q32_t between_q32, q32_t *pos_q32)
-{
-    int64_t weight_q60[3];
-    const q32_t(*const control)[AXES_MAX] = self->control_q32;
-    weigh(style, between_q32, weight_q60);
-    for (unsigned axis = 0; axis < self->axes; axis++) {
-        pos_q32[axis] = control[0][axis] + share(control[1][axis] - control[0][axis], weight_q60[0]) +
-                        share(control[2][axis] - control[1][axis], weight_q60[1]) +
-                        share(control[3][axis] - control[2][axis], weight_q60[2]);
-    }
+    weight_q60[0] = sixth(5 * one + 3 * (u - u2) + u3);
+    weight_q60[1] = sixth(one + 3 * (u + u2) - 2 * u3);
+    weight_q60[2] = sixth(u3);
 }

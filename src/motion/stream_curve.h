@@ -49,8 +49,16 @@ bool stream_curve_is_standing(const stream_curve_t *self);
 /** True once the curve rests exactly on the newest sample. */
 bool stream_curve_is_at_rest(const stream_curve_t *self);
 
-/** Positions at a phase after the commit of the newest point.
- *  @param between_q32 [0, 1)   @param pos_q32 out, one per axis */
-void stream_curve_at(const stream_curve_t *self, stream_style_t style, q32_t between_q32, q32_t *pos_q32);
+/** Weights of the ways between the control points at a phase after the commit of the newest point.
+ *  @param between_q32 [0, 1)   @param weight_q60 out, each from 0 to 1 */
+void stream_curve_weigh(stream_style_t style, q32_t between_q32, int64_t weight_q60[3]);
+
+/** Position of an axis at that phase. Q36 times Q60 is Q32 by 2^64, which costs no shifts. */
+static inline q32_t stream_curve_at(const stream_curve_t *self, unsigned axis, const int64_t weight_q60[3])
+{
+    return self->control_q32[axis] + fx_mul_shift_fit(self->way_q36[0][axis], weight_q60[0], 64) +
+           fx_mul_shift_fit(self->way_q36[1][axis], weight_q60[1], 64) +
+           fx_mul_shift_fit(self->way_q36[2][axis], weight_q60[2], 64);
+}
 
 #endif
