@@ -1202,7 +1202,59 @@ static void test_off_is_told_again_to_a_drive_that_was_lost(void)
     }
 }
 
-/* It hears what takes its torque away, and keeps it; or what was sent is not on the wire. */
+static uint32_t waiting_frames;
+
+static hv_status_t tell_waiting(void *ctx, uint32_t *out)
+{
+    (void)ctx;
+    *out = waiting_frames;
+    return HV_OK;
+}
+
+/* An answer may be one to what went out before. */
+static void test_off_that_is_not_on_the_wire_is_not_told(void)
+{
+    map = canraw_maps_rich();
+    map.enabled_when.mask = map.enabled_when.value = 0;
+    open_with(NULL, 0, true);
+    enable();
+    hal_can_ops_t telling = *sim_can_hal(&node).ops;
+    telling.unconfirmed = tell_waiting;
+    driver.can.ops = &telling;
+    waiting_frames = 0;
+    cycles(3);
+    for (unsigned i = 0; i < 2; i++) {
+        const uint64_t heard_us = feedback[0].actual_us;
+        waiting_frames = i == 0 ? 1 : 0;
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+        cycles(3);
+        TEST_ASSERT_TRUE(feedback[0].actual_us > heard_us);
+        TEST_ASSERT_EQUAL_UINT(i == 0 ? AXES : 0, energized());
+    }
+    driver.can.ops = sim_can_hal(&node).ops;
+}
+
+static void test_off_of_drives_that_no_frame_takes_torque_from_is_not_waited_for(void)
+{
+    enable();
+    TEST_ASSERT_EQUAL_UINT(0, energized());
+}
+
+static void test_off_of_a_drive_in_fault_is_told_when_it_says_so(void)
+{
+    open_rich();
+    enable();
+    slave.drive[1].is_faulty = true;
+    cycles(20);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
+    TEST_ASSERT_TRUE(feedback[1].is_energized && slave.drive[1].is_enabled);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+    cycles(20);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
+    TEST_ASSERT_EQUAL_UINT(0, energized());
+}
+
+/* It hears what takes its torque away, and keeps it. */
 static void test_off_that_is_not_confirmed_is_not_told(void)
 {
     open_rich();
@@ -1265,6 +1317,9 @@ int main(void)
     RUN_TEST(test_init_map_that_contradicts_itself_is_refused);
     RUN_TEST(test_off_is_told_once_it_is_so_whenever_it_is_asked_for);
     RUN_TEST(test_off_is_told_again_to_a_drive_that_was_lost);
+    RUN_TEST(test_off_that_is_not_on_the_wire_is_not_told);
+    RUN_TEST(test_off_of_drives_that_no_frame_takes_torque_from_is_not_waited_for);
+    RUN_TEST(test_off_of_a_drive_in_fault_is_told_when_it_says_so);
     RUN_TEST(test_off_that_is_not_confirmed_is_not_told);
     return UNITY_END();
 }

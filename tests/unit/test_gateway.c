@@ -1852,6 +1852,21 @@ static void test_end_names_the_drive_that_does_not_confirm(void)
     TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "not confirmed")); /* said once */
 }
 
+/* Its time begins when it is told. */
+static void test_end_begins_when_the_drives_are_told(void)
+{
+    settled_with_a_frozen_drive(2);
+    rig_break(&m_rig, SIM_DRIVES_BUSY, SIM_DRIVES_ALL, 0);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
+    rig_run_ms(&m_rig, 80);
+    m_rig.drives.is_busy = false;
+    rig_run_ms(&m_rig, 3000);
+    TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[0].state);
+    rig_run_ms(&m_rig, 3);
+    TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
+}
+
 /* Lost while it was under torque: nobody knows. Lost without: there is nothing to wait for. */
 static void test_end_does_not_wait_for_long_for_a_drive_that_is_lost(void)
 {
@@ -2049,6 +2064,7 @@ static void run_supervision(void)
     RUN_TEST(test_shutdown_from_settled_waits_until_the_bus_has_taken_it);
     RUN_TEST(test_end_waits_until_each_drive_has_confirmed_and_no_longer);
     RUN_TEST(test_end_names_the_drive_that_does_not_confirm);
+    RUN_TEST(test_end_begins_when_the_drives_are_told);
     RUN_TEST(test_end_does_not_wait_for_long_for_a_drive_that_is_lost);
     RUN_TEST(test_takeover_timed_move_after_a_stream_of_wild_extensions_ends_in_time);
     RUN_TEST(test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves);

@@ -647,8 +647,10 @@ static void test_off_is_told_once_it_is_so_whenever_it_is_asked_for(void)
 /* Where its line fails for longer than is borne, a drive is lost: what was heard last counts until it is back, and told again. */
 static void test_off_that_is_lost_is_told_again_when_the_drive_is_back(void)
 {
-    for (unsigned is_silent = 0; is_silent < 2; is_silent++) {
-        map.enabled_when.mask = map.enabled_when.value = (uint32_t)is_silent;
+    for (uint32_t i = 0; i < 4; i++) {
+        const bool is_refused = i >= 2; /* then it is not as it has to be */
+        map.item[0].value = 0x0203;
+        map.enabled_when.mask = map.enabled_when.value = i % 2;
         open_slaves(false, false, 300);
         enable();
         cycles(20);
@@ -660,10 +662,11 @@ static void test_off_that_is_lost_is_told_again_when_the_drive_is_back(void)
         TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[2].state);
         TEST_ASSERT_EQUAL_UINT(1, energized());
         TEST_ASSERT_TRUE(feedback[2].is_energized && slave.drive[2].is_enabled);
+        map.item[0].value = is_refused ? 0x0204 : 0x0203;
         slave.line[2].device = &slave.device[2];
         slave.line[2].devices = 1;
         cycles(900);
-        TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[2].state);
+        TEST_ASSERT_EQUAL(is_refused ? DRIVE_OFFLINE : DRIVE_DISABLED, feedback[2].state);
         TEST_ASSERT_EQUAL_UINT(0, energized());
         TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
     }
@@ -675,18 +678,84 @@ static void test_off_of_a_drive_that_says_otherwise_is_never_told(void)
     map.command[MODBUS_DRIVE_DISABLE].block[0].data[0] = 0x5A5A; /* nothing to this drive */
     enable();
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
-    cycles(1000);
+    for (int n = 0; n < 1000; n++) {
+        (void)!cycle();
+        TEST_ASSERT_EQUAL_UINT(AXES, energized());
+    }
     TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
-    TEST_ASSERT_EQUAL_UINT(AXES, energized());
     TEST_ASSERT_TRUE(modbus_drive_is_told(&driver));
+}
+
+/* An answer to what was asked before the drive had taken the command. */
+static void test_off_is_not_told_by_an_answer_from_before(void)
+{
+    enable();
+    cycles(20);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+    while (driver.axis[2].job == MODBUS_DRIVE_JOB_COMMAND) {
+        (void)!cycle();
+    }
+    driver.axis[2].is_energized = true;
+    driver.axis[2].mark_us = now_us + 50000;
+    cycles(50);
+    TEST_ASSERT_EQUAL_UINT(1, energized());
+    cycles(10);
+    TEST_ASSERT_EQUAL_UINT(0, energized());
 }
 
 static void test_off_of_drives_that_no_command_takes_torque_from_is_not_waited_for(void)
 {
-    map.command[MODBUS_DRIVE_DISABLE].count = 0;
-    enable();
-    cycles(20);
+    for (uint32_t can_tell = 0; can_tell < 2; can_tell++) {
+        map.command[MODBUS_DRIVE_DISABLE].count = 0;
+        map.enabled_when.mask = map.enabled_when.value = can_tell;
+        open_slaves(false, false, 300);
+        enable();
+        cycles(20);
+        TEST_ASSERT_EQUAL_UINT(0, energized());
+    }
+}
+
+/* What it says before it has taken the command is of a torque that may still come. */
+static void test_off_is_not_told_by_what_a_drive_says_before_it_has_taken_it(void)
+{
+    open_shared(4000);
+    await(DRIVE_DISABLED, 3000);
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.drive[k].is_weak = true;
+    }
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    while (driver.axis[6].phase != MODBUS_DRIVE_CONFIRMING) {
+        (void)!cycle();
+    }
+    cycles(200);
+    TEST_ASSERT_EQUAL_UINT(AXES, energized());
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+    unsigned untold = 0;
+    while (!modbus_drive_is_told(&driver)) {
+        (void)!cycle();
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_TRUE(feedback[k].is_energized || driver.axis[k].job != MODBUS_DRIVE_JOB_COMMAND);
+        }
+        untold++;
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(20, untold);
+    cycles(200);
     TEST_ASSERT_EQUAL_UINT(0, energized());
+}
+
+/* Nor is a fault of a drive that does not say whether it has torque the end of it. */
+static void test_off_after_a_fault_is_told_when_the_drive_has_taken_it(void)
+{
+    map.enabled_when = (canraw_when_t){0, 0};
+    enable();
+    slave.drive[2].is_faulty = true;
+    cycles(50);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_TRUE(feedback[2].is_energized && slave.drive[2].is_enabled);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+    cycles(50);
+    TEST_ASSERT_EQUAL_UINT(0, energized());
+    TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
 }
 
 static void test_alarm_is_the_fault_code(void)
@@ -1481,7 +1550,10 @@ int main(void)
     RUN_TEST(test_off_is_told_once_it_is_so_whenever_it_is_asked_for);
     RUN_TEST(test_off_that_is_lost_is_told_again_when_the_drive_is_back);
     RUN_TEST(test_off_of_a_drive_that_says_otherwise_is_never_told);
+    RUN_TEST(test_off_is_not_told_by_an_answer_from_before);
     RUN_TEST(test_off_of_drives_that_no_command_takes_torque_from_is_not_waited_for);
+    RUN_TEST(test_off_is_not_told_by_what_a_drive_says_before_it_has_taken_it);
+    RUN_TEST(test_off_after_a_fault_is_told_when_the_drive_has_taken_it);
     RUN_TEST(test_alarm_is_the_fault_code);
     RUN_TEST(test_enable_target_last_begins_where_the_drive_is_now);
     RUN_TEST(test_slow_line_gets_the_newest_setpoint_and_no_backlog);
