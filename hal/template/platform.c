@@ -52,7 +52,7 @@ const settings_t k_platform = {
     .silence_hold_ms = 500,
     .silence_neutral_ms = 5000,
     .silence_settle_ms = 60000,
-    .relay_count = 8,
+    .relays.count = 8,
     .relay_safe_after_ms = 1000,
 };
 

@@ -52,9 +52,40 @@ typedef struct {
     uint32_t at_us[AUTO_ENGAGE_FRAMES_MAX]; /**< low half of the time: no more than that many gaps lie between */
 } auto_engage_t;
 
+/** How a value sent becomes one of an axis: sign * scale * value + offset. */
+typedef struct {
+    int8_t sign;
+    q16_t scale_q16;
+    q16_t offset_q16;
+} axis_input_t;
+
+/** What a gateway needs of the settings while it runs, as they are there: motion has made its own of the rest. */
+typedef struct {
+    uint32_t cycle_us;
+    engage_policy_t engage;
+    uint32_t auto_frames;
+    axis_input_t axis[AXES_MAX];
+    bool has_angle;
+    angle_wrap_t angle_wrap;
+    q16_t angle_min_q16;
+    q16_t angle_max_q16;
+    q16_t following_error_mm_q16;
+    frame_dialect_t dialect;
+    q16_t confirm_jump_mm_q16;
+    q16_t confirm_jump_deg_q16;
+    uint32_t takeover_ms;
+    hal_udp_networks_t priority;
+    uint32_t silence_hold_ms;
+    uint32_t silence_neutral_ms;
+    uint32_t silence_settle_ms;
+    relay_settings_t relays;
+    uint16_t relay_safe_mask;
+    uint32_t relay_safe_after_ms;
+} gateway_settings_t;
+
 /** A gateway; members are private to src/gateway. */
 typedef struct {
-    settings_t settings;
+    gateway_settings_t settings;
     gateway_io_t io;
     motion_t motion;
     motion_output_t output;

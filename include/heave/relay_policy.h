@@ -19,12 +19,12 @@ typedef struct {
 } relay_policy_t;
 
 /** What may be written in this cycle.
- *  A relay that has been closed for relay_max_on_ms opens, and stays open until it has been asked to be open. One that has
- *  changed stays so for relay_min_toggle_ms; what is asked for at the end of that time is what it does then.
- *  @param settings  relay_count, relay_max_on_ms and relay_min_toggle_ms count
+ *  A relay that has been closed for max_on_ms opens, and stays open until it has been asked to be open. One that has
+ *  changed stays so for min_toggle_ms; what is asked for at the end of that time is what it does then.
+ *  @param settings  which there are, and what they bear
  *  @param asked     bit n = relay n + 1; bits without a relay are left out
  *  @param is_safe   asked is the safe mask: nothing delays it
  *  @return the mask */
-uint16_t relay_policy_step(relay_policy_t *self, const settings_t *settings, uint16_t asked, bool is_safe, uint64_t now_us);
+uint16_t relay_policy_step(relay_policy_t *self, const relay_settings_t *settings, uint16_t asked, bool is_safe, uint64_t now_us);
 
 #endif

@@ -36,6 +36,13 @@ typedef struct {
     int32_t jerk;     /**< u/s^3, whole units, above 0 */
 } axis_settings_t;
 
+/** What relays there are, and what they bear: see relay_policy.h. */
+typedef struct {
+    uint8_t count;                          /**< [0, 12] */
+    uint32_t max_on_ms[HAL_RELAYS_MAX];     /**< 0 = none */
+    uint32_t min_toggle_ms[HAL_RELAYS_MAX]; /**< 0 = none */
+} relay_settings_t;
+
 /** A platform. */
 typedef struct {
     uint32_t cycle_us; /**< [500, 10000] */
@@ -75,11 +82,9 @@ typedef struct {
     uint32_t silence_neutral_ms;
     uint32_t silence_settle_ms;
 
-    uint8_t relay_count; /**< [0, 12] */
+    relay_settings_t relays;
     uint16_t relay_safe_mask;
-    uint32_t relay_safe_after_ms;                 /**< of a hold that interrupted a ride; in every other state at once */
-    uint32_t relay_max_on_ms[HAL_RELAYS_MAX];     /**< see relay_policy.h; 0 = none */
-    uint32_t relay_min_toggle_ms[HAL_RELAYS_MAX]; /**< 0 = none */
+    uint32_t relay_safe_after_ms; /**< of a hold that interrupted a ride; in every other state at once */
 } settings_t;
 
 #endif

@@ -359,9 +359,9 @@ static void check_relay_times(config_source_t *self)
     if (!config_source_has_all(self, "relays")) {
         return;
     }
-    for (unsigned i = 0; i < settings->relay_count; i++) {
-        const unsigned on_ms = settings->relay_max_on_ms[i];
-        const unsigned toggle_ms = settings->relay_min_toggle_ms[i];
+    for (unsigned i = 0; i < settings->relays.count; i++) {
+        const unsigned on_ms = settings->relays.max_on_ms[i];
+        const unsigned toggle_ms = settings->relays.min_toggle_ms[i];
         if (on_ms != 0 && (settings->relay_safe_mask >> i & 1u) != 0) {
             config_source_key_error(self, "relays", "max_on_ms", "relay %u is closed by safe_mask; allowed: 0 for it", i + 1u);
         } else if (on_ms != 0 && on_ms < toggle_ms) {
@@ -376,10 +376,10 @@ static void check_relays(config_source_t *self)
 {
     settings_t *settings = &self->config->settings;
     const unsigned count = self->config->relays.lines.count;
-    settings->relay_count = (uint8_t)count;
+    settings->relays.count = (uint8_t)count;
     for (unsigned i = count; i < CONFIG_RELAYS_MAX; i++) {
-        settings->relay_max_on_ms[i] = 0;
-        settings->relay_min_toggle_ms[i] = 0;
+        settings->relays.max_on_ms[i] = 0;
+        settings->relays.min_toggle_ms[i] = 0;
     }
     if (config_source_has(self, "relays", "lines")) {
         check_per_relay(self, "max_on_ms");

@@ -461,9 +461,9 @@ const config_key_t config_keys[] = {
      .is_live = true, .help = "relays that are closed whenever no sender is followed (every state but ENGAGED); bit 0 = relay 1"},
     {KEY("relays", "safe_after_ms"), AT(settings.relay_safe_after_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
      RANGE(0, 600000), .is_live = true, .help = "how long a hold leaves the relays as the sender set them; every other state at once"},
-    {KEY("relays", "max_on_ms"), AT(settings.relay_max_on_ms), .type = CONFIG_PER_RELAY, .unit = "ms", .fallback = "0",
+    {KEY("relays", "max_on_ms"), AT(settings.relays.max_on_ms), .type = CONFIG_PER_RELAY, .unit = "ms", .fallback = "0",
      RANGE(0, 86400000), .help = "a relay that has been closed for so long opens, until a sender has asked for open; 0 = never"},
-    {KEY("relays", "min_toggle_ms"), AT(settings.relay_min_toggle_ms), .type = CONFIG_PER_RELAY, .unit = "ms", .fallback = "0",
+    {KEY("relays", "min_toggle_ms"), AT(settings.relays.min_toggle_ms), .type = CONFIG_PER_RELAY, .unit = "ms", .fallback = "0",
      RANGE(0, 60000), .help = "a relay that has changed stays so for this time at least; safe_mask and max_on_ms do not wait for it"},
 
     {KEY("relays-modbus", "host"), AT(relays_modbus.hosts), .type = CONFIG_HOSTS, .unit = "",

@@ -102,7 +102,7 @@ static void write_head(const report_t *self, size_t ram_bytes)
     fprintf(self->out, "%-24s  %u us\n", "cycle", (unsigned)self->settings->cycle_us);
     fprintf(self->out, "%-24s  %zu bytes\n", "memory of the gateway", ram_bytes);
     write_bus(self);
-    fprintf(self->out, "%-24s  %u\n", "relays", self->settings->relay_count);
+    fprintf(self->out, "%-24s  %u\n", "relays", self->settings->relays.count);
     write_settled(self);
 }
 

@@ -67,7 +67,7 @@ static uint32_t inputs_present(const config_inputs_t *inputs)
 
 static hv_status_t open_sim(rig_t *self, const config_t *config, uint8_t axes, uint32_t inputs, gateway_io_t *io)
 {
-    sim_relays_init(&self->sim_relays, config->settings.relay_count);
+    sim_relays_init(&self->sim_relays, config->settings.relays.count);
     sim_inputs_init(&self->sim_inputs, inputs);
     io->drives = sim_drives_hal(&self->sim_drives);
     io->relays = sim_relays_hal(&self->sim_relays);

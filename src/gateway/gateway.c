@@ -25,13 +25,46 @@ static void clear_reports(gateway_t *self)
     }
 }
 
+/* What may change in operation. */
+static void keep_changeable(gateway_settings_t *own, const settings_t *settings)
+{
+    own->silence_hold_ms = settings->silence_hold_ms;
+    own->silence_neutral_ms = settings->silence_neutral_ms;
+    own->silence_settle_ms = settings->silence_settle_ms;
+    own->takeover_ms = settings->takeover_ms;
+    own->priority = settings->priority;
+    own->dialect = settings->dialect;
+    own->relay_safe_mask = settings->relay_safe_mask;
+    own->relay_safe_after_ms = settings->relay_safe_after_ms;
+    own->following_error_mm_q16 = settings->following_error_mm_q16;
+    own->confirm_jump_mm_q16 = settings->confirm_jump_mm_q16;
+    own->confirm_jump_deg_q16 = settings->confirm_jump_deg_q16;
+}
+
+static void keep_settings(gateway_settings_t *own, const settings_t *settings)
+{
+    own->cycle_us = settings->cycle_us;
+    own->engage = settings->engage;
+    own->auto_frames = settings->auto_frames;
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        const axis_settings_t *axis = &settings->axis[i];
+        own->axis[i] = (axis_input_t){axis->sign, axis->scale_q16, axis->offset_q16};
+    }
+    own->has_angle = settings->has_angle;
+    own->angle_wrap = settings->angle_wrap;
+    own->angle_min_q16 = settings->axis[AXIS_ANGLE].min_q16;
+    own->angle_max_q16 = settings->axis[AXIS_ANGLE].max_q16;
+    own->relays = settings->relays;
+    keep_changeable(own, settings);
+}
+
 hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gateway_io_t *io)
 {
     if (!is_io_valid(io)) {
         return HV_ERR_ARG;
     }
     *self = (gateway_t){.io = *io, .is_tracking_actual = true};
-    self->settings = *settings;
+    keep_settings(&self->settings, settings);
     clear_reports(self);
     gateway_restart_auto(self);
     const hv_status_t status = motion_init(&self->motion, settings);
@@ -45,7 +78,7 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
     supervisor_init(&self->supervisor);
     self->snapshot.cylinders = (uint8_t)cylinders;
     self->snapshot.has_angle = settings->has_angle;
-    self->snapshot.relay_count = settings->relay_count;
+    self->snapshot.relay_count = settings->relays.count;
     self->snapshot.sent = self->motion.pose;
     self->frame_mask = settings->relay_safe_mask;
     return HV_OK;
@@ -116,19 +149,7 @@ void gateway_start_settled(gateway_t *self)
 
 void gateway_reload(gateway_t *self, const settings_t *settings)
 {
-    settings_t *own = &self->settings;
-    own->silence_hold_ms = settings->silence_hold_ms;
-    own->silence_neutral_ms = settings->silence_neutral_ms;
-    own->silence_settle_ms = settings->silence_settle_ms;
-    own->takeover_ms = settings->takeover_ms;
-    own->priority = settings->priority;
-    own->dialect = settings->dialect;
-    own->relay_safe_mask = settings->relay_safe_mask;
-    own->relay_safe_after_ms = settings->relay_safe_after_ms;
-    own->following_error_mm_q16 = settings->following_error_mm_q16;
-    own->confirm_jump_mm_q16 = settings->confirm_jump_mm_q16;
-    own->confirm_jump_deg_q16 = settings->confirm_jump_deg_q16;
-    own->spike_gate = settings->spike_gate;
+    keep_changeable(&self->settings, settings);
     motion_set_spike_gate(&self->motion, settings->spike_gate);
 }
 
@@ -190,7 +211,7 @@ static void write_relays(gateway_t *self, uint64_t now_us)
 {
     const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, now_us);
     const uint16_t asked = is_sender_heard ? self->frame_mask : self->settings.relay_safe_mask;
-    const uint16_t mask = relay_policy_step(&self->relay_policy, &self->settings, asked, !is_sender_heard, now_us);
+    const uint16_t mask = relay_policy_step(&self->relay_policy, &self->settings.relays, asked, !is_sender_heard, now_us);
     if (!self->is_mask_written || mask != self->written_mask) {
         self->is_mask_written = hal_relays_write(self->io.relays, mask) == HV_OK;
         self->snapshot.counters.relay_errors += !self->is_mask_written;

@@ -50,17 +50,17 @@ static const char *missing_for(const gateway_t *self, frame_command_t command)
 }
 
 /* The value in the platform's own axis: sign * scale * sent + offset. */
-static q32_t to_axis(const axis_settings_t *axis, q16_t sent_q16)
+static q32_t to_axis(const axis_input_t *axis, q16_t sent_q16)
 {
     const q32_t scaled_q32 = fx_mul_shift(q32_from_q16(sent_q16), axis->scale_q16, 16);
     return (axis->sign < 0 ? -scaled_q32 : scaled_q32) + q32_from_q16(axis->offset_q16);
 }
 
 /* The same angle some whole turns nearer, if it is beyond a limit and those bring it within both. */
-static q32_t turned_into_limits(const axis_settings_t *limits, q32_t angle_q32)
+static q32_t turned_into_limits(const gateway_settings_t *settings, q32_t angle_q32)
 {
-    const q32_t min_q32 = q32_from_q16(limits->min_q16);
-    const q32_t max_q32 = q32_from_q16(limits->max_q16);
+    const q32_t min_q32 = q32_from_q16(settings->angle_min_q16);
+    const q32_t max_q32 = q32_from_q16(settings->angle_max_q16);
     const q32_t beyond_q32 = angle_q32 > max_q32 ? angle_q32 - max_q32 : angle_q32 < min_q32 ? angle_q32 - min_q32 : 0;
     const q32_t turns = (fx_abs(beyond_q32) + TURN_Q32 - 1) / TURN_Q32;
     const q32_t turned_q32 = angle_q32 - (beyond_q32 < 0 ? -turns : turns) * TURN_Q32;
@@ -81,7 +81,7 @@ static q32_t unwrap(const gateway_t *self, q32_t angle_q32)
     } else if (way_q32 < -TURN_Q32 / 2) {
         way_q32 += TURN_Q32;
     }
-    return turned_into_limits(&self->settings.axis[AXIS_ANGLE], last_q32 + way_q32);
+    return turned_into_limits(&self->settings, last_q32 + way_q32);
 }
 
 static motion_target_t target_of(const gateway_t *self, const frame_t *frame)
@@ -169,7 +169,7 @@ static void take_mask(gateway_t *self, const frame_t *frame)
     if (frame->is_timed || !frame->has_mask) {
         return;
     }
-    const uint16_t wired = (uint16_t)((1u << self->settings.relay_count) - 1u);
+    const uint16_t wired = (uint16_t)((1u << self->settings.relays.count) - 1u);
     self->snapshot.counters.relay_missing += (frame->relay_mask & FRAME_RELAY_MASK & ~(unsigned)wired) != 0;
     self->frame_mask = frame->relay_mask & wired;
 }
@@ -285,7 +285,7 @@ HV_OWN_FRAME static void change_owner(gateway_t *self, uint64_t now_us)
 /* Whether the frame is of the sender that drives; keeps who that is. */
 static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
 {
-    const settings_t *settings = &self->settings;
+    const gateway_settings_t *settings = &self->settings;
     const owner_verdict_t verdict = owner_judge(&self->owner, from, (uint64_t)settings->takeover_ms * 1000, &settings->priority,
                                                 motion_timed_end_us(&self->motion), now_us);
     if (verdict == OWNER_OTHER) {

@@ -32,19 +32,19 @@ static bool is_delayed(relay_policy_t *self, unsigned i, uint32_t min_toggle_ms,
     return true;
 }
 
-static void step(relay_policy_t *self, const settings_t *settings, unsigned i, bool is_asked, bool is_safe, uint64_t now_us)
+static void step(relay_policy_t *self, const relay_settings_t *settings, unsigned i, bool is_asked, bool is_safe, uint64_t now_us)
 {
     const uint16_t bit = (uint16_t)(1u << i);
     if (!is_asked) {
         self->cut = (uint16_t)(self->cut & ~bit);
     }
-    const bool is_cut_now = is_asked && cut(self, i, settings->relay_max_on_ms[i], now_us);
+    const bool is_cut_now = is_asked && cut(self, i, settings->max_on_ms[i], now_us);
     const bool is_wanted = is_asked && (self->cut & bit) == 0;
     if (is_wanted == ((self->mask & bit) != 0)) {
         self->delayed = (uint16_t)(self->delayed & ~bit);
         return;
     }
-    if (!is_safe && !is_cut_now && is_delayed(self, i, settings->relay_min_toggle_ms[i], now_us)) {
+    if (!is_safe && !is_cut_now && is_delayed(self, i, settings->min_toggle_ms[i], now_us)) {
         return;
     }
     self->mask ^= bit;
@@ -53,9 +53,9 @@ static void step(relay_policy_t *self, const settings_t *settings, unsigned i, b
     self->changed_us[i] = now_us;
 }
 
-uint16_t relay_policy_step(relay_policy_t *self, const settings_t *settings, uint16_t asked, bool is_safe, uint64_t now_us)
+uint16_t relay_policy_step(relay_policy_t *self, const relay_settings_t *settings, uint16_t asked, bool is_safe, uint64_t now_us)
 {
-    for (unsigned i = 0; i < settings->relay_count; i++) {
+    for (unsigned i = 0; i < settings->count; i++) {
         step(self, settings, i, (asked >> i & 1u) != 0, is_safe, now_us);
     }
     return self->mask;

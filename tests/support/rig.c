@@ -42,7 +42,7 @@ static settings_t common(void)
                     .engage_speed_mm_s_q16 = Q(50),
                     .engage_accel_mm_s2_q16 = Q(200),
                     .spike_gate = 10,
-                    .relay_count = 12};
+                    .relays.count = 12};
     axes_of(&s);
     return s;
 }

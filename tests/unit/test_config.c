@@ -931,7 +931,7 @@ static void test_load_values_arrive_where_they_belong(void)
     TEST_ASSERT_EQUAL_INT(STREAM_FAST, settings->stream_style);
     TEST_ASSERT_EQUAL_UINT32(10000, settings->silence_hold_ms);
     TEST_ASSERT_EQUAL_UINT32(3600000, settings->silence_settle_ms);
-    TEST_ASSERT_EQUAL_UINT8(3, settings->relay_count);
+    TEST_ASSERT_EQUAL_UINT8(3, settings->relays.count);
     TEST_ASSERT_EQUAL_HEX16(3, settings->relay_safe_mask);
 
     static const uint8_t v6[16] = {0xFD, 0, 0, 1};
@@ -949,9 +949,9 @@ static void test_load_values_arrive_where_they_belong(void)
     TEST_ASSERT_EQUAL_INT32(12 * 65536 + 32768, m_config.sim.start_extension_mm_q16);
     TEST_ASSERT_FALSE(m_config.sim.is_homed);
     TEST_ASSERT_EQUAL_STRING("RELAY 3", m_config.relays.lines.line[2].text);
-    TEST_ASSERT_EQUAL_UINT32(0, settings->relay_max_on_ms[1]);
-    TEST_ASSERT_EQUAL_UINT32(7000, settings->relay_max_on_ms[2]);
-    TEST_ASSERT_EQUAL_UINT32(250, settings->relay_min_toggle_ms[2]);
+    TEST_ASSERT_EQUAL_UINT32(0, settings->relays.max_on_ms[1]);
+    TEST_ASSERT_EQUAL_UINT32(7000, settings->relays.max_on_ms[2]);
+    TEST_ASSERT_EQUAL_UINT32(250, settings->relays.min_toggle_ms[2]);
     TEST_ASSERT_TRUE(m_config.relays.is_active_low);
     TEST_ASSERT_EQUAL_STRING("[E-STOP]", m_config.inputs.estop_line.text);
     TEST_ASSERT_EQUAL_STRING("", m_config.inputs.reset_line.text);
@@ -982,7 +982,7 @@ static void test_load_defaults_stand_where_keys_are_left_out(void)
     TEST_ASSERT_EQUAL_UINT32(1000, m_config.settings.cycle_us);
     TEST_ASSERT_EQUAL_UINT16(9800, m_config.udp.port);
     TEST_ASSERT_EQUAL_INT32(2 * 65536, m_config.settings.margin_mm_q16);
-    TEST_ASSERT_EQUAL_UINT8(0, m_config.settings.relay_count);
+    TEST_ASSERT_EQUAL_UINT8(0, m_config.settings.relays.count);
     TEST_ASSERT_EQUAL_INT(ENGAGE_MANUAL, m_config.settings.engage);
     TEST_ASSERT_EQUAL_STRING("/run/heave/heaved.sock", m_config.control_socket);
     TEST_ASSERT_EQUAL_INT32(CONFIG_NONE, m_config.sim.start_extension_mm_q16);
@@ -1231,7 +1231,7 @@ static void test_demo_hexapod_has_what_every_frame_needs(void)
     TEST_ASSERT_EQUAL_INT(KIN_HEXAPOD, m_config.settings.geometry.kind);
     TEST_ASSERT_TRUE(m_config.settings.has_angle);
     TEST_ASSERT_EQUAL_INT(ENGAGE_AUTO, m_config.settings.engage);
-    TEST_ASSERT_EQUAL_UINT8(12, m_config.settings.relay_count);
+    TEST_ASSERT_EQUAL_UINT8(12, m_config.settings.relays.count);
     TEST_ASSERT_EQUAL_UINT16(9800, m_config.udp.port);
     TEST_ASSERT_EQUAL_STRING("127.0.0.1", m_config.udp.bind);
 }

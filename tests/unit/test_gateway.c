@@ -651,7 +651,7 @@ static void test_relays_may_outlast_a_hold_for_a_while(void)
 
 static void test_relays_bits_without_a_relay_are_counted(void)
 {
-    m_settings.relay_count = 4;
+    m_settings.relays.count = 4;
     m_settings.relay_safe_mask = 0;
     engage();
     send_and_run("@A6:0,0,0,0,0,0,13#", 2);
@@ -713,8 +713,8 @@ static void test_relays_that_cannot_be_looked_at_are_written_in_every_cycle(void
 
 static void test_relays_limits_of_time_apply_to_the_sender_not_to_the_safe_mask(void)
 {
-    m_settings.relay_max_on_ms[4] = 20;
-    m_settings.relay_min_toggle_ms[5] = 500;
+    m_settings.relays.max_on_ms[4] = 20;
+    m_settings.relays.min_toggle_ms[5] = 500;
     engage();
     send_and_run("@A6:0,0,0,0,0,0,F0#", 10);
     TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);

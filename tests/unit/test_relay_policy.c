@@ -17,7 +17,7 @@ void setUp(void)
 {
     memset(&m_policy, 0, sizeof m_policy);
     memset(&m_settings, 0, sizeof m_settings);
-    m_settings.relay_count = 12;
+    m_settings.relays.count = 12;
     m_now_us = 5000000;
 }
 
@@ -27,13 +27,13 @@ void tearDown(void) {}
 static uint16_t step(uint16_t asked)
 {
     m_now_us += MS;
-    return relay_policy_step(&m_policy, &m_settings, asked, false, m_now_us);
+    return relay_policy_step(&m_policy, &m_settings.relays, asked, false, m_now_us);
 }
 
 static uint16_t step_safe(uint16_t asked)
 {
     m_now_us += MS;
-    return relay_policy_step(&m_policy, &m_settings, asked, true, m_now_us);
+    return relay_policy_step(&m_policy, &m_settings.relays, asked, true, m_now_us);
 }
 
 static void assert_for(unsigned cycles, uint16_t asked, uint16_t expected)
@@ -54,17 +54,17 @@ static void test_step_without_limits_passes_every_mask(void)
 
 static void test_step_bits_without_a_relay_are_left_out(void)
 {
-    m_settings.relay_count = 3;
+    m_settings.relays.count = 3;
     TEST_ASSERT_EQUAL_HEX16(7, step(0xFFFF));
-    m_settings.relay_count = 0;
+    m_settings.relays.count = 0;
     setUp();
-    m_settings.relay_count = 0;
+    m_settings.relays.count = 0;
     TEST_ASSERT_EQUAL_HEX16(0, step(0xFFFF));
 }
 
 static void test_step_closed_for_too_long_opens_until_asked_to(void)
 {
-    m_settings.relay_max_on_ms[1] = 10;
+    m_settings.relays.max_on_ms[1] = 10;
     assert_for(10, 0x7, 0x7);
     assert_for(50, 0x7, 0x5); /* the others stay */
     TEST_ASSERT_EQUAL_UINT32(1, m_policy.cut_count);
@@ -76,7 +76,7 @@ static void test_step_closed_for_too_long_opens_until_asked_to(void)
 
 static void test_step_opened_in_time_counts_anew(void)
 {
-    m_settings.relay_max_on_ms[0] = 10;
+    m_settings.relays.max_on_ms[0] = 10;
     for (unsigned i = 0; i < 10; i++) {
         assert_for(9, 1, 1);
         assert_for(1, 0, 0);
@@ -86,7 +86,7 @@ static void test_step_opened_in_time_counts_anew(void)
 
 static void test_step_change_too_soon_waits(void)
 {
-    m_settings.relay_min_toggle_ms[0] = 20;
+    m_settings.relays.min_toggle_ms[0] = 20;
     assert_for(5, 1, 1); /* the first change never waits */
     assert_for(15, 0, 1);
     assert_for(1, 0, 0);
@@ -100,8 +100,8 @@ static void test_step_change_too_soon_waits(void)
 
 static void test_step_safe_mask_never_waits(void)
 {
-    m_settings.relay_min_toggle_ms[0] = 1000;
-    m_settings.relay_min_toggle_ms[3] = 1000;
+    m_settings.relays.min_toggle_ms[0] = 1000;
+    m_settings.relays.min_toggle_ms[3] = 1000;
     assert_for(2, 0x1, 0x1);
     TEST_ASSERT_EQUAL_HEX16(0x8, step_safe(0x8));
     TEST_ASSERT_EQUAL_HEX16(0x0, step_safe(0x0));
@@ -111,8 +111,8 @@ static void test_step_safe_mask_never_waits(void)
 
 static void test_step_longest_time_does_not_wait_for_the_shortest(void)
 {
-    m_settings.relay_min_toggle_ms[0] = 20;
-    m_settings.relay_max_on_ms[0] = 10; /* the configuration refuses that; opening wins all the same */
+    m_settings.relays.min_toggle_ms[0] = 20;
+    m_settings.relays.max_on_ms[0] = 10; /* the configuration refuses that; opening wins all the same */
     assert_for(10, 1, 1);
     assert_for(10, 1, 0);
 }
@@ -135,8 +135,8 @@ typedef struct {
 
 static void judge(seen_t *seen, unsigned i, bool is_closed, bool is_asked, bool is_safe)
 {
-    const uint32_t on_us = m_settings.relay_max_on_ms[i] * MS;
-    const uint32_t toggle_us = m_settings.relay_min_toggle_ms[i] * MS;
+    const uint32_t on_us = m_settings.relays.max_on_ms[i] * MS;
+    const uint32_t toggle_us = m_settings.relays.min_toggle_ms[i] * MS;
     const uint64_t age_us = m_now_us - seen->changed_us;
     const bool is_young = seen->has_changed && age_us < toggle_us;
     if (is_closed != seen->is_closed) {
@@ -160,8 +160,8 @@ static void test_step_at_random_keeps_every_limit(void)
     uint16_t asked = 0;
     m_random = 2463534242u;
     for (unsigned i = 0; i < HAL_RELAYS_MAX; i++) {
-        m_settings.relay_min_toggle_ms[i] = i % 3 * 7;
-        m_settings.relay_max_on_ms[i] = i % 4 * 15;
+        m_settings.relays.min_toggle_ms[i] = i % 3 * 7;
+        m_settings.relays.max_on_ms[i] = i % 4 * 15;
     }
     for (unsigned cycle = 0; cycle < 200000; cycle++) {
         asked = next_random() % 4 == 0 ? asked ^ (uint16_t)(1u << next_random() % 12) : asked;

@@ -135,7 +135,7 @@ static void put_row(int file)
 
 static void open_all(const table_t *table)
 {
-    sim_relays_init(&sim_relays, table->settings.relay_count);
+    sim_relays_init(&sim_relays, table->settings.relays.count);
     sim_inputs_init(&sim_inputs, INPUT_ESTOP);
     sim_log_init(&sim_log);
     require(sim_drives_init(&sim_drives, (uint8_t)table->axes, table->axis, NULL, 0) == HV_OK, "the drives are refused");
