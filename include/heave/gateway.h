@@ -14,7 +14,6 @@
 #include "heave/hal/udp.h"
 #include "heave/motion.h"
 #include "heave/owner.h"
-#include "heave/plate.h"
 #include "heave/relay_policy.h"
 #include "heave/supervisor.h"
 #include "heave/telemetry.h"
@@ -45,11 +44,13 @@ typedef enum { BRING_UP_IDLE, BRING_UP_ENABLE, BRING_UP_HOME, BRING_UP_MOVE } br
 
 /** The auto policy; members are private to src/gateway. */
 typedef struct {
-    bool is_due;     /**< not used up yet */
+    bool is_due; /**< not used up yet */
+    uint32_t cycle_us;
     uint32_t frames; /**< within a second, that it waits for */
     uint32_t seen;   /**< since a gap of more than a second; wraps: harmless, after 2^32 frames it has long been used */
     uint64_t last_us;
-    uint32_t at_us[AUTO_ENGAGE_FRAMES_MAX]; /**< low half of the time: no more than that many gaps lie between */
+    uint32_t span_cycles;                        /**< of the newest so many frames */
+    uint16_t gap_cycles[AUTO_ENGAGE_FRAMES_MAX]; /**< in front of each of them; a gap of a second has 2000 at most */
 } auto_engage_t;
 
 /** How a value sent becomes one of an axis: sign * scale * value + offset. */
@@ -108,7 +109,6 @@ typedef struct {
     uint64_t reset_until_us; /**< a reset waits for the drives until then; 0 = none */
     uint64_t end_since_us;   /**< a shutdown has come to OFF, FAULT or ESTOP, and the drives were told; 0 = not yet */
     owner_t owner;
-    plate_t plate;
     uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
     uint64_t state_since_us; /**< when the state was entered */
     confirm_t confirm;

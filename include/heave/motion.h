@@ -22,12 +22,12 @@ typedef enum {
 
 /** One command of a sender, already in platform axes (signs, scales and offsets applied). */
 typedef struct {
-    motion_space_t space;
     q32_t value_q32[POSE_AXES]; /**< pose, or extensions from cylinder 1 on [mm] */
-    bool has_angle;
-    q32_t angle_deg_q32; /**< rotation motor; else it keeps its last target */
-    bool is_timed;
+    q32_t angle_deg_q32;        /**< if has_angle, of the rotation motor; else it keeps its last target */
+    motion_space_t space;
     uint32_t time_ms; /**< of a timed move; 0 = as fast as the limits allow */
+    bool has_angle;
+    bool is_timed;
 } motion_target_t;
 
 /** What held a cycle's motion back or is going on in it; flags may be combined. */

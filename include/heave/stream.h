@@ -70,7 +70,7 @@ typedef struct {
 typedef struct {
     q32_t first_q32;   /**< in the first period */
     q32_t go_q32;      /**< in the later ones, if it did not fade */
-    q32_t rise_q32;    /**< share of its time in which the acceleration builds up, [0, 0.5] */
+    uint32_t rise_q32; /**< share of its time in which the acceleration builds up, [0, 0.5] */
     int32_t reach_q16; /**< how far it goes, in periods */
 } stream_lead_t;
 
@@ -95,7 +95,7 @@ typedef struct {
     stream_grain_t grain[AXES_MAX];
     uint32_t watched;               /**< samples since the watch for a grain began */
     int32_t window;                 /**< each control point is a mean of so many points, thrice; 1: the point */
-    int32_t weight[STREAM_WEIGHTS]; /**< of the points in that mean, the newest first */
+    uint8_t weight[STREAM_WEIGHTS]; /**< of the points in that mean, the newest first: 192 at most */
     int64_t period_cycles_q16;      /**< cycles in a period */
     int64_t lead_q32;               /**< of the step of the last period, that a control point is ahead of its point */
     int64_t bend_q32;               /**< of the step's change, likewise */

@@ -11,6 +11,7 @@
 #include "heave/fault.h"
 #include "heave/frame.h"
 #include "heave/owner.h"
+#include "heave/plate.h"
 #include "heave/supervisor.h"
 
 /** A machine fault. */
@@ -66,11 +67,7 @@ typedef struct {
     bool is_relays_unknown; /**< they could not be written, or not be looked at: relay_mask is what they were to be */
     pose_t asked;
     pose_t sent;
-    pose_t actual; /**< of the plate, from feedback, valid if has_actual_pose */
-    bool has_actual_pose;
-    pose_t actual_per_s;  /**< speed and acceleration of its axes, deg and mm per s and s^2, from feedback (see plate.h), */
-    pose_t actual_per_s2; /**< valid if has_actual_rates */
-    bool has_actual_rates;
+    plate_t plate; /**< from feedback: actual pose, speed and acceleration */
     q32_t extension_mm_q32[CYLINDERS_MAX];
     q32_t angle_deg_q32;
     drive_feedback_t drive[DRIVES_MAX];

@@ -175,9 +175,9 @@ static void put_rates(sheet_t *self, const char *name, const char *help, const c
 /* Missing while feedback does not tell. */
 static void put_plate(sheet_t *self, const snapshot_t *s)
 {
-    if (s->has_actual_rates) {
-        put_rates(self, "plate_speed", "speed of the plate from feedback", "s", &s->actual_per_s);
-        put_rates(self, "plate_acceleration", "acceleration of the plate from feedback", "s2", &s->actual_per_s2);
+    if (s->plate.has_rates) {
+        put_rates(self, "plate_speed", "speed of the plate from feedback", "s", &s->plate.speed_per_s);
+        put_rates(self, "plate_acceleration", "acceleration of the plate from feedback", "s2", &s->plate.accel_per_s2);
     }
 }
 

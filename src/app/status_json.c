@@ -102,9 +102,9 @@ static void write_poses(json_t *json, const snapshot_t *s)
 {
     write_pose(json, "pose_asked", k_pose_keys, &s->asked);
     write_pose(json, "pose_sent", k_pose_keys, &s->sent);
-    write_actual(json, "pose_actual", k_pose_keys, &s->actual, s->has_actual_pose);
-    write_actual(json, "speed_actual", k_speed_keys, &s->actual_per_s, s->has_actual_rates);
-    write_actual(json, "accel_actual", k_accel_keys, &s->actual_per_s2, s->has_actual_rates);
+    write_actual(json, "pose_actual", k_pose_keys, &s->plate.pose, s->plate.has_pose);
+    write_actual(json, "speed_actual", k_speed_keys, &s->plate.speed_per_s, s->plate.has_rates);
+    write_actual(json, "accel_actual", k_accel_keys, &s->plate.accel_per_s2, s->plate.has_rates);
 }
 
 /* What the drive is at, in words; null where its driver has none. */

@@ -7,8 +7,9 @@
 
 #include "heave/gateway.h"
 
-/** @param frames valid frames within a second that it waits for, [0, AUTO_ENGAGE_FRAMES_MAX]; 0: none */
-void auto_engage_init(auto_engage_t *self, bool is_due, uint32_t frames);
+/** @param cycle_us frames come at multiples of it
+ *  @param frames valid frames within a second that it waits for, [0, AUTO_ENGAGE_FRAMES_MAX]; 0: none */
+void auto_engage_init(auto_engage_t *self, bool is_due, uint32_t cycle_us, uint32_t frames);
 
 /** A valid frame of the sender that drives. */
 void auto_engage_frame(auto_engage_t *self, uint64_t now_us);

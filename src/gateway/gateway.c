@@ -86,7 +86,8 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
 
 void gateway_restart_auto(gateway_t *self)
 {
-    auto_engage_init(&self->auto_engage, self->settings.engage == ENGAGE_AUTO, self->settings.auto_frames);
+    const gateway_settings_t *own = &self->settings;
+    auto_engage_init(&self->auto_engage, own->engage == ENGAGE_AUTO, own->cycle_us, own->auto_frames);
 }
 
 void gateway_save(const gateway_t *self, gateway_t *out)
@@ -253,18 +254,6 @@ static void note_singular_stops(gateway_t *self, uint64_t now_us)
     self->snapshot.counters.singular_stops = stops;
 }
 
-/* The plate as feedback tells it. */
-static void publish_plate(gateway_t *self, uint64_t now_us)
-{
-    snapshot_t *s = &self->snapshot;
-    plate_take(&self->plate, motion_kin(&self->motion), s->drive, &s->sent, now_us);
-    s->has_actual_pose = self->plate.has_pose;
-    s->has_actual_rates = self->plate.has_rates;
-    s->actual = self->plate.pose;
-    s->actual_per_s = self->plate.speed_per_s;
-    s->actual_per_s2 = self->plate.accel_per_s2;
-}
-
 static void publish(gateway_t *self, uint64_t now_us)
 {
     snapshot_t *s = &self->snapshot;
@@ -294,7 +283,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     note_singular_stops(self, now_us);
     s->counters.unconfirmed = self->confirm.dropped;
     s->counters.stretched = motion_stretched_count(&self->motion);
-    publish_plate(self, now_us);
+    plate_take(&s->plate, motion_kin(&self->motion), s->drive, &s->sent, now_us);
     s->cycle++;
 }
 

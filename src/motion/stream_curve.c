@@ -71,7 +71,7 @@ static void find_reach(const stream_curve_t *self, unsigned axis, q32_t step_q32
     const q32_t vel_q32 = fx_mul_div(step_q32, Q16_ONE, self->period_cycles_q16);
     int64_t cycles_q16;
     on->reach_q16 = self->reach_min_q16;
-    on->rise_q32 = Q32_ONE / 2;
+    on->rise_q32 = (uint32_t)(Q32_ONE / 2);
     if (stop->jerk_per_cycle3_q32 <= 0 || vel_q32 == 0) {
         return;
     }
@@ -86,7 +86,7 @@ static void find_reach(const stream_curve_t *self, unsigned axis, q32_t step_q32
     const int64_t periods_q16 = fx_mul_div(cycles_q16, Q16_ONE, self->period_cycles_q16) - self->lead_q32 / (Q32_ONE / Q16_ONE);
     on->reach_q16 = (int32_t)fx_clamp(periods_q16, self->reach_min_q16, self->reach_max_q16);
     const int64_t rise_periods_q16 = fx_mul_div(rise_q16, Q16_ONE, self->period_cycles_q16);
-    on->rise_q32 = fx_clamp(fx_mul_div(rise_periods_q16, Q32_ONE, 2 * (int64_t)on->reach_q16), 0, Q32_ONE / 2);
+    on->rise_q32 = (uint32_t)fx_clamp(fx_mul_div(rise_periods_q16, Q32_ONE, 2 * (int64_t)on->reach_q16), 0, Q32_ONE / 2);
 }
 
 /* The point of that index; of coarse values, a mean of the points up to it. */
@@ -203,7 +203,7 @@ static void set_window(stream_curve_t *self, int32_t window)
     points_at_head(self, was_q32);
     self->window = window;
     for (int32_t k = 0; k < 3 * window - 2; k++) { /* ways to write k as a sum of three numbers below the window */
-        self->weight[k] = pairs(k + 2) - 3 * pairs(k + 2 - window) + 3 * pairs(k + 2 - 2 * window);
+        self->weight[k] = (uint8_t)(pairs(k + 2) - 3 * pairs(k + 2 - window) + 3 * pairs(k + 2 - 2 * window));
     }
     keep_going(self, was_q32, SHIFT_GUESSES);
 }

@@ -1688,27 +1688,27 @@ static void test_shutdown_in_fault_and_estop_is_finished_at_rest(void)
 static void test_telemetry_actual_speed_is_that_of_the_plate(void)
 {
     engage();
-    TEST_ASSERT_TRUE(seen()->has_actual_rates);
+    TEST_ASSERT_TRUE(seen()->plate.has_rates);
     send_and_run("@A6T:0,0,0,0,0,60,2000#", 1000);
     const double before_mm = rig_pose(&m_rig, AXIS_Z);
     rig_run_ms(&m_rig, 20);
     const double speed_mm_s = (rig_pose(&m_rig, AXIS_Z) - before_mm) / 0.02; /* half-way the speed is at its largest and steady */
     TEST_ASSERT_TRUE(speed_mm_s > 30);
-    TEST_ASSERT_TRUE(seen()->has_actual_rates);
-    TEST_ASSERT_DOUBLE_WITHIN(0.02 * speed_mm_s, speed_mm_s, (double)seen()->actual_per_s.axis_q32[AXIS_Z] / 4294967296.0);
-    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, (double)seen()->actual_per_s.axis_q32[AXIS_ROLL] / 4294967296.0);
-    TEST_ASSERT_DOUBLE_WITHIN(10, 0, (double)seen()->actual_per_s2.axis_q32[AXIS_Z] / 4294967296.0);
+    TEST_ASSERT_TRUE(seen()->plate.has_rates);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02 * speed_mm_s, speed_mm_s, (double)seen()->plate.speed_per_s.axis_q32[AXIS_Z] / 4294967296.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, (double)seen()->plate.speed_per_s.axis_q32[AXIS_ROLL] / 4294967296.0);
+    TEST_ASSERT_DOUBLE_WITHIN(10, 0, (double)seen()->plate.accel_per_s2.axis_q32[AXIS_Z] / 4294967296.0);
     rig_run_ms(&m_rig, 2000);
-    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, (double)seen()->actual_per_s.axis_q32[AXIS_Z] / 4294967296.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0, (double)seen()->plate.speed_per_s.axis_q32[AXIS_Z] / 4294967296.0);
 }
 
 static void test_telemetry_actual_pose_follows_the_feedback(void)
 {
     engage();
     send_and_run("@A6:5,-4,3,10,20,30#", 3000);
-    TEST_ASSERT_TRUE(seen()->has_actual_pose);
+    TEST_ASSERT_TRUE(seen()->plate.has_pose);
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        TEST_ASSERT_INT64_WITHIN(Q32_ONE / 1000, seen()->sent.axis_q32[i], seen()->actual.axis_q32[i]);
+        TEST_ASSERT_INT64_WITHIN(Q32_ONE / 1000, seen()->sent.axis_q32[i], seen()->plate.pose.axis_q32[i]);
     }
     gateway_note_late(&m_rig.gateway, 3);
     rig_run_ms(&m_rig, 1);

@@ -791,10 +791,10 @@ static void test_place_positions_without_a_pose_are_told_as_such(void)
     }
     rig_run_ms(&m_rig, 10);
     TEST_ASSERT_BITS_HIGH(MOTION_NO_POSE, seen()->flags);
-    TEST_ASSERT_FALSE(seen()->has_actual_pose);
+    TEST_ASSERT_FALSE(seen()->plate.has_pose);
     TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_SETTLED, 60000));
     TEST_ASSERT_BITS_LOW(MOTION_NO_POSE, seen()->flags);
-    TEST_ASSERT_TRUE(seen()->has_actual_pose);
+    TEST_ASSERT_TRUE(seen()->plate.has_pose);
 }
 
 static void test_target_is_nothing_to_a_motion_that_follows_nobody(void)
