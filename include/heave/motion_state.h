@@ -35,6 +35,20 @@ typedef enum { DUE_NOTHING, DUE_STEP, DUE_STREAM, DUE_TIMED } motion_due_t;
 /** What comes after a stop. */
 typedef enum { MOTION_THEN_REST, MOTION_THEN_PATH, MOTION_THEN_FOLLOW } motion_next_t;
 
+/** A straight way along an S-curve. */
+typedef struct {
+    scurve_t path;
+    q32_t from_q32[AXES_MAX];
+    q32_t to_q32[AXES_MAX]; /**< where it rests, too */
+    history_t history[AXES_MAX];
+} motion_straight_t;
+
+/** What leads: one of these at a time. */
+typedef union {
+    quintic_t quintic;          /**< MOTION_TIMED, and where a stream is joined */
+    motion_straight_t straight; /**< MOTION_RESTING, MOTION_ON_PATH, MOTION_STRAIGHT; begun before a stop ends */
+} motion_plan_t;
+
 /** What is never needed at the same time. */
 typedef union {
     halt_t halt;    /**< a stop that is under way, or tried */
@@ -65,12 +79,8 @@ struct motion {
     stream_t stream;
     gate_t gate;
     motion_target_t withheld; /**< what the gate holds back */
-    quintic_t quintic;
+    motion_plan_t plan;
     motion_aside_t aside;
-    scurve_t path;
-    q32_t path_from_q32[AXES_MAX];
-    q32_t path_to_q32[AXES_MAX];
-    history_t path_history[AXES_MAX];
 
     motion_due_t due;
     bool is_space_new;                          /**< the slots have to be found from the cylinders first */

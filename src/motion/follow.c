@@ -154,6 +154,7 @@ static void change_space(motion_t *self, motion_space_t space)
     self->is_space_new = true;
     self->last_stated_us = 0;
     self->source = MOTION_STREAMED;
+    self->join = JOIN_NONE; /* the last stream's way is gone */
     stream_reset(&self->stream);
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const ramp_limits_t *limits = slot_limits(self, i);
@@ -235,12 +236,15 @@ static void take_last_word(motion_t *self, uint64_t now_us)
 /* A step to where the plan leads anyway. */
 static bool is_on_the_way(const motion_t *self)
 {
-    const q32_t *to_q32 = self->source == MOTION_TIMED ? self->quintic.target_q32 : self->path_to_q32;
+    const q32_t *to_q32 = self->source == MOTION_TIMED ? self->plan.quintic.target_q32 : self->plan.straight.to_q32;
     unsigned i = 0;
+    if (self->source != MOTION_TIMED && self->source != MOTION_STRAIGHT) {
+        return false;
+    }
     while (i < self->planned_slots && to_q32[i] == self->goal_q32[i]) {
         i++;
     }
-    return i == self->planned_slots && self->source != MOTION_STREAMED && slots_is_planned(self, self->slot_q32);
+    return i == self->planned_slots && slots_is_planned(self, self->slot_q32);
 }
 
 /* During a take-over nothing but the blend bounds what extensions ask for: a stream of jumps is far beyond what the cylinders can
@@ -312,16 +316,17 @@ void follow_begin(motion_t *self, uint64_t now_us)
 static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
     if (self->source == MOTION_TIMED) {
-        quintic_step(&self->quintic, ref);
+        quintic_step(&self->plan.quintic, ref);
     } else if (self->source == MOTION_HALTING) {
         halt_step(&self->aside.halt, ref);
     } else {
-        const bool was_done = scurve_is_done(&self->path);
-        scurve_step(&self->path);
+        motion_straight_t *way = &self->plan.straight;
+        const bool was_done = scurve_is_done(&way->path);
+        scurve_step(&way->path);
         for (unsigned i = 0; i < AXES_MAX; i++) {
-            const ramp_ref_t rest = {.pos_q32 = self->path_to_q32[i]};
-            const q32_t pos_q32 = scurve_between(&self->path, self->path_from_q32[i], self->path_to_q32[i]);
-            ref[i] = was_done ? rest : history_advance(&self->path_history[i], pos_q32);
+            const ramp_ref_t rest = {.pos_q32 = way->to_q32[i]};
+            const q32_t pos_q32 = scurve_between(&way->path, way->from_q32[i], way->to_q32[i]);
+            ref[i] = was_done ? rest : history_advance(&way->history[i], pos_q32);
         }
     }
     for (unsigned i = self->planned_slots; i < AXES_MAX; i++) {
@@ -455,7 +460,8 @@ static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX
 /* A step on its way at a speed limit. */
 static bool is_step_cruising(const motion_t *self)
 {
-    return self->source == MOTION_STRAIGHT && self->planned_slots == POSE_AXES && self->path.acc == 0 && self->path.vel != 0;
+    const scurve_t *path = &self->plan.straight.path;
+    return self->source == MOTION_STRAIGHT && self->planned_slots == POSE_AXES && path->acc == 0 && path->vel != 0;
 }
 
 void follow_plan(motion_t *self, uint64_t now_us)

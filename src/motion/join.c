@@ -88,7 +88,7 @@ static bool is_on_curve(const motion_t *self, const ramp_ref_t *ref)
 
 static int64_t cycles_left(const motion_t *self)
 {
-    return self->quintic.cycles - self->quintic.elapsed;
+    return self->plan.quintic.cycles - self->plan.quintic.elapsed;
 }
 
 /* The newest sample, as it is followed. */
@@ -114,7 +114,7 @@ static bool is_heading_for(const motion_t *self, const q32_t target_q32[AXES_MAX
 {
     bool is_same = self->join == JOIN_SAMPLE;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        is_same &= self->quintic.target_q32[i] == target_q32[i];
+        is_same &= self->plan.quintic.target_q32[i] == target_q32[i];
     }
     return is_same;
 }
@@ -159,9 +159,9 @@ static void replan(motion_t *self, const ramp_ref_t *ref, bool is_curve_beyond, 
 static void shorten(motion_t *self, const ramp_ref_t *ref)
 {
     const int64_t left = cycles_left(self);
-    self->aside.kept = self->quintic;
-    if (!is_within_limits(self, ref) || !plan_join(self, ref) || self->quintic.cycles * 8 > left * 7) {
-        self->quintic = self->aside.kept;
+    self->aside.kept = self->plan.quintic;
+    if (!is_within_limits(self, ref) || !plan_join(self, ref) || self->plan.quintic.cycles * 8 > left * 7) {
+        self->plan.quintic = self->aside.kept;
     }
 }
 
@@ -208,12 +208,12 @@ static void step_plan(motion_t *self, const ramp_ref_t *curve, ramp_ref_t *ref)
     if (self->join == JOIN_HALT) {
         halt_step(&self->aside.halt, ref);
     } else {
-        quintic_step(&self->quintic, ref);
+        quintic_step(&self->plan.quintic, ref);
     }
     for (unsigned i = 0; self->join == JOIN_CURVE && i < POSE_AXES; i++) {
         ref[i] = sum(&curve[i], &ref[i]);
     }
-    if (self->join == JOIN_CURVE && quintic_is_done(&self->quintic)) {
+    if (self->join == JOIN_CURVE && quintic_is_done(&self->plan.quintic)) {
         self->join = JOIN_NONE;
     }
 }

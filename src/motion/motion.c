@@ -123,9 +123,9 @@ static void rest_here(motion_t *self)
 {
     self->source = MOTION_RESTING;
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        self->path_to_q32[i] = self->cylinder[i].state.pos_q32;
+        self->plan.straight.to_q32[i] = self->cylinder[i].state.pos_q32;
     }
-    self->path_to_q32[AXIS_ANGLE] = self->axis[AXIS_ANGLE].state.pos_q32;
+    self->plan.straight.to_q32[AXIS_ANGLE] = self->axis[AXIS_ANGLE].state.pos_q32;
 }
 
 void motion_place(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q32_t angle_deg_q32)
@@ -157,15 +157,15 @@ bool motion_is_at_rest(const motion_t *self)
 /* All cylinders along a straight line, at engage speed for the one with the longest way. */
 static void start_path(motion_t *self)
 {
+    motion_straight_t *way = &self->plan.straight;
     path_limits_t limits = path_limits_none();
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const ramp_t *ramp = i == AXIS_ANGLE ? &self->axis[AXIS_ANGLE] : &self->cylinder[i];
-        self->path_from_q32[i] = ramp->state.pos_q32;
-        self->path_history[i] = ramp->state;
-        path_limits_narrow(&limits, self->path_to_q32[i] - ramp->state.pos_q32,
-                           i == AXIS_ANGLE ? &ramp->limits : &self->engage_limits);
+        way->from_q32[i] = ramp->state.pos_q32;
+        way->history[i] = ramp->state;
+        path_limits_narrow(&limits, way->to_q32[i] - ramp->state.pos_q32, i == AXIS_ANGLE ? &ramp->limits : &self->engage_limits);
     }
-    scurve_plan(&self->path, &limits, 1);
+    scurve_plan(&way->path, &limits, 1);
     self->source = MOTION_ON_PATH;
 }
 
@@ -226,10 +226,10 @@ static void move_to(motion_t *self, const q32_t *extension_mm_q32)
 {
     self->is_following = false;
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        self->path_to_q32[i] = i < self->cylinders ? extension_mm_q32[i] : self->cylinder[i].state.pos_q32;
+        self->plan.straight.to_q32[i] = i < self->cylinders ? extension_mm_q32[i] : self->cylinder[i].state.pos_q32;
     }
     begin_stop(self, MOTION_THEN_PATH);
-    self->path_to_q32[AXIS_ANGLE] = self->aside.halt.rest_q32[AXIS_ANGLE];
+    self->plan.straight.to_q32[AXIS_ANGLE] = self->aside.halt.rest_q32[AXIS_ANGLE];
 }
 
 void motion_settle(motion_t *self)
@@ -273,20 +273,20 @@ hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_
 /* References of the cylinder-space sources. */
 HV_OWN_FRAME static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
+    motion_straight_t *way = &self->plan.straight;
     if (self->source == MOTION_STOPPING) {
         halt_step(&self->aside.halt, ref);
         return;
     }
     if (self->source == MOTION_ON_PATH) {
-        scurve_step(&self->path);
+        scurve_step(&way->path);
         for (unsigned i = 0; i < AXES_MAX; i++) {
-            ref[i] = history_advance(&self->path_history[i],
-                                     scurve_between(&self->path, self->path_from_q32[i], self->path_to_q32[i]));
+            ref[i] = history_advance(&way->history[i], scurve_between(&way->path, way->from_q32[i], way->to_q32[i]));
         }
         return;
     }
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        ref[i] = (ramp_ref_t){.pos_q32 = self->path_to_q32[i]};
+        ref[i] = (ramp_ref_t){.pos_q32 = way->to_q32[i]};
     }
 }
 
@@ -337,9 +337,9 @@ static void end_cycle(motion_t *self, uint64_t now_us)
 {
     if (self->source == MOTION_STOPPING && halt_is_done(&self->aside.halt) && motion_is_at_rest(self)) {
         go_on_after_stop(self, now_us);
-    } else if (self->source == MOTION_ON_PATH && scurve_is_done(&self->path) && motion_is_at_rest(self)) {
+    } else if (self->source == MOTION_ON_PATH && scurve_is_done(&self->plan.straight.path) && motion_is_at_rest(self)) {
         self->source = MOTION_RESTING;
-        note_known_pose(self, self->path_to_q32);
+        note_known_pose(self, self->plan.straight.to_q32);
     } else if (is_led_astray(self)) {
         self->singular_stops++;
         motion_follow(self);

@@ -102,7 +102,7 @@ HV_OWN_FRAME static bool plan_slots(motion_t *self, const task_t *task, int64_t 
     for (unsigned i = 0; i < task->slots; i++) {
         start[i] = start_of(self, task, i);
     }
-    return quintic_plan(&self->quintic, task->slots, start, task->target_q32, cycles) == HV_OK;
+    return quintic_plan(&self->plan.quintic, task->slots, start, task->target_q32, cycles) == HV_OK;
 }
 
 /* Adds what the target moves with, or takes it off again. */
@@ -110,26 +110,26 @@ static void add_curve(motion_t *self, const task_t *task, int sign)
 {
     for (unsigned i = 0; task->curve != NULL && i < task->slots; i++) {
         const ramp_state_t base = past_state(&task->curve[i]);
-        quintic_add_motion(&self->quintic, i, &base, sign);
+        quintic_add_motion(&self->plan.quintic, i, &base, sign);
     }
 }
 
-/* Whether every slot keeps its limits along self->quintic. */
+/* Whether every slot keeps its limits along self->plan.quintic. */
 HV_OWN_FRAME static bool keeps_limits(const motion_t *self, const task_t *task)
 {
     limits_t limits;
     set_limits(self, task, &limits);
-    return quintic_is_feasible(&self->quintic, limits.list);
+    return quintic_is_feasible(&self->plan.quintic, limits.list);
 }
 
-/* Plans self->quintic; false where an axis or a cylinder would break its limits, with what its target moves with. */
+/* Plans self->plan.quintic; false where an axis or a cylinder would break its limits, with what its target moves with. */
 static bool try_quintic(motion_t *self, const task_t *task, int64_t cycles)
 {
     if (!plan_slots(self, task, cycles)) {
         return false;
     }
     add_curve(self, task, 1);
-    if (!keeps_limits(self, task) || (self->space == MOTION_POSE && !way_is_feasible(self, &self->quintic))) {
+    if (!keeps_limits(self, task) || (self->space == MOTION_POSE && !way_is_feasible(self, &self->plan.quintic))) {
         return false;
     }
     add_curve(self, task, -1);
@@ -221,12 +221,12 @@ void plan_straight(motion_t *self, unsigned slots, int64_t least_cycles)
 {
     self->timed_share_q46 = self->intensity.share_q46[0];
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        self->path_history[i] = *slot_state(self, i);
-        self->path_from_q32[i] = self->path_history[i].pos_q32;
-        self->path_to_q32[i] = self->goal_q32[i];
+        self->plan.straight.history[i] = *slot_state(self, i);
+        self->plan.straight.from_q32[i] = self->plan.straight.history[i].pos_q32;
+        self->plan.straight.to_q32[i] = self->goal_q32[i];
     }
-    const path_limits_t limits = limits_of_straight(self, slots, self->path_from_q32);
-    scurve_plan(&self->path, &limits, least_cycles);
+    const path_limits_t limits = limits_of_straight(self, slots, self->plan.straight.from_q32);
+    scurve_plan(&self->plan.straight.path, &limits, least_cycles);
     self->source = MOTION_STRAIGHT;
 }
 
@@ -235,8 +235,8 @@ static int64_t plan_stop_then_straight(motion_t *self, const task_t *task)
 {
     halt_slots(self, task);
     const path_limits_t path = limits_of_straight(self, task->slots, self->aside.halt.rest_q32);
-    scurve_plan(&self->path, &path, 1);
-    self->straight_cycles = scurve_cycles(&self->path);
+    scurve_plan(&self->plan.straight.path, &path, 1);
+    self->straight_cycles = scurve_cycles(&self->plan.straight.path);
     return self->aside.halt.cycles + 1 + self->straight_cycles;
 }
 
@@ -247,7 +247,7 @@ static int64_t plan_quickest(motion_t *self, const task_t *task, int64_t least)
     self->source = MOTION_TIMED;
     const int64_t from = least > in_two_parts / 4 ? least : in_two_parts / 4; /* none is shorter than that */
     if (find_shortest(self, task, from, in_two_parts, ATTEMPTS)) {
-        return self->quintic.cycles;
+        return self->plan.quintic.cycles;
     }
     self->source = MOTION_HALTING;
     return in_two_parts;
@@ -262,7 +262,7 @@ static int64_t plan_timed_cycles(motion_t *self, int64_t cycles)
     }
     if (slot_all_at_rest(self, AXES_MAX)) {
         plan_straight(self, AXES_MAX, cycles);
-        return scurve_cycles(&self->path);
+        return scurve_cycles(&self->plan.straight.path);
     }
     if (plan_stop_then_straight(self, &task) <= cycles) {
         self->source = MOTION_HALTING;

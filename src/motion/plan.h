@@ -17,10 +17,10 @@ void plan_step(motion_t *self);
 /** Plans the straight S-curve to self->goal_q32 for slots at rest. */
 void plan_straight(motion_t *self, unsigned slots, int64_t least_cycles);
 
-/** Plans the shortest quintic (self->quintic) by which the difference of the first POSE_AXES slots to a stream's curve fades out
- * within the limits, while the curve moves on: what it uses of the limits is left to it, and speeds add.
+/** Plans the shortest quintic (self->plan.quintic) by which the difference of the first POSE_AXES slots to a stream's curve fades
+ * out within the limits, while the curve moves on: what it uses of the limits is left to it, and speeds add.
  *  @param curve this cycle's references of the stream
- *  @return false where none of those looked at keeps the limits; self->quintic is then of no use */
+ *  @return false where none of those looked at keeps the limits; self->plan.quintic is then of no use */
 bool plan_join(motion_t *self, const ramp_ref_t *curve);
 
 /** Plans the shortest quintic that leads those slots to rest on a target. Extensions go no further beyond it than their quickest

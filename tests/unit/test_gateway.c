@@ -266,6 +266,22 @@ static void test_start_auto_waits_for_a_stream(void)
     TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
 }
 
+/* The newest twenty within a second, whatever came before: fifteen gaps of 60 ms and four of 20. */
+static void test_start_auto_counts_the_newest_frames(void)
+{
+    m_settings.auto_frames = 20;
+    start(false);
+    for (unsigned i = 0; i < 40; i++) {
+        send_and_run("@A6:0,0,0,0,0,0#", 60);
+    }
+    for (unsigned i = 0; i < 4; i++) {
+        send_and_run("@A6:0,0,0,0,0,0#", 20);
+        TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    }
+    send_and_run("@A6:0,0,0,0,0,0#", 2);
+    TEST_ASSERT_EQUAL(STATE_HOMING, seen()->state);
+}
+
 /* Once per start, and never after a fault, an e-stop or an operator's word. */
 static void test_start_auto_is_over_after_fault_estop_and_requests(void)
 {
@@ -1980,6 +1996,7 @@ static void run_driving(void)
     RUN_TEST(test_start_waits_for_the_position_of_every_drive);
     RUN_TEST(test_start_manual_policy_waits_for_the_operator);
     RUN_TEST(test_start_auto_waits_for_a_stream);
+    RUN_TEST(test_start_auto_counts_the_newest_frames);
     RUN_TEST(test_start_auto_is_over_after_fault_estop_and_requests);
     RUN_TEST(test_settled_manual_frames_move_nothing);
     RUN_TEST(test_off_reset_takes_back_the_faults_of_drives);

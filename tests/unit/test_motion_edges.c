@@ -94,7 +94,7 @@ static void test_path_is_not_over_before_a_cylinder_thrown_off_is_back(void)
     motion_rise(&m_motion);
     run_ms(10, 50);
     TEST_ASSERT_EQUAL(MOTION_ON_PATH, m_motion.source);
-    while (!scurve_is_done(&m_motion.path)) {
+    while (!scurve_is_done(&m_motion.plan.straight.path)) {
         TEST_ASSERT_FALSE(motion_is_done(&m_motion));
         m_motion.cylinder[2].state.pos_q32 -= Q32_ONE / 1000; /* pushed down all the way */
         step(400);
@@ -379,6 +379,22 @@ static void test_stream_is_scaled_by_the_intensity(void)
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, stream_swing_mm(8000));
 }
 
+/* Samples that come while the bus takes nothing are a stream before the first of them has been planned for. */
+static void test_stream_from_the_first_cycle_on_does_not_go_on_along_what_the_last_one_left(void)
+{
+    motion_target_t target = {.space = MOTION_POSE};
+    start_following();
+    m_motion.join = JOIN_CURVE; /* the last ride ended on the way to a curve */
+    for (unsigned n = 0; n < 3; n++) {
+        target.value_q32[AXIS_Z] = n * (Q32_ONE / 10);
+        take(&target);
+        m_now_us += 20000;
+    }
+    step(400);
+    TEST_ASSERT_EQUAL(MOTION_STREAMED, m_motion.source);
+    TEST_ASSERT_EQUAL(JOIN_NONE, m_motion.join);
+}
+
 /* What the intensity adds to a timed move is not planned twice: else the axes are led faster than they go, and lag. */
 static void test_timed_move_planned_while_the_intensity_changes_starts_where_the_axes_are(void)
 {
@@ -419,6 +435,7 @@ int main(void)
     RUN_TEST(test_join_is_beyond_of_a_fast_stream_by_more_jerk);
     RUN_TEST(test_join_a_fast_stream_within_the_limits_stays_on_its_curve);
     RUN_TEST(test_stream_is_scaled_by_the_intensity);
+    RUN_TEST(test_stream_from_the_first_cycle_on_does_not_go_on_along_what_the_last_one_left);
     RUN_TEST(test_timed_move_planned_while_the_intensity_changes_starts_where_the_axes_are);
     return UNITY_END();
 }
