@@ -63,6 +63,14 @@ static inline int64_t fx_mul_high(int64_t a, int64_t b)
     return FX_WIDE_MUL_HIGH(a, b);
 }
 
+/** fx_mul_high() in place where code is made for size too: for functions marked HV_INNER_LOOP. */
+/*@ assigns \result \from a, b;
+    ensures a < FX_HIGH_LIMIT && b < FX_HIGH_LIMIT ==> \result == (a * b) >> 64; */
+static inline int64_t fx_mul_high_here(int64_t a, int64_t b)
+{
+    return FX_WIDE_MUL_HIGH_HERE(a, b);
+}
+
 /** fx_mul_high(a[0], b[0]) + fx_mul_high(a[1], b[1]), at half the cost where a word has 32 bits.
  *  @param a below FX_HIGH_LIMIT
  *  @param b whole multiples of 2^32, -2^61 to 2^61 */

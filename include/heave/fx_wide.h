@@ -87,14 +87,12 @@ static inline int64_t fx_wide_upper(uint64_t sum)
 /** fx_square3(), from sums of the products of halves: with values of at most 2^61 none of them leaves 64 bits. */
 HV_WRAPS static inline fx_u128_t fx_wide_square3_portable(const int64_t v[3])
 {
-    uint64_t high = 0, middle = 0, low = 0;
-    for (unsigned i = 0; i < 3; i++) {
-        const int32_t hi = fx_wide_high(v[i]), lo = fx_wide_low(v[i]);
-        high += fx_wide_halves(hi, hi);
-        middle += fx_wide_halves(hi, lo);
-        low += fx_wide_halves(lo, lo);
-    }
-    middle = 2 * middle + (low >> 32);
+    const int32_t hi[3] = {fx_wide_high(v[0]), fx_wide_high(v[1]), fx_wide_high(v[2])};
+    const int32_t lo[3] = {fx_wide_low(v[0]), fx_wide_low(v[1]), fx_wide_low(v[2])};
+    const uint64_t high = fx_wide_halves(hi[0], hi[0]) + fx_wide_halves(hi[1], hi[1]) + fx_wide_halves(hi[2], hi[2]);
+    const uint64_t low = fx_wide_halves(lo[0], lo[0]) + fx_wide_halves(lo[1], lo[1]) + fx_wide_halves(lo[2], lo[2]);
+    const uint64_t twice = fx_wide_halves(hi[0], lo[0]) + fx_wide_halves(hi[1], lo[1]) + fx_wide_halves(hi[2], lo[2]);
+    const uint64_t middle = 2 * twice + (low >> 32);
     return (fx_u128_t){high + (uint64_t)fx_wide_upper(middle), (middle << 32) | (low & UINT32_MAX)};
 }
 
@@ -185,6 +183,7 @@ static inline int64_t fx_wide_dot2_high_native(const int64_t a[2], const int64_t
 #define FX_WIDE_MUL_SHIFT_FIT fx_wide_mul_shift_fit_native
 #define FX_WIDE_SQUARE3       fx_wide_square3_native
 #define FX_WIDE_MUL_HIGH      fx_wide_mul_high_native
+#define FX_WIDE_MUL_HIGH_HERE fx_wide_mul_high_native
 #define FX_WIDE_DOT2_HIGH     fx_wide_dot2_high_native
 #else
 #define FX_WIDE_PRODUCT   fx_wide_product_portable
@@ -201,6 +200,11 @@ int64_t fx_wide_mul_high(int64_t a, int64_t b);
 #define FX_WIDE_MUL_SHIFT     fx_wide_mul_shift_portable
 #define FX_WIDE_MUL_SHIFT_FIT fx_wide_mul_shift_portable
 #define FX_WIDE_MUL_HIGH      fx_wide_mul_high_portable
+#endif
+#if defined(__OPTIMIZE_SIZE__) && defined(HV_LONG_PRODUCTS_ARE_CALLS)
+#define FX_WIDE_MUL_HIGH_HERE FX_WIDE_MUL_HIGH
+#else
+#define FX_WIDE_MUL_HIGH_HERE fx_wide_mul_high_portable
 #endif
 #endif
 

@@ -51,6 +51,18 @@ typedef enum {
 #define HV_OUT_OF_LINE
 #endif
 
+/** A processor whose long products are calls: code made for size has none of its own in its inner loops. */
+#if defined(__ARM_ARCH_ISA_THUMB) && __ARM_ARCH_ISA_THUMB == 1
+#define HV_LONG_PRODUCTS_ARE_CALLS
+#endif
+
+/** A function that all it calls becomes a part of, also where code is made for size: an inner loop. */
+#if defined(__GNUC__) && !defined(HV_LONG_PRODUCTS_ARE_CALLS)
+#define HV_INNER_LOOP __attribute__((flatten))
+#else
+#define HV_INNER_LOOP
+#endif
+
 /** A function whose variables are apart from its callers', where memory is short: they take no room on the stack while its
  * callers call others. */
 #if defined(__GNUC__) && defined(__OPTIMIZE_SIZE__)

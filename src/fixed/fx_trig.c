@@ -87,7 +87,7 @@ static const q62_t k_sine_q62[STEPS_PER_QUADRANT + 1] = {
 static uint64_t nearest_step(q32_t angle_deg_q32)
 {
     const int64_t halves = fx_shift_down(angle_deg_q32, 26) + 45;
-    return (uint64_t)fx_mul_high(fx_shift_down(halves, 1) + 45 * (INT64_C(1) << 37), INVERSE_45_Q64);
+    return (uint64_t)fx_mul_high_here(fx_shift_down(halves, 1) + 45 * (INT64_C(1) << 37), INVERSE_45_Q64);
 }
 
 /* -1 where a bit of a number is set, else 0. */
@@ -106,26 +106,26 @@ static q62_t negate_if(int64_t mask, q62_t value)
 static int64_t sine_deficit_q67(int64_t x_q67, int64_t square_q70)
 {
     const int64_t inner_q56 = (INT64_C(1) << 56) / 120 - fx_mul_high(square_q70, (INT64_C(1) << 50) / 5040);
-    const int64_t outer_q62 = Q62_ONE / 6 - fx_mul_high(square_q70, inner_q56);
-    return fx_shift_down(fx_mul_high(x_q67, fx_mul_high(square_q70, outer_q62)), 4);
+    const int64_t outer_q62 = Q62_ONE / 6 - fx_mul_high_here(square_q70, inner_q56);
+    return fx_shift_down(fx_mul_high_here(x_q67, fx_mul_high_here(square_q70, outer_q62)), 4);
 }
 
 /* 1 - cos(x) for |x| <= 0.0123, in Q68: the next term, x^8 / 8!, is below 0.06 LSB of Q62. */
 static int64_t cosine_deficit_q68(int64_t square_q70)
 {
     const int64_t inner_q56 = (INT64_C(1) << 56) / 24 - fx_mul_high(square_q70, (INT64_C(1) << 50) / 720);
-    const int64_t outer_q62 = Q62_ONE / 2 - fx_mul_high(square_q70, inner_q56);
-    return fx_mul_high(square_q70, outer_q62);
+    const int64_t outer_q62 = Q62_ONE / 2 - fx_mul_high_here(square_q70, inner_q56);
+    return fx_mul_high_here(square_q70, outer_q62);
 }
 
-HV_WRAPS void fx_sincos_deg(q32_t angle_deg_q32, q62_t *sin_q62, q62_t *cos_q62)
+HV_WRAPS HV_INNER_LOOP void fx_sincos_deg(q32_t angle_deg_q32, q62_t *sin_q62, q62_t *cos_q62)
 {
     const uint64_t step = nearest_step(angle_deg_q32);
     const q32_t rest_deg_q32 = (q32_t)((uint64_t)angle_deg_q32 - step * STEP_Q32);
     //@ assert nearest: -STEP_Q32 / 2 <= rest_deg_q32 <= STEP_Q32 / 2;
 
-    const int64_t rest_q67 = fx_mul_high(rest_deg_q32 * (INT64_C(1) << 31), RAD_PER_DEG_Q68); /* from Q63 degrees */
-    const int64_t square_q70 = fx_mul_high(rest_q67, rest_q67);
+    const int64_t rest_q67 = fx_mul_high_here(rest_deg_q32 * (INT64_C(1) << 31), RAD_PER_DEG_Q68); /* from Q63 degrees */
+    const int64_t square_q70 = fx_mul_high_here(rest_q67, rest_q67);
     const int64_t rest_sin_q67 = rest_q67 - sine_deficit_q67(rest_q67, square_q70);
     const int64_t deficit_q68 = cosine_deficit_q68(square_q70);
 
@@ -135,8 +135,8 @@ HV_WRAPS void fx_sincos_deg(q32_t angle_deg_q32, q62_t *sin_q62, q62_t *cos_q62)
     const int64_t index = ((int64_t)(step % STEPS_PER_QUADRANT) ^ falling) + (falling & (int64_t)(STEPS_PER_QUADRANT + 1));
     const q62_t sine = negate_if(mask_of_bit(step, 7), k_sine_q62[index]);
     const q62_t cosine = negate_if(mask_of_bit(step + STEPS_PER_QUADRANT, 7), k_sine_q62[(int64_t)STEPS_PER_QUADRANT - index]);
-    const int64_t sine_change_q66 = 2 * fx_mul_high(cosine, rest_sin_q67) - fx_mul_high(sine, deficit_q68);
-    const int64_t cosine_change_q66 = 2 * fx_mul_high(sine, rest_sin_q67) + fx_mul_high(cosine, deficit_q68);
+    const int64_t sine_change_q66 = 2 * fx_mul_high_here(cosine, rest_sin_q67) - fx_mul_high_here(sine, deficit_q68);
+    const int64_t cosine_change_q66 = 2 * fx_mul_high_here(sine, rest_sin_q67) + fx_mul_high_here(cosine, deficit_q68);
     *sin_q62 = sine + ((sine_change_q66 + 8) >> 4);
     *cos_q62 = cosine - ((cosine_change_q66 + 8) >> 4);
 }

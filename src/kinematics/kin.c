@@ -286,32 +286,30 @@ static void set_hub(const kin_placement_t *placement, int64_t height_mm_q48, int
     }
 }
 
-/* The vector of a leg, as kin_leg() has it. */
-static inline void set_vector(const kin_t *self, const kin_placement_t *placement, const int64_t hub_mm_q44[3], unsigned cylinder,
-                              int64_t vector_mm_q44[3])
+/* One coordinate of the vector of a leg, as kin_leg() has it. */
+static inline int64_t vector_q44(const kin_t *self, const kin_placement_t *placement, const int64_t hub_mm_q44[3],
+                                 unsigned cylinder, unsigned axis)
 {
-    const int64_t *arm_q48 = self->arm_mm_q48[cylinder];
-    for (unsigned axis = 0; axis < 3; axis++) {
-        const int64_t aside_q44 = fx_dot2_high(placement->rotation_q60[axis], arm_q48);
-        vector_mm_q44[axis] = hub_mm_q44[axis] + aside_q44 - self->base_mm_q44[cylinder][axis];
-    }
+    const int64_t aside_q44 = fx_dot2_high(placement->rotation_q60[axis], self->arm_mm_q48[cylinder]);
+    return hub_mm_q44[axis] + aside_q44 - self->base_mm_q44[cylinder][axis];
 }
 
 /* Squares of the lengths of all legs. Joints of a plate mostly are at one height: then a third of the products is worked out
  * once. */
-static void square_legs(const kin_t *self, const kin_placement_t *placement, fx_u128_t square_q88[CYLINDERS_MAX])
+HV_INNER_LOOP static void square_legs(const kin_t *self, const kin_placement_t *placement, fx_u128_t square_q88[CYLINDERS_MAX])
 {
     const unsigned cylinders = self->cylinders;
     int64_t height_mm_q48 = self->arm_mm_q48[0][2];
     int64_t hub_mm_q44[3];
     set_hub(placement, height_mm_q48, hub_mm_q44);
     for (unsigned i = 0; i < cylinders; i++) {
-        int64_t vector_mm_q44[3];
         if (HV_RARELY(self->arm_mm_q48[i][2] != height_mm_q48)) {
             height_mm_q48 = self->arm_mm_q48[i][2];
             set_hub(placement, height_mm_q48, hub_mm_q44);
         }
-        set_vector(self, placement, hub_mm_q44, i, vector_mm_q44);
+        const int64_t vector_mm_q44[3] = {vector_q44(self, placement, hub_mm_q44, i, 0),
+                                          vector_q44(self, placement, hub_mm_q44, i, 1),
+                                          vector_q44(self, placement, hub_mm_q44, i, 2)};
         square_q88[i] = fx_square3(vector_mm_q44);
     }
 }

@@ -34,6 +34,7 @@ void proof_wide(void)
     (void)fx_mul_shift(v[0], v[1], (unsigned)ANY_OF(1, 126));
     (void)fx_mul_shift_fit(v[0], v[1], (unsigned)ANY_OF(1, 126));
     (void)fx_mul_high(v[0], v[1]);
+    (void)fx_mul_high_here(v[0], v[1]);
     (void)fx_dot2_high(v, side);
     (void)fx_square3(side);
     (void)fx_add_u128(fx_square_u64(ANY_U64()), fx_square_u64(ANY_U64()));

@@ -176,6 +176,7 @@ static void test_mul_high_hostile_values_match_bit_by_bit_product(void)
             const int64_t a[2] = {below_high_limit(k_hostile[i]), below_high_limit(k_hostile[j])};
             const int64_t expected = mul_high_by_digits(a[0], a[1]);
             TEST_ASSERT_EQUAL_INT64(expected, fx_mul_high(a[0], a[1]));
+            TEST_ASSERT_EQUAL_INT64(expected, fx_mul_high_here(a[0], a[1]));
             TEST_ASSERT_EQUAL_INT64(expected, fx_wide_mul_high_portable(a[0], a[1]));
             const int64_t b[2] = {coarse_factor(k_hostile[j]), coarse_factor(k_hostile[i])};
             const int64_t dot = mul_high_by_digits(a[0], b[0]) + mul_high_by_digits(a[1], b[1]);

@@ -77,7 +77,7 @@ TARGETS = [
     Target("wide", "wide products", "fixed", FIXED),
     Target("mul_div", "products with a quotient", "fixed", FIXED),
     Target("roots", "square roots", "fixed", FIXED),
-    Target("angles", "sines and cosines", "fixed", FIXED, "fx_mul_high,fx_mul_high_0,fx_mul_high_1,fx_mul_high_2"),
+    Target("angles", "sines and cosines", "fixed", FIXED, "fx_mul_high,fx_mul_high_0,fx_mul_high_1,fx_mul_high_2,fx_mul_high_here,fx_mul_high_here_0,fx_mul_high_here_1,fx_mul_high_here_2"),
     Target("counts", "counts and units", "fixed", "src/drives/counts.c", "fx_mul_div"),
     Target("sdo", "SDO answers", "codecs", "src/canopen/sdo.c"),
     Target("pdo", "PDOs and emergencies", "codecs", "src/canopen/cia402_axis.c src/drives/counts.c src/fixed/fx.c", "fx_mul_div,fx_add_sat"),
