@@ -26,8 +26,8 @@ typedef struct {
     drive_state_t state;
     bool is_homed;       /**< actual counts from the true zero */
     bool has_actual;     /**< actual_mm_q32 and actual_us are valid (since the drive first reported) */
-    bool is_energized;   /**< its torque is on, as far as is known: it says so, or has not confirmed yet that it is off. A drive
-                            that   cannot say has confirmed by taking what it was told. While OFFLINE: as it was heard last */
+    bool is_energized;   /**< its torque is on, as far as is known: it says so, or has not confirmed yet that it is off, which
+                            one without a status does by taking what it is told. While OFFLINE: as it was heard last */
     q32_t actual_mm_q32; /**< extension [mm], or angle [deg] of the rotation motor; jumps when homing ends */
     uint64_t actual_us;  /**< when actual was measured or received; an old value means stale feedback */
     uint32_t fault_code; /**< the device's own code (16 bits), or the driver's (more), 0 = none; in DRIVE_FAULT, DRIVE_OFFLINE */

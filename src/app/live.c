@@ -386,7 +386,9 @@ static int run(live_t *self, const config_t *config)
         return say(EXIT_SOFTWARE, "the system does not wait for the next cycle: all drives were told to stop now");
     }
     if (self->signals > 1) {
-        return say(EXIT_REFUSED, "ended at once by a second signal");
+        const bool is_energized = has_ended && self->loop.is_energized;
+        return say(EXIT_REFUSED, "ended at once by a second signal%s",
+                   is_energized ? ", and not every drive has confirmed that its torque is off" : "");
     }
     if (has_ended && gateway_energized(&self->loop.session.gateway) != 0) {
         return say(EXIT_REFUSED, "ended, but not every drive has confirmed that its torque is off");

@@ -308,35 +308,35 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     answer_requests(self, result, requests);
 }
 
-/* One cycle of the drives alone, with the set-points of the last one.
- * Returns false once no drive has torque any more, as far as is known. */
-static bool run_drives(motion_loop_t *self)
+/* One cycle of the drives alone, with the set-points of the last one. */
+static void run_drives(motion_loop_t *self)
 {
     const snapshot_t *s = gateway_snapshot(&self->session.gateway);
     q32_t setpoint_q32[DRIVES_MAX] = {0};
     drive_feedback_t feedback[DRIVES_MAX];
-    bool is_energized = false;
+    self->is_energized = false;
     memcpy(setpoint_q32, s->extension_mm_q32, s->cylinders * sizeof setpoint_q32[0]);
     setpoint_q32[s->cylinders] = s->angle_deg_q32;
     (void)!drives_poll(self->io.drives, self->session.now_us, feedback);
     (void)!drives_send(self->io.drives, self->session.now_us, setpoint_q32);
     for (unsigned i = 0; i < drives_count(self->io.drives); i++) {
-        is_energized |= feedback[i].is_energized;
+        self->is_energized |= feedback[i].is_energized;
     }
     self->session.now_us += self->session.cycle_us;
-    return is_energized;
 }
 
 /* All drives stop now by their own ramps. What tells them may need some cycles: room on the bus, a SYNC behind it, a second try.
- */
-static void quit(motion_loop_t *self, uint64_t deadline_us)
+ * Late cycles are skipped: polls one right after the other would take a bus that had no time to answer for lost. */
+static void quit(motion_loop_t *self, uint64_t now_us)
 {
-    const uint64_t until_us = deadline_us + QUIT_MOST_US;
+    const uint64_t until_us = now_us + QUIT_MOST_US;
     hv_status_t told = drives_request(self->io.drives, DRIVES_QUICK_STOP);
-    while (run_drives(self) && deadline_us < until_us) {
+    run_drives(self);
+    while (self->is_energized && now_us < until_us) {
         told = told == HV_ERR_AGAIN ? drives_request(self->io.drives, DRIVES_QUICK_STOP) : told;
-        deadline_us += self->session.cycle_us;
-        (void)!hal_clock_sleep_until_us(self->clock, deadline_us);
+        (void)!hal_clock_sleep_until_us(self->clock, now_us + self->session.cycle_us);
+        now_us = hal_clock_now_us(self->clock);
+        run_drives(self);
     }
 }
 
@@ -354,7 +354,7 @@ static void run(motion_loop_t *self)
         const uint64_t now_us = hal_clock_now_us(self->clock);
         const uint64_t late_us = now_us > deadline_us ? now_us - deadline_us : 0;
         if (__atomic_load_n(&self->is_quit, __ATOMIC_ACQUIRE) != 0) {
-            quit(self, deadline_us);
+            quit(self, now_us);
             break;
         }
         run_cycle(self, late_us);

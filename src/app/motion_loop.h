@@ -103,6 +103,7 @@ typedef struct {
     uint32_t is_quit;     /**< atomic: the service thread wants an end at once */
     uint32_t is_ended;    /**< atomic: the thread has done its last cycle */
     bool has_lost_clock;  /**< once it has ended: because it could not wait for its next cycle */
+    bool is_energized;    /**< once it has ended at once: a drive has not confirmed that its torque is off */
     uint32_t memory;      /**< atomic: motion_memory_t */
     pthread_t thread;
 

@@ -174,11 +174,17 @@ def ends_and_names_who_keeps_torque(bench):
     assert all(states(bench, node)[-1] == "switch on disabled" for node in can_bench.NODES if node not in (3, 5))
 
 
-def second_signal_stops_the_drives(bench):
+def second_signal_stops_the_drives(bench, is_one_stuck=False):
     daemon = up(bench, can_config(bench))
     daemon.send_signal(signal.SIGTERM)
     time.sleep(0.3)
+    if is_one_stuck:
+        bench.do("stuck", drive=3)
     assert bench.stop(daemon) == 1
+    log = daemon.log.read_text(encoding="utf-8")
+    assert "ended at once by a second signal" in log and ("not every drive has confirmed" in log) == is_one_stuck, log
+    if is_one_stuck:
+        return
     assert all("quick stop" in states(bench, node) for node in can_bench.NODES), [states(bench, node)[-3:] for node in can_bench.NODES]
 
 
@@ -188,6 +194,7 @@ CASES = [
     ("follows a stream on a bus of 1 Mbit/s", follows_on_a_bus_of_finite_speed),
     ("ends with 1 and names the drives that have not confirmed that their torque is off", ends_and_names_who_keeps_torque),
     ("ends at a second signal when the drives have taken their quick stop", second_signal_stops_the_drives),
+    ("ends at a second signal, and says that a drive has not confirmed", lambda bench: second_signal_stops_the_drives(bench, is_one_stuck=True)),
 ]
 
 
