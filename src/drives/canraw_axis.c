@@ -75,7 +75,8 @@ static void take_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t st
         if (self->state != DRIVE_FAULT) {
             self->state = DRIVE_FAULT;
             self->fault_code = status != 0 ? status : 1u;
-            self->pending = CANRAW_NOTHING;
+            const bool is_stopping = self->pending == CANRAW_STOP || self->pending == CANRAW_DISABLE;
+            self->pending = is_stopping ? self->pending : CANRAW_NOTHING;
         }
     } else if (self->reset_until_us != 0 && self->pending != CANRAW_RESET) {
         self->state = DRIVE_DISABLED;

@@ -1202,6 +1202,27 @@ static void test_off_is_told_again_to_a_drive_that_was_lost(void)
     }
 }
 
+/* Also where it has a fault when it is back, and what was to stop it when it tells of its fault still goes out. */
+static void test_off_is_told_to_a_drive_that_comes_back_with_a_fault(void)
+{
+    for (unsigned i = 0; i < 4; i++) {
+        map = canraw_maps_rich();
+        map.enabled_when.mask = map.enabled_when.value = i % 2;
+        open_with(NULL, 0, true);
+        enable();
+        slave.drive[3].is_on = i >= 2;
+        cycles(30);
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+        slave.drive[3].is_faulty = true;
+        say(0x18FF0203, true, 6, (const uint8_t[6]){0x30, 0x07, 0, 0x3D, 0x09, 0});
+        slave.drive[3].is_on = true;
+        cycles(30);
+        TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[3].state);
+        TEST_ASSERT_FALSE(slave.drive[3].is_enabled);
+        TEST_ASSERT_EQUAL_UINT(0, energized());
+    }
+}
+
 static uint32_t waiting_frames;
 
 static hv_status_t tell_waiting(void *ctx, uint32_t *out)
@@ -1317,6 +1338,7 @@ int main(void)
     RUN_TEST(test_init_map_that_contradicts_itself_is_refused);
     RUN_TEST(test_off_is_told_once_it_is_so_whenever_it_is_asked_for);
     RUN_TEST(test_off_is_told_again_to_a_drive_that_was_lost);
+    RUN_TEST(test_off_is_told_to_a_drive_that_comes_back_with_a_fault);
     RUN_TEST(test_off_that_is_not_on_the_wire_is_not_told);
     RUN_TEST(test_off_of_drives_that_no_frame_takes_torque_from_is_not_waited_for);
     RUN_TEST(test_off_of_a_drive_in_fault_is_told_when_it_says_so);
