@@ -196,7 +196,7 @@ static void test_wide_forms_random_values_give_the_same_bits(void)
         differences += fx_wide_mul_shift_native(a, b, shift) != fx_wide_mul_shift_portable(a, b, shift);
         const int64_t factor[2] = {below_high_limit(a), below_high_limit(b)};
         differences += fx_wide_mul_high_native(factor[0], factor[1]) != fx_wide_mul_high_portable(factor[0], factor[1]);
-        const int64_t coarse[2] = {coarse_factor(a ^ b), coarse_factor(a - b / 2)};
+        const int64_t coarse[2] = {coarse_factor(a ^ b), coarse_factor(fx_sub_sat(a, b / 2))};
         differences += fx_wide_dot2_high_native(factor, coarse) != fx_wide_dot2_high_portable(factor, coarse);
         const int64_t v[3] = {a >> 2, b >> 2, (a ^ b) >> 2};
         const fx_u128_t sum = fx_wide_square3_native(v), other_sum = fx_wide_square3_portable(v);
