@@ -180,10 +180,14 @@ void cia402_slave_drop(cia402_slave_t *self, unsigned drive)
     enter(self, &self->drive[drive], ST_DISABLED);
 }
 
-static void connection_lost(cia402_slave_t *self, cia402_slave_drive_t *d)
+/* An error is told once, whatever the drive makes of it (CiA 301). */
+static void connection_lost(cia402_slave_t *self, cia402_slave_drive_t *d, bool is_always_told)
 {
-    if (d->status == ST_ENABLED && *value(d, 0x6007, 0) != 0) {
+    const bool is_fault = d->status == ST_ENABLED && *value(d, 0x6007, 0) != 0;
+    if (is_fault) {
         enter(self, d, ST_FAULT);
+    }
+    if (is_fault || is_always_told) {
         emergency(self, d, 0x8130);
     }
 }
@@ -549,7 +553,7 @@ static void set_nmt(cia402_slave_t *self, cia402_slave_drive_t *d, uint8_t state
     const uint8_t was = d->nmt;
     d->nmt = state;
     if (was == OPERATIONAL && state != OPERATIONAL) {
-        connection_lost(self, d);
+        connection_lost(self, d, false);
     }
 }
 
@@ -594,8 +598,7 @@ static void live(cia402_slave_t *self, cia402_slave_drive_t *d)
     const uint32_t watch_ms = *value(d, 0x1016, 1) & 0xFFFF;
     if (d->is_master_watched && watch_ms != 0 && self->now_us - d->master_us > watch_ms * 1000u) {
         d->is_master_watched = false;
-        emergency(self, d, 0x8130);
-        connection_lost(self, d);
+        connection_lost(self, d, true);
     }
     advance(self, d);
 }
