@@ -294,6 +294,14 @@ static void disturb_bus(world_t *self, const record_t *record)
     }
 }
 
+/* After homing set-points begin at actual again, which an old one may be far from. */
+static void ask(world_t *self, const record_t *record)
+{
+    if (drive_run_ask(&self->run, record) == HV_OK && record->kind % (DRIVES_RESET_FAULT + 1u) == DRIVES_HOME) {
+        memset(self->was_enabled, 0, sizeof self->was_enabled);
+    }
+}
+
 /* One record in a world; is_all: the one that gets everything. */
 static void step(world_t *self, const record_t *record, bool is_all)
 {
@@ -326,7 +334,7 @@ static void step(world_t *self, const record_t *record, bool is_all)
         disturb_bus(self, record);
         break;
     case 6:
-        (void)!drive_run_ask(&self->run, record);
+        ask(self, record);
         break;
     default:
         drive_run_move(&self->run, record);

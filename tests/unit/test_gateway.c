@@ -621,6 +621,57 @@ static void test_frames_reject_lines_are_rate_limited_and_count_what_was_left_ou
     TEST_ASSERT_EQUAL_UINT32(51, counted()->rejected[FRAME_ERR_COUNT]);
 }
 
+/* The next line of the log that has this beginning, to its end. */
+static void expect_line(const char *beginning, const char *line)
+{
+    const sim_log_line_t *logged;
+    do {
+        logged = sim_log_take(&m_rig.log);
+        TEST_ASSERT_NOT_NULL_MESSAGE(logged, line);
+    } while (strncmp(logged->text, beginning, strlen(beginning)) != 0);
+    TEST_ASSERT_EQUAL_STRING(line, logged->text);
+}
+
+/* Of its neighbours nothing, wherever in the datagram it is, and up to its last byte. */
+static void test_frames_a_reject_line_quotes_the_frame_alone(void)
+{
+    engage();
+    send_and_run("@A6:1,0,0,0,0,0,1#@A6:2,zz#@A6:3,0,0,0,0,0,3#", 10);
+    expect_line(
+        "frame",
+        "frame from 127.0.0.1:9 rejected: byte 24: value 2 of A6 (pitch) is not a decimal number; write it as 5, -5.5 or 1E-05; "
+        "found 'z': \"@A6:2,zz#\"");
+    send_and_run("@A6:1,0,0,0,0,0,1#@A6:5,6#", 10);
+    expect_line("frame", "frame from 127.0.0.1:9 rejected: byte 25: A6 takes 6 values and a mask, found 2: \"@A6:5,6#\"");
+}
+
+/* One frame of a stream at 50 Hz, the others of which are all zero, is far off. */
+static void send_spike(double z)
+{
+    for (unsigned i = 0; i < 40; i++) {
+        rig_sendf(&m_rig, "@A6:0,0,0,0,0,%g#", i == 20 ? z : 0.0);
+        rig_run_ms(&m_rig, 20);
+    }
+}
+
+static void test_spikes_are_told_and_the_gate_may_be_opened_in_operation(void)
+{
+    engage();
+    send_spike(50);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->spikes);
+    expect_line("sample", "sample from 127.0.0.1:9 not followed, a spike: z 50.0 after 0.0");
+    settings_t settings = m_settings;
+    settings.spike_gate = 0;
+    gateway_reload(&m_rig.gateway, &settings);
+    send_spike(-60);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->spikes);
+    settings.spike_gate = 10;
+    gateway_reload(&m_rig.gateway, &settings);
+    send_spike(-60);
+    TEST_ASSERT_EQUAL_UINT32(2, counted()->spikes);
+    expect_line("sample", "sample from 127.0.0.1:9 not followed, a spike: z -60.0 after 0.0");
+}
+
 /* ---- relays ---- */
 
 static void test_relays_follow_the_mask_only_while_engaged(void)
@@ -921,7 +972,7 @@ static void test_senders_two_at_once_only_one_is_followed(void)
     TEST_ASSERT_EQUAL_UINT32(300, counted()->accepted[FRAME_A6]);
     TEST_ASSERT_EQUAL_UINT8(1, seen()->owner.peer.address[3]);
     TEST_ASSERT_EQUAL_UINT8(2, seen()->other.peer.address[3]);
-    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "frame from 10.0.0.2:4000 not followed: 10.0.0.1:4000 drives"));
+    expect_line("frame", "frame from 10.0.0.2:4000 not followed: 10.0.0.1:4000 drives");
 }
 
 /* From any moment of the first one's motion: the second takes over after the silence, at engage speed. */
@@ -946,6 +997,7 @@ static void test_senders_take_over_after_silence_at_engage_speed(void)
         TEST_ASSERT_TRUE(m_rig.check.speed * 400 <= 50.1);
         TEST_ASSERT_EQUAL_HEX16(m_settings.relay_safe_mask, m_rig.relays.mask); /* what the first one switched is undone */
         TEST_ASSERT_EQUAL_UINT32(1, counted()->owner_changes);
+        expect_line("10.", "10.0.0.2:4000 drives from now on");
     }
 }
 
@@ -2013,6 +2065,8 @@ static void run_driving(void)
     RUN_TEST(test_frames_extensions_that_lead_near_a_singularity_stop_the_platform);
     RUN_TEST(test_frames_that_lead_astray_again_and_again_are_told_once_a_second);
     RUN_TEST(test_frames_reject_lines_are_rate_limited_and_count_what_was_left_out);
+    RUN_TEST(test_frames_a_reject_line_quotes_the_frame_alone);
+    RUN_TEST(test_spikes_are_told_and_the_gate_may_be_opened_in_operation);
     RUN_TEST(test_relays_follow_the_mask_only_while_engaged);
     RUN_TEST(test_relays_may_outlast_a_hold_for_a_while);
     RUN_TEST(test_relays_bits_without_a_relay_are_counted);
