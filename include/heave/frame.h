@@ -49,7 +49,7 @@ typedef struct {
 /** Why a frame was rejected; also the index of its counter. */
 typedef enum {
     FRAME_ERR_NO_HEAD,    /**< bytes outside any frame, or a datagram that holds none */
-    FRAME_ERR_UNFINISHED, /**< the datagram or the line ended, or a new head came, before `#` */
+    FRAME_ERR_UNFINISHED, /**< the datagram ended, or a NUL or a new head came, before `#` */
     FRAME_ERR_COMMAND,    /**< not one of the commands (look-alike letters are named) */
     FRAME_ERR_SEPARATOR,  /**< no `:` after the command */
     FRAME_ERR_COUNT,      /**< too few or too many values */

@@ -36,7 +36,7 @@ typedef struct {
 /** Starts a number. */
 void number_init(number_t *self);
 
-/** Takes the next byte of the text; blanks (space, tab) around the number are allowed.
+/** Takes the next byte of the text; blanks (space, tab, CR, LF) around the number are allowed.
  *  @return NUMBER_OK, or NUMBER_SYNTAX at the first byte that cannot be part of a number (the state is then dead). */
 number_error_t number_feed(number_t *self, uint8_t byte);
 

@@ -44,14 +44,10 @@ const char *frame_command_name(frame_command_t command)
     return k_commands[command].name;
 }
 
+/* Line breaks are blanks: people and their tools wrap long frames. */
 static bool is_blank(uint8_t byte)
 {
-    return byte == ' ' || byte == '\t';
-}
-
-static bool is_line_end(uint8_t byte)
-{
-    return byte == '\r' || byte == '\n' || byte == '\0';
+    return byte == ' ' || byte == '\t' || byte == '\r' || byte == '\n';
 }
 
 /* 0 to 15, or 16 where the byte is no hex digit. */
@@ -316,7 +312,7 @@ static void take_idle(frame_scanner_t *self, uint8_t byte)
 {
     const bool may_be_headless = self->may_be_headless;
     self->may_be_headless = false;
-    if (is_blank(byte) || is_line_end(byte)) {
+    if (is_blank(byte) || byte == '\0') {
         return;
     }
     begin_frame(self, true);
@@ -437,10 +433,10 @@ static frame_event_t take_hash(frame_scanner_t *self, frame_t *frame, frame_reje
     return FRAME_EVENT_FRAME;
 }
 
-/* Blanks and line ends: a line end cannot stand in a frame, and a field starts behind its leading blanks. */
+/* Blanks and NUL: a NUL ends the text, and a field starts behind its leading blanks. */
 static void take_white(frame_scanner_t *self, uint8_t byte)
 {
-    if (is_line_end(byte) && self->phase != PHASE_IDLE && self->phase != PHASE_REJECTED) {
+    if (byte == '\0' && self->phase != PHASE_IDLE && self->phase != PHASE_REJECTED) {
         fail(self, FRAME_ERR_UNFINISHED, byte, 0);
         return;
     }

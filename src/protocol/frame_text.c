@@ -130,6 +130,8 @@ static void put_found(text_t *line, const frame_reject_t *reject)
         text_put(line, "'");
     } else if (reject->byte == ' ' || reject->byte == '\t') {
         text_put(line, "; found a blank");
+    } else if (reject->byte == '\r' || reject->byte == '\n') {
+        text_put(line, "; found a line break");
     } else if (reject->byte != 0) {
         text_put(line, "; found byte 0x");
         text_put_hex(line, reject->byte, 2);
@@ -191,7 +193,7 @@ static void put_unfinished(text_t *line, const frame_reject_t *reject)
 {
     text_put(line, "the frame from byte ");
     text_put_u32(line, reject->start);
-    text_put(line, " on has no '#' at its end; a frame must be whole within one datagram and one line");
+    text_put(line, " on has no '#' at its end; a frame must be whole within one datagram");
 }
 
 static void put_bad_command(text_t *line, const frame_reject_t *reject)

@@ -141,6 +141,8 @@ static unsigned class_of(uint8_t byte)
         return CLASS_SIGN;
     case ' ':
     case '\t':
+    case '\r':
+    case '\n':
         return CLASS_BLANK;
     default:
         return CLASSES;

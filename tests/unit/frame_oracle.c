@@ -22,18 +22,18 @@ void line_add(line_t *line, const char *format, ...)
     TEST_ASSERT_LESS_THAN_UINT(sizeof line->text, line->length);
 }
 
-static bool is_white(char c)
+static bool is_blank(char c)
 {
-    return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\0';
+    return c == ' ' || c == '\t' || c == '\r' || c == '\n';
 }
 
 /* Cuts blanks off both ends, in place. */
 static char *trimmed(char *text)
 {
-    while (*text == ' ' || *text == '\t') {
+    while (is_blank(*text)) {
         text++;
     }
-    for (size_t length = strlen(text); length > 0 && (text[length - 1] == ' ' || text[length - 1] == '\t'); length--) {
+    for (size_t length = strlen(text); length > 0 && is_blank(text[length - 1]); length--) {
         text[length - 1] = '\0';
     }
     return text;
@@ -108,7 +108,7 @@ static bool oracle_frame(const char *bytes, size_t length, frame_dialect_t diale
     const bool is_timed = length > 2 && text[2] == 'T';
     const bool is_command =
         length > 2 && strchr("AC", text[0]) != NULL && strchr(text[0] == 'A' ? "3467" : "367", text[1]) != NULL;
-    if (!is_command || text[2 + is_timed] != ':' || memchr(bytes, '\0', length) != NULL || strpbrk(text, "\r\n") != NULL) {
+    if (!is_command || text[2 + is_timed] != ':' || memchr(bytes, '\0', length) != NULL) {
         return false;
     }
     line_add(line, "%s%.2s%s", line->length > 0 ? "; " : "", text, is_timed ? "T" : "");
@@ -128,7 +128,7 @@ void frame_oracle(line_t *line, frame_dialect_t dialect, const char *bytes, size
     line->text[0] = '\0';
     for (size_t i = 0; i < length;) {
         const bool has_head = bytes[i] == '@' || (bytes[i] == '#' && dialect == FRAME_LENIENT);
-        if (is_white(bytes[i])) {
+        if (is_blank(bytes[i]) || bytes[i] == '\0') {
             may_be_headless = false;
             i++;
             continue;

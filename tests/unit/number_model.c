@@ -19,7 +19,7 @@ typedef struct {
 
 static const char *skip_blanks(const char *text)
 {
-    while (*text == ' ' || *text == '\t') {
+    while (*text == ' ' || *text == '\t' || *text == '\r' || *text == '\n') {
         text++;
     }
     return text;

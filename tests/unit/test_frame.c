@@ -217,6 +217,21 @@ static void test_next_blanks_around_values_mask_and_time_are_skipped(void)
     check_v3("!separator@3/0", "@A3 :1,2,3,0#");
 }
 
+static void test_next_line_breaks_around_values_mask_and_time_are_skipped(void)
+{
+    check_v3("A7T 327680 393216 0 360448 196608 1310720 -1966080 time=3000", "@A7T:5,6,0,\n5.5,3.0,20,\n-30,3000#\n");
+    check_v3("A6 327680 393216 0 360448 196608 1310720 mask=240", "@A6:5,6,0,\r\n5.5,3.0\r\n,20,F0\r\n#\r\n");
+    check_v3("A6 327680 393216 0 360448 196608 1310720 mask=240", "@A6:\n5,6,0,5.5,3.0,20,\r\nF0#");
+    check_v3("A3T 65536 131072 196608 time=40; C3 65536 131072 196608 mask=1", "@A3T:1\n,\n2\n,3,40\n#\r\n@C3:1,2,\n3,1#");
+    check_v3("!value_syntax@7/1", "@A3:1\n 2,2,3,0F#");
+    check_v3("!value_syntax@5/1", "@A3:-\n1,2,3,0F#");
+    check_v3("!mask@12/4", "@A3:1,2,3,F\nF#");
+    check_v3("!command@1/0", "@\nA3:1,2,3,0#");
+    check_v3("!command@2/0", "@A\n3:1,2,3,0#");
+    check_v3("!separator@3/0", "@A3\r\n:1,2,3,0#");
+    check_v3("!unfinished@12/0; A3 65536 131072 196608 mask=0", "@A3:1,2,3,1\n@A3:1,2,3,0#");
+}
+
 static void test_next_masks_of_one_to_four_digits_keep_their_low_twelve_bits(void)
 {
     static const struct {
@@ -281,12 +296,12 @@ static void test_next_datagram_of_several_frames_delivers_each(void)
     check_length(FRAME_V3, "A3 0 0 0 mask=1", "\r\n\0\t @A3:0,0,0,1#", 17);
 }
 
-static void test_next_frame_is_over_at_the_end_of_its_line(void)
+static void test_next_frame_is_over_at_a_nul_and_with_its_datagram(void)
 {
-    check_v3("!unfinished@14/0; A3 65536 131072 196608 mask=1", "@A6:1,2,3,4,5,\n6,0#@A3:1,2,3,1#");
-    check_v3("!unfinished@12/0", "@A3:0,0,0,F0\r\n");
-    check_v3("!unfinished@3/0", "@A3\r\n");
+    check_length(FRAME_V3, "!unfinished@14/0; A3 65536 131072 196608 mask=1", "@A6:1,2,3,4,5,\0006,0#@A3:1,2,3,1#", 31);
     check_length(FRAME_V3, "!unfinished@12/0", "@A3:0,0,0,F0\0\0", 14);
+    check_v3("!unfinished@14/0", "@A3:0,0,0,F0\r\n");
+    check_v3("!unfinished@3/0", "@A3");
 }
 
 static void test_next_head_inside_an_unfinished_frame_starts_a_new_one(void)
@@ -557,7 +572,7 @@ static int random_value(char *text)
 
 static const char *blanks(void)
 {
-    return (const char *[]){"", "", "", "", " ", "\t", "  "}[below(7)];
+    return (const char *[]){"", "", "", "", " ", "\t", "  ", "\n", "\r\n"}[below(9)];
 }
 
 static void random_tail(char *text, bool is_timed, line_t *expected)
@@ -764,11 +779,14 @@ static void test_describe_says_what_would_be_right(void)
     check_words("@A3T:1,2,3#", "byte 10: A3T ends with its time, a number of ms from 0 to 3600000; found '#'");
     check_words("@A3T:1,2,3,1e7#", "byte 11: A3T has a time above 3600000 ms");
     check_words("@A6 1#", "byte 3: A6 must be followed by ':'; found a blank");
+    check_words("@A6:1\n2#", "byte 6: value 1 of A6 (roll) is not a decimal number; write it as 5, -5.5 or 1E-05; found '2'");
+    check_words("@A6:1.E\n#",
+                "byte 7: value 1 of A6 (roll) is not a decimal number; write it as 5, -5.5 or 1E-05; found a line break");
+    check_words("@A6\r\n:1#", "byte 3: A6 must be followed by ':'; found a line break");
     check_words("@a6:1#", "byte 1: not a command; right are A3 A4 A6 A7 C3 C6 C7, and T behind them for a timed move"
                           "; lower case needs dialect = lenient; found 'a'");
     check_words("A6:1#", "byte 0: outside a frame; a frame starts with '@', as in @A6:0,0,0,0,0,0,0#; found 'A'");
-    check_words("@A6:1",
-                "byte 5: the frame from byte 0 on has no '#' at its end; a frame must be whole within one datagram and one line");
+    check_words("@A6:1", "byte 5: the frame from byte 0 on has no '#' at its end; a frame must be whole within one datagram");
     check_words("@A6:1\x07,#",
                 "byte 5: value 1 of A6 (roll) is not a decimal number; write it as 5, -5.5 or 1E-05; found byte 0x07");
     check_words("", "byte 0: no frame in this datagram; a frame starts with '@', as in @A6:0,0,0,0,0,0,0#");
@@ -916,11 +934,12 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_next_reference_rows_lead_to_the_stated_events);
     RUN_TEST(test_next_blanks_around_values_mask_and_time_are_skipped);
+    RUN_TEST(test_next_line_breaks_around_values_mask_and_time_are_skipped);
     RUN_TEST(test_next_masks_of_one_to_four_digits_keep_their_low_twelve_bits);
     RUN_TEST(test_next_missing_mask_is_accepted_but_missing_time_is_not);
     RUN_TEST(test_next_times_are_rounded_and_bounded);
     RUN_TEST(test_next_datagram_of_several_frames_delivers_each);
-    RUN_TEST(test_next_frame_is_over_at_the_end_of_its_line);
+    RUN_TEST(test_next_frame_is_over_at_a_nul_and_with_its_datagram);
     RUN_TEST(test_next_head_inside_an_unfinished_frame_starts_a_new_one);
     RUN_TEST(test_next_bad_frame_does_not_spoil_its_neighbours);
     RUN_TEST(test_next_text_without_any_frame_is_counted);

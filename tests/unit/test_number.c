@@ -183,8 +183,8 @@ static void test_parse_what_is_no_number_is_refused(void)
                                           "5d",
                                           "1_000",
                                           "1'000",
-                                          "1\n",
-                                          "\r1",
+                                          "1\n1",
+                                          "\v1",
                                           "5%",
                                           "\xEF\xBC\x91",
                                           ("\xE2\x88\x92"
