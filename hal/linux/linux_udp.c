@@ -3,8 +3,10 @@
  */
 #include "linux_udp.h"
 
+#include <arpa/inet.h>
 #include <errno.h>
 #include <linux/sock_diag.h>
+#include <net/if.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <stdio.h>
@@ -166,6 +168,56 @@ static bool set_option(int fd, int level, int option, int value)
     return setsockopt(fd, level, option, &value, sizeof value) == 0;
 }
 
+/* Without these a socket on all addresses also hears the groups that other programs of this machine have joined. */
+static bool leave_foreign_groups(int fd, int family)
+{
+    return set_option(fd, IPPROTO_IP, IP_MULTICAST_ALL, 0) &&
+           (family != AF_INET6 || set_option(fd, IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0));
+}
+
+/* Address and interface of "239.1.2.3%eth0". */
+static hv_status_t resolve_group(linux_udp_t *self, const char *text, struct group_req *group)
+{
+    char host[INET6_ADDRSTRLEN] = "";
+    struct sockaddr_in v4 = {.sin_family = AF_INET};
+    struct sockaddr_in6 v6 = {.sin6_family = AF_INET6};
+    const size_t length = strcspn(text, "%");
+    const char *const interface = text[length] == '%' ? text + length + 1 : "";
+    memset(group, 0, sizeof *group);
+    (void)snprintf(host, sizeof host, "%.*s", (int)length, text);
+    if (inet_pton(AF_INET, host, &v4.sin_addr) == 1) {
+        memcpy(&group->gr_group, &v4, sizeof v4);
+    } else if (inet_pton(AF_INET6, host, &v6.sin6_addr) == 1) {
+        memcpy(&group->gr_group, &v6, sizeof v6);
+    } else {
+        self->error = EINVAL;
+        (void)snprintf(self->error_text, sizeof self->error_text, "udp: group %s: not a numeric address", text);
+        return HV_ERR_ARG;
+    }
+    group->gr_interface = if_nametoindex(interface);
+    if (group->gr_interface == 0) {
+        self->error = errno;
+        (void)snprintf(self->error_text, sizeof self->error_text,
+                       "udp: group %s: this machine has no network interface \"%s\": see `ip link`, and [udp] group", text,
+                       interface);
+        return HV_ERR_IO;
+    }
+    return HV_OK;
+}
+
+static hv_status_t join(linux_udp_t *self, const char *text)
+{
+    struct group_req group;
+    const hv_status_t status = resolve_group(self, text, &group);
+    const int level = group.gr_group.ss_family == AF_INET6 ? IPPROTO_IPV6 : IPPROTO_IP;
+    if (status != HV_OK || setsockopt(self->fd, level, MCAST_JOIN_GROUP, &group, sizeof group) == 0) {
+        return status;
+    }
+    self->error = errno;
+    (void)snprintf(self->error_text, sizeof self->error_text, "udp: join group %s: %s", text, strerror(self->error));
+    return HV_ERR_IO;
+}
+
 static hv_status_t set_up(linux_udp_t *self, const linux_udp_config_t *config, const struct addrinfo *address)
 {
     self->fd = socket(address->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
@@ -183,6 +235,9 @@ static hv_status_t set_up(linux_udp_t *self, const linux_udp_config_t *config, c
     }
     if (!set_option(self->fd, SOL_SOCKET, SO_TIMESTAMPNS, 1)) {
         return fail(self, config, "times of arrival of");
+    }
+    if (!leave_foreign_groups(self->fd, address->ai_family)) {
+        return fail(self, config, "only groups that it joined on");
     }
     if (bind(self->fd, address->ai_addr, address->ai_addrlen) != 0) {
         return fail(self, config, "bind");
@@ -214,7 +269,14 @@ hv_status_t linux_udp_open(linux_udp_t *self, const linux_udp_config_t *config)
     }
     status = set_up(self, config, found);
     freeaddrinfo(found);
-    return status == HV_OK ? look_up(self, config) : status;
+    status = status == HV_OK ? look_up(self, config) : status;
+    if (status == HV_OK && config->group != NULL && config->group[0] != '\0') {
+        status = join(self, config->group);
+    }
+    if (status != HV_OK) {
+        linux_udp_close(self);
+    }
+    return status;
 }
 
 void linux_udp_close(linux_udp_t *self)

@@ -10,6 +10,8 @@
 /** What to open. */
 typedef struct {
     const char *bind;   /**< numeric address: "0.0.0.0", "192.168.1.2", "fe80::1%eth0"; "::" hears IPv4 and IPv6 */
+    const char *group;  /**< multicast address and interface, joined: "239.1.2.3%eth0", "ff15::1%eth0"; bind is then "0.0.0.0", or
+                           "::"  for either; NULL or empty: none, and what other programs have joined is not heard */
     uint16_t port;      /**< 0 = any free one */
     int receive_buffer; /**< bytes asked of the kernel (it doubles them and has limits); 0 = the system's default.
                              Small is good: what waits there is old */
@@ -27,7 +29,8 @@ typedef struct {
 } linux_udp_t;
 
 /** Opens and binds. May block for milliseconds and allocate: before the loop starts.
- *  @return HV_OK; HV_ERR_ARG: bind is not a numeric address; HV_ERR_IO: the system refuses. error and error_text say why. */
+ *  @return HV_OK; HV_ERR_ARG: bind or group is not a numeric address; HV_ERR_IO: the system refuses. error and error_text say
+ * why. */
 hv_status_t linux_udp_open(linux_udp_t *self, const linux_udp_config_t *config) HV_MUST_CHECK;
 
 /** Closes; harmless on a closed one or one whose open failed. */

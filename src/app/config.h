@@ -21,7 +21,8 @@
 
 /** Where frames come in. */
 typedef struct {
-    char bind[CONFIG_ADDRESS_MAX]; /**< numeric IPv4 or IPv6 address */
+    char bind[CONFIG_ADDRESS_MAX];  /**< numeric IPv4 or IPv6 address */
+    char group[CONFIG_ADDRESS_MAX]; /**< joined: multicast address, % and its network interface; empty: none */
     uint16_t port;
     hal_udp_networks_t allow; /**< who may send; none at all means everyone who reaches the port */
 } config_udp_t;

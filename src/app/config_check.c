@@ -313,6 +313,18 @@ static void check_engage(config_source_t *self, const char *name, q16_t engage_q
                             q16_text(&value, engage_q16), name, q16_text(&highest, cylinder_q16));
 }
 
+/* A socket that is bound to one address hears nothing that is sent to another, be it a group's. */
+static void check_group(config_source_t *self)
+{
+    const config_udp_t *udp = &self->config->udp;
+    const bool is_ipv6 = strchr(udp->group, ':') != NULL;
+    const bool is_any = strcmp(udp->bind, "::") == 0 || (!is_ipv6 && strcmp(udp->bind, "0.0.0.0") == 0);
+    if (udp->group[0] != '\0' && !is_any) {
+        config_source_key_error(self, "udp", "group", "is not heard where bind is %s; allowed: bind = %s", udp->bind,
+                                is_ipv6 ? "::" : "0.0.0.0");
+    }
+}
+
 /* Each silence that is not "never" comes after the ones before it. */
 static void check_silence(config_source_t *self)
 {
@@ -406,6 +418,7 @@ static void check_values(config_source_t *self)
     check_cylinders(self);
     check_engage(self, "speed_mm_s", settings->engage_speed_mm_s_q16, settings->cylinder_speed_mm_s_q16);
     check_engage(self, "accel_mm_s2", settings->engage_accel_mm_s2_q16, settings->cylinder_accel_mm_s2_q16);
+    check_group(self);
     check_silence(self);
     check_intensity(self);
     check_relays(self);

@@ -163,6 +163,9 @@ const config_key_t config_keys[] = {
 
     {KEY("udp", "bind"), AT(udp.bind), .type = CONFIG_ADDRESS, .unit = "", .fallback = "127.0.0.1",
      .help = "address to listen on: 0.0.0.0 or :: for every network card; as it stands, this machine alone"},
+    {KEY("udp", "group"), AT(udp.group), .type = CONFIG_GROUP, .unit = "", .fallback = "none", .words = "none",
+     .help = "multicast group to join, for senders that send to many platforms at once, and the network card on which; bind is then "
+             "0.0.0.0 or ::, of which :: hears IPv6 groups too"},
     {KEY("udp", "port"), AT(udp.port), .type = CONFIG_INTEGER, .unit = "", .fallback = "9800", RANGE(1, 65535),
      .help = "UDP port"},
     {KEY("udp", "allow"), AT(udp.allow), .type = CONFIG_NETWORKS, .unit = "", .fallback = "any", .words = "any",

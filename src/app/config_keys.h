@@ -17,6 +17,7 @@ typedef enum {
     CONFIG_WORD,         /**< one of `words`, stored as its index */
     CONFIG_YES_NO,       /**< stored as bool */
     CONFIG_ADDRESS,      /**< numeric IPv4 or IPv6 address, stored as text */
+    CONFIG_GROUP,        /**< `none`, or a multicast address, % and a network interface; stored as text, empty for none */
     CONFIG_NETWORKS,     /**< the word for an empty list, or addresses and networks, stored as hal_udp_networks_t */
     CONFIG_PATH,         /**< absolute path, stored as text */
     CONFIG_LABEL,        /**< `none`, or the name or number of a line, or the name of a chip; stored as config_label_t */

@@ -287,13 +287,60 @@ static unsigned read_address(span_t item, uint8_t address[16])
     return inet_pton(AF_INET6, text, address) == 1 ? 128 : 0;
 }
 
+/* 224.0.0.0/4 and ff00::/8. */
+static bool is_group(const uint8_t *address, unsigned bits)
+{
+    return bits == 32u ? (address[0] & 0xF0u) == 0xE0u : bits == 128u && address[0] == 0xFFu;
+}
+
 static bool parse_address(const config_key_t *key, span_t item, char *field, config_text_t *why)
 {
     uint8_t address[16];
-    if (read_address(item, address) == 0) {
+    const unsigned bits = read_address(item, address);
+    if (bits == 0) {
         return refuse(key, item, "is not an address", why);
     }
+    if (is_group(address, bits)) {
+        config_text_add_quoted(why, item.at, item.length);
+        config_text_add(why,
+                        " is a multicast group, to be joined; write %s = %s and group = %.*s%%eth0 (the network card on which)",
+                        key->name, bits == 32u ? "0.0.0.0" : "::", (int)item.length, item.at);
+        return false;
+    }
     memset(field, 0, key->size);
+    memcpy(field, item.at, item.length);
+    return true;
+}
+
+/* What the kernel takes as the name of an interface. */
+static bool is_interface(span_t item)
+{
+    bool is_name = item.length > 0 && item.length < CONFIG_NAME_MAX;
+    for (size_t i = 0; is_name && i < item.length; i++) {
+        is_name = item.at[i] > ' ' && item.at[i] <= '~' && item.at[i] != '/' && item.at[i] != ':';
+    }
+    return is_name;
+}
+
+static bool parse_group(const config_key_t *key, span_t item, char *field, config_text_t *why)
+{
+    uint8_t address[16];
+    memset(field, 0, key->size);
+    if (find_word(key->words, item) == 0) {
+        return true;
+    }
+    const char *const sign = memchr(item.at, '%', item.length);
+    const span_t host = {item.at, sign == NULL ? item.length : (size_t)(sign - item.at)};
+    const unsigned bits = read_address(host, address);
+    if (bits == 0) {
+        return refuse(key, item, "is not an address", why);
+    }
+    if (!is_group(address, bits)) {
+        return refuse(key, item, "is not the address of a multicast group", why);
+    }
+    if (sign == NULL || !is_interface((span_t){sign + 1, item.length - host.length - 1u})) {
+        return refuse(key, item, "does not name a network card", why);
+    }
     memcpy(field, item.at, item.length);
     return true;
 }
@@ -470,6 +517,8 @@ bool config_value_parse(const config_key_t *key, const char *text, config_t *con
         return parse_yes_no(key, whole, field, why);
     case CONFIG_ADDRESS:
         return parse_address(key, whole, field, why);
+    case CONFIG_GROUP:
+        return parse_group(key, whole, field, why);
     case CONFIG_NETWORKS:
         return parse_networks(key, text, field, why);
     case CONFIG_PATH:

@@ -135,6 +135,9 @@ void config_value_format(const config_key_t *key, const config_t *config, config
     case CONFIG_PATH:
         config_text_add(text, "%s", (const char *)field);
         break;
+    case CONFIG_GROUP:
+        config_text_add(text, "%s", *(const char *)field == '\0' ? key->words : (const char *)field);
+        break;
     case CONFIG_NETWORKS:
         format_networks(key, field, text);
         break;
@@ -242,6 +245,10 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         break;
     case CONFIG_ADDRESS:
         config_text_add(text, "a numeric IPv4 or IPv6 address");
+        break;
+    case CONFIG_GROUP:
+        config_text_add(text, "%s, or a multicast address and its network card, such as 239.1.2.3%%eth0 or ff15::9800%%eth0",
+                        key->words);
         break;
     case CONFIG_NETWORKS:
         config_text_add(text, "%s, or up to %u addresses or networks such as 192.168.7.0/24", key->words, HAL_UDP_NETWORKS_MAX);

@@ -60,7 +60,7 @@ static doctor_host_t look_at_host(void)
 static void check_port(doctor_report_t *report, const config_udp_t *udp)
 {
     linux_udp_t socket;
-    const linux_udp_config_t config = {.bind = udp->bind, .port = udp->port};
+    const linux_udp_config_t config = {.bind = udp->bind, .group = udp->group, .port = udp->port};
     if (linux_udp_open(&socket, &config) == HV_OK) {
         doctor_say(report, DOCTOR_OK, "UDP port %u is free", udp->port);
         linux_udp_close(&socket);
@@ -68,7 +68,7 @@ static void check_port(doctor_report_t *report, const config_udp_t *udp)
     }
     doctor_say(report, DOCTOR_FAIL, "%s -> %s", socket.error_text,
                socket.error == EADDRINUSE ? "end the program that `ss -ulpn` shows, or another [udp] port"
-                                          : "[udp] bind and port");
+                                          : "[udp] bind, port and group");
 }
 
 /* --- The bus --- */

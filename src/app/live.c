@@ -314,9 +314,9 @@ static bool serve(live_t *self)
 
 static void say_ready(const live_t *self, const config_t *config)
 {
-    (void)say(0, "version %s, %u cylinders, cycle %" PRIu32 " us, UDP %s port %u, control socket %s", HEAVE_VERSION,
+    (void)say(0, "version %s, %u cylinders, cycle %" PRIu32 " us, UDP %s port %u%s%s, control socket %s", HEAVE_VERSION,
               config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u, config->settings.cycle_us, config->udp.bind,
-              (unsigned)self->udp.port, self->control.path);
+              (unsigned)self->udp.port, config->udp.group[0] == '\0' ? "" : ", group ", config->udp.group, self->control.path);
 }
 
 /* The rings hold more than the buffers: what a slow reader still takes within its time. */
@@ -400,7 +400,8 @@ static int run(live_t *self, const config_t *config)
 
 static int open_udp(live_t *self, const config_t *config)
 {
-    const linux_udp_config_t udp = {.bind = config->udp.bind, .port = config->udp.port, .receive_buffer = UDP_BUFFER_BYTES};
+    const linux_udp_config_t udp = {
+        .bind = config->udp.bind, .group = config->udp.group, .port = config->udp.port, .receive_buffer = UDP_BUFFER_BYTES};
     return linux_udp_open(&self->udp, &udp) == HV_OK ? EXIT_DONE : say(EXIT_UNAVAILABLE, "%s", self->udp.error_text);
 }
 

@@ -5,6 +5,7 @@
 
 #include <arpa/inet.h>
 #include <errno.h>
+#include <net/if.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sched.h>
@@ -422,6 +423,76 @@ static void test_linux_open_receive_buffer_is_bounded(void)
     linux_udp_close(&other);
 }
 
+/* Sends one datagram to a group on the loopback interface. */
+static void send_to_group(const char *group, uint16_t port)
+{
+    struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons(port)};
+    const struct ip_mreqn on = {.imr_ifindex = (int)if_nametoindex("lo")};
+    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+    TEST_ASSERT_EQUAL_INT(1, inet_pton(AF_INET, group, &to.sin_addr));
+    TEST_ASSERT_EQUAL_INT(0, setsockopt(fd, IPPROTO_IP, IP_MULTICAST_IF, &on, sizeof on));
+    TEST_ASSERT_EQUAL_INT(3, sendto(fd, "abc", 3, 0, (struct sockaddr *)&to, sizeof to));
+    (void)close(fd);
+}
+
+static unsigned heard(linux_udp_t *socket)
+{
+    uint8_t bytes[16];
+    size_t length;
+    hal_udp_peer_t from;
+    unsigned count = 0;
+    struct pollfd readable = {.fd = socket->fd, .events = POLLIN};
+    (void)poll(&readable, 1, 50);
+    while (hal_udp_recv(linux_udp_hal(socket), bytes, sizeof bytes, &length, &from) == HV_OK) {
+        count++;
+    }
+    return count;
+}
+
+/* The group that was asked for, and none that another program has joined. */
+static void test_linux_group_is_heard_alone(void)
+{
+    static const char *const k_binds[] = {"0.0.0.0", "::"};
+    for (size_t i = 0; i < sizeof k_binds / sizeof k_binds[0]; i++) {
+        linux_udp_t member, other, plain;
+        TEST_ASSERT_EQUAL(HV_OK, linux_udp_open(&member, &(linux_udp_config_t){.bind = k_binds[i], .group = "239.77.1.2%lo"}));
+        TEST_ASSERT_EQUAL(HV_OK, linux_udp_open(&other, &(linux_udp_config_t){.bind = k_binds[i], .group = "239.77.1.3%lo"}));
+        TEST_ASSERT_EQUAL(HV_OK, linux_udp_open(&plain, &(linux_udp_config_t){.bind = k_binds[i], .group = ""}));
+        send_to_group("239.77.1.2", member.port);
+        TEST_ASSERT_EQUAL_UINT(1, heard(&member));
+        send_to_group("239.77.1.3", member.port);
+        TEST_ASSERT_EQUAL_UINT(0, heard(&member));
+        send_to_group("239.77.1.2", plain.port);
+        TEST_ASSERT_EQUAL_UINT(0, heard(&plain));
+        linux_udp_close(&member);
+        linux_udp_close(&other);
+        linux_udp_close(&plain);
+    }
+}
+
+static void test_linux_group_that_cannot_be_joined_says_why(void)
+{
+    static const struct {
+        const char *bind, *group, *text;
+        hv_status_t status;
+    } k_rows[] = {
+        {"0.0.0.0", "239.1.2.3%nonesuch0", "udp: group 239.1.2.3%nonesuch0: this machine has no network interface \"nonesuch0\"",
+         HV_ERR_IO},
+        {"0.0.0.0", "239.1.2.3", "this machine has no network interface \"\"", HV_ERR_IO},
+        {"0.0.0.0", "localhost%lo", "udp: group localhost%lo: not a numeric address", HV_ERR_ARG},
+        {"0.0.0.0", "127.0.0.1%lo", "udp: join group 127.0.0.1%lo: ", HV_ERR_IO},
+        {"0.0.0.0", "ff15::7%lo", "udp: join group ff15::7%lo: ", HV_ERR_IO},
+    };
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        linux_udp_t socket;
+        const linux_udp_config_t config = {.bind = k_rows[i].bind, .group = k_rows[i].group};
+        TEST_ASSERT_EQUAL_MESSAGE(k_rows[i].status, linux_udp_open(&socket, &config), k_rows[i].text);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(socket.error_text, k_rows[i].text), socket.error_text);
+        TEST_ASSERT_NOT_EQUAL(0, socket.error);
+        TEST_ASSERT_EQUAL(-1, socket.fd);
+    }
+}
+
 static void test_linux_close_twice_and_recv_after_it_do_no_harm(void)
 {
     uint8_t byte;
@@ -620,6 +691,8 @@ static void run_linux(void)
     RUN_TEST(test_linux_open_foreign_address_says_so);
     RUN_TEST(test_linux_open_not_an_address_is_refused);
     RUN_TEST(test_linux_open_receive_buffer_is_bounded);
+    RUN_TEST(test_linux_group_is_heard_alone);
+    RUN_TEST(test_linux_group_that_cannot_be_joined_says_why);
     RUN_TEST(test_linux_close_twice_and_recv_after_it_do_no_harm);
 }
 

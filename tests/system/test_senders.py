@@ -55,6 +55,17 @@ class Agent:
             for text in texts:
                 link.sendto(text.encode(), (to, port))
 
+    def send_to_group(self, group, port, texts):
+        """Out of the only card, whatever the routes say."""
+        family, level, option = (socket.AF_INET6, socket.IPPROTO_IPV6, socket.IPV6_MULTICAST_IF) if ":" in group else (socket.AF_INET, socket.IPPROTO_IP, socket.IP_MULTICAST_IF)
+        card = socket.if_nametoindex("eth0")
+        with socket.socket(family, socket.SOCK_DGRAM) as link:
+            link.setsockopt(level, option, card if family == socket.AF_INET6 else struct.pack("=4x4xi", card))
+            try:
+                return sum(link.sendto(text.encode(), (group, port)) > 0 for text in texts)
+            except OSError:
+                return 0  # an address of IPv6 is tried out for a second first
+
     def raw(self, to, packets, count, pause_s=0):
         """Whole IPv4 packets, by turns."""
         with socket.socket(socket.AF_INET, socket.SOCK_RAW, socket.IPPROTO_RAW) as link:
@@ -349,6 +360,25 @@ def odd_datagrams(net):
     net.down()
 
 
+def joined_groups(net):
+    """A group that was asked for is heard as any datagram is, from IPv4 and IPv6; another group is not; a card that is not there ends the start."""
+    first = net.host(FIRST)
+    for bind, group, other in (("0.0.0.0", "239.1.2.3", "239.1.2.4"), ("::", "239.1.2.3", "239.1.2.4"), ("::", "ff15::9800", "ff15::9801"), ("::", "ff02::98", "ff02::99")):
+        net.set_udp(bind=bind, group=f"{group}%br0", takeover_ms=PATIENCE_MS)
+        net.up()
+        assert f"UDP {bind} port {net.port}, group {group}%br0, control" in net.daemon.log.read_text()
+        heave.wait_for(lambda: first.send_to_group(group=group, port=net.port, texts=[FAR]), f"{FIRST} has an address to send from")
+        net.wait_height(40)
+        first.send_to_group(group=other, port=net.port, texts=[FAR])
+        first.send(to=HEAVED, port=net.port, texts=[FAR])  # comes after it
+        net.wait_more(1, "datagrams")
+        assert net.count("datagrams") == 2, (bind, group)
+        net.down()
+    net.set_udp(bind="0.0.0.0", group="239.1.2.3%eth7")
+    failed = subprocess.run([net.bin / "heaved", "--config", net.config, "--socket", net.socket], capture_output=True, text=True, timeout=heave.WAIT_S, check=False)
+    assert failed.returncode == 69 and "udp: group 239.1.2.3%eth7: this machine has no network interface \"eth7\": see `ip link`" in failed.stderr, failed
+
+
 def moved_sender(net):
     """An address that changes in the ride is another sender; a link that goes down is silence."""
     first = net.host(FIRST)
@@ -412,6 +442,7 @@ NAMES = {
     "two senders at two addresses: one drives, the other after silence or by priority": two_senders,
     "spoofed addresses: outside allow nothing, as the driver no more than the driver": spoofed,
     "broadcast, multicast, fragments": odd_datagrams,
+    "a group of [udp] group is heard, IPv4 and IPv6, and no other": joined_groups,
     "an address that changes, a link that goes down and up in the ride": moved_sender,
 }
 ON_PAPER = "reordered and duplicated frames: within the limits, and the end is the same"

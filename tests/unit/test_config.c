@@ -433,6 +433,33 @@ static const spoilt_t k_spoilt[] = {
     {"engage", "accel_mm_s2", "accel_mm_s2 = 3001",
      "[engage] accel_mm_s2: 3001 is above accel_mm_s2 of [cylinders]; allowed: at most 3000"},
     {"udp", "bind", "bind = localhost", "[udp] bind: \"localhost\" is not an address; allowed: a numeric IPv4 or IPv6 address"},
+    {"udp", "bind", "bind = 239.1.2.3",
+     "[udp] bind: \"239.1.2.3\" is a multicast group, to be joined; write bind = 0.0.0.0 and group = 239.1.2.3%eth0 (the network "
+     "card on which)"},
+    {"udp", "bind", "bind = ff15::7",
+     "[udp] bind: \"ff15::7\" is a multicast group, to be joined; write bind = :: and group = ff15::7%eth0 (the network card on "
+     "which)"},
+    {"udp", "group", "group = eth0",
+     "[udp] group: \"eth0\" is not an address; allowed: none, or a multicast address and its network card, such as "
+     "239.1.2.3%eth0 or ff15::9800%eth0"},
+    {"udp", "group", "group = 192.168.7.5%eth0",
+     "[udp] group: \"192.168.7.5%eth0\" is not the address of a multicast group; allowed: none, or a multicast address and its "
+     "network card, such as "
+     "239.1.2.3%eth0 or ff15::9800%eth0"},
+    {"udp", "group", "group = 239.1.2.3",
+     "[udp] group: \"239.1.2.3\" does not name a network card; allowed: none, or a multicast address and its network card, such "
+     "as "
+     "239.1.2.3%eth0 or ff15::9800%eth0"},
+    {"udp", "group", "group = ff02::1%",
+     "[udp] group: \"ff02::1%\" does not name a network card; allowed: none, or a multicast address and its network card, such "
+     "as "
+     "239.1.2.3%eth0 or ff15::9800%eth0"},
+    {"udp", "group", "group = 239.1.2.3%sixteen-letters-x",
+     "[udp] group: \"239.1.2.3%sixteen-letters-x\" does not name a network card; allowed: none, or a multicast address and its "
+     "network card, such as "
+     "239.1.2.3%eth0 or ff15::9800%eth0"},
+    {"udp", "group", "group = 239.1.2.3%eth0", "[udp] group: is not heard where bind is 127.0.0.1; allowed: bind = 0.0.0.0"},
+    {"udp", "group", "group = ff15::7%eth0", "[udp] group: is not heard where bind is 127.0.0.1; allowed: bind = ::"},
     {"udp", "port", "port = 0", "[udp] port: \"0\" is out of range; allowed: a whole number from 1 to 65535"},
     {"udp", "allow", "allow = 192.168.7.5/24",
      "[udp] allow: \"192.168.7.5/24\" has bits set behind its prefix; allowed: any, or up to 16 addresses or networks such as "
@@ -893,6 +920,7 @@ static void test_load_values_arrive_where_they_belong(void)
     set_key("z", "jerk_mm_s3", "2147483647");
     set_key("angle", "wrap", "shortest");
     set_key("udp", "bind", "::");
+    set_key("udp", "group", "239.1.2.3%enp0s31f6.7");
     set_key("udp", "allow", "10.1.2.3, 192.168.7.0/24, fd00:1::/32");
     set_key("udp", "dialect", "lenient");
     set_key("udp", "stream", "fast");
@@ -937,6 +965,7 @@ static void test_load_values_arrive_where_they_belong(void)
     static const uint8_t v6[16] = {0xFD, 0, 0, 1};
     static const uint8_t v4[16] = {192, 168, 7, 0};
     TEST_ASSERT_EQUAL_STRING("::", m_config.udp.bind);
+    TEST_ASSERT_EQUAL_STRING("239.1.2.3%enp0s31f6.7", m_config.udp.group);
     TEST_ASSERT_EQUAL_UINT8(3, m_config.udp.allow.count);
     TEST_ASSERT_EQUAL_UINT8(32, m_config.udp.allow.network[0].prefix);
     TEST_ASSERT_EQUAL_UINT8(24, m_config.udp.allow.network[1].prefix);
@@ -1234,6 +1263,7 @@ static void test_demo_hexapod_has_what_every_frame_needs(void)
     TEST_ASSERT_EQUAL_UINT8(12, m_config.settings.relays.count);
     TEST_ASSERT_EQUAL_UINT16(9800, m_config.udp.port);
     TEST_ASSERT_EQUAL_STRING("127.0.0.1", m_config.udp.bind);
+    TEST_ASSERT_EQUAL_STRING("", m_config.udp.group);
 }
 
 static void test_hexapod_435_puts_the_senders_lowest_and_centre_where_it_says(void)
