@@ -17,10 +17,10 @@
 #define PASS             UINT32_MAX /* bytes to keep: all */
 #define DROP             0u
 
-#define LENGTH_STEPS  3u
-#define HEAD_STEPS    (LINUX_UDP_FILTER_HEADS_MAX + 2u)
+#define LENGTH_STEPS  4u
+#define FORM_STEPS    (LINUX_UDP_PLACES_MAX * (LINUX_UDP_SET_MAX + 2u) + 1u)
 #define NETWORK_STEPS (3u + 3u * WORDS_MAX + 1u)
-#define STEPS_MAX     (LENGTH_STEPS + HEAD_STEPS + HAL_UDP_NETWORKS_MAX * NETWORK_STEPS + 1u)
+#define STEPS_MAX     (LENGTH_STEPS + LINUX_UDP_FORMS_MAX * FORM_STEPS + 1u + HAL_UDP_NETWORKS_MAX * NETWORK_STEPS + 1u)
 
 /** A program being written. */
 typedef struct {
@@ -40,18 +40,55 @@ static void put_jump(program_t *self, unsigned condition, uint32_t k, unsigned s
         (struct sock_filter){(uint16_t)(BPF_JMP | condition | BPF_K), (uint8_t)skip_if, (uint8_t)skip_if_not, k};
 }
 
-static void put_length(program_t *self, uint32_t bytes_max)
+static void put_length(program_t *self, uint32_t bytes_min, uint32_t bytes_max)
 {
     put(self, BPF_LD | BPF_W | BPF_LEN, 0);
+    put_jump(self, BPF_JGE, UDP_HEADER_BYTES + bytes_min, 0, 1);
     put_jump(self, BPF_JGT, UDP_HEADER_BYTES + bytes_max, 0, 1);
     put(self, BPF_RET | BPF_K, DROP);
 }
 
-static void put_heads(program_t *self, const uint8_t *heads, size_t count)
+static unsigned places_of(const linux_udp_form_t *form)
 {
-    put(self, BPF_LD | BPF_B | BPF_ABS, UDP_HEADER_BYTES);
-    for (size_t i = 0; i < count; i++) {
-        put_jump(self, BPF_JEQ, heads[i], (unsigned)(count - i), 0);
+    unsigned places = 0;
+    while (places < LINUX_UDP_PLACES_MAX && form->place[places].count > 0) {
+        places++;
+    }
+    return places;
+}
+
+static uint16_t form_steps(const linux_udp_form_t *form)
+{
+    unsigned steps = 1;
+    for (unsigned i = 0; i < places_of(form); i++) {
+        steps += 2u + form->place[i].count;
+    }
+    return (uint16_t)steps;
+}
+
+/* Goes on to the next form at the first place that is wrong, and behind all forms where there is none. */
+static void put_form(program_t *self, const linux_udp_form_t *form, unsigned end_of_forms)
+{
+    const unsigned next = self->count + form_steps(form);
+    for (unsigned i = 0; i < places_of(form); i++) {
+        const linux_udp_set_t *set = &form->place[i];
+        put(self, BPF_LD | BPF_B | BPF_ABS, UDP_HEADER_BYTES + i);
+        for (unsigned k = 0; k < set->count; k++) {
+            put_jump(self, BPF_JEQ, (uint8_t)set->bytes[k], set->count - k, 0);
+        }
+        put(self, BPF_JMP | BPF_JA, next - self->count - 1u);
+    }
+    put(self, BPF_JMP | BPF_JA, end_of_forms - self->count - 1u);
+}
+
+static void put_forms(program_t *self, const linux_udp_filter_t *filter)
+{
+    unsigned end = self->count + 1u;
+    for (size_t i = 0; i < filter->form_count; i++) {
+        end += form_steps(&filter->forms[i]);
+    }
+    for (size_t i = 0; i < filter->form_count; i++) {
+        put_form(self, &filter->forms[i], end);
     }
     put(self, BPF_RET | BPF_K, DROP);
 }
@@ -87,10 +124,23 @@ static void put_network(program_t *self, const hal_udp_network_t *network)
     put(self, BPF_RET | BPF_K, PASS);
 }
 
+static bool are_forms_right(const linux_udp_filter_t *filter)
+{
+    bool is_right = filter->form_count >= 1 && filter->form_count <= LINUX_UDP_FORMS_MAX;
+    for (size_t i = 0; is_right && i < filter->form_count; i++) {
+        const linux_udp_form_t *form = &filter->forms[i];
+        is_right = form->place[0].count > 0;
+        for (unsigned k = 0; k < LINUX_UDP_PLACES_MAX; k++) {
+            is_right = is_right && form->place[k].count <= LINUX_UDP_SET_MAX;
+        }
+    }
+    return is_right;
+}
+
 static bool is_right(const linux_udp_filter_t *filter)
 {
-    bool is_right = filter->head_count >= 1 && filter->head_count <= LINUX_UDP_FILTER_HEADS_MAX &&
-                    filter->allow.count <= HAL_UDP_NETWORKS_MAX && filter->bytes_max <= UINT16_MAX;
+    bool is_right = are_forms_right(filter) && filter->allow.count <= HAL_UDP_NETWORKS_MAX && filter->bytes_max <= UINT16_MAX &&
+                    filter->bytes_min <= filter->bytes_max;
     for (unsigned i = 0; is_right && i < filter->allow.count; i++) {
         const hal_udp_network_t *network = &filter->allow.network[i];
         is_right = network->prefix <= (network->is_ipv6 ? 128u : 32u);
@@ -104,8 +154,8 @@ hv_status_t linux_udp_filter_on(const linux_udp_t *self, const linux_udp_filter_
     if (!is_right(filter)) {
         return HV_ERR_ARG;
     }
-    put_length(&program, filter->bytes_max);
-    put_heads(&program, filter->heads, filter->head_count);
+    put_length(&program, filter->bytes_min, filter->bytes_max);
+    put_forms(&program, filter);
     for (unsigned i = 0; i < filter->allow.count; i++) {
         put_network(&program, &filter->allow.network[i]);
     }

@@ -29,8 +29,10 @@
 #include "say.h"
 #include "socket_path.h"
 
-#define TICK_MS          10
-#define UDP_BUFFER_BYTES 131072 /* a few cycles of the densest stream: what waits longer is old */
+#define TICK_MS 10
+/* As many short datagrams as a cycle takes, and a third more: the kernel grants twice that and charges 768 bytes and more for
+ * each. What does not fit is lost as it comes; a longer queue would have the cycle follow what is older than the one before. */
+#define UDP_BUFFER_BYTES 32768
 #define QUIT_WAIT_MS     1000
 #define FIRST_CYCLE_US   500000u
 #define END_WAIT_US      2000000u
@@ -149,14 +151,28 @@ static int close_file(out_file_t *file, const char *path, const ring_t *ring, co
 
 /* --- Floods --- */
 
-/* Only what no frame begins with: the scanner passes over blanks and ends of lines. */
+#define FRAME_BYTES_MIN 9u /* A3:0,0,0# */
+
+/* Only what no frame begins with, as far as its command: the scanner passes over blanks and ends of lines. */
 static linux_udp_filter_t filter_of(const config_t *config)
 {
-    static const uint8_t k_v3[] = {'@', ' ', '\t', '\r', '\n', '\0'};
-    static const uint8_t k_lenient[] = {'@', '#', 'A', 'C', 'a', 'c', ' ', '\t', '\r', '\n', '\0'};
+#define WHITE                                                                                                                    \
+    {                                                                                                                            \
+        {                                                                                                                        \
+            LINUX_UDP_SET(" \t\r\n\0")                                                                                           \
+        }                                                                                                                        \
+    }
+    static const linux_udp_form_t k_v3[] = {
+        {{LINUX_UDP_SET("@"), LINUX_UDP_SET("AC"), LINUX_UDP_SET("3467"), LINUX_UDP_SET(":T")}}, WHITE};
+    static const linux_udp_form_t k_lenient[] = {
+        {{LINUX_UDP_SET("@#"), LINUX_UDP_SET("ACac"), LINUX_UDP_SET("3467"), LINUX_UDP_SET(":Tt")}},
+        {{LINUX_UDP_SET("ACac"), LINUX_UDP_SET("3467"), LINUX_UDP_SET(":Tt")}},
+        WHITE};
+#undef WHITE
     const bool is_lenient = config->settings.dialect == FRAME_LENIENT;
-    return (linux_udp_filter_t){.heads = is_lenient ? k_lenient : k_v3,
-                                .head_count = is_lenient ? sizeof k_lenient : sizeof k_v3,
+    return (linux_udp_filter_t){.forms = is_lenient ? k_lenient : k_v3,
+                                .form_count = is_lenient ? sizeof k_lenient / sizeof k_lenient[0] : sizeof k_v3 / sizeof k_v3[0],
+                                .bytes_min = FRAME_BYTES_MIN,
                                 .bytes_max = GATEWAY_DATAGRAM_MAX,
                                 .allow = config->udp.allow};
 }

@@ -529,11 +529,11 @@ static void test_waited_is_since_the_arrival(void)
 
 /* Filters. */
 
-static const uint8_t k_heads[] = {'@', ' ', 0};
+static const linux_udp_form_t k_first[] = {{{LINUX_UDP_SET("@ \0")}}};
 
 static linux_udp_filter_t filter_of(const hal_udp_network_t *networks, uint8_t count)
 {
-    linux_udp_filter_t filter = {.heads = k_heads, .head_count = sizeof k_heads, .bytes_max = 100, .allow = {.count = count}};
+    linux_udp_filter_t filter = {.forms = k_first, .form_count = 1, .bytes_max = 100, .allow = {.count = count}};
     for (unsigned i = 0; i < count; i++) {
         filter.allow.network[i] = networks[i];
     }
@@ -561,13 +561,43 @@ static void test_filter_head_byte_decides(void)
     TEST_ASSERT_EQUAL(HV_OK, linux_udp_filter_on(&lin, &filter));
     for (unsigned byte = 0; byte < 256; byte++) {
         const uint8_t data[2] = {(uint8_t)byte, '@'};
-        assert_comes(data, sizeof data, memchr(k_heads, (int)byte, sizeof k_heads) != NULL);
+        assert_comes(data, sizeof data, byte == '@' || byte == ' ' || byte == 0);
     }
     assert_comes("", 0, false);
     linux_udp_filter_off(&lin);
     linux_udp_filter_off(&lin);
     assert_comes("x", 1, true);
     assert_comes("", 0, true);
+}
+
+/* Every byte at every place of two forms, the others right. */
+static void test_filter_each_place_decides(void)
+{
+    static const linux_udp_form_t k_forms[] = {
+        {{LINUX_UDP_SET("@#"), LINUX_UDP_SET("AC"), LINUX_UDP_SET("12345678"), LINUX_UDP_SET(":")}},
+        {{LINUX_UDP_SET(" "), LINUX_UDP_SET("A")}}};
+    linux_udp_filter_t filter = filter_of(NULL, 0);
+    filter.forms = k_forms;
+    filter.form_count = 2;
+    TEST_ASSERT_EQUAL(HV_OK, linux_udp_filter_on(&lin, &filter));
+    for (unsigned place = 0; place < 4; place++) {
+        for (unsigned byte = 0; byte < 256; byte++) {
+            char data[6] = "#C8:zz";
+            const linux_udp_set_t *set = &k_forms[0].place[place];
+            data[place] = (char)byte;
+            const hal_udp_peer_t peer = send_linux(data, sizeof data);
+            if (memchr(set->bytes, (int)byte, set->count) != NULL) {
+                assert_received(data, sizeof data, &peer);
+            }
+            (void)send_linux(" A", 2);
+            assert_received(" A", 2, &peer);
+        }
+    }
+    (void)send_linux("@A3", 3); /* ends before the form does */
+    (void)send_linux(" B3:", 4);
+    const hal_udp_peer_t peer = send_linux("@A3:", 4);
+    assert_received("@A3:", 4, &peer);
+    assert_none_waiting();
 }
 
 static void test_filter_length_decides(void)
@@ -579,6 +609,12 @@ static void test_filter_length_decides(void)
     assert_comes(k_data, 100, true);
     assert_comes(k_data, 101, false);
     assert_comes(k_data, sizeof k_data, false);
+    linux_udp_filter_t least = filter;
+    least.bytes_min = 2;
+    TEST_ASSERT_EQUAL(HV_OK, linux_udp_filter_on(&lin, &least));
+    (void)send_linux("@", 1);
+    const hal_udp_peer_t peer = send_linux("@x", 2);
+    assert_received("@x", 2, &peer);
 }
 
 /* So many are dropped from now on, and nothing comes through; known although nothing does. */
@@ -655,9 +691,18 @@ static void test_filter_what_is_out_of_range_is_refused(void)
     linux_udp_filter_t filter = filter_of(&too_long, 1);
     TEST_ASSERT_EQUAL(HV_ERR_ARG, linux_udp_filter_on(&lin, &filter));
     filter = filter_of(NULL, 0);
-    filter.head_count = 0;
+    filter.form_count = 0;
     TEST_ASSERT_EQUAL(HV_ERR_ARG, linux_udp_filter_on(&lin, &filter));
-    filter.head_count = LINUX_UDP_FILTER_HEADS_MAX + 1u;
+    filter.form_count = LINUX_UDP_FORMS_MAX + 1u;
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, linux_udp_filter_on(&lin, &filter));
+    static const linux_udp_form_t k_empty = {{{NULL, 0}}}, k_many = {{{"@@@@@@@@@", LINUX_UDP_SET_MAX + 1u}}};
+    filter = filter_of(NULL, 0);
+    filter.forms = &k_empty;
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, linux_udp_filter_on(&lin, &filter));
+    filter.forms = &k_many;
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, linux_udp_filter_on(&lin, &filter));
+    filter = filter_of(NULL, 0);
+    filter.bytes_min = filter.bytes_max + 1u;
     TEST_ASSERT_EQUAL(HV_ERR_ARG, linux_udp_filter_on(&lin, &filter));
     filter = filter_of(NULL, 0);
     filter.allow.count = HAL_UDP_NETWORKS_MAX + 1u;
@@ -672,6 +717,7 @@ static void run_sockets(void)
 {
     RUN_TEST(test_waited_is_since_the_arrival);
     RUN_TEST(test_filter_head_byte_decides);
+    RUN_TEST(test_filter_each_place_decides);
     RUN_TEST(test_filter_length_decides);
     RUN_TEST(test_filter_drops_are_counted_at_once);
     RUN_TEST(test_filter_networks_decide);

@@ -205,8 +205,8 @@ static void assert_receives(void)
 
 static void try_udp(void)
 {
-    static const uint8_t k_heads[] = {'@', '!'};
-    const linux_udp_filter_t filter = {.heads = k_heads, .head_count = 2, .bytes_max = 1000};
+    static const linux_udp_form_t k_form = {{LINUX_UDP_SET("@!")}};
+    const linux_udp_filter_t filter = {.forms = &k_form, .form_count = 1, .bytes_max = 1000};
     size_t length;
     uint32_t dropped = 77;
     failing_begin();

@@ -5,6 +5,7 @@ is useless is kept from the program until it is over."""
 import argparse
 import contextlib
 import math
+import signal
 import subprocess
 import sys
 import threading
@@ -30,7 +31,9 @@ while sent < least or not select.select([sys.stdin], [], [], 0)[0]:
             sent += 1
 print(sent)
 """
+PER_CYCLE = 64  # datagrams that a cycle takes, GATEWAY_DATAGRAMS_PER_CYCLE
 GARBAGE = [b"\x80\x21" * 30, b"hello", bytes(range(1, 9)), b"{\"speed\": 1}", b"@A6:1" * 200]
+LOOKS_LIKE_FRAMES = [b"@@@@@@@@@@@@", b"@Axyz:1,2,3,0#", b"@B6:1,2,3,4,5,6,0#", b"@A9:1,2,3,4,5,6,0#", b"@A6;1,2,3,4,5,6,0#", b"@A6:1#"]
 STRANGER = [b"@A6:9,9,9,50,50,50,FFF#", b"@A6T:9,9,9,50,50,50,0#"]
 
 
@@ -149,8 +152,72 @@ def is_told_again(bench, daemon):
         heave.wait_for(lambda: bench.status()["counters"]["rejected"]["no_head"] == before + 1, "a wrong frame is counted by its reason")
 
 
+# Sends frames that tell by their height when they were sent, at two rates, one after the other; says how many that were.
+TIMED = """
+import socket, sys, time
+link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+link.connect(("127.0.0.1", int(sys.argv[1])))
+sent = 0
+for rate, seconds in ((500, 1), (90000, 3)):
+    begin, count = time.monotonic(), 0
+    while time.monotonic() < begin + seconds:
+        while count < (time.monotonic() - begin) * rate:
+            link.send(b"@A6:0,0,0,0,0,%.4f#" % (time.monotonic() % 30 * 1000))
+            count += 1
+    sent += count
+print(sent)
+"""
+
+
+def ages_of(record):
+    """Of the newest frame of each cycle, in ms, in order: against the youngest one of all."""
+    late, newest = 0, {}
+    for line in record.read_text(encoding="utf-8").splitlines():
+        at, _, text = line.partition(" ")
+        if text.startswith("!late "):
+            late += int(text.split()[1])
+        elif text.startswith("@A6:0,0,0,0,0,"):
+            newest[float(at) + late] = float(text[:-1].rsplit(",", 1)[1])
+    ages = [(at - sent) % 30000 for at, sent in newest.items()]
+    return [age - min(ages) for age in ages[600:]]
+
+
+def driver_floods(bench):
+    """What is followed is new all the same: half of the cycles have a frame of the last two ms."""
+    record = bench.folder / "record.txt"
+    daemon = bench.start("--record", record)
+    bench.wait_state("ENGAGED")
+    sent = int(subprocess.run([sys.executable, "-c", TIMED, str(bench.port)], stdout=subprocess.PIPE, check=True).stdout)
+    counters = bench.status()["counters"]
+    assert counters["accepted"]["A6"] + counters["lost_in_kernel"] == sent, (sent, counters)
+    assert bench.stop(daemon) == 0
+    ages = sorted(ages_of(record))
+    assert len(ages) > 1000, len(ages)
+    print("# figure " + ", ".join(f"{share * 100:.0f} % up to {ages[int(len(ages) * share)]:.2f} ms" for share in (0.5, 0.9, 0.99)) + " old in a flood of the driver's")
+    assert ages[len(ages) // 2] < 2, ages[len(ages) // 2]
+
+
+def queue_is_short(bench):
+    """What came while heaved could not run is not followed for cycles: the queue has room for one cycle's frames, and not for three."""
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    with bench.sender() as sender:
+        daemon.send_signal(signal.SIGSTOP)
+        time.sleep(0.1)
+        for _ in range(1000):
+            sender.send("@A6:0,0,0,0,0,1#")
+        before = lost_on_the_way()
+        daemon.send_signal(signal.SIGCONT)
+        counters = heave.wait_for(lambda: (lambda all: all if all["datagrams"] + all["lost_in_kernel"] == 1000 else None)(bench.status()["counters"]), "what waits is taken")
+        assert 20 <= counters["datagrams"] <= 3 * PER_CYCLE or before != lost_on_the_way(), counters
+    assert bench.stop(daemon) == 0
+
+
 CASES = {
+    "a flood of valid frames from the sender that drives: what is followed is new": driver_floods,
+    "what came while heaved could not run is little": queue_is_short,
     "a flood beside a good stream is kept from the program": lambda bench: is_kept_out(bench, "127.0.0.1", 200_000, GARBAGE),
+    "a flood of what begins as a frame does beside a good stream": lambda bench: is_kept_out(bench, "127.0.0.1", 200_000, LOOKS_LIKE_FRAMES),
     "a flood of valid frames from a sender that is not allowed": lambda bench: is_kept_out(bench, "127.0.0.2", 50_000, STRANGER, udp__allow="127.0.0.1"),
 }
 
