@@ -119,6 +119,7 @@ typedef struct {
     bool has_sent;
     uint32_t status;
     uint32_t fault_code;
+    drive_guard_t guard;
     uint64_t mark_us;        /**< of the request, of the end of homing: actual has to be newer */
     uint64_t told_us;        /**< the last command went out */
     uint64_t reset_until_us; /**< until then a fault may end; 0: no reset goes on */

@@ -164,6 +164,7 @@ typedef struct {
     uint64_t operating_us; /* operation enabled since, 0 = not */
     uint64_t stopping_us;  /* quick stop since, 0 = not */
     uint32_t own_fault;    /* found by this driver: cia402_trouble_t or a number of the standard; 0 = none */
+    drive_guard_t guard;   /* why own_fault, where its set-points were too far */
     uint16_t error_code;   /* the drive's own */
     uint8_t error_register;
     bool is_error_read;

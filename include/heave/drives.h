@@ -18,8 +18,21 @@ typedef enum {
     DRIVE_ENABLING, /**< on the way to DRIVE_ENABLED; may hold the position already */
     DRIVE_ENABLED,  /**< follows the set-points */
     DRIVE_HOMING,   /**< moves by itself to find its zero; set-points are ignored */
-    DRIVE_FAULT     /**< stopped itself; fault_code says why. Left only by DRIVES_RESET_FAULT */
+    DRIVE_FAULT /**< stopped itself, or was stopped by what guard tells; fault_code says why. Left only by DRIVES_RESET_FAULT */
 } drive_state_t;
+
+/** What heaved itself found between a drive's set-points and its position; such a set-point has not been sent. All 0: nothing. */
+typedef struct {
+    q32_t jump_q32;    /**< so far from the set-point before [mm, deg], which is too far; else 0 */
+    q32_t lag_q32;     /**< so far from actual, which is too far; else 0 */
+    q32_t allowed_q32; /**< so far it may be */
+} drive_guard_t;
+
+/** Whether anything was found. */
+static inline bool drive_guard_is_found(const drive_guard_t *guard)
+{
+    return guard->jump_q32 != 0 || guard->lag_q32 != 0;
+}
 
 /** What one drive reports. */
 typedef struct {
@@ -31,6 +44,7 @@ typedef struct {
     q32_t actual_mm_q32; /**< extension [mm], or angle [deg] of the rotation motor; jumps when homing ends */
     uint64_t actual_us;  /**< when actual was measured or received; an old value means stale feedback */
     uint32_t fault_code; /**< the device's own code (16 bits), or the driver's (more), 0 = none; in DRIVE_FAULT, DRIVE_OFFLINE */
+    drive_guard_t guard; /**< why DRIVE_FAULT, where the drive itself has not found it */
 } drive_feedback_t;
 
 /** What one drive is at, in words for people. Constant texts, "" where there is nothing to say; never NULL. */

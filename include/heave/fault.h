@@ -16,8 +16,9 @@ typedef enum {
     FAULT_DRIVE_DROPPED, /**< a drive left the enabled state by itself */
     FAULT_DRIVE_TIMEOUT, /**< enabling or homing took too long */
     FAULT_BUS,           /**< the drives' bus is gone or takes no set-points */
-    FAULT_FOLLOWING,     /**< a cylinder is too far from its set-point for too long */
+    FAULT_FOLLOWING,     /**< an axis is too far from its set-point for too long, or from one that was then not sent */
     FAULT_BUS_FAILING,   /**< the drives' bus still works, but may be lost at any moment */
+    FAULT_SETPOINT_JUMP, /**< a set-point jumped away from its drive, and was not sent */
     FAULT_CODES
 } fault_code_t;
 
@@ -34,6 +35,9 @@ fault_reaction_t fault_reaction(fault_code_t code);
 
 /** What has happened, in English: constant text. */
 const char *fault_text(fault_code_t code);
+
+/** Whether a drive has found it, rather than heaved. */
+bool fault_is_found_by_drive(fault_code_t code);
 
 /** Whether it is of one axis: of a drive, or of what hangs on it. */
 bool fault_is_of_axis(fault_code_t code);

@@ -204,7 +204,8 @@ typedef struct {
     uint64_t read_us;        /**< the feedback that is being read was begun */
     uint64_t mark_us;        /**< feedback has to be begun after that */
     uint64_t reset_until_us; /**< 0: no reset goes on */
-    uint64_t since_us;       /**< of the phase */
+    drive_guard_t guard;
+    uint64_t since_us; /**< of the phase */
     uint64_t trouble_us;
 } modbus_drive_axis_t;
 

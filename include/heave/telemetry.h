@@ -20,6 +20,8 @@ typedef struct {
     uint8_t axis;         /**< 1-based: cylinder, or cylinders + 1 for the rotation motor; 0 where none is concerned */
     uint32_t device_code; /**< the drive's own code */
     uint64_t at_us;
+    q32_t off_q32;     /**< of a distance that heaved found [mm, deg]: how far off, */
+    q32_t allowed_q32; /**< and how far it may be; 0: the fault is not about a distance */
 } fault_t;
 
 /** Counters since the start; they wrap. */

@@ -5,7 +5,7 @@
 #ifndef HEAVE_TEXT_H
 #define HEAVE_TEXT_H
 
-#include "heave/status.h"
+#include "heave/fx.h"
 
 /** A line being built in the caller's buffer. */
 typedef struct {
@@ -30,6 +30,10 @@ void text_put_u32(text_t *self, uint32_t number);
 /*@ requires \valid(self);
     assigns *self \from *self; */
 void text_put_hex(text_t *self, uint32_t number, unsigned digits_min);
+
+/** Appends a value with decimals, to the nearest.
+ *  @param decimals at most 3 */
+void text_put_q32(text_t *self, q32_t value_q32, unsigned decimals);
 
 /** Appends bytes that came from outside: printable ASCII as it is, the rest (and the backslash) as C escapes. */
 void text_put_escaped(text_t *self, const uint8_t *bytes, size_t length);

@@ -421,6 +421,21 @@ static const char *flag_words(const char *flag)
     return flag;
 }
 
+/* What heaved itself has found an axis to be off. */
+static void draw_distance(view_t *self, const cJSON *fault, const char *unit)
+{
+    char off[16], allowed[16];
+    (void)snprintf(off, sizeof off, "off_%s", unit);
+    (void)snprintf(allowed, sizeof allowed, "allowed_%s", unit);
+    if (!cJSON_IsNumber(member(fault, off))) {
+        return;
+    }
+    const bool is_chinese = self->style->is_chinese && self->style->is_utf8;
+    put(self, is_chinese ? "  由 heaved 发现：偏差 %.2f %s，允许 %.2f %s" : "  found  by heaved: %.2f %s off, allowed %.2f %s",
+        number(fault, off), unit, number(fault, allowed), unit);
+    end_line(self);
+}
+
 static void draw_fault(view_t *self, const cJSON *status)
 {
     const cJSON *fault = member(status, "fault");
@@ -449,6 +464,8 @@ static void draw_fault(view_t *self, const cJSON *status)
     put_colour(self, is_faulty ? PLAIN : "");
     end_line(self);
     if (is_faulty) {
+        draw_distance(self, fault, "mm");
+        draw_distance(self, fault, "deg");
         put(self, "  cause  ");
         put_words(self, fault, "cause");
         end_line(self);

@@ -27,8 +27,8 @@ static const char k_bad_late[] = "!late without its number of cycles; 0 to 42949
 static const char k_bad_from[] = "!from without a numeric address; 192.168.1.20, ::1 and fe80::1%2 show what is allowed";
 static const char k_bad_drive[] =
     "!drive without its number from 1 to 7 and what it did; N fault CODE (hexadecimal), N offline and N back are allowed";
-static const char k_bad_fault[] = "!fault without its code; drive-fault N, drive-offline N, drive-dropped N and following-error "
-                                  "N (N from 1 to 7), drive-timeout, "
+static const char k_bad_fault[] = "!fault without its code; drive-fault N, drive-offline N, drive-dropped N, following-error N "
+                                  "and setpoint-jump N (N from 1 to 7), drive-timeout, "
                                   "bus-lost and bus-failing are allowed";
 static const char k_bad_request[] =
     "unknown request; !engage !hold !resume !park !reset !shutdown, !intensity N (0 to 100), !estop on, !estop off, "

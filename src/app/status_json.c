@@ -51,6 +51,27 @@ static const char *device_text(const snapshot_t *s)
     return is_told ? s->report[fault->axis - 1u].trouble : "";
 }
 
+static const char *found_by(fault_code_t code)
+{
+    if (code == FAULT_NONE) {
+        return "";
+    }
+    return fault_is_found_by_drive(code) ? "drive" : "heaved";
+}
+
+/* How far off a cylinder is in mm, or the rotation motor in deg; null where the fault is not about that. */
+static void write_distance(json_t *json, const snapshot_t *s, bool is_angle)
+{
+    const bool is_there = s->fault.allowed_q32 != 0 && (s->fault.axis > s->cylinders) == is_angle;
+    if (is_there) {
+        json_q32(json, is_angle ? "off_deg" : "off_mm", s->fault.off_q32);
+        json_q32(json, is_angle ? "allowed_deg" : "allowed_mm", s->fault.allowed_q32);
+    } else {
+        json_null(json, is_angle ? "off_deg" : "off_mm");
+        json_null(json, is_angle ? "allowed_deg" : "allowed_mm");
+    }
+}
+
 static void write_fault(json_t *json, const snapshot_t *s)
 {
     const fault_help_t *help = fault_help(s->fault.code);
@@ -60,6 +81,9 @@ static void write_fault(json_t *json, const snapshot_t *s)
     json_number(json, "axis", s->fault.axis);
     json_number(json, "device_code", s->fault.device_code);
     json_text(json, "device_text", device_text(s));
+    json_text(json, "found_by", found_by(s->fault.code));
+    write_distance(json, s, false);
+    write_distance(json, s, true);
     json_ms(json, "at_ms", s->fault.at_us);
     json_text(json, "reaction", fault_reaction_name(s->reaction));
     json_text(json, "text", fault_text(s->fault.code));

@@ -2,6 +2,7 @@
  * cia402.c - CANopen drives behind drives.h: the bus, SYNC, heartbeat, set-points, requests; see cia402.h.
  */
 #include "heave/cia402.h"
+#include "heave/guard.h"
 
 #include "cia402_report.h"
 #include "cia402_stage.h"
@@ -235,22 +236,29 @@ static int32_t wrap(int64_t counts)
 }
 
 /* A set-point that jumps is a fault instead: from actual at first, later from the one before. In PP not every one is sent. */
-static bool is_jump(const cia402_t *self, unsigned k, q32_t setpoint_q32)
+static guard_limits_t limits_of(const cia402_t *self, unsigned k)
 {
     const cia402_axis_t *axis = &self->axis[k];
     const cia402_axis_config_t *own = &self->config->axis[k];
-    const q32_t from_q32 = axis->has_sent ? axis->sent_q32 : axis->actual_q32;
     const bool is_step = self->config->mode != CIA402_MODE_PP || !axis->has_sent;
-    return (is_step && fx_abs(fx_sub_sat(setpoint_q32, from_q32)) > own->step_max_q32) ||
-           (own->following_max_q32 != 0 && fx_abs(fx_sub_sat(setpoint_q32, axis->actual_q32)) > own->following_max_q32);
+    return (guard_limits_t){.from_q32 = axis->has_sent ? axis->sent_q32 : axis->actual_q32,
+                            .step_max_q32 = is_step ? own->step_max_q32 : INT64_MAX,
+                            .actual_q32 = axis->actual_q32,
+                            .window_q32 = own->following_max_q32};
 }
 
 static void take_setpoint(cia402_t *self, unsigned k, q32_t setpoint_q32)
 {
     cia402_axis_t *axis = &self->axis[k];
+    const guard_limits_t limits = limits_of(self, k);
+    drive_guard_t guard = guard_judge(setpoint_q32, &limits);
     int64_t counts = 0;
-    if (is_jump(self, k, setpoint_q32) || counts_from_units(&self->config->axis[k].scale, setpoint_q32, &counts) != HV_OK) {
+    if (!drive_guard_is_found(&guard) && counts_from_units(&self->config->axis[k].scale, setpoint_q32, &counts) != HV_OK) {
+        guard = guard_out_of_counts(setpoint_q32, &limits);
+    }
+    if (drive_guard_is_found(&guard)) {
         cia402_axis_fail(cia402_drive(self, k), CIA402_FOLLOWING_ERROR);
+        axis->guard = guard;
         return;
     }
     axis->target_counts = wrap(counts);

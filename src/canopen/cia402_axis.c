@@ -74,6 +74,7 @@ void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why)
     self->is_homed = drive.own->homing_method == 0;
     self->homing = CIA402_HOMING_NO;
     self->own_fault = 0;
+    self->guard = (drive_guard_t){.jump_q32 = 0};
     self->error_code = 0;
     self->reset_syncs = 0;
     self->reset_until_us = 0;
@@ -91,6 +92,7 @@ void cia402_axis_fail(cia402_drive_t drive, uint32_t code)
 {
     cia402_axis_t *self = drive.axis;
     self->own_fault = code;
+    self->guard = (drive_guard_t){.jump_q32 = 0};
     self->is_in = false;
     self->goal = CIA402_GOAL_STOP;
     self->trouble_us = drive.now_us;
@@ -100,6 +102,7 @@ void cia402_axis_reset(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     self->own_fault = 0;
+    self->guard = (drive_guard_t){.jump_q32 = 0};
     self->warned_object = 0;
     if (self->phase == CIA402_REFUSED) {
         self->is_reset_done = false;

@@ -6,6 +6,7 @@
 #include "cia402_axis.h"
 #include "cia402_objects.h"
 #include "heave/canopen_text.h"
+#include "heave/guard.h"
 
 static bool is_faulty(const cia402_axis_t *axis)
 {
@@ -57,6 +58,7 @@ void cia402_report_feedback(const cia402_t *self, uint8_t index, drive_feedback_
         .actual_mm_q32 = axis->actual_q32,
         .actual_us = axis->actual_us,
         .fault_code = fault_code(axis, state),
+        .guard = state == DRIVE_FAULT ? axis->guard : (drive_guard_t){.jump_q32 = 0},
     };
 }
 
@@ -164,7 +166,7 @@ void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *ou
     *out = (drive_report_t){
         .address = self->config->axis[index].node,
         .phase = phase_text(self, index),
-        .trouble = code_text(code),
+        .trouble = drive_guard_is_found(&axis->guard) && code == axis->own_fault ? guard_text(&axis->guard) : code_text(code),
         .code = code,
         .object = object_of(axis),
         .detail = detail_text(axis),

@@ -185,7 +185,9 @@ static hv_status_t send_setpoint(canraw_t *self, unsigned k, q32_t setpoint_q32)
         return HV_OK;
     }
     if (pack_setpoint(self, k, setpoint_q32, &counts, data) != HV_OK) {
-        canraw_axis_fault(axis, self->map, CANRAW_FAULT_FOLLOWING);
+        const guard_limits_t limits = canraw_axis_limits(axis, &self->map->axis[k]);
+        const drive_guard_t guard = guard_out_of_counts(setpoint_q32, &limits);
+        canraw_axis_fault_of_guard(axis, self->map, &guard);
         return HV_OK;
     }
     if (!self->map->is_on_change || !axis->has_sent || counts != axis->sent_counts) {

@@ -43,8 +43,15 @@ void canraw_axis_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t co
 {
     self->state = DRIVE_FAULT;
     self->fault_code = code;
+    self->guard = (drive_guard_t){.jump_q32 = 0};
     self->reset_until_us = 0;
     tell_stop(self, map);
+}
+
+void canraw_axis_fault_of_guard(canraw_axis_t *self, const canraw_map_t *map, const drive_guard_t *guard)
+{
+    canraw_axis_fault(self, map, CANRAW_FAULT_FOLLOWING);
+    self->guard = *guard;
 }
 
 /* --- Received --- */
@@ -75,6 +82,7 @@ static void take_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t st
         if (self->state != DRIVE_FAULT) {
             self->state = DRIVE_FAULT;
             self->fault_code = status != 0 ? status : 1u;
+            self->guard = (drive_guard_t){.jump_q32 = 0};
             const bool is_stopping = self->pending == CANRAW_STOP || self->pending == CANRAW_DISABLE;
             self->pending = is_stopping ? self->pending : CANRAW_NOTHING;
         }
@@ -251,14 +259,20 @@ bool canraw_axis_is_streaming(const canraw_axis_t *self, const canraw_map_t *map
     return self->is_online && (self->state == DRIVE_ENABLED || (self->state == DRIVE_ENABLING && has(map, CANRAW_ENABLE)));
 }
 
+guard_limits_t canraw_axis_limits(const canraw_axis_t *self, const canraw_axis_map_t *axis)
+{
+    return (guard_limits_t){.from_q32 = self->has_sent ? self->sent_q32 : self->actual_q32,
+                            .step_max_q32 = axis->step_max_q32,
+                            .actual_q32 = self->actual_q32,
+                            .window_q32 = axis->following_max_q32};
+}
+
 void canraw_axis_watch(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, q32_t setpoint_q32)
 {
-    const q32_t from_q32 = self->has_sent ? self->sent_q32 : self->actual_q32;
-    const bool is_jump = fx_abs(fx_sub_sat(setpoint_q32, from_q32)) > axis->step_max_q32;
-    const bool is_far =
-        axis->following_max_q32 != 0 && fx_abs(fx_sub_sat(setpoint_q32, self->actual_q32)) > axis->following_max_q32;
-    if (is_jump || is_far) {
-        canraw_axis_fault(self, map, CANRAW_FAULT_FOLLOWING);
+    const guard_limits_t limits = canraw_axis_limits(self, axis);
+    const drive_guard_t guard = guard_judge(setpoint_q32, &limits);
+    if (drive_guard_is_found(&guard)) {
+        canraw_axis_fault_of_guard(self, map, &guard);
     }
 }
 
@@ -288,5 +302,6 @@ void canraw_axis_report(const canraw_axis_t *self, drive_feedback_t *feedback)
         .actual_mm_q32 = self->actual_q32,
         .actual_us = self->actual_us,
         .fault_code = self->state == DRIVE_FAULT ? self->fault_code : 0,
+        .guard = self->state == DRIVE_FAULT ? self->guard : (drive_guard_t){.jump_q32 = 0},
     };
 }

@@ -6,6 +6,7 @@
 #define CANRAW_AXIS_H
 
 #include "heave/canraw.h"
+#include "heave/guard.h"
 
 /** A drive of which nothing has been heard (any more). */
 void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map);
@@ -33,6 +34,12 @@ void canraw_axis_watch(canraw_axis_t *self, const canraw_map_t *map, const canra
 
 /** The drive stops in DRIVE_FAULT, by the map's stop frame, else its disable frame, else by hearing nothing more. */
 void canraw_axis_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t code);
+
+/** Fails for its set-points. */
+void canraw_axis_fault_of_guard(canraw_axis_t *self, const canraw_map_t *map, const drive_guard_t *guard);
+
+/** What a set-point of it is measured against. */
+guard_limits_t canraw_axis_limits(const canraw_axis_t *self, const canraw_axis_map_t *axis);
 
 /** What to ask it in this round; notes it as asked. */
 canraw_asked_t canraw_axis_next_query(canraw_axis_t *self, const canraw_map_t *map);

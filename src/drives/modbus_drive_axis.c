@@ -88,9 +88,24 @@ static void fail(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint3
 {
     enter(self, MODBUS_DRIVE_FAULT, now_us);
     note_trouble(self, code, 0, now_us);
+    self->guard = (drive_guard_t){.jump_q32 = 0};
     self->reset_until_us = 0;
     self->is_reset_due = false;
     tell_stop(self, map);
+}
+
+static guard_limits_t limits_of(const modbus_drive_axis_t *self, const modbus_drive_axis_map_t *axis)
+{
+    return (guard_limits_t){.from_q32 = self->has_sent ? self->asked_q32 : self->actual_q32,
+                            .step_max_q32 = axis->step_max_q32,
+                            .actual_q32 = self->actual_q32,
+                            .window_q32 = axis->following_max_q32};
+}
+
+static void fail_of_guard(modbus_drive_axis_t *self, const modbus_drive_map_t *map, drive_guard_t guard, uint64_t now_us)
+{
+    fail(self, map, MODBUS_DRIVE_FOLLOWING, now_us);
+    self->guard = guard;
 }
 
 static bool is_up(const modbus_drive_axis_t *self)
@@ -702,19 +717,18 @@ void modbus_drive_axis_offer(modbus_drive_axis_t *self, const modbus_drive_map_t
     self->target_speed = speed_of(self, map, axis, fx_sub_sat(self->offered_q32, self->written_q32));
     self->is_fresh = true;
     if (counts_from_units(&axis->scale, self->offered_q32, &self->target_counts) != HV_OK) {
-        fail(self, map, MODBUS_DRIVE_FOLLOWING, now_us);
+        const guard_limits_t limits = limits_of(self, axis);
+        fail_of_guard(self, map, guard_out_of_counts(self->offered_q32, &limits), now_us);
     }
 }
 
 void modbus_drive_axis_watch(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,
                              q32_t setpoint_q32, uint64_t now_us)
 {
-    const q32_t from_q32 = self->has_sent ? self->asked_q32 : self->actual_q32;
-    const bool is_jump = fx_abs(fx_sub_sat(setpoint_q32, from_q32)) > axis->step_max_q32;
-    const bool is_far =
-        axis->following_max_q32 != 0 && fx_abs(fx_sub_sat(setpoint_q32, self->actual_q32)) > axis->following_max_q32;
-    if (is_jump || is_far) {
-        fail(self, map, MODBUS_DRIVE_FOLLOWING, now_us);
+    const guard_limits_t limits = limits_of(self, axis);
+    const drive_guard_t guard = guard_judge(setpoint_q32, &limits);
+    if (drive_guard_is_found(&guard)) {
+        fail_of_guard(self, map, guard, now_us);
         return;
     }
     self->asked_q32 = setpoint_q32;

@@ -5,6 +5,7 @@
 #ifndef MODBUS_DRIVE_AXIS_H
 #define MODBUS_DRIVE_AXIS_H
 
+#include "heave/guard.h"
 #include "heave/modbus_drive.h"
 
 /** Whether the driver can use a map. */

@@ -43,6 +43,7 @@ void modbus_drive_axis_feedback(const modbus_drive_axis_t *self, drive_feedback_
         .actual_mm_q32 = self->actual_q32,
         .actual_us = self->actual_us,
         .fault_code = code_of(self),
+        .guard = self->phase == MODBUS_DRIVE_FAULT ? self->guard : (drive_guard_t){.jump_q32 = 0},
     };
 }
 
@@ -107,7 +108,8 @@ void modbus_drive_axis_words(const modbus_drive_axis_t *self, const modbus_drive
         .is_modbus = true,
         .address = unit,
         .phase = phase_text(self),
-        .trouble = trouble_text(self->trouble),
+        .trouble = drive_guard_is_found(&self->guard) && self->trouble == MODBUS_DRIVE_FOLLOWING ? guard_text(&self->guard)
+                                                                                                 : trouble_text(self->trouble),
         .code = self->trouble,
         .object = object_of(self, map),
         .detail = is_exception ? exception_text(self->exception) : "",

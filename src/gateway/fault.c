@@ -17,6 +17,7 @@ static const row_t k_rows[FAULT_CODES] = {
     [FAULT_BUS] = {FAULT_REACT_SILENT, "the bus of the drives is lost"},
     [FAULT_FOLLOWING] = {FAULT_REACT_QUICK_STOP, "a cylinder does not follow its set-points"},
     [FAULT_BUS_FAILING] = {FAULT_REACT_STOP, "the bus of the drives is about to be lost"},
+    [FAULT_SETPOINT_JUMP] = {FAULT_REACT_QUICK_STOP, "a set-point jumped away from its drive"},
 };
 
 static const row_t *row_of(fault_code_t code)
@@ -34,9 +35,15 @@ const char *fault_text(fault_code_t code)
     return row_of(code)->text;
 }
 
+bool fault_is_found_by_drive(fault_code_t code)
+{
+    return code == FAULT_DRIVE;
+}
+
 bool fault_is_of_axis(fault_code_t code)
 {
-    return code == FAULT_DRIVE || code == FAULT_DRIVE_OFFLINE || code == FAULT_DRIVE_DROPPED || code == FAULT_FOLLOWING;
+    return code == FAULT_DRIVE || code == FAULT_DRIVE_OFFLINE || code == FAULT_DRIVE_DROPPED || code == FAULT_FOLLOWING ||
+           code == FAULT_SETPOINT_JUMP;
 }
 
 const char *fault_reaction_name(fault_reaction_t reaction)

@@ -41,8 +41,8 @@ static const fault_help_t k_help[FAULT_CODES] = {
         "following-error", "电动缸未跟随设定值",
         {"it is blocked or overloaded, its scaling or sign is wrong, or the window is too narrow",
          "卡阻或过载、比例或方向设置错误，或跟随误差窗口过窄"},
-        {"check the mechanics and the load, scaling and sign; [cylinders] following_error_mm is the window; then heavectl reset",
-         "检查机械和负载、比例与方向；窗口由 [cylinders] following_error_mm 设定；然后执行 heavectl reset"}},
+        {"check the mechanics and the load, scaling and sign; following_error_mm of [cylinders] or of the drives' section is the window; then heavectl reset",
+         "检查机械和负载、比例与方向；窗口由 [cylinders] 或驱动器所在节的 following_error_mm 设定；然后执行 heavectl reset"}},
     [FAULT_BUS_FAILING] = {
         "bus-failing", "与驱动器的总线通信即将中断",
         {"too many frames are disturbed: the CAN controller has been error-passive for longer than [can] passive_stop_ms",
@@ -50,6 +50,13 @@ static const fault_help_t k_help[FAULT_CODES] = {
         {"check cable, connectors, termination (120 ohm at both ends), grounding and bit rate; ip -s -d link show counts the errors; "
          "then heavectl reset",
          "检查电缆、接头、终端电阻（两端各 120 欧姆）、接地和波特率；ip -s -d link show 显示错误计数；然后执行 heavectl reset"}},
+    [FAULT_SETPOINT_JUMP] = {
+        "setpoint-jump", "设定值突跳，偏离驱动器位置",
+        {"the drive was moved, or counts otherwise than before, between taking its position and its first set-point; else an error of heaved",
+         "在读取位置与发送第一个设定值之间，驱动器被移动或计数方式改变；否则为 heaved 自身的错误"},
+        {"the log says how far; check brake and load at rest, scaling and sign, then heavectl reset; if it comes again in motion, keep the "
+         "incident and report it",
+         "日志给出偏差大小；检查静止时的制动器和负载、比例与方向，然后执行 heavectl reset；如在运动中再次出现，请保留事件记录并上报"}},
 };
 /* clang-format on */
 

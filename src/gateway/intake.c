@@ -174,16 +174,6 @@ static void take_mask(gateway_t *self, const frame_t *frame)
     self->frame_mask = frame->relay_mask & wired;
 }
 
-/* To the nearest tenth. */
-static void put_tenths(text_t *text, q32_t value_q32)
-{
-    const q32_t tenths = fx_mul_shift(fx_abs(value_q32), 10, 32);
-    text_put(text, value_q32 < 0 ? "-" : "");
-    text_put_u32(text, (uint32_t)(tenths / 10));
-    text_put(text, ".");
-    text_put_u32(text, (uint32_t)(tenths % 10));
-}
-
 /* Axes of a pose and the rotation motor, or cylinders. */
 static const char *axis_text(motion_space_t space, unsigned axis)
 {
@@ -208,9 +198,9 @@ static void log_not_followed(gateway_t *self, const char *what, const char *why,
     text_put(&text, ": ");
     text_put(&text, axis_text(jump->space, jump->axis));
     text_put(&text, " ");
-    put_tenths(&text, jump->value_q32);
+    text_put_q32(&text, jump->value_q32, 1);
     text_put(&text, " after ");
-    put_tenths(&text, jump->from_q32);
+    text_put_q32(&text, jump->from_q32, 1);
     put_suppressed(&text, suppressed);
     hal_log_write(self->io.log, HAL_LOG_WARNING, line);
 }

@@ -208,18 +208,28 @@ void operate_event(gateway_t *self, event_t event, uint64_t now_us)
     carry_out(self, action, now_us);
 }
 
-static void log_fault(gateway_t *self, fault_code_t code, unsigned axis, uint32_t device_code)
+/* Who found it is told where it might be either: what a drive says of itself, and what heaved sees of the same thing. */
+static void log_fault(gateway_t *self, const fault_t *fault)
 {
     char line[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(line, sizeof line);
-    text_put(&text, fault_text(code));
-    if (axis != 0) {
+    const char *unit = fault->axis > kin_cylinders(motion_kin(&self->motion)) ? " deg" : " mm";
+    text_put(&text, fault_text(fault->code));
+    if (fault->axis != 0) {
         text_put(&text, ", axis ");
-        text_put_u32(&text, axis);
+        text_put_u32(&text, fault->axis);
     }
-    if (device_code != 0) {
+    if (fault->device_code != 0) {
         text_put(&text, ", device code 0x");
-        text_put_hex(&text, device_code, 4);
+        text_put_hex(&text, fault->device_code, 4);
+    }
+    if (fault->allowed_q32 != 0) {
+        text_put(&text, ": found by heaved, ");
+        text_put_q32(&text, fault->off_q32, 2);
+        text_put(&text, unit);
+        text_put(&text, " off, allowed ");
+        text_put_q32(&text, fault->allowed_q32, 2);
+        text_put(&text, unit);
     }
     hal_log_write(self->io.log, HAL_LOG_ERROR, line);
 }
@@ -240,20 +250,21 @@ static void give_up_reset(gateway_t *self)
 }
 
 /* A fault begins: all are counted, the first is kept, and the worst reaction wins, also over one that is under way. */
-static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint32_t device_code, uint64_t now_us)
+static void raise_fault(gateway_t *self, const fault_t *fault)
 {
     snapshot_t *s = &self->snapshot;
+    const fault_code_t code = fault->code;
     const fault_reaction_t reaction = fault_reaction(code);
     if (self->supervisor.state == STATE_ESTOP) {
         return;
     }
-    s->begun[axis] |= 1u << (unsigned)code;
+    s->begun[fault->axis] |= 1u << (unsigned)code;
     s->counters.faults++;
     s->counters.fault[code]++;
-    s->fault_last_us[code] = now_us;
-    log_fault(self, code, axis, device_code);
+    s->fault_last_us[code] = fault->at_us;
+    log_fault(self, fault);
     if (s->fault.code == FAULT_NONE) {
-        s->fault = (fault_t){code, (uint8_t)axis, device_code, now_us};
+        s->fault = *fault;
     }
     const bool is_worse = reaction > s->reaction;
     s->reaction = is_worse ? reaction : s->reaction;
@@ -262,7 +273,7 @@ static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint3
             react(self);
         }
     } else {
-        operate_event(self, EVENT_FAULT, now_us);
+        operate_event(self, EVENT_FAULT, fault->at_us);
     }
 }
 
@@ -272,7 +283,7 @@ static void watch_bus(gateway_t *self, bool is_lost, uint64_t now_us)
     const bool is_new = is_lost && !self->is_bus_lost && self->supervisor.state != STATE_OFF;
     if (is_new || is_told(self, FAULT_BUS, 0)) {
         give_up_reset(self);
-        raise_fault(self, FAULT_BUS, 0, 0, now_us);
+        raise_fault(self, &(fault_t){.code = FAULT_BUS, .at_us = now_us});
     }
     self->is_bus_lost = is_lost && self->supervisor.state != STATE_OFF;
     self->is_tracking_actual |= is_lost;
@@ -284,7 +295,7 @@ static void watch_failing(gateway_t *self, uint64_t now_us)
     const bool is_failing = drives_is_failing(self->io.drives) && self->supervisor.state != STATE_OFF;
     if ((is_failing && !self->is_bus_failing) || is_told(self, FAULT_BUS_FAILING, 0)) {
         give_up_reset(self);
-        raise_fault(self, FAULT_BUS_FAILING, 0, 0, now_us);
+        raise_fault(self, &(fault_t){.code = FAULT_BUS_FAILING, .at_us = now_us});
     }
     self->is_bus_failing = is_failing;
 }
@@ -325,7 +336,8 @@ static fault_code_t judge_drive(gateway_t *self, unsigned i, uint64_t now_us)
     const drive_state_t state = self->snapshot.drive[i].state;
     const bool is_behind = is_left_behind(self, i, now_us);
     if (state == DRIVE_FAULT) {
-        return FAULT_DRIVE;
+        const drive_guard_t *guard = &self->snapshot.drive[i].guard;
+        return !drive_guard_is_found(guard) ? FAULT_DRIVE : guard->jump_q32 != 0 ? FAULT_SETPOINT_JUMP : FAULT_FOLLOWING;
     }
     if (state == DRIVE_OFFLINE) {
         return FAULT_DRIVE_OFFLINE;
@@ -348,6 +360,23 @@ static fault_code_t find_fault(gateway_t *self, unsigned i, uint64_t now_us)
     return judged;
 }
 
+/* With how far off an axis is, where heaved has found that. */
+static fault_t fault_of(const gateway_t *self, fault_code_t code, unsigned i, uint64_t now_us)
+{
+    const drive_feedback_t *drive = &self->snapshot.drive[i];
+    fault_t fault = {.code = code, .axis = (uint8_t)(i + 1u), .at_us = now_us};
+    if (code != FAULT_FOLLOWING && code != FAULT_SETPOINT_JUMP) {
+        fault.device_code = drive->fault_code;
+    } else if (drive_guard_is_found(&drive->guard)) {
+        fault.off_q32 = drive->guard.jump_q32 + drive->guard.lag_q32; /* one of them is 0 */
+        fault.allowed_q32 = drive->guard.allowed_q32;
+    } else if (i < kin_cylinders(motion_kin(&self->motion))) {
+        fault.off_q32 = fx_abs(fx_sub_sat(self->output.extension_mm_q32[i], drive->actual_mm_q32));
+        fault.allowed_q32 = q32_from_q16(self->settings.following_error_mm_q16);
+    }
+    return fault;
+}
+
 static void watch_drives(gateway_t *self, uint64_t now_us)
 {
     for (unsigned i = 0; i < drive_count(self); i++) {
@@ -358,7 +387,8 @@ static void watch_drives(gateway_t *self, uint64_t now_us)
         }
         self->axis_fault[i] = code;
         if (is_new) {
-            raise_fault(self, code, i + 1, code == FAULT_FOLLOWING ? 0 : self->snapshot.drive[i].fault_code, now_us);
+            const fault_t fault = fault_of(self, code, i, now_us);
+            raise_fault(self, &fault);
         }
     }
 }
@@ -368,7 +398,7 @@ static void step_bring_up(gateway_t *self, uint64_t now_us)
 {
     const bool is_late = is_coming_up(self) && now_us >= self->bring_up_deadline_us;
     if (is_late || is_told(self, FAULT_DRIVE_TIMEOUT, 0)) {
-        raise_fault(self, FAULT_DRIVE_TIMEOUT, 0, 0, now_us);
+        raise_fault(self, &(fault_t){.code = FAULT_DRIVE_TIMEOUT, .at_us = now_us});
         return;
     }
     if (self->bring_up == BRING_UP_ENABLE && !are_all(self, DRIVE_ENABLED, true)) {

@@ -65,3 +65,20 @@ void text_put_escaped(text_t *self, const uint8_t *bytes, size_t length)
         }
     }
 }
+
+void text_put_q32(text_t *self, q32_t value_q32, unsigned decimals)
+{
+    uint32_t unit = 1;
+    for (unsigned i = 0; i < decimals; i++) {
+        unit *= 10u;
+    }
+    const q32_t parts = fx_mul_shift(fx_abs(value_q32), unit, 32);
+    text_put(self, value_q32 < 0 ? "-" : "");
+    text_put_u32(self, (uint32_t)(parts / unit));
+    if (decimals > 0) {
+        text_put(self, ".");
+    }
+    for (uint32_t below = unit / 10u; below > 0; below /= 10u) {
+        text_put_u32(self, (uint32_t)(parts / below % 10));
+    }
+}

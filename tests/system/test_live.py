@@ -336,7 +336,13 @@ def replays_a_following_error(bench):
         config.write_text(config.read_text().replace("[cylinders]\n", "[cylinders]\nfollowing_error_mm = 0.01\n"))
         daemon.send_signal(signal.SIGHUP)
         heave.wait_for(lambda: sender.stream(0.5, wave) or bench.status()["state"] == "FAULT", "FAULT")
-    assert bench.status()["fault"]["name"] == "following-error", bench.status()["fault"]
+    fault = bench.status()["fault"]
+    assert fault["name"] == "following-error" and fault["found_by"] == "heaved" and fault["device_code"] == 0, fault
+    assert abs(fault["allowed_mm"] - 0.01) < 1e-4 and 0.01 < fault["off_mm"] < 100 and fault["off_deg"] is None and fault["allowed_deg"] is None, fault
+    assert f"  found  by heaved: {fault['off_mm']:.2f} mm off, allowed 0.01 mm\n" in bench.ctl("status").stdout, bench.ctl("status").stdout
+    chinese = bench.ctl("status", env={**os.environ, "LC_ALL": "zh_CN.UTF-8"}).stdout
+    assert f"由 heaved 发现：偏差 {fault['off_mm']:.2f} mm，允许 0.01 mm" in chinese, chinese
+    assert re.search(rf"axis {fault['axis']}: found by heaved, \d+\.\d\d mm off, allowed 0\.01 mm", daemon.log.read_text())
     assert bench.stop(daemon) == 0
     folder, = directory.iterdir()
     assert " !fault following-error " in (folder / "frames").read_text()

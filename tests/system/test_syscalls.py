@@ -62,7 +62,7 @@ ERRNOS = {
     "calloc": MEMORY, "malloc": MEMORY, "realloc": MEMORY, "chmod": ["EPERM", "EROFS"], "clock_nanosleep": ["EINTR", "EINVAL"],
     "connect": ["ECONNREFUSED", "EACCES", "ENOENT", "EAGAIN"], "eventfd": ["EMFILE", "ENOMEM"], "fchmod": ["EPERM", "EIO"], "fclose": DISK, "fflush": DISK,
     "fdopen": MEMORY, "fopen": FILES, "fread": ["EIO"], "fstat": ["EIO"], "fsync": DISK, "getaddrinfo": [-3, -10], "getrusage": ["EINVAL"],
-    "getsockname": ["ENOBUFS"], "getsockopt": ["ENOBUFS"], "ioctl": ["EIO", "ENODEV", "ENOTTY", "EBUSY", "EPERM"], "listen": ["EADDRINUSE"],
+    "getsockname": ["ENOBUFS"], "getsockopt": ["ENOBUFS"], "if_nametoindex": ["ENODEV", "EMFILE"], "ioctl": ["EIO", "ENODEV", "ENOTTY", "EBUSY", "EPERM"], "listen": ["EADDRINUSE"],
     "lstat": ["EACCES", "ENOENT"], "mkdir": ["EACCES", "ENOSPC", "EROFS"], "mlockall": ["EPERM", "ENOMEM"], "open": [*FILES, "ENOSPC", "EROFS", "EINTR"],
     "open_memstream": MEMORY, "opendir": FILES, "poll": ["EINTR", "ENOMEM"], "ppoll": ["EINTR", "ENOMEM"], "pthread_create": ["EAGAIN", "EPERM"],
     "pthread_setschedparam": ["EPERM"], "pthread_timedjoin_np": ["ETIMEDOUT"], "read": ["EINTR", "EAGAIN", "EIO"], "readdir": ["EIO"], "readlink": ["EACCES", "ENOENT"],
@@ -386,7 +386,8 @@ def outputs(bench):
 
 def busy_config(bench, engage):
     config = bench.write_config(f"{engage}.ini", platform__engage=engage)
-    text = config.read_text(encoding="utf-8").replace("[control]\n", f"[control]\nmetrics = {bench.folder}/heave.prom\n")
+    text = config.read_text(encoding="utf-8").replace("[udp]\nbind = 127.0.0.1", "[udp]\nbind = 0.0.0.0\ngroup = 239.77.1.2%lo")
+    text = text.replace("[control]\n", f"[control]\nmetrics = {bench.folder}/heave.prom\n")
     config.write_text(f"{text}\n[black-box]\ndirectory = {bench.folder}/incidents\nseconds = 10\nincidents = 2\n", encoding="utf-8")
     return config
 

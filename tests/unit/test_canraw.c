@@ -611,6 +611,9 @@ static void test_following_error_stops_that_axis_and_it_hears_nothing_more(void)
     cycles(3);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
     TEST_ASSERT_EQUAL_HEX32(CANRAW_FAULT_FOLLOWING, feedback[1].fault_code);
+    TEST_ASSERT_TRUE(feedback[1].guard.jump_q32 > 0);
+    TEST_ASSERT_EQUAL_INT64(MM(1) + 1, feedback[1].guard.jump_q32);
+    TEST_ASSERT_EQUAL_INT64(MM(1), feedback[1].guard.allowed_q32);
     TEST_ASSERT_TRUE(slave.drive[1].setpoints <= setpoints + 1);
     TEST_ASSERT_EQUAL_INT32(60000, slave.drive[1].target);
     TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[0].state);
@@ -639,6 +642,7 @@ static void test_setpoint_that_no_frame_can_carry_is_a_fault_and_is_not_sent(voi
         cycles(4);
         TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[1].state);
         TEST_ASSERT_EQUAL_HEX32(CANRAW_FAULT_FOLLOWING, feedback[1].fault_code);
+        TEST_ASSERT_TRUE(feedback[1].guard.jump_q32 > 0);
         TEST_ASSERT_TRUE(slave.drive[1].setpoints <= setpoints + 1);
         TEST_ASSERT_EQUAL_INT32(0, slave.drive[1].target);
         TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[0].state);

@@ -778,6 +778,10 @@ static void test_send_lag_beyond_the_window_is_a_fault_unless_it_is_not_watched(
         }
         TEST_ASSERT_EQUAL(i == 0 ? DRIVE_FAULT : DRIVE_ENABLED, feedback[2].state);
         TEST_ASSERT_EQUAL_HEX32(i == 0 ? 0x8611 : 0, feedback[2].fault_code);
+        TEST_ASSERT_TRUE(i != 0 || (feedback[2].guard.jump_q32 == 0 && feedback[2].guard.lag_q32 > MM(10) &&
+                                    feedback[2].guard.lag_q32 < MM(11) && feedback[2].guard.allowed_q32 == MM(10)));
+        TEST_ASSERT_TRUE(i != 0 || strcmp("heaved found its set-point too far from its position, and has not sent it",
+                                          report(2).trouble) == 0);
         TEST_ASSERT_INT_WITHIN(1000, i == 0 ? 10000 : 15000, slave.drive[2].last_target - 102000);
     }
 }
@@ -792,6 +796,7 @@ static void test_send_set_point_that_has_no_counts_is_a_fault_and_not_sent(void)
     setpoint_q32[2] = INT64_MIN;
     (void)cycles_until(2, DRIVE_FAULT, 2 * PERIOD);
     TEST_ASSERT_EQUAL_HEX32(0x8611, feedback[2].fault_code);
+    TEST_ASSERT_TRUE(feedback[2].guard.jump_q32 > 0);
     TEST_ASSERT_EQUAL_HEX32(0, report(2).object);
     cycles(5 * PERIOD);
     TEST_ASSERT_INT_WITHIN(2, (int)setpoints, (int)slave.drive[2].setpoints);
@@ -998,6 +1003,7 @@ static void test_poll_drive_that_cannot_follow_is_stopped(void)
         cycles(2 * PERIOD);
         TEST_ASSERT_EQUAL(k_modes[i] == CIA402_MODE_IP ? DRIVE_ENABLED : DRIVE_FAULT, feedback[2].state);
         TEST_ASSERT_EQUAL_HEX32(k_modes[i] == CIA402_MODE_IP ? 0 : 0x8611, feedback[2].fault_code);
+        TEST_ASSERT_FALSE(drive_guard_is_found(&feedback[2].guard)); /* the drive says so itself */
         cycles(2 * PERIOD);
         TEST_ASSERT_EQUAL_UINT32(k_modes[i] == CIA402_MODE_IP ? 0 : 1, slave.drive[2].quick_stops);
     }

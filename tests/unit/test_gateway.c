@@ -93,12 +93,19 @@ static double biggest_move(unsigned ms)
 
 static int m_unheard;            /* the axis that has not said where it is; -1: none */
 static drive_report_t m_reports; /* of axis 2 */
+static drive_guard_t m_guard;    /* of a drive that its set-points were too far for */
+static unsigned m_guarded;       /* which one */
 
 static hv_status_t poll_unheard(void *ctx, uint64_t now_us, drive_feedback_t *feedback)
 {
     const hv_status_t status = drives_poll(((rig_t *)ctx)->inner, now_us, feedback);
     if (m_unheard >= 0) {
         feedback[m_unheard].has_actual = false;
+    }
+    if (drive_guard_is_found(&m_guard)) {
+        feedback[m_guarded].state = DRIVE_FAULT;
+        feedback[m_guarded].fault_code = 0x8611;
+        feedback[m_guarded].guard = m_guard;
     }
     return status;
 }
@@ -120,6 +127,7 @@ static void make_talkative(void)
     talkative.report = report_of_axis_2;
     m_rig.gateway.io.drives.ops = &talkative;
     m_unheard = -1;
+    m_guard = (drive_guard_t){.jump_q32 = 0};
     m_reports = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
 }
 
@@ -1437,6 +1445,39 @@ static void test_fault_following_error_stops_all_in_time(void)
     start(true); /* the frozen drive hears no request and counts its own errors */
 }
 
+/* A set-point that its driver did not send: that is heaved's own finding, with how far it was. */
+static void test_fault_found_by_the_guard_of_set_points_tells_the_distance(void)
+{
+    static const struct {
+        unsigned axis;
+        bool is_jump;
+        fault_code_t code;
+        const char *line;
+    } k_rows[] = {
+        {2, false, FAULT_FOLLOWING,
+         "a cylinder does not follow its set-points, axis 3: found by heaved, 12.35 mm off, allowed 10.00 mm"},
+        {2, true, FAULT_SETPOINT_JUMP,
+         "a set-point jumped away from its drive, axis 3: found by heaved, 12.35 mm off, allowed 10.00 mm"},
+        {6, true, FAULT_SETPOINT_JUMP,
+         "a set-point jumped away from its drive, axis 7: found by heaved, 12.35 deg off, allowed 10.00 deg"},
+    };
+    for (unsigned i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        engage();
+        make_talkative();
+        m_guarded = k_rows[i].axis;
+        m_guard = (drive_guard_t){.allowed_q32 = 10 * Q32_ONE};
+        *(k_rows[i].is_jump ? &m_guard.jump_q32 : &m_guard.lag_q32) = Q32_ONE * 247 / 20;
+        rig_run_ms(&m_rig, 2);
+        expect_fault(k_rows[i].code, k_rows[i].axis + 1, 0);
+        TEST_ASSERT_EQUAL(FAULT_REACT_QUICK_STOP, seen()->reaction);
+        TEST_ASSERT_EQUAL_INT64(Q32_ONE * 247 / 20, seen()->fault.off_q32);
+        TEST_ASSERT_EQUAL_INT64(m_guard.allowed_q32, seen()->fault.allowed_q32);
+        TEST_ASSERT_EQUAL_UINT32(1, counted()->fault[k_rows[i].code]);
+        TEST_ASSERT_EQUAL_UINT32(0, counted()->fault[FAULT_DRIVE]);
+        expect_line("a ", k_rows[i].line);
+    }
+}
+
 /* What a replay is told was found is found, as if the drives had brought it about. */
 static void test_fault_told_is_found_in_the_next_cycle(void)
 {
@@ -2111,6 +2152,7 @@ static void run_supervision(void)
     RUN_TEST(test_fault_bus_busy_for_some_cycles_makes_motion_wait);
     RUN_TEST(test_fault_bus_that_stays_busy_is_a_fault_and_returns_without_a_jump);
     RUN_TEST(test_fault_following_error_stops_all_in_time);
+    RUN_TEST(test_fault_found_by_the_guard_of_set_points_tells_the_distance);
     RUN_TEST(test_fault_told_is_found_in_the_next_cycle);
     RUN_TEST(test_fault_told_that_is_there_counts_once);
     RUN_TEST(test_fault_told_in_off_is_none);

@@ -1329,6 +1329,7 @@ static void test_setpoint_that_has_no_counts_is_a_fault(void)
     cycles(20);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_FOLLOWING, feedback[2].fault_code);
+    TEST_ASSERT_TRUE(feedback[2].guard.jump_q32 > 0);
     TEST_ASSERT_EQUAL_INT32(target, slave.drive[2].target);
     TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].stops);
 }
@@ -1341,6 +1342,8 @@ static void test_setpoint_far_from_a_drive_that_hangs_is_a_fault(void)
     move(MM(1) / 50, 0, 300);
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_EQUAL_HEX32(MODBUS_DRIVE_FOLLOWING, feedback[2].fault_code);
+    TEST_ASSERT_TRUE(feedback[2].guard.jump_q32 == 0 && feedback[2].guard.lag_q32 > MM(3));
+    TEST_ASSERT_EQUAL_INT64(MM(3), feedback[2].guard.allowed_q32);
     TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].stops);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     cycles(20);
