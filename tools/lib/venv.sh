@@ -24,7 +24,7 @@ main() {
     [ ! -f "$venv/complete" ] || { echo "$venv/bin/python3" && return 0; }
     log=$(mktemp) || return 1
     trap 'rm -f "$log"' EXIT
-    if python3 -m venv --clear "$venv" >"$log" 2>&1 && "$venv/bin/pip" -q --disable-pip-version-check install -r "$here/requirements.txt" >>"$log" 2>&1; then
+    if python3 -m venv --clear "$venv" >"$log" 2>&1 && "$venv/bin/pip" -q --disable-pip-version-check install --require-hashes --only-binary :all: -r "$here/requirements.txt" >>"$log" 2>&1; then
         : >"$venv/complete"
         echo "$venv/bin/python3"
         return 0
