@@ -173,7 +173,7 @@ ends_beside_another() {
     fails test -e /run/heave/third
     test -S /run/heave/demo/heaved.sock
     test -s /run/heave/demo/heave.prom
-    [ "$(stat -c %G:%a /run/heave-can)" = heave:770 ]
+    [ "$(stat -c %G:%a /run/heave-can)" = heave-can:1770 ]
     until_true is_state ENGAGED # the only one again: needs no name
 }
 
