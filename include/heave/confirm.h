@@ -55,4 +55,7 @@ void confirm_followed(confirm_t *self, const motion_target_t *target);
 /** Once per cycle: drops what has waited for too long. */
 void confirm_cycle(confirm_t *self, uint64_t now_us);
 
+/** True for one that may be used, whatever file it comes from; see sane.h. */
+bool confirm_is_sane(const confirm_t *self);
+
 #endif

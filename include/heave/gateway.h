@@ -150,8 +150,9 @@ void gateway_restart_auto(gateway_t *self);
 void gateway_save(const gateway_t *self, gateway_t *out);
 
 /** Goes on from what was saved, with other handles.
- *  @return HV_OK; HV_ERR_ARG as gateway_init, for the drives of another platform, or for what no gateway saves: states and codes
- *          that there are not */
+ *  @param self  prepared by gateway_init() with the same settings: what these lead to is not taken from what was saved
+ *  @param saved is not believed: it may come from a file that anybody wrote; see sane.h
+ *  @return HV_OK; HV_ERR_ARG as gateway_init, for another platform, or for what no gateway saves: self is unchanged */
 hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io) HV_MUST_CHECK;
 
 /** Takes over what may change in operation: silence, take-over and priorities, dialect, safe mask and its delay, following error,

@@ -49,6 +49,9 @@ typedef struct {
  *  @return HV_OK; HV_ERR_RANGE where a value is outside the ranges above. On error *self is unchanged. */
 hv_status_t kin_init(kin_t *self, const kin_geometry_t *geometry) HV_MUST_CHECK;
 
+/** True for two that solve alike, member by member. One that was loaded may hold anything. */
+bool kin_is_same(const kin_t *a, const kin_t *b);
+
 /** Cylinders of the mechanism: 6 or 3. */
 static inline unsigned kin_cylinders(const kin_t *self)
 {

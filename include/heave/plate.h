@@ -33,4 +33,7 @@ void plate_init(plate_t *self);
  *  @param guess    a pose nearby, where none has been found yet or the last one leads nowhere: the pose sent */
 void plate_take(plate_t *self, const kin_t *kin, const drive_feedback_t feedback[], const pose_t *guess, uint64_t now_us);
 
+/** True for one that may be used, whatever file it comes from; see sane.h. */
+bool plate_is_sane(const plate_t *self);
+
 #endif

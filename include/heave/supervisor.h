@@ -94,4 +94,7 @@ bool supervisor_is_latched(const supervisor_t *self);
 const char *state_name(state_t state);
 const char *event_name(event_t event);
 
+/** True for one that may be used, whatever file it comes from; see sane.h. */
+bool supervisor_is_sane(const supervisor_t *self);
+
 #endif

@@ -103,9 +103,9 @@ static const char *resume(play_t *self, const config_t *config, const gateway_io
     if (wrong != NULL) {
         return wrong;
     }
-    if (saved.cycle_us != config->settings.cycle_us ||
+    if (!session_is_sane(&saved, config->settings.cycle_us) ||
         gateway_resume(&self->player.session.gateway, &saved.gateway, io) != HV_OK) {
-        return "the !state is of another platform; play it with the platform.ini beside it";
+        return "the !state is of another platform, or no heaved has written it; play it with the platform.ini beside it";
     }
     self->player.session.cycle_us = saved.cycle_us;
     self->player.session.now_us = saved.now_us;

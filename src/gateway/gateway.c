@@ -4,6 +4,8 @@
 #include "heave/gateway.h"
 
 #include "auto_engage.h"
+#include "heave/motion_sane.h"
+#include "heave/sane.h"
 #include "heave/text.h"
 #include "intake.h"
 #include "operate.h"
@@ -99,41 +101,93 @@ void gateway_save(const gateway_t *self, gateway_t *out)
     }
 }
 
-static bool is_state(unsigned value)
+/* What may change in operation may be another than in the configuration of the start; the rest may not. */
+static bool are_settings_sane(const gateway_settings_t *saved, const gateway_settings_t *prepared)
 {
-    return value < STATES;
-}
-
-/* What else is used as an index, or in a table. */
-static bool are_numbers_sound(const gateway_t *saved)
-{
-    const snapshot_t *s = &saved->snapshot;
-    const supervisor_t *v = &saved->supervisor;
-    bool is_sound = is_state(v->state) && is_state(v->goal) && is_state(v->interrupted) && is_state(s->state) &&
-                    is_state(s->goal) && (unsigned)saved->bring_up <= BRING_UP_MOVE && (unsigned)s->fault.code < FAULT_CODES &&
-                    (unsigned)s->reaction <= FAULT_REACT_SILENT && s->relay_count <= HAL_RELAYS_MAX;
-    for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        is_sound = is_sound && (unsigned)saved->axis_fault[i] < FAULT_CODES && (unsigned)s->drive[i].state <= DRIVE_FAULT;
+    bool is_sane = saved->cycle_us == prepared->cycle_us && sane_bool(&saved->has_angle) &&
+                   saved->has_angle == prepared->has_angle && saved->engage == prepared->engage &&
+                   saved->auto_frames == prepared->auto_frames && saved->angle_wrap == prepared->angle_wrap &&
+                   saved->angle_min_q16 == prepared->angle_min_q16 && saved->angle_max_q16 == prepared->angle_max_q16 &&
+                   saved->relays.count == prepared->relays.count && (unsigned)saved->dialect <= FRAME_LENIENT &&
+                   saved->priority.count <= HAL_UDP_NETWORKS_MAX && saved->following_error_mm_q16 >= 0 &&
+                   saved->confirm_jump_mm_q16 >= 0 && saved->confirm_jump_deg_q16 >= 0;
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        const axis_input_t *axis = &saved->axis[i], *own = &prepared->axis[i];
+        is_sane = is_sane && axis->sign == own->sign && axis->scale_q16 == own->scale_q16 && axis->offset_q16 == own->offset_q16;
     }
-    return is_sound;
+    for (unsigned i = 0; i < HAL_RELAYS_MAX; i++) {
+        is_sane = is_sane && saved->relays.max_on_ms[i] == prepared->relays.max_on_ms[i] &&
+                  saved->relays.min_toggle_ms[i] == prepared->relays.min_toggle_ms[i];
+    }
+    for (unsigned i = 0; is_sane && i < saved->priority.count; i++) {
+        const hal_udp_network_t *network = &saved->priority.network[i];
+        is_sane = sane_bool(&network->is_ipv6) && network->prefix <= (network->is_ipv6 ? 128u : 32u);
+    }
+    return is_sane;
 }
 
-/* True for something that a gateway with so many drives may have saved. */
-static bool is_saved_sound(const gateway_t *saved, unsigned drives)
+static bool is_output_sane(const motion_output_t *output)
 {
-    const unsigned cylinders = saved->snapshot.cylinders;
-    return (cylinders == 3 || cylinders == CYLINDERS_MAX) && cylinders == kin_cylinders(motion_kin(&saved->motion)) &&
-           saved->snapshot.has_angle == saved->settings.has_angle &&
-           drives == cylinders + (saved->settings.has_angle ? 1u : 0u) && are_numbers_sound(saved);
+    return sane_all_q32(output->asked.axis_q32, POSE_AXES) && sane_all_q32(output->sent.axis_q32, POSE_AXES) &&
+           sane_all_q32(output->extension_mm_q32, CYLINDERS_MAX) && sane_q32(output->angle_deg_q32) &&
+           output->limiting_cylinder <= CYLINDERS_MAX;
+}
+
+static bool are_drives_sane(const gateway_t *saved)
+{
+    bool is_sane = true;
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        const drive_feedback_t *drive = &saved->snapshot.drive[i];
+        is_sane = is_sane && (unsigned)saved->axis_fault[i] < FAULT_CODES && (unsigned)drive->state <= DRIVE_FAULT &&
+                  sane_bool(&drive->is_homed) && sane_bool(&drive->has_actual) && sane_bool(&drive->is_energized) &&
+                  sane_q32(drive->actual_mm_q32) && sane_time(drive->actual_us) && sane_q32(drive->guard.jump_q32) &&
+                  sane_q32(drive->guard.lag_q32) && sane_q32(drive->guard.allowed_q32);
+    }
+    for (unsigned i = 0; i <= DRIVES_MAX; i++) {
+        is_sane = is_sane && ((saved->told[i] | saved->snapshot.begun[i]) >> (unsigned)FAULT_CODES) == 0;
+    }
+    return is_sane;
+}
+
+static bool is_snapshot_sane(const snapshot_t *s, const snapshot_t *prepared)
+{
+    return sane_time(s->now_us) && (unsigned)s->state < STATES && (unsigned)s->goal < STATES && sane_bool(&s->is_estop_active) &&
+           (unsigned)s->fault.code < FAULT_CODES && s->fault.axis <= DRIVES_MAX && (unsigned)s->reaction <= FAULT_REACT_SILENT &&
+           s->cylinders == prepared->cylinders && sane_bool(&s->has_angle) && s->has_angle == prepared->has_angle &&
+           s->relay_count == prepared->relay_count && sane_bool(&s->is_relays_unknown) && plate_is_sane(&s->plate) &&
+           sane_all_q32(s->asked.axis_q32, POSE_AXES) && sane_all_q32(s->sent.axis_q32, POSE_AXES) &&
+           sane_all_q32(s->extension_mm_q32, CYLINDERS_MAX) && sane_q32(s->angle_deg_q32) &&
+           s->limiting_cylinder <= CYLINDERS_MAX && owner_is_sane(&s->owner) && owner_is_sane(&s->other);
+}
+
+static bool are_bools_sane(const gateway_t *saved)
+{
+    return sane_bool(&saved->is_bus_lost) && sane_bool(&saved->is_bus_failing) && sane_bool(&saved->is_tracking_actual) &&
+           sane_bool(&saved->is_disable_due) && sane_bool(&saved->is_shutdown_asked) && sane_bool(&saved->is_end_overdue) &&
+           sane_bool(&saved->has_newest) && sane_bool(&saved->is_mask_written) && sane_bool(&saved->newest_from.is_ipv6);
+}
+
+/* A file may hold anything: every index, enum, bool and divisor is judged before it is used. */
+static bool is_saved_sane(const gateway_t *saved, const gateway_t *prepared)
+{
+    return are_bools_sane(saved) && are_settings_sane(&saved->settings, &prepared->settings) &&
+           is_snapshot_sane(&saved->snapshot, &prepared->snapshot) && are_drives_sane(saved) &&
+           supervisor_is_sane(&saved->supervisor) && (unsigned)saved->bring_up <= BRING_UP_MOVE &&
+           auto_engage_is_sane(&saved->auto_engage, &prepared->auto_engage) && owner_is_sane(&saved->owner) &&
+           confirm_is_sane(&saved->confirm) && relay_policy_is_sane(&saved->relay_policy) &&
+           (unsigned)saved->newest_command <= FRAME_COMMANDS && motion_target_is_sane(&saved->newest) &&
+           is_output_sane(&saved->output) && motion_state_is_sane(&saved->motion, &prepared->motion);
 }
 
 hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io)
 {
-    if (!is_io_valid(io) || !is_saved_sound(saved, drives_count(io->drives))) {
+    if (!is_io_valid(io) || !is_saved_sane(saved, self) ||
+        drives_count(io->drives) != self->snapshot.cylinders + (self->settings.has_angle ? 1u : 0u)) {
         return HV_ERR_ARG;
     }
     *self = *saved;
     self->io = *io;
+    frame_scanner_init(&self->scanner, self->settings.dialect); /* it starts anew with every datagram */
     clear_reports(self);
     return HV_OK;
 }

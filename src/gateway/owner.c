@@ -3,6 +3,8 @@
  */
 #include "heave/owner.h"
 
+#include "heave/sane.h"
+
 /* True where the sender that drives has to give way to another one now. */
 static bool gives_way(const owner_t *self, const hal_udp_peer_t *from, uint64_t silence_us, const hal_udp_networks_t *priority,
                       uint64_t busy_until_us, uint64_t now_us)
@@ -21,4 +23,9 @@ owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t 
     }
     *self = (owner_t){.is_taken = true, .peer = *from, .last_us = now_us};
     return is_same ? OWNER_DRIVES : OWNER_NEW;
+}
+
+bool owner_is_sane(const owner_t *self)
+{
+    return sane_bool(&self->is_taken) && sane_bool(&self->peer.is_ipv6) && sane_time(self->last_us);
 }

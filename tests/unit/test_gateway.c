@@ -2027,13 +2027,93 @@ static void test_takeover_timed_move_after_a_stream_of_wild_extensions_ends_in_t
 
 static hv_status_t resume(const gateway_t *saved)
 {
-    static gateway_t other;
-    memset(&other, 0x5A, sizeof other);
+    static gateway_t other, before;
+    memset(&other, 0, sizeof other);
+    TEST_ASSERT_EQUAL(HV_OK, gateway_init(&other, &m_settings, &m_rig.gateway.io));
+    before = other;
     const hv_status_t status = gateway_resume(&other, saved, &m_rig.gateway.io);
     if (status != HV_OK) {
-        TEST_ASSERT_EACH_EQUAL_HEX8(0x5A, &other, sizeof other);
+        TEST_ASSERT_EQUAL_MEMORY(&before, &other, sizeof other);
     }
     return status;
+}
+
+/* A byte of a bool that is none. */
+static hv_status_t resume_with_bool(const gateway_t *saved, const bool *member)
+{
+    static gateway_t spoiled;
+    spoiled = *saved;
+    ((uint8_t *)&spoiled)[(const uint8_t *)member - (const uint8_t *)saved] = 2;
+    return resume(&spoiled);
+}
+
+/* What is no index, no enum, no bool, and what divides otherwise than the configuration says, in each module. */
+static void test_resume_refuses_what_is_insane_in_any_module(void)
+{
+    static gateway_t saved, spoiled;
+    engage();
+    gateway_save(&m_rig.gateway, &saved);
+    const bool *const k_bools[] = {&saved.is_bus_lost,
+                                   &saved.is_tracking_actual,
+                                   &saved.is_shutdown_asked,
+                                   &saved.has_newest,
+                                   &saved.auto_engage.is_due,
+                                   &saved.owner.is_taken,
+                                   &saved.owner.peer.is_ipv6,
+                                   &saved.confirm.has_last,
+                                   &saved.confirm.is_waiting,
+                                   &saved.confirm.last.has_angle,
+                                   &saved.snapshot.has_angle,
+                                   &saved.supervisor.is_held_by_silence,
+                                   &saved.snapshot.other.is_taken,
+                                   &saved.snapshot.plate.has_pose,
+                                   &saved.snapshot.drive[3].is_homed,
+                                   &saved.motion.is_following,
+                                   &saved.motion.is_axis_moved[2],
+                                   &saved.motion.pending.is_timed};
+    for (unsigned i = 0; i < sizeof k_bools / sizeof k_bools[0]; i++) {
+        TEST_ASSERT_EQUAL_MESSAGE(HV_ERR_ARG, resume_with_bool(&saved, k_bools[i]), "a bool");
+    }
+    TEST_ASSERT_EQUAL(HV_OK, resume(&saved));
+#define SPOIL(member, value)                                                                                                     \
+    do {                                                                                                                         \
+        spoiled = saved;                                                                                                         \
+        spoiled.member = (value);                                                                                                \
+        TEST_ASSERT_EQUAL_MESSAGE(HV_ERR_ARG, resume(&spoiled), #member);                                                        \
+    } while (0)
+    SPOIL(settings.dialect, (frame_dialect_t)(FRAME_LENIENT + 1)); /* an index of frame_scanner_init() */
+    SPOIL(settings.cycle_us, 0);
+    SPOIL(settings.priority.count, HAL_UDP_NETWORKS_MAX + 1);
+    SPOIL(settings.relays.count, HAL_RELAYS_MAX + 1);
+    SPOIL(settings.axis[0].sign, 0);
+    SPOIL(auto_engage.cycle_us, 0);
+    SPOIL(auto_engage.frames, AUTO_ENGAGE_FRAMES_MAX + 1);
+    SPOIL(snapshot.fault.axis, DRIVES_MAX + 1);
+    SPOIL(snapshot.limiting_cylinder, CYLINDERS_MAX + 1);
+    SPOIL(snapshot.drive[1].actual_mm_q32, INT64_MIN);
+    SPOIL(told[7], 1u << FAULT_CODES);
+    SPOIL(confirm.jump.axis, AXES_MAX);
+    SPOIL(confirm.last.space, (motion_space_t)(MOTION_CYLINDERS + 1));
+    SPOIL(relay_policy.mask, 0x8000);
+    SPOIL(newest.space, (motion_space_t)(MOTION_CYLINDERS + 1));
+    SPOIL(newest.time_ms, UINT32_MAX);
+    SPOIL(output.limiting_cylinder, CYLINDERS_MAX + 1);
+    SPOIL(motion.kin.cylinders, 200);
+    SPOIL(motion.kin.reach_shift, 200);
+    SPOIL(motion.cylinders, 7);
+    SPOIL(motion.cycle_us, 0);
+    SPOIL(motion.axis[1].limits.jerk_per_cycle3_q32, 0);
+    SPOIL(motion.cylinder[5].acc_safe_q32, 0);
+    SPOIL(motion.cylinder[5].per_acc_q62, 1);
+    SPOIL(motion.intensity.percent, 101);
+    SPOIL(motion.intensity.share_q46[3], -1);
+    SPOIL(motion.source, (motion_source_t)(MOTION_STRAIGHT + 1));
+    SPOIL(motion.join, (motion_join_t)(JOIN_HALT + 1));
+    SPOIL(motion.planned_slots, AXES_MAX + 1);
+    SPOIL(motion.asked_cycles, -1);
+#undef SPOIL
+    saved.scanner.phase = 200; /* is not taken from there */
+    TEST_ASSERT_EQUAL(HV_OK, resume(&saved));
 }
 
 static void test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves(void)
@@ -2181,6 +2261,7 @@ static void run_supervision(void)
     RUN_TEST(test_end_does_not_wait_for_long_for_a_drive_that_is_lost);
     RUN_TEST(test_takeover_timed_move_after_a_stream_of_wild_extensions_ends_in_time);
     RUN_TEST(test_resume_takes_what_was_saved_and_nothing_that_no_gateway_saves);
+    RUN_TEST(test_resume_refuses_what_is_insane_in_any_module);
     RUN_TEST(test_resume_of_three_cylinders_takes_what_they_saved);
 }
 

@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: MIT
+ * motion_sane.c - whether a motion that was loaded may go on; see motion_sane.h.
+ * What motion_init() has made of the settings is not believed: it has to be what it makes of them here.
+ */
+#include "heave/motion_sane.h"
+
+#include "heave/sane.h"
+
+#define SHARE_MAX_Q46 ((int64_t)2 << 46)
+#define CYCLES_MAX    ((int64_t)1 << 40)
+
+bool motion_target_is_sane(const motion_target_t *target)
+{
+    return sane_all_q32(target->value_q32, POSE_AXES) && sane_q32(target->angle_deg_q32) &&
+           (unsigned)target->space <= MOTION_CYLINDERS && target->time_ms <= FRAME_TIME_MAX_MS && sane_bool(&target->has_angle) &&
+           sane_bool(&target->is_timed);
+}
+
+static bool is_same_q32(const q32_t *a, const q32_t *b, unsigned count)
+{
+    bool is_same = true;
+    for (unsigned i = 0; i < count; i++) {
+        is_same = is_same && a[i] == b[i];
+    }
+    return is_same;
+}
+
+static bool are_limits_same(const ramp_limits_t *a, const ramp_limits_t *b)
+{
+    return a->pos_min_q32 == b->pos_min_q32 && a->pos_max_q32 == b->pos_max_q32 && a->vel_per_cycle_q32 == b->vel_per_cycle_q32 &&
+           a->acc_per_cycle2_q32 == b->acc_per_cycle2_q32 && a->jerk_per_cycle3_q32 == b->jerk_per_cycle3_q32;
+}
+
+static bool is_state_sane(const ramp_state_t *state)
+{
+    return sane_q32(state->pos_q32) && sane_q32(state->vel_per_cycle_q32) && sane_q32(state->acc_per_cycle2_q32);
+}
+
+/* The divisors of a ramp follow from its limits. */
+static bool is_ramp_sane(const ramp_t *saved, const ramp_t *prepared)
+{
+    return are_limits_same(&saved->limits, &prepared->limits) && saved->acc_safe_q32 == prepared->acc_safe_q32 &&
+           saved->acc_cycles == prepared->acc_cycles && saved->per_jerk_q62 == prepared->per_jerk_q62 &&
+           saved->per_acc_q62 == prepared->per_acc_q62 && saved->brake_reach_q32 == prepared->brake_reach_q32 &&
+           saved->brake_cycles == prepared->brake_cycles && is_state_sane(&saved->state) && saved->ref_jerk_q32 >= 0 &&
+           sane_q32(saved->ref_jerk_q32);
+}
+
+static bool is_intensity_sane(const intensity_t *saved, const intensity_t *prepared)
+{
+    bool is_sane = saved->max_percent == prepared->max_percent && saved->percent <= saved->max_percent &&
+                   is_ramp_sane(&saved->ramp, &prepared->ramp);
+    for (unsigned i = 0; i < sizeof saved->share_q46 / sizeof saved->share_q46[0]; i++) {
+        is_sane = is_sane && saved->share_q46[i] >= 0 && saved->share_q46[i] <= SHARE_MAX_Q46;
+    }
+    return is_sane;
+}
+
+static bool are_ramps_sane(const motion_t *saved, const motion_t *prepared)
+{
+    bool is_sane = is_intensity_sane(&saved->intensity, &prepared->intensity);
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        is_sane = is_sane && sane_bool(&saved->is_axis_moved[i]) && saved->is_axis_moved[i] == prepared->is_axis_moved[i] &&
+                  (!saved->is_axis_moved[i] || is_ramp_sane(&saved->axis[i], &prepared->axis[i])) &&
+                  is_state_sane(&saved->led[i]);
+    }
+    for (unsigned i = 0; i < saved->cylinders; i++) {
+        is_sane = is_sane && is_ramp_sane(&saved->cylinder[i], &prepared->cylinder[i]) && is_state_sane(&saved->reference[i]);
+    }
+    return is_sane;
+}
+
+static bool are_kinds_sane(const motion_t *saved)
+{
+    return (unsigned)saved->source <= MOTION_STRAIGHT && (unsigned)saved->next <= MOTION_THEN_FOLLOW &&
+           (unsigned)saved->space <= MOTION_CYLINDERS && (unsigned)saved->due <= DUE_TIMED &&
+           (unsigned)saved->join <= JOIN_HALT && saved->planned_slots <= AXES_MAX && saved->limiting_cylinder <= CYLINDERS_MAX;
+}
+
+static bool are_bools_sane(const motion_t *saved)
+{
+    return sane_bool(&saved->is_pose_stale) && sane_bool(&saved->is_space_new) && sane_bool(&saved->has_new_sample) &&
+           sane_bool(&saved->is_following) && sane_bool(&saved->is_taking_over) && sane_bool(&saved->is_blend_planned) &&
+           sane_bool(&saved->has_pending) && sane_bool(&saved->is_stretched) && sane_bool(&saved->is_clamped);
+}
+
+static bool are_numbers_sane(const motion_t *saved)
+{
+    return sane_all_q32(saved->pose.axis_q32, POSE_AXES) && sane_all_q32(saved->slot_q32, AXES_MAX) &&
+           sane_all_q32(saved->goal_q32, AXES_MAX) && sane_all_q32(saved->timed_way_q32, AXES_MAX) &&
+           sane_all_q32(saved->slot_extension_mm_q32, CYLINDERS_MAX) && sane_all_q32(saved->blend_from_q32, CYLINDERS_MAX) &&
+           sane_q32(saved->angle_target_deg_q32) && saved->asked_cycles >= 0 && saved->asked_cycles <= CYCLES_MAX &&
+           saved->join_cycles >= 0 && saved->join_cycles <= CYCLES_MAX && saved->straight_cycles >= 0 &&
+           saved->straight_cycles <= CYCLES_MAX && saved->timed_share_q46 >= 0 && saved->timed_share_q46 <= SHARE_MAX_Q46 &&
+           sane_time(saved->last_us) && sane_time(saved->timed_end_us);
+}
+
+/* TODO of whoever changes them: what stream, gate, plan, aside and blend have inside is not judged here yet. */
+bool motion_state_is_sane(const motion_t *saved, const motion_t *prepared)
+{
+    return kin_is_same(&saved->kin, &prepared->kin) && saved->cylinders == prepared->cylinders &&
+           saved->cycle_us == prepared->cycle_us && are_limits_same(&saved->engage_limits, &prepared->engage_limits) &&
+           is_same_q32(saved->neutral.axis_q32, prepared->neutral.axis_q32, POSE_AXES) &&
+           is_same_q32(saved->settled_pose.axis_q32, prepared->settled_pose.axis_q32, POSE_AXES) &&
+           is_same_q32(saved->neutral_mm_q32, prepared->neutral_mm_q32, saved->cylinders) &&
+           is_same_q32(saved->settled_mm_q32, prepared->settled_mm_q32, saved->cylinders) && are_ramps_sane(saved, prepared) &&
+           are_kinds_sane(saved) && are_bools_sane(saved) && are_numbers_sane(saved) && motion_target_is_sane(&saved->pending) &&
+           motion_target_is_sane(&saved->withheld);
+}
