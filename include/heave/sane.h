@@ -7,7 +7,7 @@
 
 #include "heave/fx.h"
 
-#define SANE_Q32_MAX  ((q32_t)1 << 55) /**< 8,000 km: a few of them can be added */
+#define SANE_Q32_MAX  ((q32_t)1 << 53) /**< 2 km, 2,000,000 deg: more than any axis has; many of them can be added */
 #define SANE_TIME_MAX (UINT64_MAX >> 2)
 
 /** True for a bool that holds 0 or 1; read as a byte, since any other value of a bool is undefined. */

@@ -36,13 +36,15 @@ static bool is_state_sane(const ramp_state_t *state)
     return sane_q32(state->pos_q32) && sane_q32(state->vel_per_cycle_q32) && sane_q32(state->acc_per_cycle2_q32);
 }
 
-/* The divisors of a ramp follow from its limits. */
+/* The divisors of a ramp follow from its limits; its speed and acceleration never leave them, though its position may. */
 static bool is_ramp_sane(const ramp_t *saved, const ramp_t *prepared)
 {
     return are_limits_same(&saved->limits, &prepared->limits) && saved->acc_safe_q32 == prepared->acc_safe_q32 &&
            saved->acc_cycles == prepared->acc_cycles && saved->per_jerk_q62 == prepared->per_jerk_q62 &&
            saved->per_acc_q62 == prepared->per_acc_q62 && saved->brake_reach_q32 == prepared->brake_reach_q32 &&
-           saved->brake_cycles == prepared->brake_cycles && is_state_sane(&saved->state) && saved->ref_jerk_q32 >= 0 &&
+           saved->brake_cycles == prepared->brake_cycles && sane_q32(saved->state.pos_q32) &&
+           fx_abs(saved->state.vel_per_cycle_q32) <= saved->limits.vel_per_cycle_q32 &&
+           fx_abs(saved->state.acc_per_cycle2_q32) <= saved->acc_safe_q32 && saved->ref_jerk_q32 >= 0 &&
            sane_q32(saved->ref_jerk_q32);
 }
 
@@ -61,10 +63,9 @@ static bool are_ramps_sane(const motion_t *saved, const motion_t *prepared)
     bool is_sane = is_intensity_sane(&saved->intensity, &prepared->intensity);
     for (unsigned i = 0; i < AXES_MAX; i++) {
         is_sane = is_sane && sane_bool(&saved->is_axis_moved[i]) && saved->is_axis_moved[i] == prepared->is_axis_moved[i] &&
-                  (!saved->is_axis_moved[i] || is_ramp_sane(&saved->axis[i], &prepared->axis[i])) &&
-                  is_state_sane(&saved->led[i]);
+                  is_ramp_sane(&saved->axis[i], &prepared->axis[i]) && is_state_sane(&saved->led[i]);
     }
-    for (unsigned i = 0; i < saved->cylinders; i++) {
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) { /* those that are not there as well: they are all 0 */
         is_sane = is_sane && is_ramp_sane(&saved->cylinder[i], &prepared->cylinder[i]) && is_state_sane(&saved->reference[i]);
     }
     return is_sane;
@@ -95,7 +96,7 @@ static bool are_numbers_sane(const motion_t *saved)
            sane_time(saved->last_us) && sane_time(saved->timed_end_us);
 }
 
-/* TODO of whoever changes them: what stream, gate, plan, aside and blend have inside is not judged here yet. */
+/* Not judged here yet: what stream, gate, plan, aside and blend have inside, and whether source and join go with it. */
 bool motion_state_is_sane(const motion_t *saved, const motion_t *prepared)
 {
     return kin_is_same(&saved->kin, &prepared->kin) && saved->cylinders == prepared->cylinders &&

@@ -13,10 +13,12 @@ import re
 import select
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
 import time
+import zlib
 from pathlib import Path
 
 import heave
@@ -324,6 +326,27 @@ def dumps_the_black_box(bench):
         assert len(trace.splitlines()) > 1000
         played = bench.play(folder / "frames", config=folder / "platform.ini")
         assert played == trace, f"{folder.name} plays back otherwise"
+
+
+def refuses_a_forged_state(bench):
+    """With its check sum right, but a cycle of 0 us, by which is divided: the first bytes of a state are the settings' period."""
+    config, directory = with_black_box(bench)
+    daemon = bench.start(config=config)
+    bench.wait_state("ENGAGED")
+    with bench.sender() as sender:
+        sender.stream(27, wave)  # more than is kept: the incident begins with a state
+    assert bench.ask("dump")[1] == 0
+    heave.wait_for(lambda: list(directory.glob("*/frames")), "the incident")
+    assert bench.stop(daemon) == 0
+    frames = min(directory.glob("*/frames"))
+    head, about, _, digits = re.search(r"(?m)^(\S+ !state )(\S+ )([0-9A-F]{8}) ([0-9A-F]+)$", frames.read_text(encoding="utf-8")).groups()
+    state = bytes.fromhex(digits)
+    assert struct.unpack_from("=I", state)[0] == 1000
+    for forged, code in ((state, 0), (bytes(4) + state[4:], 65)):
+        line = f"{head}{about}{zlib.crc32(forged):08X} {forged.hex().upper()}\n"
+        run = bench.heaved("--config", config, "--play", bench.file("forged.txt", line), "--trace", bench.folder / "forged.csv")
+        assert run.returncode == code, (code, run.returncode, run.stderr)
+    assert "line 1: the !state is of another platform, or no heaved has written it" in run.stderr, run.stderr
 
 
 def replays_a_following_error(bench):
@@ -714,6 +737,7 @@ CASES = {
     "a recording plays back to the same bytes, engage = manual, homed from elsewhere": lambda bench: replays_to_the_same_bytes(bench, **ELSEWHERE),
     "a cycle that is very late holds the platform, and replays": a_late_cycle_holds,
     "the black box is written on request, and replays": dumps_the_black_box,
+    "a forged state is refused": refuses_a_forged_state,
     "a fault that heaved finds itself replays in its cycle": replays_a_following_error,
     "without a directory there is no black box": dumps_nothing,
     "the service manager is told": tells_the_service_manager,
