@@ -202,6 +202,18 @@ static void allowed_decimals(const config_key_t *key, config_text_t *text)
     add_number_word(key, text);
 }
 
+static void allowed_addresses(const config_key_t *key, config_text_t *text)
+{
+    if (key->type == CONFIG_ADDRESS) {
+        config_text_add(text, "a numeric IPv4 or IPv6 address");
+    } else if (key->type == CONFIG_GROUP) {
+        config_text_add(text, "%s, or a multicast address and its network card, such as 239.1.2.3%%eth0 or ff15::9800%%eth0",
+                        key->words);
+    } else {
+        config_text_add(text, "%s, or up to %u addresses or networks such as 192.168.7.0/24", key->words, HAL_UDP_NETWORKS_MAX);
+    }
+}
+
 static void allowed_path(const config_key_t *key, config_text_t *text)
 {
     if (key->words != NULL) {
@@ -244,14 +256,9 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         config_text_add(text, "yes | no");
         break;
     case CONFIG_ADDRESS:
-        config_text_add(text, "a numeric IPv4 or IPv6 address");
-        break;
     case CONFIG_GROUP:
-        config_text_add(text, "%s, or a multicast address and its network card, such as 239.1.2.3%%eth0 or ff15::9800%%eth0",
-                        key->words);
-        break;
     case CONFIG_NETWORKS:
-        config_text_add(text, "%s, or up to %u addresses or networks such as 192.168.7.0/24", key->words, HAL_UDP_NETWORKS_MAX);
+        allowed_addresses(key, text);
         break;
     case CONFIG_PATH:
         allowed_path(key, text);
