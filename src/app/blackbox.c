@@ -18,9 +18,7 @@
 #define FEED_STATE_BYTES (1u << 16)
 #define KEPT_MIN_BYTES   (1u << 20)
 #define KEPT_MAX_BYTES   (1u << 30)
-#define PAUSE_NS         10000000
-#define END_WAIT_S       5
-#define STACK_BYTES      262144
+#define END_WAIT_MS      5000
 
 /* --- The motion thread --- */
 
@@ -318,17 +316,9 @@ blackbox_feed_t *blackbox_feed(blackbox_t *self)
 
 /* --- The thread --- */
 
-static void *run(void *argument)
+static void step(void *ctx, bool is_end)
 {
-    blackbox_t *self = argument;
-    const struct timespec pause = {.tv_nsec = PAUSE_NS};
-    while (__atomic_load_n(&self->is_quit, __ATOMIC_ACQUIRE) == 0) {
-        blackbox_step(self, false);
-        (void)nanosleep(&pause, NULL);
-    }
-    blackbox_step(self, true);
-    __atomic_store_n(&self->is_ended, 1, __ATOMIC_RELEASE);
-    return NULL;
+    blackbox_step(ctx, is_end);
 }
 
 bool blackbox_start(blackbox_t *self)
@@ -336,31 +326,14 @@ bool blackbox_start(blackbox_t *self)
     if (self->memory == NULL) {
         return true;
     }
-    pthread_attr_t attributes;
-    (void)pthread_attr_init(&attributes);
-    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES); /* locked into memory whole */
-    const int error = pthread_create(&self->thread, &attributes, run, self);
-    (void)pthread_attr_destroy(&attributes);
-    self->is_running = error == 0;
-    self->has_no_thread = error != 0;
-    errno = error;
-    return self->is_running;
+    self->has_no_thread = !worker_start(&self->worker, step, self);
+    return !self->has_no_thread;
 }
 
 bool blackbox_close(blackbox_t *self)
 {
-    const struct timespec pause = {.tv_nsec = PAUSE_NS};
-    __atomic_store_n(&self->is_quit, 1, __ATOMIC_RELEASE);
-    for (unsigned i = 0; self->is_running && i < END_WAIT_S * 1000000000ull / PAUSE_NS; i++) {
-        if (__atomic_load_n(&self->is_ended, __ATOMIC_ACQUIRE) != 0) {
-            (void)pthread_join(self->thread, NULL);
-            self->is_running = false;
-        } else {
-            (void)nanosleep(&pause, NULL);
-        }
-    }
-    if (self->is_running || self->memory == NULL) {
-        return !self->is_running;
+    if (!worker_close(&self->worker, END_WAIT_MS)) {
+        return false;
     }
     free(self->memory);
     free(self->platform);

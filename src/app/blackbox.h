@@ -16,6 +16,7 @@
 #include "record.h"
 #include "ring.h"
 #include "session.h"
+#include "worker.h"
 
 #define BLACKBOX_PATH_MAX (CONFIG_PATH_MAX + 112u)
 #define BLACKBOX_TEXT_MAX (BLACKBOX_PATH_MAX + 128u)
@@ -104,11 +105,8 @@ typedef struct {
     bool is_answer_good;
     char answer[BLACKBOX_TEXT_MAX];
 
-    pthread_t thread;
-    bool is_running;
+    worker_t worker;
     bool has_no_thread; /**< it could not be started: nobody writes anything */
-    uint32_t is_quit;   /**< atomic */
-    uint32_t is_ended;  /**< atomic */
 } blackbox_t;
 
 /** Prepares it. Without a directory, configured or given by a service manager, there is none, which is no error.

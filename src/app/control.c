@@ -232,12 +232,17 @@ static void take_lines(control_t *self, control_client_t *client, uint64_t now_u
         if (newline == NULL) {
             return;
         }
+        const bool has_zero = memchr(client->in, '\0', (size_t)(newline - client->in)) != NULL; /* what stands behind it counts */
         *newline = '\0';
         if (newline > client->in && newline[-1] == '\r') {
             newline[-1] = '\0';
         }
         client->asked_us = now_us;
-        take_request(self, client, client->in, now_us);
+        if (has_zero) {
+            answer_error(client, "a zero byte in the request; allowed: text, one request per line", NULL);
+        } else {
+            take_request(self, client, client->in, now_us);
+        }
         client->in_length -= (size_t)(newline + 1 - client->in);
         memmove(client->in, newline + 1, client->in_length);
     }
@@ -465,15 +470,30 @@ static control_client_t *make_room(control_t *self, uint64_t now_us)
     return client;
 }
 
-/* A newcomer for whom there is no room yet stays in the queue of the socket. */
+/* Whoever waits outside. Where the system has no descriptor left, who matters least gives one back. */
+static void let_in(control_t *self, uint64_t now_us)
+{
+    self->newcomer = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    self->is_shut = self->newcomer < 0 && errno != EAGAIN && errno != EINTR && errno != ECONNABORTED;
+    control_client_t *least = self->is_shut ? find_least(self, now_us) : NULL;
+    if (least != NULL) {
+        give_way(least);
+        self->newcomer = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    }
+}
+
+/* A newcomer for whom there is no room yet waits for it. */
 static void take_connection(control_t *self, uint64_t now_us)
 {
-    control_client_t *client = make_room(self, now_us);
-    self->is_full = client == NULL;
+    if (self->newcomer < 0) {
+        let_in(self, now_us);
+    }
+    control_client_t *client = self->newcomer >= 0 ? make_room(self, now_us) : NULL;
     if (client == NULL) {
         return;
     }
-    client->fd = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    client->fd = self->newcomer;
+    self->newcomer = -1;
     client->in_length = 0;
     client->out_length = 0;
     client->is_closing = false;
@@ -485,8 +505,8 @@ static void take_connection(control_t *self, uint64_t now_us)
 
 void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS])
 {
-    fds[0] =
-        (struct pollfd){.fd = self->is_full ? -1 : self->fd, .events = POLLIN}; /* poll would not wait while nobody is let in */
+    const bool is_open = self->newcomer < 0 && !self->is_shut; /* poll would not wait while nobody is let in */
+    fds[0] = (struct pollfd){.fd = is_open ? self->fd : -1, .events = POLLIN};
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         const control_client_t *client = &self->client[i];
         const short events = (short)((is_read(client) ? POLLIN : 0) | (client->out_length > 0 ? POLLOUT : 0));
@@ -512,7 +532,7 @@ void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64
             serve_time(self, client, now_us);
         }
     }
-    if ((fds[0].revents & POLLIN) != 0 || self->is_full) {
+    if ((fds[0].revents & POLLIN) != 0 || self->newcomer >= 0 || self->is_shut) {
         take_connection(self, now_us);
     }
 }
@@ -574,7 +594,8 @@ int control_open(control_t *self, const char *path, const config_t *config, moti
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     self->fd = -1;
-    self->is_full = false;
+    self->newcomer = -1;
+    self->is_shut = false;
     self->config = config;
     self->loop = loop;
     self->blackbox = blackbox;
@@ -613,6 +634,10 @@ void control_close(control_t *self)
         if (self->client[i].fd >= 0) {
             drop(&self->client[i]);
         }
+    }
+    if (self->newcomer >= 0) {
+        (void)close(self->newcomer);
+        self->newcomer = -1;
     }
     if (is_ours(self)) {
         (void)unlink(self->path);

@@ -46,7 +46,8 @@ typedef struct {
 /** The socket and its clients; private to control.c. */
 typedef struct {
     int fd;       /**< -1: closed */
-    bool is_full; /**< somebody waits outside, and nobody can give way yet */
+    int newcomer; /**< has come, and nobody can give way yet; -1: nobody */
+    bool is_shut; /**< the system has no descriptor for a newcomer: not waited for until it is tried again */
     char path[CONFIG_PATH_MAX];
     struct stat made; /**< identity of the socket file, so that only ours is removed */
     motion_loop_t *loop;
@@ -69,7 +70,7 @@ void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS]);
 /** How long poll may wait, in ms, not more than the given time. */
 int control_timeout_ms(const control_t *self, uint64_t now_us, int at_most_ms);
 
-/** Serves what poll found, and what time has made due. */
+/** Serves what poll found, and what time has made due. What poll only supposes does no harm. */
 void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64_t now_us);
 
 /** Sends what waits, closes, and removes the socket file; harmless on a closed one. */

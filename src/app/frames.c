@@ -8,8 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define READ_BYTES  65536u
-#define PERCENT_MAX 999u /* as a recording may have it: what is too much is refused as it was then */
+#define READ_BYTES      65536u
+#define FRAMES_LINE_MAX (1u << 20) /* the longest text with all its bytes as escapes, or a !state, several times over */
+#define FRAMES_FILE_MAX (1u << 30) /* a day of frames at 60 Hz is a third of it */
+#define PERCENT_MAX     999u       /* as a recording may have it: what is too much is refused as it was then */
 
 static const char k_bad_time[] =
     "no time at the start; a line is `<t_ms> <text>`, `<t_ms> !request`, or a comment that starts with `;`";
@@ -341,10 +343,17 @@ bool frames_parse_line(char *text, size_t length, frames_line_t *out, bool *is_e
 
 /* --- Files --- */
 
+/* A device or a pipe may never end: what cannot be a file of frames is not read on.
+ * Returns false: errno is EFBIG for too much of it, EMSGSIZE for a line that does not end; or what the system says. */
 static bool read_whole(FILE *file, char **bytes, size_t *length)
 {
     size_t capacity = 0;
+    size_t line = 0; /* where the newest one begins */
     for (;;) {
+        if (*length > FRAMES_FILE_MAX || *length - line > FRAMES_LINE_MAX) {
+            errno = *length - line > FRAMES_LINE_MAX ? EMSGSIZE : EFBIG;
+            return false;
+        }
         if (capacity - *length < READ_BYTES) {
             capacity = capacity * 2 + 2 * READ_BYTES;
             char *more = realloc(*bytes, capacity);
@@ -354,6 +363,8 @@ static bool read_whole(FILE *file, char **bytes, size_t *length)
             *bytes = more;
         }
         const size_t taken = fread(*bytes + *length, 1, READ_BYTES, file);
+        const char *newline = memrchr(*bytes + *length, '\n', taken);
+        line = newline != NULL ? (size_t)(newline + 1 - *bytes) : line;
         *length += taken;
         if (taken == 0) {
             return ferror(file) == 0;

@@ -22,6 +22,7 @@
 #include "ctl_usage.h"
 #include "ctl_view.h"
 #include "say.h" // exit codes
+#include "standard.h"
 #include "usage.h"
 
 #define ANSWER_MS   5000
@@ -493,6 +494,9 @@ static int choose_socket(ctl_t *self)
 int main(int argc, char **argv)
 {
     static ctl_t ctl;
+    if (!standard_open()) {
+        return complain(EXIT_UNAVAILABLE, "the null device: %s", strerror(errno));
+    }
     (void)setlocale(LC_CTYPE, "");
     const char *wrong = take_options(&ctl, argc, argv);
     if (wrong == NULL && ctl.command != NULL) {

@@ -192,6 +192,10 @@ static void say_summary(const play_t *self)
 static int load(play_t *self, const char *path)
 {
     const int bad = frames_load(&self->frames, path, stderr);
+    if (bad < 0 && (errno == EFBIG || errno == EMSGSIZE)) {
+        return say(EXIT_BAD_DATA, "%s: %s; allowed: a file of frames, `<t_ms> <text>` on each line", path,
+                   errno == EFBIG ? "more than 1 GiB" : "a line of more than 1 MiB");
+    }
     if (bad < 0) {
         return say(EXIT_NO_INPUT, "%s: %s", path, strerror(errno));
     }

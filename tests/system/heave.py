@@ -73,7 +73,7 @@ class Guard:
         os.ftruncate(self.report_fd, mmap.PAGESIZE)
         self.report = mmap.mmap(self.report_fd, mmap.PAGESIZE)
         self.moved = pages_moved()
-        self.options = {"env": {**environment, "LD_PRELOAD": str(library), "HEAVE_GUARD_REPORT": str(self.report_fd)}, "pass_fds": (self.report_fd,)}
+        self.options = {"env": {**environment, "LD_PRELOAD": f"{environment.get('LD_PRELOAD', '')} {library}", "HEAVE_GUARD_REPORT": str(self.report_fd)}, "pass_fds": (self.report_fd,)}
 
     def started(self):
         os.close(self.report_fd)

@@ -36,9 +36,9 @@ LIMIT_S = 60
 
 # What cannot fail, or asks nobody, or only looks into memory.
 HARMLESS = set("""
-bcmp sin cos strcpy stpcpy strnlen __ctype_b_loc __cxa_finalize __errno_location __stack_chk_fail abort fmax fmin llround lround log10 pow sqrt sincos memchr memcmp memcpy memmove memset strchr strcmp
+bcmp memrchr sin cos strcpy stpcpy strnlen __ctype_b_loc __cxa_finalize __errno_location __stack_chk_fail abort fmax fmin llround lround log10 pow sqrt sincos memchr memcmp memcpy memmove memset strchr strcmp
 strcspn strerror strlen strncmp strncpy strpbrk strrchr strspn strstr strtod strtoll strtoul strtoull snprintf vsnprintf gmtime_r inet_ntop inet_pton qsort
-getenv getopt_long gai_strerror ferror fileno free freeaddrinfo pthread_self pthread_attr_destroy pthread_attr_init pthread_attr_setinheritsched
+getenv getopt_long gai_strerror ferror fileno free freeaddrinfo pthread_self pthread_attr_destroy pthread_attr_init pthread_cond_broadcast pthread_cond_init pthread_cond_timedwait pthread_condattr_destroy pthread_condattr_init pthread_condattr_setclock pthread_attr_setinheritsched
 pthread_attr_setschedparam pthread_attr_setschedpolicy pthread_attr_setstacksize pthread_equal pthread_mutex_init pthread_mutex_lock pthread_mutex_unlock
 pthread_join pthread_sigmask sigaction sigaddset sigemptyset sigfillset signal getpid time clock_gettime setvbuf setlocale nl_langinfo isatty munlockall ini_parse_stream
 mnl_attr_get_payload mnl_attr_get_payload_len mnl_attr_get_type mnl_attr_parse mnl_attr_parse_nested mnl_attr_put_strz mnl_nlmsg_get_payload
@@ -60,8 +60,8 @@ MODBUS = ["ETIMEDOUT", "ECONNRESET", "EIO", "EBADF", 112345688 + 11]  # the last
 ERRNOS = {
     "accept4": ["EMFILE", "ECONNABORTED", "EINTR", "EAGAIN"], "access": ["EACCES", "EROFS"], "bind": ["EADDRINUSE", "EACCES", "EADDRNOTAVAIL", "ENODEV"],
     "calloc": MEMORY, "malloc": MEMORY, "realloc": MEMORY, "chmod": ["EPERM", "EROFS"], "clock_nanosleep": ["EINTR", "EINVAL"],
-    "connect": ["ECONNREFUSED", "EACCES", "ENOENT", "EAGAIN"], "eventfd": ["EMFILE", "ENOMEM"], "fchmod": ["EPERM", "EIO"], "fclose": DISK, "fflush": DISK,
-    "fdopen": MEMORY, "fopen": FILES, "fread": ["EIO"], "fstat": ["EIO"], "fsync": DISK, "getaddrinfo": [-3, -10], "getrusage": ["EINVAL"],
+    "connect": ["ECONNREFUSED", "EACCES", "ENOENT", "EAGAIN"], "eventfd": ["EMFILE", "ENOMEM"], "fchmod": ["EPERM", "EIO"], "fcntl": ["EBADF"], "fclose": DISK, "fflush": DISK,
+    "fdopen": MEMORY, "fopen": FILES, "fread": ["EIO"], "fstat": ["EIO"], "fsync": DISK, "getaddrinfo": [-3, -10], "getrlimit": ["EFAULT"], "getrusage": ["EINVAL"], "setrlimit": ["EPERM"],
     "getsockname": ["ENOBUFS"], "getsockopt": ["ENOBUFS"], "ioctl": ["EIO", "ENODEV", "ENOTTY", "EBUSY", "EPERM"], "listen": ["EADDRINUSE"],
     "lstat": ["EACCES", "ENOENT"], "mkdir": ["EACCES", "ENOSPC", "EROFS"], "mlockall": ["EPERM", "ENOMEM"], "open": [*FILES, "ENOSPC", "EROFS", "EINTR"],
     "open_memstream": MEMORY, "opendir": FILES, "poll": ["EINTR", "ENOMEM"], "ppoll": ["EINTR", "ENOMEM"], "pthread_create": ["EAGAIN", "EPERM"],
