@@ -192,11 +192,31 @@ void blackbox_step(blackbox_t *self, bool is_end)
         self->due_us = 0;
         (void)blackbox_write(self, &self->cause, text);
     }
+    blackbox_keep_seen(self);
     const uint32_t ticket = newest_ticket(self);
     if (ticket != 0) {
         const bool is_good = blackbox_write(self, NULL, text);
         answer(self, ticket, is_good, text);
     }
+}
+
+uint32_t blackbox_list(blackbox_t *self, blackbox_folder_t *to, uint32_t *seen)
+{
+    (void)pthread_mutex_lock(&self->mutex);
+    const uint32_t count = self->folders;
+    memcpy(to, self->folder, count * sizeof *to);
+    *seen = self->seen;
+    (void)pthread_mutex_unlock(&self->mutex);
+    return count;
+}
+
+void blackbox_see(blackbox_t *self)
+{
+    (void)pthread_mutex_lock(&self->mutex);
+    if (self->folders > 0) {
+        self->seen = blackbox_number(self->folder[self->folders - 1].name);
+    }
+    (void)pthread_mutex_unlock(&self->mutex);
 }
 
 uint32_t blackbox_ask(blackbox_t *self)

@@ -61,9 +61,10 @@ typedef struct {
 } blackbox_lane_t;
 
 #define BLACKBOX_INCIDENTS_MAX 100u
+#define BLACKBOX_FOLDERS_MAX   (2u * BLACKBOX_INCIDENTS_MAX + 2u) /**< incidents, dumps, the one kept, the one just written */
 #define BLACKBOX_NAME_MAX      96u
 
-/** Name of an incident's folder: `incident-NUMBER-DATE`. */
+/** Name of a folder: `incident-NUMBER-DATE` of a fault or an e-stop, with `-dump` behind it where somebody asked for it. */
 typedef struct {
     char name[BLACKBOX_NAME_MAX];
 } blackbox_folder_t;
@@ -81,10 +82,10 @@ typedef struct {
     char *platform; /**< the configuration as text */
     size_t platform_length;
     char directory[CONFIG_PATH_MAX];
-    uint32_t number;                                       /**< of the next incident */
-    blackbox_folder_t folder[BLACKBOX_INCIDENTS_MAX + 1u]; /**< the incidents there are, oldest first */
-    uint32_t folders;
-    uint32_t folders_max;
+    uint32_t number;      /**< of the next incident */
+    uint32_t folders_max; /**< of each sort */
+    uint32_t seen_kept;   /**< as the directory has it */
+    int seen_error;       /**< errno of the last try to keep it, 0 = none; each new one is said once */
     uint64_t newest_us;   /**< time of the newest row */
     uint64_t zero_us;     /**< 0 = not yet */
     uint64_t reloaded_us; /**< the configuration was last read again then; 0 = never */
@@ -99,7 +100,10 @@ typedef struct {
     blackbox_item_t read;
     char line[CHECKPOINT_LINE_MAX];
 
-    pthread_mutex_t mutex; /**< guards what follows */
+    pthread_mutex_t mutex;                          /**< guards what follows; the list is changed by its thread alone */
+    blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX]; /**< what there is, oldest first */
+    uint32_t folders;
+    uint32_t seen; /**< number of the newest one that a person has seen */
     uint32_t asked;
     uint32_t answered;
     bool is_answer_good;
@@ -132,6 +136,19 @@ uint32_t blackbox_ask(blackbox_t *self);
 /** Whether that has been written.
  *  @param text where to, or why not */
 bool blackbox_answer(blackbox_t *self, uint32_t ticket, bool *is_good, char text[BLACKBOX_TEXT_MAX]);
+
+/** What is in the directory. Any thread.
+ *  @param to   BLACKBOX_FOLDERS_MAX, oldest first
+ *  @param seen out: number of the newest one that a person has seen
+ *  @return how many */
+uint32_t blackbox_list(blackbox_t *self, blackbox_folder_t *to, uint32_t *seen);
+
+/** A person has seen all that is in the directory now: the first one after it will not make way. Any thread. */
+void blackbox_see(blackbox_t *self);
+
+/** A folder's number, and whether it was asked for. */
+uint32_t blackbox_number(const char *name);
+bool blackbox_is_dump(const char *name);
 
 /** Writes what is due and ends the thread, or leaves it alone where the disk takes too long.
  *  @return false: it still runs, and self has to stay */

@@ -204,7 +204,7 @@ const config_key_t config_keys[] = {
     {KEY("black-box", "seconds"), AT(black_box.seconds), .type = CONFIG_INTEGER, .unit = "s", .fallback = "120", RANGE(10, 600),
      .help = "kept at least, of every cycle: up to 1 MB of memory and of disk space a second, at 1000 cycles a second"},
     {KEY("black-box", "incidents"), AT(black_box.incidents), .type = CONFIG_INTEGER, .unit = "", .fallback = "10", RANGE(1, 100),
-     .help = "folders kept in the directory; the oldest one makes way"},
+     .help = "folders kept in the directory, of faults and of dumps each; the oldest one makes way, but not the first fault since `heavectl seen`"},
 
     {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim|cia402|can-raw|modbus-tcp|modbus-rtu",
      .help = "the drives in use"},

@@ -199,6 +199,34 @@ static void begin_dump(control_t *self, control_client_t *client, uint64_t now_u
     }
 }
 
+/* Who says that they have been seen gets the list of what was. */
+static void answer_incidents(control_t *self, control_client_t *client, bool is_seeing)
+{
+    uint32_t seen = 0;
+    if (blackbox_feed(self->blackbox) == NULL) {
+        answer_error(client, "incidents: there is no black box; [black-box] directory says where it writes to", NULL);
+        return;
+    }
+    if (is_seeing) {
+        blackbox_see(self->blackbox);
+    }
+    const uint32_t count = blackbox_list(self->blackbox, self->folder, &seen);
+    json_t json = start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_open(&json, "incidents", '[');
+    for (uint32_t i = 0; i < count; i++) {
+        json_open(&json, NULL, '{');
+        json_text(&json, "name", self->folder[i].name);
+        json_bool(&json, "dump", blackbox_is_dump(self->folder[i].name));
+        json_bool(&json, "seen", blackbox_number(self->folder[i].name) <= seen);
+        json_close(&json, '}');
+    }
+    json_close(&json, ']');
+    json_close(&json, '}');
+    answer(client, &json);
+}
+
 static const char k_intensity[] = "intensity ";
 
 static void take_request(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
@@ -210,6 +238,8 @@ static void take_request(control_t *self, control_client_t *client, const char *
         begin_intensity(self, client, &line[strlen(k_intensity)], now_us);
     } else if (strcmp(line, "dump") == 0) {
         begin_dump(self, client, now_us);
+    } else if (strcmp(line, "incidents") == 0 || strcmp(line, "seen") == 0) {
+        answer_incidents(self, client, line[0] == 's');
     } else if (strcmp(line, "status") == 0) {
         answer_status(self, client);
     } else if (strncmp(line, "watch", 5) == 0) {
@@ -219,7 +249,7 @@ static void take_request(control_t *self, control_client_t *client, const char *
     } else {
         answer_error(client,
                      "unknown request; status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, "
-                     "shutdown and dump are allowed",
+                     "shutdown, dump, incidents and seen are allowed",
                      NULL);
     }
 }

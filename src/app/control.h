@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
- * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump. The service thread owns it;
+ * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump,
+ * incidents, seen. The service thread owns it;
  * nothing blocks, nothing allocates after the open, and a client that does not read is dropped. Nobody keeps an operator out:
  * where all places are taken, a newcomer gets that of the client that matters least, which is told so.
  */
@@ -53,7 +54,8 @@ typedef struct {
     motion_loop_t *loop;
     const config_t *config;
     blackbox_t *blackbox;
-    status_lost_t lost; /**< the owner keeps it up to date */
+    blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX]; /**< as last listed */
+    status_lost_t lost;                             /**< the owner keeps it up to date */
     motion_view_words_t view;
     uint32_t last_id;
     control_client_t client[CONTROL_CLIENTS];

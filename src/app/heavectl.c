@@ -258,12 +258,28 @@ static int judge(const cJSON *answer)
     return complain(EXIT_REFUSED, "%s", cJSON_IsString(error) ? error->valuestring : "heaved gave an answer that says nothing");
 }
 
+static void show_incidents(const cJSON *incidents)
+{
+    const cJSON *incident = NULL;
+    cJSON_ArrayForEach(incident, incidents)
+    {
+        const cJSON *name = cJSON_GetObjectItemCaseSensitive(incident, "name");
+        const bool is_seen = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(incident, "seen"));
+        printf("%s: %s\n", cJSON_IsString(name) ? name->valuestring : "?", is_seen ? "seen" : "new");
+    }
+    if (cJSON_GetArraySize(incidents) == 0) {
+        printf("no incidents\n");
+    }
+}
+
 static void show_answer(const ctl_t *self, const cJSON *answer)
 {
     const cJSON *state = cJSON_GetObjectItemCaseSensitive(answer, "state");
     const cJSON *folder = cJSON_GetObjectItemCaseSensitive(answer, "folder");
     if (cJSON_IsString(folder)) {
         printf("%s: %s\n", self->command, folder->valuestring);
+    } else if (cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(answer, "incidents"))) {
+        show_incidents(cJSON_GetObjectItemCaseSensitive(answer, "incidents"));
     } else if (strcmp(self->command, "status") == 0) {
         show_table(answer, false);
     } else if (self->argument != NULL) {

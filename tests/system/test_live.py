@@ -316,8 +316,14 @@ def dumps_the_black_box(bench):
         sender.stream(0.3, wave)
     answer, code = bench.ask("dump")
     assert code == 0 and answer == {"ok": True, "folder": answer["folder"]}, answer
+    names = [Path(run.stdout[len("dump: "):].strip()).name, Path(answer["folder"]).name]
+    assert all(name.endswith("-dump") for name in names), names
+    assert bench.ctl("incidents").stdout == f"{names[0]}: new\n{names[1]}: new\n"
+    listed, code = bench.ask("seen")
+    assert code == 0 and listed == {"ok": True, "incidents": [{"name": name, "dump": True, "seen": True} for name in names]}, listed
+    heave.wait_for(lambda: (directory / ".seen").exists() and (directory / ".seen").read_text() == "000002\n", "that is kept")
     assert bench.stop(daemon) == 0
-    folders = sorted(directory.iterdir())
+    folders = sorted(path for path in directory.iterdir() if path.is_dir())
     assert [str(folder) for folder in folders] == [run.stdout[len("dump: "):].strip(), answer["folder"]], folders
     for folder in folders:
         trace = (folder / "trace.csv").read_bytes()
@@ -352,6 +358,8 @@ def replays_a_following_error(bench):
 def dumps_nothing(bench):
     daemon = bench.start()
     answer, code = bench.ask("dump")
+    assert code == 1 and "[black-box] directory" in answer["error"], answer
+    answer, code = bench.ask("incidents")
     assert code == 1 and "[black-box] directory" in answer["error"], answer
     assert bench.stop(daemon) == 0
 

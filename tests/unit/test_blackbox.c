@@ -347,29 +347,88 @@ static void test_blackbox_nothing_to_begin_with_is_said(void)
     free(frames);
 }
 
-static void test_blackbox_folders_are_bounded_and_a_part_is_removed(void)
+/* Another start of heaved, on the same directory. */
+static void start_anew(void)
+{
+    (void)blackbox_close(&m_box);
+    memset(&m_loop, 0, sizeof m_loop);
+    memset(&m_box, 0, sizeof m_box);
+    m_now_us = 0;
+}
+
+static bool is_kept(const char *folder)
 {
     char path[BLACKBOX_PATH_MAX + 64];
+    (void)snprintf(path, sizeof path, "%s/%s", m_config.black_box.directory, folder);
+    return access(path, F_OK) == 0;
+}
+
+static unsigned dumps(void)
+{
+    unsigned count = 0;
+    for (uint32_t i = 0; i < m_box.folders; i++) {
+        TEST_ASSERT_TRUE(is_kept(m_box.folder[i].name));
+        count += blackbox_is_dump(m_box.folder[i].name);
+    }
+    return count;
+}
+
+static void make_folder(const char *name)
+{
+    char path[BLACKBOX_PATH_MAX + 64];
+    (void)snprintf(path, sizeof path, "%s/%s", m_config.black_box.directory, name);
+    TEST_ASSERT_EQUAL(0, mkdir(path, 0700));
+}
+
+static void test_blackbox_dumps_are_bounded_and_delete_no_fault_and_a_part_is_removed(void)
+{
     m_config.black_box.incidents = 2;
     (void)mkdir(m_config.black_box.directory, 0700);
-    (void)snprintf(path, sizeof path, "%s/incident-000041-20200101T000000Z", m_config.black_box.directory);
-    TEST_ASSERT_EQUAL(0, mkdir(path, 0700));
-    (void)snprintf(m_folder, sizeof m_folder, "%s/.incident.part", m_config.black_box.directory);
-    TEST_ASSERT_EQUAL(0, mkdir(m_folder, 0700));
-    for (unsigned i = 0; i < 3; i++) {
+    make_folder("incident-000040-20200101T000000Z");
+    make_folder("incident-000041-20200101T000000Z");
+    for (unsigned i = 0; i < 4; i++) {
+        make_folder(".incident.part");
         if (i > 0) {
-            (void)blackbox_close(&m_box);
-            memset(&m_loop, 0, sizeof m_loop);
-            memset(&m_box, 0, sizeof m_box);
-            m_now_us = 0;
+            start_anew();
         }
         run((story_t){.end_us = 1000000, .ask_us = 900000});
-        TEST_ASSERT_EQUAL_UINT32(2, m_box.folders);
         TEST_ASSERT_EQUAL_UINT32(42 + i, m_box.number);
-        TEST_ASSERT_EQUAL(i == 0 ? 0 : -1, access(path, F_OK));
-        TEST_ASSERT_EQUAL(-1, access(m_folder, F_OK));
-        (void)snprintf(m_folder, sizeof m_folder, "%s/.incident.part", m_config.black_box.directory);
+        TEST_ASSERT_EQUAL_UINT32(i < 2 ? i + 1 : 2, dumps());
+        TEST_ASSERT_EQUAL_UINT32(2 + dumps(), m_box.folders);
+        TEST_ASSERT_TRUE(is_kept("incident-000040-20200101T000000Z") && is_kept("incident-000041-20200101T000000Z"));
+        TEST_ASSERT_FALSE(is_kept(".incident.part"));
     }
+}
+
+static void test_blackbox_first_fault_since_a_person_looked_is_never_dropped(void)
+{
+    static blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX];
+    uint32_t seen = 0;
+    m_config.black_box.incidents = 1;
+    (void)mkdir(m_config.black_box.directory, 0700);
+    make_folder("incident-000007-20200101T000000Z");
+    for (unsigned i = 0; i < 3; i++) { /* 8, 9, 10: each makes way for the next */
+        run((story_t){.end_us = 5000000, .fault_us = 2000000});
+        TEST_ASSERT_EQUAL_UINT32(2, m_box.folders);
+        TEST_ASSERT_TRUE(is_kept("incident-000007-20200101T000000Z"));
+        start_anew();
+    }
+    run((story_t){.end_us = 1000000});
+    blackbox_see(&m_box);
+    blackbox_step(&m_box, false);
+    start_anew();                                           /* it is on the disk */
+    run((story_t){.end_us = 5000000, .fault_us = 2000000}); /* 11: the first one since */
+    TEST_ASSERT_EQUAL_UINT32(2, blackbox_list(&m_box, folder, &seen));
+    TEST_ASSERT_EQUAL_UINT32(10, seen);
+    TEST_ASSERT_FALSE(is_kept("incident-000007-20200101T000000Z"));
+    start_anew();
+    for (unsigned i = 0; i < 2; i++) {
+        run((story_t){.end_us = 5000000, .fault_us = 2000000});
+        TEST_ASSERT_EQUAL_UINT32(2, blackbox_list(&m_box, folder, &seen));
+        TEST_ASSERT_EQUAL_UINT32(11, blackbox_number(folder[0].name));
+        start_anew();
+    }
+    run((story_t){.end_us = 1000000});
 }
 
 static void expect_refusal(const char *why)
@@ -459,7 +518,8 @@ int main(void)
     RUN_TEST(test_blackbox_estop_is_written_at_the_end_at_the_latest);
     RUN_TEST(test_blackbox_what_was_not_handed_over_is_not_replayed);
     RUN_TEST(test_blackbox_nothing_to_begin_with_is_said);
-    RUN_TEST(test_blackbox_folders_are_bounded_and_a_part_is_removed);
+    RUN_TEST(test_blackbox_dumps_are_bounded_and_delete_no_fault_and_a_part_is_removed);
+    RUN_TEST(test_blackbox_first_fault_since_a_person_looked_is_never_dropped);
     RUN_TEST(test_blackbox_full_disk_leaves_nothing_behind);
     RUN_TEST(test_blackbox_directory_that_cannot_be_is_said_at_the_start);
     RUN_TEST(test_blackbox_without_directory_there_is_none);
