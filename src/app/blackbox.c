@@ -27,6 +27,12 @@ void blackbox_note(blackbox_feed_t *feed, record_kind_t kind, uint64_t t_us, uin
     record_push(&feed->records, kind, t_us, value);
 }
 
+static uint8_t known_of(const drive_feedback_t *drive)
+{
+    return (uint8_t)((drive->is_homed ? BLACKBOX_HOMED : 0) | (drive->has_actual ? BLACKBOX_HAS_ACTUAL : 0) |
+                     (drive->is_energized ? BLACKBOX_ENERGIZED : 0));
+}
+
 static void push_row(blackbox_feed_t *feed, const session_t *session, const trace_row_t *row)
 {
     const snapshot_t *snapshot = gateway_snapshot(&session->gateway);
@@ -39,13 +45,20 @@ static void push_row(blackbox_feed_t *feed, const session_t *session, const trac
         out.actual_q32[i] = snapshot->drive[i].has_actual ? snapshot->drive[i].actual_mm_q32 : 0;
         out.code[i] = snapshot->drive[i].fault_code;
         out.drive[i] = (uint8_t)snapshot->drive[i].state;
+        out.known[i] = known_of(&snapshot->drive[i]);
+        out.age_us[i] = (uint32_t)(snapshot->now_us - snapshot->drive[i].actual_us);
     }
     (void)ring_push(&feed->rows, &out, sizeof out, NULL, 0);
 }
 
-/* Drives that are on their way to being enabled, or homed, have times of their own that a replay does not know. */
-static bool is_replay_possible(const snapshot_t *snapshot)
+/* Drives that are on their way to being enabled, or homed, have times of their own that a replay does not know. Before time
+ * zero it is told of them, cycle by cycle. */
+static bool is_replay_possible(const session_t *session)
 {
+    const snapshot_t *snapshot = gateway_snapshot(&session->gateway);
+    if (!session->has_zero) {
+        return true;
+    }
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
         if (snapshot->drive[i].state == DRIVE_ENABLING || snapshot->drive[i].state == DRIVE_HOMING) {
             return false;
@@ -57,7 +70,7 @@ static bool is_replay_possible(const snapshot_t *snapshot)
 void blackbox_cycle(blackbox_feed_t *feed, const session_t *session, const trace_row_t *row)
 {
     push_row(feed, session, row);
-    if (session->now_us >= feed->next_state_us && is_replay_possible(gateway_snapshot(&session->gateway))) {
+    if (session->now_us >= feed->next_state_us && is_replay_possible(session)) {
         session_t state;
         checkpoint_take(session, &state);
         (void)ring_push(&feed->states, &state, sizeof state, NULL, 0);

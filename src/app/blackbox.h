@@ -21,6 +21,9 @@
 #define BLACKBOX_PATH_MAX (CONFIG_PATH_MAX + 112u)
 #define BLACKBOX_TEXT_MAX (BLACKBOX_PATH_MAX + 128u)
 
+/** What else is known of a drive. */
+enum { BLACKBOX_HOMED = 1, BLACKBOX_HAS_ACTUAL = 2, BLACKBOX_ENERGIZED = 4 };
+
 /** What is kept of a cycle. */
 typedef struct {
     uint64_t now_us; /**< since the start of the program */
@@ -28,6 +31,8 @@ typedef struct {
     q32_t actual_q32[DRIVES_MAX]; /**< mm, deg of the rotation motor */
     uint32_t code[DRIVES_MAX];    /**< the drive's own */
     uint8_t drive[DRIVES_MAX];    /**< drive_state_t */
+    uint8_t known[DRIVES_MAX];    /**< BLACKBOX_HOMED ... */
+    uint32_t age_us[DRIVES_MAX];  /**< of actual */
     uint8_t drives;
     uint8_t fault; /**< fault_code_t */
     uint8_t fault_axis;
@@ -98,6 +103,7 @@ typedef struct {
     blackbox_item_t item;
     blackbox_item_t oldest; /**< that makes way */
     blackbox_item_t read;
+    blackbox_row_t told[2]; /**< rows that a replay is told: the last one, and this one */
     char line[CHECKPOINT_LINE_MAX];
 
     pthread_mutex_t mutex;                          /**< guards what follows; the list is changed by its thread alone */
@@ -159,7 +165,7 @@ bool blackbox_close(blackbox_t *self);
 /** What happened, but for datagrams; these go to feed->records by record_push_datagram(). */
 void blackbox_note(blackbox_feed_t *feed, record_kind_t kind, uint64_t t_us, uint32_t value);
 
-/** After every cycle from time zero on, with its row. */
+/** After every cycle from the first feedback on, with its row. */
 void blackbox_cycle(blackbox_feed_t *feed, const session_t *session, const trace_row_t *row);
 
 #endif

@@ -278,7 +278,7 @@ static void write_head(blackbox_t *self, const blackbox_row_t *cause, const char
 {
     static const char *const k_starts[] = {
         [START_NEVER] = "; NO REPLAY: what led here is older than what was kept\n",
-        [START_ZERO] = "; replay: heaved --config platform.ini --play frames --trace OUT repeats trace.csv\n",
+        [START_ZERO] = "; replay: heaved --config platform.ini --play frames --trace OUT repeats trace.csv from time zero on\n",
         [START_STATE] =
             "; replay, by the same version of heaved: heaved --config platform.ini --play frames --trace OUT repeats trace.csv\n",
     };
@@ -293,9 +293,9 @@ static void write_head(blackbox_t *self, const blackbox_row_t *cause, const char
         (void)snprintf(text, sizeof text, ", axis %u", (unsigned)cause->fault_axis);
         write_text(self, text);
     }
-    if (cause != NULL && self->zero_us != 0) {
-        (void)snprintf(text, sizeof text, ", at %" PRIu64 ".%03u ms", (cause->now_us - self->zero_us) / 1000,
-                       (unsigned)((cause->now_us - self->zero_us) % 1000));
+    if (cause != NULL) {
+        (void)snprintf(text, sizeof text, ", at %" PRIu64 ".%03u ms%s", cause->row.t_us / 1000,
+                       (unsigned)(cause->row.t_us % 1000), cause->now_us == cause->row.t_us ? " since the start" : "");
         write_text(self, text);
     }
     write_text(self, "\n");
@@ -327,6 +327,54 @@ static void write_records(blackbox_t *self, record_writer_t *writer, uint64_t fr
     }
 }
 
+/* What the drives told in a cycle, where it is not what they told in the one before. */
+static void write_feedback(blackbox_t *self, const blackbox_row_t *row, const blackbox_row_t *before)
+{
+    char line[64];
+    for (unsigned i = 0; i < row->drives; i++) {
+        if (before->drives != 0 && row->drive[i] == before->drive[i] && row->known[i] == before->known[i] &&
+            row->actual_q32[i] == before->actual_q32[i] && row->age_us[i] == before->age_us[i] &&
+            row->code[i] == before->code[i]) {
+            continue;
+        }
+        size_t at = decimal_put_ms(line, row->now_us);
+        at += decimal_put_text(&line[at], " !feedback ");
+        at += decimal_put_u64(&line[at], i + 1);
+        at += decimal_put_text(&line[at], " ");
+        at += decimal_put_hex(&line[at], (uint32_t)row->drive[i] << 4 | row->known[i], 2);
+        at += decimal_put_hex(&line[at], (uint32_t)((uint64_t)row->actual_q32[i] >> 32), 8);
+        at += decimal_put_hex(&line[at], (uint32_t)row->actual_q32[i], 8);
+        at += decimal_put_hex(&line[at], row->age_us[i], 8);
+        at += decimal_put_hex(&line[at], row->code[i], 8);
+        at += decimal_put_text(&line[at], "\n");
+        out_file_write(&self->file, line, at);
+    }
+}
+
+/* Before time zero drives live by times of their own: a replay is told what they told, among the records. */
+static void write_told(blackbox_t *self, record_writer_t *writer, uint64_t from_us)
+{
+    char line[RECORD_LINE_MAX];
+    uint32_t items = 0;
+    size_t record = 0;
+    self->told[0].drives = 0;
+    bool has_record = read_next(self, &self->records, &record);
+    while (go_on(self, &items) && ring_pop(&self->rows.reader, &self->told[1], sizeof self->told[1]) > 0) {
+        const blackbox_row_t *row = &self->told[1];
+        for (; has_record && self->read.record.head.t_us <= row->now_us; has_record = read_next(self, &self->records, &record)) {
+            if (self->read.record.head.t_us >= from_us && row->now_us <= self->until_us) {
+                const size_t bytes = record - sizeof self->read.record.head;
+                out_file_write(&self->file, line, record_writer_line(writer, &self->read.record, bytes, line));
+            }
+        }
+        if (row->now_us >= from_us && row->now_us <= self->until_us) {
+            write_feedback(self, row, &self->told[0]);
+            self->told[0] = *row;
+        }
+    }
+    start_reading(&self->rows); /* for the files that follow */
+}
+
 /* Where trace.csv ends, a replay does. */
 static void write_end(blackbox_t *self, const record_writer_t *writer)
 {
@@ -350,7 +398,11 @@ static bool write_frames(blackbox_t *self, const blackbox_row_t *cause, const ch
         writer.zero_us = self->zero_us;
         out_file_write(&self->file, self->line, checkpoint_format(&self->read.state, self->line));
     }
-    write_records(self, &writer, start == START_STATE ? start_us : 0);
+    if (start == START_STATE && self->zero_us == 0) {
+        write_told(self, &writer, start_us);
+    } else {
+        write_records(self, &writer, start == START_STATE ? start_us : 0);
+    }
     if (start != START_NEVER) {
         write_end(self, &writer);
     }
@@ -444,10 +496,11 @@ static bool write_files(blackbox_t *self, const blackbox_row_t *cause, const cha
     start_reading(&self->rows);
     uint64_t start_us = 0;
     const start_t start = find_start(self, &start_us);
+    const uint64_t rows_us = start == START_ZERO ? 0 : start_us; /* what came before time zero is shown, if not replayed */
     bool is_good =
-        write_frames(self, cause, name, start, start_us) && write_rows(self, FILE_TRACE, trace_head, format_row, start_us);
+        write_frames(self, cause, name, start, start_us) && write_rows(self, FILE_TRACE, trace_head, format_row, rows_us);
     start_reading(&self->rows); /* once more */
-    is_good = is_good && write_rows(self, FILE_FEEDBACK, feedback_head, format_feedback, start_us) && write_platform(self);
+    is_good = is_good && write_rows(self, FILE_FEEDBACK, feedback_head, format_feedback, rows_us) && write_platform(self);
     self->states.is_reading = false;
     self->records.is_reading = false;
     self->rows.is_reading = false;

@@ -25,7 +25,7 @@ hv_status_t session_init(session_t *self, const settings_t *settings, const gate
  *  @return true where it is time zero */
 bool session_cycle(session_t *self);
 
-/** The row of the last cycle. Once per cycle, from time zero on. */
+/** The row of the last cycle. Once per cycle, from the first one that is wanted on. */
 void session_row(session_t *self, trace_row_t *out);
 
 #endif

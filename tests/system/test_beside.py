@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import heave
 import tap
@@ -249,6 +250,33 @@ def zero_in_a_request(bench):
     assert bench.stop(daemon) == 0
 
 
+# --- What is kept of the way up ---
+
+def seen_from_the_first_feedback_on(bench):
+    """A machine that homes by itself moves further than ever: trace and black box have it, and what a dump in HOMING says can be repeated."""
+    config, trace = bench.write_config("homing.ini", platform__engage="manual", sim__enable_delay_ms="500", sim__start_extension_mm="60", sim__homed="no"), bench.folder / "t.csv"
+    config.write_text(f"{config.read_text()}\n[black-box]\ndirectory = {bench.folder}/box\n")
+    daemon = bench.start("--trace", trace, config=config)
+    time.sleep(0.3)
+    assert bench.ctl("engage").returncode == 0
+    bench.wait_state("HOMING")
+    heave.wait_for(lambda: bench.status()["cylinders"][0]["drive"] == "homing", "it homes")
+    time.sleep(0.5)
+    answer, code = bench.ask("dump")
+    assert code == 0 and bench.status()["state"] == "HOMING", answer
+    assert bench.stop(daemon) == 0
+    folder = Path(answer["folder"])
+    text = (folder / "frames").read_text()
+    assert "NO REPLAY" not in text and " !engage" in text and " !feedback 1 " in text, text[:400]
+    rows = (folder / "trace.csv").read_bytes()
+    moved = {line.split(b",")[9] for line in rows.splitlines() if b",HOMING," in line}
+    assert len(moved) > 300 and b",OFF," in rows, len(moved)
+    assert bench.play(folder / "frames", config=folder / "platform.ini") == rows, "the incident is repeated otherwise"
+    live = trace.read_bytes()
+    assert rows.split(b"\n", 1)[1] in live, "the trace has other rows"
+    assert all(line.endswith(b"before-zero") for line in live.splitlines()[1:]), "time zero never came"
+
+
 # --- Late cycles where nothing is led ---
 
 def late_on_its_way(bench):
@@ -284,6 +312,7 @@ def late_on_its_way(bench):
 
 
 CASES = {
+    "the way up: trace and black box from the first feedback on, and a dump in HOMING replays": seen_from_the_first_feedback_on,
     "too few descriptors: raised, or refused at the start": too_few_descriptors,
     "poll fails for good: operators and signals are heard": poll_fails_for_good,
     "closed standard descriptors: no log line in a trace or record": closed_standard_descriptors,

@@ -252,7 +252,7 @@ def replays_to_the_same_bytes(bench, **changes):
     daemon = bench.start("--record", record, "--trace", trace, config=config)
     session(bench, daemon)
     assert bench.stop(daemon) == 0
-    live, log, text = trace.read_bytes(), daemon.log.read_text(), record.read_text()
+    live, log, text = heave.since_zero(trace.read_bytes()), daemon.log.read_text(), record.read_text()
     assert "missing" not in log, log
     played = bench.play(record, config=config)
     assert len(live.splitlines()) > 3000, "a live run worth the name"
@@ -293,7 +293,7 @@ def a_late_cycle_holds(bench):
     assert status["late_cycles"] > 40 and status["wake_latency"]["max_us"] > 40000, status
     assert status["wake_latency"]["count"] >= status["cycle"] - 100 and status["cycle_time"]["p50_us"] <= status["cycle_time"]["max_us"]
     assert bench.stop(daemon) == 0
-    live = trace.read_bytes()
+    live = heave.since_zero(trace.read_bytes())
     assert bench.play(record, config=config)[:len(live)] == live, "a late cycle replays"
 
 
@@ -326,7 +326,7 @@ def dumps_the_black_box(bench):
     folders = sorted(path for path in directory.iterdir() if path.is_dir())
     assert [str(folder) for folder in folders] == [run.stdout[len("dump: "):].strip(), answer["folder"]], folders
     for folder in folders:
-        trace = (folder / "trace.csv").read_bytes()
+        trace = heave.since_zero((folder / "trace.csv").read_bytes())
         assert len(trace.splitlines()) > 1000
         played = bench.play(folder / "frames", config=folder / "platform.ini")
         assert played == trace, f"{folder.name} plays back otherwise"
@@ -346,7 +346,7 @@ def replays_a_following_error(bench):
     assert bench.stop(daemon) == 0
     folder, = directory.iterdir()
     assert " !fault following-error " in (folder / "frames").read_text()
-    trace = (folder / "trace.csv").read_bytes()
+    trace = heave.since_zero((folder / "trace.csv").read_bytes())
     states = [row["state"] for row in heave.rows_of(trace)]
     assert "ENGAGED" in states and states[-1] == "FAULT", set(states)
     played = bench.play(folder / "frames", config=folder / "platform.ini")

@@ -498,7 +498,7 @@ class Day:
 
 def pieces(trace, cycle_us):
     """Where the service thread could not write, rows are missing, and counted: what is between is whole."""
-    head, *rows = trace.splitlines(keepends=True)
+    head, *rows = heave.since_zero(trace).splitlines(keepends=True)
     piece, due = [], None
     for row in rows:
         t_us = round(float(row.split(b",", 1)[0]) * 1000)
