@@ -482,7 +482,8 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
             return NULL;
         }
     }
-    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump and intensity are allowed";
+    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen and intensity are "
+           "allowed";
 }
 
 /* Whom to ask: what the command line names, then the environment, then what is there. */

@@ -204,13 +204,11 @@ static void count_losses(live_t *self)
 {
     status_lost_t *lost = &self->control.lost;
     writers_count(&self->writers, lost);
-    const bool is_lossy = lost->trace_rows != 0 || lost->record_lines != 0 || lost->metrics != 0;
+    const bool is_lossy = lost->trace_rows != 0 || lost->record_lines != 0;
     if (is_lossy && !self->was_lossy) {
         writers_say(&self->writers,
                     "what is written is lost: the disk or the reader of %s is too slow; `lost` in the status counts",
-                    lost->record_lines != 0 ? "--record"
-                    : lost->trace_rows != 0 ? "--trace"
-                                            : "[control] metrics");
+                    lost->record_lines != 0 ? "--record" : "--trace");
     }
     self->was_lossy = is_lossy;
 }

@@ -263,7 +263,6 @@ size_t metrics_text(const motion_view_t *view, const config_t *config, const mot
 void metrics_init(metrics_t *self, const char *path, uint64_t now_us)
 {
     self->path = path;
-    self->first_us = now_us;
     self->next_us = now_us;
     self->error = 0;
     (void)snprintf(self->temporary, sizeof self->temporary, "%s.new", path);
@@ -291,29 +290,49 @@ static int replace(const metrics_t *self, size_t length)
     return error;
 }
 
+static void lose(metrics_t *self, uint64_t count)
+{
+    __atomic_store_n(&self->lost, self->lost + (uint32_t)count, __ATOMIC_RELAXED);
+}
+
+/* Periods that have passed over one file are lost. */
+static void end_write(metrics_t *self, uint64_t now_us)
+{
+    if (self->busy_ms != 0) {
+        __atomic_store_n(&self->busy_ms, 0, __ATOMIC_RELAXED);
+        lose(self, (now_us - self->since_us) / METRICS_PERIOD_US);
+    }
+}
+
+static void begin_write(metrics_t *self, uint64_t now_us)
+{
+    self->since_us = now_us;
+    __atomic_store_n(&self->busy_ms, (uint32_t)(now_us / 1000u) | 1u, __ATOMIC_RELAXED);
+}
+
 void metrics_serve(metrics_t *self, const motion_view_t *view, const config_t *config, const motion_times_t *times,
                    const status_lost_t *lost, uint64_t now_us)
 {
+    end_write(self, now_us);
     if (now_us < self->next_us) {
         return;
     }
     self->next_us += METRICS_PERIOD_US * (1 + (now_us - self->next_us) / METRICS_PERIOD_US);
+    begin_write(self, now_us);
     const int error = replace(self, metrics_text(view, config, times, lost, self->text, sizeof self->text));
     if (error != 0 && error != self->error) {
         (void)say(0, "metrics %s: %s; tried again every second", self->path, strerror(error));
     }
+    lose(self, error != 0);
     self->error = error;
-    if (error == 0) {
-        __atomic_store_n(&self->written, self->written + 1, __ATOMIC_RELAXED);
-    }
 }
 
-/* One of each period that is over should have been written. */
 uint32_t metrics_lost(const metrics_t *self, uint64_t now_us)
 {
-    const uint32_t written = __atomic_load_n(&self->written, __ATOMIC_RELAXED);
-    const uint64_t due = self->path != NULL ? (now_us - self->first_us) / METRICS_PERIOD_US : 0;
-    return due > written ? (uint32_t)due - written : 0;
+    const uint32_t busy_ms = __atomic_load_n(&self->busy_ms, __ATOMIC_RELAXED);
+    const int32_t for_ms = busy_ms != 0 ? (int32_t)((uint32_t)(now_us / 1000u) - busy_ms) : 0; /* may have begun since now */
+    const uint32_t late = for_ms > 0 ? (uint32_t)for_ms / (METRICS_PERIOD_US / 1000u) : 0;
+    return __atomic_load_n(&self->lost, __ATOMIC_RELAXED) + late;
 }
 
 void metrics_remove(metrics_t *self)

@@ -15,10 +15,11 @@
 /** The file. Zeroed: none. */
 typedef struct {
     const char *path; /**< NULL = no file */
-    uint64_t first_us;
     uint64_t next_us;
-    uint32_t written; /**< atomic: times that it worked */
-    int error;        /**< errno of the last write, 0 = it worked; each new one is said once */
+    uint64_t since_us; /**< of the file being written */
+    uint32_t busy_ms;  /**< atomic: the same in ms, wrapped, 0 = none is being written */
+    uint32_t lost;     /**< atomic: times that none was written, before that one */
+    int error;         /**< errno of the last write, 0 = it worked; each new one is said once */
     char temporary[CONFIG_PATH_MAX + 4];
     char text[METRICS_BYTES];
 } metrics_t;
