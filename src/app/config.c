@@ -360,10 +360,10 @@ static void read_file(config_source_t *self)
 static bool await_bytes(int fd, int wait_ms)
 {
     struct pollfd wait = {.fd = fd, .events = POLLIN};
-    int ready = poll(&wait, 1, wait_ms);
-    while (ready < 0 && errno == EINTR) {
+    int ready = -1;
+    do {
         ready = poll(&wait, 1, wait_ms);
-    }
+    } while (ready < 0 && errno == EINTR);
     if (ready == 0) {
         errno = ETIMEDOUT;
     }

@@ -500,15 +500,15 @@ static control_client_t *make_room(control_t *self, uint64_t now_us)
     return client;
 }
 
-/* Whoever waits outside. Where the system has no descriptor left, who matters least gives one back. */
+/* Whoever waits outside. Where the system has no descriptor left, who matters least gives one back, and it is tried again. */
 static void let_in(control_t *self, uint64_t now_us)
 {
+    const bool was_shut = self->is_shut;
     self->newcomer = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
     self->is_shut = self->newcomer < 0 && errno != EAGAIN && errno != EINTR && errno != ECONNABORTED;
-    control_client_t *least = self->is_shut ? find_least(self, now_us) : NULL;
+    control_client_t *least = self->is_shut && !was_shut ? find_least(self, now_us) : NULL;
     if (least != NULL) {
         give_way(least);
-        self->newcomer = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
     }
 }
 
