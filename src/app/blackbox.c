@@ -18,15 +18,19 @@
 #define FEED_STATE_BYTES (1u << 16)
 #define KEPT_MIN_BYTES   (1u << 20)
 #define KEPT_MAX_BYTES   (1u << 30)
-#define PAUSE_NS         10000000
-#define END_WAIT_S       5
-#define STACK_BYTES      262144
+#define END_WAIT_MS      5000
 
 /* --- The motion thread --- */
 
 void blackbox_note(blackbox_feed_t *feed, record_kind_t kind, uint64_t t_us, uint32_t value)
 {
     record_push(&feed->records, kind, t_us, value);
+}
+
+static uint8_t known_of(const drive_feedback_t *drive)
+{
+    return (uint8_t)((drive->is_homed ? BLACKBOX_HOMED : 0) | (drive->has_actual ? BLACKBOX_HAS_ACTUAL : 0) |
+                     (drive->is_energized ? BLACKBOX_ENERGIZED : 0));
 }
 
 static void push_row(blackbox_feed_t *feed, const session_t *session, const trace_row_t *row)
@@ -41,13 +45,20 @@ static void push_row(blackbox_feed_t *feed, const session_t *session, const trac
         out.actual_q32[i] = snapshot->drive[i].has_actual ? snapshot->drive[i].actual_mm_q32 : 0;
         out.code[i] = snapshot->drive[i].fault_code;
         out.drive[i] = (uint8_t)snapshot->drive[i].state;
+        out.known[i] = known_of(&snapshot->drive[i]);
+        out.age_us[i] = (uint32_t)(snapshot->now_us - snapshot->drive[i].actual_us);
     }
     (void)ring_push(&feed->rows, &out, sizeof out, NULL, 0);
 }
 
-/* Drives that are on their way to being enabled, or homed, have times of their own that a replay does not know. */
-static bool is_replay_possible(const snapshot_t *snapshot)
+/* Drives that are on their way to being enabled, or homed, have times of their own that a replay does not know. Before time
+ * zero it is told of them, cycle by cycle. */
+static bool is_replay_possible(const session_t *session)
 {
+    const snapshot_t *snapshot = gateway_snapshot(&session->gateway);
+    if (!session->has_zero) {
+        return true;
+    }
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
         if (snapshot->drive[i].state == DRIVE_ENABLING || snapshot->drive[i].state == DRIVE_HOMING) {
             return false;
@@ -59,7 +70,7 @@ static bool is_replay_possible(const snapshot_t *snapshot)
 void blackbox_cycle(blackbox_feed_t *feed, const session_t *session, const trace_row_t *row)
 {
     push_row(feed, session, row);
-    if (session->now_us >= feed->next_state_us && is_replay_possible(gateway_snapshot(&session->gateway))) {
+    if (session->now_us >= feed->next_state_us && is_replay_possible(session)) {
         session_t state;
         checkpoint_take(session, &state);
         (void)ring_push(&feed->states, &state, sizeof state, NULL, 0);
@@ -194,11 +205,31 @@ void blackbox_step(blackbox_t *self, bool is_end)
         self->due_us = 0;
         (void)blackbox_write(self, &self->cause, text);
     }
+    blackbox_keep_seen(self);
     const uint32_t ticket = newest_ticket(self);
     if (ticket != 0) {
         const bool is_good = blackbox_write(self, NULL, text);
         answer(self, ticket, is_good, text);
     }
+}
+
+uint32_t blackbox_list(blackbox_t *self, blackbox_folder_t *to, uint32_t *seen)
+{
+    (void)pthread_mutex_lock(&self->mutex);
+    const uint32_t count = self->folders;
+    memcpy(to, self->folder, count * sizeof *to);
+    *seen = self->seen;
+    (void)pthread_mutex_unlock(&self->mutex);
+    return count;
+}
+
+void blackbox_see(blackbox_t *self)
+{
+    (void)pthread_mutex_lock(&self->mutex);
+    if (self->folders > 0) {
+        self->seen = blackbox_number(self->folder[self->folders - 1].name);
+    }
+    (void)pthread_mutex_unlock(&self->mutex);
 }
 
 uint32_t blackbox_ask(blackbox_t *self)
@@ -318,17 +349,9 @@ blackbox_feed_t *blackbox_feed(blackbox_t *self)
 
 /* --- The thread --- */
 
-static void *run(void *argument)
+static void step(void *ctx, bool is_end)
 {
-    blackbox_t *self = argument;
-    const struct timespec pause = {.tv_nsec = PAUSE_NS};
-    while (__atomic_load_n(&self->is_quit, __ATOMIC_ACQUIRE) == 0) {
-        blackbox_step(self, false);
-        (void)nanosleep(&pause, NULL);
-    }
-    blackbox_step(self, true);
-    __atomic_store_n(&self->is_ended, 1, __ATOMIC_RELEASE);
-    return NULL;
+    blackbox_step(ctx, is_end);
 }
 
 bool blackbox_start(blackbox_t *self)
@@ -336,31 +359,14 @@ bool blackbox_start(blackbox_t *self)
     if (self->memory == NULL) {
         return true;
     }
-    pthread_attr_t attributes;
-    (void)pthread_attr_init(&attributes);
-    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES); /* locked into memory whole */
-    const int error = pthread_create(&self->thread, &attributes, run, self);
-    (void)pthread_attr_destroy(&attributes);
-    self->is_running = error == 0;
-    self->has_no_thread = error != 0;
-    errno = error;
-    return self->is_running;
+    self->has_no_thread = !worker_start(&self->worker, step, self);
+    return !self->has_no_thread;
 }
 
 bool blackbox_close(blackbox_t *self)
 {
-    const struct timespec pause = {.tv_nsec = PAUSE_NS};
-    __atomic_store_n(&self->is_quit, 1, __ATOMIC_RELEASE);
-    for (unsigned i = 0; self->is_running && i < END_WAIT_S * 1000000000ull / PAUSE_NS; i++) {
-        if (__atomic_load_n(&self->is_ended, __ATOMIC_ACQUIRE) != 0) {
-            (void)pthread_join(self->thread, NULL);
-            self->is_running = false;
-        } else {
-            (void)nanosleep(&pause, NULL);
-        }
-    }
-    if (self->is_running || self->memory == NULL) {
-        return !self->is_running;
+    if (!worker_close(&self->worker, END_WAIT_MS)) {
+        return false;
     }
     free(self->memory);
     free(self->platform);

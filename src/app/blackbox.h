@@ -16,9 +16,13 @@
 #include "record.h"
 #include "ring.h"
 #include "session.h"
+#include "worker.h"
 
 #define BLACKBOX_PATH_MAX (CONFIG_PATH_MAX + 112u)
 #define BLACKBOX_TEXT_MAX (BLACKBOX_PATH_MAX + 128u)
+
+/** What else is known of a drive. */
+enum { BLACKBOX_HOMED = 1, BLACKBOX_HAS_ACTUAL = 2, BLACKBOX_ENERGIZED = 4 };
 
 /** What is kept of a cycle. */
 typedef struct {
@@ -27,6 +31,8 @@ typedef struct {
     q32_t actual_q32[DRIVES_MAX]; /**< mm, deg of the rotation motor */
     uint32_t code[DRIVES_MAX];    /**< the drive's own */
     uint8_t drive[DRIVES_MAX];    /**< drive_state_t */
+    uint8_t known[DRIVES_MAX];    /**< BLACKBOX_HOMED ... */
+    uint32_t age_us[DRIVES_MAX];  /**< of actual */
     uint8_t drives;
     uint8_t fault; /**< fault_code_t */
     uint8_t fault_axis;
@@ -60,9 +66,10 @@ typedef struct {
 } blackbox_lane_t;
 
 #define BLACKBOX_INCIDENTS_MAX 100u
+#define BLACKBOX_FOLDERS_MAX   (2u * BLACKBOX_INCIDENTS_MAX + 2u) /**< incidents, dumps, the one kept, the one just written */
 #define BLACKBOX_NAME_MAX      96u
 
-/** Name of an incident's folder: `incident-NUMBER-DATE`. */
+/** Name of a folder: `incident-NUMBER-DATE` of a fault or an e-stop, with `-dump` behind it where somebody asked for it. */
 typedef struct {
     char name[BLACKBOX_NAME_MAX];
 } blackbox_folder_t;
@@ -80,10 +87,10 @@ typedef struct {
     char *platform; /**< the configuration as text */
     size_t platform_length;
     char directory[CONFIG_PATH_MAX];
-    uint32_t number;                                       /**< of the next incident */
-    blackbox_folder_t folder[BLACKBOX_INCIDENTS_MAX + 1u]; /**< the incidents there are, oldest first */
-    uint32_t folders;
-    uint32_t folders_max;
+    uint32_t number;      /**< of the next incident */
+    uint32_t folders_max; /**< of each sort */
+    uint32_t seen_kept;   /**< as the directory has it */
+    int seen_error;       /**< errno of the last try to keep it, 0 = none; each new one is said once */
     uint64_t newest_us;   /**< time of the newest row */
     uint64_t zero_us;     /**< 0 = not yet */
     uint64_t reloaded_us; /**< the configuration was last read again then; 0 = never */
@@ -96,19 +103,20 @@ typedef struct {
     blackbox_item_t item;
     blackbox_item_t oldest; /**< that makes way */
     blackbox_item_t read;
+    blackbox_row_t told[2]; /**< rows that a replay is told: the last one, and this one */
     char line[CHECKPOINT_LINE_MAX];
 
-    pthread_mutex_t mutex; /**< guards what follows */
+    pthread_mutex_t mutex;                          /**< guards what follows; the list is changed by its thread alone */
+    blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX]; /**< what there is, oldest first */
+    uint32_t folders;
+    uint32_t seen; /**< number of the newest one that a person has seen */
     uint32_t asked;
     uint32_t answered;
     bool is_answer_good;
     char answer[BLACKBOX_TEXT_MAX];
 
-    pthread_t thread;
-    bool is_running;
+    worker_t worker;
     bool has_no_thread; /**< it could not be started: nobody writes anything */
-    uint32_t is_quit;   /**< atomic */
-    uint32_t is_ended;  /**< atomic */
 } blackbox_t;
 
 /** Prepares it. Without a directory, configured or given by a service manager, there is none, which is no error.
@@ -135,6 +143,19 @@ uint32_t blackbox_ask(blackbox_t *self);
  *  @param text where to, or why not */
 bool blackbox_answer(blackbox_t *self, uint32_t ticket, bool *is_good, char text[BLACKBOX_TEXT_MAX]);
 
+/** What is in the directory. Any thread.
+ *  @param to   BLACKBOX_FOLDERS_MAX, oldest first
+ *  @param seen out: number of the newest one that a person has seen
+ *  @return how many */
+uint32_t blackbox_list(blackbox_t *self, blackbox_folder_t *to, uint32_t *seen);
+
+/** A person has seen all that is in the directory now: the first one after it will not make way. Any thread. */
+void blackbox_see(blackbox_t *self);
+
+/** A folder's number, and whether it was asked for. */
+uint32_t blackbox_number(const char *name);
+bool blackbox_is_dump(const char *name);
+
 /** Writes what is due and ends the thread, or leaves it alone where the disk takes too long.
  *  @return false: it still runs, and self has to stay */
 bool blackbox_close(blackbox_t *self);
@@ -144,7 +165,7 @@ bool blackbox_close(blackbox_t *self);
 /** What happened, but for datagrams; these go to feed->records by record_push_datagram(). */
 void blackbox_note(blackbox_feed_t *feed, record_kind_t kind, uint64_t t_us, uint32_t value);
 
-/** After every cycle from time zero on, with its row. */
+/** After every cycle from the first feedback on, with its row. */
 void blackbox_cycle(blackbox_feed_t *feed, const session_t *session, const trace_row_t *row);
 
 #endif

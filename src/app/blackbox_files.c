@@ -19,7 +19,11 @@
 #include "say.h"
 
 #define PREFIX          "incident-"
+#define DUMP            "-dump"
+#define DIGITS          6u /* of a number, so that names sort as numbers do */
+#define NUMBERS         1000000u
 #define PART            ".incident.part"
+#define SEEN            ".seen"
 #define ITEMS_PER_TAKE  1000u /* written before what is fed meanwhile is taken over */
 #define FEEDBACK_PLACES 6u
 
@@ -60,30 +64,115 @@ static void remove_folder(blackbox_t *self, const char *name)
     (void)rmdir(path_of(self, name, ""));
 }
 
-static void drop_oldest(blackbox_t *self)
+uint32_t blackbox_number(const char *name)
 {
-    remove_folder(self, self->folder[0].name);
+    const size_t prefix = strlen(PREFIX);
+    if (strncmp(name, PREFIX, prefix) != 0 || strspn(&name[prefix], "0123456789") != DIGITS ||
+        strlen(name) >= BLACKBOX_NAME_MAX) {
+        return 0;
+    }
+    return (uint32_t)strtoul(&name[prefix], NULL, 10);
+}
+
+bool blackbox_is_dump(const char *name)
+{
+    const size_t length = strlen(name);
+    return length >= strlen(DUMP) && strcmp(&name[length - strlen(DUMP)], DUMP) == 0;
+}
+
+static void drop(blackbox_t *self, uint32_t index)
+{
+    remove_folder(self, self->folder[index].name);
+    (void)pthread_mutex_lock(&self->mutex);
     self->folders--;
-    memmove(&self->folder[0], &self->folder[1], self->folders * sizeof self->folder[0]);
+    memmove(&self->folder[index], &self->folder[index + 1], (self->folders - index) * sizeof self->folder[0]);
+    (void)pthread_mutex_unlock(&self->mutex);
+}
+
+/* The first fault since a person looked: what came of it hides what it was. */
+static uint32_t find_first_unseen(blackbox_t *self)
+{
+    (void)pthread_mutex_lock(&self->mutex);
+    const uint32_t seen = self->seen;
+    (void)pthread_mutex_unlock(&self->mutex);
+    uint32_t index = 0;
+    while (index < self->folders &&
+           (blackbox_is_dump(self->folder[index].name) || blackbox_number(self->folder[index].name) <= seen)) {
+        index++;
+    }
+    return index;
+}
+
+/* The oldest ones of a sort make way. The first fault that nobody has seen does not, and does not count. */
+static void drop_surplus(blackbox_t *self, bool is_dump)
+{
+    const uint32_t kept = find_first_unseen(self);
+    uint32_t count = 0;
+    for (uint32_t i = self->folders; i-- > 0;) {
+        if (blackbox_is_dump(self->folder[i].name) == is_dump && i != kept && ++count > self->folders_max) {
+            drop(self, i);
+        }
+    }
 }
 
 static void add_folder(blackbox_t *self, const char *name)
 {
-    if (self->folders == BLACKBOX_INCIDENTS_MAX + 1u) {
+    if (self->folders == BLACKBOX_FOLDERS_MAX) {
         return;
     }
-    (void)snprintf(self->folder[self->folders].name, BLACKBOX_NAME_MAX, "%s", name);
+    (void)pthread_mutex_lock(&self->mutex);
+    memcpy(self->folder[self->folders].name, name, strlen(name) + 1); /* blackbox_number() has looked at its length */
     self->folders++;
+    (void)pthread_mutex_unlock(&self->mutex);
 }
 
-/* An incident's number; 0 where the name is none. Six digits, so that names sort as numbers do. */
-static uint32_t number_of(const char *name)
+/* --- What a person has seen --- */
+
+static bool close_file(blackbox_t *self);
+
+static uint32_t read_seen(blackbox_t *self)
 {
-    const size_t prefix = strlen(PREFIX);
-    if (strncmp(name, PREFIX, prefix) != 0 || strspn(&name[prefix], "0123456789") != 6 || strlen(name) >= BLACKBOX_NAME_MAX) {
+    char digits[DIGITS + 2] = "";
+    const int fd = open(path_of(self, SEEN, ""), O_RDONLY | O_CLOEXEC);
+    if (fd < 0) {
         return 0;
     }
-    return (uint32_t)strtoul(&name[prefix], NULL, 10);
+    const bool is_read = read(fd, digits, DIGITS) > 0;
+    (void)close(fd);
+    return is_read ? (uint32_t)strtoul(digits, NULL, 10) : 0;
+}
+
+/* Returns errno, 0 = it is on the disk. */
+static int write_seen(blackbox_t *self, uint32_t seen)
+{
+    char part[sizeof self->path];
+    char digits[DIGITS + 8];
+    const int length = snprintf(digits, sizeof digits, "%06u\n", (unsigned)(seen % NUMBERS));
+    (void)snprintf(part, sizeof part, "%s", path_of(self, SEEN ".part", ""));
+    if (!out_file_open(&self->file, part, OUT_FILE_WAITS)) {
+        return self->file.error;
+    }
+    out_file_write(&self->file, digits, (size_t)length);
+    if (!close_file(self)) {
+        return self->file.error;
+    }
+    return rename(part, path_of(self, SEEN, "")) == 0 ? 0 : errno;
+}
+
+void blackbox_keep_seen(blackbox_t *self)
+{
+    (void)pthread_mutex_lock(&self->mutex);
+    const uint32_t seen = self->seen;
+    (void)pthread_mutex_unlock(&self->mutex);
+    if (seen == self->seen_kept) {
+        return;
+    }
+    const int error = write_seen(self, seen);
+    if (error != 0 && error != self->seen_error) {
+        (void)say(0, "black box: %s: %s; what has been seen is forgotten with the end of heaved", self->path, strerror(error));
+    }
+    self->seen_error = error;
+    self->seen_kept = error == 0 || seen < self->seen_kept ? seen : self->seen_kept;
 }
 
 const char *blackbox_find_folders(blackbox_t *self)
@@ -92,7 +181,7 @@ const char *blackbox_find_folders(blackbox_t *self)
     (void)mkdir(self->directory, 0750);
     DIR *directory = opendir(self->directory);
     for (const struct dirent *entry = NULL; directory != NULL && (entry = readdir(directory)) != NULL;) {
-        const uint32_t number = number_of(entry->d_name);
+        const uint32_t number = blackbox_number(entry->d_name);
         if (number != 0) {
             add_folder(self, entry->d_name);
             self->number = number > self->number ? number : self->number;
@@ -108,6 +197,7 @@ const char *blackbox_find_folders(blackbox_t *self)
     (void)gmtime_r(&now, &date); /* what it allocates, it allocates here */
     if (directory != NULL && access(self->directory, W_OK | X_OK) == 0) {
         remove_folder(self, PART);
+        self->seen = self->seen_kept = read_seen(self);
         return NULL;
     }
     (void)snprintf(text, sizeof text, "black box: %s: %s; until that changes, no incident can be written", self->directory,
@@ -188,7 +278,7 @@ static void write_head(blackbox_t *self, const blackbox_row_t *cause, const char
 {
     static const char *const k_starts[] = {
         [START_NEVER] = "; NO REPLAY: what led here is older than what was kept\n",
-        [START_ZERO] = "; replay: heaved --config platform.ini --play frames --trace OUT repeats trace.csv\n",
+        [START_ZERO] = "; replay: heaved --config platform.ini --play frames --trace OUT repeats trace.csv from time zero on\n",
         [START_STATE] =
             "; replay, by the same version of heaved: heaved --config platform.ini --play frames --trace OUT repeats trace.csv\n",
     };
@@ -203,9 +293,9 @@ static void write_head(blackbox_t *self, const blackbox_row_t *cause, const char
         (void)snprintf(text, sizeof text, ", axis %u", (unsigned)cause->fault_axis);
         write_text(self, text);
     }
-    if (cause != NULL && self->zero_us != 0) {
-        (void)snprintf(text, sizeof text, ", at %" PRIu64 ".%03u ms", (cause->now_us - self->zero_us) / 1000,
-                       (unsigned)((cause->now_us - self->zero_us) % 1000));
+    if (cause != NULL) {
+        (void)snprintf(text, sizeof text, ", at %" PRIu64 ".%03u ms%s", cause->row.t_us / 1000,
+                       (unsigned)(cause->row.t_us % 1000), cause->now_us == cause->row.t_us ? " since the start" : "");
         write_text(self, text);
     }
     write_text(self, "\n");
@@ -237,6 +327,54 @@ static void write_records(blackbox_t *self, record_writer_t *writer, uint64_t fr
     }
 }
 
+/* What the drives told in a cycle, where it is not what they told in the one before. */
+static void write_feedback(blackbox_t *self, const blackbox_row_t *row, const blackbox_row_t *before)
+{
+    char line[64];
+    for (unsigned i = 0; i < row->drives; i++) {
+        if (before->drives != 0 && row->drive[i] == before->drive[i] && row->known[i] == before->known[i] &&
+            row->actual_q32[i] == before->actual_q32[i] && row->age_us[i] == before->age_us[i] &&
+            row->code[i] == before->code[i]) {
+            continue;
+        }
+        size_t at = decimal_put_ms(line, row->now_us);
+        at += decimal_put_text(&line[at], " !feedback ");
+        at += decimal_put_u64(&line[at], i + 1);
+        at += decimal_put_text(&line[at], " ");
+        at += decimal_put_hex(&line[at], (uint32_t)row->drive[i] << 4 | row->known[i], 2);
+        at += decimal_put_hex(&line[at], (uint32_t)((uint64_t)row->actual_q32[i] >> 32), 8);
+        at += decimal_put_hex(&line[at], (uint32_t)row->actual_q32[i], 8);
+        at += decimal_put_hex(&line[at], row->age_us[i], 8);
+        at += decimal_put_hex(&line[at], row->code[i], 8);
+        at += decimal_put_text(&line[at], "\n");
+        out_file_write(&self->file, line, at);
+    }
+}
+
+/* Before time zero drives live by times of their own: a replay is told what they told, among the records. */
+static void write_told(blackbox_t *self, record_writer_t *writer, uint64_t from_us)
+{
+    char line[RECORD_LINE_MAX];
+    uint32_t items = 0;
+    size_t record = 0;
+    self->told[0].drives = 0;
+    bool has_record = read_next(self, &self->records, &record);
+    while (go_on(self, &items) && ring_pop(&self->rows.reader, &self->told[1], sizeof self->told[1]) > 0) {
+        const blackbox_row_t *row = &self->told[1];
+        for (; has_record && self->read.record.head.t_us <= row->now_us; has_record = read_next(self, &self->records, &record)) {
+            if (self->read.record.head.t_us >= from_us && row->now_us <= self->until_us) {
+                const size_t bytes = record - sizeof self->read.record.head;
+                out_file_write(&self->file, line, record_writer_line(writer, &self->read.record, bytes, line));
+            }
+        }
+        if (row->now_us >= from_us && row->now_us <= self->until_us) {
+            write_feedback(self, row, &self->told[0]);
+            self->told[0] = *row;
+        }
+    }
+    start_reading(&self->rows); /* for the files that follow */
+}
+
 /* Where trace.csv ends, a replay does. */
 static void write_end(blackbox_t *self, const record_writer_t *writer)
 {
@@ -260,7 +398,11 @@ static bool write_frames(blackbox_t *self, const blackbox_row_t *cause, const ch
         writer.zero_us = self->zero_us;
         out_file_write(&self->file, self->line, checkpoint_format(&self->read.state, self->line));
     }
-    write_records(self, &writer, start == START_STATE ? start_us : 0);
+    if (start == START_STATE && self->zero_us == 0) {
+        write_told(self, &writer, start_us);
+    } else {
+        write_records(self, &writer, start == START_STATE ? start_us : 0);
+    }
     if (start != START_NEVER) {
         write_end(self, &writer);
     }
@@ -354,10 +496,11 @@ static bool write_files(blackbox_t *self, const blackbox_row_t *cause, const cha
     start_reading(&self->rows);
     uint64_t start_us = 0;
     const start_t start = find_start(self, &start_us);
+    const uint64_t rows_us = start == START_ZERO ? 0 : start_us; /* what came before time zero is shown, if not replayed */
     bool is_good =
-        write_frames(self, cause, name, start, start_us) && write_rows(self, FILE_TRACE, trace_head, format_row, start_us);
+        write_frames(self, cause, name, start, start_us) && write_rows(self, FILE_TRACE, trace_head, format_row, rows_us);
     start_reading(&self->rows); /* once more */
-    is_good = is_good && write_rows(self, FILE_FEEDBACK, feedback_head, format_feedback, start_us) && write_platform(self);
+    is_good = is_good && write_rows(self, FILE_FEEDBACK, feedback_head, format_feedback, rows_us) && write_platform(self);
     self->states.is_reading = false;
     self->records.is_reading = false;
     self->rows.is_reading = false;
@@ -380,13 +523,14 @@ static bool name_folder(blackbox_t *self, const char *name)
     return true;
 }
 
-static void make_name(blackbox_t *self, char name[BLACKBOX_NAME_MAX])
+static void make_name(blackbox_t *self, bool is_dump, char name[BLACKBOX_NAME_MAX])
 {
     const time_t now = time(NULL);
     struct tm date;
     (void)gmtime_r(&now, &date);
-    (void)snprintf(name, BLACKBOX_NAME_MAX, PREFIX "%06u-%04d%02d%02dT%02d%02d%02dZ", (unsigned)(self->number % 1000000u),
-                   date.tm_year + 1900, date.tm_mon + 1, date.tm_mday, date.tm_hour, date.tm_min, date.tm_sec);
+    (void)snprintf(name, BLACKBOX_NAME_MAX, PREFIX "%06u-%04d%02d%02dT%02d%02d%02dZ%s", (unsigned)(self->number % NUMBERS),
+                   date.tm_year + 1900, date.tm_mon + 1, date.tm_mday, date.tm_hour, date.tm_min, date.tm_sec,
+                   is_dump ? DUMP : "");
 }
 
 static int make_incident(blackbox_t *self, const blackbox_row_t *cause, const char *name)
@@ -409,7 +553,7 @@ bool blackbox_write(blackbox_t *self, const blackbox_row_t *cause, char text[BLA
 {
     char name[BLACKBOX_NAME_MAX];
     self->number++;
-    make_name(self, name);
+    make_name(self, cause == NULL, name);
     const int error = make_incident(self, cause, name);
     if (error != 0) {
         self->number--;
@@ -418,9 +562,7 @@ bool blackbox_write(blackbox_t *self, const blackbox_row_t *cause, char text[BLA
         return false;
     }
     add_folder(self, name);
-    while (self->folders > self->folders_max) {
-        drop_oldest(self);
-    }
+    drop_surplus(self, cause == NULL);
     (void)snprintf(text, BLACKBOX_TEXT_MAX, "%s", path_of(self, name, ""));
     (void)say(0, "black box: %s", text);
     return true;

@@ -9,6 +9,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <ini.h>
+#include <poll.h>
 #include <stdarg.h>
 #include <string.h>
 #include <unistd.h>
@@ -16,7 +17,8 @@
 #include "config_source.h"
 #include "config_value.h"
 
-#define CONTINUE 1 /* inih: the handler took the pair */
+#define WAIT_MS  5000 /* for who writes a pipe; once heaved runs, nobody is waited for */
+#define CONTINUE 1    /* inih: the handler took the pair */
 
 /* --- Errors --- */
 
@@ -353,15 +355,30 @@ static void read_file(config_source_t *self)
     }
 }
 
-/* The bytes of a file: nothing is allocated, so that it may be read again in operation.
- * Returns their number, or -1: errno says why. */
-static ssize_t read_bytes(const char *path, char *bytes, size_t capacity)
+/* Waits until there is something to read, or an end: a pipe may have nobody yet who writes.
+ * Returns false: errno says why. */
+static bool await_bytes(int fd, int wait_ms)
 {
-    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    struct pollfd wait = {.fd = fd, .events = POLLIN};
+    int ready = -1;
+    do {
+        ready = poll(&wait, 1, wait_ms);
+    } while (ready < 0 && errno == EINTR);
+    if (ready == 0) {
+        errno = ETIMEDOUT;
+    }
+    return ready > 0;
+}
+
+/* The bytes of a file: nothing is allocated, so that it may be read again in operation, and nothing is waited for in vain.
+ * Returns their number, or -1: errno says why. */
+static ssize_t read_bytes(const char *path, char *bytes, size_t capacity, int wait_ms)
+{
+    const int fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
     size_t length = 0;
     ssize_t got = fd < 0 ? -1 : 1;
     while (got > 0 && length < capacity) {
-        got = read(fd, &bytes[length], capacity - length);
+        got = await_bytes(fd, wait_ms) ? read(fd, &bytes[length], capacity - length) : -1;
         length += got > 0 ? (size_t)got : 0u;
     }
     const int error = errno;
@@ -376,7 +393,12 @@ static ssize_t read_bytes(const char *path, char *bytes, size_t capacity)
 static bool open_bytes(config_source_t *self)
 {
     static char bytes[CONFIG_FILE_MAX + 1u];
-    const ssize_t length = read_bytes(self->path, bytes, sizeof bytes);
+    const ssize_t length = read_bytes(self->path, bytes, sizeof bytes, self->wait_ms);
+    if (length < 0 && errno == ETIMEDOUT) {
+        config_source_error(self, 0, "nothing came from it within %d s; allowed: a file, or a pipe that somebody writes to",
+                            self->wait_ms / 1000);
+        return false;
+    }
     if (length < 0) {
         const bool is_opened = errno == EISDIR || errno == EIO;
         config_source_error(self, 0, "cannot be %s: %s; allowed: a readable text file", is_opened ? "read" : "opened",
@@ -393,12 +415,13 @@ static bool open_bytes(config_source_t *self)
 }
 
 /* Loads into the configuration of the source, whole or with errors. */
-static void load(config_source_t *self, const char *path, config_t *config, FILE *errors)
+static void load(config_source_t *self, const char *path, config_t *config, FILE *errors, int wait_ms)
 {
     HV_ASSERT(config_key_count <= CONFIG_KEYS_MAX && config_section_count <= CONFIG_SECTIONS_MAX);
     memset(config, 0, sizeof *config);
     memset(self, 0, sizeof *self);
     self->path = path;
+    self->wait_ms = wait_ms;
     self->errors = errors;
     self->config = config;
     self->section = CONFIG_SECTION_NONE;
@@ -416,7 +439,7 @@ int config_load(const char *path, config_t *out, FILE *errors)
 {
     config_t config;
     config_source_t self;
-    load(&self, path, &config, errors);
+    load(&self, path, &config, errors, WAIT_MS);
     if (self.error_count == 0) {
         memcpy(out, &config, sizeof config);
     }
@@ -450,7 +473,7 @@ int config_reload(const char *path, config_t *running, FILE *report)
 {
     static config_t config;
     static config_source_t self;
-    load(&self, path, &config, report);
+    load(&self, path, &config, report, 0);
     for (size_t i = 0; self.error_count == 0 && i < config_key_count; i++) {
         if (config_is_applicable(config_keys[i].needs, running)) {
             take_change(&self, i, running);

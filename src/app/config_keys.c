@@ -94,7 +94,7 @@ const config_key_t config_keys[] = {
     {KEY("platform", "auto_frames"), AT(settings.auto_frames), .type = CONFIG_INTEGER, .unit = "", .fallback = "0", RANGE(0, 100),
      .help = "valid frames within a second that engage = auto waits for before it brings the platform up; 0 = none"},
     {KEY("platform", "late_hold_cycles"), AT(late_hold_cycles), .type = CONFIG_INTEGER, .unit = "", .fallback = "3",
-     RANGE(0, 1000), .is_live = true, .help = "a cycle that is late by more cycles than that holds the platform; 0 = never"},
+     RANGE(0, 1000), .is_live = true, .help = "a cycle that is late by more cycles than that holds the platform while it rises, is neutral or engaged; 0 = never"},
     {KEY("platform", "engage"), AT(settings.engage), .type = CONFIG_WORD, .unit = "", .fallback = "manual",
      .words = "manual|auto",
      .help = "who brings the platform up: an operator's request, or heaved by itself once after each start, also where a service manager "
@@ -207,7 +207,7 @@ const config_key_t config_keys[] = {
     {KEY("black-box", "seconds"), AT(black_box.seconds), .type = CONFIG_INTEGER, .unit = "s", .fallback = "120", RANGE(10, 600),
      .help = "kept at least, of every cycle: up to 1 MB of memory and of disk space a second, at 1000 cycles a second"},
     {KEY("black-box", "incidents"), AT(black_box.incidents), .type = CONFIG_INTEGER, .unit = "", .fallback = "10", RANGE(1, 100),
-     .help = "folders kept in the directory; the oldest one makes way"},
+     .help = "folders kept in the directory, of faults and of dumps each; the oldest one makes way, but not the first fault since `heavectl seen`"},
 
     {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim|cia402|can-raw|modbus-tcp|modbus-rtu",
      .help = "the drives in use"},

@@ -18,6 +18,7 @@ typedef struct {
 /** A file being loaded. */
 typedef struct {
     const char *path;
+    int wait_ms;    /**< for each piece of a pipe */
     const char *at; /**< what is left of the file's bytes */
     const char *end;
     FILE *errors;

@@ -199,6 +199,34 @@ static void begin_dump(control_t *self, control_client_t *client, uint64_t now_u
     }
 }
 
+/* Who says that they have been seen gets the list of what was. */
+static void answer_incidents(control_t *self, control_client_t *client, bool is_seeing)
+{
+    uint32_t seen = 0;
+    if (blackbox_feed(self->blackbox) == NULL) {
+        answer_error(client, "incidents: there is no black box; [black-box] directory says where it writes to", NULL);
+        return;
+    }
+    if (is_seeing) {
+        blackbox_see(self->blackbox);
+    }
+    const uint32_t count = blackbox_list(self->blackbox, self->folder, &seen);
+    json_t json = start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_open(&json, "incidents", '[');
+    for (uint32_t i = 0; i < count; i++) {
+        json_open(&json, NULL, '{');
+        json_text(&json, "name", self->folder[i].name);
+        json_bool(&json, "dump", blackbox_is_dump(self->folder[i].name));
+        json_bool(&json, "seen", blackbox_number(self->folder[i].name) <= seen);
+        json_close(&json, '}');
+    }
+    json_close(&json, ']');
+    json_close(&json, '}');
+    answer(client, &json);
+}
+
 static const char k_intensity[] = "intensity ";
 
 static void take_request(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
@@ -210,6 +238,8 @@ static void take_request(control_t *self, control_client_t *client, const char *
         begin_intensity(self, client, &line[strlen(k_intensity)], now_us);
     } else if (strcmp(line, "dump") == 0) {
         begin_dump(self, client, now_us);
+    } else if (strcmp(line, "incidents") == 0 || strcmp(line, "seen") == 0) {
+        answer_incidents(self, client, line[0] == 's');
     } else if (strcmp(line, "status") == 0) {
         answer_status(self, client);
     } else if (strncmp(line, "watch", 5) == 0) {
@@ -219,7 +249,7 @@ static void take_request(control_t *self, control_client_t *client, const char *
     } else {
         answer_error(client,
                      "unknown request; status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, "
-                     "shutdown and dump are allowed",
+                     "shutdown, dump, incidents and seen are allowed",
                      NULL);
     }
 }
@@ -232,12 +262,17 @@ static void take_lines(control_t *self, control_client_t *client, uint64_t now_u
         if (newline == NULL) {
             return;
         }
+        const bool has_zero = memchr(client->in, '\0', (size_t)(newline - client->in)) != NULL; /* what stands behind it counts */
         *newline = '\0';
         if (newline > client->in && newline[-1] == '\r') {
             newline[-1] = '\0';
         }
         client->asked_us = now_us;
-        take_request(self, client, client->in, now_us);
+        if (has_zero) {
+            answer_error(client, "a zero byte in the request; allowed: text, one request per line", NULL);
+        } else {
+            take_request(self, client, client->in, now_us);
+        }
         client->in_length -= (size_t)(newline + 1 - client->in);
         memmove(client->in, newline + 1, client->in_length);
     }
@@ -465,15 +500,30 @@ static control_client_t *make_room(control_t *self, uint64_t now_us)
     return client;
 }
 
-/* A newcomer for whom there is no room yet stays in the queue of the socket. */
+/* Whoever waits outside. Where the system has no descriptor left, who matters least gives one back, and it is tried again. */
+static void let_in(control_t *self, uint64_t now_us)
+{
+    const bool was_shut = self->is_shut;
+    self->newcomer = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    self->is_shut = self->newcomer < 0 && errno != EAGAIN && errno != EINTR && errno != ECONNABORTED;
+    control_client_t *least = self->is_shut && !was_shut ? find_least(self, now_us) : NULL;
+    if (least != NULL) {
+        give_way(least);
+    }
+}
+
+/* A newcomer for whom there is no room yet waits for it. */
 static void take_connection(control_t *self, uint64_t now_us)
 {
-    control_client_t *client = make_room(self, now_us);
-    self->is_full = client == NULL;
+    if (self->newcomer < 0) {
+        let_in(self, now_us);
+    }
+    control_client_t *client = self->newcomer >= 0 ? make_room(self, now_us) : NULL;
     if (client == NULL) {
         return;
     }
-    client->fd = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    client->fd = self->newcomer;
+    self->newcomer = -1;
     client->in_length = 0;
     client->out_length = 0;
     client->is_closing = false;
@@ -485,8 +535,8 @@ static void take_connection(control_t *self, uint64_t now_us)
 
 void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS])
 {
-    fds[0] =
-        (struct pollfd){.fd = self->is_full ? -1 : self->fd, .events = POLLIN}; /* poll would not wait while nobody is let in */
+    const bool is_open = self->newcomer < 0 && !self->is_shut; /* poll would not wait while nobody is let in */
+    fds[0] = (struct pollfd){.fd = is_open ? self->fd : -1, .events = POLLIN};
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         const control_client_t *client = &self->client[i];
         const short events = (short)((is_read(client) ? POLLIN : 0) | (client->out_length > 0 ? POLLOUT : 0));
@@ -512,7 +562,7 @@ void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64
             serve_time(self, client, now_us);
         }
     }
-    if ((fds[0].revents & POLLIN) != 0 || self->is_full) {
+    if ((fds[0].revents & POLLIN) != 0 || self->newcomer >= 0 || self->is_shut) {
         take_connection(self, now_us);
     }
 }
@@ -574,7 +624,8 @@ int control_open(control_t *self, const char *path, const config_t *config, moti
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
     self->fd = -1;
-    self->is_full = false;
+    self->newcomer = -1;
+    self->is_shut = false;
     self->config = config;
     self->loop = loop;
     self->blackbox = blackbox;
@@ -613,6 +664,10 @@ void control_close(control_t *self)
         if (self->client[i].fd >= 0) {
             drop(&self->client[i]);
         }
+    }
+    if (self->newcomer >= 0) {
+        (void)close(self->newcomer);
+        self->newcomer = -1;
     }
     if (is_ours(self)) {
         (void)unlink(self->path);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
- * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump. The service thread owns it;
+ * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump,
+ * incidents, seen. The service thread owns it;
  * nothing blocks, nothing allocates after the open, and a client that does not read is dropped. Nobody keeps an operator out:
  * where all places are taken, a newcomer gets that of the client that matters least, which is told so.
  */
@@ -46,13 +47,15 @@ typedef struct {
 /** The socket and its clients; private to control.c. */
 typedef struct {
     int fd;       /**< -1: closed */
-    bool is_full; /**< somebody waits outside, and nobody can give way yet */
+    int newcomer; /**< has come, and nobody can give way yet; -1: nobody */
+    bool is_shut; /**< the system has no descriptor for a newcomer: not waited for until it is tried again */
     char path[CONFIG_PATH_MAX];
     struct stat made; /**< identity of the socket file, so that only ours is removed */
     motion_loop_t *loop;
     const config_t *config;
     blackbox_t *blackbox;
-    status_lost_t lost; /**< the owner keeps it up to date */
+    blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX]; /**< as last listed */
+    status_lost_t lost;                             /**< the owner keeps it up to date */
     motion_view_words_t view;
     uint32_t last_id;
     control_client_t client[CONTROL_CLIENTS];
@@ -69,7 +72,7 @@ void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS]);
 /** How long poll may wait, in ms, not more than the given time. */
 int control_timeout_ms(const control_t *self, uint64_t now_us, int at_most_ms);
 
-/** Serves what poll found, and what time has made due. */
+/** Serves what poll found, and what time has made due. What poll only supposes does no harm. */
 void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64_t now_us);
 
 /** Sends what waits, closes, and removes the socket file; harmless on a closed one. */

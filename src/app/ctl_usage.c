@@ -10,7 +10,7 @@
 static const usage_row_t k_forms[] = {
     {.argument = "status"},
     {.argument = "[--for SECONDS] [--hz N] watch"},
-    {.argument = "engage | hold | resume | park | reset | shutdown | dump"},
+    {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen"},
     {.argument = "intensity PERCENT"},
     {0},
 };
@@ -25,6 +25,9 @@ static const usage_row_t k_commands[] = {
     {.name = "reset", .help = "leave FAULT or ESTOP, once the cause is gone"},
     {.name = "shutdown", .help = "settle, drives off, end heaved"},
     {.name = "dump", .help = "write the last minutes down now, as after a fault; says where"},
+    {.name = "incidents", .help = "what the black box has written, and what nobody has seen yet"},
+    {.name = "seen",
+     .help = "the same, and all of it has been seen: until then the first fault does not make way for later ones"},
     {.name = "intensity",
      .argument = "PERCENT",
      .help = "how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so"},

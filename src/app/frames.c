@@ -8,8 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define READ_BYTES  65536u
-#define PERCENT_MAX 999u /* as a recording may have it: what is too much is refused as it was then */
+#define READ_BYTES      65536u
+#define FRAMES_LINE_MAX (1u << 20)       /* the longest text with all its bytes as escapes, or a !state, several times over */
+#define FRAMES_FILE_MAX (1u << 30)       /* a day of frames at 60 Hz is a third of it */
+#define ACTUAL_MAX_Q32  ((q32_t)1 << 52) /* 2^20 mm: further than any drive tells, and differences of two keep to 64 bits */
+#define PERCENT_MAX     999u             /* as a recording may have it: what is too much is refused as it was then */
 
 static const char k_bad_time[] =
     "no time at the start; a line is `<t_ms> <text>`, `<t_ms> !request`, or a comment that starts with `;`";
@@ -30,6 +33,7 @@ static const char k_bad_drive[] =
 static const char k_bad_fault[] = "!fault without its code; drive-fault N, drive-offline N, drive-dropped N, following-error N "
                                   "and setpoint-jump N (N from 1 to 7), drive-timeout, "
                                   "bus-lost and bus-failing are allowed";
+static const char k_bad_feedback[] = "!feedback is not as a black box writes it; it has to be left as it is";
 static const char k_bad_request[] =
     "unknown request; !engage !hold !resume !park !reset !shutdown, !intensity N (0 to 100), !estop on, !estop off, "
     "!late N, !drive N fault CODE, !drive N offline, !drive N back, !fault CODE, !fault CODE N, !end and !from ADDRESS are "
@@ -249,6 +253,48 @@ static bool read_drive(cursor_t *self, frames_line_t *out)
     return digits > 0;
 }
 
+/* So many hexadecimal digits, at most eight. */
+static bool read_digits(cursor_t *self, unsigned digits, uint32_t *out)
+{
+    *out = 0;
+    for (unsigned i = 0; i < digits; i++) {
+        if (self->at == self->end || hex_value(*self->at) < 0) {
+            return false;
+        }
+        *out = *out << 4 | (uint32_t)hex_value(*self->at++);
+    }
+    return true;
+}
+
+/* `N HEX`: state, what is known, actual, its age, code. Only as a black box writes it. */
+static bool read_feedback(cursor_t *self, frames_line_t *out)
+{
+    uint32_t drive = 0;
+    uint32_t state = 0;
+    uint32_t high = 0;
+    uint32_t low = 0;
+    uint32_t age_us = 0;
+    if (!read_count(self, DRIVES_MAX, &drive) || drive == 0) {
+        return false;
+    }
+    skip_blanks(self);
+    out->kind = FRAMES_FEEDBACK;
+    out->drive = (uint8_t)drive;
+    if (!read_digits(self, 2, &state) || !read_digits(self, 8, &high) || !read_digits(self, 8, &low) ||
+        !read_digits(self, 8, &age_us) || !read_digits(self, 8, &out->number) || state >> 4 > DRIVE_FAULT) {
+        return false;
+    }
+    const int64_t actual_q32 = (int64_t)((uint64_t)high << 32 | low);
+    out->feedback = (drive_feedback_t){.state = (drive_state_t)(state >> 4),
+                                       .is_homed = (state & 1u) != 0,
+                                       .has_actual = (state & 2u) != 0,
+                                       .is_energized = (state & 4u) != 0,
+                                       .actual_mm_q32 = actual_q32,
+                                       .actual_us = age_us,
+                                       .fault_code = out->number};
+    return actual_q32 >= -ACTUAL_MAX_Q32 && actual_q32 <= ACTUAL_MAX_Q32;
+}
+
 /* `CODE N` where the fault is of an axis, else `CODE`. */
 static bool read_fault(cursor_t *self, frames_line_t *out)
 {
@@ -294,6 +340,9 @@ static const char *read_request_words(cursor_t *self, frames_line_t *out)
     }
     if (take_word(self, "fault")) {
         return read_fault(self, out) ? NULL : k_bad_fault;
+    }
+    if (take_word(self, "feedback")) {
+        return read_feedback(self, out) ? NULL : k_bad_feedback;
     }
     if (take_word(self, "end")) {
         out->kind = FRAMES_END;
@@ -341,10 +390,17 @@ bool frames_parse_line(char *text, size_t length, frames_line_t *out, bool *is_e
 
 /* --- Files --- */
 
+/* A device or a pipe may never end: what cannot be a file of frames is not read on.
+ * Returns false: errno is EFBIG for too much of it, EMSGSIZE for a line that does not end; or what the system says. */
 static bool read_whole(FILE *file, char **bytes, size_t *length)
 {
     size_t capacity = 0;
+    size_t line = 0; /* where the newest one begins */
     for (;;) {
+        if (*length > FRAMES_FILE_MAX || *length - line > FRAMES_LINE_MAX) {
+            errno = *length - line > FRAMES_LINE_MAX ? EMSGSIZE : EFBIG;
+            return false;
+        }
         if (capacity - *length < READ_BYTES) {
             capacity = capacity * 2 + 2 * READ_BYTES;
             char *more = realloc(*bytes, capacity);
@@ -354,6 +410,8 @@ static bool read_whole(FILE *file, char **bytes, size_t *length)
             *bytes = more;
         }
         const size_t taken = fread(*bytes + *length, 1, READ_BYTES, file);
+        const char *newline = memrchr(*bytes + *length, '\n', taken);
+        line = newline != NULL ? (size_t)(newline + 1 - *bytes) : line;
         *length += taken;
         if (taken == 0) {
             return ferror(file) == 0;

@@ -33,7 +33,8 @@ bool frames_parse_line(char *text, size_t length, frames_line_t *out, bool *is_e
 
 /** Loads a file, "-" being standard input.
  *  @param errors takes one line for each bad one: `FILE:LINE: what; what is allowed`
- *  @return the number of bad lines; -1: cannot be read, errno says why. frames_free() in every case. */
+ *  @return the number of bad lines; -1: cannot be read, errno says why: EFBIG, EMSGSIZE: more bytes in
+ *          all, or in a line, than frames can be. frames_free() in every case. */
 int frames_load(frames_t *self, const char *path, FILE *errors);
 
 /** Gives the memory back. */

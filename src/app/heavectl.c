@@ -22,6 +22,7 @@
 #include "ctl_usage.h"
 #include "ctl_view.h"
 #include "say.h" // exit codes
+#include "standard.h"
 #include "usage.h"
 
 #define ANSWER_MS   5000
@@ -257,12 +258,28 @@ static int judge(const cJSON *answer)
     return complain(EXIT_REFUSED, "%s", cJSON_IsString(error) ? error->valuestring : "heaved gave an answer that says nothing");
 }
 
+static void show_incidents(const cJSON *incidents)
+{
+    const cJSON *incident = NULL;
+    cJSON_ArrayForEach(incident, incidents)
+    {
+        const cJSON *name = cJSON_GetObjectItemCaseSensitive(incident, "name");
+        const bool is_seen = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(incident, "seen"));
+        printf("%s: %s\n", cJSON_IsString(name) ? name->valuestring : "?", is_seen ? "seen" : "new");
+    }
+    if (cJSON_GetArraySize(incidents) == 0) {
+        printf("no incidents\n");
+    }
+}
+
 static void show_answer(const ctl_t *self, const cJSON *answer)
 {
     const cJSON *state = cJSON_GetObjectItemCaseSensitive(answer, "state");
     const cJSON *folder = cJSON_GetObjectItemCaseSensitive(answer, "folder");
     if (cJSON_IsString(folder)) {
         printf("%s: %s\n", self->command, folder->valuestring);
+    } else if (cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(answer, "incidents"))) {
+        show_incidents(cJSON_GetObjectItemCaseSensitive(answer, "incidents"));
     } else if (strcmp(self->command, "status") == 0) {
         show_table(answer, false);
     } else if (self->argument != NULL) {
@@ -465,7 +482,8 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
             return NULL;
         }
     }
-    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump and intensity are allowed";
+    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen and intensity are "
+           "allowed";
 }
 
 /* Whom to ask: what the command line names, then the environment, then what is there. */
@@ -493,6 +511,9 @@ static int choose_socket(ctl_t *self)
 int main(int argc, char **argv)
 {
     static ctl_t ctl;
+    if (!standard_open()) {
+        return complain(EXIT_UNAVAILABLE, "the null device: %s", strerror(errno));
+    }
     (void)setlocale(LC_CTYPE, "");
     const char *wrong = take_options(&ctl, argc, argv);
     if (wrong == NULL && ctl.command != NULL) {

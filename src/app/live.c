@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * live.c - the service thread: signals, control socket, log, recording and trace; see live.h.
+ * live.c - the service thread: signals, control socket, what the service manager hears; see live.h. It writes no file.
  * After the start nothing here allocates: what would (stdio, time zones) is not used.
  */
 #include "live.h"
@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <time.h>
 #include <unistd.h>
@@ -18,24 +19,23 @@
 #include "control.h"
 #include "flood.h"
 #include "linux_clock.h"
-#include "linux_log.h"
 #include "linux_udp.h"
 #include "linux_udp_filter.h"
 #include "manager.h"
-#include "metrics.h"
 #include "motion_loop.h"
 #include "out_file.h"
-#include "record.h"
 #include "say.h"
 #include "socket_path.h"
+#include "writers.h"
 
-#define TICK_MS 10
+#define TICK_MS         10
+#define WAITING_MS      1  /* between looks where the system does not wait */
+#define DESCRIPTORS_MIN 64 /* all clients, lines and files at once; half of it is used in the worst case */
 /* As many short datagrams as a cycle takes, and a third more: the kernel grants twice that and charges 768 bytes and more for
  * each. What does not fit is lost as it comes; a longer queue would have the cycle follow what is older than the one before. */
 #define UDP_BUFFER_BYTES 32768
 #define QUIT_WAIT_MS     1000
 #define FIRST_CYCLE_US   500000u
-#define END_WAIT_US      2000000u
 #define SHUTDOWN_REST_US 15000000u /* a stop before settling, the drives going off, files */
 
 /** Everything of a live run. Large: from the heap, at the start. */
@@ -44,110 +44,19 @@ typedef struct {
     control_t control;
     config_t config; /**< as it was, with what reloads changed */
     manager_t manager;
-    metrics_t metrics;
     flood_t flood;
     blackbox_t blackbox;
-    motion_view_words_t view; /**< for the manager, the metrics and the watch over floods */
+    motion_view_words_t view; /**< for the manager and the watch over floods */
     linux_udp_t udp;
-    linux_log_t log;
+    writers_t writers;
+    bool was_lossy; /**< it has been said that something is lost */
     int signal_fd;
     bool is_thread_running;
+    bool has_writers_ended;
     unsigned signals; /**< requests to end so far */
     FILE *errors;     /**< standard error for what a reload has to say; never blocks on a pipe or a terminal */
     const options_t *options;
-    record_writer_t writer;
-    out_file_t record;
-    out_file_t trace;
 } live_t;
-
-/* --- Files --- */
-
-static void write_records(live_t *self)
-{
-    record_t record;
-    char line[RECORD_LINE_MAX];
-    while (out_file_has_room(&self->record, sizeof line)) {
-        const size_t length = ring_pop(&self->loop.record, &record, sizeof record);
-        if (length == 0) {
-            return;
-        }
-        out_file_write(&self->record, line, record_writer_line(&self->writer, &record, length - sizeof record.head, line));
-    }
-}
-
-static void write_rows(live_t *self)
-{
-    trace_row_t row;
-    char line[TRACE_LINE_MAX];
-    while (out_file_has_room(&self->trace, sizeof line) && ring_pop(&self->loop.trace, &row, sizeof row) > 0) {
-        out_file_write(&self->trace, line, trace_format(&row, line));
-    }
-}
-
-/* What fits into the buffers, and as much of that as the files take. What has to wait stays in the rings, which count what they
- * cannot hold. */
-static void write_files(live_t *self)
-{
-    out_file_flush(&self->record);
-    write_records(self);
-    out_file_flush(&self->record);
-    out_file_flush(&self->trace);
-    write_rows(self);
-    out_file_flush(&self->trace);
-    self->control.lost.record_lines = ring_dropped(&self->loop.record);
-    self->control.lost.trace_rows = ring_dropped(&self->loop.trace);
-    self->control.lost.log_lines = hal_log_dropped(linux_log_hal(&self->log));
-}
-
-static bool open_file(out_file_t *file, const char *path, bool *is_used)
-{
-    file->fd = -1;
-    *is_used = path != NULL;
-    return path == NULL || out_file_open(file, path, OUT_FILE_GOES_ON);
-}
-
-static void write_record_head(live_t *self, const char *config_path)
-{
-    char line[512];
-    const time_t now = time(NULL);
-    struct tm date;
-    (void)gmtime_r(&now, &date);
-    const int length = snprintf(line, sizeof line,
-                                "; heaved %s, configuration %.300s, %04d-%02d-%02d %02d:%02d:%02d UTC\n"
-                                "; before time zero: comments, in ms since the start\n",
-                                HEAVE_VERSION, config_path, date.tm_year + 1900, date.tm_mon + 1, date.tm_mday, date.tm_hour,
-                                date.tm_min, date.tm_sec);
-    out_file_write(&self->record, line, (size_t)length);
-}
-
-static int open_files(live_t *self)
-{
-    const options_t *options = self->options;
-    if (!open_file(&self->record, options->record, &self->loop.is_recording)) {
-        return say(EXIT_NO_OUTPUT, "%s: %s", options->record, strerror(self->record.error));
-    }
-    if (!open_file(&self->trace, options->trace, &self->loop.is_tracing)) {
-        return say(EXIT_NO_OUTPUT, "%s: %s", options->trace, strerror(self->trace.error));
-    }
-    if (self->loop.is_recording) {
-        write_record_head(self, options->config);
-    }
-    if (self->loop.is_tracing) {
-        char header[TRACE_LINE_MAX];
-        out_file_write(&self->trace, header, trace_header(header));
-    }
-    return EXIT_DONE;
-}
-
-/* Closes a file at the end and says what is missing in it. */
-static int close_file(out_file_t *file, const char *path, const ring_t *ring, const char *what)
-{
-    const bool is_whole = out_file_close(file);
-    if (ring_dropped(ring) > 0) {
-        (void)say(0, "%s: %" PRIu32 " %s are missing: writing was too slow", path, ring_dropped(ring), what);
-    }
-    return is_whole ? EXIT_DONE : say(EXIT_IO, "%s: %s", path, strerror(file->error));
-}
 
 /* --- Floods --- */
 
@@ -182,16 +91,18 @@ static void set_filter(live_t *self)
 {
     if (!self->flood.is_on) {
         linux_udp_filter_off(&self->udp);
-        (void)say(0, "the flood is over: rejected frames are told again");
+        writers_say(&self->writers, "the flood is over: rejected frames are told again");
         return;
     }
     const linux_udp_filter_t filter = filter_of(&self->config);
     if (linux_udp_filter_on(&self->udp, &filter) == HV_OK) {
-        (void)say(0,
-                  "a flood of useless datagrams: what cannot be a frame, or comes from a sender that is not allowed, is dropped "
-                  "in the kernel and counted as lost there until it is over");
+        writers_say(
+            &self->writers,
+            "a flood of useless datagrams: what cannot be a frame, or comes from a sender that is not allowed, is dropped "
+            "in the kernel and counted as lost there until it is over");
     } else {
-        (void)say(0, "a flood of useless datagrams, and the kernel takes no filter against it: %s", strerror(errno));
+        writers_say(&self->writers, "a flood of useless datagrams, and the kernel takes no filter against it: %s",
+                    strerror(errno));
     }
 }
 
@@ -234,11 +145,11 @@ static bool open_signals(live_t *self)
 static void reload(live_t *self)
 {
     if (config_reload(self->options->config, &self->config, self->errors) != 0) {
-        (void)say(0, "%s is not right: nothing has changed", self->options->config);
+        writers_say(&self->writers, "%s is not right: nothing has changed", self->options->config);
     } else if (!motion_loop_reload(&self->loop, &self->config)) {
-        (void)say(0, "too many reloads at once: send SIGHUP again");
+        writers_say(&self->writers, "too many reloads at once: send SIGHUP again");
     } else {
-        (void)say(0, "%s has been read again", self->options->config);
+        writers_say(&self->writers, "%s has been read again", self->options->config);
         if (self->flood.is_on) {
             set_filter(self);
         }
@@ -272,7 +183,7 @@ static void take_signals(live_t *self)
             const motion_request_t request = {.event = EVENT_SHUTDOWN};
             (void)ring_push(&self->loop.requests, &request, sizeof request, NULL, 0);
             manager_stopping(&self->manager, shutdown_most_us(&self->config.settings));
-            (void)say(0, "shutting down: the platform settles first; once more ends at once");
+            writers_say(&self->writers, "shutting down: the platform settles first; once more ends at once");
         } else {
             motion_loop_quit(&self->loop);
         }
@@ -286,14 +197,36 @@ static uint64_t now_us(const live_t *self)
     return hal_clock_now_us(self->loop.clock);
 }
 
-/* The service manager, and whoever collects metrics. */
+/* The service manager; and who reads the log, where something is lost. */
 static void tell_others(live_t *self)
 {
     if (seqlock_read(&self->loop.view, self->view.word)) {
         watch_floods(self, now_us(self));
         manager_serve(&self->manager, &self->view.view.snapshot, now_us(self));
-        metrics_serve(&self->metrics, &self->view.view, &self->config, &self->loop.times, now_us(self));
     }
+}
+
+/* poll has failed, perhaps for good: signals and requests are looked for all the same. Nothing of it blocks. */
+static void suppose_all(struct pollfd *fds, unsigned count)
+{
+    const struct timespec pause = {.tv_nsec = errno == EINTR ? 0 : WAITING_MS * 1000000L};
+    for (unsigned i = 0; i < count; i++) {
+        fds[i].revents = fds[i].fd >= 0 ? fds[i].events : 0;
+    }
+    (void)nanosleep(&pause, NULL);
+}
+
+static void count_losses(live_t *self)
+{
+    status_lost_t *lost = &self->control.lost;
+    writers_count(&self->writers, lost);
+    const bool is_lossy = lost->trace_rows != 0 || lost->record_lines != 0;
+    if (is_lossy && !self->was_lossy) {
+        writers_say(&self->writers,
+                    "what is written is lost: the disk or the reader of %s is too slow; `lost` in the status counts",
+                    lost->record_lines != 0 ? "--record" : "--trace");
+    }
+    self->was_lossy = is_lossy;
 }
 
 static void serve_once(live_t *self)
@@ -302,13 +235,12 @@ static void serve_once(live_t *self)
     control_fill(&self->control, fds);
     fds[CONTROL_FDS] = (struct pollfd){.fd = self->signal_fd, .events = POLLIN};
     if (poll(fds, CONTROL_FDS + 1, control_timeout_ms(&self->control, now_us(self), TICK_MS)) < 0) {
-        return; /* interrupted */
+        suppose_all(fds, CONTROL_FDS + 1);
     }
     take_signals(self);
     control_serve(&self->control, fds, now_us(self));
     tell_others(self);
-    write_files(self);
-    (void)!linux_log_flush(&self->log); /* what does not go out now goes out later */
+    count_losses(self);
 }
 
 /* Until the motion thread has ended; after the second signal it gets a short while.
@@ -335,32 +267,13 @@ static void say_ready(const live_t *self, const config_t *config)
               (unsigned)self->udp.port, config->udp.group[0] == '\0' ? "" : ", group ", config->udp.group, self->control.path);
 }
 
-/* The rings hold more than the buffers: what a slow reader still takes within its time. */
-static void write_all(live_t *self)
-{
-    const uint64_t until_us = now_us(self) + END_WAIT_US;
-    do {
-        write_files(self);
-    } while ((!ring_is_empty(&self->loop.record) || !ring_is_empty(&self->loop.trace)) && now_us(self) < until_us);
-}
-
 static int finish(live_t *self)
 {
     control_serve(&self->control, (const struct pollfd[CONTROL_FDS]){{.fd = -1}}, now_us(self)); /* the last answers */
     control_close(&self->control);
-    metrics_remove(&self->metrics);
-    write_all(self);
-    (void)!linux_log_flush(&self->log);
+    const int code = writers_close(&self->writers, &self->has_writers_ended);
     if (!self->is_thread_running) {
         (void)blackbox_close(&self->blackbox); /* what has just happened is written now */
-    }
-    int code = EXIT_DONE;
-    if (self->loop.is_recording) {
-        code = close_file(&self->record, self->options->record, &self->loop.record, "lines");
-    }
-    if (self->loop.is_tracing) {
-        const int trace_code = close_file(&self->trace, self->options->trace, &self->loop.trace, "rows");
-        code = code == EXIT_DONE ? trace_code : code;
     }
     return code;
 }
@@ -383,6 +296,7 @@ static int run(live_t *self, const config_t *config)
     if (!blackbox_start(&self->blackbox)) {
         (void)say(0, "cannot start the black box: %s", strerror(errno));
     }
+    writers_start(&self->writers);
     await_first_cycle(self);
     const bool is_locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
     motion_loop_memory(&self->loop, is_locked ? MOTION_MEMORY_LOCKED : MOTION_MEMORY_UNLOCKED);
@@ -391,7 +305,6 @@ static int run(live_t *self, const config_t *config)
     }
     say_ready(self, config);
     manager_ready(&self->manager, now_us(self));
-    metrics_init(&self->metrics, strcmp(self->config.metrics_file, "none") == 0 ? "" : self->config.metrics_file);
     const bool has_ended = serve(self);
     if (has_ended) {
         (void)pthread_join(self->loop.thread, NULL);
@@ -413,6 +326,21 @@ static int run(live_t *self, const config_t *config)
 }
 
 /* --- Start --- */
+
+/* With too few, poll, accept and the files of incidents would fail later, in motion. */
+static int check_descriptors(void)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= DESCRIPTORS_MIN) {
+        return EXIT_DONE;
+    }
+    limit.rlim_cur = limit.rlim_max < DESCRIPTORS_MIN ? limit.rlim_max : DESCRIPTORS_MIN;
+    if (setrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur < DESCRIPTORS_MIN) {
+        return say(EXIT_UNAVAILABLE, "only %llu open files are allowed (ulimit -n, LimitNOFILE=); at least %d are needed",
+                   (unsigned long long)limit.rlim_cur, DESCRIPTORS_MIN);
+    }
+    return EXIT_DONE;
+}
 
 static int open_udp(live_t *self, const config_t *config)
 {
@@ -445,23 +373,23 @@ static int open_all(live_t *self, const config_t *config)
     char in_directory[SOCKET_PATH_MAX];
     const char *path =
         self->options->socket != NULL ? self->options->socket : socket_path_of_daemon(in_directory, config->control_socket);
-    int code = open_udp(self, config);
+    int code = check_descriptors();
+    code = code == EXIT_DONE ? open_udp(self, config) : code;
     code = code == EXIT_DONE ? control_open(&self->control, path, config, &self->loop, &self->blackbox) : code;
-    code = code == EXIT_DONE ? open_files(self) : code;
+    code = code == EXIT_DONE ? writers_open(&self->writers, self->options, config, &self->loop) : code;
     if (code != EXIT_DONE) {
         return code;
     }
     open_blackbox(self, config);
     const int errors = out_file_unblocked(STDERR_FILENO);
-    linux_log_init(&self->log, errors);
+    linux_log_init(&self->writers.log, errors);
+    linux_log_init(&self->writers.said, errors);
     open_errors(self, errors);
-    record_writer_init(&self->writer, &config->settings,
-                       config->settings.engage == ENGAGE_AUTO && config->settings.auto_frames == 0);
     if (!open_signals(self)) {
         return say(EXIT_UNAVAILABLE, "signals: %s", strerror(errno));
     }
     const hv_status_t status =
-        motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->log), linux_clock_hal());
+        motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->writers.log), linux_clock_hal());
     if (rig_trouble(&self->loop.rig)[0] != '\0') {
         (void)say(0, "%s", rig_trouble(&self->loop.rig));
     }
@@ -484,6 +412,7 @@ int live_run(const config_t *config, const options_t *options)
     self->config = *config;
     self->control.fd = -1;
     self->manager.fd = -1;
+    self->has_writers_ended = true;
     self->udp.fd = -1;
     int code = open_all(self, config);
     code = code == EXIT_DONE ? run(self, config) : code;
@@ -493,7 +422,7 @@ int live_run(const config_t *config, const options_t *options)
         const bool has_blackbox_ended = blackbox_close(&self->blackbox);
         const bool has_rig_ended = rig_close(&self->loop.rig, self->config.settings.relay_safe_mask);
         linux_udp_close(&self->udp);
-        if (has_blackbox_ended && has_rig_ended) {
+        if (has_blackbox_ended && has_rig_ended && self->has_writers_ended) {
             free(self);
         }
     }

@@ -2,10 +2,11 @@
  * main.c - heaved: reads the command line and the configuration, then runs what was asked for.
  */
 #include <errno.h>
-#include <fcntl.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "config.h"
@@ -17,7 +18,9 @@
 #include "live.h"
 #include "options.h"
 #include "play.h"
+#include "same_file.h"
 #include "say.h"
+#include "standard.h"
 #include "usage.h"
 #include "whole_file.h"
 
@@ -27,18 +30,40 @@ void hv_assert_failed(const char *file, int line)
     abort();
 }
 
-/* Whether the file can be read at all, before its contents are looked at. */
+/* Whether there is a file that may be read. Not by reading it: from a pipe it comes once. */
 static bool is_readable(const char *path)
 {
-    char byte;
-    const int fd = open(path, O_RDONLY | O_CLOEXEC);
-    const bool is_read = fd >= 0 && read(fd, &byte, 1) >= 0;
-    const int error = errno;
-    if (fd >= 0) {
-        (void)close(fd);
+    struct stat about;
+    if (stat(path, &about) != 0) {
+        return false;
     }
-    errno = error;
-    return is_read;
+    errno = EISDIR;
+    return !S_ISDIR(about.st_mode) && access(path, R_OK) == 0;
+}
+
+/** A file that a run reads or writes, and the option that names it. */
+typedef struct {
+    const char *option;
+    const char *path; /**< NULL: none */
+    bool is_output;
+} named_t;
+
+/* Before anything is opened: an output that is an input would empty it, and two outputs would overwrite each other.
+ * Returns EXIT_DONE; else it has said what is wrong. */
+static int check_outputs(const options_t *options, const char *metrics)
+{
+    const named_t named[] = {{"--config", options->config, false},    {"--play", options->play, false},
+                             {"--trace", options->trace, true},       {"--record", options->record, true},
+                             {"--envelope", options->envelope, true}, {"[control] metrics", metrics, true}};
+    for (size_t out = 0; out < sizeof named / sizeof named[0]; out++) {
+        for (size_t in = 0; named[out].is_output && named[out].path != NULL && in < out; in++) {
+            if (named[in].path != NULL && same_file(named[out].path, named[in].path, named[in].is_output)) {
+                return say(EXIT_BAD_USAGE, "%s %s is the file of %s, and would be written over; give it a name of its own",
+                           named[out].option, named[out].path, named[in].option);
+            }
+        }
+    }
+    return EXIT_DONE;
 }
 
 /* Standard output that took everything. */
@@ -108,7 +133,12 @@ int main(int argc, char **argv)
 {
     options_t options;
     static config_t config;
-    const int code = options_read(&options, argc, argv);
+    if (!standard_open()) {
+        return say(EXIT_UNAVAILABLE, "standard input, output or error is closed, and the null device cannot be put there: %s",
+                   strerror(errno));
+    }
+    (void)signal(SIGXFSZ, SIG_IGN); /* a file that has reached its limit is an error of the write */
+    int code = options_read(&options, argc, argv);
     if (code != EXIT_DONE) {
         return code;
     }
@@ -123,8 +153,14 @@ int main(int argc, char **argv)
     if (!is_readable(options.config)) {
         return say(EXIT_NO_INPUT, "%s: %s", options.config, strerror(errno));
     }
+    code = check_outputs(&options, NULL);
+    if (code != EXIT_DONE) {
+        return code;
+    }
     if (config_load(options.config, &config, stderr) != 0) {
         return EXIT_BAD_CONFIG;
     }
-    return run(&options, &config);
+    const bool has_metrics = options.mode == MODE_RUN && strcmp(config.metrics_file, "none") != 0;
+    code = check_outputs(&options, has_metrics ? config.metrics_file : NULL);
+    return code == EXIT_DONE ? run(&options, &config) : code;
 }

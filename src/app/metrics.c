@@ -231,8 +231,18 @@ static void put_program(sheet_t *self, const motion_view_t *view, const config_t
     whole(self, "page_faults_total", "counter", "page faults of the motion thread since the start", view->page_faults);
 }
 
+static void put_lost(sheet_t *self, const status_lost_t *lost)
+{
+    head(self, "lost_total", "counter", "what was not written because a disk or a reader was too slow");
+    put(self, "heave_lost_total{what=\"trace_rows\"} %" PRIu32 "\n", lost->trace_rows);
+    put(self, "heave_lost_total{what=\"record_lines\"} %" PRIu32 "\n", lost->record_lines);
+    put(self, "heave_lost_total{what=\"log_lines\"} %" PRIu32 "\n", lost->log_lines);
+    put(self, "heave_lost_total{what=\"metrics\"} %" PRIu32 "\n", lost->metrics);
+}
+
 /* NOLINTNEXTLINE(readability-non-const-parameter): the sheet writes through it */
-size_t metrics_text(const motion_view_t *view, const config_t *config, const motion_times_t *times, char *text, size_t capacity)
+size_t metrics_text(const motion_view_t *view, const config_t *config, const motion_times_t *times, const status_lost_t *lost,
+                    char *text, size_t capacity)
 {
     const snapshot_t *s = &view->snapshot;
     sheet_t sheet = {.capacity = capacity};
@@ -244,15 +254,16 @@ size_t metrics_text(const motion_view_t *view, const config_t *config, const mot
     put_relays(&sheet, s);
     put_frames(&sheet, view);
     put_stream(&sheet, s);
+    put_lost(&sheet, lost);
     return sheet.is_cut ? 0 : sheet.length;
 }
 
 /* --- The file --- */
 
-void metrics_init(metrics_t *self, const char *path)
+void metrics_init(metrics_t *self, const char *path, uint64_t now_us)
 {
     self->path = path;
-    self->next_us = 0;
+    self->next_us = now_us;
     self->error = 0;
     (void)snprintf(self->temporary, sizeof self->temporary, "%s.new", path);
 }
@@ -279,23 +290,52 @@ static int replace(const metrics_t *self, size_t length)
     return error;
 }
 
-void metrics_serve(metrics_t *self, const motion_view_t *view, const config_t *config, const motion_times_t *times,
-                   uint64_t now_us)
+static void lose(metrics_t *self, uint64_t count)
 {
-    if (self->path[0] == '\0' || now_us < self->next_us) {
+    __atomic_store_n(&self->lost, self->lost + (uint32_t)count, __ATOMIC_RELAXED);
+}
+
+/* Periods that have passed over one file are lost. */
+static void end_write(metrics_t *self, uint64_t now_us)
+{
+    if (self->busy_ms != 0) {
+        __atomic_store_n(&self->busy_ms, 0, __ATOMIC_RELAXED);
+        lose(self, (now_us - self->since_us) / METRICS_PERIOD_US);
+    }
+}
+
+static void begin_write(metrics_t *self, uint64_t now_us)
+{
+    self->since_us = now_us;
+    __atomic_store_n(&self->busy_ms, (uint32_t)(now_us / 1000u) | 1u, __ATOMIC_RELAXED);
+}
+
+void metrics_serve(metrics_t *self, const motion_view_t *view, const config_t *config, const motion_times_t *times,
+                   const status_lost_t *lost, uint64_t now_us)
+{
+    end_write(self, now_us);
+    if (now_us < self->next_us) {
         return;
     }
-    self->next_us = now_us + METRICS_PERIOD_US;
-    const int error = replace(self, metrics_text(view, config, times, self->text, sizeof self->text));
+    self->next_us += METRICS_PERIOD_US * (1 + (now_us - self->next_us) / METRICS_PERIOD_US);
+    begin_write(self, now_us);
+    const int error = replace(self, metrics_text(view, config, times, lost, self->text, sizeof self->text));
     if (error != 0 && error != self->error) {
         (void)say(0, "metrics %s: %s; tried again every second", self->path, strerror(error));
     }
+    lose(self, error != 0);
     self->error = error;
+}
+
+uint32_t metrics_lost(const metrics_t *self, uint64_t now_us)
+{
+    const uint32_t busy_ms = __atomic_load_n(&self->busy_ms, __ATOMIC_RELAXED);
+    const int32_t for_ms = busy_ms != 0 ? (int32_t)((uint32_t)(now_us / 1000u) - busy_ms) : 0; /* may have begun since now */
+    const uint32_t late = for_ms > 0 ? (uint32_t)for_ms / (METRICS_PERIOD_US / 1000u) : 0;
+    return __atomic_load_n(&self->lost, __ATOMIC_RELAXED) + late;
 }
 
 void metrics_remove(metrics_t *self)
 {
-    if (self->path != NULL && self->path[0] != '\0') {
-        (void)unlink(self->path);
-    }
+    (void)unlink(self->path);
 }

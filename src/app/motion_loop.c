@@ -232,6 +232,15 @@ static void write_row(motion_loop_t *self)
     }
 }
 
+static bool is_heard(const snapshot_t *snapshot)
+{
+    bool is_any = snapshot->state == STATE_SETTLED;
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        is_any = is_any || snapshot->drive[i].has_actual;
+    }
+    return is_any;
+}
+
 /* What a recording and a trace need of the cycle that has just run. */
 static void write_down(motion_loop_t *self, bool is_zero)
 {
@@ -245,7 +254,8 @@ static void write_down(motion_loop_t *self, bool is_zero)
     if (is_zero) {
         note_at(self, RECORD_ZERO, snapshot->now_us, record_zero(snapshot->goal, snapshot->intensity_percent));
     }
-    if (self->session.has_zero) {
+    self->has_feedback = self->has_feedback || is_heard(snapshot);
+    if (self->has_feedback) {
         write_row(self);
     }
 }

@@ -109,6 +109,7 @@ typedef struct {
 
     motion_view_words_t current; /**< private to the motion thread */
     bool was_estop;
+    bool has_feedback; /**< a drive has told where it is: from then on cycles are written down */
     bool has_first_faults;
     uint32_t first_faults; /**< page faults of the thread before they count */
     drive_feedback_t was_drive[DRIVES_MAX];

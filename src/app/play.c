@@ -110,6 +110,7 @@ static const char *resume(play_t *self, const config_t *config, const gateway_io
     self->player.session.cycle_us = saved.cycle_us;
     self->player.session.now_us = saved.now_us;
     self->player.session.has_zero = saved.has_zero;
+    self->player.is_before_zero = !saved.has_zero;
     self->player.session.zero_us = saved.zero_us;
     self->player.session.late_cycles = saved.late_cycles;
     const snapshot_t *snapshot = gateway_snapshot(&self->player.session.gateway);
@@ -192,6 +193,10 @@ static void say_summary(const play_t *self)
 static int load(play_t *self, const char *path)
 {
     const int bad = frames_load(&self->frames, path, stderr);
+    if (bad < 0 && (errno == EFBIG || errno == EMSGSIZE)) {
+        return say(EXIT_BAD_DATA, "%s: %s; allowed: a file of frames, `<t_ms> <text>` on each line", path,
+                   errno == EFBIG ? "more than 1 GiB" : "a line of more than 1 MiB");
+    }
     if (bad < 0) {
         return say(EXIT_NO_INPUT, "%s: %s", path, strerror(errno));
     }
@@ -207,8 +212,9 @@ static int open_all(play_t *self, const config_t *config, const char *trace_path
     self->player.inputs = &self->rig.sim_inputs;
     self->player.refused = note_refused;
     self->player.ctx = self;
-    if (rig_open_settled(&self->rig, config, &io) != HV_OK ||
-        session_init(&self->player.session, &config->settings, &io) != HV_OK ||
+    const bool is_open = rig_open_settled(&self->rig, config, &io) == HV_OK;
+    io.drives = player_drives(&self->player);
+    if (!is_open || session_init(&self->player.session, &config->settings, &io) != HV_OK ||
         (!has_state(self) && !player_settle(&self->player, &config->settings))) {
         return say(EXIT_BAD_CONFIG, "this platform cannot be simulated: its settled or neutral position is out of reach");
     }

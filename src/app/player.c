@@ -17,7 +17,7 @@
 static const frames_line_t *take_due(player_t *self, size_t *next, bool is_datagram)
 {
     const uint64_t t_us = self->session.now_us - self->session.zero_us;
-    while (self->session.has_zero && *next < self->lines && self->line[*next].t_us <= t_us) {
+    while ((self->session.has_zero || self->is_before_zero) && *next < self->lines && self->line[*next].t_us <= t_us) {
         const frames_line_t *line = &self->line[(*next)++];
         if ((line->kind == FRAMES_DATAGRAM) == is_datagram) {
             return line;
@@ -47,6 +47,55 @@ hal_udp_t player_udp(player_t *self)
 {
     static const hal_udp_ops_t k_udp = {.recv = player_recv};
     return (hal_udp_t){&k_udp, self};
+}
+
+/* --- Drives that lines tell of --- */
+
+static hv_status_t told_poll(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
+{
+    player_t *self = ctx;
+    const drives_t behind = sim_drives_hal(self->drives);
+    const hv_status_t status = drives_poll(behind, now_us, feedback);
+    bool is_any = !self->is_told;
+    for (unsigned i = 0; self->is_told && i < drives_count(behind); i++) {
+        feedback[i] = self->told[i];
+        feedback[i].actual_us = now_us - (self->told[i].actual_us < now_us ? self->told[i].actual_us : now_us);
+        is_any = is_any || feedback[i].state != DRIVE_OFFLINE;
+    }
+    return self->is_told ? (is_any ? HV_OK : HV_ERR_IO) : status;
+}
+
+static hv_status_t told_send(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
+{
+    player_t *self = ctx;
+    const hv_status_t status = drives_send(sim_drives_hal(self->drives), now_us, setpoint_q32);
+    return self->is_told ? HV_OK : status;
+}
+
+/* What the contract says of the states that were told. */
+static hv_status_t told_request(void *ctx, drives_request_t request)
+{
+    player_t *self = ctx;
+    const drives_t behind = sim_drives_hal(self->drives);
+    const hv_status_t status = drives_request(behind, request);
+    for (unsigned i = 0; self->is_told && i < drives_count(behind); i++) {
+        if (!drives_allow(request, self->told[i].state)) {
+            return HV_ERR_STATE;
+        }
+    }
+    return self->is_told ? HV_OK : status;
+}
+
+static uint8_t told_count(void *ctx)
+{
+    const player_t *self = ctx;
+    return drives_count(sim_drives_hal(self->drives));
+}
+
+drives_t player_drives(player_t *self)
+{
+    static const drives_ops_t k_ops = {told_poll, told_send, told_request, told_count, NULL, NULL};
+    return (drives_t){&k_ops, self};
 }
 
 /* --- Running --- */
@@ -90,6 +139,10 @@ static void carry_out(player_t *self, const frames_line_t *line)
         break;
     case FRAMES_FAULT:
         gateway_tell_fault(gateway, line->fault, line->drive);
+        break;
+    case FRAMES_FEEDBACK:
+        self->is_told = true;
+        self->told[line->drive - 1] = line->feedback;
         break;
     case FRAMES_END:
         self->is_ended = true;

@@ -21,6 +21,9 @@ typedef struct {
     void *ctx;
 
     session_t session;
+    bool is_before_zero; /**< the run goes on from a state before time zero: lines' times are since the start */
+    bool is_told;        /**< lines tell what the drives told; the simulated ones are not asked */
+    drive_feedback_t told[DRIVES_MAX];
     size_t next_datagram; /**< line from which on to look for one */
     size_t next_request;  /**< the same for everything else */
     bool is_ended;        /**< a line has said so: the last cycle was the last one */
@@ -30,6 +33,9 @@ typedef struct {
 
 /** The lines' datagrams, each once its time has come: for the io that session_init takes. */
 hal_udp_t player_udp(player_t *self);
+
+/** The drives: simulated, unless lines tell what they told. For the io that session_init or gateway_resume takes. */
+drives_t player_drives(player_t *self);
 
 /** Comes up to SETTLED as it does live: before time zero and without a row. What the auto policy does comes after it.
  *  @return false where the platform does not come up */

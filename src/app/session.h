@@ -29,7 +29,7 @@ bool session_is_sane(const session_t *saved, uint32_t cycle_us);
  *  @return true where it is time zero */
 bool session_cycle(session_t *self);
 
-/** The row of the last cycle. Once per cycle, from time zero on. */
+/** The row of the last cycle. Once per cycle, from the first one that is wanted on. */
 void session_row(session_t *self, trace_row_t *out);
 
 #endif

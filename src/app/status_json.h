@@ -12,6 +12,7 @@ typedef struct {
     uint32_t trace_rows;   /**< lost because writing was too slow */
     uint32_t record_lines; /**< likewise */
     uint32_t log_lines;    /**< likewise */
+    uint32_t metrics;      /**< files that were due and did not come */
     bool is_flood;         /**< the kernel drops what cannot be a frame */
 } status_lost_t;
 

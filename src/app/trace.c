@@ -11,16 +11,25 @@
 #define PLACES 9u
 
 /* Flags that are no motion flags follow those in the same word. */
-enum { FLAG_FAULT = 1u << 8, FLAG_ESTOP = 1u << 9, FLAG_SILENT = 1u << 10, FLAG_LATE = 1u << 11 };
+enum { FLAG_FAULT = 1u << 8, FLAG_ESTOP = 1u << 9, FLAG_SILENT = 1u << 10, FLAG_LATE = 1u << 11, FLAG_BEFORE_ZERO = 1u << 12 };
 
 static const struct {
     unsigned flag;
     const char *word;
 } k_words[] = {
-    {MOTION_CLAMPED, "clamped"},     {MOTION_SPEED, "speed"},       {MOTION_ACCEL, "accel"},
-    {MOTION_STRETCHED, "stretched"}, {MOTION_TAKEOVER, "takeover"}, {MOTION_IN_CYLINDERS, "cylinders"},
-    {MOTION_OFF_PATH, "off-path"},   {MOTION_NO_POSE, "no-pose"},   {FLAG_FAULT, "fault"},
-    {FLAG_ESTOP, "estop"},           {FLAG_SILENT, "silent"},       {FLAG_LATE, "late"},
+    {MOTION_CLAMPED, "clamped"},
+    {MOTION_SPEED, "speed"},
+    {MOTION_ACCEL, "accel"},
+    {MOTION_STRETCHED, "stretched"},
+    {MOTION_TAKEOVER, "takeover"},
+    {MOTION_IN_CYLINDERS, "cylinders"},
+    {MOTION_OFF_PATH, "off-path"},
+    {MOTION_NO_POSE, "no-pose"},
+    {FLAG_FAULT, "fault"},
+    {FLAG_ESTOP, "estop"},
+    {FLAG_SILENT, "silent"},
+    {FLAG_LATE, "late"},
+    {FLAG_BEFORE_ZERO, "before-zero"},
 };
 
 static unsigned flags_of(const snapshot_t *s, bool is_late)
@@ -30,11 +39,11 @@ static unsigned flags_of(const snapshot_t *s, bool is_late)
            (is_late ? FLAG_LATE : 0u);
 }
 
-void trace_take(trace_row_t *self, const snapshot_t *snapshot, uint64_t t_us, bool is_late)
+void trace_take(trace_row_t *self, const snapshot_t *snapshot, uint64_t t_us, bool is_late, bool is_before_zero)
 {
     *self = (trace_row_t){.t_us = t_us,
                           .relay_mask = snapshot->relay_mask,
-                          .flags = (uint16_t)flags_of(snapshot, is_late),
+                          .flags = (uint16_t)(flags_of(snapshot, is_late) | (is_before_zero ? FLAG_BEFORE_ZERO : 0u)),
                           .state = (uint8_t)snapshot->state};
     memcpy(self->value_q32, snapshot->sent.axis_q32, sizeof snapshot->sent.axis_q32);
     self->value_q32[AXIS_ANGLE] = snapshot->has_angle ? snapshot->angle_deg_q32 : 0;

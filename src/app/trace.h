@@ -15,7 +15,7 @@
 
 /** One cycle. */
 typedef struct {
-    uint64_t t_us; /**< since time zero */
+    uint64_t t_us; /**< since time zero; before it, since the start */
     q32_t value_q32[TRACE_VALUES];
     uint16_t relay_mask;
     uint16_t flags; /**< MOTION_* in the low byte, then those private to trace.c */
@@ -23,8 +23,9 @@ typedef struct {
 } trace_row_t;
 
 /** Takes what the trace needs of a cycle.
- *  @param is_late cycles were skipped before this one */
-void trace_take(trace_row_t *self, const snapshot_t *snapshot, uint64_t t_us, bool is_late);
+ *  @param is_late        cycles were skipped before this one
+ *  @param is_before_zero time zero has not come yet: t_us is since the start */
+void trace_take(trace_row_t *self, const snapshot_t *snapshot, uint64_t t_us, bool is_late, bool is_before_zero);
 
 /** The header line, with its newline.
  *  @return bytes written, without NUL */

@@ -229,7 +229,8 @@ hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent)
 
 void gateway_note_late(gateway_t *self, uint32_t cycles)
 {
-    self->snapshot.counters.late_cycles += cycles;
+    uint32_t *late = &self->snapshot.counters.late_cycles;
+    *late = cycles < UINT32_MAX - *late ? *late + cycles : UINT32_MAX; /* a count that began anew would look like none late */
 }
 
 void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)

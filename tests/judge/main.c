@@ -15,7 +15,8 @@
 #include "following.h"
 #include "rules.h"
 
-#define LINE_BYTES 1024u
+#define BEFORE_ZERO "before-zero\n"
+#define LINE_BYTES  1024u
 
 static size_t next_line(char line[LINE_BYTES])
 {
@@ -44,6 +45,9 @@ int main(int argc, char **argv)
     }
     while ((length = next_line(line)) > 0) {
         row_t row;
+        if (strstr(line, BEFORE_ZERO) != NULL) {
+            continue; /* the drives move by themselves, or not at all: nothing is led yet */
+        }
         if (line[length - 1] == '\n' && row_read(&row, line, length - 1)) {
             rules_row(&s_rules, &row);
             if (has_frames) {

@@ -73,7 +73,7 @@ class Guard:
         os.ftruncate(self.report_fd, mmap.PAGESIZE)
         self.report = mmap.mmap(self.report_fd, mmap.PAGESIZE)
         self.moved = pages_moved()
-        self.options = {"env": {**environment, "LD_PRELOAD": str(library), "HEAVE_GUARD_REPORT": str(self.report_fd)}, "pass_fds": (self.report_fd,)}
+        self.options = {"env": {**environment, "LD_PRELOAD": f"{environment.get('LD_PRELOAD', '')} {library}", "HEAVE_GUARD_REPORT": str(self.report_fd)}, "pass_fds": (self.report_fd,)}
 
     def started(self):
         os.close(self.report_fd)
@@ -251,8 +251,13 @@ class Sender:
             time.sleep(period_s)
 
 
+def since_zero(trace):
+    """A trace without its rows before time zero, which a recording does not repeat."""
+    return b"".join(line for line in trace.splitlines(keepends=True) if not line.endswith(b"before-zero\n"))
+
+
 def rows_of(trace):
-    """A trace as a list of dicts."""
-    lines = trace.decode().splitlines()
+    """A trace as a list of dicts, from time zero on."""
+    lines = since_zero(trace).decode().splitlines()
     names = lines[0].split(",")
     return [dict(zip(names, line.split(","))) for line in lines[1:]]

@@ -254,7 +254,7 @@ def replays_to_the_same_bytes(bench, **changes):
     daemon = bench.start("--record", record, "--trace", trace, config=config)
     session(bench, daemon)
     assert bench.stop(daemon) == 0
-    live, log, text = trace.read_bytes(), daemon.log.read_text(), record.read_text()
+    live, log, text = heave.since_zero(trace.read_bytes()), daemon.log.read_text(), record.read_text()
     assert "missing" not in log, log
     played = bench.play(record, config=config)
     assert len(live.splitlines()) > 3000, "a live run worth the name"
@@ -295,7 +295,7 @@ def a_late_cycle_holds(bench):
     assert status["late_cycles"] > 40 and status["wake_latency"]["max_us"] > 40000, status
     assert status["wake_latency"]["count"] >= status["cycle"] - 100 and status["cycle_time"]["p50_us"] <= status["cycle_time"]["max_us"]
     assert bench.stop(daemon) == 0
-    live = trace.read_bytes()
+    live = heave.since_zero(trace.read_bytes())
     assert bench.play(record, config=config)[:len(live)] == live, "a late cycle replays"
 
 
@@ -318,11 +318,17 @@ def dumps_the_black_box(bench):
         sender.stream(0.3, wave)
     answer, code = bench.ask("dump")
     assert code == 0 and answer == {"ok": True, "folder": answer["folder"]}, answer
+    names = [Path(run.stdout[len("dump: "):].strip()).name, Path(answer["folder"]).name]
+    assert all(name.endswith("-dump") for name in names), names
+    assert bench.ctl("incidents").stdout == f"{names[0]}: new\n{names[1]}: new\n"
+    listed, code = bench.ask("seen")
+    assert code == 0 and listed == {"ok": True, "incidents": [{"name": name, "dump": True, "seen": True} for name in names]}, listed
+    heave.wait_for(lambda: (directory / ".seen").exists() and (directory / ".seen").read_text() == "000002\n", "that is kept")
     assert bench.stop(daemon) == 0
-    folders = sorted(directory.iterdir())
+    folders = sorted(path for path in directory.iterdir() if path.is_dir())
     assert [str(folder) for folder in folders] == [run.stdout[len("dump: "):].strip(), answer["folder"]], folders
     for folder in folders:
-        trace = (folder / "trace.csv").read_bytes()
+        trace = heave.since_zero((folder / "trace.csv").read_bytes())
         assert len(trace.splitlines()) > 1000
         played = bench.play(folder / "frames", config=folder / "platform.ini")
         assert played == trace, f"{folder.name} plays back otherwise"
@@ -369,7 +375,7 @@ def replays_a_following_error(bench):
     assert bench.stop(daemon) == 0
     folder, = directory.iterdir()
     assert " !fault following-error " in (folder / "frames").read_text()
-    trace = (folder / "trace.csv").read_bytes()
+    trace = heave.since_zero((folder / "trace.csv").read_bytes())
     states = [row["state"] for row in heave.rows_of(trace)]
     assert "ENGAGED" in states and states[-1] == "FAULT", set(states)
     played = bench.play(folder / "frames", config=folder / "platform.ini")
@@ -381,6 +387,8 @@ def replays_a_following_error(bench):
 def dumps_nothing(bench):
     daemon = bench.start()
     answer, code = bench.ask("dump")
+    assert code == 1 and "[black-box] directory" in answer["error"], answer
+    answer, code = bench.ask("incidents")
     assert code == 1 and "[black-box] directory" in answer["error"], answer
     assert bench.stop(daemon) == 0
 

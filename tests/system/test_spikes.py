@@ -179,7 +179,7 @@ def jumps_live(bench):
         sender.stream(0.3, lambda t: frame([0, 0, 0, 0, 0, 60]))
         heave.wait_for(lambda: bench.status()["pose_sent"]["z_mm"] > 59, "a confirmed one is followed")
     assert bench.stop(daemon) == 0 and "confirm" not in off
-    live, played = trace.read_bytes(), bench.play(record)
+    live, played = heave.since_zero(trace.read_bytes()), bench.play(record)
     assert played[:len(live)] == live, "the recording plays back otherwise"
 
 

@@ -66,7 +66,7 @@ def judge(bench):
 
 
 def replays(bench):
-    live = bench.trace.read_bytes()
+    live = heave.since_zero(bench.trace.read_bytes())
     played = bench.play(bench.record)
     assert played[:len(live)] == live, "the recording plays back otherwise"
 
@@ -206,7 +206,7 @@ def ends_at_any_moment(bench, source):
         log = daemon.log.read_text()
         print(f"# SIGTERM after {state}: {took_s:.2f} s", flush=True)
         assert code == 0 and took_s < SETTLE_MOST_S, f"after {state}: exit {code} after {took_s} s\n{log}"
-        rows = judge(bench) if "-> SETTLED" in log else []  # a trace begins there
+        rows = judge(bench) if "-> SETTLED" in log else []  # what is led begins there
         if state != "OFF":
             assert rows[-1]["state"] == "OFF" and re.search(r"SETTLED -> OFF", log), log
 

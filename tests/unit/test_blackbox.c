@@ -157,9 +157,26 @@ static void find_folder(void)
     (void)snprintf(m_folder, sizeof m_folder, "%s/%s", m_config.black_box.directory, m_box.folder[m_box.folders - 1].name);
 }
 
+/* Rows before time zero are there to be looked at; a replay that begins there does not have them. */
+static void leave_out_before_zero(char *trace)
+{
+    char *to = trace;
+    for (const char *line = trace; *line != '\0';) {
+        const char *end = strchr(line, '\n') + 1;
+        static const char k_flag[] = "before-zero\n";
+        const size_t length = (size_t)(end - line);
+        if (length < sizeof k_flag || memcmp(end - (sizeof k_flag - 1), k_flag, sizeof k_flag - 1) != 0) {
+            memmove(to, line, length);
+            to += length;
+        }
+        line = end;
+    }
+    *to = '\0';
+}
+
 /* Plays the incident; what it says it was has to be what comes out, byte for byte.
  * Returns the frames. */
-static char *expect_replay(unsigned rows_min)
+static char *expect_replay_from(bool is_from_zero, unsigned rows_min)
 {
     char played_path[96];
     config_t config;
@@ -169,6 +186,9 @@ static char *expect_replay(unsigned rows_min)
     TEST_ASSERT_EQUAL(0, play_run(&config, file_of("frames"), played_path));
     char *played = contents(played_path);
     char *trace = contents(file_of("trace.csv"));
+    if (is_from_zero) {
+        leave_out_before_zero(trace);
+    }
     unsigned rows = 0;
     for (const char *at = trace; (at = strchr(at, '\n')) != NULL; at++) {
         rows++;
@@ -184,6 +204,11 @@ static char *expect_replay(unsigned rows_min)
     free(played);
     free(trace);
     return contents(file_of("frames"));
+}
+
+static char *expect_replay(unsigned rows_min)
+{
+    return expect_replay_from(true, rows_min);
 }
 
 static void expect_in(const char *text, const char *part)
@@ -236,6 +261,25 @@ static void test_blackbox_short_run_replays_from_time_zero(void)
     free(frames);
 }
 
+/* Drives that home move by themselves: what they told is all there is to repeat. */
+static void test_blackbox_dump_in_homing_has_every_row_and_replays(void)
+{
+    m_config.sim.is_homed = false;
+    m_config.sim.start_extension_mm_q16 = 60 << 16;
+    m_config.sim.enable_delay_ms = 300;
+    run((story_t){.end_us = 1200000, .ask_us = 1100000});
+    TEST_ASSERT_EQUAL(STATE_HOMING, gateway_snapshot(&m_loop.session.gateway)->state);
+    free(expect_replay_from(false, 1000));
+    char *trace = contents(file_of("trace.csv"));
+    expect_in(trace, ",HOMING,");
+    expect_in(trace, "before-zero\n");
+    free(trace);
+    char *feedback = contents(file_of("feedback.csv"));
+    expect_in(feedback, ",enabling,");
+    expect_in(feedback, ",homing,");
+    free(feedback);
+}
+
 static void test_blackbox_long_ride_replays_from_the_middle(void)
 {
     run((story_t){.end_us = 42000000, .ask_us = 41000000});
@@ -272,6 +316,7 @@ static void expect_same_fault(const char *frames_line)
     TEST_ASSERT_EQUAL(0, play_run(&config, file_of("frames"), played_path));
     char *played = contents(played_path);
     char *trace = contents(file_of("trace.csv"));
+    leave_out_before_zero(trace);
     const char *fault = strstr(trace, ",FAULT,");
     TEST_ASSERT_NOT_NULL(fault);
     TEST_ASSERT_EQUAL_MEMORY(trace, played, (size_t)(fault - trace) + strlen(",FAULT,"));
@@ -340,36 +385,95 @@ static void test_blackbox_what_was_not_handed_over_is_not_replayed(void)
 
 static void test_blackbox_nothing_to_begin_with_is_said(void)
 {
-    run((story_t){.end_us = 20100000, .deaf_us = 8000000, .hearing_us = 20000000, .ask_us = 20050000});
+    run((story_t){.end_us = 19100000, .deaf_us = 8000000, .hearing_us = 19000000, .ask_us = 19050000});
     find_folder();
     char *frames = contents(file_of("frames"));
     expect_in(frames, "; NO REPLAY: ");
     free(frames);
 }
 
-static void test_blackbox_folders_are_bounded_and_a_part_is_removed(void)
+/* Another start of heaved, on the same directory. */
+static void start_anew(void)
+{
+    (void)blackbox_close(&m_box);
+    memset(&m_loop, 0, sizeof m_loop);
+    memset(&m_box, 0, sizeof m_box);
+    m_now_us = 0;
+}
+
+static bool is_kept(const char *folder)
 {
     char path[BLACKBOX_PATH_MAX + 64];
+    (void)snprintf(path, sizeof path, "%s/%s", m_config.black_box.directory, folder);
+    return access(path, F_OK) == 0;
+}
+
+static unsigned dumps(void)
+{
+    unsigned count = 0;
+    for (uint32_t i = 0; i < m_box.folders; i++) {
+        TEST_ASSERT_TRUE(is_kept(m_box.folder[i].name));
+        count += blackbox_is_dump(m_box.folder[i].name);
+    }
+    return count;
+}
+
+static void make_folder(const char *name)
+{
+    char path[BLACKBOX_PATH_MAX + 64];
+    (void)snprintf(path, sizeof path, "%s/%s", m_config.black_box.directory, name);
+    TEST_ASSERT_EQUAL(0, mkdir(path, 0700));
+}
+
+static void test_blackbox_dumps_are_bounded_and_delete_no_fault_and_a_part_is_removed(void)
+{
     m_config.black_box.incidents = 2;
     (void)mkdir(m_config.black_box.directory, 0700);
-    (void)snprintf(path, sizeof path, "%s/incident-000041-20200101T000000Z", m_config.black_box.directory);
-    TEST_ASSERT_EQUAL(0, mkdir(path, 0700));
-    (void)snprintf(m_folder, sizeof m_folder, "%s/.incident.part", m_config.black_box.directory);
-    TEST_ASSERT_EQUAL(0, mkdir(m_folder, 0700));
-    for (unsigned i = 0; i < 3; i++) {
+    make_folder("incident-000040-20200101T000000Z");
+    make_folder("incident-000041-20200101T000000Z");
+    for (unsigned i = 0; i < 4; i++) {
+        make_folder(".incident.part");
         if (i > 0) {
-            (void)blackbox_close(&m_box);
-            memset(&m_loop, 0, sizeof m_loop);
-            memset(&m_box, 0, sizeof m_box);
-            m_now_us = 0;
+            start_anew();
         }
         run((story_t){.end_us = 1000000, .ask_us = 900000});
-        TEST_ASSERT_EQUAL_UINT32(2, m_box.folders);
         TEST_ASSERT_EQUAL_UINT32(42 + i, m_box.number);
-        TEST_ASSERT_EQUAL(i == 0 ? 0 : -1, access(path, F_OK));
-        TEST_ASSERT_EQUAL(-1, access(m_folder, F_OK));
-        (void)snprintf(m_folder, sizeof m_folder, "%s/.incident.part", m_config.black_box.directory);
+        TEST_ASSERT_EQUAL_UINT32(i < 2 ? i + 1 : 2, dumps());
+        TEST_ASSERT_EQUAL_UINT32(2 + dumps(), m_box.folders);
+        TEST_ASSERT_TRUE(is_kept("incident-000040-20200101T000000Z") && is_kept("incident-000041-20200101T000000Z"));
+        TEST_ASSERT_FALSE(is_kept(".incident.part"));
     }
+}
+
+static void test_blackbox_first_fault_since_a_person_looked_is_never_dropped(void)
+{
+    static blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX];
+    uint32_t seen = 0;
+    m_config.black_box.incidents = 1;
+    (void)mkdir(m_config.black_box.directory, 0700);
+    make_folder("incident-000007-20200101T000000Z");
+    for (unsigned i = 0; i < 3; i++) { /* 8, 9, 10: each makes way for the next */
+        run((story_t){.end_us = 5000000, .fault_us = 2000000});
+        TEST_ASSERT_EQUAL_UINT32(2, m_box.folders);
+        TEST_ASSERT_TRUE(is_kept("incident-000007-20200101T000000Z"));
+        start_anew();
+    }
+    run((story_t){.end_us = 1000000});
+    blackbox_see(&m_box);
+    blackbox_step(&m_box, false);
+    start_anew();                                           /* it is on the disk */
+    run((story_t){.end_us = 5000000, .fault_us = 2000000}); /* 11: the first one since */
+    TEST_ASSERT_EQUAL_UINT32(2, blackbox_list(&m_box, folder, &seen));
+    TEST_ASSERT_EQUAL_UINT32(10, seen);
+    TEST_ASSERT_FALSE(is_kept("incident-000007-20200101T000000Z"));
+    start_anew();
+    for (unsigned i = 0; i < 2; i++) {
+        run((story_t){.end_us = 5000000, .fault_us = 2000000});
+        TEST_ASSERT_EQUAL_UINT32(2, blackbox_list(&m_box, folder, &seen));
+        TEST_ASSERT_EQUAL_UINT32(11, blackbox_number(folder[0].name));
+        start_anew();
+    }
+    run((story_t){.end_us = 1000000});
 }
 
 static void expect_refusal(const char *why)
@@ -449,6 +553,7 @@ int main(void)
     (void)unsetenv("STATE_DIRECTORY"); // NOLINT(concurrency-mt-unsafe): before any thread
     UNITY_BEGIN();
     RUN_TEST(test_blackbox_short_run_replays_from_time_zero);
+    RUN_TEST(test_blackbox_dump_in_homing_has_every_row_and_replays);
     RUN_TEST(test_blackbox_long_ride_replays_from_the_middle);
     RUN_TEST(test_blackbox_drive_fault_is_written_by_itself_and_replays);
     RUN_TEST(test_blackbox_following_error_after_a_reload_replays);
@@ -459,7 +564,8 @@ int main(void)
     RUN_TEST(test_blackbox_estop_is_written_at_the_end_at_the_latest);
     RUN_TEST(test_blackbox_what_was_not_handed_over_is_not_replayed);
     RUN_TEST(test_blackbox_nothing_to_begin_with_is_said);
-    RUN_TEST(test_blackbox_folders_are_bounded_and_a_part_is_removed);
+    RUN_TEST(test_blackbox_dumps_are_bounded_and_delete_no_fault_and_a_part_is_removed);
+    RUN_TEST(test_blackbox_first_fault_since_a_person_looked_is_never_dropped);
     RUN_TEST(test_blackbox_full_disk_leaves_nothing_behind);
     RUN_TEST(test_blackbox_directory_that_cannot_be_is_said_at_the_start);
     RUN_TEST(test_blackbox_without_directory_there_is_none);

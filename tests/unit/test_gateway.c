@@ -1794,6 +1794,15 @@ static void test_shutdown_in_fault_and_estop_is_finished_at_rest(void)
     TEST_ASSERT_TRUE(gateway_is_finished(&m_rig.gateway));
 }
 
+static void test_late_cycles_never_count_from_zero_again(void)
+{
+    gateway_note_late(&m_rig.gateway, UINT32_MAX - 1);
+    gateway_note_late(&m_rig.gateway, 1);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, seen()->counters.late_cycles);
+    gateway_note_late(&m_rig.gateway, UINT32_MAX);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, seen()->counters.late_cycles);
+}
+
 static void test_telemetry_actual_speed_is_that_of_the_plate(void)
 {
     engage();
@@ -2249,6 +2258,7 @@ static void run_supervision(void)
     RUN_TEST(test_shutdown_while_a_drive_homes_for_ever_is_bounded);
     RUN_TEST(test_shutdown_can_be_held_and_asked_for_again);
     RUN_TEST(test_shutdown_in_fault_and_estop_is_finished_at_rest);
+    RUN_TEST(test_late_cycles_never_count_from_zero_again);
     RUN_TEST(test_telemetry_actual_speed_is_that_of_the_plate);
     RUN_TEST(test_telemetry_actual_pose_follows_the_feedback);
     RUN_TEST(test_telemetry_reports_of_drives_are_logged_once_with_what_they_name);

@@ -29,6 +29,7 @@ ANGLE = len(POSE_AXES)
 FIRST_CYLINDER = ANGLE + 1
 CYLINDER_COLUMNS = 6
 COLUMNS = POSE_COLUMNS + ["angle_deg"] + [f"c{i + 1}_mm" for i in range(CYLINDER_COLUMNS)]
+BEFORE_ZERO = "before-zero\n"  # nothing is led yet: drives are off, or move by themselves
 HEADER = ",".join(["t_ms", "state", *COLUMNS, "relays", "flags"])
 ROW = re.compile(rf"(\d+)(?:\.(\d{{1,3}}))?,([A-Z]+),((?:-?\d+\.\d{{9}},){{{len(COLUMNS)}}})([0-9A-Fa-f]{{4}}),([a-z|-]*)\n")
 
@@ -116,6 +117,9 @@ class Checker:
             self.findings.add("format", "header", 0, 1, header.strip()[:60], HEADER[:60] + "...")
         rows, first_line = [], 2
         for number, line in enumerate(lines, 2):
+            if line.endswith(BEFORE_ZERO):
+                first_line = number + 1
+                continue
             row = self._parse(line, number)
             if row:
                 rows.append(row)

@@ -3,7 +3,7 @@
 from itertools import groupby
 
 from platform_ini import POSE_AXES
-from trace_check import COLUMNS, HEADER, ROW
+from trace_check import BEFORE_ZERO, COLUMNS, HEADER, ROW
 from trace_rules import NANO
 
 NAMES = [column.rsplit("_", 1)[0] for column in COLUMNS]  # roll ... z, angle, c1 ... c6
@@ -38,6 +38,8 @@ class Window:
         if next(lines, "").rstrip("\r\n") != HEADER:
             raise TraceError(f"{name}: line 1 is not the header of a trace: {HEADER[:40]}...")
         for number, line in enumerate(lines, 2):
+            if line.endswith(BEFORE_ZERO):
+                continue
             match = ROW.fullmatch(line)
             if not match:
                 raise TraceError(f"{name}: line {number} is no row of a trace: {line.rstrip()[:60]}")
