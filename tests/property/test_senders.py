@@ -1,0 +1,500 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_senders.py - everyday senders: a platform never makes more than was asked, and goes where it is sent, at any time and with any flag.
+
+usage: test_senders.py --heaved PROGRAM [--filter REGEX] [--styles smooth,fast,balanced] [--jobs N] [--seed N] [--verbose] [--list]
+                       [--configs DIR] [--keep DIR]
+
+senders.py says what is sent and when it arrives, sender_judge.py judges the trace. Judged from SETTLED_S after the first frame on, unless a
+scenario says otherwise; before that the range alone is judged (2 %).
+"""
+import argparse
+import math
+import multiprocessing
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+for folder in (HERE, HERE.parent / "lib"):
+    sys.path.insert(0, str(folder))
+import senders as S  # noqa: E402  the paths above have to be set first
+import sender_judge as J  # noqa: E402
+
+SETTLED_S = 6.0  # from the first frame: fading in
+STYLES = ("smooth", "balanced", "fast")
+CONFIGS = next((folder for folder in (HERE.parents[1] / "config", HERE / "config") if folder.is_dir()), None)
+
+
+@dataclass
+class Ride:
+    """What is sent, and who judges what comes of it."""
+    lines: list               # [(t_ms, text)]
+    judge: object             # judge(trace, style) -> [Figure]
+    end_ms: float
+    begin_ms: int = S.UP_MS   # the first row that is judged
+    with_cylinders: bool = False
+    engage_ms: int = 0
+
+
+@dataclass
+class Scenario:
+    name: str
+    config: str
+    make: object              # make(platform, chance) -> Ride
+
+
+def rows(seconds):
+    return int(round(seconds * 1000))
+
+
+def scaled_weights(platform):
+    """mm stay, degrees count as many mm as their limits of speed say."""
+    z = platform.limits[0][platform.index("z")]
+    return [z / speed for speed in platform.limits[0]]
+
+
+def along(platform, **parts):
+    """A vector of the free axes."""
+    return [parts.get(name, 0.0) for name in platform.axes]
+
+
+# ---- shakes: gain, direction, range ----
+def shake(hz, over, limit, rate_hz, direction="z", space="A", decimals=6, seconds=14.0, rise=0.0, phase=0.0, net=(3e-4, 8e-4), make_sender=None):
+    """A sine of which the axis nearest to its limit asks for `over` times that limit; what does not fit into the platform is sent smaller."""
+    def make(platform, chance):
+        if space == "C":
+            limits, middle, weights, count = [[value] * platform.count for value in platform.cylinder_limits], platform.neutral_extensions, [1.0] * platform.count, platform.count
+        else:
+            limits, middle, weights, count = platform.limits, platform.home, scaled_weights(platform), len(platform.free)
+        if direction in S.AXES:
+            way = [platform.limits[0][platform.index(direction)] if name == direction else 0.0 for name in platform.axes]
+        else:
+            way = [limit_of_axis * chance.choice((-1, 1)) * chance.uniform(0.2, 1.0) for limit_of_axis in limits[0]]
+        orders = {"speed": 1, "accel": 2, "jerk": 3}
+        rate = 2 * math.pi * hz
+        size = [w * over / max(abs(v) * rate ** orders[limit] / lim for v, lim in zip(way, limits[orders[limit] - 1])) for w in way]
+        if space == "C":
+            factor = min(1.0, *(0.06 * platform.stroke[k] / abs(v) for k, v in enumerate(size) if v))
+        else:
+            factor = platform.fits(size)
+        size = [v * factor for v in size]
+        asked = max(abs(v) * rate ** order / lim for order in (1, 2, 3) for v, lim in zip(size, limits[order - 1]))
+        signal = S.Waves(middle, size, hz, phase, rise)
+        samples = make_sender(chance, rate_hz, seconds) if make_sender else S.network(S.even(rate_hz, seconds), chance, *net)
+        rounding = math.sqrt(count) * 10.0 ** -decimals * max(weights)
+
+        def judge(trace, style):
+            columns = trace.cylinders if space == "C" else trace.values
+            first, last = rows(SETTLED_S), rows(seconds)
+            low, high = ([m + way * abs(s) for m, s in zip(middle, size)] for way in (-1, 1))
+            return [*J.gain(columns, middle, size, weights, first, last, rounding, over=asked), J.reach(columns, low, high, weights, 0.025, 0.1 + rounding),
+                    *J.limits(trace, platform, first, last, cylinders=space == "C")]
+        return Ride(S.frames(platform, signal, samples, space, decimals), judge, S.UP_MS + 1000 * seconds, with_cylinders=space == "C")
+    return make
+
+
+# ---- streams: error at the best lag ----
+def limits(trace, platform, last):
+    """The limits of the axes, while fading in and then."""
+    figures = J.limits(trace, platform, 0, rows(SETTLED_S))
+    for figure in figures:
+        figure.name = f"fade-in {figure.name}"
+    return [*figures, *J.limits(trace, platform, rows(SETTLED_S), last)]
+
+
+def settle_range(trace, platform, truth, weights, seconds):
+    low, high = [min(home, min(column)) for home, column in zip(platform.home, truth)], [max(home, max(column)) for home, column in zip(platform.home, truth)]
+    return J.reach(trace.values, low, high, weights, 0.02, 0.05, 0, rows(seconds))
+
+
+def track(make_samples, worst_mm=1.5, size=40.0, hz=0.4, axis="z", decimals=3, seconds=30.0, bars=None, coarse=None, jerk=None):
+    """One sine, judged by its error at the best constant lag. bars: {style: {name of a bar: number}}"""
+    def make(platform, chance):
+        middle = platform.home
+        signal = S.Waves(middle, along(platform, **{axis: size}), hz, chance.uniform(0, 6.28))
+        said = S.Rounded(signal, coarse) if coarse else signal
+        samples = make_samples(chance, seconds)
+        truth = signal.table(rows(seconds) + 30)
+        weights = scaled_weights(platform)
+
+        def judge(trace, style):
+            given = {"worst_mm": worst_mm, "jerk": jerk, **(bars or {}).get(style, {})}
+            first, last = rows(SETTLED_S), rows(min(seconds, samples[-1].arrives))
+            return [*J.following(trace, truth, platform, first, last, weights, main=platform.index(axis), **given),
+                    settle_range(trace, platform, truth, weights, seconds), *limits(trace, platform, last)]
+        return Ride(S.frames(platform, said, samples, "A", decimals), judge, S.UP_MS + 1000 * seconds)
+    return make
+
+
+def cue(make_samples, sizes, bars=None, seconds=40.0, decimals=3, top_hz=6.0, knee_hz=0.35, of_limits=None, accel_share=None):
+    """A motion cue on several axes. of_limits: scaled so that it uses this much of the limits."""
+    def make(platform, chance):
+        size = along(platform, **sizes)
+        signal = S.Cue(chance, platform.home, size, seconds, top_hz, knee_hz=knee_hz)
+        if of_limits:
+            table = signal.table(rows(seconds), 1e-3)
+            use = max(J.most(J.differences(column, order)) / limit for order in (1, 2, 3) for column, limit in zip(table, platform.limits[order - 1]))
+            signal.scaled(of_limits / use)
+        truth = signal.table(rows(seconds) + 30)
+        samples = make_samples(chance, seconds)
+        weights = scaled_weights(platform)
+
+        def judge(trace, style):
+            first, last = rows(SETTLED_S), rows(min(seconds, samples[-1].arrives))
+            figures = J.following(trace, truth, platform, first, last, weights, main=platform.index("z"), **(bars or {}).get(style, {}))
+            return [*figures, Fig("flag accel", 100 * trace.share_of("accel", first, last), high=accel_share, unit=" %"),
+                    settle_range(trace, platform, truth, weights, seconds), *limits(trace, platform, last)]
+        return Ride(S.frames(platform, signal, samples, "A", decimals), judge, S.UP_MS + 1000 * seconds)
+    return make
+
+
+Fig = J.Figure
+
+
+# ---- ramps: the share of the sender's speed ----
+RAMP_BEGIN_S, RAMP_FROM_S = 7.0, 1.2  # judged from 1.2 s after the sender starts to move, to 0.1 s before it stops
+
+
+def ramp(change, hz, low=0.5, high=1.6, speed=20.0, reach=80.0, axis="z", decimals=3, accel=None, make_samples=None):
+    """A constant speed; change(samples, chance, times of the events) is what happens to the sender meanwhile."""
+    def make(platform, chance):
+        span = platform.fits(along(platform, **{axis: reach})) * reach
+        move_s = 2 * span / speed
+        seconds = RAMP_BEGIN_S + move_s + 2.0
+        signal = S.Ramp(along(platform, **{axis: -span}), along(platform, **{axis: speed}), RAMP_BEGIN_S, move_s)
+        events = [RAMP_BEGIN_S + share * move_s + chance.random() / hz for share in (0.35, 0.65)]
+        base = make_samples(chance, seconds) if make_samples else S.network(S.even(hz, seconds), chance, 3e-4, 8e-4)
+        samples = change(base, chance, events)
+
+        def judge(trace, style):
+            column, first, last = trace.values[platform.index(axis)], rows(RAMP_BEGIN_S + RAMP_FROM_S), rows(RAMP_BEGIN_S + move_s - 0.1)
+            accels = J.most(J.differences(column[first:last], 2))
+            sides = [-span, span]
+            return [*J.ramp_speed(column, speed, first, last, low, high), Fig("acceleration", accels, high=accel, unit=" mm/s^2"),
+                    J.reach([column], [min(sides)], [max(sides)], [1.0], 0.02, 0.0), *limits(trace, platform, last)]
+        return Ride(S.frames(platform, signal, samples, "A", decimals), judge, S.UP_MS + 1000 * seconds)
+    return make
+
+
+# ---- engaged while the sender moves ----
+def engaged(size, hz, rate_hz=60, shift_s=0.0, axes=("z",), decimals=3):
+    """The stream runs when the platform rises; judged from the first row that is ENGAGED on."""
+    def make(platform, chance):
+        if len(axes) == 1:
+            sizes, rate, phase = along(platform, **{axes[0]: size}), hz, 0.0
+        else:
+            sizes = [size / weight * chance.uniform(0.3, 1) / 2 for weight in scaled_weights(platform)]
+            rate, phase = [hz * chance.uniform(0.6, 1.2) for _ in sizes], [chance.uniform(0, 6.28) for _ in sizes]
+        factor = platform.fits(sizes)
+        sizes = [v * factor for v in sizes]
+        signal = S.Waves(platform.home, sizes, rate, phase)
+        seconds = 26.0 + shift_s
+        samples = S.network(S.even(rate_hz, seconds), chance, 1e-3, 3e-3)
+        begin = S.UP_MS - 26000
+        truth = signal.table(rows(8.0) if len(axes) == 1 else rows(seconds), 1e-3)
+
+        def judge(trace, style):
+            at = next((i for i, state in enumerate(trace.states) if state == "ENGAGED"), None)
+            if at is None:
+                return [Fig("engaged", 0, low=1)]
+            last = rows(seconds)
+            weights = scaled_weights(platform)
+            low, high = ([m + way * abs(s) for m, s in zip(platform.home, sizes)] for way in (-1, 1))
+            return [J.reach(trace.values, low, high, weights, 0.02, 0.05, at, last), *J.engage_speed(trace, platform, truth, at, last),
+                    *J.limits(trace, platform, at, last), Fig("ENGAGED after", (at) / 1000, unit=" s")]
+        lines = [(t + begin - S.UP_MS, text) for t, text in S.frames(platform, signal, samples, "A", decimals)]
+        return Ride(lines, judge, begin + 1000 * seconds, begin_ms=begin, with_cylinders=True, engage_ms=int(begin + 1000 * shift_s))
+    return make
+
+
+# ---- steps ----
+def settle_frame(platform):
+    """The first frame of all: the platform is taken over where it is."""
+    return S.UP_MS + 100, f"@A{platform.count}:{','.join(f'{v:.3f}' for v in platform.home)},0#"
+
+
+def steps(kind, pairs=20, gap_s=2.6):
+    """Lone steps, each interrupted by another one 0.03-0.15 s later; kind: how the two lie to each other. `six`: one axis needs longest, the others
+    move less, so that the limits of the cylinders do not count."""
+    def make(platform, chance):
+        lines, events, t = [settle_frame(platform)], [], SETTLED_S
+        names = platform.axes
+        for k in range(pairs):
+            name = "z" if kind != "six" else names[k % len(names)]
+            weights = scaled_weights(platform)
+
+            def target(distance, way, name=name, weights=weights):
+                out = list(platform.home)
+                for i, other in enumerate(names):
+                    if other == name:
+                        out[i] += way * distance / weights[i]
+                    elif kind == "six":
+                        out[i] += chance.uniform(-0.08, 0.08) * distance / weights[i]
+                return out
+            most = 60.0
+            way = chance.choice((-1, 1))
+            first = target(chance.uniform(0.3, 1) * most, way)
+            again = {"opposite": -way, "same": way}.get(kind, chance.choice((-1, 1)))
+            second = target(chance.uniform(0.1, 1) * most, again)
+            wait = (0.03, 0.05, 0.08, 0.11, 0.15)[k % 5] + chance.uniform(-0.004, 0.004) if kind != "lone" else None
+            for when, values in ((t, first), (t + wait, second)) if wait else ((t, first),):
+                text = ",".join(f"{v:.3f}" for v in values)
+                lines.append((S.UP_MS + 1000 * when, f"@A{platform.count}:{text},0#"))
+            goal = [round(v, 3) for v in (second if wait else first)]
+            events.append((1000 * (t + (wait or 0)), goal))
+            t += gap_s + chance.random() * 0.3
+        end = t
+
+        def judge(trace, style):
+            ratios, beyond = [], 0.0
+            for at, goal in events:
+                optimum, settled, far = J.step(trace, platform, at, rows(at / 1000 + gap_s - 0.25), goal)
+                ratios.append(settled / optimum)
+                beyond = max(beyond, far)
+            ratios.sort()
+            return [Fig("median of the optimum", ratios[len(ratios) // 2], high=1.1), Fig("95 %", ratios[int(0.95 * (len(ratios) - 1))], high=1.3),
+                    Fig("worst", ratios[-1]), Fig("too far", beyond, high=0.1, unit=" mm"), *limits(trace, platform, rows(end))]
+        return Ride(lines, judge, S.UP_MS + 1000 * end)
+    return make
+
+
+def timed_moves(count=8):
+    """Moves with T, one after the other has ended: there at T, to the cycle, and at rest exactly on the target."""
+    def make(platform, chance):
+        lines, events, t = [settle_frame(platform)], [], SETTLED_S
+        for _ in range(count):
+            size = [chance.uniform(-1, 1) * 30 / weight for weight in scaled_weights(platform)]
+            size = [round(v * platform.fits(size), 3) for v in size]
+            seconds = chance.choice((1.2, 1.5, 2.0, 3.0))
+            lines.append((S.UP_MS + 1000 * t, f"@A{platform.count}T:{','.join(f'{v:.3f}' for v in size)},{int(1000 * seconds)}#"))
+            events.append((1000 * t, 1000 * seconds, size))
+            t += seconds + 1.0 + 0.3 * chance.random()
+
+        def judge(trace, style):
+            late, off = [], 0.0
+            for at, need, goal in events:
+                i = math.ceil(at)
+                stop = i + int(need) + 900
+                off = max(off, max(abs(column[stop] - v) for column, v in zip(trace.values, goal)))
+                moving = max(next((k for k in range(stop, i, -1) if abs(column[k] - column[stop]) > 2e-9), i) for column in trace.values)
+                late.append(moving + 1 - i - need)
+            return [Fig("at rest late, cycles", max(late), high=2), Fig("at rest early, cycles", -min(late), high=3), Fig("off the target", off, high=2e-5, unit=" mm"),
+                    *limits(trace, platform, rows(t))]
+        return Ride(lines, judge, S.UP_MS + 1000 * t)
+    return make
+
+
+# ---- the table ----
+LARGE, DEMO, TRIPOD, OTHER, TRIPOD_R = "hexapod-400", "demo-hexapod", "tripod", "hexapod-435-300", "tripod-rotation"
+
+
+def net(low, high):
+    return lambda samples, chance: S.network(samples, chance, low * 1e-3, high * 1e-3)
+
+
+def table(seed):
+    add = []
+
+    def put(name, config, make):
+        add.append(Scenario(name, config, make))
+
+    # more than the limits allow
+    put("shake: z 5 Hz, 2 x jerk", LARGE, shake(5, 2, "jerk", 60))
+    put("shake: six axes 7.1 Hz, 2.2 x jerk, 90 Hz", LARGE, shake(7.1, 2.2, "jerk", 90, "six"))
+    put("shake: z 6 Hz, 0.9 x jerk", LARGE, shake(6, 0.9, "jerk", 60))
+    put("shake: z 8 Hz, 0.7 x jerk", LARGE, shake(8, 0.7, "jerk", 60))
+    put("shake: C6 5 Hz, 2 x jerk", LARGE, shake(5, 2, "jerk", 60, "six", "C"))
+    chance = S.chance_of(seed, "shakes")
+    for k in range(30):
+        config = (LARGE, DEMO, TRIPOD, OTHER, LARGE, DEMO)[k % 6]
+        hz = 0.5 * 24 ** chance.random()
+        over = 0.3 * (5 / 0.3) ** chance.random()
+        limit = ("jerk", "accel", "speed")[k % 3]
+        space = "C" if k % 5 == 4 else "A"
+        rate = chance.choice([r for r in (30, 45, 60, 72, 90, 120, 144, 200, 250) if r > 3.5 * hz])
+        axes = ("roll", "pitch", "z") if config == TRIPOD else ("roll", "pitch", "yaw", "x", "y", "z")
+        direction = "six" if space == "C" or k % 2 else chance.choice(axes)
+        put(f"shake {k}: {config} {direction}{' C' if space == 'C' else ''} {hz:.1f} Hz, {over:.2f} x {limit}, {rate} Hz", config,
+            shake(round(hz, 2), round(over, 3), limit, rate, direction, space, rise=chance.choice((0, 2.0)), phase=chance.choice((0.0, 1.57))))
+
+    # senders as they are: 40 mm at 0.4 Hz
+    for sigma, bar in ((0.5, 0.5), (1, 0.5), (2, 0.8)):
+        put(f"frame time 16.7 +- {sigma} ms", LARGE,
+            track(lambda c, s, g=sigma: S.network(S.frame_times(c, 60, g * 1e-3, s), c, 3e-4, 8e-4), bar))
+    put("frame time 11.1 +- 0.8 ms", DEMO, track(lambda c, s: S.network(S.frame_times(c, 90, 0.8e-3, s), c, 3e-4, 8e-4), 0.5))
+    put("frame time 33 +- 3 ms", LARGE, track(lambda c, s: S.network(S.frame_times(c, 30, 3e-3, s), c, 3e-4, 8e-4), 1.5))
+    for hz in (60, 100, 50, 120):
+        put(f"ticks of 15.6 ms, {hz} Hz", LARGE, track(lambda c, s, h=hz: S.network(S.ticks(h, s), c, 0, 3e-4)))
+    put("ticks of 15.6 ms, 100 Hz, 35 mm", LARGE, track(lambda c, s: S.network(S.ticks(100, s), c, 0, 3e-4), size=35.0))
+    put("ticks of 10 ms, 72 Hz", DEMO, track(lambda c, s: S.network(S.ticks(72, s, 0.010), c, 0, 3e-4)))
+    for steps_hz, picture_hz in ((50, 45), (60, 60), (120, 60), (50, 72), (50, 144), (100, 90)):
+        put(f"game steps {steps_hz} Hz at {picture_hz} frames/s", LARGE, track(lambda c, s, a=steps_hz, b=picture_hz: S.network(S.game_steps(c, a, b, s), c, 0, 5e-4)))
+    put("game steps 60 Hz at 60 frames/s +- 1 ms", LARGE, track(lambda c, s: S.network(S.game_steps(c, 60, 60, s, 1e-3), c, 0, 5e-4)))
+    put("game steps 50 Hz at 60 frames/s +- 1 ms", DEMO, track(lambda c, s: S.network(S.game_steps(c, 50, 60, s, 1e-3), c, 0, 5e-4)))
+    put("lateness 0-12 ms", LARGE, track(lambda c, s: S.network(S.even(60, s), c, 0, 12e-3)))
+    put("lateness 0-9 ms, 100 Hz", DEMO, track(lambda c, s: S.network(S.even(100, s), c, 0, 9e-3)))
+    for sigma in (3, 4):
+        put(f"lateness gaussian {sigma} ms", LARGE, track(lambda c, s, g=sigma: S.gaussian(S.even(60, s), c, g * 1e-3)))
+    for share in (0.10, 0.12, 0.15):
+        put(f"{100 * share:.0f} % dropped, network 2-6 ms", LARGE, track(lambda c, s, p=share: S.network(S.dropped(S.even(60, s), c, p), c, 2e-3, 6e-3)))
+    put("rates 60/30/60 Hz", LARGE, track(lambda c, s: S.network(S.rates([(60, 9), (30, 7), (60, 8)]), c, 3e-4, 8e-4), 1.0))
+    put("rates 60/120/60 Hz", LARGE, track(lambda c, s: S.network(S.rates([(60, 9), (120, 7), (60, 8)]), c, 3e-4, 8e-4), 1.0))
+    put("rates 100/50/100 Hz", DEMO, track(lambda c, s: S.network(S.rates([(100, 9), (50, 7), (100, 8)]), c, 3e-4, 8e-4), 1.0))
+
+    # ramps: one thing that goes wrong
+    for period_ms in (10, 16.667, 20):
+        hz = 1000 / period_ms
+        for shift in (0.5, 0.9, 1.0, 1.3, 1.5, 1.7, 2.0, 2.2, 2.7, 3.0):
+            # a sender that itself stands still for that long: then the platform may nearly do so
+            low = 0.5 if shift <= 1.5 else 0.2
+            pause = shift * period_ms * 1e-3
+            put(f"ramp: {period_ms:.3g} ms, one interval longer by {shift} periods, shifted", LARGE, ramp(lambda s, c, e, p=pause: S.paused(s, e[0], p, True), hz, low))
+            put(f"ramp: {period_ms:.3g} ms, one interval longer by {shift} periods, lost", LARGE, ramp(lambda s, c, e, p=pause: S.paused(s, e[0], p, False), hz, 0.5))
+    for period_ms, late in ((50, 5), (100, 12), (16.667, 6), (20, 9), (10, 4)):
+        put(f"ramp: {period_ms:.3g} ms, one frame late by {late} ms", LARGE,
+            ramp(lambda s, c, e, w=late: S.late_once(S.late_once(s, e[0], w * 1e-3), e[1], w * 1e-3), 1000 / period_ms, 0.8, 1.2))
+    for every in (30, 10):
+        for after in (1, 3, 8):
+            put(f"ramp: relay frames, every {every}th again after {after} ms", LARGE, ramp(lambda s, c, e, n=every, a=after: S.with_relays(s, n, a * 1e-3), 60, 0.9, 1.1))
+    put("ramp: relay frames, 50 Hz, every 7th again after 5 ms", DEMO, ramp(lambda s, c, e: S.with_relays(s, 7, 5e-3), 50, 0.9, 1.1))
+    for hz in (20, 30, 60):
+        for times in (0.3, 0.8, 1.0, 1.6, 2.0, 2.5, 3.0, 4.0):
+            put(f"ramp: A6T {hz} Hz, T of {times} periods", LARGE, ramp(lambda s, c, e, t=round(1000 * times / hz): S.timed(s, t), hz))
+    for times in (1.0, 2.5, 3.0):
+        put(f"A6T 50 Hz, T of {times} periods", LARGE, track(lambda c, s, t=round(20 * times): S.timed(S.network(S.even(50, s), c, 3e-4, 8e-4), t)))
+    for stall in (0.1, 0.2, 0.3):
+        # soft: a stop is right, a way back is not; twice the speed at most, and no more acceleration than a tenth of a second's change of 2 x speed needs thrice
+        put(f"ramp: Wi-Fi stall of {1000 * stall:.0f} ms", LARGE, ramp(lambda s, c, e, d=stall: S.stalled(s, [(when, d) for when in e]), 60, -0.05, 2.0, accel=600))
+    put("ramp: Wi-Fi stall of 150 ms, 90 mm/s", LARGE, ramp(lambda s, c, e: S.stalled(s, [(e[0], .15)]), 60, -0.05, 2.0, speed=60.0, accel=1800))
+
+    # engaged into a stream that moves
+    chance = S.chance_of(seed, "engaged")
+    for k in range(12):
+        config, hz = (LARGE, DEMO)[k % 2], chance.uniform(0.25, 0.5)
+        put(f"engaged {k}: {config} z", config, engaged(chance.uniform(20, 60), hz, shift_s=2 + k / 12 / hz))
+    for k in range(4):
+        put(f"engaged six {k}: {(LARGE, DEMO)[k % 2]}", (LARGE, DEMO)[k % 2], engaged(chance.uniform(20, 60), chance.uniform(0.25, 0.5), shift_s=2 + chance.random() * 4, axes=("six",) * 6))
+    put("engaged x", DEMO, engaged(50.0, 0.45, shift_s=3.1, axes=("x",)))
+    put("engaged tripod", TRIPOD, engaged(40.0, 0.4, shift_s=2.6))
+
+    # lone steps
+    for kind in ("same", "opposite", "six", "any"):
+        put(f"steps: interrupted, {kind}", LARGE, steps(kind))
+    put("steps: interrupted, any, demo", DEMO, steps("any"))
+    put("steps: lone", LARGE, steps("lone", 10))
+
+    # cues
+    sender = lambda c, s: S.network(S.dropped(S.even(60, s), c, 0.01), c, 2e-3, 7e-3)  # noqa: E731  used twice
+    bars = {"smooth": {"lag_ms": 41.1, "shape": 24.0, "jerk": 1.2}, "balanced": {"lag_ms": 30.0, "shape": 50.0, "jerk": 1.3}}
+    put("cue: z 60 mm, 60 Hz, 2-7 ms, 1 % lost", LARGE, cue(sender, {"z": 60}, bars))
+    put("cue: six axes, 60 Hz, 2-7 ms, 1 % lost", LARGE, cue(sender, {"x": 30, "y": 30, "z": 60, "roll": 2.5, "pitch": 2.5, "yaw": 2.5}, bars))
+    recorded = {style: {"shape": 60.0} for style in STYLES}
+    six = {"x": 60, "y": 60, "z": 60, "roll": 5, "pitch": 5, "yaw": 5}
+    put("recorded: six axes, 120 Hz, three decimals", LARGE, cue(lambda c, s: S.network(S.even(120, s), c, 3e-4, 8e-4), six, recorded, 24.0, top_hz=12.0, of_limits=0.7, accel_share=5))
+    put("recorded: six axes, 60 Hz, three decimals", LARGE, cue(lambda c, s: S.network(S.even(60, s), c, 3e-4, 8e-4), six, recorded, 24.0, top_hz=6.0, of_limits=0.5, accel_share=5))
+
+    # what is right today
+    put("timed moves", LARGE, timed_moves())
+    put("timed moves, demo", DEMO, timed_moves())
+    plain = lambda hz: lambda c, s: S.network(S.even(hz, s), c, 3e-4, 8e-4)  # noqa: E731
+    put("coarse: 1 mm, 60 Hz", LARGE, track(plain(60), 1.5, decimals=0, coarse=1.0))
+    put("coarse: 0.1 mm, 60 Hz", LARGE, track(plain(60), 1.5, decimals=1, coarse=0.1))
+    put("coarse: 1 mm, 100 Hz, 0.15 Hz", DEMO, track(plain(100), 1.5, decimals=0, coarse=1.0, hz=0.15))
+    put("repeats: each value twice, 100 Hz over 50", LARGE, track(lambda c, s: S.network(S.repeated(S.even(50, s), 0.01, 2), c, 3e-4, 8e-4)))
+    for hz, wave in ((6.7, 0.15), (5, 0.1), (3, 0.06), (2, 0.05), (10, 0.2)):
+        put(f"slow: {hz} Hz", LARGE, track(plain(hz), 1.5, hz=wave, seconds=30.0))
+    for hz in (30, 60, 100, 250, 1000):
+        put(f"plain: {hz} Hz", LARGE, track(plain(hz), 0.5))
+    return add
+
+
+# ---- running ----
+def run(task):
+    """One scenario in all styles: [(name, style, figures or None, error)]"""
+    index, arguments = task
+    scenario = SCENARIOS[index]
+    results = []
+    source = Path(arguments.configs) / f"{scenario.config}.ini"
+    with tempfile.TemporaryDirectory(prefix="heave-") as temporary:
+        folder = Path(arguments.keep or temporary)
+        folder.mkdir(parents=True, exist_ok=True)
+        word = re.sub(r"[^A-Za-z0-9.+-]+", "_", scenario.name)
+        config = folder / f"{word}.ini"
+        S.configured(source, config, S.NEVER_SILENT)
+        platform = S.Platform(config)
+        ride = scenario.make(platform, S.chance_of(arguments.seed, scenario.name))
+        lines = sorted([(ride.engage_ms, "!engage"), *ride.lines, (ride.end_ms + 100, "!end")], key=lambda line: line[0])
+        frames = folder / f"{word}.frames"
+        frames.write_text("".join(f"{t:.3f} {text}\n" for t, text in lines), encoding="ascii")
+        for style in arguments.styles:
+            try:
+                S.configured(source, config, {**S.NEVER_SILENT, ("udp", "stream"): style})
+                trace = folder / f"{word}.{style}.csv" if arguments.keep else "-"
+                done = subprocess.run([arguments.heaved, "--config", config, "--play", frames, "--trace", trace], stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
+                assert done.returncode == 0, f"heaved ended with {done.returncode}: {done.stderr.decode()[-300:]}"
+                text = trace.read_text(encoding="ascii") if arguments.keep else done.stdout.decode("ascii")
+                figures = ride.judge(J.Trace(text, platform, ride.begin_ms, ride.with_cylinders), style)
+                results.append((scenario.name, style, figures, None))
+            except Exception as error:  # a scenario that cannot be judged has failed, the others go on
+                results.append((scenario.name, style, [], f"{type(error).__name__}: {error}"))
+    return results
+
+
+def known_styles(arguments):
+    """Those that the program takes."""
+    known = []
+    with tempfile.TemporaryDirectory(prefix="heave-") as folder:
+        for style in arguments.styles:
+            config = Path(folder) / "style.ini"
+            S.configured(Path(arguments.configs) / f"{LARGE}.ini", config, {("udp", "stream"): style})
+            done = subprocess.run([arguments.heaved, "--config", config, "--check"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False, text=True)
+            if done.returncode == 0:
+                known.append(style)
+            else:
+                print(f"style {style} is not there: {done.stderr.strip().splitlines()[-1] if done.stderr.strip() else done.returncode}")
+    return known
+
+
+def main():
+    global SCENARIOS
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--heaved", required=True)
+    parser.add_argument("--filter", default="")
+    parser.add_argument("--styles", type=lambda text: text.split(","), default=list(STYLES))
+    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--verbose", action="store_true", help="a line per scenario with all figures; otherwise those that fail")
+    parser.add_argument("--list", action="store_true")
+    parser.add_argument("--configs", default=CONFIGS, help="where the ready-made configurations are")
+    parser.add_argument("--keep", metavar="DIR", help="leave frames, configurations and traces there")
+    a = parser.parse_args()
+    SCENARIOS = [scenario for scenario in table(a.seed) if re.search(a.filter, scenario.name)]
+    if a.list:
+        print("\n".join(f"{scenario.name} ({scenario.config})" for scenario in SCENARIOS))
+        return 0
+    a.heaved = str(Path(a.heaved).resolve())
+    a.styles = known_styles(a)
+    passed = failed = 0
+    start = time.monotonic()
+    with multiprocessing.get_context("fork").Pool(a.jobs) as pool:
+        for results in pool.imap(run, [(index, a) for index in range(len(SCENARIOS))]):
+            for name, style, figures, error in results:
+                good = error is None and all(figure.holds for figure in figures)
+                passed, failed = passed + good, failed + (not good)
+                if a.verbose or not good:
+                    shown = error or ", ".join(str(figure) for figure in figures if a.verbose or not figure.holds)
+                    print(f"{'ok  ' if good else 'FAIL'} {name} [{style}]: {shown}", flush=True)
+    print(f"{len(SCENARIOS)} scenarios in {', '.join(a.styles) or 'no style'}, {time.monotonic() - start:.0f} s")
+    print(f"{passed} passed, {failed} failed")
+    return 0 if failed == 0 and passed else 1
+
+
+SCENARIOS = []
+if __name__ == "__main__":
+    sys.exit(main())
