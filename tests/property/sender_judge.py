@@ -12,7 +12,7 @@ from operator import mul, sub
 
 COLUMNS = 17
 FIRST_POSE, FIRST_CYLINDER, FLAGS = 2, 9, 16
-LAGS_MS = range(-20, 451)
+LAGS_MS = range(-20, 1301)
 
 
 @dataclass
@@ -48,38 +48,28 @@ class Trace:
         at = 1 + int(begin_ms - first)
         assert 1 <= at < len(lines) - 100 and float(lines[at].split(",", 1)[0]) == begin_ms, f"no row at {begin_ms} ms, or rows of another cycle time"
         wanted = [FIRST_POSE + axis for axis in platform.free]
-        columns = [array("d") for _ in wanted]
-        cylinders = [array("d") for _ in range(platform.count)]
-        self.flags, self.states = [], []
-        for line in islice(lines, at, None):
-            if not line:
-                continue
-            parts = line.split(",")
-            for column, index in zip(columns, wanted):
-                column.append(float(parts[index]))
-            if with_cylinders:
-                for column, text_value in zip(cylinders, parts[FIRST_CYLINDER:FIRST_CYLINDER + platform.count]):
-                    column.append(float(text_value))
-            self.flags.append(parts[FLAGS])
-            self.states.append(parts[1])
+        table = list(zip(*(line.split(",") for line in islice(lines, at, None) if line)))
+        self.values = [array("d", map(float, table[index])) for index in wanted]
+        self.cylinders = [array("d", map(float, table[FIRST_CYLINDER + k])) for k in range(platform.count)] if with_cylinders else []
+        self.states, self.flags = table[1], table[FLAGS]
+        self.rows = len(self.flags)
         last = float(lines[-2 if not lines[-1] else -1].split(",", 1)[0])
         assert last == begin_ms + len(self.flags) - 1, "rows are missing"
-        self.values, self.cylinders, self.rows = columns, cylinders, len(self.flags)
 
     def share_of(self, flag, first, last):
         return sum(flag in flags for flags in self.flags[first:last]) / max(1, last - first)
 
 
 def differences(values, order):
-    """In units per second^order."""
-    values = list(values)
+    """Of that order, of values one ms apart, in units per second^order."""
+    scale = 1000.0 ** order
     for _ in range(order):
         values = list(map(sub, values[1:], values))
-    return [v * 1000.0 ** order for v in values]
+    return [v * scale for v in values]
 
 
 def most(values):
-    return max(map(abs, values), default=0.0)
+    return max(max(values, default=0.0), -min(values, default=0.0))
 
 
 def rms(values):
@@ -87,16 +77,19 @@ def rms(values):
 
 
 # ---- the limits of the axes ----
-def limits(trace, platform, first, last, bar=1.001, cylinders=False):
-    """Speed, acceleration and jerk as a share of the limit of the axis (or cylinder) that is nearest to it."""
-    figures = []
-    for order, what in ((1, "speed"), (2, "accel"), (3, "jerk")):
-        if cylinders:
-            shares = [most(differences(column[first:last], order)) / platform.cylinder_limits[order - 1] for column in trace.cylinders]
-        else:
-            shares = [most(differences(column[first:last], order)) / limit for column, limit in zip(trace.values, platform.limits[order - 1])]
-        figures.append(Figure(f"{what}/limit", max(shares), high=bar))
-    return figures
+def limits(trace, platform, windows, bar=1.001, cylinders=False):
+    """Speed, acceleration and jerk as a share of the limit of the axis (or cylinder) that is nearest to it. windows: [(words before the name, first
+    row, end)]"""
+    shares = {}
+    for k, column in enumerate(trace.cylinders if cylinders else trace.values):
+        rates = column
+        for order, what in ((1, "speed"), (2, "accel"), (3, "jerk")):
+            rates = list(map(sub, rates[1:], rates))
+            limit = (platform.cylinder_limits[order - 1] if cylinders else platform.limits[order - 1][k]) / 1000.0 ** order
+            for words, first, last in windows:
+                name = f"{words}{what}/limit"
+                shares[name] = max(shares.get(name, 0.0), most(rates[first:last - order]) / limit)
+    return [Figure(name, share, high=bar) for name, share in shares.items()]
 
 
 # ---- gain and direction ----
@@ -165,8 +158,8 @@ def following(trace, truth, platform, first, last, weights, worst_mm=None, lag_m
     figures = [Figure("lag", lag, high=lag_ms, unit=" ms"), Figure("worst", worst[main], high=worst_mm, unit=" mm"),
                Figure("shape", 1000 * shapes[main], high=shape, unit=" um"), Figure("jerk ratio", jerks[main], high=jerk)]
     if len(used) > 1:
-        figures += [Figure("worst of all", max(worst.values()), high=worst_mm), Figure("shape of all", 1000 * max(shapes.values()), high=shape),
-                    Figure("jerk ratio of all", max(jerks.values()), high=jerk)]
+        figures += [Figure("worst of all", max(worst[k] * weights[k] for k in used), high=worst_mm, unit=" mm"),
+                    Figure("shape of all", 1000 * max(shapes.values()), high=shape), Figure("jerk ratio of all", max(jerks.values()))]
     return figures
 
 

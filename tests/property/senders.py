@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mechanism import AXES, Mechanism
 
-UP_MS = 30000     # every ready-made platform has risen by then
+UP_MS = 14000     # every ready-made platform has risen by then
 NEVER_SILENT = {("platform", "engage"): "manual", ("udp", "silence_hold_ms"): "0", ("udp", "silence_neutral_ms"): "0", ("udp", "silence_settle_ms"): "0"}
 TICK_S = 1 / 64   # of a clock of Windows: 15.625 ms
 
@@ -38,9 +38,9 @@ class Platform(Mechanism):
         super().__init__(path)
         self.path = path
         self.axes = [AXES[axis] for axis in self.free]
-        for name in self.axes:
-            section = self.ini[name]
-            assert float(section.get("sign", "1")) == 1 and float(section.get("scale", "1")) == 1, f"{path}: [{name}] is not sent as it is"
+        # a frame's value is (pose - offset) / slope
+        self.slope = [float(self.ini[name].get("sign", "1")) * float(self.ini[name].get("scale", "1")) for name in self.axes]
+        self.offset = [float(self.ini[name].get("offset_deg", self.ini[name].get("offset_mm", "0"))) for name in self.axes]
         self.low, self.high = ([self.limit(axis, what) for axis in self.free] for what in ("min", "max"))
         self.limits = [[self.limit(axis, what) for axis in self.free] for what in ("speed", "accel", "jerk")]
         cylinders = self.ini["cylinders"]
@@ -48,6 +48,12 @@ class Platform(Mechanism):
         self.engage_speed = float(self.ini["engage"]["speed_mm_s"])
         self.home = [self.neutral[axis] for axis in self.free]
         self.neutral_extensions = self.extensions(self.neutral)
+
+    def text(self, values, decimals, space="A"):
+        """As frames say it."""
+        if space == "A":
+            values = [(value - offset) / slope for value, offset, slope in zip(values, self.offset, self.slope)]
+        return ",".join(f"{value:.{decimals}f}" for value in values)
 
     def whole(self, values):
         """The complete pose of the free axes' values."""
@@ -253,13 +259,16 @@ def stalled(samples, stalls):
 
 def with_relays(samples, every, after_s):
     """Every so many frames the last pose again a little later, with another relay mask."""
-    out, mask = [], 0
+    out, mask, again = [], 0, None
     for i, s in enumerate(samples):
+        if again is not None and s.arrives > again:
+            mask ^= 0x11
+            out.append(Sample(out[-1].at, again, None, mask))
+            again = None
         s.mask = mask
         out.append(s)
         if i % every == every - 1:
-            mask ^= 0x11
-            out.append(Sample(s.at, s.arrives + after_s, None, mask))
+            again = s.arrives + after_s
     return out
 
 
@@ -279,7 +288,7 @@ def frames(platform, signal, samples, space="A", decimals=3, begin_ms=UP_MS):
     count = platform.count
     out = []
     for s in samples:
-        text = ",".join(f"{value:.{decimals}f}" for value in signal.at(s.at))
+        text = platform.text(signal.at(s.at), decimals, space)
         end = f"{s.mask:X}" if s.time_ms is None else f"{s.time_ms}"
         out.append((begin_ms + 1000 * s.arrives, f"@{space}{count}{'' if s.time_ms is None else 'T'}:{text},{end}#"))
     return out

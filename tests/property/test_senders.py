@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """test_senders.py - everyday senders: a platform never makes more than was asked, and goes where it is sent, at any time and with any flag.
 
-usage: test_senders.py --heaved PROGRAM [--filter REGEX] [--styles smooth,fast,balanced] [--jobs N] [--seed N] [--verbose] [--list]
-                       [--configs DIR] [--keep DIR]
+usage: test_senders.py --heaved PROGRAM [--filter REGEX] [--styles smooth,balanced,fast] [--jobs N] [--seed N] [--mixtures N] [--only-mixtures]
+                       [--verbose | --tap] [--list] [--configs DIR] [--keep DIR]
 
 senders.py says what is sent and when it arrives, sender_judge.py judges the trace. Judged from SETTLED_S after the first frame on, unless a
 scenario says otherwise; before that the range alone is judged (2 %).
@@ -94,7 +94,7 @@ def shake(hz, over, limit, rate_hz, direction="z", space="A", decimals=6, second
             first, last = rows(SETTLED_S), rows(seconds)
             low, high = ([m + way * abs(s) for m, s in zip(middle, size)] for way in (-1, 1))
             return [*J.gain(columns, middle, size, weights, first, last, rounding, over=asked), J.reach(columns, low, high, weights, 0.025, 0.1 + rounding),
-                    *J.limits(trace, platform, first, last, cylinders=space == "C")]
+                    *J.limits(trace, platform, [("", first, last)], cylinders=space == "C")]
         return Ride(S.frames(platform, signal, samples, space, decimals), judge, S.UP_MS + 1000 * seconds, with_cylinders=space == "C")
     return make
 
@@ -102,14 +102,16 @@ def shake(hz, over, limit, rate_hz, direction="z", space="A", decimals=6, second
 # ---- streams: error at the best lag ----
 def limits(trace, platform, last):
     """The limits of the axes, while fading in and then."""
-    figures = J.limits(trace, platform, 0, rows(SETTLED_S))
+    figures = J.limits(trace, platform, [("fade-in ", 0, rows(SETTLED_S)), ("", rows(SETTLED_S), last)])
     for figure in figures:
-        figure.name = f"fade-in {figure.name}"
-    return [*figures, *J.limits(trace, platform, rows(SETTLED_S), last)]
+        if figure.name == "fade-in jerk/limit":
+            figure.high = None  # judged where fading in is what is tested
+    return figures
 
 
 def settle_range(trace, platform, truth, weights, seconds):
-    low, high = [min(home, min(column)) for home, column in zip(platform.home, truth)], [max(home, max(column)) for home, column in zip(platform.home, truth)]
+    """From the first frame on: between neutral and what is sent."""
+    low, high = ([extreme(home, extreme(column)) for home, column in zip(platform.home, truth)] for extreme in (min, max))
     return J.reach(trace.values, low, high, weights, 0.02, 0.05, 0, rows(seconds))
 
 
@@ -182,9 +184,14 @@ def ramp(change, hz, low=0.5, high=1.6, speed=20.0, reach=80.0, axis="z", decima
     return make
 
 
-# ---- engaged while the sender moves ----
-def engaged(size, hz, rate_hz=60, shift_s=0.0, axes=("z",), decimals=3):
-    """The stream runs when the platform rises; judged from the first row that is ENGAGED on."""
+# ---- taken over while the sender moves ----
+def engaged(size, hz, how="rising", rate_hz=60, shift_s=0.0, axes=("z",), decimals=3):
+    """how the platform comes to follow a stream that moves:
+    rising   the stream runs while it rises; from the first row that is ENGAGED on
+    start    it waits at neutral, and the first frame comes from the midst of a motion
+    resume   it holds for a while, and resumes
+    gap      nothing arrives for 1.7 s
+    All rows from there on are judged."""
     def make(platform, chance):
         if len(axes) == 1:
             sizes, rate, phase = along(platform, **{axes[0]: size}), hz, 0.0
@@ -196,7 +203,15 @@ def engaged(size, hz, rate_hz=60, shift_s=0.0, axes=("z",), decimals=3):
         signal = S.Waves(platform.home, sizes, rate, phase)
         seconds = 26.0 + shift_s
         samples = S.network(S.even(rate_hz, seconds), chance, 1e-3, 3e-3)
-        begin = S.UP_MS - 26000
+        begin, requests = S.UP_MS, []
+        if how == "rising":
+            begin = S.UP_MS - 12000
+        elif how == "start":
+            samples = [s for s in samples if s.arrives >= shift_s]
+        elif how == "resume":
+            requests = [(begin + 1000 * (9 + shift_s), "!hold"), (begin + 1000 * (12 + 1.7 * shift_s), "!resume")]
+        else:
+            samples = [s for s in samples if not 9 + shift_s <= s.arrives < 10.7 + shift_s]
         truth = signal.table(rows(8.0) if len(axes) == 1 else rows(seconds), 1e-3)
 
         def judge(trace, style):
@@ -207,16 +222,16 @@ def engaged(size, hz, rate_hz=60, shift_s=0.0, axes=("z",), decimals=3):
             weights = scaled_weights(platform)
             low, high = ([m + way * abs(s) for m, s in zip(platform.home, sizes)] for way in (-1, 1))
             return [J.reach(trace.values, low, high, weights, 0.02, 0.05, at, last), *J.engage_speed(trace, platform, truth, at, last),
-                    *J.limits(trace, platform, at, last), Fig("ENGAGED after", (at) / 1000, unit=" s")]
-        lines = [(t + begin - S.UP_MS, text) for t, text in S.frames(platform, signal, samples, "A", decimals)]
-        return Ride(lines, judge, begin + 1000 * seconds, begin_ms=begin, with_cylinders=True, engage_ms=int(begin + 1000 * shift_s))
+                    *J.limits(trace, platform, [("", at, last)])]
+        lines = [*((t + begin - S.UP_MS, text) for t, text in S.frames(platform, signal, samples, "A", decimals)), *requests]
+        return Ride(lines, judge, begin + 1000 * seconds, begin_ms=begin, with_cylinders=True, engage_ms=int(begin + 1000 * shift_s) if how == "rising" else 0)
     return make
 
 
 # ---- steps ----
 def settle_frame(platform):
     """The first frame of all: the platform is taken over where it is."""
-    return S.UP_MS + 100, f"@A{platform.count}:{','.join(f'{v:.3f}' for v in platform.home)},0#"
+    return S.UP_MS + 100, f"@A{platform.count}:{platform.text(platform.home, 3)},0#"
 
 
 def steps(kind, pairs=20, gap_s=2.6):
@@ -244,8 +259,7 @@ def steps(kind, pairs=20, gap_s=2.6):
             second = target(chance.uniform(0.1, 1) * most, again)
             wait = (0.03, 0.05, 0.08, 0.11, 0.15)[k % 5] + chance.uniform(-0.004, 0.004) if kind != "lone" else None
             for when, values in ((t, first), (t + wait, second)) if wait else ((t, first),):
-                text = ",".join(f"{v:.3f}" for v in values)
-                lines.append((S.UP_MS + 1000 * when, f"@A{platform.count}:{text},0#"))
+                lines.append((S.UP_MS + 1000 * when, f"@A{platform.count}:{platform.text(values, 3)},0#"))
             goal = [round(v, 3) for v in (second if wait else first)]
             events.append((1000 * (t + (wait or 0)), goal))
             t += gap_s + chance.random() * 0.3
@@ -272,7 +286,7 @@ def timed_moves(count=8):
             size = [chance.uniform(-1, 1) * 30 / weight for weight in scaled_weights(platform)]
             size = [round(v * platform.fits(size), 3) for v in size]
             seconds = chance.choice((1.2, 1.5, 2.0, 3.0))
-            lines.append((S.UP_MS + 1000 * t, f"@A{platform.count}T:{','.join(f'{v:.3f}' for v in size)},{int(1000 * seconds)}#"))
+            lines.append((S.UP_MS + 1000 * t, f"@A{platform.count}T:{platform.text(size, 3)},{int(1000 * seconds)}#"))
             events.append((1000 * t, 1000 * seconds, size))
             t += seconds + 1.0 + 0.3 * chance.random()
 
@@ -376,12 +390,15 @@ def table(seed):
     # engaged into a stream that moves
     chance = S.chance_of(seed, "engaged")
     for k in range(12):
-        config, hz = (LARGE, DEMO)[k % 2], chance.uniform(0.25, 0.5)
-        put(f"engaged {k}: {config} z", config, engaged(chance.uniform(20, 60), hz, shift_s=2 + k / 12 / hz))
-    for k in range(4):
-        put(f"engaged six {k}: {(LARGE, DEMO)[k % 2]}", (LARGE, DEMO)[k % 2], engaged(chance.uniform(20, 60), chance.uniform(0.25, 0.5), shift_s=2 + chance.random() * 4, axes=("six",) * 6))
-    put("engaged x", DEMO, engaged(50.0, 0.45, shift_s=3.1, axes=("x",)))
-    put("engaged tripod", TRIPOD, engaged(40.0, 0.4, shift_s=2.6))
+        config, hz = (LARGE, DEMO)[k % 2], chance.uniform(0.25, 0.6)
+        for how in ("rising", "start", *(("resume", "gap") if k < 4 else ())):
+            put(f"engaged {k}: {config} z, {how}", config, engaged(chance.uniform(20, 60), hz, how, shift_s=2 + k / 12 / hz))
+    for k in range(8):
+        how, config = ("rising", "start", "resume", "gap")[k // 2], (LARGE, DEMO)[k % 2]
+        put(f"engaged six {k}: {config}, {how}", config, engaged(chance.uniform(20, 60), chance.uniform(0.25, 0.5), how, shift_s=2 + chance.random() * 4, axes=("six",) * 6))
+    for how in ("rising", "start", "resume"):
+        put(f"engaged x: {how}", DEMO, engaged(60.0, 0.6, how, shift_s=3.1, axes=("x",)))
+        put(f"engaged tripod: {how}", TRIPOD, engaged(40.0, 0.5, how, shift_s=2.6))
 
     # lone steps
     for kind in ("same", "opposite", "six", "any"):
@@ -391,9 +408,9 @@ def table(seed):
 
     # cues
     sender = lambda c, s: S.network(S.dropped(S.even(60, s), c, 0.01), c, 2e-3, 7e-3)  # noqa: E731  used twice
-    bars = {"smooth": {"lag_ms": 41.1, "shape": 24.0, "jerk": 1.2}, "balanced": {"lag_ms": 30.0, "shape": 50.0, "jerk": 1.3}}
-    put("cue: z 60 mm, 60 Hz, 2-7 ms, 1 % lost", LARGE, cue(sender, {"z": 60}, bars))
-    put("cue: six axes, 60 Hz, 2-7 ms, 1 % lost", LARGE, cue(sender, {"x": 30, "y": 30, "z": 60, "roll": 2.5, "pitch": 2.5, "yaw": 2.5}, bars))
+    bars = {"smooth": {"lag_ms": 41.5, "shape": 24.0, "jerk": 1.2}, "balanced": {"lag_ms": 30.0, "shape": 50.0, "jerk": 1.3}}
+    put("cue: z 60 mm, 60 Hz, 2-7 ms, 1 % lost", LARGE, cue(sender, {"z": 60}, bars, 100.0))
+    put("cue: six axes, 60 Hz, 2-7 ms, 1 % lost", LARGE, cue(sender, {"x": 30, "y": 30, "z": 60, "roll": 2.5, "pitch": 2.5, "yaw": 2.5}, bars, 60.0))
     recorded = {style: {"shape": 60.0} for style in STYLES}
     six = {"x": 60, "y": 60, "z": 60, "roll": 5, "pitch": 5, "yaw": 5}
     put("recorded: six axes, 120 Hz, three decimals", LARGE, cue(lambda c, s: S.network(S.even(120, s), c, 3e-4, 8e-4), six, recorded, 24.0, top_hz=12.0, of_limits=0.7, accel_share=5))
@@ -403,15 +420,116 @@ def table(seed):
     put("timed moves", LARGE, timed_moves())
     put("timed moves, demo", DEMO, timed_moves())
     plain = lambda hz: lambda c, s: S.network(S.even(hz, s), c, 3e-4, 8e-4)  # noqa: E731
-    put("coarse: 1 mm, 60 Hz", LARGE, track(plain(60), 1.5, decimals=0, coarse=1.0))
-    put("coarse: 0.1 mm, 60 Hz", LARGE, track(plain(60), 1.5, decimals=1, coarse=0.1))
-    put("coarse: 1 mm, 100 Hz, 0.15 Hz", DEMO, track(plain(100), 1.5, decimals=0, coarse=1.0, hz=0.15))
-    put("repeats: each value twice, 100 Hz over 50", LARGE, track(lambda c, s: S.network(S.repeated(S.even(50, s), 0.01, 2), c, 3e-4, 8e-4)))
-    for hz, wave in ((6.7, 0.15), (5, 0.1), (3, 0.06), (2, 0.05), (10, 0.2)):
-        put(f"slow: {hz} Hz", LARGE, track(plain(hz), 1.5, hz=wave, seconds=30.0))
-    for hz in (30, 60, 100, 250, 1000):
-        put(f"plain: {hz} Hz", LARGE, track(plain(hz), 0.5))
+    for name, config, make_samples, arguments, lags, worsts, jerks in (
+            ("coarse: 1 mm, 60 Hz", LARGE, plain(60), {"decimals": 0, "coarse": 1.0}, (112, 119), (0.5, 0.5), (10, 28)),
+            ("coarse: 0.1 mm, 60 Hz", LARGE, plain(60), {"decimals": 1, "coarse": 0.1}, (62, 45), (0.1, 0.1), (13, 30)),
+            ("coarse: 1 mm, 100 Hz, slow", DEMO, plain(100), {"decimals": 0, "coarse": 1.0, "hz": 0.15}, (99, 103), (0.23, 0.23), (240, 580)),
+            ("repeats: each value twice, 100 Hz over 50", LARGE, lambda c, s: S.network(S.repeated(S.even(50, s), 0.01, 2), c, 3e-4, 8e-4), {}, (43.5, 21.5), (.08, .08), (1.1, 4.6)),
+            ("slow: 10 Hz", LARGE, plain(10), {"hz": 0.2}, (204, 94), (0.11, 0.08), (1.05, 7.5)),
+            ("slow: 6.7 Hz", LARGE, plain(6.7), {"hz": 0.15}, (303, 139), (0.14, 0.1), (1.05, 9.6)),
+            ("slow: 5 Hz", LARGE, plain(5), {"hz": 0.1}, (None, None), (1.3, 1.3), (4700, 4700)),
+            ("slow: 3 Hz", LARGE, plain(3), {"hz": 0.06}, (None, None), (1.75, 1.75), (17000, 17000)),
+            ("slow: 2 Hz", LARGE, plain(2), {"hz": 0.05}, (None, None), (2.5, 2.5), (25000, 25000)),
+            ("plain: 30 Hz", LARGE, plain(30), {}, (70, 33.5), (.055, .045), (1.05, 4.7)),
+            ("plain: 60 Hz", LARGE, plain(60), {}, (36.6, 18.3), (.026, .026), (1.25, 6.8)),
+            ("plain: 100 Hz", LARGE, plain(100), {}, (23.2, 12.2), (.006, .005), (2.8, 18)),
+            ("plain: 250 Hz", LARGE, plain(250), {}, (11.2, 6.8), (.003, .035), (41, 67)),
+            ("plain: 1000 Hz", LARGE, plain(1000), {}, (11.2, 6.8), (.003, .05), (42, 67))):
+        # smooth and fast: as heaved was before it looked at evidence; balanced between them
+        bars = {style: {"lag_ms": lags[k], "worst_mm": worsts[k], "jerk": jerks[k]} for k, style in enumerate(("smooth", "fast"))}
+        bars["balanced"] = {"lag_ms": lags[0], "worst_mm": 3 * max(worsts), "jerk": max(jerks)}
+        put(name, config, track(make_samples, bars=bars, **arguments))
     return add
+
+
+# ---- random mixtures ----
+def mixed_samples(chance, seconds, is_even=False):
+    """A sender with a network and, often, a trouble of its own: (words, how to make samples, share of the bars)."""
+    hz = chance.choice((30, 45, 50, 60, 60, 72, 90, 100, 120, 144, 200, 250))
+    kind = chance.choice(("even", "even", "even") if is_even else ("even", "frames", "ticks", "steps", "even"))
+    words, troubles = [f"{hz} Hz"], 0
+    sigma = chance.uniform(0.02, 0.12) / hz
+    tick = chance.choice((S.TICK_S, 0.010))
+    picture = chance.choice((45, 60, 72, 90, 120, 144))
+    if kind == "frames":
+        words.append(f"frame time +-{1e3 * sigma:.1f} ms")
+    elif kind == "ticks":
+        words.append(f"ticks of {1e3 * tick:.1f} ms")
+    elif kind == "steps":
+        hz = chance.choice((50, 60, 100, 120))
+        words = [f"steps of {hz} Hz at {picture} frames/s"]
+    networks = [(0.0003, 0.0008), (0.0003, 0.0008), (0.001, 0.003), (0.002, 0.007), (0.0, 0.010), "gaussian"]
+    net_kind = networks[0 if kind == "frames" else int(chance.random() * len(networks))]
+    spread = chance.uniform(1, 3.5) * 1e-3
+    words.append(f"gaussian {1e3 * spread:.1f} ms" if net_kind == "gaussian" else f"network {1e3 * net_kind[0]:.1f}-{1e3 * net_kind[1]:.1f} ms")
+    trouble = chance.choice(("none", "none", "drops", "drops", "relays", "T", "late"))
+    share, every, after, times, late = chance.uniform(0.005, 0.10), int(chance.uniform(7, 40)), chance.uniform(0.05, 0.6) / hz, chance.uniform(0.3, 4), chance.uniform(0.1, 0.6) / hz
+    if trouble != "none":
+        words.append({"drops": f"{100 * share:.0f} % lost", "relays": f"relays every {every}th after {1e3 * after:.1f} ms", "T": f"T of {times:.1f} periods",
+                      "late": f"each 50th late by {1e3 * late:.1f} ms"}[trouble])
+    troubles = (kind != "even") + (net_kind != networks[0] and net_kind != (0.001, 0.003)) + (trouble != "none")
+
+    def make():
+        samples = {"even": lambda: S.even(hz, seconds), "frames": lambda: S.frame_times(chance, hz, sigma, seconds), "ticks": lambda: S.ticks(hz, seconds, tick),
+                   "steps": lambda: S.game_steps(chance, hz, picture, seconds)}[kind]()
+        if trouble == "drops":
+            samples = S.dropped(samples, chance, share)
+        samples = S.gaussian(samples, chance, spread) if net_kind == "gaussian" else S.network(samples, chance, *net_kind)
+        if trouble == "late":
+            for k in range(25, len(samples), 50):
+                samples[k].arrives += late
+            samples = S.ordered(samples)
+        if trouble == "relays":
+            samples = S.with_relays(samples, every, after)
+        return S.timed(samples, max(1, round(1000 * times / hz))) if trouble == "T" else samples
+    return ", ".join(words), make, troubles, hz, trouble
+
+
+def mixtures(seed, count):
+    """Random combinations; each depends on its own number and the seed alone."""
+    add = []
+    for number in range(count):
+        chance = S.chance_of(seed, "mixture", number)
+        kind = ("shake", "sine", "six", "shake", "ramp")[number % 5]
+        config = chance.choice((LARGE, LARGE, DEMO, OTHER, TRIPOD if kind != "ramp" else LARGE))
+        if kind == "shake":
+            words, make_samples, troubles, rate, _ = mixed_samples(chance, 14.0)
+            hz, over, limit = min(0.5 * 24 ** chance.random(), rate / 3.5), 0.3 * (5 / 0.3) ** chance.random(), chance.choice(("speed", "accel", "jerk"))
+            space, direction = chance.choice("AAAC"), chance.choice(("six", "six", "z", "roll"))
+            make = shake(hz, over, limit, rate, direction if space == "A" else "six", space, chance.choice((3, 4, 6)), make_sender=lambda c, r, s, m=make_samples: m())
+            words = f"{'C ' if space == 'C' else ''}{direction} {hz:.1f} Hz {over:.2f} x {limit}, {words}"
+        elif kind == "ramp":
+            words, make_samples, troubles, rate, trouble = mixed_samples(chance, RAMP_BEGIN_S + 12.0, True)
+            # what the sender itself says late, or not at all, may bend the speed; relays and T may not
+            bars = (0.85, 1.15) if troubles == 0 or trouble in ("relays",) and troubles == 1 else (0.5, 1.6)
+            make = ramp(lambda s, c, e: s, rate, *bars, speed=chance.uniform(15, 25), make_samples=lambda c, s, m=make_samples: m())
+        else:
+            words, make_samples, troubles, rate, _ = mixed_samples(chance, 26.0)
+            hz, size = chance.uniform(0.15, 0.6), chance.uniform(15, 40)
+            # 15 ms of time error for one trouble, 25 for several together, 8 for none
+            bar = (0.008, 0.015, 0.025, 0.025)[troubles] * 2 * math.pi * hz * size + 0.1
+            make = mixed_sine(make_samples, hz, size, bar, kind == "six")
+            words = f"{size:.0f} mm {hz:.2f} Hz{' six axes' if kind == 'six' else ''}, {words}"
+        add.append(Scenario(f"mixture {number}: {kind} {config} {words}", config, make))
+    return add
+
+
+def mixed_sine(make_samples, hz, size, bar, is_six, seconds=26.0):
+    def make(platform, chance):
+        weights = scaled_weights(platform)
+        sizes = [size / w * chance.uniform(0.2, 1) / 2 for w in weights] if is_six else along(platform, z=size)
+        factor = platform.fits(sizes)
+        sizes = [v * factor for v in sizes]
+        signal = S.Waves(platform.home, sizes, [hz * (chance.uniform(0.5, 1.5) if is_six else 1) for _ in sizes], [chance.uniform(0, 6.28) for _ in sizes])
+        truth = signal.table(rows(seconds) + 30)
+        samples = make_samples()
+
+        def judge(trace, style):
+            first, last = rows(SETTLED_S), rows(min(seconds, samples[-1].arrives))
+            return [*J.following(trace, truth, platform, first, last, weights, worst_mm=bar, main=platform.index("z")),
+                    settle_range(trace, platform, truth, weights, seconds), *limits(trace, platform, last)]
+        return Ride(S.frames(platform, signal, samples, "A", 3), judge, S.UP_MS + 1000 * seconds)
+    return make
 
 
 # ---- running ----
@@ -469,12 +587,14 @@ def main():
     parser.add_argument("--styles", type=lambda text: text.split(","), default=list(STYLES))
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--mixtures", type=int, default=40, help="how many random ones")
+    parser.add_argument("--only-mixtures", action="store_true")
     parser.add_argument("--verbose", action="store_true", help="a line per scenario with all figures; otherwise those that fail")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--configs", default=CONFIGS, help="where the ready-made configurations are")
     parser.add_argument("--keep", metavar="DIR", help="leave frames, configurations and traces there")
     a = parser.parse_args()
-    SCENARIOS = [scenario for scenario in table(a.seed) if re.search(a.filter, scenario.name)]
+    SCENARIOS = [scenario for scenario in [*([] if a.only_mixtures else table(a.seed)), *mixtures(a.seed, a.mixtures)] if re.search(a.filter, scenario.name)]
     if a.list:
         print("\n".join(f"{scenario.name} ({scenario.config})" for scenario in SCENARIOS))
         return 0
