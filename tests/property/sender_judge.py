@@ -214,22 +214,28 @@ def stop_position(p, v, a, accel, jerk):
 
 
 def optimal_time(p, v, a, target, speed, accel, jerk):
-    """Least time from a state to rest at target: to one speed, then to 0; the way is monotone in that speed, and at the limit of speed there is a
-    part of constant speed."""
-    def end(peak):
-        parts = _to_speed(v, a, peak, accel, jerk)
-        parts += _to_speed(peak, 0.0, 0.0, accel, jerk)
-        return _run(p, v, a, parts)[0], sum(t for _, t in parts)
+    """Least time from a state to rest at target: full jerk towards it, up to the limits of acceleration and speed, and from some moment on the
+    quickest stop; where that ends grows with the moment."""
+    way = 1.0 if target >= stop_position(p, v, a, accel, jerk) else -1.0
+    p, v, a, target = way * p, way * v, way * a, way * target
+    off = _to_speed(v, a, speed, accel, jerk)
 
-    for way in (1.0, -1.0):
-        at, seconds = end(way * speed)
-        if (target - at) * way >= 0:
-            return seconds + abs(target - at) / speed
-    low, high = -speed, speed
-    for _ in range(80):
+    def end(moment):
+        parts, left = [], moment
+        for j, seconds in [*off, (0.0, math.inf)]:
+            parts.append((j, min(seconds, left)))
+            left -= parts[-1][1]
+        there = _run(p, v, a, parts)
+        stop = _to_speed(there[1], there[2], 0.0, accel, jerk)
+        return _run(*there, stop)[0], moment + sum(t for _, t in stop)
+
+    low, high = 0.0, 1e-3
+    while end(high)[0] < target:
+        low, high = high, 2 * high
+    for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if end(middle)[0] < target else (low, middle)
-    return end((low + high) / 2)[1]
+    return end(high)[1]
 
 
 def step(trace, platform, at_ms, end, target, tolerance=1e-3):

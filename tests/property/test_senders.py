@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """test_senders.py - everyday senders: a platform never makes more than was asked, and goes where it is sent, at any time and with any flag.
 
-usage: test_senders.py --heaved PROGRAM [--filter REGEX] [--styles smooth,balanced,fast] [--jobs N] [--seed N] [--mixtures N] [--only-mixtures]
+usage: test_senders.py --heaved PROGRAM [--filter REGEX] [--styles smooth,balanced,fast] [--jobs N] [--seed N] [--all] [--mixtures N] [--only-mixtures]
                        [--verbose | --tap] [--list] [--configs DIR] [--keep DIR]
 
 senders.py says what is sent and when it arrives, sender_judge.py judges the trace. Judged from SETTLED_S after the first frame on, unless a
@@ -47,6 +47,7 @@ class Scenario:
     name: str
     config: str
     make: object              # make(platform, chance) -> Ride
+    is_extra: bool = False    # more of the same, for --all
 
 
 def rows(seconds):
@@ -315,8 +316,8 @@ def net(low, high):
 def table(seed):
     add = []
 
-    def put(name, config, make):
-        add.append(Scenario(name, config, make))
+    def put(name, config, make, is_extra=False):
+        add.append(Scenario(name, config, make, is_extra))
 
     # more than the limits allow
     put("shake: z 5 Hz, 2 x jerk", LARGE, shake(5, 2, "jerk", 60))
@@ -347,7 +348,8 @@ def table(seed):
         put(f"ticks of 15.6 ms, {hz} Hz", LARGE, track(lambda c, s, h=hz: S.network(S.ticks(h, s), c, 0, 3e-4)))
     put("ticks of 15.6 ms, 100 Hz, 35 mm", LARGE, track(lambda c, s: S.network(S.ticks(100, s), c, 0, 3e-4), size=35.0))
     put("ticks of 10 ms, 72 Hz", DEMO, track(lambda c, s: S.network(S.ticks(72, s, 0.010), c, 0, 3e-4)))
-    for steps_hz, picture_hz in ((50, 45), (60, 60), (120, 60), (50, 72), (50, 144), (100, 90)):
+    games = ((50, 45), (60, 60), (60, 59.6), (120, 60), (120, 60.4), (50, 72), (50, 144), (100, 90))
+    for steps_hz, picture_hz in games:
         put(f"game steps {steps_hz} Hz at {picture_hz} frames/s", LARGE, track(lambda c, s, a=steps_hz, b=picture_hz: S.network(S.game_steps(c, a, b, s), c, 0, 5e-4)))
     put("game steps 60 Hz at 60 frames/s +- 1 ms", LARGE, track(lambda c, s: S.network(S.game_steps(c, 60, 60, s, 1e-3), c, 0, 5e-4)))
     put("game steps 50 Hz at 60 frames/s +- 1 ms", DEMO, track(lambda c, s: S.network(S.game_steps(c, 50, 60, s, 1e-3), c, 0, 5e-4)))
@@ -368,18 +370,29 @@ def table(seed):
             # a sender that itself stands still for that long: then the platform may nearly do so
             low = 0.5 if shift <= 1.5 else 0.2
             pause = shift * period_ms * 1e-3
-            put(f"ramp: {period_ms:.3g} ms, one interval longer by {shift} periods, shifted", LARGE, ramp(lambda s, c, e, p=pause: S.paused(s, e[0], p, True), hz, low))
-            put(f"ramp: {period_ms:.3g} ms, one interval longer by {shift} periods, lost", LARGE, ramp(lambda s, c, e, p=pause: S.paused(s, e[0], p, False), hz, 0.5))
+            put(f"ramp: {period_ms:.3g} ms, one interval longer by {shift} periods, shifted", LARGE, ramp(lambda s, c, e, p=pause: S.paused(s, e[0], p, True), hz, low),
+                period_ms != 16.667 and shift not in (1.0, 1.5, 2.7))
+            put(f"ramp: {period_ms:.3g} ms, one interval longer by {shift} periods, lost", LARGE, ramp(lambda s, c, e, p=pause: S.paused(s, e[0], p, False), hz, 0.5),
+                shift not in (1.0, 1.5, 3.0))
     for period_ms, late in ((50, 5), (100, 12), (16.667, 6), (20, 9), (10, 4)):
         put(f"ramp: {period_ms:.3g} ms, one frame late by {late} ms", LARGE,
             ramp(lambda s, c, e, w=late: S.late_once(S.late_once(s, e[0], w * 1e-3), e[1], w * 1e-3), 1000 / period_ms, 0.8, 1.2))
     for every in (30, 10):
         for after in (1, 3, 8):
             put(f"ramp: relay frames, every {every}th again after {after} ms", LARGE, ramp(lambda s, c, e, n=every, a=after: S.with_relays(s, n, a * 1e-3), 60, 0.9, 1.1))
+    for name, config, make_samples in (
+            *((f"game steps {a} Hz at {b} frames/s", LARGE, lambda c, s, a=a, b=b: S.network(S.game_steps(c, a, b, s), c, 0, 5e-4)) for a, b in games),
+            *((f"ticks of 15.6 ms, {h} Hz", LARGE, lambda c, s, h=h: S.network(S.ticks(h, s), c, 0, 3e-4)) for h in (60, 100)),
+            *((f"frame time 16.7 +- {g} ms", LARGE, lambda c, s, g=g: S.network(S.frame_times(c, 60, g * 1e-3, s), c, 3e-4, 8e-4)) for g in (1, 2)),
+            ("lateness 0-12 ms", LARGE, lambda c, s: S.network(S.even(60, s), c, 0, 12e-3)),
+            ("lateness gaussian 4 ms", LARGE, lambda c, s: S.gaussian(S.even(60, s), c, 4e-3)),
+            ("12 % dropped, network 2-6 ms", LARGE, lambda c, s: S.network(S.dropped(S.even(60, s), c, 0.12), c, 2e-3, 6e-3))):
+        put(f"ramp: {name}", config, ramp(lambda s, c, e: s, 60, make_samples=make_samples))
     put("ramp: relay frames, 50 Hz, every 7th again after 5 ms", DEMO, ramp(lambda s, c, e: S.with_relays(s, 7, 5e-3), 50, 0.9, 1.1))
     for hz in (20, 30, 60):
         for times in (0.3, 0.8, 1.0, 1.6, 2.0, 2.5, 3.0, 4.0):
-            put(f"ramp: A6T {hz} Hz, T of {times} periods", LARGE, ramp(lambda s, c, e, t=round(1000 * times / hz): S.timed(s, t), hz))
+            put(f"ramp: A6T {hz} Hz, T of {times} periods", LARGE, ramp(lambda s, c, e, t=round(1000 * times / hz): S.timed(s, t), hz),
+                hz != 60 and times in (0.3, 1.6, 2.0, 4.0))
     for times in (1.0, 2.5, 3.0):
         put(f"A6T 50 Hz, T of {times} periods", LARGE, track(lambda c, s, t=round(20 * times): S.timed(S.network(S.even(50, s), c, 3e-4, 8e-4), t)))
     for stall in (0.1, 0.2, 0.3):
@@ -587,14 +600,16 @@ def main():
     parser.add_argument("--styles", type=lambda text: text.split(","), default=list(STYLES))
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--all", action="store_true", help="more of the same, too: shifts, losses, T")
     parser.add_argument("--mixtures", type=int, default=40, help="how many random ones")
     parser.add_argument("--only-mixtures", action="store_true")
     parser.add_argument("--verbose", action="store_true", help="a line per scenario with all figures; otherwise those that fail")
+    parser.add_argument("--tap", action="store_true", help="one case for each scenario and style, for tools/test")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--configs", default=CONFIGS, help="where the ready-made configurations are")
     parser.add_argument("--keep", metavar="DIR", help="leave frames, configurations and traces there")
     a = parser.parse_args()
-    SCENARIOS = [scenario for scenario in [*([] if a.only_mixtures else table(a.seed)), *mixtures(a.seed, a.mixtures)] if re.search(a.filter, scenario.name)]
+    SCENARIOS = [scenario for scenario in [*([] if a.only_mixtures else table(a.seed)), *mixtures(a.seed, a.mixtures)] if (a.all or not scenario.is_extra) and re.search(a.filter, scenario.name)]
     if a.list:
         print("\n".join(f"{scenario.name} ({scenario.config})" for scenario in SCENARIOS))
         return 0
@@ -607,12 +622,21 @@ def main():
             for name, style, figures, error in results:
                 good = error is None and all(figure.holds for figure in figures)
                 passed, failed = passed + good, failed + (not good)
-                if a.verbose or not good:
-                    shown = error or ", ".join(str(figure) for figure in figures if a.verbose or not figure.holds)
-                    print(f"{'ok  ' if good else 'FAIL'} {name} [{style}]: {shown}", flush=True)
-    print(f"{len(SCENARIOS)} scenarios in {', '.join(a.styles) or 'no style'}, {time.monotonic() - start:.0f} s")
-    print(f"{passed} passed, {failed} failed")
+                report(a, passed + failed, f"{name} [{style}]", good, error or ", ".join(str(figure) for figure in figures if a.verbose or not figure.holds))
+    if a.tap:
+        print(f"1..{passed + failed}")
+        print(f"# figure {passed + failed} senders and mixtures of them judged, in {len(a.styles)} styles")
+    else:
+        print(f"{len(SCENARIOS)} scenarios in {', '.join(a.styles) or 'no style'}, {time.monotonic() - start:.0f} s")
+        print(f"{passed} passed, {failed} failed")
     return 0 if failed == 0 and passed else 1
+
+
+def report(arguments, number, name, good, text):
+    if arguments.tap:
+        print(f"{'ok' if good else 'not ok'} {number} - {name}", *([] if good else [f"# {text}"]), sep="\n", flush=True)
+    elif arguments.verbose or not good:
+        print(f"{'ok  ' if good else 'FAIL'} {name}: {text}", flush=True)
 
 
 SCENARIOS = []
