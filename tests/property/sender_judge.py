@@ -197,7 +197,7 @@ def _to_speed(v, a, goal, accel, jerk):
         parts = [(jerk, max(0.0, (peak - a) / jerk)), (-jerk, peak / jerk)]
     else:
         up = (accel - a) / jerk
-        rest = goal - (v + (a + accel) / 2 * up + accel * accel / (2 * jerk))
+        rest = goal - (v + (a + accel) / 2 * abs(up) + accel * accel / (2 * jerk))
         parts = [(jerk if up >= 0 else -jerk, abs(up)), (0.0, rest / accel), (-jerk, accel / jerk)]
     return [(way * j, seconds) for j, seconds in parts]
 
