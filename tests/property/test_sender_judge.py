@@ -39,7 +39,8 @@ def csv(platform, columns, begin_ms=BEGIN):
     """The text of a trace."""
     lines = ["t_ms,state,roll_deg,pitch_deg,yaw_deg,x_mm,y_mm,z_mm,angle_deg,c1_mm,c2_mm,c3_mm,c4_mm,c5_mm,c6_mm,relays,flags"]
     for i, values in enumerate(zip(*columns)):
-        lines.append(",".join([f"{begin_ms + i}.000", "ENGAGED", *(f"{v:.9f}" for v in platform.whole(values)), *["0.000000000"] * 7, "0000", "accel|off-path"]))
+        numbers = [f"{v:.9f}" for v in (*platform.whole(values), *[0.0] * 7)]
+        lines.append(",".join([f"{begin_ms + i}.000", "ENGAGED", *numbers, "0000", "accel|off-path"]))
     return "\n".join(lines) + "\n"
 
 

@@ -70,9 +70,11 @@ def shake(hz, over, limit, rate_hz, direction="z", space="A", decimals=6, second
     """A sine of which the axis nearest to its limit asks for `over` times that limit; what does not fit into the platform is sent smaller."""
     def make(platform, chance):
         if space == "C":
-            limits, middle, weights, count = [[value] * platform.count for value in platform.cylinder_limits], platform.neutral_extensions, [1.0] * platform.count, platform.count
+            limits, middle = [[value] * platform.count for value in platform.cylinder_limits], platform.neutral_extensions
+            weights, count = [1.0] * platform.count, platform.count
         else:
-            limits, middle, weights, count = platform.limits, platform.home, scaled_weights(platform), len(platform.free)
+            limits, middle = platform.limits, platform.home
+            weights, count = scaled_weights(platform), len(platform.free)
         if direction in S.AXES:
             way = [platform.limits[0][platform.index(direction)] if name == direction else 0.0 for name in platform.axes]
         else:
@@ -299,8 +301,8 @@ def timed_moves(count=8):
                 off = max(off, max(abs(column[stop] - v) for column, v in zip(trace.values, goal)))
                 moving = max(next((k for k in range(stop, i, -1) if abs(column[k] - column[stop]) > 2e-9), i) for column in trace.values)
                 late.append(moving + 1 - i - need)
-            return [Fig("at rest late, cycles", max(late), high=2), Fig("at rest early, cycles", -min(late), high=3), Fig("off the target", off, high=2e-5, unit=" mm"),
-                    *limits(trace, platform, rows(t))]
+            return [Fig("at rest late, cycles", max(late), high=2), Fig("at rest early, cycles", -min(late), high=3),
+                    Fig("off the target", off, high=2e-5, unit=" mm"), *limits(trace, platform, rows(t))]
         return Ride(lines, judge, S.UP_MS + 1000 * t)
     return make
 
@@ -309,8 +311,41 @@ def timed_moves(count=8):
 LARGE, DEMO, TRIPOD, OTHER, TRIPOD_R = "hexapod-400", "demo-hexapod", "tripod", "hexapod-435-300", "tripod-rotation"
 
 
-def net(low, high):
-    return lambda samples, chance: S.network(samples, chance, low * 1e-3, high * 1e-3)
+def via(low_ms, high_ms, samples_of):
+    """samples_of(chance, seconds), by way of a network."""
+    return lambda chance, seconds: S.network(samples_of(chance, seconds), chance, low_ms * 1e-3, high_ms * 1e-3)
+
+
+def wired(samples_of):
+    return via(0.3, 0.8, samples_of)
+
+
+def even(hz):
+    return lambda chance, seconds: S.even(hz, seconds)
+
+
+def frame_times(hz, sigma_ms):
+    return wired(lambda chance, seconds: S.frame_times(chance, hz, sigma_ms * 1e-3, seconds))
+
+
+def ticks(hz, tick=S.TICK_S):
+    return via(0, 0.3, lambda chance, seconds: S.ticks(hz, seconds, tick))
+
+
+def games(steps_hz, frames_hz, sigma_ms=0.0):
+    return via(0, 0.5, lambda chance, seconds: S.game_steps(chance, steps_hz, frames_hz, seconds, sigma_ms * 1e-3))
+
+
+def gaussian(hz, sigma_ms):
+    return lambda chance, seconds: S.gaussian(S.even(hz, seconds), chance, sigma_ms * 1e-3)
+
+
+def dropping(hz, share):
+    return via(2, 6, lambda chance, seconds: S.dropped(S.even(hz, seconds), chance, share))
+
+
+def changing(*parts):
+    return wired(lambda chance, seconds: S.rates(parts))
 
 
 def table(seed):
@@ -339,66 +374,65 @@ def table(seed):
             shake(round(hz, 2), round(over, 3), limit, rate, direction, space, rise=chance.choice((0, 2.0)), phase=chance.choice((0.0, 1.57))))
 
     # senders as they are: 40 mm at 0.4 Hz
-    for sigma, bar in ((0.5, 0.5), (1, 0.5), (2, 0.8)):
-        put(f"frame time 16.7 +- {sigma} ms", LARGE,
-            track(lambda c, s, g=sigma: S.network(S.frame_times(c, 60, g * 1e-3, s), c, 3e-4, 8e-4), bar))
-    put("frame time 11.1 +- 0.8 ms", DEMO, track(lambda c, s: S.network(S.frame_times(c, 90, 0.8e-3, s), c, 3e-4, 8e-4), 0.5))
-    put("frame time 33 +- 3 ms", LARGE, track(lambda c, s: S.network(S.frame_times(c, 30, 3e-3, s), c, 3e-4, 8e-4), 1.5))
+    for sigma_ms, bar in ((0.5, 0.5), (1, 0.5), (2, 0.8)):
+        put(f"frame time 16.7 +- {sigma_ms} ms", LARGE, track(frame_times(60, sigma_ms), bar))
+    put("frame time 11.1 +- 0.8 ms", DEMO, track(frame_times(90, 0.8), 0.5))
+    put("frame time 33 +- 3 ms", LARGE, track(frame_times(30, 3), 1.5))
     for hz in (60, 100, 50, 120):
-        put(f"ticks of 15.6 ms, {hz} Hz", LARGE, track(lambda c, s, h=hz: S.network(S.ticks(h, s), c, 0, 3e-4)))
-    put("ticks of 15.6 ms, 100 Hz, 35 mm", LARGE, track(lambda c, s: S.network(S.ticks(100, s), c, 0, 3e-4), size=35.0))
-    put("ticks of 10 ms, 72 Hz", DEMO, track(lambda c, s: S.network(S.ticks(72, s, 0.010), c, 0, 3e-4)))
-    games = ((50, 45), (60, 60), (60, 59.6), (120, 60), (120, 60.4), (50, 72), (50, 144), (100, 90))
-    for steps_hz, picture_hz in games:
-        put(f"game steps {steps_hz} Hz at {picture_hz} frames/s", LARGE, track(lambda c, s, a=steps_hz, b=picture_hz: S.network(S.game_steps(c, a, b, s), c, 0, 5e-4)))
-    put("game steps 60 Hz at 60 frames/s +- 1 ms", LARGE, track(lambda c, s: S.network(S.game_steps(c, 60, 60, s, 1e-3), c, 0, 5e-4)))
-    put("game steps 50 Hz at 60 frames/s +- 1 ms", DEMO, track(lambda c, s: S.network(S.game_steps(c, 50, 60, s, 1e-3), c, 0, 5e-4)))
-    put("lateness 0-12 ms", LARGE, track(lambda c, s: S.network(S.even(60, s), c, 0, 12e-3)))
-    put("lateness 0-9 ms, 100 Hz", DEMO, track(lambda c, s: S.network(S.even(100, s), c, 0, 9e-3)))
-    for sigma in (3, 4):
-        put(f"lateness gaussian {sigma} ms", LARGE, track(lambda c, s, g=sigma: S.gaussian(S.even(60, s), c, g * 1e-3)))
+        put(f"ticks of 15.6 ms, {hz} Hz", LARGE, track(ticks(hz)))
+    put("ticks of 15.6 ms, 100 Hz, 35 mm", LARGE, track(ticks(100), size=35.0))
+    put("ticks of 10 ms, 72 Hz", DEMO, track(ticks(72, 0.010)))
+    pictures = ((50, 45), (60, 60), (60, 59.6), (120, 60), (120, 60.4), (50, 72), (50, 144), (100, 90))
+    for steps_hz, picture_hz in pictures:
+        put(f"game steps {steps_hz} Hz at {picture_hz} frames/s", LARGE, track(games(steps_hz, picture_hz)))
+    put("game steps 60 Hz at 60 frames/s +- 1 ms", LARGE, track(games(60, 60, 1)))
+    put("game steps 50 Hz at 60 frames/s +- 1 ms", DEMO, track(games(50, 60, 1)))
+    put("lateness 0-12 ms", LARGE, track(via(0, 12, even(60))))
+    put("lateness 0-9 ms, 100 Hz", DEMO, track(via(0, 9, even(100))))
+    for sigma_ms in (3, 4):
+        put(f"lateness gaussian {sigma_ms} ms", LARGE, track(gaussian(60, sigma_ms)))
     for share in (0.10, 0.12, 0.15):
-        put(f"{100 * share:.0f} % dropped, network 2-6 ms", LARGE, track(lambda c, s, p=share: S.network(S.dropped(S.even(60, s), c, p), c, 2e-3, 6e-3)))
-    put("rates 60/30/60 Hz", LARGE, track(lambda c, s: S.network(S.rates([(60, 9), (30, 7), (60, 8)]), c, 3e-4, 8e-4), 1.0))
-    put("rates 60/120/60 Hz", LARGE, track(lambda c, s: S.network(S.rates([(60, 9), (120, 7), (60, 8)]), c, 3e-4, 8e-4), 1.0))
-    put("rates 100/50/100 Hz", DEMO, track(lambda c, s: S.network(S.rates([(100, 9), (50, 7), (100, 8)]), c, 3e-4, 8e-4), 1.0))
+        put(f"{100 * share:.0f} % dropped, network 2-6 ms", LARGE, track(dropping(60, share)))
+    put("rates 60/30/60 Hz", LARGE, track(changing((60, 9), (30, 9), (60, 12)), 1.0))
+    put("rates 60/120/60 Hz", LARGE, track(changing((60, 9), (120, 9), (60, 12)), 1.0))
+    put("rates 100/50/100 Hz", DEMO, track(changing((100, 9), (50, 9), (100, 12)), 1.0))
 
     # ramps: one thing that goes wrong
+    def trouble(name, hz, change, low=0.5, high=1.6, config=LARGE, is_extra=False, **arguments):
+        put(f"ramp: {name}", config, ramp(change, hz, low, high, **arguments), is_extra)
+
     for period_ms in (10, 16.667, 20):
         hz = 1000 / period_ms
         for shift in (0.5, 0.9, 1.0, 1.3, 1.5, 1.7, 2.0, 2.2, 2.7, 3.0):
-            # a sender that itself stands still for that long: then the platform may nearly do so
-            low = 0.5 if shift <= 1.5 else 0.2
-            pause = shift * period_ms * 1e-3
-            put(f"ramp: {period_ms:.3g} ms, one interval longer by {shift} periods, shifted", LARGE, ramp(lambda s, c, e, p=pause: S.paused(s, e[0], p, True), hz, low),
-                period_ms != 16.667 and shift not in (1.0, 1.5, 2.7))
-            put(f"ramp: {period_ms:.3g} ms, one interval longer by {shift} periods, lost", LARGE, ramp(lambda s, c, e, p=pause: S.paused(s, e[0], p, False), hz, 0.5),
-                shift not in (1.0, 1.5, 3.0))
-    for period_ms, late in ((50, 5), (100, 12), (16.667, 6), (20, 9), (10, 4)):
-        put(f"ramp: {period_ms:.3g} ms, one frame late by {late} ms", LARGE,
-            ramp(lambda s, c, e, w=late: S.late_once(S.late_once(s, e[0], w * 1e-3), e[1], w * 1e-3), 1000 / period_ms, 0.8, 1.2))
+            # a sender that itself stands still for longer: then the platform may nearly do so
+            low, pause_s = 0.5 if shift <= 1.5 else 0.2, shift * period_ms * 1e-3
+            name = f"{period_ms:.3g} ms, one interval longer by {shift} periods"
+            trouble(f"{name}, shifted", hz, lambda s, c, e, p=pause_s: S.paused(s, e[0], p, True), low,
+                    is_extra=period_ms != 16.667 and shift not in (1.0, 1.5, 2.7))
+            trouble(f"{name}, lost", hz, lambda s, c, e, p=pause_s: S.paused(s, e[0], p, False), is_extra=shift not in (1.0, 1.5, 3.0))
+    for period_ms, late_ms in ((50, 5), (100, 12), (16.667, 6), (20, 9), (10, 4)):
+        trouble(f"{period_ms:.3g} ms, one frame late by {late_ms} ms", 1000 / period_ms,
+                lambda s, c, e, w=1e-3 * late_ms: S.late_once(S.late_once(s, e[0], w), e[1], w), 0.8, 1.2)
     for every in (30, 10):
-        for after in (1, 3, 8):
-            put(f"ramp: relay frames, every {every}th again after {after} ms", LARGE, ramp(lambda s, c, e, n=every, a=after: S.with_relays(s, n, a * 1e-3), 60, 0.9, 1.1))
-    for name, config, make_samples in (
-            *((f"game steps {a} Hz at {b} frames/s", LARGE, lambda c, s, a=a, b=b: S.network(S.game_steps(c, a, b, s), c, 0, 5e-4)) for a, b in games),
-            *((f"ticks of 15.6 ms, {h} Hz", LARGE, lambda c, s, h=h: S.network(S.ticks(h, s), c, 0, 3e-4)) for h in (60, 100)),
-            *((f"frame time 16.7 +- {g} ms", LARGE, lambda c, s, g=g: S.network(S.frame_times(c, 60, g * 1e-3, s), c, 3e-4, 8e-4)) for g in (1, 2)),
-            ("lateness 0-12 ms", LARGE, lambda c, s: S.network(S.even(60, s), c, 0, 12e-3)),
-            ("lateness gaussian 4 ms", LARGE, lambda c, s: S.gaussian(S.even(60, s), c, 4e-3)),
-            ("12 % dropped, network 2-6 ms", LARGE, lambda c, s: S.network(S.dropped(S.even(60, s), c, 0.12), c, 2e-3, 6e-3))):
-        put(f"ramp: {name}", config, ramp(lambda s, c, e: s, 60, make_samples=make_samples))
-    put("ramp: relay frames, 50 Hz, every 7th again after 5 ms", DEMO, ramp(lambda s, c, e: S.with_relays(s, 7, 5e-3), 50, 0.9, 1.1))
+        for after_ms in (1, 3, 8):
+            trouble(f"relay frames, every {every}th again after {after_ms} ms", 60,
+                    lambda s, c, e, n=every, a=1e-3 * after_ms: S.with_relays(s, n, a), 0.9, 1.1)
+    trouble("relay frames, 50 Hz, every 7th again after 5 ms", 50, lambda s, c, e: S.with_relays(s, 7, 5e-3), 0.9, 1.1, DEMO)
+    for name, make_samples in (
+            *((f"game steps {a} Hz at {b} frames/s", games(a, b)) for a, b in pictures), *((f"ticks of 15.6 ms, {hz} Hz", ticks(hz)) for hz in (60, 100)),
+            *((f"frame time 16.7 +- {sigma_ms} ms", frame_times(60, sigma_ms)) for sigma_ms in (1, 2)), ("lateness 0-12 ms", via(0, 12, even(60))),
+            ("lateness gaussian 4 ms", gaussian(60, 4)), ("12 % dropped, network 2-6 ms", dropping(60, 0.12))):
+        trouble(name, 60, lambda s, c, e: s, make_samples=make_samples)
     for hz in (20, 30, 60):
         for times in (0.3, 0.8, 1.0, 1.6, 2.0, 2.5, 3.0, 4.0):
-            put(f"ramp: A6T {hz} Hz, T of {times} periods", LARGE, ramp(lambda s, c, e, t=round(1000 * times / hz): S.timed(s, t), hz),
-                hz != 60 and times in (0.3, 1.6, 2.0, 4.0))
+            trouble(f"A6T {hz} Hz, T of {times} periods", hz, lambda s, c, e, t=round(1000 * times / hz): S.timed(s, t),
+                    is_extra=hz != 60 and times in (0.3, 1.6, 2.0, 4.0))
     for times in (1.0, 2.5, 3.0):
-        put(f"A6T 50 Hz, T of {times} periods", LARGE, track(lambda c, s, t=round(20 * times): S.timed(S.network(S.even(50, s), c, 3e-4, 8e-4), t)))
-    for stall in (0.1, 0.2, 0.3):
-        # soft: a stop is right, a way back is not; twice the speed at most, and no more acceleration than a tenth of a second's change of 2 x speed needs thrice
-        put(f"ramp: Wi-Fi stall of {1000 * stall:.0f} ms", LARGE, ramp(lambda s, c, e, d=stall: S.stalled(s, [(when, d) for when in e]), 60, -0.05, 2.0, accel=600))
-    put("ramp: Wi-Fi stall of 150 ms, 90 mm/s", LARGE, ramp(lambda s, c, e: S.stalled(s, [(e[0], .15)]), 60, -0.05, 2.0, speed=60.0, accel=1800))
+        put(f"A6T 50 Hz, T of {times} periods", LARGE, track(lambda c, s, t=round(20 * times): S.timed(wired(even(50))(c, s), t)))
+    for stall_s in (0.1, 0.2, 0.3):
+        # a soft stop is right, a way back is not; at most twice the speed, at most that from standing within 67 ms
+        trouble(f"Wi-Fi stall of {1000 * stall_s:.0f} ms", 60, lambda s, c, e, d=stall_s: S.stalled(s, [(when, d) for when in e]), -0.05, 2.0, accel=600)
+    trouble("Wi-Fi stall of 150 ms, 60 mm/s", 60, lambda s, c, e: S.stalled(s, [(e[0], .15)]), -0.05, 2.0, speed=60.0, accel=1800)
 
     # engaged into a stream that moves
     chance = S.chance_of(seed, "engaged")
@@ -408,7 +442,8 @@ def table(seed):
             put(f"engaged {k}: {config} z, {how}", config, engaged(chance.uniform(20, 60), hz, how, shift_s=2 + k / 12 / hz))
     for k in range(8):
         how, config = ("rising", "start", "resume", "gap")[k // 2], (LARGE, DEMO)[k % 2]
-        put(f"engaged six {k}: {config}, {how}", config, engaged(chance.uniform(20, 60), chance.uniform(0.25, 0.5), how, shift_s=2 + chance.random() * 4, axes=("six",) * 6))
+        put(f"engaged six {k}: {config}, {how}", config,
+            engaged(chance.uniform(20, 60), chance.uniform(0.25, 0.5), how, shift_s=2 + chance.random() * 4, axes=("six",) * 6))
     for how in ("rising", "start", "resume"):
         put(f"engaged x: {how}", DEMO, engaged(60.0, 0.6, how, shift_s=3.1, axes=("x",)))
         put(f"engaged tripod: {how}", TRIPOD, engaged(40.0, 0.5, how, shift_s=2.6))
@@ -420,24 +455,25 @@ def table(seed):
     put("steps: lone", LARGE, steps("lone", 10))
 
     # cues
-    sender = lambda c, s: S.network(S.dropped(S.even(60, s), c, 0.01), c, 2e-3, 7e-3)  # noqa: E731  used twice
+    sender = via(2, 7, lambda c, s: S.dropped(S.even(60, s), c, 0.01))
     bars = {"smooth": {"lag_ms": 41.5, "shape": 24.0, "jerk": 1.2}, "balanced": {"lag_ms": 30.0, "shape": 50.0, "jerk": 1.3}}
     put("cue: z 60 mm, 60 Hz, 2-7 ms, 1 % lost", LARGE, cue(sender, {"z": 60}, bars, 100.0))
     put("cue: six axes, 60 Hz, 2-7 ms, 1 % lost", LARGE, cue(sender, {"x": 30, "y": 30, "z": 60, "roll": 2.5, "pitch": 2.5, "yaw": 2.5}, bars, 60.0))
     recorded = {style: {"shape": 60.0} for style in STYLES}
     six = {"x": 60, "y": 60, "z": 60, "roll": 5, "pitch": 5, "yaw": 5}
-    put("recorded: six axes, 120 Hz, three decimals", LARGE, cue(lambda c, s: S.network(S.even(120, s), c, 3e-4, 8e-4), six, recorded, 24.0, top_hz=12.0, of_limits=0.7, accel_share=5))
-    put("recorded: six axes, 60 Hz, three decimals", LARGE, cue(lambda c, s: S.network(S.even(60, s), c, 3e-4, 8e-4), six, recorded, 24.0, top_hz=6.0, of_limits=0.5, accel_share=5))
+    for hz, top_hz, share in ((120, 12.0, 0.7), (60, 6.0, 0.5)):
+        put(f"recorded: six axes, {hz} Hz, three decimals", LARGE, cue(wired(even(hz)), six, recorded, 24.0, top_hz=top_hz, of_limits=share, accel_share=5))
 
     # what is right today
     put("timed moves", LARGE, timed_moves())
     put("timed moves, demo", DEMO, timed_moves())
-    plain = lambda hz: lambda c, s: S.network(S.even(hz, s), c, 3e-4, 8e-4)  # noqa: E731
+    plain = lambda hz: wired(even(hz))  # noqa: E731  a shorter name for what follows
     for name, config, make_samples, arguments, lags, worsts, jerks in (
             ("coarse: 1 mm, 60 Hz", LARGE, plain(60), {"decimals": 0, "coarse": 1.0}, (112, 119), (0.5, 0.5), (10, 28)),
             ("coarse: 0.1 mm, 60 Hz", LARGE, plain(60), {"decimals": 1, "coarse": 0.1}, (62, 45), (0.1, 0.1), (13, 30)),
             ("coarse: 1 mm, 100 Hz, slow", DEMO, plain(100), {"decimals": 0, "coarse": 1.0, "hz": 0.15}, (99, 103), (0.23, 0.23), (240, 580)),
-            ("repeats: each value twice, 100 Hz over 50", LARGE, lambda c, s: S.network(S.repeated(S.even(50, s), 0.01, 2), c, 3e-4, 8e-4), {}, (43.5, 21.5), (.08, .08), (1.1, 4.6)),
+            ("repeats: each value twice, 100 Hz over 50", LARGE, wired(lambda c, s: S.repeated(S.even(50, s), 0.01, 2)), {},
+             (43.5, 21.5), (.08, .08), (1.1, 4.6)),
             ("slow: 10 Hz", LARGE, plain(10), {"hz": 0.2}, (204, 94), (0.11, 0.08), (1.05, 7.5)),
             ("slow: 6.7 Hz", LARGE, plain(6.7), {"hz": 0.15}, (303, 139), (0.14, 0.1), (1.05, 9.6)),
             ("slow: 5 Hz", LARGE, plain(5), {"hz": 0.1}, (None, None), (1.3, 1.3), (4700, 4700)),
@@ -476,15 +512,16 @@ def mixed_samples(chance, seconds, is_even=False):
     spread = chance.uniform(1, 3.5) * 1e-3
     words.append(f"gaussian {1e3 * spread:.1f} ms" if net_kind == "gaussian" else f"network {1e3 * net_kind[0]:.1f}-{1e3 * net_kind[1]:.1f} ms")
     trouble = chance.choice(("none", "none", "drops", "drops", "relays", "T", "late"))
-    share, every, after, times, late = chance.uniform(0.005, 0.10), int(chance.uniform(7, 40)), chance.uniform(0.05, 0.6) / hz, chance.uniform(0.3, 4), chance.uniform(0.1, 0.6) / hz
+    share, every, times = chance.uniform(0.005, 0.10), int(chance.uniform(7, 40)), chance.uniform(0.3, 4)
+    after, late = chance.uniform(0.05, 0.6) / hz, chance.uniform(0.1, 0.6) / hz
     if trouble != "none":
         words.append({"drops": f"{100 * share:.0f} % lost", "relays": f"relays every {every}th after {1e3 * after:.1f} ms", "T": f"T of {times:.1f} periods",
                       "late": f"each 50th late by {1e3 * late:.1f} ms"}[trouble])
     troubles = (kind != "even") + (net_kind != networks[0] and net_kind != (0.001, 0.003)) + (trouble != "none")
 
     def make():
-        samples = {"even": lambda: S.even(hz, seconds), "frames": lambda: S.frame_times(chance, hz, sigma, seconds), "ticks": lambda: S.ticks(hz, seconds, tick),
-                   "steps": lambda: S.game_steps(chance, hz, picture, seconds)}[kind]()
+        samples = {"even": lambda: S.even(hz, seconds), "frames": lambda: S.frame_times(chance, hz, sigma, seconds),
+                   "ticks": lambda: S.ticks(hz, seconds, tick), "steps": lambda: S.game_steps(chance, hz, picture, seconds)}[kind]()
         if trouble == "drops":
             samples = S.dropped(samples, chance, share)
         samples = S.gaussian(samples, chance, spread) if net_kind == "gaussian" else S.network(samples, chance, *net_kind)
@@ -507,9 +544,11 @@ def mixtures(seed, count):
         config = chance.choice((LARGE, LARGE, DEMO, OTHER, TRIPOD if kind != "ramp" else LARGE))
         if kind == "shake":
             words, make_samples, troubles, rate, _ = mixed_samples(chance, 14.0)
-            hz, over, limit = min(0.5 * 24 ** chance.random(), rate / 3.5), 0.3 * (5 / 0.3) ** chance.random(), chance.choice(("speed", "accel", "jerk"))
+            hz, over = min(0.5 * 24 ** chance.random(), rate / 3.5), 0.3 * (5 / 0.3) ** chance.random()
+            limit = chance.choice(("speed", "accel", "jerk"))
             space, direction = chance.choice("AAAC"), chance.choice(("six", "six", "z", "roll"))
-            make = shake(hz, over, limit, rate, direction if space == "A" else "six", space, chance.choice((3, 4, 6)), make_sender=lambda c, r, s, m=make_samples: m())
+            make = shake(hz, over, limit, rate, direction if space == "A" else "six", space, chance.choice((3, 4, 6)),
+                         make_sender=lambda c, r, s, m=make_samples: m())
             words = f"{'C ' if space == 'C' else ''}{direction} {hz:.1f} Hz {over:.2f} x {limit}, {words}"
         elif kind == "ramp":
             words, make_samples, troubles, rate, trouble = mixed_samples(chance, RAMP_BEGIN_S + 12.0, True)
@@ -567,7 +606,7 @@ def run(task):
             try:
                 S.configured(source, config, {**S.NEVER_SILENT, ("udp", "stream"): style})
                 trace = folder / f"{word}.{style}.csv" if arguments.keep else "-"
-                done = subprocess.run([arguments.heaved, "--config", config, "--play", frames, "--trace", trace], stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
+                done = subprocess.run([arguments.heaved, "--config", config, "--play", frames, "--trace", trace], capture_output=True, check=False)
                 assert done.returncode == 0, f"heaved ended with {done.returncode}: {done.stderr.decode()[-300:]}"
                 text = trace.read_text(encoding="ascii") if arguments.keep else done.stdout.decode("ascii")
                 figures = ride.judge(J.Trace(text, platform, ride.begin_ms, ride.with_cylinders), style)
@@ -609,7 +648,8 @@ def main():
     parser.add_argument("--configs", default=CONFIGS, help="where the ready-made configurations are")
     parser.add_argument("--keep", metavar="DIR", help="leave frames, configurations and traces there")
     a = parser.parse_args()
-    SCENARIOS = [scenario for scenario in [*([] if a.only_mixtures else table(a.seed)), *mixtures(a.seed, a.mixtures)] if (a.all or not scenario.is_extra) and re.search(a.filter, scenario.name)]
+    SCENARIOS = [scenario for scenario in [*([] if a.only_mixtures else table(a.seed)), *mixtures(a.seed, a.mixtures)]
+                 if (a.all or not scenario.is_extra) and re.search(a.filter, scenario.name)]
     if a.list:
         print("\n".join(f"{scenario.name} ({scenario.config})" for scenario in SCENARIOS))
         return 0
