@@ -194,6 +194,8 @@ def engaged(size, hz, how="rising", rate_hz=60, shift_s=0.0, axes=("z",), decima
     start    it waits at neutral, and the first frame comes from the midst of a motion
     resume   it holds for a while, and resumes
     gap      nothing arrives for 1.7 s
+    owner    its sender falls silent, and another one, which is elsewhere in the same motion, takes over
+    intensity  it makes less of it for a while
     All rows from there on are judged."""
     def make(platform, chance):
         if len(axes) == 1:
@@ -213,6 +215,12 @@ def engaged(size, hz, how="rising", rate_hz=60, shift_s=0.0, axes=("z",), decima
             samples = [s for s in samples if s.arrives >= shift_s]
         elif how == "resume":
             requests = [(begin + 1000 * (9 + shift_s), "!hold"), (begin + 1000 * (12 + 1.7 * shift_s), "!resume")]
+        elif how == "intensity":
+            requests = [(begin + 1000 * (9 + shift_s), "!intensity 30"), (begin + 1000 * (13 + 1.7 * shift_s), "!intensity 100")]
+        elif how == "owner":
+            requests = [(begin + 1000 * (12 + shift_s), "!from 127.0.0.2")]
+            samples = [S.Sample(s.at + (0.4 / hz if s.arrives > 12 + shift_s else 0), s.arrives) for s in samples
+                       if not 9 + shift_s <= s.arrives < 12.01 + shift_s]
         else:
             samples = [s for s in samples if not 9 + shift_s <= s.arrives < 10.7 + shift_s]
         truth = signal.table(rows(8.0) if len(axes) == 1 else rows(seconds), 1e-3)
@@ -438,10 +446,10 @@ def table(seed):
     chance = S.chance_of(seed, "engaged")
     for k in range(12):
         config, hz = (LARGE, DEMO)[k % 2], chance.uniform(0.25, 0.6)
-        for how in ("rising", "start", *(("resume", "gap") if k < 4 else ())):
+        for how in ("rising", "start", *(("resume", "gap", "owner", "intensity") if k < 4 else ())):
             put(f"engaged {k}: {config} z, {how}", config, engaged(chance.uniform(20, 60), hz, how, shift_s=2 + k / 12 / hz))
-    for k in range(8):
-        how, config = ("rising", "start", "resume", "gap")[k // 2], (LARGE, DEMO)[k % 2]
+    for k in range(12):
+        how, config = ("rising", "start", "resume", "gap", "owner", "intensity")[k // 2], (LARGE, DEMO)[k % 2]
         put(f"engaged six {k}: {config}, {how}", config,
             engaged(chance.uniform(20, 60), chance.uniform(0.25, 0.5), how, shift_s=2 + chance.random() * 4, axes=("six",) * 6))
     for how in ("rising", "start", "resume"):
