@@ -238,18 +238,23 @@ def optimal_time(p, v, a, target, speed, accel, jerk):
     return end(high)[1]
 
 
+def state(column, i):
+    """Position, speed and acceleration at the end of a cycle."""
+    accel = (column[i] - 2 * column[i - 1] + column[i - 2]) * 1e6
+    return column[i], (column[i] - column[i - 1]) * 1e3 + accel * 0.5e-3, accel
+
+
 def step(trace, platform, at_ms, end, target, tolerance=1e-3):
     """A lone step that comes while the one before is under way: time to settle over the least time of the axis that needs longest; how far it goes
     beyond where it is, its target and where the quickest stop from there ends, mm or deg."""
     i = math.ceil(at_ms)
     optimum, beyond, settled = 0.0, 0.0, 0
     for column, goal, speed, accel, jerk in zip(trace.values, target, *platform.limits):
-        p, v = column[i], (column[i] - column[i - 1]) * 1e3
-        a = (column[i] - 2 * column[i - 1] + column[i - 2]) * 1e6
-        v += a * 0.5e-3  # the middle of a cycle to its end
+        p, v, a = state(column, i)
         optimum = max(optimum, optimal_time(p, v, a, goal, speed, accel, jerk))
-        stop = stop_position(p, v, a, accel, jerk)
+        # the frame is seen in this cycle or the next, and moves what comes one later
+        stops = [p, goal, *(stop_position(*state(column, k), accel, jerk) for k in (i, i + 1, i + 2))]
         rest = column[i:end]
-        beyond = max(beyond, max(rest) - max(p, goal, stop), min(p, goal, stop) - min(rest))
+        beyond = max(beyond, max(rest) - max(stops), min(stops) - min(rest))
         settled = max(settled, next((k for k in range(len(rest) - 1, -1, -1) if abs(rest[k] - goal) > tolerance), 0) + 1)
     return optimum * 1e3, settled, beyond
