@@ -12,6 +12,7 @@ from operator import mul, sub
 
 COLUMNS = 17
 FIRST_POSE, FIRST_CYLINDER, FLAGS = 2, 9, 16
+ROUNDING = (0.0, 1e-9, 2e-9, 4e-9)  # what nine decimals are worth in a difference
 LAGS_MS = range(-20, 1301)
 
 
@@ -77,7 +78,7 @@ def rms(values):
 
 
 # ---- the limits of the axes ----
-def limits(trace, platform, windows, bar=1.001, cylinders=False):
+def limits(trace, platform, windows, bar=1.0005, cylinders=False):
     """Speed, acceleration and jerk as a share of the limit of the axis (or cylinder) that is nearest to it. windows: [(words before the name, first
     row, end)]"""
     shares = {}
@@ -88,7 +89,7 @@ def limits(trace, platform, windows, bar=1.001, cylinders=False):
             limit = (platform.cylinder_limits[order - 1] if cylinders else platform.limits[order - 1][k]) / 1000.0 ** order
             for words, first, last in windows:
                 name = f"{words}{what}/limit"
-                shares[name] = max(shares.get(name, 0.0), most(rates[first:last - order]) / limit)
+                shares[name] = max(shares.get(name, 0.0), (most(rates[first:last - order]) - ROUNDING[order]) / limit)
     return [Figure(name, share, high=bar) for name, share in shares.items()]
 
 

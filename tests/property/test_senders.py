@@ -6,7 +6,8 @@ usage: test_senders.py --heaved PROGRAM [--filter REGEX] [--styles smooth,balanc
                        [--verbose | --tap] [--list] [--configs DIR] [--keep DIR]
 
 senders.py says what is sent and when it arrives, sender_judge.py judges the trace. Judged from SETTLED_S after the first frame on, unless a
-scenario says otherwise; before that the range alone is judged (2 %).
+scenario says otherwise; before that the range (2 %), speed and acceleration are. A stream is judged until its last frame arrives: how far silence
+lets a platform go on is tests/judge's to say.
 """
 import argparse
 import math
@@ -94,9 +95,9 @@ def shake(hz, over, limit, rate_hz, direction="z", space="A", decimals=6, second
 
         def judge(trace, style):
             columns = trace.cylinders if space == "C" else trace.values
-            first, last = rows(SETTLED_S), rows(seconds)
+            first, last = rows(SETTLED_S), rows(samples[-1].arrives)
             low, high = ([m + way * abs(s) for m, s in zip(middle, size)] for way in (-1, 1))
-            return [*J.gain(columns, middle, size, weights, first, last, rounding, over=asked), J.reach(columns, low, high, weights, 0.025, 0.1 + rounding),
+            return [*J.gain(columns, middle, size, weights, first, last, rounding, over=asked), J.reach(columns, low, high, weights, 0.025, 0.1 + rounding, 0, last),
                     *J.limits(trace, platform, [("", first, last)], cylinders=space == "C")]
         return Ride(S.frames(platform, signal, samples, space, decimals), judge, S.UP_MS + 1000 * seconds, with_cylinders=space == "C")
     return make
@@ -112,10 +113,10 @@ def limits(trace, platform, last):
     return figures
 
 
-def settle_range(trace, platform, truth, weights, seconds):
+def settle_range(trace, platform, truth, weights, last):
     """From the first frame on: between neutral and what is sent."""
     low, high = ([extreme(home, extreme(column)) for home, column in zip(platform.home, truth)] for extreme in (min, max))
-    return J.reach(trace.values, low, high, weights, 0.02, 0.05, 0, rows(seconds))
+    return J.reach(trace.values, low, high, weights, 0.02, 0.05, 0, last)
 
 
 def track(make_samples, worst_mm=1.5, size=40.0, hz=0.4, axis="z", decimals=3, seconds=30.0, bars=None, coarse=None, jerk=None):
@@ -132,7 +133,7 @@ def track(make_samples, worst_mm=1.5, size=40.0, hz=0.4, axis="z", decimals=3, s
             given = {"worst_mm": worst_mm, "jerk": jerk, **(bars or {}).get(style, {})}
             first, last = rows(SETTLED_S), rows(min(seconds, samples[-1].arrives))
             return [*J.following(trace, truth, platform, first, last, weights, main=platform.index(axis), **given),
-                    settle_range(trace, platform, truth, weights, seconds), *limits(trace, platform, last)]
+                    settle_range(trace, platform, truth, weights, last), *limits(trace, platform, last)]
         return Ride(S.frames(platform, said, samples, "A", decimals), judge, S.UP_MS + 1000 * seconds)
     return make
 
@@ -154,7 +155,7 @@ def cue(make_samples, sizes, bars=None, seconds=40.0, decimals=3, top_hz=6.0, kn
             first, last = rows(SETTLED_S), rows(min(seconds, samples[-1].arrives))
             figures = J.following(trace, truth, platform, first, last, weights, main=platform.index("z"), **(bars or {}).get(style, {}))
             return [*figures, Fig("flag accel", 100 * trace.share_of("accel", first, last), high=accel_share, unit=" %"),
-                    settle_range(trace, platform, truth, weights, seconds), *limits(trace, platform, last)]
+                    settle_range(trace, platform, truth, weights, last), *limits(trace, platform, last)]
         return Ride(S.frames(platform, signal, samples, "A", decimals), judge, S.UP_MS + 1000 * seconds)
     return make
 
@@ -229,7 +230,7 @@ def engaged(size, hz, how="rising", rate_hz=60, shift_s=0.0, axes=("z",), decima
             at = next((i for i, state in enumerate(trace.states) if state == "ENGAGED"), None)
             if at is None:
                 return [Fig("engaged", 0, low=1)]
-            last = rows(seconds)
+            last = rows(samples[-1].arrives)
             weights = scaled_weights(platform)
             low, high = ([m + way * abs(s) for m, s in zip(platform.home, sizes)] for way in (-1, 1))
             return [J.reach(trace.values, low, high, weights, 0.02, 0.05, at, last), *J.engage_speed(trace, platform, truth, at, last),
@@ -464,7 +465,8 @@ def table(seed):
 
     # cues
     sender = via(2, 7, lambda c, s: S.dropped(S.even(60, s), c, 0.01))
-    bars = {"smooth": {"lag_ms": 41.5, "shape": 24.0, "jerk": 1.2}, "balanced": {"lag_ms": 30.0, "shape": 50.0, "jerk": 1.3}}
+    # of other seeds losses that come together make more: up to 35 um
+    bars = {"smooth": {"lag_ms": 41.5, "shape": 24.0 if seed == 1 else 40.0, "jerk": 1.2}, "balanced": {"lag_ms": 30.0, "shape": 50.0, "jerk": 1.3}}
     put("cue: z 60 mm, 60 Hz, 2-7 ms, 1 % lost", LARGE, cue(sender, {"z": 60}, bars, 100.0))
     put("cue: six axes, 60 Hz, 2-7 ms, 1 % lost", LARGE, cue(sender, {"x": 30, "y": 30, "z": 60, "roll": 2.5, "pitch": 2.5, "yaw": 2.5}, bars, 60.0))
     recorded = {style: {"shape": 60.0} for style in STYLES}
@@ -477,21 +479,21 @@ def table(seed):
     put("timed moves, demo", DEMO, timed_moves())
     plain = lambda hz: wired(even(hz))  # noqa: E731  a shorter name for what follows
     for name, config, make_samples, arguments, lags, worsts, jerks in (
-            ("coarse: 1 mm, 60 Hz", LARGE, plain(60), {"decimals": 0, "coarse": 1.0}, (112, 119), (0.5, 0.5), (10, 28)),
-            ("coarse: 0.1 mm, 60 Hz", LARGE, plain(60), {"decimals": 1, "coarse": 0.1}, (62, 45), (0.1, 0.1), (13, 30)),
+            ("coarse: 1 mm, 60 Hz", LARGE, plain(60), {"decimals": 0, "coarse": 1.0}, (115, 121), (0.5, 0.5), (12, 30)),
+            ("coarse: 0.1 mm, 60 Hz", LARGE, plain(60), {"decimals": 1, "coarse": 0.1}, (64, 50), (0.2, 0.2), (19, 33)),
             ("coarse: 1 mm, 100 Hz, slow", DEMO, plain(100), {"decimals": 0, "coarse": 1.0, "hz": 0.15}, (99, 103), (0.23, 0.23), (240, 580)),
             ("repeats: each value twice, 100 Hz over 50", LARGE, wired(lambda c, s: S.repeated(S.even(50, s), 0.01, 2)), {},
-             (43.5, 21.5), (.08, .08), (1.1, 4.6)),
+             (43.5, 21.5), (.08, .08), (1.1, 5.2)),
             ("slow: 10 Hz", LARGE, plain(10), {"hz": 0.2}, (204, 94), (0.11, 0.08), (1.05, 7.5)),
             ("slow: 6.7 Hz", LARGE, plain(6.7), {"hz": 0.15}, (303, 139), (0.14, 0.1), (1.05, 9.6)),
             ("slow: 5 Hz", LARGE, plain(5), {"hz": 0.1}, (None, None), (1.3, 1.3), (4700, 4700)),
             ("slow: 3 Hz", LARGE, plain(3), {"hz": 0.06}, (None, None), (1.75, 1.75), (17000, 17000)),
             ("slow: 2 Hz", LARGE, plain(2), {"hz": 0.05}, (None, None), (2.5, 2.5), (25000, 25000)),
             ("plain: 30 Hz", LARGE, plain(30), {}, (70, 33.5), (.055, .045), (1.05, 4.7)),
-            ("plain: 60 Hz", LARGE, plain(60), {}, (36.6, 18.3), (.026, .026), (1.25, 6.8)),
-            ("plain: 100 Hz", LARGE, plain(100), {}, (23.2, 12.2), (.006, .005), (2.8, 18)),
-            ("plain: 250 Hz", LARGE, plain(250), {}, (11.2, 6.8), (.003, .035), (41, 67)),
-            ("plain: 1000 Hz", LARGE, plain(1000), {}, (11.2, 6.8), (.003, .05), (42, 67))):
+            ("plain: 60 Hz", LARGE, plain(60), {}, (36.6, 18.3), (.035, .035), (1.35, 7.8)),
+            ("plain: 100 Hz", LARGE, plain(100), {}, (23.2, 12.2), (.007, .006), (3.3, 21)),
+            ("plain: 250 Hz", LARGE, plain(250), {}, (11.2, 6.8), (.003, .05), (44, 70)),
+            ("plain: 1000 Hz", LARGE, plain(1000), {}, (11.2, 6.8), (.003, .05), (44, 70))):
         # smooth and fast: as heaved was before it looked at evidence; balanced between them
         bars = {style: {"lag_ms": lags[k], "worst_mm": worsts[k], "jerk": jerks[k]} for k, style in enumerate(("smooth", "fast"))}
         bars["balanced"] = {"lag_ms": lags[0], "worst_mm": 3 * max(worsts), "jerk": max(jerks)}
@@ -587,7 +589,7 @@ def mixed_sine(make_samples, hz, size, bar, is_six, seconds=26.0):
         def judge(trace, style):
             first, last = rows(SETTLED_S), rows(min(seconds, samples[-1].arrives))
             return [*J.following(trace, truth, platform, first, last, weights, worst_mm=bar, main=platform.index("z")),
-                    settle_range(trace, platform, truth, weights, seconds), *limits(trace, platform, last)]
+                    settle_range(trace, platform, truth, weights, last), *limits(trace, platform, last)]
         return Ride(S.frames(platform, signal, samples, "A", 3), judge, S.UP_MS + 1000 * seconds)
     return make
 
