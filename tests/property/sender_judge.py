@@ -11,7 +11,7 @@ from itertools import islice
 from operator import mul, sub
 
 COLUMNS = 17
-FIRST_POSE, FIRST_CYLINDER, FLAGS = 2, 9, 16
+FIRST_POSE, FIRST_CYLINDER = 2, 9
 ROUNDING = (0.0, 1e-9, 2e-9, 4e-9)  # what nine decimals are worth in a difference
 LAGS_MS = range(-20, 1301)
 
@@ -49,10 +49,11 @@ class Trace:
         at = 1 + int(begin_ms - first)
         assert 1 <= at < len(lines) - 100 and float(lines[at].split(",", 1)[0]) == begin_ms, f"no row at {begin_ms} ms, or rows of another cycle time"
         wanted = [FIRST_POSE + axis for axis in platform.free]
-        table = list(zip(*(line.split(",") for line in islice(lines, at, None) if line)))
+        kept = [line for line in islice(lines, at, None) if line]
+        table = list(zip(*(line.split(",", -1 if with_cylinders else FIRST_POSE + 6) for line in kept)))
         self.values = [array("d", map(float, table[index])) for index in wanted]
         self.cylinders = [array("d", map(float, table[FIRST_CYLINDER + k])) for k in range(platform.count)] if with_cylinders else []
-        self.states, self.flags = table[1], table[FLAGS]
+        self.states, self.flags = table[1], [line[line.rfind(",") + 1:] for line in kept]
         self.rows = len(self.flags)
         last = float(lines[-2 if not lines[-1] else -1].split(",", 1)[0])
         assert last == begin_ms + len(self.flags) - 1, "rows are missing"
@@ -174,12 +175,16 @@ def ramp_speed(column, speed, first, last, low, high, over_ms=10):
 
 
 # ---- engaged into a stream that moves ----
-def engage_speed(trace, platform, truth, first, last, share=1.1):
+def own_speeds(platform, truth, stride=10):
+    """Of each cylinder, were the stream followed as it is."""
+    rows = [platform.extensions(platform.whole(values)) for values in zip(*(column[::stride] for column in truth))]
+    return [most(differences(column, 1)) / stride for column in zip(*rows)]
+
+
+def engage_speed(trace, platform, own, first, last, share=1.1):
     """How much of engage speed + 1.1 x the stream's own is used by the cylinder that is nearest to it."""
-    rows = [platform.extensions(platform.whole(values)) for values in zip(*(column[::4] for column in truth))]
     used, fastest = 0.0, 0.0
-    for own, made in zip(zip(*rows), trace.cylinders):
-        own_speed = most(differences(own, 1)) / 4
+    for own_speed, made in zip(own, trace.cylinders):
         speed = most(differences(made[first:last], 1))
         fastest = max(fastest, speed)
         used = max(used, speed / (platform.engage_speed + share * own_speed + 0.5))

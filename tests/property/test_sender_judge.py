@@ -112,9 +112,10 @@ def main():
     with suite.case("taken over: a cylinder faster than engage speed and 1.1 x the stream's own"):
         own = [platform.extensions(platform.whole(values)) for values in zip(*(column[::4] for column in truth))]
         fastest = [J.most([(b - a) * 250 for a, b in zip(column, column[1:])]) for column in zip(*own)]
+        assert all(abs(a - b) < 1e-3 * a for a, b in zip(fastest, J.own_speeds(platform, truth)))
         for factor, names in ((0.98, ()), (1.05, ("cylinder speed/allowed",))):
             cylinders = [[factor * (platform.engage_speed + 1.1 * speed + 0.5) * 1e-3 * i for i in range(3000)] for speed in fastest]
-            expect(J.engage_speed(Made(truth, cylinders), platform, truth, 0, 3000), *names)
+            expect(J.engage_speed(Made(truth, cylinders), platform, J.own_speeds(platform, truth), 0, 3000), *names)
     with suite.case("the least time to a rest: known ones, and no profile of random phases is faster"):
         for way in (1.0, 400.0):
             # far: speed reached, and acceleration reached
@@ -168,6 +169,9 @@ def main():
             raise AssertionError("a trace with a missing row, or none, was taken")
     with suite.case("senders: what is sent when"):
         chance = S.chance_of(1)
+        cue = S.Cue(chance, platform.home, size, 20.0)
+        table = cue.table(20000)
+        assert all(abs(column[i] - value) < 1e-8 for i in range(0, 20000, 37) for column, value in zip(table, cue.at(i * 1e-3)))
         assert [round(s.arrives, 6) for s in S.paused(S.even(10, 1), 0.5, 0.15, True)][4:7] == [0.4, 0.65, 0.75]
         assert [round(s.at, 6) for s in S.paused(S.even(10, 1), 0.5, 0.15, True)][4:7] == [0.4, 0.5, 0.6]
         assert [round(s.at, 6) for s in S.paused(S.even(10, 1), 0.5, 0.15, False)][4:7] == [0.4, 0.65, 0.75]

@@ -224,7 +224,7 @@ def engaged(size, hz, how="rising", rate_hz=60, shift_s=0.0, axes=("z",), decima
                        if not 9 + shift_s <= s.arrives < 12.01 + shift_s]
         else:
             samples = [s for s in samples if not 9 + shift_s <= s.arrives < 10.7 + shift_s]
-        truth = signal.table(rows(8.0) if len(axes) == 1 else rows(seconds), 1e-3)
+        own = J.own_speeds(platform, signal.table(rows(8.0) if len(axes) == 1 else rows(seconds)))
 
         def judge(trace, style):
             at = next((i for i, state in enumerate(trace.states) if state == "ENGAGED"), None)
@@ -233,7 +233,7 @@ def engaged(size, hz, how="rising", rate_hz=60, shift_s=0.0, axes=("z",), decima
             last = rows(samples[-1].arrives)
             weights = scaled_weights(platform)
             low, high = ([m + way * abs(s) for m, s in zip(platform.home, sizes)] for way in (-1, 1))
-            return [J.reach(trace.values, low, high, weights, 0.02, 0.05, at, last), *J.engage_speed(trace, platform, truth, at, last),
+            return [J.reach(trace.values, low, high, weights, 0.02, 0.05, at, last), *J.engage_speed(trace, platform, own, at, last),
                     *J.limits(trace, platform, [("", at, last)])]
         lines = [*((t + begin - S.UP_MS, text) for t, text in S.frames(platform, signal, samples, "A", decimals)), *requests]
         return Ride(lines, judge, begin + 1000 * seconds, begin_ms=begin, with_cylinders=True, engage_ms=int(begin + 1000 * shift_s) if how == "rising" else 0)
@@ -637,7 +637,7 @@ def known_styles(arguments):
             if done.returncode == 0:
                 known.append(style)
             else:
-                print(f"style {style} is not there: {done.stderr.strip().splitlines()[-1] if done.stderr.strip() else done.returncode}")
+                print(f"# style {style} is not there: {done.stderr.strip().splitlines()[-1] if done.stderr.strip() else done.returncode}")
     return known
 
 
@@ -672,7 +672,7 @@ def main():
             for name, style, figures, error in results:
                 good = error is None and all(figure.holds for figure in figures)
                 passed, failed = passed + good, failed + (not good)
-                report(a, passed + failed, f"{name} [{style}]", good, error or ", ".join(str(figure) for figure in figures if a.verbose or not figure.holds))
+                report(a, passed + failed, (name, style), good, error or ", ".join(str(figure) for figure in figures if a.verbose or not figure.holds))
     if a.tap:
         print(f"1..{passed + failed}")
         print(f"# figure {passed + failed} senders and mixtures of them judged, in {len(a.styles)} styles")
@@ -682,11 +682,14 @@ def main():
     return 0 if failed == 0 and passed else 1
 
 
-def report(arguments, number, name, good, text):
+def report(arguments, number, what, good, text):
+    name, style = what
     if arguments.tap:
-        print(f"{'ok' if good else 'not ok'} {number} - {name}", *([] if good else [f"# {text}"]), sep="\n", flush=True)
+        again = (f"# again: python3 tests/property/test_senders.py --heaved {arguments.heaved} --seed {arguments.seed} --mixtures {arguments.mixtures} --all "
+                 f"--styles {style} --filter '^{re.escape(name)}$' --verbose --keep DIR")
+        print(f"{'ok' if good else 'not ok'} {number} - {name} [{style}]", *([] if good else [f"# {text}", again]), sep="\n", flush=True)
     elif arguments.verbose or not good:
-        print(f"{'ok  ' if good else 'FAIL'} {name}: {text}", flush=True)
+        print(f"{'ok  ' if good else 'FAIL'} {name} [{style}]: {text}", flush=True)
 
 
 SCENARIOS = []
