@@ -97,8 +97,8 @@ def shake(hz, over, limit, rate_hz, direction="z", space="A", decimals=6, second
             columns = trace.cylinders if space == "C" else trace.values
             first, last = rows(SETTLED_S), rows(samples[-1].arrives)
             low, high = ([m + way * abs(s) for m, s in zip(middle, size)] for way in (-1, 1))
-            return [*J.gain(columns, middle, size, weights, first, last, rounding, over=asked), J.reach(columns, low, high, weights, 0.025, 0.1 + rounding, 0, last),
-                    *J.limits(trace, platform, [("", first, last)], cylinders=space == "C")]
+            return [*J.gain(columns, middle, size, weights, first, last, rounding, over=asked),
+                    J.reach(columns, low, high, weights, 0.025, 0.1 + rounding, 0, last), *J.limits(trace, platform, [("", first, last)], cylinders=space == "C")]
         return Ride(S.frames(platform, signal, samples, space, decimals), judge, S.UP_MS + 1000 * seconds, with_cylinders=space == "C")
     return make
 
