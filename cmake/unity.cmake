@@ -29,7 +29,8 @@ set(HEAVE_WAITS 1)
 set(HEAVE_SECONDS
   system.rt 1000 # the processors are its own: before all others
   system.live 900 system.syscalls 800 system.coils 700 system.metrics 600 system.senders 500 system.flood 400
-  system.can.failures.latched 90 system.can.failures.together 66 system.canraw 60 check.package 54 system.can.CSP 52 system.can.Mbit 45 system.can.PP 50
+  system.can.failures.latched 90 system.can.failures.together 66 property.senders 80
+  system.canraw 60 check.package 54 system.can.CSP 52 system.can.Mbit 45 system.can.PP 50
   system.doctor 48 system.can.IP 42 check.judge 40 system.can.failures.killed 38 system.modbus_presets 38 check.lint 38 golden.s390x 37 golden.armhf 37
   golden.arm64 37 golden.cortex 37 system.modbus_drives 37 check.trace 35 system.can.failures.nothing 32 property.hostile 32 system.kernel 29
   system.timed_streams 28 golden.optimisation 27 property.singularity 26 system.can.jump 24 system.trouble.stopped 22 system.trouble.clock 22 peers.cia402 22

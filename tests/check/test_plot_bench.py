@@ -425,11 +425,18 @@ def check_signals(suite):
         assert all(len(text.split(".")[1]) == 3 for _, text in arrivals)
     with suite.case("a hold knows the newest value that has arrived, that of the cycle included"):
         assert signals.held([(0, "1"), (1500, "2"), (3000, "3")], 5) == [1, 1, 2, 3, 3]
+        assert signals.held([(0, "1,7,4"), (1500, "2,8,5")], 3, axis=1) == [7, 7, 8]
     with suite.case("steps start from rest and go where they should"):
         arrivals, moves = signals.steps((1.0, 100.0))
         assert [(start, end) for _, start, end in moves] == [(0, 1), (-50, 50)]
         assert [text for _, text in arrivals] == ["0.000", "1.000", "-50.000", "50.000"]
     with suite.case("FRAMES are written as heaved reads them"):
+        six, _ = signals.stream(signals.six_axes(30, 7), 60, 30, 7)
+        alone, _ = signals.stream(signals.Cue(30, 7), 60, 30, 7)
+        assert [(t_us, text.split(",")[5]) for t_us, text in six] == alone and all(text.count(",") == 5 for _, text in six)
+        assert all(max(abs(float(text.split(",")[k])) for _, text in six) > 0.3 * half for k, half in enumerate(signals.AXES_HALF))
+        signals.write_frames(FOLDER / "six.frames", [(0, "1.0,2.0,3.0,4.0,5.0,6.0")], 0)
+        assert (FOLDER / "six.frames").read_text(encoding="ascii") == "0.000 @A6:1.0,2.0,3.0,4.0,5.0,6.0,0#\n"
         signals.write_frames(FOLDER / "some.frames", [(0, "0.000"), (16667, "-1.500")], 2_500_000)
         assert (FOLDER / "some.frames").read_text(encoding="ascii") == "2500.000 @A6:0,0,0,0,0,0.000,0#\n2516.667 @A6:0,0,0,0,0,-1.500,0#\n"
 
@@ -542,7 +549,8 @@ def check_programs(suite, heaved, bench_core):
         assert result.returncode == 0, result.stderr
         figures = json.loads(result.stdout)
         methods = figures["streams"][0]["methods"]
-        assert set(methods) == {"held, no limits", "heaved smooth", "heaved fast", "two limits"}, set(methods)
+        styles = {method for method in methods if method.startswith("heaved ")}
+        assert "heaved smooth" in styles and set(methods) == styles | {"held, no limits", "two limits"}, set(methods)
         smooth, held = methods["heaved smooth"], methods["held, no limits"]
         assert figures["streams"][0]["cycles_judged"] == 10000
         assert held["line_db"] == 0 and smooth["line_db"] < -40, smooth
@@ -551,6 +559,14 @@ def check_programs(suite, heaved, bench_core):
         assert smooth["jerk_peak_mm_s3"] <= limits["jerk_mm_s3"] + 4 and smooth["jerk_rms_of_true"] < held["jerk_rms_of_true"] / 100, smooth
         assert [move["to_mm"] - move["from_mm"] for move in figures["steps"]] == [1, 10, 100]
         assert all(move["methods"]["heaved smooth"]["settled_ms"] for move in figures["steps"]), figures["steps"]
+        six = figures["six"][0]
+        assert set(six["methods"]) == styles | {"two limits"} and six["frames"] == figures["streams"][0]["frames"], six
+        # z of six axes moves as z alone does, and no axis lags behind the others
+        both, row = six["methods"]["two limits"], six["methods"]["heaved smooth"]
+        expect_near(both["lag_ms"], methods["two limits"]["lag_ms"], 1e-6, "the lag of z, of two limits")
+        expect_near(row["lag_ms"], smooth["lag_ms"], 0.5, "the lag of z")
+        expect_near(row["lag_ms_worst"], row["lag_ms"], 1, "the lag of the worst axis")
+        assert row["shape_um"] <= 50 * row["shape_permille_worst"] + 1e-9 < held["shape_um"] and row["jerk_rms_of_true"] <= row["jerk_rms_of_true_worst"] < 10, row
     with suite.case("bench cost knows every subject of its program, and runs it"):
         if not bench_core:
             raise tap.Skip("no --bench-core")

@@ -15,6 +15,7 @@
     ((unsigned)FLAG_CYLINDERS | FLAG_TAKEOVER | FLAG_NO_POSE) /* the pose axes take over where such a row ends */
 #define NO_BOUNDS_FLAGS (ANYWHERE_FLAGS | FLAG_OFF_PATH)
 #define NO_RATES_FLAGS  (NO_BOUNDS_FLAGS | FLAG_CLAMPED)
+#define STRICT_FLAGS    ((unsigned)FLAG_CYLINDERS | FLAG_NO_POSE) /* no pose is followed */
 
 static int64_t magnitude(int64_t value)
 {
@@ -123,23 +124,25 @@ static void check_movers(rules_t *self)
  * it would have been. */
 static void check_pose(rules_t *self, unsigned flags)
 {
+    const bool has_bounds = (flags & (self->is_strict ? STRICT_FLAGS : NO_BOUNDS_FLAGS)) == 0;
+    const bool has_rates = (flags & (self->is_strict ? STRICT_FLAGS : NO_RATES_FLAGS)) == 0;
     for (unsigned axis = 0; axis < POSE_COLUMNS; axis++) {
         if (!self->mechanism->is_free[axis]) {
             continue;
         }
-        if ((flags & NO_BOUNDS_FLAGS) != 0) {
+        if (!has_bounds) {
             allow(self, axis, true, (flags & ANYWHERE_FLAGS) == 0);
         } else {
             check_range(self, axis, POSE_SLACK, (flags & FLAG_CLAMPED) != 0);
         }
-        for (unsigned order = 1; order < ORDERS && (flags & NO_RATES_FLAGS) == 0; order++) {
+        for (unsigned order = 1; order < ORDERS && has_rates; order++) {
             if (self->pose_age >= order) {
                 check_rate(self, RULE_COLUMN + 4 * axis + order, axis, order, &self->mechanism->column[axis]);
             }
         }
     }
-    self->pose_judged += (flags & NO_RATES_FLAGS) == 0;
-    self->pose_age = (flags & NO_RATES_FLAGS) == 0 ? self->pose_age + 1 : 0;
+    self->pose_judged += has_rates;
+    self->pose_age = has_rates ? self->pose_age + 1 : 0;
 }
 
 /* ---- set-points that follow the actual positions ---- */
@@ -297,9 +300,9 @@ static void count(rules_t *self, const row_t *row)
     }
 }
 
-void rules_init(rules_t *self, const mechanism_t *mechanism)
+void rules_init(rules_t *self, const mechanism_t *mechanism, bool is_strict)
 {
-    *self = (rules_t){.mechanism = mechanism};
+    *self = (rules_t){.mechanism = mechanism, .is_strict = is_strict};
 }
 
 void rules_bad_line(rules_t *self)

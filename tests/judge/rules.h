@@ -40,6 +40,7 @@ typedef struct {
 
 typedef struct {
     const mechanism_t *mechanism;
+    bool is_strict; /**< the pose axes are judged wherever a pose is followed: taken over, clamped, behind the reference */
     uint64_t rows, judged, pose_judged, in_place[PLACES], with_flag[FLAG_COUNT];
     uint64_t broken[RULES];
     double worst[RULES]; /**< share of the limit; RULE_AGREE, RULE_GUIDE: mm */
@@ -58,7 +59,7 @@ typedef struct {
     int64_t last_speed; /**< of the fastest cylinder */
 } rules_t;
 
-void rules_init(rules_t *self, const mechanism_t *mechanism);
+void rules_init(rules_t *self, const mechanism_t *mechanism, bool is_strict);
 
 /** Judges the next row. */
 void rules_row(rules_t *self, const row_t *row);

@@ -34,9 +34,9 @@ class Judge:
     def __init__(self, program):
         self.program = program
 
-    def broken(self, lines, config=CONFIG):
+    def broken(self, lines, config=CONFIG, is_strict=False):
         """{rule: count}, and (rows, judged, of these poses)."""
-        run = subprocess.run([self.program, config], input="".join(lines), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        run = subprocess.run([self.program, *(["--strict"] if is_strict else []), config], input="".join(lines), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
         assert run.returncode in (0, 1), run.stderr
         words, counts = [line.split(" ", 2) for line in run.stdout.splitlines()], {}
         for _, value, name in [parts for parts in words if parts[0] == "broken"]:
@@ -46,16 +46,16 @@ class Judge:
         return counts, (numbers["rows"], numbers["judged"], numbers["pose"])
 
 
-def by_check_trace(lines, platform):
-    checker = Checker(platform, every=1)
+def by_check_trace(lines, platform, is_strict=False):
+    checker = Checker(platform, every=1, is_strict=is_strict)
     checker.read(lines)
     counts = {rule: count for rule, count in checker.findings.by_rule.items() if rule not in NOT_JUDGED}
     return counts, (checker.rows, checker.rows - checker.following_rows, checker.pose_rows)
 
 
-def expect_same(judge, lines, config=CONFIG, platform=None):
+def expect_same(judge, lines, config=CONFIG, platform=None, is_strict=False):
     lines = list(lines)
-    fast, reference = judge.broken(lines, config), by_check_trace(lines, platform or Platform(config))
+    fast, reference = judge.broken(lines, config, is_strict), by_check_trace(lines, platform or Platform(config), is_strict)
     assert fast == reference, f"the judge: {fast}\ncheck_trace: {reference}"
     return fast[0]
 
@@ -153,6 +153,23 @@ def check_pulled_in(suite, judge):
             assert ("z position" in broken) == found, broken
 
 
+def check_strict(suite, judge):
+    """Where a pose is followed its limits count, whatever the flags say; where cylinders are led they do not."""
+    CONFIG.write_text(synthetic.ini(), encoding="utf-8")
+    for text, is_found in (("takeover", True), ("off-path", True), ("clamped", True), ("takeover|off-path|clamped|accel", True), ("cylinders", False),
+                           ("no-pose", False), ("cylinders|takeover", False)):
+        for name, shift in (("jerk", 50_000), ("position", 0)):  # 1e-9 mm
+            with suite.case(f"strictly, flags {text}: z beyond its {name} is {'found' if is_found else 'fine'}"):
+                trace = Trace()
+                for i in range(4001):
+                    trace.pose("ENGAGED", (0, 0, 0, 0, 0, (89 if shift else 91) * synthetic.smooth(i / 4000)), flags=text)
+                trace.rows[2000][2][5] += shift  # in one row; the cylinders stay
+                broken = expect_same(judge, trace.lines(), is_strict=True)
+                assert (f"z {name}" in broken) == is_found, broken
+                always = name == "position" and text == "clamped"
+                assert (f"z {name}" in expect_same(judge, trace.lines())) == always, "without --strict"
+
+
 def check_synthetic(suite, judge):
     CONFIG.write_text(synthetic.ini(), encoding="utf-8")
     with suite.case("a trace of every state, all of it within the limits, passes"):
@@ -220,7 +237,7 @@ def check_real(suite, judge, heaved, mutations):
                 part = rows[start:start + SLICE_ROWS]
                 mutate(part, chance)
                 try:
-                    broken += bool(expect_same(judge, [header, *part], config, platform))
+                    broken += bool(expect_same(judge, [header, *part], config, platform, number % 2 == 1))
                 except AssertionError as error:
                     raise AssertionError(f"mutation {number} of rows {start} on: {error}") from None
             assert broken > mutations / 4, f"only {broken} of {mutations} faults were any"
@@ -235,6 +252,7 @@ def main():
     suite, judge = tap.Suite(), Judge(arguments.judge)
     check_last_decimals(suite, judge)
     check_pulled_in(suite, judge)
+    check_strict(suite, judge)
     check_synthetic(suite, judge)
     check_real(suite, judge, arguments.heaved, arguments.mutations)
     with suite.case("a configuration that lacks a limit is refused, and the message names it"):

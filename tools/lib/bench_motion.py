@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""bench_motion.py - the subcommand motion of tools/bench: one axis, the same arrivals through heaved and through others, side by side."""
+"""bench_motion.py - the subcommand motion of tools/bench: one axis, then six at once, the same arrivals through heaved and through others, side by
+side."""
 import json
 import subprocess
 import sys
@@ -10,7 +11,7 @@ import bench_analysis as analysis
 import bench_signal as signals
 from bench_rivals import NoRuckig, Ruckig, two_limits
 from platform_ini import Platform, read_ini
-from trace_check import COLUMNS
+from trace_check import COLUMNS, POSE_COLUMNS
 from trace_rules import NANO
 
 CONFIG = Path(__file__).resolve().parents[2] / "tests" / "bench" / "z_axis.ini"
@@ -20,8 +21,10 @@ SKIPPED_S = 4.0        # of a record: the fade-in of the signal, and what the pe
 END_S = 2.0
 BAND_HZ = 4.0
 WAYS_MM = (1.0, 10.0, 100.0)
-Z = COLUMNS.index("z_mm") + 2
-HELD, SMOOTH, FAST, LIMITED, RUCKIG = "held, no limits", "heaved smooth", "heaved fast", "two limits", "Ruckig"
+FIRST_POSE = COLUMNS.index(POSE_COLUMNS[0]) + 2
+Z = POSE_COLUMNS.index("z_mm")
+STYLES = ("smooth", "balanced", "fast")
+HELD, LIMITED, RUCKIG = "held, no limits", "two limits", "Ruckig"
 
 
 class MotionError(Exception):
@@ -31,9 +34,12 @@ class MotionError(Exception):
 class Bench:
     def __init__(self, heaved, folder, with_ruckig, say):
         self.heaved, self.folder, self.say = heaved, Path(folder), say
-        self.axis = Platform(CONFIG).axes["z"]
+        axes = Platform(CONFIG).axes
         self.cycle_us = int(read_ini(CONFIG)["platform"]["cycle_us"])
-        self.limits = [float(limit) for limit in (self.axis.speed, self.axis.accel, self.axis.jerk)]
+        self.axis_limits = [[float(limit) for limit in (axis.speed, axis.accel, axis.jerk)]
+                            for axis in (axes[column.split("_")[0]] for column in POSE_COLUMNS)]
+        self.limits = self.axis_limits[Z]
+        self.styles = [style for style in STYLES if self.knows(style)] or STYLES[:1]  # one that knows none says why when it plays
         self.ruckig, self.without = None, "left out, as asked"
         if with_ruckig:
             try:
@@ -42,11 +48,23 @@ class Bench:
                 self.without = str(error)
                 say(f"without Ruckig: {error}")
 
+    def configure(self, name, style):
+        config = self.folder / f"{name}-{style}.ini"
+        config.write_text(CONFIG.read_text(encoding="ascii").replace("stream = smooth", f"stream = {style}"), encoding="ascii")
+        return config
+
+    def knows(self, style):
+        return subprocess.run([str(self.heaved), "--config", str(self.configure("style", style)), "--check"], capture_output=True, check=False).returncode == 0
+
     # ---- one list of arrivals through everything ----
     def play(self, name, style, arrivals):
         """What heaved makes of the arrivals: (z in mm, flags) of each cycle from the first arrival's time zero on."""
-        config, frames, trace = (self.folder / f"{name}-{style}.{end}" for end in ("ini", "frames", "csv"))
-        config.write_text(CONFIG.read_text(encoding="ascii").replace("stream = smooth", f"stream = {style}"), encoding="ascii")
+        axes, flags = self.play_axes(name, style, arrivals)
+        return axes[Z], flags
+
+    def play_axes(self, name, style, arrivals):
+        """The same of all six axes."""
+        config, (frames, trace) = self.configure(name, style), (self.folder / f"{name}-{style}.{end}" for end in ("frames", "csv"))
         rest = [(0, arrivals[0][1])]
         signals.write_frames(frames, rest + [(t_us + TAKEOVER_US, text) for t_us, text in arrivals], START_US - TAKEOVER_US)
         result = subprocess.run([str(self.heaved), "--config", str(config), "--play", str(frames), "--trace", str(trace)],
@@ -62,17 +80,17 @@ class Bench:
                 if t_us >= START_US:
                     if fields[1] != "ENGAGED":
                         raise MotionError(f"heaved is {fields[1]} at {fields[0]} ms of {trace}")
-                    record.append(int(fields[Z].replace(".", "")) / NANO)
+                    record.append([int(field.replace(".", "")) / NANO for field in fields[FIRST_POSE:FIRST_POSE + len(POSE_COLUMNS)]])
                     flags.append(fields[-1])
-        return record, flags
+        return list(zip(*record)), flags
 
     def records(self, name, arrivals):
         """{method: record}, all of the same length, and {method: flags} of heaved's."""
         flags = {}
         result = {HELD: None}
-        for method, style in ((SMOOTH, "smooth"), (FAST, "fast")):
-            result[method], flags[method] = self.play(name, style, arrivals)
-        cycles = min(len(result[SMOOTH]), len(result[FAST]))
+        for style in self.styles:
+            result[f"heaved {style}"], flags[f"heaved {style}"] = self.play(name, style, arrivals)
+        cycles = min(len(result[method]) for method in flags)
         targets = result[HELD] = signals.held(arrivals, cycles, self.cycle_us)
         result[LIMITED] = two_limits(targets, *self.limits[:2], analysis.CYCLE_S)
         if self.ruckig:
@@ -117,6 +135,45 @@ class Bench:
                                           "speed_peak_mm_s": max(map(abs, analysis.rates(truth, 1)))},
                 "methods": rows}
 
+    # ---- six axes at once ----
+    def six(self, rate_hz, seconds, seed):
+        """Of each method, z as above and the worst of all axes. The others move each axis for itself: they know of no others."""
+        axes = signals.six_axes(seconds, seed)
+        arrivals, lost = signals.stream(axes, rate_hz, seconds, seed)
+        records, flags = {}, {}
+        for style in self.styles:
+            records[f"heaved {style}"], flags[f"heaved {style}"] = self.play_axes(f"six-{rate_hz}hz", style, arrivals)
+        cycles = min(len(record[Z]) for record in records.values())
+        held = [signals.held(arrivals, cycles, self.cycle_us, k) for k in range(len(axes))]
+        records[LIMITED] = [two_limits(targets, *limits[:2], analysis.CYCLE_S) for targets, limits in zip(held, self.axis_limits)]
+        if self.ruckig:
+            try:
+                records[RUCKIG] = [self.ruckig.follow(targets, *limits, analysis.CYCLE_S) for targets, limits in zip(held, self.axis_limits)]
+            except NoRuckig as error:
+                self.say(f"six axes, {rate_hz} Hz: without Ruckig: {error}")
+        first, last = round(SKIPPED_S / analysis.CYCLE_S), round((seconds - END_S) / analysis.CYCLE_S)
+        rows = {}
+        for method, record in records.items():
+            figures = [self.one_of_six(column, axis, first, last) for column, axis in zip(record, axes)]
+            # of the amplitude, so that degrees and mm can be compared
+            shares = [shape / half for (_, shape, _), half in zip(figures, signals.AXES_HALF)]
+            rows[method] = {"lag_ms": 1000 * figures[Z][0], "shape_um": 1000 * figures[Z][1], "jerk_rms_of_true": figures[Z][2],
+                            "lag_ms_worst": 1000 * max(lag for lag, _, _ in figures), "shape_permille_worst": 1000 * max(shares),
+                            "jerk_rms_of_true_worst": max(jerk for _, _, jerk in figures)}
+            if method in flags:
+                words = [text for text in flags[method][first:last] if text]
+                rows[method]["flagged_cycles"] = len(words)
+                rows[method]["flags"] = sorted({word for text in words for word in text.split("|")})
+        return {"rate_hz": rate_hz, "seconds": seconds, "seed": seed, "frames": len(arrivals), "lost": lost, "cycles_judged": last - first, "methods": rows}
+
+    @staticmethod
+    def one_of_six(record, signal, first, last):
+        """Lag in s, shape, jerk in those of the signal."""
+        past, future = analysis.LAG_MAX, -analysis.LAG_MIN
+        lag, shape = analysis.lag_and_shape(record[first - past:last + future], lambda t: signal.at(t + (first - past) * analysis.CYCLE_S))
+        truth = analysis.rms(analysis.rates([signal.at(k * analysis.CYCLE_S) for k in range(first, last)], 3))
+        return lag, shape, analysis.rms(analysis.rates(record[first:last], 3)) / truth
+
     # ---- steps ----
     def steps(self):
         arrivals, moves = signals.steps(WAYS_MM)
@@ -130,7 +187,7 @@ class Bench:
             near = analysis.time_optimum_within(end - start, *self.limits)
             rows = {}
             for method, record in records.items():
-                if method in (HELD, FAST):  # no limits; a step is the same in both styles
+                if method == HELD or method in [f"heaved {style}" for style in STYLES[1:]]:  # no limits; a step is the same in all styles
                     continue
                 cycles, beyond = analysis.settling(record, first, min(last, len(record)), end)
                 moved = record[first - 4:last]
@@ -156,6 +213,17 @@ def print_stream(entry, out):
             print(f"{'':16}flags in {row['flagged_cycles']} cycles: {', '.join(row['flags'])}", file=out)
 
 
+def print_six(entry, out):
+    print(f"\nsix axes at once, {entry['rate_hz']} Hz: {entry['frames']} frames in {entry['seconds']:g} s, {entry['lost']} lost; "
+          f"{entry['cycles_judged']} cycles judged\n"
+          f"{'':16}{'z: lag':>9}{'shape':>10}{'jerk RMS':>10}{'worst axis: lag':>18}{'shape':>10}{'jerk RMS':>10}{'flags in':>10}\n"
+          f"{'':16}{'ms':>9}{'um RMS':>10}{'x true':>10}{'ms':>18}{'1/1000':>10}{'x true':>10}{'% cycles':>10}", file=out)
+    for method, row in entry["methods"].items():
+        flagged = f"{100 * row['flagged_cycles'] / entry['cycles_judged']:10.1f} {', '.join(row['flags'])}" if "flags" in row else ""
+        print(f"{method:16}{row['lag_ms']:9.2f}{row['shape_um']:10.1f}{number(row['jerk_rms_of_true']):>10}{row['lag_ms_worst']:18.2f}"
+              f"{row['shape_permille_worst']:10.2f}{number(row['jerk_rms_of_true_worst']):>10}{flagged}", file=out)
+
+
 def number(value):
     return f"{value:.2f}" if value < 100 else f"{value:.0f}"
 
@@ -173,7 +241,8 @@ def print_steps(moves, out):
 
 EXPLANATION = f"""
 lag: from the sender's sampling to the set-point, the network's {signals.NETWORK_US / 1000 + signals.JITTER_US / 2000:g} ms (mean) included;
-least-squares fit to the true signal. shape: what remains beside the lag. x true: against the jerk of the true signal sampled at the same
+least-squares fit to the true signal. shape: what remains beside the lag; of six axes in 1/1000 of the
+axis' amplitude. x true: against the jerk of the true signal sampled at the same
 cycles. dB: power of the acceleration in the band about the sender's rate, against the held targets. optimum: shortest possible with all
 three limits until within 1 um; "two limits" knows no jerk limit, so it may be faster. Peaks and RMS are finite differences of 1 ms
 set-points; nine printed decimals make up to 4 mm/s^3 of jerk."""
@@ -189,7 +258,7 @@ def run(heaved, rates, seconds, seed, with_ruckig, keep, as_json, say, out=sys.s
             print(f"one axis, {2 * signals.HALF_RANGE_MM:g} mm, limits {speed:g} mm/s, {accel:g} mm/s^2, {jerk:g} mm/s^3; cycle {bench.cycle_us} us; "
                   f"arrivals {signals.NETWORK_US / 1000:g} ms late + 0 to {signals.JITTER_US / 1000:g} ms of jitter, {signals.LOSS:.0%} lost, "
                   f"3 decimals; seed {seed}\n"
-                  f"heaved: {SMOOTH[7:]} and {FAST[7:]} ([udp] stream); {LIMITED}: speed and acceleration alone, as LinuxCNC's limit3; "
+                  f"heaved: {', '.join(bench.styles)} ([udp] stream); {LIMITED}: speed and acceleration alone, as LinuxCNC's limit3; "
                   f"{RUCKIG}: {'version ' + bench.ruckig.version if bench.ruckig else bench.without}, each target at rest", file=out)
         result = {"limits": {"speed_mm_s": speed, "accel_mm_s2": accel, "jerk_mm_s3": jerk}, "ruckig": bench.ruckig.version if bench.ruckig else None,
                   "streams": []}
@@ -198,6 +267,12 @@ def run(heaved, rates, seconds, seed, with_ruckig, keep, as_json, say, out=sys.s
             result["streams"].append(entry)
             if not as_json:
                 print_stream(entry, out)
+        result["six"] = []
+        for rate_hz in rates:
+            entry = bench.six(rate_hz, seconds, seed)
+            result["six"].append(entry)
+            if not as_json:
+                print_six(entry, out)
         result["steps"] = bench.steps()
         if as_json:
             json.dump(result, out, indent=1)

@@ -23,6 +23,7 @@ FLAGS = {"clamped", "speed", "accel", "stretched", "takeover", "cylinders", "off
 NO_POSE_BOUNDS = {"cylinders", "off-path", "takeover", "no-pose"}
 NO_POSE_LIMITS = NO_POSE_BOUNDS | {"clamped"}
 POSE_ANYWHERE = NO_POSE_BOUNDS - {"off-path"}  # the pose axes take over where such a row leaves them
+STRICTLY_NO_POSE = {"cylinders", "no-pose"}    # where a pose is followed, all rows count: taken over, pulled in, behind the reference
 
 POSE_COLUMNS = [f"{axis}_{UNIT[axis]}" for axis in POSE_AXES]
 ANGLE = len(POSE_AXES)
@@ -40,21 +41,27 @@ POSE_NOISE = 10  # a pose at rest may be solved anew from the same extensions, i
 
 
 class FlagTable(dict):
-    """flags as printed -> (has pose limits, has pose bounds, has a pose, is well-formed, pose axes are led elsewhere); filled when asked."""
+    """flags as printed -> (has pose limits, has pose bounds, has a pose, is well-formed, pose axes are led elsewhere, is clamped); filled when
+    asked."""
+
+    def __init__(self, is_strict):
+        super().__init__()
+        self.no_limits, self.no_bounds, self.anywhere = [STRICTLY_NO_POSE] * 3 if is_strict else (NO_POSE_LIMITS, NO_POSE_BOUNDS, POSE_ANYWHERE)
 
     def __missing__(self, text):
         words = text.split("|") if text else []
         known = set(words)
         fine = known <= FLAGS and len(known) == len(words)
-        self[text] = result = (not known & NO_POSE_LIMITS, not known & NO_POSE_BOUNDS, "no-pose" not in known, fine, known & POSE_ANYWHERE != set())
+        self[text] = result = (not known & self.no_limits, not known & self.no_bounds, "no-pose" not in known, fine, known & self.anywhere != set(),
+                               "clamped" in known)
         return result
 
 
 class Checker:
-    def __init__(self, platform, every=10, kept=20, watchers=(), block_rows=BLOCK_ROWS):
+    def __init__(self, platform, every=10, kept=20, watchers=(), block_rows=BLOCK_ROWS, is_strict=False):
         self.platform, self.every, self.watchers, self.block_rows = platform, every, watchers, block_rows
         self.findings = Findings(kept)
-        self.flag_table = FlagTable()
+        self.flag_table = FlagTable(is_strict)
         self.rows = self.following_rows = self.pose_rows = 0
         self.state_rows, self.flag_rows = Counter(), Counter()
         self.blocks_tail = None
@@ -289,7 +296,7 @@ class Checker:
             end = i + sum(1 for _ in group)
             if facts[1]:
                 for rule in self.pose_ranges:
-                    rule.check(block, i, end, self.findings, keeps=not facts[0])
+                    rule.check(block, i, end, self.findings, keeps=facts[5])
             else:
                 self._place_pose(block, end - 1, keeps=not facts[4])
             if facts[0]:
