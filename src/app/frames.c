@@ -311,6 +311,26 @@ static bool read_fault(cursor_t *self, frames_line_t *out)
     return false;
 }
 
+/* What a recording tells of drives and senders.
+ * Returns what is wrong with the words, NULL = nothing. */
+static const char *read_told_words(cursor_t *self, frames_line_t *out)
+{
+    static const struct {
+        const char *word;
+        const char *bad;
+        bool (*read)(cursor_t *self, frames_line_t *out);
+    } k_told[] = {{"drive", k_bad_drive, read_drive},
+                  {"fault", k_bad_fault, read_fault},
+                  {"feedback", k_bad_feedback, read_feedback},
+                  {"from", k_bad_from, read_address}};
+    for (size_t i = 0; i < sizeof k_told / sizeof k_told[0]; i++) {
+        if (take_word(self, k_told[i].word)) {
+            return k_told[i].read(self, out) ? NULL : k_told[i].bad;
+        }
+    }
+    return k_bad_request;
+}
+
 /* Reads the words behind the exclamation mark.
  * Returns what is wrong with them, NULL = nothing. */
 static const char *read_request_words(cursor_t *self, frames_line_t *out)
@@ -335,15 +355,6 @@ static const char *read_request_words(cursor_t *self, frames_line_t *out)
         out->kind = FRAMES_LATE;
         return read_count(self, UINT32_MAX, &out->number) ? NULL : k_bad_late;
     }
-    if (take_word(self, "drive")) {
-        return read_drive(self, out) ? NULL : k_bad_drive;
-    }
-    if (take_word(self, "fault")) {
-        return read_fault(self, out) ? NULL : k_bad_fault;
-    }
-    if (take_word(self, "feedback")) {
-        return read_feedback(self, out) ? NULL : k_bad_feedback;
-    }
     if (take_word(self, "end")) {
         out->kind = FRAMES_END;
         return NULL;
@@ -355,10 +366,7 @@ static const char *read_request_words(cursor_t *self, frames_line_t *out)
         self->at += out->length;
         return NULL;
     }
-    if (take_word(self, "from")) {
-        return read_address(self, out) ? NULL : k_bad_from;
-    }
-    return k_bad_request;
+    return read_told_words(self, out);
 }
 
 static const char *read_request(cursor_t *self, frames_line_t *out)

@@ -211,7 +211,7 @@ static void suppose_all(struct pollfd *fds, unsigned count)
 {
     const struct timespec pause = {.tv_nsec = errno == EINTR ? 0 : WAITING_MS * 1000000L};
     for (unsigned i = 0; i < count; i++) {
-        fds[i].revents = fds[i].fd >= 0 ? fds[i].events : 0;
+        fds[i].revents = (short)(fds[i].fd >= 0 ? fds[i].events : 0);
     }
     (void)nanosleep(&pause, NULL);
 }
