@@ -134,6 +134,20 @@ static void tidy_jump(confirm_jump_t *jump)
     jump->from_q32 = was.from_q32;
 }
 
+static void tidy_feedback(drive_feedback_t *feedback)
+{
+    const drive_feedback_t was = *feedback;
+    memset(feedback, 0, sizeof *feedback);
+    feedback->state = was.state;
+    feedback->is_homed = was.is_homed;
+    feedback->has_actual = was.has_actual;
+    feedback->is_energized = was.is_energized;
+    feedback->actual_mm_q32 = was.actual_mm_q32;
+    feedback->actual_us = was.actual_us;
+    feedback->fault_code = was.fault_code;
+    feedback->guard = was.guard;
+}
+
 /* All a gateway knows but what is said and counted of rejects. */
 static void forget_rejects(const gateway_t *gateway, gateway_t *out)
 {
@@ -154,6 +168,9 @@ static void forget_rejects(const gateway_t *gateway, gateway_t *out)
     tidy_target(&out->confirm.waiting);
     tidy_jump(&out->confirm.jump);
     tidy_jump(&out->confirm.drop);
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        tidy_feedback(&out->snapshot.drive[i]);
+    }
 }
 
 static void compare(void)
