@@ -112,6 +112,7 @@ typedef struct {
     uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
     uint64_t state_since_us; /**< when the state was entered */
     confirm_t confirm;
+    uint32_t waited_us;     /**< by the newest datagram for its cycle */
     unsigned stream_frames; /**< in quick succession so far, at most as many as make a stream */
     uint16_t frame_mask;    /**< what the sender asked of the relays */
     relay_policy_t relay_policy;

@@ -42,6 +42,9 @@ void intensity_step(intensity_t *self);
 /** What is in force, in percent. */
 q32_t intensity_percent_q32(const intensity_t *self);
 
+/** The larger one of what is in force and what is asked for: what a motion may come to need. */
+q16_t intensity_largest_q16(const intensity_t *self);
+
 /** Where a sender's value is with the share in force: exactly neutral at 0 %, exactly the value at 100 %. */
 q32_t intensity_scaled(const intensity_t *self, q32_t neutral_q32, q32_t value_q32);
 

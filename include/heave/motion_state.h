@@ -4,6 +4,7 @@
 #ifndef HEAVE_MOTION_STATE_H
 #define HEAVE_MOTION_STATE_H
 
+#include "heave/fade.h"
 #include "heave/gate.h"
 #include "heave/halt.h"
 #include "heave/motion.h"
@@ -19,15 +20,6 @@ typedef enum {
     MOTION_HALTING,  /**< following: a stop, then the S-curve */
     MOTION_STRAIGHT  /**< following: a timed move or a step from rest along an S-curve */
 } motion_source_t;
-
-/** How a stream is followed. */
-typedef enum {
-    JOIN_NONE,   /**< on its curve */
-    JOIN_DUE,    /**< to be planned in the coming cycle */
-    JOIN_CURVE,  /**< the difference to the curve fades out along the quintic */
-    JOIN_SAMPLE, /**< the quintic leads to the newest sample, as the curve is beyond the limits */
-    JOIN_HALT    /**< slowing down, as no quintic keeps the limits */
-} motion_join_t;
 
 /** What the targets of a cycle ask to be planned; the newest one counts. */
 typedef enum { DUE_NOTHING, DUE_STEP, DUE_STREAM, DUE_TIMED } motion_due_t;
@@ -45,15 +37,9 @@ typedef struct {
 
 /** What leads: one of these at a time. */
 typedef union {
-    quintic_t quintic;          /**< MOTION_TIMED, and where a stream is joined */
+    quintic_t quintic;          /**< MOTION_TIMED */
     motion_straight_t straight; /**< MOTION_RESTING, MOTION_ON_PATH, MOTION_STRAIGHT; begun before a stop ends */
 } motion_plan_t;
-
-/** What is never needed at the same time. */
-typedef union {
-    halt_t halt;    /**< a stop that is under way, or tried */
-    quintic_t kept; /**< the way to a stream's curve while a shorter one is looked for, which takes no stop */
-} motion_aside_t;
 
 struct motion {
     kin_t kin;
@@ -63,7 +49,8 @@ struct motion {
     pose_t settled_pose;
     q32_t neutral_mm_q32[CYLINDERS_MAX];
     q32_t settled_mm_q32[CYLINDERS_MAX];
-    ramp_limits_t engage_limits; /**< of every cylinder on a path and at a take-over */
+    ramp_limits_t engage_limits; /**< of every cylinder on a path */
+    fade_limits_t fade_limits;   /**< at a take-over */
 
     bool is_axis_moved[AXES_MAX];       /**< the others stay at 0 */
     ramp_t axis[AXES_MAX];              /**< pose axes and the rotation motor */
@@ -80,7 +67,7 @@ struct motion {
     gate_t gate;
     motion_target_t withheld; /**< what the gate holds back */
     motion_plan_t plan;
-    motion_aside_t aside;
+    halt_t halt; /**< a stop that is under way, or tried */
 
     motion_due_t due;
     bool is_space_new;                          /**< the slots have to be found from the cylinders first */
@@ -89,24 +76,19 @@ struct motion {
     q32_t slot_extension_mm_q32[CYLINDERS_MAX]; /**< and its extensions */
     int64_t asked_cycles;                       /**< of a timed target */
     unsigned planned_slots;                     /**< the first so many go along the plan, the others by themselves */
-    motion_join_t join;
-    bool has_new_sample;
-    int64_t join_cycles;     /**< since it was planned */
-    history_t led[AXES_MAX]; /**< the slots' last references, before any blend */
+    history_t led[AXES_MAX];                    /**< the slots' last references, before fading in */
 
     bool is_following;
-    bool is_taking_over; /**< the take-over blend is running or still to come */
-    bool is_blend_planned;
-    scurve_t blend;
-    int64_t blend_share[3]; /**< blend.pos of the last three cycles */
-    unsigned blend_rest;    /**< cycles since the blend has arrived */
-    q32_t blend_from_q32[CYLINDERS_MAX];
+    bool is_taking_over; /**< a sender is being faded in, or will be with its first target */
+    bool is_fading;
+    fade_t fade;
 
     bool has_pending; /**< a target that waits for the end of a stop */
     motion_target_t pending;
     q32_t angle_target_deg_q32;
     uint64_t last_us;        /**< arrival of the last target */
     uint32_t last_stated_us; /**< the period it stated, 0 = none */
+    uint32_t last_gap_us;    /**< interval before it, where it stated a period; else 0 */
     uint64_t timed_end_us;
     int64_t timed_share_q46;       /**< intensity that the planned move is planned with */
     q32_t timed_way_q32[AXES_MAX]; /**< from neutral to where the sender wants it, before intensity */

@@ -62,6 +62,7 @@ typedef struct {
     int64_t per_acc_q62;   /**< 1 / acc_safe */
     q32_t brake_reach_q32; /**< no brake from within the limits is longer, u */
     q32_t ref_jerk_q32;    /**< what references have lately used of the jerk: the largest, fading, u/cycle^3 */
+    q32_t ref_acc_q32;     /**< and of the acceleration, u/cycle^2 */
     uint32_t brake_cycles; /**< no brake goes further than so many cycles at its highest speed; 0: not told */
     unsigned flags;        /**< of the last step: RAMP_CLAMPED ... */
 } ramp_t;

@@ -58,7 +58,8 @@ typedef struct {
     bool has_angle;
     angle_wrap_t angle_wrap;
     stream_style_t stream_style;
-    uint32_t spike_gate; /**< [0, GATE_FACTOR_MAX] times accel_q16 of an axis; 0 = off */
+    uint32_t delay_max_ms; /**< [0, 1000]: what the delay of a stream may grow to where its samples come late */
+    uint32_t spike_gate;   /**< [0, GATE_FACTOR_MAX] times accel_q16 of an axis; 0 = off */
 
     q16_t cylinder_speed_mm_s_q16;
     q16_t cylinder_accel_mm_s2_q16;
@@ -68,6 +69,7 @@ typedef struct {
 
     q16_t engage_speed_mm_s_q16;
     q16_t engage_accel_mm_s2_q16;
+    uint32_t blend_ms; /**< [250, 20000]: least time in which a sender is faded in */
 
     int32_t intensity_start_percent; /**< [0, max] of a sender's motion about neutral */
     uint32_t intensity_max_percent;  /**< [1, 100] */

@@ -1,23 +1,29 @@
 /* SPDX-License-Identifier: MIT
- * stream.h - rebuilds a sender's motion from the samples it streams: time line from arrivals, curve through the samples.
- * Second-order phase-locked loop on arrival times; uniform B-spline with the samples as control points, each committed on use.
- * Owns no clock and no limits (the ramps behind it have those). One owner; not re-entrant per instance.
+ * stream.h - rebuilds a sender's motion from the samples it streams: time line from arrivals, curve through the samples, less of
+ * it where the limits do not allow all. Owns no clock. One owner; not re-entrant per instance.
  *
- * Delay: a sample is met 2 periods (smooth) or 0.9 (fast) plus a margin after its time. The margin is 2 ms, more if the samples
- * often come later than that, at most the larger of 2 ms and half a period. While the rate changes or the network holds samples
- * back the delay may grow by 2 periods more; then it falls again by 6 % of the time that passes.
- * Coarse values, whose steps ask for more than the axes can do (stream_set_stop()), are smoothed: a mean of up to 16 points,
- * taken thrice, 1.5 periods later for each point of it but the first.
+ * Time line: a straight line through the arrivals. A sample belongs to its own point of the line (the sender's values are even,
+ * the network or a timer made it late), or to the time when it came (a game that samples when it sends), or to a time between:
+ * its values tell, see stream_evidence.h. A late sample and a lost one are told from each other by their values too.
+ *
+ * Delay: a sample is met 2 periods (smooth) or 1.32 (balanced) after its time, and a margin later: the lateness of the latest
+ * samples of the last seconds, 0.5 ms at least, so much at most that the delay stays below stream_set_delay_max(). The margin
+ * rises at once and falls slowly; the curve is rendered up to 10 % slower or faster until it has the wished delay.
+ *
+ * Limits: governor.h. What the limits of axes and cylinders do not allow is smoothed, all axes alike.
+ *
+ * Coarse values, whose rounding would ask for more than the axes can do, are smoothed: a mean of up to 16 points, taken
+ * thrice, 1.5 periods later for each point of it but the first.
  *
  * Losses: where a point is missing when the curve needs it, the motion goes on, by the last step and its bend (not a jump: at
- * most 4 x the larger of the two steps before), and slows down as the quickest stop of the axis does (stream_set_stop(); a slow
- * motion in 72 ms, over 36 ms of its way; `fast` after a full step, and its lead beyond). When samples are back, or after 150 ms
- * without, the curve comes back to the samples, or to the last one, softly: position and velocity of the control points go on as
- * they were. So an ended stream rests exactly on its last sample, within 2 s, or 24 periods of a slow one. A stream that is known
- * may be away for a second and goes on; a new rate gives a new grid, on which the curve goes on.
+ * most 4 x the larger of the two steps before), and slows down as the quickest stop of the axis does (a slow motion in 100 ms,
+ * over 50 ms of its way). When samples are back, or after 150 ms without, the curve comes back to the samples, or to the last
+ * one, softly: position and velocity of the control points go on as they were. So an ended stream rests exactly on its last
+ * sample, within 2 s, or 24 periods of a slow one. A stream that is known may be away for a second and goes on; a new rate gives
+ * a new grid, on which the curve goes on.
  *
  * Repeats: a sender that sends each value up to 8 times (a loop beside a slower game) is followed at the rate of its values, once
- * some 12 of them have told.
+ * some 12 of them have told. The newest values again within three quarters of a period are no sample.
  *
  * Hints: a sender that states its period may be slower, and tells from its second sample on what is late and what is lost. The
  * margin is then an eighth of the period at least, as a guess at so slow a stream is poor.
@@ -25,12 +31,14 @@
 #ifndef HEAVE_STREAM_H
 #define HEAVE_STREAM_H
 
+#include "heave/governor.h"
+#include "heave/kin.h"
 #include "heave/profile.h"
 
-/** How a stream is rendered. */
+/** How a stream is rendered: both by a cubic B-spline, with continuous acceleration. */
 typedef enum {
-    STREAM_SMOOTH, /**< cubic B-spline, 2 periods + margin late: continuous acceleration (default) */
-    STREAM_FAST    /**< quadratic B-spline, led 0.6 periods ahead, 0.9 periods + margin late: continuous velocity */
+    STREAM_SMOOTH,  /**< the samples are its control points: 2 periods + margin late */
+    STREAM_BALANCED /**< control points are led 0.68 periods ahead: 1.32 periods + margin late */
 } stream_style_t;
 
 #define STREAM_PERIOD_MIN_US 4000u   /**< fastest stream followed: 250 Hz; of what comes faster every so manyth sample is taken */
@@ -39,39 +47,59 @@ typedef enum {
 #define STREAM_HINT_MAX_US   500000u /**< slowest with a hint: 2 Hz */
 
 enum {
-    STREAM_GAPS = 24,       /**< intervals the period is first found from */
+    STREAM_GAPS = 24,       /**< intervals that are watched for another rate */
     STREAM_POINTS = 64,     /**< ring of points, a power of 2 */
-    STREAM_WINDOW_MAX = 16, /**< points in the longest mean of coarse values; the ring has room for three of them */
+    STREAM_EVIDENCE = 5,    /**< samples that one of them is told from */
+    STREAM_WINDOW_MAX = 10, /**< points in the longest mean of coarse values; the ring has room for three of them */
     STREAM_WEIGHTS = 3 * STREAM_WINDOW_MAX - 2 /**< points that a control point is made from then */
 };
 
 /** The sender's time line; members are private to src/motion. */
 typedef struct {
-    uint64_t last_us;                 /**< arrival of the newest sample */
-    int64_t late_us_q16;              /**< that arrival against the time line */
-    int64_t period_us_q16;            /**< 0 while unknown */
-    int64_t margin_us_q16;            /**< how long a sample is waited for beyond its time */
-    int64_t per_us_q46;               /**< 1 / period: periods per us, Q46 */
-    uint32_t gap_us[STREAM_GAPS];     /**< newest intervals, a ring */
-    uint8_t gap_periods[STREAM_GAPS]; /**< periods each was taken for */
+    uint64_t last_us;                  /**< arrival of the newest sample */
+    int64_t late_us_q16;               /**< that arrival against the time line */
+    int64_t period_us_q16;             /**< 0 while unknown */
+    int64_t jitter_us_q16;             /**< lateness of the latest samples lately */
+    int64_t margin_us_q16;             /**< how long a sample is waited for beyond its time */
+    int64_t per_us_q46;                /**< 1 / period: periods per us, Q46 */
+    uint32_t gap_us[STREAM_GAPS];      /**< newest intervals, a ring */
+    uint16_t gap_periods[STREAM_GAPS]; /**< periods each was taken for */
     unsigned gap_next;
-    unsigned gaps;    /**< intervals in the ring that belong to the present rate */
-    unsigned settled; /**< samples since the rate was last found, up to STREAM_GAPS */
-    uint32_t hint_us; /**< the period the sender states, 0 = none */
+    unsigned gaps;         /**< intervals in the ring that belong to the present rate */
+    unsigned settled;      /**< samples that the line is found from */
+    uint32_t hint_us;      /**< the period the sender states, 0 = none */
+    uint32_t delay_max_us; /**< that the margin may make of the delay */
+    unsigned memory;       /**< samples that the line may be found from */
+    int64_t drift_us_q16;  /**< mean lateness of the newest samples */
+    int64_t rough_us_q16;  /**< largest change of the lateness between two samples lately */
+    unsigned counted;      /**< samples that losses are counted in */
+    int32_t lost_q16;      /**< lost samples for each that came */
+    unsigned each;         /**< the sender has a sample for every so manyth period, for a while */
+    bool is_sparse;        /**< so many that each is waited for until the next one is here */
+    unsigned between;      /**< samples in a row that lay half-way between two of the line */
 } stream_clock_t;
 
-/** How quickly an axis can stop: its limits. */
+/** To which time a sender's samples belong, by what their values tell; members are private to src/motion. */
 typedef struct {
-    q32_t acc_per_cycle2_q32;
-    q32_t jerk_per_cycle3_q32; /**< 0: not told, the shortest reach */
-} stream_stop_t;
+    q32_t value_q32[STREAM_EVIDENCE][AXES_MAX]; /**< the newest samples as they came, the newest first */
+    q32_t late_q32[STREAM_EVIDENCE];            /**< lateness of each against the line, in periods */
+    q32_t shift_q32[STREAM_EVIDENCE];           /**< how much later than the line each was by its value */
+    int32_t index[STREAM_EVIDENCE];             /**< periods of each before the newest */
+    unsigned count;
+    unsigned axes;
+    int64_t told_q32;  /**< how far values are off their neighbours in the way that their lateness tells */
+    int64_t off_q32;   /**< how far values are off their neighbours in any way */
+    int64_t moved_q32; /**< how far they would be if they belonged to their arrivals */
+    q32_t weight_q32;  /**< [0, Q32_ONE]: 0 by the line, 1 by arrivals */
+} stream_evidence_t;
 
 /** How a motion goes on where samples are missing; private to src/motion. */
 typedef struct {
     q32_t first_q32;   /**< in the first period */
     q32_t go_q32;      /**< in the later ones, if it did not fade */
     uint32_t rise_q32; /**< share of its time in which the acceleration builds up, [0, 0.5] */
-    int32_t reach_q16; /**< how far it goes, in periods */
+    int32_t reach_q16; /**< how far it goes, in periods ... */
+    int32_t full_q16;  /**< ... so many of them before it slows down */
 } stream_lead_t;
 
 /** What a sender's values are multiples of, on one axis; private to src/motion. */
@@ -90,24 +118,31 @@ typedef struct {
     q32_t control_q32[AXES_MAX];  /**< the oldest of four control points, as committed: points and what was still off them */
     int64_t way_q36[3][AXES_MAX]; /**< from each of the four to the next */
     q32_t off_q32[AXES_MAX][3];   /**< control less point at head, and how that changes per period and period^2 */
-    stream_stop_t stop[AXES_MAX];
     stream_lead_t lead[AXES_MAX];
     stream_grain_t grain[AXES_MAX];
     uint32_t watched;               /**< samples since the watch for a grain began */
     int32_t window;                 /**< each control point is a mean of so many points, thrice; 1: the point */
-    uint8_t weight[STREAM_WEIGHTS]; /**< of the points in that mean, the newest first: 192 at most */
+    uint8_t weight[STREAM_WEIGHTS]; /**< of the points in that mean, the newest first: 75 at most */
     int64_t period_cycles_q16;      /**< cycles in a period */
     int64_t lead_q32;               /**< of the step of the last period, that a control point is ahead of its point */
     int64_t bend_q32;               /**< of the step's change, likewise */
+    q32_t mean_q32;                 /**< share of a mean of some points that a point is replaced by */
+    q32_t led_q32;                  /**< share of the way ahead that control points are led */
+    uint32_t mean_points;           /**< so many */
     int32_t reach_min_q16;          /**< periods that a motion is kept up where samples are missing */
     int32_t reach_max_q16;
-    bool is_off;              /**< on some axis */
-    int64_t grip_q32;         /**< how firmly off is taken back, per period */
-    int64_t softest_q32;      /**< the least grip */
-    int32_t patience;         /**< guesses before the stream is taken for ended */
-    q32_t last_q32[AXES_MAX]; /**< the newest sample */
-    uint32_t head;            /**< index of the newest point committed */
-    int32_t ahead;            /**< index of the newest sample less head; negative where the curve is extrapolated */
+    bool is_off;         /**< on some axis */
+    int64_t grip_q32;    /**< how firmly off is taken back, per period */
+    int64_t softest_q32; /**< the least grip */
+    int32_t age;         /**< samples since the stream began at rest, as far as that counts */
+    int32_t patience;    /**< guesses before the stream is taken for ended */
+    governor_limits_t limits[AXES_MAX];
+    governor_t governor;
+    int32_t scale_q16;          /**< that the references will be multiplied by, for the governor */
+    q32_t newest_q32[AXES_MAX]; /**< the newest sample, as it came ... */
+    q32_t last_q32[AXES_MAX];   /**< ... and at its place on the time line */
+    uint32_t head;              /**< index of the newest point committed */
+    int32_t ahead;              /**< index of the newest sample less head; negative where the curve is extrapolated */
     unsigned axes;
 } stream_curve_t;
 
@@ -121,7 +156,7 @@ typedef enum {
 /** Which samples of a sender are taken; members are private to src/motion. */
 typedef struct {
     uint64_t last_us;          /**< newest arrival, taken or not */
-    uint32_t gaps_us;          /**< mean interval of arrivals, times 16 */
+    uint32_t gaps_us;          /**< mean interval of arrivals, times 64 */
     uint32_t each;             /**< one of so many samples is taken */
     uint32_t each_taken;       /**< so it was when the last one was taken */
     uint32_t passed;           /**< samples not taken since the last that was */
@@ -148,8 +183,15 @@ typedef struct {
     stream_phase_t phase;
     stream_thin_t thin;
     stream_repeat_t repeat;
-    bool is_fresh; /**< no reference given since the start */
+    bool is_fresh;        /**< no reference given since the start */
+    bool is_hidden;       /**< see stream_hide_start() */
+    unsigned pair;        /**< samples so far of what may become a stream, ... */
+    uint32_t pair_gap_us; /**< ... the longest interval between them, ... */
+    uint64_t began_us;    /**< ... and when the first came */
     stream_clock_t clock;
+    stream_evidence_t evidence;
+    q32_t misfit_q32; /**< how far values have lately been off where the motion led, in speed limits */
+    unsigned losses;  /**< long intervals in a row that were losses by their values, as far as that counts */
     stream_curve_t curve;
     q32_t between_q32; /**< render phase behind head, [0, 1) */
     q32_t rate_q32[2]; /**< periods per cycle behind the first and the second low-pass; the second is rendered */
@@ -157,13 +199,47 @@ typedef struct {
     history_t previous[AXES_MAX];
 } stream_t;
 
+/** How a sender's samples come. */
+typedef enum {
+    STREAM_SENDER_UNKNOWN, /**< no stream runs */
+    STREAM_SENDER_EVEN,    /**< its values are even in time; what lateness there is comes from the way here */
+    STREAM_SENDER_BURSTS,  /**< its values are even in time, and often two or more come at once */
+    STREAM_SENDER_ARRIVALS /**< its values belong to the times when they come: a program that takes them when it sends */
+} stream_sender_t;
+
+/** What is known of the sender of a stream, and what its delay is made of, for display. */
+typedef struct {
+    stream_sender_t sender;
+    uint32_t period_us;     /**< 0 while unknown */
+    uint32_t jitter_us;     /**< how late the latest samples of the last seconds were */
+    uint32_t lost_permille; /**< over the last 256 samples or so */
+    uint32_t delay_us;      /**< all of it; of that: */
+    uint32_t wait_us;       /**< for samples that come late */
+    uint32_t smoothing_us;  /**< as the limits do not allow all that is asked */
+} stream_report_t;
+
 /** Starts without any sample.
  *  @param cycle_us [500, 10000]   @param axes 1 to AXES_MAX */
 void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_t style);
 
-/** Tells the limits of an axis: where samples are missing, the motion goes no further than the axis takes to stop, or 36 ms. Kept
- *  by stream_reset(). */
-void stream_set_stop(stream_t *self, unsigned axis, stream_stop_t stop);
+/** Tells the limits of an axis: where samples are missing, the motion goes no further than the axis takes to stop, or 36 ms; and
+ * what asks for more is smoothed, but on the axes behind POSE_AXES. Kept by stream_reset(). */
+void stream_set_limits(stream_t *self, unsigned axis, const governor_limits_t *limits);
+
+/** Tells the limits of a cylinder [0, CYLINDERS_MAX) that poses lead to; jerk 0: it has none. Kept by stream_reset(). */
+void stream_set_cylinder_limits(stream_t *self, unsigned cylinder, const governor_limits_t *limits);
+
+/** What the delay may grow to because samples come late; 0 (as after stream_init()): half a period beyond the curve's own. */
+void stream_set_delay_max(stream_t *self, uint32_t delay_max_us);
+
+/** What the references will be multiplied by, [0, Q16_ONE]; Q16_ONE after stream_init(). */
+void stream_set_scale(stream_t *self, int32_t scale_q16);
+
+/** Whether a curve that begins may jump onto its samples, as nobody sees it yet. */
+void stream_hide_start(stream_t *self, bool is_hidden);
+
+/** Where the axes are, for a curve that begins while they move. */
+void stream_place(stream_t *self, const history_t *now);
 
 /** Forgets the stream; the next sample starts a new one. */
 void stream_reset(stream_t *self);
@@ -179,18 +255,21 @@ bool stream_goes_on(const stream_t *self, uint64_t now_us);
 
 /** Takes a sample. Bounded time.
  *  @param now_us     arrival, never decreasing
+ *  @param kin        the mechanism, where the axes are those of poses; else NULL
  *  @param sample_q32 one value per axis, within +-2^48
  *  A sample within STREAM_PERIOD_MAX_US of the last one (or within 3.5 periods of a stream that runs) continues or begins a
- *  stream; any other, and one that follows a lone sample within 2 ms, is a lone sample. The same values again within a quarter of
- *  a period are the same datagram and are dropped; other values then replace the newest sample. */
-void stream_push(stream_t *self, uint64_t now_us, const q32_t *sample_q32);
+ *  stream; any other, and one that follows a lone sample within 2 ms, is a lone sample. The same values again within three
+ *  quarters of a period are no sample. Two samples are steps; the third one makes a stream, or the second where the sender states
+ *  its period. */
+void stream_push(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32);
 
 /** References for the cycle at now_us, one per axis, with consistent backward differences (vel[k] = pos[k]-pos[k-1] and so on,
  *  except in the first cycle after a start, where the differences are 0).
+ *  @param kin the mechanism, where the axes are those of poses; else NULL
  *  A lone sample is a step: position of the sample, differences 0. The curve of a stream starts at rest on its first sample; when
  *  the stream ends, the references end at rest on its last. Equal samples give exactly equal references.
  *  @return false while no sample has come since reset (ref unchanged). */
-bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref);
+bool stream_step(stream_t *self, uint64_t now_us, const kin_t *kin, ramp_ref_t *ref);
 
 /** True while samples come regularly: period known, last arrival at most STREAM_PERIOD_MAX_US or 3.5 periods ago. */
 bool stream_is_live(const stream_t *self, uint64_t now_us);
@@ -201,5 +280,8 @@ uint32_t stream_period_us(const stream_t *self);
 /** Mean interval of the sender's samples: the period, or less where it sends each value several times. 0 = no stream runs. */
 uint32_t stream_frame_us(const stream_t *self);
 uint32_t stream_delay_us(const stream_t *self);
+
+/** What is known of the sender. */
+stream_report_t stream_report(const stream_t *self);
 
 #endif

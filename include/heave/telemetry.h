@@ -12,6 +12,7 @@
 #include "heave/frame.h"
 #include "heave/owner.h"
 #include "heave/plate.h"
+#include "heave/stream.h"
 #include "heave/supervisor.h"
 
 /** A machine fault. */
@@ -80,6 +81,7 @@ typedef struct {
     q32_t intensity_now_q32;   /**< in force, percent */
     uint32_t stream_period_us; /**< 0 while unknown */
     uint32_t stream_delay_us;
+    stream_report_t stream; /**< of the sender that drives */
     owner_t owner;          /**< who drives */
     owner_t other;          /**< who sent last of those who do not */
     uint64_t last_frame_us; /**< 0 before the first accepted frame */

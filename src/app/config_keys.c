@@ -152,6 +152,8 @@ const config_key_t config_keys[] = {
      .fallback = "30", ABOVE_ZERO(10000), .help = "speed limit, at most that of [cylinders]"},
     {KEY("engage", "accel_mm_s2"), AT(settings.engage_accel_mm_s2_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s^2",
      .fallback = "100", ABOVE_ZERO(MOST_Q16), .help = "acceleration limit, at most that of [cylinders]"},
+    {KEY("engage", "blend_ms"), AT(settings.blend_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "2000",
+     RANGE(250, 20000), .help = "least time in which a sender is faded in"},
 
     {KEY("intensity", "start_percent"), AT(settings.intensity_start_percent), .type = CONFIG_INTEGER, .unit = "%",
      .fallback = "max", .words = "max", RANGE(0, 100),
@@ -178,7 +180,9 @@ const config_key_t config_keys[] = {
     {KEY("udp", "dialect"), AT(settings.dialect), .type = CONFIG_WORD, .unit = "", .fallback = "v3", .words = "v3|lenient",
      .is_live = true, .help = "frames as in V3.0; or also with the head # or none, and commands in lower case"},
     {KEY("udp", "stream"), AT(settings.stream_style), .type = CONFIG_WORD, .unit = "", .fallback = "smooth",
-     .words = "smooth|fast", .help = "how a stream of poses is rendered: 2 periods late and smoother, or 0.9 periods late"},
+     .words = "smooth|balanced", .help = "how a stream is rendered: 2 periods late and smoother, or 1.3 periods late"},
+    {KEY("udp", "delay_max_ms"), AT(settings.delay_max_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "120",
+     RANGE(0, 1000), .help = "what the delay of a stream may grow to where its frames come late or in bursts"},
     {KEY("udp", "spike_gate"), AT(settings.spike_gate), .type = CONFIG_INTEGER, .unit = "", .fallback = "10",
      RANGE(0, 1000), .is_live = true,
      .help = "a sample of a stream that would take more than so many times an axis' acceleration limit waits for the next one to confirm "

@@ -388,6 +388,38 @@ static void draw_senders(view_t *self, const cJSON *status)
     end_line(self);
 }
 
+/* What kind of sender it is, in words. */
+static const char *sender_words(const char *sender)
+{
+    static const struct {
+        const char *sender, *words;
+    } k_words[] = {
+        {"even", "evenly timed"},
+        {"bursts", "evenly timed, sent in bursts"},
+        {"arrivals", "each pose is of the moment when it was sent"},
+    };
+    for (size_t i = 0; i < sizeof k_words / sizeof k_words[0]; i++) {
+        if (strcmp(k_words[i].sender, sender) == 0) {
+            return k_words[i].words;
+        }
+    }
+    return "";
+}
+
+static void draw_stream(view_t *self, const cJSON *stream)
+{
+    const char *words = sender_words(word(stream, "sender"));
+    if (words[0] == '\0') {
+        put(self, "stream   none");
+        return;
+    }
+    put(self, "stream   every %.1f ms, %s; up to %.1f ms late, %.1f %% lost", number(stream, "period_ms"), words,
+        number(stream, "jitter_ms"), number(stream, "lost_permille") / 10.0);
+    end_line(self);
+    put(self, "         followed %.1f ms later: %.1f of these for late frames, %.1f as limits bind", number(stream, "delay_ms"),
+        number(stream, "wait_ms"), number(stream, "smoothing_ms"));
+}
+
 static void draw_frames(view_t *self, const cJSON *status)
 {
     const cJSON *counters = member(status, "counters");
@@ -395,7 +427,7 @@ static void draw_frames(view_t *self, const cJSON *status)
     draw_counts(self, "accepted", member(counters, "accepted"));
     draw_counts(self, "rejected", member(counters, "rejected"));
     draw_counts(self, "other", counters);
-    put(self, "stream   period %.3f ms, delay %.3f ms", number(stream, "period_ms"), number(stream, "delay_ms"));
+    draw_stream(self, stream);
     if (cJSON_IsNumber(member(stream, "last_frame_age_ms"))) {
         put_piece(self, ", last frame %.1f s ago", number(stream, "last_frame_age_ms") / 1000.0);
     }

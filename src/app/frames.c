@@ -485,9 +485,11 @@ static int take_line(frames_t *self, char *text, size_t length, uint32_t number,
     if (is_empty) {
         return 0;
     }
-    if (self->count > 0 && line.t_us < self->line[self->count - 1].t_us) {
-        return report_order(errors, path, &line, &self->line[self->count - 1]);
+    frames_line_t *before = &self->newest[line.kind == FRAMES_DATAGRAM];
+    if (line.t_us < before->t_us) {
+        return report_order(errors, path, &line, before);
     }
+    *before = line;
     if (line.kind == FRAMES_STATE && self->count > 0) {
         return report(errors, path, number, "!state is not the first line; a run can only begin with one");
     }

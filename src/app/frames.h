@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * frames.h - a file of frames for an offline run: datagrams and operator's requests with their times.
  * A line is `<t_ms> <text>`, `<t_ms> !request`, empty, or a comment that starts with `;`. Text has C escapes. Times have up to
- * three decimals and never decrease. Datagrams come from 127.0.0.1 until a line `<t_ms> !from ADDRESS` says otherwise. Used
- * before and during offline runs only; loading allocates.
+ * three decimals and never decrease, those of datagrams and those of all else each for themselves: a recording tells when a
+ * datagram came, and of all else the cycle that it was for. Datagrams come from 127.0.0.1 until a line `<t_ms> !from ADDRESS`
+ * says otherwise. Used before and during offline runs only; loading allocates.
  */
 #ifndef HEAVE_APP_FRAMES_H
 #define HEAVE_APP_FRAMES_H
@@ -19,8 +20,9 @@ typedef struct {
     frames_line_t *line; /**< without empty lines, comments and FRAMES_FROM */
     size_t count;
     size_t capacity;
-    hal_udp_peer_t from; /**< of the datagrams of the lines to come */
-    char *bytes;         /**< the file; texts point into it */
+    frames_line_t newest[2]; /**< of datagrams, [1], and of all else: a recording has each of these two sorts in order */
+    hal_udp_peer_t from;     /**< of the datagrams of the lines to come */
+    char *bytes;             /**< the file; texts point into it */
 } frames_t;
 
 /** Reads one line, without its newline.

@@ -36,7 +36,8 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
         .allow = &self->allow,
         .record = {self->is_recording ? &self->record : NULL, self->blackbox != NULL ? &self->blackbox->records : NULL},
         .now_us = &self->session.now_us,
-        .clock = clock};
+        .clock = clock,
+        .cycle_us = config->settings.cycle_us};
     self->io = (gateway_io_t){.udp = udp_tap_hal(&self->tap), .log = log};
     const hv_status_t status = rig_open(&self->rig, config, &self->io);
     if (status != HV_OK) {

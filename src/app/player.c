@@ -43,9 +43,19 @@ static hv_status_t player_recv(void *ctx, uint8_t *buffer, size_t capacity, size
     return HV_OK;
 }
 
+/* How long ago that was. */
+static hv_status_t player_waited(void *ctx, uint32_t *us)
+{
+    const player_t *self = ctx;
+    const uint64_t t_us = self->session.now_us - self->session.zero_us;
+    const size_t taken = self->next_datagram;
+    *us = taken > 0 ? (uint32_t)(t_us - self->line[taken - 1].t_us) : 0;
+    return HV_OK;
+}
+
 hal_udp_t player_udp(player_t *self)
 {
-    static const hal_udp_ops_t k_udp = {.recv = player_recv};
+    static const hal_udp_ops_t k_udp = {.recv = player_recv, .waited = player_waited};
     return (hal_udp_t){&k_udp, self};
 }
 

@@ -266,11 +266,26 @@ static void write_intensity(json_t *json, const snapshot_t *s, const config_t *c
     json_close(json, '}');
 }
 
+/* What kind of sender it is. */
+static const char *sender_name(stream_sender_t sender)
+{
+    static const char *const k_names[] = {[STREAM_SENDER_UNKNOWN] = "",
+                                          [STREAM_SENDER_EVEN] = "even",
+                                          [STREAM_SENDER_BURSTS] = "bursts",
+                                          [STREAM_SENDER_ARRIVALS] = "arrivals"};
+    return k_names[sender];
+}
+
 static void write_stream(json_t *json, const snapshot_t *s)
 {
     json_open(json, "stream", '{');
     json_ms(json, "period_ms", s->stream_period_us);
     json_ms(json, "delay_ms", s->stream_delay_us);
+    json_text(json, "sender", sender_name(s->stream.sender));
+    json_ms(json, "jitter_ms", s->stream.jitter_us);
+    json_number(json, "lost_permille", s->stream.lost_permille);
+    json_ms(json, "wait_ms", s->stream.wait_us);
+    json_ms(json, "smoothing_ms", s->stream.smoothing_us);
     if (s->last_frame_us != 0) {
         json_ms(json, "last_frame_age_ms", s->now_us - s->last_frame_us);
     } else {

@@ -18,18 +18,22 @@ static void write_down(const udp_tap_t *self, hv_status_t status, const hal_udp_
 {
     for (unsigned i = 0; i < sizeof self->record / sizeof self->record[0]; i++) {
         if (self->record[i] != NULL) {
-            record_push_datagram(self->record[i], status == HV_OK ? RECORD_DATAGRAM : RECORD_OVERSIZE, *self->now_us, from, bytes,
-                                 length);
+            record_push_datagram(self->record[i], status == HV_OK ? RECORD_DATAGRAM : RECORD_OVERSIZE,
+                                 *self->now_us - self->waited_us, from, bytes, length);
         }
     }
 }
 
-/* When the oldest datagram of the cycle came, for those who measure. */
+/* When a datagram came, and when the oldest one of the cycle did, for those who measure. */
 static void note_arrival(udp_tap_t *self)
 {
     uint32_t waited_us = 0;
+    (void)!hal_udp_waited(self->behind, &waited_us); /* not known: it comes now */
+    const uint64_t came_us = *self->now_us - (waited_us < self->cycle_us ? waited_us : self->cycle_us - 1);
+    self->came_us =
+        came_us > self->came_us ? came_us : self->came_us; /* one that is read late has not come before the one before it */
+    self->waited_us = (uint32_t)(*self->now_us - self->came_us);
     if (self->arrival_us == 0) {
-        (void)!hal_udp_waited(self->behind, &waited_us); /* not known: it comes now */
         self->arrival_us = hal_clock_now_us(self->clock) - waited_us;
     }
 }
@@ -58,8 +62,15 @@ static hv_status_t tap_dropped(void *ctx, uint32_t *datagrams)
     return hal_udp_dropped(self->behind, datagrams);
 }
 
+static hv_status_t tap_waited(void *ctx, uint32_t *us)
+{
+    const udp_tap_t *self = ctx;
+    *us = self->waited_us;
+    return HV_OK;
+}
+
 hal_udp_t udp_tap_hal(udp_tap_t *self)
 {
-    static const hal_udp_ops_t k_ops = {.recv = tap_recv, .dropped = tap_dropped};
+    static const hal_udp_ops_t k_ops = {.recv = tap_recv, .dropped = tap_dropped, .waited = tap_waited};
     return (hal_udp_t){&k_ops, self};
 }

@@ -17,6 +17,9 @@ typedef struct {
     ring_t *record[2];      /**< NULL: nothing is written down there */
     const uint64_t *now_us; /**< of the running cycle */
     hal_clock_t clock;
+    uint32_t cycle_us;
+    uint64_t came_us;    /**< when the newest datagram came, by *now_us */
+    uint32_t waited_us;  /**< by the newest datagram, below a cycle: a replay then has it in the same cycle */
     uint64_t arrival_us; /**< out: when the first datagram came since it was set to 0; by that clock; 0 = none did */
     uint32_t refused;    /**< out: datagrams of senders that are not allowed */
 } udp_tap_t;

@@ -330,6 +330,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->intensity_now_q32 = intensity_percent_q32(motion_intensity(&self->motion));
     s->stream_period_us = stream_period_us(motion_stream(&self->motion));
     s->stream_delay_us = stream_delay_us(motion_stream(&self->motion));
+    s->stream = stream_report(motion_stream(&self->motion));
     s->owner = self->owner;
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
     s->counters.relay_cut = self->relay_policy.cut_count;

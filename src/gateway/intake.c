@@ -293,7 +293,7 @@ static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t no
 static bool tell_motion(gateway_t *self, const motion_target_t *target, frame_command_t command, const hal_udp_peer_t *from,
                         uint64_t now_us)
 {
-    if (self->supervisor.state == STATE_ENGAGED && motion_target(&self->motion, target, now_us) != HV_OK) {
+    if (self->supervisor.state == STATE_ENGAGED && motion_target(&self->motion, target, now_us - self->waited_us) != HV_OK) {
         self->snapshot.counters.impossible++;
         refuse(self, command, "no pose has these extensions, or one too near a singularity", from, now_us);
         return false;
@@ -416,6 +416,15 @@ static void take_datagram(gateway_t *self, size_t length, const hal_udp_peer_t *
     }
 }
 
+/* How long a datagram has waited for its cycle: a sender's time line is finer than cycles. What waited longer tells of a late
+ * cycle, which a replay does not have. */
+static void note_arrival(gateway_t *self)
+{
+    uint32_t waited_us = 0;
+    const bool is_known = hal_udp_waited(self->io.udp, &waited_us) == HV_OK;
+    self->waited_us = !is_known ? 0 : waited_us < self->settings.cycle_us ? waited_us : self->settings.cycle_us - 1;
+}
+
 /* What has arrived, as far as it fits into a cycle. */
 static void receive(gateway_t *self, uint64_t now_us)
 {
@@ -431,6 +440,7 @@ static void receive(gateway_t *self, uint64_t now_us)
             return;
         }
         self->snapshot.counters.datagrams++;
+        note_arrival(self);
         if (status == HV_ERR_RANGE) {
             self->snapshot.counters.oversize++;
             log_reject(self, "datagram longer than 512 bytes, send one frame per datagram", FRAME_ERR_UNFINISHED, self->datagram,

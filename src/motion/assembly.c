@@ -58,10 +58,14 @@ bool assembly_can_stop(const motion_t *self)
     const ramp_limits_t *limits[CYLINDERS_MAX];
     q32_t rest_q32[CYLINDERS_MAX];
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        const ramp_state_t *now = &self->cylinder[i].state;
-        const q32_t vel_q32 = now->vel_per_cycle_q32 + now->acc_per_cycle2_q32;
-        start[i] = (ramp_state_t){now->pos_q32 + vel_q32, vel_q32, now->acc_per_cycle2_q32};
-        limits[i] = &self->cylinder[i].limits;
+        const ramp_t *ramp = &self->cylinder[i]; /* the coming cycle may still push on with all its jerk */
+        const ramp_state_t *now = &ramp->state;
+        const q32_t jerk_q32 = ramp->limits.jerk_per_cycle3_q32;
+        const q32_t pushed_q32 = now->acc_per_cycle2_q32 + (now->vel_per_cycle_q32 < 0 ? -jerk_q32 : jerk_q32);
+        const q32_t acc_q32 = fx_clamp(pushed_q32, -ramp->acc_safe_q32, ramp->acc_safe_q32);
+        const q32_t vel_q32 = now->vel_per_cycle_q32 + acc_q32;
+        start[i] = (ramp_state_t){now->pos_q32 + vel_q32, vel_q32, acc_q32};
+        limits[i] = &ramp->limits;
     }
     halt_rests(CYLINDERS_MAX, start, limits, rest_q32);
     return is_held_or_better(self, rest_q32);

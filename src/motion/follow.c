@@ -3,21 +3,21 @@
  *
  * Poses: references of the pose axes, scaled by intensity -> ramps -> workspace -> inverse kinematics -> references of the
  * cylinders. Extensions: the references go to the cylinders as they are. When the space changes, forward kinematics of the last
- * three set-points gives the pose axes their position, velocity and acceleration, so that nothing jumps. Take-over: reference =
- * from + share (wanted - from), the share rising from 0 to 1 along an S-curve whose largest speed is engage speed.
+ * three set-points gives the pose axes their position, velocity and acceleration, so that nothing jumps. At a take-over the
+ * references are faded in (fade.h) before the ramps, so that all limits hold then too.
  */
 #include "follow.h"
 
-#include "join.h"
 #include "past.h"
 #include "plan.h"
 #include "reach.h"
 #include "slot.h"
 #include "slots.h"
 
-#define TAKEOVER_LEAST_US 250000
-#define INSTANT_MS        5     /* no move is as short: frames with such a T ... */
-#define INSTANT_GAP_US    20000 /* ... that follow each other so closely are a stream like frames without T */
+#define INSTANT_MS     5                         /* no move is as short: frames with such a T ... */
+#define INSTANT_GAP_US 20000                     /* ... that follow each other so closely are a stream like frames without T */
+#define HIDDEN_Q58     ((int64_t)1 << (58 - 10)) /* a share of 1/1024 */
+#define PERIODS_STATED 5                         /* senders that stream write up to so many periods as T */
 
 bool follow_is_moving(const motion_t *self)
 {
@@ -53,7 +53,7 @@ static ramp_state_t state_from(const pose_t pose[3], unsigned axis)
     return (ramp_state_t){now_q32, vel_q32, vel_q32 - (pose[1].axis_q32[axis] - pose[2].axis_q32[axis])};
 }
 
-void follow_adopt_pose(motion_t *self)
+static void adopt_pose(motion_t *self)
 {
     pose_t pose[3];
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
@@ -75,9 +75,8 @@ void follow_adopt_pose(motion_t *self)
 static void enter_space(motion_t *self)
 {
     self->is_space_new = false;
-    self->join = JOIN_DUE;
     if (self->space == MOTION_POSE) {
-        follow_adopt_pose(self);
+        adopt_pose(self);
         return;
     }
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
@@ -85,28 +84,22 @@ static void enter_space(motion_t *self)
     }
 }
 
-/* The first target after a rest: its way at engage speed, or slower where a timed move gives it longer. The axes stand on the
- * target at once, as it is the blend that moves the platform there. */
-HV_OWN_FRAME static void plan_blend(motion_t *self)
+/* The first target after a rest is faded in from where the platform is. */
+HV_OWN_FRAME static void begin_fade(motion_t *self)
 {
-    path_limits_t limits = path_limits_none();
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        const q32_t to_q32 = self->slot_extension_mm_q32[i];
-        self->blend_from_q32[i] = self->cylinder[i].state.pos_q32;
-        path_limits_narrow(&limits, to_q32 - self->blend_from_q32[i], &self->engage_limits);
-        self->reference[i] = (history_t){.pos_q32 = to_q32};
+    q32_t from_q32[POSE_AXES];
+    q32_t from_mm_q32[CYLINDERS_MAX];
+    q32_t to_mm_q32[CYLINDERS_MAX];
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        from_mm_q32[i] = self->cylinder[i].state.pos_q32;
+        to_mm_q32[i] = i < self->cylinders ? self->slot_extension_mm_q32[i] : from_mm_q32[i];
     }
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        self->led[i] = (history_t){.pos_q32 = self->goal_q32[i]};
-        if (self->space == MOTION_POSE) {
-            self->axis[i].state = self->led[i];
-        }
+        from_q32[i] = self->space == MOTION_POSE ? self->axis[i].state.pos_q32 : from_mm_q32[i];
     }
-    const int64_t least = TAKEOVER_LEAST_US / (int64_t)self->cycle_us;
-    scurve_plan(&self->blend, &limits, self->asked_cycles > least ? self->asked_cycles : least);
-    self->blend_share[0] = self->blend_share[1] = self->blend_share[2] = 0;
-    self->blend_rest = 0;
-    self->is_blend_planned = true;
+    fade_begin(&self->fade, from_q32, from_mm_q32);
+    fade_look(&self->fade, to_mm_q32);
+    self->is_fading = true;
 }
 
 /* The time of a target that could be a stream's period, else 0. */
@@ -116,9 +109,9 @@ static uint32_t period_stated(const motion_target_t *target)
 }
 
 /* Two times are about the same if neither is more than 2.5 times the other. */
-static bool is_about(uint64_t a_us, uint64_t b_us)
+static bool is_about(uint64_t time_us, uint64_t other_us)
 {
-    return a_us * 2 <= b_us * 5 && b_us * 2 <= a_us * 5;
+    return time_us * 2 <= other_us * 5 && other_us * 2 <= time_us * 5;
 }
 
 /* A target without a time, or with one too short for a move, after so short a gap that it is none, or where a stream runs that is
@@ -130,8 +123,14 @@ static bool is_instant(const motion_t *self, const motion_target_t *target, uint
            (target->time_ms <= INSTANT_MS && (now_us - self->last_us <= INSTANT_GAP_US || period_us <= INSTANT_GAP_US));
 }
 
-/* A timed target is a sample of a stream if its time is about the period of the one that runs, or two follow each other in about
- * the time of both. */
+/* Targets with a time that follow each other as quickly and as evenly as those of a stream, whatever time they state. */
+static bool is_in_a_row(const motion_t *self, uint64_t gap_us)
+{
+    return self->last_gap_us > 0 && gap_us <= STREAM_PERIOD_MAX_US && is_about(gap_us, self->last_gap_us);
+}
+
+/* A timed target is a sample of a stream if its time is about the period of the one that runs, or some periods, or if targets
+ * follow each other in about the time that both state, or three of them evenly. */
 static bool is_stream_sample(const motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
     const uint32_t stated_us = period_stated(target);
@@ -142,9 +141,38 @@ static bool is_stream_sample(const motion_t *self, const motion_target_t *target
     if (stated_us == 0) {
         return false;
     }
-    return stream_goes_on(&self->stream, now_us)
-               ? is_about(stated_us, stream_period_us(&self->stream)) || is_about(stated_us, stream_frame_us(&self->stream))
-               : is_about(gap_us, stated_us) && is_about(gap_us, self->last_stated_us);
+    if (stream_goes_on(&self->stream, now_us)) {
+        return is_about(stated_us, stream_period_us(&self->stream)) || is_about(stated_us, stream_frame_us(&self->stream)) ||
+               (stated_us <= PERIODS_STATED * stream_period_us(&self->stream) && stated_us == self->last_stated_us);
+    }
+    return is_in_a_row(self, gap_us) || (is_about(gap_us, stated_us) && is_about(gap_us, self->last_stated_us));
+}
+
+/* What a target says of the sender's period: a time that is not about the interval is a wish of another kind. The first interval
+ * may be that of a late frame. */
+static uint32_t period_hinted(const motion_t *self, const motion_target_t *target, uint64_t gap_us)
+{
+    const uint32_t stated_us = period_stated(target);
+    const uint64_t period_us = stream_period_us(&self->stream);
+    if (self->stream.phase == STREAM_EMPTY || self->last_stated_us == 0) {
+        return stated_us;
+    }
+    if (self->stream.phase == STREAM_LONE) {
+        return is_about(stated_us, gap_us) ? stated_us : 0;
+    }
+    return stated_us * 2 <= period_us * 3 && period_us * 2 <= stated_us * 3 ? stated_us : 0;
+}
+
+/* What a ramp can follow. */
+static governor_limits_t limits_of(const ramp_t *ramp)
+{
+    return (governor_limits_t){ramp->limits.vel_per_cycle_q32, ramp->acc_safe_q32, ramp->limits.jerk_per_cycle3_q32};
+}
+
+/* The mechanism, where poses are followed. */
+static const kin_t *kin_followed(const motion_t *self)
+{
+    return self->space == MOTION_POSE ? &self->kin : NULL;
 }
 
 /* The slots are those of a space from now on. */
@@ -153,12 +181,18 @@ static void change_space(motion_t *self, motion_space_t space)
     self->space = space;
     self->is_space_new = true;
     self->last_stated_us = 0;
+    self->last_gap_us = 0;
     self->source = MOTION_STREAMED;
-    self->join = JOIN_NONE; /* the last stream's way is gone */
     stream_reset(&self->stream);
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        const ramp_limits_t *limits = slot_limits(self, i);
-        stream_set_stop(&self->stream, i, (stream_stop_t){limits->acc_per_cycle2_q32, limits->jerk_per_cycle3_q32});
+        const bool is_used = space == MOTION_POSE || i == AXIS_ANGLE || i < self->cylinders;
+        const governor_limits_t limits = is_used ? limits_of(slot_ramp(self, i)) : (governor_limits_t){0};
+        stream_set_limits(&self->stream, i, &limits);
+    }
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        const bool is_led = space == MOTION_POSE && i < self->cylinders;
+        const governor_limits_t limits = is_led ? limits_of(&self->cylinder[i]) : (governor_limits_t){0};
+        stream_set_cylinder_limits(&self->stream, i, &limits);
     }
     gate_reset(&self->gate);
 }
@@ -178,7 +212,7 @@ static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t 
 }
 
 /* A sample, or a target by itself. */
-static void take_target(motion_t *self, const motion_target_t *target, bool is_sample, uint64_t now_us)
+static void take_target(motion_t *self, const motion_target_t *target, bool is_sample, uint32_t hint_us, uint64_t now_us)
 {
     slots_take(self, target, self->slot_q32, self->slot_extension_mm_q32);
     self->pending = *target; /* has_pending: where it has to wait for a stop after all */
@@ -189,8 +223,14 @@ static void take_target(motion_t *self, const motion_target_t *target, bool is_s
         stream_reset(&self->stream);
         gate_reset(&self->gate);
     }
-    stream_hint_period(&self->stream, period_stated(target));
-    stream_push(&self->stream, now_us, self->slot_q32);
+    if (self->source != MOTION_STREAMED && !self->is_space_new) {
+        history_t now[AXES_MAX];
+        slots_unscaled_states(self, now);
+        stream_place(&self->stream, now);
+    }
+    stream_hide_start(&self->stream, self->is_taking_over && (!self->is_fading || self->fade.share_q58[0] < HIDDEN_Q58));
+    stream_hint_period(&self->stream, hint_us);
+    stream_push(&self->stream, now_us, kin_followed(self), self->slot_q32);
     self->due = !is_sample ? DUE_TIMED : self->stream.phase == STREAM_RUNNING ? DUE_STREAM : DUE_STEP;
 }
 
@@ -214,13 +254,16 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
         change_space(self, target->space);
     }
     const bool is_sample = is_stream_sample(self, target, now_us);
+    const uint64_t gap_us = now_us - self->last_us;
+    const uint32_t hint_us = period_hinted(self, target, gap_us);
+    self->last_gap_us = period_stated(target) > 0 && gap_us <= STREAM_PERIOD_MAX_US ? (uint32_t)gap_us : 0;
     self->last_us = now_us;
     self->last_stated_us = period_stated(target);
     if (!is_sample && is_under_way(self, target)) {
         return;
     }
     if (!is_sample || !is_withheld(self, target, now_us)) {
-        take_target(self, target, is_sample, now_us);
+        take_target(self, target, is_sample, hint_us, now_us);
     }
 }
 
@@ -229,7 +272,7 @@ static void take_last_word(motion_t *self, uint64_t now_us)
 {
     if (gate_is_overdue(&self->gate, now_us)) {
         gate_reset(&self->gate);
-        take_target(self, &self->withheld, true, now_us);
+        take_target(self, &self->withheld, true, 0, now_us);
     }
 }
 
@@ -247,16 +290,13 @@ static bool is_on_the_way(const motion_t *self)
     return i == self->planned_slots && slots_is_planned(self, self->slot_q32);
 }
 
-/* During a take-over nothing but the blend bounds what extensions ask for: a stream of jumps is far beyond what the cylinders can
- * do, and a plan that went on from there would take hours to come back. A little more than the limits is only rounding. */
+/* What is faded in has not gone through a ramp: a sender may ask for far more than there is, and a plan that went on from there
+ * would take hours to come back. A little more than the limits is only rounding. */
 static bool is_led_beyond(const motion_t *self)
 {
-    if (!self->is_taking_over || !self->is_blend_planned || self->space != MOTION_CYLINDERS) {
-        return false;
-    }
     bool is_beyond = false;
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        const ramp_limits_t *limits = &self->cylinder[i].limits;
+    for (unsigned i = 0; self->is_fading && i < POSE_AXES; i++) {
+        const ramp_limits_t *limits = slot_limits(self, i);
         is_beyond = is_beyond || fx_abs(self->led[i].vel_per_cycle_q32) > 2 * limits->vel_per_cycle_q32 ||
                     fx_abs(self->led[i].acc_per_cycle2_q32) > 2 * limits->acc_per_cycle2_q32;
     }
@@ -275,7 +315,7 @@ static void take_over_again(motion_t *self)
 static void plan_what_is_due(motion_t *self, uint64_t now_us)
 {
     const motion_due_t due = self->due;
-    const bool is_first = self->is_taking_over && !self->is_blend_planned;
+    const bool is_first = self->is_taking_over && !self->is_fading;
     if ((due == DUE_TIMED || due == DUE_STEP) && is_led_beyond(self)) {
         take_over_again(self);
         return;
@@ -288,24 +328,21 @@ static void plan_what_is_due(motion_t *self, uint64_t now_us)
         slots_scale(self, self->space, self->slot_q32, self->goal_q32);
     }
     if (due != DUE_NOTHING && is_first) {
-        plan_blend(self);
+        begin_fade(self);
     }
     if (due == DUE_TIMED) {
         plan_timed(self, self->asked_cycles, is_first, now_us);
     } else if (due == DUE_STEP && (is_first || !is_on_the_way(self))) {
         plan_step(self);
-    } else if (due == DUE_STREAM && self->source != MOTION_STREAMED) {
-        self->source = MOTION_STREAMED;
-        join_begin(self);
     } else if (due == DUE_STREAM) {
-        join_sample(self);
+        self->source = MOTION_STREAMED;
     }
 }
 
 void follow_begin(motion_t *self, uint64_t now_us)
 {
     self->is_taking_over = true;
-    self->is_blend_planned = false;
+    self->is_fading = false;
     if (self->has_pending) {
         self->has_pending = false;
         follow_target(self, &self->pending, now_us);
@@ -318,7 +355,7 @@ static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
     if (self->source == MOTION_TIMED) {
         quintic_step(&self->plan.quintic, ref);
     } else if (self->source == MOTION_HALTING) {
-        halt_step(&self->aside.halt, ref);
+        halt_step(&self->halt, ref);
     } else {
         motion_straight_t *way = &self->plan.straight;
         const bool was_done = scurve_is_done(&way->path);
@@ -335,43 +372,33 @@ static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
     slots_shift_refs(self, ref);
 }
 
-/* One cylinder's reference on the way from where the take-over began: the same blend of its last four positions, so that the
- * differences of a step's reference stay what they are. */
-static ramp_ref_t blended(const motion_t *self, unsigned i, const ramp_ref_t *ref)
-{
-    const q32_t from_q32 = self->blend_from_q32[i];
-    const int64_t share[PAST] = {self->blend.pos, self->blend_share[0], self->blend_share[1], self->blend_share[2]};
-    q32_t at_q32[PAST];
-    past_of(ref, at_q32);
-    for (unsigned age = 0; age < PAST; age++) {
-        at_q32[age] = from_q32 + fx_mul_div(at_q32[age] - from_q32, share[age], self->blend.total);
-    }
-    return past_ref(at_q32);
-}
-
-/* Leads the cylinders to the sender's motion at engage speed. */
+/* Fades a sender in, at engage speed beside its own. */
 static void take_over(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
-    if (!self->is_taking_over) {
+    pose_t pose;
+    q32_t extension_mm_q32[CYLINDERS_MAX];
+    if (!self->is_fading) {
         return;
     }
-    const int64_t before = self->blend.pos;
-    scurve_step(&self->blend);
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        ref[i] = blended(self, i, &ref[i]);
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        const bool is_given = self->space == MOTION_CYLINDERS && i < self->cylinders;
+        extension_mm_q32[i] = is_given ? ref[i].pos_q32 : self->cylinder[i].state.pos_q32;
     }
-    self->blend_share[2] = self->blend_share[1];
-    self->blend_share[1] = self->blend_share[0];
-    self->blend_share[0] = self->blend.pos;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        pose.axis_q32[i] = ref[i].pos_q32;
+    }
+    if (self->space == MOTION_POSE) {
+        kin_constrain(&self->kin, &pose);
+        (void)reach_pull_in(self, &pose, extension_mm_q32, NULL);
+    }
+    fade_look(&self->fade, extension_mm_q32);
+    self->is_fading = fade_step(&self->fade, &self->fade_limits, ref);
+    self->is_taking_over = self->is_fading;
     out->flags |= MOTION_TAKEOVER;
-    if (before == self->blend.total) {
-        self->blend_rest++;
-    }
-    self->is_taking_over = self->blend_rest < 3;
 }
 
-/* Pose axes through their ramps, into the workspace, to cylinders. True if the pose had to be pulled in. */
-static bool step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
+/* Pose axes through their ramps, into the workspace, to cylinders. */
+static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
     const ramp_grip_t grip = self->source == MOTION_STREAMED ? RAMP_SOFT : RAMP_FIRM;
     q32_t extension_mm_q32[CYLINDERS_MAX];
@@ -389,71 +416,19 @@ static bool step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t 
     }
     out->flags |= ((flags & RAMP_CLAMPED) ? MOTION_CLAMPED : 0) | ((flags & RAMP_SPEED) ? MOTION_SPEED : 0) |
                   ((flags & RAMP_ACCEL) ? MOTION_ACCEL : 0) | (cylinder != 0 ? MOTION_CLAMPED : 0);
-    return cylinder != 0;
 }
 
-/* From the slots' references to the cylinders'. True if the pose had to be pulled in. */
-static bool step_slots(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
+/* From the slots' references to the cylinders'. */
+static void step_slots(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
     for (unsigned i = 0; i < AXES_MAX; i++) {
         self->led[i] = (history_t){ref[i].pos_q32, ref[i].vel_per_cycle_q32, ref[i].acc_per_cycle2_q32};
     }
+    take_over(self, ref, out);
     if (self->space == MOTION_POSE) {
-        return step_pose(self, ref, out);
-    }
-    out->flags |= MOTION_IN_CYLINDERS;
-    return false;
-}
-
-/* Takes back what a cycle has changed on the way from the slots' references to the cylinders': their differences tell all of
- * it but the accelerations of the axes. */
-static void go_back(motion_t *self, const q32_t acc_q32[POSE_AXES], const ramp_ref_t ref[AXES_MAX])
-{
-    for (unsigned i = 0; self->space == MOTION_POSE && i < POSE_AXES; i++) {
-        ramp_state_t *state = &self->axis[i].state;
-        state->pos_q32 -= state->vel_per_cycle_q32;
-        state->vel_per_cycle_q32 -= state->acc_per_cycle2_q32;
-        state->acc_per_cycle2_q32 = acc_q32[i];
-    }
-    for (unsigned i = 0; self->space == MOTION_POSE && i < self->cylinders; i++) {
-        self->reference[i] = past_state(&ref[i]);
-    }
-}
-
-/* From the stream's references to the cylinders', as planned. False where a cylinder could not follow them and another plan may
- * help, unless this is the last one: then it is as if nothing had been tried. */
-HV_OWN_FRAME static bool try_cycle(motion_t *self, bool is_last, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
-{
-    ramp_ref_t curve[AXES_MAX];
-    q32_t acc_q32[POSE_AXES];
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        curve[i] = ref[i];
-    }
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        acc_q32[i] = self->axis[i].state.acc_per_cycle2_q32;
-    }
-    join_step(self, curve, ref);
-    const bool is_beyond = !is_last && join_are_slots_beyond(self, ref);
-    if (!step_slots(self, ref, out) && !is_last && (is_beyond || join_are_cylinders_beyond(self, ref))) {
-        go_back(self, acc_q32, ref);
-        for (unsigned i = 0; i < AXES_MAX; i++) {
-            ref[i] = curve[i];
-        }
-        return false;
-    }
-    out->flags |= join_flags(self, curve);
-    return true;
-}
-
-/* A stream's references, as one body: where a cylinder could not follow them the cycle is planned anew for all. */
-static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
-{
-    (void)stream_step(&self->stream, now_us, ref);
-    slots_scale_refs(self, ref);
-    join_plan(self, ref);
-    if (!try_cycle(self, false, ref, out)) {
-        join_plan_again(self, ref);
-        (void)try_cycle(self, true, ref, out);
+        step_pose(self, ref, out);
+    } else {
+        out->flags |= MOTION_IN_CYLINDERS;
     }
 }
 
@@ -470,6 +445,15 @@ void follow_plan(motion_t *self, uint64_t now_us)
     plan_what_is_due(self, now_us);
 }
 
+/* A stream's references. */
+static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
+{
+    stream_set_scale(&self->stream, intensity_largest_q16(&self->intensity));
+    (void)stream_step(&self->stream, now_us, kin_followed(self), ref);
+    slots_scale_refs(self, ref);
+    out->flags |= self->stream.curve.governor.strength_q32 >= 2 * Q32_ONE ? MOTION_ACCEL : 0;
+}
+
 void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], motion_output_t *out)
 {
     out->flags |= self->is_stretched ? MOTION_STRETCHED : 0;
@@ -477,17 +461,16 @@ void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_M
         step_stream(self, now_us, cylinder_ref, out);
     } else {
         step_source(self, cylinder_ref);
-        (void)step_slots(self, cylinder_ref, out);
         out->flags |= is_step_cruising(self) ? MOTION_SPEED : 0;
     }
+    step_slots(self, cylinder_ref, out);
     out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &cylinder_ref[AXIS_ANGLE], RAMP_FIRM);
-    take_over(self, cylinder_ref, out);
     out->flags |= self->is_clamped ? MOTION_CLAMPED : 0;
 }
 
 void follow_end_cycle(motion_t *self)
 {
-    if (self->source == MOTION_HALTING && halt_is_done(&self->aside.halt) && slot_all_at_rest(self, self->planned_slots)) {
+    if (self->source == MOTION_HALTING && halt_is_done(&self->halt) && slot_all_at_rest(self, self->planned_slots)) {
         slots_scale(self, self->space, self->slot_q32, self->goal_q32);
         plan_straight(self, self->planned_slots, self->straight_cycles);
     }

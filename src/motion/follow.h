@@ -16,9 +16,6 @@ void follow_begin(motion_t *self, uint64_t now_us);
 /** Takes a target, at rest or in motion. Planned is in the next cycle, for the newest one. */
 void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us);
 
-/** In pose space: the pose axes go on from where the cylinders are. */
-void follow_adopt_pose(motion_t *self);
-
 /** Plans what the targets of this cycle ask for, while moving; may find that the platform has to stop first. */
 void follow_plan(motion_t *self, uint64_t now_us);
 

@@ -62,6 +62,13 @@ q32_t intensity_percent_q32(const intensity_t *self)
     return fx_mul_shift(self->share_q46[0], 100 * Q32_ONE, INTENSITY_SHIFT);
 }
 
+q16_t intensity_largest_q16(const intensity_t *self)
+{
+    const int64_t asked_q46 = share_of(self->percent);
+    const int64_t largest_q46 = asked_q46 > self->share_q46[0] ? asked_q46 : self->share_q46[0];
+    return (q16_t)(largest_q46 >> (INTENSITY_SHIFT - 16));
+}
+
 q32_t intensity_scaled(const intensity_t *self, q32_t neutral_q32, q32_t value_q32)
 {
     return neutral_q32 + fx_mul_shift(value_q32 - neutral_q32, self->share_q46[0], INTENSITY_SHIFT);

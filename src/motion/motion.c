@@ -30,8 +30,12 @@ static hv_status_t init_cylinders(motion_t *self, const settings_t *s)
             return status;
         }
     }
-    return ramp_limits_from_units(0, s->stroke_mm_q16[0], s->engage_speed_mm_s_q16, s->engage_accel_mm_s2_q16,
-                                  s->cylinder_jerk_mm_s3, s->cycle_us, &self->engage_limits);
+    const hv_status_t status = ramp_limits_from_units(0, s->stroke_mm_q16[0], s->engage_speed_mm_s_q16, s->engage_accel_mm_s2_q16,
+                                                      s->cylinder_jerk_mm_s3, s->cycle_us, &self->engage_limits);
+    self->fade_limits = (fade_limits_t){.vel_per_cycle_q32 = self->engage_limits.vel_per_cycle_q32,
+                                        .acc_per_cycle2_q32 = self->engage_limits.acc_per_cycle2_q32,
+                                        .least_cycles = (int64_t)s->blend_ms * 1000 / s->cycle_us};
+    return status;
 }
 
 /* What an axis has that the platform does not move: nothing limits it, and nothing is ever asked of it. */
@@ -112,6 +116,7 @@ hv_status_t motion_init(motion_t *self, const settings_t *settings)
         return status;
     }
     stream_init(&self->stream, settings->cycle_us, AXES_MAX, settings->stream_style);
+    stream_set_delay_max(&self->stream, settings->delay_max_ms * 1000);
     motion_place(self, self->settled_mm_q32, 0);
     status = kin_forward(&self->kin, self->settled_mm_q32, &self->neutral, &self->settled_pose, NULL);
     note_known_pose(self, self->settled_mm_q32);
@@ -138,6 +143,7 @@ void motion_place(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q
     self->angle_target_deg_q32 = angle_deg_q32;
     self->is_following = false;
     self->is_taking_over = false;
+    self->is_fading = false;
     self->has_pending = false;
     self->is_pose_stale = true;
     note_known_pose(self, extension_mm_q32);
@@ -175,6 +181,32 @@ static bool is_possible(const motion_t *self, const motion_target_t *target)
     return target->space == MOTION_POSE || slots_can_assemble(self, target);
 }
 
+static void begin_following(motion_t *self, uint64_t now_us)
+{
+    self->has_pending = self->has_pending && is_possible(self, &self->pending);
+    follow_begin(self, now_us);
+}
+
+/* Whether a pose belongs to where the cylinders are. */
+HV_OWN_FRAME static bool has_pose(const motion_t *self)
+{
+    q32_t extension_mm_q32[CYLINDERS_MAX];
+    pose_t pose;
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        extension_mm_q32[i] = self->cylinder[i].state.pos_q32;
+    }
+    return kin_forward(&self->kin, extension_mm_q32, &self->pose, &pose, NULL) == HV_OK;
+}
+
+/* Where the cylinders are to go together, at engage speed. */
+static void set_way(motion_t *self, const q32_t *extension_mm_q32)
+{
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        self->plan.straight.to_q32[i] = i < self->cylinders ? extension_mm_q32[i] : self->cylinder[i].state.pos_q32;
+    }
+    self->plan.straight.to_q32[AXIS_ANGLE] = self->axis[AXIS_ANGLE].state.pos_q32;
+}
+
 /* What was to come after the stop. */
 HV_OWN_FRAME static void go_on_after_stop(motion_t *self, uint64_t now_us)
 {
@@ -183,16 +215,18 @@ HV_OWN_FRAME static void go_on_after_stop(motion_t *self, uint64_t now_us)
         return;
     }
     rest_here(self);
-    if (self->next == MOTION_THEN_FOLLOW) {
-        self->has_pending = self->has_pending && is_possible(self, &self->pending);
-        follow_begin(self, now_us);
+    if (self->next == MOTION_THEN_FOLLOW && !has_pose(self)) { /* a sender is followed from a pose only */
+        set_way(self, self->neutral_mm_q32);
+        start_path(self);
+    } else if (self->next == MOTION_THEN_FOLLOW) {
+        begin_following(self, now_us);
     }
 }
 
 /* All cylinders and the rotation motor slow down together over the same time. */
 static void plan_stop(motion_t *self)
 {
-    halt_t *halt = &self->aside.halt;
+    halt_t *halt = &self->halt;
     const ramp_limits_t *limits[AXES_MAX];
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const ramp_t *ramp = i == AXIS_ANGLE ? &self->axis[AXIS_ANGLE] : &self->cylinder[i];
@@ -208,6 +242,7 @@ static void begin_stop(motion_t *self, motion_next_t next)
 {
     self->next = next;
     self->is_taking_over = false;
+    self->is_fading = false;
     self->has_pending = false;
     self->timed_end_us = 0;
     self->is_stretched = false;
@@ -225,11 +260,9 @@ void motion_stop(motion_t *self)
 static void move_to(motion_t *self, const q32_t *extension_mm_q32)
 {
     self->is_following = false;
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        self->plan.straight.to_q32[i] = i < self->cylinders ? extension_mm_q32[i] : self->cylinder[i].state.pos_q32;
-    }
+    set_way(self, extension_mm_q32);
     begin_stop(self, MOTION_THEN_PATH);
-    self->plan.straight.to_q32[AXIS_ANGLE] = self->aside.halt.rest_q32[AXIS_ANGLE];
+    self->plan.straight.to_q32[AXIS_ANGLE] = self->halt.rest_q32[AXIS_ANGLE];
 }
 
 void motion_settle(motion_t *self)
@@ -247,7 +280,7 @@ void motion_follow(motion_t *self)
     self->is_following = true;
     begin_stop(self, MOTION_THEN_FOLLOW);
     self->is_taking_over = true;
-    self->is_blend_planned = false;
+    self->is_fading = false;
 }
 
 hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_t now_us)
@@ -258,10 +291,10 @@ hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_
     if (!is_possible(self, target)) {
         return HV_ERR_RANGE;
     }
-    if (self->is_taking_over && self->is_blend_planned && target->space != self->space) {
-        motion_follow(self); /* a blend ends where it was planned to, or not at all */
+    if (self->is_fading && target->space != self->space) {
+        motion_follow(self); /* a sender is faded in in the space it began with, or not at all */
     }
-    if (self->source == MOTION_STOPPING) {
+    if (self->source == MOTION_STOPPING || self->source == MOTION_ON_PATH) {
         self->pending = *target;
         self->has_pending = true;
         return HV_OK;
@@ -275,7 +308,7 @@ HV_OWN_FRAME static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_M
 {
     motion_straight_t *way = &self->plan.straight;
     if (self->source == MOTION_STOPPING) {
-        halt_step(&self->aside.halt, ref);
+        halt_step(&self->halt, ref);
         return;
     }
     if (self->source == MOTION_ON_PATH) {
@@ -315,7 +348,7 @@ static bool are_cylinders_moving(const motion_t *self)
  * @param is_planned it is out->sent, if they are what was planned */
 HV_OWN_FRAME static void find_pose(motion_t *self, bool is_planned, motion_output_t *out)
 {
-    if (is_planned && (out->flags & (MOTION_OFF_PATH | MOTION_TAKEOVER)) == 0) {
+    if (is_planned && (out->flags & MOTION_OFF_PATH) == 0) {
         self->pose = out->sent;
     } else if (!self->is_pose_stale && !are_cylinders_moving(self)) {
         /* the pose found last is still the pose */
@@ -335,11 +368,14 @@ static bool is_led_astray(const motion_t *self)
 /* Changes of source that become due at the end of a cycle. */
 static void end_cycle(motion_t *self, uint64_t now_us)
 {
-    if (self->source == MOTION_STOPPING && halt_is_done(&self->aside.halt) && motion_is_at_rest(self)) {
+    if (self->source == MOTION_STOPPING && halt_is_done(&self->halt) && motion_is_at_rest(self)) {
         go_on_after_stop(self, now_us);
     } else if (self->source == MOTION_ON_PATH && scurve_is_done(&self->plan.straight.path) && motion_is_at_rest(self)) {
         self->source = MOTION_RESTING;
         note_known_pose(self, self->plan.straight.to_q32);
+        if (self->is_following) {
+            begin_following(self, now_us);
+        }
     } else if (is_led_astray(self)) {
         self->singular_stops++;
         motion_follow(self);
@@ -368,6 +404,7 @@ void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out)
         follow_step(self, now_us, ref, out);
     } else {
         step_in_cylinders(self, ref);
+        out->flags |= self->is_following && self->source == MOTION_ON_PATH ? MOTION_TAKEOVER : 0;
         out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &ref[AXIS_ANGLE], RAMP_FIRM);
         out->flags |= MOTION_IN_CYLINDERS;
     }

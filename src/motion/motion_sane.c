@@ -74,29 +74,29 @@ static bool are_ramps_sane(const motion_t *saved, const motion_t *prepared)
 static bool are_kinds_sane(const motion_t *saved)
 {
     return (unsigned)saved->source <= MOTION_STRAIGHT && (unsigned)saved->next <= MOTION_THEN_FOLLOW &&
-           (unsigned)saved->space <= MOTION_CYLINDERS && (unsigned)saved->due <= DUE_TIMED &&
-           (unsigned)saved->join <= JOIN_HALT && saved->planned_slots <= AXES_MAX && saved->limiting_cylinder <= CYLINDERS_MAX;
+           (unsigned)saved->space <= MOTION_CYLINDERS && (unsigned)saved->due <= DUE_TIMED && saved->planned_slots <= AXES_MAX &&
+           saved->limiting_cylinder <= CYLINDERS_MAX;
 }
 
 static bool are_bools_sane(const motion_t *saved)
 {
-    return sane_bool(&saved->is_pose_stale) && sane_bool(&saved->is_space_new) && sane_bool(&saved->has_new_sample) &&
-           sane_bool(&saved->is_following) && sane_bool(&saved->is_taking_over) && sane_bool(&saved->is_blend_planned) &&
-           sane_bool(&saved->has_pending) && sane_bool(&saved->is_stretched) && sane_bool(&saved->is_clamped);
+    return sane_bool(&saved->is_pose_stale) && sane_bool(&saved->is_space_new) && sane_bool(&saved->is_following) &&
+           sane_bool(&saved->is_taking_over) && sane_bool(&saved->is_fading) && sane_bool(&saved->has_pending) &&
+           sane_bool(&saved->is_stretched) && sane_bool(&saved->is_clamped);
 }
 
 static bool are_numbers_sane(const motion_t *saved)
 {
     return sane_all_q32(saved->pose.axis_q32, POSE_AXES) && sane_all_q32(saved->slot_q32, AXES_MAX) &&
            sane_all_q32(saved->goal_q32, AXES_MAX) && sane_all_q32(saved->timed_way_q32, AXES_MAX) &&
-           sane_all_q32(saved->slot_extension_mm_q32, CYLINDERS_MAX) && sane_all_q32(saved->blend_from_q32, CYLINDERS_MAX) &&
-           sane_q32(saved->angle_target_deg_q32) && saved->asked_cycles >= 0 && saved->asked_cycles <= CYCLES_MAX &&
-           saved->join_cycles >= 0 && saved->join_cycles <= CYCLES_MAX && saved->straight_cycles >= 0 &&
+           sane_all_q32(saved->slot_extension_mm_q32, CYLINDERS_MAX) && sane_all_q32(saved->fade.from_q32, POSE_AXES) &&
+           sane_all_q32(saved->fade.from_mm_q32, CYLINDERS_MAX) && sane_q32(saved->angle_target_deg_q32) &&
+           saved->asked_cycles >= 0 && saved->asked_cycles <= CYCLES_MAX && saved->straight_cycles >= 0 &&
            saved->straight_cycles <= CYCLES_MAX && saved->timed_share_q46 >= 0 && saved->timed_share_q46 <= SHARE_MAX_Q46 &&
            sane_time(saved->last_us) && sane_time(saved->timed_end_us);
 }
 
-/* Not judged here yet: what stream, gate, plan, aside and blend have inside, and whether source and join go with it. */
+/* Not judged here yet: what stream, gate, plan, halt and fade have inside, and whether source goes with it. */
 bool motion_state_is_sane(const motion_t *saved, const motion_t *prepared)
 {
     return kin_is_same(&saved->kin, &prepared->kin) && saved->cylinders == prepared->cylinders &&

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * plan.c - ways to a target that all slots go together.
  *
- * A quintic is tried for longer and longer times until axes and cylinders keep their limits. Towards a target that moves it is
- * planned for the error: the reference moves on by itself and the quintic fades the difference out. Of the acceleration and the
- * jerk it may use what such a reference leaves, but a third at least; what that turns out to be too much, the next plan mends.
+ * A quintic is tried for longer and longer times until axes and cylinders keep their limits.
  */
 #include "plan.h"
 
@@ -13,10 +11,9 @@
 #include "way.h"
 
 #define SHORTEST_CYCLES 32
-#define ATTEMPTS        34               /* each an eighth longer: up to 50 times the first ... */
-#define ATTEMPTS_POSE   48               /* ... 250 times where a stream of poses can be met in no other way */
+#define ATTEMPTS        34 /* each an eighth longer: up to 50 times the first ... */
+#define SMALL_WAY_Q32   (Q32_ONE / 16)
 #define START_SLACK_Q32 (Q32_ONE / 1000) /* rounding of a quintic's first points */
-#define JOIN_MAX_US     600000           /* a longer quintic swings out further than it is worth */
 
 /* What a quintic is looked for. Where it starts and what limits it are worked out where they are needed: they would lie on the
  * stack under everything that an attempt calls. */
@@ -24,8 +21,6 @@ typedef struct {
     unsigned slots;
     bool is_shifted; /* the intensity moves slots by itself, which is not for the plan to do */
     const q32_t *target_q32;
-    const ramp_ref_t *curve; /* what the target moves with, NULL where it rests */
-    bool stays_near;         /* goes no further than the stop in self->aside.halt */
 } task_t;
 
 /* A state of the cycle before, less what something else adds to the plan: its reference is that of this cycle already. */
@@ -36,7 +31,7 @@ static ramp_state_t seen_from(const ramp_state_t *state, const ramp_ref_t *ref)
                           state->acc_per_cycle2_q32 - base.acc_per_cycle2_q32};
 }
 
-/* Where a slot starts, seen from what the target moves with. */
+/* Where a slot starts. */
 static ramp_state_t start_of(const motion_t *self, const task_t *task, unsigned i)
 {
     ramp_state_t start = *slot_state(self, i);
@@ -44,7 +39,7 @@ static ramp_state_t start_of(const motion_t *self, const task_t *task, unsigned 
         const ramp_ref_t shift = intensity_shift(&self->intensity, self->timed_share_q46, self->timed_way_q32[i]);
         start = seen_from(&start, &shift);
     }
-    return task->curve != NULL ? seen_from(&start, &task->curve[i]) : start;
+    return start;
 }
 
 /* Where cylinders led beyond an axis' range, the way back begins there. */
@@ -54,31 +49,11 @@ static void include_start(ramp_limits_t *limits, q32_t start_q32)
     limits->pos_max_q32 = fx_clamp(start_q32 + START_SLACK_Q32, limits->pos_max_q32, INT64_MAX);
 }
 
-/* The longer a quintic is, the further the acceleration it starts with carries it: planned anew with each sample such ways swing
- * out ever further. Where none stays between start and target, or where the quickest stop ends, that stop is the better way. */
-static void stay_near(ramp_limits_t *limits, q32_t from_q32, q32_t to_q32, q32_t rest_q32)
-{
-    const q32_t low_q32 = fx_clamp(to_q32, INT64_MIN, from_q32 < rest_q32 ? from_q32 : rest_q32);
-    const q32_t high_q32 = fx_clamp(to_q32, from_q32 > rest_q32 ? from_q32 : rest_q32, INT64_MAX);
-    limits->pos_min_q32 = fx_clamp(low_q32 - START_SLACK_Q32, limits->pos_min_q32, INT64_MAX);
-    limits->pos_max_q32 = fx_clamp(high_q32 + START_SLACK_Q32, INT64_MIN, limits->pos_max_q32);
-}
-
-/* The limits of a slot, less what a target that moves takes of them. */
+/* The limits of a slot. */
 static ramp_limits_t limits_of(const motion_t *self, const task_t *task, unsigned i)
 {
     ramp_limits_t limits = *slot_limits(self, i);
-    if (task->curve != NULL) {
-        limits.jerk_per_cycle3_q32 -= limits.jerk_per_cycle3_q32 / 4;
-        limits.pos_min_q32 = INT64_MIN / 4; /* where the target will be is not known: the ramps keep the bounds */
-        limits.pos_max_q32 = INT64_MAX / 4;
-        return limits;
-    }
-    const q32_t start_q32 = start_of(self, task, i).pos_q32;
-    include_start(&limits, start_q32);
-    if (task->stays_near) {
-        stay_near(&limits, start_q32, task->target_q32[i], self->aside.halt.rest_q32[i]);
-    }
+    include_start(&limits, start_of(self, task, i).pos_q32);
     return limits;
 }
 
@@ -105,15 +80,6 @@ HV_OWN_FRAME static bool plan_slots(motion_t *self, const task_t *task, int64_t 
     return quintic_plan(&self->plan.quintic, task->slots, start, task->target_q32, cycles) == HV_OK;
 }
 
-/* Adds what the target moves with, or takes it off again. */
-static void add_curve(motion_t *self, const task_t *task, int sign)
-{
-    for (unsigned i = 0; task->curve != NULL && i < task->slots; i++) {
-        const ramp_state_t base = past_state(&task->curve[i]);
-        quintic_add_motion(&self->plan.quintic, i, &base, sign);
-    }
-}
-
 /* Whether every slot keeps its limits along self->plan.quintic. */
 HV_OWN_FRAME static bool keeps_limits(const motion_t *self, const task_t *task)
 {
@@ -128,18 +94,13 @@ static bool try_quintic(motion_t *self, const task_t *task, int64_t cycles)
     if (!plan_slots(self, task, cycles)) {
         return false;
     }
-    add_curve(self, task, 1);
-    if (!keeps_limits(self, task) || (self->space == MOTION_POSE && !way_is_feasible(self, &self->plan.quintic))) {
-        return false;
-    }
-    add_curve(self, task, -1);
-    return true;
+    return keeps_limits(self, task) && (self->space != MOTION_POSE || way_is_feasible(self, &self->plan.quintic));
 }
 
-static bool find_shortest(motion_t *self, const task_t *task, int64_t least, int64_t most, int attempts)
+static bool find_shortest(motion_t *self, const task_t *task, int64_t least, int64_t most)
 {
     int64_t cycles = least > SHORTEST_CYCLES ? least : SHORTEST_CYCLES;
-    for (int attempt = 0; attempt < attempts && cycles <= most; attempt++) {
+    for (int attempt = 0; attempt < ATTEMPTS && cycles <= most; attempt++) {
         if (try_quintic(self, task, cycles)) {
             return true;
         }
@@ -148,34 +109,14 @@ static bool find_shortest(motion_t *self, const task_t *task, int64_t least, int
     return false;
 }
 
-static int attempts_in(const motion_t *self)
-{
-    return self->space == MOTION_POSE ? ATTEMPTS_POSE : ATTEMPTS;
-}
-
-bool plan_join(motion_t *self, const ramp_ref_t *curve)
-{
-    static const q32_t k_no_difference_q32[POSE_AXES] = {0};
-    const task_t task = {.slots = POSE_AXES, .target_q32 = k_no_difference_q32, .curve = curve};
-    return find_shortest(self, &task, 1, JOIN_MAX_US / (int64_t)self->cycle_us, attempts_in(self));
-}
-
 /* A stop from where a task starts. */
 static void halt_within(motion_t *self, const task_t *task, const ramp_limits_t *const *limits)
 {
-    halt_t *halt = &self->aside.halt;
+    halt_t *halt = &self->halt;
     for (unsigned i = 0; i < task->slots; i++) {
         halt->start[i] = start_of(self, task, i);
     }
     halt_plan(halt, task->slots, POSE_AXES, halt->start, limits);
-}
-
-/* Within the task's own limits. */
-HV_OWN_FRAME static void halt_task(motion_t *self, const task_t *task)
-{
-    limits_t limits;
-    set_limits(self, task, &limits);
-    halt_within(self, task, limits.list);
 }
 
 /* Within those of the slots. */
@@ -186,22 +127,6 @@ HV_OWN_FRAME static void halt_slots(motion_t *self, const task_t *task)
         limits[i] = slot_limits(self, i);
     }
     halt_within(self, task, limits);
-}
-
-void plan_halt(motion_t *self)
-{
-    const task_t task = {.slots = POSE_AXES};
-    halt_slots(self, &task);
-}
-
-bool plan_shortest(motion_t *self, const q32_t target_q32[AXES_MAX])
-{
-    task_t task = {.slots = POSE_AXES, .target_q32 = target_q32};
-    if (self->space == MOTION_CYLINDERS) { /* of poses a stop need not be what the cylinders can do */
-        halt_task(self, &task);
-        task.stays_near = true;
-    }
-    return find_shortest(self, &task, 1, INT64_MAX, attempts_in(self));
 }
 
 /* The straight way between two points of the slots, as a path with the limits of axes and cylinders. */
@@ -234,10 +159,10 @@ void plan_straight(motion_t *self, unsigned slots, int64_t least_cycles)
 static int64_t plan_stop_then_straight(motion_t *self, const task_t *task)
 {
     halt_slots(self, task);
-    const path_limits_t path = limits_of_straight(self, task->slots, self->aside.halt.rest_q32);
+    const path_limits_t path = limits_of_straight(self, task->slots, self->halt.rest_q32);
     scurve_plan(&self->plan.straight.path, &path, 1);
     self->straight_cycles = scurve_cycles(&self->plan.straight.path);
-    return self->aside.halt.cycles + 1 + self->straight_cycles;
+    return self->halt.cycles + 1 + self->straight_cycles;
 }
 
 /* In motion: the shorter one of a quintic of at least so many cycles and a stop with a straight way. The cycles it takes. */
@@ -246,7 +171,7 @@ static int64_t plan_quickest(motion_t *self, const task_t *task, int64_t least)
     const int64_t in_two_parts = plan_stop_then_straight(self, task);
     self->source = MOTION_TIMED;
     const int64_t from = least > in_two_parts / 4 ? least : in_two_parts / 4; /* none is shorter than that */
-    if (find_shortest(self, task, from, in_two_parts, ATTEMPTS)) {
+    if (find_shortest(self, task, from, in_two_parts)) {
         return self->plan.quintic.cycles;
     }
     self->source = MOTION_HALTING;
@@ -266,7 +191,7 @@ static int64_t plan_timed_cycles(motion_t *self, int64_t cycles)
     }
     if (plan_stop_then_straight(self, &task) <= cycles) {
         self->source = MOTION_HALTING;
-        self->straight_cycles = cycles - self->aside.halt.cycles - 1;
+        self->straight_cycles = cycles - self->halt.cycles - 1;
         return cycles;
     }
     return plan_quickest(self, &task, cycles);
@@ -277,12 +202,50 @@ void plan_timed(motion_t *self, int64_t asked, bool is_first, uint64_t now_us)
     self->planned_slots = AXES_MAX;
     slots_plan(self, self->slot_q32);
     int64_t cycles = plan_timed_cycles(self, asked > 0 ? asked : 1);
-    if (is_first && scurve_cycles(&self->blend) > cycles) {
-        cycles = scurve_cycles(&self->blend);
+    if (is_first && fade_cycles_left(&self->fade, &self->fade_limits) > cycles) {
+        cycles = fade_cycles_left(&self->fade, &self->fade_limits);
     }
     self->is_stretched = asked > 0 && cycles > asked;
     self->stretched_count += self->is_stretched;
     self->timed_end_us = now_us + (uint64_t)cycles * self->cycle_us;
+}
+
+/* Whether no cylinder could be asked for more than it can do while each of these axes moves as quickly as it may: by what a small
+ * way of each axis is for the cylinders at the goal. */
+static bool can_axes_go_alone(const motion_t *self)
+{
+    pose_t pose;
+    q32_t at_mm_q32[CYLINDERS_MAX];
+    int64_t need_q16[CYLINDERS_MAX][3] = {{0}};
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        pose.axis_q32[i] = self->goal_q32[i];
+    }
+    bool is_reached = kin_inverse(&self->kin, &pose, at_mm_q32) == HV_OK;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        const ramp_state_t *state = slot_state(self, i);
+        const ramp_limits_t *axis = slot_limits(self, i);
+        if (!self->is_axis_moved[i] || (state->pos_q32 == self->goal_q32[i] && ramp_is_at_rest(&self->axis[i]))) {
+            continue;
+        }
+        q32_t there_mm_q32[CYLINDERS_MAX] = {0};
+        pose.axis_q32[i] += SMALL_WAY_Q32;
+        is_reached = is_reached && kin_inverse(&self->kin, &pose, there_mm_q32) == HV_OK;
+        pose.axis_q32[i] -= SMALL_WAY_Q32;
+        for (unsigned c = 0; c < self->cylinders && is_reached; c++) {
+            const ramp_limits_t *cylinder = &self->cylinder[c].limits;
+            const q32_t way_q32 = fx_abs(there_mm_q32[c] - at_mm_q32[c]) * (Q32_ONE / SMALL_WAY_Q32);
+            need_q16[c][0] +=
+                fx_mul_div(fx_mul_shift(axis->vel_per_cycle_q32, way_q32, 32), Q16_ONE, cylinder->vel_per_cycle_q32);
+            need_q16[c][1] +=
+                fx_mul_div(fx_mul_shift(axis->acc_per_cycle2_q32, way_q32, 32), Q16_ONE, cylinder->acc_per_cycle2_q32);
+            need_q16[c][2] +=
+                fx_mul_div(fx_mul_shift(axis->jerk_per_cycle3_q32, way_q32, 32), Q16_ONE, cylinder->jerk_per_cycle3_q32);
+        }
+    }
+    for (unsigned c = 0; c < self->cylinders; c++) {
+        is_reached = is_reached && need_q16[c][0] < Q16_ONE && need_q16[c][1] < Q16_ONE && need_q16[c][2] < Q16_ONE;
+    }
+    return is_reached;
 }
 
 void plan_step(motion_t *self)
@@ -291,6 +254,10 @@ void plan_step(motion_t *self)
     slots_plan(self, self->slot_q32);
     if (slot_all_at_rest(self, POSE_AXES)) {
         plan_straight(self, POSE_AXES, 1);
+        return;
+    }
+    if (!self->is_fading && (self->space == MOTION_CYLINDERS || can_axes_go_alone(self))) {
+        self->source = MOTION_STREAMED; /* a lone sample: each axis by its own ramp, which is the quickest way in motion */
         return;
     }
     const task_t task = {.slots = POSE_AXES, .is_shifted = true, .target_q32 = self->goal_q32};

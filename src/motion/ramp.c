@@ -34,7 +34,7 @@ static const grip_t k_grips[] = {
 /* Steps of the root search; the chord of the last bracket is the result. */
 #define SOLVER_STEPS 10
 
-#define JERK_MEMORY_SHIFT 11 /* 2^11 cycles after which what a reference once took of the jerk counts 1/e */
+#define USE_MEMORY_SHIFT 11 /* 2^11 cycles after which what a reference once took of the jerk counts 1/e */
 
 /* Errors against the reference of the cycle before. */
 typedef struct {
@@ -208,7 +208,9 @@ static void beside(const ramp_t *self, q32_t feed_q32, ramp_t *relative)
     const q32_t left_q32 = fx_clamp(jerk_q32 - self->ref_jerk_q32, jerk_q32 / 8, jerk_q32 - jerk_q32 / 4);
     *relative = *self;
     relative->limits.jerk_per_cycle3_q32 = left_q32;
-    relative->acc_cycles = fx_clamp((self->acc_safe_q32 - fx_abs(feed_q32)) / left_q32, 1, self->acc_safe_q32);
+    const q32_t used_q32 = fx_abs(feed_q32) > self->ref_acc_q32 ? fx_abs(feed_q32) : self->ref_acc_q32;
+    const q32_t acc_left_q32 = fx_clamp(self->acc_safe_q32 - used_q32, self->acc_safe_q32 / 8, self->acc_safe_q32);
+    relative->acc_cycles = fx_clamp(acc_left_q32 / left_q32, 1, self->acc_safe_q32);
     relative->acc_safe_q32 = relative->acc_cycles * left_q32;
     relative->per_jerk_q62 = Q62_ONE / left_q32;
     relative->per_acc_q62 = Q62_ONE / relative->acc_safe_q32;
@@ -271,11 +273,15 @@ static inline bool find_by_law(const ramp_t *self, const ramp_ref_t *ref, ramp_g
         *to_take_q32 = ref->acc_per_cycle2_q32 + e.d - e.w - self->state.acc_per_cycle2_q32;
         return true;
     }
-    const grip_t *g = &k_grips[is_firm ? RAMP_FIRM : RAMP_SOFT];
-    if (!is_in_layer(&e, jerk_q32, g)) {
+    if (is_firm && is_in_layer(&e, jerk_q32, &k_grips[RAMP_FIRM])) {
+        *to_take_q32 = by_law(&e, ref, &k_grips[RAMP_FIRM]);
+        return true;
+    }
+    /* towards a reference in motion the firm law has a wider layer around its own: without it, it would miss that for ever */
+    if (is_at_rest(ref) || !is_in_layer(&e, jerk_q32, &k_grips[RAMP_SOFT])) {
         return false;
     }
-    *to_take_q32 = by_law(&e, ref, g);
+    *to_take_q32 = by_law(&e, ref, &k_grips[RAMP_SOFT]);
     return true;
 }
 
@@ -436,12 +442,16 @@ static ramp_ref_t reference_within_bounds(ramp_t *self, const ramp_ref_t *ref)
     return (ramp_ref_t){.pos_q32 = inside_q32};
 }
 
-/* Remembers how much jerk the references take: a reference that has turned sharply will again. */
-static void note_jerk(ramp_t *self, q32_t ref_jerk_q32)
+/* Remembers how much of the limits the references take: a reference that has turned sharply will again. */
+static void note_use(ramp_t *self, const ramp_ref_t *ref)
 {
-    const q32_t faded_q32 = self->ref_jerk_q32 - fx_shift_down(self->ref_jerk_q32, JERK_MEMORY_SHIFT);
-    self->ref_jerk_q32 =
-        is_within(ref_jerk_q32, faded_q32) ? faded_q32 : fx_clamp(fx_abs(ref_jerk_q32), 0, self->limits.jerk_per_cycle3_q32);
+    const q32_t jerk_q32 = self->ref_jerk_q32 - fx_shift_down(self->ref_jerk_q32, USE_MEMORY_SHIFT);
+    const q32_t acc_q32 = self->ref_acc_q32 - fx_shift_down(self->ref_acc_q32, USE_MEMORY_SHIFT);
+    self->ref_jerk_q32 = is_within(ref->jerk_per_cycle3_q32, jerk_q32)
+                             ? jerk_q32
+                             : fx_clamp(fx_abs(ref->jerk_per_cycle3_q32), 0, self->limits.jerk_per_cycle3_q32);
+    self->ref_acc_q32 =
+        is_within(ref->acc_per_cycle2_q32, acc_q32) ? acc_q32 : fx_clamp(fx_abs(ref->acc_per_cycle2_q32), 0, self->acc_safe_q32);
 }
 
 static q32_t advance(ramp_t *self, q32_t acc_q32)
@@ -461,7 +471,7 @@ static bool is_reference_inside(const ramp_t *self, const ramp_ref_t *ref)
 HV_OUT_OF_LINE static q32_t step_with_care(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
 {
     const ramp_ref_t inside = reference_within_bounds(self, ref);
-    note_jerk(self, inside.jerk_per_cycle3_q32);
+    note_use(self, &inside);
     return advance(self, allowed_acceleration(self, wanted_acceleration(self, &inside, grip)));
 }
 
@@ -472,7 +482,7 @@ static inline q32_t step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
     if (!is_reference_inside(self, ref) || !find_by_law(self, ref, grip, &jerk_q32) || !is_free(self, jerk_q32)) {
         return step_with_care(self, ref, grip);
     }
-    note_jerk(self, ref->jerk_per_cycle3_q32);
+    note_use(self, ref);
     return advance(self, self->state.acc_per_cycle2_q32 + jerk_q32);
 }
 

@@ -6,20 +6,25 @@
 
 #include "heave/motion.h"
 
+/** What moves a slot. */
+static inline const ramp_t *slot_ramp(const motion_t *self, unsigned i)
+{
+    return self->space == MOTION_POSE || i == AXIS_ANGLE ? &self->axis[i] : &self->cylinder[i];
+}
+
 /** Limits of a slot. */
 static inline const ramp_limits_t *slot_limits(const motion_t *self, unsigned i)
 {
-    return self->space == MOTION_POSE || i == AXIS_ANGLE ? &self->axis[i].limits : &self->cylinder[i].limits;
+    return &slot_ramp(self, i)->limits;
 }
 
-/** Where a slot is: while a take-over leads the cylinders, those have a motion of their own, and what counts is what was asked.
- */
+/** Where a slot is: while a sender is faded in, where it was led to before that. */
 static inline const ramp_state_t *slot_state(const motion_t *self, unsigned i)
 {
-    if (self->space == MOTION_POSE || i == AXIS_ANGLE) {
-        return &self->axis[i].state;
+    if (self->is_fading && i != AXIS_ANGLE) {
+        return &self->led[i];
     }
-    return self->is_taking_over ? &self->led[i] : &self->cylinder[i].state;
+    return &slot_ramp(self, i)->state;
 }
 
 /** True if the first so many slots rest. */

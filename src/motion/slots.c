@@ -5,6 +5,7 @@
 
 #include "assembly.h"
 #include "reach.h"
+#include "slot.h"
 
 #define SLOT_MAX_Q32 q32_from_int(32768) /* no limit is beyond it */
 
@@ -87,6 +88,9 @@ void slots_take(motion_t *self, const motion_target_t *target, q32_t slot_q32[AX
         slot_q32[i] =
             is_used ? slot_within(self, target->space, i, limits, target->value_q32[i]) : self->cylinder[i].state.pos_q32;
     }
+    for (unsigned i = 0; target->space == MOTION_POSE && i < POSE_AXES; i++) {
+        slot_q32[i] = self->is_axis_moved[i] ? slot_q32[i] : 0;
+    }
     slot_q32[AXIS_ANGLE] = self->angle_target_deg_q32;
     slots_scale(self, target->space, slot_q32, scaled_q32);
     if (target->space == MOTION_POSE) {
@@ -120,6 +124,19 @@ bool slots_is_planned(const motion_t *self, const q32_t slot_q32[AXES_MAX])
         is_planned &= self->timed_way_q32[i] == whole_way(self, i, slot_q32[i]);
     }
     return is_planned;
+}
+
+void slots_unscaled_states(const motion_t *self, history_t now[AXES_MAX])
+{
+    const int64_t share_q46 = self->intensity.share_q46[0];
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        now[i] = *slot_state(self, i);
+        if (is_scaled(self, self->space, i)) {
+            now[i].pos_q32 = intensity_unscaled(&self->intensity, centre_of(self, self->space, i), now[i].pos_q32);
+            now[i].vel_per_cycle_q32 = share_q46 > 0 ? fx_mul_div(now[i].vel_per_cycle_q32, INTENSITY_FULL, share_q46) : 0;
+            now[i].acc_per_cycle2_q32 = share_q46 > 0 ? fx_mul_div(now[i].acc_per_cycle2_q32, INTENSITY_FULL, share_q46) : 0;
+        }
+    }
 }
 
 void slots_scale_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX])

@@ -27,6 +27,9 @@ void slots_shift_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX]);
 /** True if the planned move ends at these slots: at an intensity of 0 all of them look alike. */
 bool slots_is_planned(const motion_t *self, const q32_t slot_q32[AXES_MAX]);
 
+/** Where the slots are and move, as the sender would have to ask for it. At an intensity of 0: neutral, at rest. */
+void slots_unscaled_states(const motion_t *self, history_t now[AXES_MAX]);
+
 /** The references of a stream with the intensity in force. */
 void slots_scale_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX]);
 

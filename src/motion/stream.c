@@ -1,28 +1,39 @@
 /* SPDX-License-Identifier: MIT
  * stream.c - rebuilds a sender's motion: renders the curve through its samples at the pace of its clock.
- * The render phase advances by one cycle's share of the period, up to 6 % faster or slower so that it meets its time. That rate
+ * The render phase advances by one cycle's share of the period, up to 10 % faster or slower so that it meets its time. That rate
  * passes two low-pass filters: behind one, a jump of the wished rate would still be a jump of the reference's acceleration.
  */
 #include "heave/stream.h"
 #include "stream_clock.h"
 #include "stream_curve.h"
+#include "stream_evidence.h"
 #include "stream_repeat.h"
 
-#define PACE_GAIN_DIV        8                   /* a rate correction of 1/8 per period of error ... */
-#define PACE_GAIN_DIV_HINTED 2                   /* ... 1/2 where the period is stated, and often a long one */
-#define PACE_MAX_Q32         (Q32_ONE * 6 / 100) /* ... but at most this */
-#define PACE_FILTER_MAX      (Q32_ONE / 2)       /* keeps the filters stable where a cycle is longer than a period */
-#define BEHIND_MAX_Q32       (Q32_ONE * 3 / 2)   /* further behind its time, a sample is skipped */
-#define BEFORE_MAX_Q32       (Q32_ONE / 2)       /* further before it, where it has no samples, a point is filled in */
-#define AMBIGUOUS_Q32        (Q32_ONE * 13 / 20) /* a sample may belong to a period this far from its time, or ... */
-#define AMBIGUOUS_MAX_Q32    (Q32_ONE * 9 / 10)  /* ... this far, where that is no more than ... */
-#define AMBIGUOUS_US         15000u              /* ... networks make it */
-#define STEP_GAP_MIN_US      2000u /* two samples nearer than this do not begin a stream: the second replaces the first */
+#define PACE_GAIN_DIV        8                  /* a rate correction of 1/8 per period of error ... */
+#define PACE_GAIN_DIV_HINTED 3                  /* ... 1/3 where the period is stated, and often a long one */
+#define PACE_MAX_Q32         (Q32_ONE / 10)     /* ... but at most this */
+#define PACE_SLOW_Q32        (Q32_ONE * 2 / 5)  /* ... and so much slower where it is ... */
+#define FAR_BEFORE_Q32       (Q32_ONE / 2)      /* ... so far before its time: what comes next is a guess */
+#define PACE_FILTER_MAX      (Q32_ONE / 2)      /* keeps the filters stable where a cycle is longer than a period */
+#define BEHIND_MAX_Q32       (Q32_ONE * 6)      /* further behind its time, a sample is skipped */
+#define SAME_Q32             (Q32_ONE * 3 / 4)  /* the newest values again so soon after the newest sample say nothing */
+#define CLEAR_Q32            (Q32_ONE * 3 / 10) /* a sample so near to its time is the one of that time */
+#define BESIDE_Q32           (Q32_ONE / 8)      /* one further from its time than by jitter and so much is beside it */
+#define TELLING              4     /* a value tells if it is off by less than such a share of what there is to tell, ... */
+#define TELLING_OPEN         2     /* ... of such a one where the time leaves it open */
+#define LOSSES_MAX           4u    /* so often it counts that a long interval was a loss */
+#define MISFIT_MEMORY        16    /* samples */
+#define FEW                  16    /* grains in a step that tells too little */
+#define JUDGED_MAX           4u    /* periods that values are weighed for */
+#define SAME_US              2000u /* while the period is not known */
+#define YOUNG                3     /* samples */
+#define PAIR                 2u    /* samples that are steps; with the next one they are a stream, ... */
+#define BEGIN_US             (3 * STREAM_PERIOD_MIN_US) /* ... but of a flood, with those of so long */
 
 /* Thinning out. Counted, not timed: every so manyth sample of an even stream is an even stream. */
 #define THIN_GAP_FIRST_US 10000u /* a few short intervals at a start, or in a burst, say nothing */
 #define THIN_GAP_MAX_US   20000u
-#define THIN_GAPS         16 /* intervals that the mean is taken over */
+#define THIN_GAPS         64 /* intervals that the mean is taken over */
 #define THIN_BELOW_US     (STREAM_PERIOD_MIN_US * 39 / 40)
 #define THIN_ABOVE_US     (STREAM_PERIOD_MIN_US * 11 / 10)
 #define THIN_WAIT_US      (STREAM_PERIOD_MIN_US * 2) /* then a sample passed by was the last */
@@ -33,13 +44,43 @@ void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_
     *self = (stream_t){.cycle_us = cycle_us,
                        .style = style,
                        .thin = {.gaps_us = THIN_GAP_FIRST_US * THIN_GAPS, .each = 1, .each_taken = 1},
-                       .curve = {.axes = axes}};
+                       .curve = {.axes = axes, .scale_q16 = Q16_ONE}};
 }
 
-void stream_set_stop(stream_t *self, unsigned axis, stream_stop_t stop)
+void stream_set_limits(stream_t *self, unsigned axis, const governor_limits_t *limits)
 {
     HV_ASSERT(axis < self->curve.axes);
-    self->curve.stop[axis] = stop;
+    self->curve.limits[axis] = *limits;
+    if (axis < POSE_AXES) {
+        governor_set_limits(&self->curve.governor, axis, limits);
+    }
+}
+
+void stream_set_cylinder_limits(stream_t *self, unsigned cylinder, const governor_limits_t *limits)
+{
+    governor_set_limits(&self->curve.governor, POSE_AXES + cylinder, limits);
+}
+
+void stream_set_delay_max(stream_t *self, uint32_t delay_max_us)
+{
+    self->clock.delay_max_us = delay_max_us;
+}
+
+void stream_set_scale(stream_t *self, int32_t scale_q16)
+{
+    self->curve.scale_q16 = scale_q16;
+}
+
+void stream_hide_start(stream_t *self, bool is_hidden)
+{
+    self->is_hidden = is_hidden;
+}
+
+void stream_place(stream_t *self, const history_t *now)
+{
+    for (unsigned axis = 0; axis < self->curve.axes; axis++) {
+        self->previous[axis] = now[axis];
+    }
 }
 
 void stream_reset(stream_t *self)
@@ -56,11 +97,36 @@ void stream_hint_period(stream_t *self, uint32_t period_us)
     }
 }
 
-static void start_lone(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+/* True where steps are a few grains: then values tell no time. */
+static bool is_coarse(const stream_t *self)
 {
-    stream_curve_start(&self->curve, self->curve.axes, sample_q32);
+    const stream_curve_t *curve = &self->curve;
+    bool is_found = false;
+    for (unsigned axis = 0; axis < POSE_AXES && axis < curve->axes; axis++) {
+        is_found |= fx_abs(curve->grain[axis].step_q32) < FEW * curve->grain[axis].grain_q32;
+    }
+    return is_found || curve->window > 1;
+}
+
+static void note_sample(stream_t *self, unsigned periods, q32_t shift_q32, const q32_t *sample_q32)
+{
+    const q32_t late_q32 = self->clock.period_us_q16 > 0 ? stream_clock_lateness(&self->clock) : 0;
+    stream_evidence_take(&self->evidence, &self->curve.governor, self->curve.axes, periods, late_q32, shift_q32, is_coarse(self),
+                         sample_q32);
+}
+
+static void start_lone(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
+{
+    stream_curve_start(&self->curve, kin, sample_q32);
     stream_repeat_reset(&self->repeat, now_us);
+    stream_evidence_reset(&self->evidence, self->phase != STREAM_EMPTY);
+    note_sample(self, 0, 0, sample_q32);
+    self->misfit_q32 = 0;
+    self->losses = 0;
     self->phase = STREAM_LONE;
+    self->pair = 1;
+    self->pair_gap_us = 0;
+    self->began_us = now_us;
     self->is_fresh = true;
 }
 
@@ -69,62 +135,90 @@ static q32_t error_at(const stream_t *self, uint64_t now_us)
     return self->curve.ahead * Q32_ONE + stream_clock_periods(&self->clock, now_us) - self->between_q32;
 }
 
-static void start_running(stream_t *self, uint64_t now_us)
+/* How many periods the motion so far would take to a sample: its way along the newest step, in steps. 0 where it stands. */
+static q32_t advance_of(const stream_t *self, const q32_t *sample_q32)
 {
-    self->phase = STREAM_RUNNING;
-    self->between_q32 = 0;
-    self->rate_q32[0] = self->rate_q32[1] = stream_clock_span(&self->clock, self->cycle_us);
-    self->between_q32 = fx_clamp(error_at(self, now_us), 0, Q32_ONE - 1);
+    const stream_evidence_t *seen = &self->evidence;
+    int64_t along_q32 = 0;
+    int64_t square_q32 = 0;
+    if (seen->count < 2 || seen->index[1] < 1) {
+        return 0;
+    }
+    for (unsigned axis = 0; axis < POSE_AXES && axis < self->curve.axes; axis++) {
+        const int64_t per_speed_q62 = self->curve.governor.per_limit_q62[axis][0];
+        const q32_t step_q32 =
+            fx_mul_shift((seen->value_q32[0][axis] - seen->value_q32[1][axis]) / seen->index[1], per_speed_q62, 30);
+        const q32_t way_q32 = fx_mul_shift(sample_q32[axis] - seen->value_q32[0][axis], per_speed_q62, 30);
+        along_q32 +=
+            fx_mul_shift(fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), fx_clamp(way_q32, -16 * Q32_ONE, 16 * Q32_ONE), 32);
+        square_q32 +=
+            fx_mul_shift(fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), 32);
+    }
+    return square_q32 > 0 ? fx_mul_div(along_q32, Q32_ONE, square_q32) : 0;
 }
 
-/* Faster streams are thinned out, not taken for jitter. */
-static bool is_fastest(const stream_t *self)
+/* How much better than by the time the value has to tell a number of periods. Where the time leaves it open, a little; else more,
+ * and much more the more often an interval of an even sender that was too long has been told to be a loss. */
+static int32_t telling(const stream_t *self, unsigned periods, q32_t ahead_q32)
 {
-    return self->clock.period_us_q16 * 10 < (int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16 * 11;
+    const q32_t off_q32 = fx_abs(ahead_q32 - periods * Q32_ONE);
+    if (off_q32 <= stream_clock_jitter(&self->clock) + CLEAR_Q32) {
+        return TELLING_OPEN;
+    }
+    return TELLING << (stream_clock_is_even(&self->clock) ? self->losses : 0);
 }
 
-/* What speaks against a sample that is so many periods after the newest: how far it is off the motion so far, and off its time.
- */
-typedef struct {
-    q32_t cost_q32;
-    bool is_telling; /* it is where that motion would be, and about in time */
-} guess_t;
-
-static q32_t ambiguous(const stream_t *self)
+/* What a long interval was: a loss where time and value agree, else a pause of the sender. */
+static void note_loss(stream_t *self, unsigned by_time, unsigned periods, q32_t misfit_q32)
 {
-    return fx_clamp(stream_clock_span(&self->clock, AMBIGUOUS_US), AMBIGUOUS_Q32, AMBIGUOUS_MAX_Q32);
+    const q32_t apart_q32 = stream_evidence_apart(&self->evidence, &self->curve.governor, by_time, by_time - 1);
+    if (by_time < 2 || (misfit_q32 + self->misfit_q32) * TELLING >= apart_q32) {
+        return;
+    }
+    if (periods != by_time) {
+        self->losses = 0;
+    } else if (self->losses < LOSSES_MAX) {
+        self->losses++;
+    }
 }
 
-static guess_t guess_of(const stream_t *self, const q32_t *sample_q32, unsigned periods, q32_t ahead_q32)
-{
-    q32_t step_q32;
-    const q32_t misfit_q32 = stream_curve_misfit(&self->curve, sample_q32, periods, &step_q32);
-    const q32_t untimely_q32 = fx_abs(ahead_q32 - periods * Q32_ONE);
-    return (guess_t){.cost_q32 = misfit_q32 + fx_mul_shift(step_q32, untimely_q32 / 2, 32),
-                     .is_telling = untimely_q32 < ambiguous(self) && misfit_q32 * 4 < step_q32};
-}
-
-/* Periods from the newest sample to this one. A loss, a late and an early arrival look alike to the clock; where the signal
- * moves, the value tells them apart: if the motion so far goes on to within a quarter of its step. Where it hardly moves, or
- * bends, the time tells. */
-static unsigned judge_periods(const stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+/* Periods from the newest sample to this one. A loss and a late sample look alike to the clock. Where the motion so far leads to
+ * the sample in another number of periods than the time tells, and well beside it in that, the value counts; but where the time
+ * is clear.
+ * @param shift_q32 out: where value and time agree on a time between two points of the line, how far it is after the one */
+static unsigned judge_periods(stream_t *self, uint64_t now_us, const q32_t *sample_q32, q32_t *shift_q32)
 {
     q32_t ahead_q32;
-    const unsigned expected = stream_clock_expect(&self->clock, now_us, &ahead_q32);
-    if (expected > 3 || (expected == 0 && is_fastest(self))) {
-        return expected;
+    q32_t late_q32;
+    const stream_evidence_t *seen = &self->evidence;
+    const governor_t *scale = &self->curve.governor;
+    const unsigned by_time = stream_clock_expect(&self->clock, now_us, &ahead_q32, &late_q32);
+    const q32_t early_q32 = late_q32 < Q32_ONE / 2 ? Q32_ONE / 2 : late_q32;
+    const bool is_even = stream_clock_is_even(&self->clock);
+    *shift_q32 = 0;
+    const bool is_arrived = seen->weight_q32 > Q32_ONE / 2; /* the value is that of the arrival, whatever the number */
+    if (seen->count < 3 || is_arrived || (is_even && by_time == 1 && fx_abs(ahead_q32 - Q32_ONE) < CLEAR_Q32)) {
+        return by_time;
     }
-    if (fx_abs(ahead_q32 - expected * Q32_ONE) <= Q32_ONE - ambiguous(self)) {
-        return expected; /* so well in time that no other period comes into question */
-    }
-    unsigned best = expected;
-    q32_t least_q32 = guess_of(self, sample_q32, expected, ahead_q32).cost_q32;
-    for (unsigned periods = expected > 1 ? expected - 1 : expected + 1; periods <= expected + 1; periods += 2) {
-        const guess_t guess = guess_of(self, sample_q32, periods, ahead_q32);
-        if (guess.is_telling && guess.cost_q32 < least_q32) {
-            least_q32 = guess.cost_q32;
+    unsigned best = by_time;
+    const q32_t expected_q32 = stream_evidence_misfit(seen, scale, by_time, sample_q32);
+    q32_t least_q32 = expected_q32;
+    for (unsigned periods = 1; periods <= JUDGED_MAX && periods * Q32_ONE <= ahead_q32 + early_q32; periods++) {
+        const q32_t misfit_q32 = stream_evidence_misfit(seen, scale, periods, sample_q32);
+        const q32_t apart_q32 = stream_evidence_apart(seen, scale, periods, by_time);
+        const q32_t doubt_q32 = misfit_q32 + self->misfit_q32;
+        if (doubt_q32 * telling(self, periods, ahead_q32) < apart_q32 && misfit_q32 < least_q32) {
+            least_q32 = misfit_q32;
             best = periods;
         }
+    }
+    note_loss(self, by_time, best, least_q32);
+    self->misfit_q32 += (least_q32 - self->misfit_q32) / MISFIT_MEMORY;
+    const q32_t advance_q32 = advance_of(self, sample_q32);
+    if (is_even && best == by_time && expected_q32 * TELLING > stream_evidence_apart(seen, scale, by_time, by_time + 1) &&
+        fx_abs(ahead_q32 - best * Q32_ONE) > stream_clock_jitter(&self->clock) + BESIDE_Q32 &&
+        fx_abs(advance_q32 - ahead_q32) < CLEAR_Q32) {
+        *shift_q32 = advance_q32 - best * Q32_ONE;
     }
     return best;
 }
@@ -167,91 +261,174 @@ static bool is_thinned_anew(stream_t *self, uint64_t now_us)
         stream_repeat_reset(&self->repeat, now_us);
     }
     const uint32_t period_us = is_other ? thin->each * (thin->gaps_us / THIN_GAPS) : stream_repeat_period_us(self);
-    return period_us > 0 && stream_clock_set_period(&self->clock, period_us);
+    if (period_us > 0) {
+        stream_clock_set_period(&self->clock, period_us);
+    }
+    return period_us > 0;
 }
 
-static void take_sample(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+/* The newest values again, too soon for the next sample: another relay mask, or the same datagram twice. */
+static bool says_nothing(const stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+{
+    q32_t ahead_q32;
+    q32_t late_q32;
+    if (!stream_evidence_is_newest(&self->evidence, self->curve.axes, sample_q32)) {
+        return false;
+    }
+    if (self->clock.period_us_q16 == 0) {
+        return stream_clock_elapsed_us(&self->clock, now_us) < SAME_US;
+    }
+    (void)stream_clock_expect(&self->clock, now_us, &ahead_q32, &late_q32);
+    return ahead_q32 < SAME_Q32;
+}
+
+static void pace_curve(stream_t *self)
+{
+    stream_curve_pace(&self->curve, self->style, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us,
+                      stream_clock_is_lossy(&self->clock));
+}
+
+/* A curve from where the axes are, through the samples from now on. */
+static void start_curve(stream_t *self, const kin_t *kin, uint32_t interval_us, const q32_t *sample_q32)
+{
+    const unsigned periods = stream_clock_periods_in(&self->clock, interval_us);
+    const bool is_hidden = self->is_hidden && self->phase == STREAM_LONE;
+    const q32_t before_q32 = fx_clamp(stream_clock_periods(&self->clock, self->clock.last_us), -PACE_SLOW_Q32, 0);
+    const q32_t *const first_q32 = self->evidence.value_q32[self->evidence.count > 2 ? 2 : 1];
+    stream_curve_regrid(&self->curve, kin, is_hidden ? NULL : self->previous, self->phase == STREAM_RUNNING ? NULL : first_q32,
+                        periods, sample_q32);
+    self->between_q32 = 0;
+    self->rate_q32[0] = self->rate_q32[1] = stream_clock_span(&self->clock, self->cycle_us);
+    if (self->phase == STREAM_LONE) { /* at rest: the first period takes a margin longer */
+        self->rate_q32[0] = self->rate_q32[1] = fx_mul_shift(self->rate_q32[1], Q32_ONE + before_q32, 32);
+    }
+    self->phase = STREAM_RUNNING;
+}
+
+/* Whether the samples so far make a stream: three of them, or two where the sender states its period. */
+static bool is_begun(const stream_t *self, uint64_t now_us)
+{
+    return self->clock.hint_us > 0 || (self->pair > PAIR && now_us - self->began_us >= BEGIN_US);
+}
+
+/* A stream that begins as a flood is thinned out from its beginning. */
+static void thin_from_start(stream_t *self, uint64_t now_us)
+{
+    stream_thin_t *const thin = &self->thin;
+    const uint32_t mean_us = (uint32_t)(now_us - self->began_us) / (self->pair - 1);
+    if (mean_us == 0 || mean_us >= THIN_BELOW_US || self->pair_gap_us >= STREAM_PERIOD_MIN_US) {
+        return;
+    }
+    thin->gaps_us = mean_us * THIN_GAPS;
+    thin->each = thin->each_taken = (THIN_BELOW_US + mean_us - 1) / mean_us;
+    stream_clock_set_period(&self->clock, thin->each * mean_us);
+    pace_curve(self);
+}
+
+static void take_sample(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
 {
     self->thin.passed = 0;
+    const uint32_t interval_us = stream_clock_elapsed_us(&self->clock, now_us);
     if (self->phase == STREAM_EMPTY || !stream_clock_is_near(&self->clock, now_us)) {
         stream_clock_start(&self->clock, now_us);
-        start_lone(self, now_us, sample_q32);
+        start_lone(self, now_us, kin, sample_q32);
         return;
     }
-    if (self->phase == STREAM_LONE && stream_clock_elapsed_us(&self->clock, now_us) < STEP_GAP_MIN_US) {
-        start_lone(self, now_us, sample_q32);
+    const bool is_repeat = self->phase == STREAM_RUNNING && stream_repeat_watch(self, now_us, sample_q32);
+    if (is_repeat || says_nothing(self, now_us, sample_q32)) {
         return;
     }
-    if (stream_clock_is_soon(&self->clock, now_us) && stream_curve_is_newest(&self->curve, sample_q32)) {
-        return; /* the same datagram twice */
-    }
-    if (self->phase == STREAM_RUNNING && stream_repeat_watch(self, now_us, sample_q32)) {
+    const unsigned between =
+        self->phase == STREAM_RUNNING ? stream_clock_between(&self->clock, now_us, advance_of(self, sample_q32)) : 0;
+    if (between == 1) {
         return;
     }
-    const uint32_t interval_us = stream_clock_elapsed_us(&self->clock, now_us);
-    const bool is_thinned = is_thinned_anew(self, now_us);
-    const unsigned periods = judge_periods(self, now_us, sample_q32);
-    const bool is_new_rate = stream_clock_take(&self->clock, now_us, periods) || is_thinned;
-    stream_curve_pace(&self->curve, self->style, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us);
+    if (between == 2) {
+        stream_clock_set_period(&self->clock, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16 / 2));
+    }
+    const bool is_thinned = is_thinned_anew(self, now_us) || between == 2;
+    q32_t shift_q32 = 0;
+    const unsigned periods =
+        self->phase == STREAM_LONE && self->pair == 1 ? 1 : judge_periods(self, now_us, sample_q32, &shift_q32);
+    const bool is_new_rate = (stream_clock_take(&self->clock, now_us, periods) && self->phase == STREAM_RUNNING) || is_thinned;
+    pace_curve(self);
     if (is_new_rate) {
-        stream_curve_regrid(&self->curve, self->style, self->previous, stream_clock_periods_in(&self->clock, interval_us),
-                            sample_q32);
-        self->between_q32 = 0;
-        self->rate_q32[0] = self->rate_q32[1] = stream_clock_span(&self->clock, self->cycle_us);
+        stream_evidence_reset(&self->evidence, true);
+    }
+    note_sample(self, periods, shift_q32, sample_q32);
+    if (is_new_rate) {
+        start_curve(self, kin, interval_us, sample_q32);
         return;
     }
-    stream_curve_append(&self->curve, periods, sample_q32);
+    stream_curve_average(&self->curve, self->evidence.weight_q32, stream_clock_is_gappy(&self->clock));
     if (self->phase == STREAM_LONE) {
-        start_running(self, now_us);
-    } else if (error_at(self, now_us) > BEHIND_MAX_Q32) {
+        self->pair++;
+        self->pair_gap_us = interval_us > self->pair_gap_us ? interval_us : self->pair_gap_us;
+        if (!is_begun(self, now_us)) {
+            stream_curve_start(&self->curve, kin, sample_q32);
+            self->is_fresh = true;
+            return;
+        }
+        thin_from_start(self, now_us);
+        start_curve(self, kin, interval_us, sample_q32);
+        return;
+    }
+    q32_t point_q32[AXES_MAX];
+    for (unsigned axis = 0; axis < self->curve.axes; axis++) { /* a rounded value tells no time as fine as that */
+        point_q32[axis] = self->curve.window > 1 ? sample_q32[axis] : stream_evidence_on_line(&self->evidence, axis);
+    }
+    stream_curve_append(&self->curve, periods, sample_q32, point_q32);
+    if (error_at(self, now_us) > BEHIND_MAX_Q32) {
         stream_curve_skip(&self->curve);
-    } else if (error_at(self, now_us) < -BEFORE_MAX_Q32) {
-        stream_curve_stretch(&self->curve);
     }
 }
 
-void stream_push(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+void stream_push(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
 {
     if (!is_passed_by(self, now_us, sample_q32)) {
-        take_sample(self, now_us, sample_q32);
+        take_sample(self, now_us, kin, sample_q32);
     }
 }
 
 /* One cycle of the render phase; commits the points it comes to. */
-static void advance(stream_t *self, uint64_t now_us)
+static void advance(stream_t *self, uint64_t now_us, const kin_t *kin)
 {
     self->between_q32 += self->rate_q32[1];
     while (self->between_q32 >= Q32_ONE) {
         self->between_q32 -= Q32_ONE;
-        stream_curve_commit(&self->curve);
+        stream_curve_commit(&self->curve, kin);
     }
     self->error_q32 = error_at(self, now_us);
     const q32_t nominal = stream_clock_span(&self->clock, self->cycle_us);
-    const q32_t wanted = self->clock.hint_us > 0 ? self->error_q32 / PACE_GAIN_DIV_HINTED : self->error_q32 / PACE_GAIN_DIV;
-    const q32_t pace = fx_clamp(wanted, -PACE_MAX_Q32, PACE_MAX_Q32);
+    const q32_t before_q32 = self->error_q32 < -FAR_BEFORE_Q32 ? (self->error_q32 + FAR_BEFORE_Q32) / 2 : 0;
+    const q32_t arrived_q32 = fx_mul_shift(self->error_q32 / PACE_GAIN_DIV, self->evidence.weight_q32, 32);
+    const q32_t wanted = self->clock.hint_us > 0 ? self->error_q32 / PACE_GAIN_DIV_HINTED
+                                                 : self->error_q32 / PACE_GAIN_DIV + arrived_q32 + before_q32;
+    const q32_t slowest_q32 = self->error_q32 < -FAR_BEFORE_Q32 ? PACE_SLOW_Q32 : PACE_MAX_Q32;
+    const q32_t pace = fx_clamp(wanted, -slowest_q32, PACE_MAX_Q32);
     const q32_t faster = nominal > self->rate_q32[1] ? nominal : self->rate_q32[1];
-    const q32_t filter = fx_clamp(faster * 2 / 3, 0, PACE_FILTER_MAX);
+    const q32_t filter = fx_clamp(faster * 2, 0, PACE_FILTER_MAX);
     const q32_t wished = nominal + fx_mul_shift_fit(nominal, pace, 32);
     self->rate_q32[0] += fx_mul_shift_fit(wished - self->rate_q32[0], filter, 32);
     self->rate_q32[1] += fx_mul_shift_fit(self->rate_q32[0] - self->rate_q32[1], filter, 32);
 }
 
-bool stream_step(stream_t *self, uint64_t now_us, ramp_ref_t *ref)
+bool stream_step(stream_t *self, uint64_t now_us, const kin_t *kin, ramp_ref_t *ref)
 {
     if (self->phase == STREAM_EMPTY) {
         return false;
     }
     if (self->thin.has_spare && now_us - self->thin.last_us >= THIN_WAIT_US) {
         self->thin.has_spare = false;
-        take_sample(self, now_us, self->thin.spare_q32);
+        take_sample(self, now_us, kin, self->thin.spare_q32);
     }
     if (self->phase == STREAM_RUNNING) {
-        advance(self, now_us);
+        advance(self, now_us, kin);
     }
     const unsigned axes = self->curve.axes;
     const bool is_fresh = self->is_fresh;
     int64_t weight_q60[3];
-    stream_curve_weigh(self->style, self->between_q32, weight_q60);
+    stream_curve_weigh(self->between_q32, weight_q60);
     for (unsigned axis = 0; axis < axes; axis++) {
         const q32_t pos_q32 = stream_curve_at(&self->curve, axis, weight_q60);
         if (is_fresh) {
@@ -287,9 +464,34 @@ uint32_t stream_delay_us(const stream_t *self)
         return 0;
     }
     const int64_t period = self->clock.period_us_q16;
-    const int64_t spline =
-        self->style == STREAM_FAST ? period * 3 / 2 - fx_mul_shift(period, STREAM_FAST_LEAD_Q32, 32) : period * 2;
-    const int64_t mean = (self->curve.window - 1) * period * 3 / 2;
+    const stream_curve_t *curve = &self->curve;
+    const q32_t led_q32 = fx_mul_shift(curve->lead_q32, curve->led_q32, 32);
+    const q32_t mean_q32 = curve->mean_q32 / 2 * ((int64_t)curve->mean_points - 1);
+    const int64_t spline = 2 * period - fx_mul_shift(period, led_q32 - mean_q32, 32) + (curve->window - 1) * period * 3 / 2;
+    const int64_t smoothing = (int64_t)governor_delay_us(&self->curve.governor) * STREAM_US_Q16;
     const int64_t behind = fx_mul_shift(period, self->error_q32, 32);
-    return (uint32_t)(fx_clamp(spline + mean + self->clock.margin_us_q16 + behind, 0, INT64_MAX) / STREAM_US_Q16);
+    return (uint32_t)(fx_clamp(spline + smoothing + self->clock.margin_us_q16 + behind, 0, INT64_MAX) / STREAM_US_Q16);
+}
+
+static uint32_t us_of(int64_t us_q16)
+{
+    return (uint32_t)(fx_clamp(us_q16, 0, (int64_t)UINT32_MAX * STREAM_US_Q16) / STREAM_US_Q16);
+}
+
+stream_report_t stream_report(const stream_t *self)
+{
+    const stream_clock_t *clock = &self->clock;
+    if (self->phase != STREAM_RUNNING) {
+        return (stream_report_t){.sender = STREAM_SENDER_UNKNOWN};
+    }
+    const bool is_arrived = self->evidence.weight_q32 > Q32_ONE / 2;
+    return (stream_report_t){.sender = is_arrived                      ? STREAM_SENDER_ARRIVALS
+                                       : stream_clock_is_bursty(clock) ? STREAM_SENDER_BURSTS
+                                                                       : STREAM_SENDER_EVEN,
+                             .period_us = stream_period_us(self) * clock->each,
+                             .jitter_us = us_of(clock->jitter_us_q16),
+                             .lost_permille = stream_clock_lost_permille(clock),
+                             .delay_us = stream_delay_us(self),
+                             .wait_us = us_of(clock->margin_us_q16),
+                             .smoothing_us = governor_delay_us(&self->curve.governor)};
 }

@@ -1,23 +1,34 @@
 /* SPDX-License-Identifier: MIT
  * stream_clock.c - the time line of a sender, found from the arrivals of its samples.
- * Loss and jitter look alike in one interval, so the first intervals are taken together: losses count only from intervals well
- * above the middle ones, and the period is the mean. Then each arrival moves the time line by 8 % and the period by 0.4 % of its
- * deviation (damping 0.63). The last 8 intervals are watched for a new rate, which would take the loop too long to find.
+ * The line is the straight line through the arrivals: by least squares over all of them at first (a growing-memory filter of
+ * second order), with gains that then stay as they are after 48 of them. The margin is the lateness of the latest samples lately.
  */
 #include "stream_clock.h"
 
 enum {
-    WATCHED = 8,      /* intervals that tell a new rate: even, and enough that two losses among them do not */
-    WATCHED_LOST = 6, /* of these longer than a period: the rate is a fraction of what it was */
-    KNOWN = 12,       /* samples after which a stream is one */
-    SETTLED_AGAIN = 4 /* after a new rate the time line is trusted as much as after this many samples */
+    ALIKE = 6,         /* intervals alike that tell a new rate */
+    KNOWN = 12,        /* samples after which a stream is one */
+    MEMORY = 48,       /* samples that the line is found from */
+    MEMORY_LEAST = 8,  /* ... while the sender's rate changes */
+    MEMORY_FALL = 4,   /* of these in a sample, until the line follows */
+    DRIFT = 8,         /* samples that the mean lateness is taken of */
+    DRIFTS = 2,        /* a rate changes where that is so many times what lateness changes by at most in a period */
+    SECOND = 2,        /* intervals that tell that a stated period is wrong */
+    STATED = 4,        /* a stated period counts as much as so many samples */
+    BURSTS = 2,        /* short intervals, of the newest 24, that tell a sender that sends in bursts */
+    HALVES = 4,        /* samples half-way between two of the line that tell twice its rate */
+    NEW_RATE = 3,      /* and so does one that eight intervals told */
+    LOST_MEMORY = 256, /* samples that losses are counted in ... */
+    LOST_FIRST = 64    /* ... but at first */
 };
 
-#define PERIOD_MIN_Q16 ((int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16)
-#define NETWORK_Q16    ((int64_t)15000 * STREAM_US_Q16) /* jitter at both ends of a span */
-#define MARGIN_MIN_Q16 ((int64_t)2000 * STREAM_US_Q16)
-#define AWAY_US        1000000u
-#define ELAPSED_MAX_US 4000000u /* far beyond the end of any curve */
+#define PERIOD_MIN_Q16  ((int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16)
+#define SLOW_Q16        ((int64_t)40000 * STREAM_US_Q16)
+#define MARGIN_MIN_Q16  ((int64_t)500 * STREAM_US_Q16)
+#define MARGIN_FREE_Q16 ((int64_t)200 * STREAM_US_Q16)
+#define MARGIN_FALL_Q16 ((int64_t)5000000 * STREAM_US_Q16) /* the time in which a margin that is not needed falls to 1/e */
+#define AWAY_US         1000000u
+#define ELAPSED_MAX_US  4000000u /* far beyond the end of any curve */
 
 /* A running stream may be slower than what it may begin with: no flipping at the edge. */
 static int64_t period_max_q16(const stream_clock_t *self)
@@ -26,11 +37,20 @@ static int64_t period_max_q16(const stream_clock_t *self)
     return (int64_t)slowest_us * STREAM_US_Q16 / 3 * 4;
 }
 
-/* Senders that state their period are programs that wait that long, and wake late by a share of it. */
+/* Slow senders, and those that state their period, are programs that wait that long and wake late by a share of it. A guess at so
+ * slow a stream is poor, and an eighth of a period more is little beside its delay. */
 static int64_t margin_min_q16(const stream_clock_t *self)
 {
-    const int64_t share = self->hint_us > 0 ? self->period_us_q16 / 8 : 0;
+    const bool is_slow = self->period_us_q16 >= SLOW_Q16 || self->hint_us > 0;
+    const int64_t share = is_slow ? self->period_us_q16 / 8 : 0;
     return share > MARGIN_MIN_Q16 ? share : MARGIN_MIN_Q16;
+}
+
+/* What is left of the longest delay beside the curve's own; half a period there always is. */
+static int64_t margin_max_q16(const stream_clock_t *self)
+{
+    const int64_t left = (int64_t)self->delay_max_us * STREAM_US_Q16 - 2 * self->period_us_q16;
+    return left > self->period_us_q16 / 2 ? left : self->period_us_q16 / 2;
 }
 
 static void set_period(stream_clock_t *self, int64_t period_us_q16)
@@ -42,7 +62,7 @@ static void set_period(stream_clock_t *self, int64_t period_us_q16)
 void stream_clock_start(stream_clock_t *self, uint64_t now_us)
 {
     const uint32_t hint_us = self->hint_us;
-    *self = (stream_clock_t){.last_us = now_us};
+    *self = (stream_clock_t){.last_us = now_us, .delay_max_us = self->delay_max_us, .memory = MEMORY, .each = 1};
     (void)stream_clock_hint(self, hint_us);
 }
 
@@ -83,14 +103,14 @@ bool stream_clock_is_near(const stream_clock_t *self, uint64_t now_us)
     return is_within(self, now_us, self->settled >= KNOWN ? AWAY_US : STREAM_PERIOD_MAX_US);
 }
 
-bool stream_clock_is_soon(const stream_clock_t *self, uint64_t now_us)
-{
-    return stream_clock_elapsed_us(self, now_us) * (int64_t)STREAM_US_Q16 * 4 < self->period_us_q16;
-}
-
 q32_t stream_clock_span(const stream_clock_t *self, uint32_t span_us)
 {
     return fx_mul_shift_fit((int64_t)span_us * STREAM_US_Q16, self->per_us_q46, 30);
+}
+
+q32_t stream_clock_lateness(const stream_clock_t *self)
+{
+    return fx_mul_shift(self->late_us_q16, self->per_us_q46, 30);
 }
 
 q32_t stream_clock_periods(const stream_clock_t *self, uint64_t now_us)
@@ -100,253 +120,268 @@ q32_t stream_clock_periods(const stream_clock_t *self, uint64_t now_us)
     return fx_mul_shift_fit(since_us_q16 + self->late_us_q16 - self->margin_us_q16, self->per_us_q46, 30);
 }
 
-/* Where the ring has the i-th newest interval, 0 the newest. */
-static unsigned gap_at(const stream_clock_t *self, unsigned i)
+unsigned stream_clock_periods_in(const stream_clock_t *self, uint32_t interval_us)
 {
-    const unsigned at = self->gap_next + STREAM_GAPS - 1 - i;
-    return at < STREAM_GAPS ? at : at - STREAM_GAPS;
-}
-
-static int64_t gap_q16(const stream_clock_t *self, unsigned i)
-{
-    return (int64_t)self->gap_us[gap_at(self, i)] * STREAM_US_Q16;
+    const int64_t interval_us_q16 = (int64_t)interval_us * STREAM_US_Q16;
+    return (unsigned)fx_clamp((interval_us_q16 + self->period_us_q16 / 2) / self->period_us_q16, 1, INT32_MAX);
 }
 
 static void record_gap(stream_clock_t *self, uint32_t gap_us, unsigned periods)
 {
     self->gap_us[self->gap_next] = gap_us;
-    self->gap_periods[self->gap_next] = (uint8_t)(periods < UINT8_MAX ? periods : UINT8_MAX);
+    self->gap_periods[self->gap_next] = (uint16_t)(periods < UINT16_MAX ? periods : UINT16_MAX);
     self->gap_next = self->gap_next + 1 < STREAM_GAPS ? self->gap_next + 1 : 0;
     self->gaps += self->gaps < STREAM_GAPS ? 1u : 0u;
 }
 
-/* Periods in one interval seen alone. A short one may be jitter down to a quarter, a long one up to 1.6. */
-static unsigned periods_in_gap(int64_t gap_us_q16, int64_t period_us_q16)
+/* The newest intervals together. */
+typedef struct {
+    int64_t sum_us_q16;
+    unsigned periods;   /* that they were taken for */
+    unsigned long_ones; /* that were taken for more than two */
+    unsigned fewest;    /* periods that one of them was taken for */
+    unsigned lost;
+    int64_t least_q16, most_q16; /* of one period */
+} span_t;
+
+bool stream_clock_is_even(const stream_clock_t *self)
 {
-    if (gap_us_q16 * 4 < period_us_q16) {
+    return self->settled >= KNOWN && self->jitter_us_q16 * 4 < self->period_us_q16;
+}
+
+static int64_t gap_q16(const stream_clock_t *self, unsigned at)
+{
+    return (int64_t)self->gap_us[at] * STREAM_US_Q16;
+}
+
+static span_t newest_gaps(const stream_clock_t *self, unsigned gaps)
+{
+    span_t span = {.least_q16 = INT64_MAX, .fewest = UINT16_MAX};
+    for (unsigned i = 0; i < gaps; i++) {
+        const unsigned at = (self->gap_next + STREAM_GAPS - 1 - i) % STREAM_GAPS;
+        const int64_t each_q16 = gap_q16(self, at) / (self->gap_periods[at] > 0 ? self->gap_periods[at] : 1);
+        span.least_q16 = each_q16 < span.least_q16 ? each_q16 : span.least_q16;
+        span.most_q16 = each_q16 > span.most_q16 ? each_q16 : span.most_q16;
+        span.sum_us_q16 += gap_q16(self, at);
+        span.periods += self->gap_periods[at];
+        span.long_ones += self->gap_periods[at] > 2 ? 1u : 0u;
+        span.fewest = self->gap_periods[at] < span.fewest ? self->gap_periods[at] : span.fewest;
+        span.lost += self->gap_periods[at] > 1 ? self->gap_periods[at] - 1u : 0u;
+    }
+    return span;
+}
+
+q32_t stream_clock_jitter(const stream_clock_t *self)
+{
+    return fx_mul_shift(self->jitter_us_q16, self->per_us_q46, 30);
+}
+
+bool stream_clock_is_bursty(const stream_clock_t *self)
+{
+    unsigned short_ones = 0;
+    for (unsigned i = 0; i < self->gaps; i++) {
+        const unsigned at = (self->gap_next + STREAM_GAPS - 1 - i) % STREAM_GAPS;
+        short_ones += gap_q16(self, at) * 4 < self->period_us_q16 ? 1u : 0u;
+    }
+    return short_ones >= BURSTS;
+}
+
+static bool is_other_rate(const stream_clock_t *self, int64_t mean)
+{
+    return fx_abs(mean - self->period_us_q16) * 5 > self->period_us_q16;
+}
+
+/* The mean period of many intervals where it is another one, with the longest of them and without: a pause tells no rate, and
+ * what comes in a burst after it none either. Else 0. */
+static int64_t rate_on_average(const stream_clock_t *self)
+{
+    const span_t all = newest_gaps(self, STREAM_GAPS);
+    unsigned longest = 0;
+    for (unsigned i = 1; i < STREAM_GAPS; i++) {
+        longest = self->gap_us[i] > self->gap_us[longest] ? i : longest;
+    }
+    const unsigned periods = all.periods - self->gap_periods[longest];
+    const int64_t without = (all.sum_us_q16 - gap_q16(self, longest)) / (int64_t)(periods > 0 ? periods : 1u);
+    const int64_t with = all.sum_us_q16 / (int64_t)(all.periods > 0 ? all.periods : 1u);
+    return is_other_rate(self, with) && is_other_rate(self, without) ? without : 0;
+}
+
+/* A start with losses in it: the intervals so far are about one, two, or more times the short ones, and some were taken for fewer
+ * periods. The period then, else 0. */
+static int64_t rate_at_start(const stream_clock_t *self)
+{
+    const span_t all = newest_gaps(self, self->gaps);
+    int64_t shortest_q16 = INT64_MAX;
+    int64_t short_sum_q16 = 0;
+    int64_t short_ones = 0;
+    unsigned periods = 0;
+    for (unsigned i = 0; i < self->gaps; i++) {
+        shortest_q16 = gap_q16(self, i) < shortest_q16 ? gap_q16(self, i) : shortest_q16;
+    }
+    for (unsigned i = 0; i < self->gaps; i++) {
+        const bool is_short = gap_q16(self, i) * 2 < shortest_q16 * 3;
+        short_sum_q16 += is_short ? gap_q16(self, i) : 0;
+        short_ones += is_short ? 1 : 0;
+    }
+    const int64_t period_q16 = short_ones > 0 ? short_sum_q16 / short_ones : 0;
+    for (unsigned i = 0; i < self->gaps; i++) {
+        const int64_t n = period_q16 >= PERIOD_MIN_Q16 ? (gap_q16(self, i) + period_q16 / 2) / period_q16 : 0;
+        if (n < 1 || fx_abs(gap_q16(self, i) - n * period_q16) * 3 > period_q16) {
+            return 0;
+        }
+        periods += (unsigned)n;
+    }
+    return periods > all.periods ? all.sum_us_q16 / (int64_t)periods : 0;
+}
+
+/* The period where a few intervals that are alike tell that the rate is another one, or many on average; else 0. */
+static int64_t new_rate(const stream_clock_t *self)
+{
+    if (self->gaps < ALIKE) {
         return 0;
     }
-    return gap_us_q16 * 5 < period_us_q16 * 8 ? 1u : (unsigned)((gap_us_q16 + period_us_q16 / 2) / period_us_q16);
-}
-
-unsigned stream_clock_periods_in(const stream_clock_t *self, uint32_t interval_us)
-{
-    return (unsigned)fx_clamp(periods_in_gap((int64_t)interval_us * STREAM_US_Q16, self->period_us_q16), 1, INT32_MAX);
-}
-
-/* Mean period over the newest intervals if losses are counted with the given one. An interval too short to be a period belongs to
- * the one before it, which was so much too long. */
-static int64_t mean_period(const stream_clock_t *self, unsigned gaps, int64_t period_us_q16)
-{
-    int64_t sum = 0;
-    int64_t gap = 0;
-    unsigned periods = 0;
-    for (unsigned i = 0; i < gaps; i++) {
-        gap += gap_q16(self, i);
-        const unsigned in_gap = periods_in_gap(gap, period_us_q16);
-        if (in_gap > 0) {
-            periods += in_gap;
-            sum += gap;
-            gap = 0;
-        }
+    const span_t few = newest_gaps(self, ALIKE);
+    if (few.long_ones == ALIKE) {
+        return few.sum_us_q16 / ALIKE;
     }
-    return periods > 0 ? sum / periods : period_us_q16;
-}
-
-/* Mean of the middle half of the newest intervals: neither losses nor bursts reach it. An even number of them, as in a burst
- * short and long ones alternate.
- * @param gaps at least 2 */
-static int64_t middle_gap(const stream_clock_t *self, unsigned gaps)
-{
-    int64_t sorted[STREAM_GAPS];
-    const unsigned count = gaps - gaps % 2;
-    for (unsigned i = 0; i < count; i++) {
-        const int64_t gap = gap_q16(self, i);
-        unsigned at = i;
-        for (; at > 0 && sorted[at - 1] > gap; at--) {
-            sorted[at] = sorted[at - 1];
-        }
-        sorted[at] = gap;
+    const int64_t off = fx_abs(few.sum_us_q16 - few.periods * self->period_us_q16);
+    const bool is_other = few.most_q16 * 2 < few.least_q16 * 3 && off * 10 > self->period_us_q16 * 11 &&
+                          off * 2 > self->jitter_us_q16 * 5 && !stream_clock_is_bursty(self);
+    if (is_other) {
+        return few.sum_us_q16 / (int64_t)few.periods;
     }
-    const unsigned cut = count / 4;
-    int64_t sum = 0;
-    for (unsigned i = cut; i < count - cut; i++) {
-        sum += sorted[i];
+    return self->gaps == STREAM_GAPS ? rate_on_average(self) : 0;
+}
+
+uint32_t stream_clock_lost_permille(const stream_clock_t *self)
+{
+    const int64_t lost_q16 = fx_clamp(self->lost_q16 - (int64_t)(self->each - 1) * Q16_ONE, 0, INT32_MAX);
+    return (uint32_t)(lost_q16 * 1000 / self->each / Q16_ONE);
+}
+
+unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t *ahead_q32, q32_t *late_q32)
+{
+    const int64_t ahead_us_q16 = self->late_us_q16 + (int64_t)stream_clock_elapsed_us(self, now_us) * STREAM_US_Q16;
+    *ahead_q32 = Q32_ONE;
+    *late_q32 = Q32_ONE;
+    if (self->period_us_q16 == 0) {
+        return 1;
     }
-    return fx_clamp(sum / (int64_t)(count - 2 * cut), PERIOD_MIN_Q16, period_max_q16(self));
+    const q32_t late = stream_clock_jitter(self) + (stream_clock_is_bursty(self) ? Q32_ONE : Q32_ONE / 4);
+    *ahead_q32 = fx_mul_shift(ahead_us_q16, self->per_us_q46, 30);
+    *late_q32 = fx_clamp(late, self->settled < KNOWN ? Q32_ONE * 5 / 2 : Q32_ONE * 3 / 5, INT64_MAX);
+    const bool is_next = *ahead_q32 <= Q32_ONE + *late_q32 ||
+                         (int64_t)stream_clock_elapsed_us(self, now_us) * STREAM_US_Q16 * 2 < self->period_us_q16 * 3;
+    return is_next ? 1u : (unsigned)((*ahead_q32 + Q32_ONE / 2) / Q32_ONE);
 }
 
-/* True where a mean over so many intervals is off by more than an eighth, and their sum by more than a network makes it. */
-static bool is_rate_off(const stream_clock_t *self, int64_t mean_us_q16, unsigned gaps)
+/* The largest lately: more at once, less slowly. */
+static void hold_largest(const stream_clock_t *self, int64_t *largest_us_q16, int64_t now_us_q16)
 {
-    const int64_t off = fx_abs(mean_us_q16 - self->period_us_q16);
-    return off * 8 > self->period_us_q16 && off * gaps > NETWORK_Q16;
+    const int64_t fall = fx_mul_div(*largest_us_q16, self->period_us_q16, MARGIN_FALL_Q16);
+    *largest_us_q16 = now_us_q16 > *largest_us_q16 ? now_us_q16 : *largest_us_q16 - fall;
 }
 
-/* Of the newest intervals, those longer than the given period. */
-static unsigned lost_gaps(const stream_clock_t *self, unsigned gaps, int64_t period_us_q16)
-{
-    unsigned lost = 0;
-    for (unsigned i = 0; i < gaps; i++) {
-        lost += periods_in_gap(gap_q16(self, i), period_us_q16) > 1 ? 1u : 0u;
-    }
-    return lost;
-}
-
-/* Mean interval, whatever was lost. */
-static int64_t mean_gap(const stream_clock_t *self, unsigned gaps)
-{
-    int64_t sum = 0;
-    for (unsigned i = 0; i < gaps; i++) {
-        sum += gap_q16(self, i);
-    }
-    return sum / (int64_t)gaps;
-}
-
-/* Mean period over the newest intervals, with the periods that each was taken for. */
-static int64_t taken_period(const stream_clock_t *self, unsigned gaps)
-{
-    int64_t sum = 0;
-    unsigned periods = 0;
-    for (unsigned i = 0; i < gaps; i++) {
-        sum += gap_q16(self, i);
-        periods += self->gap_periods[gap_at(self, i)];
-    }
-    return periods > 0 ? sum / periods : self->period_us_q16;
-}
-
-/* The sum of the intervals tells too, as losses only make it longer: of a slower rate it has grown, of a faster one it is less.
- * Else late arrivals were taken for losses, or two at once for one. Late arrivals beside losses still look like a slower rate for
- * a while: where the samples' values tell otherwise, it has to last. */
-static bool is_slower(const stream_clock_t *self)
-{
-    const unsigned longer = self->gaps < 2 * WATCHED ? self->gaps : 2 * WATCHED;
-    return mean_gap(self, WATCHED) * 16 > self->period_us_q16 * 17 &&
-           (is_rate_off(self, taken_period(self, WATCHED), WATCHED) ||
-            is_rate_off(self, mean_period(self, longer, self->period_us_q16), longer));
-}
-
-static bool is_faster(const stream_clock_t *self)
-{
-    return mean_gap(self, WATCHED) * 16 < self->period_us_q16 * 15;
-}
-
-static bool has_new_rate(const stream_clock_t *self)
-{
-    const int64_t mean = mean_period(self, WATCHED, self->period_us_q16);
-    return lost_gaps(self, WATCHED, self->period_us_q16) >= WATCHED_LOST ||
-           (is_rate_off(self, mean, WATCHED) && (mean > self->period_us_q16 ? is_slower(self) : is_faster(self)));
-}
-
-/* Periods from the newest sample's time to an arrival that is ahead_us after it. */
-static unsigned periods_ahead(const stream_clock_t *self, int64_t ahead_us_q16, int64_t gap_us_q16)
-{
-    if (ahead_us_q16 * 4 < self->period_us_q16) {
-        return 0;
-    }
-    if (self->settled < STREAM_GAPS) {
-        return gap_us_q16 * 5 < self->period_us_q16 * 8 ? 1u : periods_in_gap(gap_us_q16, self->period_us_q16);
-    }
-    const unsigned periods = (unsigned)((ahead_us_q16 * 4 + self->period_us_q16) / (self->period_us_q16 * 4));
-    return periods > 1 ? periods : 1u; /* late by more than 0.75: a loss */
-}
-
-/* Waits longer if samples come late, up to half a period, and slowly less if they do not: 1 of 64 may come too late. */
+/* Waits as long as the latest samples need, and where many are lost a period more, for that which a missing one is told from. */
 static void adapt_margin(stream_clock_t *self)
 {
-    const int64_t step = self->period_us_q16 / 64;
-    const int64_t free = self->hint_us > 0 ? 4 * step : 0; /* guesses at slow streams are poor: rather wait */
-    const int64_t wished = self->margin_us_q16 + (self->late_us_q16 + free > self->margin_us_q16 ? step : -step / 128);
-    const int64_t half = self->period_us_q16 / 2;
+    const int64_t most = margin_max_q16(self);
     const int64_t least = margin_min_q16(self);
-    self->margin_us_q16 = fx_clamp(wished, least, half > least ? half : least);
+    const int64_t late = self->late_us_q16 + MARGIN_FREE_Q16;
+    self->is_sparse = self->lost_q16 > (self->is_sparse ? Q16_ONE / 24 : Q16_ONE / 12);
+    const int64_t waited = late + (self->is_sparse ? self->period_us_q16 : 0);
+    hold_largest(self, &self->jitter_us_q16, late <= most ? late : 0); /* what is later still cannot be waited for */
+    hold_largest(self, &self->margin_us_q16, waited <= most ? waited : 0);
+    self->margin_us_q16 = fx_clamp(self->margin_us_q16, least, most > least ? most : least);
 }
 
-/* A program's first frame is often late: the interval after it is left out where the others agree better with what the sender
- * states. */
-static void leave_out_first(stream_clock_t *self)
+bool stream_clock_is_lossy(const stream_clock_t *self)
 {
-    const int64_t stated = (int64_t)self->hint_us * STREAM_US_Q16;
-    if (stated == 0 || self->gaps < 3) {
+    return self->lost_q16 > Q16_ONE / 32;
+}
+
+bool stream_clock_is_gappy(const stream_clock_t *self)
+{
+    return self->lost_q16 > Q16_ONE / 16 && self->each == 1;
+}
+
+static bool is_about_half(q32_t periods_q32)
+{
+    return periods_q32 > Q32_ONE * 3 / 10 && periods_q32 < Q32_ONE * 7 / 10;
+}
+
+unsigned stream_clock_between(stream_clock_t *self, uint64_t now_us, q32_t advance_q32)
+{
+    q32_t ahead_q32;
+    q32_t late_q32;
+    (void)stream_clock_expect(self, now_us, &ahead_q32, &late_q32);
+    if (!stream_clock_is_even(self) || !is_about_half(ahead_q32) || !is_about_half(advance_q32) ||
+        self->period_us_q16 < 2 * PERIOD_MIN_Q16) {
+        self->between = self->between > 0 && ahead_q32 > Q32_ONE * 5 / 4 ? 0 : self->between;
+        return 0;
+    }
+    self->between++;
+    return self->between >= HALVES ? 2 : 1;
+}
+
+void stream_clock_set_period(stream_clock_t *self, uint32_t period_us)
+{
+    self->gaps = 0;
+    self->each = 1;
+    self->between = 0;
+    self->settled = NEW_RATE;
+    self->late_us_q16 = 0;
+    set_period(self, (int64_t)period_us * STREAM_US_Q16);
+}
+
+/* A line that lateness leaves slowly but far is that of another pace: a game whose frames take ever longer. Jitter, bursts and
+ * stalls change the lateness from sample to sample. */
+static void adapt_memory(stream_clock_t *self, int64_t was_us_q16)
+{
+    hold_largest(self, &self->rough_us_q16, fx_abs(self->late_us_q16 - was_us_q16));
+    self->drift_us_q16 += (self->late_us_q16 - self->drift_us_q16) / DRIFT;
+    if (fx_abs(self->drift_us_q16) > DRIFTS * self->rough_us_q16) {
+        self->memory = self->memory > MEMORY_LEAST + MEMORY_FALL ? self->memory - MEMORY_FALL : MEMORY_LEAST;
+    } else if (self->memory < MEMORY) {
+        self->memory++;
+    }
+}
+
+/* The line and its pace after one more arrival that was off by so much. Once the line is known, by how much more than two periods
+ * says nothing of them. */
+static void correct(stream_clock_t *self, int64_t off_us_q16, unsigned periods)
+{
+    const int64_t m = self->settled < self->memory ? self->settled : self->memory;
+    const int64_t gain_div = (m + 1) * (m + 2);
+    const int64_t most_us_q16 = self->settled < KNOWN ? INT64_MAX : 2 * self->period_us_q16;
+    const int64_t told_us_q16 = fx_clamp(off_us_q16, -most_us_q16, most_us_q16);
+    self->late_us_q16 = off_us_q16 - told_us_q16 * 2 * (2 * m + 1) / gain_div;
+    set_period(self, self->period_us_q16 + told_us_q16 * 6 / gain_div / (int64_t)periods);
+}
+
+/* A sender that has a sample for every second period only, or the third, is at that rate for a while: nothing is lost. */
+static void count_losses(stream_clock_t *self, unsigned periods)
+{
+    const int32_t lost_q16 = (int32_t)(periods < 8 ? (periods - 1) * (unsigned)Q16_ONE : 0);
+    self->counted += self->counted < LOST_MEMORY ? 1u : 0u;
+    self->lost_q16 += (lost_q16 - self->lost_q16) / (int32_t)(self->counted > LOST_FIRST ? self->counted : LOST_FIRST);
+    if (self->gaps < ALIKE) {
         return;
     }
-    const int64_t all = mean_period(self, self->gaps, stated);
-    const int64_t others = mean_period(self, self->gaps - 1, stated);
-    const bool is_odd = fx_abs(gap_q16(self, self->gaps - 1) - others) > NETWORK_Q16 / 2;
-    self->gaps -= is_odd && fx_abs(others - stated) < fx_abs(all - stated) ? 1u : 0u;
-}
-
-/* Period over the intervals so far, two or more. What the sender states tells losses from late arrivals better than the first
- * intervals do, if it is what they are about; against it speak two alike, not two unlike ones. */
-static int64_t first_period(const stream_clock_t *self)
-{
-    const int64_t stated = (int64_t)self->hint_us * STREAM_US_Q16;
-    if (stated > 0 && self->gaps < 3) {
-        const int64_t newest = gap_q16(self, 0);
-        const int64_t oldest = gap_q16(self, self->gaps - 1);
-        return fx_abs(newest - oldest) * 8 <= oldest ? (newest + oldest) / 2 : stated;
-    }
-    const int64_t mean = stated > 0 ? mean_period(self, self->gaps, stated) : 0;
-    if (stated > 0 && fx_abs(mean - stated) * 4 <= stated && lost_gaps(self, self->gaps, stated) * 2 <= self->gaps) {
-        return mean;
-    }
-    return mean_period(self, self->gaps, middle_gap(self, self->gaps));
-}
-
-/* At a new rate the intervals were so many other periods. */
-static void retake_gaps(stream_clock_t *self)
-{
-    for (unsigned i = 0; i < self->gaps; i++) {
-        const unsigned periods = periods_in_gap(gap_q16(self, i), self->period_us_q16);
-        self->gap_periods[gap_at(self, i)] = (uint8_t)periods;
+    const span_t few = newest_gaps(self, ALIKE);
+    if (few.fewest > 1) {
+        self->each = few.fewest;
+    } else if (self->each > 1 && few.lost == 0) {
+        self->each = 1;
+        self->lost_q16 = 0;
     }
 }
 
-/* Returns true where the sender's rate is found to be another one. */
-static bool find_period(stream_clock_t *self, int64_t off_us_q16)
+/* The first two intervals are both longer than stated, or both shorter: one alone may be that of a late frame. */
+static bool is_other_than_stated(const stream_clock_t *self)
 {
-    const int64_t before = self->period_us_q16;
-    const bool is_new = self->gaps >= WATCHED && has_new_rate(self);
-    if (is_new) {
-        self->gaps = WATCHED;
-        self->settled = SETTLED_AGAIN;
-    }
-    const int64_t taken = taken_period(self, self->gaps);
-    if (self->settled < STREAM_GAPS) {
-        leave_out_first(self);
-        set_period(self, first_period(self));
-        if (is_new) {
-            retake_gaps(self);
-        }
-    } else if (is_rate_off(self, taken, self->gaps)) {
-        set_period(self, taken);
-    } else {
-        set_period(self, self->period_us_q16 + off_us_q16 / 250);
-    }
-    return is_new && fx_abs(self->period_us_q16 - before) * 8 > before;
-}
-
-bool stream_clock_set_period(stream_clock_t *self, uint32_t period_us)
-{
-    const int64_t period_us_q16 = (int64_t)period_us * STREAM_US_Q16;
-    if (self->settled < STREAM_GAPS) {
-        return false;
-    }
-    for (unsigned i = 0; i < STREAM_GAPS; i++) {
-        const int64_t gap_us = fx_mul_div(self->gap_us[i], period_us_q16, self->period_us_q16);
-        self->gap_us[i] = (uint32_t)fx_clamp(gap_us, 0, ELAPSED_MAX_US);
-    }
-    set_period(self, period_us_q16);
-    self->settled = SETTLED_AGAIN;
-    return true;
-}
-
-unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t *ahead_q32)
-{
-    const int64_t gap_us_q16 = (int64_t)stream_clock_elapsed_us(self, now_us) * STREAM_US_Q16;
-    const int64_t ahead_us_q16 = self->late_us_q16 + gap_us_q16;
-    *ahead_q32 = self->period_us_q16 > 0 ? fx_mul_shift(ahead_us_q16, self->per_us_q46, 30) : Q32_ONE;
-    return self->period_us_q16 > 0 ? periods_ahead(self, ahead_us_q16, gap_us_q16) : 1;
+    const span_t two = newest_gaps(self, SECOND);
+    return two.least_q16 * 4 > self->period_us_q16 * 5 || two.most_q16 * 4 < self->period_us_q16 * 3;
 }
 
 bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods)
@@ -354,20 +389,36 @@ bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods)
     const uint32_t gap_us = stream_clock_elapsed_us(self, now_us);
     const int64_t gap_us_q16 = (int64_t)gap_us * STREAM_US_Q16;
     record_gap(self, gap_us, periods);
+    count_losses(self, periods);
     self->last_us = now_us;
+    self->settled += self->settled < MEMORY ? 1u : 0u;
     if (self->period_us_q16 == 0) {
         set_period(self, gap_us_q16);
-        self->settled = 1;
         return false;
     }
-    const int64_t ahead = self->late_us_q16 + gap_us_q16;
-    const int64_t off = fx_clamp(ahead - (int64_t)periods * self->period_us_q16, -self->period_us_q16, self->period_us_q16);
-    self->settled += self->settled < STREAM_GAPS ? 1u : 0u;
-    self->late_us_q16 = off - (self->settled < 12 ? off / (int64_t)(self->settled + 1) : off * 2 / 25);
-    const bool is_new_rate = self->settled > 1 && find_period(self, off); /* one interval says less than a hint */
-    if (is_new_rate) {
-        self->late_us_q16 = 0;
+    if (self->settled < STATED &&
+        self->hint_us > 0) { /* the period is known, and no sample is early: the first or this is late */
+        self->settled = STATED;
+        self->late_us_q16 = fx_clamp(gap_us_q16 - self->period_us_q16, 0, self->period_us_q16);
+        adapt_margin(self);
+        return false;
     }
+    if (self->gaps == SECOND && self->hint_us > 0 && is_other_than_stated(self)) {
+        self->settled = SECOND;
+        self->late_us_q16 = 0;
+        set_period(self, newest_gaps(self, SECOND).sum_us_q16 / SECOND);
+        return false;
+    }
+    const int64_t was_us_q16 = self->late_us_q16;
+    const int64_t off = self->late_us_q16 + gap_us_q16 - (int64_t)periods * self->period_us_q16;
+    correct(self, off, periods);
+    const bool is_known = self->settled == KNOWN && self->gaps == KNOWN;
+    const int64_t rate = is_known ? rate_at_start(self) : self->settled >= KNOWN ? new_rate(self) : 0;
+    if (rate > 0) {
+        stream_clock_set_period(self, (uint32_t)(rate / STREAM_US_Q16));
+        return true;
+    }
+    adapt_memory(self, was_us_q16);
     adapt_margin(self);
-    return is_new_rate;
+    return false;
 }

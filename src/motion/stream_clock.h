@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT
- * stream_clock.h - the time line of a sender, found from the arrivals of its samples: period, losses, lateness.
- * Mean interval at first, then a second-order phase-locked loop. Reads no clock; private to src/motion.
+ * stream_clock.h - the time line of a sender, found from the arrivals of its samples: period, lateness, losses, and how long a
+ * sample has to be waited for. Reads no clock; private to src/motion.
  */
 #ifndef STREAM_CLOCK_H
 #define STREAM_CLOCK_H
 
 #include "heave/stream.h"
 
-#define STREAM_US_Q16 65536 /**< one us in the clock's Q16 */
+#define STREAM_US_Q16 ((int64_t)Q16_ONE) /* 1 us */
 
 /** Forgets everything but what the sender states; the first sample came at now_us. */
 void stream_clock_start(stream_clock_t *self, uint64_t now_us);
@@ -22,25 +22,49 @@ bool stream_clock_is_live(const stream_clock_t *self, uint64_t now_us);
 /** True if a sample at now_us still belongs to the stream of the last one: one that is known may be away for a second. */
 bool stream_clock_is_near(const stream_clock_t *self, uint64_t now_us);
 
-/** True if a sample at now_us comes too soon to be of the next period, whatever the jitter. */
-bool stream_clock_is_soon(const stream_clock_t *self, uint64_t now_us);
-
 /** Periods that so long an interval between two samples is, seen alone: at least 1. The period is known. */
 unsigned stream_clock_periods_in(const stream_clock_t *self, uint32_t interval_us);
 
 /** us since the newest sample, at most UINT32_MAX; 0 if now_us is before it. */
 uint32_t stream_clock_elapsed_us(const stream_clock_t *self, uint64_t now_us);
 
-/** Another share of a sender's samples is taken from now on: they are so far apart, and those so far count as if they had been.
- *  @return false where the rate was not known for long: nothing is changed */
-bool stream_clock_set_period(stream_clock_t *self, uint32_t period_us);
+/** The sender has another period from now on: its time line begins anew with the newest sample. */
+void stream_clock_set_period(stream_clock_t *self, uint32_t period_us);
 
-/** Periods from the newest sample to one that arrives now, judged by time alone, and that time in periods. */
-unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t *ahead_q32);
+/** Periods from the newest sample to one that arrives now, judged by time alone: as few as its lateness may explain.
+ *  @param ahead_q32 out: from the newest sample's time on the line to now, in periods
+ *  @param late_q32  out: how late samples may be, in periods */
+unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t *ahead_q32, q32_t *late_q32);
 
 /** Takes the arrival of a sample that is so many periods after the newest.
  *  @return true where the sender has another rate now: its time line begins anew with this sample */
 bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods);
+
+/** How late the latest samples of the last seconds were, in periods. Period known. */
+q32_t stream_clock_jitter(const stream_clock_t *self);
+
+/** True where samples often come two or more at a time. */
+bool stream_clock_is_bursty(const stream_clock_t *self);
+
+/** True where samples come in time but for a quarter of a period. */
+bool stream_clock_is_even(const stream_clock_t *self);
+
+/** True where more than one of 32 samples is lost. */
+bool stream_clock_is_lossy(const stream_clock_t *self);
+
+/** Share of the sender's samples that are lost, over the last 256 or so. */
+uint32_t stream_clock_lost_permille(const stream_clock_t *self);
+
+/** True where more than one of 16 is lost, of a sender that has a sample for each period. */
+bool stream_clock_is_gappy(const stream_clock_t *self);
+
+/** Whether a sample that came at now_us, and whose value says so too, lies half-way between two of the line: a sender that is
+ *  twice as fast now, if it goes on so.
+ *  @return 1 where it does, 2 where that has lasted: another rate is due; 0 where it is none */
+unsigned stream_clock_between(stream_clock_t *self, uint64_t now_us, q32_t advance_q32);
+
+/** How late the newest sample was against the line, in periods; negative: early. Period known. */
+q32_t stream_clock_lateness(const stream_clock_t *self);
 
 /** Periods from the time of the newest sample to now_us, less the margin. Q32. Period known. */
 q32_t stream_clock_periods(const stream_clock_t *self, uint64_t now_us);

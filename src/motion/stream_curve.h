@@ -8,50 +8,46 @@
 
 #include "heave/stream.h"
 
-#define STREAM_FAST_LEAD_Q32 (Q32_ONE * 6 / 10) /**< periods that a control point is led ahead of its point, if fast ... */
-#define STREAM_FAST_BEND_Q32 (Q32_ONE / 4)      /**< ... and the share of the second difference */
-
 /** A curve that has always rested on the sample. */
-void stream_curve_start(stream_curve_t *self, unsigned axes, const q32_t *sample_q32);
+void stream_curve_start(stream_curve_t *self, const kin_t *kin, const q32_t *sample_q32);
 
 /** Tells the period: how long a motion is kept up where samples are missing, and how firmly the curve comes back to them; and
  * the style: how far control points are led ahead of the points. */
-void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us);
+void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us, bool is_lossy);
 
-/** Adds a sample the given number of periods after the newest; 0: in the place of the newest. */
-void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32);
+/** Samples belong to their arrivals by that share, [0, Q32_ONE]; many are lost. */
+void stream_curve_average(stream_curve_t *self, q32_t arrived_q32, bool is_lossy);
 
-/** The sender has another rate, and the curve another grid, which begins with this sample at head. The curve goes on as it was
- * and comes over to the samples softly. After stream_curve_pace(); the phase behind head is 0 then.
- *  @param now where the curve is: position, velocity and acceleration of each axis
+/** Adds a sample the given number of periods after the newest; 0: in the place of the newest.
+ *  @param point_q32 what it is at its place on the time line */
+void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32, const q32_t *point_q32);
+
+/** The curve has another grid, which begins with this sample at head. It goes on as it was and comes over to the samples softly.
+ * After stream_curve_pace(); the phase behind head is 0 then.
+ *  @param now where the curve is: position, velocity and acceleration of each axis; NULL: nobody sees it yet, it is on the
+ * samples
+ *  @param first_q32 a stream begins here, and its motion with this sample before the last one; NULL: the sender has another rate
  *  @param periods of the new grid since the sample before, at least 1: after a gap its step is not the way of one period */
-void stream_curve_regrid(stream_curve_t *self, stream_style_t style, const history_t *now, unsigned periods,
+void stream_curve_regrid(stream_curve_t *self, const kin_t *kin, const history_t *now, const q32_t *first_q32, unsigned periods,
                          const q32_t *sample_q32);
 
-/** How far a sample is from where the motion of the last ones would be so many periods later; and the way of the last period.
- * Sums over all axes. */
+/** How far a sample is from where the motion of the last ones would be so many periods later; and the way of the last period,
+ * as far as it was even. Sums over all axes. */
 q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *sample_q32, unsigned periods, q32_t *step_q32);
 
-/** True if the sample equals the newest one in all axes. */
-bool stream_curve_is_newest(const stream_curve_t *self, const q32_t *sample_q32);
-
-/** Makes the newest sample's index one less or one more: for a time line that was found to be wrong. The curve comes over to the
- *  other time line softly. Nothing is changed where there is no point to go to. */
+/** Makes the newest sample's index one less: for a time line that is too far behind. The curve comes over to the other time line
+ *  softly. Nothing is changed where there is no point to go to. */
 void stream_curve_skip(stream_curve_t *self);
-void stream_curve_stretch(stream_curve_t *self);
 
 /** Commits the next point: the sample, or what is guessed in its place. */
-void stream_curve_commit(stream_curve_t *self);
-
-/** True where the samples stand, or none has come for two periods: there is nothing to follow but the newest one. */
-bool stream_curve_is_standing(const stream_curve_t *self);
+void stream_curve_commit(stream_curve_t *self, const kin_t *kin);
 
 /** True once the curve rests exactly on the newest sample. */
 bool stream_curve_is_at_rest(const stream_curve_t *self);
 
 /** Weights of the ways between the control points at a phase after the commit of the newest point.
  *  @param between_q32 [0, 1)   @param weight_q60 out, each from 0 to 1 */
-void stream_curve_weigh(stream_style_t style, q32_t between_q32, int64_t weight_q60[3]);
+void stream_curve_weigh(q32_t between_q32, int64_t weight_q60[3]);
 
 /** Position of an axis at that phase. Q36 times Q60 is Q32 by 2^64, which costs no shifts. */
 static inline q32_t stream_curve_at(const stream_curve_t *self, unsigned axis, const int64_t weight_q60[3])

@@ -64,7 +64,7 @@ void stream_grain_watch(stream_curve_t *self, unsigned periods, const q32_t *sam
 {
     self->watched = self->watched < WATCH ? self->watched + 1 : 0;
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        watch_step(&self->grain[axis], (int32_t)periods, sample_q32[axis] - self->last_q32[axis]);
+        watch_step(&self->grain[axis], (int32_t)periods, sample_q32[axis] - self->newest_q32[axis]);
         judge(&self->grain[axis], self->watched == WATCH);
     }
 }

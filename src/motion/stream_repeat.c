@@ -8,6 +8,7 @@
 
 #include "stream_clock.h"
 #include "stream_curve.h"
+#include "stream_evidence.h"
 
 enum {
     RUN_MAX = 8,    /* a value that comes more often stands */
@@ -27,7 +28,7 @@ static bool is_telling(const stream_curve_t *curve, const q32_t *sample_q32)
 {
     bool is_far = false;
     for (unsigned axis = 0; axis < curve->axes; axis++) {
-        const q32_t step_q32 = fx_abs(sample_q32[axis] - curve->last_q32[axis]);
+        const q32_t step_q32 = fx_abs(sample_q32[axis] - curve->newest_q32[axis]);
         is_far |= curve->grain[axis].found_q32 > 0 && step_q32 >= TELLING * curve->grain[axis].found_q32;
     }
     return is_far;
@@ -59,14 +60,15 @@ bool stream_repeat_watch(stream_t *stream, uint64_t now_us, const q32_t *sample_
 {
     stream_repeat_t *const self = &stream->repeat;
     q32_t ahead_q32;
-    if (!stream_curve_is_newest(&stream->curve, sample_q32)) {
+    q32_t late_q32;
+    if (!stream_evidence_is_newest(&stream->evidence, stream->curve.axes, sample_q32)) {
         count_run(self, now_us, is_telling(&stream->curve, sample_q32));
         self->run = 1;
         self->began_us = now_us;
         return false;
     }
     self->run += self->run <= RUN_MAX ? 1u : 0u;
-    (void)stream_clock_expect(&stream->clock, now_us, &ahead_q32);
+    (void)stream_clock_expect(&stream->clock, now_us, &ahead_q32, &late_q32);
     return self->each > 1 && (self->run <= self->each || ahead_q32 < NEXT_DUE_Q32);
 }
 

@@ -296,7 +296,8 @@ static void start_ramps(bench_t *b)
         if (ramp_init(&b->ramp[i], &limits, 0) != HV_OK) {
             bench_fail("a ramp does not start");
         }
-        stream_set_stop(&b->stream, i, (stream_stop_t){limits.acc_per_cycle2_q32, limits.jerk_per_cycle3_q32});
+        const governor_limits_t asked = {limits.vel_per_cycle_q32, limits.acc_per_cycle2_q32, limits.jerk_per_cycle3_q32};
+        stream_set_limits(&b->stream, i, &asked);
     }
 #ifdef BENCH_RUCKIG
     peer_ruckig_start(SPEED, ACCEL, JERK);
@@ -321,10 +322,10 @@ static void run_ramps(bench_t *b, unsigned n)
     ramp_ref_t ref[AXES] = {{0}};
     b->now_us += 1000;
     if (n * 60 / 1000 != (n + 1) * 60 / 1000) {
-        stream_push(&b->stream, b->now_us, b->signal_q32[n % SIGNAL_CYCLES]);
+        stream_push(&b->stream, b->now_us, NULL, b->signal_q32[n % SIGNAL_CYCLES]);
     }
     q32_t position_q32[AXES];
-    (void)stream_step(&b->stream, b->now_us, ref);
+    (void)stream_step(&b->stream, b->now_us, NULL, ref);
     (void)ramp_step_all(b->ramp, AXES, ref, RAMP_SOFT, position_q32);
     for (unsigned i = 0; i < AXES; i++) {
         b->position[i] = (double)position_q32[i] / 4294967296.0;

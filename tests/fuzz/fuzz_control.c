@@ -67,9 +67,14 @@ static void expect(client_t *client, const uint8_t *bytes, size_t length)
     for (size_t i = 0; i < length && !client->is_over; i++) {
         if (bytes[i] == '\n') {
             client->length -= client->length > 0 && client->line[client->length - 1] == '\r';
+            const bool has_zero = memchr(client->line, '\0', client->length) != NULL;
             client->line[client->length] = '\0';
             client->length = 0;
-            expect_line(client, client->line);
+            if (has_zero) {
+                client->due++; /* no request is like that: what stands behind the zero counts, too */
+            } else {
+                expect_line(client, client->line);
+            }
         } else {
             client->line[client->length++] = (char)bytes[i];
             client->is_over = client->length == CONTROL_REQUEST_MAX; /* told once that it is too long */

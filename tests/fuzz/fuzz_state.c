@@ -27,22 +27,9 @@ static bool m_is_up;
     }
 static const struct {
     size_t offset, size;
-} k_unjudged[] = {PART(stream),
-                  PART(gate),
-                  PART(plan),
-                  PART(aside),
-                  PART(blend),
-                  PART(blend_share),
-                  PART(blend_rest),
-                  PART(source),
-                  PART(next),
-                  PART(join),
-                  PART(due), /* these say which of them is in use */
-                  PART(space),
-                  PART(is_following),
-                  PART(is_taking_over),
-                  PART(is_blend_planned),
-                  PART(is_space_new)};
+} k_unjudged[] = {PART(stream), PART(gate),         PART(plan),           PART(halt),      PART(fade),        PART(source),
+                  PART(next),   PART(due), /* these say which of them is in use */
+                  PART(space),  PART(is_following), PART(is_taking_over), PART(is_fading), PART(is_space_new)};
 
 static settings_t settings_of(unsigned platform)
 {

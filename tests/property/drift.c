@@ -165,11 +165,11 @@ static bool is_on_target(const ride_t *ride)
 static void essence(motion_t *motion)
 {
     motion->last_us = 0;
-    motion->join_cycles = 0;
     motion->gate = (gate_t){0};
     stream_t *stream = &motion->stream;
     memset(&stream->thin, 0, sizeof stream->thin);
     memset(&stream->clock, 0, sizeof stream->clock);
+    memset(&stream->evidence, 0, sizeof stream->evidence); /* which values came at which times; misfit_q32 is compared */
     stream->between_q32 = stream->error_q32 = stream->rate_q32[0] = stream->rate_q32[1] = 0;
     stream_curve_t *curve = &stream->curve;
     for (unsigned i = 0; i < AXES_MAX; i++) {
@@ -179,6 +179,12 @@ static void essence(motion_t *motion)
     curve->ahead = curve->patience = 0;
     curve->period_cycles_q16 = curve->grip_q32 = curve->softest_q32 = 0;
     curve->reach_min_q16 = curve->reach_max_q16 = 0;
+    governor_t *governor =
+        &curve->governor; /* its levels, output and strength are compared; the rest is worked out from the period */
+    governor->span_us = governor->period_us = 0;
+    governor->fall_q32 = governor->strength_q32 == 0 ? 0 : governor->fall_q32;
+    memset(governor->per_limit_q62, 0, sizeof governor->per_limit_q62);
+    memset(governor->share_q32, 0, sizeof governor->share_q32);
     curve->is_off = false; /* off_q32 says how far, and is compared */
     memset(curve->is_sample, 0, sizeof curve->is_sample);
 }

@@ -50,7 +50,7 @@ def variants(platform):
             {"platform": {"cycle_us": "500"}},
             {"angle": None if platform.has_angle else MOTOR} if has_sim_drives else {},
             {"platform": {"cycle_us": "4000"}},
-            {"udp": {"stream": "fast"}, **wrap}]
+            {"udp": {"stream": "balanced"}, **wrap}]
 
 
 def with_changes(text, changes):

@@ -125,6 +125,7 @@ def fault(bin_dir):
         bench.edit("[cylinders]\n", "[cylinders]\nfollowing_error_mm = 20\n")
         bench.start()
         with switch(bench, chip) as sender:
+            heave.wait_for(lambda: "takeover" not in bench.status()["flags"], "the sender is faded in")
             sender.send("@A6:0,0,0,0,0,90,0F#")
             bench.wait_state("FAULT")
         wait_relays(chip, SAFE, "FAULT")

@@ -154,6 +154,8 @@ def ipv4(source, port, payload, to=HEAVED, pieces=1):
 class Net(heave.Bench):
     def __init__(self, bin_dir):
         super().__init__(bin_dir, udp__bind="0.0.0.0", udp__silence_hold_ms=SILENCE_MS, engage__speed_mm_s=ENGAGE_MM_S, engage__accel_mm_s2=600)
+        text = self.config.read_text(encoding="utf-8")  # a lone frame gets where it leads before the silence holds it
+        self.config.write_text(text.replace("[engage]\n", "[engage]\nblend_ms = 250\n", 1), encoding="utf-8")
         self.trace, self.record = self.folder / "live.csv", self.folder / "record.txt"
         self.hosts = []
 

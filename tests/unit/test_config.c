@@ -923,7 +923,7 @@ static void test_load_values_arrive_where_they_belong(void)
     set_key("udp", "group", "239.1.2.3%enp0s31f6.7");
     set_key("udp", "allow", "10.1.2.3, 192.168.7.0/24, fd00:1::/32");
     set_key("udp", "dialect", "lenient");
-    set_key("udp", "stream", "fast");
+    set_key("udp", "stream", "balanced");
     set_key("udp", "silence_settle_ms", "3600000");
     set_key("control", "socket", "/tmp/h.sock");
     set_key("black-box", "directory", "/var/lib/heave");
@@ -956,7 +956,7 @@ static void test_load_values_arrive_where_they_belong(void)
     TEST_ASSERT_TRUE(settings->has_angle);
     TEST_ASSERT_EQUAL_INT(ANGLE_SHORTEST, settings->angle_wrap);
     TEST_ASSERT_EQUAL_INT(FRAME_LENIENT, settings->dialect);
-    TEST_ASSERT_EQUAL_INT(STREAM_FAST, settings->stream_style);
+    TEST_ASSERT_EQUAL_INT(STREAM_BALANCED, settings->stream_style);
     TEST_ASSERT_EQUAL_UINT32(10000, settings->silence_hold_ms);
     TEST_ASSERT_EQUAL_UINT32(3600000, settings->silence_settle_ms);
     TEST_ASSERT_EQUAL_UINT8(3, settings->relays.count);

@@ -264,6 +264,16 @@ static void test_frames_load_all_bad_lines_are_reported(void)
     frames_free(&frames);
 }
 
+static void test_frames_load_datagrams_and_requests_are_in_order_each_for_themselves(void)
+{
+    static const char k_file[] = "5 !hold\n4.2 a\n4.9 b\n6 !resume\n5.999 !hold\n4.8 c\n";
+    frames_t frames;
+    TEST_ASSERT_EQUAL_INT(2, load(k_file, sizeof k_file - 1, &frames));
+    TEST_ASSERT_NOT_NULL(strstr(m_errors, ":5: 5.999 ms is before the 6.000 ms of line 4; times must not decrease\n"));
+    TEST_ASSERT_NOT_NULL(strstr(m_errors, ":6: 4.800 ms is before the 4.900 ms of line 3; times must not decrease\n"));
+    frames_free(&frames);
+}
+
 static void test_frames_load_empty_file_holds_nothing(void)
 {
     frames_t frames;
@@ -479,6 +489,7 @@ int main(void)
     RUN_TEST(test_frames_parse_line_bad_request_is_refused);
     RUN_TEST(test_frames_load_file_without_last_newline);
     RUN_TEST(test_frames_load_all_bad_lines_are_reported);
+    RUN_TEST(test_frames_load_datagrams_and_requests_are_in_order_each_for_themselves);
     RUN_TEST(test_frames_load_empty_file_holds_nothing);
     RUN_TEST(test_frames_load_many_lines_all_arrive);
     RUN_TEST(test_frames_load_missing_file_is_an_error);

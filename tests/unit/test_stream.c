@@ -144,20 +144,22 @@ static void render(uint64_t origin_us, int from_ms, int to_ms)
         const uint64_t now_us = origin_us + (uint64_t)ms * 1000u;
         for (; next < s_sent.count && s_sent.at[next] * 1000 <= ms; next++) {
             const q32_t sample = q32(s_sent.value[next]);
-            stream_push(&s_stream, now_us, &sample);
+            stream_push(&s_stream, origin_us + (uint64_t)llround(s_sent.at[next] * 1e6), NULL, &sample);
         }
         s_ref[ms] = (ramp_ref_t){0};
-        stream_step(&s_stream, now_us, &s_ref[ms]);
+        stream_step(&s_stream, now_us, NULL, &s_ref[ms]);
     }
 }
 
 /* An axis of 3000 mm/s^2 and 50000 mm/s^3. */
-static const stream_stop_t k_stop = {.acc_per_cycle2_q32 = 12884902, .jerk_per_cycle3_q32 = 214748};
+static const governor_limits_t k_limits = {
+    .vel_per_cycle_q32 = Q32_ONE, .acc_per_cycle2_q32 = 12884902, .jerk_per_cycle3_q32 = 214748};
 
 static void start(stream_style_t style)
 {
     stream_init(&s_stream, CYCLE_US, 1, style);
-    stream_set_stop(&s_stream, 0, k_stop);
+    stream_set_limits(&s_stream, 0, &k_limits);
+    stream_set_delay_max(&s_stream, 120000);
     s_sent.count = s_sent.in_a_row = 0;
 }
 
@@ -259,14 +261,14 @@ static double signal_speed_max(double from, double to)
 static void test_stream_step_without_sample_returns_false(void)
 {
     ramp_ref_t ref = {1, 2, 3, 4};
-    TEST_ASSERT_FALSE(stream_step(&s_stream, 1000, &ref));
+    TEST_ASSERT_FALSE(stream_step(&s_stream, 1000, NULL, &ref));
     TEST_ASSERT_EQUAL_INT64(1, ref.pos_q32);
     TEST_ASSERT_EQUAL_INT64(4, ref.jerk_per_cycle3_q32);
     const q32_t sample = 77;
-    stream_push(&s_stream, 1000, &sample);
-    TEST_ASSERT_TRUE(stream_step(&s_stream, 1000, &ref));
+    stream_push(&s_stream, 1000, NULL, &sample);
+    TEST_ASSERT_TRUE(stream_step(&s_stream, 1000, NULL, &ref));
     stream_reset(&s_stream);
-    TEST_ASSERT_FALSE(stream_step(&s_stream, 2000, &ref));
+    TEST_ASSERT_FALSE(stream_step(&s_stream, 2000, NULL, &ref));
 }
 
 static void test_stream_step_lone_sample_is_a_step(void)
@@ -293,22 +295,25 @@ static void test_stream_push_two_samples_at_once_steps_to_the_second(void)
     assert_at_rest(q32(2), &s_ref[499]);
 }
 
-/* The curve starts at rest on the first sample, and comes to the second without a jump or an overshoot. */
-static void test_stream_step_second_sample_starts_at_the_first(void)
+/* Two samples are steps. The curve starts where the second one was, and comes to the third without a jump; it goes further by no
+ * more than an axis that has just begun to move takes to stop. */
+static void test_stream_step_third_sample_starts_at_the_second(void)
 {
     start(STREAM_SMOOTH);
     send(0.010, 10);
     send(0.030, 20);
-    render(0, 0, 500);
+    send(0.050, 30);
+    render(0, 0, 1500);
     assert_at_rest(q32(10), &s_ref[10]);
-    assert_at_rest(q32(10), &s_ref[31]);
-    for (int ms = 31; ms < 500; ms++) {
+    assert_at_rest(q32(10), &s_ref[29]);
+    assert_at_rest(q32(20), &s_ref[30]);
+    assert_at_rest(q32(20), &s_ref[49]);
+    for (int ms = 50; ms < 1500; ms++) {
         assert_differences(&s_ref[ms - 1], &s_ref[ms]);
-        TEST_ASSERT_TRUE(s_ref[ms].vel_per_cycle_q32 >= -2);
-        TEST_ASSERT_TRUE(s_ref[ms].pos_q32 <= q32(20) + 2);
+        TEST_ASSERT_TRUE(s_ref[ms].pos_q32 <= q32(32));
     }
-    TEST_ASSERT_TRUE(speed_max(31, 500) < 510); /* 10 mm in 20 ms */
-    assert_at_rest(q32(20), &s_ref[120]);
+    TEST_ASSERT_TRUE(speed_max(50, 1500) < 60); /* 10 mm in 20 ms, of which 20 ms at 3000 mm/s^2 make 60 mm/s */
+    assert_at_rest(q32(30), &s_ref[1499]);
 }
 
 /* ---- exactness ---- */
@@ -317,7 +322,7 @@ static void test_stream_step_constant_samples_give_a_constant_reference(void)
 {
     const network_t network = {60, 8, 0.05};
     const q32_t values[] = {0, 1, -1, 0x123456789ABCD, -0x7FFFFFFFFFFF, Q32_ONE / 3};
-    for (unsigned style = STREAM_SMOOTH; style <= STREAM_FAST; style++) {
+    for (unsigned style = STREAM_SMOOTH; style <= STREAM_BALANCED; style++) {
         for (unsigned i = 0; i < sizeof values / sizeof values[0]; i++) {
             start(style);
             send_signal(&network, 0, 2);
@@ -325,9 +330,9 @@ static void test_stream_step_constant_samples_give_a_constant_reference(void)
             for (int ms = 0; ms < 2000; ms++) {
                 ramp_ref_t ref;
                 for (; next < s_sent.count && s_sent.at[next] * 1000 <= ms; next++) {
-                    stream_push(&s_stream, (uint64_t)ms * 1000, &values[i]);
+                    stream_push(&s_stream, (uint64_t)ms * 1000, NULL, &values[i]);
                 }
-                if (stream_step(&s_stream, (uint64_t)ms * 1000, &ref)) {
+                if (stream_step(&s_stream, (uint64_t)ms * 1000, NULL, &ref)) {
                     assert_at_rest(values[i], &ref);
                 }
             }
@@ -338,12 +343,12 @@ static void test_stream_step_constant_samples_give_a_constant_reference(void)
 static void test_stream_step_differences_are_consistent(void)
 {
     const network_t network = {60, 5, 0.03};
-    for (unsigned style = STREAM_SMOOTH; style <= STREAM_FAST; style++) {
+    for (unsigned style = STREAM_SMOOTH; style <= STREAM_BALANCED; style++) {
         make_signal(5);
         start(style);
         send_signal(&network, 0.0005, 10);
         render(0, 0, 10000);
-        for (int ms = 10; ms < 10000; ms++) {
+        for (int ms = 60; ms < 10000; ms++) { /* three samples */
             assert_differences(&s_ref[ms - 1], &s_ref[ms]);
         }
     }
@@ -361,7 +366,7 @@ static void test_stream_step_signal_that_stops_is_met_exactly(void)
         send(at + 0.005 * random_unit(), last);
     }
     render(0, 0, 6000);
-    for (int ms = 4200; ms < 6000; ms++) {
+    for (int ms = 4700; ms < 6000; ms++) {
         assert_at_rest(q32(last), &s_ref[ms]);
     }
 }
@@ -389,8 +394,9 @@ static void test_stream_step_axes_of_one_signal_move_as_one(void)
     static stream_t seven;
     make_signal(2);
     start(STREAM_SMOOTH);
-    stream_set_stop(&s_stream, 0, (stream_stop_t){.jerk_per_cycle3_q32 = 0});
+    stream_set_limits(&s_stream, 0, &(governor_limits_t){.jerk_per_cycle3_q32 = 0});
     stream_init(&seven, CYCLE_US, AXES_MAX, STREAM_SMOOTH);
+    stream_set_delay_max(&seven, 120000);
     for (int ms = 0; ms < 20000; ms++) {
         const uint64_t now_us = (uint64_t)ms * 1000;
         if (ms % 16 == 3 && random_unit() > 0.1) {
@@ -398,11 +404,11 @@ static void test_stream_step_axes_of_one_signal_move_as_one(void)
             for (unsigned axis = 0; axis < AXES_MAX; axis++) {
                 sample[axis] = q32(signal_at(0.001 * ms)) / 8 * (q32_t)axis;
             }
-            stream_push(&seven, now_us, sample);
-            stream_push(&s_stream, now_us, &sample[AXES_MAX - 1]);
+            stream_push(&seven, now_us, NULL, sample);
+            stream_push(&s_stream, now_us, NULL, &sample[AXES_MAX - 1]);
         }
         ramp_ref_t ref[AXES_MAX] = {{0}}, one = {0};
-        TEST_ASSERT_EQUAL(stream_step(&s_stream, now_us, &one), stream_step(&seven, now_us, ref));
+        TEST_ASSERT_EQUAL(stream_step(&s_stream, now_us, NULL, &one), stream_step(&seven, now_us, NULL, ref));
         for (unsigned axis = 0; axis < AXES_MAX; axis++) {
             TEST_ASSERT_DOUBLE_WITHIN(1e-3, mm(one.pos_q32) * axis / (AXES_MAX - 1), mm(ref[axis].pos_q32));
         }
@@ -437,17 +443,17 @@ static void test_stream_smooth_on_cue_signals_keeps_its_figures(void)
     TEST_ASSERT_TRUE(sqrt(sum / sum_true) <= 1.15);
 }
 
-static void test_stream_fast_on_cue_signals_keeps_its_figures(void)
+static void test_stream_balanced_on_cue_signals_keeps_its_figures(void)
 {
     for (unsigned seed = 1; seed <= 5; seed++) {
-        const quality_t quality = measure_seed(seed, STREAM_FAST, &k_usual, 2000);
+        const quality_t quality = measure_seed(seed, STREAM_BALANCED, &k_usual, 2000);
         if (getenv("STREAM_FIGURES")) {
-            printf("fast %2u: lag %.1f ms shape %.1f um worst %.3f mm jerk %.2f x\n", seed, quality.lag_ms, quality.shape_um,
+            printf("balanced %2u: lag %.1f ms shape %.1f um worst %.3f mm jerk %.2f x\n", seed, quality.lag_ms, quality.shape_um,
                    quality.worst_mm, quality.jerk / quality.jerk_true);
         }
-        TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 1.4); /* 4.5 ms of the network in it */
-        TEST_ASSERT_TRUE(quality.shape_um <= 60);
-        TEST_ASSERT_TRUE(quality.jerk <= 7.5 * quality.jerk_true);
+        TEST_ASSERT_TRUE(quality.lag_ms * 0.060 <= 1.9); /* 4.5 ms of the network in it */
+        TEST_ASSERT_TRUE(quality.shape_um <= 75);        /* two losses in a row */
+        TEST_ASSERT_TRUE(quality.jerk <= (s_sent.in_a_row > 1 ? 2.1 : 1.5) * quality.jerk_true);
     }
 }
 
@@ -456,13 +462,15 @@ static void test_stream_jitter_of_a_period_is_told_from_losses(void)
 {
     const network_t network = {200, 5, 0.01};
     for (unsigned seed = 1; seed <= 10; seed++) {
-        const quality_t quality = measure_seed(seed, seed % 2 ? STREAM_SMOOTH : STREAM_FAST, &network, 4000);
+        const quality_t quality = measure_seed(seed, seed % 2 ? STREAM_SMOOTH : STREAM_BALANCED, &network, 4000);
         if (getenv("STREAM_FIGURES")) {
             printf("jitter %2u: lag %.1f ms shape %.1f um worst %.3f mm jerk %.2f x\n", seed, quality.lag_ms, quality.shape_um,
                    quality.worst_mm, quality.jerk / quality.jerk_true);
         }
-        TEST_ASSERT_TRUE(quality.lag_ms <= (seed % 2 ? 19 : 14));
-        TEST_ASSERT_TRUE(quality.shape_um <= 40);
+        TEST_ASSERT_TRUE(quality.lag_ms <= 21);
+        TEST_ASSERT_TRUE(quality.shape_um <= 90);
+        TEST_ASSERT_TRUE(quality.worst_mm <= 1);
+        TEST_ASSERT_TRUE(quality.jerk <= 9 * quality.jerk_true);
     }
 }
 
@@ -486,8 +494,8 @@ static void test_stream_step_late_arrivals_and_losses_are_no_new_rate(void)
     }
 }
 
-/* Jitter 30 % of the period: known to 1 % from 32 samples on; the shape near the signal: the bound grows with the distance of the
- * samples. */
+/* Jitter 30 % of the period: known to 4 % from 32 samples on, where a late sample was taken for a loss or a loss for a late
+ * sample, else much better; the shape near the signal: the bound grows with the distance of the samples. */
 static void test_stream_step_all_rates_converge(void)
 {
     const int rates[] = {7, 10, 20, 30, 50, 60, 100, 200, 250};
@@ -508,9 +516,9 @@ static void test_stream_step_all_rates_converge(void)
             printf("rate %3d: period off %.2f %% lag %.2f periods shape %.1f um worst %.3f mm jerk %.2f x\n", rates[i], 100 * off,
                    quality.lag_ms * rates[i] / 1000, quality.shape_um, quality.worst_mm, quality.jerk / quality.jerk_true);
         }
-        TEST_ASSERT_TRUE(off <= 0.01);
+        TEST_ASSERT_TRUE(off <= 0.04);
         TEST_ASSERT_TRUE(quality.lag_ms <= 2500.0 / rates[i] + 4.5);
-        TEST_ASSERT_TRUE(quality.shape_um <= 25 + 85e3 / rates[i] / rates[i]);
+        TEST_ASSERT_TRUE(quality.shape_um <= 45 + 180e3 / rates[i] / rates[i]);
     }
 }
 
@@ -534,7 +542,7 @@ static void test_stream_step_lossy_start_finds_the_period(void)
         printf("start: period off %.2f %%, from 1.5 s on %.2f %%\n", 100 * early, 100 * late);
     }
     TEST_ASSERT_TRUE(early < 0.04);
-    TEST_ASSERT_TRUE(late < 0.01);
+    TEST_ASSERT_TRUE(late < 0.03);
 }
 
 /* Largest distance to what the signal was when rendered, while the delay is within the bound given in stream.h. */
@@ -557,8 +565,8 @@ static double stop_distance(double velocity, double acceleration)
     return rise + (at_zero < 180 ? at_zero * sqrt(at_zero / jerk) : at_zero / 2 * (at_zero / 3000 + 0.06));
 }
 
-/* From any moment and speed: no further beyond the last sample than the axis takes to stop, or 36 ms of its speed and what a fast
- * curve is led ahead, or one more step; and at rest exactly on it after two seconds. */
+/* From any moment and speed: no further beyond the last sample than the axis takes to stop, or 50 ms of its speed and what a led
+ * curve is ahead, or one more step; and at rest exactly on it after two seconds. */
 static void test_stream_step_ended_stream_rests_on_its_last_sample(void)
 {
     double worst = 0;
@@ -566,15 +574,15 @@ static void test_stream_step_ended_stream_rests_on_its_last_sample(void)
         const double rate = i % 2 ? 60 : i % 4 ? 100 : 30;
         const network_t network = {rate, 4, 0};
         make_signal((unsigned)i % 10);
-        start(i % 3 ? STREAM_SMOOTH : STREAM_FAST);
+        start(i % 3 ? STREAM_SMOOTH : STREAM_BALANCED);
         send_signal(&network, 0, 1.2 + 0.01 * i);
         const int end_ms = (int)(1200 + 10 * i);
         render(0, 0, end_ms + 2100);
         const double *v = &s_sent.value[s_sent.count - 1];
         const double way = v[0] - v[-1] < 0 ? -1 : 1;
         const double velocity = fabs(v[0] - v[-1]) * rate, acceleration = fmax(0, (v[0] - 2 * v[-1] + v[-2]) * rate * rate * way);
-        const double led = i % 3 ? 0 : 0.6 / rate;
-        const double allowed = fmax(stop_distance(velocity, acceleration), (0.036 + led) * velocity) +
+        const double led = i % 3 ? 0 : 0.7 / rate;
+        const double allowed = fmax(stop_distance(velocity, acceleration), (0.050 + led) * velocity) +
                                (1 + led * rate) * acceleration / rate / rate + 0.05;
         double beyond = 0;
         for (int ms = end_ms; ms < end_ms + 2100; ms++) {
@@ -625,12 +633,12 @@ static void test_stream_step_bursts_of_losses_are_bridged_softly(void)
             }
             ratio += most / most_true / 40;
             worst = fmax(worst, most);
-            TEST_ASSERT_TRUE(worst_error(5000, 5900, 38) < 0.3);
+            TEST_ASSERT_TRUE(measure(5000, 5900, 120).worst_mm < 0.8); /* later, where they were taken for a pause */
         }
         if (getenv("STREAM_FIGURES")) {
             printf("%2d lost: acceleration %.2f x the signal's, %.0f mm/s^2 at most\n", lost, ratio, worst);
         }
-        TEST_ASSERT_TRUE(ratio < (lost == 1 ? 1.05 : 1.5 + 0.18 * lost));
+        TEST_ASSERT_TRUE(ratio < (lost == 1 ? 1.05 : lost <= 3 ? 1.6 : 3));
         TEST_ASSERT_TRUE(worst < 3000);
     }
 }
@@ -676,7 +684,7 @@ static double coarse_sway(stream_style_t style, double step_mm, unsigned *delay_
 /* The sway itself takes 197 mm/s^2; whole millimetres make steps of 3600. What need not be smoothed does not come later. */
 static void test_stream_coarse_values_come_out_as_the_motion_that_was_rounded(void)
 {
-    for (stream_style_t style = STREAM_SMOOTH; style <= STREAM_FAST; style++) {
+    for (stream_style_t style = STREAM_SMOOTH; style <= STREAM_BALANCED; style++) {
         unsigned fine_us, tenths_us, coarse_us;
         TEST_ASSERT_TRUE(coarse_sway(style, 0.01, &fine_us) < 600);
         TEST_ASSERT_TRUE(coarse_sway(style, 0.1, &tenths_us) < 700);
@@ -684,7 +692,7 @@ static void test_stream_coarse_values_come_out_as_the_motion_that_was_rounded(vo
         TEST_ASSERT_TRUE(fine_us < 45000 && tenths_us < fine_us + 26000 && coarse_us < fine_us + 101000);
         for (int ms = 2000; ms < 9000; ms++) {
             const double error = mm(s_ref[ms].pos_q32) - 20 * sin(3.14159265e-3 * (ms - (int)coarse_us / 1000 - 4));
-            TEST_ASSERT_TRUE(fabs(error) < 1);
+            TEST_ASSERT_TRUE(fabs(error) < 1.5);
         }
     }
 }
@@ -699,7 +707,7 @@ static void test_stream_even_ramps_and_jumps_are_not_coarse(void)
         }
         for (int ms = 0; ms < 8000; ms++) {
             render(0, ms, ms + 1);
-            TEST_ASSERT_TRUE(stream_delay_us(&s_stream) < 70000);
+            TEST_ASSERT_EQUAL_INT32(1, s_stream.curve.window == 0 ? 1 : s_stream.curve.window);
         }
     }
 }
@@ -732,24 +740,24 @@ static void test_stream_step_after_an_end_starts_again(void)
     assert_at_rest(q32(last), &s_ref[again_ms - 1]);
     assert_at_rest(q32(s_sent.value[again]), &s_ref[again_ms]);
     assert_at_rest(q32(s_sent.value[again]), &s_ref[again_ms + 10]);
-    for (int ms = again_ms + 1; ms < 8000; ms++) {
+    for (int ms = again_ms + 60; ms < 8000; ms++) { /* two samples are steps */
         assert_differences(&s_ref[ms - 1], &s_ref[ms]);
     }
-    TEST_ASSERT_TRUE(measure(5000, 8000, 80).shape_um < 40);
+    TEST_ASSERT_TRUE(measure(5000, 8000, 80).shape_um < 80);
 }
 
 static void test_stream_is_live_while_samples_come(void)
 {
     const network_t network = {50, 0, 0};
     make_signal(1);
-    start(STREAM_FAST);
+    start(STREAM_BALANCED);
     send_signal(&network, 0, 2);
     TEST_ASSERT_FALSE(stream_is_live(&s_stream, 0));
     TEST_ASSERT_EQUAL_UINT32(0, stream_delay_us(&s_stream));
     render(0, 0, 2000);
     TEST_ASSERT_TRUE(stream_is_live(&s_stream, 1999000));
     TEST_ASSERT_UINT32_WITHIN(100, 20000, stream_period_us(&s_stream));
-    TEST_ASSERT_UINT32_WITHIN(2500, 20500, stream_delay_us(&s_stream));
+    TEST_ASSERT_UINT32_WITHIN(1500, 26500, stream_delay_us(&s_stream));
     TEST_ASSERT_FALSE(stream_is_live(&s_stream, 2140000));
     render(0, 2000, 3200);
     TEST_ASSERT_FALSE(stream_is_live(&s_stream, 3199000));
@@ -793,10 +801,12 @@ static void test_stream_step_changing_rates_are_followed(void)
         const int from_ms = 4000 * i, to_ms = from_ms + 4000;
         const double delay = delay_max_periods(from_ms, to_ms);
         report("rate", from_ms + 200, to_ms, delay);
-        TEST_ASSERT_TRUE(delay < 4.5);
+        TEST_ASSERT_TRUE(delay < 6);
         TEST_ASSERT_TRUE(speed_max(from_ms + 200, to_ms) < 1.3 * signal_speed_max(0.001 * from_ms - 0.3, 0.001 * to_ms));
         TEST_ASSERT_TRUE(measure(from_ms + 2000, to_ms, 4000 / rates[i]).shape_um < 50 + 120e3 / rates[i] / rates[i]);
-        TEST_ASSERT_TRUE(fabs(stream_period_us(&s_stream) * 1e-6 * rates[i] - 1) < 0.01);
+        const double each = i == 1 ? 2 : 1; /* half of the rate before: every second period has a sample */
+        TEST_ASSERT_TRUE(fabs(stream_period_us(&s_stream) * 1e-6 * each * rates[i] - 1) < 0.01);
+        TEST_ASSERT_TRUE(fabs(stream_report(&s_stream).period_us * 1e-6 * rates[i] - 1) < 0.01);
     }
     for (int ms = 100; ms < 23000; ms++) {
         assert_differences(&s_ref[ms - 1], &s_ref[ms]);
@@ -860,7 +870,7 @@ static void test_stream_step_wandering_rate_is_followed(void)
     }
     const double delay = delay_max_periods(0, 20000);
     report("wandering", 500, 20000, delay);
-    TEST_ASSERT_TRUE(delay < 4);
+    TEST_ASSERT_TRUE(delay < 5);
     TEST_ASSERT_TRUE(speed_max(500, 20000) < 1.5 * signal_speed_max(0, 20));
     TEST_ASSERT_TRUE(measure(1000, 20000, 80).shape_um < 400);
 }
@@ -878,8 +888,8 @@ static void test_stream_step_held_back_bursts_are_sorted_in(void)
     }
     const double delay = delay_max_periods(0, 19900);
     report("bursts", 300, 19900, delay);
-    TEST_ASSERT_TRUE(delay < 5);
-    TEST_ASSERT_TRUE(speed_max(300, 19900) < 4 * signal_speed_max(0, 20));
+    TEST_ASSERT_TRUE(delay < 120e-3 * 60 + 0.5);
+    TEST_ASSERT_TRUE(speed_max(300, 19900) < 1.5 * signal_speed_max(0, 20));
     TEST_ASSERT_TRUE(worst_error(300, 19900, 45) < 20);
 }
 
@@ -950,7 +960,7 @@ static void test_stream_step_other_share_of_a_flood_is_another_rate(void)
             printf("share %2u: off for %d ms, shape %.1f um\n", seed, off_ms, measure(200, 13100, 40).shape_um);
         }
         TEST_ASSERT_TRUE(off_ms < 400);
-        TEST_ASSERT_TRUE(measure(200, 13100, 40).shape_um < 40);
+        TEST_ASSERT_TRUE(measure(1000, 13100, 40).shape_um < 40);
     }
 }
 
@@ -960,7 +970,7 @@ static void test_stream_step_flood_that_pauses_and_jumps_does_not_swing(void)
 {
     for (unsigned n = 0; n < 64; n++) {
         const double flood_hz = 600 + 150 * (n % 4), pause_s = 0.1 + 0.2 * (n / 4 % 4), rate_hz = n < 32 ? 50 : 100;
-        start(n / 16 % 2 == 0 ? STREAM_SMOOTH : STREAM_FAST);
+        start(n / 16 % 2 == 0 ? STREAM_SMOOTH : STREAM_BALANCED);
         double at = 0.001, lowest = 0, highest = 0;
         for (; at < 2; at += 1 / flood_hz) {
             send(at, 22.6);
@@ -968,8 +978,8 @@ static void test_stream_step_flood_that_pauses_and_jumps_does_not_swing(void)
         for (at += pause_s; at < 5; at += 1 / rate_hz) {
             send(at + 0.005 * random_unit(), 0);
         }
-        render(0, 0, 6000);
-        for (int ms = 0; ms < 6000; ms++) {
+        render(0, 0, 8000);
+        for (int ms = 0; ms < 8000; ms++) {
             lowest = fmin(lowest, mm(s_ref[ms].pos_q32));
             highest = fmax(highest, mm(s_ref[ms].pos_q32));
         }
@@ -977,9 +987,9 @@ static void test_stream_step_flood_that_pauses_and_jumps_does_not_swing(void)
             printf("flood of %3.0f Hz, pause of %.1f s, %3.0f Hz: from %.2f to %.2f mm\n", flood_hz, pause_s, rate_hz, lowest,
                    highest);
         }
-        TEST_ASSERT_DOUBLE_WITHIN(0.1, 0, lowest);
-        TEST_ASSERT_DOUBLE_WITHIN(pause_s < 0.2 ? 8.5 : 0.1, 22.6, highest);
-        assert_at_rest(0, &s_ref[5999]);
+        TEST_ASSERT_DOUBLE_WITHIN(1, 0, lowest);
+        TEST_ASSERT_DOUBLE_WITHIN(pause_s < 0.2 ? 8.5 : 2, 22.6, highest);
+        assert_at_rest(0, &s_ref[7999]);
     }
 }
 
@@ -991,7 +1001,7 @@ static void test_stream_step_repeated_values_are_followed_at_their_own_rate(void
     for (unsigned i = 0; i < sizeof rates / sizeof rates[0]; i++) {
         const double rate = rates[i][1];
         make_signal(i + 1);
-        start(i % 2 ? STREAM_FAST : STREAM_SMOOTH);
+        start(i % 2 ? STREAM_BALANCED : STREAM_SMOOTH);
         for (double at = 0; at < 20; at += 1 / rates[i][0]) {
             if (random_unit() > 0.01) {
                 send(at + 0.002 + 0.002 * random_unit(), signal_at(floor(at * rate + 1e-9) / rate));
@@ -1002,9 +1012,9 @@ static void test_stream_step_repeated_values_are_followed_at_their_own_rate(void
             printf("repeats %3.0f of %3.0f Hz: lag %.1f periods, shape %.1f um, worst %.3f mm, jerk %.2f x\n", rates[i][0], rate,
                    quality.lag_ms * rate / 1000, quality.shape_um, quality.worst_mm, quality.jerk / quality.jerk_true);
         }
-        TEST_ASSERT_TRUE(quality.lag_ms * rate <= (i % 2 ? 1700 : 2500) + 500 * rate / rates[i][0]);
-        TEST_ASSERT_TRUE(quality.shape_um <= 10 + 90e3 / rate / rate);
-        TEST_ASSERT_TRUE(quality.jerk <= (i % 2 ? 7.5 : 1.3) * quality.jerk_true);
+        TEST_ASSERT_TRUE(quality.lag_ms * rate <= (i % 2 ? 1900 : 2500) + 500 * rate / rates[i][0]);
+        TEST_ASSERT_TRUE(quality.shape_um <= 35 + 90e3 / rate / rate);
+        TEST_ASSERT_TRUE(quality.jerk <= 1.4 * quality.jerk_true);
     }
 }
 
@@ -1063,9 +1073,9 @@ static void test_stream_step_repeats_are_samples_where_values_are_rare_or_the_pe
         for (unsigned frame = 0; frame < 100; frame++) {
             const q32_t sample = q32(round(50000 * sin(0.15 * (frame - frame % 2))) / 1000);
             stream_hint_period(&s_stream, senders[i].stated_us);
-            stream_push(&s_stream, now_us, &sample);
+            stream_push(&s_stream, now_us, NULL, &sample);
             for (const uint64_t next_us = now_us + senders[i].frame_us; now_us < next_us; now_us += CYCLE_US) {
-                TEST_ASSERT_TRUE(stream_step(&s_stream, now_us, &ref));
+                TEST_ASSERT_TRUE(stream_step(&s_stream, now_us, NULL, &ref));
             }
         }
         TEST_ASSERT_UINT32_WITHIN(senders[i].period_us / 50, senders[i].period_us, stream_period_us(&s_stream));
@@ -1082,7 +1092,12 @@ static void test_stream_step_noise_stays_bounded(void)
     const uint32_t cycles_us[] = {500, 1000, 10000};
     for (int run = 0; run < 60; run++) {
         const uint32_t cycle_us = cycles_us[run % 3];
-        stream_init(&s_stream, cycle_us, 1, run % 2 ? STREAM_SMOOTH : STREAM_FAST);
+        const governor_limits_t limits = {.vel_per_cycle_q32 = k_limits.vel_per_cycle_q32 * cycle_us / 1000,
+                                          .acc_per_cycle2_q32 = k_limits.acc_per_cycle2_q32 * cycle_us / 1000 * cycle_us / 1000,
+                                          .jerk_per_cycle3_q32 =
+                                              k_limits.jerk_per_cycle3_q32 * cycle_us / 1000 * cycle_us / 1000 * cycle_us / 1000};
+        stream_init(&s_stream, cycle_us, 1, run % 2 ? STREAM_SMOOTH : STREAM_BALANCED);
+        stream_set_limits(&s_stream, 0, &limits);
         ramp_ref_t ref = {0};
         uint64_t now_us = 0;
         q32_t low = range, high = -range;
@@ -1093,13 +1108,13 @@ static void test_stream_step_noise_stays_bounded(void)
                 const q32_t sample = (q32_t)((random_unit() * 2 - 1) * (double)range);
                 low = sample < low ? sample : low;
                 high = sample > high ? sample : high;
-                stream_push(&s_stream, now_us, &sample);
+                stream_push(&s_stream, now_us, NULL, &sample);
             }
-            if (!stream_step(&s_stream, now_us, &ref)) {
+            if (!stream_step(&s_stream, now_us, NULL, &ref)) {
                 continue;
             }
             const q32_t span = high - low; /* noise as fast as this swings the curve about: not out of all bounds */
-            TEST_ASSERT_TRUE(ref.pos_q32 >= low - 100 * span - 2 && ref.pos_q32 <= high + 100 * span + 2);
+            TEST_ASSERT_TRUE(ref.pos_q32 >= low - 30 * span - 2 && ref.pos_q32 <= high + 30 * span + 2);
             TEST_ASSERT_TRUE(stream_period_us(&s_stream) <= 200000);
         }
     }
@@ -1111,14 +1126,14 @@ int main(void)
     RUN_TEST(test_stream_step_without_sample_returns_false);
     RUN_TEST(test_stream_step_lone_sample_is_a_step);
     RUN_TEST(test_stream_push_two_samples_at_once_steps_to_the_second);
-    RUN_TEST(test_stream_step_second_sample_starts_at_the_first);
+    RUN_TEST(test_stream_step_third_sample_starts_at_the_second);
     RUN_TEST(test_stream_step_constant_samples_give_a_constant_reference);
     RUN_TEST(test_stream_step_differences_are_consistent);
     RUN_TEST(test_stream_step_signal_that_stops_is_met_exactly);
     RUN_TEST(test_stream_step_time_near_its_end_gives_the_same_bits);
     RUN_TEST(test_stream_step_axes_of_one_signal_move_as_one);
     RUN_TEST(test_stream_smooth_on_cue_signals_keeps_its_figures);
-    RUN_TEST(test_stream_fast_on_cue_signals_keeps_its_figures);
+    RUN_TEST(test_stream_balanced_on_cue_signals_keeps_its_figures);
     RUN_TEST(test_stream_jitter_of_a_period_is_told_from_losses);
     RUN_TEST(test_stream_step_late_arrivals_and_losses_are_no_new_rate);
     RUN_TEST(test_stream_step_all_rates_converge);

@@ -23,7 +23,7 @@ BAND_HZ = 4.0
 WAYS_MM = (1.0, 10.0, 100.0)
 FIRST_POSE = COLUMNS.index(POSE_COLUMNS[0]) + 2
 Z = POSE_COLUMNS.index("z_mm")
-STYLES = ("smooth", "balanced", "fast")
+STYLES = ("smooth", "balanced")
 HELD, LIMITED, RUCKIG = "held, no limits", "two limits", "Ruckig"
 
 

@@ -74,8 +74,8 @@ static inline HV_MUST_CHECK hv_status_t hal_udp_dropped(hal_udp_t udp, uint32_t 
     return udp.ops->dropped != NULL ? udp.ops->dropped(udp.ctx, datagrams) : HV_ERR_NOSUP;
 }
 
-/** How long the datagram of the last successful recv had waited since its arrival, in us. For measurements only: a clock that is
- *  set meanwhile spoils it, beyond a minute it is told as 0. Never blocks.
+/** How long the datagram of the last successful recv had waited since its arrival, in us. A clock of the day that is
+ *  set meanwhile spoils it, so use it within a cycle only; beyond a minute it is told as 0. Never blocks.
  *  @return HV_OK; HV_ERR_NOSUP where the backend cannot know. */
 static inline HV_MUST_CHECK hv_status_t hal_udp_waited(hal_udp_t udp, uint32_t *us)
 {

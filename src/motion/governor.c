@@ -1,0 +1,362 @@
+/* SPDX-License-Identifier: MIT
+ * governor.c - smooths what a stream asks for beyond the limits; see governor.h.
+ * Differences of means are means of differences, so a point between two levels needs at most what the needs of both mix to: the
+ * strength follows from the needs in closed form. It rises as quickly as the output itself can bear, and falls slowly.
+ */
+#include "heave/governor.h"
+
+#define SPAN_US     150000u
+#define RELEASE_US  300000u           /* time constant with which the strength falls ... */
+#define SOFT_US     100000u           /* ... which that rate comes to */
+#define RELEASE_DIV 4                 /* ... and at least by a level in so many seconds, ... */
+#define CATCH_DIV   6                 /* ... but not so fast that the output gains more than a sixth of the time, ... */
+#define CATCH_SPEED 12                /* ... or a twelfth of the largest speed, whichever is more */
+#define LOOK_US     6000u             /* needs are those of differences over so long */
+#define NEED_GOAL   (Q16_ONE * 4 / 5) /* of the limits */
+#define NEED_MAX    (1000 * Q16_ONE)
+#define PACE_SAME   64                  /* a period that differs by less than this share is the same */
+#define NEAR_Q32    (Q32_ONE / 1000000) /* a low-pass so near to its input has arrived */
+
+static const uint32_t k_time_constant_us[GOVERNOR_LEVELS] = {6000, 12000, 25000, 50000, 100000, 200000, 400000};
+
+void governor_set_limits(governor_t *self, unsigned channel, const governor_limits_t *limits)
+{
+    HV_ASSERT(channel < GOVERNOR_CHANNELS);
+    self->limits[channel] = *limits;
+    self->period_us = 0;
+}
+
+/* 1 / (value per cycle * cycles^power), 0 for no limit. */
+static int64_t reciprocal(q32_t per_cycle_q32, int64_t cycles_q16, unsigned power)
+{
+    q32_t per_period_q32 = per_cycle_q32;
+    for (unsigned i = 0; i < power; i++) {
+        per_period_q32 = fx_mul_shift(per_period_q32, cycles_q16, 16);
+    }
+    return per_period_q32 > 0 ? Q62_ONE / per_period_q32 : 0;
+}
+
+/* A^2 / (2 J V): what the speed still gains while an acceleration is taken back. */
+static int32_t brake_share(const governor_limits_t *limits)
+{
+    if (limits->jerk_per_cycle3_q32 <= 0) {
+        return 0;
+    }
+    const q32_t gained_q32 = fx_mul_div(limits->acc_per_cycle2_q32, limits->acc_per_cycle2_q32, 2 * limits->jerk_per_cycle3_q32);
+    return (int32_t)fx_clamp(fx_mul_div(gained_q32, Q16_ONE, limits->vel_per_cycle_q32), 0, Q16_ONE);
+}
+
+static void stretch(governor_track_t *track, int64_t by_q32)
+{
+    track->vel_q32 = fx_mul_shift(track->vel_q32, by_q32, 32);
+    track->acc_q32 = fx_mul_shift(fx_mul_shift(track->acc_q32, by_q32, 32), by_q32, 32);
+}
+
+/* Differences are over so much longer a time now. */
+static void stretch_all(governor_t *self, int64_t by_q32)
+{
+    for (unsigned i = 0; i < GOVERNOR_CHANNELS; i++) {
+        stretch(&self->out[i], by_q32);
+        for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
+            stretch(&self->track[level][i], by_q32);
+        }
+    }
+}
+
+void governor_pace(governor_t *self, uint32_t period_us, uint32_t cycle_us)
+{
+    const uint32_t off_us = period_us > self->period_us ? period_us - self->period_us : self->period_us - period_us;
+    if (self->period_us != 0 && off_us * PACE_SAME < period_us) {
+        return;
+    }
+    const uint32_t was_us = self->period_us * self->each;
+    self->each = (LOOK_US + period_us / 2) / period_us;
+    self->each = self->each > 0 ? self->each : 1;
+    if (was_us > 0) {
+        stretch_all(self, Q32_ONE * (int64_t)(period_us * self->each) / was_us);
+    }
+    self->since = 0;
+    self->glide_q32 = 0;
+    const int64_t cycles_q16 = (int64_t)period_us * self->each * Q16_ONE / cycle_us;
+    self->period_us = period_us;
+    self->channels = 0;
+    for (unsigned i = 0; i < GOVERNOR_CHANNELS; i++) {
+        const governor_limits_t *limits = &self->limits[i];
+        self->per_limit_q62[i][0] = reciprocal(limits->vel_per_cycle_q32, cycles_q16, 1);
+        self->per_limit_q62[i][1] = reciprocal(limits->acc_per_cycle2_q32, cycles_q16, 2);
+        self->per_limit_q62[i][2] = reciprocal(limits->jerk_per_cycle3_q32, cycles_q16, 3);
+        self->brake_q16[i] = brake_share(limits);
+        self->channels = limits->jerk_per_cycle3_q32 > 0 ? i + 1 : self->channels;
+    }
+    for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
+        self->share_q32[level] = Q32_ONE * (int64_t)period_us / ((int64_t)period_us + k_time_constant_us[level]);
+    }
+}
+
+void governor_start(governor_t *self)
+{
+    for (unsigned span = 0; span < GOVERNOR_SPANS; span++) {
+        for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
+            self->need_q16[span][level] = 0;
+        }
+    }
+    self->span_us = 0;
+    self->strength_q32 = 0;
+    self->glide_q32 = 0;
+    self->fall_q32 = 0;
+    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
+        self->rise_q32[pole] = 0;
+    }
+}
+
+void governor_place(governor_t *self, unsigned channel, bool is_steady, const q32_t value_q32[3])
+{
+    const int64_t each = self->each > 0 ? self->each : 1;
+    const q32_t vel_q32 = value_q32[2] - value_q32[1];
+    const q32_t before_q32 = value_q32[1] - value_q32[0];
+    governor_track_t track = {value_q32[2], vel_q32 * each, (vel_q32 - before_q32) * each * each};
+    self->out[channel] = track;
+    self->track[0][channel] = track;
+    self->level_q32[0][channel] = track.pos_q32;
+    for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) { /* as far behind as a low-pass is in even motion */
+        if (is_steady && self->share_q32[level] > 0) {           /* 0: no period is known, and nothing moves */
+            track.pos_q32 -= fx_mul_div(vel_q32, Q32_ONE - self->share_q32[level], self->share_q32[level]);
+        } else {
+            track = (governor_track_t){value_q32[2], 0, 0}; /* behind where it has never been it would lead there */
+        }
+        self->track[level + 1][channel] = track;
+        self->level_q32[level + 1][channel] = track.pos_q32;
+    }
+}
+
+static int32_t larger(int32_t a, int32_t b)
+{
+    return a > b ? a : b;
+}
+
+/* The share of a limit that a difference is. */
+static int32_t share_of(q32_t difference_q32, int64_t per_limit_q62)
+{
+    return (int32_t)fx_clamp(fx_mul_shift(fx_abs(difference_q32), per_limit_q62, 46), 0, NEED_MAX);
+}
+
+/* What a value needs of the limits of a channel if it comes after a track. */
+static int32_t need_of(const governor_t *self, unsigned channel, const governor_track_t *track, q32_t pos_q32)
+{
+    const int64_t *per_limit_q62 = self->per_limit_q62[channel];
+    const q32_t vel_q32 = pos_q32 - track->pos_q32;
+    const q32_t acc_q32 = vel_q32 - track->vel_q32;
+    const int32_t by_jerk = share_of(acc_q32 - track->acc_q32, per_limit_q62[2]);
+    const int32_t by_acc = share_of(acc_q32, per_limit_q62[1]);
+    const int64_t square = (int64_t)by_acc * by_acc / Q16_ONE;
+    const int64_t by_vel = share_of(vel_q32, per_limit_q62[0]) + square * self->brake_q16[channel] / Q16_ONE;
+    return larger(by_jerk, larger((int32_t)fx_clamp(by_vel, 0, NEED_MAX), by_acc));
+}
+
+static void go_on(governor_track_t *track, q32_t pos_q32)
+{
+    const q32_t vel_q32 = pos_q32 - track->pos_q32;
+    *track = (governor_track_t){pos_q32, vel_q32, vel_q32 - track->vel_q32};
+}
+
+/* One period of a low-pass: always between where it was and its input. */
+static q32_t low_pass(q32_t at_q32, q32_t input_q32, q32_t share_q32)
+{
+    const q32_t way_q32 = input_q32 - at_q32;
+    return fx_abs(way_q32) < NEAR_Q32 ? input_q32 : at_q32 + fx_mul_shift_fit(way_q32, share_q32, 32);
+}
+
+/* Another quarter of a second begins. */
+static void pass_time(governor_t *self)
+{
+    self->span_us += self->period_us * self->each;
+    if (self->span_us < SPAN_US) {
+        return;
+    }
+    self->span_us = 0;
+    for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
+        for (unsigned span = GOVERNOR_SPANS - 1; span > 0; span--) {
+            self->need_q16[span][level] = self->need_q16[span - 1][level];
+        }
+        self->need_q16[0][level] = 0;
+    }
+}
+
+/* Takes what is asked to every level. */
+static void step_levels(governor_t *self, const q32_t *asked_q32)
+{
+    for (unsigned i = 0; i < self->channels; i++) {
+        self->level_q32[0][i] = asked_q32[i];
+        for (unsigned level = 1; level <= GOVERNOR_LEVELS; level++) {
+            self->level_q32[level][i] =
+                low_pass(self->level_q32[level][i], self->level_q32[level - 1][i], self->share_q32[level - 1]);
+        }
+    }
+}
+
+/* What each level needs. */
+static void note_needs(governor_t *self, int32_t scale_q16)
+{
+    for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
+        int32_t need_q16 = 0;
+        for (unsigned i = 0; i < self->channels; i++) {
+            need_q16 = larger(need_q16, need_of(self, i, &self->track[level][i], self->level_q32[level][i]));
+            go_on(&self->track[level][i], self->level_q32[level][i]);
+        }
+        need_q16 = (int32_t)fx_mul_shift(need_q16, scale_q16, 16);
+        self->need_q16[0][level] = larger(self->need_q16[0][level], need_q16);
+    }
+}
+
+static int32_t lasting_need(const governor_t *self, unsigned level)
+{
+    int32_t need_q16 = 0;
+    for (unsigned span = 0; span < GOVERNOR_SPANS; span++) {
+        need_q16 = larger(need_q16, self->need_q16[span][level]);
+    }
+    return need_q16;
+}
+
+/* The least strength with which the limits are kept. */
+static q32_t needed_strength(const governor_t *self)
+{
+    int32_t before_q16 = lasting_need(self, 0);
+    if (before_q16 <= NEED_GOAL) {
+        return 0;
+    }
+    for (unsigned level = 1; level <= GOVERNOR_LEVELS; level++) {
+        const int32_t need_q16 = lasting_need(self, level);
+        if (need_q16 <= NEED_GOAL) {
+            return (level - 1) * Q32_ONE + Q32_ONE * (int64_t)(before_q16 - NEED_GOAL) / (before_q16 - need_q16);
+        }
+        before_q16 = need_q16;
+    }
+    return GOVERNOR_LEVELS * Q32_ONE;
+}
+
+/* The value of a channel at a strength. */
+static q32_t value_at(const governor_t *self, unsigned channel, q32_t strength_q32)
+{
+    const unsigned level = (unsigned)(strength_q32 / Q32_ONE);
+    const q32_t here_q32 = self->level_q32[level][channel];
+    if (level == GOVERNOR_LEVELS) {
+        return here_q32;
+    }
+    const q32_t way_q32 = self->level_q32[level + 1][channel] - here_q32;
+    return here_q32 + fx_mul_shift_fit(way_q32, strength_q32 % Q32_ONE, 32);
+}
+
+q32_t governor_lag(const governor_t *self, unsigned channel)
+{
+    return self->level_q32[0][channel] - value_at(self, channel, self->strength_q32);
+}
+
+void governor_shift(governor_t *self, unsigned channel, q32_t asked_q32)
+{
+    const q32_t by_q32 = asked_q32 - self->level_q32[0][channel];
+    self->out[channel].pos_q32 += by_q32;
+    for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
+        self->level_q32[level][channel] += by_q32;
+        self->track[level][channel].pos_q32 += by_q32;
+    }
+}
+
+/* Goes there in the periods until needs are looked at again: a staircase would be one in the output.
+ * @param is_all a rise begins anew from there */
+static void set_strength(governor_t *self, q32_t strength_q32, bool is_all)
+{
+    const q32_t way_q32 = strength_q32 - self->strength_q32;
+    self->glide_q32 = way_q32 / (int64_t)self->each;
+    self->strength_q32 += way_q32 % (int64_t)self->each;
+    for (unsigned pole = 0; is_all && pole < GOVERNOR_POLES; pole++) {
+        self->rise_q32[pole] = strength_q32;
+    }
+}
+
+static int32_t need_at(const governor_t *self, q32_t strength_q32)
+{
+    int32_t need_q16 = 0;
+    for (unsigned i = 0; i < self->channels; i++) {
+        need_q16 = larger(need_q16, need_of(self, i, &self->out[i], value_at(self, i, strength_q32)));
+    }
+    return need_q16;
+}
+
+/* The levels are apart where the motion is quick, so that a rise is a motion of its own: it goes through three low-passes. Where
+ * not even so much is bearable, as after a jump, it comes at once, if that is better by half. */
+static void raise_strength(governor_t *self, q32_t wanted_q32)
+{
+    q32_t input_q32 = wanted_q32;
+    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
+        const q32_t next_q32 = self->rise_q32[pole] + (input_q32 - self->rise_q32[pole]) * 3 / 8;
+        self->rise_q32[pole] = next_q32 > self->rise_q32[pole] ? next_q32 : self->rise_q32[pole];
+        input_q32 = self->rise_q32[pole];
+    }
+    const int32_t soft_q16 = need_at(self, input_q32);
+    const bool is_sudden = soft_q16 > 2 * NEED_GOAL && 2 * need_at(self, wanted_q32) < soft_q16;
+    set_strength(self, is_sudden ? wanted_q32 : input_q32, is_sudden);
+}
+
+/* How far it may fall until needs are looked at again. A fall takes the output from one level to the one before: what a motion is
+ * behind is caught up. */
+static q32_t largest_fall(const governor_t *self, uint32_t since_us)
+{
+    const unsigned level = (unsigned)fx_clamp(self->strength_q32 / Q32_ONE, 0, GOVERNOR_LEVELS - 1);
+    int32_t way_q16 = 1; /* in what the largest speed goes meanwhile */
+    for (unsigned i = 0; i < self->channels; i++) {
+        way_q16 = larger(way_q16, share_of(self->level_q32[level + 1][i] - self->level_q32[level][i], self->per_limit_q62[i][0]));
+    }
+    const q32_t by_time_q32 = Q32_ONE * (int64_t)since_us / (CATCH_DIV * (int64_t)k_time_constant_us[level]);
+    const q32_t by_speed_q32 = Q32_ONE / CATCH_SPEED * Q16_ONE / way_q16;
+    return by_time_q32 > by_speed_q32 ? by_time_q32 : by_speed_q32;
+}
+
+/* Falls softly, too: the rate of the fall is a speed of the output. */
+static q32_t fallen_strength(governor_t *self, q32_t wanted_q32)
+{
+    const q32_t over_q32 = self->strength_q32 - wanted_q32;
+    const uint32_t since_us = self->period_us * self->each;
+    const q32_t period_s_q32 = (int64_t)since_us * Q32_ONE / 1000000;
+    const q32_t by_share_q32 = over_q32 * (int64_t)since_us / (RELEASE_US + since_us);
+    const q32_t fall_q32 = by_share_q32 + period_s_q32 / RELEASE_DIV;
+    const q32_t most_q32 = largest_fall(self, since_us);
+    const q32_t next_q32 = fall_q32 < most_q32 ? fall_q32 : most_q32;
+    self->fall_q32 += (next_q32 - self->fall_q32) * (int64_t)since_us / (SOFT_US + since_us);
+    return over_q32 > self->fall_q32 ? self->strength_q32 - self->fall_q32 : wanted_q32;
+}
+
+void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, q32_t *out_q32)
+{
+    step_levels(self, asked_q32);
+    self->since++;
+    const bool is_looked_at = self->since >= self->each;
+    if (is_looked_at) {
+        self->since = 0;
+        pass_time(self);
+        note_needs(self, scale_q16);
+        const q32_t wanted_q32 = needed_strength(self);
+        if (wanted_q32 > self->strength_q32) {
+            self->fall_q32 = 0;
+            raise_strength(self, wanted_q32);
+        } else {
+            set_strength(self, fallen_strength(self, wanted_q32), true);
+        }
+    }
+    self->strength_q32 += self->glide_q32;
+    for (unsigned i = 0; i < self->channels; i++) {
+        out_q32[i] = value_at(self, i, self->strength_q32);
+        if (is_looked_at) {
+            go_on(&self->out[i], out_q32[i]);
+        }
+    }
+}
+
+uint32_t governor_delay_us(const governor_t *self)
+{
+    uint64_t delay_us = 0;
+    for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
+        const q32_t part_q32 = fx_clamp(self->strength_q32 - level * Q32_ONE, 0, Q32_ONE);
+        delay_us += (uint64_t)part_q32 * k_time_constant_us[level] / (uint64_t)Q32_ONE;
+    }
+    return (uint32_t)delay_us;
+}
