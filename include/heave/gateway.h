@@ -12,6 +12,7 @@
 #include "heave/hal/log.h"
 #include "heave/hal/relays.h"
 #include "heave/hal/udp.h"
+#include "heave/healthy.h"
 #include "heave/motion.h"
 #include "heave/owner.h"
 #include "heave/relay_policy.h"
@@ -28,13 +29,14 @@
 /** Longest datagram taken. */
 #define GATEWAY_DATAGRAM_MAX 512u
 
-/** The outside, every handle valid. Backends outlive the gateway. */
+/** The outside, every handle valid, but that there need not be a line for the healthy pulse. Backends outlive the gateway. */
 typedef struct {
     hal_udp_t udp;
     drives_t drives;
     hal_relays_t relays;
     hal_inputs_t inputs;
     hal_log_t log;
+    hal_relays_t healthy; /**< a bank of one: the line of the healthy pulse; ops NULL: there is none */
 } gateway_io_t;
 
 /** How far bringing up the drives has come. */
@@ -82,6 +84,7 @@ typedef struct {
     relay_settings_t relays;
     uint16_t relay_safe_mask;
     uint32_t relay_safe_after_ms;
+    healthy_settings_t healthy;
 } gateway_settings_t;
 
 /** A gateway; members are private to src/gateway. */
@@ -120,8 +123,12 @@ typedef struct {
     motion_target_t newest;
     frame_command_t newest_command;
     hal_udp_peer_t newest_from;
-    uint16_t written_mask;
+    uint16_t effects_mask; /**< of this cycle, without the healthy pulse */
+    uint16_t written_mask; /**< with it */
     bool is_mask_written;
+    healthy_t healthy;
+    bool is_late;       /**< the coming cycle is, by more than the pulse bears */
+    bool is_pulse_lost; /**< its line cannot be written */
     uint64_t other_logged_us;    /**< 0 = never */
     uint64_t singular_logged_us; /**< 0 = never */
     uint32_t other_suppressed;
@@ -173,7 +180,7 @@ void gateway_cycle(gateway_t *self, uint64_t now_us);
 /** What the last cycle did. Valid until the next one. */
 const snapshot_t *gateway_snapshot(const gateway_t *self);
 
-/** Tells the counters of cycles that were skipped because the program was late. */
+/** Tells of cycles that were skipped just before the coming one because the program was late. */
 void gateway_note_late(gateway_t *self, uint32_t cycles);
 
 /** Offline runs: the coming cycle finds this fault, whatever the drives do; where it finds it by itself, nothing is added.

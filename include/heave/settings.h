@@ -9,6 +9,7 @@
 #include "heave/frame.h"
 #include "heave/hal/relays.h"
 #include "heave/hal/udp.h"
+#include "heave/healthy.h"
 #include "heave/kin.h"
 #include "heave/stream.h"
 
@@ -85,6 +86,8 @@ typedef struct {
     relay_settings_t relays;
     uint16_t relay_safe_mask;
     uint32_t relay_safe_after_ms; /**< of a hold that interrupted a ride; in every other state at once */
+
+    healthy_settings_t healthy;
 } settings_t;
 
 #endif

@@ -255,6 +255,17 @@ typedef struct {
     uint32_t timeout_ms;
 } config_relays_modbus_t;
 
+/** What carries the healthy pulse. */
+typedef enum { CONFIG_HEALTHY_NONE, CONFIG_HEALTHY_GPIO, CONFIG_HEALTHY_RELAY } config_healthy_driver_t;
+
+/** The line of the healthy pulse; its relay and its times are the core's. */
+typedef struct {
+    config_healthy_driver_t driver;
+    config_label_t chip; /**< as of the relays */
+    config_label_t line;
+    bool is_active_low;
+} config_healthy_t;
+
 /** What reads the operator's switches. */
 typedef enum { CONFIG_INPUTS_SIM, CONFIG_INPUTS_GPIO } config_inputs_driver_t;
 
@@ -294,6 +305,7 @@ typedef struct {
     config_relays_t relays;
     config_relays_modbus_t relays_modbus;
     config_inputs_t inputs;
+    config_healthy_t healthy;
 } config_t;
 
 /** Loads and checks a file.

@@ -9,6 +9,7 @@
 #include "config_cia402.h"
 #include "config_coils.h"
 #include "config_gpio.h"
+#include "config_healthy.h"
 #include "config_modbus.h"
 #include "config_source.h"
 #include "config_value.h"
@@ -411,6 +412,7 @@ static void check_values(config_source_t *self)
     check_relays(self);
     config_coils_check(self);
     config_gpio_check(self);
+    config_healthy_check(self);
     config_cia402_check(self);
     config_canraw_check(self);
     config_modbus_check(self);

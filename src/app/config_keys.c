@@ -44,6 +44,10 @@ const config_section_t config_sections[] = {
     {"relays-modbus", "a board of relays on Modbus coils ([relays] driver = modbus), on a line of its own; see docs/modbus.md",
      CONFIG_NEEDS_NOTHING},
     {"inputs", "switches of the operator", CONFIG_NEEDS_NOTHING},
+    {"healthy",
+     "an output that toggles as long as states, deadlines and drives are as they should be, for a watchdog outside; see "
+     "docs/safety.md",
+     CONFIG_NEEDS_NOTHING},
 };
 const size_t config_section_count = sizeof config_sections / sizeof config_sections[0];
 
@@ -497,6 +501,23 @@ const config_key_t config_keys[] = {
      .help = "line of the reset button, closed when pressed"},
     {KEY("inputs", "active_low"), AT(inputs.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "yes",
      .help = "whether a closed contact pulls its line low (contacts to ground); no: high (contacts to supply)"},
+
+    {KEY("healthy", "driver"), AT(healthy.driver), .type = CONFIG_WORD, .unit = "", .fallback = "none", .words = "none|gpio|relay",
+     .help = "what carries it: nothing, a GPIO line of its own, or one of the relays, coils of a Modbus board included"},
+    {KEY("healthy", "chip"), AT(healthy.chip), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "GPIO: label of the chip that has the line; none: whichever has a line of this name"},
+    {KEY("healthy", "line"), AT(healthy.line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "GPIO: the output line, by name, or with chip by number"},
+    {KEY("healthy", "active_low"), AT(healthy.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "whether the line rests high"},
+    {KEY("healthy", "relay"), AT(settings.healthy.relay), .type = CONFIG_INTEGER, .unit = "", .fallback = "0", RANGE(0, 12),
+     .help = "driver = relay: its number; senders do not switch it any more, and max_on_ms and min_toggle_ms are not for it"},
+    {KEY("healthy", "toggle_ms"), AT(settings.healthy.toggle_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "10",
+     RANGE(1, 1000), .help = "time between two edges, rounded up to whole cycles; 100 and more for a Modbus board"},
+    {KEY("healthy", "off_ms"), AT(settings.healthy.off_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "500",
+     RANGE(0, 60000), .help = "once it stops it stays away for so long at least; longer than the watchdog waits for an edge"},
+    {KEY("healthy", "late_cycles"), AT(settings.healthy.late_cycles), .type = CONFIG_INTEGER, .unit = "", .fallback = "3",
+     RANGE(0, 1000), .help = "a cycle that is late by more cycles than that stops it"},
 };
 /* clang-format on */
 const size_t config_key_count = sizeof config_keys / sizeof config_keys[0];

@@ -9,12 +9,21 @@ linux_gpio_relays_config_t gpio_setup_relays(const config_t *config)
 {
     const config_relays_t *relays = &config->relays;
     linux_gpio_relays_config_t out = {.names = {.chip = relays->chip.text, .count = relays->lines.count},
+                                      .consumer = "heaved relays",
                                       .is_active_low = relays->is_active_low,
                                       .safe_mask = config->settings.relay_safe_mask};
     for (unsigned i = 0; i < relays->lines.count; i++) {
         out.names.line[i] = relays->lines.line[i].text;
     }
     return out;
+}
+
+linux_gpio_relays_config_t gpio_setup_healthy(const config_t *config)
+{
+    const config_healthy_t *healthy = &config->healthy;
+    return (linux_gpio_relays_config_t){.names = {.chip = healthy->chip.text, .count = 1, .line = {healthy->line.text}},
+                                        .consumer = "heaved healthy",
+                                        .is_active_low = healthy->is_active_low};
 }
 
 linux_gpio_inputs_config_t gpio_setup_inputs(const config_t *config)
@@ -74,6 +83,11 @@ unsigned gpio_setup_check(const config_t *config, FILE *out)
     if (config->relays.driver == CONFIG_RELAYS_GPIO) {
         const linux_gpio_relays_config_t setup = gpio_setup_relays(config);
         warnings += look(&setup.names, "relays", &relays, out);
+    }
+    if (config->healthy.driver == CONFIG_HEALTHY_GPIO) {
+        linux_gpio_place_t healthy = {.count = 0};
+        const linux_gpio_relays_config_t setup = gpio_setup_healthy(config);
+        warnings += look(&setup.names, "healthy", &healthy, out);
     }
     if (config->inputs.driver == CONFIG_INPUTS_GPIO) {
         const linux_gpio_inputs_config_t setup = gpio_setup_inputs(config);

@@ -14,7 +14,7 @@
 static bool is_io_valid(const gateway_io_t *io)
 {
     return hal_udp_valid(io->udp) && drives_valid(io->drives) && hal_relays_valid(io->relays) && hal_inputs_valid(io->inputs) &&
-           hal_log_valid(io->log);
+           hal_log_valid(io->log) && (io->healthy.ops == NULL || hal_relays_valid(io->healthy));
 }
 
 /* Texts of drives that have said nothing yet. */
@@ -55,6 +55,7 @@ static void keep_settings(gateway_settings_t *own, const settings_t *settings)
     own->angle_min_q16 = settings->axis[AXIS_ANGLE].min_q16;
     own->angle_max_q16 = settings->axis[AXIS_ANGLE].max_q16;
     own->relays = settings->relays;
+    own->healthy = settings->healthy;
     keep_changeable(own, settings);
 }
 
@@ -176,6 +177,7 @@ hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent)
 void gateway_note_late(gateway_t *self, uint32_t cycles)
 {
     self->snapshot.counters.late_cycles += cycles;
+    self->is_late |= cycles > self->settings.healthy.late_cycles;
 }
 
 void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
@@ -183,6 +185,12 @@ void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
     if ((unsigned)code < FAULT_CODES && axis <= DRIVES_MAX) {
         self->told[axis] |= 1u << (unsigned)code;
     }
+}
+
+/* The relay that carries the healthy pulse, as a mask. */
+static uint16_t pulse_bit(const gateway_t *self)
+{
+    return (uint16_t)(1u << self->settings.healthy.relay >> 1);
 }
 
 /* A hold leaves a ride's relays as they are for a while, if so configured. */
@@ -207,12 +215,34 @@ static void watch_relays(gateway_t *self)
     }
 }
 
-/* Only an engaged sender commands the relays; the safe mask holds everywhere else. */
+/* The healthy pulse, on its own line or, as what is returned, on its relay. One that cannot be written has stopped: that is told
+ * of, and is what the watchdog behind it is for. */
+static uint16_t pulse(gateway_t *self, uint64_t now_us)
+{
+    const healthy_settings_t *settings = &self->settings.healthy;
+    const bool level = healthy_step(&self->healthy, settings, operate_is_well(self), now_us);
+    const bool was_lost = self->is_pulse_lost;
+    uint16_t seen = 0;
+    self->is_pulse_lost = self->io.healthy.ops != NULL && (hal_relays_write(self->io.healthy, level ? 1 : 0) != HV_OK ||
+                                                           hal_relays_read_back(self->io.healthy, &seen) == HV_ERR_IO);
+    if (self->is_pulse_lost != was_lost) {
+        hal_log_write(self->io.log, was_lost ? HAL_LOG_NOTICE : HAL_LOG_ERROR,
+                      was_lost ? "healthy pulse: its line is written again" : "healthy pulse: its line cannot be written");
+    }
+    self->snapshot.is_healthy = healthy_is_running(&self->healthy, settings, now_us);
+    self->is_late = false;
+    return (uint16_t)(level ? pulse_bit(self) : 0);
+}
+
+/* Only an engaged sender commands the relays; the safe mask holds everywhere else. The pulse is nobody's to command, and its
+ * pace is its own: the relays' limits of time are not for it. */
 static void write_relays(gateway_t *self, uint64_t now_us)
 {
     const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, now_us);
-    const uint16_t asked = is_sender_heard ? self->frame_mask : self->settings.relay_safe_mask;
-    const uint16_t mask = relay_policy_step(&self->relay_policy, &self->settings.relays, asked, !is_sender_heard, now_us);
+    const uint16_t wanted = is_sender_heard ? self->frame_mask : self->settings.relay_safe_mask;
+    const uint16_t asked = (uint16_t)(wanted & ~pulse_bit(self));
+    self->effects_mask = relay_policy_step(&self->relay_policy, &self->settings.relays, asked, !is_sender_heard, now_us);
+    const uint16_t mask = (uint16_t)(self->effects_mask | pulse(self, now_us));
     if (!self->is_mask_written || mask != self->written_mask) {
         self->is_mask_written = hal_relays_write(self->io.relays, mask) == HV_OK;
         self->snapshot.counters.relay_errors += !self->is_mask_written;
@@ -261,7 +291,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->state = self->supervisor.state;
     s->goal = self->supervisor.goal;
     s->is_held_by_silence = self->supervisor.is_held_by_silence;
-    s->relay_mask = self->written_mask;
+    s->relay_mask = self->effects_mask;
     s->asked = self->output.asked;
     s->sent = self->output.sent;
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {

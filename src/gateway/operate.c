@@ -566,6 +566,35 @@ void operate_after_motion(gateway_t *self)
     }
 }
 
+/* --- Health --- */
+
+/* A person has asked for a reset and nothing moves: drives whose safe-torque-off is a fault to them can only come back where the
+ * pulse comes first. */
+static bool is_being_reset(const gateway_t *self)
+{
+    return self->reset_until_us != 0 && !self->snapshot.is_estop_active && operate_energized(self, false) == 0;
+}
+
+/* In OFF, and while they are reset, drives may be in fault: they have no torque. */
+static bool are_drives_well(const gateway_t *self)
+{
+    const bool is_fault_borne = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor);
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        const drive_state_t state = self->snapshot.drive[i].state;
+        if (state == DRIVE_OFFLINE || (state == DRIVE_FAULT && !is_fault_borne)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool operate_is_well(const gateway_t *self)
+{
+    const bool is_state_well = !supervisor_is_latched(&self->supervisor) || is_being_reset(self);
+    const bool is_bus_well = !self->is_bus_lost && !drives_is_failing(self->io.drives) && !operate_is_bus_stalled(self);
+    return is_state_well && is_bus_well && are_drives_well(self) && !self->is_late && !self->is_end_overdue;
+}
+
 /* --- The end --- */
 
 uint32_t operate_energized(const gateway_t *self, bool is_answering)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_gpio.py BIN masks|lines|inputs - the daemon on GPIO lines that the kernel simulates, on virtual time. Runs inside kernel.py.
+"""test_gpio.py BIN masks|lines|inputs|healthy - the daemon on GPIO lines that the kernel simulates, on virtual time. Runs inside kernel.py.
 
 What the relays do is read from the other side of the lines, as a multimeter at the terminals would."""
 import signal
@@ -325,6 +325,71 @@ def inputs_missing(bin_dir):
             assert "warning: [inputs] gpio: line 2 is relay 1 already" in bench.heaved("--config", bench.config, "--check").stdout
 
 
+# --- The healthy pulse, as the watchdog behind it sees it ---
+
+PULSE = 15
+TOGGLE_MS = 20  # two looks of the watchdog below, which the kernel's tick makes ten ms apart
+
+
+class PulseBench(GpioBench):
+    def __init__(self, bin_dir, chip, **changes):
+        super().__init__(bin_dir, **{"sim__lag_ms": 300, **changes})
+        self.edit("[cylinders]\n", "[cylinders]\nfollowing_error_mm = 20\n")
+        self.chip = chip
+        self.config.write_text(self.config.read_text(encoding="utf-8") +
+                               f"\n[healthy]\ndriver = gpio\nline = FX{PULSE}\ntoggle_ms = {TOGGLE_MS}\n", encoding="utf-8")
+
+    def edges(self, seconds):
+        """Edges within that time."""
+        seen, last, until = 0, self.chip.level(PULSE), time.monotonic() + seconds
+        while time.monotonic() < until:
+            time.sleep(0.001)
+            level = self.chip.level(PULSE)
+            seen, last = seen + (level != last), level
+        return seen
+
+    def wait_pulse(self):
+        heave.wait_for(lambda: self.edges(0.2) >= 5, "the pulse runs")
+
+    def is_quiet_and_low(self):
+        return self.edges(0.3) == 0 and self.chip.level(PULSE) == 0
+
+
+def pulse(bin_dir):
+    with gpio_sim.Chip("effects", 16, "FX") as chip, PulseBench(bin_dir, chip) as bench:
+        daemon = bench.start()
+        bench.wait_pulse()
+        with switch(bench, chip) as sender:
+            bench.wait_pulse()
+            assert bench.status()["healthy"] is True
+            sender.send("@A6:0,0,0,0,0,90,0F#")
+            bench.wait_state("FAULT")
+        assert bench.is_quiet_and_low(), "in FAULT"
+        assert bench.status()["healthy"] is False
+        assert bench.stop(daemon) == 0
+        assert bench.is_quiet_and_low(), "after the end"
+
+
+def pulse_hangs(bin_dir):
+    """Stopped where it is, as a program that hangs; killed, as one that crashes."""
+    with gpio_sim.Chip("effects", 16, "FX") as chip, PulseBench(bin_dir, chip) as bench:
+        daemon = bench.start()
+        bench.wait_pulse()
+        daemon.send_signal(signal.SIGSTOP)
+        assert bench.edges(0.3) == 0, "a program that is stopped makes no edge"
+        daemon.send_signal(signal.SIGCONT)
+        bench.wait_pulse()
+        assert bench.stop(daemon, signal.SIGKILL) == -signal.SIGKILL
+        assert bench.is_quiet_and_low(), "killed"
+
+
+def pulse_missing(bin_dir):
+    with gpio_sim.Chip("effects", 15, "FX") as chip, PulseBench(bin_dir, chip) as bench:
+        wrong = "gpio: no chip has a line FX15"
+        assert f"warning: [healthy] {wrong}" in bench.heaved("--config", bench.config, "--check").stdout
+        assert wrong in bench.refused()
+
+
 def main():
     suite = tap.Suite()
     if not gpio_sim.is_there():
@@ -338,7 +403,10 @@ def main():
     inputs = [("e-stop: relays safe within two cycles, latched, reset button, replay", estop),
               ("the chip of the inputs goes while running: e-stop", desk_unplugged), ("enable key", key),
               ("an input line that is not there, is in use, or is a relay", inputs_missing)]
-    for name, case in {"masks": masks, "lines": lines, "inputs": inputs}[sys.argv[2]]:
+    healthy = [("healthy pulse: runs while all is well, low from a fault on and after the end", pulse),
+               ("healthy pulse: no edge from a program that hangs or is killed", pulse_hangs),
+               ("healthy pulse: a line that is not there", pulse_missing)]
+    for name, case in {"masks": masks, "lines": lines, "inputs": inputs, "healthy": healthy}[sys.argv[2]]:
         with suite.case(name):
             case(sys.argv[1])
     return suite.done()

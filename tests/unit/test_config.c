@@ -818,6 +818,56 @@ static void test_load_gpio_relays_need_lines_that_a_chip_can_be_found_by(void)
     }
 }
 
+static void test_load_healthy_pulse_needs_an_output_of_its_own(void)
+{
+    static const struct {
+        const char *driver, *chip, *line, *relay, *toggle_ms, *relays, *error;
+    } k_cases[] = {
+        {"none", "none", "none", "0", "10", "gpio", ""},
+        {"gpio", "none", "GPIO17", "0", "10", "gpio", ""},
+        {"gpio", "another", "7", "0", "10", "gpio", ""},
+        {"relay", "none", "none", "1", "10", "gpio", ""},
+        {"relay", "none", "none", "1", "100", "modbus", ""},
+        {"gpio", "none", "none", "0", "10", "gpio", "[healthy] line: missing; allowed: the output line of the pulse\n"},
+        {"gpio", "none", "17", "0", "10", "gpio",
+         "[healthy] line: 17 alone is no line; allowed: the name of a line, or its number with chip\n"},
+        {"gpio", "a chip", "9", "0", "10", "gpio",
+         "[healthy] line: line 9 is relay 2 already; allowed: a line of its own, or none\n"},
+        {"gpio", "a chip", "12", "0", "10", "gpio",
+         "[healthy] line: line 12 is [inputs] estop already; allowed: a line of its own\n"},
+        {"gpio", "gpiochip1", "9", "0", "10", "gpio",
+         "[healthy] chip: gpiochip1 is a number that changes; allowed: the chip's label (gpiodetect shows it)\n"},
+        {"gpio", "none", "GPIO17", "1", "10", "gpio", "[healthy] relay: 1 is for driver = relay; allowed here: 0\n"},
+        {"relay", "none", "none", "0", "10", "gpio",
+         "[healthy] relay: 0 is none of the 2 in [relays] lines; allowed: the relay of the pulse\n"},
+        {"relay", "none", "none", "3", "10", "gpio",
+         "[healthy] relay: 3 is none of the 2 in [relays] lines; allowed: the relay of the pulse\n"},
+        {"relay", "none", "none", "2", "10", "gpio",
+         "[healthy] relay: 2 is closed by [relays] safe_mask; allowed: a relay that is not\n"},
+        {"relay", "none", "none", "1", "99", "modbus",
+         "[healthy] toggle_ms: 99 ms is too quick for a coil of a Modbus board; allowed: 100 to 1000 ms\n"},
+    };
+    for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {
+        const bool is_modbus = strcmp(k_cases[i].relays, "modbus") == 0;
+        take_good_file();
+        set_key("relays", "driver", k_cases[i].relays);
+        set_key("relays", "safe_mask", "2");
+        set_key("relays", "chip", "a chip");
+        set_key("relays", "lines", is_modbus ? "7, 8" : "7, 9");
+        set_key("relays-modbus", "host", is_modbus ? "192.168.1.9" : "none");
+        set_key("inputs", "driver", "gpio");
+        set_key("inputs", "chip", "a chip");
+        set_key("inputs", "estop", "12");
+        set_key("healthy", "driver", k_cases[i].driver);
+        set_key("healthy", "chip", k_cases[i].chip);
+        set_key("healthy", "line", k_cases[i].line);
+        set_key("healthy", "relay", k_cases[i].relay);
+        set_key("healthy", "toggle_ms", k_cases[i].toggle_ms);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(k_cases[i].error[0] != '\0', load_lines(), m_errors);
+        expect_contains(k_cases[i].error);
+    }
+}
+
 static void test_load_relay_times_that_contradict_each_other_are_errors(void)
 {
     take_good_file();
@@ -1398,6 +1448,7 @@ int main(void)
     RUN_TEST(test_load_hinges_that_do_not_fit_are_an_error);
     RUN_TEST(test_load_safe_mask_above_the_relays_is_an_error);
     RUN_TEST(test_load_gpio_relays_need_lines_that_a_chip_can_be_found_by);
+    RUN_TEST(test_load_healthy_pulse_needs_an_output_of_its_own);
     RUN_TEST(test_load_gpio_inputs_need_lines_of_their_own_that_a_chip_can_be_found_by);
     RUN_TEST(test_load_relay_times_that_contradict_each_other_are_errors);
     RUN_TEST(test_load_input_line_used_twice_is_an_error);
