@@ -127,8 +127,8 @@ typedef struct {
     uint16_t written_mask; /**< with it */
     bool is_mask_written;
     healthy_t healthy;
-    bool is_late;       /**< the coming cycle is, by more than the pulse bears */
-    bool is_pulse_lost; /**< its line cannot be written */
+    bool is_late;                /**< the coming cycle is, by more than the pulse bears */
+    bool is_pulse_lost;          /**< its line cannot be written */
     uint64_t other_logged_us;    /**< 0 = never */
     uint64_t singular_logged_us; /**< 0 = never */
     uint32_t other_suppressed;

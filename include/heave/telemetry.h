@@ -56,7 +56,7 @@ typedef struct {
     state_t goal;
     bool is_held_by_silence;
     bool is_estop_active;
-    bool is_healthy; /**< the healthy pulse runs, or would if there were a line for it */
+    bool is_healthy;                     /**< the healthy pulse runs, or would if there were a line for it */
     fault_t fault;                       /**< the first one since the last reset */
     fault_reaction_t reaction;           /**< the worst of them */
     uint64_t fault_last_us[FAULT_CODES]; /**< when each was last seen to begin, 0 = never */

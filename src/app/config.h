@@ -293,6 +293,12 @@ typedef struct {
     uint32_t late_hold_cycles; /**< of the program: see motion_loop.h */
     char control_socket[CONFIG_PATH_MAX];
     char metrics_file[CONFIG_PATH_MAX]; /**< "none" = none */
+    char look_socket[CONFIG_PATH_MAX];  /**< likewise */
+    config_label_t operate_group;       /**< "" = none */
+    config_label_t service_group;       /**< likewise */
+    char operator_log[CONFIG_PATH_MAX]; /**< "none" = none */
+    uint32_t operator_log_kb;
+    uint32_t operator_log_files;
     config_black_box_t black_box;
     config_drives_t drives;
     config_sim_t sim;

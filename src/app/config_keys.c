@@ -203,6 +203,21 @@ const config_key_t config_keys[] = {
      .help = "file for Prometheus (node_exporter's textfile collector: a name that ends in .prom), renewed every second; removed at "
              "the end"},
 
+    {KEY("control", "look_socket"), AT(look_socket), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "a second socket, for everybody on this machine: status, watch and hold, and nothing else"},
+    {KEY("control", "operate_group"), AT(operate_group), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "who may engage, resume, park and turn the intensity down; none: whoever may use the socket. Everybody who may use it may "
+             "look and hold"},
+    {KEY("control", "service_group"), AT(service_group), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "who may do that and reset, turn the intensity up, dump and shut down; none: as operate_group; root always may"},
+    {KEY("control", "operator_log"), AT(operator_log), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "file that takes a line per request: when, who, what, and what became of it; none: nothing is kept, unless a service "
+             "manager has given a state directory, which then has operator.log"},
+    {KEY("control", "operator_log_kb"), AT(operator_log_kb), .type = CONFIG_INTEGER, .unit = "KB", .fallback = "1024",
+     RANGE(16, 1048576), .help = "size at which it becomes FILE.1, and a new one begins"},
+    {KEY("control", "operator_log_files"), AT(operator_log_files), .type = CONFIG_INTEGER, .unit = "", .fallback = "20",
+     RANGE(1, 100), .help = "older ones that are kept, FILE.1 the newest"},
+
     {KEY("black-box", "directory"), AT(black_box.directory), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
      .help = "takes one folder per incident; none: nothing is kept or written, unless a service manager has given a state directory"},
     {KEY("black-box", "seconds"), AT(black_box.seconds), .type = CONFIG_INTEGER, .unit = "s", .fallback = "120", RANGE(10, 600),

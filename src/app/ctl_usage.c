@@ -59,7 +59,9 @@ static const usage_section_t k_manual[] = {
      "changes nothing. Where several platforms run on one box, `--platform` says which. Members of the socket's group (`heave`, "
      "where heaved is a service) may ask; eight at a time. A ninth gets "
      "the place of one that "
-     "has asked nothing for 2 s, else that of the oldest `watch`, which ends and says so.\n\n"
+     "has asked nothing for 2 s, else that of the oldest `watch`, which ends and says so. Where the configuration names groups, "
+     "these say "
+     "who may do more than look and hold.\n\n"
      "With `--json` every answer is an object of one line: /usr/share/doc/heave/docs/status-json.md has all its members, which "
      "stay what they "
      "are within a major version. An answer with `ok` false says in `error` why.\n"},

@@ -45,6 +45,7 @@ typedef struct {
     metrics_t metrics;
     flood_t flood;
     blackbox_t blackbox;
+    operator_log_t operators;
     motion_view_words_t view; /**< for the manager, the metrics and the watch over floods */
     linux_udp_t udp;
     linux_log_t log;
@@ -94,6 +95,7 @@ static void write_files(live_t *self)
     out_file_flush(&self->trace);
     self->control.lost.record_lines = ring_dropped(&self->loop.record);
     self->control.lost.trace_rows = ring_dropped(&self->loop.trace);
+    self->control.lost.operator_entries = operator_log_lost(&self->operators);
     self->control.lost.log_lines = hal_log_dropped(linux_log_hal(&self->log));
 }
 
@@ -242,16 +244,31 @@ static uint64_t shutdown_most_us(const settings_t *settings)
     return (uint64_t)(way_us + ramps_us) + SHUTDOWN_REST_US;
 }
 
+/* Who has sent it, as far as the kernel says. */
+static void log_signal(live_t *self, const struct signalfd_siginfo *info)
+{
+    operator_entry_t entry = {.uid = info->ssi_uid, .pid = (int32_t)info->ssi_pid};
+    (void)clock_gettime(CLOCK_REALTIME, &entry.at);
+    (void)snprintf(entry.request, sizeof entry.request, "%s",
+                   info->ssi_signo == SIGHUP    ? "SIGHUP"
+                   : info->ssi_signo == SIGTERM ? "SIGTERM"
+                                                : "SIGINT");
+    entry.before = entry.after = control_state(&self->control);
+    operator_log_add(&self->operators, &entry);
+}
+
 /* The first signal settles the platform, the second one ends at once. */
 static void take_signals(live_t *self)
 {
     struct signalfd_siginfo info;
     while (read(self->signal_fd, &info, sizeof info) == (ssize_t)sizeof info) {
         if (info.ssi_signo == SIGHUP) {
+            log_signal(self, &info);
             reload(self);
             continue;
         }
         self->signals++;
+        log_signal(self, &info);
         if (self->signals == 1) {
             const motion_request_t request = {.event = EVENT_SHUTDOWN};
             (void)ring_push(&self->loop.requests, &request, sizeof request, NULL, 0);
@@ -268,6 +285,15 @@ static void take_signals(live_t *self)
 static uint64_t now_us(const live_t *self)
 {
     return hal_clock_now_us(self->loop.clock);
+}
+
+/* The log of operators goes on being tried, and heaved goes on. */
+static void tell_log_trouble(live_t *self)
+{
+    int error = 0;
+    if (operator_log_trouble(&self->operators, &error)) {
+        (void)say(0, "operator log %s: %s", self->operators.path, error != 0 ? strerror(error) : "written again");
+    }
 }
 
 /* The service manager, and whoever collects metrics. */
@@ -291,6 +317,7 @@ static void serve_once(live_t *self)
     take_signals(self);
     control_serve(&self->control, fds, now_us(self));
     tell_others(self);
+    tell_log_trouble(self);
     write_files(self);
     (void)!linux_log_flush(&self->log); /* what does not go out now goes out later */
 }
@@ -316,7 +343,7 @@ static void say_ready(const live_t *self, const config_t *config)
 {
     (void)say(0, "version %s, %u cylinders, cycle %" PRIu32 " us, UDP %s port %u, control socket %s", HEAVE_VERSION,
               config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u, config->settings.cycle_us, config->udp.bind,
-              (unsigned)self->udp.port, self->control.path);
+              (unsigned)self->udp.port, self->control.socket[0].path);
 }
 
 /* The rings hold more than the buffers: what a slow reader still takes within its time. */
@@ -360,6 +387,9 @@ static void await_first_cycle(live_t *self)
 
 static int run(live_t *self, const config_t *config)
 {
+    if (!operator_log_start(&self->operators)) {
+        return say(EXIT_UNAVAILABLE, "cannot start the operator log: %s", strerror(errno));
+    }
     if (!motion_loop_start(&self->loop)) {
         return say(EXIT_UNAVAILABLE, "cannot start the motion thread: %s", strerror(errno));
     }
@@ -429,8 +459,9 @@ static int open_all(live_t *self, const config_t *config)
     const char *path =
         self->options->socket != NULL ? self->options->socket : socket_path_of_daemon(in_directory, config->control_socket);
     int code = open_udp(self, config);
-    code = code == EXIT_DONE ? control_open(&self->control, path, config, &self->loop, &self->blackbox) : code;
+    code = code == EXIT_DONE ? control_open(&self->control, path, config, &self->loop, &self->blackbox, &self->operators) : code;
     code = code == EXIT_DONE ? open_files(self) : code;
+    code = code == EXIT_DONE ? operator_log_open(&self->operators, config) : code;
     if (code != EXIT_DONE) {
         return code;
     }
@@ -465,18 +496,19 @@ int live_run(const config_t *config, const options_t *options)
     }
     self->options = options;
     self->config = *config;
-    self->control.fd = -1;
+    control_init(&self->control);
     self->manager.fd = -1;
     self->udp.fd = -1;
     int code = open_all(self, config);
     code = code == EXIT_DONE ? run(self, config) : code;
     control_close(&self->control);
     manager_close(&self->manager);
+    const bool has_log_ended = operator_log_close(&self->operators);
     if (!self->is_thread_running) { /* a stuck thread may still use all this: the end of the process gives it back */
         const bool has_blackbox_ended = blackbox_close(&self->blackbox);
         const bool has_rig_ended = rig_close(&self->loop.rig, self->config.settings.relay_safe_mask);
         linux_udp_close(&self->udp);
-        if (has_blackbox_ended && has_rig_ended) {
+        if (has_blackbox_ended && has_log_ended && has_rig_ended) {
             free(self);
         }
     }

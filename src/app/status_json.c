@@ -342,6 +342,7 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
     json_number(json, "trace_rows", lost->trace_rows);
     json_number(json, "record_lines", lost->record_lines);
     json_number(json, "log_lines", lost->log_lines);
+    json_number(json, "operator_entries", lost->operator_entries);
     json_close(json, '}');
     json_text(json, "version", HEAVE_VERSION);
 }

@@ -9,10 +9,11 @@
 
 /** What the service thread adds to the motion thread's view. */
 typedef struct {
-    uint32_t trace_rows;   /**< lost because writing was too slow */
-    uint32_t record_lines; /**< likewise */
-    uint32_t log_lines;    /**< likewise */
-    bool is_flood;         /**< the kernel drops what cannot be a frame */
+    uint32_t trace_rows;       /**< lost because writing was too slow */
+    uint32_t record_lines;     /**< likewise */
+    uint32_t log_lines;        /**< likewise */
+    uint32_t operator_entries; /**< that the operator log has not taken */
+    bool is_flood;             /**< the kernel drops what cannot be a frame */
 } status_lost_t;
 
 void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,

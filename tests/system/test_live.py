@@ -5,6 +5,7 @@
 --guard LIB: malloc_guard.c as a shared library; without it (instrumented builds) the cases about it are skipped.
 """
 import argparse
+import grp
 import json
 import math
 import os
@@ -534,6 +535,76 @@ def strangers_are_refused(bench):
     assert bench.stop(daemon) == 0
 
 
+NOBODY = 65534
+
+
+def ask_as(path, groups, *requests):
+    """What heaved answers to somebody who is in these groups only; who cannot be somebody else asks as who this is."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            if os.geteuid() == 0:
+                os.setgroups(groups)
+                os.setgid(NOBODY)
+                os.setuid(NOBODY)
+            with socket.socket(socket.AF_UNIX) as link:
+                link.connect(str(path))
+                said = link.makefile("r")
+                for request in requests:
+                    link.sendall(request.encode() + b"\n")
+                    os.write(writer, said.readline().encode())
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader) as answers:
+        lines = answers.read().splitlines()
+    os.waitpid(child, 0)
+    assert len(lines) == len(requests), (requests, lines)
+    return [json.loads(line) for line in lines]
+
+
+def levels_and_their_log(bench):
+    """Somebody in no group looks and holds, an operator operates, and every one of them is in the log."""
+    log, look = bench.folder / "operators", bench.folder / "look.sock"
+    operators, mechanics = (grp.getgrnam(name).gr_gid for name in ("games", "users"))
+    control = f"[control]\nlook_socket = {look}\noperate_group = games\nservice_group = users\noperator_log = {log}\n"
+    bench.config.write_text(bench.config.read_text(encoding="utf-8").replace("[control]\n", control), encoding="utf-8")
+    daemon = bench.start()
+    os.chmod(bench.folder, 0o755)
+    os.chmod(bench.socket, 0o666)
+    bench.wait_state("ENGAGED")
+    for path in (bench.socket, look):
+        status, park, hold = ask_as(path, [], "status", "park", "hold")
+        assert status["ok"] and not park["ok"] and "it takes the level operate (members of group games)" in park["error"] and hold["ok"], (park, hold)
+    if os.geteuid() == 0:
+        resume, reset, down, up = ask_as(bench.socket, [operators], "resume", "reset", "intensity 40", "intensity 50")
+        assert resume["ok"] and not reset["ok"] and "level service (members of group users)" in reset["error"] and down["ok"] and not up["ok"], (resume, reset, down, up)
+        named, up, reset = ask_as(bench.socket, [mechanics], "by anna", "intensity 50", "reset")
+        assert named["ok"] and up["ok"] and not reset["ok"] and "there is nothing to reset" in reset["error"], (named, up, reset)
+        assert not ask_as(look, [mechanics], "resume")[0]["ok"], "not by that socket"
+    assert bench.stop(daemon) == 0
+    entries = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]
+    park, hold = entries[0], entries[1]
+    assert park["request"] == "park" and not park["ok"] and park["before"] == park["after"] == "ENGAGED", park
+    assert hold["request"] == "hold" and hold["ok"] and (hold["before"], hold["after"]) == ("ENGAGED", "HOLD") and hold["pid"] > 1, hold
+    assert hold["uid"] == (NOBODY if os.geteuid() == 0 else os.getuid()), hold
+    if os.geteuid() == 0:
+        assert [entry["request"] for entry in entries if entry["by"] == "anna"] == ["intensity 50", "reset"], entries
+        assert entries[-1]["request"] == "SIGTERM" and entries[-1]["pid"] == os.getpid() and entries[-1]["uid"] == 0, entries[-1]
+    assert all(re.fullmatch(r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", entry["time"]) for entry in entries), entries
+
+
+def what_is_wrong_with_levels_and_log(bench):
+    text = bench.config.read_text(encoding="utf-8")
+    for line, code, said in (("operate_group = no-such-group", 69, "[control] operate_group: there is no group no-such-group on this machine"),
+                             ("operator_log = /dev/null", 73, "operator log /dev/null: not a file"),
+                             (f"operator_log = {bench.folder}/no/log", 73, "No such file or directory")):
+        bench.config.write_text(text.replace("[control]\n", f"[control]\n{line}\n"), encoding="utf-8")
+        run = bench.heaved("--config", bench.config)
+        assert run.returncode == code and said in run.stderr, (line, run)
+
+
 def nobody_reads_standard_error(bench):
     """Log lines into a full pipe must not keep the daemon from ending."""
     daemon = bench.spawn(stderr=subprocess.PIPE)
@@ -724,6 +795,8 @@ CASES = {
     "files that cannot be created": files_that_cannot_be_created,
     "a full disk is told at the end": full_disk,
     "senders that are not allowed are refused and counted": strangers_are_refused,
+    "levels by group and by socket, hold for all, and a log of who did what": levels_and_their_log,
+    "a group or an operator log that cannot be is refused at the start": what_is_wrong_with_levels_and_log,
     "nobody reads standard error": nobody_reads_standard_error,
     "odd requests": odd_requests,
     "eight clients that ask nothing do not keep an operator out": idle_clients_keep_nobody_out,

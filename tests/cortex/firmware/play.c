@@ -139,8 +139,8 @@ static void open_all(const table_t *table)
     sim_inputs_init(&sim_inputs, INPUT_ESTOP);
     sim_log_init(&sim_log);
     require(sim_drives_init(&sim_drives, (uint8_t)table->axes, table->axis, NULL, 0) == HV_OK, "the drives are refused");
-    const gateway_io_t io = {player_udp(&player), sim_drives_hal(&sim_drives), sim_relays_hal(&sim_relays),
-                             sim_inputs_hal(&sim_inputs), sim_log_hal(&sim_log), {NULL, NULL}};
+    const gateway_io_t io = {player_udp(&player),         sim_drives_hal(&sim_drives), sim_relays_hal(&sim_relays),
+                             sim_inputs_hal(&sim_inputs), sim_log_hal(&sim_log),       {NULL, NULL}};
     player.line = line;
     player.lines = table->lines;
     player.drives = &sim_drives;
