@@ -292,6 +292,7 @@ const char *blackbox_open(blackbox_t *self, const char *config_path, const confi
     self->file.fd = -1;
     self->config_path = config_path;
     self->settings = &config->settings;
+    memcpy(self->config_hash, config->hash, sizeof self->config_hash);
     self->folders_max = config->black_box.incidents;
     (void)pthread_mutex_init(&self->mutex, NULL);
     if (length == 0) {

@@ -77,7 +77,8 @@ typedef struct {
     size_t memory_bytes;
     const char *config_path;
     const settings_t *settings;
-    char *platform; /**< the configuration as text */
+    char config_hash[CONFIG_HASH_MAX]; /**< as at the start */
+    char *platform;                    /**< the configuration as text */
     size_t platform_length;
     char directory[CONFIG_PATH_MAX];
     uint32_t number;                                       /**< of the next incident */

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "decimal.h"
+#include "build_id.h"
 #include "heave/text.h"
 #include "say.h"
 
@@ -194,7 +195,8 @@ static void write_head(blackbox_t *self, const blackbox_row_t *cause, const char
     };
     char text[640];
     const bool is_fault = cause != NULL && cause->fault != FAULT_NONE;
-    (void)snprintf(text, sizeof text, "; heaved %s, configuration %.300s, %s\n; %s", HEAVE_VERSION, self->config_path, name,
+    (void)snprintf(text, sizeof text, "; heaved %s, build %s, configuration %.300s, %s, %s\n; %s", HEAVE_VERSION, build_id(),
+                   self->config_path, self->config_hash, name,
                    cause == NULL ? "asked for by an operator"
                    : is_fault    ? fault_text((fault_code_t)cause->fault)
                                  : "e-stop");

@@ -286,11 +286,15 @@ typedef struct {
     uint32_t incidents;              /**< most folders kept in the directory */
 } config_black_box_t;
 
+#define CONFIG_HASH_MAX 17u /**< digits of what a configuration is recognised by, with its NUL */
+
 /** A whole configuration: the core's settings, and what only the hosted program needs. Plain data. */
 typedef struct {
     settings_t settings;
     config_udp_t udp;
-    uint32_t late_hold_cycles; /**< of the program: see motion_loop.h */
+    uint32_t late_hold_cycles;  /**< of the program: see motion_loop.h */
+    config_label_t approved;    /**< hash of the one that was approved, "" = any */
+    char hash[CONFIG_HASH_MAX]; /**< of this one; follows from the rest (config_hash.h) */
     char control_socket[CONFIG_PATH_MAX];
     char metrics_file[CONFIG_PATH_MAX]; /**< "none" = none */
     char look_socket[CONFIG_PATH_MAX];  /**< likewise */

@@ -103,6 +103,9 @@ const config_key_t config_keys[] = {
      .words = "manual|auto",
      .help = "who brings the platform up: an operator's request, or heaved by itself once after each start, also where a service manager "
              "starts it again after a crash"},
+    {KEY("platform", "approved"), AT(approved), .type = CONFIG_LABEL, .unit = "", .fallback = "none", .is_live = true,
+     .help = "hash of the approved configuration, as --check shows it: any other moves nothing before `heavectl acknowledge`; not "
+             "with engage = auto"},
 
     JOINT("1", 0, CONFIG_NEEDS_NOTHING),
     JOINT("2", 1, CONFIG_NEEDS_NOTHING),

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "config_bus.h"
+#include "config_hash.h"
 #include "config_modbus.h"
 #include "config_keys.h"
 #include "config_text.h"
@@ -99,6 +100,8 @@ static void write_head(const report_t *self, size_t ram_bytes)
 {
     fprintf(self->out, "%-24s  %s, %u cylinders%s\n", "platform", config_kind_name(self->settings->geometry.kind),
             self->envelope.cylinders, self->settings->has_angle ? ", rotation motor" : "");
+    fprintf(self->out, "%-24s  %s%s%s\n", "configuration", self->config->hash,
+            self->config->approved.text[0] == '\0' ? "" : ", [platform] approved = ", self->config->approved.text);
     fprintf(self->out, "%-24s  %u us\n", "cycle", (unsigned)self->settings->cycle_us);
     fprintf(self->out, "%-24s  %zu bytes\n", "memory of the gateway", ram_bytes);
     write_bus(self);
@@ -395,6 +398,9 @@ static void write_warnings(report_t *self)
     warn_cylinders(self);
     warn_network(self);
     warn_bus(self);
+    if (config_is_unapproved(self->config)) {
+        warn(self, "[platform] approved: another configuration was approved; nothing moves until `heavectl acknowledge`");
+    }
 }
 
 int config_check_report(const config_t *config, size_t ram_bytes, FILE *out)

@@ -20,6 +20,10 @@
 #define RESET_US        2500000u  /* a reset takes effect when the drives say so */
 #define WAITING_POLL_MS 1
 
+static const char k_unapproved[] =
+    "the configuration %s is not the one that was approved (%s): `heavectl acknowledge` lets it move until "
+    "heaved ends, [platform] approved for good";
+static const char k_acknowledge[] = "acknowledge";
 static const char k_dump_later[] = "dump: the disk has not taken it yet; heaved goes on trying";
 
 /* --- Answers --- */
@@ -224,7 +228,20 @@ static bool is_look(const char *line)
 static bool is_known(const char *line)
 {
     return operator_request_find(line) != EVENTS || strncmp(line, k_intensity, strlen(k_intensity)) == 0 ||
-           strcmp(line, "dump") == 0;
+           strcmp(line, "dump") == 0 || strcmp(line, k_acknowledge) == 0;
+}
+
+/* Somebody has seen that this is not the configuration that was approved, and wants it. */
+static void acknowledge(control_t *self, control_client_t *client)
+{
+    if (__atomic_exchange_n(&self->loop->is_unapproved, 0, __ATOMIC_ACQ_REL) == 0) {
+        answer_error(client, "acknowledge: there is nothing to acknowledge", state_name(snapshot_of(self)->state));
+        return;
+    }
+    (void)say(0, "configuration %s: acknowledged by user %u, process %d", self->config->hash, (unsigned)client->peer.uid,
+              (int)client->peer.pid);
+    client->request = EVENT_TICK; /* none that the motion thread has to answer */
+    answer_done(client, snapshot_of(self));
 }
 
 /* Whom it asks for, in its own words: a panel has people behind it that the kernel does not know. */
@@ -286,6 +303,8 @@ static void take_request(control_t *self, control_client_t *client, const char *
         begin_intensity(self, client, &line[strlen(k_intensity)], now_us);
     } else if (strcmp(line, "dump") == 0) {
         begin_dump(self, client, now_us);
+    } else if (strcmp(line, k_acknowledge) == 0) {
+        acknowledge(self, client);
     } else if (strcmp(line, "status") == 0) {
         answer_status(self, client);
     } else if (strncmp(line, k_by, strlen(k_by)) == 0) {
@@ -297,7 +316,7 @@ static void take_request(control_t *self, control_client_t *client, const char *
     } else {
         answer_error(client,
                      "unknown request; status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, "
-                     "shutdown, dump and by NAME are allowed",
+                     "shutdown, dump, acknowledge and by NAME are allowed",
                      NULL);
     }
 }
@@ -360,9 +379,14 @@ static void receive(control_t *self, control_client_t *client, uint64_t now_us)
 /* A reset has an effect once the platform has left FAULT or ESTOP; everything else has its answer after one cycle. */
 static void take_result(const control_t *self, control_client_t *client, const motion_result_t *result)
 {
+    char error[256];
     if (result->is_key_off) {
         client->request_id = 0;
         answer_error(client, "the enable key is off: turn it on first", state_name(result->snapshot.state));
+    } else if (result->is_unapproved) {
+        client->request_id = 0;
+        (void)snprintf(error, sizeof error, k_unapproved, self->config->hash, self->config->approved.text);
+        answer_error(client, error, state_name(result->snapshot.state));
     } else if (result->status != HV_OK) {
         client->request_id = 0;
         refuse(self, client, &result->snapshot, result->is_shutting_down);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
- * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump, by NAME. The service thread
- * owns it; nothing blocks, nothing allocates after the open, and a client that does not read is dropped. Nobody keeps an operator
- * out: where all places are taken, a newcomer gets that of the client that matters least, which is told so.
+ * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump, acknowledge, by NAME. The
+ * service thread owns it; nothing blocks, nothing allocates after the open, and a client that does not read is dropped. Nobody
+ * keeps an operator out: where all places are taken, a newcomer gets that of the client that matters least, which is told so.
  */
 #ifndef HEAVE_APP_CONTROL_H
 #define HEAVE_APP_CONTROL_H

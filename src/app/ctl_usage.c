@@ -10,7 +10,7 @@
 static const usage_row_t k_forms[] = {
     {.argument = "status"},
     {.argument = "[--for SECONDS] [--hz N] watch"},
-    {.argument = "engage | hold | resume | park | reset | shutdown | dump"},
+    {.argument = "engage | hold | resume | park | reset | shutdown | dump | acknowledge"},
     {.argument = "intensity PERCENT"},
     {0},
 };
@@ -25,6 +25,7 @@ static const usage_row_t k_commands[] = {
     {.name = "reset", .help = "leave FAULT or ESTOP, once the cause is gone"},
     {.name = "shutdown", .help = "settle, drives off, end heaved"},
     {.name = "dump", .help = "write the last minutes down now, as after a fault; says where"},
+    {.name = "acknowledge", .help = "let a configuration move that is not the approved one, until heaved ends"},
     {.name = "intensity",
      .argument = "PERCENT",
      .help = "how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so"},

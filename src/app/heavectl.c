@@ -451,7 +451,8 @@ static const char *take_options(ctl_t *self, int argc, char **argv)
 static const char *take_command(ctl_t *self, int argc, char **argv)
 {
     if (optind == argc) {
-        return "a command is needed: status, watch, engage, hold, resume, park, reset, shutdown, dump or intensity PERCENT";
+        return "a command is needed: status, watch, engage, hold, resume, park, reset, shutdown, dump, acknowledge or intensity "
+               "PERCENT";
     }
     const bool is_intensity = strcmp(argv[optind], "intensity") == 0;
     if (optind + (is_intensity ? 2 : 1) != argc) {
@@ -465,7 +466,8 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
             return NULL;
         }
     }
-    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump and intensity are allowed";
+    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, acknowledge and intensity are "
+           "allowed";
 }
 
 /* Whom to ask: what the command line names, then the environment, then what is there. */

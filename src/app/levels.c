@@ -82,7 +82,7 @@ level_t levels_needed(const char *request, unsigned percent)
         const bool is_down = operator_read_percent(&request[sizeof k_intensity - 1], &wanted) && wanted <= percent;
         return is_down ? LEVEL_OPERATE : LEVEL_SERVICE;
     }
-    if (strcmp(request, "dump") == 0) {
+    if (strcmp(request, "dump") == 0 || strcmp(request, "acknowledge") == 0) {
         return LEVEL_SERVICE;
     }
     const event_t event = operator_request_find(request);

@@ -16,7 +16,7 @@
 typedef enum {
     LEVEL_LOOK,    /**< status, watch; and hold, which is never refused to anybody */
     LEVEL_OPERATE, /**< engage, resume, park, intensity down */
-    LEVEL_SERVICE  /**< reset, intensity up, dump, shutdown */
+    LEVEL_SERVICE  /**< reset, intensity up, dump, shutdown, acknowledge */
 } level_t;
 
 /** Who has them; private. */

@@ -15,6 +15,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "build_id.h"
+#include "config_hash.h"
 #include "control.h"
 #include "flood.h"
 #include "linux_clock.h"
@@ -95,6 +97,7 @@ static void write_files(live_t *self)
     out_file_flush(&self->trace);
     self->control.lost.record_lines = ring_dropped(&self->loop.record);
     self->control.lost.trace_rows = ring_dropped(&self->loop.trace);
+    self->control.lost.is_unapproved = __atomic_load_n(&self->loop.is_unapproved, __ATOMIC_ACQUIRE) != 0;
     self->control.lost.operator_entries = operator_log_lost(&self->operators);
     self->control.lost.log_lines = hal_log_dropped(linux_log_hal(&self->log));
 }
@@ -113,10 +116,10 @@ static void write_record_head(live_t *self, const char *config_path)
     struct tm date;
     (void)gmtime_r(&now, &date);
     const int length = snprintf(line, sizeof line,
-                                "; heaved %s, configuration %.300s, %04d-%02d-%02d %02d:%02d:%02d UTC\n"
+                                "; heaved %s, build %s, configuration %.300s, %s, %04d-%02d-%02d %02d:%02d:%02d UTC\n"
                                 "; before time zero: comments, in ms since the start\n",
-                                HEAVE_VERSION, config_path, date.tm_year + 1900, date.tm_mon + 1, date.tm_mday, date.tm_hour,
-                                date.tm_min, date.tm_sec);
+                                HEAVE_VERSION, build_id(), config_path, self->config.hash, date.tm_year + 1900, date.tm_mon + 1,
+                                date.tm_mday, date.tm_hour, date.tm_min, date.tm_sec);
     out_file_write(&self->record, line, (size_t)length);
 }
 
@@ -224,7 +227,10 @@ static void reload(live_t *self)
     } else if (!motion_loop_reload(&self->loop, &self->config)) {
         (void)say(0, "too many reloads at once: send SIGHUP again");
     } else {
-        (void)say(0, "%s has been read again", self->options->config);
+        (void)say(0, "%s has been read again: configuration %s", self->options->config, self->config.hash);
+        if (!config_is_unapproved(&self->config)) {
+            __atomic_store_n(&self->loop.is_unapproved, 0, __ATOMIC_RELEASE);
+        }
         if (self->flood.is_on) {
             set_filter(self);
         }
@@ -341,6 +347,12 @@ static bool serve(live_t *self)
 
 static void say_ready(const live_t *self, const config_t *config)
 {
+    const bool is_barred = __atomic_load_n(&self->loop.is_unapproved, __ATOMIC_ACQUIRE) != 0;
+    (void)say(0, "build %s, configuration %s", build_id(), config->hash);
+    if (is_barred) {
+        (void)say(0, "configuration %s was approved, this is another one: nothing moves until `heavectl acknowledge`",
+                  config->approved.text);
+    }
     (void)say(0, "version %s, %u cylinders, cycle %" PRIu32 " us, UDP %s port %u, control socket %s", HEAVE_VERSION,
               config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u, config->settings.cycle_us, config->udp.bind,
               (unsigned)self->udp.port, self->control.socket[0].path);
@@ -459,7 +471,8 @@ static int open_all(live_t *self, const config_t *config)
     const char *path =
         self->options->socket != NULL ? self->options->socket : socket_path_of_daemon(in_directory, config->control_socket);
     int code = open_udp(self, config);
-    code = code == EXIT_DONE ? control_open(&self->control, path, config, &self->loop, &self->blackbox, &self->operators) : code;
+    code = code == EXIT_DONE ? control_open(&self->control, path, &self->config, &self->loop, &self->blackbox, &self->operators)
+                             : code;
     code = code == EXIT_DONE ? open_files(self) : code;
     code = code == EXIT_DONE ? operator_log_open(&self->operators, config) : code;
     if (code != EXIT_DONE) {
@@ -474,6 +487,7 @@ static int open_all(live_t *self, const config_t *config)
     if (!open_signals(self)) {
         return say(EXIT_UNAVAILABLE, "signals: %s", strerror(errno));
     }
+    self->loop.is_unapproved = config_is_unapproved(config);
     const hv_status_t status =
         motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->log), linux_clock_hal());
     if (rig_trouble(&self->loop.rig)[0] != '\0') {

@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "build_id.h"
 #include "decimal.h"
 #include "say.h"
 
@@ -217,8 +218,8 @@ static void put_program(sheet_t *self, const motion_view_t *view, const config_t
 {
     const snapshot_t *s = &view->snapshot;
     char text[NUMBER_MAX];
-    head(self, "build_info", "gauge", "the version of heaved");
-    put(self, "heave_build_info{version=\"%s\"} 1\n", HEAVE_VERSION);
+    head(self, "build_info", "gauge", "the version of heaved, its build and the configuration it runs");
+    put(self, "heave_build_info{version=\"%s\",build=\"%s\",configuration=\"%s\"} 1\n", HEAVE_VERSION, build_id(), config->hash);
     head(self, "uptime_seconds", "gauge", "since the start");
     put(self, "heave_uptime_seconds %s\n", seconds_text((s->cycle + s->counters.late_cycles) * config->settings.cycle_us, text));
     whole(self, "cycles_total", "counter", "motion cycles", s->cycle);

@@ -107,10 +107,13 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
 {
     unsigned count = 0;
     motion_request_t request;
+    const bool is_unapproved = __atomic_load_n(&self->is_unapproved, __ATOMIC_ACQUIRE) != 0;
     while (count < REQUESTS_PER_CYCLE && ring_pop(&self->requests, &request, sizeof request) > 0) {
         result[count].id = request.id;
         result[count].is_key_off = switches_is_key_off(&self->switches) && is_for_the_key(self, request.event);
-        result[count].status = result[count].is_key_off ? HV_ERR_STATE : carry_out(self, &request);
+        result[count].is_unapproved = is_unapproved && is_for_the_key(self, request.event);
+        const bool is_barred = result[count].is_key_off || result[count].is_unapproved;
+        result[count].status = is_barred ? HV_ERR_STATE : carry_out(self, &request);
         count++;
     }
     return count;

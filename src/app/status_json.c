@@ -3,6 +3,7 @@
  */
 #include "status_json.h"
 
+#include "build_id.h"
 #include "decimal.h"
 #include "heave/motion.h" // MOTION_CLAMPED and its kin
 
@@ -345,6 +346,12 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
     json_number(json, "operator_entries", lost->operator_entries);
     json_close(json, '}');
     json_text(json, "version", HEAVE_VERSION);
+    json_text(json, "build", build_id());
+    json_open(json, "configuration", '{');
+    json_text(json, "hash", config->hash);
+    json_text(json, "approved", config->approved.text);
+    json_bool(json, "barred", lost->is_unapproved);
+    json_close(json, '}');
 }
 
 void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,

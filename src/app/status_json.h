@@ -13,6 +13,7 @@ typedef struct {
     uint32_t record_lines;     /**< likewise */
     uint32_t log_lines;        /**< likewise */
     uint32_t operator_entries; /**< that the operator log has not taken */
+    bool is_unapproved;        /**< nothing moves until somebody has acknowledged the configuration */
     bool is_flood;             /**< the kernel drops what cannot be a frame */
 } status_lost_t;
 

@@ -605,6 +605,47 @@ def what_is_wrong_with_levels_and_log(bench):
         assert run.returncode == code and said in run.stderr, (line, run)
 
 
+def moves_what_was_approved(bench):
+    """Another configuration than the approved one moves once somebody has said that it shall; the identity is wherever somebody looks later."""
+    config = bench.write_config("manual.ini", **MANUAL)
+    text = config.read_text(encoding="utf-8")
+    identity = re.search(r"(?m)^configuration +([0-9a-f]{16})$", bench.heaved("--config", config, "--check").stdout)[1]
+    config.write_text(text.replace("[platform]\n", "[platform]\napproved = 0123456789abcdef\n", 1), encoding="utf-8")
+    assert "warning: [platform] approved: another" in bench.heaved("--config", config, "--check").stdout
+    record = bench.folder / "record.txt"
+    daemon = bench.start("--record", record, config=config)
+    for request in ("engage", "park"):
+        answer, code = bench.ask(request)
+        assert code == 1 and answer["state"] == "OFF" and f"the configuration {identity} is not the one that was approved (0123456789abcdef)" in answer["error"], answer
+    status = bench.status()
+    assert status["configuration"] == {"hash": identity, "approved": "0123456789abcdef", "barred": True}, status["configuration"]
+    assert bench.ask("acknowledge") == ({"ok": True, "state": "OFF"}, 0)
+    answer, code = bench.ask("acknowledge")
+    assert code == 1 and "there is nothing to acknowledge" in answer["error"], answer
+    assert bench.ask("engage")[1] == 0 and bench.status()["configuration"]["barred"] is False
+    bench.wait_state("ENGAGED")
+    assert bench.stop(daemon) == 0
+    said = daemon.log.read_text(encoding="utf-8")
+    build = re.search(rf"build ([0-9a-f]{{40}}), configuration {identity}\n", said)[1]
+    assert "nothing moves until" in said and f"configuration {identity}: acknowledged by user {os.getuid()}, process" in said, said
+    assert status["build"] == build and build.encode("ascii") == build_id_of(bench.bin / "heaved"), status["build"]
+    assert f"build {build}, configuration {config}, {identity}, " in record.read_text(encoding="utf-8").splitlines()[0]
+    config.write_text(text.replace("[platform]\n", f"[platform]\napproved = {identity}\n", 1), encoding="utf-8")
+    daemon = bench.start(config=config)
+    assert bench.ask("engage")[1] == 0, "the approved one asks nobody"
+    config.write_text(config.read_text(encoding="utf-8").replace("silence_hold_ms", "silence_hold_ms = 777 ;", 1), encoding="utf-8")
+    daemon.send_signal(signal.SIGHUP)
+    heave.wait_for(lambda: f"[platform] approved: {identity} is not this configuration" in daemon.log.read_text(encoding="utf-8"), "refused")
+    assert bench.status()["configuration"]["hash"] == identity
+    assert bench.stop(daemon) == 0
+
+
+def build_id_of(program):
+    """As another program reads it."""
+    notes = subprocess.run(["readelf", "-n", program], stdout=subprocess.PIPE, check=True).stdout
+    return re.search(rb"Build ID: ([0-9a-f]+)", notes)[1]
+
+
 def nobody_reads_standard_error(bench):
     """Log lines into a full pipe must not keep the daemon from ending."""
     daemon = bench.spawn(stderr=subprocess.PIPE)
@@ -797,6 +838,7 @@ CASES = {
     "senders that are not allowed are refused and counted": strangers_are_refused,
     "levels by group and by socket, hold for all, and a log of who did what": levels_and_their_log,
     "a group or an operator log that cannot be is refused at the start": what_is_wrong_with_levels_and_log,
+    "a configuration that was not approved moves nothing until somebody has said so, and all say which one it is": moves_what_was_approved,
     "nobody reads standard error": nobody_reads_standard_error,
     "odd requests": odd_requests,
     "eight clients that ask nothing do not keep an operator out": idle_clients_keep_nobody_out,

@@ -6,6 +6,7 @@
 #define _POSIX_C_SOURCE 200809L
 
 #include "config.h"
+#include "config_hash.h"
 #include "config_keys.h"
 #include "config_text.h"
 #include "config_value.h"
@@ -199,6 +200,18 @@ static void set_key(const char *section, const char *key, const char *value)
 {
     const unsigned at = find_key(section, key);
     snprintf(m_line[at], sizeof m_line[0], "%s = %s", key, value);
+}
+
+/* Errors go where those of load_lines() do. */
+static int reload(config_t *running)
+{
+    FILE *file = tmpfile();
+    TEST_ASSERT_NOT_NULL(file);
+    const int errors = config_reload(FILE_NAME, running, file);
+    rewind(file);
+    m_errors[fread(m_errors, 1, sizeof m_errors - 1, file)] = '\0';
+    fclose(file);
+    return errors;
 }
 
 /* "test_config.tmp.ini:12: [roll] min_deg: " */
@@ -1103,6 +1116,88 @@ static void test_dump_of_unusual_values_loads_to_the_same(void)
     expect_round_trip("unusual values");
 }
 
+/* ---- What a configuration is recognised by ---- */
+
+static void test_hash_is_of_the_values_and_of_nothing_else(void)
+{
+    char first[CONFIG_HASH_MAX];
+    take_good_file();
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    memcpy(first, m_config.hash, sizeof first);
+    TEST_ASSERT_EQUAL_UINT(CONFIG_HASH_MAX - 1u, strspn(first, "0123456789abcdef"));
+    load_platform("demo-hexapod.ini"); /* the same with comments, without what is a default */
+    TEST_ASSERT_EQUAL_STRING(first, m_config.hash);
+    take_good_file();
+    set_key("platform", "cycle_us", "1000 ; the same");
+    set_key("platform", "engage", "manual");
+    set_key("platform", "approved", "0123456789abcdef");
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    TEST_ASSERT_NOT_EQUAL(0, strcmp(first, m_config.hash)); /* engage */
+    TEST_ASSERT_TRUE(config_is_unapproved(&m_config));
+    memcpy(first, m_config.hash, sizeof first);
+    memcpy(m_config.approved.text, first, sizeof first);
+    config_hash(&m_config);
+    TEST_ASSERT_EQUAL_STRING(first, m_config.hash); /* what was approved is no part of it */
+    TEST_ASSERT_FALSE(config_is_unapproved(&m_config));
+}
+
+static void test_hash_changes_with_every_number(void)
+{
+    unsigned numbers = 0;
+    load_platform("demo-hexapod.ini");
+    const config_t good = m_config;
+    for (size_t i = 0; i < config_key_count; i++) {
+        const config_key_t *key = &config_keys[i];
+        const bool is_number = key->type == CONFIG_DECIMAL || key->type == CONFIG_INTEGER || key->type == CONFIG_MASK;
+        if (is_number && config_is_applicable(key->needs, &good)) {
+            m_config = good;
+            ((uint8_t *)&m_config)[key->offset] ^= 1;
+            config_hash(&m_config);
+            TEST_ASSERT_NOT_EQUAL_MESSAGE(0, strcmp(good.hash, m_config.hash), key->name);
+            numbers++;
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(100, numbers);
+}
+
+static void test_load_approved_has_to_be_a_hash_and_somebody_to_wait_for(void)
+{
+    take_good_file();
+    set_key("platform", "approved", "0123456789ABCDEF");
+    TEST_ASSERT_EQUAL_INT(1, load_lines());
+    expect_contains("[platform] approved: 0123456789ABCDEF is no hash; allowed: none, or the 16 digits that --check shows\n");
+    take_good_file();
+    set_key("platform", "approved", "0123456789abcdef");
+    TEST_ASSERT_EQUAL_INT(1, load_lines());
+    expect_contains("[platform] approved: engage = auto waits for nobody to look at it; allowed: none, or engage = manual\n");
+}
+
+static void test_reload_of_another_configuration_than_the_approved_one_is_refused(void)
+{
+    char line[128];
+    take_good_file();
+    set_key("platform", "engage", "manual");
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    snprintf(line, sizeof line, "%s", m_config.hash);
+    set_key("platform", "approved", line);
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    config_t running = m_config;
+    TEST_ASSERT_EQUAL_INT(0, config_reload(FILE_NAME, &running, stderr));
+    set_key("udp", "silence_hold_ms", "777");
+    TEST_ASSERT_EQUAL_INT(0, load_lines()); /* it may be loaded, to be looked at */
+    TEST_ASSERT_EQUAL_INT(1, reload(&running));
+    snprintf(line, sizeof line, " is not this configuration; allowed: %s, once somebody has approved it\n", m_config.hash);
+    expect_contains(line);
+    TEST_ASSERT_TRUE(running.settings.silence_hold_ms != 777);
+    snprintf(line, sizeof line, "%s", m_config.hash);
+    set_key("platform", "approved", line);
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    TEST_ASSERT_EQUAL_INT(0, reload(&running));
+    TEST_ASSERT_EQUAL_UINT32(777, running.settings.silence_hold_ms);
+    TEST_ASSERT_EQUAL_STRING(m_config.hash, running.hash);
+    TEST_ASSERT_FALSE(config_is_unapproved(&running));
+}
+
 static void test_dump_names_every_key_with_unit_range_and_help(void)
 {
     static char text[TEXT_MAX];
@@ -1460,6 +1555,10 @@ int main(void)
     RUN_TEST(test_dump_of_every_platform_loads_to_the_same);
     RUN_TEST(test_dump_of_unusual_values_loads_to_the_same);
     RUN_TEST(test_dump_names_every_key_with_unit_range_and_help);
+    RUN_TEST(test_hash_is_of_the_values_and_of_nothing_else);
+    RUN_TEST(test_hash_changes_with_every_number);
+    RUN_TEST(test_load_approved_has_to_be_a_hash_and_somebody_to_wait_for);
+    RUN_TEST(test_reload_of_another_configuration_than_the_approved_one_is_refused);
     RUN_TEST(test_write_reference_has_a_row_for_every_key);
     RUN_TEST(test_load_random_bytes_only_give_errors);
     RUN_TEST(test_load_good_files_with_random_damage_give_errors_or_load);
