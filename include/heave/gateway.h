@@ -85,6 +85,7 @@ typedef struct {
     uint16_t relay_safe_mask;
     uint32_t relay_safe_after_ms;
     healthy_settings_t healthy;
+    uint32_t power_settle_ms;
 } gateway_settings_t;
 
 /** A gateway; members are private to src/gateway. */
@@ -103,6 +104,9 @@ typedef struct {
     uint64_t bring_up_deadline_us;
     bool is_bus_lost;        /**< so that it is counted once */
     bool is_bus_failing;     /**< the same */
+    bool is_estop_apart;     /**< the same */
+    bool is_power_overdue;   /**< the same */
+    uint64_t power_since_us; /**< the supply has been failing since then; 0 = it is not */
     bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
     bool is_disable_due;     /**< disable the drives once at rest */
     auto_engage_t auto_engage;

@@ -88,6 +88,7 @@ typedef struct {
     uint32_t relay_safe_after_ms; /**< of a hold that interrupted a ride; in every other state at once */
 
     healthy_settings_t healthy;
+    uint32_t power_settle_ms; /**< not settled so long after the supply began to fail: a fault; 0 = never */
 } settings_t;
 
 #endif

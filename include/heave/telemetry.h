@@ -56,6 +56,7 @@ typedef struct {
     state_t goal;
     bool is_held_by_silence;
     bool is_estop_active;
+    bool is_power_failing;
     bool is_healthy;                     /**< the healthy pulse runs, or would if there were a line for it */
     fault_t fault;                       /**< the first one since the last reset */
     fault_reaction_t reaction;           /**< the worst of them */

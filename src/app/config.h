@@ -276,6 +276,9 @@ typedef struct {
     config_label_t estop_line;
     config_label_t enable_line;
     config_label_t reset_line;
+    config_label_t estop2_line;
+    config_label_t power_line;
+    uint32_t estop_discrepancy_ms;
     bool is_active_low; /**< a closed contact pulls its line low */
 } config_inputs_t;
 

@@ -84,15 +84,17 @@ static void check_against_relays(config_source_t *self, const char *section, con
 
 /* --- Inputs --- */
 
-#define INPUTS 3u
+#define INPUTS 5u
 
-static const char *const k_input_keys[INPUTS] = {"estop", "enable", "reset"};
+static const char *const k_input_keys[INPUTS] = {"estop", "enable", "reset", "estop2", "power"};
 
 static void list_inputs(const config_inputs_t *inputs, const config_label_t *line[INPUTS])
 {
     line[0] = &inputs->estop_line;
     line[1] = &inputs->enable_line;
     line[2] = &inputs->reset_line;
+    line[3] = &inputs->estop2_line;
+    line[4] = &inputs->power_line;
 }
 
 static void check_inputs_apart(config_source_t *self, const config_label_t *const line[INPUTS])
@@ -125,11 +127,20 @@ static void check_inputs(config_source_t *self)
         check_against_relays(self, "inputs", k_input_keys[i], &inputs->chip, line[i]);
     }
     if (count == 0) {
-        config_source_key_error(self, "inputs", "estop", "driver gpio reads none; allowed: a line for estop, enable or reset");
+        config_source_key_error(self, "inputs", "estop",
+                                "driver gpio reads none; allowed: a line for estop, enable, reset or power");
     }
     if (inputs->enable_line.text[0] != '\0' && self->config->settings.engage == ENGAGE_AUTO) {
         config_source_key_error(self, "inputs", "enable",
                                 "engage = auto does not wait for a key; allowed: none, or engage = manual");
+    }
+    if (inputs->power_line.text[0] != '\0' && self->config->settings.engage == ENGAGE_AUTO) {
+        config_source_key_error(self, "inputs", "power",
+                                "engage = auto does not wait for the supply; allowed: none, or engage = manual");
+    }
+    if (inputs->estop2_line.text[0] != '\0' && inputs->estop_line.text[0] == '\0') {
+        config_source_key_error(self, "inputs", "estop2",
+                                "there is no first channel; allowed: none, or a line for estop as well");
     }
 }
 

@@ -383,6 +383,9 @@ static void take_result(const control_t *self, control_client_t *client, const m
     if (result->is_key_off) {
         client->request_id = 0;
         answer_error(client, "the enable key is off: turn it on first", state_name(result->snapshot.state));
+    } else if (result->is_power_failing) {
+        client->request_id = 0;
+        answer_error(client, "the supply is failing: nothing goes up until it is back", state_name(result->snapshot.state));
     } else if (result->is_unapproved) {
         client->request_id = 0;
         (void)snprintf(error, sizeof error, k_unapproved, self->config->hash, self->config->approved.text);

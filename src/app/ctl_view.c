@@ -159,8 +159,9 @@ static void draw_head(view_t *self, const cJSON *status)
     put_colour(self, state_colour(word(status, "state")));
     put(self, "%-9s", word(status, "state"));
     put_colour(self, PLAIN);
-    put(self, " goal %-9s%s%s%s", word(status, "goal"), cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
+    put(self, " goal %-9s%s%s%s%s", word(status, "goal"), cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
         cJSON_IsTrue(member(status, "estop_active")) ? " E-STOP" : "",
+        cJSON_IsTrue(member(status, "power_failing")) ? " POWER" : "",
         cJSON_IsTrue(member(status, "shutting_down")) ? " SHUTTING DOWN" : "");
     put_piece(self, "  cycle %.0f us  up %.0f s  late %.0f", number(status, "cycle_us"), up_s, number(status, "late_cycles"));
     end_line(self);

@@ -29,8 +29,9 @@ linux_gpio_relays_config_t gpio_setup_healthy(const config_t *config)
 linux_gpio_inputs_config_t gpio_setup_inputs(const config_t *config)
 {
     const config_inputs_t *inputs = &config->inputs;
-    const config_label_t *const line[] = {&inputs->estop_line, &inputs->enable_line, &inputs->reset_line};
-    static const uint32_t k_input[] = {INPUT_ESTOP, INPUT_ENABLE, INPUT_RESET};
+    const config_label_t *const line[] = {&inputs->estop_line, &inputs->enable_line, &inputs->reset_line, &inputs->estop2_line,
+                                          &inputs->power_line};
+    static const uint32_t k_input[] = {INPUT_ESTOP, INPUT_ENABLE, INPUT_RESET, INPUT_ESTOP2, INPUT_POWER};
     linux_gpio_inputs_config_t out = {.names = {.chip = inputs->chip.text}, .is_active_low = inputs->is_active_low};
     for (unsigned i = 0; i < LINUX_GPIO_INPUTS_MAX; i++) {
         if (line[i]->text[0] != '\0') {

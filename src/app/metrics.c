@@ -75,6 +75,7 @@ static void put_state(sheet_t *self, const snapshot_t *s)
     }
     whole(self, "healthy", "gauge", "1 while states, deadlines and drives are as they should be, and have been for a while",
           s->is_healthy);
+    whole(self, "power_failing", "gauge", "1 while the supply is failing", s->is_power_failing);
     whole(self, "estop_active", "gauge", "1 while the e-stop is pressed", s->is_estop_active);
     whole(self, "held_by_silence", "gauge", "1 while it holds because no frames come", s->is_held_by_silence);
     whole(self, "fault_code", "gauge", "the first fault since the last reset, 0 = none", (uint64_t)s->fault.code);

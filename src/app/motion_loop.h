@@ -62,8 +62,9 @@ typedef struct {
     int32_t status; /**< hv_status_t */
     snapshot_t snapshot;
     bool is_shutting_down;
-    bool is_key_off;    /**< refused because of that */
-    bool is_unapproved; /**< likewise */
+    bool is_key_off;       /**< refused because of that */
+    bool is_unapproved;    /**< likewise */
+    bool is_power_failing; /**< likewise */
 } motion_result_t;
 
 /** What a reload hands over. */

@@ -62,7 +62,8 @@ static uint8_t describe(rig_t *self, const config_t *config)
 static uint32_t inputs_present(const config_inputs_t *inputs)
 {
     return (inputs->estop_line.text[0] != '\0' ? INPUT_ESTOP : 0u) | (inputs->enable_line.text[0] != '\0' ? INPUT_ENABLE : 0u) |
-           (inputs->reset_line.text[0] != '\0' ? INPUT_RESET : 0u);
+           (inputs->reset_line.text[0] != '\0' ? INPUT_RESET : 0u) | (inputs->estop2_line.text[0] != '\0' ? INPUT_ESTOP2 : 0u) |
+           (inputs->power_line.text[0] != '\0' ? INPUT_POWER : 0u);
 }
 
 static hv_status_t open_sim(rig_t *self, const config_t *config, uint8_t axes, uint32_t inputs, gateway_io_t *io)

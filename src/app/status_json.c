@@ -96,6 +96,7 @@ static void write_state(json_t *json, const snapshot_t *s, bool is_shutting_down
     json_bool(json, "held_by_silence", s->is_held_by_silence);
     json_bool(json, "healthy", s->is_healthy);
     json_bool(json, "estop_active", s->is_estop_active);
+    json_bool(json, "power_failing", s->is_power_failing);
     json_bool(json, "shutting_down", is_shutting_down);
     write_fault(json, s);
 }

@@ -37,6 +37,7 @@ static void keep_changeable(gateway_settings_t *own, const settings_t *settings)
     own->relay_safe_mask = settings->relay_safe_mask;
     own->relay_safe_after_ms = settings->relay_safe_after_ms;
     own->following_error_mm_q16 = settings->following_error_mm_q16;
+    own->power_settle_ms = settings->power_settle_ms;
     own->confirm_jump_mm_q16 = settings->confirm_jump_mm_q16;
     own->confirm_jump_deg_q16 = settings->confirm_jump_deg_q16;
 }

@@ -244,7 +244,7 @@ static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint3
 {
     snapshot_t *s = &self->snapshot;
     const fault_reaction_t reaction = fault_reaction(code);
-    if (self->supervisor.state == STATE_ESTOP) {
+    if (self->supervisor.state == STATE_ESTOP && code != FAULT_ESTOP_CHANNELS) { /* that one is of the e-stop itself */
         return;
     }
     s->begun[axis] |= 1u << (unsigned)code;
@@ -258,7 +258,7 @@ static void raise_fault(gateway_t *self, fault_code_t code, unsigned axis, uint3
     const bool is_worse = reaction > s->reaction;
     s->reaction = is_worse ? reaction : s->reaction;
     if (supervisor_is_latched(&self->supervisor)) {
-        if (is_worse) {
+        if (is_worse && self->supervisor.state == STATE_FAULT) {
             react(self);
         }
     } else {
@@ -412,15 +412,46 @@ static bool is_move_done(const gateway_t *self)
     return false;
 }
 
+/* The e-stop is active as long as its channels disagree: they are no reason for another state, but one for another look. */
+static void watch_channels(gateway_t *self, bool is_apart, uint64_t now_us)
+{
+    if ((is_apart && !self->is_estop_apart) || is_told(self, FAULT_ESTOP_CHANNELS, 0)) {
+        raise_fault(self, FAULT_ESTOP_CHANNELS, 0, 0, now_us);
+    }
+    self->is_estop_apart = is_apart;
+}
+
+/* Who leads the platform down is the program around; here it is only watched that it gets there while there is power left. */
+static void watch_power(gateway_t *self, bool is_failing, uint64_t now_us)
+{
+    const state_t state = self->supervisor.state;
+    const bool is_down = state == STATE_OFF || state == STATE_SETTLED || supervisor_is_latched(&self->supervisor);
+    self->snapshot.is_power_failing = is_failing;
+    if (!is_failing) {
+        self->power_since_us = 0;
+        self->is_power_overdue = false;
+    } else if (self->power_since_us == 0) {
+        self->power_since_us = now_us;
+    }
+    const bool is_overdue = is_failing && self->settings.power_settle_ms != 0 && !is_down &&
+                            now_us - self->power_since_us >= (uint64_t)self->settings.power_settle_ms * 1000;
+    if ((is_overdue && !self->is_power_overdue) || is_told(self, FAULT_POWER, 0)) {
+        raise_fault(self, FAULT_POWER, 0, 0, now_us);
+    }
+    self->is_power_overdue = is_overdue;
+}
+
 static void read_inputs(gateway_t *self, uint64_t now_us)
 {
     uint32_t levels = 0;
-    const hv_status_t status = hal_inputs_read(self->io.inputs, &levels);
-    self->snapshot.is_estop_active = status != HV_OK || (levels & INPUT_ESTOP) != 0;
+    const bool is_read = hal_inputs_read(self->io.inputs, &levels) == HV_OK;
+    self->snapshot.is_estop_active = !is_read || (levels & INPUT_ESTOP) != 0;
     if (self->snapshot.is_estop_active) {
         give_up_reset(self);
         operate_event(self, EVENT_ESTOP, now_us);
     }
+    watch_channels(self, is_read ? (levels & INPUT_APART) != 0 : self->is_estop_apart, now_us);
+    watch_power(self, is_read ? (levels & INPUT_POWER) != 0 : self->snapshot.is_power_failing, now_us);
 }
 
 /* A reset first asks the drives; it takes effect when none of them is in fault any more. */

@@ -309,6 +309,78 @@ def key(bin_dir):
         assert bench.status()["state"] == "SETTLED"
 
 
+SECOND, SUPPLY = 0, 4
+
+
+def channels(bin_dir):
+    """The reset at the start of DeskBench is refused no more once both channels are closed."""
+    with gpio_sim.Chip("effects", 16, "FX"), Desk() as desk, DeskBench(bin_dir, desk, "estop2 = DESK0\nestop_discrepancy_ms = 1000\n") as bench:
+        record, trace = bench.folder / "record.txt", bench.folder / "live.csv"
+        daemon = heave.Bench.start(bench, "--record", record, "--trace", trace)
+        bench.wait_state("ESTOP")
+        desk.close(SECOND)
+        bench.wait_status(lambda status: status["fault"]["name"] == "estop-channels", "one wire is broken, the other one closed")
+        desk.close(ESTOP)
+        time.sleep(1)
+        assert bench.status()["estop_active"] is True, "a wire that has been mended proves nothing"
+        said = bench.ctl("reset").stderr
+        assert "press it and release it" in said, said
+        for line in (ESTOP, SECOND):
+            desk.open(line)
+        for line in (ESTOP, SECOND):
+            desk.close(line)
+        time.sleep(0.2)
+        assert bench.ctl("reset").returncode == 0
+        for line in (ESTOP, SECOND):
+            bench.wait_state("OFF")
+            engage(bench)
+            desk.open(line)
+            bench.wait_state("ESTOP")
+            assert bench.status()["fault"]["name"] == "none", "not for too long yet"
+            desk.close(line)
+            time.sleep(0.2)
+            assert bench.ctl("reset").returncode == 0
+        bench.wait_state("OFF")
+        engage(bench)
+        desk.open(SECOND)
+        bench.wait_status(lambda status: status["state"] == "ESTOP" and status["fault"]["name"] == "estop-channels", "too long")
+        assert bench.stop(daemon) == 0
+        assert "!fault estop-channels" in record.read_text(encoding="utf-8")
+        live = trace.read_bytes()
+        assert bench.play(record)[:len(live)] == live, "a recording replays channels that disagree"
+
+
+def supply(bin_dir):
+    with gpio_sim.Chip("effects", 16, "FX"), Desk() as desk, DeskBench(bin_dir, desk, "power = DESK4\npower_settle_ms = 4000\n") as bench:
+        record, trace = bench.folder / "record.txt", bench.folder / "live.csv"
+        daemon = bench.start("--record", record, "--trace", trace)
+        assert "the supply is failing" in bench.ctl("engage").stderr, "its wire is broken from the start"
+        desk.close(SUPPLY)
+        bench.wait_status(lambda status: status["power_failing"] is False, "closed")
+        engage(bench)
+        desk.open(SUPPLY)
+        bench.wait_state("SETTLED")
+        for request in ("engage", "resume"):
+            assert "the supply is failing" in bench.ctl(request).stderr, request
+        assert bench.status()["power_failing"] is True
+        time.sleep(5)
+        assert bench.status()["state"] == "SETTLED", "who is down stays down, and is no fault"
+        desk.close(SUPPLY)
+        bench.wait_status(lambda status: status["power_failing"] is False, "back")
+        assert bench.status()["state"] == "SETTLED", "it moves nobody"
+        engage(bench)
+        assert bench.ctl("hold").returncode == 0
+        desk.open(SUPPLY)
+        time.sleep(2)
+        assert bench.status()["state"] == "HOLD", "an operator's hold is not ended"
+        bench.wait_state("FAULT")
+        assert bench.status()["fault"]["name"] == "power-failing"
+        assert bench.stop(daemon) == 0
+        assert "!fault power-failing" in record.read_text(encoding="utf-8")
+        live = trace.read_bytes()
+        assert bench.play(record)[:len(live)] == live, "a recording replays a supply that fails"
+
+
 def inputs_missing(bin_dir):
     with gpio_sim.Chip("effects", 16, "FX"), Desk() as desk:
         with DeskBench(bin_dir, desk) as bench, DeskBench(bin_dir, desk) as other:
@@ -402,6 +474,8 @@ def main():
              ("a line that is not there, a chip that is not there", missing), ("the chip goes while running", unplugged)]
     inputs = [("e-stop: relays safe within two cycles, latched, reset button, replay", estop),
               ("the chip of the inputs goes while running: e-stop", desk_unplugged), ("enable key", key),
+              ("two channels: either stops, one that stays behind is a fault until both have opened", channels),
+              ("supply failing: settles, nothing goes up; a hold stays until the time is over", supply),
               ("an input line that is not there, is in use, or is a relay", inputs_missing)]
     healthy = [("healthy pulse: runs while all is well, low from a fault on and after the end", pulse),
                ("healthy pulse: no edge from a program that hangs or is killed", pulse_hangs),

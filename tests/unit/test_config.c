@@ -914,7 +914,7 @@ static void test_load_gpio_inputs_need_lines_of_their_own_that_a_chip_can_be_fou
         {"none", "17", "none", "none", "auto",
          "[inputs] estop: 17 alone is no line; allowed: the name of a line, or its number with chip\n"},
         {"none", "none", "none", "none", "auto",
-         "[inputs] estop: driver gpio reads none; allowed: a line for estop, enable or reset\n"},
+         "[inputs] estop: driver gpio reads none; allowed: a line for estop, enable, reset or power\n"},
         {"a chip", "17", "none", "017", "auto",
          "[inputs] reset: line 017 is estop already; allowed: a line of its own, or none\n"},
         {"a chip", "17", "none", "09", "auto",
@@ -936,6 +936,35 @@ static void test_load_gpio_inputs_need_lines_of_their_own_that_a_chip_can_be_fou
         set_key("inputs", "estop", k_cases[i].estop);
         set_key("inputs", "enable", k_cases[i].enable);
         set_key("inputs", "reset", k_cases[i].reset);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(k_cases[i].error[0] != '\0', load_lines(), m_errors);
+        expect_contains(k_cases[i].error);
+    }
+}
+
+static void test_load_inputs_of_channels_and_supply_that_contradict_themselves_are_errors(void)
+{
+    static const struct {
+        const char *estop, *estop2, *power, *engage, *error;
+    } k_cases[] = {
+        {"GPIO1", "GPIO2", "GPIO3", "manual", ""},
+        {"none", "none", "GPIO3", "manual", ""},
+        {"GPIO1", "GPIO2", "none", "auto", ""},
+        {"none", "GPIO2", "none", "manual",
+         "[inputs] estop2: there is no first channel; allowed: none, or a line for estop as well\n"},
+        {"GPIO1", "GPIO1", "none", "manual",
+         "[inputs] estop2: line GPIO1 is estop already; allowed: a line of its own, or none\n"},
+        {"GPIO1", "GPIO2", "GPIO2", "manual",
+         "[inputs] power: line GPIO2 is estop2 already; allowed: a line of its own, or none\n"},
+        {"GPIO1", "none", "GPIO3", "auto",
+         "[inputs] power: engage = auto does not wait for the supply; allowed: none, or engage = manual\n"},
+    };
+    for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {
+        take_good_file();
+        set_key("platform", "engage", k_cases[i].engage);
+        set_key("inputs", "driver", "gpio");
+        set_key("inputs", "estop", k_cases[i].estop);
+        set_key("inputs", "estop2", k_cases[i].estop2);
+        set_key("inputs", "power", k_cases[i].power);
         TEST_ASSERT_EQUAL_INT_MESSAGE(k_cases[i].error[0] != '\0', load_lines(), m_errors);
         expect_contains(k_cases[i].error);
     }
@@ -1545,6 +1574,7 @@ int main(void)
     RUN_TEST(test_load_gpio_relays_need_lines_that_a_chip_can_be_found_by);
     RUN_TEST(test_load_healthy_pulse_needs_an_output_of_its_own);
     RUN_TEST(test_load_gpio_inputs_need_lines_of_their_own_that_a_chip_can_be_found_by);
+    RUN_TEST(test_load_inputs_of_channels_and_supply_that_contradict_themselves_are_errors);
     RUN_TEST(test_load_relay_times_that_contradict_each_other_are_errors);
     RUN_TEST(test_load_input_line_used_twice_is_an_error);
     RUN_TEST(test_load_values_arrive_where_they_belong);

@@ -1445,6 +1445,79 @@ static void test_fault_worse_one_later_escalates_and_the_first_is_kept(void)
     TEST_ASSERT_TRUE(seen()->fault_last_us[FAULT_BUS] > seen()->fault.at_us);
 }
 
+/* The e-stop of one channel has stopped all already; that they disagree is told beside it, and holds a reset back. */
+static void test_channels_apart_are_a_fault_in_estop_that_holds_back_a_reset(void)
+{
+    engage();
+    start_moving(200);
+    m_rig.inputs.levels = INPUT_ESTOP;
+    rig_run_ms(&m_rig, 300);
+    TEST_ASSERT_EQUAL(FAULT_NONE, seen()->fault.code);
+    m_rig.inputs.levels = INPUT_ESTOP | INPUT_APART;
+    rig_run_ms(&m_rig, 1);
+    m_is_fault_expected = true;
+    TEST_ASSERT_EQUAL(STATE_ESTOP, seen()->state);
+    TEST_ASSERT_EQUAL(FAULT_ESTOP_CHANNELS, seen()->fault.code);
+    TEST_ASSERT_EQUAL_HEX32(1u << FAULT_ESTOP_CHANNELS, seen()->begun[0]);
+    rig_run_ms(&m_rig, 1000);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->faults);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_RESET));
+    m_rig.inputs.levels = 0;
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(FAULT_ESTOP_CHANNELS, seen()->fault.code); /* latched */
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 100);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    TEST_ASSERT_EQUAL(FAULT_NONE, seen()->fault.code);
+    m_rig.inputs.levels = INPUT_ESTOP | INPUT_APART; /* the next one is another one */
+    rig_run_ms(&m_rig, 2);
+    TEST_ASSERT_EQUAL_UINT32(2, counted()->faults);
+}
+
+static void test_power_that_fails_stops_what_is_not_settled_in_time(void)
+{
+    m_settings.power_settle_ms = 900; /* before the silence of the sender does anything */
+    for (unsigned ms = 1; ms < 400; ms += 57) {
+        engage();
+        start_moving(ms);
+        m_rig.inputs.levels = INPUT_POWER;
+        rig_run_ms(&m_rig, 900);
+        TEST_ASSERT_NOT_EQUAL(STATE_FAULT, seen()->state);
+        TEST_ASSERT_TRUE(seen()->is_power_failing);
+        rig_run_ms(&m_rig, 2);
+        expect_fault(FAULT_POWER, 0, 0);
+        TEST_ASSERT_EQUAL(FAULT_REACT_STOP, seen()->reaction);
+        rig_run_ms(&m_rig, 3000);
+        for (unsigned i = 0; i < 7; i++) {
+            TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[i].state);
+        }
+        TEST_ASSERT_EQUAL_UINT32(1, counted()->fault[FAULT_POWER]);
+    }
+}
+
+static void test_power_that_fails_leaves_who_is_down_in_peace(void)
+{
+    m_settings.power_settle_ms = 100;
+    m_settings.engage = ENGAGE_MANUAL;
+    start(true);
+    rig_run_ms(&m_rig, 10);
+    m_rig.inputs.levels = INPUT_POWER;
+    rig_run_ms(&m_rig, 10000);
+    TEST_ASSERT_EQUAL(STATE_SETTLED, seen()->state);
+    m_rig.inputs.levels = 0;
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_FALSE(seen()->is_power_failing);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+    rig_run_ms(&m_rig, 500);
+    for (unsigned i = 0; i < 5; i++) { /* short failures do not add up */
+        m_rig.inputs.levels = INPUT_POWER;
+        rig_run_ms(&m_rig, 90);
+        m_rig.inputs.levels = 0;
+        rig_run_ms(&m_rig, 1);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, counted()->faults);
+}
+
 /* Every code has its words in both languages, and a reaction. */
 static void test_fault_tables_are_complete(void)
 {
@@ -2061,6 +2134,9 @@ static void run_supervision(void)
     RUN_TEST(test_fault_told_that_is_there_counts_once);
     RUN_TEST(test_fault_told_in_off_is_none);
     RUN_TEST(test_fault_worse_one_later_escalates_and_the_first_is_kept);
+    RUN_TEST(test_channels_apart_are_a_fault_in_estop_that_holds_back_a_reset);
+    RUN_TEST(test_power_that_fails_stops_what_is_not_settled_in_time);
+    RUN_TEST(test_power_that_fails_leaves_who_is_down_in_peace);
     RUN_TEST(test_fault_tables_are_complete);
     RUN_TEST(test_fault_bus_gone_is_a_fault_that_can_be_reset);
     RUN_TEST(test_fault_bus_failing_is_a_controlled_stop);
