@@ -13,6 +13,7 @@
 #include "heave/owner.h"
 #include "heave/plate.h"
 #include "heave/supervisor.h"
+#include "heave/wear.h"
 
 /** A machine fault. */
 typedef struct {
@@ -73,6 +74,8 @@ typedef struct {
     q32_t extension_mm_q32[CYLINDERS_MAX];
     q32_t angle_deg_q32;
     drive_feedback_t drive[DRIVES_MAX];
+    wear_t wear[DRIVES_MAX];           /**< of each drive, since the start */
+    uint32_t rides;                    /**< times that it was engaged from NEUTRAL */
     drive_report_t report[DRIVES_MAX]; /**< the same in words; "" where the driver has none */
     unsigned flags;                    /**< MOTION_CLAMPED ... */
     uint8_t limiting_cylinder;

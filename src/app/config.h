@@ -295,9 +295,10 @@ typedef struct {
 typedef struct {
     settings_t settings;
     config_udp_t udp;
-    uint32_t late_hold_cycles;  /**< of the program: see motion_loop.h */
-    config_label_t approved;    /**< hash of the one that was approved, "" = any */
-    char hash[CONFIG_HASH_MAX]; /**< of this one; follows from the rest (config_hash.h) */
+    uint32_t late_hold_cycles;       /**< of the program: see motion_loop.h */
+    char life_file[CONFIG_PATH_MAX]; /**< "none" = none */
+    config_label_t approved;         /**< hash of the one that was approved, "" = any */
+    char hash[CONFIG_HASH_MAX];      /**< of this one; follows from the rest (config_hash.h) */
     char control_socket[CONFIG_PATH_MAX];
     char metrics_file[CONFIG_PATH_MAX]; /**< "none" = none */
     char look_socket[CONFIG_PATH_MAX];  /**< likewise */

@@ -48,6 +48,7 @@ typedef struct {
     flood_t flood;
     blackbox_t blackbox;
     operator_log_t operators;
+    life_t life;
     motion_view_words_t view; /**< for the manager, the metrics and the watch over floods */
     linux_udp_t udp;
     linux_log_t log;
@@ -293,12 +294,15 @@ static uint64_t now_us(const live_t *self)
     return hal_clock_now_us(self->loop.clock);
 }
 
-/* The log of operators goes on being tried, and heaved goes on. */
+/* Both go on being tried, and heaved goes on. */
 static void tell_log_trouble(live_t *self)
 {
     int error = 0;
     if (operator_log_trouble(&self->operators, &error)) {
         (void)say(0, "operator log %s: %s", self->operators.path, error != 0 ? strerror(error) : "written again");
+    }
+    if (life_trouble(&self->life, &error)) {
+        (void)say(0, "life of the machine %s: %s", self->life.path, error != 0 ? strerror(error) : "written again");
     }
 }
 
@@ -307,6 +311,7 @@ static void tell_others(live_t *self)
 {
     if (seqlock_read(&self->loop.view, self->view.word)) {
         watch_floods(self, now_us(self));
+        life_serve(&self->life, &self->view.view.snapshot, now_us(self));
         manager_serve(&self->manager, &self->view.view.snapshot, now_us(self));
         metrics_serve(&self->metrics, &self->view.view, &self->config, &self->loop.times, now_us(self));
     }
@@ -402,6 +407,9 @@ static int run(live_t *self, const config_t *config)
     if (!operator_log_start(&self->operators)) {
         return say(EXIT_UNAVAILABLE, "cannot start the operator log: %s", strerror(errno));
     }
+    if (!life_start(&self->life)) {
+        return say(EXIT_UNAVAILABLE, "cannot start what keeps the life of the machine: %s", strerror(errno));
+    }
     if (!motion_loop_start(&self->loop)) {
         return say(EXIT_UNAVAILABLE, "cannot start the motion thread: %s", strerror(errno));
     }
@@ -475,6 +483,9 @@ static int open_all(live_t *self, const config_t *config)
                              : code;
     code = code == EXIT_DONE ? open_files(self) : code;
     code = code == EXIT_DONE ? operator_log_open(&self->operators, config) : code;
+    const uint32_t cylinders = config->settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
+    code = code == EXIT_DONE ? life_open(&self->life, config, cylinders + (config->settings.has_angle ? 1u : 0u)) : code;
+    self->control.lost.life = &self->life.now;
     if (code != EXIT_DONE) {
         return code;
     }
@@ -517,7 +528,8 @@ int live_run(const config_t *config, const options_t *options)
     code = code == EXIT_DONE ? run(self, config) : code;
     control_close(&self->control);
     manager_close(&self->manager);
-    const bool has_log_ended = operator_log_close(&self->operators);
+    const bool has_life_ended = life_close(&self->life);
+    const bool has_log_ended = operator_log_close(&self->operators) && has_life_ended;
     if (!self->is_thread_running) { /* a stuck thread may still use all this: the end of the process gives it back */
         const bool has_blackbox_ended = blackbox_close(&self->blackbox);
         const bool has_rig_ended = rig_close(&self->loop.rig, self->config.settings.relay_safe_mask);

@@ -355,6 +355,27 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
     json_close(json, '}');
 }
 
+/* Hours, way and cycles of each axis, with those before this start where they are kept. */
+static void write_life(json_t *json, const life_totals_t *life, const snapshot_t *s)
+{
+    if (life == NULL) {
+        return;
+    }
+    json_open(json, "life", '{');
+    json_number(json, "rides", life->rides);
+    json_number(json, "faults", life->faults);
+    json_open(json, "axes", '[');
+    for (unsigned i = 0; i < life->axes; i++) {
+        json_open(json, NULL, '{');
+        json_number(json, "energized_s", life->axis[i].energized_ms / 1000);
+        json_ms(json, i < s->cylinders ? "travel_mm" : "travel_deg", life->axis[i].travel_milli);
+        json_number(json, "cycles", life->axis[i].turns / 2);
+        json_close(json, '}');
+    }
+    json_close(json, ']');
+    json_close(json, '}');
+}
+
 void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,
                        const motion_times_t *times)
 {
@@ -374,6 +395,7 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     json_bool(json, "flood", lost->is_flood);
     write_counters(json, view);
     write_fault_counts(json, s);
+    write_life(json, lost->life, s);
     write_program(json, view, config, lost, times);
     json_close(json, '}');
 }

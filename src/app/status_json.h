@@ -5,6 +5,7 @@
 #define HEAVE_APP_STATUS_JSON_H
 
 #include "json.h"
+#include "life.h"
 #include "motion_loop.h"
 
 /** What the service thread adds to the motion thread's view. */
@@ -13,6 +14,7 @@ typedef struct {
     uint32_t record_lines;     /**< likewise */
     uint32_t log_lines;        /**< likewise */
     uint32_t operator_entries; /**< that the operator log has not taken */
+    const life_totals_t *life; /**< of the machine; NULL: not known yet */
     bool is_unapproved;        /**< nothing moves until somebody has acknowledged the configuration */
     bool is_flood;             /**< the kernel drops what cannot be a frame */
 } status_lost_t;

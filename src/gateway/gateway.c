@@ -314,6 +314,9 @@ static void publish(gateway_t *self, uint64_t now_us)
     note_singular_stops(self, now_us);
     s->counters.unconfirmed = self->confirm.dropped;
     s->counters.stretched = motion_stretched_count(&self->motion);
+    for (unsigned i = 0; i < drives_count(self->io.drives); i++) {
+        wear_step(&s->wear[i], &s->drive[i], self->settings.cycle_us);
+    }
     plate_take(&s->plate, motion_kin(&self->motion), s->drive, &s->sent, now_us);
     s->cycle++;
 }

@@ -203,6 +203,7 @@ void operate_event(gateway_t *self, event_t event, uint64_t now_us)
     const action_t action = supervisor_event(&self->supervisor, event, &view);
     if (self->supervisor.state != before) {
         self->state_since_us = now_us;
+        self->snapshot.rides += before == STATE_NEUTRAL && self->supervisor.state == STATE_ENGAGED;
         log_change(self, before, event);
     }
     carry_out(self, action, now_us);

@@ -595,6 +595,32 @@ def levels_and_their_log(bench):
     assert all(re.fullmatch(r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", entry["time"]) for entry in entries), entries
 
 
+def keeps_the_life_of_the_machine(bench):
+    """Over an end, a kill in motion, and a file that was lost; shown by the status."""
+    life = bench.folder / "life"
+    bench.config.write_text(bench.config.read_text(encoding="utf-8").replace("[platform]\n", f"[platform]\nlife_file = {life}\n", 1), encoding="utf-8")
+    travel_mm, rides = 0, 0
+    for number in (signal.SIGTERM, signal.SIGKILL, signal.SIGTERM):
+        daemon = bench.start()
+        bench.wait_state("ENGAGED")
+        rides += 1
+        with bench.sender() as sender:
+            sender.stream(1.0, wave)
+        now = bench.status()["life"]
+        assert now["rides"] == rides and len(now["axes"]) == 7 and now["faults"] == 0, now
+        assert all(axis["travel_mm"] > travel_mm + 10 for axis in now["axes"][:6]) and "travel_deg" in now["axes"][6], (travel_mm, now)
+        assert all(axis["cycles"] >= 0 and axis["energized_s"] >= rides for axis in now["axes"]), now
+        travel_mm = now["axes"][0]["travel_mm"] if number == signal.SIGTERM else travel_mm
+        rides -= number == signal.SIGKILL  # what was not written yet is lost: a minute at most
+        assert bench.stop(daemon, number) == (0 if number == signal.SIGTERM else -number)
+        bench.socket.unlink(missing_ok=True)
+        (life if number == signal.SIGKILL else Path(f"{life}.2")).unlink(missing_ok=True)
+    for path in (life, Path(f"{life}.2")):
+        path.write_text("heave life 1\nsequence 9\n", encoding="utf-8")
+    run = bench.heaved("--config", bench.config)
+    assert run.returncode == 65 and "neither is right" in run.stderr and "move them away to begin at zero" in run.stderr, run
+
+
 def what_is_wrong_with_levels_and_log(bench):
     text = bench.config.read_text(encoding="utf-8")
     for line, code, said in (("operate_group = no-such-group", 69, "[control] operate_group: there is no group no-such-group on this machine"),
@@ -837,6 +863,7 @@ CASES = {
     "a full disk is told at the end": full_disk,
     "senders that are not allowed are refused and counted": strangers_are_refused,
     "levels by group and by socket, hold for all, and a log of who did what": levels_and_their_log,
+    "hours, way and cycles of each axis are kept over ends, kills and a lost file": keeps_the_life_of_the_machine,
     "a group or an operator log that cannot be is refused at the start": what_is_wrong_with_levels_and_log,
     "a configuration that was not approved moves nothing until somebody has said so, and all say which one it is": moves_what_was_approved,
     "nobody reads standard error": nobody_reads_standard_error,

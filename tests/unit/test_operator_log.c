@@ -159,6 +159,29 @@ static void test_log_rotation_keeps_so_many_files_and_every_newer_line(void)
     TEST_ASSERT_EQUAL(0, read_file(path));
 }
 
+/* Something stands in the way of the older one: no line is lost, the file grows. */
+static void test_log_that_cannot_be_rotated_goes_on(void)
+{
+    char request[32], path[128];
+    (void)snprintf(path, sizeof path, "%s.1", m_path);
+    TEST_ASSERT_EQUAL(0, mkdir(path, 0700));
+    (void)snprintf(path, sizeof path, "%s.3", m_path);
+    TEST_ASSERT_EQUAL(0, mkdir(path, 0700));
+    (void)snprintf(path, sizeof path, "%s.2", m_path);
+    FILE *file = fopen(path, "w"); /* no folder goes in its place, and it in that of none */
+    TEST_ASSERT_NOT_NULL(file);
+    (void)fclose(file);
+    open_log();
+    for (unsigned i = 0; i < 300; i++) {
+        (void)snprintf(request, sizeof request, "request %u.", i);
+        add(request, 100);
+        operator_log_step(&m_log);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, operator_log_lost(&m_log));
+    (void)read_file(m_path);
+    TEST_ASSERT_EQUAL_UINT(300, lines());
+}
+
 static void test_log_the_same_again_and_again_is_a_number(void)
 {
     open_log();
@@ -276,6 +299,7 @@ int main(void)
     RUN_TEST(test_log_line_says_all);
     RUN_TEST(test_log_goes_on_where_it_ended);
     RUN_TEST(test_log_rotation_keeps_so_many_files_and_every_newer_line);
+    RUN_TEST(test_log_that_cannot_be_rotated_goes_on);
     RUN_TEST(test_log_the_same_again_and_again_is_a_number);
     RUN_TEST(test_log_more_than_there_is_room_for_is_counted);
     RUN_TEST(test_log_full_disk_is_told_counted_and_written_again);
