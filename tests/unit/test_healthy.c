@@ -87,6 +87,7 @@ static void engage(void)
 
 static void test_pulse_runs_at_its_pace_in_every_state_that_is_well(void)
 {
+    m_settings.engage = ENGAGE_MANUAL;
     start(false);
     rig_run_ms(&m_rig, OFF_MS + TOGGLE_MS);
     expect_pulse(100);
@@ -190,6 +191,25 @@ static void test_pulse_bears_some_late_cycles_and_returns_after_more(void)
     expect_pulse(100);
 }
 
+/* In OFF a drive in fault has no torque; one that is not heard may have. */
+static void test_pulse_in_off_bears_a_drive_in_fault_but_none_that_is_not_heard(void)
+{
+    m_settings.engage = ENGAGE_MANUAL;
+    start(false);
+    rig_run_ms(&m_rig, OFF_MS + TOGGLE_MS);
+    do_drive_fault();
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    expect_pulse(100);
+    do_drive_offline();
+    rig_run_ms(&m_rig, 1);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    expect_no_pulse(1000);
+    rig_break(&m_rig, SIM_DRIVES_RECOVER, 5, 0);
+    rig_run_ms(&m_rig, OFF_MS + TOGGLE_MS);
+    expect_pulse(100);
+}
+
 /* A drive to which a safe-torque-off is a fault needs the pulse to get out of it. */
 static void test_pulse_comes_before_a_reset_that_waits_for_drives(void)
 {
@@ -289,6 +309,7 @@ int main(void)
     RUN_TEST(test_pulse_stays_away_while_the_trouble_lasts);
     RUN_TEST(test_pulse_stops_with_a_following_error);
     RUN_TEST(test_pulse_bears_some_late_cycles_and_returns_after_more);
+    RUN_TEST(test_pulse_in_off_bears_a_drive_in_fault_but_none_that_is_not_heard);
     RUN_TEST(test_pulse_comes_before_a_reset_that_waits_for_drives);
     RUN_TEST(test_pulse_does_not_come_for_a_reset_while_the_estop_is_pressed);
     RUN_TEST(test_pulse_on_a_relay_is_nobodys_to_command);
