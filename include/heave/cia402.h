@@ -151,8 +151,9 @@ typedef struct {
     uint16_t statusword;
     int8_t mode_shown;
     bool has_heartbeat;
-    bool has_actual; /* since it was set up last */
-    bool was_heard;  /* has_actual at any time */
+    bool has_actual;   /* since it was set up last */
+    bool was_heard;    /* has_actual at any time */
+    bool is_answering; /* up or not, and not known to be lost */
 
     bool is_in;        /* takes part in what the drives do together */
     bool has_operated; /* since the stage began in which all get there */

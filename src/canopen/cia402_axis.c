@@ -70,6 +70,7 @@ void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why)
     cia402_axis_t *self = drive.axis;
     const bool may_hear = self->phase == CIA402_UP && why != CIA402_REBOOTED && why != CIA402_LOST_BUS;
     note_trouble(drive, why);
+    self->is_answering = self->is_answering && (why == CIA402_REBOOTED || why == CIA402_LEFT_OPERATIONAL);
     self->is_in = false;
     self->is_homed = drive.own->homing_method == 0;
     self->homing = CIA402_HOMING_NO;
@@ -199,11 +200,13 @@ static void step_missing(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     if (self->sdo.state == SDO_SILENT) {
+        self->is_answering = false;
         if (self->trouble == CIA402_TROUBLE_NONE) {
             note_trouble(drive, CIA402_SILENT);
         }
         sdo_read(&self->sdo, 0x1000, 0, 1);
     } else if (self->sdo.state == SDO_DONE || self->sdo.state == SDO_ABORTED) {
+        self->is_answering = true;
         self->trouble = self->trouble == CIA402_SILENT ? CIA402_TROUBLE_NONE : self->trouble;
         if (drive.config->is_reset_wanted && !self->is_reset_done) {
             self->nmt_command = NMT_RESET;

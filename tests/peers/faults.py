@@ -43,6 +43,7 @@ ACTIONS = {
     "tpdo late": lambda drive, us: setattr(drive, "tpdo_late_us", us),
     "tpdo drop": lambda drive, count: setattr(drive, "tpdo_drop", count),
     "refuse sdo": refuse_sdo,
+    "take sdo": lambda drive, index, sub=0: drive.refusals.pop((int(index, 16), sub)),
     "nmt": lambda drive, state: drive.set_nmt(state),
     "disable": lambda drive: drive.machine.enter("switch on disabled") or drive.entered(),
 }

@@ -313,6 +313,24 @@ def bad_drives_are_named(bench, _):
     assert status["state"] != "ENGAGED" and not bench.events("enabled")
 
 
+def all_drives_refused(bench, _):
+    """Alike drives that do not take the same object: drive-offline with the object, no lost bus; a reset leads out once they take it, in FAULT and in OFF."""
+    bench.start_drives(each={"refuse": {"60C2:1": 0x06090030}})
+    bench.start(config=test_can.can_config(bench, platform__engage="manual"))
+    heave.wait_for(lambda: all(leg["report"]["phase"] == "refused" for leg in bench.status()["cylinders"]), "all are refused")
+    assert bench.ctl("engage").returncode != 0
+    bench.wait_state("FAULT")
+    status = bench.status()
+    assert (status["fault"]["name"], status["fault"]["device_code"]) == ("drive-offline", 0x10009), status["fault"]
+    assert all((leg["report"]["object"], leg["report"]["sub_index"]) == (0x60C2, 1) for leg in status["cylinders"]), status["cylinders"]
+    for node in can_bench.NODES:
+        bench.do("take sdo", node, index="60C2", sub=1)
+    bench.ctl("reset")
+    bench.wait_state("OFF")
+    assert bench.ctl("engage").returncode == 0
+    bench.wait_state("ENGAGED")
+
+
 # --- The gateway in trouble ---
 
 KILLS = 6
@@ -360,7 +378,8 @@ CASES += [
 CASES += [(f"{name}: silence, latched", bus_lost(*row)) for name, *row in BUS_ROWS]
 CASES += [("error-passive for more than a second: a controlled stop, latched", passive_stops),
           ("error-passive for less, and a storm of error frames: nothing stops", disturbed)]
-CASES += [("drives missing or wrong are named, nobody is enabled", bad_drives_are_named), ("killed at random moments and started again", killed_anywhere)]
+CASES += [("drives missing or wrong are named, nobody is enabled", bad_drives_are_named),
+          ("drives that all refuse the same: named, no lost bus, a reset sets them up again", all_drives_refused), ("killed at random moments and started again", killed_anywhere)]
 
 
 def main():

@@ -270,6 +270,65 @@ static void test_setup_object_refused_names_drive_object_and_reason(void)
     TEST_ASSERT_EQUAL_STRING("the value is out of range", r.detail);
 }
 
+/* Alike drives, one fault of the configuration: each answers, so the bus is not lost, and each says what it does not take. */
+static void test_setup_all_refused_is_no_lost_bus_and_a_reset_sets_up_again(void)
+{
+    for (unsigned k = 0; k < AXES; k++) {
+        cia402_slave_row(&slave, k, 0x60C2, 1)->refusal = 0x06090030;
+    }
+    start();
+    cycles(4000);
+    TEST_ASSERT_EQUAL(HV_OK, cycle());
+    for (uint8_t k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_STRING("refused", report(k).phase);
+        TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, feedback[k].fault_code);
+    }
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
+    for (unsigned k = 0; k < AXES; k++) {
+        cia402_slave_row(&slave, k, 0x60C2, 1)->refusal = 0;
+    }
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    for (unsigned i = 0; i < 4000 && !are_all(DRIVE_DISABLED); i++) {
+        TEST_ASSERT_EQUAL(HV_OK, cycle()); /* drives that are being set up are no lost bus either */
+    }
+    enable();
+}
+
+/* A dip of the supply: the drives say themselves what has happened. */
+static void test_loss_all_that_start_again_are_no_lost_bus(void)
+{
+    come_up();
+    enable();
+    for (unsigned k = 0; k < AXES; k++) {
+        cia402_slave_power(&slave, k, true);
+        slave.drive[k].boot_us = now_us + CYCLE_US; /* sooner than three answers are missing */
+    }
+    while (!are_all(DRIVE_OFFLINE)) {
+        TEST_ASSERT_EQUAL(HV_OK, cycle());
+    }
+    TEST_ASSERT_EQUAL_HEX32(CIA402_REBOOTED, feedback[0].fault_code);
+    for (unsigned i = 0; i < 4000 && !are_all(DRIVE_DISABLED); i++) {
+        TEST_ASSERT_EQUAL(HV_OK, cycle());
+    }
+}
+
+/* Somebody acknowledges, but no drive is there any more. */
+static void test_loss_all_silent_is_a_lost_bus_until_one_answers(void)
+{
+    come_up();
+    for (unsigned k = 0; k < AXES; k++) {
+        cia402_slave_power(&slave, k, false);
+    }
+    cycles(40);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, cycle());
+    TEST_ASSERT_EQUAL(HV_ERR_IO, drives_request(hal, DRIVES_DISABLE));
+    cycles(2000);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, cycle());
+    cia402_slave_power(&slave, 3, true);
+    cycles(2000);
+    TEST_ASSERT_EQUAL(HV_OK, cycle());
+}
+
 static void test_setup_wrong_identity_is_refused(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
@@ -1903,6 +1962,9 @@ int main(void)
     RUN_TEST(test_setup_pdos_are_mapped_in_the_order_every_stack_accepts);
     RUN_TEST(test_setup_drives_that_are_up_already_are_reset_first);
     RUN_TEST(test_setup_object_refused_names_drive_object_and_reason);
+    RUN_TEST(test_setup_all_refused_is_no_lost_bus_and_a_reset_sets_up_again);
+    RUN_TEST(test_loss_all_that_start_again_are_no_lost_bus);
+    RUN_TEST(test_loss_all_silent_is_a_lost_bus_until_one_answers);
     RUN_TEST(test_setup_wrong_identity_is_refused);
     RUN_TEST(test_setup_wrong_revision_and_serial_number_are_refused);
     RUN_TEST(test_setup_position_limits_are_written_where_wanted);
