@@ -180,6 +180,10 @@ typedef enum { CONFIG_MODE_CSP, CONFIG_MODE_IP, CONFIG_MODE_PP } config_mode_t;
 /** What CANopen drives do when the gateway falls silent: 6007h less 1. */
 typedef enum { CONFIG_LOST_FAULT, CONFIG_LOST_DISABLE_VOLTAGE, CONFIG_LOST_QUICK_STOP } config_lost_t;
 
+/** What is watched in what CANopen drives say, and what follows: as cia402.h has both. */
+#define CONFIG_REACTIONS 6u
+typedef enum { CONFIG_REACTION_IGNORE, CONFIG_REACTION_TELL, CONFIG_REACTION_STOP } config_reaction_t;
+
 /** In which order CANopen drives home. */
 typedef enum { CONFIG_HOMING_TOGETHER, CONFIG_HOMING_IN_TURN } config_homing_order_t;
 
@@ -210,6 +214,7 @@ typedef struct {
     q16_t quick_stop_mm_s2_q16;
     q16_t angle_quick_stop_deg_s2_q16;
     config_lost_t when_gateway_lost;
+    config_reaction_t reaction[CONFIG_REACTIONS];
     uint16_t heartbeat_ms;
     uint16_t heartbeat_timeout_ms;
     uint16_t sdo_timeout_ms;

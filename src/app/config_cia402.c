@@ -126,6 +126,9 @@ void config_cia402(const config_t *config, cia402_config_t *out)
         .is_unguarded_allowed = cia402->is_no_watchdog_allowed,
         .is_homing_in_turn = cia402->homing_order == CONFIG_HOMING_IN_TURN,
     };
+    for (unsigned i = 0; i < CIA402_WATCHES; i++) {
+        out->reaction[i] = (cia402_reaction_t)cia402->reaction[i];
+    }
     for (unsigned k = 0; k < out->axes; k++) {
         describe_axis(config, k, &out->axis[k]);
     }

@@ -247,6 +247,21 @@ static void draw_report(view_t *self, const cJSON *report, const char *drive)
     end_line(self);
 }
 
+/* What a drive tells that goes on. */
+static void draw_notes(view_t *self, const cJSON *report)
+{
+    const cJSON *note = NULL;
+    bool is_any = false;
+    cJSON_ArrayForEach(note, member(report, "notes"))
+    {
+        put_piece(self, is_any ? "; %s" : "   tells: %s", cJSON_IsString(note) ? note->valuestring : "?");
+        is_any = true;
+    }
+    if (is_any) {
+        end_line(self);
+    }
+}
+
 /* A line for drives that share a slow bus: how often each is served. */
 static void draw_service(view_t *self, const cJSON *axis)
 {
@@ -265,6 +280,7 @@ static void draw_drive(view_t *self, const cJSON *axis)
     end_line(self);
     draw_service(self, axis);
     draw_report(self, member(axis, "report"), drive);
+    draw_notes(self, member(axis, "report"));
 }
 
 /* A drive that has told no position is nowhere, not at 0. */

@@ -131,6 +131,17 @@ static void write_poses(json_t *json, const snapshot_t *s)
     write_actual(json, "accel_actual", k_accel_keys, &s->plate.accel_per_s2, s->plate.has_rates);
 }
 
+static void write_notes(json_t *json, uint32_t notes)
+{
+    json_open(json, "notes", '[');
+    for (unsigned i = 0; i < DRIVE_NOTES; i++) {
+        if ((notes >> i & 1u) != 0) {
+            json_text(json, NULL, drive_note_text(i));
+        }
+    }
+    json_close(json, ']');
+}
+
 /* What the drive is at, in words; null where its driver has none. */
 static void write_report(json_t *json, const drive_report_t *report, uint64_t now_us)
 {
@@ -152,6 +163,7 @@ static void write_report(json_t *json, const drive_report_t *report, uint64_t no
     json_text(json, "detail", report->detail);
     json_number(json, "detail_code", report->detail_code);
     json_ms(json, "age_ms", now_us >= report->since_us ? now_us - report->since_us : 0);
+    write_notes(json, report->notes);
     json_close(json, '}');
 }
 

@@ -4,6 +4,7 @@
 #include "cia402_axis.h"
 
 #include "cia402_setup.h"
+#include "cia402_watch.h"
 
 #define SILENT_SYNCS_MAX    3u
 #define WORD_SYNCS_MIN      2u       /* a controlword acts at the next SYNC and shows at the one after */
@@ -147,6 +148,7 @@ void cia402_axis_take_tpdo(cia402_drive_t drive, const can_frame_t *frame)
         return;
     }
     self->silent_syncs = 0;
+    self->has_answer = true;
     self->statusword = (uint16_t)(data[0] | data[1] << 8);
     take_position(drive, (uint32_t)data[2] | (uint32_t)data[3] << 8 | (uint32_t)data[4] << 16 | (uint32_t)data[5] << 24);
     self->mode_shown = (int8_t)(data[6] < 0x80 ? data[6] : data[6] - 0x100);
@@ -261,6 +263,7 @@ static void come_up(cia402_drive_t drive)
     self->word_syncs = 0;
     self->error_code = 0;
     self->is_error_read = false;
+    cia402_watch_restart(self);
 }
 
 static void step_starting(cia402_drive_t drive)
@@ -360,6 +363,7 @@ static void step_up(cia402_drive_t drive)
         cia402_axis_lose(drive, loss);
         return;
     }
+    cia402_watch_step(drive);
     const cia402_state_t state = cia402_axis_state(self);
     self->operating_us = mark_while(state == CIA402_OPERATION_ENABLED, self->operating_us, drive.now_us);
     self->stopping_us = mark_while(state == CIA402_QUICK_STOP_ACTIVE, self->stopping_us, drive.now_us);

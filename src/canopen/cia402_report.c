@@ -85,6 +85,11 @@ static const struct {
     {CIA402_NO_TORQUE, "does not enable operation: brake, safe torque off?"},
     {CIA402_REMOTE_OFF, "is under local control, not under that of the bus"},
     {CIA402_FELL_OUT, "left operation enabled by itself: enable input, safe torque off?"},
+    {CIA402_LEFT_MODE, "left its mode of operation by itself"},
+    {CIA402_NOT_FOLLOWING, "ignores its set-points: halted, or held by its own logic?"},
+    {CIA402_NO_VOLTAGE, "has no voltage at its power stage: supply, contactor?"},
+    {CIA402_LIMITED, "is at a limit of its own: torque, speed, position (607Dh)?"},
+    {CIA402_WARNING, "warns: its manual and 603Fh say of what"},
 };
 
 static const char *code_text(uint32_t code)
@@ -171,6 +176,7 @@ void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *ou
         .object = object_of(axis),
         .detail = detail_text(axis),
         .detail_code = is_refusing(axis) && axis->trouble_object != 0 ? axis->trouble_code : 0,
+        .notes = axis->phase == CIA402_UP ? axis->notes : 0,
         .since_us = code != 0 ? axis->trouble_us : axis->phase_us,
     };
 }

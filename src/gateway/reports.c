@@ -55,6 +55,26 @@ static void log_report(const gateway_t *self, unsigned axis, const drive_report_
     hal_log_write(self->io.log, report->code != 0 ? HAL_LOG_WARNING : HAL_LOG_NOTICE, line);
 }
 
+static void log_notes(const gateway_t *self, unsigned axis, const drive_report_t *report)
+{
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    const char *before = " ";
+    text_put(&text, "axis ");
+    text_put_u32(&text, axis + 1u);
+    text_put(&text, ", node ");
+    text_put_u32(&text, report->address);
+    text_put(&text, report->notes != 0 ? ":" : ": nothing to tell of any more");
+    for (unsigned i = 0; i < DRIVE_NOTES; i++) {
+        if ((report->notes >> i & 1u) != 0) {
+            text_put(&text, before);
+            text_put(&text, drive_note_text(i));
+            before = "; ";
+        }
+    }
+    hal_log_write(self->io.log, report->notes != 0 ? HAL_LOG_WARNING : HAL_LOG_NOTICE, line);
+}
+
 /* Worth a line: another trouble, the end of one, or a refusal with its reason. */
 static bool is_news(const drive_report_t *was, const drive_report_t *is)
 {
@@ -69,6 +89,9 @@ void reports_take(gateway_t *self)
         (void)drives_report(self->io.drives, i, &report);
         if (is_news(&self->snapshot.report[i], &report)) {
             log_report(self, i, &report);
+        }
+        if (self->snapshot.report[i].notes != report.notes) {
+            log_notes(self, i, &report);
         }
         self->snapshot.report[i] = report;
     }

@@ -61,6 +61,7 @@ class Drive:
         self.is_powered = False
         self.is_frozen = self.is_mute = self.has_no_heartbeat = self.is_sdo_silent = False
         self.tpdo_drop = self.tpdo_late_us = 0
+        self.status_bits = 0, 0
         self.position_at_rest = self.config["position"]
         self.stats = {"largest_step": 0, "largest_lag": 0, "syncs": 0, "set_points": 0, "missed": 0}
         self.last_target = None
@@ -579,7 +580,8 @@ class Drive:
     def refresh(self):
         """The objects that show what is."""
         powered = 0x10 if self.machine.state in machine.POWERED else 0
-        self.od[0x6041] = machine.WORDS[self.machine.state] | powered | 0x0200 | self.mode_bits()
+        set_bits, clear_bits = self.status_bits
+        self.od[0x6041] = (machine.WORDS[self.machine.state] | powered | 0x0200 | self.mode_bits() | set_bits) & ~clear_bits
         self.od[0x6061] = self.active_mode
         self.od[0x6064] = self.count()
         self.od[0x6062] = round(self.motor.demand) - self.origin

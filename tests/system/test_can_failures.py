@@ -94,6 +94,17 @@ def sees_pre_operational(record, when_us):
     return min(beat_us, sees_last_status(record, when_us) + SILENT_US - REACTION_US)
 
 
+def sees_status(bit, is_set):
+    """The first answer that shows it; the second one counts."""
+    return lambda record, when_us: next(when for when, word, _ in record.statuses(VICTIM) if when > when_us and bool(word & bit) == is_set)
+
+
+def sees_mode(record, when_us):
+    return next(when for when, data in record.of(can_judge.TPDO + VICTIM) if when > when_us and data[6] != 8)
+
+
+REMOTE, VOLTAGE, FOLLOWS, LIMIT, WARNING = 0x0200, 0x0010, 0x1000, 0x0800, 0x0080
+SECOND_ANSWER_US = PERIOD_US + REACTION_US
 FOLLOWING_ERROR = 0x8611
 
 
@@ -111,6 +122,10 @@ ROWS = [
     ("a drive loses its power", {"do": "off"}, {}, sees_last_status, SILENT_US, "drive-offline", 0x10002),
     ("a drive's heartbeat ends", {"do": "heartbeat off"}, {}, sees_last_beat, HEARTBEAT_TIMEOUT_US + REACTION_US, "drive-offline", 0x10003),
     ("a drive leaves operational", {"do": "nmt", "state": 0x7F}, {}, sees_pre_operational, REACTION_US, "drive-offline", (0x10004, 0x10002)),
+    ("a drive ignores its set-points", {"do": "status", "clear_bits": FOLLOWS}, {}, sees_status(FOLLOWS, False), SECOND_ANSWER_US, "drive-fault", 0x10013),
+    ("a drive goes under local control", {"do": "status", "clear_bits": REMOTE}, {}, sees_status(REMOTE, False), SECOND_ANSWER_US, "drive-fault", 0x10010),
+    ("a drive shows no voltage", {"do": "status", "clear_bits": VOLTAGE}, {}, sees_status(VOLTAGE, False), SECOND_ANSWER_US, "drive-fault", 0x10014),
+    ("a drive leaves its mode", {"do": "mode", "mode": 1}, {}, sees_mode, SECOND_ANSWER_US, "drive-fault", 0x10012),
     ("5 answers lost", {"do": "tpdo drop", "count": 5}, {}, sees_last_status, SILENT_US, "drive-offline", 0x10002),
     ("50 answers lost", {"do": "tpdo drop", "count": 50}, {}, sees_last_status, SILENT_US, "drive-offline", 0x10002),
 ]
@@ -153,6 +168,32 @@ def harmless(*actions):
         assert set(record.stops(begin_us).values()) == {None} or min(filter(None, record.stops(begin_us).values())) >= end_us
         can_judge.check_order(record, begin_us, end_us, PERIOD_US)
     return case
+
+
+def tells(bench, source):
+    """A warning and a limit of a drive: in status and log, and nothing stops."""
+    daemon = in_motion(bench, source)
+    bench.do("status", VICTIM, set_bits=LIMIT | WARNING)
+    time.sleep(0.2)
+    status = bench.status()
+    notes = [leg["report"]["notes"] for leg in status["cylinders"]]
+    assert status["state"] in ("RISING", "ENGAGED"), status["state"]
+    assert notes[VICTIM - 1] == ["is at a limit of its own", "warns"] and not any(notes[:VICTIM - 1] + notes[VICTIM:]), notes
+    assert f"axis {VICTIM}, node {VICTIM}: is at a limit of its own; warns\n" in daemon.log.read_text(encoding="utf-8")
+    table = bench.ctl("status").stdout
+    assert "tells: is at a limit of its own; warns" in table, table
+
+
+def local_drive_is_not_enabled(bench, _):
+    bench.start_drives()
+    bench.do("status", VICTIM, clear_bits=REMOTE)
+    bench.start(config=test_can.can_config(bench))
+    bench.wait_state("FAULT")
+    fault = bench.status()["fault"]
+    assert (fault["name"], fault["axis"], fault["device_code"]) == ("drive-fault", VICTIM, 0x10010), fault
+    assert not bench.events("enabled")
+    bench.do("status", VICTIM)
+    bench.reset()
 
 
 # --- The bus in trouble ---
@@ -373,6 +414,8 @@ def killed_anywhere(bench, source):
 CASES = [(f"{name}: all stop together", stops_all_drives(*row)) for name, *row in ROWS]
 CASES += [
     ("lost answers, 1, 2 and 3: nothing stops", harmless(*(("tpdo drop", {"count": count}) for count in (1, 2, 3)))),
+    ("a drive's limit and warning are told: nothing stops", tells),
+    ("a drive under local control is named, nobody is enabled", local_drive_is_not_enabled),
     ("an EMCY without a fault: nothing stops", harmless(("emergency", {"code": 0xFF00}))),
 ]
 CASES += [(f"{name}: silence, latched", bus_lost(*row)) for name, *row in BUS_ROWS]

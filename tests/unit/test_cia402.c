@@ -1956,6 +1956,171 @@ static void test_period_is_one_that_the_drives_can_hold(void)
     }
 }
 
+/* --- What answers say beside state and position --- */
+
+static const struct {
+    cia402_watch_t watch;
+    uint16_t set, clear; /* in the statusword */
+    cia402_trouble_t code;
+} k_watches[] = {
+    {CIA402_WATCH_FOLLOWING, 0, CIA402_STATUS_BIT12, CIA402_NOT_FOLLOWING},
+    {CIA402_WATCH_LOCAL, 0, CIA402_STATUS_REMOTE, CIA402_REMOTE_OFF},
+    {CIA402_WATCH_VOLTAGE, 0, CIA402_STATUS_VOLTAGE, CIA402_NO_VOLTAGE},
+    {CIA402_WATCH_LIMIT, CIA402_STATUS_LIMIT, 0, CIA402_LIMITED},
+    {CIA402_WATCH_WARNING, CIA402_STATUS_WARNING, 0, CIA402_WARNING},
+};
+#define WATCHES (sizeof k_watches / sizeof k_watches[0])
+
+static void show(unsigned drive, size_t row, bool is_shown)
+{
+    slave.drive[drive].status_set = is_shown ? k_watches[row].set : 0;
+    slave.drive[drive].status_clear = is_shown ? k_watches[row].clear : 0;
+}
+
+static void test_watch_what_stops_is_a_fault_within_three_periods(void)
+{
+    for (size_t i = 0; i < WATCHES; i++) {
+        setUp();
+        config.reaction[k_watches[i].watch] = CIA402_STOP;
+        come_up();
+        enable();
+        cycles(100);
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        show(2, i, true);
+        TEST_ASSERT_TRUE(cycles_until(2, DRIVE_FAULT, 100) <= 3 * PERIOD);
+        TEST_ASSERT_EQUAL_HEX32(k_watches[i].code, feedback[2].fault_code);
+        TEST_ASSERT_TRUE(report(2).trouble[0] != '\0');
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+        cycles(20);
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_EQUAL(k == 2 ? DRIVE_FAULT : DRIVE_DISABLED, feedback[k].state);
+        }
+    }
+}
+
+static void test_watch_single_answer_stops_nothing(void)
+{
+    for (size_t i = 0; i < WATCHES; i++) {
+        setUp();
+        config.reaction[k_watches[i].watch] = CIA402_STOP;
+        come_up();
+        enable();
+        show(2, i, true);
+        cycles(PERIOD);
+        show(2, i, false);
+        cycles(100);
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        TEST_ASSERT_EQUAL_HEX32(0, report(2).notes);
+    }
+}
+
+static void test_watch_what_is_told_stops_nothing_and_is_told_for_some_seconds(void)
+{
+    for (size_t i = 0; i < WATCHES; i++) {
+        setUp();
+        config.reaction[k_watches[i].watch] = CIA402_TELL;
+        come_up();
+        enable();
+        show(2, i, true);
+        cycles(3 * PERIOD);
+        show(2, i, false);
+        cycles(4000);
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        TEST_ASSERT_EQUAL_HEX32(1u << k_watches[i].watch, report(2).notes);
+        TEST_ASSERT_EQUAL_HEX32(0, report(1).notes);
+        TEST_ASSERT_TRUE(drive_note_text(k_watches[i].watch)[0] != '\0');
+        cycles(1500);
+        TEST_ASSERT_EQUAL_HEX32(0, report(2).notes);
+    }
+}
+
+static void test_watch_what_is_ignored_is_not_told_of(void)
+{
+    come_up();
+    enable();
+    for (size_t i = 0; i < WATCHES; i++) {
+        show(2, i, true);
+        cycles(100);
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        TEST_ASSERT_EQUAL_HEX32(0, report(2).notes);
+    }
+}
+
+static void test_watch_mode_left_in_motion_is_a_fault(void)
+{
+    config.reaction[CIA402_WATCH_MODE] = CIA402_STOP;
+    come_up();
+    enable();
+    slave.drive[4].mode = 1;
+    TEST_ASSERT_TRUE(cycles_until(4, DRIVE_FAULT, 100) <= 3 * PERIOD);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_LEFT_MODE, feedback[4].fault_code);
+}
+
+static void test_watch_interpolation_that_ends_is_a_fault(void)
+{
+    config.mode = CIA402_MODE_IP;
+    config.reaction[CIA402_WATCH_FOLLOWING] = CIA402_STOP;
+    come_up();
+    enable();
+    show(0, 0, true);
+    TEST_ASSERT_TRUE(cycles_until(0, DRIVE_FAULT, 100) <= 3 * PERIOD);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_FOLLOWING, feedback[0].fault_code);
+}
+
+/* Some never show them: they are not missed. */
+static void test_watch_bits_that_a_drive_does_not_have_are_not_missed(void)
+{
+    config.reaction[CIA402_WATCH_FOLLOWING] = CIA402_STOP;
+    config.reaction[CIA402_WATCH_VOLTAGE] = CIA402_STOP;
+    config.power_timeout_ms = 900; /* without bit 12 it is believed after half a second */
+    slave.drive[1].status_clear = CIA402_STATUS_BIT12 | CIA402_STATUS_VOLTAGE;
+    come_up();
+    enable();
+    cycles(1000);
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+}
+
+static void test_watch_drive_under_local_control_is_not_enabled(void)
+{
+    config.reaction[CIA402_WATCH_LOCAL] = CIA402_STOP;
+    show(5, 1, true);
+    come_up();
+    cycles(3 * PERIOD);
+    TEST_ASSERT_EQUAL_HEX32(1u << CIA402_WATCH_LOCAL, report(5).notes);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    (void)cycles_until(5, DRIVE_FAULT, 200);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_REMOTE_OFF, feedback[5].fault_code);
+    cycles(200);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(0, slave.drive[k].enabled);
+    }
+    show(5, 1, false);
+    cycles(100);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[5].state); /* never by itself */
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    await(DRIVE_DISABLED, 100);
+    enable();
+}
+
+/* Homing runs into a limit on purpose. */
+static void test_watch_limit_while_homing_stops_nothing(void)
+{
+    config.reaction[CIA402_WATCH_LIMIT] = CIA402_STOP;
+    for (unsigned k = 0; k < AXES; k++) {
+        config.axis[k].homing_method = 17;
+    }
+    come_up();
+    enable();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    cycles(2);
+    for (unsigned i = 0; i < 3000 && feedback[3].state == DRIVE_HOMING; i++) {
+        show(3, 3, driver.stage == CIA402_STAGE_HOMING && slave.drive[3].is_homing);
+        follow_actual();
+        (void)!cycle();
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -2053,5 +2218,14 @@ int main(void)
     RUN_TEST(test_any_trouble_at_any_time_moves_nothing);
     RUN_TEST(test_init_contradictions_are_refused);
     RUN_TEST(test_period_is_one_that_the_drives_can_hold);
+    RUN_TEST(test_watch_what_stops_is_a_fault_within_three_periods);
+    RUN_TEST(test_watch_single_answer_stops_nothing);
+    RUN_TEST(test_watch_what_is_told_stops_nothing_and_is_told_for_some_seconds);
+    RUN_TEST(test_watch_what_is_ignored_is_not_told_of);
+    RUN_TEST(test_watch_mode_left_in_motion_is_a_fault);
+    RUN_TEST(test_watch_interpolation_that_ends_is_a_fault);
+    RUN_TEST(test_watch_bits_that_a_drive_does_not_have_are_not_missed);
+    RUN_TEST(test_watch_drive_under_local_control_is_not_enabled);
+    RUN_TEST(test_watch_limit_while_homing_stops_nothing);
     return UNITY_END();
 }

@@ -1863,6 +1863,22 @@ static void test_telemetry_reports_of_drives_are_logged_once_with_what_they_name
     TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, unit 3, missing: no answer (0x0032), register 0x0102"));
 }
 
+static void test_telemetry_notes_of_drives_are_logged_when_they_change(void)
+{
+    engage();
+    make_talkative();
+    m_reports = (drive_report_t){.address = 12, .phase = "enabled", .trouble = "", .detail = "", .notes = 0x30};
+    rig_run_ms(&m_rig, 5);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, node 12: is at a limit of its own; warns"));
+    TEST_ASSERT_EQUAL_HEX32(0x30, seen()->report[1].notes);
+    rig_run_ms(&m_rig, 5);
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "axis 2"));
+    m_reports.notes = 0;
+    rig_run_ms(&m_rig, 5);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, node 12: nothing to tell of any more"));
+    TEST_ASSERT_EQUAL_STRING("", drive_note_text(DRIVE_NOTES));
+}
+
 static void test_intensity_is_taken_within_its_range_and_told(void)
 {
     m_settings.intensity_max_percent = 80;
@@ -2262,6 +2278,7 @@ static void run_supervision(void)
     RUN_TEST(test_telemetry_actual_speed_is_that_of_the_plate);
     RUN_TEST(test_telemetry_actual_pose_follows_the_feedback);
     RUN_TEST(test_telemetry_reports_of_drives_are_logged_once_with_what_they_name);
+    RUN_TEST(test_telemetry_notes_of_drives_are_logged_when_they_change);
     RUN_TEST(test_intensity_is_taken_within_its_range_and_told);
     RUN_TEST(test_shutdown_on_a_bus_that_takes_nothing_ends_all_the_same);
     RUN_TEST(test_shutdown_from_settled_waits_until_the_bus_has_taken_it);
