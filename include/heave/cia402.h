@@ -170,6 +170,7 @@ typedef struct {
     int64_t position_counts; /* without the wrap-around of 32 bits */
     q32_t actual_q32;
     uint64_t actual_us;
+    drive_emergency_t emergency;
     uint64_t note_us[CIA402_WATCHES]; /* when each was seen last */
     uint32_t notes;                   /* told of: bit N for cia402_watch_t N */
     int32_t actual_counts;
@@ -197,7 +198,6 @@ typedef struct {
     uint32_t own_fault;    /* found by this driver: cia402_trouble_t or a number of the standard; 0 = none */
     drive_guard_t guard;   /* why own_fault, where its set-points were too far */
     uint16_t error_code;   /* the drive's own */
-    uint8_t error_register;
     bool is_error_read;
     q32_t sent_q32;
     int32_t target_counts;

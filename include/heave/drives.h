@@ -58,13 +58,25 @@ static inline const char *drive_note_text(unsigned note)
     return note < DRIVE_NOTES ? k_texts[note] : "";
 }
 
+/** The last error that a drive told of by itself (EMCY), whatever came of it. All 0: none yet. */
+typedef struct {
+    uint64_t at_us;
+    uint32_t count; /**< since the start */
+    uint16_t code;
+    uint8_t error_register;
+    uint8_t maker[5]; /**< what the manufacturer makes of these bytes */
+    bool is_over;     /**< it has taken it back since, or started again */
+} drive_emergency_t;
+
 /** What one drive is at, in words for people. Constant texts, "" where there is nothing to say; never NULL. */
 typedef struct {
-    bool is_modbus;       /**< address is a unit, object a register << 8 */
-    uint8_t address;      /**< on the bus; 0 = has none */
-    const char *phase;    /**< "missing", "configuring", "ready", "enabled", "fault", or what it waits for */
-    const char *trouble;  /**< what is or was wrong with it */
-    const char *detail;   /**< more about that */
+    bool is_modbus;      /**< address is a unit, object a register << 8 */
+    uint8_t address;     /**< on the bus; 0 = has none */
+    const char *phase;   /**< "missing", "configuring", "ready", "enabled", "fault", or what it waits for */
+    const char *trouble; /**< what is or was wrong with it */
+    const char *detail;  /**< more about that */
+    const char *error;   /**< what emergency.code means; NULL where there was none */
+    drive_emergency_t emergency;
     uint32_t code;        /**< number of trouble, 0 = none */
     uint32_t object;      /**< of the device, index << 8 | sub-index: what is being set, or what the trouble is about; 0 = none */
     uint32_t detail_code; /**< of the protocol, or the value found; 0 = none */

@@ -128,7 +128,9 @@ typedef struct {
     uint64_t spike_logged_us;
     uint32_t spikes_logged; /**< of all spikes, those that a line told of */
     uint64_t jump_logged_us;
-    uint32_t jumps_logged; /**< likewise */
+    uint32_t jumps_logged;                    /**< likewise */
+    uint64_t emergency_logged_us[DRIVES_MAX]; /**< 0 = never */
+    uint32_t emergencies_logged[DRIVES_MAX];  /**< of all of a drive, those that a line told of, or counted */
     uint64_t reject_logged_us[FRAME_ERRORS];
     uint32_t reject_suppressed[FRAME_ERRORS];
     uint8_t datagram[GATEWAY_DATAGRAM_MAX];

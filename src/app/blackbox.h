@@ -33,6 +33,7 @@ typedef struct {
     uint8_t drive[DRIVES_MAX];    /**< drive_state_t */
     uint8_t known[DRIVES_MAX];    /**< BLACKBOX_HOMED ... */
     uint32_t age_us[DRIVES_MAX];  /**< of actual */
+    uint16_t error[DRIVES_MAX];   /**< code of the last EMCY that has not been taken back */
     uint8_t drives;
     uint8_t fault; /**< fault_code_t */
     uint8_t fault_axis;

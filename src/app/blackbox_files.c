@@ -421,9 +421,11 @@ static void put_feedback_head(const settings_t *settings, char *to, size_t capac
         text_put_u32(&text, i);
         text_put(&text, "_actual_mm,c");
         text_put_u32(&text, i);
-        text_put(&text, "_code");
+        text_put(&text, "_code,c");
+        text_put_u32(&text, i);
+        text_put(&text, "_error");
     }
-    text_put(&text, settings->has_angle ? ",angle_state,angle_actual_deg,angle_code,fault\n" : ",fault\n");
+    text_put(&text, settings->has_angle ? ",angle_state,angle_actual_deg,angle_code,angle_error,fault\n" : ",fault\n");
 }
 
 static size_t format_feedback(const blackbox_row_t *row, char *to)
@@ -437,6 +439,8 @@ static size_t format_feedback(const blackbox_row_t *row, char *to)
         at += decimal_put_q32(&to[at], row->actual_q32[i], FEEDBACK_PLACES);
         at += decimal_put_text(&to[at], ",");
         at += decimal_put_hex(&to[at], row->code[i], 8);
+        at += decimal_put_text(&to[at], ",");
+        at += decimal_put_hex(&to[at], row->error[i], 4);
     }
     at += decimal_put_text(&to[at], ",");
     at += decimal_put_text(&to[at], row->fault == FAULT_NONE ? "" : fault_help((fault_code_t)row->fault)->name);

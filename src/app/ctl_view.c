@@ -262,6 +262,20 @@ static void draw_notes(view_t *self, const cJSON *report)
     }
 }
 
+/* The last error that a drive has told of. */
+static void draw_emergency(view_t *self, const cJSON *emergency)
+{
+    if (!cJSON_IsObject(emergency)) {
+        return;
+    }
+    put(self, "   %s 0x%04X", cJSON_IsTrue(member(emergency, "over")) ? "last error, over:" : "error",
+        (unsigned)number(emergency, "code"));
+    put_piece(self, " (%s), register 0x%02X, manufacturer %s", word(emergency, "text"), (unsigned)number(emergency, "register"),
+              word(emergency, "manufacturer"));
+    put_piece(self, ", %.1f s ago, %.0f in all", number(emergency, "age_ms") / 1000.0, number(emergency, "count"));
+    end_line(self);
+}
+
 /* A line for drives that share a slow bus: how often each is served. */
 static void draw_service(view_t *self, const cJSON *axis)
 {
@@ -281,6 +295,7 @@ static void draw_drive(view_t *self, const cJSON *axis)
     draw_service(self, axis);
     draw_report(self, member(axis, "report"), drive);
     draw_notes(self, member(axis, "report"));
+    draw_emergency(self, member(member(axis, "report"), "emergency"));
 }
 
 /* A drive that has told no position is nowhere, not at 0. */

@@ -160,6 +160,32 @@ static void put_axes(sheet_t *self, const snapshot_t *s)
     }
 }
 
+/* Missing for drives that tell of nothing. */
+static void put_drives(sheet_t *self, const snapshot_t *s)
+{
+    const unsigned axes = s->cylinders + (s->has_angle ? 1u : 0u);
+    head(self, "drive_errors_total", "counter", "errors that the drive told of by itself (EMCY)");
+    for (unsigned i = 0; i < axes; i++) {
+        if (s->report[i].phase[0] != '\0') {
+            put(self, "heave_drive_errors_total{axis=\"%u\"} %" PRIu32 "\n", i + 1, s->report[i].emergency.count);
+        }
+    }
+    head(self, "drive_error_code", "gauge", "the last one that it has not taken back, 0 = none");
+    for (unsigned i = 0; i < axes; i++) {
+        if (s->report[i].phase[0] != '\0') {
+            const drive_emergency_t *emergency = &s->report[i].emergency;
+            put(self, "heave_drive_error_code{axis=\"%u\"} %u\n", i + 1, emergency->is_over ? 0u : (unsigned)emergency->code);
+        }
+    }
+    head(self, "drive_notes", "gauge",
+         "what a drive tells that goes on: bits of mode, set-points, remote, voltage, limit, warning");
+    for (unsigned i = 0; i < axes; i++) {
+        if (s->report[i].phase[0] != '\0') {
+            put(self, "heave_drive_notes{axis=\"%u\"} %" PRIu32 "\n", i + 1, s->report[i].notes);
+        }
+    }
+}
+
 /* Turns are in degrees, ways in millimetres. */
 static void put_rates(sheet_t *self, const char *name, const char *help, const char *per, const pose_t *rates)
 {
@@ -250,6 +276,7 @@ size_t metrics_text(const motion_view_t *view, const config_t *config, const mot
     put_program(&sheet, view, config, times);
     put_state(&sheet, s);
     put_axes(&sheet, s);
+    put_drives(&sheet, s);
     put_plate(&sheet, s);
     put_relays(&sheet, s);
     put_frames(&sheet, view);

@@ -3,6 +3,8 @@
  */
 #include "status_json.h"
 
+#include <stdio.h>
+
 #include "decimal.h"
 #include "heave/motion.h" // MOTION_CLAMPED and its kin
 
@@ -131,6 +133,15 @@ static void write_poses(json_t *json, const snapshot_t *s)
     write_actual(json, "accel_actual", k_accel_keys, &s->plate.accel_per_s2, s->plate.has_rates);
 }
 
+static void write_age(json_t *json, const char *key, uint64_t at_us, uint64_t now_us)
+{
+    if (at_us == 0 || at_us > now_us) {
+        json_null(json, key);
+    } else {
+        json_ms(json, key, now_us - at_us);
+    }
+}
+
 static void write_notes(json_t *json, uint32_t notes)
 {
     json_open(json, "notes", '[');
@@ -140,6 +151,29 @@ static void write_notes(json_t *json, uint32_t notes)
         }
     }
     json_close(json, ']');
+}
+
+/* The last error that a drive has told of; null where there was none. */
+static void write_emergency(json_t *json, const drive_report_t *report, uint64_t now_us)
+{
+    const drive_emergency_t *emergency = &report->emergency;
+    char maker[2 * sizeof emergency->maker + 1];
+    if (report->error == NULL) {
+        json_null(json, "emergency");
+        return;
+    }
+    for (unsigned i = 0; i < sizeof emergency->maker; i++) {
+        (void)snprintf(&maker[2u * i], 3, "%02X", emergency->maker[i]);
+    }
+    json_open(json, "emergency", '{');
+    json_number(json, "code", emergency->code);
+    json_text(json, "text", report->error);
+    json_number(json, "register", emergency->error_register);
+    json_text(json, "manufacturer", maker);
+    json_bool(json, "over", emergency->is_over);
+    json_number(json, "count", emergency->count);
+    write_age(json, "age_ms", emergency->at_us, now_us);
+    json_close(json, '}');
 }
 
 /* What the drive is at, in words; null where its driver has none. */
@@ -164,16 +198,8 @@ static void write_report(json_t *json, const drive_report_t *report, uint64_t no
     json_number(json, "detail_code", report->detail_code);
     json_ms(json, "age_ms", now_us >= report->since_us ? now_us - report->since_us : 0);
     write_notes(json, report->notes);
+    write_emergency(json, report, now_us);
     json_close(json, '}');
-}
-
-static void write_age(json_t *json, const char *key, uint64_t at_us, uint64_t now_us)
-{
-    if (at_us == 0 || at_us > now_us) {
-        json_null(json, key);
-    } else {
-        json_ms(json, key, now_us - at_us);
-    }
 }
 
 /* How a drive is served; null where its bus has a period of its own, or nothing is known yet. */

@@ -58,12 +58,15 @@ void cia402_axis_init(cia402_drive_t drive)
     look_for(drive);
 }
 
+/* An error that the drive told of and has not taken back may be why it does not become, or stay, operational. */
 static void note_trouble(cia402_drive_t drive, cia402_trouble_t why)
 {
+    const drive_emergency_t *emergency = &drive.axis->emergency;
+    const bool is_reason = !emergency->is_over && (why == CIA402_NO_START || why == CIA402_LEFT_OPERATIONAL);
     drive.axis->trouble = why;
     drive.axis->trouble_us = drive.now_us;
     drive.axis->trouble_object = 0;
-    drive.axis->trouble_code = 0;
+    drive.axis->trouble_code = is_reason ? emergency->code : 0;
 }
 
 void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why)
@@ -157,9 +160,21 @@ void cia402_axis_take_tpdo(cia402_drive_t drive, const can_frame_t *frame)
 void cia402_axis_take_emergency(cia402_drive_t drive, const can_frame_t *frame)
 {
     const uint16_t code = (uint16_t)(frame->data[0] | frame->data[1] << 8);
-    if (frame->length == 8 && code != 0) {
-        drive.axis->error_code = code;
-        drive.axis->error_register = frame->data[2];
+    drive_emergency_t *emergency = &drive.axis->emergency;
+    if (frame->length != 8) {
+        return;
+    }
+    emergency->is_over = code == 0;
+    if (code == 0) {
+        return;
+    }
+    drive.axis->error_code = code;
+    emergency->at_us = drive.now_us;
+    emergency->count++;
+    emergency->code = code;
+    emergency->error_register = frame->data[2];
+    for (unsigned i = 0; i < sizeof emergency->maker; i++) {
+        emergency->maker[i] = frame->data[3u + i];
     }
 }
 
@@ -173,6 +188,7 @@ static void take_boot(cia402_drive_t drive)
     self->starts = self->phase == CIA402_REFUSED ? 0 : self->starts;
     self->is_reset_done = true; /* it has just begun anew */
     self->statusword = 0;       /* without torque */
+    self->emergency.is_over = true;
     look_for(drive);
 }
 

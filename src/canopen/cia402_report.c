@@ -154,9 +154,24 @@ static uint32_t object_of(const cia402_axis_t *axis)
     return is_refusing(axis) ? axis->trouble_object : axis->warned_object;
 }
 
+/* The drive itself has told why. */
+static bool has_error_for_reason(const cia402_axis_t *axis)
+{
+    const bool is_such = axis->trouble == CIA402_NO_START || axis->trouble == CIA402_LEFT_OPERATIONAL;
+    return is_such && axis->phase != CIA402_UP && axis->trouble_code != 0;
+}
+
+static uint32_t detail_code(const cia402_axis_t *axis)
+{
+    return has_error_for_reason(axis) || (is_refusing(axis) && axis->trouble_object != 0) ? axis->trouble_code : 0;
+}
+
 /* A value below 2^24 is one that was found; abort codes are above. */
 static const char *detail_text(const cia402_axis_t *axis)
 {
+    if (has_error_for_reason(axis)) {
+        return canopen_error_text((uint16_t)axis->trouble_code);
+    }
     if (!is_refusing(axis) || axis->trouble_object == 0) {
         return axis->warned_object != 0 && axis->phase == CIA402_UP ? "its guard is off, which the configuration allows" : "";
     }
@@ -175,7 +190,9 @@ void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *ou
         .code = code,
         .object = object_of(axis),
         .detail = detail_text(axis),
-        .detail_code = is_refusing(axis) && axis->trouble_object != 0 ? axis->trouble_code : 0,
+        .detail_code = detail_code(axis),
+        .error = axis->emergency.count != 0 ? canopen_error_text(axis->emergency.code) : NULL,
+        .emergency = axis->emergency,
         .notes = axis->phase == CIA402_UP ? axis->notes : 0,
         .since_us = code != 0 ? axis->trouble_us : axis->phase_us,
     };

@@ -5,6 +5,8 @@
 
 #include "heave/text.h"
 
+#define EMERGENCY_LOG_US 1000000u
+
 static void put_object(text_t *text, bool is_register, uint32_t object)
 {
     if (is_register) {
@@ -75,6 +77,42 @@ static void log_notes(const gateway_t *self, unsigned axis, const drive_report_t
     hal_log_write(self->io.log, report->notes != 0 ? HAL_LOG_WARNING : HAL_LOG_NOTICE, line);
 }
 
+/* Some drives send errors and their end in pairs, many in a second: a line in a second, with how many there were. */
+static void log_emergency(gateway_t *self, unsigned axis, const drive_report_t *report)
+{
+    const drive_emergency_t *emergency = &report->emergency;
+    const uint32_t count = emergency->count - self->emergencies_logged[axis];
+    const uint64_t now_us = self->snapshot.now_us;
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    if (count == 0 || report->error == NULL ||
+        (self->emergency_logged_us[axis] != 0 && now_us - self->emergency_logged_us[axis] < EMERGENCY_LOG_US)) {
+        return;
+    }
+    text_put(&text, "axis ");
+    text_put_u32(&text, axis + 1u);
+    text_put(&text, ", node ");
+    text_put_u32(&text, report->address);
+    text_put(&text, ": error 0x");
+    text_put_hex(&text, emergency->code, 4);
+    text_put(&text, ", ");
+    text_put(&text, report->error);
+    text_put(&text, "; register 0x");
+    text_put_hex(&text, emergency->error_register, 2);
+    text_put(&text, ", manufacturer");
+    for (unsigned i = 0; i < sizeof emergency->maker; i++) {
+        text_put(&text, " ");
+        text_put_hex(&text, emergency->maker[i], 2);
+    }
+    if (count > 1u) {
+        text_put(&text, "; the last of ");
+        text_put_u32(&text, count);
+    }
+    hal_log_write(self->io.log, HAL_LOG_WARNING, line);
+    self->emergency_logged_us[axis] = now_us;
+    self->emergencies_logged[axis] = emergency->count;
+}
+
 /* Worth a line: another trouble, the end of one, or a refusal with its reason. */
 static bool is_news(const drive_report_t *was, const drive_report_t *is)
 {
@@ -93,6 +131,7 @@ void reports_take(gateway_t *self)
         if (self->snapshot.report[i].notes != report.notes) {
             log_notes(self, i, &report);
         }
+        log_emergency(self, i, &report);
         self->snapshot.report[i] = report;
     }
 }

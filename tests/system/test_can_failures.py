@@ -180,8 +180,26 @@ def tells(bench, source):
     assert status["state"] in ("RISING", "ENGAGED"), status["state"]
     assert notes[VICTIM - 1] == ["is at a limit of its own", "warns"] and not any(notes[:VICTIM - 1] + notes[VICTIM:]), notes
     assert f"axis {VICTIM}, node {VICTIM}: is at a limit of its own; warns\n" in daemon.log.read_text(encoding="utf-8")
-    table = bench.ctl("status").stdout
+    table = " ".join(bench.ctl("status").stdout.split())
     assert "tells: is at a limit of its own; warns" in table, table
+
+
+def error_is_told(bench, source):
+    """An EMCY alone: in the status, in the log once a second, in the metrics, in the incident; and nothing stops."""
+    daemon = in_motion(bench, source)
+    for _ in range(20):
+        bench.do("emergency", VICTIM, code=0xFF00)
+        time.sleep(0.01)
+    time.sleep(0.1)
+    status = bench.status()
+    found = status["cylinders"][VICTIM - 1]["report"]["emergency"]
+    assert status["state"] in ("RISING", "ENGAGED"), status["state"]
+    assert (found["code"], found["register"], found["count"], found["over"]) == (0xFF00, 0x81, 20, False) and found["age_ms"] < 1000, found
+    assert all(leg["report"]["emergency"] is None for leg in status["cylinders"] if leg["number"] != VICTIM), status["cylinders"]
+    log = daemon.log.read_text(encoding="utf-8")
+    assert log.count(f"axis {VICTIM}, node {VICTIM}: error 0xFF00") == 1, log
+    table = " ".join(bench.ctl("status").stdout.split())  # lines break where the table is narrow
+    assert "error 0xFF00 (" in table and "register 0x81, manufacturer 00" in table, table
 
 
 def local_drive_is_not_enabled(bench, _):
@@ -415,6 +433,7 @@ CASES = [(f"{name}: all stop together", stops_all_drives(*row)) for name, *row i
 CASES += [
     ("lost answers, 1, 2 and 3: nothing stops", harmless(*(("tpdo drop", {"count": count}) for count in (1, 2, 3)))),
     ("a drive's limit and warning are told: nothing stops", tells),
+    ("an EMCY is told of once a second with all it says: nothing stops", error_is_told),
     ("a drive under local control is named, nobody is enabled", local_drive_is_not_enabled),
     ("an EMCY without a fault: nothing stops", harmless(("emergency", {"code": 0xFF00}))),
 ]

@@ -2121,6 +2121,79 @@ static void test_watch_limit_while_homing_stops_nothing(void)
     TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
 }
 
+/* --- Errors that drives tell of by themselves --- */
+
+static void tell_error(unsigned drive, uint16_t code)
+{
+    const can_frame_t frame = {
+        .id = 0x81u + drive, .length = 8, .data = {(uint8_t)code, (uint8_t)(code >> 8), 0x11, 1, 2, 3, 4, 5}};
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+    cycles(2);
+}
+
+static void test_emergency_is_reported_with_all_that_it_says(void)
+{
+    come_up();
+    TEST_ASSERT_NULL(report(3).error);
+    enable();
+    tell_error(3, 0x4310);
+    const drive_report_t r = report(3);
+    TEST_ASSERT_EQUAL_HEX16(0x4310, r.emergency.code);
+    TEST_ASSERT_EQUAL_HEX8(0x11, r.emergency.error_register);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(((const uint8_t[]){1, 2, 3, 4, 5}), r.emergency.maker, 5);
+    TEST_ASSERT_EQUAL_UINT32(1, r.emergency.count);
+    TEST_ASSERT_TRUE(now_us - r.emergency.at_us <= 2 * CYCLE_US && !r.emergency.is_over);
+    TEST_ASSERT_EQUAL_STRING("the motor is too hot", r.error);
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    tell_error(3, 0);
+    TEST_ASSERT_TRUE(report(3).emergency.is_over);
+    TEST_ASSERT_EQUAL_HEX16(0x4310, report(3).emergency.code);
+    TEST_ASSERT_EQUAL_UINT32(1, report(3).emergency.count);
+}
+
+static void test_emergency_is_kept_over_a_loss_and_over_with_a_boot(void)
+{
+    come_up();
+    tell_error(2, 0x3220);
+    cia402_slave_power(&slave, 2, false);
+    (void)cycles_until(2, DRIVE_OFFLINE, 100);
+    cycles(1000);
+    TEST_ASSERT_EQUAL_HEX16(0x3220, report(2).emergency.code);
+    TEST_ASSERT_FALSE(report(2).emergency.is_over);
+    cia402_slave_power(&slave, 2, true);
+    await(DRIVE_DISABLED, 3000);
+    TEST_ASSERT_EQUAL_HEX16(0x3220, report(2).emergency.code);
+    TEST_ASSERT_TRUE(report(2).emergency.is_over);
+}
+
+/* As stacks do that miss their SYNC. */
+static void test_emergency_of_a_drive_that_stays_preoperational_is_the_reason(void)
+{
+    start();
+    while (driver.axis[4].phase != CIA402_REFUSED) {
+        slave.drive[4].nmt = slave.drive[4].nmt == 5 ? 0x7F : slave.drive[4].nmt;
+        if (driver.axis[4].phase == CIA402_STARTING && (report(4).error == NULL || report(4).emergency.is_over)) {
+            tell_error(4, 0x8100);
+        }
+        cycles(1);
+    }
+    const drive_report_t r = report(4);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NO_START, r.code);
+    TEST_ASSERT_EQUAL_HEX32(0x8100, r.detail_code);
+    TEST_ASSERT_EQUAL_STRING(r.error, r.detail);
+}
+
+static void test_emergency_that_leaves_operational_is_the_reason(void)
+{
+    come_up();
+    tell_error(1, 0x8100);
+    slave.drive[1].nmt = 0x7F;
+    slave.drive[1].beat_us = 0;
+    (void)cycles_until(1, DRIVE_OFFLINE, 60);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_LEFT_OPERATIONAL, feedback[1].fault_code);
+    TEST_ASSERT_EQUAL_HEX32(0x8100, report(1).detail_code);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -2227,5 +2300,9 @@ int main(void)
     RUN_TEST(test_watch_bits_that_a_drive_does_not_have_are_not_missed);
     RUN_TEST(test_watch_drive_under_local_control_is_not_enabled);
     RUN_TEST(test_watch_limit_while_homing_stops_nothing);
+    RUN_TEST(test_emergency_is_reported_with_all_that_it_says);
+    RUN_TEST(test_emergency_is_kept_over_a_loss_and_over_with_a_boot);
+    RUN_TEST(test_emergency_of_a_drive_that_stays_preoperational_is_the_reason);
+    RUN_TEST(test_emergency_that_leaves_operational_is_the_reason);
     return UNITY_END();
 }

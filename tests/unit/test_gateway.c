@@ -1879,6 +1879,29 @@ static void test_telemetry_notes_of_drives_are_logged_when_they_change(void)
     TEST_ASSERT_EQUAL_STRING("", drive_note_text(DRIVE_NOTES));
 }
 
+static void test_telemetry_errors_of_drives_are_logged_once_a_second(void)
+{
+    engage();
+    make_talkative();
+    m_reports =
+        (drive_report_t){.address = 12,
+                         .phase = "enabled",
+                         .trouble = "",
+                         .detail = "",
+                         .error = "too hot",
+                         .emergency = {.at_us = 1, .count = 1, .code = 0x4310, .error_register = 9, .maker = {0xAB, 0, 0, 0, 1}}};
+    rig_run_ms(&m_rig, 5);
+    TEST_ASSERT_TRUE(
+        rig_was_logged(&m_rig, "axis 2, node 12: error 0x4310, too hot; register 0x09, manufacturer AB 00 00 00 01"));
+    m_reports.emergency.count = 201;
+    rig_run_ms(&m_rig, 500);
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "axis 2"));
+    rig_run_ms(&m_rig, 600);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "manufacturer AB 00 00 00 01; the last of 200"));
+    rig_run_ms(&m_rig, 2000);
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "axis 2"));
+}
+
 static void test_intensity_is_taken_within_its_range_and_told(void)
 {
     m_settings.intensity_max_percent = 80;
@@ -2279,6 +2302,7 @@ static void run_supervision(void)
     RUN_TEST(test_telemetry_actual_pose_follows_the_feedback);
     RUN_TEST(test_telemetry_reports_of_drives_are_logged_once_with_what_they_name);
     RUN_TEST(test_telemetry_notes_of_drives_are_logged_when_they_change);
+    RUN_TEST(test_telemetry_errors_of_drives_are_logged_once_a_second);
     RUN_TEST(test_intensity_is_taken_within_its_range_and_told);
     RUN_TEST(test_shutdown_on_a_bus_that_takes_nothing_ends_all_the_same);
     RUN_TEST(test_shutdown_from_settled_waits_until_the_bus_has_taken_it);
