@@ -51,7 +51,8 @@ typedef enum {
     CIA402_NOT_FOLLOWING = 0x10013, /**< ignores its set-points (bit 12) */
     CIA402_NO_VOLTAGE = 0x10014,    /**< bit 4 */
     CIA402_LIMITED = 0x10015,       /**< bit 11 */
-    CIA402_WARNING = 0x10016        /**< bit 7 */
+    CIA402_WARNING = 0x10016,       /**< bit 7 */
+    CIA402_NO_ANSWER = 0x10017      /**< answers, only not when asked for one object */
 } cia402_trouble_t;
 
 /** What is watched in every answer, beyond state and position: bits of drive_report_t.notes. */
@@ -158,10 +159,12 @@ typedef struct {
     uint64_t trouble_us;
     uint32_t trouble_object; /* index << 8 | sub */
     uint32_t trouble_code;   /* SDO abort code, or the value found */
+    uint32_t mute_object;    /* no answer came when it was asked for; 0 = none */
     uint32_t warned_object;  /* a guard that is off and was allowed to be */
     uint8_t nmt;             /* last heard */
     uint8_t nmt_command;     /* waits to be sent, 0 = none */
     uint8_t starts;          /* attempts to become operational */
+    uint8_t mutes;           /* attempts that ended at an object without answer */
     bool is_reset_done;
     sdo_t sdo;
     cia402_setup_t setup;

@@ -84,6 +84,14 @@ typedef struct {
     uint32_t relay_safe_after_ms;
 } gateway_settings_t;
 
+/** Which line about a drive was written last, so that one that comes and goes for ever does not fill the log. */
+typedef struct {
+    uint64_t next_us; /**< a line is free from then on, less what a burst may use up */
+    uint32_t code;
+    uint32_t detail_code;
+    uint32_t left_out; /**< changes since then that no line told of */
+} gateway_told_t;
+
 /** A gateway; members are private to src/gateway. */
 typedef struct {
     gateway_settings_t settings;
@@ -129,6 +137,7 @@ typedef struct {
     uint32_t spikes_logged; /**< of all spikes, those that a line told of */
     uint64_t jump_logged_us;
     uint32_t jumps_logged;                    /**< likewise */
+    gateway_told_t told_of[DRIVES_MAX];       /**< the last line about what a drive is at */
     uint64_t emergency_logged_us[DRIVES_MAX]; /**< 0 = never */
     uint32_t emergencies_logged[DRIVES_MAX];  /**< of all of a drive, those that a line told of, or counted */
     uint64_t reject_logged_us[FRAME_ERRORS];

@@ -75,6 +75,7 @@ void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why)
     const bool may_hear = self->phase == CIA402_UP && why != CIA402_REBOOTED && why != CIA402_LOST_BUS;
     note_trouble(drive, why);
     self->is_answering = self->is_answering && (why == CIA402_REBOOTED || why == CIA402_LEFT_OPERATIONAL);
+    self->mute_object = 0;
     self->is_in = false;
     self->is_homed = drive.own->homing_method == 0;
     self->homing = CIA402_HOMING_NO;
@@ -112,6 +113,7 @@ void cia402_axis_reset(cia402_drive_t drive)
     if (self->phase == CIA402_REFUSED) {
         self->is_reset_done = false;
         self->starts = 0;
+        self->mutes = 0;
         look_for(drive);
     }
     self->reset_until_us = drive.now_us + RESET_US;
@@ -186,6 +188,8 @@ static void take_boot(cia402_drive_t drive)
         cia402_axis_lose(drive, CIA402_REBOOTED);
     }
     self->starts = self->phase == CIA402_REFUSED ? 0 : self->starts;
+    self->mutes = self->phase == CIA402_REFUSED ? 0 : self->mutes;
+    self->mute_object = 0;
     self->is_reset_done = true; /* it has just begun anew */
     self->statusword = 0;       /* without torque */
     self->emergency.is_over = true;
@@ -214,17 +218,37 @@ void cia402_axis_note_sync(cia402_axis_t *self)
 
 /* --- From missing to up --- */
 
+/* The drive answers again. It fell silent when it was asked for an object: once may have been the bus. */
+static bool is_mute_again(cia402_drive_t drive)
+{
+    cia402_axis_t *self = drive.axis;
+    const uint32_t object = self->mute_object;
+    self->mute_object = 0;
+    if (object == 0) {
+        return false;
+    }
+    self->trouble = CIA402_NO_ANSWER;
+    self->trouble_object = object;
+    self->mutes++;
+    return self->mutes >= RESTARTS_MAX;
+}
+
 static void step_missing(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     if (self->sdo.state == SDO_SILENT) {
         self->is_answering = false;
-        if (self->trouble == CIA402_TROUBLE_NONE) {
+        self->mute_object = 0;
+        if (self->trouble == CIA402_TROUBLE_NONE || self->trouble == CIA402_NO_ANSWER) {
             note_trouble(drive, CIA402_SILENT);
         }
         sdo_read(&self->sdo, 0x1000, 0, 1);
     } else if (self->sdo.state == SDO_DONE || self->sdo.state == SDO_ABORTED) {
         self->is_answering = true;
+        if (is_mute_again(drive)) {
+            enter(drive, CIA402_REFUSED);
+            return;
+        }
         self->trouble = self->trouble == CIA402_SILENT ? CIA402_TROUBLE_NONE : self->trouble;
         if (drive.config->is_reset_wanted && !self->is_reset_done) {
             self->nmt_command = NMT_RESET;
@@ -236,6 +260,19 @@ static void step_missing(cia402_drive_t drive)
             cia402_setup_begin(self, CIA402_JOB_SETUP, drive.config->mode, drive.now_us);
         }
     }
+}
+
+/* Whether it is the object or the drive, the next question tells. */
+static void lose_at_object(cia402_drive_t drive)
+{
+    cia402_axis_t *self = drive.axis;
+    const uint32_t object = cia402_setup_object(self);
+    const bool is_same = self->trouble == CIA402_NO_ANSWER && self->trouble_object == object;
+    const bool was_answering = self->is_answering;
+    cia402_axis_lose(drive, is_same ? CIA402_NO_ANSWER : CIA402_SILENT);
+    self->trouble_object = is_same ? object : 0;
+    self->is_answering = was_answering;
+    self->mute_object = object;
 }
 
 /* The boot-up message leads on; a drive that sends none is asked all the same. */
@@ -263,7 +300,7 @@ static void step_configuring(cia402_drive_t drive)
         enter(drive, CIA402_REFUSED);
         break;
     case CIA402_SETUP_SILENT:
-        cia402_axis_lose(drive, CIA402_SILENT);
+        lose_at_object(drive);
         break;
     }
 }
@@ -273,7 +310,9 @@ static void come_up(cia402_drive_t drive)
     cia402_axis_t *self = drive.axis;
     enter(drive, CIA402_UP);
     self->trouble = CIA402_TROUBLE_NONE;
+    self->trouble_object = 0;
     self->starts = 0;
+    self->mutes = 0;
     self->heartbeat_us = drive.now_us;
     self->goal = CIA402_GOAL_OFF;
     self->word_syncs = 0;
@@ -367,7 +406,7 @@ static void step_jobs(cia402_drive_t drive)
     } else if (job == CIA402_JOB_MODE && result == CIA402_SETUP_REFUSED) {
         cia402_axis_fail(drive, self->trouble);
     } else if (job == CIA402_JOB_MODE && result == CIA402_SETUP_SILENT) {
-        cia402_axis_lose(drive, CIA402_SILENT);
+        lose_at_object(drive);
     }
 }
 

@@ -4,7 +4,7 @@
 #include "cia402_report.h"
 
 #include "cia402_axis.h"
-#include "cia402_objects.h"
+#include "cia402_setup.h"
 #include "heave/canopen_text.h"
 #include "heave/guard.h"
 
@@ -85,6 +85,7 @@ static const struct {
     {CIA402_NO_TORQUE, "does not enable operation: brake, safe torque off?"},
     {CIA402_REMOTE_OFF, "is under local control, not under that of the bus"},
     {CIA402_FELL_OUT, "left operation enabled by itself: enable input, safe torque off?"},
+    {CIA402_NO_ANSWER, "gives no answer when it is asked for an object"},
     {CIA402_LEFT_MODE, "left its mode of operation by itself"},
     {CIA402_NOT_FOLLOWING, "ignores its set-points: halted, or held by its own logic?"},
     {CIA402_NO_VOLTAGE, "has no voltage at its power stage: supply, contactor?"},
@@ -148,10 +149,10 @@ static bool is_refusing(const cia402_axis_t *axis)
 static uint32_t object_of(const cia402_axis_t *axis)
 {
     if (axis->phase == CIA402_CONFIGURING) {
-        const cia402_object_t *row = &cia402_objects[axis->setup.row];
-        return (uint32_t)row->index << 8 | row->sub;
+        return cia402_setup_object(axis);
     }
-    return is_refusing(axis) ? axis->trouble_object : axis->warned_object;
+    const bool is_mute = axis->phase != CIA402_UP && axis->trouble == CIA402_NO_ANSWER;
+    return is_refusing(axis) || is_mute ? axis->trouble_object : axis->warned_object;
 }
 
 /* The drive itself has told why. */
@@ -174,6 +175,9 @@ static const char *detail_text(const cia402_axis_t *axis)
     }
     if (!is_refusing(axis) || axis->trouble_object == 0) {
         return axis->warned_object != 0 && axis->phase == CIA402_UP ? "its guard is off, which the configuration allows" : "";
+    }
+    if (axis->trouble == CIA402_NO_ANSWER) {
+        return "";
     }
     return axis->trouble_code >= 0x05000000u ? canopen_abort_text(axis->trouble_code) : "it holds another value";
 }

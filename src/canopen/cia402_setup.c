@@ -90,6 +90,11 @@ static uint32_t object_of(const cia402_object_t *row)
     return (uint32_t)row->index << 8 | row->sub;
 }
 
+uint32_t cia402_setup_object(const cia402_axis_t *self)
+{
+    return object_of(&cia402_objects[self->setup.row]);
+}
+
 static cia402_setup_result_t refuse(cia402_axis_t *self, const cia402_object_t *row, uint32_t code)
 {
     self->setup.job = CIA402_JOB_NONE;
@@ -203,6 +208,16 @@ static cia402_setup_result_t listen(cia402_axis_t *self, const cia402_config_t *
     return CIA402_SETUP_BUSY;
 }
 
+/* What may be missing may be so without a word: some drives drop questions for objects that they do not have. */
+static cia402_setup_result_t take_silence(cia402_axis_t *self, const cia402_config_t *config, uint64_t now_us)
+{
+    if (cia402_objects[self->setup.row].need == CIA402_IF_THERE) {
+        return give_up(self, config, 0, now_us);
+    }
+    self->setup.job = CIA402_JOB_NONE;
+    return CIA402_SETUP_SILENT;
+}
+
 static cia402_setup_result_t go_on(cia402_axis_t *self, const cia402_config_t *config, const cia402_axis_config_t *axis,
                                    uint64_t now_us)
 {
@@ -219,11 +234,7 @@ static cia402_setup_result_t go_on(cia402_axis_t *self, const cia402_config_t *c
     if (self->sdo.state == SDO_ABORTED) {
         return take_abort(self, config, now_us);
     }
-    if (self->sdo.state == SDO_SILENT) {
-        self->setup.job = CIA402_JOB_NONE;
-        return CIA402_SETUP_SILENT;
-    }
-    return CIA402_SETUP_BUSY;
+    return self->sdo.state == SDO_SILENT ? take_silence(self, config, now_us) : CIA402_SETUP_BUSY;
 }
 
 /* Passes over rows that mean nothing here.

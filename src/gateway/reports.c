@@ -6,6 +6,8 @@
 #include "heave/text.h"
 
 #define EMERGENCY_LOG_US 1000000u
+#define REPORT_LOG_US    10000000u /* a line about a drive each, in the long run, */
+#define REPORT_BURST     5u        /* and as many at once */
 
 static void put_object(text_t *text, bool is_register, uint32_t object)
 {
@@ -33,7 +35,7 @@ static void put_detail(text_t *text, const drive_report_t *report)
     }
 }
 
-static void log_report(const gateway_t *self, unsigned axis, const drive_report_t *report)
+static void log_report(const gateway_t *self, unsigned axis, const drive_report_t *report, uint32_t left_out)
 {
     char line[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(line, sizeof line);
@@ -54,6 +56,11 @@ static void log_report(const gateway_t *self, unsigned axis, const drive_report_
         put_object(&text, report->is_modbus, report->object);
     }
     put_detail(&text, report);
+    if (left_out > 0) {
+        text_put(&text, "; ");
+        text_put_u32(&text, left_out);
+        text_put(&text, " changes before this were left out");
+    }
     hal_log_write(self->io.log, report->code != 0 ? HAL_LOG_WARNING : HAL_LOG_NOTICE, line);
 }
 
@@ -114,10 +121,26 @@ static void log_emergency(gateway_t *self, unsigned axis, const drive_report_t *
 }
 
 /* Worth a line: another trouble, the end of one, or a refusal with its reason. */
-static bool is_news(const drive_report_t *was, const drive_report_t *is)
+static bool is_news(uint32_t code, uint32_t detail_code, const drive_report_t *is)
 {
-    const bool is_other = was->code != is->code || (is->code != 0 && was->detail_code != is->detail_code);
-    return is->address != 0 && is_other;
+    return is->address != 0 && (code != is->code || (is->code != 0 && detail_code != is->detail_code));
+}
+
+/* What comes and goes is told of less often; what is in the end is always told of. */
+static void tell_report(gateway_t *self, unsigned axis, const drive_report_t *report)
+{
+    const drive_report_t *was = &self->snapshot.report[axis];
+    gateway_told_t *told = &self->told_of[axis];
+    const uint64_t now_us = self->snapshot.now_us;
+    const bool is_free = now_us + (uint64_t)(REPORT_BURST - 1u) * REPORT_LOG_US >= told->next_us;
+    if (is_news(told->code, told->detail_code, report) && is_free) {
+        log_report(self, axis, report, told->left_out);
+        *told = (gateway_told_t){.next_us = (told->next_us > now_us ? told->next_us : now_us) + REPORT_LOG_US,
+                                 .code = report->code,
+                                 .detail_code = report->detail_code};
+    } else {
+        told->left_out += is_news(was->code, was->detail_code, report);
+    }
 }
 
 void reports_take(gateway_t *self)
@@ -125,9 +148,7 @@ void reports_take(gateway_t *self)
     for (uint8_t i = 0; i < drives_count(self->io.drives); i++) {
         drive_report_t report;
         (void)drives_report(self->io.drives, i, &report);
-        if (is_news(&self->snapshot.report[i], &report)) {
-            log_report(self, i, &report);
-        }
+        tell_report(self, i, &report);
         if (self->snapshot.report[i].notes != report.notes) {
             log_notes(self, i, &report);
         }

@@ -390,6 +390,23 @@ def all_drives_refused(bench, _):
     bench.wait_state("ENGAGED")
 
 
+def object_without_answer(bench, _):
+    """It answers everything else: named with the object, reset no more than once, and at an engage the reason is told."""
+    bench.start_drives(only={VICTIM: {"no_answer": ["6065:0"]}})
+    daemon = bench.start(config=test_can.can_config(bench, platform__engage="manual"))
+    heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "refused", "is refused")
+    report = bench.status()["cylinders"][VICTIM - 1]["report"]
+    assert (report["code"], report["object"], report["sub_index"]) == (0x10017, 0x6065, 0), report
+    lines = [line for line in daemon.log.read_text(encoding="utf-8").splitlines() if f"node {VICTIM}," in line]
+    assert len(lines) <= 3 and "object 6065:00" in lines[-1], lines
+    assert bench.ctl("engage").returncode != 0
+    bench.wait_state("FAULT")
+    fault = bench.status()["fault"]
+    assert (fault["name"], fault["axis"], fault["device_code"]) == ("drive-offline", VICTIM, 0x10017) and fault["device_text"], fault
+    bench.do("answer sdo", VICTIM)
+    bench.reset()
+
+
 # --- The gateway in trouble ---
 
 KILLS = 6
@@ -441,6 +458,7 @@ CASES += [(f"{name}: silence, latched", bus_lost(*row)) for name, *row in BUS_RO
 CASES += [("error-passive for more than a second: a controlled stop, latched", passive_stops),
           ("error-passive for less, and a storm of error frames: nothing stops", disturbed)]
 CASES += [("drives missing or wrong are named, nobody is enabled", bad_drives_are_named),
+          ("a drive that never answers for an object is named with it", object_without_answer),
           ("drives that all refuse the same: named, no lost bus, a reset sets them up again", all_drives_refused), ("killed at random moments and started again", killed_anywhere)]
 
 

@@ -466,6 +466,71 @@ static void test_setup_missing_drive_is_named_and_taken_when_it_comes(void)
     TEST_ASSERT_EQUAL_HEX32(0, report(6).code);
 }
 
+/* It answers, only not when it is asked for that. */
+static void test_setup_object_that_is_never_answered_is_named_and_not_tried_for_ever(void)
+{
+    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = true;
+    const drive_report_t r = refusal_of(2);
+    TEST_ASSERT_EQUAL_STRING("refused", r.phase);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, r.code);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, feedback[2].fault_code);
+    TEST_ASSERT_EQUAL_HEX32(0x606500, r.object);
+    const uint32_t boots = slave.drive[2].boots;
+    TEST_ASSERT_TRUE(boots <= 3);
+    cycles(10000);
+    TEST_ASSERT_EQUAL_UINT32(boots, slave.drive[2].boots);
+    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = false;
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    await(DRIVE_DISABLED, 3000);
+    TEST_ASSERT_EQUAL_HEX32(0, report(2).code);
+    TEST_ASSERT_EQUAL_HEX32(0, report(2).object);
+}
+
+/* While it is tried again, too: an engage would be refused for a reason. */
+static void test_setup_object_without_answer_is_named_while_it_is_tried_again(void)
+{
+    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = true;
+    start();
+    for (unsigned i = 0; i < 5000 && feedback[2].fault_code != CIA402_NO_ANSWER; i++) {
+        (void)!cycle();
+    }
+    while (driver.axis[2].phase != CIA402_REFUSED) {
+        TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, feedback[2].fault_code);
+        TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, report(2).code);
+        (void)!cycle();
+    }
+}
+
+static void test_setup_object_that_may_be_missing_may_be_without_answer(void)
+{
+    cia402_slave_row(&slave, 2, 0x605B, 0)->is_silent = true;
+    come_up();
+    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].boots);
+}
+
+static void test_setup_one_question_without_answer_is_asked_again_from_the_beginning(void)
+{
+    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = true;
+    start();
+    for (unsigned i = 0; i < 5000 && feedback[2].fault_code != CIA402_NO_ANSWER; i++) {
+        (void)!cycle();
+    }
+    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = false;
+    await(DRIVE_DISABLED, 3000);
+    TEST_ASSERT_EQUAL_HEX32(0, report(2).code);
+}
+
+/* At a change of mode: lost, and then refused by name. */
+static void test_enable_drive_that_does_not_answer_for_its_mode_is_named(void)
+{
+    come_up();
+    cia402_slave_row(&slave, 4, 0x6061, 0)->is_silent = true;
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    cycles(8000);
+    TEST_ASSERT_EQUAL_STRING("refused", report(4).phase);
+    TEST_ASSERT_EQUAL_HEX32(0x606100, report(4).object);
+}
+
 /* Every answer is given to the next question only: with the retries each object is right in the end. */
 static void test_setup_answers_that_come_late_do_not_confuse(void)
 {
@@ -2214,6 +2279,11 @@ int main(void)
     RUN_TEST(test_setup_drive_that_goes_operational_by_itself_is_told_again);
     RUN_TEST(test_setup_optional_objects_missing_is_no_trouble);
     RUN_TEST(test_setup_missing_drive_is_named_and_taken_when_it_comes);
+    RUN_TEST(test_setup_object_that_is_never_answered_is_named_and_not_tried_for_ever);
+    RUN_TEST(test_setup_object_without_answer_is_named_while_it_is_tried_again);
+    RUN_TEST(test_setup_object_that_may_be_missing_may_be_without_answer);
+    RUN_TEST(test_setup_one_question_without_answer_is_asked_again_from_the_beginning);
+    RUN_TEST(test_enable_drive_that_does_not_answer_for_its_mode_is_named);
     RUN_TEST(test_setup_answers_that_come_late_do_not_confuse);
     RUN_TEST(test_setup_refused_drive_is_tried_again_by_a_reset);
     RUN_TEST(test_setup_refusal_that_may_pass_is_asked_again_before_it_counts);

@@ -1863,6 +1863,27 @@ static void test_telemetry_reports_of_drives_are_logged_once_with_what_they_name
     TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, unit 3, missing: no answer (0x0032), register 0x0102"));
 }
 
+/* A drive that boots for ever. */
+static void test_telemetry_reports_that_come_and_go_are_told_of_less_often(void)
+{
+    const drive_report_t bad = {.address = 12, .phase = "missing", .trouble = "no answer", .detail = "", .code = 0x31};
+    const drive_report_t good = {.address = 12, .phase = "ready", .trouble = "", .detail = ""};
+    unsigned lines = 0;
+    engage();
+    make_talkative();
+    for (unsigned i = 0; i < 200; i++) {
+        m_reports = i % 2 == 0 ? bad : good;
+        rig_run_ms(&m_rig, 100);
+        lines += rig_was_logged(&m_rig, "axis 2, node 12, ");
+    }
+    TEST_ASSERT_TRUE(lines >= 5 && lines <= 7);
+    m_reports = bad;
+    rig_run_ms(&m_rig, 10500);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, node 12, missing: no answer (0x0031); "));
+    rig_run_ms(&m_rig, 60000);
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "axis 2"));
+}
+
 static void test_telemetry_notes_of_drives_are_logged_when_they_change(void)
 {
     engage();
@@ -2301,6 +2322,7 @@ static void run_supervision(void)
     RUN_TEST(test_telemetry_actual_speed_is_that_of_the_plate);
     RUN_TEST(test_telemetry_actual_pose_follows_the_feedback);
     RUN_TEST(test_telemetry_reports_of_drives_are_logged_once_with_what_they_name);
+    RUN_TEST(test_telemetry_reports_that_come_and_go_are_told_of_less_often);
     RUN_TEST(test_telemetry_notes_of_drives_are_logged_when_they_change);
     RUN_TEST(test_telemetry_errors_of_drives_are_logged_once_a_second);
     RUN_TEST(test_intensity_is_taken_within_its_range_and_told);
