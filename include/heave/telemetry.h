@@ -59,6 +59,7 @@ typedef struct {
     bool is_held_by_silence;
     bool is_estop_active;
     fault_t fault;                       /**< the first one since the last reset */
+    drive_report_t fault_report;         /**< what its drive was at then, in words; "" where none is concerned */
     fault_reaction_t reaction;           /**< the worst of them */
     uint64_t fault_last_us[FAULT_CODES]; /**< when each was last seen to begin, 0 = never */
     uint32_t begun[DRIVES_MAX + 1u];     /**< in this cycle, by axis as in fault_t: bit N for fault_code_t N */

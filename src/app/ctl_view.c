@@ -220,6 +220,22 @@ static void draw_bar(view_t *self, double sent, double actual, double whole)
     }
 }
 
+static void draw_object(view_t *self, const cJSON *report)
+{
+    if (number(report, "register") > 0.0) {
+        put_piece(self, ", register 0x%04X", (unsigned)number(report, "register"));
+    } else if (number(report, "object") > 0.0) {
+        put_piece(self, ", object %04X:%02X", (unsigned)number(report, "object"), (unsigned)number(report, "sub_index"));
+    }
+}
+
+static void draw_detail(view_t *self, const cJSON *report)
+{
+    if (word(report, "detail")[0] != '\0') {
+        put_piece(self, "; %s (0x%04X)", word(report, "detail"), (unsigned)number(report, "detail_code"));
+    }
+}
+
 /* A second line where the drive is not simply as it should be: what it is at, since when, and what is wrong. */
 static void draw_report(view_t *self, const cJSON *report, const char *drive)
 {
@@ -232,17 +248,11 @@ static void draw_report(view_t *self, const cJSON *report, const char *drive)
     } else {
         put(self, "   node %.0f: %s", number(report, "node"), word(report, "phase"));
     }
-    if (number(report, "register") > 0.0) {
-        put_piece(self, ", register 0x%04X", (unsigned)number(report, "register"));
-    } else if (number(report, "object") > 0.0) {
-        put_piece(self, ", object %04X:%02X", (unsigned)number(report, "object"), (unsigned)number(report, "sub_index"));
-    }
+    draw_object(self, report);
     if (number(report, "code") > 0.0) {
         put_piece(self, "; %s (0x%04X)", word(report, "trouble"), (unsigned)number(report, "code"));
     }
-    if (word(report, "detail")[0] != '\0') {
-        put_piece(self, "; %s (0x%04X)", word(report, "detail"), (unsigned)number(report, "detail_code"));
-    }
+    draw_detail(self, report);
     put_piece(self, ", %.1f s", number(report, "age_ms") / 1000.0);
     end_line(self);
 }
@@ -467,6 +477,19 @@ static void draw_distance(view_t *self, const cJSON *fault, const char *unit)
     end_line(self);
 }
 
+/* What the drive of a fault was at when it began. */
+static void draw_device(view_t *self, const cJSON *fault)
+{
+    const cJSON *report = member(fault, "report");
+    if (word(fault, "device_text")[0] != '\0') {
+        put_piece(self, " (%s)", word(fault, "device_text"));
+    }
+    if (number(report, "code") > 0.0) {
+        draw_object(self, report);
+        draw_detail(self, report);
+    }
+}
+
 static void draw_fault(view_t *self, const cJSON *status)
 {
     const cJSON *fault = member(status, "fault");
@@ -488,10 +511,8 @@ static void draw_fault(view_t *self, const cJSON *status)
     }
     if (number(fault, "device_code") > 0.0) {
         put(self, ", device code 0x%04X", (unsigned)number(fault, "device_code"));
-        if (word(fault, "device_text")[0] != '\0') {
-            put_piece(self, " (%s)", word(fault, "device_text"));
-        }
     }
+    draw_device(self, fault);
     put_colour(self, is_faulty ? PLAIN : "");
     end_line(self);
     if (is_faulty) {

@@ -45,12 +45,84 @@ static void write_actual(json_t *json, const char *key, const char *const axis_k
     }
 }
 
-/* What the device code of the fault means, as long as the drive still says so. */
+static void write_age(json_t *json, const char *key, uint64_t at_us, uint64_t now_us)
+{
+    if (at_us == 0 || at_us > now_us) {
+        json_null(json, key);
+    } else {
+        json_ms(json, key, now_us - at_us);
+    }
+}
+
+static void write_notes(json_t *json, uint32_t notes)
+{
+    json_open(json, "notes", '[');
+    for (unsigned i = 0; i < DRIVE_NOTES; i++) {
+        if ((notes >> i & 1u) != 0) {
+            json_text(json, NULL, drive_note_text(i));
+        }
+    }
+    json_close(json, ']');
+}
+
+/* The last error that a drive has told of; null where there was none. */
+static void write_emergency(json_t *json, const drive_report_t *report, uint64_t now_us)
+{
+    const drive_emergency_t *emergency = &report->emergency;
+    char maker[2 * sizeof emergency->maker + 1];
+    if (report->error == NULL) {
+        json_null(json, "emergency");
+        return;
+    }
+    for (unsigned i = 0; i < sizeof emergency->maker; i++) {
+        (void)snprintf(&maker[2u * i], 3, "%02X", emergency->maker[i]);
+    }
+    json_open(json, "emergency", '{');
+    json_number(json, "code", emergency->code);
+    json_text(json, "text", report->error);
+    json_number(json, "register", emergency->error_register);
+    json_text(json, "manufacturer", maker);
+    json_bool(json, "over", emergency->is_over);
+    json_number(json, "count", emergency->count);
+    write_age(json, "age_ms", emergency->at_us, now_us);
+    json_close(json, '}');
+}
+
+/* What the drive is at, in words; null where its driver has none. */
+static void write_report(json_t *json, const drive_report_t *report, uint64_t now_us)
+{
+    if (report->phase == NULL || report->phase[0] == '\0') {
+        json_null(json, "report");
+        return;
+    }
+    json_open(json, "report", '{');
+    json_number(json, "node", report->address);
+    json_text(json, "phase", report->phase);
+    json_text(json, "trouble", report->trouble);
+    json_number(json, "code", report->code);
+    json_number(json, "object", report->object >> 8);
+    json_number(json, "sub_index", report->object & 0xFFu);
+    if (report->is_modbus) {
+        json_number(json, "unit", report->address);
+        json_number(json, "register", report->object >> 8);
+    }
+    json_text(json, "detail", report->detail);
+    json_number(json, "detail_code", report->detail_code);
+    json_ms(json, "age_ms", now_us >= report->since_us ? now_us - report->since_us : 0);
+    write_notes(json, report->notes);
+    write_emergency(json, report, now_us);
+    json_close(json, '}');
+}
+
+/* What the device code of the fault meant when it began; of a drive that was not there, and said nothing, what it was at. */
 static const char *device_text(const snapshot_t *s)
 {
-    const fault_t *fault = &s->fault;
-    const bool is_told = fault->axis != 0 && fault->device_code != 0 && s->report[fault->axis - 1u].code == fault->device_code;
-    return is_told ? s->report[fault->axis - 1u].trouble : "";
+    const drive_report_t *report = &s->fault_report;
+    if (report->code != 0 && report->code == s->fault.device_code) {
+        return report->trouble;
+    }
+    const bool is_at = s->fault.code == FAULT_DRIVE_OFFLINE && s->fault.device_code == 0 && report->phase != NULL;
+    return is_at ? report->phase : "";
 }
 
 static const char *found_by(fault_code_t code)
@@ -83,6 +155,7 @@ static void write_fault(json_t *json, const snapshot_t *s)
     json_number(json, "axis", s->fault.axis);
     json_number(json, "device_code", s->fault.device_code);
     json_text(json, "device_text", device_text(s));
+    write_report(json, &s->fault_report, s->now_us);
     json_text(json, "found_by", found_by(s->fault.code));
     write_distance(json, s, false);
     write_distance(json, s, true);
@@ -131,75 +204,6 @@ static void write_poses(json_t *json, const snapshot_t *s)
     write_actual(json, "pose_actual", k_pose_keys, &s->plate.pose, s->plate.has_pose);
     write_actual(json, "speed_actual", k_speed_keys, &s->plate.speed_per_s, s->plate.has_rates);
     write_actual(json, "accel_actual", k_accel_keys, &s->plate.accel_per_s2, s->plate.has_rates);
-}
-
-static void write_age(json_t *json, const char *key, uint64_t at_us, uint64_t now_us)
-{
-    if (at_us == 0 || at_us > now_us) {
-        json_null(json, key);
-    } else {
-        json_ms(json, key, now_us - at_us);
-    }
-}
-
-static void write_notes(json_t *json, uint32_t notes)
-{
-    json_open(json, "notes", '[');
-    for (unsigned i = 0; i < DRIVE_NOTES; i++) {
-        if ((notes >> i & 1u) != 0) {
-            json_text(json, NULL, drive_note_text(i));
-        }
-    }
-    json_close(json, ']');
-}
-
-/* The last error that a drive has told of; null where there was none. */
-static void write_emergency(json_t *json, const drive_report_t *report, uint64_t now_us)
-{
-    const drive_emergency_t *emergency = &report->emergency;
-    char maker[2 * sizeof emergency->maker + 1];
-    if (report->error == NULL) {
-        json_null(json, "emergency");
-        return;
-    }
-    for (unsigned i = 0; i < sizeof emergency->maker; i++) {
-        (void)snprintf(&maker[2u * i], 3, "%02X", emergency->maker[i]);
-    }
-    json_open(json, "emergency", '{');
-    json_number(json, "code", emergency->code);
-    json_text(json, "text", report->error);
-    json_number(json, "register", emergency->error_register);
-    json_text(json, "manufacturer", maker);
-    json_bool(json, "over", emergency->is_over);
-    json_number(json, "count", emergency->count);
-    write_age(json, "age_ms", emergency->at_us, now_us);
-    json_close(json, '}');
-}
-
-/* What the drive is at, in words; null where its driver has none. */
-static void write_report(json_t *json, const drive_report_t *report, uint64_t now_us)
-{
-    if (report->phase[0] == '\0') {
-        json_null(json, "report");
-        return;
-    }
-    json_open(json, "report", '{');
-    json_number(json, "node", report->address);
-    json_text(json, "phase", report->phase);
-    json_text(json, "trouble", report->trouble);
-    json_number(json, "code", report->code);
-    json_number(json, "object", report->object >> 8);
-    json_number(json, "sub_index", report->object & 0xFFu);
-    if (report->is_modbus) {
-        json_number(json, "unit", report->address);
-        json_number(json, "register", report->object >> 8);
-    }
-    json_text(json, "detail", report->detail);
-    json_number(json, "detail_code", report->detail_code);
-    json_ms(json, "age_ms", now_us >= report->since_us ? now_us - report->since_us : 0);
-    write_notes(json, report->notes);
-    write_emergency(json, report, now_us);
-    json_close(json, '}');
 }
 
 /* How a drive is served; null where its bus has a period of its own, or nothing is known yet. */

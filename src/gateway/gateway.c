@@ -22,6 +22,7 @@ static bool is_io_valid(const gateway_io_t *io)
 /* Texts of drives that have said nothing yet. */
 static void clear_reports(gateway_t *self)
 {
+    self->snapshot.fault_report = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
         self->snapshot.report[i] = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
     }
@@ -96,6 +97,7 @@ void gateway_save(const gateway_t *self, gateway_t *out)
 {
     *out = *self;
     out->io = (gateway_io_t){.udp = {NULL, NULL}};
+    out->snapshot.fault_report = (drive_report_t){.phase = NULL};
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
         out->snapshot.report[i] = (drive_report_t){.phase = NULL};
     }

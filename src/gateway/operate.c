@@ -209,7 +209,7 @@ void operate_event(gateway_t *self, event_t event, uint64_t now_us)
 }
 
 /* Who found it is told where it might be either: what a drive says of itself, and what heaved sees of the same thing. */
-static void log_fault(gateway_t *self, const fault_t *fault)
+static void log_fault(gateway_t *self, const fault_t *fault, const drive_report_t *report)
 {
     char line[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(line, sizeof line);
@@ -222,6 +222,11 @@ static void log_fault(gateway_t *self, const fault_t *fault)
     if (fault->device_code != 0) {
         text_put(&text, ", device code 0x");
         text_put_hex(&text, fault->device_code, 4);
+    }
+    if (fault->device_code != 0 && fault->device_code == report->code) {
+        text_put(&text, " (");
+        text_put(&text, report->trouble);
+        text_put(&text, ")");
     }
     if (fault->allowed_q32 != 0) {
         text_put(&text, ": found by heaved, ");
@@ -249,6 +254,16 @@ static void give_up_reset(gateway_t *self)
     }
 }
 
+/* What the drive of a fault is at; "" where none is concerned. */
+static drive_report_t report_of(const gateway_t *self, const fault_t *fault)
+{
+    drive_report_t report = {.phase = "", .trouble = "", .detail = ""};
+    if (fault->axis != 0) {
+        (void)drives_report(self->io.drives, (uint8_t)(fault->axis - 1u), &report);
+    }
+    return report;
+}
+
 /* A fault begins: all are counted, the first is kept, and the worst reaction wins, also over one that is under way. */
 static void raise_fault(gateway_t *self, const fault_t *fault)
 {
@@ -262,9 +277,11 @@ static void raise_fault(gateway_t *self, const fault_t *fault)
     s->counters.faults++;
     s->counters.fault[code]++;
     s->fault_last_us[code] = fault->at_us;
-    log_fault(self, fault);
+    const drive_report_t report = report_of(self, fault);
+    log_fault(self, fault, &report);
     if (s->fault.code == FAULT_NONE) {
         s->fault = *fault;
+        s->fault_report = report;
     }
     const bool is_worse = reaction > s->reaction;
     s->reaction = is_worse ? reaction : s->reaction;
@@ -366,7 +383,8 @@ static fault_t fault_of(const gateway_t *self, fault_code_t code, unsigned i, ui
     const drive_feedback_t *drive = &self->snapshot.drive[i];
     fault_t fault = {.code = code, .axis = (uint8_t)(i + 1u), .at_us = now_us};
     if (code != FAULT_FOLLOWING && code != FAULT_SETPOINT_JUMP) {
-        fault.device_code = drive->fault_code;
+        /* one that is disabled again has no fault any more, but may know why */
+        fault.device_code = drive->fault_code != 0 ? drive->fault_code : report_of(self, &fault).code;
     } else if (drive_guard_is_found(&drive->guard)) {
         fault.off_q32 = drive->guard.jump_q32 + drive->guard.lag_q32; /* one of them is 0 */
         fault.allowed_q32 = drive->guard.allowed_q32;
@@ -465,6 +483,7 @@ static void step_reset(gateway_t *self, uint64_t now_us)
     if (!supervisor_is_latched(&self->supervisor)) {
         self->reset_until_us = 0;
         self->snapshot.fault = (fault_t){.code = FAULT_NONE};
+        self->snapshot.fault_report = report_of(self, &self->snapshot.fault);
         self->snapshot.reaction = FAULT_REACT_NONE;
     } else if (now_us >= self->reset_until_us) {
         self->reset_until_us = 0;

@@ -117,7 +117,7 @@ ROWS = [
     # name, action, drive's keys, seen, within_us, fault, code
     ("a fault with its EMCY", {"do": "fault", "code": 0x2310}, {}, sees_emergency, PERIOD_US + REACTION_US, "drive-fault", 0x2310),
     ("a blocked axis: following error", {"do": "jam"}, {}, sees_lag, 2 * PERIOD_US + REACTION_US, "drive-fault", FOLLOWING_ERROR),
-    ("a drive loses its torque", {"do": "disable"}, {}, sees_no_torque, REACTION_US, "drive-dropped", None),
+    ("a drive loses its torque", {"do": "disable"}, {}, sees_no_torque, REACTION_US, "drive-dropped", 0x10011),
     ("a drive reboots", {"do": "reboot"}, {"boot_us": 2000}, sees_boot, REACTION_US, "drive-offline", 0x10005),
     ("a drive loses its power", {"do": "off"}, {}, sees_last_status, SILENT_US, "drive-offline", 0x10002),
     ("a drive's heartbeat ends", {"do": "heartbeat off"}, {}, sees_last_beat, HEARTBEAT_TIMEOUT_US + REACTION_US, "drive-offline", 0x10003),
@@ -150,6 +150,24 @@ def stops_all_drives(action, keys, seen, within_us, fault, code):
         assert 0 <= late_us <= within_us, f"stopped {late_us} us after it was to be seen, allowed {within_us}"
         can_judge.check_order(record, record.first_status(1, can_judge.ENABLED), when_us, PERIOD_US)
         can_judge.check_start(record)
+    return case
+
+
+def reason_stays(action, code, words, **arguments):
+    """The drive is back long before the operator comes: what it was is still told."""
+    def case(bench, source):
+        daemon = in_motion(bench, source, only={VICTIM: {"boot_us": 2000}})
+        bench.do(action, VICTIM, **arguments)
+        bench.wait_state("FAULT")
+        heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "ready", "the drive is back")
+        status = bench.status()
+        fault = status["fault"]
+        assert status["cylinders"][VICTIM - 1]["report"]["code"] in (0, code), status["cylinders"][VICTIM - 1]
+        assert (fault["axis"], fault["device_code"], fault["report"]["node"]) == (VICTIM, code, VICTIM) and words in fault["device_text"], fault
+        assert f"device code 0x{code:X} ({fault['device_text']})" in daemon.log.read_text(encoding="utf-8")
+        assert words in " ".join(bench.ctl("status").stdout.split())
+        bench.reset()
+        assert bench.status()["fault"]["device_text"] == "" and bench.status()["fault"]["report"] is None
     return case
 
 
@@ -447,6 +465,9 @@ def killed_anywhere(bench, source):
 
 
 CASES = [(f"{name}: all stop together", stops_all_drives(*row)) for name, *row in ROWS]
+CASES += [("the reason stays when the drive is back, a reboot: named until the reset", reason_stays("reboot", 0x10005, "started again by itself")),
+          ("the reason stays when the drive is back, torque gone: named until the reset", reason_stays("disable", 0x10011, "left operation enabled by itself")),
+          ("the reason stays when the drive is back, lost answers: named until the reset", reason_stays("tpdo drop", 0x10002, "sent no position", count=5))]
 CASES += [
     ("lost answers, 1, 2 and 3: nothing stops", harmless(*(("tpdo drop", {"count": count}) for count in (1, 2, 3)))),
     ("a drive's limit and warning are told: nothing stops", tells),

@@ -1863,6 +1863,35 @@ static void test_telemetry_reports_of_drives_are_logged_once_with_what_they_name
     TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, unit 3, missing: no answer (0x0032), register 0x0102"));
 }
 
+/* The drive is back, or off again: what it was stays until the reset. */
+static void test_fault_keeps_what_its_drive_said(void)
+{
+    engage();
+    make_talkative();
+    m_reports = (drive_report_t){.address = 12,
+                                 .phase = "lost",
+                                 .trouble = "started again",
+                                 .detail = "under-voltage",
+                                 .code = 0x10005,
+                                 .object = 0x606000,
+                                 .detail_code = 0x3220};
+    rig_break(&m_rig, SIM_DRIVES_OFFLINE, 1, 0);
+    rig_run_ms(&m_rig, 20);
+    TEST_ASSERT_TRUE(seen()->fault.axis == 2 && seen()->fault.device_code != 0);
+    m_reports = (drive_report_t){.address = 12, .phase = "ready", .trouble = "", .detail = ""};
+    rig_break(&m_rig, SIM_DRIVES_RECOVER, 1, 0);
+    rig_run_ms(&m_rig, 500);
+    TEST_ASSERT_EQUAL(STATE_FAULT, seen()->state);
+    TEST_ASSERT_EQUAL_STRING("started again", seen()->fault_report.trouble);
+    TEST_ASSERT_EQUAL_STRING("under-voltage", seen()->fault_report.detail);
+    TEST_ASSERT_EQUAL_HEX32(0x606000, seen()->fault_report.object);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 500);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    TEST_ASSERT_EQUAL_STRING("", seen()->fault_report.trouble);
+    m_is_fault_expected = true;
+}
+
 /* A drive that boots for ever. */
 static void test_telemetry_reports_that_come_and_go_are_told_of_less_often(void)
 {
@@ -2322,6 +2351,7 @@ static void run_supervision(void)
     RUN_TEST(test_telemetry_actual_speed_is_that_of_the_plate);
     RUN_TEST(test_telemetry_actual_pose_follows_the_feedback);
     RUN_TEST(test_telemetry_reports_of_drives_are_logged_once_with_what_they_name);
+    RUN_TEST(test_fault_keeps_what_its_drive_said);
     RUN_TEST(test_telemetry_reports_that_come_and_go_are_told_of_less_often);
     RUN_TEST(test_telemetry_notes_of_drives_are_logged_when_they_change);
     RUN_TEST(test_telemetry_errors_of_drives_are_logged_once_a_second);
