@@ -138,6 +138,8 @@ typedef struct {
     bool is_asked;     /* an SDO of this step is under way */
     uint8_t mode;      /* of CIA402_JOB_MODE and at the end of CIA402_JOB_SETUP */
     uint32_t value;    /* read in an earlier step */
+    uint32_t refusal;  /* SDO abort code of the last write that was left to a check, */
+    uint16_t refused;  /* and the index of its object; 0 = none */
     uint64_t since_us; /* of the row */
     uint64_t pause_us; /* nothing is done before */
 } cia402_setup_t;
@@ -158,7 +160,9 @@ typedef struct {
     uint64_t phase_us;
     uint64_t trouble_us;
     uint32_t trouble_object; /* index << 8 | sub */
-    uint32_t trouble_code;   /* SDO abort code, or the value found */
+    uint32_t trouble_code;   /* SDO abort code, or a code of the drive */
+    uint32_t trouble_found;  /* where has_found: the object holds this, */
+    uint32_t trouble_wanted; /* instead of this */
     uint32_t mute_object;    /* no answer came when it was asked for; 0 = none */
     uint32_t warned_object;  /* a guard that is off and was allowed to be */
     uint8_t nmt;             /* last heard */
@@ -166,6 +170,7 @@ typedef struct {
     uint8_t starts;          /* attempts to become operational */
     uint8_t mutes;           /* attempts that ended at an object without answer */
     bool is_reset_done;
+    bool has_found;
     sdo_t sdo;
     cia402_setup_t setup;
     uint64_t heartbeat_us;

@@ -80,6 +80,9 @@ typedef struct {
     uint32_t code;        /**< number of trouble, 0 = none */
     uint32_t object;      /**< of the device, index << 8 | sub-index: what is being set, or what the trouble is about; 0 = none */
     uint32_t detail_code; /**< of the protocol, or the value found; 0 = none */
+    bool has_found;       /**< object holds found instead of wanted */
+    uint32_t found;
+    uint32_t wanted;
     uint32_t notes;       /**< what it tells beside that, or told in the last seconds: bit N for drive_note_text(N) */
     uint64_t since_us;    /**< of the trouble, else of the phase */
     uint32_t period_us;   /**< measured, from one set-point that the drive took to the next; 0 = unknown */

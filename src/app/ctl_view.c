@@ -231,7 +231,10 @@ static void draw_object(view_t *self, const cJSON *report)
 
 static void draw_detail(view_t *self, const cJSON *report)
 {
-    if (word(report, "detail")[0] != '\0') {
+    if (cJSON_IsNumber(member(report, "found"))) {
+        put_piece(self, "; %s, found 0x%X, wanted 0x%X", word(report, "detail"), (unsigned)number(report, "found"),
+                  (unsigned)number(report, "wanted"));
+    } else if (word(report, "detail")[0] != '\0') {
         put_piece(self, "; %s (0x%04X)", word(report, "detail"), (unsigned)number(report, "detail_code"));
     }
 }

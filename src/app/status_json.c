@@ -108,6 +108,13 @@ static void write_report(json_t *json, const drive_report_t *report, uint64_t no
     }
     json_text(json, "detail", report->detail);
     json_number(json, "detail_code", report->detail_code);
+    if (report->has_found) {
+        json_number(json, "found", report->found);
+        json_number(json, "wanted", report->wanted);
+    } else {
+        json_null(json, "found");
+        json_null(json, "wanted");
+    }
     json_ms(json, "age_ms", now_us >= report->since_us ? now_us - report->since_us : 0);
     write_notes(json, report->notes);
     write_emergency(json, report, now_us);

@@ -66,6 +66,7 @@ static void note_trouble(cia402_drive_t drive, cia402_trouble_t why)
     drive.axis->trouble = why;
     drive.axis->trouble_us = drive.now_us;
     drive.axis->trouble_object = 0;
+    drive.axis->has_found = false;
     drive.axis->trouble_code = is_reason ? emergency->code : 0;
 }
 

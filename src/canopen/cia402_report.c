@@ -164,10 +164,15 @@ static bool has_error_for_reason(const cia402_axis_t *axis)
 
 static uint32_t detail_code(const cia402_axis_t *axis)
 {
-    return has_error_for_reason(axis) || (is_refusing(axis) && axis->trouble_object != 0) ? axis->trouble_code : 0;
+    if (has_error_for_reason(axis)) {
+        return axis->trouble_code;
+    }
+    if (!is_refusing(axis) || axis->trouble_object == 0) {
+        return 0;
+    }
+    return axis->trouble_code != 0 || !axis->has_found ? axis->trouble_code : axis->trouble_found;
 }
 
-/* A value below 2^24 is one that was found; abort codes are above. */
 static const char *detail_text(const cia402_axis_t *axis)
 {
     if (has_error_for_reason(axis)) {
@@ -176,10 +181,10 @@ static const char *detail_text(const cia402_axis_t *axis)
     if (!is_refusing(axis) || axis->trouble_object == 0) {
         return axis->warned_object != 0 && axis->phase == CIA402_UP ? "its guard is off, which the configuration allows" : "";
     }
-    if (axis->trouble == CIA402_NO_ANSWER) {
-        return "";
+    if (axis->trouble_code != 0) {
+        return canopen_abort_text(axis->trouble_code);
     }
-    return axis->trouble_code >= 0x05000000u ? canopen_abort_text(axis->trouble_code) : "it holds another value";
+    return axis->has_found ? "it holds another value" : "";
 }
 
 void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *out)
@@ -195,6 +200,9 @@ void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *ou
         .object = object_of(axis),
         .detail = detail_text(axis),
         .detail_code = detail_code(axis),
+        .has_found = is_refusing(axis) && axis->has_found,
+        .found = axis->trouble_found,
+        .wanted = axis->trouble_wanted,
         .error = axis->emergency.count != 0 ? canopen_error_text(axis->emergency.code) : NULL,
         .emergency = axis->emergency,
         .notes = axis->phase == CIA402_UP ? axis->notes : 0,

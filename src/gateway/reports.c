@@ -28,7 +28,12 @@ static void put_detail(text_t *text, const drive_report_t *report)
         text_put(text, ": ");
         text_put(text, report->detail);
     }
-    if (report->detail_code != 0) {
+    if (report->has_found) {
+        text_put(text, ", found 0x");
+        text_put_hex(text, report->found, 1);
+        text_put(text, ", wanted 0x");
+        text_put_hex(text, report->wanted, 1);
+    } else if (report->detail_code != 0) {
         text_put(text, " (0x");
         text_put_hex(text, report->detail_code, 4);
         text_put(text, ")");

@@ -386,6 +386,7 @@ def bad_drives_are_named(bench, _):
     reports = {drive["report"]["node"]: drive["report"] for drive in [*status["cylinders"], status["rotation"]] if "report" in drive}
     for node, (_, phase, where) in BAD.items():
         assert reports[node]["phase"] == phase and reports[node]["trouble"], reports[node]
+        assert reports[node]["found"] is None or reports[node]["found"] != reports[node]["wanted"], reports[node]
         assert where in (None, (reports[node]["object"], reports[node]["sub_index"])), reports[node]
     assert status["state"] != "ENGAGED" and not bench.events("enabled")
 

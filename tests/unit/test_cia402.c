@@ -329,6 +329,45 @@ static void test_loss_all_silent_is_a_lost_bus_until_one_answers(void)
     TEST_ASSERT_EQUAL(HV_OK, cycle());
 }
 
+static void test_setup_object_with_another_value_tells_both(void)
+{
+    for (unsigned k = 0; k < AXES; k++) {
+        config.axis[k].identity[0] = 0x2E5;
+    }
+    cia402_slave_row(&slave, 2, 0x1018, 1)->value = 0x0B0000EF; /* as large as an abort code */
+    const drive_report_t r = refusal_of(2);
+    TEST_ASSERT_EQUAL_STRING("it holds another value", r.detail);
+    TEST_ASSERT_TRUE(r.has_found);
+    TEST_ASSERT_EQUAL_HEX32(0x0B0000EF, r.found);
+    TEST_ASSERT_EQUAL_HEX32(0x2E5, r.wanted);
+    TEST_ASSERT_FALSE(report(1).has_found);
+}
+
+static void test_setup_object_that_can_only_be_read_is_told_as_such(void)
+{
+    cia402_slave_row(&slave, 3, 0x60C2, 1)->is_read_only = true;
+    cia402_slave_row(&slave, 3, 0x60C2, 1)->value = 10;
+    const drive_report_t r = refusal_of(3);
+    TEST_ASSERT_EQUAL_HEX32(0x60C201, r.object);
+    TEST_ASSERT_EQUAL_STRING("the object can only be read", r.detail);
+    TEST_ASSERT_EQUAL_HEX32(0x06010002, r.detail_code);
+    TEST_ASSERT_TRUE(r.has_found);
+    TEST_ASSERT_EQUAL_HEX32(10, r.found);
+    TEST_ASSERT_EQUAL_HEX32(PERIOD, r.wanted);
+}
+
+/* Written first, checked when all of it is written. */
+static void test_setup_mapping_that_can_only_be_read_is_told_as_such(void)
+{
+    cia402_slave_row(&slave, 3, 0x1600, 2)->is_read_only = true;
+    cia402_slave_row(&slave, 3, 0x1600, 2)->value = 0x60FF0020;
+    const drive_report_t r = refusal_of(3);
+    TEST_ASSERT_EQUAL_HEX32(0x160002, r.object);
+    TEST_ASSERT_EQUAL_STRING("the object can only be read", r.detail);
+    TEST_ASSERT_EQUAL_HEX32(0x60FF0020, r.found);
+    TEST_ASSERT_EQUAL_HEX32(0x607A0020, r.wanted);
+}
+
 static void test_setup_wrong_identity_is_refused(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
@@ -2269,6 +2308,9 @@ int main(void)
     RUN_TEST(test_loss_all_that_start_again_are_no_lost_bus);
     RUN_TEST(test_loss_all_silent_is_a_lost_bus_until_one_answers);
     RUN_TEST(test_setup_wrong_identity_is_refused);
+    RUN_TEST(test_setup_object_with_another_value_tells_both);
+    RUN_TEST(test_setup_object_that_can_only_be_read_is_told_as_such);
+    RUN_TEST(test_setup_mapping_that_can_only_be_read_is_told_as_such);
     RUN_TEST(test_setup_wrong_revision_and_serial_number_are_refused);
     RUN_TEST(test_setup_position_limits_are_written_where_wanted);
     RUN_TEST(test_setup_other_profile_is_refused);

@@ -206,6 +206,24 @@ static void test_describe_bus_load_is_that_of_the_frames(void)
     TEST_ASSERT_DOUBLE_WITHIN(2e-5, period_bits / 4000.0, config_bus_load_ppm(&bus) / 1e6);
 }
 
+/* As data sheets and other masters have them. */
+static void test_identity_is_read_in_hexadecimal_too(void)
+{
+    (void)put("[cia402]", "vendor_id = 0xBEEF");
+    (void)put("[cia402]", "product_code = 0XffffffFF");
+    (void)put("[cia402]", "revision_number = 65536");
+    TEST_ASSERT_EQUAL_MESSAGE(0, load(), m_errors);
+    TEST_ASSERT_EQUAL_HEX32(0xBEEF, m_config.cia402.vendor_id);
+    TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFF, m_config.cia402.product_code);
+    TEST_ASSERT_EQUAL_HEX32(0x10000, m_config.cia402.revision_number);
+    static const char *const k_wrong[] = {"vendor_id = 0x", "vendor_id = 0xG", "vendor_id = 0x100000000", "gateway_node = 0x7F"};
+    for (size_t i = 0; i < sizeof k_wrong / sizeof k_wrong[0]; i++) {
+        setUp();
+        (void)put("[cia402]", k_wrong[i]);
+        TEST_ASSERT_EQUAL_MESSAGE(1, load(), k_wrong[i]);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -216,5 +234,6 @@ int main(void)
     RUN_TEST(test_load_bus_too_slow_for_any_period_is_told_to_be_faster);
     RUN_TEST(test_load_section_not_in_use_may_be_anything);
     RUN_TEST(test_describe_bus_load_is_that_of_the_frames);
+    RUN_TEST(test_identity_is_read_in_hexadecimal_too);
     return UNITY_END();
 }

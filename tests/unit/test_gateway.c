@@ -1852,6 +1852,18 @@ static void test_telemetry_reports_of_drives_are_logged_once_with_what_they_name
     m_reports = (drive_report_t){.address = 12, .phase = "ready", .trouble = "", .detail = ""};
     rig_run_ms(&m_rig, 5);
     TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, node 12, ready"));
+    m_reports = (drive_report_t){.address = 12,
+                                 .phase = "refused",
+                                 .trouble = "not taken",
+                                 .code = 0x33,
+                                 .object = 0x60C201,
+                                 .detail = "it holds another value",
+                                 .has_found = true,
+                                 .found = 10,
+                                 .wanted = 4};
+    rig_run_ms(&m_rig, 5);
+    TEST_ASSERT_TRUE(rig_was_logged(
+        &m_rig, "axis 2, node 12, refused: not taken (0x0033), object 60C2:01: it holds another value, found 0xA, wanted 0x4"));
     m_reports = (drive_report_t){.is_modbus = true,
                                  .address = 3,
                                  .phase = "missing",
