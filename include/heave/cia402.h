@@ -52,7 +52,8 @@ typedef enum {
     CIA402_NO_VOLTAGE = 0x10014,    /**< bit 4 */
     CIA402_LIMITED = 0x10015,       /**< bit 11 */
     CIA402_WARNING = 0x10016,       /**< bit 7 */
-    CIA402_NO_ANSWER = 0x10017      /**< answers, only not when asked for one object */
+    CIA402_NO_ANSWER = 0x10017,     /**< answers, only not when asked for one object */
+    CIA402_TWICE = 0x10018          /**< two drives have its node id */
 } cia402_trouble_t;
 
 /** What is watched in every answer, beyond state and position: bits of drive_report_t.notes. */
@@ -169,11 +170,15 @@ typedef struct {
     uint8_t nmt_command;     /* waits to be sent, 0 = none */
     uint8_t starts;          /* attempts to become operational */
     uint8_t mutes;           /* attempts that ended at an object without answer */
+    uint8_t awaited;         /* TPDOs that SYNCs have asked for and that have not come, saturates */
+    uint8_t surplus;         /* those that nothing had asked for, saturates */
+    uint8_t plain_syncs;     /* since the last of these, saturates */
     bool is_reset_done;
     bool has_found;
     sdo_t sdo;
     cia402_setup_t setup;
     uint64_t heartbeat_us;
+    uint64_t boot_us; /* of the last boot-up message, 0 = none */
 
     int64_t position_counts; /* without the wrap-around of 32 bits */
     q32_t actual_q32;

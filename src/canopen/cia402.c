@@ -259,7 +259,7 @@ static void take_setpoint(cia402_t *self, unsigned k, q32_t setpoint_q32)
     }
     if (drive_guard_is_found(&guard)) {
         cia402_axis_fail(cia402_drive(self, k), CIA402_FOLLOWING_ERROR);
-        axis->guard = guard;
+        axis->guard = axis->own_fault == CIA402_FOLLOWING_ERROR ? guard : axis->guard;
         return;
     }
     axis->target_counts = wrap(counts);

@@ -14,6 +14,9 @@
 #define FOLLOWS_US          500000u  /* a drive in its mode that does not set bit 12 is believed after this */
 #define OPERATIONAL_US      500000u  /* and three heartbeats: after NMT start, until the first TPDO */
 #define RESTARTS_MAX        2u
+#define SURPLUS_MAX         2u     /* answers that nobody asked for; CAN itself may repeat one, */
+#define PLAIN_SYNCS         50u    /* which is forgotten after this */
+#define BOOTS_APART_US      10000u /* no drive starts twice in so short a time */
 #define NMT_START           0x01u
 #define NMT_PREOP           0x80u
 #define NMT_RESET           0x82u
@@ -95,10 +98,12 @@ void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why)
     }
 }
 
+/* What an answer shows that nobody asked for is of another drive, whatever else seems to be wrong. */
 void cia402_axis_fail(cia402_drive_t drive, uint32_t code)
 {
     cia402_axis_t *self = drive.axis;
-    self->own_fault = code;
+    const bool is_other = self->surplus > 0 && self->plain_syncs <= 1u;
+    self->own_fault = is_other ? CIA402_TWICE : code;
     self->guard = (drive_guard_t){.jump_q32 = 0};
     self->is_in = false;
     self->goal = CIA402_GOAL_STOP;
@@ -109,6 +114,7 @@ void cia402_axis_reset(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     self->own_fault = 0;
+    self->surplus = 0;
     self->guard = (drive_guard_t){.jump_q32 = 0};
     self->warned_object = 0;
     if (self->phase == CIA402_REFUSED) {
@@ -146,6 +152,17 @@ HV_WRAPS static void take_position(cia402_drive_t drive, uint32_t bits)
     }
 }
 
+/* One answer per SYNC; more are those of another drive. */
+static void count_answer(cia402_axis_t *self)
+{
+    if (self->awaited > 0) {
+        self->awaited--;
+    } else {
+        self->surplus = self->surplus < SURPLUS_MAX ? (uint8_t)(self->surplus + 1u) : self->surplus;
+        self->plain_syncs = 0;
+    }
+}
+
 void cia402_axis_take_tpdo(cia402_drive_t drive, const can_frame_t *frame)
 {
     cia402_axis_t *self = drive.axis;
@@ -153,6 +170,7 @@ void cia402_axis_take_tpdo(cia402_drive_t drive, const can_frame_t *frame)
     if (frame->length != CIA402_TPDO_BYTES || (self->phase != CIA402_UP && self->phase != CIA402_STARTING)) {
         return;
     }
+    count_answer(self);
     self->silent_syncs = 0;
     self->has_answer = true;
     self->statusword = (uint16_t)(data[0] | data[1] << 8);
@@ -181,9 +199,20 @@ void cia402_axis_take_emergency(cia402_drive_t drive, const can_frame_t *frame)
     }
 }
 
+/* Cannot be used until it boots or the operator resets. */
+static void refuse(cia402_drive_t drive, cia402_trouble_t why)
+{
+    drive.axis->setup.job = CIA402_JOB_NONE;
+    sdo_cancel(&drive.axis->sdo);
+    note_trouble(drive, why);
+    enter(drive, CIA402_REFUSED);
+}
+
 static void take_boot(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
+    const bool is_twice = self->boot_us != 0 && drive.now_us - self->boot_us < BOOTS_APART_US;
+    self->boot_us = drive.now_us;
     if (self->phase == CIA402_UP || self->phase == CIA402_LEAVING || self->phase == CIA402_CONFIGURING ||
         self->phase == CIA402_STARTING) {
         cia402_axis_lose(drive, CIA402_REBOOTED);
@@ -195,6 +224,9 @@ static void take_boot(cia402_drive_t drive)
     self->statusword = 0;       /* without torque */
     self->emergency.is_over = true;
     look_for(drive);
+    if (is_twice) {
+        refuse(drive, CIA402_TWICE);
+    }
 }
 
 void cia402_axis_take_heartbeat(cia402_drive_t drive, const can_frame_t *frame)
@@ -215,6 +247,9 @@ void cia402_axis_take_heartbeat(cia402_drive_t drive, const can_frame_t *frame)
 void cia402_axis_note_sync(cia402_axis_t *self)
 {
     self->silent_syncs++;
+    self->awaited = self->awaited < SILENT_SYNCS_MAX ? (uint8_t)(self->awaited + 1u) : self->awaited;
+    self->plain_syncs = self->plain_syncs < PLAIN_SYNCS ? (uint8_t)(self->plain_syncs + 1u) : self->plain_syncs;
+    self->surplus = self->plain_syncs < PLAIN_SYNCS ? self->surplus : 0;
 }
 
 /* --- From missing to up --- */
@@ -294,6 +329,8 @@ static void step_configuring(cia402_drive_t drive)
     case CIA402_SETUP_DONE:
         self->nmt_command = NMT_START;
         self->silent_syncs = 0;
+        self->awaited = 0;
+        self->surplus = 0;
         enter(drive, CIA402_STARTING);
         break;
     case CIA402_SETUP_REFUSED:
@@ -326,6 +363,10 @@ static void step_starting(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     const uint64_t limit_us = OPERATIONAL_US + 3000u * (uint64_t)drive.config->heartbeat_ms;
+    if (self->surplus >= SURPLUS_MAX) {
+        refuse(drive, CIA402_TWICE);
+        return;
+    }
     if (self->has_actual && (!self->has_heartbeat || self->nmt == NMT_STATE_OPERATION)) {
         come_up(drive);
         return;
@@ -335,8 +376,7 @@ static void step_starting(cia402_drive_t drive)
     }
     self->starts++;
     if (self->starts >= RESTARTS_MAX) {
-        note_trouble(drive, CIA402_NO_START);
-        enter(drive, CIA402_REFUSED);
+        refuse(drive, CIA402_NO_START);
     } else { /* once more from the beginning */
         self->is_reset_done = false;
         look_for(drive);
@@ -418,6 +458,9 @@ static void step_up(cia402_drive_t drive)
     if (loss != CIA402_TROUBLE_NONE) {
         cia402_axis_lose(drive, loss);
         return;
+    }
+    if (self->surplus >= SURPLUS_MAX && self->own_fault == 0) {
+        cia402_axis_fail(drive, CIA402_TWICE);
     }
     cia402_watch_step(drive);
     const cia402_state_t state = cia402_axis_state(self);

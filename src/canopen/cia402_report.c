@@ -86,6 +86,7 @@ static const struct {
     {CIA402_REMOTE_OFF, "is under local control, not under that of the bus"},
     {CIA402_FELL_OUT, "left operation enabled by itself: enable input, safe torque off?"},
     {CIA402_NO_ANSWER, "gives no answer when it is asked for an object"},
+    {CIA402_TWICE, "is there twice: two drives have this node id"},
     {CIA402_LEFT_MODE, "left its mode of operation by itself"},
     {CIA402_NOT_FOLLOWING, "ignores its set-points: halted, or held by its own logic?"},
     {CIA402_NO_VOLTAGE, "has no voltage at its power stage: supply, contactor?"},

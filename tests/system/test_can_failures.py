@@ -4,6 +4,7 @@
 
 It strikes at a moment of the rise, and so at a phase of cycle and bus period, that is drawn for each case from SEED and the case's name.
 On vcan and virtual time, inside kernel.py --virtual-time --python; judged on the recorded frames by can_judge. docs/failures.md names these cases."""
+import json
 import random
 import signal
 import socket
@@ -14,6 +15,7 @@ import time
 
 import can_bench
 import can_judge
+import forked
 import heave
 import tap
 import test_can
@@ -426,6 +428,26 @@ def object_without_answer(bench, _):
     bench.reset()
 
 
+def node_id_twice(bench, _):
+    """A second drive with the id of another one: found before anybody has torque, and led out once it has an id of its own."""
+    bench.start_drives()
+    twin_config = {"log": str(bench.folder / "twin.jsonl"), "drives": [{"node": VICTIM, "position": 9000, "boot_us": 340000, "sdo_us": 1300}], "plan": []}
+    twin = forked.Forked(can_bench.can_drives.main, bench.file("twin.json", json.dumps(twin_config)), "--follow")
+    assert twin.stdout.readline() == "ready\n"
+    bench.start(config=test_can.can_config(bench, platform__engage="manual"))
+    heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "refused", "is refused")
+    report = bench.status()["cylinders"][VICTIM - 1]["report"]
+    assert report["code"] == 0x10018 and "two drives" in report["trouble"], report
+    assert not bench.events("enabled")
+    twin.stdin.close()
+    twin.wait(timeout=heave.WAIT_S)
+    twin.stdout.close()
+    bench.ctl("reset")
+    heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["drive"] == "disabled", "is ready")
+    assert bench.ctl("engage").returncode == 0
+    bench.wait_state("ENGAGED")
+
+
 # --- The gateway in trouble ---
 
 KILLS = 6
@@ -481,6 +503,7 @@ CASES += [("error-passive for more than a second: a controlled stop, latched", p
           ("error-passive for less, and a storm of error frames: nothing stops", disturbed)]
 CASES += [("drives missing or wrong are named, nobody is enabled", bad_drives_are_named),
           ("a drive that never answers for an object is named with it", object_without_answer),
+          ("two drives with the same node id are named, nobody is enabled", node_id_twice),
           ("drives that all refuse the same: named, no lost bus, a reset sets them up again", all_drives_refused), ("killed at random moments and started again", killed_anywhere)]
 
 

@@ -2298,6 +2298,85 @@ static void test_emergency_that_leaves_operational_is_the_reason(void)
     TEST_ASSERT_EQUAL_HEX32(0x8100, report(1).detail_code);
 }
 
+/* --- Two drives with the same node id --- */
+
+/* The other one answers too, from somewhere else. */
+static void answer_twice(unsigned drive, unsigned periods, unsigned most)
+{
+    uint32_t syncs = slave.syncs;
+    while (periods > 0 && most-- > 0) {
+        cycles(1);
+        if (slave.syncs != syncs && slave.drive[drive].nmt == 5) {
+            const can_frame_t frame = {.id = 0x181u + drive, .length = 7, .data = {0x40, 0x02, 1, 2, 3, 0, 8}};
+            TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+            syncs = slave.syncs;
+            periods--;
+        }
+    }
+}
+
+static void test_twice_in_motion_is_a_fault_within_three_periods(void)
+{
+    come_up();
+    enable();
+    const uint64_t begin_us = now_us;
+    while (feedback[2].state != DRIVE_FAULT && now_us - begin_us < 100000) {
+        const can_frame_t frame = {.id = 0x183, .length = 7, .data = {0x37, 0x12, 1, 2, 3, 0, 8}};
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        cycles(PERIOD);
+    }
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_TWICE, feedback[2].fault_code);
+    TEST_ASSERT_TRUE(now_us - begin_us <= 3 * PERIOD * CYCLE_US);
+}
+
+static void test_twice_at_the_start_is_refused_before_anybody_is_enabled(void)
+{
+    start();
+    answer_twice(5, 20, 3000);
+    TEST_ASSERT_EQUAL_STRING("refused", report(5).phase);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_TWICE, report(5).code);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT)); /* the other one is gone */
+    await(DRIVE_DISABLED, 3000);
+}
+
+/* They begin together, and never quite. */
+static void test_twice_two_boot_ups_at_once_are_refused(void)
+{
+    start();
+    for (unsigned i = 0; i < 200 && slave.drive[1].boots == 0; i++) {
+        cycles(1);
+    }
+    cycles(2);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &(can_frame_t){.id = 0x702, .length = 1}));
+    cycles(3000);
+    TEST_ASSERT_EQUAL_STRING("refused", report(1).phase);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_TWICE, report(1).code);
+}
+
+/* CAN itself may repeat a frame that one receiver has not taken; and answers may come late. */
+static void test_twice_single_repeated_or_late_answers_are_none(void)
+{
+    come_up();
+    enable();
+    for (unsigned i = 0; i < 10; i++) {
+        const uint32_t position = (uint32_t)slave.drive[2].position;
+        const can_frame_t frame = {.id = 0x183,
+                                   .length = 7,
+                                   .data = {0x37, 0x12, (uint8_t)position, (uint8_t)(position >> 8), (uint8_t)(position >> 16),
+                                            (uint8_t)(position >> 24), 8}};
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        cycles(2000);
+        slave.drive[2].tpdo_drop = 2; /* two are missing, and come after all */
+        cycles(2 * PERIOD);
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        cycles(2000);
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -2416,5 +2495,9 @@ int main(void)
     RUN_TEST(test_emergency_is_kept_over_a_loss_and_over_with_a_boot);
     RUN_TEST(test_emergency_of_a_drive_that_stays_preoperational_is_the_reason);
     RUN_TEST(test_emergency_that_leaves_operational_is_the_reason);
+    RUN_TEST(test_twice_in_motion_is_a_fault_within_three_periods);
+    RUN_TEST(test_twice_at_the_start_is_refused_before_anybody_is_enabled);
+    RUN_TEST(test_twice_two_boot_ups_at_once_are_refused);
+    RUN_TEST(test_twice_single_repeated_or_late_answers_are_none);
     return UNITY_END();
 }
