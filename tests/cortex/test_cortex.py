@@ -29,8 +29,8 @@ RUN_LIMIT_S = 300
 START = ("core", "CMakeFiles/heave_start.dir")
 # Processor: topics it plays, and what must not be exceeded, in bytes: what it takes, and some 5 % for the next change and another gcc. What is aimed at: docs/firmware.md.
 KINDS = {
-    "cortex-m3": (test_golden.TELLING, {"flash": 96 * 1024, "ram": 17 * 1024, "stack": 2048}),
-    "cortex-m0plus": (("mode-changes",), {"flash": 103 * 1024, "ram": 17 * 1024, "stack": 2048}),
+    "cortex-m3": (test_golden.TELLING, {"flash": 98 * 1024, "ram": 18 * 1024 + 512, "stack": 2048}),
+    "cortex-m0plus": (("mode-changes",), {"flash": 106 * 1024, "ram": 18 * 1024 + 512, "stack": 2048}),
 }
 
 
