@@ -23,21 +23,24 @@ static uint32_t now_ms(void)
 
 /* --- The worker --- */
 
-/* Which inputs are active when these contacts are closed: the e-stop's is when it is open. */
+#define CHANNELS      (INPUT_ESTOP | INPUT_ESTOP2)
+#define ACTIVE_OPENED (CHANNELS | INPUT_POWER)
+
+/* Which inputs are active when these contacts are closed: those of the e-stop and of the supply are when they are open. */
 static uint32_t levels_of(const linux_gpio_inputs_t *self, uint32_t closed)
 {
     uint32_t levels = 0;
     for (unsigned i = 0; i < self->count; i++) {
         const bool is_closed = (closed >> i & 1u) != 0;
-        levels |= is_closed != (self->input[i] == INPUT_ESTOP) ? self->input[i] : 0u;
+        levels |= is_closed != ((self->input[i] & ACTIVE_OPENED) != 0) ? self->input[i] : 0u;
     }
     return levels;
 }
 
 static void note_pressed(linux_gpio_inputs_t *self, uint32_t levels)
 {
-    if ((levels & INPUT_ESTOP) != 0) {
-        (void)__atomic_fetch_or(&self->pressed, INPUT_ESTOP, __ATOMIC_RELEASE);
+    if ((levels & CHANNELS) != 0) {
+        (void)__atomic_fetch_or(&self->pressed, levels & CHANNELS, __ATOMIC_RELEASE);
     }
 }
 

@@ -14,7 +14,7 @@
 #include "heave/hal/inputs.h"
 #include "linux_gpio.h"
 
-#define LINUX_GPIO_INPUTS_MAX 3u
+#define LINUX_GPIO_INPUTS_MAX 5u
 
 /** The switches. */
 typedef struct {
@@ -31,7 +31,7 @@ typedef struct {
     uint32_t present;
     bool has_edges;   /**< the worker's, once it runs */
     uint32_t levels;  /**< newest; the worker writes */
-    uint32_t pressed; /**< INPUT_ESTOP where it was active since the last read; the worker sets, a read clears */
+    uint32_t pressed; /**< channels of the e-stop that were open since the last read; the worker sets, a read clears */
     uint32_t read_ms; /**< when the lines were last read; the worker writes */
     uint8_t is_lost;  /**< the last call of the kernel failed; the worker writes */
     uint8_t is_ending;

@@ -102,7 +102,7 @@ hal_relays_t linux_gpio_relays_hal(linux_gpio_relays_t *self)
 hv_status_t linux_gpio_relays_open(linux_gpio_relays_t *self, const linux_gpio_relays_config_t *config)
 {
     linux_gpio_request_t request = {
-        .consumer = "heaved relays", .is_output = true, .is_active_low = config->is_active_low, .values = config->safe_mask};
+        .consumer = config->consumer, .is_output = true, .is_active_low = config->is_active_low, .values = config->safe_mask};
     memset(self, 0, sizeof *self);
     self->wake = -1;
     self->asked = config->safe_mask;

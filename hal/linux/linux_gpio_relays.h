@@ -16,6 +16,7 @@
 /** A bank. */
 typedef struct {
     linux_gpio_names_t names; /**< relay 1 first; count 0: no relays at all, nothing is opened */
+    const char *consumer;     /**< what the kernel tells others of who has them */
     bool is_active_low;       /**< a low level closes a relay */
     uint16_t safe_mask;
 } linux_gpio_relays_config_t;

@@ -25,7 +25,7 @@ void hv_assert_failed(const char *file, int line)
 /* Not in main(), whose variables take room on the stack for ever. */
 HV_OWN_FRAME static void prepare(void)
 {
-    const gateway_io_t io = {port_udp(), cia402_hal(&drives), port_relays(), port_inputs(), port_log()};
+    const gateway_io_t io = {port_udp(), cia402_hal(&drives), port_relays(), port_inputs(), port_log(), {NULL, NULL}};
     if (cia402_init(&drives, &k_platform_drives, port_can()) != HV_OK || gateway_init(&gateway, &k_platform, &io) != HV_OK) {
         start_fail(); /* the tables are wrong */
     }

@@ -5,7 +5,7 @@
  * Such drives say little about themselves, so states are judged like this:
  *   OFFLINE   no position has been received for offline_periods of the bus
  *   ENABLING  asked for; ends with a position that is newer than the request and, where the map knows how a drive says that it is
- *             enabled (enabled_when), with that. Where the map has an enable frame, set-points go out before it already
+ *             enabled (enabled_when), with that. Where the map has either, set-points go out before it already
  *   ENABLED   set-points go out. Without enabled_when it means just this: asked for, and heard from since
  *   HOMING    the homing frame went out; ends when the drive says so (homing_done), has told its position once more and, as
  *             above, says that it is enabled

@@ -38,16 +38,41 @@ typedef enum {
     CIA402_LOST_BUS = 0x10006,
     CIA402_NOT_402 = 0x10007, /**< 1000h names another profile */
     CIA402_WRONG_IDENTITY = 0x10008,
-    CIA402_NOT_TAKEN = 0x10009,    /**< an object was refused, or does not hold what was written */
-    CIA402_UNGUARDED = 0x1000A,    /**< a guard of the drive is off: it would not stop by itself */
-    CIA402_NO_HEARTBEAT = 0x1000B, /**< never sends one */
-    CIA402_NO_MODE = 0x1000C,      /**< 6061h does not show the mode */
-    CIA402_NO_START = 0x1000D,     /**< does not become operational, or its TPDO is not what was mapped */
-    CIA402_NO_POWER = 0x1000E,     /**< does not switch on in time */
-    CIA402_NO_TORQUE = 0x1000F,    /**< does not enable operation, or does not follow, in time */
-    CIA402_REMOTE_OFF = 0x10010,   /**< under local control (bit 9 of 6041h) */
-    CIA402_FELL_OUT = 0x10011      /**< left operation enabled by itself */
+    CIA402_NOT_TAKEN = 0x10009,     /**< an object was refused, or does not hold what was written */
+    CIA402_UNGUARDED = 0x1000A,     /**< a guard of the drive is off: it would not stop by itself */
+    CIA402_NO_HEARTBEAT = 0x1000B,  /**< never sends one */
+    CIA402_NO_MODE = 0x1000C,       /**< 6061h does not show the mode */
+    CIA402_NO_START = 0x1000D,      /**< does not become operational, or its TPDO is not what was mapped */
+    CIA402_NO_POWER = 0x1000E,      /**< does not switch on in time */
+    CIA402_NO_TORQUE = 0x1000F,     /**< does not enable operation, or does not follow, in time */
+    CIA402_REMOTE_OFF = 0x10010,    /**< under local control (bit 9 of 6041h) */
+    CIA402_FELL_OUT = 0x10011,      /**< left operation enabled by itself */
+    CIA402_LEFT_MODE = 0x10012,     /**< 6061h shows another mode than it was set to */
+    CIA402_NOT_FOLLOWING = 0x10013, /**< ignores its set-points (bit 12) */
+    CIA402_NO_VOLTAGE = 0x10014,    /**< bit 4 */
+    CIA402_LIMITED = 0x10015,       /**< bit 11 */
+    CIA402_WARNING = 0x10016,       /**< bit 7 */
+    CIA402_NO_ANSWER = 0x10017,     /**< answers, only not when asked for one object */
+    CIA402_TWICE = 0x10018          /**< two drives have its node id */
 } cia402_trouble_t;
+
+/** What is watched in every answer, beyond state and position: bits of drive_report_t.notes. */
+typedef enum {
+    CIA402_WATCH_MODE,
+    CIA402_WATCH_FOLLOWING,
+    CIA402_WATCH_LOCAL,
+    CIA402_WATCH_VOLTAGE,
+    CIA402_WATCH_LIMIT,
+    CIA402_WATCH_WARNING,
+    CIA402_WATCHES
+} cia402_watch_t;
+
+/** What follows from it. */
+typedef enum {
+    CIA402_IGNORE,
+    CIA402_TELL, /**< told of in the report */
+    CIA402_STOP  /**< a fault of the drive: all stop; and such a drive is not enabled */
+} cia402_reaction_t;
 
 /** One drive. Counts are those of the drive (6064h). Unit u: mm, or deg of the rotation motor. */
 typedef struct {
@@ -87,6 +112,7 @@ typedef struct {
     bool is_reset_wanted;          /**< reset communication before setting up */
     bool is_unguarded_allowed;     /**< drives without guards are taken all the same */
     bool is_homing_in_turn;        /**< one drive after the other */
+    cia402_reaction_t reaction[CIA402_WATCHES];
     cia402_axis_config_t axis[DRIVES_MAX];
 } cia402_config_t;
 
@@ -113,6 +139,8 @@ typedef struct {
     bool is_asked;     /* an SDO of this step is under way */
     uint8_t mode;      /* of CIA402_JOB_MODE and at the end of CIA402_JOB_SETUP */
     uint32_t value;    /* read in an earlier step */
+    uint32_t refusal;  /* SDO abort code of the last write that was left to a check, */
+    uint16_t refused;  /* and the index of its object; 0 = none */
     uint64_t since_us; /* of the row */
     uint64_t pause_us; /* nothing is done before */
 } cia402_setup_t;
@@ -133,26 +161,43 @@ typedef struct {
     uint64_t phase_us;
     uint64_t trouble_us;
     uint32_t trouble_object; /* index << 8 | sub */
-    uint32_t trouble_code;   /* SDO abort code, or the value found */
+    uint32_t trouble_code;   /* SDO abort code, or a code of the drive */
+    uint32_t trouble_found;  /* where has_found: the object holds this, */
+    uint32_t trouble_wanted; /* instead of this */
+    uint32_t mute_object;    /* no answer came when it was asked for; 0 = none */
     uint32_t warned_object;  /* a guard that is off and was allowed to be */
     uint8_t nmt;             /* last heard */
     uint8_t nmt_command;     /* waits to be sent, 0 = none */
     uint8_t starts;          /* attempts to become operational */
+    uint8_t mutes;           /* attempts that ended at an object without answer */
+    uint8_t awaited;         /* TPDOs that SYNCs have asked for and that have not come, saturates */
+    uint8_t surplus;         /* those that nothing had asked for, saturates */
+    uint8_t plain_syncs;     /* since the last of these, saturates */
     bool is_reset_done;
+    bool has_found;
     sdo_t sdo;
     cia402_setup_t setup;
     uint64_t heartbeat_us;
+    uint64_t boot_us; /* of the last boot-up message, 0 = none */
 
     int64_t position_counts; /* without the wrap-around of 32 bits */
     q32_t actual_q32;
     uint64_t actual_us;
+    drive_emergency_t emergency;
+    uint64_t note_us[CIA402_WATCHES]; /* when each was seen last */
+    uint32_t notes;                   /* told of: bit N for cia402_watch_t N */
     int32_t actual_counts;
     uint32_t silent_syncs;
+    uint8_t watch_answers[CIA402_WATCHES]; /* in a row that show it, saturates */
+    bool has_followed;                     /* bit 12 was there since operation is enabled */
+    bool had_voltage;                      /* bit 4 likewise */
+    bool has_answer;                       /* a TPDO came since the last poll */
     uint16_t statusword;
     int8_t mode_shown;
     bool has_heartbeat;
-    bool has_actual; /* since it was set up last */
-    bool was_heard;  /* has_actual at any time */
+    bool has_actual;   /* since it was set up last */
+    bool was_heard;    /* has_actual at any time */
+    bool is_answering; /* up or not, and not known to be lost */
 
     bool is_in;        /* takes part in what the drives do together */
     bool has_operated; /* since the stage began in which all get there */
@@ -166,7 +211,6 @@ typedef struct {
     uint32_t own_fault;    /* found by this driver: cia402_trouble_t or a number of the standard; 0 = none */
     drive_guard_t guard;   /* why own_fault, where its set-points were too far */
     uint16_t error_code;   /* the drive's own */
-    uint8_t error_register;
     bool is_error_read;
     q32_t sent_q32;
     int32_t target_counts;

@@ -41,7 +41,10 @@ typedef enum {
 #define CIA402_STATUS_REACHED 0x0400u
 #define CIA402_STATUS_BIT12   0x1000u /**< CSP: follows; IP: interpolates; HM: attained; PP: set-point taken */
 #define CIA402_STATUS_BIT13   0x2000u /**< CSP, PP: following error; HM: homing error */
-#define CIA402_STATUS_REMOTE  0x0200u
+#define CIA402_STATUS_REMOTE  0x0200u /**< listens to the bus */
+#define CIA402_STATUS_VOLTAGE 0x0010u /**< at the power stage */
+#define CIA402_STATUS_WARNING 0x0080u
+#define CIA402_STATUS_LIMIT   0x0800u /**< a limit of its own is active */
 
 /** State that a statusword tells. */
 cia402_state_t cia402_state(uint16_t statusword);

@@ -47,16 +47,43 @@ typedef struct {
     drive_guard_t guard; /**< why DRIVE_FAULT, where the drive itself has not found it */
 } drive_feedback_t;
 
+/** What a drive that goes on tells: bits of drive_report_t.notes. */
+#define DRIVE_NOTES 6u
+static inline const char *drive_note_text(unsigned note)
+{
+    static const char *const k_texts[DRIVE_NOTES] = {
+        "has left its mode of operation",    "ignores its set-points",   "is under local control and may ignore a quick stop",
+        "has no voltage at its power stage", "is at a limit of its own", "warns",
+    };
+    return note < DRIVE_NOTES ? k_texts[note] : "";
+}
+
+/** The last error that a drive told of by itself (EMCY), whatever came of it. All 0: none yet. */
+typedef struct {
+    uint64_t at_us;
+    uint32_t count; /**< since the start */
+    uint16_t code;
+    uint8_t error_register;
+    uint8_t maker[5]; /**< what the manufacturer makes of these bytes */
+    bool is_over;     /**< it has taken it back since, or started again */
+} drive_emergency_t;
+
 /** What one drive is at, in words for people. Constant texts, "" where there is nothing to say; never NULL. */
 typedef struct {
-    bool is_modbus;       /**< address is a unit, object a register << 8 */
-    uint8_t address;      /**< on the bus; 0 = has none */
-    const char *phase;    /**< "missing", "configuring", "ready", "enabled", "fault", or what it waits for */
-    const char *trouble;  /**< what is or was wrong with it */
-    const char *detail;   /**< more about that */
+    bool is_modbus;      /**< address is a unit, object a register << 8 */
+    uint8_t address;     /**< on the bus; 0 = has none */
+    const char *phase;   /**< "missing", "configuring", "ready", "enabled", "fault", or what it waits for */
+    const char *trouble; /**< what is or was wrong with it */
+    const char *detail;  /**< more about that */
+    const char *error;   /**< what emergency.code means; NULL where there was none */
+    drive_emergency_t emergency;
     uint32_t code;        /**< number of trouble, 0 = none */
     uint32_t object;      /**< of the device, index << 8 | sub-index: what is being set, or what the trouble is about; 0 = none */
     uint32_t detail_code; /**< of the protocol, or the value found; 0 = none */
+    bool has_found;       /**< object holds found instead of wanted */
+    uint32_t found;
+    uint32_t wanted;
+    uint32_t notes;       /**< what it tells beside that, or told in the last seconds: bit N for drive_note_text(N) */
     uint64_t since_us;    /**< of the trouble, else of the phase */
     uint32_t period_us;   /**< measured, from one set-point that the drive took to the next; 0 = unknown */
     uint64_t setpoint_us; /**< when it took the newest one; 0 = none, or not known */

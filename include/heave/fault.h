@@ -11,14 +11,16 @@
 /** Codes; they keep their numbers. */
 typedef enum {
     FAULT_NONE,
-    FAULT_DRIVE,         /**< a drive reports a fault (device_code says which) */
-    FAULT_DRIVE_OFFLINE, /**< a drive does not answer */
-    FAULT_DRIVE_DROPPED, /**< a drive left the enabled state by itself */
-    FAULT_DRIVE_TIMEOUT, /**< enabling or homing took too long */
-    FAULT_BUS,           /**< the drives' bus is gone or takes no set-points */
-    FAULT_FOLLOWING,     /**< an axis is too far from its set-point for too long, or from one that was then not sent */
-    FAULT_BUS_FAILING,   /**< the drives' bus still works, but may be lost at any moment */
-    FAULT_SETPOINT_JUMP, /**< a set-point jumped away from its drive, and was not sent */
+    FAULT_DRIVE,          /**< a drive reports a fault (device_code says which) */
+    FAULT_DRIVE_OFFLINE,  /**< a drive does not answer */
+    FAULT_DRIVE_DROPPED,  /**< a drive left the enabled state by itself */
+    FAULT_DRIVE_TIMEOUT,  /**< enabling or homing took too long */
+    FAULT_BUS,            /**< the drives' bus is gone or takes no set-points */
+    FAULT_FOLLOWING,      /**< an axis is too far from its set-point for too long, or from one that was then not sent */
+    FAULT_BUS_FAILING,    /**< the drives' bus still works, but may be lost at any moment */
+    FAULT_SETPOINT_JUMP,  /**< a set-point jumped away from its drive, and was not sent */
+    FAULT_ESTOP_CHANNELS, /**< the two channels of the e-stop disagree for too long */
+    FAULT_POWER,          /**< the supply fails, and the platform was not settled in time */
     FAULT_CODES
 } fault_code_t;
 

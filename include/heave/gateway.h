@@ -12,6 +12,7 @@
 #include "heave/hal/log.h"
 #include "heave/hal/relays.h"
 #include "heave/hal/udp.h"
+#include "heave/healthy.h"
 #include "heave/motion.h"
 #include "heave/owner.h"
 #include "heave/relay_policy.h"
@@ -28,13 +29,14 @@
 /** Longest datagram taken. */
 #define GATEWAY_DATAGRAM_MAX 512u
 
-/** The outside, every handle valid. Backends outlive the gateway. */
+/** The outside, every handle valid, but that there need not be a line for the healthy pulse. Backends outlive the gateway. */
 typedef struct {
     hal_udp_t udp;
     drives_t drives;
     hal_relays_t relays;
     hal_inputs_t inputs;
     hal_log_t log;
+    hal_relays_t healthy; /**< a bank of one: the line of the healthy pulse; ops NULL: there is none */
 } gateway_io_t;
 
 /** How far bringing up the drives has come. */
@@ -82,7 +84,17 @@ typedef struct {
     relay_settings_t relays;
     uint16_t relay_safe_mask;
     uint32_t relay_safe_after_ms;
+    healthy_settings_t healthy;
+    uint32_t power_settle_ms;
 } gateway_settings_t;
+
+/** Which line about a drive was written last, so that one that comes and goes for ever does not fill the log. */
+typedef struct {
+    uint64_t next_us; /**< a line is free from then on, less what a burst may use up */
+    uint32_t code;
+    uint32_t detail_code;
+    uint32_t left_out; /**< changes since then that no line told of */
+} gateway_told_t;
 
 /** A gateway; members are private to src/gateway. */
 typedef struct {
@@ -100,6 +112,9 @@ typedef struct {
     uint64_t bring_up_deadline_us;
     bool is_bus_lost;        /**< so that it is counted once */
     bool is_bus_failing;     /**< the same */
+    bool is_estop_apart;     /**< the same */
+    bool is_power_overdue;   /**< the same */
+    uint64_t power_since_us; /**< the supply has been failing since then; 0 = it is not */
     bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
     bool is_disable_due;     /**< disable the drives once at rest */
     auto_engage_t auto_engage;
@@ -121,15 +136,22 @@ typedef struct {
     motion_target_t newest;
     frame_command_t newest_command;
     hal_udp_peer_t newest_from;
-    uint16_t written_mask;
+    uint16_t effects_mask; /**< of this cycle, without the healthy pulse */
+    uint16_t written_mask; /**< with it */
     bool is_mask_written;
+    healthy_t healthy;
+    bool is_late;                /**< the coming cycle is, by more than the pulse bears */
+    bool is_pulse_lost;          /**< its line cannot be written */
     uint64_t other_logged_us;    /**< 0 = never */
     uint64_t singular_logged_us; /**< 0 = never */
     uint32_t other_suppressed;
     uint64_t spike_logged_us;
     uint32_t spikes_logged; /**< of all spikes, those that a line told of */
     uint64_t jump_logged_us;
-    uint32_t jumps_logged; /**< likewise */
+    uint32_t jumps_logged;                    /**< likewise */
+    gateway_told_t told_of[DRIVES_MAX];       /**< the last line about what a drive is at */
+    uint64_t emergency_logged_us[DRIVES_MAX]; /**< 0 = never */
+    uint32_t emergencies_logged[DRIVES_MAX];  /**< of all of a drive, those that a line told of, or counted */
     uint64_t reject_logged_us[FRAME_ERRORS];
     uint32_t reject_suppressed[FRAME_ERRORS];
     uint8_t datagram[GATEWAY_DATAGRAM_MAX];
@@ -175,7 +197,7 @@ void gateway_cycle(gateway_t *self, uint64_t now_us);
 /** What the last cycle did. Valid until the next one. */
 const snapshot_t *gateway_snapshot(const gateway_t *self);
 
-/** Tells the counters of cycles that were skipped because the program was late. */
+/** Tells of cycles that were skipped just before the coming one because the program was late. */
 void gateway_note_late(gateway_t *self, uint32_t cycles);
 
 /** Offline runs: the coming cycle finds this fault, whatever the drives do; where it finds it by itself, nothing is added.

@@ -9,6 +9,7 @@
 #include "heave/frame.h"
 #include "heave/hal/relays.h"
 #include "heave/hal/udp.h"
+#include "heave/healthy.h"
 #include "heave/kin.h"
 #include "heave/stream.h"
 
@@ -87,6 +88,9 @@ typedef struct {
     relay_settings_t relays;
     uint16_t relay_safe_mask;
     uint32_t relay_safe_after_ms; /**< of a hold that interrupted a ride; in every other state at once */
+
+    healthy_settings_t healthy;
+    uint32_t power_settle_ms; /**< not settled so long after the supply began to fail: a fault; 0 = never */
 } settings_t;
 
 #endif

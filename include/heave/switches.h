@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * switches.h - the operator's switches without their bouncing. An e-stop acts at once; its release, and both ways of the other
- * switches, count once they have stood still for SWITCHES_SETTLE_US. Stands in front of a gateway, so that its recordings hold
- * what came of it and replay without it. The caller owns switches_t, which must not move; one thread; time is an argument.
+ * switches.h - the operator's switches without their bouncing. An e-stop acts at once, by either channel where it has two; its
+ * release, and both ways of the other switches, count once they have stood still for SWITCHES_SETTLE_US. Stands in front of a
+ * gateway, so that its recordings hold what came of it and replay without it. The caller owns switches_t, which must not move;
+ * one thread; time is an argument.
  */
 #ifndef HEAVE_SWITCHES_H
 #define HEAVE_SWITCHES_H
@@ -14,7 +15,7 @@
 /** Contacts bounce for less than 10 ms; a finger presses for more than 80 ms. */
 #define SWITCHES_SETTLE_US 50000u
 
-#define SWITCHES_INPUTS 3u
+#define SWITCHES_INPUTS 5u
 
 /** The switches; private. */
 typedef struct {
@@ -22,19 +23,24 @@ typedef struct {
     uint32_t seen;   /**< levels last read */
     uint32_t levels; /**< those that count */
     uint64_t since_us[SWITCHES_INPUTS];
+    uint32_t discrepancy_us; /**< 0: there is no second channel */
+    uint64_t agreed_us;      /**< the channels of the e-stop agreed then for the last time */
+    bool is_apart;           /**< they have disagreed for too long */
+    bool is_proven;          /**< since then both were open at the same time */
     bool is_started;
     bool is_lost;
 } switches_t;
 
-/** Inputs that have just changed, INPUT_ENABLE | INPUT_RESET; never both bits of one. */
+/** Inputs that have just changed, INPUT_ENABLE | INPUT_RESET | INPUT_POWER; never both bits of one. */
 typedef struct {
     uint32_t on;
     uint32_t off;
 } switches_change_t;
 
 /** Starts; the first levels read count as they are and are no change.
- *  @param behind valid */
-void switches_init(switches_t *self, hal_inputs_t behind);
+ *  @param behind         valid
+ *  @param discrepancy_us how long two channels of the e-stop may disagree; 0 where there is one */
+void switches_init(switches_t *self, hal_inputs_t behind, uint32_t discrepancy_us);
 
 /** Reads once; in every cycle, before the gateway's.
  *  @param now_us never less than the last time */
@@ -46,7 +52,12 @@ bool switches_is_lost(const switches_t *self);
 /** True where there is an enable key and it is off. */
 bool switches_is_key_off(const switches_t *self);
 
-/** The levels that count, as of the last step. Its read returns HV_ERR_IO while the inputs cannot be read. */
+/** True while the supply is failing. */
+bool switches_is_power_failing(const switches_t *self);
+
+/** The levels that count, as of the last step. INPUT_ESTOP is that of either channel, and stays once the channels have disagreed
+ * for too long, with INPUT_APART, until both have been open at the same time and are closed again: a contact that is welded would
+ * not be noticed otherwise. Its read returns HV_ERR_IO while the inputs cannot be read. */
 hal_inputs_t switches_hal(switches_t *self);
 
 #endif

@@ -14,6 +14,7 @@
 #include "heave/plate.h"
 #include "heave/stream.h"
 #include "heave/supervisor.h"
+#include "heave/wear.h"
 
 /** A machine fault. */
 typedef struct {
@@ -59,7 +60,10 @@ typedef struct {
     state_t goal;
     bool is_held_by_silence;
     bool is_estop_active;
+    bool is_power_failing;
+    bool is_healthy;                     /**< the healthy pulse runs, or would if there were a line for it */
     fault_t fault;                       /**< the first one since the last reset */
+    drive_report_t fault_report;         /**< what its drive was at then, in words; "" where none is concerned */
     fault_reaction_t reaction;           /**< the worst of them */
     uint64_t fault_last_us[FAULT_CODES]; /**< when each was last seen to begin, 0 = never */
     uint32_t begun[DRIVES_MAX + 1u];     /**< in this cycle, by axis as in fault_t: bit N for fault_code_t N */
@@ -74,6 +78,8 @@ typedef struct {
     q32_t extension_mm_q32[CYLINDERS_MAX];
     q32_t angle_deg_q32;
     drive_feedback_t drive[DRIVES_MAX];
+    wear_t wear[DRIVES_MAX];           /**< of each drive, since the start */
+    uint32_t rides;                    /**< times that it was engaged from NEUTRAL */
     drive_report_t report[DRIVES_MAX]; /**< the same in words; "" where the driver has none */
     unsigned flags;                    /**< MOTION_CLAMPED ... */
     uint8_t limiting_cylinder;

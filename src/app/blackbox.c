@@ -45,6 +45,7 @@ static void push_row(blackbox_feed_t *feed, const session_t *session, const trac
         out.actual_q32[i] = snapshot->drive[i].has_actual ? snapshot->drive[i].actual_mm_q32 : 0;
         out.code[i] = snapshot->drive[i].fault_code;
         out.drive[i] = (uint8_t)snapshot->drive[i].state;
+        out.error[i] = snapshot->report[i].emergency.is_over ? 0 : snapshot->report[i].emergency.code;
         out.known[i] = known_of(&snapshot->drive[i]);
         out.age_us[i] = (uint32_t)(snapshot->now_us - snapshot->drive[i].actual_us);
     }
@@ -323,6 +324,7 @@ const char *blackbox_open(blackbox_t *self, const char *config_path, const confi
     self->file.fd = -1;
     self->config_path = config_path;
     self->settings = &config->settings;
+    memcpy(self->config_hash, config->hash, sizeof self->config_hash);
     self->folders_max = config->black_box.incidents;
     (void)pthread_mutex_init(&self->mutex, NULL);
     if (length == 0) {

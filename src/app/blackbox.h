@@ -33,6 +33,7 @@ typedef struct {
     uint8_t drive[DRIVES_MAX];    /**< drive_state_t */
     uint8_t known[DRIVES_MAX];    /**< BLACKBOX_HOMED ... */
     uint32_t age_us[DRIVES_MAX];  /**< of actual */
+    uint16_t error[DRIVES_MAX];   /**< code of the last EMCY that has not been taken back */
     uint8_t drives;
     uint8_t fault; /**< fault_code_t */
     uint8_t fault_axis;
@@ -84,7 +85,8 @@ typedef struct {
     size_t memory_bytes;
     const char *config_path;
     const settings_t *settings;
-    char *platform; /**< the configuration as text */
+    char config_hash[CONFIG_HASH_MAX]; /**< as at the start */
+    char *platform;                    /**< the configuration as text */
     size_t platform_length;
     char directory[CONFIG_PATH_MAX];
     uint32_t number;      /**< of the next incident */

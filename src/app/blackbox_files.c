@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "decimal.h"
+#include "build_id.h"
 #include "heave/text.h"
 #include "say.h"
 
@@ -284,7 +285,8 @@ static void write_head(blackbox_t *self, const blackbox_row_t *cause, const char
     };
     char text[640];
     const bool is_fault = cause != NULL && cause->fault != FAULT_NONE;
-    (void)snprintf(text, sizeof text, "; heaved %s, configuration %.300s, %s\n; %s", HEAVE_VERSION, self->config_path, name,
+    (void)snprintf(text, sizeof text, "; heaved %s, build %s, configuration %.300s, %s, %s\n; %s", HEAVE_VERSION, build_id(),
+                   self->config_path, self->config_hash, name,
                    cause == NULL ? "asked for by an operator"
                    : is_fault    ? fault_text((fault_code_t)cause->fault)
                                  : "e-stop");
@@ -421,9 +423,11 @@ static void put_feedback_head(const settings_t *settings, char *to, size_t capac
         text_put_u32(&text, i);
         text_put(&text, "_actual_mm,c");
         text_put_u32(&text, i);
-        text_put(&text, "_code");
+        text_put(&text, "_code,c");
+        text_put_u32(&text, i);
+        text_put(&text, "_error");
     }
-    text_put(&text, settings->has_angle ? ",angle_state,angle_actual_deg,angle_code,fault\n" : ",fault\n");
+    text_put(&text, settings->has_angle ? ",angle_state,angle_actual_deg,angle_code,angle_error,fault\n" : ",fault\n");
 }
 
 static size_t format_feedback(const blackbox_row_t *row, char *to)
@@ -437,6 +441,8 @@ static size_t format_feedback(const blackbox_row_t *row, char *to)
         at += decimal_put_q32(&to[at], row->actual_q32[i], FEEDBACK_PLACES);
         at += decimal_put_text(&to[at], ",");
         at += decimal_put_hex(&to[at], row->code[i], 8);
+        at += decimal_put_text(&to[at], ",");
+        at += decimal_put_hex(&to[at], row->error[i], 4);
     }
     at += decimal_put_text(&to[at], ",");
     at += decimal_put_text(&to[at], row->fault == FAULT_NONE ? "" : fault_help((fault_code_t)row->fault)->name);

@@ -14,6 +14,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "config_hash.h"
 #include "config_source.h"
 #include "config_value.h"
 
@@ -441,6 +442,7 @@ int config_load(const char *path, config_t *out, FILE *errors)
     config_source_t self;
     load(&self, path, &config, errors, WAIT_MS);
     if (self.error_count == 0) {
+        config_hash(&config);
         memcpy(out, &config, sizeof config);
     }
     return self.error_count;
@@ -469,15 +471,30 @@ static void take_change(const config_source_t *self, size_t i, config_t *running
     }
 }
 
+/* A platform whose configuration was approved takes over no other one in motion. */
+static void check_approval(config_source_t *self)
+{
+    config_hash(self->config);
+    if (config_is_unapproved(self->config)) {
+        config_source_key_error(self, "platform", "approved",
+                                "%s is not this configuration; allowed: %s, once somebody has approved it",
+                                self->config->approved.text, self->config->hash);
+    }
+}
+
 int config_reload(const char *path, config_t *running, FILE *report)
 {
     static config_t config;
     static config_source_t self;
     load(&self, path, &config, report, 0);
+    if (self.error_count == 0) {
+        check_approval(&self);
+    }
     for (size_t i = 0; self.error_count == 0 && i < config_key_count; i++) {
         if (config_is_applicable(config_keys[i].needs, running)) {
             take_change(&self, i, running);
         }
     }
+    config_hash(running);
     return self.error_count;
 }

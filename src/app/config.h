@@ -180,6 +180,10 @@ typedef enum { CONFIG_MODE_CSP, CONFIG_MODE_IP, CONFIG_MODE_PP } config_mode_t;
 /** What CANopen drives do when the gateway falls silent: 6007h less 1. */
 typedef enum { CONFIG_LOST_FAULT, CONFIG_LOST_DISABLE_VOLTAGE, CONFIG_LOST_QUICK_STOP } config_lost_t;
 
+/** What is watched in what CANopen drives say, and what follows: as cia402.h has both. */
+#define CONFIG_REACTIONS 6u
+typedef enum { CONFIG_REACTION_IGNORE, CONFIG_REACTION_TELL, CONFIG_REACTION_STOP } config_reaction_t;
+
 /** In which order CANopen drives home. */
 typedef enum { CONFIG_HOMING_TOGETHER, CONFIG_HOMING_IN_TURN } config_homing_order_t;
 
@@ -210,6 +214,7 @@ typedef struct {
     q16_t quick_stop_mm_s2_q16;
     q16_t angle_quick_stop_deg_s2_q16;
     config_lost_t when_gateway_lost;
+    config_reaction_t reaction[CONFIG_REACTIONS];
     uint16_t heartbeat_ms;
     uint16_t heartbeat_timeout_ms;
     uint16_t sdo_timeout_ms;
@@ -256,6 +261,17 @@ typedef struct {
     uint32_t timeout_ms;
 } config_relays_modbus_t;
 
+/** What carries the healthy pulse. */
+typedef enum { CONFIG_HEALTHY_NONE, CONFIG_HEALTHY_GPIO, CONFIG_HEALTHY_RELAY } config_healthy_driver_t;
+
+/** The line of the healthy pulse; its relay and its times are the core's. */
+typedef struct {
+    config_healthy_driver_t driver;
+    config_label_t chip; /**< as of the relays */
+    config_label_t line;
+    bool is_active_low;
+} config_healthy_t;
+
 /** What reads the operator's switches. */
 typedef enum { CONFIG_INPUTS_SIM, CONFIG_INPUTS_GPIO } config_inputs_driver_t;
 
@@ -266,6 +282,9 @@ typedef struct {
     config_label_t estop_line;
     config_label_t enable_line;
     config_label_t reset_line;
+    config_label_t estop2_line;
+    config_label_t power_line;
+    uint32_t estop_discrepancy_ms;
     bool is_active_low; /**< a closed contact pulls its line low */
 } config_inputs_t;
 
@@ -276,13 +295,24 @@ typedef struct {
     uint32_t incidents;              /**< most folders kept in the directory */
 } config_black_box_t;
 
+#define CONFIG_HASH_MAX 17u /**< digits of what a configuration is recognised by, with its NUL */
+
 /** A whole configuration: the core's settings, and what only the hosted program needs. Plain data. */
 typedef struct {
     settings_t settings;
     config_udp_t udp;
-    uint32_t late_hold_cycles; /**< of the program: see motion_loop.h */
+    uint32_t late_hold_cycles;       /**< of the program: see motion_loop.h */
+    char life_file[CONFIG_PATH_MAX]; /**< "none" = none */
+    config_label_t approved;         /**< hash of the one that was approved, "" = any */
+    char hash[CONFIG_HASH_MAX];      /**< of this one; follows from the rest (config_hash.h) */
     char control_socket[CONFIG_PATH_MAX];
     char metrics_file[CONFIG_PATH_MAX]; /**< "none" = none */
+    char look_socket[CONFIG_PATH_MAX];  /**< likewise */
+    config_label_t operate_group;       /**< "" = none */
+    config_label_t service_group;       /**< likewise */
+    char operator_log[CONFIG_PATH_MAX]; /**< "none" = none */
+    uint32_t operator_log_kb;
+    uint32_t operator_log_files;
     config_black_box_t black_box;
     config_drives_t drives;
     config_sim_t sim;
@@ -295,6 +325,7 @@ typedef struct {
     config_relays_t relays;
     config_relays_modbus_t relays_modbus;
     config_inputs_t inputs;
+    config_healthy_t healthy;
 } config_t;
 
 /** Loads and checks a file.

@@ -106,6 +106,23 @@ static void check_load(config_source_t *self, const config_bus_t *bus, uint32_t 
                             (unsigned)fitting_us);
 }
 
+/* Of the periods beside it only those that the bus can carry. */
+static void refuse_period(config_source_t *self, const config_bus_t *bus, uint32_t cycle_us)
+{
+    const uint32_t below_us = bus->period_us < cycle_us ? cycle_us : bus->period_us - bus->period_us % cycle_us;
+    const uint32_t least_us = config_bus_fitting_us(bus, CONFIG_BUS_REFUSED_PPM, cycle_us);
+    const uint32_t first_us = below_us > least_us ? below_us : least_us;
+    if (config_bus_load_ppm(bus) > CONFIG_BUS_REFUSED_PPM) {
+        config_source_key_error(
+            self, bus->section, "period_us",
+            "is no multiple of cycle_us, and would load the bus by %u %% at worst; allowed: for instance %u or %u us",
+            (unsigned)(config_bus_load_ppm(bus) / 10000u), (unsigned)first_us, (unsigned)(first_us + cycle_us));
+    } else {
+        config_source_key_error(self, bus->section, "period_us", "is no multiple of cycle_us; allowed: for instance %u or %u us",
+                                (unsigned)first_us, (unsigned)(first_us + cycle_us));
+    }
+}
+
 void config_bus_check(config_source_t *self)
 {
     const uint32_t cycle_us = self->config->settings.cycle_us;
@@ -115,11 +132,8 @@ void config_bus_check(config_source_t *self)
         !config_source_has(self, "platform", "cycle_us") || !config_source_has(self, "platform", "kind")) {
         return;
     }
-    const uint32_t rest_us = bus.period_us % cycle_us;
-    if (rest_us != 0) {
-        config_source_key_error(self, bus.section, "period_us", "is no multiple of cycle_us; allowed: for instance %u or %u us",
-                                (unsigned)(bus.period_us < cycle_us ? cycle_us : bus.period_us - rest_us),
-                                (unsigned)(bus.period_us < cycle_us ? 2u * cycle_us : bus.period_us - rest_us + cycle_us));
+    if (bus.period_us % cycle_us != 0) {
+        refuse_period(self, &bus, cycle_us);
         return;
     }
     check_load(self, &bus, cycle_us);

@@ -9,6 +9,7 @@
 #include "config_cia402.h"
 #include "config_coils.h"
 #include "config_gpio.h"
+#include "config_healthy.h"
 #include "config_modbus.h"
 #include "config_source.h"
 #include "config_value.h"
@@ -404,6 +405,22 @@ static void check_relays(config_source_t *self)
     }
 }
 
+/* What is compared with a hash has to look like one, or nothing would ever move. */
+static void check_approved(config_source_t *self)
+{
+    const char *approved = self->config->approved.text;
+    if (!config_source_has(self, "platform", "approved") || approved[0] == '\0') {
+        return;
+    }
+    if (strlen(approved) != CONFIG_HASH_MAX - 1u || strspn(approved, "0123456789abcdef") != CONFIG_HASH_MAX - 1u) {
+        config_source_key_error(self, "platform", "approved", "%s is no hash; allowed: none, or the %u digits that --check shows",
+                                approved, CONFIG_HASH_MAX - 1u);
+    } else if (config_source_has(self, "platform", "engage") && self->config->settings.engage == ENGAGE_AUTO) {
+        config_source_key_error(self, "platform", "approved",
+                                "engage = auto waits for nobody to look at it; allowed: none, or engage = manual");
+    }
+}
+
 static void check_values(config_source_t *self)
 {
     settings_t *settings = &self->config->settings;
@@ -419,11 +436,13 @@ static void check_values(config_source_t *self)
     check_engage(self, "speed_mm_s", settings->engage_speed_mm_s_q16, settings->cylinder_speed_mm_s_q16);
     check_engage(self, "accel_mm_s2", settings->engage_accel_mm_s2_q16, settings->cylinder_accel_mm_s2_q16);
     check_group(self);
+    check_approved(self);
     check_silence(self);
     check_intensity(self);
     check_relays(self);
     config_coils_check(self);
     config_gpio_check(self);
+    config_healthy_check(self);
     config_cia402_check(self);
     config_canraw_check(self);
     config_modbus_check(self);

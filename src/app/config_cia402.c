@@ -5,6 +5,7 @@
 
 #include "config_canraw.h" // config_canraw_axes, config_canraw_id
 
+#define PP_PERIODS  8 /* from one set-point that a drive takes to the next, and its own lag */
 #define STEP_FACTOR 2 /* a set-point may be so much further than its speed limit allows before it counts as a jump */
 
 static unsigned cylinders_of(const config_t *config)
@@ -104,6 +105,14 @@ static cia402_mode_t mode_of(config_mode_t mode)
     return CIA402_MODE_CSP;
 }
 
+q32_t config_cia402_pp_lag_q32(const config_t *config, q16_t speed_mm_s_q16)
+{
+    const q32_t speed_q32 = q32_from_q16(speed_mm_s_q16);
+    const q16_t accel_q16 = config->settings.cylinder_accel_mm_s2_q16;
+    const q32_t braking_q32 = fx_mul_div(speed_q32, speed_mm_s_q16, 2 * (int64_t)accel_q16);
+    return fx_add_sat(braking_q32, fx_mul_div(speed_q32, PP_PERIODS * (int64_t)config->cia402.period_us, 1000000));
+}
+
 void config_cia402(const config_t *config, cia402_config_t *out)
 {
     const config_cia402_t *cia402 = &config->cia402;
@@ -126,6 +135,9 @@ void config_cia402(const config_t *config, cia402_config_t *out)
         .is_unguarded_allowed = cia402->is_no_watchdog_allowed,
         .is_homing_in_turn = cia402->homing_order == CONFIG_HOMING_IN_TURN,
     };
+    for (unsigned i = 0; i < CIA402_WATCHES; i++) {
+        out->reaction[i] = (cia402_reaction_t)cia402->reaction[i];
+    }
     for (unsigned k = 0; k < out->axes; k++) {
         describe_axis(config, k, &out->axis[k]);
     }

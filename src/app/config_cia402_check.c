@@ -181,6 +181,20 @@ static void check_window(config_source_t *self, const char *name, q16_t window_q
     }
 }
 
+/* Rising and settling, at least, have to be possible. */
+static void check_profile_lag(config_source_t *self)
+{
+    const config_t *config = self->config;
+    const q32_t lag_q32 = config_cia402_pp_lag_q32(config, config->settings.engage_speed_mm_s_q16);
+    if (config->cia402.mode == CONFIG_MODE_PP && config_source_has_all(self, "engage") &&
+        config_source_has_all(self, "cylinders") && q32_from_q16(config->cia402.following_error_mm_q16) < lag_q32) {
+        config_source_key_error(
+            self, SECTION, "following_error_mm",
+            "less than a drive in mode pp is behind at [engage] speed_mm_s; allowed: at least %.3f mm, or slower",
+            (double)lag_q32 / (double)Q32_ONE + 0.0005);
+    }
+}
+
 void config_cia402_check(config_source_t *self)
 {
     const config_cia402_t *cia402 = &self->config->cia402;
@@ -195,6 +209,7 @@ void config_cia402_check(config_source_t *self)
     check_methods(self, "homing_method", &cia402->homing.method, cylinders_of(self));
     check_period(self);
     check_times(self);
+    check_profile_lag(self);
     check_window(self, "following_error_mm", cia402->following_error_mm_q16, settings->cylinder_speed_mm_s_q16, "mm");
     if (settings->has_angle) {
         check_methods(self, "angle_homing_method", &cia402->angle_homing.method, 1);

@@ -21,7 +21,7 @@ static bool is_same_line(const config_label_t *a, const config_label_t *b)
 }
 
 /* Chips are counted anew at every start. */
-static void check_chip(config_source_t *self, const char *section, const config_label_t *chip)
+void config_gpio_check_chip(config_source_t *self, const char *section, const config_label_t *chip)
 {
     if (strncmp(chip->text, "gpiochip", 8) == 0 || strncmp(chip->text, "/dev/", 5) == 0) {
         config_source_key_error(self, section, "chip",
@@ -29,8 +29,8 @@ static void check_chip(config_source_t *self, const char *section, const config_
     }
 }
 
-static void check_line(config_source_t *self, const char *section, const char *key, const config_label_t *chip,
-                       const config_label_t *line)
+void config_gpio_check_line(config_source_t *self, const char *section, const char *key, const config_label_t *chip,
+                            const config_label_t *line)
 {
     if (chip->text[0] == '\0' && is_number(line)) {
         config_source_key_error(self, section, key, "%s alone is no line; allowed: the name of a line, or its number with chip",
@@ -45,13 +45,13 @@ static void check_relays(config_source_t *self)
     if (relays->driver != CONFIG_RELAYS_GPIO || !config_source_has_all(self, "relays")) {
         return;
     }
-    check_chip(self, "relays", &relays->chip);
+    config_gpio_check_chip(self, "relays", &relays->chip);
     if (lines->count == 0) {
         config_source_key_error(self, "relays", "lines", "driver gpio switches none; allowed: the lines of 1 to %u relays",
                                 CONFIG_RELAYS_MAX);
     }
     for (unsigned i = 0; i < lines->count; i++) {
-        check_line(self, "relays", "lines", &relays->chip, &lines->line[i]);
+        config_gpio_check_line(self, "relays", "lines", &relays->chip, &lines->line[i]);
         for (unsigned k = 0; k < i; k++) {
             if (is_same_line(&lines->line[i], &lines->line[k])) {
                 config_source_key_error(self, "relays", "lines", "%s is relay %u already; allowed: a line of its own for each",
@@ -61,17 +61,40 @@ static void check_relays(config_source_t *self)
     }
 }
 
+/* A number is a line of its own chip; a name may be on any where no chip is given. */
+static bool is_same_chip(const config_label_t *a, const config_label_t *b)
+{
+    return a->text[0] == '\0' || b->text[0] == '\0' || strcmp(a->text, b->text) == 0;
+}
+
+static void check_against_relays(config_source_t *self, const char *section, const char *key, const config_label_t *chip,
+                                 const config_label_t *line)
+{
+    const config_relays_t *relays = &self->config->relays;
+    if (relays->driver != CONFIG_RELAYS_GPIO || !is_same_chip(&relays->chip, chip)) {
+        return;
+    }
+    for (unsigned i = 0; i < relays->lines.count; i++) {
+        if (is_same_line(&relays->lines.line[i], line)) {
+            config_source_key_error(self, section, key, "line %s is relay %u already; allowed: a line of its own, or none",
+                                    line->text, i + 1u);
+        }
+    }
+}
+
 /* --- Inputs --- */
 
-#define INPUTS 3u
+#define INPUTS 5u
 
-static const char *const k_input_keys[INPUTS] = {"estop", "enable", "reset"};
+static const char *const k_input_keys[INPUTS] = {"estop", "enable", "reset", "estop2", "power"};
 
 static void list_inputs(const config_inputs_t *inputs, const config_label_t *line[INPUTS])
 {
     line[0] = &inputs->estop_line;
     line[1] = &inputs->enable_line;
     line[2] = &inputs->reset_line;
+    line[3] = &inputs->estop2_line;
+    line[4] = &inputs->power_line;
 }
 
 static void check_inputs_apart(config_source_t *self, const config_label_t *const line[INPUTS])
@@ -87,26 +110,6 @@ static void check_inputs_apart(config_source_t *self, const config_label_t *cons
     }
 }
 
-/* A number is a line of its own chip; a name may be on any where no chip is given. */
-static bool is_same_chip(const config_label_t *a, const config_label_t *b)
-{
-    return a->text[0] == '\0' || b->text[0] == '\0' || strcmp(a->text, b->text) == 0;
-}
-
-static void check_against_relays(config_source_t *self, unsigned input, const config_label_t *line)
-{
-    const config_relays_t *relays = &self->config->relays;
-    if (relays->driver != CONFIG_RELAYS_GPIO || !is_same_chip(&relays->chip, &self->config->inputs.chip)) {
-        return;
-    }
-    for (unsigned i = 0; i < relays->lines.count; i++) {
-        if (is_same_line(&relays->lines.line[i], line)) {
-            config_source_key_error(self, "inputs", k_input_keys[input],
-                                    "line %s is relay %u already; allowed: a line of its own, or none", line->text, i + 1u);
-        }
-    }
-}
-
 static void check_inputs(config_source_t *self)
 {
     const config_inputs_t *inputs = &self->config->inputs;
@@ -117,18 +120,42 @@ static void check_inputs(config_source_t *self)
     if (inputs->driver != CONFIG_INPUTS_GPIO) {
         return;
     }
-    check_chip(self, "inputs", &inputs->chip);
+    config_gpio_check_chip(self, "inputs", &inputs->chip);
     for (unsigned i = 0; i < INPUTS; i++) {
         count += line[i]->text[0] != '\0';
-        check_line(self, "inputs", k_input_keys[i], &inputs->chip, line[i]);
-        check_against_relays(self, i, line[i]);
+        config_gpio_check_line(self, "inputs", k_input_keys[i], &inputs->chip, line[i]);
+        check_against_relays(self, "inputs", k_input_keys[i], &inputs->chip, line[i]);
     }
     if (count == 0) {
-        config_source_key_error(self, "inputs", "estop", "driver gpio reads none; allowed: a line for estop, enable or reset");
+        config_source_key_error(self, "inputs", "estop",
+                                "driver gpio reads none; allowed: a line for estop, enable, reset or power");
     }
     if (inputs->enable_line.text[0] != '\0' && self->config->settings.engage == ENGAGE_AUTO) {
         config_source_key_error(self, "inputs", "enable",
                                 "engage = auto does not wait for a key; allowed: none, or engage = manual");
+    }
+    if (inputs->power_line.text[0] != '\0' && self->config->settings.engage == ENGAGE_AUTO) {
+        config_source_key_error(self, "inputs", "power",
+                                "engage = auto does not wait for the supply; allowed: none, or engage = manual");
+    }
+    if (inputs->estop2_line.text[0] != '\0' && inputs->estop_line.text[0] == '\0') {
+        config_source_key_error(self, "inputs", "estop2",
+                                "there is no first channel; allowed: none, or a line for estop as well");
+    }
+}
+
+void config_gpio_check_output(config_source_t *self, const char *section, const char *key, const config_label_t *chip,
+                              const config_label_t *line)
+{
+    const config_inputs_t *inputs = &self->config->inputs;
+    const config_label_t *input[INPUTS];
+    check_against_relays(self, section, key, chip, line);
+    list_inputs(inputs, input);
+    for (unsigned i = 0; inputs->driver == CONFIG_INPUTS_GPIO && i < INPUTS; i++) {
+        if (is_same_chip(&inputs->chip, chip) && is_same_line(input[i], line)) {
+            config_source_key_error(self, section, key, "line %s is [inputs] %s already; allowed: a line of its own", line->text,
+                                    k_input_keys[i]);
+        }
     }
 }
 

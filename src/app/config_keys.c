@@ -44,6 +44,10 @@ const config_section_t config_sections[] = {
     {"relays-modbus", "a board of relays on Modbus coils ([relays] driver = modbus), on a line of its own; see docs/modbus.md",
      CONFIG_NEEDS_NOTHING},
     {"inputs", "switches of the operator", CONFIG_NEEDS_NOTHING},
+    {"healthy",
+     "an output that toggles as long as states, deadlines and drives are as they should be, for a watchdog outside; see "
+     "docs/safety.md",
+     CONFIG_NEEDS_NOTHING},
 };
 const size_t config_section_count = sizeof config_sections / sizeof config_sections[0];
 
@@ -99,6 +103,12 @@ const config_key_t config_keys[] = {
      .words = "manual|auto",
      .help = "who brings the platform up: an operator's request, or heaved by itself once after each start, also where a service manager "
              "starts it again after a crash"},
+    {KEY("platform", "life_file"), AT(life_file), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "file, and beside it FILE.2, that keeps hours, way and cycles of each axis for good; none: nothing is kept, unless a "
+             "service manager has given a state directory"},
+    {KEY("platform", "approved"), AT(approved), .type = CONFIG_LABEL, .unit = "", .fallback = "none", .is_live = true,
+     .help = "hash of the approved configuration, as --check shows it: any other moves nothing before `heavectl acknowledge`; not "
+             "with engage = auto"},
 
     JOINT("1", 0, CONFIG_NEEDS_NOTHING),
     JOINT("2", 1, CONFIG_NEEDS_NOTHING),
@@ -206,6 +216,21 @@ const config_key_t config_keys[] = {
      .help = "file for Prometheus (node_exporter's textfile collector: a name that ends in .prom), renewed every second; removed at "
              "the end"},
 
+    {KEY("control", "look_socket"), AT(look_socket), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "a second socket, for everybody on this machine: status, watch and hold, and nothing else"},
+    {KEY("control", "operate_group"), AT(operate_group), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "who may engage, resume, park, turn the intensity down and mark incidents as seen; none: whoever may use the socket. Everybody who may use it may "
+             "look and hold"},
+    {KEY("control", "service_group"), AT(service_group), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "who may do that and reset, turn the intensity up, dump and shut down; none: as operate_group; root always may"},
+    {KEY("control", "operator_log"), AT(operator_log), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "file that takes a line per request: when, who, what, and what became of it; none: nothing is kept, unless a service "
+             "manager has given a state directory, which then has operator.log"},
+    {KEY("control", "operator_log_kb"), AT(operator_log_kb), .type = CONFIG_INTEGER, .unit = "KB", .fallback = "1024",
+     RANGE(16, 1048576), .help = "size at which it becomes FILE.1, and a new one begins"},
+    {KEY("control", "operator_log_files"), AT(operator_log_files), .type = CONFIG_INTEGER, .unit = "", .fallback = "20",
+     RANGE(1, 100), .help = "older ones that are kept, FILE.1 the newest"},
+
     {KEY("black-box", "directory"), AT(black_box.directory), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
      .help = "takes one folder per incident; none: nothing is kept or written, unless a service manager has given a state directory"},
     {KEY("black-box", "seconds"), AT(black_box.seconds), .type = CONFIG_INTEGER, .unit = "s", .fallback = "120", RANGE(10, 600),
@@ -278,6 +303,18 @@ const config_key_t config_keys[] = {
      .unit = "deg/s^2", .fallback = "0", RANGE(0, MOST_Q16), .needs = CONFIG_NEEDS_ANGLE, .help = "the same of the rotation motor"},
     {KEY("cia402", "when_gateway_lost"), AT(cia402.when_gateway_lost), .type = CONFIG_WORD, .unit = "", .fallback = "fault",
      .words = "fault|disable-voltage|quick-stop", .help = "what a drive does when this gateway falls silent (6007h)"},
+    {KEY("cia402", "when_mode_left"), AT(cia402.reaction[0]), .type = CONFIG_WORD, .unit = "", .fallback = "stop",
+     .words = "ignore|tell|stop", .help = "another mode in 6061h than the drive was set to, in two answers in a row as all of these: stop = fault of the drive, all stop; tell = log and status"},
+    {KEY("cia402", "when_not_following"), AT(cia402.reaction[1]), .type = CONFIG_WORD, .unit = "", .fallback = "stop",
+     .words = "ignore|tell|stop", .help = "bit 12 of 6041h, once it was set: the drive ignores its set-points"},
+    {KEY("cia402", "when_local"), AT(cia402.reaction[2]), .type = CONFIG_WORD, .unit = "", .fallback = "stop",
+     .words = "ignore|tell|stop", .help = "bit 9 of 6041h is not set: the drive is not led by the bus, may ignore a quick stop, and is not enabled; tell or ignore for drives that never set it"},
+    {KEY("cia402", "when_no_voltage"), AT(cia402.reaction[3]), .type = CONFIG_WORD, .unit = "", .fallback = "stop",
+     .words = "ignore|tell|stop", .help = "bit 4 of 6041h, once it was set in operation: no voltage at the power stage"},
+    {KEY("cia402", "when_limited"), AT(cia402.reaction[4]), .type = CONFIG_WORD, .unit = "", .fallback = "tell",
+     .words = "ignore|tell|stop", .help = "bit 11 of 6041h: a limit of the drive itself is active"},
+    {KEY("cia402", "when_warning"), AT(cia402.reaction[5]), .type = CONFIG_WORD, .unit = "", .fallback = "tell",
+     .words = "ignore|tell|stop", .help = "bit 7 of 6041h: the drive warns"},
     {KEY("cia402", "heartbeat_ms"), AT(cia402.heartbeat_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "50",
      RANGE(5, 10000), .help = "period of the heartbeats of the gateway and of the drives (1017h)"},
     {KEY("cia402", "heartbeat_timeout_ms"), AT(cia402.heartbeat_timeout_ms), .type = CONFIG_INTEGER, .unit = "ms",
@@ -498,12 +535,38 @@ const config_key_t config_keys[] = {
      .help = "GPIO: label of the chip that has the lines; none: whichever has lines of these names"},
     {KEY("inputs", "estop"), AT(inputs.estop_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
      .help = "line of a normally closed contact of the emergency stop: open, or a broken wire, stops"},
+    {KEY("inputs", "estop2"), AT(inputs.estop2_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "line of a second channel of it, normally closed too: either one stops"},
+    {KEY("inputs", "estop_discrepancy_ms"), AT(inputs.estop_discrepancy_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "500",
+     RANGE(100, 10000), .help = "two channels that disagree for so long are a fault, until both have opened together and closed again"},
+    {KEY("inputs", "power"), AT(inputs.power_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "line of a contact that is closed while the supply is good (of a UPS): open, the platform settles and stays; not with "
+             "engage = auto"},
+    {KEY("inputs", "power_settle_ms"), AT(settings.power_settle_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "20000",
+     RANGE(100, 3600000), .is_live = true, .help = "what is not settled so long after the supply began to fail stops where it is and goes off"},
     {KEY("inputs", "enable"), AT(inputs.enable_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
      .help = "line of the enable key, closed when on: off parks, and nobody engages"},
     {KEY("inputs", "reset"), AT(inputs.reset_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
      .help = "line of the reset button, closed when pressed"},
     {KEY("inputs", "active_low"), AT(inputs.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "yes",
      .help = "whether a closed contact pulls its line low (contacts to ground); no: high (contacts to supply)"},
+
+    {KEY("healthy", "driver"), AT(healthy.driver), .type = CONFIG_WORD, .unit = "", .fallback = "none", .words = "none|gpio|relay",
+     .help = "what carries it: nothing, a GPIO line of its own, or one of the relays, coils of a Modbus board included"},
+    {KEY("healthy", "chip"), AT(healthy.chip), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "GPIO: label of the chip that has the line; none: whichever has a line of this name"},
+    {KEY("healthy", "line"), AT(healthy.line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "GPIO: the output line, by name, or with chip by number"},
+    {KEY("healthy", "active_low"), AT(healthy.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "whether the line rests high"},
+    {KEY("healthy", "relay"), AT(settings.healthy.relay), .type = CONFIG_INTEGER, .unit = "", .fallback = "0", RANGE(0, 12),
+     .help = "driver = relay: its number; senders do not switch it any more, and max_on_ms and min_toggle_ms are not for it"},
+    {KEY("healthy", "toggle_ms"), AT(settings.healthy.toggle_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "10",
+     RANGE(1, 1000), .help = "time between two edges, rounded up to whole cycles; 100 and more for a Modbus board"},
+    {KEY("healthy", "off_ms"), AT(settings.healthy.off_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "500",
+     RANGE(0, 60000), .help = "once it stops it stays away for so long at least; longer than the watchdog waits for an edge"},
+    {KEY("healthy", "late_cycles"), AT(settings.healthy.late_cycles), .type = CONFIG_INTEGER, .unit = "", .fallback = "3",
+     RANGE(0, 1000), .help = "a cycle that is late by more cycles than that stops it"},
 };
 /* clang-format on */
 const size_t config_key_count = sizeof config_keys / sizeof config_keys[0];

@@ -39,6 +39,9 @@ typedef enum {
 /** What a platform must have for a section or key to mean anything. */
 typedef enum { CONFIG_NEEDS_NOTHING, CONFIG_NEEDS_HEXAPOD, CONFIG_NEEDS_ANGLE } config_needs_t;
 
+/** A number that people know in hexadecimal: one of 32 bits, as identities are. Takes both. */
+#define CONFIG_IS_HEX(key) ((key)->type == CONFIG_INTEGER && (key)->high_milli == (int64_t)UINT32_MAX * 1000)
+
 /** One section. */
 typedef struct {
     const char *name;

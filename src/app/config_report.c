@@ -7,6 +7,8 @@
 #include <string.h>
 
 #include "config_bus.h"
+#include "config_hash.h"
+#include "config_cia402.h" // config_cia402_pp_lag_q32
 #include "config_modbus.h"
 #include "config_keys.h"
 #include "config_text.h"
@@ -99,6 +101,8 @@ static void write_head(const report_t *self, size_t ram_bytes)
 {
     fprintf(self->out, "%-24s  %s, %u cylinders%s\n", "platform", config_kind_name(self->settings->geometry.kind),
             self->envelope.cylinders, self->settings->has_angle ? ", rotation motor" : "");
+    fprintf(self->out, "%-24s  %s%s%s\n", "configuration", self->config->hash,
+            self->config->approved.text[0] == '\0' ? "" : ", [platform] approved = ", self->config->approved.text);
     fprintf(self->out, "%-24s  %u us\n", "cycle", (unsigned)self->settings->cycle_us);
     fprintf(self->out, "%-24s  %zu bytes\n", "memory of the gateway", ram_bytes);
     write_bus(self);
@@ -377,6 +381,26 @@ static void warn_bus(report_t *self)
     warn(self, text.data);
 }
 
+/* In profile position drives may do no more than follow poses that are rare and near. */
+static void warn_profile_lag(report_t *self)
+{
+    const config_t *config = self->config;
+    config_text_t text;
+    if (config->drives != CONFIG_DRIVES_CIA402 || config->cia402.mode != CONFIG_MODE_PP) {
+        return;
+    }
+    const q32_t lag_q32 = config_cia402_pp_lag_q32(config, config->settings.cylinder_speed_mm_s_q16);
+    if (lag_q32 > q32_from_q16(config->cia402.following_error_mm_q16)) {
+        config_text_clear(&text);
+        config_text_add(
+            &text,
+            "[cia402] mode = pp: at [cylinders] speed_mm_s a drive is %.1f mm behind, and following_error_mm stops it before; "
+            "slower, or csp",
+            (double)lag_q32 / (double)Q32_ONE);
+        warn(self, text.data);
+    }
+}
+
 static void write_warnings(report_t *self)
 {
     for (unsigned axis = 0; axis < AXES_MAX; axis++) {
@@ -395,6 +419,10 @@ static void write_warnings(report_t *self)
     warn_cylinders(self);
     warn_network(self);
     warn_bus(self);
+    if (config_is_unapproved(self->config)) {
+        warn(self, "[platform] approved: another configuration was approved; nothing moves until `heavectl acknowledge`");
+    }
+    warn_profile_lag(self);
 }
 
 int config_check_report(const config_t *config, size_t ram_bytes, FILE *out)

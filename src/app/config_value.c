@@ -191,17 +191,6 @@ static bool parse_whole(const config_key_t *key, span_t item, int64_t *value, co
     return true;
 }
 
-static bool parse_integer(const config_key_t *key, span_t item, void *field, config_text_t *why)
-{
-    int64_t value = CONFIG_NONE;
-    const bool is_none = key->words != NULL && is_word(item, key->words);
-    if (!is_none && !parse_whole(key, item, &value, why)) {
-        return false;
-    }
-    store_whole(field, key->size, value);
-    return true;
-}
-
 static int hex_digit(char byte)
 {
     if (byte >= '0' && byte <= '9') {
@@ -211,6 +200,36 @@ static int hex_digit(char byte)
         return byte - 'A' + 10;
     }
     return byte >= 'a' && byte <= 'f' ? byte - 'a' + 10 : -1;
+}
+
+/* With 0x in front; not more digits than 32 bits have. */
+static bool read_hex(span_t item, int64_t *value)
+{
+    int64_t sum = 0;
+    if (item.length < 3 || item.length > 10 || item.at[0] != '0' || (item.at[1] != 'x' && item.at[1] != 'X')) {
+        return false;
+    }
+    for (size_t i = 2; i < item.length; i++) {
+        const int digit = hex_digit(item.at[i]);
+        if (digit < 0) {
+            return false;
+        }
+        sum = sum * 16 + digit;
+    }
+    *value = sum;
+    return true;
+}
+
+static bool parse_integer(const config_key_t *key, span_t item, void *field, config_text_t *why)
+{
+    int64_t value = CONFIG_NONE;
+    const bool is_none = key->words != NULL && is_word(item, key->words);
+    const bool is_hex = CONFIG_IS_HEX(key) && read_hex(item, &value);
+    if (!is_none && !is_hex && !parse_whole(key, item, &value, why)) {
+        return false;
+    }
+    store_whole(field, key->size, value);
+    return true;
 }
 
 static bool parse_mask(const config_key_t *key, span_t item, void *field, config_text_t *why)

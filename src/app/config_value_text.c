@@ -241,6 +241,7 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
     case CONFIG_INTEGER:
         config_text_add(text, "a whole number");
         add_range(key, text);
+        config_text_add(text, "%s", CONFIG_IS_HEX(key) ? ", or hexadecimal with 0x" : "");
         add_number_word(key, text);
         break;
     case CONFIG_MASK:

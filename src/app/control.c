@@ -20,6 +20,10 @@
 #define RESET_US        2500000u  /* a reset takes effect when the drives say so */
 #define WAITING_POLL_MS 1
 
+static const char k_unapproved[] =
+    "the configuration %s is not the one that was approved (%s): `heavectl acknowledge` lets it move until "
+    "heaved ends, [platform] approved for good";
+static const char k_acknowledge[] = "acknowledge";
 static const char k_dump_later[] = "dump: the disk has not taken it yet; heaved goes on trying";
 
 /* --- Answers --- */
@@ -34,8 +38,20 @@ static control_client_t *find_client(control_t *self, uint32_t request_id)
     return NULL;
 }
 
+/* What became of a request, for the operator log. Once for each. */
+static void log_answer(control_client_t *client, const char *error, state_t after)
+{
+    if (client->is_logged) {
+        client->is_logged = false;
+        (void)snprintf(client->entry.answer, sizeof client->entry.answer, "%s", error);
+        client->entry.after = after;
+        operator_log_add(client->control->log, &client->entry);
+    }
+}
+
 static void drop(control_client_t *client)
 {
+    log_answer(client, "the client has gone before it was answered", client->entry.before);
     (void)close(client->fd);
     client->fd = -1;
 }
@@ -86,6 +102,7 @@ static json_t start_answer(control_client_t *client)
 
 static void answer_done(control_client_t *client, const snapshot_t *snapshot)
 {
+    log_answer(client, "", snapshot->state);
     json_t json = start_answer(client);
     json_open(&json, NULL, '{');
     json_bool(&json, "ok", true);
@@ -99,6 +116,7 @@ static void answer_done(control_client_t *client, const snapshot_t *snapshot)
 
 static void answer_error(control_client_t *client, const char *error, const char *state)
 {
+    log_answer(client, error, control_state(client->control));
     json_t json = start_answer(client);
     json_open(&json, NULL, '{');
     json_bool(&json, "ok", false);
@@ -209,6 +227,7 @@ static void answer_incidents(control_t *self, control_client_t *client, bool is_
     }
     if (is_seeing) {
         blackbox_see(self->blackbox);
+        log_answer(client, "", snapshot_of(self)->state);
     }
     const uint32_t count = blackbox_list(self->blackbox, self->folder, &seen);
     json_t json = start_answer(client);
@@ -228,10 +247,85 @@ static void answer_incidents(control_t *self, control_client_t *client, bool is_
 }
 
 static const char k_intensity[] = "intensity ";
+static const char k_by[] = "by ";
+
+static bool is_look(const char *line)
+{
+    return strcmp(line, "status") == 0 || strcmp(line, "incidents") == 0 || strncmp(line, "watch", 5) == 0 ||
+           strncmp(line, k_by, strlen(k_by)) == 0;
+}
+
+static bool is_known(const char *line)
+{
+    return operator_request_find(line) != EVENTS || strncmp(line, k_intensity, strlen(k_intensity)) == 0 ||
+           strcmp(line, "dump") == 0 || strcmp(line, "seen") == 0 || strcmp(line, k_acknowledge) == 0;
+}
+
+/* Somebody has seen that this is not the configuration that was approved, and wants it. */
+static void acknowledge(control_t *self, control_client_t *client)
+{
+    if (__atomic_exchange_n(&self->loop->is_unapproved, 0, __ATOMIC_ACQ_REL) == 0) {
+        answer_error(client, "acknowledge: there is nothing to acknowledge", state_name(snapshot_of(self)->state));
+        return;
+    }
+    self->acknowledged_by = client->peer;
+    client->request = EVENT_TICK; /* none that the motion thread has to answer */
+    answer_done(client, snapshot_of(self));
+}
+
+/* Whom it asks for, in its own words: a panel has people behind it that the kernel does not know. */
+static void take_by(control_t *self, control_client_t *client, const char *name)
+{
+    (void)snprintf(client->entry.by, sizeof client->entry.by, "%s", name);
+    if (name[0] == '\0' || strlen(name) >= sizeof client->entry.by) {
+        client->entry.by[0] = '\0';
+        answer_error(client, "by: a name of 1 to 31 bytes is needed, as in `by anna`", NULL);
+    } else {
+        client->request = EVENT_TICK; /* none that the motion thread has to answer */
+        answer_done(client, snapshot_of(self));
+    }
+}
+
+/* Everything but looking on is written down. */
+static void begin_entry(control_t *self, control_client_t *client, const char *line)
+{
+    operator_entry_t *entry = &client->entry;
+    client->is_logged = is_known(line);
+    (void)clock_gettime(CLOCK_REALTIME, &entry->at);
+    entry->uid = (uint32_t)client->peer.uid;
+    entry->gid = (uint32_t)client->peer.gid;
+    entry->pid = (int32_t)client->peer.pid;
+    (void)snprintf(entry->request, sizeof entry->request, "%s", line);
+    entry->before = snapshot_of(self)->state;
+    entry->repeats = 0;
+}
+
+/* What the client may not ask for is refused here, in words that say who may. */
+static bool is_allowed(const control_t *self, control_client_t *client, const char *line)
+{
+    const level_t needed = levels_needed(line, snapshot_of(self)->intensity_percent);
+    const config_label_t *group =
+        needed == LEVEL_SERVICE && self->levels.has_service_group ? &self->config->service_group : &self->config->operate_group;
+    char error[192];
+    if (client->peer.level >= needed) {
+        return true;
+    }
+    (void)snprintf(error, sizeof error, "%.20s: not allowed; it takes the level %s (%s%s)%s", line, level_name(needed),
+                   group->text[0] != '\0' ? "members of group " : "the other socket", group->text,
+                   client->is_looker ? ", and not this socket" : "");
+    answer_error(client, error, state_name(snapshot_of(self)->state));
+    return false;
+}
 
 static void take_request(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
 {
     const event_t event = operator_request_find(line);
+    if (!is_look(line)) {
+        begin_entry(self, client, line);
+    }
+    if (!is_allowed(self, client, line)) {
+        return;
+    }
     if (event != EVENTS) {
         begin_request(self, client, event, 0, now_us);
     } else if (strncmp(line, k_intensity, strlen(k_intensity)) == 0) {
@@ -240,8 +334,12 @@ static void take_request(control_t *self, control_client_t *client, const char *
         begin_dump(self, client, now_us);
     } else if (strcmp(line, "incidents") == 0 || strcmp(line, "seen") == 0) {
         answer_incidents(self, client, line[0] == 's');
+    } else if (strcmp(line, k_acknowledge) == 0) {
+        acknowledge(self, client);
     } else if (strcmp(line, "status") == 0) {
         answer_status(self, client);
+    } else if (strncmp(line, k_by, strlen(k_by)) == 0) {
+        take_by(self, client, &line[strlen(k_by)]);
     } else if (strncmp(line, "watch", 5) == 0) {
         if (!begin_watch(client, &line[5], now_us)) {
             answer_error(client, "watch: `watch` or `watch HZ` with 1 to 50 is allowed", NULL);
@@ -249,7 +347,7 @@ static void take_request(control_t *self, control_client_t *client, const char *
     } else {
         answer_error(client,
                      "unknown request; status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, "
-                     "shutdown, dump, incidents and seen are allowed",
+                     "shutdown, dump, incidents, seen, acknowledge and by NAME are allowed",
                      NULL);
     }
 }
@@ -317,9 +415,17 @@ static void receive(control_t *self, control_client_t *client, uint64_t now_us)
 /* A reset has an effect once the platform has left FAULT or ESTOP; everything else has its answer after one cycle. */
 static void take_result(const control_t *self, control_client_t *client, const motion_result_t *result)
 {
+    char error[256];
     if (result->is_key_off) {
         client->request_id = 0;
         answer_error(client, "the enable key is off: turn it on first", state_name(result->snapshot.state));
+    } else if (result->is_power_failing) {
+        client->request_id = 0;
+        answer_error(client, "the supply is failing: nothing goes up until it is back", state_name(result->snapshot.state));
+    } else if (result->is_unapproved) {
+        client->request_id = 0;
+        (void)snprintf(error, sizeof error, k_unapproved, self->config->hash, self->config->approved.text);
+        answer_error(client, error, state_name(result->snapshot.state));
     } else if (result->status != HV_OK) {
         client->request_id = 0;
         refuse(self, client, &result->snapshot, result->is_shutting_down);
@@ -362,6 +468,7 @@ static void watch_request(control_t *self, control_client_t *client, uint64_t no
 
 static void answer_dumped(control_client_t *client, const char *folder)
 {
+    log_answer(client, "", control_state(client->control));
     json_t json = start_answer(client);
     json_open(&json, NULL, '{');
     json_bool(&json, "ok", true);
@@ -444,13 +551,13 @@ static standing_t standing(const control_client_t *client, uint64_t now_us)
 }
 
 /* Of those that matter least, the one that has not asked for longest; NULL: all stay. */
-static control_client_t *find_least(control_t *self, uint64_t now_us)
+static control_client_t *find_least(control_t *self, bool is_among_lookers, uint64_t now_us)
 {
     control_client_t *least = NULL;
     standing_t least_standing = STAYS;
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         control_client_t *client = &self->client[i];
-        const standing_t its = standing(client, now_us);
+        const standing_t its = client->is_looker || !is_among_lookers ? standing(client, now_us) : STAYS;
         if (its < least_standing || (its == least_standing && least != NULL && client->asked_us < least->asked_us)) {
             least = client;
             least_standing = its;
@@ -468,8 +575,16 @@ static void give_way(control_client_t *client)
     }
 }
 
-static control_client_t *find_free(control_t *self)
+/* The second socket has a few places at most, so that who may do more than look always finds one. */
+static control_client_t *find_free(control_t *self, bool is_looker)
 {
+    unsigned lookers = 0;
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        lookers += self->client[i].fd >= 0 && self->client[i].is_looker;
+    }
+    if (is_looker && lookers >= CONTROL_LOOKERS) {
+        return NULL;
+    }
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         if (self->client[i].fd < 0) {
             return &self->client[i];
@@ -479,9 +594,9 @@ static control_client_t *find_free(control_t *self)
 }
 
 /* A place for a newcomer; NULL: there is none yet. */
-static control_client_t *make_room(control_t *self, uint64_t now_us)
+static control_client_t *make_room(control_t *self, bool is_looker, uint64_t now_us)
 {
-    control_client_t *client = find_free(self);
+    control_client_t *client = find_free(self, is_looker);
     if (client != NULL) {
         return client;
     }
@@ -490,9 +605,9 @@ static control_client_t *make_room(control_t *self, uint64_t now_us)
             receive(self, &self->client[i], now_us);
         }
     }
-    client = find_free(self);
+    client = find_free(self, is_looker);
     if (client == NULL) {
-        client = find_least(self, now_us);
+        client = find_least(self, is_looker, now_us);
         if (client != NULL) {
             give_way(client);
         }
@@ -501,29 +616,36 @@ static control_client_t *make_room(control_t *self, uint64_t now_us)
 }
 
 /* Whoever waits outside. Where the system has no descriptor left, who matters least gives one back, and it is tried again. */
-static void let_in(control_t *self, uint64_t now_us)
+static void let_in(control_t *self, unsigned at, uint64_t now_us)
 {
-    const bool was_shut = self->is_shut;
-    self->newcomer = accept4(self->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
-    self->is_shut = self->newcomer < 0 && errno != EAGAIN && errno != EINTR && errno != ECONNABORTED;
-    control_client_t *least = self->is_shut && !was_shut ? find_least(self, now_us) : NULL;
+    control_socket_t *listening = &self->socket[at];
+    const bool was_shut = listening->is_shut;
+    listening->newcomer = accept4(listening->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    listening->is_shut = listening->newcomer < 0 && errno != EAGAIN && errno != EINTR && errno != ECONNABORTED;
+    control_client_t *least = listening->is_shut && !was_shut ? find_least(self, at > 0, now_us) : NULL;
     if (least != NULL) {
         give_way(least);
     }
 }
 
 /* A newcomer for whom there is no room yet waits for it. */
-static void take_connection(control_t *self, uint64_t now_us)
+static void take_connection(control_t *self, unsigned at, uint64_t now_us)
 {
-    if (self->newcomer < 0) {
-        let_in(self, now_us);
+    control_socket_t *listening = &self->socket[at];
+    if (listening->newcomer < 0) {
+        let_in(self, at, now_us);
     }
-    control_client_t *client = self->newcomer >= 0 ? make_room(self, now_us) : NULL;
+    control_client_t *client = listening->newcomer >= 0 ? make_room(self, at > 0, now_us) : NULL;
     if (client == NULL) {
         return;
     }
-    client->fd = self->newcomer;
-    self->newcomer = -1;
+    client->fd = listening->newcomer;
+    listening->newcomer = -1;
+    client->is_looker = at > 0;
+    client->is_logged = false;
+    client->entry.by[0] = '\0';
+    client->peer = levels_peer(&self->levels, client->fd);
+    client->peer.level = client->is_looker ? LEVEL_LOOK : client->peer.level;
     client->in_length = 0;
     client->out_length = 0;
     client->is_closing = false;
@@ -535,12 +657,15 @@ static void take_connection(control_t *self, uint64_t now_us)
 
 void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS])
 {
-    const bool is_open = self->newcomer < 0 && !self->is_shut; /* poll would not wait while nobody is let in */
-    fds[0] = (struct pollfd){.fd = is_open ? self->fd : -1, .events = POLLIN};
+    for (unsigned at = 0; at < CONTROL_SOCKETS; at++) { /* poll would not wait while nobody is let in */
+        const control_socket_t *listening = &self->socket[at];
+        const bool is_open = listening->newcomer < 0 && !listening->is_shut;
+        fds[at] = (struct pollfd){.fd = is_open ? listening->fd : -1, .events = POLLIN};
+    }
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         const control_client_t *client = &self->client[i];
         const short events = (short)((is_read(client) ? POLLIN : 0) | (client->out_length > 0 ? POLLOUT : 0));
-        fds[i + 1] = (struct pollfd){.fd = client->fd, .events = events};
+        fds[i + CONTROL_SOCKETS] = (struct pollfd){.fd = client->fd, .events = events};
     }
 }
 
@@ -550,20 +675,24 @@ void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64
     take_results(self);
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         control_client_t *client = &self->client[i];
-        if (client->fd >= 0 && (fds[i + 1].revents & POLLOUT) != 0) {
+        const short revents = fds[i + CONTROL_SOCKETS].revents;
+        if (client->fd >= 0 && (revents & POLLOUT) != 0) {
             send_out(client);
         }
-        if (client->fd >= 0 && (fds[i + 1].revents & POLLIN) != 0) {
+        if (client->fd >= 0 && (revents & POLLIN) != 0) {
             receive(self, client, now_us);
-        } else if (client->fd >= 0 && (fds[i + 1].revents & (POLLHUP | POLLERR)) != 0) {
+        } else if (client->fd >= 0 && (revents & (POLLHUP | POLLERR)) != 0) {
             drop(client);
         }
         if (client->fd >= 0) {
             serve_time(self, client, now_us);
         }
     }
-    if ((fds[0].revents & POLLIN) != 0 || self->newcomer >= 0 || self->is_shut) {
-        take_connection(self, now_us);
+    for (unsigned at = 0; at < CONTROL_SOCKETS; at++) {
+        const control_socket_t *listening = &self->socket[at];
+        if ((fds[at].revents & POLLIN) != 0 || listening->newcomer >= 0 || listening->is_shut) {
+            take_connection(self, at, now_us);
+        }
     }
 }
 
@@ -610,28 +739,19 @@ static int clear_path(const char *path, const struct sockaddr_un *address)
     return EXIT_DONE;
 }
 
-static int fail(control_t *self, const char *path)
+static int fail(control_socket_t *self)
 {
     const int error = errno;
     if (self->fd >= 0) {
         (void)close(self->fd);
     }
     self->fd = -1;
-    return say(EXIT_NO_OUTPUT, "control socket %s: %s; create its directory, or give --socket PATH", path, strerror(error));
+    return say(EXIT_NO_OUTPUT, "control socket %s: %s; create its directory, or give --socket PATH", self->path, strerror(error));
 }
 
-int control_open(control_t *self, const char *path, const config_t *config, motion_loop_t *loop, blackbox_t *blackbox)
+static int open_socket(control_socket_t *self, const char *path, mode_t mode)
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
-    self->fd = -1;
-    self->newcomer = -1;
-    self->is_shut = false;
-    self->config = config;
-    self->loop = loop;
-    self->blackbox = blackbox;
-    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
-        self->client[i].fd = -1;
-    }
     (void)snprintf(self->path, sizeof self->path, "%s", path);
     memcpy(address.sun_path, self->path, sizeof self->path);
     const int code = clear_path(self->path, &address);
@@ -639,24 +759,70 @@ int control_open(control_t *self, const char *path, const config_t *config, moti
         return code;
     }
     self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (self->fd < 0 || bind(self->fd, (const struct sockaddr *)&address, sizeof address) != 0 || chmod(self->path, 0660) != 0 ||
+    if (self->fd < 0 || bind(self->fd, (const struct sockaddr *)&address, sizeof address) != 0 || chmod(self->path, mode) != 0 ||
         stat(self->path, &self->made) != 0 || listen(self->fd, BACKLOG) != 0) {
-        return fail(self, self->path);
+        return fail(self);
     }
     return EXIT_DONE;
 }
 
-static bool is_ours(const control_t *self)
+void control_init(control_t *self)
+{
+    for (unsigned at = 0; at < CONTROL_SOCKETS; at++) {
+        self->socket[at].fd = -1;
+        self->socket[at].newcomer = -1;
+        self->socket[at].is_shut = false;
+    }
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        self->client[i].fd = -1;
+        self->client[i].control = self;
+    }
+}
+
+int control_open(control_t *self, const char *path, const config_t *config, motion_loop_t *loop, blackbox_t *blackbox,
+                 operator_log_t *log)
+{
+    control_init(self);
+    self->config = config;
+    self->loop = loop;
+    self->blackbox = blackbox;
+    self->log = log;
+    int code = levels_open(&self->levels, config);
+    code = code == EXIT_DONE ? open_socket(&self->socket[0], path, 0660) : code;
+    if (code == EXIT_DONE && strcmp(config->look_socket, "none") != 0) {
+        code = open_socket(&self->socket[1], config->look_socket, 0666);
+    }
+    return code;
+}
+
+state_t control_state(const control_t *self)
+{
+    return snapshot_of(self)->state;
+}
+
+static bool is_ours(const control_socket_t *self)
 {
     struct stat found;
     return stat(self->path, &found) == 0 && found.st_dev == self->made.st_dev && found.st_ino == self->made.st_ino;
 }
 
+static void close_socket(control_socket_t *self)
+{
+    if (self->newcomer >= 0) {
+        (void)close(self->newcomer);
+    }
+    self->newcomer = -1;
+    if (self->fd >= 0 && is_ours(self)) {
+        (void)unlink(self->path);
+    }
+    if (self->fd >= 0) {
+        (void)close(self->fd);
+    }
+    self->fd = -1;
+}
+
 void control_close(control_t *self)
 {
-    if (self->fd < 0) {
-        return;
-    }
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         if (self->client[i].fd >= 0) {
             send_out(&self->client[i]);
@@ -665,13 +831,7 @@ void control_close(control_t *self)
             drop(&self->client[i]);
         }
     }
-    if (self->newcomer >= 0) {
-        (void)close(self->newcomer);
-        self->newcomer = -1;
+    for (unsigned at = 0; at < CONTROL_SOCKETS; at++) {
+        close_socket(&self->socket[at]);
     }
-    if (is_ours(self)) {
-        (void)unlink(self->path);
-    }
-    (void)close(self->fd);
-    self->fd = -1;
 }

@@ -10,7 +10,7 @@
 static const usage_row_t k_forms[] = {
     {.argument = "status"},
     {.argument = "[--for SECONDS] [--hz N] watch"},
-    {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen"},
+    {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen | acknowledge"},
     {.argument = "intensity PERCENT"},
     {0},
 };
@@ -28,6 +28,7 @@ static const usage_row_t k_commands[] = {
     {.name = "incidents", .help = "what the black box has written, and what nobody has seen yet"},
     {.name = "seen",
      .help = "the same, and all of it has been seen: until then the first fault does not make way for later ones"},
+    {.name = "acknowledge", .help = "let a configuration move that is not the approved one, until heaved ends"},
     {.name = "intensity",
      .argument = "PERCENT",
      .help = "how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so"},
@@ -62,7 +63,9 @@ static const usage_section_t k_manual[] = {
      "changes nothing. Where several platforms run on one box, `--platform` says which. Members of the socket's group (`heave`, "
      "where heaved is a service) may ask; eight at a time. A ninth gets "
      "the place of one that "
-     "has asked nothing for 2 s, else that of the oldest `watch`, which ends and says so.\n\n"
+     "has asked nothing for 2 s, else that of the oldest `watch`, which ends and says so. Where the configuration names groups, "
+     "these say "
+     "who may do more than look and hold.\n\n"
      "With `--json` every answer is an object of one line: /usr/share/doc/heave/docs/status-json.md has all its members, which "
      "stay what they "
      "are within a major version. An answer with `ok` false says in `error` why.\n"},

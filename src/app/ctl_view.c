@@ -159,8 +159,9 @@ static void draw_head(view_t *self, const cJSON *status)
     put_colour(self, state_colour(word(status, "state")));
     put(self, "%-9s", word(status, "state"));
     put_colour(self, PLAIN);
-    put(self, " goal %-9s%s%s%s", word(status, "goal"), cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
+    put(self, " goal %-9s%s%s%s%s", word(status, "goal"), cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
         cJSON_IsTrue(member(status, "estop_active")) ? " E-STOP" : "",
+        cJSON_IsTrue(member(status, "power_failing")) ? " POWER" : "",
         cJSON_IsTrue(member(status, "shutting_down")) ? " SHUTTING DOWN" : "");
     put_piece(self, "  cycle %.0f us  up %.0f s  late %.0f", number(status, "cycle_us"), up_s, number(status, "late_cycles"));
     end_line(self);
@@ -220,6 +221,25 @@ static void draw_bar(view_t *self, double sent, double actual, double whole)
     }
 }
 
+static void draw_object(view_t *self, const cJSON *report)
+{
+    if (number(report, "register") > 0.0) {
+        put_piece(self, ", register 0x%04X", (unsigned)number(report, "register"));
+    } else if (number(report, "object") > 0.0) {
+        put_piece(self, ", object %04X:%02X", (unsigned)number(report, "object"), (unsigned)number(report, "sub_index"));
+    }
+}
+
+static void draw_detail(view_t *self, const cJSON *report)
+{
+    if (cJSON_IsNumber(member(report, "found"))) {
+        put_piece(self, "; %s, found 0x%X, wanted 0x%X", word(report, "detail"), (unsigned)number(report, "found"),
+                  (unsigned)number(report, "wanted"));
+    } else if (word(report, "detail")[0] != '\0') {
+        put_piece(self, "; %s (0x%04X)", word(report, "detail"), (unsigned)number(report, "detail_code"));
+    }
+}
+
 /* A second line where the drive is not simply as it should be: what it is at, since when, and what is wrong. */
 static void draw_report(view_t *self, const cJSON *report, const char *drive)
 {
@@ -232,18 +252,41 @@ static void draw_report(view_t *self, const cJSON *report, const char *drive)
     } else {
         put(self, "   node %.0f: %s", number(report, "node"), word(report, "phase"));
     }
-    if (number(report, "register") > 0.0) {
-        put_piece(self, ", register 0x%04X", (unsigned)number(report, "register"));
-    } else if (number(report, "object") > 0.0) {
-        put_piece(self, ", object %04X:%02X", (unsigned)number(report, "object"), (unsigned)number(report, "sub_index"));
-    }
+    draw_object(self, report);
     if (number(report, "code") > 0.0) {
         put_piece(self, "; %s (0x%04X)", word(report, "trouble"), (unsigned)number(report, "code"));
     }
-    if (word(report, "detail")[0] != '\0') {
-        put_piece(self, "; %s (0x%04X)", word(report, "detail"), (unsigned)number(report, "detail_code"));
-    }
+    draw_detail(self, report);
     put_piece(self, ", %.1f s", number(report, "age_ms") / 1000.0);
+    end_line(self);
+}
+
+/* What a drive tells that goes on. */
+static void draw_notes(view_t *self, const cJSON *report)
+{
+    const cJSON *note = NULL;
+    bool is_any = false;
+    cJSON_ArrayForEach(note, member(report, "notes"))
+    {
+        put_piece(self, is_any ? "; %s" : "   tells: %s", cJSON_IsString(note) ? note->valuestring : "?");
+        is_any = true;
+    }
+    if (is_any) {
+        end_line(self);
+    }
+}
+
+/* The last error that a drive has told of. */
+static void draw_emergency(view_t *self, const cJSON *emergency)
+{
+    if (!cJSON_IsObject(emergency)) {
+        return;
+    }
+    put(self, "   %s 0x%04X", cJSON_IsTrue(member(emergency, "over")) ? "last error, over:" : "error",
+        (unsigned)number(emergency, "code"));
+    put_piece(self, " (%s), register 0x%02X, manufacturer %s", word(emergency, "text"), (unsigned)number(emergency, "register"),
+              word(emergency, "manufacturer"));
+    put_piece(self, ", %.1f s ago, %.0f in all", number(emergency, "age_ms") / 1000.0, number(emergency, "count"));
     end_line(self);
 }
 
@@ -265,6 +308,8 @@ static void draw_drive(view_t *self, const cJSON *axis)
     end_line(self);
     draw_service(self, axis);
     draw_report(self, member(axis, "report"), drive);
+    draw_notes(self, member(axis, "report"));
+    draw_emergency(self, member(member(axis, "report"), "emergency"));
 }
 
 /* A drive that has told no position is nowhere, not at 0. */
@@ -468,6 +513,19 @@ static void draw_distance(view_t *self, const cJSON *fault, const char *unit)
     end_line(self);
 }
 
+/* What the drive of a fault was at when it began. */
+static void draw_device(view_t *self, const cJSON *fault)
+{
+    const cJSON *report = member(fault, "report");
+    if (word(fault, "device_text")[0] != '\0') {
+        put_piece(self, " (%s)", word(fault, "device_text"));
+    }
+    if (number(report, "code") > 0.0) {
+        draw_object(self, report);
+        draw_detail(self, report);
+    }
+}
+
 static void draw_fault(view_t *self, const cJSON *status)
 {
     const cJSON *fault = member(status, "fault");
@@ -489,10 +547,8 @@ static void draw_fault(view_t *self, const cJSON *status)
     }
     if (number(fault, "device_code") > 0.0) {
         put(self, ", device code 0x%04X", (unsigned)number(fault, "device_code"));
-        if (word(fault, "device_text")[0] != '\0') {
-            put_piece(self, " (%s)", word(fault, "device_text"));
-        }
     }
+    draw_device(self, fault);
     put_colour(self, is_faulty ? PLAIN : "");
     end_line(self);
     if (is_faulty) {

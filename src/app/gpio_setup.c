@@ -9,6 +9,7 @@ linux_gpio_relays_config_t gpio_setup_relays(const config_t *config)
 {
     const config_relays_t *relays = &config->relays;
     linux_gpio_relays_config_t out = {.names = {.chip = relays->chip.text, .count = relays->lines.count},
+                                      .consumer = "heaved relays",
                                       .is_active_low = relays->is_active_low,
                                       .safe_mask = config->settings.relay_safe_mask};
     for (unsigned i = 0; i < relays->lines.count; i++) {
@@ -17,11 +18,20 @@ linux_gpio_relays_config_t gpio_setup_relays(const config_t *config)
     return out;
 }
 
+linux_gpio_relays_config_t gpio_setup_healthy(const config_t *config)
+{
+    const config_healthy_t *healthy = &config->healthy;
+    return (linux_gpio_relays_config_t){.names = {.chip = healthy->chip.text, .count = 1, .line = {healthy->line.text}},
+                                        .consumer = "heaved healthy",
+                                        .is_active_low = healthy->is_active_low};
+}
+
 linux_gpio_inputs_config_t gpio_setup_inputs(const config_t *config)
 {
     const config_inputs_t *inputs = &config->inputs;
-    const config_label_t *const line[] = {&inputs->estop_line, &inputs->enable_line, &inputs->reset_line};
-    static const uint32_t k_input[] = {INPUT_ESTOP, INPUT_ENABLE, INPUT_RESET};
+    const config_label_t *const line[] = {&inputs->estop_line, &inputs->enable_line, &inputs->reset_line, &inputs->estop2_line,
+                                          &inputs->power_line};
+    static const uint32_t k_input[] = {INPUT_ESTOP, INPUT_ENABLE, INPUT_RESET, INPUT_ESTOP2, INPUT_POWER};
     linux_gpio_inputs_config_t out = {.names = {.chip = inputs->chip.text}, .is_active_low = inputs->is_active_low};
     for (unsigned i = 0; i < LINUX_GPIO_INPUTS_MAX; i++) {
         if (line[i]->text[0] != '\0') {
@@ -74,6 +84,11 @@ unsigned gpio_setup_check(const config_t *config, FILE *out)
     if (config->relays.driver == CONFIG_RELAYS_GPIO) {
         const linux_gpio_relays_config_t setup = gpio_setup_relays(config);
         warnings += look(&setup.names, "relays", &relays, out);
+    }
+    if (config->healthy.driver == CONFIG_HEALTHY_GPIO) {
+        linux_gpio_place_t healthy = {.count = 0};
+        const linux_gpio_relays_config_t setup = gpio_setup_healthy(config);
+        warnings += look(&setup.names, "healthy", &healthy, out);
     }
     if (config->inputs.driver == CONFIG_INPUTS_GPIO) {
         const linux_gpio_inputs_config_t setup = gpio_setup_inputs(config);

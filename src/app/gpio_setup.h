@@ -11,6 +11,9 @@
 /** The relays; points into config. */
 linux_gpio_relays_config_t gpio_setup_relays(const config_t *config);
 
+/** The line of the healthy pulse, as a bank of one relay; points into config. */
+linux_gpio_relays_config_t gpio_setup_healthy(const config_t *config);
+
 /** The inputs; points into config. */
 linux_gpio_inputs_config_t gpio_setup_inputs(const config_t *config);
 

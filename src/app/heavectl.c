@@ -468,7 +468,8 @@ static const char *take_options(ctl_t *self, int argc, char **argv)
 static const char *take_command(ctl_t *self, int argc, char **argv)
 {
     if (optind == argc) {
-        return "a command is needed: status, watch, engage, hold, resume, park, reset, shutdown, dump or intensity PERCENT";
+        return "a command is needed: status, watch, engage, hold, resume, park, reset, shutdown, dump, acknowledge or intensity "
+               "PERCENT";
     }
     const bool is_intensity = strcmp(argv[optind], "intensity") == 0;
     if (optind + (is_intensity ? 2 : 1) != argc) {
@@ -482,8 +483,8 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
             return NULL;
         }
     }
-    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen and intensity are "
-           "allowed";
+    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge and "
+           "intensity are allowed";
 }
 
 /* Whom to ask: what the command line names, then the environment, then what is there. */

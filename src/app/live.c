@@ -16,6 +16,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "build_id.h"
+#include "config_hash.h"
 #include "control.h"
 #include "flood.h"
 #include "linux_clock.h"
@@ -46,7 +48,9 @@ typedef struct {
     manager_t manager;
     flood_t flood;
     blackbox_t blackbox;
-    motion_view_words_t view; /**< for the manager and the watch over floods */
+    operator_log_t operators;
+    life_t life;
+    motion_view_words_t view; /**< for the manager, the life of the machine and the watch over floods */
     linux_udp_t udp;
     writers_t writers;
     bool was_lossy; /**< it has been said that something is lost */
@@ -149,7 +153,11 @@ static void reload(live_t *self)
     } else if (!motion_loop_reload(&self->loop, &self->config)) {
         writers_say(&self->writers, "too many reloads at once: send SIGHUP again");
     } else {
-        writers_say(&self->writers, "%s has been read again", self->options->config);
+        writers_say(&self->writers, "%s has been read again: configuration %s", self->options->config, self->config.hash);
+        writers_tell_hash(&self->writers, self->config.hash);
+        if (!config_is_unapproved(&self->config)) {
+            __atomic_store_n(&self->loop.is_unapproved, 0, __ATOMIC_RELEASE);
+        }
         if (self->flood.is_on) {
             set_filter(self);
         }
@@ -169,16 +177,31 @@ static uint64_t shutdown_most_us(const settings_t *settings)
     return (uint64_t)(way_us + ramps_us) + SHUTDOWN_REST_US;
 }
 
+/* Who has sent it, as far as the kernel says. */
+static void log_signal(live_t *self, const struct signalfd_siginfo *info)
+{
+    operator_entry_t entry = {.uid = info->ssi_uid, .pid = (int32_t)info->ssi_pid};
+    (void)clock_gettime(CLOCK_REALTIME, &entry.at);
+    (void)snprintf(entry.request, sizeof entry.request, "%s",
+                   info->ssi_signo == SIGHUP    ? "SIGHUP"
+                   : info->ssi_signo == SIGTERM ? "SIGTERM"
+                                                : "SIGINT");
+    entry.before = entry.after = control_state(&self->control);
+    operator_log_add(&self->operators, &entry);
+}
+
 /* The first signal settles the platform, the second one ends at once. */
 static void take_signals(live_t *self)
 {
     struct signalfd_siginfo info;
     while (read(self->signal_fd, &info, sizeof info) == (ssize_t)sizeof info) {
         if (info.ssi_signo == SIGHUP) {
+            log_signal(self, &info);
             reload(self);
             continue;
         }
         self->signals++;
+        log_signal(self, &info);
         if (self->signals == 1) {
             const motion_request_t request = {.event = EVENT_SHUTDOWN};
             (void)ring_push(&self->loop.requests, &request, sizeof request, NULL, 0);
@@ -197,11 +220,35 @@ static uint64_t now_us(const live_t *self)
     return hal_clock_now_us(self->loop.clock);
 }
 
+static void tell_acknowledged(live_t *self)
+{
+    const level_peer_t by = self->control.acknowledged_by;
+    if (by.pid != 0) {
+        writers_say(&self->writers, "configuration %s: acknowledged by user %u, process %d", self->config.hash, (unsigned)by.uid,
+                    (int)by.pid);
+    }
+    self->control.acknowledged_by.pid = 0;
+}
+
+/* Both go on being tried, and heaved goes on. */
+static void tell_trouble(live_t *self)
+{
+    int error = 0;
+    if (operator_log_trouble(&self->operators, &error)) {
+        writers_say(&self->writers, "operator log %s: %s", self->operators.path, error != 0 ? strerror(error) : "written again");
+    }
+    if (life_trouble(&self->life, &error)) {
+        writers_say(&self->writers, "life of the machine %s: %s", self->life.path,
+                    error != 0 ? strerror(error) : "written again");
+    }
+}
+
 /* The service manager; and who reads the log, where something is lost. */
 static void tell_others(live_t *self)
 {
     if (seqlock_read(&self->loop.view, self->view.word)) {
         watch_floods(self, now_us(self));
+        life_serve(&self->life, &self->view.view.snapshot, now_us(self));
         manager_serve(&self->manager, &self->view.view.snapshot, now_us(self));
     }
 }
@@ -220,6 +267,8 @@ static void count_losses(live_t *self)
 {
     status_lost_t *lost = &self->control.lost;
     writers_count(&self->writers, lost);
+    lost->operator_entries = operator_log_lost(&self->operators);
+    lost->is_unapproved = __atomic_load_n(&self->loop.is_unapproved, __ATOMIC_ACQUIRE) != 0;
     const bool is_lossy = lost->trace_rows != 0 || lost->record_lines != 0;
     if (is_lossy && !self->was_lossy) {
         writers_say(&self->writers,
@@ -240,6 +289,8 @@ static void serve_once(live_t *self)
     take_signals(self);
     control_serve(&self->control, fds, now_us(self));
     tell_others(self);
+    tell_acknowledged(self);
+    tell_trouble(self);
     count_losses(self);
 }
 
@@ -262,9 +313,15 @@ static bool serve(live_t *self)
 
 static void say_ready(const live_t *self, const config_t *config)
 {
+    (void)say(0, "build %s, configuration %s", build_id(), config->hash);
+    if (__atomic_load_n(&self->loop.is_unapproved, __ATOMIC_ACQUIRE) != 0) {
+        (void)say(0, "configuration %s was approved, this is another one: nothing moves until `heavectl acknowledge`",
+                  config->approved.text);
+    }
     (void)say(0, "version %s, %u cylinders, cycle %" PRIu32 " us, UDP %s port %u%s%s, control socket %s", HEAVE_VERSION,
               config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u, config->settings.cycle_us, config->udp.bind,
-              (unsigned)self->udp.port, config->udp.group[0] == '\0' ? "" : ", group ", config->udp.group, self->control.path);
+              (unsigned)self->udp.port, config->udp.group[0] == '\0' ? "" : ", group ", config->udp.group,
+              self->control.socket[0].path);
 }
 
 static int finish(live_t *self)
@@ -289,6 +346,12 @@ static void await_first_cycle(live_t *self)
 
 static int run(live_t *self, const config_t *config)
 {
+    if (!operator_log_start(&self->operators)) {
+        return say(EXIT_UNAVAILABLE, "cannot start the operator log: %s", strerror(errno));
+    }
+    if (!life_start(&self->life)) {
+        return say(EXIT_UNAVAILABLE, "cannot start what keeps the life of the machine: %s", strerror(errno));
+    }
     if (!motion_loop_start(&self->loop)) {
         return say(EXIT_UNAVAILABLE, "cannot start the motion thread: %s", strerror(errno));
     }
@@ -375,8 +438,13 @@ static int open_all(live_t *self, const config_t *config)
         self->options->socket != NULL ? self->options->socket : socket_path_of_daemon(in_directory, config->control_socket);
     int code = check_descriptors();
     code = code == EXIT_DONE ? open_udp(self, config) : code;
-    code = code == EXIT_DONE ? control_open(&self->control, path, config, &self->loop, &self->blackbox) : code;
+    code = code == EXIT_DONE ? control_open(&self->control, path, &self->config, &self->loop, &self->blackbox, &self->operators)
+                             : code;
     code = code == EXIT_DONE ? writers_open(&self->writers, self->options, config, &self->loop) : code;
+    code = code == EXIT_DONE ? operator_log_open(&self->operators, config) : code;
+    const uint32_t cylinders = config->settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
+    code = code == EXIT_DONE ? life_open(&self->life, config, cylinders + (config->settings.has_angle ? 1u : 0u)) : code;
+    self->control.lost.life = &self->life.now;
     if (code != EXIT_DONE) {
         return code;
     }
@@ -388,6 +456,7 @@ static int open_all(live_t *self, const config_t *config)
     if (!open_signals(self)) {
         return say(EXIT_UNAVAILABLE, "signals: %s", strerror(errno));
     }
+    self->loop.is_unapproved = config_is_unapproved(config);
     const hv_status_t status =
         motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->writers.log), linux_clock_hal());
     if (rig_trouble(&self->loop.rig)[0] != '\0') {
@@ -410,7 +479,7 @@ int live_run(const config_t *config, const options_t *options)
     }
     self->options = options;
     self->config = *config;
-    self->control.fd = -1;
+    control_init(&self->control);
     self->manager.fd = -1;
     self->has_writers_ended = true;
     self->udp.fd = -1;
@@ -418,11 +487,13 @@ int live_run(const config_t *config, const options_t *options)
     code = code == EXIT_DONE ? run(self, config) : code;
     control_close(&self->control);
     manager_close(&self->manager);
+    const bool has_life_ended = life_close(&self->life);
+    const bool has_log_ended = operator_log_close(&self->operators) && has_life_ended;
     if (!self->is_thread_running) { /* a stuck thread may still use all this: the end of the process gives it back */
         const bool has_blackbox_ended = blackbox_close(&self->blackbox);
         const bool has_rig_ended = rig_close(&self->loop.rig, self->config.settings.relay_safe_mask);
         linux_udp_close(&self->udp);
-        if (has_blackbox_ended && has_rig_ended && self->has_writers_ended) {
+        if (has_blackbox_ended && has_log_ended && has_rig_ended && self->has_writers_ended) {
             free(self);
         }
     }

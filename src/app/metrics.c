@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "build_id.h"
 #include "decimal.h"
 #include "say.h"
 
@@ -72,6 +73,9 @@ static void put_state(sheet_t *self, const snapshot_t *s)
     for (unsigned i = 0; i < STATES; i++) {
         put(self, "heave_state{state=\"%s\"} %u\n", state_name((state_t)i), s->state == (state_t)i ? 1u : 0u);
     }
+    whole(self, "healthy", "gauge", "1 while states, deadlines and drives are as they should be, and have been for a while",
+          s->is_healthy);
+    whole(self, "power_failing", "gauge", "1 while the supply is failing", s->is_power_failing);
     whole(self, "estop_active", "gauge", "1 while the e-stop is pressed", s->is_estop_active);
     whole(self, "held_by_silence", "gauge", "1 while it holds because no frames come", s->is_held_by_silence);
     whole(self, "fault_code", "gauge", "the first fault since the last reset, 0 = none", (uint64_t)s->fault.code);
@@ -160,6 +164,32 @@ static void put_axes(sheet_t *self, const snapshot_t *s)
     }
 }
 
+/* Missing for drives that tell of nothing. */
+static void put_drives(sheet_t *self, const snapshot_t *s)
+{
+    const unsigned axes = s->cylinders + (s->has_angle ? 1u : 0u);
+    head(self, "drive_errors_total", "counter", "errors that the drive told of by itself (EMCY)");
+    for (unsigned i = 0; i < axes; i++) {
+        if (s->report[i].phase[0] != '\0') {
+            put(self, "heave_drive_errors_total{axis=\"%u\"} %" PRIu32 "\n", i + 1, s->report[i].emergency.count);
+        }
+    }
+    head(self, "drive_error_code", "gauge", "the last one that it has not taken back, 0 = none");
+    for (unsigned i = 0; i < axes; i++) {
+        if (s->report[i].phase[0] != '\0') {
+            const drive_emergency_t *emergency = &s->report[i].emergency;
+            put(self, "heave_drive_error_code{axis=\"%u\"} %u\n", i + 1, emergency->is_over ? 0u : (unsigned)emergency->code);
+        }
+    }
+    head(self, "drive_notes", "gauge",
+         "what a drive tells that goes on: bits of mode, set-points, remote, voltage, limit, warning");
+    for (unsigned i = 0; i < axes; i++) {
+        if (s->report[i].phase[0] != '\0') {
+            put(self, "heave_drive_notes{axis=\"%u\"} %" PRIu32 "\n", i + 1, s->report[i].notes);
+        }
+    }
+}
+
 /* Turns are in degrees, ways in millimetres. */
 static void put_rates(sheet_t *self, const char *name, const char *help, const char *per, const pose_t *rates)
 {
@@ -211,12 +241,13 @@ static void put_times(sheet_t *self, const char *name, const char *help, const h
     put(self, "heave_%s_count %" PRIu64 "\n", name, histogram_count(times));
 }
 
-static void put_program(sheet_t *self, const motion_view_t *view, const config_t *config, const motion_times_t *times)
+static void put_program(sheet_t *self, const motion_view_t *view, const config_t *config, const char *hash,
+                        const motion_times_t *times)
 {
     const snapshot_t *s = &view->snapshot;
     char text[NUMBER_MAX];
-    head(self, "build_info", "gauge", "the version of heaved");
-    put(self, "heave_build_info{version=\"%s\"} 1\n", HEAVE_VERSION);
+    head(self, "build_info", "gauge", "the version of heaved, its build and the configuration it runs");
+    put(self, "heave_build_info{version=\"%s\",build=\"%s\",configuration=\"%s\"} 1\n", HEAVE_VERSION, build_id(), hash);
     head(self, "uptime_seconds", "gauge", "since the start");
     put(self, "heave_uptime_seconds %s\n", seconds_text((s->cycle + s->counters.late_cycles) * config->settings.cycle_us, text));
     whole(self, "cycles_total", "counter", "motion cycles", s->cycle);
@@ -241,15 +272,16 @@ static void put_lost(sheet_t *self, const status_lost_t *lost)
 }
 
 /* NOLINTNEXTLINE(readability-non-const-parameter): the sheet writes through it */
-size_t metrics_text(const motion_view_t *view, const config_t *config, const motion_times_t *times, const status_lost_t *lost,
-                    char *text, size_t capacity)
+size_t metrics_text(const motion_view_t *view, const config_t *config, const char *hash, const motion_times_t *times,
+                    const status_lost_t *lost, char *text, size_t capacity)
 {
     const snapshot_t *s = &view->snapshot;
     sheet_t sheet = {.capacity = capacity};
     sheet.at = text;
-    put_program(&sheet, view, config, times);
+    put_program(&sheet, view, config, hash, times);
     put_state(&sheet, s);
     put_axes(&sheet, s);
+    put_drives(&sheet, s);
     put_plate(&sheet, s);
     put_relays(&sheet, s);
     put_frames(&sheet, view);
@@ -310,8 +342,8 @@ static void begin_write(metrics_t *self, uint64_t now_us)
     __atomic_store_n(&self->busy_ms, (uint32_t)(now_us / 1000u) | 1u, __ATOMIC_RELAXED);
 }
 
-void metrics_serve(metrics_t *self, const motion_view_t *view, const config_t *config, const motion_times_t *times,
-                   const status_lost_t *lost, uint64_t now_us)
+void metrics_serve(metrics_t *self, const motion_view_t *view, const config_t *config, const char *hash,
+                   const motion_times_t *times, const status_lost_t *lost, uint64_t now_us)
 {
     end_write(self, now_us);
     if (now_us < self->next_us) {
@@ -319,7 +351,7 @@ void metrics_serve(metrics_t *self, const motion_view_t *view, const config_t *c
     }
     self->next_us += METRICS_PERIOD_US * (1 + (now_us - self->next_us) / METRICS_PERIOD_US);
     begin_write(self, now_us);
-    const int error = replace(self, metrics_text(view, config, times, lost, self->text, sizeof self->text));
+    const int error = replace(self, metrics_text(view, config, hash, times, lost, self->text, sizeof self->text));
     if (error != 0 && error != self->error) {
         (void)say(0, "metrics %s: %s; tried again every second", self->path, strerror(error));
     }

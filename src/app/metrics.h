@@ -28,9 +28,10 @@ typedef struct {
  *  @param path kept */
 void metrics_init(metrics_t *self, const char *path, uint64_t now_us);
 
-/** Writes the file where its time has come. Blocks as long as the file's disk does: meant for /run. */
-void metrics_serve(metrics_t *self, const motion_view_t *view, const config_t *config, const motion_times_t *times,
-                   const status_lost_t *lost, uint64_t now_us);
+/** Writes the file where its time has come. Blocks as long as the file's disk does: meant for /run.
+ *  @param hash of the configuration in force: a reload changes it, and config is as at the start */
+void metrics_serve(metrics_t *self, const motion_view_t *view, const config_t *config, const char *hash,
+                   const motion_times_t *times, const status_lost_t *lost, uint64_t now_us);
 
 /** How often its time has passed without a new file. Any thread. */
 uint32_t metrics_lost(const metrics_t *self, uint64_t now_us);
@@ -40,7 +41,7 @@ void metrics_remove(metrics_t *self);
 
 /** The text alone.
  *  @return its length; 0 where it does not fit */
-size_t metrics_text(const motion_view_t *view, const config_t *config, const motion_times_t *times, const status_lost_t *lost,
-                    char *text, size_t capacity);
+size_t metrics_text(const motion_view_t *view, const config_t *config, const char *hash, const motion_times_t *times,
+                    const status_lost_t *lost, char *text, size_t capacity);
 
 #endif

@@ -43,7 +43,8 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
     if (status != HV_OK) {
         return status;
     }
-    switches_init(&self->switches, self->io.inputs);
+    const bool has_channels = config->inputs.estop2_line.text[0] != '\0';
+    switches_init(&self->switches, self->io.inputs, has_channels ? config->inputs.estop_discrepancy_ms * 1000 : 0);
     self->io.inputs = switches_hal(&self->switches);
     return session_init(&self->session, &config->settings, &self->io);
 }
@@ -108,10 +109,14 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
 {
     unsigned count = 0;
     motion_request_t request;
+    const bool is_unapproved = __atomic_load_n(&self->is_unapproved, __ATOMIC_ACQUIRE) != 0;
     while (count < REQUESTS_PER_CYCLE && ring_pop(&self->requests, &request, sizeof request) > 0) {
         result[count].id = request.id;
         result[count].is_key_off = switches_is_key_off(&self->switches) && is_for_the_key(self, request.event);
-        result[count].status = result[count].is_key_off ? HV_ERR_STATE : carry_out(self, &request);
+        result[count].is_unapproved = is_unapproved && is_for_the_key(self, request.event);
+        result[count].is_power_failing = switches_is_power_failing(&self->switches) && is_for_the_key(self, request.event);
+        const bool is_barred = result[count].is_key_off || result[count].is_unapproved || result[count].is_power_failing;
+        result[count].status = is_barred ? HV_ERR_STATE : carry_out(self, &request);
         count++;
     }
     return count;
@@ -123,6 +128,21 @@ static void turn_off(motion_loop_t *self)
     const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
     if (!is_latched && !is_down(self) && (s->goal == STATE_NEUTRAL || s->goal == STATE_ENGAGED)) {
         hal_log_write(self->io.log, HAL_LOG_NOTICE, "the enable key was turned off: parking");
+        (void)!carry_out(self, &(motion_request_t){.event = EVENT_PARK});
+    }
+}
+
+/* Down as long as there is power, but nobody's hold is ended for it: somebody may be below. What does not get there in time is
+ * the gateway's to stop. */
+static void lose_power(motion_loop_t *self)
+{
+    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
+    const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
+    const bool is_held = s->state == STATE_HOLD && !s->is_held_by_silence;
+    hal_log_write(self->io.log, HAL_LOG_ERROR,
+                  is_held ? "the supply is failing: the platform is on hold, park settles it"
+                          : "the supply is failing: settling");
+    if (!is_latched && !is_held && !is_down(self)) {
         (void)!carry_out(self, &(motion_request_t){.event = EVENT_PARK});
     }
 }
@@ -144,6 +164,12 @@ static void take_switches(motion_loop_t *self)
     tell_blind(self);
     if ((change.off & INPUT_ENABLE) != 0) {
         turn_off(self);
+    }
+    if ((change.on & INPUT_POWER) != 0) {
+        lose_power(self);
+    }
+    if ((change.off & INPUT_POWER) != 0) {
+        hal_log_write(self->io.log, HAL_LOG_NOTICE, "the supply is back");
     }
     if ((change.on & INPUT_RESET) != 0) {
         hal_log_write(self->io.log, HAL_LOG_NOTICE, "the reset button was pressed");

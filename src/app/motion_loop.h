@@ -62,7 +62,9 @@ typedef struct {
     int32_t status; /**< hv_status_t */
     snapshot_t snapshot;
     bool is_shutting_down;
-    bool is_key_off; /**< refused because of that */
+    bool is_key_off;       /**< refused because of that */
+    bool is_unapproved;    /**< likewise */
+    bool is_power_failing; /**< likewise */
 } motion_result_t;
 
 /** What a reload hands over. */
@@ -93,18 +95,19 @@ typedef struct {
     bool is_tracing;
     blackbox_feed_t *blackbox; /**< NULL: there is none */
 
-    motion_times_t times; /**< the motion thread adds, others read */
-    seqlock_t view;       /**< motion_view_t to the service thread */
-    ring_t requests;      /**< motion_request_t from it */
-    ring_t reloads;       /**< motion_reload_t from it */
-    ring_t results;       /**< motion_result_t to it */
-    ring_t record;        /**< record_t to it */
-    ring_t trace;         /**< trace_row_t to it */
-    uint32_t is_quit;     /**< atomic: the service thread wants an end at once */
-    uint32_t is_ended;    /**< atomic: the thread has done its last cycle */
-    bool has_lost_clock;  /**< once it has ended: because it could not wait for its next cycle */
-    bool is_energized;    /**< once it has ended at once: a drive has not confirmed that its torque is off */
-    uint32_t memory;      /**< atomic: motion_memory_t */
+    motion_times_t times;   /**< the motion thread adds, others read */
+    seqlock_t view;         /**< motion_view_t to the service thread */
+    ring_t requests;        /**< motion_request_t from it */
+    ring_t reloads;         /**< motion_reload_t from it */
+    ring_t results;         /**< motion_result_t to it */
+    ring_t record;          /**< record_t to it */
+    ring_t trace;           /**< trace_row_t to it */
+    uint32_t is_quit;       /**< atomic: the service thread wants an end at once */
+    uint32_t is_unapproved; /**< atomic: nothing is brought up until it is over, as without the enable key */
+    uint32_t is_ended;      /**< atomic: the thread has done its last cycle */
+    bool has_lost_clock;    /**< once it has ended: because it could not wait for its next cycle */
+    bool is_energized;      /**< once it has ended at once: a drive has not confirmed that its torque is off */
+    uint32_t memory;        /**< atomic: motion_memory_t */
     pthread_t thread;
 
     motion_view_words_t current; /**< private to the motion thread */

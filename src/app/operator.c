@@ -60,7 +60,9 @@ static const char *reason(event_t request, const snapshot_t *s)
 {
     if (request == EVENT_RESET) {
         const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
-        return !is_latched          ? "there is nothing to reset"
+        return !is_latched ? "there is nothing to reset"
+               : s->fault.code == FAULT_ESTOP_CHANNELS && s->is_estop_active
+                   ? "the channels of the e-stop have disagreed: press it and release it, so that both open and close"
                : s->is_estop_active ? "the e-stop is still active"
                                     : "the cause is still there";
     }

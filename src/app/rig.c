@@ -62,7 +62,8 @@ static uint8_t describe(rig_t *self, const config_t *config)
 static uint32_t inputs_present(const config_inputs_t *inputs)
 {
     return (inputs->estop_line.text[0] != '\0' ? INPUT_ESTOP : 0u) | (inputs->enable_line.text[0] != '\0' ? INPUT_ENABLE : 0u) |
-           (inputs->reset_line.text[0] != '\0' ? INPUT_RESET : 0u);
+           (inputs->reset_line.text[0] != '\0' ? INPUT_RESET : 0u) | (inputs->estop2_line.text[0] != '\0' ? INPUT_ESTOP2 : 0u) |
+           (inputs->power_line.text[0] != '\0' ? INPUT_POWER : 0u);
 }
 
 static hv_status_t open_sim(rig_t *self, const config_t *config, uint8_t axes, uint32_t inputs, gateway_io_t *io)
@@ -170,6 +171,16 @@ static hv_status_t open_relays(rig_t *self, const config_t *config, gateway_io_t
     return linux_gpio_relays_open(&self->gpio_relays, &relays);
 }
 
+static hv_status_t open_healthy(rig_t *self, const config_t *config, gateway_io_t *io)
+{
+    if (config->healthy.driver != CONFIG_HEALTHY_GPIO) {
+        return HV_OK;
+    }
+    const linux_gpio_relays_config_t line = gpio_setup_healthy(config);
+    io->healthy = linux_gpio_relays_hal(&self->gpio_healthy);
+    return linux_gpio_relays_open(&self->gpio_healthy, &line);
+}
+
 static hv_status_t open_inputs(rig_t *self, const config_t *config, gateway_io_t *io)
 {
     if (config->inputs.driver != CONFIG_INPUTS_GPIO) {
@@ -216,6 +227,7 @@ hv_status_t rig_open(rig_t *self, const config_t *config, gateway_io_t *io)
     hv_status_t status = open_sim(self, config, axes, inputs_present(&config->inputs), io);
     status = status == HV_OK ? open_relays(self, config, io) : status;
     status = status == HV_OK ? open_inputs(self, config, io) : status;
+    status = status == HV_OK ? open_healthy(self, config, io) : status;
     if (status != HV_OK) {
         return status;
     }
@@ -237,6 +249,9 @@ const char *rig_trouble(rig_t *self)
 {
     if (self->gpio_relays.error_text[0] != '\0') {
         return self->gpio_relays.error_text;
+    }
+    if (self->gpio_healthy.error_text[0] != '\0') {
+        return self->gpio_healthy.error_text;
     }
     if (self->gpio_inputs.error_text[0] != '\0') {
         return self->gpio_inputs.error_text;
@@ -290,7 +305,8 @@ static void close_coils(rig_t *self, uint16_t safe_mask)
 
 bool rig_close(rig_t *self, uint16_t safe_mask)
 {
-    bool has_ended = linux_gpio_relays_close(&self->gpio_relays, safe_mask);
+    bool has_ended = linux_gpio_relays_close(&self->gpio_healthy, 0);
+    has_ended = linux_gpio_relays_close(&self->gpio_relays, safe_mask) && has_ended;
     has_ended = linux_gpio_inputs_close(&self->gpio_inputs) && has_ended;
     close_coils(self, safe_mask);
     close_modbus(self);

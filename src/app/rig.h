@@ -28,6 +28,7 @@ typedef struct {
     sim_relays_t sim_relays;
     sim_inputs_t sim_inputs;
     linux_gpio_relays_t gpio_relays;
+    linux_gpio_relays_t gpio_healthy; /**< a bank of one */
     linux_gpio_inputs_t gpio_inputs;
     bool is_can_open;
     linux_can_t can;

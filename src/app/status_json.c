@@ -3,6 +3,9 @@
  */
 #include "status_json.h"
 
+#include <stdio.h>
+
+#include "build_id.h"
 #include "decimal.h"
 #include "heave/motion.h" // MOTION_CLAMPED and its kin
 
@@ -43,12 +46,91 @@ static void write_actual(json_t *json, const char *key, const char *const axis_k
     }
 }
 
-/* What the device code of the fault means, as long as the drive still says so. */
+static void write_age(json_t *json, const char *key, uint64_t at_us, uint64_t now_us)
+{
+    if (at_us == 0 || at_us > now_us) {
+        json_null(json, key);
+    } else {
+        json_ms(json, key, now_us - at_us);
+    }
+}
+
+static void write_notes(json_t *json, uint32_t notes)
+{
+    json_open(json, "notes", '[');
+    for (unsigned i = 0; i < DRIVE_NOTES; i++) {
+        if ((notes >> i & 1u) != 0) {
+            json_text(json, NULL, drive_note_text(i));
+        }
+    }
+    json_close(json, ']');
+}
+
+/* The last error that a drive has told of; null where there was none. */
+static void write_emergency(json_t *json, const drive_report_t *report, uint64_t now_us)
+{
+    const drive_emergency_t *emergency = &report->emergency;
+    char maker[2 * sizeof emergency->maker + 1];
+    if (report->error == NULL) {
+        json_null(json, "emergency");
+        return;
+    }
+    for (unsigned i = 0; i < sizeof emergency->maker; i++) {
+        (void)snprintf(&maker[2u * i], 3, "%02X", emergency->maker[i]);
+    }
+    json_open(json, "emergency", '{');
+    json_number(json, "code", emergency->code);
+    json_text(json, "text", report->error);
+    json_number(json, "register", emergency->error_register);
+    json_text(json, "manufacturer", maker);
+    json_bool(json, "over", emergency->is_over);
+    json_number(json, "count", emergency->count);
+    write_age(json, "age_ms", emergency->at_us, now_us);
+    json_close(json, '}');
+}
+
+/* What the drive is at, in words; null where its driver has none. */
+static void write_report(json_t *json, const drive_report_t *report, uint64_t now_us)
+{
+    if (report->phase == NULL || report->phase[0] == '\0') {
+        json_null(json, "report");
+        return;
+    }
+    json_open(json, "report", '{');
+    json_number(json, "node", report->address);
+    json_text(json, "phase", report->phase);
+    json_text(json, "trouble", report->trouble);
+    json_number(json, "code", report->code);
+    json_number(json, "object", report->object >> 8);
+    json_number(json, "sub_index", report->object & 0xFFu);
+    if (report->is_modbus) {
+        json_number(json, "unit", report->address);
+        json_number(json, "register", report->object >> 8);
+    }
+    json_text(json, "detail", report->detail);
+    json_number(json, "detail_code", report->detail_code);
+    if (report->has_found) {
+        json_number(json, "found", report->found);
+        json_number(json, "wanted", report->wanted);
+    } else {
+        json_null(json, "found");
+        json_null(json, "wanted");
+    }
+    json_ms(json, "age_ms", now_us >= report->since_us ? now_us - report->since_us : 0);
+    write_notes(json, report->notes);
+    write_emergency(json, report, now_us);
+    json_close(json, '}');
+}
+
+/* What the device code of the fault meant when it began; of a drive that was not there, and said nothing, what it was at. */
 static const char *device_text(const snapshot_t *s)
 {
-    const fault_t *fault = &s->fault;
-    const bool is_told = fault->axis != 0 && fault->device_code != 0 && s->report[fault->axis - 1u].code == fault->device_code;
-    return is_told ? s->report[fault->axis - 1u].trouble : "";
+    const drive_report_t *report = &s->fault_report;
+    if (report->code != 0 && report->code == s->fault.device_code) {
+        return report->trouble;
+    }
+    const bool is_at = s->fault.code == FAULT_DRIVE_OFFLINE && s->fault.device_code == 0 && report->phase != NULL;
+    return is_at ? report->phase : "";
 }
 
 static const char *found_by(fault_code_t code)
@@ -81,6 +163,7 @@ static void write_fault(json_t *json, const snapshot_t *s)
     json_number(json, "axis", s->fault.axis);
     json_number(json, "device_code", s->fault.device_code);
     json_text(json, "device_text", device_text(s));
+    write_report(json, &s->fault_report, s->now_us);
     json_text(json, "found_by", found_by(s->fault.code));
     write_distance(json, s, false);
     write_distance(json, s, true);
@@ -117,7 +200,9 @@ static void write_state(json_t *json, const snapshot_t *s, bool is_shutting_down
     json_text(json, "state", state_name(s->state));
     json_text(json, "goal", state_name(s->goal));
     json_bool(json, "held_by_silence", s->is_held_by_silence);
+    json_bool(json, "healthy", s->is_healthy);
     json_bool(json, "estop_active", s->is_estop_active);
+    json_bool(json, "power_failing", s->is_power_failing);
     json_bool(json, "shutting_down", is_shutting_down);
     write_fault(json, s);
 }
@@ -129,39 +214,6 @@ static void write_poses(json_t *json, const snapshot_t *s)
     write_actual(json, "pose_actual", k_pose_keys, &s->plate.pose, s->plate.has_pose);
     write_actual(json, "speed_actual", k_speed_keys, &s->plate.speed_per_s, s->plate.has_rates);
     write_actual(json, "accel_actual", k_accel_keys, &s->plate.accel_per_s2, s->plate.has_rates);
-}
-
-/* What the drive is at, in words; null where its driver has none. */
-static void write_report(json_t *json, const drive_report_t *report, uint64_t now_us)
-{
-    if (report->phase[0] == '\0') {
-        json_null(json, "report");
-        return;
-    }
-    json_open(json, "report", '{');
-    json_number(json, "node", report->address);
-    json_text(json, "phase", report->phase);
-    json_text(json, "trouble", report->trouble);
-    json_number(json, "code", report->code);
-    json_number(json, "object", report->object >> 8);
-    json_number(json, "sub_index", report->object & 0xFFu);
-    if (report->is_modbus) {
-        json_number(json, "unit", report->address);
-        json_number(json, "register", report->object >> 8);
-    }
-    json_text(json, "detail", report->detail);
-    json_number(json, "detail_code", report->detail_code);
-    json_ms(json, "age_ms", now_us >= report->since_us ? now_us - report->since_us : 0);
-    json_close(json, '}');
-}
-
-static void write_age(json_t *json, const char *key, uint64_t at_us, uint64_t now_us)
-{
-    if (at_us == 0 || at_us > now_us) {
-        json_null(json, key);
-    } else {
-        json_ms(json, key, now_us - at_us);
-    }
 }
 
 /* How a drive is served; null where its bus has a period of its own, or nothing is known yet. */
@@ -381,8 +433,36 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
     json_number(json, "record_lines", lost->record_lines);
     json_number(json, "log_lines", lost->log_lines);
     json_number(json, "metrics", lost->metrics);
+    json_number(json, "operator_entries", lost->operator_entries);
     json_close(json, '}');
     json_text(json, "version", HEAVE_VERSION);
+    json_text(json, "build", build_id());
+    json_open(json, "configuration", '{');
+    json_text(json, "hash", config->hash);
+    json_text(json, "approved", config->approved.text);
+    json_bool(json, "barred", lost->is_unapproved);
+    json_close(json, '}');
+}
+
+/* Hours, way and cycles of each axis, with those before this start where they are kept. */
+static void write_life(json_t *json, const life_totals_t *life, const snapshot_t *s)
+{
+    if (life == NULL) {
+        return;
+    }
+    json_open(json, "life", '{');
+    json_number(json, "rides", life->rides);
+    json_number(json, "faults", life->faults);
+    json_open(json, "axes", '[');
+    for (unsigned i = 0; i < life->axes; i++) {
+        json_open(json, NULL, '{');
+        json_number(json, "energized_s", life->axis[i].energized_ms / 1000);
+        json_ms(json, i < s->cylinders ? "travel_mm" : "travel_deg", life->axis[i].travel_milli);
+        json_number(json, "cycles", life->axis[i].turns / 2);
+        json_close(json, '}');
+    }
+    json_close(json, ']');
+    json_close(json, '}');
 }
 
 void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,
@@ -404,6 +484,7 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     json_bool(json, "flood", lost->is_flood);
     write_counters(json, view);
     write_fault_counts(json, s);
+    write_life(json, lost->life, s);
     write_program(json, view, config, lost, times);
     json_close(json, '}');
 }

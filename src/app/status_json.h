@@ -5,15 +5,19 @@
 #define HEAVE_APP_STATUS_JSON_H
 
 #include "json.h"
+#include "life.h"
 #include "motion_loop.h"
 
 /** What the service thread adds to the motion thread's view. */
 typedef struct {
-    uint32_t trace_rows;   /**< lost because writing was too slow */
-    uint32_t record_lines; /**< likewise */
-    uint32_t log_lines;    /**< likewise */
-    uint32_t metrics;      /**< files that were due and did not come */
-    bool is_flood;         /**< the kernel drops what cannot be a frame */
+    uint32_t trace_rows;       /**< lost because writing was too slow */
+    uint32_t record_lines;     /**< likewise */
+    uint32_t log_lines;        /**< likewise */
+    uint32_t metrics;          /**< files that were due and did not come */
+    uint32_t operator_entries; /**< that the operator log has not taken */
+    const life_totals_t *life; /**< of the machine; NULL: not known yet */
+    bool is_unapproved;        /**< nothing moves until somebody has acknowledged the configuration */
+    bool is_flood;             /**< the kernel drops what cannot be a frame */
 } status_lost_t;
 
 void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,

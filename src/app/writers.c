@@ -12,6 +12,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "build_id.h"
 #include "say.h"
 
 #define END_WAIT_US   2000000u /* for a slow reader of a pipe */
@@ -78,15 +79,23 @@ static void trace_step(void *ctx, bool is_end)
 
 /* --- Metrics and log --- */
 
+void writers_tell_hash(writers_t *self, const char *hash)
+{
+    writers_hash_t words = {{0}};
+    (void)snprintf(words.text, sizeof words.text, "%s", hash);
+    seqlock_write(&self->hash, words.word);
+}
+
 static void metrics_step(void *ctx, bool is_end)
 {
     writers_t *self = ctx;
     status_lost_t lost = {0};
+    writers_hash_t hash;
     if (is_end) {
         metrics_remove(&self->metrics);
-    } else if (seqlock_read(&self->loop->view, self->view.word)) {
+    } else if (seqlock_read(&self->loop->view, self->view.word) && seqlock_read(&self->hash, hash.word)) {
         writers_count(self, &lost);
-        metrics_serve(&self->metrics, &self->view.view, self->config, &self->loop->times, &lost, now_us(self));
+        metrics_serve(&self->metrics, &self->view.view, self->config, hash.text, &self->loop->times, &lost, now_us(self));
     }
 }
 
@@ -126,10 +135,10 @@ static void write_record_head(writers_t *self, const char *config_path)
     struct tm date;
     (void)gmtime_r(&now, &date);
     const int length = snprintf(line, sizeof line,
-                                "; heaved %s, configuration %.300s, %04d-%02d-%02d %02d:%02d:%02d UTC\n"
+                                "; heaved %s, build %s, configuration %.300s, %s, %04d-%02d-%02d %02d:%02d:%02d UTC\n"
                                 "; before time zero: comments, in ms since the start\n",
-                                HEAVE_VERSION, config_path, date.tm_year + 1900, date.tm_mon + 1, date.tm_mday, date.tm_hour,
-                                date.tm_min, date.tm_sec);
+                                HEAVE_VERSION, build_id(), config_path, self->config->hash, date.tm_year + 1900, date.tm_mon + 1,
+                                date.tm_mday, date.tm_hour, date.tm_min, date.tm_sec);
     out_file_write(&self->record, line, (size_t)length);
 }
 
@@ -138,6 +147,8 @@ int writers_open(writers_t *self, const options_t *options, const config_t *conf
     self->options = options;
     self->config = config;
     self->loop = loop;
+    seqlock_init(&self->hash, self->hash_words.word, sizeof self->hash_words / sizeof(uint64_t));
+    writers_tell_hash(self, config->hash);
     if (!open_file(&self->record, options->record, &loop->is_recording)) {
         return say(EXIT_NO_OUTPUT, "%s: %s", options->record, strerror(self->record.error));
     }

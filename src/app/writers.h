@@ -14,6 +14,12 @@
 #include "status_json.h"
 #include "worker.h"
 
+/** What a configuration is recognised by, as a hand-over takes it. */
+typedef union {
+    char text[CONFIG_HASH_MAX];
+    uint64_t word[(CONFIG_HASH_MAX + 7u) / 8u];
+} writers_hash_t;
+
 /** The writers; large: from the heap, at the start. Private to writers.c but for the log. */
 typedef struct {
     motion_loop_t *loop;
@@ -25,6 +31,8 @@ typedef struct {
     out_file_t record;
     out_file_t trace;
     metrics_t metrics;
+    seqlock_t hash; /**< of the configuration in force, to the metrics */
+    writers_hash_t hash_words;
     motion_view_words_t view; /**< for the metrics */
     worker_t record_worker;
     worker_t trace_worker;
@@ -39,6 +47,9 @@ int writers_open(writers_t *self, const options_t *options, const config_t *conf
 
 /** Starts the threads. One that cannot be started is said; what it would write is lost. */
 void writers_start(writers_t *self);
+
+/** The configuration in force is another one from now on. The service thread. */
+void writers_tell_hash(writers_t *self, const char *hash);
 
 /** A line of the service thread, with what is said about as `heaved: ...`. Never waits. */
 void writers_say(writers_t *self, const char *format, ...) __attribute__((format(printf, 2, 3)));

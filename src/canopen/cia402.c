@@ -25,10 +25,11 @@
 #define NMT_OPERATIONAL  0x05u
 #define COUNTER_FIRST    1u
 
-static bool is_any_up(const cia402_t *self)
+/* One that answers but cannot be used, or is being set up, is no sign of a lost bus. */
+static bool is_any_answering(const cia402_t *self)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
-        if (self->axis[k].phase == CIA402_UP) {
+        if (self->axis[k].is_answering) {
             return true;
         }
     }
@@ -258,7 +259,7 @@ static void take_setpoint(cia402_t *self, unsigned k, q32_t setpoint_q32)
     }
     if (drive_guard_is_found(&guard)) {
         cia402_axis_fail(cia402_drive(self, k), CIA402_FOLLOWING_ERROR);
-        axis->guard = guard;
+        axis->guard = axis->own_fault == CIA402_FOLLOWING_ERROR ? guard : axis->guard;
         return;
     }
     axis->target_counts = wrap(counts);
@@ -370,7 +371,7 @@ static hv_status_t cia402_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
     for (uint8_t k = 0; k < self->config->axes; k++) {
         cia402_report_feedback(self, k, &feedback[k]);
     }
-    return self->is_gone || !is_any_up(self) ? HV_ERR_IO : HV_OK;
+    return self->is_gone || !is_any_answering(self) ? HV_ERR_IO : HV_OK;
 }
 
 static hv_status_t cia402_send(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
@@ -387,7 +388,7 @@ static hv_status_t cia402_send(void *ctx, uint64_t now_us, const q32_t setpoint_
         self->sets += status == HV_OK;
     }
     self->refused += status != HV_OK;
-    return is_any_up(self) ? status : HV_ERR_IO;
+    return is_any_answering(self) ? status : HV_ERR_IO;
 }
 
 static bool is_allowed(const cia402_t *self, drives_request_t request)
@@ -425,7 +426,7 @@ static void stop_now(cia402_t *self)
 static hv_status_t cia402_request(void *ctx, drives_request_t request)
 {
     cia402_t *self = ctx;
-    if (self->is_gone || !is_any_up(self)) {
+    if (self->is_gone || !is_any_answering(self)) {
         return HV_ERR_IO;
     }
     if (!is_allowed(self, request)) {

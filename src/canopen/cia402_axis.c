@@ -4,6 +4,7 @@
 #include "cia402_axis.h"
 
 #include "cia402_setup.h"
+#include "cia402_watch.h"
 
 #define SILENT_SYNCS_MAX    3u
 #define WORD_SYNCS_MIN      2u       /* a controlword acts at the next SYNC and shows at the one after */
@@ -13,6 +14,9 @@
 #define FOLLOWS_US          500000u  /* a drive in its mode that does not set bit 12 is believed after this */
 #define OPERATIONAL_US      500000u  /* and three heartbeats: after NMT start, until the first TPDO */
 #define RESTARTS_MAX        2u
+#define SURPLUS_MAX         2u     /* answers that nobody asked for; CAN itself may repeat one, */
+#define PLAIN_SYNCS         50u    /* which is forgotten after this */
+#define BOOTS_APART_US      10000u /* no drive starts twice in so short a time */
 #define NMT_START           0x01u
 #define NMT_PREOP           0x80u
 #define NMT_RESET           0x82u
@@ -57,12 +61,16 @@ void cia402_axis_init(cia402_drive_t drive)
     look_for(drive);
 }
 
+/* An error that the drive told of and has not taken back may be why it does not become, or stay, operational. */
 static void note_trouble(cia402_drive_t drive, cia402_trouble_t why)
 {
+    const drive_emergency_t *emergency = &drive.axis->emergency;
+    const bool is_reason = !emergency->is_over && (why == CIA402_NO_START || why == CIA402_LEFT_OPERATIONAL);
     drive.axis->trouble = why;
     drive.axis->trouble_us = drive.now_us;
     drive.axis->trouble_object = 0;
-    drive.axis->trouble_code = 0;
+    drive.axis->has_found = false;
+    drive.axis->trouble_code = is_reason ? emergency->code : 0;
 }
 
 void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why)
@@ -70,6 +78,8 @@ void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why)
     cia402_axis_t *self = drive.axis;
     const bool may_hear = self->phase == CIA402_UP && why != CIA402_REBOOTED && why != CIA402_LOST_BUS;
     note_trouble(drive, why);
+    self->is_answering = self->is_answering && (why == CIA402_REBOOTED || why == CIA402_LEFT_OPERATIONAL);
+    self->mute_object = 0;
     self->is_in = false;
     self->is_homed = drive.own->homing_method == 0;
     self->homing = CIA402_HOMING_NO;
@@ -88,10 +98,12 @@ void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why)
     }
 }
 
+/* What an answer shows that nobody asked for is of another drive, whatever else seems to be wrong. */
 void cia402_axis_fail(cia402_drive_t drive, uint32_t code)
 {
     cia402_axis_t *self = drive.axis;
-    self->own_fault = code;
+    const bool is_other = self->surplus > 0 && self->plain_syncs <= 1u;
+    self->own_fault = is_other ? CIA402_TWICE : code;
     self->guard = (drive_guard_t){.jump_q32 = 0};
     self->is_in = false;
     self->goal = CIA402_GOAL_STOP;
@@ -102,11 +114,13 @@ void cia402_axis_reset(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     self->own_fault = 0;
+    self->surplus = 0;
     self->guard = (drive_guard_t){.jump_q32 = 0};
     self->warned_object = 0;
     if (self->phase == CIA402_REFUSED) {
         self->is_reset_done = false;
         self->starts = 0;
+        self->mutes = 0;
         look_for(drive);
     }
     self->reset_until_us = drive.now_us + RESET_US;
@@ -138,6 +152,17 @@ HV_WRAPS static void take_position(cia402_drive_t drive, uint32_t bits)
     }
 }
 
+/* One answer per SYNC; more are those of another drive. */
+static void count_answer(cia402_axis_t *self)
+{
+    if (self->awaited > 0) {
+        self->awaited--;
+    } else {
+        self->surplus = self->surplus < SURPLUS_MAX ? (uint8_t)(self->surplus + 1u) : self->surplus;
+        self->plain_syncs = 0;
+    }
+}
+
 void cia402_axis_take_tpdo(cia402_drive_t drive, const can_frame_t *frame)
 {
     cia402_axis_t *self = drive.axis;
@@ -145,7 +170,9 @@ void cia402_axis_take_tpdo(cia402_drive_t drive, const can_frame_t *frame)
     if (frame->length != CIA402_TPDO_BYTES || (self->phase != CIA402_UP && self->phase != CIA402_STARTING)) {
         return;
     }
+    count_answer(self);
     self->silent_syncs = 0;
+    self->has_answer = true;
     self->statusword = (uint16_t)(data[0] | data[1] << 8);
     take_position(drive, (uint32_t)data[2] | (uint32_t)data[3] << 8 | (uint32_t)data[4] << 16 | (uint32_t)data[5] << 24);
     self->mode_shown = (int8_t)(data[6] < 0x80 ? data[6] : data[6] - 0x100);
@@ -154,23 +181,52 @@ void cia402_axis_take_tpdo(cia402_drive_t drive, const can_frame_t *frame)
 void cia402_axis_take_emergency(cia402_drive_t drive, const can_frame_t *frame)
 {
     const uint16_t code = (uint16_t)(frame->data[0] | frame->data[1] << 8);
-    if (frame->length == 8 && code != 0) {
-        drive.axis->error_code = code;
-        drive.axis->error_register = frame->data[2];
+    drive_emergency_t *emergency = &drive.axis->emergency;
+    if (frame->length != 8) {
+        return;
     }
+    emergency->is_over = code == 0;
+    if (code == 0) {
+        return;
+    }
+    drive.axis->error_code = code;
+    emergency->at_us = drive.now_us;
+    emergency->count++;
+    emergency->code = code;
+    emergency->error_register = frame->data[2];
+    for (unsigned i = 0; i < sizeof emergency->maker; i++) {
+        emergency->maker[i] = frame->data[3u + i];
+    }
+}
+
+/* Cannot be used until it boots or the operator resets. */
+static void refuse(cia402_drive_t drive, cia402_trouble_t why)
+{
+    drive.axis->setup.job = CIA402_JOB_NONE;
+    sdo_cancel(&drive.axis->sdo);
+    note_trouble(drive, why);
+    enter(drive, CIA402_REFUSED);
 }
 
 static void take_boot(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
+    const bool is_twice = self->boot_us != 0 && drive.now_us - self->boot_us < BOOTS_APART_US;
+    self->boot_us = drive.now_us;
     if (self->phase == CIA402_UP || self->phase == CIA402_LEAVING || self->phase == CIA402_CONFIGURING ||
         self->phase == CIA402_STARTING) {
         cia402_axis_lose(drive, CIA402_REBOOTED);
     }
     self->starts = self->phase == CIA402_REFUSED ? 0 : self->starts;
+    self->mutes = self->phase == CIA402_REFUSED ? 0 : self->mutes;
+    self->mute_object = 0;
     self->is_reset_done = true; /* it has just begun anew */
     self->statusword = 0;       /* without torque */
+    self->emergency.is_over = true;
     look_for(drive);
+    if (is_twice) {
+        refuse(drive, CIA402_TWICE);
+    }
 }
 
 void cia402_axis_take_heartbeat(cia402_drive_t drive, const can_frame_t *frame)
@@ -191,19 +247,44 @@ void cia402_axis_take_heartbeat(cia402_drive_t drive, const can_frame_t *frame)
 void cia402_axis_note_sync(cia402_axis_t *self)
 {
     self->silent_syncs++;
+    self->awaited = self->awaited < SILENT_SYNCS_MAX ? (uint8_t)(self->awaited + 1u) : self->awaited;
+    self->plain_syncs = self->plain_syncs < PLAIN_SYNCS ? (uint8_t)(self->plain_syncs + 1u) : self->plain_syncs;
+    self->surplus = self->plain_syncs < PLAIN_SYNCS ? self->surplus : 0;
 }
 
 /* --- From missing to up --- */
+
+/* The drive answers again. It fell silent when it was asked for an object: once may have been the bus. */
+static bool is_mute_again(cia402_drive_t drive)
+{
+    cia402_axis_t *self = drive.axis;
+    const uint32_t object = self->mute_object;
+    self->mute_object = 0;
+    if (object == 0) {
+        return false;
+    }
+    self->trouble = CIA402_NO_ANSWER;
+    self->trouble_object = object;
+    self->mutes++;
+    return self->mutes >= RESTARTS_MAX;
+}
 
 static void step_missing(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     if (self->sdo.state == SDO_SILENT) {
-        if (self->trouble == CIA402_TROUBLE_NONE) {
+        self->is_answering = false;
+        self->mute_object = 0;
+        if (self->trouble == CIA402_TROUBLE_NONE || self->trouble == CIA402_NO_ANSWER) {
             note_trouble(drive, CIA402_SILENT);
         }
         sdo_read(&self->sdo, 0x1000, 0, 1);
     } else if (self->sdo.state == SDO_DONE || self->sdo.state == SDO_ABORTED) {
+        self->is_answering = true;
+        if (is_mute_again(drive)) {
+            enter(drive, CIA402_REFUSED);
+            return;
+        }
         self->trouble = self->trouble == CIA402_SILENT ? CIA402_TROUBLE_NONE : self->trouble;
         if (drive.config->is_reset_wanted && !self->is_reset_done) {
             self->nmt_command = NMT_RESET;
@@ -215,6 +296,19 @@ static void step_missing(cia402_drive_t drive)
             cia402_setup_begin(self, CIA402_JOB_SETUP, drive.config->mode, drive.now_us);
         }
     }
+}
+
+/* Whether it is the object or the drive, the next question tells. */
+static void lose_at_object(cia402_drive_t drive)
+{
+    cia402_axis_t *self = drive.axis;
+    const uint32_t object = cia402_setup_object(self);
+    const bool is_same = self->trouble == CIA402_NO_ANSWER && self->trouble_object == object;
+    const bool was_answering = self->is_answering;
+    cia402_axis_lose(drive, is_same ? CIA402_NO_ANSWER : CIA402_SILENT);
+    self->trouble_object = is_same ? object : 0;
+    self->is_answering = was_answering;
+    self->mute_object = object;
 }
 
 /* The boot-up message leads on; a drive that sends none is asked all the same. */
@@ -235,6 +329,8 @@ static void step_configuring(cia402_drive_t drive)
     case CIA402_SETUP_DONE:
         self->nmt_command = NMT_START;
         self->silent_syncs = 0;
+        self->awaited = 0;
+        self->surplus = 0;
         enter(drive, CIA402_STARTING);
         break;
     case CIA402_SETUP_REFUSED:
@@ -242,7 +338,7 @@ static void step_configuring(cia402_drive_t drive)
         enter(drive, CIA402_REFUSED);
         break;
     case CIA402_SETUP_SILENT:
-        cia402_axis_lose(drive, CIA402_SILENT);
+        lose_at_object(drive);
         break;
     }
 }
@@ -252,18 +348,25 @@ static void come_up(cia402_drive_t drive)
     cia402_axis_t *self = drive.axis;
     enter(drive, CIA402_UP);
     self->trouble = CIA402_TROUBLE_NONE;
+    self->trouble_object = 0;
     self->starts = 0;
+    self->mutes = 0;
     self->heartbeat_us = drive.now_us;
     self->goal = CIA402_GOAL_OFF;
     self->word_syncs = 0;
     self->error_code = 0;
     self->is_error_read = false;
+    cia402_watch_restart(self);
 }
 
 static void step_starting(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     const uint64_t limit_us = OPERATIONAL_US + 3000u * (uint64_t)drive.config->heartbeat_ms;
+    if (self->surplus >= SURPLUS_MAX) {
+        refuse(drive, CIA402_TWICE);
+        return;
+    }
     if (self->has_actual && (!self->has_heartbeat || self->nmt == NMT_STATE_OPERATION)) {
         come_up(drive);
         return;
@@ -273,8 +376,7 @@ static void step_starting(cia402_drive_t drive)
     }
     self->starts++;
     if (self->starts >= RESTARTS_MAX) {
-        note_trouble(drive, CIA402_NO_START);
-        enter(drive, CIA402_REFUSED);
+        refuse(drive, CIA402_NO_START);
     } else { /* once more from the beginning */
         self->is_reset_done = false;
         look_for(drive);
@@ -345,7 +447,7 @@ static void step_jobs(cia402_drive_t drive)
     } else if (job == CIA402_JOB_MODE && result == CIA402_SETUP_REFUSED) {
         cia402_axis_fail(drive, self->trouble);
     } else if (job == CIA402_JOB_MODE && result == CIA402_SETUP_SILENT) {
-        cia402_axis_lose(drive, CIA402_SILENT);
+        lose_at_object(drive);
     }
 }
 
@@ -357,6 +459,10 @@ static void step_up(cia402_drive_t drive)
         cia402_axis_lose(drive, loss);
         return;
     }
+    if (self->surplus >= SURPLUS_MAX && self->own_fault == 0) {
+        cia402_axis_fail(drive, CIA402_TWICE);
+    }
+    cia402_watch_step(drive);
     const cia402_state_t state = cia402_axis_state(self);
     self->operating_us = mark_while(state == CIA402_OPERATION_ENABLED, self->operating_us, drive.now_us);
     self->stopping_us = mark_while(state == CIA402_QUICK_STOP_ACTIVE, self->stopping_us, drive.now_us);

@@ -4,7 +4,7 @@
 #include "cia402_report.h"
 
 #include "cia402_axis.h"
-#include "cia402_objects.h"
+#include "cia402_setup.h"
 #include "heave/canopen_text.h"
 #include "heave/guard.h"
 
@@ -85,6 +85,13 @@ static const struct {
     {CIA402_NO_TORQUE, "does not enable operation: brake, safe torque off?"},
     {CIA402_REMOTE_OFF, "is under local control, not under that of the bus"},
     {CIA402_FELL_OUT, "left operation enabled by itself: enable input, safe torque off?"},
+    {CIA402_NO_ANSWER, "gives no answer when it is asked for an object"},
+    {CIA402_TWICE, "is there twice: two drives have this node id"},
+    {CIA402_LEFT_MODE, "left its mode of operation by itself"},
+    {CIA402_NOT_FOLLOWING, "ignores its set-points: halted, or held by its own logic?"},
+    {CIA402_NO_VOLTAGE, "has no voltage at its power stage: supply, contactor?"},
+    {CIA402_LIMITED, "is at a limit of its own: torque, speed, position (607Dh)?"},
+    {CIA402_WARNING, "warns: its manual and 603Fh say of what"},
 };
 
 static const char *code_text(uint32_t code)
@@ -143,19 +150,42 @@ static bool is_refusing(const cia402_axis_t *axis)
 static uint32_t object_of(const cia402_axis_t *axis)
 {
     if (axis->phase == CIA402_CONFIGURING) {
-        const cia402_object_t *row = &cia402_objects[axis->setup.row];
-        return (uint32_t)row->index << 8 | row->sub;
+        return cia402_setup_object(axis);
     }
-    return is_refusing(axis) ? axis->trouble_object : axis->warned_object;
+    const bool is_mute = axis->phase != CIA402_UP && axis->trouble == CIA402_NO_ANSWER;
+    return is_refusing(axis) || is_mute ? axis->trouble_object : axis->warned_object;
 }
 
-/* A value below 2^24 is one that was found; abort codes are above. */
+/* The drive itself has told why. */
+static bool has_error_for_reason(const cia402_axis_t *axis)
+{
+    const bool is_such = axis->trouble == CIA402_NO_START || axis->trouble == CIA402_LEFT_OPERATIONAL;
+    return is_such && axis->phase != CIA402_UP && axis->trouble_code != 0;
+}
+
+static uint32_t detail_code(const cia402_axis_t *axis)
+{
+    if (has_error_for_reason(axis)) {
+        return axis->trouble_code;
+    }
+    if (!is_refusing(axis) || axis->trouble_object == 0) {
+        return 0;
+    }
+    return axis->trouble_code != 0 || !axis->has_found ? axis->trouble_code : axis->trouble_found;
+}
+
 static const char *detail_text(const cia402_axis_t *axis)
 {
+    if (has_error_for_reason(axis)) {
+        return canopen_error_text((uint16_t)axis->trouble_code);
+    }
     if (!is_refusing(axis) || axis->trouble_object == 0) {
         return axis->warned_object != 0 && axis->phase == CIA402_UP ? "its guard is off, which the configuration allows" : "";
     }
-    return axis->trouble_code >= 0x05000000u ? canopen_abort_text(axis->trouble_code) : "it holds another value";
+    if (axis->trouble_code != 0) {
+        return canopen_abort_text(axis->trouble_code);
+    }
+    return axis->has_found ? "it holds another value" : "";
 }
 
 void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *out)
@@ -170,7 +200,13 @@ void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *ou
         .code = code,
         .object = object_of(axis),
         .detail = detail_text(axis),
-        .detail_code = is_refusing(axis) && axis->trouble_object != 0 ? axis->trouble_code : 0,
+        .detail_code = detail_code(axis),
+        .has_found = is_refusing(axis) && axis->has_found,
+        .found = axis->trouble_found,
+        .wanted = axis->trouble_wanted,
+        .error = axis->emergency.count != 0 ? canopen_error_text(axis->emergency.code) : NULL,
+        .emergency = axis->emergency,
+        .notes = axis->phase == CIA402_UP ? axis->notes : 0,
         .since_us = code != 0 ? axis->trouble_us : axis->phase_us,
     };
 }

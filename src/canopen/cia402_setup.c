@@ -90,12 +90,18 @@ static uint32_t object_of(const cia402_object_t *row)
     return (uint32_t)row->index << 8 | row->sub;
 }
 
+uint32_t cia402_setup_object(const cia402_axis_t *self)
+{
+    return object_of(&cia402_objects[self->setup.row]);
+}
+
 static cia402_setup_result_t refuse(cia402_axis_t *self, const cia402_object_t *row, uint32_t code)
 {
     self->setup.job = CIA402_JOB_NONE;
     self->trouble = row->trouble;
     self->trouble_object = object_of(row);
     self->trouble_code = code;
+    self->has_found = false;
     return CIA402_SETUP_REFUSED;
 }
 
@@ -148,6 +154,8 @@ static cia402_setup_result_t take_abort(cia402_axis_t *self, const cia402_config
         return CIA402_SETUP_BUSY;
     }
     if (is_left_to_check(self, row)) {
+        self->setup.refusal = self->sdo.abort_code;
+        self->setup.refused = row->index;
         next_step(self, now_us);
         return CIA402_SETUP_BUSY;
     }
@@ -169,7 +177,15 @@ static cia402_setup_result_t compare(cia402_axis_t *self, const cia402_config_t 
         repeat_later(self, now_us, AWAIT_PAUSE_US);
         return CIA402_SETUP_BUSY;
     }
-    return give_up(self, config, found, now_us);
+    /* a write that was refused before says why; its object may have been another entry of the same record */
+    const uint32_t refusal = self->setup.refused == row->index ? self->setup.refusal : 0;
+    const cia402_setup_result_t result = give_up(self, config, refusal, now_us);
+    if (result == CIA402_SETUP_REFUSED) {
+        self->has_found = true;
+        self->trouble_found = found;
+        self->trouble_wanted = wanted;
+    }
+    return result;
 }
 
 static cia402_setup_result_t take_answer(cia402_axis_t *self, const cia402_config_t *config, const cia402_axis_config_t *axis,
@@ -194,13 +210,23 @@ static cia402_setup_result_t listen(cia402_axis_t *self, const cia402_config_t *
         return CIA402_SETUP_BUSY;
     }
     if (now_us - self->setup.since_us >= LISTEN_US + 3000u * (uint64_t)config->heartbeat_ms) {
-        return give_up(self, config, self->nmt, now_us);
+        return give_up(self, config, 0, now_us);
     }
     if (self->has_heartbeat) {
         self->nmt_command = NMT_PREOP;
         self->setup.pause_us = now_us + PREOP_REPEAT_US;
     }
     return CIA402_SETUP_BUSY;
+}
+
+/* What may be missing may be so without a word: some drives drop questions for objects that they do not have. */
+static cia402_setup_result_t take_silence(cia402_axis_t *self, const cia402_config_t *config, uint64_t now_us)
+{
+    if (cia402_objects[self->setup.row].need == CIA402_IF_THERE) {
+        return give_up(self, config, 0, now_us);
+    }
+    self->setup.job = CIA402_JOB_NONE;
+    return CIA402_SETUP_SILENT;
 }
 
 static cia402_setup_result_t go_on(cia402_axis_t *self, const cia402_config_t *config, const cia402_axis_config_t *axis,
@@ -219,11 +245,7 @@ static cia402_setup_result_t go_on(cia402_axis_t *self, const cia402_config_t *c
     if (self->sdo.state == SDO_ABORTED) {
         return take_abort(self, config, now_us);
     }
-    if (self->sdo.state == SDO_SILENT) {
-        self->setup.job = CIA402_JOB_NONE;
-        return CIA402_SETUP_SILENT;
-    }
-    return CIA402_SETUP_BUSY;
+    return self->sdo.state == SDO_SILENT ? take_silence(self, config, now_us) : CIA402_SETUP_BUSY;
 }
 
 /* Passes over rows that mean nothing here.

@@ -6,6 +6,7 @@
 #include "cia402_stage.h"
 
 #include "cia402_setup.h"
+#include "cia402_watch.h"
 
 #define SWITCHED_ON_SYNCS 3u /* set-points that lie on actual before the torque comes */
 #define MODE_TIMEOUT_US   6000000u
@@ -326,6 +327,18 @@ static bool are_all_in(const cia402_t *self)
     return true;
 }
 
+/* What is wrong with a drive that is where it should be, and so says itself. */
+static void watch_answers(cia402_t *self)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        const cia402_drive_t drive = cia402_drive(self, k);
+        const cia402_trouble_t why = cia402_watch_find(drive, self->stage == CIA402_STAGE_FOLLOW);
+        if (drive.axis->is_in && why != CIA402_TROUBLE_NONE) {
+            cia402_axis_fail(drive, why);
+        }
+    }
+}
+
 static void step(cia402_t *self)
 {
     switch (self->stage) {
@@ -362,6 +375,7 @@ void cia402_stage_step(cia402_t *self)
         return;
     }
     if (are_all_in(self) || self->stage == CIA402_STAGE_FOLLOW) {
+        watch_answers(self);
         step(self);
     }
     if (!are_all_in(self) && self->stage != CIA402_STAGE_FOLLOW) { /* when following, the gateway decides */

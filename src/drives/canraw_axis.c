@@ -254,9 +254,11 @@ void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_re
 
 /* --- To be sent --- */
 
+/* A drive that says when it has torque, and is not told to take it, may be waiting for its first set-point. */
 bool canraw_axis_is_streaming(const canraw_axis_t *self, const canraw_map_t *map)
 {
-    return self->is_online && (self->state == DRIVE_ENABLED || (self->state == DRIVE_ENABLING && has(map, CANRAW_ENABLE)));
+    const bool is_early = has(map, CANRAW_ENABLE) || map->enabled_when.mask != 0;
+    return self->is_online && (self->state == DRIVE_ENABLED || (self->state == DRIVE_ENABLING && is_early));
 }
 
 guard_limits_t canraw_axis_limits(const canraw_axis_t *self, const canraw_axis_map_t *axis)

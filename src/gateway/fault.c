@@ -18,6 +18,8 @@ static const row_t k_rows[FAULT_CODES] = {
     [FAULT_FOLLOWING] = {FAULT_REACT_QUICK_STOP, "a cylinder does not follow its set-points"},
     [FAULT_BUS_FAILING] = {FAULT_REACT_STOP, "the bus of the drives is about to be lost"},
     [FAULT_SETPOINT_JUMP] = {FAULT_REACT_QUICK_STOP, "a set-point jumped away from its drive"},
+    [FAULT_ESTOP_CHANNELS] = {FAULT_REACT_QUICK_STOP, "the channels of the e-stop disagree"},
+    [FAULT_POWER] = {FAULT_REACT_STOP, "the supply is failing, and the platform was not settled in time"},
 };
 
 static const row_t *row_of(fault_code_t code)

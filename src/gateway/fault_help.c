@@ -57,6 +57,18 @@ static const fault_help_t k_help[FAULT_CODES] = {
         {"the log says how far; check brake and load at rest, scaling and sign, then heavectl reset; if it comes again in motion, keep the "
          "incident and report it",
          "日志给出偏差大小；检查静止时的制动器和负载、比例与方向，然后执行 heavectl reset；如在运动中再次出现，请保留事件记录并上报"}},
+    [FAULT_ESTOP_CHANNELS] = {
+        "estop-channels", "急停两通道不一致",
+        {"one contact is welded or does not close, or one wire is broken or has a short circuit",
+         "某一触点粘连或不闭合，或某一线路断线、短路"},
+        {"check both contacts and their wires; press the e-stop and release it, so that both channels open and close; then heavectl reset",
+         "检查两个触点及其线路；按下并释放急停，使两通道都断开再闭合；然后执行 heavectl reset"}},
+    [FAULT_POWER] = {
+        "power-failing", "供电即将中断，平台未能及时回落",
+        {"the supply failed while the platform was up and on hold, or [inputs] power_settle_ms is shorter than it takes to settle",
+         "供电中断时平台处于升起并暂停的状态，或 [inputs] power_settle_ms 短于回落所需时间"},
+        {"restore the supply, then heavectl reset; power_settle_ms has to be less than the UPS lasts, and more than it takes to settle",
+         "恢复供电后执行 heavectl reset；power_settle_ms 应小于 UPS 的供电时间，且大于回落所需时间"}},
 };
 /* clang-format on */
 

@@ -16,12 +16,13 @@
 static bool is_io_valid(const gateway_io_t *io)
 {
     return hal_udp_valid(io->udp) && drives_valid(io->drives) && hal_relays_valid(io->relays) && hal_inputs_valid(io->inputs) &&
-           hal_log_valid(io->log);
+           hal_log_valid(io->log) && (io->healthy.ops == NULL || hal_relays_valid(io->healthy));
 }
 
 /* Texts of drives that have said nothing yet. */
 static void clear_reports(gateway_t *self)
 {
+    self->snapshot.fault_report = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
         self->snapshot.report[i] = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
     }
@@ -39,6 +40,7 @@ static void keep_changeable(gateway_settings_t *own, const settings_t *settings)
     own->relay_safe_mask = settings->relay_safe_mask;
     own->relay_safe_after_ms = settings->relay_safe_after_ms;
     own->following_error_mm_q16 = settings->following_error_mm_q16;
+    own->power_settle_ms = settings->power_settle_ms;
     own->confirm_jump_mm_q16 = settings->confirm_jump_mm_q16;
     own->confirm_jump_deg_q16 = settings->confirm_jump_deg_q16;
 }
@@ -57,6 +59,7 @@ static void keep_settings(gateway_settings_t *own, const settings_t *settings)
     own->angle_min_q16 = settings->axis[AXIS_ANGLE].min_q16;
     own->angle_max_q16 = settings->axis[AXIS_ANGLE].max_q16;
     own->relays = settings->relays;
+    own->healthy = settings->healthy;
     keep_changeable(own, settings);
 }
 
@@ -96,9 +99,16 @@ void gateway_save(const gateway_t *self, gateway_t *out)
 {
     *out = *self;
     out->io = (gateway_io_t){.udp = {NULL, NULL}};
+    out->snapshot.fault_report = (drive_report_t){.phase = NULL};
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
         out->snapshot.report[i] = (drive_report_t){.phase = NULL};
     }
+}
+
+static bool is_pulse_same(const healthy_settings_t *saved, const healthy_settings_t *prepared)
+{
+    return saved->relay == prepared->relay && saved->toggle_ms == prepared->toggle_ms && saved->off_ms == prepared->off_ms &&
+           saved->late_cycles == prepared->late_cycles;
 }
 
 /* What may change in operation may be another than in the configuration of the start; the rest may not. */
@@ -108,9 +118,9 @@ static bool are_settings_sane(const gateway_settings_t *saved, const gateway_set
                    saved->has_angle == prepared->has_angle && saved->engage == prepared->engage &&
                    saved->auto_frames == prepared->auto_frames && saved->angle_wrap == prepared->angle_wrap &&
                    saved->angle_min_q16 == prepared->angle_min_q16 && saved->angle_max_q16 == prepared->angle_max_q16 &&
-                   saved->relays.count == prepared->relays.count && (unsigned)saved->dialect <= FRAME_LENIENT &&
-                   saved->priority.count <= HAL_UDP_NETWORKS_MAX && saved->following_error_mm_q16 >= 0 &&
-                   saved->confirm_jump_mm_q16 >= 0 && saved->confirm_jump_deg_q16 >= 0;
+                   saved->relays.count == prepared->relays.count && is_pulse_same(&saved->healthy, &prepared->healthy) &&
+                   (unsigned)saved->dialect <= FRAME_LENIENT && saved->priority.count <= HAL_UDP_NETWORKS_MAX &&
+                   saved->following_error_mm_q16 >= 0 && saved->confirm_jump_mm_q16 >= 0 && saved->confirm_jump_deg_q16 >= 0;
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const axis_input_t *axis = &saved->axis[i], *own = &prepared->axis[i];
         is_sane = is_sane && axis->sign == own->sign && axis->scale_q16 == own->scale_q16 && axis->offset_q16 == own->offset_q16;
@@ -138,6 +148,9 @@ static bool are_drives_sane(const gateway_t *saved)
     bool is_sane = true;
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
         const drive_feedback_t *drive = &saved->snapshot.drive[i];
+        const wear_t *wear = &saved->snapshot.wear[i];
+        is_sane = is_sane && sane_bool(&wear->is_known) && sane_bool(&wear->is_upwards) && sane_q32(wear->mark_q32) &&
+                  sane_q32(wear->extreme_q32);
         is_sane = is_sane && (unsigned)saved->axis_fault[i] < FAULT_CODES && (unsigned)drive->state <= DRIVE_FAULT &&
                   sane_bool(&drive->is_homed) && sane_bool(&drive->has_actual) && sane_bool(&drive->is_energized) &&
                   sane_q32(drive->actual_mm_q32) && sane_time(drive->actual_us) && sane_q32(drive->guard.jump_q32) &&
@@ -152,19 +165,22 @@ static bool are_drives_sane(const gateway_t *saved)
 static bool is_snapshot_sane(const snapshot_t *s, const snapshot_t *prepared)
 {
     return sane_time(s->now_us) && (unsigned)s->state < STATES && (unsigned)s->goal < STATES && sane_bool(&s->is_estop_active) &&
-           (unsigned)s->fault.code < FAULT_CODES && s->fault.axis <= DRIVES_MAX && (unsigned)s->reaction <= FAULT_REACT_SILENT &&
-           s->cylinders == prepared->cylinders && sane_bool(&s->has_angle) && s->has_angle == prepared->has_angle &&
-           s->relay_count == prepared->relay_count && sane_bool(&s->is_relays_unknown) && plate_is_sane(&s->plate) &&
-           sane_all_q32(s->asked.axis_q32, POSE_AXES) && sane_all_q32(s->sent.axis_q32, POSE_AXES) &&
-           sane_all_q32(s->extension_mm_q32, CYLINDERS_MAX) && sane_q32(s->angle_deg_q32) &&
-           s->limiting_cylinder <= CYLINDERS_MAX && owner_is_sane(&s->owner) && owner_is_sane(&s->other);
+           sane_bool(&s->is_power_failing) && sane_bool(&s->is_healthy) && (unsigned)s->fault.code < FAULT_CODES &&
+           s->fault.axis <= DRIVES_MAX && (unsigned)s->reaction <= FAULT_REACT_SILENT && s->cylinders == prepared->cylinders &&
+           sane_bool(&s->has_angle) && s->has_angle == prepared->has_angle && s->relay_count == prepared->relay_count &&
+           sane_bool(&s->is_relays_unknown) && plate_is_sane(&s->plate) && sane_all_q32(s->asked.axis_q32, POSE_AXES) &&
+           sane_all_q32(s->sent.axis_q32, POSE_AXES) && sane_all_q32(s->extension_mm_q32, CYLINDERS_MAX) &&
+           sane_q32(s->angle_deg_q32) && s->limiting_cylinder <= CYLINDERS_MAX && owner_is_sane(&s->owner) &&
+           owner_is_sane(&s->other);
 }
 
 static bool are_bools_sane(const gateway_t *saved)
 {
     return sane_bool(&saved->is_bus_lost) && sane_bool(&saved->is_bus_failing) && sane_bool(&saved->is_tracking_actual) &&
            sane_bool(&saved->is_disable_due) && sane_bool(&saved->is_shutdown_asked) && sane_bool(&saved->is_end_overdue) &&
-           sane_bool(&saved->has_newest) && sane_bool(&saved->is_mask_written) && sane_bool(&saved->newest_from.is_ipv6);
+           sane_bool(&saved->has_newest) && sane_bool(&saved->is_mask_written) && sane_bool(&saved->newest_from.is_ipv6) &&
+           sane_bool(&saved->is_estop_apart) && sane_bool(&saved->is_power_overdue) && sane_bool(&saved->is_late) &&
+           sane_bool(&saved->is_pulse_lost) && sane_bool(&saved->healthy.level);
 }
 
 /* A file may hold anything: every index, enum, bool and divisor is judged before it is used. */
@@ -174,6 +190,7 @@ static bool is_saved_sane(const gateway_t *saved, const gateway_t *prepared)
            is_snapshot_sane(&saved->snapshot, &prepared->snapshot) && are_drives_sane(saved) &&
            supervisor_is_sane(&saved->supervisor) && (unsigned)saved->bring_up <= BRING_UP_MOVE &&
            auto_engage_is_sane(&saved->auto_engage, &prepared->auto_engage) && owner_is_sane(&saved->owner) &&
+           sane_time(saved->power_since_us) && sane_time(saved->healthy.ill_us) && sane_time(saved->healthy.changed_us) &&
            confirm_is_sane(&saved->confirm) && relay_policy_is_sane(&saved->relay_policy) &&
            (unsigned)saved->newest_command <= FRAME_COMMANDS && motion_target_is_sane(&saved->newest) &&
            is_output_sane(&saved->output) && motion_state_is_sane(&saved->motion, &prepared->motion);
@@ -231,6 +248,7 @@ void gateway_note_late(gateway_t *self, uint32_t cycles)
 {
     uint32_t *late = &self->snapshot.counters.late_cycles;
     *late = cycles < UINT32_MAX - *late ? *late + cycles : UINT32_MAX; /* a count that began anew would look like none late */
+    self->is_late |= cycles > self->settings.healthy.late_cycles;
 }
 
 void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
@@ -238,6 +256,12 @@ void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
     if ((unsigned)code < FAULT_CODES && axis <= DRIVES_MAX) {
         self->told[axis] |= 1u << (unsigned)code;
     }
+}
+
+/* The relay that carries the healthy pulse, as a mask. */
+static uint16_t pulse_bit(const gateway_t *self)
+{
+    return (uint16_t)(1u << self->settings.healthy.relay >> 1);
 }
 
 /* A hold leaves a ride's relays as they are for a while, if so configured. */
@@ -262,12 +286,34 @@ static void watch_relays(gateway_t *self)
     }
 }
 
-/* Only an engaged sender commands the relays; the safe mask holds everywhere else. */
+/* The healthy pulse, on its own line or, as what is returned, on its relay. One that cannot be written has stopped: that is told
+ * of, and is what the watchdog behind it is for. */
+static uint16_t pulse(gateway_t *self, uint64_t now_us)
+{
+    const healthy_settings_t *settings = &self->settings.healthy;
+    const bool level = healthy_step(&self->healthy, settings, operate_is_well(self), now_us);
+    const bool was_lost = self->is_pulse_lost;
+    uint16_t seen = 0;
+    self->is_pulse_lost = self->io.healthy.ops != NULL && (hal_relays_write(self->io.healthy, level ? 1 : 0) != HV_OK ||
+                                                           hal_relays_read_back(self->io.healthy, &seen) == HV_ERR_IO);
+    if (self->is_pulse_lost != was_lost) {
+        hal_log_write(self->io.log, was_lost ? HAL_LOG_NOTICE : HAL_LOG_ERROR,
+                      was_lost ? "healthy pulse: its line is written again" : "healthy pulse: its line cannot be written");
+    }
+    self->snapshot.is_healthy = healthy_is_running(&self->healthy, settings, now_us);
+    self->is_late = false;
+    return (uint16_t)(level ? pulse_bit(self) : 0);
+}
+
+/* Only an engaged sender commands the relays; the safe mask holds everywhere else. The pulse is nobody's to command, and its
+ * pace is its own: the relays' limits of time are not for it. */
 static void write_relays(gateway_t *self, uint64_t now_us)
 {
     const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, now_us);
-    const uint16_t asked = is_sender_heard ? self->frame_mask : self->settings.relay_safe_mask;
-    const uint16_t mask = relay_policy_step(&self->relay_policy, &self->settings.relays, asked, !is_sender_heard, now_us);
+    const uint16_t wanted = is_sender_heard ? self->frame_mask : self->settings.relay_safe_mask;
+    const uint16_t asked = (uint16_t)(wanted & ~pulse_bit(self));
+    self->effects_mask = relay_policy_step(&self->relay_policy, &self->settings.relays, asked, !is_sender_heard, now_us);
+    const uint16_t mask = (uint16_t)(self->effects_mask | pulse(self, now_us));
     if (!self->is_mask_written || mask != self->written_mask) {
         self->is_mask_written = hal_relays_write(self->io.relays, mask) == HV_OK;
         self->snapshot.counters.relay_errors += !self->is_mask_written;
@@ -316,7 +362,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->state = self->supervisor.state;
     s->goal = self->supervisor.goal;
     s->is_held_by_silence = self->supervisor.is_held_by_silence;
-    s->relay_mask = self->written_mask;
+    s->relay_mask = self->effects_mask;
     s->asked = self->output.asked;
     s->sent = self->output.sent;
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
@@ -339,6 +385,9 @@ static void publish(gateway_t *self, uint64_t now_us)
     note_singular_stops(self, now_us);
     s->counters.unconfirmed = self->confirm.dropped;
     s->counters.stretched = motion_stretched_count(&self->motion);
+    for (unsigned i = 0; i < drives_count(self->io.drives); i++) {
+        wear_step(&s->wear[i], &s->drive[i], self->settings.cycle_us);
+    }
     plate_take(&s->plate, motion_kin(&self->motion), s->drive, &s->sent, now_us);
     s->cycle++;
 }

@@ -203,13 +203,14 @@ void operate_event(gateway_t *self, event_t event, uint64_t now_us)
     const action_t action = supervisor_event(&self->supervisor, event, &view);
     if (self->supervisor.state != before) {
         self->state_since_us = now_us;
+        self->snapshot.rides += before == STATE_NEUTRAL && self->supervisor.state == STATE_ENGAGED;
         log_change(self, before, event);
     }
     carry_out(self, action, now_us);
 }
 
 /* Who found it is told where it might be either: what a drive says of itself, and what heaved sees of the same thing. */
-static void log_fault(gateway_t *self, const fault_t *fault)
+static void log_fault(gateway_t *self, const fault_t *fault, const drive_report_t *report)
 {
     char line[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(line, sizeof line);
@@ -222,6 +223,11 @@ static void log_fault(gateway_t *self, const fault_t *fault)
     if (fault->device_code != 0) {
         text_put(&text, ", device code 0x");
         text_put_hex(&text, fault->device_code, 4);
+    }
+    if (fault->device_code != 0 && fault->device_code == report->code) {
+        text_put(&text, " (");
+        text_put(&text, report->trouble);
+        text_put(&text, ")");
     }
     if (fault->allowed_q32 != 0) {
         text_put(&text, ": found by heaved, ");
@@ -249,27 +255,39 @@ static void give_up_reset(gateway_t *self)
     }
 }
 
+/* What the drive of a fault is at; "" where none is concerned. */
+static drive_report_t report_of(const gateway_t *self, const fault_t *fault)
+{
+    drive_report_t report = {.phase = "", .trouble = "", .detail = ""};
+    if (fault->axis != 0) {
+        (void)drives_report(self->io.drives, (uint8_t)(fault->axis - 1u), &report);
+    }
+    return report;
+}
+
 /* A fault begins: all are counted, the first is kept, and the worst reaction wins, also over one that is under way. */
 static void raise_fault(gateway_t *self, const fault_t *fault)
 {
     snapshot_t *s = &self->snapshot;
     const fault_code_t code = fault->code;
     const fault_reaction_t reaction = fault_reaction(code);
-    if (self->supervisor.state == STATE_ESTOP) {
+    if (self->supervisor.state == STATE_ESTOP && code != FAULT_ESTOP_CHANNELS) { /* that one is of the e-stop itself */
         return;
     }
     s->begun[fault->axis] |= 1u << (unsigned)code;
     s->counters.faults++;
     s->counters.fault[code]++;
     s->fault_last_us[code] = fault->at_us;
-    log_fault(self, fault);
+    const drive_report_t report = report_of(self, fault);
+    log_fault(self, fault, &report);
     if (s->fault.code == FAULT_NONE) {
         s->fault = *fault;
+        s->fault_report = report;
     }
     const bool is_worse = reaction > s->reaction;
     s->reaction = is_worse ? reaction : s->reaction;
     if (supervisor_is_latched(&self->supervisor)) {
-        if (is_worse) {
+        if (is_worse && self->supervisor.state == STATE_FAULT) {
             react(self);
         }
     } else {
@@ -366,7 +384,8 @@ static fault_t fault_of(const gateway_t *self, fault_code_t code, unsigned i, ui
     const drive_feedback_t *drive = &self->snapshot.drive[i];
     fault_t fault = {.code = code, .axis = (uint8_t)(i + 1u), .at_us = now_us};
     if (code != FAULT_FOLLOWING && code != FAULT_SETPOINT_JUMP) {
-        fault.device_code = drive->fault_code;
+        /* one that is disabled again has no fault any more, but may know why */
+        fault.device_code = drive->fault_code != 0 ? drive->fault_code : report_of(self, &fault).code;
     } else if (drive_guard_is_found(&drive->guard)) {
         fault.off_q32 = drive->guard.jump_q32 + drive->guard.lag_q32; /* one of them is 0 */
         fault.allowed_q32 = drive->guard.allowed_q32;
@@ -442,15 +461,46 @@ static bool is_move_done(const gateway_t *self)
     return false;
 }
 
+/* The e-stop is active as long as its channels disagree: they are no reason for another state, but one for another look. */
+static void watch_channels(gateway_t *self, bool is_apart, uint64_t now_us)
+{
+    if ((is_apart && !self->is_estop_apart) || is_told(self, FAULT_ESTOP_CHANNELS, 0)) {
+        raise_fault(self, &(fault_t){.code = FAULT_ESTOP_CHANNELS, .at_us = now_us});
+    }
+    self->is_estop_apart = is_apart;
+}
+
+/* Who leads the platform down is the program around; here it is only watched that it gets there while there is power left. */
+static void watch_power(gateway_t *self, bool is_failing, uint64_t now_us)
+{
+    const state_t state = self->supervisor.state;
+    const bool is_down = state == STATE_OFF || state == STATE_SETTLED || supervisor_is_latched(&self->supervisor);
+    self->snapshot.is_power_failing = is_failing;
+    if (!is_failing) {
+        self->power_since_us = 0;
+        self->is_power_overdue = false;
+    } else if (self->power_since_us == 0) {
+        self->power_since_us = now_us;
+    }
+    const bool is_overdue = is_failing && self->settings.power_settle_ms != 0 && !is_down &&
+                            now_us - self->power_since_us >= (uint64_t)self->settings.power_settle_ms * 1000;
+    if ((is_overdue && !self->is_power_overdue) || is_told(self, FAULT_POWER, 0)) {
+        raise_fault(self, &(fault_t){.code = FAULT_POWER, .at_us = now_us});
+    }
+    self->is_power_overdue = is_overdue;
+}
+
 static void read_inputs(gateway_t *self, uint64_t now_us)
 {
     uint32_t levels = 0;
-    const hv_status_t status = hal_inputs_read(self->io.inputs, &levels);
-    self->snapshot.is_estop_active = status != HV_OK || (levels & INPUT_ESTOP) != 0;
+    const bool is_read = hal_inputs_read(self->io.inputs, &levels) == HV_OK;
+    self->snapshot.is_estop_active = !is_read || (levels & INPUT_ESTOP) != 0;
     if (self->snapshot.is_estop_active) {
         give_up_reset(self);
         operate_event(self, EVENT_ESTOP, now_us);
     }
+    watch_channels(self, is_read ? (levels & INPUT_APART) != 0 : self->is_estop_apart, now_us);
+    watch_power(self, is_read ? (levels & INPUT_POWER) != 0 : self->snapshot.is_power_failing, now_us);
 }
 
 /* A reset first asks the drives; it takes effect when none of them is in fault any more. */
@@ -465,6 +515,7 @@ static void step_reset(gateway_t *self, uint64_t now_us)
     if (!supervisor_is_latched(&self->supervisor)) {
         self->reset_until_us = 0;
         self->snapshot.fault = (fault_t){.code = FAULT_NONE};
+        self->snapshot.fault_report = report_of(self, &self->snapshot.fault);
         self->snapshot.reaction = FAULT_REACT_NONE;
     } else if (now_us >= self->reset_until_us) {
         self->reset_until_us = 0;
@@ -594,6 +645,35 @@ void operate_after_motion(gateway_t *self)
         disable_drives(self);
         self->is_tracking_actual |= !self->is_disable_due;
     }
+}
+
+/* --- Health --- */
+
+/* A person has asked for a reset and nothing moves: drives whose safe-torque-off is a fault to them can only come back where the
+ * pulse comes first. */
+static bool is_being_reset(const gateway_t *self)
+{
+    return self->reset_until_us != 0 && !self->snapshot.is_estop_active && operate_energized(self, false) == 0;
+}
+
+/* In OFF, and while they are reset, drives may be in fault: they have no torque. */
+static bool are_drives_well(const gateway_t *self)
+{
+    const bool is_fault_borne = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor);
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        const drive_state_t state = self->snapshot.drive[i].state;
+        if (state == DRIVE_OFFLINE || (state == DRIVE_FAULT && !is_fault_borne)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool operate_is_well(const gateway_t *self)
+{
+    const bool is_state_well = !supervisor_is_latched(&self->supervisor) || is_being_reset(self);
+    const bool is_bus_well = !self->is_bus_lost && !drives_is_failing(self->io.drives) && !operate_is_bus_stalled(self);
+    return is_state_well && is_bus_well && are_drives_well(self) && !self->is_late && !self->is_end_overdue;
 }
 
 /* --- The end --- */

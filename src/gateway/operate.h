@@ -35,4 +35,7 @@ uint32_t operate_energized(const gateway_t *self, bool is_answering);
 /** True where the bus has taken no set of set-points for so long that none can be expected to get through. */
 bool operate_is_bus_stalled(const gateway_t *self);
 
+/** True where states, deadlines, bus and drives are as they should be in this cycle: what the healthy pulse says. */
+bool operate_is_well(const gateway_t *self);
+
 #endif

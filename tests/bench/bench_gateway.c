@@ -139,7 +139,7 @@ static gateway_io_t io_of(bench_gateway_t *b)
     static const hal_relays_ops_t k_relays = {write_relays, NULL, count_relays};
     static const hal_inputs_ops_t k_inputs = {read_inputs, present_inputs};
     static const hal_log_ops_t k_log = {write_log, dropped_log};
-    return (gateway_io_t){{&k_udp, b}, {&k_drives, b}, {&k_relays, b}, {&k_inputs, b}, {&k_log, b}};
+    return (gateway_io_t){{&k_udp, b}, {&k_drives, b}, {&k_relays, b}, {&k_inputs, b}, {&k_log, b}, {NULL, NULL}};
 }
 
 void bench_gateway_start(bench_gateway_t *self)

@@ -15,7 +15,8 @@
 #include "linux_gpio_inputs.h"
 #include "sim_inputs.h"
 
-#define ALL_INPUTS (INPUT_ESTOP | INPUT_ENABLE | INPUT_RESET)
+#define OPENED     (INPUT_ESTOP | INPUT_ESTOP2 | INPUT_POWER) /* active while their contacts are open */
+#define ALL_INPUTS (OPENED | INPUT_ENABLE | INPUT_RESET)
 
 /** A backend under test. */
 typedef struct {
@@ -53,9 +54,10 @@ static void do_nothing(void) {}
 
 static const fixture_t k_sim = {"sim", open_sim, close_sim, set_sim, do_nothing, break_sim};
 
-/* --- Contacts on GPIO lines: DESK1 is the e-stop, DESK2 the key, DESK3 the button --- */
+/* --- Contacts on GPIO lines: DESK1 is the e-stop, DESK2 the key, DESK3 the button, DESK4 the e-stop's second
+ * channel, DESK5 the supply --- */
 
-#define CHIP_LINES 5u
+#define CHIP_LINES 6u
 
 static linux_gpio_inputs_t gpio;
 static gpio_sim_t chip;
@@ -64,9 +66,9 @@ static bool is_without_edges; /* as from a chip without interrupts */
 
 static linux_gpio_inputs_config_t desk(uint32_t present)
 {
-    static const char *const k_line[] = {"DESK1", "DESK2", "DESK3"};
+    static const char *const k_line[] = {"DESK1", "DESK2", "DESK3", "DESK4", "DESK5"};
     linux_gpio_inputs_config_t config = {.is_active_low = is_active_low};
-    for (unsigned i = 0; i < 3; i++) {
+    for (unsigned i = 0; i < LINUX_GPIO_INPUTS_MAX; i++) {
         if ((present >> i & 1u) != 0) {
             config.names.line[config.names.count] = k_line[i];
             config.input[config.names.count++] = 1u << i;
@@ -87,11 +89,14 @@ static void set_contact(unsigned line, bool is_closed)
     gpio_sim_pull(&chip, line, is_closed != is_active_low);
 }
 
-/* Key and button close when active, the e-stop opens. */
+/* Key and button close when active, the others open. */
 static void set_gpio(uint32_t input, bool is_active)
 {
-    const unsigned line = input == INPUT_ESTOP ? 1 : input == INPUT_ENABLE ? 2 : 3;
-    set_contact(line, is_active != (input == INPUT_ESTOP));
+    unsigned line = 1;
+    while (1u << (line - 1) != input) {
+        line++;
+    }
+    set_contact(line, is_active != ((input & OPENED) != 0));
 }
 
 /* The worker looks, and what was pressed before is told of. */
@@ -114,6 +119,8 @@ static hal_inputs_t open_gpio(uint32_t present)
 {
     hal = open_gpio_broken(present);
     set_gpio(INPUT_ESTOP, false);
+    set_gpio(INPUT_ESTOP2, false);
+    set_gpio(INPUT_POWER, false);
     settle_gpio();
     return hal;
 }
@@ -144,7 +151,7 @@ static void assert_levels(uint32_t expected)
 
 static void set_all(uint32_t levels)
 {
-    for (uint32_t input = INPUT_ESTOP; input <= INPUT_RESET; input <<= 1) {
+    for (uint32_t input = INPUT_ESTOP; input <= INPUT_POWER; input <<= 1) {
         fixture->set(input, (levels & input) != 0);
     }
     fixture->settle();
@@ -236,13 +243,13 @@ static uint32_t read_now(void)
     return levels;
 }
 
-static void test_gpio_broken_wires_are_an_estop_and_nothing_else(void)
+static void test_gpio_broken_wires_are_an_estop_and_a_failing_supply_and_nothing_else(void)
 {
     close_gpio();
     hal = open_gpio_broken(ALL_INPUTS);
-    TEST_ASSERT_EQUAL_HEX32(INPUT_ESTOP, read_now()); /* from the first read on */
+    TEST_ASSERT_EQUAL_HEX32(OPENED, read_now()); /* from the first read on */
     pass(30);
-    TEST_ASSERT_EQUAL_HEX32(INPUT_ESTOP, read_now());
+    TEST_ASSERT_EQUAL_HEX32(OPENED, read_now());
 }
 
 /* Closed again before anybody looks. Simulated edges come with the next tick of the kernel's clock, at the latest after 10 ms. */
@@ -255,11 +262,12 @@ static void test_gpio_short_opening_is_told_of_by_the_kernel(void)
     for (unsigned i = 0; i < 20; i++) {
         pass(i % 10);
         TEST_ASSERT_EQUAL_HEX32(0, read_now());
-        set_contact(1, false);
+        const bool is_second = i % 2 != 0;
+        set_contact(is_second ? 4 : 1, false);
         (void)nanosleep(&half_ms, NULL);
-        set_contact(1, true);
+        set_contact(is_second ? 4 : 1, true);
         pass(25);
-        TEST_ASSERT_EQUAL_HEX32(INPUT_ESTOP, read_now());
+        TEST_ASSERT_EQUAL_HEX32(is_second ? INPUT_ESTOP2 : INPUT_ESTOP, read_now());
         pass(25);
     }
 }
@@ -310,7 +318,7 @@ static void test_gpio_lines_in_use_or_missing_are_named(void)
 
 static void run_gpio(void)
 {
-    RUN_TEST(test_gpio_broken_wires_are_an_estop_and_nothing_else);
+    RUN_TEST(test_gpio_broken_wires_are_an_estop_and_a_failing_supply_and_nothing_else);
     RUN_TEST(test_gpio_short_opening_is_told_of_by_the_kernel);
     RUN_TEST(test_gpio_without_edges_is_seen_within_a_millisecond);
     RUN_TEST(test_gpio_lines_in_use_or_missing_are_named);
@@ -378,7 +386,7 @@ int __wrap_linux_gpio_chip_edges(linux_gpio_chip_t *self, unsigned index, uint32
 
 static void start_fake(void)
 {
-    const linux_gpio_inputs_config_t config = desk(ALL_INPUTS);
+    const linux_gpio_inputs_config_t config = desk(INPUT_ESTOP | INPUT_ENABLE | INPUT_RESET);
     (void)linux_gpio_inputs_close(&gpio);
     m_fake.is_used = true;
     m_fake.closed = INPUT_ESTOP;

@@ -173,7 +173,7 @@ void __wrap_linux_gpio_chip_close(linux_gpio_chip_t *self)
 
 static linux_gpio_relays_config_t bank(const char *label, const char *const lines[], unsigned count)
 {
-    linux_gpio_relays_config_t config = {.names = {.chip = label, .count = count}};
+    linux_gpio_relays_config_t config = {.names = {.chip = label, .count = count}, .consumer = "heaved relays"};
     memcpy(config.names.line, lines, count * sizeof lines[0]);
     return config;
 }

@@ -22,6 +22,7 @@ OPTIONAL = {"ask_state", "read_back", "waited"}  # of the contracts: a backend m
 # Calls of a parameter or of a table's entry: a pattern that finds everything the file puts there.
 NAMED = {
     ("src/canopen/cia402_stage.c", "is_there"): r"\b(?:are_all|fail_where)\(self, (\w+)",
+    ("src/canopen/cia402_watch.c", "is_seen"): r"\[CIA402_WATCH_\w+\]\s*=\s*\{(\w+)",
     ("src/app/player.c", "refused"): None,  # NULL in the firmware
     ("src/protocol/frame.c", "k_take"): r"\[PHASE_\w+\]\s*=\s*(take_\w+)",
 }

@@ -109,6 +109,7 @@ static void check_report(const world_t *self, hv_status_t status)
         FUZZ_REQUIRE(!feedback->has_actual || feedback->actual_us <= self->run.now_us);
         FUZZ_REQUIRE(drives_report(self->run.drives, k, &report));
         FUZZ_REQUIRE(report.phase != NULL && report.trouble != NULL && report.detail != NULL && report.address == k + 1u);
+        FUZZ_REQUIRE(report.notes >> DRIVE_NOTES == 0);
         FUZZ_REQUIRE(self->driver.axis[k].sdo.size <= SDO_BYTES_MAX && self->driver.axis[k].sdo.at <= SDO_BYTES_MAX);
     }
 }
@@ -143,7 +144,8 @@ static void configure(void)
                                  .power_timeout_ms = 2000,
                                  .window_ms = 20,
                                  .abort_option = 1,
-                                 .is_reset_wanted = true};
+                                 .is_reset_wanted = true,
+                                 .reaction = {CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_TELL, CIA402_TELL}};
     for (uint8_t k = 0; k < DRIVES_MAX; k++) {
         m_config.axis[k] = (cia402_axis_config_t){.node = (uint8_t)(k + 1),
                                                   .scale = {k % 2 ? -COUNTS_PER_MM : COUNTS_PER_MM, 1, 5000 * k},

@@ -36,6 +36,7 @@ static config_t m_config;
 static motion_loop_t m_loop;
 static blackbox_t m_blackbox; /* there is none */
 static control_t m_control;
+static operator_log_t m_log; /* there is none: it takes no entry */
 static client_t m_client[CLIENTS];
 static uint64_t m_now_us;
 static long m_asked; /* of the motion thread */
@@ -183,15 +184,13 @@ static void start(void)
     ring_init(&m_loop.requests, m_loop.request_bytes, sizeof m_loop.request_bytes);
     ring_init(&m_loop.results, m_loop.result_bytes, sizeof m_loop.result_bytes);
     memset(&m_control, 0, sizeof m_control);
-    m_control.fd = -1;
+    control_init(&m_control);
     m_control.loop = &m_loop;
     m_control.config = &m_config;
     m_control.blackbox = &m_blackbox;
+    m_control.log = &m_log;
     m_now_us = 1000000;
     m_asked = 0;
-    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
-        m_control.client[i].fd = -1;
-    }
     for (unsigned i = 0; i < CLIENTS; i++) {
         int ends[2];
         FUZZ_REQUIRE(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends) == 0);
@@ -200,6 +199,7 @@ static void start(void)
         m_client[i].is_over = m_client[i].is_watching = false;
         m_client[i].due = m_client[i].requests = m_client[i].answers = 0;
         m_control.client[i].fd = ends[1];
+        m_control.client[i].peer.level = LEVEL_SERVICE;
     }
     change_state(0);
 }

@@ -37,6 +37,7 @@ DEFAULTS = {
     "missing_objects": [],       # indexes
     "defaults": {},              # "6007": 1, "60C2:2": -4
     "read_only": [],             # "605A"
+    "no_answer": [],             # "6065:0": nothing comes back
     "refuse": {},                # "1016:1": abort code, for good
     "periods_ms": [1, 20],       # what 60C2h takes
 }
@@ -58,9 +59,11 @@ class Drive:
         self.timers = {}                # name -> (due_us, call)
         self.now_us = now_us
         self.refusals = {where_of(where): [code, -1] for where, code in self.config["refuse"].items()}
+        self.unanswered = {where_of(where) for where in self.config["no_answer"]}
         self.is_powered = False
         self.is_frozen = self.is_mute = self.has_no_heartbeat = self.is_sdo_silent = False
         self.tpdo_drop = self.tpdo_late_us = 0
+        self.status_bits = 0, 0
         self.position_at_rest = self.config["position"]
         self.stats = {"largest_step": 0, "largest_lag": 0, "syncs": 0, "set_points": 0, "missed": 0}
         self.last_target = None
@@ -269,6 +272,8 @@ class Drive:
 
     def hear_sdo(self, data):
         if self.nmt == STOPPED or len(data) != 8 or self.is_sdo_silent:
+            return
+        if (data[1] | data[2] << 8, data[3]) in self.unanswered:
             return
         self.sdo.on_request(0x600 + self.node, bytearray(data), self.now_us / 1e6)
 
@@ -579,7 +584,8 @@ class Drive:
     def refresh(self):
         """The objects that show what is."""
         powered = 0x10 if self.machine.state in machine.POWERED else 0
-        self.od[0x6041] = machine.WORDS[self.machine.state] | powered | 0x0200 | self.mode_bits()
+        set_bits, clear_bits = self.status_bits
+        self.od[0x6041] = (machine.WORDS[self.machine.state] | powered | 0x0200 | self.mode_bits() | set_bits) & ~clear_bits
         self.od[0x6061] = self.active_mode
         self.od[0x6064] = self.count()
         self.od[0x6062] = round(self.motor.demand) - self.origin

@@ -43,6 +43,10 @@ ACTIONS = {
     "tpdo late": lambda drive, us: setattr(drive, "tpdo_late_us", us),
     "tpdo drop": lambda drive, count: setattr(drive, "tpdo_drop", count),
     "refuse sdo": refuse_sdo,
+    "answer sdo": lambda drive: drive.unanswered.clear(),
+    "take sdo": lambda drive, index, sub=0: drive.refusals.pop((int(index, 16), sub)),
+    "status": lambda drive, set_bits=0, clear_bits=0: setattr(drive, "status_bits", (set_bits, clear_bits)),  # in 6041h, whatever it does
+    "mode": lambda drive, mode: setattr(drive, "active_mode", mode),
     "nmt": lambda drive, state: drive.set_nmt(state),
     "disable": lambda drive: drive.machine.enter("switch on disabled") or drive.entered(),
 }

@@ -130,6 +130,9 @@ static void take_rich(canraw_slave_t *self, unsigned k, const can_frame_t *frame
     switch (frame->data[0]) {
     case 0x10:
         take_target(self, drive, be32(frame->data + 1));
+        if (drive->is_enabled_by_target) {
+            enable(drive);
+        }
         break;
     case 0x20:
         enable(drive);

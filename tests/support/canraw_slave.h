@@ -24,9 +24,10 @@ typedef struct {
     bool is_faulty;
     bool is_homed;
     bool is_homing;
-    bool is_dumb;       /**< works, but answers nothing */
-    bool is_failing;    /**< never comes to the end of homing */
-    uint64_t homing_us; /**< when homing ends */
+    bool is_dumb;              /**< works, but answers nothing */
+    bool is_enabled_by_target; /**< rich only: a set-point puts its torque on */
+    bool is_failing;           /**< never comes to the end of homing */
+    uint64_t homing_us;        /**< when homing ends */
     uint64_t stale_until_us;
     int32_t target; /**< counts */
     int32_t position;

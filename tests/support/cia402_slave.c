@@ -499,6 +499,9 @@ static void take_sdo(cia402_slave_t *self, cia402_slave_drive_t *d, const can_fr
         return;
     }
     cia402_slave_row_t *row = find(d, index, q[3]);
+    if (row != NULL && row->is_silent) {
+        return;
+    }
     if (row == NULL || row->is_missing) {
         refuse(self, d, q, NO_OBJECT);
     } else if (q[0] == 0x40) {

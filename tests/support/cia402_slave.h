@@ -19,6 +19,7 @@ typedef struct {
     uint8_t bytes;
     bool is_read_only;
     bool is_missing;
+    bool is_silent;   /**< nothing comes back */
     uint32_t refusal; /**< abort code for writes, 0 = none */
     uint32_t value;
     uint32_t initial;

@@ -42,7 +42,8 @@ static settings_t common(void)
                     .engage_speed_mm_s_q16 = Q(50),
                     .engage_accel_mm_s2_q16 = Q(200),
                     .spike_gate = 10,
-                    .relays.count = 12};
+                    .relays.count = 12,
+                    .healthy = {.toggle_ms = 10, .off_ms = 100, .late_cycles = 3}};
     axes_of(&s);
     return s;
 }
@@ -243,6 +244,7 @@ void rig_start(rig_t *self, const settings_t *settings, bool is_settled)
     }
     sim_udp_init(&self->udp);
     sim_relays_init(&self->relays, 12);
+    sim_relays_init(&self->healthy, 1);
     sim_inputs_init(&self->inputs, INPUT_ESTOP);
     sim_log_init(&self->log);
     self->inner = sim_drives_hal(&self->drives);
@@ -250,7 +252,8 @@ void rig_start(rig_t *self, const settings_t *settings, bool is_settled)
                              .drives = {.ops = &k_spy, .ctx = self},
                              .relays = sim_relays_hal(&self->relays),
                              .inputs = sim_inputs_hal(&self->inputs),
-                             .log = sim_log_hal(&self->log)};
+                             .log = sim_log_hal(&self->log),
+                             .healthy = sim_relays_hal(&self->healthy)};
     if (gateway_init(&self->gateway, settings, &io) != HV_OK) {
         fail("gateway_init");
     }

@@ -27,6 +27,7 @@ typedef struct {
     sim_drive_config_t drive_config[DRIVES_MAX];
     sim_udp_t udp;
     sim_relays_t relays;
+    sim_relays_t healthy; /**< the line of the healthy pulse */
     sim_inputs_t inputs;
     sim_log_t log;
     drives_t inner;

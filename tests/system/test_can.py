@@ -132,6 +132,19 @@ def check_targets(config, record, end_us):
         assert node > can_bench.CYLINDERS or max(targets) - min(targets) > 20 * MM, f"node {node} hardly moved"
 
 
+def rises_fast_in_profile_position(bench):
+    """At the speed of engaging that --check allows with this window and with none that is narrower."""
+    def config_with(window):
+        config = can_config(bench, engage__speed_mm_s=200, cylinders__accel_mm_s2=3000)
+        config.write_text(config.read_text(encoding="utf-8").replace("[cia402]\n", f"[cia402]\nmode = pp\nfollowing_error_mm = {window}\n"), encoding="utf-8")
+        return config
+    refused = bench.heaved("--config", config_with(13), "--check")
+    assert refused.returncode == 78 and "at least 13.067 mm" in refused.stderr, refused
+    daemon = up(bench, config_with(13.1))
+    assert bench.status()["fault"]["name"] == "none"
+    assert bench.stop(daemon) == 0
+
+
 def follows_on_a_bus_of_finite_speed(bench):
     bench.slow_bus()
     daemon = up(bench, can_config(bench))
@@ -191,6 +204,7 @@ def second_signal_stops_the_drives(bench, is_one_stuck=False):
 CASES = [
     ("rises without a jump, all drives at once; the torque is off before the end", rises_without_a_jump),
     ("follows the demonstration, CSP", follows("csp", demo, 1)), ("follows streams, IP", follows("ip", streams, 2)), ("follows poses, PP", follows("pp", poses, 3)),
+    ("rises at the fastest that --check allows, PP", rises_fast_in_profile_position),
     ("follows a stream on a bus of 1 Mbit/s", follows_on_a_bus_of_finite_speed),
     ("ends with 1 and names the drives that have not confirmed that their torque is off", ends_and_names_who_keeps_torque),
     ("ends at a second signal when the drives have taken their quick stop", second_signal_stops_the_drives),

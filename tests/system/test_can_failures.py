@@ -4,6 +4,7 @@
 
 It strikes at a moment of the rise, and so at a phase of cycle and bus period, that is drawn for each case from SEED and the case's name.
 On vcan and virtual time, inside kernel.py --virtual-time --python; judged on the recorded frames by can_judge. docs/failures.md names these cases."""
+import json
 import random
 import signal
 import socket
@@ -14,6 +15,7 @@ import time
 
 import can_bench
 import can_judge
+import forked
 import heave
 import tap
 import test_can
@@ -94,6 +96,17 @@ def sees_pre_operational(record, when_us):
     return min(beat_us, sees_last_status(record, when_us) + SILENT_US - REACTION_US)
 
 
+def sees_status(bit, is_set):
+    """The first answer that shows it; the second one counts."""
+    return lambda record, when_us: next(when for when, word, _ in record.statuses(VICTIM) if when > when_us and bool(word & bit) == is_set)
+
+
+def sees_mode(record, when_us):
+    return next(when for when, data in record.of(can_judge.TPDO + VICTIM) if when > when_us and data[6] != 8)
+
+
+REMOTE, VOLTAGE, FOLLOWS, LIMIT, WARNING = 0x0200, 0x0010, 0x1000, 0x0800, 0x0080
+SECOND_ANSWER_US = PERIOD_US + REACTION_US
 FOLLOWING_ERROR = 0x8611
 
 
@@ -106,11 +119,15 @@ ROWS = [
     # name, action, drive's keys, seen, within_us, fault, code
     ("a fault with its EMCY", {"do": "fault", "code": 0x2310}, {}, sees_emergency, PERIOD_US + REACTION_US, "drive-fault", 0x2310),
     ("a blocked axis: following error", {"do": "jam"}, {}, sees_lag, 2 * PERIOD_US + REACTION_US, "drive-fault", FOLLOWING_ERROR),
-    ("a drive loses its torque", {"do": "disable"}, {}, sees_no_torque, REACTION_US, "drive-dropped", None),
+    ("a drive loses its torque", {"do": "disable"}, {}, sees_no_torque, REACTION_US, "drive-dropped", 0x10011),
     ("a drive reboots", {"do": "reboot"}, {"boot_us": 2000}, sees_boot, REACTION_US, "drive-offline", 0x10005),
     ("a drive loses its power", {"do": "off"}, {}, sees_last_status, SILENT_US, "drive-offline", 0x10002),
     ("a drive's heartbeat ends", {"do": "heartbeat off"}, {}, sees_last_beat, HEARTBEAT_TIMEOUT_US + REACTION_US, "drive-offline", 0x10003),
     ("a drive leaves operational", {"do": "nmt", "state": 0x7F}, {}, sees_pre_operational, REACTION_US, "drive-offline", (0x10004, 0x10002)),
+    ("a drive ignores its set-points", {"do": "status", "clear_bits": FOLLOWS}, {}, sees_status(FOLLOWS, False), SECOND_ANSWER_US, "drive-fault", 0x10013),
+    ("a drive goes under local control", {"do": "status", "clear_bits": REMOTE}, {}, sees_status(REMOTE, False), SECOND_ANSWER_US, "drive-fault", 0x10010),
+    ("a drive shows no voltage", {"do": "status", "clear_bits": VOLTAGE}, {}, sees_status(VOLTAGE, False), SECOND_ANSWER_US, "drive-fault", 0x10014),
+    ("a drive leaves its mode", {"do": "mode", "mode": 1}, {}, sees_mode, SECOND_ANSWER_US, "drive-fault", 0x10012),
     ("5 answers lost", {"do": "tpdo drop", "count": 5}, {}, sees_last_status, SILENT_US, "drive-offline", 0x10002),
     ("50 answers lost", {"do": "tpdo drop", "count": 50}, {}, sees_last_status, SILENT_US, "drive-offline", 0x10002),
 ]
@@ -138,6 +155,24 @@ def stops_all_drives(action, keys, seen, within_us, fault, code):
     return case
 
 
+def reason_stays(action, code, words, **arguments):
+    """The drive is back long before the operator comes: what it was is still told."""
+    def case(bench, source):
+        daemon = in_motion(bench, source, only={VICTIM: {"boot_us": 2000}})
+        bench.do(action, VICTIM, **arguments)
+        bench.wait_state("FAULT")
+        heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "ready", "the drive is back")
+        status = bench.status()
+        fault = status["fault"]
+        assert status["cylinders"][VICTIM - 1]["report"]["code"] in (0, code), status["cylinders"][VICTIM - 1]
+        assert (fault["axis"], fault["device_code"], fault["report"]["node"]) == (VICTIM, code, VICTIM) and words in fault["device_text"], fault
+        assert f"device code 0x{code:X} ({fault['device_text']})" in daemon.log.read_text(encoding="utf-8")
+        assert words in " ".join(bench.ctl("status").stdout.split())
+        bench.reset()
+        assert bench.status()["fault"]["device_text"] == "" and bench.status()["fault"]["report"] is None
+    return case
+
+
 def harmless(*actions):
     """Nothing stops, and nothing is said."""
     def case(bench, source):
@@ -153,6 +188,50 @@ def harmless(*actions):
         assert set(record.stops(begin_us).values()) == {None} or min(filter(None, record.stops(begin_us).values())) >= end_us
         can_judge.check_order(record, begin_us, end_us, PERIOD_US)
     return case
+
+
+def tells(bench, source):
+    """A warning and a limit of a drive: in status and log, and nothing stops."""
+    daemon = in_motion(bench, source)
+    bench.do("status", VICTIM, set_bits=LIMIT | WARNING)
+    time.sleep(0.2)
+    status = bench.status()
+    notes = [leg["report"]["notes"] for leg in status["cylinders"]]
+    assert status["state"] in ("RISING", "ENGAGED"), status["state"]
+    assert notes[VICTIM - 1] == ["is at a limit of its own", "warns"] and not any(notes[:VICTIM - 1] + notes[VICTIM:]), notes
+    assert f"axis {VICTIM}, node {VICTIM}: is at a limit of its own; warns\n" in daemon.log.read_text(encoding="utf-8")
+    table = " ".join(bench.ctl("status").stdout.split())
+    assert "tells: is at a limit of its own; warns" in table, table
+
+
+def error_is_told(bench, source):
+    """An EMCY alone: in the status, in the log once a second, in the metrics, in the incident; and nothing stops."""
+    daemon = in_motion(bench, source)
+    for _ in range(20):
+        bench.do("emergency", VICTIM, code=0xFF00)
+        time.sleep(0.01)
+    time.sleep(0.1)
+    status = bench.status()
+    found = status["cylinders"][VICTIM - 1]["report"]["emergency"]
+    assert status["state"] in ("RISING", "ENGAGED"), status["state"]
+    assert (found["code"], found["register"], found["count"], found["over"]) == (0xFF00, 0x81, 20, False) and found["age_ms"] < 1000, found
+    assert all(leg["report"]["emergency"] is None for leg in status["cylinders"] if leg["number"] != VICTIM), status["cylinders"]
+    log = daemon.log.read_text(encoding="utf-8")
+    assert log.count(f"axis {VICTIM}, node {VICTIM}: error 0xFF00") == 1, log
+    table = " ".join(bench.ctl("status").stdout.split())  # lines break where the table is narrow
+    assert "error 0xFF00 (" in table and "register 0x81, manufacturer 00" in table, table
+
+
+def local_drive_is_not_enabled(bench, _):
+    bench.start_drives()
+    bench.do("status", VICTIM, clear_bits=REMOTE)
+    bench.start(config=test_can.can_config(bench))
+    bench.wait_state("FAULT")
+    fault = bench.status()["fault"]
+    assert (fault["name"], fault["axis"], fault["device_code"]) == ("drive-fault", VICTIM, 0x10010), fault
+    assert not bench.events("enabled")
+    bench.do("status", VICTIM)
+    bench.reset()
 
 
 # --- The bus in trouble ---
@@ -309,8 +388,64 @@ def bad_drives_are_named(bench, _):
     reports = {drive["report"]["node"]: drive["report"] for drive in [*status["cylinders"], status["rotation"]] if "report" in drive}
     for node, (_, phase, where) in BAD.items():
         assert reports[node]["phase"] == phase and reports[node]["trouble"], reports[node]
+        assert reports[node]["found"] is None or reports[node]["found"] != reports[node]["wanted"], reports[node]
         assert where in (None, (reports[node]["object"], reports[node]["sub_index"])), reports[node]
     assert status["state"] != "ENGAGED" and not bench.events("enabled")
+
+
+def all_drives_refused(bench, _):
+    """Alike drives that do not take the same object: drive-offline with the object, no lost bus; a reset leads out once they take it, in FAULT and in OFF."""
+    bench.start_drives(each={"refuse": {"60C2:1": 0x06090030}})
+    bench.start(config=test_can.can_config(bench, platform__engage="manual"))
+    heave.wait_for(lambda: all(leg["report"]["phase"] == "refused" for leg in bench.status()["cylinders"]), "all are refused")
+    assert bench.ctl("engage").returncode != 0
+    bench.wait_state("FAULT")
+    status = bench.status()
+    assert (status["fault"]["name"], status["fault"]["device_code"]) == ("drive-offline", 0x10009), status["fault"]
+    assert all((leg["report"]["object"], leg["report"]["sub_index"]) == (0x60C2, 1) for leg in status["cylinders"]), status["cylinders"]
+    for node in can_bench.NODES:
+        bench.do("take sdo", node, index="60C2", sub=1)
+    bench.ctl("reset")
+    bench.wait_state("OFF")
+    assert bench.ctl("engage").returncode == 0
+    bench.wait_state("ENGAGED")
+
+
+def object_without_answer(bench, _):
+    """It answers everything else: named with the object, reset no more than once, and at an engage the reason is told."""
+    bench.start_drives(only={VICTIM: {"no_answer": ["6065:0"]}})
+    daemon = bench.start(config=test_can.can_config(bench, platform__engage="manual"))
+    heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "refused", "is refused")
+    report = bench.status()["cylinders"][VICTIM - 1]["report"]
+    assert (report["code"], report["object"], report["sub_index"]) == (0x10017, 0x6065, 0), report
+    lines = [line for line in daemon.log.read_text(encoding="utf-8").splitlines() if f"node {VICTIM}," in line]
+    assert len(lines) <= 3 and "object 6065:00" in lines[-1], lines
+    assert bench.ctl("engage").returncode != 0
+    bench.wait_state("FAULT")
+    fault = bench.status()["fault"]
+    assert (fault["name"], fault["axis"], fault["device_code"]) == ("drive-offline", VICTIM, 0x10017) and fault["device_text"], fault
+    bench.do("answer sdo", VICTIM)
+    bench.reset()
+
+
+def node_id_twice(bench, _):
+    """A second drive with the id of another one: found before anybody has torque, and led out once it has an id of its own."""
+    bench.start_drives()
+    twin_config = {"log": str(bench.folder / "twin.jsonl"), "drives": [{"node": VICTIM, "position": 9000, "boot_us": 340000, "sdo_us": 1300}], "plan": []}
+    twin = forked.Forked(can_bench.can_drives.main, bench.file("twin.json", json.dumps(twin_config)), "--follow")
+    assert twin.stdout.readline() == "ready\n"
+    bench.start(config=test_can.can_config(bench, platform__engage="manual"))
+    heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "refused", "is refused")
+    report = bench.status()["cylinders"][VICTIM - 1]["report"]
+    assert report["code"] == 0x10018 and "two drives" in report["trouble"], report
+    assert not bench.events("enabled")
+    twin.stdin.close()
+    twin.wait(timeout=heave.WAIT_S)
+    twin.stdout.close()
+    bench.ctl("reset")
+    heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["drive"] == "disabled", "is ready")
+    assert bench.ctl("engage").returncode == 0
+    bench.wait_state("ENGAGED")
 
 
 # --- The gateway in trouble ---
@@ -353,14 +488,23 @@ def killed_anywhere(bench, source):
 
 
 CASES = [(f"{name}: all stop together", stops_all_drives(*row)) for name, *row in ROWS]
+CASES += [("the reason stays when the drive is back, a reboot: named until the reset", reason_stays("reboot", 0x10005, "started again by itself")),
+          ("the reason stays when the drive is back, torque gone: named until the reset", reason_stays("disable", 0x10011, "left operation enabled by itself")),
+          ("the reason stays when the drive is back, lost answers: named until the reset", reason_stays("tpdo drop", 0x10002, "sent no position", count=5))]
 CASES += [
     ("lost answers, 1, 2 and 3: nothing stops", harmless(*(("tpdo drop", {"count": count}) for count in (1, 2, 3)))),
+    ("a drive's limit and warning are told: nothing stops", tells),
+    ("an EMCY is told of once a second with all it says: nothing stops", error_is_told),
+    ("a drive under local control is named, nobody is enabled", local_drive_is_not_enabled),
     ("an EMCY without a fault: nothing stops", harmless(("emergency", {"code": 0xFF00}))),
 ]
 CASES += [(f"{name}: silence, latched", bus_lost(*row)) for name, *row in BUS_ROWS]
 CASES += [("error-passive for more than a second: a controlled stop, latched", passive_stops),
           ("error-passive for less, and a storm of error frames: nothing stops", disturbed)]
-CASES += [("drives missing or wrong are named, nobody is enabled", bad_drives_are_named), ("killed at random moments and started again", killed_anywhere)]
+CASES += [("drives missing or wrong are named, nobody is enabled", bad_drives_are_named),
+          ("a drive that never answers for an object is named with it", object_without_answer),
+          ("two drives with the same node id are named, nobody is enabled", node_id_twice),
+          ("drives that all refuse the same: named, no lost bus, a reset sets them up again", all_drives_refused), ("killed at random moments and started again", killed_anywhere)]
 
 
 def main():

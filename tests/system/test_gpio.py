@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_gpio.py BIN masks|lines|inputs - the daemon on GPIO lines that the kernel simulates, on virtual time. Runs inside kernel.py.
+"""test_gpio.py BIN masks|lines|inputs|healthy - the daemon on GPIO lines that the kernel simulates, on virtual time. Runs inside kernel.py.
 
 What the relays do is read from the other side of the lines, as a multimeter at the terminals would."""
 import signal
@@ -310,6 +310,78 @@ def key(bin_dir):
         assert bench.status()["state"] == "SETTLED"
 
 
+SECOND, SUPPLY = 0, 4
+
+
+def channels(bin_dir):
+    """The reset at the start of DeskBench is refused no more once both channels are closed."""
+    with gpio_sim.Chip("effects", 16, "FX"), Desk() as desk, DeskBench(bin_dir, desk, "estop2 = DESK0\nestop_discrepancy_ms = 1000\n") as bench:
+        record, trace = bench.folder / "record.txt", bench.folder / "live.csv"
+        daemon = heave.Bench.start(bench, "--record", record, "--trace", trace)
+        bench.wait_state("ESTOP")
+        desk.close(SECOND)
+        bench.wait_status(lambda status: status["fault"]["name"] == "estop-channels", "one wire is broken, the other one closed")
+        desk.close(ESTOP)
+        time.sleep(1)
+        assert bench.status()["estop_active"] is True, "a wire that has been mended proves nothing"
+        said = bench.ctl("reset").stderr
+        assert "press it and release it" in said, said
+        for line in (ESTOP, SECOND):
+            desk.open(line)
+        for line in (ESTOP, SECOND):
+            desk.close(line)
+        time.sleep(0.2)
+        assert bench.ctl("reset").returncode == 0
+        for line in (ESTOP, SECOND):
+            bench.wait_state("OFF")
+            engage(bench)
+            desk.open(line)
+            bench.wait_state("ESTOP")
+            assert bench.status()["fault"]["name"] == "none", "not for too long yet"
+            desk.close(line)
+            time.sleep(0.2)
+            assert bench.ctl("reset").returncode == 0
+        bench.wait_state("OFF")
+        engage(bench)
+        desk.open(SECOND)
+        bench.wait_status(lambda status: status["state"] == "ESTOP" and status["fault"]["name"] == "estop-channels", "too long")
+        assert bench.stop(daemon) == 0
+        assert "!fault estop-channels" in record.read_text(encoding="utf-8")
+        live = heave.since_zero(trace.read_bytes())
+        assert bench.play(record)[:len(live)] == live, "a recording replays channels that disagree"
+
+
+def supply(bin_dir):
+    with gpio_sim.Chip("effects", 16, "FX"), Desk() as desk, DeskBench(bin_dir, desk, "power = DESK4\npower_settle_ms = 4000\n") as bench:
+        record, trace = bench.folder / "record.txt", bench.folder / "live.csv"
+        daemon = bench.start("--record", record, "--trace", trace)
+        assert "the supply is failing" in bench.ctl("engage").stderr, "its wire is broken from the start"
+        desk.close(SUPPLY)
+        bench.wait_status(lambda status: status["power_failing"] is False, "closed")
+        engage(bench)
+        desk.open(SUPPLY)
+        bench.wait_state("SETTLED")
+        for request in ("engage", "resume"):
+            assert "the supply is failing" in bench.ctl(request).stderr, request
+        assert bench.status()["power_failing"] is True
+        time.sleep(5)
+        assert bench.status()["state"] == "SETTLED", "who is down stays down, and is no fault"
+        desk.close(SUPPLY)
+        bench.wait_status(lambda status: status["power_failing"] is False, "back")
+        assert bench.status()["state"] == "SETTLED", "it moves nobody"
+        engage(bench)
+        assert bench.ctl("hold").returncode == 0
+        desk.open(SUPPLY)
+        time.sleep(2)
+        assert bench.status()["state"] == "HOLD", "an operator's hold is not ended"
+        bench.wait_state("FAULT")
+        assert bench.status()["fault"]["name"] == "power-failing"
+        assert bench.stop(daemon) == 0
+        assert "!fault power-failing" in record.read_text(encoding="utf-8")
+        live = heave.since_zero(trace.read_bytes())
+        assert bench.play(record)[:len(live)] == live, "a recording replays a supply that fails"
+
+
 def inputs_missing(bin_dir):
     with gpio_sim.Chip("effects", 16, "FX"), Desk() as desk:
         with DeskBench(bin_dir, desk) as bench, DeskBench(bin_dir, desk) as other:
@@ -326,6 +398,72 @@ def inputs_missing(bin_dir):
             assert "warning: [inputs] gpio: line 2 is relay 1 already" in bench.heaved("--config", bench.config, "--check").stdout
 
 
+# --- The healthy pulse, as the watchdog behind it sees it ---
+
+PULSE = 15
+TOGGLE_MS = 20  # two looks of the watchdog below, which the kernel's tick makes ten ms apart
+
+
+class PulseBench(GpioBench):
+    def __init__(self, bin_dir, chip, **changes):
+        super().__init__(bin_dir, **{"sim__lag_ms": 300, **changes})
+        self.edit("[cylinders]\n", "[cylinders]\nfollowing_error_mm = 20\n")
+        self.chip = chip
+        self.config.write_text(self.config.read_text(encoding="utf-8") +
+                               f"\n[healthy]\ndriver = gpio\nline = FX{PULSE}\ntoggle_ms = {TOGGLE_MS}\n", encoding="utf-8")
+
+    def edges(self, seconds):
+        """Edges within that time."""
+        seen, last, until = 0, self.chip.level(PULSE), time.monotonic() + seconds
+        while time.monotonic() < until:
+            time.sleep(0.001)
+            level = self.chip.level(PULSE)
+            seen, last = seen + (level != last), level
+        return seen
+
+    def wait_pulse(self):
+        heave.wait_for(lambda: self.edges(0.2) >= 5, "the pulse runs")
+
+    def is_quiet_and_low(self):
+        return self.edges(0.3) == 0 and self.chip.level(PULSE) == 0
+
+
+def pulse(bin_dir):
+    with gpio_sim.Chip("effects", 16, "FX") as chip, PulseBench(bin_dir, chip) as bench:
+        daemon = bench.start()
+        bench.wait_pulse()
+        with switch(bench, chip) as sender:
+            bench.wait_pulse()
+            assert bench.status()["healthy"] is True
+            heave.wait_for(lambda: "takeover" not in bench.status()["flags"], "the sender is faded in")
+            sender.send("@A6:0,0,0,0,0,90,0F#")
+            bench.wait_state("FAULT")
+        assert bench.is_quiet_and_low(), "in FAULT"
+        assert bench.status()["healthy"] is False
+        assert bench.stop(daemon) == 0
+        assert bench.is_quiet_and_low(), "after the end"
+
+
+def pulse_hangs(bin_dir):
+    """Stopped where it is, as a program that hangs; killed, as one that crashes."""
+    with gpio_sim.Chip("effects", 16, "FX") as chip, PulseBench(bin_dir, chip) as bench:
+        daemon = bench.start()
+        bench.wait_pulse()
+        daemon.send_signal(signal.SIGSTOP)
+        assert bench.edges(0.3) == 0, "a program that is stopped makes no edge"
+        daemon.send_signal(signal.SIGCONT)
+        bench.wait_pulse()
+        assert bench.stop(daemon, signal.SIGKILL) == -signal.SIGKILL
+        assert bench.is_quiet_and_low(), "killed"
+
+
+def pulse_missing(bin_dir):
+    with gpio_sim.Chip("effects", 15, "FX") as chip, PulseBench(bin_dir, chip) as bench:
+        wrong = "gpio: no chip has a line FX15"
+        assert f"warning: [healthy] {wrong}" in bench.heaved("--config", bench.config, "--check").stdout
+        assert wrong in bench.refused()
+
+
 def main():
     suite = tap.Suite()
     if not gpio_sim.is_there():
@@ -338,8 +476,13 @@ def main():
              ("a line that is not there, a chip that is not there", missing), ("the chip goes while running", unplugged)]
     inputs = [("e-stop: relays safe within two cycles, latched, reset button, replay", estop),
               ("the chip of the inputs goes while running: e-stop", desk_unplugged), ("enable key", key),
+              ("two channels: either stops, one that stays behind is a fault until both have opened", channels),
+              ("supply failing: settles, nothing goes up; a hold stays until the time is over", supply),
               ("an input line that is not there, is in use, or is a relay", inputs_missing)]
-    for name, case in {"masks": masks, "lines": lines, "inputs": inputs}[sys.argv[2]]:
+    healthy = [("healthy pulse: runs while all is well, low from a fault on and after the end", pulse),
+               ("healthy pulse: no edge from a program that hangs or is killed", pulse_hangs),
+               ("healthy pulse: a line that is not there", pulse_missing)]
+    for name, case in {"masks": masks, "lines": lines, "inputs": inputs, "healthy": healthy}[sys.argv[2]]:
         with suite.case(name):
             case(sys.argv[1])
     return suite.done()

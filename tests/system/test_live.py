@@ -5,6 +5,7 @@
 --guard LIB: malloc_guard.c as a shared library; without it (instrumented builds) the cases about it are skipped.
 """
 import argparse
+import grp
 import json
 import math
 import os
@@ -571,6 +572,143 @@ def strangers_are_refused(bench):
     assert bench.stop(daemon) == 0
 
 
+NOBODY = 65534
+
+
+def ask_as(path, groups, *requests):
+    """What heaved answers to somebody who is in these groups only; who cannot be somebody else asks as who this is."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            if os.geteuid() == 0:
+                os.setgroups(groups)
+                os.setgid(NOBODY)
+                os.setuid(NOBODY)
+            with socket.socket(socket.AF_UNIX) as link:
+                link.connect(str(path))
+                said = link.makefile("r")
+                for request in requests:
+                    link.sendall(request.encode() + b"\n")
+                    os.write(writer, said.readline().encode())
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader) as answers:
+        lines = answers.read().splitlines()
+    os.waitpid(child, 0)
+    assert len(lines) == len(requests), (requests, lines)
+    return [json.loads(line) for line in lines]
+
+
+def levels_and_their_log(bench):
+    """Somebody in no group looks and holds, an operator operates, and every one of them is in the log."""
+    log, look = bench.folder / "operators", bench.folder / "look.sock"
+    operators, mechanics = (grp.getgrnam(name).gr_gid for name in ("games", "users"))
+    control = f"[control]\nlook_socket = {look}\noperate_group = games\nservice_group = users\noperator_log = {log}\n"
+    bench.config.write_text(bench.config.read_text(encoding="utf-8").replace("[control]\n", control), encoding="utf-8")
+    daemon = bench.start()
+    os.chmod(bench.folder, 0o755)
+    os.chmod(bench.socket, 0o666)
+    bench.wait_state("ENGAGED")
+    for path in (bench.socket, look):
+        status, park, hold = ask_as(path, [], "status", "park", "hold")
+        assert status["ok"] and not park["ok"] and "it takes the level operate (members of group games)" in park["error"] and hold["ok"], (park, hold)
+    if os.geteuid() == 0:
+        resume, reset, down, up = ask_as(bench.socket, [operators], "resume", "reset", "intensity 40", "intensity 50")
+        assert resume["ok"] and not reset["ok"] and "level service (members of group users)" in reset["error"] and down["ok"] and not up["ok"], (resume, reset, down, up)
+        named, up, reset = ask_as(bench.socket, [mechanics], "by anna", "intensity 50", "reset")
+        assert named["ok"] and up["ok"] and not reset["ok"] and "there is nothing to reset" in reset["error"], (named, up, reset)
+        assert not ask_as(look, [mechanics], "resume")[0]["ok"], "not by that socket"
+    assert bench.stop(daemon) == 0
+    entries = [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]
+    park, hold = entries[0], entries[1]
+    assert park["request"] == "park" and not park["ok"] and park["before"] == park["after"] == "ENGAGED", park
+    assert hold["request"] == "hold" and hold["ok"] and (hold["before"], hold["after"]) == ("ENGAGED", "HOLD") and hold["pid"] > 1, hold
+    assert hold["uid"] == (NOBODY if os.geteuid() == 0 else os.getuid()), hold
+    if os.geteuid() == 0:
+        assert [entry["request"] for entry in entries if entry["by"] == "anna"] == ["intensity 50", "reset"], entries
+        assert entries[-1]["request"] == "SIGTERM" and entries[-1]["pid"] == os.getpid() and entries[-1]["uid"] == 0, entries[-1]
+    assert all(re.fullmatch(r"20\d\d-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", entry["time"]) for entry in entries), entries
+
+
+def keeps_the_life_of_the_machine(bench):
+    """Over an end, a kill in motion, and a file that was lost; shown by the status."""
+    life = bench.folder / "life"
+    bench.config.write_text(bench.config.read_text(encoding="utf-8").replace("[platform]\n", f"[platform]\nlife_file = {life}\n", 1), encoding="utf-8")
+    travel_mm, rides = 0, 0
+    for number in (signal.SIGTERM, signal.SIGKILL, signal.SIGTERM):
+        daemon = bench.start()
+        bench.wait_state("ENGAGED")
+        rides += 1
+        with bench.sender() as sender:
+            sender.stream(1.0, wave)
+        now = bench.status()["life"]
+        assert now["rides"] == rides and len(now["axes"]) == 7 and now["faults"] == 0, now
+        assert all(axis["travel_mm"] > travel_mm + 10 for axis in now["axes"][:6]) and "travel_deg" in now["axes"][6], (travel_mm, now)
+        assert all(axis["cycles"] >= 0 and axis["energized_s"] >= rides for axis in now["axes"]), now
+        travel_mm = now["axes"][0]["travel_mm"] if number == signal.SIGTERM else travel_mm
+        rides -= number == signal.SIGKILL  # what was not written yet is lost: a minute at most
+        assert bench.stop(daemon, number) == (0 if number == signal.SIGTERM else -number)
+        bench.socket.unlink(missing_ok=True)
+        (life if number == signal.SIGKILL else Path(f"{life}.2")).unlink(missing_ok=True)
+    for path in (life, Path(f"{life}.2")):
+        path.write_text("heave life 1\nsequence 9\n", encoding="utf-8")
+    run = bench.heaved("--config", bench.config)
+    assert run.returncode == 65 and "neither is right" in run.stderr and "move them away to begin at zero" in run.stderr, run
+
+
+def what_is_wrong_with_levels_and_log(bench):
+    text = bench.config.read_text(encoding="utf-8")
+    for line, code, said in (("operate_group = no-such-group", 69, "[control] operate_group: there is no group no-such-group on this machine"),
+                             ("operator_log = /dev/null", 73, "operator log /dev/null: not a file"),
+                             (f"operator_log = {bench.folder}/no/log", 73, "No such file or directory")):
+        bench.config.write_text(text.replace("[control]\n", f"[control]\n{line}\n"), encoding="utf-8")
+        run = bench.heaved("--config", bench.config)
+        assert run.returncode == code and said in run.stderr, (line, run)
+
+
+def moves_what_was_approved(bench):
+    """Another configuration than the approved one moves once somebody has said that it shall; the identity is wherever somebody looks later."""
+    config = bench.write_config("manual.ini", **MANUAL)
+    text = config.read_text(encoding="utf-8")
+    identity = re.search(r"(?m)^configuration +([0-9a-f]{16})$", bench.heaved("--config", config, "--check").stdout)[1]
+    config.write_text(text.replace("[platform]\n", "[platform]\napproved = 0123456789abcdef\n", 1), encoding="utf-8")
+    assert "warning: [platform] approved: another" in bench.heaved("--config", config, "--check").stdout
+    record = bench.folder / "record.txt"
+    daemon = bench.start("--record", record, config=config)
+    for request in ("engage", "park"):
+        answer, code = bench.ask(request)
+        assert code == 1 and answer["state"] == "OFF" and f"the configuration {identity} is not the one that was approved (0123456789abcdef)" in answer["error"], answer
+    status = bench.status()
+    assert status["configuration"] == {"hash": identity, "approved": "0123456789abcdef", "barred": True}, status["configuration"]
+    assert bench.ask("acknowledge") == ({"ok": True, "state": "OFF"}, 0)
+    answer, code = bench.ask("acknowledge")
+    assert code == 1 and "there is nothing to acknowledge" in answer["error"], answer
+    assert bench.ask("engage")[1] == 0 and bench.status()["configuration"]["barred"] is False
+    bench.wait_state("ENGAGED")
+    assert bench.stop(daemon) == 0
+    said = daemon.log.read_text(encoding="utf-8")
+    build = re.search(rf"build ([0-9a-f]{{40}}), configuration {identity}\n", said)[1]
+    assert "nothing moves until" in said and f"configuration {identity}: acknowledged by user {os.getuid()}, process" in said, said
+    assert status["build"] == build and build.encode("ascii") == build_id_of(bench.bin / "heaved"), status["build"]
+    assert f"build {build}, configuration {config}, {identity}, " in record.read_text(encoding="utf-8").splitlines()[0]
+    config.write_text(text.replace("[platform]\n", f"[platform]\napproved = {identity}\n", 1), encoding="utf-8")
+    daemon = bench.start(config=config)
+    assert bench.ask("engage")[1] == 0, "the approved one asks nobody"
+    config.write_text(config.read_text(encoding="utf-8").replace("silence_hold_ms", "silence_hold_ms = 777 ;", 1), encoding="utf-8")
+    daemon.send_signal(signal.SIGHUP)
+    heave.wait_for(lambda: f"[platform] approved: {identity} is not this configuration" in daemon.log.read_text(encoding="utf-8"), "refused")
+    assert bench.status()["configuration"]["hash"] == identity
+    assert bench.stop(daemon) == 0
+
+
+def build_id_of(program):
+    """As another program reads it."""
+    notes = subprocess.run(["readelf", "-n", program], stdout=subprocess.PIPE, check=True).stdout
+    return re.search(rb"Build ID: ([0-9a-f]+)", notes)[1]
+
+
 def nobody_reads_standard_error(bench):
     """Log lines into a full pipe must not keep the daemon from ending."""
     daemon = bench.spawn(stderr=subprocess.PIPE)
@@ -762,6 +900,10 @@ CASES = {
     "files that cannot be created": files_that_cannot_be_created,
     "a full disk is told at the end": full_disk,
     "senders that are not allowed are refused and counted": strangers_are_refused,
+    "levels by group and by socket, hold for all, and a log of who did what": levels_and_their_log,
+    "hours, way and cycles of each axis are kept over ends, kills and a lost file": keeps_the_life_of_the_machine,
+    "a group or an operator log that cannot be is refused at the start": what_is_wrong_with_levels_and_log,
+    "a configuration that was not approved moves nothing until somebody has said so, and all say which one it is": moves_what_was_approved,
     "nobody reads standard error": nobody_reads_standard_error,
     "odd requests": odd_requests,
     "eight clients that ask nothing do not keep an operator out": idle_clients_keep_nobody_out,

@@ -65,7 +65,7 @@ def says_what_the_status_says(bench):
         told = {f"{dict(labels)['axis']}_{dict(labels)['unit'].replace('/', '_')}": value for labels, value in got[f"heave_plate_{name}"].items()}
         assert told.keys() == status[key].keys() and all(abs(value) < 1 for value in told.values()), (told, status[key])
     assert {int(dict(key)["relay"]) for key, on in got["heave_relay_on"].items() if on} == set(status["relays"]["on"]) and len(got["heave_relay_on"]) == 12
-    assert got["heave_build_info"] == {(("version", status["version"]),): 1}
+    assert got["heave_build_info"] == {(("build", status["build"]), ("configuration", status["configuration"]["hash"]), ("version", status["version"])): 1}
     assert got["heave_last_frame_age_seconds"][()] > 0 and got["heave_fault_code"][()] == 0 and got["heave_drive_enabled"][(("axis", "7"),)] == 1
     for name in ("heave_wake_latency_seconds", "heave_cycle_time_seconds", "heave_frame_latency_seconds"):
         shares = [got[name][(("quantile", q),)] for q in ("0.5", "0.99", "0.999", "0.9999", "1")]

@@ -255,7 +255,7 @@ static void test_blackbox_short_run_replays_from_time_zero(void)
     expect_in(frames, "; asked for by an operator\n");
     expect_in(frames, "!from 192.168.7.3\n");
     char *feedback = contents(file_of("feedback.csv"));
-    expect_in(feedback, "t_ms,c1_state,c1_actual_mm,c1_code,");
+    expect_in(feedback, "t_ms,c1_state,c1_actual_mm,c1_code,c1_error,");
     expect_in(feedback, "enabled");
     free(feedback);
     free(frames);

@@ -126,6 +126,49 @@ static unsigned count_frames(unsigned leg, uint8_t first, uint8_t second)
     return count;
 }
 
+/* ---- Drives without an enable frame that say whether they have torque ---- */
+
+/* They wait for a set-point, and nobody waits for them. */
+static void test_enable_drives_that_set_points_enable(void)
+{
+    map = canraw_maps_rich();
+    map.command[CANRAW_ENABLE] = (canraw_frame_t){.length = 0};
+    open_with(NULL, 0, true);
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.drive[k].is_enabled_by_target = true;
+    }
+    await(DRIVE_DISABLED, 100);
+    cycles(100);
+    TEST_ASSERT_EQUAL_UINT32(0, slave.drive[0].setpoints);
+    enable();
+    cycles(100);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_TRUE(slave.drive[k].is_enabled);
+        TEST_ASSERT_EQUAL_INT32(0, slave.drive[k].largest_step);
+    }
+}
+
+/* Theirs is switched by an input of their own. */
+static void test_enable_drives_that_are_enabled_by_themselves(void)
+{
+    map = canraw_maps_rich();
+    map.command[CANRAW_ENABLE] = (canraw_frame_t){.length = 0};
+    open_with(NULL, 0, true);
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.drive[k].is_enabled = k != 4;
+    }
+    await(DRIVE_DISABLED, 100);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    for (unsigned i = 0; i < 100; i++) {
+        (void)!cycle();
+        follow_actual();
+    }
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[3].state);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLING, feedback[4].state);
+    slave.drive[4].is_enabled = true;
+    await(DRIVE_ENABLED, 100);
+}
+
 /* ---- Bytes ---- */
 
 static void test_frames_of_the_plain_dialect_byte_for_byte(void)
@@ -1366,5 +1409,7 @@ int main(void)
     RUN_TEST(test_off_of_drives_that_no_frame_takes_torque_from_is_not_waited_for);
     RUN_TEST(test_off_of_a_drive_in_fault_is_told_when_it_says_so);
     RUN_TEST(test_off_that_is_not_confirmed_is_not_told);
+    RUN_TEST(test_enable_drives_that_set_points_enable);
+    RUN_TEST(test_enable_drives_that_are_enabled_by_themselves);
     return UNITY_END();
 }

@@ -270,6 +270,104 @@ static void test_setup_object_refused_names_drive_object_and_reason(void)
     TEST_ASSERT_EQUAL_STRING("the value is out of range", r.detail);
 }
 
+/* Alike drives, one fault of the configuration: each answers, so the bus is not lost, and each says what it does not take. */
+static void test_setup_all_refused_is_no_lost_bus_and_a_reset_sets_up_again(void)
+{
+    for (unsigned k = 0; k < AXES; k++) {
+        cia402_slave_row(&slave, k, 0x60C2, 1)->refusal = 0x06090030;
+    }
+    start();
+    cycles(4000);
+    TEST_ASSERT_EQUAL(HV_OK, cycle());
+    for (uint8_t k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_STRING("refused", report(k).phase);
+        TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, feedback[k].fault_code);
+    }
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
+    for (unsigned k = 0; k < AXES; k++) {
+        cia402_slave_row(&slave, k, 0x60C2, 1)->refusal = 0;
+    }
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    for (unsigned i = 0; i < 4000 && !are_all(DRIVE_DISABLED); i++) {
+        TEST_ASSERT_EQUAL(HV_OK, cycle()); /* drives that are being set up are no lost bus either */
+    }
+    enable();
+}
+
+/* A dip of the supply: the drives say themselves what has happened. */
+static void test_loss_all_that_start_again_are_no_lost_bus(void)
+{
+    come_up();
+    enable();
+    for (unsigned k = 0; k < AXES; k++) {
+        cia402_slave_power(&slave, k, true);
+        slave.drive[k].boot_us = now_us + CYCLE_US; /* sooner than three answers are missing */
+    }
+    while (!are_all(DRIVE_OFFLINE)) {
+        TEST_ASSERT_EQUAL(HV_OK, cycle());
+    }
+    TEST_ASSERT_EQUAL_HEX32(CIA402_REBOOTED, feedback[0].fault_code);
+    for (unsigned i = 0; i < 4000 && !are_all(DRIVE_DISABLED); i++) {
+        TEST_ASSERT_EQUAL(HV_OK, cycle());
+    }
+}
+
+/* Somebody acknowledges, but no drive is there any more. */
+static void test_loss_all_silent_is_a_lost_bus_until_one_answers(void)
+{
+    come_up();
+    for (unsigned k = 0; k < AXES; k++) {
+        cia402_slave_power(&slave, k, false);
+    }
+    cycles(40);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, cycle());
+    TEST_ASSERT_EQUAL(HV_ERR_IO, drives_request(hal, DRIVES_DISABLE));
+    cycles(2000);
+    TEST_ASSERT_EQUAL(HV_ERR_IO, cycle());
+    cia402_slave_power(&slave, 3, true);
+    cycles(2000);
+    TEST_ASSERT_EQUAL(HV_OK, cycle());
+}
+
+static void test_setup_object_with_another_value_tells_both(void)
+{
+    for (unsigned k = 0; k < AXES; k++) {
+        config.axis[k].identity[0] = 0x2E5;
+    }
+    cia402_slave_row(&slave, 2, 0x1018, 1)->value = 0x0B0000EF; /* as large as an abort code */
+    const drive_report_t r = refusal_of(2);
+    TEST_ASSERT_EQUAL_STRING("it holds another value", r.detail);
+    TEST_ASSERT_TRUE(r.has_found);
+    TEST_ASSERT_EQUAL_HEX32(0x0B0000EF, r.found);
+    TEST_ASSERT_EQUAL_HEX32(0x2E5, r.wanted);
+    TEST_ASSERT_FALSE(report(1).has_found);
+}
+
+static void test_setup_object_that_can_only_be_read_is_told_as_such(void)
+{
+    cia402_slave_row(&slave, 3, 0x60C2, 1)->is_read_only = true;
+    cia402_slave_row(&slave, 3, 0x60C2, 1)->value = 10;
+    const drive_report_t r = refusal_of(3);
+    TEST_ASSERT_EQUAL_HEX32(0x60C201, r.object);
+    TEST_ASSERT_EQUAL_STRING("the object can only be read", r.detail);
+    TEST_ASSERT_EQUAL_HEX32(0x06010002, r.detail_code);
+    TEST_ASSERT_TRUE(r.has_found);
+    TEST_ASSERT_EQUAL_HEX32(10, r.found);
+    TEST_ASSERT_EQUAL_HEX32(PERIOD, r.wanted);
+}
+
+/* Written first, checked when all of it is written. */
+static void test_setup_mapping_that_can_only_be_read_is_told_as_such(void)
+{
+    cia402_slave_row(&slave, 3, 0x1600, 2)->is_read_only = true;
+    cia402_slave_row(&slave, 3, 0x1600, 2)->value = 0x60FF0020;
+    const drive_report_t r = refusal_of(3);
+    TEST_ASSERT_EQUAL_HEX32(0x160002, r.object);
+    TEST_ASSERT_EQUAL_STRING("the object can only be read", r.detail);
+    TEST_ASSERT_EQUAL_HEX32(0x60FF0020, r.found);
+    TEST_ASSERT_EQUAL_HEX32(0x607A0020, r.wanted);
+}
+
 static void test_setup_wrong_identity_is_refused(void)
 {
     for (unsigned k = 0; k < AXES; k++) {
@@ -405,6 +503,71 @@ static void test_setup_missing_drive_is_named_and_taken_when_it_comes(void)
     cia402_slave_power(&slave, 6, true);
     await(DRIVE_DISABLED, 3000);
     TEST_ASSERT_EQUAL_HEX32(0, report(6).code);
+}
+
+/* It answers, only not when it is asked for that. */
+static void test_setup_object_that_is_never_answered_is_named_and_not_tried_for_ever(void)
+{
+    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = true;
+    const drive_report_t r = refusal_of(2);
+    TEST_ASSERT_EQUAL_STRING("refused", r.phase);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, r.code);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, feedback[2].fault_code);
+    TEST_ASSERT_EQUAL_HEX32(0x606500, r.object);
+    const uint32_t boots = slave.drive[2].boots;
+    TEST_ASSERT_TRUE(boots <= 3);
+    cycles(10000);
+    TEST_ASSERT_EQUAL_UINT32(boots, slave.drive[2].boots);
+    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = false;
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    await(DRIVE_DISABLED, 3000);
+    TEST_ASSERT_EQUAL_HEX32(0, report(2).code);
+    TEST_ASSERT_EQUAL_HEX32(0, report(2).object);
+}
+
+/* While it is tried again, too: an engage would be refused for a reason. */
+static void test_setup_object_without_answer_is_named_while_it_is_tried_again(void)
+{
+    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = true;
+    start();
+    for (unsigned i = 0; i < 5000 && feedback[2].fault_code != CIA402_NO_ANSWER; i++) {
+        (void)!cycle();
+    }
+    while (driver.axis[2].phase != CIA402_REFUSED) {
+        TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, feedback[2].fault_code);
+        TEST_ASSERT_EQUAL_HEX32(CIA402_NO_ANSWER, report(2).code);
+        (void)!cycle();
+    }
+}
+
+static void test_setup_object_that_may_be_missing_may_be_without_answer(void)
+{
+    cia402_slave_row(&slave, 2, 0x605B, 0)->is_silent = true;
+    come_up();
+    TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].boots);
+}
+
+static void test_setup_one_question_without_answer_is_asked_again_from_the_beginning(void)
+{
+    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = true;
+    start();
+    for (unsigned i = 0; i < 5000 && feedback[2].fault_code != CIA402_NO_ANSWER; i++) {
+        (void)!cycle();
+    }
+    cia402_slave_row(&slave, 2, 0x6065, 0)->is_silent = false;
+    await(DRIVE_DISABLED, 3000);
+    TEST_ASSERT_EQUAL_HEX32(0, report(2).code);
+}
+
+/* At a change of mode: lost, and then refused by name. */
+static void test_enable_drive_that_does_not_answer_for_its_mode_is_named(void)
+{
+    come_up();
+    cia402_slave_row(&slave, 4, 0x6061, 0)->is_silent = true;
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    cycles(8000);
+    TEST_ASSERT_EQUAL_STRING("refused", report(4).phase);
+    TEST_ASSERT_EQUAL_HEX32(0x606100, report(4).object);
 }
 
 /* Every answer is given to the next question only: with the retries each object is right in the end. */
@@ -1897,13 +2060,336 @@ static void test_period_is_one_that_the_drives_can_hold(void)
     }
 }
 
+/* --- What answers say beside state and position --- */
+
+static const struct {
+    cia402_watch_t watch;
+    uint16_t set, clear; /* in the statusword */
+    cia402_trouble_t code;
+} k_watches[] = {
+    {CIA402_WATCH_FOLLOWING, 0, CIA402_STATUS_BIT12, CIA402_NOT_FOLLOWING},
+    {CIA402_WATCH_LOCAL, 0, CIA402_STATUS_REMOTE, CIA402_REMOTE_OFF},
+    {CIA402_WATCH_VOLTAGE, 0, CIA402_STATUS_VOLTAGE, CIA402_NO_VOLTAGE},
+    {CIA402_WATCH_LIMIT, CIA402_STATUS_LIMIT, 0, CIA402_LIMITED},
+    {CIA402_WATCH_WARNING, CIA402_STATUS_WARNING, 0, CIA402_WARNING},
+};
+#define WATCHES (sizeof k_watches / sizeof k_watches[0])
+
+static void show(unsigned drive, size_t row, bool is_shown)
+{
+    slave.drive[drive].status_set = is_shown ? k_watches[row].set : 0;
+    slave.drive[drive].status_clear = is_shown ? k_watches[row].clear : 0;
+}
+
+static void test_watch_what_stops_is_a_fault_within_three_periods(void)
+{
+    for (size_t i = 0; i < WATCHES; i++) {
+        setUp();
+        config.reaction[k_watches[i].watch] = CIA402_STOP;
+        come_up();
+        enable();
+        cycles(100);
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        show(2, i, true);
+        TEST_ASSERT_TRUE(cycles_until(2, DRIVE_FAULT, 100) <= 3 * PERIOD);
+        TEST_ASSERT_EQUAL_HEX32(k_watches[i].code, feedback[2].fault_code);
+        TEST_ASSERT_TRUE(report(2).trouble[0] != '\0');
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+        cycles(20);
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_EQUAL(k == 2 ? DRIVE_FAULT : DRIVE_DISABLED, feedback[k].state);
+        }
+    }
+}
+
+static void test_watch_single_answer_stops_nothing(void)
+{
+    for (size_t i = 0; i < WATCHES; i++) {
+        setUp();
+        config.reaction[k_watches[i].watch] = CIA402_STOP;
+        come_up();
+        enable();
+        show(2, i, true);
+        cycles(PERIOD);
+        show(2, i, false);
+        cycles(100);
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        TEST_ASSERT_EQUAL_HEX32(0, report(2).notes);
+    }
+}
+
+static void test_watch_what_is_told_stops_nothing_and_is_told_for_some_seconds(void)
+{
+    for (size_t i = 0; i < WATCHES; i++) {
+        setUp();
+        config.reaction[k_watches[i].watch] = CIA402_TELL;
+        come_up();
+        enable();
+        show(2, i, true);
+        cycles(3 * PERIOD);
+        show(2, i, false);
+        cycles(4000);
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        TEST_ASSERT_EQUAL_HEX32(1u << k_watches[i].watch, report(2).notes);
+        TEST_ASSERT_EQUAL_HEX32(0, report(1).notes);
+        TEST_ASSERT_TRUE(drive_note_text(k_watches[i].watch)[0] != '\0');
+        cycles(1500);
+        TEST_ASSERT_EQUAL_HEX32(0, report(2).notes);
+    }
+}
+
+static void test_watch_what_is_ignored_is_not_told_of(void)
+{
+    come_up();
+    enable();
+    for (size_t i = 0; i < WATCHES; i++) {
+        show(2, i, true);
+        cycles(100);
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        TEST_ASSERT_EQUAL_HEX32(0, report(2).notes);
+    }
+}
+
+static void test_watch_mode_left_in_motion_is_a_fault(void)
+{
+    config.reaction[CIA402_WATCH_MODE] = CIA402_STOP;
+    come_up();
+    enable();
+    slave.drive[4].mode = 1;
+    TEST_ASSERT_TRUE(cycles_until(4, DRIVE_FAULT, 100) <= 3 * PERIOD);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_LEFT_MODE, feedback[4].fault_code);
+}
+
+static void test_watch_interpolation_that_ends_is_a_fault(void)
+{
+    config.mode = CIA402_MODE_IP;
+    config.reaction[CIA402_WATCH_FOLLOWING] = CIA402_STOP;
+    come_up();
+    enable();
+    show(0, 0, true);
+    TEST_ASSERT_TRUE(cycles_until(0, DRIVE_FAULT, 100) <= 3 * PERIOD);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_FOLLOWING, feedback[0].fault_code);
+}
+
+/* Some never show them: they are not missed. */
+static void test_watch_bits_that_a_drive_does_not_have_are_not_missed(void)
+{
+    config.reaction[CIA402_WATCH_FOLLOWING] = CIA402_STOP;
+    config.reaction[CIA402_WATCH_VOLTAGE] = CIA402_STOP;
+    config.power_timeout_ms = 900; /* without bit 12 it is believed after half a second */
+    slave.drive[1].status_clear = CIA402_STATUS_BIT12 | CIA402_STATUS_VOLTAGE;
+    come_up();
+    enable();
+    cycles(1000);
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+}
+
+static void test_watch_drive_under_local_control_is_not_enabled(void)
+{
+    config.reaction[CIA402_WATCH_LOCAL] = CIA402_STOP;
+    show(5, 1, true);
+    come_up();
+    cycles(3 * PERIOD);
+    TEST_ASSERT_EQUAL_HEX32(1u << CIA402_WATCH_LOCAL, report(5).notes);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    (void)cycles_until(5, DRIVE_FAULT, 200);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_REMOTE_OFF, feedback[5].fault_code);
+    cycles(200);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(0, slave.drive[k].enabled);
+    }
+    show(5, 1, false);
+    cycles(100);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[5].state); /* never by itself */
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    await(DRIVE_DISABLED, 100);
+    enable();
+}
+
+/* Homing runs into a limit on purpose. */
+static void test_watch_limit_while_homing_stops_nothing(void)
+{
+    config.reaction[CIA402_WATCH_LIMIT] = CIA402_STOP;
+    for (unsigned k = 0; k < AXES; k++) {
+        config.axis[k].homing_method = 17;
+    }
+    come_up();
+    enable();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_HOME));
+    cycles(2);
+    for (unsigned i = 0; i < 3000 && feedback[3].state == DRIVE_HOMING; i++) {
+        show(3, 3, driver.stage == CIA402_STAGE_HOMING && slave.drive[3].is_homing);
+        follow_actual();
+        (void)!cycle();
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+}
+
+/* --- Errors that drives tell of by themselves --- */
+
+static void tell_error(unsigned drive, uint16_t code)
+{
+    const can_frame_t frame = {
+        .id = 0x81u + drive, .length = 8, .data = {(uint8_t)code, (uint8_t)(code >> 8), 0x11, 1, 2, 3, 4, 5}};
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+    cycles(2);
+}
+
+static void test_emergency_is_reported_with_all_that_it_says(void)
+{
+    come_up();
+    TEST_ASSERT_NULL(report(3).error);
+    enable();
+    tell_error(3, 0x4310);
+    const drive_report_t r = report(3);
+    TEST_ASSERT_EQUAL_HEX16(0x4310, r.emergency.code);
+    TEST_ASSERT_EQUAL_HEX8(0x11, r.emergency.error_register);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(((const uint8_t[]){1, 2, 3, 4, 5}), r.emergency.maker, 5);
+    TEST_ASSERT_EQUAL_UINT32(1, r.emergency.count);
+    TEST_ASSERT_TRUE(now_us - r.emergency.at_us <= 2 * CYCLE_US && !r.emergency.is_over);
+    TEST_ASSERT_EQUAL_STRING("the motor is too hot", r.error);
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    tell_error(3, 0);
+    TEST_ASSERT_TRUE(report(3).emergency.is_over);
+    TEST_ASSERT_EQUAL_HEX16(0x4310, report(3).emergency.code);
+    TEST_ASSERT_EQUAL_UINT32(1, report(3).emergency.count);
+}
+
+static void test_emergency_is_kept_over_a_loss_and_over_with_a_boot(void)
+{
+    come_up();
+    tell_error(2, 0x3220);
+    cia402_slave_power(&slave, 2, false);
+    (void)cycles_until(2, DRIVE_OFFLINE, 100);
+    cycles(1000);
+    TEST_ASSERT_EQUAL_HEX16(0x3220, report(2).emergency.code);
+    TEST_ASSERT_FALSE(report(2).emergency.is_over);
+    cia402_slave_power(&slave, 2, true);
+    await(DRIVE_DISABLED, 3000);
+    TEST_ASSERT_EQUAL_HEX16(0x3220, report(2).emergency.code);
+    TEST_ASSERT_TRUE(report(2).emergency.is_over);
+}
+
+/* As stacks do that miss their SYNC. */
+static void test_emergency_of_a_drive_that_stays_preoperational_is_the_reason(void)
+{
+    start();
+    while (driver.axis[4].phase != CIA402_REFUSED) {
+        slave.drive[4].nmt = slave.drive[4].nmt == 5 ? 0x7F : slave.drive[4].nmt;
+        if (driver.axis[4].phase == CIA402_STARTING && (report(4).error == NULL || report(4).emergency.is_over)) {
+            tell_error(4, 0x8100);
+        }
+        cycles(1);
+    }
+    const drive_report_t r = report(4);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NO_START, r.code);
+    TEST_ASSERT_EQUAL_HEX32(0x8100, r.detail_code);
+    TEST_ASSERT_EQUAL_STRING(r.error, r.detail);
+}
+
+static void test_emergency_that_leaves_operational_is_the_reason(void)
+{
+    come_up();
+    tell_error(1, 0x8100);
+    slave.drive[1].nmt = 0x7F;
+    slave.drive[1].beat_us = 0;
+    (void)cycles_until(1, DRIVE_OFFLINE, 60);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_LEFT_OPERATIONAL, feedback[1].fault_code);
+    TEST_ASSERT_EQUAL_HEX32(0x8100, report(1).detail_code);
+}
+
+/* --- Two drives with the same node id --- */
+
+/* The other one answers too, from somewhere else. */
+static void answer_twice(unsigned drive, unsigned periods, unsigned most)
+{
+    uint32_t syncs = slave.syncs;
+    while (periods > 0 && most-- > 0) {
+        cycles(1);
+        if (slave.syncs != syncs && slave.drive[drive].nmt == 5) {
+            const can_frame_t frame = {.id = 0x181u + drive, .length = 7, .data = {0x40, 0x02, 1, 2, 3, 0, 8}};
+            TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+            syncs = slave.syncs;
+            periods--;
+        }
+    }
+}
+
+static void test_twice_in_motion_is_a_fault_within_three_periods(void)
+{
+    come_up();
+    enable();
+    const uint64_t begin_us = now_us;
+    while (feedback[2].state != DRIVE_FAULT && now_us - begin_us < 100000) {
+        const can_frame_t frame = {.id = 0x183, .length = 7, .data = {0x37, 0x12, 1, 2, 3, 0, 8}};
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        cycles(PERIOD);
+    }
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_TWICE, feedback[2].fault_code);
+    TEST_ASSERT_TRUE(now_us - begin_us <= 3 * PERIOD * CYCLE_US);
+}
+
+static void test_twice_at_the_start_is_refused_before_anybody_is_enabled(void)
+{
+    start();
+    answer_twice(5, 20, 3000);
+    TEST_ASSERT_EQUAL_STRING("refused", report(5).phase);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_TWICE, report(5).code);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_ENABLE));
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT)); /* the other one is gone */
+    await(DRIVE_DISABLED, 3000);
+}
+
+/* They begin together, and never quite. */
+static void test_twice_two_boot_ups_at_once_are_refused(void)
+{
+    start();
+    for (unsigned i = 0; i < 200 && slave.drive[1].boots == 0; i++) {
+        cycles(1);
+    }
+    cycles(2);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &(can_frame_t){.id = 0x702, .length = 1}));
+    cycles(3000);
+    TEST_ASSERT_EQUAL_STRING("refused", report(1).phase);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_TWICE, report(1).code);
+}
+
+/* CAN itself may repeat a frame that one receiver has not taken; and answers may come late. */
+static void test_twice_single_repeated_or_late_answers_are_none(void)
+{
+    come_up();
+    enable();
+    for (unsigned i = 0; i < 10; i++) {
+        const uint32_t position = (uint32_t)slave.drive[2].position;
+        const can_frame_t frame = {.id = 0x183,
+                                   .length = 7,
+                                   .data = {0x37, 0x12, (uint8_t)position, (uint8_t)(position >> 8), (uint8_t)(position >> 16),
+                                            (uint8_t)(position >> 24), 8}};
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        cycles(2000);
+        slave.drive[2].tpdo_drop = 2; /* two are missing, and come after all */
+        cycles(2 * PERIOD);
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        cycles(2000);
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_setup_pdos_are_mapped_in_the_order_every_stack_accepts);
     RUN_TEST(test_setup_drives_that_are_up_already_are_reset_first);
     RUN_TEST(test_setup_object_refused_names_drive_object_and_reason);
+    RUN_TEST(test_setup_all_refused_is_no_lost_bus_and_a_reset_sets_up_again);
+    RUN_TEST(test_loss_all_that_start_again_are_no_lost_bus);
+    RUN_TEST(test_loss_all_silent_is_a_lost_bus_until_one_answers);
     RUN_TEST(test_setup_wrong_identity_is_refused);
+    RUN_TEST(test_setup_object_with_another_value_tells_both);
+    RUN_TEST(test_setup_object_that_can_only_be_read_is_told_as_such);
+    RUN_TEST(test_setup_mapping_that_can_only_be_read_is_told_as_such);
     RUN_TEST(test_setup_wrong_revision_and_serial_number_are_refused);
     RUN_TEST(test_setup_position_limits_are_written_where_wanted);
     RUN_TEST(test_setup_other_profile_is_refused);
@@ -1914,6 +2400,11 @@ int main(void)
     RUN_TEST(test_setup_drive_that_goes_operational_by_itself_is_told_again);
     RUN_TEST(test_setup_optional_objects_missing_is_no_trouble);
     RUN_TEST(test_setup_missing_drive_is_named_and_taken_when_it_comes);
+    RUN_TEST(test_setup_object_that_is_never_answered_is_named_and_not_tried_for_ever);
+    RUN_TEST(test_setup_object_without_answer_is_named_while_it_is_tried_again);
+    RUN_TEST(test_setup_object_that_may_be_missing_may_be_without_answer);
+    RUN_TEST(test_setup_one_question_without_answer_is_asked_again_from_the_beginning);
+    RUN_TEST(test_enable_drive_that_does_not_answer_for_its_mode_is_named);
     RUN_TEST(test_setup_answers_that_come_late_do_not_confuse);
     RUN_TEST(test_setup_refused_drive_is_tried_again_by_a_reset);
     RUN_TEST(test_setup_refusal_that_may_pass_is_asked_again_before_it_counts);
@@ -1991,5 +2482,22 @@ int main(void)
     RUN_TEST(test_any_trouble_at_any_time_moves_nothing);
     RUN_TEST(test_init_contradictions_are_refused);
     RUN_TEST(test_period_is_one_that_the_drives_can_hold);
+    RUN_TEST(test_watch_what_stops_is_a_fault_within_three_periods);
+    RUN_TEST(test_watch_single_answer_stops_nothing);
+    RUN_TEST(test_watch_what_is_told_stops_nothing_and_is_told_for_some_seconds);
+    RUN_TEST(test_watch_what_is_ignored_is_not_told_of);
+    RUN_TEST(test_watch_mode_left_in_motion_is_a_fault);
+    RUN_TEST(test_watch_interpolation_that_ends_is_a_fault);
+    RUN_TEST(test_watch_bits_that_a_drive_does_not_have_are_not_missed);
+    RUN_TEST(test_watch_drive_under_local_control_is_not_enabled);
+    RUN_TEST(test_watch_limit_while_homing_stops_nothing);
+    RUN_TEST(test_emergency_is_reported_with_all_that_it_says);
+    RUN_TEST(test_emergency_is_kept_over_a_loss_and_over_with_a_boot);
+    RUN_TEST(test_emergency_of_a_drive_that_stays_preoperational_is_the_reason);
+    RUN_TEST(test_emergency_that_leaves_operational_is_the_reason);
+    RUN_TEST(test_twice_in_motion_is_a_fault_within_three_periods);
+    RUN_TEST(test_twice_at_the_start_is_refused_before_anybody_is_enabled);
+    RUN_TEST(test_twice_two_boot_ups_at_once_are_refused);
+    RUN_TEST(test_twice_single_repeated_or_late_answers_are_none);
     return UNITY_END();
 }

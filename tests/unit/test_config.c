@@ -6,6 +6,7 @@
 #define _POSIX_C_SOURCE 200809L
 
 #include "config.h"
+#include "config_hash.h"
 #include "config_keys.h"
 #include "config_text.h"
 #include "config_value.h"
@@ -20,8 +21,8 @@
 #include "unity.h"
 
 #define FILE_NAME "test_config.tmp.ini"
-#define TEXT_MAX  40000u
-#define LINES_MAX 900u
+#define TEXT_MAX  131072u
+#define LINES_MAX 1200u
 
 static const char *const k_platforms[] = {"demo-hexapod.ini", "hexapod-400.ini",     "hexapod-435-300.ini",
                                           "tripod.ini",       "tripod-rotation.ini", "can-raw-hexapod.ini"};
@@ -199,6 +200,18 @@ static void set_key(const char *section, const char *key, const char *value)
 {
     const unsigned at = find_key(section, key);
     snprintf(m_line[at], sizeof m_line[0], "%s = %s", key, value);
+}
+
+/* Errors go where those of load_lines() do. */
+static int reload(config_t *running)
+{
+    FILE *file = tmpfile();
+    TEST_ASSERT_NOT_NULL(file);
+    const int errors = config_reload(FILE_NAME, running, file);
+    rewind(file);
+    m_errors[fread(m_errors, 1, sizeof m_errors - 1, file)] = '\0';
+    fclose(file);
+    return errors;
 }
 
 /* "test_config.tmp.ini:12: [roll] min_deg: " */
@@ -845,6 +858,56 @@ static void test_load_gpio_relays_need_lines_that_a_chip_can_be_found_by(void)
     }
 }
 
+static void test_load_healthy_pulse_needs_an_output_of_its_own(void)
+{
+    static const struct {
+        const char *driver, *chip, *line, *relay, *toggle_ms, *relays, *error;
+    } k_cases[] = {
+        {"none", "none", "none", "0", "10", "gpio", ""},
+        {"gpio", "none", "GPIO17", "0", "10", "gpio", ""},
+        {"gpio", "another", "7", "0", "10", "gpio", ""},
+        {"relay", "none", "none", "1", "10", "gpio", ""},
+        {"relay", "none", "none", "1", "100", "modbus", ""},
+        {"gpio", "none", "none", "0", "10", "gpio", "[healthy] line: missing; allowed: the output line of the pulse\n"},
+        {"gpio", "none", "17", "0", "10", "gpio",
+         "[healthy] line: 17 alone is no line; allowed: the name of a line, or its number with chip\n"},
+        {"gpio", "a chip", "9", "0", "10", "gpio",
+         "[healthy] line: line 9 is relay 2 already; allowed: a line of its own, or none\n"},
+        {"gpio", "a chip", "12", "0", "10", "gpio",
+         "[healthy] line: line 12 is [inputs] estop already; allowed: a line of its own\n"},
+        {"gpio", "gpiochip1", "9", "0", "10", "gpio",
+         "[healthy] chip: gpiochip1 is a number that changes; allowed: the chip's label (gpiodetect shows it)\n"},
+        {"gpio", "none", "GPIO17", "1", "10", "gpio", "[healthy] relay: 1 is for driver = relay; allowed here: 0\n"},
+        {"relay", "none", "none", "0", "10", "gpio",
+         "[healthy] relay: 0 is none of the 2 in [relays] lines; allowed: the relay of the pulse\n"},
+        {"relay", "none", "none", "3", "10", "gpio",
+         "[healthy] relay: 3 is none of the 2 in [relays] lines; allowed: the relay of the pulse\n"},
+        {"relay", "none", "none", "2", "10", "gpio",
+         "[healthy] relay: 2 is closed by [relays] safe_mask; allowed: a relay that is not\n"},
+        {"relay", "none", "none", "1", "99", "modbus",
+         "[healthy] toggle_ms: 99 ms is too quick for a coil of a Modbus board; allowed: 100 to 1000 ms\n"},
+    };
+    for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {
+        const bool is_modbus = strcmp(k_cases[i].relays, "modbus") == 0;
+        take_good_file();
+        set_key("relays", "driver", k_cases[i].relays);
+        set_key("relays", "safe_mask", "2");
+        set_key("relays", "chip", "a chip");
+        set_key("relays", "lines", is_modbus ? "7, 8" : "7, 9");
+        set_key("relays-modbus", "host", is_modbus ? "192.168.1.9" : "none");
+        set_key("inputs", "driver", "gpio");
+        set_key("inputs", "chip", "a chip");
+        set_key("inputs", "estop", "12");
+        set_key("healthy", "driver", k_cases[i].driver);
+        set_key("healthy", "chip", k_cases[i].chip);
+        set_key("healthy", "line", k_cases[i].line);
+        set_key("healthy", "relay", k_cases[i].relay);
+        set_key("healthy", "toggle_ms", k_cases[i].toggle_ms);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(k_cases[i].error[0] != '\0', load_lines(), m_errors);
+        expect_contains(k_cases[i].error);
+    }
+}
+
 static void test_load_relay_times_that_contradict_each_other_are_errors(void)
 {
     take_good_file();
@@ -878,7 +941,7 @@ static void test_load_gpio_inputs_need_lines_of_their_own_that_a_chip_can_be_fou
         {"none", "17", "none", "none", "auto",
          "[inputs] estop: 17 alone is no line; allowed: the name of a line, or its number with chip\n"},
         {"none", "none", "none", "none", "auto",
-         "[inputs] estop: driver gpio reads none; allowed: a line for estop, enable or reset\n"},
+         "[inputs] estop: driver gpio reads none; allowed: a line for estop, enable, reset or power\n"},
         {"a chip", "17", "none", "017", "auto",
          "[inputs] reset: line 017 is estop already; allowed: a line of its own, or none\n"},
         {"a chip", "17", "none", "09", "auto",
@@ -900,6 +963,35 @@ static void test_load_gpio_inputs_need_lines_of_their_own_that_a_chip_can_be_fou
         set_key("inputs", "estop", k_cases[i].estop);
         set_key("inputs", "enable", k_cases[i].enable);
         set_key("inputs", "reset", k_cases[i].reset);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(k_cases[i].error[0] != '\0', load_lines(), m_errors);
+        expect_contains(k_cases[i].error);
+    }
+}
+
+static void test_load_inputs_of_channels_and_supply_that_contradict_themselves_are_errors(void)
+{
+    static const struct {
+        const char *estop, *estop2, *power, *engage, *error;
+    } k_cases[] = {
+        {"GPIO1", "GPIO2", "GPIO3", "manual", ""},
+        {"none", "none", "GPIO3", "manual", ""},
+        {"GPIO1", "GPIO2", "none", "auto", ""},
+        {"none", "GPIO2", "none", "manual",
+         "[inputs] estop2: there is no first channel; allowed: none, or a line for estop as well\n"},
+        {"GPIO1", "GPIO1", "none", "manual",
+         "[inputs] estop2: line GPIO1 is estop already; allowed: a line of its own, or none\n"},
+        {"GPIO1", "GPIO2", "GPIO2", "manual",
+         "[inputs] power: line GPIO2 is estop2 already; allowed: a line of its own, or none\n"},
+        {"GPIO1", "none", "GPIO3", "auto",
+         "[inputs] power: engage = auto does not wait for the supply; allowed: none, or engage = manual\n"},
+    };
+    for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {
+        take_good_file();
+        set_key("platform", "engage", k_cases[i].engage);
+        set_key("inputs", "driver", "gpio");
+        set_key("inputs", "estop", k_cases[i].estop);
+        set_key("inputs", "estop2", k_cases[i].estop2);
+        set_key("inputs", "power", k_cases[i].power);
         TEST_ASSERT_EQUAL_INT_MESSAGE(k_cases[i].error[0] != '\0', load_lines(), m_errors);
         expect_contains(k_cases[i].error);
     }
@@ -1080,6 +1172,88 @@ static void test_dump_of_unusual_values_loads_to_the_same(void)
     set_key("inputs", "enable", "0");
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_lines(), m_errors);
     expect_round_trip("unusual values");
+}
+
+/* ---- What a configuration is recognised by ---- */
+
+static void test_hash_is_of_the_values_and_of_nothing_else(void)
+{
+    char first[CONFIG_HASH_MAX];
+    take_good_file();
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    memcpy(first, m_config.hash, sizeof first);
+    TEST_ASSERT_EQUAL_UINT(CONFIG_HASH_MAX - 1u, strspn(first, "0123456789abcdef"));
+    load_platform("demo-hexapod.ini"); /* the same with comments, without what is a default */
+    TEST_ASSERT_EQUAL_STRING(first, m_config.hash);
+    take_good_file();
+    set_key("platform", "cycle_us", "1000 ; the same");
+    set_key("platform", "engage", "manual");
+    set_key("platform", "approved", "0123456789abcdef");
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    TEST_ASSERT_NOT_EQUAL(0, strcmp(first, m_config.hash)); /* engage */
+    TEST_ASSERT_TRUE(config_is_unapproved(&m_config));
+    memcpy(first, m_config.hash, sizeof first);
+    memcpy(m_config.approved.text, first, sizeof first);
+    config_hash(&m_config);
+    TEST_ASSERT_EQUAL_STRING(first, m_config.hash); /* what was approved is no part of it */
+    TEST_ASSERT_FALSE(config_is_unapproved(&m_config));
+}
+
+static void test_hash_changes_with_every_number(void)
+{
+    unsigned numbers = 0;
+    load_platform("demo-hexapod.ini");
+    const config_t good = m_config;
+    for (size_t i = 0; i < config_key_count; i++) {
+        const config_key_t *key = &config_keys[i];
+        const bool is_number = key->type == CONFIG_DECIMAL || key->type == CONFIG_INTEGER || key->type == CONFIG_MASK;
+        if (is_number && config_is_applicable(key->needs, &good)) {
+            m_config = good;
+            ((uint8_t *)&m_config)[key->offset] ^= 1;
+            config_hash(&m_config);
+            TEST_ASSERT_NOT_EQUAL_MESSAGE(0, strcmp(good.hash, m_config.hash), key->name);
+            numbers++;
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(100, numbers);
+}
+
+static void test_load_approved_has_to_be_a_hash_and_somebody_to_wait_for(void)
+{
+    take_good_file();
+    set_key("platform", "approved", "0123456789ABCDEF");
+    TEST_ASSERT_EQUAL_INT(1, load_lines());
+    expect_contains("[platform] approved: 0123456789ABCDEF is no hash; allowed: none, or the 16 digits that --check shows\n");
+    take_good_file();
+    set_key("platform", "approved", "0123456789abcdef");
+    TEST_ASSERT_EQUAL_INT(1, load_lines());
+    expect_contains("[platform] approved: engage = auto waits for nobody to look at it; allowed: none, or engage = manual\n");
+}
+
+static void test_reload_of_another_configuration_than_the_approved_one_is_refused(void)
+{
+    char line[128];
+    take_good_file();
+    set_key("platform", "engage", "manual");
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    snprintf(line, sizeof line, "%s", m_config.hash);
+    set_key("platform", "approved", line);
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    config_t running = m_config;
+    TEST_ASSERT_EQUAL_INT(0, config_reload(FILE_NAME, &running, stderr));
+    set_key("udp", "silence_hold_ms", "777");
+    TEST_ASSERT_EQUAL_INT(0, load_lines()); /* it may be loaded, to be looked at */
+    TEST_ASSERT_EQUAL_INT(1, reload(&running));
+    snprintf(line, sizeof line, " is not this configuration; allowed: %s, once somebody has approved it\n", m_config.hash);
+    expect_contains(line);
+    TEST_ASSERT_TRUE(running.settings.silence_hold_ms != 777);
+    snprintf(line, sizeof line, "%s", m_config.hash);
+    set_key("platform", "approved", line);
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    TEST_ASSERT_EQUAL_INT(0, reload(&running));
+    TEST_ASSERT_EQUAL_UINT32(777, running.settings.silence_hold_ms);
+    TEST_ASSERT_EQUAL_STRING(m_config.hash, running.hash);
+    TEST_ASSERT_FALSE(config_is_unapproved(&running));
 }
 
 static void test_dump_names_every_key_with_unit_range_and_help(void)
@@ -1428,7 +1602,9 @@ int main(void)
     RUN_TEST(test_load_hinges_that_do_not_fit_are_an_error);
     RUN_TEST(test_load_safe_mask_above_the_relays_is_an_error);
     RUN_TEST(test_load_gpio_relays_need_lines_that_a_chip_can_be_found_by);
+    RUN_TEST(test_load_healthy_pulse_needs_an_output_of_its_own);
     RUN_TEST(test_load_gpio_inputs_need_lines_of_their_own_that_a_chip_can_be_found_by);
+    RUN_TEST(test_load_inputs_of_channels_and_supply_that_contradict_themselves_are_errors);
     RUN_TEST(test_load_relay_times_that_contradict_each_other_are_errors);
     RUN_TEST(test_load_input_line_used_twice_is_an_error);
     RUN_TEST(test_load_values_arrive_where_they_belong);
@@ -1439,6 +1615,10 @@ int main(void)
     RUN_TEST(test_dump_of_every_platform_loads_to_the_same);
     RUN_TEST(test_dump_of_unusual_values_loads_to_the_same);
     RUN_TEST(test_dump_names_every_key_with_unit_range_and_help);
+    RUN_TEST(test_hash_is_of_the_values_and_of_nothing_else);
+    RUN_TEST(test_hash_changes_with_every_number);
+    RUN_TEST(test_load_approved_has_to_be_a_hash_and_somebody_to_wait_for);
+    RUN_TEST(test_reload_of_another_configuration_than_the_approved_one_is_refused);
     RUN_TEST(test_write_reference_has_a_row_for_every_key);
     RUN_TEST(test_load_random_bytes_only_give_errors);
     RUN_TEST(test_load_good_files_with_random_damage_give_errors_or_load);

@@ -246,7 +246,8 @@ static const spoilt_t k_spoilt[] = {
     {"fault_when", "fault_when = 1/1", "position_reply has no {status}; allowed: only where it has"},
     {"position_query", "position_query = none", ""}, /* reported at homing_reply, see below */
     {"period_us", "period_us = 4500", "is no multiple of cycle_us; allowed: for instance 4000 or 5000 us"},
-    {"period_us", "period_us = 500", "is no multiple of cycle_us; allowed: for instance 1000 or 2000 us"},
+    {"period_us", "period_us = 500",
+     "is no multiple of cycle_us, and would load the bus by 276 % at worst; allowed: for instance 2000 or 3000 us"},
     {"period_us", "period_us = 1000",
      "the bus would be loaded by 138 % at worst; allowed: at most 90 %, better 60 %, which 3000 us give"},
     {"query_every", "query_every = 8", ""},

@@ -206,6 +206,59 @@ static void test_describe_bus_load_is_that_of_the_frames(void)
     TEST_ASSERT_DOUBLE_WITHIN(2e-5, period_bits / 4000.0, config_bus_load_ppm(&bus) / 1e6);
 }
 
+/* As data sheets and other masters have them. */
+static void test_identity_is_read_in_hexadecimal_too(void)
+{
+    (void)put("[cia402]", "vendor_id = 0xBEEF");
+    (void)put("[cia402]", "product_code = 0XffffffFF");
+    (void)put("[cia402]", "revision_number = 65536");
+    TEST_ASSERT_EQUAL_MESSAGE(0, load(), m_errors);
+    TEST_ASSERT_EQUAL_HEX32(0xBEEF, m_config.cia402.vendor_id);
+    TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFF, m_config.cia402.product_code);
+    TEST_ASSERT_EQUAL_HEX32(0x10000, m_config.cia402.revision_number);
+    static const char *const k_wrong[] = {"vendor_id = 0x", "vendor_id = 0xG", "vendor_id = 0x100000000", "gateway_node = 0x7F"};
+    for (size_t i = 0; i < sizeof k_wrong / sizeof k_wrong[0]; i++) {
+        setUp();
+        (void)put("[cia402]", k_wrong[i]);
+        TEST_ASSERT_EQUAL_MESSAGE(1, load(), k_wrong[i]);
+    }
+}
+
+/* What --check offers instead has to be taken. */
+static void test_period_of_no_use_is_refused_with_ones_that_the_bus_carries(void)
+{
+    (void)put("[cia402]", "period_us = 1900");
+    TEST_ASSERT_EQUAL(1, load());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "is no multiple of cycle_us; allowed: for instance 2000 or 3000 us"), m_errors);
+    (void)put("[cia402]", "period_us = 900");
+    TEST_ASSERT_EQUAL(1, load());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors,
+                                        "is no multiple of cycle_us, and would load the bus by 168 % at worst; allowed: "
+                                        "for instance 2000 or 3000 us"),
+                                 m_errors);
+    (void)put("[cia402]", "period_us = 2000");
+    TEST_ASSERT_EQUAL_MESSAGE(0, load(), m_errors);
+}
+
+static void test_profile_position_needs_a_window_for_its_lag(void)
+{
+    m_config.cia402.mode = CONFIG_MODE_CSP;
+    (void)put("[cia402]", "mode = pp");
+    TEST_ASSERT_EQUAL_MESSAGE(0, load(), m_errors);
+    (void)put("[cylinders]", "accel_mm_s2 = 3000");
+    (void)put("[engage]", "speed_mm_s = 200"); /* 200^2 / 6000 mm, and 32 ms of it */
+    TEST_ASSERT_EQUAL(1, load());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors,
+                                        "[cia402] following_error_mm: less than a drive in mode pp is behind at [engage] "
+                                        "speed_mm_s; allowed: at least 13.067 mm, or slower"),
+                                 m_errors);
+    (void)put("[cia402]", "following_error_mm = 13.1");
+    TEST_ASSERT_EQUAL_MESSAGE(0, load(), m_errors);
+    (void)put("[cia402]", "mode = csp");
+    (void)put("[cia402]", "following_error_mm = 10");
+    TEST_ASSERT_EQUAL_MESSAGE(0, load(), m_errors);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -216,5 +269,8 @@ int main(void)
     RUN_TEST(test_load_bus_too_slow_for_any_period_is_told_to_be_faster);
     RUN_TEST(test_load_section_not_in_use_may_be_anything);
     RUN_TEST(test_describe_bus_load_is_that_of_the_frames);
+    RUN_TEST(test_identity_is_read_in_hexadecimal_too);
+    RUN_TEST(test_period_of_no_use_is_refused_with_ones_that_the_bus_carries);
+    RUN_TEST(test_profile_position_needs_a_window_for_its_lag);
     return UNITY_END();
 }

@@ -24,6 +24,7 @@ void hv_assert_failed(const char *file, int line)
 static config_t m_config;
 static motion_loop_t m_loop;
 static blackbox_t m_blackbox;
+static operator_log_t m_log;
 static control_t m_control;
 static uint64_t m_now_us;
 static char m_folder[64];
@@ -139,7 +140,7 @@ void setUp(void)
     for (unsigned i = 0; i <= NEWCOMER; i++) {
         m_client[i] = -1;
     }
-    TEST_ASSERT_EQUAL(0, control_open(&m_control, m_path, &m_config, &m_loop, &m_blackbox));
+    TEST_ASSERT_EQUAL(0, control_open(&m_control, m_path, &m_config, &m_loop, &m_blackbox, &m_log));
 }
 
 void tearDown(void)
@@ -267,7 +268,7 @@ static void test_who_waits_for_the_motion_thread_gets_its_answer_and_a_newcomer_
     TEST_ASSERT_NOT_NULL(strstr(m_said, IS_GONE));
     TEST_ASSERT_TRUE(has_heard(NEWCOMER, "\"counters\""));
     control_fill(&m_control, fds);
-    TEST_ASSERT_EQUAL(m_control.fd, fds[0].fd);
+    TEST_ASSERT_EQUAL(m_control.socket[0].fd, fds[0].fd);
 }
 
 static void test_who_waits_for_the_disk_gives_way_last(void)
@@ -292,6 +293,200 @@ static void test_who_waits_for_the_disk_gives_way_last(void)
     TEST_ASSERT_FALSE(is_dropped(1));
 }
 
+/* --- Who may ask for what --- */
+
+static char m_look_path[90];
+
+/* With a second socket; client NEWCOMER comes by that. */
+static void open_look_socket(void)
+{
+    control_close(&m_control);
+    (void)snprintf(m_look_path, sizeof m_look_path, "%s/look", m_folder);
+    (void)snprintf(m_config.look_socket, sizeof m_config.look_socket, "%s", m_look_path);
+    TEST_ASSERT_EQUAL(0, control_open(&m_control, m_path, &m_config, &m_loop, &m_blackbox, &m_log));
+}
+
+static void look_in(unsigned i)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    memcpy(address.sun_path, m_look_path, sizeof m_look_path);
+    m_client[i] = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    TEST_ASSERT_EQUAL(0, connect(m_client[i], (const struct sockaddr *)&address, sizeof address));
+}
+
+static void show(state_t state, unsigned percent)
+{
+    static motion_view_words_t view;
+    view.view.snapshot.state = state;
+    view.view.snapshot.intensity_percent = (uint8_t)percent;
+    seqlock_write(&m_loop.view, view.word);
+}
+
+static void expect_refused(unsigned i, const char *request, const char *why)
+{
+    ask(i, request);
+    pass(0);
+    pass(0);
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(i, why), m_said);
+    TEST_ASSERT_TRUE_MESSAGE(ring_is_empty(&m_loop.requests), request);
+}
+
+static void expect_taken(unsigned i, const char *request)
+{
+    ask(i, request);
+    pass(0);
+    pass(0);
+    motion_answers();
+    pass(0);
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(i, "{\"ok\":true"), request);
+}
+
+static void test_the_look_socket_is_for_everybody_and_takes_a_hold_but_nothing_else(void)
+{
+    static const char *const k_refused[] = {"engage\n",   "resume\n", "park\n",        "reset\n",
+                                            "shutdown\n", "dump\n",   "intensity 0\n", "intensity x\n"};
+    struct stat found;
+    open_look_socket();
+    TEST_ASSERT_EQUAL(0, stat(m_look_path, &found));
+    TEST_ASSERT_EQUAL_HEX(0666, found.st_mode & 0777);
+    look_in(NEWCOMER);
+    pass(0);
+    for (unsigned i = 0; i < sizeof k_refused / sizeof k_refused[0]; i++) {
+        expect_refused(NEWCOMER, k_refused[i], "not allowed; it takes the level ");
+    }
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_said, "and not this socket"), m_said);
+    expect_taken(NEWCOMER, "hold\n");
+    ask(NEWCOMER, "status\n");
+    pass(0);
+    TEST_ASSERT_TRUE(has_heard(NEWCOMER, "\"counters\""));
+    control_close(&m_control);
+    TEST_ASSERT_NOT_EQUAL(0, stat(m_look_path, &found));
+}
+
+static void test_levels_of_clients_decide_and_hold_is_for_all(void)
+{
+    (void)snprintf(m_config.service_group.text, sizeof m_config.service_group.text, "mechanics");
+    come(0);
+    pass(0);
+    m_control.levels.has_service_group = true;
+    show(STATE_ENGAGED, 50);
+    m_control.client[0].peer.level = LEVEL_OPERATE;
+    expect_refused(0, "intensity 51\n",
+                   "intensity 51: not allowed; it takes the level service (members of group mechanics)\",\"state\":\"ENGAGED\"");
+    expect_refused(0, "reset\n", "reset: not allowed; it takes the level service");
+    expect_refused(0, "shutdown\n", "not allowed");
+    expect_refused(0, "dump\n", "not allowed");
+    expect_taken(0, "intensity 50\n");
+    expect_taken(0, "park\n");
+    m_control.client[0].peer.level = LEVEL_LOOK;
+    expect_refused(0, "park\n", "park: not allowed; it takes the level operate");
+    expect_taken(0, "hold\n");
+    m_control.client[0].peer.level = LEVEL_SERVICE;
+    expect_taken(0, "intensity 51\n");
+    expect_taken(0, "shutdown\n");
+}
+
+static void test_without_groups_whoever_connects_may_do_all(void)
+{
+    come(0);
+    pass(0);
+    TEST_ASSERT_EQUAL(LEVEL_SERVICE, m_control.client[0].peer.level);
+    TEST_ASSERT_EQUAL(getpid(), m_control.client[0].peer.pid);
+    TEST_ASSERT_EQUAL(getuid(), m_control.client[0].peer.uid);
+}
+
+static void test_lookers_have_a_few_places_and_never_those_of_others(void)
+{
+    open_look_socket();
+    for (unsigned i = 0; i < CONTROL_LOOKERS; i++) {
+        look_in(i);
+        pass(0);
+    }
+    for (unsigned i = CONTROL_LOOKERS; i < CONTROL_CLIENTS; i++) {
+        come(i);
+        pass(0);
+    }
+    pass(CONTROL_IDLE_US);
+    for (unsigned i = CONTROL_LOOKERS; i < CONTROL_CLIENTS; i++) {
+        ask(i, "watch 1\n"); /* they would be the first to go */
+        pass(0);
+    }
+    look_in(NEWCOMER);
+    ask(NEWCOMER, "hold\n");
+    pass(LATE);
+    pass(0);
+    motion_answers();
+    pass(0);
+    TEST_ASSERT_TRUE(has_heard(NEWCOMER, "{\"ok\":true"));
+    TEST_ASSERT_LESS_THAN_UINT(CONTROL_LOOKERS, who_gave_way());
+}
+
+/* --- What is written down --- */
+
+static bool takes_entry(operator_entry_t *entry)
+{
+    return ring_pop(&m_log.ring, entry, sizeof *entry) > 0;
+}
+
+static void keep_a_log(void)
+{
+    memset(&m_log, 0, sizeof m_log);
+    ring_init(&m_log.ring, m_log.ring_bytes, sizeof m_log.ring_bytes);
+    (void)snprintf(m_log.path, sizeof m_log.path, "nobody writes it");
+}
+
+static void test_log_has_who_what_and_what_became_of_it(void)
+{
+    operator_entry_t entry;
+    keep_a_log();
+    show(STATE_SETTLED, 100);
+    come(0);
+    pass(0);
+    ask(0, "status\n");
+    pass(0);
+    ask(0, "nonsense\n");
+    pass(0);
+    TEST_ASSERT_FALSE(takes_entry(&entry));
+    expect_taken(0, "engage\n");
+    TEST_ASSERT_TRUE(takes_entry(&entry));
+    TEST_ASSERT_EQUAL_STRING("engage", entry.request);
+    TEST_ASSERT_EQUAL_STRING("", entry.answer);
+    TEST_ASSERT_EQUAL_STRING("", entry.by);
+    TEST_ASSERT_EQUAL_UINT32(getuid(), entry.uid);
+    TEST_ASSERT_EQUAL_UINT32(getgid(), entry.gid);
+    TEST_ASSERT_EQUAL_INT32(getpid(), entry.pid);
+    TEST_ASSERT_EQUAL(STATE_SETTLED, entry.before);
+    TEST_ASSERT_EQUAL(STATE_OFF, entry.after); /* as the motion thread has it in this test */
+    TEST_ASSERT_INT64_WITHIN(60, time(NULL), entry.at.tv_sec);
+    ask(0, "by anna\n");
+    pass(0);
+    TEST_ASSERT_TRUE(has_heard(0, "{\"ok\":true"));
+    m_control.client[0].peer.level = LEVEL_LOOK;
+    expect_refused(0, "park\n", "not allowed");
+    TEST_ASSERT_TRUE(takes_entry(&entry));
+    TEST_ASSERT_EQUAL_STRING("anna", entry.by);
+    TEST_ASSERT_EQUAL_STRING_LEN("park: not allowed", entry.answer, 17);
+    TEST_ASSERT_EQUAL(STATE_SETTLED, entry.after);
+    ask(0, "by \nby 01234567890123456789012345678901\n");
+    pass(0);
+    TEST_ASSERT_TRUE(has_heard(0, "by: a name of 1 to 31 bytes is needed"));
+}
+
+static void test_log_has_requests_whose_client_has_gone(void)
+{
+    operator_entry_t entry;
+    keep_a_log();
+    come(0);
+    ask(0, "hold\n");
+    pass(0);
+    pass(0);
+    TEST_ASSERT_FALSE(takes_entry(&entry));
+    control_close(&m_control);
+    TEST_ASSERT_TRUE(takes_entry(&entry));
+    TEST_ASSERT_EQUAL_STRING("hold", entry.request);
+    TEST_ASSERT_EQUAL_STRING("the client has gone before it was answered", entry.answer);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -304,5 +499,11 @@ int main(void)
     RUN_TEST(test_nobody_gives_way_where_somebody_has_gone_since_the_poll);
     RUN_TEST(test_who_waits_for_the_motion_thread_gets_its_answer_and_a_newcomer_waits_outside);
     RUN_TEST(test_who_waits_for_the_disk_gives_way_last);
+    RUN_TEST(test_the_look_socket_is_for_everybody_and_takes_a_hold_but_nothing_else);
+    RUN_TEST(test_levels_of_clients_decide_and_hold_is_for_all);
+    RUN_TEST(test_without_groups_whoever_connects_may_do_all);
+    RUN_TEST(test_lookers_have_a_few_places_and_never_those_of_others);
+    RUN_TEST(test_log_has_who_what_and_what_became_of_it);
+    RUN_TEST(test_log_has_requests_whose_client_has_gone);
     return UNITY_END();
 }

@@ -1539,6 +1539,79 @@ static void test_fault_worse_one_later_escalates_and_the_first_is_kept(void)
     TEST_ASSERT_TRUE(seen()->fault_last_us[FAULT_BUS] > seen()->fault.at_us);
 }
 
+/* The e-stop of one channel has stopped all already; that they disagree is told beside it, and holds a reset back. */
+static void test_channels_apart_are_a_fault_in_estop_that_holds_back_a_reset(void)
+{
+    engage();
+    start_moving(200);
+    m_rig.inputs.levels = INPUT_ESTOP;
+    rig_run_ms(&m_rig, 300);
+    TEST_ASSERT_EQUAL(FAULT_NONE, seen()->fault.code);
+    m_rig.inputs.levels = INPUT_ESTOP | INPUT_APART;
+    rig_run_ms(&m_rig, 1);
+    m_is_fault_expected = true;
+    TEST_ASSERT_EQUAL(STATE_ESTOP, seen()->state);
+    TEST_ASSERT_EQUAL(FAULT_ESTOP_CHANNELS, seen()->fault.code);
+    TEST_ASSERT_EQUAL_HEX32(1u << FAULT_ESTOP_CHANNELS, seen()->begun[0]);
+    rig_run_ms(&m_rig, 1000);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->faults);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_RESET));
+    m_rig.inputs.levels = 0;
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(FAULT_ESTOP_CHANNELS, seen()->fault.code); /* latched */
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 100);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    TEST_ASSERT_EQUAL(FAULT_NONE, seen()->fault.code);
+    m_rig.inputs.levels = INPUT_ESTOP | INPUT_APART; /* the next one is another one */
+    rig_run_ms(&m_rig, 2);
+    TEST_ASSERT_EQUAL_UINT32(2, counted()->faults);
+}
+
+static void test_power_that_fails_stops_what_is_not_settled_in_time(void)
+{
+    m_settings.power_settle_ms = 900; /* before the silence of the sender does anything */
+    for (unsigned ms = 1; ms < 400; ms += 57) {
+        engage();
+        start_moving(ms);
+        m_rig.inputs.levels = INPUT_POWER;
+        rig_run_ms(&m_rig, 900);
+        TEST_ASSERT_NOT_EQUAL(STATE_FAULT, seen()->state);
+        TEST_ASSERT_TRUE(seen()->is_power_failing);
+        rig_run_ms(&m_rig, 2);
+        expect_fault(FAULT_POWER, 0, 0);
+        TEST_ASSERT_EQUAL(FAULT_REACT_STOP, seen()->reaction);
+        rig_run_ms(&m_rig, 3000);
+        for (unsigned i = 0; i < 7; i++) {
+            TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[i].state);
+        }
+        TEST_ASSERT_EQUAL_UINT32(1, counted()->fault[FAULT_POWER]);
+    }
+}
+
+static void test_power_that_fails_leaves_who_is_down_in_peace(void)
+{
+    m_settings.power_settle_ms = 100;
+    m_settings.engage = ENGAGE_MANUAL;
+    start(true);
+    rig_run_ms(&m_rig, 10);
+    m_rig.inputs.levels = INPUT_POWER;
+    rig_run_ms(&m_rig, 10000);
+    TEST_ASSERT_EQUAL(STATE_SETTLED, seen()->state);
+    m_rig.inputs.levels = 0;
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_FALSE(seen()->is_power_failing);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+    rig_run_ms(&m_rig, 500);
+    for (unsigned i = 0; i < 5; i++) { /* short failures do not add up */
+        m_rig.inputs.levels = INPUT_POWER;
+        rig_run_ms(&m_rig, 90);
+        m_rig.inputs.levels = 0;
+        rig_run_ms(&m_rig, 1);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, counted()->faults);
+}
+
 /* Every code has its words in both languages, and a reaction. */
 static void test_fault_tables_are_complete(void)
 {
@@ -1853,6 +1926,18 @@ static void test_telemetry_reports_of_drives_are_logged_once_with_what_they_name
     m_reports = (drive_report_t){.address = 12, .phase = "ready", .trouble = "", .detail = ""};
     rig_run_ms(&m_rig, 5);
     TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, node 12, ready"));
+    m_reports = (drive_report_t){.address = 12,
+                                 .phase = "refused",
+                                 .trouble = "not taken",
+                                 .code = 0x33,
+                                 .object = 0x60C201,
+                                 .detail = "it holds another value",
+                                 .has_found = true,
+                                 .found = 10,
+                                 .wanted = 4};
+    rig_run_ms(&m_rig, 5);
+    TEST_ASSERT_TRUE(rig_was_logged(
+        &m_rig, "axis 2, node 12, refused: not taken (0x0033), object 60C2:01: it holds another value, found 0xA, wanted 0x4"));
     m_reports = (drive_report_t){.is_modbus = true,
                                  .address = 3,
                                  .phase = "missing",
@@ -1862,6 +1947,95 @@ static void test_telemetry_reports_of_drives_are_logged_once_with_what_they_name
                                  .detail = ""};
     rig_run_ms(&m_rig, 5);
     TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, unit 3, missing: no answer (0x0032), register 0x0102"));
+}
+
+/* The drive is back, or off again: what it was stays until the reset. */
+static void test_fault_keeps_what_its_drive_said(void)
+{
+    engage();
+    make_talkative();
+    m_reports = (drive_report_t){.address = 12,
+                                 .phase = "lost",
+                                 .trouble = "started again",
+                                 .detail = "under-voltage",
+                                 .code = 0x10005,
+                                 .object = 0x606000,
+                                 .detail_code = 0x3220};
+    rig_break(&m_rig, SIM_DRIVES_OFFLINE, 1, 0);
+    rig_run_ms(&m_rig, 20);
+    TEST_ASSERT_TRUE(seen()->fault.axis == 2 && seen()->fault.device_code != 0);
+    m_reports = (drive_report_t){.address = 12, .phase = "ready", .trouble = "", .detail = ""};
+    rig_break(&m_rig, SIM_DRIVES_RECOVER, 1, 0);
+    rig_run_ms(&m_rig, 500);
+    TEST_ASSERT_EQUAL(STATE_FAULT, seen()->state);
+    TEST_ASSERT_EQUAL_STRING("started again", seen()->fault_report.trouble);
+    TEST_ASSERT_EQUAL_STRING("under-voltage", seen()->fault_report.detail);
+    TEST_ASSERT_EQUAL_HEX32(0x606000, seen()->fault_report.object);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+    rig_run_ms(&m_rig, 500);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    TEST_ASSERT_EQUAL_STRING("", seen()->fault_report.trouble);
+    m_is_fault_expected = true;
+}
+
+/* A drive that boots for ever. */
+static void test_telemetry_reports_that_come_and_go_are_told_of_less_often(void)
+{
+    const drive_report_t bad = {.address = 12, .phase = "missing", .trouble = "no answer", .detail = "", .code = 0x31};
+    const drive_report_t good = {.address = 12, .phase = "ready", .trouble = "", .detail = ""};
+    unsigned lines = 0;
+    engage();
+    make_talkative();
+    for (unsigned i = 0; i < 200; i++) {
+        m_reports = i % 2 == 0 ? bad : good;
+        rig_run_ms(&m_rig, 100);
+        lines += rig_was_logged(&m_rig, "axis 2, node 12, ");
+    }
+    TEST_ASSERT_TRUE(lines >= 5 && lines <= 7);
+    m_reports = bad;
+    rig_run_ms(&m_rig, 10500);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, node 12, missing: no answer (0x0031); "));
+    rig_run_ms(&m_rig, 60000);
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "axis 2"));
+}
+
+static void test_telemetry_notes_of_drives_are_logged_when_they_change(void)
+{
+    engage();
+    make_talkative();
+    m_reports = (drive_report_t){.address = 12, .phase = "enabled", .trouble = "", .detail = "", .notes = 0x30};
+    rig_run_ms(&m_rig, 5);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, node 12: is at a limit of its own; warns"));
+    TEST_ASSERT_EQUAL_HEX32(0x30, seen()->report[1].notes);
+    rig_run_ms(&m_rig, 5);
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "axis 2"));
+    m_reports.notes = 0;
+    rig_run_ms(&m_rig, 5);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "axis 2, node 12: nothing to tell of any more"));
+    TEST_ASSERT_EQUAL_STRING("", drive_note_text(DRIVE_NOTES));
+}
+
+static void test_telemetry_errors_of_drives_are_logged_once_a_second(void)
+{
+    engage();
+    make_talkative();
+    m_reports =
+        (drive_report_t){.address = 12,
+                         .phase = "enabled",
+                         .trouble = "",
+                         .detail = "",
+                         .error = "too hot",
+                         .emergency = {.at_us = 1, .count = 1, .code = 0x4310, .error_register = 9, .maker = {0xAB, 0, 0, 0, 1}}};
+    rig_run_ms(&m_rig, 5);
+    TEST_ASSERT_TRUE(
+        rig_was_logged(&m_rig, "axis 2, node 12: error 0x4310, too hot; register 0x09, manufacturer AB 00 00 00 01"));
+    m_reports.emergency.count = 201;
+    rig_run_ms(&m_rig, 500);
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "axis 2"));
+    rig_run_ms(&m_rig, 600);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "manufacturer AB 00 00 00 01; the last of 200"));
+    rig_run_ms(&m_rig, 2000);
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "axis 2"));
 }
 
 static void test_intensity_is_taken_within_its_range_and_told(void)
@@ -2246,6 +2420,9 @@ static void run_supervision(void)
     RUN_TEST(test_fault_told_that_is_there_counts_once);
     RUN_TEST(test_fault_told_in_off_is_none);
     RUN_TEST(test_fault_worse_one_later_escalates_and_the_first_is_kept);
+    RUN_TEST(test_channels_apart_are_a_fault_in_estop_that_holds_back_a_reset);
+    RUN_TEST(test_power_that_fails_stops_what_is_not_settled_in_time);
+    RUN_TEST(test_power_that_fails_leaves_who_is_down_in_peace);
     RUN_TEST(test_fault_tables_are_complete);
     RUN_TEST(test_fault_bus_gone_is_a_fault_that_can_be_reset);
     RUN_TEST(test_fault_bus_failing_is_a_controlled_stop);
@@ -2262,6 +2439,10 @@ static void run_supervision(void)
     RUN_TEST(test_telemetry_actual_speed_is_that_of_the_plate);
     RUN_TEST(test_telemetry_actual_pose_follows_the_feedback);
     RUN_TEST(test_telemetry_reports_of_drives_are_logged_once_with_what_they_name);
+    RUN_TEST(test_fault_keeps_what_its_drive_said);
+    RUN_TEST(test_telemetry_reports_that_come_and_go_are_told_of_less_often);
+    RUN_TEST(test_telemetry_notes_of_drives_are_logged_when_they_change);
+    RUN_TEST(test_telemetry_errors_of_drives_are_logged_once_a_second);
     RUN_TEST(test_intensity_is_taken_within_its_range_and_told);
     RUN_TEST(test_shutdown_on_a_bus_that_takes_nothing_ends_all_the_same);
     RUN_TEST(test_shutdown_from_settled_waits_until_the_bus_has_taken_it);

@@ -11,6 +11,9 @@
 #define CYCLE_US 1000u
 #define SETTLE   (SWITCHES_SETTLE_US / CYCLE_US)
 #define ALL      (INPUT_ESTOP | INPUT_ENABLE | INPUT_RESET)
+#define BOTH     (INPUT_ESTOP | INPUT_ESTOP2)
+#define APART    (INPUT_ESTOP | INPUT_APART)
+#define APART_MS 300u
 
 static sim_inputs_t m_inputs;
 static switches_t m_switches;
@@ -20,7 +23,7 @@ static void start(uint32_t levels)
 {
     sim_inputs_init(&m_inputs, ALL);
     m_inputs.levels = levels;
-    switches_init(&m_switches, sim_inputs_hal(&m_inputs));
+    switches_init(&m_switches, sim_inputs_hal(&m_inputs), 0);
     m_now_us = 0;
 }
 
@@ -172,6 +175,100 @@ static void test_key_is_off_where_there_is_one(void)
     TEST_ASSERT_FALSE(switches_is_key_off(&m_switches));
 }
 
+/* ---- Two channels ---- */
+
+static void start_two(void)
+{
+    sim_inputs_init(&m_inputs, ALL | INPUT_ESTOP2 | INPUT_POWER);
+    switches_init(&m_switches, sim_inputs_hal(&m_inputs), APART_MS * 1000);
+    m_now_us = 0;
+    step_quiet(0, 2 * APART_MS, 0);
+}
+
+static void test_channels_either_one_is_an_estop_and_both_have_to_be_released(void)
+{
+    start_two();
+    for (uint32_t first = INPUT_ESTOP; first <= INPUT_ESTOP2; first *= INPUT_ESTOP2) {
+        step_quiet(first, 1, INPUT_ESTOP);
+        step_quiet(first, APART_MS - 10, INPUT_ESTOP);
+        step_quiet(BOTH, 1000, INPUT_ESTOP);
+        step_quiet(first, SETTLE + 100, INPUT_ESTOP); /* the other one is released first */
+        step_quiet(0, SETTLE, INPUT_ESTOP);
+        step_quiet(0, 1000, 0);
+    }
+}
+
+static void test_channels_that_disagree_too_long_are_apart_until_both_have_opened_and_closed(void)
+{
+    for (uint32_t stuck = INPUT_ESTOP; stuck <= INPUT_ESTOP2; stuck *= INPUT_ESTOP2) {
+        const uint32_t moves = BOTH & ~stuck;
+        start_two();
+        step_quiet(moves, APART_MS - 1, INPUT_ESTOP);
+        step_quiet(moves, 1000, APART);
+        step_quiet(0, 2000, APART); /* released: what is welded looks well now */
+        step_quiet(moves, 1000, APART);
+        step_quiet(stuck, 1000, APART);
+        step_quiet(BOTH, 100, APART);
+        step_quiet(0, SETTLE, APART);
+        step_quiet(0, 1000, 0);
+        step_quiet(moves, APART_MS - 1, INPUT_ESTOP); /* and from the beginning */
+        step_quiet(moves, 1, APART);
+    }
+}
+
+static void test_channels_one_that_does_not_close_again_is_apart(void)
+{
+    start_two();
+    step_quiet(BOTH, 100, INPUT_ESTOP);
+    step_quiet(INPUT_ESTOP2, SETTLE + APART_MS - 1, INPUT_ESTOP);
+    step_quiet(INPUT_ESTOP2, 100, INPUT_ESTOP | INPUT_APART);
+    step_quiet(0, 1000, APART); /* its wire is mended, and nobody has pressed it yet */
+    step_quiet(BOTH, 1, APART);
+    step_quiet(0, SETTLE, APART);
+    step_quiet(0, 1, 0);
+}
+
+static void test_channels_that_bounce_agree(void)
+{
+    start_two();
+    for (unsigned i = 0; i < 2000; i++) {
+        (void)step(i % 3 == 0 ? INPUT_ESTOP : i % 3 == 1 ? INPUT_ESTOP2 : 0);
+        TEST_ASSERT_EQUAL_HEX32(INPUT_ESTOP, levels());
+    }
+}
+
+static void test_channels_that_cannot_be_read_do_not_disagree(void)
+{
+    start_two();
+    m_inputs.is_broken = true;
+    for (unsigned i = 0; i < 3 * APART_MS; i++) {
+        (void)step(INPUT_ESTOP);
+    }
+    m_inputs.is_broken = false;
+    step_quiet(BOTH, 10, INPUT_ESTOP);
+    step_quiet(0, SETTLE, INPUT_ESTOP);
+    step_quiet(0, 1, 0);
+}
+
+static void test_channels_one_alone_is_never_apart(void)
+{
+    step_quiet(0, 1, 0);
+    step_quiet(INPUT_ESTOP, 100000, INPUT_ESTOP);
+}
+
+static void test_power_is_told_of_once_when_it_has_stood_still(void)
+{
+    start_two();
+    TEST_ASSERT_FALSE(switches_is_power_failing(&m_switches));
+    step_quiet(INPUT_POWER, SETTLE, 0);
+    TEST_ASSERT_EQUAL_HEX32(INPUT_POWER, step(INPUT_POWER).on);
+    TEST_ASSERT_TRUE(switches_is_power_failing(&m_switches));
+    step_quiet(INPUT_POWER, 1000, INPUT_POWER);
+    step_quiet(0, SETTLE, INPUT_POWER);
+    TEST_ASSERT_EQUAL_HEX32(INPUT_POWER, step(0).off);
+    TEST_ASSERT_FALSE(switches_is_power_failing(&m_switches));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -184,5 +281,12 @@ int main(void)
     RUN_TEST(test_a_button_pressed_unseen_counts_after_its_time_only);
     RUN_TEST(test_broken_from_the_start_is_an_estop_until_it_is_released);
     RUN_TEST(test_key_is_off_where_there_is_one);
+    RUN_TEST(test_channels_either_one_is_an_estop_and_both_have_to_be_released);
+    RUN_TEST(test_channels_that_disagree_too_long_are_apart_until_both_have_opened_and_closed);
+    RUN_TEST(test_channels_one_that_does_not_close_again_is_apart);
+    RUN_TEST(test_channels_that_bounce_agree);
+    RUN_TEST(test_channels_that_cannot_be_read_do_not_disagree);
+    RUN_TEST(test_channels_one_alone_is_never_apart);
+    RUN_TEST(test_power_is_told_of_once_when_it_has_stood_still);
     return UNITY_END();
 }

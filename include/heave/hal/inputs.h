@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * inputs.h - contract of the operator's switches: e-stop monitor, enable key, reset button.
+ * inputs.h - contract of the operator's switches: e-stop monitor, enable key, reset button, failing supply.
  * One thread calls the ops. Polarity is the backend's business: a set bit always means "active". Not a safety function: the
  * e-stop chain cuts the drives' power itself, this only tells the program.
  */
@@ -12,7 +12,10 @@
 enum {
     INPUT_ESTOP = 1u,  /**< e-stop active: its normally closed contact is open, or its wire is broken */
     INPUT_ENABLE = 2u, /**< enable key turned on */
-    INPUT_RESET = 4u   /**< reset button pressed */
+    INPUT_RESET = 4u,  /**< reset button pressed */
+    INPUT_ESTOP2 = 8u, /**< second channel of the e-stop, as the first */
+    INPUT_POWER = 16u, /**< the supply is failing: the contact of a UPS is open, or its wire is broken */
+    INPUT_APART = 32u  /**< of no line: the channels of the e-stop have disagreed for too long (see switches.h) */
 };
 
 /** Every op is mandatory. */
@@ -39,7 +42,8 @@ static inline uint32_t hal_inputs_present(hal_inputs_t inputs)
     return inputs.ops->present(inputs.ctx);
 }
 
-/** Levels as they are now, not debounced; an e-stop that was active since the last read is active once. <= 100 us.
+/** Levels as they are now, not debounced; an e-stop that was active since the last read is active once, each channel by itself.
+ * <= 100 us.
  *  @param levels out: INPUT_ESTOP | ...; the bit of an absent input is 0; unchanged on error
  *  @return HV_OK; HV_ERR_IO: the levels are not known (line gone, or the last reading is stale): treat it as an active
  *          e-stop. */

@@ -139,8 +139,8 @@ static void open_all(const table_t *table)
     sim_inputs_init(&sim_inputs, INPUT_ESTOP);
     sim_log_init(&sim_log);
     require(sim_drives_init(&sim_drives, (uint8_t)table->axes, table->axis, NULL, 0) == HV_OK, "the drives are refused");
-    const gateway_io_t io = {player_udp(&player), sim_drives_hal(&sim_drives), sim_relays_hal(&sim_relays),
-                             sim_inputs_hal(&sim_inputs), sim_log_hal(&sim_log)};
+    const gateway_io_t io = {player_udp(&player),         sim_drives_hal(&sim_drives), sim_relays_hal(&sim_relays),
+                             sim_inputs_hal(&sim_inputs), sim_log_hal(&sim_log),       {NULL, NULL}};
     player.line = line;
     player.lines = table->lines;
     player.drives = &sim_drives;
@@ -153,7 +153,7 @@ static void open_all(const table_t *table)
 /* The tables and handles of hal/template are such that its program would start. */
 static void check_template(void)
 {
-    const gateway_io_t io = {port_udp(), cia402_hal(&template_drives), port_relays(), port_inputs(), port_log()};
+    const gateway_io_t io = {port_udp(), cia402_hal(&template_drives), port_relays(), port_inputs(), port_log(), {NULL, NULL}};
     require(cia402_init(&template_drives, &k_platform_drives, port_can()) == HV_OK, "the drives of hal/template are refused");
     require(gateway_init(&template_gateway, &k_platform, &io) == HV_OK, "the platform of hal/template is refused");
     for (uint64_t now_us = 1000; now_us < 20000; now_us += 1000) {

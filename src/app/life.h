@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: MIT
+ * life.h - what the axes of a machine have done over its life: kept in two files that are written in turn, each as a whole, with
+ * a checksum, so that one of them is right whenever the power goes. A thread of its own writes them; the service thread hands
+ * over and never waits. Nothing is allocated after the open.
+ */
+#ifndef HEAVE_APP_LIFE_H
+#define HEAVE_APP_LIFE_H
+
+#include <pthread.h>
+
+#include "config.h"
+#include "heave/telemetry.h"
+#include "ring.h"
+
+#define LIFE_NAME       "life"    /* in the state directory, where no file is configured */
+#define LIFE_PERIOD_US  60000000u /* between two writes: so much is lost at most when the power goes */
+#define LIFE_RING_BYTES 8192u
+
+/** One axis, over its life. */
+typedef struct {
+    uint64_t energized_ms;
+    uint64_t travel_milli; /**< um, or thousandths of a degree */
+    uint64_t turns;
+} life_axis_t;
+
+/** What is in a file. */
+typedef struct {
+    uint64_t sequence; /**< of the write */
+    uint64_t rides;    /**< times that it was engaged */
+    uint64_t faults;
+    uint32_t axes;
+    life_axis_t axis[DRIVES_MAX];
+} life_totals_t;
+
+/** The counters; private but for now. */
+typedef struct {
+    char path[CONFIG_PATH_MAX]; /**< "" = they are not kept; the second file is PATH.2 */
+    life_totals_t before;       /**< when heaved started */
+    life_totals_t now;
+    state_t state; /**< of the last look */
+    uint64_t next_us;
+    ring_t ring;       /**< life_totals_t to the writer */
+    int32_t error;     /**< atomic: errno of the newest write, 0 = it worked */
+    int32_t told;      /**< error that life_trouble() has told of */
+    uint32_t is_quit;  /**< atomic */
+    uint32_t is_ended; /**< atomic */
+    bool is_running;
+    pthread_t thread;
+    uint8_t ring_bytes[LIFE_RING_BYTES];
+} life_t;
+
+/** Reads what there is; without a path, configured or given by a service manager, nothing is kept.
+ *  @param axes of this platform
+ *  @return EXIT_DONE; EXIT_BAD_DATA: there are files, and none of them is right, or they are another machine's; EXIT_NO_OUTPUT:
+ * they cannot be written. Both are said */
+int life_open(life_t *self, const config_t *config, uint32_t axes);
+
+/** Starts the writer; does nothing where nothing is kept. */
+bool life_start(life_t *self);
+
+/** Takes a view in, and hands over where it is time to. The service thread, often. */
+void life_serve(life_t *self, const snapshot_t *snapshot, uint64_t now_us);
+
+/** Whether writing has begun to fail, or works again, since the last call.
+ *  @param error out: errno; 0 = it works again */
+bool life_trouble(life_t *self, int *error);
+
+/** Writes what has been handed over. What its thread does all the time; tests do it by themselves. */
+void life_step(life_t *self);
+
+/** Hands the last totals over, writes them and ends the thread, or leaves it alone where the disk takes longer than a second.
+ *  @return false: it still runs, and self has to stay */
+bool life_close(life_t *self);
+
+#endif
