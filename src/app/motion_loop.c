@@ -19,6 +19,7 @@
 #define PAGE_BYTES         4096u
 #define REQUESTS_PER_CYCLE 4u
 #define QUIT_MOST_US       100000u /* for drives to take their last word; a brake and a ramp may take longer */
+#define KERNEL_ASKED_US    100000u
 
 hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_udp_t udp, hal_log_t log, hal_clock_t clock)
 {
@@ -198,12 +199,19 @@ static void note_bus(motion_view_t *view, rig_t *rig)
     }
 }
 
+/* The kernel is asked for its counts ten times a second, not in each cycle: each question is a system call. */
+static bool is_kernel_asked(const motion_loop_t *self, uint64_t phase_us)
+{
+    return (self->session.now_us + phase_us) % KERNEL_ASKED_US < self->session.cycle_us;
+}
+
 /* Page faults of this thread, once it is known whether there should be any. */
 static void note_page_faults(motion_loop_t *self, motion_view_t *view)
 {
     struct rusage used;
     const uint32_t memory = __atomic_load_n(&self->memory, __ATOMIC_ACQUIRE);
-    if (memory == MOTION_MEMORY_UNKNOWN || getrusage(RUSAGE_THREAD, &used) != 0) {
+    const bool is_due = !self->has_first_faults || is_kernel_asked(self, 0);
+    if (memory == MOTION_MEMORY_UNKNOWN || !is_due || getrusage(RUSAGE_THREAD, &used) != 0) {
         return;
     }
     const uint32_t faults = (uint32_t)used.ru_minflt + (uint32_t)used.ru_majflt;
@@ -220,7 +228,9 @@ static void publish(motion_loop_t *self)
     motion_view_t *view = &self->current.view;
     view->snapshot = *gateway_snapshot(&self->session.gateway);
     view->udp_refused = self->tap.refused;
-    (void)!hal_udp_dropped(self->tap.behind, &view->udp_dropped);
+    if (is_kernel_asked(self, KERNEL_ASKED_US / 2)) {
+        (void)!hal_udp_dropped(self->tap.behind, &view->udp_dropped);
+    }
     note_bus(view, &self->rig);
     note_page_faults(self, view);
     seqlock_write(&self->view, self->current.word);

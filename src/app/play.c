@@ -30,6 +30,7 @@ typedef struct {
     rig_t rig;
     frames_t frames;
     out_file_t out;
+    bool is_tracing;
     note_t note[NOTES];
     uint32_t notes; /**< seen, kept or not */
     uint32_t refused_requests;
@@ -83,7 +84,9 @@ static gateway_io_t io_of(play_t *self)
 static void write_row(play_t *self)
 {
     char line[TRACE_LINE_MAX];
-    out_file_write(&self->out, line, trace_format(&self->player.row, line));
+    if (self->is_tracing) {
+        out_file_write(&self->out, line, trace_format(&self->player.row, line));
+    }
     self->rows++;
 }
 
@@ -225,6 +228,7 @@ static int open_all(play_t *self, const config_t *config, const char *trace_path
     if (!out_file_open(&self->out, trace_path != NULL ? trace_path : "/dev/null", OUT_FILE_WAITS)) {
         return say(EXIT_NO_OUTPUT, "%s: %s", trace_path, strerror(self->out.error));
     }
+    self->is_tracing = trace_path != NULL;
     char header[TRACE_LINE_MAX];
     out_file_write(&self->out, header, trace_header(header));
     return EXIT_DONE;
