@@ -2,6 +2,8 @@
  * check.c - what the values of a configuration mean together: missing keys, keys that mean nothing here, pairs of limits
  * that contradict each other. Each error is reported at the key it concerns.
  */
+#include "config/check.h"
+
 #include <string.h>
 
 #include "config/bus.h"
@@ -10,6 +12,7 @@
 #include "config/coils.h"
 #include "config/gpio.h"
 #include "config/healthy.h"
+#include "config/mechanism.h"
 #include "config/modbus.h"
 #include "config/source.h"
 #include "config/value.h"

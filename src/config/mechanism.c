@@ -4,8 +4,6 @@
  */
 #include "config/mechanism.h"
 
-#include "config/source.h"
-
 #define HEIGHT_SEARCH_MM 8000 /* the range of zero_height_mm */
 
 static const settings_t *settings_of(const config_source_t *self)

@@ -8,8 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "config/value.h"
-
 #define ITEM_BYTES 64u /* longer ones are no value, and are cut */
 #define NAME_BYTES "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-"
 
@@ -34,7 +32,7 @@ static bool refuse(const config_key_t *key, const char *item, size_t length, con
 {
     config_text_add_quoted(why, item, length);
     config_text_add(why, " %s; allowed: ", what);
-    config_value_allowed(key, why);
+    config_value_can_allowed(key, why);
     return false;
 }
 
@@ -69,7 +67,7 @@ static const char *take_item(const char **rest, char item[ITEM_BYTES])
 static bool refuse_many(const config_key_t *key, unsigned most, config_text_t *why)
 {
     config_text_add(why, "has more than %u values; allowed: ", most);
-    config_value_allowed(key, why);
+    config_value_can_allowed(key, why);
     return false;
 }
 
