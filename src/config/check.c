@@ -14,6 +14,7 @@
 #include "config/healthy.h"
 #include "config/mechanism.h"
 #include "config/modbus.h"
+#include "config/scaling.h"
 #include "config/source.h"
 #include "config/value.h"
 #include "heave/ramp.h"
@@ -446,6 +447,8 @@ static void check_values(config_source_t *self)
     config_coils_check(self);
     config_gpio_check(self);
     config_healthy_check(self);
+    config_scaling_resolve(self);
+    config_scaling_check(self);
     config_cia402_check(self);
     config_canraw_check(self);
     config_modbus_check(self);

@@ -63,6 +63,13 @@ typedef struct {
     int32_t value[CYLINDERS_MAX];
 } config_wholes_t;
 
+/** What lies between a motor and its cylinder: another way to write counts_per_mm, see scaling.h. */
+typedef struct {
+    config_ratios_t lead_mm; /**< travel for one turn of the screw; none once counts_per_mm has been filled in */
+    config_ratios_t gear;    /**< turns of the motor for one of the screw */
+    int32_t counts_per_turn; /**< of the motor; CONFIG_NONE: unknown */
+} config_drive_train_t;
+
 /** Width of CAN identifiers. */
 typedef enum { CONFIG_ID_11_BITS, CONFIG_ID_29_BITS } config_id_bits_t;
 
@@ -315,6 +322,7 @@ typedef struct {
     uint32_t operator_log_files;
     config_black_box_t black_box;
     config_drives_t drives;
+    config_drive_train_t drive_train;
     config_sim_t sim;
     config_can_t can;
     config_can_raw_t can_raw;

@@ -240,6 +240,13 @@ const config_key_t config_keys[] = {
 
     {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim|cia402|can-raw|modbus-tcp|modbus-rtu",
      .help = "the drives in use"},
+    {KEY("drives", "lead_mm"), AT(drive_train.lead_mm), .type = CONFIG_RATIOS, .unit = "", .fallback = "none",
+     .count = CYLINDERS_MAX, .help = "travel of a cylinder for one turn of its screw, in place of counts_per_mm in the section of the drives; "
+     "negative: the drive counts backwards"},
+    {KEY("drives", "counts_per_turn"), AT(drive_train.counts_per_turn), .type = CONFIG_INTEGER, .unit = "counts", .fallback = "none",
+     .words = "none", RANGE(1, MOST_INT32), .help = "counts of one turn of the motor: needed with lead_mm, and for rpm in --check"},
+    {KEY("drives", "gear"), AT(drive_train.gear), .type = CONFIG_RATIOS, .unit = "", .fallback = "1",
+     .count = CYLINDERS_MAX, .help = "turns of the motor for one turn of the screw, with lead_mm"},
 
     {KEY("sim", "lag_ms"), AT(sim.lag_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0", RANGE(0, 10000),
      .help = "time constant with which a cylinder follows its set-point; 0 = at once"},

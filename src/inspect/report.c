@@ -13,6 +13,7 @@
 #include "config/hash.h"
 #include "config/keys.h"
 #include "config/modbus.h"
+#include "config/scaling.h"
 #include "config/text.h"
 #include "heave/ramp.h"
 #include "inspect/envelope.h"
@@ -108,6 +109,7 @@ static void write_head(const report_t *self, size_t ram_bytes)
     fprintf(self->out, "%-24s  %u us\n", "cycle", (unsigned)self->settings->cycle_us);
     fprintf(self->out, "%-24s  %zu bytes\n", "memory of the gateway", ram_bytes);
     write_bus(self);
+    config_scaling_report(self->config, self->out);
     fprintf(self->out, "%-24s  %u\n", "relays", self->settings->relays.count);
     write_settled(self);
 }
