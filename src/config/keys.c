@@ -604,7 +604,12 @@ static unsigned smallest(unsigned a, unsigned b, unsigned c)
     return ab < c ? ab : c;
 }
 
-/* Levenshtein distance; one row of the matrix at a time. */
+static char lower(char byte)
+{
+    return byte >= 'A' && byte <= 'Z' ? (char)(byte - 'A' + 'a') : byte;
+}
+
+/* Levenshtein distance, capitals and small letters alike; one row of the matrix at a time. */
 static unsigned edit_distance(const char *from, const char *to)
 {
     unsigned row[SUGGEST_LENGTH_MAX + 1u];
@@ -620,7 +625,7 @@ static unsigned edit_distance(const char *from, const char *to)
         row[0] = i;
         for (size_t j = 1; j <= width; j++) {
             const unsigned above = row[j];
-            row[j] = smallest(above + 1u, row[j - 1u] + 1u, diagonal + (from[i - 1u] != to[j - 1u]));
+            row[j] = smallest(above + 1u, row[j - 1u] + 1u, diagonal + (lower(from[i - 1u]) != lower(to[j - 1u])));
             diagonal = above;
         }
     }

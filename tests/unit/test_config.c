@@ -418,8 +418,9 @@ static const spoilt_t k_spoilt[] = {
      "[platform] cycle_us: \"99999999999999999999\" is not a whole number; allowed: a whole number from 500 to 10000 us"},
     {"geometry", "base1_mm", "base1_mm = 1, 2",
      "[geometry] base1_mm: has 2 values; allowed: 3 numbers from -4000 to 4000 mm, separated by commas"},
-    {"geometry", "base1_mm", "base1_mm = 1,5, 2, 3", /* a decimal comma */
-     "[geometry] base1_mm: has 4 values; allowed: 3 numbers from -4000 to 4000 mm, separated by commas"},
+    {"geometry", "base1_mm", "base1_mm = 1,5, 2, 3",
+     "[geometry] base1_mm: \"1,5, 2, 3\" has a comma where a decimal point belongs; allowed: 3 numbers from -4000 to 4000 mm, "
+     "separated by commas"},
     {"geometry", "base1_mm", "base1_mm = 1, , 3",
      "[geometry] base1_mm: \"\" has no number; allowed: 3 numbers from -4000 to 4000 mm, separated by commas"},
     {"geometry", "stroke_mm", "stroke_mm = 200, 200",
@@ -527,6 +528,45 @@ static const spoilt_t k_spoilt[] = {
     {"relays", "safe_mask", "safe_mask = 0x", "[relays] safe_mask: \"0x\" is not a mask; allowed: hexadecimal 0 to FFF"},
     {"inputs", "estop", "estop = A name that is longer than any line's",
      "[inputs] estop: \"A name that is longer than any line's\" is too long; allowed: none, or a name of at most 31 characters"},
+    {"geometry", "zero_height_mm", "zero_height_mm = 600,5",
+     "[geometry] zero_height_mm: \"600,5\" has a comma where a decimal point belongs; allowed: a number from 0 to 8000 mm"},
+    {"geometry", "stroke_mm", "stroke_mm = 200,5",
+     "[geometry] stroke_mm: \"200,5\" has a comma where a decimal point belongs; allowed: a number from 0.001 to 4000 mm, or one "
+     "for "
+     "each cylinder"},
+    {"platform", "cycle_us", "cycle_us = 1,000",
+     "[platform] cycle_us: \"1,000\" has a comma where a decimal point belongs; allowed: a whole number from 500 to 10000 us"},
+    {"geometry", "base1_mm", "base1_mm = 1,5, 2,5, 0",
+     "[geometry] base1_mm: \"1,5, 2,5, 0\" has a comma where a decimal point belongs; allowed: 3 numbers from -4000 to 4000 mm, "
+     "separated by commas"},
+    {"geometry", "base1_mm", "base1_mm = 1,5",
+     "[geometry] base1_mm: has 2 values; allowed: 3 numbers from -4000 to 4000 mm, separated by commas"},
+    {"geometry", "base1_mm", "base1_mm = 600 -3 0",
+     "[geometry] base1_mm: \"600 -3 0\" lacks commas between its numbers; allowed: 3 numbers from -4000 to 4000 mm, separated by "
+     "commas"},
+    {"geometry", "base1_mm", "base1_mm = 600\xEF\xBC\x8C-3, 0",
+     "[geometry] base1_mm: \"600\xEF\xBC\x8C-3, 0\" has a full-width comma; write a plain one; allowed: 3 numbers from -4000 to "
+     "4000 "
+     "mm, separated by commas"},
+    {"roll", "max_deg", "max_deg = 14.5\xC2\xB0",
+     "[roll] max_deg: \"14.5\xC2\xB0\" has a degree sign; write the number alone; allowed: a number from -90 to 90 deg"},
+    {"roll", "max_deg", "max_deg = \xEF\xBC\x91\xEF\xBC\x94",
+     "[roll] max_deg: \"\xEF\xBC\x91\xEF\xBC\x94\" has full-width digits; write plain ones; allowed: a number from -90 to 90 "
+     "deg"},
+    {"roll", "min_deg",
+     "min_deg = \xE2\x88\x92"
+     "14",
+     "[roll] min_deg: \"\\xE2\\x88\\x92"
+     "14\" has a typographic minus; write a plain -; allowed: a number from -90 to 90 deg"},
+    {"roll", "max_deg", "max_deg = 14 deg",
+     "[roll] max_deg: \"14 deg\" has its unit behind it; write the number alone; allowed: a number from -90 to 90 deg"},
+    {"cylinders", "speed_mm_s", "speed_mm_s = 250mm/s",
+     "[cylinders] speed_mm_s: \"250mm/s\" has its unit behind it; write the number alone; allowed: a number from 0.001 to 10000 "
+     "mm/s"},
+    {"cylinders", "speed_mm_s", "speed_mm_s = 250 # fast",
+     "[cylinders] speed_mm_s: \"250 # fast\" has a # comment behind it; write it with a semicolon; allowed: a number from 0.001 "
+     "to "
+     "10000 mm/s"},
     {"inputs", "estop", "estop = \xC2\xB5",
      "[inputs] estop: \"\\xC2\\xB5\" is no name; allowed: none, or a name of at most 31 characters"},
     /* lines that are no pair */
@@ -588,6 +628,10 @@ static void test_load_unknown_section_suggests_and_its_keys_are_skipped(void)
     TEST_ASSERT_EQUAL_INT(1, load_lines());
     snprintf(expected, sizeof expected, "%s:%u: [gometry]: unknown section; did you mean [geometry]?\n", FILE_NAME, m_lines - 1);
     TEST_ASSERT_EQUAL_STRING(expected, m_errors);
+    take_good_file();
+    snprintf(m_line[find_section("can")], sizeof m_line[0], "[CAN]");
+    TEST_ASSERT_EQUAL_INT(1, load_lines());
+    expect_contains("[CAN]: unknown section; did you mean [can]?\n");
 }
 
 static void test_load_section_without_keys_is_checked_too(void)
