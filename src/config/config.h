@@ -308,6 +308,7 @@ typedef struct {
 typedef struct {
     settings_t settings;
     config_udp_t udp;
+    bool is_as_measured;             /**< joints that look odd are meant: see layout.h */
     uint32_t late_hold_cycles;       /**< of the program: see daemon/motion_loop.h */
     char life_file[CONFIG_PATH_MAX]; /**< "none" = none */
     config_label_t approved;         /**< hash of the one that was approved, "" = any */

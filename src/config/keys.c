@@ -125,6 +125,9 @@ const config_key_t config_keys[] = {
     {KEY("geometry", "mrp_mm"), AT(settings.geometry.mrp_mm_q16), .type = CONFIG_DECIMAL, .count = 3, .unit = "mm",
      .fallback = "0, 0, 0", RANGE(-4000, 4000),
      .help = "x, y, z of the motion reference point, plate frame: poses place it and rotations turn about it"},
+    {KEY("geometry", "as_measured"), AT(is_as_measured), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "whether joints that look like a slip (two exchanged, numbered from the wrong place, a digit, metres) are what they are: a "
+             "warning then, else an error"},
 
     {KEY("pose", "neutral"), AT(settings.neutral_q16), .type = CONFIG_DECIMAL, .count = POSE_AXES, .unit = "deg and mm",
      .fallback = "0, 0, 0, 0, 0, 0", RANGE(-4000, 4000), .help = "roll, pitch, yaw, x, y, z the platform rises to"},

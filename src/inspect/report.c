@@ -12,6 +12,7 @@
 #include "config/cia402.h" // config_cia402_pp_lag_q32
 #include "config/hash.h"
 #include "config/keys.h"
+#include "config/layout.h"
 #include "config/modbus.h"
 #include "config/scaling.h"
 #include "config/text.h"
@@ -405,8 +406,17 @@ static void warn_profile_lag(report_t *self)
     }
 }
 
+static void warn_layout(report_t *self)
+{
+    config_text_t text;
+    for (unsigned at = 0; config_layout_next_oddity(self->config, &at, &text);) {
+        warn(self, text.data);
+    }
+}
+
 static void write_warnings(report_t *self)
 {
+    warn_layout(self);
     for (unsigned axis = 0; axis < AXES_MAX; axis++) {
         if (!config_has_axis(self->config, axis)) {
             continue;

@@ -428,7 +428,8 @@ static const spoilt_t k_spoilt[] = {
     {"geometry", "stroke_mm", "stroke_mm = 200, 200, 200",
      "[geometry] stroke_mm: has 3 values; allowed: one, or one for each of the 6 cylinders"},
     {"geometry", "stroke_mm", "stroke_mm = 200 mm",
-     "[geometry] stroke_mm: \"200 mm\" is not a number; allowed: a number from 0.001 to 4000 mm, or one for each cylinder"},
+     "[geometry] stroke_mm: \"200 mm\" has its unit behind it; write the number alone; allowed: a number from 0.001 to 4000 mm, "
+     "or one for each cylinder"},
     {"geometry", "zero_height_mm", "zero_height_mm = 300",
      "[geometry] zero_height_mm: pose zero needs an extension of -108.749 mm of cylinder 1; allowed: about 438 to 662 mm"},
     {"pose", "neutral", "neutral = 0, 0, 0, 0, 0, 120", "[pose] neutral: z of 120; allowed: -98 to 105 mm (min and max of [z])"},
