@@ -17,7 +17,7 @@
 #include "config/scaling.h"
 #include "config/text.h"
 #include "heave/ramp.h"
-#include "inspect/envelope.h"
+#include "config/envelope.h"
 
 #define EDGE_TOLERANCE 0.001 /* deg or mm: a limit on the edge itself is fine */
 #define DIAGONALS      4u    /* of a pair: both axes as far as each other, in every combination of senses */
