@@ -9,7 +9,7 @@
     check_core.py [--root DIR] format     clang-format has nothing to change
     check_core.py [--root DIR] lint --build DIR   clang-tidy has nothing to say; DIR holds compile_commands.json
 
-"Core" is include/ and src/ without src/app. --instrumented: the library carries sanitizers, so its symbols say nothing.
+"Core" is include/ and the rooms of src/ that are not a program's (tools/lib/rooms.py). --instrumented: the library carries sanitizers, so its symbols say nothing.
 """
 import argparse
 import concurrent.futures
@@ -22,6 +22,9 @@ import sys
 from pathlib import Path
 
 import tap
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools/lib"))
+import rooms  # noqa: E402  the path above has to be set first
 
 CLANG_FORMAT = "clang-format-14"  # another version formats differently
 CLANG_TIDY = "clang-tidy-14"      # another version has other checks
@@ -57,7 +60,7 @@ def c_files(root, *folders):
 
 
 def core_files(root):
-    return [path for path in c_files(root, "include", "src") if (root / "src/app") not in path.parents]
+    return [path for path in c_files(root, "include", "src") if not rooms.is_program(path.relative_to(root))]
 
 
 def includes_of(path):

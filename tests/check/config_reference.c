@@ -3,7 +3,7 @@
  */
 #include <stdlib.h>
 
-#include "config.h"
+#include "config/config.h"
 #include "heave/status.h"
 
 void hv_assert_failed(const char *file, int line)

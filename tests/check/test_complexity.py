@@ -10,7 +10,7 @@ from pathlib import Path
 import tap
 
 TOP = Path(__file__).resolve().parents[2]
-CORE, PROGRAM = "src/motion/ramp.c", "src/app/main.c"
+CORE, PROGRAM = "src/motion/ramp.c", "src/daemon/main.c"
 
 
 def row(complexity, lines, where, name):

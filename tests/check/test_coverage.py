@@ -138,7 +138,7 @@ def backends():
     is_(of("hal/linux/a.c", 2), [])
     is_(of("hal/linux/a.c", 3), ["hal/linux/a.c: 85.0 % of its branches are reached, it must be 90 %"])
     is_(of("hal/linux/a.c", 3, "hal/linux/a.c a: return 3;\n    Nobody can.\n"), [])
-    is_(of("src/app/a.c", 3), [])
+    is_(of("src/daemon/a.c", 3), [])
 
 
 CASES = {"what is reached is not told of": all_reached, "lines in a row are one": lines, "each way that was not taken": branches,

@@ -25,7 +25,7 @@ def output(*command, **more):
 
 class Built:
     def __init__(self, build):
-        self.bin = build / "src/app"
+        self.bin = build / "bin"
         self.pages = build / "packaging"
 
     def help(self, program):
@@ -79,7 +79,7 @@ def options_and_commands(built):
 
 
 def exit_codes(built):
-    in_header = set(re.findall(r"EXIT_\w+ = (\d+)", (TOP / "src/app/say.h").read_text(encoding="ascii")))
+    in_header = set(re.findall(r"EXIT_\w+ = (\d+)", (TOP / "src/common/message.h").read_text(encoding="ascii")))
     everywhere = set()
     for program, page in (("heaved", "heaved.8"), ("heavectl", "heavectl.1")):
         listed = re.search(r"(?s)Exit codes: (.*)\.\n", built.help(program))[1]

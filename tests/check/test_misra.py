@@ -22,11 +22,11 @@ def judged(printed, entries, *options, status=0):
     """(exit status, output) over src/a.c, src/b.c and a program that is not looked at; `printed`: of each of them."""
     with tempfile.TemporaryDirectory() as folder:
         here = Path(folder)
-        for name in ("src/a.c", "src/b.c", "src/app/c.c", "include/a.h"):
+        for name in ("src/a.c", "src/b.c", "src/daemon/c.c", "include/a.h"):
             (here / name).parent.mkdir(parents=True, exist_ok=True)
             (here / name).write_text("one\ntwo\nthree\n", encoding="utf-8")
         (here / "misra.md").write_text(f"# Text\n\n| rule | about | where | why |\n| --- | --- | --- | --- |\n{entries}", encoding="utf-8")
-        (here / "cppcheck").write_text(f"#!/bin/sh\nfor last; do :; done\ncase $last in src/app/*) exit 9 ;; esac\n: >$last.dump\n"
+        (here / "cppcheck").write_text(f"#!/bin/sh\nfor last; do :; done\ncase $last in src/daemon/*) exit 9 ;; esac\n: >$last.dump\n"
                                        + "".join(f"case '{line}' in *h:*|$last*|no*) echo '{line}' ;; esac\n" for line in printed)
                                        + f"exit {status}\n", encoding="utf-8")
         (here / "cppcheck").chmod(0o755)

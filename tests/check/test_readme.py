@@ -107,14 +107,14 @@ class Page:
         assert sorted(named) == sorted(known), f"named {named}, known {known}"
 
     def exit_codes(self):
-        header = (TOP / "src/app/say.h").read_text(encoding="ascii")
+        header = (TOP / "src/common/message.h").read_text(encoding="ascii")
         known = set(re.findall(r"EXIT_\w+ = (\d+)", header))
         table = re.search(r"^\| [^|]+ \| heaved, heavectl \|\n(?:\|.*\n)+", page(self.path), re.M)[0]
         named = set(re.findall(r"\d+", " ".join(re.findall(r"^\| ([\d, ]+) \|", table, re.M))))
         assert named == known, f"named {sorted(named)}, known {sorted(known)}"
 
     def flags(self):
-        words = re.findall(r'\{(?:MOTION|FLAG)_\w+, "([\w-]+)"\}', (TOP / "src/app/trace.c").read_text(encoding="ascii"))
+        words = re.findall(r'\{(?:MOTION|FLAG)_\w+, "([\w-]+)"\}', (TOP / "src/record/trace.c").read_text(encoding="ascii"))
         missing = [word for word in words if f"`{word}`" not in page(self.path)]
         assert words and not missing, f"flags of a trace that are not named: {missing}"
 

@@ -123,7 +123,7 @@ def main():
                 assert re.search(rf"(?m)^{line}$", text), f"{line} is missing"
             assert "/heaved.sock" not in re.sub(r"(?m)^#.*$", "", text), "a path that all of them share"
         with suite.case("heaved may ask for a flush where the path unit looks, and the flush may take the request away"):
-            asked = re.search(r'(?m)^#define RUN_DIR +"([^"]+)"', (TOP / "src/app/rig.c").read_text(encoding="utf-8"))[1]
+            asked = re.search(r'(?m)^#define RUN_DIR +"([^"]+)"', (TOP / "src/daemon/devices.c").read_text(encoding="utf-8"))[1]
             assert f"PathExists={asked}/flush-%i\n" in (PACKAGING / "heave-can-flush@.path").read_text(encoding="utf-8")
             assert f"ReadWritePaths=-{asked}\n" in (PACKAGING / "heave-can-flush@.service.in").read_text(encoding="utf-8")
             assert f"HEAVE_RUN:-{asked}}}/flush-" in (PACKAGING / "heave-can").read_text(encoding="utf-8")

@@ -63,7 +63,7 @@ FINE = {
     "src/a/a.h": "int a(void);\n",
     "src/a/b.c": '#include "heave/b.h"\n#include "a.h"\nstatic const char *const k_names[] = {"1.5", "float"};\n'
                  "int b(int x) { return k_names[x & 1][0]; }\n",
-    "src/app/main.c": "#include <stdio.h>\ndouble unused;\n",
+    "src/daemon/main.c": "#include <stdio.h>\ndouble unused;\n",
     "hal/sim/sim.h": "#include <math.h>\n",
     "tests/unit/CMakeLists.txt": "heave_unit_test(a)\n",
     "tests/unit/test_a.c": "void test_fine(void)\n{\n}\nint main(void) { RUN_TEST(test_fine); }\n",

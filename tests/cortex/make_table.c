@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "config.h"
-#include "frames.h"
-#include "rig.h"
+#include "config/config.h"
+#include "record/frames.h"
+#include "daemon/devices.h"
 #include "table.h"
 
 void hv_assert_failed(const char *file, int line)
@@ -41,16 +41,16 @@ static bool put_line(FILE *out, const frames_line_t *line)
 
 static bool put_all(FILE *out, const config_t *config, const frames_t *frames)
 {
-    static rig_t rig;
+    static devices_t devices;
     static table_t table;
     gateway_io_t io;
-    if (rig_open_settled(&rig, config, &io) != HV_OK) {
+    if (devices_open_settled(&devices, config, &io) != HV_OK) {
         return false;
     }
     table.magic = TABLE_MAGIC;
     table.bytes = sizeof table;
     table.settings = config->settings;
-    memcpy(table.axis, rig.sim_axis, sizeof table.axis);
+    memcpy(table.axis, devices.sim_axis, sizeof table.axis);
     table.axes = drives_count(io.drives);
     table.lines = (uint32_t)frames->count;
     bool is_put = put(out, &table, sizeof table);

@@ -23,7 +23,7 @@ OPTIONAL = {"ask_state", "read_back", "waited"}  # of the contracts: a backend m
 NAMED = {
     ("src/canopen/cia402_stage.c", "is_there"): r"\b(?:are_all|fail_where)\(self, (\w+)",
     ("src/canopen/cia402_watch.c", "is_seen"): r"\[CIA402_WATCH_\w+\]\s*=\s*\{(\w+)",
-    ("src/app/player.c", "refused"): None,  # NULL in the firmware
+    ("src/record/player.c", "refused"): None,  # NULL in the firmware
     ("src/protocol/frame.c", "k_take"): r"\[PHASE_\w+\]\s*=\s*(take_\w+)",
 }
 UNLISTED = "a call through a pointer that tests/cortex/stack_bound.py does not list: "

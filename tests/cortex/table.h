@@ -5,8 +5,8 @@
 #ifndef CORTEX_TABLE_H
 #define CORTEX_TABLE_H
 
-#include "frames_line.h"
 #include "heave/settings.h"
+#include "record/frames_line.h"
 #include "sim_drives.h"
 
 #define TABLE_MAGIC 0x56414548u /* "HEAV" */

@@ -10,9 +10,9 @@
 
 #include <cjson/cJSON.h>
 
-#include "control.h"
 #include "fuzz.h"
-#include "operator.h"
+#include "service/control.h"
+#include "service/operator_requests.h"
 
 #define CLIENTS     2u
 #define RECORDS_MAX 40u
@@ -33,7 +33,7 @@ typedef struct {
 } client_t;
 
 static config_t m_config;
-static motion_loop_t m_loop;
+static handover_t m_handover;
 static blackbox_t m_blackbox; /* there is none */
 static control_t m_control;
 static operator_log_t m_log; /* there is none: it takes no entry */
@@ -131,13 +131,13 @@ static void answer_requests(uint8_t how)
 {
     static const hv_status_t k_status[] = {HV_OK, HV_ERR_STATE, HV_ERR_RANGE, HV_OK};
     motion_request_t request;
-    while (ring_pop(&m_loop.requests, &request, sizeof request) > 0) {
+    while (ring_pop(&m_handover.requests, &request, sizeof request) > 0) {
         static motion_result_t result;
         FUZZ_REQUIRE(request.event <= OPERATOR_INTENSITY && request.number <= 999);
         m_asked++;
         result = (motion_result_t){.id = request.id, .status = k_status[how % 4], .is_key_off = how >= 0xF0};
         result.snapshot.state = (state_t)(how % STATES);
-        (void)ring_push(&m_loop.results, &result, sizeof result, NULL, 0);
+        (void)ring_push(&m_handover.results, &result, sizeof result, NULL, 0);
     }
 }
 
@@ -146,7 +146,7 @@ static void change_state(uint8_t how)
     static motion_view_words_t view;
     view.view.snapshot.state = (state_t)(how % STATES);
     view.view.is_shutting_down = how >= 0x80;
-    seqlock_write(&m_loop.view, view.word);
+    seqlock_write(&m_handover.view, view.word);
 }
 
 static void step(fuzz_input_t *in)
@@ -180,12 +180,10 @@ static void start(void)
     if (m_config.settings.cycle_us == 0) {
         FUZZ_REQUIRE(config_load(HEAVE_CONFIG_DIR "/demo-hexapod.ini", &m_config, stderr) == 0);
     }
-    seqlock_init(&m_loop.view, m_loop.view_word, MOTION_VIEW_WORDS);
-    ring_init(&m_loop.requests, m_loop.request_bytes, sizeof m_loop.request_bytes);
-    ring_init(&m_loop.results, m_loop.result_bytes, sizeof m_loop.result_bytes);
+    handover_init(&m_handover);
     memset(&m_control, 0, sizeof m_control);
     control_init(&m_control);
-    m_control.loop = &m_loop;
+    m_control.handover = &m_handover;
     m_control.config = &m_config;
     m_control.blackbox = &m_blackbox;
     m_control.log = &m_log;

@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "config_keys.h"
+#include "config/keys.h"
 
 #define LINE_MAX 400u
 

@@ -79,7 +79,7 @@ def main():
         is_built = True
     if is_built:
         with tempfile.TemporaryDirectory() as folder:
-            test_golden.run_topics(suite, f", {arguments.arch}", foreign.command("src/app/heaved"), Path(folder) / "trace.csv",
+            test_golden.run_topics(suite, f", {arguments.arch}", foreign.command("bin/heaved"), Path(folder) / "trace.csv",
                                    only=None if arguments.slow else test_golden.TELLING)
         for name in tests:
             with suite.case(f"unit.{name}, {arguments.arch}"):

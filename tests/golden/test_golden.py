@@ -93,7 +93,7 @@ def build(compiler, flags, folder):
                     ["cmake", "--build", folder, "--target", "heaved", "--parallel"]):
         run = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
         assert run.returncode == 0, run.stdout[-3000:]
-    return folder / "src/app/heaved"
+    return folder / "bin/heaved"
 
 
 def main():

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_syscalls.py BIN JUDGE [PART OF A NAME] - every place in src/app and hal/linux that asks the system for something is refused.
+"""test_syscalls.py BIN JUDGE [PART OF A NAME] - every place in the programs and hal/linux that asks the system for something is refused.
 
 The places are read from the programs themselves (objdump, addr2line), so that a new one is tried, or named here as not reached, or fails the test;
 a new function that is called has to be put into a list. failing_calls.c, preloaded, makes one place at a time fail with each errno that
@@ -30,6 +30,9 @@ from pathlib import Path
 import heave
 import tap
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools/lib"))
+import rooms  # noqa: E402  the path above has to be set first
+
 SANE_EXITS = {0, 1, 64, 65, 66, 69, 70, 73, 74, 78}
 FOR_EVER = 1 << 40
 TIMES = 3  # for what is tried again
@@ -52,14 +55,14 @@ UNUSED = set("close closedir nanosleep gpiod_chip_close mnl_socket_close modbus_
 
 # Not tried here, by file and function, and why.
 ELSEWHERE = {("metrics.c", "unlink"): "tidies up after another failure; the next second tries again",
-             ("whole_file.c", "unlink"): "tidies up after another failure, which is what is told",
+             ("atomic_file.c", "unlink"): "tidies up after another failure, which is what is told",
              ("live.c", "setrlimit"): "only where few descriptors are allowed; test_beside.py allows few",
              ("same_file.c", "stat"): "what cannot be looked at cannot be opened either, which is told then",
-             ("standard.c", "open"): "only where a standard descriptor is closed; test_beside.py closes them",
+             ("standard_descriptors.c", "open"): "only where a standard descriptor is closed; test_beside.py closes them",
              ("operator_log.c", "rename"): "when the file is full: the old one goes on, see tests/unit/test_operator_log.c",
              ("operator_log.c", "ftruncate"): "when half a line went in: see there",
-             ("life.c", "unlink"): "tidies up after another failure, which is what is told",
-             ("out_file.c", "poll"): "when a pipe is full at the end",
+             ("lifetime.c", "unlink"): "tidies up after another failure, which is what is told",
+             ("output_file.c", "poll"): "when a pipe is full at the end",
              ("linux_modbus_link.c", "tcflush"): "its result is not used"}
 
 MEMORY, FILES = ["ENOMEM"], ["EACCES", "ENOENT", "EMFILE", "EIO"]
@@ -133,7 +136,7 @@ def places_of(program, wanted):
     lines = [line.split(" ")[0] for line in tool("addr2line", "-e", program, *(hex(following - 1) for _, following, _, _ in found)).splitlines()]
     places = collections.defaultdict(list)
     for (start, following, kind, function), where in zip(found, lines):
-        ours = re.search(r"/(src/app|hal/linux)/([^/]+):(\d+)$", where)
+        ours = re.search(rf"/(src/(?:{'|'.join(rooms.PROGRAMS)})|hal/linux)/([^/]+):(\d+)$", where)
         if ours:  # of what a function ends with, the caller hears
             places[ours[2], int(ours[3]), function] += [following] if kind == "call" else callers[start]
     return [Place(*key, tuple(returns)) for key, returns in sorted(places.items())], others
@@ -560,7 +563,7 @@ def in_operation(bench, places, judge):
         page.clear()
         code = daemon.end()
         judge_end(troubles, what, code, daemon.text())
-        spoilt = ("out_file.c" in what)
+        spoilt = ("output_file.c" in what)
         troubles.judge(spoilt or not (wrong := judged(bench, judge, config)), f"{what}: {wrong if not spoilt else ''}")
 
     def flood():
@@ -588,7 +591,7 @@ def in_operation(bench, places, judge):
     day.hour()
     seen, what = page.seen(), "all day"
     for place, error in trials(places, seen, STORY.tried):
-        if place.file == "out_file.c":
+        if place.file == "output_file.c":
             continue
         what = name_of(place, error)
         page.set(place, error)

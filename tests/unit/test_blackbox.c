@@ -13,9 +13,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "blackbox.h"
-#include "motion_loop.h"
-#include "play.h"
+#include "daemon/motion_loop.h"
+#include "daemon/play.h"
+#include "record/blackbox.h"
 #include "sim_log.h"
 #include "sim_udp.h"
 #include "unity.h"
@@ -77,10 +77,10 @@ static void live(void)
         send_frame();
     }
     if (is_due(m_story.fault_us)) {
-        sim_drives_inject(&m_loop.rig.sim_drives, &(sim_drives_fault_t){.kind = SIM_DRIVES_FAULT, .axis = 2, .code = 0x7305});
+        sim_drives_inject(&m_loop.devices.sim_drives, &(sim_drives_fault_t){.kind = SIM_DRIVES_FAULT, .axis = 2, .code = 0x7305});
     }
     if (is_due(m_story.estop_us)) {
-        sim_inputs_set(&m_loop.rig.sim_inputs, INPUT_ESTOP, true);
+        sim_inputs_set(&m_loop.devices.sim_inputs, INPUT_ESTOP, true);
     }
     if (is_due(m_story.narrow_us)) {
         config_t config = m_config;
@@ -88,7 +88,7 @@ static void live(void)
         TEST_ASSERT_TRUE(motion_loop_reload(&m_loop, &config));
     }
     if (is_due(m_story.break_us)) {
-        sim_drives_inject(&m_loop.rig.sim_drives, &m_story.broken);
+        sim_drives_inject(&m_loop.devices.sim_drives, &m_story.broken);
     }
     if (is_due(m_story.ask_us)) {
         (void)blackbox_ask(&m_box);

@@ -5,11 +5,12 @@
  */
 #define _POSIX_C_SOURCE 200809L
 
-#include "config.h"
-#include "config_hash.h"
-#include "config_keys.h"
-#include "config_text.h"
-#include "config_value.h"
+#include "config/config.h"
+#include "config/hash.h"
+#include "config/keys.h"
+#include "config/text.h"
+#include "config/value.h"
+#include "inspect/report.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -1464,7 +1465,7 @@ static int report(char *text, size_t capacity)
 {
     FILE *file = tmpfile();
     TEST_ASSERT_NOT_NULL(file);
-    const int warnings = config_check_report(&m_config, 12345, file);
+    const int warnings = report_write(&m_config, 12345, file);
     rewind(file);
     text[fread(text, 1, capacity - 1, file)] = '\0';
     fclose(file);

@@ -8,10 +8,10 @@
 #include <string.h>
 
 #include "canraw_slave.h"
-#include "config.h"
-#include "config_bus.h"
-#include "config_canraw.h"
-#include "config_value.h"
+#include "config/bus.h"
+#include "config/canraw.h"
+#include "config/config.h"
+#include "config/value.h"
 #include "unity.h"
 
 #define FILE_NAME "test_config_canraw.tmp.ini"

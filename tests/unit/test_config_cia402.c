@@ -7,9 +7,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "config.h"
-#include "config_bus.h"
-#include "config_cia402.h"
+#include "config/bus.h"
+#include "config/cia402.h"
+#include "config/config.h"
 #include "unity.h"
 
 #define FILE_NAME "test_config_cia402.tmp.ini"

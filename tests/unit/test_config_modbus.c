@@ -4,7 +4,7 @@
  */
 #define _POSIX_C_SOURCE 200809L
 
-#include "config_modbus.h"
+#include "config/modbus.h"
 
 #include <stdio.h>
 #include <string.h>

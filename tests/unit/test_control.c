@@ -8,7 +8,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "control.h"
+#include "service/control.h"
 #include "unity.h"
 
 #define LATE    (CONTROL_GRACE_US + 1)
@@ -22,7 +22,7 @@ void hv_assert_failed(const char *file, int line)
 }
 
 static config_t m_config;
-static motion_loop_t m_loop;
+static handover_t m_handover;
 static blackbox_t m_blackbox;
 static operator_log_t m_log;
 static control_t m_control;
@@ -108,9 +108,9 @@ static void motion_answers(void)
 {
     static motion_result_t result;
     motion_request_t request;
-    TEST_ASSERT_TRUE(ring_pop(&m_loop.requests, &request, sizeof request) > 0);
+    TEST_ASSERT_TRUE(ring_pop(&m_handover.requests, &request, sizeof request) > 0);
     result = (motion_result_t){.id = request.id, .status = HV_OK};
-    TEST_ASSERT_TRUE(ring_push(&m_loop.results, &result, sizeof result, NULL, 0));
+    TEST_ASSERT_TRUE(ring_push(&m_handover.results, &result, sizeof result, NULL, 0));
 }
 
 static void newcomer_is_heard(void)
@@ -129,9 +129,7 @@ void setUp(void)
     static uint8_t memory;
     TEST_ASSERT_EQUAL(0, config_load(HEAVE_CONFIG_DIR "/demo-hexapod.ini", &m_config, stderr));
     memset(&m_control, 0, sizeof m_control);
-    seqlock_init(&m_loop.view, m_loop.view_word, MOTION_VIEW_WORDS);
-    ring_init(&m_loop.requests, m_loop.request_bytes, sizeof m_loop.request_bytes);
-    ring_init(&m_loop.results, m_loop.result_bytes, sizeof m_loop.result_bytes);
+    handover_init(&m_handover);
     m_blackbox.memory = &memory; /* it is there, and never answers */
     m_now_us = 1000000;
     (void)snprintf(m_folder, sizeof m_folder, "/tmp/heave-control-XXXXXX");
@@ -140,7 +138,7 @@ void setUp(void)
     for (unsigned i = 0; i <= NEWCOMER; i++) {
         m_client[i] = -1;
     }
-    TEST_ASSERT_EQUAL(0, control_open(&m_control, m_path, &m_config, &m_loop, &m_blackbox, &m_log));
+    TEST_ASSERT_EQUAL(0, control_open(&m_control, m_path, &m_config, &m_handover, &m_blackbox, &m_log));
 }
 
 void tearDown(void)
@@ -303,7 +301,7 @@ static void open_look_socket(void)
     control_close(&m_control);
     (void)snprintf(m_look_path, sizeof m_look_path, "%s/look", m_folder);
     (void)snprintf(m_config.look_socket, sizeof m_config.look_socket, "%s", m_look_path);
-    TEST_ASSERT_EQUAL(0, control_open(&m_control, m_path, &m_config, &m_loop, &m_blackbox, &m_log));
+    TEST_ASSERT_EQUAL(0, control_open(&m_control, m_path, &m_config, &m_handover, &m_blackbox, &m_log));
 }
 
 static void look_in(unsigned i)
@@ -319,7 +317,7 @@ static void show(state_t state, unsigned percent)
     static motion_view_words_t view;
     view.view.snapshot.state = state;
     view.view.snapshot.intensity_percent = (uint8_t)percent;
-    seqlock_write(&m_loop.view, view.word);
+    seqlock_write(&m_handover.view, view.word);
 }
 
 static void expect_refused(unsigned i, const char *request, const char *why)
@@ -328,7 +326,7 @@ static void expect_refused(unsigned i, const char *request, const char *why)
     pass(0);
     pass(0);
     TEST_ASSERT_TRUE_MESSAGE(has_heard(i, why), m_said);
-    TEST_ASSERT_TRUE_MESSAGE(ring_is_empty(&m_loop.requests), request);
+    TEST_ASSERT_TRUE_MESSAGE(ring_is_empty(&m_handover.requests), request);
 }
 
 static void expect_taken(unsigned i, const char *request)

@@ -3,7 +3,7 @@
  */
 #include <string.h>
 
-#include "doctor_judge.h"
+#include "inspect/doctor_judge.h"
 #include "unity.h"
 
 static char s_text[8192];

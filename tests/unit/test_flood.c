@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * test_flood.c - when a flood begins and ends, in made-up time.
  */
-#include "flood.h"
+#include "daemon/flood.h"
 
 #include "unity.h"
 

@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "config.h"
+#include "config/config.h"
 #include "unity.h"
 
 #define ERROR_MM_Q32  (Q32_ONE / 1000)

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT
  * test_frames.c - files of frames: every form of a line, every way it can be wrong, whole files, and what a recording writes.
  */
-#include "frames.h"
+#include "record/frames.h"
 
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "record.h"
+#include "record/record.h"
 #include "unity.h"
 
 static char m_text[512];

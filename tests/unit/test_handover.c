@@ -5,8 +5,8 @@
 #include <sched.h>
 #include <string.h>
 
-#include "ring.h"
-#include "seqlock.h"
+#include "common/ring.h"
+#include "common/seqlock.h"
 #include "unity.h"
 
 #define RING_BYTES 256u

@@ -3,7 +3,7 @@
  */
 #include <stdlib.h>
 
-#include "histogram.h"
+#include "common/histogram.h"
 #include "unity.h"
 
 static histogram_t m_histogram;

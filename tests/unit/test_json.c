@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * test_json.c - the JSON writer: structure, escapes, numbers, and what does not fit.
  */
-#include "json.h"
+#include "common/json.h"
 
 #include <string.h>
 

@@ -2,7 +2,7 @@
  * test_operator_log.c - the file of the operator log: what is in a line, that lines are added and never lost in a rotation, and
  * that a disk that takes nothing is told of and counted.
  */
-#include "operator_log.h"
+#include "service/operator_log.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include "say.h"
+#include "common/message.h"
 #include "unity.h"
 
 static operator_log_t m_log;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * test_sha256.c - the examples of FIPS 180-4 (NIST's), and every length around the ends of blocks against a program of others.
  */
-#include "sha256.h"
+#include "common/sha256.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-#include "ctl_socket.h"
+#include "heavectl/socket.h"
 
 #include <fcntl.h>
 #include <stdio.h>

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT
  * test_trace.c - numbers as text against the C library with long double, and whole rows of a trace.
  */
-#include "trace.h"
+#include "record/trace.h"
 
 #include <float.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "decimal.h"
+#include "common/decimal.h"
 #include "heave/motion.h"
 #include "unity.h"
 

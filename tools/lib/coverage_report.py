@@ -15,11 +15,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import rooms
+
 TOP = Path(__file__).resolve().parents[2]
 EXCLUSIONS = TOP / "tests/coverage-exclusions.txt"
 FUNCTION_HEAD = re.compile(r"[a-z][^;=#]*?\b(\w+)\(")
-GROUPS = (("Core", lambda name: name.startswith("src/") and not name.startswith("src/app/")),
-          ("Programs", lambda name: name.startswith("src/app/")),
+GROUPS = (("Core", rooms.is_core), ("Programs", rooms.is_program),
           ("Backends", lambda name: name.startswith("hal/")))
 BACKENDS_PERCENT = 90
 
@@ -134,7 +135,7 @@ def run(command):
 
 def programs(build):
     """Two sets: some programs compile sources of the core anew, with other options, and llvm-cov knows each function once."""
-    found = [path for folder in ("src", "tests") for path in sorted((build / folder).rglob("*"))
+    found = [path for folder in ("bin", "src", "tests") for path in sorted((build / folder).rglob("*"))
              if path.is_file() and path.stat().st_mode & 0o100 and path.suffix not in (".so", ".py", ".sh") and "CMakeFiles" not in path.parts]
     found = [path for path in found if path.read_bytes()[:4] == b"\x7fELF"]
     sets = [[path for path in found if path.stem.endswith("_portable") == is_portable] for is_portable in (False, True)]

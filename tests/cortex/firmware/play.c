@@ -6,8 +6,8 @@
 
 #include "heave/gateway.h"
 #include "platform.h"
-#include "player.h"
 #include "port.h"
+#include "record/player.h"
 #include "semihost.h"
 #include "sim_log.h"
 #include "sim_relays.h"

@@ -1,9 +1,0 @@
-/* SPDX-License-Identifier: MIT
- * ctl_usage.h - the options of heavectl's table, which is in usage.h.
- */
-#ifndef HEAVE_APP_CTL_USAGE_H
-#define HEAVE_APP_CTL_USAGE_H
-
-enum { OPTION_JSON = 1, OPTION_SOCKET, OPTION_PLATFORM, OPTION_FOR, OPTION_HZ, OPTION_HELP, OPTION_VERSION };
-
-#endif

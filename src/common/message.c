@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: MIT
+ * message.c - lines on standard error; see message.h.
+ */
+#include "common/message.h"
+
+#include <poll.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#define LINE_MAX_BYTES 1024
+#define WAIT_MS        200 /* for a reader of standard error; a line that nobody takes must not hold the program up */
+
+int print_message(int code, const char *format, ...)
+{
+    char line[LINE_MAX_BYTES];
+    const int prefix = snprintf(line, sizeof line, "heaved: ");
+    va_list arguments;
+    va_start(arguments, format);
+    int length = prefix + vsnprintf(&line[prefix], sizeof line - (size_t)prefix - 1, format, arguments);
+    va_end(arguments);
+    if (length > LINE_MAX_BYTES - 2) {
+        length = LINE_MAX_BYTES - 2;
+    }
+    line[length] = '\n';
+    struct pollfd wait = {.fd = STDERR_FILENO, .events = POLLOUT};
+    if (poll(&wait, 1, WAIT_MS) > 0) {
+        (void)!write(STDERR_FILENO, line, (size_t)length + 1); /* nobody is left to tell */
+    }
+    return code;
+}

@@ -1,0 +1,437 @@
+/* SPDX-License-Identifier: MIT
+ * config.c - reads the configuration file: lines, sections, keys; every error with its line, none hides another.
+ * inih splits the lines. It has no line numbers for its handler, cuts long lines and section names silently, ignores what stands
+ * behind a section's bracket, and takes indented lines as continuations: so each line is inspected before inih sees it, and a
+ * line that is refused is shown to inih as an empty one.
+ */
+#include "config/config.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <ini.h>
+#include <poll.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "config/check.h"
+#include "config/hash.h"
+#include "config/source.h"
+#include "config/value.h"
+
+#define WAIT_MS  5000 /* for who writes a pipe; once heaved runs, nobody is waited for */
+#define CONTINUE 1    /* inih: the handler took the pair */
+
+/* --- Lines --- */
+
+/* Reads one line without its end into text.
+ * Returns false at the end of the file; *length is the line's whole length, also where text could not hold it. */
+static bool take_line(config_source_t *self, char *text, size_t capacity, size_t *length)
+{
+    *length = 0;
+    if (self->at == self->end) {
+        return false;
+    }
+    for (; self->at < self->end && *self->at != '\n'; self->at++) {
+        if (*length < capacity - 1u) {
+            text[*length] = *self->at;
+        }
+        ++*length;
+    }
+    self->at += self->at < self->end ? 1 : 0;
+    self->line++;
+    text[*length < capacity ? *length : capacity - 1u] = '\0';
+    return true;
+}
+
+static bool is_blank(char byte)
+{
+    return byte == ' ' || byte == '\t';
+}
+
+/* Ends the text where a comment starts, by inih's rule: a `;` after a blank. */
+static void cut_comment(char *text)
+{
+    for (size_t i = 1; text[0] != '\0' && text[i] != '\0'; i++) {
+        if (text[i] == ';' && is_blank(text[i - 1u])) {
+            text[i] = '\0';
+            return;
+        }
+    }
+}
+
+static void cut_blanks(char *text)
+{
+    size_t length = strlen(text);
+    while (length > 0 && is_blank(text[length - 1u])) {
+        length--;
+    }
+    text[length] = '\0';
+}
+
+/* Offset of a byte that no text file has, or length. */
+static size_t find_control(const char *text, size_t length)
+{
+    size_t i = 0;
+    while (i < length && ((unsigned char)text[i] >= 0x20u || text[i] == '\t') && text[i] != 0x7F) {
+        i++;
+    }
+    return i;
+}
+
+/* "did you mean [...]", or all sections there are. */
+static void refuse_section(config_source_t *self, const char *name)
+{
+    const char *near = config_section_suggest(name);
+    config_text_t text;
+    config_text_clear(&text);
+    config_text_add(&text, "[");
+    config_text_add_escaped(&text, name, strlen(name));
+    config_text_add(&text, near != NULL ? "]: unknown section; did you mean [%s]?" : "]: unknown section; allowed:", near);
+    for (size_t i = 0; near == NULL && i < config_section_count; i++) {
+        config_text_add(&text, " %s", config_sections[i].name);
+    }
+    config_source_error(self, self->line, "%s", text.data);
+}
+
+/* Enters the section of a line `[name]`, or refuses it; the keys of a refused section are skipped. */
+static void enter_section(config_source_t *self, char *line)
+{
+    char *end = strchr(line, ']');
+    self->section = CONFIG_SECTION_REFUSED;
+    if (end == NULL || end[1] != '\0') {
+        config_source_error(self, self->line, "malformed section header; allowed: [name] and nothing behind it but a ; comment");
+        return;
+    }
+    *end = '\0';
+    const char *name = line + 1;
+    const int section = config_section_find(name);
+    if (section < 0) {
+        refuse_section(self, name);
+        return;
+    }
+    if (self->section_line[section] != 0) {
+        config_source_error(self, self->line, "[%s]: section given again; allowed: once, and it is at line %u", name,
+                            self->section_line[section]);
+    } else {
+        self->section_line[section] = self->line;
+    }
+    self->section = section;
+}
+
+/* What is neither blank, comment nor section has to have a separator. */
+static bool is_pair(config_source_t *self, const char *line)
+{
+    config_text_t quoted;
+    if (strpbrk(line, "=:") != NULL) {
+        return true;
+    }
+    config_text_clear(&quoted);
+    config_text_add_quoted(&quoted, line, strlen(line));
+    config_source_error(self, self->line, "stray text %s; allowed: key = value, [section], ; comment", quoted.data);
+    return false;
+}
+
+/* Inspects a line. Returns true where inih shall see it: a key and its value. */
+static bool inspect(config_source_t *self, char *line, size_t length)
+{
+    const size_t blanks = strspn(line, " \t");
+    const size_t control = find_control(line, length);
+    if (control < length) {
+        config_source_error(self, self->line, "control character \\x%02X; allowed: plain text (UTF-8)",
+                            (unsigned char)line[control]);
+        return false;
+    }
+    if (line[blanks] == '\0' || line[blanks] == ';' || line[blanks] == '#') {
+        return false;
+    }
+    if (blanks > 0) {
+        config_source_error(self, self->line,
+                            "indented line; allowed: sections and keys in the first column, values on one line");
+        return false;
+    }
+    cut_comment(line);
+    cut_blanks(line);
+    if (line[0] == '[') {
+        enter_section(self, line);
+        return false;
+    }
+    return is_pair(self, line);
+}
+
+/* Takes the marks of encodings off the first line. Returns false where the file is in one that cannot be read. */
+static bool take_encoding(config_source_t *self, char *line, size_t *length)
+{
+    if (self->line == 1u && *length >= 3u && memcmp(line, "\xEF\xBB\xBF", 3) == 0) {
+        *length -= 3u;
+        memmove(line, line + 3, *length + 1u);
+    }
+    if (self->line != 1u || *length < 2u || (memcmp(line, "\xFF\xFE", 2) != 0 && memcmp(line, "\xFE\xFF", 2) != 0)) {
+        return true;
+    }
+    config_source_error(self, self->line, "the file is UTF-16; allowed: plain text (UTF-8)");
+    return false;
+}
+
+/* inih's line source, as fgets. */
+static char *read_line(char *text, int size, void *stream)
+{
+    config_source_t *self = stream;
+    const size_t longest = (size_t)size - 3u; /* inih: room for CR, LF, NUL */
+    size_t length = 0;
+    if (self->is_given_up || !take_line(self, text, (size_t)size, &length)) {
+        return NULL;
+    }
+    if (length > 0 && length < (size_t)size && text[length - 1u] == '\r') {
+        text[--length] = '\0';
+    }
+    if (length > longest) {
+        config_source_error(self, self->line, "line of %zu bytes; allowed: at most %zu", length, longest);
+        text[0] = '\0';
+    } else if (!take_encoding(self, text, &length)) {
+        self->is_given_up = true;
+        return NULL;
+    } else if (!inspect(self, text, length)) {
+        text[0] = '\0';
+    }
+    strcat(text, "\n");
+    return text;
+}
+
+/* --- Keys --- */
+
+/* "did you mean ...", or where the key belongs, or what the section takes. */
+static void suggest_key(const char *section, const char *name, config_text_t *text)
+{
+    const char *near = config_key_suggest(section, name);
+    if (near != NULL) {
+        config_text_add(text, "did you mean %s?", near);
+        return;
+    }
+    for (size_t i = 0; i < config_key_count; i++) {
+        if (strcmp(config_keys[i].name, name) == 0) {
+            config_text_add(text, "it belongs to [%s]", config_keys[i].section);
+            return;
+        }
+    }
+    config_text_add(text, "[%s] takes", section);
+    for (size_t i = 0; i < config_key_count; i++) {
+        if (strcmp(config_keys[i].section, section) == 0) {
+            config_text_add(text, " %s", config_keys[i].name);
+        }
+    }
+}
+
+static void refuse_key(config_source_t *self, const char *section, const char *name)
+{
+    config_text_t text;
+    config_text_clear(&text);
+    config_text_add(&text, "[%s] ", section);
+    config_text_add_escaped(&text, name, strlen(name));
+    config_text_add(&text, ": unknown key; ");
+    suggest_key(section, name, &text);
+    config_source_error(self, self->line, "%s", text.data);
+}
+
+static void take_value(config_source_t *self, const config_key_t *key, config_entry_t *entry, const char *value)
+{
+    config_text_t why;
+    config_text_clear(&why);
+    entry->line = self->line;
+    entry->is_valid = config_value_parse(key, value, self->config, &entry->count, &why);
+    if (!entry->is_valid) {
+        config_source_error(self, self->line, "[%s] %s: %s", key->section, key->name, why.data);
+    }
+}
+
+/* inih's handler: one key and its value. The reader keeps track of the section. */
+static int take_pair(void *user, const char *section, const char *name, const char *value)
+{
+    config_source_t *self = user;
+    (void)section;
+    if (self->section == CONFIG_SECTION_NONE) {
+        config_source_error(self, self->line, "a key before any section; allowed: [section] first");
+    }
+    if (self->section < 0) {
+        return CONTINUE;
+    }
+    const char *in = config_sections[self->section].name;
+    const int key = config_key_find(in, name);
+    if (key < 0) {
+        refuse_key(self, in, name);
+    } else if (self->entry[key].line != 0) {
+        config_source_error(self, self->line, "[%s] %s: given again; allowed: once, and it is at line %u", in, name,
+                            self->entry[key].line);
+    } else {
+        take_value(self, &config_keys[key], &self->entry[key], value);
+    }
+    return CONTINUE;
+}
+
+/* --- The file --- */
+
+/* Gives every key that has one its default. */
+static void set_defaults(config_source_t *self)
+{
+    for (size_t i = 0; i < config_key_count; i++) {
+        config_text_t why;
+        config_text_clear(&why);
+        if (config_keys[i].fallback == NULL) {
+            continue;
+        }
+        self->entry[i].is_valid =
+            config_value_parse(&config_keys[i], config_keys[i].fallback, self->config, &self->entry[i].count, &why);
+        HV_ASSERT(self->entry[i].is_valid);
+    }
+}
+
+static void read_file(config_source_t *self)
+{
+    const int bad_line = ini_parse_stream(read_line, self, take_pair, self);
+    if (bad_line != 0 && self->error_count == 0) {
+        config_source_error(self, bad_line > 0 ? (unsigned)bad_line : 0u, "not understood; allowed: key = value");
+    }
+}
+
+/* Waits until there is something to read, or an end: a pipe may have nobody yet who writes.
+ * Returns false: errno says why. */
+static bool await_bytes(int fd, int wait_ms)
+{
+    struct pollfd wait = {.fd = fd, .events = POLLIN};
+    int ready = -1;
+    do {
+        ready = poll(&wait, 1, wait_ms);
+    } while (ready < 0 && errno == EINTR);
+    if (ready == 0) {
+        errno = ETIMEDOUT;
+    }
+    return ready > 0;
+}
+
+/* The bytes of a file: nothing is allocated, so that it may be read again in operation, and nothing is waited for in vain.
+ * Returns their number, or -1: errno says why. */
+static ssize_t read_bytes(const char *path, char *bytes, size_t capacity, int wait_ms)
+{
+    const int fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+    size_t length = 0;
+    ssize_t got = fd < 0 ? -1 : 1;
+    while (got > 0 && length < capacity) {
+        got = await_bytes(fd, wait_ms) ? read(fd, &bytes[length], capacity - length) : -1;
+        length += got > 0 ? (size_t)got : 0u;
+    }
+    const int error = errno;
+    if (fd >= 0) {
+        (void)close(fd);
+    }
+    errno = error;
+    return got < 0 ? -1 : (ssize_t)length;
+}
+
+/* Where the file is longer than what is kept of it, or cannot be read, that is the only error. */
+static bool open_bytes(config_source_t *self)
+{
+    static char bytes[CONFIG_FILE_MAX + 1u];
+    const ssize_t length = read_bytes(self->path, bytes, sizeof bytes, self->wait_ms);
+    if (length < 0 && errno == ETIMEDOUT) {
+        config_source_error(self, 0, "nothing came from it within %d s; allowed: a file, or a pipe that somebody writes to",
+                            self->wait_ms / 1000);
+        return false;
+    }
+    if (length < 0) {
+        const bool is_opened = errno == EISDIR || errno == EIO;
+        config_source_error(self, 0, "cannot be %s: %s; allowed: a readable text file", is_opened ? "read" : "opened",
+                            strerror(errno));
+        return false;
+    }
+    if (length > (ssize_t)CONFIG_FILE_MAX) {
+        config_source_error(self, 0, "is larger than %u bytes; allowed: a configuration of one platform", CONFIG_FILE_MAX);
+        return false;
+    }
+    self->at = bytes;
+    self->end = &bytes[length];
+    return true;
+}
+
+/* Loads into the configuration of the source, whole or with errors. */
+static void load(config_source_t *self, const char *path, config_t *config, FILE *errors, int wait_ms)
+{
+    HV_ASSERT(config_key_count <= CONFIG_KEYS_MAX && config_section_count <= CONFIG_SECTIONS_MAX);
+    memset(config, 0, sizeof *config);
+    memset(self, 0, sizeof *self);
+    self->path = path;
+    self->wait_ms = wait_ms;
+    self->errors = errors;
+    self->config = config;
+    self->section = CONFIG_SECTION_NONE;
+    if (!open_bytes(self)) {
+        return;
+    }
+    set_defaults(self);
+    read_file(self);
+    if (!self->is_given_up) {
+        config_check(self);
+    }
+}
+
+int config_load(const char *path, config_t *out, FILE *errors)
+{
+    config_t config;
+    config_source_t self;
+    load(&self, path, &config, errors, WAIT_MS);
+    if (self.error_count == 0) {
+        config_hash(&config);
+        memcpy(out, &config, sizeof config);
+    }
+    return self.error_count;
+}
+
+/* --- Again, in operation --- */
+
+/* Takes over one key that has another value now, or says that it cannot. */
+static void take_change(const config_source_t *self, size_t i, config_t *running)
+{
+    const config_key_t *key = &config_keys[i];
+    config_text_t was, is;
+    config_text_clear(&was);
+    config_text_clear(&is);
+    config_value_format(key, running, &was);
+    config_value_format(key, self->config, &is);
+    if (strcmp(was.data, is.data) == 0) {
+        return;
+    }
+    fprintf(self->errors, "%s:%u: [%s] %s: ", self->path, config_source_line_of(self, key->section, key->name), key->section,
+            key->name);
+    if (key->is_live) {
+        memcpy((char *)running + key->offset, (const char *)self->config + key->offset, key->size);
+        fprintf(self->errors, "%s from now on, was %s\n", is.data, was.data);
+    } else {
+        fprintf(self->errors, "%s needs a restart; %s stays\n", is.data, was.data);
+    }
+}
+
+/* A platform whose configuration was approved takes over no other one in motion. */
+static void check_approval(config_source_t *self)
+{
+    config_hash(self->config);
+    if (config_is_unapproved(self->config)) {
+        config_source_key_error(self, "platform", "approved",
+                                "%s is not this configuration; allowed: %s, once somebody has approved it",
+                                self->config->approved.text, self->config->hash);
+    }
+}
+
+int config_reload(const char *path, config_t *running, FILE *report)
+{
+    static config_t config;
+    static config_source_t self;
+    load(&self, path, &config, report, 0);
+    if (self.error_count == 0) {
+        check_approval(&self);
+    }
+    for (size_t i = 0; self.error_count == 0 && i < config_key_count; i++) {
+        if (config_is_applicable(config_keys[i].needs, running)) {
+            take_change(&self, i, running);
+        }
+    }
+    config_hash(running);
+    return self.error_count;
+}

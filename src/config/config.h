@@ -1,0 +1,354 @@
+/* SPDX-License-Identifier: MIT
+ * config.h - the configuration file of heaved: what it holds, and how it is loaded, reported on and written out.
+ * One table (keys.c) gives each key its type, unit, range, default and help; everything here follows from it.
+ * Used at start-up and by offline modes only; nothing here is called while the platform moves.
+ */
+#ifndef HEAVE_CONFIG_CONFIG_H
+#define HEAVE_CONFIG_CONFIG_H
+
+#include <stdio.h>
+
+#include "heave/canraw.h"
+#include "heave/modbus_drive.h"
+#include "heave/settings.h"
+
+#define CONFIG_ADDRESS_MAX 64u  /**< bytes of an address as text, with its NUL */
+#define CONFIG_PATH_MAX    108u /**< bytes of a socket path, with its NUL (the size of sun_path) */
+#define CONFIG_NAME_MAX    16u  /**< bytes of the name of a network interface, with its NUL (IFNAMSIZ) */
+#define CONFIG_RELAYS_MAX  12u
+#define CONFIG_LABEL_MAX   32u       /**< bytes of the name of a GPIO line or chip, with its NUL (GPIO_MAX_NAME_SIZE) */
+#define CONFIG_NONE        INT32_MIN /**< a number in whose place the file has a word ("none", "settled") */
+
+/** Where frames come in. */
+typedef struct {
+    char bind[CONFIG_ADDRESS_MAX];  /**< numeric IPv4 or IPv6 address */
+    char group[CONFIG_ADDRESS_MAX]; /**< joined: multicast address, % and its network interface; empty: none */
+    uint16_t port;
+    hal_udp_networks_t allow; /**< who may send; none at all means everyone who reaches the port */
+} config_udp_t;
+
+/** What drives the cylinders. */
+typedef enum {
+    CONFIG_DRIVES_SIM,
+    CONFIG_DRIVES_CIA402,
+    CONFIG_DRIVES_CAN_RAW,
+    CONFIG_DRIVES_MODBUS_TCP,
+    CONFIG_DRIVES_MODBUS_RTU
+} config_drives_t;
+
+/** Simulated drives. */
+typedef struct {
+    uint32_t lag_ms;              /**< time constant with which a cylinder follows its set-point */
+    uint32_t enable_delay_ms;     /**< from the enable command to enabled */
+    q16_t start_extension_mm_q16; /**< of all cylinders; CONFIG_NONE: the settled extension */
+    bool is_homed;                /**< the position is known from the start */
+} config_sim_t;
+
+/** CAN identifiers: one for each drive, or the first drive's, the others following it; none where count is 0. */
+typedef struct {
+    uint8_t count;
+    uint32_t id[DRIVES_MAX];
+} config_ids_t;
+
+/** Exact ratios: one, or one for each cylinder; none where count is 0. */
+typedef struct {
+    uint8_t count;
+    int32_t num[CYLINDERS_MAX];
+    int32_t den[CYLINDERS_MAX];
+} config_ratios_t;
+
+/** Whole numbers: one, or one for each cylinder. */
+typedef struct {
+    uint8_t count;
+    int32_t value[CYLINDERS_MAX];
+} config_wholes_t;
+
+/** Width of CAN identifiers. */
+typedef enum { CONFIG_ID_11_BITS, CONFIG_ID_29_BITS } config_id_bits_t;
+
+/** When set-points are sent. */
+typedef enum { CONFIG_SEND_EVERY_PERIOD, CONFIG_SEND_ON_CHANGE } config_send_t;
+
+/** The CAN bus of the drives. */
+typedef struct {
+    char interface[CONFIG_NAME_MAX];
+    uint32_t bitrate_bps;
+    uint32_t passive_stop_ms;
+} config_can_t;
+
+/** Drives with CAN frames of their own; what the frames are is in canraw.h. */
+typedef struct {
+    uint32_t period_us;
+    config_id_bits_t id_bits;
+    config_ids_t command_id;
+    config_ids_t reply_id;
+    config_ratios_t counts_per_mm;
+    config_wholes_t zero_counts;
+    config_ratios_t angle_counts_per_deg;
+    config_wholes_t angle_zero_counts;
+    config_send_t send;
+    uint32_t speed_counts;
+    config_ratios_t speed_counts_per_mm_s;
+    config_ratios_t angle_speed_counts_per_deg_s;
+    canraw_frame_t setpoint;
+    canraw_frame_t enable, disable, stop, reset, home;
+    canraw_frame_t position_query, position_reply, homing_query, homing_reply;
+    canraw_when_t enabled_when, fault_when, homing_done_when, homing_failed_when;
+    uint32_t query_every;
+    uint32_t offline_periods;
+    q16_t following_error_mm_q16;
+    q16_t angle_following_error_deg_q16;
+} config_can_raw_t;
+
+/** A Modbus server: an IPv4 address as text, and its port. */
+typedef struct {
+    char address[16];
+    uint16_t port;
+} config_host_t;
+
+/** One for each drive, or one for all; none where count is 0. */
+typedef struct {
+    uint8_t count;
+    config_host_t host[DRIVES_MAX];
+} config_hosts_t;
+
+#define CONFIG_ITEMS_MAX 12u /**< two lists of a map */
+
+/** What registers have to hold. */
+typedef struct {
+    uint8_t count;
+    modbus_drive_item_t item[CONFIG_ITEMS_MAX];
+} config_items_t;
+
+/** Which registers are read, how single ones are written, what the characters of a line have. */
+typedef enum { CONFIG_READ_HOLDING, CONFIG_READ_INPUT } config_read_t;
+typedef enum { CONFIG_WRITE_MULTIPLE, CONFIG_WRITE_SINGLE } config_write_t;
+typedef enum { CONFIG_PARITY_NONE, CONFIG_PARITY_EVEN, CONFIG_PARITY_ODD } config_parity_t;
+
+/** Who turns a serial line around; in the order of linux_modbus_direction_t. */
+typedef enum { CONFIG_RS485_AUTOMATIC, CONFIG_RS485_KERNEL, CONFIG_RS485_RTS_HIGH, CONFIG_RS485_RTS_LOW } config_rs485_t;
+
+/** Drives on Modbus; what the registers are is in modbus_drive.h. */
+typedef struct {
+    config_ids_t units;
+    uint32_t period_us;
+    uint32_t timeout_ms;
+    uint32_t turnaround_us;
+    uint8_t retries;
+    uint32_t feedback_timeout_ms;
+    config_read_t read;
+    config_write_t write;
+    bool is_broadcast;
+    bool is_target_last;
+    config_ratios_t counts_per_mm;
+    config_wholes_t zero_counts;
+    config_ratios_t angle_counts_per_deg;
+    config_wholes_t angle_zero_counts;
+    uint32_t speed_counts;
+    config_ratios_t speed_counts_per_mm_s;
+    config_ratios_t angle_speed_counts_per_deg_s;
+    modbus_drive_blocks_t setpoint, feedback;
+    modbus_drive_blocks_t enable, disable, stop, reset, home;
+    canraw_when_t enabled_when, fault_when, homing_done_when, homing_failed_when;
+    config_items_t startup;
+    config_items_t drive_timeout;
+    bool is_drive_timeout_confirmed;
+    q16_t step_mm_q16;
+    q16_t angle_step_deg_q16;
+    q16_t following_error_mm_q16;
+    q16_t angle_following_error_deg_q16;
+} config_modbus_t;
+
+/** Their lines on TCP. */
+typedef struct {
+    config_hosts_t hosts;
+} config_modbus_tcp_t;
+
+/** Their serial line. */
+typedef struct {
+    char device[CONFIG_PATH_MAX];
+    uint32_t baud_bps;
+    config_parity_t parity;
+    uint8_t stop_bits;
+    config_rs485_t rs485;
+    uint32_t rs485_delay_us;
+} config_modbus_rtu_t;
+
+/** Mode of operation of CANopen drives. */
+typedef enum { CONFIG_MODE_CSP, CONFIG_MODE_IP, CONFIG_MODE_PP } config_mode_t;
+
+/** What CANopen drives do when the gateway falls silent: 6007h less 1. */
+typedef enum { CONFIG_LOST_FAULT, CONFIG_LOST_DISABLE_VOLTAGE, CONFIG_LOST_QUICK_STOP } config_lost_t;
+
+/** What is watched in what CANopen drives say, and what follows: as cia402.h has both. */
+#define CONFIG_REACTIONS 6u
+typedef enum { CONFIG_REACTION_IGNORE, CONFIG_REACTION_TELL, CONFIG_REACTION_STOP } config_reaction_t;
+
+/** In which order CANopen drives home. */
+typedef enum { CONFIG_HOMING_TOGETHER, CONFIG_HOMING_IN_TURN } config_homing_order_t;
+
+/** How drives home; unit u is mm or deg. */
+typedef struct {
+    config_wholes_t method;
+    q16_t speed_q16;      /**< u/s, towards the switch */
+    q16_t zero_speed_q16; /**< u/s, to the zero */
+    q16_t accel_q16;      /**< u/s^2 */
+} config_homing_t;
+
+/** CANopen drives; what it means is in cia402.h. */
+typedef struct {
+    config_ids_t nodes;
+    uint8_t gateway_node;
+    config_mode_t mode;
+    uint32_t period_us;
+    config_ratios_t counts_per_mm;
+    config_wholes_t zero_counts;
+    config_ratios_t angle_counts_per_deg;
+    config_wholes_t angle_zero_counts;
+    config_homing_t homing;
+    config_homing_t angle_homing;
+    config_homing_order_t homing_order;
+    q16_t following_error_mm_q16;
+    q16_t angle_following_error_deg_q16;
+    uint16_t following_error_ms;
+    q16_t quick_stop_mm_s2_q16;
+    q16_t angle_quick_stop_deg_s2_q16;
+    config_lost_t when_gateway_lost;
+    config_reaction_t reaction[CONFIG_REACTIONS];
+    uint16_t heartbeat_ms;
+    uint16_t heartbeat_timeout_ms;
+    uint16_t sdo_timeout_ms;
+    uint16_t boot_timeout_ms;
+    uint16_t power_timeout_ms;
+    uint8_t sync_counter;
+    bool is_sync_watched;
+    bool is_reset_wanted;
+    bool is_no_watchdog_allowed;
+    q16_t software_limit_mm_q16;
+    uint32_t vendor_id;
+    uint32_t product_code;
+    uint32_t revision_number;
+    config_ids_t serial_numbers;
+} config_cia402_t;
+
+/** A line, or a chip, as the file names it; "" where it says none. */
+typedef struct {
+    char text[CONFIG_LABEL_MAX];
+} config_label_t;
+
+/** Outputs. The number of lines is the number of relays. */
+typedef struct {
+    uint8_t count;
+    config_label_t line[CONFIG_RELAYS_MAX];
+} config_lines_t;
+
+/** What switches the relays. */
+typedef enum { CONFIG_RELAYS_SIM, CONFIG_RELAYS_GPIO, CONFIG_RELAYS_MODBUS } config_relays_driver_t;
+
+/** Relay outputs, relay 1 first. */
+typedef struct {
+    config_relays_driver_t driver;
+    config_label_t chip; /**< of GPIO lines; where there is none, whichever chip has lines of these names */
+    config_lines_t lines;
+    bool is_active_low;
+} config_relays_t;
+
+/** The board of relays on Modbus and the line it has to itself: TCP, or serial where there is no host. */
+typedef struct {
+    config_hosts_t hosts;       /**< at most one */
+    config_modbus_rtu_t serial; /**< device "none": there is none */
+    uint32_t unit;
+    uint32_t timeout_ms;
+} config_relays_modbus_t;
+
+/** What carries the healthy pulse. */
+typedef enum { CONFIG_HEALTHY_NONE, CONFIG_HEALTHY_GPIO, CONFIG_HEALTHY_RELAY } config_healthy_driver_t;
+
+/** The line of the healthy pulse; its relay and its times are the core's. */
+typedef struct {
+    config_healthy_driver_t driver;
+    config_label_t chip; /**< as of the relays */
+    config_label_t line;
+    bool is_active_low;
+} config_healthy_t;
+
+/** What reads the operator's switches. */
+typedef enum { CONFIG_INPUTS_SIM, CONFIG_INPUTS_GPIO } config_inputs_driver_t;
+
+/** Switch inputs; a line without a name is not there. */
+typedef struct {
+    config_inputs_driver_t driver;
+    config_label_t chip; /**< as of the relays */
+    config_label_t estop_line;
+    config_label_t enable_line;
+    config_label_t reset_line;
+    config_label_t estop2_line;
+    config_label_t power_line;
+    uint32_t estop_discrepancy_ms;
+    bool is_active_low; /**< a closed contact pulls its line low */
+} config_inputs_t;
+
+/** The black box: what it keeps, and where it is written to. */
+typedef struct {
+    char directory[CONFIG_PATH_MAX]; /**< "none" = there is none */
+    uint32_t seconds;                /**< kept at least, of an ordinary stream */
+    uint32_t incidents;              /**< most folders kept in the directory */
+} config_black_box_t;
+
+#define CONFIG_HASH_MAX 17u /**< digits of what a configuration is recognised by, with its NUL */
+
+/** A whole configuration: the core's settings, and what only the hosted program needs. Plain data. */
+typedef struct {
+    settings_t settings;
+    config_udp_t udp;
+    uint32_t late_hold_cycles;       /**< of the program: see daemon/motion_loop.h */
+    char life_file[CONFIG_PATH_MAX]; /**< "none" = none */
+    config_label_t approved;         /**< hash of the one that was approved, "" = any */
+    char hash[CONFIG_HASH_MAX];      /**< of this one; follows from the rest (hash.h) */
+    char control_socket[CONFIG_PATH_MAX];
+    char metrics_file[CONFIG_PATH_MAX]; /**< "none" = none */
+    char look_socket[CONFIG_PATH_MAX];  /**< likewise */
+    config_label_t operate_group;       /**< "" = none */
+    config_label_t service_group;       /**< likewise */
+    char operator_log[CONFIG_PATH_MAX]; /**< "none" = none */
+    uint32_t operator_log_kb;
+    uint32_t operator_log_files;
+    config_black_box_t black_box;
+    config_drives_t drives;
+    config_sim_t sim;
+    config_can_t can;
+    config_can_raw_t can_raw;
+    config_cia402_t cia402;
+    config_modbus_t modbus;
+    config_modbus_tcp_t modbus_tcp;
+    config_modbus_rtu_t modbus_rtu;
+    config_relays_t relays;
+    config_relays_modbus_t relays_modbus;
+    config_inputs_t inputs;
+    config_healthy_t healthy;
+} config_t;
+
+/** Loads and checks a file.
+ *  @param out     unchanged on errors
+ *  @param errors  takes one line per error, all of them: `FILE:LINE: [section] key: what is wrong; what is allowed`
+ *  @return 0, or the number of errors */
+int config_load(const char *path, config_t *out, FILE *errors);
+
+#define CONFIG_FILE_MAX 131072u /**< bytes of a configuration file */
+
+/** Loads the file once more while its platform runs, and takes over what may change in operation. Allocates nothing.
+ *  @param running  changed only where the whole file is right, and only in keys that may change
+ *  @param report   takes the errors as config_load() does, else a line per key that has changed: taken over, or needs a restart
+ *  @return 0, or the number of errors: nothing has changed */
+int config_reload(const char *path, config_t *running, FILE *report);
+
+/** Writes every key with its value, unit, range and help, as a file that loads to the same configuration. */
+void config_dump(const config_t *self, FILE *out);
+
+/** Writes the reference of all keys as Markdown. */
+void config_write_reference(FILE *out);
+
+/** Writes it as sections of a manual page. */
+void config_write_manual(FILE *out);
+
+#endif

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT
+ * hash.h - what a configuration is recognised by: the same for every file that makes the same platform, whatever its
+ * comments and the order of its keys, and another one where any key that counts has another value, defaults included.
+ */
+#ifndef HEAVE_CONFIG_HASH_H
+#define HEAVE_CONFIG_HASH_H
+
+#include "config/config.h"
+
+/** Fills in config->hash; [platform] approved is no part of it. Allocates nothing. */
+void config_hash(config_t *config);
+
+/** True where the configuration says which one was approved, and is another one. */
+bool config_is_unapproved(const config_t *config);
+
+#endif

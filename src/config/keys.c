@@ -1,0 +1,691 @@
+/* SPDX-License-Identifier: MIT
+ * keys.c - the table of all sections and keys, look-up in it, and the nearest name to a misspelt one.
+ */
+#include "config/keys.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "common/socket_path.h"
+
+#define SUGGEST_LENGTH_MAX 40u /* longer names are not worth a suggestion */
+
+const char *const config_axis_section[AXES_MAX] = {"roll", "pitch", "yaw", "x", "y", "z", "angle"};
+
+const config_section_t config_sections[] = {
+    {"platform", "what it is and how it starts", CONFIG_NEEDS_NOTHING},
+    {"geometry", "joint centres and lengths, as measured; left-handed frame, +X forward, +Y right, +Z up", CONFIG_NEEDS_NOTHING},
+    {"pose", "where the platform waits", CONFIG_NEEDS_NOTHING},
+    {"roll", "rotation about X: asked = sign * scale * sent + offset, then min to max", CONFIG_NEEDS_NOTHING},
+    {"pitch", "rotation about Y, as [roll]", CONFIG_NEEDS_NOTHING},
+    {"yaw", "rotation about Z, as [roll]", CONFIG_NEEDS_HEXAPOD},
+    {"angle", "rotation motor, limits as [roll]", CONFIG_NEEDS_NOTHING},
+    {"x", "forward and back, as [roll]", CONFIG_NEEDS_HEXAPOD},
+    {"y", "right and left, as [roll]", CONFIG_NEEDS_HEXAPOD},
+    {"z", "up and down from pose zero, as [roll]", CONFIG_NEEDS_NOTHING},
+    {"cylinders", "limits of every cylinder: the last word over all motion", CONFIG_NEEDS_NOTHING},
+    {"engage", "limits of the cylinders while rising, settling, homing and taking over a sender's first pose",
+     CONFIG_NEEDS_NOTHING},
+    {"intensity", "how much of a sender's motion is made, about neutral; the rotation motor is not scaled", CONFIG_NEEDS_NOTHING},
+    {"udp", "where frames come from", CONFIG_NEEDS_NOTHING},
+    {"control", "where heavectl reaches heaved", CONFIG_NEEDS_NOTHING},
+    {"black-box", "the last minutes, kept in memory; written on every fault and e-stop, and by `heavectl dump`",
+     CONFIG_NEEDS_NOTHING},
+    {"drives", "what moves the cylinders", CONFIG_NEEDS_NOTHING},
+    {"sim", "simulated drives ([drives] driver = sim)", CONFIG_NEEDS_NOTHING},
+    {"can", "the CAN bus of the drives, for every driver that uses one", CONFIG_NEEDS_NOTHING},
+    {"cia402", "CANopen drives with the profile CiA 402 ([drives] driver = cia402); see docs/cia402.md", CONFIG_NEEDS_NOTHING},
+    {"can-raw", "drives on CAN with frames of their own ([drives] driver = can-raw); see docs/can-raw.md", CONFIG_NEEDS_NOTHING},
+    {"modbus", "registers of drives on Modbus ([drives] driver = modbus-tcp or modbus-rtu); see docs/modbus.md",
+     CONFIG_NEEDS_NOTHING},
+    {"modbus-tcp", "their connections, for driver = modbus-tcp", CONFIG_NEEDS_NOTHING},
+    {"modbus-rtu", "their serial line, for driver = modbus-rtu", CONFIG_NEEDS_NOTHING},
+    {"relays", "effects outputs", CONFIG_NEEDS_NOTHING},
+    {"relays-modbus", "a board of relays on Modbus coils ([relays] driver = modbus), on a line of its own; see docs/modbus.md",
+     CONFIG_NEEDS_NOTHING},
+    {"inputs", "switches of the operator", CONFIG_NEEDS_NOTHING},
+    {"healthy",
+     "an output that toggles as long as states, deadlines and drives are as they should be, for a watchdog outside; see "
+     "docs/safety.md",
+     CONFIG_NEEDS_NOTHING},
+};
+const size_t config_section_count = sizeof config_sections / sizeof config_sections[0];
+
+/* clang-format off */ /* a row is a record: one or two lines */
+
+/* Pieces of a row. */
+#define AT(member)       .offset = offsetof(config_t, member), .size = sizeof(((const config_t *)0)->member)
+#define KEY(in, called)  .section = (in), .name = (called)
+#define RANGE(low, high) .low_milli = (int64_t)(low)*1000, .high_milli = (int64_t)(high)*1000
+#define ABOVE_ZERO(high) .low_milli = 1, .high_milli = (int64_t)(high)*1000
+#define MOST_Q16         32767 /* whole units that Q16.16 holds */
+#define MOST_INT32       2147483647
+
+/* The rows of one joint pair: base joint and plate joint. */
+#define JOINT(number, index, need)                                                                                              \
+    {KEY("geometry", "base" number "_mm"), AT(settings.geometry.base_mm_q16[index]), .type = CONFIG_DECIMAL, .count = 3,        \
+     .unit = "mm", RANGE(-4000, 4000), .needs = need,                                                                           \
+     .help = "x, y, z of the lower joint of cylinder " number ", base frame"},                                                  \
+    {KEY("geometry", "plate" number "_mm"), AT(settings.geometry.plate_mm_q16[index]), .type = CONFIG_DECIMAL, .count = 3,      \
+     .unit = "mm", RANGE(-4000, 4000), .needs = need,                                                                           \
+     .help = "x, y, z of the upper joint of cylinder " number ", plate frame"}
+
+/* The rows of one axis. */
+#define AXIS(name, u, index, need, low, high)                                                                                   \
+    {KEY(name, "sign"), AT(settings.axis[index].sign), .type = CONFIG_SIGN, .unit = "", .fallback = "1", .needs = need,         \
+     .help = "-1 turns the sense of the sent value round"},                                                                     \
+    {KEY(name, "scale"), AT(settings.axis[index].scale_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "", .fallback = "1",   \
+     RANGE(0, 100), .needs = need, .help = "factor of the sent value; 0 switches the axis off"},                                \
+    {KEY(name, "offset_" u), AT(settings.axis[index].offset_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u,                \
+     .fallback = "0", RANGE(low, high), .needs = need, .help = "added after sign and scale"},                                   \
+    {KEY(name, "min_" u), AT(settings.axis[index].min_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u, RANGE(low, high),    \
+     .needs = need, .help = "lowest value the axis goes to"},                                                                   \
+    {KEY(name, "max_" u), AT(settings.axis[index].max_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u, RANGE(low, high),    \
+     .needs = need, .help = "highest value the axis goes to"},                                                                  \
+    {KEY(name, "speed_" u "_s"), AT(settings.axis[index].speed_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u "/s",        \
+     ABOVE_ZERO(10000), .needs = need, .help = "speed limit"},                                                                  \
+    {KEY(name, "accel_" u "_s2"), AT(settings.axis[index].accel_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u "/s^2",     \
+     ABOVE_ZERO(MOST_Q16), .needs = need,                                                                                       \
+     .help = "acceleration limit; reached only where accel^2 / jerk <= speed"},                                                 \
+    {KEY(name, "jerk_" u "_s3"), AT(settings.axis[index].jerk), .type = CONFIG_INTEGER, .unit = u "/s^3",                       \
+     RANGE(1, MOST_INT32), .needs = need, .help = "jerk limit: how fast the acceleration may change"}
+
+const config_key_t config_keys[] = {
+    {KEY("platform", "kind"), AT(settings.geometry.kind), .type = CONFIG_WORD, .unit = "", .words = "hexapod|tripod|tripod-3rps",
+     .help = "six cylinders; three round a central guide; three on hinges (yaw, x and y then follow from roll and pitch)"},
+    {KEY("platform", "cycle_us"), AT(settings.cycle_us), .type = CONFIG_INTEGER, .unit = "us", .fallback = "1000",
+     RANGE(500, 10000), .help = "period of the motion cycle"},
+    {KEY("platform", "auto_frames"), AT(settings.auto_frames), .type = CONFIG_INTEGER, .unit = "", .fallback = "0", RANGE(0, 100),
+     .help = "valid frames within a second that engage = auto waits for before it brings the platform up; 0 = none"},
+    {KEY("platform", "late_hold_cycles"), AT(late_hold_cycles), .type = CONFIG_INTEGER, .unit = "", .fallback = "3",
+     RANGE(0, 1000), .is_live = true, .help = "a cycle that is late by more cycles than that holds the platform while it rises, is neutral or engaged; 0 = never"},
+    {KEY("platform", "engage"), AT(settings.engage), .type = CONFIG_WORD, .unit = "", .fallback = "manual",
+     .words = "manual|auto",
+     .help = "who brings the platform up: an operator's request, or heaved by itself once after each start, also where a service manager "
+             "starts it again after a crash"},
+    {KEY("platform", "life_file"), AT(life_file), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "file, and beside it FILE.2, that keeps hours, way and cycles of each axis for good; none: nothing is kept, unless a "
+             "service manager has given a state directory"},
+    {KEY("platform", "approved"), AT(approved), .type = CONFIG_LABEL, .unit = "", .fallback = "none", .is_live = true,
+     .help = "hash of the approved configuration, as --check shows it: any other moves nothing before `heavectl acknowledge`; not "
+             "with engage = auto"},
+
+    JOINT("1", 0, CONFIG_NEEDS_NOTHING),
+    JOINT("2", 1, CONFIG_NEEDS_NOTHING),
+    JOINT("3", 2, CONFIG_NEEDS_NOTHING),
+    JOINT("4", 3, CONFIG_NEEDS_HEXAPOD),
+    JOINT("5", 4, CONFIG_NEEDS_HEXAPOD),
+    JOINT("6", 5, CONFIG_NEEDS_HEXAPOD),
+    {KEY("geometry", "retracted_length_mm"), AT(settings.geometry.retracted_mm_q16), .type = CONFIG_PER_CYLINDER, .unit = "mm",
+     ABOVE_ZERO(8000), .help = "joint to joint at extension 0"},
+    {KEY("geometry", "stroke_mm"), AT(settings.stroke_mm_q16), .type = CONFIG_PER_CYLINDER, .unit = "mm", ABOVE_ZERO(4000),
+     .help = "extension from end to end"},
+    {KEY("geometry", "zero_height_mm"), AT(settings.geometry.zero_height_mm_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "mm", RANGE(0, 8000), .help = "plate origin above base origin at pose zero"},
+    {KEY("geometry", "mrp_mm"), AT(settings.geometry.mrp_mm_q16), .type = CONFIG_DECIMAL, .count = 3, .unit = "mm",
+     .fallback = "0, 0, 0", RANGE(-4000, 4000),
+     .help = "x, y, z of the motion reference point, plate frame: poses place it and rotations turn about it"},
+
+    {KEY("pose", "neutral"), AT(settings.neutral_q16), .type = CONFIG_DECIMAL, .count = POSE_AXES, .unit = "deg and mm",
+     .fallback = "0, 0, 0, 0, 0, 0", RANGE(-4000, 4000), .help = "roll, pitch, yaw, x, y, z the platform rises to"},
+    {KEY("pose", "settled_extension_mm"), AT(settings.settled_extension_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     RANGE(0, 4000), .help = "of all cylinders, in which people board"},
+
+    AXIS("roll", "deg", AXIS_ROLL, CONFIG_NEEDS_NOTHING, -90, 90),
+    AXIS("pitch", "deg", AXIS_PITCH, CONFIG_NEEDS_NOTHING, -90, 90),
+    AXIS("yaw", "deg", AXIS_YAW, CONFIG_NEEDS_HEXAPOD, -180, 180),
+    {KEY("angle", "present"), AT(settings.has_angle), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "whether there is a rotation motor; the other keys of the section are for yes only"},
+    {KEY("angle", "wrap"), AT(settings.angle_wrap), .type = CONFIG_WORD, .unit = "", .fallback = "as-sent",
+     .words = "as-sent|shortest", .needs = CONFIG_NEEDS_ANGLE,
+     .help = "the number as it is, several turns allowed; or modulo one turn, the shorter way round from the last angle sent, as far as "
+             "the limits let it"},
+    AXIS("angle", "deg", AXIS_ANGLE, CONFIG_NEEDS_ANGLE, -MOST_Q16, MOST_Q16),
+    AXIS("x", "mm", AXIS_X, CONFIG_NEEDS_HEXAPOD, -4000, 4000),
+    AXIS("y", "mm", AXIS_Y, CONFIG_NEEDS_HEXAPOD, -4000, 4000),
+    AXIS("z", "mm", AXIS_Z, CONFIG_NEEDS_NOTHING, -4000, 4000),
+
+    {KEY("cylinders", "speed_mm_s"), AT(settings.cylinder_speed_mm_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s",
+     ABOVE_ZERO(10000), .help = "speed limit"},
+    {KEY("cylinders", "accel_mm_s2"), AT(settings.cylinder_accel_mm_s2_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s^2",
+     ABOVE_ZERO(MOST_Q16), .help = "acceleration limit; reached only where accel^2 / jerk <= speed"},
+    {KEY("cylinders", "jerk_mm_s3"), AT(settings.cylinder_jerk_mm_s3), .type = CONFIG_INTEGER, .unit = "mm/s^3",
+     RANGE(1, MOST_INT32), .help = "jerk limit"},
+    {KEY("cylinders", "margin_mm"), AT(settings.margin_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm", .fallback = "2",
+     RANGE(0, 1000), .help = "kept free at both ends of the stroke"},
+
+    {KEY("cylinders", "following_error_mm"), AT(settings.following_error_mm_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "mm", .fallback = "20", RANGE(0, 1000),
+     .is_live = true, .help = "a cylinder further from its set-point than that for 20 ms is a fault; 0 = not watched"},
+
+    {KEY("engage", "speed_mm_s"), AT(settings.engage_speed_mm_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s",
+     .fallback = "30", ABOVE_ZERO(10000), .help = "speed limit, at most that of [cylinders]"},
+    {KEY("engage", "accel_mm_s2"), AT(settings.engage_accel_mm_s2_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s^2",
+     .fallback = "100", ABOVE_ZERO(MOST_Q16), .help = "acceleration limit, at most that of [cylinders]"},
+    {KEY("engage", "blend_ms"), AT(settings.blend_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "2000",
+     RANGE(250, 20000), .help = "least time in which a sender is faded in"},
+
+    {KEY("intensity", "start_percent"), AT(settings.intensity_start_percent), .type = CONFIG_INTEGER, .unit = "%",
+     .fallback = "max", .words = "max", RANGE(0, 100),
+     .help = "at the start, at most max_percent; `heavectl intensity` changes it while heaved runs"},
+    {KEY("intensity", "max_percent"), AT(settings.intensity_max_percent), .type = CONFIG_INTEGER, .unit = "%",
+     .fallback = "100", RANGE(1, 100), .help = "the most that can be asked for"},
+    {KEY("intensity", "ramp_ms"), AT(settings.intensity_ramp_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "2000",
+     RANGE(500, 10000), .help = "from 0 to 100 %, jerk-limited; a change by half of that takes 0.8 of it, by a tenth 0.46"},
+
+    {KEY("udp", "bind"), AT(udp.bind), .type = CONFIG_ADDRESS, .unit = "", .fallback = "127.0.0.1",
+     .help = "address to listen on: 0.0.0.0 or :: for every network card; as it stands, this machine alone"},
+    {KEY("udp", "group"), AT(udp.group), .type = CONFIG_GROUP, .unit = "", .fallback = "none", .words = "none",
+     .help = "multicast group to join, for senders that send to many platforms at once, and the network card on which; bind is then "
+             "0.0.0.0 or ::, of which :: hears IPv6 groups too"},
+    {KEY("udp", "port"), AT(udp.port), .type = CONFIG_INTEGER, .unit = "", .fallback = "9800", RANGE(1, 65535),
+     .help = "UDP port"},
+    {KEY("udp", "allow"), AT(udp.allow), .type = CONFIG_NETWORKS, .unit = "", .fallback = "any", .words = "any",
+     .is_live = true, .help = "who may send: addresses or networks such as 192.168.7.0/24, separated by commas"},
+    {KEY("udp", "takeover_ms"), AT(settings.takeover_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "2500",
+     RANGE(0, 3600000),
+     .is_live = true, .help = "silence of the sender that drives, after which another one may: one at a time, by address; 0 = all at once"},
+    {KEY("udp", "priority"), AT(settings.priority), .type = CONFIG_NETWORKS, .unit = "", .fallback = "none", .words = "none",
+     .is_live = true, .help = "senders that take over from any behind them in the list, or not in it, without waiting"},
+    {KEY("udp", "dialect"), AT(settings.dialect), .type = CONFIG_WORD, .unit = "", .fallback = "v3", .words = "v3|lenient",
+     .is_live = true, .help = "frames as in V3.0; or also with the head # or none, and commands in lower case"},
+    {KEY("udp", "stream"), AT(settings.stream_style), .type = CONFIG_WORD, .unit = "", .fallback = "smooth",
+     .words = "smooth|balanced", .help = "how a stream is rendered: 2 periods late and smoother, or 1.3 periods late"},
+    {KEY("udp", "delay_max_ms"), AT(settings.delay_max_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "120",
+     RANGE(0, 1000), .help = "what the delay of a stream may grow to where its frames come late or in bursts"},
+    {KEY("udp", "spike_gate"), AT(settings.spike_gate), .type = CONFIG_INTEGER, .unit = "", .fallback = "10",
+     RANGE(0, 1000), .is_live = true,
+     .help = "a sample of a stream that would take more than so many times an axis' acceleration limit waits for the next one to confirm "
+             "it; 0 = off"},
+    {KEY("udp", "confirm_jump_mm"), AT(settings.confirm_jump_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     .fallback = "0", RANGE(0, 4000), .is_live = true,
+     .help = "a frame whose x, y, z or extension is further than that from the last one followed is followed only once a second frame "
+             "within a second is as near to it; 0 = every frame is followed"},
+    {KEY("udp", "confirm_jump_deg"), AT(settings.confirm_jump_deg_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg",
+     .fallback = "0", RANGE(0, 360), .is_live = true, .help = "the same of roll, pitch, yaw and the rotation motor"},
+    {KEY("udp", "silence_hold_ms"), AT(settings.silence_hold_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "1000",
+     RANGE(0, 3600000), .is_live = true, .help = "silence of the sender after which the platform holds; 0 = never"},
+    {KEY("udp", "silence_neutral_ms"), AT(settings.silence_neutral_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
+     RANGE(0, 3600000), .is_live = true, .help = "silence after which it goes to neutral; 0 = never"},
+    {KEY("udp", "silence_settle_ms"), AT(settings.silence_settle_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
+     RANGE(0, 3600000), .is_live = true, .help = "silence after which it settles; 0 = never"},
+
+    {KEY("control", "socket"), AT(control_socket), .type = CONFIG_PATH, .unit = "", .fallback = SOCKET_DEFAULT,
+     .help = "local socket of heaved; as the service heave@NAME, this default stands for /run/heave/NAME/heaved.sock"},
+    {KEY("control", "metrics"), AT(metrics_file), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "file for Prometheus (node_exporter's textfile collector: a name that ends in .prom), renewed every second; removed at "
+             "the end"},
+
+    {KEY("control", "look_socket"), AT(look_socket), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "a second socket, for everybody on this machine: status, watch and hold, and nothing else"},
+    {KEY("control", "operate_group"), AT(operate_group), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "who may engage, resume, park, turn the intensity down and mark incidents as seen; none: whoever may use the socket. Everybody who may use it may "
+             "look and hold"},
+    {KEY("control", "service_group"), AT(service_group), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "who may do that and reset, turn the intensity up, dump and shut down; none: as operate_group; root always may"},
+    {KEY("control", "operator_log"), AT(operator_log), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "file that takes a line per request: when, who, what, and what became of it; none: nothing is kept, unless a service "
+             "manager has given a state directory, which then has operator.log"},
+    {KEY("control", "operator_log_kb"), AT(operator_log_kb), .type = CONFIG_INTEGER, .unit = "KB", .fallback = "1024",
+     RANGE(16, 1048576), .help = "size at which it becomes FILE.1, and a new one begins"},
+    {KEY("control", "operator_log_files"), AT(operator_log_files), .type = CONFIG_INTEGER, .unit = "", .fallback = "20",
+     RANGE(1, 100), .help = "older ones that are kept, FILE.1 the newest"},
+
+    {KEY("black-box", "directory"), AT(black_box.directory), .type = CONFIG_PATH, .unit = "", .fallback = "none", .words = "none",
+     .help = "takes one folder per incident; none: nothing is kept or written, unless a service manager has given a state directory"},
+    {KEY("black-box", "seconds"), AT(black_box.seconds), .type = CONFIG_INTEGER, .unit = "s", .fallback = "120", RANGE(10, 600),
+     .help = "kept at least, of every cycle: up to 1 MB of memory and of disk space a second, at 1000 cycles a second"},
+    {KEY("black-box", "incidents"), AT(black_box.incidents), .type = CONFIG_INTEGER, .unit = "", .fallback = "10", RANGE(1, 100),
+     .help = "folders kept in the directory, of faults and of dumps each; the oldest one makes way, but not the first fault since `heavectl seen`"},
+
+    {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim|cia402|can-raw|modbus-tcp|modbus-rtu",
+     .help = "the drives in use"},
+
+    {KEY("sim", "lag_ms"), AT(sim.lag_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0", RANGE(0, 10000),
+     .help = "time constant with which a cylinder follows its set-point; 0 = at once"},
+    {KEY("sim", "enable_delay_ms"), AT(sim.enable_delay_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
+     RANGE(0, 60000), .help = "from the enable command to enabled"},
+    {KEY("sim", "start_extension_mm"), AT(sim.start_extension_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     .fallback = "settled", .words = "settled", RANGE(0, 4000), .help = "of all cylinders at the start"},
+    {KEY("sim", "homed"), AT(sim.is_homed), .type = CONFIG_YES_NO, .unit = "", .fallback = "yes",
+     .help = "whether the drives know their position from the start"},
+
+    {KEY("can", "interface"), AT(can.interface), .type = CONFIG_NAME, .unit = "", .fallback = "can0",
+     .help = "CAN interface of the system, set up with the bit rate below"},
+    {KEY("can", "bitrate_bps"), AT(can.bitrate_bps), .type = CONFIG_INTEGER, .unit = "bit/s", .fallback = "1000000",
+     RANGE(10000, 1000000), .help = "bit rate of the bus, for its load"},
+    {KEY("can", "passive_stop_ms"), AT(can.passive_stop_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "1000",
+     RANGE(0, 60000), .help = "error-passive for so long, the platform stops (fault bus-failing); 0 = never"},
+
+    {KEY("cia402", "nodes"), AT(cia402.nodes), .type = CONFIG_IDS, .unit = "", .fallback = "1", .words = "a node id from 1 to 127",
+     .help = "node id of drive 1, the next ones follow; or one for each drive. The rotation motor is the last"},
+    {KEY("cia402", "gateway_node"), AT(cia402.gateway_node), .type = CONFIG_INTEGER, .unit = "", .fallback = "127", RANGE(1, 127),
+     .help = "node id of this gateway, whose heartbeat the drives watch"},
+    {KEY("cia402", "mode"), AT(cia402.mode), .type = CONFIG_WORD, .unit = "", .fallback = "csp", .words = "csp|ip|pp",
+     .help = "cyclic synchronous position; interpolated position; or profile position, for slow moves only"},
+    {KEY("cia402", "period_us"), AT(cia402.period_us), .type = CONFIG_INTEGER, .unit = "us", .fallback = "4000",
+     RANGE(500, 255000), .help = "period of SYNC and set-points (60C2h), a multiple of cycle_us; whole ms suit every drive"},
+    {KEY("cia402", "counts_per_mm"), AT(cia402.counts_per_mm), .type = CONFIG_RATIOS, .unit = "", .fallback = "none",
+     .count = CYLINDERS_MAX, .help = "exact, such as counts of a turn / lead; negative: the drive counts backwards"},
+    {KEY("cia402", "zero_counts"), AT(cia402.zero_counts), .type = CONFIG_WHOLES, .unit = "counts", .fallback = "0",
+     .count = CYLINDERS_MAX, .help = "position (6064h) where the cylinder is fully in"},
+    {KEY("cia402", "angle_counts_per_deg"), AT(cia402.angle_counts_per_deg), .type = CONFIG_RATIOS, .unit = "",
+     .fallback = "none", .count = 1, .needs = CONFIG_NEEDS_ANGLE, .help = "of the rotation motor"},
+    {KEY("cia402", "angle_zero_counts"), AT(cia402.angle_zero_counts), .type = CONFIG_WHOLES, .unit = "counts", .fallback = "0",
+     .count = 1, .needs = CONFIG_NEEDS_ANGLE, .help = "of the rotation motor at 0 deg"},
+    {KEY("cia402", "homing_method"), AT(cia402.homing.method), .type = CONFIG_WHOLES, .unit = "", .fallback = "0",
+     .count = CYLINDERS_MAX, .help = "6098h, for all cylinders or for each; 0 = absolute encoders, nothing to find"},
+    {KEY("cia402", "homing_speed_mm_s"), AT(cia402.homing.speed_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s",
+     .fallback = "10", ABOVE_ZERO(1000), .help = "towards the switch or stop"},
+    {KEY("cia402", "homing_zero_speed_mm_s"), AT(cia402.homing.zero_speed_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "mm/s", .fallback = "2", ABOVE_ZERO(1000), .help = "when searching for the zero itself"},
+    {KEY("cia402", "homing_accel_mm_s2"), AT(cia402.homing.accel_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s^2",
+     .fallback = "100", ABOVE_ZERO(MOST_Q16), .help = "acceleration of homing"},
+    {KEY("cia402", "homing_order"), AT(cia402.homing_order), .type = CONFIG_WORD, .unit = "", .fallback = "together",
+     .words = "together|in-turn", .help = "all drives at once, so that a level platform sinks level; or one after the other"},
+    {KEY("cia402", "angle_homing_method"), AT(cia402.angle_homing.method), .type = CONFIG_WHOLES, .unit = "", .fallback = "0",
+     .count = 1, .needs = CONFIG_NEEDS_ANGLE, .help = "6098h of the rotation motor; 0 = absolute"},
+    {KEY("cia402", "angle_homing_speed_deg_s"), AT(cia402.angle_homing.speed_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "deg/s", .fallback = "10", ABOVE_ZERO(1000), .needs = CONFIG_NEEDS_ANGLE, .help = "towards its switch"},
+    {KEY("cia402", "angle_homing_zero_speed_deg_s"), AT(cia402.angle_homing.zero_speed_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "deg/s", .fallback = "2", ABOVE_ZERO(1000), .needs = CONFIG_NEEDS_ANGLE, .help = "when searching for its zero itself"},
+    {KEY("cia402", "angle_homing_accel_deg_s2"), AT(cia402.angle_homing.accel_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "deg/s^2", .fallback = "100", ABOVE_ZERO(MOST_Q16), .needs = CONFIG_NEEDS_ANGLE, .help = "acceleration of its homing"},
+    {KEY("cia402", "following_error_mm"), AT(cia402.following_error_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     .fallback = "10", ABOVE_ZERO(1000), .help = "window that each drive watches itself (6065h); set-points further off are not sent"},
+    {KEY("cia402", "angle_following_error_deg"), AT(cia402.angle_following_error_deg_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "deg", .fallback = "10", ABOVE_ZERO(1000), .needs = CONFIG_NEEDS_ANGLE, .help = "the same of the rotation motor"},
+    {KEY("cia402", "following_error_ms"), AT(cia402.following_error_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "20",
+     RANGE(0, 1000), .help = "how long a drive may be outside its window (6066h)"},
+    {KEY("cia402", "quick_stop_mm_s2"), AT(cia402.quick_stop_mm_s2_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s^2",
+     .fallback = "0", RANGE(0, MOST_Q16), .help = "deceleration of a quick stop (6085h); 0 = as the drive has it"},
+    {KEY("cia402", "angle_quick_stop_deg_s2"), AT(cia402.angle_quick_stop_deg_s2_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "deg/s^2", .fallback = "0", RANGE(0, MOST_Q16), .needs = CONFIG_NEEDS_ANGLE, .help = "the same of the rotation motor"},
+    {KEY("cia402", "when_gateway_lost"), AT(cia402.when_gateway_lost), .type = CONFIG_WORD, .unit = "", .fallback = "fault",
+     .words = "fault|disable-voltage|quick-stop", .help = "what a drive does when this gateway falls silent (6007h)"},
+    {KEY("cia402", "when_mode_left"), AT(cia402.reaction[0]), .type = CONFIG_WORD, .unit = "", .fallback = "stop",
+     .words = "ignore|tell|stop", .help = "another mode in 6061h than the drive was set to, in two answers in a row as all of these: stop = fault of the drive, all stop; tell = log and status"},
+    {KEY("cia402", "when_not_following"), AT(cia402.reaction[1]), .type = CONFIG_WORD, .unit = "", .fallback = "stop",
+     .words = "ignore|tell|stop", .help = "bit 12 of 6041h, once it was set: the drive ignores its set-points"},
+    {KEY("cia402", "when_local"), AT(cia402.reaction[2]), .type = CONFIG_WORD, .unit = "", .fallback = "stop",
+     .words = "ignore|tell|stop", .help = "bit 9 of 6041h is not set: the drive is not led by the bus, may ignore a quick stop, and is not enabled; tell or ignore for drives that never set it"},
+    {KEY("cia402", "when_no_voltage"), AT(cia402.reaction[3]), .type = CONFIG_WORD, .unit = "", .fallback = "stop",
+     .words = "ignore|tell|stop", .help = "bit 4 of 6041h, once it was set in operation: no voltage at the power stage"},
+    {KEY("cia402", "when_limited"), AT(cia402.reaction[4]), .type = CONFIG_WORD, .unit = "", .fallback = "tell",
+     .words = "ignore|tell|stop", .help = "bit 11 of 6041h: a limit of the drive itself is active"},
+    {KEY("cia402", "when_warning"), AT(cia402.reaction[5]), .type = CONFIG_WORD, .unit = "", .fallback = "tell",
+     .words = "ignore|tell|stop", .help = "bit 7 of 6041h: the drive warns"},
+    {KEY("cia402", "heartbeat_ms"), AT(cia402.heartbeat_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "50",
+     RANGE(5, 10000), .help = "period of the heartbeats of the gateway and of the drives (1017h)"},
+    {KEY("cia402", "heartbeat_timeout_ms"), AT(cia402.heartbeat_timeout_ms), .type = CONFIG_INTEGER, .unit = "ms",
+     .fallback = "150", RANGE(10, 30000), .help = "without a heartbeat for so long the other side is lost (1016h); at least twice heartbeat_ms"},
+    {KEY("cia402", "sdo_timeout_ms"), AT(cia402.sdo_timeout_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "500",
+     RANGE(10, 10000), .help = "how long a drive may take to answer while it is set up"},
+    {KEY("cia402", "boot_timeout_ms"), AT(cia402.boot_timeout_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "5000",
+     RANGE(10, 60000), .help = "how long it may take to boot after a reset of its communication"},
+    {KEY("cia402", "power_timeout_ms"), AT(cia402.power_timeout_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "4000",
+     RANGE(10, 9000), .help = "how long the drives may take to switch on, and again to enable operation"},
+    {KEY("cia402", "sync_counter"), AT(cia402.sync_counter), .type = CONFIG_INTEGER, .unit = "", .fallback = "0", RANGE(0, 240),
+     .help = "SYNC carries a counter up to this (1019h); 0 = none"},
+    {KEY("cia402", "sync_watched"), AT(cia402.is_sync_watched), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "whether the drives are told the period of SYNC (1006h): some need that, and some then stop where one is half a period late"},
+    {KEY("cia402", "reset_communication"), AT(cia402.is_reset_wanted), .type = CONFIG_YES_NO, .unit = "", .fallback = "yes",
+     .help = "whether a drive's communication is reset before it is set up"},
+    {KEY("cia402", "allow_no_watchdog"), AT(cia402.is_no_watchdog_allowed), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "takes drives that would not stop by themselves: without 1016h, 1017h, 6007h, 605Ah, 605Eh or 6065h, or with these off"},
+    {KEY("cia402", "vendor_id"), AT(cia402.vendor_id), .type = CONFIG_INTEGER, .unit = "", .fallback = "0",
+     RANGE(0, 4294967295), .help = "1018h:1 that every drive must have; 0 = any"},
+    {KEY("cia402", "product_code"), AT(cia402.product_code), .type = CONFIG_INTEGER, .unit = "", .fallback = "0",
+     RANGE(0, 4294967295), .help = "1018h:2 that every drive must have; 0 = any"},
+    {KEY("cia402", "revision_number"), AT(cia402.revision_number), .type = CONFIG_INTEGER, .unit = "", .fallback = "0",
+     RANGE(0, 4294967295), .help = "1018h:3 that every drive must have; 0 = any"},
+    {KEY("cia402", "serial_numbers"), AT(cia402.serial_numbers), .type = CONFIG_IDS, .unit = "", .fallback = "none",
+     RANGE(0, 4294967295), .help = "1018h:4 of each drive, the rotation motor last, so that none is exchanged unnoticed; 0 = any; none: not checked"},
+    {KEY("cia402", "software_limit_mm"), AT(cia402.software_limit_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     .fallback = "5", RANGE(0, 1000), .help = "a cylinder's own position limits (607Dh) are set so far outside its stroke, where it has them; 0 = left as they are"},
+
+    {KEY("can-raw", "period_us"), AT(can_raw.period_us), .type = CONFIG_INTEGER, .unit = "us", .fallback = "4000",
+     RANGE(500, 1000000), .help = "period of the set-points, a multiple of cycle_us"},
+    {KEY("can-raw", "id_bits"), AT(can_raw.id_bits), .type = CONFIG_WORD, .unit = "", .fallback = "11", .words = "11|29",
+     .help = "width of the identifiers"},
+    {KEY("can-raw", "command_id"), AT(can_raw.command_id), .type = CONFIG_IDS, .unit = "", .fallback = "none",
+     .help = "identifier of what is sent to drive 1, the next ones follow; or one for each drive. The rotation motor is the last"},
+    {KEY("can-raw", "reply_id"), AT(can_raw.reply_id), .type = CONFIG_IDS, .unit = "", .fallback = "none",
+     .help = "the same for what the drives send"},
+    {KEY("can-raw", "counts_per_mm"), AT(can_raw.counts_per_mm), .type = CONFIG_RATIOS, .unit = "", .fallback = "none",
+     .count = CYLINDERS_MAX, .help = "exact, such as counts of a turn / lead; negative: the drive counts backwards"},
+    {KEY("can-raw", "zero_counts"), AT(can_raw.zero_counts), .type = CONFIG_WHOLES, .unit = "counts", .fallback = "0",
+     .count = CYLINDERS_MAX, .help = "where the cylinder is fully in"},
+    {KEY("can-raw", "angle_counts_per_deg"), AT(can_raw.angle_counts_per_deg), .type = CONFIG_RATIOS, .unit = "",
+     .fallback = "none", .count = 1, .needs = CONFIG_NEEDS_ANGLE, .help = "of the rotation motor"},
+    {KEY("can-raw", "angle_zero_counts"), AT(can_raw.angle_zero_counts), .type = CONFIG_WHOLES, .unit = "counts", .fallback = "0",
+     .count = 1, .needs = CONFIG_NEEDS_ANGLE, .help = "of the rotation motor at 0 deg"},
+    {KEY("can-raw", "setpoint"), AT(can_raw.setpoint), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .words = "position|speed", .help = "the frame that sends a drive to a position"},
+    {KEY("can-raw", "send"), AT(can_raw.send), .type = CONFIG_WORD, .unit = "", .fallback = "every-period",
+     .words = "every-period|on-change", .help = "on-change leaves out a set-point that is the last one again"},
+    {KEY("can-raw", "speed_counts"), AT(can_raw.speed_counts), .type = CONFIG_INTEGER, .unit = "", .fallback = "0",
+     RANGE(0, MOST_INT32), .help = "what {speed} carries at least; always, where speed_counts_per_mm_s is none"},
+    {KEY("can-raw", "speed_counts_per_mm_s"), AT(can_raw.speed_counts_per_mm_s), .type = CONFIG_RATIOS, .unit = "",
+     .fallback = "none", .count = CYLINDERS_MAX, .help = "{speed} follows the speed of the set-points by this ratio"},
+    {KEY("can-raw", "angle_speed_counts_per_deg_s"), AT(can_raw.angle_speed_counts_per_deg_s), .type = CONFIG_RATIOS, .unit = "",
+     .fallback = "none", .count = 1, .needs = CONFIG_NEEDS_ANGLE, .help = "the same of the rotation motor"},
+    {KEY("can-raw", "enable"), AT(can_raw.enable), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .help = "torque on"},
+    {KEY("can-raw", "disable"), AT(can_raw.disable), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .help = "torque off; without it drives hold their last set-point"},
+    {KEY("can-raw", "stop"), AT(can_raw.stop), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .help = "stop now, for e-stop and faults; without it disable, else no more set-points"},
+    {KEY("can-raw", "reset"), AT(can_raw.reset), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .help = "take a fault back"},
+    {KEY("can-raw", "home"), AT(can_raw.home), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .help = "find the zero; without it drives are taken to know it"},
+    {KEY("can-raw", "position_query"), AT(can_raw.position_query), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .help = "asks for position_reply; none where drives send it unasked"},
+    {KEY("can-raw", "position_reply"), AT(can_raw.position_reply), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .words = "position|status", .count = 1, .help = "where a drive is"},
+    {KEY("can-raw", "homing_query"), AT(can_raw.homing_query), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .help = "asks for homing_reply; asked by turns with the position until a drive is homed"},
+    {KEY("can-raw", "homing_reply"), AT(can_raw.homing_reply), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .words = "status", .count = 1, .help = "how homing stands"},
+    {KEY("can-raw", "enabled_when"), AT(can_raw.enabled_when), .type = CONFIG_WHEN, .unit = "", .fallback = "none",
+     .help = "{status} of position_reply when torque is on"},
+    {KEY("can-raw", "fault_when"), AT(can_raw.fault_when), .type = CONFIG_WHEN, .unit = "", .fallback = "none",
+     .help = "the same when the drive has a fault"},
+    {KEY("can-raw", "homing_done_when"), AT(can_raw.homing_done_when), .type = CONFIG_WHEN, .unit = "", .fallback = "none",
+     .help = "{status} of homing_reply, or of position_reply where there is no homing_query, when the drive has its zero"},
+    {KEY("can-raw", "homing_failed_when"), AT(can_raw.homing_failed_when), .type = CONFIG_WHEN, .unit = "", .fallback = "none",
+     .help = "the same when homing has failed"},
+    {KEY("can-raw", "query_every"), AT(can_raw.query_every), .type = CONFIG_INTEGER, .unit = "periods", .fallback = "1",
+     RANGE(1, 1000), .help = "how often each drive is asked; the drives take turns"},
+    {KEY("can-raw", "offline_periods"), AT(can_raw.offline_periods), .type = CONFIG_INTEGER, .unit = "periods", .fallback = "20",
+     RANGE(3, 10000), .help = "without a position for so long a drive is gone; more than twice query_every"},
+    {KEY("can-raw", "following_error_mm"), AT(can_raw.following_error_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     .fallback = "20", RANGE(0, 1000), .help = "largest distance of a set-point from the position last heard; 0 = not watched"},
+    {KEY("can-raw", "angle_following_error_deg"), AT(can_raw.angle_following_error_deg_q16), .type = CONFIG_DECIMAL, .count = 1,
+     .unit = "deg", .fallback = "20", RANGE(0, 1000), .needs = CONFIG_NEEDS_ANGLE, .help = "the same of the rotation motor"},
+
+    {KEY("modbus", "units"), AT(modbus.units), .type = CONFIG_IDS, .unit = "", .words = "a unit id from 1 to 247",
+     .fallback = "1", .help = "unit id of drive 1, the next ones follow; with a host for each drive the same for all; or one for each. The rotation motor is the last"},
+    {KEY("modbus", "period_us"), AT(modbus.period_us), .type = CONFIG_INTEGER, .unit = "us",
+     .fallback = "10000", RANGE(500, 1000000), .help = "set-points and questions to a drive are no closer; a slow line takes the time it needs"},
+    {KEY("modbus", "timeout_ms"), AT(modbus.timeout_ms), .type = CONFIG_INTEGER, .unit = "ms",
+     .fallback = "30", RANGE(5, 900), .help = "how long a drive may take to answer"},
+    {KEY("modbus", "turnaround_us"), AT(modbus.turnaround_us), .type = CONFIG_INTEGER, .unit = "us",
+     .fallback = "2000", RANGE(0, 100000), .help = "how long it usually takes, for the rate that is expected; the rate in use is measured"},
+    {KEY("modbus", "retries"), AT(modbus.retries), .type = CONFIG_INTEGER, .unit = "",
+     .fallback = "2", RANGE(0, 10), .help = "failures in a row that are borne, of reads and of writes; one more, and the drive is gone"},
+    {KEY("modbus", "feedback_timeout_ms"), AT(modbus.feedback_timeout_ms), .type = CONFIG_INTEGER, .unit = "ms",
+     .fallback = "300", RANGE(10, 10000), .help = "a drive whose newest feedback is older is gone"},
+    {KEY("modbus", "read"), AT(modbus.read), .type = CONFIG_WORD, .unit = "",
+     .fallback = "holding", .words = "holding|input", .help = "registers that feedback is read from: function 3 or 4"},
+    {KEY("modbus", "write"), AT(modbus.write), .type = CONFIG_WORD, .unit = "",
+     .fallback = "multiple", .words = "multiple|single", .help = "blocks of one register are written by function 16 or 6, longer ones always by 16"},
+    {KEY("modbus", "broadcast"), AT(modbus.is_broadcast), .type = CONFIG_YES_NO, .unit = "",
+     .fallback = "no", .help = "whether the drives obey broadcasts (unit 0): a stop then goes to all of a line at once, before it goes to each"},
+    {KEY("modbus", "counts_per_mm"), AT(modbus.counts_per_mm), .type = CONFIG_RATIOS, .unit = "",
+     .fallback = "none", .count = CYLINDERS_MAX, .help = "exact, such as counts of a turn / lead; negative: the drive counts backwards"},
+    {KEY("modbus", "zero_counts"), AT(modbus.zero_counts), .type = CONFIG_WHOLES, .unit = "counts",
+     .fallback = "0", .count = CYLINDERS_MAX, .help = "where the cylinder is fully in"},
+    {KEY("modbus", "angle_counts_per_deg"), AT(modbus.angle_counts_per_deg), .type = CONFIG_RATIOS, .unit = "",
+     .fallback = "none", .count = 1, .needs = CONFIG_NEEDS_ANGLE, .help = "of the rotation motor"},
+    {KEY("modbus", "angle_zero_counts"), AT(modbus.angle_zero_counts), .type = CONFIG_WHOLES, .unit = "counts",
+     .fallback = "0", .count = 1, .needs = CONFIG_NEEDS_ANGLE, .help = "of the rotation motor at 0 deg"},
+    {KEY("modbus", "setpoint"), AT(modbus.setpoint), .type = CONFIG_BLOCKS, .unit = "",
+     .fallback = "none", .words = "position|speed", .help = "what sends a drive to a position"},
+    {KEY("modbus", "speed_counts"), AT(modbus.speed_counts), .type = CONFIG_INTEGER, .unit = "",
+     .fallback = "0", RANGE(0, MOST_INT32), .help = "what {speed} carries at least; always, where speed_counts_per_mm_s is none"},
+    {KEY("modbus", "speed_counts_per_mm_s"), AT(modbus.speed_counts_per_mm_s), .type = CONFIG_RATIOS, .unit = "",
+     .fallback = "none", .count = CYLINDERS_MAX, .help = "{speed} follows the speed of the set-points by this ratio"},
+    {KEY("modbus", "angle_speed_counts_per_deg_s"), AT(modbus.angle_speed_counts_per_deg_s), .type = CONFIG_RATIOS, .unit = "",
+     .fallback = "none", .count = 1, .needs = CONFIG_NEEDS_ANGLE, .help = "the same of the rotation motor"},
+    {KEY("modbus", "feedback"), AT(modbus.feedback), .type = CONFIG_BLOCKS, .unit = "",
+     .fallback = "none", .words = "position|status|alarm", .count = 1, .help = "where a drive is, how it is, and its alarm"},
+    {KEY("modbus", "enable"), AT(modbus.enable), .type = CONFIG_BLOCKS, .unit = "",
+     .fallback = "none", .help = "torque on"},
+    {KEY("modbus", "disable"), AT(modbus.disable), .type = CONFIG_BLOCKS, .unit = "",
+     .fallback = "none", .help = "torque off; without it drives hold their last set-point"},
+    {KEY("modbus", "stop"), AT(modbus.stop), .type = CONFIG_BLOCKS, .unit = "",
+     .fallback = "none", .help = "stop now, for e-stop and faults; without it disable, else no more set-points"},
+    {KEY("modbus", "reset"), AT(modbus.reset), .type = CONFIG_BLOCKS, .unit = "",
+     .fallback = "none", .help = "take a fault back"},
+    {KEY("modbus", "target_after_enable"), AT(modbus.is_target_last), .type = CONFIG_YES_NO, .unit = "",
+     .fallback = "no", .help = "no: a drive's target is set to where it is before enable; yes: right after it, for drives that writing a target starts"},
+    {KEY("modbus", "home"), AT(modbus.home), .type = CONFIG_BLOCKS, .unit = "",
+     .fallback = "none", .help = "find the zero; without it drives are taken to know it"},
+    {KEY("modbus", "enabled_when"), AT(modbus.enabled_when), .type = CONFIG_WHEN, .unit = "",
+     .fallback = "none", .help = "{status} when torque is on"},
+    {KEY("modbus", "fault_when"), AT(modbus.fault_when), .type = CONFIG_WHEN, .unit = "",
+     .fallback = "none", .help = "{status} when the drive has a fault; without it an {alarm} that is not 0"},
+    {KEY("modbus", "homing_done_when"), AT(modbus.homing_done_when), .type = CONFIG_WHEN, .unit = "",
+     .fallback = "none", .help = "{status} when the drive has its zero"},
+    {KEY("modbus", "homing_failed_when"), AT(modbus.homing_failed_when), .type = CONFIG_WHEN, .unit = "",
+     .fallback = "none", .help = "{status} when homing has failed"},
+    {KEY("modbus", "startup"), AT(modbus.startup), .type = CONFIG_ITEMS, .unit = "",
+     .fallback = "none", .help = "registers that are written, read back or looked at, in this order, before a drive is ready"},
+    {KEY("modbus", "drive_timeout"), AT(modbus.drive_timeout), .type = CONFIG_ITEMS, .unit = "",
+     .fallback = "none", .help = "the drive's own watch over the communication, as startup: what makes it stop when this gateway falls silent"},
+    {KEY("modbus", "drive_timeout_confirmed"), AT(modbus.is_drive_timeout_confirmed), .type = CONFIG_YES_NO, .unit = "",
+     .fallback = "no", .help = "yes, where drive_timeout is none: somebody has set that watch in every drive and has seen it stop the drive"},
+    {KEY("modbus", "step_mm"), AT(modbus.step_mm_q16), .type = CONFIG_DECIMAL, .unit = "mm",
+     .fallback = "5", .count = 1, RANGE(0, 1000), .help = "largest way from one set-point to the next: a slow line makes the motion slower, not the steps longer; 0 = any"},
+    {KEY("modbus", "angle_step_deg"), AT(modbus.angle_step_deg_q16), .type = CONFIG_DECIMAL, .unit = "deg",
+     .fallback = "5", .count = 1, RANGE(0, 1000), .needs = CONFIG_NEEDS_ANGLE, .help = "the same of the rotation motor"},
+    {KEY("modbus", "following_error_mm"), AT(modbus.following_error_mm_q16), .type = CONFIG_DECIMAL, .unit = "mm",
+     .fallback = "20", .count = 1, RANGE(0, 1000), .help = "largest distance of a set-point from the position last heard; 0 = not watched"},
+    {KEY("modbus", "angle_following_error_deg"), AT(modbus.angle_following_error_deg_q16), .type = CONFIG_DECIMAL, .unit = "deg",
+     .fallback = "20", .count = 1, RANGE(0, 1000), .needs = CONFIG_NEEDS_ANGLE, .help = "the same of the rotation motor"},
+
+    {KEY("modbus-tcp", "hosts"), AT(modbus_tcp.hosts), .type = CONFIG_HOSTS, .unit = "",
+     .fallback = "none", .help = "address of each drive, port 502 unless given; or one gateway for all, which tells them by unit"},
+
+    {KEY("modbus-rtu", "device"), AT(modbus_rtu.device), .type = CONFIG_PATH, .unit = "",
+     .fallback = "/dev/ttyUSB0", .help = "serial port; a name of /dev/serial/by-id stays the same whatever is plugged in"},
+    {KEY("modbus-rtu", "baud_bps"), AT(modbus_rtu.baud_bps), .type = CONFIG_INTEGER, .unit = "bit/s",
+     .fallback = "115200", RANGE(1200, 4000000), .help = "as set in the drives"},
+    {KEY("modbus-rtu", "parity"), AT(modbus_rtu.parity), .type = CONFIG_WORD, .unit = "",
+     .fallback = "even", .words = "none|even|odd", .help = "as set in the drives"},
+    {KEY("modbus-rtu", "stop_bits"), AT(modbus_rtu.stop_bits), .type = CONFIG_INTEGER, .unit = "",
+     .fallback = "1", RANGE(1, 2), .help = "as set in the drives; 2 where there is no parity"},
+    {KEY("modbus-rtu", "rs485"), AT(modbus_rtu.rs485), .type = CONFIG_WORD, .unit = "",
+     .fallback = "automatic", .words = "automatic|kernel|rts-high|rts-low", .help = "who turns the line around: the adapter, the serial driver (TIOCSRS485), or heaved by RTS, which is high or low while sending"},
+    {KEY("modbus-rtu", "rs485_delay_us"), AT(modbus_rtu.rs485_delay_us), .type = CONFIG_INTEGER, .unit = "us",
+     .fallback = "0", RANGE(0, 10000), .help = "between RTS and the first bit, and the last bit and RTS"},
+
+    {KEY("relays", "driver"), AT(relays.driver), .type = CONFIG_WORD, .unit = "", .fallback = "sim", .words = "sim|gpio|modbus",
+     .help = "the outputs in use: simulated, GPIO lines (docs/gpio.md), or coils of a Modbus board (docs/modbus.md)"},
+    {KEY("relays", "chip"), AT(relays.chip), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "GPIO: label of the chip that has the lines; none: whichever has lines of these names"},
+    {KEY("relays", "lines"), AT(relays.lines), .type = CONFIG_LINES, .unit = "", .fallback = "none",
+     .help = "output line of relay 1, of relay 2, ...; as many relays as lines. GPIO: names of lines, or with chip their numbers; "
+             "Modbus: numbers of coils that follow each other, from 0"},
+    {KEY("relays", "active_low"), AT(relays.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "whether a low level closes a relay"},
+    {KEY("relays", "safe_mask"), AT(settings.relay_safe_mask), .type = CONFIG_MASK, .unit = "", .fallback = "0", RANGE(0, 0xFFF),
+     .is_live = true, .help = "relays that are closed whenever no sender is followed (every state but ENGAGED); bit 0 = relay 1"},
+    {KEY("relays", "safe_after_ms"), AT(settings.relay_safe_after_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0",
+     RANGE(0, 600000), .is_live = true, .help = "how long a hold leaves the relays as the sender set them; every other state at once"},
+    {KEY("relays", "max_on_ms"), AT(settings.relays.max_on_ms), .type = CONFIG_PER_RELAY, .unit = "ms", .fallback = "0",
+     RANGE(0, 86400000), .help = "a relay that has been closed for so long opens, until a sender has asked for open; 0 = never"},
+    {KEY("relays", "min_toggle_ms"), AT(settings.relays.min_toggle_ms), .type = CONFIG_PER_RELAY, .unit = "ms", .fallback = "0",
+     RANGE(0, 60000), .help = "a relay that has changed stays so for this time at least; safe_mask and max_on_ms do not wait for it"},
+
+    {KEY("relays-modbus", "host"), AT(relays_modbus.hosts), .type = CONFIG_HOSTS, .unit = "",
+     .fallback = "none", .help = "address of the board, port 502 unless given; none: it is on a serial line"},
+    {KEY("relays-modbus", "device"), AT(relays_modbus.serial.device), .type = CONFIG_PATH, .unit = "",
+     .fallback = "none", .words = "none", .help = "its serial port; a name of /dev/serial/by-id stays the same whatever is plugged in"},
+    {KEY("relays-modbus", "baud_bps"), AT(relays_modbus.serial.baud_bps), .type = CONFIG_INTEGER, .unit = "bit/s",
+     .fallback = "9600", RANGE(1200, 4000000), .help = "as set in the board"},
+    {KEY("relays-modbus", "parity"), AT(relays_modbus.serial.parity), .type = CONFIG_WORD, .unit = "",
+     .fallback = "none", .words = "none|even|odd", .help = "as set in the board"},
+    {KEY("relays-modbus", "stop_bits"), AT(relays_modbus.serial.stop_bits), .type = CONFIG_INTEGER, .unit = "",
+     .fallback = "1", RANGE(1, 2), .help = "as set in the board"},
+    {KEY("relays-modbus", "rs485"), AT(relays_modbus.serial.rs485), .type = CONFIG_WORD, .unit = "",
+     .fallback = "automatic", .words = "automatic|kernel|rts-high|rts-low", .help = "as in [modbus-rtu]"},
+    {KEY("relays-modbus", "rs485_delay_us"), AT(relays_modbus.serial.rs485_delay_us), .type = CONFIG_INTEGER, .unit = "us",
+     .fallback = "0", RANGE(0, 10000), .help = "as in [modbus-rtu]"},
+    {KEY("relays-modbus", "unit"), AT(relays_modbus.unit), .type = CONFIG_INTEGER, .unit = "",
+     .fallback = "1", RANGE(1, 255), .help = "of the board"},
+    {KEY("relays-modbus", "timeout_ms"), AT(relays_modbus.timeout_ms), .type = CONFIG_INTEGER, .unit = "ms",
+     .fallback = "100", RANGE(10, 999), .help = "how long an answer may take"},
+
+    {KEY("inputs", "driver"), AT(inputs.driver), .type = CONFIG_WORD, .unit = "", .fallback = "sim", .words = "sim|gpio",
+     .help = "the inputs in use: simulated, or GPIO lines (docs/gpio.md)"},
+    {KEY("inputs", "chip"), AT(inputs.chip), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "GPIO: label of the chip that has the lines; none: whichever has lines of these names"},
+    {KEY("inputs", "estop"), AT(inputs.estop_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "line of a normally closed contact of the emergency stop: open, or a broken wire, stops"},
+    {KEY("inputs", "estop2"), AT(inputs.estop2_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "line of a second channel of it, normally closed too: either one stops"},
+    {KEY("inputs", "estop_discrepancy_ms"), AT(inputs.estop_discrepancy_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "500",
+     RANGE(100, 10000), .help = "two channels that disagree for so long are a fault, until both have opened together and closed again"},
+    {KEY("inputs", "power"), AT(inputs.power_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "line of a contact that is closed while the supply is good (of a UPS): open, the platform settles and stays; not with "
+             "engage = auto"},
+    {KEY("inputs", "power_settle_ms"), AT(settings.power_settle_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "20000",
+     RANGE(100, 3600000), .is_live = true, .help = "what is not settled so long after the supply began to fail stops where it is and goes off"},
+    {KEY("inputs", "enable"), AT(inputs.enable_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "line of the enable key, closed when on: off parks, and nobody engages"},
+    {KEY("inputs", "reset"), AT(inputs.reset_line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "line of the reset button, closed when pressed"},
+    {KEY("inputs", "active_low"), AT(inputs.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "yes",
+     .help = "whether a closed contact pulls its line low (contacts to ground); no: high (contacts to supply)"},
+
+    {KEY("healthy", "driver"), AT(healthy.driver), .type = CONFIG_WORD, .unit = "", .fallback = "none", .words = "none|gpio|relay",
+     .help = "what carries it: nothing, a GPIO line of its own, or one of the relays, coils of a Modbus board included"},
+    {KEY("healthy", "chip"), AT(healthy.chip), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "GPIO: label of the chip that has the line; none: whichever has a line of this name"},
+    {KEY("healthy", "line"), AT(healthy.line), .type = CONFIG_LABEL, .unit = "", .fallback = "none",
+     .help = "GPIO: the output line, by name, or with chip by number"},
+    {KEY("healthy", "active_low"), AT(healthy.is_active_low), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "whether the line rests high"},
+    {KEY("healthy", "relay"), AT(settings.healthy.relay), .type = CONFIG_INTEGER, .unit = "", .fallback = "0", RANGE(0, 12),
+     .help = "driver = relay: its number; senders do not switch it any more, and max_on_ms and min_toggle_ms are not for it"},
+    {KEY("healthy", "toggle_ms"), AT(settings.healthy.toggle_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "10",
+     RANGE(1, 1000), .help = "time between two edges, rounded up to whole cycles; 100 and more for a Modbus board"},
+    {KEY("healthy", "off_ms"), AT(settings.healthy.off_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "500",
+     RANGE(0, 60000), .help = "once it stops it stays away for so long at least; longer than the watchdog waits for an edge"},
+    {KEY("healthy", "late_cycles"), AT(settings.healthy.late_cycles), .type = CONFIG_INTEGER, .unit = "", .fallback = "3",
+     RANGE(0, 1000), .help = "a cycle that is late by more cycles than that stops it"},
+};
+/* clang-format on */
+const size_t config_key_count = sizeof config_keys / sizeof config_keys[0];
+
+int config_section_find(const char *name)
+{
+    for (size_t i = 0; i < config_section_count; i++) {
+        if (strcmp(config_sections[i].name, name) == 0) {
+            return (int)i;
+        }
+    }
+    return -1;
+}
+
+int config_key_find(const char *section, const char *name)
+{
+    for (size_t i = 0; i < config_key_count; i++) {
+        if (strcmp(config_keys[i].section, section) == 0 && strcmp(config_keys[i].name, name) == 0) {
+            return (int)i;
+        }
+    }
+    return -1;
+}
+
+static unsigned smallest(unsigned a, unsigned b, unsigned c)
+{
+    const unsigned ab = a < b ? a : b;
+    return ab < c ? ab : c;
+}
+
+/* Levenshtein distance; one row of the matrix at a time. */
+static unsigned edit_distance(const char *from, const char *to)
+{
+    unsigned row[SUGGEST_LENGTH_MAX + 1u];
+    const size_t width = strlen(to);
+    if (width > SUGGEST_LENGTH_MAX || strlen(from) > SUGGEST_LENGTH_MAX) {
+        return SUGGEST_LENGTH_MAX;
+    }
+    for (unsigned j = 0; j <= width; j++) {
+        row[j] = j;
+    }
+    for (unsigned i = 1; from[i - 1u] != '\0'; i++) {
+        unsigned diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= width; j++) {
+            const unsigned above = row[j];
+            row[j] = smallest(above + 1u, row[j - 1u] + 1u, diagonal + (from[i - 1u] != to[j - 1u]));
+            diagonal = above;
+        }
+    }
+    return row[width];
+}
+
+/* Keeps the better of two suggestions. */
+static void offer(const char *asked, const char *name, const char **best, unsigned *best_distance)
+{
+    const unsigned distance = edit_distance(asked, name);
+    if (distance < *best_distance) {
+        *best = name;
+        *best_distance = distance;
+    }
+}
+
+/* A suggestion may differ in a third of the letters. */
+static unsigned distance_limit(const char *asked)
+{
+    return (unsigned)(strlen(asked) / 3u) + 2u;
+}
+
+const char *config_section_suggest(const char *name)
+{
+    const char *best = NULL;
+    unsigned distance = distance_limit(name);
+    for (size_t i = 0; i < config_section_count; i++) {
+        offer(name, config_sections[i].name, &best, &distance);
+    }
+    return best;
+}
+
+const char *config_key_suggest(const char *section, const char *name)
+{
+    const char *best = NULL;
+    unsigned distance = distance_limit(name);
+    for (size_t i = 0; i < config_key_count; i++) {
+        if (strcmp(config_keys[i].section, section) == 0) {
+            offer(name, config_keys[i].name, &best, &distance);
+        }
+    }
+    return best;
+}
+
+bool config_is_applicable(config_needs_t needs, const config_t *config)
+{
+    switch (needs) {
+    case CONFIG_NEEDS_NOTHING:
+        return true;
+    case CONFIG_NEEDS_HEXAPOD:
+        return config->settings.geometry.kind == KIN_HEXAPOD;
+    case CONFIG_NEEDS_ANGLE:
+        return config->settings.has_angle;
+    }
+    return true;
+}
+
+const char *config_axis_unit(unsigned axis)
+{
+    return axis >= AXIS_X && axis <= AXIS_Z ? "mm" : "deg";
+}
+
+const char *config_kind_name(kin_kind_t kind)
+{
+    static const char *const names[] = {"hexapod", "tripod", "tripod-3rps"};
+    return names[kind];
+}
+
+bool config_has_axis(const config_t *config, unsigned axis)
+{
+    if (axis == AXIS_ANGLE) {
+        return config->settings.has_angle;
+    }
+    return config_is_applicable(config_sections[config_section_find(config_axis_section[axis])].needs, config);
+}

@@ -1,0 +1,169 @@
+/* SPDX-License-Identifier: MIT
+ * main.c - heaved: reads the command line and the configuration, then runs what was asked for.
+ */
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/atomic_file.h"
+#include "common/message.h"
+#include "common/same_file.h"
+#include "common/standard_descriptors.h"
+#include "common/usage.h"
+#include "config/config.h"
+#include "daemon/gpio_setup.h"
+#include "daemon/live.h"
+#include "daemon/options.h"
+#include "daemon/play.h"
+#include "heave/gateway.h"
+#include "inspect/dbc.h"
+#include "inspect/doctor.h"
+#include "inspect/envelope_csv.h"
+#include "inspect/report.h"
+
+void hv_assert_failed(const char *file, int line)
+{
+    (void)print_message(0, "%s:%d: assertion failed, this is a bug", file, line);
+    abort();
+}
+
+/* Whether there is a file that may be read. Not by reading it: from a pipe it comes once. */
+static bool is_readable(const char *path)
+{
+    struct stat about;
+    if (stat(path, &about) != 0) {
+        return false;
+    }
+    errno = EISDIR;
+    return !S_ISDIR(about.st_mode) && access(path, R_OK) == 0;
+}
+
+/** A file that a run reads or writes, and the option that names it. */
+typedef struct {
+    const char *option;
+    const char *path; /**< NULL: none */
+    bool is_output;
+} named_t;
+
+/* Before anything is opened: an output that is an input would empty it, and two outputs would overwrite each other.
+ * Returns EXIT_DONE; else it has said what is wrong. */
+static int check_outputs(const options_t *options, const char *metrics)
+{
+    const named_t named[] = {{"--config", options->config, false},    {"--play", options->play, false},
+                             {"--trace", options->trace, true},       {"--record", options->record, true},
+                             {"--envelope", options->envelope, true}, {"[control] metrics", metrics, true}};
+    for (size_t out = 0; out < sizeof named / sizeof named[0]; out++) {
+        for (size_t in = 0; named[out].is_output && named[out].path != NULL && in < out; in++) {
+            if (named[in].path != NULL && same_file(named[out].path, named[in].path, named[in].is_output)) {
+                return print_message(EXIT_BAD_USAGE,
+                                     "%s %s is the file of %s, and would be written over; give it a name of its own",
+                                     named[out].option, named[out].path, named[in].option);
+            }
+        }
+    }
+    return EXIT_DONE;
+}
+
+/* Standard output that took everything. */
+static int end_stdout(int code)
+{
+    if (fflush(stdout) != 0 || ferror(stdout) != 0) {
+        return print_message(EXIT_IO, "standard output: %s", strerror(errno));
+    }
+    return code;
+}
+
+static int dump_dbc(const options_t *options, const config_t *config)
+{
+    if (config->drives != CONFIG_DRIVES_CAN_RAW) {
+        return print_message(EXIT_BAD_CONFIG, "%s: [drives] driver: has no frames of its own; allowed for --dump-dbc: can-raw",
+                             options->config);
+    }
+    dbc_write(config, stdout);
+    return end_stdout(EXIT_DONE);
+}
+
+static int write_envelope(const char *path, const config_t *config)
+{
+    static envelope_t envelope;
+    static atomic_file_t file;
+    if (!envelope_find(&envelope, &config->settings)) {
+        return EXIT_SOFTWARE; /* not a configuration that config_load() accepted */
+    }
+    if (!atomic_file_open(&file, path)) {
+        return print_message(EXIT_NO_OUTPUT, "%s: %s", path, strerror(errno));
+    }
+    envelope_csv_write(&envelope, file.stream);
+    if (!atomic_file_close(&file)) {
+        return print_message(EXIT_IO, "%s: %s", path, strerror(errno));
+    }
+    return EXIT_DONE;
+}
+
+static int run(const options_t *options, const config_t *config)
+{
+    switch (options->mode) {
+    case MODE_RUN:
+        return live_run(config, options);
+    case MODE_PLAY:
+        return play_run(config, options->play, options->trace);
+    case MODE_CHECK:
+        (void)report_write(config, sizeof(gateway_t), stdout);
+        (void)gpio_setup_check(config, stdout);
+        return end_stdout(EXIT_DONE);
+    case MODE_ENVELOPE:
+        return write_envelope(options->envelope, config);
+    case MODE_DOCTOR:
+        return end_stdout(doctor_run(config, options->config, stdout) ? EXIT_DONE : EXIT_REFUSED);
+    case MODE_DUMP_CONFIG:
+        config_dump(config, stdout);
+        return end_stdout(EXIT_DONE);
+    case MODE_DUMP_DBC:
+        return dump_dbc(options, config);
+    case MODE_HELP:
+    case MODE_VERSION:
+        break;
+    }
+    return EXIT_SOFTWARE;
+}
+
+int main(int argc, char **argv)
+{
+    options_t options;
+    static config_t config;
+    if (!standard_descriptors_open()) {
+        return print_message(EXIT_UNAVAILABLE,
+                             "standard input, output or error is closed, and the null device cannot be put there: %s",
+                             strerror(errno));
+    }
+    (void)signal(SIGXFSZ, SIG_IGN); /* a file that has reached its limit is an error of the write */
+    int code = options_read(&options, argc, argv);
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    if (options.mode == MODE_HELP || options.mode == MODE_VERSION) {
+        if (options.mode == MODE_HELP) {
+            usage_print(&heaved_usage, stdout);
+        } else {
+            printf("heaved " HEAVE_VERSION "\n");
+        }
+        return end_stdout(EXIT_DONE);
+    }
+    if (!is_readable(options.config)) {
+        return print_message(EXIT_NO_INPUT, "%s: %s", options.config, strerror(errno));
+    }
+    code = check_outputs(&options, NULL);
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    if (config_load(options.config, &config, stderr) != 0) {
+        return EXIT_BAD_CONFIG;
+    }
+    const bool has_metrics = options.mode == MODE_RUN && strcmp(config.metrics_file, "none") != 0;
+    code = check_outputs(&options, has_metrics ? config.metrics_file : NULL);
+    return code == EXIT_DONE ? run(&options, &config) : code;
+}

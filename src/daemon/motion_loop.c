@@ -1,0 +1,469 @@
+/* SPDX-License-Identifier: MIT
+ * motion_loop.c - the motion thread; see motion_loop.h.
+ */
+#include "daemon/motion_loop.h"
+
+#include <errno.h>
+#include <sched.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/resource.h>
+
+#include "heave/text.h"
+#include "record/record.h"
+#include "service/operator_requests.h"
+
+#define PRIORITY           80 /* above threaded interrupts, which have 50 */
+#define STACK_BYTES        (512u * 1024u)
+#define STACK_TOUCH        (128u * 1024u)
+#define PAGE_BYTES         4096u
+#define REQUESTS_PER_CYCLE 4u
+#define QUIT_MOST_US       100000u /* for drives to take their last word; a brake and a ramp may take longer */
+#define KERNEL_ASKED_US    100000u
+
+hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_udp_t udp, hal_log_t log, hal_clock_t clock)
+{
+    self->clock = clock;
+    self->late_hold_cycles = config->late_hold_cycles;
+    self->allow = config->udp.allow;
+    handover_init(&self->handover);
+    self->tap = (udp_recorder_t){
+        .behind = udp,
+        .allow = &self->allow,
+        .record = {self->is_recording ? &self->handover.record : NULL, self->blackbox != NULL ? &self->blackbox->records : NULL},
+        .now_us = &self->session.now_us,
+        .clock = clock,
+        .cycle_us = config->settings.cycle_us};
+    self->io = (gateway_io_t){.udp = udp_recorder_hal(&self->tap), .log = log};
+    const hv_status_t status = devices_open(&self->devices, config, &self->io);
+    if (status != HV_OK) {
+        return status;
+    }
+    const bool has_channels = config->inputs.estop2_line.text[0] != '\0';
+    switches_init(&self->switches, self->io.inputs, has_channels ? config->inputs.estop_discrepancy_ms * 1000 : 0);
+    self->io.inputs = switches_hal(&self->switches);
+    return session_init(&self->session, &config->settings, &self->io);
+}
+
+/* --- Hand-overs --- */
+
+static void note_at(motion_loop_t *self, record_kind_t kind, uint64_t t_us, uint32_t value)
+{
+    if (self->is_recording) {
+        record_push(&self->handover.record, kind, t_us, value);
+    }
+    if (self->blackbox != NULL) {
+        blackbox_note(self->blackbox, kind, t_us, value);
+    }
+}
+
+static void note(motion_loop_t *self, record_kind_t kind, uint32_t value)
+{
+    note_at(self, kind, self->session.now_us, value);
+}
+
+static void take_reloads(motion_loop_t *self)
+{
+    motion_reload_t reload;
+    while (ring_pop(&self->handover.reloads, &reload, sizeof reload) > 0) {
+        note(self, RECORD_RELOAD, 0);
+        gateway_reload(&self->session.gateway, &reload.settings);
+        self->allow = reload.allow;
+        self->late_hold_cycles = reload.late_hold_cycles;
+    }
+}
+
+/* --- The operator: requests, switches --- */
+
+/* A hold of drives that were coming up has disabled them. */
+static bool is_down(const motion_loop_t *self)
+{
+    const state_t state = gateway_snapshot(&self->session.gateway)->state;
+    return state == STATE_OFF || (state == STATE_HOLD && self->before_hold == STATE_HOMING);
+}
+
+/* Without the key nothing goes up, and drives stay off. */
+static bool is_for_the_key(const motion_loop_t *self, uint32_t event)
+{
+    return event == EVENT_ENGAGE || event == EVENT_RESUME || (event == EVENT_PARK && is_down(self));
+}
+
+static hv_status_t carry_out(motion_loop_t *self, const motion_request_t *request)
+{
+    if (request->event == OPERATOR_INTENSITY) {
+        note(self, RECORD_INTENSITY, request->number);
+        return gateway_set_intensity(&self->session.gateway, request->number);
+    }
+    note(self, RECORD_REQUEST, request->event);
+    self->current.view.is_shutting_down |= request->event == EVENT_SHUTDOWN;
+    return gateway_request(&self->session.gateway, (event_t)request->event, self->session.now_us);
+}
+
+/* Requests that wait, in order, before the cycle.
+ * Returns how many; their results are complete after the cycle. */
+static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE])
+{
+    unsigned count = 0;
+    motion_request_t request;
+    const bool is_unapproved = __atomic_load_n(&self->handover.is_unapproved, __ATOMIC_ACQUIRE) != 0;
+    while (count < REQUESTS_PER_CYCLE && ring_pop(&self->handover.requests, &request, sizeof request) > 0) {
+        result[count].id = request.id;
+        result[count].is_key_off = switches_is_key_off(&self->switches) && is_for_the_key(self, request.event);
+        result[count].is_unapproved = is_unapproved && is_for_the_key(self, request.event);
+        result[count].is_power_failing = switches_is_power_failing(&self->switches) && is_for_the_key(self, request.event);
+        const bool is_barred = result[count].is_key_off || result[count].is_unapproved || result[count].is_power_failing;
+        result[count].status = is_barred ? HV_ERR_STATE : carry_out(self, &request);
+        count++;
+    }
+    return count;
+}
+
+static void turn_off(motion_loop_t *self)
+{
+    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
+    const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
+    if (!is_latched && !is_down(self) && (s->goal == STATE_NEUTRAL || s->goal == STATE_ENGAGED)) {
+        hal_log_write(self->io.log, HAL_LOG_NOTICE, "the enable key was turned off: parking");
+        (void)!carry_out(self, &(motion_request_t){.event = EVENT_PARK});
+    }
+}
+
+/* Down as long as there is power, but nobody's hold is ended for it: somebody may be below. What does not get there in time is
+ * the gateway's to stop. */
+static void lose_power(motion_loop_t *self)
+{
+    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
+    const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
+    const bool is_held = s->state == STATE_HOLD && !s->is_held_by_silence;
+    hal_log_write(self->io.log, HAL_LOG_ERROR,
+                  is_held ? "the supply is failing: the platform is on hold, park settles it"
+                          : "the supply is failing: settling");
+    if (!is_latched && !is_held && !is_down(self)) {
+        (void)!carry_out(self, &(motion_request_t){.event = EVENT_PARK});
+    }
+}
+
+static void tell_blind(motion_loop_t *self)
+{
+    const bool is_blind = switches_is_lost(&self->switches);
+    if (is_blind != self->was_blind) {
+        hal_log_write(self->io.log, is_blind ? HAL_LOG_ERROR : HAL_LOG_NOTICE,
+                      is_blind ? "inputs: cannot be read, which counts as an e-stop" : "inputs: read again");
+    }
+    self->was_blind = is_blind;
+}
+
+/* Key and button as requests, so that a recording replays them. The e-stop is the gateway's. */
+static void take_switches(motion_loop_t *self)
+{
+    const switches_change_t change = switches_step(&self->switches, self->session.now_us);
+    tell_blind(self);
+    if ((change.off & INPUT_ENABLE) != 0) {
+        turn_off(self);
+    }
+    if ((change.on & INPUT_POWER) != 0) {
+        lose_power(self);
+    }
+    if ((change.off & INPUT_POWER) != 0) {
+        hal_log_write(self->io.log, HAL_LOG_NOTICE, "the supply is back");
+    }
+    if ((change.on & INPUT_RESET) != 0) {
+        hal_log_write(self->io.log, HAL_LOG_NOTICE, "the reset button was pressed");
+        if (carry_out(self, &(motion_request_t){.event = EVENT_RESET}) != HV_OK) {
+            hal_log_write(self->io.log, HAL_LOG_WARNING,
+                          "reset refused: the e-stop is still active, or there is nothing to reset");
+        }
+    }
+}
+
+static void answer_requests(motion_loop_t *self, motion_result_t *result, unsigned count)
+{
+    for (unsigned i = 0; i < count; i++) {
+        result[i].snapshot = *gateway_snapshot(&self->session.gateway);
+        result[i].is_shutting_down = self->current.view.is_shutting_down;
+        (void)ring_push(&self->handover.results, &result[i], sizeof result[i], NULL, 0);
+    }
+}
+
+/* The bus' reason, in the words of its backend, which only this thread may read. */
+static void note_bus(motion_view_t *view, devices_t *devices)
+{
+    (void)snprintf(view->bus_trouble, sizeof view->bus_trouble, "%s", devices_trouble(devices));
+    if (view->bus_trouble[0] != '\0') {
+        memcpy(view->bus_last_trouble, view->bus_trouble, sizeof view->bus_last_trouble);
+    }
+}
+
+/* The kernel is asked for its counts ten times a second, not in each cycle: each question is a system call. */
+static bool is_kernel_asked(const motion_loop_t *self, uint64_t phase_us)
+{
+    return (self->session.now_us + phase_us) % KERNEL_ASKED_US < self->session.cycle_us;
+}
+
+/* Page faults of this thread, once it is known whether there should be any. */
+static void note_page_faults(motion_loop_t *self, motion_view_t *view)
+{
+    struct rusage used;
+    const uint32_t memory = __atomic_load_n(&self->handover.memory, __ATOMIC_ACQUIRE);
+    const bool is_due = !self->has_first_faults || is_kernel_asked(self, 0);
+    if (memory == MOTION_MEMORY_UNKNOWN || !is_due || getrusage(RUSAGE_THREAD, &used) != 0) {
+        return;
+    }
+    const uint32_t faults = (uint32_t)used.ru_minflt + (uint32_t)used.ru_majflt;
+    if (!self->has_first_faults) {
+        self->has_first_faults = true;
+        self->first_faults = faults;
+    }
+    view->is_memory_locked = memory == MOTION_MEMORY_LOCKED;
+    view->page_faults = faults - self->first_faults;
+}
+
+static void publish(motion_loop_t *self)
+{
+    motion_view_t *view = &self->current.view;
+    view->snapshot = *gateway_snapshot(&self->session.gateway);
+    view->udp_refused = self->tap.refused;
+    if (is_kernel_asked(self, KERNEL_ASKED_US / 2)) {
+        (void)!hal_udp_dropped(self->tap.behind, &view->udp_dropped);
+    }
+    note_bus(view, &self->devices);
+    note_page_faults(self, view);
+    seqlock_write(&self->handover.view, self->current.word);
+}
+
+static void note_faults(motion_loop_t *self, const snapshot_t *snapshot)
+{
+    if (self->is_recording) {
+        record_push_faults(&self->handover.record, snapshot);
+    }
+    if (self->blackbox != NULL) {
+        record_push_faults(&self->blackbox->records, snapshot);
+    }
+}
+
+static void note_drives(motion_loop_t *self, const snapshot_t *snapshot)
+{
+    if (self->is_recording) {
+        record_push_drives(&self->handover.record, snapshot->now_us, self->was_drive, snapshot->drive);
+    }
+    if (self->blackbox != NULL) {
+        record_push_drives(&self->blackbox->records, snapshot->now_us, self->was_drive, snapshot->drive);
+    }
+    memcpy(self->was_drive, snapshot->drive, sizeof self->was_drive);
+}
+
+static void write_row(motion_loop_t *self)
+{
+    trace_row_t row;
+    session_row(&self->session, &row);
+    if (self->is_tracing) {
+        (void)ring_push(&self->handover.trace, &row, sizeof row, NULL, 0);
+    }
+    if (self->blackbox != NULL) {
+        blackbox_cycle(self->blackbox, &self->session, &row);
+    }
+}
+
+static bool is_heard(const snapshot_t *snapshot)
+{
+    bool is_any = snapshot->state == STATE_SETTLED;
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        is_any = is_any || snapshot->drive[i].has_actual;
+    }
+    return is_any;
+}
+
+/* What a recording and a trace need of the cycle that has just run. */
+static void write_down(motion_loop_t *self, bool is_zero)
+{
+    const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
+    if (snapshot->is_estop_active != self->was_estop) {
+        note_at(self, RECORD_ESTOP, snapshot->now_us, snapshot->is_estop_active);
+    }
+    self->was_estop = snapshot->is_estop_active;
+    note_drives(self, snapshot);
+    note_faults(self, snapshot);
+    if (is_zero) {
+        note_at(self, RECORD_ZERO, snapshot->now_us, record_zero(snapshot->goal, snapshot->intensity_percent));
+    }
+    self->has_feedback = self->has_feedback || is_heard(snapshot);
+    if (self->has_feedback) {
+        write_row(self);
+    }
+}
+
+/* --- The thread --- */
+
+/* The drives have had no set-points for so long that going on as if nothing had happened would be a guess. As an operator's
+ * request, so that a recording replays it. */
+static void hold_if_too_late(motion_loop_t *self, uint32_t cycles)
+{
+    const state_t state = gateway_snapshot(&self->session.gateway)->state;
+    const bool is_leading = state == STATE_ENGAGED || state == STATE_RISING || state == STATE_NEUTRAL;
+    if (self->late_hold_cycles == 0 || cycles <= self->late_hold_cycles || !is_leading) {
+        return;
+    }
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    text_put_u32(&text, cycles);
+    text_put(&text, " cycles late: holding ([platform] late_hold_cycles)");
+    hal_log_write(self->io.log, HAL_LOG_ERROR, line);
+    note(self, RECORD_REQUEST, EVENT_HOLD);
+    (void)!gateway_request(&self->session.gateway, EVENT_HOLD, self->session.now_us);
+}
+
+/* How long a frame took to the drives. Measured beside the motion: nothing depends on it. */
+static void note_latency(motion_loop_t *self)
+{
+    const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
+    const uint64_t now_us = hal_clock_now_us(self->clock);
+    const bool is_followed = snapshot->state == STATE_ENGAGED && snapshot->last_frame_us == snapshot->now_us;
+    if (is_followed && self->tap.arrival_us != 0 && self->tap.arrival_us <= now_us) {
+        histogram_add(&self->handover.times.frame, now_us - self->tap.arrival_us);
+    }
+}
+
+static void note_hold(motion_loop_t *self)
+{
+    const state_t state = gateway_snapshot(&self->session.gateway)->state;
+    self->before_hold = state == STATE_HOLD ? self->before_hold : state;
+}
+
+static void run_cycle(motion_loop_t *self, uint64_t late_us)
+{
+    motion_result_t result[REQUESTS_PER_CYCLE];
+    const uint32_t skipped = (uint32_t)(late_us / self->session.cycle_us);
+    if (skipped > 0) {
+        note(self, RECORD_LATE, skipped);
+        gateway_note_late(&self->session.gateway, skipped);
+        hold_if_too_late(self, skipped);
+    }
+    take_reloads(self);
+    take_switches(self);
+    const unsigned requests = take_requests(self, result);
+    self->tap.arrival_us = 0;
+    const bool is_zero = session_cycle(&self->session);
+    note_latency(self);
+    note_hold(self);
+    write_down(self, is_zero);
+    publish(self);
+    answer_requests(self, result, requests);
+}
+
+/* One cycle of the drives alone, with the set-points of the last one. */
+static void run_drives(motion_loop_t *self)
+{
+    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
+    q32_t setpoint_q32[DRIVES_MAX] = {0};
+    drive_feedback_t feedback[DRIVES_MAX];
+    self->is_energized = false;
+    memcpy(setpoint_q32, s->extension_mm_q32, s->cylinders * sizeof setpoint_q32[0]);
+    setpoint_q32[s->cylinders] = s->angle_deg_q32;
+    (void)!drives_poll(self->io.drives, self->session.now_us, feedback);
+    (void)!drives_send(self->io.drives, self->session.now_us, setpoint_q32);
+    for (unsigned i = 0; i < drives_count(self->io.drives); i++) {
+        self->is_energized |= feedback[i].is_energized;
+    }
+    self->session.now_us += self->session.cycle_us;
+}
+
+/* All drives stop now by their own ramps. What tells them may need some cycles: room on the bus, a SYNC behind it, a second try.
+ * Late cycles are skipped: polls one right after the other would take a bus that had no time to answer for lost. */
+static void quit(motion_loop_t *self, uint64_t now_us)
+{
+    const uint64_t until_us = now_us + QUIT_MOST_US;
+    hv_status_t told = drives_request(self->io.drives, DRIVES_QUICK_STOP);
+    run_drives(self);
+    while (self->is_energized && now_us < until_us) {
+        told = told == HV_ERR_AGAIN ? drives_request(self->io.drives, DRIVES_QUICK_STOP) : told;
+        (void)!hal_clock_sleep_until_us(self->clock, now_us + self->session.cycle_us);
+        now_us = hal_clock_now_us(self->clock);
+        run_drives(self);
+    }
+}
+
+/* Cycle after cycle until the end; deadlines are absolute, so that nothing adds up. */
+static void run(motion_loop_t *self)
+{
+    const uint64_t cycle_us = self->session.cycle_us;
+    uint64_t deadline_us = hal_clock_now_us(self->clock) + cycle_us;
+    while (!gateway_is_finished(&self->session.gateway)) {
+        if (hal_clock_sleep_until_us(self->clock, deadline_us) != HV_OK) {
+            (void)!drives_request(self->io.drives, DRIVES_QUICK_STOP);
+            self->has_lost_clock = true;
+            break;
+        }
+        const uint64_t now_us = hal_clock_now_us(self->clock);
+        const uint64_t late_us = now_us > deadline_us ? now_us - deadline_us : 0;
+        if (__atomic_load_n(&self->handover.is_quit, __ATOMIC_ACQUIRE) != 0) {
+            quit(self, now_us);
+            break;
+        }
+        run_cycle(self, late_us);
+        histogram_add(&self->handover.times.wake, late_us);
+        histogram_add(&self->handover.times.work, hal_clock_now_us(self->clock) - now_us);
+        deadline_us += cycle_us * (1 + late_us / cycle_us);
+    }
+}
+
+/* Pages of the stack are there before the first cycle needs them. */
+static __attribute__((noinline)) void touch_stack(void)
+{
+    volatile uint8_t page[STACK_TOUCH];
+    for (size_t i = 0; i < sizeof page; i += PAGE_BYTES) {
+        page[i] = 0;
+    }
+}
+
+static void ask_for_priority(motion_loop_t *self)
+{
+    const struct sched_param parameters = {.sched_priority = PRIORITY};
+    const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+    self->current.view.is_realtime = error == 0;
+    if (error != 0) {
+        hal_log_write(self->io.log, HAL_LOG_NOTICE,
+                      "no real-time priority (SCHED_FIFO is not permitted): cycles may be late on a busy machine");
+    }
+}
+
+static void *motion_thread(void *argument)
+{
+    motion_loop_t *self = argument;
+    touch_stack();
+    ask_for_priority(self);
+    run(self);
+    __atomic_store_n(&self->handover.is_ended, 1, __ATOMIC_RELEASE);
+    return NULL;
+}
+
+bool motion_loop_start(motion_loop_t *self)
+{
+    pthread_attr_t attributes;
+    (void)pthread_attr_init(&attributes);
+    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES);
+    const int error = pthread_create(&self->thread, &attributes, motion_thread, self);
+    (void)pthread_attr_destroy(&attributes);
+    errno = error;
+    return error == 0;
+}
+
+bool motion_loop_reload(motion_loop_t *self, const config_t *config)
+{
+    const motion_reload_t reload = {config->settings, config->udp.allow, config->late_hold_cycles};
+    return ring_push(&self->handover.reloads, &reload, sizeof reload, NULL, 0);
+}
+
+void motion_loop_memory(motion_loop_t *self, motion_memory_t memory)
+{
+    __atomic_store_n(&self->handover.memory, (uint32_t)memory, __ATOMIC_RELEASE);
+}
+
+void motion_loop_quit(motion_loop_t *self)
+{
+    __atomic_store_n(&self->handover.is_quit, 1, __ATOMIC_RELEASE);
+}
+
+bool motion_loop_has_ended(const motion_loop_t *self)
+{
+    return __atomic_load_n(&self->handover.is_ended, __ATOMIC_ACQUIRE) != 0;
+}

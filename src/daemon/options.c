@@ -1,0 +1,217 @@
+/* SPDX-License-Identifier: MIT
+ * options.c - the command line of heaved; see options.h.
+ */
+#include "daemon/options.h"
+
+#include <string.h>
+
+#include "common/message.h"
+#include "common/usage.h"
+#include "config/config.h"
+
+enum {
+    OPTION_CONFIG = 1,
+    OPTION_CHECK,
+    OPTION_ENVELOPE,
+    OPTION_DOCTOR,
+    OPTION_DUMP,
+    OPTION_DUMP_DBC,
+    OPTION_PLAY,
+    OPTION_TRACE,
+    OPTION_RECORD,
+    OPTION_SOCKET,
+    OPTION_HELP,
+    OPTION_VERSION
+};
+
+static const usage_row_t k_forms[] = {
+    {.argument = "[--socket PATH] [--record FRAMES] [--trace OUT]", .help = "run"},
+    {.argument = "--check", .help = "validate, and print what follows from it"},
+    {.argument = "--envelope OUT", .help = "what the geometry can do, as CSV (docs/envelope.md)"},
+    {.argument = "--doctor", .help = "look at machine, CAN interface and drives: what is wrong, what helps"},
+    {.argument = "--dump-config", .help = "every key with its value, unit, range and help"},
+    {.argument = "--dump-dbc", .help = "the frames of [can-raw] as a DBC file"},
+    {.argument = "--play FRAMES [--trace OUT]", .help = "offline: simulated time and devices"},
+    {0},
+};
+
+static const usage_row_t k_options[] = {
+    {"config", "FILE", "the platform (INI)", OPTION_CONFIG},
+    {"check", NULL, "say whether the platform is valid, what it can reach, what it costs the bus, and what would suit it better",
+     OPTION_CHECK},
+    {"envelope", "OUT", "a file, there as a whole or not at all; - is standard output", OPTION_ENVELOPE},
+    {"doctor", NULL, "a line for each finding; writes nothing into a drive", OPTION_DOCTOR},
+    {"dump-config", NULL, "as a file that --config takes", OPTION_DUMP},
+    {"dump-dbc", NULL, "for tools that show CAN frames", OPTION_DUMP_DBC},
+    {"play", "FRAMES", "lines `<t_ms> <text>`, `<t_ms> !engage` ...; - is standard input", OPTION_PLAY},
+    {"trace", "OUT", "the set-points of every cycle (CSV); - is standard output", OPTION_TRACE},
+    {"record", "FRAMES", "log every datagram and request, so that --play repeats the run", OPTION_RECORD},
+    {"socket", "PATH", "for heavectl, instead of [control] socket", OPTION_SOCKET},
+    {"help", NULL, "print this", OPTION_HELP},
+    {"version", NULL, "print the version", OPTION_VERSION},
+    {0},
+};
+
+static const usage_exit_t k_exits[] = {
+    {EXIT_DONE, "done"},
+    {EXIT_REFUSED, "ended by a second signal, torque not confirmed off, or --doctor found something wrong"},
+    {EXIT_BAD_USAGE, "usage"},
+    {EXIT_BAD_DATA, "bad FRAMES"},
+    {EXIT_NO_INPUT, "no input"},
+    {EXIT_UNAVAILABLE, "port or socket in use"},
+    {EXIT_SOFTWARE, "a bug"},
+    {EXIT_NO_OUTPUT, "output cannot be created"},
+    {EXIT_IO, "output cannot be written"},
+    {EXIT_BAD_CONFIG, "configuration"},
+    {0},
+};
+
+static const usage_section_t k_manual[] = {
+    {"DESCRIPTION",
+     "`heaved` takes a motion platform's UDP frames (protocol V3.0), works out where each cylinder has to be, and drives "
+     "cylinders and relays "
+     "itself. `heavectl(1)` talks to it. As a service it is `heave@NAME`, which runs /etc/heave/NAME.ini.\n\n"
+     "It is no safety function: the e-stop chain has to take the power from the drives by itself, whatever heaved does.\n"},
+    {"SIGNALS",
+     "SIGTERM and SIGINT settle the platform, switch the drives off and end; a second one ends at once. SIGHUP reads the "
+     "configuration again: "
+     "what may change in operation does, the rest is named with its line and needs a restart; a wrong file changes nothing.\n"},
+    {"ENVIRONMENT",
+     "`NOTIFY_SOCKET` and `WATCHDOG_USEC` are those of systemd: it is told when the platform is ready and what state it is in, "
+     "and that the "
+     "motion thread advances. `STATE_DIRECTORY` is where the black box goes if the configuration names no directory, "
+     "`RUNTIME_DIRECTORY` where the socket is if it names no other.\n"},
+    {"FILES", " /etc/heave/NAME.ini          the platform of heave@NAME; see heave.ini(5)\n"
+              " /etc/heave/demo.ini          a simulated one, to try things out\n"
+              " /run/heave/NAME/heaved.sock  of heave@NAME, for heavectl; members of group heave may\n"
+              " /run/heave/heaved.sock       of a heaved started by hand\n"
+              " /var/lib/heave/NAME/         incidents of the black box\n"},
+    {"EXAMPLES", "Is a platform valid, and what does it come to?\n"
+                 " heaved --config /etc/heave/demo.ini --check\n"
+                 "What would a frame do? Three seconds after the start a pose, then down:\n"
+                 " printf '%s\\n' '3000 @A6:5,6,0,5.5,3.0,20,F0#' '5000 !park' |\n"
+                 "     heaved --config /etc/heave/demo.ini --play - --trace /tmp/trace.csv\n"},
+    {0},
+};
+
+const usage_t heaved_usage = {
+    .program = "heaved",
+    .manual_section = "8",
+    .summary = "motion platform gateway: takes UDP frames, moves the cylinders",
+    .common = "--config FILE",
+    .forms = k_forms,
+    .options = k_options,
+    .notes = "SIGTERM or Ctrl-C settles the platform, switches the drives off and ends; a second one ends at once.",
+    .exits = k_exits,
+    .manual = k_manual,
+    .see_also = "heavectl(1), heave.ini(5)",
+};
+
+/* Sets the mode; two different ones contradict each other. */
+static bool set_mode(options_t *self, run_mode_t mode)
+{
+    const bool is_free = self->mode == MODE_RUN || self->mode == mode;
+    self->mode = mode;
+    return is_free;
+}
+
+static const char *take_option(options_t *self, int option)
+{
+    static const char k_one_mode[] =
+        "only one of --check, --envelope, --doctor, --dump-config, --dump-dbc, --play, --help, --version at a time";
+    bool is_free = true;
+    switch (option) {
+    case OPTION_CONFIG:
+        self->config = optarg;
+        break;
+    case OPTION_CHECK:
+        is_free = set_mode(self, MODE_CHECK);
+        break;
+    case OPTION_ENVELOPE:
+        self->envelope = optarg;
+        is_free = set_mode(self, MODE_ENVELOPE);
+        break;
+    case OPTION_DOCTOR:
+        is_free = set_mode(self, MODE_DOCTOR);
+        break;
+    case OPTION_DUMP:
+        is_free = set_mode(self, MODE_DUMP_CONFIG);
+        break;
+    case OPTION_DUMP_DBC:
+        is_free = set_mode(self, MODE_DUMP_DBC);
+        break;
+    case OPTION_PLAY:
+        self->play = optarg;
+        is_free = set_mode(self, MODE_PLAY);
+        break;
+    case OPTION_TRACE:
+        self->trace = optarg;
+        break;
+    case OPTION_RECORD:
+        self->record = optarg;
+        break;
+    case OPTION_SOCKET:
+        self->socket = optarg;
+        break;
+    case OPTION_HELP:
+        is_free = set_mode(self, MODE_HELP);
+        break;
+    case OPTION_VERSION:
+        is_free = set_mode(self, MODE_VERSION);
+        break;
+    default: /* getopt's own values: '?' and ':' */
+        return option == ':' ? "option needs a value" : "unknown option";
+    }
+    return is_free ? NULL : k_one_mode;
+}
+
+/* Options that do not go together. */
+static const char *contradiction(const options_t *self)
+{
+    if (self->mode == MODE_HELP || self->mode == MODE_VERSION) {
+        return NULL;
+    }
+    if (self->config == NULL) {
+        return "--config FILE is missing";
+    }
+    if (self->mode != MODE_RUN && (self->record != NULL || self->socket != NULL)) {
+        return "--record and --socket are for running live";
+    }
+    if (self->trace != NULL && self->mode != MODE_RUN && self->mode != MODE_PLAY) {
+        return "--trace is for running live and for --play";
+    }
+    if (self->socket != NULL && (self->socket[0] == '\0' || strlen(self->socket) >= CONFIG_PATH_MAX)) {
+        return "--socket needs a path of 1 to 107 characters";
+    }
+    return NULL;
+}
+
+static int complain(const char *what, const char *about)
+{
+    return print_message(EXIT_BAD_USAGE, "%s%s%s; see heaved --help", what, about != NULL ? ": " : "",
+                         about != NULL ? about : "");
+}
+
+int options_read(options_t *self, int argc, char **argv)
+{
+    *self = (options_t){.mode = MODE_RUN};
+    struct option known[USAGE_OPTIONS_MAX + 1];
+    usage_options(&heaved_usage, known);
+    opterr = 0;
+    for (;;) {
+        const int at = optind;
+        const int option = getopt_long(argc, argv, ":", known, NULL);
+        if (option < 0) {
+            break;
+        }
+        const char *wrong = take_option(self, option);
+        if (wrong != NULL) {
+            return complain(wrong, option == '?' || option == ':' ? argv[at] : NULL);
+        }
+    }
+    if (optind < argc) {
+        return complain("unexpected argument", argv[optind]);
+    }
+    const char *wrong = contradiction(self);
+    return wrong != NULL ? complain(wrong, NULL) : EXIT_DONE;
+}

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: MIT
+ * options.h - the command line of heaved.
+ */
+#ifndef HEAVE_DAEMON_OPTIONS_H
+#define HEAVE_DAEMON_OPTIONS_H
+
+#include <stdbool.h>
+
+/** What to do. */
+typedef enum {
+    MODE_RUN,
+    MODE_CHECK,
+    MODE_ENVELOPE,
+    MODE_DOCTOR,
+    MODE_DUMP_CONFIG,
+    MODE_DUMP_DBC,
+    MODE_PLAY,
+    MODE_HELP,
+    MODE_VERSION
+} run_mode_t;
+
+/** A command line; texts point into argv, NULL where an option is not there. */
+typedef struct {
+    run_mode_t mode;
+    const char *config;
+    const char *play;
+    const char *envelope;
+    const char *trace;
+    const char *record;
+    const char *socket;
+} options_t;
+
+/** Reads a command line; says what is wrong with it.
+ *  @return EXIT_DONE or EXIT_BAD_USAGE */
+int options_read(options_t *self, int argc, char **argv);
+
+#endif

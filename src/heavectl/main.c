@@ -1,0 +1,538 @@
+/* SPDX-License-Identifier: MIT
+ * main.c - talks to a running heaved over its local socket: asks, shows, watches.
+ */
+#include <errno.h>
+#include <langinfo.h>
+#include <locale.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "common/message.h" // exit codes
+#include "common/standard_descriptors.h"
+#include "common/usage.h"
+#include "heavectl/socket.h"
+#include "heavectl/usage.h"
+#include "heavectl/view.h"
+
+#define ANSWER_MS   5000
+#define DUMP_MS     60000 /* a slow disk */
+#define WAIT_MS_MAX 1000  /* a signal between a look and a wait is seen by then */
+#define LINE_BYTES  65536u
+#define COLUMNS     80u
+#define TERMINAL_HZ 20u
+#define PLAIN_HZ    1u
+#define FOR_MAX_S   1e9
+
+/** A run of the program. */
+typedef struct {
+    const char *command;
+    const char *argument; /**< of intensity; else NULL */
+    const char *socket;   /**< NULL = not named */
+    const char *platform; /**< NULL = not named */
+    char path[SOCKET_PATH_MAX];
+    bool is_json;
+    double for_s; /**< 0 = until interrupted */
+    unsigned hz;  /**< 0 = as it suits the output */
+    int fd;
+    int error; /**< why the system does not let it hear heaved, an errno; 0 = it does */
+    char line[LINE_BYTES];
+    size_t length;   /**< bytes in line */
+    size_t consumed; /**< of those, given out already */
+} ctl_t;
+
+static volatile sig_atomic_t is_interrupted; /* set by the signal handler, which can reach nothing else */
+
+static void on_signal(int signal_number)
+{
+    (void)signal_number;
+    is_interrupted = 1;
+}
+
+static __attribute__((format(printf, 2, 3))) int complain(int code, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    fputs("heavectl: ", stderr);
+    vfprintf(stderr, format, arguments);
+    fputc('\n', stderr);
+    va_end(arguments);
+    return code;
+}
+
+/* Standard output that took everything; EXIT_IO: it has not, and that was said. */
+static int end_stdout(int code)
+{
+    if (code != EXIT_IO && (fflush(stdout) != 0 || ferror(stdout) != 0)) {
+        return complain(EXIT_IO, "standard output: %s", strerror(errno));
+    }
+    return code;
+}
+
+/* --- The link --- */
+
+static int not_running(const ctl_t *self, int error)
+{
+    if (error == EACCES) {
+        return complain(EXIT_UNAVAILABLE, "%s: no permission to talk to heaved; its user or group may", self->socket);
+    }
+    return complain(EXIT_UNAVAILABLE,
+                    "heaved is not running at %s (%s): start it with `heaved --config FILE`, or give --socket PATH", self->socket,
+                    strerror(error));
+}
+
+static int open_link(ctl_t *self)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    if (strlen(self->socket) >= sizeof address.sun_path) {
+        return complain(EXIT_BAD_USAGE, "%s: a socket's path has at most 107 characters", self->socket);
+    }
+    memcpy(address.sun_path, self->socket, strlen(self->socket));
+    self->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (self->fd < 0 || connect(self->fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+        return not_running(self, errno);
+    }
+    return EXIT_DONE;
+}
+
+/* Where heaved has closed the link, what it said before is still to be read. A signal that ends the program is the reader's to
+ * see. */
+static int send_line(const ctl_t *self, const char *request)
+{
+    char line[64];
+    const int length = snprintf(line, sizeof line, "%s\n", request);
+    ssize_t sent;
+    do {
+        sent = send(self->fd, line, (size_t)length, MSG_NOSIGNAL);
+    } while (sent < 0 && errno == EINTR && is_interrupted == 0);
+    if (sent < 0 && errno != EPIPE && errno != ECONNRESET && errno != EINTR) {
+        return complain(EXIT_UNAVAILABLE, "heaved cannot be asked: %s", strerror(errno));
+    }
+    return EXIT_DONE;
+}
+
+static int64_t now_ms(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+/* Waits for bytes until the given time.
+ * Returns false: time is up, a signal came that ends the program, or the system refuses to wait. */
+static bool wait_for_bytes(ctl_t *self, int64_t until_ms)
+{
+    struct pollfd wait = {.fd = self->fd, .events = POLLIN};
+    for (;;) {
+        const int64_t left_ms = until_ms - now_ms();
+        if (left_ms <= 0 || is_interrupted != 0) {
+            return false;
+        }
+        const int ready = poll(&wait, 1, left_ms < WAIT_MS_MAX ? (int)left_ms : WAIT_MS_MAX);
+        if (ready < 0 && errno != EINTR) {
+            self->error = errno;
+            return false;
+        }
+        if (ready > 0) {
+            return true;
+        }
+    }
+}
+
+/* More bytes into the line, until the given time.
+ * Returns false: as above, or the link is closed, or the line is longer than any answer. */
+static bool receive_more(ctl_t *self, int64_t until_ms)
+{
+    const size_t room = sizeof self->line - 1 - self->length;
+    if (room == 0 || !wait_for_bytes(self, until_ms)) {
+        return false;
+    }
+    const ssize_t received = recv(self->fd, &self->line[self->length], room, 0);
+    self->length += received > 0 ? (size_t)received : 0;
+    if (received < 0 && errno != EINTR && errno != ECONNRESET) {
+        self->error = errno;
+    }
+    return received > 0 || (received < 0 && errno == EINTR);
+}
+
+/* The next answer, ended by a NUL; NULL: none came. Valid until the next call. */
+static const char *receive_line(ctl_t *self, int64_t until_ms)
+{
+    self->length -= self->consumed;
+    memmove(self->line, &self->line[self->consumed], self->length);
+    self->consumed = 0;
+    char *newline = memchr(self->line, '\n', self->length);
+    while (newline == NULL) {
+        if (!receive_more(self, until_ms)) {
+            return NULL;
+        }
+        newline = memchr(self->line, '\n', self->length);
+    }
+    *newline = '\0';
+    self->consumed = (size_t)(newline + 1 - self->line);
+    return self->line;
+}
+
+/* No answer, or no more of them.
+ * Returns the exit code. */
+static int not_heard(const ctl_t *self, const char *why)
+{
+    return self->error != 0 ? complain(EXIT_UNAVAILABLE, "heaved cannot be heard: %s", strerror(self->error))
+                            : complain(EXIT_UNAVAILABLE, "%s", why);
+}
+
+/* --- Showing --- */
+
+/* What the locale's variables say of a category. */
+static const char *locale_of(const char *category)
+{
+    const char *const names[] = {"LC_ALL", category, "LANG"};
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; i++) {
+        const char *value = getenv(names[i]);
+        if (value != NULL && value[0] != '\0') {
+            return value;
+        }
+    }
+    return "";
+}
+
+/* The language of messages. */
+static bool is_chinese(void)
+{
+    return strncmp(locale_of("LC_MESSAGES"), "zh", 2) == 0;
+}
+
+/* Also where the locale that is asked for was never made on this box: the terminal is what it is. */
+static bool is_utf8(void)
+{
+    const char *codeset = strchr(locale_of("LC_CTYPE"), '.');
+    return strcmp(nl_langinfo(CODESET), "UTF-8") == 0 ||
+           (codeset != NULL && (strcasecmp(codeset, ".UTF-8") == 0 || strcasecmp(codeset, ".utf8") == 0));
+}
+
+/* On a terminal that knows them, unless NO_COLOR says otherwise (no-color.org). */
+static bool is_coloured(void)
+{
+    const char *refused = getenv("NO_COLOR");
+    const char *terminal = getenv("TERM");
+    return isatty(STDOUT_FILENO) != 0 && (refused == NULL || refused[0] == '\0') &&
+           (terminal == NULL || strcmp(terminal, "dumb") != 0);
+}
+
+static unsigned terminal_columns(void)
+{
+    struct winsize size;
+    return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col >= 20 ? size.ws_col : COLUMNS;
+}
+
+static void show_table(const cJSON *status, bool is_watching)
+{
+    static char text[CTL_VIEW_BYTES];
+    const ctl_view_style_t style = {.columns = terminal_columns(),
+                                    .is_chinese = is_chinese(),
+                                    .is_utf8 = is_utf8(),
+                                    .is_coloured = is_coloured(),
+                                    .line_end = is_watching ? "\x1b[K\r\n" : "\n"};
+    (void)ctl_view_table(status, &style, text);
+    printf("%s%s%s", is_watching ? "\x1b[H" : "", text, is_watching ? "\x1b[J" : "");
+}
+
+/* What heaved said no to.
+ * Returns the exit code. */
+static int judge(const cJSON *answer)
+{
+    const cJSON *error = cJSON_GetObjectItemCaseSensitive(answer, "error");
+    if (cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(answer, "ok"))) {
+        return EXIT_DONE;
+    }
+    return complain(EXIT_REFUSED, "%s", cJSON_IsString(error) ? error->valuestring : "heaved gave an answer that says nothing");
+}
+
+static void show_incidents(const cJSON *incidents)
+{
+    const cJSON *incident = NULL;
+    cJSON_ArrayForEach(incident, incidents)
+    {
+        const cJSON *name = cJSON_GetObjectItemCaseSensitive(incident, "name");
+        const bool is_seen = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(incident, "seen"));
+        printf("%s: %s\n", cJSON_IsString(name) ? name->valuestring : "?", is_seen ? "seen" : "new");
+    }
+    if (cJSON_GetArraySize(incidents) == 0) {
+        printf("no incidents\n");
+    }
+}
+
+static void show_answer(const ctl_t *self, const cJSON *answer)
+{
+    const cJSON *state = cJSON_GetObjectItemCaseSensitive(answer, "state");
+    const cJSON *folder = cJSON_GetObjectItemCaseSensitive(answer, "folder");
+    if (cJSON_IsString(folder)) {
+        printf("%s: %s\n", self->command, folder->valuestring);
+    } else if (cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(answer, "incidents"))) {
+        show_incidents(cJSON_GetObjectItemCaseSensitive(answer, "incidents"));
+    } else if (strcmp(self->command, "status") == 0) {
+        show_table(answer, false);
+    } else if (self->argument != NULL) {
+        const cJSON *percent = cJSON_GetObjectItemCaseSensitive(answer, "intensity_percent");
+        printf("intensity: %.0f %%\n", cJSON_IsNumber(percent) ? percent->valuedouble : 0.0);
+    } else {
+        printf("%s: %s\n", self->command, cJSON_IsString(state) ? state->valuestring : "?");
+    }
+}
+
+/* True where a request that brings the platform up has ended in FAULT or ESTOP at once: a script has to see that. */
+static bool has_failed(const ctl_t *self, const cJSON *answer)
+{
+    const cJSON *state = cJSON_GetObjectItemCaseSensitive(answer, "state");
+    const bool is_up =
+        strcmp(self->command, "engage") == 0 || strcmp(self->command, "resume") == 0 || strcmp(self->command, "park") == 0;
+    return is_up && cJSON_IsString(state) &&
+           (strcmp(state->valuestring, "FAULT") == 0 || strcmp(state->valuestring, "ESTOP") == 0);
+}
+
+static int show(const ctl_t *self, const char *line)
+{
+    cJSON *answer = cJSON_Parse(line);
+    if (self->is_json) {
+        printf("%s\n", line);
+    }
+    int code = judge(answer);
+    if (code == EXIT_DONE && has_failed(self, answer)) {
+        code = complain(EXIT_REFUSED, "%s: the platform is in %s; heavectl status says why", self->command,
+                        cJSON_GetObjectItemCaseSensitive(answer, "state")->valuestring);
+    }
+    if (code == EXIT_DONE && !self->is_json) {
+        show_answer(self, answer);
+    }
+    cJSON_Delete(answer);
+    return code;
+}
+
+static int ask(ctl_t *self)
+{
+    char request[64];
+    (void)snprintf(request, sizeof request, "%s%s%s", self->command, self->argument != NULL ? " " : "",
+                   self->argument != NULL ? self->argument : "");
+    const int64_t until_ms = now_ms() + (strcmp(self->command, "dump") == 0 ? DUMP_MS : ANSWER_MS);
+    const int code = send_line(self, request);
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    const char *line = receive_line(self, until_ms);
+    return line != NULL ? show(self, line) : not_heard(self, "heaved does not answer");
+}
+
+/* --- Watching --- */
+
+/* Returns false: heaved says no, which is left to show. */
+static bool show_update(const ctl_t *self, const char *line, bool is_terminal)
+{
+    static char text[CTL_VIEW_BYTES];
+    cJSON *status = cJSON_Parse(line);
+    const bool is_refused = cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(status, "ok"));
+    if (is_refused) {
+        /* not here: the terminal's other screen goes away */
+    } else if (self->is_json) {
+        printf("%s\n", line);
+    } else if (is_terminal) {
+        show_table(status, true);
+    } else {
+        (void)ctl_view_line(status, text);
+        printf("%s\n", text);
+    }
+    cJSON_Delete(status);
+    return !is_refused;
+}
+
+/* Until time is up, Ctrl-C, the end of heaved, or a line in which it says no; that is left to show. */
+static int follow(ctl_t *self, bool is_terminal)
+{
+    const int64_t until_ms = self->for_s > 0.0 ? now_ms() + (int64_t)(self->for_s * 1000.0) : INT64_MAX;
+    for (;;) {
+        const char *line = receive_line(self, until_ms);
+        if (line == NULL) {
+            break;
+        }
+        if (!show_update(self, line, is_terminal)) {
+            return EXIT_REFUSED;
+        }
+        if (fflush(stdout) != 0) {
+            return complain(EXIT_IO, "standard output: %s", strerror(errno));
+        }
+    }
+    return is_interrupted != 0 || now_ms() >= until_ms ? EXIT_DONE : EXIT_UNAVAILABLE;
+}
+
+static int watch(ctl_t *self)
+{
+    const bool is_terminal = !self->is_json && isatty(STDOUT_FILENO) != 0;
+    const unsigned hz = self->hz != 0 ? self->hz : is_terminal || self->is_json ? TERMINAL_HZ : PLAIN_HZ;
+    const struct sigaction action = {.sa_handler = on_signal};
+    char request[24];
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    (void)snprintf(request, sizeof request, "watch %u", hz);
+    int code = send_line(self, request);
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    if (is_terminal) {
+        printf("\x1b[?1049h\x1b[?25l"); /* other screen, no cursor */
+    }
+    code = follow(self, is_terminal);
+    if (is_terminal) {
+        printf("\x1b[?25h\x1b[?1049l");
+        (void)fflush(stdout);
+    }
+    if (code == EXIT_REFUSED) {
+        return show(self, self->line);
+    }
+    return code == EXIT_UNAVAILABLE ? not_heard(self, "heaved has ended") : code;
+}
+
+/* --- The command line --- */
+
+static bool read_seconds(const char *text, double *out)
+{
+    char *end = NULL;
+    *out = strtod(text, &end);
+    return end != text && *end == '\0' && *out > 0.0 && *out < FOR_MAX_S;
+}
+
+static bool read_hz(const char *text, unsigned *out)
+{
+    char *end = NULL;
+    const unsigned long value = strtoul(text, &end, 10);
+    *out = (unsigned)value;
+    return end != text && *end == '\0' && value >= 1 && value <= 50;
+}
+
+/* Takes an option; returns what is wrong with it, NULL if nothing is. */
+static const char *take_option(ctl_t *self, int option)
+{
+    switch (option) {
+    case OPTION_JSON:
+        self->is_json = true;
+        break;
+    case OPTION_SOCKET:
+        self->socket = optarg;
+        break;
+    case OPTION_PLATFORM:
+        self->platform = optarg;
+        return socket_path_of_platform(self->path, SOCKET_DIRECTORY, optarg)
+                   ? NULL
+                   : "--platform needs the NAME of a service heave@NAME, without a /";
+    case OPTION_FOR:
+        return read_seconds(optarg, &self->for_s) ? NULL : "--for needs a number of seconds above 0";
+    case OPTION_HZ:
+        return read_hz(optarg, &self->hz) ? NULL : "--hz needs a whole number from 1 to 50";
+    case OPTION_HELP:
+        self->command = "help";
+        break;
+    case OPTION_VERSION:
+        self->command = "version";
+        break;
+    default: /* getopt's own values: '?' and ':' */
+        return option == ':' ? "an option needs a value" : "unknown option";
+    }
+    return NULL;
+}
+
+static const char *take_options(ctl_t *self, int argc, char **argv)
+{
+    struct option known[USAGE_OPTIONS_MAX + 1];
+    usage_options(&heavectl_usage, known);
+    opterr = 0;
+    for (;;) {
+        const int option = getopt_long(argc, argv, ":", known, NULL);
+        if (option < 0) {
+            return NULL;
+        }
+        const char *wrong = take_option(self, option);
+        if (wrong != NULL) {
+            return wrong;
+        }
+    }
+}
+
+static const char *take_command(ctl_t *self, int argc, char **argv)
+{
+    if (optind == argc) {
+        return "a command is needed: status, watch, engage, hold, resume, park, reset, shutdown, dump, acknowledge or intensity "
+               "PERCENT";
+    }
+    const bool is_intensity = strcmp(argv[optind], "intensity") == 0;
+    if (optind + (is_intensity ? 2 : 1) != argc) {
+        return is_intensity ? "intensity needs a whole number of percent, as in `heavectl intensity 50`"
+                            : "one command is needed";
+    }
+    self->argument = is_intensity ? argv[optind + 1] : NULL;
+    for (const usage_row_t *row = heavectl_usage.commands; row->name != NULL; row++) {
+        if (strcmp(argv[optind], row->name) == 0) {
+            self->command = row->name;
+            return NULL;
+        }
+    }
+    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge and "
+           "intensity are allowed";
+}
+
+/* Whom to ask: what the command line names, then the environment, then what is there. */
+static int choose_socket(ctl_t *self)
+{
+    const char *environment = getenv("HEAVE_SOCKET");
+    char platforms[512];
+    if (self->socket != NULL) {
+        return self->platform == NULL ? EXIT_DONE : complain(EXIT_BAD_USAGE, "--socket or --platform, not both");
+    }
+    self->socket = self->path;
+    if (self->platform != NULL) {
+        return EXIT_DONE;
+    }
+    if (environment != NULL && environment[0] != '\0') {
+        self->socket = environment;
+        return EXIT_DONE;
+    }
+    if (!ctl_socket_find(self->path, SOCKET_DIRECTORY, platforms, sizeof platforms)) {
+        return complain(EXIT_BAD_USAGE, "several platforms run here: %s; say which: --platform NAME or --socket PATH", platforms);
+    }
+    return EXIT_DONE;
+}
+
+int main(int argc, char **argv)
+{
+    static ctl_t ctl;
+    if (!standard_descriptors_open()) {
+        return complain(EXIT_UNAVAILABLE, "the null device: %s", strerror(errno));
+    }
+    (void)setlocale(LC_CTYPE, "");
+    const char *wrong = take_options(&ctl, argc, argv);
+    if (wrong == NULL && ctl.command != NULL) {
+        if (strcmp(ctl.command, "help") == 0) {
+            usage_print(&heavectl_usage, stdout);
+        } else {
+            printf("heavectl " HEAVE_VERSION "\n");
+        }
+        return end_stdout(EXIT_DONE);
+    }
+    wrong = wrong == NULL ? take_command(&ctl, argc, argv) : wrong;
+    if (wrong != NULL) {
+        return complain(EXIT_BAD_USAGE, "%s; see heavectl --help", wrong);
+    }
+    int code = choose_socket(&ctl);
+    code = code == EXIT_DONE ? open_link(&ctl) : code;
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    return end_stdout(strcmp(ctl.command, "watch") == 0 ? watch(&ctl) : ask(&ctl));
+}

@@ -1,0 +1,16 @@
+/* SPDX-License-Identifier: MIT
+ * socket.h - which heaved heavectl talks to where it is not told.
+ */
+#ifndef HEAVE_HEAVECTL_SOCKET_H
+#define HEAVE_HEAVECTL_SOCKET_H
+
+#include "common/socket_path.h"
+
+/** The socket to use where none is named: that of a heaved started by hand, else the only one of a service, else the first again,
+ * at which then nobody listens.
+ *  @param directory SOCKET_DIRECTORY, another short one in tests
+ *  @param platforms gets the names of all services where there are several, separated by `, `; else empty
+ *  @return false where there are several: path is empty */
+bool ctl_socket_find(char path[SOCKET_PATH_MAX], const char *directory, char *platforms, size_t platforms_bytes);
+
+#endif

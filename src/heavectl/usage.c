@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: MIT
+ * usage.c - what heavectl takes and says of itself; see usage.h.
+ */
+#include "heavectl/usage.h"
+
+#include "common/message.h" // exit codes
+#include "common/socket_path.h"
+#include "common/usage.h"
+
+static const usage_row_t k_forms[] = {
+    {.argument = "status"},
+    {.argument = "[--for SECONDS] [--hz N] watch"},
+    {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen | acknowledge"},
+    {.argument = "intensity PERCENT"},
+    {0},
+};
+
+static const usage_row_t k_commands[] = {
+    {.name = "status", .help = "state, poses, cylinders, relays and counters, once"},
+    {.name = "watch", .help = "the same as a live table, until Ctrl-C; without a terminal, plain lines"},
+    {.name = "engage", .help = "bring the platform up and follow the sender"},
+    {.name = "hold", .help = "stop where it is"},
+    {.name = "resume", .help = "go on with what a hold interrupted"},
+    {.name = "park", .help = "settle: lowest position, at rest"},
+    {.name = "reset", .help = "leave FAULT or ESTOP, once the cause is gone"},
+    {.name = "shutdown", .help = "settle, drives off, end heaved"},
+    {.name = "dump", .help = "write the last minutes down now, as after a fault; says where"},
+    {.name = "incidents", .help = "what the black box has written, and what nobody has seen yet"},
+    {.name = "seen",
+     .help = "the same, and all of it has been seen: until then the first fault does not make way for later ones"},
+    {.name = "acknowledge", .help = "let a configuration move that is not the approved one, until heaved ends"},
+    {.name = "intensity",
+     .argument = "PERCENT",
+     .help = "how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so"},
+    {0},
+};
+
+static const usage_row_t k_options[] = {
+    {"json", NULL, "answers as heaved gives them: one JSON object per line", OPTION_JSON},
+    {"socket", "PATH", "else the environment's HEAVE_SOCKET, else " SOCKET_DEFAULT ", else that of the only service",
+     OPTION_SOCKET},
+    {"platform", "NAME", "the service heave@NAME: " SOCKET_DIRECTORY "/NAME/heaved.sock", OPTION_PLATFORM},
+    {"for", "SECONDS", "watch ends by itself", OPTION_FOR},
+    {"hz", "N", "updates per second of watch, 1 to 50; else 20, and 1 where the output is no terminal", OPTION_HZ},
+    {"help", NULL, "print this", OPTION_HELP},
+    {"version", NULL, "print the version", OPTION_VERSION},
+    {0},
+};
+
+static const usage_exit_t k_exits[] = {
+    {EXIT_DONE, "done"},
+    {EXIT_REFUSED, "refused, ended in FAULT or ESTOP at once, or gave way to a newer client"},
+    {EXIT_BAD_USAGE, "usage"},
+    {EXIT_UNAVAILABLE, "heaved is not running or may not be asked"},
+    {EXIT_IO, "output cannot be written"},
+    {0},
+};
+
+static const usage_section_t k_manual[] = {
+    {"DESCRIPTION",
+     "`heavectl` asks a running `heaved(8)` over its local socket. A request that the state does not allow is refused with the "
+     "reason and "
+     "changes nothing. Where several platforms run on one box, `--platform` says which. Members of the socket's group (`heave`, "
+     "where heaved is a service) may ask; eight at a time. A ninth gets "
+     "the place of one that "
+     "has asked nothing for 2 s, else that of the oldest `watch`, which ends and says so. Where the configuration names groups, "
+     "these say "
+     "who may do more than look and hold.\n\n"
+     "With `--json` every answer is an object of one line: /usr/share/doc/heave/docs/status-json.md has all its members, which "
+     "stay what they "
+     "are within a major version. An answer with `ok` false says in `error` why.\n"},
+    {"ENVIRONMENT", "`HEAVE_SOCKET` is the socket where none is named. `LC_ALL`, `LC_MESSAGES` "
+                    "and `LANG`: faults are "
+                    "told in Chinese where they begin "
+                    "with zh. `NO_COLOR`: no colours, which there are on terminals only.\n"},
+    {"EXAMPLES", "Bring the platform up, halve the motion, look on for ten seconds, and down again:\n"
+                 " heavectl engage\n"
+                 " heavectl intensity 50\n"
+                 " heavectl --for 10 watch\n"
+                 " heavectl park\n"
+                 "In a script:\n"
+                 " heavectl --json status | python3 -c 'import json, sys; print(json.load(sys.stdin)[\"state\"])'\n"},
+    {0},
+};
+
+const usage_t heavectl_usage = {
+    .program = "heavectl",
+    .manual_section = "1",
+    .summary = "talks to a running heaved",
+    .common = "[--json] [--socket PATH | --platform NAME]",
+    .forms = k_forms,
+    .commands = k_commands,
+    .options = k_options,
+    .exits = k_exits,
+    .manual = k_manual,
+    .see_also = "heaved(8), heave.ini(5)",
+};

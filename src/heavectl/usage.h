@@ -1,0 +1,9 @@
+/* SPDX-License-Identifier: MIT
+ * usage.h - the options of heavectl's table, which is in common/usage.h.
+ */
+#ifndef HEAVE_HEAVECTL_USAGE_H
+#define HEAVE_HEAVECTL_USAGE_H
+
+enum { OPTION_JSON = 1, OPTION_SOCKET, OPTION_PLATFORM, OPTION_FOR, OPTION_HZ, OPTION_HELP, OPTION_VERSION };
+
+#endif

@@ -1,0 +1,183 @@
+/* SPDX-License-Identifier: MIT
+ * doctor_probe.c - the core's SDO client over a real bus; see doctor_probe.h.
+ */
+#include "inspect/doctor_probe.h"
+
+#include <string.h>
+#include <time.h>
+
+#include "heave/sdo.h"
+#include "linux_clock.h"
+
+#define TRIES     2u
+#define PAUSE_NS  200000
+#define EXTRA_US  5000u /* after an answer: who else answers? */
+#define SYNC_ID   0x80u
+#define SDO_ID    0x580u
+#define HEARTBEAT 0x700u
+
+static uint64_t now_us(void)
+{
+    return hal_clock_now_us(linux_clock_hal());
+}
+
+static void pause_briefly(void)
+{
+    const struct timespec pause = {.tv_nsec = PAUSE_NS};
+    (void)nanosleep(&pause, NULL);
+}
+
+bool doctor_probe_open(doctor_probe_t *self, const char *interface)
+{
+    const linux_can_config_t config = {.interface = interface};
+    self->is_synced = false;
+    self->wire = (doctor_wire_t){.is_heard = false};
+    for (unsigned i = 0; i < DOCTOR_NODES; i++) {
+        self->nmt[i] = -1;
+    }
+    const hv_status_t status = linux_can_open(&self->can, &config);
+    if (status == HV_ERR_AGAIN) {
+        linux_can_close(&self->can);
+    }
+    return status == HV_OK;
+}
+
+void doctor_probe_close(doctor_probe_t *self)
+{
+    linux_can_close(&self->can);
+}
+
+/* The next frame of a drive or master; notes what everybody says about himself. */
+static bool hear(doctor_probe_t *self, can_frame_t *frame)
+{
+    uint64_t time_us;
+    while (hal_can_recv(linux_can_hal(&self->can), frame, &time_us) == HV_OK) {
+        if (frame->is_error) {
+            self->wire.is_unacknowledged |= (frame->id & CAN_ERROR_NO_ACK) != 0;
+            continue;
+        }
+        self->wire.is_heard = true;
+        if (frame->is_rtr) {
+            continue;
+        }
+        if (!frame->is_extended && frame->id > HEARTBEAT && frame->id < HEARTBEAT + DOCTOR_NODES && frame->length == 1) {
+            self->nmt[frame->id - HEARTBEAT] = frame->data[0] & 0x7F;
+        }
+        self->is_synced |= !frame->is_extended && frame->id == SYNC_ID;
+        return true;
+    }
+    return false;
+}
+
+const doctor_wire_t *doctor_probe_wire(doctor_probe_t *self)
+{
+    can_frame_t frame;
+    while (hear(self, &frame)) {}
+    (void)!hal_can_bus_state(linux_can_hal(&self->can), &self->wire.state);
+    (void)!hal_can_unconfirmed(linux_can_hal(&self->can), &self->wire.unconfirmed);
+    self->wire.tx_errors = self->can.tx_errors;
+    self->wire.rx_errors = self->can.rx_errors;
+    return &self->wire;
+}
+
+void doctor_probe_listen(doctor_probe_t *self, unsigned ms)
+{
+    const uint64_t end_us = now_us() + ms * 1000u;
+    can_frame_t frame;
+    while (now_us() < end_us) {
+        while (hear(self, &frame)) {}
+        pause_briefly();
+    }
+}
+
+/* --- CANopen --- */
+
+/* Frames of a node: the client takes what it waits for, the others are too many. */
+static unsigned take_answers(doctor_probe_t *self, sdo_t *sdo)
+{
+    can_frame_t frame;
+    unsigned extra = 0;
+    while (hear(self, &frame)) {
+        if (!frame.is_extended && frame.id == SDO_ID + sdo->node) {
+            extra += sdo->state == SDO_BUSY ? 0u : 1u;
+            sdo_receive(sdo, &frame);
+        }
+    }
+    return extra;
+}
+
+/* Until it is over. Tells how many answers there were too many. */
+static unsigned transfer(doctor_probe_t *self, sdo_t *sdo)
+{
+    can_frame_t frame;
+    unsigned extra = 0;
+    while (sdo->state == SDO_BUSY) {
+        extra += take_answers(self, sdo);
+        if (sdo_step(sdo, now_us(), &frame) && hal_can_send(linux_can_hal(&self->can), &frame) == HV_OK) {
+            sdo_sent(sdo, now_us());
+        } else if (self->can.trouble != LINUX_CAN_FINE) {
+            sdo_cancel(sdo);
+        }
+        pause_briefly();
+    }
+    return extra;
+}
+
+static void read_object(doctor_probe_t *self, sdo_t *sdo, doctor_object_t object, doctor_node_t *out)
+{
+    sdo_read(sdo, doctor_address[object].index, doctor_address[object].sub, TRIES);
+    const uint64_t begin_us = now_us();
+    unsigned extra = transfer(self, sdo);
+    const uint64_t end_us = now_us();
+    const bool is_first_try = end_us - begin_us < sdo->timeout_us;
+    while (now_us() < end_us + EXTRA_US) {
+        extra += take_answers(self, sdo);
+        pause_briefly();
+    }
+    out->extra_answers += is_first_try ? extra : 0; /* after a second try the answer to the first may come late */
+    out->answer[object] = sdo->state == SDO_DONE ? DOCTOR_READ : sdo->state == SDO_ABORTED ? DOCTOR_REFUSED : DOCTOR_NO_ANSWER;
+    out->value[object] = sdo->state == SDO_DONE ? sdo_value_u32(sdo) : sdo->abort_code;
+}
+
+void doctor_probe_node(doctor_probe_t *self, uint8_t node, unsigned timeout_ms, doctor_node_t *out)
+{
+    sdo_t sdo;
+    *out = (doctor_node_t){.nmt = -1};
+    sdo_init(&sdo, node, timeout_ms * 1000u);
+    for (unsigned object = 0; object < DOCTOR_OBJECTS; object++) {
+        read_object(self, &sdo, object, out);
+        if (out->answer[object] == DOCTOR_NO_ANSWER) {
+            break; /* the rest would only take time */
+        }
+    }
+    out->nmt = self->nmt[node];
+}
+
+/* --- Drives with frames of their own --- */
+
+static void send_query(doctor_probe_t *self, const canraw_map_t *map, unsigned axis)
+{
+    can_frame_t frame = {.id = map->axis[axis].command_id, .is_extended = map->is_extended, .length = map->position_query.length};
+    memcpy(frame.data, map->position_query.data, sizeof frame.data);
+    (void)!hal_can_send(linux_can_hal(&self->can), &frame);
+}
+
+void doctor_probe_raw(doctor_probe_t *self, const canraw_map_t *map, unsigned ms, bool is_heard[DRIVES_MAX])
+{
+    can_frame_t frame;
+    for (unsigned k = 0; k < map->axes; k++) {
+        is_heard[k] = false;
+        if (map->position_query.length > 0) {
+            send_query(self, map, k);
+        }
+    }
+    const uint64_t end_us = now_us() + ms * 1000u;
+    while (now_us() < end_us) {
+        while (hear(self, &frame)) {
+            for (unsigned k = 0; k < map->axes; k++) {
+                is_heard[k] |= frame.id == map->axis[k].reply_id && frame.is_extended == map->is_extended;
+            }
+        }
+        pause_briefly();
+    }
+}

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: MIT
+ * doctor_probe.h - asks the drives on a CAN bus what they are. Reads only; blocks; each answer has its time-out.
+ */
+#ifndef HEAVE_INSPECT_DOCTOR_PROBE_H
+#define HEAVE_INSPECT_DOCTOR_PROBE_H
+
+#include "heave/canraw.h"
+#include "inspect/doctor_judge.h"
+#include "linux_can.h"
+
+#define DOCTOR_NODES 128u
+
+/** A bus, and what has been heard on it. */
+typedef struct {
+    linux_can_t can;
+    int nmt[DOCTOR_NODES]; /**< in heartbeats, -1 = none heard */
+    bool is_synced;        /**< somebody sends SYNC */
+    doctor_wire_t wire;    /**< by doctor_probe_wire() */
+} doctor_probe_t;
+
+/** Opens the bus.
+ *  @return false: self->can.error_text says why */
+bool doctor_probe_open(doctor_probe_t *self, const char *interface);
+void doctor_probe_close(doctor_probe_t *self);
+
+/** What became of what was sent so far. */
+const doctor_wire_t *doctor_probe_wire(doctor_probe_t *self);
+
+/** Listens without a word. */
+void doctor_probe_listen(doctor_probe_t *self, unsigned ms);
+
+/** Reads a CiA 402 drive. */
+void doctor_probe_node(doctor_probe_t *self, uint8_t node, unsigned timeout_ms, doctor_node_t *out);
+
+/** Sends the position query to all drives of a map.
+ *  @param is_heard out: who has sent a frame with its reply_id */
+void doctor_probe_raw(doctor_probe_t *self, const canraw_map_t *map, unsigned ms, bool is_heard[DRIVES_MAX]);
+
+#endif

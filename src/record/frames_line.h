@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: MIT
+ * frames_line.h - one line of a file of frames, read.
+ */
+#ifndef HEAVE_RECORD_FRAMES_LINE_H
+#define HEAVE_RECORD_FRAMES_LINE_H
+
+#include "heave/drives.h"
+#include "heave/fault.h"
+#include "heave/hal/udp.h"
+#include "heave/supervisor.h"
+
+/** What a line does. */
+typedef enum {
+    FRAMES_DATAGRAM,  /**< a sender sends text */
+    FRAMES_REQUEST,   /**< `!engage` ...: what heavectl would ask for */
+    FRAMES_INTENSITY, /**< `!intensity N`: percent of a sender's motion */
+    FRAMES_ESTOP,     /**< `!estop on`, `!estop off` */
+    FRAMES_LATE,      /**< `!late N`: N cycles are skipped and counted (recordings hold this) */
+    FRAMES_FROM,      /**< `!from ADDRESS`: who sends the datagrams from here on */
+    FRAMES_DRIVE,     /**< `!drive N fault CODE`, `!drive N offline`, `!drive N back`: what a drive did (recordings hold this) */
+    FRAMES_FAULT,     /**< `!fault CODE`, `!fault CODE N`: what the gateway found wrong in that cycle (recordings hold this) */
+    FRAMES_FEEDBACK,  /**< `!feedback N HEX`: what a drive told, before time zero (incidents hold this) */
+    FRAMES_END,       /**< `!end`: the run ends with this cycle (incidents hold this) */
+    FRAMES_STATE      /**< `!state ...`, the first line: the run goes on from there (incidents hold this; checkpoint.h) */
+} frames_kind_t;
+
+/** One line. */
+typedef struct {
+    uint64_t t_us;
+    frames_kind_t kind;
+    event_t request;     /**< FRAMES_REQUEST */
+    uint8_t drive;       /**< FRAMES_DRIVE, FRAMES_FEEDBACK: from 1; FRAMES_FAULT: the axis, 0 where none is concerned */
+    fault_code_t fault;  /**< FRAMES_FAULT */
+    drive_state_t state; /**< FRAMES_DRIVE: DRIVE_FAULT, DRIVE_OFFLINE, else it is back */
+    uint32_t number; /**< FRAMES_INTENSITY: percent; FRAMES_ESTOP: 1 = on; FRAMES_LATE: cycles; FRAMES_DRIVE: a fault's code */
+    const uint8_t *text; /**< FRAMES_DATAGRAM: its bytes, escapes resolved; FRAMES_STATE: what stands behind the word */
+    uint32_t length;
+    drive_feedback_t feedback; /**< FRAMES_FEEDBACK; actual_us is its age */
+    hal_udp_peer_t from;       /**< FRAMES_FROM: read from it; FRAMES_DATAGRAM: set by frames_load */
+    uint32_t line;             /**< number in the file, from 1 */
+} frames_line_t;
+
+#endif

@@ -1,0 +1,266 @@
+/* SPDX-License-Identifier: MIT
+ * player.c - lines of frames through a gateway; see player.h.
+ */
+#include "record/player.h"
+
+#include <string.h>
+
+#define SETTLE_CYCLES_MAX 100000u     /* to time zero; a few are enough */
+#define EXTRA_MAX_US      7200000000u /* after the last line */
+#define REST_US           500000u     /* without any change of a set-point, and four periods of the stream */
+#define REST_PERIODS      4u
+
+/* --- What the gateway sees --- */
+
+/* The next line of its sort whose time has come, NULL where there is none. Datagrams and the rest go their own ways through the
+ * file: what a full cycle leaves of the datagrams must not hold a request up. */
+static const frames_line_t *take_due(player_t *self, size_t *next, bool is_datagram)
+{
+    const uint64_t t_us = self->session.now_us - self->session.zero_us;
+    while ((self->session.has_zero || self->is_before_zero) && *next < self->lines && self->line[*next].t_us <= t_us) {
+        const frames_line_t *line = &self->line[(*next)++];
+        if ((line->kind == FRAMES_DATAGRAM) == is_datagram) {
+            return line;
+        }
+    }
+    return NULL;
+}
+
+/* The next datagram whose time has come. */
+static hv_status_t player_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
+{
+    player_t *self = ctx;
+    const frames_line_t *line = take_due(self, &self->next_datagram, true);
+    if (line == NULL) {
+        return HV_ERR_AGAIN;
+    }
+    *length = line->length;
+    *from = line->from;
+    if (line->length > capacity) {
+        return HV_ERR_RANGE;
+    }
+    memcpy(buffer, line->text, line->length);
+    return HV_OK;
+}
+
+/* How long ago that was. */
+static hv_status_t player_waited(void *ctx, uint32_t *us)
+{
+    const player_t *self = ctx;
+    const uint64_t t_us = self->session.now_us - self->session.zero_us;
+    const size_t taken = self->next_datagram;
+    *us = taken > 0 ? (uint32_t)(t_us - self->line[taken - 1].t_us) : 0;
+    return HV_OK;
+}
+
+hal_udp_t player_udp(player_t *self)
+{
+    static const hal_udp_ops_t k_udp = {.recv = player_recv, .waited = player_waited};
+    return (hal_udp_t){&k_udp, self};
+}
+
+/* --- Drives that lines tell of --- */
+
+static hv_status_t told_poll(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
+{
+    player_t *self = ctx;
+    const drives_t behind = sim_drives_hal(self->drives);
+    const hv_status_t status = drives_poll(behind, now_us, feedback);
+    bool is_any = !self->is_told;
+    for (unsigned i = 0; self->is_told && i < drives_count(behind); i++) {
+        feedback[i] = self->told[i];
+        feedback[i].actual_us = now_us - (self->told[i].actual_us < now_us ? self->told[i].actual_us : now_us);
+        is_any = is_any || feedback[i].state != DRIVE_OFFLINE;
+    }
+    return self->is_told ? (is_any ? HV_OK : HV_ERR_IO) : status;
+}
+
+static hv_status_t told_send(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
+{
+    player_t *self = ctx;
+    const hv_status_t status = drives_send(sim_drives_hal(self->drives), now_us, setpoint_q32);
+    return self->is_told ? HV_OK : status;
+}
+
+/* What the contract says of the states that were told. */
+static hv_status_t told_request(void *ctx, drives_request_t request)
+{
+    player_t *self = ctx;
+    const drives_t behind = sim_drives_hal(self->drives);
+    const hv_status_t status = drives_request(behind, request);
+    for (unsigned i = 0; self->is_told && i < drives_count(behind); i++) {
+        if (!drives_allow(request, self->told[i].state)) {
+            return HV_ERR_STATE;
+        }
+    }
+    return self->is_told ? HV_OK : status;
+}
+
+static uint8_t told_count(void *ctx)
+{
+    const player_t *self = ctx;
+    return drives_count(sim_drives_hal(self->drives));
+}
+
+drives_t player_drives(player_t *self)
+{
+    static const drives_ops_t k_ops = {told_poll, told_send, told_request, told_count, NULL, NULL};
+    return (drives_t){&k_ops, self};
+}
+
+/* --- Running --- */
+
+static void tell_refused(const player_t *self, const frames_line_t *line, hv_status_t status, const char *what)
+{
+    if (status != HV_OK && self->refused != NULL) {
+        self->refused(self->ctx, line, what);
+    }
+}
+
+/* What a drive did; one that this platform does not have did nothing. */
+static void inject(player_t *self, const frames_line_t *line)
+{
+    const sim_drives_fault_t fault = {.kind = line->state == DRIVE_FAULT     ? SIM_DRIVES_FAULT
+                                              : line->state == DRIVE_OFFLINE ? SIM_DRIVES_OFFLINE
+                                                                             : SIM_DRIVES_RECOVER,
+                                      .axis = (uint8_t)(line->drive - 1),
+                                      .code = line->number};
+    sim_drives_inject(self->drives, &fault);
+}
+
+static void carry_out(player_t *self, const frames_line_t *line)
+{
+    gateway_t *gateway = &self->session.gateway;
+    switch (line->kind) {
+    case FRAMES_REQUEST:
+        tell_refused(self, line, gateway_request(gateway, line->request, self->session.now_us), event_name(line->request));
+        break;
+    case FRAMES_INTENSITY:
+        tell_refused(self, line, gateway_set_intensity(gateway, line->number), "intensity beyond [motion] intensity_max_percent");
+        break;
+    case FRAMES_ESTOP:
+        sim_inputs_set(self->inputs, INPUT_ESTOP, line->number != 0);
+        break;
+    case FRAMES_LATE:
+        gateway_note_late(gateway, line->number);
+        break;
+    case FRAMES_DRIVE:
+        inject(self, line);
+        break;
+    case FRAMES_FAULT:
+        gateway_tell_fault(gateway, line->fault, line->drive);
+        break;
+    case FRAMES_FEEDBACK:
+        self->is_told = true;
+        self->told[line->drive - 1] = line->feedback;
+        break;
+    case FRAMES_END:
+        self->is_ended = true;
+        break;
+    case FRAMES_DATAGRAM:
+    case FRAMES_FROM:
+    case FRAMES_STATE:
+        break;
+    }
+}
+
+/* Everything but datagrams that is due before the coming cycle. */
+static void carry_out_due(player_t *self)
+{
+    for (;;) {
+        const frames_line_t *line = take_due(self, &self->next_request, false);
+        if (line == NULL) {
+            return;
+        }
+        carry_out(self, line);
+    }
+}
+
+static bool is_state_at_rest(const snapshot_t *s)
+{
+    switch (s->state) {
+    case STATE_HOMING:
+    case STATE_RISING:
+    case STATE_SETTLING:
+        return false;
+    case STATE_SETTLED:
+    case STATE_NEUTRAL:
+        return s->goal == s->state; /* else it goes on with the next cycle */
+    case STATE_OFF:
+    case STATE_ENGAGED:
+    case STATE_HOLD:
+    case STATE_FAULT:
+    case STATE_ESTOP:
+    case STATES:
+        break;
+    }
+    return true;
+}
+
+/* Whether a set-point has changed. Not the pose: it is solved from them, and its last bits may go to and fro. */
+static bool has_moved(const trace_row_t *before, const trace_row_t *row)
+{
+    const size_t first = AXIS_ANGLE;
+    return memcmp(&before->value_q32[first], &row->value_q32[first], sizeof row->value_q32 - first * sizeof row->value_q32[0]) !=
+           0;
+}
+
+/* Keeps track of how long nothing has moved. */
+static void watch_rest(player_t *self, const trace_row_t *before)
+{
+    if (!is_state_at_rest(gateway_snapshot(&self->session.gateway)) || has_moved(before, &self->row)) {
+        self->still_since_us = self->row.t_us;
+    }
+}
+
+static uint64_t last_line_us(const player_t *self)
+{
+    return self->lines > 0 ? self->line[self->lines - 1].t_us : 0;
+}
+
+bool player_is_at_rest(const player_t *self)
+{
+    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
+    const uint64_t last_us = last_line_us(self);
+    const uint64_t since_us = self->still_since_us > last_us ? self->still_since_us : last_us;
+    const bool is_read = self->next_datagram == self->lines && self->next_request == self->lines;
+    return self->is_ended || (is_read && self->row.t_us >= since_us + REST_US + (uint64_t)REST_PERIODS * s->stream_period_us);
+}
+
+bool player_is_endless(const player_t *self)
+{
+    return self->row.t_us > last_line_us(self) + EXTRA_MAX_US;
+}
+
+/* Comes up to SETTLED. What the auto policy does comes after it: a platform that waits for frames is brought up by a request. */
+bool player_settle(player_t *self, const settings_t *settings)
+{
+    const bool is_asked = settings->engage == ENGAGE_MANUAL || settings->auto_frames > 0;
+    if (is_asked && gateway_request(&self->session.gateway, EVENT_PARK, self->session.now_us) != HV_OK) {
+        return false;
+    }
+    for (unsigned i = 0; i < SETTLE_CYCLES_MAX; i++) {
+        if (session_cycle(&self->session)) {
+            if (is_asked) {
+                gateway_restart_auto(&self->session.gateway);
+            }
+            return true;
+        }
+    }
+    return false;
+}
+
+void player_begin(player_t *self)
+{
+    session_row(&self->session, &self->row);
+    self->still_since_us = self->row.t_us;
+}
+
+void player_cycle(player_t *self)
+{
+    const trace_row_t before = self->row;
+    carry_out_due(self);
+    (void)session_cycle(&self->session);
+    session_row(&self->session, &self->row);
+    watch_rest(self, &before);
+}

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT
+ * session.c - a gateway and its time line; see session.h.
+ */
+#include "record/session.h"
+
+#include "heave/sane.h"
+
+hv_status_t session_init(session_t *self, const settings_t *settings, const gateway_io_t *io)
+{
+    self->cycle_us = settings->cycle_us;
+    self->now_us = settings->cycle_us;
+    self->has_zero = false;
+    self->zero_us = 0;
+    self->late_cycles = 0;
+    return gateway_init(&self->gateway, settings, io);
+}
+
+bool session_cycle(session_t *self)
+{
+    gateway_cycle(&self->gateway, self->now_us);
+    const snapshot_t *snapshot = gateway_snapshot(&self->gateway);
+    const bool is_zero = !self->has_zero && snapshot->state == STATE_SETTLED;
+    if (is_zero) {
+        self->late_cycles = snapshot->counters.late_cycles; /* what was late before is not part of the run */
+        self->has_zero = true;
+        self->zero_us = self->now_us;
+    }
+    self->now_us += self->cycle_us;
+    return is_zero;
+}
+
+void session_row(session_t *self, trace_row_t *out)
+{
+    const snapshot_t *snapshot = gateway_snapshot(&self->gateway);
+    const uint32_t late_cycles = snapshot->counters.late_cycles;
+    trace_take(out, snapshot, snapshot->now_us - self->zero_us, late_cycles != self->late_cycles, !self->has_zero);
+    self->late_cycles = late_cycles;
+}
+
+bool session_is_sane(const session_t *saved, uint32_t cycle_us)
+{
+    return saved->cycle_us == cycle_us && sane_bool(&saved->has_zero) && sane_time(saved->now_us) && saved->now_us >= cycle_us &&
+           saved->zero_us <= saved->now_us && saved->gateway.snapshot.now_us <= saved->now_us;
+}

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT
+ * udp_recorder.h - stands between a UDP socket and the gateway: lets allowed senders through, and writes down what they sent.
+ * A backend of hal/udp.h itself. The motion thread alone uses it; it never blocks longer than the socket behind it.
+ */
+#ifndef HEAVE_RECORD_UDP_RECORDER_H
+#define HEAVE_RECORD_UDP_RECORDER_H
+
+#include "common/ring.h"
+#include "config/config.h"
+#include "heave/hal/clock.h"
+#include "heave/hal/udp.h"
+
+/** A tap; the caller owns it. */
+typedef struct {
+    hal_udp_t behind;
+    const hal_udp_networks_t *allow;
+    ring_t *record[2];      /**< NULL: nothing is written down there */
+    const uint64_t *now_us; /**< of the running cycle */
+    hal_clock_t clock;
+    uint32_t cycle_us;
+    uint64_t came_us;    /**< when the newest datagram came, by *now_us */
+    uint32_t waited_us;  /**< by the newest datagram, below a cycle: a replay then has it in the same cycle */
+    uint64_t arrival_us; /**< out: when the first datagram came since it was set to 0; by that clock; 0 = none did */
+    uint32_t refused;    /**< out: datagrams of senders that are not allowed */
+} udp_recorder_t;
+
+/** True where the address may send; an empty list lets everyone. */
+bool udp_recorder_is_allowed(const hal_udp_networks_t *allow, const hal_udp_peer_t *peer);
+
+/** The tap as hal/udp.h wants it. */
+hal_udp_t udp_recorder_hal(udp_recorder_t *self);
+
+#endif

@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: MIT
+ * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
+ * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump, incidents, seen,
+ * acknowledge, by NAME. The service thread owns it; nothing blocks, nothing allocates after the open, and a client that does not
+ * read is dropped. Nobody keeps an operator out: where all places are taken, a newcomer gets that of the client that matters
+ * least, which is told so.
+ */
+#ifndef HEAVE_SERVICE_CONTROL_H
+#define HEAVE_SERVICE_CONTROL_H
+
+#include <poll.h>
+#include <sys/stat.h>
+
+#include "record/blackbox.h"
+#include "service/access_levels.h"
+#include "service/handover.h"
+#include "service/operator_log.h"
+#include "service/status_json.h"
+
+#define CONTROL_CLIENTS      8u
+#define CONTROL_SOCKETS      2u
+#define CONTROL_FDS          (CONTROL_CLIENTS + CONTROL_SOCKETS)
+#define CONTROL_LOOKERS      3u /* most clients of the second socket: those of the first always find a place */
+#define CONTROL_REQUEST_MAX  64u
+#define CONTROL_ANSWER_MAX   16384u
+#define CONTROL_OUT_BYTES    (4u * CONTROL_ANSWER_MAX)
+#define CONTROL_WATCH_HZ     20u /* where the client does not say */
+#define CONTROL_WATCH_MAX_HZ 50u
+#define CONTROL_IDLE_US      2000000u /* has asked nothing for so long: the first to give way */
+#define CONTROL_GRACE_US     100000u  /* after it came: time to ask something before it has to give way */
+
+/** One client; private to control.c. */
+typedef struct {
+    int fd;         /**< -1: free */
+    bool is_looker; /**< came by the second socket */
+    level_peer_t peer;
+    const struct control *control;
+    bool is_logged; /**< its request is, once it is answered */
+    operator_entry_t entry;
+    char in[CONTROL_REQUEST_MAX];
+    size_t in_length;
+    char out[CONTROL_OUT_BYTES];
+    size_t out_length;
+    bool is_closing;          /**< nothing more is read; closed once everything is answered and sent */
+    uint32_t request_id;      /**< waits for the motion thread; 0 = none */
+    event_t request;          /**< or OPERATOR_INTENSITY */
+    uint32_t number;          /**< of that */
+    bool is_accepted;         /**< by the motion thread; a reset then still has to take effect */
+    uint64_t answer_by_us;    /**< latest time of the answer */
+    uint32_t dump_ticket;     /**< waits for the black box; 0 = does not */
+    uint64_t watch_period_us; /**< 0 = does not watch */
+    uint64_t watch_next_us;
+    uint64_t came_us;
+    uint64_t asked_us; /**< its last request, else when it came */
+} control_client_t;
+
+/** A listening socket; private to control.c. */
+typedef struct {
+    int fd;       /**< -1: closed, or not there */
+    int newcomer; /**< has come, and nobody can give way yet; -1: nobody */
+    bool is_shut; /**< the system has no descriptor for a newcomer: not waited for until it is tried again */
+    char path[CONFIG_PATH_MAX];
+    struct stat made; /**< identity of the socket file, so that only ours is removed */
+} control_socket_t;
+
+/** The sockets and their clients; private to control.c. */
+typedef struct control {
+    control_socket_t socket[CONTROL_SOCKETS]; /**< the second one is [control] look_socket */
+    levels_t levels;
+    operator_log_t *log;
+    handover_t *handover;
+    const config_t *config;
+    blackbox_t *blackbox;
+    blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX]; /**< as last listed */
+    status_lost_t lost;                             /**< the owner keeps it up to date */
+    motion_view_words_t view;
+    level_peer_t
+        acknowledged_by; /**< who has just acknowledged the configuration; the owner says it and sets it back; pid 0: nobody */
+    uint32_t last_id;
+    control_client_t client[CONTROL_CLIENTS];
+} control_t;
+
+/** Opens the socket, in place of one that a dead daemon left behind. Says what is wrong.
+ *  @param config, handover, blackbox, log kept
+ *  @return EXIT_DONE; EXIT_UNAVAILABLE: a running heaved has it, or a group is not there; EXIT_NO_OUTPUT: it cannot be created */
+int control_open(control_t *self, const char *path, const config_t *config, handover_t *handover, blackbox_t *blackbox,
+                 operator_log_t *log);
+
+/** Before the open: what closes it is harmless from then on. */
+void control_init(control_t *self);
+
+/** State that the newest view shows. */
+state_t control_state(const control_t *self);
+
+/** Fills CONTROL_FDS entries for poll. */
+void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS]);
+
+/** How long poll may wait, in ms, not more than the given time. */
+int control_timeout_ms(const control_t *self, uint64_t now_us, int at_most_ms);
+
+/** Serves what poll found, and what time has made due. What poll only supposes does no harm. */
+void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64_t now_us);
+
+/** Sends what waits, closes, and removes the socket file; harmless on a closed one. */
+void control_close(control_t *self);
+
+#endif

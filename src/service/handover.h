@@ -1,0 +1,103 @@
+/* SPDX-License-Identifier: MIT
+ * handover.h - what the motion thread and the other threads hand over to each other, and nothing else: no pointer leads from one
+ * into the other. The motion thread never waits for any of it; what does not fit is dropped and counted.
+ */
+#ifndef HEAVE_SERVICE_HANDOVER_H
+#define HEAVE_SERVICE_HANDOVER_H
+
+#include "common/histogram.h"
+#include "common/ring.h"
+#include "common/seqlock.h"
+#include "config/config.h"
+#include "heave/telemetry.h"
+
+/** Longest text about the drives' bus, with its end. */
+#define BUS_TROUBLE_SIZE 160u
+
+/** What the service thread sees: the newest cycle and how punctual it was. */
+typedef struct {
+    snapshot_t snapshot;
+    uint32_t udp_refused; /**< datagrams of senders that are not allowed */
+    uint32_t udp_dropped; /**< datagrams the kernel lost because its queue was full, or dropped in a flood */
+    bool is_realtime;     /**< scheduled before everything else */
+    bool is_memory_locked;
+    uint32_t page_faults; /**< of the motion thread, since it was known whether memory is locked */
+    bool is_shutting_down;
+    char bus_trouble[BUS_TROUBLE_SIZE];      /**< what is wrong with the drives' bus now, "" = nothing */
+    char bus_last_trouble[BUS_TROUBLE_SIZE]; /**< what was last, "" = nothing so far */
+} motion_view_t;
+
+/** How punctual and how long the cycles were. */
+typedef struct {
+    histogram_t wake;  /**< from the time of a cycle to its beginning */
+    histogram_t work;  /**< from its beginning to its end */
+    histogram_t frame; /**< of cycles that follow a frame: from the arrival of the first datagram to the end of the set-points */
+} motion_times_t;
+
+#define MOTION_VIEW_WORDS ((sizeof(motion_view_t) + 7u) / 8u)
+
+/** A view with the size that the hand-over wants. */
+typedef union {
+    motion_view_t view;
+    uint64_t word[MOTION_VIEW_WORDS];
+} motion_view_words_t;
+
+/** What has become of locking memory. */
+typedef enum { MOTION_MEMORY_UNKNOWN, MOTION_MEMORY_LOCKED, MOTION_MEMORY_UNLOCKED } motion_memory_t;
+
+/** An operator's request on its way to the motion thread. */
+typedef struct {
+    uint32_t id;     /**< the asking side's */
+    uint32_t event;  /**< event_t; OPERATOR_INTENSITY: how much of a sender's motion is made */
+    uint32_t number; /**< of OPERATOR_INTENSITY: percent */
+} motion_request_t;
+
+/** What became of it, after the cycle that took it. */
+typedef struct {
+    uint32_t id;
+    int32_t status; /**< hv_status_t */
+    snapshot_t snapshot;
+    bool is_shutting_down;
+    bool is_key_off;       /**< refused because of that */
+    bool is_unapproved;    /**< likewise */
+    bool is_power_failing; /**< likewise */
+} motion_result_t;
+
+/** What a reload hands over. */
+typedef struct {
+    settings_t settings;
+    hal_udp_networks_t allow;
+    uint32_t late_hold_cycles;
+} motion_reload_t;
+
+#define HANDOVER_RELOAD_BYTES  8192u
+#define HANDOVER_REQUEST_BYTES 1024u
+#define HANDOVER_RESULT_BYTES  32768u
+#define HANDOVER_RECORD_BYTES  (1u << 21)
+#define HANDOVER_TRACE_BYTES   (1u << 21)
+
+/** All hand-overs. Large. */
+typedef struct {
+    motion_times_t times;   /**< the motion thread adds, others read */
+    seqlock_t view;         /**< motion_view_t from the motion thread */
+    ring_t requests;        /**< motion_request_t to it, from the service thread */
+    ring_t reloads;         /**< motion_reload_t likewise */
+    ring_t results;         /**< motion_result_t from it, to the service thread */
+    ring_t record;          /**< record_t from it, to the thread that writes files */
+    ring_t trace;           /**< trace_row_t likewise */
+    uint32_t is_quit;       /**< atomic: the service thread wants an end at once */
+    uint32_t is_unapproved; /**< atomic: nothing is brought up until it is over, as without the enable key */
+    uint32_t is_ended;      /**< atomic: the motion thread has done its last cycle */
+    uint32_t memory;        /**< atomic: motion_memory_t */
+    uint64_t view_word[MOTION_VIEW_WORDS];
+    uint8_t reload_bytes[HANDOVER_RELOAD_BYTES];
+    uint8_t request_bytes[HANDOVER_REQUEST_BYTES];
+    uint8_t result_bytes[HANDOVER_RESULT_BYTES];
+    uint8_t record_bytes[HANDOVER_RECORD_BYTES];
+    uint8_t trace_bytes[HANDOVER_TRACE_BYTES];
+} handover_t;
+
+/** Empties all of them; is_unapproved and is_quit stay as they are. Before there are threads. */
+void handover_init(handover_t *self);
+
+#endif

@@ -1,0 +1,335 @@
+/* SPDX-License-Identifier: MIT
+ * lifetime.c - the life of a machine in two files; see lifetime.h.
+ */
+#include "service/lifetime.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/message.h"
+#include "common/sha256.h"
+
+#define COPIES      2u
+#define TEXT_MAX    1024u
+#define PATH_BYTES  (CONFIG_PATH_MAX + 8u)
+#define DIGITS      16u /* of the checksum */
+#define STACK_BYTES (64u * 1024u)
+#define PAUSE_NS    100000000
+#define END_WAITS   10 /* pauses */
+
+/* --- The text of a file: lines that a person can read, then a checksum of them --- */
+
+static void checksum(const char *text, size_t length, char digits[DIGITS + 1u])
+{
+    uint8_t digest[SHA256_BYTES];
+    sha256_t hash;
+    sha256_start(&hash);
+    sha256_add(&hash, text, length);
+    sha256_end(&hash, digest);
+    for (unsigned i = 0; i < DIGITS / 2; i++) {
+        (void)snprintf(&digits[2 * i], 3, "%02x", (unsigned)digest[i]);
+    }
+}
+
+static size_t format(const lifetime_totals_t *totals, char text[TEXT_MAX])
+{
+    char digits[DIGITS + 1u];
+    size_t length =
+        (size_t)snprintf(text, TEXT_MAX, "heave life 1\nsequence %" PRIu64 "\nrides %" PRIu64 "\nfaults %" PRIu64 "\naxes %u\n",
+                         totals->sequence, totals->rides, totals->faults, (unsigned)totals->axes);
+    for (unsigned i = 0; i < totals->axes; i++) {
+        const lifetime_axis_t *axis = &totals->axis[i];
+        length += (size_t)snprintf(&text[length], TEXT_MAX - length,
+                                   "axis %u energized_ms %" PRIu64 " travel_milli %" PRIu64 " turns %" PRIu64 "\n", i + 1u,
+                                   axis->energized_ms, axis->travel_milli, axis->turns);
+    }
+    checksum(text, length, digits);
+    return length + (size_t)snprintf(&text[length], TEXT_MAX - length, "sum %s\n", digits);
+}
+
+/* A word and the number behind it. What is not quite a number is found when it is written again. */
+static bool read_number(const char **at, const char *word, uint64_t *number)
+{
+    const size_t length = strlen(word);
+    if (strncmp(*at, word, length) != 0) {
+        return false;
+    }
+    char *end = NULL;
+    *number = strtoull(*at + length, &end, 10);
+    *at = end;
+    return true;
+}
+
+static bool read_axis(const char **at, lifetime_axis_t *axis)
+{
+    uint64_t number = 0;
+    return read_number(at, "\naxis ", &number) && read_number(at, " energized_ms ", &axis->energized_ms) &&
+           read_number(at, " travel_milli ", &axis->travel_milli) && read_number(at, " turns ", &axis->turns);
+}
+
+/* What was written by format(), and nothing else: it is written again and compared. */
+static bool parse(const char *text, size_t length, lifetime_totals_t *totals)
+{
+    const char *const whole = text;
+    char again[TEXT_MAX];
+    uint64_t version = 0, axes = 0;
+    memset(totals, 0, sizeof *totals);
+    if (!read_number(&text, "heave life ", &version) || !read_number(&text, "\nsequence ", &totals->sequence) ||
+        !read_number(&text, "\nrides ", &totals->rides) || !read_number(&text, "\nfaults ", &totals->faults) ||
+        !read_number(&text, "\naxes ", &axes) || axes > DRIVES_MAX) {
+        return false;
+    }
+    for (totals->axes = 0; totals->axes < axes; totals->axes++) {
+        if (!read_axis(&text, &totals->axis[totals->axes])) {
+            return false;
+        }
+    }
+    return format(totals, again) == length && memcmp(again, whole, length) == 0;
+}
+
+/* --- The files --- */
+
+static void name_of(const lifetime_t *self, unsigned copy, const char *suffix, char path[PATH_BYTES])
+{
+    (void)snprintf(path, PATH_BYTES, "%s%s%s", self->path, copy == 0 ? "" : ".2", suffix);
+}
+
+/* Returns 0, ENOENT, or what is wrong; EBADMSG: its text is not right. */
+static int read_copy(const lifetime_t *self, unsigned copy, lifetime_totals_t *totals)
+{
+    char path[PATH_BYTES];
+    char text[TEXT_MAX];
+    name_of(self, copy, "", path);
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+    if (fd < 0) {
+        return errno;
+    }
+    const ssize_t length = read(fd, text, sizeof text - 1);
+    const int error = errno;
+    (void)close(fd);
+    if (length < 0) {
+        return error;
+    }
+    text[length] = '\0';
+    return parse(text, (size_t)length, totals) ? 0 : EBADMSG;
+}
+
+static int write_whole(int fd, const char *text, size_t length)
+{
+    const ssize_t written = write(fd, text, length);
+    if (written != (ssize_t)length) {
+        return written < 0 ? errno : ENOSPC;
+    }
+    return fsync(fd) == 0 ? 0 : errno;
+}
+
+/* The name has to be on the disk as well. */
+static void sync_folder(const char *path)
+{
+    char folder[PATH_BYTES];
+    (void)snprintf(folder, sizeof folder, "%s", path);
+    char *const slash = strrchr(folder, '/');
+    if (slash != NULL) {
+        slash[slash == folder ? 1 : 0] = '\0';
+        const int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+        if (fd >= 0) {
+            (void)fsync(fd);
+            (void)close(fd);
+        }
+    }
+}
+
+/* Beside its place, then renamed: the old one is there until the new one is whole. */
+static int write_copy(const lifetime_t *self, const lifetime_totals_t *totals)
+{
+    char path[PATH_BYTES], part[PATH_BYTES], text[TEXT_MAX];
+    const unsigned copy = (unsigned)(totals->sequence % COPIES);
+    name_of(self, copy, "", path);
+    name_of(self, copy, ".new", part);
+    const int fd = open(part, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | O_NOFOLLOW, 0640);
+    if (fd < 0) {
+        return errno;
+    }
+    int error = write_whole(fd, text, format(totals, text));
+    (void)close(fd);
+    if (error == 0 && rename(part, path) != 0) {
+        error = errno;
+    }
+    if (error != 0) {
+        (void)unlink(part);
+        return error;
+    }
+    sync_folder(path);
+    return 0;
+}
+
+void lifetime_step(lifetime_t *self)
+{
+    lifetime_totals_t totals;
+    bool is_new = false;
+    while (ring_pop(&self->ring, &totals, sizeof totals) > 0) {
+        is_new = true; /* the newest one has all that the others have */
+    }
+    if (is_new) {
+        __atomic_store_n(&self->error, write_copy(self, &totals), __ATOMIC_RELEASE);
+    }
+}
+
+/* --- The service thread's side --- */
+
+static void hand_over(lifetime_t *self)
+{
+    self->now.sequence++;
+    (void)ring_push(&self->ring, &self->now, sizeof self->now, NULL,
+                    0); /* no room: the disk hangs, and the next one has it all */
+}
+
+static void take(lifetime_t *self, const snapshot_t *snapshot)
+{
+    for (unsigned i = 0; i < self->now.axes; i++) {
+        const wear_t *wear = &snapshot->wear[i];
+        const lifetime_axis_t *before = &self->before.axis[i];
+        self->now.axis[i] = (lifetime_axis_t){before->energized_ms + wear->energized_us / 1000,
+                                              before->travel_milli + wear->travel_milli, before->turns + wear->turns};
+    }
+    self->now.faults = self->before.faults + snapshot->counters.faults;
+    self->now.rides = self->before.rides + snapshot->rides;
+}
+
+void lifetime_serve(lifetime_t *self, const snapshot_t *snapshot, uint64_t now_us)
+{
+    take(self, snapshot);
+    const bool is_down =
+        snapshot->state == STATE_OFF && self->state != STATE_OFF; /* a good moment: who has parked it may switch it off */
+    self->state = snapshot->state;
+    if (self->path[0] != '\0' && (is_down || now_us >= self->next_us)) {
+        self->next_us = now_us + LIFETIME_PERIOD_US;
+        hand_over(self);
+    }
+}
+
+bool lifetime_trouble(lifetime_t *self, int *error)
+{
+    *error = __atomic_load_n(&self->error, __ATOMIC_ACQUIRE);
+    const bool is_news = (*error != 0) != (self->told != 0);
+    self->told = *error;
+    return is_news;
+}
+
+/* --- Start and end --- */
+
+static bool find_path(lifetime_t *self, const config_t *config)
+{
+    const char *const state = getenv("STATE_DIRECTORY");
+    if (strcmp(config->life_file, "none") != 0) {
+        (void)snprintf(self->path, sizeof self->path, "%s", config->life_file);
+    } else if (state != NULL && state[0] == '/') {
+        const int needed = snprintf(self->path, sizeof self->path, "%.*s/" LIFETIME_NAME, (int)strcspn(state, ":"), state);
+        return needed > 0 && (size_t)needed < sizeof self->path;
+    }
+    return true;
+}
+
+/* The newest copy that is right. Copies that are not there are no error, as long as not one of them is damaged. */
+static int read_newest(lifetime_t *self)
+{
+    int error = ENOENT;
+    for (unsigned copy = 0; copy < COPIES; copy++) {
+        lifetime_totals_t totals;
+        const int its = read_copy(self, copy, &totals);
+        if (its == 0 && totals.sequence >= self->before.sequence) {
+            self->before = totals;
+        }
+        error = its == 0 || error == 0 ? 0 : its != ENOENT ? its : error;
+    }
+    return error == ENOENT ? 0 : error;
+}
+
+int lifetime_open(lifetime_t *self, const config_t *config, uint32_t axes)
+{
+    ring_init(&self->ring, self->ring_bytes, sizeof self->ring_bytes);
+    if (!find_path(self, config)) {
+        return print_message(EXIT_NO_OUTPUT, "life of the machine: the path of the state directory is too long");
+    }
+    const int error = self->path[0] != '\0' ? read_newest(self) : 0;
+    if (error != 0) {
+        return print_message(EXIT_BAD_DATA,
+                             "life of the machine: %s and its copy %s.2: %s; mend them, or move them away to begin at zero",
+                             self->path, self->path, error == EBADMSG ? "neither is right" : strerror(error));
+    }
+    if (self->before.sequence != 0 && self->before.axes != axes) {
+        return print_message(
+            EXIT_BAD_DATA,
+            "life of the machine: %s is of a machine with %u axes, this one has %u; name another [platform] life_file",
+            self->path, (unsigned)self->before.axes, (unsigned)axes);
+    }
+    self->before.axes = axes;
+    self->now = self->before;
+    if (self->path[0] == '\0') {
+        return EXIT_DONE;
+    }
+    self->now.sequence++;
+    const int unwritten = write_copy(self, &self->now);
+    return unwritten == 0
+               ? EXIT_DONE
+               : print_message(EXIT_NO_OUTPUT, "life of the machine %s: %s; [platform] life_file says where it is kept",
+                               self->path, strerror(unwritten));
+}
+
+static void *run(void *argument)
+{
+    lifetime_t *self = argument;
+    const struct timespec pause = {.tv_nsec = PAUSE_NS};
+    while (__atomic_load_n(&self->is_quit, __ATOMIC_ACQUIRE) == 0) {
+        lifetime_step(self);
+        (void)nanosleep(&pause, NULL);
+    }
+    lifetime_step(self);
+    __atomic_store_n(&self->is_ended, 1, __ATOMIC_RELEASE);
+    return NULL;
+}
+
+bool lifetime_start(lifetime_t *self)
+{
+    if (self->path[0] == '\0') {
+        return true;
+    }
+    pthread_attr_t attributes;
+    (void)pthread_attr_init(&attributes);
+    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES);
+    const int error = pthread_create(&self->thread, &attributes, run, self);
+    (void)pthread_attr_destroy(&attributes);
+    self->is_running = error == 0;
+    errno = error;
+    return self->is_running;
+}
+
+bool lifetime_close(lifetime_t *self)
+{
+    const struct timespec pause = {.tv_nsec = PAUSE_NS};
+    if (self->path[0] == '\0') {
+        return true;
+    }
+    hand_over(self);
+    __atomic_store_n(&self->is_quit, 1, __ATOMIC_RELEASE);
+    for (unsigned i = 0; self->is_running && i < END_WAITS; i++) {
+        if (__atomic_load_n(&self->is_ended, __ATOMIC_ACQUIRE) != 0) {
+            (void)pthread_join(self->thread, NULL);
+            self->is_running = false;
+        } else {
+            (void)nanosleep(&pause, NULL);
+        }
+    }
+    if (self->is_running) {
+        return false;
+    }
+    lifetime_step(self);
+    self->path[0] = '\0';
+    return true;
+}

@@ -1,0 +1,293 @@
+/* SPDX-License-Identifier: MIT
+ * operator_log.c - the operator log and its writer; see operator_log.h.
+ */
+#include "service/operator_log.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "common/json.h"
+#include "common/message.h"
+
+#define LINE_MAX_BYTES 2048u /* every character of every text escaped */
+#define PATH_BYTES     (CONFIG_PATH_MAX + 16u)
+#define STACK_BYTES    (64u * 1024u) /* locked into memory whole */
+#define PAUSE_NS       100000000
+#define END_WAITS      10 /* pauses */
+#define KB             1024u
+
+/* --- A line --- */
+
+/* Date of a day since 1970-01-01, in the proleptic Gregorian calendar; years counted from March. gmtime_r() may allocate. */
+static void date_of(int64_t days, int *year, int *month, int *day)
+{
+    const int64_t shifted = days + 719468;
+    const int64_t era = shifted / 146097;
+    const int64_t of_era = shifted - era * 146097;
+    const int64_t year_of_era = (of_era - of_era / 1460 + of_era / 36524 - of_era / 146096) / 365;
+    const int64_t of_year = of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    const int64_t from_march = (5 * of_year + 2) / 153;
+    *day = (int)(of_year - (153 * from_march + 2) / 5 + 1);
+    *month = (int)(from_march < 10 ? from_march + 3 : from_march - 9);
+    *year = (int)(year_of_era + era * 400 + (*month <= 2));
+}
+
+/* RFC 3339, UTC, with milliseconds. */
+static void put_time(const struct timespec *at, char text[40])
+{
+    int year, month, day;
+    const int64_t seconds = at->tv_sec > 0 ? at->tv_sec : 0;
+    const int of_day = (int)(seconds % 86400);
+    date_of(seconds / 86400, &year, &month, &day);
+    (void)snprintf(text, 40, "%04d-%02d-%02dT%02d:%02d:%02d.%03dZ", year, month, day, of_day / 3600, of_day / 60 % 60,
+                   of_day % 60, (int)(at->tv_nsec / 1000000));
+}
+
+static size_t put_line(const operator_entry_t *entry, char line[LINE_MAX_BYTES])
+{
+    char time[40];
+    json_t json;
+    put_time(&entry->at, time);
+    json_start(&json, line, LINE_MAX_BYTES);
+    json_open(&json, NULL, '{');
+    json_text(&json, "time", time);
+    json_number(&json, "uid", entry->uid);
+    json_number(&json, "gid", entry->gid);
+    json_number(&json, "pid", (uint64_t)(entry->pid > 0 ? entry->pid : 0));
+    json_text(&json, "by", entry->by);
+    json_text(&json, "request", entry->request);
+    json_bool(&json, "ok", entry->answer[0] == '\0');
+    json_text(&json, "answer", entry->answer);
+    json_text(&json, "before", state_name(entry->before));
+    json_text(&json, "after", state_name(entry->after));
+    json_number(&json, "repeats_before", entry->repeats);
+    json_close(&json, '}');
+    json_newline(&json);
+    return json.is_cut ? 0 : json.length;
+}
+
+/* --- The file --- */
+
+/* Only ever appended to. A pipe or a device is refused: it would block, and keep nothing. */
+static int open_file(operator_log_t *self)
+{
+    struct stat found;
+    self->fd = open(self->path, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY, 0640);
+    if (self->fd < 0) {
+        return errno;
+    }
+    if (fstat(self->fd, &found) != 0 || !S_ISREG(found.st_mode)) {
+        (void)close(self->fd);
+        self->fd = -1;
+        return EINVAL;
+    }
+    self->bytes = (uint64_t)found.st_size;
+    return 0;
+}
+
+static void name_of(const operator_log_t *self, uint32_t number, char path[PATH_BYTES])
+{
+    (void)snprintf(path, PATH_BYTES, number == 0 ? "%s" : "%s.%u", self->path, (unsigned)number);
+}
+
+/* FILE becomes FILE.1, that FILE.2, and so on; the last one goes. A line is never in two of them. */
+static void rotate(operator_log_t *self)
+{
+    char from[PATH_BYTES], to[PATH_BYTES];
+    for (uint32_t number = self->files; number > 0; number--) {
+        name_of(self, number - 1, from);
+        name_of(self, number, to);
+        (void)rename(from, to); /* where it fails the file just goes on */
+    }
+    (void)close(self->fd);
+    self->fd = -1;
+}
+
+/* A line that went in by half, on a disk that is full, is ended before the next one. */
+static int write_line(operator_log_t *self, const char *line, size_t length)
+{
+    const ssize_t written = write(self->fd, line, length);
+    if (written == (ssize_t)length) {
+        self->bytes += length;
+        return 0;
+    }
+    const int error = written < 0 ? errno : ENOSPC;
+    if (written > 0) {
+        (void)!ftruncate(self->fd, (off_t)self->bytes);
+    }
+    return error;
+}
+
+static int put_entry(operator_log_t *self, const operator_entry_t *entry)
+{
+    char line[LINE_MAX_BYTES];
+    const size_t length = put_line(entry, line);
+    if (self->fd >= 0 && self->bytes + length > self->bytes_max && self->bytes > 0) {
+        rotate(self);
+    }
+    const int error = self->fd < 0 ? open_file(self) : 0;
+    return error != 0 ? error : write_line(self, line, length);
+}
+
+void operator_log_step(operator_log_t *self)
+{
+    operator_entry_t entry;
+    bool is_new = false;
+    int error = 0;
+    while (ring_pop(&self->ring, &entry, sizeof entry) > 0) {
+        error = put_entry(self, &entry);
+        (void)__atomic_fetch_add(&self->failed, error != 0, __ATOMIC_RELAXED);
+        is_new = true;
+    }
+    if (is_new && error == 0 && fdatasync(self->fd) != 0) {
+        error = errno;
+    }
+    if (is_new) {
+        __atomic_store_n(&self->error, error, __ATOMIC_RELEASE);
+    }
+}
+
+/* --- The service thread's side --- */
+
+static bool is_repeat(const operator_entry_t *last, const operator_entry_t *entry)
+{
+    return last->request[0] != '\0' && last->uid == entry->uid && last->before == entry->before && last->after == entry->after &&
+           strcmp(last->request, entry->request) == 0 && strcmp(last->answer, entry->answer) == 0 &&
+           strcmp(last->by, entry->by) == 0 && entry->at.tv_sec - last->at.tv_sec < OPERATOR_LOG_REPEATS_S &&
+           entry->at.tv_sec >= last->at.tv_sec;
+}
+
+/* Somebody who asks the same a thousand times a second does not rotate away what others did. */
+void operator_log_add(operator_log_t *self, const operator_entry_t *entry)
+{
+    if (self->path[0] == '\0') {
+        return;
+    }
+    if (is_repeat(&self->last, entry)) {
+        self->repeats++;
+        self->repeated_at = entry->at;
+        return;
+    }
+    self->last = *entry;
+    self->last.repeats = self->repeats;
+    self->repeats = 0;
+    (void)ring_push(&self->ring, &self->last, sizeof self->last, NULL, 0);
+}
+
+uint32_t operator_log_lost(const operator_log_t *self)
+{
+    return ring_dropped(&self->ring) + __atomic_load_n(&self->failed, __ATOMIC_RELAXED);
+}
+
+bool operator_log_trouble(operator_log_t *self, int *error)
+{
+    *error = __atomic_load_n(&self->error, __ATOMIC_ACQUIRE);
+    const bool is_news = (*error != 0) != (self->told != 0);
+    self->told = *error;
+    return is_news;
+}
+
+/* --- Start and end --- */
+
+/* What is configured, else a file in the state directory that a service manager has given. */
+static bool find_path(operator_log_t *self, const config_t *config)
+{
+    const char *const state = getenv("STATE_DIRECTORY");
+    if (strcmp(config->operator_log, "none") != 0) {
+        (void)snprintf(self->path, sizeof self->path, "%s", config->operator_log);
+    } else if (state != NULL && state[0] == '/') {
+        const int length = (int)strcspn(state, ":");
+        const int needed = snprintf(self->path, sizeof self->path, "%.*s/" OPERATOR_LOG_NAME, length, state);
+        return needed > 0 && (size_t)needed < sizeof self->path;
+    }
+    return true;
+}
+
+int operator_log_open(operator_log_t *self, const config_t *config)
+{
+    ring_init(&self->ring, self->ring_bytes, sizeof self->ring_bytes);
+    self->fd = -1;
+    self->bytes_max = (uint64_t)config->operator_log_kb * KB;
+    self->files = config->operator_log_files;
+    if (!find_path(self, config)) {
+        return print_message(EXIT_NO_OUTPUT, "operator log: the path of the state directory is too long");
+    }
+    const int error = self->path[0] != '\0' ? open_file(self) : 0;
+    if (error == 0) {
+        return EXIT_DONE;
+    }
+    const int code = print_message(EXIT_NO_OUTPUT, "operator log %s: %s", self->path,
+                                   error == EINVAL ? "not a file; [control] operator_log has to be one" : strerror(error));
+    self->path[0] = '\0';
+    return code;
+}
+
+static void *run(void *argument)
+{
+    operator_log_t *self = argument;
+    const struct timespec pause = {.tv_nsec = PAUSE_NS};
+    while (__atomic_load_n(&self->is_quit, __ATOMIC_ACQUIRE) == 0) {
+        operator_log_step(self);
+        (void)nanosleep(&pause, NULL);
+    }
+    operator_log_step(self);
+    __atomic_store_n(&self->is_ended, 1, __ATOMIC_RELEASE);
+    return NULL;
+}
+
+bool operator_log_start(operator_log_t *self)
+{
+    if (self->path[0] == '\0') {
+        return true;
+    }
+    pthread_attr_t attributes;
+    (void)pthread_attr_init(&attributes);
+    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES);
+    const int error = pthread_create(&self->thread, &attributes, run, self);
+    (void)pthread_attr_destroy(&attributes);
+    self->is_running = error == 0;
+    errno = error;
+    return self->is_running;
+}
+
+/* The newest of the entries that were only counted, as a line. */
+static void end_repeats(operator_log_t *self)
+{
+    if (self->repeats > 0) {
+        self->last.at = self->repeated_at;
+        self->last.repeats = self->repeats - 1;
+        self->repeats = 0;
+        (void)ring_push(&self->ring, &self->last, sizeof self->last, NULL, 0);
+    }
+}
+
+bool operator_log_close(operator_log_t *self)
+{
+    const struct timespec pause = {.tv_nsec = PAUSE_NS};
+    end_repeats(self);
+    __atomic_store_n(&self->is_quit, 1, __ATOMIC_RELEASE);
+    for (unsigned i = 0; self->is_running && i < END_WAITS; i++) {
+        if (__atomic_load_n(&self->is_ended, __ATOMIC_ACQUIRE) != 0) {
+            (void)pthread_join(self->thread, NULL);
+            self->is_running = false;
+        } else {
+            (void)nanosleep(&pause, NULL);
+        }
+    }
+    if (self->is_running) {
+        return false;
+    }
+    if (self->path[0] != '\0') {
+        operator_log_step(self);
+    }
+    if (self->fd >= 0) {
+        (void)close(self->fd);
+        self->fd = -1;
+    }
+    return true;
+}

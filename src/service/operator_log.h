@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: MIT
+ * operator_log.h - who asked for what, and what became of it: an append-only file, a JSON object per line, rotated by size. The
+ * service thread hands entries over and never waits; a thread of its own writes them, and what it has no room for is counted.
+ * Nothing is allocated after the open.
+ */
+#ifndef HEAVE_SERVICE_OPERATOR_LOG_H
+#define HEAVE_SERVICE_OPERATOR_LOG_H
+
+#include <pthread.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <sys/types.h>
+#include <time.h>
+
+#include "common/ring.h"
+#include "config/config.h"
+#include "heave/supervisor.h"
+
+#define OPERATOR_LOG_NAME       "operator.log" /* in the state directory, where no file is configured */
+#define OPERATOR_LOG_BY_MAX     32u
+#define OPERATOR_LOG_ASKED_MAX  64u
+#define OPERATOR_LOG_ANSWER_MAX 192u
+#define OPERATOR_LOG_RING_BYTES (1u << 16)
+#define OPERATOR_LOG_REPEATS_S  10 /* the same again within that time is a number, not a line */
+
+/** A request and its answer. Texts are cut to fit. */
+typedef struct {
+    struct timespec at; /**< wall clock */
+    uint32_t uid;
+    uint32_t gid;
+    int32_t pid;
+    char by[OPERATOR_LOG_BY_MAX]; /**< whom the client says that it asks for; "" = nobody */
+    char request[OPERATOR_LOG_ASKED_MAX];
+    char answer[OPERATOR_LOG_ANSWER_MAX]; /**< why it was refused; "" = it was done */
+    state_t before;
+    state_t after;
+    uint32_t repeats; /**< of the entry before this one, that were not written */
+} operator_entry_t;
+
+/** The log; large: from the heap, at the start. Private. */
+typedef struct {
+    char path[CONFIG_PATH_MAX]; /**< "" = there is none */
+    int fd;
+    uint64_t bytes;     /**< of the file */
+    uint64_t bytes_max; /**< beyond that it is rotated */
+    uint32_t files;     /**< older ones that are kept */
+    operator_entry_t last;
+    uint32_t repeats; /**< of the last one */
+    struct timespec repeated_at;
+    ring_t ring;      /**< operator_entry_t to the writer */
+    uint32_t failed;  /**< atomic: entries that could not be written */
+    int32_t error;    /**< atomic: errno of the newest failure, 0 = the newest entry is on the disk */
+    int32_t told;     /**< error that operator_log_trouble() has told of */
+    uint32_t is_quit; /**< atomic */
+    uint32_t is_ended;
+    bool is_running;
+    pthread_t thread;
+    uint8_t ring_bytes[OPERATOR_LOG_RING_BYTES];
+} operator_log_t;
+
+/** Opens or creates the file; without one, configured or given by a service manager, there is none, which is no error.
+ *  @return EXIT_DONE; EXIT_NO_OUTPUT: it cannot be written, which is said */
+int operator_log_open(operator_log_t *self, const config_t *config);
+
+/** Starts the writer; does nothing where there is no log.
+ *  @return false: errno says why */
+bool operator_log_start(operator_log_t *self);
+
+/** Hands an entry over. Never blocks. The service thread. */
+void operator_log_add(operator_log_t *self, const operator_entry_t *entry);
+
+/** Entries that are lost: no room for them on the way, or the disk does not take them. Any thread. */
+uint32_t operator_log_lost(const operator_log_t *self);
+
+/** Whether writing has begun to fail, or works again, since the last call.
+ *  @param error out: errno; 0 = it works again */
+bool operator_log_trouble(operator_log_t *self, int *error);
+
+/** Writes what has been handed over. What its thread does all the time; tests do it by themselves. */
+void operator_log_step(operator_log_t *self);
+
+/** Writes what waits and ends the thread, or leaves it alone where the disk takes longer than a second.
+ *  @return false: it still runs, and self has to stay */
+bool operator_log_close(operator_log_t *self);
+
+#endif

@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: MIT
+ * operator_requests.c - requests of an operator; see operator_requests.h.
+ */
+#include "service/operator_requests.h"
+
+#include <string.h>
+
+#include "heave/text.h"
+
+const event_t operator_requests[OPERATOR_REQUESTS] = {EVENT_ENGAGE, EVENT_HOLD,  EVENT_RESUME,
+                                                      EVENT_PARK,   EVENT_RESET, EVENT_SHUTDOWN};
+
+/* What each state takes, shutdown aside. */
+static const char *const k_possible[STATES] = {
+    [STATE_OFF] = "engage, park",
+    [STATE_HOMING] = "hold, engage, park",
+    [STATE_SETTLED] = "engage",
+    [STATE_RISING] = "hold, engage, park",
+    [STATE_NEUTRAL] = "engage, hold, park",
+    [STATE_ENGAGED] = "hold, park",
+    [STATE_HOLD] = "resume, engage, park",
+    [STATE_SETTLING] = "hold, engage",
+    [STATE_FAULT] = "reset, once the cause is gone",
+    [STATE_ESTOP] = "reset, once the e-stop is released",
+};
+
+event_t operator_request_find(const char *name)
+{
+    for (unsigned i = 0; i < OPERATOR_REQUESTS; i++) {
+        if (strcmp(event_name(operator_requests[i]), name) == 0) {
+            return operator_requests[i];
+        }
+    }
+    return EVENTS;
+}
+
+bool operator_read_percent(const char *text, uint32_t *percent)
+{
+    *percent = 0;
+    const size_t length = strlen(text);
+    for (size_t i = 0; i < length; i++) {
+        *percent = *percent * 10 + (uint32_t)(uint8_t)(text[i] - '0');
+    }
+    return length > 0 && length <= 3 && strspn(text, "0123456789") == length;
+}
+
+size_t operator_explain_percent(uint32_t percent, unsigned max_percent, char *text, size_t capacity)
+{
+    text_t out = text_start(text, capacity);
+    text_put(&out, "intensity ");
+    text_put_u32(&out, percent);
+    text_put(&out, ": too much for this platform; possible: 0 to ");
+    text_put_u32(&out, max_percent);
+    text_put(&out, " % ([intensity] max_percent)");
+    return out.length;
+}
+
+/* What of a request does not fit the state. */
+static const char *reason(event_t request, const snapshot_t *s)
+{
+    if (request == EVENT_RESET) {
+        const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
+        return !is_latched ? "there is nothing to reset"
+               : s->fault.code == FAULT_ESTOP_CHANNELS && s->is_estop_active
+                   ? "the channels of the e-stop have disagreed: press it and release it, so that both open and close"
+               : s->is_estop_active ? "the e-stop is still active"
+                                    : "the cause is still there";
+    }
+    return request == EVENT_RESUME ? "there is nothing to resume" : "this is not possible";
+}
+
+size_t operator_explain(event_t request, const snapshot_t *snapshot, bool is_shutting_down, char *text, size_t capacity)
+{
+    text_t out = text_start(text, capacity);
+    text_put(&out, event_name(request));
+    text_put(&out, ": ");
+    if (is_shutting_down && request != EVENT_RESET) {
+        text_put(&out, "a shutdown is under way; ");
+        text_put(&out, snapshot->state == STATE_HOLD ? "shutdown goes on with it, a second signal ends at once"
+                                                     : "start heaved again once it has ended");
+        return out.length;
+    }
+    text_put(&out, reason(request, snapshot));
+    text_put(&out, " in ");
+    text_put(&out, state_name(snapshot->state));
+    if (snapshot->state == STATE_FAULT) {
+        text_put(&out, " (");
+        text_put(&out, fault_text(snapshot->fault.code));
+        text_put(&out, ")");
+    }
+    text_put(&out, "; possible: ");
+    text_put(&out, k_possible[snapshot->state]);
+    return out.length;
+}

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: MIT
+ * operator_requests.h - what an operator can ask for: names of requests, and why one was refused. Pure.
+ */
+#ifndef HEAVE_SERVICE_REQUESTS_H
+#define HEAVE_SERVICE_REQUESTS_H
+
+#include "heave/telemetry.h"
+
+/** Requests that travel to the motion thread. */
+#define OPERATOR_REQUESTS 6u
+extern const event_t operator_requests[OPERATOR_REQUESTS];
+
+/** In the place of an event: a request with a percentage. */
+#define OPERATOR_INTENSITY EVENTS
+
+/** Reads what follows `intensity `.
+ *  @return false where it is no whole number of at most three digits */
+bool operator_read_percent(const char *text, uint32_t *percent);
+
+/** Why a percentage was refused, and what would be possible.
+ *  @return length without NUL; cut to fit */
+size_t operator_explain_percent(uint32_t percent, unsigned max_percent, char *text, size_t capacity);
+
+/** @return EVENTS where the name is no request */
+event_t operator_request_find(const char *name);
+
+/** Why a request was refused, and what would be possible.
+ *  @param is_shutting_down a shutdown was asked for
+ *  @return length without NUL; cut to fit */
+size_t operator_explain(event_t request, const snapshot_t *snapshot, bool is_shutting_down, char *text, size_t capacity);
+
+#endif

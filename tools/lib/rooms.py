@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""rooms.py - the folders of src/ and which of them each may use. tests/check/check_rooms.py holds the sources and src/DESIGN.md to it."""
+from pathlib import PurePath
+
+# The portable core: firmware. Without it, the programs.
+CORE = {
+    "fixed": set(),
+    "protocol": {"fixed"},
+    "kinematics": {"fixed"},
+    "motion": {"fixed", "kinematics"},
+    "drives": {"fixed"},
+    "canopen": {"fixed", "drives"},
+    "gateway": {"fixed", "protocol", "kinematics", "motion", "drives", "canopen"},
+}
+PROGRAMS = {
+    "common": set(),
+    "config": {"common"},
+    "record": {"common", "config"},
+    "inspect": {"common", "config"},
+    "service": {"common", "config", "record"},
+    "daemon": {"common", "config", "record", "inspect", "service", "heavectl"},
+    "heavectl": {"common"},
+}
+
+
+def is_program(path):
+    """Whether a path below the top of the project belongs to the programs, not to the core."""
+    parts = PurePath(path).parts
+    return len(parts) > 1 and parts[0] == "src" and parts[1] in PROGRAMS
+
+
+def is_core(path):
+    """The same of the core's sources."""
+    parts = PurePath(path).parts
+    return len(parts) > 1 and parts[0] == "src" and parts[1] not in PROGRAMS
