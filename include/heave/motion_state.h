@@ -17,7 +17,7 @@ typedef enum {
     MOTION_ON_PATH,  /**< an S-curve in cylinder space */
     MOTION_STREAMED, /**< following: a stream */
     MOTION_TIMED,    /**< following: a quintic (timed, or a step in motion) */
-    MOTION_HALTING,  /**< following: a stop, then the S-curve */
+    MOTION_HALTING,  /**< following: a stop, and the S-curve from where it ends, which may begin before that */
     MOTION_STRAIGHT  /**< following: a timed move or a step from rest along an S-curve */
 } motion_source_t;
 
@@ -92,7 +92,7 @@ struct motion {
     uint64_t timed_end_us;
     int64_t timed_share_q46;       /**< intensity that the planned move is planned with */
     q32_t timed_way_q32[AXES_MAX]; /**< from neutral to where the sender wants it, before intensity */
-    int64_t straight_cycles;       /**< left for the straight part of a move that begins with a stop */
+    int64_t straight_after;        /**< cycles of the stop before the S-curve begins */
     bool is_stretched;
     bool is_clamped;           /**< the last target was pulled in */
     uint8_t limiting_cylinder; /**< by this cylinder, 0 where none bounds it */
