@@ -72,6 +72,7 @@ typedef struct {
     angle_wrap_t angle_wrap;
     q16_t angle_min_q16;
     q16_t angle_max_q16;
+    q16_t stroke_mm_q16[CYLINDERS_MAX];
     q16_t following_error_mm_q16;
     frame_dialect_t dialect;
     q16_t confirm_jump_mm_q16;
