@@ -94,6 +94,26 @@ def index():
         assert named == wanted, f"docs/{name}: missing {wanted - named}, too many {named - wanted}"
 
 
+def keys():
+    """`[section] key` in a page is a key that there is. Of what is gone, the list of changes tells."""
+    text = (DOCS / "configuration.md").read_text(encoding="utf-8")
+    known = {(section, key) for section, rows in re.findall(r"^## \[([\w-]+)\]$(.*?)(?=^## |\Z)", text, re.M | re.S) for key in re.findall(r"^\| `(\w+)` \|", rows, re.M)}
+    assert len(known) > 150
+    named = [(path.name, *place) for path in every_page() for place in re.findall(r"`\[([\w-]+)\] (\w+)(?: = [^`]*)?`", path.read_text(encoding="utf-8"))]
+    wrong = [place for place in named if place[1:] not in known]
+    assert len(named) > 50 and not wrong, f"keys that are not there: {wrong}"
+
+
+def licence():
+    """LICENSE is what the package's copyright file says, and every source names it."""
+    words = [re.findall(r"[\w\"']+", (TOP / name).read_text(encoding="utf-8")) for name in ("LICENSE", "packaging/debian/copyright")]
+    start = [one.index("Permission") for one in words]
+    assert words[0][start[0]:] == words[1][start[1]:], "LICENSE and packaging/debian/copyright differ"
+    sources = [path for folder in ("include", "src", "hal", "examples") for path in (TOP / folder).rglob("*.[ch]")]
+    silent = [str(path) for path in sources if "SPDX-License-Identifier: MIT" not in path.read_text(encoding="utf-8")[:200]]
+    assert len(sources) > 200 and not silent, f"no SPDX line: {silent}"
+
+
 def commands(path, programs):
     """Of shell blocks: program and paths exist, the program knows its options."""
     for line in (line for text in blocks(path, "sh") for line in text.splitlines()):
@@ -313,6 +333,10 @@ def main():
         links()
     with suite.case("the indexes lead to every page"):
         index()
+    with suite.case("keys that pages name are there"):
+        keys()
+    with suite.case("LICENSE is what the package and the sources say"):
+        licence()
     with suite.case("CONTRIBUTING.md: the files of the recipes are all there are"):
         recipes()
     with suite.case("docs/demo.svg shows what heaved does"):
