@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import tap
 
@@ -28,6 +29,7 @@ STATES = re.compile(r"<!-- states:begin -->.*?<!-- states:end -->", re.S)
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]*))?\)")
 NOT_OURS = {"cmake", "export", "printf", "cp", "nano", "sleep", "sudo", "gpiodetect", "gpioinfo"}
 OTHER_OPTIONS = {"--build", "--install", "--now", "--component", "--prefix"}  # of cmake, systemctl
+NUMBER = re.compile(r"-?\d+")
 OWN_STROKE_MM, OWN_POSE = 260, (5, 6, 0, 5.5, 3, 20)
 
 
@@ -280,6 +282,10 @@ def picture(heaved):
     assert shown.stat().st_size < 150_000, f"{shown.stat().st_size} bytes"
     result = run(TOP / "tools/picture", "--heaved", heaved, "--check", shown)
     assert result.returncode == 0, result.stdout + result.stderr
+    for animation in ElementTree.parse(shown).iter("{http://www.w3.org/2000/svg}animate"):
+        values, times = animation.get("values").split(";"), [float(time) for time in animation.get("keyTimes", "").split(";") if time]
+        assert len(values) > 1 and len({len(NUMBER.findall(value)) for value in values}) == 1, f"not alike from picture to picture: {animation.attrib}"
+        assert not times or times[0] == 0 and times == sorted(times) and len(times) == len(values), f"key times: {animation.attrib}"
     with tempfile.TemporaryDirectory() as folder:
         other = Path(folder) / "other.svg"
         other.write_text(shown.read_text(encoding="ascii").replace("ENGAGED", "HOLD"), encoding="ascii")
