@@ -362,6 +362,10 @@ int config_reload(const char *path, config_t *running, FILE *report);
 /** Writes every key with its value, unit, range and help, as a file that loads to the same configuration. */
 void config_dump(const config_t *self, FILE *out);
 
+/** Writes a file to fill in, for a kind of platform and a driver.
+ *  @return NULL; else the words that are allowed, separated by |, of the first argument that is none of them: nothing is written */
+const char *config_write_template(const char *kind, const char *driver, FILE *out);
+
 /** Writes the reference of all keys as Markdown. */
 void config_write_reference(FILE *out);
 

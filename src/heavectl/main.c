@@ -19,6 +19,7 @@
 #include <unistd.h>
 
 #include "common/message.h" // exit codes
+#include "common/presets.h"
 #include "common/standard_descriptors.h"
 #include "common/usage.h"
 #include "heavectl/socket.h"
@@ -483,8 +484,8 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
             return NULL;
         }
     }
-    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge and "
-           "intensity are allowed";
+    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge, "
+           "intensity and presets are allowed";
 }
 
 /* Whom to ask: what the command line names, then the environment, then what is there. */
@@ -528,6 +529,10 @@ int main(int argc, char **argv)
     wrong = wrong == NULL ? take_command(&ctl, argc, argv) : wrong;
     if (wrong != NULL) {
         return complain(EXIT_BAD_USAGE, "%s; see heavectl --help", wrong);
+    }
+    if (strcmp(ctl.command, "presets") == 0) {
+        return presets_list(stdout) >= 0 ? end_stdout(EXIT_DONE)
+                                         : complain(EXIT_UNAVAILABLE, "%s: %s", presets_directory(), strerror(errno));
     }
     int code = choose_socket(&ctl);
     code = code == EXIT_DONE ? open_link(&ctl) : code;

@@ -12,6 +12,7 @@ static const usage_row_t k_forms[] = {
     {.argument = "[--for SECONDS] [--hz N] watch"},
     {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen | acknowledge"},
     {.argument = "intensity PERCENT"},
+    {.argument = "presets"},
     {0},
 };
 
@@ -32,6 +33,7 @@ static const usage_row_t k_commands[] = {
     {.name = "intensity",
      .argument = "PERCENT",
      .help = "how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so"},
+    {.name = "presets", .help = "ready-made platforms, for heaved --preset; needs no heaved"},
     {0},
 };
 
