@@ -10,6 +10,7 @@
 static const usage_row_t k_forms[] = {
     {.argument = "status"},
     {.argument = "[--for SECONDS] [--hz N] watch"},
+    {.argument = "--wait [--for SECONDS] engage | resume | park | shutdown"},
     {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen | acknowledge"},
     {.argument = "intensity PERCENT"},
     {.argument = "presets"},
@@ -42,7 +43,8 @@ static const usage_row_t k_options[] = {
     {"socket", "PATH", "else the environment's HEAVE_SOCKET, else " SOCKET_DEFAULT ", else that of the only service",
      OPTION_SOCKET},
     {"platform", "NAME", "the service heave@NAME: " SOCKET_DIRECTORY "/NAME/heaved.sock", OPTION_PLATFORM},
-    {"for", "SECONDS", "watch ends by itself", OPTION_FOR},
+    {"wait", NULL, "engage, resume, park, shutdown: return once it is done, or cannot be any more", OPTION_WAIT},
+    {"for", "SECONDS", "watch ends by itself; --wait waits no longer", OPTION_FOR},
     {"hz", "N", "updates per second of watch, 1 to 50; else 20, and 1 where the output is no terminal", OPTION_HZ},
     {"help", NULL, "print this", OPTION_HELP},
     {"version", NULL, "print the version", OPTION_VERSION},
@@ -51,7 +53,7 @@ static const usage_row_t k_options[] = {
 
 static const usage_exit_t k_exits[] = {
     {EXIT_DONE, "done"},
-    {EXIT_REFUSED, "refused, ended in FAULT or ESTOP at once, or gave way to a newer client"},
+    {EXIT_REFUSED, "refused, not done in time, ended in FAULT or ESTOP at once, or gave way to a newer client"},
     {EXIT_BAD_USAGE, "usage"},
     {EXIT_UNAVAILABLE, "heaved is not running or may not be asked"},
     {EXIT_IO, "output cannot be written"},

@@ -130,6 +130,9 @@ static void answer_error(control_client_t *client, const char *error, const char
 
 static void answer_status(control_t *self, control_client_t *client)
 {
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    self->lost.unix_ms = (uint64_t)now.tv_sec * 1000u + (uint64_t)now.tv_nsec / 1000000u;
     json_t json = start_answer(client);
     status_json_write(&json, &self->view.view, self->config, &self->lost, &self->handover->times);
     answer(client, &json);
