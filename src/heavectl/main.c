@@ -22,6 +22,7 @@
 #include "common/presets.h"
 #include "common/standard_descriptors.h"
 #include "common/usage.h"
+#include "heavectl/scope.h"
 #include "heavectl/socket.h"
 #include "heavectl/usage.h"
 #include "heavectl/view.h"
@@ -488,6 +489,32 @@ static int wait_for_end(ctl_t *self)
     return code;
 }
 
+/* --- Samples --- */
+
+static int scope(ctl_t *self)
+{
+    const scope_t scope = {.columns = self->argument,
+                           .for_s = self->for_s,
+                           .hz = self->hz != 0 ? self->hz : TERMINAL_HZ,
+                           .is_terminal = isatty(STDOUT_FILENO) != 0,
+                           .is_interrupted = &is_interrupted};
+    const struct sigaction action = {.sa_handler = on_signal};
+    char error[256] = "";
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    int code = send_line(self, "samples");
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    const int fd = scope_receive(self->fd, self->line, sizeof self->line);
+    if (fd < 0) {
+        return self->line[0] != '\0' ? show(self, self->line) : not_heard(self, "heaved does not answer");
+    }
+    code = scope_run(&scope, self->fd, fd, error, sizeof error);
+    (void)close(fd);
+    return code == EXIT_DONE ? code : complain(code, "%s", error);
+}
+
 /* --- The command line --- */
 
 static bool read_seconds(const char *text, double *out)
@@ -563,11 +590,12 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
                "PERCENT";
     }
     const bool is_intensity = strcmp(argv[optind], "intensity") == 0;
-    if (optind + (is_intensity ? 2 : 1) != argc) {
+    const bool has_columns = strcmp(argv[optind], "scope") == 0 && optind + 2 == argc;
+    if (optind + (is_intensity || has_columns ? 2 : 1) != argc) {
         return is_intensity ? "intensity needs a whole number of percent, as in `heavectl intensity 50`"
                             : "one command is needed";
     }
-    self->argument = is_intensity ? argv[optind + 1] : NULL;
+    self->argument = is_intensity || has_columns ? argv[optind + 1] : NULL;
     if (self->is_waiting && destination(argv[optind]) == NULL) {
         return "--wait goes with engage, resume, park and shutdown";
     }
@@ -578,7 +606,7 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
         }
     }
     return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge, "
-           "intensity and presets are allowed";
+           "intensity, scope and presets are allowed";
 }
 
 /* Whom to ask: what the command line names, then the environment, then what is there. */
@@ -632,6 +660,6 @@ int main(int argc, char **argv)
     if (code != EXIT_DONE) {
         return code;
     }
-    code = strcmp(ctl.command, "watch") == 0 ? watch(&ctl) : ask(&ctl);
+    code = strcmp(ctl.command, "watch") == 0 ? watch(&ctl) : strcmp(ctl.command, "scope") == 0 ? scope(&ctl) : ask(&ctl);
     return end_stdout(ctl.is_waiting && code == EXIT_DONE ? wait_for_end(&ctl) : code);
 }

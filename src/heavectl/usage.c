@@ -13,6 +13,7 @@ static const usage_row_t k_forms[] = {
     {.argument = "--wait [--for SECONDS] engage | resume | park | shutdown"},
     {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen | acknowledge"},
     {.argument = "intensity PERCENT"},
+    {.argument = "[--for SECONDS] [--hz N] scope [COLUMN,...]"},
     {.argument = "presets"},
     {0},
 };
@@ -34,6 +35,9 @@ static const usage_row_t k_commands[] = {
     {.name = "intensity",
      .argument = "PERCENT",
      .help = "how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so"},
+    {.name = "scope",
+     .argument = "[COLUMN,...]",
+     .help = "every cycle as a line of CSV, all columns or these; on a terminal some lines a second (docs/samples.md)"},
     {.name = "presets", .help = "ready-made platforms, for heaved --preset; needs no heaved"},
     {0},
 };
