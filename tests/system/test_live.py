@@ -9,6 +9,7 @@ import fcntl
 import grp
 import json
 import math
+import mmap
 import os
 import pty
 import re
@@ -238,6 +239,59 @@ def has_colours_on_a_terminal_only(bench):
     for environment in ({"NO_COLOR": "1"}, {"TERM": "dumb"}):
         assert b"\x1b" not in shown_on_terminal(bench, "status", **environment), environment
     assert b"\x1b" not in shown_on_terminal(bench, "--json", "status")
+    assert bench.stop(daemon) == 0
+
+
+def shows_every_cycle(bench):
+    """heavectl scope: consecutive cycles, chosen columns; a stopped reader holds nobody up; a ninth client's rules do not matter to a mapped memory."""
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    with subprocess.Popen([bench.bin / "heavectl", "--socket", str(bench.socket), "scope"], stdout=subprocess.DEVNULL) as stopped:
+        stopped.send_signal(signal.SIGSTOP)
+        with bench.sender() as sender:
+            sender.stream(0.3, wave)
+            run = bench.ctl("--for", "1", "scope")
+            assert run.returncode == 0 and run.stderr == "", run.stderr
+            lines = run.stdout.splitlines()
+            names = lines[0].split(",")
+            rows = [dict(zip(names, map(float, line.split(",")))) for line in lines[1:]]
+            assert len(rows) > 200, len(rows)
+            assert all(after["cycle"] == before["cycle"] + 1 for before, after in zip(rows, rows[1:]))
+            assert {row["state"] for row in rows} <= {5.0, 6.0}, rows[0]
+            late = bench.status()
+            assert rows[-1]["cycle"] <= late["cycle"] and rows[0]["sent_c1_mm"] > 0, rows[-1]
+        stopped.send_signal(signal.SIGCONT)
+        stopped.send_signal(signal.SIGINT)
+        assert stopped.wait(timeout=heave.WAIT_S) == 0
+    lines = bench.ctl("--for", "0.2", "scope", "t_ms,drive1,sent_z_mm").stdout.splitlines()
+    assert lines[0] == "t_ms,drive1,sent_z_mm" and re.fullmatch(r"\d+\.000,3,-?\d+\.\d{9}", lines[1]), lines[:2]
+    run = bench.ctl("scope", "t_ms,colour")
+    assert run.returncode == 64 and "colour is no column" in run.stderr, run.stderr
+    with socket.socket(socket.AF_UNIX) as client:
+        client.connect(str(bench.socket))
+        client.sendall(b"samples\n")
+        answer, (fd,), _, _ = socket.recv_fds(client, 4096, 4)
+        assert json.loads(answer) == {"ok": True, "seconds": 30}, answer
+        try:
+            mmap.mmap(fd, 4096, prot=mmap.PROT_READ | mmap.PROT_WRITE)
+            raise AssertionError("a reader may write")
+        except PermissionError:
+            pass
+        with mmap.mmap(fd, 0, prot=mmap.PROT_READ) as memory:
+            assert memory[:8] == b"HEAVESMP" and struct.unpack_from("<I", memory, 32)[0] == status_cycle_us(bench)
+        os.close(fd)
+    assert bench.stop(daemon) == 0
+
+
+def status_cycle_us(bench):
+    return bench.status()["cycle_us"]
+
+
+def has_no_samples(bench):
+    text = bench.config.read_text(encoding="utf-8") + "\n[samples]\nseconds = 0\n"
+    daemon = bench.start(config=bench.file("none.ini", text))
+    run = bench.ctl("scope")
+    assert run.returncode == 1 and "samples: there are none" in run.stderr, run.stderr
     assert bench.stop(daemon) == 0
 
 
@@ -950,6 +1004,8 @@ CASES = {
     "watch, not on a terminal": watches_by_line,
     "--wait returns when it is done, or says why it is not": waits_for_the_end,
     "--wait and a hold": waits_and_is_held,
+    "scope shows every cycle, and a stopped reader holds nobody up": shows_every_cycle,
+    "without samples, scope says so": has_no_samples,
     "watch on 80 x 24 keeps the state, the fault and whole words": watches_on_a_small_terminal,
     "watch on a terminal puts it back on Ctrl-C": watches_on_a_terminal,
     "status has colours on a terminal only, and not with NO_COLOR": has_colours_on_a_terminal_only,
