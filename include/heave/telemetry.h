@@ -71,6 +71,8 @@ typedef struct {
     uint8_t relay_count;
     uint16_t relay_mask;
     bool is_relays_unknown; /**< they could not be written or read back: relay_mask is the requested mask */
+    bool has_received;
+    q16_t received_q16[POSE_AXES]; /**< the newest pose that was followed, as it stood in its frame */
     pose_t asked;
     pose_t sent;
     plate_t plate; /**< from feedback: actual pose, speed and acceleration */

@@ -330,6 +330,7 @@ typedef struct {
     uint32_t operator_log_kb;
     uint32_t operator_log_files;
     config_black_box_t black_box;
+    uint32_t samples_seconds; /**< 0 = no samples */
     config_drives_t drives;
     config_drive_train_t drive_train;
     config_sim_t sim;
@@ -361,6 +362,11 @@ int config_reload(const char *path, config_t *running, FILE *report);
 
 /** Writes every key with its value, unit, range and help, as a file that loads to the same configuration. */
 void config_dump(const config_t *self, FILE *out);
+
+/** Writes a file to fill in, for a kind of platform and a driver.
+ *  @return NULL; else the words that are allowed, separated by |, of the first argument that is none of them: nothing is written
+ */
+const char *config_write_template(const char *kind, const char *driver, FILE *out);
 
 /** Writes the reference of all keys as Markdown. */
 void config_write_reference(FILE *out);

@@ -31,6 +31,8 @@ const config_section_t config_sections[] = {
     {"control", "where heavectl reaches heaved", CONFIG_NEEDS_NOTHING},
     {"black-box", "the last minutes, kept in memory; written on every fault and e-stop, and by `heavectl dump`",
      CONFIG_NEEDS_NOTHING},
+    {"samples", "every cycle in shared memory, for `heavectl scope` and other programs that look on; see docs/samples.md",
+     CONFIG_NEEDS_NOTHING},
     {"drives", "what moves the cylinders", CONFIG_NEEDS_NOTHING},
     {"sim", "simulated drives ([drives] driver = sim)", CONFIG_NEEDS_NOTHING},
     {"can", "the CAN bus of the drives, for every driver that uses one", CONFIG_NEEDS_NOTHING},
@@ -254,6 +256,9 @@ const config_key_t config_keys[] = {
      .help = "kept at least, of every cycle: up to 1 MB of memory and of disk space a second, at 1000 cycles a second"},
     {KEY("black-box", "incidents"), AT(black_box.incidents), .type = CONFIG_INTEGER, .unit = "", .fallback = "10", RANGE(1, 100),
      .help = "folders kept in the directory, of faults and of dumps each; the oldest one makes way, but not the first fault since `heavectl seen`"},
+
+    {KEY("samples", "seconds"), AT(samples_seconds), .type = CONFIG_INTEGER, .unit = "s", .fallback = "30", RANGE(0, 600),
+     .help = "how long they are kept: 0.4 MB of memory a second at 1000 cycles a second; 0 = there are none"},
 
     {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim|cia402|can-raw|modbus-tcp|modbus-rtu",
      .help = "the drives in use"},

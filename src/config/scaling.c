@@ -127,6 +127,9 @@ void config_scaling_resolve(config_source_t *self)
     config_drive_train_t *train = &self->config->drive_train;
     const char *section = NULL;
     config_ratios_t *target = target_of(self->config, &section);
+    if (target != NULL && !config_source_has_all(self, SECTION) && self->entry[config_key_find(SECTION, "lead_mm")].line != 0) {
+        self->entry[config_key_find(section, "counts_per_mm")].is_valid = false; /* what it follows from was refused */
+    }
     if (target == NULL || !config_source_has_all(self, SECTION) || !config_source_has(self, "platform", "kind") ||
         !config_source_has(self, section, "counts_per_mm")) {
         return;

@@ -458,6 +458,10 @@ static int open_all(live_t *self, const config_t *config)
     if (!open_signals(self)) {
         return print_message(EXIT_UNAVAILABLE, "signals: %s", strerror(errno));
     }
+    if (!samples_writer_open(&self->loop.samples, config)) { /* who looks on has to do without: the platform does not need it */
+        (void)print_message(0, "samples: no memory to share: %s", strerror(errno));
+    }
+    self->control.samples_fd = self->loop.samples.fd;
     self->loop.handover.is_unapproved = config_is_unapproved(config);
     const hv_status_t status =
         motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->writers.log), linux_clock_hal());
@@ -495,6 +499,7 @@ int live_run(const config_t *config, const options_t *options)
         const bool has_blackbox_ended = blackbox_close(&self->blackbox);
         const bool have_devices_ended = devices_close(&self->loop.devices, self->config.settings.relay_safe_mask);
         linux_udp_close(&self->udp);
+        samples_writer_close(&self->loop.samples);
         if (has_blackbox_ended && has_log_ended && have_devices_ended && self->has_writers_ended) {
             free(self);
         }

@@ -11,6 +11,7 @@
 
 #include "common/atomic_file.h"
 #include "common/message.h"
+#include "common/presets.h"
 #include "common/same_file.h"
 #include "common/standard_descriptors.h"
 #include "common/usage.h"
@@ -126,14 +127,56 @@ static int run(const options_t *options, const config_t *config)
         return dump_dbc(options, config);
     case MODE_HELP:
     case MODE_VERSION:
+    case MODE_PRESETS:
+    case MODE_TEMPLATE:
         break;
     }
     return EXIT_SOFTWARE;
 }
 
+static int list_presets(void)
+{
+    return presets_list(stdout) >= 0 ? end_stdout(EXIT_DONE)
+                                     : print_message(EXIT_NO_INPUT, "%s: %s", presets_directory(), strerror(errno));
+}
+
+static int write_template(const options_t *options)
+{
+    const char *allowed = config_write_template(options->template_kind, options->template_driver, stdout);
+    return allowed == NULL ? end_stdout(EXIT_DONE)
+                           : print_message(EXIT_BAD_USAGE, "--template %s %s: allowed: %s", options->template_kind,
+                                           options->template_driver, allowed);
+}
+
+/* What needs no configuration; -1: the rest does. */
+static int run_without_file(const options_t *options)
+{
+    switch (options->mode) {
+    case MODE_HELP:
+        usage_print(&heaved_usage, stdout);
+        return end_stdout(EXIT_DONE);
+    case MODE_VERSION:
+        printf("heaved " HEAVE_VERSION "\n");
+        return end_stdout(EXIT_DONE);
+    case MODE_PRESETS:
+        return list_presets();
+    case MODE_TEMPLATE:
+        return write_template(options);
+    case MODE_RUN:
+    case MODE_CHECK:
+    case MODE_ENVELOPE:
+    case MODE_DOCTOR:
+    case MODE_DUMP_CONFIG:
+    case MODE_DUMP_DBC:
+    case MODE_PLAY:
+        break;
+    }
+    return -1;
+}
+
 int main(int argc, char **argv)
 {
-    options_t options;
+    static options_t options;
     static config_t config;
     if (!standard_descriptors_open()) {
         return print_message(EXIT_UNAVAILABLE,
@@ -145,13 +188,9 @@ int main(int argc, char **argv)
     if (code != EXIT_DONE) {
         return code;
     }
-    if (options.mode == MODE_HELP || options.mode == MODE_VERSION) {
-        if (options.mode == MODE_HELP) {
-            usage_print(&heaved_usage, stdout);
-        } else {
-            printf("heaved " HEAVE_VERSION "\n");
-        }
-        return end_stdout(EXIT_DONE);
+    code = run_without_file(&options);
+    if (code >= 0) {
+        return code;
     }
     if (!is_readable(options.config)) {
         return print_message(EXIT_NO_INPUT, "%s: %s", options.config, strerror(errno));

@@ -347,6 +347,7 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     note_hold(self);
     write_down(self, is_zero);
     publish(self);
+    samples_writer_add(&self->samples, gateway_snapshot(&self->session.gateway));
     answer_requests(self, result, requests);
 }
 

@@ -15,6 +15,7 @@
 #include "record/session.h"
 #include "record/udp_recorder.h"
 #include "service/handover.h"
+#include "service/samples_writer.h"
 
 /** The thread and all it hands over. Large: from the heap, at the start. */
 typedef struct {
@@ -30,6 +31,8 @@ typedef struct {
     bool is_recording;
     bool is_tracing;
     blackbox_feed_t *blackbox; /**< NULL: there is none */
+
+    samples_writer_t samples; /**< opened by the owner */
 
     handover_t handover;
     bool has_lost_clock; /**< once it has ended: because it could not wait for its next cycle */

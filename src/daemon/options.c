@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "common/message.h"
+#include "common/presets.h"
 #include "common/usage.h"
 #include "config/config.h"
 
@@ -20,6 +21,9 @@ enum {
     OPTION_TRACE,
     OPTION_RECORD,
     OPTION_SOCKET,
+    OPTION_PRESET,
+    OPTION_PRESETS,
+    OPTION_TEMPLATE,
     OPTION_HELP,
     OPTION_VERSION
 };
@@ -32,11 +36,17 @@ static const usage_row_t k_forms[] = {
     {.argument = "--dump-config", .help = "every key with its value, unit, range and help"},
     {.argument = "--dump-dbc", .help = "the frames of [can-raw] as a DBC file"},
     {.argument = "--play FRAMES [--trace OUT]", .help = "offline: simulated time and devices"},
+    {.argument = "--presets", .help = "ready-made platforms, without a file"},
+    {.argument = "--template KIND DRIVER", .help = "a file to fill in, without a file"},
     {0},
 };
 
 static const usage_row_t k_options[] = {
     {"config", "FILE", "the platform (INI)", OPTION_CONFIG},
+    {"preset", "NAME", "a ready-made platform, in place of --config", OPTION_PRESET},
+    {"presets", NULL, "their names", OPTION_PRESETS},
+    {"template", "KIND", "hexapod, tripod or tripod-3rps, and a driver: sim, cia402, can-raw, modbus-tcp or modbus-rtu",
+     OPTION_TEMPLATE},
     {"check", NULL, "say whether the platform is valid, what it can reach, what it costs the bus, and what would suit it better",
      OPTION_CHECK},
     {"envelope", "OUT", "a file, there as a whole or not at all; - is standard output", OPTION_ENVELOPE},
@@ -83,6 +93,7 @@ static const usage_section_t k_manual[] = {
      "`RUNTIME_DIRECTORY` where the socket is if it names no other.\n"},
     {"FILES", " /etc/heave/NAME.ini          the platform of heave@NAME; see heave.ini(5)\n"
               " /etc/heave/demo.ini          a simulated one, to try things out\n"
+              " /usr/share/heave/presets/    ready-made platforms, for --preset; HEAVE_PRESETS says another folder\n"
               " /run/heave/NAME/heaved.sock  of heave@NAME, for heavectl; members of group heave may\n"
               " /run/heave/heaved.sock       of a heaved started by hand\n"
               " /var/lib/heave/NAME/         incidents of the black box\n"},
@@ -117,11 +128,14 @@ static bool set_mode(options_t *self, run_mode_t mode)
 
 static const char *take_option(options_t *self, int option)
 {
-    static const char k_one_mode[] =
-        "only one of --check, --envelope, --doctor, --dump-config, --dump-dbc, --play, --help, --version at a time";
+    static const char k_one_mode[] = "only one of --check, --envelope, --doctor, --dump-config, --dump-dbc, --play, --presets, "
+                                     "--template, --help, --version at a time";
     bool is_free = true;
     switch (option) {
     case OPTION_CONFIG:
+        if (self->config == self->preset) {
+            return "--config or --preset, not both";
+        }
         self->config = optarg;
         break;
     case OPTION_CHECK:
@@ -153,6 +167,20 @@ static const char *take_option(options_t *self, int option)
     case OPTION_SOCKET:
         self->socket = optarg;
         break;
+    case OPTION_PRESET:
+        if (self->config != NULL) {
+            return "--config or --preset, not both";
+        }
+        self->config = self->preset;
+        return presets_path(optarg, self->preset, sizeof self->preset) ? NULL
+                                                                       : "--preset needs one of the names that --presets shows";
+    case OPTION_PRESETS:
+        is_free = set_mode(self, MODE_PRESETS);
+        break;
+    case OPTION_TEMPLATE:
+        self->template_kind = optarg;
+        is_free = set_mode(self, MODE_TEMPLATE);
+        break;
     case OPTION_HELP:
         is_free = set_mode(self, MODE_HELP);
         break;
@@ -168,11 +196,14 @@ static const char *take_option(options_t *self, int option)
 /* Options that do not go together. */
 static const char *contradiction(const options_t *self)
 {
-    if (self->mode == MODE_HELP || self->mode == MODE_VERSION) {
+    if (self->mode == MODE_HELP || self->mode == MODE_VERSION || self->mode == MODE_PRESETS) {
         return NULL;
     }
+    if (self->mode == MODE_TEMPLATE) {
+        return self->template_driver != NULL ? NULL : "--template needs a kind and a driver, as in --template hexapod cia402";
+    }
     if (self->config == NULL) {
-        return "--config FILE is missing";
+        return "--config FILE or --preset NAME is missing";
     }
     if (self->mode != MODE_RUN && (self->record != NULL || self->socket != NULL)) {
         return "--record and --socket are for running live";
@@ -208,6 +239,9 @@ int options_read(options_t *self, int argc, char **argv)
         if (wrong != NULL) {
             return complain(wrong, option == '?' || option == ':' ? argv[at] : NULL);
         }
+    }
+    if (self->mode == MODE_TEMPLATE && optind < argc) {
+        self->template_driver = argv[optind++];
     }
     if (optind < argc) {
         return complain("unexpected argument", argv[optind]);

@@ -15,6 +15,8 @@ typedef enum {
     MODE_DUMP_CONFIG,
     MODE_DUMP_DBC,
     MODE_PLAY,
+    MODE_PRESETS,
+    MODE_TEMPLATE,
     MODE_HELP,
     MODE_VERSION
 } run_mode_t;
@@ -28,6 +30,9 @@ typedef struct {
     const char *trace;
     const char *record;
     const char *socket;
+    const char *template_kind;   /**< of --template */
+    const char *template_driver; /**< what stands behind it */
+    char preset[4096];           /**< path of the file that --preset names, which config then is */
 } options_t;
 
 /** Reads a command line; says what is wrong with it.

@@ -173,11 +173,11 @@ static bool is_snapshot_sane(const snapshot_t *s, const snapshot_t *prepared)
     return sane_time(s->now_us) && (unsigned)s->state < STATES && (unsigned)s->goal < STATES && sane_bool(&s->is_estop_active) &&
            sane_bool(&s->is_power_failing) && sane_bool(&s->is_healthy) && (unsigned)s->fault.code < FAULT_CODES &&
            s->fault.axis <= DRIVES_MAX && (unsigned)s->reaction <= FAULT_REACT_SILENT && s->cylinders == prepared->cylinders &&
-           sane_bool(&s->has_angle) && s->has_angle == prepared->has_angle && s->relay_count == prepared->relay_count &&
-           sane_bool(&s->is_relays_unknown) && plate_is_sane(&s->plate) && sane_all_q32(s->asked.axis_q32, POSE_AXES) &&
-           sane_all_q32(s->sent.axis_q32, POSE_AXES) && sane_all_q32(s->extension_mm_q32, CYLINDERS_MAX) &&
-           sane_q32(s->angle_deg_q32) && s->limiting_cylinder <= CYLINDERS_MAX && owner_is_sane(&s->owner) &&
-           owner_is_sane(&s->other);
+           sane_bool(&s->has_received) && sane_bool(&s->has_angle) && s->has_angle == prepared->has_angle &&
+           s->relay_count == prepared->relay_count && sane_bool(&s->is_relays_unknown) && plate_is_sane(&s->plate) &&
+           sane_all_q32(s->asked.axis_q32, POSE_AXES) && sane_all_q32(s->sent.axis_q32, POSE_AXES) &&
+           sane_all_q32(s->extension_mm_q32, CYLINDERS_MAX) && sane_q32(s->angle_deg_q32) &&
+           s->limiting_cylinder <= CYLINDERS_MAX && owner_is_sane(&s->owner) && owner_is_sane(&s->other);
 }
 
 static bool are_bools_sane(const gateway_t *saved)

@@ -367,6 +367,20 @@ static void watch_gap(gateway_t *self, uint64_t now_us)
     self->stream_frames = !is_next ? 0 : self->stream_frames < STREAM_FRAMES ? self->stream_frames + 1 : STREAM_FRAMES;
 }
 
+/* What the sender asked for in its own words, before sign, scale, offset, intensity and limits. */
+static void keep_received(snapshot_t *s, const frame_t *frame)
+{
+    s->has_received = k_slots[frame->command][0] < SLOT_CYLINDER;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        s->received_q16[i] = 0;
+    }
+    for (unsigned i = 0; s->has_received && i < frame->count; i++) {
+        if (k_slots[frame->command][i] < POSE_AXES) {
+            s->received_q16[k_slots[frame->command][i]] = frame->value_q16[i];
+        }
+    }
+}
+
 static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *from, uint64_t now_us)
 {
     const char *missing = missing_for(self, frame->command);
@@ -385,6 +399,7 @@ static void accept(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *
     if (!is_waiting && !follow(self, &target, frame->command, from, now_us)) {
         return;
     }
+    keep_received(&self->snapshot, frame);
     counters_t *counters = &self->snapshot.counters;
     counters->accepted[frame->command]++;
     counters->accepted_timed += frame->is_timed;

@@ -19,20 +19,23 @@
 #include <unistd.h>
 
 #include "common/message.h" // exit codes
+#include "common/presets.h"
 #include "common/standard_descriptors.h"
 #include "common/usage.h"
+#include "heavectl/scope.h"
 #include "heavectl/socket.h"
 #include "heavectl/usage.h"
 #include "heavectl/view.h"
 
-#define ANSWER_MS   5000
-#define DUMP_MS     60000 /* a slow disk */
-#define WAIT_MS_MAX 1000  /* a signal between a look and a wait is seen by then */
-#define LINE_BYTES  65536u
-#define COLUMNS     80u
-#define TERMINAL_HZ 20u
-#define PLAIN_HZ    1u
-#define FOR_MAX_S   1e9
+#define ANSWER_MS     5000
+#define DUMP_MS       60000 /* a slow disk */
+#define WAIT_MS_MAX   1000  /* a signal between a look and a wait is seen by then */
+#define LINE_BYTES    65536u
+#define COLUMNS       80u
+#define TERMINAL_HZ   20u
+#define PLAIN_HZ      1u
+#define FOR_MAX_S     1e9
+#define WATCH_REQUEST "watch 20" /* of who waits: HOLD may come after 100 ms */
 
 /** A run of the program. */
 typedef struct {
@@ -42,8 +45,9 @@ typedef struct {
     const char *platform; /**< NULL = not named */
     char path[SOCKET_PATH_MAX];
     bool is_json;
-    double for_s; /**< 0 = until interrupted */
-    unsigned hz;  /**< 0 = as it suits the output */
+    bool is_waiting; /* --wait */
+    double for_s;    /**< 0 = until interrupted */
+    unsigned hz;     /**< 0 = as it suits the output */
     int fd;
     int error; /**< why the system does not let it hear heaved, an errno; 0 = it does */
     char line[LINE_BYTES];
@@ -235,10 +239,18 @@ static unsigned terminal_columns(void)
     return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col >= 20 ? size.ws_col : COLUMNS;
 }
 
+/* 0: it does not say. */
+static unsigned terminal_rows(void)
+{
+    struct winsize size;
+    return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 ? size.ws_row : 0;
+}
+
 static void show_table(const cJSON *status, bool is_watching)
 {
     static char text[CTL_VIEW_BYTES];
     const ctl_view_style_t style = {.columns = terminal_columns(),
+                                    .rows = is_watching ? terminal_rows() : 0,
                                     .is_chinese = is_chinese(),
                                     .is_utf8 = is_utf8(),
                                     .is_coloured = is_coloured(),
@@ -303,7 +315,7 @@ static bool has_failed(const ctl_t *self, const cJSON *answer)
 static int show(const ctl_t *self, const char *line)
 {
     cJSON *answer = cJSON_Parse(line);
-    if (self->is_json) {
+    if (self->is_json && !self->is_waiting) {
         printf("%s\n", line);
     }
     int code = judge(answer);
@@ -311,7 +323,7 @@ static int show(const ctl_t *self, const char *line)
         code = complain(EXIT_REFUSED, "%s: the platform is in %s; heavectl status says why", self->command,
                         cJSON_GetObjectItemCaseSensitive(answer, "state")->valuestring);
     }
-    if (code == EXIT_DONE && !self->is_json) {
+    if (code == EXIT_DONE && !self->is_json && !self->is_waiting) {
         show_answer(self, answer);
     }
     cJSON_Delete(answer);
@@ -400,6 +412,109 @@ static int watch(ctl_t *self)
     return code == EXIT_UNAVAILABLE ? not_heard(self, "heaved has ended") : code;
 }
 
+/* --- Waiting for the end of what was asked for --- */
+
+static const char *text_of(const cJSON *object, const char *name)
+{
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
+    return cJSON_IsString(item) ? item->valuestring : "?";
+}
+
+/* Where a request leads to; NULL: nowhere that could be waited for. */
+static const char *destination(const char *command)
+{
+    static const char *const k_rows[][2] = {{"engage", "ENGAGED"}, {"resume", ""}, {"park", "SETTLED"}, {"shutdown", "OFF"}};
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        if (strcmp(k_rows[i][0], command) == 0) {
+            return k_rows[i][1];
+        }
+    }
+    return NULL;
+}
+
+/* Whether a status is the end; code: what came of it. */
+static bool has_ended(const ctl_t *self, const cJSON *status, int *code)
+{
+    const char *state = text_of(status, "state");
+    const char *wanted = destination(self->command)[0] != '\0' ? destination(self->command) : text_of(status, "goal");
+    const bool is_silent = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(status, "held_by_silence"));
+    *code = EXIT_DONE;
+    if (strcmp(state, wanted) == 0 || (strcmp(wanted, "ENGAGED") == 0 && is_silent)) {
+        return true;
+    }
+    if (strcmp(state, "FAULT") == 0 || strcmp(state, "ESTOP") == 0) {
+        const cJSON *fault = cJSON_GetObjectItemCaseSensitive(status, "fault");
+        *code = complain(EXIT_REFUSED, "%s: the platform is in %s (%s); heavectl status says more", self->command, state,
+                         text_of(fault, "text"));
+        return true;
+    }
+    if (strcmp(state, "HOLD") == 0) {
+        *code = complain(EXIT_REFUSED, "%s: somebody has asked for hold; heavectl resume goes on", self->command);
+        return true;
+    }
+    return false;
+}
+
+static void show_end(const ctl_t *self, const cJSON *status)
+{
+    const bool is_alone = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(status, "waiting_for_sender"));
+    printf("%s: %s%s\n", self->command, text_of(status, "state"), is_alone ? ", waiting for a sender" : "");
+}
+
+/* Until the state is there that was asked for, or cannot come any more. */
+static int wait_for_end(ctl_t *self)
+{
+    const int64_t until_ms = self->for_s > 0.0 ? now_ms() + (int64_t)(self->for_s * 1000.0) : INT64_MAX;
+    const bool is_shutdown = strcmp(self->command, "shutdown") == 0;
+    int code = send_line(self, WATCH_REQUEST);
+    bool is_over = code != EXIT_DONE;
+    while (!is_over) {
+        const char *line = receive_line(self, until_ms);
+        if (line == NULL) {
+            const bool is_late = now_ms() >= until_ms;
+            code = is_late       ? complain(EXIT_REFUSED, "%s: not done in time; it goes on", self->command)
+                   : is_shutdown ? EXIT_DONE
+                                 : not_heard(self, "heaved has ended");
+            break;
+        }
+        cJSON *status = cJSON_Parse(line);
+        is_over = !is_shutdown && has_ended(self, status, &code);
+        if (is_over && code == EXIT_DONE && !self->is_json) {
+            show_end(self, status);
+        } else if (is_over && self->is_json) {
+            printf("%s\n", line);
+        }
+        cJSON_Delete(status);
+    }
+    return code;
+}
+
+/* --- Samples --- */
+
+static int scope(ctl_t *self)
+{
+    const scope_t scope = {.columns = self->argument,
+                           .for_s = self->for_s,
+                           .hz = self->hz != 0 ? self->hz : TERMINAL_HZ,
+                           .is_terminal = isatty(STDOUT_FILENO) != 0,
+                           .is_interrupted = &is_interrupted};
+    const struct sigaction action = {.sa_handler = on_signal};
+    char error[256] = "";
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    int code = send_line(self, "samples");
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    const int fd = scope_receive(self->fd, self->line, sizeof self->line);
+    if (fd < 0) {
+        return self->line[0] != '\0' ? show(self, self->line) : not_heard(self, "heaved does not answer");
+    }
+    code = scope_run(&scope, self->fd, fd, error, sizeof error);
+    (void)close(fd);
+    return code == EXIT_DONE ? code : complain(code, "%s", error);
+}
+
 /* --- The command line --- */
 
 static bool read_seconds(const char *text, double *out)
@@ -432,6 +547,9 @@ static const char *take_option(ctl_t *self, int option)
         return socket_path_of_platform(self->path, SOCKET_DIRECTORY, optarg)
                    ? NULL
                    : "--platform needs the NAME of a service heave@NAME, without a /";
+    case OPTION_WAIT:
+        self->is_waiting = true;
+        break;
     case OPTION_FOR:
         return read_seconds(optarg, &self->for_s) ? NULL : "--for needs a number of seconds above 0";
     case OPTION_HZ:
@@ -472,19 +590,23 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
                "PERCENT";
     }
     const bool is_intensity = strcmp(argv[optind], "intensity") == 0;
-    if (optind + (is_intensity ? 2 : 1) != argc) {
+    const bool has_columns = strcmp(argv[optind], "scope") == 0 && optind + 2 == argc;
+    if (optind + (is_intensity || has_columns ? 2 : 1) != argc) {
         return is_intensity ? "intensity needs a whole number of percent, as in `heavectl intensity 50`"
                             : "one command is needed";
     }
-    self->argument = is_intensity ? argv[optind + 1] : NULL;
+    self->argument = is_intensity || has_columns ? argv[optind + 1] : NULL;
+    if (self->is_waiting && destination(argv[optind]) == NULL) {
+        return "--wait goes with engage, resume, park and shutdown";
+    }
     for (const usage_row_t *row = heavectl_usage.commands; row->name != NULL; row++) {
         if (strcmp(argv[optind], row->name) == 0) {
             self->command = row->name;
             return NULL;
         }
     }
-    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge and "
-           "intensity are allowed";
+    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge, "
+           "intensity, scope and presets are allowed";
 }
 
 /* Whom to ask: what the command line names, then the environment, then what is there. */
@@ -529,10 +651,15 @@ int main(int argc, char **argv)
     if (wrong != NULL) {
         return complain(EXIT_BAD_USAGE, "%s; see heavectl --help", wrong);
     }
+    if (strcmp(ctl.command, "presets") == 0) {
+        return presets_list(stdout) >= 0 ? end_stdout(EXIT_DONE)
+                                         : complain(EXIT_UNAVAILABLE, "%s: %s", presets_directory(), strerror(errno));
+    }
     int code = choose_socket(&ctl);
     code = code == EXIT_DONE ? open_link(&ctl) : code;
     if (code != EXIT_DONE) {
         return code;
     }
-    return end_stdout(strcmp(ctl.command, "watch") == 0 ? watch(&ctl) : ask(&ctl));
+    code = strcmp(ctl.command, "watch") == 0 ? watch(&ctl) : strcmp(ctl.command, "scope") == 0 ? scope(&ctl) : ask(&ctl);
+    return end_stdout(ctl.is_waiting && code == EXIT_DONE ? wait_for_end(&ctl) : code);
 }

@@ -10,8 +10,11 @@
 static const usage_row_t k_forms[] = {
     {.argument = "status"},
     {.argument = "[--for SECONDS] [--hz N] watch"},
+    {.argument = "--wait [--for SECONDS] engage | resume | park | shutdown"},
     {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen | acknowledge"},
     {.argument = "intensity PERCENT"},
+    {.argument = "[--for SECONDS] [--hz N] scope [COLUMN,...]"},
+    {.argument = "presets"},
     {0},
 };
 
@@ -32,6 +35,10 @@ static const usage_row_t k_commands[] = {
     {.name = "intensity",
      .argument = "PERCENT",
      .help = "how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so"},
+    {.name = "scope",
+     .argument = "[COLUMN,...]",
+     .help = "every cycle as a line of CSV, all columns or these; on a terminal some lines a second (docs/samples.md)"},
+    {.name = "presets", .help = "ready-made platforms, for heaved --preset; needs no heaved"},
     {0},
 };
 
@@ -40,7 +47,8 @@ static const usage_row_t k_options[] = {
     {"socket", "PATH", "else the environment's HEAVE_SOCKET, else " SOCKET_DEFAULT ", else that of the only service",
      OPTION_SOCKET},
     {"platform", "NAME", "the service heave@NAME: " SOCKET_DIRECTORY "/NAME/heaved.sock", OPTION_PLATFORM},
-    {"for", "SECONDS", "watch ends by itself", OPTION_FOR},
+    {"wait", NULL, "engage, resume, park, shutdown: return once it is done, or cannot be any more", OPTION_WAIT},
+    {"for", "SECONDS", "watch ends by itself; --wait waits no longer", OPTION_FOR},
     {"hz", "N", "updates per second of watch, 1 to 50; else 20, and 1 where the output is no terminal", OPTION_HZ},
     {"help", NULL, "print this", OPTION_HELP},
     {"version", NULL, "print the version", OPTION_VERSION},
@@ -49,7 +57,7 @@ static const usage_row_t k_options[] = {
 
 static const usage_exit_t k_exits[] = {
     {EXIT_DONE, "done"},
-    {EXIT_REFUSED, "refused, ended in FAULT or ESTOP at once, or gave way to a newer client"},
+    {EXIT_REFUSED, "refused, not done in time, ended in FAULT or ESTOP at once, or gave way to a newer client"},
     {EXIT_BAD_USAGE, "usage"},
     {EXIT_UNAVAILABLE, "heaved is not running or may not be asked"},
     {EXIT_IO, "output cannot be written"},

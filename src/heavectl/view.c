@@ -11,6 +11,7 @@
 #define BAR_COLUMNS_MAX  60u
 #define BAR_BESIDE       34u /* columns of a cylinder's line beside its bar */
 #define LINE_COLUMNS_MAX 512u
+#define LABEL_COLUMNS    9
 #define BOLD             "\x1b[1m"
 #define RED              "\x1b[1;31m"
 #define GREEN            "\x1b[1;32m"
@@ -25,6 +26,7 @@ typedef struct {
     char line[LINE_COLUMNS_MAX * 4];
     size_t at;        /* bytes of the line */
     unsigned columns; /* of the line, used */
+    unsigned rows;
 } view_t;
 
 static const cJSON *member(const cJSON *object, const char *name)
@@ -84,10 +86,14 @@ static void put_colour(view_t *self, const char *sequence)
 
 static void end_line(view_t *self)
 {
-    const size_t end = strlen(self->style->line_end);
-    if (self->length + self->at + end < CTL_VIEW_BYTES) {
+    const bool is_seen = self->style->rows == 0 || self->rows < self->style->rows;
+    const bool is_last = self->rows + 1u == self->style->rows; /* what ended it would scroll the first one away */
+    const char *line_end = is_last ? "" : self->style->line_end;
+    const size_t end = strlen(line_end);
+    self->rows++;
+    if (is_seen && self->length + self->at + end < CTL_VIEW_BYTES) {
         memcpy(&self->text[self->length], self->line, self->at);
-        memcpy(&self->text[self->length + self->at], self->style->line_end, end + 1);
+        memcpy(&self->text[self->length + self->at], line_end, end + 1);
         self->length += self->at + end;
     }
     self->at = 0;
@@ -98,19 +104,34 @@ static void end_line(view_t *self)
 static void wrap(view_t *self)
 {
     end_line(self);
-    put(self, "         ");
+    put(self, "%*s", LABEL_COLUMNS, "");
+}
+
+/* True where the word that begins here fits into a line of its own, but not into what is left of this one. */
+static bool is_word_too_long(const view_t *self, const char *text)
+{
+    size_t length = 0;
+    while (text[length] > ' ' && (unsigned char)text[length] < 0x80u) {
+        length++;
+    }
+    return self->columns + length > self->style->columns && length + LABEL_COLUMNS <= self->style->columns;
 }
 
 /* Adds words; what a line does not hold goes on in the next one. */
 static void put_text(view_t *self, const char *text)
 {
+    bool is_start = true; /* of a word */
     while (*text != '\0') {
         char glyph[5] = {0};
         size_t length = 0;
+        if (is_start && *text != ' ' && is_word_too_long(self, text)) {
+            wrap(self);
+        }
+        is_start = *text == ' ';
         do {
             glyph[length++] = *text++;
         } while (length < 4 && ((unsigned char)*text & 0xC0u) == 0x80u);
-        if (self->columns + 2 > self->style->columns) {
+        if (self->columns + (length > 2 ? 2u : 1u) > self->style->columns) {
             wrap(self);
         }
         put_column(self, glyph);
@@ -159,7 +180,12 @@ static void draw_head(view_t *self, const cJSON *status)
     put_colour(self, state_colour(word(status, "state")));
     put(self, "%-9s", word(status, "state"));
     put_colour(self, PLAIN);
-    put(self, " goal %-9s%s%s%s%s", word(status, "goal"), cJSON_IsTrue(member(status, "held_by_silence")) ? " SENDER SILENT" : "",
+    const bool is_waiting = cJSON_IsTrue(member(status, "waiting_for_sender"));
+    const bool is_silent = cJSON_IsTrue(member(status, "held_by_silence"));
+    put(self, " goal %-9s%s%s%s%s", word(status, "goal"),
+        is_waiting  ? " waiting for a sender"
+        : is_silent ? " SENDER SILENT"
+                    : "",
         cJSON_IsTrue(member(status, "estop_active")) ? " E-STOP" : "",
         cJSON_IsTrue(member(status, "power_failing")) ? " POWER" : "",
         cJSON_IsTrue(member(status, "shutting_down")) ? " SHUTTING DOWN" : "");
@@ -189,6 +215,9 @@ static void draw_poses(view_t *self, const cJSON *status)
 {
     put(self, "%-7s %10s %10s %10s %10s %10s %10s", "pose", "roll deg", "pitch deg", "yaw deg", "x mm", "y mm", "z mm");
     end_line(self);
+    if (cJSON_IsObject(member(status, "pose_received"))) {
+        draw_pose(self, status, "frame", "pose_received", "");
+    }
     draw_pose(self, status, "asked", "pose_asked", "");
     draw_pose(self, status, "sent", "pose_sent", "");
     draw_pose(self, status, "actual", "pose_actual", "");
@@ -526,9 +555,8 @@ static void draw_device(view_t *self, const cJSON *fault)
     }
 }
 
-static void draw_fault(view_t *self, const cJSON *status)
+static void draw_flags(view_t *self, const cJSON *status)
 {
-    const cJSON *fault = member(status, "fault");
     const cJSON *flag = NULL;
     bool is_any = false;
     put(self, "flags    ");
@@ -538,6 +566,11 @@ static void draw_fault(view_t *self, const cJSON *status)
         is_any = true;
     }
     end_line(self);
+}
+
+static void draw_fault(view_t *self, const cJSON *status)
+{
+    const cJSON *fault = member(status, "fault");
     const bool is_faulty = number(fault, "code") > 0.0;
     put_colour(self, is_faulty ? RED : "");
     put(self, "fault    ");
@@ -568,7 +601,11 @@ size_t ctl_view_table(const cJSON *status, const ctl_view_style_t *style, char t
     view_t view = {.style = style};
     view.text = text;
     text[0] = '\0';
+    const bool is_faulty = number(member(status, "fault"), "code") > 0.0;
     draw_head(&view, status);
+    if (is_faulty) { /* at once below the state: of a table that is too long, the end is not seen */
+        draw_fault(&view, status);
+    }
     draw_poses(&view, status);
     draw_cylinders(&view, status);
     draw_bus(&view, member(status, "bus"));
@@ -576,7 +613,10 @@ size_t ctl_view_table(const cJSON *status, const ctl_view_style_t *style, char t
     draw_intensity(&view, member(status, "intensity"));
     draw_senders(&view, status);
     draw_frames(&view, status);
-    draw_fault(&view, status);
+    draw_flags(&view, status);
+    if (!is_faulty) {
+        draw_fault(&view, status);
+    }
     return view.length;
 }
 

@@ -13,6 +13,7 @@
 /** How to draw. */
 typedef struct {
     unsigned columns;     /**< lines are cut there */
+    unsigned rows;        /**< so many lines are drawn, the last one without its end; 0 = all */
     bool is_chinese;      /**< words for faults in Chinese, else English */
     bool is_utf8;         /**< blocks for bars, else ASCII */
     bool is_coloured;     /**< the state and a fault in colours of a terminal */

@@ -61,13 +61,37 @@ static bool is_waiting(const control_client_t *client)
     return client->request_id != 0 || client->dump_ticket != 0;
 }
 
+/* Sends bytes, and with the first of them a descriptor that is due. */
+static ssize_t send_bytes(control_client_t *client)
+{
+    union {
+        struct cmsghdr header;
+        char bytes[CMSG_SPACE(sizeof(int))];
+    } passed;
+    struct iovec bytes = {client->out, client->out_length};
+    struct msghdr message = {.msg_iov = &bytes, .msg_iovlen = 1};
+    if (client->is_passing) {
+        memset(&passed, 0, sizeof passed);
+        message.msg_control = passed.bytes;
+        message.msg_controllen = sizeof passed.bytes;
+        struct cmsghdr *header = CMSG_FIRSTHDR(&message);
+        header->cmsg_level = SOL_SOCKET;
+        header->cmsg_type = SCM_RIGHTS;
+        header->cmsg_len = CMSG_LEN(sizeof(int));
+        memcpy(CMSG_DATA(header), &client->control->samples_fd, sizeof(int));
+    }
+    const ssize_t sent = sendmsg(client->fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
+    client->is_passing = client->is_passing && sent <= 0;
+    return sent;
+}
+
 /* Sends what the socket takes now. */
 static void send_out(control_client_t *client)
 {
     if (client->out_length == 0) {
         return;
     }
-    const ssize_t sent = send(client->fd, client->out, client->out_length, MSG_DONTWAIT | MSG_NOSIGNAL);
+    const ssize_t sent = send_bytes(client);
     if (sent < 0) {
         if (errno != EAGAIN && errno != EINTR) {
             drop(client);
@@ -130,6 +154,9 @@ static void answer_error(control_client_t *client, const char *error, const char
 
 static void answer_status(control_t *self, control_client_t *client)
 {
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    self->lost.unix_ms = (uint64_t)now.tv_sec * 1000u + (uint64_t)now.tv_nsec / 1000000u;
     json_t json = start_answer(client);
     status_json_write(&json, &self->view.view, self->config, &self->lost, &self->handover->times);
     answer(client, &json);
@@ -246,13 +273,29 @@ static void answer_incidents(control_t *self, control_client_t *client, bool is_
     answer(client, &json);
 }
 
+/* The memory of the samples comes with the answer (SCM_RIGHTS). */
+static void answer_samples(const control_t *self, control_client_t *client)
+{
+    if (self->samples_fd < 0) {
+        answer_error(client, "samples: there are none; [samples] seconds says how long they are kept", NULL);
+        return;
+    }
+    client->is_passing = true;
+    json_t json = start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_number(&json, "seconds", self->config->samples_seconds);
+    json_close(&json, '}');
+    answer(client, &json);
+}
+
 static const char k_intensity[] = "intensity ";
 static const char k_by[] = "by ";
 
 static bool is_look(const char *line)
 {
-    return strcmp(line, "status") == 0 || strcmp(line, "incidents") == 0 || strncmp(line, "watch", 5) == 0 ||
-           strncmp(line, k_by, strlen(k_by)) == 0;
+    return strcmp(line, "status") == 0 || strcmp(line, "incidents") == 0 || strcmp(line, "samples") == 0 ||
+           strncmp(line, "watch", 5) == 0 || strncmp(line, k_by, strlen(k_by)) == 0;
 }
 
 static bool is_known(const char *line)
@@ -336,6 +379,8 @@ static void take_request(control_t *self, control_client_t *client, const char *
         answer_incidents(self, client, line[0] == 's');
     } else if (strcmp(line, k_acknowledge) == 0) {
         acknowledge(self, client);
+    } else if (strcmp(line, "samples") == 0) {
+        answer_samples(self, client);
     } else if (strcmp(line, "status") == 0) {
         answer_status(self, client);
     } else if (strncmp(line, k_by, strlen(k_by)) == 0) {
@@ -347,7 +392,7 @@ static void take_request(control_t *self, control_client_t *client, const char *
     } else {
         answer_error(client,
                      "unknown request; status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, "
-                     "shutdown, dump, incidents, seen, acknowledge and by NAME are allowed",
+                     "shutdown, dump, incidents, samples, seen, acknowledge and by NAME are allowed",
                      NULL);
     }
 }
@@ -649,6 +694,7 @@ static void take_connection(control_t *self, unsigned at, uint64_t now_us)
     client->in_length = 0;
     client->out_length = 0;
     client->is_closing = false;
+    client->is_passing = false;
     client->request_id = 0;
     client->dump_ticket = 0;
     client->watch_period_us = 0;
@@ -770,6 +816,7 @@ static int open_socket(control_socket_t *self, const char *path, mode_t mode)
 
 void control_init(control_t *self)
 {
+    self->samples_fd = -1;
     for (unsigned at = 0; at < CONTROL_SOCKETS; at++) {
         self->socket[at].fd = -1;
         self->socket[at].newcomer = -1;

@@ -41,6 +41,7 @@ typedef struct {
     size_t in_length;
     char out[CONTROL_OUT_BYTES];
     size_t out_length;
+    bool is_passing;          /**< the descriptor of the samples goes out with the next bytes */
     bool is_closing;          /**< nothing more is read; closed once everything is answered and sent */
     uint32_t request_id;      /**< waits for the motion thread; 0 = none */
     event_t request;          /**< or OPERATOR_INTENSITY */
@@ -72,6 +73,7 @@ typedef struct control {
     const config_t *config;
     blackbox_t *blackbox;
     blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX]; /**< as last listed */
+    int samples_fd;                                 /**< given to who asks for samples; -1: there are none. The owner sets it */
     status_lost_t lost;                             /**< the owner keeps it up to date */
     motion_view_words_t view;
     level_peer_t

@@ -195,11 +195,18 @@ static void write_fault_counts(json_t *json, const snapshot_t *s)
     json_close(json, ']');
 }
 
+/* Engaged, or held since, and nobody has ever sent a frame that it could follow. */
+static bool is_waiting_for_sender(const snapshot_t *s)
+{
+    return s->last_frame_us == 0 && (s->state == STATE_ENGAGED || s->is_held_by_silence);
+}
+
 static void write_state(json_t *json, const snapshot_t *s, bool is_shutting_down)
 {
     json_text(json, "state", state_name(s->state));
     json_text(json, "goal", state_name(s->goal));
     json_bool(json, "held_by_silence", s->is_held_by_silence);
+    json_bool(json, "waiting_for_sender", is_waiting_for_sender(s));
     json_bool(json, "healthy", s->is_healthy);
     json_bool(json, "estop_active", s->is_estop_active);
     json_bool(json, "power_failing", s->is_power_failing);
@@ -209,6 +216,11 @@ static void write_state(json_t *json, const snapshot_t *s, bool is_shutting_down
 
 static void write_poses(json_t *json, const snapshot_t *s)
 {
+    pose_t received;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        received.axis_q32[i] = q32_from_q16(s->received_q16[i]);
+    }
+    write_actual(json, "pose_received", k_pose_keys, &received, s->has_received);
     write_pose(json, "pose_asked", k_pose_keys, &s->asked);
     write_pose(json, "pose_sent", k_pose_keys, &s->sent);
     write_actual(json, "pose_actual", k_pose_keys, &s->plate.pose, s->plate.has_pose);
@@ -284,11 +296,23 @@ static void write_relays(json_t *json, const snapshot_t *s)
     json_close(json, '}');
 }
 
+/* The platform is where it was asked to be. */
+static bool has_arrived(const snapshot_t *s)
+{
+    bool is_there = true;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        is_there = is_there && s->asked.axis_q32[i] == s->sent.axis_q32[i];
+    }
+    return is_there;
+}
+
+/* A move that took longer has done so once it has arrived. */
 static void write_flags(json_t *json, const snapshot_t *s)
 {
+    const unsigned over = has_arrived(s) ? MOTION_STRETCHED : 0u;
     json_open(json, "flags", '[');
     for (size_t i = 0; i < sizeof k_flags / sizeof k_flags[0]; i++) {
-        if ((s->flags & k_flags[i].flag) != 0) {
+        if ((s->flags & ~over & k_flags[i].flag) != 0) {
             json_text(json, NULL, k_flags[i].word);
         }
     }
@@ -331,7 +355,11 @@ static const char *sender_name(stream_sender_t sender)
 static void write_stream(json_t *json, const snapshot_t *s)
 {
     json_open(json, "stream", '{');
-    json_ms(json, "period_ms", s->stream_period_us);
+    if (s->stream_period_us != 0) {
+        json_ms(json, "period_ms", s->stream_period_us);
+    } else {
+        json_null(json, "period_ms");
+    }
     json_ms(json, "delay_ms", s->stream_delay_us);
     json_text(json, "sender", sender_name(s->stream.sender));
     json_ms(json, "jitter_ms", s->stream.jitter_us);
@@ -421,6 +449,7 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
     json_number(json, "cycle", view->snapshot.cycle);
     json_number(json, "cycle_us", config->settings.cycle_us);
     json_ms(json, "uptime_ms", (view->snapshot.cycle + view->snapshot.counters.late_cycles) * config->settings.cycle_us);
+    json_number(json, "time_unix_ms", lost->unix_ms);
     json_number(json, "late_cycles", view->snapshot.counters.late_cycles);
     json_bool(json, "realtime", view->is_realtime);
     write_times(json, "wake_latency", &times->wake);

@@ -15,6 +15,7 @@ typedef struct {
     uint32_t log_lines;            /**< likewise */
     uint32_t metrics;              /**< files that were due and did not come */
     uint32_t operator_entries;     /**< that the operator log has not taken */
+    uint64_t unix_ms;              /**< the time of day, for who compares the status with something else */
     const lifetime_totals_t *life; /**< of the machine; NULL: not known yet */
     bool is_unapproved;            /**< nothing moves until somebody has acknowledged the configuration */
     bool is_flood;                 /**< the kernel drops what cannot be a frame */

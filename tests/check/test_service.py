@@ -70,7 +70,7 @@ def main():
             assert {"bin/heaved", "bin/heavectl", "lib/systemd/system/heave@.service", "lib/sysusers.d/heave.conf", "libexec/heave-can",
                     "lib/systemd/system/heave-can@.service", "lib/systemd/system/heave-can-flush@.path",
                     "share/man/man8/heaved.8.gz", "share/man/man1/heavectl.1.gz", "share/man/man5/heave.ini.5.gz",
-                    "share/bash-completion/completions/heaved", "share/bash-completion/completions/heavectl", "lib/modules-load.d/heave.conf", "lib/udev/rules.d/60-heave.rules", "share/doc/heave/examples/70-heave-can.link",
+                    "share/heave/presets/hexapod-400.ini", "share/heave/presets/tripod.ini", "share/bash-completion/completions/heaved", "share/bash-completion/completions/heavectl", "lib/modules-load.d/heave.conf", "lib/udev/rules.d/60-heave.rules", "share/doc/heave/examples/70-heave-can.link",
                     "share/doc/heave/examples/70-heave-can.network"} <= files, files
             assert any(file.endswith("demo-hexapod.ini") for file in files), files
         unit = folder / "heave@test.service"

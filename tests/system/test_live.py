@@ -5,9 +5,11 @@
 --guard LIB: malloc_guard.c as a shared library; without it (instrumented builds) the cases about it are skipped.
 """
 import argparse
+import fcntl
 import grp
 import json
 import math
+import mmap
 import os
 import pty
 import re
@@ -17,6 +19,7 @@ import socket
 import struct
 import subprocess
 import sys
+import termios
 import threading
 import time
 import zlib
@@ -73,6 +76,50 @@ def every_command_answers(bench):
             bench.wait_state(then)
     assert daemon.wait(timeout=heave.WAIT_S) == 0
     assert not bench.socket.exists()
+
+
+def waits_for_the_end(bench):
+    """--wait: what was asked for is done when it returns, or somebody is told why not."""
+    daemon = bench.start(config=bench.write_config("manual.ini", **MANUAL))
+
+    def wait(*arguments):
+        run = bench.ctl(*arguments)
+        return run.returncode, run.stdout, run.stderr
+
+    assert wait("--wait", "engage") == (0, "engage: ENGAGED, waiting for a sender\n", "")
+    code, out, error = wait("--wait", "resume")
+    assert code == 1 and not out and "nothing to resume" in error, error
+    assert wait("--wait", "hold")[0] == 64 and wait("--wait", "status")[0] == 64
+    heave.wait_for(lambda: bench.status()["held_by_silence"], "the silence")
+    status = bench.status()
+    assert status["waiting_for_sender"] is True and status["pose_received"] is None and status["stream"]["period_ms"] is None, status
+    assert abs(status["time_unix_ms"] / 1000 - time.time()) < 60, status["time_unix_ms"]
+    assert "waiting for a sender" in bench.ctl("status").stdout and "SENDER SILENT" not in bench.ctl("status").stdout
+    with bench.sender() as sender:
+        sender.send("@A6:90,0,0,0,0,0,0#")
+        heave.wait_for(lambda: bench.status()["pose_received"] is not None, "a frame")
+        status = bench.status()
+        assert status["pose_received"]["roll_deg"] == 90 and status["pose_asked"]["roll_deg"] < 90, status["pose_asked"]
+        assert status["waiting_for_sender"] is False
+    code, out, error = wait("--wait", "--for", "0.05", "park")
+    assert code == 1 and not out and error == "heavectl: park: not done in time; it goes on\n", error
+    assert wait("--wait", "park") == (0, "park: SETTLED\n", "")
+    assert bench.status()["state"] == "SETTLED"
+    code, out, _ = wait("--json", "--wait", "engage")
+    assert code == 0 and json.loads(out)["state"] == "ENGAGED", out
+    assert wait("--wait", "shutdown") == (0, "", "")
+    assert daemon.wait(timeout=heave.WAIT_S) == 0
+
+
+def waits_and_is_held(bench):
+    daemon = bench.start(config=bench.write_config("manual.ini", **MANUAL))
+    with subprocess.Popen([bench.bin / "heavectl", "--socket", str(bench.socket), "--wait", "engage"], stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, text=True) as waiting:
+        bench.wait_state("HOMING", "RISING")
+        assert bench.ctl("hold").returncode == 0
+        out, error = waiting.communicate(timeout=heave.WAIT_S)
+    assert waiting.returncode == 1 and not out and "somebody has asked for hold" in error, error
+    assert bench.stop(daemon) == 0
 
 
 def plain_answers_are_lines(bench):
@@ -192,6 +239,84 @@ def has_colours_on_a_terminal_only(bench):
     for environment in ({"NO_COLOR": "1"}, {"TERM": "dumb"}):
         assert b"\x1b" not in shown_on_terminal(bench, "status", **environment), environment
     assert b"\x1b" not in shown_on_terminal(bench, "--json", "status")
+    assert bench.stop(daemon) == 0
+
+
+def shows_every_cycle(bench):
+    """heavectl scope: consecutive cycles, chosen columns; a stopped reader holds nobody up; a ninth client's rules do not matter to a mapped memory."""
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    with subprocess.Popen([bench.bin / "heavectl", "--socket", str(bench.socket), "scope"], stdout=subprocess.DEVNULL) as stopped:
+        stopped.send_signal(signal.SIGSTOP)
+        with bench.sender() as sender:
+            sender.stream(0.3, wave)
+            run = bench.ctl("--for", "1", "scope")
+            assert run.returncode == 0 and run.stderr == "", run.stderr
+            lines = run.stdout.splitlines()
+            names = lines[0].split(",")
+            rows = [dict(zip(names, map(float, line.split(",")))) for line in lines[1:]]
+            assert len(rows) > 200, len(rows)
+            assert all(after["cycle"] == before["cycle"] + 1 for before, after in zip(rows, rows[1:]))
+            assert {row["state"] for row in rows} <= {5.0, 6.0}, rows[0]
+            late = bench.status()
+            assert rows[-1]["cycle"] <= late["cycle"] and rows[0]["sent_c1_mm"] > 0, rows[-1]
+        stopped.send_signal(signal.SIGCONT)
+        stopped.send_signal(signal.SIGINT)
+        assert stopped.wait(timeout=heave.WAIT_S) == 0
+    lines = bench.ctl("--for", "0.2", "scope", "t_ms,drive1,sent_z_mm").stdout.splitlines()
+    assert lines[0] == "t_ms,drive1,sent_z_mm" and re.fullmatch(r"\d+\.000,3,-?\d+\.\d{9}", lines[1]), lines[:2]
+    run = bench.ctl("scope", "t_ms,colour")
+    assert run.returncode == 64 and "colour is no column" in run.stderr, run.stderr
+    with socket.socket(socket.AF_UNIX) as client:
+        client.connect(str(bench.socket))
+        client.sendall(b"samples\n")
+        answer, (fd,), _, _ = socket.recv_fds(client, 4096, 4)
+        assert json.loads(answer) == {"ok": True, "seconds": 30}, answer
+        try:
+            mmap.mmap(fd, 4096, prot=mmap.PROT_READ | mmap.PROT_WRITE)
+            raise AssertionError("a reader may write")
+        except PermissionError:
+            pass
+        with mmap.mmap(fd, 0, prot=mmap.PROT_READ) as memory:
+            assert memory[:8] == b"HEAVESMP" and struct.unpack_from("<I", memory, 32)[0] == status_cycle_us(bench)
+        os.close(fd)
+    assert bench.stop(daemon) == 0
+
+
+def status_cycle_us(bench):
+    return bench.status()["cycle_us"]
+
+
+def has_no_samples(bench):
+    text = bench.config.read_text(encoding="utf-8") + "\n[samples]\nseconds = 0\n"
+    daemon = bench.start(config=bench.file("none.ini", text))
+    run = bench.ctl("scope")
+    assert run.returncode == 1 and "samples: there are none" in run.stderr, run.stderr
+    assert bench.stop(daemon) == 0
+
+
+def watches_on_a_small_terminal(bench):
+    """24 lines of 80 columns: the line with the state stays, with a fault the fault does too, and no word is broken."""
+    text = (heave.TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8").replace("can0", "nosuch0").replace("port = 9800", f"port = {bench.port}")
+    daemon = bench.start(config=bench.file("bus.ini", text + f"\n[control]\nsocket = {bench.socket}\n"))
+    bench.ctl("engage")
+    bench.wait_state("FAULT")
+    pid, terminal = ctl_on_terminal(bench, "--for", "0.5", "watch")
+    fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+    seen = b""
+    try:
+        while part := os.read(terminal, 65536):
+            seen += part
+    except OSError:
+        pass  # the terminal's other end is closed
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+    screen = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", seen.decode().split("\x1b[H")[-1].split("\x1b[?25h")[0])
+    lines = screen.replace("\r", "").split("\n")
+    assert len(lines) == 24 and all(len(line) <= 80 for line in lines), lines
+    assert lines[0].startswith("FAULT") and lines[1].startswith("fault "), lines[:2]
+    words = set(bench.status()["fault"]["remedy"].split())
+    shown = set(" ".join(lines).split())
+    assert words <= shown, words - shown
     assert bench.stop(daemon) == 0
 
 
@@ -877,6 +1002,11 @@ CASES = {
     "every member of the status is documented": every_member_is_documented,
     "heavectl without a daemon, or wrongly called": without_a_daemon,
     "watch, not on a terminal": watches_by_line,
+    "--wait returns when it is done, or says why it is not": waits_for_the_end,
+    "--wait and a hold": waits_and_is_held,
+    "scope shows every cycle, and a stopped reader holds nobody up": shows_every_cycle,
+    "without samples, scope says so": has_no_samples,
+    "watch on 80 x 24 keeps the state, the fault and whole words": watches_on_a_small_terminal,
     "watch on a terminal puts it back on Ctrl-C": watches_on_a_terminal,
     "status has colours on a terminal only, and not with NO_COLOR": has_colours_on_a_terminal_only,
     "a recording plays back to the same bytes, engage = auto": replays_to_the_same_bytes,

@@ -1,12 +1,16 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """test_offline.py BIN - heaved without a socket: its command line, its exit codes, and offline runs."""
+import os
 import re
+import subprocess
 import sys
+from pathlib import Path
 
 import heave
 import tap
 
+TOP = Path(__file__).resolve().parents[2]
 HEADER = "t_ms,state,roll_deg,pitch_deg,yaw_deg,x_mm,y_mm,z_mm,angle_deg,c1_mm,c2_mm,c3_mm,c4_mm,c5_mm,c6_mm,relays,flags"
 NUMBER = re.compile(r"-?(0|[1-9]\d*)\.\d{9}")
 
@@ -14,7 +18,7 @@ STREAM = "; a stream\n" + "\n".join(f"{2500 + 20 * i} @A6:{i % 7}.5,-{i % 5}.25,
 
 # arguments after --config FILE (unless they hold it), the exit code, and a piece of the message
 USAGE = {
-    "no configuration": (["--check"], 64, "--config FILE is missing"),
+    "no configuration": (["--check"], 64, "--config FILE or --preset NAME is missing"),
     "an unknown option": (["--config", "{ini}", "--frobnicate"], 64, "unknown option: --frobnicate"),
     "an option without its value": (["--config"], 64, "needs a value"),
     "an argument too many": (["--config", "{ini}", "extra"], 64, "unexpected argument: extra"),
@@ -31,6 +35,14 @@ USAGE = {
     "a record that cannot be created": (["--config", "{ini}", "--record", "/nonexistent/r.txt"], 73, "/nonexistent/r.txt: No such file"),
     "a bad configuration": (["--config", "{bad}", "--check"], 78, "bad.ini:"),
     "bad frames": (["--config", "{ini}", "--play", "{wrong}", "--trace", "{trace}"], 65, "wrong.txt:2: "),
+    "a preset beside a configuration": (["--config", "{ini}", "--preset", "tripod"], 64, "--config or --preset, not both"),
+    "a configuration beside a preset": (["--preset", "tripod", "--config", "{ini}"], 64, "--config or --preset, not both"),
+    "a preset with a folder": (["--preset", "../tripod", "--check"], 64, "one of the names that --presets shows"),
+    "a preset that is not there": (["--preset", "octopod", "--check"], 66, "octopod.ini: No such file"),
+    "a template without a driver": (["--template", "hexapod"], 64, "--template needs a kind and a driver"),
+    "a template of an unknown kind": (["--template", "octopod", "sim"], 64, "allowed: hexapod|tripod|tripod-3rps"),
+    "a template of an unknown driver": (["--template", "tripod", "steam"], 64, "allowed: sim|cia402|can-raw|modbus-tcp|modbus-rtu"),
+    "a template": (["--template", "tripod", "sim"], 0, ""),
     "help": (["--help"], 0, ""),
     "version": (["--version"], 0, ""),
     "check": (["--config", "{ini}", "--check"], 0, ""),
@@ -47,6 +59,28 @@ def check_usage(bench, arguments, code, part):
         assert re.fullmatch(r"heaved: [^\n]*\n", run.stderr), f"not one line: {run.stderr}"
     assert bool(run.stdout) == (code == 0), run.stdout
     assert not (bench.folder / "never.csv").exists(), "something was written"
+
+
+def heavectl_presets(bench):
+    return subprocess.run([bench.bin / "heavectl", "presets"], capture_output=True, text=True, timeout=60, check=False)
+
+
+def check_presets(bench):
+    os.environ["HEAVE_PRESETS"] = str(TOP / "config")
+    listed = bench.heaved("--presets")
+    assert listed.returncode == 0 and re.search(r"(?m)^tripod +three cylinders of 250 mm stroke", listed.stdout), listed.stdout
+    names = [line.split()[0] for line in listed.stdout.splitlines()]
+    assert set(names) == {path.stem for path in (TOP / "config").glob("*.ini")}, names
+    assert heavectl_presets(bench).stdout == listed.stdout
+    for name in names:
+        run = bench.heaved("--preset", name, "--check")
+        assert run.returncode == 0 and run.stdout.startswith("platform "), run.stderr
+
+
+def check_no_presets(bench):
+    os.environ["HEAVE_PRESETS"] = "/nonexistent"
+    for run, code in ((bench.heaved("--presets"), 66), (heavectl_presets(bench), 69)):
+        assert run.returncode == code and "/nonexistent: No such file" in run.stderr, run.stderr
 
 
 def check_rows(trace):
@@ -75,6 +109,10 @@ def run_cases(suite, bench):
     for name, (arguments, code, part) in USAGE.items():
         with suite.case(f"command line, {name}: exit {code}"):
             check_usage(bench, arguments, code, part)
+    with suite.case("presets are listed with what they are, by both programs, and each is valid"):
+        check_presets(bench)
+    with suite.case("without the folder of presets: its path, and why"):
+        check_no_presets(bench)
     with suite.case("--dump-config loads to the same configuration"):
         once = bench.heaved("--config", bench.config, "--dump-config").stdout
         assert bench.heaved("--config", bench.file("dumped.ini", once), "--dump-config").stdout == once

@@ -1752,6 +1752,94 @@ static void test_load_sizes_that_say_too_much_or_too_little_are_one_error(void)
     expect_contains("[geometry] plate_turn_deg: means nothing without plate_radius_mm; allowed: with it");
 }
 
+/* ---- A file to fill in ---- */
+
+/* What a person would write behind a key that has no value yet. */
+static const char *answer_of(const char *key)
+{
+    static const char *const k_answers[][2] = {
+        {"base_radius_mm", "420"},
+        {"base_spread_deg", "16"},
+        {"plate_radius_mm", "300"},
+        {"plate_spread_deg", "20"},
+        {"retracted_length_mm", "520"},
+        {"stroke_mm", "200"},
+        {"settled_extension_mm", "5"},
+        {"speed_mm_s", "300"},
+        {"accel_mm_s2", "2000"},
+        {"jerk_mm_s3", "40000"},
+        {"lead_mm", "5"},
+        {"counts_per_turn", "10000"},
+        {"command_id", "0x601"},
+        {"hosts", "192.168.7.11"},
+    };
+    for (size_t i = 0; i < sizeof k_answers / sizeof k_answers[0]; i++) {
+        if (strcmp(k_answers[i][0], key) == 0)
+            return k_answers[i][1];
+    }
+    return "none"; /* frames and registers are the drive's */
+}
+
+/* Fills in the template; returns the errors that are left. */
+static int load_filled_template(const char *kind, const char *driver)
+{
+    FILE *file = tmpfile();
+    TEST_ASSERT_NOT_NULL(file);
+    TEST_ASSERT_NULL(config_write_template(kind, driver, file));
+    rewind(file);
+    m_text[fread(m_text, 1, sizeof m_text - 1, file)] = '\0';
+    fclose(file);
+    take_lines(m_text);
+    for (unsigned i = 0; i < m_lines; i++) {
+        const size_t length = strlen(m_line[i]);
+        if (length > 2 && strcmp(&m_line[i][length - 2], " =") == 0 && m_line[i][0] != ';') {
+            char key[64];
+            snprintf(key, sizeof key, "%.*s", (int)length - 2, m_line[i]);
+            snprintf(m_line[i], sizeof m_line[0], "%s = %s", key, answer_of(key));
+        }
+    }
+    return load_lines();
+}
+
+static void test_template_filled_in_is_a_platform(void)
+{
+    static const char *const k_kinds[] = {"hexapod", "tripod", "tripod-3rps"};
+    for (unsigned k = 0; k < 3; k++) {
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_filled_template(k_kinds[k], "sim"), m_errors);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_filled_template(k_kinds[k], "cia402"), m_errors);
+        TEST_ASSERT_EQUAL_INT32(2000, m_config.cia402.counts_per_mm.num[0] / m_config.cia402.counts_per_mm.den[0]);
+        TEST_ASSERT_GREATER_THAN_INT(0,
+                                     load_filled_template(k_kinds[k], "can-raw")); /* its frames are missing, and nothing else */
+        expect_contains("[can-raw] setpoint: ");
+        TEST_ASSERT_NULL_MESSAGE(strstr(m_errors, "[geometry]"), m_errors);
+        TEST_ASSERT_NULL_MESSAGE(strstr(m_errors, "counts_per_mm"), m_errors);
+        TEST_ASSERT_GREATER_THAN_INT(0, load_filled_template(k_kinds[k], "modbus-tcp"));
+        expect_contains("[modbus] setpoint: ");
+        TEST_ASSERT_GREATER_THAN_INT(0, load_filled_template(k_kinds[k], "modbus-rtu"));
+        expect_contains("[modbus] setpoint: ");
+    }
+}
+
+/* As it is written, every key without a value is one error, and there are no others. */
+static void test_template_as_it_is_names_what_to_fill_in(void)
+{
+    unsigned blanks = 0;
+    FILE *file = tmpfile();
+    TEST_ASSERT_NOT_NULL(file);
+    TEST_ASSERT_NULL(config_write_template("hexapod", "cia402", file));
+    rewind(file);
+    m_text[fread(m_text, 1, sizeof m_text - 1, file)] = '\0';
+    fclose(file);
+    take_lines(m_text);
+    for (unsigned i = 0; i < m_lines; i++)
+        blanks += m_line[i][0] != ';' && m_line[i][0] != '\0' && m_line[i][strlen(m_line[i]) - 1] == '=';
+    TEST_ASSERT_EQUAL_UINT(12, blanks);
+    TEST_ASSERT_EQUAL_INT_MESSAGE((int)blanks, load_lines(), m_errors);
+    TEST_ASSERT_EQUAL_STRING("hexapod|tripod|tripod-3rps", config_write_template("hexa", "cia402", stderr));
+    TEST_ASSERT_NOT_NULL(config_write_template("", "cia402", stderr));
+    TEST_ASSERT_NOT_NULL(config_write_template("tripod", "cia40", stderr));
+}
+
 /* ---- Limits that the file leaves out ---- */
 
 static void expect_limits(unsigned axis, const char *unit)
@@ -1893,6 +1981,8 @@ int main(void)
     RUN_TEST(test_load_sizes_give_the_joints_of_the_ready_made_platforms);
     RUN_TEST(test_load_sizes_agree_with_a_model_and_are_dumped_as_joints);
     RUN_TEST(test_load_sizes_that_say_too_much_or_too_little_are_one_error);
+    RUN_TEST(test_template_filled_in_is_a_platform);
+    RUN_TEST(test_template_as_it_is_names_what_to_fill_in);
     RUN_TEST(test_load_limits_left_out_are_the_suggested_ones);
     RUN_TEST(test_load_limits_left_out_survive_a_dump_and_do_not_change_in_operation);
     RUN_TEST(test_load_limits_left_out_of_a_tripod_leave_other_axes_alone);

@@ -1,0 +1,349 @@
+/* SPDX-License-Identifier: MIT
+ * test_samples.c - samples in shared memory: what is written is read, nobody else can write, a slow reader knows what it has
+ * lost, and no reader ever gets a record that is half of another one. HEAVE_SAMPLES_RECORDS: how many records are checked for
+ * that.
+ */
+#include "common/samples.h"
+#include "service/samples_writer.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "unity.h"
+
+#define READERS 8u
+
+static samples_writer_t m_writer;
+static config_t m_config;
+static snapshot_t m_snapshot;
+
+void hv_assert_failed(const char *file, int line)
+{
+    (void)file;
+    (void)line;
+    TEST_FAIL_MESSAGE("assertion");
+}
+
+static void open_ring(uint32_t seconds)
+{
+    memset(&m_config, 0, sizeof m_config);
+    m_config.settings.geometry.kind = KIN_HEXAPOD;
+    m_config.settings.cycle_us = 1000;
+    m_config.settings.has_angle = true;
+    m_config.samples_seconds = seconds;
+    memset(&m_snapshot, 0, sizeof m_snapshot);
+    m_snapshot.cylinders = 6;
+    m_snapshot.has_angle = true;
+    TEST_ASSERT_TRUE(samples_writer_open(&m_writer, &m_config));
+}
+
+void setUp(void)
+{
+    m_writer = (samples_writer_t){.fd = -1};
+}
+
+void tearDown(void)
+{
+    samples_writer_close(&m_writer);
+}
+
+/* Every column of a record says the same number. */
+static void add_numbered(uint64_t number)
+{
+    m_snapshot.cycle = number;
+    m_snapshot.now_us = number;
+    for (unsigned i = 0; i < 6; i++) {
+        m_snapshot.asked.axis_q32[i] = (q32_t)number;
+        m_snapshot.sent.axis_q32[i] = (q32_t)number;
+        m_snapshot.plate.pose.axis_q32[i] = (q32_t)number;
+        m_snapshot.extension_mm_q32[i] = (q32_t)number;
+        m_snapshot.drive[i].actual_mm_q32 = (q32_t)number;
+    }
+    m_snapshot.angle_deg_q32 = (q32_t)number;
+    m_snapshot.drive[6].actual_mm_q32 = (q32_t)number;
+    samples_writer_add(&m_writer, &m_snapshot);
+}
+
+static double value_of(const samples_reader_t *reader, const samples_record_t *record, const char *name)
+{
+    const samples_column_t *column = samples_column_named(reader->header, name, strlen(name));
+    TEST_ASSERT_NOT_NULL_MESSAGE(column, name);
+    return samples_value(column, record);
+}
+
+static void test_record_has_what_the_cycle_came_to(void)
+{
+    samples_reader_t reader;
+    samples_record_t record;
+    open_ring(1);
+    TEST_ASSERT_NULL(samples_reader_open(&reader, m_writer.fd));
+    TEST_ASSERT_FALSE(samples_reader_next(&reader, &record));
+    m_snapshot.cycle = 77;
+    m_snapshot.now_us = 77123;
+    m_snapshot.state = STATE_ENGAGED;
+    m_snapshot.goal = STATE_SETTLED;
+    m_snapshot.fault = (fault_t){.code = FAULT_FOLLOWING, .axis = 4};
+    m_snapshot.relay_mask = 0x801;
+    m_snapshot.intensity_percent = 55;
+    m_snapshot.flags = 0x105;
+    m_snapshot.last_frame_us = 70123;
+    m_snapshot.is_estop_active = true;
+    m_snapshot.plate.has_pose = true;
+    for (unsigned i = 0; i < 6; i++) {
+        m_snapshot.asked.axis_q32[i] = q32_from_int((int32_t)i + 1);
+        m_snapshot.sent.axis_q32[i] = -q32_from_int((int32_t)i + 11) / 2;
+        m_snapshot.plate.pose.axis_q32[i] = q32_from_int((int32_t)i + 21);
+        m_snapshot.extension_mm_q32[i] = q32_from_int((int32_t)i + 31);
+        m_snapshot.drive[i].actual_mm_q32 = q32_from_int((int32_t)i + 41);
+        m_snapshot.drive[i].state = (drive_state_t)i;
+    }
+    m_snapshot.angle_deg_q32 = q32_from_int(300);
+    m_snapshot.drive[6].actual_mm_q32 = q32_from_int(299);
+    m_snapshot.drive[6].state = DRIVE_HOMING;
+    samples_writer_add(&m_writer, &m_snapshot);
+    TEST_ASSERT_TRUE(samples_reader_next(&reader, &record));
+    TEST_ASSERT_FALSE(samples_reader_next(&reader, &record));
+    const struct {
+        const char *name;
+        double value;
+    } k_rows[] = {
+        {"cycle", 77},
+        {"t_ms", 77.123},
+        {"state", STATE_ENGAGED},
+        {"goal", STATE_SETTLED},
+        {"fault", FAULT_FOLLOWING},
+        {"fault_axis", 4},
+        {"relays", 0x801},
+        {"intensity", 55},
+        {"bits", 5},
+        {"flags", 0x105},
+        {"frame_age_ms", 7},
+        {"drive1", 0},
+        {"drive6", 5},
+        {"drive7", DRIVE_HOMING},
+        {"asked_roll_deg", 1},
+        {"asked_z_mm", 6},
+        {"sent_yaw_deg", -6.5},
+        {"actual_x_mm", 24},
+        {"sent_c6_mm", 36},
+        {"actual_c1_mm", 41},
+        {"sent_angle_deg", 300},
+        {"actual_angle_deg", 299},
+    };
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        TEST_ASSERT_DOUBLE_WITHIN(1e-9, k_rows[i].value, value_of(&reader, &record, k_rows[i].name));
+    }
+    TEST_ASSERT_NULL(samples_column_named(reader.header, "asked", 5));
+    TEST_ASSERT_EQUAL_UINT32(1000, reader.header->cycle_us);
+    TEST_ASSERT_EQUAL_UINT32(1000, reader.header->capacity);
+    samples_reader_close(&reader);
+}
+
+static void test_nobody_else_writes_or_changes_the_size(void)
+{
+    open_ring(1);
+    TEST_ASSERT_EQUAL_PTR(MAP_FAILED, mmap(NULL, 4096, PROT_READ | PROT_WRITE, MAP_SHARED, m_writer.fd, 0));
+    void *looked = mmap(NULL, 4096, PROT_READ, MAP_SHARED, m_writer.fd, 0);
+    TEST_ASSERT_NOT_EQUAL(MAP_FAILED, looked);
+    TEST_ASSERT_EQUAL_INT(-1, mprotect(looked, 4096, PROT_READ | PROT_WRITE));
+    TEST_ASSERT_EQUAL_INT(0, munmap(looked, 4096));
+    TEST_ASSERT_EQUAL_INT(-1, ftruncate(m_writer.fd, 4096));
+    TEST_ASSERT_EQUAL_INT(-1, ftruncate(m_writer.fd, 1 << 24));
+    TEST_ASSERT_EQUAL_INT(-1, pwrite(m_writer.fd, "x", 1, 0));
+    TEST_ASSERT_EQUAL_INT(-1, fcntl(m_writer.fd, F_ADD_SEALS, F_SEAL_WRITE));
+    char path[64];
+    snprintf(path, sizeof path, "/proc/self/fd/%d", m_writer.fd);
+    const int again = open(path, O_RDWR | O_CLOEXEC); /* the same file by another way */
+    if (again >= 0) {
+        TEST_ASSERT_EQUAL_PTR(MAP_FAILED, mmap(NULL, 4096, PROT_READ | PROT_WRITE, MAP_SHARED, again, 0));
+        TEST_ASSERT_EQUAL_INT(-1, pwrite(again, "x", 1, 0));
+        close(again);
+    }
+    add_numbered(5); /* and its owner still can */
+    TEST_ASSERT_EQUAL_UINT64(1, m_writer.header->written);
+}
+
+static void test_no_seconds_is_no_ring(void)
+{
+    open_ring(0);
+    TEST_ASSERT_NULL(m_writer.header);
+    TEST_ASSERT_EQUAL_INT(-1, m_writer.fd);
+    add_numbered(1);
+}
+
+static void test_slow_reader_knows_what_it_has_lost(void)
+{
+    samples_reader_t reader;
+    samples_record_t record;
+    uint64_t read = 0;
+    open_ring(1);
+    TEST_ASSERT_NULL(samples_reader_open(&reader, m_writer.fd));
+    for (uint64_t i = 0; i < 12345; i++) {
+        add_numbered(i);
+        if (i % 5000 == 4999 || i == 12344) {
+            while (samples_reader_next(&reader, &record)) {
+                TEST_ASSERT_EQUAL_DOUBLE((double)(read + reader.lost), value_of(&reader, &record, "cycle"));
+                read++;
+            }
+            TEST_ASSERT_EQUAL_UINT64(i + 1, read + reader.lost);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT64(1500, read);
+    samples_reader_close(&reader);
+}
+
+/* Whatever stands in memory that somebody else hands over is refused, or can be read within its bounds. */
+static void test_memory_that_contradicts_itself_is_refused(void)
+{
+    samples_reader_t reader;
+    samples_record_t record;
+    static union {
+        samples_header_t header;
+        uint64_t word[1200];
+    } memory;
+    open_ring(1);
+    const samples_header_t *good = m_writer.header;
+    TEST_ASSERT_NOT_NULL(samples_reader_begin(&reader, good, 100));
+    uint32_t random = 2463534242u;
+    unsigned refused = 0;
+    for (unsigned run = 0; run < 200000; run++) {
+        memcpy(memory.word, good, 8192);
+        memory.header.capacity = 2;
+        memory.header.record_bytes = 400;
+        for (unsigned k = 0; k < 3; k++) {
+            random ^= random << 13;
+            random ^= random >> 17;
+            random ^= random << 5;
+            ((uint32_t *)memory.word)[random % 40 + (k == 2 ? 32 * (random >> 8) % 1000 : 0)] =
+                random % 3 == 0 ? random : random >> 24;
+        }
+        memory.header.written = random % 7;
+        if (samples_reader_begin(&reader, &memory, sizeof memory) != NULL) {
+            refused++;
+            continue;
+        }
+        reader.next = random % 3;
+        (void)samples_reader_next(&reader, &record);
+        for (uint32_t i = 0; i < reader.header->columns; i++) {
+            (void)samples_value(samples_column(reader.header, i), &record);
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(10000, refused);
+    TEST_ASSERT_LESS_THAN_UINT(200000, refused);
+}
+
+/* --- Torn records --- */
+
+typedef struct {
+    pthread_t thread;
+    samples_reader_t reader;
+    uint64_t read;
+    uint64_t torn;
+} looker_t;
+
+static uint32_t m_is_over; /* atomic */
+
+/* All words of a record but those of small columns have its number. */
+static bool is_torn(const samples_reader_t *reader, const samples_record_t *record)
+{
+    const uint64_t number = record->word[1];
+    bool is_whole = record->word[2] == number && record->word[0] == number + 1;
+    for (uint32_t i = 6; i < reader->header->record_bytes / 8u; i++) {
+        is_whole = is_whole && record->word[i] == number;
+    }
+    return !is_whole;
+}
+
+static void *look(void *argument)
+{
+    looker_t *self = argument;
+    samples_record_t record;
+    while (__atomic_load_n(&m_is_over, __ATOMIC_ACQUIRE) == 0) {
+        while (samples_reader_next(&self->reader, &record)) {
+            self->torn += is_torn(&self->reader, &record);
+            self->read++;
+        }
+    }
+    return NULL;
+}
+
+/* The writer as quick as it can, in bursts longer than the ring, so that readers are overtaken while they copy; one of them has
+ * stopped for good. */
+static void test_eight_readers_never_get_a_torn_record(void)
+{
+    static looker_t looker[READERS];
+    const char *wanted = getenv("HEAVE_SAMPLES_RECORDS");
+    const uint64_t records = wanted != NULL ? strtoull(wanted, NULL, 10) : 300000u;
+    uint64_t read = 0, written = 0, lost = 0;
+    open_ring(1);
+    m_is_over = 0;
+    memset(looker, 0, sizeof looker);
+    for (unsigned i = 0; i < READERS; i++) {
+        TEST_ASSERT_NULL(samples_reader_open(&looker[i].reader, m_writer.fd));
+        if (i > 0) { /* the first one has stopped */
+            TEST_ASSERT_EQUAL_INT(0, pthread_create(&looker[i].thread, NULL, look, &looker[i]));
+        }
+    }
+    while (read < records) {
+        for (unsigned i = 0; i < 1700; i++) {
+            add_numbered(written++);
+        }
+        read = 0;
+        for (unsigned i = 1; i < READERS; i++) {
+            read += __atomic_load_n(&looker[i].read, __ATOMIC_RELAXED);
+        }
+    }
+    __atomic_store_n(&m_is_over, 1, __ATOMIC_RELEASE);
+    for (unsigned i = 0; i < READERS; i++) {
+        if (i > 0) {
+            TEST_ASSERT_EQUAL_INT(0, pthread_join(looker[i].thread, NULL));
+        }
+        TEST_ASSERT_EQUAL_UINT64(0, looker[i].torn);
+        lost += looker[i].reader.lost;
+        samples_reader_close(&looker[i].reader);
+    }
+    TEST_ASSERT_GREATER_THAN_UINT64(0, lost); /* else nobody was overtaken, and nothing was tried */
+    printf("%llu records checked, %llu written, %llu lost\n", (unsigned long long)read, (unsigned long long)written,
+           (unsigned long long)lost);
+}
+
+/* The best of many runs: what the others have more is the machine's. */
+static void test_record_costs_less_than_200_ns(void)
+{
+    double best_ns = 1e9;
+    open_ring(30);
+    for (unsigned run = 0; run < 200; run++) {
+        struct timespec from, to;
+        clock_gettime(CLOCK_MONOTONIC, &from);
+        for (unsigned i = 0; i < 1000; i++) {
+            samples_writer_add(&m_writer, &m_snapshot);
+        }
+        clock_gettime(CLOCK_MONOTONIC, &to);
+        const double ns = ((double)(to.tv_sec - from.tv_sec) * 1e9 + (double)(to.tv_nsec - from.tv_nsec)) / 1000;
+        best_ns = ns < best_ns ? ns : best_ns;
+    }
+    printf("%.0f ns a record\n", best_ns);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__) && defined(__OPTIMIZE__)
+    TEST_ASSERT_TRUE(best_ns < 200);
+#endif
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_record_has_what_the_cycle_came_to);
+    RUN_TEST(test_nobody_else_writes_or_changes_the_size);
+    RUN_TEST(test_no_seconds_is_no_ring);
+    RUN_TEST(test_slow_reader_knows_what_it_has_lost);
+    RUN_TEST(test_memory_that_contradicts_itself_is_refused);
+    RUN_TEST(test_eight_readers_never_get_a_torn_record);
+    RUN_TEST(test_record_costs_less_than_200_ns);
+    return UNITY_END();
+}
