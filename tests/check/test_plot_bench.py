@@ -101,6 +101,8 @@ def check_plot_arguments(suite):
     for name, (arguments, status, *words) in refusals.items():
         with suite.case(f"plot refuses {name}"):
             expect_refusal(run("plot", *arguments), status, *words)
+    with suite.case("plot: rows of OFF, FAULT and ESTOP do not stretch its axes"):
+        scales_by_what_has_limits()
     with suite.case("plot without matplotlib says how to install it"):
         (FOLDER / "without").mkdir()
         (FOLDER / "without/matplotlib.py").write_text("raise ImportError('not here')\n", encoding="ascii")
@@ -586,6 +588,21 @@ def check_programs(suite, heaved, bench_core):
         assert bench_cost.percentile([3, 1, 2], 95) == 3
         assert bench_cost.percentile(list(range(1, 101)), 95) == 95
         assert bench_cost.percentile([7], 5) == 7
+
+
+def scales_by_what_has_limits():
+    """A drive that stands 90 mm away, and a fault that takes the set-points to the drives: jumps of one cycle, to which no limit applies."""
+    trace = Trace()
+    for i in range(300):
+        state = "OFF" if i < 50 else "ENGAGED" if i < 200 else "FAULT" if i < 250 else "ENGAGED"
+        trace.pose(state, [0, 0, 0, 0, 0, 40.0 if state != "ENGAGED" else 5 * math.sin(i / 40)])
+    window = Window(trace.lines())
+    for order in range(4):
+        low, high = window.extent(["z"], order)
+        values = [value for value, state in zip(window.rates("z", order), window.states) if state == "ENGAGED" and value is not None]
+        calm = sorted(map(abs, values))[len(values) * 9 // 10]
+        assert low < high and max(abs(low), abs(high)) <= 2 * calm, (order, low, high, calm)
+    assert Window(line for line in trace.lines() if "ENGAGED" not in line).extent(["z"], 1) is None
 
 
 def main():

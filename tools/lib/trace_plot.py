@@ -64,16 +64,20 @@ def draw(scenes, axes, path):
 
 
 def _panel(panel, scene, names, axes, order, unit):
-    window, peak = scene.window, 0.0
+    window = scene.window
+    extent = window.extent(names, order)
+    peak = max(map(abs, extent)) if extent else 0.0
     for state, start, end in window.state_bands():
         panel.axvspan(start / 1e6, end / 1e6, color=STATE_COLOURS.get(state, "#FFFFFF"), linewidth=0, zorder=0)
     times = [t_us / 1e6 for t_us in window.times_us]
     for name in names:
         values = window.rates(name, order)
-        peak = max([peak, *(abs(value) for value in values if value is not None)])
         drawn_times, drawn = thinned(times, values, MOST_POINTS)
         panel.plot(drawn_times, [math.nan if value is None else value for value in drawn], color=_colour(name, axes), linewidth=1.0, zorder=3)
     panel.margins(y=0.08)
+    if extent and extent[0] < extent[1]:
+        room = 0.08 * (extent[1] - extent[0])
+        panel.set_ylim(extent[0] - room, extent[1] + room)
     if scene.platform:
         _limits(panel, scene, names, axes, order, peak, unit)
     panel.set_ylabel(f"{ORDER_LABEL[order]} [{unit}{ORDER_UNIT[order]}]", fontsize=9)

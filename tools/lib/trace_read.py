@@ -28,6 +28,9 @@ def axes_named(text):
     return result
 
 
+WITHOUT_LIMITS = ("OFF", "FAULT", "ESTOP")
+
+
 class Window:
     """Rows from_us to to_us (either may be None). times_us, states and flags are lists; column(name) is one of integers of 1e-9."""
 
@@ -80,6 +83,18 @@ class Window:
             run = run + 1 if i and times[i] - times[i - 1] == self.cycle_us else 0
             result.append(value * scale if run >= order else None)
         return result[len(self._before):]
+
+    def extent(self, names, order):
+        """(least, most) of what is drawn where limits apply: in OFF, FAULT and ESTOP set-points jump to where the drives are. None: no such row."""
+        free = 0
+        least, most = None, None
+        columns = [self.rates(name, order) for name in names]
+        for i, state in enumerate(self.states):
+            free = order + 1 if state in WITHOUT_LIMITS else max(0, free - 1)
+            for value in (column[i] for column in columns if not free):
+                if value is not None:
+                    least, most = (value, value) if least is None else (min(least, value), max(most, value))
+        return None if least is None else (least, most)
 
     def state_bands(self):
         """[(state, from_us, to_us)], each up to where the next begins."""
