@@ -30,7 +30,8 @@ set(HEAVE_SECONDS
   system.rt 1000 # the processors are its own: before all others
   system.live 900 system.syscalls 800 system.coils 700 system.metrics 600 system.senders 500 system.flood 400
   system.can.failures.latched 90 system.can.failures.together 66 property.senders 80
-  system.canraw 60 check.package 54 system.can.CSP 52 system.can.Mbit 45 system.can.PP 50
+  python.recipes 100 python.lab 30 python.plugin 20 python.package 18
+  system.canraw 60 check.package 70 system.can.CSP 52 system.can.Mbit 45 system.can.PP 50
   system.doctor 48 system.can.IP 42 check.judge 40 system.can.failures.killed 38 system.modbus_presets 38 check.lint 38 golden.s390x 37 golden.armhf 37
   golden.arm64 37 golden.cortex 37 system.modbus_drives 37 check.trace 35 system.can.failures.nothing 32 property.hostile 32 system.kernel 29
   system.timed_streams 28 golden.optimisation 27 property.singularity 26 system.can.jump 24 system.trouble.stopped 22 system.trouble.clock 22 peers.cia402 22
@@ -63,7 +64,7 @@ endfunction()
 # heave_script_test(NAME SCRIPT [ARG...]): a Python script that reports its cases in TAP (tests/lib/tap.py, importable as `tap`).
 function(heave_script_test name script)
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/${script} ${ARGN})
-  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib;PYTHONDONTWRITEBYTECODE=1" PROCESSORS
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib:${PROJECT_SOURCE_DIR}/python;PYTHONDONTWRITEBYTECODE=1" PROCESSORS
                                                ${HEAVE_COMPUTES})
   heave_order(${name})
 endfunction()
@@ -84,7 +85,7 @@ function(heave_kernel_test name)
     list(APPEND options --instrumented)
   endif()
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/lib/kernel.py ${options} -- ${kernel_UNPARSED_ARGUMENTS})
-  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib;PYTHONDONTWRITEBYTECODE=1" LABELS kernel TIMEOUT 900
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib:${PROJECT_SOURCE_DIR}/python;PYTHONDONTWRITEBYTECODE=1" LABELS kernel TIMEOUT 900
                                                PROCESSORS ${weight})
   heave_order(${name})
 endfunction()

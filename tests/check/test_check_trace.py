@@ -12,13 +12,14 @@ import tap
 
 HERE = Path(__file__).resolve().parent
 TOP = HERE.parents[1]
-sys.path[:0] = [str(TOP / "tools/lib"), str(HERE)]
+sys.path[:0] = [str(TOP / "python"), str(HERE)]
 import synthetic_trace as synthetic  # noqa: E402  the path above has to be set first
-from frames_file import Line, unescape  # noqa: E402
-from platform_ini import ConfigError, Platform  # noqa: E402
+from heave.recording import Line, unescape  # noqa: E402
+from heave.configuration import ConfigError, Configuration  # noqa: E402
 from synthetic_trace import NANO, Trace, there_and_back  # noqa: E402
-from timed_check import TimedWatcher  # noqa: E402
-from trace_check import COLUMNS, Checker  # noqa: E402
+from heave.judge.timed import TimedWatcher  # noqa: E402
+from heave.judge.checker import Checker  # noqa: E402
+from heave.trace import COLUMNS  # noqa: E402
 
 NANOMETRE = NANO // 10**6
 FOLDER = tempfile.TemporaryDirectory()
@@ -27,7 +28,7 @@ CONFIG = Path(FOLDER.name) / "platform.ini"
 
 def platform(**changes):
     CONFIG.write_text(synthetic.ini(**changes), encoding="utf-8")
-    return Platform(CONFIG)
+    return Configuration(CONFIG)
 
 
 def rules_broken(lines, on=None, **options):
@@ -373,7 +374,7 @@ def tripod_rows(kind, roll, pitch, twist=0.0):
 def check_tripods(suite):
     for kind in ("tripod", "tripod-3rps"):
         CONFIG.write_text(tripod_text(kind).replace("stroke_mm = 200", "stroke_mm = 400"), encoding="utf-8")
-        mechanism = Platform(CONFIG)
+        mechanism = Configuration(CONFIG)
         # joints are given with four decimals: as far as that may be seen
         exact = [round(v * 10**4) / 10**4 for v in (340 * math.cos(math.radians(120)), 340 * math.sin(math.radians(120)))]
         assert math.dist(mechanism.plate[1][:2], exact) < 2e-5
@@ -501,7 +502,7 @@ def main():
     with suite.case("a configuration with a line that is none is refused"):
         CONFIG.write_text("[platform]\nnonsense\n", encoding="utf-8")
         try:
-            Platform(CONFIG)
+            Configuration(CONFIG)
         except ConfigError as error:
             assert ":2:" in str(error)
         else:

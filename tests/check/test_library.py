@@ -12,8 +12,8 @@ from pathlib import Path
 import tap
 
 TOP = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(TOP / "tools/lib"))
-from platform_ini import Platform  # noqa: E402  the path above has to be set first
+sys.path.insert(0, str(TOP / "python"))
+from heave.configuration import Configuration  # noqa: E402  the path above has to be set first
 
 POSE = [5, 6, 0, 0, 0, 20]  # of the example
 WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
@@ -38,7 +38,7 @@ def commands(folder):
 
 def judge(rows):
     """The example ends where another calculation of the same pose ends, on the way from pose zero."""
-    platform = Platform(TOP / "config/demo-hexapod.ini")
+    platform = Configuration(TOP / "config/demo-hexapod.ini")
     assert rows[0] == "t_ms,c1_mm,c2_mm,c3_mm,c4_mm,c5_mm,c6_mm" and len(rows) > 5, rows
     values = [[float(value) for value in row.split(",")] for row in rows[1:]]
     for row, pose in ((values[0], [0] * 6), (values[-1], POSE)):

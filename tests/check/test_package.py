@@ -20,7 +20,7 @@ TOP = Path(__file__).resolve().parents[2]
 QUICK = ["-DCMAKE_BUILD_TYPE=None"]  # no optimisation
 CONFIG = "etc/heave/demo.ini"
 SOURCES = ("CHANGELOG.md", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md", "LICENSE", "README.md", "README.zh-CN.md", "cmake", "config", "docs", "examples",
-           "hal", "include", "packaging", "src", "tools")
+           "hal", "include", "packaging", "python", "src", "tools")
 
 
 def run(*command, **more):
@@ -36,12 +36,13 @@ def checked(*command, **more):
 
 
 def pack(source, build):
-    """A package, quickly made: without SOURCE_DATE_EPOCH and ccache, whose answers would be the same anyway."""
+    """Both packages: that of the programs, that for Python; quickly made: without SOURCE_DATE_EPOCH and ccache, whose answers would be the same anyway."""
     environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"} | {"CCACHE_DISABLE": "1"}
     checked("cmake", "--preset", "package", "-B", build, *QUICK, cwd=source, env=environment)
     checked("cmake", "--build", build, env=environment)
     checked("cpack", "--config", build / "CPackConfig.cmake", "-B", build, env=environment)
-    return next(build.glob("heave_*.deb"))
+    checked("cpack", "--config", build / "CPackPython.cmake", "-B", build, env=environment)
+    return next(build.glob("heave_*.deb")), next(build.glob("python3-heave_*.deb"))
 
 
 def copy_sources(folder):
@@ -50,7 +51,7 @@ def copy_sources(folder):
     for name in SOURCES:
         place = TOP / name
         if place.is_dir():
-            shutil.copytree(place, folder / name, copy_function=shutil.copy)
+            shutil.copytree(place, folder / name, copy_function=shutil.copy, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
         else:
             shutil.copy(place, folder / name)
 
@@ -168,6 +169,39 @@ def life(suite, machine, deb, folder):
             case()
 
 
+def python_works(deb, root):
+    """Unpacked: its programs run, its data are there, and pytest finds the plugin by the metadata."""
+    checked("dpkg-deb", "-x", deb, root)
+    packages = root / "usr/lib/python3/dist-packages"
+    environment = {**os.environ, "PYTHONPATH": str(packages), "PYTHONDONTWRITEBYTECODE": "1"}
+    for name, words in (("heave", ("--version",)), ("heave-lab", ("--help",))):
+        code, text = run(sys.executable, root / "usr/bin" / name, *words, env=environment)
+        assert code == 0 and name in text, text
+    script = "import heave; from importlib.metadata import version, entry_points; print(heave.__file__, version('heave'), heave.demo_config().read_text()[:20], *entry_points(group='pytest11', name='heave'))"
+    text = checked(sys.executable, "-c", script, env=environment)
+    assert str(packages) in text and "; demo-hexapod.ini" in text and "heave.pytest_plugin" in text, text
+    mine = {path.relative_to(TOP / "python").as_posix() for path in (TOP / "python/heave").rglob("*") if path.is_file() and "__pycache__" not in path.parts}
+    there = {path.relative_to(packages).as_posix() for path in (packages / "heave").rglob("*") if path.is_file()}
+    assert mine == there, f"sources and package differ in {mine ^ there}"
+    assert all(os.access(packages / "heave/lab" / name, os.X_OK) for name in ("uml.sh", "init.sh"))
+    project, installed = (TOP / "python/pyproject.toml").read_text(encoding="utf-8"), (TOP / "packaging/python/entry_points.txt").read_text(encoding="utf-8")
+    for name, target in re.findall(r"(?m)^([\w-]+) = ([\w.]+(?::\w+)?)$", installed):
+        assert f'{name} = "{target}"' in project, f"pyproject.toml and entry_points.txt differ in {name}"
+    versions = {re.search(r'(?m)^version = "(.*)"', project)[1], re.search(r'__version__ = "(.*)"', (TOP / "python/heave/__init__.py").read_text(encoding="utf-8"))[1],
+                re.search(r"project\(heave VERSION (\S+)", (TOP / "CMakeLists.txt").read_text(encoding="utf-8"))[1]}
+    assert len(versions) == 1, f"versions differ: {versions}"
+
+
+def python_goes(machine, deb):
+    if os.geteuid() != 0:
+        raise tap.Skip("dpkg takes root")
+    machine.dpkg("-i", deb)
+    assert (machine.folder / "usr/lib/python3/dist-packages/heave/__init__.py").exists()
+    machine.dpkg("-r", "python3-heave")
+    left = [path for path in (machine.folder / "usr").rglob("*heave*") if not path.is_dir()]
+    assert not left, f"left behind: {left}"
+
+
 def accepted_by_lintian(deb):
     if shutil.which("lintian") is None:
         raise tap.Skip("lintian is not there")
@@ -189,13 +223,20 @@ def in_a_system(system, folder):
 
 def quickly(folder):
     suite = tap.Suite()
-    deb = None
+    deb = python_deb = None
     with suite.case("has the same bytes when its sources are copied and built in another folder, later"):
         copy_sources(folder / "copy")
-        deb, other = pack(TOP, folder / "one"), pack(folder / "copy", folder / "elsewhere/two")
-        assert deb.read_bytes() == other.read_bytes(), f"{deb.stat().st_size} and {other.stat().st_size} bytes"
+        (deb, python_deb), others = pack(TOP, folder / "one"), pack(folder / "copy", folder / "elsewhere/two")
+        for one, other in zip((deb, python_deb), others):
+            assert one.read_bytes() == other.read_bytes(), f"{one.name}: {one.stat().st_size} and {other.stat().st_size} bytes"
     with suite.case("lintian finds nothing to say"):
         accepted_by_lintian(deb)
+    with suite.case("lintian finds nothing to say about the Python package"):
+        accepted_by_lintian(python_deb)
+    with suite.case("the Python package is installed, works, and is what pip would install"):
+        python_works(python_deb, folder / "python")
+    with suite.case("the Python package is removed: nothing of it is left"):
+        python_goes(EmptyRoot(folder / "python-root"), python_deb)
     with suite.case("is refused where the units would name programs that are not there"):
         (folder / "local").mkdir()
         text = (folder / "one/CPackConfig.cmake").read_text(encoding="utf-8").replace('CPACK_HEAVE_PREFIX "/usr"', 'CPACK_HEAVE_PREFIX "/usr/local"')

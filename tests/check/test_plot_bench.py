@@ -22,7 +22,7 @@ import tap
 
 HERE = Path(__file__).resolve().parent
 TOP = HERE.parents[1]
-sys.path[:0] = [str(TOP / "tools/lib"), str(HERE)]
+sys.path[:0] = [str(TOP / "python"), str(TOP / "tools/lib"), str(HERE)]
 import bench_analysis as analysis  # noqa: E402  the path above has to be set first
 import bench_cortex  # noqa: E402
 import bench_cost  # noqa: E402
@@ -31,12 +31,12 @@ import bench_peers  # noqa: E402
 import bench_signal as signals  # noqa: E402
 import latency_run as latency_runs  # noqa: E402
 from bench_rivals import two_limits  # noqa: E402
-from frame_dots import dots_of  # noqa: E402
-from frames_file import Line  # noqa: E402
-from platform_ini import Platform  # noqa: E402
+from heave.plot.dots import dots_of  # noqa: E402
+from heave.recording import Line  # noqa: E402
+from heave.configuration import Configuration  # noqa: E402
 from synthetic_trace import Trace, ini  # noqa: E402
-from trace_check import HEADER  # noqa: E402
-from trace_read import TraceError, Window, axes_named, thinned  # noqa: E402
+from heave.trace import HEADER  # noqa: E402
+from heave.plot.window import TraceError, Window, axes_named, thinned  # noqa: E402
 
 FOLDER = Path(tempfile.mkdtemp(prefix="plot_bench."))
 NANO = 10**9
@@ -82,6 +82,8 @@ def write(name, text):
 # ---- tools/plot ----
 def check_plot_arguments(suite):
     trace = write("trace.csv", "".join([HEADER + "\n", *(row(t, t * t) for t in range(50))]))
+    nothing = FOLDER / "nothing"
+    nothing.mkdir()
     refusals = {
         "no trace": ((), 2, "TRACE"),
         "three traces": ((trace, trace, trace), 2, "at most two"),
@@ -96,6 +98,12 @@ def check_plot_arguments(suite):
         "an empty trace": ((write("empty.csv", HEADER + "\n"),), 1, "no row"),
         "a time without rows": ((trace, "--from", "7"), 1, "no row"),
         "a configuration that is none": ((trace, "--config", write("bad.ini", "nonsense\n")), 1, "bad.ini:1"),
+        "limits used without a configuration": ((trace, "--what", "limits"), 1, "limits", "--config"),
+        "an animation without a configuration": ((trace, "-o", "ride.html"), 1, "animation", "--config"),
+        "an animation as a PNG": ((trace, "--what", "animation", "-o", "ride.png"), 2, "ride.png", ".html"),
+        "limits used of two traces": ((trace, trace, "--what", "limits"), 2, "of one trace"),
+        "a kind of picture that is none": ((trace, "--what", "music"), 2, "'music'", "spectrum"),
+        "a folder that is no incident": ((nothing,), 1, "nothing/trace.csv"),
         "frames that are none": ((trace, "--frames", write("bad.frames", "nonsense\n")), 1, "bad.frames"),
     }
     for name, (arguments, status, *words) in refusals.items():
@@ -117,6 +125,20 @@ def check_plot_arguments(suite):
         result = run("plot", trace, trace, "--axes", "z,roll,c1", "--config", config, "--frames", frames, "-o", "two.png")
         assert result.returncode == 0, result.stderr
         assert (FOLDER / "two.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+        for what, words in (("limits", ("--config", config)), ("spectrum", ())):
+            long = write("long.csv", "".join([HEADER + "\n", *(row(t, 10**9 + t * t * 1000) for t in range(600))]))
+            result = run("plot", long, "--what", what, "-o", f"{what}.png", *words)
+            assert result.returncode == 0 and (FOLDER / f"{what}.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n", result.stderr
+            expect_refusal(run("plot", trace, "--what", "spectrum"), 1, "48 rows", "256")
+    with suite.case("plot makes an animation of an incident, from what lies in its folder"):
+        incident = FOLDER / "incident-000001-20260101T000000Z"
+        incident.mkdir()
+        for name, text in (("trace.csv", Path(FOLDER / trace).read_text(encoding="ascii")), ("platform.ini", ini()), ("frames", "10 @A6:0,0,0,0,0,5,0#\n")):
+            (incident / name).write_text(text, encoding="utf-8")
+        result = run("plot", incident, "-o", "ride.html")
+        assert result.returncode == 0 and f"<title>{incident.name}</title>" in (FOLDER / "ride.html").read_text(encoding="utf-8"), result.stderr
+        result = run("plot", incident, "--what", "animation")
+        assert result.returncode == 0 and (incident / "trace.html").exists(), result.stderr
     with suite.case("plot and bench tell how they are used"):
         for tool, arguments in (("plot", ("--help",)), ("bench", ("--help",)), ("bench", ("motion", "--help")), ("bench", ("cost", "--help"))):
             result = run(tool, *arguments)
@@ -179,7 +201,7 @@ def check_window(suite):
 
 
 def check_dots(suite):
-    platform = Platform(write("dots.ini", ini()))
+    platform = Configuration(write("dots.ini", ini()))
     frames = [Line(1000, "@A6:1,2,3,4,5,6,F0#"), Line(2000, "!hold"), Line(3000, "@C6T:1,2,3,4,5,6,500#@A3:1,2,3#\r\n"),
               Line(4000, "@A6:1,2,x,4,5,6,0#"), Line(5000, "@A6T:1,2,3,4,5,6#"), Line(6000, "@A6:1,2#")]
     with suite.case("well-formed frames become dots, others do not"):
@@ -287,7 +309,7 @@ def check_latency(suite):
         try:
             bench_latency.run_part("can-design", "heaved", "drives", 1)
         except bench_latency.LatencyError as error:
-            assert "tools/lib/uml.sh" in str(error) and "modprobe vcan" in str(error), error
+            assert "tools/heave-lab build" in str(error) and "modprobe vcan" in str(error), error
         else:
             raise AssertionError("measured without a kernel")
         finally:

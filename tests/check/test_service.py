@@ -11,8 +11,8 @@ from pathlib import Path
 
 import tap
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools/lib"))
-from platform_ini import read_ini  # noqa: E402  the path above has to be set first
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "python"))
+from heave.configuration import read_ini  # noqa: E402  the path above has to be set first
 
 TOP = Path(__file__).resolve().parents[2]
 PACKAGING = TOP / "packaging"

@@ -14,12 +14,12 @@ from pathlib import Path
 import tap
 
 TOP = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(TOP / "tools/lib"), str(TOP / "tests/check")]
+sys.path[:0] = [str(TOP / "python"), str(TOP / "tests/check")]
 import synthetic_trace as synthetic  # noqa: E402  the path above has to be set first
 import test_check_trace as slow  # noqa: E402
-from platform_ini import Platform  # noqa: E402
+from heave.configuration import Configuration  # noqa: E402
 from synthetic_trace import NANO, Trace  # noqa: E402
-from trace_check import Checker  # noqa: E402
+from heave.judge.checker import Checker  # noqa: E402
 
 FOLDER = tempfile.TemporaryDirectory()
 CONFIG = Path(FOLDER.name) / "platform.ini"
@@ -55,7 +55,7 @@ def by_check_trace(lines, platform, is_strict=False):
 
 def expect_same(judge, lines, config=CONFIG, platform=None, is_strict=False):
     lines = list(lines)
-    fast, reference = judge.broken(lines, config, is_strict), by_check_trace(lines, platform or Platform(config), is_strict)
+    fast, reference = judge.broken(lines, config, is_strict), by_check_trace(lines, platform or Configuration(config), is_strict)
     assert fast == reference, f"the judge: {fast}\ncheck_trace: {reference}"
     return fast[0]
 
@@ -228,7 +228,7 @@ def real_trace(heaved, topic):
 def check_real(suite, judge, heaved, mutations):
     for topic in MORE_GOLDEN:
         config, header, rows = real_trace(heaved, topic)
-        platform, chance, broken = Platform(config), random.Random(topic), 0
+        platform, chance, broken = Configuration(config), random.Random(topic), 0
         with suite.case(f"{topic}: nothing is found in the trace itself"):
             assert expect_same(judge, [header, *rows], config, platform) == {}
         with suite.case(f"{topic}: {mutations} traces with a fault each, judged as by check_trace"):

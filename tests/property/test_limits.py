@@ -24,8 +24,8 @@ from pathlib import Path
 import tap
 
 TOP = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(TOP / "tools/lib"))
-from platform_ini import Platform  # noqa: E402  the path above has to be set first
+sys.path.insert(0, str(TOP / "python"))
+from heave.configuration import Configuration  # noqa: E402  the path above has to be set first
 
 DATAGRAMS = 3000
 FAILURES_MAX = 3
@@ -114,10 +114,10 @@ class Seed:
     def __init__(self, programs, config, number, folder):
         self.heaved, self.judge, self.strict, self.number = *programs, number
         self.frames, self.ini, self.trace = folder / "frames", folder / "platform.ini", folder / "trace.csv"
-        changes = variants(Platform(config))[(number - 1) % 5]
+        changes = variants(Configuration(config))[(number - 1) % 5]
         self.ini.write_text(with_changes(config.read_text(encoding="utf-8"), changes), encoding="utf-8")
         with open(self.frames, "w", encoding="utf-8") as file:
-            subprocess.run([sys.executable, TOP / "tests/property/make_frames.py", str(number), str(DATAGRAMS), *generator_options(Platform(self.ini))],
+            subprocess.run([sys.executable, TOP / "tests/property/make_frames.py", str(number), str(DATAGRAMS), *generator_options(Configuration(self.ini))],
                            stdout=file, check=True)
 
     def play_command(self, trace):
@@ -185,7 +185,7 @@ class Hunt:
 
     def run_seed(self, suite, number, folder):
         a, name, verdict = self.arguments, self.arguments.config.stem, None
-        what = describe(variants(Platform(a.config))[(number - 1) % 5])
+        what = describe(variants(Configuration(a.config))[(number - 1) % 5])
         with suite.case(f"{name}, {what}, seed {number}: no limit is exceeded in any cycle"):
             seed = Seed((a.heaved, a.judge, ["--strict"] if a.strict else []), a.config, number, folder)
             verdict = self.judge(seed)
@@ -195,7 +195,7 @@ class Hunt:
         self.seeds += 1
 
     def check_coverage(self, suite):
-        platform, name = Platform(self.arguments.config), self.arguments.config.stem
+        platform, name = Configuration(self.arguments.config), self.arguments.config.stem
         with suite.case(f"{name}: the {self.cycles} cycles came across every state, every flag and timed moves"):
             assert STATES <= set(self.states), f"not seen: {STATES - set(self.states)}"
             assert expected_flags(platform) <= set(self.flags), f"not seen: {expected_flags(platform) - set(self.flags)}"

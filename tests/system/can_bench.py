@@ -14,10 +14,10 @@ import sys
 
 import can_judge
 import forked
-import heave
+import harness
 import vcan
 
-sys.path.append(str(heave.TOP / "tests/peers"))
+sys.path.append(str(harness.TOP / "tests/peers"))
 import can_drives  # noqa: E402  the path above has to be set first
 import can_record  # noqa: E402
 
@@ -27,7 +27,7 @@ CYLINDERS = 6
 NODES = range(1, CYLINDERS + 2)  # the last one is the rotation motor
 
 
-class CanBench(heave.Bench):
+class CanBench(harness.Bench):
     def __init__(self, bin_dir, **changes):
         super().__init__(bin_dir, **changes)
         self.drives = None
@@ -53,7 +53,7 @@ class CanBench(heave.Bench):
     def stop_drives(self):
         if self.drives:
             self.drives.stdin.close()
-            self.drives.wait(timeout=heave.WAIT_S)
+            self.drives.wait(timeout=harness.WAIT_S)
             self.drives.stdout.close()
             self.drives = None
 
@@ -94,7 +94,7 @@ class RecordedBench(CanBench):
     def end_recorder(self):
         if self.recorder:
             self.recorder.stdin.close()
-            self.recorder.wait(timeout=heave.WAIT_S)
+            self.recorder.wait(timeout=harness.WAIT_S)
             self.recorder.stdout.close()
             self.recorder = None
 

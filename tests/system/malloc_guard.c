@@ -25,7 +25,7 @@
 
 #define CALLS_MAX 24
 
-/** Read by tests/system/heave.py. */
+/** Read by tests/system/harness.py. */
 typedef struct {
     uint64_t cycles;      /**< of the motion thread, under guard */
     uint64_t page_faults; /**< of the motion thread, in those */
@@ -48,7 +48,7 @@ int posix_memalign(void **memory, size_t alignment, size_t size);
 static report_t g_own;
 static report_t *g_report = &g_own;
 static bool g_is_armed;
-static bool g_has_own_faults; /**< User Mode Linux: see heave.py */
+static bool g_has_own_faults; /**< User Mode Linux: see harness.py */
 static __thread bool t_is_realtime __attribute__((tls_model("initial-exec")));
 static __thread bool t_has_faults __attribute__((tls_model("initial-exec")));
 static __thread uint64_t t_first_faults __attribute__((tls_model("initial-exec")));

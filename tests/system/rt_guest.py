@@ -16,12 +16,12 @@ import time
 import traceback
 
 import can_judge
-import heave
+import harness
 import slcan_drives
 import tap
 
-PLATFORM = heave.TOP / "config/tripod.ini"
-MAP = heave.TOP / "config/can-raw-hexapod.ini"
+PLATFORM = harness.TOP / "config/tripod.ini"
+MAP = harness.TOP / "config/can-raw-hexapod.ini"
 PEER = slcan_drives.__file__
 MODULES = ["can-dev", "can", "can-raw", "slcan"]
 REPORT = "/dev/ttyS1"
@@ -100,7 +100,7 @@ def endless(cpu, priority):
             write("/proc/sys/kernel/sched_rt_runtime_us", "950000")
 
 
-class SlcanBench(heave.Bench):
+class SlcanBench(harness.Bench):
     """Three cylinders on drives behind a serial adapter: few frames, because the kernel and the drives need long for each."""
 
     def __init__(self, bin_dir):
@@ -154,7 +154,7 @@ class SlcanBench(heave.Bench):
     def wait_for_setpoints(self, count):
         """Until so many more have come to each drive."""
         wanted = len(self.setpoints(self.rows())[slcan_drives.FIRST_ID]) + count
-        heave.wait_for(lambda: len(self.setpoints(self.rows())[slcan_drives.FIRST_ID]) >= wanted, f"{count} more set-points")
+        harness.wait_for(lambda: len(self.setpoints(self.rows())[slcan_drives.FIRST_ID]) >= wanted, f"{count} more set-points")
 
     def wait_for_quiet(self):
         """Until no set-point comes any more; those that the adapter has taken already do come."""
@@ -162,10 +162,10 @@ class SlcanBench(heave.Bench):
             before = self.setpoints(self.rows())
             time.sleep(5 * PERIOD_US / 1e6)
             return self.setpoints(self.rows()) == before
-        heave.wait_for(is_quiet, "an end of the set-points")
+        harness.wait_for(is_quiet, "an end of the set-points")
 
     def wait_for_drives(self):
-        heave.wait_for(lambda: {drive["drive"] for drive in self.status()["cylinders"]} == {"disabled"}, "the drives are heard again")
+        harness.wait_for(lambda: {drive["drive"] for drive in self.status()["cylinders"]} == {"disabled"}, "the drives are heard again")
 
     @staticmethod
     def setpoints(rows):
@@ -201,12 +201,12 @@ def is_the_machine_meant(bench):
 def goes_before_what_is_less_urgent(bench):
     """Without the kernel's reserve for others: a thread with a lower real-time priority that never waits, on the same CPU. Drives are simulated
     by heaved itself, because nothing else goes on there, not even the kernel's own work for slcan."""
-    with heave.Bench(bench.bin, platform__cycle_us="10000", platform__late_hold_cycles="0") as other, endless(1, 10):
+    with harness.Bench(bench.bin, platform__cycle_us="10000", platform__late_hold_cycles="0") as other, endless(1, 10):
         daemon = other.start()
         motion = Threads(daemon.pid).motion
         os.sched_setaffinity(motion, {1})
         begin = other.status()["cycle"]
-        heave.wait_for(lambda: other.status()["cycle"] >= begin + 50, "cycles beside a busy thread of lower priority")
+        harness.wait_for(lambda: other.status()["cycle"] >= begin + 50, "cycles beside a busy thread of lower priority")
         assert Threads(daemon.pid).cpu(motion) == 1
         other.wait_state("ENGAGED")
         assert other.stop(daemon) == 0
@@ -304,7 +304,7 @@ def judge(case, bench):
 
 def main():
     prepare()
-    heave.WAIT_S, heave.LOOK_S, heave.STATUS_LOOK_S = WAIT_S, LOOK_S, LOOK_S
+    harness.WAIT_S, harness.LOOK_S, harness.STATUS_LOOK_S = WAIT_S, LOOK_S, LOOK_S
     os.nice(10)  # the test itself; the kernel's work for slcan is not nice
     sys.stdout = open(REPORT, "w", encoding="utf-8")
     suite = tap.Suite()
@@ -317,7 +317,7 @@ def main():
             if not is_done:
                 print(bench.story())
                 break
-    heave.Guard.sum_up()  # there is no end of the interpreter
+    harness.Guard.sum_up()  # there is no end of the interpreter
     suite.done()
 
 

@@ -7,7 +7,7 @@ import random
 import subprocess
 import sys
 
-import heave
+import harness
 import tap
 
 T0 = 15000  # up and following by then
@@ -21,14 +21,14 @@ class Play:
     def __init__(self, bench, lines, **changes):
         config = bench.write_config("angle.ini", udp__silence_hold_ms=0, **changes)
         frames = bench.file("frames.txt", "".join(f"{t} {what}\n" for t, what in sorted(lines, key=lambda line: line[0])))
-        self.rows = heave.rows_of(bench.play(frames, config=config))
+        self.rows = harness.rows_of(bench.play(frames, config=config))
         bench.check_limits(config)
         if any("T:" in what for _, what in lines):
             self.check_timed_moves(bench, config, frames)
 
     @staticmethod
     def check_timed_moves(bench, config, frames):
-        check = subprocess.run([sys.executable, heave.TOP / "tools/check_trace", "--json", "--frames", frames, config, bench.folder / "played.csv"],
+        check = subprocess.run([sys.executable, harness.TOP / "tools/check_trace", "--json", "--frames", frames, config, bench.folder / "played.csv"],
                                stdout=subprocess.PIPE, text=True, check=False)
         assert check.returncode == 0, check.stdout
         assert json.loads(check.stdout)["violations"] == 0
@@ -220,7 +220,7 @@ CASES = {
 
 def main():
     suite = tap.Suite()
-    with heave.Bench(sys.argv[1]) as bench:
+    with harness.Bench(sys.argv[1]) as bench:
         for name, test in CASES.items():
             with suite.case(name):
                 test(bench)

@@ -7,7 +7,7 @@ Where the plate is follows from the cylinders of the trace alone, by a mechanism
 import math
 import sys
 
-import heave
+import harness
 import mechanism
 import tap
 from test_envelope import set_keys
@@ -30,7 +30,7 @@ PLATFORMS = {
 class Platform:
     def __init__(self, bench, source, changes):
         self.bench = bench
-        self.text = set_keys((heave.TOP / "config" / source).read_text(encoding="utf-8").replace("engage = manual", "engage = auto"), changes)
+        self.text = set_keys((harness.TOP / "config" / source).read_text(encoding="utf-8").replace("engage = manual", "engage = auto"), changes)
         self.model = mechanism.Mechanism(bench.file("axes.ini", self.text))
         self.start_ms = 12000  # up and engaged by then
 
@@ -50,7 +50,7 @@ class Platform:
     def poses(self, trace, every=90):
         """The plate of some rows, from their cylinders."""
         guess = self.model.neutral
-        rows = [row for row in heave.rows_of(trace) if float(row["t_ms"]) > self.start_ms + 20 * FADE_FRAMES and row["state"] == "ENGAGED"]
+        rows = [row for row in harness.rows_of(trace) if float(row["t_ms"]) > self.start_ms + 20 * FADE_FRAMES and row["state"] == "ENGAGED"]
         assert not any(FLAGS_OF_NO_STREAM & set(row["flags"].split("|")) for row in rows), "the stream is not followed"
         found = []
         for row in rows[::every] + rows[-1:]:
@@ -108,7 +108,7 @@ def signs_mirror(platform):
     for turned in ({k for k in model.free if k % 2 == 0}, {k for k in model.free if k % 3 == 0}):
         mirrored = platform.play(values, {mechanism.AXES[k]: {"sign": -1} for k in turned})
         assert mirrored == platform.play([[-value if k in turned else value for k, value in enumerate(row)] for row in values]), turned
-        pairs = list(zip(heave.rows_of(platform.play(values)), heave.rows_of(mirrored)))
+        pairs = list(zip(harness.rows_of(platform.play(values)), harness.rows_of(mirrored)))
         assert sum(not a["flags"] and not b["flags"] for a, b in pairs) > 2000
         for k in model.free:
             column = f"{mechanism.AXES[k]}_{UNITS[k]}"
@@ -130,7 +130,7 @@ def scale_and_offset(platform):
 
 def main():
     suite = tap.Suite()
-    with heave.Bench(sys.argv[1]) as bench:
+    with harness.Bench(sys.argv[1]) as bench:
         for name, (source, changes) in PLATFORMS.items():
             platform = Platform(bench, source, changes)
             for check in (turns_about_the_reference_point, ends_where_it_was_sent, signs_mirror, scale_and_offset):

@@ -13,7 +13,7 @@ import sys
 import time
 from pathlib import Path
 
-import heave
+import harness
 import tap
 
 EXIT_USAGE, EXIT_DATA, EXIT_NO_INPUT, EXIT_UNAVAILABLE, EXIT_IO, EXIT_CONFIG = 64, 65, 66, 69, 74, 78
@@ -93,7 +93,7 @@ def closed_standard_descriptors(bench):
                 os.close(fd)
 
         daemon = bench.spawn("--trace", trace, "--record", record, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, preexec_fn=close)
-        heave.wait_for(lambda: daemon.poll() is not None or bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
+        harness.wait_for(lambda: daemon.poll() is not None or bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
         bench.wait_state("ENGAGED")
         bench.ctl("hold")
         bench.ctl("nonsense")
@@ -194,9 +194,9 @@ def disk_that_stalls(bench):
         daemon = bench.spawn("--trace", disk / "trace.csv", "--record", disk / "record.txt", stdout=log, stderr=log,
                              environment={"LD_PRELOAD": str(library), "HEAVE_STALLED": str(disk), "NOTIFY_SOCKET": manager.getsockname(),
                                           "WATCHDOG_USEC": "1000000"})
-    heave.wait_for(lambda: bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
+    harness.wait_for(lambda: bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
     bench.wait_state("ENGAGED")
-    heave.wait_for((disk / "heave.prom").exists, "metrics are written")
+    harness.wait_for((disk / "heave.prom").exists, "metrics are written")
     stall.touch()
     with Link(bench) as link, bench.sender() as sender:
         end = time.monotonic() + 25  # the rings hold 16 s
@@ -216,7 +216,7 @@ def disk_that_stalls(bench):
         found = re.search(r'^heave_lost_total{what="trace_rows"} (\d+)$', (disk / "heave.prom").read_text(), re.MULTILINE)
         return found and int(found[1]) >= lost["trace_rows"]
 
-    heave.wait_for(told, "the count is in the metrics")
+    harness.wait_for(told, "the count is in the metrics")
     assert bench.ctl("status").returncode == 0
     assert bench.stop(daemon) == 0
     said = (disk / "log").read_text()
@@ -260,7 +260,7 @@ def seen_from_the_first_feedback_on(bench):
     time.sleep(0.3)
     assert bench.ctl("engage").returncode == 0
     bench.wait_state("HOMING")
-    heave.wait_for(lambda: bench.status()["cylinders"][0]["drive"] == "homing", "it homes")
+    harness.wait_for(lambda: bench.status()["cylinders"][0]["drive"] == "homing", "it homes")
     time.sleep(0.5)
     answer, code = bench.ask("dump")
     assert code == 0 and bench.status()["state"] == "HOMING", answer
@@ -290,7 +290,7 @@ def late_on_its_way(bench):
         daemon.send_signal(signal.SIGSTOP)
         time.sleep(0.1)
         daemon.send_signal(signal.SIGCONT)
-        heave.wait_for(lambda: bench.status()["late_cycles"] >= late + 50, "late cycles are counted")
+        harness.wait_for(lambda: bench.status()["late_cycles"] >= late + 50, "late cycles are counted")
         assert bench.status()["state"] == state
 
     assert bench.ctl("engage").returncode == 0
@@ -300,7 +300,7 @@ def late_on_its_way(bench):
             sender.send("@A6:0,0,0,0,0,40,0#")
             status = bench.status()
             return bench.ctl("resume") and False if status["state"] == "HOLD" else status["state"] == "ENGAGED"
-        heave.wait_for(is_engaged, "ENGAGED")
+        harness.wait_for(is_engaged, "ENGAGED")
         for _ in range(100):
             sender.send("@A6:0,0,0,0,0,40,0#")
             time.sleep(0.02)
@@ -333,7 +333,7 @@ def main():
     only = sys.argv[2] if len(sys.argv) > 2 else ""
     for name, check in CASES.items():
         if only in name:
-            with heave.Bench(sys.argv[1]) as bench, suite.case(name):
+            with harness.Bench(sys.argv[1]) as bench, suite.case(name):
                 check(bench)
     return suite.done()
 

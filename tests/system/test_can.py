@@ -9,10 +9,10 @@ import time
 
 import can_bench
 import can_judge
-import heave
+import harness
 import tap
 
-sys.path.append(str(heave.TOP / "tools/lib"))
+sys.path.append(str(harness.TOP / "tools/lib"))
 import demo_sender  # noqa: E402  the path above has to be set first
 
 MM = can_bench.COUNTS_PER_MM
@@ -173,7 +173,7 @@ def ends_and_names_who_keeps_torque(bench):
     """One drive that answers, and acts on nothing; one that has lost its power, of which nobody knows."""
     bench.start_drives()
     daemon = bench.start(config=can_config(bench, platform__engage="manual"))
-    heave.wait_for(lambda: all(leg["drive"] == "disabled" for leg in bench.status()["cylinders"]), "the drives are set up")
+    harness.wait_for(lambda: all(leg["drive"] == "disabled" for leg in bench.status()["cylinders"]), "the drives are set up")
     assert bench.ctl("park").returncode == 0
     bench.wait_state("SETTLED")
     bench.do("stuck", drive=3)

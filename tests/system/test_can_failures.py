@@ -16,7 +16,7 @@ import time
 import can_bench
 import can_judge
 import forked
-import heave
+import harness
 import tap
 import test_can
 
@@ -37,7 +37,7 @@ def in_motion(bench, source, during_s=RISE_S, **drives):
     print(f"# strikes {moment_s:.6f} s after all have torque", flush=True)
     bench.start_drives(**drives)
     daemon = bench.start(config=test_can.can_config(bench))
-    heave.wait_for(lambda: bench.events("all enabled"), "torque")
+    harness.wait_for(lambda: bench.events("all enabled"), "torque")
     time.sleep(moment_s)
     return daemon
 
@@ -161,7 +161,7 @@ def reason_stays(action, code, words, **arguments):
         daemon = in_motion(bench, source, only={VICTIM: {"boot_us": 2000}})
         bench.do(action, VICTIM, **arguments)
         bench.wait_state("FAULT")
-        heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "ready", "the drive is back")
+        harness.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "ready", "the drive is back")
         status = bench.status()
         fault = status["fault"]
         assert status["cylinders"][VICTIM - 1]["report"]["code"] in (0, code), status["cylinders"][VICTIM - 1]
@@ -397,7 +397,7 @@ def all_drives_refused(bench, _):
     """Alike drives that do not take the same object: drive-offline with the object, no lost bus; a reset leads out once they take it, in FAULT and in OFF."""
     bench.start_drives(each={"refuse": {"60C2:1": 0x06090030}})
     bench.start(config=test_can.can_config(bench, platform__engage="manual"))
-    heave.wait_for(lambda: all(leg["report"]["phase"] == "refused" for leg in bench.status()["cylinders"]), "all are refused")
+    harness.wait_for(lambda: all(leg["report"]["phase"] == "refused" for leg in bench.status()["cylinders"]), "all are refused")
     assert bench.ctl("engage").returncode != 0
     bench.wait_state("FAULT")
     status = bench.status()
@@ -415,7 +415,7 @@ def object_without_answer(bench, _):
     """It answers everything else: named with the object, reset no more than once, and at an engage the reason is told."""
     bench.start_drives(only={VICTIM: {"no_answer": ["6065:0"]}})
     daemon = bench.start(config=test_can.can_config(bench, platform__engage="manual"))
-    heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "refused", "is refused")
+    harness.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "refused", "is refused")
     report = bench.status()["cylinders"][VICTIM - 1]["report"]
     assert (report["code"], report["object"], report["sub_index"]) == (0x10017, 0x6065, 0), report
     lines = [line for line in daemon.log.read_text(encoding="utf-8").splitlines() if f"node {VICTIM}," in line]
@@ -435,15 +435,15 @@ def node_id_twice(bench, _):
     twin = forked.Forked(can_bench.can_drives.main, bench.file("twin.json", json.dumps(twin_config)), "--follow")
     assert twin.stdout.readline() == "ready\n"
     bench.start(config=test_can.can_config(bench, platform__engage="manual"))
-    heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "refused", "is refused")
+    harness.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "refused", "is refused")
     report = bench.status()["cylinders"][VICTIM - 1]["report"]
     assert report["code"] == 0x10018 and "two drives" in report["trouble"], report
     assert not bench.events("enabled")
     twin.stdin.close()
-    twin.wait(timeout=heave.WAIT_S)
+    twin.wait(timeout=harness.WAIT_S)
     twin.stdout.close()
     bench.ctl("reset")
-    heave.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["drive"] == "disabled", "is ready")
+    harness.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["drive"] == "disabled", "is ready")
     assert bench.ctl("engage").returncode == 0
     bench.wait_state("ENGAGED")
 
@@ -468,7 +468,7 @@ def killed_anywhere(bench, source):
             assert bench.ctl("reset").returncode == 0
             time.sleep(0.1)
             assert bench.ctl("engage").returncode == 0, bench.status()["state"]
-        heave.wait_for(lambda turn=turn: len(bench.events("enabled")) >= 7 * (turn + 1), "torque")
+        harness.wait_for(lambda turn=turn: len(bench.events("enabled")) >= 7 * (turn + 1), "torque")
         time.sleep(source.uniform(0, 0.8))
         number = ENDS[turn % len(ENDS)]
         assert bench.stop(daemon, number) == -number

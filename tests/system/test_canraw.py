@@ -11,13 +11,13 @@ import time
 
 import cantools
 import forked
-import heave
+import harness
 import tap
 
-sys.path.append(str(heave.TOP / "tests/peers"))
+sys.path.append(str(harness.TOP / "tests/peers"))
 import raw_drives  # noqa: E402  the path above has to be set first
 
-PRESET = heave.TOP / "config/can-raw-hexapod.ini"
+PRESET = harness.TOP / "config/can-raw-hexapod.ini"
 CYLINDERS = 6
 COUNTS_PER_MM = 2000
 FIRST_ID = 0x601
@@ -28,7 +28,7 @@ SETPOINT = b"\x01\x05"
 LIMITS = (300.0, 3000.0, 50000.0)  # speed_mm_s, accel_mm_s2, jerk_mm_s3 of the preset
 
 
-class RawBench(heave.Bench):
+class RawBench(harness.Bench):
     """The preset on vcan0, rising by itself, with its drives."""
 
     def __init__(self, bin_dir, start):
@@ -49,7 +49,7 @@ class RawBench(heave.Bench):
     def end_drives(self):
         if self.drives.stdin:
             self.drives.stdin.close()
-            code = self.drives.wait(timeout=heave.WAIT_S)
+            code = self.drives.wait(timeout=harness.WAIT_S)
             self.drives.stdout.close()
             self.drives.stdin = None
             assert code == 0, "the drives heard a frame that is none of theirs"
@@ -101,7 +101,7 @@ def follows_and_keeps_its_limits(bench, source):
     assert bench.status()["state"] == "ENGAGED"
     assert bench.stop(daemon) == 0
     bench.end_drives()
-    columns = [[float(row[f"c{k + 1}_mm"]) for row in heave.rows_of(trace.read_bytes())] for k in range(CYLINDERS)]
+    columns = [[float(row[f"c{k + 1}_mm"]) for row in harness.rows_of(trace.read_bytes())] for k in range(CYLINDERS)]
     for k, (start_mm, rows) in enumerate(bench.setpoints()):
         assert abs(rows[0][1] - start_mm) <= 1 / COUNTS_PER_MM, f"first set-point {rows[0][1]}, the drive stood at {start_mm}"
         gaps = {after - before for (before, _), (after, _) in zip(rows, rows[1:])}

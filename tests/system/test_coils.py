@@ -8,10 +8,10 @@ import re
 import subprocess
 import sys
 
-import heave
+import harness
 import tap
 
-sys.path.insert(0, str(heave.TOP / "tests/peers"))
+sys.path.insert(0, str(harness.TOP / "tests/peers"))
 UNIT, COILS, FIRST = 1, 1, 16
 SAFE = 0x801
 FRAME = "@A6:0,0,0,0,0,5,{:03X}#"
@@ -33,7 +33,7 @@ def mask_on(devices):
 
 
 def reaches(devices, mask):
-    heave.wait_for(lambda: mask_on(devices) == mask, f"mask {mask:03X} is on the board")
+    harness.wait_for(lambda: mask_on(devices) == mask, f"mask {mask:03X} is on the board")
 
 
 def masks_reach_the_board(bench, devices, **place):
@@ -47,9 +47,9 @@ def masks_reach_the_board(bench, devices, **place):
             sender.send(FRAME.format(mask))
             reaches(devices, mask)
     reaches(devices, SAFE)  # the sender is silent: HOLD
-    heave.wait_for(lambda: bench.status()["relays"]["known"] is True, "the board has answered")
+    harness.wait_for(lambda: bench.status()["relays"]["known"] is True, "the board has answered")
     with bench.sender() as sender:
-        heave.wait_for(lambda: sender.send(FRAME.format(0x0F0)) or mask_on(devices) == 0x0F0, "it follows again")
+        harness.wait_for(lambda: sender.send(FRAME.format(0x0F0)) or mask_on(devices) == 0x0F0, "it follows again")
     assert bench.stop(daemon) == 0
     reaches(devices, SAFE)
     assert devices.get(UNIT, COILS, FIRST - 1) and devices.get(UNIT, COILS, FIRST + 12), "a neighbour was written"
@@ -75,15 +75,15 @@ def a_board_that_is_not_there(bench):
         daemon = bench.start(config=config_of(bench, devices, host=f"127.0.0.1:{line.address[1]}"))
         bench.wait_state("ENGAGED")
         line.unplug()
-        heave.wait_for(lambda: bench.status()["relays"]["known"] is False, "its silence is noticed")
+        harness.wait_for(lambda: bench.status()["relays"]["known"] is False, "its silence is noticed")
         assert bench.status()["bus"]["last_trouble"], "the status does not say why"
         with bench.sender() as sender:
-            heave.wait_for(lambda: sender.send(FRAME.format(0x0F0)) or abs(bench.status()["pose_sent"]["z_mm"] - 5) < 0.01,
+            harness.wait_for(lambda: sender.send(FRAME.format(0x0F0)) or abs(bench.status()["pose_sent"]["z_mm"] - 5) < 0.01,
                            "the platform goes where it is sent, whatever becomes of the board")
         assert bench.status()["relays"]["known"] is False, "the board was not away meanwhile"
         devices.set(UNIT, COILS, FIRST + 3, True)  # what it came back with
         line.plug()
-        heave.wait_for(lambda: bench.status()["relays"]["known"] is True, "it is back")
+        harness.wait_for(lambda: bench.status()["relays"]["known"] is True, "it is back")
         reaches(devices, SAFE)
         assert bench.stop(daemon) == 0
 
@@ -123,7 +123,7 @@ CASES = {
 def main():
     only = sys.argv[sys.argv.index("--only") + 1] if "--only" in sys.argv else ""
     if "HEAVE_TEST_VENV" not in os.environ:
-        found = subprocess.run([heave.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        found = subprocess.run([harness.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
         if found.returncode != 0:
             print(f"1..0 # SKIP {found.stderr.strip()}")
             return 0
@@ -132,7 +132,7 @@ def main():
     suite = tap.Suite()
     for name, check in CASES.items():
         if only in name:
-            with heave.Bench(sys.argv[1]) as bench, suite.case(name):
+            with harness.Bench(sys.argv[1]) as bench, suite.case(name):
                 check(bench)
     return suite.done()
 

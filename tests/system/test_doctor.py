@@ -9,12 +9,12 @@ import sys
 import can
 import can_bench
 import forked
-import heave
+import harness
 import raw_drives
 import tap
 from test_can import can_config
 
-RAW_PRESET = heave.TOP / "config/can-raw-hexapod.ini"
+RAW_PRESET = harness.TOP / "config/can-raw-hexapod.ini"
 
 
 def link(*arguments):
@@ -192,7 +192,7 @@ def drives_with_frames_of_their_own(bench, _config):
     rows = doctor(bench, config, 1, "drive 6: nothing with identifier 586h")
     assert [text for level, text in rows if "answers with" in text] == [f"drive {k + 1} answers with identifier {0x581 + k:X}h" for k in range(5)], rows
     drives.stdin.close()
-    assert drives.wait(timeout=heave.WAIT_S) == 0
+    assert drives.wait(timeout=harness.WAIT_S) == 0
     drives.stdout.close()
 
 

@@ -10,7 +10,7 @@ import resource
 import signal
 import sys
 
-import heave
+import harness
 import mechanism
 import tap
 
@@ -44,7 +44,7 @@ def set_keys(text, changes):
 
 class Platform:
     def __init__(self, bench, source, changes):
-        text = set_keys((heave.TOP / "config" / source).read_text(encoding="utf-8"), changes)
+        text = set_keys((harness.TOP / "config" / source).read_text(encoding="utf-8"), changes)
         self.bench = bench
         self.path = bench.file("envelope.ini", text)
         self.model = mechanism.Mechanism(self.path)
@@ -295,7 +295,7 @@ def run_files(suite, bench):
             run = write(path)
             assert run.returncode == code and re.fullmatch(rf"heaved: {path}: {part}[^\n]*\n", run.stderr), (run.returncode, run.stderr)
     with suite.case("a device is written to, not replaced"):
-        assert write("/dev/null").returncode == 0 and heave.Path("/dev/null").is_char_device()
+        assert write("/dev/null").returncode == 0 and harness.Path("/dev/null").is_char_device()
     with suite.case("it excludes the other modes, and needs a name"):
         assert bench.heaved("--config", bench.config, "--envelope", out, "--check").returncode == 64
         assert bench.heaved("--config", bench.config, "--envelope").returncode == 64
@@ -304,7 +304,7 @@ def run_files(suite, bench):
 
 def main():
     suite = tap.Suite()
-    with heave.Bench(sys.argv[1]) as bench:
+    with harness.Bench(sys.argv[1]) as bench:
         run_platforms(suite, bench)
         run_warnings(suite, bench)
         run_files(suite, bench)

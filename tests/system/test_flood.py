@@ -12,7 +12,7 @@ import threading
 import time
 from pathlib import Path
 
-import heave
+import harness
 import tap
 
 # Sends blocks until it has sent enough and its standard input is closed; then says how many that were.
@@ -94,9 +94,9 @@ def settled(bench):
     """The counters, once nothing useless comes through any more."""
     def look():
         before = bench.status()
-        now = heave.wait_for(lambda: (lambda status: status if status["cycle"] > before["cycle"] + 200 else None)(bench.status()), "it has looked often")
+        now = harness.wait_for(lambda: (lambda status: status if status["cycle"] > before["cycle"] + 200 else None)(bench.status()), "it has looked often")
         return now["counters"] if counted(now["counters"])[1] == counted(before["counters"])[1] else None
-    return heave.wait_for(look, "the program sees no more of the flood")
+    return harness.wait_for(look, "the program sees no more of the flood")
 
 
 def lost_on_the_way():
@@ -105,7 +105,7 @@ def lost_on_the_way():
 
 
 def check_limits(config, trace):
-    run = subprocess.run([sys.executable, heave.TOP / "tools/check_trace", config, trace], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    run = subprocess.run([sys.executable, harness.TOP / "tools/check_trace", config, trace], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     assert run.returncode == 0, run.stdout
 
 
@@ -114,27 +114,27 @@ def is_kept_out(bench, source, at_least, payloads, **changes):
     daemon = bench.start("--trace", trace, config=config)
     bench.wait_state("ENGAGED")
     with streaming(bench) as stream:
-        heave.wait_for(lambda: counted(bench.status()["counters"])[0] > 10, "the stream is followed")
+        harness.wait_for(lambda: counted(bench.status()["counters"])[0] > 10, "the stream is followed")
         assert bench.status()["flood"] is False
         on_the_way = lost_on_the_way()
         with flooding(bench, source, at_least, payloads) as child:
-            heave.wait_for(lambda: bench.status()["flood"], "the flood is noticed")
+            harness.wait_for(lambda: bench.status()["flood"], "the flood is noticed")
             first, sent = settled(bench), stream.sent
-            heave.wait_for(lambda: stream.sent >= sent + 100, "the stream goes on in the flood")
+            harness.wait_for(lambda: stream.sent >= sent + 100, "the stream goes on in the flood")
             useless = int(child.communicate(input="")[0])
         last = settled(bench)
         was_kept_out = "is over" not in daemon.log.read_text()
         stream.end()
         is_all_there = on_the_way == lost_on_the_way()
         if was_kept_out and is_all_there:  # the queue was the stream's alone
-            heave.wait_for(lambda: counted(bench.status()["counters"])[0] - counted(first)[0] >= stream.sent - sent - 1, "every frame sent since then")
+            harness.wait_for(lambda: counted(bench.status()["counters"])[0] - counted(first)[0] >= stream.sent - sent - 1, "every frame sent since then")
         end = bench.status()["counters"]
         followed, seen = counted(end)
         assert followed <= stream.sent and useless >= at_least, (useless, stream.sent, end)
         assert seen + followed + end["lost_in_kernel"] <= useless + stream.sent, (useless, stream.sent, end)
         assert end["lost_in_kernel"] > at_least / 2 or not is_all_there, (useless, end)
         assert not was_kept_out or counted(first)[1] == counted(last)[1], (first, last)  # else the flood paused for seconds
-        heave.wait_for(lambda: "a flood of useless datagrams" in daemon.log.read_text(), "the flood is told")
+        harness.wait_for(lambda: "a flood of useless datagrams" in daemon.log.read_text(), "the flood is told")
     is_told_again(bench, daemon)
     assert bench.stop(daemon) == 0
     check_limits(config, trace)
@@ -142,14 +142,14 @@ def is_kept_out(bench, source, at_least, payloads, **changes):
 
 def is_told_again(bench, daemon):
     """Single wrong frames are, once it is over."""
-    heave.wait_for(lambda: not bench.status()["flood"], "it is over")
-    heave.wait_for(lambda: "the flood is over" in daemon.log.read_text(), "it is said")  # by another thread, a little later
+    harness.wait_for(lambda: not bench.status()["flood"], "it is over")
+    harness.wait_for(lambda: "the flood is over" in daemon.log.read_text(), "it is said")  # by another thread, a little later
     if bench.status()["counters"]["refused_senders"] > 0:
         return  # to all but this one
     before = bench.status()["counters"]["rejected"]["no_head"]
     with bench.sender() as sender:
         sender.send("nonsense")
-        heave.wait_for(lambda: bench.status()["counters"]["rejected"]["no_head"] == before + 1, "a wrong frame is counted by its reason")
+        harness.wait_for(lambda: bench.status()["counters"]["rejected"]["no_head"] == before + 1, "a wrong frame is counted by its reason")
 
 
 # Sends frames that tell by their height when they were sent, at two rates, one after the other; says how many that were.
@@ -190,7 +190,7 @@ def driver_floods(bench):
     bench.wait_state("ENGAGED")
     sent = int(subprocess.run([sys.executable, "-c", TIMED, str(bench.port)], stdout=subprocess.PIPE, check=True).stdout)
     # the kernel is asked ten times a second
-    heave.wait_for(lambda: (lambda all: all["accepted"]["A6"] + all["lost_in_kernel"] == sent)(bench.status()["counters"]), "every frame is followed or counted as lost")
+    harness.wait_for(lambda: (lambda all: all["accepted"]["A6"] + all["lost_in_kernel"] == sent)(bench.status()["counters"]), "every frame is followed or counted as lost")
     assert bench.stop(daemon) == 0
     ages = sorted(ages_of(record))
     assert len(ages) > 1000, len(ages)
@@ -209,7 +209,7 @@ def queue_is_short(bench):
             sender.send("@A6:0,0,0,0,0,1#")
         before = lost_on_the_way()
         daemon.send_signal(signal.SIGCONT)
-        counters = heave.wait_for(lambda: (lambda all: all if all["datagrams"] + all["lost_in_kernel"] == 1000 else None)(bench.status()["counters"]), "what waits is taken")
+        counters = harness.wait_for(lambda: (lambda all: all if all["datagrams"] + all["lost_in_kernel"] == 1000 else None)(bench.status()["counters"]), "what waits is taken")
         assert 20 <= counters["datagrams"] <= 3 * PER_CYCLE or before != lost_on_the_way(), counters
     assert bench.stop(daemon) == 0
 
@@ -231,7 +231,7 @@ def main():
     suite = tap.Suite()
     for name, check in CASES.items():
         if arguments.only in name:
-            with heave.Bench(arguments.bin) as bench, suite.case(name):
+            with harness.Bench(arguments.bin) as bench, suite.case(name):
                 check(bench)
     return suite.done()
 

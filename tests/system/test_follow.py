@@ -6,7 +6,7 @@ import math
 import random
 import sys
 
-import heave
+import harness
 import tap
 
 T0 = 15000  # ms: up and ready by then
@@ -30,7 +30,7 @@ def arrivals(rate_hz, jitter_ms=0.0, seconds=7.0):
 
 def play(bench, lines, config=None):
     frames = bench.file("frames.txt", "".join(f"{t:.3f} {text}\n" for t, text in lines))
-    return heave.rows_of(bench.play(frames, config=config))
+    return harness.rows_of(bench.play(frames, config=config))
 
 
 def worst_error(rows, end_ms):
@@ -52,14 +52,14 @@ def coarse_values(bench):
     """Whole millimetres, as some games send, ask for more than the axis can do at every step: the motion that was rounded comes out."""
     for rate, step_mm, most_mm in ((60, 1, 0.4), (30, 1, 0.5), (100, 1, 0.5), (100, 0.1, 0.4)):
         lines = [(T0 + at, f"@A6:0,0,0,0,0,{step_mm * round(height(t) / step_mm):.1f},0#") for at, t in arrivals(rate, 3)]
-        rows = play(bench, [(0, "!engage"), *lines], heave.TOP / "config/hexapod-400.ini")
+        rows = play(bench, [(0, "!engage"), *lines], harness.TOP / "config/hexapod-400.ini")
         error = worst_error(rows, lines[-1][0] - T0)
         assert error <= most_mm, f"{rate} Hz, steps of {step_mm} mm: {error:.2f} mm"
 
 
 def beyond_an_end(bench, rate, speed, style, stands):
     """How far a ramp that ends is overshot, in mm; and how far what comes back goes beyond the last sample again."""
-    text = (heave.TOP / "config/hexapod-400.ini").read_text(encoding="utf-8")
+    text = (harness.TOP / "config/hexapod-400.ini").read_text(encoding="utf-8")
     config = bench.file("ends.ini", text.replace("stream = smooth", f"stream = {style}").replace("silence_hold_ms = 500", "silence_hold_ms = 0"))
     count = int(min(1.2 * rate + 2, 100 * rate / speed))
     heights = [speed * min(i, count - 1) / rate for i in range(count + (rate if stands else 0))]
@@ -111,7 +111,7 @@ def back_from_beyond_an_axis(bench):
     lines = [(0, "!engage"), (T0, "@C6:200,200,200,200,200,200,0#")]
     lines += [(T0 + 400 * i, "@C6:10,10,390,390,390,390,0#") for i in range(1, 11)]
     lines += [(T0 + 4400 + 1000 * i / 60, "@A6:0,0,0,0,0,0,0#") for i in range(1200)]
-    rows = [row for row in play(bench, lines, heave.TOP / "config/hexapod-400.ini") if float(row["t_ms"]) <= lines[-1][0]]
+    rows = [row for row in play(bench, lines, harness.TOP / "config/hexapod-400.ini") if float(row["t_ms"]) <= lines[-1][0]]
     assert max(float(row["x_mm"]) for row in rows) > 305, "the cylinders did not lead beyond the range"
     assert all(float(rows[-1][axis]) == 0 for axis in ("roll_deg", "pitch_deg", "x_mm", "z_mm")), rows[-1]
 
@@ -119,7 +119,7 @@ def back_from_beyond_an_axis(bench):
 def extensions_at_a_new_rate(bench):
     """Where gentle extensions go over from 750 Hz, which jitters, to 1 kHz, the way back to them is planned anew with every frame: it must
     not swing out further and further."""
-    text = (heave.TOP / "config/tripod.ini").read_text(encoding="utf-8")
+    text = (harness.TOP / "config/tripod.ini").read_text(encoding="utf-8")
     config = bench.file("new-rate.ini", text.replace("silence_hold_ms = 1000", "silence_hold_ms = 0"))
     dice = random.Random(1)
     at, lines = 0.0, [(0, "!engage"), (T0 - 4000, "@C3:120,105,105,0#")]
@@ -150,7 +150,7 @@ CASES = {
 def main():
     suite = tap.Suite()
     for name, case in CASES.items():
-        with suite.case(name), heave.Bench(sys.argv[1], **PATIENT) as bench:
+        with suite.case(name), harness.Bench(sys.argv[1], **PATIENT) as bench:
             case(bench)
     return suite.done()
 

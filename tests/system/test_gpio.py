@@ -8,7 +8,7 @@ import sys
 import time
 
 import gpio_sim
-import heave
+import harness
 import tap
 
 RELAYS = 12
@@ -24,7 +24,7 @@ DOCUMENT = [("@A3:5.5,3.0,20,0F#", 0x00F), ("@A4:5.5,3.0,20,45,0F#", 0x00F), ("@
             ("@A6:0,0,0,0,0,20,0#", 0x000), ("@A6:0,0,0,0,0,20,FFF#", 0xFFF)]
 
 
-class GpioBench(heave.Bench):
+class GpioBench(harness.Bench):
     """The demonstration platform with its relays on lines of a chip that is called effects."""
 
     def __init__(self, bin_dir, relays="", **changes):
@@ -38,12 +38,12 @@ class GpioBench(heave.Bench):
 
     def wait_status(self, condition, what):
         """Asks five times a second: each question is a process, and starting one costs far more here than simulating a second."""
-        for _ in range(5 * heave.WAIT_S):
+        for _ in range(5 * harness.WAIT_S):
             status = self.status()
             if condition(status):
                 return status
             time.sleep(0.2)
-        raise AssertionError(f"{what}: not within {heave.WAIT_S} s")
+        raise AssertionError(f"{what}: not within {harness.WAIT_S} s")
 
     def wait_state(self, *states):
         return self.wait_status(lambda status: status["state"] in states, f"state {' or '.join(states)}")
@@ -60,7 +60,7 @@ def relays(chip):
 
 
 def wait_relays(chip, mask, what):
-    heave.wait_for(lambda: relays(chip) == mask, f"{what}: relays {mask:03X}, they are {relays(chip):03X}")
+    harness.wait_for(lambda: relays(chip) == mask, f"{what}: relays {mask:03X}, they are {relays(chip):03X}")
 
 
 def switch(bench, chip, mask=0x0F0):
@@ -91,10 +91,10 @@ def fewer(bin_dir):
                                                           relays__safe_mask="8") as bench:
         bench.start()
         bench.wait_state("ENGAGED")
-        heave.wait_for(lambda: chip.mask(FIRST, 4) == 0x7, "active low: only relay 4 is closed")
+        harness.wait_for(lambda: chip.mask(FIRST, 4) == 0x7, "active low: only relay 4 is closed")
         with bench.sender() as sender:
             sender.send("@A6:0,0,0,0,0,20,F5#")
-            heave.wait_for(lambda: chip.mask(FIRST, 4) == 0xA, "relays 1 and 3 are closed")
+            harness.wait_for(lambda: chip.mask(FIRST, 4) == 0xA, "relays 1 and 3 are closed")
         assert bench.status()["counters"]["relay_missing"] == 1
         assert "relay_missing 1" in bench.ctl("status").stdout
 
@@ -117,7 +117,7 @@ def every_way_out(bin_dir):
         daemon.send_signal(signal.SIGTERM)
         wait_relays(chip, SAFE, "SIGTERM")
         assert daemon.poll() is None, "it settles first"
-        assert daemon.wait(timeout=heave.WAIT_S) == 0
+        assert daemon.wait(timeout=harness.WAIT_S) == 0
 
 
 def fault(bin_dir):
@@ -125,7 +125,7 @@ def fault(bin_dir):
         bench.edit("[cylinders]\n", "[cylinders]\nfollowing_error_mm = 20\n")
         bench.start()
         with switch(bench, chip) as sender:
-            heave.wait_for(lambda: "takeover" not in bench.status()["flags"], "the sender is faded in")
+            harness.wait_for(lambda: "takeover" not in bench.status()["flags"], "the sender is faded in")
             sender.send("@A6:0,0,0,0,0,90,0F#")
             bench.wait_state("FAULT")
         wait_relays(chip, SAFE, "FAULT")
@@ -259,7 +259,7 @@ def estop(bin_dir):
         said = daemon.log.read_text(encoding="utf-8")
         assert "ENGAGED -> ESTOP (estop)" in said and "the reset button was pressed" in said and "reset refused" in said, said
         assert "!estop on" in record.read_text(encoding="utf-8") and "!reset" in record.read_text(encoding="utf-8")
-        live = heave.since_zero(trace.read_bytes())
+        live = harness.since_zero(trace.read_bytes())
         assert bench.play(record)[:len(live)] == live, "a recording replays switches"
 
 
@@ -317,7 +317,7 @@ def channels(bin_dir):
     """The reset at the start of DeskBench is refused no more once both channels are closed."""
     with gpio_sim.Chip("effects", 16, "FX"), Desk() as desk, DeskBench(bin_dir, desk, "estop2 = DESK0\nestop_discrepancy_ms = 1000\n") as bench:
         record, trace = bench.folder / "record.txt", bench.folder / "live.csv"
-        daemon = heave.Bench.start(bench, "--record", record, "--trace", trace)
+        daemon = harness.Bench.start(bench, "--record", record, "--trace", trace)
         bench.wait_state("ESTOP")
         desk.close(SECOND)
         bench.wait_status(lambda status: status["fault"]["name"] == "estop-channels", "one wire is broken, the other one closed")
@@ -347,7 +347,7 @@ def channels(bin_dir):
         bench.wait_status(lambda status: status["state"] == "ESTOP" and status["fault"]["name"] == "estop-channels", "too long")
         assert bench.stop(daemon) == 0
         assert "!fault estop-channels" in record.read_text(encoding="utf-8")
-        live = heave.since_zero(trace.read_bytes())
+        live = harness.since_zero(trace.read_bytes())
         assert bench.play(record)[:len(live)] == live, "a recording replays channels that disagree"
 
 
@@ -378,7 +378,7 @@ def supply(bin_dir):
         assert bench.status()["fault"]["name"] == "power-failing"
         assert bench.stop(daemon) == 0
         assert "!fault power-failing" in record.read_text(encoding="utf-8")
-        live = heave.since_zero(trace.read_bytes())
+        live = harness.since_zero(trace.read_bytes())
         assert bench.play(record)[:len(live)] == live, "a recording replays a supply that fails"
 
 
@@ -422,7 +422,7 @@ class PulseBench(GpioBench):
         return seen
 
     def wait_pulse(self):
-        heave.wait_for(lambda: self.edges(0.2) >= 5, "the pulse runs")
+        harness.wait_for(lambda: self.edges(0.2) >= 5, "the pulse runs")
 
     def is_quiet_and_low(self):
         return self.edges(0.3) == 0 and self.chip.level(PULSE) == 0
@@ -435,7 +435,7 @@ def pulse(bin_dir):
         with switch(bench, chip) as sender:
             bench.wait_pulse()
             assert bench.status()["healthy"] is True
-            heave.wait_for(lambda: "takeover" not in bench.status()["flags"], "the sender is faded in")
+            harness.wait_for(lambda: "takeover" not in bench.status()["flags"], "the sender is faded in")
             sender.send("@A6:0,0,0,0,0,90,0F#")
             bench.wait_state("FAULT")
         assert bench.is_quiet_and_low(), "in FAULT"

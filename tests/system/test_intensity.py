@@ -5,7 +5,7 @@ import math
 import re
 import sys
 
-import heave
+import harness
 import tap
 
 T0 = 15000  # up and following by then
@@ -35,7 +35,7 @@ class Play:
         text = "".join(f"{t} {what}\n" for t, what in sorted(lines, key=lambda line: line[0]))
         frames = bench.file("frames.txt", text)
         self.bytes = bench.play(frames, config=config)
-        self.rows = heave.rows_of(self.bytes)
+        self.rows = harness.rows_of(self.bytes)
         bench.check_limits(config)
 
     def row(self, t_ms):
@@ -158,7 +158,7 @@ def start_above_the_cap(bench):
 
 
 def quick_changes_on_every_platform(bench):
-    for source in sorted((heave.TOP / "config").glob("*.ini")):
+    for source in sorted((harness.TOP / "config").glob("*.ini")):
         text = re.sub(r"(?m)^engage = manual", "engage = auto", source.read_text(encoding="utf-8"))
         config = bench.file("any.ini", text + "\n[intensity]\nramp_ms = 500\n")
         found = re.search(r"(?ms)^\[z\][^\[]*?^offset_mm *= *(-?[\d.]+)", text)
@@ -188,7 +188,7 @@ CASES = {
 
 def main():
     suite = tap.Suite()
-    with heave.Bench(sys.argv[1], **PATIENT) as bench:
+    with harness.Bench(sys.argv[1], **PATIENT) as bench:
         for name, test in CASES.items():
             with suite.case(name):
                 test(bench)

@@ -25,7 +25,7 @@ import time
 import zlib
 from pathlib import Path
 
-import heave
+import harness
 import tap
 
 TRIES = 5  # for what has to be done within seconds
@@ -46,12 +46,12 @@ def follows_frames(bench):
     assert len(status["cylinders"]) == 6 and status["relays"]["count"] == 12 and status["rotation"] is not None
     with bench.sender() as sender:
         sender.send("@A7:4,-3,2,10,-20,30,45,0A05#")
-        heave.wait_for(lambda: abs(bench.status()["pose_sent"]["z_mm"] - 30) < 1e-6, "the pose is reached")
-        heave.wait_for(lambda: abs(bench.status()["rotation"]["sent_deg"] - 45) < 1e-6, "the angle is reached")
-        status = heave.wait_for(lambda: (lambda s: s if s["speed_actual"] and abs(s["speed_actual"]["z_mm_s"]) < 0.1 else None)(bench.status()), "at rest")
+        harness.wait_for(lambda: abs(bench.status()["pose_sent"]["z_mm"] - 30) < 1e-6, "the pose is reached")
+        harness.wait_for(lambda: abs(bench.status()["rotation"]["sent_deg"] - 45) < 1e-6, "the angle is reached")
+        status = harness.wait_for(lambda: (lambda s: s if s["speed_actual"] and abs(s["speed_actual"]["z_mm_s"]) < 0.1 else None)(bench.status()), "at rest")
         sender.send("@A7:1#")
         sender.send("@A3T:1,1,1,100#")
-        counters = heave.wait_for(lambda: (lambda c: c if c["accepted"]["A3"] else None)(bench.status()["counters"]), "A3 is accepted")
+        counters = harness.wait_for(lambda: (lambda c: c if c["accepted"]["A3"] else None)(bench.status()["counters"]), "A3 is accepted")
     expected = {"roll_deg": 4, "pitch_deg": -3, "yaw_deg": 2, "x_mm": 10, "y_mm": -20, "z_mm": 30}
     assert all(abs(status["pose_sent"][name] - value) < 1e-6 for name, value in expected.items()), status["pose_sent"]
     assert list(status["speed_actual"]) == [f"{name}_s" for name in expected] and list(status["accel_actual"]) == [f"{name}_s2" for name in expected], status
@@ -74,7 +74,7 @@ def every_command_answers(bench):
         assert code == 0 and answer == {"ok": True, "state": state}, answer
         if then:
             bench.wait_state(then)
-    assert daemon.wait(timeout=heave.WAIT_S) == 0
+    assert daemon.wait(timeout=harness.WAIT_S) == 0
     assert not bench.socket.exists()
 
 
@@ -90,14 +90,14 @@ def waits_for_the_end(bench):
     code, out, error = wait("--wait", "resume")
     assert code == 1 and not out and "nothing to resume" in error, error
     assert wait("--wait", "hold")[0] == 64 and wait("--wait", "status")[0] == 64
-    heave.wait_for(lambda: bench.status()["held_by_silence"], "the silence")
+    harness.wait_for(lambda: bench.status()["held_by_silence"], "the silence")
     status = bench.status()
     assert status["waiting_for_sender"] is True and status["pose_received"] is None and status["stream"]["period_ms"] is None, status
     assert abs(status["time_unix_ms"] / 1000 - time.time()) < 60, status["time_unix_ms"]
     assert "waiting for a sender" in bench.ctl("status").stdout and "SENDER SILENT" not in bench.ctl("status").stdout
     with bench.sender() as sender:
         sender.send("@A6:90,0,0,0,0,0,0#")
-        heave.wait_for(lambda: bench.status()["pose_received"] is not None, "a frame")
+        harness.wait_for(lambda: bench.status()["pose_received"] is not None, "a frame")
         status = bench.status()
         assert status["pose_received"]["roll_deg"] == 90 and status["pose_asked"]["roll_deg"] < 90, status["pose_asked"]
         assert status["waiting_for_sender"] is False
@@ -108,7 +108,7 @@ def waits_for_the_end(bench):
     code, out, _ = wait("--json", "--wait", "engage")
     assert code == 0 and json.loads(out)["state"] == "ENGAGED", out
     assert wait("--wait", "shutdown") == (0, "", "")
-    assert daemon.wait(timeout=heave.WAIT_S) == 0
+    assert daemon.wait(timeout=harness.WAIT_S) == 0
 
 
 def waits_and_is_held(bench):
@@ -117,7 +117,7 @@ def waits_and_is_held(bench):
                           stderr=subprocess.PIPE, text=True) as waiting:
         bench.wait_state("HOMING", "RISING")
         assert bench.ctl("hold").returncode == 0
-        out, error = waiting.communicate(timeout=heave.WAIT_S)
+        out, error = waiting.communicate(timeout=harness.WAIT_S)
     assert waiting.returncode == 1 and not out and "somebody has asked for hold" in error, error
     assert bench.stop(daemon) == 0
 
@@ -138,10 +138,10 @@ def plain_answers_are_lines(bench):
 
 
 def a_bus_that_does_not_work_says_why(bench):
-    text = (heave.TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8").replace("can0", "nosuch0").replace("port = 9800", f"port = {bench.port}")
+    text = (harness.TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8").replace("can0", "nosuch0").replace("port = 9800", f"port = {bench.port}")
     text += f"\n[control]\nsocket = {bench.socket}\n"
     daemon = bench.start(config=bench.file("bus.ini", text))
-    bus = heave.wait_for(lambda: bench.status()["bus"], "the bus is in the status")
+    bus = harness.wait_for(lambda: bench.status()["bus"], "the bus is in the status")
     assert bus["trouble"].startswith("can: nosuch0: ") and bus["trouble"] == bus["last_trouble"], bus
     assert all(cylinder["actual_mm"] is None for cylinder in bench.status()["cylinders"])
     table = bench.ctl("status", env={**os.environ, "LC_ALL": "C"}).stdout
@@ -164,7 +164,7 @@ def every_member_is_documented(bench):
     status = bench.status()
     for counts in ("accepted", "rejected"):
         status["counters"][counts] = None  # members are commands and reasons there
-    rows = re.findall(r"^\|.*$", (heave.TOP / "docs/status-json.md").read_text(encoding="utf-8"), re.MULTILINE)
+    rows = re.findall(r"^\|.*$", (harness.TOP / "docs/status-json.md").read_text(encoding="utf-8"), re.MULTILINE)
     known = {word for row in rows for piece in re.findall(r"`([^`]+)`", row) for word in re.split(r"[.\[\]]+", piece)}
     promised = {re.split(r"[.\[]", piece)[0] for row in rows for piece in re.findall(r"`([^`]+)`", row.split("|")[1]) if piece[0] != "."}
     assert not names_of(status) - known, f"not in docs/status-json.md: {sorted(names_of(status) - known)}"
@@ -193,9 +193,9 @@ def watches_by_line(bench):
         assert run.returncode == 0, run
         return (run.stdout.splitlines(), time.monotonic() - started_s) if run.stdout.count("\n") >= least else None
 
-    lines, took_s = heave.wait_for(lambda: watch(1, "--for", "1.2"), "a line")
+    lines, took_s = harness.wait_for(lambda: watch(1, "--for", "1.2"), "a line")
     assert took_s >= 1.2 and len(lines) <= took_s + 2 and "\x1b" not in "".join(lines), (took_s, lines)
-    lines, _ = heave.wait_for(lambda: watch(6, "--json", "--for", "1", "--hz", "50"), "more than one a second")
+    lines, _ = harness.wait_for(lambda: watch(6, "--json", "--for", "1", "--hz", "50"), "more than one a second")
     cycles = [json.loads(line)["cycle"] for line in lines]
     assert cycles == sorted(cycles), cycles
     assert bench.stop(daemon) == 0
@@ -262,7 +262,7 @@ def shows_every_cycle(bench):
             assert rows[-1]["cycle"] <= late["cycle"] and rows[0]["sent_c1_mm"] > 0, rows[-1]
         stopped.send_signal(signal.SIGCONT)
         stopped.send_signal(signal.SIGINT)
-        assert stopped.wait(timeout=heave.WAIT_S) == 0
+        assert stopped.wait(timeout=harness.WAIT_S) == 0
     lines = bench.ctl("--for", "0.2", "scope", "t_ms,drive1,sent_z_mm").stdout.splitlines()
     assert lines[0] == "t_ms,drive1,sent_z_mm" and re.fullmatch(r"\d+\.000,3,-?\d+\.\d{9}", lines[1]), lines[:2]
     run = bench.ctl("scope", "t_ms,colour")
@@ -297,7 +297,7 @@ def has_no_samples(bench):
 
 def watches_on_a_small_terminal(bench):
     """24 lines of 80 columns: the line with the state stays, with a fault the fault does too, and no word is broken."""
-    text = (heave.TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8").replace("can0", "nosuch0").replace("port = 9800", f"port = {bench.port}")
+    text = (harness.TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8").replace("can0", "nosuch0").replace("port = 9800", f"port = {bench.port}")
     daemon = bench.start(config=bench.file("bus.ini", text + f"\n[control]\nsocket = {bench.socket}\n"))
     bench.ctl("engage")
     bench.wait_state("FAULT")
@@ -324,7 +324,7 @@ def watches_on_a_terminal(bench):
     daemon = bench.start()
     pid, terminal = ctl_on_terminal(bench, "watch")
     seen = b""
-    end = time.monotonic() + heave.WAIT_S
+    end = time.monotonic() + harness.WAIT_S
     while seen.count(b"\x1b[H") < 5 and time.monotonic() < end:
         if select.select([terminal], [], [], 0.5)[0]:
             seen += os.read(terminal, 65536)
@@ -380,7 +380,7 @@ def replays_to_the_same_bytes(bench, **changes):
     daemon = bench.start("--record", record, "--trace", trace, config=config)
     session(bench, daemon)
     assert bench.stop(daemon) == 0
-    live, log, text = heave.since_zero(trace.read_bytes()), daemon.log.read_text(), record.read_text()
+    live, log, text = harness.since_zero(trace.read_bytes()), daemon.log.read_text(), record.read_text()
     assert "missing" not in log, log
     played = bench.play(record, config=config)
     assert len(live.splitlines()) > 3000, "a live run worth the name"
@@ -388,9 +388,9 @@ def replays_to_the_same_bytes(bench, **changes):
     if live[:length] != played[:length]:
         for ours, theirs in zip(live.splitlines(), played.splitlines()):
             assert ours == theirs, f"live:   {ours}\nplayed: {theirs}"
-    states = {row["state"] for row in heave.rows_of(live)}
+    states = {row["state"] for row in harness.rows_of(live)}
     assert {"SETTLED", "RISING", "ENGAGED", "HOLD", "SETTLING", "OFF"} <= states, states
-    assert any("late" in row["flags"] for row in heave.rows_of(live)) and " !late " in text
+    assert any("late" in row["flags"] for row in harness.rows_of(live)) and " !late " in text
     assert text.startswith("; heaved ") and "!shutdown" in text and "!intensity 20" in text and "\\x21engage" in text, text[:200]
     assert bench.play(record, config=config) == played
 
@@ -406,7 +406,7 @@ def a_late_cycle_holds(bench):
             bench.ctl("resume")
         return state == "ENGAGED"
 
-    heave.wait_for(is_engaged, "ENGAGED")
+    harness.wait_for(is_engaged, "ENGAGED")
     with bench.sender() as sender:
         sender.stream(0.5, wave)
         daemon.send_signal(signal.SIGSTOP)
@@ -421,7 +421,7 @@ def a_late_cycle_holds(bench):
     assert status["late_cycles"] > 40 and status["wake_latency"]["max_us"] > 40000, status
     assert status["wake_latency"]["count"] >= status["cycle"] - 100 and status["cycle_time"]["p50_us"] <= status["cycle_time"]["max_us"]
     assert bench.stop(daemon) == 0
-    live = heave.since_zero(trace.read_bytes())
+    live = harness.since_zero(trace.read_bytes())
     assert bench.play(record, config=config)[:len(live)] == live, "a late cycle replays"
 
 
@@ -449,12 +449,12 @@ def dumps_the_black_box(bench):
     assert bench.ctl("incidents").stdout == f"{names[0]}: new\n{names[1]}: new\n"
     listed, code = bench.ask("seen")
     assert code == 0 and listed == {"ok": True, "incidents": [{"name": name, "dump": True, "seen": True} for name in names]}, listed
-    heave.wait_for(lambda: (directory / ".seen").exists() and (directory / ".seen").read_text() == "000002\n", "that is kept")
+    harness.wait_for(lambda: (directory / ".seen").exists() and (directory / ".seen").read_text() == "000002\n", "that is kept")
     assert bench.stop(daemon) == 0
     folders = sorted(path for path in directory.iterdir() if path.is_dir())
     assert [str(folder) for folder in folders] == [run.stdout[len("dump: "):].strip(), answer["folder"]], folders
     for folder in folders:
-        trace = heave.since_zero((folder / "trace.csv").read_bytes())
+        trace = harness.since_zero((folder / "trace.csv").read_bytes())
         assert len(trace.splitlines()) > 1000
         played = bench.play(folder / "frames", config=folder / "platform.ini")
         assert played == trace, f"{folder.name} plays back otherwise"
@@ -468,7 +468,7 @@ def refuses_a_forged_state(bench):
     with bench.sender() as sender:
         sender.stream(27, wave)  # more than is kept: the incident begins with a state
     assert bench.ask("dump")[1] == 0
-    heave.wait_for(lambda: list(directory.glob("*/frames")), "the incident")
+    harness.wait_for(lambda: list(directory.glob("*/frames")), "the incident")
     assert bench.stop(daemon) == 0
     frames = min(directory.glob("*/frames"))
     head, about, _, digits = re.search(r"(?m)^(\S+ !state )(\S+ )([0-9A-F]{8}) ([0-9A-F]+)$", frames.read_text(encoding="utf-8")).groups()
@@ -490,7 +490,7 @@ def replays_a_following_error(bench):
         sender.stream(0.5, wave)
         config.write_text(config.read_text().replace("[cylinders]\n", "[cylinders]\nfollowing_error_mm = 0.01\n"))
         daemon.send_signal(signal.SIGHUP)
-        heave.wait_for(lambda: sender.stream(0.5, wave) or bench.status()["state"] == "FAULT", "FAULT")
+        harness.wait_for(lambda: sender.stream(0.5, wave) or bench.status()["state"] == "FAULT", "FAULT")
     fault = bench.status()["fault"]
     assert fault["name"] == "following-error" and fault["found_by"] == "heaved" and fault["device_code"] == 0, fault
     assert abs(fault["allowed_mm"] - 0.01) < 1e-4 and 0.01 < fault["off_mm"] < 100 and fault["off_deg"] is None and fault["allowed_deg"] is None, fault
@@ -501,8 +501,8 @@ def replays_a_following_error(bench):
     assert bench.stop(daemon) == 0
     folder, = directory.iterdir()
     assert " !fault following-error " in (folder / "frames").read_text()
-    trace = heave.since_zero((folder / "trace.csv").read_bytes())
-    states = [row["state"] for row in heave.rows_of(trace)]
+    trace = harness.since_zero((folder / "trace.csv").read_bytes())
+    states = [row["state"] for row in harness.rows_of(trace)]
     assert "ENGAGED" in states and states[-1] == "FAULT", set(states)
     played = bench.play(folder / "frames", config=folder / "platform.ini")
     end = trace.index(b"\n", trace.index(b",FAULT,")) + 1
@@ -523,7 +523,7 @@ def tells_the_service_manager(bench):
     path = str(bench.folder / "notify")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(path)
-        manager.settimeout(heave.WAIT_S)
+        manager.settimeout(harness.WAIT_S)
         heard = []
 
         def hear_until(text):
@@ -541,7 +541,7 @@ def tells_the_service_manager(bench):
         within_s = int(heard[-1].rpartition("=")[2]) / 1e6
         assert 200 / 50 < within_s < 30, f"{within_s} s for a stroke of 200 mm at 50 mm/s"
         hear_until("STATUS=OFF")
-        assert daemon.wait(timeout=heave.WAIT_S) == 0
+        assert daemon.wait(timeout=harness.WAIT_S) == 0
 
 
 # --- The end ---
@@ -561,7 +561,7 @@ def second_signal_ends_at_once(bench):
         daemon = bench.start()
         bench.wait_state("ENGAGED")
         daemon.send_signal(signal.SIGINT)
-        heave.wait_for(lambda: "-> SETTLING" in daemon.log.read_text(), "it settles")
+        harness.wait_for(lambda: "-> SETTLING" in daemon.log.read_text(), "it settles")
         code, log = bench.stop(daemon, signal.SIGINT), daemon.log.read_text()
         assert not bench.socket.exists()
         if "SETTLED -> OFF" not in log:
@@ -573,7 +573,7 @@ def second_signal_ends_at_once(bench):
 def hangup_reads_the_configuration_again(bench):
     daemon = bench.start()
     text = bench.config.read_text()
-    said = lambda words: heave.wait_for(lambda: words in daemon.log.read_text(), words)  # noqa: E731
+    said = lambda words: harness.wait_for(lambda: words in daemon.log.read_text(), words)  # noqa: E731
     bench.wait_state("ENGAGED")
     # in motion: silence shortened, a stroke that would need a restart
     bench.config.write_text(re.sub(r"(?m)^(silence_hold_ms *= *)\S+", r"\g<1>700", text.replace("stroke_mm = 200", "stroke_mm = 199")))
@@ -581,7 +581,7 @@ def hangup_reads_the_configuration_again(bench):
         sender.stream(0.3, wave)
         daemon.send_signal(signal.SIGHUP)
         said("has been read again")
-        heave.wait_for(lambda: sender.stream(0.3, wave) or bench.status()["state"] == "ENGAGED", "ENGAGED as long as there are frames")
+        harness.wait_for(lambda: sender.stream(0.3, wave) or bench.status()["state"] == "ENGAGED", "ENGAGED as long as there are frames")
     log = daemon.log.read_text()
     assert re.search(r"platform.ini:\d+: \[geometry\] stroke_mm: 199 needs a restart; 200 stays", log), log
     assert re.search(r"platform.ini:\d+: \[udp\] silence_hold_ms: 700 from now on", log), log
@@ -593,7 +593,7 @@ def hangup_reads_the_configuration_again(bench):
     assert re.search(r"platform.ini:\d+: \[geometry\] stroke_mm: ", daemon.log.read_text())
     bench.config.unlink()
     daemon.send_signal(signal.SIGHUP)
-    heave.wait_for(lambda: daemon.log.read_text().count("nothing has changed") == 2, "a missing file changes nothing")
+    harness.wait_for(lambda: daemon.log.read_text().count("nothing has changed") == 2, "a missing file changes nothing")
     assert bench.status()["ok"] and bench.stop(daemon) == 0
 
 
@@ -614,7 +614,7 @@ def port_in_use(bench):
 def socket_of_a_running_daemon(bench):
     trace = bench.file("kept.csv", "kept")
     daemon = bench.start()
-    run = refused(bench, "--trace", trace, config=bench.write_config("second.ini", udp__port=heave.free_port()))
+    run = refused(bench, "--trace", trace, config=bench.write_config("second.ini", udp__port=harness.free_port()))
     assert run.returncode == 69 and "another heaved is running" in run.stderr and run.stderr.count("\n") == 1, run
     assert trace.read_text() == "kept", "a refused start must not empty files"
     assert bench.status()["ok"], "the first one still answers"
@@ -692,7 +692,7 @@ def strangers_are_refused(bench):
     with bench.sender() as sender:
         for i in range(10):
             sender.send(wave(i * 0.02))
-    counters = heave.wait_for(lambda: (lambda c: c if c["refused_senders"] >= 10 else None)(bench.status()["counters"]), "counted")
+    counters = harness.wait_for(lambda: (lambda c: c if c["refused_senders"] >= 10 else None)(bench.status()["counters"]), "counted")
     assert counters["datagrams"] == 0 and counters["refused_senders"] == 10, counters
     assert bench.stop(daemon) == 0
 
@@ -823,7 +823,7 @@ def moves_what_was_approved(bench):
     assert bench.ask("engage")[1] == 0, "the approved one asks nobody"
     config.write_text(config.read_text(encoding="utf-8").replace("silence_hold_ms", "silence_hold_ms = 777 ;", 1), encoding="utf-8")
     daemon.send_signal(signal.SIGHUP)
-    heave.wait_for(lambda: f"[platform] approved: {identity} is not this configuration" in daemon.log.read_text(encoding="utf-8"), "refused")
+    harness.wait_for(lambda: f"[platform] approved: {identity} is not this configuration" in daemon.log.read_text(encoding="utf-8"), "refused")
     assert bench.status()["configuration"]["hash"] == identity
     assert bench.stop(daemon) == 0
 
@@ -837,7 +837,7 @@ def build_id_of(program):
 def nobody_reads_standard_error(bench):
     """Log lines into a full pipe must not keep the daemon from ending."""
     daemon = bench.spawn(stderr=subprocess.PIPE)
-    heave.wait_for(lambda: bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
+    harness.wait_for(lambda: bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
     with open(f"/proc/{daemon.pid}/fd/2", "wb", buffering=0, opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)) as pipe:
         while pipe.write(b"x" * 4096):
             pass  # None: it is full
@@ -851,7 +851,7 @@ def nobody_reads_standard_error(bench):
 class Client:
     def __init__(self, bench):
         self.link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self.link.settimeout(heave.WAIT_S)
+        self.link.settimeout(harness.WAIT_S)
         self.link.connect(str(bench.socket))
         self.file = self.link.makefile("r")
 
@@ -908,14 +908,14 @@ def idle_clients_keep_nobody_out(bench):
 def watchers_keep_nobody_out(bench, *options):
     daemon = bench.start()
     bench.wait_state("ENGAGED")
-    with subprocess.Popen([bench.bin / "heavectl", "--socket", bench.socket, *options, "--for", str(heave.WAIT_S), "watch"],
+    with subprocess.Popen([bench.bin / "heavectl", "--socket", bench.socket, *options, "--for", str(harness.WAIT_S), "watch"],
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as oldest:
         assert oldest.stdout.readline()
         clients = [Client(bench) for _ in range(7)]
         assert all(client.ask("watch 1\n")["ok"] for client in clients)  # so rarely that they need not be read soon
         answer, code = bench.ask("hold")
         assert code == 0 and answer == {"ok": True, "state": "HOLD"}, (answer, code)
-        out, said = oldest.communicate(timeout=heave.WAIT_S)
+        out, said = oldest.communicate(timeout=harness.WAIT_S)
         assert oldest.returncode == 1 and re.fullmatch(r"heavectl: too many clients: [^\n]*\n", said), (oldest.returncode, said)
         assert (json.loads(out.splitlines()[-1])["ok"] is False) if options else "too many" not in out, out
     assert all(json.loads(client.file.readline())["ok"] for client in clients), "the others go on"
@@ -930,7 +930,7 @@ def a_client_that_does_not_read(bench):
         client.link.sendall(b"watch 50\n")
         poll = select.poll()
         poll.register(client.link, select.POLLHUP | select.POLLRDHUP)
-        heave.wait_for(lambda: poll.poll(100), "the client is dropped")
+        harness.wait_for(lambda: poll.poll(100), "the client is dropped")
         assert bench.status()["ok"], "others are served"
     assert bench.stop(daemon) == 0
 
@@ -958,13 +958,13 @@ def busy_session(bench):
         sender.send("@A6T:0,5,0,0,0,0,400#")
         sender.stream(0.5, wave)
         bench.wait_state("ENGAGED")
-        heave.wait_for(lambda: (sender.send(wave(0)), bench.status()["frame_latency"]["count"] > 0)[1], "frames are measured")
+        harness.wait_for(lambda: (sender.send(wave(0)), bench.status()["frame_latency"]["count"] > 0)[1], "frames are measured")
         bench.ctl("park")
         status = bench.wait_state("SETTLED")
         watcher.file.readline()
-    heave.wait_for(metrics.exists, "metrics are written")
+    harness.wait_for(metrics.exists, "metrics are written")
     daemon.send_signal(signal.SIGHUP)
-    heave.wait_for(lambda: "has been read again" in daemon.log.read_text(), "the configuration is read again")
+    harness.wait_for(lambda: "has been read again" in daemon.log.read_text(), "the configuration is read again")
     assert bench.stop(daemon) == 0  # and says what the guard has found
     return status
 
@@ -973,13 +973,13 @@ def faults_no_pages_and_allocates_nothing(bench, guard):
     if guard is None:
         raise tap.Skip("instrumented build")
     assert Path(guard).samefile(bench.guard), f"heaved runs under {bench.guard}"
-    moved = heave.pages_moved()
+    moved = harness.pages_moved()
     status = busy_session(bench)
     latency = status["frame_latency"]
     assert 0 < latency["p50_us"] <= latency["p99_us"] <= latency["max_us"] and latency["count"] <= sum(status["counters"]["accepted"].values()), latency
     if not status["memory_locked"]:
         raise tap.Skip("memory cannot be locked here")
-    assert heave.Guard.cycles[True] > 1000 and (status["page_faults"] == 0 or heave.pages_moved() != moved), (heave.Guard.cycles, status["page_faults"])
+    assert harness.Guard.cycles[True] > 1000 and (status["page_faults"] == 0 or harness.pages_moved() != moved), (harness.Guard.cycles, status["page_faults"])
 
 
 def guard_ends_a_program(bench, guard):
@@ -1055,7 +1055,7 @@ def main():
     suite = tap.Suite()
     for name, check in cases.items():
         if arguments.only in name:
-            with heave.Bench(arguments.bin) as bench, suite.case(name):
+            with harness.Bench(arguments.bin) as bench, suite.case(name):
                 check(bench)
     return suite.done()
 

@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 
-import heave
+import harness
 import tap
 
 FRAMES = 20
@@ -48,10 +48,10 @@ def says_what_the_status_says(bench):
             sender.send(FRAME)
             time.sleep(0.02)
         sender.send("nonsense")
-    heave.wait_for(lambda: abs(bench.status()["rotation"]["sent_deg"] - 30) < 1e-6, "the pose is reached")
-    heave.wait_for(lambda: bench.status()["counters"]["rejected"]["no_head"] == 1, "the nonsense is counted")
-    before = heave.wait_for(lambda: read(path), "it is written")["heave_cycles_total"][()]
-    heave.wait_for(lambda: read(path)["heave_cycles_total"][()] > before + 1500, "the file is renewed")
+    harness.wait_for(lambda: abs(bench.status()["rotation"]["sent_deg"] - 30) < 1e-6, "the pose is reached")
+    harness.wait_for(lambda: bench.status()["counters"]["rejected"]["no_head"] == 1, "the nonsense is counted")
+    before = harness.wait_for(lambda: read(path), "it is written")["heave_cycles_total"][()]
+    harness.wait_for(lambda: read(path)["heave_cycles_total"][()] > before + 1500, "the file is renewed")
     got, status = read(path), bench.status()
     assert got["heave_state"][(("state", status["state"]),)] == 1 and sum(got["heave_state"].values()) == 1, got["heave_state"]
     assert got["heave_udp_frames_total"][(("result", "accepted"), ("what", "A7"))] == status["counters"]["accepted"]["A7"] == FRAMES
@@ -84,7 +84,7 @@ def is_never_seen_in_part(bench):
     watcher = threading.Thread(target=watch)
     watcher.start()
     try:
-        heave.wait_for(lambda: len(seen) > 2, "three different files")
+        harness.wait_for(lambda: len(seen) > 2, "three different files")
     finally:
         is_over.set()
         watcher.join()
@@ -100,7 +100,7 @@ def is_readable_by_anybody(bench):
         daemon = bench.start(config=with_metrics(bench, path))
     finally:
         os.umask(before)
-    heave.wait_for(path.exists, "it is written")
+    harness.wait_for(path.exists, "it is written")
     assert path.stat().st_mode & 0o777 == 0o644, oct(path.stat().st_mode)
     assert bench.stop(daemon) == 0
 
@@ -108,9 +108,9 @@ def is_readable_by_anybody(bench):
 def goes_on_without_its_directory(bench):
     path = bench.folder / "later" / "heave.prom"
     daemon = bench.start(config=with_metrics(bench, path))
-    heave.wait_for(lambda: f"metrics {path}: No such file or directory; tried again every second" in daemon.log.read_text(), "it is said")
+    harness.wait_for(lambda: f"metrics {path}: No such file or directory; tried again every second" in daemon.log.read_text(), "it is said")
     path.parent.mkdir()
-    heave.wait_for(path.exists, "it is written as soon as it can be")
+    harness.wait_for(path.exists, "it is written as soon as it can be")
     assert bench.stop(daemon) == 0 and daemon.log.read_text().count("metrics ") == 1, daemon.log.read_text()
 
 
@@ -130,7 +130,7 @@ CASES = {
 
 def main():
     if "HEAVE_TEST_VENV" not in os.environ:
-        found = subprocess.run([heave.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        found = subprocess.run([harness.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
         if found.returncode != 0:
             print(f"1..0 # SKIP {found.stderr.strip()}")
             return 0
@@ -138,7 +138,7 @@ def main():
         os.execv(found.stdout.strip(), [found.stdout.strip(), *sys.argv])
     suite = tap.Suite()
     for name, check in CASES.items():
-        with heave.Bench(sys.argv[1]) as bench, suite.case(name):
+        with harness.Bench(sys.argv[1]) as bench, suite.case(name):
             check(bench)
     return suite.done()
 

@@ -14,11 +14,11 @@ import threading
 import time
 from pathlib import Path
 
-import heave
+import harness
 import tap
 
-sys.path.insert(0, str(heave.TOP / "tests/peers"))
-PRESET = heave.TOP / "config/modbus-tcp-hexapod.ini"
+sys.path.insert(0, str(harness.TOP / "tests/peers"))
+PRESET = harness.TOP / "config/modbus-tcp-hexapod.ini"
 UNIT, HOLDING = 1, 3
 # registers of the preset, moved to where the servers have some
 STATUS, POSITION, ALARM, TARGET, CONTROL, WATCHDOG = 1, 2, 4, 10, 20, 30
@@ -105,7 +105,7 @@ class Platform(contextlib.ExitStack):
 
     def end(self):
         self.is_ending = True
-        self.thread.join(heave.WAIT_S)
+        self.thread.join(harness.WAIT_S)
 
     def __exit__(self, kind, error, where):
         from modbus_peer import judge_failure
@@ -113,7 +113,7 @@ class Platform(contextlib.ExitStack):
         judge_failure(error, self.lines)
 
 
-class ModbusBench(heave.Bench):
+class ModbusBench(harness.Bench):
     """The preset with the registers and addresses of these servers, and times for a busy machine."""
 
     def __init__(self, bin_dir, platform, **changes):
@@ -150,7 +150,7 @@ def check_registers(platform):
 
 
 def engage(bench):
-    heave.wait_for(lambda: all(leg["drive"] == "disabled" for leg in bench.status()["cylinders"]), "the drives are started up")
+    harness.wait_for(lambda: all(leg["drive"] == "disabled" for leg in bench.status()["cylinders"]), "the drives are started up")
     assert bench.ctl("engage").returncode == 0
     return bench.wait_state("ENGAGED", "FAULT")
 
@@ -166,7 +166,7 @@ def ride(bench, platform, seconds):
         return all(len(drive.targets) >= count for drive, count in zip(platform.drives, wanted))
 
     with bench.sender() as sender:
-        heave.wait_for(is_enough, f"{RIDE_SETPOINTS} set-points of each drive")
+        harness.wait_for(is_enough, f"{RIDE_SETPOINTS} set-points of each drive")
 
 
 def check_ride(bin_dir):
@@ -189,7 +189,7 @@ def check_ride(bin_dir):
 
 def settle(bench):
     daemon = bench.start()
-    heave.wait_for(lambda: all(leg["drive"] == "disabled" for leg in bench.status()["cylinders"]), "the drives are started up")
+    harness.wait_for(lambda: all(leg["drive"] == "disabled" for leg in bench.status()["cylinders"]), "the drives are started up")
     assert bench.ctl("park").returncode == 0
     status = bench.wait_state("SETTLED", "FAULT")
     assert status["state"] == "SETTLED", f"{status['fault']} {status['cylinders']}"
@@ -220,15 +220,15 @@ def check_silent(bin_dir):
         assert status["state"] == "ENGAGED", f"{status['fault']} {status['cylinders']}"
         ride(bench, platform, 0.5)
         platform.lines[2].delay_s = lambda number: 5.0  # a device that is far too late
-        heave.wait_for(lambda: bench.status()["state"] == "FAULT", "FAULT")
+        harness.wait_for(lambda: bench.status()["state"] == "FAULT", "FAULT")
         status = bench.status()
         assert status["fault"]["name"] == "drive-offline" and status["fault"]["axis"] == 3, status["fault"]
-        heave.wait_for(lambda: all(STOP in drive.commands for k, drive in enumerate(platform.drives) if k != 2), "every other drive is told to stop")
+        harness.wait_for(lambda: all(STOP in drive.commands for k, drive in enumerate(platform.drives) if k != 2), "every other drive is told to stop")
         for k, drive in enumerate(platform.drives):
             assert k == 2 or not drive.is_enabled
         assert status["cylinders"][2]["report"]["phase"] == "waiting for the line"
         platform.pass_on()
-        heave.wait_for(lambda: bench.status()["cylinders"][2]["drive"] == "disabled", "the drive is back, without torque")
+        harness.wait_for(lambda: bench.status()["cylinders"][2]["drive"] == "disabled", "the drive is back, without torque")
         assert bench.status()["state"] == "FAULT"  # nothing clears itself
         bench.reset()
         status = engage(bench)
@@ -242,7 +242,7 @@ def check_refusal(bin_dir):
         text = bench.config.read_text(encoding="utf-8").replace(f"0x{WATCHDOG:04X} = 100", f"0x{WATCHDOG:04X} is 77")
         bench.config.write_text(text, encoding="utf-8")
         daemon = bench.start()
-        leg = heave.wait_for(lambda: (lambda leg: leg if leg["report"]["phase"] == "refused" else None)(bench.status()["cylinders"][0]), "refused")
+        leg = harness.wait_for(lambda: (lambda leg: leg if leg["report"]["phase"] == "refused" else None)(bench.status()["cylinders"][0]), "refused")
         assert leg["drive"] == "offline" and leg["report"]["register"] == WATCHDOG and leg["report"]["unit"] == UNIT, leg
         assert f"unit {UNIT}: refused, register 0x{WATCHDOG:04X}; a register holds another value" in bench.ctl("status").stdout
         assert all(not drive.targets for drive in platform.drives)
@@ -270,7 +270,7 @@ def main():
 
 if __name__ == "__main__":
     if "HEAVE_TEST_VENV" not in os.environ:
-        found = subprocess.run([heave.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        found = subprocess.run([harness.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
         if found.returncode != 0:
             print(f"1..0 # SKIP {found.stderr.strip()}")
             sys.exit(0)

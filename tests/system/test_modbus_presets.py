@@ -17,10 +17,10 @@ import threading
 import time
 from pathlib import Path
 
-import heave
+import harness
 import tap
 
-sys.path.insert(0, str(heave.TOP / "tests/peers"))
+sys.path.insert(0, str(harness.TOP / "tests/peers"))
 HOLDING = 3
 START_MM = [60, 70, 80, 80, 70, 60]
 UNITS = range(1, 7)
@@ -204,11 +204,11 @@ class Line(contextlib.ExitStack):
         """The adapter is gone, and the drives have heard all that came through it: the line answers a question before it goes."""
         self.line.unplug()
         rounds = self.rounds
-        heave.wait_for(lambda: self.rounds > rounds + 1, "the drives have heard what was written")
+        harness.wait_for(lambda: self.rounds > rounds + 1, "the drives have heard what was written")
 
     def end(self):
         self.is_ending = True
-        self.thread.join(heave.WAIT_S)
+        self.thread.join(harness.WAIT_S)
 
     def __exit__(self, kind, error, where):
         from modbus_peer import judge_failure
@@ -216,12 +216,12 @@ class Line(contextlib.ExitStack):
         judge_failure(error, [self.line])
 
 
-class PresetBench(heave.Bench):
+class PresetBench(harness.Bench):
     """A preset with the address of this line, the confirmation that it asks for, and times for a busy machine."""
 
     def __init__(self, bin_dir, preset, line):
         super().__init__(bin_dir)
-        source = heave.TOP / f"config/modbus/{preset}.ini"
+        source = harness.TOP / f"config/modbus/{preset}.ini"
         run = self.heaved("--config", source, "--check")
         assert run.returncode == 78 and run.stderr.count("\n") == 1 and "drive_timeout_confirmed = yes" in run.stderr, run.stderr
         text = source.read_text(encoding="utf-8")
@@ -253,7 +253,7 @@ def check_registers(platform):
 
 
 def wait_ready(bench):
-    heave.wait_for(lambda: all(leg["drive"] == "disabled" for leg in bench.status()["cylinders"]), "the drives are started up")
+    harness.wait_for(lambda: all(leg["drive"] == "disabled" for leg in bench.status()["cylinders"]), "the drives are started up")
 
 
 def engage(bench):
@@ -278,7 +278,7 @@ def ride(bench, platform, seconds):
         return all(len(drive.targets) >= count for drive, count in zip(platform.drives, wanted))
 
     with bench.sender() as sender:
-        heave.wait_for(is_enough, f"{RIDE_SETPOINTS} set-points of each drive")
+        harness.wait_for(is_enough, f"{RIDE_SETPOINTS} set-points of each drive")
 
 
 def await_fault(bench, names, axis=None):
@@ -287,7 +287,7 @@ def await_fault(bench, names, axis=None):
 
 
 def all_stopped(platform, but=()):
-    heave.wait_for(lambda: all(drive.is_stopped for drive in platform.drives if drive.unit not in but), "every other drive is told to stop")
+    harness.wait_for(lambda: all(drive.is_stopped for drive in platform.drives if drive.unit not in but), "every other drive is told to stop")
 
 
 def come_back(bench):
@@ -306,7 +306,7 @@ def check_ride(bin_dir, preset, kind):
         assert all(leg["period_ms"] > 0 for leg in status["cylinders"])
         assert [leg["report"]["unit"] for leg in status["cylinders"]] == list(UNITS)
         assert bench.stop(daemon) == 0
-        heave.wait_for(lambda: not any(drive.has_torque for drive in platform.drives), "torque is off")
+        harness.wait_for(lambda: not any(drive.has_torque for drive in platform.drives), "torque is off")
         check_registers(platform)
 
 
@@ -370,7 +370,7 @@ def check_killed(bin_dir, preset, kind):
         ride(bench, platform, 0.5)
         bench.stop(daemon, signal.SIGKILL)
         platform.unplug()  # what the dead one had asked is not heard later
-        heave.wait_for(lambda: all(drive.position == drive.target for drive in platform.drives), "they come to rest at their last set-point")
+        harness.wait_for(lambda: all(drive.position == drive.target for drive in platform.drives), "they come to rest at their last set-point")
         before = [len(drive.targets) for drive in platform.drives]
         bench.socket.unlink(missing_ok=True)
         platform.line.plug()
@@ -385,9 +385,9 @@ def check_killed(bin_dir, preset, kind):
 
 def counted(check, *arguments):
     """Runs the check, in a process that ends without a word; the cycles of its heaved."""
-    before = dict(heave.Guard.cycles)
+    before = dict(harness.Guard.cycles)
     check(*arguments)
-    return [(is_judged, cycles - before[is_judged]) for is_judged, cycles in heave.Guard.cycles.items()]
+    return [(is_judged, cycles - before[is_judged]) for is_judged, cycles in harness.Guard.cycles.items()]
 
 
 def main():
@@ -409,13 +409,13 @@ def main():
         for name, future in running:
             with suite.case(name):
                 for is_judged, cycles in future.result():
-                    heave.Guard.cycles[is_judged] += cycles
+                    harness.Guard.cycles[is_judged] += cycles
     return suite.done()
 
 
 if __name__ == "__main__":
     if "HEAVE_TEST_VENV" not in os.environ:
-        found = subprocess.run([heave.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        found = subprocess.run([harness.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
         if found.returncode != 0:
             print(f"1..0 # SKIP {found.stderr.strip()}")
             sys.exit(0)

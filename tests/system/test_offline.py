@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-import heave
+import harness
 import tap
 
 TOP = Path(__file__).resolve().parents[2]
@@ -86,7 +86,7 @@ def check_no_presets(bench):
 def check_rows(trace):
     text = trace.decode()
     assert text.startswith(HEADER + "\n") and text.endswith("\n")
-    for index, row in enumerate(heave.rows_of(trace)):
+    for index, row in enumerate(harness.rows_of(trace)):
         assert row["t_ms"] == f"{index}.000", row
         assert re.fullmatch(r"[0-9A-F]{4}", row["relays"]), row
         for name in HEADER.split(",")[2:15]:
@@ -95,7 +95,7 @@ def check_rows(trace):
 
 def states_of(trace):
     states = []
-    for row in heave.rows_of(trace):
+    for row in harness.rows_of(trace):
         if not states or states[-1] != row["state"]:
             states.append(row["state"])
     return states
@@ -137,7 +137,7 @@ def run_cases(suite, bench):
     with suite.case("engage = auto: it rises and engages by itself, and starts settled"):
         trace = bench.play(frames)
         assert states_of(trace)[:4] == ["SETTLED", "RISING", "NEUTRAL", "ENGAGED"], states_of(trace)
-        assert heave.rows_of(trace)[0]["c1_mm"] == "5.000000000"
+        assert harness.rows_of(trace)[0]["c1_mm"] == "5.000000000"
     with suite.case("rejected frames are counted by reason, with their time and reason"):
         run = bench.heaved("--config", bench.config, "--play", bench.file("rejects.txt", "10 @A6:1#\n20.5 hello\n"))
         assert "2 rejected" in run.stderr and "at 10.000 ms: " in run.stderr, run.stderr
@@ -152,12 +152,12 @@ def sent_z(text, wanted_mm):
 
 
 def run_platforms(suite, bench):
-    for source in sorted((heave.TOP / "config").glob("*.ini")):
+    for source in sorted((harness.TOP / "config").glob("*.ini")):
         with suite.case(f"{source.name} rises, follows frames and fills the columns it has"):
             text = re.sub(r"(?m)^engage = manual", "engage = auto", source.read_text(encoding="utf-8"))
             # every platform has these axes, and is up by then; a sender that falls silent would be held
             lines = "".join(f"{20000 + 100 * i} @A3:2,-1.5,{sent_z(text, 5):.3f},0#\n" for i in range(50))
-            rows = heave.rows_of(bench.play(bench.file("a3.txt", lines), config=bench.file("ready.ini", text)))
+            rows = harness.rows_of(bench.play(bench.file("a3.txt", lines), config=bench.file("ready.ini", text)))
             axes = [float(rows[-1][name]) for name in ("roll_deg", "pitch_deg", "z_mm")]
             assert rows[-1]["state"] in ("ENGAGED", "HOLD") and all(abs(a - b) < 1e-6 for a, b in zip(axes, (2, -1.5, 5))), rows[-1]
             moved = [any(row[f"c{i}_mm"] != "0.000000000" for row in rows) for i in range(1, 7)]
@@ -171,7 +171,7 @@ def run_manual(suite, bench):
     with suite.case("engage = auto with auto_frames: it waits for a stream, and once only"):
         patient = bench.file("patient.ini", bench.config.read_text().replace("engage = auto", "auto_frames = 10\nengage = auto", 1))
         assert states_of(bench.play(bench.file("few.txt", "".join(f"{200 * i} @A6:1,0,0,0,0,0,0#\n" for i in range(50))), config=patient)) == ["SETTLED"]
-        rows = heave.rows_of(bench.play(bench.file("many.txt", "".join(f"{100 + 20 * i} @A6:1,0,0,0,0,0,0#\n" for i in range(300))), config=patient))
+        rows = harness.rows_of(bench.play(bench.file("many.txt", "".join(f"{100 + 20 * i} @A6:1,0,0,0,0,0,0#\n" for i in range(300))), config=patient))
         assert next(row["t_ms"] for row in rows if row["state"] == "RISING") == "281.000" and rows[-1]["state"] in ("ENGAGED", "HOLD")
     with suite.case("requests do what heavectl would"):
         text = "0.5 !engage\n4000 !hold\n5000 !resume\n6000 !park\n20000 !shutdown\n"
@@ -181,29 +181,29 @@ def run_manual(suite, bench):
         text = "1 !engage\n500 !estop on\n600 !reset\n4000 !estop off\n4100 !reset\n"
         trace = bench.play(bench.file("estop.txt", text), config=manual)
         assert states_of(trace) == ["SETTLED", "RISING", "ESTOP", "OFF"], states_of(trace)
-        rows = heave.rows_of(trace)
+        rows = harness.rows_of(trace)
         assert rows[499]["state"] == "RISING" and rows[500]["state"] == "ESTOP" and "estop" in rows[500]["flags"].split("|")
         assert rows[4099]["state"] == "ESTOP" and rows[4101]["state"] == "OFF"
     with suite.case("a request that is refused is named, with its line and the state"):
         run = bench.heaved("--config", manual, "--play", bench.file("refused.txt", "1 !resume\n2 !park\n3 !intensity 100\n"))
         assert "1 requests refused" in run.stderr and "line 1: resume is refused in SETTLED" in run.stderr, run.stderr
     with suite.case("!late is counted in the flags of its row alone"):
-        rows = heave.rows_of(bench.play(bench.file("late.txt", "5 !late 3\n"), config=manual))
+        rows = harness.rows_of(bench.play(bench.file("late.txt", "5 !late 3\n"), config=manual))
         assert [row["t_ms"] for row in rows if "late" in row["flags"].split("|")] == ["5.000"]
     with suite.case("!from says who sends: one at a time is followed, and bad addresses are refused"):
         lines = "".join(f"{4000 + 20 * i} !from 192.168.7.{5 + i % 2}\n{4000 + 20 * i} @A6:{10 - 20 * (i % 2)},0,0,0,0,0,0#\n" for i in range(100))
-        rows = heave.rows_of(bench.play(bench.file("two.txt", "1 !engage\n" + lines), config=manual))
+        rows = harness.rows_of(bench.play(bench.file("two.txt", "1 !engage\n" + lines), config=manual))
         assert min(float(row["roll_deg"]) for row in rows) >= 0 and rows[-1]["roll_deg"] == "10.000000000", rows[-1]
         run = bench.heaved("--config", manual, "--play", bench.file("from.txt", "1 !from somebody\n2 !from 1.2.3.4 x\n3 !from ::1\n"))
         assert [line.split(": ")[0][-1] for line in run.stderr.splitlines()] == ["1", "2"], run.stderr
     with suite.case("the run goes on until the motion rests"):
-        rows = heave.rows_of(bench.play(bench.file("one.txt", "1 !engage\n4000 @A6:10,0,0,0,0,0,0#\n"), config=manual))
+        rows = harness.rows_of(bench.play(bench.file("one.txt", "1 !engage\n4000 @A6:10,0,0,0,0,0,0#\n"), config=manual))
         assert rows[-1]["roll_deg"] == "10.000000000" and float(rows[-1]["t_ms"]) > 4200, rows[-1]
 
 
 def main():
     suite = tap.Suite()
-    with heave.Bench(sys.argv[1]) as bench:
+    with harness.Bench(sys.argv[1]) as bench:
         run_cases(suite, bench)
     return suite.done()
 

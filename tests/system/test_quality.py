@@ -8,10 +8,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-import heave
+import harness
 import tap
 
-sys.path.insert(0, str(heave.TOP / "tools/lib"))
+sys.path.insert(0, str(harness.TOP / "tools/lib"))
 import bench_analysis as analysis  # noqa: E402  the path above has to be set first
 import bench_motion  # noqa: E402
 import bench_signal as signals  # noqa: E402

@@ -14,12 +14,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-import heave
+import harness
 import kernel
 import tap
 
 HERE = Path(__file__).resolve().parent
-PEERS = heave.TOP / "tests/peers"
+PEERS = harness.TOP / "tests/peers"
 GUEST = HERE / "rt_guest.py"
 MODULES = ["can-dev", "can", "can-raw", "slcan"]
 QEMU = "qemu-system-x86_64"
@@ -91,14 +91,14 @@ def python_files():
 
 
 def search_path():
-    return f"{HERE}:{heave.TOP / 'tests/lib'}:{PEERS}"
+    return f"{HERE}:{harness.TOP / 'tests/lib'}:{PEERS}"
 
 
 def initramfs(bin_dir, kernel_dir, python):
     archive = Archive()
     programs = [python, f"{bin_dir}/heaved", f"{bin_dir}/heavectl"]
     guard = Path(bin_dir).resolve().parent / "tests/system/libmalloc_guard.so"  # where a Bench looks for it
-    for path in [*programs, guard, *python_files(), *heave.TOP.glob("config/*.ini")]:
+    for path in [*programs, guard, *python_files(), *harness.TOP.glob("config/*.ini")]:
         archive.file(path)
         if os.access(path, os.X_OK) or str(path).endswith(".so"):
             for library in libraries(path):

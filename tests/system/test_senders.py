@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 
-import heave
+import harness
 import kernel
 import tap
 
@@ -127,7 +127,7 @@ class Host:
 
     def close(self):
         self.process.stdin.close()
-        self.process.wait(timeout=heave.WAIT_S)
+        self.process.wait(timeout=harness.WAIT_S)
         self.process.stdout.close()
         subprocess.run(["ip", "link", "delete", self.port], stderr=subprocess.DEVNULL, check=False)
 
@@ -151,7 +151,7 @@ def ipv4(source, port, payload, to=HEAVED, pieces=1):
 
 # --- The platform among them ---
 
-class Net(heave.Bench):
+class Net(harness.Bench):
     def __init__(self, bin_dir):
         super().__init__(bin_dir, udp__bind="0.0.0.0", udp__silence_hold_ms=SILENCE_MS, engage__speed_mm_s=ENGAGE_MM_S, engage__accel_mm_s2=600)
         text = self.config.read_text(encoding="utf-8")  # a lone frame gets where it leads before the silence holds it
@@ -183,14 +183,14 @@ class Net(heave.Bench):
         self.set_udp(**changes)
         before = self.daemon.log.read_text().count("has been read again")
         self.daemon.send_signal(signal.SIGHUP)
-        heave.wait_for(lambda: self.daemon.log.read_text().count("has been read again") > before, "the configuration is read again")
+        harness.wait_for(lambda: self.daemon.log.read_text().count("has been read again") > before, "the configuration is read again")
 
     def driver(self):
         sender = self.status()["sender"]
         return sender and sender["address"].rsplit(":", 1)[0]
 
     def wait_driver(self, address):
-        heave.wait_for(lambda: self.driver() == address, f"{address} drives")
+        harness.wait_for(lambda: self.driver() == address, f"{address} drives")
 
     def count(self, *names):
         value = self.status()["counters"]
@@ -199,10 +199,10 @@ class Net(heave.Bench):
         return value
 
     def wait_more(self, than, *names):
-        heave.wait_for(lambda: self.count(*names) > than, f"more than {than} {'.'.join(names)}")
+        harness.wait_for(lambda: self.count(*names) > than, f"more than {than} {'.'.join(names)}")
 
     def wait_height(self, mm):
-        heave.wait_for(lambda: abs(self.status()["pose_sent"]["z_mm"] - mm) < 0.001, f"{mm} mm up")
+        harness.wait_for(lambda: abs(self.status()["pose_sent"]["z_mm"] - mm) < 0.001, f"{mm} mm up")
 
     def down(self):
         """Ends well, every limit kept in every cycle; the rows."""
@@ -210,7 +210,7 @@ class Net(heave.Bench):
         with self.trace.open("rb") as trace:
             run = subprocess.run([sys.argv[2], self.config], stdin=trace, stdout=subprocess.PIPE, check=False)
         assert run.returncode == 0, run.stdout.decode()
-        return heave.rows_of(self.trace.read_bytes())
+        return harness.rows_of(self.trace.read_bytes())
 
     def frames(self):
         """What was recorded: (ms, address) of every datagram."""
@@ -310,10 +310,10 @@ def spoofed(net):
     # a flood from outside: the kernel's filter drops it unread, and the driver is heard
     flood = {"to": HEAVED, "packets": [packet for i in range(250) for packet in ipv4(f"192.0.2.{i}", net.port, FAR)], "count": 10000}
     log = lambda: net.daemon.log.read_text()  # noqa: E731
-    heave.wait_for(lambda: stranger.raw(**flood) or "a flood of useless datagrams" in log(), "the flood is noticed")
+    harness.wait_for(lambda: stranger.raw(**flood) or "a flood of useless datagrams" in log(), "the flood is noticed")
     before = net.status()["counters"]
     stranger.raw(**flood)
-    heave.wait_for(lambda: net.count("lost_in_kernel") >= before["lost_in_kernel"] + 10000 or "is over" in log(), "the kernel drops it")
+    harness.wait_for(lambda: net.count("lost_in_kernel") >= before["lost_in_kernel"] + 10000 or "is over" in log(), "the kernel drops it")
     assert net.count("refused_senders") < before["refused_senders"] + 1000 or "is over" in log()
     accepted = net.count("accepted", "A6")
     net.wait_more(accepted + 20, "accepted", "A6")
@@ -369,7 +369,7 @@ def joined_groups(net):
         net.set_udp(bind=bind, group=f"{group}%br0", takeover_ms=PATIENCE_MS)
         net.up()
         assert f"UDP {bind} port {net.port}, group {group}%br0, control" in net.daemon.log.read_text()
-        heave.wait_for(lambda: first.send_to_group(group=group, port=net.port, texts=[FAR]), f"{FIRST} has an address to send from")
+        harness.wait_for(lambda: first.send_to_group(group=group, port=net.port, texts=[FAR]), f"{FIRST} has an address to send from")
         net.wait_height(40)
         first.send_to_group(group=other, port=net.port, texts=[FAR])
         first.send(to=HEAVED, port=net.port, texts=[FAR])  # comes after it
@@ -377,7 +377,7 @@ def joined_groups(net):
         assert net.count("datagrams") == 2, (bind, group)
         net.down()
     net.set_udp(bind="0.0.0.0", group="239.1.2.3%eth7")
-    failed = subprocess.run([net.bin / "heaved", "--config", net.config, "--socket", net.socket], capture_output=True, text=True, timeout=heave.WAIT_S, check=False)
+    failed = subprocess.run([net.bin / "heaved", "--config", net.config, "--socket", net.socket], capture_output=True, text=True, timeout=harness.WAIT_S, check=False)
     assert failed.returncode == 69 and "udp: group 239.1.2.3%eth7: this machine has no network interface \"eth7\": see `ip link`" in failed.stderr, failed
 
 
@@ -430,7 +430,7 @@ def reordered(bench):
         trace = bench.play(bench.file("frames.txt", "".join(f"{at} {text}\n" for at, text in frames)))
         run = subprocess.run([sys.argv[2], bench.config], input=trace, stdout=subprocess.PIPE, check=False)
         assert run.returncode == 0, run.stdout.decode()
-        return heave.rows_of(trace)
+        return harness.rows_of(trace)
 
     frames = [(15000 + 20 * i, wave(i * PERIOD_S)) for i in range(300)]
     straight = play(frames)
@@ -452,7 +452,7 @@ ON_PAPER = "reordered and duplicated frames: within the limits, and the end is t
 def why_not():
     """Why there are no name spaces here, or None."""
     try:
-        status, output = kernel.bounded([*kernel.own_name_space(), "sh", "-e", "-c", PROBE], heave.WAIT_S)
+        status, output = kernel.bounded([*kernel.own_name_space(), "sh", "-e", "-c", PROBE], harness.WAIT_S)
     except OSError as error:
         return str(error)
     return None if status == 0 else f"no network name spaces with veth and bridge here: {output.strip() or 'no answer'}"
@@ -495,7 +495,7 @@ def main():
         return case_inside(arguments)
     suite = tap.Suite()
     if arguments.only in ON_PAPER:
-        with heave.Bench(arguments.bin) as bench, suite.case(ON_PAPER):
+        with harness.Bench(arguments.bin) as bench, suite.case(ON_PAPER):
             reordered(bench)
     in_spaces(suite, [name for name in NAMES if arguments.only in name])
     return suite.done()

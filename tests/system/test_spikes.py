@@ -7,7 +7,7 @@ import random
 import signal
 import sys
 
-import heave
+import harness
 import tap
 
 T0 = 15000  # up and following by then
@@ -82,7 +82,7 @@ def the_last_frame_counts(bench):
     """A sender that stops with zeros, far from where it was."""
     lines = stream(50, 225)
     assert max(map(abs, lines[-1][1])) > 15
-    rows = heave.rows_of(play(bench, [*lines, (lines[-1][0] + 20, [0] * 6)]))
+    rows = harness.rows_of(play(bench, [*lines, (lines[-1][0] + 20, [0] * 6)]))
     bench.check_limits()
     assert all(float(rows[-1][name]) == 0 for name in ("roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm")), rows[-1]
 
@@ -102,7 +102,7 @@ def configured(bench, name, factor):
 def the_gate_is_configured(bench):
     """At 60 Hz, 10 times 2500 mm/s^2 are 7 mm in a sample, 2 times are 1.4 mm."""
     lines = [(T0 + i * 1000 / 60, [0, 0, 0, 0, 0, 3 if i == 100 else 0]) for i in range(200)]
-    heights = [max(float(row["z_mm"]) for row in heave.rows_of(play(bench, lines, config=config)))
+    heights = [max(float(row["z_mm"]) for row in harness.rows_of(play(bench, lines, config=config)))
                for config in (None, configured(bench, "two.ini", 2), configured(bench, "off.ini", 0))]
     assert heights[0] > 0.1 and heights[1] == 0 and heights[2] > 0.1, heights
     refused = bench.heaved("--config", configured(bench, "wrong.ini", 1001), "--check")
@@ -128,9 +128,9 @@ def spikes_live(bench):
             sender.stream(0.1, lambda t: frame([0, 0, 0, 0, 0, 0]), 0.02)
             return bench.status()["counters"]["spikes"]
 
-        heave.wait_for(count_after_a_spike, "a spike is counted")
+        harness.wait_for(count_after_a_spike, "a spike is counted")
     assert "spikes" in bench.ctl("status").stdout
-    heave.wait_for(lambda: "a spike: z 95.0" in daemon.log.read_text(), "a spike is logged")
+    harness.wait_for(lambda: "a spike: z 95.0" in daemon.log.read_text(), "a spike is logged")
 
 
 # --- Far jumps that wait for a second frame ---
@@ -158,7 +158,7 @@ def confirmed_jumps_are_followed(bench):
         assert play(bench, [first, second], timed, config) == play(bench, [second], timed, off), f"T {timed}"
     for twice_ms, is_followed in ((4, False), (5, True), (1000, True), (1001, False)):
         again = [(T0, [0, 0, 0, 0, 0, 60]), (T0 + twice_ms, [0, 0, 0, 0, 0, 60])]
-        highest = max(float(row["z_mm"]) for row in heave.rows_of(play(bench, again, config=config)))
+        highest = max(float(row["z_mm"]) for row in harness.rows_of(play(bench, again, config=config)))
         assert (highest > 1) == is_followed, f"the same frame {twice_ms} ms later: {highest} mm"
 
 
@@ -166,20 +166,20 @@ def jumps_live(bench):
     """Switched on in the ride; told, counted, and played back to the same bytes."""
     record, trace, off = bench.folder / "record.txt", bench.folder / "live.csv", bench.config.read_text()
     daemon = bench.start("--record", record, "--trace", trace, config=confirming(bench, 0, 0, "platform.ini"))
-    said = lambda words: heave.wait_for(lambda: words in daemon.log.read_text(), words)  # noqa: E731
+    said = lambda words: harness.wait_for(lambda: words in daemon.log.read_text(), words)  # noqa: E731
     bench.wait_state("ENGAGED")
     confirming(bench, name="platform.ini")
     daemon.send_signal(signal.SIGHUP)
     said("[udp] confirm_jump_mm: 20 from now on")
     with bench.sender() as sender:
         sender.send(frame([0, 0, 0, 0, 0, 60]))
-        heave.wait_for(lambda: bench.status()["counters"]["unconfirmed"] == 1, "the jump is dropped")
+        harness.wait_for(lambda: bench.status()["counters"]["unconfirmed"] == 1, "the jump is dropped")
         said("not followed, a far jump that no second one confirmed: z 60.0 after 0.0\n")
         assert bench.status()["pose_sent"]["z_mm"] == 0
         sender.stream(0.3, lambda t: frame([0, 0, 0, 0, 0, 60]))
-        heave.wait_for(lambda: bench.status()["pose_sent"]["z_mm"] > 59, "a confirmed one is followed")
+        harness.wait_for(lambda: bench.status()["pose_sent"]["z_mm"] > 59, "a confirmed one is followed")
     assert bench.stop(daemon) == 0 and "confirm" not in off
-    live, played = heave.since_zero(trace.read_bytes()), bench.play(record)
+    live, played = harness.since_zero(trace.read_bytes()), bench.play(record)
     assert played[:len(live)] == live, "the recording plays back otherwise"
 
 
@@ -201,7 +201,7 @@ CASES = {
 def main():
     suite = tap.Suite()
     for name, case in CASES.items():
-        with suite.case(name), heave.Bench(sys.argv[1], **PATIENT) as bench:
+        with suite.case(name), harness.Bench(sys.argv[1], **PATIENT) as bench:
             case(bench)
     return suite.done()
 

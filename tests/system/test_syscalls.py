@@ -27,7 +27,7 @@ import threading
 import time
 from pathlib import Path
 
-import heave
+import harness
 import tap
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools/lib"))
@@ -253,14 +253,14 @@ def judge_end(troubles, what, code, stderr, is_silent=False):
 
 def commands_of(bench):
     frames = bench.file("frames.txt", "0 !engage\n3000 @A6:0,0,0,0,0,5,0#\n3500 !park\n")
-    raw = heave.TOP / "config/can-raw-hexapod.ini"
+    raw = harness.TOP / "config/can-raw-hexapod.ini"
     head = [bench.bin / "heaved", "--config"]
     return [[*head, bench.config, "--check"], [*head, bench.config, "--dump-config"], [*head, raw, "--dump-dbc"],
             [*head, bench.config, "--envelope", bench.file("old.csv", "old")], [*head, bench.config, "--envelope", bench.folder / "new.csv"],
             [*head, bench.config, "--envelope", "/dev/null"],
             [*head, bench.config, "--play", frames, "--trace", bench.folder / "played.csv"],
             [*head, bench.config, "--play", frames, "--trace", "-"], [*head, bench.config, "--doctor"],
-            [*head, heave.TOP / "config/hexapod-cia402.ini", "--doctor"]]
+            [*head, harness.TOP / "config/hexapod-cia402.ini", "--doctor"]]
 
 
 def offline(bench, places, _judge):
@@ -297,7 +297,7 @@ def interrupt(troubles, page, sends, command):
     for place in sends:
         page.set(place, "EINTR", FOR_EVER)
         with subprocess.Popen(list(map(str, command)), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **page.options) as process:
-            heave.wait_for(lambda: page.failed() > TIMES, "the request is sent anew")
+            harness.wait_for(lambda: page.failed() > TIMES, "the request is sent anew")
             process.send_signal(signal.SIGINT)
             _, stderr = process.communicate(timeout=LIMIT_S)
         troubles.judge(process.returncode == 0 and not stderr, f"Ctrl-C in {name_of(place, 'EINTR')}: exit {process.returncode}: {stderr.strip()[-300:]}")
@@ -518,7 +518,7 @@ class Day:
 
 def pieces(trace, cycle_us):
     """Where the service thread could not write, rows are missing, and counted: what is between is whole."""
-    head, *rows = heave.since_zero(trace).splitlines(keepends=True)
+    head, *rows = harness.since_zero(trace).splitlines(keepends=True)
     piece, due = [], None
     for row in rows:
         t_us = round(float(row.split(b",", 1)[0]) * 1000)
@@ -652,7 +652,7 @@ def missing(places):
 
 def main():
     suite = tap.Suite()
-    with heave.Bench(sys.argv[1]) as bench:
+    with harness.Bench(sys.argv[1]) as bench:
         can_fail = wrapped(bench)
         places, others = places_of(bench.bin / "heaved", can_fail)
         if "__llvm_profile_runtime" in tool("nm", bench.bin / "heaved"):
@@ -663,7 +663,7 @@ def main():
     only = sys.argv[3] if len(sys.argv) > 3 else ""
     for name, check in CASES.items():
         if only in name or check is backends:
-            with heave.Bench(sys.argv[1]) as bench, suite.case(name):
+            with harness.Bench(sys.argv[1]) as bench, suite.case(name):
                 check(bench, places, sys.argv[2])
     if not only:
         with suite.case("every function that is called can be made to fail, or cannot fail"):
@@ -672,7 +672,7 @@ def main():
         with suite.case("every place has failed"):
             for check in CASES.values():  # what was missed on a busy machine
                 if missing(places):
-                    with heave.Bench(sys.argv[1]) as bench:
+                    with harness.Bench(sys.argv[1]) as bench:
                         check(bench, missing(places), sys.argv[2])
             assert not missing(places), "\n".join(f"{place.file}:{place.line}: {place.function}" for place in missing(places))
     print(f"# {len(STORY.tried)} places tried here, {len(STORY.played)} where the system is played")

@@ -6,7 +6,7 @@ import random
 import subprocess
 import sys
 
-import heave
+import harness
 import tap
 
 T0 = 15000  # up and following by then
@@ -22,8 +22,8 @@ def play(bench, lines):
     """Heights per ms from T0 on, with the take-over of a first pose long before; every limit kept."""
     lines = [(T0 - 3000, "@A6:0,0,0,0,0,0#"), *lines]
     frames = bench.file("frames.txt", "".join(f"{t:.3f} {text}\n" for t, text in lines))
-    rows = heave.rows_of(bench.play(frames))
-    check = subprocess.run([sys.executable, heave.TOP / "tools/check_trace", "--json", "--frames", frames, bench.config, bench.folder / "played.csv"],
+    rows = harness.rows_of(bench.play(frames))
+    check = subprocess.run([sys.executable, harness.TOP / "tools/check_trace", "--json", "--frames", frames, bench.config, bench.folder / "played.csv"],
                            stdout=subprocess.PIPE, text=True, check=False)
     assert check.returncode == 0 and json.loads(check.stdout)["violations"] == 0, check.stdout
     return [float(row["z_mm"]) for row in rows[T0:]]
@@ -82,7 +82,7 @@ CASES = {
 
 def main():
     suite = tap.Suite()
-    with heave.Bench(sys.argv[1], udp__silence_hold_ms=0) as bench:
+    with harness.Bench(sys.argv[1], udp__silence_hold_ms=0) as bench:
         for name, case in CASES.items():
             with suite.case(name):
                 case(bench)

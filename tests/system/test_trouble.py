@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 
-import heave
+import harness
 import tap
 
 CYCLE_US = 2000
@@ -26,7 +26,7 @@ def wave(t):
     return f"@A6:{6 * math.sin(2 * t):.3f},{5 * math.sin(1.7 * t):.3f},0,0,0,{20 * math.sin(1.3 * t):.3f},{int(10 * t) % 4096:X}#"
 
 
-class TroubleBench(heave.Bench):
+class TroubleBench(harness.Bench):
     def __init__(self, bin_dir, **changes):
         super().__init__(bin_dir, **{"platform__cycle_us": CYCLE_US, "platform__late_hold_cycles": LATE_HOLD_CYCLES, **changes})
         self.trace, self.record = self.folder / "live.csv", self.folder / "record.txt"
@@ -48,12 +48,12 @@ class TroubleBench(heave.Bench):
 
     def wait_state(self, *states):
         """Asks seldom: a question is a process."""
-        for _ in range(10 * heave.WAIT_S):
+        for _ in range(10 * harness.WAIT_S):
             status = self.status()
             if status["state"] in states:
                 return status
             time.sleep(0.1)
-        raise AssertionError(f"state {' or '.join(states)}: not within {heave.WAIT_S} s")
+        raise AssertionError(f"state {' or '.join(states)}: not within {harness.WAIT_S} s")
 
 
 def judge(bench):
@@ -62,11 +62,11 @@ def judge(bench):
     trace = trace[:trace.rindex(b"\n") + 1]
     run = subprocess.run([sys.argv[2], bench.config], input=trace, stdout=subprocess.PIPE, check=False)
     assert run.returncode == 0, run.stdout.decode()
-    return heave.rows_of(trace)
+    return harness.rows_of(trace)
 
 
 def replays(bench):
-    live = heave.since_zero(bench.trace.read_bytes())
+    live = harness.since_zero(bench.trace.read_bytes())
     played = bench.play(bench.record)
     assert played[:len(live)] == live, "the recording plays back otherwise"
 
@@ -141,7 +141,7 @@ def standard_error_is_full(bench, _):
     with open(f"/proc/{daemon.pid}/fd/2", "wb", buffering=0, opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)) as pipe:
         while pipe.write(b"x" * 4096):
             pass  # None: it is full
-    heave.wait_for(lambda: bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
+    harness.wait_for(lambda: bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
     bench.engaged()
     with bench.sender() as sender:
         for _ in range(10):

@@ -117,7 +117,7 @@ def lines_of(name, result):
 # --- Measuring ---
 
 def missing_kernel(reason):
-    return (f"{reason}. Either a kernel of one's own (tools/lib/uml.sh builds it once, some minutes; User Mode Linux, any x86_64 machine, no rights needed), "
+    return (f"{reason}. Either a kernel of one's own (tools/heave-lab build makes it once, some minutes; User Mode Linux, any x86_64 machine, no rights needed), "
             "or on real time vcan of this machine's kernel: modprobe vcan as root (Debian's package linux-image-amd64 has it), and run this as root or where users "
             "may make name spaces")
 

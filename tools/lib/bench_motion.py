@@ -10,9 +10,8 @@ from pathlib import Path
 import bench_analysis as analysis
 import bench_signal as signals
 from bench_rivals import NoRuckig, Ruckig, two_limits
-from platform_ini import Platform, read_ini
-from trace_check import COLUMNS, POSE_COLUMNS
-from trace_rules import NANO
+from heave.configuration import Configuration, read_ini
+from heave.trace import COLUMNS, NANO, POSE_COLUMNS
 
 CONFIG = Path(__file__).resolve().parents[2] / "tests" / "bench" / "z_axis.ini"
 START_US = 2_500_000  # heaved has risen to z = 0 by then
@@ -34,7 +33,7 @@ class MotionError(Exception):
 class Bench:
     def __init__(self, heaved, folder, with_ruckig, say):
         self.heaved, self.folder, self.say = heaved, Path(folder), say
-        axes = Platform(CONFIG).axes
+        axes = Configuration(CONFIG).axes
         self.cycle_us = int(read_ini(CONFIG)["platform"]["cycle_us"])
         self.axis_limits = [[float(limit) for limit in (axis.speed, axis.accel, axis.jerk)]
                             for axis in (axes[column.split("_")[0]] for column in POSE_COLUMNS)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""platform_ini.py - what a heaved configuration says about a platform: exact numbers, and its geometry in double precision.
+"""configuration.py - what a heaved configuration says about a platform: exact numbers, and its geometry in double precision.
 
 Written from the convention alone, so that it can contradict the core. Numbers with a fraction are taken as the nearest Q16.16, which is
 what a configuration can hold. A key that has no obvious default must stand in the file: `heaved --dump-config` prints one with every key.
@@ -8,11 +8,13 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
+from heave.errors import HeaveError
+
 POSE_AXES = ("roll", "pitch", "yaw", "x", "y", "z")
 UNIT = {"roll": "deg", "pitch": "deg", "yaw": "deg", "x": "mm", "y": "mm", "z": "mm", "angle": "deg"}
 
 
-class ConfigError(Exception):
+class ConfigError(HeaveError):
     """The file cannot be read, or does not say what a check needs."""
 
 
@@ -60,7 +62,7 @@ def q16(text):
     return Fraction(round(Fraction(text.strip()) * 65536), 65536)
 
 
-class Platform:
+class Configuration:
     def __init__(self, path):
         self.path = path
         self.ini = read_ini(path)
@@ -159,3 +161,26 @@ class Platform:
             return max(abs(pose[axis]) for axis in (2, 3, 4))
         joints = self.place(pose, self.hinge_arms)
         return max(abs(s * x - c * y) for (s, c), (x, y, _) in zip(self.hinge_planes, joints))
+
+
+def changed(text, changes, name="configuration"):
+    """The text of a configuration with other values: {"udp.port": 9801}. A key that is not there is added to its section, a section to the end."""
+    lines = text.splitlines()
+    for where, value in changes.items():
+        section, dot, key = where.partition(".")
+        if not (section and dot and key):
+            raise ConfigError(f"{name}: a change is named section.key, as in udp.port, not {where!r}")
+        if "\n" in str(value):
+            raise ConfigError(f"{name}: {where}: a value is one line")
+        heads = [i for i, line in enumerate(lines) if line.strip().startswith("[")]
+        begin = next((i for i in heads if lines[i].split(";")[0].strip() == f"[{section}]"), None)
+        if begin is None:
+            lines += ["", f"[{section}]", f"{key} = {value}"]
+            continue
+        end = next((i for i in heads if i > begin), len(lines))
+        at = next((i for i in range(begin + 1, end) if not lines[i].strip().startswith((";", "#")) and lines[i].partition("=")[0].strip() == key), None)
+        if at is None:
+            lines.insert(begin + 1, f"{key} = {value}")
+        else:
+            lines[at] = f"{key} = {value}"
+    return "\n".join(lines) + "\n"

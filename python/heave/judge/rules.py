@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""trace_rules.py - the rules a trace of set-points has to keep, and what each of them found. See tools/check_trace.
+"""rules.py - the rules a trace of set-points has to keep, and what each of them found. See command.py.
 
 Positions are integers of 1e-9 mm or deg, as printed; differences of them are integers too, so no limit check involves rounding of its own.
 """
 import math
 from dataclasses import dataclass
 
-NANO = 10**9
+from heave.trace import NANO
+
 ORDER_NAME = ("position", "speed", "accel", "jerk")
 ORDER_UNIT = ("", "/s", "/s^2", "/s^3")
 # A printed number is within half a unit of the ninth decimal of the true one (one unit if it was cut off), so that a k-th difference

@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""trace_check.py - walks through a trace row by row, in blocks, and applies the rules. See tools/check_trace.
+"""checker.py - walks through a trace row by row, in blocks, and applies the rules. See command.py.
 
 Which rules hold depends on the state: in OFF, HOMING and ESTOP, and in FAULT after the stop, the set-points follow the actual positions and
 are nobody's plan. Everything else is limited.
 """
-import re
 from collections import Counter
 from itertools import groupby
 
-from platform_ini import POSE_AXES, UNIT
-from trace_rules import NANO, ORDER_NAME, Block, ErrorRule, Findings, RangeRule, RateRule
+from heave.configuration import POSE_AXES
+from heave.judge.rules import ORDER_NAME, Block, ErrorRule, Findings, RangeRule, RateRule
+from heave.trace import ANGLE, BEFORE_ZERO, COLUMNS, FIRST_CYLINDER, FLAGS, HEADER, NANO, ROW, STATES
 
-STATES = {"OFF", "HOMING", "SETTLED", "RISING", "NEUTRAL", "ENGAGED", "HOLD", "SETTLING", "FAULT", "ESTOP"}
 FOLLOWING = {"OFF", "HOMING", "FAULT", "ESTOP"}      # the set-points follow the actual positions ...
 STOPS_FIRST = {"OFF", "FAULT"}                       # ... in these once what still moves has come to rest
 RESTING = {"SETTLED", "NEUTRAL"}
@@ -19,20 +18,10 @@ MOVING_GENTLY = {"RISING", "SETTLING"}
 NOT_BEFORE_ENGAGED = {"OFF", "HOMING", "SETTLED", "FAULT", "ESTOP"}
 LATCHED = {"FAULT": {"FAULT", "ESTOP", "OFF"}, "ESTOP": {"ESTOP", "FAULT", "OFF"}}
 
-FLAGS = {"clamped", "speed", "accel", "stretched", "takeover", "cylinders", "off-path", "no-pose", "late", "fault", "estop", "silent"}
 NO_POSE_BOUNDS = {"cylinders", "off-path", "takeover", "no-pose"}
 NO_POSE_LIMITS = NO_POSE_BOUNDS | {"clamped"}
 POSE_ANYWHERE = NO_POSE_BOUNDS - {"off-path"}  # the pose axes take over where such a row leaves them
 STRICTLY_NO_POSE = {"cylinders", "no-pose"}    # where a pose is followed, all rows count: taken over, pulled in, behind the reference
-
-POSE_COLUMNS = [f"{axis}_{UNIT[axis]}" for axis in POSE_AXES]
-ANGLE = len(POSE_AXES)
-FIRST_CYLINDER = ANGLE + 1
-CYLINDER_COLUMNS = 6
-COLUMNS = POSE_COLUMNS + ["angle_deg"] + [f"c{i + 1}_mm" for i in range(CYLINDER_COLUMNS)]
-BEFORE_ZERO = "before-zero\n"  # nothing is led yet: drives are off, or move by themselves
-HEADER = ",".join(["t_ms", "state", *COLUMNS, "relays", "flags"])
-ROW = re.compile(rf"(\d+)(?:\.(\d{{1,3}}))?,([A-Z]+),((?:-?\d+\.\d{{9}},){{{len(COLUMNS)}}})([0-9A-Fa-f]{{4}}),([a-z|-]*)\n")
 
 BLOCK_ROWS = 8192
 REST_ROWS = 20  # as many equal rows are taken for rest, not for the slow start of a move

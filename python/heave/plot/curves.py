@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""trace_plot.py - draws windows of traces with matplotlib. See tools/plot."""
+"""curves.py - draws windows of traces with matplotlib. See command.py."""
 import math
 
 import matplotlib
@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
 from matplotlib.ticker import EngFormatter, MaxNLocator  # noqa: E402
 
-from trace_read import UNITS, thinned  # noqa: E402
+from heave.plot.window import UNITS, thinned  # noqa: E402
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#444444")  # told apart by colour-blind people too
 STATE_COLOURS = {"OFF": "#C9C9C9", "HOMING": "#D9CDEB", "SETTLED": "#E2E2E2", "RISING": "#CFE4F5", "NEUTRAL": "#DCEFD8", "ENGAGED": "#FFFFFF",
@@ -73,7 +73,7 @@ def _panel(panel, scene, names, axes, order, unit):
     for name in names:
         values = window.rates(name, order)
         drawn_times, drawn = thinned(times, values, MOST_POINTS)
-        panel.plot(drawn_times, [math.nan if value is None else value for value in drawn], color=_colour(name, axes), linewidth=1.0, zorder=3)
+        panel.plot(drawn_times, [math.nan if value is None else value for value in drawn], color=colour_of(name, axes), linewidth=1.0, zorder=3)
     panel.margins(y=0.08)
     if extent and extent[0] < extent[1]:
         room = 0.08 * (extent[1] - extent[0])
@@ -88,7 +88,7 @@ def _panel(panel, scene, names, axes, order, unit):
     panel.tick_params(labelsize=8)
 
 
-def _colour(name, axes):
+def colour_of(name, axes):
     return COLOURS[axes.index(name) % len(COLOURS)]
 
 
@@ -106,13 +106,13 @@ def _dots(panel, scene, names, axes):
     for (name, marker, is_timed), points in kinds.items():
         is_dense = marker == "o" and len(points) > MANY_DOTS
         size = 16 if not is_dense else 5 if len(points) <= 5 * MANY_DOTS else 1
-        colour = _colour(name, axes)
+        colour = colour_of(name, axes)
         panel.scatter(*zip(*points), s=size, marker=marker, linewidths=0.5, edgecolors=colour, facecolors="white" if is_timed else colour,
                       zorder=2.5 if is_dense else 4, clip_on=marker not in "^v")
     panel.set_ylim(low, high)
 
 
-def _bounds(platform, name, order):
+def bounds_of(platform, name, order):
     """(low, high) of an axis or a cylinder, None where there is none."""
     if name.startswith("c"):
         index = int(name[1:]) - 1
@@ -131,14 +131,14 @@ def _bounds(platform, name, order):
 
 
 def _limits(panel, scene, names, axes, order, peak, unit):
-    bounds = {name: _bounds(scene.platform, name, order) for name in names}
+    bounds = {name: bounds_of(scene.platform, name, order) for name in names}
     bounds = {name: pair for name, pair in bounds.items() if pair}
     is_common = len(set(bounds.values())) == 1
     low, high = panel.get_ylim()
     room = (high - low) / 4 if order == 0 else peak * (FAR_LIMIT - 1)
     words, drawn = [], []
     for name, pair in bounds.items():
-        colour = LIMIT_COLOUR if is_common else _colour(name, axes)
+        colour = LIMIT_COLOUR if is_common else colour_of(name, axes)
         for value in set(pair):
             if low - room <= value <= high + room:
                 panel.axhline(value, color=colour, linewidth=1.0, linestyle=(0, (5, 3)), zorder=2)
@@ -195,7 +195,7 @@ def _same_scales(panels, columns):
 
 
 def _legend(figure, scenes, axes, wide):
-    handles = [Line2D([], [], color=_colour(name, axes), linewidth=2, label=name) for name in axes]
+    handles = [Line2D([], [], color=colour_of(name, axes), linewidth=2, label=name) for name in axes]
     if any(scene.platform for scene in scenes):
         handles.append(Line2D([], [], color=LIMIT_COLOUR, linewidth=1, linestyle=(0, (5, 3)), label="limit"))
     for is_timed, label, face in ((False, "frame", "#555555"), (True, "timed frame", "white")):

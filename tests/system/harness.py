@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""heave.py - what the system tests share: a platform in a temporary folder, the programs as child processes, a sender of frames.
+"""harness.py - what the system tests share: a platform in a temporary folder, the programs as child processes, a sender of frames.
 
 Every heaved that a Bench starts live runs under malloc_guard.c, where that was built (not with sanitizers, which have an allocator of their own): it is
 ended where it allocates after its start, and must have no page fault in its motion thread where memory is locked. stop() and the Bench's end say so.

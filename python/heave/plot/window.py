@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""trace_read.py - a window of a trace, column-wise, with differences computed from its nine-decimal integers. See tools/plot."""
+"""window.py - a window of a trace, column-wise, with differences computed from its nine-decimal integers. See command.py."""
 from itertools import groupby
 
-from platform_ini import POSE_AXES
-from trace_check import BEFORE_ZERO, COLUMNS, HEADER, ROW
-from trace_rules import NANO
+from heave.configuration import POSE_AXES
+from heave.errors import HeaveError
+from heave.trace import BEFORE_ZERO, COLUMNS, HEADER, NANO, ROW
 
 NAMES = [column.rsplit("_", 1)[0] for column in COLUMNS]  # roll ... z, angle, c1 ... c6
 UNITS = dict(zip(NAMES, (column.rsplit("_", 1)[1] for column in COLUMNS)))
@@ -13,7 +13,7 @@ GROUPS = {"pose": list(POSE_AXES), "cylinders": CYLINDERS, "all": NAMES}
 HIGHEST_ORDER = 3
 
 
-class TraceError(Exception):
+class TraceError(HeaveError):
     """The file is no trace, or holds nothing of what was asked for."""
 
 

@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# uml_init.sh - first process in the User Mode Linux kernel of kernel.py: mounts what programs expect, runs the job named on the kernel's
+# init.sh - first process in the User Mode Linux kernel of heave-lab: mounts what programs expect, runs the job named on the kernel's
 # command line, writes its exit status beside it, and switches off. The root file system is the host's, with the rights of who started it.
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin
 mount -t proc proc /proc
@@ -15,6 +15,11 @@ ln -s /proc/self/fd /dev/fd
 # A process that never waits can starve a receiver here: there is one CPU, and no preemption.
 echo 16777216 >/proc/sys/net/core/rmem_default
 job=$(sed -n 's/.*\bjob=\([^ ]*\).*/\1/p' /proc/cmdline)
+# The host sees what is written when it is written back.
+if grep -q '\bheave_live\b' /proc/cmdline; then
+    : >"$job/output"
+    while sleep 1; do sync "$job/output"; done &
+fi
 bash "$job/run.sh" >"$job/output" 2>&1 </dev/null
 echo $? >"$job/status"
 poweroff -f

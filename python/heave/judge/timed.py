@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""timed_check.py - do isolated timed moves arrive when they were asked to? A watcher of trace_check.Checker.
+"""timed.py - do isolated timed moves arrive when they were asked to? A watcher of checker.Checker.
 
 Only moves that leave no doubt are looked at: a single well-formed T frame, the platform ENGAGED and at rest, no other line near it. A move
 that the trace flags as stretched, clamped or taken over is not expected to be in time.
@@ -7,8 +7,8 @@ that the trace flags as stretched, clamped or taken over is not expected to be i
 import re
 from fractions import Fraction
 
-from platform_ini import POSE_AXES, UNIT
-from trace_rules import NANO
+from heave.configuration import POSE_AXES, UNIT
+from heave.trace import NANO
 
 FRAME = re.compile(r"@([AC])([3467])T:([-+0-9.,]+),(\d+)#[\r\n\0 ]*")
 EXCUSES = {"stretched", "takeover", "clamped"}

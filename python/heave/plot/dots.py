@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""frame_dots.py - where the frames of a FRAMES file ask the platform to be, for tools/plot. Only well-formed frames of the V3.0 form give a dot."""
+"""dots.py - where the frames of a FRAMES file ask the platform to be, for plots. Only well-formed frames of the V3.0 form give a dot."""
 import re
 from dataclasses import dataclass
 
-from platform_ini import POSE_AXES
+from heave.configuration import POSE_AXES
 
 FRAME = re.compile(r"@([AC])([3467])(T?):([^@#]*)#")
 ORDER = {"A3": ["roll", "pitch", "z"], "A4": ["roll", "pitch", "z", "angle"], "A6": list(POSE_AXES), "A7": [*POSE_AXES, "angle"],
@@ -18,7 +18,7 @@ class Dot:
 
 
 def dots_of(lines, platform=None):
-    """The dots of frames_file.Line's. With a platform, values are those of its axes, and poses give extensions too."""
+    """The dots of recording.Line's. With a platform, values are those of its axes, and poses give extensions too."""
     result = []
     for line in lines:
         for space, number, timed, text in [] if line.is_request else FRAME.findall(line.text):

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# uml.sh - prints the path of a User Mode Linux kernel with SocketCAN (vcan, slcan) and simulated GPIO for the system tests, after building
+# uml.sh - prints the path of a User Mode Linux kernel with SocketCAN (vcan, slcan) and simulated GPIO after building
 # it once into the user's cache. It is an ordinary program of 4 MB that boots in half a second, for any user, on machines whose own kernel
 # has no CAN; and it can run on virtual time, where sleeps are exact whatever else the machine does.
 # Debian's own user-mode-linux package panics on CPUs with AMX, hence from the sources: the package linux-source, fetched by apt without
@@ -13,7 +13,7 @@ here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/heave
 build_limit_s=3600
 
-say() { printf 'uml: %s\n' "$*" >&2; }
+say() { printf 'heave-lab: %s\n' "$*" >&2; }
 
 # The name says what the kernel is made from, so that a change of either makes another one.
 recipe_hash() { { cat "$here/uml.config" && declare -f configure; } | sha256sum | cut -c 1-12; }
@@ -80,7 +80,7 @@ lacking_tools() {
 main() {
     local lacking
     find_cached && return 0
-    [ "${1:-}" != --cached ] || { say "no kernel in $cache yet: tools/test builds one" && return 1; }
+    [ "${1:-}" != --cached ] || { say "no kernel in $cache yet: heave-lab build makes one, in some minutes" && return 1; }
     [ "$(uname -m)" = x86_64 ] || { say "User Mode Linux needs an x86_64 machine" && return 1; }
     lacking=$(lacking_tools)
     [ -z "$lacking" ] || { say "building the kernel takes these, which are not here:$lacking" && return 1; }
@@ -88,7 +88,7 @@ main() {
     exec 9>"$cache/.uml.lock" && flock 9 # a second run waits and finds the kernel
     find_cached && return 0
     work=$(mktemp -d "$cache/.uml.XXXXXX") && trap 'rm -rf "$work"' EXIT || return 1
-    say "building a kernel with CAN for the system tests into $cache, once: some minutes, 1 GB of disk while it lasts"
+    say "building a kernel with CAN into $cache, once: some minutes, 1 GB of disk while it lasts"
     if ! (build "$work") >"$work/log" 2>&1; then
         say "the kernel could not be built: $(grep -m 1 -E '^E:|error:|Error [0-9]' "$work/log" || tail -n 1 "$work/log")"
         return 1

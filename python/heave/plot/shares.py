@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: MIT
+"""shares.py - draws how much of each limit a run used, and the spectra of its accelerations, with matplotlib. See command.py."""
+import numpy
+from matplotlib.ticker import PercentFormatter
+
+from heave.configuration import POSE_AXES
+from heave.plot.curves import LIMIT_COLOUR, ORDER_LABEL, bounds_of, colour_of, plt
+from heave.plot.window import UNITS, TraceError
+
+SEGMENT = 4096    # rows of one spectrum; of all of them the mean is drawn
+LEAST_ROWS = 256
+NOT_LED = {"OFF", "HOMING", "FAULT", "ESTOP"}  # there set-points follow the actual positions: no limit holds
+
+
+def shares_of(window, platform):
+    """{name: [share of the limit on position, speed, acceleration, jerk]}; of the rows that are led, and of a position the distance from the middle of its range."""
+    led = [state not in NOT_LED for state in window.states]
+    names = [*platform.axes, *(f"c{i + 1}" for i in range(platform.cylinders))]
+    result = {}
+    for name in names:
+        # cylinder by cylinder, no limit of a pose axis holds
+        counts = [is_led and (name not in POSE_AXES or not {"cylinders", "no-pose", "off-path", "takeover"} & set(flags.split("|"))) for is_led, flags in zip(led, window.flags)]
+        result[name] = []
+        for order in range(len(ORDER_LABEL)):
+            low, high = bounds_of(platform, name, order)
+            middle, half = (low + high) / 2, (high - low) / 2
+            values = [value for value, is_counted in zip(window.rates(name, order), counts) if is_counted and value is not None]
+            result[name].append(max((abs(value - middle) for value in values), default=0.0) / half if half else 0.0)
+    return result
+
+
+def draw_limits(scene, path):
+    shares = shares_of(scene.window, scene.platform)
+    figure, panels = plt.subplots(1, len(ORDER_LABEL), sharey=True, constrained_layout=True, figsize=(12, 1.4 + 0.28 * len(shares)))
+    places = range(len(shares))
+    for order, panel in enumerate(panels):
+        values = [of_axis[order] for of_axis in shares.values()]
+        panel.barh(places, values, color=[LIMIT_COLOUR if value > 1 + 1e-6 else "#0072B2" for value in values])
+        for place, value in zip(places, values):
+            panel.text(value, place, f" {value:.0%}", va="center", fontsize=7.5)
+        panel.axvline(1, color=LIMIT_COLOUR, linewidth=1, linestyle=(0, (5, 3)))
+        panel.set_xlim(0, max(1.15, 1.15 * max(values)))
+        panel.xaxis.set_major_formatter(PercentFormatter(1.0))
+        panel.set_title(ORDER_LABEL[order] if order else "range, from its middle", fontsize=10)
+        panel.tick_params(labelsize=8)
+    panels[0].set_yticks(list(places), list(shares))
+    panels[0].invert_yaxis()
+    figure.suptitle(f"{scene.window.name}: share of each limit that was used", fontsize=10)
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
+
+
+def spectrum_of(window, name):
+    """(frequencies in Hz, amplitude density in unit/s^2 per sqrt Hz) of the acceleration, by the mean of Hann windows that overlap by half."""
+    values = window.rates(name, 2)
+    pieces, piece = [], []
+    for value, state in zip(values, window.states):
+        if value is None or state in NOT_LED:
+            pieces, piece = [*pieces, piece], []
+        else:
+            piece.append(value)
+    longest = numpy.array(max([*pieces, piece], key=len))
+    if len(longest) < LEAST_ROWS:
+        raise TraceError(f"{window.name}: {len(longest)} rows in a row that are led; a spectrum takes {LEAST_ROWS}")
+    rate, size = 1e6 / window.cycle_us, min(SEGMENT, len(longest))
+    shape = numpy.hanning(size)
+    starts = range(0, len(longest) - size + 1, max(1, size // 2))
+    power = numpy.mean([numpy.abs(numpy.fft.rfft(shape * longest[start:start + size])) ** 2 for start in starts], axis=0)
+    return numpy.fft.rfftfreq(size, 1 / rate), numpy.sqrt(2 * power / (rate * numpy.sum(shape**2)))
+
+
+def draw_spectrum(scenes, axes, path):
+    units = [unit for unit in ("deg", "mm") if any(UNITS[name] == unit for name in axes)]
+    figure, panels = plt.subplots(len(units), len(scenes), squeeze=False, sharex=True, sharey="row", constrained_layout=True, figsize=(7.5 * len(scenes), 3.2 * len(units)))
+    for column, scene in enumerate(scenes):
+        for row, unit in enumerate(units):
+            panel = panels[row][column]
+            for name in [name for name in axes if UNITS[name] == unit]:
+                frequencies, density = spectrum_of(scene.window, name)
+                panel.loglog(frequencies[1:], numpy.maximum(density[1:], 1e-9), color=colour_of(name, axes), linewidth=1, label=name)
+            panel.set_ylabel(f"acceleration [{unit}/s²/√Hz]", fontsize=9)
+            panel.grid(which="both", color="#000000", alpha=0.12, linewidth=0.6)
+            panel.legend(fontsize=8, loc="best")
+            panel.tick_params(labelsize=8)
+        panels[0][column].set_title(scene.window.name, fontsize=10)
+        panels[-1][column].set_xlabel("Hz")
+    figure.savefig(path, dpi=130)
+    plt.close(figure)
