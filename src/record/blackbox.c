@@ -10,6 +10,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "common/state_path.h"
 #include "record/blackbox_files.h"
 #include "record/blackbox_kept.h"
 
@@ -18,6 +19,7 @@
 #define FEED_STATE_BYTES (1u << 16)
 #define KEPT_MIN_BYTES   (1u << 20)
 #define KEPT_MAX_BYTES   (1u << 30)
+#define PAUSE_MS         10
 #define END_WAIT_MS      5000
 
 /* --- The motion thread --- */
@@ -208,32 +210,20 @@ static bool describe_platform(blackbox_t *self, const config_t *config)
     return fclose(out) == 0;
 }
 
-static const char *directory_of(const config_t *config)
-{
-    const char *given = getenv("STATE_DIRECTORY"); /* of systemd; the first one of a list */
-    if (strcmp(config->black_box.directory, "none") != 0) {
-        return config->black_box.directory;
-    }
-    return given != NULL ? given : "";
-}
-
 const char *blackbox_open(blackbox_t *self, const char *config_path, const config_t *config)
 {
-    const char *directory = directory_of(config);
-    const size_t length = strcspn(directory, ":");
     self->file.fd = -1;
     self->config_path = config_path;
     self->settings = &config->settings;
     memcpy(self->config_hash, config->hash, sizeof self->config_hash);
     self->folders_max = config->black_box.incidents;
     (void)pthread_mutex_init(&self->mutex, NULL);
-    if (length == 0) {
-        return NULL;
-    }
-    if (length >= sizeof self->directory) {
+    if (!state_path(self->directory, sizeof self->directory, config->black_box.directory, "")) {
         return "black box: the directory's path is too long";
     }
-    memcpy(self->directory, directory, length);
+    if (self->directory[0] == '\0') {
+        return NULL;
+    }
     if (!get_memory(self, config) || !describe_platform(self, config)) {
         free(self->memory);
         free(self->platform);
@@ -261,7 +251,7 @@ bool blackbox_start(blackbox_t *self)
     if (self->memory == NULL) {
         return true;
     }
-    self->has_no_thread = !worker_start(&self->worker, step, self);
+    self->has_no_thread = !worker_start(&self->worker, step, self, PAUSE_MS);
     return !self->has_no_thread;
 }
 
