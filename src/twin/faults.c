@@ -151,7 +151,9 @@ ACT(act_late)
 
 ACT(act_preop)
 {
-    UNUSED();
+    if (fault->number[0] > 0) {
+        act_emcy(twin, k, fault, now_us);
+    }
     node_enter(node_of(twin, k), 0x7F);
 }
 
@@ -272,7 +274,7 @@ static const row_t k_rows[] = {
     {"drop", "d", "DRIVE", "loses its torque by itself", {0}, 0, act_drop, BUS_OFF},
     {"lose", "dn", "DRIVE COUNT", "so many of its answers (TPDOs) are lost", {0}, 1e6, act_lose, BUS_OFF},
     {"late", "dn", "DRIVE MS", "its answers come so late", {0}, 1e4, act_late, BUS_OFF},
-    {"pre-operational", "d", "DRIVE", "leaves operational", {0}, 0, act_preop, BUS_OFF},
+    {"pre-operational", "dN", "DRIVE [CODE]", "leaves operational, with this EMCY", {0}, INDEX_MAX, act_preop, BUS_OFF},
     {"stopped", "d", "DRIVE", "goes into the NMT state stopped", {0}, 0, act_stopped, BUS_OFF},
     {"mode", "dn", "DRIVE NUMBER", "leaves its mode of operation for this one", {0}, 127, act_mode, BUS_OFF},
     {"status", "dnN", "DRIVE SET [CLEAR]", "bits of the statusword that it shows whatever it does", {0}, INDEX_MAX, act_status, BUS_OFF},

@@ -15,6 +15,7 @@
 #include "twin/wire.h"
 
 #define FDS_MAX  (WIRE_FDS_MAX + CONTROL_FDS_MAX)
+#define NICE     (-15)
 #define AWAKE_US 1000000u /* it looks around so often, whatever happens */
 
 /** A run of the program. */
@@ -179,6 +180,7 @@ static sigset_t catch_signals(void)
 static int run_twin(run_t *self)
 {
     const sigset_t open = catch_signals();
+    (void)setpriority(PRIO_PROCESS, 0, NICE); /* where we may: drives have a processor to themselves */
     int code = open_all(self);
     if (code == EXIT_DONE) {
         self->start_us = self->now_us = clock_us();

@@ -163,9 +163,21 @@ static void boot(node_t *self, uint32_t delay_us)
     memset(self->rate_count, 0, sizeof self->rate_count);
 }
 
+/* What is wrong with single objects stays wrong when the drive starts again. */
+static void keep_defects(objects_t *self, const objects_t *before)
+{
+    for (uint32_t i = 0; i < before->count; i++) {
+        self->row[i].is_missing = before->row[i].is_missing;
+        self->row[i].is_silent = before->row[i].is_silent;
+        self->row[i].refusal = before->row[i].refusal;
+    }
+}
+
 static void start(node_t *self)
 {
+    const objects_t before = self->drive.od;
     objects_start(&self->drive.od, self->number, self->identity);
+    keep_defects(&self->drive.od, &before);
     drive_start(&self->drive, self->now_us);
     boot(self, self->boot_us);
 }
