@@ -16,9 +16,9 @@
 
 #define SYNCHRONOUS_MAX 240u
 #define BAD_COMMAND     0x05040001u
-#define RESET_SHARE     4u    /* a reset of the communication takes so much less than a boot */
-#define EVENT_US        10000 /* PDOs that tell of changes leave a gap */
-#define LOOK_US         1000  /* an axis with power is looked at so often */
+#define RESET_SHARE     4u   /* a reset of the communication takes so much less than a boot */
+#define EVENT_US        1000 /* PDOs that tell of changes leave a gap */
+#define LOOK_US         1000 /* an axis with power is looked at so often */
 
 /* --- Out --- */
 
@@ -120,19 +120,33 @@ static void put_synchronous(node_t *self)
     }
 }
 
+static bool is_event_pdo(const node_t *self, uint16_t n)
+{
+    return objects_is_pdo(&self->drive.od, (uint16_t)(0x1800 + n)) &&
+           objects_get(&self->drive.od, (uint16_t)(0x1800 + n), 2) >= 254;
+}
+
+/* When a TPDO is sent whether its values have changed or not. */
+static uint64_t event_due_us(const node_t *self, uint16_t n)
+{
+    const uint32_t timer_ms = objects_get(&self->drive.od, (uint16_t)(0x1800 + n), 5);
+    if (self->nmt != OPERATIONAL || !is_event_pdo(self, n)) {
+        return DRIVE_NEVER;
+    }
+    return self->event_us[n] == 0 ? self->now_us : timer_ms == 0 ? DRIVE_NEVER : self->event_us[n] + timer_ms * 1000u;
+}
+
 static void put_events(node_t *self)
 {
     for (uint16_t n = 0; n < OBJECT_PDOS && self->nmt == OPERATIONAL; n++) {
         uint8_t data[8] = {0};
-        const bool is_event = objects_is_pdo(&self->drive.od, (uint16_t)(0x1800 + n)) &&
-                              objects_get(&self->drive.od, (uint16_t)(0x1800 + n), 2) >= 254;
-        if (!is_event || self->now_us < self->event_us[n]) {
+        if (!is_event_pdo(self, n) || self->now_us < self->event_us[n] + EVENT_US) {
             continue;
         }
         (void)pack(self, (uint16_t)(0x1A00 + n), data);
-        if (self->event_us[n] == 0 || memcmp(data, self->event_data[n], 8) != 0) {
+        if (self->now_us >= event_due_us(self, n) || memcmp(data, self->event_data[n], 8) != 0) {
             memcpy(self->event_data[n], data, 8);
-            self->event_us[n] = self->now_us + EVENT_US;
+            self->event_us[n] = self->now_us;
             put_tpdo(self, n);
         }
     }
@@ -447,6 +461,8 @@ void node_hear(node_t *self, const can_frame_t *frame, uint64_t now_us)
     } else if (self->nmt == OPERATIONAL) {
         hear_pdo(self, frame);
     }
+    drive_advance(&self->drive, now_us);
+    put_events(self);
     tell_emergency(self);
 }
 
@@ -493,6 +509,9 @@ uint64_t node_due_us(const node_t *self)
     due_us = least(due_us, least(self->master_due_us, self->sync_due_us));
     for (uint32_t i = 0; i < self->waits; i++) {
         due_us = least(due_us, self->waiting[i].due_us);
+    }
+    for (uint16_t n = 0; n < OBJECT_PDOS; n++) {
+        due_us = least(due_us, event_due_us(self, n));
     }
     const bool is_busy = self->drive.motor.has_torque || self->drive.motor.slip > 0;
     return is_busy && self->nmt != 0 ? least(due_us, self->now_us + LOOK_US) : due_us;

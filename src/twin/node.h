@@ -45,7 +45,7 @@ typedef struct {
     uint8_t received[OBJECT_PDOS][8];
     uint8_t rate_count[OBJECT_PDOS];
     uint8_t event_data[OBJECT_PDOS][8];
-    uint64_t event_us[OBJECT_PDOS];
+    uint64_t event_us[OBJECT_PDOS]; /**< when TPDO N told of a change last; 0 = never */
     uint32_t waits;
     node_waiting_t waiting[NODE_WAITING_MAX];
 } node_t;

@@ -100,6 +100,10 @@ def canopens_profile_homes_and_drives_it(bench):
         node = BaseNode402(2, dictionary())
         network.add_node(node)
         time.sleep(0.5)
+        for number in (1, 2):
+            node.tpdo[number].read()
+            node.tpdo[number].event_timer = 10
+            node.tpdo[number].save()
         node.setup_402_state_machine()
         node.sdo[0x6099][1].raw = 20 * COUNTS_PER_MM
         node.sdo[0x6098].raw = 17
