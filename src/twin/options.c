@@ -45,7 +45,7 @@ static const usage_row_t k_options[] = {
     {"config", "FILE", "the platform (INI), as heaved has it", OPTION_CONFIG},
     {"check", NULL, "run nothing", OPTION_CHECK},
     {"fault", "LINE", "one line of a script; may be given 32 times", OPTION_FAULT},
-    {"script", "FILE", "lines `SECONDS FAULT`, since the start; `+SECONDS FAULT`, since all drives had torque", OPTION_SCRIPT},
+    {"script", "FILE", "faults with times; see docs/twin.md", OPTION_SCRIPT},
     {"socket", "PATH", "where a running one can be asked", OPTION_SOCKET},
     {"swap", "A,B", "drives A and B are on each other's leg; may be given several times", OPTION_SWAP},
     {"reverse", "A,B,...", "these drives run backwards", OPTION_REVERSE},
@@ -78,6 +78,9 @@ static const usage_section_t k_manual[] = {
      "machine with real drives: never start it on their bus.\n\n"
      "It takes configurations with CANopen drives (`[drives] driver = cia402`). `[can] interface` is a SocketCAN interface, such "
      "as vcan0; a name that begins with twin is a bus between programs, for kernels without CAN.\n"},
+    {"SCRIPTS",
+     "A line is `SECONDS FAULT`: a time since heave-twin started. `+SECONDS FAULT` counts since all drives had torque. What "
+     "stands behind a # is a comment. Each line that is wrong is named, and then nothing starts.\n"},
     {"EXAMPLES", "A whole platform without hardware:\n"
                  " ip link add vcan0 type vcan && ip link set vcan0 up\n"
                  " heave-twin --config platform.ini --socket /tmp/twin.sock\n"
