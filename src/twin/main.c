@@ -4,7 +4,6 @@
 #include <poll.h>
 #include <signal.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <sys/resource.h>
 #include <time.h>
 
@@ -38,12 +37,6 @@ static void on_signal(int signal_number)
 {
     (void)signal_number;
     is_ended = 1;
-}
-
-void hv_assert_failed(const char *file, int line)
-{
-    fprintf(stderr, "heave-twin: assertion failed at %s:%d\n", file, line);
-    abort();
 }
 
 static uint64_t clock_us(void)

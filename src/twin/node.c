@@ -84,8 +84,8 @@ static uint8_t pack(const node_t *self, uint16_t mapping, uint8_t data[8])
 {
     const objects_t *od = &self->drive.od;
     uint8_t length = 0;
-    for (uint8_t k = 1; k <= objects_get(od, mapping, 0); k++) {
-        const uint32_t entry = objects_get(od, mapping, k);
+    for (uint32_t k = 1; k <= objects_get(od, mapping, 0); k++) {
+        const uint32_t entry = objects_get(od, mapping, (uint8_t)k);
         const uint32_t value = objects_get(od, (uint16_t)(entry >> 16), (uint8_t)(entry >> 8 & 0xFF));
         for (unsigned i = 0; i < (entry & 0xFF) / 8 && length < 8; i++) {
             data[length++] = (uint8_t)(value >> (8 * i));
@@ -298,8 +298,8 @@ static void apply(node_t *self, uint16_t n, const uint8_t *data)
     objects_t *od = &self->drive.od;
     unsigned at = 0;
     uint32_t control = UINT32_MAX;
-    for (uint8_t k = 1; k <= objects_get(od, (uint16_t)(0x1600 + n), 0); k++) {
-        const uint32_t entry = objects_get(od, (uint16_t)(0x1600 + n), k);
+    for (uint32_t k = 1; k <= objects_get(od, (uint16_t)(0x1600 + n), 0); k++) {
+        const uint32_t entry = objects_get(od, (uint16_t)(0x1600 + n), (uint8_t)k);
         const uint16_t index = (uint16_t)(entry >> 16);
         uint32_t value = 0;
         for (unsigned i = 0; i < (entry & 0xFF) / 8; i++) {

@@ -124,8 +124,8 @@ bool objects_is_pdo(const objects_t *self, uint16_t record)
 uint8_t objects_mapped_bytes(const objects_t *self, uint16_t mapping)
 {
     uint32_t bits = 0;
-    for (uint8_t k = 1; k <= objects_get(self, mapping, 0); k++) {
-        bits += objects_get(self, mapping, k) & 0xFF;
+    for (uint32_t k = 1; k <= objects_get(self, mapping, 0); k++) {
+        bits += objects_get(self, mapping, (uint8_t)k) & 0xFF;
     }
     return (uint8_t)(bits / 8);
 }
@@ -161,8 +161,8 @@ static bool is_elsewhere(const objects_t *self, uint16_t mapping, uint32_t entry
         if (other == mapping || !objects_is_pdo(self, (uint16_t)(0x1400 + n))) {
             continue;
         }
-        for (uint8_t k = 1; k <= objects_get(self, other, 0); k++) {
-            if (objects_get(self, other, k) == entry) {
+        for (uint32_t k = 1; k <= objects_get(self, other, 0); k++) {
+            if (objects_get(self, other, (uint8_t)k) == entry) {
                 return true;
             }
         }
@@ -177,8 +177,8 @@ static uint32_t count_refusal(const objects_t *self, uint16_t mapping, uint32_t 
     if (count > 8) {
         return OBJECT_PDO_LENGTH;
     }
-    for (uint8_t k = 1; k <= count; k++) {
-        const uint32_t entry = objects_get(self, mapping, k);
+    for (uint32_t k = 1; k <= count; k++) {
+        const uint32_t entry = objects_get(self, mapping, (uint8_t)k);
         bits += entry & 0xFF;
         if (!is_mappable(self, is_received, entry)) {
             return OBJECT_NOT_MAPPABLE;

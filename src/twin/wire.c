@@ -25,8 +25,6 @@
 #define WORDS_MAX     16u
 #define COMMAND_MAX   160u
 
-extern char **environ;
-
 static const char k_without[] = "this kernel has no SocketCAN. Load it (as root: modprobe can_raw vcan), or use a bus between "
                                 "programs: [can] interface = twin0";
 
