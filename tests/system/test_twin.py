@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_twin.py BIN - heave-twin on a bus between programs, as on a kernel without CAN: drives, mechanism, faults, and what it says to bad input."""
+"""test_twin.py BIN [PART OF A NAME] - heave-twin on a bus between programs, as on a kernel without CAN: drives, mechanism, faults, and what it says to bad input."""
 import contextlib
 import os
+import re
 import socket
 import struct
 import sys
@@ -155,7 +156,9 @@ def cpu_us(pid):
 
 
 def costs_little(bench):
-    """Seven drives at 2 ms: below a quarter of a core."""
+    """Of real time: on virtual time computing takes none."""
+    if heave.HAS_OWN_KERNEL:
+        raise tap.Skip("takes real time")
     up(bench)
     begin, begin_us = time.monotonic(), cpu_us(bench.twin.pid)
     time.sleep(5)
@@ -173,14 +176,14 @@ CASES = [
     ("heave-twin: bad input is named", bad_input, {}),
     ("heave-twin: without SocketCAN, or without the interface, it says what to do", says_what_is_missing, {}),
     ("heave-twin: hostile clients stop nothing", hostile_clients_stop_nothing, {}),
-    ("heave-twin: seven drives at 2 ms cost less than a quarter of a core", costs_little, {"period_us": 2000}),
+    ("heave-twin: costs little, seven drives at 2 ms less than a quarter of a core", costs_little, {"period_us": 2000}),
 ]
 
 
 def main():
     suite = tap.Suite()
     for name, case, options in CASES:
-        if len(sys.argv) > 2 and sys.argv[2] not in name:
+        if len(sys.argv) > 2 and not re.search(sys.argv[2], name):
             continue
         with suite.case(name), TwinBench(sys.argv[1], **options) as bench:
             case(bench)
