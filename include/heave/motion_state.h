@@ -10,7 +10,7 @@
 #include "heave/motion.h"
 #include "heave/profile.h"
 
-/** What moves the platform at the moment. */
+/** Present source of the motion. */
 typedef enum {
     MOTION_RESTING,  /**< nothing: it stays where it is */
     MOTION_STOPPING, /**< a controlled stop in cylinder space */
@@ -21,13 +21,13 @@ typedef enum {
     MOTION_STRAIGHT  /**< following: a timed move or a step from rest along an S-curve */
 } motion_source_t;
 
-/** What the targets of a cycle ask to be planned; the newest one counts. */
+/** What has to be planned for the targets of a cycle; the newest one counts. */
 typedef enum { DUE_NOTHING, DUE_STEP, DUE_STREAM, DUE_TIMED } motion_due_t;
 
 /** What comes after a stop. */
 typedef enum { MOTION_THEN_REST, MOTION_THEN_PATH, MOTION_THEN_FOLLOW } motion_next_t;
 
-/** A straight way along an S-curve. */
+/** A straight move along an S-curve. */
 typedef struct {
     scurve_t path;
     q32_t from_q32[AXES_MAX];
@@ -35,7 +35,7 @@ typedef struct {
     history_t history[AXES_MAX];
 } motion_straight_t;
 
-/** What leads: one of these at a time. */
+/** The active plan: one of these at a time. */
 typedef union {
     quintic_t quintic;          /**< MOTION_TIMED */
     motion_straight_t straight; /**< MOTION_RESTING, MOTION_ON_PATH, MOTION_STRAIGHT; begun before a stop ends */
@@ -55,7 +55,7 @@ struct motion {
     bool is_axis_moved[AXES_MAX];       /**< the others stay at 0 */
     ramp_t axis[AXES_MAX];              /**< pose axes and the rotation motor */
     ramp_t cylinder[CYLINDERS_MAX];     /**< the limiter */
-    history_t reference[CYLINDERS_MAX]; /**< what the limiter was last asked for */
+    history_t reference[CYLINDERS_MAX]; /**< last reference of the limiter */
     pose_t pose;                        /**< last pose sent; where forward kinematics starts */
     bool is_pose_stale;                 /**< the extensions were placed: the pose has to be found even at rest */
 

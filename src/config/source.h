@@ -10,9 +10,10 @@
 
 /** What the file said for one key. */
 typedef struct {
-    unsigned line;  /**< 0: not in the file */
-    unsigned count; /**< values given */
-    bool is_valid;  /**< the file's value was accepted, or the default stands */
+    unsigned line;   /**< 0: not in the file */
+    unsigned count;  /**< values given */
+    bool is_derived; /**< follows from other keys, so that nobody misses it */
+    bool is_valid;   /**< the file's value was accepted, or the default stands */
 } config_entry_t;
 
 /** A file being loaded. */
