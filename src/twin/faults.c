@@ -252,6 +252,12 @@ ACT(act_friction)
     node_of(twin, k)->drive.motor.friction = fault->number[0] * fabs(twin->per_unit[k]);
 }
 
+ACT(act_encoder)
+{
+    UNUSED();
+    node_of(twin, k)->drive.origin -= fault->number[0] * twin->per_unit[k];
+}
+
 ACT(act_lag)
 {
     UNUSED();
@@ -290,6 +296,7 @@ static const row_t k_rows[] = {
     {"slip", "dn", "DRIVE MM_S", "the brake does not hold: sinks so fast without torque", {0}, 1e4, act_slip, BUS_OFF},
     {"load", "dn", "DRIVE MM", "gives way so far under its load", {0}, 1e4, act_load, BUS_OFF},
     {"friction", "dn", "DRIVE MM", "breaks loose so far behind its demand", {0}, 1e4, act_friction, BUS_OFF},
+    {"encoder", "dn", "DRIVE MM", "its encoder tells so much more from now on", {0}, 1e4, act_encoder, BUS_OFF},
     {"lag", "dn", "DRIVE MS", "follows with this time constant", {0}, 1e5, act_lag, BUS_OFF},
     {"mend", "d", "DRIVE", "all of the above that lasts is over", {0}, 0, act_mend, BUS_OFF},
     {"bus-off", "", "", "heaved's controller goes bus-off", {0}, 0, NULL, BUS_OFF},

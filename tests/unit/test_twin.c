@@ -8,7 +8,9 @@
 #include <unistd.h>
 
 #include "heave/status.h"
+#include "linux_can_local.h"
 #include "twin/options.h"
+#include "twin/wire.h"
 #include "unity.h"
 
 #define HEARD_MAX 4096u
@@ -550,6 +552,110 @@ static void test_script_wrong_lines_are_named_with_their_number(void)
     unlink(path);
 }
 
+/* --- The bus between programs --- */
+
+static wire_t m_wire;
+static unsigned m_wire_heard;
+
+static void count_heard(void *ctx, const can_frame_t *frame)
+{
+    (void)ctx;
+    m_wire_heard += frame->id == 0x123 && frame->length == 2 && frame->data[1] == 7;
+}
+
+static uint32_t unconfirmed(hal_can_t can)
+{
+    uint32_t frames = 99;
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_unconfirmed(can, &frames));
+    return frames;
+}
+
+static hal_can_state_t state_of(hal_can_t can)
+{
+    hal_can_state_t state = HAL_CAN_WARNING;
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_bus_state(can, &state));
+    return state;
+}
+
+static void fault_of_bus(bus_fault_t fault)
+{
+    char why[FAULT_WHY_MAX] = "";
+    TEST_ASSERT_TRUE_MESSAGE(wire_fault(&m_wire, fault, 3, why, sizeof why), why);
+}
+
+static void test_local_bus_is_a_can_bus_with_echoes_and_faults(void)
+{
+    const can_frame_t frame = {.id = 0x123, .length = 2, .data = {1, 7}};
+    const can_frame_t of_drive = {.id = 0x181, .length = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
+    char name[CONFIG_NAME_MAX];
+    char why[WIRE_WHY_MAX];
+    linux_can_local_t local;
+    linux_can_local_t other;
+    can_frame_t got;
+    uint64_t at_us = 0;
+    (void)snprintf(name, sizeof name, "twin%u", (unsigned)getpid());
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, linux_can_local_open(&local, name)); /* nobody is it yet */
+    const hal_can_t can = linux_can_local_hal(&local);
+    TEST_ASSERT_NOT_NULL(strstr(local.error_text, "start heave-twin"));
+    TEST_ASSERT_EQUAL(HAL_CAN_GONE, state_of(can));
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_send(can, &frame));
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_recv(can, &got, &at_us));
+    TEST_ASSERT_TRUE_MESSAGE(wire_open(&m_wire, name, why), why);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(can));
+    TEST_ASSERT_EQUAL(HV_OK, linux_can_local_open(&other, name));
+    TEST_ASSERT_TRUE(wire_hear(&m_wire, count_heard, NULL)); /* one comes in at a time */
+    TEST_ASSERT_TRUE(wire_hear(&m_wire, count_heard, NULL));
+
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(can, &frame));
+    TEST_ASSERT_EQUAL(1, unconfirmed(can));
+    TEST_ASSERT_TRUE(wire_hear(&m_wire, count_heard, NULL));
+    TEST_ASSERT_EQUAL(1, m_wire_heard);
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_can_recv(can, &got, &at_us)); /* its own never comes back */
+    TEST_ASSERT_EQUAL(0, unconfirmed(can));
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_recv(linux_can_local_hal(&other), &got, &at_us));
+    TEST_ASSERT_EQUAL(0x123, got.id);
+    wire_put(&m_wire, &of_drive);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_recv(can, &got, &at_us));
+    TEST_ASSERT_EQUAL_MEMORY(of_drive.data, got.data, 8);
+
+    fault_of_bus(BUS_CABLE_OUT);
+    for (unsigned i = 0; i < LINUX_CAN_LOCAL_QUEUE_FRAMES; i++) {
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(can, &frame));
+    }
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_can_send(can, &frame));
+    wire_put(&m_wire, &of_drive);
+    TEST_ASSERT_TRUE(wire_hear(&m_wire, count_heard, NULL));
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_can_recv(can, &got, &at_us));
+    TEST_ASSERT_EQUAL(LINUX_CAN_LOCAL_QUEUE_FRAMES, unconfirmed(can));
+    TEST_ASSERT_EQUAL(1, m_wire_heard);
+    fault_of_bus(BUS_CABLE_IN);
+
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(can));
+    TEST_ASSERT_TRUE(wire_hear(&m_wire, count_heard, NULL));
+    TEST_ASSERT_EQUAL(0, unconfirmed(can));
+    fault_of_bus(BUS_PASSIVE);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_recv(can, &got, &at_us));
+    TEST_ASSERT_TRUE(got.is_error && (got.id & CAN_ERROR_PASSIVE) != 0);
+    TEST_ASSERT_EQUAL(HAL_CAN_PASSIVE, state_of(can));
+    fault_of_bus(BUS_ACTIVE);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_recv(can, &got, &at_us));
+    TEST_ASSERT_EQUAL(HAL_CAN_ACTIVE, state_of(can));
+    fault_of_bus(BUS_OFF);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_recv(can, &got, &at_us));
+    TEST_ASSERT_EQUAL(HAL_CAN_BUS_OFF, state_of(can));
+    TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_send(can, &frame));
+
+    fault_of_bus(BUS_DOWN);
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, hal_can_restart(can));
+    fault_of_bus(BUS_UP);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(can));
+    TEST_ASSERT_EQUAL(HAL_CAN_ACTIVE, state_of(can));
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, hal_can_send(can, &(can_frame_t){.id = 0x800}));
+    linux_can_local_close(&local);
+    linux_can_local_close(&other);
+    wire_close(&m_wire);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -571,5 +677,6 @@ int main(void)
     RUN_TEST(test_faults_of_a_drive_show_on_the_bus);
     RUN_TEST(test_script_times_count_from_the_start_or_from_torque);
     RUN_TEST(test_script_wrong_lines_are_named_with_their_number);
+    RUN_TEST(test_local_bus_is_a_can_bus_with_echoes_and_faults);
     return UNITY_END();
 }
