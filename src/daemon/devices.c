@@ -76,10 +76,20 @@ static hv_status_t open_sim(devices_t *self, const config_t *config, uint8_t axe
     return sim_drives_init(&self->sim_drives, axes, self->sim_axis, NULL, 0);
 }
 
+static hal_can_t can_hal(devices_t *self)
+{
+    return self->is_can_local_open ? linux_can_local_hal(&self->can_local) : linux_can_hal(&self->can);
+}
+
 /* The interface, for these identifiers and no others. One that is not usable yet is restarted by the driver. */
 static hv_status_t open_can(devices_t *self, const char *interface, const hal_can_filter_t *filter, uint32_t filters,
                             const hal_can_filter_t *own, uint32_t owns)
 {
+    if (linux_can_local_is(interface)) {
+        const hv_status_t status = linux_can_local_open(&self->can_local, interface);
+        self->is_can_local_open = true;
+        return status == HV_OK || status == HV_ERR_AGAIN ? HV_OK : HV_ERR_IO;
+    }
     const linux_can_config_t can = {
         .interface = interface, .filter = filter, .filters = filters, .own = own, .owns = owns, .run_dir = RUN_DIR};
     const hv_status_t status = linux_can_open(&self->can, &can);
@@ -99,7 +109,7 @@ static hv_status_t open_can_raw(devices_t *self, const config_t *config, gateway
     }
     const hv_status_t status = open_can(self, config->can.interface, filter, count, own, count);
     io->drives = canraw_hal(&self->canraw);
-    return status == HV_OK ? canraw_init(&self->canraw, &self->canraw_map, linux_can_hal(&self->can)) : status;
+    return status == HV_OK ? canraw_init(&self->canraw, &self->canraw_map, can_hal(self)) : status;
 }
 
 static hv_status_t open_cia402(devices_t *self, const config_t *config, gateway_io_t *io)
@@ -111,7 +121,7 @@ static hv_status_t open_cia402(devices_t *self, const config_t *config, gateway_
     const uint32_t owns = cia402_owns(&self->cia402_config, own);
     const hv_status_t status = open_can(self, config->can.interface, filter, filters, own, owns);
     io->drives = cia402_hal(&self->cia402);
-    return status == HV_OK ? cia402_init(&self->cia402, &self->cia402_config, linux_can_hal(&self->can)) : status;
+    return status == HV_OK ? cia402_init(&self->cia402, &self->cia402_config, can_hal(self)) : status;
 }
 
 /* The serial line of a section. */
@@ -256,7 +266,7 @@ const char *devices_trouble(devices_t *self)
     if (self->gpio_inputs.error_text[0] != '\0') {
         return self->gpio_inputs.error_text;
     }
-    const char *text = self->is_can_open ? self->can.error_text : "";
+    const char *text = self->is_can_open ? self->can.error_text : self->is_can_local_open ? self->can_local.error_text : "";
     for (unsigned i = 0; i < self->modbus_lines && text[0] == '\0'; i++) {
         text = linux_modbus_text(&self->modbus_line[i]);
     }
@@ -310,12 +320,16 @@ bool devices_close(devices_t *self, uint16_t safe_mask)
     has_ended = linux_gpio_inputs_close(&self->gpio_inputs) && has_ended;
     close_coils(self, safe_mask);
     close_modbus(self);
+    if ((self->is_can_open || self->is_can_local_open) && self->cia402.config != NULL) {
+        leave_cia402(self);
+    }
     if (self->is_can_open) {
-        if (self->cia402.config != NULL) {
-            leave_cia402(self);
-        }
         linux_can_close(&self->can);
         self->is_can_open = false;
+    }
+    if (self->is_can_local_open) {
+        linux_can_local_close(&self->can_local);
+        self->is_can_local_open = false;
     }
     return has_ended;
 }

@@ -11,6 +11,7 @@
 #include "heave/gateway.h"
 #include "heave/modbus_drive.h"
 #include "linux_can.h"
+#include "linux_can_local.h"
 #include "linux_gpio_inputs.h"
 #include "linux_gpio_relays.h"
 #include "linux_modbus.h"
@@ -30,6 +31,8 @@ typedef struct {
     linux_gpio_inputs_t gpio_inputs;
     bool is_can_open;
     linux_can_t can;
+    bool is_can_local_open; /**< instead of it: a bus between programs */
+    linux_can_local_t can_local;
     canraw_map_t canraw_map;
     canraw_t canraw;
     cia402_config_t cia402_config;

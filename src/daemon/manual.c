@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * manual.c - writes the manual pages out of the tables that the programs read: --help's and that of the configuration's keys.
  *
- * usage: manual heaved.8|heavectl.1|heave.ini.5 DATE
+ * usage: manual heaved.8|heavectl.1|heave-twin.1|heave.ini.5 DATE
  */
 #include <stdbool.h>
 #include <stdlib.h>
@@ -12,6 +12,7 @@
 #include "common/usage.h"
 #include "config/config.h"
 #include "heave/status.h"
+#include "twin/options.h"
 
 void hv_assert_failed(const char *file, int line)
 {
@@ -24,7 +25,8 @@ static void write_synopsis(const usage_t *usage, FILE *out)
     char text[200];
     roff_heading("SYNOPSIS", out);
     for (const usage_row_t *form = usage->forms; !usage_is_end(form); form++) {
-        (void)snprintf(text, sizeof text, "%s %s %s", usage->program, usage->common, form->argument);
+        (void)snprintf(text, sizeof text, "%s %s%s%s", usage->program, usage->common != NULL ? usage->common : "",
+                       usage->common != NULL ? " " : "", form->argument);
         fputs(form == usage->forms ? "" : ".br\n", out);
         roff_bold(text, out);
     }
@@ -114,6 +116,8 @@ int main(int argc, char **argv)
         write_program(&heaved_usage, argv[2], stdout);
     } else if (strcmp(argv[1], "heavectl.1") == 0) {
         write_program(&heavectl_usage, argv[2], stdout);
+    } else if (strcmp(argv[1], "heave-twin.1") == 0) {
+        write_program(twin_usage(), argv[2], stdout);
     } else if (strcmp(argv[1], "heave.ini.5") == 0) {
         write_configuration(argv[2], stdout);
     } else {

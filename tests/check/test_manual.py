@@ -12,7 +12,8 @@ from pathlib import Path
 import tap
 
 TOP = Path(__file__).resolve().parents[2]
-PAGES = ("heaved.8", "heavectl.1", "heave.ini.5")
+PAGES = ("heaved.8", "heavectl.1", "heave-twin.1", "heave.ini.5")
+PROGRAMS = (("heaved", "heaved.8"), ("heavectl", "heavectl.1"), ("heave-twin", "heave-twin.1"))
 COMPLETION = Path("/usr/share/bash-completion/bash_completion")
 WORD_LIST = re.compile(r"(?m)^  (?!heave)(--)?([a-z][a-z-]*)")
 
@@ -68,7 +69,7 @@ def man_warnings(built):
 
 
 def options_and_commands(built):
-    for program, page in (("heaved", "heaved.8"), ("heavectl", "heavectl.1")):
+    for program, page in PROGRAMS:
         options, commands = built.words(program)
         assert len(options) > 5, options
         named = sorted(item.split()[0][2:] for item in built.items(page, "OPTIONS"))
@@ -81,7 +82,7 @@ def options_and_commands(built):
 def exit_codes(built):
     in_header = set(re.findall(r"EXIT_\w+ = (\d+)", (TOP / "src/common/message.h").read_text(encoding="ascii")))
     everywhere = set()
-    for program, page in (("heaved", "heaved.8"), ("heavectl", "heavectl.1")):
+    for program, page in PROGRAMS:
         listed = re.search(r"(?s)Exit codes: (.*)\.\n", built.help(program))[1]
         codes = re.findall(r"(?:^|[ \n])(\d+) ", listed)
         assert built.items(page, "EXIT STATUS") == codes and codes, f"{page}, and --help {codes}"
@@ -108,7 +109,7 @@ def complete(built, *words):
     program = built.bin / words[0]
     text = f"""source {COMPLETION}; source {script}
 COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); COMP_LINE="$*"; COMP_POINT=${{#COMP_LINE}}
-_{words[0]} {program} "${{COMP_WORDS[COMP_CWORD]}}" "${{COMP_WORDS[COMP_CWORD-1]}}"
+_{words[0].replace('-', '_')} {program} "${{COMP_WORDS[COMP_CWORD]}}" "${{COMP_WORDS[COMP_CWORD-1]}}"
 printf '%s\\n' "${{COMPREPLY[@]}}" """
     code, found = output("bash", "--norc", "-c", text, "bash", *words, cwd=TOP / "config")
     assert code == 0, found
@@ -116,7 +117,7 @@ printf '%s\\n' "${{COMPREPLY[@]}}" """
 
 
 def completion(built):
-    for program in ("heaved", "heavectl"):
+    for program, _ in PROGRAMS:
         options, commands = built.words(program)
         assert complete(built, program, "--") == sorted(f"--{option}" for option in options), complete(built, program, "--")
         if commands:
@@ -125,6 +126,8 @@ def completion(built):
     assert complete(built, "heaved", "--config", "demo") == ["demo-hexapod.ini"]
     assert complete(built, "heavectl", "--json", "s") == ["scope", "seen", "shutdown", "status"]
     assert complete(built, "heavectl", "--hz", "") == []
+    assert complete(built, "heave-twin", "cable-") == ["cable-in", "cable-out"]
+    assert complete(built, "heave-twin", "--swap", "") == []
     assert not any(word.startswith("-") for word in complete(built, "heavectl", "--platform", "")), "names of platforms, where some run"
 
 

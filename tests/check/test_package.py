@@ -117,7 +117,7 @@ class Life:
 
     def installs(self):
         self.machine.dpkg("-i", self.deb)
-        for name in ("heaved", "heavectl"):
+        for name in ("heaved", "heavectl", "heave-twin"):
             code, text = self.machine.program(name, "--version")
             assert code == 0 and re.fullmatch(rf"{name} \d+\.\d+\.\d+\n", text), text
         code, text = self.machine.program("heaved", "--config", f"/{CONFIG}", "--check")

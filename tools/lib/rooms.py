@@ -18,7 +18,8 @@ PROGRAMS = {
     "record": {"common", "config"},
     "inspect": {"common", "config"},
     "service": {"common", "config", "record"},
-    "daemon": {"common", "config", "record", "inspect", "service", "heavectl"},
+    "daemon": {"common", "config", "record", "inspect", "service", "heavectl", "twin"},
+    "twin": {"common", "config"},
     "heavectl": {"common"},
 }
 

@@ -1,0 +1,459 @@
+/* SPDX-License-Identifier: MIT
+ * faults.c - what can be made to go wrong; see faults.h.
+ */
+#include "twin/faults.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define WORD_MAX     32u
+#define INDEX_MAX    0xFFFFu
+#define GENERIC      0x2310u     /* continuous over-current */
+#define NOT_NOW      0x08000000u /* SDO: general error */
+#define HOT_C        120.0
+#define REGISTER_SET 0x81u
+
+/** One name. form: d = drives, o = an object, n = a number, N = one that may be left out. */
+typedef struct {
+    const char *name;
+    const char *form;
+    const char *arguments;
+    const char *help;
+    double fallback[FAULT_NUMBERS];                                               /**< of numbers left out */
+    double most;                                                                  /**< largest number */
+    void (*act)(twin_t *twin, unsigned k, const fault_t *fault, uint64_t now_us); /**< once per drive; NULL: bus */
+    bus_fault_t bus;
+} row_t;
+
+static node_t *node_of(twin_t *twin, unsigned k)
+{
+    return &twin->node[k];
+}
+
+static object_t *object_of(twin_t *twin, unsigned k, const fault_t *fault)
+{
+    return objects_find(&twin->node[k].drive.od, (uint16_t)(fault->object >> 8), (uint8_t)fault->object);
+}
+
+/* --- One function per name --- */
+
+#define ACT(name) static void name(twin_t *twin, unsigned k, const fault_t *fault, uint64_t now_us)
+#define UNUSED()                                                                                                                 \
+    do {                                                                                                                         \
+        (void)fault;                                                                                                             \
+        (void)now_us;                                                                                                            \
+    } while (false)
+
+ACT(act_fault)
+{
+    UNUSED();
+    drive_fault(&node_of(twin, k)->drive, (uint16_t)fault->number[0]);
+}
+
+ACT(act_broken)
+{
+    act_fault(twin, k, fault, now_us);
+    node_of(twin, k)->drive.is_broken = true;
+}
+
+ACT(act_mend)
+{
+    UNUSED();
+    node_t *node = node_of(twin, k);
+    node->drive.is_broken = node->drive.is_deaf = node->drive.is_homing_broken = false;
+    node->drive.motor.is_jammed = false;
+    node->drive.motor.slip = 0;
+    node->drive.motor.temperature_c = MOTOR_AMBIENT_C;
+    node->is_mute = node->is_cut = node->is_sdo_silent = node->has_no_heartbeat = false;
+    node->tpdo_drop = node->tpdo_us = 0;
+    node->sdo_us = 1000;
+    node->drive.bits_set = node->drive.bits_clear = 0;
+    for (uint32_t i = 0; i < node->drive.od.count; i++) {
+        object_t *row = &node->drive.od.row[i];
+        row->is_missing = row->is_silent = false;
+        row->refusal = 0;
+    }
+}
+
+ACT(act_emcy)
+{
+    UNUSED();
+    node_emergency(node_of(twin, k), (uint16_t)fault->number[0], REGISTER_SET);
+}
+
+ACT(act_heartbeat)
+{
+    UNUSED();
+    node_of(twin, k)->has_no_heartbeat = true;
+}
+
+ACT(act_reboot)
+{
+    UNUSED();
+    node_reboot(node_of(twin, k), now_us);
+}
+
+ACT(act_power_off)
+{
+    UNUSED();
+    node_power(node_of(twin, k), false, now_us);
+}
+
+ACT(act_power_on)
+{
+    UNUSED();
+    node_power(node_of(twin, k), true, now_us);
+}
+
+ACT(act_mute)
+{
+    UNUSED();
+    node_of(twin, k)->is_mute = true;
+}
+
+ACT(act_cut)
+{
+    UNUSED();
+    node_of(twin, k)->is_cut = true;
+}
+
+ACT(act_ignore)
+{
+    UNUSED();
+    node_of(twin, k)->drive.is_deaf = true;
+}
+
+ACT(act_jam)
+{
+    UNUSED();
+    node_of(twin, k)->drive.motor.is_jammed = true;
+}
+
+ACT(act_drop)
+{
+    UNUSED();
+    drive_drop(&node_of(twin, k)->drive);
+}
+
+ACT(act_lose)
+{
+    UNUSED();
+    node_of(twin, k)->tpdo_drop = (uint32_t)fault->number[0];
+}
+
+ACT(act_late)
+{
+    UNUSED();
+    node_of(twin, k)->tpdo_us = (uint32_t)(fault->number[0] * 1000);
+}
+
+ACT(act_preop)
+{
+    if (fault->number[0] > 0) {
+        act_emcy(twin, k, fault, now_us);
+    }
+    node_enter(node_of(twin, k), 0x7F);
+}
+
+ACT(act_stopped)
+{
+    UNUSED();
+    node_enter(node_of(twin, k), 0x04);
+}
+
+ACT(act_mode)
+{
+    UNUSED();
+    node_of(twin, k)->drive.mode = (int8_t)fault->number[0];
+}
+
+ACT(act_status)
+{
+    UNUSED();
+    node_of(twin, k)->drive.bits_set = (uint16_t)fault->number[0];
+    node_of(twin, k)->drive.bits_clear = (uint16_t)fault->number[1];
+}
+
+ACT(act_no_homing)
+{
+    UNUSED();
+    node_of(twin, k)->drive.is_homing_broken = true;
+}
+
+ACT(act_sdo_silent)
+{
+    UNUSED();
+    node_of(twin, k)->is_sdo_silent = true;
+}
+
+ACT(act_sdo_slow)
+{
+    UNUSED();
+    node_of(twin, k)->sdo_us = (uint32_t)(fault->number[0] * 1000);
+}
+
+ACT(act_sdo_refuse)
+{
+    UNUSED();
+    object_of(twin, k, fault)->refusal = (uint32_t)fault->number[0];
+}
+
+ACT(act_sdo_mute)
+{
+    UNUSED();
+    object_of(twin, k, fault)->is_silent = true;
+}
+
+ACT(act_sdo_missing)
+{
+    UNUSED();
+    object_of(twin, k, fault)->is_missing = true;
+}
+
+/* Holds it over a reset, too, and takes no other. */
+ACT(act_object)
+{
+    UNUSED();
+    object_t *row = object_of(twin, k, fault);
+    row->value = row->fallback = (uint32_t)fault->number[0];
+    row->is_read_only = true;
+}
+
+ACT(act_node)
+{
+    UNUSED();
+    node_of(twin, k)->number = (uint8_t)fault->number[0];
+    node_reboot(node_of(twin, k), now_us);
+}
+
+ACT(act_hot)
+{
+    UNUSED();
+    node_of(twin, k)->drive.motor.temperature_c = HOT_C;
+}
+
+ACT(act_slip)
+{
+    UNUSED();
+    node_of(twin, k)->drive.motor.slip = fault->number[0] * twin->per_unit[k];
+}
+
+ACT(act_load)
+{
+    UNUSED();
+    node_of(twin, k)->drive.motor.load = fault->number[0] * twin->per_unit[k];
+}
+
+ACT(act_friction)
+{
+    UNUSED();
+    node_of(twin, k)->drive.motor.friction = fault->number[0] * fabs(twin->per_unit[k]);
+}
+
+ACT(act_encoder)
+{
+    UNUSED();
+    node_of(twin, k)->drive.origin -= fault->number[0] * twin->per_unit[k];
+}
+
+ACT(act_lag)
+{
+    UNUSED();
+    node_of(twin, k)->drive.motor.lag_us = fault->number[0] * 1000;
+}
+
+/* clang-format off */ /* a row is a record */
+static const row_t k_rows[] = {
+    {"fault", "dN", "DRIVE [CODE]", "the drive finds a fault, with its EMCY; else 0x2310", {GENERIC}, INDEX_MAX, act_fault, BUS_OFF},
+    {"broken", "dN", "DRIVE [CODE]", "the same, and no reset leads out of it before mend", {GENERIC}, INDEX_MAX, act_broken, BUS_OFF},
+    {"emcy", "dn", "DRIVE CODE", "an EMCY without a fault", {0}, INDEX_MAX, act_emcy, BUS_OFF},
+    {"heartbeat-lost", "d", "DRIVE", "sends no heartbeat any more", {0}, 0, act_heartbeat, BUS_OFF},
+    {"reboot", "d", "DRIVE", "starts again by itself, as after a dip of its supply", {0}, 0, act_reboot, BUS_OFF},
+    {"power-off", "d", "DRIVE", "its supply goes", {0}, 0, act_power_off, BUS_OFF},
+    {"power-on", "d", "DRIVE", "its supply is back", {0}, 0, act_power_on, BUS_OFF},
+    {"mute", "d", "DRIVE", "hears, but says nothing", {0}, 0, act_mute, BUS_OFF},
+    {"cut", "d", "DRIVE", "the cable of this drive is out: neither hears nor says anything", {0}, 0, act_cut, BUS_OFF},
+    {"ignore", "d", "DRIVE", "answers, but acts on nothing", {0}, 0, act_ignore, BUS_OFF},
+    {"jam", "d", "DRIVE", "the cylinder is stuck", {0}, 0, act_jam, BUS_OFF},
+    {"drop", "d", "DRIVE", "loses its torque by itself", {0}, 0, act_drop, BUS_OFF},
+    {"lose", "dn", "DRIVE COUNT", "so many of its answers (TPDOs) are lost", {0}, 1e6, act_lose, BUS_OFF},
+    {"late", "dn", "DRIVE MS", "its answers come so late", {0}, 1e4, act_late, BUS_OFF},
+    {"pre-operational", "dN", "DRIVE [CODE]", "leaves operational, with this EMCY", {0}, INDEX_MAX, act_preop, BUS_OFF},
+    {"stopped", "d", "DRIVE", "goes into the NMT state stopped", {0}, 0, act_stopped, BUS_OFF},
+    {"mode", "dn", "DRIVE NUMBER", "leaves its mode of operation for this one", {0}, 127, act_mode, BUS_OFF},
+    {"status", "dnN", "DRIVE SET [CLEAR]", "bits of the statusword that it shows whatever it does", {0}, INDEX_MAX, act_status, BUS_OFF},
+    {"homing-fails", "d", "DRIVE", "homing ends with an error", {0}, 0, act_no_homing, BUS_OFF},
+    {"sdo-silent", "d", "DRIVE", "answers no SDO", {0}, 0, act_sdo_silent, BUS_OFF},
+    {"sdo-slow", "dn", "DRIVE MS", "answers SDOs so late", {0}, 1e5, act_sdo_slow, BUS_OFF},
+    {"sdo-refuse", "doN", "DRIVE INDEX[:SUB] [ABORT]", "refuses to write that object; else 0x08000000", {NOT_NOW}, UINT32_MAX, act_sdo_refuse, BUS_OFF},
+    {"sdo-mute", "do", "DRIVE INDEX[:SUB]", "never answers for that object", {0}, 0, act_sdo_mute, BUS_OFF},
+    {"missing", "do", "DRIVE INDEX[:SUB]", "has not got that object", {0}, 0, act_sdo_missing, BUS_OFF},
+    {"object", "don", "DRIVE INDEX[:SUB] VALUE", "that object holds this until the next power-up, and takes nothing else", {0}, UINT32_MAX, act_object, BUS_OFF},
+    {"node", "dn", "DRIVE NODE", "gets this node id, which another one may have, and starts again", {0}, 127, act_node, BUS_OFF},
+    {"hot", "d", "DRIVE", "the motor is too hot", {0}, 0, act_hot, BUS_OFF},
+    {"slip", "dn", "DRIVE MM_S", "the brake does not hold: sinks so fast without torque", {0}, 1e4, act_slip, BUS_OFF},
+    {"load", "dn", "DRIVE MM", "gives way so far under its load", {0}, 1e4, act_load, BUS_OFF},
+    {"friction", "dn", "DRIVE MM", "breaks loose so far behind its demand", {0}, 1e4, act_friction, BUS_OFF},
+    {"encoder", "dn", "DRIVE MM", "its encoder tells so much more from now on", {0}, 1e4, act_encoder, BUS_OFF},
+    {"lag", "dn", "DRIVE MS", "follows with this time constant", {0}, 1e5, act_lag, BUS_OFF},
+    {"mend", "d", "DRIVE", "ends the lasting faults above, from broken to slip but object and node; load, friction, lag and encoder take 0 or another value", {0}, 0, act_mend, BUS_OFF},
+    {"bus-off", "", "", "heaved's controller goes bus-off", {0}, 0, NULL, BUS_OFF},
+    {"passive", "", "", "heaved's controller becomes error-passive", {0}, 0, NULL, BUS_PASSIVE},
+    {"active", "", "", "and recovers", {0}, 0, NULL, BUS_ACTIVE},
+    {"storm", "n", "COUNT", "so many error frames at once", {0}, 10000, NULL, BUS_STORM},
+    {"cable-out", "", "", "the cable of heaved is out: nobody acknowledges", {0}, 0, NULL, BUS_CABLE_OUT},
+    {"queue-full", "", "", "the same behind a queue that takes one frame: ENOBUFS", {0}, 0, NULL, BUS_FULL},
+    {"cable-in", "", "", "and is back", {0}, 0, NULL, BUS_CABLE_IN},
+    {"down", "", "", "the interface goes down", {0}, 0, NULL, BUS_DOWN},
+    {"up", "", "", "and up", {0}, 0, NULL, BUS_UP},
+};
+/* clang-format on */
+
+#define ROWS (sizeof k_rows / sizeof k_rows[0])
+
+bool fault_describe(unsigned i, const char **name, const char **arguments, const char **help)
+{
+    if (i >= ROWS) {
+        return false;
+    }
+    *name = k_rows[i].name;
+    *arguments = k_rows[i].arguments[0] == '\0' ? NULL : k_rows[i].arguments;
+    *help = k_rows[i].help;
+    return true;
+}
+
+/* --- Reading --- */
+
+/* The next word of a line. False where there is none, or it is too long. */
+static bool next_word(const char **at, char word[WORD_MAX])
+{
+    const char *from = *at + strspn(*at, " \t");
+    const size_t length = strcspn(from, " \t");
+    if (length == 0 || length >= WORD_MAX) {
+        return false;
+    }
+    memcpy(word, from, length);
+    word[length] = '\0';
+    *at = from + length;
+    return true;
+}
+
+static bool read_drives(const char *word, unsigned drives, uint32_t *out, char why[FAULT_WHY_MAX])
+{
+    uint32_t found = 0;
+    if (strcmp(word, "all") == 0) {
+        *out = (1u << drives) - 1;
+        return true;
+    }
+    for (const char *at = word; *at != '\0';) {
+        char *end = NULL;
+        const unsigned long number = *at >= '0' && *at <= '9' ? strtoul(at, &end, 10) : 0;
+        if (number < 1 || number > drives || (*end != '\0' && (*end != ',' || end[1] == '\0'))) {
+            (void)snprintf(why, FAULT_WHY_MAX, "there is no drive %s; the configuration has 1 to %u, several as 2,5, or all",
+                           word, drives);
+            return false;
+        }
+        found |= 1u << (number - 1);
+        at = *end == ',' ? end + 1 : end;
+    }
+    *out = found;
+    return found != 0;
+}
+
+static bool read_object(const char *word, uint32_t *out, char why[FAULT_WHY_MAX])
+{
+    char *end = NULL;
+    const unsigned long index = strtoul(word, &end, 16);
+    unsigned long sub = 0;
+    if (*end == ':' && end[1] != '\0') {
+        sub = strtoul(end + 1, &end, 16);
+    }
+    if (end == word || *end != '\0' || index < 0x1000 || index > INDEX_MAX || sub > 0xFF || word[0] == '-') {
+        (void)snprintf(why, FAULT_WHY_MAX, "%s is no object; one is written as 6065 or 1016:1, hexadecimal", word);
+        return false;
+    }
+    objects_t any;
+    const uint32_t identity[4] = {0};
+    objects_start(&any, 1, identity);
+    if (objects_find(&any, (uint16_t)index, (uint8_t)sub) == NULL) {
+        (void)snprintf(why, FAULT_WHY_MAX, "these drives have no object %04lX:%lX", index, sub);
+        return false;
+    }
+    *out = (uint32_t)(index << 8 | sub);
+    return true;
+}
+
+static bool read_number(const char *word, double most, double *out, char why[FAULT_WHY_MAX])
+{
+    char *end = NULL;
+    const bool is_hex = word[0] == '0' && (word[1] == 'x' || word[1] == 'X');
+    const double number = is_hex ? (double)strtoul(word, &end, 16) : strtod(word, &end);
+    if (end == word || *end != '\0' || !(number >= 0 && number <= most)) {
+        (void)snprintf(why, FAULT_WHY_MAX, "%s is no number from 0 to %.0f", word, most);
+        return false;
+    }
+    *out = number;
+    return true;
+}
+
+static bool refuse_form(const row_t *row, char why[FAULT_WHY_MAX])
+{
+    (void)snprintf(why, FAULT_WHY_MAX, "this is written as: %s%s%s", row->name, row->arguments[0] == '\0' ? "" : " ",
+                   row->arguments);
+    return false;
+}
+
+static bool read_arguments(fault_t *self, const row_t *row, const char *at, unsigned drives, char why[FAULT_WHY_MAX])
+{
+    char word[WORD_MAX];
+    unsigned numbers = 0;
+    for (const char *form = row->form; *form != '\0'; form++) {
+        if (!next_word(&at, word)) {
+            if (*form == 'N' && at[strspn(at, " \t")] == '\0') {
+                continue;
+            }
+            return refuse_form(row, why);
+        }
+        const bool is_read = *form == 'd'   ? read_drives(word, drives, &self->drives, why)
+                             : *form == 'o' ? read_object(word, &self->object, why)
+                                            : read_number(word, row->most, &self->number[numbers++], why);
+        if (!is_read) {
+            return false;
+        }
+    }
+    return at[strspn(at, " \t")] == '\0' || refuse_form(row, why);
+}
+
+bool fault_read(fault_t *self, const char *line, unsigned drives, char why[FAULT_WHY_MAX])
+{
+    char name[WORD_MAX];
+    const char *at = line;
+    if (!next_word(&at, name)) {
+        (void)snprintf(why, FAULT_WHY_MAX, "no name of a fault; heave-twin --help lists them");
+        return false;
+    }
+    for (unsigned i = 0; i < ROWS; i++) {
+        if (strcmp(k_rows[i].name, name) == 0) {
+            *self = (fault_t){.row = i, .number = {k_rows[i].fallback[0], k_rows[i].fallback[1]}};
+            return read_arguments(self, &k_rows[i], at, drives, why);
+        }
+    }
+    (void)snprintf(why, FAULT_WHY_MAX, "there is no fault %s; heave-twin --help lists them", name);
+    return false;
+}
+
+bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT_WHY_MAX])
+{
+    const row_t *row = &k_rows[self->row];
+    if (row->act == NULL) {
+        return twin->bus.act(twin->bus.ctx, row->bus, (uint32_t)self->number[0], why, FAULT_WHY_MAX);
+    }
+    for (unsigned k = 0; k < twin->drives; k++) {
+        if ((self->drives >> k & 1u) != 0) {
+            row->act(twin, k, self, now_us);
+        }
+    }
+    return true;
+}

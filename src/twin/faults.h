@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: MIT
+ * faults.h - what can be made to go wrong, by name: one line each, from the command line, a script or the socket.
+ */
+#ifndef HEAVE_TWIN_FAULTS_H
+#define HEAVE_TWIN_FAULTS_H
+
+#include "twin/twin.h"
+
+#define FAULT_WHY_MAX 240u
+#define FAULT_NUMBERS 2u
+
+/** A line that was understood. */
+typedef struct {
+    unsigned row;
+    uint32_t drives; /**< bit k: drive k + 1 */
+    uint32_t object; /**< index << 8 | sub */
+    double number[FAULT_NUMBERS];
+} fault_t;
+
+/** Reads a line.
+ *  @param drives how many the configuration has
+ *  @param why    what is wrong and what would be right, where false is returned */
+bool fault_read(fault_t *self, const char *line, unsigned drives, char why[FAULT_WHY_MAX]);
+
+/** Makes it so. Returns false where the system does not let it, and why. */
+bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT_WHY_MAX]);
+
+/** Row i of the table of names, for a help text; false behind the last one. */
+bool fault_describe(unsigned i, const char **name, const char **arguments, const char **help);
+
+#endif

@@ -1,0 +1,221 @@
+/* SPDX-License-Identifier: MIT
+ * main.c - heave-twin: the outside of a platform's configuration, until a signal ends it.
+ */
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <sys/resource.h>
+#include <time.h>
+
+#include "common/message.h" // exit codes
+#include "config/config.h"
+#include "twin/control.h"
+#include "twin/options.h"
+#include "twin/script.h"
+#include "twin/wire.h"
+
+#define FDS_MAX  (WIRE_FDS_MAX + CONTROL_FDS_MAX)
+#define NICE     (-15)
+#define AWAKE_US 1000000u /* it looks around so often, whatever happens */
+
+/** A run of the program. */
+typedef struct {
+    twin_options_t options;
+    config_t config;
+    twin_settings_t settings;
+    script_t script;
+    wire_t wire;
+    control_t control;
+    twin_t twin;
+    uint64_t start_us;
+    uint64_t now_us;
+} run_t;
+
+static volatile sig_atomic_t is_ended; /* set by the signal handler, which can reach nothing else */
+
+static void on_signal(int signal_number)
+{
+    (void)signal_number;
+    is_ended = 1;
+}
+
+static uint64_t clock_us(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u;
+}
+
+static int refuse(int code, const char *where, const char *why)
+{
+    fprintf(stderr, "heave-twin: %s: %s\n", where, why);
+    return code;
+}
+
+/* --- Before it runs --- */
+
+static int read_script(run_t *self, unsigned drives)
+{
+    char why[FAULT_WHY_MAX];
+    for (unsigned i = 0; i < self->options.faults; i++) {
+        if (!script_add(&self->script, self->options.fault[i], drives, why)) {
+            fprintf(stderr, "heave-twin: --fault '%s': %s\n", self->options.fault[i], why);
+            return EXIT_BAD_DATA;
+        }
+    }
+    if (self->options.script == NULL) {
+        return EXIT_DONE;
+    }
+    const int wrong = script_load(&self->script, self->options.script, drives, stderr);
+    return wrong == 0 ? EXIT_DONE : wrong > 0 ? EXIT_BAD_DATA : EXIT_NO_INPUT;
+}
+
+static int prepare(run_t *self)
+{
+    if (config_load(self->options.config, &self->config, stderr) != 0) {
+        return EXIT_BAD_CONFIG;
+    }
+    const char *refusal = twin_refusal(&self->config);
+    if (refusal != NULL) {
+        return refuse(EXIT_BAD_CONFIG, self->options.config, refusal);
+    }
+    const unsigned cylinders = self->config.settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
+    const unsigned drives = cylinders + (self->config.settings.has_angle ? 1 : 0);
+    twin_settings_init(&self->settings, &self->config);
+    const int code = twin_options_apply(&self->options, drives, cylinders, &self->settings);
+    return code != EXIT_DONE ? code : read_script(self, drives);
+}
+
+static int open_all(run_t *self)
+{
+    char why[WIRE_WHY_MAX];
+    self->control = (control_t){.fd = -1};
+    if (!wire_open(&self->wire, self->config.can.interface, why)) {
+        return refuse(EXIT_UNAVAILABLE, "[can] interface", why);
+    }
+    if (!control_open(&self->control, self->options.socket, why)) {
+        return refuse(EXIT_UNAVAILABLE, self->options.socket, why);
+    }
+    return EXIT_DONE;
+}
+
+static void say_what_runs(const run_t *self)
+{
+    const wire_t *wire = &self->wire;
+    printf("heave-twin: %u CiA 402 drives on %s%s, nodes", self->twin.drives, self->config.can.interface,
+           wire->is_local ? " (a bus between programs; no CAN)" : "");
+    for (unsigned k = 0; k < self->twin.drives; k++) {
+        printf(" %u", self->twin.node[k].number);
+    }
+    printf("\n");
+    (void)fflush(stdout);
+}
+
+/* --- While it runs --- */
+
+static void hear(void *ctx, const can_frame_t *frame)
+{
+    run_t *self = ctx;
+    twin_hear(&self->twin, frame, self->now_us);
+}
+
+static uint64_t next_us(const run_t *self)
+{
+    const uint64_t twin_us = twin_due_us(&self->twin);
+    const uint64_t script_us = script_due_us(&self->script, self->start_us, self->twin.enabled_us);
+    const uint64_t due_us = twin_us < script_us ? twin_us : script_us;
+    const uint64_t latest_us = self->now_us + AWAKE_US;
+    return due_us < latest_us ? due_us : latest_us;
+}
+
+/* Until something is heard, something is due, or a signal comes. */
+static void wait(const run_t *self, const sigset_t *open)
+{
+    struct pollfd fds[FDS_MAX];
+    const uint64_t due_us = next_us(self);
+    const uint64_t now_us = clock_us();
+    const uint64_t span_us = due_us > now_us ? due_us - now_us : 0;
+    const struct timespec span = {.tv_sec = (time_t)(span_us / 1000000u), .tv_nsec = (long)(span_us % 1000000u) * 1000};
+    unsigned count = wire_watch(&self->wire, fds);
+    count += control_watch(&self->control, fds + count);
+    (void)ppoll(fds, count, &span, open);
+}
+
+static int run(run_t *self, const sigset_t *open)
+{
+    while (is_ended == 0) {
+        wait(self, open);
+        self->now_us = clock_us();
+        if (!wire_hear(&self->wire, hear, self)) {
+            return refuse(EXIT_UNAVAILABLE, self->wire.name, "the interface is gone");
+        }
+        twin_advance(&self->twin, self->now_us);
+        script_run(&self->script, &self->twin, self->start_us, self->now_us, stderr);
+        control_serve(&self->control, &self->twin, self->now_us);
+    }
+    return EXIT_DONE;
+}
+
+/* Signals are taken while it waits, and at no other time. Returns the mask to wait with. */
+static sigset_t catch_signals(void)
+{
+    sigset_t ends;
+    sigset_t open;
+    const struct sigaction action = {.sa_handler = on_signal};
+    (void)sigemptyset(&ends);
+    (void)sigaddset(&ends, SIGTERM);
+    (void)sigaddset(&ends, SIGINT);
+    (void)sigprocmask(SIG_BLOCK, &ends, &open);
+    (void)sigaction(SIGTERM, &action, NULL);
+    (void)sigaction(SIGINT, &action, NULL);
+    return open;
+}
+
+static int run_twin(run_t *self)
+{
+    const sigset_t open = catch_signals();
+    (void)setpriority(PRIO_PROCESS, 0, NICE); /* where we may: drives have a processor to themselves */
+    int code = open_all(self);
+    if (code == EXIT_DONE) {
+        self->start_us = self->now_us = clock_us();
+        twin_start(&self->twin, &self->config, &self->settings, (node_out_t){wire_put, &self->wire}, self->now_us);
+        self->twin.bus = (twin_bus_t){wire_fault, &self->wire};
+        say_what_runs(self);
+        code = run(self, &open);
+    }
+    control_close(&self->control);
+    wire_close(&self->wire);
+    return code;
+}
+
+static int check(run_t *self)
+{
+    printf("%s: %u CiA 402 drives on %s, %u faults: right\n", self->options.config,
+           (unsigned)(self->config.settings.geometry.kind == KIN_HEXAPOD ? 6 : 3) + (self->config.settings.has_angle ? 1u : 0u),
+           self->config.can.interface, self->script.count);
+    return EXIT_DONE;
+}
+
+int main(int argc, char **argv)
+{
+    static run_t self;
+    int code = twin_options_read(&self.options, argc, argv);
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    switch (self.options.mode) {
+    case TWIN_HELP:
+        usage_print(twin_usage(), stdout);
+        return EXIT_DONE;
+    case TWIN_VERSION:
+        printf("heave-twin %s\n", HEAVE_VERSION);
+        return EXIT_DONE;
+    case TWIN_ASK:
+        return control_ask(self.options.socket, self.options.line);
+    case TWIN_RUN:
+    case TWIN_CHECK:
+        code = prepare(&self);
+        return code != EXIT_DONE ? code : self.options.mode == TWIN_CHECK ? check(&self) : run_twin(&self);
+    }
+    return EXIT_SOFTWARE;
+}

@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: MIT
+ * twin.c - the outside of a configuration; see twin.h.
+ */
+#include "twin/twin.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "config/cia402.h"
+
+#define STOP_MM       3.0 /* end stops are so far beyond the stroke */
+#define BOOT_US       300000u
+#define SDO_US        1000u
+#define SWITCH_ON_US  50000u
+#define BRAKE_US      100000u
+#define JUMP_U        20.0 /* a set-point so far away is a following error at once; mm or deg */
+#define MISSED_MAX    3u
+#define LAG_MS        2.0
+#define VENDOR        0x2E5u
+#define ANGLE_RATED_U 360.0
+
+void twin_settings_init(twin_settings_t *self, const config_t *config)
+{
+    memset(self, 0, sizeof *self);
+    for (unsigned k = 0; k < DRIVES_MAX; k++) {
+        self->leg_of[k] = (uint8_t)k;
+        self->lead[k] = 1;
+    }
+    self->start_mm = config->settings.settled_extension_mm_q16 / (double)Q16_ONE;
+    self->lag_ms = LAG_MS;
+}
+
+const char *twin_refusal(const config_t *config)
+{
+    switch (config->drives) {
+    case CONFIG_DRIVES_CIA402:
+        return NULL;
+    case CONFIG_DRIVES_SIM:
+        return "[drives] driver = sim: heaved simulates these drives itself; heave-twin needs driver = cia402";
+    case CONFIG_DRIVES_CAN_RAW:
+        return "[drives] driver = can_raw: heave-twin has no drives with CAN frames of their own yet, only cia402";
+    case CONFIG_DRIVES_MODBUS_TCP:
+    case CONFIG_DRIVES_MODBUS_RTU:
+        return "[drives] driver: heave-twin has no Modbus drives yet, only cia402";
+    }
+    return "[drives] driver is unknown to heave-twin";
+}
+
+/* What a drive moves: raw counts = zero + u * per_unit. */
+static void couple(twin_t *self, const config_t *config, const twin_settings_t *settings, const cia402_axis_config_t *axis,
+                   unsigned k)
+{
+    const double expected = (double)axis->scale.num / axis->scale.den;
+    self->leg_of[k] = settings->leg_of[k];
+    self->per_unit[k] = expected / settings->lead[k] * (settings->is_reversed[k] ? -1 : 1);
+    self->zero[k] = axis->scale.zero + settings->zero_counts[k];
+    drive_t *drive = &self->node[k].drive;
+    motor_t *motor = &drive->motor;
+    const double counts = fabs(self->per_unit[k]);
+    const bool is_cylinder = k < self->cylinders;
+    motor->lag_us = settings->lag_ms * 1000;
+    motor->friction = settings->friction_mm * counts;
+    motor->load = is_cylinder ? settings->load_mm * self->per_unit[k] : 0;
+    motor->rated_speed = counts * (is_cylinder ? config->settings.cylinder_speed_mm_s_q16 / (double)Q16_ONE : ANGLE_RATED_U);
+    drive->jump_counts = (uint32_t)fmin(JUMP_U * fabs(expected), 2e9);
+    drive->home = self->zero[k];
+    double start = 0;
+    if (is_cylinder) {
+        const double stroke = config->settings.stroke_mm_q16[self->leg_of[k]] / (double)Q16_ONE;
+        const double in = self->zero[k] - STOP_MM * self->per_unit[k];
+        const double out = self->zero[k] + (stroke + STOP_MM) * self->per_unit[k];
+        motor->stop_low = fmin(in, out);
+        motor->stop_high = fmax(in, out);
+        /* it looks for its zero where the configuration has "in": backwards that is the other end */
+        drive->home += settings->is_reversed[k] ? stroke * self->per_unit[k] : 0;
+        start = settings->start_mm;
+    }
+    motor_start(motor, self->zero[k] + start * self->per_unit[k], 0);
+}
+
+void twin_start(twin_t *self, const config_t *config, const twin_settings_t *settings, node_out_t out, uint64_t now_us)
+{
+    cia402_config_t drives;
+    memset(self, 0, sizeof *self);
+    config_cia402(config, &drives);
+    self->drives = drives.axes;
+    self->has_pose = kin_init(&self->kin, &config->settings.geometry) == HV_OK;
+    self->cylinders = kin_cylinders(&self->kin);
+    for (unsigned k = 0; k < self->drives; k++) {
+        const cia402_axis_config_t *axis = &drives.axis[k];
+        const uint32_t identity[4] = {
+            axis->identity[0] != 0 ? axis->identity[0] : VENDOR, axis->identity[1] != 0 ? axis->identity[1] : 1,
+            axis->identity[2] != 0 ? axis->identity[2] : 1, axis->identity[3] != 0 ? axis->identity[3] : k + 1};
+        node_t *node = &self->node[k];
+        node->number = axis->node;
+        memcpy(node->identity, identity, sizeof identity);
+        node->boot_us = BOOT_US;
+        node->sdo_us = SDO_US;
+        node->out = out;
+        node->drive.switch_on_us = SWITCH_ON_US;
+        node->drive.brake_us = BRAKE_US;
+        node->drive.missed_max = MISSED_MAX;
+        node->drive.is_absolute = axis->homing_method == 0;
+        couple(self, config, settings, axis, k);
+        node_power(node, true, now_us);
+    }
+}
+
+void twin_hear(twin_t *self, const can_frame_t *frame, uint64_t now_us)
+{
+    for (unsigned k = 0; k < self->drives; k++) {
+        node_hear(&self->node[k], frame, now_us);
+    }
+}
+
+void twin_advance(twin_t *self, uint64_t now_us)
+{
+    unsigned enabled = 0;
+    for (unsigned k = 0; k < self->drives; k++) {
+        node_advance(&self->node[k], now_us);
+        enabled += self->node[k].is_powered && drive_is_enabled(&self->node[k].drive);
+    }
+    if (self->enabled_us == 0 && enabled == self->drives) {
+        self->enabled_us = now_us;
+    }
+}
+
+uint64_t twin_due_us(const twin_t *self)
+{
+    uint64_t due_us = DRIVE_NEVER;
+    for (unsigned k = 0; k < self->drives; k++) {
+        const uint64_t node_us = node_due_us(&self->node[k]);
+        due_us = node_us < due_us ? node_us : due_us;
+    }
+    return due_us;
+}
+
+double twin_position(const twin_t *self, unsigned drive)
+{
+    return (self->node[drive].drive.motor.actual - self->zero[drive]) / self->per_unit[drive];
+}
+
+bool twin_find_pose(twin_t *self, pose_t *out)
+{
+    q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
+    for (unsigned k = 0; k < self->cylinders; k++) {
+        extension_mm_q32[self->leg_of[k]] = (q32_t)(twin_position(self, k) * (double)Q32_ONE);
+    }
+    pose_t level;
+    memset(&level, 0, sizeof level);
+    if (kin_forward(&self->kin, extension_mm_q32, &self->pose, out, NULL) != HV_OK &&
+        kin_forward(&self->kin, extension_mm_q32, &level, out, NULL) != HV_OK) {
+        return false;
+    }
+    self->pose = *out;
+    return true;
+}

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: MIT
+ * twin.h - the outside of a configuration: its drives on their bus, and the mechanism that they move. What is wrong between the
+ * two is a setting: which drive is on which leg, which runs backwards, whose scale is another. Time is an argument, us.
+ */
+#ifndef HEAVE_TWIN_TWIN_H
+#define HEAVE_TWIN_TWIN_H
+
+#include "config/config.h"
+#include "heave/drives.h"
+#include "heave/kin.h"
+#include "twin/node.h"
+
+/** How the machine was put together. */
+typedef struct {
+    uint8_t leg_of[DRIVES_MAX]; /**< leg that each drive moves */
+    bool is_reversed[DRIVES_MAX];
+    double lead[DRIVES_MAX];        /**< times the way that the configuration expects */
+    double zero_counts[DRIVES_MAX]; /**< its encoder is so much beside */
+    double start_mm;                /**< extension of all legs */
+    double lag_ms, friction_mm, load_mm;
+} twin_settings_t;
+
+/** Faults of the whole bus. */
+typedef enum { BUS_OFF, BUS_PASSIVE, BUS_ACTIVE, BUS_STORM, BUS_CABLE_OUT, BUS_CABLE_IN, BUS_FULL, BUS_DOWN, BUS_UP } bus_fault_t;
+
+/** Who makes them. act returns false where it cannot, and says why. */
+typedef struct {
+    bool (*act)(void *ctx, bus_fault_t fault, uint32_t number, char *why, size_t size);
+    void *ctx;
+} twin_bus_t;
+
+/** The outside. */
+typedef struct {
+    unsigned drives;
+    unsigned cylinders;
+    node_t node[DRIVES_MAX];
+    uint8_t leg_of[DRIVES_MAX];
+    double zero[DRIVES_MAX];     /**< raw counts of a drive at 0 u */
+    double per_unit[DRIVES_MAX]; /**< raw counts per u as it really is */
+    kin_t kin;
+    pose_t pose; /**< the last that was found */
+    bool has_pose;
+    uint64_t enabled_us; /**< all had torque for the first time; 0 = not yet */
+    twin_bus_t bus;
+} twin_t;
+
+/** Everything as it should be. */
+void twin_settings_init(twin_settings_t *self, const config_t *config);
+
+/** Whether the drives of a configuration can be simulated here. Returns NULL, or why not and what to do. */
+const char *twin_refusal(const config_t *config);
+
+/** Switches everything on. */
+void twin_start(twin_t *self, const config_t *config, const twin_settings_t *settings, node_out_t out, uint64_t now_us);
+
+/** A frame on the bus. */
+void twin_hear(twin_t *self, const can_frame_t *frame, uint64_t now_us);
+
+/** Lives up to now. */
+void twin_advance(twin_t *self, uint64_t now_us);
+
+/** When it wants to be looked at next. */
+uint64_t twin_due_us(const twin_t *self);
+
+/** Where a drive is, mm or deg, as it really is. */
+double twin_position(const twin_t *self, unsigned drive);
+
+/** The pose that the legs give; false where there is none. */
+bool twin_find_pose(twin_t *self, pose_t *out);
+
+#endif
