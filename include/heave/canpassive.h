@@ -14,7 +14,7 @@ typedef struct {
     uint64_t since_us; /* start of error-passive, or time of the last query */
 } canpassive_t;
 
-/** Checks the controller. Call once per cycle, after all frames were received. When the time is over, queries the controller
+/** Checks the controller. Call once per cycle, after all frames were received. After limit_ms, queries the controller
  *  itself (hal_can_ask_state()), because some controllers never report that they have recovered. Repeats the query every
  * limit_ms.
  *  @param now_us   never decreasing

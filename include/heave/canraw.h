@@ -107,22 +107,22 @@ typedef enum { CANRAW_ASKED_NOTHING, CANRAW_ASKED_POSITION, CANRAW_ASKED_HOMING 
 typedef struct {
     drive_state_t state; /**< never DRIVE_OFFLINE */
     canraw_asked_t asked;
-    uint8_t pending; /**< canraw_command_t that has to go out, or CANRAW_NOTHING */
+    uint8_t pending; /**< canraw_command_t to be sent, or CANRAW_NOTHING */
     bool is_online;
-    bool is_begun; /**< the request that led to this state has been seen in a poll */
+    bool is_begun; /**< a poll has processed the request that led to this state */
     bool is_homed;
-    bool is_homing_seen; /**< the drive has said that homing goes on */
-    bool is_homing_over; /**< it has said that homing is done */
+    bool is_homing_seen; /**< the drive has reported that homing is in progress */
+    bool is_homing_over; /**< the drive has reported that homing is done */
     bool is_homing_next; /**< the next query is the one for homing */
-    bool is_energized;   /**< torque was asked for, and that it is off has not been confirmed since */
+    bool is_energized;   /**< torque was requested, and the drive has not confirmed since that it is off */
     bool has_actual;
     bool has_sent;
     uint32_t status;
     uint32_t fault_code;
     drive_guard_t guard;
-    uint64_t mark_us;        /**< of the request, of the end of homing: actual has to be newer */
-    uint64_t told_us;        /**< the last command went out */
-    uint64_t reset_until_us; /**< until then a fault may end; 0: no reset goes on */
+    uint64_t mark_us;        /**< time of the request or of the end of homing: actual has to be newer */
+    uint64_t told_us;        /**< when the last command was sent */
+    uint64_t reset_until_us; /**< end of the time in which a reset may end the fault; 0: no reset */
     uint64_t actual_us;
     int64_t sent_counts;
     q32_t sent_q32;
@@ -133,22 +133,22 @@ typedef struct {
 typedef struct {
     const canraw_map_t *map;
     hal_can_t can;
-    bool is_gone;    /**< the bus does not work */
-    bool is_due;     /**< a period has passed, the next set has not gone out */
-    bool is_free;    /**< everything sent was seen on the wire */
-    bool is_refused; /**< the last set, by a queue that is full */
+    bool is_gone;    /**< the bus has failed */
+    bool is_due;     /**< a period has passed, and the next set was not sent yet */
+    bool is_free;    /**< all frames sent were seen on the wire */
+    bool is_refused; /**< the queue was full for the last set */
     bool has_time;
     canpassive_t passive;
     uint64_t now_us;
-    uint64_t set_us;     /**< the last set went out */
-    uint64_t query_us;   /**< the last queries went out */
-    uint64_t free_us;    /**< is_free was true */
-    uint64_t restart_us; /**< of the bus, last tried */
+    uint64_t set_us;     /**< when the last set was sent */
+    uint64_t query_us;   /**< when the last queries were sent */
+    uint64_t free_us;    /**< when is_free was last true */
+    uint64_t restart_us; /**< last attempt to restart the bus */
     uint32_t round;      /**< of queries */
     uint32_t sets;       /**< sent */
     uint32_t refused;    /**< sets that had to wait for the bus */
-    uint32_t strange;    /**< frames on a reply_id that match no reply, or that nobody asked for */
-    uint32_t restarts;   /**< of the bus, that worked */
+    uint32_t strange;    /**< frames on a reply_id that match no reply, or without a query */
+    uint32_t restarts;   /**< successful restarts of the bus */
     canraw_axis_t axis[DRIVES_MAX];
 } canraw_t;
 

@@ -157,22 +157,22 @@ typedef enum {
 /** State of one drive; private. Ordered so that there is no padding. */
 typedef struct {
     cia402_phase_t phase;
-    uint32_t trouble; /* cia402_trouble_t of the last loss or refusal */
+    uint32_t trouble; /* cia402_trouble_t: reason of the last loss or refusal */
     uint64_t phase_us;
     uint64_t trouble_us;
     uint32_t trouble_object; /* index << 8 | sub */
     uint32_t trouble_code;   /* SDO abort code, or a code of the drive */
-    uint32_t trouble_found;  /* where has_found: the object holds this, */
-    uint32_t trouble_wanted; /* instead of this */
-    uint32_t mute_object;    /* no answer came when it was asked for; 0 = none */
-    uint32_t warned_object;  /* a guard that is off and was allowed to be */
-    uint8_t nmt;             /* last heard */
-    uint8_t nmt_command;     /* waits to be sent, 0 = none */
+    uint32_t trouble_found;  /* if has_found: value of the object, */
+    uint32_t trouble_wanted; /* and the required value */
+    uint32_t mute_object;    /* object without an answer; 0 = none */
+    uint32_t warned_object;  /* a watchdog that is off and was accepted */
+    uint8_t nmt;             /* last received */
+    uint8_t nmt_command;     /* command to be sent, 0 = none */
     uint8_t starts;          /* attempts to become operational */
     uint8_t mutes;           /* attempts that ended at an object without answer */
-    uint8_t awaited;         /* TPDOs that SYNCs have asked for and that have not come, saturates */
-    uint8_t surplus;         /* those that nothing had asked for, saturates */
-    uint8_t plain_syncs;     /* since the last of these, saturates */
+    uint8_t awaited;         /* TPDOs requested by SYNC that are still missing, saturates */
+    uint8_t surplus;         /* TPDOs without a request, saturates */
+    uint8_t plain_syncs;     /* SYNCs since the last of these, saturates */
     bool is_reset_done;
     bool has_found;
     sdo_t sdo;
@@ -185,31 +185,31 @@ typedef struct {
     uint64_t actual_us;
     drive_emergency_t emergency;
     uint64_t note_us[CIA402_WATCHES]; /* when each was seen last */
-    uint32_t notes;                   /* told of: bit N for cia402_watch_t N */
+    uint32_t notes;                   /* reported: bit N for cia402_watch_t N */
     int32_t actual_counts;
     uint32_t silent_syncs;
-    uint8_t watch_answers[CIA402_WATCHES]; /* in a row that show it, saturates */
-    bool has_followed;                     /* bit 12 was there since operation is enabled */
-    bool had_voltage;                      /* bit 4 likewise */
+    uint8_t watch_answers[CIA402_WATCHES]; /* consecutive answers with the condition, saturates */
+    bool has_followed;                     /* bit 12 was set since operation was enabled */
+    bool had_voltage;                      /* bit 4 was set since operation was enabled */
     bool has_answer;                       /* a TPDO came since the last poll */
     uint16_t statusword;
     int8_t mode_shown;
     bool has_heartbeat;
     bool has_actual;   /* since it was set up last */
     bool was_heard;    /* has_actual at any time */
-    bool is_answering; /* up or not, and not known to be lost */
+    bool is_answering; /* answers, whether up or not */
 
-    bool is_in;        /* takes part in what the drives do together */
-    bool has_operated; /* since the stage began in which all get there */
+    bool is_in;        /* takes part in the common stage */
+    bool has_operated; /* operation was enabled since its stage began */
     cia402_goal_t goal;
     uint16_t word;
     uint8_t word_syncs;  /* since it changed, saturates */
-    uint8_t reset_syncs; /* of the way through a fault reset, 0 = none */
+    uint8_t reset_syncs; /* SYNCs since a fault reset began, 0 = none */
     uint64_t reset_until_us;
     uint64_t operating_us; /* operation enabled since, 0 = not */
     uint64_t stopping_us;  /* quick stop since, 0 = not */
-    uint32_t own_fault;    /* found by this driver: cia402_trouble_t or a number of the standard; 0 = none */
-    drive_guard_t guard;   /* why own_fault, where its set-points were too far */
+    uint32_t own_fault;    /* error found by this driver: cia402_trouble_t or a code of the standard; 0 = none */
+    drive_guard_t guard;   /* distances, if own_fault is about set-points */
     uint16_t error_code;   /* the drive's own */
     bool is_error_read;
     q32_t sent_q32;
@@ -218,10 +218,10 @@ typedef struct {
     bool is_homed;
     bool has_sent;
     bool was_faulty;
-    uint8_t down_syncs; /* since a controlword that leads up to power or torque, as far as it matters */
+    uint8_t down_syncs; /* SYNCs since the last controlword that leads to power or torque, saturates */
 } cia402_axis_t;
 
-/** What the drives do together; private. */
+/** Common stage of all drives; private. */
 typedef enum {
     CIA402_STAGE_OFF,
     CIA402_STAGE_WITHDRAW, /**< no torque, for a change of mode */
@@ -239,17 +239,17 @@ typedef struct {
     cia402_stage_t stage;
     uint64_t stage_us;
     uint32_t stage_syncs;
-    bool is_begun;  /* the request that led here has been seen in a poll */
-    bool is_homing; /* on the way through homing, rather than to enabled */
+    bool is_begun;  /* a poll has processed the request that led here */
+    bool is_homing; /* the goal is homing, else enabled */
     bool is_homing_asked;
     bool is_gone;          /* the bus does not work */
     bool is_due;           /* a period has begun, its SYNC has not gone out */
     bool is_open;          /* SYNC has gone out, the set-points have not */
     bool was_period_begin; /* in the last poll */
-    bool is_free;          /* everything sent was seen on the wire */
-    bool is_refused;       /* the last SYNC, or some of the last set, by a queue that is full */
+    bool is_free;          /* all frames sent were seen on the wire */
+    bool is_refused;       /* the queue was full for the last SYNC or a part of the last set */
     bool has_time;
-    bool is_preop_due; /* all nodes have to be told to leave operational */
+    bool is_preop_due; /* NMT pre-operational has to be sent to all nodes */
     canpassive_t passive;
     uint8_t pp_step; /* of the handshake in PP */
     uint8_t sync_count;

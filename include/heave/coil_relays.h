@@ -21,7 +21,7 @@ typedef struct {
     uint16_t first_coil; /**< coil of relay 1, from 0; the others follow */
     uint8_t count;       /**< [0, HAL_RELAYS_MAX] */
     bool is_active_low;  /**< a coil that is off closes its relay */
-    uint16_t start_mask; /**< written at the start, bits above count are left out */
+    uint16_t start_mask; /**< written at the start; bits above count are ignored */
     uint32_t look_calls; /**< calls of read_back without a write after which the board is read; also the limit for one
                             transaction; > 0 */
 } coil_relays_config_t;

@@ -21,7 +21,7 @@ typedef enum {
     FAULT_SETPOINT_JUMP,  /**< a set-point jumped away from its drive, and was not sent */
     FAULT_ESTOP_CHANNELS, /**< the two channels of the e-stop disagree for too long */
     FAULT_POWER,          /**< the supply fails, and the platform was not settled in time */
-    FAULT_OUTSIDE_STROKE, /**< a drive that is coming up says that its cylinder stands outside its stroke */
+    FAULT_OUTSIDE_STROKE, /**< a drive reports a position outside its stroke while it comes up */
     FAULT_CODES
 } fault_code_t;
 

@@ -46,13 +46,13 @@ typedef enum { BRING_UP_IDLE, BRING_UP_ENABLE, BRING_UP_HOME, BRING_UP_MOVE } br
 
 /** The auto policy; members are private to src/gateway. */
 typedef struct {
-    bool is_due; /**< not used up yet */
+    bool is_due; /**< engage = auto has not taken effect yet */
     uint32_t cycle_us;
-    uint32_t frames; /**< within a second, that it waits for */
-    uint32_t seen;   /**< since a gap of more than a second; wraps: harmless, after 2^32 frames it has long been used */
+    uint32_t frames; /**< valid frames within a second that it waits for */
+    uint32_t seen;   /**< frames since a gap of more than a second; may wrap */
     uint64_t last_us;
-    uint32_t span_cycles;                        /**< of the newest so many frames */
-    uint16_t gap_cycles[AUTO_ENGAGE_FRAMES_MAX]; /**< in front of each of them; a gap of a second has 2000 at most */
+    uint32_t span_cycles;                        /**< duration of the newest frames, at most `frames` of them */
+    uint16_t gap_cycles[AUTO_ENGAGE_FRAMES_MAX]; /**< cycles before each of these; at most 2000 in a second */
 } auto_engage_t;
 
 /** Converts a value of a frame into a value of an axis: sign * scale * value + offset. */
@@ -91,10 +91,10 @@ typedef struct {
 
 /** The last log line about a drive. Limits the rate, so that a drive that comes and goes does not fill the log. */
 typedef struct {
-    uint64_t next_us; /**< a line is free from then on, less what a burst may use up */
+    uint64_t next_us; /**< when the next line may be written; a burst may be earlier */
     uint32_t code;
     uint32_t detail_code;
-    uint32_t left_out; /**< changes since then that no line told of */
+    uint32_t left_out; /**< changes since then without a line */
 } gateway_told_t;
 
 /** A gateway; members are private to src/gateway. */
@@ -106,34 +106,34 @@ typedef struct {
     supervisor_t supervisor;
     frame_scanner_t scanner;
     snapshot_t snapshot;
-    fault_code_t axis_fault[DRIVES_MAX];        /**< what is wrong with each drive now */
-    uint32_t told[DRIVES_MAX + 1u];             /**< faults that the coming cycle is to find, as snapshot.begun */
-    uint64_t following_since_us[CYLINDERS_MAX]; /**< further from its set-point than allowed since then; 0 = it is not */
+    fault_code_t axis_fault[DRIVES_MAX];        /**< present fault of each drive */
+    uint32_t told[DRIVES_MAX + 1u];             /**< faults that the next cycle has to find, as snapshot.begun */
+    uint64_t following_since_us[CYLINDERS_MAX]; /**< start of a distance from the set-point that is too large; 0 = none */
     bring_up_t bring_up;
     uint64_t bring_up_deadline_us;
-    bool is_bus_lost;        /**< so that it is counted once */
+    bool is_bus_lost;        /**< so that the fault is counted once */
     bool is_bus_failing;     /**< the same */
     bool is_estop_apart;     /**< the same */
     bool is_power_overdue;   /**< the same */
-    uint64_t power_since_us; /**< the supply has been failing since then; 0 = it is not */
+    uint64_t power_since_us; /**< start of the failure of the supply; 0 = none */
     bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
     bool is_disable_due;     /**< disable the drives once at rest */
     auto_engage_t auto_engage;
-    bool is_shutdown_asked;  /**< nothing brings the platform up any more */
-    bool is_end_overdue;     /**< drives that have not confirmed that their torque is off are not waited for any more */
+    bool is_shutdown_asked;  /**< the platform may not rise any more */
+    bool is_end_overdue;     /**< the time for drives to confirm that their torque is off has passed */
     uint32_t unsent_cycles;  /**< cycles in a row whose set-points the bus did not take */
-    uint64_t reset_until_us; /**< a reset waits for the drives until then; 0 = none */
-    uint64_t end_since_us;   /**< a shutdown has come to OFF, FAULT or ESTOP, and the drives were told; 0 = not yet */
+    uint64_t reset_until_us; /**< end of the time in which a reset waits for the drives; 0 = no reset */
+    uint64_t end_since_us;   /**< when a shutdown reached OFF, FAULT or ESTOP and the drives were told; 0 = not yet */
     owner_t owner;
-    uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
+    uint64_t start_us;       /**< start of the silence timer: last accepted frame or entry into ENGAGED */
     uint64_t state_since_us; /**< when the state was entered */
     confirm_t confirm;
-    uint32_t waited_us;     /**< by the newest datagram for its cycle */
-    unsigned stream_frames; /**< in quick succession so far, at most as many as make a stream */
-    uint16_t frame_mask;    /**< what the sender asked of the relays */
+    uint32_t waited_us;     /**< time that the newest datagram waited for its cycle */
+    unsigned stream_frames; /**< frames in quick succession so far, up to the number that makes a stream */
+    uint16_t frame_mask;    /**< relay mask of the sender */
     relay_policy_t relay_policy;
     unsigned targets; /**< of this cycle */
-    bool has_newest;  /**< newest is of this cycle and motion has not been told of it */
+    bool has_newest;  /**< newest is of this cycle, and motion has not got it yet */
     motion_target_t newest;
     frame_command_t newest_command;
     hal_udp_peer_t newest_from;
@@ -141,13 +141,13 @@ typedef struct {
     uint16_t written_mask; /**< with it */
     bool is_mask_written;
     healthy_t healthy;
-    bool is_late;                /**< the coming cycle is, by more than the pulse bears */
+    bool is_late;                /**< the next cycle is too late for the healthy pulse */
     bool is_pulse_lost;          /**< its line cannot be written */
     uint64_t other_logged_us;    /**< 0 = never */
     uint64_t singular_logged_us; /**< 0 = never */
     uint32_t other_suppressed;
     uint64_t spike_logged_us;
-    uint32_t spikes_logged; /**< of all spikes, those that a line told of */
+    uint32_t spikes_logged; /**< spikes that are already in the log */
     uint64_t jump_logged_us;
     uint32_t jumps_logged;                    /**< likewise */
     gateway_told_t told_of[DRIVES_MAX];       /**< the last line about what a drive is at */

@@ -17,7 +17,7 @@
 enum {
     GOVERNOR_LEVELS = 7,                   /**< low-passes */
     GOVERNOR_CHANNELS = 2 * CYLINDERS_MAX, /**< pose axes, then the cylinders that follow from them */
-    GOVERNOR_POLES = 3,                    /**< low-passes that smooth a rise of the strength */
+    GOVERNOR_POLES = 3,                    /**< number of low-passes that smooth a rising strength */
     GOVERNOR_SPANS = 4                     /**< quarters of a second for which a need is remembered */
 };
 

@@ -34,6 +34,10 @@ void halt_plan(halt_t *self, unsigned axes, unsigned together, const ramp_state_
 /** End positions of such a stop of all axes together, without planning it. */
 void halt_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits, q32_t *rest_q32);
 
+/** Velocity of an axis in a cycle of the stop, by the same profile as halt_step(), without rounding errors of sums.
+ *  @param cycle at least 1; past the end: 0 */
+q32_t halt_velocity(const halt_t *self, unsigned axis, int64_t cycle);
+
 /** References of the next cycle. Past the end: at rest. */
 void halt_step(halt_t *self, ramp_ref_t *ref);
 

@@ -171,15 +171,15 @@ typedef struct {
     uint8_t read_step; /**< block of the feedback */
     bool is_checking;  /**< the item is being read back */
     bool is_broadcast; /**< the stop goes to all drives of the line first; whichever slot has its turn carries it */
-    bool is_reset_due; /**< asked for while a stop was on its way */
+    bool is_reset_due; /**< requested while a stop was in progress */
     bool is_homed;
     bool is_after_homing; /**< placed once more, torque is on */
-    bool is_placed;       /**< the target is where the drive was when it was last asked to follow */
+    bool is_placed;       /**< the target was set to the actual position when following was last requested */
     bool is_homing_seen;
-    bool is_energized; /**< torque was on or asked for, and that it is off has not been confirmed since */
+    bool is_energized; /**< torque was on or requested, and the drive has not confirmed since that it is off */
     bool has_actual;
-    bool has_sent;     /**< asked_q32 is the last set-point that came */
-    bool is_fresh;     /**< a set-point has come since the last was handed over */
+    bool has_sent;     /**< asked_q32 is valid */
+    bool is_fresh;     /**< there is a newer set-point than the one submitted last */
     uint8_t exception; /**< of the trouble */
     uint16_t object;   /**< register of the trouble, or of the item */
     uint32_t trouble;  /**< modbus_drive_trouble_t, or the drive's own code */
@@ -189,21 +189,21 @@ typedef struct {
     int64_t actual_counts;
     q32_t actual_q32;
     uint64_t actual_us;
-    int64_t target_counts; /**< what set-point blocks carry */
+    int64_t target_counts; /**< values for the set-point blocks */
     int64_t target_speed;
     q32_t asked_q32; /**< last set-point of the motion */
-    q32_t paced_q32; /**< what the line can carry of it */
+    q32_t paced_q32; /**< after pacing */
     int64_t sum_q32; /**< of paced_q32 since the last one written */
     uint32_t sums;
-    q32_t offered_q32;    /**< mean that was handed over last */
+    q32_t offered_q32;    /**< mean that was submitted last */
     q32_t written_q32;    /**< mean that was confirmed last */
     uint32_t period_us;   /**< T, smoothed */
     uint64_t setpoint_us; /**< last confirmed; 0 = none */
     uint64_t due_us;      /**< of the next set-point */
     uint64_t next_read_us;
-    uint64_t read_us;        /**< the feedback that is being read was begun */
-    uint64_t mark_us;        /**< feedback has to be begun after that */
-    uint64_t reset_until_us; /**< 0: no reset goes on */
+    uint64_t read_us;        /**< when the present read of the feedback began */
+    uint64_t mark_us;        /**< only feedback that began later counts */
+    uint64_t reset_until_us; /**< 0: no reset in progress */
     drive_guard_t guard;
     uint64_t since_us; /**< of the phase */
     uint64_t trouble_us;

@@ -64,7 +64,7 @@ typedef struct {
     q32_t ref_jerk_q32;    /**< largest recent jerk of the references, decaying, u/cycle^3 */
     q32_t ref_acc_q32;     /**< largest recent acceleration of the references, decaying, u/cycle^2 */
     uint32_t brake_cycles; /**< upper bound of a braking distance in cycles at its highest speed; 0: unknown */
-    unsigned flags;        /**< of the last step: RAMP_CLAMPED ... */
+    unsigned flags;        /**< flags of the last step: RAMP_CLAMPED ... */
 } ramp_t;
 
 /** Converts limits from units to cycles.

@@ -31,7 +31,7 @@ typedef enum {
                                 requests of the cycle, else it would end the move that a request has only just begun */
     EVENT_ENGAGE,          /**< operator, enable key, or the auto policy */
     EVENT_HOLD,            /**< operator */
-    EVENT_RESUME,          /**< operator: go on with what a hold interrupted */
+    EVENT_RESUME,          /**< operator: continue what a hold interrupted */
     EVENT_PARK,            /**< operator: settle */
     EVENT_RESET,           /**< operator: leave FAULT or ESTOP, once the cause is gone */
     EVENT_SHUTDOWN,        /**< operator or SIGTERM: settle, then off */

@@ -26,7 +26,7 @@ typedef struct {
     uint32_t discrepancy_us; /**< 0: there is no second channel */
     uint64_t agreed_us;      /**< last time at which the channels of the e-stop agreed */
     bool is_apart;           /**< they have disagreed for too long */
-    bool is_proven;          /**< since then both were open at the same time */
+    bool is_proven;          /**< both were open at the same time since then */
     bool is_started;
     bool is_lost;
 } switches_t;

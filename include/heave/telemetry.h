@@ -64,8 +64,8 @@ typedef struct {
     fault_t fault;                       /**< the first one since the last reset */
     drive_report_t fault_report;         /**< report of its drive at that time; "" if the fault concerns no drive */
     fault_reaction_t reaction;           /**< the worst of them */
-    uint64_t fault_last_us[FAULT_CODES]; /**< when each was last seen to begin, 0 = never */
-    uint32_t begun[DRIVES_MAX + 1u];     /**< in this cycle, by axis as in fault_t: bit N for fault_code_t N */
+    uint64_t fault_last_us[FAULT_CODES]; /**< last beginning of each fault, 0 = never */
+    uint32_t begun[DRIVES_MAX + 1u];     /**< faults that began in this cycle, by axis as in fault_t: bit N for fault_code_t N */
     uint8_t cylinders;
     bool has_angle;
     uint8_t relay_count;

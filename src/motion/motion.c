@@ -328,8 +328,6 @@ static void end_cycle(motion_t *self, uint64_t now_us)
     } else if (is_led_astray(self)) {
         self->singular_stops++;
         motion_follow(self);
-    } else if (self->is_following) {
-        follow_end_cycle(self);
     }
 }
 

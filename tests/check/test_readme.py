@@ -6,6 +6,7 @@ usage: test_readme.py --heaved PROGRAM --heavectl PROGRAM --reference PROGRAM --
 """
 import argparse
 import functools
+import json
 import os
 import re
 import signal
@@ -14,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from xml.etree import ElementTree
 
 import tap
 
@@ -27,7 +29,8 @@ STATES = re.compile(r"<!-- states:begin -->.*?<!-- states:end -->", re.S)
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]*))?\)")
 NOT_OURS = {"cmake", "export", "printf", "cp", "nano", "sleep", "sudo", "gpiodetect", "gpioinfo"}
 OTHER_OPTIONS = {"--build", "--install", "--now", "--component", "--prefix"}  # of cmake, systemctl
-OWN_STROKE_MM, OWN_TARGET = "210", (5, 6, 0, 5.5, 3, 20)
+NUMBER = re.compile(r"-?\d+")
+OWN_STROKE_MM, OWN_POSE = 260, (5, 6, 0, 5.5, 3, 20)
 
 
 def run(*command, **more):
@@ -91,6 +94,26 @@ def index():
         pages = {path.name for path in DOCS.glob("*.md") if ".zh-CN" not in path.name} - {"README.md"}
         wanted = {f"{Path(page).stem}{suffix}.md" if (DOCS / f"{Path(page).stem}{suffix}.md").exists() else page for page in pages}
         assert named == wanted, f"docs/{name}: missing {wanted - named}, too many {named - wanted}"
+
+
+def keys():
+    """`[section] key` in a page is a key that there is. Of what is gone, the list of changes tells."""
+    text = (DOCS / "configuration.md").read_text(encoding="utf-8")
+    known = {(section, key) for section, rows in re.findall(r"^## \[([\w-]+)\]$(.*?)(?=^## |\Z)", text, re.M | re.S) for key in re.findall(r"^\| `(\w+)` \|", rows, re.M)}
+    assert len(known) > 150
+    named = [(path.name, *place) for path in every_page() for place in re.findall(r"`\[([\w-]+)\] (\w+)(?: = [^`]*)?`", path.read_text(encoding="utf-8"))]
+    wrong = [place for place in named if place[1:] not in known]
+    assert len(named) > 50 and not wrong, f"keys that are not there: {wrong}"
+
+
+def licence():
+    """LICENSE is what the package's copyright file says, and every source names it."""
+    words = [re.findall(r"[\w\"']+", (TOP / name).read_text(encoding="utf-8")) for name in ("LICENSE", "packaging/debian/copyright")]
+    start = [one.index("Permission") for one in words]
+    assert words[0][start[0]:] == words[1][start[1]:], "LICENSE and packaging/debian/copyright differ"
+    sources = [path for folder in ("include", "src", "hal", "examples") for path in (TOP / folder).rglob("*.[ch]")]
+    silent = [str(path) for path in sources if "SPDX-License-Identifier: MIT" not in path.read_text(encoding="utf-8")[:200]]
+    assert len(sources) > 200 and not silent, f"no SPDX line: {silent}"
 
 
 def commands(path, programs):
@@ -211,21 +234,19 @@ class Manual:
             assert receiver.recv(512).decode() in text
 
     def a_platform_of_ones_own(self):
-        """The block as it stands, on another port: the editor changes the stroke, and the frame brings the platform to its pose."""
+        """The file with another stroke and port, then the commands as they stand: the frame brings the platform to its pose."""
         text, = (text for text in blocks(self.readme, "sh") if "my-platform.ini" in text)
-        assert len(text.splitlines()) <= 10
+        sizes, = blocks(self.readme, "ini")
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
             free.bind(("127.0.0.1", 0))
             port = str(free.getsockname()[1])
         with tempfile.TemporaryDirectory() as folder:
-            editor = Path(folder) / "nano"
-            editor.write_text(f"#!/bin/sh\nsed -i 's/^stroke_mm = .*/stroke_mm = {OWN_STROKE_MM}/; s/^port = .*/port = {port}/' \"$1\"\n", encoding="ascii")
-            editor.chmod(0o755)
-            text = text.replace("/tmp/", f"{folder}/").replace("/9800", f"/{port}").replace("config/", f"{TOP}/config/")
+            own = re.sub(r"(?m)^stroke_mm = \d+$", f"stroke_mm = {OWN_STROKE_MM}", sizes)
+            assert own != sizes
+            (Path(folder) / "my-platform.ini").write_text(f"{own}\n[udp]\nport = {port}\n", encoding="utf-8")
+            text = text.replace("/tmp/", f"{folder}/").replace("/9800", f"/{port}").replace("$PWD/build/demo/bin", str(self.programs["heaved"].parent))
             text = text.replace("heavectl shutdown", "heavectl --json status\nheavectl shutdown\nwait")
-            environment = self.environment()
-            text = text.replace('export PATH="$PWD/build/demo/bin:', f'export PATH="{folder}:{self.programs["heaved"].parent}:')
-            with subprocess.Popen(["bash", "-e", "-c", text], cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            with subprocess.Popen(["bash", "-e", "-c", text], cwd=folder, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                   stderr=subprocess.STDOUT, text=True, start_new_session=True) as process:
                 try:
                     output, _ = process.communicate(timeout=120)
@@ -233,11 +254,9 @@ class Manual:
                     os.killpg(process.pid, signal.SIGKILL)
                     raise
         assert process.returncode == 0, output[-3000:]
-        assert f'"stroke_mm":{OWN_STROKE_MM}' in output.replace(" ", ""), output[-3000:]
-        status = next(line for line in output.splitlines() if line.startswith("{"))
-        sent = re.search(r'"pose_sent":\s*\{(.*?)\}', status)[1]
-        values = [float(value) for value in re.findall(r":\s*(-?[\d.]+)", sent)]
-        assert all(abs(a - b) < 0.01 for a, b in zip(values, OWN_TARGET)), sent
+        status = next(json.loads(line) for line in output.splitlines() if line.startswith("{"))
+        assert all(cylinder["stroke_mm"] == OWN_STROKE_MM for cylinder in status["cylinders"]), output[-3000:]
+        assert all(abs(a - b) < 0.01 for a, b in zip(status["pose_sent"].values(), OWN_POSE)), status["pose_sent"]
 
 
 def sections(programs):
@@ -263,6 +282,10 @@ def picture(heaved):
     assert shown.stat().st_size < 150_000, f"{shown.stat().st_size} bytes"
     result = run(TOP / "tools/picture", "--heaved", heaved, "--check", shown)
     assert result.returncode == 0, result.stdout + result.stderr
+    for animation in ElementTree.parse(shown).iter("{http://www.w3.org/2000/svg}animate"):
+        values, times = animation.get("values").split(";"), [float(time) for time in animation.get("keyTimes", "").split(";") if time]
+        assert len(values) > 1 and len({len(NUMBER.findall(value)) for value in values}) == 1, f"not alike from picture to picture: {animation.attrib}"
+        assert not times or times[0] == 0 and times == sorted(times) and len(times) == len(values), f"key times: {animation.attrib}"
     with tempfile.TemporaryDirectory() as folder:
         other = Path(folder) / "other.svg"
         other.write_text(shown.read_text(encoding="ascii").replace("ENGAGED", "HOLD"), encoding="ascii")
@@ -272,7 +295,7 @@ def picture(heaved):
 def recipes():
     """Each file of a recipe in CONTRIBUTING.md holds all its examples, and no other file of the programs, their tests and generated pages does."""
     text = (TOP / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    examples = {"Add a fault": ("FAULT_SETPOINT_JUMP|setpoint-jump", "FAULT_ESTOP_CHANNELS|estop-channels", r"FAULT_POWER\b|power-failing"),
+    examples = {"Add a fault": ("FAULT_ESTOP_CHANNELS|estop-channels", r"FAULT_POWER\b|power-failing", "FAULT_OUTSIDE_STROKE|outside-stroke"),
                 "Add a key": ("blend_ms", "delay_max_ms", "silence_hold_ms"),
                 "Add a drive family": ("(?i)cia_?402", "(?i)can[-_]?raw", "(?i)modbus[-_ ](drive|tcp)")}
     told = re.findall(r"^### (Add .*)$", text, re.M)
@@ -316,6 +339,10 @@ def main():
         links()
     with suite.case("the indexes lead to every page"):
         index()
+    with suite.case("keys that pages name are there"):
+        keys()
+    with suite.case("LICENSE is what the package and the sources say"):
+        licence()
     with suite.case("CONTRIBUTING.md: the files of the recipes are all there are"):
         recipes()
     with suite.case("docs/demo.svg shows what heaved does"):
