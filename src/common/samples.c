@@ -12,8 +12,8 @@ static bool is_whole(const samples_header_t *header, size_t bytes)
 {
     const uint64_t table = sizeof *header + (uint64_t)header->columns * header->column_bytes;
     const uint64_t records = (uint64_t)header->capacity * header->record_bytes;
-    return header->column_bytes >= sizeof(samples_column_t) && header->header_bytes >= table && header->header_bytes % 8u == 0 &&
-           header->record_bytes % 8u == 0 && header->record_bytes >= 8u &&
+    return header->column_bytes >= sizeof(samples_column_t) && header->column_bytes % 8u == 0 && header->header_bytes >= table &&
+           header->header_bytes % 8u == 0 && header->record_bytes % 8u == 0 && header->record_bytes >= 8u &&
            header->record_bytes <= 8u * SAMPLES_RECORD_WORDS_MAX && header->capacity >= 2u &&
            header->header_bytes + records <= bytes;
 }

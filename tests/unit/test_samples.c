@@ -221,8 +221,9 @@ static void test_memory_that_contradicts_itself_is_refused(void)
             random ^= random << 13;
             random ^= random >> 17;
             random ^= random << 5;
-            ((uint32_t *)memory.word)[random % 40 + (k == 2 ? 32 * (random >> 8) % 1000 : 0)] =
-                random % 3 == 0 ? random : random >> 24;
+            const uint32_t value = random % 3 == 0 ? random : random >> 24;
+            const uint32_t at = random % 40 + (k == 2 ? 32 * (random >> 8) % 1000 : 0);
+            memcpy((char *)memory.word + 4 * at, &value, sizeof value);
         }
         memory.header.written = random % 7;
         if (samples_reader_begin(&reader, &memory, sizeof memory) != NULL) {
