@@ -124,6 +124,7 @@ typedef struct {
     uint64_t told_us;        /**< the last command went out */
     uint64_t reset_until_us; /**< until then a fault may end; 0: no reset goes on */
     uint64_t actual_us;
+    int64_t counts; /**< of the last position, as the drive has them */
     int64_t sent_counts;
     q32_t sent_q32;
     q32_t actual_q32;

@@ -11,15 +11,17 @@ from itertools import groupby
 from platform_ini import POSE_AXES, UNIT
 from trace_rules import NANO, ORDER_NAME, Block, ErrorRule, Findings, RangeRule, RateRule
 
-STATES = {"OFF", "HOMING", "SETTLED", "RISING", "NEUTRAL", "ENGAGED", "HOLD", "SETTLING", "FAULT", "ESTOP"}
-FOLLOWING = {"OFF", "HOMING", "FAULT", "ESTOP"}      # the set-points follow the actual positions ...
+STATES = {"OFF", "HOMING", "SETTLED", "RISING", "NEUTRAL", "ENGAGED", "HOLD", "SETTLING", "SERVICE", "FAULT", "ESTOP"}
+LOOSE = "SERVICE, loose"                             # rows of SERVICE in which a drive has no torque, or moves by itself
+FOLLOWING = {"OFF", "HOMING", LOOSE, "FAULT", "ESTOP"}  # the set-points follow the actual positions ...
 STOPS_FIRST = {"OFF", "FAULT"}                       # ... in these once what still moves has come to rest
+SWITCHED = {"ENGAGED", "SERVICE", LOOSE}              # relays are what the sender, or a hand, wants them to be
 RESTING = {"SETTLED", "NEUTRAL"}
 MOVING_GENTLY = {"RISING", "SETTLING"}
-NOT_BEFORE_ENGAGED = {"OFF", "HOMING", "SETTLED", "FAULT", "ESTOP"}
+NOT_BEFORE_ENGAGED = {"OFF", "HOMING", "SETTLED", "SERVICE", LOOSE, "FAULT", "ESTOP"}
 LATCHED = {"FAULT": {"FAULT", "ESTOP", "OFF"}, "ESTOP": {"ESTOP", "FAULT", "OFF"}}
 
-FLAGS = {"clamped", "speed", "accel", "stretched", "takeover", "cylinders", "off-path", "no-pose", "late", "fault", "estop", "silent"}
+FLAGS = {"clamped", "speed", "accel", "stretched", "takeover", "cylinders", "off-path", "no-pose", "late", "fault", "estop", "silent", "loose"}
 NO_POSE_BOUNDS = {"cylinders", "off-path", "takeover", "no-pose"}
 NO_POSE_LIMITS = NO_POSE_BOUNDS | {"clamped"}
 POSE_ANYWHERE = NO_POSE_BOUNDS - {"off-path"}  # the pose axes take over where such a row leaves them
@@ -148,6 +150,7 @@ class Checker:
             return None
         whole, part, state, numbers, relays, flags = match.groups()
         t_us = int(whole) * 1000 + (int(part.ljust(3, "0")) if part else 0)
+        state = LOOSE if state == "SERVICE" and "loose" in flags.split("|") else state
         self.last_rest, self.last_parsed = rest, (state, list(map(int, numbers[:-1].replace(".", "").split(","))), relays, flags)
         return t_us, *self.last_parsed
 
@@ -379,8 +382,9 @@ class Checker:
         platform = self.platform
         for text in set(block.relays[start:stop]):
             value = int(text, 16)
-            if value & ~platform.relay_mask if state == "ENGAGED" else value != platform.safe_mask:
-                limit = f"within {platform.relay_mask:04X}" if state == "ENGAGED" else f"{platform.safe_mask:04X} in {state}"
+            is_free = state in SWITCHED
+            if value & ~platform.relay_mask if is_free else value != platform.safe_mask:
+                limit = f"within {platform.relay_mask:04X}" if is_free else f"{platform.safe_mask:04X} in {state}"
                 for i in range(start, stop):
                     if block.relays[i] == text:
                         self.findings.add("relays", "relays", *block.at(i), text, limit)
