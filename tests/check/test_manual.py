@@ -123,7 +123,7 @@ def completion(built):
             assert complete(built, program, "") == commands, complete(built, program, "")
     assert complete(built, "heaved", "--d") == ["--doctor", "--dump-config", "--dump-dbc"]
     assert complete(built, "heaved", "--config", "demo") == ["demo-hexapod.ini"]
-    assert complete(built, "heavectl", "--json", "s") == ["seen", "shutdown", "status"]
+    assert complete(built, "heavectl", "--json", "s") == ["seen", "service", "service-off", "shutdown", "status"]
     assert complete(built, "heavectl", "--hz", "") == []
     assert not any(word.startswith("-") for word in complete(built, "heavectl", "--platform", "")), "names of platforms, where some run"
 
