@@ -19,7 +19,7 @@ BEGIN, END = "<!-- states:begin -->", "<!-- states:end -->"
 
 # Who causes an event; every event of the header must be here.
 ACTORS = {
-    "operator": ["engage", "hold", "resume", "park", "reset", "shutdown"],
+    "operator": ["engage", "hold", "resume", "park", "reset", "shutdown", "service", "service-off"],
     "sender": ["frame", "silence-hold", "silence-neutral", "silence-settle"],
     "machine": ["drives-ready", "fault", "estop"],
     "itself": ["move-done", "tick"],
@@ -48,12 +48,13 @@ ZH = {
     "states": {"OFF": "驱动器未使能", "HOMING": "驱动器上电使能、回零，再以投入速度移到回落位",
                "SETTLED": "最低位，静止；可以上下人", "RISING": "以投入速度升到中位姿态",
                "NEUTRAL": "已升起，静止，不跟随", "ENGAGED": "跟随发送端", "HOLD": "停在原处，驱动器仍使能",
-               "SETTLING": "以投入速度降到回落位", "FAULT": "锁存：按故障类别停止，然后驱动器失能",
+               "SETTLING": "以投入速度降到回落位",
+               "SERVICE": "检修，平台上无人：按住按键时逐轴手动移动；不跟随发送端", "FAULT": "锁存：按故障类别停止，然后驱动器失能",
                "ESTOP": "锁存：目标立即停止，设定值跟随实际位置"},
     "events": {"engage": "投入", "hold": "暂停", "resume": "继续", "park": "回落", "reset": "复位", "shutdown": "关机",
                "frame": "收到帧", "silence-hold": "静默（暂停）", "silence-neutral": "静默（中位）",
                "silence-settle": "静默（回落）", "drives-ready": "驱动器就绪", "fault": "故障", "estop": "急停",
-               "move-done": "动作完成", "tick": "下一周期"},
+               "move-done": "动作完成", "tick": "下一周期", "service": "检修", "service-off": "退出检修"},
     "guards": {"COMES_UP_SETTLED": "位于回落位", "GOAL_OFF": "目标为 OFF", "GOAL_UP": "目标在上方",
                "GOAL_ENGAGED": "目标为 ENGAGED", "BY_SILENCE": "因静默进入", "WAS_HOMING": "原为 HOMING",
                "WAS_RISING": "原为 RISING", "WAS_NEUTRAL": "原为 NEUTRAL", "WAS_ENGAGED": "原为 ENGAGED",

@@ -10,6 +10,8 @@
 /* Keeps every difference of two positions, and a second at homing speed, far inside 64 bits: 2^20 mm. */
 #define POSITION_MAX_Q32 ((q32_t)1 << 52)
 
+#define COUNTS_PER_UNIT 1000
+
 /* Longest time one poll simulates; a longer pause counts as this. */
 #define DT_MAX_US 1000000u
 
@@ -258,12 +260,16 @@ static hv_status_t drives_sim_send(void *ctx, uint64_t now_us, const q32_t setpo
     return HV_OK;
 }
 
+static bool is_axis_allowed(const sim_drives_t *self, uint8_t k, drives_request_t request)
+{
+    const bool is_known = !self->axis[k].is_offline && self->axis[k].feedback.has_actual;
+    return drives_allow(request, is_known ? self->axis[k].state : DRIVE_OFFLINE);
+}
+
 static bool is_allowed(const sim_drives_t *self, drives_request_t request)
 {
     for (uint8_t k = 0; k < self->count; k++) {
-        const bool is_known = !self->axis[k].is_offline && self->axis[k].feedback.has_actual;
-        const drive_state_t state = is_known ? self->axis[k].state : DRIVE_OFFLINE;
-        if (!drives_allow(request, state)) {
+        if (!is_axis_allowed(self, k, request)) {
             return false;
         }
     }
@@ -316,6 +322,35 @@ static hv_status_t drives_sim_request(void *ctx, drives_request_t request)
         }
     }
     return HV_OK;
+}
+
+static hv_status_t drives_sim_request_one(void *ctx, uint8_t k, drives_request_t request)
+{
+    sim_drives_t *self = ctx;
+    if (is_bus_gone(self)) {
+        return HV_ERR_IO;
+    }
+    if (self->is_busy) {
+        return HV_ERR_AGAIN;
+    }
+    if (!is_axis_allowed(self, k, request)) {
+        return HV_ERR_STATE;
+    }
+    if (!self->axis[k].is_offline && !self->axis[k].is_frozen) {
+        carry_out(&self->axis[k], &self->config[k], request, self->now_us);
+    }
+    return HV_OK;
+}
+
+/* What a drive whose counts are thousandths of a unit would have, in its own zero. */
+static bool drives_sim_counts(void *ctx, uint8_t k, int64_t *out)
+{
+    const sim_drives_t *self = ctx;
+    const drive_feedback_t *feedback = &self->axis[k].feedback;
+    if (feedback->has_actual) {
+        *out = fx_mul_shift(feedback->actual_mm_q32, COUNTS_PER_UNIT, 32);
+    }
+    return feedback->has_actual;
 }
 
 static uint8_t drives_sim_count(void *ctx)
@@ -381,6 +416,7 @@ void sim_drives_place(sim_drives_t *self, uint64_t now_us, const drive_feedback_
 
 drives_t sim_drives_hal(sim_drives_t *self)
 {
-    static const drives_ops_t k_ops = {drives_sim_poll, drives_sim_send, drives_sim_request, drives_sim_count, NULL, NULL};
+    static const drives_ops_t k_ops = {drives_sim_poll,        drives_sim_send,  drives_sim_request, drives_sim_count, NULL, NULL,
+                                       drives_sim_request_one, drives_sim_counts};
     return (drives_t){&k_ops, self};
 }

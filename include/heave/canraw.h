@@ -124,6 +124,7 @@ typedef struct {
     uint64_t told_us;        /**< when the last command was sent */
     uint64_t reset_until_us; /**< end of the time in which a reset may end the fault; 0: no reset */
     uint64_t actual_us;
+    int64_t counts; /**< of the last position, as the drive has them */
     int64_t sent_counts;
     q32_t sent_q32;
     q32_t actual_q32;

@@ -108,14 +108,16 @@ static inline bool drives_allow(drives_request_t request, drive_state_t state)
     return request != DRIVES_HOME || state == DRIVE_ENABLED;
 }
 
-/** Every op is mandatory, except report and is_failing. */
+/** Every op is mandatory but those that say so. */
 typedef struct {
     hv_status_t (*poll)(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX]);
     hv_status_t (*send)(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX]);
     hv_status_t (*request)(void *ctx, drives_request_t request);
     uint8_t (*count)(void *ctx);
-    void (*report)(void *ctx, uint8_t axis, drive_report_t *out); /* optional */
-    bool (*is_failing)(void *ctx);                                /* optional: never */
+    void (*report)(void *ctx, uint8_t axis, drive_report_t *out);                  /* optional */
+    bool (*is_failing)(void *ctx);                                                 /* optional: never */
+    hv_status_t (*request_one)(void *ctx, uint8_t axis, drives_request_t request); /* optional: all or none */
+    bool (*counts)(void *ctx, uint8_t axis, int64_t *out);                         /* optional: not known */
 } drives_ops_t;
 
 /** Passed by value; ctx belongs to the backend and lives until its close. */
@@ -168,6 +170,24 @@ static inline HV_MUST_CHECK hv_status_t drives_send(drives_t drives, uint64_t no
 static inline HV_MUST_CHECK hv_status_t drives_request(drives_t drives, drives_request_t request)
 {
     return drives.ops->request(drives.ctx, request);
+}
+
+/** The same to a single axis, for a machine in service: the others stay as they are, and so do their set-points. Requests to all
+ *  override it. ENABLE and HOME need the state of this axis only.
+ *  @param axis [0, drives_count())
+ *  @return as drives_request(); HV_ERR_NOSUP: this bus brings its drives up together only */
+static inline HV_MUST_CHECK hv_status_t drives_request_one(drives_t drives, uint8_t axis, drives_request_t request)
+{
+    return drives.ops->request_one != NULL ? drives.ops->request_one(drives.ctx, axis, request) : HV_ERR_NOSUP;
+}
+
+/** The position as the drive itself counts it, before scale, sign and zero; for people. As of the last poll; never blocks.
+ *  @param axis [0, drives_count())
+ *  @param out unchanged where false is returned
+ *  @return false: nothing was heard of it yet, or this backend has no counts */
+static inline bool drives_counts(drives_t drives, uint8_t axis, int64_t *out)
+{
+    return drives.ops->counts != NULL && drives.ops->counts(drives.ctx, axis, out);
 }
 
 /** Status of a drive, for display. Never blocks.

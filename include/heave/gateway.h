@@ -16,6 +16,7 @@
 #include "heave/motion.h"
 #include "heave/owner.h"
 #include "heave/relay_policy.h"
+#include "heave/service.h"
 #include "heave/supervisor.h"
 #include "heave/telemetry.h"
 
@@ -127,6 +128,7 @@ typedef struct {
     owner_t owner;
     uint64_t start_us;       /**< start of the silence timer: last accepted frame or entry into ENGAGED */
     uint64_t state_since_us; /**< when the state was entered */
+    service_t service;
     confirm_t confirm;
     uint32_t waited_us;     /**< time that the newest datagram waited for its cycle */
     unsigned stream_frames; /**< frames in quick succession so far, up to the number that makes a stream */
@@ -183,9 +185,18 @@ hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gatewa
  *  spike gate, confirmation of far jumps. Ignores the rest of the settings. */
 void gateway_reload(gateway_t *self, const settings_t *settings);
 
-/** An operator's request: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET or EVENT_SHUTDOWN.
- *  @return HV_OK; HV_ERR_STATE if the state does not allow it: nothing changes. */
+/** What an operator asks for: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET, EVENT_SHUTDOWN, EVENT_SERVICE or
+ *  EVENT_SERVICE_OFF.
+ *  @return HV_OK; HV_ERR_STATE where the state does not allow it: nothing changes. */
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us) HV_MUST_CHECK;
+
+/** What a person does by hand, in SERVICE.
+ *  @return SERVICE_DONE; or why not: nothing changes */
+service_answer_t gateway_service(gateway_t *self, const service_request_t *request, uint64_t now_us) HV_MUST_CHECK;
+
+/** How old a tick is that the snapshot showed (service.tick_us) and that a client echoes now; UINT64_MAX for one that it never
+ *  showed. */
+uint64_t gateway_tick_age(const gateway_t *self, uint64_t tick_us);
 
 /** Sets the intensity, which changes by a ramp (see motion_set_intensity). Allowed in every state.
  *  @return HV_OK; HV_ERR_RANGE above intensity_max_percent: nothing changes. */

@@ -218,6 +218,7 @@ typedef struct {
     uint32_t setpoints; /**< confirmed, of all drives */
     uint32_t failures;  /**< transactions that failed */
     uint32_t paced;     /**< cycles in which the line was slower than the motion */
+    bool is_one_by_one; /**< the newest request was to a single drive */
     modbus_drive_axis_t axis[DRIVES_MAX];
 } modbus_drive_t;
 

@@ -7,6 +7,7 @@
 #include "heave/fade.h"
 #include "heave/gate.h"
 #include "heave/halt.h"
+#include "heave/jog.h"
 #include "heave/motion.h"
 #include "heave/profile.h"
 
@@ -15,6 +16,7 @@ typedef enum {
     MOTION_RESTING,  /**< nothing: it stays where it is */
     MOTION_STOPPING, /**< a controlled stop in cylinder space */
     MOTION_ON_PATH,  /**< an S-curve in cylinder space */
+    MOTION_JOGGED,   /**< led by hand */
     MOTION_STREAMED, /**< following: a stream */
     MOTION_TIMED,    /**< following: a quintic (timed, or a step in motion) */
     MOTION_HALTING,  /**< following: a stop, and the S-curve from where it ends, which may begin before that */
@@ -38,7 +40,7 @@ typedef struct {
 /** The active plan: one of these at a time. */
 typedef union {
     quintic_t quintic;          /**< MOTION_TIMED */
-    motion_straight_t straight; /**< MOTION_RESTING, MOTION_ON_PATH, MOTION_STRAIGHT; begun before a stop ends */
+    motion_straight_t straight; /**< MOTION_RESTING, MOTION_ON_PATH, MOTION_JOGGED, MOTION_STRAIGHT; begun before a stop ends */
 } motion_plan_t;
 
 struct motion {
@@ -51,6 +53,7 @@ struct motion {
     q32_t settled_mm_q32[CYLINDERS_MAX];
     ramp_limits_t engage_limits; /**< of every cylinder on a path */
     fade_limits_t fade_limits;   /**< at a take-over */
+    jog_limits_t jog_limits;
 
     bool is_axis_moved[AXES_MAX];       /**< the others stay at 0 */
     ramp_t axis[AXES_MAX];              /**< pose axes and the rotation motor */
@@ -78,6 +81,8 @@ struct motion {
     unsigned planned_slots;                     /**< number of slots that follow the plan; the others move by themselves */
     history_t
         led[AXES_MAX]; /**< last references of the slots (pose axes or cylinders, then the rotation motor), before blending */
+
+    jog_t jog;
 
     bool is_following;
     bool is_taking_over; /**< a sender is being blended in, or will be with its first target */

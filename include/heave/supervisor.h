@@ -18,6 +18,7 @@ typedef enum {
     STATE_ENGAGED,  /**< follows the sender */
     STATE_HOLD,     /**< stopped where it is, drives enabled */
     STATE_SETTLING, /**< to the settled extension at engage speed */
+    STATE_SERVICE,  /**< nobody on board: moved by hand, drive by drive, while the hand is there; senders are not followed */
     STATE_FAULT,    /**< latched: stopped as the fault asks for, then drives disabled */
     STATE_ESTOP,    /**< latched: targets stopped, set-points follow the actual positions */
     STATES
@@ -35,6 +36,8 @@ typedef enum {
     EVENT_PARK,            /**< operator: settle */
     EVENT_RESET,           /**< operator: leave FAULT or ESTOP, once the cause is gone */
     EVENT_SHUTDOWN,        /**< operator or SIGTERM: settle, then off */
+    EVENT_SERVICE,         /**< operator: into SERVICE, from OFF or SETTLED */
+    EVENT_SERVICE_OFF,     /**< operator: out of it, drives off */
     EVENT_FRAME,           /**< a valid frame came */
     EVENT_SILENCE_HOLD,    /**< level: the sender has been silent for silence_hold_ms */
     EVENT_SILENCE_NEUTRAL, /**< level: for silence_neutral_ms */
@@ -55,6 +58,7 @@ typedef enum {
     ACTION_STAY,       /**< arrived: nothing to move */
     ACTION_OFF,        /**< bring to rest what still moves, then disable the drives */
     ACTION_FAULT_STOP, /**< stop as the fault's row says, disable the drives; relays to the safe mask */
+    ACTION_SERVE,      /**< nothing moves but what a hand leads; drives stay as they are */
     ACTION_ESTOP       /**< stop targets at once, set-points follow actual; relays to the safe mask */
 } action_t;
 

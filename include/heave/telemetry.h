@@ -11,6 +11,7 @@
 #include "heave/frame.h"
 #include "heave/owner.h"
 #include "heave/plate.h"
+#include "heave/service.h"
 #include "heave/stream.h"
 #include "heave/supervisor.h"
 #include "heave/wear.h"
@@ -92,6 +93,7 @@ typedef struct {
     owner_t owner;          /**< who drives */
     owner_t other;          /**< the last sender that does not drive */
     uint64_t last_frame_us; /**< 0 before the first accepted frame */
+    service_view_t service;
     counters_t counters;
 } snapshot_t;
 

@@ -5,8 +5,8 @@ import re
 from heave.configuration import POSE_AXES, UNIT
 
 NANO = 10**9  # numbers are printed with nine decimals, and are integers of 1e-9 here
-STATES = {"OFF", "HOMING", "SETTLED", "RISING", "NEUTRAL", "ENGAGED", "HOLD", "SETTLING", "FAULT", "ESTOP"}
-FLAGS = {"clamped", "speed", "accel", "stretched", "takeover", "cylinders", "off-path", "no-pose", "late", "fault", "estop", "silent"}
+STATES = {"OFF", "HOMING", "SETTLED", "RISING", "NEUTRAL", "ENGAGED", "HOLD", "SETTLING", "SERVICE", "FAULT", "ESTOP"}
+FLAGS = {"clamped", "speed", "accel", "stretched", "takeover", "cylinders", "off-path", "no-pose", "late", "fault", "estop", "silent", "loose"}
 
 POSE_COLUMNS = [f"{axis}_{UNIT[axis]}" for axis in POSE_AXES]
 ANGLE = len(POSE_AXES)

@@ -467,6 +467,16 @@ static void cia402_report(void *ctx, uint8_t axis, drive_report_t *out)
     cia402_report_words(ctx, axis, out);
 }
 
+/* 6064h as it was last told. */
+static bool cia402_counts(void *ctx, uint8_t axis, int64_t *out)
+{
+    const cia402_t *self = ctx;
+    if (self->axis[axis].has_actual) {
+        *out = self->axis[axis].actual_counts;
+    }
+    return self->axis[axis].has_actual;
+}
+
 static bool cia402_is_failing(void *ctx)
 {
     const cia402_t *self = ctx;
@@ -475,7 +485,8 @@ static bool cia402_is_failing(void *ctx)
 
 drives_t cia402_hal(cia402_t *self)
 {
-    static const drives_ops_t k_ops = {cia402_poll, cia402_send, cia402_request, cia402_count, cia402_report, cia402_is_failing};
+    static const drives_ops_t k_ops = {cia402_poll,   cia402_send,       cia402_request, cia402_count,
+                                       cia402_report, cia402_is_failing, NULL,           cia402_counts};
     return (drives_t){&k_ops, self};
 }
 

@@ -114,6 +114,16 @@ void json_number(json_t *self, const char *key, uint64_t number)
     put_bytes(self, digits, decimal_put_u64(digits, number));
 }
 
+void json_integer(json_t *self, const char *key, int64_t number)
+{
+    char digits[DECIMAL_U64_MAX];
+    begin_value(self, key);
+    if (number < 0) {
+        put_bytes(self, "-", 1);
+    }
+    put_bytes(self, digits, decimal_put_u64(digits, number < 0 ? 0u - (uint64_t)number : (uint64_t)number));
+}
+
 void json_q32(json_t *self, const char *key, q32_t value_q32)
 {
     char digits[DECIMAL_Q32_MAX];

@@ -27,6 +27,7 @@ void json_close(json_t *self, char bracket);
 
 void json_text(json_t *self, const char *key, const char *text);
 void json_number(json_t *self, const char *key, uint64_t number);
+void json_integer(json_t *self, const char *key, int64_t number);
 /** With six decimals. */
 void json_q32(json_t *self, const char *key, q32_t value_q32);
 /** Microseconds as milliseconds with three decimals. */

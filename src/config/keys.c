@@ -26,6 +26,7 @@ const config_section_t config_sections[] = {
     {"cylinders", "limits of every cylinder: the last word over all motion", CONFIG_NEEDS_NOTHING},
     {"engage", "limits of the cylinders while rising, settling, homing and taking over a sender's first pose",
      CONFIG_NEEDS_NOTHING},
+    {"service", "what moves by hand, in SERVICE (`heavectl service`)", CONFIG_NEEDS_NOTHING},
     {"intensity", "how much of a sender's motion is made, about neutral; the rotation motor is not scaled", CONFIG_NEEDS_NOTHING},
     {"udp", "where frames come from", CONFIG_NEEDS_NOTHING},
     {"control", "where heavectl reaches heaved", CONFIG_NEEDS_NOTHING},
@@ -183,6 +184,11 @@ const config_key_t config_keys[] = {
      .fallback = "100", ABOVE_ZERO(MOST_Q16), .help = "acceleration limit, at most that of [cylinders]"},
     {KEY("engage", "blend_ms"), AT(settings.blend_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "2000",
      RANGE(250, 20000), .help = "least time in which a sender is faded in"},
+
+    {KEY("service", "jog_mm_s"), AT(settings.jog_mm_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s", .fallback = "5",
+     ABOVE_ZERO(50), .help = "no cylinder is faster than that while a hand leads it, nor than the limit of [cylinders]"},
+    {KEY("service", "jog_deg_s"), AT(settings.jog_deg_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg/s",
+     .fallback = "2", ABOVE_ZERO(20), .help = "nor a rotation, nor the rotation motor"},
 
     {KEY("intensity", "start_percent"), AT(settings.intensity_start_percent), .type = CONFIG_INTEGER, .unit = "%",
      .fallback = "max", .words = "max", RANGE(0, 100),

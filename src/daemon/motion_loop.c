@@ -85,7 +85,23 @@ static bool is_down(const motion_loop_t *self)
 /* Without the key nothing goes up, and drives stay off. */
 static bool is_for_the_key(const motion_loop_t *self, uint32_t event)
 {
-    return event == EVENT_ENGAGE || event == EVENT_RESUME || (event == EVENT_PARK && is_down(self));
+    return event == EVENT_ENGAGE || event == EVENT_RESUME || event == EVENT_SERVICE || (event == EVENT_PARK && is_down(self));
+}
+
+/* What was refused has changed nothing: a recording does without. */
+static service_answer_t serve(motion_loop_t *self, const motion_request_t *request)
+{
+    service_request_t service = request->service;
+    const bool is_proof = service_is_held(service.verb) || service.verb == SERVICE_BEAT;
+    service.age_us = is_proof ? gateway_tick_age(&self->session.gateway, request->tick_us) : 0;
+    const service_answer_t answer = gateway_service(&self->session.gateway, &service, self->session.now_us);
+    if (answer == SERVICE_DONE && self->is_recording) {
+        record_push_service(&self->handover.record, self->session.now_us, &service);
+    }
+    if (answer == SERVICE_DONE && self->blackbox != NULL) {
+        record_push_service(&self->blackbox->records, self->session.now_us, &service);
+    }
+    return answer;
 }
 
 static hv_status_t carry_out(motion_loop_t *self, const motion_request_t *request)
@@ -112,6 +128,11 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
         result[count].is_unapproved = is_unapproved && is_for_the_key(self, request.event);
         result[count].is_power_failing = switches_is_power_failing(&self->switches) && is_for_the_key(self, request.event);
         const bool is_barred = result[count].is_key_off || result[count].is_unapproved || result[count].is_power_failing;
+        if (request.event == OPERATOR_SERVICE) {
+            result[count].answer = serve(self, &request);
+            result[count++].status = HV_OK;
+            continue;
+        }
         result[count].status = is_barred ? HV_ERR_STATE : carry_out(self, &request);
         count++;
     }
@@ -122,7 +143,10 @@ static void turn_off(motion_loop_t *self)
 {
     const snapshot_t *s = gateway_snapshot(&self->session.gateway);
     const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
-    if (!is_latched && !is_down(self) && (s->goal == STATE_NEUTRAL || s->goal == STATE_ENGAGED)) {
+    if (s->state == STATE_SERVICE) {
+        hal_log_write(self->io.log, HAL_LOG_NOTICE, "the enable key was turned off: service ends");
+        (void)!carry_out(self, &(motion_request_t){.event = EVENT_SERVICE_OFF});
+    } else if (!is_latched && !is_down(self) && (s->goal == STATE_NEUTRAL || s->goal == STATE_ENGAGED)) {
         hal_log_write(self->io.log, HAL_LOG_NOTICE, "the enable key was turned off: parking");
         (void)!carry_out(self, &(motion_request_t){.event = EVENT_PARK});
     }
@@ -136,8 +160,13 @@ static void lose_power(motion_loop_t *self)
     const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
     const bool is_held = s->state == STATE_HOLD && !s->is_held_by_silence;
     hal_log_write(self->io.log, HAL_LOG_ERROR,
-                  is_held ? "the supply is failing: the platform is on hold, park settles it"
-                          : "the supply is failing: settling");
+                  is_held                     ? "the supply is failing: the platform is on hold, park settles it"
+                  : s->state == STATE_SERVICE ? "the supply is failing: service ends"
+                                              : "the supply is failing: settling");
+    if (s->state == STATE_SERVICE) {
+        (void)!carry_out(self, &(motion_request_t){.event = EVENT_SERVICE_OFF});
+        return;
+    }
     if (!is_latched && !is_held && !is_down(self)) {
         (void)!carry_out(self, &(motion_request_t){.event = EVENT_PARK});
     }
@@ -299,7 +328,7 @@ static void write_down(motion_loop_t *self, bool is_zero)
 static void hold_if_too_late(motion_loop_t *self, uint32_t cycles)
 {
     const state_t state = gateway_snapshot(&self->session.gateway)->state;
-    const bool is_leading = state == STATE_ENGAGED || state == STATE_RISING || state == STATE_NEUTRAL;
+    const bool is_leading = state == STATE_ENGAGED || state == STATE_RISING || state == STATE_NEUTRAL || state == STATE_SERVICE;
     if (self->late_hold_cycles == 0 || cycles <= self->late_hold_cycles || !is_leading) {
         return;
     }

@@ -275,12 +275,17 @@ static hv_status_t canraw_send(void *ctx, uint64_t now_us, const q32_t setpoint_
     return HV_OK;
 }
 
+static bool is_axis_allowed(const canraw_t *self, unsigned k, drives_request_t request)
+{
+    drive_feedback_t feedback;
+    canraw_axis_report(&self->axis[k], &feedback);
+    return drives_allow(request, feedback.state);
+}
+
 static bool is_allowed(const canraw_t *self, drives_request_t request)
 {
     for (unsigned k = 0; k < self->map->axes; k++) {
-        drive_feedback_t feedback;
-        canraw_axis_report(&self->axis[k], &feedback);
-        if (!drives_allow(request, feedback.state)) {
+        if (!is_axis_allowed(self, k, request)) {
             return false;
         }
     }
@@ -306,6 +311,31 @@ static hv_status_t canraw_request(void *ctx, drives_request_t request)
     return HV_OK;
 }
 
+static hv_status_t canraw_request_one(void *ctx, uint8_t k, drives_request_t request)
+{
+    canraw_t *self = ctx;
+    if (self->is_gone || !is_any_online(self)) {
+        return HV_ERR_IO;
+    }
+    if (!is_axis_allowed(self, k, request)) {
+        return HV_ERR_STATE;
+    }
+    if (self->axis[k].is_online) {
+        canraw_axis_request(&self->axis[k], self->map, request, self->now_us);
+    }
+    send_commands(self, CANRAW_RESET);
+    return HV_OK;
+}
+
+static bool canraw_counts(void *ctx, uint8_t k, int64_t *out)
+{
+    const canraw_t *self = ctx;
+    if (self->axis[k].has_actual) {
+        *out = self->axis[k].counts;
+    }
+    return self->axis[k].has_actual;
+}
+
 static uint8_t canraw_count(void *ctx)
 {
     const canraw_t *self = ctx;
@@ -320,6 +350,7 @@ static bool canraw_is_failing(void *ctx)
 
 drives_t canraw_hal(canraw_t *self)
 {
-    static const drives_ops_t k_ops = {canraw_poll, canraw_send, canraw_request, canraw_count, NULL, canraw_is_failing};
+    static const drives_ops_t k_ops = {canraw_poll, canraw_send,       canraw_request,     canraw_count,
+                                       NULL,        canraw_is_failing, canraw_request_one, canraw_counts};
     return (drives_t){&k_ops, self};
 }

@@ -35,6 +35,7 @@ void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map)
                             .is_homed = !has(map, CANRAW_HOME),
                             .is_energized = self->is_energized,
                             .has_actual = self->has_actual,
+                            .counts = self->counts,
                             .actual_q32 = self->actual_q32,
                             .actual_us = self->actual_us};
 }
@@ -113,9 +114,11 @@ static bool take_position(canraw_axis_t *self, const canraw_map_t *map, const co
 {
     const canraw_field_t *position = canraw_find(&map->position_reply, CANRAW_POSITION);
     const canraw_field_t *status = canraw_find(&map->position_reply, CANRAW_STATUS);
-    if (counts_to_units(scale, canraw_extract(position, data), &self->actual_q32) != HV_OK) {
+    const int64_t counts = canraw_extract(position, data);
+    if (counts_to_units(scale, counts, &self->actual_q32) != HV_OK) {
         return false;
     }
+    self->counts = counts;
     if (!self->is_online && self->is_energized) { /* lost under torque, and what stopped the others may not have reached it */
         tell(self, map, CANRAW_DISABLE);
     }

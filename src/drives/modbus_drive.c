@@ -103,11 +103,14 @@ static void submit_read(modbus_drive_t *self, unsigned k)
 
 /* --- Set-points --- */
 
-/* Nobody follows before everybody has torque. */
+/* Nobody follows before everybody has torque, unless they are asked one by one: then those that stand without it stay so. */
 static void begin_together(modbus_drive_t *self)
 {
     for (unsigned k = 0; k < self->map->axes; k++) {
         const modbus_drive_phase_t phase = self->axis[k].phase;
+        if (self->is_one_by_one && phase != MODBUS_DRIVE_HOLDING) {
+            continue;
+        }
         if (phase != MODBUS_DRIVE_HOLDING && phase != MODBUS_DRIVE_ENABLED) {
             return;
         }
@@ -243,11 +246,38 @@ static hv_status_t drive_request(void *ctx, drives_request_t request)
     if (!is_allowed(self, request)) {
         return HV_ERR_STATE;
     }
+    self->is_one_by_one = false;
     for (unsigned k = 0; k < self->map->axes; k++) {
         modbus_drive_axis_request(&self->axis[k], self->map, request, self->now_us);
         submit_write(self, k);
     }
     return HV_OK;
+}
+
+/* Where a stop would go to a whole line, this one goes to its drive. */
+static hv_status_t drive_request_one(void *ctx, uint8_t k, drives_request_t request)
+{
+    modbus_drive_t *self = ctx;
+    if (!is_any_online(self)) {
+        return HV_ERR_IO;
+    }
+    if (!drives_allow(request, modbus_drive_axis_state(&self->axis[k]))) {
+        return HV_ERR_STATE;
+    }
+    modbus_drive_axis_request(&self->axis[k], self->map, request, self->now_us);
+    modbus_drive_axis_end_broadcast(&self->axis[k]);
+    self->is_one_by_one = true;
+    submit_write(self, k);
+    return HV_OK;
+}
+
+static bool drive_counts(void *ctx, uint8_t k, int64_t *out)
+{
+    const modbus_drive_t *self = ctx;
+    if (self->axis[k].has_actual) {
+        *out = self->axis[k].actual_counts;
+    }
+    return self->axis[k].has_actual;
 }
 
 static uint8_t drive_count(void *ctx)
@@ -274,6 +304,7 @@ bool modbus_drive_is_told(const modbus_drive_t *self)
 
 drives_t modbus_drive_hal(modbus_drive_t *self)
 {
-    static const drives_ops_t k_ops = {drive_poll, drive_send, drive_request, drive_count, drive_report, NULL};
+    static const drives_ops_t k_ops = {drive_poll,   drive_send, drive_request,     drive_count,
+                                       drive_report, NULL,       drive_request_one, drive_counts};
     return (drives_t){&k_ops, self};
 }

@@ -10,6 +10,7 @@
 #include "intake.h"
 #include "operate.h"
 #include "reports.h"
+#include "service.h"
 
 #define SINGULAR_LOG_US 1000000 /* lines about the same thing are no closer */
 
@@ -173,11 +174,12 @@ static bool is_snapshot_sane(const snapshot_t *s, const snapshot_t *prepared)
     return sane_time(s->now_us) && (unsigned)s->state < STATES && (unsigned)s->goal < STATES && sane_bool(&s->is_estop_active) &&
            sane_bool(&s->is_power_failing) && sane_bool(&s->is_healthy) && (unsigned)s->fault.code < FAULT_CODES &&
            s->fault.axis <= DRIVES_MAX && (unsigned)s->reaction <= FAULT_REACT_SILENT && s->cylinders == prepared->cylinders &&
-           sane_bool(&s->has_received) && sane_bool(&s->has_angle) && s->has_angle == prepared->has_angle &&
-           s->relay_count == prepared->relay_count && sane_bool(&s->is_relays_unknown) && plate_is_sane(&s->plate) &&
-           sane_all_q32(s->asked.axis_q32, POSE_AXES) && sane_all_q32(s->sent.axis_q32, POSE_AXES) &&
-           sane_all_q32(s->extension_mm_q32, CYLINDERS_MAX) && sane_q32(s->angle_deg_q32) &&
-           s->limiting_cylinder <= CYLINDERS_MAX && owner_is_sane(&s->owner) && owner_is_sane(&s->other);
+           sane_bool(&s->has_angle) && s->has_angle == prepared->has_angle && s->relay_count == prepared->relay_count &&
+           sane_bool(&s->is_relays_unknown) && plate_is_sane(&s->plate) && sane_all_q32(s->asked.axis_q32, POSE_AXES) &&
+           sane_all_q32(s->sent.axis_q32, POSE_AXES) && sane_all_q32(s->extension_mm_q32, CYLINDERS_MAX) &&
+           sane_q32(s->angle_deg_q32) && s->limiting_cylinder <= CYLINDERS_MAX && owner_is_sane(&s->owner) &&
+           owner_is_sane(&s->other) && sane_bool(&s->service.is_held) && sane_time(s->service.tick_us) &&
+           (unsigned)s->service.doing < SERVICE_VERBS;
 }
 
 static bool are_bools_sane(const gateway_t *saved)
@@ -195,6 +197,7 @@ static bool is_saved_sane(const gateway_t *saved, const gateway_t *prepared)
     return are_bools_sane(saved) && are_settings_sane(&saved->settings, &prepared->settings) &&
            is_snapshot_sane(&saved->snapshot, &prepared->snapshot) && are_drives_sane(saved) &&
            supervisor_is_sane(&saved->supervisor) && (unsigned)saved->bring_up <= BRING_UP_MOVE &&
+           service_is_sane(&saved->service, &prepared->service, prepared->snapshot.cylinders + 1u) &&
            auto_engage_is_sane(&saved->auto_engage, &prepared->auto_engage) && owner_is_sane(&saved->owner) &&
            sane_time(saved->power_since_us) && sane_time(saved->healthy.ill_us) && sane_time(saved->healthy.changed_us) &&
            confirm_is_sane(&saved->confirm) && relay_policy_is_sane(&saved->relay_policy) &&
@@ -254,6 +257,7 @@ void gateway_note_late(gateway_t *self, uint32_t cycles)
 {
     uint32_t *late = &self->snapshot.counters.late_cycles;
     *late = cycles < UINT32_MAX - *late ? *late + cycles : UINT32_MAX; /* a count that began anew would look like none late */
+    self->service.late_us += (uint64_t)cycles * self->settings.cycle_us;
     self->is_late |= cycles > self->settings.healthy.late_cycles;
 }
 
@@ -311,14 +315,18 @@ static uint16_t pulse(gateway_t *self, uint64_t now_us)
     return (uint16_t)(level ? pulse_bit(self) : 0);
 }
 
-/* Only an engaged sender commands the relays; the safe mask holds everywhere else. The pulse is nobody's to command, and its
- * pace is its own: the relays' limits of time are not for it. */
+/* Only an engaged sender commands the relays, or a hand in service; the safe mask holds everywhere else. The pulse is nobody's to
+ * command, and its pace is its own: the relays' limits of time are not for it. */
 static void write_relays(gateway_t *self, uint64_t now_us)
 {
     const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, now_us);
-    const uint16_t wanted = is_sender_heard ? self->frame_mask : self->settings.relay_safe_mask;
+    const bool is_serving = self->supervisor.state == STATE_SERVICE;
+    const uint16_t wanted = is_sender_heard ? self->frame_mask
+                            : is_serving    ? service_relays(self)
+                                            : self->settings.relay_safe_mask;
+    const bool is_safe = wanted == self->settings.relay_safe_mask && !is_sender_heard;
     const uint16_t asked = (uint16_t)(wanted & ~pulse_bit(self));
-    self->effects_mask = relay_policy_step(&self->relay_policy, &self->settings.relays, asked, !is_sender_heard, now_us);
+    self->effects_mask = relay_policy_step(&self->relay_policy, &self->settings.relays, asked, is_safe, now_us);
     const uint16_t mask = (uint16_t)(self->effects_mask | pulse(self, now_us));
     if (!self->is_mask_written || mask != self->written_mask) {
         self->is_mask_written = hal_relays_write(self->io.relays, mask) == HV_OK;
@@ -384,6 +392,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->stream_delay_us = stream_delay_us(motion_stream(&self->motion));
     s->stream = stream_report(motion_stream(&self->motion));
     s->owner = self->owner;
+    service_publish(self);
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
     s->counters.relay_cut = self->relay_policy.cut_count;
     s->counters.relay_delayed = self->relay_policy.delay_count;

@@ -6,6 +6,7 @@
 
 #include "auto_engage.h"
 #include "heave/text.h"
+#include "service.h"
 
 #define ENABLE_TIMEOUT_US    10000000u
 #define HOMING_TIMEOUT_US    120000000u
@@ -187,6 +188,9 @@ static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
     case ACTION_FAULT_STOP:
         react(self);
         break;
+    case ACTION_SERVE:
+        service_begin(self, !self->is_tracking_actual);
+        break;
     case ACTION_ESTOP:
         self->bring_up = BRING_UP_IDLE;
         drop_drives(self);
@@ -324,10 +328,13 @@ bool operate_is_bus_stalled(const gateway_t *self)
     return self->unsent_cycles * (uint64_t)self->settings.cycle_us > UNSENT_MAX_US;
 }
 
-/* In a state that is not OFF. */
-static bool is_torque_expected(const gateway_t *self)
+/* Of a drive, in a state that is not OFF. */
+static bool is_torque_expected(const gateway_t *self, unsigned i)
 {
     const state_t state = self->supervisor.state;
+    if (state == STATE_SERVICE) {
+        return service_is_up(self, i);
+    }
     return state != STATE_FAULT && state != STATE_ESTOP && self->bring_up != BRING_UP_ENABLE && self->bring_up != BRING_UP_HOME &&
            !self->is_tracking_actual;
 }
@@ -339,8 +346,8 @@ static bool is_left_behind(gateway_t *self, unsigned i, uint64_t now_us)
     if (i >= kin_cylinders(motion_kin(&self->motion)) || window_q32 == 0) {
         return false;
     }
-    const bool is_far =
-        is_torque_expected(self) && fx_abs(self->output.extension_mm_q32[i] - self->snapshot.drive[i].actual_mm_q32) > window_q32;
+    const bool is_far = is_torque_expected(self, i) &&
+                        fx_abs(self->output.extension_mm_q32[i] - self->snapshot.drive[i].actual_mm_q32) > window_q32;
     if (!is_far) {
         self->following_since_us[i] = 0;
     } else if (self->following_since_us[i] == 0) {
@@ -382,7 +389,7 @@ static fault_code_t judge_drive(gateway_t *self, unsigned i, uint64_t now_us)
         return FAULT_OUTSIDE_STROKE;
     }
     if (state != DRIVE_ENABLED) {
-        return is_torque_expected(self) ? FAULT_DRIVE_DROPPED : FAULT_NONE;
+        return is_torque_expected(self, i) ? FAULT_DRIVE_DROPPED : FAULT_NONE;
     }
     return is_behind ? FAULT_FOLLOWING : FAULT_NONE;
 }
@@ -477,6 +484,7 @@ static bool is_move_done(const gateway_t *self)
     case STATE_NEUTRAL:
     case STATE_ENGAGED:
     case STATE_HOLD:
+    case STATE_SERVICE:
     case STATE_FAULT:
     case STATE_ESTOP:
     case STATES:
@@ -585,6 +593,15 @@ static void clear_faults(uint32_t by_axis[DRIVES_MAX + 1u])
     }
 }
 
+/* What hands do, and drives that take too long about it. */
+static void watch_service(gateway_t *self, uint64_t now_us)
+{
+    const fault_code_t code = service_step(self, now_us);
+    if (code != FAULT_NONE) {
+        raise_fault(self, &(fault_t){.code = code, .at_us = now_us});
+    }
+}
+
 void operate_before_frames(gateway_t *self, uint64_t now_us)
 {
     clear_faults(self->snapshot.begun);
@@ -606,6 +623,9 @@ void operate_before_frames(gateway_t *self, uint64_t now_us)
     if (is_move_done(self)) {
         self->bring_up = BRING_UP_IDLE;
         operate_event(self, EVENT_MOVE_DONE, now_us);
+    }
+    if (self->supervisor.state == STATE_SERVICE) {
+        watch_service(self, now_us);
     }
     clear_faults(self->told);
 }
@@ -654,6 +674,13 @@ hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us)
     const uint32_t ignored = self->supervisor.ignored[request];
     if (self->is_shutdown_asked && request != EVENT_SHUTDOWN && request != EVENT_HOLD) {
         return HV_ERR_STATE;
+    }
+    const bool is_going_off = self->is_disable_due || !motion_is_at_rest(&self->motion);
+    if (request == EVENT_SERVICE && (is_going_off || is_drive_fault_present(self))) {
+        return HV_ERR_STATE; /* it would become a fault at once */
+    }
+    if (request == EVENT_HOLD && self->supervisor.state == STATE_SERVICE) {
+        service_let_go(self);
     }
     if (request == EVENT_SHUTDOWN && is_coming_up(self)) {
         operate_event(self, EVENT_HOLD, now_us); /* homing may take minutes, and who ends heaved has less patience */

@@ -4,7 +4,8 @@
  *
  * How to read it. The goal is where the platform is to end up, and it goes there by itself, one state at a time. Only ENGAGE
  * brings it up from below. Silence of the sender may stop it, send it to neutral or settle it, and a frame brings back only what
- * silence took: it never releases an operator's hold and never raises a platform that has begun to settle.
+ * silence took: it never releases an operator's hold and never raises a platform that has begun to settle. SERVICE has no way up:
+ * it ends in OFF, which only ENGAGE and PARK leave then.
  */
 #include "heave/supervisor.h"
 
@@ -66,6 +67,7 @@ static const row_t k_rows[] = {
     {STATE_OFF,      EVENT_ENGAGE,          ALWAYS,           STATE_HOMING,   STATE_ENGAGED,  CLEAR, ACTION_HOME},
     {STATE_OFF,      EVENT_PARK,            ALWAYS,           STATE_HOMING,   STATE_SETTLED,  CLEAR, ACTION_HOME},
     {STATE_OFF,      EVENT_SHUTDOWN,        ALWAYS,           STAY,           STATE_OFF,      CLEAR, ACTION_NONE},
+    {STATE_OFF,      EVENT_SERVICE,         ALWAYS,           STATE_SERVICE,  STATE_OFF,      CLEAR, ACTION_SERVE},
 
     {STATE_HOMING,   EVENT_MOVE_DONE,       ALWAYS,           STATE_SETTLED,  KEEP,           CLEAR, ACTION_STAY},
     {STATE_HOMING,   EVENT_ENGAGE,          ALWAYS,           STAY,           STATE_ENGAGED,  CLEAR, ACTION_NONE},
@@ -79,6 +81,7 @@ static const row_t k_rows[] = {
     {STATE_SETTLED,  EVENT_HOLD,            GOAL_UP,          STAY,           STATE_SETTLED,  CLEAR, ACTION_NONE},
     {STATE_SETTLED,  EVENT_PARK,            ALWAYS,           STAY,           STATE_SETTLED,  CLEAR, ACTION_NONE},
     {STATE_SETTLED,  EVENT_SHUTDOWN,        ALWAYS,           STATE_OFF,      STATE_OFF,      CLEAR, ACTION_OFF},
+    {STATE_SETTLED,  EVENT_SERVICE,         ALWAYS,           STATE_SERVICE,  STATE_OFF,      CLEAR, ACTION_SERVE},
 
     {STATE_RISING,   EVENT_MOVE_DONE,       ALWAYS,           STATE_NEUTRAL,  KEEP,           SAME,  ACTION_STAY},
     {STATE_RISING,   EVENT_ENGAGE,          ALWAYS,           STAY,           STATE_ENGAGED,  CLEAR, ACTION_NONE},
@@ -129,6 +132,11 @@ static const row_t k_rows[] = {
     {STATE_SETTLING, EVENT_HOLD,            ALWAYS,           STATE_HOLD,     KEEP,           CLEAR, ACTION_STOP},
     {STATE_SETTLING, EVENT_PARK,            ALWAYS,           STAY,           STATE_SETTLED,  CLEAR, ACTION_NONE},
     {STATE_SETTLING, EVENT_SHUTDOWN,        ALWAYS,           STAY,           STATE_OFF,      CLEAR, ACTION_NONE},
+
+    {STATE_SERVICE,  EVENT_SERVICE,         ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {STATE_SERVICE,  EVENT_SERVICE_OFF,     ALWAYS,           STATE_OFF,      STATE_OFF,      CLEAR, ACTION_OFF},
+    {STATE_SERVICE,  EVENT_HOLD,            ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
+    {STATE_SERVICE,  EVENT_SHUTDOWN,        ALWAYS,           STATE_OFF,      STATE_OFF,      CLEAR, ACTION_OFF},
 
     /* levels that no row above takes: expected, not counted */
     {ANY,            EVENT_DRIVES_READY,    ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
@@ -231,7 +239,7 @@ const char *state_name(state_t state)
     static const char *const k_names[STATES] = {
         [STATE_OFF] = "OFF",         [STATE_HOMING] = "HOMING",   [STATE_SETTLED] = "SETTLED", [STATE_RISING] = "RISING",
         [STATE_NEUTRAL] = "NEUTRAL", [STATE_ENGAGED] = "ENGAGED", [STATE_HOLD] = "HOLD",       [STATE_SETTLING] = "SETTLING",
-        [STATE_FAULT] = "FAULT",     [STATE_ESTOP] = "ESTOP",
+        [STATE_SERVICE] = "SERVICE", [STATE_FAULT] = "FAULT",     [STATE_ESTOP] = "ESTOP",
     };
     return (unsigned)state < STATES ? k_names[state] : "?";
 }
@@ -248,6 +256,8 @@ const char *event_name(event_t event)
         [EVENT_PARK] = "park",
         [EVENT_RESET] = "reset",
         [EVENT_SHUTDOWN] = "shutdown",
+        [EVENT_SERVICE] = "service",
+        [EVENT_SERVICE_OFF] = "service-off",
         [EVENT_FRAME] = "frame",
         [EVENT_SILENCE_HOLD] = "silence-hold",
         [EVENT_SILENCE_NEUTRAL] = "silence-neutral",

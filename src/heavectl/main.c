@@ -22,6 +22,7 @@
 #include "common/presets.h"
 #include "common/standard_descriptors.h"
 #include "common/usage.h"
+#include "heavectl/hold.h"
 #include "heavectl/scope.h"
 #include "heavectl/socket.h"
 #include "heavectl/usage.h"
@@ -40,7 +41,8 @@
 /** A run of the program. */
 typedef struct {
     const char *command;
-    const char *argument; /**< of intensity; else NULL */
+    const char *argument; /**< what follows the command, one blank between words; NULL: nothing */
+    char words[64];       /**< of that */
     const char *socket;   /**< NULL = not named */
     const char *platform; /**< NULL = not named */
     char path[SOCKET_PATH_MAX];
@@ -113,7 +115,7 @@ static int open_link(ctl_t *self)
  * see. */
 static int send_line(const ctl_t *self, const char *request)
 {
-    char line[64];
+    char line[96];
     const int length = snprintf(line, sizeof line, "%s\n", request);
     ssize_t sent;
     do {
@@ -284,6 +286,34 @@ static void show_incidents(const cJSON *incidents)
     }
 }
 
+/* One line for each drive. */
+static void show_counts(const cJSON *answer)
+{
+    const cJSON *drive = NULL;
+    cJSON_ArrayForEach(drive, cJSON_GetObjectItemCaseSensitive(answer, "drives"))
+    {
+        const cJSON *number = cJSON_GetObjectItemCaseSensitive(drive, "drive");
+        const cJSON *state = cJSON_GetObjectItemCaseSensitive(drive, "state");
+        const cJSON *counts = cJSON_GetObjectItemCaseSensitive(drive, "counts");
+        const cJSON *mm = cJSON_GetObjectItemCaseSensitive(drive, "actual_mm");
+        const cJSON *deg = cJSON_GetObjectItemCaseSensitive(drive, "actual_deg");
+        const cJSON *actual = mm != NULL ? mm : deg;
+        printf("drive %.0f: ", cJSON_IsNumber(number) ? number->valuedouble : 0.0);
+        if (cJSON_IsNumber(counts)) {
+            printf("%12.0f counts", counts->valuedouble);
+        } else {
+            printf("           - counts");
+        }
+        if (cJSON_IsNumber(actual)) {
+            printf("  %11.3f %s", actual->valuedouble, mm != NULL ? "mm " : "deg");
+        }
+        printf("  %s%s%s", cJSON_IsString(state) ? state->valuestring : "?",
+               cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(drive, "homed")) ? ", homed" : ", not homed",
+               cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(drive, "torque")) ? ", torque" : "");
+        printf("%s", isatty(STDOUT_FILENO) != 0 ? "\x1b[K\n" : "\n");
+    }
+}
+
 static void show_answer(const ctl_t *self, const cJSON *answer)
 {
     const cJSON *state = cJSON_GetObjectItemCaseSensitive(answer, "state");
@@ -294,7 +324,9 @@ static void show_answer(const ctl_t *self, const cJSON *answer)
         show_incidents(cJSON_GetObjectItemCaseSensitive(answer, "incidents"));
     } else if (strcmp(self->command, "status") == 0) {
         show_table(answer, false);
-    } else if (self->argument != NULL) {
+    } else if (cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(answer, "drives"))) {
+        show_counts(answer);
+    } else if (strcmp(self->command, "intensity") == 0) {
         const cJSON *percent = cJSON_GetObjectItemCaseSensitive(answer, "intensity_percent");
         printf("intensity: %.0f %%\n", cJSON_IsNumber(percent) ? percent->valuedouble : 0.0);
     } else {
@@ -332,7 +364,7 @@ static int show(const ctl_t *self, const char *line)
 
 static int ask(ctl_t *self)
 {
-    char request[64];
+    char request[80];
     (void)snprintf(request, sizeof request, "%s%s%s", self->command, self->argument != NULL ? " " : "",
                    self->argument != NULL ? self->argument : "");
     const int64_t until_ms = now_ms() + (strcmp(self->command, "dump") == 0 ? DUMP_MS : ANSWER_MS);
@@ -515,6 +547,50 @@ static int scope(ctl_t *self)
     return code == EXIT_DONE ? code : complain(code, "%s", error);
 }
 
+/* --- Counts --- */
+
+/* Once where the output is no terminal, else until Ctrl-C: somebody turns a spindle and looks at the number. */
+static int watch_counts(ctl_t *self)
+{
+    const struct sigaction action = {.sa_handler = on_signal};
+    const struct timespec pause = {.tv_nsec = 100000000};
+    if (self->is_json || isatty(STDOUT_FILENO) == 0) {
+        return ask(self);
+    }
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    const int64_t until_ms = self->for_s > 0.0 ? now_ms() + (int64_t)(self->for_s * 1000.0) : INT64_MAX;
+    printf("\x1b[2J");
+    while (is_interrupted == 0 && now_ms() < until_ms) {
+        printf("\x1b[H");
+        const int code = ask(self);
+        (void)fflush(stdout);
+        if (code != EXIT_DONE) {
+            return is_interrupted != 0 ? EXIT_DONE : code;
+        }
+        (void)nanosleep(&pause, NULL);
+    }
+    return EXIT_DONE;
+}
+
+/* --- By hand --- */
+
+static bool is_held(const ctl_t *self)
+{
+    return strcmp(self->command, "jog") == 0 || strcmp(self->command, "home") == 0 || strcmp(self->command, "relay") == 0;
+}
+
+static int hold(ctl_t *self)
+{
+    char request[80];
+    const struct sigaction action = {.sa_handler = on_signal};
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    (void)sigaction(SIGHUP, &action, NULL);
+    (void)snprintf(request, sizeof request, "%s %s", self->command, self->argument);
+    return hold_run(self->fd, request, &is_interrupted);
+}
+
 /* --- The command line --- */
 
 static bool read_seconds(const char *text, double *out)
@@ -566,10 +642,23 @@ static const char *take_option(ctl_t *self, int option)
     return NULL;
 }
 
+/* A number below zero is no option: getopt does not see its sign. */
+#define HIDDEN_SIGN '\x01'
+
+static void hide_signs(int argc, char **argv)
+{
+    for (int i = 1; i < argc; i++) {
+        if (argv[i][0] == '-' && argv[i][1] != '\0' && strchr("0123456789.", argv[i][1]) != NULL) {
+            argv[i][0] = HIDDEN_SIGN;
+        }
+    }
+}
+
 static const char *take_options(ctl_t *self, int argc, char **argv)
 {
     struct option known[USAGE_OPTIONS_MAX + 1];
     usage_options(&heavectl_usage, known);
+    hide_signs(argc, argv);
     opterr = 0;
     for (;;) {
         const int option = getopt_long(argc, argv, ":", known, NULL);
@@ -583,30 +672,89 @@ static const char *take_options(ctl_t *self, int argc, char **argv)
     }
 }
 
+static const usage_row_t *find_command(const char *name)
+{
+    const usage_row_t *row = heavectl_usage.commands;
+    while (!usage_is_end(row) && strcmp(name, row->name) != 0) {
+        row++;
+    }
+    return usage_is_end(row) ? NULL : row;
+}
+
+static int words_in(const char *text)
+{
+    int words = text != NULL ? 1 : 0;
+    for (; text != NULL && *text != '\0'; text++) {
+        words += *text == ' ';
+    }
+    return words;
+}
+
+/* Takes a unit off the end of a speed: heaved knows it by the axis. */
+static void drop_unit(char *words)
+{
+    static const char *const k_units[] = {"mm/s", "deg/s"};
+    const size_t length = strlen(words);
+    for (size_t i = 0; i < sizeof k_units / sizeof k_units[0]; i++) {
+        const size_t unit = strlen(k_units[i]);
+        if (length > unit && strcmp(&words[length - unit], k_units[i]) == 0) {
+            words[length - unit] = '\0';
+        }
+    }
+}
+
+/* Words that follow the command, with one blank between. */
+static bool join(ctl_t *self, char *const *word, int count)
+{
+    size_t length = 0;
+    for (int i = 0; i < count; i++) {
+        if (word[i][0] == HIDDEN_SIGN) {
+            word[i][0] = '-';
+        }
+        if (word[i][0] == '\0' || strpbrk(word[i], " \r\n") != NULL) {
+            return false;
+        }
+        const int more = snprintf(&self->words[length], sizeof self->words - length, "%s%s", i > 0 ? " " : "", word[i]);
+        length += (size_t)more;
+        if (length >= sizeof self->words) {
+            return false;
+        }
+    }
+    self->argument = count > 0 ? self->words : NULL;
+    return true;
+}
+
 static const char *take_command(ctl_t *self, int argc, char **argv)
 {
+    static char wrong[128];
     if (optind == argc) {
         return "a command is needed: status, watch, engage, hold, resume, park, reset, shutdown, dump, acknowledge or intensity "
                "PERCENT";
     }
-    const bool is_intensity = strcmp(argv[optind], "intensity") == 0;
-    const bool has_columns = strcmp(argv[optind], "scope") == 0 && optind + 2 == argc;
-    if (optind + (is_intensity || has_columns ? 2 : 1) != argc) {
-        return is_intensity ? "intensity needs a whole number of percent, as in `heavectl intensity 50`"
-                            : "one command is needed";
+    const usage_row_t *row = find_command(argv[optind]);
+    const int words = argc - optind - 1;
+    if (row == NULL) {
+        return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge, "
+               "intensity, service, service-off, counts, torque, jog, home, relay, scope and presets are allowed";
     }
-    self->argument = is_intensity || has_columns ? argv[optind + 1] : NULL;
-    if (self->is_waiting && destination(argv[optind]) == NULL) {
+    const bool is_all_columns = strcmp(row->name, "scope") == 0 && words == 0;
+    if (!is_all_columns && words != words_in(row->argument)) {
+        (void)snprintf(wrong, sizeof wrong, "%s needs %s", row->name, row->argument);
+        return strcmp(row->name, "intensity") == 0 ? "intensity needs a whole number of percent, as in `heavectl intensity 50`"
+               : row->argument != NULL             ? wrong
+                                                   : "one command is needed";
+    }
+    if (!join(self, &argv[optind + 1], words)) {
+        return "a word is empty, has a blank in it, or is too long";
+    }
+    if (self->is_waiting && destination(row->name) == NULL) {
         return "--wait goes with engage, resume, park and shutdown";
     }
-    for (const usage_row_t *row = heavectl_usage.commands; row->name != NULL; row++) {
-        if (strcmp(argv[optind], row->name) == 0) {
-            self->command = row->name;
-            return NULL;
-        }
+    self->command = row->name;
+    if (strcmp(row->name, "jog") == 0) {
+        drop_unit(self->words);
     }
-    return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge, "
-           "intensity, scope and presets are allowed";
+    return NULL;
 }
 
 /* Whom to ask: what the command line names, then the environment, then what is there. */
@@ -660,6 +808,10 @@ int main(int argc, char **argv)
     if (code != EXIT_DONE) {
         return code;
     }
-    code = strcmp(ctl.command, "watch") == 0 ? watch(&ctl) : strcmp(ctl.command, "scope") == 0 ? scope(&ctl) : ask(&ctl);
+    code = strcmp(ctl.command, "watch") == 0    ? watch(&ctl)
+           : strcmp(ctl.command, "scope") == 0  ? scope(&ctl)
+           : strcmp(ctl.command, "counts") == 0 ? watch_counts(&ctl)
+           : is_held(&ctl)                      ? hold(&ctl)
+                                                : ask(&ctl);
     return end_stdout(ctl.is_waiting && code == EXIT_DONE ? wait_for_end(&ctl) : code);
 }

@@ -13,6 +13,11 @@ static const usage_row_t k_forms[] = {
     {.argument = "--wait [--for SECONDS] engage | resume | park | shutdown"},
     {.argument = "engage | hold | resume | park | reset | shutdown | dump | incidents | seen | acknowledge"},
     {.argument = "intensity PERCENT"},
+    {.argument = "service | service-off | counts"},
+    {.argument = "torque N|all on|off"},
+    {.argument = "jog AXIS SPEED"},
+    {.argument = "home N|all"},
+    {.argument = "relay N"},
     {.argument = "[--for SECONDS] [--hz N] scope [COLUMN,...]"},
     {.argument = "presets"},
     {0},
@@ -35,6 +40,15 @@ static const usage_row_t k_commands[] = {
     {.name = "intensity",
      .argument = "PERCENT",
      .help = "how much of the sender's motion is made, about neutral: 0 to 100, or less where the configuration says so"},
+    {.name = "service", .help = "from OFF or SETTLED, with nobody on board: moved by hand, senders are not followed"},
+    {.name = "service-off", .help = "out of it: drives off"},
+    {.name = "counts", .help = "what each drive counts, before there is torque too; on a terminal until Ctrl-C"},
+    {.name = "torque", .argument = "N|all on|off", .help = "in service: of one drive, the others stay as they are; or of all"},
+    {.name = "jog",
+     .argument = "AXIS SPEED",
+     .help = "in service, while a key is held: drive N, or roll, pitch, yaw, x, y or z, by 5mm/s, -2deg/s"},
+    {.name = "home", .argument = "N|all", .help = "in service, while a key is held: drives find their zero"},
+    {.name = "relay", .argument = "N", .help = "in service, while a key is held: away from its safe position"},
     {.name = "scope",
      .argument = "[COLUMN,...]",
      .help = "every cycle as a line of CSV, all columns or these; on a terminal some lines a second (docs/samples.md)"},
@@ -77,6 +91,14 @@ static const usage_section_t k_manual[] = {
      "With `--json` every answer is an object of one line: /usr/share/doc/heave/docs/status-json.md has all its members, which "
      "stay what they "
      "are within a major version. An answer with `ok` false says in `error` why.\n"},
+    {"SERVICE",
+     "In service the machine is moved by hand. What moves or switches something goes on while a key is held: the terminal "
+     "repeats "
+     "it, and a tap moves nothing. `heavectl` tells heaved every 50 ms that the key is still held; heaved stops by itself 250 ms "
+     "after it has heard that last, whatever became of `heavectl`, the terminal or the link between. Then the key has to be let "
+     "go and held again. `q` or Ctrl-C ends.\n\n"
+     "Nobody may be on the platform or within its reach, and the e-stop belongs into the other hand: service mode is no safety "
+     "function.\n"},
     {"ENVIRONMENT", "`HEAVE_SOCKET` is the socket where none is named. `LC_ALL`, `LC_MESSAGES` "
                     "and `LANG`: faults are "
                     "told in Chinese where they begin "
@@ -86,6 +108,11 @@ static const usage_section_t k_manual[] = {
                  " heavectl intensity 50\n"
                  " heavectl --for 10 watch\n"
                  " heavectl park\n"
+                 "Which cylinder is drive 3, and which way does it go:\n"
+                 " heavectl service\n"
+                 " heavectl torque 3 on\n"
+                 " heavectl jog 3 2mm/s\n"
+                 " heavectl service-off\n"
                  "In a script:\n"
                  " heavectl --json status | python3 -c 'import json, sys; print(json.load(sys.stdin)[\"state\"])'\n"},
     {0},

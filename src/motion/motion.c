@@ -6,6 +6,8 @@
 
 #include "assembly.h"
 #include "follow.h"
+#include "jog.h"
+#include "jog_limits.h"
 #include "reach.h"
 #include "slots.h"
 #include "stop.h"
@@ -100,6 +102,7 @@ hv_status_t motion_init(motion_t *self, const settings_t *settings)
     self->cylinders = status == HV_OK ? kin_cylinders(&self->kin) : 0;
     status = status == HV_OK ? init_cylinders(self, settings) : status;
     status = status == HV_OK ? init_axes(self, settings) : status;
+    status = status == HV_OK ? jog_limits_init(&self->jog_limits, settings) : status;
     status = status == HV_OK ? init_gate(self, settings) : status;
     if (status != HV_OK) {
         return status;
@@ -147,6 +150,8 @@ void motion_place(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q
     self->is_fading = false;
     self->has_pending = false;
     self->is_pose_stale = true;
+    self->jog.is_serving = false;
+    self->jog.led = 0;
     note_known_pose(self, extension_mm_q32);
     rest_here(self);
 }
@@ -260,6 +265,10 @@ HV_OWN_FRAME static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_M
         halt_step(&self->halt, ref);
         return;
     }
+    if (self->source == MOTION_JOGGED) {
+        jog_refer(self, ref);
+        return;
+    }
     if (self->source == MOTION_ON_PATH) {
         scurve_step(&way->path);
         for (unsigned i = 0; i < AXES_MAX; i++) {
@@ -275,8 +284,10 @@ HV_OWN_FRAME static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_M
 /* The last word: every cylinder and the rotation motor through its ramp. */
 static void limit(motion_t *self, const ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
-    const unsigned flags = ramp_step_all(self->cylinder, self->cylinders, ref, RAMP_FIRM, out->extension_mm_q32);
-    for (unsigned i = 0; i < self->cylinders; i++) {
+    const bool is_serving = self->jog.is_serving;
+    const unsigned flags = is_serving ? jog_limit(self, ref, out->extension_mm_q32)
+                                      : ramp_step_all(self->cylinder, self->cylinders, ref, RAMP_FIRM, out->extension_mm_q32);
+    for (unsigned i = 0; i < self->cylinders && !is_serving; i++) {
         out->flags |= out->extension_mm_q32[i] != ref[i].pos_q32 ? MOTION_OFF_PATH : 0;
     }
     out->flags |= ((flags & RAMP_CLAMPED) ? MOTION_CLAMPED : 0) | ((flags & RAMP_SPEED) ? MOTION_SPEED : 0) |
@@ -325,6 +336,11 @@ static void end_cycle(motion_t *self, uint64_t now_us)
         if (self->is_following) {
             begin_following(self, now_us);
         }
+    } else if (jog_is_done(self)) {
+        rest_here(self);
+    } else if (jog_is_astray(self)) {
+        self->singular_stops++;
+        motion_stop(self);
     } else if (is_led_astray(self)) {
         self->singular_stops++;
         motion_follow(self);
@@ -352,7 +368,8 @@ void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out)
     } else {
         step_in_cylinders(self, ref);
         out->flags |= self->is_following && self->source == MOTION_ON_PATH ? MOTION_TAKEOVER : 0;
-        out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &ref[AXIS_ANGLE], RAMP_FIRM);
+        out->angle_deg_q32 = self->jog.is_serving ? jog_limit_angle(self, &ref[AXIS_ANGLE])
+                                                  : ramp_step(&self->axis[AXIS_ANGLE], &ref[AXIS_ANGLE], RAMP_FIRM);
         out->flags |= MOTION_IN_CYLINDERS;
     }
     limit(self, ref, out);

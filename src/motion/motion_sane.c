@@ -5,6 +5,7 @@
 #include "heave/motion_sane.h"
 
 #include "heave/sane.h"
+#include "jog.h"
 
 #define SHARE_MAX_Q46 ((int64_t)2 << 46)
 #define CYCLES_MAX    ((int64_t)1 << 40)
@@ -105,6 +106,6 @@ bool motion_state_is_sane(const motion_t *saved, const motion_t *prepared)
            is_same_q32(saved->settled_pose.axis_q32, prepared->settled_pose.axis_q32, POSE_AXES) &&
            is_same_q32(saved->neutral_mm_q32, prepared->neutral_mm_q32, saved->cylinders) &&
            is_same_q32(saved->settled_mm_q32, prepared->settled_mm_q32, saved->cylinders) && are_ramps_sane(saved, prepared) &&
-           are_kinds_sane(saved) && are_bools_sane(saved) && are_numbers_sane(saved) && motion_target_is_sane(&saved->pending) &&
-           motion_target_is_sane(&saved->withheld);
+           jog_is_sane(saved, prepared) && are_kinds_sane(saved) && are_bools_sane(saved) && are_numbers_sane(saved) &&
+           motion_target_is_sane(&saved->pending) && motion_target_is_sane(&saved->withheld);
 }

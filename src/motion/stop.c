@@ -4,6 +4,7 @@
 #include "stop.h"
 
 #include "heave/halt.h"
+#include "jog_limits.h"
 
 bool motion_is_at_rest(const motion_t *self)
 {
@@ -21,7 +22,7 @@ static void plan_stop(motion_t *self)
     halt_t *halt = &self->halt;
     const ramp_limits_t *limits[AXES_MAX];
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        const ramp_t *ramp = i == AXIS_ANGLE ? &self->axis[AXIS_ANGLE] : &self->cylinder[i];
+        const ramp_t *ramp = jog_limiter(self, i);
         halt->start[i] = ramp->state;
         limits[i] = &ramp->limits;
     }

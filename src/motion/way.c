@@ -5,6 +5,7 @@
  */
 #include "way.h"
 
+#include "jog_limits.h"
 #include "slot.h"
 
 #define QUINTIC_SHIFT   5 /* a division for each limit of each piece took a sixth of the time of a plan */
@@ -117,14 +118,14 @@ void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q
         }
     }
     for (unsigned i = 0; i < motion->cylinders; i++) {
-        const ramp_limits_t *own = &motion->cylinder[i].limits;
+        const ramp_limits_t *own = &jog_limiter(motion, i)->limits;
         slope_q32[i] *= STRAIGHT_PIECES;
         bend_q32[i] *= STRAIGHT_PIECES * STRAIGHT_PIECES;
         narrow_by_speed(limits, slope_q32[i], own->vel_per_cycle_q32);
         narrow_by_bend(limits, bend_q32[i], own->acc_per_cycle2_q32);
     }
     for (unsigned i = 0; i < motion->cylinders; i++) {
-        const ramp_limits_t left = less_bend(&motion->cylinder[i].limits, bend_q32[i], limits);
+        const ramp_limits_t left = less_bend(&jog_limiter(motion, i)->limits, bend_q32[i], limits);
         path_limits_narrow(limits, slope_q32[i], &left);
     }
 }

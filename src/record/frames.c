@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "record/service_words.h"
+
 #define READ_BYTES      65536u
 #define FRAMES_LINE_MAX (1u << 20)       /* the longest text with all its bytes as escapes, or a !state, several times over */
 #define FRAMES_FILE_MAX (1u << 30)       /* a day of frames at 60 Hz is a third of it */
@@ -33,10 +35,15 @@ static const char k_bad_drive[] =
 static const char k_bad_fault[] = "!fault without its code; drive-fault N, drive-offline N, drive-dropped N, following-error N "
                                   "and setpoint-jump N (N from 1 to 7), drive-timeout, "
                                   "bus-lost and bus-failing are allowed";
+static const char k_bad_service[] =
+    "not as a recording has it; !torque N on, !torque N off, !jog N SPEED SERIES AGE_US, !home N SERIES AGE_US, !relay N SERIES "
+    "AGE_US, !beat SERIES COUNTER AGE_US and !release SERIES are allowed (N may be all of torque and home, an axis of jog)";
 static const char k_bad_feedback[] = "!feedback is not as a black box writes it; it has to be left as it is";
 static const char k_bad_request[] =
-    "unknown request; !engage !hold !resume !park !reset !shutdown, !intensity N (0 to 100), !estop on, !estop off, "
-    "!late N, !drive N fault CODE, !drive N offline, !drive N back, !fault CODE, !fault CODE N, !end and !from ADDRESS are "
+    "unknown request; !engage !hold !resume !park !reset !shutdown !service !service-off, !intensity N (0 to 100), !estop on, "
+    "!estop off, "
+    "!torque, !jog, !home, !relay, !beat and !release as a recording has them, !late N, !drive N fault CODE, !drive N offline, "
+    "!drive N back, !fault CODE, !fault CODE N, !end and !from ADDRESS are "
     "allowed (a "
     "datagram that starts with ! "
     "is written \\x21)";
@@ -44,8 +51,9 @@ static const char k_bad_request[] =
 static const struct {
     const char *word;
     event_t event;
-} k_requests[] = {{"engage", EVENT_ENGAGE}, {"hold", EVENT_HOLD},   {"resume", EVENT_RESUME},
-                  {"park", EVENT_PARK},     {"reset", EVENT_RESET}, {"shutdown", EVENT_SHUTDOWN}};
+} k_requests[] = {
+    {"engage", EVENT_ENGAGE}, {"hold", EVENT_HOLD},         {"resume", EVENT_RESUME},   {"park", EVENT_PARK},
+    {"reset", EVENT_RESET},   {"shutdown", EVENT_SHUTDOWN}, {"service", EVENT_SERVICE}, {"service-off", EVENT_SERVICE_OFF}};
 
 /** A line being read. */
 typedef struct {
@@ -354,6 +362,13 @@ static const char *read_request_words(cursor_t *self, frames_line_t *out)
     if (take_word(self, "late")) {
         out->kind = FRAMES_LATE;
         return read_count(self, UINT32_MAX, &out->number) ? NULL : k_bad_late;
+    }
+    if (service_words_are(self->at, (size_t)(self->end - self->at))) {
+        uint64_t none = 0;
+        const char *why = service_words_read(self->at, (size_t)(self->end - self->at), true, &out->service, &none);
+        out->kind = FRAMES_SERVICE;
+        self->at += self->end - self->at;
+        return why == NULL ? NULL : k_bad_service;
     }
     if (take_word(self, "end")) {
         out->kind = FRAMES_END;

@@ -7,6 +7,7 @@
 #include "heave/drives.h"
 #include "heave/fault.h"
 #include "heave/hal/udp.h"
+#include "heave/service.h"
 #include "heave/supervisor.h"
 
 /** What a line does. */
@@ -14,6 +15,7 @@ typedef enum {
     FRAMES_DATAGRAM,  /**< a sender sends text */
     FRAMES_REQUEST,   /**< `!engage` ...: what heavectl would ask for */
     FRAMES_INTENSITY, /**< `!intensity N`: percent of a sender's motion */
+    FRAMES_SERVICE,   /**< `!jog ...`, `!torque ...`: by hand (service_words.h; recordings hold this) */
     FRAMES_ESTOP,     /**< `!estop on`, `!estop off` */
     FRAMES_LATE,      /**< `!late N`: N cycles are skipped and counted (recordings hold this) */
     FRAMES_FROM,      /**< `!from ADDRESS`: who sends the datagrams from here on */
@@ -36,6 +38,7 @@ typedef struct {
     const uint8_t *text; /**< FRAMES_DATAGRAM: its bytes, escapes resolved; FRAMES_STATE: what stands behind the word */
     uint32_t length;
     drive_feedback_t feedback; /**< FRAMES_FEEDBACK; actual_us is its age */
+    service_request_t service; /**< FRAMES_SERVICE */
     hal_udp_peer_t from;       /**< FRAMES_FROM: read from it; FRAMES_DATAGRAM: set by frames_load */
     uint32_t line;             /**< number in the file, from 1 */
 } frames_line_t;

@@ -96,6 +96,13 @@ static hv_status_t told_request(void *ctx, drives_request_t request)
     return self->is_told ? HV_OK : status;
 }
 
+static hv_status_t told_request_one(void *ctx, uint8_t axis, drives_request_t request)
+{
+    player_t *self = ctx;
+    const hv_status_t status = drives_request_one(sim_drives_hal(self->drives), axis, request);
+    return !self->is_told ? status : drives_allow(request, self->told[axis].state) ? HV_OK : HV_ERR_STATE;
+}
+
 static uint8_t told_count(void *ctx)
 {
     const player_t *self = ctx;
@@ -104,7 +111,7 @@ static uint8_t told_count(void *ctx)
 
 drives_t player_drives(player_t *self)
 {
-    static const drives_ops_t k_ops = {told_poll, told_send, told_request, told_count, NULL, NULL};
+    static const drives_ops_t k_ops = {told_poll, told_send, told_request, told_count, NULL, NULL, told_request_one, NULL};
     return (drives_t){&k_ops, self};
 }
 
@@ -128,6 +135,12 @@ static void inject(player_t *self, const frames_line_t *line)
     sim_drives_inject(self->drives, &fault);
 }
 
+static void serve(player_t *self, const frames_line_t *line)
+{
+    const service_answer_t answer = gateway_service(&self->session.gateway, &line->service, self->session.now_us);
+    tell_refused(self, line, answer == SERVICE_DONE ? HV_OK : HV_ERR_STATE, service_verb_name(line->service.verb));
+}
+
 static void carry_out(player_t *self, const frames_line_t *line)
 {
     gateway_t *gateway = &self->session.gateway;
@@ -137,6 +150,9 @@ static void carry_out(player_t *self, const frames_line_t *line)
         break;
     case FRAMES_INTENSITY:
         tell_refused(self, line, gateway_set_intensity(gateway, line->number), "intensity beyond [motion] intensity_max_percent");
+        break;
+    case FRAMES_SERVICE:
+        serve(self, line);
         break;
     case FRAMES_ESTOP:
         sim_inputs_set(self->inputs, INPUT_ESTOP, line->number != 0);
@@ -189,6 +205,7 @@ static bool is_state_at_rest(const snapshot_t *s)
     case STATE_OFF:
     case STATE_ENGAGED:
     case STATE_HOLD:
+    case STATE_SERVICE:
     case STATE_FAULT:
     case STATE_ESTOP:
     case STATES:

@@ -3,7 +3,10 @@
  */
 #include "record/record.h"
 
+#include <string.h>
+
 #include "common/decimal.h"
+#include "record/service_words.h"
 
 void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value)
 {
@@ -16,6 +19,12 @@ void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const
 {
     const record_head_t head = {.from = *from, .t_us = t_us, .value = (uint32_t)length, .kind = (uint32_t)kind};
     (void)ring_push(ring, &head, sizeof head, bytes, kind == RECORD_DATAGRAM ? length : 0);
+}
+
+void record_push_service(ring_t *ring, uint64_t t_us, const service_request_t *request)
+{
+    const record_head_t head = {.t_us = t_us, .kind = RECORD_SERVICE};
+    (void)ring_push(ring, &head, sizeof head, request, sizeof *request);
 }
 
 void record_push_drives(ring_t *ring, uint64_t t_us, const drive_feedback_t was[DRIVES_MAX],
@@ -119,6 +128,14 @@ static size_t put_fault(char *to, fault_code_t code, uint32_t axis)
     return at + (axis != 0 ? put_number(&to[at], " ", axis, "") : 0);
 }
 
+static size_t put_service(char *to, const uint8_t *bytes)
+{
+    service_request_t request;
+    memcpy(&request, bytes, sizeof request);
+    const size_t at = decimal_put_text(to, "!");
+    return at + service_words_put(&to[at], &request);
+}
+
 /* What a record says, behind its time. */
 static size_t put_content(char *to, const record_t *record, size_t length)
 {
@@ -139,6 +156,8 @@ static size_t put_content(char *to, const record_t *record, size_t length)
         return put_drive(to, record->head.detail, record->head.value);
     case RECORD_FAULT:
         return put_fault(to, (fault_code_t)record->head.value, record->head.detail);
+    case RECORD_SERVICE:
+        return put_service(to, record->bytes);
     case RECORD_RELOAD:
         return decimal_put_text(to, "the configuration was read again: what changed with it does not replay, but for faults");
     case RECORD_ZERO:

@@ -20,11 +20,12 @@ typedef enum {
     RECORD_DRIVE,     /**< a drive went into DRIVE_FAULT, went DRIVE_OFFLINE or came back; detail: number, from 1, << 8 |
                          drive_state_t;     value: its code */
     RECORD_FAULT,     /**< a fault began; value: fault_code_t, detail: its axis as in fault_t */
+    RECORD_SERVICE,   /**< by hand, and taken; bytes: service_request_t */
     RECORD_RELOAD,    /**< the configuration was read again */
     RECORD_ZERO       /**< time zero; value: record_zero() */
 } record_kind_t;
 
-/** What stands before the bytes of a datagram. */
+/** What stands before the bytes of a datagram or of a request. */
 typedef struct {
     hal_udp_peer_t from; /**< of a datagram */
     uint64_t t_us;       /**< of the cycle, since the start of the program */
@@ -58,6 +59,9 @@ void record_push(ring_t *ring, record_kind_t kind, uint64_t t_us, uint32_t value
 /** Hands a datagram over: RECORD_DATAGRAM, or RECORD_OVERSIZE whose bytes are not kept. */
 void record_push_datagram(ring_t *ring, record_kind_t kind, uint64_t t_us, const hal_udp_peer_t *from, const uint8_t *bytes,
                           size_t length);
+
+/** Hands a request of SERVICE over. */
+void record_push_service(ring_t *ring, uint64_t t_us, const service_request_t *request);
 
 /** Hands over what has become of the drives in a cycle, where that is to be played back: faults, and drives that are gone or
  * back.

@@ -11,32 +11,38 @@
 #define PLACES 9u
 
 /* Flags that are no motion flags follow those in the same word. */
-enum { FLAG_FAULT = 1u << 8, FLAG_ESTOP = 1u << 9, FLAG_SILENT = 1u << 10, FLAG_LATE = 1u << 11, FLAG_BEFORE_ZERO = 1u << 12 };
+enum {
+    FLAG_FAULT = 1u << 8,
+    FLAG_ESTOP = 1u << 9,
+    FLAG_SILENT = 1u << 10,
+    FLAG_LATE = 1u << 11,
+    FLAG_BEFORE_ZERO = 1u << 12,
+    FLAG_LOOSE = 1u << 13
+};
 
 static const struct {
     unsigned flag;
     const char *word;
 } k_words[] = {
-    {MOTION_CLAMPED, "clamped"},
-    {MOTION_SPEED, "speed"},
-    {MOTION_ACCEL, "accel"},
-    {MOTION_STRETCHED, "stretched"},
-    {MOTION_TAKEOVER, "takeover"},
-    {MOTION_IN_CYLINDERS, "cylinders"},
-    {MOTION_OFF_PATH, "off-path"},
-    {MOTION_NO_POSE, "no-pose"},
-    {FLAG_FAULT, "fault"},
-    {FLAG_ESTOP, "estop"},
-    {FLAG_SILENT, "silent"},
-    {FLAG_LATE, "late"},
-    {FLAG_BEFORE_ZERO, "before-zero"},
+    {MOTION_CLAMPED, "clamped"},     {MOTION_SPEED, "speed"},           {MOTION_ACCEL, "accel"},
+    {MOTION_STRETCHED, "stretched"}, {MOTION_TAKEOVER, "takeover"},     {MOTION_IN_CYLINDERS, "cylinders"},
+    {MOTION_OFF_PATH, "off-path"},   {MOTION_NO_POSE, "no-pose"},       {FLAG_FAULT, "fault"},
+    {FLAG_ESTOP, "estop"},           {FLAG_SILENT, "silent"},           {FLAG_LATE, "late"},
+    {FLAG_LOOSE, "loose"},           {FLAG_BEFORE_ZERO, "before-zero"},
 };
+
+/* In service, a drive has no torque or moves by itself: its set-point is where it is. */
+static bool is_loose(const snapshot_t *s)
+{
+    const uint32_t all = (1u << (s->cylinders + (s->has_angle ? 1u : 0u))) - 1u;
+    return s->state == STATE_SERVICE && (s->service.torque & ~s->service.homing) != all;
+}
 
 static unsigned flags_of(const snapshot_t *s, bool is_late)
 {
     return (s->flags & 0xFFu) | (s->state == STATE_FAULT ? FLAG_FAULT : 0u) |
            (s->state == STATE_ESTOP || s->is_estop_active ? FLAG_ESTOP : 0u) | (s->is_held_by_silence ? FLAG_SILENT : 0u) |
-           (is_late ? FLAG_LATE : 0u);
+           (is_late ? FLAG_LATE : 0u) | (is_loose(s) ? FLAG_LOOSE : 0u);
 }
 
 void trace_take(trace_row_t *self, const snapshot_t *snapshot, uint64_t t_us, bool is_late, bool is_before_zero)

@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 
 #include "common/message.h"
+#include "record/service_words.h"
 #include "service/operator_requests.h"
 
 #define GROUPS_MAX 256u
@@ -86,14 +87,16 @@ level_t levels_needed(const char *request, unsigned percent)
     if (strcmp(request, "seen") == 0) {
         return LEVEL_OPERATE;
     }
-    if (strcmp(request, "dump") == 0 || strcmp(request, "acknowledge") == 0) {
+    if (service_words_are(request, strlen(request)) || strcmp(request, "dump") == 0 || strcmp(request, "acknowledge") == 0) {
         return LEVEL_SERVICE;
     }
     const event_t event = operator_request_find(request);
     if (event == EVENTS || event == EVENT_HOLD) {
         return LEVEL_LOOK;
     }
-    return event == EVENT_RESET || event == EVENT_SHUTDOWN ? LEVEL_SERVICE : LEVEL_OPERATE;
+    return event == EVENT_RESET || event == EVENT_SHUTDOWN || event == EVENT_SERVICE || event == EVENT_SERVICE_OFF
+               ? LEVEL_SERVICE
+               : LEVEL_OPERATE;
 }
 
 const char *level_name(level_t level)

@@ -12,7 +12,9 @@
 #include <unistd.h>
 
 #include "common/message.h"
+#include "record/service_words.h"
 #include "service/operator_requests.h"
+#include "service/service_json.h"
 
 #define BACKLOG         8
 #define ANSWER_US       1000000u  /* the motion thread answers within a cycle or two */
@@ -138,6 +140,27 @@ static void answer_done(control_client_t *client, const snapshot_t *snapshot)
     answer(client, &json);
 }
 
+/* Of a request by hand: as good or as bad as it was, with the newest tick. */
+static void answer_service(control_client_t *client, const motion_result_t *result)
+{
+    char error[160];
+    const bool is_done = result->answer == SERVICE_DONE;
+    (void)snprintf(error, sizeof error, "%s%s%s", is_done ? "" : service_verb_name(client->service.verb), is_done ? "" : ": ",
+                   service_answer_text(result->answer));
+    log_answer(client, error, result->snapshot.state);
+    json_t json = start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", is_done);
+    if (!is_done) {
+        json_text(&json, "error", error);
+        json_text(&json, "why", service_answer_name(result->answer));
+    }
+    json_text(&json, "state", state_name(result->snapshot.state));
+    service_json_hand(&json, &result->snapshot);
+    json_close(&json, '}');
+    answer(client, &json);
+}
+
 static void answer_error(control_client_t *client, const char *error, const char *state)
 {
     log_answer(client, error, control_state(client->control));
@@ -180,20 +203,44 @@ static void refuse(const control_t *self, control_client_t *client, const snapsh
     answer_error(client, error, state_name(snapshot->state));
 }
 
-/* Hands an operator's request to the motion thread; the answer follows. */
-static void begin_request(control_t *self, control_client_t *client, event_t event, uint32_t number, uint64_t now_us)
+/* Hands a request to the motion thread; the answer follows.
+ * @param content what it asks for, without its id */
+static void hand_over(control_t *self, control_client_t *client, const motion_request_t *content, uint64_t now_us)
 {
+    const event_t event = (event_t)content->event;
+    motion_request_t request = *content;
     self->last_id += self->last_id == UINT32_MAX ? 2 : 1; /* 0 means none */
-    const motion_request_t request = {self->last_id, (uint32_t)event, number};
+    request.id = self->last_id;
     if (!ring_push(&self->handover->requests, &request, sizeof request, NULL, 0)) {
         answer_error(client, "heaved is busy: try again", NULL);
         return;
     }
     client->request_id = self->last_id;
     client->request = event;
-    client->number = number;
+    client->number = request.number;
+    client->service = request.service;
     client->is_accepted = false;
     client->answer_by_us = now_us + (event == EVENT_RESET ? RESET_US : ANSWER_US);
+}
+
+static void begin_request(control_t *self, control_client_t *client, event_t event, uint32_t number, uint64_t now_us)
+{
+    hand_over(self, client, &(motion_request_t){.event = (uint32_t)event, .number = number}, now_us);
+}
+
+/* By hand. What is held gets the number of its series here. */
+static void begin_service(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+{
+    motion_request_t request = {.event = OPERATOR_SERVICE};
+    const char *why = service_words_read(line, strlen(line), false, &request.service, &request.tick_us);
+    if (why != NULL) {
+        answer_error(client, why, state_name(snapshot_of(self)->state));
+        return;
+    }
+    if (service_is_held(request.service.verb)) {
+        request.service.series = ++self->last_series;
+    }
+    hand_over(self, client, &request, now_us);
 }
 
 static void begin_intensity(control_t *self, control_client_t *client, const char *argument, uint64_t now_us)
@@ -242,6 +289,22 @@ static void begin_dump(control_t *self, control_client_t *client, uint64_t now_u
     if (client->dump_ticket == 0) {
         answer_error(client, "dump: there is no black box; [black-box] directory says where it writes to", NULL);
     }
+}
+
+/* `tick`, `counts`: what a hand needs before and while it does anything. From the newest view: nothing is asked of the motion. */
+static void answer_tick(control_t *self, control_client_t *client, bool has_counts)
+{
+    const snapshot_t *s = snapshot_of(self);
+    json_t json = start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_text(&json, "state", state_name(s->state));
+    service_json_hand(&json, s);
+    if (has_counts) {
+        service_json_drives(&json, s);
+    }
+    json_close(&json, '}');
+    answer(client, &json);
 }
 
 /* Who says that they have been seen gets the list of what was. */
@@ -294,14 +357,16 @@ static const char k_by[] = "by ";
 
 static bool is_look(const char *line)
 {
-    return strcmp(line, "status") == 0 || strcmp(line, "incidents") == 0 || strcmp(line, "samples") == 0 ||
+    return strcmp(line, "status") == 0 || strcmp(line, "tick") == 0 || strcmp(line, "counts") == 0 ||
+           strncmp(line, "beat ", 5) == 0 || strcmp(line, "incidents") == 0 || strcmp(line, "samples") == 0 ||
            strncmp(line, "watch", 5) == 0 || strncmp(line, k_by, strlen(k_by)) == 0;
 }
 
 static bool is_known(const char *line)
 {
-    return operator_request_find(line) != EVENTS || strncmp(line, k_intensity, strlen(k_intensity)) == 0 ||
-           strcmp(line, "dump") == 0 || strcmp(line, "seen") == 0 || strcmp(line, k_acknowledge) == 0;
+    return operator_request_find(line) != EVENTS || service_words_are(line, strlen(line)) ||
+           strncmp(line, k_intensity, strlen(k_intensity)) == 0 || strcmp(line, "dump") == 0 || strcmp(line, "seen") == 0 ||
+           strcmp(line, k_acknowledge) == 0;
 }
 
 /* Somebody has seen that this is not the configuration that was approved, and wants it. */
@@ -373,6 +438,10 @@ static void take_request(control_t *self, control_client_t *client, const char *
         begin_request(self, client, event, 0, now_us);
     } else if (strncmp(line, k_intensity, strlen(k_intensity)) == 0) {
         begin_intensity(self, client, &line[strlen(k_intensity)], now_us);
+    } else if (service_words_are(line, strlen(line))) {
+        begin_service(self, client, line, now_us);
+    } else if (strcmp(line, "tick") == 0 || strcmp(line, "counts") == 0) {
+        answer_tick(self, client, line[0] == 'c');
     } else if (strcmp(line, "dump") == 0) {
         begin_dump(self, client, now_us);
     } else if (strcmp(line, "incidents") == 0 || strcmp(line, "seen") == 0) {
@@ -391,8 +460,9 @@ static void take_request(control_t *self, control_client_t *client, const char *
         }
     } else {
         answer_error(client,
-                     "unknown request; status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, "
-                     "shutdown, dump, incidents, samples, seen, acknowledge and by NAME are allowed",
+                     "unknown request; status, watch [HZ], tick, counts, intensity PERCENT, engage, hold, resume, park, reset, "
+                     "shutdown, service, service-off, torque, jog, home, relay, beat, release, dump, incidents, samples, seen, "
+                     "acknowledge and by NAME are allowed",
                      NULL);
     }
 }
@@ -471,6 +541,9 @@ static void take_result(const control_t *self, control_client_t *client, const m
         client->request_id = 0;
         (void)snprintf(error, sizeof error, k_unapproved, self->config->hash, self->config->approved.text);
         answer_error(client, error, state_name(result->snapshot.state));
+    } else if (client->request == OPERATOR_SERVICE) {
+        client->request_id = 0;
+        answer_service(client, result);
     } else if (result->status != HV_OK) {
         client->request_id = 0;
         refuse(self, client, &result->snapshot, result->is_shutting_down);

@@ -41,15 +41,16 @@ typedef struct {
     size_t in_length;
     char out[CONTROL_OUT_BYTES];
     size_t out_length;
-    bool is_passing;          /**< the descriptor of the samples goes out with the next bytes */
-    bool is_closing;          /**< nothing more is read; closed once everything is answered and sent */
-    uint32_t request_id;      /**< waits for the motion thread; 0 = none */
-    event_t request;          /**< or OPERATOR_INTENSITY */
-    uint32_t number;          /**< of that */
-    bool is_accepted;         /**< by the motion thread; a reset then still has to take effect */
-    uint64_t answer_by_us;    /**< latest time of the answer */
-    uint32_t dump_ticket;     /**< waits for the black box; 0 = does not */
-    uint64_t watch_period_us; /**< 0 = does not watch */
+    bool is_passing;           /**< the descriptor of the samples goes out with the next bytes */
+    bool is_closing;           /**< nothing more is read; closed once everything is answered and sent */
+    uint32_t request_id;       /**< waits for the motion thread; 0 = none */
+    event_t request;           /**< or OPERATOR_INTENSITY */
+    uint32_t number;           /**< of that */
+    service_request_t service; /**< of OPERATOR_SERVICE */
+    bool is_accepted;          /**< by the motion thread; a reset then still has to take effect */
+    uint64_t answer_by_us;     /**< latest time of the answer */
+    uint32_t dump_ticket;      /**< waits for the black box; 0 = does not */
+    uint64_t watch_period_us;  /**< 0 = does not watch */
     uint64_t watch_next_us;
     uint64_t came_us;
     uint64_t asked_us; /**< its last request, else when it came */
@@ -79,6 +80,7 @@ typedef struct control {
     level_peer_t
         acknowledged_by; /**< who has just acknowledged the configuration; the owner says it and sets it back; pid 0: nobody */
     uint32_t last_id;
+    uint32_t last_series; /**< given out: of what somebody has begun to hold */
     control_client_t client[CONTROL_CLIENTS];
 } control_t;
 

@@ -47,9 +47,11 @@ typedef enum { MOTION_MEMORY_UNKNOWN, MOTION_MEMORY_LOCKED, MOTION_MEMORY_UNLOCK
 
 /** An operator's request on its way to the motion thread. */
 typedef struct {
-    uint32_t id;     /**< the asking side's */
-    uint32_t event;  /**< event_t; OPERATOR_INTENSITY: how much of a sender's motion is made */
-    uint32_t number; /**< of OPERATOR_INTENSITY: percent */
+    uint32_t id;               /**< the asking side's */
+    uint32_t event;            /**< event_t; OPERATOR_INTENSITY, OPERATOR_SERVICE */
+    uint32_t number;           /**< of OPERATOR_INTENSITY: percent */
+    service_request_t service; /**< of OPERATOR_SERVICE; its age comes from: */
+    uint64_t tick_us;
 } motion_request_t;
 
 /** What became of it, after the cycle that took it. */
@@ -58,9 +60,10 @@ typedef struct {
     int32_t status; /**< hv_status_t */
     snapshot_t snapshot;
     bool is_shutting_down;
-    bool is_key_off;       /**< refused because of that */
-    bool is_unapproved;    /**< likewise */
-    bool is_power_failing; /**< likewise */
+    bool is_key_off;         /**< refused because of that */
+    bool is_unapproved;      /**< likewise */
+    bool is_power_failing;   /**< likewise */
+    service_answer_t answer; /**< of OPERATOR_SERVICE */
 } motion_result_t;
 
 /** What a reload hands over. */
@@ -71,7 +74,7 @@ typedef struct {
 } motion_reload_t;
 
 #define HANDOVER_RELOAD_BYTES  8192u
-#define HANDOVER_REQUEST_BYTES 1024u
+#define HANDOVER_REQUEST_BYTES 2048u
 #define HANDOVER_RESULT_BYTES  32768u
 #define HANDOVER_RECORD_BYTES  (1u << 21)
 #define HANDOVER_TRACE_BYTES   (1u << 21)

@@ -7,19 +7,20 @@
 
 #include "heave/text.h"
 
-const event_t operator_requests[OPERATOR_REQUESTS] = {EVENT_ENGAGE, EVENT_HOLD,  EVENT_RESUME,
-                                                      EVENT_PARK,   EVENT_RESET, EVENT_SHUTDOWN};
+const event_t operator_requests[OPERATOR_REQUESTS] = {EVENT_ENGAGE, EVENT_HOLD,     EVENT_RESUME,  EVENT_PARK,
+                                                      EVENT_RESET,  EVENT_SHUTDOWN, EVENT_SERVICE, EVENT_SERVICE_OFF};
 
 /* What each state takes, shutdown aside. */
 static const char *const k_possible[STATES] = {
-    [STATE_OFF] = "engage, park",
+    [STATE_OFF] = "engage, park, service",
     [STATE_HOMING] = "hold, engage, park",
-    [STATE_SETTLED] = "engage",
+    [STATE_SETTLED] = "engage, service",
     [STATE_RISING] = "hold, engage, park",
     [STATE_NEUTRAL] = "engage, hold, park",
     [STATE_ENGAGED] = "hold, park",
     [STATE_HOLD] = "resume, engage, park",
     [STATE_SETTLING] = "hold, engage",
+    [STATE_SERVICE] = "torque, jog, home, relay, hold, service-off",
     [STATE_FAULT] = "reset, once the cause is gone",
     [STATE_ESTOP] = "reset, once the e-stop is released",
 };
@@ -55,6 +56,17 @@ size_t operator_explain_percent(uint32_t percent, unsigned max_percent, char *te
     return out.length;
 }
 
+/* A drive that would be a fault as soon as the state is one in which drives are watched. */
+static bool is_drive_amiss(const snapshot_t *s)
+{
+    for (unsigned i = 0; i < s->cylinders + (s->has_angle ? 1u : 0u); i++) {
+        if (s->drive[i].state == DRIVE_FAULT || s->drive[i].state == DRIVE_OFFLINE) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* What of a request does not fit the state. */
 static const char *reason(event_t request, const snapshot_t *s)
 {
@@ -65,6 +77,10 @@ static const char *reason(event_t request, const snapshot_t *s)
                    ? "the channels of the e-stop have disagreed: press it and release it, so that both open and close"
                : s->is_estop_active ? "the e-stop is still active"
                                     : "the cause is still there";
+    }
+    if (request == EVENT_SERVICE && (s->state == STATE_OFF || s->state == STATE_SETTLED)) {
+        return is_drive_amiss(s) ? "a drive does not answer yet, or is in fault (`counts` says which)"
+                                 : "the drives are still going off: try again";
     }
     return request == EVENT_RESUME ? "there is nothing to resume" : "this is not possible";
 }

@@ -7,11 +7,14 @@
 #include "heave/telemetry.h"
 
 /** Requests that travel to the motion thread. */
-#define OPERATOR_REQUESTS 6u
+#define OPERATOR_REQUESTS 8u
 extern const event_t operator_requests[OPERATOR_REQUESTS];
 
 /** In the place of an event: a request with a percentage. */
 #define OPERATOR_INTENSITY EVENTS
+
+/** Likewise: a request of SERVICE (heave/service.h). */
+#define OPERATOR_SERVICE ((event_t)(EVENTS + 1))
 
 /** Reads what follows `intensity `.
  *  @return false where it is no whole number of at most three digits */

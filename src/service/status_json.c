@@ -8,6 +8,7 @@
 #include "common/build_id.h"
 #include "common/decimal.h"
 #include "heave/motion.h" // MOTION_CLAMPED and its kin
+#include "service/service_json.h"
 
 static const char *const k_pose_keys[POSE_AXES] = {"roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm"};
 static const char *const k_speed_keys[POSE_AXES] = {"roll_deg_s", "pitch_deg_s", "yaw_deg_s", "x_mm_s", "y_mm_s", "z_mm_s"};
@@ -211,6 +212,9 @@ static void write_state(json_t *json, const snapshot_t *s, bool is_shutting_down
     json_bool(json, "estop_active", s->is_estop_active);
     json_bool(json, "power_failing", s->is_power_failing);
     json_bool(json, "shutting_down", is_shutting_down);
+    json_open(json, "service", '{');
+    service_json_hand(json, s);
+    json_close(json, '}');
     write_fault(json, s);
 }
 

@@ -67,7 +67,7 @@ def kinds():
     sys.dont_write_bytecode = True
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader("nightly", loader))
     loader.exec_module(module)
-    few = types.SimpleNamespace(cycles=6, kills=1, bus_kills=1, days=1, seed=7)
+    few = types.SimpleNamespace(cycles=6, kills=1, bus_kills=1, hands=1, days=1, seed=7)
     for kind, make in module.MAKERS.items():
         assert f"\n  {kind} " in module.__doc__, kind
         for job in make(few, Path("/build")):

@@ -172,9 +172,9 @@ class Manual:
 
     def commands_of_heavectl(self):
         table = re.search(r"^## heavectl\n.*?(?=^## )", page(self.of("operation")), re.M | re.S)[0]
-        named = re.findall(r"^\| `(\w+)` \|", table, re.M)
+        named = re.findall(r"^\| `([\w-]+)` \|", table, re.M)
         answer = run(self.programs["heavectl"], "nonsense").stderr
-        known = re.findall(r"\w+", re.search(r"unknown command; (.*) are allowed", answer)[1].replace(" and ", " "))
+        known = re.findall(r"[\w-]+", re.search(r"unknown command; (.*) are allowed", answer)[1].replace(" and ", " "))
         assert sorted(named) == sorted(known), f"named {named}, known {known}"
 
     def exit_codes(self):

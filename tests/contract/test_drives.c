@@ -629,6 +629,108 @@ static void test_request_home_needs_enabled_and_returns_there_homed(void)
     assert_all(DRIVE_ENABLED);
 }
 
+/* ---- one by one ---- */
+
+/* A cycle in which what is not enabled is led by nobody. */
+static void loose_cycle(void)
+{
+    TEST_ASSERT_EQUAL(HV_OK, poll_once());
+    for (uint8_t k = 0; k < AXES; k++) {
+        setpoint_q32[k] = feedback[k].state == DRIVE_ENABLED ? setpoint_q32[k] : feedback[k].actual_mm_q32;
+    }
+    TEST_ASSERT_EQUAL(HV_OK, drives_send(hal, now_us, setpoint_q32));
+}
+
+/* Until the axis is in the state; every other one stays in its own. */
+static void await_one(uint8_t axis, drive_state_t state)
+{
+    drive_state_t kept[AXES];
+    for (uint8_t k = 0; k < AXES; k++) {
+        kept[k] = feedback[k].state;
+    }
+    for (int cycles = 0; cycles < 20000 && feedback[axis].state != state; cycles++) {
+        loose_cycle();
+        for (uint8_t k = 0; k < AXES; k++) {
+            TEST_ASSERT_TRUE(k == axis || feedback[k].state == kept[k]);
+        }
+    }
+    TEST_ASSERT_EQUAL(state, feedback[axis].state);
+}
+
+static void test_request_one_changes_that_axis_and_no_other(void)
+{
+    q32_t kept_q32[DRIVES_MAX];
+    keep_actual(kept_q32);
+    const hv_status_t status = drives_request_one(hal, 1, DRIVES_ENABLE);
+    if (hal.ops->request_one == NULL) {
+        TEST_ASSERT_EQUAL(HV_ERR_NOSUP, status);
+        return;
+    }
+    TEST_ASSERT_EQUAL(HV_OK, status);
+    await_one(1, DRIVE_ENABLED);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request_one(hal, 0, DRIVES_HOME)); /* it is not enabled */
+    for (int i = 0; i < 1000; i++) {                                          /* the one that is up follows */
+        setpoint_q32[1] += i < 500 ? MM(1) / 500 : 0;
+        loose_cycle();
+    }
+    TEST_ASSERT_TRUE(fx_abs(feedback[1].actual_mm_q32 - kept_q32[1] - MM(1)) < MM(1) / 10);
+    TEST_ASSERT_TRUE(fx_abs(feedback[0].actual_mm_q32 - kept_q32[0]) < MM(1) / 100);
+
+    TEST_ASSERT_EQUAL(HV_OK, drives_request_one(hal, 0, DRIVES_ENABLE)); /* beside one that holds its position */
+    await_one(0, DRIVE_ENABLED);
+    for (int i = 0; i < 200; i++) {
+        loose_cycle();
+        TEST_ASSERT_EQUAL(DRIVE_ENABLED, feedback[1].state);
+    }
+    TEST_ASSERT_TRUE(fx_abs(feedback[1].actual_mm_q32 - setpoint_q32[1]) < MM(1) / 10);
+
+    TEST_ASSERT_EQUAL(HV_OK, drives_request_one(hal, 1, DRIVES_DISABLE));
+    await_one(1, DRIVE_DISABLED);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request_one(hal, 0, DRIVES_QUICK_STOP));
+    await_one(0, DRIVE_DISABLED);
+    enable(); /* together again, as ever */
+}
+
+static void test_request_one_home_leaves_the_others_holding(void)
+{
+    if (hal.ops->request_one == NULL) {
+        return;
+    }
+    enable();
+    const q32_t held_q32 = setpoint_q32[0];
+    TEST_ASSERT_EQUAL(HV_OK, drives_request_one(hal, 1, DRIVES_HOME));
+    loose_cycle();
+    TEST_ASSERT_EQUAL(DRIVE_HOMING, feedback[1].state);
+    await_one(1, DRIVE_ENABLED);
+    TEST_ASSERT_TRUE(feedback[1].is_homed);
+    setpoint_q32[1] = feedback[1].actual_mm_q32;
+    TEST_ASSERT_EQUAL(HV_OK, drives_send(hal, now_us, setpoint_q32));
+    for (int i = 0; i < 200; i++) {
+        loose_cycle();
+        assert_all(DRIVE_ENABLED);
+    }
+    TEST_ASSERT_TRUE(fx_abs(feedback[0].actual_mm_q32 - held_q32) < MM(1) / 10);
+}
+
+/* What a person compares with the way a spindle was turned. */
+static void test_counts_go_with_the_position(void)
+{
+    int64_t before = 0;
+    int64_t after = 0;
+    enable();
+    TEST_ASSERT_TRUE(drives_counts(hal, 1, &before));
+    const q32_t from_q32 = feedback[1].actual_mm_q32;
+    for (int i = 0; i < 3000; i++) {
+        setpoint_q32[1] += i < 1000 ? MM(1) / 500 : 0;
+        cycle();
+    }
+    const double mm = (double)(feedback[1].actual_mm_q32 - from_q32) / 4294967296.0;
+    TEST_ASSERT_TRUE(mm > 1.8 && mm < 2.2);
+    TEST_ASSERT_TRUE(drives_counts(hal, 1, &after));
+    const double per_mm = (double)(after - before) / mm;
+    TEST_ASSERT_TRUE(per_mm > 50 || per_mm < -50); /* a drive may count the other way round */
+}
+
 static void test_power_lost_is_offline_and_returns_disabled(void)
 {
     if (fixture->set_power == NULL) {
@@ -690,6 +792,9 @@ static void run_contract(void)
     RUN_TEST(test_request_taken_is_seen_in_the_next_poll);
     RUN_TEST(test_request_disable_and_quick_stop_end_in_disabled);
     RUN_TEST(test_request_home_needs_enabled_and_returns_there_homed);
+    RUN_TEST(test_request_one_changes_that_axis_and_no_other);
+    RUN_TEST(test_request_one_home_leaves_the_others_holding);
+    RUN_TEST(test_counts_go_with_the_position);
     RUN_TEST(test_power_lost_is_offline_and_returns_disabled);
     RUN_TEST(test_power_lost_everywhere_says_io_and_comes_back);
 }

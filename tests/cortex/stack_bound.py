@@ -18,7 +18,7 @@ INDIRECT = {
     "include/heave/hal/relays.h": ("relays_{}",),
     "include/heave/hal/udp.h": ("udp_{}", "player_{}"),
 }
-OPTIONAL = {"ask_state", "read_back", "waited"}  # of the contracts: a backend may leave them out, and then nothing is called
+OPTIONAL = {"ask_state", "counts", "read_back", "request_one", "waited"}  # of the contracts: a backend may leave them out, and then nothing is called
 # Calls of a parameter or of a table's entry: a pattern that finds everything the file puts there.
 NAMED = {
     ("src/canopen/cia402_stage.c", "is_there"): r"\b(?:are_all|fail_where)\(self, (\w+)",

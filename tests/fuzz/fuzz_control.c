@@ -11,6 +11,7 @@
 #include <cjson/cJSON.h>
 
 #include "fuzz.h"
+#include "record/service_words.h"
 #include "service/control.h"
 #include "service/operator_requests.h"
 
@@ -51,7 +52,7 @@ static bool is_number(const char *text, long least, long most)
 
 static void expect_line(client_t *client, const char *line)
 {
-    static const char *const k_requests[] = {"engage", "hold", "resume", "park", "reset", "shutdown"};
+    static const char *const k_requests[] = {"engage", "hold", "resume", "park", "reset", "shutdown", "service", "service-off"};
     if (strcmp(line, "watch") == 0 || (strncmp(line, "watch ", 6) == 0 && is_number(line + 6, 1, CONTROL_WATCH_MAX_HZ))) {
         client->is_watching = true;
         return;
@@ -61,6 +62,11 @@ static void expect_line(client_t *client, const char *line)
         client->requests += strcmp(line, k_requests[i]) == 0;
     }
     client->requests += strncmp(line, "intensity ", 10) == 0 && is_number(line + 10, 0, 999);
+    if (service_words_are(line, strlen(line))) { /* unit.service_words says what is one */
+        service_request_t request;
+        uint64_t tick_us = 0;
+        client->requests += service_words_read(line, strlen(line), false, &request, &tick_us) == NULL;
+    }
 }
 
 static void expect(client_t *client, const uint8_t *bytes, size_t length)
@@ -133,9 +139,14 @@ static void answer_requests(uint8_t how)
     motion_request_t request;
     while (ring_pop(&m_handover.requests, &request, sizeof request) > 0) {
         static motion_result_t result;
-        FUZZ_REQUIRE(request.event <= OPERATOR_INTENSITY && request.number <= 999);
+        FUZZ_REQUIRE(request.event <= OPERATOR_SERVICE && request.number <= 999);
+        FUZZ_REQUIRE((request.event == OPERATOR_SERVICE) == (request.service.verb != SERVICE_NOTHING));
+        FUZZ_REQUIRE(!service_is_held(request.service.verb) || request.service.series > 0);
         m_asked++;
-        result = (motion_result_t){.id = request.id, .status = k_status[how % 4], .is_key_off = how >= 0xF0};
+        result = (motion_result_t){.id = request.id,
+                                   .status = k_status[how % 4],
+                                   .is_key_off = how >= 0xF0,
+                                   .answer = (service_answer_t)(how % SERVICE_ANSWERS)};
         result.snapshot.state = (state_t)(how % STATES);
         (void)ring_push(&m_handover.results, &result, sizeof result, NULL, 0);
     }

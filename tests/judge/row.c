@@ -8,10 +8,10 @@
 const char row_header[] = "t_ms,state,roll_deg,pitch_deg,yaw_deg,x_mm,y_mm,z_mm,angle_deg,c1_mm,c2_mm,c3_mm,c4_mm,c5_mm,c6_mm,"
                           "relays,flags";
 
-static const char *const k_places[PLACES] = {"OFF",     "HOMING", "SETTLED",  "RISING", "NEUTRAL",
-                                             "ENGAGED", "HOLD",   "SETTLING", "FAULT",  "ESTOP"};
-static const char *const k_flags[FLAG_COUNT] = {"clamped",  "speed",   "accel", "stretched", "takeover", "cylinders",
-                                                "off-path", "no-pose", "late",  "fault",     "estop",    "silent"};
+static const char *const k_places[PLACES] = {"OFF",  "HOMING",   "SETTLED", "RISING", "NEUTRAL", "ENGAGED",
+                                             "HOLD", "SETTLING", "SERVICE", "FAULT",  "ESTOP"};
+static const char *const k_flags[FLAG_COUNT] = {"clamped", "speed", "accel", "stretched", "takeover", "cylinders", "off-path",
+                                                "no-pose", "late",  "fault", "estop",     "silent",   "loose"};
 static const char *const k_columns[COLUMNS] = {"roll_deg", "pitch_deg", "yaw_deg", "x_mm",  "y_mm",  "z_mm", "angle_deg",
                                                "c1_mm",    "c2_mm",     "c3_mm",   "c4_mm", "c5_mm", "c6_mm"};
 

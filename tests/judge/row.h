@@ -19,6 +19,7 @@ typedef enum {
     AT_ENGAGED,
     AT_HOLD,
     AT_SETTLING,
+    AT_SERVICE,
     AT_FAULT,
     AT_ESTOP,
     PLACES
@@ -37,7 +38,8 @@ enum {
     FLAG_FAULT = 1u << 9,
     FLAG_ESTOP = 1u << 10,
     FLAG_SILENT = 1u << 11,
-    FLAG_COUNT = 12
+    FLAG_LOOSE = 1u << 12, /**< in service: a drive without torque, or one that moves by itself, is where it is */
+    FLAG_COUNT = 13
 };
 
 typedef struct {

@@ -324,6 +324,9 @@ void rules_row(rules_t *self, const row_t *row)
     }
     const bool is_placed_anew = !is_first && row->place != before &&
                                 (before == AT_OFF || before == AT_HOMING || before == AT_FAULT || before == AT_ESTOP);
+    if (row->place == AT_SERVICE) {
+        self->is_limited = (row->flags & FLAG_LOOSE) == 0;
+    }
     const bool is_still = larger(peak(self, 1, ANGLE_COLUMN, true), peak(self, 2, ANGLE_COLUMN, true)) == 0;
     if (self->is_limited) {
         check_movers(self);

@@ -41,6 +41,8 @@ static settings_t common(void)
                     .intensity_ramp_ms = 2000,
                     .engage_speed_mm_s_q16 = Q(50),
                     .engage_accel_mm_s2_q16 = Q(200),
+                    .jog_mm_s_q16 = Q(20),
+                    .jog_deg_s_q16 = Q(5),
                     .spike_gate = 10,
                     .relays.count = 12,
                     .healthy = {.toggle_ms = 10, .off_ms = 100, .late_cycles = 3}};
@@ -207,8 +209,23 @@ static bool spy_is_failing(void *ctx)
     return ((rig_t *)ctx)->is_failing;
 }
 
-static const drives_ops_t k_spy = {
-    .poll = spy_poll, .send = spy_send, .request = spy_request, .count = spy_count, .is_failing = spy_is_failing};
+static hv_status_t spy_request_one(void *ctx, uint8_t axis, drives_request_t request)
+{
+    return drives_request_one(((rig_t *)ctx)->inner, axis, request);
+}
+
+static bool spy_counts(void *ctx, uint8_t axis, int64_t *out)
+{
+    return drives_counts(((rig_t *)ctx)->inner, axis, out);
+}
+
+static const drives_ops_t k_spy = {.poll = spy_poll,
+                                   .send = spy_send,
+                                   .request = spy_request,
+                                   .count = spy_count,
+                                   .is_failing = spy_is_failing,
+                                   .request_one = spy_request_one,
+                                   .counts = spy_counts};
 
 static void fail(const char *what)
 {

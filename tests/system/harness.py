@@ -227,6 +227,40 @@ class Bench:
         return Sender(self.port)
 
 
+class Line:
+    """A client of the control socket that speaks its protocol itself."""
+
+    def __init__(self, path):
+        self.link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.link.connect(str(path))
+        self.link.settimeout(WAIT_S)
+        self.file = self.link.makefile("rb")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.file.close()
+        self.link.close()
+
+    def ask(self, request):
+        self.link.sendall(request.encode() + b"\n")
+        return json.loads(self.file.readline())
+
+    def good(self, request):
+        answer = self.ask(request)
+        assert answer["ok"], f"{request}: {answer}"
+        return answer
+
+    def refused(self, request, text):
+        answer = self.ask(request)
+        assert not answer["ok"] and text in answer["error"], f"{request}: {answer}"
+        return answer
+
+    def press(self, request):
+        return self.good(f"{request} {self.good('tick')['tick']}")
+
+
 class Sender:
     """Sends frames to the daemon."""
 

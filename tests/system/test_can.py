@@ -201,7 +201,38 @@ def second_signal_stops_the_drives(bench, is_one_stuck=False):
     assert all("quick stop" in states(bench, node) for node in can_bench.NODES), [states(bench, node)[-3:] for node in can_bench.NODES]
 
 
+def moved_by_hand(bench):
+    """In service: torque of all, one cylinder led while there are proofs of a hand, at rest without them; no drive sees a jump."""
+    config = can_config(bench, platform__engage="manual")
+    bench.start_drives()
+    daemon = bench.start(config=config)
+    with heave.Line(bench.socket) as line:
+        harness.wait_for(lambda: line.ask("service")["ok"], "service")
+        assert line.refused("torque 3 on", "all drives together")["why"] == "together"
+        counts = [drive["counts"] for drive in line.good("counts")["drives"]]
+        assert all(isinstance(count, int) for count in counts), counts
+        line.good("torque all on")
+        harness.wait_for(lambda: all(drive["torque"] for drive in line.good("counts")["drives"]), "torque")
+        answer = line.press("jog 3 5")
+        for counter in range(1, 21):
+            time.sleep(0.05)
+            answer = line.good(f"beat {answer['series']} {counter} {answer['tick']}")
+        time.sleep(0.25 + 0.2)  # nobody is there any more
+        moved = [drive["counts"] for drive in line.good("counts")["drives"]]
+        assert 3 * MM < moved[2] - counts[2] < 7 * MM, (counts, moved)
+        assert all(abs(after - before) < MM / 20 for i, (before, after) in enumerate(zip(counts, moved)) if i != 2), (counts, moved)
+        assert "press again" in line.ask(f"beat {answer['series']} 99 {line.good('tick')['tick']}")["error"]
+        time.sleep(0.5)
+        rest = [drive["counts"] for drive in line.good("counts")["drives"]]
+        assert abs(rest[2] - moved[2]) < MM / 20, (moved, rest)
+        line.good("service-off")
+    assert bench.stop(daemon) == 0, daemon.log.read_text(encoding="utf-8")
+    bench.stop_drives()
+    assert not bench.events("emergency") and not bench.events("jump"), (bench.events("emergency"), bench.events("jump"))
+
+
 CASES = [
+    ("is moved by hand in service, CSP", moved_by_hand),
     ("rises without a jump, all drives at once; the torque is off before the end", rises_without_a_jump),
     ("follows the demonstration, CSP", follows("csp", demo, 1)), ("follows streams, IP", follows("ip", streams, 2)), ("follows poses, PP", follows("pp", poses, 3)),
     ("rises at the fastest that --check allows, PP", rises_fast_in_profile_position),

@@ -43,7 +43,7 @@ static void test_operator_request_find_knows_every_request_and_no_other_event(vo
 static void test_operator_explain_says_why_and_what_else(void)
 {
     (void)operator_explain(EVENT_RESUME, &m_snapshot, false, m_text, sizeof m_text);
-    TEST_ASSERT_EQUAL_STRING("resume: there is nothing to resume in SETTLED; possible: engage", m_text);
+    TEST_ASSERT_EQUAL_STRING("resume: there is nothing to resume in SETTLED; possible: engage, service", m_text);
     m_snapshot.state = STATE_FAULT;
     m_snapshot.fault.code = FAULT_BUS;
     (void)operator_explain(EVENT_RESET, &m_snapshot, false, m_text, sizeof m_text);
@@ -71,6 +71,21 @@ static void test_operator_explain_percent_says_the_cap(void)
 {
     (void)operator_explain_percent(90, 60, m_text, sizeof m_text);
     TEST_ASSERT_EQUAL_STRING("intensity 90: too much for this platform; possible: 0 to 60 % ([intensity] max_percent)", m_text);
+}
+
+static void test_operator_explain_says_what_service_waits_for(void)
+{
+    m_snapshot = (snapshot_t){.state = STATE_OFF, .cylinders = 3};
+    (void)operator_explain(EVENT_SERVICE, &m_snapshot, false, m_text, sizeof m_text); /* nothing is heard yet */
+    TEST_ASSERT_EQUAL_STRING(
+        "service: a drive does not answer yet, or is in fault (`counts` says which) in OFF; possible: engage, park, service",
+        m_text);
+    for (unsigned i = 0; i < 3; i++) {
+        m_snapshot.drive[i].state = DRIVE_DISABLED;
+    }
+    (void)operator_explain(EVENT_SERVICE, &m_snapshot, false, m_text, sizeof m_text);
+    TEST_ASSERT_EQUAL_STRING("service: the drives are still going off: try again in OFF; possible: engage, park, service",
+                             m_text);
 }
 
 /* What a refusal offers has to be something the states take. */
@@ -146,6 +161,7 @@ int main(void)
     RUN_TEST(test_operator_explain_says_why_and_what_else);
     RUN_TEST(test_operator_read_percent_takes_whole_numbers_only);
     RUN_TEST(test_operator_explain_percent_says_the_cap);
+    RUN_TEST(test_operator_explain_says_what_service_waits_for);
     RUN_TEST(test_operator_explain_offers_only_what_the_states_take);
     RUN_TEST(test_udp_recorder_is_allowed_without_a_list_everyone_is);
     RUN_TEST(test_udp_recorder_is_allowed_compares_the_first_bits);

@@ -38,12 +38,12 @@ void tearDown(void) {}
 
 /* ---- the matrix, by hand ----
  * A cell says what an event does: four letters <state><goal><held by silence><action>, where
- *   state, goal   O OFF  H HOMING  S SETTLED  R RISING  N NEUTRAL  E ENGAGED  D HOLD  T SETTLING  F FAULT  X ESTOP   = as it was
- *   silence       0 no   1 yes   = as it was
- *   action        h home  t settle  r rise  f follow  s stop  y stay  o off  x fault stop  e e-stop   - none
+ *   state, goal   O OFF  H HOMING  S SETTLED  R RISING  N NEUTRAL  E ENGAGED  D HOLD  T SETTLING  V SERVICE  F FAULT  X ESTOP   =
+ * as it was silence       0 no   1 yes   = as it was action        h home  t settle  r rise  f follow  s stop  y stay  o off  x
+ * fault stop  v serve  e e-stop   - none
  * "." = not for this state: nothing changes and it is counted.   "-" = nothing to do and it is not counted. */
-static const char k_states[] = "OHSRNEDTFX";
-static const char k_actions[] = "-htrfsyoxe";
+static const char k_states[] = "OHSRNEDTVFX";
+static const char k_actions[] = "-htrfsyoxve";
 
 typedef enum { ANY, NO, YES } tri_t;
 
@@ -59,31 +59,32 @@ typedef struct {
 
 /* clang-format off */
 static const situation_t k_matrix[] = {
-    /*                                               REDY TICK DONE ENGA HOLD RESU PARK RESE SHUT FRAM S_HO S_NE S_SE FAUL ESTO */
-    {"off, at settled", 'O', "SNE",  "",  NO,  YES, "SS0y -    .    HE0h .    .    HS0h .    =O0- .    -    -    -    F=0x X=0e"},
-    {"off, elsewhere",  'O', "SNE",  "",  NO,  NO,  "-    -    .    HE0h .    .    HS0h .    =O0- .    -    -    -    F=0x X=0e"},
-    {"off on request",  'O', "O",    "",  NO,  ANY, "-    -    .    HE0h .    .    HS0h .    =O0- .    -    -    -    F=0x X=0e"},
-    {"homing",          'H', "OSNE", "",  NO,  ANY, "-    -    S=0y =E0- D=0s .    =S0- .    =O0- .    -    -    -    F=0x X=0e"},
-    {"settled",         'S', "S",    "",  NO,  ANY, "-    -    .    RE0r .    .    =S0- .    OO0o .    -    -    -    F=0x X=0e"},
-    {"settled, to up",  'S', "NE",   "",  NO,  ANY, "-    R=0r .    RE0r =S0- .    =S0- .    OO0o .    -    -    -    F=0x X=0e"},
-    {"settled, to off", 'S', "O",    "",  NO,  ANY, "-    OO0o .    RE0r .    .    =S0- .    OO0o .    -    -    -    F=0x X=0e"},
-    {"rising",          'R', "OSNE", "",  NO,  ANY, "-    -    N=0y =E0- D=0s .    TS0t .    TO0t .    -    -    -    F=0x X=0e"},
-    {"rising, silent",  'R', "OSNE", "",  YES, ANY, "-    -    N=1y =E0- D=0s .    TS0t .    TO0t =E0- -    -    TS0t F=0x X=0e"},
-    {"neutral",         'N', "OSN",  "",  NO,  ANY, "-    -    .    EE0f D=0s .    TS0t .    TO0t .    -    -    -    F=0x X=0e"},
-    {"neutral, to up",  'N', "E",    "",  NO,  ANY, "-    EE0f .    EE0f D=0s .    TS0t .    TO0t .    -    -    -    F=0x X=0e"},
-    {"neutral, silent", 'N', "N",    "",  YES, ANY, "-    -    .    EE0f D=0s .    TS0t .    TO0t EE0f -    -    TS0t F=0x X=0e"},
-    {"engaged",         'E', "OSNE", "",  NO,  ANY, "-    -    .    -    D=0s .    TS0t .    TO0t -    D=1s RN1r TS0t F=0x X=0e"},
-    {"homing held",     'D', "OSNE", "H", NO,  ANY, "-    -    .    HE0h -    H=0h HS0h .    OO0o .    -    -    -    F=0x X=0e"},
-    {"rising held",     'D', "OSNE", "R", NO,  ANY, "-    -    .    RE0r -    R=0r TS0t .    TO0t .    -    -    -    F=0x X=0e"},
-    {"neutral held",    'D', "OSNE", "N", NO,  ANY, "-    -    .    EE0f -    N=0y TS0t .    TO0t .    -    -    -    F=0x X=0e"},
-    {"engaged held",    'D', "OSNE", "E", NO,  ANY, "-    -    .    EE0f -    EE0f TS0t .    TO0t .    -    -    -    F=0x X=0e"},
-    {"engaged, silent", 'D', "OSNE", "E", YES, ANY, "-    -    .    EE0f ==0- EE0f TS0t .    TO0t EE0f -    RN1r TS0t F=0x X=0e"},
-    {"settling held",   'D', "OSNE", "T", NO,  ANY, "-    -    .    RE0r -    T=0t TS0t .    TO0t .    -    -    -    F=0x X=0e"},
-    {"settling",        'T', "OSNE", "",  NO,  ANY, "-    -    S=0y RE0r D=0s .    =S0- .    =O0- .    -    -    -    F=0x X=0e"},
-    {"fault, gone",     'F', "OSNE", "",  NO,  YES, "-    -    .    .    .    .    .    OO0o =O0- .    -    -    -    -    X=0e"},
-    {"fault",           'F', "OSNE", "",  NO,  NO,  "-    -    .    .    .    .    .    .    =O0- .    -    -    -    -    X=0e"},
-    {"e-stop released", 'X', "OSNE", "",  NO,  YES, "-    -    .    .    .    .    .    OO0o =O0- .    -    -    -    -    -   "},
-    {"e-stop",          'X', "OSNE", "",  NO,  NO,  "-    -    .    .    .    .    .    .    =O0- .    -    -    -    -    -   "},
+    /*                                               REDY TICK DONE ENGA HOLD RESU PARK RESE SHUT SERV SOFF FRAM S_HO S_NE S_SE FAUL ESTO */
+    {"off, at settled", 'O', "SNE",  "",  NO,  YES, "SS0y -    .    HE0h .    .    HS0h .    =O0- VO0v .    .    -    -    -    F=0x X=0e"},
+    {"off, elsewhere",  'O', "SNE",  "",  NO,  NO,  "-    -    .    HE0h .    .    HS0h .    =O0- VO0v .    .    -    -    -    F=0x X=0e"},
+    {"off on request",  'O', "O",    "",  NO,  ANY, "-    -    .    HE0h .    .    HS0h .    =O0- VO0v .    .    -    -    -    F=0x X=0e"},
+    {"homing",          'H', "OSNE", "",  NO,  ANY, "-    -    S=0y =E0- D=0s .    =S0- .    =O0- .    .    .    -    -    -    F=0x X=0e"},
+    {"settled",         'S', "S",    "",  NO,  ANY, "-    -    .    RE0r .    .    =S0- .    OO0o VO0v .    .    -    -    -    F=0x X=0e"},
+    {"settled, to up",  'S', "NE",   "",  NO,  ANY, "-    R=0r .    RE0r =S0- .    =S0- .    OO0o VO0v .    .    -    -    -    F=0x X=0e"},
+    {"settled, to off", 'S', "O",    "",  NO,  ANY, "-    OO0o .    RE0r .    .    =S0- .    OO0o VO0v .    .    -    -    -    F=0x X=0e"},
+    {"rising",          'R', "OSNE", "",  NO,  ANY, "-    -    N=0y =E0- D=0s .    TS0t .    TO0t .    .    .    -    -    -    F=0x X=0e"},
+    {"rising, silent",  'R', "OSNE", "",  YES, ANY, "-    -    N=1y =E0- D=0s .    TS0t .    TO0t .    .    =E0- -    -    TS0t F=0x X=0e"},
+    {"neutral",         'N', "OSN",  "",  NO,  ANY, "-    -    .    EE0f D=0s .    TS0t .    TO0t .    .    .    -    -    -    F=0x X=0e"},
+    {"neutral, to up",  'N', "E",    "",  NO,  ANY, "-    EE0f .    EE0f D=0s .    TS0t .    TO0t .    .    .    -    -    -    F=0x X=0e"},
+    {"neutral, silent", 'N', "N",    "",  YES, ANY, "-    -    .    EE0f D=0s .    TS0t .    TO0t .    .    EE0f -    -    TS0t F=0x X=0e"},
+    {"engaged",         'E', "OSNE", "",  NO,  ANY, "-    -    .    -    D=0s .    TS0t .    TO0t .    .    -    D=1s RN1r TS0t F=0x X=0e"},
+    {"homing held",     'D', "OSNE", "H", NO,  ANY, "-    -    .    HE0h -    H=0h HS0h .    OO0o .    .    .    -    -    -    F=0x X=0e"},
+    {"rising held",     'D', "OSNE", "R", NO,  ANY, "-    -    .    RE0r -    R=0r TS0t .    TO0t .    .    .    -    -    -    F=0x X=0e"},
+    {"neutral held",    'D', "OSNE", "N", NO,  ANY, "-    -    .    EE0f -    N=0y TS0t .    TO0t .    .    .    -    -    -    F=0x X=0e"},
+    {"engaged held",    'D', "OSNE", "E", NO,  ANY, "-    -    .    EE0f -    EE0f TS0t .    TO0t .    .    .    -    -    -    F=0x X=0e"},
+    {"engaged, silent", 'D', "OSNE", "E", YES, ANY, "-    -    .    EE0f ==0- EE0f TS0t .    TO0t .    .    EE0f -    RN1r TS0t F=0x X=0e"},
+    {"settling held",   'D', "OSNE", "T", NO,  ANY, "-    -    .    RE0r -    T=0t TS0t .    TO0t .    .    .    -    -    -    F=0x X=0e"},
+    {"settling",        'T', "OSNE", "",  NO,  ANY, "-    -    S=0y RE0r D=0s .    =S0- .    =O0- .    .    .    -    -    -    F=0x X=0e"},
+    {"service",         'V', "OSNE", "",  NO,  ANY, "-    -    .    .    -    .    .    .    OO0o -    OO0o .    -    -    -    F=0x X=0e"},
+    {"fault, gone",     'F', "OSNE", "",  NO,  YES, "-    -    .    .    .    .    .    OO0o =O0- .    .    .    -    -    -    -    X=0e"},
+    {"fault",           'F', "OSNE", "",  NO,  NO,  "-    -    .    .    .    .    .    .    =O0- .    .    .    -    -    -    -    X=0e"},
+    {"e-stop released", 'X', "OSNE", "",  NO,  YES, "-    -    .    .    .    .    .    OO0o =O0- .    .    .    -    -    -    -    -   "},
+    {"e-stop",          'X', "OSNE", "",  NO,  NO,  "-    -    .    .    .    .    .    .    =O0- .    .    .    -    -    -    -    -   "},
 };
 /* clang-format on */
 #define CELL       5
@@ -275,8 +276,9 @@ static bool is_up_by_silence(const supervisor_t *sup)
 static void check_invariants(const supervisor_t *before, event_t event, const supervisor_view_t *view, action_t action,
                              const supervisor_t *after)
 {
-    static const action_t k_entry[STATES] = {ACTION_OFF,    ACTION_HOME, ACTION_STAY,   ACTION_RISE,       ACTION_STAY,
-                                             ACTION_FOLLOW, ACTION_STOP, ACTION_SETTLE, ACTION_FAULT_STOP, ACTION_ESTOP};
+    static const action_t k_entry[STATES] = {ACTION_OFF,   ACTION_HOME,       ACTION_STAY, ACTION_RISE,
+                                             ACTION_STAY,  ACTION_FOLLOW,     ACTION_STOP, ACTION_SETTLE,
+                                             ACTION_SERVE, ACTION_FAULT_STOP, ACTION_ESTOP};
     const state_t from = before->state, to = after->state;
     char text[120];
     snprintf(text, sizeof text, "%s + %s -> %s", state_name(from), event_name(event), state_name(to));
@@ -292,11 +294,16 @@ static void check_invariants(const supervisor_t *before, event_t event, const su
     IMPLIES(supervisor_is_latched(after) && to != from, event == EVENT_FAULT || event == EVENT_ESTOP);
 
     /* the drives go off under nobody who is up */
-    IMPLIES(to == STATE_OFF && from != to, from == STATE_SETTLED || supervisor_is_latched(before) ||
+    IMPLIES(to == STATE_OFF && from != to, from == STATE_SETTLED || from == STATE_SERVICE || supervisor_is_latched(before) ||
                                                (from == STATE_HOLD && before->interrupted == STATE_HOMING));
     /* SETTLED and NEUTRAL are arrived at, never declared */
     IMPLIES(to == STATE_NEUTRAL && from != to, from == STATE_RISING || (from == STATE_HOLD && before->interrupted == to));
     IMPLIES(to == STATE_SETTLED && from != to, event == EVENT_MOVE_DONE || view->is_at_settled);
+
+    /* into SERVICE from where nobody rides, and out of it to OFF, which then comes up on request only */
+    IMPLIES(to == STATE_SERVICE && from != to, event == EVENT_SERVICE && (from == STATE_OFF || from == STATE_SETTLED));
+    IMPLIES(from == STATE_SERVICE && to != from, to == STATE_OFF || supervisor_is_latched(after));
+    IMPLIES(to == STATE_SERVICE, after->goal == STATE_OFF);
 
     /* a frame raises nobody, and gives back only what silence took */
     IMPLIES(event == EVENT_FRAME, to == from || (to == STATE_ENGAGED && before->is_held_by_silence));
@@ -324,14 +331,15 @@ static void run_on(supervisor_t *sup)
     }
 }
 
-/* From every reachable context that is not latched: the request is carried through to the end and rests there. */
+/* From every reachable context that is not latched, nor SERVICE where the request leads up: it is carried through to the end and
+ * rests there. */
 static void check_request_ends_in(event_t request, state_t end)
 {
     bool seen[CONTEXTS];
     reach(seen, NULL);
     for (unsigned n = 0; n < CONTEXTS; n++) {
         supervisor_t sup = context_of(n);
-        if (!seen[n] || supervisor_is_latched(&sup))
+        if (!seen[n] || supervisor_is_latched(&sup) || (sup.state == STATE_SERVICE && end != STATE_OFF))
             continue;
         char text[80];
         snprintf(text, sizeof text, "%s from %s", event_name(request), state_name(sup.state));
@@ -483,6 +491,18 @@ static void test_supervisor_event_hold_in_the_cycle_of_settling_keeps_it_down(vo
     story(k_events, k_expected, 5);
 }
 
+static void test_supervisor_event_out_of_service_the_drives_stay_off_until_somebody_wants_them(void)
+{
+    static const event_t k_events[] = {EVENT_SERVICE, EVENT_ENGAGE,      EVENT_PARK,         EVENT_FRAME,
+                                       EVENT_HOLD,    EVENT_SERVICE_OFF, EVENT_DRIVES_READY, EVENT_PARK};
+    static const state_t k_expected[] = {STATE_SERVICE, STATE_SERVICE, STATE_SERVICE, STATE_SERVICE,
+                                         STATE_SERVICE, STATE_OFF,     STATE_OFF,     STATE_HOMING};
+    supervisor_init_settled(&m_sup);
+    m_view.is_at_settled = true;
+    story(k_events, k_expected, 8);
+    TEST_ASSERT_EQUAL_UINT32(1, m_sup.ignored[EVENT_ENGAGE]);
+}
+
 static void test_supervisor_event_outside_the_enum_asserts_and_changes_nothing(void)
 {
     static supervisor_t s_before;
@@ -534,6 +554,7 @@ int main(void)
     RUN_TEST(test_supervisor_event_drives_still_on_after_shutdown_stay_off);
     RUN_TEST(test_supervisor_event_operator_hold_over_silence_is_not_released_by_frames);
     RUN_TEST(test_supervisor_event_hold_in_the_cycle_of_settling_keeps_it_down);
+    RUN_TEST(test_supervisor_event_out_of_service_the_drives_stay_off_until_somebody_wants_them);
     RUN_TEST(test_supervisor_event_outside_the_enum_asserts_and_changes_nothing);
     RUN_TEST(test_supervisor_is_latched_only_in_fault_and_estop);
     RUN_TEST(test_state_name_and_event_name_are_complete_and_distinct);

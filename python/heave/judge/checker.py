@@ -11,11 +11,13 @@ from heave.configuration import POSE_AXES
 from heave.judge.rules import ORDER_NAME, Block, ErrorRule, Findings, RangeRule, RateRule
 from heave.trace import ANGLE, BEFORE_ZERO, COLUMNS, FIRST_CYLINDER, FLAGS, HEADER, NANO, ROW, STATES
 
-FOLLOWING = {"OFF", "HOMING", "FAULT", "ESTOP"}      # the set-points follow the actual positions ...
+LOOSE = "SERVICE, loose"                             # rows of SERVICE in which a drive has no torque, or moves by itself
+FOLLOWING = {"OFF", "HOMING", LOOSE, "FAULT", "ESTOP"}  # the set-points follow the actual positions ...
 STOPS_FIRST = {"OFF", "FAULT"}                       # ... in these once what still moves has come to rest
+SWITCHED = {"ENGAGED", "SERVICE", LOOSE}              # relays are what the sender, or a hand, wants them to be
 RESTING = {"SETTLED", "NEUTRAL"}
 MOVING_GENTLY = {"RISING", "SETTLING"}
-NOT_BEFORE_ENGAGED = {"OFF", "HOMING", "SETTLED", "FAULT", "ESTOP"}
+NOT_BEFORE_ENGAGED = {"OFF", "HOMING", "SETTLED", "SERVICE", LOOSE, "FAULT", "ESTOP"}
 LATCHED = {"FAULT": {"FAULT", "ESTOP", "OFF"}, "ESTOP": {"ESTOP", "FAULT", "OFF"}}
 
 NO_POSE_BOUNDS = {"cylinders", "off-path", "takeover", "no-pose"}
@@ -137,6 +139,7 @@ class Checker:
             return None
         whole, part, state, numbers, relays, flags = match.groups()
         t_us = int(whole) * 1000 + (int(part.ljust(3, "0")) if part else 0)
+        state = LOOSE if state == "SERVICE" and "loose" in flags.split("|") else state
         self.last_rest, self.last_parsed = rest, (state, list(map(int, numbers[:-1].replace(".", "").split(","))), relays, flags)
         return t_us, *self.last_parsed
 
@@ -368,8 +371,9 @@ class Checker:
         platform = self.platform
         for text in set(block.relays[start:stop]):
             value = int(text, 16)
-            if value & ~platform.relay_mask if state == "ENGAGED" else value != platform.safe_mask:
-                limit = f"within {platform.relay_mask:04X}" if state == "ENGAGED" else f"{platform.safe_mask:04X} in {state}"
+            is_free = state in SWITCHED
+            if value & ~platform.relay_mask if is_free else value != platform.safe_mask:
+                limit = f"within {platform.relay_mask:04X}" if is_free else f"{platform.safe_mask:04X} in {state}"
                 for i in range(start, stop):
                     if block.relays[i] == text:
                         self.findings.add("relays", "relays", *block.at(i), text, limit)

@@ -13,7 +13,7 @@ from heave.plot.window import UNITS, thinned  # noqa: E402
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#444444")  # told apart by colour-blind people too
 STATE_COLOURS = {"OFF": "#C9C9C9", "HOMING": "#D9CDEB", "SETTLED": "#E2E2E2", "RISING": "#CFE4F5", "NEUTRAL": "#DCEFD8", "ENGAGED": "#FFFFFF",
-                 "HOLD": "#FFF1BF", "SETTLING": "#DDE3F3", "FAULT": "#F8C9C4", "ESTOP": "#F2A59D"}
+                 "HOLD": "#FFF1BF", "SETTLING": "#DDE3F3", "SERVICE": "#E6DDF2", "FAULT": "#F8C9C4", "ESTOP": "#F2A59D"}
 FLAG_COLOUR, LIMIT_COLOUR = "#8A3A2E", "#B00020"
 ORDER_LABEL = ("set-point", "speed", "acceleration", "jerk")
 ORDER_UNIT = ("", "/s", "/s²", "/s³")

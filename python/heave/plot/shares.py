@@ -14,7 +14,7 @@ NOT_LED = {"OFF", "HOMING", "FAULT", "ESTOP"}  # there set-points follow the act
 
 def shares_of(window, platform):
     """{name: [share of the limit on position, speed, acceleration, jerk]}; of the rows that are led, and of a position the distance from the middle of its range."""
-    led = [state not in NOT_LED for state in window.states]
+    led = [state not in NOT_LED and "loose" not in flags for state, flags in zip(window.states, window.flags)]
     names = [*platform.axes, *(f"c{i + 1}" for i in range(platform.cylinders))]
     result = {}
     for name in names:
