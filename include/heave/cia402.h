@@ -321,7 +321,7 @@ typedef struct {
  *  @return false after the last one */
 bool cia402_next_wish(const cia402_config_t *config, unsigned axis, cia402_wish_t *wish);
 
-/** True where some drive is set up by writing this object: no place for a start-up list. */
+/** True where some configuration sets drives up by writing this object. */
 bool cia402_is_own_object(uint16_t index, uint8_t sub);
 
 /** True where 60C2h can hold this period: whole ms up to 255, or up to 255 of 100 us. */

@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "config/cia402.h"
+
 #define WORDS_MAX  6u
 #define WORD_BYTES 24u
 #define BLANKS     " \t"
@@ -15,9 +17,9 @@
 #define RESTORE    0x1011u
 
 const char config_startup_help[] =
-    "A line is `0x2030:01 = 50 u16`: object, value, type (u8 i8 u16 i16 u32 i32), written before "
-    "everything that heaved sets and read back. `is` instead of `=`: only looked at. Behind the type: `unchecked` (not read "
-    "back), `if-there` (a drive may be without it, or refuse it), `last` (after everything else).\n";
+    "A line is `0x2030:01 = 50 u16`: object, value, type (u8 i8 u16 i16 u32 i32), written before everything that heaved sets and "
+    "read back. `is` instead of `=`: only looked at. Behind the type may stand `unchecked`: not read back; `if-there`: a drive "
+    "may be without it, or refuse it; `last`: after everything else.\n";
 
 static const char k_allowed[] =
     "0x2030:01 = 50 u16, is instead of = to look only; type u8 i8 u16 i16 u32 i32; then unchecked, if-there, last";
@@ -117,14 +119,8 @@ static const char *read_flag(const char *word, cia402_item_t *item)
 /* What a list must not do, whatever the drive. */
 static const char *judge(const cia402_item_t *item)
 {
-    if (!item->is_written) {
-        return NULL;
-    }
-    if (item->index == STORE || item->index == RESTORE) {
+    if (item->is_written && (item->index == STORE || item->index == RESTORE)) {
         return "would write the drive's memory at each start, which wears it; store by the maker's program";
-    }
-    if (cia402_is_own_object(item->index, item->sub)) {
-        return "is an object that heaved sets itself: by the keys of [cia402]";
     }
     return NULL;
 }
@@ -179,7 +175,42 @@ void config_startup_take(config_source_t *self, const char *before, const char *
         config_source_error(self, self->line, "[%s] %s %s; allowed: %s", section->name, quoted.data, wrong, k_allowed);
         return;
     }
+    self->startup_line[list == &self->config->cia402.startup ? 0 : 1][list->count] = self->line;
     list->item[list->count++] = item;
+}
+
+/* An item of a drive that heaved writes as well. */
+static bool is_written_by_heaved(const cia402_config_t *drives, unsigned axis, const cia402_item_t *item)
+{
+    cia402_wish_t wish = {0};
+    while (item->is_written && cia402_next_wish(drives, axis, &wish)) {
+        if (wish.is_own && wish.is_written && wish.index == item->index && wish.sub == item->sub) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void check_list(config_source_t *self, const cia402_config_t *drives, unsigned axis, unsigned which)
+{
+    const cia402_axis_config_t *own = &drives->axis[axis];
+    for (unsigned i = 0; i < own->items; i++) {
+        if (is_written_by_heaved(drives, axis, &own->item[i])) {
+            config_source_error(self, self->startup_line[which][i],
+                                "[%s] 0x%04X:%02u: heaved sets it itself; allowed: the keys of [cia402] for that",
+                                which == 0 ? "cia402-startup" : "cia402-angle-startup", own->item[i].index, own->item[i].sub);
+        }
+    }
+}
+
+void config_startup_check(config_source_t *self)
+{
+    static cia402_config_t drives;
+    config_cia402(self->config, &drives);
+    check_list(self, &drives, 0, 0);
+    if (self->config->settings.has_angle) {
+        check_list(self, &drives, drives.axes - 1u, 1);
+    }
 }
 
 /* --- To text --- */

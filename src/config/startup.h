@@ -19,6 +19,9 @@ const config_startup_t *config_startup_of(const config_section_t *section, const
 /** Takes a line of the section that the reader is in, cut in two at its first = or :. */
 void config_startup_take(config_source_t *self, const char *before, const char *behind);
 
+/** Refuses items that heaved sets itself for this configuration. */
+void config_startup_check(config_source_t *self);
+
 /** Appends an item as it stands in a file. */
 void config_startup_format(const cia402_item_t *item, config_text_t *text);
 

@@ -16,6 +16,8 @@ enum {
     OPTION_DOCTOR,
     OPTION_DUMP,
     OPTION_DUMP_DBC,
+    OPTION_EDS,
+    OPTION_IMPORT_DCF,
     OPTION_PLAY,
     OPTION_TRACE,
     OPTION_RECORD,
@@ -26,11 +28,12 @@ enum {
 
 static const usage_row_t k_forms[] = {
     {.argument = "[--socket PATH] [--record FRAMES] [--trace OUT]", .help = "run"},
-    {.argument = "--check", .help = "validate, and print what follows from it"},
+    {.argument = "--check [--eds EDS]", .help = "validate, and print what follows from it"},
     {.argument = "--envelope OUT", .help = "what the geometry can do, as CSV (docs/envelope.md)"},
     {.argument = "--doctor", .help = "look at machine, CAN interface and drives: what is wrong, what helps"},
     {.argument = "--dump-config", .help = "every key with its value, unit, range and help"},
     {.argument = "--dump-dbc", .help = "the frames of [can-raw] as a DBC file"},
+    {.argument = "--import-dcf DCF", .help = "what it sets, as a [cia402-startup] list"},
     {.argument = "--play FRAMES [--trace OUT]", .help = "offline: simulated time and devices"},
     {0},
 };
@@ -43,6 +46,10 @@ static const usage_row_t k_options[] = {
     {"doctor", NULL, "a line for each finding; writes nothing into a drive", OPTION_DOCTOR},
     {"dump-config", NULL, "as a file that --config takes", OPTION_DUMP},
     {"dump-dbc", NULL, "for tools that show CAN frames", OPTION_DUMP_DBC},
+    {"eds", "EDS", "the file of the drives ([drives] driver = cia402): which objects they lack, which settings do not fit",
+     OPTION_EDS},
+    {"import-dcf", "DCF", "a drive as its maker's program left it; what heaved sets itself, or the node decides, stays out",
+     OPTION_IMPORT_DCF},
     {"play", "FRAMES", "lines `<t_ms> <text>`, `<t_ms> !engage` ...; - is standard input", OPTION_PLAY},
     {"trace", "OUT", "the set-points of every cycle (CSV); - is standard output", OPTION_TRACE},
     {"record", "FRAMES", "log every datagram and request, so that --play repeats the run", OPTION_RECORD},
@@ -54,9 +61,9 @@ static const usage_row_t k_options[] = {
 
 static const usage_exit_t k_exits[] = {
     {EXIT_DONE, "done"},
-    {EXIT_REFUSED, "ended by a second signal, torque not confirmed off, or --doctor found something wrong"},
+    {EXIT_REFUSED, "ended by a second signal, torque not confirmed off, or --doctor or --eds found something wrong"},
     {EXIT_BAD_USAGE, "usage"},
-    {EXIT_BAD_DATA, "bad FRAMES"},
+    {EXIT_BAD_DATA, "bad FRAMES, EDS or DCF"},
     {EXIT_NO_INPUT, "no input"},
     {EXIT_UNAVAILABLE, "port or socket in use"},
     {EXIT_SOFTWARE, "a bug"},
@@ -118,7 +125,7 @@ static bool set_mode(options_t *self, run_mode_t mode)
 static const char *take_option(options_t *self, int option)
 {
     static const char k_one_mode[] =
-        "only one of --check, --envelope, --doctor, --dump-config, --dump-dbc, --play, --help, --version at a time";
+        "only one of --check, --envelope, --doctor, --dump-config, --dump-dbc, --import-dcf, --play, --help, --version at a time";
     bool is_free = true;
     switch (option) {
     case OPTION_CONFIG:
@@ -139,6 +146,13 @@ static const char *take_option(options_t *self, int option)
         break;
     case OPTION_DUMP_DBC:
         is_free = set_mode(self, MODE_DUMP_DBC);
+        break;
+    case OPTION_EDS:
+        self->eds = optarg;
+        break;
+    case OPTION_IMPORT_DCF:
+        is_free = set_mode(self, MODE_IMPORT_DCF);
+        self->dcf = optarg;
         break;
     case OPTION_PLAY:
         self->play = optarg;
@@ -176,6 +190,9 @@ static const char *contradiction(const options_t *self)
     }
     if (self->mode != MODE_RUN && (self->record != NULL || self->socket != NULL)) {
         return "--record and --socket are for running live";
+    }
+    if (self->eds != NULL && self->mode != MODE_CHECK) {
+        return "--eds is for --check";
     }
     if (self->trace != NULL && self->mode != MODE_RUN && self->mode != MODE_PLAY) {
         return "--trace is for running live and for --play";
