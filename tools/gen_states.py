@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""gen_states.py - the README's state diagram and table, drawn from the rows of src/gateway/supervisor.c.
+"""gen_states.py - the state diagram and table of docs/operation.md, drawn from the rows of src/gateway/supervisor.c.
 
     tools/gen_states.py [--lang en|zh]              print the block
     tools/gen_states.py [--lang en|zh] --check FILE exit 1, with a diff, if the block between FILE's markers differs

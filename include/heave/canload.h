@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * canload.h - how much of a classic CAN bus a set of frames takes in the worst case, stuffing bits included.
+ * canload.h - worst-case load of a classic CAN bus by a set of frames, stuffing bits included.
  * Pure; used when a configuration is checked.
  */
 #ifndef HEAVE_CANLOAD_H
@@ -9,12 +9,13 @@
 
 #define CANLOAD_BYTES_MAX 8u /**< of data in a frame */
 
-/** Frames of one kind that the bus carries again and again. */
+/** Periodic frames of one kind. */
 typedef struct {
     bool is_extended; /**< 29-bit identifiers */
     uint8_t bytes;    /**< of data, [0, CANLOAD_BYTES_MAX] */
     uint32_t frames;  /**< per interval */
-    uint32_t periods; /**< the interval in bus periods, for what keeps time with them; 0: interval_us counts */
+    uint32_t
+        periods; /**< interval in bus periods, for frames that are sent in step with them; 0: interval_us holds the interval */
     uint32_t interval_us;
 } canload_entry_t;
 
@@ -32,7 +33,7 @@ uint32_t canload_ppm(const canload_entry_t *entry, size_t count, uint32_t period
 /** Shortest bus period, a multiple of step_us, that keeps the load within a limit.
  *  @param limit_ppm above 0
  *  @param step_us   above 0
- *  @return 0 where none does: what does not follow the period takes too much */
+ *  @return 0 if no period does: the frames with an interval_us of their own already exceed the limit */
 uint32_t canload_fitting_period_us(const canload_entry_t *entry, size_t count, uint32_t bitrate_bps, uint32_t limit_ppm,
                                    uint32_t step_us);
 

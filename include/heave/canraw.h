@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT
- * canraw.h - drives on CAN with frames of their own (no CANopen): a map says what the bytes mean, this driver does the rest.
- * One identifier per drive for commands, one for replies. The caller owns canraw_t; the motion thread alone calls it (drives.h).
+ * canraw.h - driver for CAN drives with frames of their own (no CANopen). A map defines the bytes of each frame.
+ * Each drive has one identifier for commands and one for replies. The caller owns canraw_t; only the motion thread calls it.
  *
- * Such drives say little about themselves, so states are judged like this:
+ * Such drives report little about themselves. The driver derives their states:
  *   OFFLINE   no position has been received for offline_periods of the bus
- *   ENABLING  asked for; ends with a position that is newer than the request and, where the map knows how a drive says that it is
- *             enabled (enabled_when), with that. Where the map has either, set-points go out before it already
- *   ENABLED   set-points go out. Without enabled_when it means just this: asked for, and heard from since
- *   HOMING    the homing frame went out; ends when the drive says so (homing_done), has told its position once more and, as
- *             above, says that it is enabled
- *   DISABLED  everything else: set-points are not sent. Without disable and stop frames a drive keeps holding its last set-point
- *   FAULT     fault_when, homing_failed, or found here, because these drives have no guard of their own: a set-point further than
- *             step_max from the one before (at first: from actual), or further than following_max from actual. It is not sent
+ *   ENABLING  requested. Ends when a position newer than the request has been received and, if the map has enabled_when, when
+ * that condition holds. If the map has enable or enabled_when, set-points are sent in this state already ENABLED   set-points are
+ * sent. Without enabled_when this only means: requested, and a position was received since HOMING    the homing frame was sent.
+ * Ends when homing_done holds, a new position was received and, if the map has enabled_when, that condition holds DISABLED  every
+ * other case; set-points are not sent. Without disable and stop frames a drive holds its last set-point FAULT     fault_when or
+ * homing_failed holds, or this driver found an error, because these drives do not check set-points: a set-point further than
+ * step_max from the previous one (the first one: from the actual position), or further than following_max from the actual
+ * position. Such a set-point is not sent
  */
 #ifndef HEAVE_CANRAW_H
 #define HEAVE_CANRAW_H
@@ -24,9 +24,9 @@
 #define CANRAW_BYTES_MAX  8u
 #define CANRAW_FIELDS_MAX 5u
 
-/** Fault codes of this driver; where the map has fault_when, the code is the status as received (1 where that is 0). */
+/** Fault codes of this driver. With fault_when, the code is the status as received (1 if that is 0). */
 #define CANRAW_FAULT_FOLLOWING 0x8611u /**< following error, the number CANopen drives use */
-#define CANRAW_FAULT_HOMING    0x8613u /**< the drive says that homing failed */
+#define CANRAW_FAULT_HOMING    0x8613u /**< the drive reports that homing failed */
 
 /** What a field carries. */
 typedef enum {
@@ -53,7 +53,7 @@ typedef struct {
     bool is_big_endian;
 } canraw_field_t;
 
-/** A frame as the map has it: constant bytes and fields; in replies also bytes that may be anything. */
+/** A frame of the map: constant bytes and fields; replies may also have bytes that are ignored. */
 typedef struct {
     uint8_t length;   /**< 0: the map has no such frame */
     uint8_t constant; /**< bit i: byte i is data[i] */
@@ -62,13 +62,13 @@ typedef struct {
     canraw_field_t field[CANRAW_FIELDS_MAX];
 } canraw_frame_t;
 
-/** True where (status & mask) == value; a mask of 0 means that the map does not say. */
+/** A condition: (status & mask) == value. A mask of 0 means that the map has no such condition. */
 typedef struct {
     uint32_t value;
     uint32_t mask;
 } canraw_when_t;
 
-/** What a drive can be told beside set-points; frames without fields but counter and check byte, each optional. */
+/** Commands other than set-points: frames without fields except counter and check byte, each optional. */
 typedef enum { CANRAW_STOP, CANRAW_DISABLE, CANRAW_RESET, CANRAW_ENABLE, CANRAW_HOME } canraw_command_t;
 
 #define CANRAW_COMMANDS 5u
@@ -88,15 +88,15 @@ typedef struct {
 typedef struct {
     uint8_t axes; /**< [1, DRIVES_MAX] */
     bool is_extended;
-    bool is_on_change;        /**< a set-point that is the last one again is not sent */
+    bool is_on_change;        /**< a set-point equal to the last one is not sent */
     uint32_t period_us;       /**< of the bus, a multiple of the motion cycle */
-    uint32_t query_every;     /**< each drive is asked once in so many periods, [1, 1000] */
+    uint32_t query_every;     /**< number of periods between two queries of a drive, [1, 1000] */
     uint32_t offline_periods; /**< > 2 * query_every */
-    uint32_t passive_stop_ms; /**< error-passive for so long: the bus is failing; 0 = never */
-    uint32_t speed_least;     /**< what a speed field carries at least; the only speed where axis[].speed is 0 per u/s */
+    uint32_t passive_stop_ms; /**< the bus counts as failing after this time in error-passive; 0 = never */
+    uint32_t speed_least;     /**< smallest value of a speed field; its only value if axis[].speed is 0 per u/s */
     canraw_frame_t setpoint;
     canraw_frame_t command[CANRAW_COMMANDS];
-    canraw_frame_t position_query; /**< absent: positions come unasked */
+    canraw_frame_t position_query; /**< absent: the drive sends positions by itself */
     canraw_frame_t position_reply; /**< has a position, may have a status */
     canraw_frame_t homing_query;
     canraw_frame_t homing_reply; /**< has a status */
@@ -107,21 +107,21 @@ typedef struct {
     canraw_axis_map_t axis[DRIVES_MAX];
 } canraw_map_t;
 
-/** What a drive was asked last; private. */
+/** Last query to a drive; private. */
 typedef enum { CANRAW_ASKED_NOTHING, CANRAW_ASKED_POSITION, CANRAW_ASKED_HOMING } canraw_asked_t;
 
-/** One drive at work; private. Times are those of poll. */
+/** State of one drive; private. Times are those of poll. */
 typedef struct {
     drive_state_t state; /**< never DRIVE_OFFLINE */
     canraw_asked_t asked;
-    uint8_t pending; /**< canraw_command_t that has to go out, or CANRAW_NOTHING */
+    uint8_t pending; /**< canraw_command_t to be sent, or CANRAW_NOTHING */
     bool is_online;
-    bool is_begun; /**< the request that led to this state has been seen in a poll */
+    bool is_begun; /**< a poll has processed the request that led to this state */
     bool is_homed;
-    bool is_homing_seen; /**< the drive has said that homing goes on */
-    bool is_homing_over; /**< it has said that homing is done */
+    bool is_homing_seen; /**< the drive has reported that homing is in progress */
+    bool is_homing_over; /**< the drive has reported that homing is done */
     bool is_homing_next; /**< the next query is the one for homing */
-    bool is_energized;   /**< torque was asked for, and that it is off has not been confirmed since */
+    bool is_energized;   /**< torque was requested, and the drive has not confirmed since that it is off */
     bool has_actual;
     bool has_sent;
     bool has_counter;    /**< of the last reply: */
@@ -130,35 +130,35 @@ typedef struct {
     uint32_t status;
     uint32_t fault_code;
     drive_guard_t guard;
-    uint64_t mark_us;        /**< of the request, of the end of homing: actual has to be newer */
-    uint64_t told_us;        /**< the last command went out */
-    uint64_t reset_until_us; /**< until then a fault may end; 0: no reset goes on */
+    uint64_t mark_us;        /**< time of the request or of the end of homing: actual has to be newer */
+    uint64_t told_us;        /**< when the last command was sent */
+    uint64_t reset_until_us; /**< end of the time in which a reset may end the fault; 0: no reset */
     uint64_t actual_us;
     int64_t sent_counts;
     q32_t sent_q32;
     q32_t actual_q32;
 } canraw_axis_t;
 
-/** The drives of a platform; private but for the counters. */
+/** The drives of a platform. Members are private, except the counters. */
 typedef struct {
     const canraw_map_t *map;
     hal_can_t can;
-    bool is_gone;    /**< the bus does not work */
-    bool is_due;     /**< a period has passed, the next set has not gone out */
-    bool is_free;    /**< everything sent was seen on the wire */
-    bool is_refused; /**< the last set, by a queue that is full */
+    bool is_gone;    /**< the bus has failed */
+    bool is_due;     /**< a period has passed, and the next set was not sent yet */
+    bool is_free;    /**< all frames sent were seen on the wire */
+    bool is_refused; /**< the queue was full for the last set */
     bool has_time;
     canpassive_t passive;
     uint64_t now_us;
-    uint64_t set_us;     /**< the last set went out */
-    uint64_t query_us;   /**< the last queries went out */
-    uint64_t free_us;    /**< is_free was true */
-    uint64_t restart_us; /**< of the bus, last tried */
+    uint64_t set_us;     /**< when the last set was sent */
+    uint64_t query_us;   /**< when the last queries were sent */
+    uint64_t free_us;    /**< when is_free was last true */
+    uint64_t restart_us; /**< last attempt to restart the bus */
     uint32_t round;      /**< of queries */
     uint32_t sets;       /**< sent */
     uint32_t refused;    /**< sets that had to wait for the bus */
-    uint32_t strange;    /**< frames on a reply_id that match no reply, or that nobody asked for */
-    uint32_t restarts;   /**< of the bus, that worked */
+    uint32_t strange;    /**< frames on a reply_id that match no reply, or without a query */
+    uint32_t restarts;   /**< successful restarts of the bus */
     canraw_axis_t axis[DRIVES_MAX];
 } canraw_t;
 
@@ -167,8 +167,9 @@ typedef struct {
  *  @return HV_OK; HV_ERR_ARG: no usable bus; HV_ERR_RANGE: the map contradicts itself or its ranges above. */
 hv_status_t canraw_init(canraw_t *self, const canraw_map_t *map, hal_can_t can) HV_MUST_CHECK;
 
-/** The drives as drives.h wants them. Sets go out once per period, a gate lets the next one pass only when the last was seen on
- *  the wire; after three periods without that the bus is gone, is restarted, and drives are OFFLINE until they answer again. */
+/** The implementation of drives.h. Sends one set of set-points per period, and the next one only after the previous one was seen
+ * on the wire. After three periods without that the bus counts as lost: it is restarted, and the drives are OFFLINE until they
+ *  answer again. */
 drives_t canraw_hal(canraw_t *self);
 
 /** Receive filters for the backend's open.
@@ -180,7 +181,7 @@ uint32_t canraw_filters(const canraw_map_t *map, hal_can_filter_t filter[DRIVES_
 int64_t canraw_field_min(const canraw_field_t *field);
 int64_t canraw_field_max(const canraw_field_t *field);
 
-/** The first field of a frame that carries something.
+/** The first field of a frame that carries a value.
  *  @return NULL where there is none */
 const canraw_field_t *canraw_find(const canraw_frame_t *frame, canraw_value_t value);
 
@@ -199,7 +200,7 @@ bool canraw_matches(const canraw_frame_t *frame, const uint8_t *data, uint8_t le
 /** Value of a field in the bytes of a frame that matches. */
 int64_t canraw_extract(const canraw_field_t *field, const uint8_t *data);
 
-/** True where some bytes would match both frames: only what was asked last tells replies apart. */
+/** True if some bytes would match both frames. Then only the last query tells which reply it is. */
 bool canraw_is_ambiguous(const canraw_frame_t *a, const canraw_frame_t *b);
 
 #endif

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT
- * cia402.h - CANopen drives with the profile CiA 402, behind drives.h: the gateway is their master.
- * It produces SYNC and a heartbeat, sets every drive up by SDO (nodes in parallel) and reads back what matters, then sends one
- * set of set-points per bus period. All drives are switched on together and get their torque together, with the target on the
- * actual position; a drive that is not perfectly well is not enabled. The caller owns cia402_t; the motion thread alone calls it.
+ * cia402.h - master of CANopen drives with the profile CiA 402, behind drives.h.
+ * Produces SYNC and a heartbeat, configures every drive by SDO (all nodes in parallel), reads the important objects back, and
+ * then sends one set of set-points per bus period. All drives are switched on together and enabled together, with the target on
+ * the actual position. A drive with any problem is not enabled. The caller owns cia402_t; only the motion thread calls it.
  *
- * Order in a bus period: SYNC when the period begins (in poll), RPDOs in the send of the same cycle; they act at the next SYNC.
- * Everything else (heartbeat, NMT, SDO) goes out in cycles in which no period begins, if there are any. Nothing of a new period
- * is sent before everything of the last one was seen on the wire; three periods of that are the loss of the bus. The gateway then
- * keeps silent until the drives' watch over its heartbeat has run out, restarts the bus and sets all drives up again.
+ * Order in a bus period: poll sends SYNC when the period begins, and send sends the RPDOs in the same cycle; they act at the next
+ * SYNC. Heartbeat, NMT and SDO are sent in cycles in which no period begins, if there are any. Nothing of a new period is sent
+ * before all frames of the last one were seen on the wire. After three periods without that the bus counts as lost. The driver
+ * then sends nothing until the drives have noticed the missing heartbeat, restarts the bus and configures all drives again.
  *
- * A drive is OFFLINE until it is set up and its first TPDO has come, and again as soon as one of these says that it is lost: no
- * TPDO for three SYNCs, no heartbeat for heartbeat_timeout_ms, another NMT state than operational, a boot-up message. It is set
- * up again from the beginning; its position must be found again unless it is absolute.
+ * A drive is OFFLINE until it is configured and its first TPDO was received. It becomes OFFLINE again if no TPDO is received for
+ * three SYNCs, no heartbeat for heartbeat_timeout_ms, an NMT state other than operational, or a boot-up message. The driver then
+ * configures it from the beginning. It must be homed again unless its position is absolute.
  */
 #ifndef HEAVE_CIA402_H
 #define HEAVE_CIA402_H
@@ -26,20 +26,20 @@
 /** Modes of operation (6060h) that set-points are sent in, and homing. */
 typedef enum { CIA402_MODE_PP = 1, CIA402_MODE_HOMING = 6, CIA402_MODE_IP = 7, CIA402_MODE_CSP = 8 } cia402_mode_t;
 
-/** Why a drive is not there, or has been stopped by this driver: the numbers of feedback.fault_code beyond 16 bits. Codes of the
- *  drives themselves have 16 bits. */
+/** Why a drive is offline, or why this driver stopped it: values of feedback.fault_code above 16 bits. The drives' own codes have
+ *  16 bits. */
 typedef enum {
     CIA402_TROUBLE_NONE,
     CIA402_SILENT = 0x10001,    /**< does not answer */
     CIA402_LOST_TPDO = 0x10002, /**< no TPDO for three SYNCs */
     CIA402_LOST_HEARTBEAT = 0x10003,
     CIA402_LEFT_OPERATIONAL = 0x10004,
-    CIA402_REBOOTED = 0x10005, /**< booted without being asked to */
+    CIA402_REBOOTED = 0x10005, /**< boot-up without a request */
     CIA402_LOST_BUS = 0x10006,
     CIA402_NOT_402 = 0x10007, /**< 1000h names another profile */
     CIA402_WRONG_IDENTITY = 0x10008,
     CIA402_NOT_TAKEN = 0x10009,     /**< an object was refused, or does not hold what was written */
-    CIA402_UNGUARDED = 0x1000A,     /**< a guard of the drive is off: it would not stop by itself */
+    CIA402_UNGUARDED = 0x1000A,     /**< a watchdog of the drive is off: it would not stop by itself */
     CIA402_NO_HEARTBEAT = 0x1000B,  /**< never sends one */
     CIA402_NO_MODE = 0x1000C,       /**< 6061h does not show the mode */
     CIA402_NO_START = 0x1000D,      /**< does not become operational, or its TPDO is not what was mapped */
@@ -52,11 +52,11 @@ typedef enum {
     CIA402_NO_VOLTAGE = 0x10014,    /**< bit 4 */
     CIA402_LIMITED = 0x10015,       /**< bit 11 */
     CIA402_WARNING = 0x10016,       /**< bit 7 */
-    CIA402_NO_ANSWER = 0x10017,     /**< answers, only not when asked for one object */
+    CIA402_NO_ANSWER = 0x10017,     /**< answers, but not to the request for one object */
     CIA402_TWICE = 0x10018          /**< two drives have its node id */
 } cia402_trouble_t;
 
-/** What is watched in every answer, beyond state and position: bits of drive_report_t.notes. */
+/** Conditions that are checked in every answer beside state and position: bits of drive_report_t.notes. */
 typedef enum {
     CIA402_WATCH_MODE,
     CIA402_WATCH_FOLLOWING,
@@ -67,11 +67,11 @@ typedef enum {
     CIA402_WATCHES
 } cia402_watch_t;
 
-/** What follows from it. */
+/** Reaction to such a condition. */
 typedef enum {
     CIA402_IGNORE,
-    CIA402_TELL, /**< told of in the report */
-    CIA402_STOP  /**< a fault of the drive: all stop; and such a drive is not enabled */
+    CIA402_TELL, /**< reported only */
+    CIA402_STOP  /**< a fault of the drive: all drives stop, and this one is not enabled */
 } cia402_reaction_t;
 
 /** An object of a start-up list: what a family of drives has to hold beyond what every drive is set to. */
@@ -95,7 +95,7 @@ typedef struct {
     q32_t step_max_q32;           /**< largest step of set-points, u per bus period; > 0 */
     q32_t following_max_q32;      /**< largest distance of a set-point from actual, u; 0 = not watched here */
     uint32_t window_counts;       /**< 6065h */
-    int8_t homing_method;         /**< 6098h; 0: the position is absolute, there is nothing to find */
+    int8_t homing_method;         /**< 6098h; 0: no homing, the position is absolute */
     uint32_t homing_speed[2];     /**< 6099h, counts/s: towards the switch, and to the zero */
     uint32_t homing_accel;        /**< 609Ah, counts/s^2 */
     int32_t homing_offset_counts; /**< 607Ch */
@@ -112,7 +112,7 @@ typedef struct {
 /** The drives of a platform. */
 typedef struct {
     uint8_t axes;                  /**< [1, DRIVES_MAX] */
-    uint8_t master_node;           /**< [1, 127]: whose heartbeat the drives watch */
+    uint8_t master_node;           /**< [1, 127]: the drives monitor the heartbeat of this node */
     cia402_mode_t mode;            /**< CSP, IP or PP */
     uint32_t period_us;            /**< of the bus: cia402_is_period() */
     uint16_t heartbeat_ms;         /**< of both sides; > 0 */
@@ -121,29 +121,29 @@ typedef struct {
     uint16_t boot_timeout_ms;      /**< after reset communication */
     uint16_t power_timeout_ms;     /**< to switch on, and to enable operation */
     uint16_t window_ms;            /**< 6066h */
-    uint32_t passive_stop_ms;      /**< error-passive for so long: the bus is failing; 0 = never */
+    uint32_t passive_stop_ms;      /**< the bus counts as failing after this time in error-passive; 0 = never */
     int16_t abort_option;          /**< 6007h: 1 fault, 2 disable voltage, 3 quick stop */
     uint8_t sync_counter;          /**< 1019h: 0 = none, or [2, 240] */
-    bool is_sync_watched;          /**< 1006h holds the period: drives may stop where SYNC is late */
+    bool is_sync_watched;          /**< 1006h holds the period: drives may stop if SYNC is late */
     bool is_reset_wanted;          /**< reset communication before setting up */
-    bool is_unguarded_allowed;     /**< drives without guards are taken all the same */
+    bool is_unguarded_allowed;     /**< drives without watchdogs are accepted */
     bool is_homing_in_turn;        /**< one drive after the other */
     cia402_reaction_t reaction[CIA402_WATCHES];
     cia402_axis_config_t axis[DRIVES_MAX];
 } cia402_config_t;
 
-/** How far a drive has come; private. */
+/** Phase of a drive's start-up; private. */
 typedef enum {
     CIA402_MISSING,
     CIA402_RESETTING,
     CIA402_CONFIGURING,
     CIA402_STARTING,
     CIA402_UP,
-    CIA402_LEAVING, /**< lost, is told to stop for a while */
+    CIA402_LEAVING, /**< lost; stop commands are sent for a while */
     CIA402_REFUSED  /**< cannot be used; until it boots or the operator resets */
 } cia402_phase_t;
 
-/** What runs through the table of objects; private. */
+/** Which job walks through the table of objects; private. */
 typedef enum { CIA402_JOB_NONE, CIA402_JOB_SETUP, CIA402_JOB_MODE, CIA402_JOB_ERROR } cia402_job_t;
 
 /** A walk through some rows of the table of objects; private. */
@@ -171,25 +171,25 @@ typedef enum {
     CIA402_HOMING_DONE
 } cia402_homing_t;
 
-/** One drive at work; private. In an order that leaves no holes. */
+/** State of one drive; private. Ordered so that there is no padding. */
 typedef struct {
     cia402_phase_t phase;
-    uint32_t trouble; /* cia402_trouble_t of the last loss or refusal */
+    uint32_t trouble; /* cia402_trouble_t: reason of the last loss or refusal */
     uint64_t phase_us;
     uint64_t trouble_us;
     uint32_t trouble_object; /* index << 8 | sub */
     uint32_t trouble_code;   /* SDO abort code, or a code of the drive */
-    uint32_t trouble_found;  /* where has_found: the object holds this, */
-    uint32_t trouble_wanted; /* instead of this */
-    uint32_t mute_object;    /* no answer came when it was asked for; 0 = none */
-    uint32_t warned_object;  /* a guard that is off and was allowed to be */
-    uint8_t nmt;             /* last heard */
-    uint8_t nmt_command;     /* waits to be sent, 0 = none */
+    uint32_t trouble_found;  /* if has_found: value of the object, */
+    uint32_t trouble_wanted; /* and the required value */
+    uint32_t mute_object;    /* object without an answer; 0 = none */
+    uint32_t warned_object;  /* a watchdog that is off and was accepted */
+    uint8_t nmt;             /* last received */
+    uint8_t nmt_command;     /* command to be sent, 0 = none */
     uint8_t starts;          /* attempts to become operational */
     uint8_t mutes;           /* attempts that ended at an object without answer */
-    uint8_t awaited;         /* TPDOs that SYNCs have asked for and that have not come, saturates */
-    uint8_t surplus;         /* those that nothing had asked for, saturates */
-    uint8_t plain_syncs;     /* since the last of these, saturates */
+    uint8_t awaited;         /* TPDOs requested by SYNC that are still missing, saturates */
+    uint8_t surplus;         /* TPDOs without a request, saturates */
+    uint8_t plain_syncs;     /* SYNCs since the last of these, saturates */
     bool is_reset_done;
     bool has_found;
     sdo_t sdo;
@@ -202,31 +202,31 @@ typedef struct {
     uint64_t actual_us;
     drive_emergency_t emergency;
     uint64_t note_us[CIA402_WATCHES]; /* when each was seen last */
-    uint32_t notes;                   /* told of: bit N for cia402_watch_t N */
+    uint32_t notes;                   /* reported: bit N for cia402_watch_t N */
     int32_t actual_counts;
     uint32_t silent_syncs;
-    uint8_t watch_answers[CIA402_WATCHES]; /* in a row that show it, saturates */
-    bool has_followed;                     /* bit 12 was there since operation is enabled */
-    bool had_voltage;                      /* bit 4 likewise */
+    uint8_t watch_answers[CIA402_WATCHES]; /* consecutive answers with the condition, saturates */
+    bool has_followed;                     /* bit 12 was set since operation was enabled */
+    bool had_voltage;                      /* bit 4 was set since operation was enabled */
     bool has_answer;                       /* a TPDO came since the last poll */
     uint16_t statusword;
     int8_t mode_shown;
     bool has_heartbeat;
     bool has_actual;   /* since it was set up last */
     bool was_heard;    /* has_actual at any time */
-    bool is_answering; /* up or not, and not known to be lost */
+    bool is_answering; /* answers, whether up or not */
 
-    bool is_in;        /* takes part in what the drives do together */
-    bool has_operated; /* since the stage began in which all get there */
+    bool is_in;        /* takes part in the common stage */
+    bool has_operated; /* operation was enabled since its stage began */
     cia402_goal_t goal;
     uint16_t word;
     uint8_t word_syncs;  /* since it changed, saturates */
-    uint8_t reset_syncs; /* of the way through a fault reset, 0 = none */
+    uint8_t reset_syncs; /* SYNCs since a fault reset began, 0 = none */
     uint64_t reset_until_us;
     uint64_t operating_us; /* operation enabled since, 0 = not */
     uint64_t stopping_us;  /* quick stop since, 0 = not */
-    uint32_t own_fault;    /* found by this driver: cia402_trouble_t or a number of the standard; 0 = none */
-    drive_guard_t guard;   /* why own_fault, where its set-points were too far */
+    uint32_t own_fault;    /* error found by this driver: cia402_trouble_t or a code of the standard; 0 = none */
+    drive_guard_t guard;   /* distances, if own_fault is about set-points */
     uint16_t error_code;   /* the drive's own */
     bool is_error_read;
     q32_t sent_q32;
@@ -235,10 +235,10 @@ typedef struct {
     bool is_homed;
     bool has_sent;
     bool was_faulty;
-    uint8_t down_syncs; /* since a controlword that leads up to power or torque, as far as it matters */
+    uint8_t down_syncs; /* SYNCs since the last controlword that leads to power or torque, saturates */
 } cia402_axis_t;
 
-/** What the drives do together; private. */
+/** Common stage of all drives; private. */
 typedef enum {
     CIA402_STAGE_OFF,
     CIA402_STAGE_WITHDRAW, /**< no torque, for a change of mode */
@@ -249,24 +249,24 @@ typedef enum {
     CIA402_STAGE_FOLLOW
 } cia402_stage_t;
 
-/** The drives of a platform; private but for the counters. */
+/** The drives of a platform. Members are private, except the counters. */
 typedef struct {
     const cia402_config_t *config;
     hal_can_t can;
     cia402_stage_t stage;
     uint64_t stage_us;
     uint32_t stage_syncs;
-    bool is_begun;  /* the request that led here has been seen in a poll */
-    bool is_homing; /* on the way through homing, rather than to enabled */
+    bool is_begun;  /* a poll has processed the request that led here */
+    bool is_homing; /* the goal is homing, else enabled */
     bool is_homing_asked;
     bool is_gone;          /* the bus does not work */
     bool is_due;           /* a period has begun, its SYNC has not gone out */
     bool is_open;          /* SYNC has gone out, the set-points have not */
     bool was_period_begin; /* in the last poll */
-    bool is_free;          /* everything sent was seen on the wire */
-    bool is_refused;       /* the last SYNC, or some of the last set, by a queue that is full */
+    bool is_free;          /* all frames sent were seen on the wire */
+    bool is_refused;       /* the queue was full for the last SYNC or a part of the last set */
     bool has_time;
-    bool is_preop_due; /* all nodes have to be told to leave operational */
+    bool is_preop_due; /* NMT pre-operational has to be sent to all nodes */
     canpassive_t passive;
     uint8_t pp_step; /* of the handshake in PP */
     uint8_t sync_count;
@@ -289,11 +289,11 @@ typedef struct {
  *  @return HV_OK; HV_ERR_ARG: no usable bus; HV_ERR_RANGE: the configuration contradicts itself or the ranges above. */
 hv_status_t cia402_init(cia402_t *self, const cia402_config_t *config, hal_can_t can) HV_MUST_CHECK;
 
-/** The drives as drives.h wants them. */
+/** The implementation of drives.h. */
 drives_t cia402_hal(cia402_t *self);
 
-/** Last word to the drives when the program ends in an orderly way: the communication of those without torque is reset, so that
- *  they do not take the silence for a loss and are not in fault at the next start. The others are left to their watchdogs. */
+/** Call at the orderly end of the program: resets the communication of the drives without torque, so that they do not report a
+ *  lost master and are not in fault at the next start. Drives with torque are left to their watchdogs. */
 void cia402_leave(cia402_t *self);
 
 /** What follows where a drive lacks an object, or refuses it. */
@@ -324,13 +324,13 @@ bool cia402_next_wish(const cia402_config_t *config, unsigned axis, cia402_wish_
 /** True where some configuration sets drives up by writing this object. */
 bool cia402_is_own_object(uint16_t index, uint8_t sub);
 
-/** True where 60C2h can hold this period: whole ms up to 255, or up to 255 of 100 us. */
+/** True if 60C2h can hold this period: whole ms up to 255, or up to 255 of 100 us. */
 bool cia402_is_period(uint32_t period_us);
 
 #define CIA402_FILTERS_MAX (4u * DRIVES_MAX)
 #define CIA402_OWNS_MAX    (3u + 2u * DRIVES_MAX)
 
-/** What is received, and what is sent, for the backend's open.
+/** Identifiers that are received, and those that are sent, for the backend's open.
  *  @param filter out
  *  @return how many */
 uint32_t cia402_filters(const cia402_config_t *config, hal_can_filter_t filter[CIA402_FILTERS_MAX]);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * cia402_state.h - the state machine of CiA 402 drives: what a statusword says, and which controlword leads towards a goal.
+ * cia402_state.h - the state machine of CiA 402 drives: decodes a statusword, and selects the controlword that leads to a goal.
  * Two constant tables; pure.
  */
 #ifndef HEAVE_CIA402_STATE_H
@@ -21,7 +21,7 @@ typedef enum {
     CIA402_STATES
 } cia402_state_t;
 
-/** Where a drive is to be led. */
+/** Target state of a drive. */
 typedef enum {
     CIA402_GOAL_OFF,     /**< no voltage, by the drive's own ramps: one step down at a time */
     CIA402_GOAL_STOP,    /**< quick stop, then off */
@@ -34,7 +34,7 @@ typedef enum {
 #define CIA402_WORD_SWITCH_ON  0x0001u
 #define CIA402_WORD_BIT4       0x0010u /**< IP: interpolate; HM: start; PP: new set-point */
 #define CIA402_WORD_AT_ONCE    0x0020u /**< PP: do not wait for the end of the last one */
-#define CIA402_WORD_RESET      0x0080u /**< its rising edge takes a fault back */
+#define CIA402_WORD_RESET      0x0080u /**< fault reset, on the rising edge */
 #define CIA402_WORD_QUICK_STOP 0x0002u
 
 /** Bits of the statusword. */
@@ -46,13 +46,13 @@ typedef enum {
 #define CIA402_STATUS_WARNING 0x0080u
 #define CIA402_STATUS_LIMIT   0x0800u /**< a limit of its own is active */
 
-/** State that a statusword tells. */
+/** Decodes a statusword. */
 cia402_state_t cia402_state(uint16_t statusword);
 
 /** Controlword for the next step from a state to a goal; never 000Fh in quick stop. */
 uint16_t cia402_controlword(cia402_state_t state, cia402_goal_t goal);
 
-/** True where the drive has torque, or is about to take it away. */
+/** True if the drive has torque, or is switching it off. */
 bool cia402_has_torque(cia402_state_t state);
 
 /** "switched on", ...: constant text. */

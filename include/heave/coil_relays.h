@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * coil_relays.h - a bank of relays on the coils of a Modbus device: the common boards with 8 or 16 of them. All relays are
- * written in one transaction (write multiple coils), read back, and written again where the board has lost them. Such a board
- * keeps its relays as they are when this program or the line dies, unless it has a watchdog of its own: nothing belongs there
- * that must not stay closed. The caller owns coil_relays_t; one thread. Time is counted in calls of read_back, one a cycle.
+ * coil_relays.h - a bank of relays on the coils of a Modbus device, such as the common boards with 8 or 16 relays. Writes all
+ * relays in one transaction (write multiple coils), reads them back, and writes them again if the board has lost them. Such a
+ * board keeps its relays when this program or the line fails, unless it has a watchdog: do not connect anything that must not
+ * stay closed. The caller owns coil_relays_t; one thread. Time is counted in calls of read_back, one per cycle.
  */
 #ifndef HEAVE_COIL_RELAYS_H
 #define HEAVE_COIL_RELAYS_H
@@ -21,9 +21,9 @@ typedef struct {
     uint16_t first_coil; /**< coil of relay 1, from 0; the others follow */
     uint8_t count;       /**< [0, HAL_RELAYS_MAX] */
     bool is_active_low;  /**< a coil that is off closes its relay */
-    uint16_t start_mask; /**< written at the start, bits above count are left out */
-    uint32_t look_calls; /**< the board is looked at after so many calls of read_back without anything to write, and given up
-                            where a transaction does not end within as many; > 0 */
+    uint16_t start_mask; /**< written at the start; bits above count are ignored */
+    uint32_t look_calls; /**< calls of read_back without a write after which the board is read; also the limit for one
+                            transaction; > 0 */
 } coil_relays_config_t;
 
 /** An open bank; private. */
@@ -39,13 +39,13 @@ typedef struct {
     uint32_t calls;    /**< of read_back since the last transaction began or ended */
 } coil_relays_t;
 
-/** Starts and has start_mask written.
+/** Starts, and submits a write of start_mask.
  *  @param config copied
- *  @return HV_OK; HV_ERR_RANGE: a figure, or the line does not take it */
+ *  @return HV_OK; HV_ERR_RANGE: a value of the configuration is out of range, or the line refuses the request */
 hv_status_t coil_relays_init(coil_relays_t *self, const coil_relays_config_t *config) HV_MUST_CHECK;
 
-/** The bank as hal/relays.h wants it. A write is handed to the line at once; read_back sees to its end, tries again what failed,
- *  and has to be called every cycle. */
+/** The implementation of hal/relays.h. write submits the request to the line at once. read_back completes it and repeats what
+ *  failed; call it every cycle. */
 hal_relays_t coil_relays_hal(coil_relays_t *self);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * counts.h - the counts of a drive and the mm (or deg) of an axis: exact ratios, both ways, rounded to the nearest.
- * Pure and exact: no ratio is turned into a fraction of its own, so that nothing adds up over a stroke.
+ * counts.h - converts between the counts of a drive and the mm (or deg) of an axis by exact ratios, rounded to the nearest.
+ * Pure. The ratio itself is never rounded, so that no error accumulates over a stroke.
  */
 #ifndef HEAVE_COUNTS_H
 #define HEAVE_COUNTS_H
@@ -9,12 +9,12 @@
 
 /** counts = zero + units * num / den; unit u is mm, deg, or one of these per second. */
 typedef struct {
-    int32_t num;  /**< not 0 where counts are turned back into units; negative: the drive counts the other way round */
+    int32_t num;  /**< not 0 if counts are converted to units; negative: the drive counts in the opposite direction */
     int32_t den;  /**< > 0 */
     int32_t zero; /**< counts at 0 u */
 } counts_scale_t;
 
-/** True where a scale can be used both ways. */
+/** True if a scale can be used in both directions. */
 static inline bool counts_is_valid(const counts_scale_t *self)
 {
     return self->num != 0 && self->den > 0;

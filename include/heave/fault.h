@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * fault.h - machine faults: how the platform reacts to each (fault.c), what it means and what to do (fault_help.c).
- * A fault latches: only an operator's reset, with the cause gone, ends it. The first one is kept, all are counted, the worst
- * reaction wins. docs/faults.md is made from both. Pure and constant.
+ * fault.h - machine faults: the reaction to each (fault.c), its meaning and its remedy (fault_help.c).
+ * A fault latches: only an operator's reset ends it, after the cause is gone. The first fault is shown, all are counted, and the
+ * worst reaction wins. docs/faults.md is generated from both tables. Pure and constant.
  */
 #ifndef HEAVE_FAULT_H
 #define HEAVE_FAULT_H
@@ -21,27 +21,28 @@ typedef enum {
     FAULT_SETPOINT_JUMP,  /**< a set-point jumped away from its drive, and was not sent */
     FAULT_ESTOP_CHANNELS, /**< the two channels of the e-stop disagree for too long */
     FAULT_POWER,          /**< the supply fails, and the platform was not settled in time */
+    FAULT_OUTSIDE_STROKE, /**< a drive reports a position outside its stroke while it comes up */
     FAULT_CODES
 } fault_code_t;
 
-/** What the platform does, the mildest first. */
+/** Reactions, the mildest first. */
 typedef enum {
     FAULT_REACT_NONE,
     FAULT_REACT_STOP,       /**< controlled stop of all axes together, then disable */
     FAULT_REACT_QUICK_STOP, /**< every drive stops now by its own ramp, all in the same cycle, then disable */
-    FAULT_REACT_SILENT      /**< nobody hears the gateway: it stops talking, so that the drives' own watchdogs stop them */
+    FAULT_REACT_SILENT      /**< no drive receives anything: the gateway stops sending, so that the drives' watchdogs stop them */
 } fault_reaction_t;
 
-/** The reaction to a code; that to FAULT_NONE outside the enum. */
+/** The reaction to a code; outside the enum, that of FAULT_NONE. */
 fault_reaction_t fault_reaction(fault_code_t code);
 
 /** What has happened, in English: constant text. */
 const char *fault_text(fault_code_t code);
 
-/** Whether a drive has found it, rather than heaved. */
+/** True if a drive detects this fault, false if heaved does. */
 bool fault_is_found_by_drive(fault_code_t code);
 
-/** Whether it is of one axis: of a drive, or of what hangs on it. */
+/** True if the fault concerns one axis: a drive or its mechanics. */
 bool fault_is_of_axis(fault_code_t code);
 
 /** "stop", "quick-stop", ...: constant text. */
@@ -54,11 +55,11 @@ typedef enum { FAULT_ENGLISH, FAULT_CHINESE, FAULT_LANGUAGES } fault_language_t;
 typedef struct {
     const char *name;                    /**< a word for programs */
     const char *text_zh;                 /**< fault_text() in Chinese */
-    const char *cause[FAULT_LANGUAGES];  /**< what it usually comes from */
+    const char *cause[FAULT_LANGUAGES];  /**< usual cause */
     const char *remedy[FAULT_LANGUAGES]; /**< what to do */
 } fault_help_t;
 
-/** That of a code; of FAULT_NONE outside the enum. */
+/** The help of a code; outside the enum, that of FAULT_NONE. */
 const fault_help_t *fault_help(fault_code_t code);
 
 #endif

@@ -25,11 +25,11 @@ typedef enum {
 #define FRAME_TIME_MAX_MS 3600000u
 #define FRAME_RELAY_MASK  0x0FFFu
 
-/** Bytes of one frame. Longer than any UDP datagram: it only makes a serial line without heads and tails count its rejects. */
+/** Longest frame. It is longer than any UDP datagram: the limit only matters on a serial line that sends no heads and tails. */
 #define FRAME_LENGTH_MAX 65536u
 
-/** What is accepted beside the V3.0 form. In the lenient dialect the `#` behind rejected text counts as its tail and as the head
- * of what may follow directly, so that bad text never spoils a good frame; the `#` of a good frame is its tail alone. */
+/** Accepted forms beside V3.0. In the lenient dialect, the `#` after rejected text is both its tail and the head of a frame that
+ * may follow directly, so that bad text never spoils a good frame. The `#` of a good frame is only its tail. */
 typedef enum {
     FRAME_V3,     /**< head `@` only */
     FRAME_LENIENT /**< also V1.0's `#` head, no head at the start of a datagram, lower-case commands */
@@ -63,7 +63,7 @@ typedef enum {
     FRAME_ERRORS
 } frame_error_t;
 
-/** Where and why: the first error of the frame, except that too many values are COUNT and not what the last one looks like.
+/** Place and reason of the first error of the frame. Exception: too many values are reported as COUNT, whatever they look like.
  *  Offsets count bytes from the start of the datagram (or since the last reset of a serial feed, modulo 2^32). */
 typedef struct {
     frame_error_t error;
@@ -79,7 +79,7 @@ typedef struct {
     bool is_timed;           /**< the T form of command */
 } frame_reject_t;
 
-/** What a byte led to; never both. What came before a head is reported at that head, a frame at its `#`. */
+/** Result of a byte. Stray bytes before a head are reported at that head, a frame at its `#`. */
 typedef enum { FRAME_EVENT_NONE, FRAME_EVENT_FRAME, FRAME_EVENT_REJECT } frame_event_t;
 
 /** Scanner state; members are private to src/protocol. */
@@ -135,8 +135,7 @@ const char *frame_command_name(frame_command_t command);
 /** Short constant identifier of a reason for counters and JSON: "no_head", "unfinished", ... */
 const char *frame_error_name(frame_error_t error);
 
-/** One line for the log: at which byte (from 0), what is wrong, what would be right, look-alikes named; printable ASCII, no
- * newline.
+/** One line for the log: the byte (from 0), the error, what is allowed, and look-alikes by name; printable ASCII, no newline.
  *  @param capacity bytes at text, at least 1; the line is cut to fit and always ends in NUL
  *  @return length without NUL */
 size_t frame_reject_describe(const frame_reject_t *reject, char *text, size_t capacity);

@@ -45,16 +45,16 @@ static inline int64_t fx_mul_shift(int64_t a, int64_t b, unsigned shift)
     return FX_WIDE_MUL_SHIFT(a, b, shift);
 }
 
-/** fx_mul_shift without its saturation, for inner loops: the caller knows that the result fits. */
+/** fx_mul_shift without saturation, for inner loops: the caller guarantees that the result fits. */
 static inline int64_t fx_mul_shift_fit(int64_t a, int64_t b, unsigned shift)
 {
     return FX_WIDE_MUL_SHIFT_FIT(a, b, shift);
 }
 
-/** What fx_mul_high() takes is below this: 2^63 - 2^31. */
+/** Upper limit of the operands of fx_mul_high(): 2^63 - 2^31. */
 #define FX_HIGH_LIMIT (INT64_MAX - INT32_MAX)
 
-/** a * b / 2^64, rounded down: the cheapest wide product there is. Formats are chosen so that the 64 comes out right.
+/** a * b / 2^64, rounded down: the cheapest wide product. Formats are chosen so that a shift by 64 is right.
  *  @param a,b below FX_HIGH_LIMIT */
 /*@ assigns \result \from a, b;
     ensures a < FX_HIGH_LIMIT && b < FX_HIGH_LIMIT ==> \result == (a * b) >> 64; */

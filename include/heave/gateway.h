@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * gateway.h - the whole gateway: one cycle from datagrams and feedback to set-points and relays.
- * Owns the motion, the states and the counters; talks to the world through the HAL handles it is given. One thread owns it
+ * Owns the motion, the states and the counters. Uses the HAL handles that it is given for all I/O. One thread owns it
  * (the motion thread); time is an argument. Nothing here blocks or allocates.
  */
 #ifndef HEAVE_GATEWAY_H
@@ -22,14 +22,14 @@
 /** Most datagrams read in one cycle; the rest waits for the next. */
 #define GATEWAY_DATAGRAMS_PER_CYCLE 64u
 
-/** Most targets in one cycle that motion is told of one by one, in order: a sender's frames that the network has bunched. Of
- * more, only the newest one counts: nobody rides by several frames a cycle, and what each of them costs has to fit into it. */
+/** Most targets that motion gets one by one in one cycle, in order, when the network has bunched a sender's frames. Of more, only
+ * the newest counts, so that the cost of a cycle is bounded. */
 #define GATEWAY_TARGETS_PER_CYCLE 4u
 
 /** Longest datagram taken. */
 #define GATEWAY_DATAGRAM_MAX 512u
 
-/** The outside, every handle valid, but that there need not be a line for the healthy pulse. Backends outlive the gateway. */
+/** The HAL handles. All are valid, except that healthy is optional. Backends outlive the gateway. */
 typedef struct {
     hal_udp_t udp;
     drives_t drives;
@@ -39,30 +39,30 @@ typedef struct {
     hal_relays_t healthy; /**< a bank of one: the line of the healthy pulse; ops NULL: there is none */
 } gateway_io_t;
 
-/** How far bringing up the drives has come. */
+/** Phase of bringing up the drives. */
 typedef enum { BRING_UP_IDLE, BRING_UP_ENABLE, BRING_UP_HOME, BRING_UP_MOVE } bring_up_t;
 
 #define AUTO_ENGAGE_FRAMES_MAX 100u
 
 /** The auto policy; members are private to src/gateway. */
 typedef struct {
-    bool is_due; /**< not used up yet */
+    bool is_due; /**< engage = auto has not taken effect yet */
     uint32_t cycle_us;
-    uint32_t frames; /**< within a second, that it waits for */
-    uint32_t seen;   /**< since a gap of more than a second; wraps: harmless, after 2^32 frames it has long been used */
+    uint32_t frames; /**< valid frames within a second that it waits for */
+    uint32_t seen;   /**< frames since a gap of more than a second; may wrap */
     uint64_t last_us;
-    uint32_t span_cycles;                        /**< of the newest so many frames */
-    uint16_t gap_cycles[AUTO_ENGAGE_FRAMES_MAX]; /**< in front of each of them; a gap of a second has 2000 at most */
+    uint32_t span_cycles;                        /**< duration of the newest frames, at most `frames` of them */
+    uint16_t gap_cycles[AUTO_ENGAGE_FRAMES_MAX]; /**< cycles before each of these; at most 2000 in a second */
 } auto_engage_t;
 
-/** How a value sent becomes one of an axis: sign * scale * value + offset. */
+/** Converts a value of a frame into a value of an axis: sign * scale * value + offset. */
 typedef struct {
     int8_t sign;
     q16_t scale_q16;
     q16_t offset_q16;
 } axis_input_t;
 
-/** What a gateway needs of the settings while it runs, as they are there: motion has made its own of the rest. */
+/** Copies of the settings that the gateway needs while it runs. Motion has converted the rest. */
 typedef struct {
     uint32_t cycle_us;
     engage_policy_t engage;
@@ -72,6 +72,7 @@ typedef struct {
     angle_wrap_t angle_wrap;
     q16_t angle_min_q16;
     q16_t angle_max_q16;
+    q16_t stroke_mm_q16[CYLINDERS_MAX];
     q16_t following_error_mm_q16;
     frame_dialect_t dialect;
     q16_t confirm_jump_mm_q16;
@@ -88,12 +89,12 @@ typedef struct {
     uint32_t power_settle_ms;
 } gateway_settings_t;
 
-/** Which line about a drive was written last, so that one that comes and goes for ever does not fill the log. */
+/** The last log line about a drive. Limits the rate, so that a drive that comes and goes does not fill the log. */
 typedef struct {
-    uint64_t next_us; /**< a line is free from then on, less what a burst may use up */
+    uint64_t next_us; /**< when the next line may be written; a burst may be earlier */
     uint32_t code;
     uint32_t detail_code;
-    uint32_t left_out; /**< changes since then that no line told of */
+    uint32_t left_out; /**< changes since then without a line */
 } gateway_told_t;
 
 /** A gateway; members are private to src/gateway. */
@@ -105,34 +106,34 @@ typedef struct {
     supervisor_t supervisor;
     frame_scanner_t scanner;
     snapshot_t snapshot;
-    fault_code_t axis_fault[DRIVES_MAX];        /**< what is wrong with each drive now */
-    uint32_t told[DRIVES_MAX + 1u];             /**< faults that the coming cycle is to find, as snapshot.begun */
-    uint64_t following_since_us[CYLINDERS_MAX]; /**< further from its set-point than allowed since then; 0 = it is not */
+    fault_code_t axis_fault[DRIVES_MAX];        /**< present fault of each drive */
+    uint32_t told[DRIVES_MAX + 1u];             /**< faults that the next cycle has to find, as snapshot.begun */
+    uint64_t following_since_us[CYLINDERS_MAX]; /**< start of a distance from the set-point that is too large; 0 = none */
     bring_up_t bring_up;
     uint64_t bring_up_deadline_us;
-    bool is_bus_lost;        /**< so that it is counted once */
+    bool is_bus_lost;        /**< so that the fault is counted once */
     bool is_bus_failing;     /**< the same */
     bool is_estop_apart;     /**< the same */
     bool is_power_overdue;   /**< the same */
-    uint64_t power_since_us; /**< the supply has been failing since then; 0 = it is not */
+    uint64_t power_since_us; /**< start of the failure of the supply; 0 = none */
     bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
     bool is_disable_due;     /**< disable the drives once at rest */
     auto_engage_t auto_engage;
-    bool is_shutdown_asked;  /**< nothing brings the platform up any more */
-    bool is_end_overdue;     /**< drives that have not confirmed that their torque is off are not waited for any more */
+    bool is_shutdown_asked;  /**< the platform may not rise any more */
+    bool is_end_overdue;     /**< the time for drives to confirm that their torque is off has passed */
     uint32_t unsent_cycles;  /**< cycles in a row whose set-points the bus did not take */
-    uint64_t reset_until_us; /**< a reset waits for the drives until then; 0 = none */
-    uint64_t end_since_us;   /**< a shutdown has come to OFF, FAULT or ESTOP, and the drives were told; 0 = not yet */
+    uint64_t reset_until_us; /**< end of the time in which a reset waits for the drives; 0 = no reset */
+    uint64_t end_since_us;   /**< when a shutdown reached OFF, FAULT or ESTOP and the drives were told; 0 = not yet */
     owner_t owner;
-    uint64_t start_us;       /**< of the silence timer: last accepted frame or entry into ENGAGED */
+    uint64_t start_us;       /**< start of the silence timer: last accepted frame or entry into ENGAGED */
     uint64_t state_since_us; /**< when the state was entered */
     confirm_t confirm;
-    uint32_t waited_us;     /**< by the newest datagram for its cycle */
-    unsigned stream_frames; /**< in quick succession so far, at most as many as make a stream */
-    uint16_t frame_mask;    /**< what the sender asked of the relays */
+    uint32_t waited_us;     /**< time that the newest datagram waited for its cycle */
+    unsigned stream_frames; /**< frames in quick succession so far, up to the number that makes a stream */
+    uint16_t frame_mask;    /**< relay mask of the sender */
     relay_policy_t relay_policy;
     unsigned targets; /**< of this cycle */
-    bool has_newest;  /**< newest is of this cycle and motion has not been told of it */
+    bool has_newest;  /**< newest is of this cycle, and motion has not got it yet */
     motion_target_t newest;
     frame_command_t newest_command;
     hal_udp_peer_t newest_from;
@@ -140,13 +141,13 @@ typedef struct {
     uint16_t written_mask; /**< with it */
     bool is_mask_written;
     healthy_t healthy;
-    bool is_late;                /**< the coming cycle is, by more than the pulse bears */
+    bool is_late;                /**< the next cycle is too late for the healthy pulse */
     bool is_pulse_lost;          /**< its line cannot be written */
     uint64_t other_logged_us;    /**< 0 = never */
     uint64_t singular_logged_us; /**< 0 = never */
     uint32_t other_suppressed;
     uint64_t spike_logged_us;
-    uint32_t spikes_logged; /**< of all spikes, those that a line told of */
+    uint32_t spikes_logged; /**< spikes that are already in the log */
     uint64_t jump_logged_us;
     uint32_t jumps_logged;                    /**< likewise */
     gateway_told_t told_of[DRIVES_MAX];       /**< the last line about what a drive is at */
@@ -172,21 +173,21 @@ void gateway_restart_auto(gateway_t *self);
  *  @param out not a gateway that runs: gateway_resume() makes one of it */
 void gateway_save(const gateway_t *self, gateway_t *out);
 
-/** Goes on from what was saved, with other handles.
- *  @param self  prepared by gateway_init() with the same settings: what these lead to is not taken from what was saved
- *  @param saved is not believed: it may come from a file that anybody wrote; see sane.h
- *  @return HV_OK; HV_ERR_ARG as gateway_init, for another platform, or for what no gateway saves: self is unchanged */
+/** Continues from a saved state, with other handles.
+ *  @param self  prepared by gateway_init() with the same settings; members that follow from the settings are kept
+ *  @param saved is checked, because anybody may have written the file; see sane.h
+ *  @return HV_OK; HV_ERR_ARG as gateway_init, for another platform, or for a state that no gateway saves: self is unchanged */
 hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io) HV_MUST_CHECK;
 
 /** Takes over what may change in operation: silence, take-over and priorities, dialect, safe mask and its delay, following error,
- *  spike gate, confirmation of far jumps. The rest of the settings is not looked at. */
+ *  spike gate, confirmation of far jumps. Ignores the rest of the settings. */
 void gateway_reload(gateway_t *self, const settings_t *settings);
 
-/** What an operator asks for: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET or EVENT_SHUTDOWN.
- *  @return HV_OK; HV_ERR_STATE where the state does not allow it: nothing changes. */
+/** An operator's request: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET or EVENT_SHUTDOWN.
+ *  @return HV_OK; HV_ERR_STATE if the state does not allow it: nothing changes. */
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us) HV_MUST_CHECK;
 
-/** How much of a sender's motion is made from now on, by a ramp (see motion_set_intensity). In every state.
+/** Sets the intensity, which changes by a ramp (see motion_set_intensity). Allowed in every state.
  *  @return HV_OK; HV_ERR_RANGE above intensity_max_percent: nothing changes. */
 hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent) HV_MUST_CHECK;
 
@@ -194,22 +195,22 @@ hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent) HV_MUST_CHE
  *  @param now_us one cycle_us more than the last time */
 void gateway_cycle(gateway_t *self, uint64_t now_us);
 
-/** What the last cycle did. Valid until the next one. */
+/** Result of the last cycle. Valid until the next one. */
 const snapshot_t *gateway_snapshot(const gateway_t *self);
 
-/** Tells of cycles that were skipped just before the coming one because the program was late. */
+/** Reports cycles that were skipped just before the next one because the program was late. */
 void gateway_note_late(gateway_t *self, uint32_t cycles);
 
-/** Offline runs: the coming cycle finds this fault, whatever the drives do; where it finds it by itself, nothing is added.
- *  @param axis as in fault_t; one that this platform does not have, or that does not go with the code, finds nothing */
+/** Offline runs: the next cycle finds this fault, whatever the drives do. If the cycle finds it by itself, nothing is added.
+ *  @param axis as in fault_t; ignored if the platform does not have this axis, or if it does not fit the code */
 void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis);
 
-/** True once a shutdown has ended: OFF, or FAULT / ESTOP with a shutdown asked for, the drives told, where their bus tells them
- *  anything, and no drive energized as far as is known. Drives that do not confirm that are waited for for 3 s, for 1 s where
- *  none of them answers; then a line of the log names them. */
+/** True when a shutdown has ended: the state is OFF, or FAULT / ESTOP with a shutdown requested, the drives were told (if their
+ * bus works), and no drive is energized as far as is known. Waits 3 s for drives that do not confirm this, or 1 s if none of them
+ *  answers; then a line of the log names them. */
 bool gateway_is_finished(const gateway_t *self);
 
-/** Drives whose torque is on as far as is known: bit i for axis i + 1. Drives that are lost, as they were heard last. */
+/** Drives whose torque is on as far as is known: bit i for axis i + 1. For lost drives: the last known state. */
 uint32_t gateway_energized(const gateway_t *self);
 
 #endif

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT
- * governor.h - reference governor: what a stream asks for beyond the limits is smoothed, just as far as needed, all axes alike.
+ * governor.h - reference governor: smooths a stream that exceeds the limits, as much as needed and equally for all axes.
  *
- * Works on the control points of a curve, one step per period. Level 0 is the curve as asked; each further level is the one
- * before behind one more low-pass (time constants 6, 12, 25, 50, 100, 200, 400 ms). Of each level is known how much of the limits
- * of axes and cylinders it has needed lately. The output lies on the way from level to level, as far along as the limits need.
- * Every level is a mean of what was asked, and so is the output: it never leaves the range of what was asked, it cannot swing,
- * and as all axes share one strength it keeps the direction. Owns no clock; not re-entrant per instance.
+ * Works on the control points of a curve, one step per period. Level 0 is the curve as requested. Each further level is the
+ * previous one after one more low-pass (time constants 6, 12, 25, 50, 100, 200, 400 ms). For each level the governor records
+ * which share of the limits of axes and cylinders it has recently needed. The output is interpolated between the levels, as far
+ * along as the limits require. Every level is a mean of the requested curve, and so is the output: it never leaves the range of
+ * the request and cannot oscillate. All axes share one strength, so the direction is kept. Owns no clock; not re-entrant per
+ * instance.
  */
 #ifndef HEAVE_GOVERNOR_H
 #define HEAVE_GOVERNOR_H
@@ -15,9 +16,9 @@
 
 enum {
     GOVERNOR_LEVELS = 7,                   /**< low-passes */
-    GOVERNOR_CHANNELS = 2 * CYLINDERS_MAX, /**< axes that are followed in, then the cylinders they lead to */
-    GOVERNOR_POLES = 3,                    /**< low-passes that a rise of the strength goes through */
-    GOVERNOR_SPANS = 4                     /**< quarters of a second that a need is remembered for */
+    GOVERNOR_CHANNELS = 2 * CYLINDERS_MAX, /**< pose axes, then the cylinders that follow from them */
+    GOVERNOR_POLES = 3,                    /**< number of low-passes that smooth a rising strength */
+    GOVERNOR_SPANS = 4                     /**< quarters of a second for which a need is remembered */
 };
 
 /** Limits of a channel, per cycle^k. */
@@ -35,51 +36,51 @@ typedef struct {
 /** Members are private to src/motion. */
 typedef struct {
     governor_limits_t limits[GOVERNOR_CHANNELS];
-    unsigned channels;                           /**< that have limits: the first so many */
-    uint32_t period_us;                          /**< that what follows was worked out for */
+    unsigned channels;                           /**< number of channels with limits; they come first */
+    uint32_t period_us;                          /**< for which the following members were calculated */
     int64_t per_limit_q62[GOVERNOR_CHANNELS][3]; /**< 1 / limit per period, per period^2, per period^3 */
-    int32_t brake_q16[GOVERNOR_CHANNELS];        /**< share of the speed limit that taking the largest acceleration back adds */
-    q32_t share_q32[GOVERNOR_LEVELS];            /**< of the way to its input that a low-pass goes in a period */
+    int32_t brake_q16[GOVERNOR_CHANNELS]; /**< share of the speed limit that is added while the largest acceleration is removed */
+    q32_t share_q32[GOVERNOR_LEVELS];     /**< coefficient of each low-pass per period */
     q32_t level_q32[GOVERNOR_LEVELS + 1][GOVERNOR_CHANNELS];
-    unsigned each;  /**< needs are looked at every so manyth period: finer ones would be those of rounding */
-    unsigned since; /**< periods since they were */
-    governor_track_t track[GOVERNOR_LEVELS + 1][GOVERNOR_CHANNELS]; /**< of the levels when needs were looked at, and ... */
-    governor_track_t out[GOVERNOR_CHANNELS];                        /**< ... of the output */
+    unsigned each;  /**< needs are calculated once in so many periods: shorter intervals would show rounding only */
+    unsigned since; /**< periods since the last calculation */
+    governor_track_t track[GOVERNOR_LEVELS + 1][GOVERNOR_CHANNELS]; /**< levels at the last calculation, and ... */
+    governor_track_t out[GOVERNOR_CHANNELS];                        /**< ... the output */
     int32_t need_q16[GOVERNOR_SPANS]
                     [GOVERNOR_LEVELS + 1]; /**< largest share of a limit, by quarters of a second, the newest first */
-    uint32_t span_us;                      /**< of the newest of these so far */
+    uint32_t span_us;                      /**< length of the newest quarter so far */
     q32_t rise_q32[GOVERNOR_POLES];
-    q32_t fall_q32;     /**< that the strength falls by at present */
-    q32_t glide_q32;    /**< that it changes by in a period */
+    q32_t fall_q32;     /**< present rate of fall of the strength */
+    q32_t glide_q32;    /**< change of the strength per period */
     q32_t strength_q32; /**< [0, GOVERNOR_LEVELS]: 0 is the curve as asked */
 } governor_t;
 
-/** Tells the limits of a channel; jerk 0: it has none. Before governor_place(). */
+/** Sets the limits of a channel; jerk 0: none. Call before governor_place(). */
 void governor_set_limits(governor_t *self, unsigned channel, const governor_limits_t *limits);
 
-/** Tells the period; cheap where it hardly changes.
+/** Sets the period; cheap if it hardly changes.
  *  @param period_us [1000, 2000000]   @param cycle_us [500, 10000] */
 void governor_pace(governor_t *self, uint32_t period_us, uint32_t cycle_us);
 
-/** Nothing has been beyond the limits so far. */
+/** Starts without any recorded need. */
 void governor_start(governor_t *self);
 
-/** A channel has come along these values, the newest last. After governor_pace().
- *  @param is_steady it has moved like that for long; else it was at rest until now: the levels are where it has been */
+/** Sets the past values of a channel, the newest last. Call after governor_pace().
+ *  @param is_steady true: it has moved like this for long; false: it was at rest, and the levels start at the rest position */
 void governor_place(governor_t *self, unsigned channel, bool is_steady, const q32_t value_q32[3]);
 
-/** How far the output is behind what was asked last, of a channel with limits. */
+/** Distance of the output from the last request, of a channel with limits. */
 q32_t governor_lag(const governor_t *self, unsigned channel);
 
-/** What was asked last is at another time, and there it was so much; all that follows from it goes along. */
+/** Moves the last request of a channel to another point in time, where its value is asked_q32; shifts all levels with it. */
 void governor_shift(governor_t *self, unsigned channel, q32_t asked_q32);
 
 /** One period.
  *  @param asked_q32 one value per channel with limits   @param scale_q16 [0, Q16_ONE] that the result will be multiplied by
- *  @param out_q32   out: the same within the limits as far as they can be kept; asked_q32 exactly where nothing is beyond them */
+ *  @param out_q32   out: the request within the limits as far as possible; exactly asked_q32 if nothing exceeds them */
 void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, q32_t *out_q32);
 
-/** Delay that the smoothing adds at present, in us. */
+/** Present delay by smoothing, in us. */
 uint32_t governor_delay_us(const governor_t *self);
 
 #endif

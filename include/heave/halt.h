@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * halt.h - the quickest stop of several axes together: one trapezoid of acceleration for all of them, in whole cycles.
- * Every axis changes its acceleration to its own plateau, holds it and takes it back in the same cycles as the others, so that
- * the body keeps its direction while it slows down. Integer only; no clock.
+ * halt.h - plans the quickest stop of several axes together, with one trapezoidal acceleration profile in whole cycles.
+ * All axes change, hold and remove their acceleration in the same cycles, each with its own plateau. So the platform keeps its
+ * direction while it slows down. Integer only; no clock.
  */
 #ifndef HEAVE_HALT_H
 #define HEAVE_HALT_H
@@ -9,7 +9,7 @@
 #include "heave/axes.h"
 #include "heave/ramp.h"
 
-/** Cycles of change, hold and take-back of the acceleration. */
+/** Cycles in which the acceleration changes, is held, and is removed. */
 typedef struct {
     int64_t change, hold, back;
 } halt_times_t;
@@ -19,7 +19,7 @@ typedef struct {
     unsigned axes;
     int64_t cycles; /**< of the slowest axis */
     int64_t elapsed;
-    halt_times_t times[AXES_MAX]; /**< an axis apart, or near a limit, takes its own */
+    halt_times_t times[AXES_MAX]; /**< equal, except for an axis near a limit or planned separately */
     ramp_state_t start[AXES_MAX];
     ramp_state_t now[AXES_MAX];
     q32_t rest_q32[AXES_MAX]; /**< where it ends */
@@ -27,12 +27,16 @@ typedef struct {
 
 /** Plans the quickest stop within acceleration and jerk limits.
  *  @param start may be self->start
- *  @param together so many axes, from the first on, take the same cycles, except one that this would carry out of its bounds or
- *                  beyond its speed; that one and the axes behind take their own */
+ *  @param together number of axes, from the first on, that stop in the same cycles. An axis that would leave its bounds or exceed
+ *                  its speed, and the axes after `together`, get their own times */
 void halt_plan(halt_t *self, unsigned axes, unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits);
 
-/** Where such a stop of axes that all go together would end, without planning it. */
+/** End positions of such a stop of all axes together, without planning it. */
 void halt_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits, q32_t *rest_q32);
+
+/** Velocity of an axis in a cycle of the stop, by the same profile as halt_step(), without rounding errors of sums.
+ *  @param cycle at least 1; past the end: 0 */
+q32_t halt_velocity(const halt_t *self, unsigned axis, int64_t cycle);
 
 /** References of the next cycle. Past the end: at rest. */
 void halt_step(halt_t *self, ramp_ref_t *ref);

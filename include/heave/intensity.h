@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * intensity.h - how much of a sender's motion the platform makes: 0 to 100 % about neutral, changed by a jerk-limited ramp.
- * Scales references, never set-points: limits, workspace and take-over stand behind it. Owns no clock and no I/O.
+ * intensity.h - scales a sender's motion about neutral, 0 to 100 %; changes follow a jerk-limited ramp.
+ * Scales references, not set-points: limits, workspace and take-over are applied afterwards. Owns no clock and no I/O.
  */
 #ifndef HEAVE_INTENSITY_H
 #define HEAVE_INTENSITY_H
@@ -10,7 +10,7 @@
 #define INTENSITY_RAMP_MIN_MS 500u
 #define INTENSITY_RAMP_MAX_MS 10000u
 
-/** The share that 100 % is. */
+/** The share at 100 %. */
 #define INTENSITY_SHIFT 46u
 #define INTENSITY_FULL  ((int64_t)1 << INTENSITY_SHIFT)
 
@@ -29,35 +29,35 @@ typedef struct {
 hv_status_t intensity_init(intensity_t *self, unsigned percent, unsigned max_percent, uint32_t ramp_ms,
                            uint32_t cycle_us) HV_MUST_CHECK;
 
-/** Asks for another percentage; intensity_step leads there, at any moment, with continuous acceleration.
+/** Sets the target percentage at any time; intensity_step() moves there with continuous acceleration.
  *  @return HV_OK; HV_ERR_RANGE above max_percent: nothing changes */
 hv_status_t intensity_set(intensity_t *self, unsigned percent) HV_MUST_CHECK;
 
-/** What was asked for is in force from now on: for when nothing moves by it. */
+/** Applies the target percentage at once. For situations in which this moves nothing. */
 void intensity_place(intensity_t *self);
 
-/** Goes on by one cycle. */
+/** Advances one cycle. */
 void intensity_step(intensity_t *self);
 
-/** What is in force, in percent. */
+/** The percentage in force. */
 q32_t intensity_percent_q32(const intensity_t *self);
 
-/** The larger one of what is in force and what is asked for: what a motion may come to need. */
+/** The larger of the percentage in force and the target: the most that a motion may need. */
 q16_t intensity_largest_q16(const intensity_t *self);
 
-/** Where a sender's value is with the share in force: exactly neutral at 0 %, exactly the value at 100 %. */
+/** A sender's value scaled with the share in force: exactly neutral at 0 %, exactly the value at 100 %. */
 q32_t intensity_scaled(const intensity_t *self, q32_t neutral_q32, q32_t value_q32);
 
 /** The value that intensity_scaled turns into this one; neutral at 0 %. */
 q32_t intensity_unscaled(const intensity_t *self, q32_t neutral_q32, q32_t scaled_q32);
 
-/** A reference that a sender's values gave, scaled; its differences contain those of the share. */
+/** A scaled reference; its differences include those of the share. */
 ramp_ref_t intensity_scale(const intensity_t *self, q32_t neutral_q32, const ramp_ref_t *ref);
 
-/** True while intensity_shift() for this planned share is 0 whatever the way. */
+/** True if intensity_shift() for this planned share is 0 for every way_q32. */
 bool intensity_is_still(const intensity_t *self, int64_t planned_q46);
 
-/** What has to be added to a reference that was planned with another share, to where way is the sender's value less neutral. */
+/** The correction of a reference that was planned with another share. way_q32 is the sender's value minus neutral. */
 ramp_ref_t intensity_shift(const intensity_t *self, int64_t planned_q46, q32_t way_q32);
 
 #endif

@@ -29,7 +29,7 @@ typedef struct {
     q16_t mrp_mm_q16[3]; /**< motion reference point, plate frame: poses place it and turn about it; +-4000 mm */
 } kin_geometry_t;
 
-/** How far a joint of a 3-RPS may lie from where its hinge puts it: 0.1 mm. */
+/** Largest distance of a 3-RPS joint from the position that its hinge defines: 0.1 mm. */
 #define KIN_HINGE_TOLERANCE_MM_Q16 ((q16_t)6554)
 
 /** A mechanism prepared for solving. Members are private to src/kinematics. */
@@ -49,7 +49,7 @@ typedef struct {
  *  @return HV_OK; HV_ERR_RANGE where a value is outside the ranges above. On error *self is unchanged. */
 hv_status_t kin_init(kin_t *self, const kin_geometry_t *geometry) HV_MUST_CHECK;
 
-/** True for two that solve alike, member by member. One that was loaded may hold anything. */
+/** True if two mechanisms are equal, member by member. A loaded one may hold any bytes. */
 bool kin_is_same(const kin_t *a, const kin_t *b);
 
 /** Cylinders of the mechanism: 6 or 3. */
@@ -83,8 +83,8 @@ void kin_constrain(const kin_t *self, pose_t *pose);
 hv_status_t kin_forward(const kin_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], const pose_t *guess, pose_t *pose,
                         unsigned *iterations) HV_MUST_CHECK;
 
-/** Below this singularity margin, 0.1, a platform is not to be brought: cylinder forces, and what play and elasticity of the
- *  cylinders let the plate do, have grown tenfold, and beyond it they grow without end. Ordinary platforms have 0.2 to 1. */
+/** Smallest singularity margin for operation, 0.1. Here, cylinder forces and the effect of play and elasticity are ten times as
+ * large as at margin 1, and below they grow without bound. Ordinary platforms have 0.2 to 1. */
 #define KIN_MARGIN_LEAST_Q32 ((q32_t)429496730)
 
 /** Singularity margin of a pose, 0 to 1: the smallest of

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT
- * modbus_drive.h - drives on Modbus (TCP or RTU): a map says what the registers mean, this driver does the rest.
- * The caller owns modbus_drive_t; the motion thread alone calls it (drives.h). Nothing here waits: transactions are handed to the
- * workers of the lines (hal/modbus.h), and looked at later.
+ * modbus_drive.h - driver for drives on Modbus (TCP or RTU). A map defines the registers.
+ * The caller owns modbus_drive_t; only the motion thread calls it (drives.h). Nothing here waits: the driver submits transactions
+ * to the workers of the lines (hal/modbus.h) and collects the results later.
  *
- * A drive is written through one slot of its line and read through another one. Where a set-point still waits for its turn, the
- * newest one replaces it, and a command replaces any set-point: nothing old is ever sent, and nothing queues up.
+ * Each drive has one slot of its line for writes and one for reads. A new set-point replaces one that still waits, and a command
+ * replaces any set-point. So nothing old is sent, and there is no queue.
  *
- * What a slow line can carry: set-points come once per motion cycle, a drive gets one per period T of its line, which is
- * measured. pace       set-points move no faster than carry per T of the slowest drive, all axes by the same share of their way
- *   smoothing  what is written is the mean of the set-points since the last one that was written: a mean over T
- *   speed      the speed register gets the way since the last one, divided by T, and an eighth more, so that a drive arrives
- *              just before the next set-point and neither stops between them nor falls behind
+ * Slow lines: motion makes one set-point per cycle, but a drive gets only one per period T of its line. T is measured.
+ *   pace       a set-point moves by at most `carry` per T of the slowest drive; all axes move by the same share of their distance
+ *   smoothing  the value written is the mean of all set-points since the last one written, that is, a mean over T
+ *   speed      the speed register gets the distance since the last set-point, divided by T, plus an eighth. So a drive arrives
+ *              just before the next set-point; it neither stops in between nor falls behind
  */
 #ifndef HEAVE_MODBUS_DRIVE_H
 #define HEAVE_MODBUS_DRIVE_H
@@ -61,15 +61,15 @@ typedef struct {
     modbus_drive_block_t block[MODBUS_DRIVE_BLOCKS_MAX];
 } modbus_drive_blocks_t;
 
-/** What a register has to hold before a drive counts as ready. */
+/** A register value that a drive needs before it is ready. */
 typedef struct {
     uint16_t address;
     uint16_t value;
-    bool is_written; /**< else only looked at */
+    bool is_written; /**< false: only compared */
     bool is_checked; /**< read back */
 } modbus_drive_item_t;
 
-/** What a drive can be told beside set-points; blocks of constants, each optional. */
+/** Commands other than set-points: blocks of constants, each optional. */
 typedef enum {
     MODBUS_DRIVE_STOP,
     MODBUS_DRIVE_DISABLE,
@@ -87,23 +87,23 @@ typedef struct {
     counts_scale_t scale;
     counts_scale_t speed;    /**< speed field per u/s */
     q32_t step_max_q32;      /**< largest step of set-points, u per motion cycle; > 0 */
-    q32_t speed_max_q32;     /**< what the speed field carries at most, u/s; > 0 */
-    q32_t carry_q32;         /**< largest way of a set-point that is written, u; 0 = as the motion has it */
+    q32_t speed_max_q32;     /**< largest value of the speed field, u/s; > 0 */
+    q32_t carry_q32;         /**< largest step between set-points that are written, u; 0 = no limit */
     q32_t following_max_q32; /**< largest distance of a set-point from actual, u; 0 = not watched */
 } modbus_drive_axis_map_t;
 
 /** The whole map. */
 typedef struct {
-    uint8_t axes;                   /**< [1, DRIVES_MAX] */
-    bool is_input;                  /**< feedback is read from input registers, else from holding registers */
-    bool is_single;                 /**< blocks of one register are written by function 6, else by 16 */
-    bool is_broadcast;              /**< the first block of a stop goes to all drives of a line at once, then the stop to each */
-    bool is_target_last;            /**< a drive is placed after it has torque, as writing its target starts it; else before */
-    uint32_t period_us;             /**< set-points and reads of a drive are no closer; > 0 */
-    uint32_t expected_us;           /**< period to assume before it is measured; > 0 */
-    uint32_t feedback_timeout_us;   /**< a drive whose newest feedback is older is gone; > period_us */
-    uint8_t retries;                /**< failures in a row that are borne */
-    uint32_t speed_least;           /**< what the speed field carries at least */
+    uint8_t axes;         /**< [1, DRIVES_MAX] */
+    bool is_input;        /**< feedback is read from input registers, else from holding registers */
+    bool is_single;       /**< blocks of one register are written by function 6, else by 16 */
+    bool is_broadcast;    /**< the first block of a stop goes to all drives of a line at once, then the stop to each */
+    bool is_target_last;  /**< the target is written after torque is on, because writing it starts the drive; false: before */
+    uint32_t period_us;   /**< shortest time between two set-points and two reads of a drive; > 0 */
+    uint32_t expected_us; /**< period to assume before it is measured; > 0 */
+    uint32_t feedback_timeout_us;   /**< a drive is lost if its newest feedback is older; > period_us */
+    uint8_t retries;                /**< failures in a row that are tolerated */
+    uint32_t speed_least;           /**< smallest value of the speed field */
     modbus_drive_blocks_t setpoint; /**< has a position, may have a speed */
     modbus_drive_blocks_t feedback; /**< has a position, may have status and alarm */
     modbus_drive_blocks_t command[MODBUS_DRIVE_COMMANDS];
@@ -116,11 +116,11 @@ typedef struct {
     modbus_drive_axis_map_t axis[DRIVES_MAX];
 } modbus_drive_map_t;
 
-/** Where a drive stands. */
+/** Phase of a drive. */
 typedef enum {
-    MODBUS_DRIVE_WAITING,    /**< for its line, or for its answer; asked twice a second */
+    MODBUS_DRIVE_WAITING,    /**< for its line, or for its answer; it is asked twice a second */
     MODBUS_DRIVE_STARTING,   /**< torque off, then the items one by one */
-    MODBUS_DRIVE_REFUSED,    /**< an item is not as it has to be; begins again after two seconds, or by a reset */
+    MODBUS_DRIVE_REFUSED,    /**< an item has a wrong value; starts again after two seconds, or by a reset */
     MODBUS_DRIVE_READY,      /**< no torque */
     MODBUS_DRIVE_PLACING,    /**< its target is being set to where it is */
     MODBUS_DRIVE_ENABLING,   /**< the enable blocks are being written */
@@ -131,20 +131,20 @@ typedef enum {
     MODBUS_DRIVE_FAULT
 } modbus_drive_phase_t;
 
-/** What is or was wrong with a drive; its own alarms and statuses are numbers of its own. */
+/** Problem of a drive. Alarms and statuses of the drive itself have its own numbers. */
 typedef enum {
     MODBUS_DRIVE_NO_TROUBLE,
     MODBUS_DRIVE_NO_LINK = 0x10001, /**< no connection, or no serial port */
     MODBUS_DRIVE_NO_ANSWER,
     MODBUS_DRIVE_DAMAGED,   /**< answers that are broken, or not to the question */
-    MODBUS_DRIVE_EXCEPTION, /**< it answers that it will not */
-    MODBUS_DRIVE_VALUE,     /**< an item does not hold what it has to */
+    MODBUS_DRIVE_EXCEPTION, /**< answers with an exception */
+    MODBUS_DRIVE_VALUE,     /**< an item has a wrong value */
     MODBUS_DRIVE_OLD,       /**< the newest feedback is too old */
     MODBUS_DRIVE_FOLLOWING, /**< found here: a set-point too far from the last one, or from actual */
     MODBUS_DRIVE_HOMING_FAILED
 } modbus_drive_trouble_t;
 
-/** What is being written; private. */
+/** Present write job; private. */
 typedef enum {
     MODBUS_DRIVE_NO_JOB,
     MODBUS_DRIVE_JOB_STARTUP,
@@ -152,7 +152,7 @@ typedef enum {
     MODBUS_DRIVE_JOB_SETPOINT
 } modbus_drive_job_t;
 
-/** A slot of a line; private. Tags count transactions: results below `first` are of something that is over. */
+/** A slot of a line; private. Tags count transactions: results below `first` belong to finished jobs and are ignored. */
 typedef struct {
     bool is_out;
     uint8_t failures; /**< in a row */
@@ -160,7 +160,7 @@ typedef struct {
     uint32_t first;
 } modbus_drive_slot_t;
 
-/** One drive at work; private. Times are those of poll. */
+/** State of one drive; private. Times are those of poll. */
 typedef struct {
     modbus_drive_phase_t phase;
     modbus_drive_job_t job;
@@ -171,15 +171,15 @@ typedef struct {
     uint8_t read_step; /**< block of the feedback */
     bool is_checking;  /**< the item is being read back */
     bool is_broadcast; /**< the stop goes to all drives of the line first; whichever slot has its turn carries it */
-    bool is_reset_due; /**< asked for while a stop was on its way */
+    bool is_reset_due; /**< requested while a stop was in progress */
     bool is_homed;
     bool is_after_homing; /**< placed once more, torque is on */
-    bool is_placed;       /**< the target is where the drive was when it was last asked to follow */
+    bool is_placed;       /**< the target was set to the actual position when following was last requested */
     bool is_homing_seen;
-    bool is_energized; /**< torque was on or asked for, and that it is off has not been confirmed since */
+    bool is_energized; /**< torque was on or requested, and the drive has not confirmed since that it is off */
     bool has_actual;
-    bool has_sent;     /**< asked_q32 is the last set-point that came */
-    bool is_fresh;     /**< a set-point has come since the last was handed over */
+    bool has_sent;     /**< asked_q32 is valid */
+    bool is_fresh;     /**< there is a newer set-point than the one submitted last */
     uint8_t exception; /**< of the trouble */
     uint16_t object;   /**< register of the trouble, or of the item */
     uint32_t trouble;  /**< modbus_drive_trouble_t, or the drive's own code */
@@ -189,27 +189,27 @@ typedef struct {
     int64_t actual_counts;
     q32_t actual_q32;
     uint64_t actual_us;
-    int64_t target_counts; /**< what set-point blocks carry */
+    int64_t target_counts; /**< values for the set-point blocks */
     int64_t target_speed;
     q32_t asked_q32; /**< last set-point of the motion */
-    q32_t paced_q32; /**< what the line can carry of it */
+    q32_t paced_q32; /**< after pacing */
     int64_t sum_q32; /**< of paced_q32 since the last one written */
     uint32_t sums;
-    q32_t offered_q32;    /**< mean that was handed over last */
+    q32_t offered_q32;    /**< mean that was submitted last */
     q32_t written_q32;    /**< mean that was confirmed last */
     uint32_t period_us;   /**< T, smoothed */
     uint64_t setpoint_us; /**< last confirmed; 0 = none */
     uint64_t due_us;      /**< of the next set-point */
     uint64_t next_read_us;
-    uint64_t read_us;        /**< the feedback that is being read was begun */
-    uint64_t mark_us;        /**< feedback has to be begun after that */
-    uint64_t reset_until_us; /**< 0: no reset goes on */
+    uint64_t read_us;        /**< when the present read of the feedback began */
+    uint64_t mark_us;        /**< only feedback that began later counts */
+    uint64_t reset_until_us; /**< 0: no reset in progress */
     drive_guard_t guard;
     uint64_t since_us; /**< of the phase */
     uint64_t trouble_us;
 } modbus_drive_axis_t;
 
-/** The drives of a platform; private but for the counters. */
+/** The drives of a platform. Members are private, except the counters. */
 typedef struct {
     const modbus_drive_map_t *map;
     hal_modbus_t line[DRIVES_MAX];
@@ -228,17 +228,17 @@ typedef struct {
 hv_status_t modbus_drive_init(modbus_drive_t *self, const modbus_drive_map_t *map,
                               const hal_modbus_t line[DRIVES_MAX]) HV_MUST_CHECK;
 
-/** The drives as drives.h wants them. send never says HV_ERR_AGAIN: the newest set-point wins. */
+/** The implementation of drives.h. send never returns HV_ERR_AGAIN: the newest set-point wins. */
 drives_t modbus_drive_hal(modbus_drive_t *self);
 
-/** True where no drive is still to be written something that stops, resets or starts it: at the end, polls lead there. */
+/** True if no stop, reset or start of a drive is still to be written. At the end of the program, poll until then. */
 bool modbus_drive_is_told(const modbus_drive_t *self);
 
 /** Range of a field's values. */
 int64_t modbus_drive_field_min(const modbus_drive_field_t *field);
 int64_t modbus_drive_field_max(const modbus_drive_field_t *field);
 
-/** The first field that carries something.
+/** The first field that carries a value.
  *  @param block out: its block; may be NULL
  *  @return NULL where there is none */
 const modbus_drive_field_t *modbus_drive_find(const modbus_drive_blocks_t *blocks, modbus_drive_value_t value, unsigned *block);
@@ -251,18 +251,18 @@ hv_status_t modbus_drive_pack(const modbus_drive_block_t *block, const int64_t v
 /** Value of a field in the registers of its block. */
 int64_t modbus_drive_extract(const modbus_drive_field_t *field, const uint16_t *registers);
 
-/** How long things take on a line. */
+/** Timing of a line. */
 typedef struct {
     uint32_t bitrate_bps;   /**< of RTU; 0: TCP, where bytes take no time */
     uint8_t bits_per_char;  /**< with start, parity and stop bits */
     uint32_t turnaround_us; /**< from the end of a question to the beginning of its answer */
 } modbus_drive_timing_t;
 
-/** How long a transaction takes with the silence behind it (RTU: 3.5 characters, at least 1.75 ms above 19,200 bit/s).
+/** Duration of a transaction, including the silence after it (RTU: 3.5 characters, at least 1.75 ms above 19,200 bit/s).
  *  @param count registers */
 uint32_t modbus_drive_transaction_us(const modbus_drive_timing_t *timing, modbus_function_t function, unsigned count);
 
-/** How long it takes until every drive of a line has had a set-point and told where it is.
+/** Time until every drive of a line has received a set-point and has been read.
  *  @param drives on that line */
 uint32_t modbus_drive_round_us(const modbus_drive_map_t *map, const modbus_drive_timing_t *timing, unsigned drives);
 

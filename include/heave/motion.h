@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * motion.h - from commands to set-points: where the platform should be this cycle, limited, cylinder by cylinder.
+ * motion.h - calculates the set-points of each cycle from the commands, within the limits of every axis and cylinder.
  * Order: source (step, stream, timed move, path, stop) -> intensity -> ramps of the pose axes -> workspace -> inverse kinematics
  * -> take-over blend -> limiter of each cylinder. Nothing reaches an output except through a ramp (ramp.h). Owns no clock and no
  * I/O.
@@ -14,7 +14,7 @@
 #include "heave/settings.h"
 #include "heave/stream.h"
 
-/** What a target is given in. */
+/** Coordinates of a target. */
 typedef enum {
     MOTION_POSE,     /**< roll, pitch, yaw, x, y, z */
     MOTION_CYLINDERS /**< extensions */
@@ -30,13 +30,13 @@ typedef struct {
     bool is_timed;
 } motion_target_t;
 
-/** What held a cycle's motion back or is going on in it; flags may be combined. */
+/** What limited the motion of a cycle, or what is in progress; flags may be combined. */
 enum {
-    MOTION_CLAMPED = 1u << 0,      /**< the pose or an extension was asked for beyond its limits and pulled in */
+    MOTION_CLAMPED = 1u << 0,      /**< the requested pose or extension exceeds its limits and was pulled in */
     MOTION_SPEED = 1u << 1,        /**< a speed limit held it back */
     MOTION_ACCEL = 1u << 2,        /**< an acceleration limit did */
     MOTION_STRETCHED = 1u << 3,    /**< the running timed move takes longer than asked */
-    MOTION_TAKEOVER = 1u << 4,     /**< coming to a sender's first pose at engage speed */
+    MOTION_TAKEOVER = 1u << 4,     /**< moving to a sender's first pose at engage speed */
     MOTION_IN_CYLINDERS = 1u << 5, /**< moving in cylinder space: pose limits do not apply */
     MOTION_OFF_PATH = 1u << 6,     /**< a cylinder's limiter is not on its reference: pose limits do not hold exactly */
     MOTION_NO_POSE = 1u << 7       /**< no pose belongs to the extensions: the pose shown is the last one */
@@ -58,7 +58,7 @@ typedef struct motion motion_t;
  *  @return HV_OK; HV_ERR_RANGE where a setting is outside its range or neutral and settled positions are out of reach. */
 hv_status_t motion_init(motion_t *self, const settings_t *settings) HV_MUST_CHECK;
 
-/** At rest where the cylinders actually are: before the drives are enabled, and in an e-stop. */
+/** Sets the set-points to the actual positions, at rest. Before the drives are enabled, and in an e-stop. */
 void motion_place(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q32_t angle_deg_q32);
 
 /** Stops all axes together, as quickly as the limits allow, and stays there. */
@@ -67,14 +67,14 @@ void motion_stop(motion_t *self);
 /** Stops if moving, then goes to the settled extension, all cylinders together at engage speed. */
 void motion_settle(motion_t *self);
 
-/** Stops if moving, then rises to the neutral pose likewise. */
+/** Stops if moving, then rises to the neutral pose, all cylinders together at engage speed. */
 void motion_rise(motion_t *self);
 
-/** Follows targets from now on: the first one, once at rest, at engage speed. */
+/** Follows targets from now on. Moves to the first one from rest, at engage speed. */
 void motion_follow(motion_t *self);
 
 /** Takes a target while following (else it is ignored).
- *  @return HV_OK; HV_ERR_RANGE for extensions no pose belongs to, or one that the cylinders hardly hold (KIN_MARGIN_LEAST_Q32):
+ *  @return HV_OK; HV_ERR_RANGE for extensions that no pose has, or only one near a singularity (KIN_MARGIN_LEAST_Q32):
  *          nothing changes. */
 hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_t now_us) HV_MUST_CHECK;
 
@@ -87,11 +87,11 @@ bool motion_is_done(const motion_t *self);
 /** True when every set-point rests. */
 bool motion_is_at_rest(const motion_t *self);
 
-/** Where the rotation motor was last asked to go; where a stop ends once one has begun. deg */
+/** Target of the rotation motor, or the end of a stop that has begun. deg */
 q32_t motion_angle_target(const motion_t *self);
 
-/** How much of a sender's motion is made, about the neutral pose or the neutral extensions; the rotation motor is not scaled.
- *  While a sender is followed it changes by a ramp, else at once, which moves nothing.
+/** Scales a sender's motion about the neutral pose or the neutral extensions; the rotation motor is not scaled.
+ *  Changes by a ramp while a sender is followed, else at once, which moves nothing.
  *  @return HV_OK; HV_ERR_RANGE above intensity_max_percent: nothing changes */
 hv_status_t motion_set_intensity(motion_t *self, unsigned percent) HV_MUST_CHECK;
 
@@ -104,8 +104,8 @@ uint64_t motion_timed_end_us(const motion_t *self);
 /** Timed moves that had to be stretched since the start. */
 uint32_t motion_stretched_count(const motion_t *self);
 
-/** Stops, since the start, because extensions given one by one led to where the cylinders would not hold the plate: the platform
- *  stops before that and goes to the next target that it can hold, at engage speed. */
+/** Number of stops since the start in front of a singularity, on the way from one set of extensions to another. The platform then
+ *  moves to the next allowed target at engage speed. */
 uint32_t motion_singular_stops(const motion_t *self);
 
 /** Extensions at which people board. */
@@ -114,10 +114,10 @@ const q32_t *motion_settled_extension(const motion_t *self);
 /** The mechanism, for feedback. */
 const kin_t *motion_kin(const motion_t *self);
 
-/** Another factor of the gate in front of the stream (see gate.h): [0, GATE_FACTOR_MAX], 0 = off. */
+/** Sets the factor of the spike filter in front of the stream (gate.h): [0, GATE_FACTOR_MAX], 0 = off. */
 void motion_set_spike_gate(motion_t *self, uint32_t factor);
 
-/** The gate's state, for display. */
+/** State of the spike filter, for display. */
 const gate_t *motion_gate(const motion_t *self);
 
 /** The stream's state, for display. */

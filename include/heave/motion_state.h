@@ -10,24 +10,24 @@
 #include "heave/motion.h"
 #include "heave/profile.h"
 
-/** What moves the platform at the moment. */
+/** Present source of the motion. */
 typedef enum {
     MOTION_RESTING,  /**< nothing: it stays where it is */
     MOTION_STOPPING, /**< a controlled stop in cylinder space */
     MOTION_ON_PATH,  /**< an S-curve in cylinder space */
     MOTION_STREAMED, /**< following: a stream */
     MOTION_TIMED,    /**< following: a quintic (timed, or a step in motion) */
-    MOTION_HALTING,  /**< following: a stop, then the S-curve */
+    MOTION_HALTING,  /**< following: a stop, and the S-curve from where it ends, which may begin before that */
     MOTION_STRAIGHT  /**< following: a timed move or a step from rest along an S-curve */
 } motion_source_t;
 
-/** What the targets of a cycle ask to be planned; the newest one counts. */
+/** What has to be planned for the targets of a cycle; the newest one counts. */
 typedef enum { DUE_NOTHING, DUE_STEP, DUE_STREAM, DUE_TIMED } motion_due_t;
 
 /** What comes after a stop. */
 typedef enum { MOTION_THEN_REST, MOTION_THEN_PATH, MOTION_THEN_FOLLOW } motion_next_t;
 
-/** A straight way along an S-curve. */
+/** A straight move along an S-curve. */
 typedef struct {
     scurve_t path;
     q32_t from_q32[AXES_MAX];
@@ -35,7 +35,7 @@ typedef struct {
     history_t history[AXES_MAX];
 } motion_straight_t;
 
-/** What leads: one of these at a time. */
+/** The active plan: one of these at a time. */
 typedef union {
     quintic_t quintic;          /**< MOTION_TIMED */
     motion_straight_t straight; /**< MOTION_RESTING, MOTION_ON_PATH, MOTION_STRAIGHT; begun before a stop ends */
@@ -55,7 +55,7 @@ struct motion {
     bool is_axis_moved[AXES_MAX];       /**< the others stay at 0 */
     ramp_t axis[AXES_MAX];              /**< pose axes and the rotation motor */
     ramp_t cylinder[CYLINDERS_MAX];     /**< the limiter */
-    history_t reference[CYLINDERS_MAX]; /**< what the limiter was last asked for */
+    history_t reference[CYLINDERS_MAX]; /**< last reference of the limiter */
     pose_t pose;                        /**< last pose sent; where forward kinematics starts */
     bool is_pose_stale;                 /**< the extensions were placed: the pose has to be found even at rest */
 
@@ -67,32 +67,33 @@ struct motion {
     gate_t gate;
     motion_target_t withheld; /**< what the gate holds back */
     motion_plan_t plan;
-    halt_t halt; /**< a stop that is under way, or tried */
+    halt_t halt; /**< a stop in progress, or being planned */
 
     motion_due_t due;
-    bool is_space_new;                          /**< the slots have to be found from the cylinders first */
+    bool is_space_new;                          /**< the values of the slots have to be calculated from the cylinders first */
     q32_t slot_q32[AXES_MAX];                   /**< the newest target, before intensity */
-    q32_t goal_q32[AXES_MAX];                   /**< where it was planned to lead: with intensity, inside the limits */
+    q32_t goal_q32[AXES_MAX];                   /**< planned end: with intensity, within the limits */
     q32_t slot_extension_mm_q32[CYLINDERS_MAX]; /**< and its extensions */
     int64_t asked_cycles;                       /**< of a timed target */
-    unsigned planned_slots;                     /**< the first so many go along the plan, the others by themselves */
-    history_t led[AXES_MAX];                    /**< the slots' last references, before fading in */
+    unsigned planned_slots;                     /**< number of slots that follow the plan; the others move by themselves */
+    history_t
+        led[AXES_MAX]; /**< last references of the slots (pose axes or cylinders, then the rotation motor), before blending */
 
     bool is_following;
-    bool is_taking_over; /**< a sender is being faded in, or will be with its first target */
+    bool is_taking_over; /**< a sender is being blended in, or will be with its first target */
     bool is_fading;
     fade_t fade;
 
-    bool has_pending; /**< a target that waits for the end of a stop */
+    bool has_pending; /**< pending is a target that waits for the end of a stop */
     motion_target_t pending;
     q32_t angle_target_deg_q32;
     uint64_t last_us;        /**< arrival of the last target */
-    uint32_t last_stated_us; /**< the period it stated, 0 = none */
-    uint32_t last_gap_us;    /**< interval before it, where it stated a period; else 0 */
+    uint32_t last_stated_us; /**< period that it stated, 0 = none */
+    uint32_t last_gap_us;    /**< interval before it if it stated a period; else 0 */
     uint64_t timed_end_us;
-    int64_t timed_share_q46;       /**< intensity that the planned move is planned with */
-    q32_t timed_way_q32[AXES_MAX]; /**< from neutral to where the sender wants it, before intensity */
-    int64_t straight_cycles;       /**< left for the straight part of a move that begins with a stop */
+    int64_t timed_share_q46;       /**< intensity used for planning the move */
+    q32_t timed_way_q32[AXES_MAX]; /**< from neutral to the target of the sender, before intensity */
+    int64_t straight_after;        /**< cycles of the stop before the S-curve begins */
     bool is_stretched;
     bool is_clamped;           /**< the last target was pulled in */
     uint8_t limiting_cylinder; /**< by this cylinder, 0 where none bounds it */

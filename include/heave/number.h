@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * number.h - decimal text to Q16.16, correctly rounded, fed a byte at a time.
- * Accepts what senders print for a single-precision float (sign, digits, point, exponent); refuses nan, inf, hex, blanks inside.
+ * Accepts the usual text of a single-precision float (sign, digits, point, exponent); refuses nan, inf, hex, blanks inside.
  * Pure state machine: no locale, no allocation, bounded time per byte, any digit count and any exponent.
  */
 #ifndef HEAVE_NUMBER_H

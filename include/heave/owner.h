@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * owner.h - one driver at a time: which sender's frames the platform follows.
- * The protocol has no log-in, so the address tells senders apart (not the port: a program that starts again has another one).
- * The first sender of a valid frame drives. Another one takes over when that one has been silent for long enough, or at once
- * where a list of priorities puts it in front. Pure: time and settings are arguments; one caller at a time.
+ * owner.h - decides which sender's frames the platform follows: one sender at a time.
+ * The protocol has no log-in, so senders are identified by their address (not by the port: it changes when a program restarts).
+ * The first sender of a valid frame drives. Another sender takes over when the driving one has been silent for long enough, or at
+ * once if it has a higher priority. Pure: time and settings are arguments; one caller at a time.
  */
 #ifndef HEAVE_OWNER_H
 #define HEAVE_OWNER_H
@@ -16,17 +16,17 @@ typedef struct {
     uint64_t last_us;    /**< its last valid frame */
 } owner_t;
 
-/** What becomes of a frame. */
+/** Decision about a frame. */
 typedef enum {
-    OWNER_DRIVES, /**< of the sender that drives, or the first one */
-    OWNER_NEW,    /**< of one that takes over now: go to its pose at engage speed */
-    OWNER_OTHER   /**< of one that does not drive: count it, follow it in nothing */
+    OWNER_DRIVES, /**< from the driving sender, or the first one */
+    OWNER_NEW,    /**< from a sender that takes over now: move to its pose at engage speed */
+    OWNER_OTHER   /**< from another sender: count it, do not follow it */
 } owner_verdict_t;
 
-/** Judges a valid frame and keeps who drives.
- *  @param silence_us after which another sender may take over; 0: nobody owns the platform, every frame is followed
- *  @param priority   senders that need not wait for those behind them, or not in it
- *  @param busy_until_us end of the timed move that was asked for: its sender is not silent before that */
+/** Decides about a valid frame and records who drives.
+ *  @param silence_us silence after which another sender may take over; 0: every frame is followed
+ *  @param priority   senders in order of priority: each takes over at once from later ones and from those not in the list
+ *  @param busy_until_us end of the requested timed move: until then its sender does not count as silent */
 owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t silence_us, const hal_udp_networks_t *priority,
                             uint64_t busy_until_us, uint64_t now_us);
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * profile.h - moves planned as a whole: quintics (timed moves) and integer-count S-curves (moves from rest).
+ * profile.h - planned moves: quintic polynomials (timed moves) and S-curves in whole cycles (moves from rest).
  * All axes of a move share one duration, so they start and end together. Integer only; no clock.
  */
 #ifndef HEAVE_PROFILE_H
@@ -8,7 +8,7 @@
 #include "heave/axes.h"
 #include "heave/ramp.h"
 
-/** The last emitted reference; turns positions into references with backward differences. */
+/** The last reference. Used to calculate the backward differences of the next one. */
 typedef ramp_state_t history_t;
 
 /** The reference for the next position; the history then ends in it. */
@@ -38,9 +38,9 @@ typedef struct {
 hv_status_t quintic_plan(quintic_t *self, unsigned axes, const ramp_state_t *start, const q32_t *target_q32,
                          int64_t cycles) HV_MUST_CHECK;
 
-/** Adds to an axis the motion that goes on from a state while its acceleration fades to 0 over the quintic's cycles. For checks:
- *  such a quintic is not to be stepped.
- *  @param sign 1; -1 takes it off again, exactly */
+/** Adds to an axis the motion that continues from a state while its acceleration fades to 0 over the quintic's cycles. For checks
+ *  only: do not step such a quintic.
+ *  @param sign 1; -1 removes it again, exactly */
 void quintic_add_motion(quintic_t *self, unsigned axis, const ramp_state_t *from, int sign);
 
 /** True if every axis stays within its limits (checked at 33 points with 1/64 to spare). */
@@ -79,10 +79,10 @@ void path_limits_narrow(path_limits_t *self, q32_t distance_q32, const ramp_limi
 /** Plans the shortest move within the limits that takes at least so many cycles. */
 void scurve_plan(scurve_t *self, const path_limits_t *limits, int64_t least_cycles);
 
-/** Goes on by one cycle. */
+/** Advances one cycle. */
 void scurve_step(scurve_t *self);
 
-/** Where the path is between two values. */
+/** The present position of the path between two values. */
 q32_t scurve_between(const scurve_t *self, q32_t from_q32, q32_t to_q32);
 
 static inline int64_t scurve_cycles(const scurve_t *self)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * ramp.h - the jerk-limited ramp of one axis: follows a reference, never exceeds speed, acceleration, jerk or the position
- * bounds. The only thing in the core that moves a set-point. All state is exact integer sums in Q32 per cycle^k, so finite
- * differences of the set-points ARE the limited values. Owns no clock and no I/O; instances are independent.
+ * ramp.h - the jerk-limited ramp of one axis: follows a reference and never exceeds speed, acceleration, jerk or position bounds.
+ * Only ramps move set-points. All state consists of exact integer sums in Q32 per cycle^k, so the limits hold exactly for the
+ * finite differences of the set-points. Owns no clock and no I/O; instances are independent.
  */
 #ifndef HEAVE_RAMP_H
 #define HEAVE_RAMP_H
@@ -38,7 +38,7 @@ typedef struct {
 #define RAMP_CYCLE_MIN_US 500u
 #define RAMP_CYCLE_MAX_US 10000u
 
-/** How sharply the boundary layer follows; see ramp.c. */
+/** How sharply the ramp follows near the reference; see ramp.c. */
 typedef enum {
     RAMP_SOFT, /**< streams: bandwidth 1/16 per cycle, filters the noise of reconstructed samples */
     RAMP_FIRM  /**< steps, timed moves, cylinders: bandwidth 1/4 per cycle */
@@ -47,8 +47,8 @@ typedef enum {
 /** What limited a cycle; flags may be combined. */
 enum {
     RAMP_CLAMPED = 1u, /**< the reference is outside the position bounds */
-    RAMP_SPEED = 2u,   /**< the speed limit held the ramp back */
-    RAMP_ACCEL = 4u,   /**< the acceleration limit did */
+    RAMP_SPEED = 2u,   /**< the speed limit slowed the ramp */
+    RAMP_ACCEL = 4u,   /**< the acceleration limit slowed the ramp */
     RAMP_BOUND = 8u    /**< the ramp braked because of a position bound */
 };
 
@@ -61,10 +61,10 @@ typedef struct {
     int64_t per_jerk_q62;  /**< 1 / jerk */
     int64_t per_acc_q62;   /**< 1 / acc_safe */
     q32_t brake_reach_q32; /**< no brake from within the limits is longer, u */
-    q32_t ref_jerk_q32;    /**< what references have lately used of the jerk: the largest, fading, u/cycle^3 */
-    q32_t ref_acc_q32;     /**< and of the acceleration, u/cycle^2 */
-    uint32_t brake_cycles; /**< no brake goes further than so many cycles at its highest speed; 0: not told */
-    unsigned flags;        /**< of the last step: RAMP_CLAMPED ... */
+    q32_t ref_jerk_q32;    /**< largest recent jerk of the references, decaying, u/cycle^3 */
+    q32_t ref_acc_q32;     /**< largest recent acceleration of the references, decaying, u/cycle^2 */
+    uint32_t brake_cycles; /**< upper bound of a braking distance in cycles at its highest speed; 0: unknown */
+    unsigned flags;        /**< flags of the last step: RAMP_CLAMPED ... */
 } ramp_t;
 
 /** Converts limits from units to cycles.
@@ -79,11 +79,11 @@ hv_status_t ramp_limits_from_units(q16_t pos_min_q16, q16_t pos_max_q16, q16_t s
 q32_t ramp_safe_acceleration(const ramp_limits_t *limits);
 
 /** Starts at rest.
- *  @param pos_q32 within the bounds (else the ramp comes in from outside: allowed, at limited speed, never further out)
+ *  @param pos_q32 within the bounds. From outside, the ramp moves in at limited speed and never further out
  *  @return HV_OK; HV_ERR_RANGE where limits make no sense. */
 hv_status_t ramp_init(ramp_t *self, const ramp_limits_t *limits, q32_t pos_q32) HV_MUST_CHECK;
 
-/** Takes a state over as it is: the ramp goes on from there (clipped into the limits). */
+/** Continues from a given state, clipped to the limits. */
 void ramp_take_over(ramp_t *self, const ramp_state_t *state);
 
 /** Advances one cycle towards the reference. Constant time.

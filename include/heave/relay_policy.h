@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * relay_policy.h - what relays bear: how long one may stay closed, and how soon one may change again.
- * Between what is asked of the relays and what is written to them. Plain data, no clock, no I/O; one thread.
+ * relay_policy.h - limits how long a relay may stay closed, and how soon it may change again.
+ * Stands between the requested mask and the written one. Plain data, no clock, no I/O; one thread.
  */
 #ifndef HEAVE_RELAY_POLICY_H
 #define HEAVE_RELAY_POLICY_H
@@ -11,19 +11,19 @@
 typedef struct {
     uint16_t mask;        /**< as last allowed */
     uint16_t changed;     /**< bits whose changed_us is valid */
-    uint16_t cut;         /**< bits that were closed for too long, and whose sender has not asked for open since */
-    uint16_t delayed;     /**< bits that wait for min_toggle_ms */
-    uint32_t cut_count;   /**< times that a relay was opened because of max_on_ms; wraps */
-    uint32_t delay_count; /**< changes that had to wait for min_toggle_ms, or came to nothing in that time; wraps */
+    uint16_t cut;         /**< relays that were opened after max_on_ms and that the sender has not opened since */
+    uint16_t delayed;     /**< relays that wait for min_toggle_ms */
+    uint32_t cut_count;   /**< relays opened because of max_on_ms; wraps */
+    uint32_t delay_count; /**< changes that waited for min_toggle_ms, or were withdrawn in that time; wraps */
     uint64_t changed_us[HAL_RELAYS_MAX];
 } relay_policy_t;
 
-/** What may be written in this cycle.
- *  A relay that has been closed for max_on_ms opens, and stays open until it has been asked to be open. One that has
- *  changed stays so for min_toggle_ms; what is asked for at the end of that time is what it does then.
- *  @param settings  which there are, and what they bear
+/** The mask to write in this cycle.
+ *  A relay that has been closed for max_on_ms opens, and stays open until the sender has requested open once. A relay that has
+ *  changed keeps its state for min_toggle_ms and then takes the state requested at that time.
+ *  @param settings  number of relays, and their limits
  *  @param asked     bit n = relay n + 1; bits without a relay are left out
- *  @param is_safe   asked is the safe mask: nothing delays it
+ *  @param is_safe   asked is the safe mask, which is never delayed
  *  @return the mask */
 uint16_t relay_policy_step(relay_policy_t *self, const relay_settings_t *settings, uint16_t asked, bool is_safe, uint64_t now_us);
 

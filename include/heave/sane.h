@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT
- * sane.h - whether what was loaded from a file may be used: a file is written by anybody, and a byte that no program of ours
- * writes must not become an index, a divisor or a bool. Each module judges its own members; gateway_resume() asks them all. Pure.
+ * sane.h - checks of data that was loaded from a file. Anybody may have written the file, so no value of it may become an index,
+ * a divisor or a bool without a check. Each module checks its own members; gateway_resume() calls all checks. Pure.
  */
 #ifndef HEAVE_SANE_H
 #define HEAVE_SANE_H
 
 #include "heave/fx.h"
 
-#define SANE_Q32_MAX  ((q32_t)1 << 53) /**< 2 km, 2,000,000 deg: more than any axis has; many of them can be added */
+#define SANE_Q32_MAX  ((q32_t)1 << 53) /**< 2 km, 2,000,000 deg: more than any axis has, and small enough to add many of them */
 #define SANE_TIME_MAX (UINT64_MAX >> 2)
 
 /** True for a bool that holds 0 or 1; read as a byte, since any other value of a bool is undefined. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * sdo.h - SDO client for one CANopen node (CiA 301): reads and writes one object at a time, expedited or in segments.
- * Owns no bus and no clock: frames and times are arguments. Late answers and repeated frames are dropped; a transfer that gets no
- * answer is aborted, left alone for one time-out, and tried again. Nothing blocks.
+ * Owns no bus and no clock: frames and times are arguments. Drops late answers and repeated frames. A transfer without an answer
+ * is aborted, and repeated after a pause of one time-out. Nothing blocks.
  */
 #ifndef HEAVE_SDO_H
 #define HEAVE_SDO_H
@@ -19,7 +19,7 @@ typedef enum {
     SDO_SILENT   /**< no answer to any attempt */
 } sdo_state_t;
 
-/** What is awaited; private. */
+/** Expected answer; private. */
 typedef enum { SDO_AWAIT_INITIATE, SDO_AWAIT_SEGMENT, SDO_AWAIT_QUIET } sdo_await_t;
 
 /** A client; read state, abort_code, value and size, the rest is private. */
@@ -47,27 +47,27 @@ typedef struct {
  *  @param timeout_us for each answer */
 void sdo_init(sdo_t *self, uint8_t node, uint32_t timeout_us);
 
-/** Begins to read an object; gives up what is under way.
+/** Begins to read an object; cancels the present transfer.
  *  @param tries at least 1 */
 void sdo_read(sdo_t *self, uint16_t index, uint8_t sub, uint8_t tries);
 
-/** Begins to write an object; gives up what is under way.
+/** Begins to write an object; cancels the present transfer.
  *  @param value copied, least significant byte first
  *  @param size  [1, SDO_BYTES_MAX]: the exact size of the object */
 void sdo_write(sdo_t *self, uint16_t index, uint8_t sub, const uint8_t *value, uint8_t size, uint8_t tries);
 
-/** Gives up what is under way, without a word to the node. */
+/** Cancels the present transfer without telling the node. */
 void sdo_cancel(sdo_t *self);
 
-/** Takes a frame with the identifier 580h + node in. */
+/** Processes a received frame with the identifier 580h + node. */
 void sdo_receive(sdo_t *self, const can_frame_t *frame);
 
-/** Watches the time-out.
+/** Checks the time-out and returns the next frame to send.
  *  @param out the frame to send now
- *  @return true where there is one; call sdo_sent() once the bus has taken it, else it is offered again */
+ *  @return true if there is one. Call sdo_sent() when the bus has accepted it; otherwise it is returned again */
 bool sdo_step(sdo_t *self, uint64_t now_us, can_frame_t *out);
 
-/** The frame of sdo_step() is on its way: its answer is awaited from now on. */
+/** Reports that the frame of sdo_step() was sent: the time-out of its answer starts. */
 void sdo_sent(sdo_t *self, uint64_t now_us);
 
 /** The value read, as an unsigned number of up to four bytes. */

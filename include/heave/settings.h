@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * settings.h - everything the core needs to know about one platform: plain data, filled once before the start.
- * Ranges are checked where the values enter (the configuration file, or a port's own table) and again by each module's init.
+ * settings.h - all settings of one platform that the core needs: plain data, filled once before the start.
+ * Ranges are checked where the values are entered (configuration file, or a port's own table) and again by each module's init.
  */
 #ifndef HEAVE_SETTINGS_H
 #define HEAVE_SETTINGS_H
@@ -19,7 +19,7 @@ typedef enum {
     ENGAGE_AUTO    /**< by itself, once after the start */
 } engage_policy_t;
 
-/** How the rotation motor takes an angle. */
+/** How an angle of the rotation motor is interpreted. */
 typedef enum {
     ANGLE_AS_SENT, /**< the number as it is, several turns allowed */
     ANGLE_SHORTEST /**< modulo one turn, the shorter way round */
@@ -37,7 +37,7 @@ typedef struct {
     int32_t jerk;     /**< u/s^3, whole units, above 0 */
 } axis_settings_t;
 
-/** What relays there are, and what they bear: see relay_policy.h. */
+/** Number and limits of the relays: see relay_policy.h. */
 typedef struct {
     uint8_t count;                          /**< [0, 12] */
     uint32_t max_on_ms[HAL_RELAYS_MAX];     /**< 0 = none */
@@ -59,38 +59,39 @@ typedef struct {
     bool has_angle;
     angle_wrap_t angle_wrap;
     stream_style_t stream_style;
-    uint32_t delay_max_ms; /**< [0, 1000]: what the delay of a stream may grow to where its samples come late */
+    uint32_t delay_max_ms; /**< [0, 1000]: upper limit of a stream's delay when its samples come late */
     uint32_t spike_gate;   /**< [0, GATE_FACTOR_MAX] times accel_q16 of an axis; 0 = off */
 
     q16_t cylinder_speed_mm_s_q16;
     q16_t cylinder_accel_mm_s2_q16;
     int32_t cylinder_jerk_mm_s3;
-    q16_t following_error_mm_q16; /**< a cylinder further from its set-point, for 20 ms, is a fault; 0 = not watched */
+    q16_t following_error_mm_q16; /**< fault if a cylinder is further from its set-point for 20 ms; 0 = off */
     q16_t margin_mm_q16;          /**< kept free at both ends of the stroke */
 
     q16_t engage_speed_mm_s_q16;
     q16_t engage_accel_mm_s2_q16;
-    uint32_t blend_ms; /**< [250, 20000]: least time in which a sender is faded in */
+    uint32_t blend_ms; /**< [250, 20000]: shortest time for blending a sender in */
 
     int32_t intensity_start_percent; /**< [0, max] of a sender's motion about neutral */
     uint32_t intensity_max_percent;  /**< [1, 100] */
     uint32_t intensity_ramp_ms;      /**< [500, 10000]: from 0 to 100 % */
 
     frame_dialect_t dialect;
-    q16_t confirm_jump_mm_q16;   /**< targets further than that from the last one wait for a second frame; 0 = none do */
-    q16_t confirm_jump_deg_q16;  /**< the same of rotations and the rotation motor */
-    uint32_t takeover_ms;        /**< silence of the sender that drives, after which another may; 0: all are heard */
-    hal_udp_networks_t priority; /**< senders that need not wait, the first one in front */
-    uint32_t silence_hold_ms;    /**< 0 = never, as the two below; after the last valid frame or the end of its timed move */
+    q16_t confirm_jump_mm_q16;  /**< targets further than this from the last one wait for a second frame; 0 = off */
+    q16_t confirm_jump_deg_q16; /**< the same of rotations and the rotation motor */
+    uint32_t takeover_ms; /**< silence of the driving sender after which another one may take over; 0: all senders are followed */
+    hal_udp_networks_t priority; /**< senders that take over at once, the highest priority first */
+    uint32_t
+        silence_hold_ms; /**< counted from the last valid frame or the end of its timed move; 0 = never, also of the next two */
     uint32_t silence_neutral_ms;
     uint32_t silence_settle_ms;
 
     relay_settings_t relays;
     uint16_t relay_safe_mask;
-    uint32_t relay_safe_after_ms; /**< of a hold that interrupted a ride; in every other state at once */
+    uint32_t relay_safe_after_ms; /**< in a hold that interrupted a ride; in every other state the mask applies at once */
 
     healthy_settings_t healthy;
-    uint32_t power_settle_ms; /**< not settled so long after the supply began to fail: a fault; 0 = never */
+    uint32_t power_settle_ms; /**< fault if not settled within this time after the supply began to fail; 0 = never */
 } settings_t;
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * status.h - the one result type of every function that can fail, and the assertion for programmer errors.
- * Zero is success, negatives are errors; positive values stay free for counts. Device codes never travel here.
+ * Zero is success, negatives are errors; positive values stay free for counts. Device codes are never returned this way.
  */
 #ifndef HEAVE_STATUS_H
 #define HEAVE_STATUS_H
@@ -37,34 +37,33 @@ typedef enum {
 #define HV_WRAPS
 #endif
 
-/** A condition that hardly ever holds: the way without it is kept short. */
+/** A condition that is rarely true: the compiler keeps the other path short. */
 #if defined(__GNUC__)
 #define HV_RARELY(condition) (__builtin_expect((condition), 0) != 0)
 #else
 #define HV_RARELY(condition) (condition)
 #endif
 
-/** A function that is hardly ever called, kept out of its callers: they need not save registers for it. */
+/** A function that is rarely called. It is not inlined, so that callers need not save registers for it. */
 #if defined(__GNUC__)
 #define HV_OUT_OF_LINE __attribute__((noinline))
 #else
 #define HV_OUT_OF_LINE
 #endif
 
-/** A processor whose long products are calls: code made for size has none of its own in its inner loops. */
+/** A processor on which long products are function calls: inner loops are not flattened there. */
 #if defined(__ARM_ARCH_ISA_THUMB) && __ARM_ARCH_ISA_THUMB == 1
 #define HV_LONG_PRODUCTS_ARE_CALLS
 #endif
 
-/** A function that all it calls becomes a part of, also where code is made for size: an inner loop. */
+/** An inner loop: everything that the function calls is inlined, also when optimising for size. */
 #if defined(__GNUC__) && !defined(HV_LONG_PRODUCTS_ARE_CALLS)
 #define HV_INNER_LOOP __attribute__((flatten))
 #else
 #define HV_INNER_LOOP
 #endif
 
-/** A function whose variables are apart from its callers', where memory is short: they take no room on the stack while its
- * callers call others. */
+/** A function that is not inlined when optimising for size, so that its variables use the stack only while it runs. */
 #if defined(__GNUC__) && defined(__OPTIMIZE_SIZE__)
 #define HV_OWN_FRAME __attribute__((noinline))
 #else
@@ -74,7 +73,7 @@ typedef enum {
 /** Called when an HV_ASSERT fails: supplied by the program (hosted: print and abort; firmware: fail silent). Never returns. */
 void hv_assert_failed(const char *file, int line);
 
-/** Programmer errors only; what the outside can cause is an hv_status_t. */
+/** For programmer errors only. Errors that input can cause are an hv_status_t. */
 #define HV_ASSERT(condition) ((condition) ? (void)0 : hv_assert_failed(__FILE__, __LINE__))
 
 #endif

@@ -1,32 +1,33 @@
 /* SPDX-License-Identifier: MIT
- * stream.h - rebuilds a sender's motion from the samples it streams: time line from arrivals, curve through the samples, less of
- * it where the limits do not allow all. Owns no clock. One owner; not re-entrant per instance.
+ * stream.h - reconstructs a sender's motion from the samples of its stream: estimates its time line from the arrivals,
+ * interpolates the samples, and smooths the result if it exceeds the limits. Owns no clock. One owner; not re-entrant per
+ * instance.
  *
- * Time line: a straight line through the arrivals. A sample belongs to its own point of the line (the sender's values are even,
- * the network or a timer made it late), or to the time when it came (a game that samples when it sends), or to a time between:
- * its values tell, see stream_evidence.h. A late sample and a lost one are told from each other by their values too.
+ * Time line: a straight line through the arrivals. A sample belongs to its point on the line if the sender samples regularly and
+ * the network or a timer delayed it. It belongs to its arrival if the sender samples when it sends, as games do. Or it belongs to
+ * a time in between. The values decide, see stream_evidence.h. They also distinguish a late sample from a lost one.
  *
- * Delay: a sample is met 2 periods (smooth) or 1.32 (balanced) after its time, and a margin later: the lateness of the latest
- * samples of the last seconds, 0.5 ms at least, so much at most that the delay stays below stream_set_delay_max(). The margin
- * rises at once and falls slowly; the curve is rendered up to 10 % slower or faster until it has the wished delay.
+ * Delay: the curve reaches a sample 2 periods (smooth) or 1.32 periods (balanced) after its time, plus a margin. The margin is
+ * the largest lateness in the last seconds, at least 0.5 ms, and limited so that the delay stays below stream_set_delay_max(). It
+ * rises at once and falls slowly. The curve is played up to 10 % slower or faster until it has the desired delay.
  *
- * Limits: governor.h. What the limits of axes and cylinders do not allow is smoothed, all axes alike.
+ * Limits: governor.h smooths what exceeds the limits of axes and cylinders, equally for all axes.
  *
- * Coarse values, whose rounding would ask for more than the axes can do, are smoothed: a mean of up to 16 points, taken
- * thrice, 1.5 periods later for each point of it but the first.
+ * Coarse values: if the rounding steps of the values exceed what the axes can do, they are smoothed by a mean of up to
+ * STREAM_WINDOW_MAX points, applied three times. Each point after the first adds 1.5 periods of delay.
  *
- * Losses: where a point is missing when the curve needs it, the motion goes on, by the last step and its bend (not a jump: at
- * most 4 x the larger of the two steps before), and slows down as the quickest stop of the axis does (a slow motion in 100 ms,
- * over 50 ms of its way). When samples are back, or after 150 ms without, the curve comes back to the samples, or to the last
- * one, softly: position and velocity of the control points go on as they were. So an ended stream rests exactly on its last
- * sample, within 2 s, or 24 periods of a slow one. A stream that is known may be away for a second and goes on; a new rate gives
- * a new grid, on which the curve goes on.
+ * Losses: if a point is missing when the curve needs it, the motion is extrapolated with the last step and its curvature (at most
+ * 4 times the larger of the two steps before) and slows down like the quickest stop of the axis (a slow motion in 100 ms, over
+ * 50 ms of travel). When samples return, or after 150 ms without any, the curve returns softly to the samples or to the last one:
+ * position and velocity of the control points are continuous. So a stream that has ended comes to rest exactly on its last
+ * sample, within 2 s, or within 24 periods of a slow stream. A known stream may pause for a second and continues. A new rate
+ * gives a new grid, on which the curve continues.
  *
- * Repeats: a sender that sends each value up to 8 times (a loop beside a slower game) is followed at the rate of its values, once
- * some 12 of them have told. The newest values again within three quarters of a period are no sample.
+ * Repeats: a sender may send each value up to 8 times, such as a loop beside a slower game. After about 12 values it is followed
+ * at the rate of its values. A repetition of the newest values within three quarters of a period is not a sample.
  *
- * Hints: a sender that states its period may be slower, and tells from its second sample on what is late and what is lost. The
- * margin is then an eighth of the period at least, as a guess at so slow a stream is poor.
+ * Hints: a sender that states its period may be slower, and late and lost samples are known from its second sample on. The margin
+ * is then at least an eighth of the period, because extrapolation of such a slow stream is poor.
  */
 #ifndef HEAVE_STREAM_H
 #define HEAVE_STREAM_H
@@ -38,20 +39,20 @@
 /** How a stream is rendered: both by a cubic B-spline, with continuous acceleration. */
 typedef enum {
     STREAM_SMOOTH,  /**< the samples are its control points: 2 periods + margin late */
-    STREAM_BALANCED /**< control points are led 0.68 periods ahead: 1.32 periods + margin late */
+    STREAM_BALANCED /**< control points are extrapolated by 0.68 periods: 1.32 periods + margin late */
 } stream_style_t;
 
-#define STREAM_PERIOD_MIN_US 4000u   /**< fastest stream followed: 250 Hz; of what comes faster every so manyth sample is taken */
-#define STREAM_PERIOD_MAX_US 150000u /**< slowest: 6.7 Hz; samples further apart are steps, but for hints */
-#define STREAM_HINT_MIN_US   50000u  /**< a hint of less says nothing: senders' timers step by up to 16 ms */
+#define STREAM_PERIOD_MIN_US 4000u   /**< fastest stream: 250 Hz; of a faster one, every second, third, ... sample is used */
+#define STREAM_PERIOD_MAX_US 150000u /**< slowest without a hint: 6.7 Hz; samples further apart are steps */
+#define STREAM_HINT_MIN_US   50000u  /**< a shorter hint is ignored: timers of senders have steps of up to 16 ms */
 #define STREAM_HINT_MAX_US   500000u /**< slowest with a hint: 2 Hz */
 
 enum {
     STREAM_GAPS = 24,       /**< intervals that are watched for another rate */
     STREAM_POINTS = 64,     /**< ring of points, a power of 2 */
-    STREAM_EVIDENCE = 5,    /**< samples that one of them is told from */
+    STREAM_EVIDENCE = 5,    /**< samples for a decision about one of them */
     STREAM_WINDOW_MAX = 10, /**< points in the longest mean of coarse values; the ring has room for three of them */
-    STREAM_WEIGHTS = 3 * STREAM_WINDOW_MAX - 2 /**< points that a control point is made from then */
+    STREAM_WEIGHTS = 3 * STREAM_WINDOW_MAX - 2 /**< points of a control point in that case */
 };
 
 /** The sender's time line; members are private to src/motion. */
@@ -59,41 +60,41 @@ typedef struct {
     uint64_t last_us;                  /**< arrival of the newest sample */
     int64_t late_us_q16;               /**< that arrival against the time line */
     int64_t period_us_q16;             /**< 0 while unknown */
-    int64_t jitter_us_q16;             /**< lateness of the latest samples lately */
-    int64_t margin_us_q16;             /**< how long a sample is waited for beyond its time */
+    int64_t jitter_us_q16;             /**< recent lateness of the latest samples */
+    int64_t margin_us_q16;             /**< waiting time for a sample beyond its time */
     int64_t per_us_q46;                /**< 1 / period: periods per us, Q46 */
     uint32_t gap_us[STREAM_GAPS];      /**< newest intervals, a ring */
-    uint16_t gap_periods[STREAM_GAPS]; /**< periods each was taken for */
+    uint16_t gap_periods[STREAM_GAPS]; /**< number of periods of each interval */
     unsigned gap_next;
     unsigned gaps;         /**< intervals in the ring that belong to the present rate */
-    unsigned settled;      /**< samples that the line is found from */
+    unsigned settled;      /**< samples used for the line */
     uint32_t hint_us;      /**< the period the sender states, 0 = none */
-    uint32_t delay_max_us; /**< that the margin may make of the delay */
-    unsigned memory;       /**< samples that the line may be found from */
+    uint32_t delay_max_us; /**< upper limit of the delay, margin included */
+    unsigned memory;       /**< most samples that the line may use */
     int64_t drift_us_q16;  /**< mean lateness of the newest samples */
-    int64_t rough_us_q16;  /**< largest change of the lateness between two samples lately */
+    int64_t rough_us_q16;  /**< largest recent change of the lateness between two samples */
     unsigned counted;      /**< samples that losses are counted in */
     int32_t lost_q16;      /**< lost samples for each that came */
-    unsigned each;         /**< the sender has a sample for every so manyth period, for a while */
-    bool is_sparse;        /**< so many that each is waited for until the next one is here */
+    unsigned each;         /**< the sender sends one sample in so many periods, for a while */
+    bool is_sparse;        /**< so sparse that the curve waits for each sample until the next one is here */
     unsigned between;      /**< samples in a row that lay half-way between two of the line */
 } stream_clock_t;
 
-/** To which time a sender's samples belong, by what their values tell; members are private to src/motion. */
+/** Decides from the values to which time a sender's samples belong; members are private to src/motion. */
 typedef struct {
     q32_t value_q32[STREAM_EVIDENCE][AXES_MAX]; /**< the newest samples as they came, the newest first */
     q32_t late_q32[STREAM_EVIDENCE];            /**< lateness of each against the line, in periods */
-    q32_t shift_q32[STREAM_EVIDENCE];           /**< how much later than the line each was by its value */
+    q32_t shift_q32[STREAM_EVIDENCE];           /**< lateness of each against the line according to its value */
     int32_t index[STREAM_EVIDENCE];             /**< periods of each before the newest */
     unsigned count;
     unsigned axes;
-    int64_t told_q32;  /**< how far values are off their neighbours in the way that their lateness tells */
-    int64_t off_q32;   /**< how far values are off their neighbours in any way */
-    int64_t moved_q32; /**< how far they would be if they belonged to their arrivals */
+    int64_t told_q32;  /**< deviation from the neighbours that the lateness explains */
+    int64_t off_q32;   /**< total deviation from the neighbours */
+    int64_t moved_q32; /**< deviation if the samples belonged to their arrivals */
     q32_t weight_q32;  /**< [0, Q32_ONE]: 0 by the line, 1 by arrivals */
 } stream_evidence_t;
 
-/** How a motion goes on where samples are missing; private to src/motion. */
+/** Extrapolation where samples are missing; private to src/motion. */
 typedef struct {
     q32_t first_q32;   /**< in the first period */
     q32_t go_q32;      /**< in the later ones, if it did not fade */
@@ -102,9 +103,9 @@ typedef struct {
     int32_t full_q16;  /**< ... so many of them before it slows down */
 } stream_lead_t;
 
-/** What a sender's values are multiples of, on one axis; private to src/motion. */
+/** Resolution of a sender's values on one axis; private to src/motion. */
 typedef struct {
-    q32_t grain_q32; /**< 0: nothing, or nothing that could be told from a smooth motion */
+    q32_t grain_q32; /**< 0: none, or too fine to distinguish from a smooth motion */
     q32_t found_q32; /**< of the steps since the watch began, 0 = there were none */
     q32_t step_q32;  /**< the newest step, of one period */
     bool is_up;      /**< the newest change of the step was upwards */
@@ -146,14 +147,14 @@ typedef struct {
     unsigned axes;
 } stream_curve_t;
 
-/** What a stream is doing. */
+/** Phase of a stream. */
 typedef enum {
     STREAM_EMPTY,  /**< no sample yet */
     STREAM_LONE,   /**< one sample: a step */
     STREAM_RUNNING /**< a curve */
 } stream_phase_t;
 
-/** Which samples of a sender are taken; members are private to src/motion. */
+/** Selection of samples from a stream that is too fast; members are private to src/motion. */
 typedef struct {
     uint64_t last_us;          /**< newest arrival, taken or not */
     uint32_t gaps_us;          /**< mean interval of arrivals, times 64 */
@@ -168,7 +169,7 @@ typedef struct {
 typedef struct {
     uint64_t began_us; /**< the first of these came */
     uint32_t run;      /**< equal samples so far */
-    uint32_t each;     /**< a value comes so many times; 1: the sender does not repeat them */
+    uint32_t each;     /**< repetitions of each value; 1: the sender does not repeat values */
     uint32_t frames;   /**< in the newest runs that were counted */
     uint32_t span_us;  /**< these took */
     uint32_t runs;     /**< these */
@@ -199,58 +200,57 @@ typedef struct {
     history_t previous[AXES_MAX];
 } stream_t;
 
-/** How a sender's samples come. */
+/** How a sender's samples arrive. */
 typedef enum {
     STREAM_SENDER_UNKNOWN, /**< no stream runs */
-    STREAM_SENDER_EVEN,    /**< its values are even in time; what lateness there is comes from the way here */
-    STREAM_SENDER_BURSTS,  /**< its values are even in time, and often two or more come at once */
-    STREAM_SENDER_ARRIVALS /**< its values belong to the times when they come: a program that takes them when it sends */
+    STREAM_SENDER_EVEN,    /**< its values are even in time; lateness comes from timers or the network */
+    STREAM_SENDER_BURSTS,  /**< its values are even in time, and often two or more arrive at once */
+    STREAM_SENDER_ARRIVALS /**< its values belong to the arrival times: the program samples when it sends */
 } stream_sender_t;
 
-/** What is known of the sender of a stream, and what its delay is made of, for display. */
+/** Properties of the sender of a stream, and the parts of the delay, for display. */
 typedef struct {
     stream_sender_t sender;
     uint32_t period_us;     /**< 0 while unknown */
     uint32_t jitter_us;     /**< how late the latest samples of the last seconds were */
     uint32_t lost_permille; /**< over the last 256 samples or so */
-    uint32_t delay_us;      /**< all of it; of that: */
-    uint32_t wait_us;       /**< for samples that come late */
-    uint32_t smoothing_us;  /**< as the limits do not allow all that is asked */
+    uint32_t delay_us;      /**< total; parts of it: */
+    uint32_t wait_us;       /**< waiting for late samples */
+    uint32_t smoothing_us;  /**< smoothing because of the limits */
 } stream_report_t;
 
 /** Starts without any sample.
  *  @param cycle_us [500, 10000]   @param axes 1 to AXES_MAX */
 void stream_init(stream_t *self, uint32_t cycle_us, unsigned axes, stream_style_t style);
 
-/** Tells the limits of an axis: where samples are missing, the motion goes no further than the axis takes to stop, or 36 ms; and
- * what asks for more is smoothed, but on the axes behind POSE_AXES. Kept by stream_reset(). */
+/** Sets the limits of an axis. Where samples are missing, the motion continues no longer than the axis takes to stop, or 36 ms.
+ * Samples that exceed the limits are smoothed, except on axes from POSE_AXES on. Kept by stream_reset(). */
 void stream_set_limits(stream_t *self, unsigned axis, const governor_limits_t *limits);
 
-/** Tells the limits of a cylinder [0, CYLINDERS_MAX) that poses lead to; jerk 0: it has none. Kept by stream_reset(). */
+/** Sets the limits of a cylinder [0, CYLINDERS_MAX); jerk 0: none. Kept by stream_reset(). */
 void stream_set_cylinder_limits(stream_t *self, unsigned cylinder, const governor_limits_t *limits);
 
-/** What the delay may grow to because samples come late; 0 (as after stream_init()): half a period beyond the curve's own. */
+/** Sets the upper limit of the delay for late samples; 0 (default): half a period more than the curve's own delay. */
 void stream_set_delay_max(stream_t *self, uint32_t delay_max_us);
 
-/** What the references will be multiplied by, [0, Q16_ONE]; Q16_ONE after stream_init(). */
+/** Sets the factor by which the caller will multiply the references, [0, Q16_ONE]; Q16_ONE after stream_init(). */
 void stream_set_scale(stream_t *self, int32_t scale_q16);
 
-/** Whether a curve that begins may jump onto its samples, as nobody sees it yet. */
+/** Allows a curve that begins to jump onto its samples, because it is not visible yet. */
 void stream_hide_start(stream_t *self, bool is_hidden);
 
-/** Where the axes are, for a curve that begins while they move. */
+/** Sets the state of the axes, for a curve that begins while they move. */
 void stream_place(stream_t *self, const history_t *now);
 
 /** Forgets the stream; the next sample starts a new one. */
 void stream_reset(stream_t *self);
 
-/** What the sender states as its period with the next sample, at most STREAM_HINT_MAX_US; 0 = nothing, as after stream_init().
- * With it, a stream may be slower than STREAM_PERIOD_MAX_US, and its second sample may be late. Without, a stream so slow is
- * over. */
+/** Sets the period that the sender states with the next sample, at most STREAM_HINT_MAX_US; 0 = none (default). With a hint, a
+ * stream may be slower than STREAM_PERIOD_MAX_US, and its second sample may be late. Without one, such a slow stream ends. */
 void stream_hint_period(stream_t *self, uint32_t period_us);
 
-/** True if a sample at now_us would be the next one of the stream that runs: it may be away for a second once 12 samples have
- *  come, else for STREAM_PERIOD_MAX_US, and for 3.5 periods. */
+/** True if a sample at now_us would continue the present stream. A stream of 12 samples or more may pause for a second; a shorter
+ * one for STREAM_PERIOD_MAX_US or 3.5 periods. */
 bool stream_goes_on(const stream_t *self, uint64_t now_us);
 
 /** Takes a sample. Bounded time.

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT
- * supervisor.h - the states of a platform and what may change them: one table, pure, no clock and no I/O.
- * The gateway turns what it sees into events and carries out the action a transition names. The table is in supervisor.c;
- * tools/gen_states.py draws the README's diagram from it. One caller at a time per instance; nothing blocks.
+ * supervisor.h - the state machine of a platform: one table, pure, no clock and no I/O.
+ * The gateway generates the events and carries out the action of each transition. The table is in supervisor.c;
+ * tools/gen_states.py draws the diagram in docs/operation.md from it. One caller at a time per instance; nothing blocks.
  */
 #ifndef HEAVE_SUPERVISOR_H
 #define HEAVE_SUPERVISOR_H
 
 #include "heave/status.h"
 
-/** States, in the trade's words. */
+/** States of a platform. */
 typedef enum {
     STATE_OFF,      /**< drives disabled */
     STATE_HOMING,   /**< drives come up, find their zero, go to the settled extension at engage speed */
@@ -23,7 +23,7 @@ typedef enum {
     STATES
 } state_t;
 
-/** What can happen. A level may be offered in every cycle while it lasts; where it changes nothing it is not counted. */
+/** Events. A level may be passed in every cycle while it lasts; it is not counted if it changes nothing. */
 typedef enum {
     EVENT_DRIVES_READY,    /**< level: every drive answers, is enabled and its position is known */
     EVENT_TICK,            /**< level, once a cycle and first: SETTLED and NEUTRAL go on to the goal after one visible cycle */
@@ -31,7 +31,7 @@ typedef enum {
                                 requests of the cycle, else it would end the move that a request has only just begun */
     EVENT_ENGAGE,          /**< operator, enable key, or the auto policy */
     EVENT_HOLD,            /**< operator */
-    EVENT_RESUME,          /**< operator: go on with what a hold interrupted */
+    EVENT_RESUME,          /**< operator: continue what a hold interrupted */
     EVENT_PARK,            /**< operator: settle */
     EVENT_RESET,           /**< operator: leave FAULT or ESTOP, once the cause is gone */
     EVENT_SHUTDOWN,        /**< operator or SIGTERM: settle, then off */
@@ -58,7 +58,7 @@ typedef enum {
     ACTION_ESTOP       /**< stop targets at once, set-points follow actual; relays to the safe mask */
 } action_t;
 
-/** What the guards of the table look at; the gateway fills it before each event. */
+/** Inputs of the guards of the table; the gateway fills it before each event. */
 typedef struct {
     bool is_at_settled;    /**< actual extensions at the settled extension */
     bool is_at_rest;       /**< set-points at rest */
@@ -75,8 +75,8 @@ typedef struct {
     uint32_t ignored[EVENTS]; /**< events that had no row for the state, by event; wraps */
 } supervisor_t;
 
-/** Starts in OFF, free to become SETTLED if the drives come up enabled at the settled extension (goal SETTLED). Once told to be
- *  off, by SHUTDOWN or RESET (goal OFF), OFF is left for ENGAGE and PARK only. */
+/** Starts in OFF with the goal SETTLED: changes to SETTLED if the drives are already enabled at the settled extension. After
+ * SHUTDOWN or RESET (goal OFF), only ENGAGE and PARK leave OFF. */
 void supervisor_init(supervisor_t *self);
 
 /** Starts in SETTLED (offline runs: simulated drives that are enabled and at the settled extension). */

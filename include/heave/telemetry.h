@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * telemetry.h - one plain struct per cycle that tells everything there is to see of a running platform.
- * The motion thread fills it; readers get copies (see the hand-over of the program). No pointers inside but those to constant
- * texts.
+ * telemetry.h - the complete visible state of a running platform as one plain struct per cycle.
+ * The motion thread fills it; readers get copies. It has no pointers, except to constant texts.
  */
 #ifndef HEAVE_TELEMETRY_H
 #define HEAVE_TELEMETRY_H
@@ -22,8 +21,8 @@ typedef struct {
     uint8_t axis;         /**< 1-based: cylinder, or cylinders + 1 for the rotation motor; 0 where none is concerned */
     uint32_t device_code; /**< the drive's own code */
     uint64_t at_us;
-    q32_t off_q32;     /**< of a distance that heaved found [mm, deg]: how far off, */
-    q32_t allowed_q32; /**< and how far it may be; 0: the fault is not about a distance */
+    q32_t off_q32;     /**< distance that heaved found [mm, deg], */
+    q32_t allowed_q32; /**< and the allowed distance; 0: the fault has no distance */
 } fault_t;
 
 /** Counters since the start; they wrap. */
@@ -34,13 +33,13 @@ typedef struct {
     uint32_t accepted[FRAME_COMMANDS];
     uint32_t accepted_timed; /**< of those, T forms */
     uint32_t rejected[FRAME_ERRORS];
-    uint32_t other_sender;   /**< valid frames of senders that do not drive */
+    uint32_t other_sender;   /**< valid frames of senders other than the driving one */
     uint32_t owner_changes;  /**< take-overs by another sender */
     uint32_t not_followed;   /**< accepted while the platform was not ENGAGED */
-    uint32_t impossible;     /**< extensions no pose belongs to, or one near a singularity */
+    uint32_t impossible;     /**< extensions that no pose has, or only one near a singularity */
     uint32_t singular_stops; /**< stops before a singularity on the way from one set of extensions to another */
-    uint32_t spikes;         /**< samples of a stream that were not followed (see gate.h) */
-    uint32_t unconfirmed;    /**< far jumps that no second frame confirmed (see confirm.h) */
+    uint32_t spikes;         /**< samples of a stream that the spike filter dropped (gate.h) */
+    uint32_t unconfirmed;    /**< far jumps that no second frame confirmed (confirm.h) */
     uint32_t clamped;        /**< cycles that pulled a target in */
     uint32_t stretched;      /**< timed moves that took longer than asked */
     uint32_t relay_missing;  /**< masks that set a relay this platform does not have */
@@ -52,7 +51,7 @@ typedef struct {
     uint32_t late_cycles;        /**< cycles skipped because the program was late */
 } counters_t;
 
-/** Everything, once per cycle. Extensions mm, angle deg, Q32. */
+/** State of one cycle. Extensions mm, angle deg, Q32. */
 typedef struct {
     uint64_t cycle;
     uint64_t now_us;
@@ -61,17 +60,17 @@ typedef struct {
     bool is_held_by_silence;
     bool is_estop_active;
     bool is_power_failing;
-    bool is_healthy;                     /**< the healthy pulse runs, or would if there were a line for it */
+    bool is_healthy;                     /**< the healthy pulse runs, or would run if it had a line */
     fault_t fault;                       /**< the first one since the last reset */
-    drive_report_t fault_report;         /**< what its drive was at then, in words; "" where none is concerned */
+    drive_report_t fault_report;         /**< report of its drive at that time; "" if the fault concerns no drive */
     fault_reaction_t reaction;           /**< the worst of them */
-    uint64_t fault_last_us[FAULT_CODES]; /**< when each was last seen to begin, 0 = never */
-    uint32_t begun[DRIVES_MAX + 1u];     /**< in this cycle, by axis as in fault_t: bit N for fault_code_t N */
+    uint64_t fault_last_us[FAULT_CODES]; /**< last beginning of each fault, 0 = never */
+    uint32_t begun[DRIVES_MAX + 1u];     /**< faults that began in this cycle, by axis as in fault_t: bit N for fault_code_t N */
     uint8_t cylinders;
     bool has_angle;
     uint8_t relay_count;
     uint16_t relay_mask;
-    bool is_relays_unknown; /**< they could not be written, or not be looked at: relay_mask is what they were to be */
+    bool is_relays_unknown; /**< they could not be written or read back: relay_mask is the requested mask */
     pose_t asked;
     pose_t sent;
     plate_t plate; /**< from feedback: actual pose, speed and acceleration */
@@ -89,7 +88,7 @@ typedef struct {
     uint32_t stream_delay_us;
     stream_report_t stream; /**< of the sender that drives */
     owner_t owner;          /**< who drives */
-    owner_t other;          /**< who sent last of those who do not */
+    owner_t other;          /**< the last sender that does not drive */
     uint64_t last_frame_us; /**< 0 before the first accepted frame */
     counters_t counters;
 } snapshot_t;

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * wear.h - what an axis has done since the start: how long under torque, how far, how often to and fro. From its feedback, so
- * that it is what the screw has turned, not what it was asked for; what an encoder trembles at rest does not count. Pure; the
- * caller owns wear_t.
+ * wear.h - operating time under torque, travel and cycles of an axis since the start. Uses the feedback, so it counts what the
+ * screw has really turned; noise of an encoder at rest does not count. Pure; the caller owns wear_t.
  */
 #ifndef HEAVE_WEAR_H
 #define HEAVE_WEAR_H
@@ -13,7 +12,7 @@ typedef struct {
     uint64_t energized_us;
     uint64_t travel_milli; /**< thousandths of u: um */
     uint32_t turns;        /**< changes of direction, each after at least 1 u; two are a cycle */
-    bool is_known;         /**< private, as what follows: the two are of a drive that knows where it is */
+    bool is_known;         /**< private, as are the next members: mark and extreme are valid */
     bool is_upwards;
     q32_t mark_q32;    /**< travel is counted up to here */
     q32_t extreme_q32; /**< furthest since the last turn */

@@ -8,7 +8,7 @@
 
 static bool is_enabled(const cia402_axis_t *axis)
 {
-    return cia402_axis_state(axis) == CIA402_OPERATION_ENABLED;
+    return cia402_state(axis->statusword) == CIA402_OPERATION_ENABLED;
 }
 
 static bool has(const cia402_axis_t *axis, uint16_t bit)

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * json.h - writes JSON into a buffer of fixed size. No allocation, no locale. What does not fit sets is_cut: then the text is
  * no JSON and must not be sent.
+ * By hand: the libraries that write JSON (cJSON among them, which heavectl reads it with) allocate, and nothing in heaved may
+ * once it runs.
  */
 #ifndef HEAVE_COMMON_JSON_H
 #define HEAVE_COMMON_JSON_H

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * roff.h - text as a manual page has it: escaped, in short lines. Macros of man(7).
+ * By hand: scdoc and asciidoctor would have to be installed for every build, and what they save here is the escaping alone.
  */
 #ifndef HEAVE_COMMON_ROFF_H
 #define HEAVE_COMMON_ROFF_H

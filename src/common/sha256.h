@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * sha256.h - SHA-256 as FIPS 180-4 defines it, for recognising texts again. No allocation.
+ * By hand: one function, fixed by test vectors, is no reason for a cryptographic library on every controller box.
  */
 #ifndef HEAVE_COMMON_SHA256_H
 #define HEAVE_COMMON_SHA256_H

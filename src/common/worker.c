@@ -7,7 +7,6 @@
 #include <stdint.h>
 #include <time.h>
 
-#define PAUSE_MS    10
 #define STACK_BYTES 262144 /* locked into memory whole */
 
 static struct timespec from_now(unsigned ms)
@@ -47,7 +46,7 @@ static void *run(void *argument)
     while (!is_quit) {
         self->step(self->ctx, false);
         (void)pthread_mutex_lock(&self->mutex);
-        is_quit = await(self, &self->is_quit, PAUSE_MS);
+        is_quit = await(self, &self->is_quit, self->pause_ms);
         (void)pthread_mutex_unlock(&self->mutex);
     }
     self->step(self->ctx, true);
@@ -55,10 +54,10 @@ static void *run(void *argument)
     return NULL;
 }
 
-static void init(worker_t *self, worker_step_t *step, void *ctx)
+static void init(worker_t *self, worker_step_t *step, void *ctx, unsigned pause_ms)
 {
     pthread_condattr_t attributes;
-    *self = (worker_t){.step = step, .ctx = ctx};
+    *self = (worker_t){.step = step, .ctx = ctx, .pause_ms = pause_ms};
     (void)pthread_mutex_init(&self->mutex, NULL);
     (void)pthread_condattr_init(&attributes);
     (void)pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
@@ -66,10 +65,10 @@ static void init(worker_t *self, worker_step_t *step, void *ctx)
     (void)pthread_condattr_destroy(&attributes);
 }
 
-bool worker_start(worker_t *self, worker_step_t *step, void *ctx)
+bool worker_start(worker_t *self, worker_step_t *step, void *ctx, unsigned pause_ms)
 {
     pthread_attr_t attributes;
-    init(self, step, ctx);
+    init(self, step, ctx, pause_ms);
     (void)pthread_attr_init(&attributes);
     (void)pthread_attr_setstacksize(&attributes, STACK_BYTES);
     const int error = pthread_create(&self->thread, &attributes, run, self);

@@ -8,7 +8,7 @@
 #include <pthread.h>
 #include <stdbool.h>
 
-/** What it does about a hundred times a second.
+/** What it does over and over.
  *  @param is_end the last time: what waits is done now, as far as it can be */
 typedef void worker_step_t(void *ctx, bool is_end);
 
@@ -16,6 +16,7 @@ typedef void worker_step_t(void *ctx, bool is_end);
 typedef struct {
     worker_step_t *step;
     void *ctx;
+    unsigned pause_ms;
     pthread_t thread;
     bool is_running;
     pthread_mutex_t mutex; /**< guards what follows */
@@ -25,8 +26,9 @@ typedef struct {
 } worker_t;
 
 /** Starts it.
+ *  @param pause_ms between two steps
  *  @return false: errno says why; its last step can be done by worker_close() all the same */
-bool worker_start(worker_t *self, worker_step_t *step, void *ctx);
+bool worker_start(worker_t *self, worker_step_t *step, void *ctx, unsigned pause_ms);
 
 /** Tells it to do its last step; waits for nothing. Harmless on none. */
 void worker_tell_end(worker_t *self);

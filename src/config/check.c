@@ -2,6 +2,8 @@
  * check.c - what the values of a configuration mean together: missing keys, keys that mean nothing here, pairs of limits
  * that contradict each other. Each error is reported at the key it concerns.
  */
+#include "config/check.h"
+
 #include <string.h>
 
 #include "config/bus.h"
@@ -10,7 +12,11 @@
 #include "config/coils.h"
 #include "config/gpio.h"
 #include "config/healthy.h"
+#include "config/limits.h"
+#include "config/mechanism.h"
 #include "config/modbus.h"
+#include "config/scaling.h"
+#include "config/sizes.h"
 #include "config/source.h"
 #include "config/value.h"
 #include "heave/ramp.h"
@@ -81,7 +87,7 @@ static void check_presence(config_source_t *self, const config_key_t *key, const
         }
         return;
     }
-    if (entry->line != 0 || key->fallback != NULL) {
+    if (entry->line != 0 || entry->is_derived || key->fallback != NULL) {
         return;
     }
     config_text_clear(&allowed);
@@ -134,6 +140,7 @@ static bool has_bounds(const config_source_t *self, unsigned axis)
     const char *section = config_axis_section[axis];
     return config_source_has(self, section, axis_key(&key, axis, "min", "")) &&
            config_source_has(self, section, axis_key(&key, axis, "max", "")) &&
+           settings_of(self)->axis[axis].min_q16 != CONFIG_NONE && settings_of(self)->axis[axis].max_q16 != CONFIG_NONE &&
            settings_of(self)->axis[axis].min_q16 < settings_of(self)->axis[axis].max_q16;
 }
 
@@ -142,7 +149,8 @@ static void check_bounds(config_source_t *self, unsigned axis)
     const char *section = config_axis_section[axis];
     config_text_t key, low;
     if (has_bounds(self, axis) || !config_source_has(self, section, axis_key(&key, axis, "min", "")) ||
-        !config_source_has(self, section, axis_key(&key, axis, "max", ""))) {
+        !config_source_has(self, section, axis_key(&key, axis, "max", "")) ||
+        settings_of(self)->axis[axis].min_q16 == CONFIG_NONE || settings_of(self)->axis[axis].max_q16 == CONFIG_NONE) {
         return;
     }
     config_source_key_error(self, section, key.data, "not above min_%s; allowed: more than %s %s", config_axis_unit(axis),
@@ -201,7 +209,8 @@ static void check_axis(config_source_t *self, unsigned axis)
         return;
     }
     check_bounds(self, axis);
-    if (!has_bounds(self, axis) || !config_source_has(self, section, axis_key(&key, axis, "speed", "_s")) ||
+    if (!has_bounds(self, axis) || config_limits_is_open(&settings_of(self)->axis[axis]) ||
+        !config_source_has(self, section, axis_key(&key, axis, "speed", "_s")) ||
         !config_source_has(self, section, axis_key(&key, axis, "accel", "_s2")) ||
         !config_source_has(self, section, axis_key(&key, axis, "jerk", "_s3"))) {
         return;
@@ -421,15 +430,21 @@ static void check_approved(config_source_t *self)
     }
 }
 
+/* Those that the file gives; those that it leaves out once they are filled in. */
+static void check_limits(config_source_t *self)
+{
+    for (unsigned axis = 0; axis < AXES_MAX; axis++) {
+        check_axis(self, axis);
+    }
+    check_neutral(self);
+}
+
 static void check_values(config_source_t *self)
 {
     settings_t *settings = &self->config->settings;
     check_per_cylinder(self, "retracted_length_mm", settings->geometry.retracted_mm_q16);
     check_per_cylinder(self, "stroke_mm", settings->stroke_mm_q16);
-    for (unsigned axis = 0; axis < AXES_MAX; axis++) {
-        check_axis(self, axis);
-    }
-    check_neutral(self);
+    check_limits(self);
     check_stroke(self);
     check_sim(self);
     check_cylinders(self);
@@ -443,6 +458,8 @@ static void check_values(config_source_t *self)
     config_coils_check(self);
     config_gpio_check(self);
     config_healthy_check(self);
+    config_scaling_resolve(self);
+    config_scaling_check(self);
     config_cia402_check(self);
     config_canraw_check(self);
     config_modbus_check(self);
@@ -451,9 +468,17 @@ static void check_values(config_source_t *self)
 
 void config_check(config_source_t *self)
 {
+    config_sizes_resolve(self);
     check_keys(self);
     check_values(self);
+    config_limits_clear_absent(self->config);
+    if (self->error_count == 0) {
+        config_sizes_resolve_height(self);
+    }
     if (self->error_count == 0) {
         config_check_mechanism(self);
+    }
+    if (self->error_count == 0 && config_limits_fill(self->config)) {
+        check_limits(self);
     }
 }

@@ -10,10 +10,10 @@
 #include <fcntl.h>
 #include <ini.h>
 #include <poll.h>
-#include <stdarg.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "config/check.h"
 #include "config/hash.h"
 #include "config/source.h"
 #include "config/startup.h"
@@ -21,70 +21,6 @@
 
 #define WAIT_MS  5000 /* for who writes a pipe; once heaved runs, nobody is waited for */
 #define CONTINUE 1    /* inih: the handler took the pair */
-
-/* --- Errors --- */
-
-static void write_error(config_source_t *self, unsigned line, const char *where, const char *format, va_list arguments)
-{
-    if (line == 0) {
-        fprintf(self->errors, "%s: ", self->path);
-    } else {
-        fprintf(self->errors, "%s:%u: %s", self->path, line, where);
-    }
-    vfprintf(self->errors, format, arguments);
-    fputc('\n', self->errors);
-    self->error_count++;
-}
-
-void config_source_error(config_source_t *self, unsigned line, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    write_error(self, line, "", format, arguments);
-    va_end(arguments);
-}
-
-/* The line a key's error is reported at. */
-static unsigned line_of(const config_source_t *self, const char *section, const char *name)
-{
-    const int key = config_key_find(section, name);
-    const int in = config_section_find(section);
-    if (key >= 0 && self->entry[key].line != 0) {
-        return self->entry[key].line;
-    }
-    if (in >= 0 && self->section_line[in] != 0) {
-        return self->section_line[in];
-    }
-    return self->line == 0 ? 1 : self->line; /* an empty file has no line to name */
-}
-
-void config_source_key_error(config_source_t *self, const char *section, const char *name, const char *format, ...)
-{
-    config_text_t where;
-    va_list arguments;
-    config_text_clear(&where);
-    config_text_add(&where, "[%s] %s: ", section, name);
-    va_start(arguments, format);
-    write_error(self, line_of(self, section, name), where.data, format, arguments);
-    va_end(arguments);
-}
-
-bool config_source_has(const config_source_t *self, const char *section, const char *name)
-{
-    const int key = config_key_find(section, name);
-    HV_ASSERT(key >= 0);
-    return self->entry[key].is_valid;
-}
-
-bool config_source_has_all(const config_source_t *self, const char *section)
-{
-    for (size_t i = 0; i < config_key_count; i++) {
-        if (strcmp(config_keys[i].section, section) == 0 && !self->entry[i].is_valid) {
-            return false;
-        }
-    }
-    return true;
-}
 
 /* --- Lines --- */
 
@@ -467,7 +403,8 @@ static void take_change(const config_source_t *self, size_t i, config_t *running
     if (strcmp(was.data, is.data) == 0) {
         return;
     }
-    fprintf(self->errors, "%s:%u: [%s] %s: ", self->path, line_of(self, key->section, key->name), key->section, key->name);
+    fprintf(self->errors, "%s:%u: [%s] %s: ", self->path, config_source_line_of(self, key->section, key->name), key->section,
+            key->name);
     if (key->is_live) {
         memcpy((char *)running + key->offset, (const char *)self->config + key->offset, key->size);
         fprintf(self->errors, "%s from now on, was %s\n", is.data, was.data);

@@ -64,6 +64,20 @@ typedef struct {
     int32_t value[CYLINDERS_MAX];
 } config_wholes_t;
 
+/** Joints of the base or of the plate on a circle: another way to write them, see sizes.h. None once they have been filled in. */
+typedef struct {
+    q16_t radius_mm_q16;  /**< CONFIG_NONE: joints one by one */
+    q16_t spread_deg_q16; /**< between the two joints of a pair; CONFIG_NONE: three cylinders */
+    q16_t turn_deg_q16;   /**< clockwise, seen from above */
+} config_circle_t;
+
+/** What lies between a motor and its cylinder: another way to write counts_per_mm, see scaling.h. */
+typedef struct {
+    config_ratios_t lead_mm; /**< travel for one turn of the screw; none once counts_per_mm has been filled in */
+    config_ratios_t gear;    /**< turns of the motor for one of the screw */
+    int32_t counts_per_turn; /**< of the motor; CONFIG_NONE: unknown */
+} config_drive_train_t;
+
 /** Width of CAN identifiers. */
 typedef enum { CONFIG_ID_11_BITS, CONFIG_ID_29_BITS } config_id_bits_t;
 
@@ -310,6 +324,8 @@ typedef struct {
 typedef struct {
     settings_t settings;
     config_udp_t udp;
+    config_circle_t base, plate;
+    bool is_as_measured;             /**< joints that look odd are meant: see layout.h */
     uint32_t late_hold_cycles;       /**< of the program: see daemon/motion_loop.h */
     char life_file[CONFIG_PATH_MAX]; /**< "none" = none */
     config_label_t approved;         /**< hash of the one that was approved, "" = any */
@@ -324,6 +340,7 @@ typedef struct {
     uint32_t operator_log_files;
     config_black_box_t black_box;
     config_drives_t drives;
+    config_drive_train_t drive_train;
     config_sim_t sim;
     config_can_t can;
     config_can_raw_t can_raw;

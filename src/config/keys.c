@@ -69,30 +69,41 @@ const size_t config_section_count = sizeof config_sections / sizeof config_secti
 #define JOINT(number, index, need)                                                                                              \
     {KEY("geometry", "base" number "_mm"), AT(settings.geometry.base_mm_q16[index]), .type = CONFIG_DECIMAL, .count = 3,        \
      .unit = "mm", RANGE(-4000, 4000), .needs = need,                                                                           \
-     .help = "x, y, z of the lower joint of cylinder " number ", base frame"},                                                  \
+     .help = "x, y, z of the lower joint of cylinder " number ", base frame; or base_radius_mm for all"},                                                  \
     {KEY("geometry", "plate" number "_mm"), AT(settings.geometry.plate_mm_q16[index]), .type = CONFIG_DECIMAL, .count = 3,      \
      .unit = "mm", RANGE(-4000, 4000), .needs = need,                                                                           \
-     .help = "x, y, z of the upper joint of cylinder " number ", plate frame"}
+     .help = "x, y, z of the upper joint of cylinder " number ", plate frame; or plate_radius_mm for all"}
 
-/* The rows of one axis. */
-#define AXIS(name, u, index, need, low, high)                                                                                   \
+/* The rows of joints on a circle, in place of joints one by one. */
+#define CIRCLE(set, member, pairs)                                                                                              \
+    {KEY("geometry", set "_radius_mm"), AT(member.radius_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",             \
+     .fallback = "none", .words = "none", ABOVE_ZERO(4000),                                                                     \
+     .help = "circle through the joints of the " set ", in place of " set "1_mm and so on: they follow from it (docs/geometry.md)"},\
+    {KEY("geometry", set "_spread_deg"), AT(member.spread_deg_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg",          \
+     .fallback = "none", .words = "none", RANGE(0, 119), .needs = CONFIG_NEEDS_HEXAPOD,                                         \
+     .help = "angle between the two joints of a pair: " pairs},                                                                 \
+    {KEY("geometry", set "_turn_deg"), AT(member.turn_deg_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg",              \
+     .fallback = "0", RANGE(-180, 180), .help = "all joints of the " set " turned by so much, clockwise as seen from above"}
+
+/* The rows of one axis; left_out: what stands for limits that the file does not give. */
+#define AXIS(name, u, index, need, low, high, left_out)                                                                         \
     {KEY(name, "sign"), AT(settings.axis[index].sign), .type = CONFIG_SIGN, .unit = "", .fallback = "1", .needs = need,         \
      .help = "-1 turns the sense of the sent value round"},                                                                     \
     {KEY(name, "scale"), AT(settings.axis[index].scale_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "", .fallback = "1",   \
      RANGE(0, 100), .needs = need, .help = "factor of the sent value; 0 switches the axis off"},                                \
     {KEY(name, "offset_" u), AT(settings.axis[index].offset_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u,                \
      .fallback = "0", RANGE(low, high), .needs = need, .help = "added after sign and scale"},                                   \
-    {KEY(name, "min_" u), AT(settings.axis[index].min_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u, RANGE(low, high),    \
+    {KEY(name, "min_" u), AT(settings.axis[index].min_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u, RANGE(low, high), .fallback = left_out, .words = left_out, \
      .needs = need, .help = "lowest value the axis goes to"},                                                                   \
-    {KEY(name, "max_" u), AT(settings.axis[index].max_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u, RANGE(low, high),    \
+    {KEY(name, "max_" u), AT(settings.axis[index].max_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u, RANGE(low, high), .fallback = left_out, .words = left_out, \
      .needs = need, .help = "highest value the axis goes to"},                                                                  \
     {KEY(name, "speed_" u "_s"), AT(settings.axis[index].speed_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u "/s",        \
-     ABOVE_ZERO(10000), .needs = need, .help = "speed limit"},                                                                  \
+     ABOVE_ZERO(10000), .fallback = left_out, .words = left_out, .needs = need, .help = "speed limit"},                         \
     {KEY(name, "accel_" u "_s2"), AT(settings.axis[index].accel_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = u "/s^2",     \
-     ABOVE_ZERO(MOST_Q16), .needs = need,                                                                                       \
+     ABOVE_ZERO(MOST_Q16), .fallback = left_out, .words = left_out, .needs = need,                                              \
      .help = "acceleration limit; reached only where accel^2 / jerk <= speed"},                                                 \
     {KEY(name, "jerk_" u "_s3"), AT(settings.axis[index].jerk), .type = CONFIG_INTEGER, .unit = u "/s^3",                       \
-     RANGE(1, MOST_INT32), .needs = need, .help = "jerk limit: how fast the acceleration may change"}
+     RANGE(1, MOST_INT32), .fallback = left_out, .words = left_out, .needs = need, .help = "jerk limit: how fast the acceleration may change"}
 
 const config_key_t config_keys[] = {
     {KEY("platform", "kind"), AT(settings.geometry.kind), .type = CONFIG_WORD, .unit = "", .words = "hexapod|tripod|tripod-3rps",
@@ -120,34 +131,40 @@ const config_key_t config_keys[] = {
     JOINT("4", 3, CONFIG_NEEDS_HEXAPOD),
     JOINT("5", 4, CONFIG_NEEDS_HEXAPOD),
     JOINT("6", 5, CONFIG_NEEDS_HEXAPOD),
+    CIRCLE("base", base, "1 and 2 in front, 3 and 4, 5 and 6"),
+    CIRCLE("plate", plate, "6 and 1, 2 and 3, 4 and 5"),
     {KEY("geometry", "retracted_length_mm"), AT(settings.geometry.retracted_mm_q16), .type = CONFIG_PER_CYLINDER, .unit = "mm",
      ABOVE_ZERO(8000), .help = "joint to joint at extension 0"},
     {KEY("geometry", "stroke_mm"), AT(settings.stroke_mm_q16), .type = CONFIG_PER_CYLINDER, .unit = "mm", ABOVE_ZERO(4000),
      .help = "extension from end to end"},
     {KEY("geometry", "zero_height_mm"), AT(settings.geometry.zero_height_mm_q16), .type = CONFIG_DECIMAL, .count = 1,
-     .unit = "mm", RANGE(0, 8000), .help = "plate origin above base origin at pose zero"},
+     .unit = "mm", .fallback = "mid-stroke", .words = "mid-stroke", RANGE(0, 8000),
+     .help = "plate origin above base origin at pose zero; mid-stroke: where the cylinders are half way out"},
     {KEY("geometry", "mrp_mm"), AT(settings.geometry.mrp_mm_q16), .type = CONFIG_DECIMAL, .count = 3, .unit = "mm",
      .fallback = "0, 0, 0", RANGE(-4000, 4000),
      .help = "x, y, z of the motion reference point, plate frame: poses place it and rotations turn about it"},
+    {KEY("geometry", "as_measured"), AT(is_as_measured), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "whether joints that look like a slip (two exchanged, numbered from the wrong place, a digit, metres) are what they are: a "
+             "warning then, else an error"},
 
     {KEY("pose", "neutral"), AT(settings.neutral_q16), .type = CONFIG_DECIMAL, .count = POSE_AXES, .unit = "deg and mm",
      .fallback = "0, 0, 0, 0, 0, 0", RANGE(-4000, 4000), .help = "roll, pitch, yaw, x, y, z the platform rises to"},
     {KEY("pose", "settled_extension_mm"), AT(settings.settled_extension_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
      RANGE(0, 4000), .help = "of all cylinders, in which people board"},
 
-    AXIS("roll", "deg", AXIS_ROLL, CONFIG_NEEDS_NOTHING, -90, 90),
-    AXIS("pitch", "deg", AXIS_PITCH, CONFIG_NEEDS_NOTHING, -90, 90),
-    AXIS("yaw", "deg", AXIS_YAW, CONFIG_NEEDS_HEXAPOD, -180, 180),
+    AXIS("roll", "deg", AXIS_ROLL, CONFIG_NEEDS_NOTHING, -90, 90, "suggested"),
+    AXIS("pitch", "deg", AXIS_PITCH, CONFIG_NEEDS_NOTHING, -90, 90, "suggested"),
+    AXIS("yaw", "deg", AXIS_YAW, CONFIG_NEEDS_HEXAPOD, -180, 180, "suggested"),
     {KEY("angle", "present"), AT(settings.has_angle), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
      .help = "whether there is a rotation motor; the other keys of the section are for yes only"},
     {KEY("angle", "wrap"), AT(settings.angle_wrap), .type = CONFIG_WORD, .unit = "", .fallback = "as-sent",
      .words = "as-sent|shortest", .needs = CONFIG_NEEDS_ANGLE,
      .help = "the number as it is, several turns allowed; or modulo one turn, the shorter way round from the last angle sent, as far as "
              "the limits let it"},
-    AXIS("angle", "deg", AXIS_ANGLE, CONFIG_NEEDS_ANGLE, -MOST_Q16, MOST_Q16),
-    AXIS("x", "mm", AXIS_X, CONFIG_NEEDS_HEXAPOD, -4000, 4000),
-    AXIS("y", "mm", AXIS_Y, CONFIG_NEEDS_HEXAPOD, -4000, 4000),
-    AXIS("z", "mm", AXIS_Z, CONFIG_NEEDS_NOTHING, -4000, 4000),
+    AXIS("angle", "deg", AXIS_ANGLE, CONFIG_NEEDS_ANGLE, -MOST_Q16, MOST_Q16, NULL),
+    AXIS("x", "mm", AXIS_X, CONFIG_NEEDS_HEXAPOD, -4000, 4000, "suggested"),
+    AXIS("y", "mm", AXIS_Y, CONFIG_NEEDS_HEXAPOD, -4000, 4000, "suggested"),
+    AXIS("z", "mm", AXIS_Z, CONFIG_NEEDS_NOTHING, -4000, 4000, "suggested"),
 
     {KEY("cylinders", "speed_mm_s"), AT(settings.cylinder_speed_mm_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s",
      ABOVE_ZERO(10000), .help = "speed limit"},
@@ -244,6 +261,13 @@ const config_key_t config_keys[] = {
 
     {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim|cia402|can-raw|modbus-tcp|modbus-rtu",
      .help = "the drives in use"},
+    {KEY("drives", "lead_mm"), AT(drive_train.lead_mm), .type = CONFIG_RATIOS, .unit = "", .fallback = "none",
+     .count = CYLINDERS_MAX, .help = "travel of a cylinder for one turn of its screw, in place of counts_per_mm in the section of the drives; "
+     "negative: the drive counts backwards"},
+    {KEY("drives", "counts_per_turn"), AT(drive_train.counts_per_turn), .type = CONFIG_INTEGER, .unit = "counts", .fallback = "none",
+     .words = "none", RANGE(1, MOST_INT32), .help = "counts of one turn of the motor: needed with lead_mm, and for rpm in --check"},
+    {KEY("drives", "gear"), AT(drive_train.gear), .type = CONFIG_RATIOS, .unit = "", .fallback = "1",
+     .count = CYLINDERS_MAX, .help = "turns of the motor for one turn of the screw, with lead_mm"},
 
     {KEY("sim", "lag_ms"), AT(sim.lag_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "0", RANGE(0, 10000),
      .help = "time constant with which a cylinder follows its set-point; 0 = at once"},
@@ -601,7 +625,12 @@ static unsigned smallest(unsigned a, unsigned b, unsigned c)
     return ab < c ? ab : c;
 }
 
-/* Levenshtein distance; one row of the matrix at a time. */
+static int lower(char byte)
+{
+    return byte >= 'A' && byte <= 'Z' ? byte - 'A' + 'a' : byte;
+}
+
+/* Levenshtein distance, capitals and small letters alike; one row of the matrix at a time. */
 static unsigned edit_distance(const char *from, const char *to)
 {
     unsigned row[SUGGEST_LENGTH_MAX + 1u];
@@ -617,7 +646,7 @@ static unsigned edit_distance(const char *from, const char *to)
         row[0] = i;
         for (size_t j = 1; j <= width; j++) {
             const unsigned above = row[j];
-            row[j] = smallest(above + 1u, row[j - 1u] + 1u, diagonal + (from[i - 1u] != to[j - 1u]));
+            row[j] = smallest(above + 1u, row[j - 1u] + 1u, diagonal + (lower(from[i - 1u]) != lower(to[j - 1u])));
             diagonal = above;
         }
     }

@@ -4,7 +4,7 @@
  */
 #include "config/mechanism.h"
 
-#include "config/source.h"
+#include "config/layout.h"
 
 #define HEIGHT_SEARCH_MM 8000 /* the range of zero_height_mm */
 
@@ -119,6 +119,11 @@ void config_check_mechanism(config_source_t *self)
                                 settings_of(self)->geometry.kind == KIN_TRIPOD_3RPS
                                     ? "joints at 0, 120 and 240 deg from +X, plate joints on one level circle"
                                     : "joints and lengths in their ranges");
+        return;
+    }
+    const int before = self->error_count;
+    config_layout_check(self);
+    if (self->error_count > before) {
         return;
     }
     if (check_zero_height(self, &kin)) {

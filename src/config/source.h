@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * source.h - a configuration file while it is loaded: where each key stood, and the errors found so far.
- * Shared by config.c (lines and keys) and check.c and mechanism.c (what the values mean together).
+ * config.c fills it in; the checks of the sections report into it.
  */
 #ifndef HEAVE_CONFIG_SOURCE_H
 #define HEAVE_CONFIG_SOURCE_H
@@ -10,9 +10,10 @@
 
 /** What the file said for one key. */
 typedef struct {
-    unsigned line;  /**< 0: not in the file */
-    unsigned count; /**< values given */
-    bool is_valid;  /**< the file's value was accepted, or the default stands */
+    unsigned line;   /**< 0: not in the file */
+    unsigned count;  /**< values given */
+    bool is_derived; /**< follows from other keys, so that nobody misses it */
+    bool is_valid;   /**< the file's value was accepted, or the default stands */
 } config_entry_t;
 
 /** A file being loaded. */
@@ -37,6 +38,9 @@ enum { CONFIG_SECTION_NONE = -1, CONFIG_SECTION_REFUSED = -2 };
 /** Reports an error at a line. */
 void config_source_error(config_source_t *self, unsigned line, const char *format, ...) CONFIG_PRINTF(3, 4);
 
+/** The line that an error of a key is reported at. */
+unsigned config_source_line_of(const config_source_t *self, const char *section, const char *name);
+
 /** Reports an error of a key: at its line, else at its section's, else at the end of the file. */
 void config_source_key_error(config_source_t *self, const char *section, const char *name, const char *format, ...)
     CONFIG_PRINTF(4, 5);
@@ -46,11 +50,5 @@ bool config_source_has(const config_source_t *self, const char *section, const c
 
 /** True where every key of a section has a usable value: what was refused is reported once, not for all that follows from it. */
 bool config_source_has_all(const config_source_t *self, const char *section);
-
-/** Checks what the values mean together; reports into self. Fills in what follows from them (relay count). */
-void config_check(config_source_t *self);
-
-/** Checks the mechanism; everything else has to be right. */
-void config_check_mechanism(config_source_t *self);
 
 #endif

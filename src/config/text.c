@@ -27,11 +27,29 @@ void config_text_add(config_text_t *self, const char *format, ...)
     }
 }
 
+/* Bytes of a sign that nobody takes for another one: a degree sign, Chinese and Japanese writing and its punctuation. Letters of
+ * other alphabets may look like ours, and stay \xNN. Returns 0 where there is none. */
+static size_t legible(const char *text, size_t length)
+{
+    const unsigned char *byte = (const unsigned char *)text;
+    if (length >= 2u && byte[0] == 0xC2u && byte[1] == 0xB0u) {
+        return 2;
+    }
+    const bool is_lead = length >= 3u && ((byte[0] >= 0xE3u && byte[0] <= 0xE9u) || (byte[0] == 0xEFu && byte[1] == 0xBCu));
+    return is_lead && (byte[1] & 0xC0u) == 0x80u && (byte[2] & 0xC0u) == 0x80u ? 3 : 0;
+}
+
 void config_text_add_escaped(config_text_t *self, const char *text, size_t length)
 {
     const size_t shown = length < ESCAPED_MAX ? length : ESCAPED_MAX;
     for (size_t i = 0; i < shown; i++) {
         const unsigned char byte = (unsigned char)text[i];
+        const size_t sign = legible(&text[i], length - i);
+        if (sign > 0) {
+            config_text_add(self, "%.*s", (int)sign, &text[i]);
+            i += sign - 1u;
+            continue;
+        }
         const bool is_plain = byte >= 0x20u && byte < 0x7Fu && byte != '"' && byte != '\\';
         config_text_add(self, is_plain ? "%c" : "\\x%02X", byte);
     }

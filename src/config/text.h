@@ -24,7 +24,7 @@ void config_text_clear(config_text_t *self);
 /** Appends as printf does. */
 void config_text_add(config_text_t *self, const char *format, ...) CONFIG_PRINTF(2, 3);
 
-/** Appends a piece of the file: bytes that do not print as \xNN, cut after 40 bytes. */
+/** Appends a piece of the file: bytes that do not print, or look like others, as \xNN, cut after 40 bytes. */
 void config_text_add_escaped(config_text_t *self, const char *text, size_t length);
 
 /** The same in quotes. */

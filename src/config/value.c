@@ -4,6 +4,7 @@
  */
 #include "config/value.h"
 
+#include "config/slip.h"
 #include "config/value_can.h"
 #include "config/value_modbus.h"
 
@@ -514,7 +515,7 @@ static bool parse_per_relay(const config_key_t *key, const char *text, uint32_t 
     return true;
 }
 
-bool config_value_parse(const config_key_t *key, const char *text, config_t *config, unsigned *count, config_text_t *why)
+static bool parse(const config_key_t *key, const char *text, config_t *config, unsigned *count, config_text_t *why)
 {
     void *const field = (char *)config + key->offset;
     const span_t whole = {text, strlen(text)};
@@ -559,6 +560,21 @@ bool config_value_parse(const config_key_t *key, const char *text, config_t *con
     case CONFIG_BLOCKS:
     case CONFIG_ITEMS:
         return config_value_modbus_parse(key, text, field, why);
+    }
+    return false;
+}
+
+bool config_value_parse(const config_key_t *key, const char *text, config_t *config, unsigned *count, config_text_t *why)
+{
+    config_text_t slip;
+    if (parse(key, text, config, count, why)) {
+        return true;
+    }
+    config_text_clear(&slip);
+    if (config_slip_find(key, text, &slip)) {
+        config_text_add(&slip, "; allowed: ");
+        config_value_allowed(key, &slip);
+        *why = slip;
     }
     return false;
 }

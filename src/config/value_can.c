@@ -8,8 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "config/value.h"
-
 #define ITEM_BYTES 64u /* longer ones are no value, and are cut */
 #define NAME_BYTES "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-"
 
@@ -36,7 +34,7 @@ static bool refuse(const config_key_t *key, const char *item, size_t length, con
 {
     config_text_add_quoted(why, item, length);
     config_text_add(why, " %s; allowed: ", what);
-    config_value_allowed(key, why);
+    config_value_can_allowed(key, why);
     return false;
 }
 
@@ -71,7 +69,7 @@ static const char *take_item(const char **rest, char item[ITEM_BYTES])
 static bool refuse_many(const config_key_t *key, unsigned most, config_text_t *why)
 {
     config_text_add(why, "has more than %u values; allowed: ", most);
-    config_value_allowed(key, why);
+    config_value_can_allowed(key, why);
     return false;
 }
 
@@ -107,13 +105,31 @@ static bool parse_ids(const config_key_t *key, const char *text, config_ids_t *i
     return true;
 }
 
-/* "20000/10", or a whole number. */
+/* The digits behind a point: 5.08 is 508/100. Returns what follows, NULL where 32 bits do not hold them. */
+static const char *read_decimals(const char *digits, bool is_negative, int64_t *above, int64_t *below)
+{
+    if (*digits < '0' || *digits > '9') {
+        return NULL;
+    }
+    for (; *digits >= '0' && *digits <= '9'; digits++) {
+        *above = *above * 10 + (is_negative ? '0' - *digits : *digits - '0');
+        *below *= 10;
+        if (*above < -INT32_MAX || *above > INT32_MAX || *below > INT32_MAX) {
+            return NULL;
+        }
+    }
+    return digits;
+}
+
+/* "20000/10", "2000" or "5.08". */
 static bool read_ratio(const char *text, int32_t *num, int32_t *den)
 {
     int64_t above = 0;
     int64_t below = 1;
     const char *end = read_number(text, -INT32_MAX, INT32_MAX, &above);
-    if (end != NULL && *end == '/') {
+    if (end != NULL && *end == '.' && strpbrk(text, "xX") == NULL) {
+        end = read_decimals(end + 1, text[0] == '-', &above, &below);
+    } else if (end != NULL && *end == '/') {
         end = read_number(end + 1, 1, INT32_MAX, &below);
     }
     *num = (int32_t)above;
@@ -431,7 +447,7 @@ void config_value_can_allowed(const config_key_t *key, config_text_t *text)
         config_text_add(text, "%s, or one for each drive",
                         key->words != NULL ? key->words : "none, or an identifier such as 0x601");
     } else if (key->type == CONFIG_RATIOS) {
-        config_text_add(text, "none, or a ratio of whole numbers such as 20000/10 or 2000%s",
+        config_text_add(text, "none, or a ratio such as 20000/10, 2000 or 5.08%s",
                         key->count > 1 ? ", or one for each cylinder" : "");
     } else if (key->type == CONFIG_WHOLES) {
         config_text_add(text, "a whole number%s", key->count > 1 ? ", or one for each cylinder" : "");

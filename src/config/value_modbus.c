@@ -7,8 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "config/value.h"
-
 #define TOKEN_BYTES  48u /* longer ones are no value */
 #define BLANKS       " \t"
 #define PORT_DEFAULT 502
@@ -33,7 +31,7 @@ static bool refuse(const config_key_t *key, const char *item, const char *what, 
 {
     config_text_add_quoted(why, item, strlen(item));
     config_text_add(why, " %s; allowed: ", what);
-    config_value_allowed(key, why);
+    config_value_modbus_allowed(key, why);
     return false;
 }
 

@@ -17,6 +17,7 @@
 
 #define END_WAIT_US   2000000u /* for a slow reader of a pipe */
 #define CLOSE_WAIT_MS 5000u    /* for a disk */
+#define PAUSE_MS      10u
 
 static uint64_t now_us(const writers_t *self)
 {
@@ -170,7 +171,7 @@ int writers_open(writers_t *self, const options_t *options, const config_t *conf
 
 static void start(worker_t *worker, worker_step_t *step, writers_t *self, const char *what)
 {
-    if (!worker_start(worker, step, self)) {
+    if (!worker_start(worker, step, self, PAUSE_MS)) {
         (void)print_message(0, "cannot start the thread that writes the %s: %s", what, strerror(errno));
     }
 }

@@ -20,6 +20,7 @@ static const row_t k_rows[FAULT_CODES] = {
     [FAULT_SETPOINT_JUMP] = {FAULT_REACT_QUICK_STOP, "a set-point jumped away from its drive"},
     [FAULT_ESTOP_CHANNELS] = {FAULT_REACT_QUICK_STOP, "the channels of the e-stop disagree"},
     [FAULT_POWER] = {FAULT_REACT_STOP, "the supply is failing, and the platform was not settled in time"},
+    [FAULT_OUTSIDE_STROKE] = {FAULT_REACT_QUICK_STOP, "a cylinder stands outside its stroke, says its drive"},
 };
 
 static const row_t *row_of(fault_code_t code)
@@ -45,7 +46,7 @@ bool fault_is_found_by_drive(fault_code_t code)
 bool fault_is_of_axis(fault_code_t code)
 {
     return code == FAULT_DRIVE || code == FAULT_DRIVE_OFFLINE || code == FAULT_DRIVE_DROPPED || code == FAULT_FOLLOWING ||
-           code == FAULT_SETPOINT_JUMP;
+           code == FAULT_SETPOINT_JUMP || code == FAULT_OUTSIDE_STROKE;
 }
 
 const char *fault_reaction_name(fault_reaction_t reaction)

@@ -69,6 +69,12 @@ static const fault_help_t k_help[FAULT_CODES] = {
          "供电中断时平台处于升起并暂停的状态，或 [inputs] power_settle_ms 短于回落所需时间"},
         {"restore the supply, then heavectl reset; power_settle_ms has to be less than the UPS lasts, and more than it takes to settle",
          "恢复供电后执行 heavectl reset；power_settle_ms 应小于 UPS 的供电时间，且大于回落所需时间"}},
+    [FAULT_OUTSIDE_STROKE] = {
+        "outside-stroke", "驱动器报告的电动缸位置超出行程",
+        {"the scaling, its sign, zero_counts or stroke_mm is wrong, or homing has ended at the wrong place",
+         "比例、方向、zero_counts 或 stroke_mm 设置错误，或回零停在错误的位置"},
+        {"the log says how far; heaved --check shows the counts of the stroke: compare them with what the drive shows, then heavectl reset",
+         "日志给出超出多少；heaved --check 显示行程对应的计数，与驱动器显示的值对照并改正，然后执行 heavectl reset"}},
 };
 /* clang-format on */
 

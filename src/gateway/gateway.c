@@ -58,6 +58,9 @@ static void keep_settings(gateway_settings_t *own, const settings_t *settings)
     own->angle_wrap = settings->angle_wrap;
     own->angle_min_q16 = settings->axis[AXIS_ANGLE].min_q16;
     own->angle_max_q16 = settings->axis[AXIS_ANGLE].max_q16;
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        own->stroke_mm_q16[i] = settings->stroke_mm_q16[i];
+    }
     own->relays = settings->relays;
     own->healthy = settings->healthy;
     keep_changeable(own, settings);
@@ -124,6 +127,9 @@ static bool are_settings_sane(const gateway_settings_t *saved, const gateway_set
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const axis_input_t *axis = &saved->axis[i], *own = &prepared->axis[i];
         is_sane = is_sane && axis->sign == own->sign && axis->scale_q16 == own->scale_q16 && axis->offset_q16 == own->offset_q16;
+    }
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        is_sane = is_sane && saved->stroke_mm_q16[i] == prepared->stroke_mm_q16[i];
     }
     for (unsigned i = 0; i < HAL_RELAYS_MAX; i++) {
         is_sane = is_sane && saved->relays.max_on_ms[i] == prepared->relays.max_on_ms[i] &&

@@ -15,6 +15,7 @@
 #define LOST_TIMEOUT_US      1000000u /* in which a drive may come back and be told */
 #define AT_SETTLED_WINDOW_MM 1
 #define FOLLOWING_TIME_US    20000u
+#define OUTSIDE_STROKE_MM    5       /* what a stop gives way, and what a homing switch is off */
 #define UNSENT_MAX_US        100000u /* the drives' own watch is quicker: it knows the period of its bus */
 
 static unsigned drive_count(const gateway_t *self)
@@ -348,6 +349,23 @@ static bool is_left_behind(gateway_t *self, unsigned i, uint64_t now_us)
     return is_far && now_us - self->following_since_us[i] >= FOLLOWING_TIME_US;
 }
 
+/* How far a cylinder stands outside its stroke. */
+static q32_t outside_stroke(const gateway_t *self, unsigned i)
+{
+    const q32_t actual_q32 = self->snapshot.drive[i].actual_mm_q32;
+    const q32_t beyond_q32 = fx_sub_sat(actual_q32, q32_from_q16(self->settings.stroke_mm_q16[i]));
+    return actual_q32 < 0 ? -actual_q32 : beyond_q32 > 0 ? beyond_q32 : 0;
+}
+
+/* True where a drive that is to move for the first time knows its zero, and is where no cylinder can be: with such a scaling the
+ * way to the settled extension would be a way into a stop. */
+static bool is_astray(const gateway_t *self, unsigned i)
+{
+    const drive_feedback_t *f = &self->snapshot.drive[i];
+    return is_coming_up(self) && i < kin_cylinders(motion_kin(&self->motion)) && f->has_actual && f->is_homed &&
+           f->state != DRIVE_HOMING && outside_stroke(self, i) > q32_from_int(OUTSIDE_STROKE_MM);
+}
+
 /* What is wrong with a drive, in any state in which it is meant to be up. */
 static fault_code_t judge_drive(gateway_t *self, unsigned i, uint64_t now_us)
 {
@@ -359,6 +377,9 @@ static fault_code_t judge_drive(gateway_t *self, unsigned i, uint64_t now_us)
     }
     if (state == DRIVE_OFFLINE) {
         return FAULT_DRIVE_OFFLINE;
+    }
+    if (is_astray(self, i)) {
+        return FAULT_OUTSIDE_STROKE;
     }
     if (state != DRIVE_ENABLED) {
         return is_torque_expected(self) ? FAULT_DRIVE_DROPPED : FAULT_NONE;
@@ -383,7 +404,10 @@ static fault_t fault_of(const gateway_t *self, fault_code_t code, unsigned i, ui
 {
     const drive_feedback_t *drive = &self->snapshot.drive[i];
     fault_t fault = {.code = code, .axis = (uint8_t)(i + 1u), .at_us = now_us};
-    if (code != FAULT_FOLLOWING && code != FAULT_SETPOINT_JUMP) {
+    if (code == FAULT_OUTSIDE_STROKE) {
+        fault.off_q32 = outside_stroke(self, i);
+        fault.allowed_q32 = q32_from_int(OUTSIDE_STROKE_MM);
+    } else if (code != FAULT_FOLLOWING && code != FAULT_SETPOINT_JUMP) {
         /* one that is disabled again has no fault any more, but may know why */
         fault.device_code = drive->fault_code != 0 ? drive->fault_code : report_of(self, &fault).code;
     } else if (drive_guard_is_found(&drive->guard)) {

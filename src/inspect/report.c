@@ -12,10 +12,12 @@
 #include "config/cia402.h" // config_cia402_pp_lag_q32
 #include "config/hash.h"
 #include "config/keys.h"
+#include "config/layout.h"
 #include "config/modbus.h"
+#include "config/scaling.h"
 #include "config/text.h"
 #include "heave/ramp.h"
-#include "inspect/envelope.h"
+#include "config/envelope.h"
 
 #define EDGE_TOLERANCE 0.001 /* deg or mm: a limit on the edge itself is fine */
 #define DIAGONALS      4u    /* of a pair: both axes as far as each other, in every combination of senses */
@@ -108,6 +110,7 @@ static void write_head(const report_t *self, size_t ram_bytes)
     fprintf(self->out, "%-24s  %u us\n", "cycle", (unsigned)self->settings->cycle_us);
     fprintf(self->out, "%-24s  %zu bytes\n", "memory of the gateway", ram_bytes);
     write_bus(self);
+    config_scaling_report(self->config, self->out);
     fprintf(self->out, "%-24s  %u\n", "relays", self->settings->relays.count);
     write_settled(self);
 }
@@ -403,8 +406,17 @@ static void warn_profile_lag(report_t *self)
     }
 }
 
+static void warn_layout(report_t *self)
+{
+    config_text_t text;
+    for (unsigned at = 0; config_layout_next_oddity(self->config, &at, &text);) {
+        warn(self, text.data);
+    }
+}
+
 static void write_warnings(report_t *self)
 {
+    warn_layout(self);
     for (unsigned axis = 0; axis < AXES_MAX; axis++) {
         if (!config_has_axis(self->config, axis)) {
             continue;

@@ -349,13 +349,29 @@ void follow_begin(motion_t *self, uint64_t now_us)
     }
 }
 
+/* A stop, and the straight way that begins in it. */
+static void step_stop_and_straight(motion_t *self, ramp_ref_t ref[AXES_MAX])
+{
+    motion_straight_t *way = &self->plan.straight;
+    const bool was_done = halt_is_done(&self->halt) && scurve_is_done(&way->path);
+    halt_step(&self->halt, ref);
+    if (self->halt.elapsed > self->straight_after) {
+        scurve_step(&way->path);
+    }
+    for (unsigned i = 0; i < self->planned_slots; i++) {
+        const ramp_ref_t rest = {.pos_q32 = way->to_q32[i]};
+        const q32_t gone_q32 = scurve_between(&way->path, way->from_q32[i], way->to_q32[i]) - way->from_q32[i];
+        ref[i] = was_done ? rest : history_advance(&way->history[i], ref[i].pos_q32 + gone_q32);
+    }
+}
+
 /* The references of the slots along a plan. */
 static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
     if (self->source == MOTION_TIMED) {
         quintic_step(&self->plan.quintic, ref);
     } else if (self->source == MOTION_HALTING) {
-        halt_step(&self->halt, ref);
+        step_stop_and_straight(self, ref);
     } else {
         motion_straight_t *way = &self->plan.straight;
         const bool was_done = scurve_is_done(&way->path);
@@ -466,12 +482,4 @@ void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_M
     step_slots(self, cylinder_ref, out);
     out->angle_deg_q32 = ramp_step(&self->axis[AXIS_ANGLE], &cylinder_ref[AXIS_ANGLE], RAMP_FIRM);
     out->flags |= self->is_clamped ? MOTION_CLAMPED : 0;
-}
-
-void follow_end_cycle(motion_t *self)
-{
-    if (self->source == MOTION_HALTING && halt_is_done(&self->halt) && slot_all_at_rest(self, self->planned_slots)) {
-        slots_scale(self, self->space, self->slot_q32, self->goal_q32);
-        plan_straight(self, self->planned_slots, self->straight_cycles);
-    }
 }

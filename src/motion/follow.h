@@ -23,7 +23,4 @@ void follow_plan(motion_t *self, uint64_t now_us);
  *  @param out asked, angle and flags are filled in, and in pose space sent: the pose that the references belong to */
 void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], motion_output_t *out);
 
-/** Changes that become due at the end of a cycle. */
-void follow_end_cycle(motion_t *self);
-
 #endif

@@ -242,6 +242,12 @@ static q32_t velocity_after(const halt_t *self, unsigned i, int64_t k)
            fx_mul_div(push_of(start, t), shape, 2 * n1 * n3 * divisor_of(t));
 }
 
+q32_t halt_velocity(const halt_t *self, unsigned axis, int64_t cycle)
+{
+    const halt_times_t *t = &self->times[axis];
+    return cycle < t->change + t->hold + t->back ? velocity_after(self, axis, cycle) : 0;
+}
+
 void halt_step(halt_t *self, ramp_ref_t *ref)
 {
     const bool was_done = halt_is_done(self);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * motion.c - the sources of motion and their changes: resting, stopping, paths, following; one step per cycle.
- * Stops and paths run in cylinder space, where the limiter's own state is where the platform is; following is in motion_follow.c.
+ * Stops and paths run in cylinder space, where the limiter's own state is where the platform is; following is in follow.c.
  */
 #include "heave/motion.h"
 
@@ -8,6 +8,7 @@
 #include "follow.h"
 #include "reach.h"
 #include "slots.h"
+#include "stop.h"
 
 /* Extensions of a pose, inside the stroke with its margins. */
 static bool reaches(const motion_t *self, const pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX])
@@ -150,16 +151,6 @@ void motion_place(motion_t *self, const q32_t extension_mm_q32[CYLINDERS_MAX], q
     rest_here(self);
 }
 
-bool motion_is_at_rest(const motion_t *self)
-{
-    for (unsigned i = 0; i < self->cylinders; i++) {
-        if (!ramp_is_at_rest(&self->cylinder[i])) {
-            return false;
-        }
-    }
-    return ramp_is_at_rest(&self->axis[AXIS_ANGLE]);
-}
-
 /* All cylinders along a straight line, at engage speed for the one with the longest way. */
 static void start_path(motion_t *self)
 {
@@ -223,45 +214,11 @@ HV_OWN_FRAME static void go_on_after_stop(motion_t *self, uint64_t now_us)
     }
 }
 
-/* All cylinders and the rotation motor slow down together over the same time. */
-static void plan_stop(motion_t *self)
-{
-    halt_t *halt = &self->halt;
-    const ramp_limits_t *limits[AXES_MAX];
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        const ramp_t *ramp = i == AXIS_ANGLE ? &self->axis[AXIS_ANGLE] : &self->cylinder[i];
-        halt->start[i] = ramp->state;
-        limits[i] = &ramp->limits;
-    }
-    halt_plan(halt, AXES_MAX, CYLINDERS_MAX, halt->start, limits);
-    self->source = MOTION_STOPPING;
-    self->angle_target_deg_q32 = halt->rest_q32[AXIS_ANGLE];
-}
-
-static void begin_stop(motion_t *self, motion_next_t next)
-{
-    self->next = next;
-    self->is_taking_over = false;
-    self->is_fading = false;
-    self->has_pending = false;
-    self->timed_end_us = 0;
-    self->is_stretched = false;
-    if (self->source != MOTION_STOPPING) {
-        plan_stop(self);
-    }
-}
-
-void motion_stop(motion_t *self)
-{
-    self->is_following = false;
-    begin_stop(self, MOTION_THEN_REST);
-}
-
 static void move_to(motion_t *self, const q32_t *extension_mm_q32)
 {
     self->is_following = false;
     set_way(self, extension_mm_q32);
-    begin_stop(self, MOTION_THEN_PATH);
+    stop_begin(self, MOTION_THEN_PATH);
     self->plan.straight.to_q32[AXIS_ANGLE] = self->halt.rest_q32[AXIS_ANGLE];
 }
 
@@ -273,14 +230,6 @@ void motion_settle(motion_t *self)
 void motion_rise(motion_t *self)
 {
     move_to(self, self->neutral_mm_q32);
-}
-
-void motion_follow(motion_t *self)
-{
-    self->is_following = true;
-    begin_stop(self, MOTION_THEN_FOLLOW);
-    self->is_taking_over = true;
-    self->is_fading = false;
 }
 
 hv_status_t motion_target(motion_t *self, const motion_target_t *target, uint64_t now_us)
@@ -379,8 +328,6 @@ static void end_cycle(motion_t *self, uint64_t now_us)
     } else if (is_led_astray(self)) {
         self->singular_stops++;
         motion_follow(self);
-    } else if (self->is_following) {
-        follow_end_cycle(self);
     }
 }
 

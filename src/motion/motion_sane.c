@@ -91,8 +91,8 @@ static bool are_numbers_sane(const motion_t *saved)
            sane_all_q32(saved->goal_q32, AXES_MAX) && sane_all_q32(saved->timed_way_q32, AXES_MAX) &&
            sane_all_q32(saved->slot_extension_mm_q32, CYLINDERS_MAX) && sane_all_q32(saved->fade.from_q32, POSE_AXES) &&
            sane_all_q32(saved->fade.from_mm_q32, CYLINDERS_MAX) && sane_q32(saved->angle_target_deg_q32) &&
-           saved->asked_cycles >= 0 && saved->asked_cycles <= CYCLES_MAX && saved->straight_cycles >= 0 &&
-           saved->straight_cycles <= CYCLES_MAX && saved->timed_share_q46 >= 0 && saved->timed_share_q46 <= SHARE_MAX_Q46 &&
+           saved->asked_cycles >= 0 && saved->asked_cycles <= CYCLES_MAX && saved->straight_after >= 0 &&
+           saved->straight_after <= CYCLES_MAX && saved->timed_share_q46 >= 0 && saved->timed_share_q46 <= SHARE_MAX_Q46 &&
            sane_time(saved->last_us) && sane_time(saved->timed_end_us);
 }
 

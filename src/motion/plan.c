@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: MIT
  * plan.c - ways to a target that all slots go together.
- *
- * A quintic is tried for longer and longer times until axes and cylinders keep their limits.
  */
 #include "plan.h"
 
@@ -10,8 +8,7 @@
 #include "slots.h"
 #include "way.h"
 
-#define SHORTEST_CYCLES 32
-#define ATTEMPTS        34 /* each an eighth longer: up to 50 times the first ... */
+#define BLEND_PARTS     8 /* of a stop, after which the way behind it may begin */
 #define SMALL_WAY_Q32   (Q32_ONE / 16)
 #define START_SLACK_Q32 (Q32_ONE / 1000) /* rounding of a quintic's first points */
 
@@ -97,36 +94,16 @@ static bool try_quintic(motion_t *self, const task_t *task, int64_t cycles)
     return keeps_limits(self, task) && (self->space != MOTION_POSE || way_is_feasible(self, &self->plan.quintic));
 }
 
-static bool find_shortest(motion_t *self, const task_t *task, int64_t least, int64_t most)
-{
-    int64_t cycles = least > SHORTEST_CYCLES ? least : SHORTEST_CYCLES;
-    for (int attempt = 0; attempt < ATTEMPTS && cycles <= most; attempt++) {
-        if (try_quintic(self, task, cycles)) {
-            return true;
-        }
-        cycles += cycles / 8;
-    }
-    return false;
-}
-
-/* A stop from where a task starts. */
-static void halt_within(motion_t *self, const task_t *task, const ramp_limits_t *const *limits)
-{
-    halt_t *halt = &self->halt;
-    for (unsigned i = 0; i < task->slots; i++) {
-        halt->start[i] = start_of(self, task, i);
-    }
-    halt_plan(halt, task->slots, POSE_AXES, halt->start, limits);
-}
-
-/* Within those of the slots. */
+/* A stop of all slots together from where a task starts. */
 HV_OWN_FRAME static void halt_slots(motion_t *self, const task_t *task)
 {
     const ramp_limits_t *limits[AXES_MAX];
+    halt_t *halt = &self->halt;
     for (unsigned i = 0; i < task->slots; i++) {
         limits[i] = slot_limits(self, i);
+        halt->start[i] = start_of(self, task, i);
     }
-    halt_within(self, task, limits);
+    halt_plan(halt, task->slots, POSE_AXES, halt->start, limits);
 }
 
 /* The straight way between two points of the slots, as a path with the limits of axes and cylinders. */
@@ -155,27 +132,29 @@ void plan_straight(motion_t *self, unsigned slots, int64_t least_cycles)
     self->source = MOTION_STRAIGHT;
 }
 
-/* A stop first, then the straight way; the cycles of both. */
-static int64_t plan_stop_then_straight(motion_t *self, const task_t *task)
+/* In motion: a stop, and the straight way from where it ends, of so many cycles at least; the cycles of both. The way begins as
+ * early in the stop as the limits allow. Each part goes one way only, so that the sum goes no further than the stop or the
+ * target. */
+static int64_t plan_stop_and_straight(motion_t *self, const task_t *task, int64_t least_cycles)
 {
+    motion_straight_t *way = &self->plan.straight;
     halt_slots(self, task);
-    const path_limits_t path = limits_of_straight(self, task->slots, self->halt.rest_q32);
-    scurve_plan(&self->plan.straight.path, &path, 1);
-    self->straight_cycles = scurve_cycles(&self->plan.straight.path);
-    return self->halt.cycles + 1 + self->straight_cycles;
-}
-
-/* In motion: the shorter one of a quintic of at least so many cycles and a stop with a straight way. The cycles it takes. */
-static int64_t plan_quickest(motion_t *self, const task_t *task, int64_t least)
-{
-    const int64_t in_two_parts = plan_stop_then_straight(self, task);
-    self->source = MOTION_TIMED;
-    const int64_t from = least > in_two_parts / 4 ? least : in_two_parts / 4; /* none is shorter than that */
-    if (find_shortest(self, task, from, in_two_parts)) {
-        return self->plan.quintic.cycles;
+    for (unsigned i = 0; i < task->slots; i++) {
+        way->history[i] = self->halt.start[i];
+        way->from_q32[i] = self->halt.rest_q32[i];
+        way->to_q32[i] = self->goal_q32[i];
     }
+    const path_limits_t limits = limits_of_straight(self, task->slots, way->from_q32);
+    scurve_plan(&way->path, &limits, 1);
+    int64_t part = 0;
+    while (part < BLEND_PARTS && !way_blend_is_feasible(self, task->slots, self->halt.cycles * part / BLEND_PARTS)) {
+        part++;
+    }
+    self->straight_after = self->halt.cycles * part / BLEND_PARTS;
+    scurve_plan(&way->path, &limits, least_cycles - self->straight_after);
     self->source = MOTION_HALTING;
-    return in_two_parts;
+    const int64_t cycles = self->straight_after + scurve_cycles(&way->path);
+    return cycles > self->halt.cycles ? cycles : self->halt.cycles;
 }
 
 static int64_t plan_timed_cycles(motion_t *self, int64_t cycles)
@@ -189,12 +168,7 @@ static int64_t plan_timed_cycles(motion_t *self, int64_t cycles)
         plan_straight(self, AXES_MAX, cycles);
         return scurve_cycles(&self->plan.straight.path);
     }
-    if (plan_stop_then_straight(self, &task) <= cycles) {
-        self->source = MOTION_HALTING;
-        self->straight_cycles = cycles - self->halt.cycles - 1;
-        return cycles;
-    }
-    return plan_quickest(self, &task, cycles);
+    return plan_stop_and_straight(self, &task, cycles);
 }
 
 void plan_timed(motion_t *self, int64_t asked, bool is_first, uint64_t now_us)
@@ -261,5 +235,5 @@ void plan_step(motion_t *self)
         return;
     }
     const task_t task = {.slots = POSE_AXES, .is_shifted = true, .target_q32 = self->goal_q32};
-    (void)plan_quickest(self, &task, 1);
+    (void)plan_stop_and_straight(self, &task, 1);
 }

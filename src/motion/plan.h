@@ -7,7 +7,7 @@
 #include "heave/motion.h"
 
 /** Plans a timed move to self->goal_q32: a quintic if the limits allow; else from rest an S-curve, longer than asked if need be;
- * in motion a stop and an S-curve where the time has room for both, or whatever arrives first.
+ * in motion a stop and an S-curve, which begins as early in the stop as the limits allow.
  *  @param asked cycles, 0 = as few as there can be */
 void plan_timed(motion_t *self, int64_t asked, bool is_first, uint64_t now_us);
 

@@ -458,6 +458,12 @@ uint32_t stream_period_us(const stream_t *self)
     return self->phase == STREAM_RUNNING ? (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16) : 0;
 }
 
+uint32_t stream_frame_us(const stream_t *self)
+{
+    return self->phase == STREAM_RUNNING && self->repeat.each > 1 ? self->repeat.span_us / self->repeat.frames
+                                                                  : stream_period_us(self);
+}
+
 uint32_t stream_delay_us(const stream_t *self)
 {
     if (self->phase != STREAM_RUNNING) {

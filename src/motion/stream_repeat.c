@@ -97,9 +97,3 @@ uint32_t stream_repeat_period_us(stream_t *stream)
     const int64_t off_us_q16 = fx_abs((int64_t)period_us * STREAM_US_Q16 - is_us_q16);
     return off_us_q16 * 8 > is_us_q16 ? period_us : 0; /* else the stream is at that rate already */
 }
-
-uint32_t stream_frame_us(const stream_t *self)
-{
-    return self->phase == STREAM_RUNNING && self->repeat.each > 1 ? self->repeat.span_us / self->repeat.frames
-                                                                  : stream_period_us(self);
-}

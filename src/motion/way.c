@@ -5,9 +5,12 @@
  */
 #include "way.h"
 
+#include "slot.h"
+
 #define QUINTIC_SHIFT   5 /* a division for each limit of each piece took a sixth of the time of a plan */
 #define QUINTIC_PIECES  (1 << QUINTIC_SHIFT)
 #define STRAIGHT_PIECES 16
+#define BLEND_PIECES    32
 
 /* The last differences of one cylinder's extensions. */
 typedef struct {
@@ -124,4 +127,75 @@ void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q
         const ramp_limits_t left = less_bend(&motion->cylinder[i].limits, bend_q32[i], limits);
         path_limits_narrow(limits, slope_q32[i], &left);
     }
+}
+
+/* The positions of the slots n cycles later: those of the stop, by the trapezoidal rule, and what the straight way adds. */
+static void advance_blend(const motion_t *motion, unsigned slots, int64_t cycle, int64_t n, q32_t *vel_q32, q32_t *halted_q32)
+{
+    for (unsigned i = 0; i < slots; i++) {
+        const q32_t next_q32 = halt_velocity(&motion->halt, i, cycle);
+        halted_q32[i] += (vel_q32[i] + next_q32) * n / 2;
+        vel_q32[i] = next_q32;
+    }
+}
+
+/* A sample of all slots: whether each is within. */
+static bool are_within(differences_t *d, int64_t sample, const q32_t *pos_q32, unsigned count, const ramp_limits_t *const *limits,
+                       int64_t n)
+{
+    bool are = true;
+    for (unsigned i = 0; i < count; i++) {
+        const q32_t third_q32 = add_sample(&d[i], sample, pos_q32[i]);
+        are = are && fx_abs(d[i].first_q32) <= limits[i]->vel_per_cycle_q32 * n + n &&
+              fx_abs(d[i].second_q32) <= (limits[i]->acc_per_cycle2_q32 * n + n) * n &&
+              fx_abs(third_q32) <= (limits[i]->jerk_per_cycle3_q32 * n + n) * n * n;
+    }
+    return are;
+}
+
+HV_OWN_FRAME bool way_blend_is_feasible(const motion_t *motion, unsigned slots, int64_t after)
+{
+    const motion_straight_t *way = &motion->plan.straight;
+    const int64_t n = 1 + motion->halt.cycles / BLEND_PIECES;
+    scurve_t path = way->path;
+    differences_t slot[AXES_MAX] = {{0}};
+    differences_t cylinder[CYLINDERS_MAX] = {{0}};
+    const ramp_limits_t *slot_list[AXES_MAX];
+    const ramp_limits_t *cylinder_list[CYLINDERS_MAX];
+    q32_t vel_q32[AXES_MAX];
+    q32_t halted_q32[AXES_MAX];
+    for (unsigned i = 0; i < slots; i++) {
+        slot_list[i] = slot_limits(motion, i);
+        vel_q32[i] = motion->halt.start[i].vel_per_cycle_q32;
+        halted_q32[i] = motion->halt.start[i].pos_q32;
+    }
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        cylinder_list[i] = &motion->cylinder[i].limits;
+    }
+    for (int64_t cycle = n, sample = 0; cycle <= motion->halt.cycles + n; cycle += n, sample++) {
+        q32_t pos_q32[AXES_MAX] = {0};
+        q32_t extension_mm_q32[CYLINDERS_MAX];
+        pose_t pose = {{0}};
+        advance_blend(motion, slots, cycle, n, vel_q32, halted_q32);
+        for (int64_t k = cycle - n; k < cycle; k++) {
+            if (k >= after) {
+                scurve_step(&path);
+            }
+        }
+        for (unsigned i = 0; i < slots; i++) {
+            pos_q32[i] = halted_q32[i] + scurve_between(&path, way->from_q32[i], way->to_q32[i]) - way->from_q32[i];
+        }
+        if (!are_within(slot, sample, pos_q32, slots, slot_list, n)) {
+            return false;
+        }
+        for (unsigned i = 0; i < POSE_AXES; i++) {
+            pose.axis_q32[i] = pos_q32[i];
+        }
+        if (motion->space == MOTION_POSE &&
+            (kin_inverse(&motion->kin, &pose, extension_mm_q32) != HV_OK ||
+             !are_within(cylinder, sample, extension_mm_q32, motion->cylinders, cylinder_list, n))) {
+            return false;
+        }
+    }
+    return true;
 }

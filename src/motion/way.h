@@ -13,4 +13,9 @@ bool way_is_feasible(const motion_t *motion, const quintic_t *quintic);
 /** Narrows path limits so that every cylinder keeps its own on the straight way between two poses (17 of them are looked at). */
 void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q32, path_limits_t *limits);
 
+/** True if axes and cylinders keep their limits while motion->halt and motion->plan.straight are made together, the straight way
+ * from a cycle of the stop on (33 points are looked at). What the stop alone asks of the cylinders counts too.
+ *  @param after cycles of the stop before the straight way begins */
+bool way_blend_is_feasible(const motion_t *motion, unsigned slots, int64_t after);
+
 #endif

@@ -8,6 +8,7 @@
  * behind it.
  */
 #include "heave/frame.h"
+#include "frame_command.h"
 #include "frame_quick.h"
 
 typedef enum {
@@ -23,26 +24,6 @@ typedef enum {
 } phase_t;
 
 enum { MASK_DIGITS_MAX = 4 };
-
-typedef struct {
-    char name[3];
-    uint8_t value_count;
-} command_t;
-
-static const command_t k_commands[FRAME_COMMANDS] = {
-    [FRAME_A3] = {"A3", 3}, [FRAME_A4] = {"A4", 4}, [FRAME_A6] = {"A6", 6}, [FRAME_A7] = {"A7", 7},
-    [FRAME_C3] = {"C3", 3}, [FRAME_C6] = {"C6", 6}, [FRAME_C7] = {"C7", 7},
-};
-
-unsigned frame_value_count(frame_command_t command)
-{
-    return k_commands[command].value_count;
-}
-
-const char *frame_command_name(frame_command_t command)
-{
-    return k_commands[command].name;
-}
 
 /* Line breaks are blanks: people and their tools wrap long frames. */
 static bool is_blank(uint8_t byte)
@@ -166,15 +147,6 @@ static void take_letter(frame_scanner_t *self, uint8_t byte)
     }
 }
 
-frame_command_t frame_find_command(char letter, uint8_t digit)
-{
-    unsigned command = 0;
-    while (command < FRAME_COMMANDS && (k_commands[command].name[0] != letter || (uint8_t)k_commands[command].name[1] != digit)) {
-        command++;
-    }
-    return (frame_command_t)command;
-}
-
 static void take_digit(frame_scanner_t *self, uint8_t byte)
 {
     const frame_command_t command = frame_find_command(self->letter, byte);
@@ -183,7 +155,7 @@ static void take_digit(frame_scanner_t *self, uint8_t byte)
         return;
     }
     self->frame.command = command;
-    self->frame.count = k_commands[command].value_count;
+    self->frame.count = (uint8_t)frame_value_count(command);
     self->phase = PHASE_SUFFIX;
 }
 

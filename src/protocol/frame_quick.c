@@ -5,6 +5,8 @@
  */
 #include "frame_quick.h"
 
+#include "frame_command.h"
+
 enum { DIGITS_MAX = 13, MASK_DIGITS_MAX = 4, TIME_DIGITS_MAX = 7 };
 
 /* By powers of ten from 1, for up to 12 decimals: 2^(63 + shift) / power, rounded up and of 64 bits. What it is too large by,

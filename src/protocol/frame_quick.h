@@ -17,7 +17,4 @@
     assigns *frame, \result \from text[..]; */
 size_t frame_quick(const uint8_t *text, const uint8_t *end, frame_t *frame);
 
-/** FRAME_COMMANDS where there is none of that name. */
-frame_command_t frame_find_command(char letter, uint8_t digit);
-
 #endif

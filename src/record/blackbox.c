@@ -10,14 +10,16 @@
 #include <string.h>
 #include <time.h>
 
+#include "common/state_path.h"
 #include "record/blackbox_files.h"
+#include "record/blackbox_kept.h"
 
-#define AFTER_US         2000000u /* of what a fault leads to: every stop has ended by then */
 #define STATE_US         5000000u /* from one place where a replay can begin to the next */
 #define FEED_BYTES       (1u << 20)
 #define FEED_STATE_BYTES (1u << 16)
 #define KEPT_MIN_BYTES   (1u << 20)
 #define KEPT_MAX_BYTES   (1u << 30)
+#define PAUSE_MS         10
 #define END_WAIT_MS      5000
 
 /* --- The motion thread --- */
@@ -77,106 +79,6 @@ void blackbox_cycle(blackbox_feed_t *feed, const session_t *session, const trace
         (void)ring_push(&feed->states, &state, sizeof state, NULL, 0);
         feed->next_state_us = session->now_us + STATE_US;
     }
-}
-
-/* --- What is kept --- */
-
-static uint64_t time_of(const blackbox_lane_t *lane, const blackbox_item_t *item)
-{
-    uint64_t t_us = 0;
-    memcpy(&t_us, (const uint8_t *)item + lane->time_at, sizeof t_us);
-    return t_us;
-}
-
-static void lose_until(blackbox_lane_t *lane, uint64_t t_us)
-{
-    lane->lost_until_us = t_us > lane->lost_until_us ? t_us : lane->lost_until_us;
-}
-
-/* The newest item in, and as many of the oldest ones out as that takes; what an incident still has to be written from stays. */
-static void keep(blackbox_t *self, blackbox_lane_t *lane, size_t length)
-{
-    while (!ring_push(&lane->kept, &self->item, length, NULL, 0)) {
-        const bool is_needed = lane->is_reading && lane->reader.taken == lane->kept.taken;
-        if (is_needed || ring_pop(&lane->kept, &self->oldest, sizeof self->oldest) == 0) {
-            lose_until(lane, time_of(lane, &self->item));
-            return;
-        }
-        lose_until(lane, time_of(lane, &self->oldest));
-    }
-}
-
-/* What was not handed over was so before this row came. */
-static void end_gap(blackbox_lane_t *lane, const blackbox_row_t *row)
-{
-    if (lane->is_gap) {
-        lane->is_gap = false;
-        lose_until(lane, row->now_us);
-    }
-}
-
-/* Looks at a row on its way in: the time, and whether an incident has begun. */
-static void watch(blackbox_t *self, const blackbox_row_t *row)
-{
-    end_gap(&self->records, row);
-    end_gap(&self->rows, row);
-    const bool is_latched = row->row.state == STATE_FAULT || row->row.state == STATE_ESTOP;
-    self->newest_us = row->now_us;
-    if (is_latched && row->row.state != self->last_state && self->due_us == 0) {
-        self->cause = *row;
-        self->due_us = row->now_us + AFTER_US;
-    }
-    self->last_state = row->row.state;
-}
-
-static void take_rows(blackbox_t *self)
-{
-    size_t length = ring_pop(self->rows.from, &self->item, sizeof self->item);
-    for (; length > 0; length = ring_pop(self->rows.from, &self->item, sizeof self->item)) {
-        watch(self, &self->item.row);
-        keep(self, &self->rows, length);
-    }
-}
-
-static void take_records(blackbox_t *self)
-{
-    size_t length = ring_pop(self->records.from, &self->item, sizeof self->item);
-    for (; length > 0; length = ring_pop(self->records.from, &self->item, sizeof self->item)) {
-        if (self->item.record.head.kind == RECORD_ZERO) {
-            self->zero_us = self->item.record.head.t_us;
-        } else if (self->item.record.head.kind == RECORD_RELOAD) {
-            self->reloaded_us = self->item.record.head.t_us;
-        }
-        keep(self, &self->records, length);
-    }
-}
-
-static void take_states(blackbox_t *self)
-{
-    size_t length = ring_pop(self->states.from, &self->item, sizeof self->item);
-    for (; length > 0; length = ring_pop(self->states.from, &self->item, sizeof self->item)) {
-        keep(self, &self->states, length);
-    }
-}
-
-/* What the motion thread could not hand over. When that was, the first row tells that comes after all those that had come by
- * the time of this count. */
-static void note_drops(blackbox_lane_t *lane, uint32_t dropped)
-{
-    lane->is_gap = lane->is_gap || dropped != lane->dropped;
-    lane->dropped = dropped;
-}
-
-void blackbox_take(blackbox_t *self)
-{
-    take_rows(self);
-    take_records(self);
-    const uint32_t records = ring_dropped(self->records.from);
-    const uint32_t rows = ring_dropped(self->rows.from);
-    take_rows(self);
-    note_drops(&self->records, records);
-    note_drops(&self->rows, rows);
-    take_states(self);
 }
 
 /* --- When it is written --- */
@@ -308,32 +210,20 @@ static bool describe_platform(blackbox_t *self, const config_t *config)
     return fclose(out) == 0;
 }
 
-static const char *directory_of(const config_t *config)
-{
-    const char *given = getenv("STATE_DIRECTORY"); /* of systemd; the first one of a list */
-    if (strcmp(config->black_box.directory, "none") != 0) {
-        return config->black_box.directory;
-    }
-    return given != NULL ? given : "";
-}
-
 const char *blackbox_open(blackbox_t *self, const char *config_path, const config_t *config)
 {
-    const char *directory = directory_of(config);
-    const size_t length = strcspn(directory, ":");
     self->file.fd = -1;
     self->config_path = config_path;
     self->settings = &config->settings;
     memcpy(self->config_hash, config->hash, sizeof self->config_hash);
     self->folders_max = config->black_box.incidents;
     (void)pthread_mutex_init(&self->mutex, NULL);
-    if (length == 0) {
-        return NULL;
-    }
-    if (length >= sizeof self->directory) {
+    if (!state_path(self->directory, sizeof self->directory, config->black_box.directory, "")) {
         return "black box: the directory's path is too long";
     }
-    memcpy(self->directory, directory, length);
+    if (self->directory[0] == '\0') {
+        return NULL;
+    }
     if (!get_memory(self, config) || !describe_platform(self, config)) {
         free(self->memory);
         free(self->platform);
@@ -361,7 +251,7 @@ bool blackbox_start(blackbox_t *self)
     if (self->memory == NULL) {
         return true;
     }
-    self->has_no_thread = !worker_start(&self->worker, step, self);
+    self->has_no_thread = !worker_start(&self->worker, step, self, PAUSE_MS);
     return !self->has_no_thread;
 }
 

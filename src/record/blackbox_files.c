@@ -18,6 +18,7 @@
 #include "common/decimal.h"
 #include "common/message.h"
 #include "heave/text.h"
+#include "record/blackbox_kept.h"
 
 #define PREFIX          "incident-"
 #define DUMP            "-dump"

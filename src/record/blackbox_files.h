@@ -20,7 +20,4 @@ bool blackbox_write(blackbox_t *self, const blackbox_row_t *cause, char text[BLA
 /** Keeps what a person has seen in the directory, where that has changed. Says where it cannot. */
 void blackbox_keep_seen(blackbox_t *self);
 
-/** Takes over what was fed meanwhile (blackbox.c). */
-void blackbox_take(blackbox_t *self);
-
 #endif

@@ -14,14 +14,14 @@
 
 #include "common/message.h"
 #include "common/sha256.h"
+#include "common/state_path.h"
 
 #define COPIES      2u
 #define TEXT_MAX    1024u
 #define PATH_BYTES  (CONFIG_PATH_MAX + 8u)
 #define DIGITS      16u /* of the checksum */
-#define STACK_BYTES (64u * 1024u)
-#define PAUSE_NS    100000000
-#define END_WAITS   10 /* pauses */
+#define PAUSE_MS    100u
+#define END_WAIT_MS 1000u
 
 /* --- The text of a file: lines that a person can read, then a checksum of them --- */
 
@@ -224,18 +224,6 @@ bool lifetime_trouble(lifetime_t *self, int *error)
 
 /* --- Start and end --- */
 
-static bool find_path(lifetime_t *self, const config_t *config)
-{
-    const char *const state = getenv("STATE_DIRECTORY");
-    if (strcmp(config->life_file, "none") != 0) {
-        (void)snprintf(self->path, sizeof self->path, "%s", config->life_file);
-    } else if (state != NULL && state[0] == '/') {
-        const int needed = snprintf(self->path, sizeof self->path, "%.*s/" LIFETIME_NAME, (int)strcspn(state, ":"), state);
-        return needed > 0 && (size_t)needed < sizeof self->path;
-    }
-    return true;
-}
-
 /* The newest copy that is right. Copies that are not there are no error, as long as not one of them is damaged. */
 static int read_newest(lifetime_t *self)
 {
@@ -254,7 +242,7 @@ static int read_newest(lifetime_t *self)
 int lifetime_open(lifetime_t *self, const config_t *config, uint32_t axes)
 {
     ring_init(&self->ring, self->ring_bytes, sizeof self->ring_bytes);
-    if (!find_path(self, config)) {
+    if (!state_path(self->path, sizeof self->path, config->life_file, "/" LIFETIME_NAME)) {
         return print_message(EXIT_NO_OUTPUT, "life of the machine: the path of the state directory is too long");
     }
     const int error = self->path[0] != '\0' ? read_newest(self) : 0;
@@ -282,51 +270,24 @@ int lifetime_open(lifetime_t *self, const config_t *config, uint32_t axes)
                                self->path, strerror(unwritten));
 }
 
-static void *run(void *argument)
+static void step(void *ctx, bool is_end)
 {
-    lifetime_t *self = argument;
-    const struct timespec pause = {.tv_nsec = PAUSE_NS};
-    while (__atomic_load_n(&self->is_quit, __ATOMIC_ACQUIRE) == 0) {
-        lifetime_step(self);
-        (void)nanosleep(&pause, NULL);
-    }
-    lifetime_step(self);
-    __atomic_store_n(&self->is_ended, 1, __ATOMIC_RELEASE);
-    return NULL;
+    (void)is_end;
+    lifetime_step(ctx);
 }
 
 bool lifetime_start(lifetime_t *self)
 {
-    if (self->path[0] == '\0') {
-        return true;
-    }
-    pthread_attr_t attributes;
-    (void)pthread_attr_init(&attributes);
-    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES);
-    const int error = pthread_create(&self->thread, &attributes, run, self);
-    (void)pthread_attr_destroy(&attributes);
-    self->is_running = error == 0;
-    errno = error;
-    return self->is_running;
+    return self->path[0] == '\0' || worker_start(&self->worker, step, self, PAUSE_MS);
 }
 
 bool lifetime_close(lifetime_t *self)
 {
-    const struct timespec pause = {.tv_nsec = PAUSE_NS};
     if (self->path[0] == '\0') {
         return true;
     }
     hand_over(self);
-    __atomic_store_n(&self->is_quit, 1, __ATOMIC_RELEASE);
-    for (unsigned i = 0; self->is_running && i < END_WAITS; i++) {
-        if (__atomic_load_n(&self->is_ended, __ATOMIC_ACQUIRE) != 0) {
-            (void)pthread_join(self->thread, NULL);
-            self->is_running = false;
-        } else {
-            (void)nanosleep(&pause, NULL);
-        }
-    }
-    if (self->is_running) {
+    if (!worker_close(&self->worker, END_WAIT_MS)) {
         return false;
     }
     lifetime_step(self);

@@ -6,9 +6,8 @@
 #ifndef HEAVE_SERVICE_LIFETIME_H
 #define HEAVE_SERVICE_LIFETIME_H
 
-#include <pthread.h>
-
 #include "common/ring.h"
+#include "common/worker.h"
 #include "config/config.h"
 #include "heave/telemetry.h"
 
@@ -39,13 +38,10 @@ typedef struct {
     lifetime_totals_t now;
     state_t state; /**< of the last look */
     uint64_t next_us;
-    ring_t ring;       /**< lifetime_totals_t to the writer */
-    int32_t error;     /**< atomic: errno of the newest write, 0 = it worked */
-    int32_t told;      /**< error that lifetime_trouble() has told of */
-    uint32_t is_quit;  /**< atomic */
-    uint32_t is_ended; /**< atomic */
-    bool is_running;
-    pthread_t thread;
+    ring_t ring;   /**< lifetime_totals_t to the writer */
+    int32_t error; /**< atomic: errno of the newest write, 0 = it worked */
+    int32_t told;  /**< error that lifetime_trouble() has told of */
+    worker_t worker;
     uint8_t ring_bytes[LIFETIME_RING_BYTES];
 } lifetime_t;
 

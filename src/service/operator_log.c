@@ -6,19 +6,18 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "common/json.h"
 #include "common/message.h"
+#include "common/state_path.h"
 
 #define LINE_MAX_BYTES 2048u /* every character of every text escaped */
 #define PATH_BYTES     (CONFIG_PATH_MAX + 16u)
-#define STACK_BYTES    (64u * 1024u) /* locked into memory whole */
-#define PAUSE_NS       100000000
-#define END_WAITS      10 /* pauses */
+#define PAUSE_MS       100u
+#define END_WAIT_MS    1000u
 #define KB             1024u
 
 /* --- A line --- */
@@ -194,27 +193,13 @@ bool operator_log_trouble(operator_log_t *self, int *error)
 
 /* --- Start and end --- */
 
-/* What is configured, else a file in the state directory that a service manager has given. */
-static bool find_path(operator_log_t *self, const config_t *config)
-{
-    const char *const state = getenv("STATE_DIRECTORY");
-    if (strcmp(config->operator_log, "none") != 0) {
-        (void)snprintf(self->path, sizeof self->path, "%s", config->operator_log);
-    } else if (state != NULL && state[0] == '/') {
-        const int length = (int)strcspn(state, ":");
-        const int needed = snprintf(self->path, sizeof self->path, "%.*s/" OPERATOR_LOG_NAME, length, state);
-        return needed > 0 && (size_t)needed < sizeof self->path;
-    }
-    return true;
-}
-
 int operator_log_open(operator_log_t *self, const config_t *config)
 {
     ring_init(&self->ring, self->ring_bytes, sizeof self->ring_bytes);
     self->fd = -1;
     self->bytes_max = (uint64_t)config->operator_log_kb * KB;
     self->files = config->operator_log_files;
-    if (!find_path(self, config)) {
+    if (!state_path(self->path, sizeof self->path, config->operator_log, "/" OPERATOR_LOG_NAME)) {
         return print_message(EXIT_NO_OUTPUT, "operator log: the path of the state directory is too long");
     }
     const int error = self->path[0] != '\0' ? open_file(self) : 0;
@@ -227,32 +212,15 @@ int operator_log_open(operator_log_t *self, const config_t *config)
     return code;
 }
 
-static void *run(void *argument)
+static void step(void *ctx, bool is_end)
 {
-    operator_log_t *self = argument;
-    const struct timespec pause = {.tv_nsec = PAUSE_NS};
-    while (__atomic_load_n(&self->is_quit, __ATOMIC_ACQUIRE) == 0) {
-        operator_log_step(self);
-        (void)nanosleep(&pause, NULL);
-    }
-    operator_log_step(self);
-    __atomic_store_n(&self->is_ended, 1, __ATOMIC_RELEASE);
-    return NULL;
+    (void)is_end;
+    operator_log_step(ctx);
 }
 
 bool operator_log_start(operator_log_t *self)
 {
-    if (self->path[0] == '\0') {
-        return true;
-    }
-    pthread_attr_t attributes;
-    (void)pthread_attr_init(&attributes);
-    (void)pthread_attr_setstacksize(&attributes, STACK_BYTES);
-    const int error = pthread_create(&self->thread, &attributes, run, self);
-    (void)pthread_attr_destroy(&attributes);
-    self->is_running = error == 0;
-    errno = error;
-    return self->is_running;
+    return self->path[0] == '\0' || worker_start(&self->worker, step, self, PAUSE_MS);
 }
 
 /* The newest of the entries that were only counted, as a line. */
@@ -268,18 +236,8 @@ static void end_repeats(operator_log_t *self)
 
 bool operator_log_close(operator_log_t *self)
 {
-    const struct timespec pause = {.tv_nsec = PAUSE_NS};
     end_repeats(self);
-    __atomic_store_n(&self->is_quit, 1, __ATOMIC_RELEASE);
-    for (unsigned i = 0; self->is_running && i < END_WAITS; i++) {
-        if (__atomic_load_n(&self->is_ended, __ATOMIC_ACQUIRE) != 0) {
-            (void)pthread_join(self->thread, NULL);
-            self->is_running = false;
-        } else {
-            (void)nanosleep(&pause, NULL);
-        }
-    }
-    if (self->is_running) {
+    if (!worker_close(&self->worker, END_WAIT_MS)) {
         return false;
     }
     if (self->path[0] != '\0') {

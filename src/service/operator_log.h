@@ -6,13 +6,13 @@
 #ifndef HEAVE_SERVICE_OPERATOR_LOG_H
 #define HEAVE_SERVICE_OPERATOR_LOG_H
 
-#include <pthread.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <sys/types.h>
 #include <time.h>
 
 #include "common/ring.h"
+#include "common/worker.h"
 #include "config/config.h"
 #include "heave/supervisor.h"
 
@@ -47,14 +47,11 @@ typedef struct {
     operator_entry_t last;
     uint32_t repeats; /**< of the last one */
     struct timespec repeated_at;
-    ring_t ring;      /**< operator_entry_t to the writer */
-    uint32_t failed;  /**< atomic: entries that could not be written */
-    int32_t error;    /**< atomic: errno of the newest failure, 0 = the newest entry is on the disk */
-    int32_t told;     /**< error that operator_log_trouble() has told of */
-    uint32_t is_quit; /**< atomic */
-    uint32_t is_ended;
-    bool is_running;
-    pthread_t thread;
+    ring_t ring;     /**< operator_entry_t to the writer */
+    uint32_t failed; /**< atomic: entries that could not be written */
+    int32_t error;   /**< atomic: errno of the newest failure, 0 = the newest entry is on the disk */
+    int32_t told;    /**< error that operator_log_trouble() has told of */
+    worker_t worker;
     uint8_t ring_bytes[OPERATOR_LOG_RING_BYTES];
 } operator_log_t;
 

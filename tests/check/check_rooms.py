@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""check_rooms.py [--root DIR] - the folders of src/ use each other in the directions that tools/lib/rooms.py names, and no file leads back to itself.
+"""check_rooms.py --build DIR [--root DIR] - the folders of src/ use each other in the directions that tools/lib/rooms.py names, and no source leads
+back to itself.
 
-A file is an x.c with its x.h: the header beside it, or the public one, include/heave/x.h. What it uses are the headers that both include.
+Which room uses which is told by the headers that its files include; which source uses which, by the symbols of the objects in DIR.
 src/DESIGN.md has a row for each folder, which names the same directions.
 """
 import argparse
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -18,42 +20,41 @@ import rooms  # noqa: E402  the path above has to be set first
 USES = {**rooms.CORE, **rooms.PROGRAMS}
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*"([^"]+)"', re.MULTILINE)
 ROW = re.compile(r"^\| `src/(\w+)/` \|[^|]*\|([^|]*)\|$", re.MULTILINE)
-HEAVIEST = 0.2  # of all lines
+HEAVIEST = 0.2  # of the lines of src/, hal/ and include/
 
 
-def units(root):
-    """{(room, name): paths}: sources with their headers."""
-    found = {}
+def included(root):
+    """(room, header's name as it is written, the folder of src/ or "include" that it is in, where) of each include that leads out of its room."""
     for path in sorted((root / "src").rglob("*.[ch]")):
-        found.setdefault((path.parent.name, path.stem), []).append(path)
-    for path in sorted((root / "include/heave").glob("*.h")):
-        homes = [unit for unit in found if unit[1] == path.stem and unit[0] in rooms.CORE]
-        if homes:
-            found[homes[0]].append(path)
-        else:
-            found["include", path.stem] = [path]
-    return found
+        room = path.parent.name
+        for name in INCLUDE.findall(path.read_text(encoding="utf-8")):
+            for base in (path.parent, root / "src", root / "include"):
+                target = (base / name).resolve()
+                if target.is_file() and target.is_relative_to(root):
+                    parts = target.relative_to(root).parts
+                    other = parts[1] if parts[0] == "src" else parts[0]
+                    if other != room:
+                        yield room, other, f"{path.relative_to(root)} includes {name}"
+                    break
 
 
-def graph(root):
-    """{unit: {unit: where it is included}}"""
-    found = units(root)
-    unit_of = {path.resolve(): unit for unit, paths in found.items() for path in paths}
-    edges = {unit: {} for unit in found}
-    for unit, paths in found.items():
-        for path in paths:
-            for name in INCLUDE.findall(path.read_text(encoding="utf-8")):
-                for target in (path.parent / name, root / "src" / name, root / "include" / name):
-                    other = unit_of.get(target.resolve())
-                    if other is not None:
-                        if other != unit:
-                            edges[unit].setdefault(other, f"{path.relative_to(root)} includes {name}")
-                        break
-    return edges
+def references(build):
+    """{source: the sources that define what it needs}"""
+    defined, needed = {}, {}
+    for path in sorted((build / "src").rglob("*.o")):
+        source = "/".join(part for part in path.relative_to(build / "src").parts if part != "CMakeFiles" and not part.endswith(".dir")).removesuffix(".o")
+        needed[source] = set()
+        listed = subprocess.run(["nm", "--format=posix", path], stdout=subprocess.PIPE, text=True, check=True).stdout
+        for name, kind in (line.split()[:2] for line in listed.splitlines()):
+            if kind == "U":
+                needed[source].add(name)
+            elif kind.isupper():
+                defined[name] = source
+    return {source: {defined[name] for name in names if name in defined} - {source} for source, names in needed.items()}
 
 
 def circles(edges):
-    """Each group of units that lead to each other (Tarjan's strongly connected components)."""
+    """Each group of names that lead to each other (Tarjan's strongly connected components)."""
     index, low, stack, found = {}, {}, [], []
 
     def visit(unit):
@@ -78,15 +79,13 @@ def circles(edges):
     return found
 
 
-def wrong_ways(edges):
-    return [f"{where}: {unit[0]} may not use {other[0]}" for unit, others in edges.items() for other, where in others.items()
-            if unit[0] != "include" and other[0] not in ("include", unit[0]) and other[0] not in USES.get(unit[0], ())
-            and not (other[0] in rooms.CORE and (unit[0] in rooms.PROGRAMS or where.split(" includes ")[1].startswith("heave/")))]
+def wrong_ways(root):
+    return [f"{where}: src/{room} may not use src/{other}" for room, other, where in included(root)
+            if other in USES and other not in USES.get(room, ()) and not (room in rooms.PROGRAMS and other in rooms.CORE)]
 
 
-def private_ways(edges):
-    return [where for unit, others in edges.items() for other, where in others.items()
-            if unit[0] in rooms.PROGRAMS and other[0] in rooms.CORE and not where.split(" includes ")[1].startswith("heave/")]
+def private_ways(root):
+    return [where for room, other, where in included(root) if room in rooms.PROGRAMS and other in rooms.CORE]
 
 
 def up_ways():
@@ -96,7 +95,7 @@ def up_ways():
 
 def lines_of(root):
     count = {}
-    for path in (root / "src").rglob("*.[ch]"):
+    for path in [path for folder in ("src", "hal", "include") for path in (root / folder).rglob("*.[ch]")]:
         count[path.parent.name] = count.get(path.parent.name, 0) + path.read_text(encoding="utf-8").count("\n")
     return count
 
@@ -114,17 +113,22 @@ def design_rows(root):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--root", type=Path, default=Path(__file__).resolve().parents[2])
-    root = parser.parse_args().root.resolve()
-    suite, edges = tap.Suite(), graph(root)
+    parser.add_argument("--build", type=Path, required=True)
+    args = parser.parse_args()
+    root, suite = args.root.resolve(), tap.Suite()
     with suite.case("each folder of src/ is a room, and each room a folder"):
         folders = {path.name for path in (root / "src").iterdir() if path.is_dir()}
         must(sorted(folders ^ set(USES)), "only in one of src/ and tools/lib/rooms.py")
     with suite.case("the rooms are in layers"):
         must(up_ways(), "rooms that lead to each other")
     with suite.case("each room uses the rooms that it may"):
-        must(wrong_ways(edges), "the wrong way")
+        must(wrong_ways(root), "the wrong way")
     with suite.case("the programs use the core through its public headers"):
-        must(private_ways(edges), "private headers")
+        must(private_ways(root), "private headers")
+    with suite.case("no source leads back to itself"):
+        found = references(args.build)
+        assert found, f"no object in {args.build}"
+        must(circles(found), "circles")
     with suite.case("src/DESIGN.md says the same"):
         must(design_rows(root), "differs")
     with suite.case(f"no room has more than {HEAVIEST:.0%} of the lines"):

@@ -19,7 +19,8 @@ import tap
 TOP = Path(__file__).resolve().parents[2]
 QUICK = ["-DCMAKE_BUILD_TYPE=None"]  # no optimisation
 CONFIG = "etc/heave/demo.ini"
-SOURCES = ("CMakeLists.txt", "CMakePresets.json", "README.md", "README.zh-CN.md", "cmake", "config", "docs", "hal", "include", "packaging", "src", "tools")
+SOURCES = ("CHANGELOG.md", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md", "LICENSE", "README.md", "README.zh-CN.md", "cmake", "config", "docs", "examples",
+           "hal", "include", "packaging", "src", "tools")
 
 
 def run(*command, **more):

@@ -189,6 +189,19 @@ def ramp(change, hz, low=0.5, high=1.6, speed=20.0, reach=80.0, axis="z", decima
 
 
 # ---- taken over while the sender moves ----
+def followed(trace, first, last):
+    """(first row, end) of each time in which a pose is followed. A stop for a hold is one of the cylinders, whose limits alone hold then."""
+    windows, begin = [], None
+    for i in range(first, last + 1):
+        is_followed = i < last and trace.states[i] == "ENGAGED"
+        if is_followed and begin is None:
+            begin = i
+        elif not is_followed and begin is not None:
+            windows.append((begin, i))
+            begin = None
+    return windows
+
+
 def engaged(size, hz, how="rising", rate_hz=60, shift_s=0.0, axes=("z",), decimals=3):
     """how the platform comes to follow a stream that moves:
     rising   the stream runs while it rises; from the first row that is ENGAGED on
@@ -197,7 +210,7 @@ def engaged(size, hz, how="rising", rate_hz=60, shift_s=0.0, axes=("z",), decima
     gap      nothing arrives for 1.7 s
     owner    its sender falls silent, and another one, which is elsewhere in the same motion, takes over
     intensity  it makes less of it for a while
-    All rows from there on are judged."""
+    All rows from there on are judged, by the limits of the axes where a pose is followed."""
     def make(platform, chance):
         if len(axes) == 1:
             sizes, rate, phase = along(platform, **{axes[0]: size}), hz, 0.0
@@ -234,7 +247,8 @@ def engaged(size, hz, how="rising", rate_hz=60, shift_s=0.0, axes=("z",), decima
             weights = scaled_weights(platform)
             low, high = ([m + way * abs(s) for m, s in zip(platform.home, sizes)] for way in (-1, 1))
             return [J.reach(trace.values, low, high, weights, 0.02, 0.05, at, last), *J.engage_speed(trace, platform, own, at, last),
-                    *J.limits(trace, platform, [("", at, last)])]
+                    *J.limits(trace, platform, [("", *window) for window in followed(trace, at, last)]),
+                    *J.limits(trace, platform, [("cylinder ", at, last)], cylinders=True)]
         lines = [*((t + begin - S.UP_MS, text) for t, text in S.frames(platform, signal, samples, "A", decimals)), *requests]
         return Ride(lines, judge, begin + 1000 * seconds, begin_ms=begin, with_cylinders=True, engage_ms=int(begin + 1000 * shift_s) if how == "rising" else 0)
     return make

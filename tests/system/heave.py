@@ -112,7 +112,7 @@ class Bench:
         self.socket = self.folder / "heaved.sock"
         self.config = self.write_config("platform.ini", **changes)
         self.running = []
-        library = self.bin.resolve().parents[1] / "tests/system/libmalloc_guard.so"
+        library = self.bin.resolve().parent / "tests/system/libmalloc_guard.so"
         self.guard = library if library.exists() else None
 
     def __enter__(self):
@@ -160,7 +160,7 @@ class Bench:
     def check_limits(self, config=None):
         """Of what was played last: tests/judge, which takes a twentieth of check_trace's time. (What check_trace has more: relays, states, timed moves.)"""
         with open(self.folder / "played.csv", "rb") as trace:
-            run = subprocess.run([self.bin.resolve().parents[1] / "tests/judge/trace_judge", config or self.config], stdin=trace,
+            run = subprocess.run([self.bin.resolve().parent / "tests/judge/trace_judge", config or self.config], stdin=trace,
                                  stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=WAIT_S, check=False)
         assert run.returncode == 0, run.stdout
 

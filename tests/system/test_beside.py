@@ -180,7 +180,7 @@ def output_onto_input(bench):
 
 def disk_that_stalls(bench):
     """Record, trace, metrics and log on a disk that does not answer: operators, signals and the service manager do not notice; losses are counted."""
-    library = bench.bin.resolve().parents[1] / "tests/system/libstalled_disk.so"
+    library = bench.bin.resolve().parent / "tests/system/libstalled_disk.so"
     if not library.exists():
         raise tap.Skip("instrumented build")
     disk, stall = bench.folder / "disk", bench.folder / "disk.stall"
@@ -226,7 +226,7 @@ def disk_that_stalls(bench):
 
 def ends_on_a_disk_that_stalls(bench):
     """SIGTERM is acted on at once; what the disk does not take is given up after some seconds, and said."""
-    library = bench.bin.resolve().parents[1] / "tests/system/libstalled_disk.so"
+    library = bench.bin.resolve().parent / "tests/system/libstalled_disk.so"
     if not library.exists():
         raise tap.Skip("instrumented build")
     disk, stall = bench.folder / "disk", bench.folder / "disk.stall"

@@ -97,7 +97,7 @@ def search_path():
 def initramfs(bin_dir, kernel_dir, python):
     archive = Archive()
     programs = [python, f"{bin_dir}/heaved", f"{bin_dir}/heavectl"]
-    guard = Path(bin_dir).resolve().parents[1] / "tests/system/libmalloc_guard.so"  # where a Bench looks for it
+    guard = Path(bin_dir).resolve().parent / "tests/system/libmalloc_guard.so"  # where a Bench looks for it
     for path in [*programs, guard, *python_files(), *heave.TOP.glob("config/*.ini")]:
         archive.file(path)
         if os.access(path, os.X_OK) or str(path).endswith(".so"):

@@ -150,7 +150,7 @@ class Page:
     SIZE = 4 * mmap.PAGESIZE
 
     def __init__(self, bench):
-        folder = bench.bin.resolve().parents[1] / "tests/system"
+        folder = bench.bin.resolve().parent / "tests/system"
         self.fd = os.memfd_create("failures")
         os.ftruncate(self.fd, Page.SIZE)
         self.memory = mmap.mmap(self.fd, Page.SIZE)
@@ -620,7 +620,7 @@ PLAYED = ("can", "gpio", "modbus", "udp")
 
 
 def backends(bench, _places, _judge):
-    folder = bench.bin.resolve().parents[1] / "tests/contract"
+    folder = bench.bin.resolve().parent / "tests/contract"
     for name in PLAYED:
         program, failed = folder / f"test_{name}_failures", bench.folder / f"{name}.places"
         run = subprocess.run([program], stdout=subprocess.PIPE, text=True, check=False, env={**os.environ, "HEAVE_FAILED_PLACES": str(failed)})
@@ -641,7 +641,7 @@ CASES = {"backends": backends,
 
 
 def wrapped(bench):
-    library = bench.bin.resolve().parents[1] / "tests/system/libfailing_calls.so"
+    library = bench.bin.resolve().parent / "tests/system/libfailing_calls.so"
     return {line.split()[-1] for line in tool("nm", "-D", "--defined-only", library).splitlines() if " T " in line}
 
 

@@ -11,6 +11,7 @@
 #include "config/cia402.h"
 #include "config/config.h"
 #include "cia402_slave.h"
+#include "inspect/report.h"
 #include "unity.h"
 
 #define FILE_NAME "test_config_cia402.tmp.ini"
@@ -437,6 +438,114 @@ static void test_profile_position_needs_a_window_for_its_lag(void)
     TEST_ASSERT_EQUAL_MESSAGE(0, load(), m_errors);
 }
 
+/* ---- From the screw ---- */
+
+static void expect_ratio(unsigned i, int32_t num, int32_t den)
+{
+    const counts_scale_t scale = config_cia402_scale(&m_config, i);
+    TEST_ASSERT_EQUAL_INT64((int64_t)num * scale.den, (int64_t)scale.num * den);
+}
+
+/* Puts lines into [drives], in place of counts_per_mm; returns the number of the first one. */
+static unsigned put_train(const char *lines)
+{
+    setUp();
+    (void)put("[cia402]", "counts_per_mm = none");
+    return put("[drives]", lines);
+}
+
+static void test_lead_and_counts_per_turn_stand_in_place_of_counts_per_mm(void)
+{
+    (void)put_train("lead_mm = 10\ncounts_per_turn = 131072");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    TEST_ASSERT_EQUAL_INT(131072, m_config.cia402.counts_per_mm.num[0] * 10 / m_config.cia402.counts_per_mm.den[0]);
+    (void)put_train("lead_mm = 5.08\ncounts_per_turn = 10000\ngear = 5/2");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    for (unsigned i = 0; i < 6; i++)
+        expect_ratio(i, 2500000, 508);
+    (void)put_train("lead_mm = 10, -10, 5, 20, 16/3, 10\ncounts_per_turn = 131072");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    expect_ratio(1, -131072, 10);
+    expect_ratio(3, 131072, 20);
+    expect_ratio(4, 131072 * 3, 16);
+}
+
+/* What the file says twice as a dump, it would say twice when it is read again. */
+static void test_lead_is_dumped_as_the_counts_that_follow(void)
+{
+    static char text[300000];
+    (void)put_train("lead_mm = 10\ncounts_per_turn = 131072\ngear = 3");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    FILE *file = tmpfile();
+    TEST_ASSERT_NOT_NULL(file);
+    config_dump(&m_config, file);
+    rewind(file);
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    fclose(file);
+    TEST_ASSERT_NOT_NULL(strstr(text, "\ncounts_per_mm = 196608/5\n"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\nlead_mm = none\n"));
+    TEST_ASSERT_NOT_NULL(strstr(text, "\ncounts_per_turn = 131072\n"));
+}
+
+static void test_lead_that_is_not_the_whole_story_is_one_error(void)
+{
+    static const char *const k_rows[][2] = {
+        {"lead_mm = 10", "counts_per_turn: missing beside lead_mm; allowed: "},
+        {"lead_mm = 10, 10\ncounts_per_turn = 1000", "lead_mm: has 2 values; allowed: one, or one for each of the 6 drives"},
+        {"lead_mm = 10\ncounts_per_turn = 1000\ngear = 1, 2", "gear: has 2 values; allowed: one, or one for each"},
+        {"gear = 2", "gear: means nothing without lead_mm; allowed: "},
+        {"lead_mm = 5/10000\ncounts_per_turn = none", "counts_per_turn: missing beside lead_mm; allowed: "},
+        {"lead_mm = 1/2147483647\ncounts_per_turn = 2147483646",
+         "lead_mm: counts_per_turn * gear / lead of drive 1 is no ratio of numbers of 32 bits; allowed: "},
+    };
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        (void)put_train(k_rows[i][0]);
+        const int errors = load();
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, k_rows[i][1]), m_errors);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(i == 3 ? 2 : 1, errors, m_errors); /* gear alone: counts_per_mm is missing too */
+    }
+}
+
+static void test_lead_beside_counts_per_mm_is_an_error_that_names_the_other_line(void)
+{
+    char expected[160];
+    setUp();
+    (void)put("[drives]", "counts_per_turn = 131072\nlead_mm = 10");
+    const unsigned line = put("[cia402]", "counts_per_mm = 131072/10");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(1, load(), m_errors);
+    snprintf(expected, sizeof expected, "[drives] lead_mm: counts_per_mm of [cia402] gives the scaling already, at line %u; ",
+             line);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, expected), m_errors);
+}
+
+static const char *report(void)
+{
+    static char text[40000];
+    FILE *file = tmpfile();
+    TEST_ASSERT_NOT_NULL(file);
+    (void)report_write(&m_config, 1, file);
+    rewind(file);
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    fclose(file);
+    return text;
+}
+
+static void test_check_report_says_what_the_scaling_comes_to(void)
+{
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(
+        strstr(report(), "stroke of 400 mm = 5,242,880 counts (0 to 5,242,880), 500 mm/s = 6,553,600 counts/s\n"), report());
+    (void)put_train("lead_mm = 5\ncounts_per_turn = 10000");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(report(), "stroke of 400 mm = 800,000 counts (0 to 800,000), 500 mm/s = 6000 rpm\n"),
+                                 report());
+    (void)put_train("lead_mm = 5, 5, -5, 5, 5, 5\ncounts_per_turn = 10000");
+    (void)put("[cia402]", "zero_counts = 100");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(
+        strstr(report(), "  drive 3: stroke of 400 mm = -800,000 counts (100 to -799,900), 500 mm/s = -6000 rpm\n"), report());
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -456,5 +565,10 @@ int main(void)
     RUN_TEST(test_identity_is_read_in_hexadecimal_too);
     RUN_TEST(test_period_of_no_use_is_refused_with_ones_that_the_bus_carries);
     RUN_TEST(test_profile_position_needs_a_window_for_its_lag);
+    RUN_TEST(test_lead_and_counts_per_turn_stand_in_place_of_counts_per_mm);
+    RUN_TEST(test_lead_is_dumped_as_the_counts_that_follow);
+    RUN_TEST(test_lead_that_is_not_the_whole_story_is_one_error);
+    RUN_TEST(test_lead_beside_counts_per_mm_is_an_error_that_names_the_other_line);
+    RUN_TEST(test_check_report_says_what_the_scaling_comes_to);
     return UNITY_END();
 }

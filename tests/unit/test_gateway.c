@@ -1479,6 +1479,63 @@ static void test_fault_found_by_the_guard_of_set_points_tells_the_distance(void)
     }
 }
 
+/* ---- drives that stand where no cylinder can ---- */
+
+/* Every cylinder at its place, one elsewhere, all without torque. */
+static void start_at(unsigned axis, double extension_mm, bool is_homed)
+{
+    m_settings.engage = ENGAGE_MANUAL;
+    start(false);
+    for (unsigned i = 0; i < 6; i++) {
+        sim_drive_t *drive = &m_rig.drives.axis[i];
+        drive->is_homed = is_homed;
+        drive->position_q32 = (q32_t)((i == axis ? extension_mm : 20.0) * 4294967296.0);
+        drive->setpoint_q32 = drive->position_q32;
+    }
+    rig_run_ms(&m_rig, 10);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+}
+
+static void test_engage_with_a_drive_outside_its_stroke_is_refused_before_there_is_torque(void)
+{
+    const double stroke_mm = m_settings.stroke_mm_q16[4] / 65536.0;
+    const double places_mm[] = {-5.5, stroke_mm + 5.5, -30000, 30000};
+    for (unsigned i = 0; i < sizeof places_mm / sizeof places_mm[0]; i++) {
+        start_at(4, places_mm[i], true);
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+        for (unsigned ms = 0; ms < 50; ms++) {
+            rig_run_ms(&m_rig, 1);
+            TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[4].state);
+        }
+        expect_fault(FAULT_OUTSIDE_STROKE, 5, 0);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, places_mm[i] < 0 ? -places_mm[i] : places_mm[i] - stroke_mm,
+                                  (double)seen()->fault.off_q32 / 4294967296.0);
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESET));
+        rig_run_ms(&m_rig, 100);
+        TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_PARK)); /* whoever asks, as long as it is so */
+        rig_run_ms(&m_rig, 10);
+        expect_fault(FAULT_OUTSIDE_STROKE, 5, 0);
+        TEST_ASSERT_EQUAL_UINT32(2, counted()->fault[FAULT_OUTSIDE_STROKE]);
+    }
+    expect_line("a cylinder", "a cylinder stands outside its stroke, says its drive, axis 5: found by heaved, 29800.00 mm off, "
+                              "allowed 5.00 mm");
+}
+
+/* A stop gives way, a switch is a little off; what a drive without a zero says is no place at all. */
+static void test_engage_with_a_drive_a_little_outside_or_without_its_zero_comes_up(void)
+{
+    const double places_mm[] = {-4.5, 4.5 + m_settings.stroke_mm_q16[4] / 65536.0};
+    for (unsigned i = 0; i < 2; i++) {
+        start_at(4, places_mm[i], true);
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_PARK));
+        TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_SETTLED, 60000));
+    }
+    start_at(4, 300, false);
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_PARK));
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_SETTLED, 60000));
+}
+
 /* What a replay is told was found is found, as if the drives had brought it about. */
 static void test_fault_told_is_found_in_the_next_cycle(void)
 {
@@ -2270,6 +2327,7 @@ static void test_resume_refuses_what_is_insane_in_any_module(void)
     SPOIL(settings.priority.count, HAL_UDP_NETWORKS_MAX + 1);
     SPOIL(settings.relays.count, HAL_RELAYS_MAX + 1);
     SPOIL(settings.axis[0].sign, 0);
+    SPOIL(settings.stroke_mm_q16[2], 1);
     SPOIL(auto_engage.cycle_us, 0);
     SPOIL(auto_engage.frames, AUTO_ENGAGE_FRAMES_MAX + 1);
     SPOIL(snapshot.fault.axis, DRIVES_MAX + 1);
@@ -2416,6 +2474,8 @@ static void run_supervision(void)
     RUN_TEST(test_fault_bus_that_stays_busy_is_a_fault_and_returns_without_a_jump);
     RUN_TEST(test_fault_following_error_stops_all_in_time);
     RUN_TEST(test_fault_found_by_the_guard_of_set_points_tells_the_distance);
+    RUN_TEST(test_engage_with_a_drive_outside_its_stroke_is_refused_before_there_is_torque);
+    RUN_TEST(test_engage_with_a_drive_a_little_outside_or_without_its_zero_comes_up);
     RUN_TEST(test_fault_told_is_found_in_the_next_cycle);
     RUN_TEST(test_fault_told_that_is_there_counts_once);
     RUN_TEST(test_fault_told_in_off_is_none);

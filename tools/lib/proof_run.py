@@ -61,8 +61,8 @@ class Contracts(Target):
                 "-wp-cache", "none", *self.sources, "-then", "-report-csv", str(table)]
 
 
-PARSER = "src/protocol/frame.c src/protocol/frame_quick.c src/protocol/number.c"
-WORDS = "src/protocol/frame.c src/protocol/frame_text.c src/protocol/text.c"
+PARSER = "src/protocol/frame.c src/protocol/frame_command.c src/protocol/frame_quick.c src/protocol/number.c"
+WORDS = "src/protocol/frame.c src/protocol/frame_command.c src/protocol/frame_text.c src/protocol/text.c"
 FIXED = "src/fixed/fx.c src/fixed/fx_root.c src/fixed/fx_trig.c"
 DRIVERS = ("src/canopen/cia402_axis.c", "src/drives/canraw", "src/drives/modbus")  # of these, the codecs alone
 TARGETS = [

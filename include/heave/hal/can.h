@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * can.h - contract of one classic CAN bus: frames out, frames in, and what is known about the wire.
- * One thread calls the ops; restart see there. Bit rate and receive filters are given to the backend's open.
+ * can.h - contract of one classic CAN bus: send, receive, and the state of the controller.
+ * One thread calls the ops; for restart see below. Bit rate and receive filters are given to the backend's open.
  */
 #ifndef HEAVE_HAL_CAN_H
 #define HEAVE_HAL_CAN_H
@@ -21,12 +21,12 @@ typedef struct {
     uint8_t data[8];
 } can_frame_t;
 
-/** What a report says, in can_frame_t.id; bits may be combined. Reports come in order with the frames around them. */
+/** Contents of a report, in can_frame_t.id; bits may be combined. Reports keep their order among the frames. */
 enum {
     CAN_ERROR_WARNING = 1u,
     CAN_ERROR_PASSIVE = 2u,
     CAN_ERROR_BUS_OFF = 4u,
-    CAN_ERROR_RESTARTED = 8u, /**< the controller came back from bus-off: everything on the bus must be treated as lost */
+    CAN_ERROR_RESTARTED = 8u, /**< the controller returned from bus-off: treat everything on the bus as lost */
     CAN_ERROR_NO_ACK = 16u,   /**< nobody acknowledged a frame */
     CAN_ERROR_OVERRUN = 32u,  /**< received frames were lost */
     CAN_ERROR_OTHER = 64u
@@ -43,8 +43,8 @@ typedef enum {
 } hal_can_state_t;
 
 /** A receive filter: a frame passes where (id ^ filter.id) & mask is 0 and its width is the filter's. A backend takes a list
- *  of these when it is opened; a frame that passes none is never seen, an empty list lets everything pass. Reports always
- *  pass. */
+ *  of these when it is opened; a frame that passes no filter is never received, and an empty list passes everything. Reports
+ * always pass. */
 typedef struct {
     uint32_t id;
     uint32_t mask;
@@ -73,20 +73,20 @@ static inline bool hal_can_valid(hal_can_t can)
     return can.ops != NULL && can.ops->send != NULL && can.ops->recv != NULL;
 }
 
-/** Queues a frame; frames leave in the order of their sending. <= 50 us. Call recv until HV_ERR_AGAIN before each burst: what
- *  has left the queue is known from there. HV_OK means queued, not sent: with no partner, and
- *  with some controllers in bus-off, frames pile up and would go out much later. Set-points need unconfirmed().
+/** Queues a frame; frames leave in the order of their sending. <= 50 us. Call recv until HV_ERR_AGAIN before each
+ *  burst: only then is it known which frames have left the queue. HV_OK means queued, not sent: without a partner, and with some
+ *  controllers in bus-off, frames accumulate and would be sent much later. Check unconfirmed() before sending set-points.
  *  @param frame the caller's, copied
- *  @return HV_OK; HV_ERR_AGAIN: the queue is full, the frame is not taken (a set-point is then worthless: drop it, do not
- *          spin); HV_ERR_ARG: id, length or is_error out of range; HV_ERR_IO: bus-off, interface down or gone, the frame is
- *          not taken, and none will be until restart. */
+ *  @return HV_OK; HV_ERR_AGAIN: the queue is full, the frame is not taken (drop a set-point then, do not retry in a loop);
+ * HV_ERR_ARG: id, length or is_error out of range; HV_ERR_IO: bus-off, interface down or gone, the frame is not taken, and none
+ * will be until restart. */
 static inline HV_MUST_CHECK hv_status_t hal_can_send(hal_can_t can, const can_frame_t *frame)
 {
     return can.ops->send(can.ctx, frame);
 }
 
-/** Takes the oldest received frame or report. Own frames never come back here: the backend takes their echo in and counts
- *  it, see hal_can_unconfirmed(). Never blocks (<= 50 us).
+/** Takes the oldest received frame or report. Own frames are never returned: the backend counts their echo,
+ *  see hal_can_unconfirmed(). Never blocks (<= 50 us).
  *  @param rx_time_us out: when it was received, on the time line of hal_clock_now_us()
  *  @return HV_OK; HV_ERR_AGAIN: none waiting; HV_ERR_IO: interface down or gone: go on calling once a cycle. Outputs
  *          unchanged on error. */
@@ -106,16 +106,16 @@ static inline HV_MUST_CHECK hv_status_t hal_can_bus_state(hal_can_t can, hal_can
     return HV_OK;
 }
 
-/** The state of the controller, asked afresh: some controllers report that they have become error-passive and never that they
- * have recovered. May take some ms where the system is busy with its interfaces: not every cycle. What bus_state tells follows.
+/** Queries the state of the controller. Some controllers report error-passive, but never that they have recovered. May take some
+ * ms if the system is busy with its interfaces, so do not call it every cycle. Also updates bus_state.
  *  @return HV_OK; HV_ERR_IO: no answer, out is unchanged. A backend without the op has nothing newer than bus_state. */
 static inline HV_MUST_CHECK hv_status_t hal_can_ask_state(hal_can_t can, hal_can_state_t *out)
 {
     return can.ops->ask_state != NULL ? can.ops->ask_state(can.ctx, out) : hal_can_bus_state(can, out);
 }
 
-/** Frames taken by send of which no echo has come: not seen on the wire. Up to date once recv has returned HV_ERR_AGAIN. The
- *  next set of set-points may be queued only where this is 0, so that no stale set can ever wait in a queue. Never blocks.
+/** Number of frames that were queued and whose echo is still missing: not seen on the wire. Up to date when recv has returned
+ *  HV_ERR_AGAIN. Queue the next set of set-points only if this is 0, so that no old set can wait in a queue. Never blocks.
  *  After bus-off or a pulled cable it stays above 0 until restart.
  *  @return HV_OK; HV_ERR_NOSUP: the backend gets no echo. */
 static inline HV_MUST_CHECK hv_status_t hal_can_unconfirmed(hal_can_t can, uint32_t *frames)
@@ -123,12 +123,11 @@ static inline HV_MUST_CHECK hv_status_t hal_can_unconfirmed(hal_can_t can, uint3
     return can.ops->unconfirmed != NULL ? can.ops->unconfirmed(can.ctx, frames) : HV_ERR_NOSUP;
 }
 
-/** Starts afresh after bus-off, stall or unplugging: takes the interface up again by name, discards received frames, drops
- *  the frames that wait to be sent, forgets unconfirmed ones. Call only while no drive is enabled: a frame in the controller
- *  itself may still go out. May block for some ms, unlike the other ops, and may run in another thread while no other op
- *  does.
+/** Restarts after bus-off, stall or unplugging: opens the interface again by name, discards received frames, drops the frames
+ * that wait to be sent, and forgets unconfirmed ones. Call only while no drive is enabled: a frame in the controller itself may
+ * still go out. May block for some ms, unlike the other ops, and may run in another thread while no other op does.
  *  @return HV_OK; HV_ERR_AGAIN: the interface is not there yet, try later; HV_ERR_IO: it is there but refuses, is still down
- *          or bus-off, or frames wait in it that the system does not let us drop; try later, someone may have helped;
+ *          or bus-off, or old frames wait in it that this program has no right to drop; try later;
  *          HV_ERR_NOSUP. */
 static inline HV_MUST_CHECK hv_status_t hal_can_restart(hal_can_t can)
 {

@@ -33,8 +33,8 @@ static inline uint64_t hal_clock_now_us(hal_clock_t clock)
     return clock.ops->now_us(clock.ctx);
 }
 
-/** Blocks until the deadline (as late as the scheduler makes it, never early); at once where it has passed. Signals do not
- *  end it.
+/** Blocks until the deadline, never shorter; returns at once if it has passed. The scheduler may make it later. Signals do not
+ * end it.
  *  @return HV_OK: hal_clock_now_us() is at least deadline_us; HV_ERR_IO: the system refuses to sleep, the caller must stop.
  *          */
 static inline HV_MUST_CHECK hv_status_t hal_clock_sleep_until_us(hal_clock_t clock, uint64_t deadline_us)

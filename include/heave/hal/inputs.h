@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * inputs.h - contract of the operator's switches: e-stop monitor, enable key, reset button, failing supply.
  * One thread calls the ops. Polarity is the backend's business: a set bit always means "active". Not a safety function: the
- * e-stop chain cuts the drives' power itself, this only tells the program.
+ * e-stop chain removes the drives' power by itself, and this only informs the program.
  */
 #ifndef HEAVE_HAL_INPUTS_H
 #define HEAVE_HAL_INPUTS_H
@@ -42,7 +42,7 @@ static inline uint32_t hal_inputs_present(hal_inputs_t inputs)
     return inputs.ops->present(inputs.ctx);
 }
 
-/** Levels as they are now, not debounced; an e-stop that was active since the last read is active once, each channel by itself.
+/** Present levels, not debounced. An e-stop channel that was active at any time since the last read is returned as active once.
  * <= 100 us.
  *  @param levels out: INPUT_ESTOP | ...; the bit of an absent input is 0; unchanged on error
  *  @return HV_OK; HV_ERR_IO: the levels are not known (line gone, or the last reading is stale): treat it as an active

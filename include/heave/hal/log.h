@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * log.h - contract of the log as the motion loop sees it: hand a line over and go on.
+ * log.h - contract of the log for the motion loop: accepts a line without waiting.
  * One writer thread per hal_log_t; another thread (of the backend's owner) prints. Time stamps are the reader's business.
  */
 #ifndef HEAVE_HAL_LOG_H
@@ -31,8 +31,7 @@ static inline bool hal_log_valid(hal_log_t log)
     return log.ops != NULL && log.ops->write != NULL && log.ops->dropped != NULL;
 }
 
-/** Hands one line over. Never blocks (<= 5 us); where the backend has no room, the line is dropped and counted, earlier ones
- *  are kept.
+/** Writes one line. Never blocks (<= 5 us). If the backend has no room, it drops the line and counts it; earlier lines are kept.
  *  @param text without newline; copied before the return. Bytes outside printable ASCII become '?': text may come from a
  *          sender. */
 static inline void hal_log_write(hal_log_t log, hal_log_level_t level, const char *text)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * modbus.h - contract of one Modbus line (TCP or RTU) behind a worker: submit a transaction, ask later what became of it.
- * One thread (the motion thread) calls the ops and is never made to wait; the worker is the backend's.
- * The line is shared by slots: each holds the newest transaction of one purpose (set-point of axis 3, status of axis 3, relays).
+ * modbus.h - contract of one Modbus line (TCP or RTU) with a worker: submit a transaction, poll its result later.
+ * One thread (the motion thread) calls the ops and never waits; the worker belongs to the backend.
+ * The line has slots. Each holds the newest transaction of one purpose (set-point of axis 3, status of axis 3, relays).
  */
 #ifndef HEAVE_HAL_MODBUS_H
 #define HEAVE_HAL_MODBUS_H
@@ -46,7 +46,7 @@ static inline bool modbus_is_write(modbus_function_t function)
            function == MODBUS_WRITE_REGISTERS;
 }
 
-/** True for a request that a line can carry: what submit asks of one, but for unit 255, which only TCP has. */
+/** True for a valid request, as submit requires it. Unit 255 is valid on TCP only, which this does not check. */
 static inline bool modbus_is_valid(const modbus_request_t *request)
 {
     const bool is_write = modbus_is_write(request->function);
@@ -56,7 +56,7 @@ static inline bool modbus_is_valid(const modbus_request_t *request)
            (request->unit <= 247 || request->unit == 255) && (request->unit != HAL_MODBUS_BROADCAST || is_write);
 }
 
-/** What became of it. */
+/** Result of a transaction. */
 typedef struct {
     hv_status_t
         status; /**< HV_OK; HV_ERR_TIMEOUT: no answer in time (a write may have acted); HV_ERR_FORMAT: the answer was damaged or
@@ -86,9 +86,10 @@ static inline bool hal_modbus_valid(hal_modbus_t modbus)
     return modbus.ops != NULL && modbus.ops->submit != NULL && modbus.ops->poll != NULL;
 }
 
-/** Puts a transaction into a slot. Newest wins: one that waits in the slot is replaced and never gets a result; one that is
- *  already on the wire ends first and gets its own result. Waiting slots are served in turn, so that none starves. Never
- *  blocks (<= 20 us).
+/** Puts a transaction into a slot. The newest wins: it replaces one that still waits, which then gets no result. A transaction
+ * that is already on the wire ends first and gets its result. Waiting slots are served in turn, so that none starves. Never
+ * blocks
+ *  (<= 20 us).
  *  @param request the caller's, copied
  *  @return HV_OK; HV_ERR_ARG: slot, function, unit or count out of range, nothing changes. */
 static inline HV_MUST_CHECK hv_status_t hal_modbus_submit(hal_modbus_t modbus, unsigned slot, const modbus_request_t *request)
@@ -96,10 +97,9 @@ static inline HV_MUST_CHECK hv_status_t hal_modbus_submit(hal_modbus_t modbus, u
     return modbus.ops->submit(modbus.ctx, slot, request);
 }
 
-/** Takes the newest result of a slot, once; an older one that was not taken is lost. A transaction ends at the latest with
- *  the backend's timeout: no result for much longer means that the worker is stuck. The backend never repeats a transaction
- *  by itself, restores the link by itself, and never takes a late answer for that of a later transaction. Never blocks (<=
- *  20 us).
+/** Returns the newest result of a slot, once; an older one that was not polled is lost. A transaction ends with the backend's
+ *  timeout at the latest; no result for much longer means that the worker is stuck. The backend restores the link by itself. It
+ *  never repeats a transaction by itself, and never accepts a late answer for a later transaction. Never blocks (<= 20 us).
  *  @param result out: unchanged on error
  *  @return HV_OK; HV_ERR_AGAIN: nothing new; HV_ERR_ARG: slot out of range. */
 static inline HV_MUST_CHECK hv_status_t hal_modbus_poll(hal_modbus_t modbus, unsigned slot, modbus_result_t *result)

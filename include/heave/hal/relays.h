@@ -35,8 +35,8 @@ static inline uint8_t hal_relays_count(hal_relays_t relays)
     return relays.ops->count(relays.ctx);
 }
 
-/** Sets every relay at once: bit n = relay n + 1, 1 = closed. <= 100 us. A slow bank takes the mask and carries it out later
- *  (newest wins); read_back then tells when. Writing the same mask again is allowed and cheap.
+/** Sets all relays at once: bit n = relay n + 1, 1 = closed. <= 100 us. A slow bank accepts the mask and writes it later (the
+ * newest wins); read_back shows when. Writing the same mask again is allowed and cheap.
  *  @return HV_OK; HV_ERR_RANGE: a bit above count is set, nothing was written; HV_ERR_IO: the relays are in an unknown
  *          state; write again in a later cycle. */
 static inline HV_MUST_CHECK hv_status_t hal_relays_write(hal_relays_t relays, uint16_t mask)
@@ -44,7 +44,7 @@ static inline HV_MUST_CHECK hv_status_t hal_relays_write(hal_relays_t relays, ui
     return relays.ops->write(relays.ctx, mask);
 }
 
-/** What the hardware reports (of the lines, not of the contacts, where it cannot see those). <= 100 us.
+/** The mask that the hardware reports: of the lines, if it cannot see the contacts. <= 100 us.
  *  @param mask out: unchanged on error
  *  @return HV_OK; HV_ERR_AGAIN: not known yet; HV_ERR_IO: unknown; HV_ERR_NOSUP: the backend cannot know. */
 static inline HV_MUST_CHECK hv_status_t hal_relays_read_back(hal_relays_t relays, uint16_t *mask)

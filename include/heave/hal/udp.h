@@ -25,7 +25,7 @@ typedef struct {
 
 #define HAL_UDP_NETWORKS_MAX 16u
 
-/** A list of them, the first one first. */
+/** A list of networks, in order. */
 typedef struct {
     uint8_t count;
     hal_udp_network_t network[HAL_UDP_NETWORKS_MAX];
@@ -66,16 +66,16 @@ static inline HV_MUST_CHECK hv_status_t hal_udp_recv(hal_udp_t udp, uint8_t *buf
     return udp.ops->recv(udp.ctx, buffer, capacity, length, from);
 }
 
-/** Datagrams lost since the open because the receive queue was full, or dropped by a filter in front of it; as known at the last
- *  successful recv, or later. Never blocks.
+/** Number of datagrams lost since the open, because the receive queue was full or a filter dropped them. At least as new as the
+ * last successful recv. Never blocks.
  *  @return HV_OK; HV_ERR_NOSUP where the backend cannot know. */
 static inline HV_MUST_CHECK hv_status_t hal_udp_dropped(hal_udp_t udp, uint32_t *datagrams)
 {
     return udp.ops->dropped != NULL ? udp.ops->dropped(udp.ctx, datagrams) : HV_ERR_NOSUP;
 }
 
-/** How long the datagram of the last successful recv had waited since its arrival, in us. A clock of the day that is
- *  set meanwhile spoils it, so use it within a cycle only; beyond a minute it is told as 0. Never blocks.
+/** Time between the arrival of the datagram of the last successful recv and that recv, in us. It is wrong if the wall clock is
+ * set in between, so use it within a cycle only. More than a minute is returned as 0. Never blocks.
  *  @return HV_OK; HV_ERR_NOSUP where the backend cannot know. */
 static inline HV_MUST_CHECK hv_status_t hal_udp_waited(hal_udp_t udp, uint32_t *us)
 {
@@ -91,7 +91,7 @@ size_t hal_udp_peer_text(const hal_udp_peer_t *peer, char *text, size_t capacity
 /** "192.168.1.5" or "fe80::1%2": the address alone. Else as hal_udp_peer_text(). */
 size_t hal_udp_host_text(const hal_udp_peer_t *peer, char *text, size_t capacity);
 
-/** True for two peers with one address, whatever their ports: a program that starts again has another port. Pure. */
+/** True for two peers with the same address. Ports are not compared: a program that restarts has another one. Pure. */
 bool hal_udp_is_same_host(const hal_udp_peer_t *a, const hal_udp_peer_t *b);
 
 /** Index of the first network the peer is in; list->count where it is in none. Pure. */

@@ -3,8 +3,8 @@
  * how near a singularity they come, and the limits of axes that the cylinders can serve. Worked out from the inverse solution and
  * the singularity margin, in double precision: figures for people, never for motion. For offline use: takes some 0.1 s.
  */
-#ifndef HEAVE_INSPECT_ENVELOPE_H
-#define HEAVE_INSPECT_ENVELOPE_H
+#ifndef HEAVE_CONFIG_ENVELOPE_H
+#define HEAVE_CONFIG_ENVELOPE_H
 
 #include "heave/kin.h"
 #include "heave/settings.h"
@@ -66,7 +66,7 @@ typedef struct {
 } envelope_t;
 
 /** Works out an envelope.
- *  @param settings of a configuration that config_load() accepted; has to stay
+ *  @param settings whose mechanism is right, see mechanism.h; has to stay
  *  @return false where they do not make a mechanism */
 bool envelope_find(envelope_t *self, const settings_t *settings);
 

@@ -4,7 +4,7 @@
  * The worst cases of a box: over a grid of it, then climbing from the worst points of the grid. Poses out of reach are pulled in
  * on the way from neutral as motion does it, so that the edge of the workspace is looked at, where the worst cases are.
  */
-#include "inspect/envelope.h"
+#include "config/envelope.h"
 
 #include <math.h>
 

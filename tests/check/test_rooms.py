@@ -1,0 +1,61 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
+"""test_rooms.py - check_rooms.py finds what is planted: an include the wrong way, a private header of the core, sources that lead to each other."""
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import check_rooms
+import tap
+
+FILES = {"src/config/a.h": '#include "common/b.h"\n#include "heave/c.h"\n', "src/common/b.h": "", "include/heave/c.h": "", "src/motion/d.h": "",
+         "src/service/e.h": "", "src/motion/f.c": '#include "d.h"\n'}
+
+
+def planted(extra):
+    """(includes the wrong way, private headers)"""
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder).resolve()
+        for name, text in {**FILES, **extra}.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(text, encoding="utf-8")
+        return check_rooms.wrong_ways(root), check_rooms.private_ways(root)
+
+
+def fine():
+    assert planted({}) == ([], []), planted({})
+
+
+def wrong_way():
+    assert planted({"src/config/g.c": '#include "service/e.h"\n'}) == (["src/config/g.c includes service/e.h: src/config may not use src/service"], [])
+    assert planted({"src/motion/g.c": '#include "common/b.h"\n'})[0] == ["src/motion/g.c includes common/b.h: src/motion may not use src/common"]
+
+
+def private():
+    assert planted({"src/daemon/g.c": '#include "motion/d.h"\n'}) == ([], ["src/daemon/g.c includes motion/d.h"])
+
+
+def circle():
+    with tempfile.TemporaryDirectory() as folder:
+        objects = Path(folder) / "src/config/CMakeFiles/x.dir"
+        objects.mkdir(parents=True)
+        for name, code in {"a": "int b(void); int a(void) { return b(); }", "b": "int c(void); int b(void) { return c(); }",
+                           "c": "int a(void); int c(void) { return a(); }", "d": "int a(void); int d(void) { return a(); }"}.items():
+            (objects / f"{name}.c").write_text(code, encoding="utf-8")
+            subprocess.run(["cc", "-c", "-o", objects / f"{name}.c.o", objects / f"{name}.c"], check=True)
+        found = check_rooms.circles(check_rooms.references(Path(folder)))
+        assert found == [["config/a.c", "config/b.c", "config/c.c"]], found
+
+
+def main():
+    suite = tap.Suite()
+    for name, check in {"nothing wrong is nothing": fine, "an include the wrong way": wrong_way, "a private header of the core": private,
+                        "sources that lead to each other": circle}.items():
+        with suite.case(f"rooms: {name}"):
+            check()
+    return suite.done()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
