@@ -4,7 +4,7 @@
  */
 #include "config/canraw.h" // config_canraw_axes
 #include "config/cia402.h"
-#include "config/startup.h"
+#include "config/startup_read.h"
 #include "config/value.h"
 
 #define SECTION           "cia402"

@@ -17,6 +17,7 @@
 #include "config/hash.h"
 #include "config/source.h"
 #include "config/startup.h"
+#include "config/startup_read.h"
 #include "config/value.h"
 
 #define WAIT_MS  5000 /* for who writes a pipe; once heaved runs, nobody is waited for */

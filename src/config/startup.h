@@ -4,10 +4,14 @@
 #ifndef HEAVE_CONFIG_STARTUP_H
 #define HEAVE_CONFIG_STARTUP_H
 
-#include "config/source.h"
+#include "config/keys.h"
+#include "config/text.h"
 
 /** What a line may be, for the reference. */
 extern const char config_startup_help[];
+
+/** The same in an error. */
+extern const char config_startup_allowed[];
 
 /** True where a section is such a list. */
 bool config_startup_is_list(const config_section_t *section);
@@ -16,19 +20,10 @@ bool config_startup_is_list(const config_section_t *section);
  *  @return NULL where it has keys */
 const config_startup_t *config_startup_of(const config_section_t *section, const config_t *config);
 
-/** Takes a line of the section that the reader is in, cut in two at its first = or :. */
-void config_startup_take(config_source_t *self, const char *before, const char *behind);
-
-/** Refuses items that heaved sets itself for this configuration. */
-void config_startup_check(config_source_t *self);
-
 /** Appends an item as it stands in a file. */
 void config_startup_format(const cia402_item_t *item, config_text_t *text);
 
 /** Writes the items of a section as lines of a file; nothing where it has keys. */
 void config_startup_dump(const config_section_t *section, const config_t *config, FILE *out);
-
-/** Says which lists of a file differ from those of a platform that runs, which keeps its own. */
-void config_startup_compare(const config_source_t *self, const config_t *running);
 
 #endif
