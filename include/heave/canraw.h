@@ -22,7 +22,7 @@
 #include "heave/hal/can.h"
 
 #define CANRAW_BYTES_MAX  8u
-#define CANRAW_FIELDS_MAX 4u
+#define CANRAW_FIELDS_MAX 5u
 
 /** Fault codes of this driver. With fault_when, the code is the status as received (1 if that is 0). */
 #define CANRAW_FAULT_FOLLOWING 0x8611u /**< following error, the number CANopen drives use */
@@ -32,16 +32,23 @@
 typedef enum {
     CANRAW_POSITION, /**< counts: the set-point, or in replies actual */
     CANRAW_SPEED,    /**< set-points only */
-    CANRAW_STATUS    /**< replies only */
+    CANRAW_STATUS,   /**< replies only */
+    CANRAW_COUNTER,  /**< alive counter: sent, one more with each frame of a drive; received, a reply with that of the last one is
+                        old */
+    CANRAW_FAULT,    /**< position replies only: what the drive calls its fault */
+    CANRAW_SUM,      /**< check byte over all other bytes of the frame: their sum; */
+    CANRAW_XOR,      /**< their exclusive or; */
+    CANRAW_CRC8,     /**< a CRC-8 from 0, its polynomial in the frame's data at this byte; */
+    CANRAW_CRC8_FF   /**< the same from FFh, inverted at the end */
 } canraw_value_t;
 
-#define CANRAW_VALUES 3u
+#define CANRAW_VALUES 9u
 
 /** A field of a frame. */
 typedef struct {
     canraw_value_t value;
     uint8_t at;    /**< first byte */
-    uint8_t bytes; /**< 1, 2 or 4 */
+    uint8_t bytes; /**< [1, 4]; of a check byte 1 */
     bool is_signed;
     bool is_big_endian;
 } canraw_field_t;
@@ -61,7 +68,7 @@ typedef struct {
     uint32_t mask;
 } canraw_when_t;
 
-/** Commands other than set-points: frames without fields, each optional. */
+/** Commands other than set-points: frames without fields except counter and check byte, each optional. */
 typedef enum { CANRAW_STOP, CANRAW_DISABLE, CANRAW_RESET, CANRAW_ENABLE, CANRAW_HOME } canraw_command_t;
 
 #define CANRAW_COMMANDS 5u
@@ -117,6 +124,9 @@ typedef struct {
     bool is_energized;   /**< torque was requested, and the drive has not confirmed since that it is off */
     bool has_actual;
     bool has_sent;
+    bool has_counter;    /**< of the last reply: */
+    uint32_t counter_in; /**< it, */
+    uint32_t counter;    /**< and that of the next frame to the drive */
     uint32_t status;
     uint32_t fault_code;
     drive_guard_t guard;
@@ -177,12 +187,15 @@ int64_t canraw_field_max(const canraw_field_t *field);
 const canraw_field_t *canraw_find(const canraw_frame_t *frame, canraw_value_t value);
 
 /** Writes a frame's bytes.
- *  @param value one for each canraw_value_t
+ *  @param value one for each canraw_value_t; of a counter its low bits count, check bytes follow from the rest
  *  @return HV_OK; HV_ERR_RANGE: a value does not fit its field, out is unchanged */
 hv_status_t canraw_pack(const canraw_frame_t *frame, const int64_t value[CANRAW_VALUES],
                         uint8_t out[CANRAW_BYTES_MAX]) HV_MUST_CHECK;
 
-/** True if received bytes are this frame: long enough, and with the same constant bytes. */
+/** True where a field is a check byte. */
+bool canraw_is_check(canraw_value_t value);
+
+/** True where received bytes are this frame: long enough, and constant bytes and check bytes as they should be. */
 bool canraw_matches(const canraw_frame_t *frame, const uint8_t *data, uint8_t length);
 
 /** Value of a field in the bytes of a frame that matches. */

@@ -74,6 +74,20 @@ typedef enum {
     CIA402_STOP  /**< a fault of the drive: all drives stop, and this one is not enabled */
 } cia402_reaction_t;
 
+/** An object of a start-up list: what a family of drives has to hold beyond what every drive is set to. */
+typedef struct {
+    uint32_t value; /**< the low bytes count */
+    uint16_t index;
+    uint8_t sub;
+    uint8_t bytes;    /**< 1, 2 or 4 */
+    bool is_written;  /**< else only looked at */
+    bool is_checked;  /**< read back after it was written */
+    bool is_optional; /**< a drive may be without it */
+    bool is_last;     /**< after everything else, else before it */
+} cia402_item_t;
+
+#define CIA402_ITEMS_MAX 32u /**< of a list */
+
 /** One drive. Counts are those of the drive (6064h). Unit u: mm, or deg of the rotation motor. */
 typedef struct {
     uint8_t node;                 /**< [1, 127], all different, also from the master's */
@@ -91,6 +105,8 @@ typedef struct {
     bool has_limits;              /**< 607Dh is written */
     int32_t limit_counts[2];      /**< 607Dh: least and greatest position */
     uint32_t identity[4];         /**< 1018h sub 1 to 4: vendor, product, revision, serial number; 0 = any */
+    const cia402_item_t *item;    /**< start-up list, kept; NULL where there is none */
+    uint8_t items;                /**< [0, CIA402_ITEMS_MAX] */
 } cia402_axis_config_t;
 
 /** The drives of a platform. */
@@ -138,6 +154,7 @@ typedef struct {
     uint8_t tries;
     bool is_asked;     /* an SDO of this step is under way */
     uint8_t mode;      /* of CIA402_JOB_MODE and at the end of CIA402_JOB_SETUP */
+    uint8_t item;      /* of the start-up list, in its rows */
     uint32_t value;    /* read in an earlier step */
     uint32_t refusal;  /* SDO abort code of the last write that was left to a check, */
     uint16_t refused;  /* and the index of its object; 0 = none */
@@ -278,6 +295,34 @@ drives_t cia402_hal(cia402_t *self);
 /** Call at the orderly end of the program: resets the communication of the drives without torque, so that they do not report a
  *  lost master and are not in fault at the next start. Drives with torque are left to their watchdogs. */
 void cia402_leave(cia402_t *self);
+
+/** What follows where a drive lacks an object, or refuses it. */
+typedef enum {
+    CIA402_WISH_NEEDED,  /**< the drive is refused */
+    CIA402_WISH_GUARD,   /**< refused unless drives without guards are allowed */
+    CIA402_WISH_IF_THERE /**< nothing */
+} cia402_wish_need_t;
+
+/** An object as a drive is set up. Begin with all zero. */
+typedef struct {
+    uint32_t value; /**< what it has to hold, but for COB-IDs that are switched off */
+    uint16_t index;
+    uint8_t sub;
+    uint8_t bytes;
+    bool is_written;
+    bool is_compared; /**< it has to hold the value in the end */
+    bool is_own;      /**< not of a start-up list */
+    cia402_wish_need_t need;
+    uint8_t row;  /**< private */
+    uint8_t item; /**< private */
+} cia402_wish_t;
+
+/** Walks through the objects of a drive, in the order of setting up.
+ *  @return false after the last one */
+bool cia402_next_wish(const cia402_config_t *config, unsigned axis, cia402_wish_t *wish);
+
+/** True where some configuration sets drives up by writing this object. */
+bool cia402_is_own_object(uint16_t index, uint8_t sub);
 
 /** True if 60C2h can hold this period: whole ms up to 255, or up to 255 of 100 us. */
 bool cia402_is_period(uint32_t period_us);

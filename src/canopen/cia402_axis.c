@@ -302,7 +302,7 @@ static void step_missing(cia402_drive_t drive)
 static void lose_at_object(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
-    const uint32_t object = cia402_setup_object(self);
+    const uint32_t object = cia402_setup_object(self, drive.own);
     const bool is_same = self->trouble == CIA402_NO_ANSWER && self->trouble_object == object;
     const bool was_answering = self->is_answering;
     cia402_axis_lose(drive, is_same ? CIA402_NO_ANSWER : CIA402_SILENT);

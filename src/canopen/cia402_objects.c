@@ -31,6 +31,7 @@
 const cia402_object_t cia402_objects[] = {
     {.index = 0x1000, .bytes = 4, .deed = CIA402_CHECK, .constant = 0x0192, .trouble = CIA402_NOT_402},
     IDENTITY(1), IDENTITY(2), IDENTITY(3), IDENTITY(4),
+    {.deed = CIA402_LIST, .constant = false},
 
     GUARD(0x1017, 0, 2, CIA402_HEARTBEAT, 0),
     {.deed = CIA402_PREOPERATIONAL, .need = CIA402_GUARD, .trouble = CIA402_NO_HEARTBEAT},
@@ -98,6 +99,7 @@ const cia402_object_t cia402_objects[] = {
     ONLY(CIA402_IF_HOMING, 0x6099, 2, 4, CIA402_SET, CIA402_HOMING_SPEED, 1),
     ONLY(CIA402_IF_HOMING, 0x609A, 0, 4, CIA402_SET, CIA402_HOMING_ACCEL, 0),
     ONLY(CIA402_IF_HOMING, 0x607C, 0, 4, CIA402_SET, CIA402_HOMING_OFFSET, 0),
+    {.deed = CIA402_LIST, .constant = true},
 
     /* some drives act only on a mode that changes */
     IF_THERE(0x6060, 0, 1, CIA402_WRITE, CIA402_CONSTANT, 0),
@@ -140,6 +142,39 @@ bool cia402_is_period(uint32_t period_us)
     return cia402_period_parts(period_us, &value, &exponent);
 }
 
+static bool is_list_row(const cia402_axis_config_t *axis, const cia402_setup_t *setup)
+{
+    const cia402_object_t *row = &cia402_objects[setup->row];
+    return row->deed == CIA402_LIST && setup->item < axis->items && axis->item[setup->item].is_last == (row->constant != 0);
+}
+
+cia402_object_t cia402_objects_at(const cia402_axis_config_t *axis, const cia402_setup_t *setup)
+{
+    if (!is_list_row(axis, setup)) {
+        return cia402_objects[setup->row];
+    }
+    const cia402_item_t *item = &axis->item[setup->item];
+    const cia402_deed_t written = item->is_checked ? CIA402_SET : CIA402_WRITE;
+    return (cia402_object_t){.index = item->index,
+                             .sub = item->sub,
+                             .bytes = item->bytes,
+                             .deed = (uint8_t)(item->is_written ? written : CIA402_CHECK),
+                             .need = item->is_optional ? CIA402_IF_THERE : CIA402_MUST,
+                             .source = CIA402_ITEM,
+                             .constant = item->value,
+                             .trouble = CIA402_NOT_TAKEN};
+}
+
+void cia402_objects_next(const cia402_axis_config_t *axis, cia402_setup_t *setup)
+{
+    if (cia402_objects[setup->row].deed == CIA402_LIST && setup->item < axis->items) {
+        setup->item++;
+        return;
+    }
+    setup->row++;
+    setup->item = 0;
+}
+
 static uint32_t source_value(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis,
                              const cia402_setup_t *setup)
 {
@@ -148,6 +183,7 @@ static uint32_t source_value(const cia402_object_t *row, const cia402_config_t *
     (void)cia402_period_parts(config->period_us, &period, &exponent);
     switch ((cia402_source_t)row->source) {
     case CIA402_CONSTANT:
+    case CIA402_ITEM:
         return row->constant;
     case CIA402_IDENTITY:
         return axis->identity[row->constant];
@@ -227,6 +263,9 @@ bool cia402_object_is_guarding(const cia402_object_t *row, const cia402_config_t
 
 bool cia402_object_applies(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis)
 {
+    if (row->deed == CIA402_LIST) {
+        return false; /* no item, or one of the other row */
+    }
     switch ((cia402_when_t)row->when) {
     case CIA402_ALWAYS:
         return true;
@@ -244,6 +283,57 @@ bool cia402_object_applies(const cia402_object_t *row, const cia402_config_t *co
         return config->sync_counter != 0;
     case CIA402_IF_LIMITED:
         return axis->has_limits;
+    }
+    return false;
+}
+
+/* --- For others --- */
+
+static cia402_wish_need_t need_of(const cia402_object_t *row)
+{
+    if (row->need == CIA402_GUARD) {
+        return CIA402_WISH_GUARD;
+    }
+    return row->need == CIA402_MUST ? CIA402_WISH_NEEDED : CIA402_WISH_IF_THERE;
+}
+
+static bool is_written(const cia402_object_t *row)
+{
+    return row->deed == CIA402_WRITE || row->deed == CIA402_SET || row->deed == CIA402_PDO_OFF || row->deed == CIA402_PDO_ON;
+}
+
+bool cia402_next_wish(const cia402_config_t *config, unsigned axis, cia402_wish_t *wish)
+{
+    const cia402_axis_config_t *own = &config->axis[axis];
+    cia402_setup_t at = {.row = wish->row, .item = wish->item, .mode = (uint8_t)config->mode};
+    for (; at.row < cia402_objects_setup_end; cia402_objects_next(own, &at)) {
+        const cia402_object_t row = cia402_objects_at(own, &at);
+        if (row.index == 0 || !cia402_object_applies(&row, config, own)) {
+            continue;
+        }
+        *wish = (cia402_wish_t){.index = row.index,
+                                .sub = row.sub,
+                                .bytes = row.bytes,
+                                .value = source_value(&row, config, own, &at) & all_bits(row.bytes),
+                                .is_written = is_written(&row),
+                                .is_compared = row.deed != CIA402_WRITE && row.deed != CIA402_PDO_OFF,
+                                .is_own = row.source != CIA402_ITEM,
+                                .need = need_of(&row)};
+        cia402_objects_next(own, &at);
+        wish->row = at.row;
+        wish->item = at.item;
+        return true;
+    }
+    return false;
+}
+
+bool cia402_is_own_object(uint16_t index, uint8_t sub)
+{
+    for (uint8_t i = 0; i < cia402_objects_setup_end; i++) {
+        const cia402_object_t *row = &cia402_objects[i];
+        if (row->index == index && row->sub == sub && is_written(row)) {
+            return true;
+        }
     }
     return false;
 }

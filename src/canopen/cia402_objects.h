@@ -8,14 +8,15 @@
 
 /** What is done with an object. */
 typedef enum {
-    CIA402_WRITE,         /**< written; "read only" is no trouble, a later row checks */
-    CIA402_SET,           /**< written and read back */
-    CIA402_CHECK,         /**< read and compared */
-    CIA402_AWAIT,         /**< read until it holds the value */
-    CIA402_PDO_OFF,       /**< bit 31 of the COB-ID set, the rest as it is */
-    CIA402_PDO_ON,        /**< COB-ID with bit 31 clear and bit 30 as it is, read back */
-    CIA402_READ,          /**< read */
-    CIA402_PREOPERATIONAL /**< no object: the drive's heartbeat says pre-operational */
+    CIA402_WRITE,          /**< written; "read only" is no trouble, a later row checks */
+    CIA402_SET,            /**< written and read back */
+    CIA402_CHECK,          /**< read and compared */
+    CIA402_AWAIT,          /**< read until it holds the value */
+    CIA402_PDO_OFF,        /**< bit 31 of the COB-ID set, the rest as it is */
+    CIA402_PDO_ON,         /**< COB-ID with bit 31 clear and bit 30 as it is, read back */
+    CIA402_READ,           /**< read */
+    CIA402_PREOPERATIONAL, /**< no object: the drive's heartbeat says pre-operational */
+    CIA402_LIST            /**< no object: stands for the items of the start-up list whose is_last is `constant` */
 } cia402_deed_t;
 
 /** What follows from a refusal. */
@@ -61,7 +62,8 @@ typedef enum {
     CIA402_HOMING_OFFSET,
     CIA402_PROFILE_SPEED,
     CIA402_PROFILE_ACCEL,
-    CIA402_MODE
+    CIA402_MODE,
+    CIA402_ITEM /**< of the start-up list */
 } cia402_source_t;
 
 /** One row, in bytes: an enumeration may take four. */
@@ -85,6 +87,9 @@ extern const uint8_t cia402_objects_mode_begin;
 extern const uint8_t cia402_objects_error_begin;
 extern const uint8_t cia402_objects_error_end;
 
+/** The row that a job is at; of a list, the item. */
+cia402_object_t cia402_objects_at(const cia402_axis_config_t *axis, const cia402_setup_t *setup);
+
 /** True where the row means something for this drive. */
 bool cia402_object_applies(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis);
 
@@ -92,6 +97,9 @@ bool cia402_object_applies(const cia402_object_t *row, const cia402_config_t *co
  *  @param setup for values read before, and the mode */
 uint32_t cia402_object_value(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis,
                              const cia402_setup_t *setup);
+
+/** Goes to the next row, or to the next item. */
+void cia402_objects_next(const cia402_axis_config_t *axis, cia402_setup_t *setup);
 
 /** Bits of the object that are compared. */
 uint32_t cia402_object_mask(const cia402_object_t *row);

@@ -147,10 +147,10 @@ static bool is_refusing(const cia402_axis_t *axis)
 }
 
 /* The object that a drive is being set up with, or that it does not take. */
-static uint32_t object_of(const cia402_axis_t *axis)
+static uint32_t object_of(const cia402_axis_t *axis, const cia402_axis_config_t *own)
 {
     if (axis->phase == CIA402_CONFIGURING) {
-        return cia402_setup_object(axis);
+        return cia402_setup_object(axis, own);
     }
     const bool is_mute = axis->phase != CIA402_UP && axis->trouble == CIA402_NO_ANSWER;
     return is_refusing(axis) || is_mute ? axis->trouble_object : axis->warned_object;
@@ -198,7 +198,7 @@ void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *ou
         .phase = phase_text(self, index),
         .trouble = drive_guard_is_found(&axis->guard) && code == axis->own_fault ? guard_text(&axis->guard) : code_text(code),
         .code = code,
-        .object = object_of(axis),
+        .object = object_of(axis, &self->config->axis[index]),
         .detail = detail_text(axis),
         .detail_code = detail_code(axis),
         .has_found = is_refusing(axis) && axis->has_found,

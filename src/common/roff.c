@@ -21,6 +21,7 @@ static void put_char(roff_line_t *self, char character)
     if (character == '`') {
         self->is_bold = !self->is_bold;
         fputs(self->is_bold ? "\\fB" : "\\fR", self->out);
+        self->column += 3;
         return;
     }
     if (self->column == 0 && (character == '.' || character == '\'')) {

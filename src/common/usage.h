@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-#define USAGE_OPTIONS_MAX 16u
+#define USAGE_OPTIONS_MAX 32u
 
 /** An option, a command, or a way to call the program. */
 typedef struct {

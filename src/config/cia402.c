@@ -88,6 +88,8 @@ static void describe_axis(const config_t *config, unsigned k, cia402_axis_config
         .profile_accel = magnitude(&scale, accel_q16),
         .identity = {cia402->vendor_id, cia402->product_code, cia402->revision_number,
                      cia402->serial_numbers.count == 0 ? 0 : cia402->serial_numbers.id[k]},
+        .item = (is_angle ? &cia402->angle_startup : &cia402->startup)->item,
+        .items = (is_angle ? &cia402->angle_startup : &cia402->startup)->count,
     };
     describe_limits(config, k, axis);
 }

@@ -4,6 +4,7 @@
  */
 #include "config/canraw.h" // config_canraw_axes
 #include "config/cia402.h"
+#include "config/startup_read.h"
 #include "config/value.h"
 
 #define SECTION           "cia402"
@@ -215,5 +216,8 @@ void config_cia402_check(config_source_t *self)
         check_methods(self, "angle_homing_method", &cia402->angle_homing.method, 1);
         check_window(self, "angle_following_error_deg", cia402->angle_following_error_deg_q16,
                      settings->axis[AXIS_ANGLE].speed_q16, "deg");
+    }
+    if (self->error_count == 0) {
+        config_startup_check(self);
     }
 }

@@ -16,6 +16,8 @@
 #include "config/check.h"
 #include "config/hash.h"
 #include "config/source.h"
+#include "config/startup.h"
+#include "config/startup_read.h"
 #include "config/value.h"
 
 #define WAIT_MS  5000 /* for who writes a pipe; once heaved runs, nobody is waited for */
@@ -255,6 +257,10 @@ static int take_pair(void *user, const char *section, const char *name, const ch
         return CONTINUE;
     }
     const char *in = config_sections[self->section].name;
+    if (config_startup_of(&config_sections[self->section], self->config) != NULL) {
+        config_startup_take(self, name, value);
+        return CONTINUE;
+    }
     const int key = config_key_find(in, name);
     if (key < 0) {
         refuse_key(self, in, name);
@@ -431,6 +437,9 @@ int config_reload(const char *path, config_t *running, FILE *report)
         if (config_is_applicable(config_keys[i].needs, running)) {
             take_change(&self, i, running);
         }
+    }
+    if (self.error_count == 0) {
+        config_startup_compare(&self, running);
     }
     config_hash(running);
     return self.error_count;

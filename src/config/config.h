@@ -9,6 +9,7 @@
 #include <stdio.h>
 
 #include "heave/canraw.h"
+#include "heave/cia402.h"
 #include "heave/modbus_drive.h"
 #include "heave/settings.h"
 
@@ -209,6 +210,12 @@ typedef struct {
     q16_t accel_q16;      /**< u/s^2 */
 } config_homing_t;
 
+/** Objects that a family of CANopen drives has to hold, in the order of the file. */
+typedef struct {
+    uint8_t count;
+    cia402_item_t item[CIA402_ITEMS_MAX];
+} config_startup_t;
+
 /** CANopen drives; what it means is in cia402.h. */
 typedef struct {
     config_ids_t nodes;
@@ -243,6 +250,8 @@ typedef struct {
     uint32_t product_code;
     uint32_t revision_number;
     config_ids_t serial_numbers;
+    config_startup_t startup;
+    config_startup_t angle_startup;
 } config_cia402_t;
 
 /** A line, or a chip, as the file names it; "" where it says none. */

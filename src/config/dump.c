@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "common/roff.h"
+#include "config/startup.h"
 #include "config/value.h"
 
 /* "required", or the default. */
@@ -47,6 +48,7 @@ void config_dump(const config_t *self, FILE *out)
                 dump_key(&config_keys[k], self, is_used, out);
             }
         }
+        config_startup_dump(section, self, out);
     }
 }
 
@@ -94,8 +96,10 @@ void config_write_reference(FILE *out)
             "heaved gets that signal and the whole file is right; the others need a restart.\n");
     for (size_t i = 0; i < config_section_count; i++) {
         const config_section_t *section = &config_sections[i];
-        fprintf(out, "\n## [%s]\n\n%s%s\n\n| key | allowed | default | meaning |\n| --- | --- | --- | --- |\n", section->name,
-                section->help, need_text(section->needs));
+        fprintf(out, "\n## [%s]\n\n%s%s\n\n", section->name, section->help, need_text(section->needs));
+        fputs(config_startup_is_list(section) ? config_startup_help
+                                              : "| key | allowed | default | meaning |\n| --- | --- | --- | --- |\n",
+              out);
         for (size_t k = 0; k < config_key_count; k++) {
             if (strcmp(config_keys[k].section, section->name) == 0) {
                 write_row(&config_keys[k], out);
@@ -130,6 +134,10 @@ void config_write_manual(FILE *out)
         config_text_clear(&text);
         config_text_add(&text, "%s%s", section->help, need_text(section->needs));
         roff_text(text.data, out);
+        if (config_startup_is_list(section)) {
+            fputs(".PP\n", out);
+            roff_text(config_startup_help, out);
+        }
         for (size_t k = 0; k < config_key_count; k++) {
             if (strcmp(config_keys[k].section, section->name) == 0) {
                 write_item(&config_keys[k], out);

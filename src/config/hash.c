@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "common/sha256.h"
+#include "config/startup.h"
 #include "config/value.h"
 
 static bool is_approval(const config_key_t *key)
@@ -33,6 +34,15 @@ void config_hash(config_t *config)
             config_text_add(&value, "%s.%s = ", key->section, key->name);
             config_value_format(key, config, &value);
             sha256_add(&hash, value.data, strlen(value.data) + 1); /* its end is a part of it */
+        }
+    }
+    for (size_t i = 0; i < config_section_count; i++) {
+        const config_startup_t *list = config_startup_of(&config_sections[i], config);
+        for (unsigned k = 0; list != NULL && config_is_applicable(config_sections[i].needs, config) && k < list->count; k++) {
+            config_text_clear(&value);
+            config_text_add(&value, "%s ", config_sections[i].name);
+            config_startup_format(&list->item[k], &value);
+            sha256_add(&hash, value.data, strlen(value.data) + 1);
         }
     }
     sha256_end(&hash, digest);

@@ -22,11 +22,13 @@ typedef struct {
 static const field_type_t k_types[] = {
     {"u8", 1, false, false},   {"i8", 1, true, false},   {"u16le", 2, false, false}, {"u16be", 2, false, true},
     {"i16le", 2, true, false}, {"i16be", 2, true, true}, {"u32le", 4, false, false}, {"u32be", 4, false, true},
-    {"i32le", 4, true, false}, {"i32be", 4, true, true},
+    {"i32le", 4, true, false}, {"i32be", 4, true, true}, {"u24le", 3, false, false}, {"u24be", 3, false, true},
+    {"i24le", 3, true, false}, {"i24be", 3, true, true},
 };
 #define TYPES (sizeof k_types / sizeof k_types[0])
 
-static const char *const k_values[CANRAW_VALUES] = {"position", "speed", "status"};
+static const char *const k_values[CANRAW_VALUES] = {"position", "speed", "status", "counter", "fault",
+                                                    "sum",      "xor",   "crc8",   "crc8ff"};
 
 static bool refuse(const config_key_t *key, const char *item, size_t length, const char *what, config_text_t *why)
 {
@@ -181,10 +183,53 @@ static bool is_listed(const char *words, const char *name, size_t length)
     return false;
 }
 
+static bool has_check(const canraw_frame_t *frame)
+{
+    for (unsigned i = 0; i < frame->fields; i++) {
+        if (canraw_is_check(frame->field[i].value)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* `{sum}`, `{xor}`, `{crc8:07}`, `{crc8ff:1D}`.
+ * Returns whether it is one; *wrong says what is wrong with it. */
+static bool add_check(const char *token, size_t length, canraw_frame_t *frame, const char **wrong)
+{
+    const char *colon = memchr(token, ':', length);
+    const size_t name_length = (colon != NULL ? (size_t)(colon - token) : length - 1u) - 1u;
+    canraw_field_t field = {.at = frame->length, .bytes = 1};
+    for (unsigned i = CANRAW_SUM; i < CANRAW_VALUES && length > 2 && token[length - 1] == '}'; i++) {
+        field.value = is_listed(k_values[i], token + 1, name_length) ? (canraw_value_t)i : field.value;
+    }
+    if (!canraw_is_check(field.value)) {
+        return false;
+    }
+    const bool is_crc = field.value == CANRAW_CRC8 || field.value == CANRAW_CRC8_FF;
+    const size_t digits = colon != NULL ? length - name_length - 3u : 0;
+    if (is_crc != (colon != NULL) || (is_crc && (digits != 2 || strspn(colon + 1, "0123456789ABCDEFabcdef") < 2))) {
+        *wrong = is_crc ? "has no polynomial of two digits, such as {crc8:07}" : "takes no type";
+    } else if (has_check(frame)) {
+        *wrong = "is a second check byte";
+    } else if (frame->length == CANRAW_BYTES_MAX) {
+        *wrong = "goes beyond the 8 bytes of a frame";
+    } else {
+        frame->data[frame->length] = is_crc ? (uint8_t)strtoul(colon + 1, NULL, 16) : 0;
+        frame->field[frame->fields++] = field;
+        frame->length++;
+    }
+    return true;
+}
+
 /* Reads `{name:type}` into the next field. Returns what is wrong, NULL where nothing is. */
 static const char *add_field(const config_key_t *key, const char *token, size_t length, canraw_frame_t *frame)
 {
     const char *colon = memchr(token, ':', length);
+    const char *wrong = NULL;
+    if (add_check(token, length, frame, &wrong)) {
+        return wrong;
+    }
     if (length < 2 || token[length - 1] != '}' || colon == NULL) {
         return "is no field";
     }
@@ -340,7 +385,11 @@ static void format_frame(const canraw_frame_t *frame, config_text_t *text)
     for (unsigned at = 0; at < frame->length;) {
         const canraw_field_t *field = field_at(frame, at);
         config_text_add(text, "%s", at == 0 ? "" : " ");
-        if (field != NULL) {
+        if (field != NULL && (field->value == CANRAW_SUM || field->value == CANRAW_XOR)) {
+            config_text_add(text, "{%s}", k_values[field->value]);
+        } else if (field != NULL && canraw_is_check(field->value)) {
+            config_text_add(text, "{%s:%02X}", k_values[field->value], (unsigned)frame->data[at]);
+        } else if (field != NULL) {
             config_text_add(text, "{%s:%s}", k_values[field->value], type_name(field));
         } else if ((frame->constant >> at & 1u) != 0) {
             config_text_add(text, "%02X", (unsigned)frame->data[at]);
@@ -383,8 +432,9 @@ static void allowed_frame(const config_key_t *key, config_text_t *text)
         config_text_add(text, "%s{%.*s:T}", word == key->words ? ", " : " ", (int)strcspn(word, "|"), word);
     }
     if (key->words != NULL) {
-        config_text_add(text, " with T u8 i8 u16le u16be i16le ... i32be");
+        config_text_add(text, " with T u8 i8 u16le ... i32be");
     }
+    config_text_add(text, ", {sum} {xor} {crc8:07} {crc8ff:1D}");
 }
 
 void config_value_can_allowed(const config_key_t *key, config_text_t *text)

@@ -23,6 +23,7 @@
 #include "heave/gateway.h"
 #include "inspect/dbc.h"
 #include "inspect/doctor.h"
+#include "inspect/eds_judge.h"
 #include "inspect/envelope_csv.h"
 #include "inspect/report.h"
 
@@ -56,6 +57,7 @@ static int check_outputs(const options_t *options, const char *metrics)
 {
     const named_t named[] = {{"--config", options->config, false},    {"--play", options->play, false},
                              {"--trace", options->trace, true},       {"--record", options->record, true},
+                             {"--eds", options->eds, false},          {"--import-dcf", options->dcf, false},
                              {"--envelope", options->envelope, true}, {"[control] metrics", metrics, true}};
     for (size_t out = 0; out < sizeof named / sizeof named[0]; out++) {
         for (size_t in = 0; named[out].is_output && named[out].path != NULL && in < out; in++) {
@@ -88,6 +90,54 @@ static int dump_dbc(const options_t *options, const config_t *config)
     return end_stdout(EXIT_DONE);
 }
 
+/* Reads a drive's file.
+ * Returns EXIT_DONE; else it has said what is wrong. */
+static int read_eds(eds_t *eds, const char *path)
+{
+    FILE *in = is_readable(path) ? fopen(path, "r") : NULL;
+    *eds = (eds_t){.object = NULL};
+    if (in == NULL) {
+        return print_message(EXIT_NO_INPUT, "%s: %s", path, strerror(errno));
+    }
+    const bool is_read = eds_read(eds, in, path, stderr);
+    (void)fclose(in);
+    return is_read ? EXIT_DONE : EXIT_BAD_DATA;
+}
+
+static int import_dcf(const char *path)
+{
+    eds_t eds;
+    const int code = read_eds(&eds, path);
+    if (code == EXIT_DONE) {
+        eds_write_startup(&eds, stdout);
+    }
+    eds_free(&eds);
+    return end_stdout(code);
+}
+
+/* What is wrong with the drives' file comes first: the report is long. */
+static int check(const options_t *options, const config_t *config)
+{
+    eds_t eds = {.object = NULL};
+    int code = EXIT_DONE;
+    if (options->eds != NULL && config->drives != CONFIG_DRIVES_CIA402) {
+        return print_message(EXIT_BAD_CONFIG, "%s: [drives] driver: has no CANopen drives; allowed for --eds: cia402",
+                             options->config);
+    }
+    if (options->eds != NULL) {
+        code = read_eds(&eds, options->eds);
+    }
+    if (code == EXIT_DONE) {
+        (void)report_write(config, sizeof(gateway_t), stdout);
+        (void)gpio_setup_check(config, stdout);
+    }
+    if (code == EXIT_DONE && options->eds != NULL && !eds_judge(&eds, config, stdout)) {
+        code = EXIT_REFUSED;
+    }
+    eds_free(&eds);
+    return end_stdout(code);
+}
+
 static int write_envelope(const char *path, const config_t *config)
 {
     static envelope_t envelope;
@@ -113,9 +163,7 @@ static int run(const options_t *options, const config_t *config)
     case MODE_PLAY:
         return play_run(config, options->play, options->trace);
     case MODE_CHECK:
-        (void)report_write(config, sizeof(gateway_t), stdout);
-        (void)gpio_setup_check(config, stdout);
-        return end_stdout(EXIT_DONE);
+        return check(options, config);
     case MODE_ENVELOPE:
         return write_envelope(options->envelope, config);
     case MODE_DOCTOR:
@@ -125,6 +173,7 @@ static int run(const options_t *options, const config_t *config)
         return end_stdout(EXIT_DONE);
     case MODE_DUMP_DBC:
         return dump_dbc(options, config);
+    case MODE_IMPORT_DCF:
     case MODE_HELP:
     case MODE_VERSION:
     case MODE_PRESETS:
@@ -162,6 +211,8 @@ static int run_without_file(const options_t *options)
         return list_presets();
     case MODE_TEMPLATE:
         return write_template(options);
+    case MODE_IMPORT_DCF:
+        return import_dcf(options->dcf);
     case MODE_RUN:
     case MODE_CHECK:
     case MODE_ENVELOPE:

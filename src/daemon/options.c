@@ -17,6 +17,8 @@ enum {
     OPTION_DOCTOR,
     OPTION_DUMP,
     OPTION_DUMP_DBC,
+    OPTION_EDS,
+    OPTION_IMPORT_DCF,
     OPTION_PLAY,
     OPTION_TRACE,
     OPTION_RECORD,
@@ -30,11 +32,12 @@ enum {
 
 static const usage_row_t k_forms[] = {
     {.argument = "[--socket PATH] [--record FRAMES] [--trace OUT]", .help = "run"},
-    {.argument = "--check", .help = "validate, and print what follows from it"},
+    {.argument = "--check [--eds EDS]", .help = "validate, and print what follows from it"},
     {.argument = "--envelope OUT", .help = "what the geometry can do, as CSV (docs/envelope.md)"},
     {.argument = "--doctor", .help = "look at machine, CAN interface and drives: what is wrong, what helps"},
     {.argument = "--dump-config", .help = "every key with its value, unit, range and help"},
     {.argument = "--dump-dbc", .help = "the frames of [can-raw] as a DBC file"},
+    {.argument = "--import-dcf DCF", .help = "what it sets, as a [cia402-startup] list"},
     {.argument = "--play FRAMES [--trace OUT]", .help = "offline: simulated time and devices"},
     {.argument = "--presets", .help = "ready-made platforms, without a file"},
     {.argument = "--template KIND DRIVER", .help = "a file to fill in, without a file"},
@@ -53,6 +56,10 @@ static const usage_row_t k_options[] = {
     {"doctor", NULL, "a line for each finding; writes nothing into a drive", OPTION_DOCTOR},
     {"dump-config", NULL, "as a file that --config takes", OPTION_DUMP},
     {"dump-dbc", NULL, "for tools that show CAN frames", OPTION_DUMP_DBC},
+    {"eds", "EDS", "the file of the drives ([drives] driver = cia402): which objects they lack, which settings do not fit",
+     OPTION_EDS},
+    {"import-dcf", "DCF", "a drive as its maker's program left it; what heaved sets itself, or the node decides, stays out",
+     OPTION_IMPORT_DCF},
     {"play", "FRAMES", "lines `<t_ms> <text>`, `<t_ms> !engage` ...; - is standard input", OPTION_PLAY},
     {"trace", "OUT", "the set-points of every cycle (CSV); - is standard output", OPTION_TRACE},
     {"record", "FRAMES", "log every datagram and request, so that --play repeats the run", OPTION_RECORD},
@@ -64,9 +71,9 @@ static const usage_row_t k_options[] = {
 
 static const usage_exit_t k_exits[] = {
     {EXIT_DONE, "done"},
-    {EXIT_REFUSED, "ended by a second signal, torque not confirmed off, or --doctor found something wrong"},
+    {EXIT_REFUSED, "ended by a second signal, torque not confirmed off, or --doctor or --eds found something wrong"},
     {EXIT_BAD_USAGE, "usage"},
-    {EXIT_BAD_DATA, "bad FRAMES"},
+    {EXIT_BAD_DATA, "bad FRAMES, EDS or DCF"},
     {EXIT_NO_INPUT, "no input"},
     {EXIT_UNAVAILABLE, "port or socket in use"},
     {EXIT_SOFTWARE, "a bug"},
@@ -118,85 +125,79 @@ const usage_t heaved_usage = {
     .see_also = "heavectl(1), heave.ini(5)",
 };
 
-/* Sets the mode; two different ones contradict each other. */
-static bool set_mode(options_t *self, run_mode_t mode)
+/* The mode that an option asks for; MODE_RUN where it asks for none. */
+static run_mode_t mode_of(int option)
 {
-    const bool is_free = self->mode == MODE_RUN || self->mode == mode;
-    self->mode = mode;
-    return is_free;
+    static const run_mode_t k_modes[] = {
+        [OPTION_CHECK] = MODE_CHECK,      [OPTION_ENVELOPE] = MODE_ENVELOPE, [OPTION_DOCTOR] = MODE_DOCTOR,
+        [OPTION_DUMP] = MODE_DUMP_CONFIG, [OPTION_DUMP_DBC] = MODE_DUMP_DBC, [OPTION_IMPORT_DCF] = MODE_IMPORT_DCF,
+        [OPTION_PLAY] = MODE_PLAY,        [OPTION_PRESETS] = MODE_PRESETS,   [OPTION_TEMPLATE] = MODE_TEMPLATE,
+        [OPTION_HELP] = MODE_HELP,        [OPTION_VERSION] = MODE_VERSION};
+    return (size_t)option < sizeof k_modes / sizeof k_modes[0] ? k_modes[option] : MODE_RUN;
+}
+
+/* Where the value of an option goes; NULL where it has none. */
+static const char **value_of(options_t *self, int option)
+{
+    switch (option) {
+    case OPTION_ENVELOPE:
+        return &self->envelope;
+    case OPTION_EDS:
+        return &self->eds;
+    case OPTION_IMPORT_DCF:
+        return &self->dcf;
+    case OPTION_PLAY:
+        return &self->play;
+    case OPTION_TRACE:
+        return &self->trace;
+    case OPTION_RECORD:
+        return &self->record;
+    case OPTION_SOCKET:
+        return &self->socket;
+    case OPTION_TEMPLATE:
+        return &self->template_kind;
+    default:
+        return NULL;
+    }
+}
+
+/* Which configuration: a file, or one of the ready-made platforms. */
+static const char *take_config(options_t *self, int option)
+{
+    const bool is_preset = option == OPTION_PRESET;
+    if (is_preset ? self->config != NULL : self->config == self->preset) {
+        return "--config or --preset, not both";
+    }
+    self->config = is_preset ? self->preset : optarg;
+    return !is_preset || presets_path(optarg, self->preset, sizeof self->preset)
+               ? NULL
+               : "--preset needs one of the names that --presets shows";
 }
 
 static const char *take_option(options_t *self, int option)
 {
-    static const char k_one_mode[] = "only one of --check, --envelope, --doctor, --dump-config, --dump-dbc, --play, --presets, "
-                                     "--template, --help, --version at a time";
-    bool is_free = true;
-    switch (option) {
-    case OPTION_CONFIG:
-        if (self->config == self->preset) {
-            return "--config or --preset, not both";
-        }
-        self->config = optarg;
-        break;
-    case OPTION_CHECK:
-        is_free = set_mode(self, MODE_CHECK);
-        break;
-    case OPTION_ENVELOPE:
-        self->envelope = optarg;
-        is_free = set_mode(self, MODE_ENVELOPE);
-        break;
-    case OPTION_DOCTOR:
-        is_free = set_mode(self, MODE_DOCTOR);
-        break;
-    case OPTION_DUMP:
-        is_free = set_mode(self, MODE_DUMP_CONFIG);
-        break;
-    case OPTION_DUMP_DBC:
-        is_free = set_mode(self, MODE_DUMP_DBC);
-        break;
-    case OPTION_PLAY:
-        self->play = optarg;
-        is_free = set_mode(self, MODE_PLAY);
-        break;
-    case OPTION_TRACE:
-        self->trace = optarg;
-        break;
-    case OPTION_RECORD:
-        self->record = optarg;
-        break;
-    case OPTION_SOCKET:
-        self->socket = optarg;
-        break;
-    case OPTION_PRESET:
-        if (self->config != NULL) {
-            return "--config or --preset, not both";
-        }
-        self->config = self->preset;
-        return presets_path(optarg, self->preset, sizeof self->preset) ? NULL
-                                                                       : "--preset needs one of the names that --presets shows";
-    case OPTION_PRESETS:
-        is_free = set_mode(self, MODE_PRESETS);
-        break;
-    case OPTION_TEMPLATE:
-        self->template_kind = optarg;
-        is_free = set_mode(self, MODE_TEMPLATE);
-        break;
-    case OPTION_HELP:
-        is_free = set_mode(self, MODE_HELP);
-        break;
-    case OPTION_VERSION:
-        is_free = set_mode(self, MODE_VERSION);
-        break;
-    default: /* getopt's own values: '?' and ':' */
+    const run_mode_t mode = mode_of(option);
+    if (option == '?' || option == ':') { /* getopt's own */
         return option == ':' ? "option needs a value" : "unknown option";
     }
-    return is_free ? NULL : k_one_mode;
+    if (option == OPTION_CONFIG || option == OPTION_PRESET) {
+        return take_config(self, option);
+    }
+    if (value_of(self, option) != NULL) {
+        *value_of(self, option) = optarg;
+    }
+    if (mode != MODE_RUN && self->mode != MODE_RUN && self->mode != mode) {
+        return "only one of --check, --envelope, --doctor, --dump-config, --dump-dbc, --import-dcf, --play, --presets, "
+               "--template, --help, --version at a time";
+    }
+    self->mode = mode != MODE_RUN ? mode : self->mode;
+    return NULL;
 }
 
 /* Options that do not go together. */
 static const char *contradiction(const options_t *self)
 {
-    if (self->mode == MODE_HELP || self->mode == MODE_VERSION || self->mode == MODE_PRESETS) {
+    if (self->mode == MODE_HELP || self->mode == MODE_VERSION || self->mode == MODE_PRESETS || self->mode == MODE_IMPORT_DCF) {
         return NULL;
     }
     if (self->mode == MODE_TEMPLATE) {
@@ -207,6 +208,9 @@ static const char *contradiction(const options_t *self)
     }
     if (self->mode != MODE_RUN && (self->record != NULL || self->socket != NULL)) {
         return "--record and --socket are for running live";
+    }
+    if (self->eds != NULL && self->mode != MODE_CHECK) {
+        return "--eds is for --check";
     }
     if (self->trace != NULL && self->mode != MODE_RUN && self->mode != MODE_PLAY) {
         return "--trace is for running live and for --play";

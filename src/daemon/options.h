@@ -14,6 +14,7 @@ typedef enum {
     MODE_DOCTOR,
     MODE_DUMP_CONFIG,
     MODE_DUMP_DBC,
+    MODE_IMPORT_DCF,
     MODE_PLAY,
     MODE_PRESETS,
     MODE_TEMPLATE,
@@ -27,6 +28,8 @@ typedef struct {
     const char *config;
     const char *play;
     const char *envelope;
+    const char *eds;
+    const char *dcf;
     const char *trace;
     const char *record;
     const char *socket;

@@ -101,13 +101,24 @@ static void watch_bus(canraw_t *self, bool is_up)
 
 /* --- Out --- */
 
-static hv_status_t send_bytes(const canraw_t *self, unsigned k, uint8_t length, const uint8_t data[CANRAW_BYTES_MAX])
+static hv_status_t send_bytes(canraw_t *self, unsigned k, uint8_t length, const uint8_t data[CANRAW_BYTES_MAX])
 {
     can_frame_t frame = {.id = self->map->axis[k].command_id, .is_extended = self->map->is_extended, .length = length};
     for (unsigned i = 0; i < CANRAW_BYTES_MAX; i++) {
         frame.data[i] = data[i];
     }
-    return hal_can_send(self->can, &frame);
+    const hv_status_t status = hal_can_send(self->can, &frame);
+    self->axis[k].counter += status == HV_OK; /* what did not go out is no gap */
+    return status;
+}
+
+/* A frame without values but counter and check byte. */
+static hv_status_t send_plain(canraw_t *self, unsigned k, const canraw_frame_t *frame)
+{
+    const int64_t value[CANRAW_VALUES] = {[CANRAW_COUNTER] = self->axis[k].counter};
+    uint8_t data[CANRAW_BYTES_MAX];
+    const hv_status_t status = canraw_pack(frame, value, data);
+    return status == HV_OK ? send_bytes(self, k, frame->length, data) : status;
 }
 
 /* Commands that wait, of the kinds up to last; what the bus does not take waits on. */
@@ -119,7 +130,7 @@ static void send_commands(canraw_t *self, canraw_command_t last)
             continue;
         }
         const canraw_frame_t *command = &self->map->command[axis->pending];
-        if (send_bytes(self, k, command->length, command->data) == HV_OK) {
+        if (send_plain(self, k, command) == HV_OK) {
             axis->pending = CANRAW_NOTHING;
             axis->told_us = self->now_us;
         }
@@ -136,7 +147,7 @@ static void send_queries(canraw_t *self)
         }
         const canraw_asked_t asked = canraw_axis_next_query(&self->axis[k], map);
         const canraw_frame_t *query = asked == CANRAW_ASKED_HOMING ? &map->homing_query : &map->position_query;
-        if (asked != CANRAW_ASKED_NOTHING && send_bytes(self, k, query->length, query->data) != HV_OK) {
+        if (asked != CANRAW_ASKED_NOTHING && send_plain(self, k, query) != HV_OK) {
             self->axis[k].asked = CANRAW_ASKED_NOTHING;
         }
     }
@@ -171,6 +182,7 @@ static hv_status_t pack_setpoint(const canraw_t *self, unsigned k, q32_t setpoin
         return HV_ERR_RANGE;
     }
     value[CANRAW_POSITION] = *counts;
+    value[CANRAW_COUNTER] = axis->counter;
     value[CANRAW_SPEED] = speed_of(self, k, axis->has_sent ? fx_sub_sat(setpoint_q32, axis->sent_q32) : 0);
     return canraw_pack(&self->map->setpoint, value, data);
 }

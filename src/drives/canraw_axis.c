@@ -34,6 +34,9 @@ void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map)
                             .is_begun = true,
                             .is_homed = !has(map, CANRAW_HOME),
                             .is_energized = self->is_energized,
+                            .counter = self->counter,
+                            .has_counter = self->has_counter, /* one that has stood still is not heard again by losing it */
+                            .counter_in = self->counter_in,
                             .has_actual = self->has_actual,
                             .counts = self->counts,
                             .actual_q32 = self->actual_q32,
@@ -77,12 +80,12 @@ static void take_homing(canraw_axis_t *self, const canraw_map_t *map, uint32_t s
     }
 }
 
-static void take_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t status)
+static void take_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint32_t code)
 {
     if (is_when(map->fault_when, status)) {
         if (self->state != DRIVE_FAULT) {
             self->state = DRIVE_FAULT;
-            self->fault_code = status != 0 ? status : 1u;
+            self->fault_code = code != 0 ? code : status != 0 ? status : 1u;
             self->guard = (drive_guard_t){.jump_q32 = 0};
             const bool is_stopping = self->pending == CANRAW_STOP || self->pending == CANRAW_DISABLE;
             self->pending = is_stopping ? self->pending : CANRAW_NOTHING;
@@ -95,11 +98,11 @@ static void take_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t st
 }
 
 /* The status of a position reply; the field is there where the map judges by it. */
-static void take_status(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint64_t now_us)
+static void take_status(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint32_t code, uint64_t now_us)
 {
     self->status = status;
     if (map->fault_when.mask != 0) {
-        take_fault(self, map, status);
+        take_fault(self, map, status, code);
     }
     if (map->homing_query.length == 0 && has(map, CANRAW_HOME)) {
         take_homing(self, map, status, now_us);
@@ -109,11 +112,29 @@ static void take_status(canraw_axis_t *self, const canraw_map_t *map, uint32_t s
     }
 }
 
+/* A drive whose counter stands still repeats what it said last, whatever has become of it. */
+static bool is_repeated(canraw_axis_t *self, const canraw_map_t *map, const uint8_t *data)
+{
+    const canraw_field_t *counter = canraw_find(&map->position_reply, CANRAW_COUNTER);
+    if (counter == NULL) {
+        return false;
+    }
+    const uint32_t found = (uint32_t)canraw_extract(counter, data);
+    const bool is_same = self->has_counter && found == self->counter_in;
+    self->has_counter = true;
+    self->counter_in = found;
+    return is_same;
+}
+
 static bool take_position(canraw_axis_t *self, const canraw_map_t *map, const counts_scale_t *scale, const uint8_t *data,
                           uint64_t now_us)
 {
     const canraw_field_t *position = canraw_find(&map->position_reply, CANRAW_POSITION);
     const canraw_field_t *status = canraw_find(&map->position_reply, CANRAW_STATUS);
+    const canraw_field_t *fault = canraw_find(&map->position_reply, CANRAW_FAULT);
+    if (is_repeated(self, map, data)) {
+        return false;
+    }
     const int64_t counts = canraw_extract(position, data);
     if (counts_to_units(scale, counts, &self->actual_q32) != HV_OK) {
         return false;
@@ -126,7 +147,8 @@ static bool take_position(canraw_axis_t *self, const canraw_map_t *map, const co
     self->has_actual = true;
     self->actual_us = now_us;
     if (status != NULL) {
-        take_status(self, map, (uint32_t)canraw_extract(status, data), now_us);
+        const uint32_t code = fault != NULL ? (uint32_t)canraw_extract(fault, data) : 0;
+        take_status(self, map, (uint32_t)canraw_extract(status, data), code, now_us);
     }
     return true;
 }

@@ -34,11 +34,51 @@ static unsigned shift_of(const canraw_field_t *field, unsigned i)
     return 8u * (field->is_big_endian ? field->bytes - 1u - i : i);
 }
 
+bool canraw_is_check(canraw_value_t value)
+{
+    return value >= CANRAW_SUM;
+}
+
+static uint8_t crc8_step(uint8_t crc, uint8_t byte, uint8_t polynomial)
+{
+    crc ^= byte;
+    for (unsigned bit = 0; bit < 8u; bit++) {
+        crc = (uint8_t)((crc & 0x80u) != 0 ? (unsigned)crc << 1 ^ polynomial : (unsigned)crc << 1);
+    }
+    return crc;
+}
+
+/* The check byte of a frame over its other bytes. */
+static uint8_t check_of(const canraw_frame_t *frame, const canraw_field_t *field, const uint8_t *data)
+{
+    uint8_t check = field->value == CANRAW_CRC8_FF ? 0xFFu : 0;
+    for (unsigned at = 0; at < frame->length; at++) {
+        if (at == field->at) {
+            continue;
+        }
+        if (field->value == CANRAW_SUM) {
+            check = (uint8_t)(check + data[at]);
+        } else if (field->value == CANRAW_XOR) {
+            check ^= data[at];
+        } else {
+            check = crc8_step(check, data[at], frame->data[field->at]);
+        }
+    }
+    return field->value == CANRAW_CRC8_FF ? (uint8_t)~check : check;
+}
+
+/* True where a field has a range that its value has to be in. */
+static bool is_bounded(const canraw_field_t *field)
+{
+    return !canraw_is_check(field->value) && field->value != CANRAW_COUNTER;
+}
+
 hv_status_t canraw_pack(const canraw_frame_t *frame, const int64_t value[CANRAW_VALUES], uint8_t out[CANRAW_BYTES_MAX])
 {
     for (unsigned i = 0; i < frame->fields; i++) {
         const canraw_field_t *field = &frame->field[i];
-        if (value[field->value] < canraw_field_min(field) || value[field->value] > canraw_field_max(field)) {
+        if (is_bounded(field) &&
+            (value[field->value] < canraw_field_min(field) || value[field->value] > canraw_field_max(field))) {
             return HV_ERR_RANGE;
         }
     }
@@ -47,8 +87,14 @@ hv_status_t canraw_pack(const canraw_frame_t *frame, const int64_t value[CANRAW_
     }
     for (unsigned i = 0; i < frame->fields; i++) {
         const canraw_field_t *field = &frame->field[i];
-        for (unsigned byte = 0; byte < field->bytes; byte++) {
+        for (unsigned byte = 0; byte < field->bytes && !canraw_is_check(field->value); byte++) {
             out[field->at + byte] = (uint8_t)((uint64_t)value[field->value] >> shift_of(field, byte) & 0xFFu);
+        }
+    }
+    for (unsigned i = 0; i < frame->fields; i++) { /* there is one at most */
+        const canraw_field_t *field = &frame->field[i];
+        if (canraw_is_check(field->value)) {
+            out[field->at] = check_of(frame, field, out);
         }
     }
     return HV_OK;
@@ -61,6 +107,12 @@ bool canraw_matches(const canraw_frame_t *frame, const uint8_t *data, uint8_t le
     }
     for (unsigned at = 0; at < frame->length; at++) {
         if (is_constant(frame, at) && data[at] != frame->data[at]) {
+            return false;
+        }
+    }
+    for (unsigned i = 0; i < frame->fields; i++) {
+        const canraw_field_t *field = &frame->field[i];
+        if (canraw_is_check(field->value) && data[field->at] != check_of(frame, field, data)) {
             return false;
         }
     }

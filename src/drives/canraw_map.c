@@ -11,13 +11,16 @@
 static bool is_frame_sound(const canraw_frame_t *frame)
 {
     unsigned used = frame->constant;
+    unsigned checks = 0;
     if (frame->length > CANRAW_BYTES_MAX || frame->fields > CANRAW_FIELDS_MAX || frame->constant >> frame->length != 0) {
         return false;
     }
     for (unsigned i = 0; i < frame->fields; i++) {
         const canraw_field_t *field = &frame->field[i];
-        const bool is_width = field->bytes == 1 || field->bytes == 2 || field->bytes == 4;
-        if (!is_width || field->at + field->bytes > frame->length) {
+        const bool is_check = canraw_is_check(field->value);
+        const bool is_width = field->bytes >= 1 && field->bytes <= (is_check ? 1u : 4u);
+        checks += is_check;
+        if (!is_width || field->value >= CANRAW_VALUES || field->at + field->bytes > frame->length) {
             return false;
         }
         const unsigned bytes = ((1u << field->bytes) - 1u) << field->at;
@@ -26,7 +29,7 @@ static bool is_frame_sound(const canraw_frame_t *frame)
         }
         used |= bytes;
     }
-    return true;
+    return checks <= 1;
 }
 
 /* What is sent leaves no byte open. */
@@ -41,7 +44,12 @@ static bool is_complete(const canraw_frame_t *frame)
 
 static bool is_command_sound(const canraw_frame_t *frame)
 {
-    return is_frame_sound(frame) && is_complete(frame) && frame->fields == 0;
+    for (unsigned i = 0; i < frame->fields && i < CANRAW_FIELDS_MAX; i++) {
+        if (frame->field[i].value != CANRAW_COUNTER && !canraw_is_check(frame->field[i].value)) {
+            return false;
+        }
+    }
+    return is_frame_sound(frame) && is_complete(frame);
 }
 
 static bool are_frames_sound(const canraw_map_t *map)

@@ -164,7 +164,8 @@ static unsigned start_bit(const canraw_field_t *field)
 static void write_signal(const config_t *config, unsigned drive, const group_t *group, unsigned i, const canraw_field_t *field,
                          FILE *out)
 {
-    static const char *const k_names[] = {"position", "speed", "status"};
+    static const char *const k_names[CANRAW_VALUES] = {"position", "speed",    "status",   "counter", "fault",
+                                                       "checksum", "checksum", "checksum", "checksum"};
     const reading_t reading = read_field(config, drive, field);
     const bool is_big_endian = field->is_big_endian && field->bytes > 1;
     const bool is_homing = strcmp(group->kind[i], "homing_reply") == 0;

@@ -117,21 +117,22 @@ static void check_strangers(doctor_report_t *report, const doctor_probe_t *probe
 static void check_cia402(doctor_report_t *report, const config_t *config, doctor_probe_t *probe)
 {
     static cia402_config_t drives;
-    doctor_node_t node;
+    static doctor_node_t node[DRIVES_MAX];
     config_cia402(config, &drives);
     doctor_probe_listen(probe, LISTEN_MS);
     for (unsigned k = 0; k < drives.axes; k++) {
-        doctor_probe_node(probe, drives.axis[k].node, drives.sdo_timeout_ms, &node);
+        doctor_probe_node(probe, drives.axis[k].node, drives.sdo_timeout_ms, &node[k]);
         if (doctor_judge_wire(report, &config->can, doctor_probe_wire(probe))) {
             return;
         }
-        doctor_judge_node(report, &drives, k, &node);
+        doctor_judge_node(report, &drives, k, &node[k]);
         if (probe->can.trouble != LINUX_CAN_FINE) {
             doctor_say(report, DOCTOR_FAIL, "%s -> docs/can.md", probe->can.error_text);
             return;
         }
     }
     check_strangers(report, probe, &drives);
+    doctor_write_inventory(report->out, &drives, node);
 }
 
 static void check_can_raw(doctor_report_t *report, const config_t *config, doctor_probe_t *probe)

@@ -22,6 +22,9 @@ const doctor_address_t doctor_address[DOCTOR_OBJECTS] = {
     [DOCTOR_WINDOW] = {0x6065, 0},
 };
 
+const uint16_t doctor_name_index[DOCTOR_NAMES] = {
+    [DOCTOR_DEVICE] = 0x1008, [DOCTOR_HARDWARE] = 0x1009, [DOCTOR_SOFTWARE] = 0x100A};
+
 /* --- The machine --- */
 
 void doctor_judge_host(doctor_report_t *report, const doctor_host_t *host)
@@ -345,4 +348,80 @@ void doctor_judge_node(doctor_report_t *report, const cia402_config_t *config, u
                    node->value[DOCTOR_VENDOR], node->value[DOCTOR_PRODUCT],
                    cia402_state_name(cia402_state((uint16_t)node->value[DOCTOR_STATUS])), nmt_name(node->nmt));
     }
+}
+
+/* --- Inventory --- */
+
+void doctor_take_name(char name[DOCTOR_NAME_MAX], const uint8_t *bytes, size_t length)
+{
+    size_t at = 0;
+    for (; at < length && at < DOCTOR_NAME_MAX - 1u && bytes[at] != 0; at++) {
+        name[at] = '?';
+        if (bytes[at] >= ' ' && bytes[at] <= '~') {
+            name[at] = (char)bytes[at];
+        }
+    }
+    while (at > 0 && name[at - 1u] == ' ') {
+        at--;
+    }
+    name[at] = '\0';
+}
+
+static bool is_drive(const doctor_node_t *node)
+{
+    return node->answer[DOCTOR_TYPE] == DOCTOR_READ && (node->value[DOCTOR_TYPE] & 0xFFFFu) == 402u;
+}
+
+/* A key for all of them where they agree: a number that is 0 means any. */
+static void write_common(FILE *out, const char *key, doctor_object_t object, unsigned axes, const doctor_node_t *node)
+{
+    uint32_t common = 0;
+    for (unsigned k = 0; k < axes; k++) {
+        const uint32_t own = node[k].answer[object] == DOCTOR_READ ? node[k].value[object] : 0;
+        if (is_drive(&node[k]) && common != 0 && own != common) {
+            (void)fprintf(out, "; %s: they differ\n", key);
+            return;
+        }
+        common = is_drive(&node[k]) ? own : common;
+    }
+    if (common != 0) {
+        (void)fprintf(out, "%s = 0x%" PRIX32 "\n", key, common);
+    }
+}
+
+static void write_drive(FILE *out, unsigned number, unsigned axis, const doctor_node_t *node)
+{
+    if (!is_drive(node)) {
+        (void)fprintf(out, "; drive %u, node %u: not found\n", axis + 1u, number);
+        return;
+    }
+    (void)fprintf(out, "; drive %u, node %u: %s, hardware %s, software %s, revision 0x%" PRIX32 "\n", axis + 1u, number,
+                  node->name[DOCTOR_DEVICE][0] != '\0' ? node->name[DOCTOR_DEVICE] : "(no name)",
+                  node->name[DOCTOR_HARDWARE][0] != '\0' ? node->name[DOCTOR_HARDWARE] : "(not told)",
+                  node->name[DOCTOR_SOFTWARE][0] != '\0' ? node->name[DOCTOR_SOFTWARE] : "(not told)",
+                  node->answer[DOCTOR_REVISION] == DOCTOR_READ ? node->value[DOCTOR_REVISION] : 0);
+}
+
+void doctor_write_inventory(FILE *out, const cia402_config_t *config, const doctor_node_t node[DRIVES_MAX])
+{
+    bool is_any = false;
+    bool has_serial = false;
+    for (unsigned k = 0; k < config->axes; k++) {
+        is_any |= is_drive(&node[k]);
+        has_serial |= is_drive(&node[k]) && node[k].answer[DOCTOR_SERIAL] == DOCTOR_READ && node[k].value[DOCTOR_SERIAL] != 0;
+    }
+    if (!is_any) {
+        return;
+    }
+    (void)fprintf(out, "\n; the drives that were found, for [cia402]: a drive that is exchanged is then refused by name\n");
+    for (unsigned k = 0; k < config->axes; k++) {
+        write_drive(out, config->axis[k].node, k, &node[k]);
+    }
+    write_common(out, "vendor_id", DOCTOR_VENDOR, config->axes, node);
+    write_common(out, "product_code", DOCTOR_PRODUCT, config->axes, node);
+    for (unsigned k = 0; has_serial && k < config->axes; k++) {
+        const bool is_told = is_drive(&node[k]) && node[k].answer[DOCTOR_SERIAL] == DOCTOR_READ;
+        (void)fprintf(out, "%s0x%" PRIX32, k == 0 ? "serial_numbers = " : ", ", is_told ? node[k].value[DOCTOR_SERIAL] : 0);
+    }
+    (void)fprintf(out, "%s\n", has_serial ? "\n" : "");
 }

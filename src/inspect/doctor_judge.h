@@ -55,11 +55,19 @@ extern const doctor_address_t doctor_address[DOCTOR_OBJECTS];
 /** What a drive answered. */
 typedef enum { DOCTOR_NO_ANSWER, DOCTOR_REFUSED, DOCTOR_READ } doctor_answer_t;
 
+/** What a drive calls itself; each may be missing. */
+typedef enum { DOCTOR_DEVICE, DOCTOR_HARDWARE, DOCTOR_SOFTWARE, DOCTOR_NAMES } doctor_name_t;
+
+#define DOCTOR_NAME_MAX 65u /**< bytes, with the NUL */
+
+extern const uint16_t doctor_name_index[DOCTOR_NAMES];
+
 typedef struct {
     doctor_answer_t answer[DOCTOR_OBJECTS];
-    uint32_t value[DOCTOR_OBJECTS]; /**< or the abort code */
-    unsigned extra_answers;         /**< beyond one for each request */
-    int nmt;                        /**< state in its heartbeat, -1 = none heard */
+    uint32_t value[DOCTOR_OBJECTS];           /**< or the abort code */
+    unsigned extra_answers;                   /**< beyond one for each request */
+    int nmt;                                  /**< state in its heartbeat, -1 = none heard */
+    char name[DOCTOR_NAMES][DOCTOR_NAME_MAX]; /**< as text that prints; "" where it has none */
 } doctor_node_t;
 
 /** What became of what was sent. */
@@ -83,6 +91,13 @@ bool doctor_judge_wire(doctor_report_t *report, const config_can_t *config, cons
 
 /** What the machine permits. */
 void doctor_judge_host(doctor_report_t *report, const doctor_host_t *host);
+
+/** Keeps what prints of a name that a drive gives. */
+void doctor_take_name(char name[DOCTOR_NAME_MAX], const uint8_t *bytes, size_t length);
+
+/** What drives answered, as lines of [cia402]: identities where all have the same, serial numbers, and a comment for each.
+ *  @param node for each drive of the configuration */
+void doctor_write_inventory(FILE *out, const cia402_config_t *config, const doctor_node_t node[DRIVES_MAX]);
 
 /** One CiA 402 drive. */
 void doctor_judge_node(doctor_report_t *report, const cia402_config_t *config, unsigned axis, const doctor_node_t *node);

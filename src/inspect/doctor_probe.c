@@ -150,6 +150,13 @@ void doctor_probe_node(doctor_probe_t *self, uint8_t node, unsigned timeout_ms, 
             break; /* the rest would only take time */
         }
     }
+    for (unsigned name = 0; name < DOCTOR_NAMES && sdo.state != SDO_SILENT; name++) {
+        sdo_read(&sdo, doctor_name_index[name], 0, 1);
+        (void)transfer(self, &sdo);
+        if (sdo.state == SDO_DONE) {
+            doctor_take_name(out->name[name], sdo.value, sdo.size);
+        }
+    }
     out->nmt = self->nmt[node];
 }
 

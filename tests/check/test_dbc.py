@@ -32,6 +32,16 @@ homing_reply = 31 {status:u16le}
 """
 
 
+SEALED = """[can-raw]
+command_id = 0x601
+reply_id = 0x581
+counts_per_mm = 100
+setpoint = 10 {position:i24be} {counter:u8} {crc8:07}
+position_reply = 30 {status:u8} {fault:u8} {position:i24le} {counter:u8} {xor}
+fault_when = 0x02/0x02
+"""
+
+
 def load_database(heaved, text):
     import cantools  # noqa: PLC0415  only in the second run
     with tempfile.NamedTemporaryFile("w", suffix=".ini") as config:
@@ -71,12 +81,23 @@ def other_map_is_read_as_it_is_sent(heaved):
     assert reply.decode(b"\x31\x34\x12\0\0\0")["homing_status"] == 0x1234
 
 
+def sealed_map_is_read_as_it_is_sent(heaved):
+    """Fields of 24 bits, fault codes, counters and check bytes have their places."""
+    text = re.sub(r"\[can-raw\].*?(?=\n\[relays\])", SEALED, PRESET.read_text(encoding="utf-8"), flags=re.DOTALL)
+    database = load_database(heaved, text)
+    signals = database.get_message_by_name("drive1_command").decode(b"\x10" + (30000).to_bytes(3, "big") + b"\x07\x99")
+    assert abs(signals["position"] - 300) < 1e-9 and signals["counter"] == 7 and signals["checksum"] == 0x99, signals
+    reply = database.get_message_by_name("drive2_reply").decode(b"\x30\x01\x2a" + (-100).to_bytes(3, "little", signed=True) + b"\x05\x44")
+    assert (reply["status"], reply["fault"], reply["counter"], reply["checksum"]) == (1, 0x2A, 5, 0x44) and abs(reply["position"] + 1) < 1e-9, reply
+
+
 def drives_without_frames_are_told(heaved):
     run = subprocess.run([heaved, "--config", TOP / "config/demo-hexapod.ini", "--dump-dbc"], capture_output=True, text=True, check=False)
     assert run.returncode == 78 and "can-raw" in run.stderr and not run.stdout, run
 
 
 CASES = [
+    ("counters, check bytes and fields of 24 bits have their places", sealed_map_is_read_as_it_is_sent),
     ("the preset's DBC file reads what is sent", preset_is_read_as_it_is_sent),
     ("a DBC file of 29-bit, big-endian, signed, backward frames reads what is sent", other_map_is_read_as_it_is_sent),
     ("drives without frames of their own have no DBC file", drives_without_frames_are_told),

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * fuzz_canraw.c - frames from the bus (positions, answers about homing, what is nearly one of them, reports) to the driver of raw
- * CAN maps, while seven simulated drives do their work, in three dialects. Input: records of twelve bytes, see step().
+ * CAN maps, while seven simulated drives do their work, in four dialects. Input: records of twelve bytes, see step().
  * What must hold: frames that are not meant for it change nothing in the driver (a second one does not get them), and what is
  * no reply is counted and no more; only frames of the map go out; set-points go to drives that may have them, no step larger
  * than the largest one; positions, drives that are gone and faults are told exactly when what was received and sent says so.
@@ -16,12 +16,12 @@
 #define CYCLE_US    1000u
 #define RECORDS_MAX 48u
 #define CYCLES_MAX  16u
-#define DIALECTS    3u
+#define DIALECTS    4u
 #define STATUS_ON   1u
 #define STATUS_BAD  2u
 #define STATUS_FAIL 8u /* of homing */
 
-enum { AMBIGUOUS, PLAIN, RICH };
+enum { AMBIGUOUS, PLAIN, RICH, SEALED };
 
 /* What one drive was sent and has told, by the bytes alone. */
 typedef struct {
@@ -33,6 +33,8 @@ typedef struct {
     bool is_homing_q; /* asked for homing last, else for its position */
     bool is_reset;    /* a reset was asked for since */
     bool is_stopped;  /* a stop frame went out in this request */
+    bool has_counter; /* sealed: a reply has come, */
+    uint8_t counter;  /* with this */
     int64_t told_counts;
     uint8_t status;
     uint64_t told_us;
@@ -62,6 +64,11 @@ static const canraw_map_t *map_of(const world_t *self)
     return &m_map[self->dialect];
 }
 
+static bool is_rich(const world_t *self)
+{
+    return self->dialect == RICH || self->dialect == SEALED;
+}
+
 /* --- Numbers, by the register lists of canraw_slave.h --- */
 
 static int64_t le32(const uint8_t *data)
@@ -76,8 +83,8 @@ static int64_t be32(const uint8_t *data)
 
 static int64_t counts_of(const world_t *self, q32_t mm_q32)
 {
-    const bool is_rich = self->dialect == RICH;
-    return drive_run_counts(mm_q32, is_rich ? -10000 : 6000, is_rich ? CANRAW_SLAVE_RICH_ZERO : 0);
+    const bool has_status = is_rich(self);
+    return drive_run_counts(mm_q32, has_status ? -10000 : 6000, has_status ? CANRAW_SLAVE_RICH_ZERO : 0);
 }
 
 /* True where counts are those of a position, but for one. */
@@ -88,7 +95,7 @@ static bool are_counts_of(const world_t *self, int64_t counts, q32_t mm_q32)
 
 static int64_t counts_per_mm(const world_t *self)
 {
-    return self->dialect == RICH ? 3334 : 2000;
+    return is_rich(self) ? 3334 : 2000;
 }
 
 /* --- What the driver sends --- */
@@ -99,7 +106,7 @@ static void see_setpoint(world_t *self, unsigned k, int64_t counts)
     seen_t *seen = &self->seen[k];
     const drive_state_t state = self->run.feedback[k].state;
     const int64_t from = seen->has_target ? seen->target_counts : seen->told_counts;
-    FUZZ_REQUIRE(state == DRIVE_ENABLED || (state == DRIVE_ENABLING && self->dialect == RICH));
+    FUZZ_REQUIRE(state == DRIVE_ENABLED || (state == DRIVE_ENABLING && is_rich(self)));
     FUZZ_REQUIRE(are_counts_of(self, counts, self->run.setpoint_q32[k]));
     FUZZ_REQUIRE(llabs(counts - from) <= counts_per_mm(self) + 1);
     FUZZ_REQUIRE(llabs(counts - seen->told_counts) <= 10 * counts_per_mm(self) + 1);
@@ -129,11 +136,14 @@ static void see_plain(world_t *self, unsigned k, const can_frame_t *frame)
 
 static void see_rich(world_t *self, unsigned k, const can_frame_t *frame)
 {
+    const unsigned more = self->dialect == SEALED ? 2 : 0;
+    FUZZ_REQUIRE(more == 0 ||
+                 (frame->length > 2 && canraw_slave_crc(frame->data, frame->length - 1u) == frame->data[frame->length - 1]));
     if (frame->data[0] == 0x10) {
-        FUZZ_REQUIRE(frame->length == 5);
+        FUZZ_REQUIRE(frame->length == 5 + more);
         see_setpoint(self, k, be32(frame->data + 1));
     } else {
-        FUZZ_REQUIRE(frame->length == 1 && ((frame->data[0] >= 0x20 && frame->data[0] <= 0x24) || frame->data[0] == 0x30));
+        FUZZ_REQUIRE(frame->length == 1 + more && ((frame->data[0] >= 0x20 && frame->data[0] <= 0x24) || frame->data[0] == 0x30));
         self->seen[k].is_stopped |= frame->data[0] == 0x22;
     }
 }
@@ -141,10 +151,10 @@ static void see_rich(world_t *self, unsigned k, const can_frame_t *frame)
 static void see_sent(void *watcher, const can_frame_t *frame)
 {
     world_t *self = watcher;
-    const bool is_rich = self->dialect == RICH;
-    const uint32_t k = frame->id - (is_rich ? 0x18FF0100u : 0x601u);
-    FUZZ_REQUIRE(frame->is_extended == is_rich && !frame->is_rtr && !frame->is_error && k < DRIVES_MAX);
-    if (is_rich) {
+    const bool has_status = is_rich(self);
+    const uint32_t k = frame->id - (has_status ? 0x18FF0100u : 0x601u);
+    FUZZ_REQUIRE(frame->is_extended == has_status && !frame->is_rtr && !frame->is_error && k < DRIVES_MAX);
+    if (has_status) {
         see_rich(self, k, frame);
     } else {
         see_plain(self, k, frame);
@@ -159,21 +169,30 @@ static bool begins(const can_frame_t *frame, uint8_t first, uint8_t second)
 }
 
 /* Where no byte tells replies apart, what was asked does. The driver says whether it still waits for an answer. */
-static bool is_position(const world_t *self, unsigned k, const can_frame_t *frame)
+static bool is_position(world_t *self, unsigned k, const can_frame_t *frame)
 {
-    const seen_t *seen = &self->seen[k];
+    seen_t *seen = &self->seen[k];
+    if (self->dialect == SEALED) {
+        if (frame->length < 8 || frame->data[0] != 0x30 || canraw_slave_crc(frame->data, 7) != frame->data[7]) {
+            return false;
+        }
+        const bool is_new = !seen->has_counter || seen->counter != frame->data[6];
+        seen->has_counter = true;
+        seen->counter = frame->data[6];
+        return is_new;
+    }
     if (frame->length < 6) {
         return false;
     }
     if (self->dialect == AMBIGUOUS) {
         return self->driver.axis[k].asked != CANRAW_ASKED_NOTHING && !seen->is_homing_q;
     }
-    return self->dialect == RICH ? frame->data[0] == 0x30 : begins(frame, 0, 0x15);
+    return is_rich(self) ? frame->data[0] == 0x30 : begins(frame, 0, 0x15);
 }
 
 static bool is_about_homing(const world_t *self, unsigned k, const can_frame_t *frame)
 {
-    if (frame->length < 3 || self->dialect == RICH) {
+    if (frame->length < 3 || is_rich(self)) {
         return false;
     }
     if (self->dialect == AMBIGUOUS) {
@@ -185,13 +204,13 @@ static bool is_about_homing(const world_t *self, unsigned k, const can_frame_t *
 static void see_position(world_t *self, unsigned k, const can_frame_t *frame)
 {
     seen_t *seen = &self->seen[k];
-    const bool is_rich = self->dialect == RICH;
+    const bool has_status = is_rich(self);
     seen->is_heard = true;
     seen->has_told = true;
     seen->told_us = self->run.now_us;
-    seen->told_counts = is_rich ? be32(frame->data + 2) : (int32_t)le32(frame->data + 2);
-    seen->status = is_rich ? frame->data[1] : STATUS_ON;
-    seen->is_faulty |= (seen->status & STATUS_BAD) != 0 || (is_rich && (seen->status & STATUS_FAIL) != 0);
+    seen->told_counts = has_status ? be32(frame->data + 2) : (int32_t)le32(frame->data + 2);
+    seen->status = has_status ? frame->data[1] : STATUS_ON;
+    seen->is_faulty |= (seen->status & STATUS_BAD) != 0 || (has_status && (seen->status & STATUS_FAIL) != 0);
 }
 
 static void lose_all(world_t *self)
@@ -205,13 +224,13 @@ static void lose_all(world_t *self)
 static void see_received(void *watcher, const can_frame_t *frame)
 {
     world_t *self = watcher;
-    const bool is_rich = self->dialect == RICH;
-    const uint32_t k = frame->id - (is_rich ? 0x18FF0200u : 0x581u);
+    const bool has_status = is_rich(self);
+    const uint32_t k = frame->id - (has_status ? 0x18FF0200u : 0x581u);
     if (frame->is_error) {
         if ((frame->id & CAN_ERROR_RESTARTED) != 0) {
             lose_all(self);
         }
-    } else if (frame->is_extended == is_rich && !frame->is_rtr && k < DRIVES_MAX) {
+    } else if (frame->is_extended == has_status && !frame->is_rtr && k < DRIVES_MAX) {
         if (is_position(self, k, frame)) {
             see_position(self, k, frame);
         } else {
@@ -279,7 +298,7 @@ static verdict_t judge(const world_t *self, const seen_t *seen, unsigned k)
     if (drive_run_is_beyond(setpoint_q32, from_q32, Q32_ONE) || drive_run_is_beyond(setpoint_q32, actual_q32, 10 * Q32_ONE)) {
         return WRONG;
     }
-    if (self->dialect == RICH || counts >= 0) {
+    if (is_rich(self) || counts >= 0) {
         return GOOD;
     }
     return counts < -1 ? WRONG : DOUBTFUL; /* no room for what is below 0 */
@@ -290,7 +309,7 @@ static void check_set(world_t *self, const seen_t before[DRIVES_MAX], bool is_wh
 {
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         const drive_state_t state = self->run.feedback[k].state;
-        const bool is_streamed = state == DRIVE_ENABLED || (state == DRIVE_ENABLING && self->dialect == RICH);
+        const bool is_streamed = state == DRIVE_ENABLED || (state == DRIVE_ENABLING && is_rich(self));
         const bool is_new = state != DRIVE_FAULT && self->driver.axis[k].state == DRIVE_FAULT;
         const verdict_t verdict = judge(self, &before[k], k);
         FUZZ_REQUIRE(!is_new || (is_streamed && verdict != GOOD && self->driver.axis[k].fault_code == CANRAW_FAULT_FOLLOWING));
@@ -333,7 +352,8 @@ static void configure(void)
     m_map[PLAIN].position_reply.data[1] = 0x15;
     m_map[PLAIN].homing_reply.data[1] = 0x12;
     m_map[RICH] = canraw_maps_rich();
-    m_map[RICH].homing_failed = (canraw_when_t){STATUS_FAIL, STATUS_FAIL};
+    m_map[SEALED] = canraw_maps_sealed();
+    m_map[RICH].homing_failed = m_map[SEALED].homing_failed = (canraw_when_t){STATUS_FAIL, STATUS_FAIL};
 }
 
 static void bring_up(unsigned i, unsigned dialect)
@@ -344,10 +364,11 @@ static void bring_up(unsigned i, unsigned dialect)
     self->dialect = dialect;
     self->run.now_us = 5000000;
     sim_can_bus_init(&self->bus, 0, NULL, 0);
-    canraw_slave_open(&self->slave, &self->bus, dialect == RICH);
+    canraw_slave_open(&self->slave, &self->bus, is_rich(self));
+    self->slave.is_sealed = dialect == SEALED;
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         const int32_t mm = 20 + 10 * (int32_t)k;
-        self->slave.drive[k].position = dialect == RICH ? CANRAW_SLAVE_RICH_ZERO - mm * 10000 / 3 : mm * 2000;
+        self->slave.drive[k].position = is_rich(self) ? CANRAW_SLAVE_RICH_ZERO - mm * 10000 / 3 : mm * 2000;
     }
     FUZZ_REQUIRE(sim_can_open(&self->node, &self->bus, filter, canraw_filters(&m_map[dialect], filter)) == HV_OK);
     self->tap = (can_tap_t){.inner = sim_can_hal(&self->node), .watcher = self, .sent = see_sent, .received = see_received};
@@ -373,7 +394,7 @@ static can_frame_t frame_of(const world_t *world, const record_t *record)
 static void put_counts(const world_t *world, int64_t counts, uint8_t *out)
 {
     for (unsigned i = 0; i < 4; i++) {
-        out[i] = (uint8_t)((uint64_t)counts >> (world->dialect == RICH ? 24 - 8 * i : 8 * i));
+        out[i] = (uint8_t)((uint64_t)counts >> (is_rich(world) ? 24 - 8 * i : 8 * i));
     }
 }
 
@@ -386,17 +407,22 @@ static can_frame_t reply(const world_t *world, const record_t *record)
     if (record->kind % 4 == 3) {
         return frame;
     }
-    if (record->kind % 4 == 2 && world->dialect != RICH) { /* about homing */
+    if (record->kind % 4 == 2 && !is_rich(world)) { /* about homing */
         frame.length = 3;
         memcpy(frame.data, "\x00\x12", 2);
         return frame;
     }
     frame.length = 6;
     memcpy(frame.data + 2, record->data + 2, 4);
-    frame.data[0] = world->dialect == RICH ? 0x30 : 0;
-    frame.data[1] = world->dialect == RICH ? record->data[1] : 0x15;
+    frame.data[0] = is_rich(world) ? 0x30 : 0;
+    frame.data[1] = is_rich(world) ? record->data[1] : 0x15;
     if (is_near) {
         put_counts(world, near, frame.data + 2);
+    }
+    if (world->dialect == SEALED) {
+        frame.length = 8;
+        frame.data[6] = record->data[6];
+        frame.data[7] = (uint8_t)(canraw_slave_crc(frame.data, 7) ^ (record->kind % 16 == 4 ? 1u << record->data[7] % 8 : 0));
     }
     return frame;
 }
@@ -488,7 +514,7 @@ static void disturb_bus(world_t *self, const record_t *record)
 static void ask(world_t *self, const record_t *record)
 {
     const unsigned request = record->kind % (DRIVES_RESET_FAULT + 1u);
-    const bool is_stop = request == DRIVES_QUICK_STOP && self->dialect == RICH;
+    const bool is_stop = request == DRIVES_QUICK_STOP && is_rich(self);
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         self->seen[k].is_stopped = false;
     }

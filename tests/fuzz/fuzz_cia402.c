@@ -35,6 +35,12 @@ typedef struct {
     uint32_t emergencies;         /* that the driver got */
 } world_t;
 
+static const cia402_item_t k_items[] = {
+    {.index = 0x2030, .sub = 1, .bytes = 2, .value = 50, .is_written = true, .is_checked = true},
+    {.index = 0x2099, .bytes = 1, .is_written = true, .is_optional = true}, /* no drive has it */
+    {.index = 0x2031, .bytes = 4, .value = 0x80000000u, .is_written = true, .is_last = true},
+    {.index = 0x2032, .bytes = 1, .value = 3, .is_last = true},
+};
 static cia402_config_t m_config;
 static world_t m_start[2][2]; /* off, and enabled */
 static world_t m_world[2];    /* the one that gets everything, and the one without what is not meant for it */
@@ -151,7 +157,9 @@ static void configure(void)
                                                   .scale = {k % 2 ? -COUNTS_PER_MM : COUNTS_PER_MM, 1, 5000 * k},
                                                   .step_max_q32 = q32_from_int(STEP_MM),
                                                   .following_max_q32 = q32_from_int(10),
-                                                  .window_counts = 10000};
+                                                  .window_counts = 10000,
+                                                  .item = k_items,
+                                                  .items = sizeof k_items / sizeof k_items[0]};
     }
 }
 

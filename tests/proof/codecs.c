@@ -84,7 +84,7 @@ void proof_canraw(void)
     canraw_field_t *field = &frame.field[0];
     canraw_frame_t other = {.length = (uint8_t)ANY_OF(0, 8), .constant = ANY_U8()};
     field->value = (canraw_value_t)ANY_OF(0, CANRAW_VALUES - 1);
-    field->bytes = (uint8_t)(1u << ANY_OF(0, 2));
+    field->bytes = (uint8_t)ANY_OF(1, 4);
     field->is_signed = ANY_BOOL();
     field->is_big_endian = ANY_BOOL();
     //@ split field->bytes;

@@ -66,4 +66,26 @@ static inline canraw_map_t canraw_maps_rich(void)
     return map;
 }
 
+/* Behind what there is: a counter, then a CRC-8. */
+static inline void canraw_maps_seal(canraw_frame_t *frame)
+{
+    frame->field[frame->fields++] = (canraw_field_t){CANRAW_COUNTER, frame->length, 1, false, false};
+    frame->data[frame->length + 1u] = 0x1D;
+    frame->field[frame->fields++] = (canraw_field_t){CANRAW_CRC8, (uint8_t)(frame->length + 1u), 1, false, false};
+    frame->length = (uint8_t)(frame->length + 2u);
+}
+
+/** Rich drives that seal their frames and want them sealed. */
+static inline canraw_map_t canraw_maps_sealed(void)
+{
+    canraw_map_t map = canraw_maps_rich();
+    canraw_maps_seal(&map.setpoint);
+    for (unsigned i = 0; i < CANRAW_COMMANDS; i++) {
+        canraw_maps_seal(&map.command[i]);
+    }
+    canraw_maps_seal(&map.position_query);
+    canraw_maps_seal(&map.position_reply);
+    return map;
+}
+
 #endif

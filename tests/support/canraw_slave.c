@@ -25,11 +25,29 @@ void canraw_slave_open(canraw_slave_t *self, sim_can_bus_t *bus, bool is_rich)
     }
 }
 
+/* Bit by bit, highest first, as the standard draws it: shares nothing with the driver. */
+uint8_t canraw_slave_crc(const uint8_t *data, unsigned length)
+{
+    unsigned remainder = 0;
+    for (unsigned bit = 0; bit < 8 * length + 8; bit++) {
+        const unsigned next = bit < 8 * length ? data[bit / 8] >> (7 - bit % 8) & 1u : 0;
+        remainder = remainder << 1 | next;
+        remainder = (remainder & 0x100u) != 0 ? remainder ^ 0x11Du : remainder;
+    }
+    return (uint8_t)remainder;
+}
+
 static void answer(canraw_slave_t *self, unsigned k, const uint8_t *data, uint8_t length)
 {
     can_frame_t frame = {
         .id = (self->is_rich ? RICH_REPLY_ID : PLAIN_REPLY_ID) + k, .is_extended = self->is_rich, .length = length};
     memcpy(frame.data, data, length);
+    if (self->is_sealed) {
+        self->drive[k].counter_out = (uint8_t)(self->drive[k].counter_out + !self->drive[k].is_stuck);
+        frame.data[length] = self->drive[k].counter_out;
+        frame.data[length + 1] = canraw_slave_crc(frame.data, length + 1u);
+        frame.length = (uint8_t)(length + 2);
+    }
     if (!self->drive[k].is_dumb) {
         (void)!hal_can_send(sim_can_hal(&self->node), &frame); /* a full queue loses it, as with real ones */
     }
@@ -169,6 +187,15 @@ static void take_frame(canraw_slave_t *self, const can_frame_t *frame)
         abort();
     }
     const unsigned k = frame->id - base;
+    if (self->is_sealed) {
+        canraw_slave_drive_t *drive = &self->drive[k];
+        const uint8_t counter = frame->data[frame->length - 2];
+        if (frame->length < 3 || canraw_slave_crc(frame->data, frame->length - 1u) != frame->data[frame->length - 1]) {
+            abort();
+        }
+        drive->gaps += drive->frames++ > 0 && counter != (uint8_t)(drive->counter_in + 1);
+        drive->counter_in = counter;
+    }
     if (!self->drive[k].is_on) {
         return;
     }

@@ -35,12 +35,18 @@ typedef struct {
     uint32_t setpoints;   /**< received */
     uint32_t stops;       /**< stop frames received */
     uint16_t speed;       /**< last received */
+    bool is_stuck;        /**< sealed only: its counter stands still */
+    uint8_t counter_in;   /**< sealed only: of the last frame received, */
+    uint32_t frames;      /**< how many came, */
+    uint32_t gaps;        /**< and how often it was not one more than before */
+    uint8_t counter_out;
 } canraw_slave_drive_t;
 
 /** All of them on one controller. */
 typedef struct {
     sim_can_t node;
     bool is_rich;
+    bool is_sealed; /**< rich, with a counter and a CRC-8 (1Dh from 0) behind each frame; set after opening */
     uint32_t homing_takes_us;
     uint32_t homing_stale_us; /**< for so long they report the last homing as done */
     uint64_t now_us;
@@ -51,6 +57,9 @@ typedef struct {
 
 /** Puts them on the bus, on, homed, at position 0. */
 void canraw_slave_open(canraw_slave_t *self, sim_can_bus_t *bus, bool is_rich);
+
+/** CRC-8 with the polynomial 1Dh, from 0. */
+uint8_t canraw_slave_crc(const uint8_t *data, unsigned length);
 
 /** Lets bus and drives work up to now: frames arrive, are answered, answers arrive. */
 void canraw_slave_step(canraw_slave_t *self, uint64_t now_us);

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 
+import can
 import can_bench
 import can_judge
 import forked
@@ -411,6 +412,46 @@ def all_drives_refused(bench, _):
     bench.wait_state("ENGAGED")
 
 
+STARTUP = """
+[cia402-startup]
+0x1007:00 = 1000 u32
+0x1005:00 = 0x80 u32 unchecked last
+0x1000:00 is 0x20192 u32
+0x2999:00 = 1 u8 if-there
+"""
+
+
+def read_object(node, index):
+    """As another program on the bus would."""
+    with can.Bus(interface="socketcan", channel="vcan0") as bus:
+        bus.send(can.Message(arbitration_id=0x600 + node, is_extended_id=False, data=[0x40, index & 0xFF, index >> 8, 0, 0, 0, 0, 0]))
+        while (message := bus.recv(5)) is not None:
+            if message.arbitration_id == 0x580 + node and message.data[1:4] == bytes([index & 0xFF, index >> 8, 0]):
+                return int.from_bytes(message.data[4:8], "little")
+    raise AssertionError(f"node {node} does not answer")
+
+
+def start_up_list(bench, _):
+    """Each drive holds what the list says; one that does not take it is named with the object and its reason; mended, a reset sets it up."""
+    bench.start_drives(only={VICTIM: {"refuse": {"1007": 0x06090030}}})
+    config = test_can.can_config(bench, platform__engage="manual")
+    config.write_text(config.read_text(encoding="utf-8") + STARTUP, encoding="utf-8")
+    bench.start(config=config)
+    harness.wait_for(lambda: bench.status()["cylinders"][VICTIM - 1]["report"]["phase"] == "refused", "is refused")
+    report = bench.status()["cylinders"][VICTIM - 1]["report"]
+    assert (report["code"], report["object"], report["sub_index"], report["detail_code"]) == (0x10009, 0x1007, 0, 0x06090030), report
+    harness.wait_for(lambda: sum(leg["report"]["phase"] == "ready" for leg in bench.status()["cylinders"]) == 5, "the others are ready")
+    assert all(read_object(node, 0x1007) == 1000 for node in range(1, 7) if node != VICTIM)
+    assert bench.ctl("engage").returncode != 0
+    bench.wait_state("FAULT")
+    bench.do("take sdo", VICTIM, index="1007", sub=0)
+    bench.ctl("reset")
+    bench.wait_state("OFF")
+    harness.wait_for(lambda: bench.ctl("engage").returncode == 0, "may be engaged")
+    bench.wait_state("ENGAGED")
+    assert read_object(VICTIM, 0x1007) == 1000
+
+
 def object_without_answer(bench, _):
     """It answers everything else: named with the object, reset no more than once, and at an engage the reason is told."""
     bench.start_drives(only={VICTIM: {"no_answer": ["6065:0"]}})
@@ -502,6 +543,7 @@ CASES += [(f"{name}: silence, latched", bus_lost(*row)) for name, *row in BUS_RO
 CASES += [("error-passive for more than a second: a controlled stop, latched", passive_stops),
           ("error-passive for less, and a storm of error frames: nothing stops", disturbed)]
 CASES += [("drives missing or wrong are named, nobody is enabled", bad_drives_are_named),
+          ("a start-up list is held by all drives, and one that does not take it is named", start_up_list),
           ("a drive that never answers for an object is named with it", object_without_answer),
           ("two drives with the same node id are named, nobody is enabled", node_id_twice),
           ("drives that all refuse the same: named, no lost bus, a reset sets them up again", all_drives_refused), ("killed at random moments and started again", killed_anywhere)]

@@ -53,6 +53,20 @@ def sound(bench, config):
     assert all(level == "ok" for level, _ in rows), rows
 
 
+def inventory_is_ready_to_paste(bench, config):
+    """What it prints goes into [cia402] as it is, and the next run has nothing to say; with another drive's number it has."""
+    bench.start_drives()
+    output = bench.heaved("--config", config, "--doctor").stdout
+    pasted = output.split("; the drives that were found", 1)[1].rsplit("\n", 2)[0].split("\n", 1)[1]
+    assert "; drive 1, node 1: simulated drive" in pasted and re.search(r"^serial_numbers = 0x", pasted, re.MULTILINE), output
+    text = config.read_text(encoding="utf-8")
+    for line in pasted.splitlines():
+        text = re.sub(rf"^{line.split(' ')[0]} = .*\n", "", text, flags=re.MULTILINE) if " = " in line else text
+    doctor(bench, bench.file("pasted.ini", text.replace("[cia402]\n", f"[cia402]\n{pasted}\n")), 0)
+    wrong = re.sub(r"^serial_numbers = 0x\w+", "serial_numbers = 0xBEEF", pasted, flags=re.MULTILINE)
+    doctor(bench, bench.file("wrong.ini", text.replace("[cia402]\n", f"[cia402]\n{wrong}\n")), 1, "serial_numbers is")
+
+
 def writes_nothing(bench, config):
     bench.start_drives()
     with can.Bus(interface="socketcan", channel="vcan0") as bus:
@@ -61,7 +75,7 @@ def writes_nothing(bench, config):
         while (message := bus.recv(0)) is not None:
             heard.append(message)
     sent = [message for message in heard if 0x600 <= message.arbitration_id < 0x680]
-    assert len(sent) > 100 and all(message.data[0] == 0x40 for message in sent), "something else than reading"
+    assert len(sent) > 100 and all(message.data[0] in (0x40, 0x60, 0x70) for message in sent), "something else than reading"
     own = {message.arbitration_id for message in heard} - {base + node for base in (0x600, 0x580, 0x700, 0x180, 0x280, 0x80) for node in range(1, 8)}
     assert not own, own
 
@@ -198,6 +212,7 @@ def drives_with_frames_of_their_own(bench, _config):
 
 CASES = [
     ("sound drives: nothing is wrong", sound),
+    ("its inventory is ready to paste", inventory_is_ready_to_paste),
     ("reads, and sends nothing else", writes_nothing),
     ("an interface that is not there", missing_interface),
     ("an interface of another kind", no_can_interface),

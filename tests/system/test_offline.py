@@ -26,6 +26,11 @@ USAGE = {
     "record while playing": (["--config", "{ini}", "--play", "x", "--record", "y"], 64, "for running live"),
     "trace while checking": (["--config", "{ini}", "--check", "--trace", "x"], 64, "--trace is for"),
     "a socket path that is too long": (["--config", "{ini}", "--socket", "/" + "x" * 200], 64, "1 to 107"),
+    "an EDS without a check": (["--config", "{ini}", "--eds", "x"], 64, "--eds is for --check"),
+    "an EDS for other drives": (["--config", "{ini}", "--check", "--eds", "{empty}"], 78, "allowed for --eds: cia402"),
+    "a missing EDS": (["--config", "{can}", "--check", "--eds", "/nonexistent.eds"], 66, "/nonexistent.eds: No such file"),
+    "a DCF that is none": (["--config", "{ini}", "--import-dcf", "{wrong}"], 65, "wrong.txt:1: "),
+    "a missing DCF": (["--config", "{ini}", "--import-dcf", "/nonexistent.dcf"], 66, "/nonexistent.dcf: No such file"),
     "a missing configuration": (["--config", "/nonexistent.ini", "--check"], 66, "/nonexistent.ini: No such file"),
     "a folder as configuration": (["--config", "/tmp", "--check"], 66, "/tmp: Is a directory"),
     "missing frames": (["--config", "{ini}", "--play", "/nonexistent.txt"], 66, "/nonexistent.txt: No such file"),
@@ -52,7 +57,7 @@ USAGE = {
 
 def check_usage(bench, arguments, code, part):
     run = bench.heaved(*[argument.format(ini=bench.config, bad=bench.folder / "bad.ini", empty=bench.folder / "empty.txt",
-                                         wrong=bench.folder / "wrong.txt", trace=bench.folder / "never.csv") for argument in arguments])
+                                         wrong=bench.folder / "wrong.txt", can=harness.TOP / "config/hexapod-cia402.ini", trace=bench.folder / "never.csv") for argument in arguments])
     assert run.returncode == code, f"exit {run.returncode}: {run.stderr}"
     assert part in run.stderr, run.stderr
     if code not in (0, 65, 78):

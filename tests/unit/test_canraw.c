@@ -100,6 +100,13 @@ static void open_rich(void)
     open_with(NULL, 0, true);
 }
 
+static void open_sealed(void)
+{
+    map = canraw_maps_sealed();
+    open_with(NULL, 0, true);
+    slave.is_sealed = true;
+}
+
 void setUp(void)
 {
     map = canraw_maps_plain();
@@ -167,6 +174,91 @@ static void test_enable_drives_that_are_enabled_by_themselves(void)
     TEST_ASSERT_EQUAL(DRIVE_ENABLING, feedback[4].state);
     slave.drive[4].is_enabled = true;
     await(DRIVE_ENABLED, 100);
+}
+
+/* ---- Counters and check bytes ---- */
+
+static void test_sealed_frames_have_no_gap_and_no_wrong_check_byte(void)
+{
+    open_sealed(); /* the drives abort at a wrong check byte */
+    enable();
+    cycles(1000);
+    follow_actual();
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+    cycles(10);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_TRUE(slave.drive[k].frames > 900);
+        TEST_ASSERT_EQUAL_UINT32(0, slave.drive[k].gaps);
+        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].stops);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, driver.strange);
+}
+
+/* A frame that never left is no gap: the drive would take it for a loss. */
+static void test_sealed_frame_that_finds_no_room_is_no_gap(void)
+{
+    for (uint32_t at = 150; at < 150 + 2 * AXES; at++) {
+        const sim_can_fault_t plan[] = {{SIM_CAN_FULL, at, 0}};
+        map = canraw_maps_sealed();
+        open_with(plan, 1, true);
+        slave.is_sealed = true;
+        enable();
+        cycles(100);
+        for (unsigned k = 0; k < AXES; k++) {
+            TEST_ASSERT_EQUAL_UINT32(0, slave.drive[k].gaps);
+        }
+    }
+}
+
+static void test_reply_with_a_wrong_check_byte_is_not_believed(void)
+{
+    open_sealed();
+    enable();
+    const q32_t before_q32 = feedback[2].actual_mm_q32;
+    can_frame_t frame = {.id = 0x18FF0202, .is_extended = true, .length = 8, .data = {0x30, 0x01, 0, 0, 0, 0, 0x77}};
+    frame.data[7] = (uint8_t)(canraw_slave_crc(frame.data, 7) ^ 0x10);
+    const uint32_t strange = driver.strange;
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+    sim_can_bus_step(&bus, now_us);
+    (void)!drives_poll(hal, now_us, feedback);
+    TEST_ASSERT_EQUAL_INT64(before_q32, feedback[2].actual_mm_q32);
+    TEST_ASSERT_EQUAL_UINT32(strange + 1, driver.strange);
+}
+
+/* It answers, with what it said last: a controller that hangs behind a bus controller that does not. */
+static void test_drive_whose_counter_stands_still_is_lost_and_stays_so(void)
+{
+    open_sealed();
+    enable();
+    slave.drive[4].is_stuck = true;
+    cycles(2 * ((int)map.offline_periods + 2));
+    TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
+    for (unsigned i = 0; i < 200; i++) {
+        (void)!cycle();
+        TEST_ASSERT_EQUAL(DRIVE_OFFLINE, feedback[4].state);
+    }
+    slave.drive[4].is_stuck = false;
+    cycles(10);
+    TEST_ASSERT_TRUE(feedback[4].state != DRIVE_OFFLINE);
+}
+
+static void test_fault_of_a_drive_has_the_code_that_it_tells(void)
+{
+    map = canraw_maps_rich();
+    map.position_reply = (canraw_frame_t){
+        6,
+        0x01,
+        3,
+        {0x30},
+        {{CANRAW_STATUS, 1, 1, false, false}, {CANRAW_FAULT, 2, 1, false, false}, {CANRAW_POSITION, 3, 3, true, true}}};
+    open_with(NULL, 0, true);
+    const can_frame_t bad = {.id = 0x18FF0203, .is_extended = true, .length = 6, .data = {0x30, 0x02, 0x2A, 0xFF, 0xFF, 0xFE}};
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &bad));
+    sim_can_bus_step(&bus, now_us);
+    (void)!drives_poll(hal, now_us + 1, feedback);
+    TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[3].state);
+    TEST_ASSERT_EQUAL_HEX32(0x2A, feedback[3].fault_code);
+    TEST_ASSERT_INT64_WITHIN(Q32_ONE / 1000, fx_mul_div(4000002, Q32_ONE * 3, 10000), feedback[3].actual_mm_q32); /* -2 counts */
 }
 
 /* ---- Bytes ---- */
@@ -1355,6 +1447,11 @@ static void test_off_that_is_not_confirmed_is_not_told(void)
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_sealed_frames_have_no_gap_and_no_wrong_check_byte);
+    RUN_TEST(test_sealed_frame_that_finds_no_room_is_no_gap);
+    RUN_TEST(test_reply_with_a_wrong_check_byte_is_not_believed);
+    RUN_TEST(test_drive_whose_counter_stands_still_is_lost_and_stays_so);
+    RUN_TEST(test_fault_of_a_drive_has_the_code_that_it_tells);
     RUN_TEST(test_frames_of_the_plain_dialect_byte_for_byte);
     RUN_TEST(test_setpoint_at_full_stroke_byte_for_byte);
     RUN_TEST(test_speed_field_is_that_of_the_setpoints);

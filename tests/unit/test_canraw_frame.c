@@ -65,8 +65,8 @@ static void check_value(const canraw_frame_t *frame, int64_t number)
 
 static void test_pack_every_place_width_order_and_sign_matches_the_model(void)
 {
-    static const unsigned k_bytes[] = {1, 2, 4};
-    for (unsigned w = 0; w < 3; w++) {
+    static const unsigned k_bytes[] = {1, 2, 3, 4};
+    for (unsigned w = 0; w < 4; w++) {
         for (unsigned at = 0; at + k_bytes[w] <= 8; at++) {
             for (unsigned kind = 0; kind < 4; kind++) {
                 canraw_frame_t frame = {.length = 8, .fields = 1, .field = {field_at(at, k_bytes[w], kind)}};
@@ -148,9 +148,41 @@ static void test_is_ambiguous_with_a_frame_that_is_not_there_is_nothing(void)
     TEST_ASSERT_FALSE(canraw_is_ambiguous(&(canraw_frame_t){0}, &any));
 }
 
+/* By a CRC of other making, which over "123456789" gives the check values of the catalogues: SMBUS F4h, SAE-J1850 4Bh. */
+static void test_check_bytes_are_those_of_the_catalogue(void)
+{
+    static const struct {
+        canraw_value_t kind;
+        uint8_t polynomial;
+        uint8_t data[7];
+        uint8_t check;
+    } k_cases[] = {
+        {CANRAW_SUM, 0, {0xFF, 2, 3, 4, 5, 6, 7}, 0x1A},
+        {CANRAW_XOR, 0, {0x0F, 0xF0, 0x11, 0, 0, 0, 1}, 0xEF},
+        {CANRAW_CRC8, 0x07, {'1', '2', '3', '4', '5', '6', '7'}, 0x78},
+        {CANRAW_CRC8_FF, 0x1D, {'1', '2', '3', '4', '5', '6', '7'}, 0x4D},
+    };
+    for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {
+        canraw_frame_t frame = {.length = 8, .constant = 0x7F, .fields = 1};
+        uint8_t out[8];
+        memcpy(frame.data, k_cases[i].data, 7);
+        frame.data[7] = k_cases[i].polynomial;
+        frame.field[0] = (canraw_field_t){k_cases[i].kind, 7, 1, false, false};
+        TEST_ASSERT_EQUAL(HV_OK, canraw_pack(&frame, (const int64_t[CANRAW_VALUES]){0}, out));
+        TEST_ASSERT_EQUAL_HEX8(k_cases[i].check, out[7]);
+        TEST_ASSERT_TRUE(canraw_matches(&frame, out, 8));
+        for (unsigned bit = 0; bit < 8; bit++) { /* any other byte is not it */
+            out[7] ^= (uint8_t)(1u << bit);
+            TEST_ASSERT_FALSE(canraw_matches(&frame, out, 8));
+            out[7] ^= (uint8_t)(1u << bit);
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_check_bytes_are_those_of_the_catalogue);
     RUN_TEST(test_pack_every_place_width_order_and_sign_matches_the_model);
     RUN_TEST(test_pack_value_that_does_not_fit_is_refused_and_changes_nothing);
     RUN_TEST(test_matches_constants_and_length_decide);

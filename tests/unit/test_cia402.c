@@ -399,6 +399,117 @@ static void test_setup_position_limits_are_written_where_wanted(void)
     TEST_ASSERT_EQUAL_INT32(0, (int32_t)cia402_slave_row(&slave, 0, 0x607D, 1)->value);
 }
 
+/* --- Start-up lists --- */
+
+static cia402_item_t items[3];
+
+static void list(void)
+{
+    items[0] = (cia402_item_t){
+        .index = 0x2031, .bytes = 4, .value = 0xFFFFFFFE, .is_written = true, .is_checked = true, .is_last = true};
+    items[1] = (cia402_item_t){.index = 0x2030, .sub = 1, .bytes = 2, .value = 50, .is_written = true, .is_checked = true};
+    items[2] = (cia402_item_t){.index = 0x2032, .bytes = 1, .value = 3, .is_checked = true};
+    for (unsigned k = 0; k < AXES; k++) {
+        config.axis[k].item = items;
+        config.axis[k].items = 3;
+    }
+}
+
+static void test_startup_list_is_written_before_and_behind_everything_else(void)
+{
+    list();
+    come_up();
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(50, cia402_slave_row(&slave, k, 0x2030, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, cia402_slave_row(&slave, k, 0x2031, 0)->value);
+        TEST_ASSERT_TRUE(place(k, 0x203001, 0) < place(k, 0x101700, 0));
+        TEST_ASSERT_TRUE(place(k, 0x203100, 0) > place(k, 0x60C201, 0));
+        TEST_ASSERT_TRUE(place(k, 0x203100, 0) < place(k, 0x606000, 0));
+    }
+    const unsigned before = slave.drive[2].logged;
+    cia402_slave_power(&slave, 2, false);
+    cycles(50);
+    cia402_slave_power(&slave, 2, true);
+    cycles(2000);
+    TEST_ASSERT_TRUE(place(2, 0x203001, before) < place(2, 0x203100, before)); /* again after each boot-up */
+    enable();
+}
+
+static void test_startup_list_that_a_drive_does_not_take_names_the_object(void)
+{
+    list();
+    cia402_slave_row(&slave, 4, 0x2030, 1)->is_missing = true;
+    drive_report_t r = refusal_of(4);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, r.code);
+    TEST_ASSERT_EQUAL_HEX32(0x203001, r.object);
+    TEST_ASSERT_EQUAL_HEX32(0x06020000, r.detail_code);
+
+    setUp();
+    list();
+    cia402_slave_row(&slave, 4, 0x2031, 0)->is_read_only = true;
+    r = refusal_of(4);
+    TEST_ASSERT_EQUAL_HEX32(0x203100, r.object);
+    TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, r.wanted);
+
+    setUp();
+    list();
+    items[0].is_checked = false; /* nothing is read back, so the refusal itself counts */
+    cia402_slave_row(&slave, 4, 0x2031, 0)->is_read_only = true;
+    TEST_ASSERT_EQUAL_HEX32(0x203100, refusal_of(4).object);
+
+    setUp();
+    list();
+    cia402_slave_row(&slave, 4, 0x2032, 0)->value = 4;
+    r = refusal_of(4);
+    TEST_ASSERT_EQUAL_HEX32(0x203200, r.object);
+    TEST_ASSERT_EQUAL_HEX32(4, r.found);
+    TEST_ASSERT_EQUAL_HEX32(3, r.wanted);
+}
+
+static void test_startup_list_item_that_may_be_missing_is_passed_over(void)
+{
+    list();
+    items[1].is_optional = true;
+    cia402_slave_row(&slave, 4, 0x2030, 1)->is_missing = true;
+    cia402_slave_row(&slave, 5, 0x2030, 1)->refusal = 0x06090030;
+    come_up();
+    TEST_ASSERT_EQUAL_UINT32(7, cia402_slave_row(&slave, 5, 0x2030, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFE, cia402_slave_row(&slave, 4, 0x2031, 0)->value);
+}
+
+static void test_startup_list_too_long_or_missing_is_refused(void)
+{
+    list();
+    config.axis[1].items = CIA402_ITEMS_MAX + 1;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, cia402_init(&driver, &config, sim_can_hal(&node)));
+    config.axis[1].items = 1;
+    config.axis[1].item = NULL;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, cia402_init(&driver, &config, sim_can_hal(&node)));
+}
+
+/* What can be told without a drive is what is done with one. */
+static void test_wishes_are_what_is_written(void)
+{
+    cia402_wish_t wish = {0};
+    unsigned written = 0;
+    list();
+    config.axis[0].homing_method = 17;
+    come_up();
+    const uint32_t logged = slave.drive[0].logged;
+    while (cia402_next_wish(&config, 0, &wish)) {
+        if (wish.is_written && cia402_slave_row(&slave, 0, wish.index, wish.sub) != NULL) {
+            (void)place(0, (uint32_t)wish.index << 8 | wish.sub, 0);
+            written++;
+        }
+        TEST_ASSERT_EQUAL(wish.index < 0x2030 || wish.index > 0x2032, wish.is_own);
+        TEST_ASSERT_EQUAL(wish.is_written && wish.is_own,
+                          wish.is_own && cia402_is_own_object(wish.index, wish.sub) && wish.is_written);
+    }
+    TEST_ASSERT_EQUAL_UINT32(logged, written);
+    TEST_ASSERT_FALSE(cia402_is_own_object(0x2030, 1));
+    TEST_ASSERT_TRUE(cia402_is_own_object(0x605A, 0));
+}
+
 static void test_setup_other_profile_is_refused(void)
 {
     cia402_slave_row(&slave, 0, 0x1000, 0)->value = 0x00020191;
@@ -2392,6 +2503,11 @@ int main(void)
     RUN_TEST(test_setup_mapping_that_can_only_be_read_is_told_as_such);
     RUN_TEST(test_setup_wrong_revision_and_serial_number_are_refused);
     RUN_TEST(test_setup_position_limits_are_written_where_wanted);
+    RUN_TEST(test_startup_list_is_written_before_and_behind_everything_else);
+    RUN_TEST(test_startup_list_that_a_drive_does_not_take_names_the_object);
+    RUN_TEST(test_startup_list_item_that_may_be_missing_is_passed_over);
+    RUN_TEST(test_startup_list_too_long_or_missing_is_refused);
+    RUN_TEST(test_wishes_are_what_is_written);
     RUN_TEST(test_setup_other_profile_is_refused);
     RUN_TEST(test_setup_missing_guard_is_refused_unless_allowed);
     RUN_TEST(test_setup_guard_that_cannot_be_written_is_taken_where_it_is_on);

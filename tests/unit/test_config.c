@@ -804,7 +804,7 @@ static void test_load_angle_keys_without_motor_are_errors(void)
 {
     take_good_file();
     set_key("angle", "present", "no");
-    TEST_ASSERT_EQUAL_INT(9 + 4 + 8 + 5, load_lines()); /* those of [angle], of [can-raw], of [cia402] and of [modbus] */
+    TEST_ASSERT_EQUAL_INT(9 + 4 + 8 + 1 + 5, load_lines()); /* [angle], [can-raw], [cia402], the section of its list, [modbus] */
     expect_contains(prefix(find_key("angle", "speed_deg_s") + 1, "angle", "speed_deg_s"));
     expect_contains("means nothing on this platform; allowed: with [angle] present = yes only");
 }

@@ -207,7 +207,13 @@ static const spoilt_t k_spoilt[] = {
     {"setpoint", "setpoint = 01 05 06 {position:u32le} {speed:u16le}", "\"{speed:u16le}\" goes beyond the 8 bytes of a frame; "},
     {"setpoint", "setpoint = 01 05 {position:u32le} {speed:u16le} 00", "\"00\" goes beyond the 8 bytes of a frame; allowed: "},
     {"setpoint", "setpoint = 01 {position:u32le} {position:u16le}", "\"{position:u16le}\" is there twice; allowed: "},
-    {"setpoint", "setpoint = 01 {position:u24le}", "\"{position:u24le}\" has no type that there is; allowed: "},
+    {"setpoint", "setpoint = 01 {position:u40le}", "\"{position:u40le}\" has no type that there is; allowed: "},
+    {"enable", "enable = 01 {position:u8}", "\"{position:u8}\" is no field of this frame; allowed: "},
+    {"enable", "enable = 01 {crc8}", "\"{crc8}\" has no polynomial of two digits, such as {crc8:07}; allowed: "},
+    {"enable", "enable = 01 {crc8:1}", "\"{crc8:1}\" has no polynomial of two digits, such as {crc8:07}; allowed: "},
+    {"enable", "enable = 01 {sum:u8}", "\"{sum:u8}\" takes no type; allowed: "},
+    {"enable", "enable = 01 {sum} {xor}", "\"{xor}\" is a second check byte; allowed: "},
+    {"enable", "enable = 01 02 03 04 05 06 07 08 {sum}", "\"{sum}\" goes beyond the 8 bytes of a frame; allowed: "},
     {"setpoint", "setpoint = 01 {status:u8}", "\"{status:u8}\" is no field of this frame; allowed: "},
     {"setpoint", "setpoint = 01 {position}", "\"{position}\" is no field; allowed: "},
     {"setpoint", "setpoint = 01 .. {position:u32le}", "\"..\" stands for any byte, which only replies can have; allowed: "},
@@ -258,6 +264,45 @@ static const spoilt_t k_spoilt[] = {
     {"offline_periods", "offline_periods = 4", "too few for query_every = 2; allowed: at least 5"},
     {"following_error_mm", "following_error_mm = 4", "less than a cylinder moves at full speed until its position is heard; "},
 };
+
+/* Every field and check byte there is, from the file into the bytes, and the dump as it stood. */
+static void test_fields_and_check_bytes_reach_the_driver_as_they_are_written(void)
+{
+    static const char *const k_lines[] = {"setpoint = 01 {counter:u8} {position:i24be} {speed:u16le} {crc8ff:1D}",
+                                          "enable = 20 {counter:u16le} {sum}", "stop = 22 {xor}",
+                                          "position_reply = 30 {status:u8} {fault:u8} {counter:u8} {position:i24le} {crc8:07}"};
+    static const char *const k_keys[] = {"setpoint", "enable", "stop", "position_reply"};
+    canraw_map_t map;
+    canraw_t driver;
+    sim_can_bus_t bus;
+    sim_can_t node;
+    uint8_t out[8];
+    read_preset();
+    for (unsigned i = 0; i < 4; i++) {
+        put_line(k_keys[i], k_lines[i]);
+    }
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_text(), m_errors);
+    config_canraw_map(&m_config, &map);
+    sim_can_bus_init(&bus, 0, NULL, 0);
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, NULL, 0));
+    TEST_ASSERT_EQUAL(HV_OK, canraw_init(&driver, &map, sim_can_hal(&node)));
+    const int64_t value[CANRAW_VALUES] = {[CANRAW_POSITION] = -2, [CANRAW_SPEED] = 0x1234, [CANRAW_COUNTER] = 0x1FF};
+    TEST_ASSERT_EQUAL(HV_OK, canraw_pack(&map.setpoint, value, out));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(((const uint8_t[]){0x01, 0xFF, 0xFF, 0xFF, 0xFE, 0x34, 0x12, 0x8D}), out, 8);
+    TEST_ASSERT_EQUAL(HV_OK, canraw_pack(&map.command[CANRAW_ENABLE], value, out));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(((const uint8_t[]){0x20, 0xFF, 0x01, 0x20}), out, 4);
+    TEST_ASSERT_EQUAL(HV_OK, canraw_pack(&map.command[CANRAW_STOP], value, out));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(((const uint8_t[]){0x22, 0x22}), out, 2);
+    FILE *dump = tmpfile();
+    config_dump(&m_config, dump);
+    rewind(dump);
+    static char text[60000];
+    text[fread(text, 1, sizeof text - 1, dump)] = '\0';
+    fclose(dump);
+    for (unsigned i = 0; i < 4; i++) {
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, k_lines[i]), k_lines[i]);
+    }
+}
 
 static void test_spoilt_lines_are_one_error_at_the_key_they_concern(void)
 {
@@ -350,6 +395,7 @@ int main(void)
     RUN_TEST(test_preset_frames_byte_for_byte);
     RUN_TEST(test_preset_drives_are_enabled_homed_and_led);
     RUN_TEST(test_preset_bus_load_is_the_sum_of_its_frames);
+    RUN_TEST(test_fields_and_check_bytes_reach_the_driver_as_they_are_written);
     RUN_TEST(test_spoilt_lines_are_one_error_at_the_key_they_concern);
     RUN_TEST(test_spoilt_bus_is_reported_where_it_is_wrong);
     RUN_TEST(test_section_not_in_use_is_kept_and_not_checked);

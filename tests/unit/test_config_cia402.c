@@ -10,6 +10,7 @@
 #include "config/bus.h"
 #include "config/cia402.h"
 #include "config/config.h"
+#include "cia402_slave.h"
 #include "inspect/report.h"
 #include "unity.h"
 
@@ -146,6 +147,183 @@ static void test_load_lists_and_signs_reach_their_drives(void)
     TEST_ASSERT_TRUE(drives.axis[1].has_limits && drives.axis[1].limit_counts[1] == 500 + 5000); /* it runs backwards */
     TEST_ASSERT_EQUAL(CIA402_MODE_IP, drives.mode);
     TEST_ASSERT_EQUAL_INT16(3, drives.abort_option);
+}
+
+/* --- Start-up lists --- */
+
+static void test_load_startup_list_reaches_every_drive_in_its_order(void)
+{
+    cia402_config_t drives;
+    strcat(m_text, "\n[cia402-startup]\n0x2030:01 = 50 u16\n0x2031:0x10 = -2 i32 unchecked last   ; why\n"
+                   "0x1008:0 is 0x6F4D u32 if-there\n0x2030:01 = 0xFFFF u16\n");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_cia402(&m_config, &drives);
+    for (unsigned k = 0; k < 6; k++) {
+        const cia402_item_t *item = drives.axis[k].item;
+        TEST_ASSERT_EQUAL_UINT8(4, drives.axis[k].items);
+        TEST_ASSERT_TRUE(item[0].index == 0x2030 && item[0].sub == 1 && item[0].bytes == 2 && item[0].value == 50);
+        TEST_ASSERT_TRUE(item[0].is_written && item[0].is_checked && !item[0].is_last && !item[0].is_optional);
+        TEST_ASSERT_TRUE(item[1].sub == 16 && item[1].value == 0xFFFFFFFE && !item[1].is_checked && item[1].is_last);
+        TEST_ASSERT_TRUE(item[2].index == 0x1008 && !item[2].is_written && item[2].is_optional);
+        TEST_ASSERT_EQUAL_HEX32(0xFFFF, item[3].value);
+    }
+}
+
+static void refuse_item(const char *line, const char *why)
+{
+    char place[200];
+    unsigned number = 1;
+    setUp();
+    strcat(m_text, "\n[cia402-startup]\n0x2040:00 = 1 u8\n");
+    for (const char *c = m_text; *c != '\0'; c++) {
+        number += *c == '\n';
+    }
+    strcat(m_text, line);
+    strcat(m_text, "\n");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(1, load(), m_errors);
+    sprintf(place, "%s:%u: [cia402-startup] \"", FILE_NAME, number);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, place), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, why), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "; allowed: 0x2030:01 = 50 u16"), m_errors);
+}
+
+static void test_load_startup_item_that_cannot_be_is_refused_at_its_line(void)
+{
+    refuse_item("0x2030 = 50 u16", "has no sub-index");
+    refuse_item("2030:01 = 50 u16", "has no object such as");
+    refuse_item("0x12030:01 = 50 u16", "has no object such as");
+    refuse_item("0x2030:256 = 50 u16", "has no sub-index from 0 to 255");
+    refuse_item("0x2030:01 = 50", "is no object with value and type");
+    refuse_item("0x2030:01 == 50 u16", "has no type that there is");
+    refuse_item("0x2030:01 = 65536 u16", "has a value that its type does not hold");
+    refuse_item("0x2030:01 = -1 u16", "has a value that its type does not hold");
+    refuse_item("0x2030:01 = 1.5 u16", "has a value that its type does not hold");
+    refuse_item("0x2030:01 = 1 u24", "has no type that there is");
+    refuse_item("0x2030:01 = 1 u8 later", "ends with a word that does not belong there");
+    refuse_item("0x2030:01 = 1 u8 last last", "ends with a word that does not belong there");
+    refuse_item("0x2030:01 is 1 u8 unchecked", "ends with a word that does not belong there");
+    refuse_item("0x2030:01 = 1 u8 last if-there unchecked more", "is no object with value and type");
+    refuse_item("0x1010:01 = 0x65766173 u32", "which wears it");
+}
+
+/* What heaved writes is not for a list; what it would write with other keys is. */
+static void test_load_startup_item_that_heaved_sets_itself_is_refused_at_its_line(void)
+{
+    static const char *const k_own[] = {"0x605A:00 = 0 i16", "0x1800:01 = 0x181 u32 last", "0x6085:00 = 1 u32"};
+    static const char *const k_free[] = {"0x6098:00 = 1 i8", "0x605A:00 is 2 i16", "0x60C0:00 = 0 i16"};
+    char place[200];
+    for (unsigned i = 0; i < 3; i++) {
+        setUp();
+        strcat(m_text, "\n[cia402-startup]\n0x2040:00 = 1 u8\n");
+        strcat(m_text, k_own[i]);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(1, load(), k_own[i]);
+        unsigned line = 1;
+        for (const char *c = m_text; *c != '\0'; c++) {
+            line += *c == '\n';
+        }
+        sprintf(place, "%s:%u: [cia402-startup] %.9s: heaved sets it itself", FILE_NAME, line, k_own[i]);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, place), m_errors);
+        setUp();
+        strcat(m_text, "\n[cia402-startup]\n");
+        strcat(m_text, k_free[i]);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    }
+    setUp();
+    put("[cia402]", "quick_stop_mm_s2 = 0");
+    strcat(m_text, "\n[cia402-startup]\n0x6085:00 = 1 u32\n");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+}
+
+/* A drive family's file, on simulated drives that have its objects: all come up, and hold what the list says. */
+static void test_preset_of_a_drive_family_sets_its_drives_up(void)
+{
+    static const char *const k_presets[] = {"/cia402/maxon-epos4.ini", "/cia402/nanotec-c5-n5-pd4.ini"};
+    static sim_can_bus_t bus;
+    static sim_can_t node;
+    static cia402_slave_t slave;
+    static cia402_t driver;
+    for (unsigned i = 0; i < 2; i++) {
+        char path[300];
+        cia402_config_t drives;
+        hal_can_filter_t filter[CIA402_FILTERS_MAX];
+        drive_feedback_t feedback[DRIVES_MAX] = {{0}};
+        const q32_t setpoint_q32[DRIVES_MAX] = {0};
+        sprintf(path, "%s%s", HEAVE_CONFIG_DIR, k_presets[i]);
+        TEST_ASSERT_EQUAL_INT(0, config_load(path, &m_config, stderr));
+        config_cia402(&m_config, &drives);
+        TEST_ASSERT_TRUE(drives.axis[0].items >= 3);
+        sim_can_bus_init(&bus, 0, NULL, 0);
+        cia402_slave_open(&slave, &bus);
+        for (unsigned k = 0; k < drives.axes; k++) {
+            cia402_slave_drive_t *drive = &slave.drive[k];
+            cia402_slave_row(&slave, k, 0x1018, 1)->value = 0xFB;
+            for (unsigned at = 0; at < drives.axis[k].items; at++) {
+                const cia402_item_t *item = &drives.axis[k].item[at];
+                if (cia402_slave_row(&slave, k, item->index, item->sub) == NULL) {
+                    drive->row[drive->rows++] = (cia402_slave_row_t){.index = item->index,
+                                                                     .sub = item->sub,
+                                                                     .bytes = item->bytes,
+                                                                     .value = item->is_written ? 0 : item->value};
+                }
+            }
+        }
+        TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, filter, cia402_filters(&drives, filter)));
+        TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &drives, sim_can_hal(&node)));
+        for (uint64_t now_us = 5000000; now_us < 10000000; now_us += 1000) {
+            cia402_slave_step(&slave, now_us);
+            (void)!drives_poll(cia402_hal(&driver), now_us, feedback);
+            (void)!drives_send(cia402_hal(&driver), now_us, setpoint_q32);
+        }
+        for (unsigned k = 0; k < drives.axes; k++) {
+            TEST_ASSERT_EQUAL_MESSAGE(DRIVE_DISABLED, feedback[k].state, k_presets[i]);
+            for (unsigned at = 0; at < drives.axis[k].items; at++) {
+                const cia402_item_t *item = &drives.axis[k].item[at];
+                TEST_ASSERT_EQUAL_HEX32(item->value, cia402_slave_row(&slave, k, item->index, item->sub)->value);
+            }
+        }
+    }
+}
+
+static void test_load_startup_list_of_more_than_32_is_refused(void)
+{
+    strcat(m_text, "\n[cia402-startup]\n");
+    for (unsigned i = 0; i < 33; i++) {
+        strcat(m_text, "0x2030:01 = 50 u16\n");
+    }
+    TEST_ASSERT_EQUAL_INT(1, load());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "is one too many: a list has up to 32"), m_errors);
+}
+
+/* A list counts for the hash that is approved, its dump loads to the same, and in operation it stays. */
+static void test_load_startup_list_is_dumped_hashed_and_needs_a_restart(void)
+{
+    static config_t running;
+    char before[CONFIG_HASH_MAX];
+    TEST_ASSERT_EQUAL_INT(0, load());
+    strcpy(before, m_config.hash);
+    strcat(m_text, "\n[cia402-startup]\n0x2030:01 = -50 i16 unchecked last\n0x2032:0 is 3 u8\n");
+    TEST_ASSERT_EQUAL_INT(0, load());
+    TEST_ASSERT_TRUE(strcmp(before, m_config.hash) != 0);
+    running = m_config;
+    FILE *file = fopen(FILE_NAME, "wb");
+    config_dump(&m_config, file);
+    fclose(file);
+    memset(&m_config, 0, sizeof m_config);
+    FILE *report = tmpfile();
+    TEST_ASSERT_EQUAL_INT(0, config_load(FILE_NAME, &m_config, report));
+    TEST_ASSERT_EQUAL_STRING(running.hash, m_config.hash);
+    TEST_ASSERT_EQUAL_UINT8(2, m_config.cia402.startup.count);
+    file = fopen(FILE_NAME, "wb");
+    fputs(m_text, file);
+    fputs("0x2033:0 = 1 u8\n", file);
+    fclose(file);
+    rewind(report);
+    TEST_ASSERT_EQUAL_INT(0, config_reload(FILE_NAME, &running, report));
+    rewind(report);
+    m_errors[fread(m_errors, 1, sizeof m_errors - 1, report)] = '\0';
+    fclose(report);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "[cia402-startup] another list needs a restart"), m_errors);
+    TEST_ASSERT_EQUAL_UINT8(2, running.cia402.startup.count);
 }
 
 static void test_load_what_contradicts_itself_is_refused_at_its_line(void)
@@ -373,6 +551,12 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_load_preset_gives_what_the_driver_takes);
     RUN_TEST(test_load_lists_and_signs_reach_their_drives);
+    RUN_TEST(test_load_startup_list_reaches_every_drive_in_its_order);
+    RUN_TEST(test_load_startup_item_that_cannot_be_is_refused_at_its_line);
+    RUN_TEST(test_load_startup_item_that_heaved_sets_itself_is_refused_at_its_line);
+    RUN_TEST(test_preset_of_a_drive_family_sets_its_drives_up);
+    RUN_TEST(test_load_startup_list_of_more_than_32_is_refused);
+    RUN_TEST(test_load_startup_list_is_dumped_hashed_and_needs_a_restart);
     RUN_TEST(test_load_what_contradicts_itself_is_refused_at_its_line);
     RUN_TEST(test_load_period_that_60c2h_cannot_hold_is_refused);
     RUN_TEST(test_load_bus_too_slow_for_any_period_is_told_to_be_faster);

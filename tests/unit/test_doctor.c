@@ -374,9 +374,62 @@ static void test_judge_node_local_control_warns(void)
     expect(0, 1, "remote is off");
 }
 
+/* --- Inventory --- */
+
+static void inventory(const doctor_node_t *node)
+{
+    doctor_write_inventory(s_report.out, &s_drives, node);
+    (void)fflush(s_report.out);
+}
+
+static void expect_text(const char *text)
+{
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(s_text, text), s_text);
+}
+
+static void test_inventory_is_ready_for_the_configuration(void)
+{
+    doctor_node_t node[DRIVES_MAX];
+    s_drives.axes = 3;
+    for (unsigned k = 0; k < 3; k++) {
+        s_drives.axis[k].node = (uint8_t)(k + 5);
+        node[k] = s_node;
+        node[k].value[DOCTOR_VENDOR] = 0xFB;
+        node[k].value[DOCTOR_PRODUCT] = 0x60500000;
+        node[k].value[DOCTOR_REVISION] = 0x01700000;
+        node[k].value[DOCTOR_SERIAL] = 0x1000 + k;
+        doctor_take_name(node[k].name[DOCTOR_DEVICE], (const uint8_t *)"EPOS4 24\xFF  ", 11);
+    }
+    inventory(node);
+    expect_text("; drive 2, node 6: EPOS4 24?, hardware (not told), software (not told), revision 0x1700000\n");
+    expect_text("\nvendor_id = 0xFB\nproduct_code = 0x60500000\nserial_numbers = 0x1000, 0x1001, 0x1002\n");
+}
+
+static void test_inventory_of_drives_that_differ_or_are_missing_says_so(void)
+{
+    doctor_node_t node[DRIVES_MAX] = {{.nmt = -1}};
+    s_drives.axes = 3;
+    node[1] = node[2] = s_node;
+    node[2].value[DOCTOR_PRODUCT] = 2;
+    node[2].answer[DOCTOR_SERIAL] = DOCTOR_REFUSED;
+    inventory(node);
+    expect_text("; drive 1, node 3: not found\n");
+    expect_text("\nvendor_id = 0x1\n; product_code: they differ\nserial_numbers = 0x0, 0x1, 0x0\n");
+}
+
+static void test_inventory_of_nothing_is_nothing(void)
+{
+    doctor_node_t node[DRIVES_MAX] = {{.nmt = -1}};
+    inventory(node);
+    TEST_ASSERT_EQUAL_STRING("", s_text);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_inventory_is_ready_for_the_configuration);
+    RUN_TEST(test_inventory_of_drives_that_differ_or_are_missing_says_so);
+    RUN_TEST(test_inventory_of_nothing_is_nothing);
     RUN_TEST(test_judge_link_sound_is_one_ok);
     RUN_TEST(test_judge_link_not_can_cannot_be_used);
     RUN_TEST(test_judge_link_down_names_the_command);

@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: MIT
+ * startup_read.c - start-up lists of CANopen drives from a file; see startup_read.h.
+ */
+#include "config/startup_read.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "config/cia402.h"
+#include "config/startup.h"
+
+#define WORDS_MAX  6u
+#define WORD_BYTES 24u
+#define BLANKS     " \t"
+#define STORE      0x1010u
+#define RESTORE    0x1011u
+
+static const struct {
+    const char *name;
+    uint8_t bytes;
+    int64_t low;
+    int64_t high;
+} k_types[] = {
+    {"u8", 1, 0, UINT8_MAX},          {"i8", 1, INT8_MIN, INT8_MAX}, {"u16", 2, 0, UINT16_MAX},
+    {"i16", 2, INT16_MIN, INT16_MAX}, {"u32", 4, 0, UINT32_MAX},     {"i32", 4, INT32_MIN, INT32_MAX},
+};
+#define TYPES (sizeof k_types / sizeof k_types[0])
+
+static bool read_number(const char *text, int64_t low, int64_t high, int64_t *value)
+{
+    const char *digits = text + (text[0] == '-');
+    const bool is_hex = digits[0] == '0' && (digits[1] == 'x' || digits[1] == 'X');
+    char *end = NULL;
+    if (strchr(is_hex ? "0123456789ABCDEFabcdef" : "0123456789", digits[is_hex ? 2 : 0]) == NULL ||
+        digits[is_hex ? 2 : 0] == '\0') {
+        return false;
+    }
+    errno = 0;
+    *value = strtoll(text, &end, is_hex ? 16 : 10);
+    return errno == 0 && *end == '\0' && *value >= low && *value <= high;
+}
+
+/* "0x2030:01"; the sub-index is decimal, or hexadecimal with 0x. */
+static const char *read_object(char *text, cia402_item_t *item)
+{
+    int64_t index = 0;
+    int64_t sub = 0;
+    char *colon = strchr(text, ':');
+    if (colon == NULL) {
+        return "has no sub-index, such as :00";
+    }
+    *colon = '\0';
+    if (strncmp(text, "0x", 2) != 0 || !read_number(text, 1, UINT16_MAX, &index)) {
+        return "has no object such as 0x2030";
+    }
+    if (!read_number(colon + 1, 0, UINT8_MAX, &sub)) {
+        return "has no sub-index from 0 to 255 behind the colon";
+    }
+    item->index = (uint16_t)index;
+    item->sub = (uint8_t)sub;
+    return NULL;
+}
+
+static const char *read_value(const char *text, const char *type, cia402_item_t *item)
+{
+    int64_t value = 0;
+    for (size_t i = 0; i < TYPES; i++) {
+        if (strcmp(k_types[i].name, type) == 0) {
+            item->bytes = k_types[i].bytes;
+            if (!read_number(text, k_types[i].low, k_types[i].high, &value)) {
+                return "has a value that its type does not hold";
+            }
+            item->value = (uint32_t)(uint64_t)value & (item->bytes == 4 ? UINT32_MAX : (1u << 8u * item->bytes) - 1u);
+            return NULL;
+        }
+    }
+    return "has no type that there is";
+}
+
+static const char *read_flag(const char *word, cia402_item_t *item)
+{
+    if (strcmp(word, "unchecked") == 0 && item->is_written && item->is_checked) {
+        item->is_checked = false;
+    } else if (strcmp(word, "if-there") == 0 && !item->is_optional) {
+        item->is_optional = true;
+    } else if (strcmp(word, "last") == 0 && !item->is_last) {
+        item->is_last = true;
+    } else {
+        return "ends with a word that does not belong there";
+    }
+    return NULL;
+}
+
+/* What a list must not do, whatever the drive. */
+static const char *judge(const cia402_item_t *item)
+{
+    if (item->is_written && (item->index == STORE || item->index == RESTORE)) {
+        return "would write the drive's memory at each start, which wears it; store by the maker's program";
+    }
+    return NULL;
+}
+
+static const char *read_item(char word[WORDS_MAX + 1u][WORD_BYTES], unsigned words, cia402_item_t *item)
+{
+    const bool is_looked_at = strcmp(word[1], "is") == 0;
+    if (words < 4 || words > WORDS_MAX || (!is_looked_at && strcmp(word[1], "=") != 0)) {
+        return "is no object with value and type";
+    }
+    *item = (cia402_item_t){.is_written = !is_looked_at, .is_checked = true};
+    const char *wrong = read_object(word[0], item);
+    wrong = wrong != NULL ? wrong : read_value(word[2], word[3], item);
+    for (unsigned i = 4; wrong == NULL && i < words; i++) {
+        wrong = read_flag(word[i], item);
+    }
+    return wrong != NULL ? wrong : judge(item);
+}
+
+/* The words of a line, those that are too long cut. */
+static unsigned split(const char *line, char word[WORDS_MAX + 1u][WORD_BYTES])
+{
+    unsigned words = 0;
+    for (const char *at = line + strspn(line, BLANKS); *at != '\0' && words <= WORDS_MAX; words++) {
+        const size_t length = *at == '=' ? 1u : strcspn(at, BLANKS "=");
+        (void)snprintf(word[words], WORD_BYTES, "%.*s", (int)length, at);
+        at += length;
+        at += strspn(at, BLANKS);
+    }
+    return words;
+}
+
+void config_startup_take(config_source_t *self, const char *before, const char *behind)
+{
+    const config_section_t *section = &config_sections[self->section];
+    config_startup_t *list =
+        strcmp(section->name, "cia402-startup") == 0 ? &self->config->cia402.startup : &self->config->cia402.angle_startup;
+    char word[WORDS_MAX + 1u][WORD_BYTES] = {""};
+    config_text_t line, quoted;
+    cia402_item_t item;
+    config_text_clear(&line);
+    config_text_clear(&quoted);
+    /* cut at the first = or :, which is the colon of the object unless somebody left it out */
+    const bool is_colon = strchr(behind, '=') != NULL || strstr(behind, " is ") != NULL;
+    config_text_add(&line, "%s%s%s", before, is_colon ? ":" : " = ", behind);
+    const char *wrong = read_item(word, split(line.data, word), &item);
+    if (wrong == NULL && list->count == CIA402_ITEMS_MAX) {
+        wrong = "is one too many: a list has up to 32";
+    }
+    if (wrong != NULL) {
+        config_text_add_quoted(&quoted, line.data, line.length);
+        config_source_error(self, self->line, "[%s] %s %s; allowed: %s", section->name, quoted.data, wrong,
+                            config_startup_allowed);
+        return;
+    }
+    self->startup_line[list == &self->config->cia402.startup ? 0 : 1][list->count] = self->line;
+    list->item[list->count++] = item;
+}
+
+/* An item of a drive that heaved writes as well. */
+static bool is_written_by_heaved(const cia402_config_t *drives, unsigned axis, const cia402_item_t *item)
+{
+    cia402_wish_t wish = {0};
+    while (item->is_written && cia402_next_wish(drives, axis, &wish)) {
+        if (wish.is_own && wish.is_written && wish.index == item->index && wish.sub == item->sub) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void check_list(config_source_t *self, const cia402_config_t *drives, unsigned axis, unsigned which)
+{
+    const cia402_axis_config_t *own = &drives->axis[axis];
+    for (unsigned i = 0; i < own->items; i++) {
+        if (is_written_by_heaved(drives, axis, &own->item[i])) {
+            config_source_error(self, self->startup_line[which][i],
+                                "[%s] 0x%04X:%02u: heaved sets it itself; allowed: the keys of [cia402] for that",
+                                which == 0 ? "cia402-startup" : "cia402-angle-startup", own->item[i].index, own->item[i].sub);
+        }
+    }
+}
+
+void config_startup_check(config_source_t *self)
+{
+    static cia402_config_t drives;
+    config_cia402(self->config, &drives);
+    check_list(self, &drives, 0, 0);
+    if (self->config->settings.has_angle) {
+        check_list(self, &drives, drives.axes - 1u, 1);
+    }
+}
+
+static bool is_same(const config_startup_t *a, const config_startup_t *b)
+{
+    config_text_t is, was;
+    bool is_equal = a->count == b->count;
+    for (unsigned i = 0; is_equal && i < a->count; i++) {
+        config_text_clear(&is);
+        config_text_clear(&was);
+        config_startup_format(&a->item[i], &is);
+        config_startup_format(&b->item[i], &was);
+        is_equal = strcmp(is.data, was.data) == 0;
+    }
+    return is_equal;
+}
+
+void config_startup_compare(const config_source_t *self, const config_t *running)
+{
+    for (size_t i = 0; i < config_section_count; i++) {
+        const config_startup_t *list = config_startup_of(&config_sections[i], self->config);
+        if (list != NULL && !is_same(list, config_startup_of(&config_sections[i], running))) {
+            fprintf(self->errors, "%s:%u: [%s] another list needs a restart; the one of the start stays\n", self->path,
+                    self->section_line[i] != 0 ? self->section_line[i] : self->line, config_sections[i].name);
+        }
+    }
+}

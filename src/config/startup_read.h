@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: MIT
+ * startup_read.h - start-up lists of CANopen drives from a file, with an error for each line that cannot be.
+ */
+#ifndef HEAVE_CONFIG_STARTUP_READ_H
+#define HEAVE_CONFIG_STARTUP_READ_H
+
+#include "config/source.h"
+
+/** Takes a line of the section that the reader is in, cut in two at its first = or :. */
+void config_startup_take(config_source_t *self, const char *before, const char *behind);
+
+/** Refuses items that heaved sets itself for this configuration. */
+void config_startup_check(config_source_t *self);
+
+/** Says which lists of a file differ from those of a platform that runs, which keeps its own. */
+void config_startup_compare(const config_source_t *self, const config_t *running);
+
+#endif

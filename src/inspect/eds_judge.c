@@ -1,0 +1,318 @@
+/* SPDX-License-Identifier: MIT
+ * eds_judge.c - a drive's file against the table of objects; see eds_judge.h.
+ */
+#include "inspect/eds_judge.h"
+
+#include <inttypes.h>
+#include <string.h>
+
+#include "config/cia402.h"
+#include "inspect/doctor_report.h"
+
+#define FINDINGS_MAX  128u
+#define FINDING_BYTES 256u
+#define PDO_FIRST     0x1400u
+#define PDO_LAST      0x1BFFu
+#define SDO_FIRST     0x1200u
+#define SDO_LAST      0x12FFu
+
+/** A file being judged. Drives are alike: what has been said of one is not said again. */
+typedef struct {
+    const eds_t *eds;
+    const config_t *config;
+    const cia402_config_t *drives;
+    doctor_report_t report;
+    char said[FINDINGS_MAX][FINDING_BYTES];
+    unsigned sayings;
+    char left[FINDING_BYTES]; /* objects that heaved goes on without */
+} judge_t;
+
+/* The key that a value comes from. */
+static const struct {
+    uint16_t index;
+    const char *key;
+} k_keys[] = {
+    {0x1006, "sync_watched"},
+    {0x1016, "heartbeat_timeout_ms"},
+    {0x1017, "heartbeat_ms"},
+    {0x1018, "vendor_id"},
+    {0x1019, "sync_counter"},
+    {0x6007, "when_gateway_lost"},
+    {0x6060, "mode"},
+    {0x6065, "following_error_mm"},
+    {0x6066, "following_error_ms"},
+    {0x607D, "software_limit_mm"},
+    {0x6081, "[cylinders] speed_mm_s"},
+    {0x6083, "[cylinders] accel_mm_s2"},
+    {0x6084, "[cylinders] accel_mm_s2"},
+    {0x6085, "quick_stop_mm_s2"},
+    {0x6098, "homing_method"},
+    {0x6099, "homing_speed_mm_s"},
+    {0x609A, "homing_accel_mm_s2"},
+    {0x60C2, "period_us"},
+};
+
+static const char *key_of(const cia402_wish_t *wish)
+{
+    for (size_t i = 0; wish->is_own && i < sizeof k_keys / sizeof k_keys[0]; i++) {
+        if (k_keys[i].index == wish->index) {
+            return k_keys[i].key;
+        }
+    }
+    return wish->is_own ? NULL : "[cia402-startup]";
+}
+
+static void say(judge_t *self, doctor_level_t level, const char *text)
+{
+    for (unsigned i = 0; i < self->sayings; i++) {
+        if (strcmp(self->said[i], text) == 0) {
+            return;
+        }
+    }
+    if (self->sayings < FINDINGS_MAX) {
+        (void)snprintf(self->said[self->sayings++], FINDING_BYTES, "%s", text);
+    }
+    doctor_say(&self->report, level, "%s", text);
+}
+
+static doctor_level_t level_of(const judge_t *self, const cia402_wish_t *wish)
+{
+    if (wish->need == CIA402_WISH_IF_THERE || (wish->need == CIA402_WISH_GUARD && self->drives->is_unguarded_allowed)) {
+        return DOCTOR_WARN;
+    }
+    return DOCTOR_FAIL;
+}
+
+static const char *remedy_of(const judge_t *self, const cia402_wish_t *wish)
+{
+    if (wish->need == CIA402_WISH_IF_THERE) {
+        return "nothing, heaved goes on without it";
+    }
+    if (wish->need == CIA402_WISH_GUARD) {
+        return self->drives->is_unguarded_allowed ? "nothing, [cia402] allow_no_watchdog = yes"
+                                                  : "another drive, or [cia402] allow_no_watchdog = yes where nobody is on it";
+    }
+    return wish->index >= PDO_FIRST && wish->index <= PDO_LAST ? "a drive whose PDOs can be mapped"
+                                                               : "another drive, or firmware";
+}
+
+static void judge_missing(judge_t *self, const cia402_wish_t *wish)
+{
+    char text[FINDING_BYTES];
+    if (wish->need == CIA402_WISH_IF_THERE) {
+        (void)snprintf(text, sizeof text, " %04Xh:%02X", wish->index, wish->sub);
+        if (strstr(self->left, text) == NULL && strlen(self->left) + strlen(text) < sizeof self->left) {
+            strcat(self->left, text);
+        }
+        return;
+    }
+    const char *remedy =
+        !wish->is_own && wish->need == CIA402_WISH_NEEDED ? "if-there behind the item, or without it" : remedy_of(self, wish);
+    (void)snprintf(text, sizeof text, "%04Xh:%02X is not in it%s -> %s", wish->index, wish->sub,
+                   wish->is_own ? "" : ", and is in [cia402-startup]", remedy);
+    say(self, level_of(self, wish), text);
+}
+
+/* The value as its type shows it. */
+static int64_t shown(const eds_object_t *object, uint32_t value)
+{
+    const char *name = eds_type_name(object);
+    if (name[0] != 'i') {
+        return value;
+    }
+    return name[1] == '8' ? (int8_t)value : name[1] == '1' ? (int16_t)value : (int32_t)value;
+}
+
+static void judge_value(judge_t *self, const cia402_wish_t *wish, const eds_object_t *object)
+{
+    char text[FINDING_BYTES];
+    const int64_t value = shown(object, wish->value);
+    const bool is_low = object->low.is_there && !object->low.has_node && value < shown(object, (uint32_t)object->low.value);
+    const bool is_high = object->high.is_there && !object->high.has_node && value > shown(object, (uint32_t)object->high.value);
+    const char *key = key_of(wish);
+    if (key == NULL || (!is_low && !is_high)) { /* COB-IDs and mappings are heaved's own affair */
+        return;
+    }
+    (void)snprintf(text, sizeof text, "%04Xh:%02X (line %u) takes %s %" PRId64 ", heaved sets %" PRId64 " -> %s%s", wish->index,
+                   wish->sub, object->line, is_low ? "at least" : "at most",
+                   shown(object, (uint32_t)(is_low ? object->low.value : object->high.value)), value,
+                   key[0] == '[' ? "" : "[cia402] ", key);
+    say(self, level_of(self, wish), text);
+}
+
+static void judge_access(judge_t *self, const cia402_wish_t *wish, const eds_object_t *object)
+{
+    char text[FINDING_BYTES];
+    const bool is_equal =
+        object->fallback.is_there && !object->fallback.has_node && ((uint32_t)object->fallback.value ^ wish->value) == 0;
+    const uint8_t bytes = eds_bytes(object);
+    if (wish->is_written && !object->is_writable && !(wish->is_compared && is_equal)) {
+        char holds[48] = "";
+        if (object->fallback.is_there) {
+            (void)snprintf(holds, sizeof holds, " and holds %" PRId64, object->fallback.value);
+        }
+        (void)snprintf(text, sizeof text, "%04Xh:%02X (line %u) can only be read%s, heaved sets %" PRId64 " -> %s", wish->index,
+                       wish->sub, object->line, holds, shown(object, wish->value), remedy_of(self, wish));
+        say(self, level_of(self, wish), text);
+    } else if (wish->is_written && bytes != wish->bytes && wish->index != 0x1000) {
+        (void)snprintf(text, sizeof text, "%04Xh:%02X (line %u) is no value of %u byte%s, as heaved writes it -> %s", wish->index,
+                       wish->sub, object->line, wish->bytes, wish->bytes == 1 ? "" : "s",
+                       wish->is_own ? remedy_of(self, wish) : "the type in [cia402-startup]");
+        say(self, level_of(self, wish), text);
+    } else if (wish->is_written) {
+        judge_value(self, wish, object);
+    }
+}
+
+static void judge_wishes(judge_t *self, unsigned axis)
+{
+    cia402_wish_t wish = {0};
+    while (cia402_next_wish(self->drives, axis, &wish)) {
+        const eds_object_t *object = eds_find(self->eds, wish.index, wish.sub);
+        if (object == NULL) {
+            judge_missing(self, &wish);
+        } else {
+            judge_access(self, &wish, object);
+        }
+    }
+}
+
+/* What goes into the PDOs. */
+static void judge_mapping(judge_t *self)
+{
+    const uint32_t mapped[] = {0x604000, self->drives->mode == CIA402_MODE_IP ? 0x60C101u : 0x607A00u, 0x604100, 0x606400,
+                               0x606100};
+    char text[FINDING_BYTES];
+    for (unsigned i = 0; i < sizeof mapped / sizeof mapped[0]; i++) {
+        const eds_object_t *object = eds_find(self->eds, (uint16_t)(mapped[i] >> 8), (uint8_t)mapped[i]);
+        if (object == NULL || !object->is_mappable) {
+            (void)snprintf(text, sizeof text, "%04Xh:%02X %s -> another drive, or firmware", (unsigned)(mapped[i] >> 8),
+                           (unsigned)(mapped[i] & 0xFFu), object == NULL ? "is not in it" : "cannot be mapped into a PDO");
+            say(self, DOCTOR_FAIL, text);
+        }
+    }
+}
+
+static void judge_identity(judge_t *self)
+{
+    const struct {
+        const char *key;
+        uint32_t wanted;
+        const eds_number_t *found;
+    } k_parts[] = {{"vendor_id", self->config->cia402.vendor_id, &self->eds->vendor},
+                   {"product_code", self->config->cia402.product_code, &self->eds->product}};
+    char text[FINDING_BYTES];
+    for (unsigned i = 0; i < 2; i++) {
+        if (k_parts[i].wanted != 0 && k_parts[i].found->is_there && (uint32_t)k_parts[i].found->value != k_parts[i].wanted) {
+            (void)snprintf(text, sizeof text, "it is the file of another device: 0x%" PRIX32 " -> the right file, or [cia402] %s",
+                           (uint32_t)k_parts[i].found->value, k_parts[i].key);
+            say(self, DOCTOR_FAIL, text);
+        }
+    }
+}
+
+static void judge_bitrate(judge_t *self)
+{
+    char text[FINDING_BYTES];
+    const unsigned kbps = self->config->can.bitrate_bps / 1000u;
+    for (unsigned i = 0; self->eds->has_bitrates && eds_bitrates_kbps[i] != 0; i++) {
+        if (eds_bitrates_kbps[i] == kbps && (self->eds->bitrates >> i & 1u) == 0) {
+            (void)snprintf(text, sizeof text, "no %u kbit/s (BaudRate_%u) -> [can] bitrate_bps", kbps, kbps);
+            say(self, DOCTOR_FAIL, text);
+        }
+    }
+}
+
+/* 6502h has a default in some files, and is not reliable: worth a word, no more. */
+static void judge_mode(judge_t *self)
+{
+    static const char *const k_names[] = {[CIA402_MODE_PP] = "pp", [CIA402_MODE_IP] = "ip", [CIA402_MODE_CSP] = "csp"};
+    const eds_object_t *modes = eds_find(self->eds, 0x6502, 0);
+    char text[FINDING_BYTES];
+    if (modes == NULL || !modes->fallback.is_there || modes->fallback.value == 0 ||
+        (modes->fallback.value >> ((unsigned)self->drives->mode - 1u) & 1) != 0) {
+        return;
+    }
+    (void)snprintf(text, sizeof text, "6502h:00 (line %u) does not name mode %s (0x%" PRIX64 ") -> [cia402] mode", modes->line,
+                   k_names[self->drives->mode], modes->fallback.value);
+    say(self, DOCTOR_WARN, text);
+}
+
+bool eds_judge(const eds_t *eds, const config_t *config, FILE *out)
+{
+    static cia402_config_t drives;
+    static judge_t self;
+    const unsigned cylinders = config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u;
+    config_cia402(config, &drives);
+    self = (judge_t){.eds = eds, .config = config, .drives = &drives, .report = {.out = out}};
+    judge_identity(&self);
+    judge_bitrate(&self);
+    judge_mode(&self);
+    judge_mapping(&self);
+    for (unsigned k = 0; k < cylinders; k++) {
+        judge_wishes(&self, k);
+    }
+    if (self.left[0] != '\0') {
+        doctor_say(&self.report, DOCTOR_OK, "not in it, and heaved goes on without:%s", self.left);
+    }
+    if (self.report.count[DOCTOR_FAIL] == 0) {
+        doctor_say(&self.report, DOCTOR_OK, "%zu objects: all that heaved needs is there and takes what it is set to",
+                   eds->objects);
+    }
+    doctor_sum(&self.report);
+    return self.report.count[DOCTOR_FAIL] == 0;
+}
+
+/* --- A DCF as a list --- */
+
+/* Why a value is not taken over, NULL where it is. */
+static const char *reason_to_leave(const eds_object_t *object)
+{
+    if (object->parameter.has_node) {
+        return "depends on the node";
+    }
+    if (!object->is_writable) {
+        return "can only be read";
+    }
+    if (object->index == 0x1010 || object->index == 0x1011) {
+        return "stores or restores";
+    }
+    if (cia402_is_own_object(object->index, object->sub)) {
+        return "is set by heaved itself, by the keys of [cia402]";
+    }
+    if ((object->index >= PDO_FIRST && object->index <= PDO_LAST) || (object->index >= SDO_FIRST && object->index <= SDO_LAST) ||
+        object->index == 0x1005 || object->index == 0x1014) {
+        return "is a matter of the master";
+    }
+    return eds_bytes(object) == 0 ? "is no whole number of up to 32 bits" : NULL;
+}
+
+void eds_write_startup(const eds_t *eds, FILE *out)
+{
+    unsigned items = 0;
+    unsigned same = 0;
+    fprintf(out, "[cia402-startup]\n");
+    for (size_t i = 0; i < eds->objects; i++) {
+        const eds_object_t *object = &eds->object[i];
+        if (!object->parameter.is_there || object->is_parent) {
+            continue;
+        }
+        const char *left = reason_to_leave(object);
+        if (left == NULL && object->fallback.is_there && object->fallback.value == object->parameter.value) {
+            same++;
+            continue;
+        }
+        if (left == NULL && items++ >= CIA402_ITEMS_MAX) {
+            left = "is one too many: a list has up to 32; store the rest in the drive by its maker's program";
+        }
+        if (left != NULL) {
+            fprintf(out, "; 0x%04X:%02u %s\n", object->index, object->sub, left);
+        } else {
+            fprintf(out, "0x%04X:%02u = %" PRId64 " %s\n", object->index, object->sub,
+                    shown(object, (uint32_t)object->parameter.value), eds_type_name(object));
+        }
+    }
+    if (same > 0) {
+        fprintf(out, "; %u more hold their defaults\n", same);
+    }
+}
