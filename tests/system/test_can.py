@@ -206,7 +206,7 @@ def moved_by_hand(bench):
     config = can_config(bench, platform__engage="manual")
     bench.start_drives()
     daemon = bench.start(config=config)
-    with heave.Line(bench.socket) as line:
+    with harness.Line(bench.socket) as line:
         harness.wait_for(lambda: line.ask("service")["ok"], "service")
         assert line.refused("torque 3 on", "all drives together")["why"] == "together"
         counts = [drive["counts"] for drive in line.good("counts")["drives"]]

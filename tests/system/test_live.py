@@ -246,7 +246,9 @@ def shows_every_cycle(bench):
     """heavectl scope: consecutive cycles, chosen columns; a stopped reader holds nobody up; a ninth client's rules do not matter to a mapped memory."""
     daemon = bench.start()
     bench.wait_state("ENGAGED")
-    with subprocess.Popen([bench.bin / "heavectl", "--socket", str(bench.socket), "scope"], stdout=subprocess.DEVNULL) as stopped:
+    shown = bench.folder / "shown.csv"
+    with open(shown, "wb") as file, subprocess.Popen([bench.bin / "heavectl", "--socket", str(bench.socket), "scope"], stdout=file) as stopped:
+        harness.wait_for(lambda: shown.stat().st_size > 0, "the first rows")
         stopped.send_signal(signal.SIGSTOP)
         with bench.sender() as sender:
             sender.stream(0.3, wave)

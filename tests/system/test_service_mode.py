@@ -199,7 +199,7 @@ def end(bench, daemon):
 def requests():
     with harness.Bench(BIN, **CONFIG) as bench:
         daemon = bench.start()
-        with heave.Line(bench.socket) as line:
+        with harness.Line(bench.socket) as line:
             assert line.refused("jog 1 5 1", "in SERVICE only")["why"] == "not-serving"
             assert line.good("service")["state"] == "SERVICE"
             assert line.good("status")["service"]["doing"] == "nothing"
@@ -281,7 +281,7 @@ def moments(bench, index, rng):
     axis, speed = rng.choice((("2", 5), ("z", 4), ("5", -5), ("roll", 1), ("1", 5), ("z", -4)))
     hand = Hand(bench, "jog", axis, str(speed * rng.choice((1, -1))), path=between.path if between else None)
     before = bench.status()["service"]["series"]
-    with heave.Line(bench.socket) as line:
+    with harness.Line(bench.socket) as line:
         hand.hold_until(lambda: line.good("tick")["series"] != before, "pressed")
         hand.is_held = True
         time.sleep(rng.uniform(0, 0.7))
@@ -328,7 +328,7 @@ def plays_back():
     """A recording of a jog, from a client of its own, plays back to the same bytes."""
     with harness.Bench(BIN, **CONFIG) as bench:
         daemon, trace, record = serve(bench, "played-live")
-        with heave.Line(bench.socket) as line:
+        with harness.Line(bench.socket) as line:
             for request in ("jog 3 5", "jog z -3", "relay 2", "jog pitch 1.5", "home 4", "jog 1 -2.125"):
                 answer = line.press(request)
                 series = answer["series"]
@@ -354,7 +354,7 @@ def black_box():
         bench.config.write_text(bench.config.read_text() + f"\n[black-box]\ndirectory = {bench.folder}\nseconds = 10\n")
         daemon, _, _ = serve(bench, "box")
         time.sleep(9)  # so that time zero is forgotten
-        with heave.Line(bench.socket) as line:
+        with harness.Line(bench.socket) as line:
             answer = line.press("jog 3 5")
             for counter in range(1, 140):
                 time.sleep(0.05)
