@@ -3,6 +3,8 @@
  */
 #include "canraw_axis.h"
 
+#include <string.h>
+
 #define RESET_US        1000000u /* after a reset, the drive has so long to take its fault back */
 #define HOMING_BEGIN_US 500000u  /* "done" before "not done" is believed only after this: it may be that of the last homing */
 
@@ -29,18 +31,20 @@ static void tell_stop(canraw_axis_t *self, const canraw_map_t *map)
 
 void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map)
 {
-    *self = (canraw_axis_t){.state = DRIVE_DISABLED,
-                            .pending = CANRAW_NOTHING,
-                            .is_begun = true,
-                            .is_homed = !has(map, CANRAW_HOME),
-                            .is_energized = self->is_energized,
-                            .counter = self->counter,
-                            .has_counter = self->has_counter, /* one that has stood still is not heard again by losing it */
-                            .counter_in = self->counter_in,
-                            .has_actual = self->has_actual,
-                            .counts = self->counts,
-                            .actual_q32 = self->actual_q32,
-                            .actual_us = self->actual_us};
+    const canraw_axis_t was = *self;
+    memset(self, 0, sizeof *self); /* what lies between the members, too: states are compared byte by byte */
+    self->state = DRIVE_DISABLED;
+    self->pending = CANRAW_NOTHING;
+    self->is_begun = true;
+    self->is_homed = !has(map, CANRAW_HOME);
+    self->is_energized = was.is_energized;
+    self->counter = was.counter;
+    self->has_counter = was.has_counter; /* one that has stood still is not heard again by losing it */
+    self->counter_in = was.counter_in;
+    self->has_actual = was.has_actual;
+    self->counts = was.counts;
+    self->actual_q32 = was.actual_q32;
+    self->actual_us = was.actual_us;
 }
 
 void canraw_axis_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t code)
