@@ -27,6 +27,7 @@ enum {
 #define LOSSY_PERIODS                                                                                                            \
     4u /* ... but where samples are often lost: so many periods, so that the next one to come finds it moving                    \
         */
+#define BRIDGED_PERIODS 3u
 #define MEAN_US        29000u         /* of arrivals, about so long */
 #define LED_CHANGE_Q32 (Q32_ONE / 64) /* of what is led, in a period */
 #define OFF_US         80000          /* time constant with which the curve comes back to the samples */
@@ -146,7 +147,10 @@ static void find_reach(const stream_curve_t *self, unsigned axis, q32_t step_q32
     cycles_q16 -= cycles_q16 / 16; /* what follows the curve is a little behind it */
     const int64_t stop_q16 = fx_mul_div(cycles_q16, Q16_ONE, self->period_cycles_q16);
     on->reach_q16 = (int32_t)fx_clamp(stop_q16 - self->lead_q32 / (Q32_ONE / Q16_ONE), self->reach_min_q16, self->reach_max_q16);
-    on->full_q16 = (int32_t)fx_clamp(on->reach_q16 - stop_q16, 0, on->reach_q16);
+    if (on->reach_q16 > stop_q16) { /* there is room for a softer one */
+        on->full_q16 = (int32_t)((on->reach_q16 - stop_q16) / 2);
+        return;
+    }
     const int64_t rise_periods_q16 = fx_mul_div(rise_q16, Q16_ONE, self->period_cycles_q16);
     on->rise_q32 = (uint32_t)fx_clamp(fx_mul_div(rise_periods_q16, Q32_ONE, 2 * stop_q16 + 1), 0, Q32_ONE / 2);
 }
@@ -349,7 +353,7 @@ static void find_mean(stream_curve_t *self, uint32_t period_us)
 
 void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us, bool is_lossy)
 {
-    const uint32_t bridged_us = is_lossy ? LOSSY_PERIODS * period_us : 0;
+    const uint32_t bridged_us = (is_lossy ? LOSSY_PERIODS : BRIDGED_PERIODS) * period_us;
     const uint32_t reach_us = bridged_us < REACH_MIN_US ? REACH_MIN_US : bridged_us < REACH_MAX_US ? bridged_us : REACH_MAX_US;
     self->lead_q32 = style == STREAM_BALANCED ? LED_Q32 : 0;
     self->period_cycles_q16 = (int64_t)period_us * Q16_ONE / cycle_us;
