@@ -28,13 +28,13 @@ enum {
     4u /* ... but where samples are often lost: so many periods, so that the next one to come finds it moving                    \
         */
 #define BRIDGED_PERIODS 3u
-#define MEAN_US        29000u         /* of arrivals, about so long */
-#define LED_CHANGE_Q32 (Q32_ONE / 64) /* of what is led, in a period */
-#define OFF_US         80000          /* time constant with which the curve comes back to the samples */
-#define PATIENCE_US    150000
-#define LED_Q32        (Q32_ONE * 7 / 10) /* periods that control points are led ahead of their points, if balanced ... */
-#define WAY_SHIFT      4                  /* from Q32 to Q36 */
-#define OFF_NOTHING    (Q32_ONE / 2000)   /* 0.5 um: what is less is given up */
+#define MEAN_US         29000u         /* of arrivals, about so long */
+#define LED_CHANGE_Q32  (Q32_ONE / 64) /* of what is led, in a period */
+#define OFF_US          80000
+#define PATIENCE_US     400000
+#define LED_Q32         (Q32_ONE * 7 / 10) /* periods that control points are led ahead of their points, if balanced ... */
+#define WAY_SHIFT       4                  /* from Q32 to Q36 */
+#define OFF_NOTHING     (Q32_ONE / 2000)   /* 0.5 um: what is less is given up */
 
 /* Where the ring has an index; indices wrap. */
 static unsigned slot(uint32_t index)
@@ -105,6 +105,7 @@ void stream_curve_start(stream_curve_t *self, const kin_t *kin, const q32_t *sam
         self->grain[axis] = (stream_grain_t){0};
     }
     self->watched = 0;
+    self->change = 0;
     self->is_off = false;
     self->window = 1;
     self->mean_points = 0;
@@ -262,21 +263,40 @@ static q32_t within_speed(const stream_curve_t *self, unsigned axis, q32_t step_
     return limits->jerk_per_cycle3_q32 > 0 ? fx_clamp(step_q32, -least_q32, least_q32) : step_q32;
 }
 
-/* The points at head are others now: what the curve is off them, and how that changes, so that it goes on as it was. The change
- * is taken over two periods, as the first of them may be the error of a single guess. */
-static void keep_going(stream_curve_t *self, q32_t was_q32[3][AXES_MAX], int32_t guessed)
+/* The points at head are about to become others. However many changes follow, as in a burst, they are made up for once. */
+static void note_change(stream_curve_t *self, int32_t guessed)
+{
+    if (self->change == 0) {
+        points_at_head(self, self->was_q32);
+    }
+    self->change = guessed > self->change ? guessed : self->change;
+}
+
+/* Half of the error of a single guess, which is of one point and of no velocity, is taken back at once, as far as is bearable. */
+static void take_back_half(stream_curve_t *self)
+{
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        const q32_t error_q32 = self->was_q32[0][axis] - led_point(self, axis, self->head);
+        const q32_t most_q32 = bearable_jump(self, axis);
+        self->off_q32[axis][0] += error_q32 - fx_clamp(error_q32 / 2, -most_q32, most_q32);
+    }
+    (void)soften(self, 0);
+}
+
+/* What the curve is off its new points, and how that changes, so that it goes on as it was. The change is taken over two periods,
+ * as the first of them may be the error of a single guess. */
+static void keep_going(stream_curve_t *self)
 {
     q32_t is_q32[3][AXES_MAX];
-    const q32_t share_q32 = soften(self, guessed);
+    const q32_t share_q32 = soften(self, self->change);
     points_at_head(self, is_q32);
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        const q32_t here_q32 = was_q32[0][axis] - is_q32[0][axis];
+        const q32_t here_q32 = self->was_q32[0][axis] - is_q32[0][axis];
         const q32_t most_q32 = 4 * fx_abs(self->lead[axis].first_q32) + fx_abs(here_q32) / 16;
-        const q32_t change_q32 = fx_clamp((here_q32 - (was_q32[2][axis] - is_q32[2][axis])) / 2, -most_q32, most_q32);
+        const q32_t change_q32 = fx_clamp((here_q32 - (self->was_q32[2][axis] - is_q32[2][axis])) / 2, -most_q32, most_q32);
         self->off_q32[axis][0] += here_q32;
         self->off_q32[axis][1] = within_speed(self, axis, self->off_q32[axis][1] + fx_mul_shift(change_q32, share_q32, 32));
     }
-    soften_to_limits(self);
 }
 
 /* How many points a control point is to be the mean of, thrice. Values in steps of q are off by up to q / 2. Of that a mean of m
@@ -322,16 +342,14 @@ static int32_t pairs(int32_t n)
  * no to and fro with the period. */
 static void set_window(stream_curve_t *self, int32_t window)
 {
-    q32_t was_q32[3][AXES_MAX];
     if (window == self->window || (window > 1 && window + 1 == self->window)) {
         return;
     }
-    points_at_head(self, was_q32);
+    note_change(self, SHIFT_GUESSES);
     self->window = window;
     for (int32_t k = 0; k < 3 * window - 2; k++) { /* ways to write k as a sum of three numbers below the window */
         self->weight[k] = (uint8_t)(pairs(k + 2) - 3 * pairs(k + 2 - window) + 3 * pairs(k + 2 - 2 * window));
     }
-    keep_going(self, was_q32, SHIFT_GUESSES);
 }
 
 void stream_curve_average(stream_curve_t *self, q32_t arrived_q32, bool is_lossy)
@@ -441,6 +459,38 @@ static void guess_again(stream_curve_t *self)
     }
 }
 
+/* The newest sample gets the index that is so far ahead of head, and so do those before it. */
+HV_WRAPS static void relabel(stream_curve_t *self, int32_t ahead)
+{
+    const uint32_t was = newest(self);
+    self->ahead = ahead;
+    for (uint32_t back = 0; back < STREAM_POINTS - AHEAD_MAX; back++) {
+        copy_point(self, self->point_q32[slot(newest(self) - back)], self->point_q32[slot(was - back)]);
+    }
+}
+
+/* Makes up for what has changed since the last control point. A sample that is far behind head still is no late one of a burst:
+ * its sender is so much later now. */
+static void make_up(stream_curve_t *self)
+{
+    if (self->change == 0) {
+        return;
+    }
+    if (self->ahead < -BEHIND_MAX) {
+        relabel(self, -BEHIND_MAX);
+    }
+    if (self->ahead < 0) {
+        guess_again(self);
+    }
+    if (self->change == 1) {
+        take_back_half(self);
+    } else {
+        keep_going(self);
+    }
+    self->change = 0;
+    soften_to_limits(self);
+}
+
 /* The point after last: of one that is missing on the parabola through before, last, and next; of more on the straight line, as
  * a parabola could swing out. */
 static q32_t point_between(q32_t before_q32, q32_t last_q32, q32_t next_q32, int32_t periods)
@@ -465,18 +515,19 @@ HV_WRAPS static void fill_gap(stream_curve_t *self, int32_t periods, const q32_t
 
 HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32, const q32_t *point_q32)
 {
-    q32_t was_q32[3][AXES_MAX];
     q32_t before_q32[AXES_MAX];
-    const int32_t guessed = -self->ahead;
-    if (guessed > 0) {
-        points_at_head(self, was_q32);
+    if (self->ahead < 0) {
+        note_change(self, -self->ahead);
+    }
+    if (self->ahead < -AHEAD_MAX) {
+        relabel(self, -AHEAD_MAX);
     }
     copy_point(self, before_q32, self->last_q32);
     stream_grain_watch(self, periods, sample_q32);
     copy_point(self, self->last_q32, point_q32);
     copy_point(self, self->newest_q32, sample_q32);
     const int32_t ahead = self->ahead + (int32_t)periods;
-    const int32_t kept = (int32_t)fx_clamp(ahead, -BEHIND_MAX, AHEAD_MAX);
+    const int32_t kept = ahead < AHEAD_MAX ? ahead : AHEAD_MAX;
     for (int32_t i = self->ahead > 0 ? self->ahead + 1 : 1; i < kept; i++) {
         self->is_sample[slot(self->head + (uint32_t)i)] = false;
     }
@@ -485,20 +536,6 @@ HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, const 
     copy_point(self, self->point_q32[slot(newest(self))], self->last_q32);
     self->is_sample[slot(newest(self))] = true;
     fill_gap(self, (int32_t)periods, before_q32);
-    if (self->ahead < 0) {
-        guess_again(self);
-    }
-    if (guessed == 1) { /* an error of one point, and of no velocity: half of it is taken back at once, as far as bearable */
-        for (unsigned axis = 0; axis < self->axes; axis++) {
-            const q32_t error_q32 = was_q32[0][axis] - led_point(self, axis, self->head);
-            const q32_t most_q32 = bearable_jump(self, axis);
-            self->off_q32[axis][0] += error_q32 - fx_clamp(error_q32 / 2, -most_q32, most_q32);
-        }
-        (void)soften(self, 0);
-        soften_to_limits(self);
-    } else if (guessed > 1) {
-        keep_going(self, was_q32, guessed);
-    }
 }
 
 HV_WRAPS q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *sample_q32, unsigned periods, q32_t *step_q32)
@@ -536,16 +573,18 @@ HV_WRAPS static void interpolate(stream_curve_t *self, q32_t *point_q32)
  */
 HV_WRAPS static void give_up(stream_curve_t *self)
 {
-    q32_t was_q32[3][AXES_MAX];
-    points_at_head(self, was_q32);
+    points_at_head(self, self->was_q32);
+    self->change = self->patience;
     copy_point(self, self->last_q32, self->newest_q32);
-    for (int32_t back = 0; back < self->patience; back++) { /* 40 at most: the ring is longer */
+    for (int32_t back = 0; back < self->patience && back < STREAM_POINTS; back++) {
         copy_point(self, self->point_q32[slot(self->head - (uint32_t)back)], self->last_q32);
     }
     for (unsigned axis = 0; axis < self->axes; axis++) {
         self->lead[axis] = (stream_lead_t){.rise_q32 = 0};
     }
-    keep_going(self, was_q32, self->patience);
+    keep_going(self);
+    soften_to_limits(self);
+    self->change = 0;
 }
 
 /* Settles the point after head. */
@@ -567,15 +606,13 @@ HV_WRAPS static void find_next(stream_curve_t *self)
 
 void stream_curve_skip(stream_curve_t *self)
 {
-    q32_t was_q32[3][AXES_MAX];
     if (self->ahead < 2) {
         return;
     }
-    points_at_head(self, was_q32);
+    note_change(self, SHIFT_GUESSES);
     find_next(self);
     self->head++;
     self->ahead--;
-    keep_going(self, was_q32, SHIFT_GUESSES);
 }
 
 /* One period of the filter that takes back what the curve is off: q^3 with q = 1 - grip, see the ramp in DESIGN.md. */
@@ -637,6 +674,7 @@ static void put_control(stream_curve_t *self, const kin_t *kin)
 
 HV_WRAPS void stream_curve_commit(stream_curve_t *self, const kin_t *kin)
 {
+    make_up(self);
     find_next(self);
     for (unsigned axis = 0; axis < self->axes; axis++) {
         self->control_q32[axis] += fx_shift_down(self->way_q36[0][axis], WAY_SHIFT);
@@ -700,6 +738,7 @@ HV_WRAPS void stream_curve_regrid(stream_curve_t *self, const kin_t *kin, const 
     q32_t asked_q32[AXES_MAX];
     self->ahead = 0;
     self->age = goes_on ? self->age : now == NULL ? AGE_MAX : 1;
+    self->change = 0;
     self->is_off = false; /* what it was off was per period of the old grid, and so was the grip */
     (void)soften(self, self->patience);
     place_points(self, now != NULL ? first_q32 : NULL, periods, sample_q32);
