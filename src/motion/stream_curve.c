@@ -16,6 +16,7 @@ enum {
     MEAN_MAX = 5,      /* points of which one is the mean, where samples belong to their arrivals */
     LED_POINTS = 7,    /* that a control point is led by, beside its own */
     SHIFT_GUESSES = 4, /* a shifted time line is come over to as softly as after so many guesses */
+    STALL_GUESSES = 8, /* what a stall left behind is come over to more softly still */
     BEHIND_MAX = 4,    /* points before head that corrections and guesses look back at */
     COARSE_ACC = 4,    /* of the accelerations that coarse steps can make, half is to be left to the motion ... */
     COARSE_JERK = 6,   /* ... and of the jerk most */
@@ -245,7 +246,8 @@ static void soften_to_limits(stream_curve_t *self)
  * Returns the share of a velocity that may be added: the same velocity swings further out in a softer way. */
 static q32_t soften(stream_curve_t *self, int32_t guessed)
 {
-    const int64_t wished_q32 = fx_clamp(Q32_ONE / (guessed + 2), self->softest_q32, Q32_ONE / 2);
+    const int64_t softest_q32 = guessed >= STALL_GUESSES ? self->softest_q32 / 5 * 4 : self->softest_q32;
+    const int64_t wished_q32 = fx_clamp(Q32_ONE / (guessed + 2), softest_q32, Q32_ONE / 2);
     self->grip_q32 = self->is_off && self->grip_q32 < wished_q32 ? self->grip_q32 : wished_q32;
     self->is_off = true;
     return fx_mul_div(self->grip_q32, Q32_ONE, wished_q32);
