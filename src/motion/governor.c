@@ -282,18 +282,21 @@ static int32_t need_at(const governor_t *self, q32_t strength_q32)
     return need_q16;
 }
 
-/* The levels are apart where the motion is quick, so that a rise is a motion of its own: it goes through three low-passes. Where
- * not even so much is bearable, as after a jump, it comes at once, if that is better by half. */
+/* The levels are apart where the motion is quick, so that a rise is a motion of its own: it goes through three low-passes, and
+ * what was falling goes on to, ever less. Where not even so much is bearable, as after a jump, it comes at once, if that is
+ * better by half. */
 static void raise_strength(governor_t *self, q32_t wanted_q32)
 {
     q32_t input_q32 = wanted_q32;
     for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
-        const q32_t next_q32 = self->rise_q32[pole] + (input_q32 - self->rise_q32[pole]) * 3 / 8;
-        self->rise_q32[pole] = next_q32 > self->rise_q32[pole] ? next_q32 : self->rise_q32[pole];
+        const q32_t from_q32 = fx_clamp(self->rise_q32[pole] - self->fall_q32, 0, GOVERNOR_LEVELS * Q32_ONE);
+        const q32_t next_q32 = from_q32 + (input_q32 - from_q32) * 3 / 8;
+        self->rise_q32[pole] = next_q32 > from_q32 ? next_q32 : from_q32;
         input_q32 = self->rise_q32[pole];
     }
     const int32_t soft_q16 = need_at(self, input_q32);
     const bool is_sudden = soft_q16 > 2 * NEED_GOAL && 2 * need_at(self, wanted_q32) < soft_q16;
+    self->fall_q32 = is_sudden ? 0 : self->fall_q32;
     set_strength(self, is_sudden ? wanted_q32 : input_q32, is_sudden);
 }
 
@@ -311,18 +314,23 @@ static q32_t largest_fall(const governor_t *self, uint32_t since_us)
     return by_time_q32 > by_speed_q32 ? by_time_q32 : by_speed_q32;
 }
 
-/* Falls softly, too: the rate of the fall is a speed of the output. */
-static q32_t fallen_strength(governor_t *self, q32_t wanted_q32)
+static q32_t least_of(q32_t a, q32_t b, q32_t c)
 {
-    const q32_t over_q32 = self->strength_q32 - wanted_q32;
-    const uint32_t since_us = self->period_us * self->each;
-    const q32_t period_s_q32 = (int64_t)since_us * Q32_ONE / 1000000;
-    const q32_t by_share_q32 = over_q32 * (int64_t)since_us / (RELEASE_US + since_us);
-    const q32_t fall_q32 = by_share_q32 + period_s_q32 / RELEASE_DIV;
-    const q32_t most_q32 = largest_fall(self, since_us);
-    const q32_t next_q32 = fall_q32 < most_q32 ? fall_q32 : most_q32;
-    self->fall_q32 += (next_q32 - self->fall_q32) * (int64_t)since_us / (SOFT_US + since_us);
-    return over_q32 > self->fall_q32 ? self->strength_q32 - self->fall_q32 : wanted_q32;
+    const q32_t least_q32 = a < b ? a : b;
+    return least_q32 < c ? least_q32 : c;
+}
+
+/* Falls softly, too: the rate of the fall is a speed of the output. It changes slowly, and ends slowly where no less strength is
+ * wanted. */
+static void find_fall(governor_t *self, q32_t wanted_q32)
+{
+    const q32_t over_q32 = fx_clamp(self->strength_q32 - wanted_q32, 0, GOVERNOR_LEVELS * Q32_ONE);
+    const int64_t since_us = self->period_us * self->each;
+    const q32_t period_s_q32 = since_us * Q32_ONE / 1000000;
+    const q32_t by_share_q32 = over_q32 * since_us / (RELEASE_US + since_us) + period_s_q32 / RELEASE_DIV;
+    const q32_t at_end_q32 = over_q32 * since_us / (2 * SOFT_US + since_us);
+    const q32_t wished_q32 = least_of(by_share_q32, largest_fall(self, (uint32_t)since_us), at_end_q32);
+    self->fall_q32 += (wished_q32 - self->fall_q32) * since_us / (SOFT_US + since_us);
 }
 
 void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, q32_t *out_q32)
@@ -335,11 +343,11 @@ void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, 
         pass_time(self);
         note_needs(self, scale_q16);
         const q32_t wanted_q32 = needed_strength(self);
+        find_fall(self, wanted_q32);
         if (wanted_q32 > self->strength_q32) {
-            self->fall_q32 = 0;
             raise_strength(self, wanted_q32);
         } else {
-            set_strength(self, fallen_strength(self, wanted_q32), true);
+            set_strength(self, fx_clamp(self->strength_q32 - self->fall_q32, 0, self->strength_q32), true);
         }
     }
     self->strength_q32 += self->glide_q32;
