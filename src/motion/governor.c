@@ -93,6 +93,16 @@ void governor_pace(governor_t *self, uint32_t period_us, uint32_t cycle_us)
     }
 }
 
+/* The strength comes from there. */
+static void place_strength(governor_t *self, q32_t strength_q32)
+{
+    self->target_q32 = strength_q32;
+    self->fall_q32 = 0;
+    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
+        self->pole_q32[pole] = strength_q32;
+    }
+}
+
 void governor_start(governor_t *self)
 {
     for (unsigned span = 0; span < GOVERNOR_SPANS; span++) {
@@ -103,10 +113,7 @@ void governor_start(governor_t *self)
     self->span_us = 0;
     self->strength_q32 = 0;
     self->glide_q32 = 0;
-    self->fall_q32 = 0;
-    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
-        self->rise_q32[pole] = 0;
-    }
+    place_strength(self, 0);
 }
 
 void governor_place(governor_t *self, unsigned channel, bool is_steady, const q32_t value_q32[3])
@@ -261,16 +268,12 @@ void governor_shift(governor_t *self, unsigned channel, q32_t asked_q32)
     }
 }
 
-/* Goes there in the periods until needs are looked at again: a staircase would be one in the output.
- * @param is_all a rise begins anew from there */
-static void set_strength(governor_t *self, q32_t strength_q32, bool is_all)
+/* Goes there in the periods until needs are looked at again: a staircase would be one in the output. */
+static void set_strength(governor_t *self, q32_t strength_q32)
 {
     const q32_t way_q32 = strength_q32 - self->strength_q32;
     self->glide_q32 = way_q32 / (int64_t)self->each;
     self->strength_q32 += way_q32 % (int64_t)self->each;
-    for (unsigned pole = 0; is_all && pole < GOVERNOR_POLES; pole++) {
-        self->rise_q32[pole] = strength_q32;
-    }
 }
 
 static int32_t need_at(const governor_t *self, q32_t strength_q32)
@@ -280,24 +283,6 @@ static int32_t need_at(const governor_t *self, q32_t strength_q32)
         need_q16 = larger(need_q16, need_of(self, i, &self->out[i], value_at(self, i, strength_q32)));
     }
     return need_q16;
-}
-
-/* The levels are apart where the motion is quick, so that a rise is a motion of its own: it goes through three low-passes, and
- * what was falling goes on to, ever less. Where not even so much is bearable, as after a jump, it comes at once, if that is
- * better by half. */
-static void raise_strength(governor_t *self, q32_t wanted_q32)
-{
-    q32_t input_q32 = wanted_q32;
-    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
-        const q32_t from_q32 = fx_clamp(self->rise_q32[pole] - self->fall_q32, 0, GOVERNOR_LEVELS * Q32_ONE);
-        const q32_t next_q32 = from_q32 + (input_q32 - from_q32) * 3 / 8;
-        self->rise_q32[pole] = next_q32 > from_q32 ? next_q32 : from_q32;
-        input_q32 = self->rise_q32[pole];
-    }
-    const int32_t soft_q16 = need_at(self, input_q32);
-    const bool is_sudden = soft_q16 > 2 * NEED_GOAL && 2 * need_at(self, wanted_q32) < soft_q16;
-    self->fall_q32 = is_sudden ? 0 : self->fall_q32;
-    set_strength(self, is_sudden ? wanted_q32 : input_q32, is_sudden);
 }
 
 /* How far it may fall until needs are looked at again. A fall takes the output from one level to the one before: what a motion is
@@ -314,23 +299,37 @@ static q32_t largest_fall(const governor_t *self, uint32_t since_us)
     return by_time_q32 > by_speed_q32 ? by_time_q32 : by_speed_q32;
 }
 
-static q32_t least_of(q32_t a, q32_t b, q32_t c)
+/* Falls slowly: what the output gains is a speed of its own. */
+static q32_t fall_of(const governor_t *self, q32_t wanted_q32)
 {
-    const q32_t least_q32 = a < b ? a : b;
-    return least_q32 < c ? least_q32 : c;
+    const q32_t over_q32 = self->target_q32 - wanted_q32;
+    const int64_t since_us = self->period_us * self->each;
+    const q32_t by_share_q32 = over_q32 * since_us / (RELEASE_US + since_us) + since_us * Q32_ONE / (RELEASE_DIV * 1000000);
+    const q32_t most_q32 = largest_fall(self, (uint32_t)since_us);
+    const q32_t fall_q32 = by_share_q32 < most_q32 ? by_share_q32 : most_q32;
+    return fall_q32 < over_q32 ? fall_q32 : over_q32;
 }
 
-/* Falls softly, too: the rate of the fall is a speed of the output. It changes slowly, and ends slowly where no less strength is
- * wanted. */
-static void find_fall(governor_t *self, q32_t wanted_q32)
+/* The levels are apart where the motion is quick, so that every change of the strength is a motion of its own: it goes through
+ * low-passes. Where not even so much is bearable, as after a jump, a rise comes at once, if that is better by half. */
+static void follow_need(governor_t *self, q32_t wanted_q32)
 {
-    const q32_t over_q32 = fx_clamp(self->strength_q32 - wanted_q32, 0, GOVERNOR_LEVELS * Q32_ONE);
-    const int64_t since_us = self->period_us * self->each;
-    const q32_t period_s_q32 = since_us * Q32_ONE / 1000000;
-    const q32_t by_share_q32 = over_q32 * since_us / (RELEASE_US + since_us) + period_s_q32 / RELEASE_DIV;
-    const q32_t at_end_q32 = over_q32 * since_us / (2 * SOFT_US + since_us);
-    const q32_t wished_q32 = least_of(by_share_q32, largest_fall(self, (uint32_t)since_us), at_end_q32);
-    self->fall_q32 += (wished_q32 - self->fall_q32) * since_us / (SOFT_US + since_us);
+    const q32_t fall_q32 = wanted_q32 < self->target_q32 ? fall_of(self, wanted_q32) : 0;
+    self->fall_q32 +=
+        (fall_q32 - self->fall_q32) * (int64_t)(self->period_us * self->each) / (SOFT_US + self->period_us * self->each);
+    const q32_t fallen_q32 = self->target_q32 - self->fall_q32;
+    self->target_q32 = wanted_q32 > fallen_q32 ? wanted_q32 : fallen_q32;
+    q32_t next_q32 = self->target_q32;
+    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
+        self->pole_q32[pole] += (next_q32 - self->pole_q32[pole]) * 3 / 8;
+        next_q32 = self->pole_q32[pole];
+    }
+    const int32_t soft_q16 = wanted_q32 > next_q32 ? need_at(self, next_q32) : 0;
+    if (soft_q16 > 2 * NEED_GOAL && 2 * need_at(self, wanted_q32) < soft_q16) {
+        place_strength(self, wanted_q32);
+        next_q32 = wanted_q32;
+    }
+    set_strength(self, next_q32);
 }
 
 void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, q32_t *out_q32)
@@ -343,12 +342,7 @@ void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, 
         pass_time(self);
         note_needs(self, scale_q16);
         const q32_t wanted_q32 = needed_strength(self);
-        find_fall(self, wanted_q32);
-        if (wanted_q32 > self->strength_q32) {
-            raise_strength(self, wanted_q32);
-        } else {
-            set_strength(self, fx_clamp(self->strength_q32 - self->fall_q32, 0, self->strength_q32), true);
-        }
+        follow_need(self, wanted_q32);
     }
     self->strength_q32 += self->glide_q32;
     for (unsigned i = 0; i < self->channels; i++) {
