@@ -6,13 +6,15 @@
  */
 #include "stream_evidence.h"
 
-#define MEMORY_SHIFT  5                  /* 2^6 samples */
-#define LEAST_Q32     (Q32_ONE / 4096)   /* sum(p p) that tells anything: 1/64 of the way of a period at the speed limit */
-#define EVEN_Q32      (Q32_ONE * 3 / 10) /* below that share values are even, ... */
-#define ARRIVED_Q32   (Q32_ONE * 6 / 10) /* ... above that one they belong to their arrivals, between as before */
-#define EXPLAINED_DIV 3                  /* what arrivals explain less of than that share has other causes */
-#define SHIFT_FADE    16                 /* samples in which a shift of the line fades to 1/e, as the line follows */
-#define CHANGE_Q32    (Q32_ONE / 32)     /* of the weight in a sample */
+#define MEMORY_SHIFT 5                /* 2^6 samples */
+#define LEAST_Q32    (Q32_ONE / 4096) /* sum(p p) that tells anything: 1/64 of the way of a period at the speed limit */
+#define EVEN_Q32     (Q32_ONE / 5)    /* below that share values are even, ... */
+#define ARRIVED_Q32                                                                                                              \
+    (Q32_ONE * 2 /                                                                                                               \
+     5) /* ... above that one they belong to their arrivals (the network's part of the lateness lowers it), between as before */
+#define EXPLAINED_DIV 5              /* what arrivals explain less of than that share has other causes */
+#define SHIFT_FADE    16             /* samples in which a shift of the line fades to 1/e, as the line follows */
+#define CHANGE_Q32    (Q32_ONE / 32) /* of the weight in a sample */
 #define LATE_MAX_Q32  Q32_ONE
 #define NEAR_Q32      (Q32_ONE / 4) /* samples that came closer to each other tell no speed */
 
