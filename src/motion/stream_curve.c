@@ -742,7 +742,7 @@ HV_WRAPS void stream_curve_regrid(stream_curve_t *self, const kin_t *kin, const 
     self->age = goes_on ? self->age : now == NULL ? AGE_MAX : 1;
     self->change = 0;
     self->is_off = false; /* what it was off was per period of the old grid, and so was the grip */
-    (void)soften(self, self->patience);
+    (void)soften(self, SHIFT_GUESSES);
     place_points(self, now != NULL ? first_q32 : NULL, periods, sample_q32);
     for (unsigned axis = 0; axis < self->axes; axis++) {
         q32_t control_q32[3];
