@@ -373,7 +373,9 @@ static void find_mean(stream_curve_t *self, uint32_t period_us)
 
 void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us, bool is_lossy)
 {
-    const uint32_t bridged_us = (is_lossy ? LOSSY_PERIODS : BRIDGED_PERIODS) * period_us;
+    const uint32_t led_us =
+        style == STREAM_BALANCED ? (uint32_t)((uint64_t)period_us * (uint64_t)LED_Q32 / (uint64_t)Q32_ONE) : 0;
+    const uint32_t bridged_us = (is_lossy ? LOSSY_PERIODS : BRIDGED_PERIODS) * period_us + led_us;
     const uint32_t reach_us = bridged_us < REACH_MIN_US ? REACH_MIN_US : bridged_us < REACH_MAX_US ? bridged_us : REACH_MAX_US;
     self->lead_q32 = style == STREAM_BALANCED ? LED_Q32 : 0;
     self->period_cycles_q16 = (int64_t)period_us * Q16_ONE / cycle_us;
