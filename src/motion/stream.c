@@ -407,7 +407,7 @@ static void advance(stream_t *self, uint64_t now_us, const kin_t *kin)
     const q32_t slowest_q32 = self->error_q32 < -FAR_BEFORE_Q32 ? PACE_SLOW_Q32 : PACE_MAX_Q32;
     const q32_t pace = fx_clamp(wanted, -slowest_q32, PACE_MAX_Q32);
     const q32_t faster = nominal > self->rate_q32[1] ? nominal : self->rate_q32[1];
-    const q32_t filter = fx_clamp(faster * 2, 0, PACE_FILTER_MAX);
+    const q32_t filter = fx_clamp(faster, 0, PACE_FILTER_MAX);
     const q32_t wished = nominal + fx_mul_shift_fit(nominal, pace, 32);
     self->rate_q32[0] += fx_mul_shift_fit(wished - self->rate_q32[0], filter, 32);
     self->rate_q32[1] += fx_mul_shift_fit(self->rate_q32[0] - self->rate_q32[1], filter, 32);
