@@ -224,6 +224,30 @@ static int32_t lasting_need(const governor_t *self, unsigned level)
     return need_q16;
 }
 
+/* How far the output is on its way from a level to the next one: 3 u^2 - 2 u^3 of the strength between them. Ways between levels
+ * are of different lengths, and a strength that passes a level evenly would change the speed of the output at once. */
+static q32_t way_share(q32_t u_q32)
+{
+    const q32_t square_q32 = fx_mul_shift(u_q32, u_q32, 32);
+    return 3 * square_q32 - 2 * fx_mul_shift(square_q32, u_q32, 32);
+}
+
+/* The least u that is so far on its way. */
+static q32_t strength_for(q32_t share_q32)
+{
+    q32_t low_q32 = 0;
+    q32_t high_q32 = Q32_ONE;
+    while (high_q32 - low_q32 > Q32_ONE / 65536) {
+        const q32_t middle_q32 = (low_q32 + high_q32) / 2;
+        if (way_share(middle_q32) < share_q32) {
+            low_q32 = middle_q32;
+        } else {
+            high_q32 = middle_q32;
+        }
+    }
+    return high_q32;
+}
+
 /* The least strength with which the limits are kept. */
 static q32_t needed_strength(const governor_t *self)
 {
@@ -234,7 +258,7 @@ static q32_t needed_strength(const governor_t *self)
     for (unsigned level = 1; level <= GOVERNOR_LEVELS; level++) {
         const int32_t need_q16 = lasting_need(self, level);
         if (need_q16 <= NEED_GOAL) {
-            return (level - 1) * Q32_ONE + Q32_ONE * (int64_t)(before_q16 - NEED_GOAL) / (before_q16 - need_q16);
+            return (level - 1) * Q32_ONE + strength_for(Q32_ONE * (int64_t)(before_q16 - NEED_GOAL) / (before_q16 - need_q16));
         }
         before_q16 = need_q16;
     }
@@ -250,7 +274,7 @@ static q32_t value_at(const governor_t *self, unsigned channel, q32_t strength_q
         return here_q32;
     }
     const q32_t way_q32 = self->level_q32[level + 1][channel] - here_q32;
-    return here_q32 + fx_mul_shift_fit(way_q32, strength_q32 % Q32_ONE, 32);
+    return here_q32 + fx_mul_shift_fit(way_q32, way_share(strength_q32 % Q32_ONE), 32);
 }
 
 q32_t governor_lag(const governor_t *self, unsigned channel)
@@ -357,7 +381,7 @@ uint32_t governor_delay_us(const governor_t *self)
 {
     uint64_t delay_us = 0;
     for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
-        const q32_t part_q32 = fx_clamp(self->strength_q32 - level * Q32_ONE, 0, Q32_ONE);
+        const q32_t part_q32 = way_share(fx_clamp(self->strength_q32 - level * Q32_ONE, 0, Q32_ONE));
         delay_us += (uint64_t)part_q32 * k_time_constant_us[level] / (uint64_t)Q32_ONE;
     }
     return (uint32_t)delay_us;
