@@ -23,19 +23,18 @@ enum {
     COARSE_LED = 2     /* control points that are led swing so many times further */
 };
 
-#define REACH_MIN_US 50000  /* a motion is kept up for that long; longer only as far as the axis takes to stop ... */
-#define REACH_MAX_US 100000 /* ... and not longer than this */
-#define LOSSY_PERIODS                                                                                                            \
-    4u /* ... but where samples are often lost: so many periods, so that the next one to come finds it moving                    \
-        */
-#define BRIDGED_PERIODS 3u
-#define MEAN_US         29000u         /* of arrivals, about so long */
-#define LED_CHANGE_Q32  (Q32_ONE / 64) /* of what is led, in a period */
-#define OFF_US          80000
-#define PATIENCE_US     400000
-#define LED_Q32         (Q32_ONE * 7 / 10) /* periods that control points are led ahead of their points, if balanced ... */
-#define WAY_SHIFT       4                  /* from Q32 to Q36 */
-#define OFF_NOTHING     (Q32_ONE / 2000)   /* 0.5 um: what is less is given up */
+#define REACH_MIN_US   50000          /* a motion is kept up for that long, ... */
+#define REACH_FEW_US   62000          /* ... or for that long where ... */
+#define FEW_PERIODS    3              /* ... as much is needed to find it moving still after such a pause; ... */
+#define LOSSY_PERIODS  4              /* ... where samples are often lost, after that many; ... */
+#define REACH_MAX_US   100000         /* ... and longer only as far as the axis takes to stop: so long at most */
+#define MEAN_US        29000u         /* of arrivals, about so long */
+#define LED_CHANGE_Q32 (Q32_ONE / 64) /* of what is led, in a period */
+#define OFF_US         80000
+#define PATIENCE_US    300000
+#define LED_Q32        (Q32_ONE * 7 / 10) /* periods that control points are led ahead of their points, if balanced ... */
+#define WAY_SHIFT      4                  /* from Q32 to Q36 */
+#define OFF_NOTHING    (Q32_ONE / 2000)   /* 0.5 um: what is less is given up */
 
 /* Where the ring has an index; indices wrap. */
 static unsigned slot(uint32_t index)
@@ -373,14 +372,13 @@ static void find_mean(stream_curve_t *self, uint32_t period_us)
 
 void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us, bool is_lossy)
 {
-    const uint32_t led_us =
-        style == STREAM_BALANCED ? (uint32_t)((uint64_t)period_us * (uint64_t)LED_Q32 / (uint64_t)Q32_ONE) : 0;
-    const uint32_t bridged_us = (is_lossy ? LOSSY_PERIODS : BRIDGED_PERIODS) * period_us + led_us;
-    const uint32_t reach_us = bridged_us < REACH_MIN_US ? REACH_MIN_US : bridged_us < REACH_MAX_US ? bridged_us : REACH_MAX_US;
+    const int64_t led_us = style == STREAM_BALANCED ? fx_mul_shift(period_us, LED_Q32, 32) : 0;
+    const int64_t few_us = fx_clamp(FEW_PERIODS * period_us + led_us, REACH_MIN_US, REACH_FEW_US);
+    const int64_t reach_us = is_lossy ? fx_clamp(LOSSY_PERIODS * period_us, few_us, REACH_MAX_US) : few_us;
     self->lead_q32 = style == STREAM_BALANCED ? LED_Q32 : 0;
     self->period_cycles_q16 = (int64_t)period_us * Q16_ONE / cycle_us;
-    self->reach_min_q16 = (int32_t)((int64_t)reach_us * Q16_ONE / period_us);
-    self->reach_max_q16 = (int32_t)((int64_t)(REACH_MAX_US > reach_us ? REACH_MAX_US : reach_us) * Q16_ONE / period_us);
+    self->reach_min_q16 = (int32_t)(reach_us * Q16_ONE / period_us);
+    self->reach_max_q16 = (int32_t)((int64_t)REACH_MAX_US * Q16_ONE / period_us);
     self->softest_q32 = fx_clamp((int64_t)period_us * Q32_ONE / OFF_US, Q32_ONE / 32, Q32_ONE / 2);
     self->patience = (int32_t)(PATIENCE_US / period_us) + 3;
     find_mean(self, period_us);
@@ -578,7 +576,7 @@ HV_WRAPS static void interpolate(stream_curve_t *self, q32_t *point_q32)
 HV_WRAPS static void give_up(stream_curve_t *self)
 {
     points_at_head(self, self->was_q32);
-    self->change = self->patience;
+    self->change = STALL_GUESSES - 1;
     copy_point(self, self->last_q32, self->newest_q32);
     for (int32_t back = 0; back < self->patience && back < STREAM_POINTS; back++) {
         copy_point(self, self->point_q32[slot(self->head - (uint32_t)back)], self->last_q32);
