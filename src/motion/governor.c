@@ -345,7 +345,8 @@ static void follow_need(governor_t *self, q32_t wanted_q32)
     self->target_q32 = wanted_q32 > fallen_q32 ? wanted_q32 : fallen_q32;
     q32_t next_q32 = self->target_q32;
     for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
-        self->pole_q32[pole] += (next_q32 - self->pole_q32[pole]) * 3 / 8;
+        const q32_t way_q32 = next_q32 - self->pole_q32[pole];
+        self->pole_q32[pole] = fx_abs(way_q32) < NEAR_Q32 ? next_q32 : self->pole_q32[pole] + way_q32 * 3 / 8;
         next_q32 = self->pole_q32[pole];
     }
     const int32_t soft_q16 = wanted_q32 > next_q32 ? need_at(self, next_q32) : 0;

@@ -377,7 +377,7 @@ static void take_sample(stream_t *self, uint64_t now_us, const kin_t *kin, const
     for (unsigned axis = 0; axis < self->curve.axes; axis++) { /* a rounded value tells no time as fine as that */
         point_q32[axis] = self->curve.window > 1 ? sample_q32[axis] : stream_evidence_on_line(&self->evidence, axis);
     }
-    stream_curve_append(&self->curve, periods, sample_q32, point_q32);
+    stream_curve_append(&self->curve, periods, self->clock.stalled > 0, sample_q32, point_q32);
     if (error_at(self, now_us) > BEHIND_MAX_Q32) {
         stream_curve_skip(&self->curve);
     }

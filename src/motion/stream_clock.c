@@ -402,7 +402,7 @@ static bool is_other_than_stated(const stream_clock_t *self)
  * sample comes at the usual pace and is as late, the sender itself has stood still, and the line goes on from there. */
 static bool is_of_stall(stream_clock_t *self, bool is_paced)
 {
-    const bool is_late = self->settled >= KNOWN && self->late_us_q16 > margin_max_q16(self);
+    const bool is_late = self->settled >= MEMORY && self->late_us_q16 > margin_max_q16(self);
     const bool is_stall = is_late || (self->stalled > 0 && !is_paced);
     self->stalled = !is_stall ? 0 : self->stalled + (is_paced ? 1u : 0u);
     if (self->stalled < STALLED) {

@@ -515,14 +515,16 @@ HV_WRAPS static void fill_gap(stream_curve_t *self, int32_t periods, const q32_t
     }
 }
 
-HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32, const q32_t *point_q32)
+HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, bool is_of_stall, const q32_t *sample_q32,
+                                  const q32_t *point_q32)
 {
     q32_t before_q32[AXES_MAX];
     if (self->ahead < 0) {
         note_change(self, -self->ahead);
     }
-    if (self->ahead < -AHEAD_MAX) {
-        relabel(self, -AHEAD_MAX);
+    const int32_t furthest = is_of_stall ? -AHEAD_MAX : -BEHIND_MAX - (int32_t)periods;
+    if (self->ahead < furthest) {
+        relabel(self, furthest);
     }
     copy_point(self, before_q32, self->last_q32);
     stream_grain_watch(self, periods, sample_q32);
