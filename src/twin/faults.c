@@ -3,6 +3,8 @@
  */
 #include "twin/faults.h"
 
+#include "twin/modbus_faults.h"
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -264,6 +266,14 @@ ACT(act_lag)
     node_of(twin, k)->drive.motor.lag_us = fault->number[0] * 1000;
 }
 
+/* Of Modbus only: modbus_faults.c has what it does. */
+ACT(act_none)
+{
+    (void)twin;
+    (void)k;
+    UNUSED();
+}
+
 /* clang-format off */ /* a row is a record */
 static const row_t k_rows[] = {
     {"fault", "dN", "DRIVE [CODE]", "the drive finds a fault, with its EMCY; else 0x2310", {GENERIC}, INDEX_MAX, act_fault, BUS_OFF},
@@ -298,6 +308,10 @@ static const row_t k_rows[] = {
     {"friction", "dn", "DRIVE MM", "breaks loose so far behind its demand", {0}, 1e4, act_friction, BUS_OFF},
     {"encoder", "dn", "DRIVE MM", "its encoder tells so much more from now on", {0}, 1e4, act_encoder, BUS_OFF},
     {"lag", "dn", "DRIVE MS", "follows with this time constant", {0}, 1e5, act_lag, BUS_OFF},
+    {"damaged", "dn", "DRIVE COUNT", "Modbus: so many of its answers are damaged, the CRC or the function", {0}, 1e6, act_none, BUS_OFF},
+    {"half", "dn", "DRIVE COUNT", "Modbus: of so many of its answers only a half comes", {0}, 1e6, act_none, BUS_OFF},
+    {"exception", "dnN", "DRIVE COUNT [CODE]", "Modbus: it answers so many times with an exception; else 6, busy", {0}, 1e6, act_none, BUS_OFF},
+    {"register", "dnn", "DRIVE ADDRESS VALUE", "Modbus: that register holds this, and takes nothing else", {0}, INDEX_MAX, act_none, BUS_OFF},
     {"mend", "d", "DRIVE", "ends the lasting faults above, from broken to slip but object and node; load, friction, lag and encoder take 0 or another value", {0}, 0, act_mend, BUS_OFF},
     {"bus-off", "", "", "heaved's controller goes bus-off", {0}, 0, NULL, BUS_OFF},
     {"passive", "", "", "heaved's controller becomes error-passive", {0}, 0, NULL, BUS_PASSIVE},
@@ -308,6 +322,11 @@ static const row_t k_rows[] = {
     {"cable-in", "", "", "and is back", {0}, 0, NULL, BUS_CABLE_IN},
     {"down", "", "", "the interface goes down", {0}, 0, NULL, BUS_DOWN},
     {"up", "", "", "and up", {0}, 0, NULL, BUS_UP},
+    {"unplug", "", "", "Modbus: the adapters and the hosts are gone", {0}, 0, NULL, BUS_UNPLUG},
+    {"plug", "", "", "and back", {0}, 0, NULL, BUS_PLUG},
+    {"relays-silent", "", "", "the board of relays on Modbus does not answer", {0}, 0, NULL, BUS_RELAYS_SILENT},
+    {"relays-forget", "", "", "it opens all its relays by itself, as after a dip of its supply", {0}, 0, NULL, BUS_RELAYS_FORGET},
+    {"relays-back", "", "", "it answers again", {0}, 0, NULL, BUS_RELAYS_BACK},
 };
 /* clang-format on */
 
@@ -444,15 +463,75 @@ bool fault_read(fault_t *self, const char *line, unsigned drives, char why[FAULT
     return false;
 }
 
+static bool is_of_board(bus_fault_t fault)
+{
+    return fault == BUS_RELAYS_SILENT || fault == BUS_RELAYS_FORGET || fault == BUS_RELAYS_BACK;
+}
+
+static bool is_of_lines(bus_fault_t fault)
+{
+    return fault == BUS_UNPLUG || fault == BUS_PLUG;
+}
+
+bool fault_suits(const fault_t *self, bool is_modbus, bool has_board, char why[FAULT_WHY_MAX])
+{
+    const row_t *row = &k_rows[self->row];
+    bool is_shared = false;
+    bool is_right = false;
+    if (row->act == NULL) {
+        is_right = is_of_board(row->bus)   ? has_board
+                   : is_of_lines(row->bus) ? is_modbus || has_board
+                                           : !is_modbus || row->bus == BUS_CABLE_OUT || row->bus == BUS_CABLE_IN;
+    } else {
+        is_right = is_modbus ? modbus_fault_find(row->name, &is_shared) != NULL || is_shared : !modbus_fault_is_own(row->name);
+    }
+    if (!is_right) {
+        (void)snprintf(why, FAULT_WHY_MAX, "%s: %s", row->name,
+                       row->act == NULL && is_of_board(row->bus) ? "the configuration has no board of relays on Modbus"
+                       : is_modbus ? "drives on Modbus have no such fault; docs/twin.md says which they have"
+                                   : "only drives on Modbus have this fault");
+    }
+    return is_right;
+}
+
+/* Of lines and boards on Modbus. False: it is one of the CAN bus. */
+static bool do_on_modbus(modbus_side_t *side, bus_fault_t fault)
+{
+    const bool is_cable = side->drives > 0 && (fault == BUS_CABLE_OUT || fault == BUS_CABLE_IN);
+    if (is_cable) {
+        side->is_cable_out = fault == BUS_CABLE_OUT;
+    } else if (is_of_lines(fault)) {
+        side->is_unplugged = fault == BUS_UNPLUG;
+    } else if (fault == BUS_RELAYS_FORGET) {
+        memset(side->board.coil, 0, sizeof side->board.coil);
+    } else if (is_of_board(fault)) {
+        side->board.is_silent = fault == BUS_RELAYS_SILENT;
+    }
+    return is_cable || is_of_lines(fault) || is_of_board(fault);
+}
+
+static void (*act_of(const row_t *row, const twin_t *twin))(twin_t *, unsigned, const fault_t *, uint64_t)
+{
+    bool is_shared = false;
+    const modbus_act_t act = twin->modbus.drives > 0 ? modbus_fault_find(row->name, &is_shared) : NULL;
+    return act != NULL ? act : row->act;
+}
+
 bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT_WHY_MAX])
 {
     const row_t *row = &k_rows[self->row];
+    if (!fault_suits(self, twin->modbus.drives > 0, twin->modbus.board.is_there, why)) {
+        return false;
+    }
+    if (row->act == NULL && do_on_modbus(&twin->modbus, row->bus)) {
+        return true;
+    }
     if (row->act == NULL) {
         return twin->bus.act(twin->bus.ctx, row->bus, (uint32_t)self->number[0], why, FAULT_WHY_MAX);
     }
     for (unsigned k = 0; k < twin->drives; k++) {
         if ((self->drives >> k & 1u) != 0) {
-            row->act(twin, k, self, now_us);
+            act_of(row, twin)(twin, k, self, now_us);
         }
     }
     return true;
