@@ -108,7 +108,6 @@ def bad_input(bench):
     refused(69, "nobody answers", "--socket", bench.folder / "none", "status")
     refused(78, "", "--config", bench.file("empty.ini", ""))
     refused(78, "heaved simulates these drives itself", "--config", harness.TOP / "config/demo-hexapod.ini")
-    refused(78, "no Modbus drives yet", "--config", harness.TOP / "config/modbus-tcp-hexapod.ini")
     refused(78, "frames of their own yet", "--config", harness.TOP / "config/can-raw-hexapod.ini")
     assert bench.run_twin(*config, "--fault", "1 jam 2", "--check").returncode == 0
     bench.start_twin()

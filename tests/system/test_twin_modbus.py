@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """test_twin_modbus.py BIN [PART OF A NAME] - heave-twin's drives and relays on Modbus: TCP, a serial line on a pseudo terminal, a board of coils, and every
-row of docs/twin.md that plays a failure of Modbus. In real time on this kernel: no CAN is needed."""
-import contextlib
-import os
+row of docs/twin.md that plays a failure of Modbus. On virtual time, as they
+are late on a busy machine; no CAN is needed."""
 import re
 import socket
 import struct
@@ -176,7 +175,7 @@ def bad_input(bench):
     refused(65, "drives on Modbus have no such fault", bench.config, "--fault", "1 heartbeat-lost 3")
     refused(65, "no board of relays", bench.config, "--fault", "1 relays-silent")
     refused(65, "this is written as: register DRIVE ADDRESS VALUE", bench.config, "--fault", "1 register 3")
-    refused(69, "take 127.0.0.1", bench.file("far.ini", re.sub("hosts = .*", "hosts = 192.0.2.7", text)))
+    refused(69, "take 127.0.0.1", bench.file("far.ini", re.sub("hosts = .*", "hosts = " + ", ".join(f"192.0.2.{k}" for k in range(1, 7)), text)))
     serial = (harness.TOP / "config/modbus/oriental-motor-az.ini").read_text(encoding="utf-8").replace("drive_timeout_confirmed = no", "drive_timeout_confirmed = yes")
     refused(69, "parity = none", bench.file("serial.ini", serial))
     there = bench.file("there", "somebody's")
@@ -209,7 +208,7 @@ def plays(line, says):
             assert bench.status()["state"] == "ENGAGED", bench.status()["fault"]
             return
         bench.wait_state("FAULT")
-        assert bench.status()["fault"]["name"] == says, bench.status()["fault"]
+        assert bench.status()["fault"]["name"] in says.split(" or "), bench.status()["fault"]
     return case
 
 
