@@ -34,7 +34,7 @@ NOT_OF_BUS = re.compile(r"^(a flood of valid frames|anything that is not|SIGTERM
 
 def twin_rows():
     """What docs/twin.md plays, and what it says it cannot."""
-    text = (TOP / "docs/twin.md").read_text(encoding="utf-8").split("## Each failure")[1].split("## Cost")[0]
+    text = (TOP / "docs/twin.md").read_text(encoding="utf-8").split("## Each failure", 1)[1].split("## Cost")[0]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("| ") and not line.startswith(("| what", "| ---"))]
 
 
