@@ -76,6 +76,17 @@ ACT(act_mend)
         object_t *row = &node->drive.od.row[i];
         row->is_missing = row->is_silent = false;
         row->refusal = 0;
+        if (row->is_forced) {
+            row->value = row->was_value;
+            row->fallback = row->was_fallback;
+            row->is_read_only = row->was_read_only;
+            row->is_forced = false;
+        }
+    }
+    if (node->own_number != 0) {
+        node->number = node->own_number;
+        node->own_number = 0;
+        node_reboot(node, now_us);
     }
 }
 
@@ -219,15 +230,22 @@ ACT(act_object)
 {
     UNUSED();
     object_t *row = object_of(twin, k, fault);
+    if (!row->is_forced) {
+        row->was_value = row->value;
+        row->was_fallback = row->fallback;
+        row->was_read_only = row->is_read_only;
+        row->is_forced = true;
+    }
     row->value = row->fallback = (uint32_t)fault->number[0];
     row->is_read_only = true;
 }
 
 ACT(act_node)
 {
-    UNUSED();
-    node_of(twin, k)->number = (uint8_t)fault->number[0];
-    node_reboot(node_of(twin, k), now_us);
+    node_t *node = node_of(twin, k);
+    node->own_number = node->own_number != 0 ? node->own_number : node->number;
+    node->number = (uint8_t)fault->number[0];
+    node_reboot(node, now_us);
 }
 
 ACT(act_hot)
@@ -300,7 +318,7 @@ static const row_t k_rows[] = {
     {"sdo-refuse", "doN", "DRIVE INDEX[:SUB] [ABORT]", "refuses to write that object; else 0x08000000", {NOT_NOW}, UINT32_MAX, act_sdo_refuse, BUS_OFF},
     {"sdo-mute", "do", "DRIVE INDEX[:SUB]", "never answers for that object", {0}, 0, act_sdo_mute, BUS_OFF},
     {"missing", "do", "DRIVE INDEX[:SUB]", "has not got that object", {0}, 0, act_sdo_missing, BUS_OFF},
-    {"object", "don", "DRIVE INDEX[:SUB] VALUE", "that object holds this until the next power-up, and takes nothing else", {0}, UINT32_MAX, act_object, BUS_OFF},
+    {"object", "don", "DRIVE INDEX[:SUB] VALUE", "that object holds this until mend or the next power-up, and takes nothing else", {0}, UINT32_MAX, act_object, BUS_OFF},
     {"node", "dn", "DRIVE NODE", "gets this node id, which another one may have, and starts again", {0}, 127, act_node, BUS_OFF},
     {"hot", "d", "DRIVE", "the motor is too hot", {0}, 0, act_hot, BUS_OFF},
     {"slip", "dn", "DRIVE MM_S", "the brake does not hold: sinks so fast without torque", {0}, 1e4, act_slip, BUS_OFF},
@@ -312,7 +330,7 @@ static const row_t k_rows[] = {
     {"half", "dn", "DRIVE COUNT", "Modbus: of so many of its answers only a half comes", {0}, 1e6, act_none, BUS_OFF},
     {"exception", "dnN", "DRIVE COUNT [CODE]", "Modbus: it answers so many times with an exception; else 6, busy", {0}, 1e6, act_none, BUS_OFF},
     {"register", "dnn", "DRIVE ADDRESS VALUE", "Modbus: that register holds this, and takes nothing else", {0}, INDEX_MAX, act_none, BUS_OFF},
-    {"mend", "d", "DRIVE", "ends the lasting faults above, from broken to slip but object and node; load, friction, lag and encoder take 0 or another value", {0}, 0, act_mend, BUS_OFF},
+    {"mend", "d", "DRIVE", "ends the lasting faults above; load, friction, lag and encoder take 0 or another value", {0}, 0, act_mend, BUS_OFF},
     {"bus-off", "", "", "heaved's controller goes bus-off", {0}, 0, NULL, BUS_OFF},
     {"passive", "", "", "heaved's controller becomes error-passive", {0}, 0, NULL, BUS_PASSIVE},
     {"active", "", "", "and recovers", {0}, 0, NULL, BUS_ACTIVE},

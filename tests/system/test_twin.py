@@ -115,6 +115,24 @@ def bad_input(bench):
     refused(1, "there is no drive 9", "--socket", bench.twin_socket, "jam", "9")
 
 
+def doctor_asks_them(bench):
+    """It knows the bus between programs, and says that it is none for a machine."""
+    def run():
+        return bench.heaved("--config", bench.config, "--doctor")
+
+    alone = run()
+    assert alone.returncode == 1 and "start heave-twin with the same configuration" in alone.stdout, alone.stdout
+    bench.start_twin("--fault", "0 sdo-refuse 3 6065", "--fault", "0 power-off 5")
+    time.sleep(1)
+    seen = run().stdout
+    assert "is a bus between programs, for heave-twin" in seen, seen
+    assert re.search(r"^ok\s+.*drive 2, node 2", seen, re.MULTILINE) and re.search(r"^FAIL\s+.*drive 5, node 5", seen, re.MULTILINE), seen
+    bench.do("power-on 5")
+    time.sleep(1)
+    run = bench.heaved("--config", bench.config, "--doctor")
+    assert run.returncode == 0, run.stdout
+
+
 def says_what_is_missing(bench):
     """On a kernel without CAN, and where the interface is not there."""
     text = bench.config.read_text(encoding="utf-8").replace(f"interface = {bench.interface}", "interface = vcan77")
@@ -173,6 +191,7 @@ CASES = [
     ("heave-twin: a script runs by its times", script_runs, {}),
     ("heave-twin: heaved without it says what to do, and goes on when it is there", without_a_twin_it_says_what_to_do, {}),
     ("heave-twin: bad input is named", bad_input, {}),
+    ("heave-twin: heaved --doctor asks the drives on a bus between programs", doctor_asks_them, {}),
     ("heave-twin: without SocketCAN, or without the interface, it says what to do", says_what_is_missing, {}),
     ("heave-twin: hostile clients stop nothing", hostile_clients_stop_nothing, {}),
     ("heave-twin: costs little, seven drives at 2 ms less than a quarter of a core", costs_little, {"period_us": 2000}),
