@@ -126,7 +126,7 @@ def doctor_asks_them(bench):
     time.sleep(1)
     seen = run().stdout
     assert "is a bus between programs, for heave-twin" in seen, seen
-    assert re.search(r"^ok\s+.*drive 2, node 2", seen, re.MULTILINE) and re.search(r"^FAIL\s+.*drive 5, node 5", seen, re.MULTILINE), seen
+    assert re.search(r"^ok\s+node 2 \(drive 2\)", seen, re.MULTILINE) and re.search(r"^FAIL\s+node 5 \(drive 5\) does not answer", seen, re.MULTILINE), seen
     bench.do("power-on 5")
     time.sleep(1)
     run = bench.heaved("--config", bench.config, "--doctor")
