@@ -145,7 +145,7 @@ def twin_and_heaved(*arguments, **options):
     text = (TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
         config = Path(folder) / "twin.ini"
-        config.write_text(changed(text, {"can.interface": f"twin{os.getpid() % 1000000}", "platform.engage": "auto", "udp.silence_hold_ms": 60000, "udp.silence_neutral_ms": 0, "udp.silence_settle_ms": 0}), encoding="utf-8")
+        config.write_text(changed(text, {"can.interface": f"twin{os.getpid() % 1000000}", "platform.engage": "auto", "platform.late_hold_cycles": 0, "udp.silence_hold_ms": 60000, "udp.silence_neutral_ms": 0, "udp.silence_settle_ms": 0}), encoding="utf-8")
         with heave.Twin(config, arguments, **options) as twin, heave.Heaved(config) as heaved:
             yield twin, heaved
 
@@ -154,8 +154,8 @@ def faults_and_positions_at_run_time():
     with twin_and_heaved("--start", "20") as (twin, heaved):
         assert all(abs(position - 20) < 0.5 for position in twin.positions), twin.positions
         heaved.platform.wait_for("ENGAGED", timeout=WAIT_S)
-        heaved.sender.a6(z=120, roll=2, time_ms=1000)
-        heaved.platform.wait_for_pose(z_mm=20)
+        heaved.sender.a6(z=20, roll=2, time_ms=1000)
+        heaved.platform.wait_for_pose(roll_deg=2)
         time.sleep(0.3)
         assert abs(twin.pose["roll"] - 2) < 0.2 and len(twin.positions) == 6, (twin.pose, twin.positions)
         twin.fault("drop 3")
