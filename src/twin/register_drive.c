@@ -185,22 +185,26 @@ static uint32_t status_of(const register_drive_t *self)
     return status_word(self->map, wanted);
 }
 
-/* What it shows of itself, into the registers of the feedback. */
+/* A field of its feedback, into its registers. */
+static void show_field(register_drive_t *self, uint16_t address, const modbus_drive_field_t *field)
+{
+    const uint32_t bits = field->value == MODBUS_DRIVE_POSITION ? (uint32_t)register_drive_count(self)
+                          : field->value == MODBUS_DRIVE_STATUS ? status_of(self)
+                                                                : self->alarm;
+    for (unsigned n = 0; n < field->registers; n++) {
+        register_cell_t *cell = register_drive_find(self, (uint16_t)(address + field->at + n));
+        if (cell != NULL && !cell->is_held) {
+            cell->value = half_of(field, n, bits & mask_of(field));
+        }
+    }
+}
+
 static void show(register_drive_t *self)
 {
     for (unsigned i = 0; i < self->map->feedback.count; i++) {
         const modbus_drive_block_t *block = &self->map->feedback.block[i];
         for (unsigned k = 0; k < block->fields; k++) {
-            const modbus_drive_field_t *field = &block->field[k];
-            const uint32_t bits = field->value == MODBUS_DRIVE_POSITION ? (uint32_t)register_drive_count(self)
-                                  : field->value == MODBUS_DRIVE_STATUS ? status_of(self)
-                                                                        : self->alarm;
-            for (unsigned n = 0; n < field->registers; n++) {
-                register_cell_t *reg = register_drive_find(self, (uint16_t)(block->address + field->at + n));
-                if (reg != NULL && !reg->is_held) {
-                    reg->value = half_of(field, n, bits & mask_of(field));
-                }
-            }
+            show_field(self, block->address, &block->field[k]);
         }
     }
 }
