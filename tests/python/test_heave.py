@@ -406,6 +406,20 @@ def frequency_responses_are_read():
     assert run.returncode == 0 and picture.count("<path") > 20, run.stderr
 
 
+def feedback_of_an_incident_is_read():
+    from heave.plot.feedback import Feedback
+    from heave.plot.window import TraceError
+    head = "t_ms,c1_state,c1_actual_mm,c1_code,c1_error,c2_state,c2_actual_mm,c2_code,c2_error,fault"
+    text = f"{head}\n1,enabled,10.5,0,0,enabled,11,0,0,\n2,enabled,10.6,0,0,offline,11,0,0,drive-offline\n3,fault,10.6,7,0,offline,11,0,0,drive-offline\n"
+    feedback = Feedback(text.splitlines())
+    assert feedback.actual == {"c1": [10.5, 10.6, 10.6], "c2": [11, None, None]} and feedback.times_us == [1000, 2000, 3000], feedback.actual
+    assert feedback.fault == (2000, "drive-offline")
+    assert Feedback(text.splitlines(), 2000, 2000).times_us == [2000]
+    for wrong, words in (("a,b", "line 1 is not the header"), (f"{head}\n1,enabled,x,0,0,enabled,11,0,0,", "line 2 is no row"), (f"{head}\n1,enabled", "line 2 is no row"), ("", "line 1")):
+        with refused(TraceError, "feedback.csv", words):
+            Feedback(wrong.splitlines())
+
+
 def command_run(*words):
     return subprocess.run([sys.executable, "-m", "heave", *words], capture_output=True, text=True, check=False, timeout=WAIT_S)
 
@@ -428,7 +442,7 @@ def main():
     for case in (frames_are_as_the_protocol_has_them, wrong_values_are_named, csv_becomes_frames, wrong_recordings_are_named_with_their_line, a_stream_does_not_drift, a_stream_makes_up_for_nothing,
                  a_stream_of_values_ends_with_them, a_recording_keeps_its_times, requests_say_who_asks, refusals_are_in_heaveds_words, waiting_ends_where_it_is_in_vain, nobody_there_is_said,
                  a_heaved_of_ones_own, a_recording_is_sent_to_it, a_heaved_that_cannot_start_says_why, configurations_are_changed, offline_runs_are_arrays, offline_runs_that_fail_say_why,
-                 the_judge_finds_what_is_wrong, what_a_configuration_leaves_out_is_filled_in, lag_and_gain_are_found, the_animation_is_one_page, limits_used_are_shares, frequency_responses_are_read):
+                 the_judge_finds_what_is_wrong, what_a_configuration_leaves_out_is_filled_in, lag_and_gain_are_found, the_animation_is_one_page, limits_used_are_shares, frequency_responses_are_read, feedback_of_an_incident_is_read):
         with suite.case(case.__name__.replace("_", " ")):
             case()
     return suite.done()

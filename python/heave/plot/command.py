@@ -3,7 +3,7 @@
 
 usage: heave plot TRACE [TRACE2] [-o FILE] [--what KIND] [--axes NAME,...] [--from S] [--to S] [--config FILE] [--frames FRAMES]
 
-TRACE    what heaved --trace wrote, or the folder of an incident, whose platform.ini and frames are taken then. Two are drawn side by side, with the same scales.
+TRACE    what heaved --trace wrote, or the folder of an incident, whose platform.ini, frames and feedback.csv (where the drives really were: dashed) are taken then. Two are drawn side by side, with the same scales.
 -o FILE  .png, .svg or .pdf, or .html for an animation (default: TRACE with .png or .html)
 --what   curves; limits: how much of each limit was used; spectrum: acceleration over frequency; animation: the platform in motion, a page of its own for a browser.
          bode: gain and phase over frequency; TRACE is then a CSV file with columns frequency_hz, gain, phase_deg, and axis where it has several; two are drawn in one.
@@ -27,6 +27,7 @@ from heave.configuration import Configuration
 from heave.errors import HeaveError
 from heave.plot import animation, bode
 from heave.plot.dots import dots_of
+from heave.plot.feedback import Feedback
 from heave.plot.window import CYLINDERS, GROUPS, Window, axes_named
 from heave.recording import read_frames
 
@@ -98,25 +99,29 @@ def of_trace(given, i):
 
 
 def read(arguments, i):
-    """(window, configuration, dots, requests) of the i-th trace."""
+    """(window, configuration, dots, requests, feedback) of the i-th trace."""
+    feedback = None
     path = Path(arguments.trace[i])
     config, frames = of_trace(arguments.config, i), of_trace(arguments.frames, i)
     if path.is_dir():
         folder, path = path, path / "trace.csv"
         config = config or (folder / "platform.ini" if (folder / "platform.ini").exists() else None)
         frames = frames or (folder / "frames" if (folder / "frames").exists() else None)
+        if (folder / "feedback.csv").exists():
+            with open(folder / "feedback.csv", encoding="ascii", errors="replace", newline="") as file:
+                feedback = Feedback(file, arguments.from_us, arguments.to_us, name=str(folder / "feedback.csv"))
     with open(path, encoding="ascii", errors="replace", newline="\n") as file:
         window = Window(file, arguments.from_us, arguments.to_us, name=path.parent.name if Path(arguments.trace[i]).is_dir() else path.name)
     platform = Configuration(config) if config else None
     if arguments.what in ("limits", "animation") and platform is None:
         raise PlotError(f"{arguments.what}: needs the configuration of the run, --config FILE")
     lines = read_frames(frames) if frames else []
-    return window, platform, dots_of(lines, platform), [(line.t_us, line.text) for line in lines if line.is_request]
+    return window, platform, dots_of(lines, platform), [(line.t_us, line.text) for line in lines if line.is_request], feedback
 
 
 def draw(arguments):
     if arguments.what == "animation":
-        window, platform, _, _ = read(arguments, 0)
+        window, platform, *_ = read(arguments, 0)
         arguments.output.write_text(animation.page(window, platform), encoding="utf-8")
         return
     if arguments.what == "bode":
