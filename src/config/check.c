@@ -430,6 +430,15 @@ static void check_approved(config_source_t *self)
     }
 }
 
+static void check_selftest(config_source_t *self)
+{
+    if (self->config->selftest.when != CONFIG_SELFTEST_NONE && config_source_has(self, "platform", "engage") &&
+        self->config->settings.engage == ENGAGE_AUTO) {
+        config_source_key_error(self, "service", "selftest",
+                                "engage = auto waits for nobody to make it; allowed: none, or engage = manual");
+    }
+}
+
 /* Those that the file gives; those that it leaves out once they are filled in. */
 static void check_limits(config_source_t *self)
 {
@@ -452,6 +461,7 @@ static void check_values(config_source_t *self)
     check_engage(self, "accel_mm_s2", settings->engage_accel_mm_s2_q16, settings->cylinder_accel_mm_s2_q16);
     check_group(self);
     check_approved(self);
+    check_selftest(self);
     check_silence(self);
     check_intensity(self);
     check_relays(self);

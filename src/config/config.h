@@ -320,6 +320,16 @@ typedef struct {
 
 #define CONFIG_HASH_MAX 17u /**< digits of what a configuration is recognised by, with its NUL */
 
+/** Values of [service] selftest. */
+typedef enum { CONFIG_SELFTEST_NONE, CONFIG_SELFTEST_DAILY } config_selftest_when_t;
+
+/** When a self-test is asked for, and what it allows. */
+typedef struct {
+    config_selftest_when_t when;
+    q16_t following_mm_q16; /**< largest difference between set-point and drive while it is jogged */
+    q16_t drift_mm_q16;     /**< largest way of a cylinder without torque */
+} config_selftest_t;
+
 /** A whole configuration: the core's settings, and what only the hosted program needs. Plain data. */
 typedef struct {
     settings_t settings;
@@ -330,6 +340,7 @@ typedef struct {
     char life_file[CONFIG_PATH_MAX]; /**< "none" = none */
     config_label_t approved;         /**< hash of the one that was approved, "" = any */
     char hash[CONFIG_HASH_MAX];      /**< of this one; follows from the rest (hash.h) */
+    config_selftest_t selftest;
     char control_socket[CONFIG_PATH_MAX];
     char metrics_file[CONFIG_PATH_MAX]; /**< "none" = none */
     char look_socket[CONFIG_PATH_MAX];  /**< likewise */

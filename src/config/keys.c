@@ -193,6 +193,12 @@ const config_key_t config_keys[] = {
      ABOVE_ZERO(50), .help = "no cylinder is faster than that while a hand leads it, nor than the limit of [cylinders]"},
     {KEY("service", "jog_deg_s"), AT(settings.jog_deg_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg/s",
      .fallback = "2", ABOVE_ZERO(20), .help = "nor a rotation, nor the rotation motor"},
+    {KEY("service", "selftest"), AT(selftest.when), .type = CONFIG_WORD, .unit = "", .fallback = "none", .words = "none|daily",
+     .help = "daily: `engage` is refused until `heavectl selftest` has passed on this calendar day, with this configuration; not with engage = auto"},
+    {KEY("service", "selftest_following_mm"), AT(selftest.following_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     .fallback = "2", ABOVE_ZERO(100), .help = "how far a cylinder may be from its set-point while the self-test jogs it"},
+    {KEY("service", "selftest_drift_mm"), AT(selftest.drift_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
+     .fallback = "1", ABOVE_ZERO(100), .help = "how far a cylinder may move within 5 s without torque, which its brake or its friction has to hold"},
 
     {KEY("intensity", "start_percent"), AT(settings.intensity_start_percent), .type = CONFIG_INTEGER, .unit = "%",
      .fallback = "max", .words = "max", RANGE(0, 100),

@@ -230,6 +230,35 @@ static void tell_acknowledged(live_t *self)
     self->control.acknowledged_by.pid = 0;
 }
 
+static uint32_t today(void)
+{
+    struct timespec now = {0};
+    struct tm date = {0};
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    (void)localtime_r(&now.tv_sec, &date);
+    return (uint32_t)((date.tm_year + 1900) * 10000 + (date.tm_mon + 1) * 100 + date.tm_mday);
+}
+
+/* Keeps what somebody says of a self-test. It is asked for anew on every day of the local calendar, whichever way the clock went.
+ */
+static void watch_selftest(live_t *self)
+{
+    control_selftest_t *said = &self->control.selftest;
+    const uint32_t day = today();
+    if (said->is_news) {
+        lifetime_selftest_t selftest = {.day = day, .is_passed = said->is_passed};
+        memcpy(selftest.hash, self->config.hash, sizeof selftest.hash);
+        lifetime_note_selftest(&self->life, &selftest);
+        writers_say(&self->writers, "self-test %s, by user %u, process %d, configuration %s",
+                    said->is_passed ? "passed" : "failed", (unsigned)said->peer.uid, (int)said->peer.pid, self->config.hash);
+        said->is_news = false;
+    }
+    const bool is_due =
+        self->config.selftest.when == CONFIG_SELFTEST_DAILY && !lifetime_has_passed(&self->life, day, self->config.hash);
+    self->control.lost.is_untested = is_due;
+    __atomic_store_n(&self->loop.handover.is_untested, is_due ? 1u : 0u, __ATOMIC_RELEASE);
+}
+
 /* Both go on being tried, and heaved goes on. */
 static void tell_trouble(live_t *self)
 {
@@ -290,6 +319,7 @@ static void serve_once(live_t *self)
     control_serve(&self->control, fds, now_us(self));
     tell_others(self);
     tell_acknowledged(self);
+    watch_selftest(self);
     tell_trouble(self);
     count_losses(self);
 }
@@ -314,6 +344,10 @@ static bool serve(live_t *self)
 static void say_ready(const live_t *self, const config_t *config)
 {
     (void)print_message(0, "build %s, configuration %s", build_id(), config->hash);
+    if (self->control.lost.is_untested) {
+        (void)print_message(0, "a self-test is due: nobody engages until `heavectl selftest` has passed%s",
+                            self->life.path[0] != '\0' ? "" : "; without [platform] life_file that is forgotten at the end");
+    }
     if (__atomic_load_n(&self->loop.handover.is_unapproved, __ATOMIC_ACQUIRE) != 0) {
         (void)print_message(0, "configuration %s was approved, this is another one: nothing moves until `heavectl acknowledge`",
                             config->approved.text);
@@ -463,6 +497,7 @@ static int open_all(live_t *self, const config_t *config)
     }
     self->control.samples_fd = self->loop.samples.fd;
     self->loop.handover.is_unapproved = config_is_unapproved(config);
+    watch_selftest(self);
     const hv_status_t status =
         motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->writers.log), linux_clock_hal());
     if (devices_trouble(&self->loop.devices)[0] != '\0') {

@@ -38,7 +38,9 @@ typedef struct {
     bool is_pressed;    /**< heaved holds it */
     bool is_let_go_due; /**< the key has to be let go before it can begin again */
     bool is_over;       /**< the run is */
-    int code;           /**< then */
+    bool has_arrived;   /**< because of watch */
+    const hold_watch_t *watch;
+    int code; /**< then */
     char line[LINE_BYTES];
     size_t length;
 } hold_t;
@@ -278,17 +280,29 @@ static void run(hold_t *self, const volatile sig_atomic_t *is_interrupted)
         if (self->asked != ASKED_NOTHING && now_ms() - self->asked_ms > HOLD_SILENCE_MS) {
             end(self, EXIT_UNAVAILABLE, "heaved does not answer");
         }
+        if (!self->is_over && self->watch != NULL && self->watch->is_over(self->watch->context, self->is_pressed)) {
+            show("there: let go of the key");
+            self->has_arrived = true;
+            end(self, EXIT_DONE, NULL);
+        }
         if (!self->is_over) {
             speak(self);
         }
     }
 }
 
-int hold_run(int fd, const char *request, const volatile sig_atomic_t *is_interrupted)
+static bool s_has_arrived; /* of the last run */
+
+bool hold_has_arrived(void)
+{
+    return s_has_arrived;
+}
+
+int hold_run(int fd, const char *request, const hold_watch_t *watch, const volatile sig_atomic_t *is_interrupted)
 {
     static hold_t hold;
     struct termios before;
-    hold = (hold_t){.fd = fd, .request = request};
+    hold = (hold_t){.fd = fd, .request = request, .watch = watch};
     if (tcgetattr(STDIN_FILENO, &before) != 0) {
         fprintf(stderr, "heavectl: %s: goes on while a key is held, which takes a terminal\n", request);
         return EXIT_BAD_USAGE;
@@ -304,6 +318,7 @@ int hold_run(int fd, const char *request, const volatile sig_atomic_t *is_interr
     if (hold.is_pressed) {
         release(&hold); /* nobody waits for the answer: without it heaved lets go by itself */
     }
+    s_has_arrived = hold.has_arrived;
     printf("\r\n");
     (void)tcsetattr(STDIN_FILENO, TCSAFLUSH, &before);
     return hold.code;

@@ -35,10 +35,20 @@ bool hold_key_is_let_go(const hold_key_t *self, int64_t now_ms);
 /** Nobody was there to hear it until now: what came meanwhile says nothing, nor that nothing came. */
 void hold_key_miss(hold_key_t *self, int64_t now_ms);
 
+/** Looks on while a key is held; NULL in its place: nobody does. */
+typedef struct {
+    bool (*is_over)(void *context, bool is_pressed); /**< true: what was wanted is there, and the key may be let go */
+    void *context;
+} hold_watch_t;
+
 /** Asks over a connected socket, in the terminal of standard input, until q, Ctrl-C, the end of homing, or a refusal.
  *  @param request as heaved takes it, without the tick at its end
+ *  @param watch kept until the end; NULL: none
  *  @param is_interrupted set by a signal that ends the program
  *  @return exit code; what is wrong was said */
-int hold_run(int fd, const char *request, const volatile sig_atomic_t *is_interrupted);
+int hold_run(int fd, const char *request, const hold_watch_t *watch, const volatile sig_atomic_t *is_interrupted);
+
+/** Whether the last run ended because the one who looked on said so. */
+bool hold_has_arrived(void);
 
 #endif

@@ -24,6 +24,7 @@
 #include "common/usage.h"
 #include "heavectl/hold.h"
 #include "heavectl/scope.h"
+#include "heavectl/selftest.h"
 #include "heavectl/socket.h"
 #include "heavectl/usage.h"
 #include "heavectl/view.h"
@@ -588,7 +589,16 @@ static int hold(ctl_t *self)
     (void)sigaction(SIGTERM, &action, NULL);
     (void)sigaction(SIGHUP, &action, NULL);
     (void)snprintf(request, sizeof request, "%s %s", self->command, self->argument);
-    return hold_run(self->fd, request, &is_interrupted);
+    return hold_run(self->fd, request, NULL, &is_interrupted);
+}
+
+static int selftest(const ctl_t *self)
+{
+    const struct sigaction action = {.sa_handler = on_signal};
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    (void)sigaction(SIGHUP, &action, NULL);
+    return selftest_run(self->socket, self->argument, &is_interrupted);
 }
 
 /* --- The command line --- */
@@ -735,10 +745,11 @@ static const char *take_command(ctl_t *self, int argc, char **argv)
     const int words = argc - optind - 1;
     if (row == NULL) {
         return "unknown command; status, watch, engage, hold, resume, park, reset, shutdown, dump, incidents, seen, acknowledge, "
-               "intensity, service, service-off, counts, torque, jog, home, relay, scope and presets are allowed";
+               "intensity, service, service-off, counts, torque, jog, home, relay, selftest, scope and presets are allowed";
     }
     const bool is_all_columns = strcmp(row->name, "scope") == 0 && words == 0;
-    if (!is_all_columns && words != words_in(row->argument)) {
+    const bool is_without_file = strcmp(row->name, "selftest") == 0 && words == 0;
+    if (!is_all_columns && !is_without_file && words != words_in(row->argument)) {
         (void)snprintf(wrong, sizeof wrong, "%s needs %s", row->name, row->argument);
         return strcmp(row->name, "intensity") == 0 ? "intensity needs a whole number of percent, as in `heavectl intensity 50`"
                : row->argument != NULL             ? wrong
@@ -804,6 +815,9 @@ int main(int argc, char **argv)
                                          : complain(EXIT_UNAVAILABLE, "%s: %s", presets_directory(), strerror(errno));
     }
     int code = choose_socket(&ctl);
+    if (code == EXIT_DONE && strcmp(ctl.command, "selftest") == 0) {
+        return end_stdout(selftest(&ctl));
+    }
     code = code == EXIT_DONE ? open_link(&ctl) : code;
     if (code != EXIT_DONE) {
         return code;

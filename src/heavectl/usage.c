@@ -18,6 +18,7 @@ static const usage_row_t k_forms[] = {
     {.argument = "jog AXIS SPEED"},
     {.argument = "home N|all"},
     {.argument = "relay N"},
+    {.argument = "selftest [FILE]"},
     {.argument = "[--for SECONDS] [--hz N] scope [COLUMN,...]"},
     {.argument = "presets"},
     {0},
@@ -49,6 +50,10 @@ static const usage_row_t k_commands[] = {
      .help = "in service, while a key is held: drive N, or roll, pitch, yaw, x, y or z, by 5mm/s, -2deg/s"},
     {.name = "home", .argument = "N|all", .help = "in service, while a key is held: drives find their zero"},
     {.name = "relay", .argument = "N", .help = "in service, while a key is held: away from its safe position"},
+    {.name = "selftest",
+     .argument = "[FILE]",
+     .help = "the daily check in service, with a person at the terminal: switches, relays, ends, brakes; FILE gets the report as "
+             "JSON"},
     {.name = "scope",
      .argument = "[COLUMN,...]",
      .help = "every cycle as a line of CSV, all columns or these; on a terminal some lines a second (docs/samples.md)"},

@@ -87,7 +87,8 @@ level_t levels_needed(const char *request, unsigned percent)
     if (strcmp(request, "seen") == 0) {
         return LEVEL_OPERATE;
     }
-    if (service_words_are(request, strlen(request)) || strcmp(request, "dump") == 0 || strcmp(request, "acknowledge") == 0) {
+    if (service_words_are(request, strlen(request)) || strcmp(request, "dump") == 0 || strcmp(request, "acknowledge") == 0 ||
+        strncmp(request, "selftest ", 9) == 0) {
         return LEVEL_SERVICE;
     }
     const event_t event = operator_request_find(request);

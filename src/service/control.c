@@ -25,7 +25,10 @@
 static const char k_unapproved[] =
     "the configuration %s is not the one that was approved (%s): `heavectl acknowledge` lets it move until "
     "heaved ends, [platform] approved for good";
+static const char k_untested[] =
+    "a self-test is due: `heavectl selftest`, with nobody on board, has to pass today with this configuration";
 static const char k_acknowledge[] = "acknowledge";
+static const char k_selftest[] = "selftest";
 static const char k_dump_later[] = "dump: the disk has not taken it yet; heaved goes on trying";
 
 /* --- Answers --- */
@@ -359,14 +362,20 @@ static bool is_look(const char *line)
 {
     return strcmp(line, "status") == 0 || strcmp(line, "tick") == 0 || strcmp(line, "counts") == 0 ||
            strncmp(line, "beat ", 5) == 0 || strcmp(line, "incidents") == 0 || strcmp(line, "samples") == 0 ||
-           strncmp(line, "watch", 5) == 0 || strncmp(line, k_by, strlen(k_by)) == 0;
+           strcmp(line, k_selftest) == 0 || strncmp(line, "watch", 5) == 0 || strncmp(line, k_by, strlen(k_by)) == 0;
+}
+
+/* What came of one; the bare word asks. */
+static bool is_said_of_selftest(const char *line)
+{
+    return strcmp(line, "selftest passed") == 0 || strcmp(line, "selftest failed") == 0;
 }
 
 static bool is_known(const char *line)
 {
     return operator_request_find(line) != EVENTS || service_words_are(line, strlen(line)) ||
            strncmp(line, k_intensity, strlen(k_intensity)) == 0 || strcmp(line, "dump") == 0 || strcmp(line, "seen") == 0 ||
-           strcmp(line, k_acknowledge) == 0;
+           strcmp(line, k_acknowledge) == 0 || is_said_of_selftest(line);
 }
 
 /* Somebody has seen that this is not the configuration that was approved, and wants it. */
@@ -377,6 +386,45 @@ static void acknowledge(control_t *self, control_client_t *client)
         return;
     }
     self->acknowledged_by = client->peer;
+    client->request = EVENT_TICK; /* none that the motion thread has to answer */
+    answer_done(client, snapshot_of(self));
+}
+
+static void put_switch(json_t *json, const char *name, const config_label_t *line)
+{
+    json_bool(json, name, line->text[0] != '\0');
+}
+
+/* What a self-test has to look at, and what it allows; and what is known of the newest one. */
+static void answer_selftest(control_t *self, control_client_t *client)
+{
+    const config_t *config = self->config;
+    const config_inputs_t *inputs = &config->inputs;
+    json_t json = start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_text(&json, "state", state_name(snapshot_of(self)->state));
+    status_json_selftest(&json, &self->lost, config);
+    json_q32(&json, "following_mm", q32_from_q16(config->selftest.following_mm_q16));
+    json_q32(&json, "drift_mm", q32_from_q16(config->selftest.drift_mm_q16));
+    json_q32(&json, "jog_mm_s", q32_from_q16(config->settings.jog_mm_s_q16));
+    json_number(&json, "relays", snapshot_of(self)->relay_count);
+    json_open(&json, "switches", '{');
+    put_switch(&json, "estop", &inputs->estop_line);
+    put_switch(&json, "estop2", &inputs->estop2_line);
+    put_switch(&json, "enable", &inputs->enable_line);
+    put_switch(&json, "power", &inputs->power_line);
+    json_close(&json, '}');
+    json_bool(&json, "healthy_pulse", config->healthy.driver != CONFIG_HEALTHY_NONE);
+    json_text(&json, "configuration", config->hash);
+    json_close(&json, '}');
+    answer(client, &json);
+}
+
+/* Somebody has made one. Who did, and what came of it, is in the operator log. */
+static void take_selftest(control_t *self, control_client_t *client, bool is_passed)
+{
+    self->selftest = (control_selftest_t){.is_news = true, .is_passed = is_passed, .peer = client->peer};
     client->request = EVENT_TICK; /* none that the motion thread has to answer */
     answer_done(client, snapshot_of(self));
 }
@@ -448,6 +496,10 @@ static void take_request(control_t *self, control_client_t *client, const char *
         answer_incidents(self, client, line[0] == 's');
     } else if (strcmp(line, k_acknowledge) == 0) {
         acknowledge(self, client);
+    } else if (strcmp(line, k_selftest) == 0) {
+        answer_selftest(self, client);
+    } else if (is_said_of_selftest(line)) {
+        take_selftest(self, client, strcmp(line, "selftest passed") == 0);
     } else if (strcmp(line, "samples") == 0) {
         answer_samples(self, client);
     } else if (strcmp(line, "status") == 0) {
@@ -462,7 +514,7 @@ static void take_request(control_t *self, control_client_t *client, const char *
         answer_error(client,
                      "unknown request; status, watch [HZ], tick, counts, intensity PERCENT, engage, hold, resume, park, reset, "
                      "shutdown, service, service-off, torque, jog, home, relay, beat, release, dump, incidents, samples, seen, "
-                     "acknowledge and by NAME are allowed",
+                     "selftest [passed|failed], acknowledge and by NAME are allowed",
                      NULL);
     }
 }
@@ -541,6 +593,9 @@ static void take_result(const control_t *self, control_client_t *client, const m
         client->request_id = 0;
         (void)snprintf(error, sizeof error, k_unapproved, self->config->hash, self->config->approved.text);
         answer_error(client, error, state_name(result->snapshot.state));
+    } else if (result->is_untested) {
+        client->request_id = 0;
+        answer_error(client, k_untested, state_name(result->snapshot.state));
     } else if (client->request == OPERATOR_SERVICE) {
         client->request_id = 0;
         answer_service(client, result);

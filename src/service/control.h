@@ -56,6 +56,13 @@ typedef struct {
     uint64_t asked_us; /**< its last request, else when it came */
 } control_client_t;
 
+/** What has come of a self-test, in the words of who made it. */
+typedef struct {
+    bool is_news;
+    bool is_passed;
+    level_peer_t peer;
+} control_selftest_t;
+
 /** A listening socket; private to control.c. */
 typedef struct {
     int fd;       /**< -1: closed, or not there */
@@ -79,6 +86,7 @@ typedef struct control {
     motion_view_words_t view;
     level_peer_t
         acknowledged_by; /**< who has just acknowledged the configuration; the owner says it and sets it back; pid 0: nobody */
+    control_selftest_t selftest; /**< what somebody has just said of a self-test; likewise */
     uint32_t last_id;
     uint32_t last_series; /**< given out: of what somebody has begun to hold */
     control_client_t client[CONTROL_CLIENTS];

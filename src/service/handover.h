@@ -63,6 +63,7 @@ typedef struct {
     bool is_key_off;         /**< refused because of that */
     bool is_unapproved;      /**< likewise */
     bool is_power_failing;   /**< likewise */
+    bool is_untested;        /**< likewise: a self-test is due */
     service_answer_t answer; /**< of OPERATOR_SERVICE */
 } motion_result_t;
 
@@ -90,6 +91,7 @@ typedef struct {
     ring_t trace;           /**< trace_row_t likewise */
     uint32_t is_quit;       /**< atomic: the service thread wants an end at once */
     uint32_t is_unapproved; /**< atomic: nothing is brought up until it is over, as without the enable key */
+    uint32_t is_untested;   /**< atomic: nobody engages until a self-test has passed */
     uint32_t is_ended;      /**< atomic: the motion thread has done its last cycle */
     uint32_t memory;        /**< atomic: motion_memory_t */
     uint64_t view_word[MOTION_VIEW_WORDS];

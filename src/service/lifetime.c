@@ -40,14 +40,20 @@ static void checksum(const char *text, size_t length, char digits[DIGITS + 1u])
 static size_t format(const lifetime_totals_t *totals, char text[TEXT_MAX])
 {
     char digits[DIGITS + 1u];
+    const lifetime_selftest_t *selftest = &totals->selftest;
+    const unsigned version = selftest->day == 0 ? 1 : 2; /* where there was none, an older heaved can read it */
     size_t length =
-        (size_t)snprintf(text, TEXT_MAX, "heave life 1\nsequence %" PRIu64 "\nrides %" PRIu64 "\nfaults %" PRIu64 "\naxes %u\n",
-                         totals->sequence, totals->rides, totals->faults, (unsigned)totals->axes);
+        (size_t)snprintf(text, TEXT_MAX, "heave life %u\nsequence %" PRIu64 "\nrides %" PRIu64 "\nfaults %" PRIu64 "\naxes %u\n",
+                         version, totals->sequence, totals->rides, totals->faults, (unsigned)totals->axes);
     for (unsigned i = 0; i < totals->axes; i++) {
         const lifetime_axis_t *axis = &totals->axis[i];
         length += (size_t)snprintf(&text[length], TEXT_MAX - length,
                                    "axis %u energized_ms %" PRIu64 " travel_milli %" PRIu64 " turns %" PRIu64 "\n", i + 1u,
                                    axis->energized_ms, axis->travel_milli, axis->turns);
+    }
+    if (version > 1) {
+        length += (size_t)snprintf(&text[length], TEXT_MAX - length, "selftest %u passed %u configuration %s\n", selftest->day,
+                                   selftest->is_passed ? 1u : 0u, selftest->hash);
     }
     checksum(text, length, digits);
     return length + (size_t)snprintf(&text[length], TEXT_MAX - length, "sum %s\n", digits);
@@ -73,6 +79,25 @@ static bool read_axis(const char **at, lifetime_axis_t *axis)
            read_number(at, " travel_milli ", &axis->travel_milli) && read_number(at, " turns ", &axis->turns);
 }
 
+static bool read_selftest(const char **at, lifetime_selftest_t *selftest)
+{
+    uint64_t day = 0, passed = 0;
+    if (!read_number(at, "\nselftest ", &day) || !read_number(at, " passed ", &passed) ||
+        strncmp(*at, " configuration ", 15) != 0) {
+        return false;
+    }
+    *at += 15;
+    const size_t length = strcspn(*at, "\n");
+    if (length >= sizeof selftest->hash) {
+        return false;
+    }
+    selftest->day = (uint32_t)day;
+    selftest->is_passed = passed != 0;
+    memcpy(selftest->hash, *at, length);
+    *at += length;
+    return true;
+}
+
 /* What was written by format(), and nothing else: it is written again and compared. */
 static bool parse(const char *text, size_t length, lifetime_totals_t *totals)
 {
@@ -89,6 +114,9 @@ static bool parse(const char *text, size_t length, lifetime_totals_t *totals)
         if (!read_axis(&text, &totals->axis[totals->axes])) {
             return false;
         }
+    }
+    if (version > 1 && !read_selftest(&text, &totals->selftest)) {
+        return false;
     }
     return format(totals, again) == length && memcmp(again, whole, length) == 0;
 }
@@ -212,6 +240,20 @@ void lifetime_serve(lifetime_t *self, const snapshot_t *snapshot, uint64_t now_u
         self->next_us = now_us + LIFETIME_PERIOD_US;
         hand_over(self);
     }
+}
+
+void lifetime_note_selftest(lifetime_t *self, const lifetime_selftest_t *selftest)
+{
+    self->now.selftest = *selftest;
+    if (self->path[0] != '\0') {
+        hand_over(self);
+    }
+}
+
+bool lifetime_has_passed(const lifetime_t *self, uint32_t day, const char *hash)
+{
+    const lifetime_selftest_t *selftest = &self->now.selftest;
+    return selftest->is_passed && selftest->day == day && strcmp(selftest->hash, hash) == 0;
 }
 
 bool lifetime_trouble(lifetime_t *self, int *error)

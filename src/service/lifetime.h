@@ -22,6 +22,13 @@ typedef struct {
     uint64_t turns;
 } lifetime_axis_t;
 
+/** The newest self-test. */
+typedef struct {
+    uint32_t day; /**< of the local calendar, as 20261123; 0 = there was none */
+    bool is_passed;
+    char hash[CONFIG_HASH_MAX]; /**< of the configuration it was made with */
+} lifetime_selftest_t;
+
 /** What is in a file. */
 typedef struct {
     uint64_t sequence; /**< of the write */
@@ -29,6 +36,7 @@ typedef struct {
     uint64_t faults;
     uint32_t axes;
     lifetime_axis_t axis[DRIVES_MAX];
+    lifetime_selftest_t selftest;
 } lifetime_totals_t;
 
 /** The counters; private but for now. */
@@ -56,6 +64,12 @@ bool lifetime_start(lifetime_t *self);
 
 /** Takes a view in, and hands over where it is time to. The service thread, often. */
 void lifetime_serve(lifetime_t *self, const snapshot_t *snapshot, uint64_t now_us);
+
+/** Keeps what has come of a self-test, on the disk as soon as it takes it. */
+void lifetime_note_selftest(lifetime_t *self, const lifetime_selftest_t *selftest);
+
+/** Whether a self-test has passed on that day, with that configuration. */
+bool lifetime_has_passed(const lifetime_t *self, uint32_t day, const char *hash);
 
 /** Whether writing has begun to fail, or works again, since the last call.
  *  @param error out: errno; 0 = it works again */

@@ -17,11 +17,15 @@ typedef struct {
     uint32_t operator_entries;     /**< that the operator log has not taken */
     uint64_t unix_ms;              /**< the time of day, for who compares the status with something else */
     const lifetime_totals_t *life; /**< of the machine; NULL: not known yet */
+    bool is_untested;              /**< nobody engages until a self-test has passed */
     bool is_unapproved;            /**< nothing moves until somebody has acknowledged the configuration */
     bool is_flood;                 /**< the kernel drops what cannot be a frame */
 } status_lost_t;
 
 void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,
                        const motion_times_t *times);
+
+/** When a self-test is asked for, whether one is due, and what came of the newest: member `selftest`. */
+void status_json_selftest(json_t *json, const status_lost_t *lost, const config_t *config);
 
 #endif

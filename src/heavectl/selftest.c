@@ -1,0 +1,637 @@
+/* SPDX-License-Identifier: MIT
+ * selftest.c - the daily check of a platform; see selftest.h.
+ * Each thing that is held has a connection of its own: what a hold leaves unanswered belongs to nobody after it.
+ */
+#include "heavectl/selftest.h"
+
+#include <cjson/cJSON.h>
+#include <errno.h>
+#include <poll.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <termios.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "common/message.h" // exit codes
+#include "common/samples.h"
+#include "heavectl/hold.h"
+#include "heavectl/scope.h"
+#include "heavectl/selftest_report.h"
+
+#define LINE_BYTES   65536u
+#define ANSWER_MS    5000
+#define LOOK_MS      100    /* between looks at the state */
+#define PERSON_MS    120000 /* for a switch to be turned */
+#define DRIVES_MS    15000  /* for torque, and for a reset to take effect */
+#define REST_MS      1500   /* a set-point that stands for so long has come to its end */
+#define LEAST_WAY_MM 5.0    /* between the ends: less is no way */
+#define BRAKE_MM     15.0   /* above the lower end, where the brakes are tried: what slips has not far to fall */
+#define DRIFT_MS     5000
+#define CYLINDERS    6u
+
+static double larger(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+static double apart(double a, double b)
+{
+    return a > b ? a - b : b - a;
+}
+
+/* The way of a jog, from the samples of every cycle. */
+typedef struct {
+    samples_reader_t *reader;
+    unsigned cylinders;
+    double least_mm[CYLINDERS], most_mm[CYLINDERS], off_mm[CYLINDERS];
+    double first_z_mm, last_z_mm, until_mm; /* until_mm: the way after which it is over; 0: its end */
+    bool has_first;
+    int64_t moved_ms;
+} way_t;
+
+/* A run. */
+typedef struct {
+    const char *path;
+    const volatile sig_atomic_t *is_interrupted;
+    int fd;
+    samples_reader_t reader;
+    selftest_report_t report;
+    char line[LINE_BYTES];
+    double following_mm, drift_mm, jog_mm_s;
+    unsigned cylinders;
+    bool is_over; /* the person wants to end, or heaved is gone */
+} run_t;
+
+static int64_t now_ms(void)
+{
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
+}
+
+static __attribute__((format(printf, 4, 5))) void note(run_t *self, const char *name, selftest_result_t result,
+                                                       const char *format, ...)
+{
+    char text[SELFTEST_NOTE_MAX];
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    selftest_note(&self->report, name, result, text);
+}
+
+/* --- heaved --- */
+
+static int open_link(const char *path)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    if (strlen(path) >= sizeof address.sun_path) {
+        return -1;
+    }
+    memcpy(address.sun_path, path, strlen(path));
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    if (fd >= 0 && connect(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
+        (void)close(fd);
+        return -1;
+    }
+    return fd;
+}
+
+/* The answer to a request; NULL: none came. */
+static cJSON *ask(run_t *self, const char *request)
+{
+    char line[96];
+    size_t length = 0;
+    const int64_t until_ms = now_ms() + ANSWER_MS;
+    const int bytes = snprintf(line, sizeof line, "%s\n", request);
+    if (send(self->fd, line, (size_t)bytes, MSG_NOSIGNAL) != bytes) {
+        return NULL;
+    }
+    while (length < sizeof self->line - 1 && now_ms() < until_ms) {
+        struct pollfd wait = {.fd = self->fd, .events = POLLIN};
+        if (poll(&wait, 1, LOOK_MS) <= 0) {
+            continue;
+        }
+        const ssize_t received = recv(self->fd, &self->line[length], sizeof self->line - 1 - length, 0);
+        if (received <= 0) {
+            return NULL;
+        }
+        length += (size_t)received;
+        self->line[length] = '\0';
+        if (self->line[length - 1] == '\n') {
+            return cJSON_Parse(self->line);
+        }
+    }
+    return NULL;
+}
+
+static const char *text_of(const cJSON *object, const char *name)
+{
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
+    return cJSON_IsString(item) ? item->valuestring : "";
+}
+
+static double number_of(const cJSON *object, const char *name)
+{
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
+    return cJSON_IsNumber(item) ? item->valuedouble : 0.0;
+}
+
+static bool is_set(const cJSON *object, const char *name)
+{
+    return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(object, name));
+}
+
+/* Asks for something to be done.
+ * @param error out: why not, where it returns false */
+static bool has_done(run_t *self, const char *request, char error[SELFTEST_NOTE_MAX])
+{
+    cJSON *answer = ask(self, request);
+    const bool is_done = is_set(answer, "ok");
+    (void)snprintf(error, SELFTEST_NOTE_MAX, "%s",
+                   is_done          ? ""
+                   : answer != NULL ? text_of(answer, "error")
+                                    : "heaved does not answer");
+    self->is_over = self->is_over || answer == NULL;
+    cJSON_Delete(answer);
+    return is_done;
+}
+
+typedef bool (*seen_t)(const cJSON *answer);
+
+static bool is_estop(const cJSON *status)
+{
+    return is_set(status, "estop_active");
+}
+static bool is_no_estop(const cJSON *status)
+{
+    return !is_set(status, "estop_active");
+}
+static bool is_failing(const cJSON *status)
+{
+    return is_set(status, "power_failing");
+}
+static bool is_supplied(const cJSON *status)
+{
+    return !is_set(status, "power_failing");
+}
+static bool is_out(const cJSON *status)
+{
+    return strcmp(text_of(status, "state"), "SERVICE") != 0;
+}
+
+/* Every drive has torque, and its zero too. */
+static bool has_all(const cJSON *counts, const char *what)
+{
+    const cJSON *drive = NULL;
+    bool has = cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(counts, "drives")) > 0;
+    cJSON_ArrayForEach(drive, cJSON_GetObjectItemCaseSensitive(counts, "drives"))
+    {
+        has = has && is_set(drive, what);
+    }
+    return has;
+}
+
+static bool has_torque(const cJSON *counts)
+{
+    return has_all(counts, "torque");
+}
+static bool is_homed(const cJSON *counts)
+{
+    return has_all(counts, "homed");
+}
+
+/* A line from the person, without blocking: 0, or its first letter. */
+static char typed(void)
+{
+    char line[64];
+    struct pollfd wait = {.fd = STDIN_FILENO, .events = POLLIN};
+    if (poll(&wait, 1, 0) <= 0) {
+        return '\0';
+    }
+    const ssize_t length = read(STDIN_FILENO, line, sizeof line);
+    return length <= 0 ? 'q' : line[0];
+}
+
+/* Waits until heaved shows it.
+ * Returns 'y', 's' where the person leaves it out, 'q' where it is ended, 'n' where time is up. */
+static char wait_for(run_t *self, const char *request, seen_t is_seen, int64_t most_ms)
+{
+    const int64_t until_ms = now_ms() + most_ms;
+    const struct timespec pause = {.tv_nsec = LOOK_MS * 1000000L};
+    while (now_ms() < until_ms && *self->is_interrupted == 0) {
+        cJSON *answer = ask(self, request);
+        const bool is_there = answer != NULL && is_seen(answer);
+        const bool is_gone = answer == NULL;
+        cJSON_Delete(answer);
+        if (is_there) {
+            return 'y';
+        }
+        const char key = typed();
+        if (is_gone || key == 'q' || key == 's') {
+            self->is_over = self->is_over || is_gone || key == 'q';
+            return is_gone ? 'q' : key;
+        }
+        (void)nanosleep(&pause, NULL);
+    }
+    self->is_over = self->is_over || *self->is_interrupted != 0;
+    return self->is_over ? 'q' : 'n';
+}
+
+/* A question: y, n, s (left out) or q. Keys that were held before it are no answer. */
+static char question(run_t *self, const char *text)
+{
+    char line[64];
+    for (;;) {
+        (void)tcflush(STDIN_FILENO, TCIFLUSH);
+        printf("%s [y/n, s leaves it out, q ends] ", text);
+        (void)fflush(stdout);
+        const ssize_t length = read(STDIN_FILENO, line, sizeof line);
+        const char key = length > 0 ? line[0] : 'q';
+        if (length <= 0 || *self->is_interrupted != 0 || key == 'q') {
+            self->is_over = true;
+            return 'q';
+        }
+        if (key == 'y' || key == 'n' || key == 's') {
+            return key;
+        }
+    }
+}
+
+static void note_answer(run_t *self, const char *name, char key, const char *failure)
+{
+    note(self, name,
+         key == 'y'   ? SELFTEST_PASSED
+         : key == 'n' ? SELFTEST_FAILED
+                      : SELFTEST_SKIPPED,
+         "%s",
+         key == 'n'   ? failure
+         : key == 'y' ? ""
+                      : "left out");
+}
+
+static bool enter_service(run_t *self)
+{
+    char error[SELFTEST_NOTE_MAX];
+    const int64_t until_ms = now_ms() + DRIVES_MS;
+    const struct timespec pause = {.tv_nsec = LOOK_MS * 1000000L};
+    cJSON *status = ask(self, "tick");
+    bool is_in = status != NULL && !is_out(status);
+    cJSON_Delete(status);
+    while (!is_in && !self->is_over) {
+        is_in = has_done(self, "service", error);
+        if (!is_in && now_ms() >= until_ms) {
+            fprintf(stderr, "heavectl: selftest: %s\n", error);
+            self->is_over = true;
+        }
+        if (!is_in) {
+            (void)nanosleep(&pause, NULL);
+        }
+    }
+    return is_in;
+}
+
+/* --- Switches --- */
+
+/* One that ends SERVICE and comes back.
+ * @param on what to do, off how to undo it; each with what heaved shows then */
+static void try_switch(run_t *self, const char *name, const char *on, seen_t is_on, const char *off, seen_t is_off)
+{
+    char error[SELFTEST_NOTE_MAX];
+    printf("%s (s leaves it out)\n", on);
+    char key = wait_for(self, "status", is_on, PERSON_MS);
+    if (key != 'y') {
+        note_answer(self, name, key, "nothing changed within two minutes");
+        return;
+    }
+    printf("%s\n", off);
+    key = wait_for(self, "status", is_off, PERSON_MS);
+    if (key != 'y') {
+        note_answer(self, name, key == 's' ? 'n' : key, "it did not go back");
+        return;
+    }
+    if (is_on == is_estop) {
+        (void)has_done(self, "reset", error);
+    }
+    note(self, name, SELFTEST_PASSED, "%s", "");
+}
+
+static bool is_always(const cJSON *status)
+{
+    (void)status;
+    return true;
+}
+
+/* The enable key ends SERVICE; that it is on again is seen by entering it. */
+static void try_switches(run_t *self, const cJSON *plan)
+{
+    const cJSON *switches = cJSON_GetObjectItemCaseSensitive(plan, "switches");
+    if (is_set(switches, "estop") && !self->is_over && enter_service(self)) {
+        try_switch(self, "e-stop", "Press the e-stop.", is_estop, "Release the e-stop.", is_no_estop);
+        if (is_set(plan, "healthy_pulse") && !self->is_over) {
+            note_answer(self, "healthy pulse",
+                        question(self, "Did the safety relay drop while the e-stop was pressed, and does it hold now?"),
+                        "the relay of the healthy pulse did not follow");
+        }
+    }
+    if (is_set(switches, "enable") && !self->is_over && enter_service(self)) {
+        try_switch(self, "enable key", "Turn the enable key off.", is_out, "Turn the enable key on, and wait.", is_always);
+    }
+    if (is_set(switches, "power") && !self->is_over && enter_service(self)) {
+        try_switch(self, "power failing", "Let the supply's contact tell that the supply fails.", is_failing,
+                   "Let it be well again.", is_supplied);
+    }
+}
+
+/* --- What is held --- */
+
+static int hold(run_t *self, const char *request, const hold_watch_t *watch)
+{
+    const int fd = open_link(self->path);
+    if (fd < 0) {
+        self->is_over = true;
+        return EXIT_UNAVAILABLE;
+    }
+    const int code = hold_run(fd, request, watch, self->is_interrupted);
+    (void)close(fd);
+    (void)tcflush(STDIN_FILENO, TCIFLUSH);
+    return code;
+}
+
+static void try_relays(run_t *self, unsigned relays)
+{
+    char text[64], request[32], name[32];
+    for (unsigned i = 1; i <= relays && !self->is_over; i++) {
+        (void)snprintf(text, sizeof text, "Relay %u: try it? n: nothing is connected to it.", i);
+        (void)snprintf(name, sizeof name, "relay %u", i);
+        (void)snprintf(request, sizeof request, "relay %u", i);
+        char key = question(self, text);
+        if (key == 'y') {
+            key = hold(self, request, NULL) == EXIT_DONE ? question(self, "Did it switch, and back again?") : 'n';
+            note_answer(self, name, key, "it did not switch");
+        } else if (key == 'n') {
+            note(self, name, SELFTEST_UNUSED, "%s", "nothing is connected");
+        } else {
+            note_answer(self, name, key, "");
+        }
+    }
+}
+
+/* --- Ends and brakes --- */
+
+static double value(const run_t *self, const samples_record_t *record, const char *format, unsigned cylinder)
+{
+    char name[32];
+    (void)snprintf(name, sizeof name, "%s%u_mm", format, cylinder + 1);
+    const samples_column_t *column = samples_column_named(self->reader.header, name, strlen(name));
+    return column != NULL ? samples_value(column, record) : 0.0;
+}
+
+static void take_sample(const run_t *self, way_t *way, const samples_record_t *record)
+{
+    const samples_column_t *z = samples_column_named(self->reader.header, "sent_z_mm", strlen("sent_z_mm"));
+    const double z_mm = z != NULL ? samples_value(z, record) : 0.0;
+    for (unsigned i = 0; i < self->cylinders; i++) {
+        const double actual_mm = value(self, record, "actual_c", i);
+        way->off_mm[i] = larger(way->off_mm[i], apart(value(self, record, "sent_c", i), actual_mm));
+        way->least_mm[i] = way->has_first && way->least_mm[i] < actual_mm ? way->least_mm[i] : actual_mm;
+        way->most_mm[i] = way->has_first ? larger(way->most_mm[i], actual_mm) : actual_mm;
+    }
+    if (!way->has_first || apart(z_mm, way->last_z_mm) > 1e-4) {
+        way->moved_ms = now_ms();
+        way->last_z_mm = z_mm;
+    }
+    way->first_z_mm = way->has_first ? way->first_z_mm : z_mm;
+    way->has_first = true;
+}
+
+/* A run and one of its ways, for a hold that looks on. */
+typedef struct {
+    run_t *run;
+    way_t way;
+} watched_t;
+
+static bool is_at_end(void *context, bool is_pressed)
+{
+    watched_t *self = context;
+    samples_record_t record;
+    while (samples_reader_next(&self->run->reader, &record)) {
+        take_sample(self->run, &self->way, &record);
+    }
+    if (!is_pressed) {
+        self->way.moved_ms = now_ms();
+        return false;
+    }
+    const double gone_mm = apart(self->way.last_z_mm, self->way.first_z_mm);
+    return self->way.until_mm > 0 ? gone_mm >= self->way.until_mm : now_ms() - self->way.moved_ms > REST_MS;
+}
+
+static void judge_way(run_t *self, const char *name, const way_t *way)
+{
+    unsigned worst = 0, shortest = 0;
+    for (unsigned i = 1; i < self->cylinders; i++) {
+        worst = way->off_mm[i] > way->off_mm[worst] ? i : worst;
+        shortest = way->most_mm[i] - way->least_mm[i] < way->most_mm[shortest] - way->least_mm[shortest] ? i : shortest;
+    }
+    const double least_mm = way->most_mm[shortest] - way->least_mm[shortest];
+    if (way->off_mm[worst] > self->following_mm) {
+        note(self, name, SELFTEST_FAILED, "cylinder %u was %.2f mm off its set-point, allowed are %.2f", worst + 1,
+             way->off_mm[worst], self->following_mm);
+    } else if (way->until_mm <= 0 && least_mm < LEAST_WAY_MM) {
+        note(self, name, SELFTEST_FAILED, "cylinder %u moved %.2f mm only", shortest + 1, least_mm);
+    } else {
+        note(self, name, SELFTEST_PASSED,
+             "every cylinder moved %.1f mm or more and was %.2f mm off its set-point at most (allowed: %.2f)", least_mm,
+             way->off_mm[worst], self->following_mm);
+    }
+}
+
+/* Jogs the platform up or down.
+ * Returns false: it did not get there. */
+static bool try_way(run_t *self, const char *name, double speed_mm_s, double until_mm)
+{
+    char request[48];
+    watched_t watched = {.run = self, .way = {.until_mm = until_mm, .moved_ms = now_ms()}};
+    samples_record_t record;
+    while (samples_reader_next(&self->reader, &record)) { /* what was before says nothing */
+    }
+    (void)snprintf(request, sizeof request, "jog z %.3f", speed_mm_s);
+    const hold_watch_t watch = {is_at_end, &watched};
+    const int code = hold(self, request, &watch);
+    (void)is_at_end(&watched, false);
+    if (code != EXIT_DONE || !watched.way.has_first) {
+        note(self, name, SELFTEST_FAILED, "%s", "it was not led there; see what heaved said");
+        return false;
+    }
+    if (!hold_has_arrived()) {
+        note(self, name, SELFTEST_SKIPPED, "%s", "ended before it was there");
+        return false;
+    }
+    judge_way(self, name, &watched.way);
+    return true;
+}
+
+/* Torque off: brakes or friction hold what stands. */
+static void try_brakes(run_t *self)
+{
+    char error[SELFTEST_NOTE_MAX];
+    watched_t watched = {.run = self};
+    const struct timespec pause = {.tv_nsec = LOOK_MS * 1000000L};
+    bool is_off = has_done(self, "torque all off", error);
+    for (int64_t until_ms = now_ms() + REST_MS; !is_off && now_ms() < until_ms;) { /* it comes to rest first */
+        (void)nanosleep(&pause, NULL);
+        is_off = has_done(self, "torque all off", error);
+    }
+    if (!is_off) {
+        note(self, "brakes", SELFTEST_FAILED, "%s", error);
+        return;
+    }
+    (void)nanosleep(&pause, NULL);
+    (void)is_at_end(&watched, false);
+    watched.way = (way_t){0}; /* what was before, with torque, says nothing */
+    printf("Torque is off: the platform has to stay where it is for %d s.\n", DRIFT_MS / 1000);
+    const int64_t until_ms = now_ms() + DRIFT_MS;
+    while (now_ms() < until_ms && *self->is_interrupted == 0) {
+        (void)nanosleep(&pause, NULL);
+        (void)is_at_end(&watched, false);
+    }
+    unsigned worst = 0;
+    for (unsigned i = 1; i < self->cylinders; i++) {
+        worst = watched.way.most_mm[i] - watched.way.least_mm[i] > watched.way.most_mm[worst] - watched.way.least_mm[worst]
+                    ? i
+                    : worst;
+    }
+    const double most_mm = watched.way.most_mm[worst] - watched.way.least_mm[worst];
+    note(self, "brakes", watched.way.has_first && most_mm <= self->drift_mm ? SELFTEST_PASSED : SELFTEST_FAILED,
+         "cylinder %u moved %.2f mm without torque (allowed: %.2f)", worst + 1, most_mm, self->drift_mm);
+}
+
+static void try_motion(run_t *self)
+{
+    char error[SELFTEST_NOTE_MAX];
+    if (!enter_service(self)) {
+        return;
+    }
+    printf("Now the platform moves, while you hold the space bar. Nobody may be on it or near it.\n");
+    const char key = question(self, "Go on?");
+    if (key != 'y') {
+        note_answer(self, "ends", 's', "");
+        return;
+    }
+    if (!has_done(self, "torque all on", error)) {
+        note(self, "torque", SELFTEST_FAILED, "%s", error);
+        return;
+    }
+    if (wait_for(self, "counts", has_torque, DRIVES_MS) != 'y') {
+        note(self, "torque", SELFTEST_FAILED, "%s", "not every drive has torque; heavectl counts shows which");
+        return;
+    }
+    note(self, "torque", SELFTEST_PASSED, "%s", "");
+    if (wait_for(self, "counts", is_homed, 2 * LOOK_MS) == 'n' && hold(self, "home all", NULL) != EXIT_DONE) {
+        note(self, "home", SELFTEST_FAILED, "%s", "not every drive has found its zero");
+        return;
+    }
+    printf("Up, to the end. ");
+    bool is_there = !self->is_over && try_way(self, "upper end", self->jog_mm_s, 0);
+    if (is_there) {
+        printf("Down, to the end. ");
+    }
+    is_there = is_there && try_way(self, "lower end", -self->jog_mm_s, 0);
+    if (is_there) {
+        printf("A little up, where the brakes are tried. ");
+    }
+    if (is_there && try_way(self, "off the lower end", self->jog_mm_s, BRAKE_MM)) {
+        try_brakes(self);
+    }
+}
+
+/* --- All of it --- */
+
+static int finish(run_t *self, const char *file, const char *configuration, const char *version, const char *build)
+{
+    char error[SELFTEST_NOTE_MAX];
+    const bool is_passed = selftest_has_passed(&self->report) && !self->is_over;
+    const bool is_told = has_done(self, is_passed ? "selftest passed" : "selftest failed", error);
+    if (!is_told) {
+        fprintf(stderr, "heavectl: selftest: %s\n", error);
+    }
+    (void)has_done(self, "service-off", error);
+    const int wrong = file != NULL ? selftest_write(&self->report, file, configuration, version, build) : 0;
+    if (wrong != 0) {
+        fprintf(stderr, "heavectl: %s: %s\n", file, strerror(wrong));
+    }
+    printf("self-test: %s\n", is_passed ? "passed" : "failed");
+    return !is_told ? EXIT_UNAVAILABLE : wrong != 0 ? EXIT_IO : is_passed ? EXIT_DONE : EXIT_REFUSED;
+}
+
+static bool begin(run_t *self, cJSON **plan, cJSON **status)
+{
+    self->fd = open_link(self->path);
+    if (self->fd < 0) {
+        fprintf(stderr, "heavectl: heaved is not running at %s: %s\n", self->path, strerror(errno));
+        return false;
+    }
+    *plan = ask(self, "selftest");
+    *status = ask(self, "status");
+    if (!is_set(*plan, "ok") || !is_set(*status, "ok")) {
+        fprintf(stderr, "heavectl: selftest: %s\n", *plan != NULL ? text_of(*plan, "error") : "heaved does not answer");
+        return false;
+    }
+    self->following_mm = number_of(*plan, "following_mm");
+    self->drift_mm = number_of(*plan, "drift_mm");
+    self->jog_mm_s = number_of(*plan, "jog_mm_s");
+    self->cylinders = (unsigned)cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(*status, "cylinders"));
+    self->cylinders = self->cylinders < CYLINDERS ? self->cylinders : CYLINDERS;
+    if (send(self->fd, "samples\n", 8, MSG_NOSIGNAL) != 8) {
+        return false;
+    }
+    const int samples = scope_receive(self->fd, self->line, sizeof self->line);
+    const char *wrong =
+        samples < 0 ? "there are no samples; [samples] seconds has to be above 0" : samples_reader_open(&self->reader, samples);
+    if (samples >= 0) {
+        (void)close(samples);
+    }
+    if (wrong != NULL) {
+        fprintf(stderr, "heavectl: selftest: %s\n", wrong);
+    }
+    return wrong == NULL;
+}
+
+int selftest_run(const char *path, const char *file, const volatile sig_atomic_t *is_interrupted)
+{
+    static run_t run;
+    cJSON *plan = NULL, *status = NULL;
+    run = (run_t){.path = path, .is_interrupted = is_interrupted, .fd = -1};
+    if (isatty(STDIN_FILENO) == 0) {
+        fprintf(stderr, "heavectl: selftest takes a terminal: a person presses, looks and holds\n");
+        return EXIT_BAD_USAGE;
+    }
+    int code = EXIT_UNAVAILABLE;
+    if (begin(&run, &plan, &status)) {
+        const cJSON *program = cJSON_GetObjectItemCaseSensitive(plan, "configuration");
+        printf("Self-test of configuration %s, with nobody on board.\n", cJSON_IsString(program) ? program->valuestring : "?");
+        if (enter_service(&run)) {
+            try_switches(&run, plan);
+            if (!run.is_over && enter_service(&run)) {
+                try_relays(&run, (unsigned)number_of(plan, "relays"));
+            }
+            if (!run.is_over) {
+                try_motion(&run);
+            }
+            code = finish(&run, file, text_of(plan, "configuration"), text_of(status, "version"), text_of(status, "build"));
+        } else {
+            code = EXIT_REFUSED;
+        }
+        samples_reader_close(&run.reader);
+    }
+    cJSON_Delete(plan);
+    cJSON_Delete(status);
+    if (run.fd >= 0) {
+        (void)close(run.fd);
+    }
+    return code;
+}
