@@ -790,6 +790,16 @@ static int choose_socket(ctl_t *self)
     return EXIT_DONE;
 }
 
+static int carry_out(ctl_t *self)
+{
+    return strcmp(self->command, "watch") == 0      ? watch(self)
+           : strcmp(self->command, "scope") == 0    ? scope(self)
+           : strcmp(self->command, "counts") == 0   ? watch_counts(self)
+           : strcmp(self->command, "selftest") == 0 ? selftest(self)
+           : is_held(self)                          ? hold(self)
+                                                    : ask(self);
+}
+
 int main(int argc, char **argv)
 {
     static ctl_t ctl;
@@ -815,17 +825,10 @@ int main(int argc, char **argv)
                                          : complain(EXIT_UNAVAILABLE, "%s: %s", presets_directory(), strerror(errno));
     }
     int code = choose_socket(&ctl);
-    if (code == EXIT_DONE && strcmp(ctl.command, "selftest") == 0) {
-        return end_stdout(selftest(&ctl));
-    }
     code = code == EXIT_DONE ? open_link(&ctl) : code;
     if (code != EXIT_DONE) {
         return code;
     }
-    code = strcmp(ctl.command, "watch") == 0    ? watch(&ctl)
-           : strcmp(ctl.command, "scope") == 0  ? scope(&ctl)
-           : strcmp(ctl.command, "counts") == 0 ? watch_counts(&ctl)
-           : is_held(&ctl)                      ? hold(&ctl)
-                                                : ask(&ctl);
+    code = carry_out(&ctl);
     return end_stdout(ctl.is_waiting && code == EXIT_DONE ? wait_for_end(&ctl) : code);
 }

@@ -206,7 +206,7 @@ static bool is_homed(const cJSON *counts)
 }
 
 /* A line from the person, without blocking: 0, or its first letter. */
-static char typed(void)
+static int typed(void)
 {
     char line[64];
     struct pollfd wait = {.fd = STDIN_FILENO, .events = POLLIN};
@@ -219,7 +219,7 @@ static char typed(void)
 
 /* Waits until heaved shows it.
  * Returns 'y', 's' where the person leaves it out, 'q' where it is ended, 'n' where time is up. */
-static char wait_for(run_t *self, const char *request, seen_t is_seen, int64_t most_ms)
+static int wait_for(run_t *self, const char *request, seen_t is_seen, int64_t most_ms)
 {
     const int64_t until_ms = now_ms() + most_ms;
     const struct timespec pause = {.tv_nsec = LOOK_MS * 1000000L};
@@ -231,7 +231,7 @@ static char wait_for(run_t *self, const char *request, seen_t is_seen, int64_t m
         if (is_there) {
             return 'y';
         }
-        const char key = typed();
+        const int key = typed();
         if (is_gone || key == 'q' || key == 's') {
             self->is_over = self->is_over || is_gone || key == 'q';
             return is_gone ? 'q' : key;
@@ -243,7 +243,7 @@ static char wait_for(run_t *self, const char *request, seen_t is_seen, int64_t m
 }
 
 /* A question: y, n, s (left out) or q. Keys that were held before it are no answer. */
-static char question(run_t *self, const char *text)
+static int question(run_t *self, const char *text)
 {
     char line[64];
     for (;;) {
@@ -251,7 +251,7 @@ static char question(run_t *self, const char *text)
         printf("%s [y/n, s leaves it out, q ends] ", text);
         (void)fflush(stdout);
         const ssize_t length = read(STDIN_FILENO, line, sizeof line);
-        const char key = length > 0 ? line[0] : 'q';
+        const int key = length > 0 ? line[0] : 'q';
         if (length <= 0 || *self->is_interrupted != 0 || key == 'q') {
             self->is_over = true;
             return 'q';
@@ -262,7 +262,7 @@ static char question(run_t *self, const char *text)
     }
 }
 
-static void note_answer(run_t *self, const char *name, char key, const char *failure)
+static void note_answer(run_t *self, const char *name, int key, const char *failure)
 {
     note(self, name,
          key == 'y'   ? SELFTEST_PASSED
@@ -303,7 +303,7 @@ static void try_switch(run_t *self, const char *name, const char *on, seen_t is_
 {
     char error[SELFTEST_NOTE_MAX];
     printf("%s (s leaves it out)\n", on);
-    char key = wait_for(self, "status", is_on, PERSON_MS);
+    int key = wait_for(self, "status", is_on, PERSON_MS);
     if (key != 'y') {
         note_answer(self, name, key, "nothing changed within two minutes");
         return;
@@ -369,7 +369,7 @@ static void try_relays(run_t *self, unsigned relays)
         (void)snprintf(text, sizeof text, "Relay %u: try it? n: nothing is connected to it.", i);
         (void)snprintf(name, sizeof name, "relay %u", i);
         (void)snprintf(request, sizeof request, "relay %u", i);
-        char key = question(self, text);
+        int key = question(self, text);
         if (key == 'y') {
             key = hold(self, request, NULL) == EXIT_DONE ? question(self, "Did it switch, and back again?") : 'n';
             note_answer(self, name, key, "it did not switch");
@@ -517,7 +517,7 @@ static void try_motion(run_t *self)
         return;
     }
     printf("Now the platform moves, while you hold the space bar. Nobody may be on it or near it.\n");
-    const char key = question(self, "Go on?");
+    const int key = question(self, "Go on?");
     if (key != 'y') {
         note_answer(self, "ends", 's', "");
         return;

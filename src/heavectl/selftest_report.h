@@ -27,7 +27,8 @@ typedef struct {
 /** Adds an item and prints its line. */
 void selftest_note(selftest_report_t *self, const char *name, selftest_result_t result, const char *note);
 
-/** True where something has passed and nothing has failed or was left out: that was not seen to work. What is unused does not count. */
+/** True where something has passed and nothing has failed or was left out: that was not seen to work. What is unused does not
+ * count. */
 bool selftest_has_passed(const selftest_report_t *self);
 
 /** Writes the report as JSON, beside its place first.

@@ -124,7 +124,7 @@ def completion(built):
             assert complete(built, program, "") == commands, complete(built, program, "")
     assert complete(built, "heaved", "--d") == ["--doctor", "--dump-config", "--dump-dbc"]
     assert complete(built, "heaved", "--config", "demo") == ["demo-hexapod.ini"]
-    assert complete(built, "heavectl", "--json", "s") == ["scope", "seen", "service", "service-off", "shutdown", "status"]
+    assert complete(built, "heavectl", "--json", "s") == ["scope", "seen", "selftest", "service", "service-off", "shutdown", "status"]
     assert complete(built, "heavectl", "--hz", "") == []
     assert complete(built, "heave-twin", "cable-") == ["cable-in", "cable-out"]
     assert complete(built, "heave-twin", "--swap", "") == []

@@ -1282,6 +1282,18 @@ static void test_load_approved_has_to_be_a_hash_and_somebody_to_wait_for(void)
     expect_contains("[platform] approved: engage = auto waits for nobody to look at it; allowed: none, or engage = manual\n");
 }
 
+static void test_load_daily_selftest_has_to_have_somebody_to_make_it(void)
+{
+    take_good_file();
+    set_key("platform", "engage", "manual");
+    set_key("service", "selftest", "daily");
+    TEST_ASSERT_EQUAL_INT(0, load_lines());
+    take_good_file();
+    set_key("service", "selftest", "daily");
+    TEST_ASSERT_EQUAL_INT(1, load_lines());
+    expect_contains("[service] selftest: engage = auto waits for nobody to make it; allowed: none, or engage = manual\n");
+}
+
 static void test_reload_of_another_configuration_than_the_approved_one_is_refused(void)
 {
     char line[128];
@@ -1970,6 +1982,7 @@ int main(void)
     RUN_TEST(test_hash_is_of_the_values_and_of_nothing_else);
     RUN_TEST(test_hash_changes_with_every_number);
     RUN_TEST(test_load_approved_has_to_be_a_hash_and_somebody_to_wait_for);
+    RUN_TEST(test_load_daily_selftest_has_to_have_somebody_to_make_it);
     RUN_TEST(test_reload_of_another_configuration_than_the_approved_one_is_refused);
     RUN_TEST(test_write_reference_has_a_row_for_every_key);
     RUN_TEST(test_load_random_bytes_only_give_errors);

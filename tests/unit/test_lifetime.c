@@ -114,6 +114,28 @@ static void test_life_is_written_once_a_minute_and_when_it_goes_off(void)
     TEST_ASSERT_TRUE(ring_pop(&m_life.ring, &totals, sizeof totals) > 0);
 }
 
+/* Kept over a start; of another day, another configuration, or failed, it does not count. */
+static void test_selftest_counts_for_its_day_and_configuration(void)
+{
+    lifetime_selftest_t selftest = {.day = 20261123, .is_passed = true, .hash = "0123456789abcdef"};
+    TEST_ASSERT_EQUAL(EXIT_DONE, start());
+    TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 20261123, "0123456789abcdef"));
+    TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 0, ""));
+    lifetime_note_selftest(&m_life, &selftest);
+    TEST_ASSERT_TRUE(lifetime_close(&m_life));
+    TEST_ASSERT_EQUAL(EXIT_DONE, start());
+    TEST_ASSERT_TRUE(lifetime_has_passed(&m_life, 20261123, "0123456789abcdef"));
+    TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 20261124, "0123456789abcdef"));
+    TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 20261122, "0123456789abcdef"));
+    TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 20261123, "0123456789abcdee"));
+    selftest.is_passed = false;
+    lifetime_note_selftest(&m_life, &selftest);
+    TEST_ASSERT_TRUE(lifetime_close(&m_life));
+    TEST_ASSERT_EQUAL(EXIT_DONE, start());
+    TEST_ASSERT_EQUAL_UINT32(20261123, m_life.now.selftest.day);
+    TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 20261123, "0123456789abcdef"));
+}
+
 /* So many writes: each one more than the last, in turn to both. */
 static void live(unsigned writes)
 {
@@ -245,6 +267,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_life_goes_on_after_every_start);
     RUN_TEST(test_life_is_written_once_a_minute_and_when_it_goes_off);
+    RUN_TEST(test_selftest_counts_for_its_day_and_configuration);
     RUN_TEST(test_life_survives_any_damage_of_one_file);
     RUN_TEST(test_life_without_a_file_that_is_right_does_not_begin_at_zero);
     RUN_TEST(test_life_of_another_machine_is_refused);
