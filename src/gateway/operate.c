@@ -104,9 +104,9 @@ static void begin_bring_up(gateway_t *self, uint64_t now_us)
 
 void operate_follow(gateway_t *self, uint64_t now_us)
 {
-    self->start_us = now_us;
-    self->frame_mask = self->settings.relay_safe_mask;
-    confirm_restart(&self->confirm);
+    self->sender.start_us = now_us;
+    self->sender.frame_mask = self->settings.relay_safe_mask;
+    confirm_restart(&self->sender.confirm);
     motion_follow(&self->motion);
 }
 
@@ -638,7 +638,7 @@ static bool has_passed(uint64_t now_us, uint64_t since_us, uint32_t limit_ms)
 void operate_after_frames(gateway_t *self, uint64_t now_us)
 {
     const uint64_t end_us = motion_timed_end_us(&self->motion);
-    const uint64_t since_us = end_us > self->start_us ? end_us : self->start_us;
+    const uint64_t since_us = end_us > self->sender.start_us ? end_us : self->sender.start_us;
     if (has_passed(now_us, since_us, self->settings.silence_hold_ms)) {
         operate_event(self, EVENT_SILENCE_HOLD, now_us);
     }
