@@ -14,8 +14,10 @@ from heave.frames import COMMANDS, frame
 from heave.offline import Run, play
 from heave.platform import Platform
 from heave.programs import demo_config
+from heave.samples import Samples, SamplesError
 from heave.sender import Sender, Sent
+from heave.twin import Twin
 
 __version__ = "0.1.0"
-__all__ = ["COMMANDS", "FrameError", "HeaveError", "Heaved", "NotInstalled", "NotRunning", "Platform", "PlatformFault", "PlayFailed", "Refused", "Run", "Sender", "Sent",
-           "WaitTimeout", "demo_config", "frame", "judge", "play", "programs", "recording"]
+__all__ = ["COMMANDS", "FrameError", "HeaveError", "Heaved", "NotInstalled", "NotRunning", "Platform", "PlatformFault", "PlayFailed", "Refused", "Run", "Samples", "SamplesError",
+           "Sender", "Sent", "Twin", "WaitTimeout", "demo_config", "frame", "judge", "play", "programs", "recording"]

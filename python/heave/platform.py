@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from heave.errors import HeaveError, NotRunning, PlatformFault, Refused, WaitTimeout
+from heave.samples import Samples
 
 RUN = Path("/run/heave")
 LOOK_S = 0.05       # between two looks at the status
@@ -79,6 +80,10 @@ class Platform:
 
     def status(self) -> Status:
         return self.request("status")
+
+    def samples(self) -> Samples:
+        """Every cycle, out of shared memory; needs numpy."""
+        return Samples(self.socket, timeout=self.timeout)
 
     @property
     def state(self) -> str:

@@ -1,31 +1,52 @@
 # SPDX-License-Identifier: MIT
-"""twin.py - a heave-twin of one's own: the drives outside a heaved, made from the same configuration file."""
+"""twin.py - a heave-twin of one's own: the drives outside a heaved, made from the same configuration file, with faults and positions while it runs.
+
+    with Twin("ride.ini") as twin:
+        twin.fault("jam 3")             # any line of docs/twin.md, without a time
+        twin.positions                  # mm, deg: where the drives really are
+        twin.mend()
+"""
 from __future__ import annotations
 
+import json
 import os
+import socket
 import subprocess
 import tempfile
+import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from heave import programs
-from heave.errors import NotRunning
+from heave.errors import NotRunning, Refused
 
 STOP_S = 10.0
+START_S = 10.0
+LOOK_S = 0.02
 
 
 class Twin:
-    """with Twin("ride.ini"): heave-twin --config ride.ini, until the end."""
+    """with Twin("ride.ini"): heave-twin --config ride.ini, until the end. It listens when the constructor returns."""
 
-    def __init__(self, config: str | os.PathLike[str], arguments: Sequence[str] = (), *, program: str | os.PathLike[str] | None = None):
+    def __init__(self, config: str | os.PathLike[str], arguments: Sequence[str] = (), *, script: Sequence[str] = (), program: str | os.PathLike[str] | None = None,
+                 timeout: float = 5.0):
+        """arguments: of heave-twin, such as "--swap", "2,5". script: lines of faults with their times, as "+2 jam 3". timeout: of one answer, in s."""
         self.program = Path(program) if program is not None else programs.find("heave-twin")
-        descriptor, name = tempfile.mkstemp(prefix="heave-twin-")
-        self._log, self._said = Path(name), ""
-        command = [str(self.program), "--config", os.fspath(config), *arguments]
-        try:
-            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=descriptor, stderr=descriptor)
-        finally:
-            os.close(descriptor)
+        self.timeout, self._said = timeout, ""
+        self._folder = tempfile.TemporaryDirectory(prefix="heave-twin-")
+        self._log, self.socket = Path(self._folder.name) / "log", Path(self._folder.name) / "socket"
+        faults = [word for line in script for word in ("--fault", line)]
+        command = [str(self.program), "--config", os.fspath(config), "--socket", str(self.socket), *faults, *arguments]
+        with open(self._log, "wb") as log:
+            self.process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+        end = time.monotonic() + START_S
+        while not self.socket.exists() and self.process.poll() is None and time.monotonic() < end:
+            time.sleep(LOOK_S)
+        if self.process.poll() is not None or not self.socket.exists():
+            code, said = self.process.poll(), self.log
+            self.close()
+            raise NotRunning(f"heave-twin {'does not answer' if code is None else f'ended with exit code {code}'}: {_last(said)}")
 
     def __enter__(self) -> Twin:
         return self
@@ -40,7 +61,55 @@ class Twin:
     def check(self) -> None:
         """Raises where it has ended by itself."""
         if self.process.poll() is not None:
-            raise NotRunning(f"heave-twin ended with exit code {self.process.returncode}: {' / '.join(self.log.splitlines()[-5:]) or 'it has said nothing'}")
+            raise NotRunning(f"heave-twin ended with exit code {self.process.returncode}: {_last(self.log)}")
+
+    def _ask(self, line: str) -> str:
+        if "\n" in line or "\0" in line:
+            raise Refused(line, f"{line!r}: a fault is one line")
+        answer = b""
+        try:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
+                link.settimeout(self.timeout)
+                link.connect(str(self.socket))
+                link.sendall(f"{line}\n".encode())
+                while not answer.endswith(b"\n"):
+                    more = link.recv(65536)
+                    if not more:
+                        break
+                    answer += more
+        except OSError as error:
+            self.check()
+            raise NotRunning(f"heave-twin cannot be asked at {self.socket}: {error.strerror or error}") from error
+        text = answer.decode("utf-8", errors="replace").rstrip("\n")
+        if text.startswith("error: "):
+            raise Refused(line, text.removeprefix("error: "))
+        if not text:
+            raise NotRunning(f"heave-twin has not answered {line!r}")
+        return text
+
+    def fault(self, line: str) -> None:
+        """Makes it now: a line of docs/twin.md without its time, such as "jam 3" or "lose 2 5". Refused: heave-twin's own words."""
+        self._ask(line)
+
+    def mend(self, drive: int | None = None) -> None:
+        """Ends the lasting faults of a drive, or of all."""
+        self._ask(f"mend {'all' if drive is None else drive}")
+
+    def status(self) -> dict[str, Any]:
+        """All that heave-twin knows: drives, pose, coils of a board."""
+        status: dict[str, Any] = json.loads(self._ask("status"))
+        return status
+
+    @property
+    def positions(self) -> list[float]:
+        """Where the drives really are, mm or deg."""
+        return [float(drive["position"]) for drive in self.status()["drives"]]
+
+    @property
+    def pose(self) -> dict[str, float] | None:
+        """Where the platform really is: roll, pitch, yaw in deg, x, y, z in mm; None where the legs fit no pose."""
+        pose = self.status()["pose"]
+        return None if pose is None else dict(zip(("roll", "pitch", "yaw", "x", "y", "z"), map(float, pose)))
 
     def close(self) -> None:
         if self.process.poll() is None:
@@ -51,4 +120,8 @@ class Twin:
                 self.process.kill()
                 self.process.wait()
         self._said = self.log
-        self._log.unlink(missing_ok=True)
+        self._folder.cleanup()
+
+
+def _last(text: str) -> str:
+    return " / ".join(text.splitlines()[-5:]) or "it has said nothing"

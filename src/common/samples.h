@@ -37,7 +37,7 @@ typedef struct {
     uint64_t start_monotonic_ns; /**< CLOCK_MONOTONIC when heaved began, */
     uint64_t start_realtime_ns;  /**< and CLOCK_REALTIME in the same moment */
     uint64_t written; /**< atomic: records so far; record n is at place n % capacity and has the sequence number n + 1 */
-    uint64_t spare[7];
+    uint64_t spare[8];
 } samples_header_t;
 
 /** Longest record that a reader takes. */

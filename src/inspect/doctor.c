@@ -16,6 +16,7 @@
 #include "common/socket_path.h"
 #include "config/canraw.h"
 #include "config/cia402.h"
+#include "config/modbus.h"
 #include "inspect/doctor_judge.h"
 #include "inspect/doctor_probe.h"
 #include "linux_udp.h"
@@ -126,8 +127,8 @@ static void check_cia402(doctor_report_t *report, const config_t *config, doctor
             return;
         }
         doctor_judge_node(report, &drives, k, &node[k]);
-        if (probe->can.trouble != LINUX_CAN_FINE) {
-            doctor_say(report, DOCTOR_FAIL, "%s -> docs/can.md", probe->can.error_text);
+        if (doctor_probe_trouble(probe) != NULL) {
+            doctor_say(report, DOCTOR_FAIL, "%s -> docs/can.md", doctor_probe_trouble(probe));
             return;
         }
     }
@@ -159,12 +160,18 @@ static void check_can_raw(doctor_report_t *report, const config_t *config, docto
 static void check_bus(doctor_report_t *report, const config_t *config, const doctor_host_t *host)
 {
     static doctor_probe_t probe;
-    if (!check_interface(report, &config->can, host)) {
+    const bool is_local = linux_can_local_is(config->can.interface);
+    if (is_local) {
+        doctor_say(report, DOCTOR_WARN,
+                   "%s is a bus between programs, for heave-twin -> for real drives [can] interface has to be a CAN interface",
+                   config->can.interface);
+    } else if (!check_interface(report, &config->can, host)) {
         doctor_say(report, DOCTOR_WARN, "the drives have not been asked -> the interface first, then --doctor again");
         return;
     }
     if (!doctor_probe_open(&probe, config->can.interface)) {
-        doctor_say(report, DOCTOR_FAIL, "%s -> docs/can.md", probe.can.error_text);
+        doctor_say(report, DOCTOR_FAIL, "%s -> %s", doctor_probe_trouble(&probe) != NULL ? doctor_probe_trouble(&probe) : "?",
+                   is_local ? "docs/twin.md" : "docs/can.md");
         return;
     }
     if (config->drives == CONFIG_DRIVES_CIA402) {
@@ -204,6 +211,9 @@ bool doctor_run(const config_t *config, const char *file, FILE *out)
     check_port(&report, &config->udp);
     if (config->drives == CONFIG_DRIVES_SIM) {
         doctor_say(&report, DOCTOR_OK, "drives are simulated: there is no bus to look at");
+    } else if (config_modbus_is_used(config)) {
+        doctor_say(&report, DOCTOR_WARN,
+                   "drives on Modbus are not asked here -> start heaved; heavectl status shows each of them");
     } else {
         check_bus(&report, config, &host);
     }

@@ -35,23 +35,38 @@ bool doctor_probe_open(doctor_probe_t *self, const char *interface)
     for (unsigned i = 0; i < DOCTOR_NODES; i++) {
         self->nmt[i] = -1;
     }
-    const hv_status_t status = linux_can_open(&self->can, &config);
+    self->is_local = linux_can_local_is(interface);
+    const hv_status_t status =
+        self->is_local ? linux_can_local_open(&self->local, interface) : linux_can_open(&self->can, &config);
+    self->bus = self->is_local ? linux_can_local_hal(&self->local) : linux_can_hal(&self->can);
     if (status == HV_ERR_AGAIN) {
-        linux_can_close(&self->can);
+        doctor_probe_close(self);
     }
     return status == HV_OK;
 }
 
 void doctor_probe_close(doctor_probe_t *self)
 {
-    linux_can_close(&self->can);
+    if (self->is_local) {
+        linux_can_local_close(&self->local);
+    } else {
+        linux_can_close(&self->can);
+    }
+}
+
+const char *doctor_probe_trouble(const doctor_probe_t *self)
+{
+    if (self->is_local) {
+        return self->local.error_text[0] != '\0' ? self->local.error_text : NULL;
+    }
+    return self->can.trouble != LINUX_CAN_FINE ? self->can.error_text : NULL;
 }
 
 /* The next frame of a drive or master; notes what everybody says about himself. */
 static bool hear(doctor_probe_t *self, can_frame_t *frame)
 {
     uint64_t time_us;
-    while (hal_can_recv(linux_can_hal(&self->can), frame, &time_us) == HV_OK) {
+    while (hal_can_recv(self->bus, frame, &time_us) == HV_OK) {
         if (frame->is_error) {
             self->wire.is_unacknowledged |= (frame->id & CAN_ERROR_NO_ACK) != 0;
             continue;
@@ -73,10 +88,10 @@ const doctor_wire_t *doctor_probe_wire(doctor_probe_t *self)
 {
     can_frame_t frame;
     while (hear(self, &frame)) {}
-    (void)!hal_can_bus_state(linux_can_hal(&self->can), &self->wire.state);
-    (void)!hal_can_unconfirmed(linux_can_hal(&self->can), &self->wire.unconfirmed);
-    self->wire.tx_errors = self->can.tx_errors;
-    self->wire.rx_errors = self->can.rx_errors;
+    (void)!hal_can_bus_state(self->bus, &self->wire.state);
+    (void)!hal_can_unconfirmed(self->bus, &self->wire.unconfirmed);
+    self->wire.tx_errors = self->is_local ? 0 : self->can.tx_errors;
+    self->wire.rx_errors = self->is_local ? 0 : self->can.rx_errors;
     return &self->wire;
 }
 
@@ -113,9 +128,9 @@ static unsigned transfer(doctor_probe_t *self, sdo_t *sdo)
     unsigned extra = 0;
     while (sdo->state == SDO_BUSY) {
         extra += take_answers(self, sdo);
-        if (sdo_step(sdo, now_us(), &frame) && hal_can_send(linux_can_hal(&self->can), &frame) == HV_OK) {
+        if (sdo_step(sdo, now_us(), &frame) && hal_can_send(self->bus, &frame) == HV_OK) {
             sdo_sent(sdo, now_us());
-        } else if (self->can.trouble != LINUX_CAN_FINE) {
+        } else if (doctor_probe_trouble(self) != NULL) {
             sdo_cancel(sdo);
         }
         pause_briefly();
@@ -166,7 +181,7 @@ static void send_query(doctor_probe_t *self, const canraw_map_t *map, unsigned a
 {
     can_frame_t frame = {.id = map->axis[axis].command_id, .is_extended = map->is_extended, .length = map->position_query.length};
     memcpy(frame.data, map->position_query.data, sizeof frame.data);
-    (void)!hal_can_send(linux_can_hal(&self->can), &frame);
+    (void)!hal_can_send(self->bus, &frame);
 }
 
 void doctor_probe_raw(doctor_probe_t *self, const canraw_map_t *map, unsigned ms, bool is_heard[DRIVES_MAX])

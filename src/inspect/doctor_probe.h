@@ -7,21 +7,28 @@
 #include "heave/canraw.h"
 #include "inspect/doctor_judge.h"
 #include "linux_can.h"
+#include "linux_can_local.h"
 
 #define DOCTOR_NODES 128u
 
 /** A bus, and what has been heard on it. */
 typedef struct {
-    linux_can_t can;
+    hal_can_t bus;           /**< one of these two */
+    linux_can_t can;         /**< an interface */
+    linux_can_local_t local; /**< a bus between programs */
+    bool is_local;
     int nmt[DOCTOR_NODES]; /**< in heartbeats, -1 = none heard */
     bool is_synced;        /**< somebody sends SYNC */
     doctor_wire_t wire;    /**< by doctor_probe_wire() */
 } doctor_probe_t;
 
 /** Opens the bus.
- *  @return false: self->can.error_text says why */
+ *  @return false: doctor_probe_trouble() says why */
 bool doctor_probe_open(doctor_probe_t *self, const char *interface);
 void doctor_probe_close(doctor_probe_t *self);
+
+/** What is wrong with the bus by now; NULL: nothing. */
+const char *doctor_probe_trouble(const doctor_probe_t *self);
 
 /** What became of what was sent so far. */
 const doctor_wire_t *doctor_probe_wire(doctor_probe_t *self);

@@ -137,6 +137,37 @@ static const char *state_name(const node_t *node)
     return "?";
 }
 
+static const char *register_state_name(const register_drive_t *drive)
+{
+    static const char *const k_names[] = {"no torque", "torque", "homing", "fault"};
+    return drive->is_powered ? k_names[drive->state] : "no power";
+}
+
+static size_t answer_register_drive(char *out, size_t size, twin_t *twin, unsigned k)
+{
+    const register_drive_t *drive = &twin->modbus.drive[k];
+    return (size_t)snprintf(out, size,
+                            "%s{\"drive\": %u, \"unit\": %u, \"leg\": %u, \"state\": \"%s\", \"alarm\": %" PRIu32
+                            ", \"counts\": %" PRId32 ", \"position\": %.4f, \"error\": %.4f, \"set_points\": %" PRIu32 "}",
+                            k == 0 ? "" : ", ", k + 1, drive->axis->unit, twin->leg_of[k] + 1u, register_state_name(drive),
+                            drive->alarm, register_drive_count(drive), twin_position(twin, k),
+                            motor_error(drive->motor) / twin->per_unit[k], drive->set_points);
+}
+
+/* The coils that are on, from 0. */
+static size_t answer_board(char *out, size_t size, const modbus_board_t *board)
+{
+    size_t at = (size_t)snprintf(out, size, "], \"coils\": [");
+    const char *comma = "";
+    for (unsigned i = 0; i < MODBUS_COILS_MAX && at < size; i++) {
+        if (board->coil[i]) {
+            at += (size_t)snprintf(out + at, size - at, "%s%u", comma, i);
+            comma = ", ";
+        }
+    }
+    return at;
+}
+
 /* One JSON object; each drive where it really is. */
 static void answer_status(char *out, twin_t *twin)
 {
@@ -144,6 +175,10 @@ static void answer_status(char *out, twin_t *twin)
     size_t at = (size_t)snprintf(out, ANSWER_MAX, "{\"ok\": true, \"drives\": [");
     for (unsigned k = 0; k < twin->drives && at < ANSWER_MAX; k++) {
         const node_t *node = &twin->node[k];
+        if (twin->modbus.drives > 0) {
+            at += answer_register_drive(out + at, ANSWER_MAX - at, twin, k);
+            continue;
+        }
         at += (size_t)snprintf(out + at, ANSWER_MAX - at,
                                "%s{\"drive\": %u, \"node\": %u, \"leg\": %u, \"state\": \"%s\", \"counts\": %" PRId32
                                ", \"position\": %.4f, \"error\": %.4f, \"temperature_c\": %.1f, \"set_points\": %" PRIu32 "}",
@@ -153,6 +188,9 @@ static void answer_status(char *out, twin_t *twin)
                                node->drive.set_points);
     }
     const bool has_pose = twin_find_pose(twin, &pose);
+    if (twin->modbus.board.is_there && at < ANSWER_MAX) {
+        at += answer_board(out + at, ANSWER_MAX - at, &twin->modbus.board);
+    }
     at += (size_t)snprintf(out + at, ANSWER_MAX - at, "], \"pose\": %s", has_pose ? "[" : "null");
     for (unsigned i = 0; i < POSE_AXES && has_pose; i++) {
         at +=

@@ -5,10 +5,11 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
-#define WORD_MAX     32u
+#include "twin/fault_words.h"
+#include "twin/modbus_faults.h"
+
 #define INDEX_MAX    0xFFFFu
 #define GENERIC      0x2310u     /* continuous over-current */
 #define NOT_NOW      0x08000000u /* SDO: general error */
@@ -74,6 +75,17 @@ ACT(act_mend)
         object_t *row = &node->drive.od.row[i];
         row->is_missing = row->is_silent = false;
         row->refusal = 0;
+        if (row->is_forced) {
+            row->value = row->was_value;
+            row->fallback = row->was_fallback;
+            row->is_read_only = row->was_read_only;
+            row->is_forced = false;
+        }
+    }
+    if (node->own_number != 0) {
+        node->number = node->own_number;
+        node->own_number = 0;
+        node_reboot(node, now_us);
     }
 }
 
@@ -217,15 +229,22 @@ ACT(act_object)
 {
     UNUSED();
     object_t *row = object_of(twin, k, fault);
+    if (!row->is_forced) {
+        row->was_value = row->value;
+        row->was_fallback = row->fallback;
+        row->was_read_only = row->is_read_only;
+        row->is_forced = true;
+    }
     row->value = row->fallback = (uint32_t)fault->number[0];
     row->is_read_only = true;
 }
 
 ACT(act_node)
 {
-    UNUSED();
-    node_of(twin, k)->number = (uint8_t)fault->number[0];
-    node_reboot(node_of(twin, k), now_us);
+    node_t *node = node_of(twin, k);
+    node->own_number = node->own_number != 0 ? node->own_number : node->number;
+    node->number = (uint8_t)fault->number[0];
+    node_reboot(node, now_us);
 }
 
 ACT(act_hot)
@@ -264,6 +283,14 @@ ACT(act_lag)
     node_of(twin, k)->drive.motor.lag_us = fault->number[0] * 1000;
 }
 
+/* Of Modbus only: modbus_faults.c has what it does. */
+ACT(act_none)
+{
+    (void)twin;
+    (void)k;
+    UNUSED();
+}
+
 /* clang-format off */ /* a row is a record */
 static const row_t k_rows[] = {
     {"fault", "dN", "DRIVE [CODE]", "the drive finds a fault, with its EMCY; else 0x2310", {GENERIC}, INDEX_MAX, act_fault, BUS_OFF},
@@ -290,7 +317,7 @@ static const row_t k_rows[] = {
     {"sdo-refuse", "doN", "DRIVE INDEX[:SUB] [ABORT]", "refuses to write that object; else 0x08000000", {NOT_NOW}, UINT32_MAX, act_sdo_refuse, BUS_OFF},
     {"sdo-mute", "do", "DRIVE INDEX[:SUB]", "never answers for that object", {0}, 0, act_sdo_mute, BUS_OFF},
     {"missing", "do", "DRIVE INDEX[:SUB]", "has not got that object", {0}, 0, act_sdo_missing, BUS_OFF},
-    {"object", "don", "DRIVE INDEX[:SUB] VALUE", "that object holds this until the next power-up, and takes nothing else", {0}, UINT32_MAX, act_object, BUS_OFF},
+    {"object", "don", "DRIVE INDEX[:SUB] VALUE", "that object holds this until mend or the next power-up, and takes nothing else", {0}, UINT32_MAX, act_object, BUS_OFF},
     {"node", "dn", "DRIVE NODE", "gets this node id, which another one may have, and starts again", {0}, 127, act_node, BUS_OFF},
     {"hot", "d", "DRIVE", "the motor is too hot", {0}, 0, act_hot, BUS_OFF},
     {"slip", "dn", "DRIVE MM_S", "the brake does not hold: sinks so fast without torque", {0}, 1e4, act_slip, BUS_OFF},
@@ -298,7 +325,11 @@ static const row_t k_rows[] = {
     {"friction", "dn", "DRIVE MM", "breaks loose so far behind its demand", {0}, 1e4, act_friction, BUS_OFF},
     {"encoder", "dn", "DRIVE MM", "its encoder tells so much more from now on", {0}, 1e4, act_encoder, BUS_OFF},
     {"lag", "dn", "DRIVE MS", "follows with this time constant", {0}, 1e5, act_lag, BUS_OFF},
-    {"mend", "d", "DRIVE", "ends the lasting faults above, from broken to slip but object and node; load, friction, lag and encoder take 0 or another value", {0}, 0, act_mend, BUS_OFF},
+    {"damaged", "dn", "DRIVE COUNT", "Modbus: so many of its answers are damaged, the CRC or the function", {0}, 1e6, act_none, BUS_OFF},
+    {"half", "dn", "DRIVE COUNT", "Modbus: of so many of its answers only a half comes", {0}, 1e6, act_none, BUS_OFF},
+    {"exception", "dnN", "DRIVE COUNT [CODE]", "Modbus: it answers so many times with an exception; else 6, busy", {0}, 1e6, act_none, BUS_OFF},
+    {"register", "dnn", "DRIVE ADDRESS VALUE", "Modbus: that register holds this, and takes nothing else", {0}, INDEX_MAX, act_none, BUS_OFF},
+    {"mend", "d", "DRIVE", "ends the lasting faults above; load, friction, lag and encoder take 0 or another value", {0}, 0, act_mend, BUS_OFF},
     {"bus-off", "", "", "heaved's controller goes bus-off", {0}, 0, NULL, BUS_OFF},
     {"passive", "", "", "heaved's controller becomes error-passive", {0}, 0, NULL, BUS_PASSIVE},
     {"active", "", "", "and recovers", {0}, 0, NULL, BUS_ACTIVE},
@@ -308,6 +339,11 @@ static const row_t k_rows[] = {
     {"cable-in", "", "", "and is back", {0}, 0, NULL, BUS_CABLE_IN},
     {"down", "", "", "the interface goes down", {0}, 0, NULL, BUS_DOWN},
     {"up", "", "", "and up", {0}, 0, NULL, BUS_UP},
+    {"unplug", "", "", "Modbus: the adapters and the hosts are gone", {0}, 0, NULL, BUS_UNPLUG},
+    {"plug", "", "", "and back", {0}, 0, NULL, BUS_PLUG},
+    {"relays-silent", "", "", "the board of relays on Modbus does not answer", {0}, 0, NULL, BUS_RELAYS_SILENT},
+    {"relays-forget", "", "", "it opens all its relays by itself, as after a dip of its supply", {0}, 0, NULL, BUS_RELAYS_FORGET},
+    {"relays-back", "", "", "it answers again", {0}, 0, NULL, BUS_RELAYS_BACK},
 };
 /* clang-format on */
 
@@ -326,78 +362,6 @@ bool fault_describe(unsigned i, const char **name, const char **arguments, const
 
 /* --- Reading --- */
 
-/* The next word of a line. False where there is none, or it is too long. */
-static bool next_word(const char **at, char word[WORD_MAX])
-{
-    const char *from = *at + strspn(*at, " \t");
-    const size_t length = strcspn(from, " \t");
-    if (length == 0 || length >= WORD_MAX) {
-        return false;
-    }
-    memcpy(word, from, length);
-    word[length] = '\0';
-    *at = from + length;
-    return true;
-}
-
-static bool read_drives(const char *word, unsigned drives, uint32_t *out, char why[FAULT_WHY_MAX])
-{
-    uint32_t found = 0;
-    if (strcmp(word, "all") == 0) {
-        *out = (1u << drives) - 1;
-        return true;
-    }
-    for (const char *at = word; *at != '\0';) {
-        char *end = NULL;
-        const unsigned long number = *at >= '0' && *at <= '9' ? strtoul(at, &end, 10) : 0;
-        if (number < 1 || number > drives || (*end != '\0' && (*end != ',' || end[1] == '\0'))) {
-            (void)snprintf(why, FAULT_WHY_MAX, "there is no drive %s; the configuration has 1 to %u, several as 2,5, or all",
-                           word, drives);
-            return false;
-        }
-        found |= 1u << (number - 1);
-        at = *end == ',' ? end + 1 : end;
-    }
-    *out = found;
-    return found != 0;
-}
-
-static bool read_object(const char *word, uint32_t *out, char why[FAULT_WHY_MAX])
-{
-    char *end = NULL;
-    const unsigned long index = strtoul(word, &end, 16);
-    unsigned long sub = 0;
-    if (*end == ':' && end[1] != '\0') {
-        sub = strtoul(end + 1, &end, 16);
-    }
-    if (end == word || *end != '\0' || index < 0x1000 || index > INDEX_MAX || sub > 0xFF || word[0] == '-') {
-        (void)snprintf(why, FAULT_WHY_MAX, "%s is no object; one is written as 6065 or 1016:1, hexadecimal", word);
-        return false;
-    }
-    objects_t any;
-    const uint32_t identity[4] = {0};
-    objects_start(&any, 1, identity);
-    if (objects_find(&any, (uint16_t)index, (uint8_t)sub) == NULL) {
-        (void)snprintf(why, FAULT_WHY_MAX, "these drives have no object %04lX:%lX", index, sub);
-        return false;
-    }
-    *out = (uint32_t)(index << 8 | sub);
-    return true;
-}
-
-static bool read_number(const char *word, double most, double *out, char why[FAULT_WHY_MAX])
-{
-    char *end = NULL;
-    const bool is_hex = word[0] == '0' && (word[1] == 'x' || word[1] == 'X');
-    const double number = is_hex ? (double)strtoul(word, &end, 16) : strtod(word, &end);
-    if (end == word || *end != '\0' || !(number >= 0 && number <= most)) {
-        (void)snprintf(why, FAULT_WHY_MAX, "%s is no number from 0 to %.0f", word, most);
-        return false;
-    }
-    *out = number;
-    return true;
-}
-
 static bool refuse_form(const row_t *row, char why[FAULT_WHY_MAX])
 {
     (void)snprintf(why, FAULT_WHY_MAX, "this is written as: %s%s%s", row->name, row->arguments[0] == '\0' ? "" : " ",
@@ -407,18 +371,18 @@ static bool refuse_form(const row_t *row, char why[FAULT_WHY_MAX])
 
 static bool read_arguments(fault_t *self, const row_t *row, const char *at, unsigned drives, char why[FAULT_WHY_MAX])
 {
-    char word[WORD_MAX];
+    char word[FAULT_WORD_MAX];
     unsigned numbers = 0;
     for (const char *form = row->form; *form != '\0'; form++) {
-        if (!next_word(&at, word)) {
+        if (!fault_next_word(&at, word)) {
             if (*form == 'N' && at[strspn(at, " \t")] == '\0') {
                 continue;
             }
             return refuse_form(row, why);
         }
-        const bool is_read = *form == 'd'   ? read_drives(word, drives, &self->drives, why)
-                             : *form == 'o' ? read_object(word, &self->object, why)
-                                            : read_number(word, row->most, &self->number[numbers++], why);
+        const bool is_read = *form == 'd'   ? fault_read_drives(word, drives, &self->drives, why)
+                             : *form == 'o' ? fault_read_object(word, &self->object, why)
+                                            : fault_read_number(word, row->most, &self->number[numbers++], why);
         if (!is_read) {
             return false;
         }
@@ -428,9 +392,9 @@ static bool read_arguments(fault_t *self, const row_t *row, const char *at, unsi
 
 bool fault_read(fault_t *self, const char *line, unsigned drives, char why[FAULT_WHY_MAX])
 {
-    char name[WORD_MAX];
+    char name[FAULT_WORD_MAX];
     const char *at = line;
-    if (!next_word(&at, name)) {
+    if (!fault_next_word(&at, name)) {
         (void)snprintf(why, FAULT_WHY_MAX, "no name of a fault; heave-twin --help lists them");
         return false;
     }
@@ -444,15 +408,75 @@ bool fault_read(fault_t *self, const char *line, unsigned drives, char why[FAULT
     return false;
 }
 
+static bool is_of_board(bus_fault_t fault)
+{
+    return fault == BUS_RELAYS_SILENT || fault == BUS_RELAYS_FORGET || fault == BUS_RELAYS_BACK;
+}
+
+static bool is_of_lines(bus_fault_t fault)
+{
+    return fault == BUS_UNPLUG || fault == BUS_PLUG;
+}
+
+bool fault_suits(const fault_t *self, bool is_modbus, bool has_board, char why[FAULT_WHY_MAX])
+{
+    const row_t *row = &k_rows[self->row];
+    bool is_shared = false;
+    bool is_right = false;
+    if (row->act == NULL) {
+        is_right = is_of_board(row->bus)   ? has_board
+                   : is_of_lines(row->bus) ? is_modbus || has_board
+                                           : !is_modbus || row->bus == BUS_CABLE_OUT || row->bus == BUS_CABLE_IN;
+    } else {
+        is_right = is_modbus ? modbus_fault_find(row->name, &is_shared) != NULL || is_shared : !modbus_fault_is_own(row->name);
+    }
+    if (!is_right) {
+        (void)snprintf(why, FAULT_WHY_MAX, "%s: %s", row->name,
+                       row->act == NULL && is_of_board(row->bus) ? "the configuration has no board of relays on Modbus"
+                       : is_modbus ? "drives on Modbus have no such fault; docs/twin.md says which they have"
+                                   : "only drives on Modbus have this fault");
+    }
+    return is_right;
+}
+
+/* Of lines and boards on Modbus. False: it is one of the CAN bus. */
+static bool do_on_modbus(modbus_side_t *side, bus_fault_t fault)
+{
+    const bool is_cable = side->drives > 0 && (fault == BUS_CABLE_OUT || fault == BUS_CABLE_IN);
+    if (is_cable) {
+        side->is_cable_out = fault == BUS_CABLE_OUT;
+    } else if (is_of_lines(fault)) {
+        side->is_unplugged = fault == BUS_UNPLUG;
+    } else if (fault == BUS_RELAYS_FORGET) {
+        memset(side->board.coil, 0, sizeof side->board.coil);
+    } else if (is_of_board(fault)) {
+        side->board.is_silent = fault == BUS_RELAYS_SILENT;
+    }
+    return is_cable || is_of_lines(fault) || is_of_board(fault);
+}
+
+static void (*act_of(const row_t *row, const twin_t *twin))(twin_t *, unsigned, const fault_t *, uint64_t)
+{
+    bool is_shared = false;
+    const modbus_act_t act = twin->modbus.drives > 0 ? modbus_fault_find(row->name, &is_shared) : NULL;
+    return act != NULL ? act : row->act;
+}
+
 bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT_WHY_MAX])
 {
     const row_t *row = &k_rows[self->row];
+    if (!fault_suits(self, twin->modbus.drives > 0, twin->modbus.board.is_there, why)) {
+        return false;
+    }
+    if (row->act == NULL && do_on_modbus(&twin->modbus, row->bus)) {
+        return true;
+    }
     if (row->act == NULL) {
         return twin->bus.act(twin->bus.ctx, row->bus, (uint32_t)self->number[0], why, FAULT_WHY_MAX);
     }
     for (unsigned k = 0; k < twin->drives; k++) {
         if ((self->drives >> k & 1u) != 0) {
-            row->act(twin, k, self, now_us);
+            act_of(row, twin)(twin, k, self, now_us);
         }
     }
     return true;

@@ -25,6 +25,11 @@ bool fault_read(fault_t *self, const char *line, unsigned drives, char why[FAULT
 /** Makes it so. Returns false where the system does not let it, and why. */
 bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT_WHY_MAX]);
 
+/** Why this configuration has no such fault.
+ *  @param config what the drives are on
+ *  @return true where it has; else why says so */
+bool fault_suits(const fault_t *self, bool is_modbus, bool has_board, char why[FAULT_WHY_MAX]);
+
 /** Row i of the table of names, for a help text; false behind the last one. */
 bool fault_describe(unsigned i, const char **name, const char **arguments, const char **help);
 

@@ -8,13 +8,14 @@
 #include <time.h>
 
 #include "common/message.h" // exit codes
-#include "config/config.h"
+#include "config/modbus.h"
 #include "twin/control.h"
+#include "twin/modbus_ports.h"
 #include "twin/options.h"
 #include "twin/script.h"
 #include "twin/wire.h"
 
-#define FDS_MAX  (WIRE_FDS_MAX + CONTROL_FDS_MAX)
+#define FDS_MAX  (WIRE_FDS_MAX + CONTROL_FDS_MAX + MODBUS_PORTS_FDS_MAX)
 #define NICE     (-15)
 #define AWAKE_US 1000000u /* it looks around so often, whatever happens */
 
@@ -24,7 +25,8 @@ typedef struct {
     config_t config;
     twin_settings_t settings;
     script_t script;
-    wire_t wire;
+    wire_t wire; /**< where the drives are on CAN */
+    modbus_ports_t ports;
     control_t control;
     twin_t twin;
     uint64_t start_us;
@@ -82,6 +84,8 @@ static int prepare(run_t *self)
     const unsigned cylinders = self->config.settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
     const unsigned drives = cylinders + (self->config.settings.has_angle ? 1 : 0);
     twin_settings_init(&self->settings, &self->config);
+    self->script.is_modbus = config_modbus_is_used(&self->config);
+    self->script.has_board = self->config.relays.driver == CONFIG_RELAYS_MODBUS;
     const int code = twin_options_apply(&self->options, drives, cylinders, &self->settings);
     return code != EXIT_DONE ? code : read_script(self, drives);
 }
@@ -90,7 +94,10 @@ static int open_all(run_t *self)
 {
     char why[WIRE_WHY_MAX];
     self->control = (control_t){.fd = -1};
-    if (!wire_open(&self->wire, self->config.can.interface, why)) {
+    if (!modbus_ports_open(&self->ports, &self->config, why)) {
+        return refuse(EXIT_UNAVAILABLE, self->options.config, why);
+    }
+    if (!self->script.is_modbus && !wire_open(&self->wire, self->config.can.interface, why)) {
         return refuse(EXIT_UNAVAILABLE, "[can] interface", why);
     }
     if (!control_open(&self->control, self->options.socket, why)) {
@@ -102,6 +109,16 @@ static int open_all(run_t *self)
 static void say_what_runs(const run_t *self)
 {
     const wire_t *wire = &self->wire;
+    modbus_ports_describe(&self->ports, stdout);
+    if (self->script.is_modbus) {
+        printf("heave-twin: %u drives on Modbus, units", self->twin.drives);
+        for (unsigned k = 0; k < self->twin.drives; k++) {
+            printf(" %u", self->twin.modbus.map.axis[k].unit);
+        }
+        printf("\n");
+        (void)fflush(stdout);
+        return;
+    }
     printf("heave-twin: %u CiA 402 drives on %s%s, nodes", self->twin.drives, self->config.can.interface,
            wire->is_local ? " (a bus between programs; no CAN)" : "");
     for (unsigned k = 0; k < self->twin.drives; k++) {
@@ -123,7 +140,9 @@ static uint64_t next_us(const run_t *self)
 {
     const uint64_t twin_us = twin_due_us(&self->twin);
     const uint64_t script_us = script_due_us(&self->script, self->start_us, self->twin.enabled_us);
-    const uint64_t due_us = twin_us < script_us ? twin_us : script_us;
+    const uint64_t port_us = modbus_ports_due_us(&self->ports);
+    const uint64_t first_us = twin_us < script_us ? twin_us : script_us;
+    const uint64_t due_us = first_us < port_us ? first_us : port_us;
     const uint64_t latest_us = self->now_us + AWAKE_US;
     return due_us < latest_us ? due_us : latest_us;
 }
@@ -136,7 +155,8 @@ static void wait(const run_t *self, const sigset_t *open)
     const uint64_t now_us = clock_us();
     const uint64_t span_us = due_us > now_us ? due_us - now_us : 0;
     const struct timespec span = {.tv_sec = (time_t)(span_us / 1000000u), .tv_nsec = (long)(span_us % 1000000u) * 1000};
-    unsigned count = wire_watch(&self->wire, fds);
+    unsigned count = self->script.is_modbus ? 0 : wire_watch(&self->wire, fds);
+    count += modbus_ports_watch(&self->ports, fds + count);
     count += control_watch(&self->control, fds + count);
     (void)ppoll(fds, count, &span, open);
 }
@@ -146,10 +166,11 @@ static int run(run_t *self, const sigset_t *open)
     while (is_ended == 0) {
         wait(self, open);
         self->now_us = clock_us();
-        if (!wire_hear(&self->wire, hear, self)) {
+        if (!self->script.is_modbus && !wire_hear(&self->wire, hear, self)) {
             return refuse(EXIT_UNAVAILABLE, self->wire.name, "the interface is gone");
         }
         twin_advance(&self->twin, self->now_us);
+        modbus_ports_serve(&self->ports, &self->twin.modbus, self->now_us);
         script_run(&self->script, &self->twin, self->start_us, self->now_us, stderr);
         control_serve(&self->control, &self->twin, self->now_us);
     }
@@ -184,15 +205,23 @@ static int run_twin(run_t *self)
         code = run(self, &open);
     }
     control_close(&self->control);
-    wire_close(&self->wire);
+    modbus_ports_close(&self->ports);
+    if (!self->script.is_modbus) {
+        wire_close(&self->wire);
+    }
     return code;
 }
 
 static int check(run_t *self)
 {
-    printf("%s: %u CiA 402 drives on %s, %u faults: right\n", self->options.config,
-           (unsigned)(self->config.settings.geometry.kind == KIN_HEXAPOD ? 6 : 3) + (self->config.settings.has_angle ? 1u : 0u),
-           self->config.can.interface, self->script.count);
+    const unsigned drives =
+        (self->config.settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u) + (self->config.settings.has_angle ? 1u : 0u);
+    if (self->script.is_modbus) {
+        printf("%s: %u drives on Modbus, %u faults: right\n", self->options.config, drives, self->script.count);
+    } else {
+        printf("%s: %u CiA 402 drives on %s, %u faults: right\n", self->options.config, drives, self->config.can.interface,
+               self->script.count);
+    }
     return EXIT_DONE;
 }
 

@@ -24,7 +24,8 @@ typedef struct {
 
 /** One drive. The first block is the caller's. */
 typedef struct {
-    uint8_t number; /**< node id */
+    uint8_t number;     /**< node id */
+    uint8_t own_number; /**< of before it was made another's; 0 = it has its own */
     uint32_t identity[4];
     uint32_t boot_us;   /**< from power to the boot-up message */
     uint32_t sdo_us;    /**< answers that late */

@@ -38,6 +38,9 @@ typedef struct {
     uint32_t refusal; /**< writes end with this abort code; 0 = none */
     uint32_t value;
     uint32_t fallback; /**< what it holds after a reset */
+    bool is_forced;    /**< made to hold a value; what it was before: */
+    bool was_read_only;
+    uint32_t was_value, was_fallback;
 } object_t;
 
 /** All objects of one drive. */

@@ -76,7 +76,9 @@ static const usage_section_t k_manual[] = {
      "`heave-twin` is the outside of a platform: the drives that its configuration names, on their bus, and the mechanism that "
      "they move. heaved(8), or any other master, sees no difference, as long as nothing is made to fail. It has no part in a "
      "machine with real drives: never start it on their bus.\n\n"
-     "It takes configurations with CANopen drives (`[drives] driver = cia402`). `[can] interface` is a SocketCAN interface, such "
+     "It takes configurations with CANopen drives (`[drives] driver = cia402`) and with drives on Modbus (modbus-tcp, "
+     "modbus-rtu), and a board of relays on Modbus. For Modbus TCP it is a server at each host; for a serial line it makes a "
+     "pseudo terminal, and a link to it at the configured device. `[can] interface` is a SocketCAN interface, such "
      "as vcan0; a name that begins with twin is a bus between programs, for kernels without CAN.\n"},
     {"SCRIPTS",
      "A line is `SECONDS FAULT`: a time since heave-twin started. `+SECONDS FAULT` counts since all drives had torque. What "

@@ -23,6 +23,7 @@ typedef struct {
 /** All of them. */
 typedef struct {
     unsigned count;
+    bool is_modbus, has_board; /**< which faults the configuration has; set by the caller */
     script_entry_t entry[SCRIPT_MAX];
 } script_t;
 

@@ -7,17 +7,19 @@
 #include <string.h>
 
 #include "config/cia402.h"
+#include "config/modbus.h"
 
-#define STOP_MM       3.0 /* end stops are so far beyond the stroke */
-#define BOOT_US       300000u
-#define SDO_US        1000u
-#define SWITCH_ON_US  50000u
-#define BRAKE_US      100000u
-#define JUMP_U        20.0 /* a set-point so far away is a following error at once; mm or deg */
-#define MISSED_MAX    3u
-#define LAG_MS        2.0
-#define VENDOR        0x2E5u
-#define ANGLE_RATED_U 360.0
+#define STOP_MM        3.0 /* end stops are so far beyond the stroke */
+#define BOOT_US        300000u
+#define SDO_US         1000u
+#define SWITCH_ON_US   50000u
+#define BRAKE_US       100000u
+#define JUMP_U         20.0 /* a set-point so far away is a following error at once; mm or deg */
+#define MISSED_MAX     3u
+#define LAG_MS         2.0
+#define VENDOR         0x2E5u
+#define MODBUS_STEP_US 10000u /* drives on Modbus are looked at so often beside their questions */
+#define ANGLE_RATED_U  360.0
 
 void twin_settings_init(twin_settings_t *self, const config_t *config)
 {
@@ -30,30 +32,38 @@ void twin_settings_init(twin_settings_t *self, const config_t *config)
     self->lag_ms = LAG_MS;
 }
 
+static const char *refusal_of_registers(const config_t *config)
+{
+    modbus_drive_map_t map;
+    config_modbus_map(config, &map);
+    return register_drive_refusal(&map);
+}
+
 const char *twin_refusal(const config_t *config)
 {
     switch (config->drives) {
     case CONFIG_DRIVES_CIA402:
         return NULL;
     case CONFIG_DRIVES_SIM:
-        return "[drives] driver = sim: heaved simulates these drives itself; heave-twin needs driver = cia402";
+        return "[drives] driver = sim: heaved simulates these drives itself; heave-twin needs driver = cia402, modbus-tcp or "
+               "modbus-rtu";
     case CONFIG_DRIVES_CAN_RAW:
-        return "[drives] driver = can_raw: heave-twin has no drives with CAN frames of their own yet, only cia402";
+        return "[drives] driver = can-raw: heave-twin has no drives with CAN frames of their own yet, only cia402, modbus-tcp "
+               "and modbus-rtu";
     case CONFIG_DRIVES_MODBUS_TCP:
     case CONFIG_DRIVES_MODBUS_RTU:
-        return "[drives] driver: heave-twin has no Modbus drives yet, only cia402";
+        return refusal_of_registers(config);
     }
     return "[drives] driver is unknown to heave-twin";
 }
 
 /* What a drive moves: raw counts = zero + u * per_unit. */
-static void couple(twin_t *self, const config_t *config, const twin_settings_t *settings, const cia402_axis_config_t *axis,
-                   unsigned k)
+static void couple(twin_t *self, const config_t *config, const twin_settings_t *settings, const counts_scale_t *scale, unsigned k)
 {
-    const double expected = (double)axis->scale.num / axis->scale.den;
+    const double expected = (double)scale->num / scale->den;
     self->leg_of[k] = settings->leg_of[k];
     self->per_unit[k] = expected / settings->lead[k] * (settings->is_reversed[k] ? -1 : 1);
-    self->zero[k] = axis->scale.zero + settings->zero_counts[k];
+    self->zero[k] = scale->zero + settings->zero_counts[k];
     drive_t *drive = &self->node[k].drive;
     motor_t *motor = &drive->motor;
     const double counts = fabs(self->per_unit[k]);
@@ -78,14 +88,33 @@ static void couple(twin_t *self, const config_t *config, const twin_settings_t *
     motor_start(motor, self->zero[k] + start * self->per_unit[k], 0);
 }
 
+static void start_modbus(twin_t *self, const config_t *config, const twin_settings_t *settings, uint64_t now_us)
+{
+    self->drives = self->modbus.drives;
+    for (unsigned k = 0; k < self->drives; k++) {
+        register_drive_t *drive = &self->modbus.drive[k];
+        couple(self, config, settings, &self->modbus.map.axis[k].scale, k);
+        drive->motor = &self->node[k].drive.motor;
+        drive->motor->now_us = now_us;
+        drive->home = self->node[k].drive.home;
+        drive->usual_speed = drive->motor->rated_speed;
+        register_drive_power(drive, true, now_us);
+    }
+}
+
 void twin_start(twin_t *self, const config_t *config, const twin_settings_t *settings, node_out_t out, uint64_t now_us)
 {
     cia402_config_t drives;
     memset(self, 0, sizeof *self);
-    config_cia402(config, &drives);
-    self->drives = drives.axes;
     self->has_pose = kin_init(&self->kin, &config->settings.geometry) == HV_OK;
     self->cylinders = kin_cylinders(&self->kin);
+    modbus_side_init(&self->modbus, config);
+    if (config_modbus_is_used(config)) {
+        start_modbus(self, config, settings, now_us);
+        return;
+    }
+    config_cia402(config, &drives);
+    self->drives = drives.axes;
     for (unsigned k = 0; k < self->drives; k++) {
         const cia402_axis_config_t *axis = &drives.axis[k];
         const uint32_t identity[4] = {
@@ -101,9 +130,21 @@ void twin_start(twin_t *self, const config_t *config, const twin_settings_t *set
         node->drive.brake_us = BRAKE_US;
         node->drive.missed_max = MISSED_MAX;
         node->drive.is_absolute = axis->homing_method == 0;
-        couple(self, config, settings, axis, k);
+        couple(self, config, settings, &axis->scale, k);
         node_power(node, true, now_us);
     }
+}
+
+/* Has torque. Lives up to now. */
+static bool advance_drive(twin_t *self, unsigned k, uint64_t now_us)
+{
+    if (self->modbus.drives > 0) {
+        register_drive_t *drive = &self->modbus.drive[k];
+        register_drive_advance(drive, now_us);
+        return drive->is_powered && drive->state == REGISTER_TORQUE;
+    }
+    node_advance(&self->node[k], now_us);
+    return self->node[k].is_powered && drive_is_enabled(&self->node[k].drive);
 }
 
 void twin_hear(twin_t *self, const can_frame_t *frame, uint64_t now_us)
@@ -117,8 +158,7 @@ void twin_advance(twin_t *self, uint64_t now_us)
 {
     unsigned enabled = 0;
     for (unsigned k = 0; k < self->drives; k++) {
-        node_advance(&self->node[k], now_us);
-        enabled += self->node[k].is_powered && drive_is_enabled(&self->node[k].drive);
+        enabled += advance_drive(self, k, now_us);
     }
     if (self->enabled_us == 0 && enabled == self->drives) {
         self->enabled_us = now_us;
@@ -128,6 +168,9 @@ void twin_advance(twin_t *self, uint64_t now_us)
 uint64_t twin_due_us(const twin_t *self)
 {
     uint64_t due_us = DRIVE_NEVER;
+    if (self->modbus.drives > 0) {
+        return self->node[0].drive.motor.now_us + MODBUS_STEP_US;
+    }
     for (unsigned k = 0; k < self->drives; k++) {
         const uint64_t node_us = node_due_us(&self->node[k]);
         due_us = node_us < due_us ? node_us : due_us;

@@ -8,6 +8,7 @@
 #include "config/config.h"
 #include "heave/drives.h"
 #include "heave/kin.h"
+#include "twin/modbus_side.h"
 #include "twin/node.h"
 
 /** How the machine was put together. */
@@ -21,7 +22,22 @@ typedef struct {
 } twin_settings_t;
 
 /** Faults of the whole bus. */
-typedef enum { BUS_OFF, BUS_PASSIVE, BUS_ACTIVE, BUS_STORM, BUS_CABLE_OUT, BUS_CABLE_IN, BUS_FULL, BUS_DOWN, BUS_UP } bus_fault_t;
+typedef enum {
+    BUS_OFF,
+    BUS_PASSIVE,
+    BUS_ACTIVE,
+    BUS_STORM,
+    BUS_CABLE_OUT,
+    BUS_CABLE_IN,
+    BUS_FULL,
+    BUS_DOWN,
+    BUS_UP,
+    BUS_UNPLUG,
+    BUS_PLUG,
+    BUS_RELAYS_SILENT,
+    BUS_RELAYS_FORGET,
+    BUS_RELAYS_BACK
+} bus_fault_t;
 
 /** Who makes them. act returns false where it cannot, and says why. */
 typedef struct {
@@ -33,7 +49,8 @@ typedef struct {
 typedef struct {
     unsigned drives;
     unsigned cylinders;
-    node_t node[DRIVES_MAX];
+    node_t node[DRIVES_MAX]; /**< the motors are here, whatever the bus */
+    modbus_side_t modbus;    /**< drives, and a board of relays, on Modbus */
     uint8_t leg_of[DRIVES_MAX];
     double zero[DRIVES_MAX];     /**< raw counts of a drive at 0 u */
     double per_unit[DRIVES_MAX]; /**< raw counts per u as it really is */

@@ -297,6 +297,12 @@ bool wire_fault(void *self, bus_fault_t fault, uint32_t number, char *why, size_
     case BUS_DOWN:
     case BUS_UP:
         return wire->is_local ? local_fault(wire, fault, why) : can_fault(wire, fault, why, size);
+    case BUS_UNPLUG: /* of Modbus: nobody asks this bus for it */
+    case BUS_PLUG:
+    case BUS_RELAYS_SILENT:
+    case BUS_RELAYS_FORGET:
+    case BUS_RELAYS_BACK:
+        break;
     }
     return false;
 }

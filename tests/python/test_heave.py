@@ -9,6 +9,7 @@ import math
 import os
 import re
 import socket
+import subprocess
 import sys
 import tempfile
 import threading
@@ -385,6 +386,44 @@ def limits_used_are_shares():
     assert abs(peak - 100 / 16 / 2 / math.pi) < 0.3, peak
 
 
+def frequency_responses_are_read():
+    from heave.plot import bode
+    from heave.plot.window import TraceError
+    lag = [(f, 1 / math.hypot(1, f / 8), -math.degrees(math.atan(f / 8))) for f in (0.5, 1, 2, 4, 6, 10, 20, 40)]
+    text = "axis,frequency_hz,gain,phase_deg\n" + "".join(f"{axis},{f},{gain},{phase}\n" for axis in ("roll", "z") for f, gain, phase in reversed(lag))
+    response = bode.read_response(text.splitlines(), "r.csv")
+    assert list(response) == ["roll", "z"] and [point[0] for point in response["z"]] == [point[0] for point in lag]
+    assert abs(bode.bandwidth_hz(response["z"]) - 8) < 0.3 and bode.bandwidth_hz(response["z"][:3]) is None
+    assert bode.unwrapped([-170, 175, 160]) == [-170, -185, -200]
+    for wrong, words in (("frequency_hz,gain\n1,1\n", "no column phase_deg"), ("frequency_hz,gain,phase_deg\n", "no row behind"), ("frequency_hz,gain,phase_deg\n1,x,0\n", "line 2 is no row"),
+                         ("frequency_hz,gain,phase_deg\n1,1,0\n2,0,0\n", "line 3: frequency and gain"), ("", "no column frequency_hz")):
+        with refused(TraceError, "r.csv", words):
+            bode.read_response(wrong.splitlines(), "r.csv")
+    run = command_run("plot", str(write("r.csv", text)), "--what", "bode", "-o", str(Path(FOLDER.name) / "r.svg"))
+    if "needs matplotlib" in run.stderr:
+        return
+    picture = (Path(FOLDER.name) / "r.svg").read_text(encoding="utf-8")
+    assert run.returncode == 0 and picture.count("<path") > 20, run.stderr
+
+
+def feedback_of_an_incident_is_read():
+    from heave.plot.feedback import Feedback
+    from heave.plot.window import TraceError
+    head = "t_ms,c1_state,c1_actual_mm,c1_code,c1_error,c2_state,c2_actual_mm,c2_code,c2_error,fault"
+    text = f"{head}\n1,enabled,10.5,0,0,enabled,11,0,0,\n2,enabled,10.6,0,0,offline,11,0,0,drive-offline\n3,fault,10.6,7,0,offline,11,0,0,drive-offline\n"
+    feedback = Feedback(text.splitlines())
+    assert feedback.actual == {"c1": [10.5, 10.6, 10.6], "c2": [11, None, None]} and feedback.times_us == [1000, 2000, 3000], feedback.actual
+    assert feedback.fault == (2000, "drive-offline")
+    assert Feedback(text.splitlines(), 2000, 2000).times_us == [2000]
+    for wrong, words in (("a,b", "line 1 is not the header"), (f"{head}\n1,enabled,x,0,0,enabled,11,0,0,", "line 2 is no row"), (f"{head}\n1,enabled", "line 2 is no row"), ("", "line 1")):
+        with refused(TraceError, "feedback.csv", words):
+            Feedback(wrong.splitlines())
+
+
+def command_run(*words):
+    return subprocess.run([sys.executable, "-m", "heave", *words], capture_output=True, text=True, check=False, timeout=WAIT_S)
+
+
 def python_with_numpy():
     """This script again, with NumPy where that is to be had."""
     if importlib.util.find_spec("numpy") is None and "HEAVE_TEST_AGAIN" not in os.environ:
@@ -403,7 +442,7 @@ def main():
     for case in (frames_are_as_the_protocol_has_them, wrong_values_are_named, csv_becomes_frames, wrong_recordings_are_named_with_their_line, a_stream_does_not_drift, a_stream_makes_up_for_nothing,
                  a_stream_of_values_ends_with_them, a_recording_keeps_its_times, requests_say_who_asks, refusals_are_in_heaveds_words, waiting_ends_where_it_is_in_vain, nobody_there_is_said,
                  a_heaved_of_ones_own, a_recording_is_sent_to_it, a_heaved_that_cannot_start_says_why, configurations_are_changed, offline_runs_are_arrays, offline_runs_that_fail_say_why,
-                 the_judge_finds_what_is_wrong, what_a_configuration_leaves_out_is_filled_in, lag_and_gain_are_found, the_animation_is_one_page, limits_used_are_shares):
+                 the_judge_finds_what_is_wrong, what_a_configuration_leaves_out_is_filled_in, lag_and_gain_are_found, the_animation_is_one_page, limits_used_are_shares, frequency_responses_are_read, feedback_of_an_incident_is_read):
         with suite.case(case.__name__.replace("_", " ")):
             case()
     return suite.done()

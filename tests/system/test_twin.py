@@ -108,12 +108,29 @@ def bad_input(bench):
     refused(69, "nobody answers", "--socket", bench.folder / "none", "status")
     refused(78, "", "--config", bench.file("empty.ini", ""))
     refused(78, "heaved simulates these drives itself", "--config", harness.TOP / "config/demo-hexapod.ini")
-    refused(78, "no Modbus drives yet", "--config", harness.TOP / "config/modbus-tcp-hexapod.ini")
     refused(78, "frames of their own yet", "--config", harness.TOP / "config/can-raw-hexapod.ini")
     assert bench.run_twin(*config, "--fault", "1 jam 2", "--check").returncode == 0
     bench.start_twin()
     refused(69, "another heave-twin is this bus already", *config)
     refused(1, "there is no drive 9", "--socket", bench.twin_socket, "jam", "9")
+
+
+def doctor_asks_them(bench):
+    """It knows the bus between programs, and says that it is none for a machine."""
+    def run():
+        return bench.heaved("--config", bench.config, "--doctor")
+
+    alone = run()
+    assert alone.returncode == 1 and "start heave-twin with the same configuration" in alone.stdout, alone.stdout
+    bench.start_twin("--fault", "0 sdo-refuse 3 6065", "--fault", "0 power-off 5")
+    time.sleep(1)
+    seen = run().stdout
+    assert "is a bus between programs, for heave-twin" in seen, seen
+    assert re.search(r"^ok\s+node 2 \(drive 2\)", seen, re.MULTILINE) and re.search(r"^FAIL\s+node 5 \(drive 5\) does not answer", seen, re.MULTILINE), seen
+    bench.do("power-on 5")
+    time.sleep(1)
+    run = bench.heaved("--config", bench.config, "--doctor")
+    assert run.returncode == 0, run.stdout
 
 
 def says_what_is_missing(bench):
@@ -174,6 +191,7 @@ CASES = [
     ("heave-twin: a script runs by its times", script_runs, {}),
     ("heave-twin: heaved without it says what to do, and goes on when it is there", without_a_twin_it_says_what_to_do, {}),
     ("heave-twin: bad input is named", bad_input, {}),
+    ("heave-twin: heaved --doctor asks the drives on a bus between programs", doctor_asks_them, {}),
     ("heave-twin: without SocketCAN, or without the interface, it says what to do", says_what_is_missing, {}),
     ("heave-twin: hostile clients stop nothing", hostile_clients_stop_nothing, {}),
     ("heave-twin: costs little, seven drives at 2 ms less than a quarter of a core", costs_little, {"period_us": 2000}),

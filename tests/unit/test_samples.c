@@ -336,9 +336,19 @@ static void test_record_costs_less_than_200_ns(void)
 #endif
 }
 
+/* docs/samples.md has these numbers, and readers in other languages begin there. */
+static void test_layout_is_the_contracts(void)
+{
+    TEST_ASSERT_EQUAL(128, sizeof(samples_header_t));
+    TEST_ASSERT_EQUAL(56, offsetof(samples_header_t, written));
+    TEST_ASSERT_EQUAL(64, sizeof(samples_column_t));
+    TEST_ASSERT_EQUAL(56, offsetof(samples_column_t, scale));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_layout_is_the_contracts);
     RUN_TEST(test_record_has_what_the_cycle_came_to);
     RUN_TEST(test_nobody_else_writes_or_changes_the_size);
     RUN_TEST(test_no_seconds_is_no_ring);

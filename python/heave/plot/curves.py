@@ -26,8 +26,8 @@ PANEL_WIDTH, PANEL_HEIGHT, FLAG_HEIGHT, LEGEND_HEIGHT = 7.5, 2.1, 0.2, 0.45  # i
 class Scene:
     """One trace and what belongs to it."""
 
-    def __init__(self, window, platform=None, dots=(), requests=()):
-        self.window, self.platform, self.dots, self.requests = window, platform, dots, requests
+    def __init__(self, window, platform=None, dots=(), requests=(), feedback=None):
+        self.window, self.platform, self.dots, self.requests, self.feedback = window, platform, dots, requests, feedback
 
 
 def draw(scenes, axes, path):
@@ -74,6 +74,8 @@ def _panel(panel, scene, names, axes, order, unit):
         values = window.rates(name, order)
         drawn_times, drawn = thinned(times, values, MOST_POINTS)
         panel.plot(drawn_times, [math.nan if value is None else value for value in drawn], color=colour_of(name, axes), linewidth=1.0, zorder=3)
+    if order == 0 and scene.feedback:
+        _feedback(panel, scene.feedback, names, axes)
     panel.margins(y=0.08)
     if extent and extent[0] < extent[1]:
         room = 0.08 * (extent[1] - extent[0])
@@ -86,6 +88,17 @@ def _panel(panel, scene, names, axes, order, unit):
         panel.yaxis.set_major_formatter(EngFormatter(sep=""))
     panel.grid(color="#000000", alpha=0.12, linewidth=0.6, zorder=1)
     panel.tick_params(labelsize=8)
+
+
+def _feedback(panel, feedback, names, axes):
+    """Where the drives were, dashed, and the first fault. Set-points have the scale: feedback beside them is cut off, as where a drive lies about itself."""
+    for name in names:
+        times, values = thinned([t_us / 1e6 for t_us in feedback.times_us], feedback.actual.get(name, []), MOST_POINTS) if feedback.actual.get(name) else ([], [])
+        panel.plot(times, [math.nan if value is None else value for value in values], color=colour_of(name, axes), linewidth=0.9, linestyle=(0, (4, 2)), zorder=4)
+    if feedback.fault:
+        t_us, text = feedback.fault
+        panel.axvline(t_us / 1e6, color=LIMIT_COLOUR, linewidth=1, zorder=2)
+        panel.annotate(text, (t_us / 1e6, 1), xycoords=("data", "axes fraction"), xytext=(3, -9), textcoords="offset points", fontsize=7.5, color=LIMIT_COLOUR)
 
 
 def colour_of(name, axes):

@@ -1,0 +1,192 @@
+/* SPDX-License-Identifier: MIT
+ * modbus_faults.c - what faults mean on Modbus drives; see modbus_faults.h.
+ */
+#include "twin/modbus_faults.h"
+
+#include <string.h>
+
+#define BUSY 6u /* the exception "device busy" */
+
+/** A name. act is NULL where it is the motor's fault, which is the same on every bus. */
+typedef struct {
+    const char *name;
+    bool is_own; /**< drives on CAN have none such */
+    modbus_act_t act;
+} row_t;
+
+#define ACT(name) static void name(twin_t *twin, unsigned k, const fault_t *fault, uint64_t now_us)
+#define UNUSED()                                                                                                                 \
+    do {                                                                                                                         \
+        (void)fault;                                                                                                             \
+        (void)now_us;                                                                                                            \
+    } while (false)
+
+static register_drive_t *drive_of(twin_t *twin, unsigned k)
+{
+    return &twin->modbus.drive[k];
+}
+
+ACT(act_fault)
+{
+    UNUSED();
+    register_drive_fault(drive_of(twin, k), (uint16_t)fault->number[0]);
+}
+
+ACT(act_broken)
+{
+    act_fault(twin, k, fault, now_us);
+    drive_of(twin, k)->is_broken = true;
+}
+
+ACT(act_power_on)
+{
+    UNUSED();
+    register_drive_power(drive_of(twin, k), true, now_us);
+}
+
+ACT(act_power_off)
+{
+    UNUSED();
+    register_drive_power(drive_of(twin, k), false, now_us);
+}
+
+ACT(act_mute)
+{
+    UNUSED();
+    drive_of(twin, k)->is_mute = true;
+}
+
+ACT(act_cut)
+{
+    UNUSED();
+    drive_of(twin, k)->is_cut = true;
+}
+
+ACT(act_ignore)
+{
+    UNUSED();
+    drive_of(twin, k)->is_deaf = true;
+}
+
+ACT(act_drop)
+{
+    UNUSED();
+    register_drive_drop(drive_of(twin, k));
+}
+
+ACT(act_lose)
+{
+    UNUSED();
+    drive_of(twin, k)->lost = (uint32_t)fault->number[0];
+}
+
+ACT(act_late)
+{
+    UNUSED();
+    drive_of(twin, k)->late_us = (uint32_t)(fault->number[0] * 1000);
+}
+
+ACT(act_damaged)
+{
+    UNUSED();
+    drive_of(twin, k)->damaged = (uint32_t)fault->number[0];
+}
+
+ACT(act_half)
+{
+    UNUSED();
+    drive_of(twin, k)->halved = (uint32_t)fault->number[0];
+}
+
+ACT(act_exception)
+{
+    UNUSED();
+    drive_of(twin, k)->refused = (uint32_t)fault->number[0];
+    drive_of(twin, k)->exception = fault->number[1] > 0 ? (uint8_t)fault->number[1] : BUSY;
+}
+
+ACT(act_register)
+{
+    UNUSED();
+    register_cell_t *reg = register_drive_find(drive_of(twin, k), (uint16_t)fault->number[0]);
+    if (reg != NULL) {
+        reg->value = (uint16_t)fault->number[1];
+        reg->is_held = true;
+    }
+}
+
+ACT(act_homing_fails)
+{
+    UNUSED();
+    drive_of(twin, k)->is_homing_broken = true;
+}
+
+ACT(act_encoder)
+{
+    UNUSED();
+    drive_of(twin, k)->origin -= fault->number[0] * twin->per_unit[k];
+}
+
+ACT(act_mend)
+{
+    UNUSED();
+    register_drive_t *drive = drive_of(twin, k);
+    drive->is_broken = drive->is_mute = drive->is_cut = drive->is_deaf = drive->is_homing_broken = false;
+    drive->late_us = drive->lost = drive->damaged = drive->halved = drive->refused = 0;
+    drive->motor->is_jammed = false;
+    drive->motor->slip = 0;
+    for (unsigned i = 0; i < drive->count; i++) {
+        drive->reg[i].is_held = false;
+    }
+}
+
+static const row_t k_rows[] = {
+    {"fault", false, act_fault},
+    {"broken", false, act_broken},
+    {"reboot", false, act_power_on},
+    {"power-off", false, act_power_off},
+    {"power-on", false, act_power_on},
+    {"mute", false, act_mute},
+    {"cut", false, act_cut},
+    {"ignore", false, act_ignore},
+    {"jam", false, NULL},
+    {"drop", false, act_drop},
+    {"lose", false, act_lose},
+    {"late", false, act_late},
+    {"damaged", true, act_damaged},
+    {"half", true, act_half},
+    {"exception", true, act_exception},
+    {"register", true, act_register},
+    {"slip", false, NULL},
+    {"homing-fails", false, act_homing_fails},
+    {"load", false, NULL},
+    {"friction", false, NULL},
+    {"lag", false, NULL},
+    {"encoder", false, act_encoder},
+    {"mend", false, act_mend},
+};
+
+#define ROWS (sizeof k_rows / sizeof k_rows[0])
+
+static const row_t *row_of(const char *name)
+{
+    for (unsigned i = 0; i < ROWS; i++) {
+        if (strcmp(k_rows[i].name, name) == 0) {
+            return &k_rows[i];
+        }
+    }
+    return NULL;
+}
+
+modbus_act_t modbus_fault_find(const char *name, bool *is_shared)
+{
+    const row_t *row = row_of(name);
+    *is_shared = row != NULL && row->act == NULL;
+    return row != NULL ? row->act : NULL;
+}
+
+bool modbus_fault_is_own(const char *name)
+{
+    const row_t *row = row_of(name);
+    return row != NULL && row->is_own;
+}
