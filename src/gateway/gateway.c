@@ -4,6 +4,7 @@
 #include "heave/gateway.h"
 
 #include "auto_engage.h"
+#include "fault_watch.h"
 #include "heave/motion_sane.h"
 #include "heave/sane.h"
 #include "heave/text.h"
@@ -13,6 +14,7 @@
 #include "reports.h"
 #include "sender.h"
 #include "service.h"
+#include "shutdown.h"
 
 #define SINGULAR_LOG_US 1000000 /* lines about the same thing are no closer */
 
@@ -289,7 +291,7 @@ static void write_relays(gateway_t *self, uint64_t now_us)
                                             : self->settings.relay_safe_mask;
     const relay_output_in_t in = {.wanted_mask = wanted,
                                   .is_safe = wanted == self->settings.relay_safe_mask && !is_sender_heard,
-                                  .is_well = operate_is_well(self),
+                                  .is_well = fault_watch_is_well(self),
                                   .was_unknown = self->snapshot.is_relays_unknown};
     const relay_output_out_t out = relay_output_step(&self->relay_output, &self->settings, &self->io, &in, now_us);
     self->is_late = false;
@@ -389,7 +391,7 @@ void gateway_cycle(gateway_t *self, uint64_t now_us)
     step_motion(self, now_us);
     send_setpoints(self, now_us);
     operate_after_motion(self);
-    operate_watch_end(self, now_us);
+    shutdown_watch(self, now_us);
     write_relays(self, now_us);
     publish(self, now_us);
 }
@@ -406,5 +408,5 @@ bool gateway_is_finished(const gateway_t *self)
 
 uint32_t gateway_energized(const gateway_t *self)
 {
-    return operate_energized(self, false);
+    return shutdown_energized(self, false);
 }

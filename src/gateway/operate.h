@@ -24,18 +24,13 @@ hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us);
 /** After the motion of the cycle: drives that are to be disabled once at rest. */
 void operate_after_motion(gateway_t *self);
 
-/** A shutdown that has come to its end waits for drives that have not confirmed yet that their torque is off, but not for ever.
- */
-void operate_watch_end(gateway_t *self, uint64_t now_us);
+/** True while the drives are being enabled or home by themselves: no set-point leads them. */
+bool operate_is_coming_up(const gateway_t *self);
 
-/** As gateway_energized().
- *  @param is_answering only drives that answer */
-uint32_t operate_energized(const gateway_t *self, bool is_answering);
+/** True if a drive or the bus has a fault that a reset would come too early for. */
+bool operate_is_drive_fault_present(const gateway_t *self);
 
-/** True where the bus has taken no set of set-points for so long that none can be expected to get through. */
-bool operate_is_bus_stalled(const gateway_t *self);
-
-/** True where states, deadlines, bus and drives are as they should be in this cycle: what the healthy pulse says. */
-bool operate_is_well(const gateway_t *self);
+/** Carries out the reaction of the worst fault so far. */
+void operate_react(gateway_t *self);
 
 #endif
