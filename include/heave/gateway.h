@@ -137,7 +137,7 @@ typedef struct {
     uint32_t spikes_logged; /**< spikes that are already in the log */
     uint64_t jump_logged_us;
     uint32_t jumps_logged; /**< likewise */
-} sender_t;
+} gateway_sender_t;
 
 /** Relays and the healthy pulse as they were written; members are private to src/gateway. */
 typedef struct {
@@ -157,7 +157,7 @@ typedef struct {
     motion_output_t output;
     supervisor_t supervisor;
     intake_t intake;
-    sender_t sender;
+    gateway_sender_t sender;
     relay_output_t relay_output;
     reports_t reports;
     snapshot_t snapshot;

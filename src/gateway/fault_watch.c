@@ -6,7 +6,6 @@
 #include "heave/text.h"
 #include "operate.h"
 #include "service.h"
-#include "shutdown.h"
 
 #define FOLLOWING_TIME_US 20000u
 #define OUTSIDE_STROKE_MM 5       /* what a stop gives way, and what a homing switch is off */
@@ -272,31 +271,4 @@ void fault_watch_power(gateway_t *self, bool is_failing, uint64_t now_us)
         fault_watch_raise(self, &(fault_t){.code = FAULT_POWER, .at_us = now_us});
     }
     self->is_power_overdue = is_overdue;
-}
-
-/* A person has asked for a reset and nothing moves: drives whose safe-torque-off is a fault to them can only come back where the
- * pulse comes first. */
-static bool is_being_reset(const gateway_t *self)
-{
-    return self->reset_until_us != 0 && !self->snapshot.is_estop_active && shutdown_energized(self, false) == 0;
-}
-
-/* In OFF, and while they are reset, drives may be in fault: they have no torque. */
-static bool are_drives_well(const gateway_t *self)
-{
-    const bool is_fault_borne = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor);
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        const drive_state_t state = self->snapshot.drive[i].state;
-        if (state == DRIVE_OFFLINE || (state == DRIVE_FAULT && !is_fault_borne)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-bool fault_watch_is_well(const gateway_t *self)
-{
-    const bool is_state_well = !supervisor_is_latched(&self->supervisor) || is_being_reset(self);
-    const bool is_bus_well = !self->is_bus_lost && !drives_is_failing(self->io.drives) && !fault_watch_is_bus_stalled(self);
-    return is_state_well && is_bus_well && are_drives_well(self) && !self->is_late && !self->is_end_overdue;
 }

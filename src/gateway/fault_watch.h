@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * fault_watch.h - finds faults of bus, drives, e-stop channels and supply, raises each one once, and says whether all is well.
+ * fault_watch.h - finds faults of bus, drives, e-stop channels and supply, and raises each one once.
  * Private to src/gateway.
  */
 #ifndef GATEWAY_FAULT_WATCH_H
@@ -37,8 +37,5 @@ void fault_watch_power(gateway_t *self, bool is_failing, uint64_t now_us);
 
 /** True if the bus has taken no set-points for so long that none can be expected to get through. */
 bool fault_watch_is_bus_stalled(const gateway_t *self);
-
-/** True if states, deadlines, bus and drives are as they should be in this cycle. The healthy pulse depends on it. */
-bool fault_watch_is_well(const gateway_t *self);
 
 #endif

@@ -4,7 +4,6 @@
 #include "heave/gateway.h"
 
 #include "auto_engage.h"
-#include "fault_watch.h"
 #include "heave/motion_sane.h"
 #include "heave/sane.h"
 #include "heave/text.h"
@@ -13,6 +12,7 @@
 #include "relay_output.h"
 #include "reports.h"
 #include "sender.h"
+#include "sequencer.h"
 #include "service.h"
 #include "shutdown.h"
 
@@ -242,7 +242,7 @@ void gateway_reload(gateway_t *self, const settings_t *settings)
 
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)
 {
-    return operate_request(self, request, now_us);
+    return sequencer_request(self, request, now_us);
 }
 
 hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent)
@@ -291,7 +291,7 @@ static void write_relays(gateway_t *self, uint64_t now_us)
                                             : self->settings.relay_safe_mask;
     const relay_output_in_t in = {.wanted_mask = wanted,
                                   .is_safe = wanted == self->settings.relay_safe_mask && !is_sender_heard,
-                                  .is_well = fault_watch_is_well(self),
+                                  .is_well = sequencer_is_well(self),
                                   .was_unknown = self->snapshot.is_relays_unknown};
     const relay_output_out_t out = relay_output_step(&self->relay_output, &self->settings, &self->io, &in, now_us);
     self->is_late = false;
@@ -385,9 +385,9 @@ static void publish(gateway_t *self, uint64_t now_us)
 
 void gateway_cycle(gateway_t *self, uint64_t now_us)
 {
-    operate_before_frames(self, now_us);
+    sequencer_before_frames(self, now_us);
     receive_frames(self, now_us);
-    operate_after_frames(self, now_us);
+    sequencer_after_frames(self, now_us);
     step_motion(self, now_us);
     send_setpoints(self, now_us);
     operate_after_motion(self);

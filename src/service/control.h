@@ -29,7 +29,7 @@
 #define CONTROL_IDLE_US      2000000u /* has asked nothing for so long: the first to give way */
 #define CONTROL_GRACE_US     100000u  /* after it came: time to ask something before it has to give way */
 
-/** One client; private to control.c. */
+/** One client; private to control*.c. */
 typedef struct {
     int fd;         /**< -1: free */
     bool is_looker; /**< came by the second socket */
@@ -56,7 +56,7 @@ typedef struct {
     uint64_t asked_us; /**< its last request, else when it came */
 } control_client_t;
 
-/** A listening socket; private to control.c. */
+/** A listening socket; private to control*.c. */
 typedef struct {
     int fd;       /**< -1: closed, or not there */
     int newcomer; /**< has come, and nobody can give way yet; -1: nobody */
@@ -65,7 +65,7 @@ typedef struct {
     struct stat made; /**< identity of the socket file, so that only ours is removed */
 } control_socket_t;
 
-/** The sockets and their clients; private to control.c. */
+/** The sockets and their clients; private to control*.c. */
 typedef struct control {
     control_socket_t socket[CONTROL_SOCKETS]; /**< the second one is [control] look_socket */
     levels_t levels;
