@@ -25,7 +25,7 @@
 
 /** Most targets that motion gets one by one in one cycle, in order, when the network has bunched a sender's frames. Of more, only
  * the newest counts, so that the cost of a cycle is bounded. */
-#define GATEWAY_TARGETS_PER_CYCLE 4u
+#define GATEWAY_TARGETS_PER_CYCLE 20u
 
 /** Longest datagram taken. */
 #define GATEWAY_DATAGRAM_MAX 512u

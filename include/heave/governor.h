@@ -49,10 +49,11 @@ typedef struct {
     int32_t need_q16[GOVERNOR_SPANS]
                     [GOVERNOR_LEVELS + 1]; /**< largest share of a limit, by quarters of a second, the newest first */
     uint32_t span_us;                      /**< length of the newest quarter so far */
-    q32_t rise_q32[GOVERNOR_POLES];
-    q32_t fall_q32;     /**< present rate of fall of the strength */
-    q32_t glide_q32;    /**< change of the strength per period */
-    q32_t strength_q32; /**< [0, GOVERNOR_LEVELS]: 0 is the curve as asked */
+    q32_t target_q32;                      /**< strength that it goes to ... */
+    q32_t pole_q32[GOVERNOR_POLES];        /**< ... through low-passes */
+    q32_t fall_q32;                        /**< present rate of fall of the target */
+    q32_t glide_q32;                       /**< change of the strength per period */
+    q32_t strength_q32;                    /**< [0, GOVERNOR_LEVELS]: 0 is the curve as asked */
 } governor_t;
 
 /** Sets the limits of a channel; jerk 0: none. Call before governor_place(). */

@@ -77,6 +77,7 @@ typedef struct {
     int32_t lost_q16;      /**< lost samples for each that came */
     unsigned each;         /**< the sender sends one sample in so many periods, for a while */
     bool is_sparse;        /**< so sparse that the curve waits for each sample until the next one is here */
+    unsigned stalled;      /**< samples at the usual pace that were later than can be waited for */
     unsigned between;      /**< samples in a row that lay half-way between two of the line */
 } stream_clock_t;
 
@@ -132,11 +133,13 @@ typedef struct {
     uint32_t mean_points;           /**< so many */
     int32_t reach_min_q16;          /**< periods that a motion is kept up where samples are missing */
     int32_t reach_max_q16;
-    bool is_off;         /**< on some axis */
-    int64_t grip_q32;    /**< how firmly off is taken back, per period */
-    int64_t softest_q32; /**< the least grip */
-    int32_t age;         /**< samples since the stream began at rest, as far as that counts */
-    int32_t patience;    /**< guesses before the stream is taken for ended */
+    int32_t change; /**< how much the points at head are others than the curve went through, in guesses; 0: they are the same */
+    q32_t was_q32[3][AXES_MAX]; /**< what the curve went through at head and before it, if so */
+    bool is_off;                /**< on some axis */
+    int64_t grip_q32;           /**< how firmly off is taken back, per period */
+    int64_t softest_q32;        /**< the least grip */
+    int32_t age;                /**< samples since the stream began at rest, as far as that counts */
+    int32_t patience;           /**< guesses before the stream is taken for ended */
     governor_limits_t limits[AXES_MAX];
     governor_t governor;
     int32_t scale_q16;          /**< that the references will be multiplied by, for the governor */

@@ -156,6 +156,11 @@ static void check_frames(config_source_t *self)
     check_has_field(self, "position_reply", &raw->position_reply, CANRAW_POSITION, "position");
     check_when(self, "enabled_when", raw->enabled_when, &raw->position_reply, "position_reply");
     check_when(self, "fault_when", raw->fault_when, &raw->position_reply, "position_reply");
+    if (raw->fault_when.mask == 0 && canraw_find(&raw->position_reply, CANRAW_FAULT) != NULL) { /* nothing would read it */
+        config_source_key_error(self, SECTION, "position_reply",
+                                "{fault} is shown only where fault_when holds, which is missing; allowed: with fault_when = "
+                                "value/mask of {status} such as 0x08/0x08, or without {fault}");
+    }
     check_homing(self);
 }
 

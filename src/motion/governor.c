@@ -93,6 +93,16 @@ void governor_pace(governor_t *self, uint32_t period_us, uint32_t cycle_us)
     }
 }
 
+/* The strength comes from there. */
+static void place_strength(governor_t *self, q32_t strength_q32)
+{
+    self->target_q32 = strength_q32;
+    self->fall_q32 = 0;
+    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
+        self->pole_q32[pole] = strength_q32;
+    }
+}
+
 void governor_start(governor_t *self)
 {
     for (unsigned span = 0; span < GOVERNOR_SPANS; span++) {
@@ -103,10 +113,7 @@ void governor_start(governor_t *self)
     self->span_us = 0;
     self->strength_q32 = 0;
     self->glide_q32 = 0;
-    self->fall_q32 = 0;
-    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
-        self->rise_q32[pole] = 0;
-    }
+    place_strength(self, 0);
 }
 
 void governor_place(governor_t *self, unsigned channel, bool is_steady, const q32_t value_q32[3])
@@ -217,6 +224,30 @@ static int32_t lasting_need(const governor_t *self, unsigned level)
     return need_q16;
 }
 
+/* How far the output is on its way from a level to the next one: 3 u^2 - 2 u^3 of the strength between them. Ways between levels
+ * are of different lengths, and a strength that passes a level evenly would change the speed of the output at once. */
+static q32_t way_share(q32_t u_q32)
+{
+    const q32_t square_q32 = fx_mul_shift(u_q32, u_q32, 32);
+    return 3 * square_q32 - 2 * fx_mul_shift(square_q32, u_q32, 32);
+}
+
+/* The least u that is so far on its way. */
+static q32_t strength_for(q32_t share_q32)
+{
+    q32_t low_q32 = 0;
+    q32_t high_q32 = Q32_ONE;
+    while (high_q32 - low_q32 > Q32_ONE / 65536) {
+        const q32_t middle_q32 = (low_q32 + high_q32) / 2;
+        if (way_share(middle_q32) < share_q32) {
+            low_q32 = middle_q32;
+        } else {
+            high_q32 = middle_q32;
+        }
+    }
+    return high_q32;
+}
+
 /* The least strength with which the limits are kept. */
 static q32_t needed_strength(const governor_t *self)
 {
@@ -227,7 +258,7 @@ static q32_t needed_strength(const governor_t *self)
     for (unsigned level = 1; level <= GOVERNOR_LEVELS; level++) {
         const int32_t need_q16 = lasting_need(self, level);
         if (need_q16 <= NEED_GOAL) {
-            return (level - 1) * Q32_ONE + Q32_ONE * (int64_t)(before_q16 - NEED_GOAL) / (before_q16 - need_q16);
+            return (level - 1) * Q32_ONE + strength_for(Q32_ONE * (int64_t)(before_q16 - NEED_GOAL) / (before_q16 - need_q16));
         }
         before_q16 = need_q16;
     }
@@ -243,7 +274,7 @@ static q32_t value_at(const governor_t *self, unsigned channel, q32_t strength_q
         return here_q32;
     }
     const q32_t way_q32 = self->level_q32[level + 1][channel] - here_q32;
-    return here_q32 + fx_mul_shift_fit(way_q32, strength_q32 % Q32_ONE, 32);
+    return here_q32 + fx_mul_shift_fit(way_q32, way_share(strength_q32 % Q32_ONE), 32);
 }
 
 q32_t governor_lag(const governor_t *self, unsigned channel)
@@ -261,16 +292,12 @@ void governor_shift(governor_t *self, unsigned channel, q32_t asked_q32)
     }
 }
 
-/* Goes there in the periods until needs are looked at again: a staircase would be one in the output.
- * @param is_all a rise begins anew from there */
-static void set_strength(governor_t *self, q32_t strength_q32, bool is_all)
+/* Goes there in the periods until needs are looked at again: a staircase would be one in the output. */
+static void set_strength(governor_t *self, q32_t strength_q32)
 {
     const q32_t way_q32 = strength_q32 - self->strength_q32;
     self->glide_q32 = way_q32 / (int64_t)self->each;
     self->strength_q32 += way_q32 % (int64_t)self->each;
-    for (unsigned pole = 0; is_all && pole < GOVERNOR_POLES; pole++) {
-        self->rise_q32[pole] = strength_q32;
-    }
 }
 
 static int32_t need_at(const governor_t *self, q32_t strength_q32)
@@ -280,21 +307,6 @@ static int32_t need_at(const governor_t *self, q32_t strength_q32)
         need_q16 = larger(need_q16, need_of(self, i, &self->out[i], value_at(self, i, strength_q32)));
     }
     return need_q16;
-}
-
-/* The levels are apart where the motion is quick, so that a rise is a motion of its own: it goes through three low-passes. Where
- * not even so much is bearable, as after a jump, it comes at once, if that is better by half. */
-static void raise_strength(governor_t *self, q32_t wanted_q32)
-{
-    q32_t input_q32 = wanted_q32;
-    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
-        const q32_t next_q32 = self->rise_q32[pole] + (input_q32 - self->rise_q32[pole]) * 3 / 8;
-        self->rise_q32[pole] = next_q32 > self->rise_q32[pole] ? next_q32 : self->rise_q32[pole];
-        input_q32 = self->rise_q32[pole];
-    }
-    const int32_t soft_q16 = need_at(self, input_q32);
-    const bool is_sudden = soft_q16 > 2 * NEED_GOAL && 2 * need_at(self, wanted_q32) < soft_q16;
-    set_strength(self, is_sudden ? wanted_q32 : input_q32, is_sudden);
 }
 
 /* How far it may fall until needs are looked at again. A fall takes the output from one level to the one before: what a motion is
@@ -311,18 +323,38 @@ static q32_t largest_fall(const governor_t *self, uint32_t since_us)
     return by_time_q32 > by_speed_q32 ? by_time_q32 : by_speed_q32;
 }
 
-/* Falls softly, too: the rate of the fall is a speed of the output. */
-static q32_t fallen_strength(governor_t *self, q32_t wanted_q32)
+/* Falls slowly: what the output gains is a speed of its own. */
+static q32_t fall_of(const governor_t *self, q32_t wanted_q32)
 {
-    const q32_t over_q32 = self->strength_q32 - wanted_q32;
-    const uint32_t since_us = self->period_us * self->each;
-    const q32_t period_s_q32 = (int64_t)since_us * Q32_ONE / 1000000;
-    const q32_t by_share_q32 = over_q32 * (int64_t)since_us / (RELEASE_US + since_us);
-    const q32_t fall_q32 = by_share_q32 + period_s_q32 / RELEASE_DIV;
-    const q32_t most_q32 = largest_fall(self, since_us);
-    const q32_t next_q32 = fall_q32 < most_q32 ? fall_q32 : most_q32;
-    self->fall_q32 += (next_q32 - self->fall_q32) * (int64_t)since_us / (SOFT_US + since_us);
-    return over_q32 > self->fall_q32 ? self->strength_q32 - self->fall_q32 : wanted_q32;
+    const q32_t over_q32 = self->target_q32 - wanted_q32;
+    const int64_t since_us = self->period_us * self->each;
+    const q32_t by_share_q32 = over_q32 * since_us / (RELEASE_US + since_us) + since_us * Q32_ONE / (RELEASE_DIV * 1000000);
+    const q32_t most_q32 = largest_fall(self, (uint32_t)since_us);
+    const q32_t fall_q32 = by_share_q32 < most_q32 ? by_share_q32 : most_q32;
+    return fall_q32 < over_q32 ? fall_q32 : over_q32;
+}
+
+/* The levels are apart where the motion is quick, so that every change of the strength is a motion of its own: it goes through
+ * low-passes. Where not even so much is bearable, as after a jump, a rise comes at once, if that is better by half. */
+static void follow_need(governor_t *self, q32_t wanted_q32)
+{
+    const q32_t fall_q32 = wanted_q32 < self->target_q32 ? fall_of(self, wanted_q32) : 0;
+    self->fall_q32 +=
+        (fall_q32 - self->fall_q32) * (int64_t)(self->period_us * self->each) / (SOFT_US + self->period_us * self->each);
+    const q32_t fallen_q32 = self->target_q32 - self->fall_q32;
+    self->target_q32 = wanted_q32 > fallen_q32 ? wanted_q32 : fallen_q32;
+    q32_t next_q32 = self->target_q32;
+    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
+        const q32_t way_q32 = next_q32 - self->pole_q32[pole];
+        self->pole_q32[pole] = fx_abs(way_q32) < NEAR_Q32 ? next_q32 : self->pole_q32[pole] + way_q32 * 3 / 8;
+        next_q32 = self->pole_q32[pole];
+    }
+    const int32_t soft_q16 = wanted_q32 > next_q32 ? need_at(self, next_q32) : 0;
+    if (soft_q16 > 2 * NEED_GOAL && 2 * need_at(self, wanted_q32) < soft_q16) {
+        place_strength(self, wanted_q32);
+        next_q32 = wanted_q32;
+    }
+    set_strength(self, next_q32);
 }
 
 void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, q32_t *out_q32)
@@ -335,12 +367,7 @@ void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, 
         pass_time(self);
         note_needs(self, scale_q16);
         const q32_t wanted_q32 = needed_strength(self);
-        if (wanted_q32 > self->strength_q32) {
-            self->fall_q32 = 0;
-            raise_strength(self, wanted_q32);
-        } else {
-            set_strength(self, fallen_strength(self, wanted_q32), true);
-        }
+        follow_need(self, wanted_q32);
     }
     self->strength_q32 += self->glide_q32;
     for (unsigned i = 0; i < self->channels; i++) {
@@ -355,7 +382,7 @@ uint32_t governor_delay_us(const governor_t *self)
 {
     uint64_t delay_us = 0;
     for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
-        const q32_t part_q32 = fx_clamp(self->strength_q32 - level * Q32_ONE, 0, Q32_ONE);
+        const q32_t part_q32 = way_share(fx_clamp(self->strength_q32 - level * Q32_ONE, 0, Q32_ONE));
         delay_us += (uint64_t)part_q32 * k_time_constant_us[level] / (uint64_t)Q32_ONE;
     }
     return (uint32_t)delay_us;

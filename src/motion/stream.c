@@ -377,7 +377,7 @@ static void take_sample(stream_t *self, uint64_t now_us, const kin_t *kin, const
     for (unsigned axis = 0; axis < self->curve.axes; axis++) { /* a rounded value tells no time as fine as that */
         point_q32[axis] = self->curve.window > 1 ? sample_q32[axis] : stream_evidence_on_line(&self->evidence, axis);
     }
-    stream_curve_append(&self->curve, periods, sample_q32, point_q32);
+    stream_curve_append(&self->curve, periods, self->clock.stalled > 0, sample_q32, point_q32);
     if (error_at(self, now_us) > BEHIND_MAX_Q32) {
         stream_curve_skip(&self->curve);
     }
@@ -407,7 +407,7 @@ static void advance(stream_t *self, uint64_t now_us, const kin_t *kin)
     const q32_t slowest_q32 = self->error_q32 < -FAR_BEFORE_Q32 ? PACE_SLOW_Q32 : PACE_MAX_Q32;
     const q32_t pace = fx_clamp(wanted, -slowest_q32, PACE_MAX_Q32);
     const q32_t faster = nominal > self->rate_q32[1] ? nominal : self->rate_q32[1];
-    const q32_t filter = fx_clamp(faster * 2, 0, PACE_FILTER_MAX);
+    const q32_t filter = fx_clamp(faster, 0, PACE_FILTER_MAX);
     const q32_t wished = nominal + fx_mul_shift_fit(nominal, pace, 32);
     self->rate_q32[0] += fx_mul_shift_fit(wished - self->rate_q32[0], filter, 32);
     self->rate_q32[1] += fx_mul_shift_fit(self->rate_q32[0] - self->rate_q32[1], filter, 32);

@@ -17,6 +17,7 @@ enum {
     STATED = 4,        /* a stated period counts as much as so many samples */
     BURSTS = 2,        /* short intervals, of the newest 24, that tell a sender that sends in bursts */
     HALVES = 4,        /* samples half-way between two of the line that tell twice its rate */
+    STALLED = 2,       /* samples at the usual pace that tell that a sender stood still */
     NEW_RATE = 3,      /* and so does one that eight intervals told */
     LOST_MEMORY = 256, /* samples that losses are counted in ... */
     LOST_FIRST = 64    /* ... but at first */
@@ -126,12 +127,25 @@ unsigned stream_clock_periods_in(const stream_clock_t *self, uint32_t interval_u
     return (unsigned)fx_clamp((interval_us_q16 + self->period_us_q16 / 2) / self->period_us_q16, 1, INT32_MAX);
 }
 
+static uint16_t add_periods(uint32_t a, unsigned b)
+{
+    return (uint16_t)(b < UINT16_MAX - a ? a + b : UINT16_MAX);
+}
+
 static void record_gap(stream_clock_t *self, uint32_t gap_us, unsigned periods)
 {
     self->gap_us[self->gap_next] = gap_us;
-    self->gap_periods[self->gap_next] = (uint16_t)(periods < UINT16_MAX ? periods : UINT16_MAX);
+    self->gap_periods[self->gap_next] = add_periods(0, periods);
     self->gap_next = self->gap_next + 1 < STREAM_GAPS ? self->gap_next + 1 : 0;
     self->gaps += self->gaps < STREAM_GAPS ? 1u : 0u;
+}
+
+/* What comes in a burst after a stall belongs to its interval. */
+static void lengthen_gap(stream_clock_t *self, uint32_t gap_us, unsigned periods)
+{
+    const unsigned at = (self->gap_next + STREAM_GAPS - 1) % STREAM_GAPS;
+    self->gap_us[at] += gap_us;
+    self->gap_periods[at] = add_periods(self->gap_periods[at], periods);
 }
 
 /* The newest intervals together. */
@@ -384,34 +398,69 @@ static bool is_other_than_stated(const stream_clock_t *self)
     return two.least_q16 * 4 > self->period_us_q16 * 5 || two.most_q16 * 4 < self->period_us_q16 * 3;
 }
 
+/* What is later than can be waited for is of a stall, and so is what follows it in a burst: it says nothing of the line. Where a
+ * sample comes at the usual pace and is as late, the sender itself has stood still, and the line goes on from there. */
+static bool is_of_stall(stream_clock_t *self, bool is_paced)
+{
+    const bool is_late = self->settled >= MEMORY && self->late_us_q16 > margin_max_q16(self);
+    const bool is_stall = is_late || (self->stalled > 0 && !is_paced);
+    self->stalled = !is_stall ? 0 : self->stalled + (is_paced ? 1u : 0u);
+    if (self->stalled < STALLED) {
+        return is_stall;
+    }
+    self->stalled = 0;
+    self->late_us_q16 = 0;
+    return true;
+}
+
+/* The first samples of a sender that states its period.
+ * @return true where that is all there is to take */
+static bool is_taken_as_stated(stream_clock_t *self, int64_t gap_us_q16)
+{
+    if (self->hint_us == 0) {
+        return false;
+    }
+    if (self->settled < STATED) { /* the period is known, and no sample is early: the first or this is late */
+        self->settled = STATED;
+        self->late_us_q16 = fx_clamp(gap_us_q16 - self->period_us_q16, 0, self->period_us_q16);
+        adapt_margin(self);
+        return true;
+    }
+    if (self->gaps == SECOND && is_other_than_stated(self)) {
+        self->settled = SECOND;
+        self->late_us_q16 = 0;
+        set_period(self, newest_gaps(self, SECOND).sum_us_q16 / SECOND);
+        return true;
+    }
+    return false;
+}
+
 bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods)
 {
     const uint32_t gap_us = stream_clock_elapsed_us(self, now_us);
     const int64_t gap_us_q16 = (int64_t)gap_us * STREAM_US_Q16;
-    record_gap(self, gap_us, periods);
-    count_losses(self, periods);
+    const bool is_paced = gap_us_q16 * 2 > self->period_us_q16;
     self->last_us = now_us;
+    if (self->stalled > 0 && !is_paced) {
+        lengthen_gap(self, gap_us, periods);
+    } else {
+        record_gap(self, gap_us, periods);
+        count_losses(self, periods);
+    }
     self->settled += self->settled < MEMORY ? 1u : 0u;
     if (self->period_us_q16 == 0) {
         set_period(self, gap_us_q16);
         return false;
     }
-    if (self->settled < STATED &&
-        self->hint_us > 0) { /* the period is known, and no sample is early: the first or this is late */
-        self->settled = STATED;
-        self->late_us_q16 = fx_clamp(gap_us_q16 - self->period_us_q16, 0, self->period_us_q16);
-        adapt_margin(self);
-        return false;
-    }
-    if (self->gaps == SECOND && self->hint_us > 0 && is_other_than_stated(self)) {
-        self->settled = SECOND;
-        self->late_us_q16 = 0;
-        set_period(self, newest_gaps(self, SECOND).sum_us_q16 / SECOND);
+    if (is_taken_as_stated(self, gap_us_q16)) {
         return false;
     }
     const int64_t was_us_q16 = self->late_us_q16;
-    const int64_t off = self->late_us_q16 + gap_us_q16 - (int64_t)periods * self->period_us_q16;
-    correct(self, off, periods);
+    self->late_us_q16 += gap_us_q16 - (int64_t)periods * self->period_us_q16;
+    if (is_of_stall(self, is_paced)) {
+        return false;
+    }
+    correct(self, self->late_us_q16, periods);
     const bool is_known = self->settled == KNOWN && self->gaps == KNOWN;
     const int64_t rate = is_known ? rate_at_start(self) : self->settled >= KNOWN ? new_rate(self) : 0;
     if (rate > 0) {

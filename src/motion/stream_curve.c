@@ -16,21 +16,22 @@ enum {
     MEAN_MAX = 5,      /* points of which one is the mean, where samples belong to their arrivals */
     LED_POINTS = 7,    /* that a control point is led by, beside its own */
     SHIFT_GUESSES = 4, /* a shifted time line is come over to as softly as after so many guesses */
+    STALL_GUESSES = 8, /* what a stall left behind is come over to more softly still */
     BEHIND_MAX = 4,    /* points before head that corrections and guesses look back at */
     COARSE_ACC = 4,    /* of the accelerations that coarse steps can make, half is to be left to the motion ... */
     COARSE_JERK = 6,   /* ... and of the jerk most */
     COARSE_LED = 2     /* control points that are led swing so many times further */
 };
 
-#define REACH_MIN_US 50000  /* a motion is kept up for that long; longer only as far as the axis takes to stop ... */
-#define REACH_MAX_US 100000 /* ... and not longer than this */
-#define LOSSY_PERIODS                                                                                                            \
-    4u /* ... but where samples are often lost: so many periods, so that the next one to come finds it moving                    \
-        */
+#define REACH_MIN_US   50000          /* a motion is kept up for that long, ... */
+#define REACH_FEW_US   62000          /* ... or for that long where ... */
+#define FEW_PERIODS    3              /* ... as much is needed to find it moving still after such a pause; ... */
+#define LOSSY_PERIODS  4              /* ... where samples are often lost, after that many; ... */
+#define REACH_MAX_US   100000         /* ... and longer only as far as the axis takes to stop: so long at most */
 #define MEAN_US        29000u         /* of arrivals, about so long */
 #define LED_CHANGE_Q32 (Q32_ONE / 64) /* of what is led, in a period */
-#define OFF_US         80000          /* time constant with which the curve comes back to the samples */
-#define PATIENCE_US    150000
+#define OFF_US         80000
+#define PATIENCE_US    300000
 #define LED_Q32        (Q32_ONE * 7 / 10) /* periods that control points are led ahead of their points, if balanced ... */
 #define WAY_SHIFT      4                  /* from Q32 to Q36 */
 #define OFF_NOTHING    (Q32_ONE / 2000)   /* 0.5 um: what is less is given up */
@@ -104,6 +105,7 @@ void stream_curve_start(stream_curve_t *self, const kin_t *kin, const q32_t *sam
         self->grain[axis] = (stream_grain_t){0};
     }
     self->watched = 0;
+    self->change = 0;
     self->is_off = false;
     self->window = 1;
     self->mean_points = 0;
@@ -146,7 +148,10 @@ static void find_reach(const stream_curve_t *self, unsigned axis, q32_t step_q32
     cycles_q16 -= cycles_q16 / 16; /* what follows the curve is a little behind it */
     const int64_t stop_q16 = fx_mul_div(cycles_q16, Q16_ONE, self->period_cycles_q16);
     on->reach_q16 = (int32_t)fx_clamp(stop_q16 - self->lead_q32 / (Q32_ONE / Q16_ONE), self->reach_min_q16, self->reach_max_q16);
-    on->full_q16 = (int32_t)fx_clamp(on->reach_q16 - stop_q16, 0, on->reach_q16);
+    if (on->reach_q16 > stop_q16) { /* there is room for a softer one */
+        on->full_q16 = (int32_t)((on->reach_q16 - stop_q16) / 2);
+        return;
+    }
     const int64_t rise_periods_q16 = fx_mul_div(rise_q16, Q16_ONE, self->period_cycles_q16);
     on->rise_q32 = (uint32_t)fx_clamp(fx_mul_div(rise_periods_q16, Q32_ONE, 2 * stop_q16 + 1), 0, Q32_ONE / 2);
 }
@@ -240,7 +245,8 @@ static void soften_to_limits(stream_curve_t *self)
  * Returns the share of a velocity that may be added: the same velocity swings further out in a softer way. */
 static q32_t soften(stream_curve_t *self, int32_t guessed)
 {
-    const int64_t wished_q32 = fx_clamp(Q32_ONE / (guessed + 2), self->softest_q32, Q32_ONE / 2);
+    const int64_t softest_q32 = guessed >= STALL_GUESSES ? self->softest_q32 / 5 * 4 : self->softest_q32;
+    const int64_t wished_q32 = fx_clamp(Q32_ONE / (guessed + 2), softest_q32, Q32_ONE / 2);
     self->grip_q32 = self->is_off && self->grip_q32 < wished_q32 ? self->grip_q32 : wished_q32;
     self->is_off = true;
     return fx_mul_div(self->grip_q32, Q32_ONE, wished_q32);
@@ -258,21 +264,40 @@ static q32_t within_speed(const stream_curve_t *self, unsigned axis, q32_t step_
     return limits->jerk_per_cycle3_q32 > 0 ? fx_clamp(step_q32, -least_q32, least_q32) : step_q32;
 }
 
-/* The points at head are others now: what the curve is off them, and how that changes, so that it goes on as it was. The change
- * is taken over two periods, as the first of them may be the error of a single guess. */
-static void keep_going(stream_curve_t *self, q32_t was_q32[3][AXES_MAX], int32_t guessed)
+/* The points at head are about to become others. However many changes follow, as in a burst, they are made up for once. */
+static void note_change(stream_curve_t *self, int32_t guessed)
+{
+    if (self->change == 0) {
+        points_at_head(self, self->was_q32);
+    }
+    self->change = guessed > self->change ? guessed : self->change;
+}
+
+/* Half of the error of a single guess, which is of one point and of no velocity, is taken back at once, as far as is bearable. */
+static void take_back_half(stream_curve_t *self)
+{
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        const q32_t error_q32 = self->was_q32[0][axis] - led_point(self, axis, self->head);
+        const q32_t most_q32 = bearable_jump(self, axis);
+        self->off_q32[axis][0] += error_q32 - fx_clamp(error_q32 / 2, -most_q32, most_q32);
+    }
+    (void)soften(self, 0);
+}
+
+/* What the curve is off its new points, and how that changes, so that it goes on as it was. The change is taken over two periods,
+ * as the first of them may be the error of a single guess. */
+static void keep_going(stream_curve_t *self)
 {
     q32_t is_q32[3][AXES_MAX];
-    const q32_t share_q32 = soften(self, guessed);
+    const q32_t share_q32 = soften(self, self->change);
     points_at_head(self, is_q32);
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        const q32_t here_q32 = was_q32[0][axis] - is_q32[0][axis];
+        const q32_t here_q32 = self->was_q32[0][axis] - is_q32[0][axis];
         const q32_t most_q32 = 4 * fx_abs(self->lead[axis].first_q32) + fx_abs(here_q32) / 16;
-        const q32_t change_q32 = fx_clamp((here_q32 - (was_q32[2][axis] - is_q32[2][axis])) / 2, -most_q32, most_q32);
+        const q32_t change_q32 = fx_clamp((here_q32 - (self->was_q32[2][axis] - is_q32[2][axis])) / 2, -most_q32, most_q32);
         self->off_q32[axis][0] += here_q32;
         self->off_q32[axis][1] = within_speed(self, axis, self->off_q32[axis][1] + fx_mul_shift(change_q32, share_q32, 32));
     }
-    soften_to_limits(self);
 }
 
 /* How many points a control point is to be the mean of, thrice. Values in steps of q are off by up to q / 2. Of that a mean of m
@@ -318,16 +343,14 @@ static int32_t pairs(int32_t n)
  * no to and fro with the period. */
 static void set_window(stream_curve_t *self, int32_t window)
 {
-    q32_t was_q32[3][AXES_MAX];
     if (window == self->window || (window > 1 && window + 1 == self->window)) {
         return;
     }
-    points_at_head(self, was_q32);
+    note_change(self, SHIFT_GUESSES);
     self->window = window;
     for (int32_t k = 0; k < 3 * window - 2; k++) { /* ways to write k as a sum of three numbers below the window */
         self->weight[k] = (uint8_t)(pairs(k + 2) - 3 * pairs(k + 2 - window) + 3 * pairs(k + 2 - 2 * window));
     }
-    keep_going(self, was_q32, SHIFT_GUESSES);
 }
 
 void stream_curve_average(stream_curve_t *self, q32_t arrived_q32, bool is_lossy)
@@ -349,12 +372,13 @@ static void find_mean(stream_curve_t *self, uint32_t period_us)
 
 void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us, bool is_lossy)
 {
-    const uint32_t bridged_us = is_lossy ? LOSSY_PERIODS * period_us : 0;
-    const uint32_t reach_us = bridged_us < REACH_MIN_US ? REACH_MIN_US : bridged_us < REACH_MAX_US ? bridged_us : REACH_MAX_US;
+    const int64_t led_us = style == STREAM_BALANCED ? fx_mul_shift(period_us, LED_Q32, 32) : 0;
+    const int64_t few_us = fx_clamp(FEW_PERIODS * period_us + led_us, REACH_MIN_US, REACH_FEW_US);
+    const int64_t reach_us = is_lossy ? fx_clamp(LOSSY_PERIODS * period_us, few_us, REACH_MAX_US) : few_us;
     self->lead_q32 = style == STREAM_BALANCED ? LED_Q32 : 0;
     self->period_cycles_q16 = (int64_t)period_us * Q16_ONE / cycle_us;
-    self->reach_min_q16 = (int32_t)((int64_t)reach_us * Q16_ONE / period_us);
-    self->reach_max_q16 = (int32_t)((int64_t)(REACH_MAX_US > reach_us ? REACH_MAX_US : reach_us) * Q16_ONE / period_us);
+    self->reach_min_q16 = (int32_t)(reach_us * Q16_ONE / period_us);
+    self->reach_max_q16 = (int32_t)((int64_t)REACH_MAX_US * Q16_ONE / period_us);
     self->softest_q32 = fx_clamp((int64_t)period_us * Q32_ONE / OFF_US, Q32_ONE / 32, Q32_ONE / 2);
     self->patience = (int32_t)(PATIENCE_US / period_us) + 3;
     find_mean(self, period_us);
@@ -437,6 +461,38 @@ static void guess_again(stream_curve_t *self)
     }
 }
 
+/* The newest sample gets the index that is so far ahead of head, and so do those before it. */
+HV_WRAPS static void relabel(stream_curve_t *self, int32_t ahead)
+{
+    const uint32_t was = newest(self);
+    self->ahead = ahead;
+    for (uint32_t back = 0; back < STREAM_POINTS - AHEAD_MAX; back++) {
+        copy_point(self, self->point_q32[slot(newest(self) - back)], self->point_q32[slot(was - back)]);
+    }
+}
+
+/* Makes up for what has changed since the last control point. A sample that is far behind head still is no late one of a burst:
+ * its sender is so much later now. */
+static void make_up(stream_curve_t *self)
+{
+    if (self->change == 0) {
+        return;
+    }
+    if (self->ahead < -BEHIND_MAX) {
+        relabel(self, -BEHIND_MAX);
+    }
+    if (self->ahead < 0) {
+        guess_again(self);
+    }
+    if (self->change == 1) {
+        take_back_half(self);
+    } else {
+        keep_going(self);
+    }
+    self->change = 0;
+    soften_to_limits(self);
+}
+
 /* The point after last: of one that is missing on the parabola through before, last, and next; of more on the straight line, as
  * a parabola could swing out. */
 static q32_t point_between(q32_t before_q32, q32_t last_q32, q32_t next_q32, int32_t periods)
@@ -459,20 +515,23 @@ HV_WRAPS static void fill_gap(stream_curve_t *self, int32_t periods, const q32_t
     }
 }
 
-HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32, const q32_t *point_q32)
+HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, bool is_of_stall, const q32_t *sample_q32,
+                                  const q32_t *point_q32)
 {
-    q32_t was_q32[3][AXES_MAX];
     q32_t before_q32[AXES_MAX];
-    const int32_t guessed = -self->ahead;
-    if (guessed > 0) {
-        points_at_head(self, was_q32);
+    if (self->ahead < 0) {
+        note_change(self, -self->ahead);
+    }
+    const int32_t furthest = is_of_stall ? -AHEAD_MAX : -BEHIND_MAX - (int32_t)periods;
+    if (self->ahead < furthest) {
+        relabel(self, furthest);
     }
     copy_point(self, before_q32, self->last_q32);
     stream_grain_watch(self, periods, sample_q32);
     copy_point(self, self->last_q32, point_q32);
     copy_point(self, self->newest_q32, sample_q32);
     const int32_t ahead = self->ahead + (int32_t)periods;
-    const int32_t kept = (int32_t)fx_clamp(ahead, -BEHIND_MAX, AHEAD_MAX);
+    const int32_t kept = ahead < AHEAD_MAX ? ahead : AHEAD_MAX;
     for (int32_t i = self->ahead > 0 ? self->ahead + 1 : 1; i < kept; i++) {
         self->is_sample[slot(self->head + (uint32_t)i)] = false;
     }
@@ -481,20 +540,6 @@ HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, const 
     copy_point(self, self->point_q32[slot(newest(self))], self->last_q32);
     self->is_sample[slot(newest(self))] = true;
     fill_gap(self, (int32_t)periods, before_q32);
-    if (self->ahead < 0) {
-        guess_again(self);
-    }
-    if (guessed == 1) { /* an error of one point, and of no velocity: half of it is taken back at once, as far as bearable */
-        for (unsigned axis = 0; axis < self->axes; axis++) {
-            const q32_t error_q32 = was_q32[0][axis] - led_point(self, axis, self->head);
-            const q32_t most_q32 = bearable_jump(self, axis);
-            self->off_q32[axis][0] += error_q32 - fx_clamp(error_q32 / 2, -most_q32, most_q32);
-        }
-        (void)soften(self, 0);
-        soften_to_limits(self);
-    } else if (guessed > 1) {
-        keep_going(self, was_q32, guessed);
-    }
 }
 
 HV_WRAPS q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *sample_q32, unsigned periods, q32_t *step_q32)
@@ -532,16 +577,18 @@ HV_WRAPS static void interpolate(stream_curve_t *self, q32_t *point_q32)
  */
 HV_WRAPS static void give_up(stream_curve_t *self)
 {
-    q32_t was_q32[3][AXES_MAX];
-    points_at_head(self, was_q32);
+    points_at_head(self, self->was_q32);
+    self->change = STALL_GUESSES - 1;
     copy_point(self, self->last_q32, self->newest_q32);
-    for (int32_t back = 0; back < self->patience; back++) { /* 40 at most: the ring is longer */
+    for (int32_t back = 0; back < self->patience && back < STREAM_POINTS; back++) {
         copy_point(self, self->point_q32[slot(self->head - (uint32_t)back)], self->last_q32);
     }
     for (unsigned axis = 0; axis < self->axes; axis++) {
         self->lead[axis] = (stream_lead_t){.rise_q32 = 0};
     }
-    keep_going(self, was_q32, self->patience);
+    keep_going(self);
+    soften_to_limits(self);
+    self->change = 0;
 }
 
 /* Settles the point after head. */
@@ -563,15 +610,13 @@ HV_WRAPS static void find_next(stream_curve_t *self)
 
 void stream_curve_skip(stream_curve_t *self)
 {
-    q32_t was_q32[3][AXES_MAX];
     if (self->ahead < 2) {
         return;
     }
-    points_at_head(self, was_q32);
+    note_change(self, SHIFT_GUESSES);
     find_next(self);
     self->head++;
     self->ahead--;
-    keep_going(self, was_q32, SHIFT_GUESSES);
 }
 
 /* One period of the filter that takes back what the curve is off: q^3 with q = 1 - grip, see the ramp in DESIGN.md. */
@@ -633,6 +678,7 @@ static void put_control(stream_curve_t *self, const kin_t *kin)
 
 HV_WRAPS void stream_curve_commit(stream_curve_t *self, const kin_t *kin)
 {
+    make_up(self);
     find_next(self);
     for (unsigned axis = 0; axis < self->axes; axis++) {
         self->control_q32[axis] += fx_shift_down(self->way_q36[0][axis], WAY_SHIFT);
@@ -696,8 +742,9 @@ HV_WRAPS void stream_curve_regrid(stream_curve_t *self, const kin_t *kin, const 
     q32_t asked_q32[AXES_MAX];
     self->ahead = 0;
     self->age = goes_on ? self->age : now == NULL ? AGE_MAX : 1;
+    self->change = 0;
     self->is_off = false; /* what it was off was per period of the old grid, and so was the grip */
-    (void)soften(self, self->patience);
+    (void)soften(self, SHIFT_GUESSES);
     place_points(self, now != NULL ? first_q32 : NULL, periods, sample_q32);
     for (unsigned axis = 0; axis < self->axes; axis++) {
         q32_t control_q32[3];

@@ -19,8 +19,10 @@ void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t peri
 void stream_curve_average(stream_curve_t *self, q32_t arrived_q32, bool is_lossy);
 
 /** Adds a sample the given number of periods after the newest; 0: in the place of the newest.
+ *  @param is_of_stall others will follow it in a burst: its index is believed however late it is
  *  @param point_q32 what it is at its place on the time line */
-void stream_curve_append(stream_curve_t *self, unsigned periods, const q32_t *sample_q32, const q32_t *point_q32);
+void stream_curve_append(stream_curve_t *self, unsigned periods, bool is_of_stall, const q32_t *sample_q32,
+                         const q32_t *point_q32);
 
 /** The curve has another grid, which begins with this sample at head. It goes on as it was and comes over to the samples softly.
  * After stream_curve_pace(); the phase behind head is 0 then.

@@ -6,13 +6,14 @@
  */
 #include "stream_evidence.h"
 
-#define MEMORY_SHIFT  5                  /* 2^6 samples */
-#define LEAST_Q32     (Q32_ONE / 4096)   /* sum(p p) that tells anything: 1/64 of the way of a period at the speed limit */
-#define EVEN_Q32      (Q32_ONE * 3 / 10) /* below that share values are even, ... */
-#define ARRIVED_Q32   (Q32_ONE * 6 / 10) /* ... above that one they belong to their arrivals, between as before */
-#define EXPLAINED_DIV 3                  /* what arrivals explain less of than that share has other causes */
-#define SHIFT_FADE    16                 /* samples in which a shift of the line fades to 1/e, as the line follows */
-#define CHANGE_Q32    (Q32_ONE / 32)     /* of the weight in a sample */
+#define MEMORY_SHIFT 5                /* 2^6 samples */
+#define LEAST_Q32    (Q32_ONE / 4096) /* sum(p p) that tells anything: 1/64 of the way of a period at the speed limit */
+#define EVEN_Q32     (Q32_ONE / 5)    /* below that share values are even, ... */
+/* ... above that one they belong to their arrivals, between as before. The network's part of the lateness lowers the share. */
+#define ARRIVED_Q32   (Q32_ONE * 2 / 5)
+#define EXPLAINED_DIV 5              /* what arrivals explain less of than that share has other causes */
+#define SHIFT_FADE    16             /* samples in which a shift of the line fades to 1/e, as the line follows */
+#define CHANGE_Q32    (Q32_ONE / 32) /* of the weight in a sample */
 #define LATE_MAX_Q32  Q32_ONE
 #define NEAR_Q32      (Q32_ONE / 4) /* samples that came closer to each other tell no speed */
 
@@ -122,19 +123,20 @@ static q32_t at_least_near(q32_t span_q32)
     return span_q32 > NEAR_Q32 ? span_q32 : NEAR_Q32;
 }
 
-/* Newton's parabola through the newest three samples at their times. It moves a sample no further than they are apart: arrivals
- * in a burst tell no speed. */
+/* Newton's parabola through three samples at their times: the newest, the one before, and the one two before that, as what the
+ * network adds to the times bends a longer parabola less. It moves a sample no further than they are apart: arrivals in a burst
+ * tell no speed. */
 q32_t stream_evidence_on_line(const stream_evidence_t *self, unsigned axis)
 {
     const q32_t here_q32 = self->value_q32[0][axis];
-    if (time_of(self, 0) == 0 || self->count < 3) {
+    if (time_of(self, 0) == 0 || self->count < 4) {
         return here_q32;
     }
     const q32_t t0 = time_of(self, 0);
     const q32_t h1 = at_least_near(t0 - time_of(self, 1));
-    const q32_t h2 = at_least_near(time_of(self, 1) - time_of(self, 2));
+    const q32_t h2 = at_least_near(time_of(self, 1) - time_of(self, 3));
     const q32_t way1 = here_q32 - self->value_q32[1][axis];
-    const q32_t way2 = self->value_q32[1][axis] - self->value_q32[2][axis];
+    const q32_t way2 = self->value_q32[1][axis] - self->value_q32[3][axis];
     const q32_t slope1 = fx_mul_div(way1, Q32_ONE, h1);
     const q32_t slope2 = fx_mul_div(way2, Q32_ONE, h2);
     const q32_t bend = fx_mul_div(slope1 - slope2, Q32_ONE, h1 + h2);

@@ -247,6 +247,8 @@ static const spoilt_t k_spoilt[] = {
     {"speed_counts_per_mm_s", "speed_counts_per_mm_s = 1000",
      "the speed limit is 300000 counts, and {speed} carries up to 65535; allowed: a smaller ratio"},
     {"position_reply", "position_reply = .. .. ..", "has no {position}; allowed: with one such as {position:u32le}"},
+    {"position_reply", "position_reply = 01 {status:u8} {fault:u8} {position:i32le}",
+     "{fault} is shown only where fault_when holds, which is missing; allowed: with fault_when = value/mask"},
     {"homing_reply", "homing_reply = none", "missing for driver = can-raw; allowed: "},
     {"homing_reply", "homing_reply = 01 ..", "has no {status}; allowed: with one such as {status:u8}"},
     {"homing_done_when", "homing_done_when = none", "missing where there is home; allowed: value/mask"},
@@ -281,6 +283,7 @@ static void test_fields_and_check_bytes_reach_the_driver_as_they_are_written(voi
     for (unsigned i = 0; i < 4; i++) {
         put_line(k_keys[i], k_lines[i]);
     }
+    put_line("fault_when", "fault_when = 0x08/0x08"); /* without one, {fault} is an error */
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_text(), m_errors);
     config_canraw_map(&m_config, &map);
     sim_can_bus_init(&bus, 0, NULL, 0);

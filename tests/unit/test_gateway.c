@@ -474,7 +474,7 @@ static void run_burst(unsigned between, double mm[][CYLINDERS_MAX], unsigned cyc
 
 static void test_frames_of_many_in_a_cycle_only_the_newest_costs_motion(void)
 {
-    enum { CYCLES = 1200, BETWEEN = 26 };
+    enum { CYCLES = 1500, BETWEEN = SIM_UDP_DATAGRAMS - GATEWAY_TARGETS_PER_CYCLE - 1 };
     static double few_mm[CYCLES][CYLINDERS_MAX], many_mm[CYCLES][CYLINDERS_MAX];
     run_burst(0, few_mm, CYCLES);
     const uint32_t few = counted()->accepted[FRAME_A6] + counted()->accepted[FRAME_C6];

@@ -35,7 +35,7 @@ void tearDown(void) {}
 static void append(unsigned samples, q32_t sample_q32)
 {
     for (unsigned i = 0; i < samples; i++) {
-        stream_curve_append(&m_curve, 1, &sample_q32, &sample_q32);
+        stream_curve_append(&m_curve, 1, false, &sample_q32, &sample_q32);
     }
 }
 
