@@ -2,8 +2,8 @@
  * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
  * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump, incidents, seen,
  * acknowledge, by NAME. The service thread owns it; nothing blocks, nothing allocates after the open, and a client that does not
- * read is dropped. Nobody keeps an operator out: where all places are taken, a newcomer gets that of the client that matters
- * least, which is told so.
+ * read is dropped. An operator can always connect: if all places are taken, heaved closes the connection of the
+ * least important client, with an error that says so.
  */
 #ifndef HEAVE_SERVICE_CONTROL_H
 #define HEAVE_SERVICE_CONTROL_H
