@@ -3,15 +3,17 @@
  * Each drive has one identifier for commands and one for replies. The caller owns canraw_t; only the motion thread calls it.
  *
  * Such drives report little about themselves. The driver derives their states:
- *   OFFLINE   no position has been received for offline_periods of the bus
- *   ENABLING  requested. Ends when a position newer than the request has been received and, if the map has enabled_when, when
- * that condition holds. If the map has enable or enabled_when, set-points are sent in this state already ENABLED   set-points are
- * sent. Without enabled_when this only means: requested, and a position was received since HOMING    the homing frame was sent.
- * Ends when homing_done holds, a new position was received and, if the map has enabled_when, that condition holds DISABLED  every
- * other case; set-points are not sent. Without disable and stop frames a drive holds its last set-point FAULT     fault_when or
- * homing_failed holds, or this driver found an error, because these drives do not check set-points: a set-point further than
- * step_max from the previous one (the first one: from the actual position), or further than following_max from the actual
- * position. Such a set-point is not sent
+ *
+ * - OFFLINE: no position has been received for offline_periods of the bus.
+ * - ENABLING: requested. It ends when a position newer than the request has been received and, if the map has enabled_when, that
+ *   condition holds. If the map has enable or enabled_when, the driver already sends set-points in this state.
+ * - ENABLED: the driver sends set-points. Without enabled_when this only means: requested, and a position was received since.
+ * - HOMING: the homing frame was sent. It ends when homing_done holds, a new position was received and, if the map has
+ *   enabled_when, that condition holds.
+ * - DISABLED: every other case; the driver sends no set-points. Without disable and stop frames a drive holds its last set-point.
+ * - FAULT: fault_when or homing_failed holds, or the driver found an error. These drives do not check set-points, so the driver
+ *   does. It does not send a set-point further than step_max from the previous one (the first one: from the actual position), or
+ *   further than following_max from the actual position.
  */
 #ifndef HEAVE_CANRAW_H
 #define HEAVE_CANRAW_H
@@ -110,7 +112,7 @@ typedef struct {
 /** Last query to a drive; private. */
 typedef enum { CANRAW_ASKED_NOTHING, CANRAW_ASKED_POSITION, CANRAW_ASKED_HOMING } canraw_asked_t;
 
-/** State of one drive; private. Times are those of poll. */
+/** State of one drive; members are private. All times are the now_us of the last poll. */
 typedef struct {
     drive_state_t state; /**< never DRIVE_OFFLINE */
     canraw_asked_t asked;
@@ -198,7 +200,7 @@ bool canraw_is_check(canraw_value_t value);
 /** True where received bytes are this frame: long enough, and constant bytes and check bytes as they should be. */
 bool canraw_matches(const canraw_frame_t *frame, const uint8_t *data, uint8_t length);
 
-/** Value of a field in the bytes of a frame that matches. */
+/** Reads the value of a field from the bytes of a received frame that matches the map. */
 int64_t canraw_extract(const canraw_field_t *field, const uint8_t *data);
 
 /** True if some bytes would match both frames. Then only the last query tells which reply it is. */

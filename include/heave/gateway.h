@@ -98,6 +98,57 @@ typedef struct {
     uint32_t left_out; /**< changes since then without a line */
 } gateway_told_t;
 
+/** Log lines about what the drives report; members are private to src/gateway. */
+typedef struct {
+    gateway_told_t told_of[DRIVES_MAX];       /**< the last line about the report of a drive */
+    uint64_t emergency_logged_us[DRIVES_MAX]; /**< 0 = never */
+    uint32_t emergencies_logged[DRIVES_MAX];  /**< emergencies of a drive that a line reported or counted */
+} reports_t;
+
+/** From datagrams to frames; members are private to src/gateway. */
+typedef struct {
+    frame_scanner_t scanner;
+    uint8_t datagram[GATEWAY_DATAGRAM_MAX];
+    size_t length;       /**< of the present datagram */
+    size_t position;     /**< of the next byte in it */
+    hal_udp_peer_t from; /**< its sender */
+    uint32_t waited_us;  /**< time that it waited for its cycle */
+    unsigned datagrams;  /**< received in this cycle */
+    bool is_open;        /**< the present datagram may hold further frames */
+    uint64_t reject_logged_us[FRAME_ERRORS];
+    uint32_t reject_suppressed[FRAME_ERRORS];
+} intake_t;
+
+/** The sender in control and what it asks for; members are private to src/gateway. */
+typedef struct {
+    owner_t owner;
+    uint64_t start_us;      /**< start of the silence timer: last accepted frame or entry into ENGAGED */
+    uint16_t frame_mask;    /**< relay mask of the sender */
+    unsigned stream_frames; /**< frames in quick succession so far, up to the number that makes a stream */
+    confirm_t confirm;
+    unsigned targets; /**< of this cycle */
+    bool has_newest;  /**< newest is of this cycle, and motion has not got it yet */
+    motion_target_t newest;
+    frame_command_t newest_command;
+    hal_udp_peer_t newest_from;
+    uint64_t other_logged_us; /**< 0 = never */
+    uint32_t other_suppressed;
+    uint64_t spike_logged_us;
+    uint32_t spikes_logged; /**< spikes that are already in the log */
+    uint64_t jump_logged_us;
+    uint32_t jumps_logged; /**< likewise */
+} gateway_sender_t;
+
+/** Relays and the healthy pulse as they were written; members are private to src/gateway. */
+typedef struct {
+    relay_policy_t policy;
+    healthy_t healthy;
+    uint16_t effects_mask; /**< of this cycle, without the healthy pulse */
+    uint16_t written_mask; /**< with it */
+    bool is_mask_written;
+    bool is_pulse_lost; /**< its line cannot be written */
+} relay_output_t;
+
 /** A gateway; members are private to src/gateway. */
 typedef struct {
     gateway_settings_t settings;
@@ -105,7 +156,10 @@ typedef struct {
     motion_t motion;
     motion_output_t output;
     supervisor_t supervisor;
-    frame_scanner_t scanner;
+    intake_t intake;
+    gateway_sender_t sender;
+    relay_output_t relay_output;
+    reports_t reports;
     snapshot_t snapshot;
     fault_code_t axis_fault[DRIVES_MAX];        /**< present fault of each drive */
     uint32_t told[DRIVES_MAX + 1u];             /**< faults that the next cycle has to find, as snapshot.begun */
@@ -125,39 +179,10 @@ typedef struct {
     uint32_t unsent_cycles;  /**< cycles in a row whose set-points the bus did not take */
     uint64_t reset_until_us; /**< end of the time in which a reset waits for the drives; 0 = no reset */
     uint64_t end_since_us;   /**< when a shutdown reached OFF, FAULT or ESTOP and the drives were told; 0 = not yet */
-    owner_t owner;
-    uint64_t start_us;       /**< start of the silence timer: last accepted frame or entry into ENGAGED */
     uint64_t state_since_us; /**< when the state was entered */
     service_t service;
-    confirm_t confirm;
-    uint32_t waited_us;     /**< time that the newest datagram waited for its cycle */
-    unsigned stream_frames; /**< frames in quick succession so far, up to the number that makes a stream */
-    uint16_t frame_mask;    /**< relay mask of the sender */
-    relay_policy_t relay_policy;
-    unsigned targets; /**< of this cycle */
-    bool has_newest;  /**< newest is of this cycle, and motion has not got it yet */
-    motion_target_t newest;
-    frame_command_t newest_command;
-    hal_udp_peer_t newest_from;
-    uint16_t effects_mask; /**< of this cycle, without the healthy pulse */
-    uint16_t written_mask; /**< with it */
-    bool is_mask_written;
-    healthy_t healthy;
     bool is_late;                /**< the next cycle is too late for the healthy pulse */
-    bool is_pulse_lost;          /**< its line cannot be written */
-    uint64_t other_logged_us;    /**< 0 = never */
     uint64_t singular_logged_us; /**< 0 = never */
-    uint32_t other_suppressed;
-    uint64_t spike_logged_us;
-    uint32_t spikes_logged; /**< spikes that are already in the log */
-    uint64_t jump_logged_us;
-    uint32_t jumps_logged;                    /**< likewise */
-    gateway_told_t told_of[DRIVES_MAX];       /**< the last line about what a drive is at */
-    uint64_t emergency_logged_us[DRIVES_MAX]; /**< 0 = never */
-    uint32_t emergencies_logged[DRIVES_MAX];  /**< of all of a drive, those that a line told of, or counted */
-    uint64_t reject_logged_us[FRAME_ERRORS];
-    uint32_t reject_suppressed[FRAME_ERRORS];
-    uint8_t datagram[GATEWAY_DATAGRAM_MAX];
 } gateway_t;
 
 /** Prepares a gateway in OFF. Touches no device.

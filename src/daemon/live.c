@@ -29,6 +29,7 @@
 #include "linux_udp.h"
 #include "linux_udp_filter.h"
 #include "service/control.h"
+#include "service/control_selftest.h"
 
 #define TICK_MS         10
 #define WAITING_MS      1  /* between looks where the system does not wait */
@@ -38,7 +39,6 @@
 #define UDP_BUFFER_BYTES 32768
 #define QUIT_WAIT_MS     1000
 #define FIRST_CYCLE_US   500000u
-#define SHUTDOWN_REST_US 15000000u /* a stop before settling, the drives going off, files */
 
 /** Everything of a live run. Large: from the heap, at the start. */
 typedef struct {
@@ -164,19 +164,6 @@ static void reload(live_t *self)
     }
 }
 
-/* The longest that a shutdown takes: a stop, the longest cylinder's whole stroke at engage speed, and the drives going off. */
-static uint64_t shutdown_most_us(const settings_t *settings)
-{
-    int64_t stroke_mm_q16 = 0;
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        stroke_mm_q16 = settings->stroke_mm_q16[i] > stroke_mm_q16 ? settings->stroke_mm_q16[i] : stroke_mm_q16;
-    }
-    const int64_t speed_q16 = settings->engage_speed_mm_s_q16;
-    const int64_t way_us = stroke_mm_q16 * 1000000 / speed_q16;
-    const int64_t ramps_us = 2 * speed_q16 * 1000000 / settings->engage_accel_mm_s2_q16;
-    return (uint64_t)(way_us + ramps_us) + SHUTDOWN_REST_US;
-}
-
 /* Who has sent it, as far as the kernel says. */
 static void log_signal(live_t *self, const struct signalfd_siginfo *info)
 {
@@ -205,7 +192,7 @@ static void take_signals(live_t *self)
         if (self->signals == 1) {
             const motion_request_t request = {.event = EVENT_SHUTDOWN};
             (void)ring_push(&self->loop.handover.requests, &request, sizeof request, NULL, 0);
-            sd_notify_stopping(&self->manager, shutdown_most_us(&self->config.settings));
+            sd_notify_stopping(&self->manager, sd_notify_shutdown_us(&self->config.settings));
             writers_say(&self->writers, "shutting down: the platform settles first; once more ends at once");
         } else {
             motion_loop_quit(&self->loop);
@@ -230,33 +217,12 @@ static void tell_acknowledged(live_t *self)
     self->control.acknowledged_by.pid = 0;
 }
 
-static uint32_t today(void)
-{
-    struct timespec now = {0};
-    struct tm date = {0};
-    (void)clock_gettime(CLOCK_REALTIME, &now);
-    (void)localtime_r(&now.tv_sec, &date);
-    return (uint32_t)((date.tm_year + 1900) * 10000 + (date.tm_mon + 1) * 100 + date.tm_mday);
-}
-
-/* Keeps what somebody says of a self-test. It is asked for anew on every day of the local calendar, whichever way the clock went.
- */
 static void watch_selftest(live_t *self)
 {
-    control_selftest_t *said = &self->control.selftest;
-    const uint32_t day = today();
-    if (said->is_news) {
-        lifetime_selftest_t selftest = {.day = day, .is_passed = said->is_passed};
-        memcpy(selftest.hash, self->config.hash, sizeof selftest.hash);
-        lifetime_note_selftest(&self->life, &selftest);
-        writers_say(&self->writers, "self-test %s, by user %u, process %d, configuration %s",
-                    said->is_passed ? "passed" : "failed", (unsigned)said->peer.uid, (int)said->peer.pid, self->config.hash);
-        said->is_news = false;
+    char said[128];
+    if (control_selftest_watch(&self->control, &self->life, &self->config, said)) {
+        writers_say(&self->writers, "%s", said);
     }
-    const bool is_due =
-        self->config.selftest.when == CONFIG_SELFTEST_DAILY && !lifetime_has_passed(&self->life, day, self->config.hash);
-    self->control.lost.is_untested = is_due;
-    __atomic_store_n(&self->loop.handover.is_untested, is_due ? 1u : 0u, __ATOMIC_RELEASE);
 }
 
 /* Both go on being tried, and heaved goes on. */

@@ -10,6 +10,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#define SHUTDOWN_REST_US 15000000u /* a stop before settling, the drives going off, files */
+
 /* Whether there is nothing left to tell: taken, or nobody is there to take it. */
 static bool tell(const sd_notify_t *self, const char *text)
 {
@@ -92,6 +94,18 @@ void sd_notify_serve(sd_notify_t *self, const snapshot_t *snapshot, uint64_t now
         self->cycle = snapshot->cycle;
         self->next_us = now_us + self->watchdog_us;
     }
+}
+
+uint64_t sd_notify_shutdown_us(const settings_t *settings)
+{
+    int64_t stroke_mm_q16 = 0;
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        stroke_mm_q16 = settings->stroke_mm_q16[i] > stroke_mm_q16 ? settings->stroke_mm_q16[i] : stroke_mm_q16;
+    }
+    const int64_t speed_q16 = settings->engage_speed_mm_s_q16;
+    const int64_t way_us = stroke_mm_q16 * 1000000 / speed_q16;
+    const int64_t ramps_us = 2 * speed_q16 * 1000000 / settings->engage_accel_mm_s2_q16;
+    return (uint64_t)(way_us + ramps_us) + SHUTDOWN_REST_US;
 }
 
 void sd_notify_stopping(sd_notify_t *self, uint64_t within_us)

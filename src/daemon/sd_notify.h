@@ -9,6 +9,7 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 
+#include "heave/settings.h"
 #include "heave/telemetry.h"
 
 /** What was told last. */
@@ -32,6 +33,9 @@ void sd_notify_ready(sd_notify_t *self, uint64_t now_us);
 
 /** Often: tells changes of state, and pets the watchdog if the motion thread has run a cycle since the last time. */
 void sd_notify_serve(sd_notify_t *self, const snapshot_t *snapshot, uint64_t now_us);
+
+/** The longest that a shutdown takes: a stop, the longest cylinder's whole stroke at engage speed, and the drives going off. */
+uint64_t sd_notify_shutdown_us(const settings_t *settings);
 
 /** Once, when a shutdown has been asked for. What the manager does not take is told again by sd_notify_serve.
  *  @param within_us above 0, the longest that it takes: the manager waits as long, also where its unit says less */

@@ -9,8 +9,12 @@
 #include "heave/text.h"
 #include "intake.h"
 #include "operate.h"
+#include "relay_output.h"
 #include "reports.h"
+#include "sender.h"
+#include "sequencer.h"
 #include "service.h"
+#include "shutdown.h"
 
 #define SINGULAR_LOG_US 1000000 /* lines about the same thing are no closer */
 
@@ -89,7 +93,7 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
     self->snapshot.has_angle = settings->has_angle;
     self->snapshot.relay_count = settings->relays.count;
     self->snapshot.sent = self->motion.pose;
-    self->frame_mask = settings->relay_safe_mask;
+    self->sender.frame_mask = settings->relay_safe_mask;
     return HV_OK;
 }
 
@@ -186,9 +190,10 @@ static bool are_bools_sane(const gateway_t *saved)
 {
     return sane_bool(&saved->is_bus_lost) && sane_bool(&saved->is_bus_failing) && sane_bool(&saved->is_tracking_actual) &&
            sane_bool(&saved->is_disable_due) && sane_bool(&saved->is_shutdown_asked) && sane_bool(&saved->is_end_overdue) &&
-           sane_bool(&saved->has_newest) && sane_bool(&saved->is_mask_written) && sane_bool(&saved->newest_from.is_ipv6) &&
-           sane_bool(&saved->is_estop_apart) && sane_bool(&saved->is_power_overdue) && sane_bool(&saved->is_late) &&
-           sane_bool(&saved->is_pulse_lost) && sane_bool(&saved->healthy.level);
+           sane_bool(&saved->sender.has_newest) && sane_bool(&saved->relay_output.is_mask_written) &&
+           sane_bool(&saved->sender.newest_from.is_ipv6) && sane_bool(&saved->is_estop_apart) &&
+           sane_bool(&saved->is_power_overdue) && sane_bool(&saved->is_late) && sane_bool(&saved->relay_output.is_pulse_lost) &&
+           sane_bool(&saved->relay_output.healthy.level);
 }
 
 /* A file may hold anything: every index, enum, bool and divisor is judged before it is used. */
@@ -198,11 +203,12 @@ static bool is_saved_sane(const gateway_t *saved, const gateway_t *prepared)
            is_snapshot_sane(&saved->snapshot, &prepared->snapshot) && are_drives_sane(saved) &&
            supervisor_is_sane(&saved->supervisor) && (unsigned)saved->bring_up <= BRING_UP_MOVE &&
            service_is_sane(&saved->service, &prepared->service, prepared->snapshot.cylinders + 1u) &&
-           auto_engage_is_sane(&saved->auto_engage, &prepared->auto_engage) && owner_is_sane(&saved->owner) &&
-           sane_time(saved->power_since_us) && sane_time(saved->healthy.ill_us) && sane_time(saved->healthy.changed_us) &&
-           confirm_is_sane(&saved->confirm) && relay_policy_is_sane(&saved->relay_policy) &&
-           (unsigned)saved->newest_command <= FRAME_COMMANDS && motion_target_is_sane(&saved->newest) &&
-           is_output_sane(&saved->output) && motion_state_is_sane(&saved->motion, &prepared->motion);
+           auto_engage_is_sane(&saved->auto_engage, &prepared->auto_engage) && owner_is_sane(&saved->sender.owner) &&
+           sane_time(saved->power_since_us) && sane_time(saved->relay_output.healthy.ill_us) &&
+           sane_time(saved->relay_output.healthy.changed_us) && confirm_is_sane(&saved->sender.confirm) &&
+           relay_policy_is_sane(&saved->relay_output.policy) && (unsigned)saved->sender.newest_command <= FRAME_COMMANDS &&
+           motion_target_is_sane(&saved->sender.newest) && is_output_sane(&saved->output) &&
+           motion_state_is_sane(&saved->motion, &prepared->motion);
 }
 
 hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io)
@@ -213,7 +219,7 @@ hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gatewa
     }
     *self = *saved;
     self->io = *io;
-    frame_scanner_init(&self->scanner, self->settings.dialect); /* it starts anew with every datagram */
+    frame_scanner_init(&self->intake.scanner, self->settings.dialect); /* it starts anew with every datagram */
     clear_reports(self);
     return HV_OK;
 }
@@ -236,7 +242,7 @@ void gateway_reload(gateway_t *self, const settings_t *settings)
 
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)
 {
-    return operate_request(self, request, now_us);
+    return sequencer_request(self, request, now_us);
 }
 
 hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent)
@@ -268,12 +274,6 @@ void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
     }
 }
 
-/* The relay that carries the healthy pulse, as a mask. */
-static uint16_t pulse_bit(const gateway_t *self)
-{
-    return (uint16_t)(1u << self->settings.healthy.relay >> 1);
-}
-
 /* A hold leaves a ride's relays as they are for a while, if so configured. */
 static bool is_hold_young(const gateway_t *self, uint64_t now_us)
 {
@@ -281,59 +281,23 @@ static bool is_hold_young(const gateway_t *self, uint64_t now_us)
            now_us - self->state_since_us < (uint64_t)self->settings.relay_safe_after_ms * 1000;
 }
 
-/* Relays that can no longer be written or looked at are written again in every cycle, and told of once. */
-static void watch_relays(gateway_t *self)
-{
-    uint16_t mask = 0;
-    const bool was_unknown = self->snapshot.is_relays_unknown;
-    const bool is_answered =
-        hal_relays_read_back(self->io.relays, &mask) != HV_ERR_IO; /* slow banks go on with it: every cycle */
-    self->is_mask_written = self->is_mask_written && is_answered;
-    self->snapshot.is_relays_unknown = !self->is_mask_written;
-    if (self->snapshot.is_relays_unknown != was_unknown) {
-        hal_log_write(self->io.log, was_unknown ? HAL_LOG_NOTICE : HAL_LOG_ERROR,
-                      was_unknown ? "relays: switched again" : "relays: cannot be switched, their state is not known");
-    }
-}
-
-/* The healthy pulse, on its own line or, as what is returned, on its relay. One that cannot be written has stopped: that is told
- * of, and is what the watchdog behind it is for. */
-static uint16_t pulse(gateway_t *self, uint64_t now_us)
-{
-    const healthy_settings_t *settings = &self->settings.healthy;
-    const bool level = healthy_step(&self->healthy, settings, operate_is_well(self), now_us);
-    const bool was_lost = self->is_pulse_lost;
-    uint16_t seen = 0;
-    self->is_pulse_lost = self->io.healthy.ops != NULL && (hal_relays_write(self->io.healthy, level ? 1 : 0) != HV_OK ||
-                                                           hal_relays_read_back(self->io.healthy, &seen) == HV_ERR_IO);
-    if (self->is_pulse_lost != was_lost) {
-        hal_log_write(self->io.log, was_lost ? HAL_LOG_NOTICE : HAL_LOG_ERROR,
-                      was_lost ? "healthy pulse: its line is written again" : "healthy pulse: its line cannot be written");
-    }
-    self->snapshot.is_healthy = healthy_is_running(&self->healthy, settings, now_us);
-    self->is_late = false;
-    return (uint16_t)(level ? pulse_bit(self) : 0);
-}
-
-/* Only an engaged sender commands the relays, or a hand in service; the safe mask holds everywhere else. The pulse is nobody's to
- * command, and its pace is its own: the relays' limits of time are not for it. */
+/* Only an engaged sender commands the relays, or a hand in service; the safe mask holds everywhere else. */
 static void write_relays(gateway_t *self, uint64_t now_us)
 {
     const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, now_us);
     const bool is_serving = self->supervisor.state == STATE_SERVICE;
-    const uint16_t wanted = is_sender_heard ? self->frame_mask
+    const uint16_t wanted = is_sender_heard ? self->sender.frame_mask
                             : is_serving    ? service_relays(self)
                                             : self->settings.relay_safe_mask;
-    const bool is_safe = wanted == self->settings.relay_safe_mask && !is_sender_heard;
-    const uint16_t asked = (uint16_t)(wanted & ~pulse_bit(self));
-    self->effects_mask = relay_policy_step(&self->relay_policy, &self->settings.relays, asked, is_safe, now_us);
-    const uint16_t mask = (uint16_t)(self->effects_mask | pulse(self, now_us));
-    if (!self->is_mask_written || mask != self->written_mask) {
-        self->is_mask_written = hal_relays_write(self->io.relays, mask) == HV_OK;
-        self->snapshot.counters.relay_errors += !self->is_mask_written;
-        self->written_mask = mask;
-    }
-    watch_relays(self);
+    const relay_output_in_t in = {.wanted_mask = wanted,
+                                  .is_safe = wanted == self->settings.relay_safe_mask && !is_sender_heard,
+                                  .is_well = sequencer_is_well(self),
+                                  .was_unknown = self->snapshot.is_relays_unknown};
+    const relay_output_out_t out = relay_output_step(&self->relay_output, &self->settings, &self->io, &in, now_us);
+    self->is_late = false;
+    self->snapshot.is_healthy = out.is_healthy;
+    self->snapshot.is_relays_unknown = out.is_unknown;
+    self->snapshot.counters.relay_errors += out.is_refused;
 }
 
 HV_OWN_FRAME static void send_setpoints(gateway_t *self, uint64_t now_us)
@@ -345,6 +309,18 @@ HV_OWN_FRAME static void send_setpoints(gateway_t *self, uint64_t now_us)
     }
     setpoint_q32[cylinders] = self->output.angle_deg_q32;
     self->unsent_cycles = drives_send(self->io.drives, now_us, setpoint_q32) == HV_OK ? 0 : self->unsent_cycles + 1;
+}
+
+static void receive_frames(gateway_t *self, uint64_t now_us)
+{
+    const intake_io_t io = {self->io.udp, self->io.log, &self->snapshot.counters};
+    frame_t frame;
+    intake_begin(&self->intake);
+    sender_begin(self, now_us);
+    while (intake_next(&self->intake, &self->settings, &io, now_us, &frame)) {
+        sender_take(self, &frame, now_us);
+    }
+    sender_end(self, now_us);
 }
 
 /* Motion waits for a bus that has not taken the last set: what the drives get next then follows on what they got last. Where the
@@ -376,14 +352,14 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->state = self->supervisor.state;
     s->goal = self->supervisor.goal;
     s->is_held_by_silence = self->supervisor.is_held_by_silence;
-    s->relay_mask = self->effects_mask;
+    s->relay_mask = self->relay_output.effects_mask;
     s->asked = self->output.asked;
     s->sent = self->output.sent;
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
         s->extension_mm_q32[i] = self->output.extension_mm_q32[i];
     }
     s->angle_deg_q32 = self->output.angle_deg_q32;
-    reports_take(self);
+    reports_take(&self->reports, self->io.drives, self->io.log, now_us, s->report);
     s->flags = self->output.flags;
     s->limiting_cylinder = self->output.limiting_cylinder;
     s->intensity_percent = (uint8_t)motion_intensity(&self->motion)->percent;
@@ -391,14 +367,14 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->stream_period_us = stream_period_us(motion_stream(&self->motion));
     s->stream_delay_us = stream_delay_us(motion_stream(&self->motion));
     s->stream = stream_report(motion_stream(&self->motion));
-    s->owner = self->owner;
+    s->owner = self->sender.owner;
     service_publish(self);
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
-    s->counters.relay_cut = self->relay_policy.cut_count;
-    s->counters.relay_delayed = self->relay_policy.delay_count;
+    s->counters.relay_cut = self->relay_output.policy.cut_count;
+    s->counters.relay_delayed = self->relay_output.policy.delay_count;
     s->counters.spikes = gate_spikes(motion_gate(&self->motion));
     note_singular_stops(self, now_us);
-    s->counters.unconfirmed = self->confirm.dropped;
+    s->counters.unconfirmed = self->sender.confirm.dropped;
     s->counters.stretched = motion_stretched_count(&self->motion);
     for (unsigned i = 0; i < drives_count(self->io.drives); i++) {
         wear_step(&s->wear[i], &s->drive[i], self->settings.cycle_us);
@@ -409,13 +385,13 @@ static void publish(gateway_t *self, uint64_t now_us)
 
 void gateway_cycle(gateway_t *self, uint64_t now_us)
 {
-    operate_before_frames(self, now_us);
-    intake_receive(self, now_us);
-    operate_after_frames(self, now_us);
+    sequencer_before_frames(self, now_us);
+    receive_frames(self, now_us);
+    sequencer_after_frames(self, now_us);
     step_motion(self, now_us);
     send_setpoints(self, now_us);
     operate_after_motion(self);
-    operate_watch_end(self, now_us);
+    shutdown_watch(self, now_us);
     write_relays(self, now_us);
     publish(self, now_us);
 }
@@ -432,5 +408,5 @@ bool gateway_is_finished(const gateway_t *self)
 
 uint32_t gateway_energized(const gateway_t *self)
 {
-    return operate_energized(self, false);
+    return shutdown_energized(self, false);
 }

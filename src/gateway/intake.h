@@ -1,13 +1,36 @@
 /* SPDX-License-Identifier: MIT
- * intake.h - datagrams to targets and relay masks: what the platform accepts, counters, and what is logged of the rest.
+ * intake.h - from datagrams to frames: receives, parses, counts and logs what is no frame. Knows nothing of states and motion.
  * Private to src/gateway.
  */
 #ifndef INTAKE_H
 #define INTAKE_H
 
 #include "heave/gateway.h"
+#include "heave/text.h"
 
-/** Reads what has arrived (at most GATEWAY_DATAGRAMS_PER_CYCLE) and carries out every good frame. */
-void intake_receive(gateway_t *self, uint64_t now_us);
+#define REJECT_LOG_INTERVAL_US 1000000u /* lines of the log about the same thing are at least this far apart */
+
+/** What the intake reads and writes besides its own state. */
+typedef struct {
+    hal_udp_t udp;
+    hal_log_t log;
+    counters_t *counters;
+} intake_io_t;
+
+/** Begins a cycle. */
+void intake_begin(intake_t *self);
+
+/** The next valid frame of this cycle, out of at most GATEWAY_DATAGRAMS_PER_CYCLE datagrams. self->from is its sender and
+ *  self->waited_us the time that it waited for the cycle.
+ *  @return false: there is none */
+bool intake_next(intake_t *self, const gateway_settings_t *settings, const intake_io_t *io, uint64_t now_us, frame_t *frame);
+
+/** Counts and logs a valid frame that this platform cannot follow.
+ *  @param missing why */
+void intake_refuse(intake_t *self, const intake_io_t *io, frame_command_t command, const char *missing,
+                   const hal_udp_peer_t *from, uint64_t now_us);
+
+/** Appends how many lines of this kind were left out since the last one; nothing for 0. */
+void intake_put_suppressed(text_t *text, uint32_t lines);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * operate.h - states in deeds: events to the supervisor, its actions on motion, drives and relays. Private to src/gateway.
+ * operate.h - offers events to the supervisor and carries out its actions on motion, drives and relays. Private to src/gateway.
  */
 #ifndef OPERATE_H
 #define OPERATE_H
@@ -12,30 +12,22 @@ void operate_event(gateway_t *self, event_t event, uint64_t now_us);
 /** Follows a sender from now on: its first pose at engage speed, relays safe until it says otherwise. */
 void operate_follow(gateway_t *self, uint64_t now_us);
 
-/** Drives and inputs to events, before the frames of the cycle are read. */
-void operate_before_frames(gateway_t *self, uint64_t now_us);
-
-/** Silence of the sender to events, after them. */
-void operate_after_frames(gateway_t *self, uint64_t now_us);
-
-/** An operator's request (see gateway_request). */
-hv_status_t operate_request(gateway_t *self, event_t request, uint64_t now_us);
-
 /** After the motion of the cycle: drives that are to be disabled once at rest. */
 void operate_after_motion(gateway_t *self);
 
-/** A shutdown that has come to its end waits for drives that have not confirmed yet that their torque is off, but not for ever.
- */
-void operate_watch_end(gateway_t *self, uint64_t now_us);
+/** True while the drives are being enabled or home by themselves: no set-point leads them. */
+bool operate_is_coming_up(const gateway_t *self);
 
-/** As gateway_energized().
- *  @param is_answering only drives that answer */
-uint32_t operate_energized(const gateway_t *self, bool is_answering);
+/** True if a drive or the bus has a fault that a reset would come too early for. */
+bool operate_is_drive_fault_present(const gateway_t *self);
 
-/** True where the bus has taken no set of set-points for so long that none can be expected to get through. */
-bool operate_is_bus_stalled(const gateway_t *self);
+/** Carries out the reaction of the worst fault so far. */
+void operate_react(gateway_t *self);
 
-/** True where states, deadlines, bus and drives are as they should be in this cycle: what the healthy pulse says. */
-bool operate_is_well(const gateway_t *self);
+/** Puts the set-points on the actual positions. */
+void operate_track_actual(gateway_t *self);
+
+/** Asks the drives to go off; is_disable_due stays true if they cannot be asked now. */
+void operate_disable_drives(gateway_t *self);
 
 #endif

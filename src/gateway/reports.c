@@ -40,7 +40,7 @@ static void put_detail(text_t *text, const drive_report_t *report)
     }
 }
 
-static void log_report(const gateway_t *self, unsigned axis, const drive_report_t *report, uint32_t left_out)
+static void log_report(hal_log_t log, unsigned axis, const drive_report_t *report, uint32_t left_out)
 {
     char line[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(line, sizeof line);
@@ -66,10 +66,10 @@ static void log_report(const gateway_t *self, unsigned axis, const drive_report_
         text_put_u32(&text, left_out);
         text_put(&text, " changes before this were left out");
     }
-    hal_log_write(self->io.log, report->code != 0 ? HAL_LOG_WARNING : HAL_LOG_NOTICE, line);
+    hal_log_write(log, report->code != 0 ? HAL_LOG_WARNING : HAL_LOG_NOTICE, line);
 }
 
-static void log_notes(const gateway_t *self, unsigned axis, const drive_report_t *report)
+static void log_notes(hal_log_t log, unsigned axis, const drive_report_t *report)
 {
     char line[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(line, sizeof line);
@@ -86,15 +86,14 @@ static void log_notes(const gateway_t *self, unsigned axis, const drive_report_t
             before = "; ";
         }
     }
-    hal_log_write(self->io.log, report->notes != 0 ? HAL_LOG_WARNING : HAL_LOG_NOTICE, line);
+    hal_log_write(log, report->notes != 0 ? HAL_LOG_WARNING : HAL_LOG_NOTICE, line);
 }
 
 /* Some drives send errors and their end in pairs, many in a second: a line in a second, with how many there were. */
-static void log_emergency(gateway_t *self, unsigned axis, const drive_report_t *report)
+static void log_emergency(reports_t *self, hal_log_t log, unsigned axis, const drive_report_t *report, uint64_t now_us)
 {
     const drive_emergency_t *emergency = &report->emergency;
     const uint32_t count = emergency->count - self->emergencies_logged[axis];
-    const uint64_t now_us = self->snapshot.now_us;
     char line[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(line, sizeof line);
     if (count == 0 || report->error == NULL ||
@@ -120,7 +119,7 @@ static void log_emergency(gateway_t *self, unsigned axis, const drive_report_t *
         text_put(&text, "; the last of ");
         text_put_u32(&text, count);
     }
-    hal_log_write(self->io.log, HAL_LOG_WARNING, line);
+    hal_log_write(log, HAL_LOG_WARNING, line);
     self->emergency_logged_us[axis] = now_us;
     self->emergencies_logged[axis] = emergency->count;
 }
@@ -131,15 +130,14 @@ static bool is_news(uint32_t code, uint32_t detail_code, const drive_report_t *i
     return is->address != 0 && (code != is->code || (is->code != 0 && detail_code != is->detail_code));
 }
 
-/* What comes and goes is told of less often; what is in the end is always told of. */
-static void tell_report(gateway_t *self, unsigned axis, const drive_report_t *report)
+/* A trouble that comes and goes is logged less often; the last one is always logged. */
+static void tell_report(reports_t *self, hal_log_t log, unsigned axis, const drive_report_t *was, const drive_report_t *report,
+                        uint64_t now_us)
 {
-    const drive_report_t *was = &self->snapshot.report[axis];
     gateway_told_t *told = &self->told_of[axis];
-    const uint64_t now_us = self->snapshot.now_us;
     const bool is_free = now_us + (uint64_t)(REPORT_BURST - 1u) * REPORT_LOG_US >= told->next_us;
     if (is_news(told->code, told->detail_code, report) && is_free) {
-        log_report(self, axis, report, told->left_out);
+        log_report(log, axis, report, told->left_out);
         *told = (gateway_told_t){.next_us = (told->next_us > now_us ? told->next_us : now_us) + REPORT_LOG_US,
                                  .code = report->code,
                                  .detail_code = report->detail_code};
@@ -148,16 +146,16 @@ static void tell_report(gateway_t *self, unsigned axis, const drive_report_t *re
     }
 }
 
-void reports_take(gateway_t *self)
+void reports_take(reports_t *self, drives_t drives, hal_log_t log, uint64_t now_us, drive_report_t shown[DRIVES_MAX])
 {
-    for (uint8_t i = 0; i < drives_count(self->io.drives); i++) {
+    for (uint8_t i = 0; i < drives_count(drives); i++) {
         drive_report_t report;
-        (void)drives_report(self->io.drives, i, &report);
-        tell_report(self, i, &report);
-        if (self->snapshot.report[i].notes != report.notes) {
-            log_notes(self, i, &report);
+        (void)drives_report(drives, i, &report);
+        tell_report(self, log, i, &shown[i], &report, now_us);
+        if (shown[i].notes != report.notes) {
+            log_notes(log, i, &report);
         }
-        log_emergency(self, i, &report);
-        self->snapshot.report[i] = report;
+        log_emergency(self, log, i, &report, now_us);
+        shown[i] = report;
     }
 }

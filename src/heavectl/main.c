@@ -23,6 +23,7 @@
 #include "common/standard_descriptors.h"
 #include "common/usage.h"
 #include "heavectl/hold.h"
+#include "heavectl/lists.h"
 #include "heavectl/scope.h"
 #include "heavectl/selftest.h"
 #include "heavectl/socket.h"
@@ -273,48 +274,6 @@ static int judge(const cJSON *answer)
     return complain(EXIT_REFUSED, "%s", cJSON_IsString(error) ? error->valuestring : "heaved gave an answer that says nothing");
 }
 
-static void show_incidents(const cJSON *incidents)
-{
-    const cJSON *incident = NULL;
-    cJSON_ArrayForEach(incident, incidents)
-    {
-        const cJSON *name = cJSON_GetObjectItemCaseSensitive(incident, "name");
-        const bool is_seen = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(incident, "seen"));
-        printf("%s: %s\n", cJSON_IsString(name) ? name->valuestring : "?", is_seen ? "seen" : "new");
-    }
-    if (cJSON_GetArraySize(incidents) == 0) {
-        printf("no incidents\n");
-    }
-}
-
-/* One line for each drive. */
-static void show_counts(const cJSON *answer)
-{
-    const cJSON *drive = NULL;
-    cJSON_ArrayForEach(drive, cJSON_GetObjectItemCaseSensitive(answer, "drives"))
-    {
-        const cJSON *number = cJSON_GetObjectItemCaseSensitive(drive, "drive");
-        const cJSON *state = cJSON_GetObjectItemCaseSensitive(drive, "state");
-        const cJSON *counts = cJSON_GetObjectItemCaseSensitive(drive, "counts");
-        const cJSON *mm = cJSON_GetObjectItemCaseSensitive(drive, "actual_mm");
-        const cJSON *deg = cJSON_GetObjectItemCaseSensitive(drive, "actual_deg");
-        const cJSON *actual = mm != NULL ? mm : deg;
-        printf("drive %.0f: ", cJSON_IsNumber(number) ? number->valuedouble : 0.0);
-        if (cJSON_IsNumber(counts)) {
-            printf("%12.0f counts", counts->valuedouble);
-        } else {
-            printf("           - counts");
-        }
-        if (cJSON_IsNumber(actual)) {
-            printf("  %11.3f %s", actual->valuedouble, mm != NULL ? "mm " : "deg");
-        }
-        printf("  %s%s%s", cJSON_IsString(state) ? state->valuestring : "?",
-               cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(drive, "homed")) ? ", homed" : ", not homed",
-               cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(drive, "torque")) ? ", torque" : "");
-        printf("%s", isatty(STDOUT_FILENO) != 0 ? "\x1b[K\n" : "\n");
-    }
-}
-
 static void show_answer(const ctl_t *self, const cJSON *answer)
 {
     const cJSON *state = cJSON_GetObjectItemCaseSensitive(answer, "state");
@@ -322,11 +281,11 @@ static void show_answer(const ctl_t *self, const cJSON *answer)
     if (cJSON_IsString(folder)) {
         printf("%s: %s\n", self->command, folder->valuestring);
     } else if (cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(answer, "incidents"))) {
-        show_incidents(cJSON_GetObjectItemCaseSensitive(answer, "incidents"));
+        lists_show_incidents(cJSON_GetObjectItemCaseSensitive(answer, "incidents"));
     } else if (strcmp(self->command, "status") == 0) {
         show_table(answer, false);
     } else if (cJSON_IsArray(cJSON_GetObjectItemCaseSensitive(answer, "drives"))) {
-        show_counts(answer);
+        lists_show_counts(answer);
     } else if (strcmp(self->command, "intensity") == 0) {
         const cJSON *percent = cJSON_GetObjectItemCaseSensitive(answer, "intensity_percent");
         printf("intensity: %.0f %%\n", cJSON_IsNumber(percent) ? percent->valuedouble : 0.0);

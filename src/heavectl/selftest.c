@@ -6,12 +6,10 @@
 
 #include <cjson/cJSON.h>
 #include <errno.h>
-#include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <termios.h>
 #include <time.h>
 #include <unistd.h>
@@ -20,11 +18,9 @@
 #include "common/samples.h"
 #include "heavectl/hold.h"
 #include "heavectl/scope.h"
+#include "heavectl/selftest_link.h"
 #include "heavectl/selftest_report.h"
 
-#define LINE_BYTES   65536u
-#define ANSWER_MS    5000
-#define LOOK_MS      100    /* between looks at the state */
 #define PERSON_MS    120000 /* for a switch to be turned */
 #define DRIVES_MS    15000  /* for torque, and for a reset to take effect */
 #define REST_MS      1500   /* a set-point that stands for so long has come to its end */
@@ -56,22 +52,12 @@ typedef struct {
 /* A run. */
 typedef struct {
     const char *path;
-    const volatile sig_atomic_t *is_interrupted;
-    int fd;
+    selftest_link_t link;
     samples_reader_t reader;
     selftest_report_t report;
-    char line[LINE_BYTES];
     double following_mm, drift_mm, jog_mm_s;
     unsigned cylinders;
-    bool is_over; /* the person wants to end, or heaved is gone */
 } run_t;
-
-static int64_t now_ms(void)
-{
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    return (int64_t)now.tv_sec * 1000 + now.tv_nsec / 1000000;
-}
 
 static __attribute__((format(printf, 4, 5))) void note(run_t *self, const char *name, selftest_result_t result,
                                                        const char *format, ...)
@@ -84,104 +70,25 @@ static __attribute__((format(printf, 4, 5))) void note(run_t *self, const char *
     selftest_note(&self->report, name, result, text);
 }
 
-/* --- heaved --- */
-
-static int open_link(const char *path)
-{
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    if (strlen(path) >= sizeof address.sun_path) {
-        return -1;
-    }
-    memcpy(address.sun_path, path, strlen(path));
-    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    if (fd >= 0 && connect(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
-        (void)close(fd);
-        return -1;
-    }
-    return fd;
-}
-
-/* The answer to a request; NULL: none came. */
-static cJSON *ask(run_t *self, const char *request)
-{
-    char line[96];
-    size_t length = 0;
-    const int64_t until_ms = now_ms() + ANSWER_MS;
-    const int bytes = snprintf(line, sizeof line, "%s\n", request);
-    if (send(self->fd, line, (size_t)bytes, MSG_NOSIGNAL) != bytes) {
-        return NULL;
-    }
-    while (length < sizeof self->line - 1 && now_ms() < until_ms) {
-        struct pollfd wait = {.fd = self->fd, .events = POLLIN};
-        if (poll(&wait, 1, LOOK_MS) <= 0) {
-            continue;
-        }
-        const ssize_t received = recv(self->fd, &self->line[length], sizeof self->line - 1 - length, 0);
-        if (received <= 0) {
-            return NULL;
-        }
-        length += (size_t)received;
-        self->line[length] = '\0';
-        if (self->line[length - 1] == '\n') {
-            return cJSON_Parse(self->line);
-        }
-    }
-    return NULL;
-}
-
-static const char *text_of(const cJSON *object, const char *name)
-{
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
-    return cJSON_IsString(item) ? item->valuestring : "";
-}
-
-static double number_of(const cJSON *object, const char *name)
-{
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
-    return cJSON_IsNumber(item) ? item->valuedouble : 0.0;
-}
-
-static bool is_set(const cJSON *object, const char *name)
-{
-    return cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(object, name));
-}
-
-/* Asks for something to be done.
- * @param error out: why not, where it returns false */
-static bool has_done(run_t *self, const char *request, char error[SELFTEST_NOTE_MAX])
-{
-    cJSON *answer = ask(self, request);
-    const bool is_done = is_set(answer, "ok");
-    (void)snprintf(error, SELFTEST_NOTE_MAX, "%s",
-                   is_done          ? ""
-                   : answer != NULL ? text_of(answer, "error")
-                                    : "heaved does not answer");
-    self->is_over = self->is_over || answer == NULL;
-    cJSON_Delete(answer);
-    return is_done;
-}
-
-typedef bool (*seen_t)(const cJSON *answer);
-
 static bool is_estop(const cJSON *status)
 {
-    return is_set(status, "estop_active");
+    return selftest_is_set(status, "estop_active");
 }
 static bool is_no_estop(const cJSON *status)
 {
-    return !is_set(status, "estop_active");
+    return !selftest_is_set(status, "estop_active");
 }
 static bool is_failing(const cJSON *status)
 {
-    return is_set(status, "power_failing");
+    return selftest_is_set(status, "power_failing");
 }
 static bool is_supplied(const cJSON *status)
 {
-    return !is_set(status, "power_failing");
+    return !selftest_is_set(status, "power_failing");
 }
 static bool is_out(const cJSON *status)
 {
-    return strcmp(text_of(status, "state"), "SERVICE") != 0;
+    return strcmp(selftest_text(status, "state"), "SERVICE") != 0;
 }
 
 /* Every drive has torque, and its zero too. */
@@ -191,7 +98,7 @@ static bool has_all(const cJSON *counts, const char *what)
     bool has = cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(counts, "drives")) > 0;
     cJSON_ArrayForEach(drive, cJSON_GetObjectItemCaseSensitive(counts, "drives"))
     {
-        has = has && is_set(drive, what);
+        has = has && selftest_is_set(drive, what);
     }
     return has;
 }
@@ -203,63 +110,6 @@ static bool has_torque(const cJSON *counts)
 static bool is_homed(const cJSON *counts)
 {
     return has_all(counts, "homed");
-}
-
-/* A line from the person, without blocking: 0, or its first letter. */
-static int typed(void)
-{
-    char line[64];
-    struct pollfd wait = {.fd = STDIN_FILENO, .events = POLLIN};
-    if (poll(&wait, 1, 0) <= 0) {
-        return '\0';
-    }
-    const ssize_t length = read(STDIN_FILENO, line, sizeof line);
-    return length <= 0 ? 'q' : line[0];
-}
-
-/* Waits until heaved shows it.
- * Returns 'y', 's' where the person leaves it out, 'q' where it is ended, 'n' where time is up. */
-static int wait_for(run_t *self, const char *request, seen_t is_seen, int64_t most_ms)
-{
-    const int64_t until_ms = now_ms() + most_ms;
-    const struct timespec pause = {.tv_nsec = LOOK_MS * 1000000L};
-    while (now_ms() < until_ms && *self->is_interrupted == 0) {
-        cJSON *answer = ask(self, request);
-        const bool is_there = answer != NULL && is_seen(answer);
-        const bool is_gone = answer == NULL;
-        cJSON_Delete(answer);
-        if (is_there) {
-            return 'y';
-        }
-        const int key = typed();
-        if (is_gone || key == 'q' || key == 's') {
-            self->is_over = self->is_over || is_gone || key == 'q';
-            return is_gone ? 'q' : key;
-        }
-        (void)nanosleep(&pause, NULL);
-    }
-    self->is_over = self->is_over || *self->is_interrupted != 0;
-    return self->is_over ? 'q' : 'n';
-}
-
-/* A question: y, n, s (left out) or q. Keys that were held before it are no answer. */
-static int question(run_t *self, const char *text)
-{
-    char line[64];
-    for (;;) {
-        (void)tcflush(STDIN_FILENO, TCIFLUSH);
-        printf("%s [y/n, s leaves it out, q ends] ", text);
-        (void)fflush(stdout);
-        const ssize_t length = read(STDIN_FILENO, line, sizeof line);
-        const int key = length > 0 ? line[0] : 'q';
-        if (length <= 0 || *self->is_interrupted != 0 || key == 'q') {
-            self->is_over = true;
-            return 'q';
-        }
-        if (key == 'y' || key == 'n' || key == 's') {
-            return key;
-        }
-    }
 }
 
 static void note_answer(run_t *self, const char *name, int key, const char *failure)
@@ -277,16 +127,16 @@ static void note_answer(run_t *self, const char *name, int key, const char *fail
 static bool enter_service(run_t *self)
 {
     char error[SELFTEST_NOTE_MAX];
-    const int64_t until_ms = now_ms() + DRIVES_MS;
-    const struct timespec pause = {.tv_nsec = LOOK_MS * 1000000L};
-    cJSON *status = ask(self, "tick");
+    const int64_t until_ms = selftest_now_ms() + DRIVES_MS;
+    const struct timespec pause = {.tv_nsec = SELFTEST_LOOK_MS * 1000000L};
+    cJSON *status = selftest_ask(&self->link, "tick");
     bool is_in = status != NULL && !is_out(status);
     cJSON_Delete(status);
-    while (!is_in && !self->is_over) {
-        is_in = has_done(self, "service", error);
-        if (!is_in && now_ms() >= until_ms) {
+    while (!is_in && !self->link.is_over) {
+        is_in = selftest_has_done(&self->link, "service", error);
+        if (!is_in && selftest_now_ms() >= until_ms) {
             fprintf(stderr, "heavectl: selftest: %s\n", error);
-            self->is_over = true;
+            self->link.is_over = true;
         }
         if (!is_in) {
             (void)nanosleep(&pause, NULL);
@@ -299,23 +149,24 @@ static bool enter_service(run_t *self)
 
 /* One that ends SERVICE and comes back.
  * @param on what to do, off how to undo it; each with what heaved shows then */
-static void try_switch(run_t *self, const char *name, const char *on, seen_t is_on, const char *off, seen_t is_off)
+static void try_switch(run_t *self, const char *name, const char *on, selftest_seen_t is_on, const char *off,
+                       selftest_seen_t is_off)
 {
     char error[SELFTEST_NOTE_MAX];
     printf("%s (s leaves it out)\n", on);
-    int key = wait_for(self, "status", is_on, PERSON_MS);
+    int key = selftest_wait(&self->link, "status", is_on, PERSON_MS);
     if (key != 'y') {
         note_answer(self, name, key, "nothing changed within two minutes");
         return;
     }
     printf("%s\n", off);
-    key = wait_for(self, "status", is_off, PERSON_MS);
+    key = selftest_wait(&self->link, "status", is_off, PERSON_MS);
     if (key != 'y') {
         note_answer(self, name, key == 's' ? 'n' : key, "it did not go back");
         return;
     }
     if (is_on == is_estop) {
-        (void)has_done(self, "reset", error);
+        (void)selftest_has_done(&self->link, "reset", error);
     }
     note(self, name, SELFTEST_PASSED, "%s", "");
 }
@@ -330,18 +181,19 @@ static bool is_always(const cJSON *status)
 static void try_switches(run_t *self, const cJSON *plan)
 {
     const cJSON *switches = cJSON_GetObjectItemCaseSensitive(plan, "switches");
-    if (is_set(switches, "estop") && !self->is_over && enter_service(self)) {
+    if (selftest_is_set(switches, "estop") && !self->link.is_over && enter_service(self)) {
         try_switch(self, "e-stop", "Press the e-stop.", is_estop, "Release the e-stop.", is_no_estop);
-        if (is_set(plan, "healthy_pulse") && !self->is_over) {
-            note_answer(self, "healthy pulse",
-                        question(self, "Did the safety relay drop while the e-stop was pressed, and does it hold now?"),
-                        "the relay of the healthy pulse did not follow");
+        if (selftest_is_set(plan, "healthy_pulse") && !self->link.is_over) {
+            note_answer(
+                self, "healthy pulse",
+                selftest_question(&self->link, "Did the safety relay drop while the e-stop was pressed, and does it hold now?"),
+                "the relay of the healthy pulse did not follow");
         }
     }
-    if (is_set(switches, "enable") && !self->is_over && enter_service(self)) {
+    if (selftest_is_set(switches, "enable") && !self->link.is_over && enter_service(self)) {
         try_switch(self, "enable key", "Turn the enable key off.", is_out, "Turn the enable key on, and wait.", is_always);
     }
-    if (is_set(switches, "power") && !self->is_over && enter_service(self)) {
+    if (selftest_is_set(switches, "power") && !self->link.is_over && enter_service(self)) {
         try_switch(self, "power failing", "Let the supply's contact tell that the supply fails.", is_failing,
                    "Let it be well again.", is_supplied);
     }
@@ -351,12 +203,12 @@ static void try_switches(run_t *self, const cJSON *plan)
 
 static int hold(run_t *self, const char *request, const hold_watch_t *watch)
 {
-    const int fd = open_link(self->path);
+    const int fd = selftest_connect(self->path);
     if (fd < 0) {
-        self->is_over = true;
+        self->link.is_over = true;
         return EXIT_UNAVAILABLE;
     }
-    const int code = hold_run(fd, request, watch, self->is_interrupted);
+    const int code = hold_run(fd, request, watch, self->link.is_interrupted);
     (void)close(fd);
     (void)tcflush(STDIN_FILENO, TCIFLUSH);
     return code;
@@ -365,13 +217,13 @@ static int hold(run_t *self, const char *request, const hold_watch_t *watch)
 static void try_relays(run_t *self, unsigned relays)
 {
     char text[64], request[32], name[32];
-    for (unsigned i = 1; i <= relays && !self->is_over; i++) {
+    for (unsigned i = 1; i <= relays && !self->link.is_over; i++) {
         (void)snprintf(text, sizeof text, "Relay %u: try it? n: nothing is connected to it.", i);
         (void)snprintf(name, sizeof name, "relay %u", i);
         (void)snprintf(request, sizeof request, "relay %u", i);
-        int key = question(self, text);
+        int key = selftest_question(&self->link, text);
         if (key == 'y') {
-            key = hold(self, request, NULL) == EXIT_DONE ? question(self, "Did it switch, and back again?") : 'n';
+            key = hold(self, request, NULL) == EXIT_DONE ? selftest_question(&self->link, "Did it switch, and back again?") : 'n';
             note_answer(self, name, key, "it did not switch");
         } else if (key == 'n') {
             note(self, name, SELFTEST_UNUSED, "%s", "nothing is connected");
@@ -402,7 +254,7 @@ static void take_sample(const run_t *self, way_t *way, const samples_record_t *r
         way->most_mm[i] = way->has_first ? larger(way->most_mm[i], actual_mm) : actual_mm;
     }
     if (!way->has_first || apart(z_mm, way->last_z_mm) > 1e-4) {
-        way->moved_ms = now_ms();
+        way->moved_ms = selftest_now_ms();
         way->last_z_mm = z_mm;
     }
     way->first_z_mm = way->has_first ? way->first_z_mm : z_mm;
@@ -423,11 +275,11 @@ static bool is_at_end(void *context, bool is_pressed)
         take_sample(self->run, &self->way, &record);
     }
     if (!is_pressed) {
-        self->way.moved_ms = now_ms();
+        self->way.moved_ms = selftest_now_ms();
         return false;
     }
     const double gone_mm = apart(self->way.last_z_mm, self->way.first_z_mm);
-    return self->way.until_mm > 0 ? gone_mm >= self->way.until_mm : now_ms() - self->way.moved_ms > REST_MS;
+    return self->way.until_mm > 0 ? gone_mm >= self->way.until_mm : selftest_now_ms() - self->way.moved_ms > REST_MS;
 }
 
 static void judge_way(run_t *self, const char *name, const way_t *way)
@@ -455,7 +307,7 @@ static void judge_way(run_t *self, const char *name, const way_t *way)
 static bool try_way(run_t *self, const char *name, double speed_mm_s, double until_mm)
 {
     char request[48];
-    watched_t watched = {.run = self, .way = {.until_mm = until_mm, .moved_ms = now_ms()}};
+    watched_t watched = {.run = self, .way = {.until_mm = until_mm, .moved_ms = selftest_now_ms()}};
     samples_record_t record;
     while (samples_reader_next(&self->reader, &record)) { /* what was before says nothing */
     }
@@ -480,11 +332,11 @@ static void try_brakes(run_t *self)
 {
     char error[SELFTEST_NOTE_MAX];
     watched_t watched = {.run = self};
-    const struct timespec pause = {.tv_nsec = LOOK_MS * 1000000L};
-    bool is_off = has_done(self, "torque all off", error);
-    for (int64_t until_ms = now_ms() + REST_MS; !is_off && now_ms() < until_ms;) { /* it comes to rest first */
+    const struct timespec pause = {.tv_nsec = SELFTEST_LOOK_MS * 1000000L};
+    bool is_off = selftest_has_done(&self->link, "torque all off", error);
+    for (int64_t until_ms = selftest_now_ms() + REST_MS; !is_off && selftest_now_ms() < until_ms;) { /* it comes to rest first */
         (void)nanosleep(&pause, NULL);
-        is_off = has_done(self, "torque all off", error);
+        is_off = selftest_has_done(&self->link, "torque all off", error);
     }
     if (!is_off) {
         note(self, "brakes", SELFTEST_FAILED, "%s", error);
@@ -494,8 +346,8 @@ static void try_brakes(run_t *self)
     (void)is_at_end(&watched, false);
     watched.way = (way_t){0}; /* what was before, with torque, says nothing */
     printf("Torque is off: the platform has to stay where it is for %d s.\n", DRIFT_MS / 1000);
-    const int64_t until_ms = now_ms() + DRIFT_MS;
-    while (now_ms() < until_ms && *self->is_interrupted == 0) {
+    const int64_t until_ms = selftest_now_ms() + DRIFT_MS;
+    while (selftest_now_ms() < until_ms && *self->link.is_interrupted == 0) {
         (void)nanosleep(&pause, NULL);
         (void)is_at_end(&watched, false);
     }
@@ -517,26 +369,27 @@ static void try_motion(run_t *self)
         return;
     }
     printf("Now the platform moves, while you hold the space bar. Nobody may be on it or near it.\n");
-    const int key = question(self, "Go on?");
+    const int key = selftest_question(&self->link, "Go on?");
     if (key != 'y') {
         note_answer(self, "ends", 's', "");
         return;
     }
-    if (!has_done(self, "torque all on", error)) {
+    if (!selftest_has_done(&self->link, "torque all on", error)) {
         note(self, "torque", SELFTEST_FAILED, "%s", error);
         return;
     }
-    if (wait_for(self, "counts", has_torque, DRIVES_MS) != 'y') {
+    if (selftest_wait(&self->link, "counts", has_torque, DRIVES_MS) != 'y') {
         note(self, "torque", SELFTEST_FAILED, "%s", "not every drive has torque; heavectl counts shows which");
         return;
     }
     note(self, "torque", SELFTEST_PASSED, "%s", "");
-    if (wait_for(self, "counts", is_homed, 2 * LOOK_MS) == 'n' && hold(self, "home all", NULL) != EXIT_DONE) {
+    if (selftest_wait(&self->link, "counts", is_homed, 2 * SELFTEST_LOOK_MS) == 'n' &&
+        hold(self, "home all", NULL) != EXIT_DONE) {
         note(self, "home", SELFTEST_FAILED, "%s", "not every drive has found its zero");
         return;
     }
     printf("Up, to the end. ");
-    bool is_there = !self->is_over && try_way(self, "upper end", self->jog_mm_s, 0);
+    bool is_there = !self->link.is_over && try_way(self, "upper end", self->jog_mm_s, 0);
     if (is_there) {
         printf("Down, to the end. ");
     }
@@ -554,12 +407,12 @@ static void try_motion(run_t *self)
 static int finish(run_t *self, const char *file, const char *configuration, const char *version, const char *build)
 {
     char error[SELFTEST_NOTE_MAX];
-    const bool is_passed = selftest_has_passed(&self->report) && !self->is_over;
-    const bool is_told = has_done(self, is_passed ? "selftest passed" : "selftest failed", error);
+    const bool is_passed = selftest_has_passed(&self->report) && !self->link.is_over;
+    const bool is_told = selftest_has_done(&self->link, is_passed ? "selftest passed" : "selftest failed", error);
     if (!is_told) {
         fprintf(stderr, "heavectl: selftest: %s\n", error);
     }
-    (void)has_done(self, "service-off", error);
+    (void)selftest_has_done(&self->link, "service-off", error);
     const int wrong = file != NULL ? selftest_write(&self->report, file, configuration, version, build) : 0;
     if (wrong != 0) {
         fprintf(stderr, "heavectl: %s: %s\n", file, strerror(wrong));
@@ -570,26 +423,26 @@ static int finish(run_t *self, const char *file, const char *configuration, cons
 
 static bool begin(run_t *self, cJSON **plan, cJSON **status)
 {
-    self->fd = open_link(self->path);
-    if (self->fd < 0) {
+    self->link.fd = selftest_connect(self->path);
+    if (self->link.fd < 0) {
         fprintf(stderr, "heavectl: heaved is not running at %s: %s\n", self->path, strerror(errno));
         return false;
     }
-    *plan = ask(self, "selftest");
-    *status = ask(self, "status");
-    if (!is_set(*plan, "ok") || !is_set(*status, "ok")) {
-        fprintf(stderr, "heavectl: selftest: %s\n", *plan != NULL ? text_of(*plan, "error") : "heaved does not answer");
+    *plan = selftest_ask(&self->link, "selftest");
+    *status = selftest_ask(&self->link, "status");
+    if (!selftest_is_set(*plan, "ok") || !selftest_is_set(*status, "ok")) {
+        fprintf(stderr, "heavectl: selftest: %s\n", *plan != NULL ? selftest_text(*plan, "error") : "heaved does not answer");
         return false;
     }
-    self->following_mm = number_of(*plan, "following_mm");
-    self->drift_mm = number_of(*plan, "drift_mm");
-    self->jog_mm_s = number_of(*plan, "jog_mm_s");
+    self->following_mm = selftest_number(*plan, "following_mm");
+    self->drift_mm = selftest_number(*plan, "drift_mm");
+    self->jog_mm_s = selftest_number(*plan, "jog_mm_s");
     self->cylinders = (unsigned)cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(*status, "cylinders"));
     self->cylinders = self->cylinders < CYLINDERS ? self->cylinders : CYLINDERS;
-    if (send(self->fd, "samples\n", 8, MSG_NOSIGNAL) != 8) {
+    if (send(self->link.fd, "samples\n", 8, MSG_NOSIGNAL) != 8) {
         return false;
     }
-    const int samples = scope_receive(self->fd, self->line, sizeof self->line);
+    const int samples = scope_receive(self->link.fd, self->link.line, sizeof self->link.line);
     const char *wrong =
         samples < 0 ? "there are no samples; [samples] seconds has to be above 0" : samples_reader_open(&self->reader, samples);
     if (samples >= 0) {
@@ -605,7 +458,7 @@ int selftest_run(const char *path, const char *file, const volatile sig_atomic_t
 {
     static run_t run;
     cJSON *plan = NULL, *status = NULL;
-    run = (run_t){.path = path, .is_interrupted = is_interrupted, .fd = -1};
+    run = (run_t){.path = path, .link = {.is_interrupted = is_interrupted, .fd = -1}};
     if (isatty(STDIN_FILENO) == 0) {
         fprintf(stderr, "heavectl: selftest takes a terminal: a person presses, looks and holds\n");
         return EXIT_BAD_USAGE;
@@ -616,13 +469,14 @@ int selftest_run(const char *path, const char *file, const volatile sig_atomic_t
         printf("Self-test of configuration %s, with nobody on board.\n", cJSON_IsString(program) ? program->valuestring : "?");
         if (enter_service(&run)) {
             try_switches(&run, plan);
-            if (!run.is_over && enter_service(&run)) {
-                try_relays(&run, (unsigned)number_of(plan, "relays"));
+            if (!run.link.is_over && enter_service(&run)) {
+                try_relays(&run, (unsigned)selftest_number(plan, "relays"));
             }
-            if (!run.is_over) {
+            if (!run.link.is_over) {
                 try_motion(&run);
             }
-            code = finish(&run, file, text_of(plan, "configuration"), text_of(status, "version"), text_of(status, "build"));
+            code = finish(&run, file, selftest_text(plan, "configuration"), selftest_text(status, "version"),
+                          selftest_text(status, "build"));
         } else {
             code = EXIT_REFUSED;
         }
@@ -630,8 +484,8 @@ int selftest_run(const char *path, const char *file, const volatile sig_atomic_t
     }
     cJSON_Delete(plan);
     cJSON_Delete(status);
-    if (run.fd >= 0) {
-        (void)close(run.fd);
+    if (run.link.fd >= 0) {
+        (void)close(run.link.fd);
     }
     return code;
 }

@@ -158,7 +158,7 @@ void blackbox_see(blackbox_t *self);
 uint32_t blackbox_number(const char *name);
 bool blackbox_is_dump(const char *name);
 
-/** Writes what is due and ends the thread, or leaves it alone where the disk takes too long.
+/** Writes the incidents that are due and ends the thread. If the disk takes too long, the thread is left running.
  *  @return false: it still runs, and self has to stay */
 bool blackbox_close(blackbox_t *self);
 

@@ -2,8 +2,8 @@
  * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
  * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump, incidents, seen,
  * acknowledge, by NAME. The service thread owns it; nothing blocks, nothing allocates after the open, and a client that does not
- * read is dropped. Nobody keeps an operator out: where all places are taken, a newcomer gets that of the client that matters
- * least, which is told so.
+ * read is dropped. An operator can always connect: if all places are taken, heaved closes the connection of the
+ * least important client, with an error that says so.
  */
 #ifndef HEAVE_SERVICE_CONTROL_H
 #define HEAVE_SERVICE_CONTROL_H
@@ -29,7 +29,7 @@
 #define CONTROL_IDLE_US      2000000u /* has asked nothing for so long: the first to give way */
 #define CONTROL_GRACE_US     100000u  /* after it came: time to ask something before it has to give way */
 
-/** One client; private to control.c. */
+/** One client; private to control*.c. */
 typedef struct {
     int fd;         /**< -1: free */
     bool is_looker; /**< came by the second socket */
@@ -63,7 +63,7 @@ typedef struct {
     level_peer_t peer;
 } control_selftest_t;
 
-/** A listening socket; private to control.c. */
+/** A listening socket; private to control*.c. */
 typedef struct {
     int fd;       /**< -1: closed, or not there */
     int newcomer; /**< has come, and nobody can give way yet; -1: nobody */
@@ -72,7 +72,7 @@ typedef struct {
     struct stat made; /**< identity of the socket file, so that only ours is removed */
 } control_socket_t;
 
-/** The sockets and their clients; private to control.c. */
+/** The sockets and their clients; private to control*.c. */
 typedef struct control {
     control_socket_t socket[CONTROL_SOCKETS]; /**< the second one is [control] look_socket */
     levels_t levels;

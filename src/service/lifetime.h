@@ -59,7 +59,7 @@ typedef struct {
  * they cannot be written. Both are said */
 int lifetime_open(lifetime_t *self, const config_t *config, uint32_t axes);
 
-/** Starts the writer; does nothing where nothing is kept. */
+/** Starts the writer thread. Does nothing and returns true if there is no file to write to. */
 bool lifetime_start(lifetime_t *self);
 
 /** Takes a view in, and hands over where it is time to. The service thread, often. */

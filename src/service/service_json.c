@@ -64,3 +64,21 @@ void service_json_drives(json_t *json, const snapshot_t *snapshot)
     }
     json_close(json, ']');
 }
+
+void service_json_selftest(json_t *json, const status_lost_t *lost, const config_t *config)
+{
+    const lifetime_selftest_t *last = lost->life != NULL && lost->life->selftest.day != 0 ? &lost->life->selftest : NULL;
+    json_open(json, "selftest", '{');
+    json_text(json, "when", config->selftest.when == CONFIG_SELFTEST_DAILY ? "daily" : "none");
+    json_bool(json, "due", lost->is_untested);
+    if (last != NULL) {
+        json_number(json, "day", last->day);
+        json_bool(json, "passed", last->is_passed);
+        json_text(json, "configuration", last->hash);
+    } else {
+        json_null(json, "day");
+        json_null(json, "passed");
+        json_null(json, "configuration");
+    }
+    json_close(json, '}');
+}

@@ -447,24 +447,6 @@ static void write_times(json_t *json, const char *key, const histogram_t *times)
     json_close(json, '}');
 }
 
-void status_json_selftest(json_t *json, const status_lost_t *lost, const config_t *config)
-{
-    const lifetime_selftest_t *last = lost->life != NULL && lost->life->selftest.day != 0 ? &lost->life->selftest : NULL;
-    json_open(json, "selftest", '{');
-    json_text(json, "when", config->selftest.when == CONFIG_SELFTEST_DAILY ? "daily" : "none");
-    json_bool(json, "due", lost->is_untested);
-    if (last != NULL) {
-        json_number(json, "day", last->day);
-        json_bool(json, "passed", last->is_passed);
-        json_text(json, "configuration", last->hash);
-    } else {
-        json_null(json, "day");
-        json_null(json, "passed");
-        json_null(json, "configuration");
-    }
-    json_close(json, '}');
-}
-
 static void write_program(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,
                           const motion_times_t *times)
 {
@@ -536,7 +518,7 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     write_counters(json, view);
     write_fault_counts(json, s);
     write_life(json, lost->life, s);
-    status_json_selftest(json, lost, config);
+    service_json_selftest(json, lost, config);
     write_program(json, view, config, lost, times);
     json_close(json, '}');
 }

@@ -25,7 +25,4 @@ typedef struct {
 void status_json_write(json_t *json, const motion_view_t *view, const config_t *config, const status_lost_t *lost,
                        const motion_times_t *times);
 
-/** When a self-test is asked for, whether one is due, and what came of the newest: member `selftest`. */
-void status_json_selftest(json_t *json, const status_lost_t *lost, const config_t *config);
-
 #endif

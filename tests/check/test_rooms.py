@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_rooms.py - check_rooms.py finds what is planted: an include the wrong way, a private header of the core, sources that lead to each other."""
+"""test_rooms.py - check_rooms.py finds what is planted: an include the wrong way, a private header of the core, sources that lead to each other, a file that is too long."""
 import subprocess
 import sys
 import tempfile
@@ -48,10 +48,21 @@ def circle():
         assert found == [["config/a.c", "config/b.c", "config/c.c"]], found
 
 
+def long_file():
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        for name, lines in {"src/motion/a.c": 500, "src/motion/b.c": 501, "hal/sim/c.h": 700, "src/config/keys.c": 900, "src/protocol/frame.c": 9000}.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text("\n" * lines, encoding="utf-8")
+        most = check_rooms.STILL_LONG["src/protocol/frame.c"]
+        assert sorted(check_rooms.too_long(root)) == ["hal/sim/c.h: 700 lines, at most 500", "src/motion/b.c: 501 lines, at most 500",
+                                                      f"src/protocol/frame.c: 9000 lines, at most {most}"], check_rooms.too_long(root)
+
+
 def main():
     suite = tap.Suite()
     for name, check in {"nothing wrong is nothing": fine, "an include the wrong way": wrong_way, "a private header of the core": private,
-                        "sources that lead to each other": circle}.items():
+                        "sources that lead to each other": circle, "a file that is too long": long_file}.items():
         with suite.case(f"rooms: {name}"):
             check()
     return suite.done()

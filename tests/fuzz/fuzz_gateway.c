@@ -157,17 +157,16 @@ static void forget_rejects(const gateway_t *gateway, gateway_t *out)
     memset(counters->rejected, 0, sizeof counters->rejected);
     counters->rejected[FRAME_ERR_PLATFORM] = platform; /* of good frames */
     counters->datagrams = counters->oversize = 0;
-    memset(out->reject_logged_us, 0, sizeof out->reject_logged_us);
-    memset(out->reject_suppressed, 0, sizeof out->reject_suppressed);
-    memset(&out->scanner, 0, sizeof out->scanner);
-    memset(out->datagram, 0, sizeof out->datagram);
-    tidy_owner(&out->owner);
+    const uint32_t waited_us = out->intake.waited_us;
+    memset(&out->intake, 0, sizeof out->intake);
+    out->intake.waited_us = waited_us;
+    tidy_owner(&out->sender.owner);
     tidy_owner(&out->snapshot.owner);
     tidy_owner(&out->snapshot.other);
-    tidy_target(&out->confirm.last);
-    tidy_target(&out->confirm.waiting);
-    tidy_jump(&out->confirm.jump);
-    tidy_jump(&out->confirm.drop);
+    tidy_target(&out->sender.confirm.last);
+    tidy_target(&out->sender.confirm.waiting);
+    tidy_jump(&out->sender.confirm.jump);
+    tidy_jump(&out->sender.confirm.drop);
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
         tidy_feedback(&out->snapshot.drive[i]);
     }

@@ -2297,13 +2297,13 @@ static void test_resume_refuses_what_is_insane_in_any_module(void)
     const bool *const k_bools[] = {&saved.is_bus_lost,
                                    &saved.is_tracking_actual,
                                    &saved.is_shutdown_asked,
-                                   &saved.has_newest,
+                                   &saved.sender.has_newest,
                                    &saved.auto_engage.is_due,
-                                   &saved.owner.is_taken,
-                                   &saved.owner.peer.is_ipv6,
-                                   &saved.confirm.has_last,
-                                   &saved.confirm.is_waiting,
-                                   &saved.confirm.last.has_angle,
+                                   &saved.sender.owner.is_taken,
+                                   &saved.sender.owner.peer.is_ipv6,
+                                   &saved.sender.confirm.has_last,
+                                   &saved.sender.confirm.is_waiting,
+                                   &saved.sender.confirm.last.has_angle,
                                    &saved.snapshot.has_angle,
                                    &saved.supervisor.is_held_by_silence,
                                    &saved.snapshot.other.is_taken,
@@ -2334,11 +2334,11 @@ static void test_resume_refuses_what_is_insane_in_any_module(void)
     SPOIL(snapshot.limiting_cylinder, CYLINDERS_MAX + 1);
     SPOIL(snapshot.drive[1].actual_mm_q32, INT64_MIN);
     SPOIL(told[7], 1u << FAULT_CODES);
-    SPOIL(confirm.jump.axis, AXES_MAX);
-    SPOIL(confirm.last.space, (motion_space_t)(MOTION_CYLINDERS + 1));
-    SPOIL(relay_policy.mask, 0x8000);
-    SPOIL(newest.space, (motion_space_t)(MOTION_CYLINDERS + 1));
-    SPOIL(newest.time_ms, UINT32_MAX);
+    SPOIL(sender.confirm.jump.axis, AXES_MAX);
+    SPOIL(sender.confirm.last.space, (motion_space_t)(MOTION_CYLINDERS + 1));
+    SPOIL(relay_output.policy.mask, 0x8000);
+    SPOIL(sender.newest.space, (motion_space_t)(MOTION_CYLINDERS + 1));
+    SPOIL(sender.newest.time_ms, UINT32_MAX);
     SPOIL(output.limiting_cylinder, CYLINDERS_MAX + 1);
     SPOIL(motion.kin.cylinders, 200);
     SPOIL(motion.kin.reach_shift, 200);
@@ -2353,7 +2353,7 @@ static void test_resume_refuses_what_is_insane_in_any_module(void)
     SPOIL(motion.planned_slots, AXES_MAX + 1);
     SPOIL(motion.asked_cycles, -1);
 #undef SPOIL
-    saved.scanner.phase = 200; /* is not taken from there */
+    saved.intake.scanner.phase = 200; /* is not taken from there */
     TEST_ASSERT_EQUAL(HV_OK, resume(&saved));
 }
 

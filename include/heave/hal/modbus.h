@@ -14,7 +14,7 @@
 /** Most registers or coils of one transaction. */
 #define HAL_MODBUS_VALUES_MAX 64u
 
-/** Unit id of a broadcast: writes only, nobody answers. */
+/** Unit id of a broadcast. Broadcasts are writes; no unit answers them. */
 #define HAL_MODBUS_BROADCAST 0u
 
 /** Function codes. */

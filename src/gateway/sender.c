@@ -1,0 +1,272 @@
+/* SPDX-License-Identifier: MIT
+ * sender.c - see sender.h.
+ */
+#include "sender.h"
+
+#include "auto_engage.h"
+#include "operate.h"
+#include "target.h"
+
+#define STREAM_FRAMES    10u      /* as many are a stream, */
+#define STREAM_PERIOD_US 250000u  /* when each comes within that after the last one, */
+#define STREAM_GAP_US    1000000u /* and over when none has for that */
+
+static void refuse(gateway_t *self, frame_command_t command, const char *missing, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    const intake_io_t io = {self->io.udp, self->io.log, &self->snapshot.counters};
+    intake_refuse(&self->intake, &io, command, missing, from, now_us);
+}
+
+/* What the sender asks of the relays; bits that no relay has are counted. */
+static void take_mask(gateway_t *self, const frame_t *frame)
+{
+    if (frame->is_timed || !frame->has_mask) {
+        return;
+    }
+    const uint16_t wired = (uint16_t)((1u << self->settings.relays.count) - 1u);
+    self->snapshot.counters.relay_missing += (frame->relay_mask & FRAME_RELAY_MASK & ~(unsigned)wired) != 0;
+    self->sender.frame_mask = frame->relay_mask & wired;
+}
+
+/* Axes of a pose and the rotation motor, or cylinders. */
+static const char *axis_text(motion_space_t space, unsigned axis)
+{
+    static const char *const k_axes[AXES_MAX] = {"roll", "pitch", "yaw", "x", "y", "z", "angle"};
+    static const char *const k_cylinders_1_to_6[CYLINDERS_MAX] = {"cylinder 1", "cylinder 2", "cylinder 3",
+                                                                  "cylinder 4", "cylinder 5", "cylinder 6"};
+    return space == MOTION_CYLINDERS && axis < CYLINDERS_MAX ? k_cylinders_1_to_6[axis] : k_axes[axis];
+}
+
+/* One line about a value of the sender that drives. */
+static void log_not_followed(gateway_t *self, const char *what, const char *why, const confirm_jump_t *jump, uint32_t suppressed)
+{
+    char line[HAL_LOG_TEXT_MAX + 1];
+    char peer[HAL_UDP_PEER_TEXT_MAX];
+    text_t text = text_start(line, sizeof line);
+    (void)hal_udp_peer_text(&self->sender.owner.peer, peer, sizeof peer);
+    text_put(&text, what);
+    text_put(&text, " from ");
+    text_put(&text, peer);
+    text_put(&text, " not followed, ");
+    text_put(&text, why);
+    text_put(&text, ": ");
+    text_put(&text, axis_text(jump->space, jump->axis));
+    text_put(&text, " ");
+    text_put_q32(&text, jump->value_q32, 1);
+    text_put(&text, " after ");
+    text_put_q32(&text, jump->from_q32, 1);
+    intake_put_suppressed(&text, suppressed);
+    hal_log_write(self->io.log, HAL_LOG_WARNING, line);
+}
+
+/* One line for the first spike of a burst; what is left out is told with a later one. */
+static void log_spikes(gateway_t *self, uint64_t now_us)
+{
+    const gate_t *gate = motion_gate(&self->motion);
+    const uint32_t unlogged = gate_spikes(gate) - self->sender.spikes_logged;
+    if (unlogged == 0 || (self->sender.spike_logged_us != 0 && now_us - self->sender.spike_logged_us < REJECT_LOG_INTERVAL_US)) {
+        return;
+    }
+    const gate_spike_t *spike = gate_last_spike(gate);
+    const confirm_jump_t jump = {MOTION_POSE, spike->axis, spike->value_q32, spike->before_q32};
+    log_not_followed(self, "sample", "a spike", &jump, unlogged - 1);
+    self->sender.spike_logged_us = now_us;
+    self->sender.spikes_logged += unlogged;
+}
+
+/* The same of far jumps. */
+static void log_jumps(gateway_t *self, uint64_t now_us)
+{
+    const uint32_t unlogged = self->sender.confirm.dropped - self->sender.jumps_logged;
+    if (unlogged == 0 || (self->sender.jump_logged_us != 0 && now_us - self->sender.jump_logged_us < REJECT_LOG_INTERVAL_US)) {
+        return;
+    }
+    log_not_followed(self, "frame", "a far jump that no second one confirmed", &self->sender.confirm.drop, unlogged - 1);
+    self->sender.jump_logged_us = now_us;
+    self->sender.jumps_logged += unlogged;
+}
+
+/* One line for the first frame of a sender that does not drive, and then at times. */
+HV_OWN_FRAME static void log_other(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    if (self->sender.other_logged_us != 0 && now_us - self->sender.other_logged_us < REJECT_LOG_INTERVAL_US) {
+        self->sender.other_suppressed++;
+        return;
+    }
+    char line[HAL_LOG_TEXT_MAX + 1];
+    char peer[HAL_UDP_PEER_TEXT_MAX];
+    text_t text = text_start(line, sizeof line);
+    text_put(&text, "frame from ");
+    (void)hal_udp_peer_text(from, peer, sizeof peer);
+    text_put(&text, peer);
+    text_put(&text, " not followed: ");
+    (void)hal_udp_peer_text(&self->sender.owner.peer, peer, sizeof peer);
+    text_put(&text, peer);
+    text_put(&text, " drives");
+    intake_put_suppressed(&text, self->sender.other_suppressed);
+    hal_log_write(self->io.log, HAL_LOG_WARNING, line);
+    self->sender.other_logged_us = now_us;
+    self->sender.other_suppressed = 0;
+}
+
+/* A sender takes over from another: the platform stops and goes to its first pose at engage speed. */
+HV_OWN_FRAME static void change_owner(gateway_t *self, uint64_t now_us)
+{
+    char line[HAL_LOG_TEXT_MAX + 1];
+    char peer[HAL_UDP_PEER_TEXT_MAX];
+    text_t text = text_start(line, sizeof line);
+    (void)hal_udp_peer_text(&self->sender.owner.peer, peer, sizeof peer);
+    text_put(&text, peer);
+    text_put(&text, " drives from now on");
+    hal_log_write(self->io.log, HAL_LOG_NOTICE, line);
+    self->snapshot.counters.owner_changes++;
+    confirm_restart(&self->sender.confirm); /* what waits is another sender's */
+    if (self->supervisor.state == STATE_ENGAGED) {
+        operate_follow(self, now_us);
+    }
+}
+
+/* Whether the frame is of the sender that drives; keeps who that is. */
+static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    const gateway_settings_t *settings = &self->settings;
+    const owner_verdict_t verdict = owner_judge(&self->sender.owner, from, (uint64_t)settings->takeover_ms * 1000,
+                                                &settings->priority, motion_timed_end_us(&self->motion), now_us);
+    if (verdict == OWNER_OTHER) {
+        self->snapshot.counters.other_sender++;
+        self->snapshot.other = (owner_t){.is_taken = true, .peer = *from, .last_us = now_us};
+        log_other(self, from, now_us);
+    } else if (verdict == OWNER_NEW) {
+        change_owner(self, now_us);
+    }
+    return verdict != OWNER_OTHER;
+}
+
+/* Tells motion of a target.
+ * Returns false: it is impossible, and has been refused. */
+static bool tell_motion(gateway_t *self, const motion_target_t *target, frame_command_t command, const hal_udp_peer_t *from,
+                        uint64_t now_us)
+{
+    if (self->supervisor.state == STATE_ENGAGED &&
+        motion_target(&self->motion, target, now_us - self->intake.waited_us) != HV_OK) {
+        self->snapshot.counters.impossible++;
+        refuse(self, command, "no pose has these extensions, or one too near a singularity", from, now_us);
+        return false;
+    }
+    log_spikes(self, now_us);
+    return true;
+}
+
+/* The first ones of a cycle at once; then the newest one waits until there is no newer one, and counts as possible. */
+static bool take_target(gateway_t *self, const motion_target_t *target, frame_command_t command, const hal_udp_peer_t *from,
+                        uint64_t now_us)
+{
+    self->sender.targets++;
+    if (self->sender.targets <= GATEWAY_TARGETS_PER_CYCLE) {
+        return tell_motion(self, target, command, from, now_us);
+    }
+    self->sender.has_newest = true;
+    self->sender.newest = *target;
+    self->sender.newest_command = command;
+    self->sender.newest_from = *from;
+    return true;
+}
+
+/* Where the platform is, as a target of that space. */
+static motion_target_t here(const gateway_t *self, motion_space_t space)
+{
+    motion_target_t target = {.space = space, .has_angle = self->settings.has_angle, .angle_deg_q32 = self->output.angle_deg_q32};
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        target.value_q32[i] = space == MOTION_POSE ? self->output.sent.axis_q32[i] : self->output.extension_mm_q32[i];
+    }
+    return target;
+}
+
+/* False for a far jump that waits for a second frame. */
+HV_OWN_FRAME static bool is_confirmed(gateway_t *self, const motion_target_t *target, uint64_t now_us)
+{
+    const bool is_asked_for = self->settings.confirm_jump_mm_q16 != 0 || self->settings.confirm_jump_deg_q16 != 0;
+    if (!is_asked_for || self->supervisor.state != STATE_ENGAGED) {
+        return true;
+    }
+    const confirm_distance_t distance = {q32_from_q16(self->settings.confirm_jump_mm_q16),
+                                         q32_from_q16(self->settings.confirm_jump_deg_q16)};
+    const motion_target_t from = here(self, target->space);
+    return confirm_passes(&self->sender.confirm, &distance, &from, target, now_us);
+}
+
+/* Follows a target that nothing is to be waited for.
+ * Returns false: it is impossible, and has been refused. */
+static bool follow(gateway_t *self, const motion_target_t *target, frame_command_t command, const hal_udp_peer_t *from,
+                   uint64_t now_us)
+{
+    const bool is_taken = take_target(self, target, command, from, now_us);
+    if (is_taken) {
+        confirm_followed(&self->sender.confirm, target);
+    }
+    return is_taken;
+}
+
+/* A stream that comes back after a gap, as of a sender that was started again, is taken over like a new sender's: nothing says
+ * that it goes on where it ended. Where silence leads to HOLD within the gap that has happened already. Poses sent one by one are
+ * no stream. */
+static void watch_gap(gateway_t *self, uint64_t now_us)
+{
+    const uint64_t end_us = motion_timed_end_us(&self->motion);
+    const uint64_t since_us = end_us > self->sender.start_us ? end_us : self->sender.start_us;
+    const bool is_gap = now_us > since_us && now_us - since_us >= STREAM_GAP_US;
+    if (is_gap && self->sender.stream_frames >= STREAM_FRAMES && self->supervisor.state == STATE_ENGAGED) {
+        operate_follow(self, now_us);
+    }
+    const bool is_next = !is_gap && now_us - self->snapshot.last_frame_us < STREAM_PERIOD_US;
+    self->sender.stream_frames = !is_next                                     ? 0
+                                 : self->sender.stream_frames < STREAM_FRAMES ? self->sender.stream_frames + 1
+                                                                              : STREAM_FRAMES;
+}
+
+void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
+{
+    const hal_udp_peer_t *from = &self->intake.from;
+    const char *missing = target_missing(frame->command, kin_cylinders(motion_kin(&self->motion)), self->settings.has_angle);
+    if (missing != NULL) {
+        refuse(self, frame->command, missing, from, now_us);
+        return;
+    }
+    if (!is_followed(self, from, now_us)) {
+        return;
+    }
+    auto_engage_frame(&self->auto_engage, now_us);
+    const motion_target_t target = target_of(&self->settings, motion_angle_target(&self->motion), frame);
+    operate_event(self, EVENT_FRAME, now_us);
+    watch_gap(self, now_us);
+    const bool is_waiting = !is_confirmed(self, &target, now_us);
+    if (!is_waiting && !follow(self, &target, frame->command, from, now_us)) {
+        return;
+    }
+    target_received(&self->snapshot, frame);
+    counters_t *counters = &self->snapshot.counters;
+    counters->accepted[frame->command]++;
+    counters->accepted_timed += frame->is_timed;
+    self->snapshot.last_frame_us = now_us;
+    self->sender.start_us = now_us;
+    if (self->supervisor.state != STATE_ENGAGED) {
+        counters->not_followed++;
+    } else if (!is_waiting) {
+        take_mask(self, frame);
+    }
+}
+
+void sender_begin(gateway_t *self, uint64_t now_us)
+{
+    self->sender.targets = 0;
+    confirm_cycle(&self->sender.confirm, now_us);
+}
+
+void sender_end(gateway_t *self, uint64_t now_us)
+{
+    if (self->sender.has_newest) {
+        self->sender.has_newest = false;
+        (void)tell_motion(self, &self->sender.newest, self->sender.newest_command, &self->sender.newest_from, now_us);
+    }
+    log_jumps(self, now_us);
+}

@@ -1,0 +1,279 @@
+/* SPDX-License-Identifier: MIT
+ * sequencer.c - see sequencer.h. Bringing up: enable the drives (set-points on actual), home those that have no zero, then go to
+ * the settled extension at engage speed.
+ */
+#include "sequencer.h"
+
+#include "auto_engage.h"
+#include "fault_watch.h"
+#include "operate.h"
+#include "service.h"
+#include "shutdown.h"
+
+#define HOMING_TIMEOUT_US  120000000u
+#define RESET_TIMEOUT_US   2000000u
+#define ABANDON_TIMEOUT_US 3000000u
+
+static unsigned drive_count(const gateway_t *self)
+{
+    return drives_count(self->io.drives);
+}
+
+/* True if every drive is in the state and knows where it is. */
+static bool are_all(const gateway_t *self, drive_state_t state, bool is_zero_needed)
+{
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        const drive_feedback_t *f = &self->snapshot.drive[i];
+        if (f->state != state || !f->has_actual || (is_zero_needed && !f->is_homed)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Next step of bringing up, when the last one is complete. */
+static void step_bring_up(gateway_t *self, uint64_t now_us)
+{
+    const bool is_late = operate_is_coming_up(self) && now_us >= self->bring_up_deadline_us;
+    if (is_late || fault_watch_is_told(self, FAULT_DRIVE_TIMEOUT, 0)) {
+        fault_watch_raise(self, &(fault_t){.code = FAULT_DRIVE_TIMEOUT, .at_us = now_us});
+        return;
+    }
+    if (self->bring_up == BRING_UP_ENABLE && !are_all(self, DRIVE_ENABLED, true)) {
+        self->is_tracking_actual = true;
+        if (!are_all(self, DRIVE_ENABLED, false)) {
+            (void)!drives_request(self->io.drives, DRIVES_ENABLE);
+        } else if (drives_request(self->io.drives, DRIVES_HOME) == HV_OK) {
+            self->bring_up = BRING_UP_HOME;
+            self->bring_up_deadline_us = now_us + HOMING_TIMEOUT_US;
+        }
+    }
+    if (operate_is_coming_up(self) && are_all(self, DRIVE_ENABLED, true)) {
+        self->bring_up = BRING_UP_MOVE;
+        if (self->is_tracking_actual) { /* else it goes on from the motion it is in */
+            self->is_tracking_actual = false;
+            operate_track_actual(self);
+        }
+        motion_settle(&self->motion);
+    }
+}
+
+/* The move of HOMING, RISING or SETTLING has arrived. */
+static bool is_move_done(const gateway_t *self)
+{
+    switch (self->supervisor.state) {
+    case STATE_HOMING:
+        return self->bring_up == BRING_UP_MOVE && motion_is_done(&self->motion);
+    case STATE_RISING:
+    case STATE_SETTLING:
+        return motion_is_done(&self->motion);
+    case STATE_OFF:
+    case STATE_SETTLED:
+    case STATE_NEUTRAL:
+    case STATE_ENGAGED:
+    case STATE_HOLD:
+    case STATE_SERVICE:
+    case STATE_FAULT:
+    case STATE_ESTOP:
+    case STATES:
+        break;
+    }
+    return false;
+}
+
+static void read_inputs(gateway_t *self, uint64_t now_us)
+{
+    uint32_t levels = 0;
+    const bool is_read = hal_inputs_read(self->io.inputs, &levels) == HV_OK;
+    self->snapshot.is_estop_active = !is_read || (levels & INPUT_ESTOP) != 0;
+    if (self->snapshot.is_estop_active) {
+        fault_watch_give_up_reset(self);
+        operate_event(self, EVENT_ESTOP, now_us);
+    }
+    fault_watch_channels(self, is_read ? (levels & INPUT_APART) != 0 : self->is_estop_apart, now_us);
+    fault_watch_power(self, is_read ? (levels & INPUT_POWER) != 0 : self->snapshot.is_power_failing, now_us);
+}
+
+/* A reset first asks the drives; it takes effect when none of them is in fault any more. */
+static void step_reset(gateway_t *self, uint64_t now_us)
+{
+    if (self->reset_until_us == 0) {
+        return;
+    }
+    if (!operate_is_drive_fault_present(self)) {
+        operate_event(self, EVENT_RESET, now_us);
+    }
+    if (!supervisor_is_latched(&self->supervisor)) {
+        self->reset_until_us = 0;
+        self->snapshot.fault = (fault_t){.code = FAULT_NONE};
+        self->snapshot.fault_report = fault_watch_report_of(self, &self->snapshot.fault);
+        self->snapshot.reaction = FAULT_REACT_NONE;
+    } else if (now_us >= self->reset_until_us) {
+        self->reset_until_us = 0;
+        hal_log_write(self->io.log, HAL_LOG_WARNING, "reset refused: the cause of the fault or the e-stop is still there");
+    }
+}
+
+/* A shutdown that interrupted homing ends once the drives have stopped, or do not within a few seconds: their own watch has to.
+ */
+static void step_abandoned(gateway_t *self, uint64_t now_us)
+{
+    const bool is_abandoned = self->is_shutdown_asked && self->supervisor.state == STATE_HOLD && self->is_tracking_actual;
+    if (!is_abandoned || self->is_disable_due) {
+        return;
+    }
+    unsigned down = 0;
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        down += self->snapshot.drive[i].state == DRIVE_DISABLED; /* one that cannot tell would be a fault */
+    }
+    if (down == drive_count(self) || now_us - self->state_since_us >= ABANDON_TIMEOUT_US) {
+        operate_event(self, EVENT_SHUTDOWN, now_us);
+    }
+}
+
+/* The auto policy, once: brings the platform up as an operator's engage would. */
+static void step_auto(gateway_t *self, uint64_t now_us)
+{
+    const state_t state = self->supervisor.state;
+    const bool can_engage = (state == STATE_OFF && !operate_is_drive_fault_present(self)) || state == STATE_SETTLED;
+    if (can_engage && auto_engage_is_ready(&self->auto_engage, now_us)) {
+        auto_engage_end(&self->auto_engage);
+        operate_event(self, EVENT_ENGAGE, now_us);
+    } else if (supervisor_is_latched(&self->supervisor)) {
+        auto_engage_end(&self->auto_engage); /* after a fault only an operator engages */
+    }
+}
+
+/* Those of a cycle. */
+static void clear_faults(uint32_t by_axis[DRIVES_MAX + 1u])
+{
+    for (unsigned i = 0; i <= DRIVES_MAX; i++) {
+        by_axis[i] = 0;
+    }
+}
+
+/* What hands do, and drives that take too long about it. */
+static void watch_service(gateway_t *self, uint64_t now_us)
+{
+    const fault_code_t code = service_step(self, now_us);
+    if (code != FAULT_NONE) {
+        fault_watch_raise(self, &(fault_t){.code = code, .at_us = now_us});
+    }
+}
+
+void sequencer_before_frames(gateway_t *self, uint64_t now_us)
+{
+    clear_faults(self->snapshot.begun);
+    operate_event(self, EVENT_TICK, now_us);
+    const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->snapshot.drive) == HV_OK;
+    fault_watch_bus(self, !is_bus_heard || fault_watch_is_bus_stalled(self), now_us);
+    fault_watch_bus_failing(self, now_us);
+    fault_watch_drives(self, now_us);
+    read_inputs(self, now_us);
+    step_reset(self, now_us);
+    step_abandoned(self, now_us);
+    step_auto(self, now_us);
+    if (self->supervisor.state == STATE_OFF && are_all(self, DRIVE_ENABLED, true) && !self->is_disable_due) {
+        operate_track_actual(self); /* they may have told where they are in this cycle only */
+        operate_event(self, EVENT_DRIVES_READY, now_us);
+        self->is_tracking_actual = self->supervisor.state == STATE_OFF;
+    }
+    step_bring_up(self, now_us);
+    if (is_move_done(self)) {
+        self->bring_up = BRING_UP_IDLE;
+        operate_event(self, EVENT_MOVE_DONE, now_us);
+    }
+    if (self->supervisor.state == STATE_SERVICE) {
+        watch_service(self, now_us);
+    }
+    clear_faults(self->told);
+}
+
+static bool has_passed(uint64_t now_us, uint64_t since_us, uint32_t limit_ms)
+{
+    return limit_ms != 0 && now_us >= since_us && now_us - since_us >= (uint64_t)limit_ms * 1000;
+}
+
+void sequencer_after_frames(gateway_t *self, uint64_t now_us)
+{
+    const uint64_t end_us = motion_timed_end_us(&self->motion);
+    const uint64_t since_us = end_us > self->sender.start_us ? end_us : self->sender.start_us;
+    if (has_passed(now_us, since_us, self->settings.silence_hold_ms)) {
+        operate_event(self, EVENT_SILENCE_HOLD, now_us);
+    }
+    if (has_passed(now_us, since_us, self->settings.silence_neutral_ms)) {
+        operate_event(self, EVENT_SILENCE_NEUTRAL, now_us);
+    }
+    if (has_passed(now_us, since_us, self->settings.silence_settle_ms)) {
+        operate_event(self, EVENT_SILENCE_SETTLE, now_us);
+    }
+    if (self->is_tracking_actual) {
+        /* torque off first: a drive that follows would take the set-points' way back to actual for a jump */
+        if (self->is_disable_due) {
+            operate_disable_drives(self);
+        }
+        operate_track_actual(self);
+    }
+}
+
+hv_status_t sequencer_request(gateway_t *self, event_t request, uint64_t now_us)
+{
+    if (request == EVENT_RESET) {
+        const bool is_latched = supervisor_is_latched(&self->supervisor);
+        const bool is_for_drives = self->supervisor.state == STATE_OFF && operate_is_drive_fault_present(self);
+        if (self->snapshot.is_estop_active || (!is_latched && !is_for_drives)) {
+            return HV_ERR_STATE;
+        }
+        (void)!drives_request(self->io.drives, DRIVES_RESET_FAULT);
+        self->reset_until_us = is_latched ? now_us + RESET_TIMEOUT_US : 0;
+        return HV_OK;
+    }
+    auto_engage_end(&self->auto_engage);
+    self->is_shutdown_asked |= request == EVENT_SHUTDOWN;
+    const uint32_t ignored = self->supervisor.ignored[request];
+    if (self->is_shutdown_asked && request != EVENT_SHUTDOWN && request != EVENT_HOLD) {
+        return HV_ERR_STATE;
+    }
+    const bool is_going_off = self->is_disable_due || !motion_is_at_rest(&self->motion);
+    if (request == EVENT_SERVICE && (is_going_off || operate_is_drive_fault_present(self))) {
+        return HV_ERR_STATE; /* it would become a fault at once */
+    }
+    if (request == EVENT_HOLD && self->supervisor.state == STATE_SERVICE) {
+        service_let_go(self);
+    }
+    if (request == EVENT_SHUTDOWN && operate_is_coming_up(self)) {
+        operate_event(self, EVENT_HOLD, now_us); /* homing may take minutes, and who ends heaved has less patience */
+        return HV_OK;
+    }
+    operate_event(self, request, now_us);
+    return self->supervisor.ignored[request] == ignored ? HV_OK : HV_ERR_STATE;
+}
+
+/* --- Health --- */
+
+/* A person has asked for a reset and nothing moves: drives whose safe-torque-off is a fault to them can only come back where the
+ * pulse comes first. */
+static bool is_being_reset(const gateway_t *self)
+{
+    return self->reset_until_us != 0 && !self->snapshot.is_estop_active && shutdown_energized(self, false) == 0;
+}
+
+/* In OFF, and while they are reset, drives may be in fault: they have no torque. */
+static bool are_drives_well(const gateway_t *self)
+{
+    const bool is_fault_borne = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor);
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        const drive_state_t state = self->snapshot.drive[i].state;
+        if (state == DRIVE_OFFLINE || (state == DRIVE_FAULT && !is_fault_borne)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool sequencer_is_well(const gateway_t *self)
+{
+    const bool is_state_well = !supervisor_is_latched(&self->supervisor) || is_being_reset(self);
+    const bool is_bus_well = !self->is_bus_lost && !drives_is_failing(self->io.drives) && !fault_watch_is_bus_stalled(self);
+    return is_state_well && is_bus_well && are_drives_well(self) && !self->is_late && !self->is_end_overdue;
+}

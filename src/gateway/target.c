@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: MIT
+ * target.c - see target.h.
+ */
+#include "target.h"
+
+#define TURN_Q32 q32_from_int(360)
+
+/* Where the values of a frame go: an axis of the platform, or a cylinder (from SLOT_CYLINDER on). */
+enum { SLOT_CYLINDER = AXES_MAX };
+
+static const uint8_t k_slots[FRAME_COMMANDS][FRAME_VALUES_MAX] = {
+    [FRAME_A3] = {AXIS_ROLL, AXIS_PITCH, AXIS_Z},
+    [FRAME_A4] = {AXIS_ROLL, AXIS_PITCH, AXIS_Z, AXIS_ANGLE},
+    [FRAME_A6] = {AXIS_ROLL, AXIS_PITCH, AXIS_YAW, AXIS_X, AXIS_Y, AXIS_Z},
+    [FRAME_A7] = {AXIS_ROLL, AXIS_PITCH, AXIS_YAW, AXIS_X, AXIS_Y, AXIS_Z, AXIS_ANGLE},
+    [FRAME_C3] = {SLOT_CYLINDER, SLOT_CYLINDER + 1, SLOT_CYLINDER + 2},
+    [FRAME_C6] = {SLOT_CYLINDER, SLOT_CYLINDER + 1, SLOT_CYLINDER + 2, SLOT_CYLINDER + 3, SLOT_CYLINDER + 4, SLOT_CYLINDER + 5},
+    [FRAME_C7] = {SLOT_CYLINDER, SLOT_CYLINDER + 1, SLOT_CYLINDER + 2, SLOT_CYLINDER + 3, SLOT_CYLINDER + 4, SLOT_CYLINDER + 5,
+                  AXIS_ANGLE},
+};
+
+/* Cylinders a command is for: 0 where poses of both kinds of platform take it. */
+static const uint8_t k_cylinders[FRAME_COMMANDS] = {
+    [FRAME_A6] = 6, [FRAME_A7] = 6, [FRAME_C3] = 3, [FRAME_C6] = 6, [FRAME_C7] = 6};
+
+static bool needs_angle(frame_command_t command)
+{
+    return command == FRAME_A4 || command == FRAME_A7 || command == FRAME_C7;
+}
+
+const char *target_missing(frame_command_t command, unsigned cylinders, bool has_angle)
+{
+    if (k_cylinders[command] != 0 && k_cylinders[command] != cylinders) {
+        return cylinders == 3
+                   ? "it is for six cylinders, this platform has three (A3, C3, and A4 with a rotation motor)"
+                   : "it is for three cylinders, this platform has six (A3, A6, C6, and A4, A7, C7 with a rotation motor)";
+    }
+    return needs_angle(command) && !has_angle ? "it needs a rotation motor, and [angle] present is no" : NULL;
+}
+
+/* The value in the platform's own axis: sign * scale * sent + offset. */
+static q32_t to_axis(const axis_input_t *axis, q16_t sent_q16)
+{
+    const q32_t scaled_q32 = fx_mul_shift(q32_from_q16(sent_q16), axis->scale_q16, 16);
+    return (axis->sign < 0 ? -scaled_q32 : scaled_q32) + q32_from_q16(axis->offset_q16);
+}
+
+/* The same angle some whole turns nearer, if it is beyond a limit and those bring it within both. */
+static q32_t turned_into_limits(const gateway_settings_t *settings, q32_t angle_q32)
+{
+    const q32_t min_q32 = q32_from_q16(settings->angle_min_q16);
+    const q32_t max_q32 = q32_from_q16(settings->angle_max_q16);
+    const q32_t beyond_q32 = angle_q32 > max_q32 ? angle_q32 - max_q32 : angle_q32 < min_q32 ? angle_q32 - min_q32 : 0;
+    const q32_t turns = (fx_abs(beyond_q32) + TURN_Q32 - 1) / TURN_Q32;
+    const q32_t turned_q32 = angle_q32 - (beyond_q32 < 0 ? -turns : turns) * TURN_Q32;
+    return turned_q32 >= min_q32 && turned_q32 <= max_q32 ? turned_q32 : angle_q32;
+}
+
+/* If the motor takes the shorter way: the angle that is whole turns away and nearest to the last one that was asked for. Not to
+ * where the motor is: it may be more than half a turn behind, and would change its direction with every frame. */
+static q32_t unwrap(const gateway_settings_t *settings, q32_t last_q32, q32_t angle_q32)
+{
+    if (settings->angle_wrap == ANGLE_AS_SENT) {
+        return angle_q32;
+    }
+    q32_t way_q32 = (angle_q32 - last_q32) % TURN_Q32;
+    if (way_q32 > TURN_Q32 / 2) {
+        way_q32 -= TURN_Q32;
+    } else if (way_q32 < -TURN_Q32 / 2) {
+        way_q32 += TURN_Q32;
+    }
+    return turned_into_limits(settings, last_q32 + way_q32);
+}
+
+motion_target_t target_of(const gateway_settings_t *settings, q32_t last_angle_q32, const frame_t *frame)
+{
+    const bool is_pose = k_slots[frame->command][0] < SLOT_CYLINDER;
+    motion_target_t target = {
+        .space = is_pose ? MOTION_POSE : MOTION_CYLINDERS, .is_timed = frame->is_timed, .time_ms = frame->time_ms};
+    q16_t axis_q16[AXES_MAX] = {0};
+    for (unsigned i = 0; i < frame->count; i++) {
+        const uint8_t slot = k_slots[frame->command][i];
+        if (slot >= SLOT_CYLINDER) {
+            target.value_q32[slot - SLOT_CYLINDER] = q32_from_q16(frame->value_q16[i]);
+        } else {
+            axis_q16[slot] = frame->value_q16[i];
+        }
+    }
+    for (unsigned i = 0; is_pose && i < POSE_AXES; i++) {
+        target.value_q32[i] = to_axis(&settings->axis[i], axis_q16[i]);
+    }
+    target.has_angle = needs_angle(frame->command);
+    target.angle_deg_q32 = unwrap(settings, last_angle_q32, to_axis(&settings->axis[AXIS_ANGLE], axis_q16[AXIS_ANGLE]));
+    return target;
+}
+
+void target_received(snapshot_t *s, const frame_t *frame)
+{
+    s->has_received = k_slots[frame->command][0] < SLOT_CYLINDER;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        s->received_q16[i] = 0;
+    }
+    for (unsigned i = 0; s->has_received && i < frame->count; i++) {
+        if (k_slots[frame->command][i] < POSE_AXES) {
+            s->received_q16[k_slots[frame->command][i]] = frame->value_q16[i];
+        }
+    }
+}

@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: MIT
+ * control_client.c - see control_client.h.
+ */
+#include "service/control_client.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "service/operator_requests.h"
+#include "service/service_json.h"
+
+const snapshot_t *control_snapshot(const control_t *self)
+{
+    return &self->view.view.snapshot;
+}
+
+state_t control_state(const control_t *self)
+{
+    return control_snapshot(self)->state;
+}
+
+/* What became of a request, for the operator log. Once for each. */
+void control_client_log(control_client_t *client, const char *error, state_t after)
+{
+    if (client->is_logged) {
+        client->is_logged = false;
+        (void)snprintf(client->entry.answer, sizeof client->entry.answer, "%s", error);
+        client->entry.after = after;
+        operator_log_add(client->control->log, &client->entry);
+    }
+}
+
+void control_client_drop(control_client_t *client)
+{
+    control_client_log(client, "the client has gone before it was answered", client->entry.before);
+    (void)close(client->fd);
+    client->fd = -1;
+}
+
+bool control_client_is_waiting(const control_client_t *client)
+{
+    return client->request_id != 0 || client->dump_ticket != 0;
+}
+
+/* Sends bytes, and with the first of them a descriptor that is due. */
+static ssize_t send_bytes(control_client_t *client)
+{
+    union {
+        struct cmsghdr header;
+        char bytes[CMSG_SPACE(sizeof(int))];
+    } passed;
+    struct iovec bytes = {client->out, client->out_length};
+    struct msghdr message = {.msg_iov = &bytes, .msg_iovlen = 1};
+    if (client->is_passing) {
+        memset(&passed, 0, sizeof passed);
+        message.msg_control = passed.bytes;
+        message.msg_controllen = sizeof passed.bytes;
+        struct cmsghdr *header = CMSG_FIRSTHDR(&message);
+        header->cmsg_level = SOL_SOCKET;
+        header->cmsg_type = SCM_RIGHTS;
+        header->cmsg_len = CMSG_LEN(sizeof(int));
+        memcpy(CMSG_DATA(header), &client->control->samples_fd, sizeof(int));
+    }
+    const ssize_t sent = sendmsg(client->fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
+    client->is_passing = client->is_passing && sent <= 0;
+    return sent;
+}
+
+/* Sends what the socket takes now. */
+void control_client_send(control_client_t *client)
+{
+    if (client->out_length == 0) {
+        return;
+    }
+    const ssize_t sent = send_bytes(client);
+    if (sent < 0) {
+        if (errno != EAGAIN && errno != EINTR) {
+            control_client_drop(client);
+        }
+        return;
+    }
+    client->out_length -= (size_t)sent;
+    memmove(client->out, &client->out[sent], client->out_length);
+    if (client->out_length == 0 && client->is_closing && !control_client_is_waiting(client)) {
+        control_client_drop(client);
+    }
+}
+
+/* Queues a complete answer. A client that has not read the last ones is dropped: it would get half an answer. */
+void control_client_answer(control_client_t *client, json_t *json)
+{
+    json_newline(json);
+    if (json->is_cut) {
+        control_client_drop(client);
+        return;
+    }
+    client->out_length += json->length;
+    control_client_send(client);
+}
+
+json_t control_client_start_answer(control_client_t *client)
+{
+    json_t json;
+    json_start(&json, &client->out[client->out_length], sizeof client->out - client->out_length);
+    return json;
+}
+
+void control_client_answer_done(control_client_t *client, const snapshot_t *snapshot)
+{
+    control_client_log(client, "", snapshot->state);
+    json_t json = control_client_start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_text(&json, "state", state_name(snapshot->state));
+    if (client->request == OPERATOR_INTENSITY) {
+        json_number(&json, "intensity_percent", snapshot->intensity_percent);
+    }
+    json_close(&json, '}');
+    control_client_answer(client, &json);
+}
+
+/* Of a request by hand: as good or as bad as it was, with the newest tick. */
+void control_client_answer_service(control_client_t *client, const motion_result_t *result)
+{
+    char error[160];
+    const bool is_done = result->answer == SERVICE_DONE;
+    (void)snprintf(error, sizeof error, "%s%s%s", is_done ? "" : service_verb_name(client->service.verb), is_done ? "" : ": ",
+                   service_answer_text(result->answer));
+    control_client_log(client, error, result->snapshot.state);
+    json_t json = control_client_start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", is_done);
+    if (!is_done) {
+        json_text(&json, "error", error);
+        json_text(&json, "why", service_answer_name(result->answer));
+    }
+    json_text(&json, "state", state_name(result->snapshot.state));
+    service_json_hand(&json, &result->snapshot);
+    json_close(&json, '}');
+    control_client_answer(client, &json);
+}
+
+void control_client_answer_error(control_client_t *client, const char *error, const char *state)
+{
+    control_client_log(client, error, control_state(client->control));
+    json_t json = control_client_start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", false);
+    json_text(&json, "error", error);
+    if (state != NULL) {
+        json_text(&json, "state", state);
+    }
+    json_close(&json, '}');
+    control_client_answer(client, &json);
+}
+
+void control_client_answer_status(control_t *self, control_client_t *client)
+{
+    struct timespec now = {0};
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    self->lost.unix_ms = (uint64_t)now.tv_sec * 1000u + (uint64_t)now.tv_nsec / 1000000u;
+    json_t json = control_client_start_answer(client);
+    status_json_write(&json, &self->view.view, self->config, &self->lost, &self->handover->times);
+    control_client_answer(client, &json);
+}
+
+void control_client_answer_dumped(control_client_t *client, const char *folder)
+{
+    control_client_log(client, "", control_state(client->control));
+    json_t json = control_client_start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_text(&json, "folder", folder);
+    json_close(&json, '}');
+    control_client_answer(client, &json);
+}

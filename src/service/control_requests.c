@@ -1,0 +1,473 @@
+/* SPDX-License-Identifier: MIT
+ * control_requests.c - see control_requests.h.
+ */
+#include "service/control_requests.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "record/service_words.h"
+#include "service/control_client.h"
+#include "service/control_selftest.h"
+#include "service/operator_requests.h"
+#include "service/service_json.h"
+
+#define ANSWER_US 1000000u  /* the motion thread answers within a cycle or two */
+#define DUMP_US   50000000u /* heavectl waits a little longer */
+#define RESET_US  2500000u  /* a reset takes effect when the drives say so */
+
+static const char k_unapproved[] =
+    "the configuration %s is not the one that was approved (%s): `heavectl acknowledge` lets it move until "
+    "heaved ends, [platform] approved for good";
+static const char k_untested[] =
+    "a self-test is due: `heavectl selftest`, with nobody on board, has to pass today with this configuration";
+static const char k_acknowledge[] = "acknowledge";
+
+static control_client_t *find_client(control_t *self, uint32_t request_id)
+{
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        if (self->client[i].fd >= 0 && self->client[i].request_id == request_id) {
+            return &self->client[i];
+        }
+    }
+    return NULL;
+}
+
+static void refuse(const control_t *self, control_client_t *client, const snapshot_t *snapshot, bool is_shutting_down)
+{
+    char error[256];
+    if (client->request == OPERATOR_INTENSITY) {
+        (void)operator_explain_percent(client->number, self->config->settings.intensity_max_percent, error, sizeof error);
+    } else {
+        (void)operator_explain(client->request, snapshot, is_shutting_down, error, sizeof error);
+    }
+    control_client_answer_error(client, error, state_name(snapshot->state));
+}
+
+/* Hands a request to the motion thread; the answer follows.
+ * @param content what it asks for, without its id */
+static void hand_over(control_t *self, control_client_t *client, const motion_request_t *content, uint64_t now_us)
+{
+    const event_t event = (event_t)content->event;
+    motion_request_t request = *content;
+    self->last_id += self->last_id == UINT32_MAX ? 2 : 1; /* 0 means none */
+    request.id = self->last_id;
+    if (!ring_push(&self->handover->requests, &request, sizeof request, NULL, 0)) {
+        control_client_answer_error(client, "heaved is busy: try again", NULL);
+        return;
+    }
+    client->request_id = self->last_id;
+    client->request = event;
+    client->number = request.number;
+    client->service = request.service;
+    client->is_accepted = false;
+    client->answer_by_us = now_us + (event == EVENT_RESET ? RESET_US : ANSWER_US);
+}
+
+static void begin_request(control_t *self, control_client_t *client, event_t event, uint32_t number, uint64_t now_us)
+{
+    hand_over(self, client, &(motion_request_t){.event = (uint32_t)event, .number = number}, now_us);
+}
+
+/* By hand. What is held gets the number of its series here. */
+static void begin_service(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+{
+    motion_request_t request = {.event = OPERATOR_SERVICE};
+    const char *why = service_words_read(line, strlen(line), false, &request.service, &request.tick_us);
+    if (why != NULL) {
+        control_client_answer_error(client, why, state_name(control_snapshot(self)->state));
+        return;
+    }
+    if (service_is_held(request.service.verb)) {
+        request.service.series = ++self->last_series;
+    }
+    hand_over(self, client, &request, now_us);
+}
+
+static void begin_intensity(control_t *self, control_client_t *client, const char *argument, uint64_t now_us)
+{
+    uint32_t percent = 0;
+    if (operator_read_percent(argument, &percent)) {
+        begin_request(self, client, OPERATOR_INTENSITY, percent, now_us);
+    } else {
+        control_client_answer_error(client, "intensity: a whole number of percent is needed, as in `intensity 50`", NULL);
+    }
+}
+
+static bool is_digits(const char *text)
+{
+    return text[0] != '\0' && strspn(text, "0123456789") == strlen(text) && strlen(text) <= 3;
+}
+
+/* "watch" or "watch HZ". */
+static bool begin_watch(control_client_t *client, const char *argument, uint64_t now_us)
+{
+    unsigned hz = CONTROL_WATCH_HZ;
+    if (argument[0] == ' ') {
+        argument++;
+        if (!is_digits(argument)) {
+            return false;
+        }
+        for (hz = 0; *argument != '\0'; argument++) {
+            hz = hz * 10 + (unsigned)(*argument - '0');
+        }
+    } else if (argument[0] != '\0') {
+        return false;
+    }
+    if (hz < 1 || hz > CONTROL_WATCH_MAX_HZ) {
+        return false;
+    }
+    client->watch_period_us = 1000000u / hz;
+    client->watch_next_us = now_us;
+    return true;
+}
+
+/* The answer follows when everything is on the disk. */
+static void begin_dump(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    client->dump_ticket = blackbox_ask(self->blackbox);
+    client->answer_by_us = now_us + DUMP_US;
+    if (client->dump_ticket == 0) {
+        control_client_answer_error(client, "dump: there is no black box; [black-box] directory says where it writes to", NULL);
+    }
+}
+
+/* `tick`, `counts`: what a hand needs before and while it does anything. From the newest view: nothing is asked of the motion. */
+static void answer_tick(control_t *self, control_client_t *client, bool has_counts)
+{
+    const snapshot_t *s = control_snapshot(self);
+    json_t json = control_client_start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_text(&json, "state", state_name(s->state));
+    service_json_hand(&json, s);
+    if (has_counts) {
+        service_json_drives(&json, s);
+    }
+    json_close(&json, '}');
+    control_client_answer(client, &json);
+}
+
+/* Who says that they have been seen gets the list of what was. */
+static void answer_incidents(control_t *self, control_client_t *client, bool is_seeing)
+{
+    uint32_t seen = 0;
+    if (blackbox_feed(self->blackbox) == NULL) {
+        control_client_answer_error(client, "incidents: there is no black box; [black-box] directory says where it writes to",
+                                    NULL);
+        return;
+    }
+    if (is_seeing) {
+        blackbox_see(self->blackbox);
+        control_client_log(client, "", control_snapshot(self)->state);
+    }
+    const uint32_t count = blackbox_list(self->blackbox, self->folder, &seen);
+    json_t json = control_client_start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_open(&json, "incidents", '[');
+    for (uint32_t i = 0; i < count; i++) {
+        json_open(&json, NULL, '{');
+        json_text(&json, "name", self->folder[i].name);
+        json_bool(&json, "dump", blackbox_is_dump(self->folder[i].name));
+        json_bool(&json, "seen", blackbox_number(self->folder[i].name) <= seen);
+        json_close(&json, '}');
+    }
+    json_close(&json, ']');
+    json_close(&json, '}');
+    control_client_answer(client, &json);
+}
+
+/* The memory of the samples comes with the answer (SCM_RIGHTS). */
+static void answer_samples(const control_t *self, control_client_t *client)
+{
+    if (self->samples_fd < 0) {
+        control_client_answer_error(client, "samples: there are none; [samples] seconds says how long they are kept", NULL);
+        return;
+    }
+    client->is_passing = true;
+    json_t json = control_client_start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_number(&json, "seconds", self->config->samples_seconds);
+    json_close(&json, '}');
+    control_client_answer(client, &json);
+}
+
+static const char k_intensity[] = "intensity ";
+static const char k_by[] = "by ";
+
+static bool is_look(const char *line)
+{
+    return strcmp(line, "status") == 0 || strcmp(line, "tick") == 0 || strcmp(line, "counts") == 0 ||
+           strncmp(line, "beat ", 5) == 0 || strcmp(line, "incidents") == 0 || strcmp(line, "samples") == 0 ||
+           strcmp(line, "selftest") == 0 || strncmp(line, "watch", 5) == 0 || strncmp(line, k_by, strlen(k_by)) == 0;
+}
+
+static bool is_known(const char *line)
+{
+    return operator_request_find(line) != EVENTS || service_words_are(line, strlen(line)) ||
+           strncmp(line, k_intensity, strlen(k_intensity)) == 0 || strcmp(line, "dump") == 0 || strcmp(line, "seen") == 0 ||
+           strcmp(line, k_acknowledge) == 0 || control_selftest_is_said(line);
+}
+
+/* Somebody has seen that this is not the configuration that was approved, and wants it. */
+static void acknowledge(control_t *self, control_client_t *client)
+{
+    if (__atomic_exchange_n(&self->handover->is_unapproved, 0, __ATOMIC_ACQ_REL) == 0) {
+        control_client_answer_error(client, "acknowledge: there is nothing to acknowledge",
+                                    state_name(control_snapshot(self)->state));
+        return;
+    }
+    self->acknowledged_by = client->peer;
+    client->request = EVENT_TICK; /* none that the motion thread has to answer */
+    control_client_answer_done(client, control_snapshot(self));
+}
+
+/* Whom it asks for, in its own words: a panel has people behind it that the kernel does not know. */
+static void take_by(control_t *self, control_client_t *client, const char *name)
+{
+    (void)snprintf(client->entry.by, sizeof client->entry.by, "%s", name);
+    if (name[0] == '\0' || strlen(name) >= sizeof client->entry.by) {
+        client->entry.by[0] = '\0';
+        control_client_answer_error(client, "by: a name of 1 to 31 bytes is needed, as in `by anna`", NULL);
+    } else {
+        client->request = EVENT_TICK; /* none that the motion thread has to answer */
+        control_client_answer_done(client, control_snapshot(self));
+    }
+}
+
+/* Everything but looking on is written down. */
+static void begin_entry(control_t *self, control_client_t *client, const char *line)
+{
+    operator_entry_t *entry = &client->entry;
+    client->is_logged = is_known(line);
+    (void)clock_gettime(CLOCK_REALTIME, &entry->at);
+    entry->uid = (uint32_t)client->peer.uid;
+    entry->gid = (uint32_t)client->peer.gid;
+    entry->pid = (int32_t)client->peer.pid;
+    (void)snprintf(entry->request, sizeof entry->request, "%s", line);
+    entry->before = control_snapshot(self)->state;
+    entry->repeats = 0;
+}
+
+/* What the client may not ask for is refused here, in words that say who may. */
+static bool is_allowed(const control_t *self, control_client_t *client, const char *line)
+{
+    const level_t needed = levels_needed(line, control_snapshot(self)->intensity_percent);
+    const config_label_t *group =
+        needed == LEVEL_SERVICE && self->levels.has_service_group ? &self->config->service_group : &self->config->operate_group;
+    char error[192];
+    if (client->peer.level >= needed) {
+        return true;
+    }
+    (void)snprintf(error, sizeof error, "%.20s: not allowed; it takes the level %s (%s%s)%s", line, level_name(needed),
+                   group->text[0] != '\0' ? "members of group " : "the other socket", group->text,
+                   client->is_looker ? ", and not this socket" : "");
+    control_client_answer_error(client, error, state_name(control_snapshot(self)->state));
+    return false;
+}
+
+static void take_request(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+{
+    const event_t event = operator_request_find(line);
+    if (!is_look(line)) {
+        begin_entry(self, client, line);
+    }
+    if (!is_allowed(self, client, line)) {
+        return;
+    }
+    if (event != EVENTS) {
+        begin_request(self, client, event, 0, now_us);
+    } else if (strncmp(line, k_intensity, strlen(k_intensity)) == 0) {
+        begin_intensity(self, client, &line[strlen(k_intensity)], now_us);
+    } else if (service_words_are(line, strlen(line))) {
+        begin_service(self, client, line, now_us);
+    } else if (strcmp(line, "tick") == 0 || strcmp(line, "counts") == 0) {
+        answer_tick(self, client, line[0] == 'c');
+    } else if (strcmp(line, "dump") == 0) {
+        begin_dump(self, client, now_us);
+    } else if (strcmp(line, "incidents") == 0 || strcmp(line, "seen") == 0) {
+        answer_incidents(self, client, line[0] == 's');
+    } else if (strcmp(line, k_acknowledge) == 0) {
+        acknowledge(self, client);
+    } else if (strcmp(line, "selftest") == 0) {
+        control_selftest_answer(self, client);
+    } else if (control_selftest_is_said(line)) {
+        control_selftest_take(self, client, line);
+    } else if (strcmp(line, "samples") == 0) {
+        answer_samples(self, client);
+    } else if (strcmp(line, "status") == 0) {
+        control_client_answer_status(self, client);
+    } else if (strncmp(line, k_by, strlen(k_by)) == 0) {
+        take_by(self, client, &line[strlen(k_by)]);
+    } else if (strncmp(line, "watch", 5) == 0) {
+        if (!begin_watch(client, &line[5], now_us)) {
+            control_client_answer_error(client, "watch: `watch` or `watch HZ` with 1 to 50 is allowed", NULL);
+        }
+    } else {
+        control_client_answer_error(
+            client,
+            "unknown request; status, watch [HZ], tick, counts, intensity PERCENT, engage, hold, resume, park, reset, "
+            "shutdown, service, service-off, torque, jog, home, relay, beat, release, dump, incidents, samples, seen, "
+            "selftest [passed|failed], acknowledge and by NAME are allowed",
+            NULL);
+    }
+}
+
+/* Carries out the complete lines of a client, one at a time: the next one waits for the answer to the last. */
+static void take_lines(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    while (client->fd >= 0 && !control_client_is_waiting(client)) {
+        char *const newline = memchr(client->in, '\n', client->in_length);
+        if (newline == NULL) {
+            return;
+        }
+        const bool has_zero = memchr(client->in, '\0', (size_t)(newline - client->in)) != NULL; /* what stands behind it counts */
+        *newline = '\0';
+        if (newline > client->in && newline[-1] == '\r') {
+            newline[-1] = '\0';
+        }
+        client->asked_us = now_us;
+        if (has_zero) {
+            control_client_answer_error(client, "a zero byte in the request; allowed: text, one request per line", NULL);
+        } else {
+            take_request(self, client, client->in, now_us);
+        }
+        client->in_length -= (size_t)(newline + 1 - client->in);
+        memmove(client->in, newline + 1, client->in_length);
+    }
+}
+
+/* A client that has said all it wants to say still gets its answer. */
+static void end_input(control_client_t *client, bool is_false_alarm)
+{
+    if (is_false_alarm) {
+        return;
+    }
+    client->is_closing = true;
+    if (!control_client_is_waiting(client) && client->out_length == 0) {
+        control_client_drop(client);
+    }
+}
+
+/* A closing client is read no more, nor one whose next requests wait for the answer to the last. */
+bool control_requests_is_reading(const control_client_t *client)
+{
+    return client->fd >= 0 && !client->is_closing && client->in_length < sizeof client->in;
+}
+
+void control_requests_receive(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    const ssize_t received =
+        recv(client->fd, &client->in[client->in_length], sizeof client->in - client->in_length, MSG_DONTWAIT);
+    if (received <= 0) {
+        end_input(client, received < 0 && (errno == EAGAIN || errno == EINTR));
+        return;
+    }
+    client->in_length += (size_t)received;
+    take_lines(self, client, now_us);
+    if (client->fd >= 0 && client->in_length == sizeof client->in && memchr(client->in, '\n', sizeof client->in) == NULL) {
+        client->is_closing = true;
+        control_client_answer_error(client, "request too long", NULL);
+    }
+}
+
+/* --- What time brings --- */
+
+/* A reset has an effect once the platform has left FAULT or ESTOP; everything else has its answer after one cycle. */
+static void take_result(const control_t *self, control_client_t *client, const motion_result_t *result)
+{
+    char error[256];
+    if (result->is_key_off) {
+        client->request_id = 0;
+        control_client_answer_error(client, "the enable key is off: turn it on first", state_name(result->snapshot.state));
+    } else if (result->is_power_failing) {
+        client->request_id = 0;
+        control_client_answer_error(client, "the supply is failing: nothing goes up until it is back",
+                                    state_name(result->snapshot.state));
+    } else if (result->is_unapproved) {
+        client->request_id = 0;
+        (void)snprintf(error, sizeof error, k_unapproved, self->config->hash, self->config->approved.text);
+        control_client_answer_error(client, error, state_name(result->snapshot.state));
+    } else if (result->is_untested) {
+        client->request_id = 0;
+        control_client_answer_error(client, k_untested, state_name(result->snapshot.state));
+    } else if (client->request == OPERATOR_SERVICE) {
+        client->request_id = 0;
+        control_client_answer_service(client, result);
+    } else if (result->status != HV_OK) {
+        client->request_id = 0;
+        refuse(self, client, &result->snapshot, result->is_shutting_down);
+    } else if (client->request == EVENT_RESET) {
+        client->is_accepted = true;
+    } else {
+        client->request_id = 0;
+        control_client_answer_done(client, &result->snapshot);
+    }
+}
+
+void control_requests_take_results(control_t *self)
+{
+    motion_result_t result;
+    while (ring_pop(&self->handover->results, &result, sizeof result) > 0) {
+        control_client_t *client = find_client(self, result.id);
+        if (result.id != 0 && client != NULL) {
+            take_result(self, client, &result);
+        }
+    }
+}
+
+/* Requests whose answer comes with time: a reset that took effect, or one that never got its answer. */
+static void watch_request(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    const snapshot_t *s = control_snapshot(self);
+    const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
+    if (client->is_accepted && !is_latched) {
+        client->request_id = 0;
+        control_client_answer_done(client, s);
+    } else if (now_us >= client->answer_by_us) {
+        client->request_id = 0;
+        if (client->is_accepted) {
+            refuse(self, client, s, self->view.view.is_shutting_down);
+        } else {
+            control_client_answer_error(client, "no answer from the motion thread", NULL);
+        }
+    }
+}
+
+static void watch_dump(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    char text[BLACKBOX_TEXT_MAX];
+    char error[BLACKBOX_TEXT_MAX + 8];
+    bool is_good = false;
+    if (blackbox_answer(self->blackbox, client->dump_ticket, &is_good, text)) {
+        client->dump_ticket = 0;
+        (void)snprintf(error, sizeof error, "dump: %s", text);
+        if (is_good) {
+            control_client_answer_dumped(client, text);
+        } else {
+            control_client_answer_error(client, error, NULL);
+        }
+    } else if (now_us >= client->answer_by_us) {
+        client->dump_ticket = 0;
+        control_client_answer_error(client, CONTROL_DUMP_LATER, NULL);
+    }
+}
+
+void control_requests_serve_time(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    if (client->request_id != 0) {
+        watch_request(self, client, now_us);
+    } else if (client->dump_ticket != 0) {
+        watch_dump(self, client, now_us);
+    }
+    take_lines(self, client, now_us); /* what waited for an answer */
+    if (client->fd >= 0 && client->watch_period_us != 0 && now_us >= client->watch_next_us) {
+        client->watch_next_us += client->watch_period_us * (1 + (now_us - client->watch_next_us) / client->watch_period_us);
+        control_client_answer_status(self, client);
+    }
+}

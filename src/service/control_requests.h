@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: MIT
+ * control_requests.h - the requests of clients: reads lines, judges them, hands them to the motion thread or the black box, and
+ * answers when the result is there. Private to control*.c.
+ */
+#ifndef HEAVE_SERVICE_CONTROL_REQUESTS_H
+#define HEAVE_SERVICE_CONTROL_REQUESTS_H
+
+#include "service/control.h"
+
+/** True if the client's bytes are read now. */
+bool control_requests_is_reading(const control_client_t *client);
+
+/** Reads bytes of the client and takes the complete lines. */
+void control_requests_receive(control_t *self, control_client_t *client, uint64_t now_us);
+
+/** Takes the motion thread's results. */
+void control_requests_take_results(control_t *self);
+
+/** Answers that are due by now: results, timeouts, and the next status of a client that watches. */
+void control_requests_serve_time(control_t *self, control_client_t *client, uint64_t now_us);
+
+#endif

@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: MIT
+ * control_selftest.c - see control_selftest.h.
+ */
+#include "service/control_selftest.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+#include "service/control_client.h"
+#include "service/service_json.h"
+
+static const char k_passed[] = "selftest passed";
+
+bool control_selftest_is_said(const char *line)
+{
+    return strcmp(line, k_passed) == 0 || strcmp(line, "selftest failed") == 0;
+}
+
+static void put_switch(json_t *json, const char *name, const config_label_t *line)
+{
+    json_bool(json, name, line->text[0] != '\0');
+}
+
+void control_selftest_answer(control_t *self, control_client_t *client)
+{
+    const config_t *config = self->config;
+    const config_inputs_t *inputs = &config->inputs;
+    json_t json = control_client_start_answer(client);
+    json_open(&json, NULL, '{');
+    json_bool(&json, "ok", true);
+    json_text(&json, "state", state_name(control_snapshot(self)->state));
+    service_json_selftest(&json, &self->lost, config);
+    json_q32(&json, "following_mm", q32_from_q16(config->selftest.following_mm_q16));
+    json_q32(&json, "drift_mm", q32_from_q16(config->selftest.drift_mm_q16));
+    json_q32(&json, "jog_mm_s", q32_from_q16(config->settings.jog_mm_s_q16));
+    json_number(&json, "relays", control_snapshot(self)->relay_count);
+    json_open(&json, "switches", '{');
+    put_switch(&json, "estop", &inputs->estop_line);
+    put_switch(&json, "estop2", &inputs->estop2_line);
+    put_switch(&json, "enable", &inputs->enable_line);
+    put_switch(&json, "power", &inputs->power_line);
+    json_close(&json, '}');
+    json_bool(&json, "healthy_pulse", config->healthy.driver != CONFIG_HEALTHY_NONE);
+    json_text(&json, "configuration", config->hash);
+    json_close(&json, '}');
+    control_client_answer(client, &json);
+}
+
+void control_selftest_take(control_t *self, control_client_t *client, const char *line)
+{
+    self->selftest = (control_selftest_t){.is_news = true, .is_passed = strcmp(line, k_passed) == 0, .peer = client->peer};
+    client->request = EVENT_TICK; /* none that the motion thread has to answer */
+    control_client_answer_done(client, control_snapshot(self));
+}
+
+static uint32_t today(void)
+{
+    struct timespec now = {0};
+    struct tm date = {0};
+    (void)clock_gettime(CLOCK_REALTIME, &now);
+    (void)localtime_r(&now.tv_sec, &date);
+    return (uint32_t)((date.tm_year + 1900) * 10000 + (date.tm_mon + 1) * 100 + date.tm_mday);
+}
+
+bool control_selftest_watch(control_t *self, lifetime_t *life, const config_t *config, char said[128])
+{
+    const uint32_t day = today();
+    const bool is_news = self->selftest.is_news;
+    if (is_news) {
+        lifetime_selftest_t selftest = {.day = day, .is_passed = self->selftest.is_passed};
+        memcpy(selftest.hash, config->hash, sizeof selftest.hash);
+        lifetime_note_selftest(life, &selftest);
+        (void)snprintf(said, 128, "self-test %s, by user %u, process %d, configuration %s",
+                       selftest.is_passed ? "passed" : "failed", (unsigned)self->selftest.peer.uid, (int)self->selftest.peer.pid,
+                       config->hash);
+        self->selftest.is_news = false;
+    }
+    self->lost.is_untested = config->selftest.when == CONFIG_SELFTEST_DAILY && !lifetime_has_passed(life, day, config->hash);
+    __atomic_store_n(&self->handover->is_untested, self->lost.is_untested ? 1u : 0u, __ATOMIC_RELEASE);
+    return is_news;
+}
