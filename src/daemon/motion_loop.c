@@ -82,12 +82,6 @@ static bool is_down(const motion_loop_t *self)
     return state == STATE_OFF || (state == STATE_HOLD && self->before_hold == STATE_HOMING);
 }
 
-/* Nobody is on board, or is only about to be. */
-static bool is_below(const motion_loop_t *self)
-{
-    return is_down(self) || gateway_snapshot(&self->session.gateway)->state == STATE_SETTLED;
-}
-
 /* Without the key nothing goes up, and drives stay off. */
 static bool is_for_the_key(const motion_loop_t *self, uint32_t event)
 {
@@ -128,22 +122,20 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
     unsigned count = 0;
     motion_request_t request;
     const bool is_unapproved = __atomic_load_n(&self->handover.is_unapproved, __ATOMIC_ACQUIRE) != 0;
-    const bool is_untested = __atomic_load_n(&self->handover.is_untested, __ATOMIC_ACQUIRE) != 0;
-    while (count < REQUESTS_PER_CYCLE && ring_pop(&self->handover.requests, &request, sizeof request) > 0) {
+    const bool is_below = is_down(self) || gateway_snapshot(&self->session.gateway)->state == STATE_SETTLED;
+    const bool is_untested = is_below && __atomic_load_n(&self->handover.is_untested, __ATOMIC_ACQUIRE) != 0;
+    for (; count < REQUESTS_PER_CYCLE && ring_pop(&self->handover.requests, &request, sizeof request) > 0; count++) {
         result[count].id = request.id;
         result[count].is_key_off = switches_is_key_off(&self->switches) && is_for_the_key(self, request.event);
         result[count].is_unapproved = is_unapproved && is_for_the_key(self, request.event);
         result[count].is_power_failing = switches_is_power_failing(&self->switches) && is_for_the_key(self, request.event);
-        result[count].is_untested = is_untested && request.event == EVENT_ENGAGE && is_below(self);
-        const bool is_barred = result[count].is_key_off || result[count].is_unapproved || result[count].is_power_failing ||
-                               result[count].is_untested;
+        result[count].is_untested = is_untested && request.event == EVENT_ENGAGE;
         if (request.event == OPERATOR_SERVICE) {
             result[count].answer = serve(self, &request);
-            result[count++].status = HV_OK;
+            result[count].status = HV_OK;
             continue;
         }
-        result[count].status = is_barred ? HV_ERR_STATE : carry_out(self, &request);
-        count++;
+        result[count].status = handover_is_barred(&result[count]) ? HV_ERR_STATE : carry_out(self, &request);
     }
     return count;
 }

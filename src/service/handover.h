@@ -67,6 +67,12 @@ typedef struct {
     service_answer_t answer; /**< of OPERATOR_SERVICE */
 } motion_result_t;
 
+/** Whether it was refused for a reason that has a flag of its own. */
+static inline bool handover_is_barred(const motion_result_t *result)
+{
+    return result->is_key_off || result->is_unapproved || result->is_power_failing || result->is_untested;
+}
+
 /** What a reload hands over. */
 typedef struct {
     settings_t settings;
