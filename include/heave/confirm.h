@@ -3,8 +3,8 @@
  * A target that is further than a configured distance from the last one followed has to wait. If the next frame is near it, the
  * next frame is followed, with its own time. If the next frame is anywhere else, or none comes within CONFIRM_WAIT_US, the
  * waiting target is dropped. An identical frame within CONFIRM_APART_US may be a copy made by the network and confirms nothing.
- * gate.h is different: it judges samples of a stream by the acceleration that they need. Owns no clock and no settings; one
- * owner.
+ * spike_filter.h is different: it judges samples of a stream by the acceleration that they need. Owns no clock and no settings;
+ * one owner.
  */
 #ifndef HEAVE_CONFIRM_H
 #define HEAVE_CONFIRM_H

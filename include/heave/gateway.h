@@ -117,7 +117,7 @@ typedef struct {
     bool is_open;        /**< the present datagram may hold further frames */
     uint64_t reject_logged_us[FRAME_ERRORS];
     uint32_t reject_suppressed[FRAME_ERRORS];
-} intake_t;
+} frame_receiver_t;
 
 /** The sender in control and what it asks for; members are private to src/gateway. */
 typedef struct {
@@ -156,7 +156,7 @@ typedef struct {
     motion_t motion;
     motion_output_t output;
     supervisor_t supervisor;
-    intake_t intake;
+    frame_receiver_t receiver;
     gateway_sender_t sender;
     relay_output_t relay_output;
     reports_t reports;

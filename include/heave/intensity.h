@@ -54,10 +54,10 @@ q32_t intensity_unscaled(const intensity_t *self, q32_t neutral_q32, q32_t scale
 /** A scaled reference; its differences include those of the share. */
 ramp_ref_t intensity_scale(const intensity_t *self, q32_t neutral_q32, const ramp_ref_t *ref);
 
-/** True if intensity_shift() for this planned share is 0 for every way_q32. */
+/** True if intensity_shift() for this planned share is 0 for every travel_q32. */
 bool intensity_is_still(const intensity_t *self, int64_t planned_q46);
 
-/** The correction of a reference that was planned with another share. way_q32 is the sender's value minus neutral. */
-ramp_ref_t intensity_shift(const intensity_t *self, int64_t planned_q46, q32_t way_q32);
+/** The correction of a reference that was planned with another share. travel_q32 is the sender's value minus neutral. */
+ramp_ref_t intensity_shift(const intensity_t *self, int64_t planned_q46, q32_t travel_q32);
 
 #endif

@@ -7,7 +7,7 @@
 #ifndef HEAVE_MOTION_H
 #define HEAVE_MOTION_H
 
-#include "heave/gate.h"
+#include "heave/spike_filter.h"
 #include "heave/intensity.h"
 #include "heave/kin.h"
 #include "heave/ramp.h"
@@ -114,11 +114,11 @@ const q32_t *motion_settled_extension(const motion_t *self);
 /** The mechanism, for feedback. */
 const kin_t *motion_kin(const motion_t *self);
 
-/** Sets the factor of the spike filter in front of the stream (gate.h): [0, GATE_FACTOR_MAX], 0 = off. */
+/** Sets the factor of the spike filter in front of the stream (spike_filter.h): [0, SPIKE_FILTER_FACTOR_MAX], 0 = off. */
 void motion_set_spike_gate(motion_t *self, uint32_t factor);
 
 /** State of the spike filter, for display. */
-const gate_t *motion_gate(const motion_t *self);
+const spike_filter_t *motion_spike_filter(const motion_t *self);
 
 /** The stream's state, for display. */
 const stream_t *motion_stream(const motion_t *self);

@@ -5,8 +5,8 @@
 #define HEAVE_MOTION_STATE_H
 
 #include "heave/fade.h"
-#include "heave/gate.h"
-#include "heave/halt.h"
+#include "heave/spike_filter.h"
+#include "heave/sync_stop.h"
 #include "heave/jog.h"
 #include "heave/motion.h"
 #include "heave/profile.h"
@@ -67,10 +67,10 @@ struct motion {
     motion_next_t next;
     motion_space_t space;
     stream_t stream;
-    gate_t gate;
+    spike_filter_t gate;
     motion_target_t withheld; /**< what the gate holds back */
     motion_plan_t plan;
-    halt_t halt; /**< a stop in progress, or being planned */
+    sync_stop_t halt; /**< a stop in progress, or being planned */
 
     motion_due_t due;
     bool is_space_new;                          /**< the values of the slots have to be calculated from the cylinders first */

@@ -60,7 +60,7 @@ typedef struct {
     angle_wrap_t angle_wrap;
     stream_style_t stream_style;
     uint32_t delay_max_ms; /**< [0, 1000]: upper limit of a stream's delay when its samples come late */
-    uint32_t spike_gate;   /**< [0, GATE_FACTOR_MAX] times accel_q16 of an axis; 0 = off */
+    uint32_t spike_gate;   /**< [0, SPIKE_FILTER_FACTOR_MAX] times accel_q16 of an axis; 0 = off */
 
     q16_t cylinder_speed_mm_s_q16;
     q16_t cylinder_accel_mm_s2_q16;

@@ -106,12 +106,12 @@ typedef struct {
 
 /** Resolution of a sender's values on one axis; private to src/motion. */
 typedef struct {
-    q32_t grain_q32; /**< 0: none, or too fine to distinguish from a smooth motion */
-    q32_t found_q32; /**< of the steps since the watch began, 0 = there were none */
-    q32_t step_q32;  /**< the newest step, of one period */
-    bool is_up;      /**< the newest change of the step was upwards */
-    uint8_t turns;   /**< changes of the step, up and down in turn, since the watch began */
-} stream_grain_t;
+    q32_t quantum_q32; /**< 0: none, or too fine to distinguish from a smooth motion */
+    q32_t found_q32;   /**< of the steps since the watch began, 0 = there were none */
+    q32_t step_q32;    /**< the newest step, of one period */
+    bool is_up;        /**< the newest change of the step was upwards */
+    uint8_t turns;     /**< changes of the step, up and down in turn, since the watch began */
+} stream_quantum_t;
 
 /** The points of the curve, by index modulo the ring; members are private to src/motion. */
 typedef struct {
@@ -121,7 +121,7 @@ typedef struct {
     int64_t way_q36[3][AXES_MAX]; /**< from each of the four to the next */
     q32_t off_q32[AXES_MAX][3];   /**< control less point at head, and how that changes per period and period^2 */
     stream_lead_t lead[AXES_MAX];
-    stream_grain_t grain[AXES_MAX];
+    stream_quantum_t grain[AXES_MAX];
     uint32_t watched;               /**< samples since the watch for a grain began */
     int32_t window;                 /**< each control point is a mean of so many points, thrice; 1: the point */
     uint8_t weight[STREAM_WEIGHTS]; /**< of the points in that mean, the newest first: 75 at most */

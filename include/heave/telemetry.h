@@ -39,7 +39,7 @@ typedef struct {
     uint32_t not_followed;   /**< accepted while the platform was not ENGAGED */
     uint32_t impossible;     /**< extensions that no pose has, or only one near a singularity */
     uint32_t singular_stops; /**< stops before a singularity on the way from one set of extensions to another */
-    uint32_t spikes;         /**< samples of a stream that the spike filter dropped (gate.h) */
+    uint32_t spikes;         /**< samples of a stream that the spike filter dropped (spike_filter.h) */
     uint32_t unconfirmed;    /**< far jumps that no second frame confirmed (confirm.h) */
     uint32_t clamped;        /**< cycles that pulled a target in */
     uint32_t stretched;      /**< timed moves that took longer than asked */

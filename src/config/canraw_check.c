@@ -175,13 +175,13 @@ static void check_times(config_source_t *self)
                                 (unsigned)raw->query_every, 2u * (unsigned)raw->query_every + 1u);
     }
     /* at full speed, while the newest position is as old as it can be and the drive one period behind */
-    const q32_t way_q32 =
+    const q32_t travel_q32 =
         fx_mul_div(q32_from_q16(settings->cylinder_speed_mm_s_q16), (int64_t)(raw->query_every + 2u) * raw->period_us, 1000000);
     const q32_t window_q32 = q32_from_q16(raw->following_error_mm_q16);
-    if (window_q32 != 0 && window_q32 < way_q32) {
+    if (window_q32 != 0 && window_q32 < travel_q32) {
         config_source_key_error(self, SECTION, "following_error_mm",
                                 "less than a cylinder moves at full speed until its position is heard; allowed: at least %.3f mm",
-                                (double)way_q32 / (double)Q32_ONE + 0.0005);
+                                (double)travel_q32 / (double)Q32_ONE + 0.0005);
     }
 }
 

@@ -174,11 +174,12 @@ static void check_times(config_source_t *self)
 /* At full speed a drive is behind by some periods without any fault. */
 static void check_window(config_source_t *self, const char *name, q16_t window_q16, q16_t speed_q16, const char *unit)
 {
-    const q32_t way_q32 = fx_mul_div(q32_from_q16(speed_q16), WINDOW_PERIODS * (int64_t)self->config->cia402.period_us, 1000000);
-    if (q32_from_q16(window_q16) < way_q32) {
+    const q32_t travel_q32 =
+        fx_mul_div(q32_from_q16(speed_q16), WINDOW_PERIODS * (int64_t)self->config->cia402.period_us, 1000000);
+    if (q32_from_q16(window_q16) < travel_q32) {
         config_source_key_error(self, SECTION, name,
                                 "less than a drive at full speed moves in %d periods; allowed: at least %.3f %s", WINDOW_PERIODS,
-                                (double)way_q32 / (double)Q32_ONE + 0.0005, unit);
+                                (double)travel_q32 / (double)Q32_ONE + 0.0005, unit);
     }
 }
 

@@ -240,13 +240,13 @@ static void check_step(config_source_t *self, uint32_t period_us)
 {
     const q32_t speed_q32 = q32_from_q16(self->config->settings.cylinder_speed_mm_s_q16);
     const q32_t step_q32 = q32_from_q16(modbus_of(self)->step_mm_q16);
-    const q32_t way_q32 = fx_mul_div(speed_q32, period_us, 1000000);
-    if (step_q32 != 0 && way_q32 > step_q32) {
+    const q32_t travel_q32 = fx_mul_div(speed_q32, period_us, 1000000);
+    if (step_q32 != 0 && travel_q32 > step_q32) {
         config_source_key_error(
             self, SECTION, "step_mm",
             "at speed_mm_s of [cylinders] the set-points are %.3f mm apart: this line gives each drive one every %.1f "
             "ms; allowed: at least %.3f mm, or a speed of at most %.1f mm/s, or a quicker line",
-            mm_of(way_q32), (double)period_us / 1000.0, mm_of(way_q32) + 0.0005,
+            mm_of(travel_q32), (double)period_us / 1000.0, mm_of(travel_q32) + 0.0005,
             mm_of(step_q32) * 1e6 / (double)period_us - 0.05);
     }
 }
@@ -254,13 +254,13 @@ static void check_step(config_source_t *self, uint32_t period_us)
 static void check_window(config_source_t *self, const char *section, q16_t window_q16, uint32_t period_us)
 {
     const q32_t speed_q32 = q32_from_q16(self->config->settings.cylinder_speed_mm_s_q16);
-    const q32_t way_q32 = fx_mul_div(speed_q32, LAG_PERIODS * (int64_t)period_us, 1000000);
-    if (window_q16 != 0 && q32_from_q16(window_q16) < way_q32) {
+    const q32_t travel_q32 = fx_mul_div(speed_q32, LAG_PERIODS * (int64_t)period_us, 1000000);
+    if (window_q16 != 0 && q32_from_q16(window_q16) < travel_q32) {
         config_source_key_error(
             self, section, "following_error_mm",
             "less than a cylinder moves at full speed in the %u periods of %.1f ms until its position is heard; "
             "allowed: at least %.3f mm",
-            LAG_PERIODS, (double)period_us / 1000.0, mm_of(way_q32) + 0.0005);
+            LAG_PERIODS, (double)period_us / 1000.0, mm_of(travel_q32) + 0.0005);
     }
 }
 

@@ -156,7 +156,7 @@ static void send_queries(canraw_t *self)
 }
 
 /* The speed field of a way since the last set: its magnitude at least speed_least, what does not fit at the field's end. */
-static int64_t speed_of(const canraw_t *self, unsigned k, q32_t way_q32)
+static int64_t speed_of(const canraw_t *self, unsigned k, q32_t travel_q32)
 {
     const canraw_field_t *field = canraw_find(&self->map->setpoint, CANRAW_SPEED);
     const counts_scale_t *scale = &self->map->axis[k].speed;
@@ -164,7 +164,7 @@ static int64_t speed_of(const canraw_t *self, unsigned k, q32_t way_q32)
     if (field == NULL) {
         return 0;
     }
-    const q32_t per_s_q32 = fx_mul_div(way_q32, 1000000, self->map->period_us);
+    const q32_t per_s_q32 = fx_mul_div(travel_q32, 1000000, self->map->period_us);
     if (counts_from_units(scale, per_s_q32, &speed) != HV_OK) {
         speed = (per_s_q32 < 0) == (scale->num < 0) ? INT64_MAX : INT64_MIN;
     }

@@ -156,10 +156,10 @@ static int64_t share_of(const modbus_drive_t *self, const q32_t setpoint_q32[DRI
         if (!is_following(self, k) || carry_q32 == 0) {
             continue;
         }
-        const q32_t way_q32 = fx_abs(fx_sub_sat(setpoint_q32[k], self->axis[k].paced_q32));
+        const q32_t travel_q32 = fx_abs(fx_sub_sat(setpoint_q32[k], self->axis[k].paced_q32));
         const q32_t allowed_q32 = fx_mul_div(carry_q32, passed_us, period_us);
-        if (way_q32 > allowed_q32) {
-            const int64_t own = fx_mul_div(allowed_q32, SHARE_ONE, way_q32);
+        if (travel_q32 > allowed_q32) {
+            const int64_t own = fx_mul_div(allowed_q32, SHARE_ONE, travel_q32);
             share = own < share ? own : share;
         }
     }
@@ -175,8 +175,8 @@ static void pace(modbus_drive_t *self, const q32_t setpoint_q32[DRIVES_MAX], uin
         if (!is_following(self, k)) {
             continue;
         }
-        const q32_t way_q32 = fx_sub_sat(setpoint_q32[k], axis->paced_q32);
-        axis->paced_q32 = fx_add_sat(axis->paced_q32, fx_mul_div(way_q32, share, SHARE_ONE));
+        const q32_t travel_q32 = fx_sub_sat(setpoint_q32[k], axis->paced_q32);
+        axis->paced_q32 = fx_add_sat(axis->paced_q32, fx_mul_div(travel_q32, share, SHARE_ONE));
         modbus_drive_axis_offer(axis, self->map, &self->map->axis[k], self->now_us);
     }
 }

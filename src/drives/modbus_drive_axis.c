@@ -684,14 +684,14 @@ void modbus_drive_axis_begin(modbus_drive_axis_t *self, const counts_scale_t *sc
 /* The speed field: the way since the last set-point in the period of the line and an eighth more; what does not fit at the
  * field's end. */
 static int64_t speed_of(const modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_drive_axis_map_t *axis,
-                        q32_t way_q32)
+                        q32_t travel_q32)
 {
     const modbus_drive_field_t *field = modbus_drive_find(&map->setpoint, MODBUS_DRIVE_SPEED, NULL);
     int64_t speed = 0;
     if (field == NULL) {
         return 0;
     }
-    const q32_t asked_q32 = fx_mul_div(fx_add_sat(way_q32, way_q32 / 8), 1000000, self->period_us);
+    const q32_t asked_q32 = fx_mul_div(fx_add_sat(travel_q32, travel_q32 / 8), 1000000, self->period_us);
     const q32_t per_s_q32 = fx_clamp(asked_q32, -axis->speed_max_q32, axis->speed_max_q32);
     if (counts_from_units(&axis->speed, per_s_q32, &speed) != HV_OK) {
         speed = (per_s_q32 < 0) == (axis->speed.num < 0) ? INT64_MAX : INT64_MIN;

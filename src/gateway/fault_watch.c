@@ -4,7 +4,7 @@
 #include "fault_watch.h"
 
 #include "heave/text.h"
-#include "operate.h"
+#include "actions.h"
 #include "service.h"
 
 #define FOLLOWING_TIME_US 20000u
@@ -94,10 +94,10 @@ void fault_watch_raise(gateway_t *self, const fault_t *fault)
     s->reaction = is_worse ? reaction : s->reaction;
     if (supervisor_is_latched(&self->supervisor)) {
         if (is_worse && self->supervisor.state == STATE_FAULT) {
-            operate_react(self);
+            actions_react(self);
         }
     } else {
-        operate_event(self, EVENT_FAULT, fault->at_us);
+        actions_event(self, EVENT_FAULT, fault->at_us);
     }
 }
 
@@ -170,7 +170,7 @@ static q32_t outside_stroke(const gateway_t *self, unsigned i)
 static bool is_astray(const gateway_t *self, unsigned i)
 {
     const drive_feedback_t *f = &self->snapshot.drive[i];
-    return operate_is_coming_up(self) && i < kin_cylinders(motion_kin(&self->motion)) && f->has_actual && f->is_homed &&
+    return actions_is_coming_up(self) && i < kin_cylinders(motion_kin(&self->motion)) && f->has_actual && f->is_homed &&
            f->state != DRIVE_HOMING && outside_stroke(self, i) > q32_from_int(OUTSIDE_STROKE_MM);
 }
 

@@ -7,8 +7,8 @@
 #include "heave/motion_sane.h"
 #include "heave/sane.h"
 #include "heave/text.h"
-#include "intake.h"
-#include "operate.h"
+#include "frame_receiver.h"
+#include "actions.h"
 #include "relay_output.h"
 #include "reports.h"
 #include "sender.h"
@@ -219,7 +219,7 @@ hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gatewa
     }
     *self = *saved;
     self->io = *io;
-    frame_scanner_init(&self->intake.scanner, self->settings.dialect); /* it starts anew with every datagram */
+    frame_scanner_init(&self->receiver.scanner, self->settings.dialect); /* it starts anew with every datagram */
     clear_reports(self);
     return HV_OK;
 }
@@ -313,11 +313,11 @@ HV_OWN_FRAME static void send_setpoints(gateway_t *self, uint64_t now_us)
 
 static void receive_frames(gateway_t *self, uint64_t now_us)
 {
-    const intake_io_t io = {self->io.udp, self->io.log, &self->snapshot.counters};
+    const frame_receiver_io_t io = {self->io.udp, self->io.log, &self->snapshot.counters};
     frame_t frame;
-    intake_begin(&self->intake);
+    frame_receiver_begin(&self->receiver);
     sender_begin(self, now_us);
-    while (intake_next(&self->intake, &self->settings, &io, now_us, &frame)) {
+    while (frame_receiver_next(&self->receiver, &self->settings, &io, now_us, &frame)) {
         sender_take(self, &frame, now_us);
     }
     sender_end(self, now_us);
@@ -372,7 +372,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
     s->counters.relay_cut = self->relay_output.policy.cut_count;
     s->counters.relay_delayed = self->relay_output.policy.delay_count;
-    s->counters.spikes = gate_spikes(motion_gate(&self->motion));
+    s->counters.spikes = spike_filter_spikes(motion_spike_filter(&self->motion));
     note_singular_stops(self, now_us);
     s->counters.unconfirmed = self->sender.confirm.dropped;
     s->counters.stretched = motion_stretched_count(&self->motion);
@@ -390,7 +390,7 @@ void gateway_cycle(gateway_t *self, uint64_t now_us)
     sequencer_after_frames(self, now_us);
     step_motion(self, now_us);
     send_setpoints(self, now_us);
-    operate_after_motion(self);
+    actions_after_motion(self);
     shutdown_watch(self, now_us);
     write_relays(self, now_us);
     publish(self, now_us);

@@ -4,7 +4,7 @@
 #include "sender.h"
 
 #include "auto_engage.h"
-#include "operate.h"
+#include "actions.h"
 #include "target.h"
 
 #define STREAM_FRAMES    10u      /* as many are a stream, */
@@ -13,8 +13,8 @@
 
 static void refuse(gateway_t *self, frame_command_t command, const char *missing, const hal_udp_peer_t *from, uint64_t now_us)
 {
-    const intake_io_t io = {self->io.udp, self->io.log, &self->snapshot.counters};
-    intake_refuse(&self->intake, &io, command, missing, from, now_us);
+    const frame_receiver_io_t io = {self->io.udp, self->io.log, &self->snapshot.counters};
+    frame_receiver_refuse(&self->receiver, &io, command, missing, from, now_us);
 }
 
 /* What the sender asks of the relays; bits that no relay has are counted. */
@@ -55,19 +55,19 @@ static void log_not_followed(gateway_t *self, const char *what, const char *why,
     text_put_q32(&text, jump->value_q32, 1);
     text_put(&text, " after ");
     text_put_q32(&text, jump->from_q32, 1);
-    intake_put_suppressed(&text, suppressed);
+    frame_receiver_put_suppressed(&text, suppressed);
     hal_log_write(self->io.log, HAL_LOG_WARNING, line);
 }
 
 /* One line for the first spike of a burst; what is left out is told with a later one. */
 static void log_spikes(gateway_t *self, uint64_t now_us)
 {
-    const gate_t *gate = motion_gate(&self->motion);
-    const uint32_t unlogged = gate_spikes(gate) - self->sender.spikes_logged;
+    const spike_filter_t *gate = motion_spike_filter(&self->motion);
+    const uint32_t unlogged = spike_filter_spikes(gate) - self->sender.spikes_logged;
     if (unlogged == 0 || (self->sender.spike_logged_us != 0 && now_us - self->sender.spike_logged_us < REJECT_LOG_INTERVAL_US)) {
         return;
     }
-    const gate_spike_t *spike = gate_last_spike(gate);
+    const spike_t *spike = spike_filter_last_spike(gate);
     const confirm_jump_t jump = {MOTION_POSE, spike->axis, spike->value_q32, spike->before_q32};
     log_not_followed(self, "sample", "a spike", &jump, unlogged - 1);
     self->sender.spike_logged_us = now_us;
@@ -103,7 +103,7 @@ HV_OWN_FRAME static void log_other(gateway_t *self, const hal_udp_peer_t *from, 
     (void)hal_udp_peer_text(&self->sender.owner.peer, peer, sizeof peer);
     text_put(&text, peer);
     text_put(&text, " drives");
-    intake_put_suppressed(&text, self->sender.other_suppressed);
+    frame_receiver_put_suppressed(&text, self->sender.other_suppressed);
     hal_log_write(self->io.log, HAL_LOG_WARNING, line);
     self->sender.other_logged_us = now_us;
     self->sender.other_suppressed = 0;
@@ -122,7 +122,7 @@ HV_OWN_FRAME static void change_owner(gateway_t *self, uint64_t now_us)
     self->snapshot.counters.owner_changes++;
     confirm_restart(&self->sender.confirm); /* what waits is another sender's */
     if (self->supervisor.state == STATE_ENGAGED) {
-        operate_follow(self, now_us);
+        actions_follow(self, now_us);
     }
 }
 
@@ -148,7 +148,7 @@ static bool tell_motion(gateway_t *self, const motion_target_t *target, frame_co
                         uint64_t now_us)
 {
     if (self->supervisor.state == STATE_ENGAGED &&
-        motion_target(&self->motion, target, now_us - self->intake.waited_us) != HV_OK) {
+        motion_target(&self->motion, target, now_us - self->receiver.waited_us) != HV_OK) {
         self->snapshot.counters.impossible++;
         refuse(self, command, "no pose has these extensions, or one too near a singularity", from, now_us);
         return false;
@@ -216,7 +216,7 @@ static void watch_gap(gateway_t *self, uint64_t now_us)
     const uint64_t since_us = end_us > self->sender.start_us ? end_us : self->sender.start_us;
     const bool is_gap = now_us > since_us && now_us - since_us >= STREAM_GAP_US;
     if (is_gap && self->sender.stream_frames >= STREAM_FRAMES && self->supervisor.state == STATE_ENGAGED) {
-        operate_follow(self, now_us);
+        actions_follow(self, now_us);
     }
     const bool is_next = !is_gap && now_us - self->snapshot.last_frame_us < STREAM_PERIOD_US;
     self->sender.stream_frames = !is_next                                     ? 0
@@ -226,7 +226,7 @@ static void watch_gap(gateway_t *self, uint64_t now_us)
 
 void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
 {
-    const hal_udp_peer_t *from = &self->intake.from;
+    const hal_udp_peer_t *from = &self->receiver.from;
     const char *missing = target_missing(frame->command, kin_cylinders(motion_kin(&self->motion)), self->settings.has_angle);
     if (missing != NULL) {
         refuse(self, frame->command, missing, from, now_us);
@@ -237,7 +237,7 @@ void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
     }
     auto_engage_frame(&self->auto_engage, now_us);
     const motion_target_t target = target_of(&self->settings, motion_angle_target(&self->motion), frame);
-    operate_event(self, EVENT_FRAME, now_us);
+    actions_event(self, EVENT_FRAME, now_us);
     watch_gap(self, now_us);
     const bool is_waiting = !is_confirmed(self, &target, now_us);
     if (!is_waiting && !follow(self, &target, frame->command, from, now_us)) {

@@ -6,12 +6,12 @@
 #define GATEWAY_SENDER_H
 
 #include "heave/gateway.h"
-#include "intake.h"
+#include "frame_receiver.h"
 
 /** Before the first frame of a cycle. */
 void sender_begin(gateway_t *self, uint64_t now_us);
 
-/** Takes a valid frame of intake_next(), from self->intake.from. */
+/** Takes a valid frame of frame_receiver_next(), from self->receiver.from. */
 void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us);
 
 /** After the last frame of a cycle: motion gets the newest target if it has not got it yet. */

@@ -6,7 +6,7 @@
 
 #include "auto_engage.h"
 #include "fault_watch.h"
-#include "operate.h"
+#include "actions.h"
 #include "service.h"
 #include "shutdown.h"
 
@@ -34,7 +34,7 @@ static bool are_all(const gateway_t *self, drive_state_t state, bool is_zero_nee
 /* Next step of bringing up, when the last one is complete. */
 static void step_bring_up(gateway_t *self, uint64_t now_us)
 {
-    const bool is_late = operate_is_coming_up(self) && now_us >= self->bring_up_deadline_us;
+    const bool is_late = actions_is_coming_up(self) && now_us >= self->bring_up_deadline_us;
     if (is_late || fault_watch_is_told(self, FAULT_DRIVE_TIMEOUT, 0)) {
         fault_watch_raise(self, &(fault_t){.code = FAULT_DRIVE_TIMEOUT, .at_us = now_us});
         return;
@@ -48,11 +48,11 @@ static void step_bring_up(gateway_t *self, uint64_t now_us)
             self->bring_up_deadline_us = now_us + HOMING_TIMEOUT_US;
         }
     }
-    if (operate_is_coming_up(self) && are_all(self, DRIVE_ENABLED, true)) {
+    if (actions_is_coming_up(self) && are_all(self, DRIVE_ENABLED, true)) {
         self->bring_up = BRING_UP_MOVE;
         if (self->is_tracking_actual) { /* else it goes on from the motion it is in */
             self->is_tracking_actual = false;
-            operate_track_actual(self);
+            actions_track_actual(self);
         }
         motion_settle(&self->motion);
     }
@@ -88,7 +88,7 @@ static void read_inputs(gateway_t *self, uint64_t now_us)
     self->snapshot.is_estop_active = !is_read || (levels & INPUT_ESTOP) != 0;
     if (self->snapshot.is_estop_active) {
         fault_watch_give_up_reset(self);
-        operate_event(self, EVENT_ESTOP, now_us);
+        actions_event(self, EVENT_ESTOP, now_us);
     }
     fault_watch_channels(self, is_read ? (levels & INPUT_APART) != 0 : self->is_estop_apart, now_us);
     fault_watch_power(self, is_read ? (levels & INPUT_POWER) != 0 : self->snapshot.is_power_failing, now_us);
@@ -100,8 +100,8 @@ static void step_reset(gateway_t *self, uint64_t now_us)
     if (self->reset_until_us == 0) {
         return;
     }
-    if (!operate_is_drive_fault_present(self)) {
-        operate_event(self, EVENT_RESET, now_us);
+    if (!actions_is_drive_fault_present(self)) {
+        actions_event(self, EVENT_RESET, now_us);
     }
     if (!supervisor_is_latched(&self->supervisor)) {
         self->reset_until_us = 0;
@@ -127,7 +127,7 @@ static void step_abandoned(gateway_t *self, uint64_t now_us)
         down += self->snapshot.drive[i].state == DRIVE_DISABLED; /* one that cannot tell would be a fault */
     }
     if (down == drive_count(self) || now_us - self->state_since_us >= ABANDON_TIMEOUT_US) {
-        operate_event(self, EVENT_SHUTDOWN, now_us);
+        actions_event(self, EVENT_SHUTDOWN, now_us);
     }
 }
 
@@ -135,10 +135,10 @@ static void step_abandoned(gateway_t *self, uint64_t now_us)
 static void step_auto(gateway_t *self, uint64_t now_us)
 {
     const state_t state = self->supervisor.state;
-    const bool can_engage = (state == STATE_OFF && !operate_is_drive_fault_present(self)) || state == STATE_SETTLED;
+    const bool can_engage = (state == STATE_OFF && !actions_is_drive_fault_present(self)) || state == STATE_SETTLED;
     if (can_engage && auto_engage_is_ready(&self->auto_engage, now_us)) {
         auto_engage_end(&self->auto_engage);
-        operate_event(self, EVENT_ENGAGE, now_us);
+        actions_event(self, EVENT_ENGAGE, now_us);
     } else if (supervisor_is_latched(&self->supervisor)) {
         auto_engage_end(&self->auto_engage); /* after a fault only an operator engages */
     }
@@ -164,7 +164,7 @@ static void watch_service(gateway_t *self, uint64_t now_us)
 void sequencer_before_frames(gateway_t *self, uint64_t now_us)
 {
     clear_faults(self->snapshot.begun);
-    operate_event(self, EVENT_TICK, now_us);
+    actions_event(self, EVENT_TICK, now_us);
     const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->snapshot.drive) == HV_OK;
     fault_watch_bus(self, !is_bus_heard || fault_watch_is_bus_stalled(self), now_us);
     fault_watch_bus_failing(self, now_us);
@@ -174,14 +174,14 @@ void sequencer_before_frames(gateway_t *self, uint64_t now_us)
     step_abandoned(self, now_us);
     step_auto(self, now_us);
     if (self->supervisor.state == STATE_OFF && are_all(self, DRIVE_ENABLED, true) && !self->is_disable_due) {
-        operate_track_actual(self); /* they may have told where they are in this cycle only */
-        operate_event(self, EVENT_DRIVES_READY, now_us);
+        actions_track_actual(self); /* they may have told where they are in this cycle only */
+        actions_event(self, EVENT_DRIVES_READY, now_us);
         self->is_tracking_actual = self->supervisor.state == STATE_OFF;
     }
     step_bring_up(self, now_us);
     if (is_move_done(self)) {
         self->bring_up = BRING_UP_IDLE;
-        operate_event(self, EVENT_MOVE_DONE, now_us);
+        actions_event(self, EVENT_MOVE_DONE, now_us);
     }
     if (self->supervisor.state == STATE_SERVICE) {
         watch_service(self, now_us);
@@ -199,20 +199,20 @@ void sequencer_after_frames(gateway_t *self, uint64_t now_us)
     const uint64_t end_us = motion_timed_end_us(&self->motion);
     const uint64_t since_us = end_us > self->sender.start_us ? end_us : self->sender.start_us;
     if (has_passed(now_us, since_us, self->settings.silence_hold_ms)) {
-        operate_event(self, EVENT_SILENCE_HOLD, now_us);
+        actions_event(self, EVENT_SILENCE_HOLD, now_us);
     }
     if (has_passed(now_us, since_us, self->settings.silence_neutral_ms)) {
-        operate_event(self, EVENT_SILENCE_NEUTRAL, now_us);
+        actions_event(self, EVENT_SILENCE_NEUTRAL, now_us);
     }
     if (has_passed(now_us, since_us, self->settings.silence_settle_ms)) {
-        operate_event(self, EVENT_SILENCE_SETTLE, now_us);
+        actions_event(self, EVENT_SILENCE_SETTLE, now_us);
     }
     if (self->is_tracking_actual) {
         /* torque off first: a drive that follows would take the set-points' way back to actual for a jump */
         if (self->is_disable_due) {
-            operate_disable_drives(self);
+            actions_disable_drives(self);
         }
-        operate_track_actual(self);
+        actions_track_actual(self);
     }
 }
 
@@ -220,7 +220,7 @@ hv_status_t sequencer_request(gateway_t *self, event_t request, uint64_t now_us)
 {
     if (request == EVENT_RESET) {
         const bool is_latched = supervisor_is_latched(&self->supervisor);
-        const bool is_for_drives = self->supervisor.state == STATE_OFF && operate_is_drive_fault_present(self);
+        const bool is_for_drives = self->supervisor.state == STATE_OFF && actions_is_drive_fault_present(self);
         if (self->snapshot.is_estop_active || (!is_latched && !is_for_drives)) {
             return HV_ERR_STATE;
         }
@@ -235,17 +235,17 @@ hv_status_t sequencer_request(gateway_t *self, event_t request, uint64_t now_us)
         return HV_ERR_STATE;
     }
     const bool is_going_off = self->is_disable_due || !motion_is_at_rest(&self->motion);
-    if (request == EVENT_SERVICE && (is_going_off || operate_is_drive_fault_present(self))) {
+    if (request == EVENT_SERVICE && (is_going_off || actions_is_drive_fault_present(self))) {
         return HV_ERR_STATE; /* it would become a fault at once */
     }
     if (request == EVENT_HOLD && self->supervisor.state == STATE_SERVICE) {
         service_let_go(self);
     }
-    if (request == EVENT_SHUTDOWN && operate_is_coming_up(self)) {
-        operate_event(self, EVENT_HOLD, now_us); /* homing may take minutes, and who ends heaved has less patience */
+    if (request == EVENT_SHUTDOWN && actions_is_coming_up(self)) {
+        actions_event(self, EVENT_HOLD, now_us); /* homing may take minutes, and who ends heaved has less patience */
         return HV_OK;
     }
-    operate_event(self, request, now_us);
+    actions_event(self, request, now_us);
     return self->supervisor.ignored[request] == ignored ? HV_OK : HV_ERR_STATE;
 }
 

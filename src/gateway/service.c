@@ -6,7 +6,7 @@
 #include "service.h"
 
 #include "heave/sane.h"
-#include "operate.h"
+#include "actions.h"
 
 #define UP_TIMEOUT_US   10000000u
 #define HOME_TIMEOUT_US 120000000u

@@ -63,13 +63,13 @@ static q32_t unwrap(const gateway_settings_t *settings, q32_t last_q32, q32_t an
     if (settings->angle_wrap == ANGLE_AS_SENT) {
         return angle_q32;
     }
-    q32_t way_q32 = (angle_q32 - last_q32) % TURN_Q32;
-    if (way_q32 > TURN_Q32 / 2) {
-        way_q32 -= TURN_Q32;
-    } else if (way_q32 < -TURN_Q32 / 2) {
-        way_q32 += TURN_Q32;
+    q32_t travel_q32 = (angle_q32 - last_q32) % TURN_Q32;
+    if (travel_q32 > TURN_Q32 / 2) {
+        travel_q32 -= TURN_Q32;
+    } else if (travel_q32 < -TURN_Q32 / 2) {
+        travel_q32 += TURN_Q32;
     }
-    return turned_into_limits(settings, last_q32 + way_q32);
+    return turned_into_limits(settings, last_q32 + travel_q32);
 }
 
 motion_target_t target_of(const gateway_settings_t *settings, q32_t last_angle_q32, const frame_t *frame)

@@ -35,11 +35,11 @@ void wear_step(wear_t *self, const drive_feedback_t *feedback, uint32_t cycle_us
         self->is_known = false;
         return;
     }
-    const q32_t way_q32 = self->is_known ? fx_abs(at_q32 - self->mark_q32) : JUMP_Q32;
-    if (way_q32 >= JUMP_Q32) {
+    const q32_t travel_q32 = self->is_known ? fx_abs(at_q32 - self->mark_q32) : JUMP_Q32;
+    if (travel_q32 >= JUMP_Q32) {
         begin(self, at_q32);
-    } else if (way_q32 >= STEP_Q32) {
-        self->travel_milli += (uint64_t)(way_q32 / (Q32_ONE / 1000));
+    } else if (travel_q32 >= STEP_Q32) {
+        self->travel_milli += (uint64_t)(travel_q32 / (Q32_ONE / 1000));
         self->mark_q32 = at_q32;
         note_turn(self, at_q32);
     }

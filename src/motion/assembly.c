@@ -27,8 +27,8 @@ static void look_ahead(const motion_t *self, const q32_t extension_mm_q32[CYLIND
 {
     q32_t longest_q32 = AHEAD_Q32;
     for (unsigned i = 0; i < self->cylinders; i++) {
-        const q32_t way_q32 = fx_abs(extension_mm_q32[i] - self->cylinder[i].state.pos_q32);
-        longest_q32 = way_q32 > longest_q32 ? way_q32 : longest_q32;
+        const q32_t travel_q32 = fx_abs(extension_mm_q32[i] - self->cylinder[i].state.pos_q32);
+        longest_q32 = travel_q32 > longest_q32 ? travel_q32 : longest_q32;
     }
     for (unsigned i = 0; i < self->cylinders; i++) {
         const q32_t here_q32 = self->cylinder[i].state.pos_q32;
@@ -67,6 +67,6 @@ bool assembly_can_stop(const motion_t *self)
         start[i] = (ramp_state_t){now->pos_q32 + vel_q32, vel_q32, acc_q32};
         limits[i] = &ramp->limits;
     }
-    halt_rests(CYLINDERS_MAX, start, limits, rest_q32);
+    sync_stop_rests(CYLINDERS_MAX, start, limits, rest_q32);
     return is_held_or_better(self, rest_q32);
 }

@@ -3,7 +3,7 @@
  */
 #include "heave/fade.h"
 
-#include "past.h"
+#include "ref_history.h"
 
 #define ONE_Q58 ((int64_t)1 << 58)
 #define SHIFT   58
@@ -22,8 +22,8 @@ void fade_begin(fade_t *self, const q32_t *from_q32, const q32_t *from_mm_q32)
 void fade_look(fade_t *self, const q32_t *extension_mm_q32)
 {
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        const q32_t way_q32 = fx_abs(extension_mm_q32[i] - self->from_mm_q32[i]);
-        self->farthest_mm_q32 = way_q32 > self->farthest_mm_q32 ? way_q32 : self->farthest_mm_q32;
+        const q32_t travel_q32 = fx_abs(extension_mm_q32[i] - self->from_mm_q32[i]);
+        self->farthest_mm_q32 = travel_q32 > self->farthest_mm_q32 ? travel_q32 : self->farthest_mm_q32;
     }
 }
 
@@ -55,18 +55,18 @@ static int64_t share_at(int64_t u_q58)
 
 bool fade_step(fade_t *self, const fade_limits_t *limits, ramp_ref_t ref[POSE_AXES])
 {
-    for (unsigned age = PAST - 1; age > 0; age--) {
+    for (unsigned age = REF_HISTORY - 1; age > 0; age--) {
         self->share_q58[age] = self->share_q58[age - 1];
     }
     self->progress_q58 = fx_clamp(self->progress_q58 + rise_q58(self, limits), 0, ONE_Q58);
     self->share_q58[0] = share_at(self->progress_q58);
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        q32_t at_q32[PAST];
-        past_of(&ref[i], at_q32);
-        for (unsigned age = 0; age < PAST; age++) {
+        q32_t at_q32[REF_HISTORY];
+        ref_history_of(&ref[i], at_q32);
+        for (unsigned age = 0; age < REF_HISTORY; age++) {
             at_q32[age] = self->from_q32[i] + fx_mul_shift(at_q32[age] - self->from_q32[i], self->share_q58[age], SHIFT);
         }
-        ref[i] = past_ref(at_q32);
+        ref[i] = ref_history_ref(at_q32);
     }
-    return self->share_q58[PAST - 1] < ONE_Q58;
+    return self->share_q58[REF_HISTORY - 1] < ONE_Q58;
 }

@@ -8,11 +8,11 @@
  */
 #include "follow.h"
 
-#include "past.h"
+#include "ref_history.h"
 #include "plan.h"
-#include "reach.h"
-#include "slot.h"
-#include "slots.h"
+#include "workspace.h"
+#include "active_axis.h"
+#include "axis_targets.h"
 
 #define INSTANT_MS     5                         /* no move is as short: frames with such a T ... */
 #define INSTANT_GAP_US 20000                     /* ... that follow each other so closely are a stream like frames without T */
@@ -186,7 +186,7 @@ static void change_space(motion_t *self, motion_space_t space)
     stream_reset(&self->stream);
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const bool is_used = space == MOTION_POSE || i == AXIS_ANGLE || i < self->cylinders;
-        const governor_limits_t limits = is_used ? limits_of(slot_ramp(self, i)) : (governor_limits_t){0};
+        const governor_limits_t limits = is_used ? limits_of(active_axis_ramp(self, i)) : (governor_limits_t){0};
         stream_set_limits(&self->stream, i, &limits);
     }
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
@@ -194,7 +194,7 @@ static void change_space(motion_t *self, motion_space_t space)
         const governor_limits_t limits = is_led ? limits_of(&self->cylinder[i]) : (governor_limits_t){0};
         stream_set_cylinder_limits(&self->stream, i, &limits);
     }
-    gate_reset(&self->gate);
+    spike_filter_reset(&self->gate);
 }
 
 /* True if the sample of a stream of poses is held back for the next one to confirm. */
@@ -202,9 +202,9 @@ static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t 
 {
     const uint32_t period_us = stream_is_live(&self->stream, now_us) ? stream_period_us(&self->stream) : 0;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        gate_set_grain(&self->gate, i, self->stream.curve.grain[i].grain_q32);
+        spike_filter_set_quantum(&self->gate, i, self->stream.curve.grain[i].quantum_q32);
     }
-    if (target->space != MOTION_POSE || gate_passes(&self->gate, now_us, period_us, target->value_q32)) {
+    if (target->space != MOTION_POSE || spike_filter_passes(&self->gate, now_us, period_us, target->value_q32)) {
         return false;
     }
     self->withheld = *target;
@@ -214,18 +214,18 @@ static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t 
 /* A sample, or a target by itself. */
 static void take_target(motion_t *self, const motion_target_t *target, bool is_sample, uint32_t hint_us, uint64_t now_us)
 {
-    slots_take(self, target, self->slot_q32, self->slot_extension_mm_q32);
+    axis_targets_take(self, target, self->slot_q32, self->slot_extension_mm_q32);
     self->pending = *target; /* has_pending: where it has to wait for a stop after all */
     self->asked_cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
     self->timed_end_us = is_sample ? 0 : now_us + (uint64_t)self->asked_cycles * self->cycle_us;
     self->is_stretched = false;
     if (!is_sample) {
         stream_reset(&self->stream);
-        gate_reset(&self->gate);
+        spike_filter_reset(&self->gate);
     }
     if (self->source != MOTION_STREAMED && !self->is_space_new) {
         history_t now[AXES_MAX];
-        slots_unscaled_states(self, now);
+        axis_targets_unscaled_states(self, now);
         stream_place(&self->stream, now);
     }
     stream_hide_start(&self->stream, self->is_taking_over && (!self->is_fading || self->fade.share_q58[0] < HIDDEN_Q58));
@@ -270,8 +270,8 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
 /* A stream that ended with a sample that is withheld rests there. */
 static void take_last_word(motion_t *self, uint64_t now_us)
 {
-    if (gate_is_overdue(&self->gate, now_us)) {
-        gate_reset(&self->gate);
+    if (spike_filter_is_overdue(&self->gate, now_us)) {
+        spike_filter_reset(&self->gate);
         take_target(self, &self->withheld, true, 0, now_us);
     }
 }
@@ -287,7 +287,7 @@ static bool is_on_the_way(const motion_t *self)
     while (i < self->planned_slots && to_q32[i] == self->goal_q32[i]) {
         i++;
     }
-    return i == self->planned_slots && slots_is_planned(self, self->slot_q32);
+    return i == self->planned_slots && axis_targets_is_planned(self, self->slot_q32);
 }
 
 /* What is faded in has not gone through a ramp: a sender may ask for far more than there is, and a plan that went on from there
@@ -296,7 +296,7 @@ static bool is_led_beyond(const motion_t *self)
 {
     bool is_beyond = false;
     for (unsigned i = 0; self->is_fading && i < POSE_AXES; i++) {
-        const ramp_limits_t *limits = slot_limits(self, i);
+        const ramp_limits_t *limits = active_axis_limits(self, i);
         is_beyond = is_beyond || fx_abs(self->led[i].vel_per_cycle_q32) > 2 * limits->vel_per_cycle_q32 ||
                     fx_abs(self->led[i].acc_per_cycle2_q32) > 2 * limits->acc_per_cycle2_q32;
     }
@@ -325,7 +325,7 @@ static void plan_what_is_due(motion_t *self, uint64_t now_us)
         enter_space(self);
     }
     if (due != DUE_NOTHING) {
-        slots_scale(self, self->space, self->slot_q32, self->goal_q32);
+        axis_targets_scale(self, self->space, self->slot_q32, self->goal_q32);
     }
     if (due != DUE_NOTHING && is_first) {
         begin_fade(self);
@@ -353,8 +353,8 @@ void follow_begin(motion_t *self, uint64_t now_us)
 static void step_stop_and_straight(motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
     motion_straight_t *way = &self->plan.straight;
-    const bool was_done = halt_is_done(&self->halt) && scurve_is_done(&way->path);
-    halt_step(&self->halt, ref);
+    const bool was_done = sync_stop_is_done(&self->halt) && scurve_is_done(&way->path);
+    sync_stop_step(&self->halt, ref);
     if (self->halt.elapsed > self->straight_after) {
         scurve_step(&way->path);
     }
@@ -385,7 +385,7 @@ static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
     for (unsigned i = self->planned_slots; i < AXES_MAX; i++) {
         ref[i] = (ramp_ref_t){.pos_q32 = self->slot_q32[i]};
     }
-    slots_shift_refs(self, ref);
+    axis_targets_shift_refs(self, ref);
 }
 
 /* Fades a sender in, at engage speed beside its own. */
@@ -405,7 +405,7 @@ static void take_over(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t 
     }
     if (self->space == MOTION_POSE) {
         kin_constrain(&self->kin, &pose);
-        (void)reach_pull_in(self, &pose, extension_mm_q32, NULL);
+        (void)workspace_pull_in(self, &pose, extension_mm_q32, NULL);
     }
     fade_look(&self->fade, extension_mm_q32);
     self->is_fading = fade_step(&self->fade, &self->fade_limits, ref);
@@ -424,7 +424,7 @@ static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t 
         out->asked.axis_q32[i] = ref[i].pos_q32;
     }
     kin_constrain(&self->kin, planned);
-    const unsigned cylinder = reach_pull_in(self, planned, extension_mm_q32, NULL);
+    const unsigned cylinder = workspace_pull_in(self, planned, extension_mm_q32, NULL);
     kin_constrain(&self->kin, planned); /* what is parasitic is not on the straight way the pose was pulled along */
     out->limiting_cylinder = cylinder != 0 ? (uint8_t)cylinder : self->limiting_cylinder;
     for (unsigned i = 0; i < self->cylinders; i++) {
@@ -466,7 +466,7 @@ static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX
 {
     stream_set_scale(&self->stream, intensity_largest_q16(&self->intensity));
     (void)stream_step(&self->stream, now_us, kin_followed(self), ref);
-    slots_scale_refs(self, ref);
+    axis_targets_scale_refs(self, ref);
     out->flags |= self->stream.curve.governor.strength_q32 >= 2 * Q32_ONE ? MOTION_ACCEL : 0;
 }
 

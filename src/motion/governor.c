@@ -169,8 +169,8 @@ static void go_on(governor_track_t *track, q32_t pos_q32)
 /* One period of a low-pass: always between where it was and its input. */
 static q32_t low_pass(q32_t at_q32, q32_t input_q32, q32_t share_q32)
 {
-    const q32_t way_q32 = input_q32 - at_q32;
-    return fx_abs(way_q32) < NEAR_Q32 ? input_q32 : at_q32 + fx_mul_shift_fit(way_q32, share_q32, 32);
+    const q32_t travel_q32 = input_q32 - at_q32;
+    return fx_abs(travel_q32) < NEAR_Q32 ? input_q32 : at_q32 + fx_mul_shift_fit(travel_q32, share_q32, 32);
 }
 
 /* Another quarter of a second begins. */
@@ -273,8 +273,8 @@ static q32_t value_at(const governor_t *self, unsigned channel, q32_t strength_q
     if (level == GOVERNOR_LEVELS) {
         return here_q32;
     }
-    const q32_t way_q32 = self->level_q32[level + 1][channel] - here_q32;
-    return here_q32 + fx_mul_shift_fit(way_q32, way_share(strength_q32 % Q32_ONE), 32);
+    const q32_t travel_q32 = self->level_q32[level + 1][channel] - here_q32;
+    return here_q32 + fx_mul_shift_fit(travel_q32, way_share(strength_q32 % Q32_ONE), 32);
 }
 
 q32_t governor_lag(const governor_t *self, unsigned channel)
@@ -295,9 +295,9 @@ void governor_shift(governor_t *self, unsigned channel, q32_t asked_q32)
 /* Goes there in the periods until needs are looked at again: a staircase would be one in the output. */
 static void set_strength(governor_t *self, q32_t strength_q32)
 {
-    const q32_t way_q32 = strength_q32 - self->strength_q32;
-    self->glide_q32 = way_q32 / (int64_t)self->each;
-    self->strength_q32 += way_q32 % (int64_t)self->each;
+    const q32_t travel_q32 = strength_q32 - self->strength_q32;
+    self->glide_q32 = travel_q32 / (int64_t)self->each;
+    self->strength_q32 += travel_q32 % (int64_t)self->each;
 }
 
 static int32_t need_at(const governor_t *self, q32_t strength_q32)
@@ -345,8 +345,8 @@ static void follow_need(governor_t *self, q32_t wanted_q32)
     self->target_q32 = wanted_q32 > fallen_q32 ? wanted_q32 : fallen_q32;
     q32_t next_q32 = self->target_q32;
     for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
-        const q32_t way_q32 = next_q32 - self->pole_q32[pole];
-        self->pole_q32[pole] = fx_abs(way_q32) < NEAR_Q32 ? next_q32 : self->pole_q32[pole] + way_q32 * 3 / 8;
+        const q32_t travel_q32 = next_q32 - self->pole_q32[pole];
+        self->pole_q32[pole] = fx_abs(travel_q32) < NEAR_Q32 ? next_q32 : self->pole_q32[pole] + travel_q32 * 3 / 8;
         next_q32 = self->pole_q32[pole];
     }
     const int32_t soft_q16 = wanted_q32 > next_q32 ? need_at(self, next_q32) : 0;

@@ -4,7 +4,7 @@
  */
 #include "heave/intensity.h"
 
-#include "past.h"
+#include "ref_history.h"
 
 static int64_t share_of(unsigned percent)
 {
@@ -41,7 +41,7 @@ hv_status_t intensity_set(intensity_t *self, unsigned percent)
 void intensity_place(intensity_t *self)
 {
     self->ramp.state = (ramp_state_t){.pos_q32 = share_of(self->percent)};
-    for (unsigned age = 0; age < PAST; age++) {
+    for (unsigned age = 0; age < REF_HISTORY; age++) {
         self->share_q46[age] = self->ramp.state.pos_q32;
     }
 }
@@ -49,7 +49,7 @@ void intensity_place(intensity_t *self)
 void intensity_step(intensity_t *self)
 {
     const ramp_ref_t goal = {.pos_q32 = share_of(self->percent)};
-    for (unsigned age = PAST - 1; age > 0; age--) {
+    for (unsigned age = REF_HISTORY - 1; age > 0; age--) {
         self->share_q46[age] = self->share_q46[age - 1];
     }
     if (self->share_q46[0] != goal.pos_q32 || !ramp_is_at_rest(&self->ramp)) {
@@ -82,28 +82,28 @@ q32_t intensity_unscaled(const intensity_t *self, q32_t neutral_q32, q32_t scale
 
 ramp_ref_t intensity_scale(const intensity_t *self, q32_t neutral_q32, const ramp_ref_t *ref)
 {
-    q32_t at_q32[PAST];
-    past_of(ref, at_q32);
-    for (unsigned age = 0; age < PAST; age++) {
+    q32_t at_q32[REF_HISTORY];
+    ref_history_of(ref, at_q32);
+    for (unsigned age = 0; age < REF_HISTORY; age++) {
         at_q32[age] = neutral_q32 + fx_mul_shift(at_q32[age] - neutral_q32, self->share_q46[age], INTENSITY_SHIFT);
     }
-    return past_ref(at_q32);
+    return ref_history_ref(at_q32);
 }
 
 bool intensity_is_still(const intensity_t *self, int64_t planned_q46)
 {
     unsigned age = 0;
-    while (age < PAST && self->share_q46[age] == planned_q46) {
+    while (age < REF_HISTORY && self->share_q46[age] == planned_q46) {
         age++;
     }
-    return age == PAST;
+    return age == REF_HISTORY;
 }
 
-ramp_ref_t intensity_shift(const intensity_t *self, int64_t planned_q46, q32_t way_q32)
+ramp_ref_t intensity_shift(const intensity_t *self, int64_t planned_q46, q32_t travel_q32)
 {
-    q32_t at_q32[PAST];
-    for (unsigned age = 0; age < PAST; age++) {
-        at_q32[age] = fx_mul_shift(way_q32, self->share_q46[age] - planned_q46, INTENSITY_SHIFT);
+    q32_t at_q32[REF_HISTORY];
+    for (unsigned age = 0; age < REF_HISTORY; age++) {
+        at_q32[age] = fx_mul_shift(travel_q32, self->share_q46[age] - planned_q46, INTENSITY_SHIFT);
     }
-    return past_ref(at_q32);
+    return ref_history_ref(at_q32);
 }

@@ -6,7 +6,7 @@
 #include "jog.h"
 
 #include "assembly.h"
-#include "way.h"
+#include "path_check.h"
 
 #define REACH_PIECES 64
 #define REACH_HALVES 16
@@ -214,7 +214,7 @@ hv_status_t motion_jog_pose(motion_t *self, unsigned axis, q16_t speed_q16)
     }
     self->jog.led = (1u << self->cylinders) - 1u; /* their limits are those of the way */
     path_limits_narrow(&limits, to_q32[axis] - from_q32[axis], &asked);
-    way_narrow(self, from_q32, to_q32, &limits);
+    path_check_narrow(self, from_q32, to_q32, &limits);
     for (unsigned i = 0; i < POSE_AXES; i++) {
         way->from_q32[i] = from_q32[i];
         way->to_q32[i] = to_q32[i];

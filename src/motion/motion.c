@@ -8,15 +8,15 @@
 #include "follow.h"
 #include "jog.h"
 #include "jog_limits.h"
-#include "reach.h"
-#include "slots.h"
+#include "workspace.h"
+#include "axis_targets.h"
 #include "stop.h"
 
 /* Extensions of a pose, inside the stroke with its margins. */
 static bool reaches(const motion_t *self, const pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX])
 {
     pose_t kept = *pose;
-    return reach_pull_in(self, &kept, extension_mm_q32, NULL) == 0;
+    return workspace_pull_in(self, &kept, extension_mm_q32, NULL) == 0;
 }
 
 static hv_status_t init_cylinders(motion_t *self, const settings_t *s)
@@ -92,7 +92,7 @@ static hv_status_t init_gate(motion_t *self, const settings_t *s)
     for (unsigned i = 0; i < POSE_AXES; i++) {
         accel_q16[i] = s->axis[i].accel_q16;
     }
-    return gate_init(&self->gate, accel_q16, s->spike_gate);
+    return spike_filter_init(&self->gate, accel_q16, s->spike_gate);
 }
 
 hv_status_t motion_init(motion_t *self, const settings_t *settings)
@@ -174,7 +174,7 @@ static void start_path(motion_t *self)
 /* Whether the platform can be where a target leads. */
 static bool is_possible(const motion_t *self, const motion_target_t *target)
 {
-    return target->space == MOTION_POSE || slots_can_assemble(self, target);
+    return target->space == MOTION_POSE || axis_targets_can_assemble(self, target);
 }
 
 static void begin_following(motion_t *self, uint64_t now_us)
@@ -262,7 +262,7 @@ HV_OWN_FRAME static void step_in_cylinders(motion_t *self, ramp_ref_t ref[AXES_M
 {
     motion_straight_t *way = &self->plan.straight;
     if (self->source == MOTION_STOPPING) {
-        halt_step(&self->halt, ref);
+        sync_stop_step(&self->halt, ref);
         return;
     }
     if (self->source == MOTION_JOGGED) {
@@ -328,7 +328,7 @@ static bool is_led_astray(const motion_t *self)
 /* Changes of source that become due at the end of a cycle. */
 static void end_cycle(motion_t *self, uint64_t now_us)
 {
-    if (self->source == MOTION_STOPPING && halt_is_done(&self->halt) && motion_is_at_rest(self)) {
+    if (self->source == MOTION_STOPPING && sync_stop_is_done(&self->halt) && motion_is_at_rest(self)) {
         go_on_after_stop(self, now_us);
     } else if (self->source == MOTION_ON_PATH && scurve_is_done(&self->plan.straight.path) && motion_is_at_rest(self)) {
         self->source = MOTION_RESTING;
@@ -427,10 +427,10 @@ const kin_t *motion_kin(const motion_t *self)
 
 void motion_set_spike_gate(motion_t *self, uint32_t factor)
 {
-    gate_set_factor(&self->gate, factor);
+    spike_filter_set_factor(&self->gate, factor);
 }
 
-const gate_t *motion_gate(const motion_t *self)
+const spike_filter_t *motion_spike_filter(const motion_t *self)
 {
     return &self->gate;
 }

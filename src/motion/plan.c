@@ -3,10 +3,10 @@
  */
 #include "plan.h"
 
-#include "past.h"
-#include "slot.h"
-#include "slots.h"
-#include "way.h"
+#include "ref_history.h"
+#include "active_axis.h"
+#include "axis_targets.h"
+#include "path_check.h"
 
 #define BLEND_PARTS     8 /* of a stop, after which the way behind it may begin */
 #define SMALL_WAY_Q32   (Q32_ONE / 16)
@@ -23,7 +23,7 @@ typedef struct {
 /* A state of the cycle before, less what something else adds to the plan: its reference is that of this cycle already. */
 static ramp_state_t seen_from(const ramp_state_t *state, const ramp_ref_t *ref)
 {
-    const ramp_state_t base = past_state(ref);
+    const ramp_state_t base = ref_history_state(ref);
     return (ramp_state_t){state->pos_q32 - base.pos_q32, state->vel_per_cycle_q32 - base.vel_per_cycle_q32,
                           state->acc_per_cycle2_q32 - base.acc_per_cycle2_q32};
 }
@@ -31,7 +31,7 @@ static ramp_state_t seen_from(const ramp_state_t *state, const ramp_ref_t *ref)
 /* Where a slot starts. */
 static ramp_state_t start_of(const motion_t *self, const task_t *task, unsigned i)
 {
-    ramp_state_t start = *slot_state(self, i);
+    ramp_state_t start = *active_axis_state(self, i);
     if (task->is_shifted) {
         const ramp_ref_t shift = intensity_shift(&self->intensity, self->timed_share_q46, self->timed_way_q32[i]);
         start = seen_from(&start, &shift);
@@ -49,7 +49,7 @@ static void include_start(ramp_limits_t *limits, q32_t start_q32)
 /* The limits of a slot. */
 static ramp_limits_t limits_of(const motion_t *self, const task_t *task, unsigned i)
 {
-    ramp_limits_t limits = *slot_limits(self, i);
+    ramp_limits_t limits = *active_axis_limits(self, i);
     include_start(&limits, start_of(self, task, i).pos_q32);
     return limits;
 }
@@ -91,19 +91,19 @@ static bool try_quintic(motion_t *self, const task_t *task, int64_t cycles)
     if (!plan_slots(self, task, cycles)) {
         return false;
     }
-    return keeps_limits(self, task) && (self->space != MOTION_POSE || way_is_feasible(self, &self->plan.quintic));
+    return keeps_limits(self, task) && (self->space != MOTION_POSE || path_check_is_feasible(self, &self->plan.quintic));
 }
 
 /* A stop of all slots together from where a task starts. */
-HV_OWN_FRAME static void halt_slots(motion_t *self, const task_t *task)
+HV_OWN_FRAME static void sync_stop_slots(motion_t *self, const task_t *task)
 {
     const ramp_limits_t *limits[AXES_MAX];
-    halt_t *halt = &self->halt;
+    sync_stop_t *halt = &self->halt;
     for (unsigned i = 0; i < task->slots; i++) {
-        limits[i] = slot_limits(self, i);
+        limits[i] = active_axis_limits(self, i);
         halt->start[i] = start_of(self, task, i);
     }
-    halt_plan(halt, task->slots, POSE_AXES, halt->start, limits);
+    sync_stop_plan(halt, task->slots, POSE_AXES, halt->start, limits);
 }
 
 /* The straight way between two points of the slots, as a path with the limits of axes and cylinders. */
@@ -111,10 +111,10 @@ static path_limits_t limits_of_straight(const motion_t *self, unsigned slots, co
 {
     path_limits_t limits = path_limits_none();
     for (unsigned i = 0; i < slots; i++) {
-        path_limits_narrow(&limits, self->goal_q32[i] - from_q32[i], slot_limits(self, i));
+        path_limits_narrow(&limits, self->goal_q32[i] - from_q32[i], active_axis_limits(self, i));
     }
     if (self->space == MOTION_POSE) {
-        way_narrow(self, from_q32, self->goal_q32, &limits);
+        path_check_narrow(self, from_q32, self->goal_q32, &limits);
     }
     return limits;
 }
@@ -123,7 +123,7 @@ void plan_straight(motion_t *self, unsigned slots, int64_t least_cycles)
 {
     self->timed_share_q46 = self->intensity.share_q46[0];
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        self->plan.straight.history[i] = *slot_state(self, i);
+        self->plan.straight.history[i] = *active_axis_state(self, i);
         self->plan.straight.from_q32[i] = self->plan.straight.history[i].pos_q32;
         self->plan.straight.to_q32[i] = self->goal_q32[i];
     }
@@ -138,7 +138,7 @@ void plan_straight(motion_t *self, unsigned slots, int64_t least_cycles)
 static int64_t plan_stop_and_straight(motion_t *self, const task_t *task, int64_t least_cycles)
 {
     motion_straight_t *way = &self->plan.straight;
-    halt_slots(self, task);
+    sync_stop_slots(self, task);
     for (unsigned i = 0; i < task->slots; i++) {
         way->history[i] = self->halt.start[i];
         way->from_q32[i] = self->halt.rest_q32[i];
@@ -147,7 +147,7 @@ static int64_t plan_stop_and_straight(motion_t *self, const task_t *task, int64_
     const path_limits_t limits = limits_of_straight(self, task->slots, way->from_q32);
     scurve_plan(&way->path, &limits, 1);
     int64_t part = 0;
-    while (part < BLEND_PARTS && !way_blend_is_feasible(self, task->slots, self->halt.cycles * part / BLEND_PARTS)) {
+    while (part < BLEND_PARTS && !path_check_blend_is_feasible(self, task->slots, self->halt.cycles * part / BLEND_PARTS)) {
         part++;
     }
     self->straight_after = self->halt.cycles * part / BLEND_PARTS;
@@ -164,7 +164,7 @@ static int64_t plan_timed_cycles(motion_t *self, int64_t cycles)
     if (try_quintic(self, &task, cycles)) {
         return cycles;
     }
-    if (slot_all_at_rest(self, AXES_MAX)) {
+    if (active_axis_all_at_rest(self, AXES_MAX)) {
         plan_straight(self, AXES_MAX, cycles);
         return scurve_cycles(&self->plan.straight.path);
     }
@@ -174,7 +174,7 @@ static int64_t plan_timed_cycles(motion_t *self, int64_t cycles)
 void plan_timed(motion_t *self, int64_t asked, bool is_first, uint64_t now_us)
 {
     self->planned_slots = AXES_MAX;
-    slots_plan(self, self->slot_q32);
+    axis_targets_plan(self, self->slot_q32);
     int64_t cycles = plan_timed_cycles(self, asked > 0 ? asked : 1);
     if (is_first && fade_cycles_left(&self->fade, &self->fade_limits) > cycles) {
         cycles = fade_cycles_left(&self->fade, &self->fade_limits);
@@ -196,8 +196,8 @@ static bool can_axes_go_alone(const motion_t *self)
     }
     bool is_reached = kin_inverse(&self->kin, &pose, at_mm_q32) == HV_OK;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        const ramp_state_t *state = slot_state(self, i);
-        const ramp_limits_t *axis = slot_limits(self, i);
+        const ramp_state_t *state = active_axis_state(self, i);
+        const ramp_limits_t *axis = active_axis_limits(self, i);
         if (!self->is_axis_moved[i] || (state->pos_q32 == self->goal_q32[i] && ramp_is_at_rest(&self->axis[i]))) {
             continue;
         }
@@ -207,13 +207,13 @@ static bool can_axes_go_alone(const motion_t *self)
         pose.axis_q32[i] -= SMALL_WAY_Q32;
         for (unsigned c = 0; c < self->cylinders && is_reached; c++) {
             const ramp_limits_t *cylinder = &self->cylinder[c].limits;
-            const q32_t way_q32 = fx_abs(there_mm_q32[c] - at_mm_q32[c]) * (Q32_ONE / SMALL_WAY_Q32);
+            const q32_t travel_q32 = fx_abs(there_mm_q32[c] - at_mm_q32[c]) * (Q32_ONE / SMALL_WAY_Q32);
             need_q16[c][0] +=
-                fx_mul_div(fx_mul_shift(axis->vel_per_cycle_q32, way_q32, 32), Q16_ONE, cylinder->vel_per_cycle_q32);
+                fx_mul_div(fx_mul_shift(axis->vel_per_cycle_q32, travel_q32, 32), Q16_ONE, cylinder->vel_per_cycle_q32);
             need_q16[c][1] +=
-                fx_mul_div(fx_mul_shift(axis->acc_per_cycle2_q32, way_q32, 32), Q16_ONE, cylinder->acc_per_cycle2_q32);
+                fx_mul_div(fx_mul_shift(axis->acc_per_cycle2_q32, travel_q32, 32), Q16_ONE, cylinder->acc_per_cycle2_q32);
             need_q16[c][2] +=
-                fx_mul_div(fx_mul_shift(axis->jerk_per_cycle3_q32, way_q32, 32), Q16_ONE, cylinder->jerk_per_cycle3_q32);
+                fx_mul_div(fx_mul_shift(axis->jerk_per_cycle3_q32, travel_q32, 32), Q16_ONE, cylinder->jerk_per_cycle3_q32);
         }
     }
     for (unsigned c = 0; c < self->cylinders; c++) {
@@ -225,8 +225,8 @@ static bool can_axes_go_alone(const motion_t *self)
 void plan_step(motion_t *self)
 {
     self->planned_slots = POSE_AXES;
-    slots_plan(self, self->slot_q32);
-    if (slot_all_at_rest(self, POSE_AXES)) {
+    axis_targets_plan(self, self->slot_q32);
+    if (active_axis_all_at_rest(self, POSE_AXES)) {
         plan_straight(self, POSE_AXES, 1);
         return;
     }

@@ -3,7 +3,7 @@
  */
 #include "stop.h"
 
-#include "heave/halt.h"
+#include "heave/sync_stop.h"
 #include "jog_limits.h"
 
 bool motion_is_at_rest(const motion_t *self)
@@ -19,14 +19,14 @@ bool motion_is_at_rest(const motion_t *self)
 /* All cylinders and the rotation motor slow down together over the same time. */
 static void plan_stop(motion_t *self)
 {
-    halt_t *halt = &self->halt;
+    sync_stop_t *halt = &self->halt;
     const ramp_limits_t *limits[AXES_MAX];
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const ramp_t *ramp = jog_limiter(self, i);
         halt->start[i] = ramp->state;
         limits[i] = &ramp->limits;
     }
-    halt_plan(halt, AXES_MAX, CYLINDERS_MAX, halt->start, limits);
+    sync_stop_plan(halt, AXES_MAX, CYLINDERS_MAX, halt->start, limits);
     self->source = MOTION_STOPPING;
     self->angle_target_deg_q32 = halt->rest_q32[AXIS_ANGLE];
 }

@@ -103,7 +103,7 @@ static bool is_coarse(const stream_t *self)
     const stream_curve_t *curve = &self->curve;
     bool is_found = false;
     for (unsigned axis = 0; axis < POSE_AXES && axis < curve->axes; axis++) {
-        is_found |= fx_abs(curve->grain[axis].step_q32) < FEW * curve->grain[axis].grain_q32;
+        is_found |= fx_abs(curve->grain[axis].step_q32) < FEW * curve->grain[axis].quantum_q32;
     }
     return is_found || curve->window > 1;
 }
@@ -148,9 +148,9 @@ static q32_t advance_of(const stream_t *self, const q32_t *sample_q32)
         const int64_t per_speed_q62 = self->curve.governor.per_limit_q62[axis][0];
         const q32_t step_q32 =
             fx_mul_shift((seen->value_q32[0][axis] - seen->value_q32[1][axis]) / seen->index[1], per_speed_q62, 30);
-        const q32_t way_q32 = fx_mul_shift(sample_q32[axis] - seen->value_q32[0][axis], per_speed_q62, 30);
+        const q32_t travel_q32 = fx_mul_shift(sample_q32[axis] - seen->value_q32[0][axis], per_speed_q62, 30);
         along_q32 +=
-            fx_mul_shift(fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), fx_clamp(way_q32, -16 * Q32_ONE, 16 * Q32_ONE), 32);
+            fx_mul_shift(fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), fx_clamp(travel_q32, -16 * Q32_ONE, 16 * Q32_ONE), 32);
         square_q32 +=
             fx_mul_shift(fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), 32);
     }

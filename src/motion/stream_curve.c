@@ -8,7 +8,7 @@
  */
 #include "stream_curve.h"
 
-#include "stream_grain.h"
+#include "stream_quantum.h"
 
 enum {
     AGE_MAX = 100,     /* samples after which an axis may move as fast as it can */
@@ -102,7 +102,7 @@ void stream_curve_start(stream_curve_t *self, const kin_t *kin, const q32_t *sam
         self->way_q36[0][axis] = self->way_q36[1][axis] = self->way_q36[2][axis] = 0;
         self->off_q32[axis][0] = self->off_q32[axis][1] = self->off_q32[axis][2] = 0;
         self->lead[axis] = (stream_lead_t){0};
-        self->grain[axis] = (stream_grain_t){0};
+        self->grain[axis] = (stream_quantum_t){0};
     }
     self->watched = 0;
     self->change = 0;
@@ -307,15 +307,15 @@ static int32_t window_of_axis(const stream_curve_t *self, unsigned axis)
 {
     const governor_limits_t *stop = &self->limits[axis];
     const int64_t n_q16 = self->period_cycles_q16;
-    const q32_t grain_q32 = self->grain[axis].grain_q32;
-    if (grain_q32 == 0 || stop->jerk_per_cycle3_q32 <= 0) {
+    const q32_t quantum_q32 = self->grain[axis].quantum_q32;
+    if (quantum_q32 == 0 || stop->jerk_per_cycle3_q32 <= 0) {
         return 1;
     }
     const q32_t acc_q32 = fx_mul_shift(fx_mul_shift(stop->acc_per_cycle2_q32, n_q16, 16), n_q16, 16);
     const q32_t jerk_q32 = fx_mul_shift(fx_mul_shift(fx_mul_shift(stop->jerk_per_cycle3_q32, n_q16, 16), n_q16, 16), n_q16, 16);
     const int64_t one_q16 = self->lead_q32 == 0 ? Q16_ONE : COARSE_LED * Q16_ONE;
-    const int64_t by_acc_q16 = fx_mul_div(grain_q32, COARSE_ACC * one_q16, acc_q32);
-    const int64_t by_jerk_q16 = fx_mul_div(grain_q32, COARSE_JERK * one_q16, jerk_q32);
+    const int64_t by_acc_q16 = fx_mul_div(quantum_q32, COARSE_ACC * one_q16, acc_q32);
+    const int64_t by_jerk_q16 = fx_mul_div(quantum_q32, COARSE_JERK * one_q16, jerk_q32);
     int64_t m = 1;
     while (m <= STREAM_WINDOW_MAX && (m * m * Q16_ONE < by_acc_q16 || m * m * m * Q16_ONE < by_jerk_q16)) {
         m++;
@@ -435,9 +435,9 @@ static int64_t way_q16(const stream_lead_t *on, int64_t periods)
         return time_q16 <= 0 ? periods * Q16_ONE : on->reach_q16;
     }
     const q32_t time_q32 = fx_mul_div(time_q16, Q32_ONE, stop_q16);
-    const q32_t way_q32 = time_q32 <= Q32_ONE / 2 ? time_q32 - lost_q32(time_q32, on->rise_q32)
-                                                  : Q32_ONE / 2 - lost_q32(Q32_ONE - time_q32, on->rise_q32);
-    return full_q16 + fx_mul_shift(way_q32, stop_q16, 32);
+    const q32_t travel_q32 = time_q32 <= Q32_ONE / 2 ? time_q32 - lost_q32(time_q32, on->rise_q32)
+                                                     : Q32_ONE / 2 - lost_q32(Q32_ONE - time_q32, on->rise_q32);
+    return full_q16 + fx_mul_shift(travel_q32, stop_q16, 32);
 }
 
 /* The point so many periods beyond the newest sample: the motion goes on, ever more slowly. */
@@ -527,7 +527,7 @@ HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, bool i
         relabel(self, furthest);
     }
     copy_point(self, before_q32, self->last_q32);
-    stream_grain_watch(self, periods, sample_q32);
+    stream_quantum_watch(self, periods, sample_q32);
     copy_point(self, self->last_q32, point_q32);
     copy_point(self, self->newest_q32, sample_q32);
     const int32_t ahead = self->ahead + (int32_t)periods;
@@ -552,7 +552,7 @@ HV_WRAPS q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *samp
         const q32_t step = self->last_q32[axis] - before_q32;
         const q32_t bend = step - (before_q32 - self->point_q32[slot(newest(self) - 2)][axis]);
         misfit_q32 += fx_abs(sample_q32[axis] - self->last_q32[axis] - n * step - n * (n + 1) / 2 * bend);
-        misfit_q32 += 2 * self->grain[axis].grain_q32;                        /* what rounding may make of it */
+        misfit_q32 += 2 * self->grain[axis].quantum_q32;                      /* what rounding may make of it */
         *step_q32 += fx_clamp(fx_abs(step) - 2 * fx_abs(bend), 0, INT64_MAX); /* a motion that bends tells little */
     }
     return misfit_q32;
@@ -712,8 +712,8 @@ static q32_t jump_speed(const stream_curve_t *self, q32_t off_q32)
 HV_WRAPS static void place_points(stream_curve_t *self, const q32_t *first_q32, unsigned periods, const q32_t *sample_q32)
 {
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        const q32_t way_q32 = sample_q32[axis] - self->last_q32[axis];
-        const q32_t step_q32 = (int32_t)periods > self->patience ? 0 : way_q32 / (int32_t)periods;
+        const q32_t travel_q32 = sample_q32[axis] - self->last_q32[axis];
+        const q32_t step_q32 = (int32_t)periods > self->patience ? 0 : travel_q32 / (int32_t)periods;
         for (int32_t back = 0; back < STREAM_POINTS - AHEAD_MAX; back++) {
             const bool is_before = first_q32 != NULL && back > (int32_t)periods;
             self->point_q32[slot(self->head - (uint32_t)back)][axis] =

@@ -155,17 +155,17 @@ static q32_t way_in(const stream_evidence_t *self, unsigned axis, unsigned perio
     return n * step_q32 + (q32_t)(n * (n + h1) / 2) * bend_q32;
 }
 
-static q32_t in_speed_limits(const governor_t *governor, unsigned axis, q32_t way_q32)
+static q32_t in_speed_limits(const governor_t *governor, unsigned axis, q32_t travel_q32)
 {
-    return fx_clamp(fx_mul_shift(fx_abs(way_q32), governor->per_limit_q62[axis][0], 30), 0, 256 * Q32_ONE);
+    return fx_clamp(fx_mul_shift(fx_abs(travel_q32), governor->per_limit_q62[axis][0], 30), 0, 256 * Q32_ONE);
 }
 
 q32_t stream_evidence_misfit(const stream_evidence_t *self, const governor_t *governor, unsigned periods, const q32_t *sample_q32)
 {
     q32_t sum_q32 = 0;
     for (unsigned axis = 0; axis < self->axes && axis < POSE_AXES; axis++) {
-        const q32_t way_q32 = sample_q32[axis] - self->value_q32[0][axis];
-        sum_q32 += in_speed_limits(governor, axis, way_q32 - way_in(self, axis, periods));
+        const q32_t travel_q32 = sample_q32[axis] - self->value_q32[0][axis];
+        sum_q32 += in_speed_limits(governor, axis, travel_q32 - way_in(self, axis, periods));
     }
     return sum_q32;
 }

@@ -157,9 +157,9 @@ static void forget_rejects(const gateway_t *gateway, gateway_t *out)
     memset(counters->rejected, 0, sizeof counters->rejected);
     counters->rejected[FRAME_ERR_PLATFORM] = platform; /* of good frames */
     counters->datagrams = counters->oversize = 0;
-    const uint32_t waited_us = out->intake.waited_us;
-    memset(&out->intake, 0, sizeof out->intake);
-    out->intake.waited_us = waited_us;
+    const uint32_t waited_us = out->receiver.waited_us;
+    memset(&out->receiver, 0, sizeof out->receiver);
+    out->receiver.waited_us = waited_us;
     tidy_owner(&out->sender.owner);
     tidy_owner(&out->snapshot.owner);
     tidy_owner(&out->snapshot.other);

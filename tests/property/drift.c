@@ -165,7 +165,7 @@ static bool is_on_target(const ride_t *ride)
 static void essence(motion_t *motion)
 {
     motion->last_us = 0;
-    motion->gate = (gate_t){0};
+    motion->gate = (spike_filter_t){0};
     stream_t *stream = &motion->stream;
     memset(&stream->thin, 0, sizeof stream->thin);
     memset(&stream->clock, 0, sizeof stream->clock);

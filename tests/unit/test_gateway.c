@@ -2353,7 +2353,7 @@ static void test_resume_refuses_what_is_insane_in_any_module(void)
     SPOIL(motion.planned_slots, AXES_MAX + 1);
     SPOIL(motion.asked_cycles, -1);
 #undef SPOIL
-    saved.intake.scanner.phase = 200; /* is not taken from there */
+    saved.receiver.scanner.phase = 200; /* is not taken from there */
     TEST_ASSERT_EQUAL(HV_OK, resume(&saved));
 }
 

@@ -826,7 +826,7 @@ static void test_init_settings_that_no_platform_moves_with_are_refused(void)
     SPOIL(engage_speed_mm_s_q16, 0);
     SPOIL(axis[AXIS_YAW].accel_q16, 0);
     SPOIL(axis[AXIS_ANGLE].jerk, 0);
-    SPOIL(spike_gate, GATE_FACTOR_MAX + 1);
+    SPOIL(spike_gate, SPIKE_FILTER_FACTOR_MAX + 1);
     SPOIL(neutral_q16[AXIS_Z], 110 * Q16_ONE);
     SPOIL(intensity_start_percent, 101);
     SPOIL(settled_extension_mm_q16, -700 * Q16_ONE);

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "../../src/motion/way.h"
+#include "../../src/motion/path_check.h"
 #include "rig.h"
 #include "unity.h"
 
@@ -270,9 +270,9 @@ static void test_way_where_nothing_can_be_solved_is_not_feasible(void)
     const q32_t near_q32[POSE_AXES] = {[AXIS_X] = q32_from_int(10)};
     quintic_t quintic;
     TEST_ASSERT_EQUAL(HV_OK, quintic_plan(&quintic, POSE_AXES, start, near_q32, 1000));
-    TEST_ASSERT_TRUE(way_is_feasible(&m_motion, &quintic));
+    TEST_ASSERT_TRUE(path_check_is_feasible(&m_motion, &quintic));
     TEST_ASSERT_EQUAL(HV_OK, quintic_plan(&quintic, POSE_AXES, rest, beyond_q32, 1000));
-    TEST_ASSERT_FALSE(way_is_feasible(&m_motion, &quintic));
+    TEST_ASSERT_FALSE(path_check_is_feasible(&m_motion, &quintic));
 }
 
 static void test_way_where_nothing_can_be_solved_narrows_nothing(void)
@@ -282,9 +282,9 @@ static void test_way_where_nothing_can_be_solved_narrows_nothing(void)
     const q32_t beyond_q32[POSE_AXES] = {[AXIS_X] = q32_from_int(20000)};
     const path_limits_t none = path_limits_none();
     path_limits_t limits = none;
-    way_narrow(&m_motion, from_q32, beyond_q32, &limits);
+    path_check_narrow(&m_motion, from_q32, beyond_q32, &limits);
     TEST_ASSERT_EQUAL_MEMORY(&none, &limits, sizeof limits);
-    way_narrow(&m_motion, from_q32, near_q32, &limits);
+    path_check_narrow(&m_motion, from_q32, near_q32, &limits);
     TEST_ASSERT_TRUE(limits.vel_q62 < none.vel_q62 && limits.acc_q62 < none.acc_q62 && limits.jerk_q62 < none.jerk_q62);
 }
 

@@ -105,7 +105,7 @@ static void check_window(int32_t expected, uint32_t period_us)
 static void test_pace_a_longer_mean_than_needed_is_kept_where_one_less_would_do(void)
 {
     m_curve.limits[0] = (governor_limits_t){.acc_per_cycle2_q32 = Q32_ONE * 3 / 1000, .jerk_per_cycle3_q32 = Q32_ONE};
-    m_curve.grain[0].grain_q32 = Q32_ONE;
+    m_curve.grain[0].quantum_q32 = Q32_ONE;
     check_window(2, 20000);
     check_window(3, 16000);
     check_window(3, 20000);

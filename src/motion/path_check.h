@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: MIT
- * way.h - what a planned way of the pose asks of the cylinders: their limits are known before the move begins.
+ * path_check.h - what a planned way of the pose asks of the cylinders: their limits are known before the move begins.
  * Private to src/motion.
  */
-#ifndef WAY_H
-#define WAY_H
+#ifndef PATH_CHECK_H
+#define PATH_CHECK_H
 
 #include "heave/motion.h"
 
 /** True if every cylinder can follow the poses of a quintic (33 of them are looked at). */
-bool way_is_feasible(const motion_t *motion, const quintic_t *quintic);
+bool path_check_is_feasible(const motion_t *motion, const quintic_t *quintic);
 
 /** Narrows path limits so that every cylinder keeps its own on the straight way between two poses (17 of them are looked at). */
-void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q32, path_limits_t *limits);
+void path_check_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q32, path_limits_t *limits);
 
 /** True if axes and cylinders keep their limits while motion->halt and motion->plan.straight are made together, the straight way
  * from a cycle of the stop on (33 points are looked at). What the stop alone asks of the cylinders counts too.
  *  @param after cycles of the stop before the straight way begins */
-bool way_blend_is_feasible(const motion_t *motion, unsigned slots, int64_t after);
+bool path_check_blend_is_feasible(const motion_t *motion, unsigned slots, int64_t after);
 
 #endif

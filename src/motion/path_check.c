@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT
- * way.c - cylinder speeds, accelerations and jerks along a planned way, from differences of a few sampled extensions.
+ * path_check.c - cylinder speeds, accelerations and jerks along a planned way, from differences of a few sampled extensions.
  * On a straight way with parameter s a cylinder's acceleration is c' s'' + c'' s'^2. The bend takes a quarter of the limit at
  * most, what it does not take is left for s''. The limiter stays the last word; this makes moves that it need not touch.
  */
-#include "way.h"
+#include "path_check.h"
 
 #include "jog_limits.h"
-#include "slot.h"
+#include "active_axis.h"
 
 #define QUINTIC_SHIFT   5 /* a division for each limit of each piece took a sixth of the time of a plan */
 #define QUINTIC_PIECES  (1 << QUINTIC_SHIFT)
@@ -48,7 +48,7 @@ static bool is_within(const differences_t *d, q32_t third_q32, const ramp_limits
            fx_abs(third_q32) <= limit_per_piece(limits->jerk_per_cycle3_q32, cycles, 3);
 }
 
-bool way_is_feasible(const motion_t *motion, const quintic_t *quintic)
+bool path_check_is_feasible(const motion_t *motion, const quintic_t *quintic)
 {
     differences_t d[CYLINDERS_MAX] = {{0}};
     for (int64_t piece = 0; piece <= QUINTIC_PIECES; piece++) {
@@ -97,7 +97,7 @@ static ramp_limits_t less_bend(const ramp_limits_t *own, q32_t bend_q32, const p
     return left;
 }
 
-void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q32, path_limits_t *limits)
+void path_check_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q32, path_limits_t *limits)
 {
     differences_t d[CYLINDERS_MAX] = {{0}};
     q32_t slope_q32[CYLINDERS_MAX] = {0};
@@ -134,7 +134,7 @@ void way_narrow(const motion_t *motion, const q32_t *from_q32, const q32_t *to_q
 static void advance_blend(const motion_t *motion, unsigned slots, int64_t cycle, int64_t n, q32_t *vel_q32, q32_t *halted_q32)
 {
     for (unsigned i = 0; i < slots; i++) {
-        const q32_t next_q32 = halt_velocity(&motion->halt, i, cycle);
+        const q32_t next_q32 = sync_stop_velocity(&motion->halt, i, cycle);
         halted_q32[i] += (vel_q32[i] + next_q32) * n / 2;
         vel_q32[i] = next_q32;
     }
@@ -154,7 +154,7 @@ static bool are_within(differences_t *d, int64_t sample, const q32_t *pos_q32, u
     return are;
 }
 
-HV_OWN_FRAME bool way_blend_is_feasible(const motion_t *motion, unsigned slots, int64_t after)
+HV_OWN_FRAME bool path_check_blend_is_feasible(const motion_t *motion, unsigned slots, int64_t after)
 {
     const motion_straight_t *way = &motion->plan.straight;
     const int64_t n = 1 + motion->halt.cycles / BLEND_PIECES;
@@ -166,7 +166,7 @@ HV_OWN_FRAME bool way_blend_is_feasible(const motion_t *motion, unsigned slots, 
     q32_t vel_q32[AXES_MAX];
     q32_t halted_q32[AXES_MAX];
     for (unsigned i = 0; i < slots; i++) {
-        slot_list[i] = slot_limits(motion, i);
+        slot_list[i] = active_axis_limits(motion, i);
         vel_q32[i] = motion->halt.start[i].vel_per_cycle_q32;
         halted_q32[i] = motion->halt.start[i].pos_q32;
     }

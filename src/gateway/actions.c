@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * operate.c - offers events to the supervisor and carries out its actions: motion, and requests to the drives.
+ * actions.c - offers events to the supervisor and carries out its actions: motion, and requests to the drives.
  */
-#include "operate.h"
+#include "actions.h"
 
 #include "heave/text.h"
 #include "service.h"
@@ -26,7 +26,7 @@ static bool is_at_settled(const gateway_t *self)
 }
 
 /* What a reset would come too early for. */
-bool operate_is_drive_fault_present(const gateway_t *self)
+bool actions_is_drive_fault_present(const gateway_t *self)
 {
     if (drives_is_failing(self->io.drives)) {
         return true;
@@ -44,7 +44,7 @@ static supervisor_view_t view_of(const gateway_t *self)
     return (supervisor_view_t){
         .is_at_settled = is_at_settled(self),
         .is_at_rest = motion_is_at_rest(&self->motion),
-        .is_fault_present = operate_is_drive_fault_present(self),
+        .is_fault_present = actions_is_drive_fault_present(self),
         .is_estop_active = self->snapshot.is_estop_active,
     };
 }
@@ -63,7 +63,7 @@ static void log_change(gateway_t *self, state_t from, event_t event)
 }
 
 /* Set-points on the actual positions. */
-void operate_track_actual(gateway_t *self)
+void actions_track_actual(gateway_t *self)
 {
     q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
     const unsigned cylinders = kin_cylinders(motion_kin(&self->motion));
@@ -80,7 +80,7 @@ static void begin_bring_up(gateway_t *self, uint64_t now_us)
     self->is_disable_due = false;
 }
 
-void operate_follow(gateway_t *self, uint64_t now_us)
+void actions_follow(gateway_t *self, uint64_t now_us)
 {
     self->sender.start_us = now_us;
     self->sender.frame_mask = self->settings.relay_safe_mask;
@@ -89,7 +89,7 @@ void operate_follow(gateway_t *self, uint64_t now_us)
 }
 
 /* Asks the drives to go off; is_disable_due stays while they cannot be asked. */
-void operate_disable_drives(gateway_t *self)
+void actions_disable_drives(gateway_t *self)
 {
     const state_t state = self->supervisor.state;
     const bool is_quick = state == STATE_ESTOP || state == STATE_HOLD ||
@@ -102,11 +102,11 @@ static void drop_drives(gateway_t *self)
 {
     self->is_tracking_actual = true;
     self->is_disable_due = true;
-    operate_track_actual(self);
+    actions_track_actual(self);
 }
 
 /* The drives are coming up, or home by themselves: no set-point leads them. */
-bool operate_is_coming_up(const gateway_t *self)
+bool actions_is_coming_up(const gateway_t *self)
 {
     return self->bring_up == BRING_UP_ENABLE || self->bring_up == BRING_UP_HOME;
 }
@@ -114,7 +114,7 @@ bool operate_is_coming_up(const gateway_t *self)
 /* Stops where it is; drives that are coming up or homing by themselves are told so. */
 static void hold(gateway_t *self)
 {
-    if (operate_is_coming_up(self)) {
+    if (actions_is_coming_up(self)) {
         drop_drives(self);
     } else {
         motion_stop(&self->motion);
@@ -132,7 +132,7 @@ static void stop_and_disable(gateway_t *self)
 }
 
 /* What the worst fault so far asks for. */
-void operate_react(gateway_t *self)
+void actions_react(gateway_t *self)
 {
     if (self->snapshot.reaction >= FAULT_REACT_QUICK_STOP) {
         self->bring_up = BRING_UP_IDLE;
@@ -155,7 +155,7 @@ static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
         motion_rise(&self->motion);
         break;
     case ACTION_FOLLOW:
-        operate_follow(self, now_us);
+        actions_follow(self, now_us);
         break;
     case ACTION_STOP:
         hold(self);
@@ -164,7 +164,7 @@ static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
         stop_and_disable(self);
         break;
     case ACTION_FAULT_STOP:
-        operate_react(self);
+        actions_react(self);
         break;
     case ACTION_SERVE:
         service_begin(self, !self->is_tracking_actual);
@@ -179,7 +179,7 @@ static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
     }
 }
 
-void operate_event(gateway_t *self, event_t event, uint64_t now_us)
+void actions_event(gateway_t *self, event_t event, uint64_t now_us)
 {
     const state_t before = self->supervisor.state;
     const supervisor_view_t view = view_of(self);
@@ -192,10 +192,10 @@ void operate_event(gateway_t *self, event_t event, uint64_t now_us)
     carry_out(self, action, now_us);
 }
 
-void operate_after_motion(gateway_t *self)
+void actions_after_motion(gateway_t *self)
 {
     if (self->is_disable_due && motion_is_at_rest(&self->motion)) {
-        operate_disable_drives(self);
+        actions_disable_drives(self);
         self->is_tracking_actual |= !self->is_disable_due;
     }
 }

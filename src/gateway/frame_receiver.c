@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT
- * intake.c - see intake.h.
+ * frame_receiver.c - see frame_receiver.h.
  */
-#include "intake.h"
+#include "frame_receiver.h"
 
 #define REJECT_TEXT_BYTES 60u
 
-void intake_put_suppressed(text_t *text, uint32_t lines)
+void frame_receiver_put_suppressed(text_t *text, uint32_t lines)
 {
     if (lines > 0) {
         text_put(text, "; before that ");
@@ -15,7 +15,7 @@ void intake_put_suppressed(text_t *text, uint32_t lines)
 }
 
 /* One line for the first reject of a burst, with what was left out since the last one. */
-static void log_reject(intake_t *self, hal_log_t log, const char *reason, frame_error_t error, const uint8_t *bytes,
+static void log_reject(frame_receiver_t *self, hal_log_t log, const char *reason, frame_error_t error, const uint8_t *bytes,
                        size_t length, const hal_udp_peer_t *from, uint64_t now_us)
 {
     uint64_t *logged_us = &self->reject_logged_us[error];
@@ -34,13 +34,13 @@ static void log_reject(intake_t *self, hal_log_t log, const char *reason, frame_
     text_put(&text, ": \"");
     text_put_escaped(&text, bytes, length < REJECT_TEXT_BYTES ? length : REJECT_TEXT_BYTES);
     text_put(&text, "\"");
-    intake_put_suppressed(&text, self->reject_suppressed[error]);
+    frame_receiver_put_suppressed(&text, self->reject_suppressed[error]);
     hal_log_write(log, HAL_LOG_WARNING, line);
     *logged_us = now_us;
     self->reject_suppressed[error] = 0;
 }
 
-HV_OWN_FRAME static void reject(intake_t *self, const intake_io_t *io, const frame_reject_t *why, uint64_t now_us)
+HV_OWN_FRAME static void reject(frame_receiver_t *self, const frame_receiver_io_t *io, const frame_reject_t *why, uint64_t now_us)
 {
     char reason[HAL_LOG_TEXT_MAX + 1];
     io->counters->rejected[why->error]++;
@@ -48,8 +48,8 @@ HV_OWN_FRAME static void reject(intake_t *self, const intake_io_t *io, const fra
     log_reject(self, io->log, reason, why->error, &self->datagram[why->start], why->end - why->start, &self->from, now_us);
 }
 
-HV_OWN_FRAME void intake_refuse(intake_t *self, const intake_io_t *io, frame_command_t command, const char *missing,
-                                const hal_udp_peer_t *from, uint64_t now_us)
+HV_OWN_FRAME void frame_receiver_refuse(frame_receiver_t *self, const frame_receiver_io_t *io, frame_command_t command,
+                                        const char *missing, const hal_udp_peer_t *from, uint64_t now_us)
 {
     char reason[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(reason, sizeof reason);
@@ -62,7 +62,7 @@ HV_OWN_FRAME void intake_refuse(intake_t *self, const intake_io_t *io, frame_com
 
 /* How long the datagram has waited for its cycle: a sender's time line is finer than cycles. A longer wait means a late cycle,
  * which a replay does not have. */
-static void note_arrival(intake_t *self, hal_udp_t udp, uint32_t cycle_us)
+static void note_arrival(frame_receiver_t *self, hal_udp_t udp, uint32_t cycle_us)
 {
     uint32_t waited_us = 0;
     const bool is_known = hal_udp_waited(udp, &waited_us) == HV_OK;
@@ -71,7 +71,7 @@ static void note_arrival(intake_t *self, hal_udp_t udp, uint32_t cycle_us)
 
 /* Receives the next datagram that is not too long.
  * Returns false where none has arrived, or the cycle has had its share. */
-static bool receive(intake_t *self, const gateway_settings_t *settings, const intake_io_t *io, uint64_t now_us)
+static bool receive(frame_receiver_t *self, const gateway_settings_t *settings, const frame_receiver_io_t *io, uint64_t now_us)
 {
     while (self->datagrams < GATEWAY_DATAGRAMS_PER_CYCLE) {
         self->position = 0;
@@ -97,13 +97,14 @@ static bool receive(intake_t *self, const gateway_settings_t *settings, const in
     return false;
 }
 
-void intake_begin(intake_t *self)
+void frame_receiver_begin(frame_receiver_t *self)
 {
     self->datagrams = 0;
     self->is_open = false;
 }
 
-bool intake_next(intake_t *self, const gateway_settings_t *settings, const intake_io_t *io, uint64_t now_us, frame_t *frame)
+bool frame_receiver_next(frame_receiver_t *self, const gateway_settings_t *settings, const frame_receiver_io_t *io,
+                         uint64_t now_us, frame_t *frame)
 {
     for (;;) {
         self->is_open = self->is_open || receive(self, settings, io, now_us);

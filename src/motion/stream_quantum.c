@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
- * stream_grain.c - what the values of a sender are multiples of.
+ * stream_quantum.c - what the values of a sender are multiples of.
  * The grain is the greatest common divisor of all steps since the watch began. An even ramp has one too, and a jump: values count
  * as coarse only where the step itself changes up and down in turn, as it does where a motion is rounded.
  */
-#include "stream_grain.h"
+#include "stream_quantum.h"
 
 enum {
     WATCH = 64, /* samples after which the watch begins anew: a sender may have become finer, or coarser */
@@ -25,7 +25,7 @@ static q32_t common_divisor(q32_t a_q32, q32_t b_q32)
 }
 
 /* A change of the step. */
-static void watch_turn(stream_grain_t *grain, q32_t change_q32)
+static void watch_turn(stream_quantum_t *grain, q32_t change_q32)
 {
     const bool is_up = change_q32 > 0;
     if (fx_abs(change_q32) > NOTHING_Q32) {
@@ -36,7 +36,7 @@ static void watch_turn(stream_grain_t *grain, q32_t change_q32)
     }
 }
 
-static void watch_step(stream_grain_t *grain, int32_t periods, q32_t step_q32)
+static void watch_step(stream_quantum_t *grain, int32_t periods, q32_t step_q32)
 {
     if (grain->found_q32 == 0 || grain->found_q32 >= FINEST_Q32) {
         grain->found_q32 = common_divisor(grain->found_q32, fx_abs(step_q32));
@@ -47,12 +47,12 @@ static void watch_step(stream_grain_t *grain, int32_t periods, q32_t step_q32)
 }
 
 /* A finer step than the grain refutes it at once; a coarser grain has to last for a whole watch. */
-static void judge(stream_grain_t *grain, bool is_over)
+static void judge(stream_quantum_t *grain, bool is_over)
 {
     const bool is_coarse = grain->turns == TURNS;
-    const bool is_finer = grain->found_q32 > 0 && grain->found_q32 < grain->grain_q32;
-    if ((is_coarse && (is_over || grain->grain_q32 == 0)) || is_finer) {
-        grain->grain_q32 = grain->found_q32 < FINEST_Q32 ? 0 : grain->found_q32;
+    const bool is_finer = grain->found_q32 > 0 && grain->found_q32 < grain->quantum_q32;
+    if ((is_coarse && (is_over || grain->quantum_q32 == 0)) || is_finer) {
+        grain->quantum_q32 = grain->found_q32 < FINEST_Q32 ? 0 : grain->found_q32;
     }
     if (is_over) {
         grain->found_q32 = 0;
@@ -60,7 +60,7 @@ static void judge(stream_grain_t *grain, bool is_over)
     }
 }
 
-void stream_grain_watch(stream_curve_t *self, unsigned periods, const q32_t *sample_q32)
+void stream_quantum_watch(stream_curve_t *self, unsigned periods, const q32_t *sample_q32)
 {
     self->watched = self->watched < WATCH ? self->watched + 1 : 0;
     for (unsigned axis = 0; axis < self->axes; axis++) {

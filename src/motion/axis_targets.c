@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT
- * slots.c - a sender's targets as one value per slot of the space that is followed in; see slots.h.
+ * axis_targets.c - a sender's targets as one value per slot of the space that is followed in; see axis_targets.h.
  */
-#include "slots.h"
+#include "axis_targets.h"
 
 #include "assembly.h"
-#include "reach.h"
-#include "slot.h"
+#include "workspace.h"
+#include "active_axis.h"
 
 #define SLOT_MAX_Q32 q32_from_int(32768) /* no limit is beyond it */
 
@@ -26,7 +26,7 @@ static q32_t centre_of(const motion_t *self, motion_space_t space, unsigned i)
     return space == MOTION_POSE ? self->neutral.axis_q32[i] : self->neutral_mm_q32[i];
 }
 
-bool slots_can_assemble(const motion_t *self, const motion_target_t *target)
+bool axis_targets_can_assemble(const motion_t *self, const motion_target_t *target)
 {
     q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
     for (unsigned i = 0; i < self->cylinders; i++) {
@@ -50,7 +50,7 @@ static q32_t slot_within(motion_t *self, motion_space_t space, unsigned i, const
     return is_scaled(self, space, i) ? intensity_unscaled(&self->intensity, centre_q32, kept_q32) : kept_q32;
 }
 
-void slots_scale(const motion_t *self, motion_space_t space, const q32_t slot_q32[AXES_MAX], q32_t scaled_q32[AXES_MAX])
+void axis_targets_scale(const motion_t *self, motion_space_t space, const q32_t slot_q32[AXES_MAX], q32_t scaled_q32[AXES_MAX])
 {
     for (unsigned i = 0; i < AXES_MAX; i++) {
         scaled_q32[i] =
@@ -67,14 +67,15 @@ static void pull_slots_in(motion_t *self, q32_t slot_q32[AXES_MAX], const q32_t 
     for (unsigned i = 0; i < POSE_AXES; i++) {
         pose.axis_q32[i] = scaled_q32[i];
     }
-    self->limiting_cylinder = (uint8_t)reach_pull_in(self, &pose, extension_mm_q32, &share_q62);
+    self->limiting_cylinder = (uint8_t)workspace_pull_in(self, &pose, extension_mm_q32, &share_q62);
     for (unsigned i = 0; self->limiting_cylinder != 0 && i < POSE_AXES; i++) {
         const q32_t neutral_q32 = self->neutral.axis_q32[i];
         slot_q32[i] = neutral_q32 + fx_mul_shift(slot_q32[i] - neutral_q32, share_q62, 62);
     }
 }
 
-void slots_take(motion_t *self, const motion_target_t *target, q32_t slot_q32[AXES_MAX], q32_t extension_mm_q32[CYLINDERS_MAX])
+void axis_targets_take(motion_t *self, const motion_target_t *target, q32_t slot_q32[AXES_MAX],
+                       q32_t extension_mm_q32[CYLINDERS_MAX])
 {
     q32_t scaled_q32[AXES_MAX];
     if (target->has_angle) {
@@ -92,7 +93,7 @@ void slots_take(motion_t *self, const motion_target_t *target, q32_t slot_q32[AX
         slot_q32[i] = self->is_axis_moved[i] ? slot_q32[i] : 0;
     }
     slot_q32[AXIS_ANGLE] = self->angle_target_deg_q32;
-    slots_scale(self, target->space, slot_q32, scaled_q32);
+    axis_targets_scale(self, target->space, slot_q32, scaled_q32);
     if (target->space == MOTION_POSE) {
         pull_slots_in(self, slot_q32, scaled_q32, extension_mm_q32);
     } else {
@@ -109,7 +110,7 @@ static q32_t whole_way(const motion_t *self, unsigned slot, q32_t slot_q32)
     return is_scaled(self, self->space, slot) ? slot_q32 - centre_of(self, self->space, slot) : 0;
 }
 
-void slots_plan(motion_t *self, const q32_t slot_q32[AXES_MAX])
+void axis_targets_plan(motion_t *self, const q32_t slot_q32[AXES_MAX])
 {
     self->timed_share_q46 = self->intensity.share_q46[0];
     for (unsigned i = 0; i < AXES_MAX; i++) {
@@ -117,7 +118,7 @@ void slots_plan(motion_t *self, const q32_t slot_q32[AXES_MAX])
     }
 }
 
-bool slots_is_planned(const motion_t *self, const q32_t slot_q32[AXES_MAX])
+bool axis_targets_is_planned(const motion_t *self, const q32_t slot_q32[AXES_MAX])
 {
     bool is_planned = true;
     for (unsigned i = 0; i < self->planned_slots; i++) {
@@ -126,11 +127,11 @@ bool slots_is_planned(const motion_t *self, const q32_t slot_q32[AXES_MAX])
     return is_planned;
 }
 
-void slots_unscaled_states(const motion_t *self, history_t now[AXES_MAX])
+void axis_targets_unscaled_states(const motion_t *self, history_t now[AXES_MAX])
 {
     const int64_t share_q46 = self->intensity.share_q46[0];
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        now[i] = *slot_state(self, i);
+        now[i] = *active_axis_state(self, i);
         if (is_scaled(self, self->space, i)) {
             now[i].pos_q32 = intensity_unscaled(&self->intensity, centre_of(self, self->space, i), now[i].pos_q32);
             now[i].vel_per_cycle_q32 = share_q46 > 0 ? fx_mul_div(now[i].vel_per_cycle_q32, INTENSITY_FULL, share_q46) : 0;
@@ -139,7 +140,7 @@ void slots_unscaled_states(const motion_t *self, history_t now[AXES_MAX])
     }
 }
 
-void slots_scale_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX])
+void axis_targets_scale_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
     if (intensity_is_still(&self->intensity, INTENSITY_FULL)) {
         return; /* what has always been whole is not changed by a bit */
@@ -151,7 +152,7 @@ void slots_scale_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX])
     }
 }
 
-void slots_shift_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX])
+void axis_targets_shift_refs(const motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
     if (intensity_is_still(&self->intensity, self->timed_share_q46)) {
         return;

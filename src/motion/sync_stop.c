@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT
- * halt.c - the quickest stop of several axes together.
+ * sync_stop.c - the quickest stop of several axes together.
  *
  * With n1, n2, n3 cycles of change, hold and take-back the acceleration runs from a straight to the plateau p, stays there and
  * falls straight to 0. Its sum has to be -v:  p = -(2 v + a (n1 - 1)) / (n1 + 2 n2 + n3).  Limits: |p| <= A, |p| <= n3 J,
  * |p - a| <= n1 J. For given n1 and n3 each of them is a bound of the divisor, so the shortest n2 is found directly, and the
  * shortest stop by looking along n1 and n3 with halving steps.
  */
-#include "heave/halt.h"
+#include "heave/sync_stop.h"
 #include "heave/profile.h"
 
 #define NONE_CYCLES     ((int64_t)1 << 40)
@@ -65,7 +65,7 @@ static void narrow(const need_t *need, int64_t change, int64_t back, int64_t *le
 }
 
 /* Cycles of the whole stop with these ends; the hold is as short as it can be. NONE_CYCLES where there is none. */
-static int64_t cycles_with(const need_t *need, unsigned axes, halt_times_t *times)
+static int64_t cycles_with(const need_t *need, unsigned axes, sync_stop_times_t *times)
 {
     int64_t least = times->change + times->back;
     int64_t most = NONE_CYCLES;
@@ -80,9 +80,9 @@ static int64_t cycles_with(const need_t *need, unsigned axes, halt_times_t *time
 }
 
 /* Ends that always do: the acceleration has time for every change there may be. */
-static halt_times_t longest_ends(const need_t *need, unsigned axes)
+static sync_stop_times_t longest_ends(const need_t *need, unsigned axes)
 {
-    halt_times_t times = {.change = 1, .back = 1};
+    sync_stop_times_t times = {.change = 1, .back = 1};
     for (unsigned i = 0; i < axes; i++) {
         const q32_t acc_q32 = fx_abs(need[i].acc_q32);
         const int64_t back = 1 + divide_up(need[i].acc_max_q32, need[i].jerk_q32);
@@ -95,9 +95,9 @@ static halt_times_t longest_ends(const need_t *need, unsigned axes)
     return times;
 }
 
-static bool try_ends(const need_t *need, unsigned axes, halt_times_t *best, int64_t change, int64_t back)
+static bool try_ends(const need_t *need, unsigned axes, sync_stop_times_t *best, int64_t change, int64_t back)
 {
-    halt_times_t tried = {.change = change > 1 ? change : 1, .back = back > 1 ? back : 1};
+    sync_stop_times_t tried = {.change = change > 1 ? change : 1, .back = back > 1 ? back : 1};
     if (cycles_with(need, axes, &tried) >= best->change + best->hold + best->back) {
         return false;
     }
@@ -106,7 +106,7 @@ static bool try_ends(const need_t *need, unsigned axes, halt_times_t *best, int6
 }
 
 /* One step to shorter or exchanged ends, if any of them helps. */
-static bool improve(const need_t *need, unsigned axes, halt_times_t *best, int64_t step)
+static bool improve(const need_t *need, unsigned axes, sync_stop_times_t *best, int64_t step)
 {
     static const int8_t k_moves[][2] = {{-1, -1}, {-1, 0}, {0, -1}, {1, 1}, {1, 0}, {0, 1}, {1, -1}, {-1, 1}};
     for (unsigned i = 0; i < sizeof k_moves / sizeof k_moves[0]; i++) {
@@ -117,9 +117,9 @@ static bool improve(const need_t *need, unsigned axes, halt_times_t *best, int64
     return false;
 }
 
-static halt_times_t shortest(const need_t *need, unsigned axes)
+static sync_stop_times_t shortest(const need_t *need, unsigned axes)
 {
-    halt_times_t best = longest_ends(need, axes);
+    sync_stop_times_t best = longest_ends(need, axes);
     int64_t step = 1;
     (void)cycles_with(need, axes, &best);
     while (step < best.change) { /* of the longest ends, the change is the longer one */
@@ -132,18 +132,18 @@ static halt_times_t shortest(const need_t *need, unsigned axes)
 }
 
 /* What the plateau has to make up for, and what it is divided by. */
-static q32_t push_of(const ramp_state_t *start, const halt_times_t *t)
+static q32_t push_of(const ramp_state_t *start, const sync_stop_times_t *t)
 {
     return 2 * start->vel_per_cycle_q32 + start->acc_per_cycle2_q32 * (t->change - 1);
 }
 
-static int64_t divisor_of(const halt_times_t *t)
+static int64_t divisor_of(const sync_stop_times_t *t)
 {
     return t->change + 2 * t->hold + t->back;
 }
 
 /* Distance of the whole stop: the sums of the three phases over speed, acceleration and plateau, the last two in sixths. */
-static q32_t distance(const ramp_state_t *start, const halt_times_t *t)
+static q32_t distance(const ramp_state_t *start, const sync_stop_times_t *t)
 {
     const int64_t n1 = t->change, n2 = t->hold, n3 = t->back;
     const int64_t by_acc = 3 * n1 * (n1 + 1) - (n1 + 1) * (n1 + 2) + 3 * (n1 - 1) * (n2 + n3);
@@ -159,13 +159,13 @@ static q32_t distance(const ramp_state_t *start, const halt_times_t *t)
 
 /* Where an axis comes to rest. The state that forward kinematics finds near a singularity can be hundreds of times beyond the
  * limits, and a stop from there further away than anything is: it must not wrap around and look near. */
-static q32_t rest_of(const ramp_state_t *start, const halt_times_t *t)
+static q32_t rest_of(const ramp_state_t *start, const sync_stop_times_t *t)
 {
     return fx_clamp(fx_add_sat(start->pos_q32, distance(start, t)), -FURTHEST_Q32, FURTHEST_Q32);
 }
 
 /* Fastest an axis gets while its acceleration is taken back: v + a^2 / 2 over the slope of the change. */
-static q32_t fastest(const ramp_state_t *start, const halt_times_t *t)
+static q32_t fastest(const ramp_state_t *start, const sync_stop_times_t *t)
 {
     const q32_t acc_q32 = start->acc_per_cycle2_q32;
     const q32_t fall_q32 = fx_abs(acc_q32 + push_of(start, t) / divisor_of(t));
@@ -175,14 +175,14 @@ static q32_t fastest(const ramp_state_t *start, const halt_times_t *t)
 }
 
 /* An axis that goes along with the others would leave its bounds or go too fast. */
-static bool is_carried_away(const ramp_state_t *start, const halt_times_t *common, const ramp_limits_t *limits)
+static bool is_carried_away(const ramp_state_t *start, const sync_stop_times_t *common, const ramp_limits_t *limits)
 {
     const q32_t rest_q32 = rest_of(start, common);
     return rest_q32 < limits->pos_min_q32 || rest_q32 > limits->pos_max_q32 || fastest(start, common) > limits->vel_per_cycle_q32;
 }
 
 /* The times of the axes that stop together. */
-static halt_times_t common_times(unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits)
+static sync_stop_times_t common_times(unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits)
 {
     need_t need[AXES_MAX] = {{0}};
     for (unsigned i = 0; i < together; i++) {
@@ -192,7 +192,8 @@ static halt_times_t common_times(unsigned together, const ramp_state_t *start, c
 }
 
 /* The times of one axis. */
-static halt_times_t own_times(const halt_times_t *common, bool is_apart, const ramp_state_t *start, const ramp_limits_t *limits)
+static sync_stop_times_t own_times(const sync_stop_times_t *common, bool is_apart, const ramp_state_t *start,
+                                   const ramp_limits_t *limits)
 {
     if (!is_apart && !is_carried_away(start, common, limits)) {
         return *common;
@@ -201,14 +202,15 @@ static halt_times_t own_times(const halt_times_t *common, bool is_apart, const r
     return shortest(&need, 1);
 }
 
-void halt_plan(halt_t *self, unsigned axes, unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits)
+void sync_stop_plan(sync_stop_t *self, unsigned axes, unsigned together, const ramp_state_t *start,
+                    const ramp_limits_t *const *limits)
 {
-    const halt_times_t common = common_times(together, start, limits);
+    const sync_stop_times_t common = common_times(together, start, limits);
     self->axes = axes;
     self->cycles = 0;
     self->elapsed = 0;
     for (unsigned i = 0; i < axes; i++) {
-        halt_times_t *times = &self->times[i];
+        sync_stop_times_t *times = &self->times[i];
         *times = own_times(&common, i >= together, &start[i], limits[i]);
         const int64_t cycles = times->change + times->hold + times->back;
         self->start[i] = self->now[i] = start[i];
@@ -217,19 +219,19 @@ void halt_plan(halt_t *self, unsigned axes, unsigned together, const ramp_state_
     }
 }
 
-void halt_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits, q32_t *rest_q32)
+void sync_stop_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits, q32_t *rest_q32)
 {
-    const halt_times_t common = common_times(axes, start, limits);
+    const sync_stop_times_t common = common_times(axes, start, limits);
     for (unsigned i = 0; i < axes; i++) {
-        const halt_times_t times = own_times(&common, false, &start[i], limits[i]);
+        const sync_stop_times_t times = own_times(&common, false, &start[i], limits[i]);
         rest_q32[i] = rest_of(&start[i], &times);
     }
 }
 
 /* Velocity of an axis k cycles after the start, before the end: v + a c + plateau w, with the sums c and w of the shape. */
-static q32_t velocity_after(const halt_t *self, unsigned i, int64_t k)
+static q32_t velocity_after(const sync_stop_t *self, unsigned i, int64_t k)
 {
-    const halt_times_t *t = &self->times[i];
+    const sync_stop_times_t *t = &self->times[i];
     const ramp_state_t *start = &self->start[i];
     const int64_t n1 = t->change, n2 = t->hold, n3 = t->back;
     const int64_t in_change = k < n1 ? k : n1;
@@ -242,18 +244,18 @@ static q32_t velocity_after(const halt_t *self, unsigned i, int64_t k)
            fx_mul_div(push_of(start, t), shape, 2 * n1 * n3 * divisor_of(t));
 }
 
-q32_t halt_velocity(const halt_t *self, unsigned axis, int64_t cycle)
+q32_t sync_stop_velocity(const sync_stop_t *self, unsigned axis, int64_t cycle)
 {
-    const halt_times_t *t = &self->times[axis];
+    const sync_stop_times_t *t = &self->times[axis];
     return cycle < t->change + t->hold + t->back ? velocity_after(self, axis, cycle) : 0;
 }
 
-void halt_step(halt_t *self, ramp_ref_t *ref)
+void sync_stop_step(sync_stop_t *self, ramp_ref_t *ref)
 {
-    const bool was_done = halt_is_done(self);
+    const bool was_done = sync_stop_is_done(self);
     self->elapsed++;
     for (unsigned i = 0; i < self->axes; i++) {
-        const halt_times_t *t = &self->times[i];
+        const sync_stop_times_t *t = &self->times[i];
         const bool is_ending = self->elapsed >= t->change + t->hold + t->back;
         const q32_t pos_q32 = is_ending ? self->rest_q32[i] : self->now[i].pos_q32 + velocity_after(self, i, self->elapsed);
         const ramp_ref_t rest = {.pos_q32 = pos_q32};

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * test_reach.c - poses pulled into the workspace, on every ready-made platform: inside the stroke, in the asked direction, with
- * the cylinder that bounds them, and continuous. Judged by kin_inverse in double precision differences.
+ * test_workspace.c - poses pulled into the workspace, on every ready-made platform: inside the stroke, in the asked direction,
+ * with the cylinder that bounds them, and continuous. Judged by kin_inverse in double precision differences.
  */
-#include "../../src/motion/reach.h"
+#include "../../src/motion/workspace.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -95,7 +95,7 @@ static void test_reach_pull_in_result_is_inside_on_the_way_and_bounded_by_the_na
             pose_t pose = asked;
             q32_t extension[CYLINDERS_MAX], judged[CYLINDERS_MAX];
             q62_t share = 0;
-            const unsigned cylinder = reach_pull_in(&m_motion, &pose, extension, &share);
+            const unsigned cylinder = workspace_pull_in(&m_motion, &pose, extension, &share);
             TEST_ASSERT_EQUAL(HV_OK, kin_inverse(&m_motion.kin, &pose, judged));
             for (unsigned i = 0; i < m_motion.cylinders; i++) {
                 TEST_ASSERT_EQUAL_INT64(judged[i], extension[i]);
@@ -133,7 +133,7 @@ static void test_reach_pull_in_pose_beyond_all_solving_comes_in_too(void)
     pose = asked;
     q32_t extension[CYLINDERS_MAX];
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, kin_inverse(&m_motion.kin, &asked, extension));
-    const unsigned cylinder = reach_pull_in(&m_motion, &pose, extension, NULL);
+    const unsigned cylinder = workspace_pull_in(&m_motion, &pose, extension, NULL);
     TEST_ASSERT_EQUAL(HV_OK, kin_inverse(&m_motion.kin, &pose, extension));
     double least = 1e9;
     for (unsigned i = 0; i < m_motion.cylinders; i++) {
@@ -159,7 +159,7 @@ static void test_reach_pull_in_is_continuous(void)
                 for (unsigned i = 0; i < POSE_AXES; i++) {
                     pose.axis_q32[i] = from.axis_q32[i] + (to.axis_q32[i] - from.axis_q32[i]) / 400 * k;
                 }
-                (void)reach_pull_in(&m_motion, &pose, extension, NULL);
+                (void)workspace_pull_in(&m_motion, &pose, extension, NULL);
                 worst = k > 0 ? fmax(worst, distance(&pose, &last) / step) : worst;
                 last = pose;
             }

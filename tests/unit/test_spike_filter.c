@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * test_gate.c - the spike gate: wild samples, steps, losses, jitter, duplicates and ordinary motion at all rates.
+ * test_spike_filter.c - the spike gate: wild samples, steps, losses, jitter, duplicates and ordinary motion at all rates.
  * Signals and arrivals are made here in double precision; the period is that of the sender, as a settled clock finds it.
  */
-#include "heave/gate.h"
+#include "heave/spike_filter.h"
 #include "unity.h"
 
 #include <math.h>
@@ -13,7 +13,7 @@
 #define FACTOR 10
 #define SINES  6
 
-static gate_t s_gate;
+static spike_filter_t s_gate;
 static uint64_t s_random;
 
 void hv_assert_failed(const char *file, int line)
@@ -28,7 +28,7 @@ static void start(uint32_t factor)
     for (unsigned i = 0; i < POSE_AXES; i++) {
         accel_q16[i] = (q16_t)(ACCEL * 65536);
     }
-    TEST_ASSERT_EQUAL(HV_OK, gate_init(&s_gate, accel_q16, factor));
+    TEST_ASSERT_EQUAL(HV_OK, spike_filter_init(&s_gate, accel_q16, factor));
 }
 
 void setUp(void)
@@ -52,7 +52,7 @@ static bool push(double at_s, uint32_t period_us, unsigned axis, double value)
 {
     q32_t sample[POSE_AXES] = {0};
     sample[axis] = (q32_t)llround(value * 65536) * 65536;
-    return gate_passes(&s_gate, (uint64_t)llround(at_s * 1e6), period_us, sample);
+    return spike_filter_passes(&s_gate, (uint64_t)llround(at_s * 1e6), period_us, sample);
 }
 
 /* A motion cue signal whose acceleration goes up to a share of the limit. */
@@ -124,7 +124,7 @@ static void test_gate_passes_ordinary_motion_at_all_rates(void)
                     TEST_ASSERT_TRUE(
                         push(at, (uint32_t)(1e6 / k_rates_hz[r]), run % POSE_AXES, round(signal_at(t) * 1000) / 1000));
                 }
-                TEST_ASSERT_EQUAL_UINT32(0, gate_spikes(&s_gate));
+                TEST_ASSERT_EQUAL_UINT32(0, spike_filter_spikes(&s_gate));
             }
         }
     }
@@ -151,7 +151,7 @@ static void test_gate_passes_everything_outside_a_stream(void)
     for (int i = 0; i < 100; i++) {
         TEST_ASSERT_TRUE(push(i * 0.02, 20000, AXIS_X, i % 2 * 100));
     }
-    TEST_ASSERT_EQUAL_UINT32(0, gate_spikes(&s_gate));
+    TEST_ASSERT_EQUAL_UINT32(0, spike_filter_spikes(&s_gate));
 }
 
 static void test_gate_passes_after_a_gap_without_a_known_course(void)
@@ -196,8 +196,8 @@ static void test_gate_random_spikes_none_followed_and_nothing_else_lost(void)
                 expected += is_spike;
             }
             expected -= since == 8; /* nothing came after it */
-            TEST_ASSERT_EQUAL_UINT32(expected, gate_spikes(&s_gate));
-            TEST_ASSERT_TRUE(expected == 0 || gate_last_spike(&s_gate)->axis == axis);
+            TEST_ASSERT_EQUAL_UINT32(expected, spike_filter_spikes(&s_gate));
+            TEST_ASSERT_TRUE(expected == 0 || spike_filter_last_spike(&s_gate)->axis == axis);
             spikes += expected;
         }
     }
@@ -212,10 +212,10 @@ static void test_gate_spike_tells_axis_value_and_the_sample_before(void)
         TEST_ASSERT_TRUE(push(i * 0.02, 20000, AXIS_PITCH, 5));
     }
     TEST_ASSERT_FALSE(push(0.40, 20000, AXIS_PITCH, -80));
-    TEST_ASSERT_EQUAL_UINT32(0, gate_spikes(&s_gate));
+    TEST_ASSERT_EQUAL_UINT32(0, spike_filter_spikes(&s_gate));
     TEST_ASSERT_TRUE(push(0.42, 20000, AXIS_PITCH, 5));
-    TEST_ASSERT_EQUAL_UINT32(1, gate_spikes(&s_gate));
-    const gate_spike_t *spike = gate_last_spike(&s_gate);
+    TEST_ASSERT_EQUAL_UINT32(1, spike_filter_spikes(&s_gate));
+    const spike_t *spike = spike_filter_last_spike(&s_gate);
     TEST_ASSERT_EQUAL_UINT8(AXIS_PITCH, spike->axis);
     TEST_ASSERT_TRUE(spike->value_q32 == q32_from_int(-80) && spike->before_q32 == q32_from_int(5));
 }
@@ -242,7 +242,7 @@ static void test_gate_random_steps_come_one_sample_later_and_are_no_spikes(void)
                 TEST_ASSERT_EQUAL(!is_step, push(at, (uint32_t)(1e6 / k_rates_hz[r]), AXIS_Z, signal_at(t) + base));
             }
             TEST_ASSERT_TRUE(withheld > 0);
-            TEST_ASSERT_EQUAL_UINT32(0, gate_spikes(&s_gate));
+            TEST_ASSERT_EQUAL_UINT32(0, spike_filter_spikes(&s_gate));
         }
     }
 }
@@ -257,7 +257,7 @@ static void test_gate_noise_withholds_at_most_every_other_sample(void)
         for (unsigned a = 0; a < POSE_AXES; a++) {
             sample[a] = (q32_t)((unit() - 0.5) * 36028797018963968.0); /* +-2^54 */
         }
-        const bool passes = gate_passes(&s_gate, (uint64_t)i * 20000 + (uint64_t)(unit() * 19000), 20000, sample);
+        const bool passes = spike_filter_passes(&s_gate, (uint64_t)i * 20000 + (uint64_t)(unit() * 19000), 20000, sample);
         TEST_ASSERT_TRUE(passes || did_pass);
         withheld += !passes;
         did_pass = passes;
@@ -273,7 +273,7 @@ static void test_gate_spike_that_comes_twice_confirms_nothing(void)
     TEST_ASSERT_FALSE(push(0.400, 20000, AXIS_X, 90));
     TEST_ASSERT_FALSE(push(0.402, 20000, AXIS_X, 90));
     TEST_ASSERT_TRUE(push(0.420, 20000, AXIS_X, 0));
-    TEST_ASSERT_EQUAL_UINT32(1, gate_spikes(&s_gate));
+    TEST_ASSERT_EQUAL_UINT32(1, spike_filter_spikes(&s_gate));
 }
 
 static void test_gate_last_word_is_overdue_after_four_periods(void)
@@ -282,17 +282,17 @@ static void test_gate_last_word_is_overdue_after_four_periods(void)
         TEST_ASSERT_TRUE(push(i * 0.02, 20000, AXIS_X, 50));
     }
     TEST_ASSERT_FALSE(push(0.4, 20000, AXIS_X, 0));
-    TEST_ASSERT_FALSE(gate_is_overdue(&s_gate, 480000));
-    TEST_ASSERT_TRUE(gate_is_overdue(&s_gate, 480001));
-    gate_reset(&s_gate);
-    TEST_ASSERT_FALSE(gate_is_overdue(&s_gate, 900000));
-    TEST_ASSERT_EQUAL_UINT32(0, gate_spikes(&s_gate));
+    TEST_ASSERT_FALSE(spike_filter_is_overdue(&s_gate, 480000));
+    TEST_ASSERT_TRUE(spike_filter_is_overdue(&s_gate, 480001));
+    spike_filter_reset(&s_gate);
+    TEST_ASSERT_FALSE(spike_filter_is_overdue(&s_gate, 900000));
+    TEST_ASSERT_EQUAL_UINT32(0, spike_filter_spikes(&s_gate));
 }
 
 static void test_gate_factor_out_of_range_is_refused(void)
 {
     const q16_t accel_q16[POSE_AXES] = {1, 1, 1, 1, 1, 1};
-    TEST_ASSERT_EQUAL(HV_ERR_RANGE, gate_init(&s_gate, accel_q16, GATE_FACTOR_MAX + 1));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, spike_filter_init(&s_gate, accel_q16, SPIKE_FILTER_FACTOR_MAX + 1));
 }
 
 /* The gate is where it says: just inside passes, just outside does not. */
@@ -317,7 +317,7 @@ static void test_gate_grain_passes_steps_as_coarse_as_the_values(void)
 {
     for (int grain = 0; grain <= 1; grain++) {
         start(FACTOR);
-        gate_set_grain(&s_gate, 2, grain * 4 * Q32_ONE);
+        spike_filter_set_quantum(&s_gate, 2, grain * 4 * Q32_ONE);
         for (int i = 0; i < 40; i++) {
             (void)push(i * 0.01, 10000, 2, 0);
         }

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
- * intake.h - from datagrams to frames: receives, parses, counts and logs what is no frame. Knows nothing of states and motion.
- * Private to src/gateway.
+ * frame_receiver.h - from datagrams to frames: receives, parses, counts and logs what is no frame. Knows nothing of states and
+ * motion. Private to src/gateway.
  */
-#ifndef INTAKE_H
-#define INTAKE_H
+#ifndef FRAME_RECEIVER_H
+#define FRAME_RECEIVER_H
 
 #include "heave/gateway.h"
 #include "heave/text.h"
@@ -15,22 +15,23 @@ typedef struct {
     hal_udp_t udp;
     hal_log_t log;
     counters_t *counters;
-} intake_io_t;
+} frame_receiver_io_t;
 
 /** Begins a cycle. */
-void intake_begin(intake_t *self);
+void frame_receiver_begin(frame_receiver_t *self);
 
 /** The next valid frame of this cycle, out of at most GATEWAY_DATAGRAMS_PER_CYCLE datagrams. self->from is its sender and
  *  self->waited_us the time that it waited for the cycle.
  *  @return false: there is none */
-bool intake_next(intake_t *self, const gateway_settings_t *settings, const intake_io_t *io, uint64_t now_us, frame_t *frame);
+bool frame_receiver_next(frame_receiver_t *self, const gateway_settings_t *settings, const frame_receiver_io_t *io,
+                         uint64_t now_us, frame_t *frame);
 
 /** Counts and logs a valid frame that this platform cannot follow.
  *  @param missing why */
-void intake_refuse(intake_t *self, const intake_io_t *io, frame_command_t command, const char *missing,
-                   const hal_udp_peer_t *from, uint64_t now_us);
+void frame_receiver_refuse(frame_receiver_t *self, const frame_receiver_io_t *io, frame_command_t command, const char *missing,
+                           const hal_udp_peer_t *from, uint64_t now_us);
 
 /** Appends how many lines of this kind were left out since the last one; nothing for 0. */
-void intake_put_suppressed(text_t *text, uint32_t lines);
+void frame_receiver_put_suppressed(text_t *text, uint32_t lines);
 
 #endif

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT
- * past.h - a reference as the last four positions, and back: what is to be scaled or blended is its positions, and the
+ * ref_history.h - a reference as the last four positions, and back: what is to be scaled or blended is its positions, and the
  * differences follow. Private to src/motion.
  */
-#ifndef PAST_H
-#define PAST_H
+#ifndef REF_HISTORY_H
+#define REF_HISTORY_H
 
 #include "heave/ramp.h"
 
 /** Positions that a reference consists of. */
-#define PAST 4u
+#define REF_HISTORY 4u
 
 /** The positions of a reference, the newest first. */
-static inline void past_of(const ramp_ref_t *ref, q32_t at_q32[PAST])
+static inline void ref_history_of(const ramp_ref_t *ref, q32_t at_q32[REF_HISTORY])
 {
     const q32_t vel_q32 = ref->vel_per_cycle_q32;
     const q32_t acc_q32 = ref->acc_per_cycle2_q32;
@@ -22,14 +22,14 @@ static inline void past_of(const ramp_ref_t *ref, q32_t at_q32[PAST])
 }
 
 /** The reference of the cycle before. */
-static inline ramp_state_t past_state(const ramp_ref_t *ref)
+static inline ramp_state_t ref_history_state(const ramp_ref_t *ref)
 {
     return (ramp_state_t){ref->pos_q32 - ref->vel_per_cycle_q32, ref->vel_per_cycle_q32 - ref->acc_per_cycle2_q32,
                           ref->acc_per_cycle2_q32 - ref->jerk_per_cycle3_q32};
 }
 
 /** The reference of such positions. */
-static inline ramp_ref_t past_ref(const q32_t at_q32[PAST])
+static inline ramp_ref_t ref_history_ref(const q32_t at_q32[REF_HISTORY])
 {
     const q32_t v0 = at_q32[0] - at_q32[1];
     const q32_t v1 = at_q32[1] - at_q32[2];

@@ -1,33 +1,33 @@
 /* SPDX-License-Identifier: MIT
- * operate.h - offers events to the supervisor and carries out its actions on motion, drives and relays. Private to src/gateway.
+ * actions.h - offers events to the supervisor and carries out its actions on motion, drives and relays. Private to src/gateway.
  */
-#ifndef OPERATE_H
-#define OPERATE_H
+#ifndef ACTIONS_H
+#define ACTIONS_H
 
 #include "heave/gateway.h"
 
 /** Offers an event and carries out the action of the transition. Logs every change of state. */
-void operate_event(gateway_t *self, event_t event, uint64_t now_us);
+void actions_event(gateway_t *self, event_t event, uint64_t now_us);
 
 /** Follows a sender from now on: its first pose at engage speed, relays safe until it says otherwise. */
-void operate_follow(gateway_t *self, uint64_t now_us);
+void actions_follow(gateway_t *self, uint64_t now_us);
 
 /** After the motion of the cycle: drives that are to be disabled once at rest. */
-void operate_after_motion(gateway_t *self);
+void actions_after_motion(gateway_t *self);
 
 /** True while the drives are being enabled or home by themselves: no set-point leads them. */
-bool operate_is_coming_up(const gateway_t *self);
+bool actions_is_coming_up(const gateway_t *self);
 
 /** True if a drive or the bus has a fault that a reset would come too early for. */
-bool operate_is_drive_fault_present(const gateway_t *self);
+bool actions_is_drive_fault_present(const gateway_t *self);
 
 /** Carries out the reaction of the worst fault so far. */
-void operate_react(gateway_t *self);
+void actions_react(gateway_t *self);
 
 /** Puts the set-points on the actual positions. */
-void operate_track_actual(gateway_t *self);
+void actions_track_actual(gateway_t *self);
 
 /** Asks the drives to go off; is_disable_due stays true if they cannot be asked now. */
-void operate_disable_drives(gateway_t *self);
+void actions_disable_drives(gateway_t *self);
 
 #endif

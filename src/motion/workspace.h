@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * reach.h - pulls poses that the cylinders cannot reach onto the edge of the workspace. Private to src/motion.
+ * workspace.h - pulls poses that the cylinders cannot reach onto the edge of the workspace. Private to src/motion.
  */
-#ifndef REACH_H
-#define REACH_H
+#ifndef WORKSPACE_H
+#define WORKSPACE_H
 
 #include "heave/motion.h"
 
@@ -11,6 +11,6 @@
  *  @param extension_mm_q32 out: the extensions of the resulting pose
  *  @param share_q62 out, may be NULL: how much of that way is left, Q62_ONE where the pose could be kept
  *  @return 0 where the pose could be kept; else 1-based, the cylinder that bounds it */
-unsigned reach_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX], q62_t *share_q62);
+unsigned workspace_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX], q62_t *share_q62);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * reach.c - the workspace: the largest share of the way from neutral to a pose that keeps every cylinder in its stroke.
+ * workspace.c - the workspace: the largest share of the way from neutral to a pose that keeps every cylinder in its stroke.
  */
-#include "reach.h"
+#include "workspace.h"
 
 #include "root.h"
 
@@ -51,7 +51,7 @@ static q62_t find_share(const motion_t *motion, const pose_t *asked, bracket_t s
     return share.low;
 }
 
-unsigned reach_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX], q62_t *share_q62)
+unsigned workspace_pull_in(const motion_t *motion, pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX], q62_t *share_q62)
 {
     unsigned cylinder = 0;
     bracket_t share = {.low = 0, .high = Q62_ONE};

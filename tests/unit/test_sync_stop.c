@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * test_halt.c - stops of several axes: how long against the slowest axis' own, in which direction, within which limits.
+ * test_sync_stop.c - stops of several axes: how long against the slowest axis' own, in which direction, within which limits.
  * The quickest stop of one axis is worked out here in double precision from the continuous law.
  */
-#include "heave/halt.h"
+#include "heave/sync_stop.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -104,11 +104,11 @@ static ramp_state_t random_state(const ramp_limits_t *limits)
 }
 
 /* Walks a stop to its end. */
-static void walk(halt_t *halt, const ramp_limits_t *limits, judge_t *j)
+static void walk(sync_stop_t *halt, const ramp_limits_t *limits, judge_t *j)
 {
     ramp_ref_t ref[AXES_MAX];
-    while (!halt_is_done(halt)) {
-        halt_step(halt, ref);
+    while (!sync_stop_is_done(halt)) {
+        sync_stop_step(halt, ref);
         for (unsigned i = 0; i < halt->axes; i++) {
             judge(&j[i], &limits[i], ref[i].pos_q32);
         }
@@ -117,7 +117,7 @@ static void walk(halt_t *halt, const ramp_limits_t *limits, judge_t *j)
         TEST_ASSERT_EQUAL_INT64(halt->rest_q32[i], j[i].last.pos_q32);
         TEST_ASSERT_TRUE(llabs(j[i].last.vel_per_cycle_q32) <= 2 * halt->cycles + 8); /* rounding */
     }
-    halt_step(halt, ref);
+    sync_stop_step(halt, ref);
     for (unsigned i = 0; i < halt->axes; i++) {
         TEST_ASSERT_EQUAL_INT64(halt->rest_q32[i], ref[i].pos_q32);
         TEST_ASSERT_EQUAL_INT64(0, ref[i].vel_per_cycle_q32);
@@ -133,8 +133,8 @@ static void test_halt_plan_one_axis_is_as_quick_as_its_limits(void)
         const ramp_limits_t *const list[1] = {&limits};
         const ramp_state_t start = random_state(&limits);
         judge_t j = {.last = start};
-        halt_t halt;
-        halt_plan(&halt, 1, 1, &start, list);
+        sync_stop_t halt;
+        sync_stop_plan(&halt, 1, 1, &start, list);
         const double own = own_cycles(&start, &limits);
         worst = own > 50 ? fmax(worst, (double)halt.cycles / own) : worst;
         longer += (double)halt.cycles > own * 1.05 + 6;
@@ -164,8 +164,8 @@ static void test_halt_plan_one_body_ends_together_within_ten_percent_of_the_slow
             j[i].last = start[i];
             own = fmax(own, own_cycles(&start[i], &one));
         }
-        halt_t halt;
-        halt_plan(&halt, AXES, AXES, start, list);
+        sync_stop_t halt;
+        sync_stop_plan(&halt, AXES, AXES, start, list);
         walk(&halt, limits, j);
         for (unsigned i = 0; i < AXES; i++) {
             accel = fmax(accel, j[i].accel);
@@ -202,12 +202,12 @@ static void test_halt_plan_proportional_axes_keep_their_direction(void)
             start[i] = (ramp_state_t){0, (q32_t)((double)lead.vel_per_cycle_q32 * share[i]),
                                       (q32_t)((double)lead.acc_per_cycle2_q32 * share[i])};
         }
-        halt_t halt;
-        halt_plan(&halt, AXES, AXES, start, list);
+        sync_stop_t halt;
+        sync_stop_plan(&halt, AXES, AXES, start, list);
         TEST_ASSERT_TRUE((double)halt.cycles <= own_cycles(&lead, &one) * 1.05 + 6);
-        while (!halt_is_done(&halt)) {
+        while (!sync_stop_is_done(&halt)) {
             ramp_ref_t ref[AXES];
-            halt_step(&halt, ref);
+            sync_stop_step(&halt, ref);
             for (unsigned i = 1; i < AXES; i++) {
                 TEST_ASSERT_DOUBLE_WITHIN(1e-4, (double)ref[0].pos_q32 / LSB * share[i], (double)ref[i].pos_q32 / LSB);
             }
@@ -220,8 +220,8 @@ static void test_halt_plan_at_rest_stays_where_it_is(void)
     const ramp_limits_t limits = limits_of(400, 3000, 50000);
     const ramp_limits_t *const list[2] = {&limits, &limits};
     const ramp_state_t start[2] = {{.pos_q32 = q32(3)}, {.pos_q32 = q32(-7)}};
-    halt_t halt;
-    halt_plan(&halt, 2, 2, start, list);
+    sync_stop_t halt;
+    sync_stop_plan(&halt, 2, 2, start, list);
     TEST_ASSERT_TRUE(halt.cycles <= 3);
     TEST_ASSERT_EQUAL_INT64(start[0].pos_q32, halt.rest_q32[0]);
     TEST_ASSERT_EQUAL_INT64(start[1].pos_q32, halt.rest_q32[1]);
@@ -235,8 +235,8 @@ static void test_halt_plan_acceleration_of_one_cycle_ends_where_it_is(void)
     const q32_t jerk_q32 = limits.jerk_per_cycle3_q32;
     const ramp_state_t start = {.pos_q32 = q32(20), .acc_per_cycle2_q32 = jerk_q32 - jerk_q32 / 128 - 4};
     judge_t j = {.last = start};
-    halt_t halt;
-    halt_plan(&halt, 1, 1, &start, list);
+    sync_stop_t halt;
+    sync_stop_plan(&halt, 1, 1, &start, list);
     TEST_ASSERT_EQUAL_INT64(2, halt.cycles);
     walk(&halt, &limits, &j);
     TEST_ASSERT_EQUAL_INT64(start.pos_q32, halt.rest_q32[0]);
@@ -250,8 +250,8 @@ static void test_halt_plan_axis_apart_takes_its_own_time(void)
     const ramp_limits_t *const list[3] = {&limits[0], &limits[1], &limits[2]};
     const ramp_state_t start[3] = {{0, q32(0.1), q32(0.003)}, {0, q32(0.2), 0}, {0, q32(0.06), 0}};
     judge_t j[3] = {{.last = start[0]}, {.last = start[1]}, {.last = start[2]}};
-    halt_t halt;
-    halt_plan(&halt, 3, 2, start, list);
+    sync_stop_t halt;
+    sync_stop_plan(&halt, 3, 2, start, list);
     TEST_ASSERT_TRUE(halt.cycles > 3000);
     TEST_ASSERT_TRUE(halt.times[0].change + halt.times[0].hold + halt.times[0].back < 250);
     TEST_ASSERT_EQUAL_INT64(halt.times[0].change, halt.times[1].change);
@@ -264,11 +264,11 @@ static void test_halt_plan_near_a_bound_takes_its_own_time(void)
     ramp_limits_t limits[2] = {limits_of(400, 3000, 50000), limits_of(400, 3000, 50000)};
     const ramp_limits_t *const list[2] = {&limits[0], &limits[1]};
     const ramp_state_t start[2] = {{0, q32(0.4), 0}, {0, q32(0.1), 0}};
-    halt_t halt;
-    halt_plan(&halt, 2, 2, start, list);
+    sync_stop_t halt;
+    sync_stop_plan(&halt, 2, 2, start, list);
     const q32_t together = halt.rest_q32[1];
     limits[1].pos_max_q32 = together - q32(1);
-    halt_plan(&halt, 2, 2, start, list);
+    sync_stop_plan(&halt, 2, 2, start, list);
     TEST_ASSERT_TRUE(halt.rest_q32[1] < limits[1].pos_max_q32);
 }
 
@@ -280,11 +280,11 @@ static void test_halt_plan_far_beyond_the_limits_does_not_wrap_around(void)
     const ramp_state_t start[2] = {{0, INT64_C(4628414351), INT64_C(709253659)}, {0, INT64_C(20861527538), INT64_C(3196799946)}};
     for (int sign = 1; sign >= -1; sign -= 2) {
         ramp_state_t turned[2];
-        halt_t halt;
+        sync_stop_t halt;
         for (unsigned i = 0; i < 2; i++) {
             turned[i] = (ramp_state_t){0, sign * start[i].vel_per_cycle_q32, sign * start[i].acc_per_cycle2_q32};
         }
-        halt_plan(&halt, 2, 2, turned, list);
+        sync_stop_plan(&halt, 2, 2, turned, list);
         for (unsigned i = 0; i < 2; i++) {
             TEST_ASSERT_TRUE(sign * halt.rest_q32[i] > q32(100) && sign * halt.rest_q32[i] <= q32(1 << 20));
         }

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT
- * gate.c - keeps single wild samples out of a stream of poses; see gate.h.
+ * spike_filter.c - keeps single wild samples out of a stream of poses; see spike_filter.h.
  * Arrivals jitter and samples are lost, so how far along its course a sender has come is hardly known. The course is therefore a
  * stretch: from the last sample as far as the larger of the last two steps leads in one period (and 10 ms) more than seem to have
  * passed. What a sample lacks to that stretch is motion that only an acceleration can have made: a over h periods of T makes
  * a T^2 h (h + 1) / 2 of difference to the step before.
  */
-#include "heave/gate.h"
+#include "heave/spike_filter.h"
 
 enum {
     SETTLED = 8,        /* samples before the first judgement: until then the period may be far off */
@@ -14,24 +14,24 @@ enum {
     OVERDUE_PERIODS = 4 /* a spike and three losses in a row are rarer than a last frame that is a step */
 };
 
-hv_status_t gate_init(gate_t *self, const q16_t accel_q16[POSE_AXES], uint32_t factor)
+hv_status_t spike_filter_init(spike_filter_t *self, const q16_t accel_q16[POSE_AXES], uint32_t factor)
 {
-    if (factor > GATE_FACTOR_MAX) {
+    if (factor > SPIKE_FILTER_FACTOR_MAX) {
         return HV_ERR_RANGE;
     }
-    *self = (gate_t){.factor = factor};
+    *self = (spike_filter_t){.factor = factor};
     for (unsigned i = 0; i < POSE_AXES; i++) {
         self->accel_q32[i] = q32_from_q16(accel_q16[i]);
     }
     return HV_OK;
 }
 
-void gate_set_factor(gate_t *self, uint32_t factor)
+void spike_filter_set_factor(spike_filter_t *self, uint32_t factor)
 {
     self->factor = factor;
 }
 
-void gate_reset(gate_t *self)
+void spike_filter_reset(spike_filter_t *self)
 {
     self->settled = 0;
     self->is_withholding = false;
@@ -46,7 +46,7 @@ static bool is_equal(const q32_t a_q32[POSE_AXES], const q32_t b_q32[POSE_AXES])
     return i == POSE_AXES;
 }
 
-static void note(gate_t *self, const q32_t value_q32[POSE_AXES])
+static void note(spike_filter_t *self, const q32_t value_q32[POSE_AXES])
 {
     for (unsigned i = 0; i < POSE_AXES; i++) {
         self->past_q32[2][i] = self->past_q32[1][i];
@@ -56,30 +56,30 @@ static void note(gate_t *self, const q32_t value_q32[POSE_AXES])
 }
 
 /* The course begins anew after a jump: with the steps of what came before, it would lead on. */
-static void note_jump(gate_t *self, const q32_t to_q32[POSE_AXES])
+static void note_jump(spike_filter_t *self, const q32_t to_q32[POSE_AXES])
 {
-    for (unsigned age = 0; age < GATE_PAST; age++) {
+    for (unsigned age = 0; age < SPIKE_FILTER_HISTORY; age++) {
         note(self, to_q32);
     }
 }
 
 /* How far a value is from where the course can have led in so many periods. */
-static q32_t off_course(const gate_t *self, unsigned axis, int64_t periods, q32_t value_q32)
+static q32_t off_course(const spike_filter_t *self, unsigned axis, int64_t periods, q32_t value_q32)
 {
     const int64_t most = (periods > 1 ? periods : 1) + 1 + JITTER_US / self->period_us;
     q32_t low_q32 = 0;
     q32_t high_q32 = 0;
-    for (unsigned age = 0; age + 1 < GATE_PAST; age++) {
-        const q32_t way_q32 = (self->past_q32[age][axis] - self->past_q32[age + 1][axis]) * most;
-        low_q32 = way_q32 < low_q32 ? way_q32 : low_q32;
-        high_q32 = way_q32 > high_q32 ? way_q32 : high_q32;
+    for (unsigned age = 0; age + 1 < SPIKE_FILTER_HISTORY; age++) {
+        const q32_t travel_q32 = (self->past_q32[age][axis] - self->past_q32[age + 1][axis]) * most;
+        low_q32 = travel_q32 < low_q32 ? travel_q32 : low_q32;
+        high_q32 = travel_q32 > high_q32 ? travel_q32 : high_q32;
     }
     const q32_t moved_q32 = value_q32 - self->past_q32[0][axis];
     return fx_abs(moved_q32 - fx_clamp(moved_q32, low_q32, high_q32));
 }
 
 /* How far off its course the gate lets an axis be. */
-static q32_t allowance(const gate_t *self, unsigned axis, int64_t periods)
+static q32_t allowance(const spike_filter_t *self, unsigned axis, int64_t periods)
 {
     const int64_t h = periods > 1 ? periods : 1;
     const q32_t speed_q32 = fx_mul_div(self->accel_q32[axis] * self->factor, self->period_us, 1000000);
@@ -87,12 +87,12 @@ static q32_t allowance(const gate_t *self, unsigned axis, int64_t periods)
 }
 
 /* The axis furthest beyond its allowance, POSE_AXES where none is. */
-static unsigned beyond_axis(const gate_t *self, int64_t periods, const q32_t value_q32[POSE_AXES])
+static unsigned beyond_axis(const spike_filter_t *self, int64_t periods, const q32_t value_q32[POSE_AXES])
 {
     unsigned worst = POSE_AXES;
     int64_t worst_share = 0;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        const q32_t allowed_q32 = allowance(self, i, periods) + self->grain_q32[i];
+        const q32_t allowed_q32 = allowance(self, i, periods) + self->quantum_q32[i];
         const q32_t off_q32 = off_course(self, i, periods, value_q32[i]);
         const int64_t share = off_q32 / (allowed_q32 / 256 + 1);
         if (off_q32 > allowed_q32 && share >= worst_share) {
@@ -103,12 +103,12 @@ static unsigned beyond_axis(const gate_t *self, int64_t periods, const q32_t val
     return worst;
 }
 
-static void withhold(gate_t *self, uint64_t now_us, int64_t periods, unsigned axis, const q32_t value_q32[POSE_AXES])
+static void withhold(spike_filter_t *self, uint64_t now_us, int64_t periods, unsigned axis, const q32_t value_q32[POSE_AXES])
 {
     self->is_withholding = true;
     self->withheld_us = now_us;
     self->withheld_periods = periods;
-    self->withheld = (gate_spike_t){(uint8_t)axis, value_q32[axis], self->past_q32[0][axis]};
+    self->withheld = (spike_t){(uint8_t)axis, value_q32[axis], self->past_q32[0][axis]};
     for (unsigned i = 0; i < POSE_AXES; i++) {
         self->withheld_q32[i] = value_q32[i];
     }
@@ -116,7 +116,7 @@ static void withhold(gate_t *self, uint64_t now_us, int64_t periods, unsigned ax
 
 /* What the withheld sample was, by whether the one after it goes on from there or from the sample before: judged on the axis for
  * which it was withheld. */
-static void settle_withheld(gate_t *self, int64_t periods, const q32_t value_q32[POSE_AXES])
+static void settle_withheld(spike_filter_t *self, int64_t periods, const q32_t value_q32[POSE_AXES])
 {
     const unsigned axis = self->withheld.axis;
     const q32_t step_q32 = self->past_q32[0][axis] - self->past_q32[1][axis];
@@ -131,16 +131,16 @@ static void settle_withheld(gate_t *self, int64_t periods, const q32_t value_q32
     }
 }
 
-void gate_set_grain(gate_t *self, unsigned axis, q32_t grain_q32)
+void spike_filter_set_quantum(spike_filter_t *self, unsigned axis, q32_t quantum_q32)
 {
     HV_ASSERT(axis < POSE_AXES);
-    self->grain_q32[axis] = grain_q32;
+    self->quantum_q32[axis] = quantum_q32;
 }
 
-bool gate_passes(gate_t *self, uint64_t now_us, uint32_t period_us, const q32_t value_q32[POSE_AXES])
+bool spike_filter_passes(spike_filter_t *self, uint64_t now_us, uint32_t period_us, const q32_t value_q32[POSE_AXES])
 {
     if (self->factor == 0 || period_us == 0) {
-        gate_reset(self);
+        spike_filter_reset(self);
         return true;
     }
     self->period_us = period_us;
@@ -168,17 +168,17 @@ bool gate_passes(gate_t *self, uint64_t now_us, uint32_t period_us, const q32_t 
     return true;
 }
 
-bool gate_is_overdue(const gate_t *self, uint64_t now_us)
+bool spike_filter_is_overdue(const spike_filter_t *self, uint64_t now_us)
 {
     return self->is_withholding && now_us - self->withheld_us > (uint64_t)self->period_us * OVERDUE_PERIODS;
 }
 
-uint32_t gate_spikes(const gate_t *self)
+uint32_t spike_filter_spikes(const spike_filter_t *self)
 {
     return self->spikes;
 }
 
-const gate_spike_t *gate_last_spike(const gate_t *self)
+const spike_t *spike_filter_last_spike(const spike_filter_t *self)
 {
     return &self->spike;
 }

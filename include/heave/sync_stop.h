@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT
- * halt.h - plans the quickest stop of several axes together, with one trapezoidal acceleration profile in whole cycles.
+ * sync_stop.h - plans the quickest stop of several axes together, with one trapezoidal acceleration profile in whole cycles.
  * All axes change, hold and remove their acceleration in the same cycles, each with its own plateau. So the platform keeps its
  * direction while it slows down. Integer only; no clock.
  */
-#ifndef HEAVE_HALT_H
-#define HEAVE_HALT_H
+#ifndef HEAVE_SYNC_STOP_H
+#define HEAVE_SYNC_STOP_H
 
 #include "heave/axes.h"
 #include "heave/ramp.h"
@@ -12,36 +12,37 @@
 /** Cycles in which the acceleration changes, is held, and is removed. */
 typedef struct {
     int64_t change, hold, back;
-} halt_times_t;
+} sync_stop_times_t;
 
 /** A stop of up to AXES_MAX axes. */
 typedef struct {
     unsigned axes;
     int64_t cycles; /**< of the slowest axis */
     int64_t elapsed;
-    halt_times_t times[AXES_MAX]; /**< equal, except for an axis near a limit or planned separately */
+    sync_stop_times_t times[AXES_MAX]; /**< equal, except for an axis near a limit or planned separately */
     ramp_state_t start[AXES_MAX];
     ramp_state_t now[AXES_MAX];
     q32_t rest_q32[AXES_MAX]; /**< where it ends */
-} halt_t;
+} sync_stop_t;
 
 /** Plans the quickest stop within acceleration and jerk limits.
  *  @param start may be self->start
  *  @param together number of axes, from the first on, that stop in the same cycles. An axis that would leave its bounds or exceed
  *                  its speed, and the axes after `together`, get their own times */
-void halt_plan(halt_t *self, unsigned axes, unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits);
+void sync_stop_plan(sync_stop_t *self, unsigned axes, unsigned together, const ramp_state_t *start,
+                    const ramp_limits_t *const *limits);
 
 /** End positions of such a stop of all axes together, without planning it. */
-void halt_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits, q32_t *rest_q32);
+void sync_stop_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits, q32_t *rest_q32);
 
-/** Velocity of an axis in a cycle of the stop, by the same profile as halt_step(), without rounding errors of sums.
+/** Velocity of an axis in a cycle of the stop, by the same profile as sync_stop_step(), without rounding errors of sums.
  *  @param cycle at least 1; past the end: 0 */
-q32_t halt_velocity(const halt_t *self, unsigned axis, int64_t cycle);
+q32_t sync_stop_velocity(const sync_stop_t *self, unsigned axis, int64_t cycle);
 
 /** References of the next cycle. Past the end: at rest. */
-void halt_step(halt_t *self, ramp_ref_t *ref);
+void sync_stop_step(sync_stop_t *self, ramp_ref_t *ref);
 
-static inline bool halt_is_done(const halt_t *self)
+static inline bool sync_stop_is_done(const sync_stop_t *self)
 {
     return self->elapsed >= self->cycles;
 }

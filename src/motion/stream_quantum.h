@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: MIT
+ * stream_quantum.h - what the values of a sender are multiples of: whole millimetres, tenths of a degree. Private to src/motion.
+ */
+#ifndef STREAM_QUANTUM_H
+#define STREAM_QUANTUM_H
+
+#include "heave/stream.h"
+
+/** Looks at a sample so many periods after the newest one, which is still last_q32; finds quantum_q32 of each axis. Values that
+ * go on in even steps, or jump now and then, have none. */
+void stream_quantum_watch(stream_curve_t *self, unsigned periods, const q32_t *sample_q32);
+
+#endif
