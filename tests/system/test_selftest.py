@@ -121,6 +121,8 @@ def finds():
         found = {item["name"]: item for item in json.loads(report.read_text(encoding="utf-8"))["items"]}
         assert code == 1 and re.fullmatch(r"cylinder \d was [0-9.]+ mm off its set-point, allowed are 0.05", found["upper end"]["note"]), found
         assert bench.ask("engage")[0]["error"] == DUE
+        code, text = Person(bench, bench.folder / "missing" / "report.json", **{"Relay 1:": "n\n", "Go on": "s\n"}).run()
+        assert code == 74 and "report.json: No such file or directory" in text and "self-test: failed" in text, text
         bench.stop(daemon)
 
 

@@ -42,7 +42,7 @@ LIMIT_S = 60
 # What cannot fail, or asks nobody, or only looks into memory.
 HARMLESS = set("""
 atan2 bcmp feof hypot memrchr sin cos strcasecmp strncasecmp strcpy stpcpy strnlen __ctype_b_loc __cxa_finalize __errno_location __stack_chk_fail abort fmax fmin llround lround log10 pow sqrt sincos memchr memcmp memcpy memmove memset strchr strcmp
-strcspn strerror strlen strncmp strncpy strpbrk strrchr strspn strstr strtod strtoll strtoul strtoull snprintf vsnprintf gmtime_r inet_ntop inet_pton qsort
+strcspn strerror strlen strncmp strncpy strpbrk strrchr strspn strstr strtod strtoll strtoul strtoull snprintf vsnprintf gmtime_r localtime_r inet_ntop inet_pton qsort
 getenv dl_iterate_phdr getopt_long gai_strerror ferror fileno free freeaddrinfo pthread_self pthread_attr_destroy pthread_attr_init pthread_cond_broadcast pthread_cond_init pthread_cond_timedwait pthread_condattr_destroy pthread_condattr_init pthread_condattr_setclock pthread_attr_setinheritsched
 pthread_attr_setschedparam pthread_attr_setschedpolicy pthread_attr_setstacksize pthread_equal pthread_mutex_init pthread_mutex_lock pthread_mutex_unlock
 pthread_join pthread_sigmask sigaction sigaddset sigemptyset sigfillset signal getpid time clock_gettime setvbuf setlocale nl_langinfo isatty munlockall ini_parse_stream
@@ -64,6 +64,9 @@ ELSEWHERE = {("metrics.c", "unlink"): "tidies up after another failure; the next
              ("lifetime.c", "unlink"): "tidies up after another failure, which is what is told",
              ("output_file.c", "poll"): "when a pipe is full at the end",
              **{("hold.c", function): "only while a person holds a key; test_service_mode.py stops, kills and cuts it off" for function in ("fflush", "send", "recv", "read", "poll")},
+             **{(file, function): "only with a person at a terminal; test_selftest.py kills it there, and gives it a report that cannot be written"
+                for file in ("selftest.c", "selftest_link.c", "selftest_report.c")
+                for function in ("fclose", "fflush", "fopen", "fsync", "rename", "unlink", "connect", "poll", "read", "recv", "send", "socket", "tcflush")},
              **{("linux_can_local.c", function): "the bus to heave-twin; test_twin.py takes its other side away" for function in ("socket", "connect", "send", "recv")},
              ("linux_modbus_link.c", "tcflush"): "its result is not used"}
 
