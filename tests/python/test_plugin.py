@@ -11,13 +11,10 @@ from pathlib import Path
 import kernel
 import tap
 
+from heave.configuration import changed
+
 TOP = Path(__file__).resolve().parents[2]
 LIMIT_S = 300
-TWIN = """#!/bin/sh
-[ "$1" = --config ] && [ -f "$2" ] || exit 3
-echo "a twin of $2"
-exec sleep 1000
-"""
 
 
 class Bench:
@@ -75,14 +72,19 @@ def a_heaved_that_is_not_there_is_said(bench):
 def a_twin_where_there_is_one(bench):
     (bench.folder / "bin").mkdir()
     (bench.folder / "bin/heaved").symlink_to(Path(bench.bin) / "heaved")
-    test = "def test_it(twin, platform):\n    assert 'a twin of' in twin.log and twin.process.poll() is None\n"
-    bench.expect(bench.pytest(test, "--heave-bin", str(bench.folder / "bin"), "-rs"), 0, "1 skipped", "heave-twin")
+    text = (TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8")
+    (bench.folder / "twin.ini").write_text(changed(text, {"can.interface": f"twin{os.getpid() % 1000000}"}), encoding="utf-8")
+    arguments = ("--heave-bin", str(bench.folder / "bin"), "--heave-config", "twin.ini", "-rs")
+    test = "def test_it(twin, platform):\n    assert len(twin.positions) == 6 and platform.status()['state'] == 'OFF'\n"
+    bench.expect(bench.pytest(test, *arguments), 0, "1 skipped", "heave-twin")
     twin = bench.folder / "bin/heave-twin"
-    twin.write_text(TWIN, encoding="ascii")
-    twin.chmod(0o755)
-    bench.expect(bench.pytest(test, "--heave-bin", str(bench.folder / "bin")), 0, "1 passed")
+    twin.symlink_to(Path(bench.bin) / "heave-twin")
+    bench.expect(bench.pytest(test, *arguments), 0, "1 passed")
+    bench.expect(bench.pytest("def test_it(twin):\n    twin.process.kill()\n    twin.process.wait()\n", *arguments), 1, "heave-twin ended with exit code -9")
+    twin.unlink()
     twin.write_text("#!/bin/sh\necho 'no such interface'\nexit 5\n", encoding="ascii")
-    bench.expect(bench.pytest("def test_it(twin, platform):\n    twin.process.wait()\n", "--heave-bin", str(bench.folder / "bin")), 1, "exit code 5", "no such interface")
+    twin.chmod(0o755)
+    bench.expect(bench.pytest(test, *arguments), 1, "exit code 5", "no such interface")
 
 
 def a_lab(bench):
