@@ -51,6 +51,7 @@ enum {
     STREAM_GAPS = 24,       /**< intervals that are watched for another rate */
     STREAM_POINTS = 64,     /**< ring of points, a power of 2 */
     STREAM_EVIDENCE = 5,    /**< samples for a decision about one of them */
+    STREAM_LOSSES_MAX = 4,  /**< so often it counts that a long interval was a loss */
     STREAM_WINDOW_MAX = 10, /**< points in the longest mean of coarse values; the ring has room for three of them */
     STREAM_WEIGHTS = 3 * STREAM_WINDOW_MAX - 2 /**< points of a control point in that case */
 };
@@ -127,7 +128,6 @@ typedef struct {
     uint8_t weight[STREAM_WEIGHTS]; /**< of the points in that mean, the newest first: 75 at most */
     int64_t period_cycles_q16;      /**< cycles in a period */
     int64_t lead_q32;               /**< of the step of the last period, that a control point is ahead of its point */
-    int64_t bend_q32;               /**< of the step's change, likewise */
     q32_t mean_q32;                 /**< share of a mean of some points that a point is replaced by */
     q32_t led_q32;                  /**< share of the way ahead that control points are led */
     uint32_t mean_points;           /**< so many */

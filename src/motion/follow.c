@@ -175,6 +175,17 @@ static const kin_t *kin_followed(const motion_t *self)
     return self->space == MOTION_POSE ? &self->kin : NULL;
 }
 
+governor_limits_t follow_axis_limits(const motion_t *self, unsigned i)
+{
+    const bool is_used = self->space == MOTION_POSE || i == AXIS_ANGLE || i < self->cylinders;
+    return is_used ? limits_of(active_axis_ramp(self, i)) : (governor_limits_t){0};
+}
+
+governor_limits_t follow_cylinder_limits(const motion_t *self, unsigned i)
+{
+    return self->space == MOTION_POSE && i < self->cylinders ? limits_of(&self->cylinder[i]) : (governor_limits_t){0};
+}
+
 /* The slots are those of a space from now on. */
 static void change_space(motion_t *self, motion_space_t space)
 {
@@ -185,13 +196,11 @@ static void change_space(motion_t *self, motion_space_t space)
     self->source = MOTION_STREAMED;
     stream_reset(&self->stream);
     for (unsigned i = 0; i < AXES_MAX; i++) {
-        const bool is_used = space == MOTION_POSE || i == AXIS_ANGLE || i < self->cylinders;
-        const governor_limits_t limits = is_used ? limits_of(active_axis_ramp(self, i)) : (governor_limits_t){0};
+        const governor_limits_t limits = follow_axis_limits(self, i);
         stream_set_limits(&self->stream, i, &limits);
     }
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        const bool is_led = space == MOTION_POSE && i < self->cylinders;
-        const governor_limits_t limits = is_led ? limits_of(&self->cylinder[i]) : (governor_limits_t){0};
+        const governor_limits_t limits = follow_cylinder_limits(self, i);
         stream_set_cylinder_limits(&self->stream, i, &limits);
     }
     spike_filter_reset(&self->gate);

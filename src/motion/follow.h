@@ -7,6 +7,10 @@
 
 #include "heave/motion.h"
 
+/** Limits that a stream has on an axis of the space that is followed in [0, AXES_MAX), and on a cylinder [0, CYLINDERS_MAX). */
+governor_limits_t follow_axis_limits(const motion_t *self, unsigned i);
+governor_limits_t follow_cylinder_limits(const motion_t *self, unsigned i);
+
 /** True while a sender's target moves the platform. */
 bool follow_is_moving(const motion_t *self);
 

@@ -5,6 +5,8 @@
  */
 #include "heave/governor.h"
 
+#include "heave/sane.h"
+
 #define SPAN_US     150000u
 #define RELEASE_US  300000u           /* time constant with which the strength falls ... */
 #define SOFT_US     100000u           /* ... which that rate comes to */
@@ -46,6 +48,32 @@ static int32_t brake_share(const governor_limits_t *limits)
     return (int32_t)fx_clamp(fx_mul_div(gained_q32, Q16_ONE, limits->vel_per_cycle_q32), 0, Q16_ONE);
 }
 
+/* Periods between two looks at the needs, and the cycles of so long. */
+static uint32_t periods_of_look(uint32_t period_us)
+{
+    const uint32_t each = period_us > 0 ? (LOOK_US + period_us / 2) / period_us : 0;
+    return each > 0 ? each : 1;
+}
+
+static int64_t cycles_of_look(uint32_t period_us, uint32_t each, uint32_t cycle_us)
+{
+    return (int64_t)period_us * each * Q16_ONE / cycle_us;
+}
+
+static unsigned channels_with_limits(const governor_t *self)
+{
+    unsigned channels = 0;
+    for (unsigned i = 0; i < GOVERNOR_CHANNELS; i++) {
+        channels = self->limits[i].jerk_per_cycle3_q32 > 0 ? i + 1 : channels;
+    }
+    return channels;
+}
+
+static q32_t share_of_period(uint32_t period_us, unsigned level)
+{
+    return Q32_ONE * (int64_t)period_us / ((int64_t)period_us + k_time_constant_us[level]);
+}
+
 static void stretch(governor_track_t *track, int64_t by_q32)
 {
     track->vel_q32 = fx_mul_shift(track->vel_q32, by_q32, 32);
@@ -70,26 +98,24 @@ void governor_pace(governor_t *self, uint32_t period_us, uint32_t cycle_us)
         return;
     }
     const uint32_t was_us = self->period_us * self->each;
-    self->each = (LOOK_US + period_us / 2) / period_us;
-    self->each = self->each > 0 ? self->each : 1;
+    self->each = periods_of_look(period_us);
     if (was_us > 0) {
         stretch_all(self, Q32_ONE * (int64_t)(period_us * self->each) / was_us);
     }
     self->since = 0;
     self->glide_q32 = 0;
-    const int64_t cycles_q16 = (int64_t)period_us * self->each * Q16_ONE / cycle_us;
+    const int64_t cycles_q16 = cycles_of_look(period_us, self->each, cycle_us);
     self->period_us = period_us;
-    self->channels = 0;
+    self->channels = channels_with_limits(self);
     for (unsigned i = 0; i < GOVERNOR_CHANNELS; i++) {
         const governor_limits_t *limits = &self->limits[i];
         self->per_limit_q62[i][0] = reciprocal(limits->vel_per_cycle_q32, cycles_q16, 1);
         self->per_limit_q62[i][1] = reciprocal(limits->acc_per_cycle2_q32, cycles_q16, 2);
         self->per_limit_q62[i][2] = reciprocal(limits->jerk_per_cycle3_q32, cycles_q16, 3);
         self->brake_q16[i] = brake_share(limits);
-        self->channels = limits->jerk_per_cycle3_q32 > 0 ? i + 1 : self->channels;
     }
     for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
-        self->share_q32[level] = Q32_ONE * (int64_t)period_us / ((int64_t)period_us + k_time_constant_us[level]);
+        self->share_q32[level] = share_of_period(period_us, level);
     }
 }
 
@@ -386,4 +412,86 @@ uint32_t governor_delay_us(const governor_t *self)
         delay_us += (uint64_t)part_q32 * k_time_constant_us[level] / (uint64_t)Q32_ONE;
     }
     return (uint32_t)delay_us;
+}
+
+static bool is_strength(q32_t strength_q32)
+{
+    return strength_q32 >= 0 && strength_q32 <= GOVERNOR_LEVELS * Q32_ONE;
+}
+
+static bool is_track_sane(const governor_track_t *track)
+{
+    return sane_q32(track->pos_q32) && sane_q32(track->vel_q32) && sane_q32(track->acc_q32);
+}
+
+/* What governor_pace() makes of the limits and the period; nothing before it was called. */
+static bool is_pace_sane(const governor_t *self, uint32_t cycle_us)
+{
+    const uint32_t each = periods_of_look(self->period_us);
+    const int64_t cycles_q16 = cycles_of_look(self->period_us, each, cycle_us);
+    bool is_sane = self->period_us >= 1000 && self->period_us <= 2000000 && self->each == each && self->since < each &&
+                   self->channels == channels_with_limits(self);
+    for (unsigned i = 0; i < GOVERNOR_CHANNELS; i++) {
+        const governor_limits_t *limits = &self->limits[i];
+        is_sane = is_sane && self->per_limit_q62[i][0] == reciprocal(limits->vel_per_cycle_q32, cycles_q16, 1) &&
+                  self->per_limit_q62[i][1] == reciprocal(limits->acc_per_cycle2_q32, cycles_q16, 2) &&
+                  self->per_limit_q62[i][2] == reciprocal(limits->jerk_per_cycle3_q32, cycles_q16, 3) &&
+                  self->brake_q16[i] == brake_share(limits);
+    }
+    for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
+        is_sane = is_sane && self->share_q32[level] == share_of_period(self->period_us, level);
+    }
+    return is_sane;
+}
+
+/* New limits wait for a period: what was made of the old ones is not used any more. */
+static bool is_waiting_sane(const governor_t *self)
+{
+    bool is_sane = self->period_us == 0 && self->channels <= GOVERNOR_CHANNELS && self->each <= LOOK_US;
+    for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
+        is_sane = is_sane && self->share_q32[level] >= 0 && self->share_q32[level] <= Q32_ONE;
+    }
+    return is_sane;
+}
+
+/* The strength picks a level; it glides on until needs are looked at again. */
+static bool is_strength_sane(const governor_t *self)
+{
+    const int64_t glides = self->since < self->each ? (int64_t)(self->each - 1 - self->since) : 0;
+    bool is_sane = is_strength(self->strength_q32) && fx_abs(self->glide_q32) <= GOVERNOR_LEVELS * Q32_ONE &&
+                   is_strength(self->strength_q32 + self->glide_q32 * glides) && is_strength(self->target_q32) &&
+                   is_strength(self->fall_q32);
+    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
+        is_sane = is_sane && is_strength(self->pole_q32[pole]);
+    }
+    return is_sane;
+}
+
+static bool are_levels_sane(const governor_t *self)
+{
+    bool is_sane = true;
+    for (unsigned i = 0; i < GOVERNOR_CHANNELS; i++) {
+        is_sane = is_sane && is_track_sane(&self->out[i]);
+        for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
+            is_sane = is_sane && sane_q32(self->level_q32[level][i]) && is_track_sane(&self->track[level][i]);
+        }
+    }
+    return is_sane;
+}
+
+static bool are_needs_sane(const governor_t *self)
+{
+    bool is_sane = self->span_us <= SPAN_US;
+    for (unsigned span = 0; span < GOVERNOR_SPANS; span++) {
+        for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
+            is_sane = is_sane && self->need_q16[span][level] >= 0 && self->need_q16[span][level] <= 2 * NEED_MAX;
+        }
+    }
+    return is_sane;
+}
+
+bool governor_is_sane(const governor_t *saved, uint32_t cycle_us, bool is_running)
+{
+    return (is_pace_sane(saved, cycle_us) || (!is_running && is_waiting_sane(saved))) && is_strength_sane(saved) &&
+           are_levels_sane(saved) && are_needs_sane(saved);
 }

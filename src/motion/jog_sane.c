@@ -27,17 +27,9 @@ static bool is_ramp_sane(const ramp_t *saved, const ramp_limits_t *own)
            sane_q32(saved->ref_jerk_q32) && saved->ref_acc_q32 >= 0 && sane_q32(saved->ref_acc_q32);
 }
 
-static bool is_scurve_sane(const scurve_t *path)
-{
-    const int64_t most = (int64_t)1 << 40;
-    return path->nj >= 0 && path->nj <= most && path->na >= 0 && path->na <= most && path->nv >= 0 && path->nv <= most &&
-           path->elapsed >= 0 && path->total > 0 && path->pos >= 0 && path->pos <= path->total;
-}
-
 bool jog_is_sane(const motion_t *saved, const motion_t *prepared)
 {
     const jog_t *jog = &saved->jog;
-    const motion_straight_t *way = &saved->plan.straight;
     const uint32_t all = ((1u << saved->cylinders) - 1u) | 1u << AXIS_ANGLE;
     bool is_sane = are_limits_same(&saved->jog_limits.cylinder, &prepared->jog_limits.cylinder) &&
                    saved->jog_limits.deg_per_cycle_q32 == prepared->jog_limits.deg_per_cycle_q32 && sane_bool(&jog->is_serving) &&
@@ -46,9 +38,6 @@ bool jog_is_sane(const motion_t *saved, const motion_t *prepared)
     for (unsigned i = 0; is_sane && i < AXES_MAX; i++) {
         const ramp_limits_t *own = i == AXIS_ANGLE ? &prepared->axis[AXIS_ANGLE].limits : &prepared->jog_limits.cylinder;
         is_sane = (jog->led >> i & 1u) == 0 || is_ramp_sane(&jog->ramp[i], own);
-    }
-    if (is_sane && saved->source == MOTION_JOGGED) {
-        is_sane = is_scurve_sane(&way->path) && sane_all_q32(way->from_q32, AXES_MAX) && sane_all_q32(way->to_q32, AXES_MAX);
     }
     return is_sane;
 }

@@ -5,17 +5,14 @@
 #include "heave/motion_sane.h"
 
 #include "heave/sane.h"
+#include "follow.h"
 #include "jog.h"
+#include "plan_sane.h"
+#include "stream_sane.h"
 
-#define SHARE_MAX_Q46 ((int64_t)2 << 46)
-#define CYCLES_MAX    ((int64_t)1 << 40)
-
-bool motion_target_is_sane(const motion_target_t *target)
-{
-    return sane_all_q32(target->value_q32, POSE_AXES) && sane_q32(target->angle_deg_q32) &&
-           (unsigned)target->space <= MOTION_CYLINDERS && target->time_ms <= FRAME_TIME_MAX_MS && sane_bool(&target->has_angle) &&
-           sane_bool(&target->is_timed);
-}
+#define CYCLES_MAX ((int64_t)1 << 40)
+#define SLOT_Q32   ((q32_t)1 << 48) /* from end to end of what a slot may be asked for, see axis_targets.c */
+#define SHARES     (sizeof((intensity_t *)0)->share_q46 / sizeof((intensity_t *)0)->share_q46[0])
 
 static bool is_same_q32(const q32_t *a, const q32_t *b, unsigned count)
 {
@@ -49,12 +46,21 @@ static bool is_ramp_sane(const ramp_t *saved, const ramp_t *prepared)
            sane_q32(saved->ref_jerk_q32);
 }
 
+/* The shares of the last cycles are those of the ramp: they change as slowly as it does. */
 static bool is_intensity_sane(const intensity_t *saved, const intensity_t *prepared)
 {
+    const ramp_limits_t *limits = &prepared->ramp.limits;
+    const int64_t *share_q46 = saved->share_q46;
     bool is_sane = saved->max_percent == prepared->max_percent && saved->percent <= saved->max_percent &&
-                   is_ramp_sane(&saved->ramp, &prepared->ramp);
-    for (unsigned i = 0; i < sizeof saved->share_q46 / sizeof saved->share_q46[0]; i++) {
-        is_sane = is_sane && saved->share_q46[i] >= 0 && saved->share_q46[i] <= SHARE_MAX_Q46;
+                   is_ramp_sane(&saved->ramp, &prepared->ramp) && share_q46[0] == saved->ramp.state.pos_q32;
+    for (unsigned i = 0; i < SHARES; i++) {
+        is_sane = is_sane && share_q46[i] >= 0 && share_q46[i] <= INTENSITY_FULL;
+    }
+    for (unsigned i = 0; is_sane && i + 1 < SHARES; i++) {
+        is_sane = fx_abs(share_q46[i] - share_q46[i + 1]) <= limits->vel_per_cycle_q32 + 1;
+    }
+    for (unsigned i = 0; is_sane && i + 2 < SHARES; i++) {
+        is_sane = fx_abs(share_q46[i] - 2 * share_q46[i + 1] + share_q46[i + 2]) <= limits->acc_per_cycle2_q32 + 1;
     }
     return is_sane;
 }
@@ -88,16 +94,53 @@ static bool are_bools_sane(const motion_t *saved)
 
 static bool are_numbers_sane(const motion_t *saved)
 {
-    return sane_all_q32(saved->pose.axis_q32, POSE_AXES) && sane_all_q32(saved->slot_q32, AXES_MAX) &&
-           sane_all_q32(saved->goal_q32, AXES_MAX) && sane_all_q32(saved->timed_way_q32, AXES_MAX) &&
-           sane_all_q32(saved->slot_extension_mm_q32, CYLINDERS_MAX) && sane_all_q32(saved->fade.from_q32, POSE_AXES) &&
-           sane_all_q32(saved->fade.from_mm_q32, CYLINDERS_MAX) && sane_q32(saved->angle_target_deg_q32) &&
-           saved->asked_cycles >= 0 && saved->asked_cycles <= CYCLES_MAX && saved->straight_after >= 0 &&
-           saved->straight_after <= CYCLES_MAX && saved->timed_share_q46 >= 0 && saved->timed_share_q46 <= SHARE_MAX_Q46 &&
-           sane_time(saved->last_us) && sane_time(saved->timed_end_us);
+    return sane_all_q32(saved->pose.axis_q32, POSE_AXES) && stream_sane_all(saved->slot_q32, AXES_MAX, SLOT_Q32) &&
+           stream_sane_all(saved->goal_q32, AXES_MAX, SLOT_Q32) && stream_sane_all(saved->timed_way_q32, AXES_MAX, SLOT_Q32) &&
+           stream_sane_all(saved->slot_extension_mm_q32, CYLINDERS_MAX, SLOT_Q32) &&
+           sane_all_q32(saved->fade.from_q32, POSE_AXES) && sane_all_q32(saved->fade.from_mm_q32, CYLINDERS_MAX) &&
+           sane_q32(saved->angle_target_deg_q32) && saved->asked_cycles >= 0 && saved->asked_cycles <= CYCLES_MAX &&
+           saved->straight_after >= 0 && saved->straight_after <= CYCLES_MAX && saved->timed_share_q46 >= 0 &&
+           saved->timed_share_q46 <= INTENSITY_FULL && sane_time(saved->last_us) && sane_time(saved->timed_end_us);
 }
 
-/* Not judged here yet: what stream, gate, plan, halt and fade have inside, and whether source goes with it. */
+static bool are_governor_limits(const governor_limits_t *saved, governor_limits_t wanted)
+{
+    return saved->vel_per_cycle_q32 == wanted.vel_per_cycle_q32 && saved->acc_per_cycle2_q32 == wanted.acc_per_cycle2_q32 &&
+           saved->jerk_per_cycle3_q32 == wanted.jerk_per_cycle3_q32;
+}
+
+/* A stream has the limits of the space that is followed in; before anything was followed it has none. */
+static bool are_stream_limits_sane(const motion_t *saved, bool has_followed)
+{
+    const governor_limits_t none = {0};
+    const stream_curve_t *curve = &saved->stream.curve;
+    bool is_sane = has_followed || saved->stream.phase == STREAM_EMPTY;
+    for (unsigned i = 0; i < AXES_MAX; i++) {
+        const governor_limits_t wanted = has_followed ? follow_axis_limits(saved, i) : none;
+        is_sane = is_sane && are_governor_limits(&curve->limits[i], wanted) &&
+                  (i >= POSE_AXES || are_governor_limits(&curve->governor.limits[i], wanted));
+    }
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        const governor_limits_t wanted = has_followed ? follow_cylinder_limits(saved, i) : none;
+        is_sane = is_sane && are_governor_limits(&curve->governor.limits[POSE_AXES + i], wanted);
+    }
+    return is_sane;
+}
+
+static bool are_fade_limits_same(const fade_limits_t *a, const fade_limits_t *b)
+{
+    return a->vel_per_cycle_q32 == b->vel_per_cycle_q32 && a->acc_per_cycle2_q32 == b->acc_per_cycle2_q32 &&
+           a->least_cycles == b->least_cycles;
+}
+
+static bool is_what_leads_sane(const motion_t *saved, const motion_t *prepared)
+{
+    return stream_is_sane(&saved->stream, &prepared->stream) &&
+           (are_stream_limits_sane(saved, true) || are_stream_limits_sane(saved, false)) &&
+           spike_filter_is_sane(&saved->gate, &prepared->gate) && plan_is_sane(saved) && fade_is_sane(&saved->fade) &&
+           are_fade_limits_same(&saved->fade_limits, &prepared->fade_limits);
+}
+
 bool motion_state_is_sane(const motion_t *saved, const motion_t *prepared)
 {
     return kin_is_same(&saved->kin, &prepared->kin) && saved->cylinders == prepared->cylinders &&
@@ -106,6 +149,7 @@ bool motion_state_is_sane(const motion_t *saved, const motion_t *prepared)
            is_same_q32(saved->settled_pose.axis_q32, prepared->settled_pose.axis_q32, POSE_AXES) &&
            is_same_q32(saved->neutral_mm_q32, prepared->neutral_mm_q32, saved->cylinders) &&
            is_same_q32(saved->settled_mm_q32, prepared->settled_mm_q32, saved->cylinders) && are_ramps_sane(saved, prepared) &&
-           jog_is_sane(saved, prepared) && are_kinds_sane(saved) && are_bools_sane(saved) && are_numbers_sane(saved) &&
-           motion_target_is_sane(&saved->pending) && motion_target_is_sane(&saved->withheld);
+           are_kinds_sane(saved) && jog_is_sane(saved, prepared) && is_what_leads_sane(saved, prepared) &&
+           are_bools_sane(saved) && are_numbers_sane(saved) && motion_target_is_sane(&saved->pending) &&
+           motion_target_is_sane(&saved->withheld);
 }

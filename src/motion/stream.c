@@ -21,7 +21,6 @@
 #define BESIDE_Q32           (Q32_ONE / 8)      /* one further from its time than by jitter and so much is beside it */
 #define TELLING              4     /* a value tells if it is off by less than such a share of what there is to tell, ... */
 #define TELLING_OPEN         2     /* ... of such a one where the time leaves it open */
-#define LOSSES_MAX           4u    /* so often it counts that a long interval was a loss */
 #define MISFIT_MEMORY        16    /* samples */
 #define FEW                  16    /* grains in a step that tells too little */
 #define JUDGED_MAX           4u    /* periods that values are weighed for */
@@ -177,7 +176,7 @@ static void note_loss(stream_t *self, unsigned by_time, unsigned periods, q32_t 
     }
     if (periods != by_time) {
         self->losses = 0;
-    } else if (self->losses < LOSSES_MAX) {
+    } else if (self->losses < (unsigned)STREAM_LOSSES_MAX) {
         self->losses++;
     }
 }

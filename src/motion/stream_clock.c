@@ -6,21 +6,21 @@
 #include "stream_clock.h"
 
 enum {
-    ALIKE = 6,         /* intervals alike that tell a new rate */
-    KNOWN = 12,        /* samples after which a stream is one */
-    MEMORY = 48,       /* samples that the line is found from */
-    MEMORY_LEAST = 8,  /* ... while the sender's rate changes */
-    MEMORY_FALL = 4,   /* of these in a sample, until the line follows */
-    DRIFT = 8,         /* samples that the mean lateness is taken of */
-    DRIFTS = 2,        /* a rate changes where that is so many times what lateness changes by at most in a period */
-    SECOND = 2,        /* intervals that tell that a stated period is wrong */
-    STATED = 4,        /* a stated period counts as much as so many samples */
-    BURSTS = 2,        /* short intervals, of the newest 24, that tell a sender that sends in bursts */
-    HALVES = 4,        /* samples half-way between two of the line that tell twice its rate */
-    STALLED = 2,       /* samples at the usual pace that tell that a sender stood still */
-    NEW_RATE = 3,      /* and so does one that eight intervals told */
-    LOST_MEMORY = 256, /* samples that losses are counted in ... */
-    LOST_FIRST = 64    /* ... but at first */
+    ALIKE = 6,  /* intervals alike that tell a new rate */
+    KNOWN = 12, /* samples after which a stream is one */
+    MEMORY = STREAM_CLOCK_MEMORY,
+    MEMORY_LEAST = 8, /* ... while the sender's rate changes */
+    MEMORY_FALL = 4,  /* of these in a sample, until the line follows */
+    DRIFT = 8,        /* samples that the mean lateness is taken of */
+    DRIFTS = 2,       /* a rate changes where that is so many times what lateness changes by at most in a period */
+    SECOND = 2,       /* intervals that tell that a stated period is wrong */
+    STATED = 4,       /* a stated period counts as much as so many samples */
+    BURSTS = 2,       /* short intervals, of the newest 24, that tell a sender that sends in bursts */
+    HALVES = STREAM_CLOCK_HALVES,
+    STALLED = STREAM_CLOCK_STALLED,
+    NEW_RATE = 3, /* and so does one that eight intervals told */
+    LOST_MEMORY = STREAM_CLOCK_LOST_MEMORY,
+    LOST_FIRST = 64 /* samples that losses are counted in at first */
 };
 
 #define PERIOD_MIN_Q16  ((int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16)

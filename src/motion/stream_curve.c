@@ -11,9 +11,9 @@
 #include "stream_quantum.h"
 
 enum {
-    AGE_MAX = 100,     /* samples after which an axis may move as fast as it can */
-    AHEAD_MAX = 28,    /* samples kept that are not committed; the ring has room for the longest mean of led points behind them */
-    MEAN_MAX = 5,      /* points of which one is the mean, where samples belong to their arrivals */
+    AGE_MAX = STREAM_CURVE_AGE_MAX,
+    AHEAD_MAX = STREAM_CURVE_AHEAD_MAX,
+    MEAN_MAX = STREAM_CURVE_MEAN_MAX,
     LED_POINTS = 7,    /* that a control point is led by, beside its own */
     SHIFT_GUESSES = 4, /* a shifted time line is come over to as softly as after so many guesses */
     STALL_GUESSES = 8, /* what a stall left behind is come over to more softly still */
@@ -32,9 +32,8 @@ enum {
 #define LED_CHANGE_Q32 (Q32_ONE / 64) /* of what is led, in a period */
 #define OFF_US         80000
 #define PATIENCE_US    300000
-#define LED_Q32        (Q32_ONE * 7 / 10) /* periods that control points are led ahead of their points, if balanced ... */
-#define WAY_SHIFT      4                  /* from Q32 to Q36 */
-#define OFF_NOTHING    (Q32_ONE / 2000)   /* 0.5 um: what is less is given up */
+#define WAY_SHIFT      4                /* from Q32 to Q36 */
+#define OFF_NOTHING    (Q32_ONE / 2000) /* 0.5 um: what is less is given up */
 
 /* Where the ring has an index; indices wrap. */
 static unsigned slot(uint32_t index)
@@ -372,10 +371,10 @@ static void find_mean(stream_curve_t *self, uint32_t period_us)
 
 void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us, bool is_lossy)
 {
-    const int64_t led_us = style == STREAM_BALANCED ? fx_mul_shift(period_us, LED_Q32, 32) : 0;
+    const int64_t led_us = style == STREAM_BALANCED ? fx_mul_shift(period_us, STREAM_CURVE_LED_Q32, 32) : 0;
     const int64_t few_us = fx_clamp(FEW_PERIODS * period_us + led_us, REACH_MIN_US, REACH_FEW_US);
     const int64_t reach_us = is_lossy ? fx_clamp(LOSSY_PERIODS * period_us, few_us, REACH_MAX_US) : few_us;
-    self->lead_q32 = style == STREAM_BALANCED ? LED_Q32 : 0;
+    self->lead_q32 = style == STREAM_BALANCED ? STREAM_CURVE_LED_Q32 : 0;
     self->period_cycles_q16 = (int64_t)period_us * Q16_ONE / cycle_us;
     self->reach_min_q16 = (int32_t)(reach_us * Q16_ONE / period_us);
     self->reach_max_q16 = (int32_t)((int64_t)REACH_MAX_US * Q16_ONE / period_us);
@@ -540,22 +539,6 @@ HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, bool i
     copy_point(self, self->point_q32[slot(newest(self))], self->last_q32);
     self->is_sample[slot(newest(self))] = true;
     fill_gap(self, (int32_t)periods, before_q32);
-}
-
-HV_WRAPS q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *sample_q32, unsigned periods, q32_t *step_q32)
-{
-    const int64_t n = periods;
-    q32_t misfit_q32 = 0;
-    *step_q32 = 0;
-    for (unsigned axis = 0; axis < self->axes; axis++) {
-        const q32_t before_q32 = self->point_q32[slot(newest(self) - 1)][axis];
-        const q32_t step = self->last_q32[axis] - before_q32;
-        const q32_t bend = step - (before_q32 - self->point_q32[slot(newest(self) - 2)][axis]);
-        misfit_q32 += fx_abs(sample_q32[axis] - self->last_q32[axis] - n * step - n * (n + 1) / 2 * bend);
-        misfit_q32 += 2 * self->grain[axis].quantum_q32;                      /* what rounding may make of it */
-        *step_q32 += fx_clamp(fx_abs(step) - 2 * fx_abs(bend), 0, INT64_MAX); /* a motion that bends tells little */
-    }
-    return misfit_q32;
 }
 
 /* Between the last point committed and the next sample. */

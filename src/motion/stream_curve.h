@@ -8,6 +8,15 @@
 
 #include "heave/stream.h"
 
+#define STREAM_CURVE_LED_Q32 (Q32_ONE * 7 / 10) /**< periods that control points are led ahead of their points, if balanced */
+
+enum {
+    STREAM_CURVE_AGE_MAX = 100,  /**< samples after which an axis may move as fast as it can */
+    STREAM_CURVE_AHEAD_MAX = 28, /**< samples kept that are not committed; the ring has room for the longest mean of led points
+                                      behind them */
+    STREAM_CURVE_MEAN_MAX = 5    /**< points of which one is the mean, where samples belong to their arrivals */
+};
+
 /** A curve that has always rested on the sample. */
 void stream_curve_start(stream_curve_t *self, const kin_t *kin, const q32_t *sample_q32);
 
@@ -32,10 +41,6 @@ void stream_curve_append(stream_curve_t *self, unsigned periods, bool is_of_stal
  *  @param periods of the new grid since the sample before, at least 1: after a gap its step is not the way of one period */
 void stream_curve_regrid(stream_curve_t *self, const kin_t *kin, const history_t *now, const q32_t *first_q32, unsigned periods,
                          const q32_t *sample_q32);
-
-/** How far a sample is from where the motion of the last ones would be so many periods later; and the way of the last period,
- * as far as it was even. Sums over all axes. */
-q32_t stream_curve_misfit(const stream_curve_t *self, const q32_t *sample_q32, unsigned periods, q32_t *step_q32);
 
 /** Makes the newest sample's index one less: for a time line that is too far behind. The curve comes over to the other time line
  *  softly. Nothing is changed where there is no point to go to. */

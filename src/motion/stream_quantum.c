@@ -5,10 +5,7 @@
  */
 #include "stream_quantum.h"
 
-enum {
-    WATCH = 64, /* samples after which the watch begins anew: a sender may have become finer, or coarser */
-    TURNS = 4   /* a jump makes one, or two where a sample is withheld */
-};
+enum { WATCH = STREAM_QUANTUM_WATCH, TURNS = STREAM_QUANTUM_TURNS };
 
 #define NOTHING_Q32 (Q32_ONE / 1024) /* values are rounded to 2^-16, and maybe scaled: what is less says nothing */
 #define FINEST_Q32  (Q32_ONE / 256)  /* finer grains cannot be told */

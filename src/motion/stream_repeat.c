@@ -11,10 +11,10 @@
 #include "stream_evidence.h"
 
 enum {
-    RUN_MAX = 8,    /* a value that comes more often stands */
+    RUN_MAX = STREAM_REPEAT_RUN_MAX,
     RUNS_LEAST = 8, /* that tell */
-    RUNS_MOST = 16, /* what is older counts half */
-    TELLING = 4     /* grains in a step that is not the rounding of a slow motion */
+    RUNS_MOST = STREAM_REPEAT_RUNS_MOST,
+    TELLING = 4 /* grains in a step that is not the rounding of a slow motion */
 };
 
 #define NEXT_DUE_Q32 (Q32_ONE * 7 / 8) /* of a period after the newest sample, one that stands is the next */

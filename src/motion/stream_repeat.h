@@ -6,6 +6,11 @@
 
 #include "heave/stream.h"
 
+enum {
+    STREAM_REPEAT_RUN_MAX = 8,   /**< a value that comes more often stands */
+    STREAM_REPEAT_RUNS_MOST = 16 /**< runs that count; what is older counts half */
+};
+
 /** Forgets what was seen of a sender. */
 void stream_repeat_reset(stream_repeat_t *self, uint64_t now_us);
 
