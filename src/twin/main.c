@@ -2,6 +2,7 @@
  * main.c - heave-twin: the outside of a platform's configuration, until a signal ends it.
  */
 #include <poll.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdio.h>
 #include <sys/resource.h>
@@ -16,7 +17,8 @@
 #include "twin/wire.h"
 
 #define FDS_MAX  (WIRE_FDS_MAX + CONTROL_FDS_MAX + MODBUS_PORTS_FDS_MAX)
-#define NICE     (-15)
+#define PRIORITY 40       /* heaved has 80, interrupts 50 */
+#define NICE     (-15)    /* the next best */
 #define AWAKE_US 1000000u /* it looks around so often, whatever happens */
 
 /** A run of the program. */
@@ -192,10 +194,20 @@ static sigset_t catch_signals(void)
     return open;
 }
 
+/* Drives have a processor to themselves. Where it may, the twin comes before everything but the motion thread of heaved, so that
+ * a busy machine loses no drive. */
+static void ask_for_priority(void)
+{
+    const struct sched_param parameters = {.sched_priority = PRIORITY};
+    if (sched_setscheduler(0, SCHED_FIFO, &parameters) != 0) {
+        (void)setpriority(PRIO_PROCESS, 0, NICE);
+    }
+}
+
 static int run_twin(run_t *self)
 {
     const sigset_t open = catch_signals();
-    (void)setpriority(PRIO_PROCESS, 0, NICE); /* where we may: drives have a processor to themselves */
+    ask_for_priority();
     int code = open_all(self);
     if (code == EXIT_DONE) {
         self->start_us = self->now_us = clock_us();

@@ -72,13 +72,14 @@ def beyond_an_end(bench, rate, speed, style, stands):
 
 
 def ends(bench):
-    """Not beyond the last sample by more than the axis takes to stop; where no sample comes, 50 ms are bridged. `balanced`: its lead more, and to and fro by it."""
+    """Not beyond the last sample by more than the axis takes to stop; where no sample comes, three periods are bridged, 50 to 62 ms. `balanced`: its lead more, and to and fro by it."""
     for style, stands in (("smooth", False), ("smooth", True), ("balanced", True), ("balanced", False)):
         for rate in (10, 60, 200):
             for speed in (5, 150):
                 stop_mm = speed * math.sqrt(speed / 40000)  # up to 3000 * 3000 / 40000 mm/s
                 lead_mm = {"smooth": 0, "balanced": 0.4 * speed / rate}[style]
-                most_mm = max(1.02 * stop_mm, 0 if stands else 0.05 * speed) + lead_mm + 0.01
+                bridged_s = min(max({"smooth": 3, "balanced": 3.7}[style] / rate, 0.050), 0.062)
+                most_mm = max(1.04 * stop_mm, 0 if stands else bridged_s * speed) + lead_mm + 0.01
                 over, back = beyond_an_end(bench, rate, speed, style, stands)
                 assert over <= most_mm, f"{style}, {rate} Hz, {speed} mm/s, {stands}: {over:.3f} mm, not {most_mm:.3f}"
                 most_back_mm = {"smooth": 0.05, "balanced": 0.05 + 0.25 * speed / rate}[style]
