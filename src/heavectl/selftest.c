@@ -148,8 +148,9 @@ static bool enter_service(run_t *self)
 /* --- Switches --- */
 
 /* One that ends SERVICE and comes back.
- * @param on what to do, off how to undo it; each with what heaved shows then */
-static void try_switch(run_t *self, const char *name, const char *on, selftest_seen_t is_on, const char *off,
+ * @param on what to do, off how to undo it; each with what heaved shows then
+ * Returns whether it worked. */
+static bool try_switch(run_t *self, const char *name, const char *on, selftest_seen_t is_on, const char *off,
                        selftest_seen_t is_off)
 {
     char error[SELFTEST_NOTE_MAX];
@@ -157,18 +158,19 @@ static void try_switch(run_t *self, const char *name, const char *on, selftest_s
     int key = selftest_wait(&self->link, "status", is_on, PERSON_MS);
     if (key != 'y') {
         note_answer(self, name, key, "nothing changed within two minutes");
-        return;
+        return false;
     }
     printf("%s\n", off);
     key = selftest_wait(&self->link, "status", is_off, PERSON_MS);
     if (key != 'y') {
         note_answer(self, name, key == 's' ? 'n' : key, "it did not go back");
-        return;
+        return false;
     }
     if (is_on == is_estop) {
         (void)selftest_has_done(&self->link, "reset", error);
     }
     note(self, name, SELFTEST_PASSED, "%s", "");
+    return true;
 }
 
 static bool is_always(const cJSON *status)
@@ -182,20 +184,19 @@ static void try_switches(run_t *self, const cJSON *plan)
 {
     const cJSON *switches = cJSON_GetObjectItemCaseSensitive(plan, "switches");
     if (selftest_is_set(switches, "estop") && !self->link.is_over && enter_service(self)) {
-        try_switch(self, "e-stop", "Press the e-stop.", is_estop, "Release the e-stop.", is_no_estop);
+        const bool is_tried = try_switch(self, "e-stop", "Press the e-stop.", is_estop, "Release the e-stop.", is_no_estop);
         if (selftest_is_set(plan, "healthy_pulse") && !self->link.is_over) {
-            note_answer(
-                self, "healthy pulse",
-                selftest_question(&self->link, "Did the safety relay drop while the e-stop was pressed, and does it hold now?"),
-                "the relay of the healthy pulse did not follow");
+            const char *question = "Did the safety relay drop while the e-stop was pressed, and does it hold now?";
+            note_answer(self, "healthy pulse", is_tried ? selftest_question(&self->link, question) : 's',
+                        "the relay of the healthy pulse did not follow");
         }
     }
     if (selftest_is_set(switches, "enable") && !self->link.is_over && enter_service(self)) {
-        try_switch(self, "enable key", "Turn the enable key off.", is_out, "Turn the enable key on, and wait.", is_always);
+        (void)try_switch(self, "enable key", "Turn the enable key off.", is_out, "Turn the enable key on, and wait.", is_always);
     }
     if (selftest_is_set(switches, "power") && !self->link.is_over && enter_service(self)) {
-        try_switch(self, "power failing", "Let the supply's contact tell that the supply fails.", is_failing,
-                   "Let it be well again.", is_supplied);
+        (void)try_switch(self, "power failing", "Let the supply's contact tell that the supply fails.", is_failing,
+                         "Let it be well again.", is_supplied);
     }
 }
 

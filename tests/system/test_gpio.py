@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_gpio.py BIN masks|lines|inputs|healthy - the daemon on GPIO lines that the kernel simulates, on virtual time. Runs inside kernel.py.
+"""test_gpio.py BIN masks|lines|inputs|healthy|selftest - the daemon on GPIO lines that the kernel simulates, on virtual time. Runs inside kernel.py.
 
 What the relays do is read from the other side of the lines, as a multimeter at the terminals would."""
+import json
 import signal
 import sys
 import time
@@ -402,6 +403,18 @@ def inputs_missing(bin_dir):
 
 PULSE = 15
 TOGGLE_MS = 20  # two looks of the watchdog below, which the kernel's tick makes ten ms apart
+PULSE_KEYS = f"\n[healthy]\ndriver = gpio\nline = FX{PULSE}\ntoggle_ms = {TOGGLE_MS}\n"
+SELFTEST = "\n[service]\njog_mm_s = 50\nselftest = daily\n"
+
+
+def edges(chip, seconds):
+    """Edges of the pulse within that time."""
+    seen, last, until = 0, chip.level(PULSE), time.monotonic() + seconds
+    while time.monotonic() < until:
+        time.sleep(0.001)
+        level = chip.level(PULSE)
+        seen, last = seen + (level != last), level
+    return seen
 
 
 class PulseBench(GpioBench):
@@ -409,17 +422,10 @@ class PulseBench(GpioBench):
         super().__init__(bin_dir, **{"sim__lag_ms": 300, **changes})
         self.edit("[cylinders]\n", "[cylinders]\nfollowing_error_mm = 20\n")
         self.chip = chip
-        self.config.write_text(self.config.read_text(encoding="utf-8") +
-                               f"\n[healthy]\ndriver = gpio\nline = FX{PULSE}\ntoggle_ms = {TOGGLE_MS}\n", encoding="utf-8")
+        self.config.write_text(self.config.read_text(encoding="utf-8") + PULSE_KEYS, encoding="utf-8")
 
     def edges(self, seconds):
-        """Edges within that time."""
-        seen, last, until = 0, self.chip.level(PULSE), time.monotonic() + seconds
-        while time.monotonic() < until:
-            time.sleep(0.001)
-            level = self.chip.level(PULSE)
-            seen, last = seen + (level != last), level
-        return seen
+        return edges(self.chip, seconds)
 
     def wait_pulse(self):
         harness.wait_for(lambda: self.edges(0.2) >= 5, "the pulse runs")
@@ -464,6 +470,54 @@ def pulse_missing(bin_dir):
         assert wrong in bench.refused()
 
 
+# --- The daily check, by a person at the desk who looks at the lines ---
+
+def daily_check(bin_dir):
+    """Every switch and the first relay are tried; the person says what the lines show. One switch whose wire is loose is found."""
+    with gpio_sim.Chip("effects", 16, "FX") as chip, Desk() as desk, \
+            DeskBench(bin_dir, desk, "enable = DESK2\npower = DESK4\n" + SELFTEST + PULSE_KEYS) as bench:
+        bench.start()
+        for line in (KEY, SUPPLY):
+            desk.close(line)
+        bench.wait_status(lambda status: status["power_failing"] is False, "supplied")
+        dropped = []
+
+        def press():
+            time.sleep(0.3)
+            desk.open(ESTOP)
+            time.sleep(0.3)
+            dropped.append(edges(chip, 0.3) == 0)
+
+        def turn_off():
+            time.sleep(0.3)
+            desk.open(KEY)
+
+        def see_relay():
+            harness.wait_for(lambda: relays(chip) & 1, "relay 1 is closed")
+
+        acts = {"Press the e-stop": press, "Release the e-stop": lambda: desk.close(ESTOP), "Did the safety relay drop": lambda: "y\n" if dropped == [True] else "n\n",
+                "Turn the enable key off": turn_off, "Turn the enable key on": lambda: desk.close(KEY),
+                "the supply fails": lambda: desk.open(SUPPLY), "Let it be well": lambda: desk.close(SUPPLY)}
+        code, found, text = checked(bench, acts)
+        assert code == 0, text
+        for name in ("e-stop", "healthy pulse", "enable key", "power failing", "relay 1", "torque", "upper end", "lower end", "brakes"):
+            assert found[name]["result"] == "passed", (name, found[name], text)
+        assert bench.status()["selftest"]["due"] is False
+        acts.update({"Press the e-stop": lambda: "s\n", "Turn the enable key off": turn_off, "Turn the enable key on": lambda: desk.close(KEY), "the supply fails": lambda: "s\n"})
+        code, found, text = checked(bench, {name: act for name, act in acts.items() if name != "Did the safety relay drop"})
+        assert code == 1 and found["e-stop"]["result"] == "skipped" and found["power failing"]["result"] == "skipped", text
+        assert bench.status()["selftest"]["due"] is True, "the last one counts"
+
+
+def checked(bench, acts):
+    """A self-test by hand: exit code, items by name, what was said."""
+    from test_selftest import Person  # has a terminal of its own
+    report = bench.folder / "report.json"
+    code, text = Person(bench, report, acts).run()
+    assert report.exists(), f"exit code {code}: {text}"
+    return code, {item["name"]: item for item in json.loads(report.read_text(encoding="utf-8"))["items"]}, text
+
+
 def main():
     suite = tap.Suite()
     if not gpio_sim.is_there():
@@ -482,7 +536,8 @@ def main():
     healthy = [("healthy pulse: runs while all is well, low from a fault on and after the end", pulse),
                ("healthy pulse: no edge from a program that hangs or is killed", pulse_hangs),
                ("healthy pulse: a line that is not there", pulse_missing)]
-    for name, case in {"masks": masks, "lines": lines, "inputs": inputs, "healthy": healthy}[sys.argv[2]]:
+    selftest = [("daily check: each switch, the healthy pulse and a relay, as a person at the desk sees them", daily_check)]
+    for name, case in {"masks": masks, "lines": lines, "inputs": inputs, "healthy": healthy, "selftest": selftest}[sys.argv[2]]:
         with suite.case(name):
             case(sys.argv[1])
     return suite.done()

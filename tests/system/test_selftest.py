@@ -22,9 +22,11 @@ KEYS = "\n[service]\njog_mm_s = 50\nselftest = daily\n"
 
 
 class Person:
-    """Answers questions, and holds the space bar where it is asked for. answers: {pattern: what is typed}; the last question that matches counts."""
+    """Answers questions, and holds the space bar where it is asked for. answers: {pattern: what is typed}; the last question that matches counts. acts: {what
+    is asked for: what the person does then}; it may return what is typed."""
 
-    def __init__(self, bench, report, **answers):
+    def __init__(self, bench, report, acts=(), **answers):
+        self.acts = dict(acts)
         self.answers = {"Relay 1:": "y\n", "Relay [0-9]+:": "n\n", "Did it switch": "y\n", "Go on": "y\n", **answers}
         self.master, slave = pty.openpty()
         self.process = subprocess.Popen([BIN / "heavectl", "--socket", str(bench.socket), "selftest", str(report)], stdin=slave, stdout=slave,
@@ -40,6 +42,7 @@ class Person:
             except OSError:
                 return False
         new = self.text[self.read:]
+        self.act(new)
         found = re.search(r"Relay 1:|Relay \d+:|Did it switch|Go on\?|hold a key, the space bar|goes on while|hold a key to go on|there: let go", new)
         if found:
             self.read += found.end()
@@ -59,6 +62,13 @@ class Person:
         elif self.is_held:
             os.write(self.master, b" ")
         return self.process.poll() is None
+
+    def act(self, new):
+        for asked in [asked for asked in self.acts if asked in new]:
+            typed = self.acts.pop(asked)()
+            if typed:
+                time.sleep(0.2)
+                os.write(self.master, typed.encode())
 
     def run(self):
         end = time.monotonic() + 120
