@@ -9,11 +9,16 @@ import select
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import harness
 import tap
+
+from heave import Heaved, Twin
+from heave.configuration import changed
 
 BIN = Path(sys.argv[1])
 KEY_S = 1 / 30
@@ -136,6 +141,26 @@ def finds():
         bench.stop(daemon)
 
 
+def on_drives_of_a_bus():
+    """CiA 402 drives of heave-twin: it passes; a brake that slips and a cylinder that is stuck are found."""
+    text = (harness.TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8")
+    changes = {"can.interface": f"twin{os.getpid() % 1000000}", "platform.engage": "manual", "platform.late_hold_cycles": 0}
+    with tempfile.TemporaryDirectory() as folder:
+        config, report = Path(folder) / "twin.ini", Path(folder) / "report.json"
+        config.write_text(changed(text, changes) + KEYS, encoding="utf-8")
+        with Twin(config, program=BIN / "heave-twin") as twin, Heaved(config, program=BIN / "heaved") as heaved:
+            bench = SimpleNamespace(socket=heaved.socket)
+            for fault, answers, item, words in ((None, {"Relay 1:": "n\n"}, None, ""), ("slip 2 0.3", {"Relay 1:": "n\n"}, "brakes", "cylinder 2 moved"),
+                                                ("jam 3", {"Relay 1:": "n\n"}, "upper end", "it was not led there")):
+                if fault is not None:
+                    twin.fault(fault)
+                code, said = Person(bench, report, **answers).run()
+                found = {one["name"]: one for one in json.loads(report.read_text(encoding="utf-8"))["items"]}
+                assert code == (0 if item is None else 1), said
+                assert item is None or (found[item]["result"] == "failed" and words in found[item]["note"]), (item, found, said)
+                twin.mend()
+
+
 def nobody_there():
     """Without a terminal; killed while it moves: it comes to rest, and nothing has passed."""
     with bench_with() as bench:
@@ -156,6 +181,7 @@ def main():
     suite = tap.Suite()
     for name, case in (("it passes, and is kept for the day and the configuration", passes),
                        ("what it finds has failed", finds),
+                       ("CiA 402 drives: it passes; a brake that slips, a cylinder that is stuck", on_drives_of_a_bus),
                        ("nobody at the terminal, or no more", nobody_there)):
         with suite.case(name):
             case()
