@@ -154,6 +154,23 @@ static size_t answer_register_drive(char *out, size_t size, twin_t *twin, unsign
                             motor_error(drive->motor) / twin->per_unit[k], drive->set_points);
 }
 
+static const char *frame_state_name(const frame_drive_t *drive)
+{
+    static const char *const k_names[] = {"no torque", "torque", "homing", "fault"};
+    return drive->is_powered ? k_names[drive->state] : "no power";
+}
+
+static size_t answer_frame_drive(char *out, size_t size, twin_t *twin, unsigned k)
+{
+    const frame_drive_t *drive = &twin->frame[k];
+    return (size_t)snprintf(out, size,
+                            "%s{\"drive\": %u, \"id\": %" PRIu32 ", \"leg\": %u, \"state\": \"%s\", \"alarm\": %" PRIu32
+                            ", \"counts\": %" PRId64 ", \"position\": %.4f, \"error\": %.4f, \"set_points\": %" PRIu32 "}",
+                            k == 0 ? "" : ", ", k + 1, drive->axis->command_id, twin->leg_of[k] + 1u, frame_state_name(drive),
+                            drive->fault_code, frame_drive_count(drive), twin_position(twin, k),
+                            motor_error(drive->motor) / twin->per_unit[k], drive->set_points);
+}
+
 /* The coils that are on, from 0. */
 static size_t answer_board(char *out, size_t size, const modbus_board_t *board)
 {
@@ -175,7 +192,11 @@ static void answer_status(char *out, twin_t *twin)
     size_t at = (size_t)snprintf(out, ANSWER_MAX, "{\"ok\": true, \"drives\": [");
     for (unsigned k = 0; k < twin->drives && at < ANSWER_MAX; k++) {
         const node_t *node = &twin->node[k];
-        if (twin->modbus.drives > 0) {
+        if (twin->kind == TWIN_DRIVES_FRAMES) {
+            at += answer_frame_drive(out + at, ANSWER_MAX - at, twin, k);
+            continue;
+        }
+        if (twin->kind == TWIN_DRIVES_MODBUS) {
             at += answer_register_drive(out + at, ANSWER_MAX - at, twin, k);
             continue;
         }

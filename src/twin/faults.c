@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "twin/fault_words.h"
+#include "twin/frame_faults.h"
 #include "twin/modbus_faults.h"
 
 #define INDEX_MAX    0xFFFFu
@@ -283,7 +284,7 @@ ACT(act_lag)
     node_of(twin, k)->drive.motor.lag_us = fault->number[0] * 1000;
 }
 
-/* Of Modbus only: modbus_faults.c has what it does. */
+/* Not of CiA 402 drives: modbus_faults.c and frame_faults.c have what it does. */
 ACT(act_none)
 {
     (void)twin;
@@ -325,7 +326,8 @@ static const row_t k_rows[] = {
     {"friction", "dn", "DRIVE MM", "breaks loose so far behind its demand", {0}, 1e4, act_friction, BUS_OFF},
     {"encoder", "dn", "DRIVE MM", "its encoder tells so much more from now on", {0}, 1e4, act_encoder, BUS_OFF},
     {"lag", "dn", "DRIVE MS", "follows with this time constant", {0}, 1e5, act_lag, BUS_OFF},
-    {"damaged", "dn", "DRIVE COUNT", "Modbus: so many of its answers are damaged, the CRC or the function", {0}, 1e6, act_none, BUS_OFF},
+    {"damaged", "dn", "DRIVE COUNT", "Modbus, own frames: so many of its answers are damaged, the check byte, CRC or function", {0}, 1e6, act_none, BUS_OFF},
+    {"stuck-counter", "d", "DRIVE", "own frames: its alive counter stands still", {0}, 0, act_none, BUS_OFF},
     {"half", "dn", "DRIVE COUNT", "Modbus: of so many of its answers only a half comes", {0}, 1e6, act_none, BUS_OFF},
     {"exception", "dnN", "DRIVE COUNT [CODE]", "Modbus: it answers so many times with an exception; else 6, busy", {0}, 1e6, act_none, BUS_OFF},
     {"register", "dnn", "DRIVE ADDRESS VALUE", "Modbus: that register holds this, and takes nothing else", {0}, INDEX_MAX, act_none, BUS_OFF},
@@ -418,23 +420,36 @@ static bool is_of_lines(bus_fault_t fault)
     return fault == BUS_UNPLUG || fault == BUS_PLUG;
 }
 
-bool fault_suits(const fault_t *self, bool is_modbus, bool has_board, char why[FAULT_WHY_MAX])
+/* What a name does to drives of that kind; NULL: they have no such fault. */
+static fault_act_t act_on(const row_t *row, twin_drives_t kind)
 {
-    const row_t *row = &k_rows[self->row];
     bool is_shared = false;
-    bool is_right = false;
-    if (row->act == NULL) {
-        is_right = is_of_board(row->bus)   ? has_board
-                   : is_of_lines(row->bus) ? is_modbus || has_board
-                                           : !is_modbus || row->bus == BUS_CABLE_OUT || row->bus == BUS_CABLE_IN;
-    } else {
-        is_right = is_modbus ? modbus_fault_find(row->name, &is_shared) != NULL || is_shared : !modbus_fault_is_own(row->name);
+    fault_act_t act = NULL;
+    if (kind == TWIN_DRIVES_CIA402) {
+        return row->act == act_none ? NULL : row->act;
     }
-    if (!is_right) {
-        (void)snprintf(why, FAULT_WHY_MAX, "%s: %s", row->name,
-                       row->act == NULL && is_of_board(row->bus) ? "the configuration has no board of relays on Modbus"
-                       : is_modbus ? "drives on Modbus have no such fault; docs/twin.md says which they have"
-                                   : "only drives on Modbus have this fault");
+    act = kind == TWIN_DRIVES_MODBUS ? modbus_fault_find(row->name, &is_shared) : frame_fault_find(row->name, &is_shared);
+    return is_shared ? row->act : act;
+}
+
+static bool suits_bus(bus_fault_t fault, twin_drives_t kind, bool has_board)
+{
+    const bool is_modbus = kind == TWIN_DRIVES_MODBUS;
+    return is_of_board(fault)   ? has_board
+           : is_of_lines(fault) ? is_modbus || has_board
+                                : !is_modbus || fault == BUS_CABLE_OUT || fault == BUS_CABLE_IN;
+}
+
+bool fault_suits(const fault_t *self, twin_drives_t kind, bool has_board, char why[FAULT_WHY_MAX])
+{
+    static const char *const k_drives[] = {"CiA 402 drives", "drives with CAN frames of their own", "drives on Modbus"};
+    const row_t *row = &k_rows[self->row];
+    const bool is_right = row->act == NULL ? suits_bus(row->bus, kind, has_board) : act_on(row, kind) != NULL;
+    if (!is_right && row->act == NULL && is_of_board(row->bus)) {
+        (void)snprintf(why, FAULT_WHY_MAX, "%s: the configuration has no board of relays on Modbus", row->name);
+    } else if (!is_right) {
+        (void)snprintf(why, FAULT_WHY_MAX, "%s: %s have no such fault; docs/twin.md says which they have", row->name,
+                       k_drives[kind]);
     }
     return is_right;
 }
@@ -455,17 +470,10 @@ static bool do_on_modbus(modbus_side_t *side, bus_fault_t fault)
     return is_cable || is_of_lines(fault) || is_of_board(fault);
 }
 
-static void (*act_of(const row_t *row, const twin_t *twin))(twin_t *, unsigned, const fault_t *, uint64_t)
-{
-    bool is_shared = false;
-    const modbus_act_t act = twin->modbus.drives > 0 ? modbus_fault_find(row->name, &is_shared) : NULL;
-    return act != NULL ? act : row->act;
-}
-
 bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT_WHY_MAX])
 {
     const row_t *row = &k_rows[self->row];
-    if (!fault_suits(self, twin->modbus.drives > 0, twin->modbus.board.is_there, why)) {
+    if (!fault_suits(self, twin->kind, twin->modbus.board.is_there, why)) {
         return false;
     }
     if (row->act == NULL && do_on_modbus(&twin->modbus, row->bus)) {
@@ -476,7 +484,7 @@ bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT
     }
     for (unsigned k = 0; k < twin->drives; k++) {
         if ((self->drives >> k & 1u) != 0) {
-            act_of(row, twin)(twin, k, self, now_us);
+            act_on(row, twin->kind)(twin, k, self, now_us);
         }
     }
     return true;

@@ -17,6 +17,9 @@ typedef struct {
     double number[FAULT_NUMBERS];
 } fault_t;
 
+/** What a name does to drive k. */
+typedef void (*fault_act_t)(twin_t *twin, unsigned k, const fault_t *fault, uint64_t now_us);
+
 /** Reads a line.
  *  @param drives how many the configuration has
  *  @param why    what is wrong and what would be right, where false is returned */
@@ -26,9 +29,9 @@ bool fault_read(fault_t *self, const char *line, unsigned drives, char why[FAULT
 bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT_WHY_MAX]);
 
 /** Why this configuration has no such fault.
- *  @param config what the drives are on
+ *  @param kind what the drives are on
  *  @return true where it has; else why says so */
-bool fault_suits(const fault_t *self, bool is_modbus, bool has_board, char why[FAULT_WHY_MAX]);
+bool fault_suits(const fault_t *self, twin_drives_t kind, bool has_board, char why[FAULT_WHY_MAX]);
 
 /** Row i of the table of names, for a help text; false behind the last one. */
 bool fault_describe(unsigned i, const char **name, const char **arguments, const char **help);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * main.c - heave-twin: the outside of a platform's configuration, until a signal ends it.
  */
+#include <inttypes.h>
 #include <poll.h>
 #include <sched.h>
 #include <signal.h>
@@ -56,6 +57,11 @@ static int refuse(int code, const char *where, const char *why)
     return code;
 }
 
+static bool has_wire(const run_t *self)
+{
+    return self->script.kind != TWIN_DRIVES_MODBUS;
+}
+
 /* --- Before it runs --- */
 
 static int read_script(run_t *self, unsigned drives)
@@ -86,7 +92,7 @@ static int prepare(run_t *self)
     const unsigned cylinders = self->config.settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
     const unsigned drives = cylinders + (self->config.settings.has_angle ? 1 : 0);
     twin_settings_init(&self->settings, &self->config);
-    self->script.is_modbus = config_modbus_is_used(&self->config);
+    self->script.kind = twin_kind(&self->config);
     self->script.has_board = self->config.relays.driver == CONFIG_RELAYS_MODBUS;
     const int code = twin_options_apply(&self->options, drives, cylinders, &self->settings);
     return code != EXIT_DONE ? code : read_script(self, drives);
@@ -99,7 +105,7 @@ static int open_all(run_t *self)
     if (!modbus_ports_open(&self->ports, &self->config, why)) {
         return refuse(EXIT_UNAVAILABLE, self->options.config, why);
     }
-    if (!self->script.is_modbus && !wire_open(&self->wire, self->config.can.interface, why)) {
+    if (has_wire(self) && !wire_open(&self->wire, self->config.can.interface, why)) {
         return refuse(EXIT_UNAVAILABLE, "[can] interface", why);
     }
     if (!control_open(&self->control, self->options.socket, why)) {
@@ -112,7 +118,7 @@ static void say_what_runs(const run_t *self)
 {
     const wire_t *wire = &self->wire;
     modbus_ports_describe(&self->ports, stdout);
-    if (self->script.is_modbus) {
+    if (!has_wire(self)) {
         printf("heave-twin: %u drives on Modbus, units", self->twin.drives);
         for (unsigned k = 0; k < self->twin.drives; k++) {
             printf(" %u", self->twin.modbus.map.axis[k].unit);
@@ -121,10 +127,16 @@ static void say_what_runs(const run_t *self)
         (void)fflush(stdout);
         return;
     }
-    printf("heave-twin: %u CiA 402 drives on %s%s, nodes", self->twin.drives, self->config.can.interface,
-           wire->is_local ? " (a bus between programs; no CAN)" : "");
+    const bool is_frames = self->script.kind == TWIN_DRIVES_FRAMES;
+    printf("heave-twin: %u drives on %s%s, %s", self->twin.drives, self->config.can.interface,
+           wire->is_local ? " (a bus between programs; no CAN)" : "",
+           is_frames ? "frames of their own to identifiers" : "CiA 402, nodes");
     for (unsigned k = 0; k < self->twin.drives; k++) {
-        printf(" %u", self->twin.node[k].number);
+        if (is_frames) {
+            printf(" 0x%" PRIX32, self->twin.frame_map.axis[k].command_id);
+        } else {
+            printf(" %u", self->twin.node[k].number);
+        }
     }
     printf("\n");
     (void)fflush(stdout);
@@ -157,7 +169,7 @@ static void wait(const run_t *self, const sigset_t *open)
     const uint64_t now_us = clock_us();
     const uint64_t span_us = due_us > now_us ? due_us - now_us : 0;
     const struct timespec span = {.tv_sec = (time_t)(span_us / 1000000u), .tv_nsec = (long)(span_us % 1000000u) * 1000};
-    unsigned count = self->script.is_modbus ? 0 : wire_watch(&self->wire, fds);
+    unsigned count = !has_wire(self) ? 0 : wire_watch(&self->wire, fds);
     count += modbus_ports_watch(&self->ports, fds + count);
     count += control_watch(&self->control, fds + count);
     (void)ppoll(fds, count, &span, open);
@@ -168,7 +180,7 @@ static int run(run_t *self, const sigset_t *open)
     while (is_ended == 0) {
         wait(self, open);
         self->now_us = clock_us();
-        if (!self->script.is_modbus && !wire_hear(&self->wire, hear, self)) {
+        if (has_wire(self) && !wire_hear(&self->wire, hear, self)) {
             return refuse(EXIT_UNAVAILABLE, self->wire.name, "the interface is gone");
         }
         twin_advance(&self->twin, self->now_us);
@@ -218,7 +230,7 @@ static int run_twin(run_t *self)
     }
     control_close(&self->control);
     modbus_ports_close(&self->ports);
-    if (!self->script.is_modbus) {
+    if (has_wire(self)) {
         wire_close(&self->wire);
     }
     return code;
@@ -228,11 +240,12 @@ static int check(run_t *self)
 {
     const unsigned drives =
         (self->config.settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u) + (self->config.settings.has_angle ? 1u : 0u);
-    if (self->script.is_modbus) {
+    if (!has_wire(self)) {
         printf("%s: %u drives on Modbus, %u faults: right\n", self->options.config, drives, self->script.count);
     } else {
-        printf("%s: %u CiA 402 drives on %s, %u faults: right\n", self->options.config, drives, self->config.can.interface,
-               self->script.count);
+        printf("%s: %u %s on %s, %u faults: right\n", self->options.config, drives,
+               self->script.kind == TWIN_DRIVES_FRAMES ? "drives with frames of their own" : "CiA 402 drives",
+               self->config.can.interface, self->script.count);
     }
     return EXIT_DONE;
 }

@@ -10,8 +10,7 @@
 /** A name. act is NULL where it is the motor's fault, which is the same on every bus. */
 typedef struct {
     const char *name;
-    bool is_own; /**< drives on CAN have none such */
-    modbus_act_t act;
+    fault_act_t act;
 } row_t;
 
 #define ACT(name) static void name(twin_t *twin, unsigned k, const fault_t *fault, uint64_t now_us)
@@ -141,29 +140,29 @@ ACT(act_mend)
 }
 
 static const row_t k_rows[] = {
-    {"fault", false, act_fault},
-    {"broken", false, act_broken},
-    {"reboot", false, act_power_on},
-    {"power-off", false, act_power_off},
-    {"power-on", false, act_power_on},
-    {"mute", false, act_mute},
-    {"cut", false, act_cut},
-    {"ignore", false, act_ignore},
-    {"jam", false, NULL},
-    {"drop", false, act_drop},
-    {"lose", false, act_lose},
-    {"late", false, act_late},
-    {"damaged", true, act_damaged},
-    {"half", true, act_half},
-    {"exception", true, act_exception},
-    {"register", true, act_register},
-    {"slip", false, NULL},
-    {"homing-fails", false, act_homing_fails},
-    {"load", false, NULL},
-    {"friction", false, NULL},
-    {"lag", false, NULL},
-    {"encoder", false, act_encoder},
-    {"mend", false, act_mend},
+    {"fault", act_fault},
+    {"broken", act_broken},
+    {"reboot", act_power_on},
+    {"power-off", act_power_off},
+    {"power-on", act_power_on},
+    {"mute", act_mute},
+    {"cut", act_cut},
+    {"ignore", act_ignore},
+    {"jam", NULL},
+    {"drop", act_drop},
+    {"lose", act_lose},
+    {"late", act_late},
+    {"damaged", act_damaged},
+    {"half", act_half},
+    {"exception", act_exception},
+    {"register", act_register},
+    {"slip", NULL},
+    {"homing-fails", act_homing_fails},
+    {"load", NULL},
+    {"friction", NULL},
+    {"lag", NULL},
+    {"encoder", act_encoder},
+    {"mend", act_mend},
 };
 
 #define ROWS (sizeof k_rows / sizeof k_rows[0])
@@ -178,15 +177,9 @@ static const row_t *row_of(const char *name)
     return NULL;
 }
 
-modbus_act_t modbus_fault_find(const char *name, bool *is_shared)
+fault_act_t modbus_fault_find(const char *name, bool *is_shared)
 {
     const row_t *row = row_of(name);
     *is_shared = row != NULL && row->act == NULL;
     return row != NULL ? row->act : NULL;
-}
-
-bool modbus_fault_is_own(const char *name)
-{
-    const row_t *row = row_of(name);
-    return row != NULL && row->is_own;
 }

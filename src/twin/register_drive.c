@@ -6,6 +6,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "twin/status_word.h"
+
 #define BOOT_US       300000u
 #define STOP_S        0.1 /* a stop from the usual speed */
 #define HOMING_PART   5.0 /* it homes at such a part of the usual speed */
@@ -63,71 +65,17 @@ static bool is_block(const modbus_drive_block_t *block, uint16_t address, const 
     return true;
 }
 
-static bool holds(canraw_when_t when, uint32_t status)
+static status_conditions_t conditions_of(const modbus_drive_map_t *map)
 {
-    return when.mask != 0 && (status & when.mask) == when.value;
-}
-
-/* A word of which one condition does not hold any more, without touching the bits of `kept`. */
-static uint32_t spoil(canraw_when_t when, uint32_t status, uint32_t kept)
-{
-    const uint32_t free = when.mask & ~kept;
-    return holds(when, status) ? status ^ (free & (~free + 1u)) : status;
-}
-
-/* The conditions of a status that shall hold, by bit: those of the map in this order. */
-enum { HOLDS_DONE = 1, HOLDS_FAILED = 2, HOLDS_ENABLED = 4, HOLDS_FAULT = 8 };
-#define CONDITIONS 4u
-
-static void conditions_of(const modbus_drive_map_t *map, canraw_when_t out[CONDITIONS])
-{
-    out[0] = map->homing_done;
-    out[1] = map->homing_failed;
-    out[2] = map->enabled_when;
-    out[3] = map->fault_when;
-}
-
-static uint32_t status_word(const modbus_drive_map_t *map, unsigned wanted)
-{
-    canraw_when_t when[CONDITIONS];
-    uint32_t status = 0;
-    uint32_t kept = 0;
-    conditions_of(map, when);
-    for (unsigned i = 0; i < CONDITIONS; i++) {
-        if ((wanted >> i & 1u) != 0) {
-            status = (status & ~when[i].mask) | when[i].value;
-            kept |= when[i].mask;
-        }
-    }
-    for (unsigned i = 0; i < CONDITIONS; i++) {
-        status = (wanted >> i & 1u) != 0 ? status : spoil(when[i], status, kept);
-    }
-    return status;
-}
-
-static bool tells(const modbus_drive_map_t *map, unsigned wanted)
-{
-    canraw_when_t when[CONDITIONS];
-    const uint32_t status = status_word(map, wanted);
-    conditions_of(map, when);
-    for (unsigned i = 0; i < CONDITIONS; i++) {
-        if (when[i].mask != 0 && holds(when[i], status) != ((wanted >> i & 1u) != 0)) {
-            return false;
-        }
-    }
-    return true;
+    return (status_conditions_t){map->homing_done, map->homing_failed, map->enabled_when, map->fault_when};
 }
 
 const char *register_drive_refusal(const modbus_drive_map_t *map)
 {
-    const unsigned states[] = {0, HOLDS_DONE, HOLDS_ENABLED | HOLDS_DONE, HOLDS_FAULT | HOLDS_DONE, HOLDS_FAULT};
-    for (unsigned i = 0; i < sizeof states / sizeof states[0]; i++) {
-        if (!tells(map, states[i])) {
-            return "[modbus] enabled_when, fault_when and homing_done_when: no status tells them apart, so heave-twin can show "
-                   "none";
-        }
-    }
-    return NULL;
+    const status_conditions_t conditions = conditions_of(map);
+    return status_word_tells(&conditions) ? NULL
+                                          : "[modbus] enabled_when, fault_when and homing_done_when: no status tells them apart, "
+                                            "so heave-twin can show none";
 }
 
 /* --- Registers --- */
@@ -178,11 +126,12 @@ int32_t register_drive_count(const register_drive_t *self)
 
 static uint32_t status_of(const register_drive_t *self)
 {
-    unsigned wanted = self->is_homed ? HOLDS_DONE : 0;
-    wanted |= self->has_homing_failed ? HOLDS_FAILED : 0;
-    wanted |= self->state == REGISTER_TORQUE || self->state == REGISTER_HOMING ? HOLDS_ENABLED : 0;
-    wanted |= self->state == REGISTER_FAULT ? HOLDS_FAULT : 0;
-    return status_word(self->map, wanted);
+    unsigned wanted = self->is_homed ? STATUS_DONE : 0;
+    wanted |= self->has_homing_failed ? STATUS_FAILED : 0;
+    wanted |= self->state == REGISTER_TORQUE || self->state == REGISTER_HOMING ? STATUS_ENABLED : 0;
+    wanted |= self->state == REGISTER_FAULT ? STATUS_FAULT : 0;
+    const status_conditions_t conditions = conditions_of(self->map);
+    return status_word(&conditions, wanted);
 }
 
 /* A field of its feedback, into its registers. */

@@ -35,7 +35,7 @@ bool script_add(script_t *self, const char *line, unsigned drives, char why[FAUL
     }
     script_entry_t *entry = &self->entry[self->count];
     *entry = (script_entry_t){.is_after_enabled = is_after, .at_us = (uint64_t)(seconds * SECOND_US)};
-    if (!fault_read(&entry->fault, end, drives, why) || !fault_suits(&entry->fault, self->is_modbus, self->has_board, why)) {
+    if (!fault_read(&entry->fault, end, drives, why) || !fault_suits(&entry->fault, self->kind, self->has_board, why)) {
         return false;
     }
     (void)snprintf(entry->text, sizeof entry->text, "%s", end + strspn(end, " \t"));

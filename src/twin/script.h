@@ -23,7 +23,8 @@ typedef struct {
 /** All of them. */
 typedef struct {
     unsigned count;
-    bool is_modbus, has_board; /**< which faults the configuration has; set by the caller */
+    twin_drives_t kind; /**< which faults the configuration has; set by the caller, and so is ... */
+    bool has_board;     /**< ... whether it has a board of relays on Modbus */
     script_entry_t entry[SCRIPT_MAX];
 } script_t;
 

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "config/canraw.h"
 #include "config/cia402.h"
 #include "config/modbus.h"
 
@@ -39,17 +40,30 @@ static const char *refusal_of_registers(const config_t *config)
     return register_drive_refusal(&map);
 }
 
+static const char *refusal_of_frames(const config_t *config)
+{
+    canraw_map_t map;
+    config_canraw_map(config, &map);
+    return frame_drive_refusal(&map);
+}
+
+twin_drives_t twin_kind(const config_t *config)
+{
+    return config_modbus_is_used(config)             ? TWIN_DRIVES_MODBUS
+           : config->drives == CONFIG_DRIVES_CAN_RAW ? TWIN_DRIVES_FRAMES
+                                                     : TWIN_DRIVES_CIA402;
+}
+
 const char *twin_refusal(const config_t *config)
 {
     switch (config->drives) {
     case CONFIG_DRIVES_CIA402:
         return NULL;
     case CONFIG_DRIVES_SIM:
-        return "[drives] driver = sim: heaved simulates these drives itself; heave-twin needs driver = cia402, modbus-tcp or "
-               "modbus-rtu";
+        return "[drives] driver = sim: heaved simulates these drives itself; heave-twin needs driver = cia402, can-raw, "
+               "modbus-tcp or modbus-rtu";
     case CONFIG_DRIVES_CAN_RAW:
-        return "[drives] driver = can-raw: heave-twin has no drives with CAN frames of their own yet, only cia402, modbus-tcp "
-               "and modbus-rtu";
+        return refusal_of_frames(config);
     case CONFIG_DRIVES_MODBUS_TCP:
     case CONFIG_DRIVES_MODBUS_RTU:
         return refusal_of_registers(config);
@@ -102,15 +116,36 @@ static void start_modbus(twin_t *self, const config_t *config, const twin_settin
     }
 }
 
+static void start_frames(twin_t *self, const config_t *config, const twin_settings_t *settings, node_out_t out, uint64_t now_us)
+{
+    config_canraw_map(config, &self->frame_map);
+    self->drives = self->frame_map.axes;
+    for (unsigned k = 0; k < self->drives; k++) {
+        frame_drive_t *drive = &self->frame[k];
+        frame_drive_init(drive, &self->frame_map, k, out);
+        couple(self, config, settings, &self->frame_map.axis[k].scale, k);
+        drive->motor = &self->node[k].drive.motor;
+        drive->motor->now_us = now_us;
+        drive->home = self->node[k].drive.home;
+        drive->usual_speed = drive->motor->rated_speed;
+        frame_drive_power(drive, true, now_us);
+    }
+}
+
 void twin_start(twin_t *self, const config_t *config, const twin_settings_t *settings, node_out_t out, uint64_t now_us)
 {
     cia402_config_t drives;
     memset(self, 0, sizeof *self);
     self->has_pose = kin_init(&self->kin, &config->settings.geometry) == HV_OK;
     self->cylinders = kin_cylinders(&self->kin);
+    self->kind = twin_kind(config);
     modbus_side_init(&self->modbus, config);
-    if (config_modbus_is_used(config)) {
+    if (self->kind == TWIN_DRIVES_MODBUS) {
         start_modbus(self, config, settings, now_us);
+        return;
+    }
+    if (self->kind == TWIN_DRIVES_FRAMES) {
+        start_frames(self, config, settings, out, now_us);
         return;
     }
     config_cia402(config, &drives);
@@ -138,7 +173,11 @@ void twin_start(twin_t *self, const config_t *config, const twin_settings_t *set
 /* Has torque. Lives up to now. */
 static bool advance_drive(twin_t *self, unsigned k, uint64_t now_us)
 {
-    if (self->modbus.drives > 0) {
+    if (self->kind == TWIN_DRIVES_FRAMES) {
+        frame_drive_advance(&self->frame[k], now_us);
+        return frame_drive_is_enabled(&self->frame[k]);
+    }
+    if (self->kind == TWIN_DRIVES_MODBUS) {
         register_drive_t *drive = &self->modbus.drive[k];
         register_drive_advance(drive, now_us);
         return drive->is_powered && drive->state == REGISTER_TORQUE;
@@ -150,7 +189,11 @@ static bool advance_drive(twin_t *self, unsigned k, uint64_t now_us)
 void twin_hear(twin_t *self, const can_frame_t *frame, uint64_t now_us)
 {
     for (unsigned k = 0; k < self->drives; k++) {
-        node_hear(&self->node[k], frame, now_us);
+        if (self->kind == TWIN_DRIVES_FRAMES) {
+            frame_drive_hear(&self->frame[k], frame, now_us);
+        } else {
+            node_hear(&self->node[k], frame, now_us);
+        }
     }
 }
 
@@ -168,11 +211,12 @@ void twin_advance(twin_t *self, uint64_t now_us)
 uint64_t twin_due_us(const twin_t *self)
 {
     uint64_t due_us = DRIVE_NEVER;
-    if (self->modbus.drives > 0) {
+    if (self->kind == TWIN_DRIVES_MODBUS) {
         return self->node[0].drive.motor.now_us + MODBUS_STEP_US;
     }
     for (unsigned k = 0; k < self->drives; k++) {
-        const uint64_t node_us = node_due_us(&self->node[k]);
+        const uint64_t node_us =
+            self->kind == TWIN_DRIVES_FRAMES ? frame_drive_due_us(&self->frame[k]) : node_due_us(&self->node[k]);
         due_us = node_us < due_us ? node_us : due_us;
     }
     return due_us;

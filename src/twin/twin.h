@@ -8,8 +8,16 @@
 #include "config/config.h"
 #include "heave/drives.h"
 #include "heave/kin.h"
+#include "twin/frame_drive.h"
 #include "twin/modbus_side.h"
 #include "twin/node.h"
+
+/** What the drives are on. */
+typedef enum {
+    TWIN_DRIVES_CIA402, /**< CANopen */
+    TWIN_DRIVES_FRAMES, /**< CAN, frames of their own */
+    TWIN_DRIVES_MODBUS
+} twin_drives_t;
 
 /** How the machine was put together. */
 typedef struct {
@@ -47,10 +55,13 @@ typedef struct {
 
 /** The outside. */
 typedef struct {
+    twin_drives_t kind;
     unsigned drives;
     unsigned cylinders;
-    node_t node[DRIVES_MAX]; /**< the motors are here, whatever the bus */
-    modbus_side_t modbus;    /**< drives, and a board of relays, on Modbus */
+    canraw_map_t frame_map;
+    frame_drive_t frame[DRIVES_MAX]; /**< of TWIN_DRIVES_FRAMES */
+    node_t node[DRIVES_MAX];         /**< the motors are here, whatever the bus */
+    modbus_side_t modbus;            /**< drives, and a board of relays, on Modbus */
     uint8_t leg_of[DRIVES_MAX];
     double zero[DRIVES_MAX];     /**< raw counts of a drive at 0 u */
     double per_unit[DRIVES_MAX]; /**< raw counts per u as it really is */
@@ -63,6 +74,9 @@ typedef struct {
 
 /** Everything as it should be. */
 void twin_settings_init(twin_settings_t *self, const config_t *config);
+
+/** What the drives of a configuration are on. */
+twin_drives_t twin_kind(const config_t *config);
 
 /** Whether the drives of a configuration can be simulated here. Returns NULL, or why not and what to do. */
 const char *twin_refusal(const config_t *config);

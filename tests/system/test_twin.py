@@ -72,6 +72,40 @@ def faults_and_back(bench):
         harness.wait_for(lambda: is_led_up(bench), f"{line}: up again", 0.5)
 
 
+def frames_of_their_own(bench):
+    """Rises, follows where it is led, and is off or held in the end."""
+    daemon = up(bench)
+    with bench.sender() as sender:
+        sender.send("@A6T:2,1,0,0,0,20,2000#")
+        time.sleep(3)
+    twin, status = bench.twin_status(), bench.status()
+    for leg, drive in zip(status["cylinders"], twin["drives"]):
+        assert abs(leg["actual_mm"] - drive["position"]) < NEAR_MM and drive["set_points"] > 200, (leg, drive)
+        assert drive["state"] == "torque", drive
+    assert abs(twin["pose"][0] - 2) < 0.3 and abs(twin["pose"][1] - 1) < 0.3, twin["pose"]
+    assert bench.stop(daemon) == 0
+
+
+def off_in_the_end(bench):
+    frames_of_their_own(bench)
+    assert {drive["state"] for drive in bench.twin_status()["drives"]} == {"no torque"}, bench.twin_status()
+
+
+def faults_of_frames(bench):
+    up(bench)
+    for line, fault in (("jam 3", "following-error"), ("fault 2 0x17", "drive-fault"), ("mute 5", "drive-offline"), ("stuck-counter 4", "drive-offline"),
+                        ("damaged 6 100000", "drive-offline"), ("drop 1", "drive-dropped"), ("bus-off", "bus-lost")):
+        bench.do(line)
+        with bench.sender() as sender:
+            sender.send("@A6T:0,0,0,0,0,40,1500#")
+            harness.wait_for(lambda: bench.status()["state"] == "FAULT", f"{line}: a fault")
+        found = bench.status()["fault"]
+        assert found["name"] == fault, f"{line}: {found}"
+        assert line != "fault 2 0x17" or "0x17" in str(found) or found["device_code"] == 0x17, found
+        bench.do("active" if line == "bus-off" else "mend all")
+        harness.wait_for(lambda: is_led_up(bench), f"{line}: up again", 0.5)
+
+
 def script_runs(bench):
     script = bench.file("script", "# drive 3, a second after torque\n+1 emcy 3 0x5000   # only told\n+1.5 drop 4\n")
     bench.start_twin("--script", script)
@@ -108,7 +142,8 @@ def bad_input(bench):
     refused(69, "nobody answers", "--socket", bench.folder / "none", "status")
     refused(78, "", "--config", bench.file("empty.ini", ""))
     refused(78, "heaved simulates these drives itself", "--config", harness.TOP / "config/demo-hexapod.ini")
-    refused(78, "frames of their own yet", "--config", harness.TOP / "config/can-raw-hexapod.ini")
+    refused(65, "CiA 402 drives have no such fault", *config, "--fault", "1 stuck-counter 2")
+    refused(65, "drives with CAN frames of their own have no such fault", "--config", harness.TOP / "config/can-raw-hexapod.ini", "--fault", "1 sdo-silent 2")
     assert bench.run_twin(*config, "--fault", "1 jam 2", "--check").returncode == 0
     bench.start_twin()
     refused(69, "another heave-twin is this bus already", *config)
@@ -188,6 +223,9 @@ CASES = [
     ("heave-twin: the platform rises and follows, and the drives are where heaved believes", rises_and_follows, {}),
     ("heave-twin: a drive that runs backwards shows it before anything moves", backwards_is_seen_before_it_moves, {"platform__engage": "manual"}),
     ("heave-twin: faults of each class, and back", faults_and_back, {}),
+    ("heave-twin: drives with CAN frames of their own, a plain map", frames_of_their_own, {"frames": "plain"}),
+    ("heave-twin: drives with CAN frames of their own, a rich map", off_in_the_end, {"frames": "rich"}),
+    ("heave-twin: faults of drives with frames of their own, and back", faults_of_frames, {"frames": "rich"}),
     ("heave-twin: a script runs by its times", script_runs, {}),
     ("heave-twin: heaved without it says what to do, and goes on when it is there", without_a_twin_it_says_what_to_do, {}),
     ("heave-twin: bad input is named", bad_input, {}),

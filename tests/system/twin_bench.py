@@ -30,16 +30,59 @@ angle_counts_per_deg = {counts}
 period_us = {period_us}
 """
 
+# Drives with frames of their own: one that tells a position and whether it is homed, and one with torque, status, fault code, counter and check byte.
+FRAMES = {"plain": """
+command_id = 0x601
+reply_id = 0x581
+setpoint = 01 05 {position:i32le} {speed:u16le}
+speed_counts = 2000
+home = 01 03 01 00 00 00 00 00
+position_query = 00 15
+position_reply = .. .. {position:i32le}
+homing_query = 00 12
+homing_reply = .. .. {status:u8}
+homing_done_when = 0x01/0xFF
+""", "rich": """
+id_bits = 29
+command_id = 0x18FF0100
+reply_id = 0x18FF0200
+setpoint = 10 {position:i32be} {counter:u8} {crc8:1D}
+enable = 20 {counter:u8} {crc8:1D}
+disable = 21 {counter:u8} {crc8:1D}
+stop = 22 {counter:u8} {crc8:1D}
+reset = 23 {counter:u8} {crc8:1D}
+position_reply = {status:u8} {position:i32be} {fault:u8} {counter:u8} {crc8:1D}
+enabled_when = 0x01/0x01
+fault_when = 0x02/0x02
+"""}
+OWN_FRAMES = """
+[drives]
+driver = can-raw
+
+[can]
+interface = {interface}
+bitrate_bps = 1000000
+
+[can-raw]
+counts_per_mm = {counts}
+angle_counts_per_deg = {counts}
+period_us = {period_us}
+offline_periods = 20
+following_error_mm = 10
+angle_following_error_deg = 10
+"""
+
 
 class TwinBench(harness.Bench):
-    def __init__(self, bin_dir, interface=None, period_us=4000, more="", **changes):
+    def __init__(self, bin_dir, interface=None, period_us=4000, more="", frames=None, **changes):
         super().__init__(bin_dir, **changes)
         self.interface = interface or f"twin{self.port}"  # a bus between programs, of this test alone
         self.twin = None
         self.twin_socket = self.folder / "twin.sock"
         self.twin_log = self.folder / "twin.log"
         text = self.config.read_text(encoding="utf-8")
-        section = DRIVES.format(interface=self.interface, counts=COUNTS_PER_MM, period_us=period_us).strip() + more + "\n"
+        more = FRAMES[frames] if frames else more
+        section = (OWN_FRAMES if frames else DRIVES).format(interface=self.interface, counts=COUNTS_PER_MM, period_us=period_us).strip() + "\n" + more.strip() + "\n"
         text, count = re.subn(r"\[drives\].*?(?=\n\[relays\])", section, text, flags=re.DOTALL)
         assert count == 1
         self.config.write_text(text, encoding="utf-8")
