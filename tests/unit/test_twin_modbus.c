@@ -231,8 +231,8 @@ static void test_faults_that_these_drives_lack_are_refused(void)
         TEST_ASSERT_FALSE_MESSAGE(fault_do(&fault, &m_twin, m_now_us, why), k_lines[i]);
     }
     TEST_ASSERT_TRUE(fault_read(&fault, "damaged 2 1", 6, why));
-    TEST_ASSERT_FALSE(fault_suits(&fault, false, false, why));
-    TEST_ASSERT_TRUE(fault_suits(&fault, true, false, why));
+    TEST_ASSERT_FALSE(fault_suits(&fault, TWIN_DRIVES_CIA402, false, why));
+    TEST_ASSERT_TRUE(fault_suits(&fault, TWIN_DRIVES_MODBUS, false, why));
 }
 
 static void test_any_bytes_get_an_answer_or_none(void)
