@@ -11,6 +11,7 @@
 
 #include "record/service_words.h"
 #include "service/control_client.h"
+#include "service/control_geometry.h"
 #include "service/control_selftest.h"
 #include "service/operator_requests.h"
 #include "service/service_json.h"
@@ -204,7 +205,8 @@ static bool is_look(const char *line)
 {
     return strcmp(line, "status") == 0 || strcmp(line, "tick") == 0 || strcmp(line, "counts") == 0 ||
            strncmp(line, "beat ", 5) == 0 || strcmp(line, "incidents") == 0 || strcmp(line, "samples") == 0 ||
-           strcmp(line, "selftest") == 0 || strncmp(line, "watch", 5) == 0 || strncmp(line, k_by, strlen(k_by)) == 0;
+           strcmp(line, "selftest") == 0 || strcmp(line, "geometry") == 0 || strncmp(line, "watch", 5) == 0 ||
+           strncmp(line, k_by, strlen(k_by)) == 0;
 }
 
 static bool is_known(const char *line)
@@ -298,6 +300,8 @@ static void take_request(control_t *self, control_client_t *client, const char *
         control_selftest_answer(self, client);
     } else if (control_selftest_is_said(line)) {
         control_selftest_take(self, client, line);
+    } else if (strcmp(line, "geometry") == 0) {
+        control_geometry_answer(self, client);
     } else if (strcmp(line, "samples") == 0) {
         answer_samples(self, client);
     } else if (strcmp(line, "status") == 0) {
@@ -312,7 +316,7 @@ static void take_request(control_t *self, control_client_t *client, const char *
         control_client_answer_error(
             client,
             "unknown request; status, watch [HZ], tick, counts, intensity PERCENT, engage, hold, resume, park, reset, "
-            "shutdown, service, service-off, torque, jog, home, relay, beat, release, dump, incidents, samples, seen, "
+            "shutdown, service, service-off, torque, jog, home, relay, beat, release, dump, incidents, samples, geometry, seen, "
             "selftest [passed|failed], acknowledge and by NAME are allowed",
             NULL);
     }

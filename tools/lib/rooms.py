@@ -21,6 +21,7 @@ PROGRAMS = {
     "daemon": {"common", "config", "record", "inspect", "service", "heavectl", "twin"},
     "twin": {"common", "config"},
     "heavectl": {"common"},
+    "panel": {"common", "service"},
 }
 
 

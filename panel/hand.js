@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// hand.js - a button that moves the machine as long as it is held: a press, beats of 50 ms from the main thread with the newest tick that
+// this page has heard, a release. Whatever ends the hold (finger, window, tab, connection) ends the beats; heaved stops 250 ms later by itself.
+const BEAT_MS = 50;
+
+export class Hand {
+  constructor(link, platform, say) {
+    Object.assign(this, { link, platform, say, tick: 0, series: 0, counter: 0, timer: null, isPressing: false });
+    this.letGo = this.letGo.bind(this);
+    window.addEventListener("blur", this.letGo);
+    window.addEventListener("pagehide", this.letGo);
+    document.addEventListener("visibilitychange", this.letGo);
+  }
+
+  end() {
+    this.letGo();
+    window.removeEventListener("blur", this.letGo);
+    window.removeEventListener("pagehide", this.letGo);
+    document.removeEventListener("visibilitychange", this.letGo);
+  }
+
+  heard(tick) {
+    this.tick = tick.tick;
+    if (this.series && !(tick.held && tick.series === this.series)) this.letGo(); // heaved has ended it
+  }
+
+  async press(line) {
+    if (this.isPressing || this.timer) return;
+    this.isPressing = true;
+    this.isWanted = true;
+    const got = await this.link.ask({ op: "press", platform: this.platform, line, tick: this.tick });
+    this.isPressing = false;
+    if (got.error || got.answer?.ok === false) {
+      this.say(got.error ?? got.answer.error);
+      this.isWanted = false;
+      return;
+    }
+    this.series = got.answer.series;
+    this.tick = got.answer.tick;
+    this.counter = 0;
+    if (!this.isWanted) return this.letGo();
+    this.timer = setInterval(() => {
+      this.counter += 1;
+      this.link.send({ op: "beat", platform: this.platform, series: this.series, counter: this.counter, tick: this.tick });
+    }, BEAT_MS);
+  }
+
+  letGo() {
+    this.isWanted = false;
+    clearInterval(this.timer);
+    this.timer = null;
+    if (this.series) this.link.send({ op: "release", platform: this.platform });
+    this.series = 0;
+    this.onLetGo?.();
+  }
+
+  // Makes a button one that is held. line(): what to press.
+  attach(button, line) {
+    const begin = (event) => {
+      event.preventDefault();
+      button.classList.add("held");
+      this.onLetGo = () => button.classList.remove("held");
+      this.press(line());
+    };
+    button.addEventListener("pointerdown", (event) => { if (event.button === 0) { button.setPointerCapture(event.pointerId); begin(event); } });
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) button.addEventListener(name, this.letGo);
+    button.addEventListener("keydown", (event) => { if ((event.key === " " || event.key === "Enter") && !event.repeat) begin(event); });
+    button.addEventListener("keyup", this.letGo);
+    button.addEventListener("blur", this.letGo);
+    button.addEventListener("contextmenu", (event) => event.preventDefault());
+  }
+}

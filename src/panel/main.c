@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: MIT
+ * main.c - heave-panel: the platforms of a box in a browser.
+ */
+#include <arpa/inet.h>
+#include <glob.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include "common/message.h" // exit codes
+#include "panel/options.h"
+#include "panel/server.h"
+
+#ifndef HEAVE_PANEL_WWW
+#error "where the pages are installed"
+#endif
+
+#define WHY_MAX      256u
+#define PASSWORD_MAX 256u
+
+static volatile sig_atomic_t is_ended; /* set by the signal handler, which can reach nothing else */
+
+static void on_signal(int number)
+{
+    (void)number;
+    is_ended = 1;
+}
+
+static int refuse(int code, const char *why)
+{
+    fprintf(stderr, "heave-panel: %s\n", why);
+    return code;
+}
+
+/* --- Passwords --- */
+
+static bool read_password(char password[PASSWORD_MAX])
+{
+    struct termios usual, quiet;
+    const bool is_terminal = tcgetattr(STDIN_FILENO, &usual) == 0;
+    if (is_terminal) {
+        quiet = usual;
+        quiet.c_lflag &= (tcflag_t)~ECHO;
+        fputs("Password: ", stderr);
+        (void)tcsetattr(STDIN_FILENO, TCSAFLUSH, &quiet);
+    }
+    const bool is_read = fgets(password, (int)PASSWORD_MAX, stdin) != NULL;
+    if (is_terminal) {
+        (void)tcsetattr(STDIN_FILENO, TCSAFLUSH, &usual);
+        fputs("\n", stderr);
+    }
+    if (is_read) {
+        password[strcspn(password, "\r\n")] = '\0';
+    }
+    return is_read;
+}
+
+static int set_password(const char *state, const char *word)
+{
+    char password[PASSWORD_MAX] = "";
+    char why[WHY_MAX];
+    const int role = access_role(word);
+    if (role < 0) {
+        return refuse(EXIT_BAD_USAGE, "passwd: the roles are look, operate and service");
+    }
+    const bool is_set = read_password(password) && access_set_password(state, (level_t)role, password, why, sizeof why);
+    memset(password, 0, sizeof password);
+    if (!is_set) {
+        return refuse(EXIT_BAD_CONFIG, why);
+    }
+    printf("heave-panel: the password of %s is set; restart heave-panel\n", word);
+    return EXIT_DONE;
+}
+
+/* --- Platforms --- */
+
+static bool add(hall_t *hall, const char *name, size_t length, const char *path)
+{
+    char short_name[UPSTREAM_NAME_MAX];
+    if (hall->platforms == VIEWER_PLATFORMS || length == 0 || length >= sizeof short_name) {
+        return false;
+    }
+    (void)snprintf(short_name, sizeof short_name, "%.*s", (int)length, name);
+    return upstream_init(&hall->platform[hall->platforms++], short_name, path, &server_upstream_calls);
+}
+
+/* Those of services, by their folders; and that of a heaved started by hand. */
+static void add_found(hall_t *hall)
+{
+    glob_t found = {0};
+    if (glob(SOCKET_DIRECTORY "/*/" SOCKET_NAME, 0, NULL, &found) == 0) {
+        for (size_t i = 0; i < found.gl_pathc; i++) {
+            const char *const name = found.gl_pathv[i] + strlen(SOCKET_DIRECTORY "/");
+            (void)add(hall, name, strcspn(name, "/"), found.gl_pathv[i]);
+        }
+    }
+    globfree(&found);
+    if (hall->platforms == 0) {
+        (void)add(hall, "heave", strlen("heave"), SOCKET_DIRECTORY "/" SOCKET_NAME);
+    }
+}
+
+static bool add_platforms(hall_t *hall, const panel_options_t *options)
+{
+    for (unsigned i = 0; i < options->platforms; i++) {
+        const char *const equals = strchr(options->platform[i], '=');
+        if (!add(hall, options->platform[i], (size_t)(equals - options->platform[i]), equals + 1)) {
+            return false;
+        }
+    }
+    if (options->platforms == 0) {
+        add_found(hall);
+    }
+    return true;
+}
+
+/* --- Where --- */
+
+static bool split(const char *listen, char address[ACCESS_HOST_MAX], int *port)
+{
+    const char *const colon = strrchr(listen, ':');
+    const size_t length = (size_t)(colon - listen);
+    char *end = NULL;
+    const long number = strtol(colon + 1, &end, 10);
+    if (length >= ACCESS_HOST_MAX || length == 0 || *end != '\0' || number < 1 || number > 65535) {
+        return false;
+    }
+    (void)snprintf(address, ACCESS_HOST_MAX, "%.*s", (int)length, listen);
+    *port = (int)number;
+    return true;
+}
+
+static bool is_this_machine(const char *address)
+{
+    struct in_addr ip;
+    return inet_pton(AF_INET, address, &ip) == 1 && (ntohl(ip.s_addr) >> 24) == 127;
+}
+
+static const char *state_of(const panel_options_t *options)
+{
+    const char *const given = getenv("STATE_DIRECTORY");
+    return options->state != NULL ? options->state : given != NULL ? given : "/var/lib/heave-panel";
+}
+
+static int serve(const panel_options_t *options)
+{
+    static access_t access;
+    static pages_t pages;
+    static upstream_t platform[VIEWER_PLATFORMS];
+    static hall_t hall = {.platform = platform};
+    char address[ACCESS_HOST_MAX];
+    char why[WHY_MAX];
+    const struct sigaction action = {.sa_handler = on_signal};
+    server_t server = {.address = address,
+                       .certificate = options->certificate,
+                       .key = options->key,
+                       .state = state_of(options),
+                       .access = &access,
+                       .pages = &pages,
+                       .hall = &hall,
+                       .version = HEAVE_VERSION,
+                       .is_ended = &is_ended};
+    if (!split(options->listen, address, &server.port)) {
+        return refuse(EXIT_BAD_USAGE, "--listen: written as 127.0.0.1:9801");
+    }
+    if (!access_load(&access, server.state, why, sizeof why)) {
+        return refuse(EXIT_BAD_CONFIG, why);
+    }
+    if (!access.has_password && !is_this_machine(address)) {
+        return refuse(EXIT_BAD_CONFIG, "--listen: other machines only once there is a password: heave-panel passwd service");
+    }
+    if (!pages_load(&pages, options->www != NULL ? options->www : HEAVE_PANEL_WWW, why, sizeof why)) {
+        return refuse(EXIT_BAD_CONFIG, why);
+    }
+    static const char *const k_names[] = {"127.0.0.1", "localhost", "[::1]"};
+    for (unsigned i = 0; i < sizeof k_names / sizeof k_names[0]; i++) {
+        (void)access_allow_host(&access, k_names[i]);
+    }
+    (void)access_allow_host(&access, address);
+    for (unsigned i = 0; i < options->hosts; i++) {
+        if (!access_allow_host(&access, options->host[i])) {
+            return refuse(EXIT_BAD_USAGE, "--allow-host: too long");
+        }
+    }
+    if (!add_platforms(&hall, options)) {
+        return refuse(EXIT_BAD_USAGE, "--platform: NAME has 1 to 31 characters");
+    }
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    return server_run(&server) == 0 ? EXIT_DONE : EXIT_UNAVAILABLE;
+}
+
+int main(int argc, char **argv)
+{
+    panel_options_t options;
+    const int code = panel_options_read(&options, argc, argv);
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    if (options.is_help) {
+        usage_print(&heave_panel_usage, stdout);
+        return EXIT_DONE;
+    }
+    if (options.is_version) {
+        printf("heave-panel %s\n", HEAVE_VERSION);
+        return EXIT_DONE;
+    }
+    return options.password_of != NULL ? set_password(state_of(&options), options.password_of) : serve(&options);
+}

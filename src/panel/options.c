@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: MIT
+ * options.c - see options.h.
+ */
+#include "panel/options.h"
+
+#include <string.h>
+
+#include "common/message.h" // exit codes
+
+enum {
+    OPTION_HELP = 'h',
+    OPTION_VERSION = 'V',
+    OPTION_LISTEN = 256,
+    OPTION_WWW,
+    OPTION_STATE,
+    OPTION_PLATFORM,
+    OPTION_HOST,
+    OPTION_CERT,
+    OPTION_KEY
+};
+
+static const usage_row_t k_forms[] = {
+    {.argument = "[OPTION ...]", .help = "serve, until Ctrl-C"},
+    {.argument = "[--state DIR] passwd look|operate|service", .help = "set the password of a role, read from standard input"},
+    {0},
+};
+
+static const usage_row_t k_options[] = {
+    {"listen", "ADDRESS:PORT", "where; else 127.0.0.1:9801. Other machines only once there is a password", OPTION_LISTEN},
+    {"platform", "NAME=SOCKET", "a heaved; else all of /run/heave. May be given again", OPTION_PLATFORM},
+    {"allow-host", "NAME", "a name or address that browsers call it by, beside its own. May be given again", OPTION_HOST},
+    {"state", "DIR", "where passwords are; else $STATE_DIRECTORY, else /var/lib/heave-panel", OPTION_STATE},
+    {"www", "DIR", "its pages", OPTION_WWW},
+    {"tls-cert", "FILE", "certificate, for https; with --tls-key", OPTION_CERT},
+    {"tls-key", "FILE", "its key", OPTION_KEY},
+    {"help", NULL, "print this", OPTION_HELP},
+    {"version", NULL, "print the version", OPTION_VERSION},
+    {0},
+};
+
+static const usage_exit_t k_exits[] = {{EXIT_DONE, "ended by a signal"},
+                                       {EXIT_BAD_USAGE, "wrong use"},
+                                       {EXIT_BAD_CONFIG, "passwords or pages cannot be read, or an address needs a password"},
+                                       {EXIT_UNAVAILABLE, "it cannot listen there"},
+                                       {0}};
+
+const usage_t heave_panel_usage = {
+    .program = "heave-panel",
+    .manual_section = "8",
+    .summary = "the machine in a browser: state, curves, and the buttons of an operator",
+    .forms = k_forms,
+    .options = k_options,
+    .notes = "What it can do, heavectl can do. heaved does not need it: it may die and come back at any time.",
+    .exits = k_exits,
+    .see_also = "heaved(8), heavectl(1); docs/panel.md",
+};
+
+static int complain(const char *what, const char *right)
+{
+    fprintf(stderr, "heave-panel: %s: %s; see --help\n", what, right);
+    return EXIT_BAD_USAGE;
+}
+
+static int take(panel_options_t *self, int option, const char *value)
+{
+    switch (option) {
+    case OPTION_HELP:
+        self->is_help = true;
+        return EXIT_DONE;
+    case OPTION_VERSION:
+        self->is_version = true;
+        return EXIT_DONE;
+    case OPTION_LISTEN:
+        self->listen = value;
+        return strrchr(value, ':') != NULL ? EXIT_DONE : complain("--listen", "written as 127.0.0.1:9801");
+    case OPTION_PLATFORM:
+        if (self->platforms == OPTIONS_LIST_MAX || strchr(value, '=') == NULL) {
+            return complain("--platform", "written as NAME=SOCKET, at most 16");
+        }
+        self->platform[self->platforms++] = value;
+        return EXIT_DONE;
+    case OPTION_HOST:
+        if (self->hosts == OPTIONS_LIST_MAX) {
+            return complain("--allow-host", "at most 16");
+        }
+        self->host[self->hosts++] = value;
+        return EXIT_DONE;
+    case OPTION_STATE:
+        self->state = value;
+        return EXIT_DONE;
+    case OPTION_WWW:
+        self->www = value;
+        return EXIT_DONE;
+    case OPTION_CERT:
+        self->certificate = value;
+        return EXIT_DONE;
+    case OPTION_KEY:
+        self->key = value;
+        return EXIT_DONE;
+    default:
+        return EXIT_BAD_USAGE;
+    }
+}
+
+int panel_options_read(panel_options_t *self, int argc, char **argv)
+{
+    struct option options[USAGE_OPTIONS_MAX + 1];
+    int option = 0;
+    int code = EXIT_DONE;
+    *self = (panel_options_t){.listen = "127.0.0.1:9801"};
+    usage_options(&heave_panel_usage, options);
+    while (code == EXIT_DONE && (option = getopt_long(argc, argv, "hV", options, NULL)) != -1) {
+        code = take(self, option, optarg);
+    }
+    if (code != EXIT_DONE) {
+        return code;
+    }
+    if (optind + 2 == argc && strcmp(argv[optind], "passwd") == 0) {
+        self->password_of = argv[optind + 1];
+    } else if (optind != argc) {
+        return complain(argv[optind], "only `passwd ROLE` is known");
+    }
+    return (self->certificate == NULL) == (self->key == NULL) ? EXIT_DONE : complain("--tls-cert and --tls-key", "only together");
+}
