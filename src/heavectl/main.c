@@ -370,9 +370,12 @@ static int follow(ctl_t *self, bool is_terminal)
         if (!show_update(self, line, is_terminal)) {
             return EXIT_REFUSED;
         }
-        if (fflush(stdout) != 0) {
+        if (fflush(stdout) != 0 && is_interrupted == 0) {
             return complain(EXIT_IO, "standard output: %s", strerror(errno));
         }
+    }
+    if (is_interrupted != 0) { /* Ctrl-C in the middle of a write is no fault of the terminal */
+        clearerr(stdout);
     }
     return is_interrupted != 0 || now_ms() >= until_ms ? EXIT_DONE : EXIT_UNAVAILABLE;
 }

@@ -193,7 +193,7 @@ def hostile_clients_stop_nothing(bench):
     bus = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     bus.connect(f"\0heave-can-{bench.interface}")
     for _ in range(50):
-        bus.send(struct.pack("=IB3x8sI", ERROR_FRAME | 0x80, 8, bytes(8), 0))
+        bus.send(struct.pack("=IB3x8sI4x", ERROR_FRAME | 0x80, 8, bytes(8), 0))
     bus.send(b"short")
     time.sleep(1)
     for link in links:
