@@ -67,6 +67,14 @@ static void on_signal(int signal_number)
     is_interrupted = 1;
 }
 
+static void catch_signals(void)
+{
+    const struct sigaction action = {.sa_handler = on_signal};
+    (void)sigaction(SIGINT, &action, NULL);
+    (void)sigaction(SIGTERM, &action, NULL);
+    (void)sigaction(SIGHUP, &action, NULL);
+}
+
 static __attribute__((format(printf, 2, 3))) int complain(int code, const char *format, ...)
 {
     va_list arguments;
@@ -384,10 +392,8 @@ static int watch(ctl_t *self)
 {
     const bool is_terminal = !self->is_json && isatty(STDOUT_FILENO) != 0;
     const unsigned hz = self->hz != 0 ? self->hz : is_terminal || self->is_json ? TERMINAL_HZ : PLAIN_HZ;
-    const struct sigaction action = {.sa_handler = on_signal};
     char request[24];
-    (void)sigaction(SIGINT, &action, NULL);
-    (void)sigaction(SIGTERM, &action, NULL);
+    catch_signals();
     (void)snprintf(request, sizeof request, "watch %u", hz);
     int code = send_line(self, request);
     if (code != EXIT_DONE) {
@@ -493,10 +499,8 @@ static int scope(ctl_t *self)
                            .hz = self->hz != 0 ? self->hz : TERMINAL_HZ,
                            .is_terminal = isatty(STDOUT_FILENO) != 0,
                            .is_interrupted = &is_interrupted};
-    const struct sigaction action = {.sa_handler = on_signal};
     char error[256] = "";
-    (void)sigaction(SIGINT, &action, NULL);
-    (void)sigaction(SIGTERM, &action, NULL);
+    catch_signals();
     int code = send_line(self, "samples");
     if (code != EXIT_DONE) {
         return code;
@@ -515,13 +519,11 @@ static int scope(ctl_t *self)
 /* Once where the output is no terminal, else until Ctrl-C: somebody turns a spindle and looks at the number. */
 static int watch_counts(ctl_t *self)
 {
-    const struct sigaction action = {.sa_handler = on_signal};
     const struct timespec pause = {.tv_nsec = 100000000};
     if (self->is_json || isatty(STDOUT_FILENO) == 0) {
         return ask(self);
     }
-    (void)sigaction(SIGINT, &action, NULL);
-    (void)sigaction(SIGTERM, &action, NULL);
+    catch_signals();
     const int64_t until_ms = self->for_s > 0.0 ? now_ms() + (int64_t)(self->for_s * 1000.0) : INT64_MAX;
     printf("\x1b[2J");
     while (is_interrupted == 0 && now_ms() < until_ms) {
@@ -546,20 +548,14 @@ static bool is_held(const ctl_t *self)
 static int hold(ctl_t *self)
 {
     char request[80];
-    const struct sigaction action = {.sa_handler = on_signal};
-    (void)sigaction(SIGINT, &action, NULL);
-    (void)sigaction(SIGTERM, &action, NULL);
-    (void)sigaction(SIGHUP, &action, NULL);
+    catch_signals();
     (void)snprintf(request, sizeof request, "%s %s", self->command, self->argument);
     return hold_run(self->fd, request, NULL, &is_interrupted);
 }
 
 static int selftest(const ctl_t *self)
 {
-    const struct sigaction action = {.sa_handler = on_signal};
-    (void)sigaction(SIGINT, &action, NULL);
-    (void)sigaction(SIGTERM, &action, NULL);
-    (void)sigaction(SIGHUP, &action, NULL);
+    catch_signals();
     return selftest_run(self->socket, self->argument, &is_interrupted);
 }
 

@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "panel/outbox.h"
+
 #define ROWS_MAX    512u /* of a block */
 #define BLOCKS_MAX  8u   /* at once: what was before a page came fills its curves quickly */
 #define HEAD_BYTES  24u

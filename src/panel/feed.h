@@ -7,7 +7,7 @@
 
 #include <cjson/cJSON.h>
 
-#include "panel/viewer.h"
+#include "panel/viewer_state.h"
 
 /** Begins one, as a message asks for it. @return NULL, and why */
 feed_t *feed_begin(viewer_t *viewer, upstream_t *upstream, const cJSON *json, char *error, size_t size);
@@ -19,8 +19,5 @@ void feed_end(viewer_t *viewer, uint32_t number);
 
 /** Sends what is new. @return true: something waits to be sent */
 bool feed_pump(viewer_t *viewer);
-
-/** Queues a message. @return false: the queue is full */
-bool viewer_put(viewer_t *viewer, const void *data, size_t length, bool is_binary);
 
 #endif

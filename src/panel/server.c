@@ -13,6 +13,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "panel/outbox.h"
+
 #define PROTOCOL    "heave-panel.1"
 #define HEAD_BYTES  2048u
 #define BODY_MAX    512u
@@ -20,7 +22,6 @@
 #define PUMP_US     (33 * LWS_US_PER_MS)
 #define CONNECT_US  (1 * LWS_US_PER_SEC)
 #define VIEWERS_MAX 64u
-#define ANSWER_HEAD 32u /* before a message, as viewer.c leaves room */
 
 /* Nothing but our own files and this origin's WebSocket; nobody may put the page into a frame. */
 #define POLICY                                                                                                                   \
@@ -329,7 +330,7 @@ static int talk(struct lws *wsi, viewer_t *viewer)
         return 0;
     }
     const int sent =
-        lws_write(wsi, message.data + ANSWER_HEAD, message.length, message.is_binary ? LWS_WRITE_BINARY : LWS_WRITE_TEXT);
+        lws_write(wsi, message.data + OUTBOX_HEAD, message.length, message.is_binary ? LWS_WRITE_BINARY : LWS_WRITE_TEXT);
     free(message.data);
     if (viewer->count > 0) {
         (void)lws_callback_on_writable(wsi);

@@ -9,45 +9,19 @@
 #include <string.h>
 
 #include "panel/feed.h"
+#include "panel/outbox.h"
 
-#define HEAD          32u /* room for the library, before a message */
 #define STATUS_HZ_MAX 10.0
 #define NO_PLATFORM   "there is no such platform here"
 #define TICK_ID       (-1) /* of the panel's own questions */
 
 /* --- Out --- */
 
-bool viewer_put(viewer_t *viewer, const void *data, size_t length, bool is_binary)
-{
-    if (viewer->count == VIEWER_QUEUE) {
-        return false;
-    }
-    unsigned char *const copy = malloc(HEAD + length);
-    if (copy == NULL) {
-        return false;
-    }
-    memcpy(copy + HEAD, data, length);
-    viewer->queue[(viewer->first + viewer->count) % VIEWER_QUEUE] = (message_t){is_binary, length, copy};
-    viewer->count++;
-    return true;
-}
-
 /* What may not be lost: a page that does not take it is closed, and comes again. */
 static void tell(hall_t *hall, viewer_t *viewer, const char *text, size_t length)
 {
     viewer->is_over = viewer->is_over || !viewer_put(viewer, text, length, false);
     hall->wake(viewer);
-}
-
-bool viewer_take(viewer_t *viewer, message_t *out)
-{
-    if (viewer->count == 0) {
-        return false;
-    }
-    *out = viewer->queue[viewer->first];
-    viewer->first = (viewer->first + 1) % VIEWER_QUEUE;
-    viewer->count--;
-    return true;
 }
 
 static void tell_json(hall_t *hall, viewer_t *viewer, cJSON *json)

@@ -176,8 +176,9 @@ class Page:
     def wait(self, script, what, timeout=WAIT_S):
         end = time.monotonic() + timeout
         while time.monotonic() < end:
-            if self.run(script):
-                return
+            with contextlib.suppress(AssertionError):  # the page is not there yet
+                if self.run(script):
+                    return
             time.sleep(0.1)
         raise AssertionError(f"{what}: not within {timeout} s; the page says {self.run('document.body.innerText')[:600]!r}")
 
