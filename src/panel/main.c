@@ -77,10 +77,12 @@ static int set_password(const char *state, const char *word)
 
 /* --- Platforms --- */
 
+/* A name stands in messages as it is. */
 static bool add(hall_t *hall, const char *name, size_t length, const char *path)
 {
+    static const char k_letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
     char short_name[UPSTREAM_NAME_MAX];
-    if (hall->platforms == VIEWER_PLATFORMS || length == 0 || length >= sizeof short_name) {
+    if (hall->platforms == VIEWER_PLATFORMS || length == 0 || length >= sizeof short_name || strspn(name, k_letters) < length) {
         return false;
     }
     (void)snprintf(short_name, sizeof short_name, "%.*s", (int)length, name);
@@ -186,7 +188,7 @@ static int serve(const panel_options_t *options)
         }
     }
     if (!add_platforms(&hall, options)) {
-        return refuse(EXIT_BAD_USAGE, "--platform: NAME has 1 to 31 characters");
+        return refuse(EXIT_BAD_USAGE, "--platform: NAME has 1 to 31 letters, digits, - _ or .");
     }
     (void)sigaction(SIGINT, &action, NULL);
     (void)sigaction(SIGTERM, &action, NULL);

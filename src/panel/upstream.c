@@ -4,6 +4,7 @@
 #include "panel/upstream.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,6 +30,7 @@ bool upstream_init(upstream_t *self, const char *name, const char *path, const u
     return is_ready;
 }
 
+/* Never waits: a heaved that stands still has a full queue. */
 static int join(const char *path)
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
@@ -36,7 +38,7 @@ static int join(const char *path)
         return -1;
     }
     memcpy(address.sun_path, path, strlen(path) + 1);
-    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (fd >= 0 && connect(fd, (const struct sockaddr *)&address, sizeof address) != 0) {
         (void)close(fd);
         return -1;
@@ -124,6 +126,7 @@ static void open_samples(upstream_t *self)
     if (fd < 0) {
         return;
     }
+    (void)fcntl(fd, F_SETFL, 0); /* the one answer that is waited for, a little */
     (void)setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     const int memory = put(fd, "samples\n") ? receive_memory(fd) : -1;
     if (memory >= 0) {
@@ -156,7 +159,8 @@ const char *upstream_send(upstream_t *self, link_kind_t kind, const char *line, 
         return "too many requests wait for heaved: try again";
     }
     (void)snprintf(text, sizeof text, "%s%s%s%s\n", is_named ? "by " : "", is_named ? asker->by : "", is_named ? "\n" : "", line);
-    if (!put(link->fd, text)) {
+    if (!put(link->fd, text)) { /* half a request may have gone: that connection is over */
+        (void)shutdown(link->fd, SHUT_RDWR);
         return NO_CONNECTION;
     }
     if (is_named) {
@@ -167,9 +171,14 @@ const char *upstream_send(upstream_t *self, link_kind_t kind, const char *line, 
     return NULL;
 }
 
+static const char k_good[] = "{\"ok\":true";
+
 static void take_line(link_t *link, char *line)
 {
     upstream_t *const self = link->upstream;
+    if (link->kind == LINK_WATCH && strncmp(line, k_good, strlen(k_good)) != 0) {
+        return; /* that it gives way to another client */
+    }
     if (link->kind == LINK_WATCH) {
         (void)snprintf(self->status, UPSTREAM_LINE_MAX, "%s", line);
         const char *const percent = strstr(line, "\"now_percent\":");

@@ -203,6 +203,23 @@ def comes_back(bench):
         link.receive(lambda message: message.get("event") == "status")
 
 
+def gives_way_and_comes_back(bench):
+    """More clients than heaved takes: the panel's connections are among those that give way, and it makes them anew."""
+    bench.both()
+    with bench.link() as link, contextlib.ExitStack() as others:
+        link.send({"op": "status", "platform": "ride", "hz": 10, "id": 0})
+        link.receive(lambda message: message.get("event") == "status")
+        for _ in range(12):
+            one = others.enter_context(harness.Line(bench.socket))
+            one.link.sendall(b"watch 10\n")
+            time.sleep(0.1)
+        others.close()
+        for _ in range(5):
+            status = link.receive(lambda message: message.get("event") == "status", 30)["status"]
+            assert "cylinders" in status, status
+        harness.wait_for(lambda: "answer" in request(link, "hold"), "requests go through again")
+
+
 # --- Whom it lets in ---
 
 def strangers(bench):
@@ -283,6 +300,7 @@ def bad_use(bench):
     refused(78, "No such file", "--www", "/nonexistent")
     refused(64, "127.0.0.1:9801", "--listen", "here")
     refused(64, "NAME=SOCKET", "--platform", "ride")
+    refused(64, "letters", "--platform", 'a"b=/tmp/x', "--www", harness.TOP / "panel")
     refused(64, "only together", "--tls-cert", "x")
     refused(64, "look, operate and service", "passwd", "boss")
     refused(78, "at least 8", "passwd", "look", stdin="short\n")
@@ -492,6 +510,7 @@ def every_text_has_two_languages(bench):
 
 CASES = [("a request is answered as heaved answers it", answers_as_heaved_does, {}), ("geometry is that of the kinematics", geometry_is_that_of_the_kinematics, {}),
          ("samples are every cycle, or least and most of so many", samples_are_every_cycle, {}), ("heaved and panel come and go", comes_back, {}),
+         ("the panel gives way to other clients and comes back", gives_way_and_comes_back, {}),
          ("strangers, foreign pages and broken messages", strangers, {}), ("passwords, roles and sessions", passwords_and_roles, {"passwords": ("look", "operate", "service")}),
          ("wrong use is named", bad_use, {}), ("a hand that is gone moves nothing", a_hand_that_is_gone, {}), ("every text has two languages, and all of it is small", every_text_has_two_languages, {}),
          ("pages in a browser: three widths, two languages", pages_in_a_browser, {}), ("buttons in a browser", buttons_in_a_browser, {}), ("the spectrum finds a ripple; joints are where they are", ripple_is_found, {})]
