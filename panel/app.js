@@ -7,7 +7,7 @@ import { Picture } from "/picture.js";
 import { chinese, switchLanguage, t } from "/text.js";
 
 const at = (id) => document.getElementById(id);
-const shown = { me: null, platform: null, tab: "operate", status: null, isGone: false, holder: null, isMine: false, geometry: null };
+const shown = { me: null, platform: null, tab: "operate", status: null, isGone: false, holder: null, isMine: false, geometry: null, all: {} };
 const AXES = ["roll", "pitch", "yaw", "x", "y", "z"];
 const unitOf = (axis) => (["x", "y", "z"].includes(axis) ? "mm" : "deg");
 const GROUPS = {
@@ -80,7 +80,8 @@ function showFrame() {
   at("link").textContent = link?.isOpen ? t("connected") : t("lost");
   at("link").className = link?.isOpen ? "" : "lost";
   fill(at("platforms"), ...(shown.me?.platforms ?? []).map((name) => button(name, null, { "aria-pressed": String(name === shown.platform), "data-platform": name })));
-  fill(at("tabs"), ...["operate", "live", "service", "incidents"].map((name) => button(t(name), null,
+  const names = ["operate", "live", "service", "incidents", ...(shown.me?.platforms.length > 1 ? ["wall"] : [])];
+  fill(at("tabs"), ...names.map((name) => button(t(name), null,
     { role: "tab", "aria-selected": String(name === shown.tab), "data-tab": name })));
 }
 
@@ -277,6 +278,24 @@ async function buildIncidents() {
   show(await request("incidents"));
 }
 
+// --- The wall: every platform of the box ---
+
+function buildWall() {
+  page = {
+    cards: element("div", { class: "grid two" }),
+    update() {
+      fill(page.cards, ...shown.me.platforms.map((name) => {
+        const status = shown.all[name];
+        const state = status ? t(status.state) : t("gone");
+        const isBad = !status || ["FAULT", "ESTOP"].includes(status.state);
+        return element("section", { class: isBad ? "fault" : "" }, element("h2", {}, name), element("b", { class: isBad ? "bad" : status.state === "ENGAGED" ? "good" : "" }, state),
+          status ? element("p", {}, status.fault.code ? status.fault[chinese() ? "text_zh" : "text"] : `${t("sender")}: ${status.sender?.address ?? "–"}; ${t("intensity")} ${status.intensity.percent} %`) : null);
+      }));
+    },
+  };
+  at("page").replaceChildren(page.cards);
+}
+
 // --- All of it ---
 
 function build() {
@@ -284,21 +303,25 @@ function build() {
   for (const stream of [page.stream, page.raw]) if (stream) link.send({ op: "samples-end", platform: shown.platform, stream, id: 0 });
   page = {};
   showFrame();
-  if (!shown.status || shown.isGone) {
+  if (shown.tab !== "wall" && (!shown.status || shown.isGone)) {
     at("page").replaceChildren(element("p", {}, shown.isGone ? t("gone") : t("noWebSocket")));
     return;
   }
-  ({ operate: buildOperate, live: buildLive, service: buildService, incidents: buildIncidents })[shown.tab]();
+  ({ operate: buildOperate, live: buildLive, service: buildService, incidents: buildIncidents, wall: buildWall })[shown.tab]();
   page.update?.(shown.status);
 }
 
 async function choose(name) {
   Object.assign(shown, { platform: name, status: null, isGone: false, geometry: null, holder: null, isMine: false });
-  link.send({ op: "status", platform: name, hz: 10, id: 0 });
+  for (const one of shown.me.platforms) link.send({ op: "status", platform: one, hz: one === name ? 10 : 1, id: 0 });
   build();
 }
 
 async function onEvent(event) {
+  if (event.event === "status" || event.event === "gone") {
+    shown.all[event.platform] = event.status ?? null;
+    if (shown.tab === "wall") page.update?.();
+  }
   if (event.platform !== shown.platform) return;
   if (event.event === "status") {
     const isFirst = shown.status === null || shown.isGone;

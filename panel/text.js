@@ -4,7 +4,7 @@ export const TEXT = {
   hold: ["HOLD", "停住"], holdHelp: ["Hold: stops where it is. Key: Escape", "停住：平台在原地停下。按键：Escape"],
   connected: ["connected", "已连接"], lost: ["CONNECTION LOST - buttons do nothing", "连接已断开，按钮无效"], gone: ["heaved is not running", "heaved 未运行"],
   language: ["中文", "English"], logout: ["Log out", "退出登录"],
-  operate: ["Operate", "操作"], live: ["Live", "实时"], service: ["Service", "维护"], incidents: ["Incidents", "事故记录"],
+  operate: ["Operate", "操作"], live: ["Live", "实时"], service: ["Service", "维护"], incidents: ["Incidents", "事故记录"], wall: ["All platforms", "全部平台"],
   login: ["Log in", "登录"], role: ["Role", "角色"], password: ["Password", "密码"], look: ["look", "查看"], operateRole: ["operate", "操作"], serviceRole: ["service", "维护"],
   engage: ["Start", "启动"], resume: ["Resume", "继续"], park: ["Board (park)", "上下客（停放）"], reset: ["Reset", "复位"], take: ["Take the controls", "取得控制权"], drop: ["Give the controls back", "交还控制权"],
   yours: ["You have the controls", "您拥有控制权"], nobody: ["Nobody has the controls", "无人控制"], others: ["has the controls", "拥有控制权"],

@@ -476,6 +476,25 @@ def buttons_in_a_browser(bench):
         assert moved(bench, 0.4) < 1e-6, "the browser died in the middle of a jog"
 
 
+def several_platforms(bench):
+    """One heaved is there, the other is not: both are on the wall, and one is chosen after the other."""
+    if web_socket.browser() is None:
+        raise tap.Skip("no Chromium here")
+    bench.both()
+    with Page(f"http://127.0.0.1:{bench.web}/", 1920, 1080) as page:
+        page.wait("document.getElementById('state').textContent.startsWith('OFF')", "the first is shown")
+        page.run("document.querySelector('[data-tab=wall]').click()")
+        page.wait("document.getElementById('page').innerText.includes('ride') && document.getElementById('page').innerText.includes('heaved is not running')", "both are on the wall")
+        PICTURES.mkdir(parents=True, exist_ok=True)
+        page.picture(PICTURES / "wall-1920-en.png")
+        page.run("document.querySelector('[data-tab=operate]').click()")
+        page.run("document.querySelector('[data-platform=other]').click()")
+        page.wait("document.getElementById('state').textContent === 'heaved is not running'", "the other is shown")
+        page.run("document.querySelector('[data-platform=ride]').click()")
+        page.wait("document.getElementById('state').textContent.startsWith('OFF')", "the first is shown again")
+        assert page.problems == [], page.problems
+
+
 def ripple_is_found(bench):
     """A ripple of 37 Hz in samples, by the spectrum that the page shows."""
     if web_socket.browser() is None:
@@ -513,7 +532,8 @@ CASES = [("a request is answered as heaved answers it", answers_as_heaved_does, 
          ("the panel gives way to other clients and comes back", gives_way_and_comes_back, {}),
          ("strangers, foreign pages and broken messages", strangers, {}), ("passwords, roles and sessions", passwords_and_roles, {"passwords": ("look", "operate", "service")}),
          ("wrong use is named", bad_use, {}), ("a hand that is gone moves nothing", a_hand_that_is_gone, {}), ("every text has two languages, and all of it is small", every_text_has_two_languages, {}),
-         ("pages in a browser: three widths, two languages", pages_in_a_browser, {}), ("buttons in a browser", buttons_in_a_browser, {}), ("the spectrum finds a ripple; joints are where they are", ripple_is_found, {})]
+         ("pages in a browser: three widths, two languages", pages_in_a_browser, {}), ("buttons in a browser", buttons_in_a_browser, {}),
+         ("several platforms on a wall", several_platforms, {"more": ("--platform", "other=/nonexistent/heaved.sock")}), ("the spectrum finds a ripple; joints are where they are", ripple_is_found, {})]
 
 
 def main():
