@@ -70,7 +70,7 @@ function table(head, rows) {
 function showFrame() {
   const status = shown.status;
   document.documentElement.lang = chinese() ? "zh-CN" : "en";
-  at("hold").textContent = t("hold");
+  at("hold").textContent = shown.me?.platforms.length > 1 && shown.platform ? `${t("hold")}: ${shown.platform}` : t("hold");
   at("hold").title = t("holdHelp");
   at("language").textContent = t("language");
   at("logout").textContent = t("logout");
