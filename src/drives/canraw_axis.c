@@ -32,7 +32,7 @@ static void tell_stop(canraw_axis_t *self, const canraw_map_t *map)
 void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map)
 {
     const canraw_axis_t was = *self;
-    memset(self, 0, sizeof *self); /* what lies between the members, too: states are compared byte by byte */
+    (void)memset(self, 0, sizeof *self); /* what lies between the members, too: states are compared byte by byte */
     self->state = DRIVE_DISABLED;
     self->pending = CANRAW_NOTHING;
     self->is_begun = true;

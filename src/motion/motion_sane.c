@@ -12,7 +12,6 @@
 
 #define CYCLES_MAX ((int64_t)1 << 40)
 #define SLOT_Q32   ((q32_t)1 << 48) /* from end to end of what a slot may be asked for, see axis_targets.c */
-#define SHARES     (sizeof((intensity_t *)0)->share_q46 / sizeof((intensity_t *)0)->share_q46[0])
 
 static bool is_same_q32(const q32_t *a, const q32_t *b, unsigned count)
 {
@@ -51,15 +50,16 @@ static bool is_intensity_sane(const intensity_t *saved, const intensity_t *prepa
 {
     const ramp_limits_t *limits = &prepared->ramp.limits;
     const int64_t *share_q46 = saved->share_q46;
+    const unsigned shares = sizeof saved->share_q46 / sizeof saved->share_q46[0];
     bool is_sane = saved->max_percent == prepared->max_percent && saved->percent <= saved->max_percent &&
                    is_ramp_sane(&saved->ramp, &prepared->ramp) && share_q46[0] == saved->ramp.state.pos_q32;
-    for (unsigned i = 0; i < SHARES; i++) {
+    for (unsigned i = 0; i < shares; i++) {
         is_sane = is_sane && share_q46[i] >= 0 && share_q46[i] <= INTENSITY_FULL;
     }
-    for (unsigned i = 0; is_sane && i + 1 < SHARES; i++) {
+    for (unsigned i = 0; is_sane && i + 1 < shares; i++) {
         is_sane = fx_abs(share_q46[i] - share_q46[i + 1]) <= limits->vel_per_cycle_q32 + 1;
     }
-    for (unsigned i = 0; is_sane && i + 2 < SHARES; i++) {
+    for (unsigned i = 0; is_sane && i + 2 < shares; i++) {
         is_sane = fx_abs(share_q46[i] - 2 * share_q46[i + 1] + share_q46[i + 2]) <= limits->acc_per_cycle2_q32 + 1;
     }
     return is_sane;
