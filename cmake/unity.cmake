@@ -29,7 +29,8 @@ set(HEAVE_WAITS 1)
 set(HEAVE_SECONDS
   system.rt 1000 # the processors are its own: before all others
   system.live 900 system.syscalls 800 system.coils 700 system.metrics 600 system.senders 500 system.flood 400
-  system.selftest 380 system.panel 370 system.service_mode 200 system.twin_modbus.tcp 195 system.twin_modbus.rtu 190 system.twin 130
+  system.selftest 380 system.panel 370 system.service_mode 200 system.twin_modbus.tcp 195 system.twin_modbus.rtu 190 system.twin.frames 250
+  system.twin.frames_that_fail 260 system.twin.alone 270 system.panel_hands 240
   system.can.failures.latched 90 system.can.failures.together 66 property.senders 80
   python.recipes 100 python.lab 30 python.plugin 20 python.package 18
   system.canraw 60 check.package 70 system.can.CSP 52 system.can.Mbit 45 system.can.PP 50

@@ -1,37 +1,22 @@
 // SPDX-License-Identifier: MIT
 // app.js - the pages: what is shown, and what buttons ask for. All that is known comes from heaved's status; nothing is guessed.
-import { Curves, spectrum, strongest } from "/curves.js";
 import { Hand } from "/hand.js";
+import { atLimits, extensionOf, nearness } from "/limits.js";
 import { Link } from "/link.js";
-import { Picture } from "/picture.js";
-import { chinese, switchLanguage, t } from "/text.js";
+import { Motion } from "/motion.js";
+import { Recorder } from "/recorder.js";
+import { chinese, putBackOf, refusalOf, switchLanguage, t } from "/text.js";
+import { button, element, fill, number, rowsOf, table } from "/ui.js";
+import { View } from "/view.js";
 
 const at = (id) => document.getElementById(id);
 const shown = { me: null, platform: null, tab: "operate", status: null, isGone: false, holder: null, isMine: false, geometry: null, all: {} };
 const AXES = ["roll", "pitch", "yaw", "x", "y", "z"];
 const unitOf = (axis) => (["x", "y", "z"].includes(axis) ? "mm" : "deg");
-const GROUPS = {
-  translations: ["x", "y", "z"].flatMap((axis) => [`sent_${axis}_mm`, `actual_${axis}_mm`]),
-  rotations: ["roll", "pitch", "yaw"].flatMap((axis) => [`sent_${axis}_deg`, `actual_${axis}_deg`]),
-  cylinders: null, errors: null,
-};
-let link, page = {}, picture, hand;
+let link, page = {}, hand, recorder;
+const takers = {}; // of blocks, by stream
 
 // --- Small things ---
-
-function element(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
-    else if (value === true) made.setAttribute(name, "");
-    else if (value !== false && value !== null && value !== undefined) made.setAttribute(name, value);
-  }
-  made.append(...children.filter((child) => child !== null && child !== undefined));
-  return made;
-}
-
-const button = (text, onclick, attributes = {}) => element("button", { type: "button", onclick, ...attributes }, text);
-const number = (value, digits = 2) => (value === null || value === undefined ? "–" : value.toFixed(digits));
 
 let sayTimer;
 function say(text) {
@@ -42,27 +27,10 @@ function say(text) {
 }
 
 async function request(line) {
-  const got = await link.ask({ op: "request", platform: shown.platform, line });
-  if (got.error || got.answer?.ok === false) say(got.error ?? got.answer.error);
+  const got = await link.ask({ op: "request", platform: shown.platform, line, seen: shown.status?.time_unix_ms ?? 0 }); // what comes late is not done
+  const why = refusalOf(got);
+  if (why) say(why);
   return got.answer;
-}
-
-// Rebuilds a part of the page only where it says something else: focus and a finger stay where they are.
-function fill(part, ...children) {
-  if (!part) return;
-  const fresh = element("div", {}, ...children);
-  if (part.dataset.shown !== fresh.innerHTML) {
-    part.dataset.shown = fresh.innerHTML;
-    part.replaceChildren(...fresh.childNodes);
-  }
-}
-
-const rowsOf = (pairs) => element("dl", {}, ...pairs.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
-
-function table(head, rows) {
-  const cell = (tag) => (value, i) => element(tag, { class: i ? "number" : "" }, value);
-  return element("div", { class: "scroll", tabindex: "0" }, element("table", {}, element("thead", {}, element("tr", {}, ...head.map(cell("th")))),
-    element("tbody", {}, ...rows.map((row) => element("tr", {}, ...row.map(cell("td")))))));
 }
 
 // --- The frame of every page ---
@@ -80,14 +48,17 @@ function showFrame() {
   at("link").textContent = link?.isOpen ? t("connected") : t("lost");
   at("link").className = link?.isOpen ? "" : "lost";
   fill(at("platforms"), ...(shown.me?.platforms ?? []).map((name) => button(name, null, { "aria-pressed": String(name === shown.platform), "data-platform": name })));
-  const names = ["operate", "live", "service", "incidents", ...(shown.me?.platforms.length > 1 ? ["wall"] : [])];
+  const names = ["operate", "live", "service", "incidents", ...(shown.me?.role === "look" ? [] : ["log"]), ...(shown.me?.role === "service" ? ["configuration", "commission"] : []), ...(shown.me?.platforms.length > 1 ? ["wall"] : [])];
   fill(at("tabs"), ...names.map((name) => button(t(name), null,
     { role: "tab", "aria-selected": String(name === shown.tab), "data-tab": name })));
 }
 
 at("platforms").addEventListener("click", (event) => event.target.dataset.platform && choose(event.target.dataset.platform));
 at("tabs").addEventListener("click", (event) => { if (event.target.dataset.tab) { shown.tab = event.target.dataset.tab; build(); } });
-at("hold").addEventListener("click", () => request("hold"));
+let isHoldPressed = false; // by a pointer: its click, if one comes, is that same press
+at("hold").addEventListener("pointerdown", () => { isHoldPressed = true; request("hold"); }); // when it is touched: a long press, or a finger that slips, makes no click
+at("hold").addEventListener("click", (event) => { if (event.detail === 0 || !isHoldPressed) request("hold"); isHoldPressed = false; }); // by keyboard or screen reader
+at("hold").addEventListener("contextmenu", (event) => event.preventDefault());
 at("language").addEventListener("click", () => { switchLanguage(); build(); });
 at("logout").addEventListener("click", async () => { await fetch("/api/logout", { method: "POST", headers: { "Content-Type": "application/json" }, body: "{}" }); location.reload(); });
 document.addEventListener("keydown", (event) => { if (event.key === "Escape") { event.preventDefault(); request("hold"); } });
@@ -106,7 +77,8 @@ function faultOf(status) {
 
 function noticesOf(status) {
   const rows = [[status.estop_active, "estop"], [status.power_failing, "power"], [status.selftest.due, "due"], [status.configuration.barred, "barred"]];
-  return rows.filter(([is]) => is).map(([, name]) => element("p", { class: "notice bad" }, t(name)));
+  const putBack = putBackOf(status);
+  return [...rows.filter(([is]) => is).map(([, name]) => t(name)), ...(putBack ? [`${t("putBack")} ${putBack}`] : [])].map((text) => element("p", { class: "notice bad" }, text));
 }
 
 function senderOf(status) {
@@ -115,6 +87,24 @@ function senderOf(status) {
   return rowsOf([[t("sender"), status.sender.address], [t("period"), `${number(stream.period_ms)} ms ${stream.sender ? `(${t(stream.sender)})` : ""}`],
     [t("jitter"), `${number(stream.jitter_ms)} ms`], [t("delay"), `${number(stream.delay_ms, 1)} ms`], [t("losses"), `${stream.lost_permille} ‰`],
     [t("age"), `${number(stream.last_frame_age_ms, 0)} ms`]]);
+}
+
+// What the colours of the picture mean; they differ in lightness too, and a sign stands beside them. Words have the colour of text: those of lines are too light to be read in sunlight.
+function legend() {
+  const word = (name, text) => { const sign = element("i", { "aria-hidden": "true" }); sign.style.background = `var(--${name})`; return element("span", {}, sign, text); };
+  return element("p", { class: "legend" }, t("legend"), element("br"), word("soft", t("ghost")), word("close", `${t("closeToEnd")} ▲▼`), word("end", `${t("atEnd")} ▲▼`));
+}
+
+// The picture in words.
+function toldOf(status) {
+  const pose = status.pose_actual ?? status.pose_sent;
+  return [t("picture"), AXES.map((axis) => `${axis} ${number(pose[`${axis}_${unitOf(axis)}`], 1)} ${unitOf(axis)}`).join(", "), limitsOf(status)].join("; ");
+}
+
+function limitsOf(status) {
+  const near = status.cylinders.filter((one) => nearness(extensionOf(one), one.stroke_mm) !== "free").map((one) => one.number);
+  const axes = atLimits(shown.geometry?.limits, status.pose_sent).map((axis) => axis.split("_")[0]);
+  return [near.length ? `${t("nearEnd")}: ${near.join(", ")}` : "", axes.length ? `${t("limitOf")}: ${axes.join(", ")}` : ""].filter(Boolean).join("; ") || t("farFromLimits");
 }
 
 const controlsText = () => (shown.isMine ? t("yours") : shown.holder ? `${shown.holder} ${t("others")}` : t("nobody"));
@@ -127,7 +117,7 @@ function buildOperate() {
   const main = at("page");
   const intensity = element("input", { type: "number", min: 0, max: 100, step: 1, "aria-label": t("intensity"), id: "intensity" });
   page = {
-    problems: element("div", {}), controls: element("div", {}), sender: element("div", {}), relays: element("div", {}), pose: element("div", {}), drives: element("div", {}),
+    problems: element("div", {}), controls: element("div", {}), sender: element("div", {}), relays: element("div", {}), pose: element("div", {}), limits: element("div", {}),
     update(status) {
       fill(page.problems, faultOf(status), ...noticesOf(status));
       fill(page.controls, element("p", {}, controlsText()), element("div", { class: "buttons" }, takeButton()));
@@ -137,106 +127,29 @@ function buildOperate() {
         const name = `${axis}_${unitOf(axis)}`;
         return [`${axis} (${unitOf(axis)})`, number(status.pose_asked?.[name]), number(status.pose_sent?.[name]), number(status.pose_actual?.[name])];
       })));
-      picture.draw(shown.geometry, status);
+      page.motion.heard(status);
+      page.view.tell(toldOf(status));
+      fill(page.limits, element("p", {}, limitsOf(status)));
       if (document.activeElement !== intensity) intensity.value = status.intensity.percent;
     },
   };
-  const canvas = element("canvas", { tabindex: "0", role: "img" });
-  main.replaceChildren(page.problems, element("div", { class: "grid wide" },
-    element("section", {}, element("h2", {}, t("operate")), element("div", { class: "buttons" }, ...["engage", "resume", "park", "reset"].map((name) =>
+  const view = element("div", { class: "view" });
+  main.replaceChildren(page.problems, element("div", { class: "grid wide" }, element("div", { class: "stack" },
+    element("section", {}, element("h2", {}, t("operate")), page.controls, element("div", { class: "buttons" }, ...["engage", "resume", "park", "reset"].map((name) =>
       button(t(name), () => request(name), { class: name === "engage" ? "main" : "", "data-request": name }))),
     element("h2", {}, t("intensity")), element("div", { class: "buttons" }, intensity, button(t("apply"), () => request(`intensity ${Math.round(Number(intensity.value))}`)))),
-    element("section", {}, element("h2", {}, t("controls")), page.controls, element("h2", {}, t("sender")), page.sender, element("h2", {}, t("relays")), page.relays),
-    element("section", {}, element("h2", {}, t("machine")), canvas, element("p", {}, `${t("ghost")}; ${t("atEnd")}`)),
-    element("section", {}, element("h2", {}, t("pose")), page.pose)));
-  picture = new Picture(canvas);
+    element("section", {}, element("h2", {}, t("machine")), view, page.limits, legend())),
+  element("div", { class: "stack" }, element("section", {}, element("h2", {}, t("sender")), page.sender, element("h2", {}, t("relays")), page.relays),
+    element("section", {}, element("h2", {}, t("pose")), page.pose))));
+  const mine = new View(view), motion = new Motion({ link, takers, platform: shown.platform, view: mine });
+  Object.assign(page, { view: mine, motion, end() { motion.end(); mine.end(); } });
+  motion.begin(shown.geometry, shown.status);
   page.controls.addEventListener("click", (event) => { if (event.target.dataset.op) take(event.target.dataset.op); });
 }
 
 async function take(op) {
   const got = await Promise.race([link.ask({ op, platform: shown.platform }), new Promise((resolve) => setTimeout(() => resolve({}), 300))]);
-  if (got.error) say(got.error);
-}
-
-// --- Live ---
-
-const SPECTRUM_S = 4.1;
-const FLOOR = 0.0005; // what is less is rounding
-const curvesOf = {};
-
-async function subscribe() {
-  const curves = page.curves;
-  if (!curves || !shown.status) return;
-  const cylinders = shown.status.cylinders.length;
-  const names = GROUPS[page.group] ?? Array.from({ length: cylinders }, (_, i) => `${page.group === "cylinders" ? "actual" : "sent"}_c${i + 1}_mm`);
-  if (page.stream) link.send({ op: "samples-end", platform: shown.platform, stream: page.stream, id: 0 });
-  const width = at("page").clientWidth || 800;
-  const every = Math.max(1, Math.floor(curves.spanS * 1e6 / shown.status.cycle_us / width));
-  const mine = page;
-  const got = await link.ask({ op: "samples", platform: shown.platform, columns: ["t_ms", ...names], every, history_s: curves.spanS });
-  if (got.error) return say(got.error);
-  if (mine !== page) return link.send({ op: "samples-end", platform: shown.platform, stream: got.stream, id: 0 });
-  page.stream = got.stream;
-  curvesOf[got.stream] = curves;
-  curves.begin(got.columns, got.cycle_us, got.every);
-  return listen(mine, names[0]);
-}
-
-// The first curve once more, every cycle of it: the least and the most of some cycles have no spectrum.
-async function listen(mine, name) {
-  if (mine.raw) link.send({ op: "samples-end", platform: shown.platform, stream: mine.raw, id: 0 });
-  const got = await link.ask({ op: "samples", platform: shown.platform, columns: [name], every: 1, history_s: SPECTRUM_S });
-  if (got.error) return;
-  Object.assign(mine, { raw: got.stream, values: [], unit: got.columns[0].unit, rate: 1e6 / got.cycle_us });
-  curvesOf[got.stream] = { take(block) {
-    if (!mine.curves.isPaused) mine.values.push(...block.columns[0]);
-    mine.values.splice(0, Math.max(0, mine.values.length - SPECTRUM_S * mine.rate));
-  } };
-}
-
-function buildLive() {
-  const canvas = element("canvas", { role: "img", "aria-label": t("curves") });
-  const curves = new Curves(canvas);
-  const lines = element("canvas", { role: "img", "aria-label": t("spectrum") });
-  const choice = (label, values, chosen, onchange, name = (value) => value) => element("label", {}, `${label} `, element("select", { onchange: (event) => onchange(event.target.value) },
-    ...values.map((value) => element("option", { value, selected: value === chosen }, name(value)))));
-  const pause = button(t("pause"), () => { curves.isPaused = !curves.isPaused; pause.textContent = t(curves.isPaused ? "go" : "pause"); pause.setAttribute("aria-pressed", String(curves.isPaused)); });
-  page = {
-    curves, group: "translations", readings: element("div", {}), drives: element("div", {}), bus: element("div", {}), peak: element("p", { id: "peak" }),
-    update(status) {
-      fill(page.drives, table([t("drive"), t("state"), t("homed"), t("sent"), t("actual")], status.cylinders.map((one) => [String(one.number), t(one.drive === "fault" ? "faulted" : one.drive),
-        t(one.homed ? "yes" : "no"), number(one.sent_mm), number(one.actual_mm)])), ...status.cylinders.filter((one) => one.report?.trouble).map((one) => element("p", { class: "warn" }, `${one.number}: ${one.report.trouble}`)));
-      fill(page.bus, rowsOf([[t("bus"), status.bus ? status.bus.trouble || status.bus.last_trouble || t("none") : t("none")], [t("late"), String(status.late_cycles)]]));
-    },
-    frame() {
-      curves.draw();
-      fill(page.readings, ...curves.readings().map((one) => { const row = element("span", {}, `■ ${one.name} ${number(one.value, 3)} ${one.unit}   `); row.style.color = one.colour; return row; }),
-        element("span", { class: curves.lost ? "warn" : "" }, `${t("rows")}: ${curves.lost}`));
-      page.count = (page.count ?? 0) + 1;
-      if (page.count % 10 === 0) showSpectrum(lines);
-    },
-  };
-  at("page").replaceChildren(element("section", {}, element("h2", {}, t("curves")), element("div", { class: "buttons" },
-    choice(t("group"), Object.keys(GROUPS), page.group, (value) => { page.group = value; subscribe(); }, t),
-    choice(t("span"), ["2", "10", "20"], "10", (value) => { curves.spanS = Number(value); subscribe(); }, (value) => `${value} s`), pause), canvas, page.readings,
-  element("h2", {}, t("spectrum")), lines, page.peak), element("div", { class: "grid two" }, element("section", {}, element("h2", {}, t("drives")), page.drives),
-    element("section", {}, element("h2", {}, t("latency")), page.bus)));
-  subscribe();
-}
-
-function showSpectrum(canvas) {
-  const found = spectrum(page.values ?? [], page.rate);
-  const [hz, amplitude] = strongest(found);
-  page.peak.textContent = amplitude > FLOOR ? `${t("strongest")}: ${hz.toFixed(2)} Hz, ${amplitude.toFixed(4)} ${page.unit}` : "";
-  const width = canvas.clientWidth, tall = 120, pen = canvas.getContext("2d");
-  canvas.style.height = `${tall}px`;
-  canvas.width = width;
-  canvas.height = tall;
-  const most = Math.max(...found.map((line) => line[1]), FLOOR);
-  pen.strokeStyle = getComputedStyle(document.body).getPropertyValue("--act");
-  pen.beginPath();
-  found.forEach(([f, a], i) => { const x = width * i / found.length, y = tall * (1 - a / most); if (i) pen.lineTo(x, y); else pen.moveTo(x, y); });
-  pen.stroke();
+  if (got.error) say(refusalOf(got));
 }
 
 // --- Service ---
@@ -266,16 +179,13 @@ function buildService() {
   page.controls.addEventListener("click", (event) => { if (event.target.dataset.op) take(event.target.dataset.op); });
 }
 
-// --- Incidents ---
+// --- Pages that are loaded when somebody looks at them ---
 
-async function buildIncidents() {
-  page = { update() {}, list: element("div", {}) };
+function buildLater(module) {
+  page = { update() {} };
   const mine = page;
-  const show = (answer) => mine === page && answer?.incidents && fill(page.list, answer.incidents.length
-    ? table([t("incidents"), ""], [...answer.incidents].reverse().map((one) => [one.name, `${one.dump ? t("asDump") : ""} ${one.seen ? "" : t("new")}`])) : element("p", {}, t("noIncidents")));
-  at("page").replaceChildren(element("section", {}, element("h2", {}, t("incidents")), element("p", {}, t("incidentHelp")),
-    element("div", { class: "buttons" }, button(t("seen"), async () => show(await request("seen"))), button(t("dump"), async () => { await request("dump"); show(await request("incidents")); })), page.list));
-  show(await request("incidents"));
+  at("page").replaceChildren(element("p", {}, t("loading")));
+  import(module).then((its) => mine === page && its.build({ page: mine, shown, request, say, place: at("page"), link, take, recorder, takers, senderOf, legend, toldOf }));
 }
 
 // --- The wall: every platform of the box ---
@@ -300,14 +210,14 @@ function buildWall() {
 
 function build() {
   page.end?.();
-  for (const stream of [page.stream, page.raw]) if (stream) link.send({ op: "samples-end", platform: shown.platform, stream, id: 0 });
+  for (const stream of [page.stream]) if (stream) link.send({ op: "samples-end", platform: shown.platform, stream, id: 0 });
   page = {};
   showFrame();
   if (shown.tab !== "wall" && (!shown.status || shown.isGone)) {
     at("page").replaceChildren(element("p", {}, shown.isGone ? t("gone") : t("noWebSocket")));
     return;
   }
-  ({ operate: buildOperate, live: buildLive, service: buildService, incidents: buildIncidents, wall: buildWall })[shown.tab]();
+  ({ operate: buildOperate, live: () => buildLater("/live.js"), service: buildService, incidents: () => buildLater("/incidents.js"), log: () => buildLater("/log.js"), configuration: () => buildLater("/configuration.js"), commission: () => buildLater("/commission.js"), wall: buildWall })[shown.tab]();
   page.update?.(shown.status);
 }
 
@@ -318,6 +228,7 @@ async function choose(name) {
 }
 
 async function onEvent(event) {
+  if (event.put_back_zh) event.status.configuration.put_back_zh = event.put_back_zh;
   if (event.event === "status" || event.event === "gone") {
     shown.all[event.platform] = event.status ?? null;
     if (shown.tab === "wall") page.update?.();
@@ -333,6 +244,7 @@ async function onEvent(event) {
     showFrame();
     page.update?.(shown.status);
   } else if (event.event === "gone") {
+    recorder.stop();
     Object.assign(shown, { isGone: true, status: null });
     build();
   } else if (event.event === "controls") {
@@ -340,6 +252,9 @@ async function onEvent(event) {
     if (shown.status) page.update?.(shown.status);
   } else if (event.event === "tick") {
     hand?.heard(event.tick);
+    page.heard?.(event.tick);
+  } else {
+    page.event?.(event);
   }
 }
 
@@ -359,9 +274,10 @@ async function start() {
   if (!shown.me.role) return showLogin();
   link = new Link({
     onEvent,
-    onBlock: (block) => curvesOf[block.stream]?.take(block),
-    onChange: (isOpen) => { hand?.letGo(); shown.isMine = false; if (isOpen) choose(shown.platform ?? shown.me.platforms[0]); else { shown.status = null; build(); } },
+    onBlock: (block) => takers[block.stream]?.take(block),
+    onChange: (isOpen) => { hand?.letGo(); recorder?.stop(); shown.isMine = false; if (isOpen) choose(shown.platform ?? shown.me.platforms[0]); else { shown.status = null; build(); } },
   });
+  recorder = new Recorder(link, takers);
   const animate = () => { page.frame?.(); requestAnimationFrame(animate); };
   animate();
   return undefined;

@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: MIT
 // hand.js - a button that moves the machine as long as it is held: a press, beats of 50 ms from the main thread with the newest tick that
 // this page has heard, a release. Whatever ends the hold (finger, window, tab, connection) ends the beats; heaved stops 250 ms later by itself.
+import { refusalOf } from "/text.js";
+
 const BEAT_MS = 50;
+let held = 0;
+
+// Whether a button that moves the machine is held, on any page of this tab: what can wait waits then.
+export const isHolding = () => held > 0;
 
 export class Hand {
   constructor(link, platform, say) {
@@ -28,10 +34,11 @@ export class Hand {
     if (this.isPressing || this.timer) return;
     this.isPressing = true;
     this.isWanted = true;
-    const got = await this.link.ask({ op: "press", platform: this.platform, line, tick: this.tick });
+    const message = typeof line === "string" ? { op: "press", line } : line; // what is more than a request of heaved has an operation of its own
+    const got = await this.link.ask({ ...message, platform: this.platform, tick: this.tick });
     this.isPressing = false;
     if (got.error || got.answer?.ok === false) {
-      this.say(got.error ?? got.answer.error);
+      this.say(refusalOf(got));
       this.isWanted = false;
       return;
     }
@@ -39,6 +46,7 @@ export class Hand {
     this.tick = got.answer.tick;
     this.counter = 0;
     if (!this.isWanted) return this.letGo();
+    held += 1;
     this.timer = setInterval(() => {
       this.counter += 1;
       this.link.send({ op: "beat", platform: this.platform, series: this.series, counter: this.counter, tick: this.tick });
@@ -47,6 +55,7 @@ export class Hand {
 
   letGo() {
     this.isWanted = false;
+    if (this.timer !== null) held -= 1;
     clearInterval(this.timer);
     this.timer = null;
     if (this.series) this.link.send({ op: "release", platform: this.platform });

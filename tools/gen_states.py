@@ -2,16 +2,19 @@
 # SPDX-License-Identifier: MIT
 """gen_states.py - the state diagram and table of docs/operation.md, drawn from the rows of src/gateway/supervisor.c.
 
-    tools/gen_states.py [--lang en|zh]              print the block
-    tools/gen_states.py [--lang en|zh] --check FILE exit 1, with a diff, if the block between FILE's markers differs
-    tools/gen_states.py [--lang en|zh] --write FILE put the block there
+    tools/gen_states.py [--lang en|zh|js]              print the block
+    tools/gen_states.py [--lang en|zh|js] --check FILE exit 1, with a diff, if the block between FILE's markers differs
+    tools/gen_states.py [--lang en|zh|js] --write FILE put the block there
 
-The markers are <!-- states:begin --> and <!-- states:end -->. A file name that holds ".zh" means --lang zh.
+The markers are <!-- states:begin --> and <!-- states:end -->. A file name that holds ".zh" means --lang zh. --lang js is panel/states.js, the whole file: the rows themselves, for the diagram
+of the panel.
 """
 import argparse
 import difflib
+import json
 import pathlib
 import re
+import signal
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -170,9 +173,20 @@ def block(lang):
         fail("no %s text for %s" % (lang, missing))
 
 
+def module():
+    rows = read_rows(read_header())
+    lines = ["// SPDX-License-Identifier: MIT", "// states.js - made by tools/gen_states.py from src/gateway/supervisor.c: [from, event, condition, to] of every row that changes the state.", "export const ROWS = ["]
+    lines += ["  [%s]," % ", ".join('"%s"' % part for part in row) for row in rows]
+    actors = ["export const ACTORS = {"] + ["  %s: [%s]," % (actor, ", ".join('"%s"' % event for event in events)) for actor, events in ACTORS.items()]
+    words = {lang: {"events": {event: event_text(words, event) for event in sum(ACTORS.values(), [])}, "guards": words["guards"], "actors": words["actors"]} for lang, words in (("en", EN), ("zh", ZH))}
+    return "\n".join(lines + ["];"] + actors + ["};", "export const WORDS = %s;" % json.dumps(words, ensure_ascii=False, indent=1)]) + "\n"
+
+
 def split(path):
     """The file's text up to and with the begin marker, between the markers, and from the end marker on."""
-    text = path.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8") if path.exists() or path.suffix != ".js" else ""
+    if path.suffix == ".js":
+        return "", text, ""
     if text.count(BEGIN) != 1 or text.count(END) != 1 or text.index(BEGIN) > text.index(END):
         fail("%s: needs one %s and, after it, one %s" % (path, BEGIN, END))
     start, end = text.index(BEGIN) + len(BEGIN), text.index(END)
@@ -190,13 +204,14 @@ def check(path, wanted):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--lang", choices=["en", "zh"])
+    parser.add_argument("--lang", choices=["en", "zh", "js"])
     mode = parser.add_mutually_exclusive_group()
     mode.add_argument("--check", metavar="FILE", type=pathlib.Path)
     mode.add_argument("--write", metavar="FILE", type=pathlib.Path)
     args = parser.parse_args()
     path = args.check or args.write
-    wanted = block(args.lang or ("zh" if path and ".zh" in path.name else "en"))
+    lang = args.lang or ("js" if path and path.suffix == ".js" else "zh" if path and ".zh" in path.name else "en")
+    wanted = module() if lang == "js" else block(lang)
     if args.check:
         return check(path, wanted)
     if args.write:
@@ -208,4 +223,5 @@ def main():
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends it without a word, as other programs
     sys.exit(main())

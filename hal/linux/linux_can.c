@@ -15,86 +15,13 @@
 #include <unistd.h>
 
 #include "linux_can_frame.h"
+#include "linux_can_trouble.h"
 
 #define FRAME_MEMORY  768      /* what a waiting frame counts against SO_SNDBUF on 64-bit kernels */
 #define CLOCK_STEP_US 1000000u /* a frame that seems to have waited longer came around a change of the wall clock */
 
 static const char k_sending[] = "sending";
 static const char k_receiving[] = "receiving";
-
-/* --- What is wrong --- */
-
-static void forget_trouble(linux_can_t *self)
-{
-    self->trouble = LINUX_CAN_FINE;
-    self->failing = NULL;
-    self->error_text[0] = '\0';
-}
-
-static hv_status_t report_trouble(linux_can_t *self, linux_can_trouble_t trouble, int error, const char *what)
-{
-    self->trouble = trouble;
-    self->failing = NULL;
-    self->error = error;
-    (void)snprintf(self->error_text, sizeof self->error_text, "can: %s: %s%s%s", self->name, what, error != 0 ? ": " : "",
-                   error != 0 ? strerror(error) : "");
-    return HV_ERR_IO;
-}
-
-/* Nothing passes any more until a restart. */
-static void cut_off(linux_can_t *self, hal_can_state_t state)
-{
-    self->state = state;
-    self->is_cut = true;
-    self->has_kept = false;
-}
-
-static hv_status_t say_gone(linux_can_t *self)
-{
-    cut_off(self, HAL_CAN_GONE);
-    (void)report_trouble(self, LINUX_CAN_NO_INTERFACE, 0,
-                         "there is no such interface: is the adapter plugged in? (ip -br link show type can)");
-    return HV_ERR_AGAIN;
-}
-
-static hv_status_t say_down(linux_can_t *self)
-{
-    cut_off(self, HAL_CAN_DOWN);
-    return report_trouble(self, LINUX_CAN_IS_DOWN, 0, "the interface is down (as root: ip link set it up, with its bitrate)");
-}
-
-static hv_status_t say_bus_off(linux_can_t *self)
-{
-    cut_off(self, HAL_CAN_BUS_OFF);
-    return report_trouble(self, LINUX_CAN_IS_BUS_OFF, 0,
-                          "bus-off: the controller gave up; check wiring, termination and bit rate");
-}
-
-/* A failed call: the interface's own reasons, or the system's. */
-static hv_status_t note_failure(linux_can_t *self, int error, const char *what)
-{
-    switch (error) {
-    case ENETDOWN:
-        return say_down(self);
-    case ENODEV:
-    case ENXIO:
-        (void)say_gone(self);
-        return HV_ERR_IO;
-    default:
-        (void)report_trouble(self, error == EPERM || error == EACCES ? LINUX_CAN_NOT_ALLOWED : LINUX_CAN_SYSTEM_ERROR, error,
-                             what);
-        self->failing = what;
-        return HV_ERR_IO;
-    }
-}
-
-/* That call works; what was wrong with it has passed. */
-static void note_success(linux_can_t *self, const char *what)
-{
-    if (self->failing == what) {
-        forget_trouble(self);
-    }
-}
 
 /* --- Sending --- */
 
@@ -130,7 +57,7 @@ static hv_status_t can_send_op(void *ctx, const can_frame_t *frame)
     const struct can_frame out = linux_can_frame_to_kernel(frame);
     if (send(self->fd, &out, sizeof out, MSG_DONTWAIT) == (ssize_t)sizeof out) {
         self->unconfirmed++;
-        note_success(self, k_sending);
+        linux_can_trouble_note_success(self, k_sending);
         return HV_OK;
     }
     if (errno == ENOBUFS) {
@@ -140,7 +67,7 @@ static hv_status_t can_send_op(void *ctx, const can_frame_t *frame)
     if (errno == EAGAIN || errno == EWOULDBLOCK) {
         return HV_ERR_AGAIN;
     }
-    return note_failure(self, errno, k_sending);
+    return linux_can_trouble_note_failure(self, errno, k_sending);
 }
 
 /* --- Receiving --- */
@@ -169,10 +96,10 @@ static can_frame_t take_report(linux_can_t *self, const struct can_frame *frame)
     self->tx_errors = frame->data[6];
     self->rx_errors = frame->data[7];
     if ((out.id & CAN_ERROR_BUS_OFF) != 0) {
-        (void)say_bus_off(self);
+        (void)linux_can_trouble_say_bus_off(self);
     }
     if ((out.id & CAN_ERROR_RESTARTED) != 0) {
-        cut_off(self, HAL_CAN_ACTIVE);
+        linux_can_trouble_cut_off(self, HAL_CAN_ACTIVE);
     }
     return out;
 }
@@ -217,9 +144,9 @@ static hv_status_t receive_next(linux_can_t *self, linux_can_received_t *receive
         }
         const bool has_come = linux_can_frame_receive(self->fd, received);
         if (!has_come && errno != EAGAIN && errno != EWOULDBLOCK) {
-            return note_failure(self, errno, k_receiving);
+            return linux_can_trouble_note_failure(self, errno, k_receiving);
         }
-        note_success(self, k_receiving);
+        linux_can_trouble_note_success(self, k_receiving);
         if (!has_come) {
             return HV_ERR_AGAIN;
         }
@@ -339,16 +266,17 @@ static hv_status_t open_socket(linux_can_t *self, int index)
 {
     const struct sockaddr_can address = {.can_family = AF_CAN, .can_ifindex = index};
     close_socket(self);
-    cut_off(self, HAL_CAN_DOWN);
+    linux_can_trouble_cut_off(self, HAL_CAN_DOWN);
     self->unconfirmed = 0;
     self->lost = 0;
     self->is_overrun = false;
     self->fd = socket(AF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
     if (self->fd < 0 && (errno == EAFNOSUPPORT || errno == EPROTONOSUPPORT)) {
-        return report_trouble(self, LINUX_CAN_NO_SUPPORT, errno, "this kernel has no SocketCAN (modules can and can_raw)");
+        return linux_can_trouble_report(self, LINUX_CAN_NO_SUPPORT, errno,
+                                        "this kernel has no SocketCAN (modules can and can_raw)");
     }
     if (self->fd < 0 || !set_options(self) || bind(self->fd, (const struct sockaddr *)&address, sizeof address) != 0) {
-        const hv_status_t status = note_failure(self, errno, "opening");
+        const hv_status_t status = linux_can_trouble_note_failure(self, errno, "opening");
         close_socket(self);
         return status;
     }
@@ -370,13 +298,13 @@ static hv_status_t look(linux_can_t *self, linux_can_link_t *link)
 {
     const hv_status_t status = linux_can_link_look(self->netlink, self->name, link);
     if (status == HV_ERR_AGAIN) {
-        return say_gone(self);
+        return linux_can_trouble_say_gone(self);
     }
     if (status != HV_OK) {
-        return report_trouble(self, LINUX_CAN_SYSTEM_ERROR, errno, "asking for its state");
+        return linux_can_trouble_report(self, LINUX_CAN_SYSTEM_ERROR, errno, "asking for its state");
     }
     if (!link->is_can) {
-        (void)report_trouble(self, LINUX_CAN_NOT_CAN, 0, "this is not a CAN interface (ip -br link show type can)");
+        (void)linux_can_trouble_report(self, LINUX_CAN_NOT_CAN, 0, "this is not a CAN interface (ip -br link show type can)");
         return HV_ERR_ARG;
     }
     return HV_OK;
@@ -399,14 +327,15 @@ static hv_status_t clear(linux_can_t *self, linux_can_link_t *link, bool is_susp
         return status;
     }
     if (!link->is_up) {
-        return say_down(self);
+        return linux_can_trouble_say_down(self);
     }
     if (link->state == HAL_CAN_BUS_OFF) {
-        return say_bus_off(self);
+        return linux_can_trouble_say_bus_off(self);
     }
     if (link->waiting > 0) {
-        return report_trouble(self, LINUX_CAN_FRAMES_WAIT, 0,
-                              "old frames wait in it; dropping them takes CAP_NET_ADMIN (as root: ip link set it down, then up)");
+        return linux_can_trouble_report(
+            self, LINUX_CAN_FRAMES_WAIT, 0,
+            "old frames wait in it; dropping them takes CAP_NET_ADMIN (as root: ip link set it down, then up)");
     }
     return HV_OK;
 }
@@ -415,7 +344,7 @@ static hv_status_t clear(linux_can_t *self, linux_can_link_t *link, bool is_susp
 static hv_status_t start(linux_can_t *self)
 {
     linux_can_link_t link;
-    cut_off(self, is_off(self) || self->state == HAL_CAN_BUS_OFF ? self->state : HAL_CAN_DOWN);
+    linux_can_trouble_cut_off(self, is_off(self) || self->state == HAL_CAN_BUS_OFF ? self->state : HAL_CAN_DOWN);
     hv_status_t status = look(self, &link);
     if (status == HV_OK) {
         status = clear(self, &link, self->unconfirmed > 0);
@@ -427,7 +356,7 @@ static hv_status_t start(linux_can_t *self)
         self->state = link.state == HAL_CAN_WARNING || link.state == HAL_CAN_PASSIVE ? link.state : HAL_CAN_ACTIVE;
         self->has_echo = link.has_echo;
         self->is_cut = false;
-        forget_trouble(self);
+        linux_can_trouble_forget(self);
     }
     return status;
 }
@@ -479,7 +408,8 @@ hv_status_t linux_can_open(linux_can_t *self, const linux_can_config_t *config)
         return status;
     }
     self->netlink = linux_can_link_open();
-    status = self->netlink == NULL ? report_trouble(self, LINUX_CAN_SYSTEM_ERROR, errno, "asking for its state") : start(self);
+    status = self->netlink == NULL ? linux_can_trouble_report(self, LINUX_CAN_SYSTEM_ERROR, errno, "asking for its state")
+                                   : start(self);
     if (status == HV_OK || may_pass(self->trouble)) {
         return status == HV_OK ? HV_OK : HV_ERR_AGAIN;
     }

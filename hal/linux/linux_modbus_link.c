@@ -2,8 +2,8 @@
  * linux_modbus_link.c - a Modbus connection by libmodbus; see linux_modbus_link.h.
  */
 #include "linux_modbus_link.h"
+#include "linux_modbus_request.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <modbus.h>
 #include <poll.h>
@@ -19,10 +19,8 @@
 #define CLEAR_LIMIT_US  100000u /* a line that never falls silent is spoken on all the same: the answers then tell */
 #define FAST_BPS        19200u  /* above, the silence between frames is not 3.5 characters any more */
 #define FAST_SILENCE_US 1750u
-#define RTU_FRAME_MAX   256u
 #define QUESTION_HEAD   9u /* characters of the longest question without its values, and of an answer likewise */
 #define ANSWER_HEAD     8u
-#define TIMEOUT_MOST_US 10000000u
 #define SERIAL_BITS     8
 
 /* --- Time --- */
@@ -213,7 +211,7 @@ void linux_modbus_link_mend(linux_modbus_link_t *self)
 /* Takes what came in unasked; false where the link is gone. On TCP nothing may: it would be taken for the next answer. */
 static bool take_strays(linux_modbus_link_t *self)
 {
-    uint8_t bytes[RTU_FRAME_MAX];
+    uint8_t bytes[LINUX_MODBUS_FRAME_MAX];
     const ssize_t got = read(modbus_get_socket(self->modbus), bytes, sizeof bytes);
     if (got > 0) {
         add(&self->count.strays, (uint32_t)got);
@@ -257,51 +255,6 @@ void linux_modbus_link_look(linux_modbus_link_t *self)
 static size_t characters_of(const modbus_request_t *request)
 {
     return QUESTION_HEAD + ANSWER_HEAD + 2u * request->count;
-}
-
-static int read_bits(modbus_t *modbus, const modbus_request_t *request, uint16_t *value)
-{
-    uint8_t bit[HAL_MODBUS_VALUES_MAX];
-    const int got = request->function == MODBUS_READ_COILS
-                        ? modbus_read_bits(modbus, request->address, request->count, bit)
-                        : modbus_read_input_bits(modbus, request->address, request->count, bit);
-    for (unsigned i = 0; got >= 0 && i < request->count; i++) {
-        value[i] = bit[i];
-    }
-    return got;
-}
-
-static int write_bits(modbus_t *modbus, const modbus_request_t *request)
-{
-    uint8_t bit[HAL_MODBUS_VALUES_MAX];
-    for (unsigned i = 0; i < request->count; i++) {
-        bit[i] = request->value[i] != 0;
-    }
-    return modbus_write_bits(modbus, request->address, request->count, bit);
-}
-
-/* libmodbus waits for the answer and checks that it is one to this question. -1: errno says. */
-static int ask(modbus_t *modbus, const modbus_request_t *request, uint16_t *value)
-{
-    switch (request->function) {
-    case MODBUS_READ_COILS:
-    case MODBUS_READ_DISCRETE_INPUTS:
-        return read_bits(modbus, request, value);
-    case MODBUS_READ_HOLDING:
-        return modbus_read_registers(modbus, request->address, request->count, value);
-    case MODBUS_READ_INPUT:
-        return modbus_read_input_registers(modbus, request->address, request->count, value);
-    case MODBUS_WRITE_COIL:
-        return modbus_write_bit(modbus, request->address, request->value[0] != 0);
-    case MODBUS_WRITE_REGISTER:
-        return modbus_write_register(modbus, request->address, request->value[0]);
-    case MODBUS_WRITE_COILS:
-        return write_bits(modbus, request);
-    case MODBUS_WRITE_REGISTERS:
-        return modbus_write_registers(modbus, request->address, request->count, request->value);
-    }
-    errno = EINVAL;
-    return -1;
 }
 
 static hv_status_t judge_silence(linux_modbus_link_t *self, int error)
@@ -369,8 +322,8 @@ static hv_status_t converse(linux_modbus_link_t *self, const modbus_request_t *r
     }
     set_timeout(self, self->timeout_us + characters_us(self, characters_of(request)));
     (void)modbus_set_slave(self->modbus, request->unit);
-    const int got = ask(self->modbus, request, result->value);
-    const hv_status_t status = got < 0 ? judge(self, errno, &result->exception) : HV_OK;
+    const int error = linux_modbus_request_ask(self->modbus, request, result->value);
+    const hv_status_t status = error != 0 ? judge(self, error, &result->exception) : HV_OK;
     note_traffic(self);
     if (is_answer(status)) {
         self->has_worked = true;
@@ -422,53 +375,13 @@ static hv_status_t converse_doubtfully(linux_modbus_link_t *self, const modbus_r
 
 /* --- Broadcasts, which libmodbus would wait an answer for --- */
 
-static size_t pack_bits(uint8_t *to, const modbus_request_t *request)
-{
-    const size_t bytes = (request->count + 7u) / 8u;
-    memset(to, 0, bytes);
-    for (unsigned i = 0; i < request->count; i++) {
-        to[i / 8] = (uint8_t)(to[i / 8] | (request->value[i] != 0) << i % 8);
-    }
-    return bytes;
-}
-
-static size_t pack_registers(uint8_t *to, const modbus_request_t *request)
-{
-    for (unsigned i = 0; i < request->count; i++) {
-        to[2 * i] = (uint8_t)(request->value[i] >> 8);
-        to[2 * i + 1] = (uint8_t)request->value[i];
-    }
-    return 2u * request->count;
-}
-
-/* Unit, function, address and what follows it. */
-static size_t pack(uint8_t *to, const modbus_request_t *request)
-{
-    const bool is_coil = request->function == MODBUS_WRITE_COIL;
-    const uint8_t head[] = {request->unit, (uint8_t)request->function, (uint8_t)(request->address >> 8),
-                            (uint8_t)request->address};
-    memcpy(to, head, sizeof head);
-    to += sizeof head;
-    if (is_coil || request->function == MODBUS_WRITE_REGISTER) {
-        const unsigned value = !is_coil ? request->value[0] : request->value[0] != 0 ? 0xFF00u : 0u;
-        to[0] = (uint8_t)(value >> 8);
-        to[1] = (uint8_t)value;
-        return sizeof head + 2;
-    }
-    const size_t bytes = request->function == MODBUS_WRITE_COILS ? pack_bits(to + 3, request) : pack_registers(to + 3, request);
-    to[0] = 0;
-    to[1] = request->count;
-    to[2] = (uint8_t)bytes;
-    return sizeof head + 3 + bytes;
-}
-
 static hv_status_t broadcast(linux_modbus_link_t *self, const modbus_request_t *request)
 {
-    uint8_t frame[RTU_FRAME_MAX];
+    uint8_t frame[LINUX_MODBUS_FRAME_MAX];
     if (!make_ready(self)) {
         return HV_ERR_IO;
     }
-    const size_t length = pack(frame, request);
+    const size_t length = linux_modbus_request_pack(frame, request);
     if (modbus_send_raw_request(self->modbus, frame, (int)length) < 0) {
         uint8_t exception;
         return judge(self, errno, &exception);
@@ -516,56 +429,6 @@ int linux_modbus_link_fd(const linux_modbus_link_t *self)
 
 /* --- Opening --- */
 
-/* libmodbus takes any other rate for 9600. */
-static bool is_rate(uint32_t bps)
-{
-    static const uint32_t k_rates[] = {1200,   2400,   4800,   9600,    19200,   38400,   57600,   115200,  230400,  460800,
-                                       500000, 576000, 921600, 1000000, 1152000, 1500000, 2500000, 3000000, 3500000, 4000000};
-    for (size_t i = 0; i < sizeof k_rates / sizeof k_rates[0]; i++) {
-        if (k_rates[i] == bps) {
-            return true;
-        }
-    }
-    return false;
-}
-
-static const char *wrong_in_serial(const linux_modbus_config_t *config)
-{
-    if (config->device == NULL || config->device[0] == '\0' || strlen(config->device) >= LINUX_MODBUS_NAME_SIZE) {
-        return "the device has to be a path such as /dev/serial/by-id/...";
-    }
-    if (!is_rate(config->baud_bps)) {
-        return "the bit rate has to be one that Linux has, such as 9600, 19200, 38400, 57600 or 115200";
-    }
-    if (config->parity != 'N' && config->parity != 'E' && config->parity != 'O') {
-        return "the parity has to be N, E or O";
-    }
-    if (config->stop_bits != 1 && config->stop_bits != 2) {
-        return "the stop bits have to be 1 or 2";
-    }
-    return config->direction_delay_us <= 10000 ? NULL : "the direction delay has to be within 0 and 10000 us";
-}
-
-static const char *wrong_in_tcp(const linux_modbus_config_t *config)
-{
-    struct in_addr address;
-    if (inet_pton(AF_INET, config->host, &address) != 1) {
-        return "the host has to be an IPv4 address in numbers, such as 192.168.1.20";
-    }
-    return config->port != 0 ? NULL : "the port has to be within 1 and 65535";
-}
-
-static const char *wrong_in(const linux_modbus_config_t *config)
-{
-    if (config->timeout_us < 1000 || config->timeout_us > TIMEOUT_MOST_US) {
-        return "the timeout has to be within 1000 and 10000000 us";
-    }
-    if (config->broadcast_pause_us > 999999) {
-        return "the pause after a broadcast has to be within 0 and 999999 us";
-    }
-    return config->host != NULL ? wrong_in_tcp(config) : wrong_in_serial(config);
-}
-
 static void describe_serial(linux_modbus_link_t *self, const linux_modbus_config_t *config)
 {
     const uint32_t bits = 1u + SERIAL_BITS + (config->parity == 'N' ? 0u : 1u) + config->stop_bits;
@@ -576,7 +439,7 @@ static void describe_serial(linux_modbus_link_t *self, const linux_modbus_config
 hv_status_t linux_modbus_link_open(linux_modbus_link_t *self, const linux_modbus_config_t *config, const char **what)
 {
     memset(self, 0, sizeof *self);
-    *what = wrong_in(config);
+    *what = linux_modbus_config_find_wrong(config);
     if (*what != NULL) {
         return HV_ERR_ARG;
     }

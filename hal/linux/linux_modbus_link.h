@@ -83,6 +83,10 @@ typedef struct {
     linux_modbus_doubt_t doubt;
 } linux_modbus_link_t;
 
+/** Looks for a figure that no line has.
+ *  @return NULL, or which one and its range */
+const char *linux_modbus_config_find_wrong(const linux_modbus_config_t *config);
+
 /** Prepares a link; touches no device. Allocates.
  *  @return HV_OK; HV_ERR_ARG: the configuration, what says which figure and its range; HV_ERR_IO: no memory. */
 hv_status_t linux_modbus_link_open(linux_modbus_link_t *self, const linux_modbus_config_t *config,

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT
  * canraw.h - driver for CAN drives with frames of their own (no CANopen). A map defines the bytes of each frame.
- * Each drive has one identifier for commands and one for replies. The caller owns canraw_t; only the motion thread calls it.
+ * Each drive has one identifier for commands and one for replies. Several may share a frame for set-points, and one for replies:
+ * in it each has fields of its own (a slot). The caller owns canraw_t; only the motion thread calls it.
  *
  * Such drives report little about themselves. The driver derives their states:
  *
- * - OFFLINE: no position has been received for offline_periods of the bus.
+ * - OFFLINE: no position has been received for offline_periods of the bus, or the drive has not been started up: a drive gets
+ *   the frames of step when the first frame comes from it, and meanwhile every second, since it may say nothing before.
  * - ENABLING: requested. It ends when a position newer than the request has been received and, if the map has enabled_when, that
  *   condition holds. If the map has enable or enabled_when, the driver already sends set-points in this state.
  * - ENABLED: the driver sends set-points. Without enabled_when this only means: requested, and a position was received since.
@@ -24,7 +26,14 @@
 #include "heave/hal/can.h"
 
 #define CANRAW_BYTES_MAX  8u
-#define CANRAW_FIELDS_MAX 5u
+#define CANRAW_FIELDS_MAX 12u
+
+/** Largest number of counts that a float field carries exactly, and its largest divisor. */
+#define CANRAW_FLOAT_MAX   8388607
+#define CANRAW_DIVISOR_MAX 1000000u
+
+#define CANRAW_OWNS_MAX    (2u * DRIVES_MAX)
+#define CANRAW_FILTERS_MAX (2u * DRIVES_MAX)
 
 /** Fault codes of this driver. With fault_when, the code is the status as received (1 if that is 0). */
 #define CANRAW_FAULT_FOLLOWING 0x8611u /**< following error, the number CANopen drives use */
@@ -35,33 +44,39 @@ typedef enum {
     CANRAW_POSITION, /**< counts: the set-point, or in replies actual */
     CANRAW_SPEED,    /**< set-points only */
     CANRAW_STATUS,   /**< replies only */
-    CANRAW_COUNTER,  /**< alive counter: sent, one more with each frame of a drive; received, a reply with that of the last one is
-                        old */
-    CANRAW_FAULT,    /**< position replies only: what the drive calls its fault */
+    CANRAW_COUNTER,  /**< alive counter. Sent: it increases by one with each frame to a drive. Received: a reply with the same
+                        counter as the last one is old */
+    CANRAW_FAULT,    /**< replies: fault code of the drive */
+    CANRAW_TORQUE,   /**< replies: torque, in counts of the drive */
     CANRAW_SUM,      /**< check byte over all other bytes of the frame: their sum; */
     CANRAW_XOR,      /**< their exclusive or; */
-    CANRAW_CRC8,     /**< a CRC-8 from 0, its polynomial in the frame's data at this byte; */
-    CANRAW_CRC8_FF   /**< the same from FFh, inverted at the end */
+    CANRAW_CRC8      /**< a CRC-8, highest bit first; its polynomial is in the frame's data at this byte */
 } canraw_value_t;
 
 #define CANRAW_VALUES 9u
 
-/** A field of a frame. */
+/** A field of a frame: a whole number, or a float32 that carries counts / divisor. */
 typedef struct {
     canraw_value_t value;
-    uint8_t at;    /**< first byte */
-    uint8_t bytes; /**< [1, 4]; of a check byte 1 */
+    uint8_t at;   /**< first byte that it touches */
+    uint8_t bits; /**< [1, 32]; of a check byte 8, of a float 32 */
     bool is_signed;
     bool is_big_endian;
+    uint8_t skip;     /**< [0, 7] bits of that byte before it: below its lowest bit, of a big-endian one above its highest; of a
+                         check byte 0 */
+    uint32_t divisor; /**< 0: no float; else up to CANRAW_DIVISOR_MAX, and the field is signed */
+    uint8_t slot;     /**< 0: of all drives that share the frame; else of the one with this slot, [1, DRIVES_MAX] */
 } canraw_field_t;
 
 /** A frame of the map: constant bytes and fields; replies may also have bytes that are ignored. */
 typedef struct {
     uint8_t length;   /**< 0: the map has no such frame */
-    uint8_t constant; /**< bit i: byte i is data[i] */
+    uint8_t constant; /**< bit i: byte i is data[i], but for the bits of fields */
     uint8_t fields;
     uint8_t data[CANRAW_BYTES_MAX];
     canraw_field_t field[CANRAW_FIELDS_MAX];
+    uint8_t crc_initial; /**< of its CRC-8 */
+    uint8_t crc_final;   /**< exclusive or with the end of it */
 } canraw_frame_t;
 
 /** A condition: (status & mask) == value. A mask of 0 means that the map has no such condition. */
@@ -76,10 +91,24 @@ typedef enum { CANRAW_STOP, CANRAW_DISABLE, CANRAW_RESET, CANRAW_ENABLE, CANRAW_
 #define CANRAW_COMMANDS 5u
 #define CANRAW_NOTHING  CANRAW_COMMANDS
 
+#define CANRAW_STEPS_MAX 8u
+
+/** A step of starting a drive up. */
+typedef struct {
+    canraw_frame_t frame;  /**< to command_id, without fields except counter and check byte; length 0: the list ends before it */
+    canraw_frame_t answer; /**< on reply_id, expected within half a second; length 0: none */
+    uint32_t wait_us;      /**< before the next step */
+} canraw_step_t;
+
 /** One drive. Unit u: mm, or deg of the rotation motor. */
 typedef struct {
-    uint32_t command_id; /**< all different, also from the reply_ids */
-    uint32_t reply_id;
+    uint32_t command_id;   /**< of commands and queries: all different, also from the reply_ids */
+    uint32_t setpoint_id;  /**< of set-points: command_id, or one that drives with different setpoint_slots share */
+    uint32_t reply_id;     /**< drives with different reply_slots may share it */
+    uint32_t status_id;    /**< of status_reply: likewise; may be reply_id */
+    uint8_t setpoint_slot; /**< 0: has no fields of its own */
+    uint8_t reply_slot;
+    uint8_t status_slot;
     counts_scale_t scale;    /**< counts per u, and the counts at 0 u */
     counts_scale_t speed;    /**< speed field per u/s */
     q32_t step_max_q32;      /**< largest step of set-points, u per bus period; > 0 */
@@ -95,19 +124,41 @@ typedef struct {
     uint32_t query_every;     /**< number of periods between two queries of a drive, [1, 1000] */
     uint32_t offline_periods; /**< > 2 * query_every */
     uint32_t passive_stop_ms; /**< the bus counts as failing after this time in error-passive; 0 = never */
+    uint32_t rated_torque;    /**< counts of a torque field at the rated torque; 0 = not known: torque is not reported */
     uint32_t speed_least;     /**< smallest value of a speed field; its only value if axis[].speed is 0 per u/s */
     canraw_frame_t setpoint;
     canraw_frame_t command[CANRAW_COMMANDS];
     canraw_frame_t position_query; /**< absent: the drive sends positions by itself */
     canraw_frame_t position_reply; /**< has a position, may have a status */
     canraw_frame_t homing_query;
-    canraw_frame_t homing_reply; /**< has a status */
-    canraw_when_t enabled_when;  /**< of the status of position_reply */
-    canraw_when_t fault_when;    /**< of the same */
-    canraw_when_t homing_done;   /**< of the status of homing_reply; of position_reply where there is no homing_query */
-    canraw_when_t homing_failed; /**< of the same */
+    canraw_frame_t homing_reply;          /**< has a status */
+    canraw_frame_t status_reply;          /**< absent: the status is in position_reply; else it comes unasked and has a status */
+    uint32_t status_every;                /**< number of periods between two of them, [1, 1000]; without status_reply any */
+    canraw_step_t step[CANRAW_STEPS_MAX]; /**< frames that a drive gets when it appears, before it counts as online */
+    canraw_when_t enabled_when;           /**< condition on the status in status_reply if it exists, else in position_reply */
+    canraw_when_t fault_when;             /**< on the same status */
+    canraw_when_t homing_done;   /**< on the status in homing_reply; without homing_query, on the status of enabled_when */
+    canraw_when_t homing_failed; /**< as homing_done */
     canraw_axis_map_t axis[DRIVES_MAX];
 } canraw_map_t;
+
+/** Result of comparing received bytes with a frame. Later values mean a closer match. */
+typedef enum {
+    CANRAW_MATCH,
+    CANRAW_OTHER,      /**< length or constant bits are those of another frame */
+    CANRAW_BAD_CHECK,  /**< length and constant bits match, but the check byte is wrong */
+    CANRAW_BAD_NUMBER, /**< the check byte is right, but a float is not a number, or a position is out of range */
+    CANRAW_REPEATED    /**< all is right, but the counter is that of the previous reply */
+} canraw_verdict_t;
+
+/** Codes for the problems that drive_report_t names in words. The driver has found them, not the drive. */
+enum {
+    CANRAW_SILENT = 0x10001,     /**< nothing is received from the drive */
+    CANRAW_NO_STATUS = 0x10002,  /**< positions are received, but no status_reply */
+    CANRAW_STRANGE = 0x10003,    /**< plus (canraw_verdict_t - CANRAW_OTHER): received frames are rejected */
+    CANRAW_NO_ANSWER = 0x10008,  /**< no answer to a start-up step */
+    CANRAW_TELLS_ERROR = 0x10010 /**< the drive sends a fault code other than 0, but has no fault */
+};
 
 /** Last query to a drive; private. */
 typedef enum { CANRAW_ASKED_NOTHING, CANRAW_ASKED_POSITION, CANRAW_ASKED_HOMING } canraw_asked_t;
@@ -126,17 +177,35 @@ typedef struct {
     bool is_energized;   /**< torque was requested, and the drive has not confirmed since that it is off */
     bool has_actual;
     bool has_sent;
-    bool has_counter;    /**< of the last reply: */
-    uint32_t counter_in; /**< it, */
-    uint32_t counter;    /**< and that of the next frame to the drive */
+    bool has_counter[2];       /**< of the last reply with a position, and with a status: */
+    uint32_t counter_in[2];    /**< it, */
+    uint32_t counter;          /**< and that of the next frame to the drive, */
+    uint32_t setpoint_counter; /**< and of the next set-points where they have an identifier of their own */
     uint32_t status;
     uint32_t fault_code;
+    uint32_t told_code; /**< the fault field of the last reply that has one */
+    int64_t torque;
+    bool has_torque;
+    bool is_talking;     /**< something came since it was lost */
+    bool is_step_sent;   /**< and its answer is awaited */
+    uint8_t step;        /**< of starting up: the next one */
+    uint8_t failed_step; /**< last step without an answer, from 1; 0 = none since the start-up */
+    uint64_t step_us;    /**< when that was sent, or when the next one is due */
+    bool is_placed;      /**< a position came since it was lost, */
+    bool has_status;     /**< and status_reply */
+    canraw_verdict_t trouble;
+    uint64_t trouble_us; /**< when that came */
+    uint64_t heard_us;   /**< last time that any frame came that may be from it */
+    uint64_t status_us;
+    uint64_t torque_us;
+    uint64_t phase_us; /**< since when it is in its state */
+    uint8_t phase;
     drive_guard_t guard;
     uint64_t mark_us;        /**< time of the request or of the end of homing: actual has to be newer */
-    uint64_t told_us;        /**< when the last command was sent */
+    uint64_t told_us;        /**< time of the last command */
     uint64_t reset_until_us; /**< end of the time in which a reset may end the fault; 0: no reset */
     uint64_t actual_us;
-    int64_t counts; /**< of the last position, as the drive has them */
+    int64_t counts; /**< of the last position, in counts of the drive */
     int64_t sent_counts;
     q32_t sent_q32;
     q32_t actual_q32;
@@ -176,28 +245,54 @@ hv_status_t canraw_init(canraw_t *self, const canraw_map_t *map, hal_can_t can) 
 drives_t canraw_hal(canraw_t *self);
 
 /** Receive filters for the backend's open.
- *  @param filter out: map->axes entries
- *  @return how many */
-uint32_t canraw_filters(const canraw_map_t *map, hal_can_filter_t filter[DRIVES_MAX]);
+ *  @param filter out
+ *  @return number of filters */
+uint32_t canraw_filters(const canraw_map_t *map, hal_can_filter_t filter[CANRAW_FILTERS_MAX]);
+
+/** Identifiers that the driver sends, for backends that need them.
+ *  @param own out
+ *  @return number of entries */
+uint32_t canraw_owns(const canraw_map_t *map, hal_can_filter_t own[CANRAW_OWNS_MAX]);
 
 /** Range of a field's values. */
 int64_t canraw_field_min(const canraw_field_t *field);
 int64_t canraw_field_max(const canraw_field_t *field);
 
 /** The first field of a frame that carries a value.
- *  @return NULL where there is none */
+ *  @return NULL: there is none */
 const canraw_field_t *canraw_find(const canraw_frame_t *frame, canraw_value_t value);
 
-/** Writes a frame's bytes.
- *  @param value one for each canraw_value_t; of a counter its low bits count, check bytes follow from the rest
- *  @return HV_OK; HV_ERR_RANGE: a value does not fit its field, out is unchanged */
-hv_status_t canraw_pack(const canraw_frame_t *frame, const int64_t value[CANRAW_VALUES],
-                        uint8_t out[CANRAW_BYTES_MAX]) HV_MUST_CHECK;
+/** The field that carries a value for the drive with this slot, or for all drives.
+ *  @return NULL: there is none */
+const canraw_field_t *canraw_find_of(const canraw_frame_t *frame, canraw_value_t value, unsigned slot);
 
-/** True where a field is a check byte. */
+/** Number of drives that may share a frame: its highest slot; 0: the frame belongs to a single drive. */
+unsigned canraw_slots(const canraw_frame_t *frame);
+
+/** Index of a field's value in the array for canraw_pack(). */
+unsigned canraw_value_at(canraw_value_t value, unsigned slot);
+
+/** Bytes that a field touches. */
+unsigned canraw_field_span(const canraw_field_t *field);
+
+/** Sets the bits of a field.
+ *  @return false: some of these bits were set before */
+bool canraw_field_cover(const canraw_field_t *field, uint8_t bits[CANRAW_BYTES_MAX]);
+
+/** Writes a frame's bytes.
+ *  @param value at canraw_value_at(): one for each canraw_value_t, again for each slot of the frame. Only the low bits of a
+ *               counter are used. Check bytes are calculated
+ *  @return HV_OK; HV_ERR_RANGE: a value does not fit its field, out is unchanged */
+hv_status_t canraw_pack(const canraw_frame_t *frame, const int64_t value[], uint8_t out[CANRAW_BYTES_MAX]) HV_MUST_CHECK;
+
+/** True if the field is a check byte. */
 bool canraw_is_check(canraw_value_t value);
 
-/** True where received bytes are this frame: long enough, and constant bytes and check bytes as they should be. */
+/** Whether received bytes are this frame. */
+canraw_verdict_t canraw_judge(const canraw_frame_t *frame, const uint8_t *data, uint8_t length);
+
+/** True if the received bytes are this frame: they are long enough, constant bits and check bytes are right, and floats are
+ * numbers in their range. */
 bool canraw_matches(const canraw_frame_t *frame, const uint8_t *data, uint8_t length);
 
 /** Reads the value of a field from the bytes of a received frame that matches the map. */
@@ -205,5 +300,8 @@ int64_t canraw_extract(const canraw_field_t *field, const uint8_t *data);
 
 /** True if some bytes would match both frames. Then only the last query tells which reply it is. */
 bool canraw_is_ambiguous(const canraw_frame_t *a, const canraw_frame_t *b);
+
+/** True if some bytes would be both the answer to a step and this reply. */
+bool canraw_startup_is_mixed(const canraw_step_t *step, const canraw_frame_t *reply);
 
 #endif

@@ -10,8 +10,8 @@
  * then sends nothing until the drives have noticed the missing heartbeat, restarts the bus and configures all drives again.
  *
  * A drive is OFFLINE until it is configured and its first TPDO was received. It becomes OFFLINE again if no TPDO is received for
- * three SYNCs, no heartbeat for heartbeat_timeout_ms, an NMT state other than operational, or a boot-up message. The driver then
- * configures it from the beginning. It must be homed again unless its position is absolute.
+ * three times its turn, no heartbeat for heartbeat_timeout_ms, an NMT state other than operational, or a boot-up message. The
+ * driver then configures it from the beginning. It must be homed again unless its position is absolute.
  */
 #ifndef HEAVE_CIA402_H
 #define HEAVE_CIA402_H
@@ -31,29 +31,33 @@ typedef enum { CIA402_MODE_PP = 1, CIA402_MODE_HOMING = 6, CIA402_MODE_IP = 7, C
 typedef enum {
     CIA402_TROUBLE_NONE,
     CIA402_SILENT = 0x10001,    /**< does not answer */
-    CIA402_LOST_TPDO = 0x10002, /**< no TPDO for three SYNCs */
+    CIA402_LOST_TPDO = 0x10002, /**< no TPDO, three times in a row */
     CIA402_LOST_HEARTBEAT = 0x10003,
     CIA402_LEFT_OPERATIONAL = 0x10004,
     CIA402_REBOOTED = 0x10005, /**< boot-up without a request */
     CIA402_LOST_BUS = 0x10006,
     CIA402_NOT_402 = 0x10007, /**< 1000h names another profile */
     CIA402_WRONG_IDENTITY = 0x10008,
-    CIA402_NOT_TAKEN = 0x10009,     /**< an object was refused, or does not hold what was written */
-    CIA402_UNGUARDED = 0x1000A,     /**< a watchdog of the drive is off: it would not stop by itself */
-    CIA402_NO_HEARTBEAT = 0x1000B,  /**< never sends one */
-    CIA402_NO_MODE = 0x1000C,       /**< 6061h does not show the mode */
-    CIA402_NO_START = 0x1000D,      /**< does not become operational, or its TPDO is not what was mapped */
-    CIA402_NO_POWER = 0x1000E,      /**< does not switch on in time */
-    CIA402_NO_TORQUE = 0x1000F,     /**< does not enable operation, or does not follow, in time */
-    CIA402_REMOTE_OFF = 0x10010,    /**< under local control (bit 9 of 6041h) */
-    CIA402_FELL_OUT = 0x10011,      /**< left operation enabled by itself */
-    CIA402_LEFT_MODE = 0x10012,     /**< 6061h shows another mode than it was set to */
-    CIA402_NOT_FOLLOWING = 0x10013, /**< ignores its set-points (bit 12) */
-    CIA402_NO_VOLTAGE = 0x10014,    /**< bit 4 */
-    CIA402_LIMITED = 0x10015,       /**< bit 11 */
-    CIA402_WARNING = 0x10016,       /**< bit 7 */
-    CIA402_NO_ANSWER = 0x10017,     /**< answers, but not to the request for one object */
-    CIA402_TWICE = 0x10018          /**< two drives have its node id */
+    CIA402_NOT_TAKEN = 0x10009,      /**< an object was refused, or does not hold what was written */
+    CIA402_UNGUARDED = 0x1000A,      /**< a watchdog of the drive is off: it would not stop by itself */
+    CIA402_NO_HEARTBEAT = 0x1000B,   /**< never sends one */
+    CIA402_NO_MODE = 0x1000C,        /**< 6061h does not show the mode */
+    CIA402_NO_START = 0x1000D,       /**< does not become operational, or its TPDO is not what was mapped */
+    CIA402_NO_POWER = 0x1000E,       /**< does not switch on in time */
+    CIA402_NO_TORQUE = 0x1000F,      /**< does not enable operation, or does not follow, in time */
+    CIA402_REMOTE_OFF = 0x10010,     /**< under local control (bit 9 of 6041h) */
+    CIA402_FELL_OUT = 0x10011,       /**< left operation enabled by itself */
+    CIA402_LEFT_MODE = 0x10012,      /**< 6061h shows another mode than it was set to */
+    CIA402_NOT_FOLLOWING = 0x10013,  /**< ignores its set-points (bit 12) */
+    CIA402_NO_VOLTAGE = 0x10014,     /**< bit 4 */
+    CIA402_LIMITED = 0x10015,        /**< bit 11 */
+    CIA402_WARNING = 0x10016,        /**< bit 7 */
+    CIA402_NO_ANSWER = 0x10017,      /**< answers, but not to the request for one object */
+    CIA402_TWICE = 0x10018,          /**< two drives have its node id */
+    CIA402_NO_SUCH_MODE = 0x10019,   /**< 6502h does not list the mode, or homing */
+    CIA402_NO_SUCH_HOMING = 0x1001A, /**< 60E3h does not list the homing method */
+    CIA402_LOST_NODE = 0x1001B,      /**< another axis of its node was lost, and the node is set up again */
+    CIA402_GUARDED_LATE = 0x1001C    /**< its watchdog of the gateway is on, with more than twice the time that it has to have */
 } cia402_trouble_t;
 
 /** Conditions that are checked in every answer beside state and position: bits of drive_report_t.notes. */
@@ -74,30 +78,53 @@ typedef enum {
     CIA402_STOP  /**< a fault of the drive: all drives stop, and this one is not enabled */
 } cia402_reaction_t;
 
-/** An object of a start-up list: what a family of drives has to hold beyond what every drive is set to. */
+/** An object of a start-up list: a setting that a family of drives needs in addition to the settings of all drives. */
 typedef struct {
     uint32_t value; /**< the low bytes count */
     uint16_t index;
     uint8_t sub;
     uint8_t bytes;    /**< 1, 2 or 4 */
-    bool is_written;  /**< else only looked at */
+    bool is_written;  /**< else only read and compared */
     bool is_checked;  /**< read back after it was written */
-    bool is_optional; /**< a drive may be without it */
-    bool is_last;     /**< after everything else, else before it */
+    bool is_optional; /**< the drive may lack this object */
+    bool is_last;     /**< written after all other objects, else before them */
 } cia402_item_t;
 
 #define CIA402_ITEMS_MAX 32u /**< of a list */
 
+#define CIA402_CHANNELS_MAX 4u /**< axes of a node: it has four TPDOs with identifiers of their own */
+#define CIA402_MAPS_MAX     3u /**< PDOs of a list of maps */
+#define CIA402_PDO_ENTRIES  8u
+
+/** A PDO that is described, in place of the usual one. */
+typedef struct {
+    uint16_t number;                    /**< [1, CIA402_PDO_NUMBER_MAX]: RPDO 1 has the records 1400h and 1600h */
+    uint8_t entries;                    /**< > 0 */
+    uint32_t entry[CIA402_PDO_ENTRIES]; /**< in their order, as in 1600h: index << 16 | sub-index << 8 | bits, whole bytes. An
+                                             index of another channel makes the PDO one of the whole node */
+} cia402_map_t;
+
+#define CIA402_PDO_NUMBER_MAX 256u
+
+/** PDOs of a direction. */
+typedef struct {
+    cia402_map_t map[CIA402_MAPS_MAX];
+    uint8_t count; /**< 0: the usual PDO */
+} cia402_maps_t;
+
 /** One drive. Counts are those of the drive (6064h). Unit u: mm, or deg of the rotation motor. */
 typedef struct {
-    uint8_t node;                 /**< [1, 127], all different, also from the master's */
-    counts_scale_t scale;         /**< counts per u, and the counts at 0 u */
-    q32_t step_max_q32;           /**< largest step of set-points, u per bus period; > 0 */
-    q32_t following_max_q32;      /**< largest distance of a set-point from actual, u; 0 = not watched here */
-    uint32_t window_counts;       /**< 6065h */
-    int8_t homing_method;         /**< 6098h; 0: no homing, the position is absolute */
-    uint32_t homing_speed[2];     /**< 6099h, counts/s: towards the switch, and to the zero */
-    uint32_t homing_accel;        /**< 609Ah, counts/s^2 */
+    uint8_t node;             /**< [1, 127], not the master's; axes of one node have different channels */
+    uint8_t channel;          /**< its axis in the node, [0, CIA402_CHANNELS_MAX): its objects 6000h to 67FFh are at + channel *
+                                   800h. A node's channels begin at 0 and have no gaps */
+    uint8_t mode;             /**< cia402_mode_t of its set-points; 0 = that of the platform */
+    counts_scale_t scale;     /**< counts per u, and the counts at 0 u */
+    q32_t step_max_q32;       /**< largest step of set-points, u per bus period; > 0 */
+    q32_t following_max_q32;  /**< largest distance of a set-point from actual, u; 0 = not watched here */
+    uint32_t window_counts;   /**< 6065h */
+    int8_t homing_method;     /**< 6098h; 0: no homing, the position is absolute */
+    uint32_t homing_speed[2]; /**< 6099h, counts/s: towards the switch, and to the zero */
+    uint32_t homing_accel;    /**< 609Ah, counts/s^2 */
     int32_t homing_offset_counts; /**< 607Ch */
     uint32_t quick_stop_accel;    /**< 6085h, counts/s^2; 0 = as it is */
     uint32_t profile_speed;       /**< 6081h, mode PP only */
@@ -105,7 +132,7 @@ typedef struct {
     bool has_limits;              /**< 607Dh is written */
     int32_t limit_counts[2];      /**< 607Dh: least and greatest position */
     uint32_t identity[4];         /**< 1018h sub 1 to 4: vendor, product, revision, serial number; 0 = any */
-    const cia402_item_t *item;    /**< start-up list, kept; NULL where there is none */
+    const cia402_item_t *item;    /**< start-up list, has to stay valid; NULL: none */
     uint8_t items;                /**< [0, CIA402_ITEMS_MAX] */
 } cia402_axis_config_t;
 
@@ -113,7 +140,7 @@ typedef struct {
 typedef struct {
     uint8_t axes;                  /**< [1, DRIVES_MAX] */
     uint8_t master_node;           /**< [1, 127]: the drives monitor the heartbeat of this node */
-    cia402_mode_t mode;            /**< CSP, IP or PP */
+    cia402_mode_t mode;            /**< CSP, IP or PP; of drives that have none of their own */
     uint32_t period_us;            /**< of the bus: cia402_is_period() */
     uint16_t heartbeat_ms;         /**< of both sides; > 0 */
     uint16_t heartbeat_timeout_ms; /**< of both sides; > heartbeat_ms */
@@ -124,19 +151,31 @@ typedef struct {
     uint32_t passive_stop_ms;      /**< the bus counts as failing after this time in error-passive; 0 = never */
     int16_t abort_option;          /**< 6007h: 1 fault, 2 disable voltage, 3 quick stop */
     uint8_t sync_counter;          /**< 1019h: 0 = none, or [2, 240] */
-    bool is_sync_watched;          /**< 1006h holds the period: drives may stop if SYNC is late */
-    bool is_reset_wanted;          /**< reset communication before setting up */
-    bool is_unguarded_allowed;     /**< drives without watchdogs are accepted */
-    bool is_homing_in_turn;        /**< one drive after the other */
+    uint8_t pdo_step;          /**< PDO records from those of a channel to those of the next, [1, 64]; 0 = 64, as in CiA 301 */
+    bool are_maps_fixed;       /**< the drives' maps are compared, not written */
+    cia402_maps_t commands;    /**< RPDOs: with 6040h, and 607Ah or 60C1h:01; of channel 0, others are at their distance */
+    cia402_maps_t answers;     /**< TPDOs: with 6041h and 6064h */
+    uint8_t answer_every;      /**< SYNCs between two answers of a drive, [0, CIA402_ANSWER_EVERY_MAX]; 0 as 1. Not in PP */
+    uint8_t telemetry;         /**< additional values that drives send: bits DRIVE_TELLS_... */
+    uint8_t telemetry_every;   /**< SYNCs between two telemetry PDOs, [1, 240] if there is telemetry */
+    bool is_guarded;           /**< node guarding in place of heartbeats, of both sides: for drives that have none */
+    bool is_sync_watched;      /**< 1006h holds the period: drives may stop if SYNC is late */
+    bool is_reset_wanted;      /**< reset communication before setting up */
+    bool is_unguarded_allowed; /**< drives without watchdogs are accepted */
+    bool is_homing_in_turn;    /**< one drive after the other */
+    bool is_support_checked;   /**< drives whose 6502h or 60E3h do not list the configured mode or homing method are refused */
     cia402_reaction_t reaction[CIA402_WATCHES];
     cia402_axis_config_t axis[DRIVES_MAX];
 } cia402_config_t;
+
+#define CIA402_ANSWER_EVERY_MAX 10u
 
 /** Phase of a drive's start-up; private. */
 typedef enum {
     CIA402_MISSING,
     CIA402_RESETTING,
     CIA402_CONFIGURING,
+    CIA402_CONFIGURED, /**< waits for the other axes of its node */
     CIA402_STARTING,
     CIA402_UP,
     CIA402_LEAVING, /**< lost; stop commands are sent for a while */
@@ -154,10 +193,12 @@ typedef struct {
     uint8_t tries;
     bool is_asked;     /* an SDO of this step is under way */
     uint8_t mode;      /* of CIA402_JOB_MODE and at the end of CIA402_JOB_SETUP */
-    uint8_t item;      /* of the start-up list, in its rows */
+    uint8_t item;      /* of the start-up list, or of a PDO, in its row */
+    uint8_t entry;     /* of a list in the drive, while it is searched */
     uint32_t value;    /* read in an earlier step */
     uint32_t refusal;  /* SDO abort code of the last write that was left to a check, */
     uint16_t refused;  /* and the index of its object; 0 = none */
+    uint16_t guard_ms; /* what 100Ch holds; 0 = not read */
     uint64_t since_us; /* of the row */
     uint64_t pause_us; /* nothing is done before */
 } cia402_setup_t;
@@ -170,6 +211,26 @@ typedef enum {
     CIA402_HOMING_RUNNING,
     CIA402_HOMING_DONE
 } cia402_homing_t;
+
+#define CIA402_TELEMETRY_PDOS 2u /**< the second one where one is too short */
+#define CIA402_PDOS           (2u * CIA402_MAPS_MAX + CIA402_TELEMETRY_PDOS)
+
+/** The PDOs of an axis, in the order of setting up: commands, answers, telemetry. */
+#define CIA402_COMMAND   0u
+#define CIA402_ANSWER    CIA402_MAPS_MAX
+#define CIA402_TELEMETRY (2u * CIA402_MAPS_MAX)
+
+/** What is in a PDO. */
+typedef struct {
+    uint32_t entry[CIA402_PDO_ENTRIES]; /**< as cia402_map_t has them, with the indices of their channels */
+    uint8_t entries;                    /**< 0 = not in use */
+    uint8_t bytes;
+    uint8_t every;   /**< SYNCs from one to the next */
+    uint8_t start;   /**< 1800h:06, see cia402_sync_start() */
+    uint16_t record; /**< 1400h or 1800h and so on; the map is 200h further */
+    uint16_t id;     /**< CAN identifier */
+    bool is_fixed;   /**< the map is not written */
+} cia402_pdo_t;
 
 /** State of one drive; private. Ordered so that there is no padding. */
 typedef struct {
@@ -187,24 +248,30 @@ typedef struct {
     uint8_t nmt_command;     /* command to be sent, 0 = none */
     uint8_t starts;          /* attempts to become operational */
     uint8_t mutes;           /* attempts that ended at an object without answer */
-    uint8_t awaited;         /* TPDOs requested by SYNC that are still missing, saturates */
+    uint8_t awaited;         /* SYNCs that no TPDO has answered yet, saturates */
     uint8_t surplus;         /* TPDOs without a request, saturates */
     uint8_t plain_syncs;     /* SYNCs since the last of these, saturates */
     bool is_reset_done;
     bool has_found;
+    bool is_asking; /* uses the SDO server of its node */
+    bool has_mates; /* its node has other axes */
     sdo_t sdo;
     cia402_setup_t setup;
     uint64_t heartbeat_us;
-    uint64_t boot_us; /* of the last boot-up message, 0 = none */
+    uint64_t guard_us; /* when it was asked for its state last */
+    uint64_t boot_us;  /* of the last boot-up message, 0 = none */
 
     int64_t position_counts; /* without the wrap-around of 32 bits */
     q32_t actual_q32;
     uint64_t actual_us;
     drive_emergency_t emergency;
+    drive_telemetry_t telemetry;
     uint64_t note_us[CIA402_WATCHES]; /* when each was seen last */
     uint32_t notes;                   /* reported: bit N for cia402_watch_t N */
     int32_t actual_counts;
     uint32_t silent_syncs;
+    uint8_t answered;                      /* bit N: answer N has come since the last whole set */
+    bool has_answered;                     /* a whole set came since it was set up last */
     uint8_t watch_answers[CIA402_WATCHES]; /* consecutive answers with the condition, saturates */
     bool has_followed;                     /* bit 12 was set since operation was enabled */
     bool had_voltage;                      /* bit 4 was set since operation was enabled */
@@ -212,9 +279,10 @@ typedef struct {
     uint16_t statusword;
     int8_t mode_shown;
     bool has_heartbeat;
-    bool has_actual;   /* since it was set up last */
-    bool was_heard;    /* has_actual at any time */
-    bool is_answering; /* answers, whether up or not */
+    uint8_t guard_toggle; /* of the last answer to guarding */
+    bool has_actual;      /* since it was set up last */
+    bool was_heard;       /* has_actual at any time */
+    bool is_answering;    /* answers, whether up or not */
 
     bool is_in;        /* takes part in the common stage */
     bool has_operated; /* operation was enabled since its stage began */
@@ -235,7 +303,7 @@ typedef struct {
     bool is_homed;
     bool has_sent;
     bool was_faulty;
-    uint8_t down_syncs; /* SYNCs since the last controlword that leads to power or torque, saturates */
+    uint8_t live_syncs; /* SYNCs in which the last controlword that leads to power or torque may not have shown yet */
 } cia402_axis_t;
 
 /** Common stage of all drives; private. */
@@ -279,9 +347,13 @@ typedef struct {
     uint32_t syncs;
     uint32_t sets;     /**< sent */
     uint32_t refused;  /**< sets that had to wait for the bus */
-    uint32_t restarts; /**< of the bus, that worked */
+    uint32_t restarts; /**< successful restarts of the bus */
     uint32_t emergencies;
+    sdo_t visitor; /* client for a person, beside the clients of the driver */
+    drive_object_state_t visit;
+    uint8_t visited; /* axis, while visit is BUSY */
     cia402_axis_t axis[DRIVES_MAX];
+    cia402_pdo_t pdo[DRIVES_MAX][CIA402_PDOS]; /* cia402_pdo() of each, which takes long to find in every period */
 } cia402_t;
 
 /** Starts; sends nothing yet.
@@ -296,39 +368,69 @@ drives_t cia402_hal(cia402_t *self);
  *  lost master and are not in fault at the next start. Drives with torque are left to their watchdogs. */
 void cia402_leave(cia402_t *self);
 
-/** What follows where a drive lacks an object, or refuses it. */
+/** Consequence if a drive lacks an object, or refuses it. */
 typedef enum {
     CIA402_WISH_NEEDED,  /**< the drive is refused */
     CIA402_WISH_GUARD,   /**< refused unless drives without guards are allowed */
     CIA402_WISH_IF_THERE /**< nothing */
 } cia402_wish_need_t;
 
-/** An object as a drive is set up. Begin with all zero. */
+/** An object of the configuration of a drive. Set all members to 0 before the first call. */
 typedef struct {
-    uint32_t value; /**< what it has to hold, but for COB-IDs that are switched off */
+    uint32_t value; /**< value that it has to hold, except for COB-IDs that are switched off */
     uint16_t index;
     uint8_t sub;
     uint8_t bytes;
     bool is_written;
-    bool is_compared; /**< it has to hold the value in the end */
-    bool is_own;      /**< not of a start-up list */
+    bool is_compared; /**< it has to hold the value at the end of the configuration */
+    bool is_own;      /**< set by heaved itself, not by a start-up list */
     cia402_wish_need_t need;
     uint8_t row;  /**< private */
     uint8_t item; /**< private */
 } cia402_wish_t;
 
-/** Walks through the objects of a drive, in the order of setting up.
+/** Goes to the next object of a drive, in the order of configuration.
  *  @return false after the last one */
 bool cia402_next_wish(const cia402_config_t *config, unsigned axis, cia402_wish_t *wish);
 
-/** True where some configuration sets drives up by writing this object. */
+/** True if heaved itself writes this object with some configuration. */
 bool cia402_is_own_object(uint16_t index, uint8_t sub);
+
+/** True for objects that a person must not write: those that the driver sets itself with this configuration, those that the
+ * motion uses, and those that scale a count. */
+bool cia402_is_relied_on(const cia402_config_t *config, unsigned axis, uint16_t index, uint8_t sub);
 
 /** True if 60C2h can hold this period: whole ms up to 255, or up to 255 of 100 us. */
 bool cia402_is_period(uint32_t period_us);
 
-#define CIA402_FILTERS_MAX (4u * DRIVES_MAX)
-#define CIA402_OWNS_MAX    (3u + 2u * DRIVES_MAX)
+/** Mode of the set-points of a drive. */
+cia402_mode_t cia402_mode(const cia402_config_t *config, unsigned axis);
+
+/** A PDO of an axis. A PDO of the whole node counts as PDO of channel 0.
+ *  @param which CIA402_COMMAND, CIA402_ANSWER or CIA402_TELEMETRY, and on; < CIA402_PDOS */
+cia402_pdo_t cia402_pdo(const cia402_config_t *config, unsigned axis, unsigned which);
+
+/** The axis to which the object of a mapped entry belongs, by node and channel.
+ *  @return config->axes: there is none */
+unsigned cia402_axis_of(const cia402_config_t *config, uint8_t node, uint32_t entry);
+
+/** The index that an object has in channel 0. */
+uint16_t cia402_plain_index(uint16_t index);
+
+/** True if the PDOs are valid: every node has at most four in each direction, and they contain all required objects, each of
+ * them completely.
+ *  @param why out: constant text, if they are not valid */
+bool cia402_pdos_fit(const cia402_config_t *config, const char **why);
+
+/** SYNCs between two answers of a drive, from 1. */
+uint8_t cia402_answer_every(const cia402_config_t *config);
+
+/** Value of the SYNC counter at which a drive begins to count SYNCs for a TPDO (1800h:06): drives that send it at every n-th
+ *  SYNC take turns. 0 = none: there is no counter, or its range is not a multiple of n. */
+uint8_t cia402_sync_start(const cia402_config_t *config, unsigned axis, uint8_t every);
+
+#define CIA402_FILTERS_MAX (7u * DRIVES_MAX) /* three and four TPDOs of a node */
+#define CIA402_OWNS_MAX    (3u + 6u * DRIVES_MAX)
 
 /** Identifiers that are received, and those that are sent, for the backend's open.
  *  @param filter out

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * cia402_state.h - the state machine of CiA 402 drives: decodes a statusword, and selects the controlword that leads to a goal.
- * Two constant tables; pure.
+ * Pure.
  */
 #ifndef HEAVE_CIA402_STATE_H
 #define HEAVE_CIA402_STATE_H

@@ -1,50 +1,50 @@
 /* SPDX-License-Identifier: MIT
- * deadman.h - whether a hand is still there: what a person holds goes on for a moment after the newest proof of it, no longer.
- * The proof is an echo: a client sends back the newest tick that it has heard of this machine, so that the tick's age says how
- * old the proof is at most, whatever happened on the way. What a stalled link delivers in a burst carries old ticks and counts
- * for nothing. Once the hand has been away only a new press begins again. Pure; time is an argument.
+ * deadman.h - hold-to-run: decides whether a person still holds a button ("the hand"). A motion continues only for a short time
+ * after the newest proof. For a proof, a client sends back the newest tick that it has received from this machine. The age of
+ * the tick is thus an upper limit for the age of the proof, whatever delayed it. A burst from a stalled link carries old ticks
+ * and is ignored. Once the proofs have ended, only a new press starts a motion again. Pure; time is an argument.
  */
 #ifndef HEAVE_DEADMAN_H
 #define HEAVE_DEADMAN_H
 
 #include "heave/fx.h"
 
-/** A proof counts for so long, from the tick that it echoes. */
+/** A proof is valid for this time, counted from its tick. */
 #define DEADMAN_HOLD_US 250000u
 
-/** A hand; members are private to deadman.c but for display. All zero: none, and none before. */
+/** State of the hand. Other modules may read members for display only. All zero: nothing is held, or was held before. */
 typedef struct {
     bool is_held;
     uint32_t series;   /**< of the newest press; 0 = none yet */
     uint32_t counter;  /**< of the newest beat of that series */
-    uint64_t until_us; /**< while is_held: until then */
+    uint64_t until_us; /**< while is_held: the newest proof is valid until this time */
 } deadman_t;
 
-/** What became of a press or a beat. */
+/** Result of a press or a beat. */
 typedef enum {
     DEADMAN_TAKEN,
-    DEADMAN_STALE, /**< the tick is too old, or of a time that has not come: nothing changes */
-    DEADMAN_OVER,  /**< of a beat: its series is not held, or not any more; it takes a new press */
-    DEADMAN_KNOWN  /**< of a beat: not newer than the last; of a press: such a series was held before. Nothing changes */
+    DEADMAN_STALE, /**< the tick is too old, or in the future: nothing changes */
+    DEADMAN_OVER,  /**< beat: its series is not held, or not any more; a new press is needed */
+    DEADMAN_KNOWN  /**< beat: its counter is not newer than the last one; press: this series is not new. Nothing changes */
 } deadman_answer_t;
 
-/** Begins a series. A hand that is there gives way.
- *  @param series above that of every press before
- *  @param age_us of the tick that it echoes */
+/** Begins a series, and ends one that is held.
+ *  @param series above that of every earlier press
+ *  @param age_us age of the tick that was sent back */
 deadman_answer_t deadman_press(deadman_t *self, uint32_t series, uint64_t age_us, uint64_t now_us);
 
-/** Goes on with it.
- *  @param counter above that of every beat of this series before; the first is at least 1 */
+/** Prolongs the series.
+ *  @param counter above that of every earlier beat of this series; the first is at least 1 */
 deadman_answer_t deadman_beat(deadman_t *self, uint32_t series, uint32_t counter, uint64_t age_us, uint64_t now_us);
 
-/** Lets go. */
+/** Ends the series: the button was released. */
 void deadman_release(deadman_t *self);
 
-/** Once per cycle, before anything moves.
- *  @return true while the hand is there */
+/** Call it once per cycle, before the motion.
+ *  @return true while the series is held */
 bool deadman_step(deadman_t *self, uint64_t now_us);
 
-/** True for one that may be used, whatever file it comes from; see sane.h. */
+/** True if all members are valid; for data that was loaded from a file, see sane.h. */
 bool deadman_is_sane(const deadman_t *self);
 
 #endif

@@ -68,15 +68,30 @@ typedef struct {
     bool is_over;     /**< the drive has cleared it since, or has restarted */
 } drive_emergency_t;
 
+/** Values that a drive measures in addition to its position: bits of drive_telemetry_t.has. */
+enum { DRIVE_TELLS_TORQUE = 1, DRIVE_TELLS_LAG = 2, DRIVE_TELLS_INPUTS = 4 };
+
+/** The newest of these values. All 0: none yet. */
+typedef struct {
+    uint64_t at_us;
+    q32_t lag_q32;           /**< following error as the drive calculates it: demanded minus actual position [mm, deg] */
+    int32_t torque_permille; /**< of the rated torque; positive pushes out */
+    uint32_t inputs;         /**< digital inputs, as 60FDh has them: bit 0 negative limit, 1 positive limit, 2 home */
+    uint8_t has;             /**< values that the drive sends */
+} drive_telemetry_t;
+
 /** Status of one drive in words. Constant texts, "" if there is nothing to report; never NULL. */
 typedef struct {
     bool is_modbus;      /**< address is a unit, object a register << 8 */
-    uint8_t address;     /**< on the bus; 0 = none */
+    uint8_t address;     /**< on the bus; 0 = none; with an identifier: number of the drive */
+    uint8_t channel;     /**< its axis at this address, from 1; 0 = there is no other */
+    uint32_t identifier; /**< CAN identifier of its replies, for drives with frames of their own; 0 = another bus */
     const char *phase;   /**< "missing", "configuring", "ready", "enabled", "fault", or the reason for waiting */
     const char *trouble; /**< present or last problem */
     const char *detail;  /**< details of the problem */
     const char *error;   /**< meaning of emergency.code; NULL if there was none */
     drive_emergency_t emergency;
+    drive_telemetry_t telemetry;
     uint32_t code;        /**< number of trouble, 0 = none */
     uint32_t object;      /**< object being written, or object of the trouble: index << 8 | sub-index; 0 = none */
     uint32_t detail_code; /**< of the protocol, or the value found; 0 = none */
@@ -108,16 +123,39 @@ static inline bool drives_allow(drives_request_t request, drive_state_t state)
     return request != DRIVES_HOME || state == DRIVE_ENABLED;
 }
 
-/** Every op is mandatory but those that say so. */
+#define DRIVE_OBJECT_BYTES 64u
+
+/** An entry of the object dictionary of a drive, for a person who reads or sets it. The motion does not use this. */
+typedef struct {
+    uint16_t index;
+    uint8_t sub;
+    bool is_write;
+    uint8_t size; /**< number of bytes in value: [1, DRIVE_OBJECT_BYTES] for a write; after a read, those received */
+    uint8_t value[DRIVE_OBJECT_BYTES]; /**< least significant byte first */
+} drive_object_t;
+
+/** Progress of an access to such an entry. */
+typedef enum {
+    DRIVE_OBJECT_NONE, /**< there was none */
+    DRIVE_OBJECT_BUSY,
+    DRIVE_OBJECT_DONE,
+    DRIVE_OBJECT_REFUSED, /**< by the drive, with a code of its protocol */
+    DRIVE_OBJECT_SILENT,  /**< no answer in time */
+    DRIVE_OBJECT_LEFT     /**< cancelled: the driver itself needed the drive, or has lost it */
+} drive_object_state_t;
+
+/** All ops are mandatory, except those marked as optional. */
 typedef struct {
     hv_status_t (*poll)(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX]);
     hv_status_t (*send)(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX]);
     hv_status_t (*request)(void *ctx, drives_request_t request);
     uint8_t (*count)(void *ctx);
-    void (*report)(void *ctx, uint8_t axis, drive_report_t *out);                  /* optional */
-    bool (*is_failing)(void *ctx);                                                 /* optional: never */
-    hv_status_t (*request_one)(void *ctx, uint8_t axis, drives_request_t request); /* optional: all or none */
-    bool (*counts)(void *ctx, uint8_t axis, int64_t *out);                         /* optional: not known */
+    void (*report)(void *ctx, uint8_t axis, drive_report_t *out);                       /* optional */
+    bool (*is_failing)(void *ctx);                                                      /* optional: never */
+    hv_status_t (*request_one)(void *ctx, uint8_t axis, drives_request_t request);      /* optional: all or none */
+    bool (*counts)(void *ctx, uint8_t axis, int64_t *out);                              /* optional: not known */
+    hv_status_t (*object_begin)(void *ctx, uint8_t axis, const drive_object_t *object); /* optional, with the next */
+    drive_object_state_t (*object_end)(void *ctx, drive_object_t *out, uint32_t *code);
 } drives_ops_t;
 
 /** Passed by value; ctx belongs to the backend and lives until its close. */
@@ -126,7 +164,7 @@ typedef struct {
     void *ctx;
 } drives_t;
 
-/** True where every mandatory op is there; refuse to start otherwise. */
+/** True if every mandatory op is set. If not, refuse to start. */
 static inline bool drives_valid(drives_t drives)
 {
     return drives.ops != NULL && drives.ops->poll != NULL && drives.ops->send != NULL && drives.ops->request != NULL &&
@@ -163,7 +201,7 @@ static inline HV_MUST_CHECK hv_status_t drives_send(drives_t drives, uint64_t no
 
 /** Requests a change of all axes; asynchronous. A newer request replaces an unfinished one. Never blocks (<= 50 us). The next
  *  poll already returns ENABLING or HOMING for ENABLE or HOME, so that the previous state cannot be mistaken for the end of the
- *  request; later polls show the end. Axes whose state the request does not concern stay as they are.
+ *  request; later polls show the end. Axes in other states do not change.
  *  @return HV_OK: taken; HV_ERR_AGAIN: not taken, repeat it in the next cycle; HV_ERR_STATE: not every axis is in a state that
  * the request needs (ENABLE: DISABLED, ENABLING or ENABLED; HOME: ENABLED), nothing changes; HV_ERR_IO: the bus is gone, no drive
  * receives it. */
@@ -172,22 +210,42 @@ static inline HV_MUST_CHECK hv_status_t drives_request(drives_t drives, drives_r
     return drives.ops->request(drives.ctx, request);
 }
 
-/** The same to a single axis, for a machine in service: the others stay as they are, and so do their set-points. Requests to all
- *  override it. ENABLE and HOME need the state of this axis only.
+/** The same for a single axis, for SERVICE: the other axes and their set-points do not change. Requests to all axes override
+ * it. ENABLE and HOME need the state of this axis only.
  *  @param axis [0, drives_count())
- *  @return as drives_request(); HV_ERR_NOSUP: this bus brings its drives up together only */
+ *  @return as drives_request(); HV_ERR_NOSUP: this bus can only enable all drives together */
 static inline HV_MUST_CHECK hv_status_t drives_request_one(drives_t drives, uint8_t axis, drives_request_t request)
 {
     return drives.ops->request_one != NULL ? drives.ops->request_one(drives.ctx, axis, request) : HV_ERR_NOSUP;
 }
 
-/** The position as the drive itself counts it, before scale, sign and zero; for people. As of the last poll; never blocks.
+/** Raw count of the drive's position, before scale, sign and zero, for people. As of the last poll; never blocks.
  *  @param axis [0, drives_count())
- *  @param out unchanged where false is returned
- *  @return false: nothing was heard of it yet, or this backend has no counts */
+ *  @param out unchanged if the function returns false
+ *  @return false: the drive has not sent it yet, or this backend has no counts */
 static inline bool drives_counts(drives_t drives, uint8_t axis, int64_t *out)
 {
     return drives.ops->counts != NULL && drives.ops->counts(drives.ctx, axis, out);
+}
+
+/** Begins to read or to write an entry of a drive's dictionary. It does not affect the motion. One access at a time is possible
+ * on the whole bus, and the following polls carry it out. Never blocks (<= 50 us).
+ *  @param axis   [0, drives_count())
+ *  @param object copied
+ *  @return HV_OK: begun; HV_ERR_AGAIN: another access is in progress; HV_ERR_STATE: the drive does not answer, or the driver is
+ * talking to it; HV_ERR_ARG: a write to an entry that the driver itself relies on; HV_ERR_RANGE: no such size; HV_ERR_NOSUP:
+ * these drives have no such dictionary */
+static inline HV_MUST_CHECK hv_status_t drives_object_begin(drives_t drives, uint8_t axis, const drive_object_t *object)
+{
+    return drives.ops->object_begin != NULL ? drives.ops->object_begin(drives.ctx, axis, object) : HV_ERR_NOSUP;
+}
+
+/** State of the last access, as of the last poll.
+ *  @param out  in DONE after a read: size and value; else unchanged
+ *  @param code in REFUSED: the drive's reason; else unchanged */
+static inline drive_object_state_t drives_object_end(drives_t drives, drive_object_t *out, uint32_t *code)
+{
+    return drives.ops->object_end != NULL ? drives.ops->object_end(drives.ctx, out, code) : DRIVE_OBJECT_NONE;
 }
 
 /** Status of a drive, for display. Never blocks.

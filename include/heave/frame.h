@@ -67,15 +67,15 @@ typedef enum {
  *  Offsets count bytes from the start of the datagram (or since the last reset of a serial feed, modulo 2^32). */
 typedef struct {
     frame_error_t error;
-    uint32_t offset;  /**< of the first offending byte: the first that cannot stand there, or where a value out of range starts */
-    uint32_t start;   /**< of the frame's head (or of the first stray byte) */
-    uint32_t end;     /**< one past the last byte that belongs to the rejected text */
-    uint8_t field;    /**< 1-based index of the value concerned, mask or time being the last; 0 where none is */
-    uint8_t expected; /**< FRAME_ERR_COUNT: values the command takes before mask or time, else 0 */
-    uint8_t found;    /**< FRAME_ERR_COUNT: values seen, any mask or time included, else 0; stops at 255 */
-    uint8_t byte;     /**< at offset, where that byte itself is what is wrong; else 0 */
-    uint32_t look_alike;     /**< code point of a non-ASCII character (UTF-8) at offset, 0 where it is ASCII or not UTF-8 */
-    frame_command_t command; /**< FRAME_COMMANDS where none was recognised */
+    uint32_t offset;         /**< of the first byte that is not allowed there, or of the start of a value out of range */
+    uint32_t start;          /**< of the frame's head (or of the first stray byte) */
+    uint32_t end;            /**< one past the last byte that belongs to the rejected text */
+    uint8_t field;           /**< index of the value concerned, from 1; mask or time is the last; 0: none */
+    uint8_t expected;        /**< FRAME_ERR_COUNT: values the command takes before mask or time, else 0 */
+    uint8_t found;           /**< FRAME_ERR_COUNT: values seen, any mask or time included, else 0; stops at 255 */
+    uint8_t byte;            /**< the byte at offset if this byte is the error; else 0 */
+    uint32_t look_alike;     /**< code point of a non-ASCII character (UTF-8) at offset; 0: it is ASCII or not UTF-8 */
+    frame_command_t command; /**< FRAME_COMMANDS: none was recognised */
     bool is_timed;           /**< the T form of command */
 } frame_reject_t;
 
@@ -92,8 +92,8 @@ typedef struct {
     uint8_t mask_digits;
     bool is_mask_prefixed; /**< `0x` was read */
     bool is_mask_ended;    /**< a blank after the mask was read */
-    bool is_headless;      /**< the frame being read has no head of its own */
-    bool may_be_headless;  /**< lenient: a command may stand right here */
+    bool is_headless;      /**< the frame being read began without a head (`@`) */
+    bool may_be_headless;  /**< lenient dialect: a frame without a head may begin here */
     bool has_event;        /**< this datagram has led to an event */
     uint32_t offset;       /**< of the next byte */
     uint32_t start;        /**< of the frame or stray text being read */

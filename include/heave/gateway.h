@@ -166,7 +166,7 @@ typedef struct {
     uint64_t following_since_us[CYLINDERS_MAX]; /**< start of a distance from the set-point that is too large; 0 = none */
     bring_up_t bring_up;
     uint64_t bring_up_deadline_us;
-    bool is_bus_lost;        /**< so that the fault is counted once */
+    bool is_bus_lost;        /**< the fault has been counted already */
     bool is_bus_failing;     /**< the same */
     bool is_estop_apart;     /**< the same */
     bool is_power_overdue;   /**< the same */
@@ -206,21 +206,30 @@ void gateway_save(const gateway_t *self, gateway_t *out);
  *  @return HV_OK; HV_ERR_ARG as gateway_init, for another platform, or for a state that no gateway saves: self is unchanged */
 hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io) HV_MUST_CHECK;
 
-/** Takes over what may change in operation: silence, take-over and priorities, dialect, safe mask and its delay, following error,
- *  spike gate, confirmation of far jumps. Ignores the rest of the settings. */
+/** Takes over the settings that may change in operation: silence, take-over and priorities, dialect, safe mask and its delay,
+ * following error, spike gate, confirmation of far jumps. Ignores the rest of the settings. */
 void gateway_reload(gateway_t *self, const settings_t *settings);
 
-/** What an operator asks for: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET, EVENT_SHUTDOWN, EVENT_SERVICE or
+/** A request of an operator: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET, EVENT_SHUTDOWN, EVENT_SERVICE or
  *  EVENT_SERVICE_OFF.
- *  @return HV_OK; HV_ERR_STATE where the state does not allow it: nothing changes. */
+ *  @return HV_OK; HV_ERR_STATE: the state does not allow it, and nothing changes. */
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us) HV_MUST_CHECK;
 
-/** What a person does by hand, in SERVICE.
- *  @return SERVICE_DONE; or why not: nothing changes */
+/** A request for manual operation in SERVICE.
+ *  @return SERVICE_DONE; or the reason why not: nothing changes */
 service_answer_t gateway_service(gateway_t *self, const service_request_t *request, uint64_t now_us) HV_MUST_CHECK;
 
-/** How old a tick is that the snapshot showed (service.tick_us) and that a client echoes now; UINT64_MAX for one that it never
- *  showed. */
+/** Begins a person's access to an object of a drive: reading in OFF, SERVICE, FAULT and ESTOP, writing in SERVICE while nothing
+ *  moves. No cycle depends on it, so recordings do not hold it. gateway_object_end() returns its result.
+ *  @param drive from 1
+ *  @return SERVICE_DONE: begun; or the reason why not: nothing changes */
+service_answer_t gateway_object_begin(gateway_t *self, unsigned drive, const drive_object_t *object) HV_MUST_CHECK;
+
+/** As drives_object_end(). */
+drive_object_state_t gateway_object_end(gateway_t *self, drive_object_t *out, uint32_t *code);
+
+/** Age of a tick that a client sends back now. The snapshot showed it as service.tick_us; UINT64_MAX if the snapshot never
+ * showed it. */
 uint64_t gateway_tick_age(const gateway_t *self, uint64_t tick_us);
 
 /** Sets the intensity, which changes by a ramp (see motion_set_intensity). Allowed in every state.
@@ -246,7 +255,7 @@ void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis);
  *  answers; then a line of the log names them. */
 bool gateway_is_finished(const gateway_t *self);
 
-/** Drives whose torque is on as far as is known: bit i for axis i + 1. For lost drives: the last known state. */
+/** Drives that have torque, as far as is known: bit i for axis i + 1. For lost drives: the last known state. */
 uint32_t gateway_energized(const gateway_t *self);
 
 #endif

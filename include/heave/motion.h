@@ -34,7 +34,7 @@ typedef struct {
 enum {
     MOTION_CLAMPED = 1u << 0,      /**< the requested pose or extension exceeds its limits and was pulled in */
     MOTION_SPEED = 1u << 1,        /**< a speed limit held it back */
-    MOTION_ACCEL = 1u << 2,        /**< an acceleration limit did */
+    MOTION_ACCEL = 1u << 2,        /**< an acceleration limit held it back */
     MOTION_STRETCHED = 1u << 3,    /**< the running timed move takes longer than asked */
     MOTION_TAKEOVER = 1u << 4,     /**< moving to a sender's first pose at engage speed */
     MOTION_IN_CYLINDERS = 1u << 5, /**< moving in cylinder space: pose limits do not apply */
@@ -49,13 +49,13 @@ typedef struct {
     q32_t extension_mm_q32[CYLINDERS_MAX];
     q32_t angle_deg_q32;
     unsigned flags;
-    uint8_t limiting_cylinder; /**< 1-based: the one that bounds a clamped pose, 0 where none does */
+    uint8_t limiting_cylinder; /**< the cylinder that bounds a clamped pose, from 1; 0: none */
 } motion_output_t;
 
 typedef struct motion motion_t;
 
 /** Prepares a platform; everything rests at the settled extension.
- *  @return HV_OK; HV_ERR_RANGE where a setting is outside its range or neutral and settled positions are out of reach. */
+ *  @return HV_OK; HV_ERR_RANGE: a setting is outside its range, or the neutral or settled position cannot be reached. */
 hv_status_t motion_init(motion_t *self, const settings_t *settings) HV_MUST_CHECK;
 
 /** Sets the set-points to the actual positions, at rest. Before the drives are enabled, and in an e-stop. */
@@ -84,6 +84,10 @@ void motion_step(motion_t *self, uint64_t now_us, motion_output_t *out);
 /** True when a stop, settle or rise has ended and everything is exactly at rest. */
 bool motion_is_done(const motion_t *self);
 
+/** True during a stop: a requested one, or that of a jog that leads to where the cylinders would not hold the
+ *  plate (a singularity). */
+bool motion_is_stopping(const motion_t *self);
+
 /** True when every set-point rests. */
 bool motion_is_at_rest(const motion_t *self);
 
@@ -98,7 +102,7 @@ hv_status_t motion_set_intensity(motion_t *self, unsigned percent) HV_MUST_CHECK
 /** Intensity asked for and in force, for display. */
 const intensity_t *motion_intensity(const motion_t *self);
 
-/** End of the timed move that is running, us on the clock of motion_target; 0 where none is. */
+/** End of the timed move that is running, us on the clock of motion_target(); 0: none. */
 uint64_t motion_timed_end_us(const motion_t *self);
 
 /** Timed moves that had to be stretched since the start. */

@@ -30,7 +30,7 @@ typedef enum {
 owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t silence_us, const hal_udp_networks_t *priority,
                             uint64_t busy_until_us, uint64_t now_us);
 
-/** True for one that may be used, whatever file it comes from; see sane.h. */
+/** True if all members are valid; for data that was loaded from a file, see sane.h. */
 bool owner_is_sane(const owner_t *self);
 
 #endif

@@ -70,9 +70,11 @@ typedef struct {
 
     q16_t engage_speed_mm_s_q16;
     q16_t engage_accel_mm_s2_q16;
-    q16_t jog_mm_s_q16;  /**< no cylinder is faster while it is led by hand; 0: none is led */
-    q16_t jog_deg_s_q16; /**< nor a rotation */
-    uint32_t blend_ms;   /**< [250, 20000]: shortest time for blending a sender in */
+    q16_t jog_mm_s_q16;                  /**< no cylinder is faster while it is led by hand; 0: none is led */
+    q16_t jog_deg_s_q16;                 /**< nor a rotation */
+    q16_t signal_mm_q16, signal_deg_q16; /**< no test signal is wider, from its middle to one side */
+    q16_t signal_mm_s_q16;               /**< no cylinder is faster in one */
+    uint32_t blend_ms;                   /**< [250, 20000]: shortest time for blending a sender in */
 
     int32_t intensity_start_percent; /**< [0, max] of a sender's motion about neutral */
     uint32_t intensity_max_percent;  /**< [1, 100] */

@@ -76,9 +76,9 @@ typedef struct {
     int64_t rough_us_q16;  /**< largest recent change of the lateness between two samples */
     unsigned counted;      /**< samples that losses are counted in */
     int32_t lost_q16;      /**< lost samples for each that came */
-    unsigned each;         /**< the sender sends one sample in so many periods, for a while */
+    unsigned each;         /**< for a while, the sender sends one sample per this many periods */
     bool is_sparse;        /**< so sparse that the curve waits for each sample until the next one is here */
-    unsigned stalled;      /**< samples at the usual pace that were later than can be waited for */
+    unsigned stalled;      /**< samples at the usual pace that were too late to wait for */
     unsigned between;      /**< samples in a row that lay half-way between two of the line */
 } stream_clock_t;
 
@@ -101,8 +101,10 @@ typedef struct {
     q32_t first_q32;   /**< in the first period */
     q32_t go_q32;      /**< in the later ones, if it did not fade */
     uint32_t rise_q32; /**< share of its time in which the acceleration builds up, [0, 0.5] */
-    int32_t reach_q16; /**< how far it goes, in periods ... */
-    int32_t full_q16;  /**< ... so many of them before it slows down */
+    int32_t reach_q16; /**< duration of the extrapolation, in periods */
+    int32_t full_q16;  /**< periods of these before it slows down */
+    q32_t bend_q32;    /**< of an oscillation: change of the step in the first period */
+    int64_t pull_q32;  /**< of an oscillation: share of each step that is subtracted from that change; 0: no oscillation */
 } stream_lead_t;
 
 /** Resolution of a sender's values on one axis; private to src/motion. */
@@ -116,33 +118,36 @@ typedef struct {
 
 /** The points of the curve, by index modulo the ring; members are private to src/motion. */
 typedef struct {
-    q32_t point_q32[STREAM_POINTS][AXES_MAX]; /**< what is known best of each index: a sample, or the guess committed */
-    bool is_sample[STREAM_POINTS];            /**< of the indices beyond head */
-    q32_t control_q32[AXES_MAX];  /**< the oldest of four control points, as committed: points and what was still off them */
-    int64_t way_q36[3][AXES_MAX]; /**< from each of the four to the next */
-    q32_t off_q32[AXES_MAX][3];   /**< control less point at head, and how that changes per period and period^2 */
+    q32_t point_q32[STREAM_POINTS][AXES_MAX]; /**< best known value of each index: a sample, or the committed guess */
+    bool is_sample[STREAM_POINTS];            /**< for the indices after head: the point is a sample */
+    q32_t control_q32[AXES_MAX];  /**< the oldest of the four committed control points: point plus offset at that time */
+    int64_t way_q36[3][AXES_MAX]; /**< distance from each of these four to the next */
+    q32_t off_q32[AXES_MAX][3];   /**< offset: control point minus point at head, and its change per period and period^2 */
+    q32_t low_q32[AXES_MAX];      /**< recent range of the motion, lower end: the offset never leads the curve out of it */
+    q32_t high_q32[AXES_MAX];     /**< upper end */
     stream_lead_t lead[AXES_MAX];
     stream_quantum_t grain[AXES_MAX];
-    uint32_t watched;               /**< samples since the watch for a grain began */
-    int32_t window;                 /**< each control point is a mean of so many points, thrice; 1: the point */
+    uint32_t watched; /**< samples since the watch for a grain began */
+    int32_t window;   /**< each control point is a running mean of this many points, applied three times; 1: the point itself */
     uint8_t weight[STREAM_WEIGHTS]; /**< of the points in that mean, the newest first: 75 at most */
     int64_t period_cycles_q16;      /**< cycles in a period */
-    int64_t lead_q32;               /**< of the step of the last period, that a control point is ahead of its point */
-    q32_t mean_q32;                 /**< share of a mean of some points that a point is replaced by */
-    q32_t led_q32;                  /**< share of the way ahead that control points are led */
-    uint32_t mean_points;           /**< so many */
-    int32_t reach_min_q16;          /**< periods that a motion is kept up where samples are missing */
+    int64_t lead_q32;               /**< distance of a control point ahead of its point, as share of the last step */
+    q32_t mean_q32;                 /**< a point is replaced by a mean of some points to this share */
+    q32_t led_q32;                  /**< share of the distance to the predicted point by which control points are led */
+    uint32_t mean_points;           /**< number of points in that mean */
+    uint32_t fitted;                /**< points used to detect an oscillation */
+    int32_t reach_min_q16;          /**< shortest and longest time, in periods, of a motion without samples */
     int32_t reach_max_q16;
-    int32_t change; /**< how much the points at head are others than the curve went through, in guesses; 0: they are the same */
-    q32_t was_q32[3][AXES_MAX]; /**< what the curve went through at head and before it, if so */
-    bool is_off;                /**< on some axis */
-    int64_t grip_q32;           /**< how firmly off is taken back, per period */
-    int64_t softest_q32;        /**< the least grip */
-    int32_t age;                /**< samples since the stream began at rest, as far as that counts */
-    int32_t patience;           /**< guesses before the stream is taken for ended */
+    int32_t change; /**< how much the points at head have changed since the curve passed them, in guesses; 0: not at all */
+    q32_t was_q32[3][AXES_MAX]; /**< if changed: points at head and before it that the curve has passed */
+    bool is_off;                /**< an axis has an offset */
+    int64_t grip_q32;           /**< rate at which the offset is taken back, per period */
+    int64_t softest_q32;        /**< smallest grip_q32 */
+    int32_t age;                /**< samples since the stream began at rest, up to a maximum */
+    int32_t patience;           /**< number of guesses after which the stream counts as ended */
     governor_limits_t limits[AXES_MAX];
     governor_t governor;
-    int32_t scale_q16;          /**< that the references will be multiplied by, for the governor */
+    int32_t scale_q16;          /**< factor by which the references will be multiplied, for the governor */
     q32_t newest_q32[AXES_MAX]; /**< the newest sample, as it came ... */
     q32_t last_q32[AXES_MAX];   /**< ... and at its place on the time line */
     uint32_t head;              /**< index of the newest point committed */
@@ -161,23 +166,23 @@ typedef enum {
 typedef struct {
     uint64_t last_us;          /**< newest arrival, taken or not */
     uint32_t gaps_us;          /**< mean interval of arrivals, times 64 */
-    uint32_t each;             /**< one of so many samples is taken */
-    uint32_t each_taken;       /**< so it was when the last one was taken */
-    uint32_t passed;           /**< samples not taken since the last that was */
-    bool has_spare;            /**< the newest sample is not taken */
+    uint32_t each;             /**< one of this many samples is taken */
+    uint32_t each_taken;       /**< value of each when the last sample was taken */
+    uint32_t passed;           /**< samples skipped since the last one that was taken */
+    bool has_spare;            /**< the newest sample was not taken */
     q32_t spare_q32[AXES_MAX]; /**< that sample */
 } stream_thin_t;
 
 /** How often a sender repeats each value; members are private to src/motion. */
 typedef struct {
-    uint64_t began_us; /**< the first of these came */
+    uint64_t began_us; /**< arrival of the first of the equal samples */
     uint32_t run;      /**< equal samples so far */
     uint32_t each;     /**< repetitions of each value; 1: the sender does not repeat values */
-    uint32_t frames;   /**< in the newest runs that were counted */
-    uint32_t span_us;  /**< these took */
-    uint32_t runs;     /**< these */
-    uint32_t telling;  /**< of these, by a step that is no rounding */
-    uint32_t longest;  /**< of these */
+    uint32_t frames;   /**< frames in the newest counted runs */
+    uint32_t span_us;  /**< duration of these runs */
+    uint32_t runs;     /**< number of these runs */
+    uint32_t telling;  /**< runs of these whose step is larger than rounding */
+    uint32_t longest;  /**< longest of these runs */
 } stream_repeat_t;
 
 /** Stream state; members are private to src/motion. */
@@ -189,13 +194,13 @@ typedef struct {
     stream_repeat_t repeat;
     bool is_fresh;        /**< no reference given since the start */
     bool is_hidden;       /**< see stream_hide_start() */
-    unsigned pair;        /**< samples so far of what may become a stream, ... */
-    uint32_t pair_gap_us; /**< ... the longest interval between them, ... */
-    uint64_t began_us;    /**< ... and when the first came */
+    unsigned pair;        /**< number of samples so far that may become a stream */
+    uint32_t pair_gap_us; /**< longest interval between them */
+    uint64_t began_us;    /**< arrival of the first of them */
     stream_clock_t clock;
     stream_evidence_t evidence;
-    q32_t misfit_q32; /**< how far values have lately been off where the motion led, in speed limits */
-    unsigned losses;  /**< long intervals in a row that were losses by their values, as far as that counts */
+    q32_t misfit_q32; /**< recent distance of values from the predicted motion, in units of the speed limit */
+    unsigned losses;  /**< long intervals in a row that were losses according to their values, up to a maximum */
     stream_curve_t curve;
     q32_t between_q32; /**< render phase behind head, [0, 1) */
     q32_t rate_q32[2]; /**< periods per cycle behind the first and the second low-pass; the second is rendered */

@@ -18,8 +18,8 @@ typedef enum {
     STATE_ENGAGED,  /**< follows the sender */
     STATE_HOLD,     /**< stopped where it is, drives enabled */
     STATE_SETTLING, /**< to the settled extension at engage speed */
-    STATE_SERVICE,  /**< nobody on board: moved by hand, drive by drive, while the hand is there; senders are not followed */
-    STATE_FAULT,    /**< latched: stopped as the fault asks for, then drives disabled */
+    STATE_SERVICE,  /**< nobody on board: single drives are moved while a person holds a button; senders are not followed */
+    STATE_FAULT,    /**< latched: stopped with the reaction of the fault, then drives disabled */
     STATE_ESTOP,    /**< latched: targets stopped, set-points follow the actual positions */
     STATES
 } state_t;
@@ -56,9 +56,9 @@ typedef enum {
     ACTION_FOLLOW,     /**< follow the sender, the first pose at engage speed */
     ACTION_STOP,       /**< controlled stop where it is */
     ACTION_STAY,       /**< arrived: nothing to move */
-    ACTION_OFF,        /**< bring to rest what still moves, then disable the drives */
-    ACTION_FAULT_STOP, /**< stop as the fault's row says, disable the drives; relays to the safe mask */
-    ACTION_SERVE,      /**< nothing moves but what a hand leads; drives stay as they are */
+    ACTION_OFF,        /**< bring all axes to rest, then disable the drives */
+    ACTION_FAULT_STOP, /**< stop with the reaction of the fault, disable the drives; relays to the safe mask */
+    ACTION_SERVE,      /**< only manual motion is possible; the drives do not change */
     ACTION_ESTOP       /**< stop targets at once, set-points follow actual; relays to the safe mask */
 } action_t;
 
@@ -73,7 +73,7 @@ typedef struct {
 /** A platform's state; others read it, only supervisor.c writes it. */
 typedef struct {
     state_t state;
-    state_t goal;             /**< where it is to end up: STATE_OFF, STATE_SETTLED, STATE_NEUTRAL or STATE_ENGAGED */
+    state_t goal;             /**< state to end in: STATE_OFF, STATE_SETTLED, STATE_NEUTRAL or STATE_ENGAGED */
     state_t interrupted;      /**< in HOLD: the state that was interrupted */
     bool is_held_by_silence;  /**< HOLD, RISING or NEUTRAL because the sender fell silent: its next frame engages again */
     uint32_t ignored[EVENTS]; /**< events that had no row for the state, by event; wraps */
@@ -98,7 +98,7 @@ bool supervisor_is_latched(const supervisor_t *self);
 const char *state_name(state_t state);
 const char *event_name(event_t event);
 
-/** True for one that may be used, whatever file it comes from; see sane.h. */
+/** True if all members are valid; for data that was loaded from a file, see sane.h. */
 bool supervisor_is_sane(const supervisor_t *self);
 
 #endif

@@ -22,15 +22,24 @@ typedef struct {
     sync_stop_times_t times[AXES_MAX]; /**< equal, except for an axis near a limit or planned separately */
     ramp_state_t start[AXES_MAX];
     ramp_state_t now[AXES_MAX];
-    q32_t rest_q32[AXES_MAX]; /**< where it ends */
+    q32_t rest_q32[AXES_MAX]; /**< end position */
 } sync_stop_t;
+
+/** Cylinders that move with pose axes and have limits of their own. */
+typedef struct {
+    unsigned count;
+    const ramp_state_t *state[CYLINDERS_MAX];
+    const ramp_limits_t *limits[CYLINDERS_MAX];
+} sync_stop_riders_t;
 
 /** Plans the quickest stop within acceleration and jerk limits.
  *  @param start may be self->start
- *  @param together number of axes, from the first on, that stop in the same cycles. An axis that would leave its bounds or exceed
- *                  its speed, and the axes after `together`, get their own times */
+ *  @param together number of axes, from the first on, that stop in the same cycles. An axis that would leave its bounds or
+ * exceed its speed, and the axes after `together`, get their own times
+ *  @param riders   their acceleration and jerk limits are kept too, as far as they move in proportion to the axes; NULL: none
+ */
 void sync_stop_plan(sync_stop_t *self, unsigned axes, unsigned together, const ramp_state_t *start,
-                    const ramp_limits_t *const *limits);
+                    const ramp_limits_t *const *limits, const sync_stop_riders_t *riders);
 
 /** End positions of such a stop of all axes together, without planning it. */
 void sync_stop_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits, q32_t *rest_q32);

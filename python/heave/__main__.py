@@ -2,6 +2,7 @@
 """heave check, heave plot: what can be told of runs."""
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Sequence
 
@@ -14,6 +15,7 @@ USAGE = """usage: heave check [--json] [--strict] [--frames FRAMES] [--every N] 
 
 
 def main(words: Sequence[str] | None = None) -> int:
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `| head` ends it without a word, as other programs
     words = list(sys.argv[1:] if words is None else words)
     if words[:1] == ["check"]:
         from heave.judge.command import main as check

@@ -4,7 +4,11 @@
 Written from the convention alone, so that it can contradict the core. Numbers with a fraction are taken as the nearest Q16.16, which is
 what a configuration can hold. A key that has no obvious default must stand in the file: `heaved --dump-config` prints one with every key.
 """
+from __future__ import annotations
+
 import math
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -37,9 +41,10 @@ class Axis(Limits):
     high: Fraction
 
 
-def read_ini(path):
+def read_ini(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
     """{section: {key: text}}; full-line comments start with ; or #, others with a blank and ;"""
-    sections, section = {}, None
+    sections: dict[str, dict[str, str]] = {}
+    section: dict[str, str] | None = None
     with open(path, encoding="utf-8") as file:
         for number, line in enumerate(file, 1):
             text = line.strip()
@@ -57,13 +62,13 @@ def read_ini(path):
     return sections
 
 
-def q16(text):
+def q16(text: str) -> Fraction:
     """The number as a configuration holds it: nearest multiple of 2^-16, ties to even."""
     return Fraction(round(Fraction(text.strip()) * 65536), 65536)
 
 
 class Configuration:
-    def __init__(self, path):
+    def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = path
         self.ini = read_ini(path)
         try:
@@ -71,16 +76,16 @@ class Configuration:
         except (ValueError, ZeroDivisionError) as error:
             raise ConfigError(f"{path}: {error}") from error
 
-    def _text(self, section, key, default=None):
+    def _text(self, section: str, key: str, default: str | None = None) -> str:
         text = self.ini.get(section, {}).get(key, default)
         if text is None:
             raise ConfigError(f"{self.path}: [{section}] {key} is not stated; check what heaved --dump-config prints instead")
         return text
 
-    def _number(self, section, key, default=None):
+    def _number(self, section: str, key: str, default: str | None = None) -> Fraction:
         return q16(self._text(section, key, default))
 
-    def _numbers(self, section, key, count, default=None):
+    def _numbers(self, section: str, key: str, count: int, default: str | None = None) -> list[Fraction]:
         """count numbers; a single one stands for all."""
         numbers = [q16(part) for part in self._text(section, key, default).split(",")]
         if len(numbers) == 1:
@@ -89,14 +94,16 @@ class Configuration:
             raise ConfigError(f"{self.path}: [{section}] {key}: {count} numbers are needed")
         return numbers
 
-    def _axis(self, name):
+    def _axis(self, name: str) -> Axis:
         unit = UNIT[name]
-        number = lambda key, default=None: self._number(name, key, default)  # noqa: E731  a shorter name for what follows
+        def number(key: str, default: str | None = None) -> Fraction:
+            return self._number(name, key, default)
+
         return Axis(unit=unit, speed=number(f"speed_{unit}_s"), accel=number(f"accel_{unit}_s2"), jerk=number(f"jerk_{unit}_s3"),
                     sign=int(self._text(name, "sign", "1")), scale=number("scale", "1"), offset=number(f"offset_{unit}", "0"),
                     low=number(f"min_{unit}"), high=number(f"max_{unit}"))
 
-    def _read(self):
+    def _read(self) -> None:
         self.kind = self._text("platform", "kind")
         if self.kind not in ("hexapod", "tripod", "tripod-3rps"):
             raise ConfigError(f"{self.path}: [platform] kind = {self.kind} is unknown")
@@ -124,8 +131,10 @@ class Configuration:
         self.safe_mask = int(self._text("relays", "safe_mask", "0"), 16)
         self._read_geometry(count)
 
-    def _read_geometry(self, count):
-        triple = lambda key, default=None: [float(v) for v in self._numbers("geometry", key, 3, default)]  # noqa: E731
+    def _read_geometry(self, count: int) -> None:
+        def triple(key: str, default: str | None = None) -> list[float]:
+            return [float(v) for v in self._numbers("geometry", key, 3, default)]
+
         self.base = [triple(f"base{i + 1}_mm") for i in range(count)]
         self.plate = [triple(f"plate{i + 1}_mm") for i in range(count)]
         self.retracted = [float(v) for v in self._numbers("geometry", "retracted_length_mm", count)]
@@ -140,7 +149,7 @@ class Configuration:
         self.hinge_arms = [[radius * math.cos(turn) - self.mrp[0], radius * math.sin(turn) - self.mrp[1], height - self.mrp[2]]
                            for turn in turns]
 
-    def place(self, pose, arms):
+    def place(self, pose: Sequence[float], arms: Sequence[Sequence[float]]) -> list[tuple[float, float, float]]:
         """Where points of the plate are in the base frame: centre + (x, y, z) + Rz(yaw) Ry(pitch) Rx(roll) * arm."""
         roll, pitch, yaw = (math.radians(v) for v in pose[:3])
         cr, sr, cp, sp, cy, sy = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch), math.cos(yaw), math.sin(yaw)
@@ -149,11 +158,11 @@ class Configuration:
                  at[1] + sy * cp * x + (sy * sp * sr + cy * cr) * y + (sy * sp * cr - cy * sr) * z,
                  at[2] - sp * x + cp * sr * y + cp * cr * z) for x, y, z in arms]
 
-    def extensions(self, pose):
+    def extensions(self, pose: Sequence[float]) -> list[float]:
         """Of each cylinder, mm, for a complete pose (degrees and mm)."""
         return [math.dist(joint, base) - length for joint, base, length in zip(self.place(pose, self.arms), self.base, self.retracted)]
 
-    def guide_error(self, pose):
+    def guide_error(self, pose: Sequence[float]) -> float:
         """How far a pose is from what the mechanism can hold, mm or deg: the guide, or the planes in which the cylinders swing."""
         if self.kind == "hexapod":
             return 0.0
@@ -163,7 +172,7 @@ class Configuration:
         return max(abs(s * x - c * y) for (s, c), (x, y, _) in zip(self.hinge_planes, joints))
 
 
-def changed(text, changes, name="configuration"):
+def changed(text: str, changes: Mapping[str, object], name: str = "configuration") -> str:
     """The text of a configuration with other values: {"udp.port": 9801}. A key that is not there is added to its section, a section to the end."""
     lines = text.splitlines()
     for where, value in changes.items():

@@ -16,6 +16,9 @@ from heave.plot.window import NAMES, Window
 
 if TYPE_CHECKING:
     import numpy
+    from numpy.typing import NDArray
+
+    Array = NDArray[numpy.float64]
 
 Frames = str | os.PathLike[str] | Iterable[recording.Line | tuple[float, str]]
 
@@ -33,27 +36,27 @@ class Run:
         return len(self.states)
 
     @property
-    def t_s(self) -> numpy.ndarray:
-        return _numpy().array(self.window.times_us) / 1e6
+    def t_s(self) -> Array:
+        return _array(self.window.times_us) / 1e6
 
-    def __getitem__(self, name: str) -> numpy.ndarray:
+    def __getitem__(self, name: str) -> Array:
         """roll, pitch, yaw, x, y, z, angle, c1 ... c6: the set-points, in deg and mm."""
         if name not in NAMES:
             raise KeyError(f"{name!r} is no axis: {', '.join(NAMES)}")
-        return _numpy().array(self.window.column(name)) / 1e9
+        return _array(self.window.column(name)) / 1e9
 
     @property
-    def pose(self) -> numpy.ndarray:
+    def pose(self) -> Array:
         """A row per cycle: roll, pitch, yaw, x, y, z."""
-        return _numpy().array([row[:6] for row in self.window.rows]) / 1e9
+        return _array([row[:6] for row in self.window.rows]) / 1e9
 
     @property
-    def cylinders(self) -> numpy.ndarray:
-        return _numpy().array([row[7:] for row in self.window.rows]) / 1e9
+    def cylinders(self) -> Array:
+        return _array([row[7:] for row in self.window.rows]) / 1e9
 
-    def rates(self, name: str, order: int) -> numpy.ndarray:
+    def rates(self, name: str, order: int) -> Array:
         """Speed (1), acceleration (2) or jerk (3) as finite differences, per second; NaN where rows before are missing."""
-        return _numpy().array([float("nan") if value is None else value for value in self.window.rates(name, order)])
+        return _array([float("nan") if value is None else value for value in self.window.rates(name, order)])
 
 
 def play(config: str | os.PathLike[str], frames: Frames, *, changes: Mapping[str, object] | None = None, arguments: Sequence[str] = (),
@@ -89,9 +92,9 @@ def escape(text: str) -> str:
     return "".join(each if " " <= each <= "~" and each != "\\" else f"\\x{ord(each):02x}" for each in text)
 
 
-def _numpy() -> Any:
+def _array(values: Sequence[Any]) -> Array:
     try:
         import numpy as module
     except ImportError as error:
         raise HeaveError("arrays need NumPy: apt-get install python3-numpy, or pip install 'heave[arrays]'") from error
-    return module
+    return module.array(values, dtype=module.float64)

@@ -102,12 +102,13 @@ def sender(heaved: heave.Heaved) -> Sender:
 
 @pytest.fixture
 def twin(request: pytest.FixtureRequest, heave_config: Path) -> Iterator[Twin]:
-    """Ask for it before heaved: the drives are there when it looks for them."""
+    """On the configuration of heaved, with the same changes. Ask for it before heaved: the drives are there when it looks for them."""
     try:
         program = heave.programs.find("heave-twin", request.config.getoption("--heave-bin"))
     except heave.NotInstalled as error:
         pytest.skip(str(error))
-    with Twin(heave_config, program=program) as running:
+    marker = request.node.get_closest_marker("heave")
+    with Twin(heave_config, program=program, changes=marker.kwargs.get("changes") if marker else None) as running:
         _remember(request, "heave-twin", running)
         yield running
         running.check()

@@ -8,7 +8,8 @@ import re
 from dataclasses import dataclass
 
 from heave.errors import HeaveError
-from heave.frames import COMMANDS, FrameError, frame
+from heave.errors import FrameError
+from heave.frames import COMMANDS, frame
 
 ESCAPE = re.compile(r"\\(x[0-9A-Fa-f]{2}|[0-7]{1,3}|.)", re.DOTALL)
 PLAIN = {"n": "\n", "r": "\r", "t": "\t", "0": "\0", "a": "\a", "b": "\b", "f": "\f", "v": "\v"}

@@ -30,7 +30,7 @@ MAGIC, VERSION = b"HEAVESMP", 1
 HEADER = struct.Struct("=8s7I4x2Q")  # up to start_realtime_ns
 HEADER_BYTES, WRITTEN_AT = 128, 56
 COLUMN = struct.Struct("=32s12s4sI4xd")
-TYPES = {"u1", "u2", "u4", "u8", "i8"}
+TYPES = {"u1", "u2", "u4", "u8", "i2", "i4", "i8"}
 SEQUENCE = "sequence number"  # no column has a blank in its name
 
 

@@ -5,6 +5,7 @@
         twin.fault("jam 3")             # any line of docs/twin.md, without a time
         twin.positions                  # mm, deg: where the drives really are
         twin.mend()
+        twin.switch("estop", closed=False)      # with [inputs] driver = gpio
 """
 from __future__ import annotations
 
@@ -14,28 +15,34 @@ import socket
 import subprocess
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from heave import programs
+from heave.configuration import changed
 from heave.errors import NotRunning, Refused
 
 STOP_S = 10.0
 START_S = 10.0
 LOOK_S = 0.02
+SWITCHES = ("estop", "estop2", "enable", "reset", "power")
 
 
 class Twin:
     """with Twin("ride.ini"): heave-twin --config ride.ini, until the end. It listens when the constructor returns."""
 
-    def __init__(self, config: str | os.PathLike[str], arguments: Sequence[str] = (), *, script: Sequence[str] = (), program: str | os.PathLike[str] | None = None,
-                 timeout: float = 5.0):
-        """arguments: of heave-twin, such as "--swap", "2,5". script: lines of faults with their times, as "+2 jam 3". timeout: of one answer, in s."""
+    def __init__(self, config: str | os.PathLike[str], arguments: Sequence[str] = (), *, script: Sequence[str] = (), changes: Mapping[str, object] | None = None,
+                 program: str | os.PathLike[str] | None = None, timeout: float = 5.0):
+        """arguments: of heave-twin, such as "--swap", "2,5". script: lines of faults with their times, as "+2 jam 3". changes: of a copy of the configuration, as Heaved
+        has them ({"can.interface": "twin0"}). timeout: of one answer, in s."""
         self.program = Path(program) if program is not None else programs.find("heave-twin")
         self.timeout, self._said = timeout, ""
         self._folder = tempfile.TemporaryDirectory(prefix="heave-twin-")
         self._log, self.socket = Path(self._folder.name) / "log", Path(self._folder.name) / "socket"
+        if changes:
+            source, config = Path(config), Path(self._folder.name) / "platform.ini"
+            config.write_text(changed(source.read_text(encoding="utf-8"), changes, str(source)), encoding="utf-8")
         faults = [word for line in script for word in ("--fault", line)]
         command = [str(self.program), "--config", os.fspath(config), "--socket", str(self.socket), *faults, *arguments]
         with open(self._log, "wb") as log:
@@ -96,9 +103,26 @@ class Twin:
         self._ask(f"mend {'all' if drive is None else drive}")
 
     def status(self) -> dict[str, Any]:
-        """All that heave-twin knows: drives, pose, coils of a board."""
+        """All that heave-twin knows: drives, pose, coils of a board, switches, relays and healthy pulse on GPIO lines."""
         status: dict[str, Any] = json.loads(self._ask("status"))
         return status
+
+    def switch(self, name: str, *, closed: bool) -> None:
+        """Opens or closes a switch on a GPIO line, by its key of [inputs]: estop, estop2, enable, reset, power."""
+        if name not in SWITCHES:
+            raise Refused(name, f"{name!r} is no switch: {', '.join(SWITCHES)}")
+        self._ask(f"{name} {'closed' if closed else 'open'}")
+
+    @property
+    def switches(self) -> dict[str, bool]:
+        """Which switches on GPIO lines are closed."""
+        return {name: state == "closed" for name, state in self.status().get("switches", {}).items()}
+
+    @property
+    def relays(self) -> list[int] | None:
+        """Numbers of the relays on GPIO lines that are closed; None where there are none, or their chip is gone."""
+        relays: list[int] | None = self.status().get("relays")
+        return relays
 
     @property
     def positions(self) -> list[float]:

@@ -6,18 +6,19 @@
 
 #include "heave/cia402.h"
 
-/** Bytes of the PDOs. */
-#define CIA402_TPDO_BYTES 7u
-#define CIA402_RPDO_BYTES 6u
-
 /** Number of the fault that the driver itself finds: like the drives' own. */
 #define CIA402_FOLLOWING_ERROR 0x8611u
 #define CIA402_HOMING_ERROR    0x8613u
 #define CIA402_GENERIC_ERROR   0x1000u
 
+#define CIA402_NODE_MAX      127u
+#define CIA402_NMT_OPERATION 0x05u
+#define CIA402_SURPLUS_MAX   2u /* answers that nobody asked for; CAN itself may repeat one */
+
 /** One drive with what it is configured to be, for the functions below. */
 typedef struct {
     cia402_axis_t *axis;
+    cia402_axis_t *all; /**< the platform's, for the others of its node */
     const cia402_config_t *config;
     const cia402_axis_config_t *own; /**< its entry of the configuration */
     uint64_t now_us;
@@ -27,18 +28,23 @@ typedef struct {
 void cia402_axis_init(cia402_drive_t drive);
 
 /** Received: by the kind of identifier. */
-void cia402_axis_take_tpdo(cia402_drive_t drive, const can_frame_t *frame);
+void cia402_axis_take_position(cia402_drive_t drive, uint32_t bits);
 void cia402_axis_take_emergency(cia402_drive_t drive, const can_frame_t *frame);
 void cia402_axis_take_heartbeat(cia402_drive_t drive, const can_frame_t *frame);
 
-/** SYNC went out: a TPDO is due. */
-void cia402_axis_note_sync(cia402_axis_t *self);
+/** True where its PDOs count. */
+bool cia402_axis_is_told(const cia402_axis_t *self);
+
+/** A TPDO with an answer came.
+ *  @param n   which of them
+ *  @param all bit N: there is an answer N */
+void cia402_axis_note_answer(cia402_drive_t drive, unsigned n, uint8_t all);
+
+/** SYNC went out: a TPDO is due, now or at a later one. */
+void cia402_axis_note_sync(cia402_drive_t drive);
 
 /** Once per poll, behind what was received: goes on with setting up, finds out whether the drive is lost or fell out. */
 void cia402_axis_step(cia402_drive_t drive);
-
-/** The drive is lost; it is set up again, after a while in which it is told to stop where it may still hear. */
-void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why);
 
 /** Stops the drive and holds it as faulty until a reset.
  *  @param code cia402_trouble_t, or a number of the standard */

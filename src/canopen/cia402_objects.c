@@ -4,10 +4,19 @@
  */
 #include "cia402_objects.h"
 
+#include "cia402_map.h"
+#include "cia402_pdo_rows.h"
+
 #define COB_INVALID 0x80000000u
 #define COB_NO_RTR  0x40000000u
-#define RPDO1       0x200u
-#define TPDO1       0x180u
+#define RECORDS     0x1400u
+#define RECORDS_END 0x1C00u
+#define OBJECTS     0x6000u
+#define CHANNEL     0x800u
+#define TPDOS       0x1800u
+#define CONSUMER    0x1016u
+#define GUARD_TIME  0x100Cu
+#define LIFE_FACTOR 0x100Du
 #define RAMP        1u /* 605Bh, 605Ch: slow down, then off */
 #define QUICK_RAMP  2u /* 605Ah, 605Eh: by the quick-stop ramp, then off */
 #define SYNCHRONOUS 1u /* PDO type: every SYNC */
@@ -23,60 +32,50 @@
      .need = CIA402_GUARD, .source = (from), .constant = (number), .trouble = CIA402_UNGUARDED}
 #define ONLY(when_, at, sub_, size, deed_, from, number) {.index = (at), .sub = (sub_), .bytes = (size), .deed = (deed_), \
      .need = CIA402_MUST, .when = (when_), .source = (from), .constant = (number), .trouble = CIA402_NOT_TAKEN}
+/* An object that a node has once, whatever its channels. */
+#define NODE(at, sub_, size, deed_, need_, trouble_, from) {.index = (at), .sub = (sub_), .bytes = (size), .deed = (deed_), \
+     .need = (need_), .when = CIA402_IF_FIRST, .source = (from), .trouble = (trouble_)}
+/* What both sides are watched by. */
+#define LIFE(when_, at, sub_, size, from) {.index = (at), .sub = (sub_), .bytes = (size), .deed = CIA402_SET, .need = CIA402_GUARD, \
+     .when = (when_), .source = (from), .trouble = CIA402_UNGUARDED}
+/* A PDO that may be there and is not wanted. */
+#define SPARE(at) {.index = (at), .sub = 1, .bytes = 4, .deed = CIA402_PDO_OFF, .need = CIA402_IF_THERE, .when = CIA402_IF_OWN_RECORD}
+/* Stands for the rows that set a PDO up. */
+#define PDO(which) {.deed = CIA402_PDO, .constant = (which)}
 #define LIMIT(sub_) {.index = 0x607D, .sub = (sub_), .bytes = 4, .deed = CIA402_WRITE, .need = CIA402_IF_THERE, \
      .when = CIA402_IF_LIMITED, .source = CIA402_POSITION_LIMIT, .constant = (sub_) - 1u}
-#define IDENTITY(sub_) {.index = 0x1018, .sub = (sub_), .bytes = 4, .deed = CIA402_CHECK, .when = CIA402_IF_NONZERO, \
+#define IDENTITY(sub_) {.index = 0x1018, .sub = (sub_), .bytes = 4, .deed = CIA402_CHECK, .when = CIA402_IF_IDENTITY, \
      .source = CIA402_IDENTITY, .constant = (sub_) - 1u, .trouble = CIA402_WRONG_IDENTITY}
 
 const cia402_object_t cia402_objects[] = {
-    {.index = 0x1000, .bytes = 4, .deed = CIA402_CHECK, .constant = 0x0192, .trouble = CIA402_NOT_402},
+    {.index = 0x1000, .bytes = 4, .deed = CIA402_CHECK, .when = CIA402_IF_FIRST, .constant = 0x0192, .trouble = CIA402_NOT_402},
     IDENTITY(1), IDENTITY(2), IDENTITY(3), IDENTITY(4),
     {.deed = CIA402_LIST, .constant = false},
+    {.index = 0x6502, .bytes = 4, .deed = CIA402_HAS, .need = CIA402_IF_TOLD, .when = CIA402_IF_SUPPORT, .source = CIA402_MODE_BITS,
+     .trouble = CIA402_NO_SUCH_MODE},
+    {.index = 0x60E3, .bytes = 1, .deed = CIA402_LISTED, .need = CIA402_IF_TOLD, .when = CIA402_IF_STANDARD_HOMING,
+     .source = CIA402_HOMING_METHOD, .trouble = CIA402_NO_SUCH_HOMING},
 
-    GUARD(0x1017, 0, 2, CIA402_HEARTBEAT, 0),
-    {.deed = CIA402_PREOPERATIONAL, .need = CIA402_GUARD, .trouble = CIA402_NO_HEARTBEAT},
-    GUARD(0x1016, 1, 4, CIA402_CONSUMER, 0),
-    IF_THERE(0x1029, 1, 1, CIA402_WRITE, CIA402_CONSTANT, 0),
-    IF_THERE(0x1006, 0, 4, CIA402_WRITE, CIA402_CONSTANT, 0), /* 1019h may be written only while this is 0 */
+    LIFE(CIA402_IF_HEARTBEAT, 0x1017, 0, 2, CIA402_HEARTBEAT),
+    {.index = 0x1017, .bytes = 2, .deed = CIA402_WRITE, .need = CIA402_IF_THERE, .when = CIA402_IF_GUARDED}, /* not both */
+    LIFE(CIA402_IF_GUARDED, GUARD_TIME, 0, 2, CIA402_HEARTBEAT),
+    LIFE(CIA402_IF_GUARDED, LIFE_FACTOR, 0, 1, CIA402_LIFE_FACTOR),
+    {.deed = CIA402_PREOPERATIONAL, .need = CIA402_GUARD, .when = CIA402_IF_FIRST, .trouble = CIA402_NO_HEARTBEAT},
+    LIFE(CIA402_IF_HEARTBEAT, CONSUMER, 1, 4, CIA402_CONSUMER),
+    NODE(0x1029, 1, 1, CIA402_WRITE, CIA402_IF_THERE, 0, CIA402_CONSTANT),
+    NODE(0x1006, 0, 4, CIA402_WRITE, CIA402_IF_THERE, 0, CIA402_CONSTANT), /* 1019h may be written only while this is 0 */
     {.index = 0x1019, .bytes = 1, .deed = CIA402_SET, .when = CIA402_IF_COUNTER, .source = CIA402_COUNTER, .trouble = CIA402_NOT_TAKEN},
-    IF_THERE(0x1019, 0, 1, CIA402_WRITE, CIA402_COUNTER, 0),
-    IF_THERE(0x1006, 0, 4, CIA402_WRITE, CIA402_SYNC_PERIOD, 0),
+    NODE(0x1019, 0, 1, CIA402_WRITE, CIA402_IF_THERE, 0, CIA402_COUNTER),
+    NODE(0x1006, 0, 4, CIA402_WRITE, CIA402_IF_THERE, 0, CIA402_SYNC_PERIOD),
 
     MUST(0x1400, 1, 4, CIA402_PDO_OFF, CIA402_CONSTANT, 0),
-    IF_THERE(0x1401, 1, 4, CIA402_PDO_OFF, CIA402_CONSTANT, 0),
-    IF_THERE(0x1402, 1, 4, CIA402_PDO_OFF, CIA402_CONSTANT, 0),
-    IF_THERE(0x1403, 1, 4, CIA402_PDO_OFF, CIA402_CONSTANT, 0),
+    SPARE(0x1401), SPARE(0x1402), SPARE(0x1403),
     MUST(0x1800, 1, 4, CIA402_PDO_OFF, CIA402_CONSTANT, 0),
-    IF_THERE(0x1801, 1, 4, CIA402_PDO_OFF, CIA402_CONSTANT, 0),
-    IF_THERE(0x1802, 1, 4, CIA402_PDO_OFF, CIA402_CONSTANT, 0),
-    IF_THERE(0x1803, 1, 4, CIA402_PDO_OFF, CIA402_CONSTANT, 0),
+    SPARE(0x1801), SPARE(0x1802), SPARE(0x1803),
 
-    MUST(0x1400, 2, 1, CIA402_WRITE, CIA402_CONSTANT, SYNCHRONOUS),
-    MUST(0x1600, 0, 1, CIA402_WRITE, CIA402_CONSTANT, 0),
-    MUST(0x1600, 1, 4, CIA402_WRITE, CIA402_CONSTANT, 0x60400010),
-    MUST(0x1600, 2, 4, CIA402_WRITE, CIA402_TARGET_MAPPING, 0),
-    MUST(0x1600, 0, 1, CIA402_WRITE, CIA402_CONSTANT, 2),
-    MUST(0x1400, 1, 4, CIA402_PDO_ON, CIA402_RPDO_COB, 0),
-    MUST(0x1400, 2, 1, CIA402_CHECK, CIA402_CONSTANT, SYNCHRONOUS),
-    MUST(0x1600, 0, 1, CIA402_CHECK, CIA402_CONSTANT, 2),
-    MUST(0x1600, 1, 4, CIA402_CHECK, CIA402_CONSTANT, 0x60400010),
-    MUST(0x1600, 2, 4, CIA402_CHECK, CIA402_TARGET_MAPPING, 0),
-
-    MUST(0x1800, 2, 1, CIA402_WRITE, CIA402_CONSTANT, SYNCHRONOUS),
-    IF_THERE(0x1800, 3, 2, CIA402_WRITE, CIA402_CONSTANT, 0),
-    IF_THERE(0x1800, 5, 2, CIA402_WRITE, CIA402_CONSTANT, 0),
-    IF_THERE(0x1800, 6, 1, CIA402_WRITE, CIA402_CONSTANT, 0),
-    MUST(0x1A00, 0, 1, CIA402_WRITE, CIA402_CONSTANT, 0),
-    MUST(0x1A00, 1, 4, CIA402_WRITE, CIA402_CONSTANT, 0x60410010),
-    MUST(0x1A00, 2, 4, CIA402_WRITE, CIA402_CONSTANT, 0x60640020),
-    MUST(0x1A00, 3, 4, CIA402_WRITE, CIA402_CONSTANT, 0x60610008),
-    MUST(0x1A00, 0, 1, CIA402_WRITE, CIA402_CONSTANT, 3),
-    MUST(0x1800, 1, 4, CIA402_PDO_ON, CIA402_TPDO_COB, 0),
-    MUST(0x1800, 2, 1, CIA402_CHECK, CIA402_CONSTANT, SYNCHRONOUS),
-    MUST(0x1A00, 0, 1, CIA402_CHECK, CIA402_CONSTANT, 3),
-    MUST(0x1A00, 1, 4, CIA402_CHECK, CIA402_CONSTANT, 0x60410010),
-    MUST(0x1A00, 2, 4, CIA402_CHECK, CIA402_CONSTANT, 0x60640020),
-    MUST(0x1A00, 3, 4, CIA402_CHECK, CIA402_CONSTANT, 0x60610008),
+    PDO(CIA402_COMMAND), PDO(CIA402_COMMAND + 1), PDO(CIA402_COMMAND + 2),
+    PDO(CIA402_ANSWER), PDO(CIA402_ANSWER + 1), PDO(CIA402_ANSWER + 2),
+    PDO(CIA402_TELEMETRY), PDO(CIA402_TELEMETRY + 1),
 
     GUARD(0x6007, 0, 2, CIA402_ABORT_OPTION, 0),
     GUARD(0x605A, 0, 2, CIA402_CONSTANT, QUICK_RAMP),
@@ -142,18 +141,16 @@ bool cia402_is_period(uint32_t period_us)
     return cia402_period_parts(period_us, &value, &exponent);
 }
 
+/* --- Rows that stand for several --- */
+
 static bool is_list_row(const cia402_axis_config_t *axis, const cia402_setup_t *setup)
 {
     const cia402_object_t *row = &cia402_objects[setup->row];
     return row->deed == CIA402_LIST && setup->item < axis->items && axis->item[setup->item].is_last == (row->constant != 0);
 }
 
-cia402_object_t cia402_objects_at(const cia402_axis_config_t *axis, const cia402_setup_t *setup)
+static cia402_object_t list_row(const cia402_item_t *item)
 {
-    if (!is_list_row(axis, setup)) {
-        return cia402_objects[setup->row];
-    }
-    const cia402_item_t *item = &axis->item[setup->item];
     const cia402_deed_t written = item->is_checked ? CIA402_SET : CIA402_WRITE;
     return (cia402_object_t){.index = item->index,
                              .sub = item->sub,
@@ -165,14 +162,78 @@ cia402_object_t cia402_objects_at(const cia402_axis_config_t *axis, const cia402
                              .trouble = CIA402_NOT_TAKEN};
 }
 
-void cia402_objects_next(const cia402_axis_config_t *axis, cia402_setup_t *setup)
+static unsigned index_of(const cia402_config_t *config, const cia402_axis_config_t *axis)
 {
-    if (cia402_objects[setup->row].deed == CIA402_LIST && setup->item < axis->items) {
+    return (unsigned)(axis - config->axis);
+}
+
+/* As the axis has it: records of its channel, and objects at their distance. */
+static uint16_t index_in_channel(uint16_t index, const cia402_config_t *config, const cia402_axis_config_t *axis)
+{
+    if (index >= OBJECTS) {
+        return (uint16_t)(index + axis->channel * CHANNEL);
+    }
+    const unsigned step = config->pdo_step != 0 ? config->pdo_step : 64u;
+    return (uint16_t)(index >= RECORDS && index < RECORDS_END ? index + axis->channel * step : index);
+}
+
+/* The first PDOs of each channel are switched off by rows of their own, whether they are used or not. */
+static bool is_off_already(const cia402_config_t *config, const cia402_axis_config_t *axis, uint16_t record)
+{
+    const unsigned first = index_in_channel(record >= TPDOS ? TPDOS : RECORDS, config, axis);
+    return record >= first && record - first < CIA402_PDOS_USUAL;
+}
+
+/* The other axes of a node whose PDOs are of the whole node may have no records at all. */
+static bool may_have_no_record(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis)
+{
+    const cia402_maps_t *maps = row->index >= TPDOS ? &config->answers : &config->commands;
+    return row->deed == CIA402_PDO_OFF && axis->channel > 0 && cia402_map_is_shared(maps);
+}
+
+cia402_object_t cia402_objects_at(const cia402_config_t *config, const cia402_axis_config_t *axis, const cia402_setup_t *setup)
+{
+    cia402_object_t row = cia402_objects[setup->row];
+    if (is_list_row(axis, setup)) {
+        row = list_row(&axis->item[setup->item]);
+    } else if (row.deed == CIA402_PDO) {
+        const cia402_pdo_t pdo = cia402_pdo(config, index_of(config, axis), row.constant);
+        return cia402_pdo_row(&pdo, setup->item, is_off_already(config, axis, pdo.record));
+    }
+    if (may_have_no_record(&row, config, axis)) {
+        row.need = CIA402_IF_THERE;
+    }
+    row.index = row.index != 0 ? index_in_channel(row.index, config, axis) : 0;
+    return row;
+}
+
+void cia402_objects_next(const cia402_config_t *config, const cia402_axis_config_t *axis, cia402_setup_t *setup)
+{
+    const cia402_object_t *row = &cia402_objects[setup->row];
+    unsigned items = row->deed == CIA402_LIST ? axis->items : 0;
+    if (row->deed == CIA402_PDO) {
+        const cia402_pdo_t pdo = cia402_pdo(config, index_of(config, axis), row->constant);
+        items = cia402_pdo_rows(&pdo);
+    }
+    if (setup->item < items) {
         setup->item++;
         return;
     }
     setup->row++;
     setup->item = 0;
+}
+
+static uint32_t mode_bits(const cia402_config_t *config, const cia402_axis_config_t *axis)
+{
+    const uint32_t homing = axis->homing_method != 0 ? 1u << ((uint32_t)CIA402_MODE_HOMING - 1u) : 0;
+    return homing | 1u << ((uint32_t)cia402_mode(config, index_of(config, axis)) - 1u);
+}
+
+/* Requests that a drive may miss: at least the time that we are allowed to be silent. */
+static uint32_t life_factor(const cia402_config_t *config, uint32_t guard_ms)
+{
+    const uint32_t factor = (config->heartbeat_timeout_ms + guard_ms - 1u) / guard_ms;
+    return factor < UINT8_MAX ? factor : UINT8_MAX;
 }
 
 static uint32_t source_value(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis,
@@ -191,16 +252,12 @@ static uint32_t source_value(const cia402_object_t *row, const cia402_config_t *
         return (uint32_t)config->master_node << 16 | config->heartbeat_timeout_ms;
     case CIA402_HEARTBEAT:
         return config->heartbeat_ms;
+    case CIA402_LIFE_FACTOR:
+        return life_factor(config, setup->guard_ms != 0 ? setup->guard_ms : config->heartbeat_ms);
     case CIA402_SYNC_PERIOD:
         return config->is_sync_watched ? config->period_us : 0;
     case CIA402_COUNTER:
         return config->sync_counter;
-    case CIA402_RPDO_COB:
-        return RPDO1 + axis->node;
-    case CIA402_TPDO_COB:
-        return TPDO1 + axis->node;
-    case CIA402_TARGET_MAPPING:
-        return config->mode == CIA402_MODE_IP ? 0x60C10120u : 0x607A0020u;
     case CIA402_ABORT_OPTION:
         return (uint32_t)config->abort_option;
     case CIA402_WINDOW:
@@ -229,6 +286,8 @@ static uint32_t source_value(const cia402_object_t *row, const cia402_config_t *
         return axis->profile_accel;
     case CIA402_MODE:
         return setup->mode;
+    case CIA402_MODE_BITS:
+        return mode_bits(config, axis);
     }
     return 0;
 }
@@ -253,36 +312,79 @@ uint32_t cia402_object_mask(const cia402_object_t *row)
     return row->index == 0x1000u ? 0xFFFFu : all_bits(row->bytes);
 }
 
-bool cia402_object_is_guarding(const cia402_object_t *row, const cia402_config_t *config, uint32_t value)
+bool cia402_object_is_late(const cia402_object_t *row, const cia402_config_t *config, const cia402_setup_t *setup, uint32_t value)
 {
-    if (row->index == 0x1016u) {
+    const uint64_t life_ms = (uint64_t)config->heartbeat_ms * life_factor(config, config->heartbeat_ms);
+    switch (row->index) {
+    case CONSUMER:
+        return (value & 0xFFFFu) > 2u * config->heartbeat_timeout_ms;
+    case GUARD_TIME: /* with a life factor of 1 at least */
+        return value > 2u * life_ms;
+    case LIFE_FACTOR:
+        return (uint64_t)value * setup->guard_ms > 2u * life_ms;
+    default:
+        return false;
+    }
+}
+
+bool cia402_object_is_guarding(const cia402_object_t *row, const cia402_config_t *config, const cia402_setup_t *setup,
+                               uint32_t value)
+{
+    if (cia402_object_is_late(row, config, setup, value)) {
+        return false;
+    }
+    if (row->index == CONSUMER) {
         return value >> 16 == config->master_node && (value & 0xFFFFu) != 0;
     }
     return value != 0 && value != all_bits(row->bytes); /* all ones: no window, or -1, no reaction */
 }
 
+/* Not one of the next channel, where channels have less than the usual records. */
+static bool is_own_record(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis)
+{
+    const unsigned step = config->pdo_step != 0 ? config->pdo_step : 64u;
+    const unsigned channel = (row->index & 0xFFu) / step;
+    const uint32_t entry = (OBJECTS + CHANNEL * channel) << 16;
+    return channel == axis->channel || cia402_axis_of(config, axis->node, entry) == config->axes;
+}
+
 bool cia402_object_applies(const cia402_object_t *row, const cia402_config_t *config, const cia402_axis_config_t *axis)
 {
-    if (row->deed == CIA402_LIST) {
+    if (row->deed == CIA402_LIST || row->deed == CIA402_SKIP) {
         return false; /* no item, or one of the other row */
     }
+    const cia402_mode_t mode = cia402_mode(config, index_of(config, axis));
     switch ((cia402_when_t)row->when) {
     case CIA402_ALWAYS:
         return true;
+    case CIA402_IF_FIRST:
+        return axis->channel == 0;
+    case CIA402_IF_HEARTBEAT:
+        return axis->channel == 0 && !config->is_guarded;
+    case CIA402_IF_GUARDED:
+        return axis->channel == 0 && config->is_guarded;
     case CIA402_IF_CYCLIC:
-        return config->mode != CIA402_MODE_PP;
+        return mode != CIA402_MODE_PP;
     case CIA402_IF_IP:
-        return config->mode == CIA402_MODE_IP;
+        return mode == CIA402_MODE_IP;
     case CIA402_IF_PP:
-        return config->mode == CIA402_MODE_PP;
+        return mode == CIA402_MODE_PP;
     case CIA402_IF_HOMING:
         return axis->homing_method != 0;
     case CIA402_IF_NONZERO:
         return cia402_object_value(row, config, axis, &(cia402_setup_t){.job = CIA402_JOB_NONE}) != 0;
+    case CIA402_IF_IDENTITY:
+        return axis->channel == 0 && axis->identity[row->constant] != 0;
     case CIA402_IF_COUNTER:
-        return config->sync_counter != 0;
+        return axis->channel == 0 && config->sync_counter != 0;
     case CIA402_IF_LIMITED:
         return axis->has_limits;
+    case CIA402_IF_OWN_RECORD:
+        return is_own_record(row, config, axis);
+    case CIA402_IF_SUPPORT:
+        return config->is_support_checked;
+    case CIA402_IF_STANDARD_HOMING: /* makers leave methods of their own out of the list */
+        return config->is_support_checked && axis->homing_method > 0;
     }
     return false;
 }
@@ -297,6 +399,12 @@ static cia402_wish_need_t need_of(const cia402_object_t *row)
     return row->need == CIA402_MUST ? CIA402_WISH_NEEDED : CIA402_WISH_IF_THERE;
 }
 
+/* What is asked of the drive, not wished of it. */
+static bool is_question(const cia402_object_t *row)
+{
+    return row->deed == CIA402_HAS || row->deed == CIA402_LISTED;
+}
+
 static bool is_written(const cia402_object_t *row)
 {
     return row->deed == CIA402_WRITE || row->deed == CIA402_SET || row->deed == CIA402_PDO_OFF || row->deed == CIA402_PDO_ON;
@@ -305,10 +413,10 @@ static bool is_written(const cia402_object_t *row)
 bool cia402_next_wish(const cia402_config_t *config, unsigned axis, cia402_wish_t *wish)
 {
     const cia402_axis_config_t *own = &config->axis[axis];
-    cia402_setup_t at = {.row = wish->row, .item = wish->item, .mode = (uint8_t)config->mode};
-    for (; at.row < cia402_objects_setup_end; cia402_objects_next(own, &at)) {
-        const cia402_object_t row = cia402_objects_at(own, &at);
-        if (row.index == 0 || !cia402_object_applies(&row, config, own)) {
+    cia402_setup_t at = {.row = wish->row, .item = wish->item, .mode = (uint8_t)cia402_mode(config, axis)};
+    for (; at.row < cia402_objects_setup_end; cia402_objects_next(config, own, &at)) {
+        const cia402_object_t row = cia402_objects_at(config, own, &at);
+        if (row.index == 0 || is_question(&row) || !cia402_object_applies(&row, config, own)) {
             continue;
         }
         *wish = (cia402_wish_t){.index = row.index,
@@ -319,7 +427,7 @@ bool cia402_next_wish(const cia402_config_t *config, unsigned axis, cia402_wish_
                                 .is_compared = row.deed != CIA402_WRITE && row.deed != CIA402_PDO_OFF,
                                 .is_own = row.source != CIA402_ITEM,
                                 .need = need_of(&row)};
-        cia402_objects_next(own, &at);
+        cia402_objects_next(config, own, &at);
         wish->row = at.row;
         wish->item = at.item;
         return true;
@@ -329,6 +437,10 @@ bool cia402_next_wish(const cia402_config_t *config, unsigned axis, cia402_wish_
 
 bool cia402_is_own_object(uint16_t index, uint8_t sub)
 {
+    if (index >= RECORDS && index < RECORDS_END && (index & 0x3Fu) < CIA402_PDOS_USUAL) { /* whichever of them are in use */
+        return true;
+    }
+    index = cia402_plain_index(index);
     for (uint8_t i = 0; i < cia402_objects_setup_end; i++) {
         const cia402_object_t *row = &cia402_objects[i];
         if (row->index == index && row->sub == sub && is_written(row)) {

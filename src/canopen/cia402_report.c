@@ -69,8 +69,8 @@ static const struct {
     const char *text;
 } k_troubles[] = {
     {CIA402_SILENT, "does not answer: supply, cable, termination, node id, bit rate?"},
-    {CIA402_LOST_TPDO, "sent no position for three SYNCs"},
-    {CIA402_LOST_HEARTBEAT, "sent no heartbeat in time"},
+    {CIA402_LOST_TPDO, "sent no position, three times in a row"},
+    {CIA402_LOST_HEARTBEAT, "sent no heartbeat in time, or did not answer to guarding"},
     {CIA402_LEFT_OPERATIONAL, "left the NMT state operational"},
     {CIA402_REBOOTED, "started again by itself: supply?"},
     {CIA402_LOST_BUS, "the bus does not work"},
@@ -78,7 +78,8 @@ static const struct {
     {CIA402_WRONG_IDENTITY, "is not the device that the configuration names"},
     {CIA402_NOT_TAKEN, "does not take what it has to be set to"},
     {CIA402_UNGUARDED, "would not stop by itself: a guard is off"},
-    {CIA402_NO_HEARTBEAT, "sends no heartbeat"},
+    {CIA402_GUARDED_LATE, "would stop too late by itself when the gateway is gone"},
+    {CIA402_NO_HEARTBEAT, "sends no heartbeat, or does not answer to guarding"},
     {CIA402_NO_MODE, "does not go to the mode of operation"},
     {CIA402_NO_START, "does not become operational, or sends another TPDO than was mapped"},
     {CIA402_NO_POWER, "does not switch on: power stage, enable input?"},
@@ -87,6 +88,9 @@ static const struct {
     {CIA402_FELL_OUT, "left operation enabled by itself: enable input, safe torque off?"},
     {CIA402_NO_ANSWER, "gives no answer when it is asked for an object"},
     {CIA402_TWICE, "is there twice: two drives have this node id"},
+    {CIA402_NO_SUCH_MODE, "has not got the configured mode of operation, or homing"},
+    {CIA402_NO_SUCH_HOMING, "has not got the configured homing method"},
+    {CIA402_LOST_NODE, "was lost with another axis of its node, which is set up again"},
     {CIA402_LEFT_MODE, "left its mode of operation by itself"},
     {CIA402_NOT_FOLLOWING, "ignores its set-points: halted, or held by its own logic?"},
     {CIA402_NO_VOLTAGE, "has no voltage at its power stage: supply, contactor?"},
@@ -133,8 +137,10 @@ static const char *up_text(const cia402_t *self, uint8_t index)
 static const char *phase_text(const cia402_t *self, uint8_t index)
 {
     static const char *const k_texts[] = {
-        [CIA402_MISSING] = "missing",   [CIA402_RESETTING] = "booting", [CIA402_CONFIGURING] = "configuring",
-        [CIA402_STARTING] = "starting", [CIA402_LEAVING] = "lost",      [CIA402_REFUSED] = "refused",
+        [CIA402_MISSING] = "missing",         [CIA402_RESETTING] = "booting",
+        [CIA402_CONFIGURING] = "configuring", [CIA402_CONFIGURED] = "waits for the other axes of its node",
+        [CIA402_STARTING] = "starting",       [CIA402_LEAVING] = "lost",
+        [CIA402_REFUSED] = "refused",
     };
     const cia402_phase_t phase = self->axis[index].phase;
     return phase == CIA402_UP ? up_text(self, index) : k_texts[phase];
@@ -147,10 +153,11 @@ static bool is_refusing(const cia402_axis_t *axis)
 }
 
 /* The object that a drive is being set up with, or that it does not take. */
-static uint32_t object_of(const cia402_axis_t *axis, const cia402_axis_config_t *own)
+static uint32_t object_of(const cia402_t *self, uint8_t index)
 {
+    const cia402_axis_t *axis = &self->axis[index];
     if (axis->phase == CIA402_CONFIGURING) {
-        return cia402_setup_object(axis, own);
+        return cia402_setup_object(axis, self->config, &self->config->axis[index]);
     }
     const bool is_mute = axis->phase != CIA402_UP && axis->trouble == CIA402_NO_ANSWER;
     return is_refusing(axis) || is_mute ? axis->trouble_object : axis->warned_object;
@@ -185,7 +192,21 @@ static const char *detail_text(const cia402_axis_t *axis)
     if (axis->trouble_code != 0) {
         return canopen_abort_text(axis->trouble_code);
     }
+    if (axis->trouble == CIA402_NO_SUCH_MODE) {
+        return "a bit for each mode that it supports";
+    }
+    if (axis->trouble == CIA402_NO_SUCH_HOMING) {
+        return "the last of the methods that it supports";
+    }
     return axis->has_found ? "it holds another value" : "";
+}
+
+/* 0 where the drive has its node to itself. */
+static uint8_t channel_of(const cia402_t *self, uint8_t index)
+{
+    const cia402_axis_config_t *own = &self->config->axis[index];
+    const bool is_alone = cia402_axis_of(self->config, own->node, 0x68000000u) == self->config->axes;
+    return is_alone ? 0 : (uint8_t)(own->channel + 1u);
 }
 
 void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *out)
@@ -195,10 +216,11 @@ void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *ou
     const uint32_t code = fault != 0 ? fault : axis->trouble;
     *out = (drive_report_t){
         .address = self->config->axis[index].node,
+        .channel = channel_of(self, index),
         .phase = phase_text(self, index),
         .trouble = drive_guard_is_found(&axis->guard) && code == axis->own_fault ? guard_text(&axis->guard) : code_text(code),
         .code = code,
-        .object = object_of(axis, &self->config->axis[index]),
+        .object = object_of(self, index),
         .detail = detail_text(axis),
         .detail_code = detail_code(axis),
         .has_found = is_refusing(axis) && axis->has_found,
@@ -206,6 +228,7 @@ void cia402_report_words(const cia402_t *self, uint8_t index, drive_report_t *ou
         .wanted = axis->trouble_wanted,
         .error = axis->emergency.count != 0 ? canopen_error_text(axis->emergency.code) : NULL,
         .emergency = axis->emergency,
+        .telemetry = axis->telemetry,
         .notes = axis->phase == CIA402_UP ? axis->notes : 0,
         .since_us = code != 0 ? axis->trouble_us : axis->phase_us,
     };

@@ -8,19 +8,21 @@
 #define SDO_TRIES       3u
 #define STATE_TRIES     3u /* a drive that says "not in this state" is asked again */
 #define STATE_PAUSE_US  100000u
+#define LIST_MAX        254u
 #define AWAIT_PAUSE_US  10000u
 #define AWAIT_US        5000000u
 #define LISTEN_US       1000000u
 #define PREOP_REPEAT_US 100000u
 #define NMT_PREOP       0x80u
 #define NMT_STATE_PREOP 0x7Fu
+#define GUARD_TIME      0x100Cu
 #define ABORT_READ_ONLY 0x06010002u
 #define ABORT_ACCESS    0x06010000u
 #define ABORT_LOCAL     0x08000021u
 #define ABORT_STATE     0x08000022u
 
 /* What a deed is made of, in order; STEP_END is the last of each. */
-typedef enum { STEP_END, STEP_WRITE, STEP_COMPARE, STEP_KEEP, STEP_POLL, STEP_LISTEN } step_t;
+typedef enum { STEP_END, STEP_WRITE, STEP_COMPARE, STEP_KEEP, STEP_POLL, STEP_LISTEN, STEP_SEEK } step_t;
 
 #define STEPS_MAX 4u
 
@@ -28,6 +30,8 @@ static const step_t k_steps[][STEPS_MAX] = {
     [CIA402_WRITE] = {STEP_WRITE},
     [CIA402_SET] = {STEP_WRITE, STEP_COMPARE},
     [CIA402_CHECK] = {STEP_COMPARE},
+    [CIA402_HAS] = {STEP_COMPARE},
+    [CIA402_LISTED] = {STEP_SEEK},
     [CIA402_AWAIT] = {STEP_POLL},
     [CIA402_PDO_OFF] = {STEP_KEEP, STEP_WRITE},
     [CIA402_PDO_ON] = {STEP_KEEP, STEP_WRITE, STEP_COMPARE},
@@ -71,9 +75,10 @@ static step_t step_of(const visit_t *self)
 static void next_row(const visit_t *self)
 {
     cia402_setup_t *setup = &self->axis->setup;
-    cia402_objects_next(self->own, setup);
+    cia402_objects_next(self->config, self->own, setup);
     setup->step = 0;
     setup->tries = 0;
+    setup->entry = 0;
     setup->is_asked = false;
     setup->since_us = self->now_us;
 }
@@ -94,14 +99,19 @@ static void repeat_later(const visit_t *self, uint32_t pause_us)
     self->axis->setup.pause_us = self->now_us + pause_us;
 }
 
+static bool may_be_missing(const cia402_object_t *row)
+{
+    return row->need == CIA402_IF_THERE || row->need == CIA402_IF_TOLD;
+}
+
 static uint32_t object_of(const cia402_object_t *row)
 {
     return (uint32_t)row->index << 8 | row->sub;
 }
 
-uint32_t cia402_setup_object(const cia402_axis_t *self, const cia402_axis_config_t *axis)
+uint32_t cia402_setup_object(const cia402_axis_t *self, const cia402_config_t *config, const cia402_axis_config_t *axis)
 {
-    const cia402_object_t row = cia402_objects_at(axis, &self->setup);
+    const cia402_object_t row = cia402_objects_at(config, axis, &self->setup);
     return object_of(&row);
 }
 
@@ -136,7 +146,7 @@ static void ask(const visit_t *self)
     sdo_t *sdo = &self->axis->sdo;
     self->axis->setup.is_asked = true;
     if (step_of(self) != STEP_WRITE) {
-        sdo_read(sdo, row->index, row->sub, SDO_TRIES);
+        sdo_read(sdo, row->index, (uint8_t)(row->sub + self->axis->setup.entry), SDO_TRIES);
         return;
     }
     const uint32_t value = cia402_object_value(row, self->config, self->own, &self->axis->setup);
@@ -150,7 +160,7 @@ static bool is_left_to_check(const visit_t *self)
     const cia402_object_t *row = &self->row;
     const bool is_unchecked = row->source == CIA402_ITEM && row->deed == CIA402_WRITE;
     const bool is_read_only = self->axis->sdo.abort_code == ABORT_READ_ONLY && !is_unchecked;
-    return step_of(self) == STEP_WRITE && row->need != CIA402_IF_THERE && (is_read_only || row->need == CIA402_GUARD);
+    return step_of(self) == STEP_WRITE && !may_be_missing(row) && (is_read_only || row->need == CIA402_GUARD);
 }
 
 static bool is_worth_another_try(const cia402_axis_t *self)
@@ -162,7 +172,7 @@ static bool is_worth_another_try(const cia402_axis_t *self)
 static cia402_setup_result_t take_abort(const visit_t *self)
 {
     cia402_axis_t *axis = self->axis;
-    if (self->row.need != CIA402_IF_THERE && is_worth_another_try(axis)) {
+    if (!may_be_missing(&self->row) && is_worth_another_try(axis)) {
         axis->setup.tries++;
         repeat_later(self, STATE_PAUSE_US);
         return CIA402_SETUP_BUSY;
@@ -176,14 +186,40 @@ static cia402_setup_result_t take_abort(const visit_t *self)
     return give_up(self, axis->sdo.abort_code);
 }
 
+/* Some drives have 6502h and leave it at 0: that tells nothing. */
+static bool is_fitting(const cia402_object_t *row, uint32_t found, uint32_t wanted)
+{
+    if (row->deed == CIA402_HAS) {
+        return found == 0 || (found & wanted) == wanted;
+    }
+    return ((found ^ wanted) & cia402_object_mask(row)) == 0;
+}
+
+static void note_found(cia402_axis_t *self, uint32_t found, uint32_t wanted)
+{
+    self->has_found = true;
+    self->trouble_found = found;
+    self->trouble_wanted = wanted;
+}
+
+static bool is_guarding(const visit_t *self, uint32_t found)
+{
+    return self->row.need == CIA402_GUARD && cia402_object_is_guarding(&self->row, self->config, &self->axis->setup, found);
+}
+
+static bool is_late(const visit_t *self, uint32_t found)
+{
+    return self->row.need == CIA402_GUARD && cia402_object_is_late(&self->row, self->config, &self->axis->setup, found);
+}
+
 static cia402_setup_result_t compare(const visit_t *self)
 {
     const cia402_object_t *row = &self->row;
     cia402_axis_t *axis = self->axis;
     const uint32_t found = sdo_value_u32(&axis->sdo);
     const uint32_t wanted = cia402_object_value(row, self->config, self->own, &axis->setup);
-    const bool is_equal = ((found ^ wanted) & cia402_object_mask(row)) == 0;
-    if (is_equal || (row->need == CIA402_GUARD && cia402_object_is_guarding(row, self->config, found))) {
+    axis->setup.guard_ms = row->index == GUARD_TIME ? (uint16_t)found : axis->setup.guard_ms;
+    if (is_fitting(row, found, wanted) || is_guarding(self, found)) {
         next_step(self);
         return CIA402_SETUP_BUSY;
     }
@@ -193,12 +229,33 @@ static cia402_setup_result_t compare(const visit_t *self)
     }
     /* a write that was refused before says why; its object may have been another entry of the same record */
     const uint32_t refusal = axis->setup.refused == row->index ? axis->setup.refusal : 0;
-    const cia402_setup_result_t result = give_up(self, refusal);
+    const cia402_setup_result_t result = row->need == CIA402_IF_TOLD ? refuse(self, refusal) : give_up(self, refusal);
     if (result == CIA402_SETUP_REFUSED) {
-        axis->has_found = true;
-        axis->trouble_found = found;
-        axis->trouble_wanted = wanted;
+        note_found(axis, found, wanted);
+        axis->trouble = is_late(self, found) ? (uint32_t)CIA402_GUARDED_LATE : axis->trouble;
     }
+    return result;
+}
+
+/* Entry 0 is the length of the list. The others may have one byte or two. */
+static cia402_setup_result_t seek(const visit_t *self)
+{
+    cia402_setup_t *setup = &self->axis->setup;
+    const uint32_t found = sdo_value_u32(&self->axis->sdo);
+    const uint32_t wanted = cia402_object_value(&self->row, self->config, self->own, setup);
+    setup->value = setup->entry == 0 ? found : setup->value;
+    if (setup->value == 0 || (setup->entry > 0 && found == wanted)) { /* an empty list tells nothing */
+        next_row(self);
+        return CIA402_SETUP_BUSY;
+    }
+    if (setup->entry < setup->value && setup->entry < LIST_MAX) {
+        setup->entry++;
+        setup->is_asked = false;
+        return CIA402_SETUP_BUSY;
+    }
+    const cia402_setup_result_t result = refuse(self, 0);
+    self->axis->trouble_object += setup->entry;
+    note_found(self->axis, found, wanted);
     return result;
 }
 
@@ -207,6 +264,9 @@ static cia402_setup_result_t take_answer(const visit_t *self)
     const step_t step = step_of(self);
     if (step == STEP_COMPARE || step == STEP_POLL) {
         return compare(self);
+    }
+    if (step == STEP_SEEK) {
+        return seek(self);
     }
     if (step == STEP_KEEP) {
         self->axis->setup.value = sdo_value_u32(&self->axis->sdo);
@@ -236,7 +296,7 @@ static cia402_setup_result_t listen(const visit_t *self)
 /* What may be missing may be so without a word: some drives drop questions for objects that they do not have. */
 static cia402_setup_result_t take_silence(const visit_t *self)
 {
-    if (self->row.need == CIA402_IF_THERE) {
+    if (may_be_missing(&self->row)) {
         return give_up(self, 0);
     }
     self->axis->setup.job = CIA402_JOB_NONE;
@@ -269,7 +329,7 @@ static bool find_row(visit_t *self)
     const cia402_setup_t *setup = &self->axis->setup;
     const uint8_t end = end_of(setup->job);
     while (setup->row < end) {
-        self->row = cia402_objects_at(self->own, setup);
+        self->row = cia402_objects_at(self->config, self->own, setup);
         if (cia402_object_applies(&self->row, self->config, self->own)) {
             return true;
         }

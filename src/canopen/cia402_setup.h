@@ -19,7 +19,7 @@ typedef enum {
 void cia402_setup_begin(cia402_axis_t *self, cia402_job_t job, cia402_mode_t mode, uint64_t now_us);
 
 /** The object that it is at, index << 8 | sub. */
-uint32_t cia402_setup_object(const cia402_axis_t *self, const cia402_axis_config_t *axis);
+uint32_t cia402_setup_object(const cia402_axis_t *self, const cia402_config_t *config, const cia402_axis_config_t *axis);
 
 /** Goes on as far as it can. Idle jobs are DONE. */
 cia402_setup_result_t cia402_setup_step(cia402_axis_t *self, const cia402_config_t *config, const cia402_axis_config_t *axis,

@@ -5,19 +5,15 @@
  */
 #include "cia402_stage.h"
 
+#include "cia402_node.h"
 #include "cia402_setup.h"
 #include "cia402_watch.h"
 
-#define SWITCHED_ON_SYNCS 3u /* set-points that lie on actual before the torque comes */
+#define SWITCHED_ON_SYNCS 3u /* SYNCs with set-points at the actual position before torque */
 #define MODE_TIMEOUT_US   6000000u
 #define HOMING_BEGIN_US                                                                                                          \
-    500000u /* "done" or "failed" from the start is believed only after this: it may be that of the last homing */
+    500000u /* "done" or "failed" at the begin counts only after this time: it may be left from the last homing */
 #define HOMING_BITS (CIA402_STATUS_BIT12 | CIA402_STATUS_REACHED)
-
-cia402_drive_t cia402_drive(cia402_t *self, unsigned axis)
-{
-    return (cia402_drive_t){&self->axis[axis], self->config, &self->config->axis[axis], self->now_us};
-}
 
 static void enter(cia402_t *self, cia402_stage_t stage)
 {
@@ -58,7 +54,7 @@ static bool is_in_state(const cia402_t *self, cia402_state_t state)
     return true;
 }
 
-/* Down to no torque; what is switched on may stay so. */
+/* Takes the torque off; drives may stay switched on. */
 static void withdraw(cia402_t *self)
 {
     enter(self, CIA402_STAGE_WITHDRAW);
@@ -104,7 +100,7 @@ void cia402_stage_end(cia402_t *self, cia402_goal_t goal)
 
 static cia402_mode_t mode_of(const cia402_t *self, unsigned k)
 {
-    return self->is_homing && needs_homing(self, k) ? CIA402_MODE_HOMING : self->config->mode;
+    return self->is_homing && needs_homing(self, k) ? CIA402_MODE_HOMING : cia402_mode(self->config, k);
 }
 
 /* --- Towards enabled --- */
@@ -127,7 +123,7 @@ static bool is_in_mode(const cia402_axis_t *axis)
     return axis->setup.job == CIA402_JOB_NONE && axis->mode_shown == (int8_t)axis->setup.mode;
 }
 
-/* Those that have not come along in time. */
+/* Reports the drives that have not arrived in time. */
 static void fail_where(cia402_t *self, bool (*is_there)(cia402_t *self, unsigned k), cia402_trouble_t why)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
@@ -209,7 +205,7 @@ static void begin_following(cia402_t *self)
     }
 }
 
-/* A drive that had its torque and lost it again is not given it once more. */
+/* A drive that had torque and lost it does not get it again. */
 static void watch_relapse(cia402_t *self)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
@@ -238,7 +234,7 @@ static void step_operate(cia402_t *self)
 
 /* --- Homing --- */
 
-/* Alone, or when all before it have arrived. */
+/* True if homing of drive k may start: at once, or, with homing in turn, after all drives before it. */
 static bool may_start(const cia402_t *self, unsigned k)
 {
     for (unsigned i = 0; self->config->is_homing_in_turn && i < k; i++) {
@@ -273,7 +269,7 @@ static void step_homing_axis(cia402_t *self, unsigned k)
     }
 }
 
-/* Then back to the mode of the set-points, on the new zero. */
+/* After homing: back to the mode of the set-points, with the new zero. */
 static void step_homing(cia402_t *self)
 {
     bool is_over = true;
@@ -296,13 +292,13 @@ static void step_homing(cia402_t *self)
 
 /* --- Following --- */
 
-/* A drive that leaves the enabled state without being asked to, or that says that it cannot follow. */
+/* Finds a drive that has left the enabled state by itself, or that reports that it cannot follow. */
 static void watch_operation(cia402_t *self)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
         cia402_axis_t *axis = &self->axis[k];
         const cia402_state_t state = cia402_axis_state(axis);
-        const bool is_watched = self->config->mode != CIA402_MODE_IP && self->stage == CIA402_STAGE_FOLLOW;
+        const bool is_watched = cia402_mode(self->config, k) != CIA402_MODE_IP && self->stage == CIA402_STAGE_FOLLOW;
         if (!axis->is_in) {
             continue;
         }
@@ -327,7 +323,7 @@ static bool are_all_in(const cia402_t *self)
     return true;
 }
 
-/* What is wrong with a drive that is where it should be, and so says itself. */
+/* Finds problems of a drive that is in the right state and reports no fault. */
 static void watch_answers(cia402_t *self)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
@@ -370,7 +366,7 @@ void cia402_stage_step(cia402_t *self)
     if (self->stage == CIA402_STAGE_OFF) {
         return;
     }
-    if (!self->is_begun) { /* a request is seen in one poll before it goes on in the next */
+    if (!self->is_begun) { /* a request is visible for one poll before the next one carries it out */
         self->is_begun = true;
         return;
     }
@@ -389,8 +385,9 @@ uint16_t cia402_stage_mode_bits(const cia402_t *self, unsigned k)
     if (axis->homing != CIA402_HOMING_NO && self->is_homing) {
         return axis->homing == CIA402_HOMING_WAITING ? 0 : CIA402_WORD_BIT4;
     }
-    if (self->config->mode == CIA402_MODE_PP) {
+    const cia402_mode_t mode = cia402_mode(self->config, k);
+    if (mode == CIA402_MODE_PP) {
         return CIA402_WORD_AT_ONCE | (self->pp_step == 1u ? CIA402_WORD_BIT4 : 0);
     }
-    return self->config->mode == CIA402_MODE_IP ? CIA402_WORD_BIT4 : 0;
+    return mode == CIA402_MODE_IP ? CIA402_WORD_BIT4 : 0;
 }

@@ -6,9 +6,6 @@
 
 #include "cia402_axis.h"
 
-/** One of the drives, for cia402_axis.h. */
-cia402_drive_t cia402_drive(cia402_t *self, unsigned axis);
-
 /** Begins to enable all drives, or to home those that have to be. Every drive must be up and without fault. */
 void cia402_stage_begin(cia402_t *self, bool is_homing);
 

@@ -3,17 +3,6 @@
  */
 #include "heave/cia402_state.h"
 
-static const struct {
-    uint16_t mask;
-    uint16_t value;
-    cia402_state_t state;
-} k_states[] = {
-    {0x4F, 0x00, CIA402_NOT_READY},          {0x4F, 0x40, CIA402_SWITCH_ON_DISABLED},
-    {0x6F, 0x21, CIA402_READY_TO_SWITCH_ON}, {0x6F, 0x23, CIA402_SWITCHED_ON},
-    {0x6F, 0x27, CIA402_OPERATION_ENABLED},  {0x6F, 0x07, CIA402_QUICK_STOP_ACTIVE},
-    {0x4F, 0x0F, CIA402_FAULT_REACTION},     {0x4F, 0x08, CIA402_FAULT},
-};
-
 /* Towards off a drive is led down by its ramps (605Ch, then 605Bh) before the voltage goes. Where a quick stop ends by itself
  * (605Ah 1 to 4) it is left alone. */
 static const uint16_t k_words[CIA402_STATES][CIA402_GOALS] = {
@@ -29,14 +18,33 @@ static const uint16_t k_words[CIA402_STATES][CIA402_GOALS] = {
     [CIA402_STRANGE] = {0x0000, 0x0002, 0x0000, 0x0000},
 };
 
+/* Bits 0 to 3, 5 and 6 tell. The mask of the standard leaves bit 5 out where both of its values are listed. */
 cia402_state_t cia402_state(uint16_t statusword)
 {
-    for (size_t i = 0; i < sizeof k_states / sizeof k_states[0]; i++) {
-        if ((statusword & k_states[i].mask) == k_states[i].value) {
-            return k_states[i].state;
-        }
+    switch (statusword & 0x6Fu) {
+    case 0x00u:
+    case 0x20u:
+        return CIA402_NOT_READY;
+    case 0x40u:
+    case 0x60u:
+        return CIA402_SWITCH_ON_DISABLED;
+    case 0x21u:
+        return CIA402_READY_TO_SWITCH_ON;
+    case 0x23u:
+        return CIA402_SWITCHED_ON;
+    case 0x27u:
+        return CIA402_OPERATION_ENABLED;
+    case 0x07u:
+        return CIA402_QUICK_STOP_ACTIVE;
+    case 0x0Fu:
+    case 0x2Fu:
+        return CIA402_FAULT_REACTION;
+    case 0x08u:
+    case 0x28u:
+        return CIA402_FAULT;
+    default:
+        return CIA402_STRANGE;
     }
-    return CIA402_STRANGE;
 }
 
 uint16_t cia402_controlword(cia402_state_t state, cia402_goal_t goal)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * atomic_file.h - a file that is there as a whole or not at all: written beside its place and renamed when all of it is on the
- * disk. What is not a file (a pipe, a terminal, /dev/null; "-" is standard output) is written as it comes.
+ * atomic_file.h - a file that exists completely or not at all. It is written under another name in the same folder, and renamed
+ * when all of it is on the disk. A path that is not a regular file (a pipe, a terminal, /dev/null; "-": standard output) is
+ * written directly.
  */
 #ifndef HEAVE_COMMON_ATOMIC_FILE_H
 #define HEAVE_COMMON_ATOMIC_FILE_H
@@ -9,18 +10,18 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/** A file in the making. */
+/** A file that is being written. */
 typedef struct {
-    FILE *stream;        /**< to write to */
-    char path[PATH_MAX]; /**< of the result, links followed */
-    char part[PATH_MAX]; /**< of what is written until then; empty: the result itself */
+    FILE *stream;        /**< the caller writes here */
+    char path[PATH_MAX]; /**< of the finished file, with symbolic links resolved */
+    char part[PATH_MAX]; /**< of the file while it is written; empty: `path` is written directly */
 } atomic_file_t;
 
-/** Opens a file for writing; an old one of that name stays until the end.
+/** Opens a file for writing. An old file of this name stays until atomic_file_close().
  *  @return false: errno says why */
 bool atomic_file_open(atomic_file_t *self, const char *path);
 
-/** Ends it: all of it is there, or nothing has changed.
+/** Closes the file. Afterwards the new file is complete, or the old one is unchanged.
  *  @return false: errno says why */
 bool atomic_file_close(atomic_file_t *self);
 

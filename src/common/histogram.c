@@ -40,6 +40,15 @@ uint64_t histogram_percentile_us(const histogram_t *self, uint32_t of_100000)
     return histogram_max_us(self);
 }
 
+uint64_t histogram_between(const histogram_t *self, uint64_t from_us, uint64_t below_us)
+{
+    uint64_t count = 0;
+    for (uint64_t i = from_us; i < below_us && i < HISTOGRAM_BINS; i++) {
+        count += bin_at(self, (unsigned)i);
+    }
+    return count;
+}
+
 uint64_t histogram_max_us(const histogram_t *self)
 {
     return __atomic_load_n(&self->most_us, __ATOMIC_RELAXED);

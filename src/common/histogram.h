@@ -25,6 +25,9 @@ uint64_t histogram_count(const histogram_t *self);
  *  nothing was added. */
 uint64_t histogram_percentile_us(const histogram_t *self, uint32_t of_100000);
 
+/** How many lasted from_us or longer, and less than below_us. What lasted HISTOGRAM_BINS - 1 us or longer counts as that long. */
+uint64_t histogram_between(const histogram_t *self, uint64_t from_us, uint64_t below_us);
+
 /** The longest one. */
 uint64_t histogram_max_us(const histogram_t *self);
 

@@ -4,6 +4,8 @@
 #ifndef HEAVE_COMMON_MESSAGE_H
 #define HEAVE_COMMON_MESSAGE_H
 
+#include <stddef.h>
+
 /** Exit codes, with the numbers of sysexits.h. */
 enum {
     EXIT_DONE = 0,
@@ -22,5 +24,9 @@ enum {
 /** Prints `heaved: ` and a line to standard error, in one piece. No allocation.
  *  @return code, so that a caller can report and return at once */
 int print_message(int code, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/** Keeps the newest line in a buffer, too, without its prefix: for who has to tell later why something failed. While there is one
+ *  thread; NULL: no more. */
+void print_message_keep(char *buffer, size_t size);
 
 #endif

@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/translate.h"
+
 #define ENDING    ".ini"
 #define NAME_ROOM 20 /* columns of a name */
 
@@ -41,7 +43,7 @@ static void write_summary(const char *path, FILE *out)
     }
     const char *summary = strstr(line, " - ");
     line[strcspn(line, "\r\n")] = '\0';
-    fprintf(out, "%s\n", summary == NULL || line[0] != ';' ? "" : summary + strlen(" - "));
+    fprintf(out, "%s\n", summary == NULL || line[0] != ';' ? "" : translate(summary + strlen(" - ")));
 }
 
 int presets_list(FILE *out)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * presets.h - platforms that come with the programs: configuration files in a folder of the system, by name.
+ * presets.h - ready-made platforms that are installed with the programs: configuration files in one folder, found by name.
  */
 #ifndef HEAVE_COMMON_PRESETS_H
 #define HEAVE_COMMON_PRESETS_H
@@ -7,17 +7,17 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-/** The folder; the environment's HEAVE_PRESETS says another one. */
+/** The folder. The environment variable HEAVE_PRESETS replaces it. */
 const char *presets_directory(void);
 
-/** The file of a preset.
+/** Makes the path of a preset's file.
  *  @param name without folder and ending
  *  @param path out: its path
- *  @return false where the name is none, or the path is too long; whether the file is there is the reader's to see */
+ *  @return false: the name is not valid, or the path is too long. Does not check whether the file exists */
 bool presets_path(const char *name, char *path, size_t size);
 
-/** Writes the names, one a line, with what the first line of each file says of it.
- *  @return their number, or -1: errno says why there is no such folder */
+/** Writes one line per preset: its name, and the description in the first line of its file.
+ *  @return number of presets; -1: the folder cannot be read, errno says why */
 int presets_list(FILE *out);
 
 #endif

@@ -7,6 +7,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "common/columns.h"
+
 #define LINE_WIDTH 72u
 
 /** A line that is being written. */
@@ -37,13 +39,20 @@ static void put_char(roff_line_t *self, char character)
 
 static void put_word(roff_line_t *self, const char *word, size_t length)
 {
+    const char *previous = NULL;
     if (self->column > 0) {
         const bool is_full = self->column + length >= LINE_WIDTH;
         fputc(is_full ? '\n' : ' ', self->out);
         self->column = is_full ? 0 : self->column + 1;
     }
-    for (size_t i = 0; i < length; i++) {
-        put_char(self, word[i]);
+    for (size_t i = 0; i < length;) {
+        if (columns_may_break(previous, &word[i])) {
+            fputs("\\:", self->out); /* troff breaks lines at blanks, which Chinese has not */
+        }
+        previous = &word[i];
+        for (glyph_t glyph = columns_glyph(&word[i]); glyph.bytes > 0; glyph.bytes--) {
+            put_char(self, word[i++]);
+        }
     }
 }
 

@@ -4,6 +4,7 @@
  */
 #include "common/sha256.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #define BLOCK_BYTES  64u
@@ -91,4 +92,22 @@ void sha256_end(sha256_t *self, uint8_t digest[SHA256_BYTES])
     for (unsigned i = 0; i < SHA256_BYTES; i++) {
         digest[i] = (uint8_t)(self->state[i / 4] >> (24u - 8u * (i % 4)));
     }
+}
+
+void sha256_end_digits(sha256_t *self, char *digits, size_t size)
+{
+    uint8_t digest[SHA256_BYTES];
+    sha256_end(self, digest);
+    digits[0] = '\0';
+    for (size_t i = 0; i < SHA256_BYTES && 2 * i + 2 < size; i++) {
+        (void)snprintf(&digits[2 * i], 3, "%02x", (unsigned)digest[i]);
+    }
+}
+
+void sha256_digits(const void *bytes, size_t length, char *digits, size_t size)
+{
+    sha256_t hash;
+    sha256_start(&hash);
+    sha256_add(&hash, bytes, length);
+    sha256_end_digits(&hash, digits, size);
 }

@@ -21,4 +21,10 @@ void sha256_start(sha256_t *self);
 void sha256_add(sha256_t *self, const void *bytes, size_t length);
 void sha256_end(sha256_t *self, uint8_t digest[SHA256_BYTES]);
 
+/** sha256_end(), in digits. @param size of digits: as many whole bytes as fit, and a NUL; at most 65 */
+void sha256_end_digits(sha256_t *self, char *digits, size_t size);
+
+/** All of it for a text that is there as a whole. */
+void sha256_digits(const void *bytes, size_t length, char *digits, size_t size);
+
 #endif

@@ -5,6 +5,9 @@
 
 #include <string.h>
 
+#include "common/columns.h"
+#include "common/translate.h"
+
 #define COLUMN_MAX 56 /* forms longer than that leave their help no room beside them */
 #define LINE_WIDTH 120
 
@@ -32,7 +35,7 @@ static void print_rows(const usage_row_t *rows, const char *before, FILE *out)
     for (const usage_row_t *row = rows; !usage_is_end(row); row++) {
         (void)row_text(row, before, text, sizeof text);
         if (row->help != NULL) {
-            fprintf(out, "%-*s  %s\n", width, text, row->help);
+            fprintf(out, "%-*s  %s\n", width, text, translate(row->help));
         } else {
             fprintf(out, "%s\n", text);
         }
@@ -42,15 +45,17 @@ static void print_rows(const usage_row_t *rows, const char *before, FILE *out)
 /* "Exit codes: 0 done, 1 ...", in lines. */
 static void print_exits(const usage_exit_t *exits, FILE *out)
 {
-    size_t column = (size_t)fprintf(out, "Exit codes:");
+    size_t column = columns_of(_("Exit codes:"));
+    fputs(_("Exit codes:"), out);
     for (const usage_exit_t *exit = exits; exit->meaning != NULL; exit++) {
-        const size_t length = strlen(exit->meaning) + 5;
+        const char *meaning = translate(exit->meaning);
+        const size_t length = columns_of(meaning) + 5;
         if (column + length > LINE_WIDTH) {
             fputc('\n', out);
             column = 0;
         }
-        column += (size_t)fprintf(out, "%s%d %s%c", column == 0 ? "" : " ", exit->code, exit->meaning,
-                                  exit[1].meaning != NULL ? ',' : '.');
+        fprintf(out, "%s%d %s%s", column == 0 ? "" : " ", exit->code, meaning, exit[1].meaning != NULL ? _(",") : _("."));
+        column += length;
     }
     fputc('\n', out);
 }
@@ -58,7 +63,7 @@ static void print_exits(const usage_exit_t *exits, FILE *out)
 void usage_print(const usage_t *self, FILE *out)
 {
     char before[80];
-    fprintf(out, "%s - %s.\n\n", self->program, self->summary);
+    fprintf(out, _("%s - %s.\n\n"), self->program, translate(self->summary));
     (void)snprintf(before, sizeof before, "  %s %s%s", self->program, self->common != NULL ? self->common : "",
                    self->common != NULL ? " " : "");
     print_rows(self->forms, before, out);
@@ -68,7 +73,7 @@ void usage_print(const usage_t *self, FILE *out)
     }
     fputc('\n', out);
     print_rows(self->options, "  --", out);
-    fprintf(out, "\n%s%s", self->notes != NULL ? self->notes : "", self->notes != NULL ? "\n" : "");
+    fprintf(out, "\n%s%s", self->notes != NULL ? translate(self->notes) : "", self->notes != NULL ? "\n" : "");
     print_exits(self->exits, out);
 }
 

@@ -4,6 +4,7 @@
 #include "config/bus.h"
 
 #include "config/canraw.h"
+#include "config/cia402.h"
 
 #define SDO_EVERY_US 20000u /* service requests while drives move: next to none */
 
@@ -19,21 +20,41 @@ static uint8_t longer(const canraw_frame_t *a, const canraw_frame_t *b)
     return a->length > b->length ? a->length : b->length;
 }
 
+/* Different identifiers: drives may share one. */
+static uint32_t count_ids(const config_can_raw_t *raw, uint32_t (*id_of)(const config_can_raw_t *raw, unsigned axis),
+                          uint32_t axes)
+{
+    uint32_t count = 0;
+    for (unsigned k = 0; k < axes; k++) {
+        bool is_new = true;
+        for (unsigned i = 0; i < k; i++) {
+            is_new = is_new && id_of(raw, i) != id_of(raw, k);
+        }
+        count += is_new ? 1u : 0u;
+    }
+    return count;
+}
+
 /* Each drive gets a set-point per period and answers a query every query_every periods: that for the position, or that for
  * homing, whichever is longer. */
 static void describe_can_raw(const config_t *config, config_bus_t *bus)
 {
     const config_can_raw_t *raw = &config->can_raw;
     const bool is_extended = raw->id_bits == CONFIG_ID_29_BITS;
+    const bool is_asked = raw->position_query.length + raw->homing_query.length > 0;
     const uint32_t axes = config_canraw_axes(config);
     bus->section = "can-raw";
     bus->period_us = raw->period_us;
     bus->bitrate_bps = config->can.bitrate_bps;
-    add(bus, is_extended, raw->setpoint.length, axes, 1);
-    if (raw->position_query.length + raw->homing_query.length > 0) {
+    add(bus, is_extended, raw->setpoint.length, count_ids(raw, config_canraw_setpoint_id, axes), 1);
+    if (is_asked) {
         add(bus, is_extended, longer(&raw->position_query, &raw->homing_query), axes, raw->query_every);
     }
-    add(bus, is_extended, longer(&raw->position_reply, &raw->homing_reply), axes, raw->query_every);
+    add(bus, is_extended, longer(&raw->position_reply, &raw->homing_reply),
+        is_asked ? axes : count_ids(raw, config_canraw_reply_id, axes), raw->query_every);
+    if (raw->status_reply.length > 0) {
+        add(bus, is_extended, raw->status_reply.length, count_ids(raw, config_canraw_status_id, axes), raw->status_every);
+    }
 }
 
 static uint32_t periods_of(uint32_t time_us, uint32_t period_us)
@@ -41,19 +62,55 @@ static uint32_t periods_of(uint32_t time_us, uint32_t period_us)
     return time_us > period_us ? time_us / period_us : 1u;
 }
 
+/* So many drives send what they send at every so manyth SYNC in the same period: all of them unless they take turns. */
+static uint32_t together(const cia402_config_t *drives, uint8_t every)
+{
+    const bool is_in_turn = cia402_sync_start(drives, 0, every) != 0;
+    return is_in_turn ? (drives->axes + every - 1u) / every : drives->axes;
+}
+
+/* Those of one kind, of all drives: a PDO of a node is that of its first axis alone. */
+static void describe_pdos(const cia402_config_t *drives, unsigned which, config_bus_t *bus)
+{
+    uint32_t frames = 0;
+    cia402_pdo_t pdo = {.entries = 0};
+    for (unsigned k = 0; k < drives->axes; k++) {
+        const cia402_pdo_t own = cia402_pdo(drives, k, which);
+        frames += own.entries > 0;
+        pdo = own.entries > 0 ? own : pdo;
+    }
+    if (frames > 0) {
+        add(bus, false, pdo.bytes, frames < drives->axes ? frames : together(drives, pdo.every), 1);
+    }
+}
+
+static uint32_t count_nodes(const cia402_config_t *drives)
+{
+    uint32_t count = 0;
+    for (unsigned k = 0; k < drives->axes; k++) {
+        count += drives->axis[k].channel == 0;
+    }
+    return count;
+}
+
 /* SYNC, a command and an answer of each drive per period; heartbeats of all, and a service request with its answer now and then.
  */
 static void describe_cia402(const config_t *config, config_bus_t *bus)
 {
     const config_cia402_t *cia402 = &config->cia402;
-    const uint32_t axes = config_canraw_axes(config);
+    cia402_config_t drives;
+    config_cia402(config, &drives);
     bus->section = "cia402";
     bus->period_us = cia402->period_us;
     bus->bitrate_bps = config->can.bitrate_bps;
     add(bus, false, cia402->sync_counter != 0 ? 1 : 0, 1, 1);
-    add(bus, false, 6, axes, 1);
-    add(bus, false, 7, axes, 1);
-    add(bus, false, 1, axes + 1u, periods_of(cia402->heartbeat_ms * 1000u, cia402->period_us));
+    for (unsigned which = 0; which < CIA402_PDOS; which++) {
+        describe_pdos(&drives, which, bus);
+    }
+    if (drives.is_guarded) {
+        add(bus, false, 0, count_nodes(&drives), periods_of(cia402->heartbeat_ms * 1000u, cia402->period_us));
+    }
+    add(bus, false, 1, count_nodes(&drives) + 1u, periods_of(cia402->heartbeat_ms * 1000u, cia402->period_us));
     add(bus, false, 8, 2, periods_of(SDO_EVERY_US, cia402->period_us));
 }
 

@@ -11,7 +11,7 @@
 #define CONFIG_BUS_REFUSED_PPM 900000u
 #define CONFIG_BUS_WARNED_PPM  600000u
 
-#define CONFIG_BUS_ENTRIES_MAX 8u
+#define CONFIG_BUS_ENTRIES_MAX 13u
 
 /** The frames of a bus. */
 typedef struct {

@@ -13,6 +13,24 @@ uint8_t config_canraw_axes(const config_t *config);
  *  @param ids count 1 or that of the drives */
 uint32_t config_canraw_id(const config_ids_t *ids, unsigned axis);
 
+/** Identifier of a frame that so many drives may share (0: none): a single one in ids is that of the first of them. */
+uint32_t config_canraw_shared_id(const config_ids_t *ids, unsigned axis, unsigned slots);
+
+/** Identifier of the set-points of a drive. */
+uint32_t config_canraw_setpoint_id(const config_can_raw_t *raw, unsigned axis);
+
+/** Identifier of the replies of a drive. */
+uint32_t config_canraw_reply_id(const config_can_raw_t *raw, unsigned axis);
+
+/** Identifier of the status of a drive, where it comes apart. */
+uint32_t config_canraw_status_id(const config_can_raw_t *raw, unsigned axis);
+
+/** The frame that tells the status, and its key. */
+const canraw_frame_t *config_canraw_status_frame(const config_can_raw_t *raw, const char **name);
+
+/** True where the section has frames for command_id beside set-points. */
+bool config_canraw_has_commands(const config_can_raw_t *raw);
+
 /** Counts of a drive per mm (deg), as the section has them; usable only where the lists have the right lengths. */
 counts_scale_t config_canraw_scale(const config_t *config, unsigned axis);
 

@@ -4,6 +4,8 @@
  */
 #include "config/check.h"
 
+#include "common/translate.h"
+
 #include <string.h>
 
 #include "config/bus.h"
@@ -83,7 +85,7 @@ static void check_presence(config_source_t *self, const config_key_t *key, const
     if (!config_is_applicable(key->needs, self->config)) {
         if (entry->line != 0) {
             config_source_key_error(self, key->section, key->name, "means nothing on this platform; allowed: with %s only",
-                                    key->needs == CONFIG_NEEDS_ANGLE ? "[angle] present = yes" : "kind = hexapod");
+                                    key->needs == CONFIG_NEEDS_ANGLE ? _("[angle] present = yes") : _("kind = hexapod"));
         }
         return;
     }

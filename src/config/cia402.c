@@ -4,6 +4,7 @@
 #include "config/cia402.h"
 
 #include "config/canraw.h" // config_canraw_axes, config_canraw_id
+#include "config/telemetry.h"
 
 #define PP_PERIODS  8 /* from one set-point that a drive takes to the next, and its own lag */
 #define STEP_FACTOR 2 /* a set-point may be so much further than its speed limit allows before it counts as a jump */
@@ -31,7 +32,12 @@ counts_scale_t config_cia402_scale(const config_t *config, unsigned axis)
 
 uint32_t config_cia402_node(const config_t *config, unsigned axis)
 {
-    return config_canraw_id(&config->cia402.nodes, axis);
+    return config_canraw_id(&config->cia402.nodes, axis) & CONFIG_NODE_MASK;
+}
+
+uint32_t config_cia402_channel(const config_t *config, unsigned axis)
+{
+    return config_canraw_id(&config->cia402.nodes, axis) >> CONFIG_CHANNEL_SHIFT;
 }
 
 /* A way, speed or acceleration in counts: never 0 where there is one, at the end of 32 bits where it does not fit. */
@@ -64,6 +70,14 @@ static void describe_limits(const config_t *config, unsigned k, cia402_axis_conf
     axis->limit_counts[1] = (int32_t)fx_clamp(in < out ? out : in, INT32_MIN, INT32_MAX);
 }
 
+cia402_mode_t config_cia402_mode(const config_t *config, unsigned axis)
+{
+    static const cia402_mode_t k_modes[] = {
+        [CONFIG_MODE_CSP] = CIA402_MODE_CSP, [CONFIG_MODE_IP] = CIA402_MODE_IP, [CONFIG_MODE_PP] = CIA402_MODE_PP};
+    const config_words_t *words = &config->cia402.mode;
+    return k_modes[words->word[words->count == 1 ? 0 : axis]];
+}
+
 static void describe_axis(const config_t *config, unsigned k, cia402_axis_config_t *axis)
 {
     const config_cia402_t *cia402 = &config->cia402;
@@ -76,6 +90,8 @@ static void describe_axis(const config_t *config, unsigned k, cia402_axis_config
     const q16_t window_q16 = is_angle ? cia402->angle_following_error_deg_q16 : cia402->following_error_mm_q16;
     *axis = (cia402_axis_config_t){
         .node = (uint8_t)config_cia402_node(config, k),
+        .channel = (uint8_t)config_cia402_channel(config, k),
+        .mode = (uint8_t)config_cia402_mode(config, k),
         .scale = scale,
         .step_max_q32 = fx_mul_div(q32_from_q16(speed_q16), STEP_FACTOR * (int64_t)cia402->period_us, 1000000) + 1,
         .following_max_q32 = q32_from_q16(window_q16),
@@ -94,19 +110,6 @@ static void describe_axis(const config_t *config, unsigned k, cia402_axis_config
     describe_limits(config, k, axis);
 }
 
-static cia402_mode_t mode_of(config_mode_t mode)
-{
-    switch (mode) {
-    case CONFIG_MODE_CSP:
-        return CIA402_MODE_CSP;
-    case CONFIG_MODE_IP:
-        return CIA402_MODE_IP;
-    case CONFIG_MODE_PP:
-        return CIA402_MODE_PP;
-    }
-    return CIA402_MODE_CSP;
-}
-
 q32_t config_cia402_pp_lag_q32(const config_t *config, q16_t speed_mm_s_q16)
 {
     const q32_t speed_q32 = q32_from_q16(speed_mm_s_q16);
@@ -121,8 +124,13 @@ void config_cia402(const config_t *config, cia402_config_t *out)
     *out = (cia402_config_t){
         .axes = config_canraw_axes(config),
         .master_node = cia402->gateway_node,
-        .mode = mode_of(cia402->mode),
+        .mode = config_cia402_mode(config, 0),
+        .pdo_step = cia402->pdo_step,
+        .are_maps_fixed = !cia402->is_map_written,
+        .commands = cia402->command_map,
+        .answers = cia402->answer_map,
         .period_us = cia402->period_us,
+        .is_guarded = cia402->error_control == CONFIG_CONTROL_GUARDING,
         .heartbeat_ms = cia402->heartbeat_ms,
         .heartbeat_timeout_ms = cia402->heartbeat_timeout_ms,
         .sdo_timeout_ms = cia402->sdo_timeout_ms,
@@ -132,9 +140,13 @@ void config_cia402(const config_t *config, cia402_config_t *out)
         .passive_stop_ms = config->can.passive_stop_ms,
         .abort_option = (int16_t)((int)cia402->when_gateway_lost + 1),
         .sync_counter = cia402->sync_counter,
+        .answer_every = cia402->answer_every,
+        .telemetry = config_telemetry(config),
+        .telemetry_every = cia402->tell_every,
         .is_sync_watched = cia402->is_sync_watched,
         .is_reset_wanted = cia402->is_reset_wanted,
         .is_unguarded_allowed = cia402->is_no_watchdog_allowed,
+        .is_support_checked = cia402->is_support_checked,
         .is_homing_in_turn = cia402->homing_order == CONFIG_HOMING_IN_TURN,
     };
     for (unsigned i = 0; i < CIA402_WATCHES; i++) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * cia402.h - the section [cia402] as the driver wants it, and what is checked of it.
+ * cia402.h - converts the section [cia402] into the configuration of the driver, and checks it.
  */
 #ifndef HEAVE_CONFIG_CIA402_H
 #define HEAVE_CONFIG_CIA402_H
@@ -7,11 +7,15 @@
 #include "config/source.h"
 #include "heave/cia402.h"
 
-/** Counts of a drive per mm (deg); usable only where the lists have the right lengths. */
+/** Counts of a drive per mm (deg); valid only if the lists have the right lengths. */
 counts_scale_t config_cia402_scale(const config_t *config, unsigned axis);
 
-/** Node of a drive. */
+/** Node of a drive, and its axis there, from 0. */
 uint32_t config_cia402_node(const config_t *config, unsigned axis);
+uint32_t config_cia402_channel(const config_t *config, unsigned axis);
+
+/** Mode of the set-points of a drive. */
+cia402_mode_t config_cia402_mode(const config_t *config, unsigned axis);
 
 /** How far a cylinder's drive is behind set-points in profile position: it is always about to stop at the last one that it took.
  *  @return mm */

@@ -3,13 +3,15 @@
  * reported at the key it concerns.
  */
 #include "config/canraw.h" // config_canraw_axes
+
+#include "common/translate.h"
 #include "config/cia402.h"
 #include "config/startup_read.h"
 #include "config/value.h"
 
 #define SECTION           "cia402"
 #define NODE_MAX          127u
-#define WINDOW_PERIODS    3 /* a drive lags by its own lag and by one or two periods */
+#define WINDOW_PERIODS    3u /* a drive lags by its own lag and by one or two periods */
 #define HOMING_METHOD_MAX 127
 
 static unsigned cylinders_of(const config_source_t *self)
@@ -33,6 +35,7 @@ static bool is_length(config_source_t *self, const char *name, unsigned count, u
 static bool is_node_free(config_source_t *self, unsigned axis)
 {
     const uint32_t node = config_cia402_node(self->config, axis);
+    const uint32_t channel = config_cia402_channel(self->config, axis);
     if (node < 1u || node > NODE_MAX) {
         config_source_key_error(self, SECTION, "nodes", "%u of drive %u is no node id; allowed: 1 to %u", (unsigned)node,
                                 axis + 1u, NODE_MAX);
@@ -45,14 +48,33 @@ static bool is_node_free(config_source_t *self, unsigned axis)
         return false;
     }
     for (unsigned i = 0; i < axis; i++) {
-        if (config_cia402_node(self->config, i) == node) {
+        if (config_cia402_node(self->config, i) == node && config_cia402_channel(self->config, i) == channel) {
             config_source_key_error(self, SECTION, "nodes",
-                                    "%u of drive %u is that of drive %u already; allowed: a different one for each",
-                                    (unsigned)node, axis + 1u, i + 1u);
+                                    "%u of drive %u is that of drive %u already; allowed: a different one for each, or axes of a "
+                                    "node such as %u.1 and %u.2",
+                                    (unsigned)node, axis + 1u, i + 1u, (unsigned)node, (unsigned)node);
             return false;
         }
     }
     return true;
+}
+
+/* The axes of a node begin at 1: what belongs to the node is done with its first one. */
+static bool has_axis_below(config_source_t *self, unsigned axis, unsigned axes)
+{
+    const uint32_t node = config_cia402_node(self->config, axis);
+    const uint32_t channel = config_cia402_channel(self->config, axis);
+    for (unsigned i = 0; i < axes; i++) {
+        if (config_cia402_node(self->config, i) == node && config_cia402_channel(self->config, i) + 1u == channel) {
+            return true;
+        }
+    }
+    if (channel > 0) {
+        config_source_key_error(self, SECTION, "nodes",
+                                "%u.%u of drive %u is there without %u.%u; allowed: axes from 1, without gaps", (unsigned)node,
+                                (unsigned)channel + 1u, axis + 1u, (unsigned)node, (unsigned)channel);
+    }
+    return channel == 0;
 }
 
 static void check_nodes(config_source_t *self, unsigned axes)
@@ -67,6 +89,36 @@ static void check_nodes(config_source_t *self, unsigned axes)
     for (unsigned k = 0; is_fine && k < axes; k++) {
         is_fine = is_node_free(self, k);
     }
+    for (unsigned k = 0; is_fine && k < axes; k++) {
+        is_fine = has_axis_below(self, k, axes);
+    }
+}
+
+/* The key that a PDO which does not fit is of: of two that are both as usual, the nodes are too full. */
+static void check_maps(config_source_t *self)
+{
+    const config_cia402_t *cia402 = &self->config->cia402;
+    const char *why = NULL;
+    cia402_config_t drives;
+    config_cia402(self->config, &drives);
+    if (!cia402_pdos_fit(&drives, &why)) {
+        config_source_key_error(self, SECTION,
+                                cia402->command_map.count != 0  ? "command_map"
+                                : cia402->answer_map.count != 0 ? "answer_map"
+                                                                : "nodes",
+                                "the PDOs do not fit: %s; allowed: other maps, or less telemetry (tell_torque, ...)",
+                                translate(why));
+    }
+}
+
+static bool has_mode(const config_t *config, cia402_mode_t mode)
+{
+    for (unsigned k = 0; k < config_canraw_axes(config); k++) {
+        if (config_cia402_mode(config, k) == mode) {
+            return true;
+        }
+    }
+    return false;
 }
 
 static void check_serials(config_source_t *self, unsigned axes)
@@ -96,7 +148,7 @@ static bool is_carried(config_source_t *self, unsigned axis, q32_t at_q32)
     config_text_add_q16(&at, q16_from_q32(at_q32));
     config_source_key_error(
         self, SECTION, is_angle ? "angle_counts_per_deg" : "counts_per_mm",
-        "%s %s of drive %u are %lld counts, and 607Ah carries %d to %d; allowed: fewer counts, other zero counts", at.data,
+        _("%s %s of drive %u are %lld counts, and 607Ah carries %d to %d; allowed: fewer counts, other zero counts"), at.data,
         is_angle ? "deg" : "mm", axis + 1u, (long long)counts, (int)INT32_MIN, (int)INT32_MAX);
     return false;
 }
@@ -166,6 +218,10 @@ static void check_times(config_source_t *self)
                                 "less than two heartbeats: one late one would stop the platform; allowed: at least %u ms",
                                 2u * cia402->heartbeat_ms);
     }
+    if (has_mode(self->config, CIA402_MODE_PP) && cia402->answer_every > 1) {
+        config_source_key_error(self, SECTION, "answer_every",
+                                "mode = pp needs the answer to every SYNC; allowed: 1, or another mode");
+    }
     if (cia402->sync_counter == 1) {
         config_source_key_error(self, SECTION, "sync_counter", "a counter cannot end at 1; allowed: 0, or 2 to 240");
     }
@@ -174,11 +230,11 @@ static void check_times(config_source_t *self)
 /* At full speed a drive is behind by some periods without any fault. */
 static void check_window(config_source_t *self, const char *name, q16_t window_q16, q16_t speed_q16, const char *unit)
 {
-    const q32_t travel_q32 =
-        fx_mul_div(q32_from_q16(speed_q16), WINDOW_PERIODS * (int64_t)self->config->cia402.period_us, 1000000);
+    const unsigned periods = WINDOW_PERIODS + self->config->cia402.answer_every - 1u;
+    const q32_t travel_q32 = fx_mul_div(q32_from_q16(speed_q16), periods * (int64_t)self->config->cia402.period_us, 1000000);
     if (q32_from_q16(window_q16) < travel_q32) {
         config_source_key_error(self, SECTION, name,
-                                "less than a drive at full speed moves in %d periods; allowed: at least %.3f %s", WINDOW_PERIODS,
+                                "less than a drive at full speed moves in %u periods; allowed: at least %.3f %s", periods,
                                 (double)travel_q32 / (double)Q32_ONE + 0.0005, unit);
     }
 }
@@ -188,8 +244,8 @@ static void check_profile_lag(config_source_t *self)
 {
     const config_t *config = self->config;
     const q32_t lag_q32 = config_cia402_pp_lag_q32(config, config->settings.engage_speed_mm_s_q16);
-    if (config->cia402.mode == CONFIG_MODE_PP && config_source_has_all(self, "engage") &&
-        config_source_has_all(self, "cylinders") && q32_from_q16(config->cia402.following_error_mm_q16) < lag_q32) {
+    if (has_mode(config, CIA402_MODE_PP) && config_source_has_all(self, "engage") && config_source_has_all(self, "cylinders") &&
+        q32_from_q16(config->cia402.following_error_mm_q16) < lag_q32) {
         config_source_key_error(
             self, SECTION, "following_error_mm",
             "less than a drive in mode pp is behind at [engage] speed_mm_s; allowed: at least %.3f mm, or slower",
@@ -203,6 +259,9 @@ void config_cia402_check(config_source_t *self)
     const settings_t *settings = &self->config->settings;
     if (self->config->drives != CONFIG_DRIVES_CIA402 || !config_source_has(self, "platform", "kind") ||
         !config_source_has_all(self, SECTION)) {
+        return;
+    }
+    if (!is_length(self, "mode", cia402->mode.count, config_canraw_axes(self->config), "drives")) {
         return;
     }
     check_nodes(self, config_canraw_axes(self->config));
@@ -219,6 +278,7 @@ void config_cia402_check(config_source_t *self)
                      settings->axis[AXIS_ANGLE].speed_q16, "deg");
     }
     if (self->error_count == 0) {
+        check_maps(self);
         config_startup_check(self);
     }
 }

@@ -6,6 +6,8 @@
  */
 #include "config/config.h"
 
+#include "common/translate.h"
+
 #include <errno.h>
 #include <fcntl.h>
 #include <ini.h>
@@ -88,7 +90,7 @@ static void refuse_section(config_source_t *self, const char *name)
     config_text_clear(&text);
     config_text_add(&text, "[");
     config_text_add_escaped(&text, name, strlen(name));
-    config_text_add(&text, near != NULL ? "]: unknown section; did you mean [%s]?" : "]: unknown section; allowed:", near);
+    config_text_add(&text, near != NULL ? _("]: unknown section; did you mean [%s]?") : _("]: unknown section; allowed:"), near);
     for (size_t i = 0; near == NULL && i < config_section_count; i++) {
         config_text_add(&text, " %s", config_sections[i].name);
     }
@@ -187,7 +189,9 @@ static char *read_line(char *text, int size, void *stream)
         text[--length] = '\0';
     }
     if (length > longest) {
-        config_source_error(self, self->line, "line of %zu bytes; allowed: at most %zu", length, longest);
+        if (text[0] != ';' && text[0] != '#') { /* a comment is as long as it likes: nobody keeps it */
+            config_source_error(self, self->line, "line of %zu bytes; allowed: at most %zu", length, longest);
+        }
         text[0] = '\0';
     } else if (!take_encoding(self, text, &length)) {
         self->is_given_up = true;
@@ -206,16 +210,16 @@ static void suggest_key(const char *section, const char *name, config_text_t *te
 {
     const char *near = config_key_suggest(section, name);
     if (near != NULL) {
-        config_text_add(text, "did you mean %s?", near);
+        config_text_add(text, _("did you mean %s?"), near);
         return;
     }
     for (size_t i = 0; i < config_key_count; i++) {
         if (strcmp(config_keys[i].name, name) == 0) {
-            config_text_add(text, "it belongs to [%s]", config_keys[i].section);
+            config_text_add(text, _("it belongs to [%s]"), config_keys[i].section);
             return;
         }
     }
-    config_text_add(text, "[%s] takes", section);
+    config_text_add(text, _("[%s] takes"), section);
     for (size_t i = 0; i < config_key_count; i++) {
         if (strcmp(config_keys[i].section, section) == 0) {
             config_text_add(text, " %s", config_keys[i].name);
@@ -229,7 +233,7 @@ static void refuse_key(config_source_t *self, const char *section, const char *n
     config_text_clear(&text);
     config_text_add(&text, "[%s] ", section);
     config_text_add_escaped(&text, name, strlen(name));
-    config_text_add(&text, ": unknown key; ");
+    config_text_add(&text, _(": unknown key; "));
     suggest_key(section, name, &text);
     config_source_error(self, self->line, "%s", text.data);
 }
@@ -294,7 +298,7 @@ static void read_file(config_source_t *self)
 {
     const int bad_line = ini_parse_stream(read_line, self, take_pair, self);
     if (bad_line != 0 && self->error_count == 0) {
-        config_source_error(self, bad_line > 0 ? (unsigned)bad_line : 0u, "not understood; allowed: key = value");
+        config_source_error(self, bad_line > 0 ? (unsigned)bad_line : 0u, _("not understood; allowed: key = value"));
     }
 }
 
@@ -332,10 +336,15 @@ static ssize_t read_bytes(const char *path, char *bytes, size_t capacity, int wa
     return got < 0 ? -1 : (ssize_t)length;
 }
 
+ssize_t config_read(const char *path, char text[CONFIG_TEXT_BYTES])
+{
+    return read_bytes(path, text, CONFIG_TEXT_BYTES, 0);
+}
+
 /* Where the file is longer than what is kept of it, or cannot be read, that is the only error. */
 static bool open_bytes(config_source_t *self)
 {
-    static char bytes[CONFIG_FILE_MAX + 1u];
+    static char bytes[CONFIG_TEXT_BYTES];
     const ssize_t length = read_bytes(self->path, bytes, sizeof bytes, self->wait_ms);
     if (length < 0 && errno == ETIMEDOUT) {
         config_source_error(self, 0, "nothing came from it within %d s; allowed: a file, or a pipe that somebody writes to",
@@ -344,8 +353,8 @@ static bool open_bytes(config_source_t *self)
     }
     if (length < 0) {
         const bool is_opened = errno == EISDIR || errno == EIO;
-        config_source_error(self, 0, "cannot be %s: %s; allowed: a readable text file", is_opened ? "read" : "opened",
-                            strerror(errno));
+        config_source_error(self, 0, "cannot be %s: %s; allowed: a readable text file", is_opened ? _("read") : _("opened"),
+                            error_text(errno));
         return false;
     }
     if (length > (ssize_t)CONFIG_FILE_MAX) {
@@ -357,18 +366,19 @@ static bool open_bytes(config_source_t *self)
     return true;
 }
 
-/* Loads into the configuration of the source, whole or with errors. */
-static void load(config_source_t *self, const char *path, config_t *config, FILE *errors, int wait_ms)
+void config_source_load(config_source_t *self, const config_text_source_t *from, config_t *config, FILE *errors)
 {
     HV_ASSERT(config_key_count <= CONFIG_KEYS_MAX && config_section_count <= CONFIG_SECTIONS_MAX);
     memset(config, 0, sizeof *config);
     memset(self, 0, sizeof *self);
-    self->path = path;
-    self->wait_ms = wait_ms;
+    self->path = from->name;
+    self->wait_ms = from->wait_ms;
     self->errors = errors;
     self->config = config;
     self->section = CONFIG_SECTION_NONE;
-    if (!open_bytes(self)) {
+    self->at = from->text;
+    self->end = from->text != NULL ? from->text + from->length : NULL;
+    if (from->text == NULL && !open_bytes(self)) {
         return;
     }
     set_defaults(self);
@@ -382,65 +392,10 @@ int config_load(const char *path, config_t *out, FILE *errors)
 {
     config_t config;
     config_source_t self;
-    load(&self, path, &config, errors, WAIT_MS);
+    config_source_load(&self, &(config_text_source_t){.name = path, .wait_ms = WAIT_MS}, &config, errors);
     if (self.error_count == 0) {
         config_hash(&config);
         memcpy(out, &config, sizeof config);
     }
-    return self.error_count;
-}
-
-/* --- Again, in operation --- */
-
-/* Takes over one key that has another value now, or says that it cannot. */
-static void take_change(const config_source_t *self, size_t i, config_t *running)
-{
-    const config_key_t *key = &config_keys[i];
-    config_text_t was, is;
-    config_text_clear(&was);
-    config_text_clear(&is);
-    config_value_format(key, running, &was);
-    config_value_format(key, self->config, &is);
-    if (strcmp(was.data, is.data) == 0) {
-        return;
-    }
-    fprintf(self->errors, "%s:%u: [%s] %s: ", self->path, config_source_line_of(self, key->section, key->name), key->section,
-            key->name);
-    if (key->is_live) {
-        memcpy((char *)running + key->offset, (const char *)self->config + key->offset, key->size);
-        fprintf(self->errors, "%s from now on, was %s\n", is.data, was.data);
-    } else {
-        fprintf(self->errors, "%s needs a restart; %s stays\n", is.data, was.data);
-    }
-}
-
-/* A platform whose configuration was approved takes over no other one in motion. */
-static void check_approval(config_source_t *self)
-{
-    config_hash(self->config);
-    if (config_is_unapproved(self->config)) {
-        config_source_key_error(self, "platform", "approved",
-                                "%s is not this configuration; allowed: %s, once somebody has approved it",
-                                self->config->approved.text, self->config->hash);
-    }
-}
-
-int config_reload(const char *path, config_t *running, FILE *report)
-{
-    static config_t config;
-    static config_source_t self;
-    load(&self, path, &config, report, 0);
-    if (self.error_count == 0) {
-        check_approval(&self);
-    }
-    for (size_t i = 0; self.error_count == 0 && i < config_key_count; i++) {
-        if (config_is_applicable(config_keys[i].needs, running)) {
-            take_change(&self, i, running);
-        }
-    }
-    if (self.error_count == 0) {
-        config_startup_compare(&self, running);
-    }
-    config_hash(running);
     return self.error_count;
 }

@@ -7,6 +7,7 @@
 #define HEAVE_CONFIG_CONFIG_H
 
 #include <stdio.h>
+#include <sys/types.h>
 
 #include "heave/canraw.h"
 #include "heave/cia402.h"
@@ -51,6 +52,16 @@ typedef struct {
     uint32_t id[DRIVES_MAX];
 } config_ids_t;
 
+/** Nodes are such numbers: the node, and its axis from 0. */
+#define CONFIG_CHANNEL_SHIFT 24u
+#define CONFIG_NODE_MASK     0xFFFFFFu
+
+/** Indices of words: one, or one for each drive. */
+typedef struct {
+    uint8_t count;
+    uint8_t word[DRIVES_MAX];
+} config_words_t;
+
 /** Exact ratios: one, or one for each cylinder; none where count is 0. */
 typedef struct {
     uint8_t count;
@@ -64,17 +75,18 @@ typedef struct {
     int32_t value[CYLINDERS_MAX];
 } config_wholes_t;
 
-/** Joints of the base or of the plate on a circle: another way to write them, see sizes.h. None once they have been filled in. */
+/** Joints of the base or of the plate, given by a circle in place of coordinates: see sizes.h. Empty once the joints are filled
+ * in. */
 typedef struct {
     q16_t radius_mm_q16;  /**< CONFIG_NONE: joints one by one */
     q16_t spread_deg_q16; /**< between the two joints of a pair; CONFIG_NONE: three cylinders */
     q16_t turn_deg_q16;   /**< clockwise, seen from above */
 } config_circle_t;
 
-/** What lies between a motor and its cylinder: another way to write counts_per_mm, see scaling.h. */
+/** Screw and gear between motor and cylinder, given in place of counts_per_mm: see scaling.h. */
 typedef struct {
     config_ratios_t lead_mm; /**< travel for one turn of the screw; none once counts_per_mm has been filled in */
-    config_ratios_t gear;    /**< turns of the motor for one of the screw */
+    config_ratios_t gear;    /**< turns of the motor for one turn of the screw */
     int32_t counts_per_turn; /**< of the motor; CONFIG_NONE: unknown */
 } config_drive_train_t;
 
@@ -91,23 +103,29 @@ typedef struct {
     uint32_t passive_stop_ms;
 } config_can_t;
 
-/** Drives with CAN frames of their own; what the frames are is in canraw.h. */
+/** Drives with CAN frames of their own. canraw.h describes the frames. */
 typedef struct {
     uint32_t period_us;
     config_id_bits_t id_bits;
     config_ids_t command_id;
+    config_ids_t setpoint_id; /**< count 0: command_id */
     config_ids_t reply_id;
     config_ratios_t counts_per_mm;
     config_wholes_t zero_counts;
     config_ratios_t angle_counts_per_deg;
     config_wholes_t angle_zero_counts;
     config_send_t send;
+    uint32_t rated_torque;
     uint32_t speed_counts;
     config_ratios_t speed_counts_per_mm_s;
     config_ratios_t angle_speed_counts_per_deg_s;
     canraw_frame_t setpoint;
     canraw_frame_t enable, disable, stop, reset, home;
     canraw_frame_t position_query, position_reply, homing_query, homing_reply;
+    canraw_step_t startup[CANRAW_STEPS_MAX];
+    config_ids_t status_id; /**< count 0: reply_id */
+    canraw_frame_t status_reply;
+    uint32_t status_every;
     canraw_when_t enabled_when, fault_when, homing_done_when, homing_failed_when;
     uint32_t query_every;
     uint32_t offline_periods;
@@ -199,6 +217,9 @@ typedef enum { CONFIG_LOST_FAULT, CONFIG_LOST_DISABLE_VOLTAGE, CONFIG_LOST_QUICK
 #define CONFIG_REACTIONS 6u
 typedef enum { CONFIG_REACTION_IGNORE, CONFIG_REACTION_TELL, CONFIG_REACTION_STOP } config_reaction_t;
 
+/** How CANopen drives and the gateway watch each other. */
+typedef enum { CONFIG_CONTROL_HEARTBEAT, CONFIG_CONTROL_GUARDING } config_error_control_t;
+
 /** In which order CANopen drives home. */
 typedef enum { CONFIG_HOMING_TOGETHER, CONFIG_HOMING_IN_TURN } config_homing_order_t;
 
@@ -220,7 +241,11 @@ typedef struct {
 typedef struct {
     config_ids_t nodes;
     uint8_t gateway_node;
-    config_mode_t mode;
+    config_words_t mode; /**< config_mode_t of each */
+    uint8_t pdo_step;
+    cia402_maps_t command_map;
+    cia402_maps_t answer_map;
+    bool is_map_written;
     uint32_t period_us;
     config_ratios_t counts_per_mm;
     config_wholes_t zero_counts;
@@ -236,6 +261,7 @@ typedef struct {
     q16_t angle_quick_stop_deg_s2_q16;
     config_lost_t when_gateway_lost;
     config_reaction_t reaction[CONFIG_REACTIONS];
+    config_error_control_t error_control;
     uint16_t heartbeat_ms;
     uint16_t heartbeat_timeout_ms;
     uint16_t sdo_timeout_ms;
@@ -244,6 +270,12 @@ typedef struct {
     uint8_t sync_counter;
     bool is_sync_watched;
     bool is_reset_wanted;
+    bool is_support_checked;
+    uint8_t answer_every;
+    bool is_torque_told;
+    bool is_lag_told;
+    bool are_inputs_told;
+    uint8_t tell_every;
     bool is_no_watchdog_allowed;
     q16_t software_limit_mm_q16;
     uint32_t vendor_id;
@@ -254,7 +286,7 @@ typedef struct {
     config_startup_t angle_startup;
 } config_cia402_t;
 
-/** A line, or a chip, as the file names it; "" where it says none. */
+/** The name of a line or of a chip in the file; "" if the file gives none. */
 typedef struct {
     char text[CONFIG_LABEL_MAX];
 } config_label_t;
@@ -271,12 +303,12 @@ typedef enum { CONFIG_RELAYS_SIM, CONFIG_RELAYS_GPIO, CONFIG_RELAYS_MODBUS } con
 /** Relay outputs, relay 1 first. */
 typedef struct {
     config_relays_driver_t driver;
-    config_label_t chip; /**< of GPIO lines; where there is none, whichever chip has lines of these names */
+    config_label_t chip; /**< of GPIO lines; if empty, any chip that has lines of these names */
     config_lines_t lines;
     bool is_active_low;
 } config_relays_t;
 
-/** The board of relays on Modbus and the line it has to itself: TCP, or serial where there is no host. */
+/** The relay board on Modbus. It has a line of its own: TCP if a host is given, else serial. */
 typedef struct {
     config_hosts_t hosts;       /**< at most one */
     config_modbus_rtu_t serial; /**< device "none": there is none */
@@ -284,10 +316,10 @@ typedef struct {
     uint32_t timeout_ms;
 } config_relays_modbus_t;
 
-/** What carries the healthy pulse. */
+/** The output of the healthy pulse. */
 typedef enum { CONFIG_HEALTHY_NONE, CONFIG_HEALTHY_GPIO, CONFIG_HEALTHY_RELAY } config_healthy_driver_t;
 
-/** The line of the healthy pulse; its relay and its times are the core's. */
+/** The line of the healthy pulse. Its relay and its times are in the settings of the core. */
 typedef struct {
     config_healthy_driver_t driver;
     config_label_t chip; /**< as of the relays */
@@ -298,7 +330,7 @@ typedef struct {
 /** What reads the operator's switches. */
 typedef enum { CONFIG_INPUTS_SIM, CONFIG_INPUTS_GPIO } config_inputs_driver_t;
 
-/** Switch inputs; a line without a name is not there. */
+/** Switch inputs. An input whose line has no name does not exist. */
 typedef struct {
     config_inputs_driver_t driver;
     config_label_t chip; /**< as of the relays */
@@ -311,31 +343,31 @@ typedef struct {
     bool is_active_low; /**< a closed contact pulls its line low */
 } config_inputs_t;
 
-/** The black box: what it keeps, and where it is written to. */
+/** The black box: how much it keeps, and where it writes incidents. */
 typedef struct {
     char directory[CONFIG_PATH_MAX]; /**< "none" = there is none */
     uint32_t seconds;                /**< kept at least, of an ordinary stream */
     uint32_t incidents;              /**< most folders kept in the directory */
 } config_black_box_t;
 
-#define CONFIG_HASH_MAX 17u /**< digits of what a configuration is recognised by, with its NUL */
+#define CONFIG_HASH_MAX 17u /**< digits of the hash of a configuration, with its NUL */
 
 /** Values of [service] selftest. */
 typedef enum { CONFIG_SELFTEST_NONE, CONFIG_SELFTEST_DAILY } config_selftest_when_t;
 
-/** When a self-test is asked for, and what it allows. */
+/** When a self-test is required, and its limits. */
 typedef struct {
     config_selftest_when_t when;
     q16_t following_mm_q16; /**< largest difference between set-point and drive while it is jogged */
-    q16_t drift_mm_q16;     /**< largest way of a cylinder without torque */
+    q16_t drift_mm_q16;     /**< largest distance that a cylinder may move without torque */
 } config_selftest_t;
 
-/** A whole configuration: the core's settings, and what only the hosted program needs. Plain data. */
+/** A whole configuration: the settings of the core, and those that only the hosted program needs. Plain data. */
 typedef struct {
     settings_t settings;
     config_udp_t udp;
     config_circle_t base, plate;
-    bool is_as_measured;             /**< joints that look odd are meant: see layout.h */
+    bool is_as_measured;             /**< joints that look wrong are intended: see layout.h */
     uint32_t late_hold_cycles;       /**< of the program: see daemon/motion_loop.h */
     char life_file[CONFIG_PATH_MAX]; /**< "none" = none */
     config_label_t approved;         /**< hash of the one that was approved, "" = any */
@@ -372,7 +404,12 @@ typedef struct {
  *  @return 0, or the number of errors */
 int config_load(const char *path, config_t *out, FILE *errors);
 
-#define CONFIG_FILE_MAX 131072u /**< bytes of a configuration file */
+#define CONFIG_FILE_MAX   131072u                /**< bytes of a configuration file */
+#define CONFIG_TEXT_BYTES (CONFIG_FILE_MAX + 1u) /**< of memory for one; full: it is longer than a configuration may be */
+
+/** The bytes of a file, without waiting for a pipe and without allocating.
+ *  @return their number, CONFIG_TEXT_BYTES: it is too long; -1: errno says why */
+ssize_t config_read(const char *path, char text[CONFIG_TEXT_BYTES]);
 
 /** Loads the file once more while its platform runs, and takes over what may change in operation. Allocates nothing.
  *  @param running  changed only where the whole file is right, and only in keys that may change
@@ -380,8 +417,27 @@ int config_load(const char *path, config_t *out, FILE *errors);
  *  @return 0, or the number of errors: nothing has changed */
 int config_reload(const char *path, config_t *running, FILE *report);
 
+/** The same from memory.
+ *  @param name what the text is called in the report */
+int config_reload_text(const char *name, const char *text, size_t length, config_t *running, FILE *report);
+
+/** What a configuration would change on a running platform. */
+typedef struct {
+    unsigned live;              /**< keys that may change in operation */
+    unsigned restart;           /**< keys and lists that need a restart */
+    char hash[CONFIG_HASH_MAX]; /**< of the whole new one */
+} config_changes_t;
+
+/** Looks at a configuration in memory as config_reload_text() would take it, and changes nothing. Allocates nothing.
+ *  @return 0, or the number of errors, which went to errors */
+int config_judge_text(const char *name, const char *text, size_t length, const config_t *running, config_changes_t *changes,
+                      FILE *errors);
+
 /** Writes every key with its value, unit, range and help, as a file that loads to the same configuration. */
 void config_dump(const config_t *self, FILE *out);
+
+/** Writes the table of keys as JSON: for editors (docs/control-socket.md). */
+void config_write_keys(FILE *out);
 
 /** Writes a file to fill in, for a kind of platform and a driver.
  *  @return NULL; else the words that are allowed, separated by |, of the first argument that is none of them: nothing is written

@@ -3,6 +3,8 @@
  */
 #include "config/drives_check.h"
 
+#include "common/translate.h"
+
 #include "config/value.h"
 
 bool config_drives_is_given(config_source_t *self, const char *section, const char *name, const char *used_by, unsigned size)
@@ -43,8 +45,8 @@ static bool is_carried(config_source_t *self, const config_drives_numbers_t *num
     config_text_clear(&at);
     config_text_add_q16(&at, q16_from_q32(at_q32));
     config_source_key_error(self, numbers->section, is_angle ? "angle_counts_per_deg" : "counts_per_mm",
-                            "%s %s of drive %u are %lld counts, and {position} of %s carries %lld to %lld; allowed: a wider or "
-                            "signed field, other zero counts, fewer counts",
+                            _("%s %s of drive %u are %lld counts, and {position} of %s carries %lld to %lld; allowed: a wider or "
+                              "signed field, other zero counts, fewer counts"),
                             at.data, is_angle ? "deg" : "mm", axis + 1u, (long long)counts, field->name, (long long)field->min,
                             (long long)field->max);
     return false;
@@ -92,7 +94,7 @@ static void check_ratio(config_source_t *self, const config_drives_numbers_t *nu
         if (!is_number || fx_abs(counts) > numbers->speed.max) {
             config_source_key_error(self, numbers->section, name,
                                     "the speed limit %s %lld counts, and {speed} carries up to %lld; allowed: a smaller ratio",
-                                    numbers->speed_eighths == 9u ? "and an eighth are" : "is", (long long)counts,
+                                    numbers->speed_eighths == 9u ? _("and an eighth are") : "is", (long long)counts,
                                     (long long)numbers->speed.max);
             return;
         }
@@ -109,7 +111,7 @@ void config_drives_check_speed(config_source_t *self, const config_drives_number
     if (numbers->speed.name == NULL) {
         if (ratios > 0 || numbers->speed_counts > 0) {
             config_source_key_error(self, section, ratios > 0 ? "speed_counts_per_mm_s" : "speed_counts",
-                                    "setpoint has no {speed}; allowed: only where it has");
+                                    _("setpoint has no {speed}; allowed: only where it has"));
         }
         return;
     }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "common/roff.h"
+#include "common/translate.h"
 #include "config/startup.h"
 #include "config/value.h"
 
@@ -11,9 +12,9 @@
 static void add_default(const config_key_t *key, config_text_t *text)
 {
     if (key->fallback == NULL) {
-        config_text_add(text, "required");
+        config_text_add(text, _("required"));
     } else {
-        config_text_add(text, "default %s", key->fallback);
+        config_text_add(text, _("default %s"), key->fallback);
     }
 }
 
@@ -27,12 +28,12 @@ static void dump_key(const config_key_t *key, const config_t *config, bool is_se
     config_value_allowed(key, &allowed);
     config_text_add(&allowed, "; ");
     add_default(key, &allowed);
-    fprintf(out, "; %s\n; %s\n", key->help, allowed.data);
+    fprintf(out, "; %s\n; %s\n", translate(key->help), allowed.data);
     if (is_used) {
         config_value_format(key, config, &value);
         fprintf(out, "%s = %s\n", key->name, value.data);
     } else {
-        fprintf(out, "; %s: not on this platform\n", key->name);
+        fprintf(out, _("; %s: not on this platform\n"), key->name);
     }
 }
 
@@ -41,8 +42,8 @@ void config_dump(const config_t *self, FILE *out)
     for (size_t i = 0; i < config_section_count; i++) {
         const config_section_t *section = &config_sections[i];
         const bool is_used = config_is_applicable(section->needs, self);
-        fprintf(out, "%s; %s\n%s[%s]\n", i == 0 ? "" : "\n", section->help,
-                is_used ? "" : "; not on this platform: ", section->name);
+        fprintf(out, "%s; %s\n%s[%s]\n", i == 0 ? "" : "\n", translate(section->help),
+                is_used ? "" : _("; not on this platform: "), section->name);
         for (size_t k = 0; k < config_key_count; k++) {
             if (strcmp(config_keys[k].section, section->name) == 0) {
                 dump_key(&config_keys[k], self, is_used, out);
@@ -70,9 +71,9 @@ static const char *need_text(config_needs_t needs)
     case CONFIG_NEEDS_NOTHING:
         return "";
     case CONFIG_NEEDS_HEXAPOD:
-        return " (hexapod only)";
+        return _(" (hexapod only)");
     case CONFIG_NEEDS_ANGLE:
-        return " (with `present = yes` only)";
+        return _(" (with `present = yes` only)");
     }
     return "";
 }
@@ -91,14 +92,14 @@ static void write_row(const config_key_t *key, FILE *out)
 void config_write_reference(FILE *out)
 {
     fprintf(out,
-            "# Configuration reference\n\nOne INI file. Comments start with `;`. Decimal point, no thousands separator. "
-            "Written by the build from the table of keys in src/config/keys.c. Keys marked (SIGHUP) change in operation when "
-            "heaved gets that signal and the whole file is right; the others need a restart.\n");
+            ("# Configuration reference\n\nOne INI file. Comments start with `;`. Decimal point, no thousands separator. "
+             "Written by the build from the table of keys in src/config/keys.c. Keys marked (SIGHUP) change in operation when "
+             "heaved gets that signal and the whole file is right; the others need a restart.\n"));
     for (size_t i = 0; i < config_section_count; i++) {
         const config_section_t *section = &config_sections[i];
         fprintf(out, "\n## [%s]\n\n%s%s\n\n", section->name, section->help, need_text(section->needs));
         fputs(config_startup_is_list(section) ? config_startup_help
-                                              : "| key | allowed | default | meaning |\n| --- | --- | --- | --- |\n",
+                                              : ("| key | allowed | default | meaning |\n| --- | --- | --- | --- |\n"),
               out);
         for (size_t k = 0; k < config_key_count; k++) {
             if (strcmp(config_keys[k].section, section->name) == 0) {
@@ -121,7 +122,7 @@ static void write_item(const config_key_t *key, FILE *out)
     roff_text(allowed.data, out);
     fputs(".br\n", out);
     config_text_clear(&allowed);
-    config_text_add(&allowed, "%s%s%s", key->help, need_text(key->needs), key->is_live ? " (SIGHUP)" : "");
+    config_text_add(&allowed, "%s%s%s", translate(key->help), need_text(key->needs), key->is_live ? " (SIGHUP)" : "");
     roff_text(allowed.data, out);
 }
 
@@ -129,14 +130,14 @@ void config_write_manual(FILE *out)
 {
     for (size_t i = 0; i < config_section_count; i++) {
         const config_section_t *section = &config_sections[i];
-        fprintf(out, ".SH SECTION [%s]\n", section->name);
+        fprintf(out, ".SH %s [%s]\n", _("SECTION"), section->name);
         config_text_t text;
         config_text_clear(&text);
-        config_text_add(&text, "%s%s", section->help, need_text(section->needs));
+        config_text_add(&text, "%s%s", translate(section->help), need_text(section->needs));
         roff_text(text.data, out);
         if (config_startup_is_list(section)) {
             fputs(".PP\n", out);
-            roff_text(config_startup_help, out);
+            roff_text(translate(config_startup_help), out);
         }
         for (size_t k = 0; k < config_key_count; k++) {
             if (strcmp(config_keys[k].section, section->name) == 0) {

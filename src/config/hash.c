@@ -23,7 +23,6 @@ static bool counts(const config_key_t *key, const config_t *config)
 
 void config_hash(config_t *config)
 {
-    uint8_t digest[SHA256_BYTES];
     config_text_t value;
     sha256_t hash;
     sha256_start(&hash);
@@ -45,10 +44,7 @@ void config_hash(config_t *config)
             sha256_add(&hash, value.data, strlen(value.data) + 1);
         }
     }
-    sha256_end(&hash, digest);
-    for (unsigned i = 0; i < (CONFIG_HASH_MAX - 1u) / 2u; i++) {
-        (void)snprintf(&config->hash[2 * i], 3, "%02x", (unsigned)digest[i]);
-    }
+    sha256_end_digits(&hash, config->hash, sizeof config->hash);
 }
 
 bool config_is_unapproved(const config_t *config)

@@ -7,53 +7,60 @@
 #include <string.h>
 
 #include "common/socket_path.h"
+#include "common/translate.h"
 
 #define SUGGEST_LENGTH_MAX 40u /* longer names are not worth a suggestion */
 
 const char *const config_axis_section[AXES_MAX] = {"roll", "pitch", "yaw", "x", "y", "z", "angle"};
 
 const config_section_t config_sections[] = {
-    {"platform", "what it is and how it starts", CONFIG_NEEDS_NOTHING},
-    {"geometry", "joint centres and lengths, as measured; left-handed frame, +X forward, +Y right, +Z up", CONFIG_NEEDS_NOTHING},
-    {"pose", "where the platform waits", CONFIG_NEEDS_NOTHING},
-    {"roll", "rotation about X: asked = sign * scale * sent + offset, then min to max", CONFIG_NEEDS_NOTHING},
-    {"pitch", "rotation about Y, as [roll]", CONFIG_NEEDS_NOTHING},
-    {"yaw", "rotation about Z, as [roll]", CONFIG_NEEDS_HEXAPOD},
-    {"angle", "rotation motor, limits as [roll]", CONFIG_NEEDS_NOTHING},
-    {"x", "forward and back, as [roll]", CONFIG_NEEDS_HEXAPOD},
-    {"y", "right and left, as [roll]", CONFIG_NEEDS_HEXAPOD},
-    {"z", "up and down from pose zero, as [roll]", CONFIG_NEEDS_NOTHING},
-    {"cylinders", "limits of every cylinder: the last word over all motion", CONFIG_NEEDS_NOTHING},
-    {"engage", "limits of the cylinders while rising, settling, homing and taking over a sender's first pose",
+    {"platform", N_("what it is and how it starts"), CONFIG_NEEDS_NOTHING},
+    {"geometry", N_("joint centres and lengths, as measured; left-handed frame, +X forward, +Y right, +Z up"),
      CONFIG_NEEDS_NOTHING},
-    {"service", "what moves by hand, in SERVICE (`heavectl service`)", CONFIG_NEEDS_NOTHING},
-    {"intensity", "how much of a sender's motion is made, about neutral; the rotation motor is not scaled", CONFIG_NEEDS_NOTHING},
-    {"udp", "where frames come from", CONFIG_NEEDS_NOTHING},
-    {"control", "where heavectl reaches heaved", CONFIG_NEEDS_NOTHING},
-    {"black-box", "the last minutes, kept in memory; written on every fault and e-stop, and by `heavectl dump`",
+    {"pose", N_("where the platform waits"), CONFIG_NEEDS_NOTHING},
+    {"roll", N_("rotation about X: asked = sign * scale * sent + offset, then min to max"), CONFIG_NEEDS_NOTHING},
+    {"pitch", N_("rotation about Y, as [roll]"), CONFIG_NEEDS_NOTHING},
+    {"yaw", N_("rotation about Z, as [roll]"), CONFIG_NEEDS_HEXAPOD},
+    {"angle", N_("rotation motor, limits as [roll]"), CONFIG_NEEDS_NOTHING},
+    {"x", N_("forward and back, as [roll]"), CONFIG_NEEDS_HEXAPOD},
+    {"y", N_("right and left, as [roll]"), CONFIG_NEEDS_HEXAPOD},
+    {"z", N_("up and down from pose zero, as [roll]"), CONFIG_NEEDS_NOTHING},
+    {"cylinders", N_("limits of every cylinder: the last word over all motion"), CONFIG_NEEDS_NOTHING},
+    {"engage", N_("limits of the cylinders while rising, settling, homing and taking over a sender's first pose"),
      CONFIG_NEEDS_NOTHING},
-    {"samples", "every cycle in shared memory, for `heavectl scope` and other programs that look on; see docs/samples.md",
+    {"service", N_("what moves by hand, in SERVICE (`heavectl service`)"), CONFIG_NEEDS_NOTHING},
+    {"intensity", N_("how much of a sender's motion is made, about neutral; the rotation motor is not scaled"),
      CONFIG_NEEDS_NOTHING},
-    {"drives", "what moves the cylinders", CONFIG_NEEDS_NOTHING},
-    {"sim", "simulated drives ([drives] driver = sim)", CONFIG_NEEDS_NOTHING},
-    {"can", "the CAN bus of the drives, for every driver that uses one", CONFIG_NEEDS_NOTHING},
-    {"cia402", "CANopen drives with the profile CiA 402 ([drives] driver = cia402); see docs/cia402.md", CONFIG_NEEDS_NOTHING},
+    {"udp", N_("where frames come from"), CONFIG_NEEDS_NOTHING},
+    {"control", N_("where heavectl reaches heaved"), CONFIG_NEEDS_NOTHING},
+    {"black-box", N_("the last minutes, kept in memory; written on every fault and e-stop, and by `heavectl dump`"),
+     CONFIG_NEEDS_NOTHING},
+    {"samples", N_("every cycle in shared memory, for `heavectl scope` and other programs that look on; see docs/samples.md"),
+     CONFIG_NEEDS_NOTHING},
+    {"drives", N_("what moves the cylinders"), CONFIG_NEEDS_NOTHING},
+    {"sim", N_("simulated drives ([drives] driver = sim)"), CONFIG_NEEDS_NOTHING},
+    {"can", N_("the CAN bus of the drives, for every driver that uses one"), CONFIG_NEEDS_NOTHING},
+    {"cia402", N_("CANopen drives with the profile CiA 402 ([drives] driver = cia402); see docs/cia402.md"),
+     CONFIG_NEEDS_NOTHING},
     {"cia402-startup",
-     "what the cylinders' drives have to hold beyond what heaved sets in every drive, an object in a line; see docs/cia402.md",
+     N_("what the cylinders' drives have to hold beyond what heaved sets in every drive, an object in a line; see "
+        "docs/cia402.md"),
      CONFIG_NEEDS_NOTHING},
-    {"cia402-angle-startup", "the same of the rotation motor", CONFIG_NEEDS_ANGLE},
-    {"can-raw", "drives on CAN with frames of their own ([drives] driver = can-raw); see docs/can-raw.md", CONFIG_NEEDS_NOTHING},
-    {"modbus", "registers of drives on Modbus ([drives] driver = modbus-tcp or modbus-rtu); see docs/modbus.md",
+    {"cia402-angle-startup", N_("the same of the rotation motor"), CONFIG_NEEDS_ANGLE},
+    {"can-raw", N_("drives on CAN with frames of their own ([drives] driver = can-raw); see docs/can-raw.md"),
      CONFIG_NEEDS_NOTHING},
-    {"modbus-tcp", "their connections, for driver = modbus-tcp", CONFIG_NEEDS_NOTHING},
-    {"modbus-rtu", "their serial line, for driver = modbus-rtu", CONFIG_NEEDS_NOTHING},
-    {"relays", "effects outputs", CONFIG_NEEDS_NOTHING},
-    {"relays-modbus", "a board of relays on Modbus coils ([relays] driver = modbus), on a line of its own; see docs/modbus.md",
+    {"modbus", N_("registers of drives on Modbus ([drives] driver = modbus-tcp or modbus-rtu); see docs/modbus.md"),
      CONFIG_NEEDS_NOTHING},
-    {"inputs", "switches of the operator", CONFIG_NEEDS_NOTHING},
+    {"modbus-tcp", N_("their connections, for driver = modbus-tcp"), CONFIG_NEEDS_NOTHING},
+    {"modbus-rtu", N_("their serial line, for driver = modbus-rtu"), CONFIG_NEEDS_NOTHING},
+    {"relays", N_("effects outputs"), CONFIG_NEEDS_NOTHING},
+    {"relays-modbus",
+     N_("a board of relays on Modbus coils ([relays] driver = modbus), on a line of its own; see docs/modbus.md"),
+     CONFIG_NEEDS_NOTHING},
+    {"inputs", N_("switches of the operator"), CONFIG_NEEDS_NOTHING},
     {"healthy",
-     "an output that toggles as long as states, deadlines and drives are as they should be, for a watchdog outside; see "
-     "docs/safety.md",
+     N_("an output that toggles as long as states, deadlines and drives are as they should be, for a watchdog outside; see "
+        "docs/safety.md"),
      CONFIG_NEEDS_NOTHING},
 };
 const size_t config_section_count = sizeof config_sections / sizeof config_sections[0];
@@ -72,21 +79,21 @@ const size_t config_section_count = sizeof config_sections / sizeof config_secti
 #define JOINT(number, index, need)                                                                                              \
     {KEY("geometry", "base" number "_mm"), AT(settings.geometry.base_mm_q16[index]), .type = CONFIG_DECIMAL, .count = 3,        \
      .unit = "mm", RANGE(-4000, 4000), .needs = need,                                                                           \
-     .help = "x, y, z of the lower joint of cylinder " number ", base frame; or base_radius_mm for all"},                                                  \
+     .help = "x, y, z of the lower joint of this cylinder, base frame; or base_radius_mm for all"},                                                  \
     {KEY("geometry", "plate" number "_mm"), AT(settings.geometry.plate_mm_q16[index]), .type = CONFIG_DECIMAL, .count = 3,      \
      .unit = "mm", RANGE(-4000, 4000), .needs = need,                                                                           \
-     .help = "x, y, z of the upper joint of cylinder " number ", plate frame; or plate_radius_mm for all"}
+     .help = "x, y, z of the upper joint of this cylinder, plate frame; or plate_radius_mm for all"}
 
 /* The rows of joints on a circle, in place of joints one by one. */
 #define CIRCLE(set, member, pairs)                                                                                              \
     {KEY("geometry", set "_radius_mm"), AT(member.radius_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",             \
      .fallback = "none", .words = "none", ABOVE_ZERO(4000),                                                                     \
-     .help = "circle through the joints of the " set ", in place of " set "1_mm and so on: they follow from it (docs/geometry.md)"},\
+     .help = "circle through these joints, in place of joints one by one: they follow from it (docs/geometry.md)"},\
     {KEY("geometry", set "_spread_deg"), AT(member.spread_deg_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg",          \
      .fallback = "none", .words = "none", RANGE(0, 119), .needs = CONFIG_NEEDS_HEXAPOD,                                         \
-     .help = "angle between the two joints of a pair: " pairs},                                                                 \
+     .help = pairs},                                                                 \
     {KEY("geometry", set "_turn_deg"), AT(member.turn_deg_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg",              \
-     .fallback = "0", RANGE(-180, 180), .help = "all joints of the " set " turned by so much, clockwise as seen from above"}
+     .fallback = "0", RANGE(-180, 180), .help = "all these joints turned by so much, clockwise as seen from above"}
 
 /* The rows of one axis; left_out: what stands for limits that the file does not give. */
 #define AXIS(name, u, index, need, low, high, left_out)                                                                         \
@@ -134,8 +141,8 @@ const config_key_t config_keys[] = {
     JOINT("4", 3, CONFIG_NEEDS_HEXAPOD),
     JOINT("5", 4, CONFIG_NEEDS_HEXAPOD),
     JOINT("6", 5, CONFIG_NEEDS_HEXAPOD),
-    CIRCLE("base", base, "1 and 2 in front, 3 and 4, 5 and 6"),
-    CIRCLE("plate", plate, "6 and 1, 2 and 3, 4 and 5"),
+    CIRCLE("base", base, N_("angle between the two joints of a pair: 1 and 2 in front, 3 and 4, 5 and 6")),
+    CIRCLE("plate", plate, N_("angle between the two joints of a pair: 6 and 1, 2 and 3, 4 and 5")),
     {KEY("geometry", "retracted_length_mm"), AT(settings.geometry.retracted_mm_q16), .type = CONFIG_PER_CYLINDER, .unit = "mm",
      ABOVE_ZERO(8000), .help = "joint to joint at extension 0"},
     {KEY("geometry", "stroke_mm"), AT(settings.stroke_mm_q16), .type = CONFIG_PER_CYLINDER, .unit = "mm", ABOVE_ZERO(4000),
@@ -193,6 +200,12 @@ const config_key_t config_keys[] = {
      ABOVE_ZERO(50), .help = "no cylinder is faster than that while a hand leads it, nor than the limit of [cylinders]"},
     {KEY("service", "jog_deg_s"), AT(settings.jog_deg_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg/s",
      .fallback = "2", ABOVE_ZERO(20), .help = "nor a rotation, nor the rotation motor"},
+    {KEY("service", "signal_mm"), AT(settings.signal_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm", .fallback = "10",
+     ABOVE_ZERO(100), .help = "no test signal (`heavectl signal`, `heavectl identify`) is wider, from its middle to one side"},
+    {KEY("service", "signal_deg"), AT(settings.signal_deg_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg",
+     .fallback = "3", ABOVE_ZERO(30), .help = "the same of a rotation, and of the rotation motor"},
+    {KEY("service", "signal_mm_s"), AT(settings.signal_mm_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s",
+     .fallback = "50", ABOVE_ZERO(500), .help = "no cylinder is faster in a test signal, nor than the limit of [cylinders]; the rotation motor goes by jog_deg_s"},
     {KEY("service", "selftest"), AT(selftest.when), .type = CONFIG_WORD, .unit = "", .fallback = "none", .words = "none|daily",
      .help = "daily: `engage` is refused until `heavectl selftest` has passed on this calendar day, with this configuration; not with engage = auto"},
     {KEY("service", "selftest_following_mm"), AT(selftest.following_mm_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm",
@@ -274,7 +287,7 @@ const config_key_t config_keys[] = {
      .help = "folders kept in the directory, of faults and of dumps each; the oldest one makes way, but not the first fault since `heavectl seen`"},
 
     {KEY("samples", "seconds"), AT(samples_seconds), .type = CONFIG_INTEGER, .unit = "s", .fallback = "30", RANGE(0, 600),
-     .help = "how long they are kept: 0.4 MB of memory a second at 1000 cycles a second; 0 = there are none"},
+     .help = "how long they are kept: 0.5 MB of memory a second at 1000 cycles a second; 0 = there are none"},
 
     {KEY("drives", "driver"), AT(drives), .type = CONFIG_WORD, .unit = "", .words = "sim|cia402|can-raw|modbus-tcp|modbus-rtu",
      .help = "the drives in use"},
@@ -302,12 +315,22 @@ const config_key_t config_keys[] = {
     {KEY("can", "passive_stop_ms"), AT(can.passive_stop_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "1000",
      RANGE(0, 60000), .help = "error-passive for so long, the platform stops (fault bus-failing); 0 = never"},
 
-    {KEY("cia402", "nodes"), AT(cia402.nodes), .type = CONFIG_IDS, .unit = "", .fallback = "1", .words = "a node id from 1 to 127",
-     .help = "node id of drive 1, the next ones follow; or one for each drive. The rotation motor is the last"},
+    {KEY("cia402", "nodes"), AT(cia402.nodes), .type = CONFIG_NODES, .unit = "", .fallback = "1",
+     .help = "node id of drive 1, the next ones follow; or one for each drive, 5.2 is the second axis of node 5. The rotation motor "
+             "is the last"},
     {KEY("cia402", "gateway_node"), AT(cia402.gateway_node), .type = CONFIG_INTEGER, .unit = "", .fallback = "127", RANGE(1, 127),
      .help = "node id of this gateway, whose heartbeat the drives watch"},
-    {KEY("cia402", "mode"), AT(cia402.mode), .type = CONFIG_WORD, .unit = "", .fallback = "csp", .words = "csp|ip|pp",
-     .help = "cyclic synchronous position; interpolated position; or profile position, for slow moves only"},
+    {KEY("cia402", "mode"), AT(cia402.mode), .type = CONFIG_WORDS, .unit = "", .fallback = "csp", .words = "csp|ip|pp",
+     .help = "cyclic synchronous position; interpolated position; or profile position, for slow moves only. For all drives, or for "
+             "each"},
+    {KEY("cia402", "command_map"), AT(cia402.command_map), .type = CONFIG_MAPS, .unit = "", .fallback = "none",
+     .help = "RPDOs, their numbers and what is in them; none = RPDO 1 with 6040h and the target. See docs/cia402.md"},
+    {KEY("cia402", "answer_map"), AT(cia402.answer_map), .type = CONFIG_MAPS, .unit = "", .fallback = "none",
+     .help = "TPDOs likewise; none = TPDO 1 with 6041h, 6064h and 6061h"},
+    {KEY("cia402", "map_written"), AT(cia402.is_map_written), .type = CONFIG_YES_NO, .unit = "", .fallback = "yes",
+     .help = "no: command_map and answer_map are what the drives have and cannot change; it is compared"},
+    {KEY("cia402", "pdo_step"), AT(cia402.pdo_step), .type = CONFIG_INTEGER, .unit = "", .fallback = "64", RANGE(1, 64),
+     .help = "numbers from the PDOs of an axis of a node to those of the next one; 64 is that of the standard"},
     {KEY("cia402", "period_us"), AT(cia402.period_us), .type = CONFIG_INTEGER, .unit = "us", .fallback = "4000",
      RANGE(500, 255000), .help = "period of SYNC and set-points (60C2h), a multiple of cycle_us; whole ms suit every drive"},
     {KEY("cia402", "counts_per_mm"), AT(cia402.counts_per_mm), .type = CONFIG_RATIOS, .unit = "", .fallback = "none",
@@ -360,8 +383,10 @@ const config_key_t config_keys[] = {
      .words = "ignore|tell|stop", .help = "bit 11 of 6041h: a limit of the drive itself is active"},
     {KEY("cia402", "when_warning"), AT(cia402.reaction[5]), .type = CONFIG_WORD, .unit = "", .fallback = "tell",
      .words = "ignore|tell|stop", .help = "bit 7 of 6041h: the drive warns"},
+    {KEY("cia402", "error_control"), AT(cia402.error_control), .type = CONFIG_WORD, .unit = "", .fallback = "heartbeat",
+     .words = "heartbeat|node-guarding", .help = "how heaved and the drives watch each other; node-guarding for drives without heartbeats"},
     {KEY("cia402", "heartbeat_ms"), AT(cia402.heartbeat_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "50",
-     RANGE(5, 10000), .help = "period of the heartbeats of the gateway and of the drives (1017h)"},
+     RANGE(5, 10000), .help = "period of the heartbeats of the gateway and of the drives (1017h), or of node guarding (100Ch)"},
     {KEY("cia402", "heartbeat_timeout_ms"), AT(cia402.heartbeat_timeout_ms), .type = CONFIG_INTEGER, .unit = "ms",
      .fallback = "150", RANGE(10, 30000), .help = "without a heartbeat for so long the other side is lost (1016h); at least twice heartbeat_ms"},
     {KEY("cia402", "sdo_timeout_ms"), AT(cia402.sdo_timeout_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "500",
@@ -374,8 +399,20 @@ const config_key_t config_keys[] = {
      .help = "SYNC carries a counter up to this (1019h); 0 = none"},
     {KEY("cia402", "sync_watched"), AT(cia402.is_sync_watched), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
      .help = "whether the drives are told the period of SYNC (1006h): some need that, and some then stop where one is half a period late"},
+    {KEY("cia402", "answer_every"), AT(cia402.answer_every), .type = CONFIG_INTEGER, .unit = "", .fallback = "1", RANGE(1, 10),
+     .help = "the drives answer at every so manyth SYNC; where sync_counter is a multiple of it they take turns, else they may answer together; not for mode = pp"},
+    {KEY("cia402", "tell_torque"), AT(cia402.is_torque_told), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "the drives tell their torque (6077h) in a second TPDO, for status and metrics"},
+    {KEY("cia402", "tell_following_error"), AT(cia402.is_lag_told), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "likewise their following error (60F4h)"},
+    {KEY("cia402", "tell_inputs"), AT(cia402.are_inputs_told), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
+     .help = "likewise their digital inputs (60FDh); all three need a third TPDO"},
+    {KEY("cia402", "tell_every"), AT(cia402.tell_every), .type = CONFIG_INTEGER, .unit = "", .fallback = "10", RANGE(1, 240),
+     .help = "at every so manyth SYNC; where sync_counter is a multiple of it the drives take turns"},
     {KEY("cia402", "reset_communication"), AT(cia402.is_reset_wanted), .type = CONFIG_YES_NO, .unit = "", .fallback = "yes",
      .help = "whether a drive's communication is reset before it is set up"},
+    {KEY("cia402", "check_supported"), AT(cia402.is_support_checked), .type = CONFIG_YES_NO, .unit = "", .fallback = "yes",
+     .help = "whether drives that have 6502h or 60E3h, and there not the mode or the homing method, are refused; no for drives whose lists are wrong"},
     {KEY("cia402", "allow_no_watchdog"), AT(cia402.is_no_watchdog_allowed), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
      .help = "takes drives that would not stop by themselves: without 1016h, 1017h, 6007h, 605Ah, 605Eh or 6065h, or with these off"},
     {KEY("cia402", "vendor_id"), AT(cia402.vendor_id), .type = CONFIG_INTEGER, .unit = "", .fallback = "0",
@@ -395,8 +432,10 @@ const config_key_t config_keys[] = {
      .help = "width of the identifiers"},
     {KEY("can-raw", "command_id"), AT(can_raw.command_id), .type = CONFIG_IDS, .unit = "", .fallback = "none",
      .help = "identifier of what is sent to drive 1, the next ones follow; or one for each drive. The rotation motor is the last"},
+    {KEY("can-raw", "setpoint_id"), AT(can_raw.setpoint_id), .type = CONFIG_IDS, .unit = "", .fallback = "none",
+     .help = "identifier of setpoint, where it is not command_id; drives share it by fields {position.1:T} {position.2:T}"},
     {KEY("can-raw", "reply_id"), AT(can_raw.reply_id), .type = CONFIG_IDS, .unit = "", .fallback = "none",
-     .help = "the same for what the drives send"},
+     .help = "the same for what the drives send; drives may share it by such fields of position_reply"},
     {KEY("can-raw", "counts_per_mm"), AT(can_raw.counts_per_mm), .type = CONFIG_RATIOS, .unit = "", .fallback = "none",
      .count = CYLINDERS_MAX, .help = "exact, such as counts of a turn / lead; negative: the drive counts backwards"},
     {KEY("can-raw", "zero_counts"), AT(can_raw.zero_counts), .type = CONFIG_WHOLES, .unit = "counts", .fallback = "0",
@@ -428,17 +467,41 @@ const config_key_t config_keys[] = {
     {KEY("can-raw", "position_query"), AT(can_raw.position_query), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
      .words = "counter", .help = "asks for position_reply; none where drives send it unasked"},
     {KEY("can-raw", "position_reply"), AT(can_raw.position_reply), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
-     .words = "position|status|fault|counter", .count = 1, .help = "where a drive is"},
+     .words = "position|status|fault|torque|counter", .count = 1, .help = "where a drive is"},
     {KEY("can-raw", "homing_query"), AT(can_raw.homing_query), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
      .words = "counter", .help = "asks for homing_reply; asked by turns with the position until a drive is homed"},
     {KEY("can-raw", "homing_reply"), AT(can_raw.homing_reply), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
      .words = "status", .count = 1, .help = "how homing stands"},
+    {KEY("can-raw", "status_id"), AT(can_raw.status_id), .type = CONFIG_IDS, .unit = "", .fallback = "none",
+     .help = "identifier of status_reply, where it is not reply_id"},
+    {KEY("can-raw", "status_reply"), AT(can_raw.status_reply), .type = CONFIG_FRAME, .unit = "", .fallback = "none",
+     .words = "status|fault|torque|counter", .count = 1, .help = "status of a drive that does not tell it with its position; comes unasked"},
+    {KEY("can-raw", "status_every"), AT(can_raw.status_every), .type = CONFIG_INTEGER, .unit = "periods", .fallback = "1",
+     RANGE(1, 1000), .help = "how often drives send status_reply; without it for offline_periods times as long a drive is gone"},
+    {KEY("can-raw", "rated_torque_counts"), AT(can_raw.rated_torque), .type = CONFIG_INTEGER, .unit = "counts", .fallback = "1000",
+     RANGE(1, MOST_INT32), .help = "what {torque} carries at the rated torque of the drive; 1000 where it tells tenths of a percent"},
+    {KEY("can-raw", "startup1"), AT(can_raw.startup[0]), .type = CONFIG_STEP, .unit = "", .fallback = "none",
+     .words = "counter", .help = "frame that a drive gets before it is used, -> its answer, wait and ms; then startup2, up to startup8"},
+    {KEY("can-raw", "startup2"), AT(can_raw.startup[1]), .type = CONFIG_STEP, .unit = "", .fallback = "none",
+     .words = "counter", .help = "the next one"},
+    {KEY("can-raw", "startup3"), AT(can_raw.startup[2]), .type = CONFIG_STEP, .unit = "", .fallback = "none",
+     .words = "counter", .help = "the next one"},
+    {KEY("can-raw", "startup4"), AT(can_raw.startup[3]), .type = CONFIG_STEP, .unit = "", .fallback = "none",
+     .words = "counter", .help = "the next one"},
+    {KEY("can-raw", "startup5"), AT(can_raw.startup[4]), .type = CONFIG_STEP, .unit = "", .fallback = "none",
+     .words = "counter", .help = "the next one"},
+    {KEY("can-raw", "startup6"), AT(can_raw.startup[5]), .type = CONFIG_STEP, .unit = "", .fallback = "none",
+     .words = "counter", .help = "the next one"},
+    {KEY("can-raw", "startup7"), AT(can_raw.startup[6]), .type = CONFIG_STEP, .unit = "", .fallback = "none",
+     .words = "counter", .help = "the next one"},
+    {KEY("can-raw", "startup8"), AT(can_raw.startup[7]), .type = CONFIG_STEP, .unit = "", .fallback = "none",
+     .words = "counter", .help = "the next one"},
     {KEY("can-raw", "enabled_when"), AT(can_raw.enabled_when), .type = CONFIG_WHEN, .unit = "", .fallback = "none",
-     .help = "{status} of position_reply when torque is on"},
+     .help = "{status} of status_reply, else of position_reply, when torque is on"},
     {KEY("can-raw", "fault_when"), AT(can_raw.fault_when), .type = CONFIG_WHEN, .unit = "", .fallback = "none",
      .help = "the same when the drive has a fault"},
     {KEY("can-raw", "homing_done_when"), AT(can_raw.homing_done_when), .type = CONFIG_WHEN, .unit = "", .fallback = "none",
-     .help = "{status} of homing_reply, or of position_reply where there is no homing_query, when the drive has its zero"},
+     .help = "{status} of homing_reply, or the same where there is no homing_query, when the drive has its zero"},
     {KEY("can-raw", "homing_failed_when"), AT(can_raw.homing_failed_when), .type = CONFIG_WHEN, .unit = "", .fallback = "none",
      .help = "the same when homing has failed"},
     {KEY("can-raw", "query_every"), AT(can_raw.query_every), .type = CONFIG_INTEGER, .unit = "periods", .fallback = "1",

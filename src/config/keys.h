@@ -27,10 +27,14 @@ typedef enum {
     CONFIG_IDS,          /**< `none`, or CAN identifiers, stored as config_ids_t; `words`: what they are called instead */
     CONFIG_RATIOS,       /**< `none`, or up to `count` ratios such as 20000/10, stored as config_ratios_t */
     CONFIG_WHOLES,       /**< up to `count` whole numbers, stored as config_wholes_t */
-    CONFIG_FRAME,  /**< `none`, or bytes and fields of a CAN frame, stored as canraw_frame_t; `words`: the fields it may have,
-                        in replies (`count` 1) also bytes that may be anything */
-    CONFIG_WHEN,   /**< `none`, or value/mask, stored as canraw_when_t */
-    CONFIG_HOSTS,  /**< `none`, or IPv4 addresses with or without a port, stored as config_hosts_t */
+    CONFIG_FRAME, /**< `none`, or bytes and fields of a CAN frame, stored as canraw_frame_t; `words`: the fields it may have,
+                       in replies (`count` 1) also bytes that may be anything */
+    CONFIG_STEP,  /**< `none`, or a frame, -> and its answer, wait and ms, stored as canraw_step_t; `words` as for CONFIG_FRAME */
+    CONFIG_WHEN,  /**< `none`, or value/mask, stored as canraw_when_t */
+    CONFIG_NODES, /**< nodes and their axes, stored as config_ids_t */
+    CONFIG_WORDS, /**< one of `words` for all drives, or one for each, stored as config_words_t */
+    CONFIG_MAPS,  /**< `none`, or maps of PDOs, stored as config.h has them */
+    CONFIG_HOSTS, /**< `none`, or IPv4 addresses with or without a port, stored as config_hosts_t */
     CONFIG_BLOCKS, /**< `none`, or blocks of registers, stored as modbus_drive_blocks_t; `words` and `count` as for CONFIG_FRAME
                     */
     CONFIG_ITEMS   /**< `none`, or what registers have to hold, stored as config_items_t */
@@ -68,7 +72,7 @@ typedef struct {
     bool is_live;  /**< may change in operation (SIGHUP); gateway_reload() or daemon/motion_loop.c take it over */
 } config_key_t;
 
-#define CONFIG_KEYS_MAX     320u /**< bound of arrays with one element per key */
+#define CONFIG_KEYS_MAX     352u /**< bound of arrays with one element per key */
 #define CONFIG_SECTIONS_MAX 32u
 
 extern const config_section_t config_sections[];

@@ -7,6 +7,8 @@
  */
 #include "config/layout.h"
 
+#include "common/translate.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -149,8 +151,8 @@ static void try_exchanges(const layout_t *seen, const fit_t *seen_fit, guess_t *
             if (is_better(&fit, seen_fit, best)) {
                 const char *set = disordered_set(seen);
                 keep(best, &fit, set, i);
-                config_text_add(&best->what, "%s%u and %s%u look exchanged", set, i + 1u, set, k + 1u);
-                config_text_add(&best->remedy, "with them exchanged");
+                config_text_add(&best->what, _("%s%u and %s%u look exchanged"), set, i + 1u, set, k + 1u);
+                config_text_add(&best->remedy, _("with them exchanged"));
             }
         }
     }
@@ -173,11 +175,11 @@ static void try_numberings(const layout_t *seen, const fit_t *seen_fit, guess_t 
         }
         keep(best, &fit, "plate", 0);
         if (is_mirrored) {
-            config_text_add(&best->what, "the numbers of the plate's joints run the other way round than those of the base's");
-            config_text_add(&best->remedy, "with plate%u as plate1, and on against that order", places + 1u);
+            config_text_add(&best->what, _("the numbers of the plate's joints run the other way round than those of the base's"));
+            config_text_add(&best->remedy, _("with plate%u as plate1, and on against that order"), places + 1u);
         } else {
-            config_text_add(&best->what, "the plate's joints look numbered from the wrong place");
-            config_text_add(&best->remedy, "with plate%u as plate1, and on in that order", places + 1u);
+            config_text_add(&best->what, _("the plate's joints look numbered from the wrong place"));
+            config_text_add(&best->remedy, _("with plate%u as plate1, and on in that order"), places + 1u);
         }
     }
 }
@@ -216,8 +218,8 @@ static void try_number(const layout_t *seen, const fit_t *seen_fit, guess_t *bes
     }
     best->disorder = fit.spread + disorder(&tried);
     keep(best, &fit, is_base ? "base" : "plate", joint);
-    config_text_add(&best->what, "%c of %s%u looks %s", "xyz"[at % COORDINATES], is_base ? "base" : "plate", joint + 1u, slip);
-    config_text_add(&best->remedy, "with %.6g", value);
+    config_text_add(&best->what, _("%c of %s%u looks %s"), "xyz"[at % COORDINATES], is_base ? "base" : "plate", joint + 1u, slip);
+    config_text_add(&best->remedy, _("with %.6g"), value);
 }
 
 /* Two digits beside each other in the wrong order, as in 428.136 for 482.136. */
@@ -237,7 +239,7 @@ static void try_digits(const layout_t *seen, const fit_t *seen_fit, guess_t *bes
         text.data[i] = text.data[next];
         text.data[next] = digit;
         if (number_parse(text.data, text.length, &other_q16) == NUMBER_OK) {
-            try_number(seen, seen_fit, best, at, from_q16(other_q16), "as if two of its digits were exchanged");
+            try_number(seen, seen_fit, best, at, from_q16(other_q16), _("as if two of its digits were exchanged"));
         }
         text.data[next] = text.data[i];
         text.data[i] = digit;
@@ -255,9 +257,9 @@ static void try_numbers(const kin_geometry_t *geometry, const layout_t *seen, co
         const q16_t value_q16 = (is_base ? geometry->base_mm_q16 : geometry->plate_mm_q16)[joint][at % COORDINATES];
         const double value = from_q16(value_q16);
         try_digits(seen, seen_fit, best, at, value_q16);
-        try_number(seen, seen_fit, best, at, -value, "as if its sign were wrong");
-        try_number(seen, seen_fit, best, at, value * 10, "as if its decimal point were one place off");
-        try_number(seen, seen_fit, best, at, value / 10, "as if its decimal point were one place off");
+        try_number(seen, seen_fit, best, at, -value, _("as if its sign were wrong"));
+        try_number(seen, seen_fit, best, at, value * 10, _("as if its decimal point were one place off"));
+        try_number(seen, seen_fit, best, at, value / 10, _("as if its decimal point were one place off"));
     }
 }
 
@@ -279,12 +281,12 @@ static void add_slip(const settings_t *settings, const guess_t *slip, config_tex
 {
     const layout_t seen = layout_of(settings);
     const fit_t fit = fit_of(&seen);
-    config_text_add(text, "%s: %s all %u extensions at pose zero agree within %.1f mm, at %.1f mm", slip->what.data,
+    config_text_add(text, _("%s: %s all %u extensions at pose zero agree within %.1f mm, at %.1f mm"), slip->what.data,
                     slip->remedy.data, seen.count, fmax(slip->fit.spread, 0.1), slip->fit.mean);
     if (fit.spread > SUSPECT_MM) {
-        config_text_add(text, "; as they are they differ by %.1f mm", fit.spread);
+        config_text_add(text, _("; as they are they differ by %.1f mm"), fit.spread);
     } else {
-        config_text_add(text, "; as they are the cylinders are %.0f mm longer", fit.mean - slip->fit.mean);
+        config_text_add(text, _("; as they are the cylinders are %.0f mm longer"), fit.mean - slip->fit.mean);
     }
 }
 
@@ -321,8 +323,8 @@ void config_layout_check(config_source_t *self)
     if (self->config->is_as_measured) {
         return;
     }
-    const bool is_base = is_in_mm(self, "base1_mm", "joints of the base", farthest(&layout, &layout.base));
-    const bool is_plate = is_in_mm(self, "plate1_mm", "joints of the plate", farthest(&layout, &layout.plate));
+    const bool is_base = is_in_mm(self, "base1_mm", _("joints of the base"), farthest(&layout, &layout.base));
+    const bool is_plate = is_in_mm(self, "plate1_mm", _("joints of the plate"), farthest(&layout, &layout.plate));
     const bool is_length = is_in_mm(self, "retracted_length_mm", "lengths", layout.retracted[0]);
     if (is_base && is_plate && is_length && find_slip(settings, &slip)) {
         config_text_clear(&text);
@@ -354,8 +356,8 @@ static bool find_crossing(const layout_t *layout, config_text_t *text)
             if (is_crossing(layout, i, k)) {
                 config_text_add(
                     text,
-                    "[geometry] cylinders %u and %u cross each other, seen from above, at pose zero: look at the order "
-                    "of the joints",
+                    _("[geometry] cylinders %u and %u cross each other, seen from above, at pose zero: look at the order "
+                      "of the joints"),
                     i + 1u, k + 1u);
                 return true;
             }
@@ -371,8 +373,8 @@ static bool find_mirror(const layout_t *layout, config_text_t *text)
         return false;
     }
     config_text_add(
-        text, "[geometry] the joints are numbered against the clock, seen from above: right if the cylinders are; but where Y "
-              "was measured to the left, turn the signs of all y");
+        text, _("[geometry] the joints are numbered against the clock, seen from above: right if the cylinders are; but where Y "
+                "was measured to the left, turn the signs of all y"));
     return true;
 }
 
@@ -381,7 +383,7 @@ static bool find_tilt(const settings_t *settings, config_text_t *text)
     if (fx_abs(settings->neutral_q16[AXIS_ROLL]) <= TILTED && fx_abs(settings->neutral_q16[AXIS_PITCH]) <= TILTED) {
         return false;
     }
-    config_text_add(text, "[pose] neutral is not level: roll %.3g deg, pitch %.3g deg",
+    config_text_add(text, _("[pose] neutral is not level: roll %.3g deg, pitch %.3g deg"),
                     from_q16(settings->neutral_q16[AXIS_ROLL]), from_q16(settings->neutral_q16[AXIS_PITCH]));
     return true;
 }
@@ -402,9 +404,9 @@ static bool find_odd_one(const layout_t *layout, config_text_t *text)
         if (all.spread > SUSPECT_MM && rest.spread < AGREE_MM) {
             config_text_add(
                 text,
-                "[geometry] cylinder %u is %.1f mm %s than the others at pose zero, which agree within %.1f mm: look at "
-                "its joints and its length",
-                odd + 1u, all.spread, all.mean > rest.mean ? "further out" : "further in", fmax(rest.spread, 0.1));
+                _("[geometry] cylinder %u is %.1f mm %s than the others at pose zero, which agree within %.1f mm: look at "
+                  "its joints and its length"),
+                odd + 1u, all.spread, all.mean > rest.mean ? _("further out") : _("further in"), fmax(rest.spread, 0.1));
             return true;
         }
     }

@@ -4,6 +4,8 @@
  */
 #include "config/mechanism.h"
 
+#include "common/translate.h"
+
 #include "config/layout.h"
 
 #define HEIGHT_SEARCH_MM 8000 /* the range of zero_height_mm */
@@ -117,8 +119,8 @@ void config_check_mechanism(config_source_t *self)
         config_source_key_error(self, "platform", "kind", "these joints do not make a %s; allowed: %s",
                                 config_kind_name(settings_of(self)->geometry.kind),
                                 settings_of(self)->geometry.kind == KIN_TRIPOD_3RPS
-                                    ? "joints at 0, 120 and 240 deg from +X, plate joints on one level circle"
-                                    : "joints and lengths in their ranges");
+                                    ? _("joints at 0, 120 and 240 deg from +X, plate joints on one level circle")
+                                    : _("joints and lengths in their ranges"));
         return;
     }
     const int before = self->error_count;

@@ -3,6 +3,9 @@
  */
 #include "config/modbus.h"
 
+#include "common/columns.h"
+#include "common/translate.h"
+
 #include "config/canraw.h"
 
 #define STEP_FACTOR 2 /* a set-point may be so much further than its speed limit allows before it counts as a jump */
@@ -124,13 +127,15 @@ void config_modbus_report(const config_t *config, FILE *out)
     config_modbus_map(config, &map);
     const unsigned on_line = (unsigned)map.axes / config_modbus_lines(config);
     const double rate_hz = 1e6 / (double)map.expected_us;
-    fprintf(out, "%-24s  %.1f Hz of each drive expected (%.1f ms: %u on a line, %u us turnaround", "set-points", rate_hz,
+    columns_put(out, _("set-points"), CONFIG_LABEL_COLUMNS);
+    fprintf(out, _("%.1f Hz of each drive expected (%.1f ms: %u on a line, %u us turnaround"), rate_hz,
             (double)map.expected_us / 1000.0, on_line, (unsigned)config->modbus.turnaround_us);
     if (is_rtu(config)) {
-        fprintf(out, ", %u bit/s", (unsigned)config->modbus_rtu.baud_bps);
+        fprintf(out, _(", %u bit/s"), (unsigned)config->modbus_rtu.baud_bps);
     }
-    fprintf(out, ")\n");
+    fprintf(out, "%s\n", _(")"));
     if (config->modbus.step_mm_q16 != 0) {
-        fprintf(out, "%-24s  %.1f mm/s of a cylinder (step_mm %.3f)\n", "the line carries", step_mm * rate_hz, step_mm);
+        columns_put(out, _("the line carries"), CONFIG_LABEL_COLUMNS);
+        fprintf(out, _("%.1f mm/s of a cylinder (step_mm %.3f)\n"), step_mm * rate_hz, step_mm);
     }
 }

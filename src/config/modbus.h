@@ -25,7 +25,7 @@ modbus_drive_timing_t config_modbus_timing(const config_t *config);
 /** The map of a configuration whose drives are on Modbus and that config_load() accepted. */
 void config_modbus_map(const config_t *config, modbus_drive_map_t *map);
 
-/** Checks the sections, where they are in use; reports into self. */
+/** Checks the sections that are in use; reports errors into self. */
 void config_modbus_check(config_source_t *self);
 
 /** Writes what the lines can carry. */

@@ -6,6 +6,8 @@
 #include <string.h>
 
 #include "config/canraw.h"
+
+#include "common/translate.h"
 #include "config/drives_check.h"
 #include "config/modbus.h"
 
@@ -162,7 +164,7 @@ static void check_setpoint_overlap(config_source_t *self, const char *name, cons
         const uint32_t at = common_register(&blocks->block[b], setpoint, is_itself ? b : setpoint->count);
         if (at <= 65535) {
             config_source_key_error(self, SECTION, name, "register 0x%04X is %s; allowed: each register once", (unsigned)at,
-                                    is_itself ? "in two blocks" : "one of setpoint, too");
+                                    is_itself ? _("in two blocks") : _("one of setpoint, too"));
             return;
         }
     }
@@ -180,7 +182,7 @@ static void check_item_overlap(config_source_t *self, const char *name, const co
         if (is_twice) {
             config_source_key_error(self, SECTION, name, "register 0x%04X is written by %s, too; allowed: each register once",
                                     (unsigned)own.address,
-                                    items == &modbus_of(self)->startup ? "setpoint" : "startup or setpoint");
+                                    items == &modbus_of(self)->startup ? "setpoint" : _("startup or setpoint"));
             return;
         }
     }

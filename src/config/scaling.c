@@ -3,6 +3,9 @@
  */
 #include "config/scaling.h"
 
+#include "common/columns.h"
+#include "common/translate.h"
+
 #include <inttypes.h>
 #include <string.h>
 
@@ -196,10 +199,9 @@ void config_scaling_check(config_source_t *self)
         const q16_t stroke_q16 = self->config->settings.stroke_mm_q16[i];
         if (is_scaled && fx_abs(stroke_counts(&scale, stroke_q16)) < COUNTS_OF_STROKE) {
             config_source_key_error(self, section, "counts_per_mm",
-                                    "a stroke of %g mm would be %" PRId64
-                                    " counts of drive %u; allowed: counts per mm, not mm per "
+                                    "a stroke of %g mm would be %lld counts of drive %u; allowed: counts per mm, not mm per "
                                     "count: counts of a turn / lead",
-                                    (double)stroke_q16 / (double)Q16_ONE, stroke_counts(&scale, stroke_q16), i + 1u);
+                                    (double)stroke_q16 / (double)Q16_ONE, (long long)stroke_counts(&scale, stroke_q16), i + 1u);
             return;
         }
     }
@@ -225,22 +227,22 @@ static void describe(const config_t *config, unsigned i, config_text_t *text)
     (void)config_scaling_of(config, i, &scale);
     const int64_t counts = stroke_counts(&scale, stroke_q16);
     const double counts_per_s = (double)speed_q16 / (double)Q16_ONE * (double)scale.num / (double)scale.den;
-    config_text_add(text, "stroke of ");
+    config_text_add(text, _("stroke of "));
     config_text_add_q16(text, stroke_q16);
-    config_text_add(text, " mm = ");
+    config_text_add(text, _(" mm = "));
     add_grouped(text, counts);
-    config_text_add(text, " counts (");
+    config_text_add(text, _(" counts ("));
     add_grouped(text, scale.zero);
-    config_text_add(text, " to ");
+    config_text_add(text, _(" to "));
     add_grouped(text, scale.zero + counts);
-    config_text_add(text, "), ");
+    config_text_add(text, _("), "));
     config_text_add_q16(text, speed_q16);
-    config_text_add(text, " mm/s = ");
+    config_text_add(text, _(" mm/s = "));
     if (config->drive_train.counts_per_turn != CONFIG_NONE) {
-        config_text_add(text, "%.0f rpm", 60.0 * counts_per_s / config->drive_train.counts_per_turn);
+        config_text_add(text, _("%.0f rpm"), 60.0 * counts_per_s / config->drive_train.counts_per_turn);
     } else {
         add_grouped(text, (int64_t)counts_per_s);
-        config_text_add(text, " counts/s");
+        config_text_add(text, _(" counts/s"));
     }
 }
 
@@ -259,9 +261,9 @@ void config_scaling_report(const config_t *config, FILE *out)
         is_same = is_same && strcmp(text[i].data, text[0].data) == 0;
     }
     for (unsigned i = 0; i < (is_same ? 1u : cylinders); i++) {
-        fprintf(out, "%-24s  ", i == 0 ? "counts of the drives" : "");
+        columns_put(out, i == 0 ? _("counts of the drives") : "", CONFIG_LABEL_COLUMNS);
         if (!is_same) {
-            fprintf(out, "drive %u: ", i + 1u);
+            fprintf(out, _("drive %u: "), i + 1u);
         }
         fprintf(out, "%s\n", text[i].data);
     }

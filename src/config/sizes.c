@@ -7,6 +7,8 @@
  */
 #include "config/sizes.h"
 
+#include "common/translate.h"
+
 #include "heave/kin.h"
 
 #define SECTION      "geometry"
@@ -95,8 +97,8 @@ static void refuse_rest(config_source_t *self, const set_t *set)
 {
     const bool is_spread = cylinders_of(self) == 6u && set->circle->spread_deg_q16 != CONFIG_NONE;
     if (is_spread || set->circle->turn_deg_q16 != 0) {
-        config_source_key_error(self, SECTION, is_spread ? set->spread : set->turn, "means nothing without %s; allowed: with it",
-                                set->radius);
+        config_source_key_error(self, SECTION, is_spread ? set->spread : set->turn,
+                                _("means nothing without %s; allowed: with it"), set->radius);
     }
 }
 

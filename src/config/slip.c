@@ -4,6 +4,8 @@
  */
 #include "config/slip.h"
 
+#include "common/translate.h"
+
 #include <string.h>
 
 /* Signs of other keyboards that stand where a plain one belongs. */
@@ -11,18 +13,18 @@ static const struct {
     const char *bytes;
     const char *what;
 } k_signs[] = {
-    {"\xEF\xBC\x8C", "has a full-width comma; write a plain one"},
-    {"\xE3\x80\x81", "has a Chinese comma; write a plain one"},
-    {"\xEF\xBC\x8E", "has a full-width point; write a plain one"},
-    {"\xE3\x80\x82", "has a Chinese full stop; write a plain point"},
-    {"\xEF\xBC\x8D", "has a full-width minus; write a plain one"},
-    {"\xE2\x88\x92", "has a typographic minus; write a plain -"},
-    {"\xE2\x80\x93", "has a dash; write a plain -"},
-    {"\xEF\xBC\x9B", "has a full-width semicolon; comments begin with a blank and a plain ;"},
-    {"\xE3\x80\x80", "has a full-width blank; write plain ones"},
-    {"\xC2\xA0", "has a no-break space; write plain blanks"},
-    {"\xC2\xB0", "has a degree sign; write the number alone"},
-    {"\xEF\xBC\x90", "has full-width digits; write plain ones"},
+    {"\xEF\xBC\x8C", N_("has a full-width comma; write a plain one")},
+    {"\xE3\x80\x81", N_("has a Chinese comma; write a plain one")},
+    {"\xEF\xBC\x8E", N_("has a full-width point; write a plain one")},
+    {"\xE3\x80\x82", N_("has a Chinese full stop; write a plain point")},
+    {"\xEF\xBC\x8D", N_("has a full-width minus; write a plain one")},
+    {"\xE2\x88\x92", N_("has a typographic minus; write a plain -")},
+    {"\xE2\x80\x93", N_("has a dash; write a plain -")},
+    {"\xEF\xBC\x9B", N_("has a full-width semicolon; comments begin with a blank and a plain ;")},
+    {"\xE3\x80\x80", N_("has a full-width blank; write plain ones")},
+    {"\xC2\xA0", N_("has a no-break space; write plain blanks")},
+    {"\xC2\xB0", N_("has a degree sign; write the number alone")},
+    {"\xEF\xBC\x90", N_("has full-width digits; write plain ones")},
 };
 
 static bool is_digit(char byte)
@@ -53,7 +55,7 @@ static const char *find_sign(const char *text)
             return k_signs[i].what;
         }
     }
-    return has_wide_digit(text) ? "has full-width digits; write plain ones" : NULL;
+    return has_wide_digit(text) ? _("has full-width digits; write plain ones") : NULL;
 }
 
 /* "30 # fast": behind a value only `;` begins a comment. */
@@ -91,8 +93,9 @@ static bool has_no_commas(const config_key_t *key, const char *text)
         has_gap = has_gap || (i > 0 && is_blank(text[i]) && is_digit(text[i - 1]) &&
                               strchr("0123456789+-.", text[i + strspn(&text[i], " \t")]) != NULL);
     }
-    return has_gap && ((key->type == CONFIG_DECIMAL && key->count > 1) || key->type == CONFIG_PER_CYLINDER ||
-                       key->type == CONFIG_PER_RELAY || key->type == CONFIG_WHOLES || key->type == CONFIG_IDS);
+    return has_gap &&
+           ((key->type == CONFIG_DECIMAL && key->count > 1) || key->type == CONFIG_PER_CYLINDER ||
+            key->type == CONFIG_PER_RELAY || key->type == CONFIG_WHOLES || key->type == CONFIG_IDS || key->type == CONFIG_NODES);
 }
 
 /* "600 mm" or "600mm". */
@@ -111,15 +114,15 @@ static const char *find(const config_key_t *key, const char *text)
         return sign;
     }
     if (has_hash_comment(text)) {
-        return "has a # comment behind it; write it with a semicolon";
+        return _("has a # comment behind it; write it with a semicolon");
     }
     if (has_decimal_comma(key, text)) {
-        return "has a comma where a decimal point belongs";
+        return _("has a comma where a decimal point belongs");
     }
     if (has_no_commas(key, text)) {
-        return "lacks commas between its numbers";
+        return _("lacks commas between its numbers");
     }
-    return has_unit(key, text) ? "has its unit behind it; write the number alone" : NULL;
+    return has_unit(key, text) ? _("has its unit behind it; write the number alone") : NULL;
 }
 
 bool config_slip_find(const config_key_t *key, const char *text, config_text_t *why)
@@ -129,6 +132,6 @@ bool config_slip_find(const config_key_t *key, const char *text, config_text_t *
         return false;
     }
     config_text_add_quoted(why, text, strlen(text));
-    config_text_add(why, " %s", slip);
+    config_text_add(why, " %s", translate(slip));
     return true;
 }

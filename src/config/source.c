@@ -3,6 +3,8 @@
  */
 #include "config/source.h"
 
+#include "common/translate.h"
+
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -14,7 +16,7 @@ static void write_error(config_source_t *self, unsigned line, const char *where,
     } else {
         fprintf(self->errors, "%s:%u: %s", self->path, line, where);
     }
-    vfprintf(self->errors, format, arguments);
+    vfprintf(self->errors, translate(format), arguments);
     fputc('\n', self->errors);
     self->error_count++;
 }

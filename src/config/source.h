@@ -33,6 +33,17 @@ typedef struct {
     unsigned startup_line[2][CIA402_ITEMS_MAX]; /**< of the items of the cylinders' list, and of the rotation motor's */
 } config_source_t;
 
+/** Where a configuration comes from. */
+typedef struct {
+    const char *name; /**< the file's path; of a text, what it is called in errors */
+    const char *text; /**< NULL: the file is read */
+    size_t length;
+    int wait_ms; /**< for each piece of a pipe */
+} config_text_source_t;
+
+/** Loads into a configuration, whole or with errors. Allocates nothing. */
+void config_source_load(config_source_t *self, const config_text_source_t *from, config_t *config, FILE *errors);
+
 enum { CONFIG_SECTION_NONE = -1, CONFIG_SECTION_REFUSED = -2 };
 
 /** Reports an error at a line. */

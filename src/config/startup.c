@@ -3,16 +3,18 @@
  */
 #include "config/startup.h"
 
+#include "common/translate.h"
+
 #include <inttypes.h>
 #include <string.h>
 
-const char config_startup_help[] =
+const char config_startup_help[] = N_(
     "A line is `0x2030:01 = 50 u16`: object, value, type (u8 i8 u16 i16 u32 i32), written before everything that heaved sets and "
     "read back. `is` instead of `=`: only looked at. Behind the type may stand `unchecked`: not read back; `if-there`: a drive "
-    "may be without it, or refuse it; `last`: after everything else.\n";
+    "may be without it, or refuse it; `last`: after everything else.\n");
 
 const char config_startup_allowed[] =
-    "0x2030:01 = 50 u16, is instead of = to look only; type u8 i8 u16 i16 u32 i32; then unchecked, if-there, last";
+    N_("0x2030:01 = 50 u16, is instead of = to look only; type u8 i8 u16 i16 u32 i32; then unchecked, if-there, last");
 
 const config_startup_t *config_startup_of(const config_section_t *section, const config_t *config)
 {
@@ -43,7 +45,7 @@ void config_startup_dump(const config_section_t *section, const config_t *config
     if (list == NULL) {
         return;
     }
-    fprintf(out, "; lines such as %s\n", config_startup_allowed);
+    fprintf(out, _("; lines such as %s\n"), translate(config_startup_allowed));
     for (unsigned i = 0; i < list->count && config_is_applicable(section->needs, config); i++) {
         config_text_clear(&text);
         config_startup_format(&list->item[i], &text);

@@ -3,6 +3,8 @@
  */
 #include "config/startup_read.h"
 
+#include "common/translate.h"
+
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -48,14 +50,14 @@ static const char *read_object(char *text, cia402_item_t *item)
     int64_t sub = 0;
     char *colon = strchr(text, ':');
     if (colon == NULL) {
-        return "has no sub-index, such as :00";
+        return _("has no sub-index, such as :00");
     }
     *colon = '\0';
     if (strncmp(text, "0x", 2) != 0 || !read_number(text, 1, UINT16_MAX, &index)) {
-        return "has no object such as 0x2030";
+        return _("has no object such as 0x2030");
     }
     if (!read_number(colon + 1, 0, UINT8_MAX, &sub)) {
-        return "has no sub-index from 0 to 255 behind the colon";
+        return _("has no sub-index from 0 to 255 behind the colon");
     }
     item->index = (uint16_t)index;
     item->sub = (uint8_t)sub;
@@ -69,13 +71,13 @@ static const char *read_value(const char *text, const char *type, cia402_item_t 
         if (strcmp(k_types[i].name, type) == 0) {
             item->bytes = k_types[i].bytes;
             if (!read_number(text, k_types[i].low, k_types[i].high, &value)) {
-                return "has a value that its type does not hold";
+                return _("has a value that its type does not hold");
             }
             item->value = (uint32_t)(uint64_t)value & (item->bytes == 4 ? UINT32_MAX : (1u << 8u * item->bytes) - 1u);
             return NULL;
         }
     }
-    return "has no type that there is";
+    return _("has no type that there is");
 }
 
 static const char *read_flag(const char *word, cia402_item_t *item)
@@ -87,16 +89,16 @@ static const char *read_flag(const char *word, cia402_item_t *item)
     } else if (strcmp(word, "last") == 0 && !item->is_last) {
         item->is_last = true;
     } else {
-        return "ends with a word that does not belong there";
+        return _("ends with a word that does not belong there");
     }
     return NULL;
 }
 
-/* What a list must not do, whatever the drive. */
+/* Errors of an item that do not depend on the drive. */
 static const char *judge(const cia402_item_t *item)
 {
     if (item->is_written && (item->index == STORE || item->index == RESTORE)) {
-        return "would write the drive's memory at each start, which wears it; store by the maker's program";
+        return _("would write the drive's memory at each start, which wears it; store by the maker's program");
     }
     return NULL;
 }
@@ -105,7 +107,7 @@ static const char *read_item(char word[WORDS_MAX + 1u][WORD_BYTES], unsigned wor
 {
     const bool is_looked_at = strcmp(word[1], "is") == 0;
     if (words < 4 || words > WORDS_MAX || (!is_looked_at && strcmp(word[1], "=") != 0)) {
-        return "is no object with value and type";
+        return _("is no object with value and type");
     }
     *item = (cia402_item_t){.is_written = !is_looked_at, .is_checked = true};
     const char *wrong = read_object(word[0], item);
@@ -144,12 +146,12 @@ void config_startup_take(config_source_t *self, const char *before, const char *
     config_text_add(&line, "%s%s%s", before, is_colon ? ":" : " = ", behind);
     const char *wrong = read_item(word, split(line.data, word), &item);
     if (wrong == NULL && list->count == CIA402_ITEMS_MAX) {
-        wrong = "is one too many: a list has up to 32";
+        wrong = _("is one too many: a list has up to 32");
     }
     if (wrong != NULL) {
         config_text_add_quoted(&quoted, line.data, line.length);
         config_source_error(self, self->line, "[%s] %s %s; allowed: %s", section->name, quoted.data, wrong,
-                            config_startup_allowed);
+                            translate(config_startup_allowed));
         return;
     }
     self->startup_line[list == &self->config->cia402.startup ? 0 : 1][list->count] = self->line;
@@ -204,13 +206,17 @@ static bool is_same(const config_startup_t *a, const config_startup_t *b)
     return is_equal;
 }
 
-void config_startup_compare(const config_source_t *self, const config_t *running)
+unsigned config_startup_compare(const config_source_t *self, const config_t *running, FILE *report)
 {
+    unsigned changed = 0;
     for (size_t i = 0; i < config_section_count; i++) {
         const config_startup_t *list = config_startup_of(&config_sections[i], self->config);
-        if (list != NULL && !is_same(list, config_startup_of(&config_sections[i], running))) {
-            fprintf(self->errors, "%s:%u: [%s] another list needs a restart; the one of the start stays\n", self->path,
+        const bool is_other = list != NULL && !is_same(list, config_startup_of(&config_sections[i], running));
+        changed += is_other;
+        if (is_other && report != NULL) {
+            fprintf(report, _("%s:%u: [%s] another list needs a restart; the one of the start stays\n"), self->path,
                     self->section_line[i] != 0 ? self->section_line[i] : self->line, config_sections[i].name);
         }
     }
+    return changed;
 }

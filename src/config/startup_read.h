@@ -12,7 +12,9 @@ void config_startup_take(config_source_t *self, const char *before, const char *
 /** Refuses items that heaved sets itself for this configuration. */
 void config_startup_check(config_source_t *self);
 
-/** Says which lists of a file differ from those of a platform that runs, which keeps its own. */
-void config_startup_compare(const config_source_t *self, const config_t *running);
+/** Which lists of a file differ from those of a platform that runs, which keeps its own.
+ *  @param report says it; NULL: nothing is said
+ *  @return how many do */
+unsigned config_startup_compare(const config_source_t *self, const config_t *running, FILE *report);
 
 #endif

@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "config/config.h"
+
+#include "common/translate.h"
 #include "config/value.h"
 
 /** How a key stands in the file. */
@@ -88,7 +90,7 @@ static const config_key_t *key_of(const char *section, const char *name)
 static void begin(const char *section, FILE *out)
 {
     const config_section_t *found = &config_sections[config_section_find(section)];
-    fprintf(out, "\n; %s\n[%s]\n", found->help, found->name);
+    fprintf(out, "\n; %s\n[%s]\n", translate(found->help), found->name);
 }
 
 static void write_key(const config_key_t *key, const char *value, FILE *out)
@@ -96,7 +98,7 @@ static void write_key(const config_key_t *key, const char *value, FILE *out)
     config_text_t allowed;
     config_text_clear(&allowed);
     config_value_allowed(key, &allowed);
-    fprintf(out, "; %s\n; %s\n", key->help, allowed.data);
+    fprintf(out, "; %s\n; %s\n", translate(key->help), allowed.data);
     if (value != NULL) {
         fprintf(out, "%s =%s%s\n", key->name, value[0] == '\0' ? "" : " ", value);
     } else {
@@ -169,11 +171,12 @@ const char *config_write_template(const char *kind, const char *driver, FILE *ou
     if (!is_one_of(key_of("drives", "driver")->words, driver)) {
         return key_of("drives", "driver")->words;
     }
-    fprintf(out, "; A platform to fill in: every key that has no value yet. `heaved --check --config FILE` says what is missing "
-                 "and what is wrong.\n"
-                 "; Keys behind a ; may stay so: then they have the value that stands there. [roll] to [z] are left out, and "
-                 "with them the limits\n"
-                 "; of the axes: they are then what each axis alone can do with these cylinders.\n");
+    fprintf(out,
+            _("; A platform to fill in: every key that has no value yet. `heaved --check --config FILE` says what is missing "
+              "and what is wrong.\n"
+              "; Keys behind a ; may stay so: then they have the value that stands there. [roll] to [z] are left out, and "
+              "with them the limits\n"
+              "; of the axes: they are then what each axis alone can do with these cylinders.\n"));
     for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
         if (i == 0 || strcmp(k_rows[i].section, k_rows[i - 1].section) != 0) {
             begin(k_rows[i].section, out);

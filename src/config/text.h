@@ -6,6 +6,9 @@
 
 #include "heave/fx.h"
 
+/** Columns of what stands before the values of a report, with the blanks behind it. */
+#define CONFIG_LABEL_COLUMNS 26u
+
 /** A text that grows; always ends with a NUL. */
 typedef struct {
     size_t length;

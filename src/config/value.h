@@ -5,6 +5,7 @@
 #define HEAVE_CONFIG_VALUE_H
 
 #include "config/keys.h"
+#include "config/span.h"
 #include "config/text.h"
 
 /** Stores a value.
@@ -19,5 +20,10 @@ void config_value_format(const config_key_t *key, const config_t *config, config
 
 /** Appends what the key takes: "a number from -90 to 90 deg". */
 void config_value_allowed(const config_key_t *key, config_text_t *text);
+
+/** Says what is wrong with an item, or with the number of items of a list, then what is allowed.
+ *  @return false */
+bool config_value_refuse(const config_key_t *key, span_t item, const char *what, config_text_t *why);
+bool config_value_refuse_count(const config_key_t *key, unsigned count, config_text_t *why);
 
 #endif

@@ -3,6 +3,8 @@
  */
 #include "config/value_modbus.h"
 
+#include "common/translate.h"
+
 #include <arpa/inet.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,7 +32,7 @@ static const char *const k_values[MODBUS_DRIVE_VALUES] = {"position", "speed", "
 static bool refuse(const config_key_t *key, const char *item, const char *what, config_text_t *why)
 {
     config_text_add_quoted(why, item, strlen(item));
-    config_text_add(why, " %s; allowed: ", what);
+    config_text_add(why, _(" %s; allowed: "), what);
     config_value_modbus_allowed(key, why);
     return false;
 }
@@ -90,10 +92,10 @@ static bool parse_hosts(const config_key_t *key, const char *text, config_hosts_
     for (const char *rest = text; rest != NULL; hosts->count++) {
         take(&rest, ",", token);
         if (hosts->count == DRIVES_MAX) {
-            return refuse(key, token, "is one too many", why);
+            return refuse(key, token, _("is one too many"), why);
         }
         if (!read_host(token, &hosts->host[hosts->count])) {
-            return refuse(key, token, "is no IPv4 address with or without :port", why);
+            return refuse(key, token, _("is no IPv4 address with or without :port"), why);
         }
     }
     return true;
@@ -123,11 +125,11 @@ static const char *add_field(const config_key_t *key, const char *token, modbus_
     const size_t length = strlen(token);
     const char *colon = strchr(token, ':');
     if (length < 2 || token[length - 1] != '}' || colon == NULL) {
-        return "is no field";
+        return _("is no field");
     }
     const size_t name_length = (size_t)(colon - token) - 1u;
     if (!is_listed(key->words, token + 1, name_length)) {
-        return "is no field of these blocks";
+        return _("is no field of these blocks");
     }
     modbus_drive_field_t field = {.at = block->count};
     for (unsigned i = 0; i < MODBUS_DRIVE_VALUES; i++) {
@@ -141,13 +143,13 @@ static const char *add_field(const config_key_t *key, const char *token, modbus_
         }
     }
     if (field.registers == 0) {
-        return "has no type that there is";
+        return _("has no type that there is");
     }
     if (is_twice(blocks, field.value)) {
-        return "is there twice";
+        return _("is there twice");
     }
     if (block->count + field.registers > MODBUS_DRIVE_REGISTERS_MAX) {
-        return "goes beyond the 16 registers of a block";
+        return _("goes beyond the 16 registers of a block");
     }
     block->field[block->fields++] = field;
     block->count = (uint8_t)(block->count + field.registers);
@@ -159,16 +161,16 @@ static const char *add_register(const config_key_t *key, const char *token, modb
     modbus_drive_block_t *block = &blocks->block[blocks->count - 1u];
     const bool is_any = strcmp(token, "..") == 0;
     if (is_any && key->count == 0) {
-        return "stands for any register, which only feedback can have";
+        return _("stands for any register, which only feedback can have");
     }
     if (block->count == MODBUS_DRIVE_REGISTERS_MAX) {
-        return "goes beyond the 16 registers of a block";
+        return _("goes beyond the 16 registers of a block");
     }
     if (!is_any && key->count != 0) {
-        return "is neither a field nor .. for any register";
+        return _("is neither a field nor .. for any register");
     }
     if (!is_any && !read_word(token, &block->data[block->count])) {
-        return "is no value of a register";
+        return _("is no value of a register");
     }
     block->any = (uint16_t)(block->any | (is_any ? 1u << block->count : 0u));
     block->count++;
@@ -178,19 +180,19 @@ static const char *add_register(const config_key_t *key, const char *token, modb
 static const char *add_block(const char *token, modbus_drive_blocks_t *blocks)
 {
     if (blocks->count == MODBUS_DRIVE_BLOCKS_MAX) {
-        return "begins a fifth block, and there are up to four";
+        return _("begins a fifth block, and there are up to four");
     }
-    return read_word(token, &blocks->block[blocks->count++].address) ? NULL : "is no register to begin a block with";
+    return read_word(token, &blocks->block[blocks->count++].address) ? NULL : _("is no register to begin a block with");
 }
 
 static bool end_block(const config_key_t *key, const char *text, const modbus_drive_blocks_t *blocks, config_text_t *why)
 {
     const modbus_drive_block_t *block = &blocks->block[blocks->count - 1u];
     if (blocks->count == 0 || block->count == 0) {
-        return refuse(key, text, "has a block without registers", why);
+        return refuse(key, text, _("has a block without registers"), why);
     }
     if (block->address + (unsigned)block->count > 65536u) {
-        return refuse(key, text, "goes beyond register 65535", why);
+        return refuse(key, text, _("goes beyond register 65535"), why);
     }
     return true;
 }
@@ -217,7 +219,7 @@ static bool parse_blocks(const config_key_t *key, const char *text, modbus_drive
         }
         is_start = false;
     }
-    return is_start ? refuse(key, text, "ends where a block should begin", why) : end_block(key, text, blocks, why);
+    return is_start ? refuse(key, text, _("ends where a block should begin"), why) : end_block(key, text, blocks, why);
 }
 
 /* --- Start-up lists --- */
@@ -233,10 +235,10 @@ static const char *read_item(const char *text, modbus_drive_item_t *item)
     const bool is_written = strcmp(token[1], "=") == 0;
     const bool is_unchecked = is_written && strcmp(token[3], "unchecked") == 0;
     if ((!is_written && strcmp(token[1], "is") != 0) || count < 3 || (count == 4 && !is_unchecked)) {
-        return "is no item";
+        return _("is no item");
     }
     if (!read_word(token[0], &item->address) || !read_word(token[2], &item->value)) {
-        return "has a register or a value that is none";
+        return _("has a register or a value that is none");
     }
     item->is_written = is_written;
     item->is_checked = !is_unchecked;
@@ -250,7 +252,7 @@ static bool parse_items(const config_key_t *key, const char *text, config_items_
     for (const char *rest = text; rest != NULL; items->count++) {
         take(&rest, ",", token);
         if (items->count == CONFIG_ITEMS_MAX) {
-            return refuse(key, token, "is one too many", why);
+            return refuse(key, token, _("is one too many"), why);
         }
         const char *wrong = read_item(token, &items->item[items->count]);
         if (wrong != NULL) {
@@ -352,24 +354,24 @@ void config_value_modbus_format(const config_key_t *key, const void *field, conf
 
 static void allowed_blocks(const config_key_t *key, config_text_t *text)
 {
-    config_text_add(text, "none, or a register and what it holds, such as 0x6200%s", key->count != 0 ? "" : " 0x0001");
+    config_text_add(text, _("none, or a register and what it holds, such as 0x6200%s"), key->count != 0 ? "" : " 0x0001");
     for (const char *word = key->words; word != NULL; word = strchr(word, '|') != NULL ? strchr(word, '|') + 1 : NULL) {
         config_text_add(text, " {%.*s:T}", (int)strcspn(word, "|"), word);
     }
-    config_text_add(text, "%s%s, more behind |", key->words != NULL ? " with T u16 i16 u32hl ... i32lh" : "",
-                    key->count != 0 ? ", .. for any register" : "");
+    config_text_add(text, _("%s%s, more behind |"), key->words != NULL ? _(" with T u16 i16 u32hl ... i32lh") : "",
+                    key->count != 0 ? _(", .. for any register") : "");
 }
 
 void config_value_modbus_allowed(const config_key_t *key, config_text_t *text)
 {
     if (key->type == CONFIG_HOSTS) {
-        config_text_add(text, "none, or IPv4 addresses such as 192.168.1.11 or 192.168.1.11:1502, one for each drive");
+        config_text_add(text, _("none, or IPv4 addresses such as 192.168.1.11 or 192.168.1.11:1502, one for each drive"));
     } else if (key->type == CONFIG_BLOCKS) {
         allowed_blocks(key, text);
     } else {
         config_text_add(text,
-                        "none, or items such as 0x0304 = 50 (written and read back), 0x0304 = 50 unchecked, 0x0000 is 3 (only "
-                        "looked at), up to %u",
+                        _("none, or items such as 0x0304 = 50 (written and read back), 0x0304 = 50 unchecked, 0x0000 is 3 (only "
+                          "looked at), up to %u"),
                         CONFIG_ITEMS_MAX);
     }
 }

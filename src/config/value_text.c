@@ -3,7 +3,10 @@
  */
 #include "config/value.h"
 
+#include "common/translate.h"
+
 #include "config/value_can.h"
+#include "config/value_canopen.h"
 #include "config/value_modbus.h"
 
 #include <arpa/inet.h>
@@ -101,9 +104,11 @@ static void format_per_relay(const config_t *config, const uint32_t *values, con
     }
 }
 
-static const char *label_text(const config_label_t *label)
+/* A value that is text. */
+static const char *text_of(const config_key_t *key, const char *field)
 {
-    return label->text[0] == '\0' ? "none" : label->text;
+    const bool has_none = key->type == CONFIG_LABEL || key->type == CONFIG_GROUP;
+    return has_none && field[0] == '\0' ? "none" : field;
 }
 
 void config_value_format(const config_key_t *key, const config_t *config, config_text_t *text)
@@ -133,16 +138,12 @@ void config_value_format(const config_key_t *key, const config_t *config, config
         break;
     case CONFIG_ADDRESS:
     case CONFIG_PATH:
-        config_text_add(text, "%s", (const char *)field);
-        break;
     case CONFIG_GROUP:
-        config_text_add(text, "%s", *(const char *)field == '\0' ? key->words : (const char *)field);
+    case CONFIG_LABEL:
+        config_text_add(text, "%s", text_of(key, field));
         break;
     case CONFIG_NETWORKS:
         format_networks(key, field, text);
-        break;
-    case CONFIG_LABEL:
-        config_text_add(text, "%s", label_text(field));
         break;
     case CONFIG_LINES:
         format_lines(field, text);
@@ -155,8 +156,14 @@ void config_value_format(const config_key_t *key, const config_t *config, config
     case CONFIG_RATIOS:
     case CONFIG_WHOLES:
     case CONFIG_FRAME:
+    case CONFIG_STEP:
     case CONFIG_WHEN:
         config_value_can_format(key, field, text);
+        break;
+    case CONFIG_NODES:
+    case CONFIG_WORDS:
+    case CONFIG_MAPS:
+        config_value_canopen_format(key, field, text);
         break;
     case CONFIG_HOSTS:
     case CONFIG_BLOCKS:
@@ -168,18 +175,18 @@ void config_value_format(const config_key_t *key, const config_t *config, config
 
 static void add_range(const config_key_t *key, config_text_t *text)
 {
-    config_text_add(text, " from ");
+    config_text_add(text, _(" from "));
     config_text_add_milli(text, key->low_milli);
-    config_text_add(text, " to ");
+    config_text_add(text, _(" to "));
     config_text_add_milli(text, key->high_milli);
-    config_text_add(text, "%s%s", key->unit[0] == '\0' ? "" : " ", key->unit);
+    config_text_add(text, "%s%s", key->unit[0] == '\0' ? "" : " ", translate(key->unit));
 }
 
 /* "or none": the word that may stand in place of a number. */
 static void add_number_word(const config_key_t *key, config_text_t *text)
 {
     if (key->words != NULL) {
-        config_text_add(text, ", or %s", key->words);
+        config_text_add(text, _(", or %s"), key->words);
     }
 }
 
@@ -193,40 +200,42 @@ static void add_words(const char *words, config_text_t *text)
 static void allowed_decimals(const config_key_t *key, config_text_t *text)
 {
     if (key->count == 1u) {
-        config_text_add(text, "a number");
+        config_text_add(text, _("a number"));
     } else {
-        config_text_add(text, "%u numbers", key->count);
+        config_text_add(text, _("%u numbers"), key->count);
     }
     add_range(key, text);
-    config_text_add(text, "%s", key->count == 1u ? "" : ", separated by commas");
+    config_text_add(text, "%s", key->count == 1u ? "" : _(", separated by commas"));
     add_number_word(key, text);
 }
 
 static void allowed_addresses(const config_key_t *key, config_text_t *text)
 {
     if (key->type == CONFIG_ADDRESS) {
-        config_text_add(text, "a numeric IPv4 or IPv6 address");
+        config_text_add(text, _("a numeric IPv4 or IPv6 address"));
     } else if (key->type == CONFIG_GROUP) {
-        config_text_add(text, "%s, or a multicast address and its network card, such as 239.1.2.3%%eth0 or ff15::9800%%eth0",
+        config_text_add(text, _("%s, or a multicast address and its network card, such as 239.1.2.3%%eth0 or ff15::9800%%eth0"),
                         key->words);
     } else {
-        config_text_add(text, "%s, or up to %u addresses or networks such as 192.168.7.0/24", key->words, HAL_UDP_NETWORKS_MAX);
+        config_text_add(text, _("%s, or up to %u addresses or networks such as 192.168.7.0/24"), key->words,
+                        HAL_UDP_NETWORKS_MAX);
     }
 }
 
 static void allowed_path(const config_key_t *key, config_text_t *text)
 {
     if (key->words != NULL) {
-        config_text_add(text, "%s, or ", key->words);
+        config_text_add(text, _("%s, or "), key->words);
     }
-    config_text_add(text, "an absolute path of at most %u characters", (unsigned)key->size - 1u);
+    config_text_add(text, _("an absolute path of at most %u characters"), (unsigned)key->size - 1u);
 }
 
-static void allowed_each(const config_key_t *key, const char *number, const char *each, config_text_t *text)
+static void allowed_each(const config_key_t *key, config_text_t *text)
 {
-    config_text_add(text, "%s", number);
+    const bool is_relay = key->type == CONFIG_PER_RELAY;
+    config_text_add(text, "%s", is_relay ? _("a whole number") : _("a number"));
     add_range(key, text);
-    config_text_add(text, ", or one for each %s", each);
+    config_text_add(text, _(", or one for each %s"), is_relay ? _("relay") : _("cylinder"));
 }
 
 void config_value_allowed(const config_key_t *key, config_text_t *text)
@@ -236,25 +245,24 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         allowed_decimals(key, text);
         break;
     case CONFIG_PER_CYLINDER:
-        allowed_each(key, "a number", "cylinder", text);
+    case CONFIG_PER_RELAY:
+        allowed_each(key, text);
         break;
     case CONFIG_INTEGER:
-        config_text_add(text, "a whole number");
+        config_text_add(text, _("a whole number"));
         add_range(key, text);
-        config_text_add(text, "%s", CONFIG_IS_HEX(key) ? ", or hexadecimal with 0x" : "");
+        config_text_add(text, "%s", CONFIG_IS_HEX(key) ? _(", or hexadecimal with 0x") : "");
         add_number_word(key, text);
         break;
     case CONFIG_MASK:
-        config_text_add(text, "hexadecimal 0 to %X", (unsigned)(key->high_milli / 1000));
-        break;
-    case CONFIG_SIGN:
-        config_text_add(text, "1 or -1");
+        config_text_add(text, _("hexadecimal 0 to %X"), (unsigned)(key->high_milli / 1000));
         break;
     case CONFIG_WORD:
         add_words(key->words, text);
         break;
+    case CONFIG_SIGN:
     case CONFIG_YES_NO:
-        config_text_add(text, "yes | no");
+        config_text_add(text, "%s", key->type == CONFIG_SIGN ? _("1 or -1") : _("yes | no"));
         break;
     case CONFIG_ADDRESS:
     case CONFIG_GROUP:
@@ -265,21 +273,24 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         allowed_path(key, text);
         break;
     case CONFIG_LABEL:
-        config_text_add(text, "none, or a name of at most %u characters", CONFIG_LABEL_MAX - 1u);
+        config_text_add(text, _("none, or a name of at most %u characters"), CONFIG_LABEL_MAX - 1u);
         break;
     case CONFIG_LINES:
-        config_text_add(text, "none, or up to %u different lines, by name or number", CONFIG_RELAYS_MAX);
-        break;
-    case CONFIG_PER_RELAY:
-        allowed_each(key, "a whole number", "relay", text);
+        config_text_add(text, _("none, or up to %u different lines, by name or number"), CONFIG_RELAYS_MAX);
         break;
     case CONFIG_NAME:
     case CONFIG_IDS:
     case CONFIG_RATIOS:
     case CONFIG_WHOLES:
     case CONFIG_FRAME:
+    case CONFIG_STEP:
     case CONFIG_WHEN:
         config_value_can_allowed(key, text);
+        break;
+    case CONFIG_NODES:
+    case CONFIG_WORDS:
+    case CONFIG_MAPS:
+        config_value_canopen_allowed(key, text);
         break;
     case CONFIG_HOSTS:
     case CONFIG_BLOCKS:
@@ -287,4 +298,19 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
         config_value_modbus_allowed(key, text);
         break;
     }
+}
+
+bool config_value_refuse(const config_key_t *key, span_t item, const char *what, config_text_t *why)
+{
+    config_text_add_quoted(why, item.at, item.length);
+    config_text_add(why, _(" %s; allowed: "), what);
+    config_value_allowed(key, why);
+    return false;
+}
+
+bool config_value_refuse_count(const config_key_t *key, unsigned count, config_text_t *why)
+{
+    config_text_add(why, translate_count("has %u value; allowed: ", "has %u values; allowed: ", count), count);
+    config_value_allowed(key, why);
+    return false;
 }

@@ -99,15 +99,12 @@ static hv_status_t open_can(devices_t *self, const char *interface, const hal_ca
 
 static hv_status_t open_can_raw(devices_t *self, const config_t *config, gateway_io_t *io)
 {
-    hal_can_filter_t filter[DRIVES_MAX];
-    hal_can_filter_t own[DRIVES_MAX];
+    hal_can_filter_t filter[CANRAW_FILTERS_MAX];
+    hal_can_filter_t own[CANRAW_OWNS_MAX];
     config_canraw_map(config, &self->canraw_map);
     const uint32_t count = canraw_filters(&self->canraw_map, filter);
-    for (uint32_t k = 0; k < count; k++) {
-        own[k] = filter[k];
-        own[k].id = self->canraw_map.axis[k].command_id;
-    }
-    const hv_status_t status = open_can(self, config->can.interface, filter, count, own, count);
+    const uint32_t owns = canraw_owns(&self->canraw_map, own);
+    const hv_status_t status = open_can(self, config->can.interface, filter, count, own, owns);
     io->drives = canraw_hal(&self->canraw);
     return status == HV_OK ? canraw_init(&self->canraw, &self->canraw_map, can_hal(self)) : status;
 }

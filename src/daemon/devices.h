@@ -20,7 +20,7 @@
 #include "sim_inputs.h"
 #include "sim_relays.h"
 
-/** The devices. What is not in use stays zero. sim_inputs is for offline runs, which press its e-stop. */
+/** The devices. Those that are not in use stay zero. Offline runs press the e-stop of sim_inputs. */
 typedef struct {
     sim_drive_config_t sim_axis[DRIVES_MAX];
     sim_drives_t sim_drives;
@@ -31,7 +31,7 @@ typedef struct {
     linux_gpio_inputs_t gpio_inputs;
     bool is_can_open;
     linux_can_t can;
-    bool is_can_local_open; /**< instead of it: a bus between programs */
+    bool is_can_local_open; /**< a bus between programs is open, in place of CAN */
     linux_can_local_t can_local;
     canraw_map_t canraw_map;
     canraw_t canraw;
@@ -39,27 +39,28 @@ typedef struct {
     cia402_t cia402;
     linux_modbus_t coil_line;
     coil_relays_t coil_relays;
-    uint8_t modbus_lines; /**< open */
+    uint8_t modbus_lines; /**< number of open lines */
     linux_modbus_t modbus_line[DRIVES_MAX];
     modbus_drive_map_t modbus_map;
     modbus_drive_t modbus_drive;
 } devices_t;
 
-/** Opens what the configuration names and puts the handles into io (its udp and log are left alone).
- *  @return HV_OK, also where a bus is not usable yet (drives are then offline until it is); HV_ERR_RANGE where a device does not
- *          take its figures; HV_ERR_IO where one is not there at all. devices_trouble() says what is wrong. */
+/** Opens the devices that the configuration names and puts their handles into io. Does not change udp and log of io.
+ *  @return HV_OK, also if a bus is not usable yet: its drives are offline until it is; HV_ERR_RANGE: a device does not accept
+ *          its values; HV_ERR_IO: a device does not exist. devices_trouble() then says what is wrong. */
 hv_status_t devices_open(devices_t *self, const config_t *config, gateway_io_t *io) HV_MUST_CHECK;
 
-/** What is wrong with a device of open ones, or with the one that could not be opened. The thread that runs the drives.
- *  @return "" where nothing is */
+/** What is wrong with an open device, or with the device that could not be opened. Only for the thread that runs the drives.
+ *  @return "" if nothing is wrong */
 const char *devices_trouble(devices_t *self);
 
-/** Closes; harmless on one that is not open. What a bus has not taken by now is dropped.
- *  @param safe_mask where the relays end
- *  @return false: a device hangs, and may still use self */
+/** Closes all devices; does nothing for a device that is not open. Drops what a bus has not accepted yet.
+ *  @param safe_mask the last mask of the relays
+ *  @return false: a device hangs, and its thread may still use self */
 bool devices_close(devices_t *self, uint16_t safe_mask);
 
-/** For offline runs: simulated devices whatever the configuration names, drives enabled, homed, at the settled extension. */
+/** For offline runs: opens simulated devices, whatever the configuration names. The drives are enabled, homed, and at the
+ * settled extension. */
 hv_status_t devices_open_settled(devices_t *self, const config_t *config, gateway_io_t *io) HV_MUST_CHECK;
 
 #endif

@@ -5,6 +5,11 @@
 
 #include <string.h>
 
+#include "common/columns.h"
+#include "common/sentence.h"
+#include "common/translate.h"
+#include "config/text.h"
+
 linux_gpio_relays_config_t gpio_setup_relays(const config_t *config)
 {
     const config_relays_t *relays = &config->relays;
@@ -45,14 +50,16 @@ linux_gpio_inputs_config_t gpio_setup_inputs(const config_t *config)
 /* Finds lines and says what is wrong with them. Returns the number of warnings. */
 static unsigned look(const linux_gpio_names_t *names, const char *section, linux_gpio_place_t *place, FILE *out)
 {
-    char text[LINUX_GPIO_TEXT_SIZE];
+    char text[LINUX_GPIO_TEXT_SIZE], shown[SENTENCE_MAX];
     const hv_status_t status = linux_gpio_find(names, place, text);
     if (status == HV_ERR_NOSUP) {
-        fprintf(out, "%-24s  not looked at: %s\n", section, text);
+        columns_put(out, translate(section), CONFIG_LABEL_COLUMNS);
+        fprintf(out, _("not looked at: %s\n"), sentence(text, shown, sizeof shown));
     } else if (status != HV_OK) {
-        fprintf(out, "warning: [%s] %s\n", section, text);
+        fprintf(out, _("warning: [%s] %s\n"), section, sentence(text, shown, sizeof shown));
     } else {
-        fprintf(out, "%-24s  %u line%s on chip %s\n", section, place->count, place->count == 1u ? "" : "s", place->label);
+        columns_put(out, translate(section), CONFIG_LABEL_COLUMNS);
+        fprintf(out, translate_count("%u line on chip %s\n", "%u lines on chip %s\n", place->count), place->count, place->label);
     }
     return status != HV_OK && status != HV_ERR_NOSUP;
 }
@@ -68,7 +75,7 @@ static unsigned compare(const config_t *config, const linux_gpio_place_t *relays
     for (unsigned i = 0; i < inputs->count; i++) {
         for (unsigned k = 0; k < relays->count; k++) {
             if (inputs->offset[i] == relays->offset[k]) {
-                fprintf(out, "warning: [inputs] gpio: line %s is relay %u already\n", setup.names.line[i], k + 1u);
+                fprintf(out, _("warning: [inputs] gpio: line %s is relay %u already\n"), setup.names.line[i], k + 1u);
                 warnings++;
             }
         }
@@ -83,16 +90,16 @@ unsigned gpio_setup_check(const config_t *config, FILE *out)
     unsigned warnings = 0;
     if (config->relays.driver == CONFIG_RELAYS_GPIO) {
         const linux_gpio_relays_config_t setup = gpio_setup_relays(config);
-        warnings += look(&setup.names, "relays", &relays, out);
+        warnings += look(&setup.names, N_("relays"), &relays, out);
     }
     if (config->healthy.driver == CONFIG_HEALTHY_GPIO) {
         linux_gpio_place_t healthy = {.count = 0};
         const linux_gpio_relays_config_t setup = gpio_setup_healthy(config);
-        warnings += look(&setup.names, "healthy", &healthy, out);
+        warnings += look(&setup.names, N_("healthy"), &healthy, out);
     }
     if (config->inputs.driver == CONFIG_INPUTS_GPIO) {
         const linux_gpio_inputs_config_t setup = gpio_setup_inputs(config);
-        warnings += look(&setup.names, "inputs", &inputs, out) + compare(config, &relays, &inputs, out);
+        warnings += look(&setup.names, N_("inputs"), &inputs, out) + compare(config, &relays, &inputs, out);
     }
     return warnings;
 }

@@ -11,7 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <sys/resource.h>
 #include <sys/signalfd.h>
 #include <time.h>
 #include <unistd.h>
@@ -22,7 +21,9 @@
 #include "common/socket_path.h"
 #include "config/hash.h"
 #include "daemon/flood.h"
+#include "daemon/flood_filter.h"
 #include "daemon/motion_loop.h"
+#include "daemon/reconfigure.h"
 #include "daemon/sd_notify.h"
 #include "daemon/writers.h"
 #include "linux_clock.h"
@@ -31,9 +32,8 @@
 #include "service/control.h"
 #include "service/control_selftest.h"
 
-#define TICK_MS         10
-#define WAITING_MS      1  /* between looks where the system does not wait */
-#define DESCRIPTORS_MIN 64 /* all clients, lines and files at once; half of it is used in the worst case */
+#define TICK_MS    10
+#define WAITING_MS 1 /* between looks where the system does not wait */
 /* As many short datagrams as a cycle takes, and a third more: the kernel grants twice that and charges 768 bytes and more for
  * each. What does not fit is lost as it comes; a longer queue would have the cycle follow what is older than the one before. */
 #define UDP_BUFFER_BYTES 32768
@@ -55,40 +55,16 @@ typedef struct {
     writers_t writers;
     bool was_lossy; /**< it has been said that something is lost */
     int signal_fd;
+    bool is_ready; /* once */
     bool is_thread_running;
     bool has_writers_ended;
     unsigned signals; /**< requests to end so far */
-    FILE *errors;     /**< standard error for what a reload has to say; never blocks on a pipe or a terminal */
+    reconfigure_t reconfigure;
+    config_store_t store;
     const options_t *options;
 } live_t;
 
 /* --- Floods --- */
-
-#define FRAME_BYTES_MIN 9u /* A3:0,0,0# */
-
-/* Only what no frame begins with, as far as its command: the scanner passes over blanks and ends of lines. */
-static linux_udp_filter_t filter_of(const config_t *config)
-{
-#define WHITE                                                                                                                    \
-    {                                                                                                                            \
-        {                                                                                                                        \
-            LINUX_UDP_SET(" \t\r\n\0")                                                                                           \
-        }                                                                                                                        \
-    }
-    static const linux_udp_form_t k_v3[] = {
-        {{LINUX_UDP_SET("@"), LINUX_UDP_SET("AC"), LINUX_UDP_SET("3467"), LINUX_UDP_SET(":T")}}, WHITE};
-    static const linux_udp_form_t k_lenient[] = {
-        {{LINUX_UDP_SET("@#"), LINUX_UDP_SET("ACac"), LINUX_UDP_SET("3467"), LINUX_UDP_SET(":Tt")}},
-        {{LINUX_UDP_SET("ACac"), LINUX_UDP_SET("3467"), LINUX_UDP_SET(":Tt")}},
-        WHITE};
-#undef WHITE
-    const bool is_lenient = config->settings.dialect == FRAME_LENIENT;
-    return (linux_udp_filter_t){.forms = is_lenient ? k_lenient : k_v3,
-                                .form_count = is_lenient ? sizeof k_lenient / sizeof k_lenient[0] : sizeof k_v3 / sizeof k_v3[0],
-                                .bytes_min = FRAME_BYTES_MIN,
-                                .bytes_max = GATEWAY_DATAGRAM_MAX,
-                                .allow = config->udp.allow};
-}
 
 /* Says what becomes of useless datagrams from now on. */
 static void set_filter(live_t *self)
@@ -98,7 +74,7 @@ static void set_filter(live_t *self)
         writers_say(&self->writers, "the flood is over: rejected frames are told again");
         return;
     }
-    const linux_udp_filter_t filter = filter_of(&self->config);
+    const linux_udp_filter_t filter = flood_filter_of(&self->config);
     if (linux_udp_filter_on(&self->udp, &filter) == HV_OK) {
         writers_say(
             &self->writers,
@@ -145,22 +121,11 @@ static bool open_signals(live_t *self)
     return self->signal_fd >= 0;
 }
 
-/* Reads the configuration again. What may change in operation does, if the whole file is right. */
-static void reload(live_t *self)
+/* What is let through of a flood follows from the configuration. */
+static void take_reload(live_t *self, bool is_in_force)
 {
-    if (config_reload(self->options->config, &self->config, self->errors) != 0) {
-        writers_say(&self->writers, "%s is not right: nothing has changed", self->options->config);
-    } else if (!motion_loop_reload(&self->loop, &self->config)) {
-        writers_say(&self->writers, "too many reloads at once: send SIGHUP again");
-    } else {
-        writers_say(&self->writers, "%s has been read again: configuration %s", self->options->config, self->config.hash);
-        writers_tell_hash(&self->writers, self->config.hash);
-        if (!config_is_unapproved(&self->config)) {
-            __atomic_store_n(&self->loop.handover.is_unapproved, 0, __ATOMIC_RELEASE);
-        }
-        if (self->flood.is_on) {
-            set_filter(self);
-        }
+    if (is_in_force && self->flood.is_on) {
+        set_filter(self);
     }
 }
 
@@ -184,10 +149,11 @@ static void take_signals(live_t *self)
     while (read(self->signal_fd, &info, sizeof info) == (ssize_t)sizeof info) {
         if (info.ssi_signo == SIGHUP) {
             log_signal(self, &info);
-            reload(self);
+            take_reload(self, reconfigure_reload(&self->reconfigure));
             continue;
         }
         self->signals++;
+        self->reconfigure.is_end_wanted = true;
         log_signal(self, &info);
         if (self->signals == 1) {
             const motion_request_t request = {.event = EVENT_SHUTDOWN};
@@ -263,6 +229,8 @@ static void count_losses(live_t *self)
     status_lost_t *lost = &self->control.lost;
     writers_count(&self->writers, lost);
     lost->operator_entries = operator_log_lost(&self->operators);
+    lost->digest = self->store.digest;
+    lost->put_back = self->store.put_back;
     lost->is_unapproved = __atomic_load_n(&self->loop.handover.is_unapproved, __ATOMIC_ACQUIRE) != 0;
     const bool is_lossy = lost->trace_rows != 0 || lost->record_lines != 0;
     if (is_lossy && !self->was_lossy) {
@@ -283,6 +251,7 @@ static void serve_once(live_t *self)
     }
     take_signals(self);
     control_serve(&self->control, fds, now_us(self));
+    take_reload(self, reconfigure_serve(&self->reconfigure, &self->control));
     tell_others(self);
     tell_acknowledged(self);
     watch_selftest(self);
@@ -349,10 +318,13 @@ static int run(live_t *self, const config_t *config)
     if (!operator_log_start(&self->operators)) {
         return print_message(EXIT_UNAVAILABLE, "cannot start the operator log: %s", strerror(errno));
     }
+    if (!config_store_start(&self->store)) {
+        return print_message(EXIT_UNAVAILABLE, "cannot start what keeps the configuration: %s", strerror(errno));
+    }
     if (!lifetime_start(&self->life)) {
         return print_message(EXIT_UNAVAILABLE, "cannot start what keeps the life of the machine: %s", strerror(errno));
     }
-    if (!motion_loop_start(&self->loop)) {
+    if ((self->options->anew != ANEW_NOT && !reconfigure_stay_off(&self->reconfigure)) || !motion_loop_start(&self->loop)) {
         return print_message(EXIT_UNAVAILABLE, "cannot start the motion thread: %s", strerror(errno));
     }
     self->is_thread_running = true;
@@ -367,7 +339,11 @@ static int run(live_t *self, const config_t *config)
         (void)print_message(0, "memory is not locked (%s): cycles may be late when memory is short", strerror(errno));
     }
     say_ready(self, config);
+    self->is_ready = true;
     sd_notify_ready(&self->manager, now_us(self));
+    if (self->options->anew != ANEW_NOT) {
+        sd_notify_restart(&self->manager, true);
+    }
     const bool has_ended = serve(self);
     if (has_ended) {
         (void)pthread_join(self->loop.thread, NULL);
@@ -385,26 +361,14 @@ static int run(live_t *self, const config_t *config)
     if (has_ended && gateway_energized(&self->loop.session.gateway) != 0) {
         return print_message(EXIT_REFUSED, "ended, but not every drive has confirmed that its torque is off");
     }
-    return code;
+    const bool is_anew = has_ended && code == EXIT_DONE && reconfigure_starts_anew(&self->reconfigure, &self->control);
+    if (is_anew) {
+        sd_notify_restart(&self->manager, false);
+    }
+    return is_anew ? LIVE_RESTART : code;
 }
 
 /* --- Start --- */
-
-/* With too few, poll, accept and the files of incidents would fail later, in motion. */
-static int check_descriptors(void)
-{
-    struct rlimit limit;
-    if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= DESCRIPTORS_MIN) {
-        return EXIT_DONE;
-    }
-    limit.rlim_cur = limit.rlim_max < DESCRIPTORS_MIN ? limit.rlim_max : DESCRIPTORS_MIN;
-    if (setrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur < DESCRIPTORS_MIN) {
-        return print_message(EXIT_UNAVAILABLE,
-                             "only %llu open files are allowed (ulimit -n, LimitNOFILE=); at least %d are needed",
-                             (unsigned long long)limit.rlim_cur, DESCRIPTORS_MIN);
-    }
-    return EXIT_DONE;
-}
 
 static int open_udp(live_t *self, const config_t *config)
 {
@@ -426,9 +390,9 @@ static void open_blackbox(live_t *self, const config_t *config)
 /* Without a buffer: what is not taken at once is lost. */
 static void open_errors(live_t *self, int fd)
 {
-    self->errors = fd != STDERR_FILENO ? fdopen(fd, "w") : stderr;
-    self->errors = self->errors != NULL ? self->errors : stderr;
-    (void)setvbuf(self->errors, NULL, _IONBF, 0);
+    FILE *const errors = fd != STDERR_FILENO ? fdopen(fd, "w") : stderr;
+    self->reconfigure.errors = errors != NULL ? errors : stderr;
+    (void)setvbuf(self->reconfigure.errors, NULL, _IONBF, 0);
 }
 
 /* What can be refused comes first: a second heaved must not empty the files of the first. */
@@ -437,8 +401,7 @@ static int open_all(live_t *self, const config_t *config)
     char in_directory[SOCKET_PATH_MAX];
     const char *path =
         self->options->socket != NULL ? self->options->socket : socket_path_of_daemon(in_directory, config->control_socket);
-    int code = check_descriptors();
-    code = code == EXIT_DONE ? open_udp(self, config) : code;
+    int code = open_udp(self, config);
     code = code == EXIT_DONE
                ? control_open(&self->control, path, &self->config, &self->loop.handover, &self->blackbox, &self->operators)
                : code;
@@ -447,6 +410,7 @@ static int open_all(live_t *self, const config_t *config)
     const uint32_t cylinders = config->settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
     code = code == EXIT_DONE ? lifetime_open(&self->life, config, cylinders + (config->settings.has_angle ? 1u : 0u)) : code;
     self->control.lost.life = &self->life.now;
+    self->control.store = &self->store;
     if (code != EXIT_DONE) {
         return code;
     }
@@ -478,7 +442,7 @@ static int open_all(live_t *self, const config_t *config)
     return EXIT_DONE;
 }
 
-int live_run(const config_t *config, const options_t *options)
+int live_run(const config_t *config, const options_t *options, bool *is_ready)
 {
     live_t *self = calloc(1, sizeof *self);
     if (self == NULL) {
@@ -486,16 +450,28 @@ int live_run(const config_t *config, const options_t *options)
     }
     self->options = options;
     self->config = *config;
+    self->reconfigure =
+        (reconfigure_t){.config = &self->config, .loop = &self->loop, .writers = &self->writers, .store = &self->store};
+    config_store_open(&self->store, options->file, options->config);
+    self->store.no_restart =
+        options->record != NULL || options->trace != NULL
+            ? "heaved writes --record or --trace, and does not start anew by itself: end it, and start it with "
+              "another file"
+            : NULL;
     control_init(&self->control);
     self->manager.fd = -1;
     self->has_writers_ended = true;
     self->udp.fd = -1;
+    (void)snprintf(self->store.put_back, sizeof self->store.put_back, "%s", options->put_back);
     int code = open_all(self, config);
+    print_message_keep(NULL, 0); /* other threads may say something from now on */
     code = code == EXIT_DONE ? run(self, config) : code;
+    *is_ready = self->is_ready;
     control_close(&self->control);
     sd_notify_close(&self->manager);
     const bool has_life_ended = lifetime_close(&self->life);
-    const bool has_log_ended = operator_log_close(&self->operators) && has_life_ended;
+    const bool has_store_ended = config_store_close(&self->store);
+    const bool has_log_ended = operator_log_close(&self->operators) && has_life_ended && has_store_ended;
     if (!self->is_thread_running) { /* a stuck thread may still use all this: the end of the process gives it back */
         const bool has_blackbox_ended = blackbox_close(&self->blackbox);
         const bool have_devices_ended = devices_close(&self->loop.devices, self->config.settings.relay_safe_mask);

@@ -7,8 +7,11 @@
 #include "config/config.h"
 #include "daemon/options.h"
 
+#define LIVE_RESTART (-1) /**< no exit code: heaved has ended to start anew, with another configuration */
+
 /** Runs until a shutdown has ended.
- *  @return the program's exit code */
-int live_run(const config_t *config, const options_t *options);
+ *  @param is_ready out: it was up; false: it could not be started
+ *  @return the program's exit code, or LIVE_RESTART */
+int live_run(const config_t *config, const options_t *options, bool *is_ready);
 
 #endif

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -14,8 +15,10 @@
 #include "common/presets.h"
 #include "common/same_file.h"
 #include "common/standard_descriptors.h"
+#include "common/translate.h"
 #include "common/usage.h"
 #include "config/config.h"
+#include "daemon/check_json.h"
 #include "daemon/gpio_setup.h"
 #include "daemon/live.h"
 #include "daemon/options.h"
@@ -26,6 +29,10 @@
 #include "inspect/eds_judge.h"
 #include "inspect/envelope_csv.h"
 #include "inspect/report.h"
+#include "inspect/scan.h"
+#include "service/config_store.h"
+
+#define DESCRIPTORS_MIN 64 /* all clients, lines and files at once; half of it is used in the worst case */
 
 void hv_assert_failed(const char *file, int line)
 {
@@ -75,18 +82,21 @@ static int check_outputs(const options_t *options, const char *metrics)
 static int end_stdout(int code)
 {
     if (fflush(stdout) != 0 || ferror(stdout) != 0) {
-        return print_message(EXIT_IO, "standard output: %s", strerror(errno));
+        return print_message(EXIT_IO, "standard output: %s", error_text(errno));
     }
     return code;
 }
 
 static int dump_dbc(const options_t *options, const config_t *config)
 {
-    if (config->drives != CONFIG_DRIVES_CAN_RAW) {
-        return print_message(EXIT_BAD_CONFIG, "%s: [drives] driver: has no frames of its own; allowed for --dump-dbc: can-raw",
+    if (config->drives == CONFIG_DRIVES_CAN_RAW) {
+        dbc_write(config, stdout);
+    } else if (config->drives == CONFIG_DRIVES_CIA402) {
+        dbc_write_cia402(config, stdout);
+    } else {
+        return print_message(EXIT_BAD_CONFIG, "%s: [drives] driver: is on no CAN bus; allowed for --dump-dbc: can-raw, cia402",
                              options->config);
     }
-    dbc_write(config, stdout);
     return end_stdout(EXIT_DONE);
 }
 
@@ -97,7 +107,7 @@ static int read_eds(eds_t *eds, const char *path)
     FILE *in = is_readable(path) ? fopen(path, "r") : NULL;
     *eds = (eds_t){.object = NULL};
     if (in == NULL) {
-        return print_message(EXIT_NO_INPUT, "%s: %s", path, strerror(errno));
+        return print_message(EXIT_NO_INPUT, "%s: %s", path, error_text(errno));
     }
     const bool is_read = eds_read(eds, in, path, stderr);
     (void)fclose(in);
@@ -146,21 +156,21 @@ static int write_envelope(const char *path, const config_t *config)
         return EXIT_SOFTWARE; /* not a configuration that config_load() accepted */
     }
     if (!atomic_file_open(&file, path)) {
-        return print_message(EXIT_NO_OUTPUT, "%s: %s", path, strerror(errno));
+        return print_message(EXIT_NO_OUTPUT, "%s: %s", path, error_text(errno));
     }
     envelope_csv_write(&envelope, file.stream);
     if (!atomic_file_close(&file)) {
-        return print_message(EXIT_IO, "%s: %s", path, strerror(errno));
+        return print_message(EXIT_IO, "%s: %s", path, error_text(errno));
     }
     return EXIT_DONE;
 }
 
+/* What ends by itself. */
 static int run(const options_t *options, const config_t *config)
 {
     switch (options->mode) {
-    case MODE_RUN:
-        return live_run(config, options);
     case MODE_PLAY:
+        translate_end(); /* it repeats the log */
         return play_run(config, options->play, options->trace);
     case MODE_CHECK:
         return check(options, config);
@@ -173,11 +183,14 @@ static int run(const options_t *options, const config_t *config)
         return end_stdout(EXIT_DONE);
     case MODE_DUMP_DBC:
         return dump_dbc(options, config);
+    case MODE_RUN:
     case MODE_IMPORT_DCF:
     case MODE_HELP:
     case MODE_VERSION:
     case MODE_PRESETS:
+    case MODE_SCAN:
     case MODE_TEMPLATE:
+    case MODE_KEYS:
         break;
     }
     return EXIT_SOFTWARE;
@@ -186,7 +199,7 @@ static int run(const options_t *options, const config_t *config)
 static int list_presets(void)
 {
     return presets_list(stdout) >= 0 ? end_stdout(EXIT_DONE)
-                                     : print_message(EXIT_NO_INPUT, "%s: %s", presets_directory(), strerror(errno));
+                                     : print_message(EXIT_NO_INPUT, "%s: %s", presets_directory(), error_text(errno));
 }
 
 static int write_template(const options_t *options)
@@ -209,6 +222,11 @@ static int run_without_file(const options_t *options)
         return end_stdout(EXIT_DONE);
     case MODE_PRESETS:
         return list_presets();
+    case MODE_KEYS:
+        config_write_keys(stdout);
+        return end_stdout(EXIT_DONE);
+    case MODE_SCAN:
+        return end_stdout(scan_run(options->scan, stdout) ? EXIT_DONE : EXIT_REFUSED);
     case MODE_TEMPLATE:
         return write_template(options);
     case MODE_IMPORT_DCF:
@@ -225,6 +243,78 @@ static int run_without_file(const options_t *options)
     return -1;
 }
 
+/* The file, or what was applied over it; said where that does not count any more. */
+static const char *choose_file(const char *file, char kept[CONFIG_PATH_MAX])
+{
+    const char *const path = config_store_choose(file, kept);
+    if (path != file) {
+        (void)print_message(0, "%s was applied over %s, and counts until that file is changed", path, file);
+    } else if (kept[0] != '\0' && access(kept, F_OK) == 0) {
+        (void)print_message(0, "%s has changed since %s was applied over it: the file counts", file, kept);
+    }
+    return path;
+}
+
+/* What was just applied and could not be started never ran: the one before it did, and does again. What failed to start after it
+ * has run, perhaps for years, stays: an older one may be that of another machine. */
+static int put_back(char **argv, const char *kept, const char *why, int code)
+{
+    if (!config_store_put_back(kept)) {
+        return print_message(code, "%s cannot be put back: %s", kept, strerror(errno));
+    }
+    (void)print_message(
+        0, "what was applied cannot be started; it stays as %s.failed, and the configuration before it is in force", kept);
+    anew_start(argv, ANEW_PUT_BACK, why[0] != '\0' ? why : N_("its log tells why"));
+    return print_message(EXIT_UNAVAILABLE, "cannot start anew: %s", strerror(errno));
+}
+
+/* With too few, poll, accept and the files of incidents would fail later, in motion. */
+static int check_descriptors(void)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= DESCRIPTORS_MIN) {
+        return EXIT_DONE;
+    }
+    limit.rlim_cur = limit.rlim_max < DESCRIPTORS_MIN ? limit.rlim_max : DESCRIPTORS_MIN;
+    if (setrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur < DESCRIPTORS_MIN) {
+        return print_message(EXIT_UNAVAILABLE,
+                             "only %llu open files are allowed (ulimit -n, LimitNOFILE=); at least %d are needed",
+                             (unsigned long long)limit.rlim_cur, DESCRIPTORS_MIN);
+    }
+    return EXIT_DONE;
+}
+
+/* @return EXIT_DONE; else it has said what is wrong */
+static int load(const options_t *options, config_t *config)
+{
+    if (config_load(options->config, config, stderr) != 0) {
+        return EXIT_BAD_CONFIG;
+    }
+    const bool has_metrics = options->mode == MODE_RUN && strcmp(config->metrics_file, "none") != 0;
+    return check_outputs(options, has_metrics ? config->metrics_file : NULL);
+}
+
+static int run_live(options_t *options, config_t *config, char **argv)
+{
+    static char kept[CONFIG_PATH_MAX], why[ANEW_WHY_MAX] = "";
+    bool is_ready = false;
+    options->anew = anew_read(options->put_back);
+    options->config = choose_file(options->file, kept);
+    print_message_keep(why, sizeof why);
+    int code = load(options, config);
+    code = code == EXIT_DONE ? check_descriptors() : code;
+    if (code == EXIT_DONE) {
+        translate_end(); /* the log is English, and no thread looks up texts */
+        code = live_run(config, options, &is_ready);
+    }
+    print_message_keep(NULL, 0);
+    if (code == LIVE_RESTART) {
+        anew_start(argv, ANEW_APPLIED, ""); /* what was applied is read at its start */
+        return print_message(EXIT_UNAVAILABLE, "cannot start anew: %s", strerror(errno));
+    }
+    return options->anew == ANEW_APPLIED && options->config == kept && !is_ready ? put_back(argv, kept, why, code) : code;
+}
+
 int main(int argc, char **argv)
 {
     static options_t options;
@@ -232,8 +322,9 @@ int main(int argc, char **argv)
     if (!standard_descriptors_open()) {
         return print_message(EXIT_UNAVAILABLE,
                              "standard input, output or error is closed, and the null device cannot be put there: %s",
-                             strerror(errno));
+                             error_text(errno));
     }
+    translate_begin();
     (void)signal(SIGXFSZ, SIG_IGN); /* a file that has reached its limit is an error of the write */
     int code = options_read(&options, argc, argv);
     if (code != EXIT_DONE) {
@@ -244,16 +335,19 @@ int main(int argc, char **argv)
         return code;
     }
     if (!is_readable(options.config)) {
-        return print_message(EXIT_NO_INPUT, "%s: %s", options.config, strerror(errno));
+        return print_message(EXIT_NO_INPUT, "%s: %s", options.config, error_text(errno));
     }
     code = check_outputs(&options, NULL);
     if (code != EXIT_DONE) {
         return code;
     }
-    if (config_load(options.config, &config, stderr) != 0) {
-        return EXIT_BAD_CONFIG;
+    options.file = options.config;
+    if (options.mode == MODE_RUN) {
+        return run_live(&options, &config, argv);
     }
-    const bool has_metrics = options.mode == MODE_RUN && strcmp(config.metrics_file, "none") != 0;
-    code = check_outputs(&options, has_metrics ? config.metrics_file : NULL);
+    if (options.mode == MODE_CHECK && options.is_json) { /* its mistakes are a part of what it says */
+        return end_stdout(check_json(options.config));
+    }
+    code = load(&options, &config);
     return code == EXIT_DONE ? run(&options, &config) : code;
 }

@@ -9,8 +9,9 @@
 #include <string.h>
 #include <sys/resource.h>
 
+#include "daemon/motion_notes.h"
+#include "daemon/motion_objects.h"
 #include "heave/text.h"
-#include "record/record.h"
 #include "service/operator_requests.h"
 
 #define PRIORITY           80 /* above threaded interrupts, which have 50 */
@@ -47,26 +48,11 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
 
 /* --- Hand-overs --- */
 
-static void note_at(motion_loop_t *self, record_kind_t kind, uint64_t t_us, uint32_t value)
-{
-    if (self->is_recording) {
-        record_push(&self->handover.record, kind, t_us, value);
-    }
-    if (self->blackbox != NULL) {
-        blackbox_note(self->blackbox, kind, t_us, value);
-    }
-}
-
-static void note(motion_loop_t *self, record_kind_t kind, uint32_t value)
-{
-    note_at(self, kind, self->session.now_us, value);
-}
-
 static void take_reloads(motion_loop_t *self)
 {
     motion_reload_t reload;
     while (ring_pop(&self->handover.reloads, &reload, sizeof reload) > 0) {
-        note(self, RECORD_RELOAD, 0);
+        motion_note(self, RECORD_RELOAD, 0);
         gateway_reload(&self->session.gateway, &reload.settings);
         self->allow = reload.allow;
         self->late_hold_cycles = reload.late_hold_cycles;
@@ -95,11 +81,8 @@ static service_answer_t serve(motion_loop_t *self, const motion_request_t *reque
     const bool is_proof = service_is_held(service.verb) || service.verb == SERVICE_BEAT;
     service.age_us = is_proof ? gateway_tick_age(&self->session.gateway, request->tick_us) : 0;
     const service_answer_t answer = gateway_service(&self->session.gateway, &service, self->session.now_us);
-    if (answer == SERVICE_DONE && self->is_recording) {
-        record_push_service(&self->handover.record, self->session.now_us, &service);
-    }
-    if (answer == SERVICE_DONE && self->blackbox != NULL) {
-        record_push_service(&self->blackbox->records, self->session.now_us, &service);
+    if (answer == SERVICE_DONE) {
+        motion_note_service(self, &service);
     }
     return answer;
 }
@@ -107,16 +90,15 @@ static service_answer_t serve(motion_loop_t *self, const motion_request_t *reque
 static hv_status_t carry_out(motion_loop_t *self, const motion_request_t *request)
 {
     if (request->event == OPERATOR_INTENSITY) {
-        note(self, RECORD_INTENSITY, request->number);
+        motion_note(self, RECORD_INTENSITY, request->number);
         return gateway_set_intensity(&self->session.gateway, request->number);
     }
-    note(self, RECORD_REQUEST, request->event);
+    motion_note(self, RECORD_REQUEST, request->event);
     self->current.view.is_shutting_down |= request->event == EVENT_SHUTDOWN;
     return gateway_request(&self->session.gateway, (event_t)request->event, self->session.now_us);
 }
 
-/* Requests that wait, in order, before the cycle.
- * Returns how many; their results are complete after the cycle. */
+/* Requests that wait, in order, before the cycle. Returns how many; their results are complete after the cycle. */
 static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE])
 {
     unsigned count = 0;
@@ -126,6 +108,7 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
     const bool is_untested = is_below && __atomic_load_n(&self->handover.is_untested, __ATOMIC_ACQUIRE) != 0;
     for (; count < REQUESTS_PER_CYCLE && ring_pop(&self->handover.requests, &request, sizeof request) > 0; count++) {
         result[count].id = request.id;
+        result[count].is_later = false;
         result[count].is_key_off = switches_is_key_off(&self->switches) && is_for_the_key(self, request.event);
         result[count].is_unapproved = is_unapproved && is_for_the_key(self, request.event);
         result[count].is_power_failing = switches_is_power_failing(&self->switches) && is_for_the_key(self, request.event);
@@ -133,9 +116,11 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
         if (request.event == OPERATOR_SERVICE) {
             result[count].answer = serve(self, &request);
             result[count].status = HV_OK;
-            continue;
+        } else if (request.event == OPERATOR_OBJECT) {
+            motion_objects_take(self, &request, &result[count]);
+        } else {
+            result[count].status = handover_is_barred(&result[count]) ? HV_ERR_STATE : carry_out(self, &request);
         }
-        result[count].status = handover_is_barred(&result[count]) ? HV_ERR_STATE : carry_out(self, &request);
     }
     return count;
 }
@@ -209,6 +194,9 @@ static void take_switches(motion_loop_t *self)
 static void answer_requests(motion_loop_t *self, motion_result_t *result, unsigned count)
 {
     for (unsigned i = 0; i < count; i++) {
+        if (result[i].is_later) {
+            continue;
+        }
         result[i].snapshot = *gateway_snapshot(&self->session.gateway);
         result[i].is_shutting_down = self->current.view.is_shutting_down;
         (void)ring_push(&self->handover.results, &result[i], sizeof result[i], NULL, 0);
@@ -261,67 +249,6 @@ static void publish(motion_loop_t *self)
     seqlock_write(&self->handover.view, self->current.word);
 }
 
-static void note_faults(motion_loop_t *self, const snapshot_t *snapshot)
-{
-    if (self->is_recording) {
-        record_push_faults(&self->handover.record, snapshot);
-    }
-    if (self->blackbox != NULL) {
-        record_push_faults(&self->blackbox->records, snapshot);
-    }
-}
-
-static void note_drives(motion_loop_t *self, const snapshot_t *snapshot)
-{
-    if (self->is_recording) {
-        record_push_drives(&self->handover.record, snapshot->now_us, self->was_drive, snapshot->drive);
-    }
-    if (self->blackbox != NULL) {
-        record_push_drives(&self->blackbox->records, snapshot->now_us, self->was_drive, snapshot->drive);
-    }
-    memcpy(self->was_drive, snapshot->drive, sizeof self->was_drive);
-}
-
-static void write_row(motion_loop_t *self)
-{
-    trace_row_t row;
-    session_row(&self->session, &row);
-    if (self->is_tracing) {
-        (void)ring_push(&self->handover.trace, &row, sizeof row, NULL, 0);
-    }
-    if (self->blackbox != NULL) {
-        blackbox_cycle(self->blackbox, &self->session, &row);
-    }
-}
-
-static bool is_heard(const snapshot_t *snapshot)
-{
-    bool is_any = snapshot->state == STATE_SETTLED;
-    for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        is_any = is_any || snapshot->drive[i].has_actual;
-    }
-    return is_any;
-}
-
-/* What a recording and a trace need of the cycle that has just run. */
-static void write_down(motion_loop_t *self, bool is_zero)
-{
-    const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
-    if (snapshot->is_estop_active != self->was_estop) {
-        note_at(self, RECORD_ESTOP, snapshot->now_us, snapshot->is_estop_active);
-    }
-    self->was_estop = snapshot->is_estop_active;
-    note_drives(self, snapshot);
-    note_faults(self, snapshot);
-    if (is_zero) {
-        note_at(self, RECORD_ZERO, snapshot->now_us, record_zero(snapshot->goal, snapshot->intensity_percent));
-    }
-    self->has_feedback = self->has_feedback || is_heard(snapshot);
-    if (self->has_feedback) {
-        write_row(self);
-    }
-}
-
 /* --- The thread --- */
 
 /* The drives have had no set-points for so long that going on as if nothing had happened would be a guess. As an operator's
@@ -338,7 +265,7 @@ static void hold_if_too_late(motion_loop_t *self, uint32_t cycles)
     text_put_u32(&text, cycles);
     text_put(&text, " cycles late: holding ([platform] late_hold_cycles)");
     hal_log_write(self->io.log, HAL_LOG_ERROR, line);
-    note(self, RECORD_REQUEST, EVENT_HOLD);
+    motion_note(self, RECORD_REQUEST, EVENT_HOLD);
     (void)!gateway_request(&self->session.gateway, EVENT_HOLD, self->session.now_us);
 }
 
@@ -364,7 +291,7 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     motion_result_t result[REQUESTS_PER_CYCLE];
     const uint32_t skipped = (uint32_t)(late_us / self->session.cycle_us);
     if (skipped > 0) {
-        note(self, RECORD_LATE, skipped);
+        motion_note(self, RECORD_LATE, skipped);
         gateway_note_late(&self->session.gateway, skipped);
         hold_if_too_late(self, skipped);
     }
@@ -375,10 +302,11 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     const bool is_zero = session_cycle(&self->session);
     note_latency(self);
     note_hold(self);
-    write_down(self, is_zero);
+    motion_write_down(self, is_zero);
     publish(self);
-    samples_writer_add(&self->samples, gateway_snapshot(&self->session.gateway));
+    samples_writer_add(&self->samples, gateway_snapshot(&self->session.gateway), late_us, self->work_us);
     answer_requests(self, result, requests);
+    motion_objects_step(self);
 }
 
 /* One cycle of the drives alone, with the set-points of the last one. */
@@ -432,7 +360,8 @@ static void run(motion_loop_t *self)
         }
         run_cycle(self, late_us);
         histogram_add(&self->handover.times.wake, late_us);
-        histogram_add(&self->handover.times.work, hal_clock_now_us(self->clock) - now_us);
+        self->work_us = hal_clock_now_us(self->clock) - now_us;
+        histogram_add(&self->handover.times.work, self->work_us);
         deadline_us += cycle_us * (1 + late_us / cycle_us);
     }
 }

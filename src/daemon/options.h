@@ -6,10 +6,13 @@
 
 #include <stdbool.h>
 
+#include "daemon/anew.h"
+
 /** What to do. */
 typedef enum {
     MODE_RUN,
     MODE_CHECK,
+    MODE_KEYS,
     MODE_ENVELOPE,
     MODE_DOCTOR,
     MODE_DUMP_CONFIG,
@@ -17,6 +20,7 @@ typedef enum {
     MODE_IMPORT_DCF,
     MODE_PLAY,
     MODE_PRESETS,
+    MODE_SCAN,
     MODE_TEMPLATE,
     MODE_HELP,
     MODE_VERSION
@@ -25,7 +29,8 @@ typedef enum {
 /** A command line; texts point into argv, NULL where an option is not there. */
 typedef struct {
     run_mode_t mode;
-    const char *config;
+    const char *config; /**< what is loaded */
+    const char *file;   /**< what was named; another configuration may have been applied over it */
     const char *play;
     const char *envelope;
     const char *eds;
@@ -33,6 +38,10 @@ typedef struct {
     const char *trace;
     const char *record;
     const char *socket;
+    const char *scan; /**< the bus of --scan */
+    bool is_json;
+    anew_t anew;                 /**< this may be the start after another configuration was applied */
+    char put_back[ANEW_WHY_MAX]; /**< why the one that was applied is not in force; "": nothing was put back */
     const char *template_kind;   /**< of --template */
     const char *template_driver; /**< what stands behind it */
     char preset[4096];           /**< path of the file that --preset names, which config then is */

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #define SHUTDOWN_REST_US 15000000u /* a stop before settling, the drives going off, files */
+#define RESTART_US       30000000u /* files and devices closed, opened again */
 
 /* Whether there is nothing left to tell: taken, or nobody is there to take it. */
 static bool tell(const sd_notify_t *self, const char *text)
@@ -112,6 +113,16 @@ void sd_notify_stopping(sd_notify_t *self, uint64_t within_us)
 {
     self->untold_us = within_us;
     tell_stopping(self);
+}
+
+void sd_notify_restart(const sd_notify_t *self, bool is_over)
+{
+    char text[64];
+    const unsigned long long period_us = is_over ? 2u * self->watchdog_us : RESTART_US;
+    (void)snprintf(text, sizeof text, "WATCHDOG=1\nWATCHDOG_USEC=%llu", period_us);
+    if (self->watchdog_us != 0) {
+        (void)tell(self, text);
+    }
 }
 
 void sd_notify_close(sd_notify_t *self)

@@ -41,6 +41,10 @@ uint64_t sd_notify_shutdown_us(const settings_t *settings);
  *  @param within_us above 0, the longest that it takes: the manager waits as long, also where its unit says less */
 void sd_notify_stopping(sd_notify_t *self, uint64_t within_us);
 
+/** heaved starts anew in the same process: the watchdog has patience meanwhile.
+ *  @param is_over it has started; after sd_notify_ready() */
+void sd_notify_restart(const sd_notify_t *self, bool is_over);
+
 /** Once, at the end. */
 void sd_notify_close(sd_notify_t *self);
 

@@ -5,6 +5,7 @@
 #include "heave/canraw.h"
 
 #include "canraw_axis.h"
+#include "canraw_startup.h"
 
 #define STALLED_PERIODS 3u      /* without an echo: the bus is gone */
 #define RESTART_US      500000u /* between attempts to restart the bus */
@@ -31,16 +32,18 @@ static void lose_all(canraw_t *self)
 
 static void take_frame(canraw_t *self, const can_frame_t *frame)
 {
+    bool is_of_drive = false;
+    bool is_strange = false;
     for (unsigned k = 0; k < self->map->axes; k++) {
         const canraw_axis_map_t *axis = &self->map->axis[k];
-        if (frame->id != axis->reply_id || frame->is_extended != self->map->is_extended || frame->is_rtr) {
+        const bool is_status = self->map->status_reply.length != 0 && frame->id == axis->status_id;
+        if ((frame->id != axis->reply_id && !is_status) || frame->is_extended != self->map->is_extended || frame->is_rtr) {
             continue;
         }
-        if (!canraw_axis_receive(&self->axis[k], self->map, &axis->scale, frame, self->now_us)) {
-            self->strange++;
-        }
-        return;
+        is_of_drive = true;
+        is_strange |= !canraw_axis_receive(&self->axis[k], self->map, axis, frame, self->now_us);
     }
+    self->strange += is_of_drive && is_strange ? 1u : 0u;
 }
 
 /* Everything that waits, within bounds.
@@ -101,15 +104,13 @@ static void watch_bus(canraw_t *self, bool is_up)
 
 /* --- Out --- */
 
-static hv_status_t send_bytes(canraw_t *self, unsigned k, uint8_t length, const uint8_t data[CANRAW_BYTES_MAX])
+static hv_status_t send_bytes(canraw_t *self, uint32_t id, uint8_t length, const uint8_t data[CANRAW_BYTES_MAX])
 {
-    can_frame_t frame = {.id = self->map->axis[k].command_id, .is_extended = self->map->is_extended, .length = length};
+    can_frame_t frame = {.id = id, .is_extended = self->map->is_extended, .length = length};
     for (unsigned i = 0; i < CANRAW_BYTES_MAX; i++) {
         frame.data[i] = data[i];
     }
-    const hv_status_t status = hal_can_send(self->can, &frame);
-    self->axis[k].counter += status == HV_OK; /* what did not go out is no gap */
-    return status;
+    return hal_can_send(self->can, &frame);
 }
 
 /* A frame without values but counter and check byte. */
@@ -117,8 +118,10 @@ static hv_status_t send_plain(canraw_t *self, unsigned k, const canraw_frame_t *
 {
     const int64_t value[CANRAW_VALUES] = {[CANRAW_COUNTER] = self->axis[k].counter};
     uint8_t data[CANRAW_BYTES_MAX];
-    const hv_status_t status = canraw_pack(frame, value, data);
-    return status == HV_OK ? send_bytes(self, k, frame->length, data) : status;
+    hv_status_t status = canraw_pack(frame, value, data);
+    status = status == HV_OK ? send_bytes(self, self->map->axis[k].command_id, frame->length, data) : status;
+    self->axis[k].counter += status == HV_OK; /* what did not go out is no gap */
+    return status;
 }
 
 /* Commands that wait, of the kinds up to last; what the bus does not take waits on. */
@@ -133,6 +136,22 @@ static void send_commands(canraw_t *self, canraw_command_t last)
         if (send_plain(self, k, command) == HV_OK) {
             axis->pending = CANRAW_NOTHING;
             axis->told_us = self->now_us;
+        }
+    }
+}
+
+/* Drives that are not there, or have just come. */
+static void send_steps(canraw_t *self)
+{
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        const canraw_frame_t *frame = canraw_startup_next(&self->axis[k], self->map, self->now_us);
+        const bool is_off_due =
+            frame != NULL && self->axis[k].step == 0 && self->axis[k].is_energized; /* there is `disable` then */
+        if (is_off_due && send_plain(self, k, &self->map->command[CANRAW_DISABLE]) != HV_OK) {
+            continue;
+        }
+        if (frame != NULL && send_plain(self, k, frame) == HV_OK) {
+            canraw_startup_sent(&self->axis[k], self->map, self->now_us);
         }
     }
 }
@@ -158,7 +177,7 @@ static void send_queries(canraw_t *self)
 /* The speed field of a way since the last set: its magnitude at least speed_least, what does not fit at the field's end. */
 static int64_t speed_of(const canraw_t *self, unsigned k, q32_t travel_q32)
 {
-    const canraw_field_t *field = canraw_find(&self->map->setpoint, CANRAW_SPEED);
+    const canraw_field_t *field = canraw_find_of(&self->map->setpoint, CANRAW_SPEED, self->map->axis[k].setpoint_slot);
     const counts_scale_t *scale = &self->map->axis[k].speed;
     int64_t speed = 0;
     if (field == NULL) {
@@ -172,46 +191,115 @@ static int64_t speed_of(const canraw_t *self, unsigned k, q32_t travel_q32)
     return fx_clamp(field->is_signed && speed < 0 ? -magnitude : magnitude, canraw_field_min(field), canraw_field_max(field));
 }
 
-/* Bytes of a set-point. */
-static hv_status_t pack_setpoint(const canraw_t *self, unsigned k, q32_t setpoint_q32, int64_t *counts,
-                                 uint8_t data[CANRAW_BYTES_MAX])
+static bool is_carried(const canraw_map_t *map, const canraw_axis_map_t *axis, int64_t counts)
 {
-    const canraw_axis_t *axis = &self->axis[k];
-    int64_t value[CANRAW_VALUES] = {0};
-    if (counts_from_units(&self->map->axis[k].scale, setpoint_q32, counts) != HV_OK) {
-        return HV_ERR_RANGE;
-    }
-    value[CANRAW_POSITION] = *counts;
-    value[CANRAW_COUNTER] = axis->counter;
-    value[CANRAW_SPEED] = speed_of(self, k, axis->has_sent ? fx_sub_sat(setpoint_q32, axis->sent_q32) : 0);
-    return canraw_pack(&self->map->setpoint, value, data);
+    const canraw_field_t *field = canraw_find_of(&map->setpoint, CANRAW_POSITION, axis->setpoint_slot);
+    return counts >= canraw_field_min(field) && counts <= canraw_field_max(field);
 }
 
-static hv_status_t send_setpoint(canraw_t *self, unsigned k, q32_t setpoint_q32)
+/* Counts of a set-point that goes out.
+ * Returns false where the drive does not follow, or has stopped because it cannot. */
+static bool find_setpoint(canraw_t *self, unsigned k, q32_t setpoint_q32, int64_t *counts)
 {
+    const canraw_map_t *map = self->map;
+    const canraw_axis_map_t *axis_map = &map->axis[k];
     canraw_axis_t *axis = &self->axis[k];
-    uint8_t data[CANRAW_BYTES_MAX];
-    int64_t counts = 0;
-    canraw_axis_watch(axis, self->map, &self->map->axis[k], setpoint_q32);
-    if (!canraw_axis_is_streaming(axis, self->map)) {
-        return HV_OK;
+    if (!canraw_axis_is_streaming(axis, map)) {
+        return false;
     }
-    if (pack_setpoint(self, k, setpoint_q32, &counts, data) != HV_OK) {
-        const guard_limits_t limits = canraw_axis_limits(axis, &self->map->axis[k]);
+    canraw_axis_watch(axis, map, axis_map, setpoint_q32);
+    if (!canraw_axis_is_streaming(axis, map)) {
+        return false;
+    }
+    if (counts_from_units(&axis_map->scale, setpoint_q32, counts) != HV_OK || !is_carried(map, axis_map, *counts)) {
+        const guard_limits_t limits = canraw_axis_limits(axis, axis_map);
         const drive_guard_t guard = guard_out_of_counts(setpoint_q32, &limits);
-        canraw_axis_fault_of_guard(axis, self->map, &guard);
-        return HV_OK;
+        canraw_axis_fault_of_guard(axis, map, &guard);
+        return false;
     }
-    if (!self->map->is_on_change || !axis->has_sent || counts != axis->sent_counts) {
-        const hv_status_t status = send_bytes(self, k, self->map->setpoint.length, data);
-        if (status != HV_OK) {
-            return status;
+    return true;
+}
+
+/* What a frame of set-points carries for drives that may share it. */
+typedef struct {
+    int64_t value[DRIVES_MAX * CANRAW_VALUES];
+    int64_t counts[DRIVES_MAX];
+    bool is_following[DRIVES_MAX];
+    bool is_any;     /* somebody follows, */
+    bool is_news;    /* and something is other than last time */
+    bool is_unknown; /* where somebody is, who shares it */
+} setpoints_t;
+
+static bool is_shared(const canraw_map_t *map, unsigned a, unsigned b)
+{
+    return map->axis[a].setpoint_id == map->axis[b].setpoint_id;
+}
+
+static void add_setpoint(canraw_t *self, setpoints_t *set, unsigned k, q32_t setpoint_q32)
+{
+    const canraw_axis_map_t *axis_map = &self->map->axis[k];
+    const canraw_field_t *field = canraw_find_of(&self->map->setpoint, CANRAW_POSITION, axis_map->setpoint_slot);
+    const canraw_axis_t *axis = &self->axis[k];
+    const q32_t travel_q32 = axis->has_sent ? fx_sub_sat(setpoint_q32, axis->sent_q32) : 0;
+    int64_t *counts = &set->counts[k];
+    set->is_following[k] = find_setpoint(self, k, setpoint_q32, counts);
+    if (set->is_following[k]) {
+        set->is_any = true;
+        set->is_news |= !self->map->is_on_change || !axis->has_sent || *counts != axis->sent_counts;
+    } else {
+        *counts = fx_clamp(canraw_axis_held(axis, self->map), canraw_field_min(field), canraw_field_max(field));
+        set->is_unknown |= !axis->has_actual || axis->state == DRIVE_HOMING; /* it moves by itself: a set-point would end that */
+    }
+    set->value[canraw_value_at(CANRAW_POSITION, axis_map->setpoint_slot)] = *counts;
+    set->value[canraw_value_at(CANRAW_SPEED, axis_map->setpoint_slot)] = speed_of(self, k, set->is_following[k] ? travel_q32 : 0);
+}
+
+static hv_status_t send_setpoints(canraw_t *self, unsigned first, setpoints_t *set)
+{
+    const canraw_axis_map_t *axis_map = &self->map->axis[first];
+    canraw_axis_t *axis = &self->axis[first];
+    uint32_t *counter = axis_map->setpoint_id == axis_map->command_id ? &axis->counter : &axis->setpoint_counter;
+    uint8_t data[CANRAW_BYTES_MAX];
+    set->value[CANRAW_COUNTER] = *counter;
+    hv_status_t status = canraw_pack(&self->map->setpoint, set->value, data); /* every value is in its range */
+    status = status == HV_OK ? send_bytes(self, axis_map->setpoint_id, self->map->setpoint.length, data) : status;
+    *counter += status == HV_OK;
+    return status;
+}
+
+/* The set-points of a drive, and of those that share its frame. Where one of these was never heard nobody knows what would leave
+ * it where it is, and nothing is sent. */
+static hv_status_t send_frame_of(canraw_t *self, unsigned first, const q32_t setpoint_q32[DRIVES_MAX])
+{
+    setpoints_t set = {.is_any = false};
+    for (unsigned k = first; k < self->map->axes; k++) {
+        if (is_shared(self->map, first, k)) {
+            add_setpoint(self, &set, k, setpoint_q32[k]);
         }
     }
-    axis->sent_counts = counts;
-    axis->sent_q32 = setpoint_q32;
-    axis->has_sent = axis->state == DRIVE_ENABLED;
-    return HV_OK;
+    if (!set.is_any || set.is_unknown) {
+        return HV_OK;
+    }
+    const hv_status_t status = set.is_news ? send_setpoints(self, first, &set) : HV_OK;
+    for (unsigned k = first; k < self->map->axes && status == HV_OK; k++) {
+        canraw_axis_t *axis = &self->axis[k];
+        if (is_shared(self->map, first, k) && set.is_following[k]) {
+            axis->sent_counts = set.counts[k];
+            axis->sent_q32 = setpoint_q32[k];
+            axis->has_sent = axis->state == DRIVE_ENABLED;
+        }
+    }
+    return status;
+}
+
+static bool is_first(const canraw_map_t *map, unsigned k)
+{
+    for (unsigned i = 0; i < k; i++) {
+        if (is_shared(map, i, k)) {
+            return false;
+        }
+    }
+    return true;
 }
 
 /* A set that breaks off is offered again as a whole: the same set-point twice moves nothing. */
@@ -219,8 +307,7 @@ static hv_status_t send_set(canraw_t *self, const q32_t setpoint_q32[DRIVES_MAX]
 {
     send_commands(self, CANRAW_RESET);
     for (unsigned k = 0; k < self->map->axes; k++) {
-        const bool is_streaming = canraw_axis_is_streaming(&self->axis[k], self->map);
-        const hv_status_t status = is_streaming ? send_setpoint(self, k, setpoint_q32[k]) : HV_OK;
+        const hv_status_t status = is_first(self->map, k) ? send_frame_of(self, k, setpoint_q32) : HV_OK;
         if (status != HV_OK) {
             return status;
         }
@@ -256,6 +343,9 @@ static hv_status_t canraw_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
             canraw_axis_note_off(&self->axis[k], self->map);
         }
         canraw_axis_report(&self->axis[k], &feedback[k]);
+    }
+    if (!self->is_gone && self->is_free) {
+        send_steps(self);
     }
     /* send asks once per period; where nobody calls it, or nobody answers, this does */
     if (!self->is_gone && self->is_free && now_us - self->query_us >= 2u * (uint64_t)self->map->period_us) {
@@ -304,23 +394,52 @@ static bool is_allowed(const canraw_t *self, drives_request_t request)
     return true;
 }
 
+/* It was lost under torque, for its status or in its start-up, and is there. */
+static bool is_lost_and_heard(const canraw_t *self, unsigned k)
+{
+    const canraw_axis_t *axis = &self->axis[k];
+    const uint64_t silent_us = (uint64_t)self->map->offline_periods * self->map->period_us;
+    return !axis->is_online && axis->is_energized && self->now_us - axis->heard_us <= silent_us;
+}
+
+/* Whether a request is for it: what takes torque away is for those that are lost and can hear, too. */
+static bool is_told(const canraw_t *self, unsigned k, drives_request_t request)
+{
+    const bool is_end = request == DRIVES_DISABLE || request == DRIVES_QUICK_STOP;
+    return self->axis[k].is_online || (is_end && is_lost_and_heard(self, k));
+}
+
 /* What stops drives goes out at once, past the gate: after the last set-point there may be no other chance. */
 static hv_status_t canraw_request(void *ctx, drives_request_t request)
 {
     canraw_t *self = ctx;
-    if (self->is_gone || !is_any_online(self)) {
+    bool is_any = false;
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        is_any |= is_told(self, k, request);
+    }
+    if (self->is_gone || !is_any) {
         return HV_ERR_IO;
     }
     if (!is_allowed(self, request)) {
         return HV_ERR_STATE;
     }
     for (unsigned k = 0; k < self->map->axes; k++) {
-        if (self->axis[k].is_online) {
+        if (is_told(self, k, request)) {
             canraw_axis_request(&self->axis[k], self->map, request, self->now_us);
         }
     }
     send_commands(self, CANRAW_RESET);
     return HV_OK;
+}
+
+/* Set-points are the word for torque, and others get the same frame. */
+static bool would_enable_others(const canraw_map_t *map, unsigned k)
+{
+    bool has_others = !is_first(map, k);
+    for (unsigned i = k + 1u; i < map->axes; i++) {
+        has_others |= is_shared(map, i, k);
+    }
+    return has_others && map->command[CANRAW_ENABLE].length == 0;
 }
 
 static hv_status_t canraw_request_one(void *ctx, uint8_t k, drives_request_t request)
@@ -329,11 +448,15 @@ static hv_status_t canraw_request_one(void *ctx, uint8_t k, drives_request_t req
     if (self->is_gone || !is_any_online(self)) {
         return HV_ERR_IO;
     }
-    if (!is_axis_allowed(self, k, request)) {
+    if (!is_axis_allowed(self, k, request) || (request == DRIVES_ENABLE && would_enable_others(self->map, k))) {
         return HV_ERR_STATE;
     }
-    if (self->axis[k].is_online) {
-        canraw_axis_request(&self->axis[k], self->map, request, self->now_us);
+    const bool is_end = request == DRIVES_DISABLE || request == DRIVES_QUICK_STOP;
+    for (unsigned i = 0; i < self->map->axes; i++) { /* the next set-point of another would give it its torque again */
+        const bool goes_along = is_end && is_shared(self->map, i, k) && would_enable_others(self->map, k);
+        if (self->axis[i].is_online && (i == k || goes_along)) {
+            canraw_axis_request(&self->axis[i], self->map, request, self->now_us);
+        }
     }
     send_commands(self, CANRAW_RESET);
     return HV_OK;
@@ -360,9 +483,15 @@ static bool canraw_is_failing(void *ctx)
     return self->passive.is_failing;
 }
 
+static void canraw_report(void *ctx, uint8_t k, drive_report_t *out)
+{
+    const canraw_t *self = ctx;
+    canraw_axis_words(&self->axis[k], self->map, k, self->now_us, out);
+}
+
 drives_t canraw_hal(canraw_t *self)
 {
-    static const drives_ops_t k_ops = {canraw_poll, canraw_send,       canraw_request,     canraw_count,
-                                       NULL,        canraw_is_failing, canraw_request_one, canraw_counts};
+    static const drives_ops_t k_ops = {canraw_poll,       canraw_send,        canraw_request, canraw_count, canraw_report,
+                                       canraw_is_failing, canraw_request_one, canraw_counts,  NULL,         NULL};
     return (drives_t){&k_ops, self};
 }

@@ -3,6 +3,8 @@
  */
 #include "canraw_axis.h"
 
+#include "canraw_startup.h"
+
 #include <string.h>
 
 #define RESET_US        1000000u /* after a reset, the drive has so long to take its fault back */
@@ -39,8 +41,17 @@ void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map)
     self->is_homed = !has(map, CANRAW_HOME);
     self->is_energized = was.is_energized;
     self->counter = was.counter;
-    self->has_counter = was.has_counter; /* one that has stood still is not heard again by losing it */
-    self->counter_in = was.counter_in;
+    self->setpoint_counter = was.setpoint_counter;
+    for (unsigned i = 0; i < 2; i++) { /* one that has stood still is not heard again by losing it */
+        self->has_counter[i] = was.has_counter[i];
+        self->counter_in[i] = was.counter_in[i];
+    }
+    self->failed_step = was.failed_step;
+    self->trouble = was.trouble;
+    self->trouble_us = was.trouble_us;
+    self->heard_us = was.heard_us;
+    self->phase = was.phase;
+    self->phase_us = was.phase_us;
     self->has_actual = was.has_actual;
     self->counts = was.counts;
     self->actual_q32 = was.actual_q32;
@@ -101,12 +112,15 @@ static void take_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t st
     }
 }
 
-/* The status of a position reply; the field is there where the map judges by it. */
-static void take_status(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint32_t code, uint64_t now_us)
+/* The status of a reply that tells it; the field is there where the map judges by it. */
+static void take_status(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint64_t now_us)
 {
     self->status = status;
+    if (is_when(map->enabled_when, status)) {
+        self->is_energized = has(map, CANRAW_DISABLE); /* whatever it was told */
+    }
     if (map->fault_when.mask != 0) {
-        take_fault(self, map, status, code);
+        take_fault(self, map, status, self->told_code);
     }
     if (map->homing_query.length == 0 && has(map, CANRAW_HOME)) {
         take_homing(self, map, status, now_us);
@@ -116,44 +130,93 @@ static void take_status(canraw_axis_t *self, const canraw_map_t *map, uint32_t s
     }
 }
 
-/* A drive whose counter stands still repeats what it said last, whatever has become of it. */
-static bool is_repeated(canraw_axis_t *self, const canraw_map_t *map, const uint8_t *data)
+static void note_trouble(canraw_axis_t *self, canraw_verdict_t trouble, uint64_t now_us)
 {
-    const canraw_field_t *counter = canraw_find(&map->position_reply, CANRAW_COUNTER);
+    self->trouble = trouble;
+    self->trouble_us = now_us;
+}
+
+/* A drive whose counter stands still repeats what it said last, whatever has become of it. */
+static bool is_repeated(canraw_axis_t *self, unsigned which, const canraw_frame_t *frame, const uint8_t *data, uint64_t now_us)
+{
+    const canraw_field_t *counter = canraw_find(frame, CANRAW_COUNTER);
     if (counter == NULL) {
         return false;
     }
     const uint32_t found = (uint32_t)canraw_extract(counter, data);
-    const bool is_same = self->has_counter && found == self->counter_in;
-    self->has_counter = true;
-    self->counter_in = found;
+    const bool is_same = self->has_counter[which] && found == self->counter_in[which];
+    self->has_counter[which] = true;
+    self->counter_in[which] = found;
+    if (is_same) {
+        note_trouble(self, CANRAW_REPEATED, now_us);
+    }
     return is_same;
 }
 
-static bool take_position(canraw_axis_t *self, const canraw_map_t *map, const counts_scale_t *scale, const uint8_t *data,
-                          uint64_t now_us)
+/* What any reply may tell beside its own. */
+static void take_beside(canraw_axis_t *self, const canraw_frame_t *frame, unsigned slot, const uint8_t *data, uint64_t now_us)
 {
-    const canraw_field_t *position = canraw_find(&map->position_reply, CANRAW_POSITION);
-    const canraw_field_t *status = canraw_find(&map->position_reply, CANRAW_STATUS);
-    const canraw_field_t *fault = canraw_find(&map->position_reply, CANRAW_FAULT);
-    if (is_repeated(self, map, data)) {
-        return false;
+    const canraw_field_t *fault = canraw_find_of(frame, CANRAW_FAULT, slot);
+    const canraw_field_t *torque = canraw_find_of(frame, CANRAW_TORQUE, slot);
+    if (fault != NULL) {
+        self->told_code = (uint32_t)canraw_extract(fault, data);
     }
-    const int64_t counts = canraw_extract(position, data);
-    if (counts_to_units(scale, counts, &self->actual_q32) != HV_OK) {
-        return false;
+    if (torque != NULL) {
+        self->torque = canraw_extract(torque, data);
+        self->has_torque = true;
+        self->torque_us = now_us;
     }
-    self->counts = counts;
-    if (!self->is_online && self->is_energized) { /* lost under torque, and what stopped the others may not have reached it */
+}
+
+/* It is there once it has been started up, and all that it has to tell has come since. */
+static void note_online(canraw_axis_t *self, const canraw_map_t *map)
+{
+    if (self->is_online || !self->is_placed || !canraw_startup_is_over(self, map) ||
+        (map->status_reply.length != 0 && !self->has_status)) {
+        return;
+    }
+    if (self->is_energized) { /* lost under torque, and what stopped the others may not have reached it */
         tell(self, map, CANRAW_DISABLE);
     }
     self->is_online = true;
+}
+
+static bool take_position(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const uint8_t *data,
+                          uint64_t now_us)
+{
+    const canraw_frame_t *reply = &map->position_reply;
+    const canraw_field_t *status = canraw_find_of(reply, CANRAW_STATUS, axis->reply_slot);
+    if (is_repeated(self, 0, reply, data, now_us)) {
+        return false;
+    }
+    const int64_t counts = canraw_extract(canraw_find_of(reply, CANRAW_POSITION, axis->reply_slot), data);
+    if (counts_to_units(&axis->scale, counts, &self->actual_q32) != HV_OK) {
+        note_trouble(self, CANRAW_BAD_NUMBER, now_us);
+        return false;
+    }
+    self->counts = counts;
+    self->is_placed = true;
     self->has_actual = true;
     self->actual_us = now_us;
-    if (status != NULL) {
-        const uint32_t code = fault != NULL ? (uint32_t)canraw_extract(fault, data) : 0;
-        take_status(self, map, (uint32_t)canraw_extract(status, data), code, now_us);
+    take_beside(self, reply, axis->reply_slot, data, now_us);
+    note_online(self, map);
+    if (status != NULL && map->status_reply.length == 0) {
+        take_status(self, map, (uint32_t)canraw_extract(status, data), now_us);
     }
+    return true;
+}
+
+static bool take_status_reply(canraw_axis_t *self, const canraw_map_t *map, unsigned slot, const uint8_t *data, uint64_t now_us)
+{
+    const canraw_frame_t *reply = &map->status_reply;
+    if (is_repeated(self, 1, reply, data, now_us)) {
+        return false;
+    }
+    self->has_status = true;
+    self->status_us = now_us;
+    take_beside(self, reply, slot, data, now_us);
+    note_online(self, map);
+    take_status(self, map, (uint32_t)canraw_extract(canraw_find_of(reply, CANRAW_STATUS, slot), data), now_us);
     return true;
 }
 
@@ -163,46 +226,85 @@ static bool is_expected(const canraw_axis_t *self, const canraw_map_t *map, canr
     return self->asked == asked || !canraw_is_ambiguous(&map->position_reply, &map->homing_reply);
 }
 
-bool canraw_axis_receive(canraw_axis_t *self, const canraw_map_t *map, const counts_scale_t *scale, const can_frame_t *frame,
-                         uint64_t now_us)
+static canraw_verdict_t nearer(canraw_verdict_t a, canraw_verdict_t b)
 {
-    if (canraw_matches(&map->homing_reply, frame->data, frame->length) && is_expected(self, map, CANRAW_ASKED_HOMING)) {
-        const canraw_field_t *status = canraw_find(&map->homing_reply, CANRAW_STATUS);
+    return a > b ? a : b;
+}
+
+/* A frame on its reply_id. Returns false where it is none, and how near it comes. */
+static bool take_reply(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const can_frame_t *frame,
+                       canraw_verdict_t *verdict, uint64_t now_us)
+{
+    const canraw_verdict_t homing = canraw_judge(&map->homing_reply, frame->data, frame->length);
+    const canraw_verdict_t position = canraw_judge(&map->position_reply, frame->data, frame->length);
+    if (homing == CANRAW_MATCH && is_expected(self, map, CANRAW_ASKED_HOMING)) {
+        const canraw_field_t *status = canraw_find_of(&map->homing_reply, CANRAW_STATUS, axis->reply_slot);
         self->asked = CANRAW_ASKED_NOTHING;
         take_homing(self, map, (uint32_t)canraw_extract(status, frame->data), now_us);
         return true;
     }
-    if (canraw_matches(&map->position_reply, frame->data, frame->length) && is_expected(self, map, CANRAW_ASKED_POSITION)) {
+    if (position == CANRAW_MATCH && is_expected(self, map, CANRAW_ASKED_POSITION)) {
         self->asked = CANRAW_ASKED_NOTHING;
-        return take_position(self, map, scale, frame->data, now_us);
+        *verdict = CANRAW_MATCH; /* what is wrong with it then is noted there */
+        return take_position(self, map, axis, frame->data, now_us);
+    }
+    const bool is_late = homing == CANRAW_MATCH || position == CANRAW_MATCH;
+    *verdict = is_late ? CANRAW_MATCH : nearer(*verdict, nearer(homing, position));
+    return false;
+}
+
+bool canraw_axis_receive(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const can_frame_t *frame,
+                         uint64_t now_us)
+{
+    canraw_verdict_t verdict = CANRAW_OTHER;
+    self->heard_us = now_us;
+    if (canraw_startup_take(self, map, axis, frame, now_us)) {
+        return true;
+    }
+    if (map->status_reply.length != 0 && frame->id == axis->status_id) {
+        verdict = canraw_judge(&map->status_reply, frame->data, frame->length);
+        if (verdict == CANRAW_MATCH) {
+            return take_status_reply(self, map, axis->status_slot, frame->data, now_us);
+        }
+    }
+    if (frame->id == axis->reply_id && take_reply(self, map, axis, frame, &verdict, now_us)) {
+        return true;
+    }
+    if (verdict != CANRAW_MATCH) {
+        note_trouble(self, verdict, now_us);
     }
     return false;
 }
 
 /* --- Time --- */
 
-/* A position has come since the request and since the command went out. */
-static bool is_heard(const canraw_axis_t *self)
+/* A position has come since the request and since the command went out; and a status, where it comes apart. */
+static bool is_heard(const canraw_axis_t *self, const canraw_map_t *map)
 {
-    return self->pending == CANRAW_NOTHING && self->actual_us > self->mark_us && self->actual_us > self->told_us;
+    const uint64_t since_us = self->mark_us > self->told_us ? self->mark_us : self->told_us;
+    const bool is_status = map->status_reply.length == 0 || self->status_us > since_us;
+    return self->pending == CANRAW_NOTHING && self->actual_us > since_us && is_status;
 }
 
 static bool is_enabled(const canraw_axis_t *self, const canraw_map_t *map)
 {
-    return is_heard(self) && (map->enabled_when.mask == 0 || is_when(map->enabled_when, self->status));
+    return is_heard(self, map) && (map->enabled_when.mask == 0 || is_when(map->enabled_when, self->status));
 }
 
 void canraw_axis_note_off(canraw_axis_t *self, const canraw_map_t *map)
 {
     const bool is_down = self->state == DRIVE_DISABLED || self->state == DRIVE_FAULT;
-    if (self->is_online && is_down && is_heard(self) && !is_when(map->enabled_when, self->status)) {
+    if (self->is_online && is_down && is_heard(self, map) && !is_when(map->enabled_when, self->status)) {
         self->is_energized = false;
     }
 }
 
 void canraw_axis_step(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
 {
-    if (self->is_online && now_us - self->actual_us > (uint64_t)map->offline_periods * map->period_us) {
+    const uint64_t silent_us = (uint64_t)map->offline_periods * map->period_us;
+    const bool is_position_old = self->is_placed && now_us - self->actual_us > silent_us;
+    const bool is_status_old = self->has_status && now_us - self->status_us > silent_us * map->status_every;
+    if (is_position_old || is_status_old) {
         canraw_axis_lose(self, map);
     }
     if (self->reset_until_us != 0 && now_us > self->reset_until_us) {
@@ -217,6 +319,9 @@ void canraw_axis_step(canraw_axis_t *self, const canraw_map_t *map, uint64_t now
         self->is_homed = true;
         self->has_sent = false;
     }
+    const uint8_t phase = (uint8_t)(self->is_online ? self->state : DRIVE_OFFLINE);
+    self->phase_us = phase == self->phase && self->phase_us != 0 ? self->phase_us : now_us;
+    self->phase = phase;
 }
 
 /* --- Requests --- */
@@ -288,6 +393,13 @@ bool canraw_axis_is_streaming(const canraw_axis_t *self, const canraw_map_t *map
 {
     const bool is_early = has(map, CANRAW_ENABLE) || map->enabled_when.mask != 0;
     return self->is_online && (self->state == DRIVE_ENABLED || (self->state == DRIVE_ENABLING && is_early));
+}
+
+int64_t canraw_axis_held(const canraw_axis_t *self, const canraw_map_t *map)
+{
+    const bool is_told_off = map->enabled_when.mask != 0 && !is_when(map->enabled_when, self->status);
+    const bool is_off = is_told_off || (has(map, CANRAW_DISABLE) && !self->is_energized);
+    return self->has_sent && !is_off ? self->sent_counts : self->counts;
 }
 
 guard_limits_t canraw_axis_limits(const canraw_axis_t *self, const canraw_axis_map_t *axis)

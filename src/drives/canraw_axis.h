@@ -13,7 +13,7 @@ void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map);
 
 /** Takes a frame on its reply_id in.
  *  @return false where it means nothing here */
-bool canraw_axis_receive(canraw_axis_t *self, const canraw_map_t *map, const counts_scale_t *scale, const can_frame_t *frame,
+bool canraw_axis_receive(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const can_frame_t *frame,
                          uint64_t now_us);
 
 /** What follows from the time and all that has been received. Once per poll. */
@@ -28,6 +28,10 @@ void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_re
 
 /** Whether set-points go out. */
 bool canraw_axis_is_streaming(const canraw_axis_t *self, const canraw_map_t *map);
+
+/** Counts that leave it where it is, in a frame for others that follow. One that may have torque keeps its last set-point: led to
+ *  where it is, it would creep under load. */
+int64_t canraw_axis_held(const canraw_axis_t *self, const canraw_map_t *map);
 
 /** Stops following where a set-point is too far away. */
 void canraw_axis_watch(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, q32_t setpoint_q32);
@@ -45,5 +49,8 @@ guard_limits_t canraw_axis_limits(const canraw_axis_t *self, const canraw_axis_m
 canraw_asked_t canraw_axis_next_query(canraw_axis_t *self, const canraw_map_t *map);
 
 void canraw_axis_report(const canraw_axis_t *self, drive_feedback_t *feedback);
+
+/** Drive k in words. */
+void canraw_axis_words(const canraw_axis_t *self, const canraw_map_t *map, unsigned k, uint64_t now_us, drive_report_t *out);
 
 #endif

@@ -16,7 +16,7 @@ static int64_t halve_to_nearest(int64_t doubled)
 hv_status_t counts_from_units(const counts_scale_t *self, q32_t units_q32, int64_t *counts)
 {
     const int64_t doubled = fx_mul_div(units_q32, 2 * (int64_t)self->num, self->den * Q32_PER_UNIT);
-    if (doubled == INT64_MAX) { /* nothing comes as low as INT64_MIN: what would is a product of two that are positive */
+    if (doubled == INT64_MAX || doubled == INT64_MIN) {
         return HV_ERR_RANGE;
     }
     const int64_t sum = halve_to_nearest(doubled) + self->zero;

@@ -304,7 +304,7 @@ bool modbus_drive_is_told(const modbus_drive_t *self)
 
 drives_t modbus_drive_hal(modbus_drive_t *self)
 {
-    static const drives_ops_t k_ops = {drive_poll,   drive_send, drive_request,     drive_count,
-                                       drive_report, NULL,       drive_request_one, drive_counts};
+    static const drives_ops_t k_ops = {drive_poll, drive_send,        drive_request, drive_count, drive_report,
+                                       NULL,       drive_request_one, drive_counts,  NULL,        NULL};
     return (drives_t){&k_ops, self};
 }

@@ -22,6 +22,21 @@ static void put_object(text_t *text, bool is_register, uint32_t object)
     text_put_hex(text, object & 0xFFu, 2);
 }
 
+static void put_address(text_t *text, const drive_report_t *report)
+{
+    if (report->identifier != 0) {
+        text_put(text, ", identifier 0x");
+        text_put_hex(text, report->identifier, 1);
+        return;
+    }
+    text_put(text, report->is_modbus ? ", unit " : ", node ");
+    text_put_u32(text, report->address);
+    if (report->channel != 0) {
+        text_put(text, ".");
+        text_put_u32(text, report->channel);
+    }
+}
+
 static void put_detail(text_t *text, const drive_report_t *report)
 {
     if (report->detail[0] != '\0') {
@@ -46,8 +61,7 @@ static void log_report(hal_log_t log, unsigned axis, const drive_report_t *repor
     text_t text = text_start(line, sizeof line);
     text_put(&text, "axis ");
     text_put_u32(&text, axis + 1u);
-    text_put(&text, report->is_modbus ? ", unit " : ", node ");
-    text_put_u32(&text, report->address);
+    put_address(&text, report);
     text_put(&text, ", ");
     text_put(&text, report->phase);
     if (report->trouble[0] != '\0') {
@@ -76,8 +90,7 @@ static void log_notes(hal_log_t log, unsigned axis, const drive_report_t *report
     const char *before = " ";
     text_put(&text, "axis ");
     text_put_u32(&text, axis + 1u);
-    text_put(&text, ", node ");
-    text_put_u32(&text, report->address);
+    put_address(&text, report);
     text_put(&text, report->notes != 0 ? ":" : ": nothing to tell of any more");
     for (unsigned i = 0; i < DRIVE_NOTES; i++) {
         if ((report->notes >> i & 1u) != 0) {
@@ -102,8 +115,7 @@ static void log_emergency(reports_t *self, hal_log_t log, unsigned axis, const d
     }
     text_put(&text, "axis ");
     text_put_u32(&text, axis + 1u);
-    text_put(&text, ", node ");
-    text_put_u32(&text, report->address);
+    put_address(&text, report);
     text_put(&text, ": error 0x");
     text_put_hex(&text, emergency->code, 4);
     text_put(&text, ", ");

@@ -76,11 +76,21 @@ static void stop_homing(gateway_t *self)
     own->homing = 0;
 }
 
+static bool is_signal(service_verb_t verb)
+{
+    return verb == SERVICE_SIGNAL_AXIS || verb == SERVICE_SIGNAL_POSE;
+}
+
+static bool moves_by_hand(service_verb_t verb)
+{
+    return verb == SERVICE_JOG_AXIS || verb == SERVICE_JOG_POSE || is_signal(verb);
+}
+
 void service_let_go(gateway_t *self)
 {
     service_t *own = &self->service;
     deadman_release(&own->hand);
-    if (own->doing == SERVICE_JOG_AXIS || own->doing == SERVICE_JOG_POSE) {
+    if (moves_by_hand(own->doing)) {
         motion_stop(&self->motion);
     } else if (own->doing == SERVICE_HOME) {
         stop_homing(self);
@@ -166,8 +176,13 @@ fault_code_t service_step(gateway_t *self, uint64_t now_us)
         }
     }
     place_loose(self);
-    if (own->doing == SERVICE_HOME && own->homing == 0) {
+    if (moves_by_hand(own->doing) && motion_is_stopping(&self->motion)) {
+        service_let_go(self); /* motion stopped what led astray: that is no end of its own */
+    }
+    if ((own->doing == SERVICE_HOME && own->homing == 0) ||
+        (own->has_end && moves_by_hand(own->doing) && motion_is_done(&self->motion))) {
         own->doing = SERVICE_NOTHING;
+        own->finished = own->hand.series;
         deadman_release(&own->hand);
     }
     return is_in_time ? FAULT_NONE : FAULT_DRIVE_TIMEOUT;
@@ -188,6 +203,7 @@ void service_publish(gateway_t *self)
     view->axis = own->axis;
     view->is_held = own->hand.is_held;
     view->series = own->hand.series;
+    view->finished = own->finished;
     view->torque = own->up;
     view->homing = own->homing;
     view->has_counts = 0;
@@ -250,11 +266,22 @@ static bool are_up(const gateway_t *self, uint32_t axes)
 /* Of a jog. */
 static service_answer_t answer_of(hv_status_t status)
 {
-    return status == HV_OK          ? SERVICE_DONE
-           : status == HV_ERR_RANGE ? SERVICE_AT_END
-           : status == HV_ERR_NOSUP ? SERVICE_NO_SUCH
-           : status == HV_ERR_ARG   ? SERVICE_NO_POSE
-                                    : SERVICE_BUSY;
+    return status == HV_OK           ? SERVICE_DONE
+           : status == HV_ERR_RANGE  ? SERVICE_AT_END
+           : status == HV_ERR_NOSUP  ? SERVICE_NO_SUCH
+           : status == HV_ERR_ARG    ? SERVICE_NO_POSE
+           : status == HV_ERR_FORMAT ? SERVICE_TOO_WIDE
+                                     : SERVICE_BUSY;
+}
+
+static bool are_homed(const gateway_t *self, uint32_t axes)
+{
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        if ((axes >> i & 1u) != 0 && !self->snapshot.drive[i].is_homed) {
+            return false;
+        }
+    }
+    return true;
 }
 
 static service_answer_t jog_axis(gateway_t *self, const service_request_t *request)
@@ -266,7 +293,7 @@ static service_answer_t jog_axis(gateway_t *self, const service_request_t *reque
     if (!are_up(self, axes)) {
         return SERVICE_NO_TORQUE;
     }
-    return answer_of(motion_jog_axis(&self->motion, motion_axis(self, request->axis - 1u), request->speed_q16));
+    return answer_of(motion_jog_axis(&self->motion, motion_axis(self, request->axis - 1u), request->speed_q16, request->way_q16));
 }
 
 static service_answer_t jog_pose(gateway_t *self, const service_request_t *request)
@@ -278,12 +305,33 @@ static service_answer_t jog_pose(gateway_t *self, const service_request_t *reque
     if (!are_up(self, (1u << cylinders) - 1u)) {
         return SERVICE_NO_TORQUE;
     }
-    for (unsigned i = 0; i < cylinders; i++) {
-        if (!self->snapshot.drive[i].is_homed) {
-            return SERVICE_NOT_HOMED;
-        }
+    if (!are_homed(self, (1u << cylinders) - 1u)) {
+        return SERVICE_NOT_HOMED;
     }
-    return answer_of(motion_jog_pose(&self->motion, request->axis - 1u, request->speed_q16));
+    return answer_of(motion_jog_pose(&self->motion, request->axis - 1u, request->speed_q16, request->way_q16));
+}
+
+/* A signal goes by where things are, so its drives have found their zero. */
+static service_answer_t excite(gateway_t *self, const service_request_t *request)
+{
+    const bool is_posed = request->verb == SERVICE_SIGNAL_POSE;
+    const uint32_t axes = is_posed                       ? (1u << self->snapshot.cylinders) - 1u
+                          : request->axis != SERVICE_ALL ? named(self, request->axis)
+                                                         : 0;
+    if (axes == 0 || (is_posed && (request->axis < 1 || request->axis > POSE_AXES))) {
+        return SERVICE_NO_SUCH;
+    }
+    if (!excitation_is_allowed(&request->signal, self->settings.cycle_us)) {
+        return SERVICE_BAD_SIGNAL;
+    }
+    if (!are_up(self, axes)) {
+        return SERVICE_NO_TORQUE;
+    }
+    if (!are_homed(self, axes)) {
+        return SERVICE_NOT_HOMED;
+    }
+    return answer_of(is_posed ? motion_excite_pose(&self->motion, request->axis - 1u, &request->signal)
+                              : motion_excite_axis(&self->motion, motion_axis(self, request->axis - 1u), &request->signal));
 }
 
 static service_answer_t home(gateway_t *self, const service_request_t *request, uint64_t now_us)
@@ -329,6 +377,9 @@ static service_answer_t start(gateway_t *self, const service_request_t *request,
         return home(self, request, now_us);
     case SERVICE_RELAY:
         return take_relay(self, request->axis);
+    case SERVICE_SIGNAL_AXIS:
+    case SERVICE_SIGNAL_POSE:
+        return excite(self, request);
     case SERVICE_NOTHING:
     case SERVICE_TORQUE_ON:
     case SERVICE_TORQUE_OFF:
@@ -364,6 +415,7 @@ static service_answer_t hold(gateway_t *self, const service_request_t *request, 
     if (answer == SERVICE_DONE) {
         own->hand = hand;
         own->doing = request->verb;
+        own->has_end = is_signal(request->verb) || request->way_q16 > 0;
         own->axis = request->axis;
     }
     return answer;
@@ -400,6 +452,8 @@ service_answer_t gateway_service(gateway_t *self, const service_request_t *reque
     case SERVICE_JOG_POSE:
     case SERVICE_HOME:
     case SERVICE_RELAY:
+    case SERVICE_SIGNAL_AXIS:
+    case SERVICE_SIGNAL_POSE:
         break;
     }
     return SERVICE_NO_SUCH;
@@ -409,63 +463,9 @@ bool service_is_sane(const service_t *saved, const service_t *prepared, unsigned
 {
     const uint32_t none = ~((1u << drives) - 1u);
     (void)prepared;
-    return deadman_is_sane(&saved->hand) && (unsigned)saved->doing < SERVICE_VERBS &&
+    return deadman_is_sane(&saved->hand) && sane_bool(&saved->has_end) && (unsigned)saved->doing < SERVICE_VERBS &&
            (saved->doing == SERVICE_NOTHING || service_is_held(saved->doing)) &&
            (saved->doing != SERVICE_RELAY || (saved->axis >= 1 && saved->axis <= HAL_RELAYS_MAX)) &&
            ((saved->wanted | saved->up | saved->homing | saved->off_due | saved->stop_due) & none) == 0 &&
            sane_time(saved->late_us);
-}
-
-/* --- Words --- */
-
-const char *service_answer_text(service_answer_t answer)
-{
-    static const char *const k_texts[SERVICE_ANSWERS] = {
-        [SERVICE_DONE] = "",
-        [SERVICE_NOT_SERVING] = "this is possible in SERVICE only: `service` enters it from OFF or SETTLED",
-        [SERVICE_STALE] = "the tick is older than 250 ms: echo the newest one",
-        [SERVICE_OVER] = "the hand was away for 250 ms, or this series is not the one that is held: press again",
-        [SERVICE_KNOWN] = "not newer than the last one: count upwards",
-        [SERVICE_BUSY] = "something is held or moves: let go of it first",
-        [SERVICE_NO_SUCH] = "this platform has no such drive, axis or relay",
-        [SERVICE_NO_TORQUE] = "a drive has no torque: `torque` switches it on",
-        [SERVICE_NOT_HOMED] = "a cylinder has not found its zero: `home` first",
-        [SERVICE_AT_END] = "there is no way left in that direction, or the speed is too low to count",
-        [SERVICE_NO_POSE] = "no pose belongs to where the cylinders are: jog them one by one",
-        [SERVICE_TOGETHER] = "this bus does that to all drives together only: `all`",
-        [SERVICE_NOT_TAKEN] = "the drives do not take it now: try again",
-        [SERVICE_PULSE] = "that relay carries the healthy pulse: nobody switches it",
-    };
-    return (unsigned)answer < SERVICE_ANSWERS ? k_texts[answer] : "?";
-}
-
-const char *service_answer_name(service_answer_t answer)
-{
-    static const char *const k_names[SERVICE_ANSWERS] = {
-        [SERVICE_DONE] = "",
-        [SERVICE_NOT_SERVING] = "not-serving",
-        [SERVICE_STALE] = "stale",
-        [SERVICE_OVER] = "over",
-        [SERVICE_KNOWN] = "known",
-        [SERVICE_BUSY] = "busy",
-        [SERVICE_NO_SUCH] = "no-such",
-        [SERVICE_NO_TORQUE] = "no-torque",
-        [SERVICE_NOT_HOMED] = "not-homed",
-        [SERVICE_AT_END] = "at-end",
-        [SERVICE_NO_POSE] = "no-pose",
-        [SERVICE_TOGETHER] = "together",
-        [SERVICE_NOT_TAKEN] = "not-taken",
-        [SERVICE_PULSE] = "pulse",
-    };
-    return (unsigned)answer < SERVICE_ANSWERS ? k_names[answer] : "?";
-}
-
-const char *service_verb_name(service_verb_t verb)
-{
-    static const char *const k_names[SERVICE_VERBS] = {
-        [SERVICE_NOTHING] = "nothing", [SERVICE_TORQUE_ON] = "torque", [SERVICE_TORQUE_OFF] = "torque",
-        [SERVICE_JOG_AXIS] = "jog",    [SERVICE_JOG_POSE] = "jog",     [SERVICE_HOME] = "home",
-        [SERVICE_RELAY] = "relay",     [SERVICE_BEAT] = "beat",        [SERVICE_RELEASE] = "release",
-    };
-    return (unsigned)verb < SERVICE_VERBS ? k_names[verb] : "?";
 }

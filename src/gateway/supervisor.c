@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT
- * supervisor.c - the table of states: one row per transition, the first row that matches wins, no row means stay and count.
- * Owns the state, its goal and the counters; never moves anything itself.
+ * supervisor.c - the table of states: one row per transition, and the first row that matches counts. Without
+ * such a row the state stays, and the event is counted. Owns the state, its goal and the counters; never moves anything itself.
  *
- * How to read it. The goal is where the platform is to end up, and it goes there by itself, one state at a time. Only ENGAGE
- * brings it up from below. Silence of the sender may stop it, send it to neutral or settle it, and a frame brings back only what
- * silence took: it never releases an operator's hold and never raises a platform that has begun to settle. SERVICE has no way up:
- * it ends in OFF, which only ENGAGE and PARK leave then.
+ * How to read it. The goal is the state in which the platform is to end. The platform goes there by itself, one state at a
+ * time. Only ENGAGE makes it rise. If the sender is silent, the platform may hold, go to neutral or settle. The next frame
+ * undoes only what silence has caused: it never releases an operator's hold and never raises a platform that has begun to
+ * settle. SERVICE leads only to OFF, and after it only ENGAGE and PARK lead out of OFF.
  */
 #include "heave/supervisor.h"
 
@@ -14,7 +14,8 @@
 /** What must be true for a row to match. */
 typedef enum {
     ALWAYS,
-    COMES_UP_SETTLED, /**< the drives stand at the settled extension, and nobody has asked for OFF: they may still be going off */
+    COMES_UP_SETTLED, /**< the drives stand at the settled extension, and the goal is not OFF (else they may still be switching
+                         off) */
     GOAL_OFF,
     GOAL_UP, /**< NEUTRAL or ENGAGED */
     GOAL_ENGAGED,
@@ -36,7 +37,7 @@ typedef enum { SAME, SET, CLEAR } mark_t;
 #define STAY STATES /* to: the state it is in */
 #define KEEP STATES /* goal: as it was */
 
-/** A row, in bytes: an enumeration may take four. */
+/** A row. Its members are bytes, because an enumeration may take four. */
 typedef struct {
     uint8_t from;       /**< state_t */
     uint8_t event;      /**< event_t */
@@ -51,7 +52,7 @@ typedef struct {
 static const row_t k_rows[] = {
     /* from          event                  guard             to              goal           silence action          */
 
-    /* latching: from everywhere, entered once */
+    /* latching: entered once, from every state */
     {STATE_ESTOP,    EVENT_ESTOP,           ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
     {ANY,            EVENT_ESTOP,           ALWAYS,           STATE_ESTOP,    KEEP,           CLEAR, ACTION_ESTOP},
     {STATE_ESTOP,    EVENT_FAULT,           ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
@@ -138,7 +139,7 @@ static const row_t k_rows[] = {
     {STATE_SERVICE,  EVENT_HOLD,            ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
     {STATE_SERVICE,  EVENT_SHUTDOWN,        ALWAYS,           STATE_OFF,      STATE_OFF,      CLEAR, ACTION_OFF},
 
-    /* levels that no row above takes: expected, not counted */
+    /* levels that match no row above are expected, and not counted */
     {ANY,            EVENT_DRIVES_READY,    ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
     {ANY,            EVENT_TICK,            ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},
     {ANY,            EVENT_SILENCE_HOLD,    ALWAYS,           STAY,           KEEP,           SAME,  ACTION_NONE},

@@ -15,9 +15,12 @@
 #include <unistd.h>
 
 #include "common/message.h" // exit codes
+#include "common/translate.h"
+#include "heavectl/ctl.h"
+#include "common/sentence.h"
 
 #define LINE_BYTES    4096u
-#define REQUEST_BYTES 96u
+#define REQUEST_BYTES 192u
 #define CTRL_C        3
 #define CTRL_D        4
 
@@ -37,8 +40,9 @@ typedef struct {
     bool has_tick;
     bool is_pressed;    /**< heaved holds it */
     bool is_let_go_due; /**< the key has to be let go before it can begin again */
+    bool is_told;       /**< and the screen says so */
     bool is_over;       /**< the run is */
-    bool has_arrived;   /**< because of watch */
+    bool has_arrived;   /**< because of watch, or by itself */
     const hold_watch_t *watch;
     int code; /**< then */
     char line[LINE_BYTES];
@@ -82,7 +86,8 @@ static int64_t now_ms(void)
 static void end(hold_t *self, int code, const char *text)
 {
     if (text != NULL) {
-        fprintf(stderr, "\r\x1b[Kheavectl: %s\r\n", text);
+        char shown[SENTENCE_MAX];
+        fprintf(stderr, "\r\x1b[Kheavectl: %s\r\n", sentence(text, shown, sizeof shown));
     }
     self->is_over = true;
     self->code = code;
@@ -100,7 +105,7 @@ static void ask(hold_t *self, asked_t asked, const char *line)
 {
     const size_t length = strlen(line);
     if (send(self->fd, line, length, MSG_NOSIGNAL | MSG_DONTWAIT) != (ssize_t)length) {
-        end(self, EXIT_UNAVAILABLE, "heaved cannot be asked");
+        end(self, EXIT_UNAVAILABLE, N_("heaved cannot be asked"));
     }
     self->asked = asked;
     self->asked_ms = now_ms();
@@ -136,11 +141,12 @@ static void speak(hold_t *self)
 {
     const bool is_held = hold_key_is_held(&self->key, now_ms());
     self->is_let_go_due = self->is_let_go_due && !hold_key_is_let_go(&self->key, now_ms());
+    self->is_told = self->is_told && self->is_let_go_due;
     if (self->asked != ASKED_NOTHING) {
         return;
     }
     if (self->is_pressed && !is_held) {
-        show("let go; hold a key to go on, q to end");
+        show(_("let go; hold a key to go on, q to end"));
         release(self);
     } else if (now_ms() - self->asked_ms < HOLD_BEAT_MS) {
         return;
@@ -173,7 +179,7 @@ static void take_press(hold_t *self, const cJSON *answer, bool is_done)
     self->is_pressed = is_done;
     self->series = number_of(answer, "series");
     if (is_done) {
-        show("goes on while the key is held");
+        show(_("goes on while the key is held"));
     } else if (strcmp(why, "busy") != 0 && strcmp(why, "stale") != 0) { /* these pass: it is tried again, with a newer tick */
         end(self, EXIT_REFUSED, text_of(answer, "error"));
     }
@@ -183,16 +189,20 @@ static void take_press(hold_t *self, const cJSON *answer, bool is_done)
 static void take_beat(hold_t *self, const cJSON *answer, bool is_done)
 {
     const bool is_finished = strcmp(text_of(answer, "doing"), "nothing") == 0;
+    const bool has_come = is_finished && number_of(answer, "finished") == self->series && self->series != 0;
     if (strcmp(text_of(answer, "state"), "SERVICE") != 0) {
-        end(self, EXIT_REFUSED, "the platform is not in SERVICE any more; heavectl status says why");
-    } else if (is_finished && strncmp(self->request, "home ", 5) == 0) {
+        end(self, EXIT_REFUSED, N_("the platform is not in SERVICE any more; heavectl status says why"));
+    } else if (has_come) {
         self->is_pressed = false;
-        show("home has ended; heavectl counts shows what is homed");
+        self->has_arrived = true;
+        show(strncmp(self->request, "home ", 5) == 0 ? _("home has ended; heavectl counts shows what is homed")
+                                                     : _("there: let go of the key"));
         end(self, EXIT_DONE, NULL);
     } else if (!is_done && is_finished) {
         self->is_pressed = false;
         self->is_let_go_due = true;
-        show("stopped: let go of the key and hold it again");
+        self->is_told = true;
+        show(_("stopped: let go of the key and hold it again"));
     }
 }
 
@@ -234,15 +244,32 @@ static void hear(hold_t *self)
         self->length += (size_t)received;
         take_lines(self);
     } else if (received == 0 || (errno != EAGAIN && errno != EINTR)) {
-        end(self, EXIT_UNAVAILABLE, "heaved has ended");
+        end(self, EXIT_UNAVAILABLE, N_("heaved has ended"));
     }
 }
 
 /* --- The terminal --- */
 
+/* A key that is down already was meant for something else. Enter never counts: it ended the answer before, and the pause before
+ * a key's first repeat looks as if it had been let go. */
+static void take_key(hold_t *self, bool is_enter)
+{
+    if (!is_enter) {
+        hold_key_take(&self->key, now_ms());
+    } else if (!self->is_pressed) {
+        hold_key_miss(&self->key, now_ms());
+        self->is_let_go_due = true;
+    }
+    if (self->is_let_go_due && !self->is_told) {
+        self->is_told = true;
+        show(_("let go of the key first, then hold the space bar; q ends"));
+    }
+}
+
 static void read_keys(hold_t *self)
 {
     char keys[64];
+    bool is_enter = false;
     const ssize_t count = read(STDIN_FILENO, keys, sizeof keys);
     if (count <= 0) {
         end(self, EXIT_DONE, NULL);
@@ -253,8 +280,9 @@ static void read_keys(hold_t *self)
             end(self, EXIT_DONE, NULL);
             return;
         }
+        is_enter = is_enter || keys[i] == '\r' || keys[i] == '\n';
     }
-    hold_key_take(&self->key, now_ms());
+    take_key(self, is_enter);
 }
 
 static void run(hold_t *self, const volatile sig_atomic_t *is_interrupted)
@@ -263,7 +291,7 @@ static void run(hold_t *self, const volatile sig_atomic_t *is_interrupted)
     while (!self->is_over && *is_interrupted == 0) {
         struct pollfd wait[2] = {{.fd = STDIN_FILENO, .events = POLLIN}, {.fd = self->fd, .events = POLLIN}};
         if (poll(wait, 2, HOLD_BEAT_MS / 5) < 0 && errno != EINTR) {
-            end(self, EXIT_UNAVAILABLE, strerror(errno));
+            end(self, EXIT_UNAVAILABLE, error_text(errno));
             return;
         }
         if (now_ms() - looked_ms > HOLD_ABSENCE_MS) { /* stopped, or starved: whoever holds the key has to say so anew */
@@ -278,10 +306,10 @@ static void run(hold_t *self, const volatile sig_atomic_t *is_interrupted)
             read_keys(self);
         }
         if (self->asked != ASKED_NOTHING && now_ms() - self->asked_ms > HOLD_SILENCE_MS) {
-            end(self, EXIT_UNAVAILABLE, "heaved does not answer");
+            end(self, EXIT_UNAVAILABLE, N_("heaved does not answer"));
         }
         if (!self->is_over && self->watch != NULL && self->watch->is_over(self->watch->context, self->is_pressed)) {
-            show("there: let go of the key");
+            show(self->is_pressed ? _("there: let go of the key") : _("let go"));
             self->has_arrived = true;
             end(self, EXIT_DONE, NULL);
         }
@@ -302,10 +330,9 @@ int hold_run(int fd, const char *request, const hold_watch_t *watch, const volat
 {
     static hold_t hold;
     struct termios before;
-    hold = (hold_t){.fd = fd, .request = request, .watch = watch};
+    hold = (hold_t){.fd = fd, .request = request, .watch = watch, .is_let_go_due = true};
     if (tcgetattr(STDIN_FILENO, &before) != 0) {
-        fprintf(stderr, "heavectl: %s: goes on while a key is held, which takes a terminal\n", request);
-        return EXIT_BAD_USAGE;
+        return ctl_complain(EXIT_BAD_USAGE, "%s: goes on while a key is held, which takes a terminal", request);
     }
     struct termios raw = before;
     raw.c_lflag &= ~(tcflag_t)(ICANON | ECHO | ISIG | IEXTEN);
@@ -313,7 +340,8 @@ int hold_run(int fd, const char *request, const hold_watch_t *watch, const volat
     raw.c_cc[VMIN] = 1;
     raw.c_cc[VTIME] = 0;
     (void)tcsetattr(STDIN_FILENO, TCSAFLUSH, &raw);
-    show("hold a key, the space bar for one; q ends");
+    hold_key_miss(&hold.key, now_ms());
+    show(_("hold a key, the space bar for one; q ends"));
     run(&hold, is_interrupted);
     if (hold.is_pressed) {
         release(&hold); /* nobody waits for the answer: without it heaved lets go by itself */

@@ -13,6 +13,8 @@
 
 #include "common/message.h" // exit codes
 #include "common/samples.h"
+#include "common/translate.h"
+#include "heavectl/ctl.h"
 
 #define COLUMNS_MAX 128u
 #define LOOK_MS     5 /* between looks into the memory */
@@ -66,7 +68,7 @@ static bool choose_columns(run_t *self, char *error, size_t size)
         if (column != NULL) {
             self->column[self->columns++] = column;
         } else if (names != k_on_terminal && self->scope->columns != NULL) {
-            (void)snprintf(error, size, "scope: %.*s is no column; `heavectl --for 0.1 scope | head -1` shows them all",
+            (void)snprintf(error, size, _("scope: %.*s is no column; `heavectl --for 0.1 scope | head -1` shows them all"),
                            (int)(length < 40 ? length : 40), names);
             return false;
         }
@@ -136,16 +138,16 @@ static int show(run_t *self, int socket_fd, char *error, size_t size)
         is_alive = wait_a_moment(socket_fd);
         write_rows(self, &next_s);
         if (fflush(stdout) != 0) {
-            (void)snprintf(error, size, "standard output: %s", strerror(errno));
+            (void)snprintf(error, size, _("standard output: %s"), error_text(errno));
             return EXIT_IO;
         }
     }
     if (self->reader.lost > 0) {
-        fprintf(stderr, "heavectl: scope: %llu records were overwritten before they could be written\n",
-                (unsigned long long)self->reader.lost);
+        (void)ctl_complain(EXIT_DONE, "scope: %llu records were overwritten before they could be written",
+                           (unsigned long long)self->reader.lost);
     }
     if (!is_alive) {
-        (void)snprintf(error, size, "heaved has ended");
+        (void)snprintf(error, size, "%s", _("heaved has ended"));
         return EXIT_UNAVAILABLE;
     }
     return EXIT_DONE;
@@ -156,7 +158,7 @@ int scope_run(const scope_t *self, int socket_fd, int samples_fd, char *error, s
     run_t run = {.scope = self};
     const char *wrong = samples_reader_open(&run.reader, samples_fd);
     if (wrong != NULL) {
-        (void)snprintf(error, size, "scope: %s", wrong);
+        (void)snprintf(error, size, "scope: %s", translate(wrong));
         return EXIT_UNAVAILABLE;
     }
     const int code = choose_columns(&run, error, size) ? show(&run, socket_fd, error, size) : EXIT_BAD_USAGE;

@@ -16,10 +16,14 @@
 
 #include "common/message.h" // exit codes
 #include "common/samples.h"
+#include "common/translate.h"
+#include "heavectl/ctl.h"
 #include "heavectl/hold.h"
 #include "heavectl/scope.h"
-#include "heavectl/selftest_link.h"
+#include "heavectl/heaved_link.h"
 #include "heavectl/selftest_report.h"
+#include "heavectl/selftest_seen.h"
+#include "common/sentence.h"
 
 #define PERSON_MS    120000 /* for a switch to be turned */
 #define DRIVES_MS    15000  /* for torque, and for a reset to take effect */
@@ -52,90 +56,64 @@ typedef struct {
 /* A run. */
 typedef struct {
     const char *path;
-    selftest_link_t link;
+    heaved_link_t link;
     samples_reader_t reader;
     selftest_report_t report;
     double following_mm, drift_mm, jog_mm_s;
     unsigned cylinders;
 } run_t;
 
+/* What is kept is English, what is shown is not. */
 static __attribute__((format(printf, 4, 5))) void note(run_t *self, const char *name, selftest_result_t result,
                                                        const char *format, ...)
 {
-    char text[SELFTEST_NOTE_MAX];
-    va_list arguments;
+    char text[SELFTEST_NOTE_MAX], shown[SELFTEST_NOTE_MAX];
+    va_list arguments, again;
     va_start(arguments, format);
+    va_copy(again, arguments);
     (void)vsnprintf(text, sizeof text, format, arguments);
+    (void)vsnprintf(shown, sizeof shown, translate(format), again);
+    va_end(again);
     va_end(arguments);
-    selftest_note(&self->report, name, result, text);
+    selftest_note(&self->report, name, result, text, shown);
 }
 
-static bool is_estop(const cJSON *status)
+/* The same of a text without numbers, or of what heaved has answered. */
+static void note_text(run_t *self, const char *name, selftest_result_t result, const char *text)
 {
-    return selftest_is_set(status, "estop_active");
-}
-static bool is_no_estop(const cJSON *status)
-{
-    return !selftest_is_set(status, "estop_active");
-}
-static bool is_failing(const cJSON *status)
-{
-    return selftest_is_set(status, "power_failing");
-}
-static bool is_supplied(const cJSON *status)
-{
-    return !selftest_is_set(status, "power_failing");
-}
-static bool is_out(const cJSON *status)
-{
-    return strcmp(selftest_text(status, "state"), "SERVICE") != 0;
+    char shown[SELFTEST_NOTE_MAX];
+    selftest_note(&self->report, name, result, text, sentence(text, shown, sizeof shown));
 }
 
-/* Every drive has torque, and its zero too. */
-static bool has_all(const cJSON *counts, const char *what)
+static int complain(int code, const char *why)
 {
-    const cJSON *drive = NULL;
-    bool has = cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(counts, "drives")) > 0;
-    cJSON_ArrayForEach(drive, cJSON_GetObjectItemCaseSensitive(counts, "drives"))
-    {
-        has = has && selftest_is_set(drive, what);
-    }
-    return has;
-}
-
-static bool has_torque(const cJSON *counts)
-{
-    return has_all(counts, "torque");
-}
-static bool is_homed(const cJSON *counts)
-{
-    return has_all(counts, "homed");
+    char shown[SELFTEST_NOTE_MAX];
+    return ctl_complain(code, "selftest: %s", sentence(why, shown, sizeof shown));
 }
 
 static void note_answer(run_t *self, const char *name, int key, const char *failure)
 {
-    note(self, name,
-         key == 'y'   ? SELFTEST_PASSED
-         : key == 'n' ? SELFTEST_FAILED
-                      : SELFTEST_SKIPPED,
-         "%s",
-         key == 'n'   ? failure
-         : key == 'y' ? ""
-                      : "left out");
+    note_text(self, name,
+              key == 'y'   ? SELFTEST_PASSED
+              : key == 'n' ? SELFTEST_FAILED
+                           : SELFTEST_SKIPPED,
+              key == 'n'   ? failure
+              : key == 'y' ? ""
+                           : N_("left out"));
 }
 
 static bool enter_service(run_t *self)
 {
     char error[SELFTEST_NOTE_MAX];
-    const int64_t until_ms = selftest_now_ms() + DRIVES_MS;
-    const struct timespec pause = {.tv_nsec = SELFTEST_LOOK_MS * 1000000L};
-    cJSON *status = selftest_ask(&self->link, "tick");
-    bool is_in = status != NULL && !is_out(status);
+    const int64_t until_ms = heaved_link_now_ms() + DRIVES_MS;
+    const struct timespec pause = {.tv_nsec = HEAVED_LINK_LOOK_MS * 1000000L};
+    cJSON *status = heaved_link_ask(&self->link, "tick");
+    bool is_in = status != NULL && !selftest_is_out(status);
     cJSON_Delete(status);
     while (!is_in && !self->link.is_over) {
-        is_in = selftest_has_done(&self->link, "service", error);
-        if (!is_in && selftest_now_ms() >= until_ms) {
-            fprintf(stderr, "heavectl: selftest: %s\n", error);
+        is_in = heaved_link_has_done(&self->link, "service", error);
+        if (!is_in && heaved_link_now_ms() >= until_ms) {
+            (void)complain(EXIT_REFUSED, error);
             self->link.is_over = true;
         }
         if (!is_in) {
@@ -150,26 +128,26 @@ static bool enter_service(run_t *self)
 /* One that ends SERVICE and comes back.
  * @param on what to do, off how to undo it; each with what heaved shows then
  * Returns whether it worked. */
-static bool try_switch(run_t *self, const char *name, const char *on, selftest_seen_t is_on, const char *off,
-                       selftest_seen_t is_off)
+static bool try_switch(run_t *self, const char *name, const char *on, heaved_link_seen_t is_on, const char *off,
+                       heaved_link_seen_t is_off)
 {
     char error[SELFTEST_NOTE_MAX];
-    printf("%s (s leaves it out)\n", on);
-    int key = selftest_wait(&self->link, "status", is_on, PERSON_MS);
+    printf(_("%s (s leaves it out)\n"), on);
+    int key = heaved_link_wait(&self->link, "status", is_on, PERSON_MS);
     if (key != 'y') {
-        note_answer(self, name, key, "nothing changed within two minutes");
+        note_answer(self, name, key, N_("nothing changed within two minutes"));
         return false;
     }
     printf("%s\n", off);
-    key = selftest_wait(&self->link, "status", is_off, PERSON_MS);
+    key = heaved_link_wait(&self->link, "status", is_off, PERSON_MS);
     if (key != 'y') {
-        note_answer(self, name, key == 's' ? 'n' : key, "it did not go back");
+        note_answer(self, name, key == 's' ? 'n' : key, N_("it did not go back"));
         return false;
     }
-    if (is_on == is_estop) {
-        (void)selftest_has_done(&self->link, "reset", error);
+    if (is_on == selftest_is_estop) {
+        (void)heaved_link_has_done(&self->link, "reset", error);
     }
-    note(self, name, SELFTEST_PASSED, "%s", "");
+    note_text(self, name, SELFTEST_PASSED, "");
     return true;
 }
 
@@ -183,20 +161,22 @@ static bool is_always(const cJSON *status)
 static void try_switches(run_t *self, const cJSON *plan)
 {
     const cJSON *switches = cJSON_GetObjectItemCaseSensitive(plan, "switches");
-    if (selftest_is_set(switches, "estop") && !self->link.is_over && enter_service(self)) {
-        const bool is_tried = try_switch(self, "e-stop", "Press the e-stop.", is_estop, "Release the e-stop.", is_no_estop);
-        if (selftest_is_set(plan, "healthy_pulse") && !self->link.is_over) {
-            const char *question = "Did the safety relay drop while the e-stop was pressed, and does it hold now?";
-            note_answer(self, "healthy pulse", is_tried ? selftest_question(&self->link, question) : 's',
-                        "the relay of the healthy pulse did not follow");
+    if (heaved_link_is_set(switches, "estop") && !self->link.is_over && enter_service(self)) {
+        const bool is_tried = try_switch(self, N_("e-stop"), _("Press the e-stop."), selftest_is_estop, _("Release the e-stop."),
+                                         selftest_is_no_estop);
+        if (heaved_link_is_set(plan, "healthy_pulse") && !self->link.is_over) {
+            const char *question = _("Did the safety relay drop while the e-stop was pressed, and does it hold now?");
+            note_answer(self, N_("healthy pulse"), is_tried ? heaved_link_question(&self->link, question) : 's',
+                        N_("the relay of the healthy pulse did not follow"));
         }
     }
-    if (selftest_is_set(switches, "enable") && !self->link.is_over && enter_service(self)) {
-        (void)try_switch(self, "enable key", "Turn the enable key off.", is_out, "Turn the enable key on, and wait.", is_always);
+    if (heaved_link_is_set(switches, "enable") && !self->link.is_over && enter_service(self)) {
+        (void)try_switch(self, N_("enable key"), _("Turn the enable key off."), selftest_is_out,
+                         _("Turn the enable key on, and wait."), is_always);
     }
-    if (selftest_is_set(switches, "power") && !self->link.is_over && enter_service(self)) {
-        (void)try_switch(self, "power failing", "Let the supply's contact tell that the supply fails.", is_failing,
-                         "Let it be well again.", is_supplied);
+    if (heaved_link_is_set(switches, "power") && !self->link.is_over && enter_service(self)) {
+        (void)try_switch(self, N_("power failing"), _("Let the supply's contact tell that the supply fails."),
+                         selftest_is_failing, _("Let it be well again."), selftest_is_supplied);
     }
 }
 
@@ -204,7 +184,7 @@ static void try_switches(run_t *self, const cJSON *plan)
 
 static int hold(run_t *self, const char *request, const hold_watch_t *watch)
 {
-    const int fd = selftest_connect(self->path);
+    const int fd = heaved_link_open(self->path);
     if (fd < 0) {
         self->link.is_over = true;
         return EXIT_UNAVAILABLE;
@@ -219,15 +199,16 @@ static void try_relays(run_t *self, unsigned relays)
 {
     char text[64], request[32], name[32];
     for (unsigned i = 1; i <= relays && !self->link.is_over; i++) {
-        (void)snprintf(text, sizeof text, "Relay %u: try it? n: nothing is connected to it.", i);
-        (void)snprintf(name, sizeof name, "relay %u", i);
+        (void)snprintf(text, sizeof text, _("Relay %u: try it? n: nothing is connected to it."), i);
+        (void)snprintf(name, sizeof name, N_("relay %u"), i);
         (void)snprintf(request, sizeof request, "relay %u", i);
-        int key = selftest_question(&self->link, text);
+        int key = heaved_link_question(&self->link, text);
         if (key == 'y') {
-            key = hold(self, request, NULL) == EXIT_DONE ? selftest_question(&self->link, "Did it switch, and back again?") : 'n';
-            note_answer(self, name, key, "it did not switch");
+            key = hold(self, request, NULL) == EXIT_DONE ? heaved_link_question(&self->link, _("Did it switch, and back again?"))
+                                                         : 'n';
+            note_answer(self, name, key, N_("it did not switch"));
         } else if (key == 'n') {
-            note(self, name, SELFTEST_UNUSED, "%s", "nothing is connected");
+            note_text(self, name, SELFTEST_UNUSED, N_("nothing is connected"));
         } else {
             note_answer(self, name, key, "");
         }
@@ -255,7 +236,7 @@ static void take_sample(const run_t *self, way_t *way, const samples_record_t *r
         way->most_mm[i] = way->has_first ? larger(way->most_mm[i], actual_mm) : actual_mm;
     }
     if (!way->has_first || apart(z_mm, way->last_z_mm) > 1e-4) {
-        way->moved_ms = selftest_now_ms();
+        way->moved_ms = heaved_link_now_ms();
         way->last_z_mm = z_mm;
     }
     way->first_z_mm = way->has_first ? way->first_z_mm : z_mm;
@@ -276,11 +257,11 @@ static bool is_at_end(void *context, bool is_pressed)
         take_sample(self->run, &self->way, &record);
     }
     if (!is_pressed) {
-        self->way.moved_ms = selftest_now_ms();
+        self->way.moved_ms = heaved_link_now_ms();
         return false;
     }
     const double gone_mm = apart(self->way.last_z_mm, self->way.first_z_mm);
-    return self->way.until_mm > 0 ? gone_mm >= self->way.until_mm : selftest_now_ms() - self->way.moved_ms > REST_MS;
+    return self->way.until_mm > 0 ? gone_mm >= self->way.until_mm : heaved_link_now_ms() - self->way.moved_ms > REST_MS;
 }
 
 static void judge_way(run_t *self, const char *name, const way_t *way)
@@ -308,7 +289,7 @@ static void judge_way(run_t *self, const char *name, const way_t *way)
 static bool try_way(run_t *self, const char *name, double speed_mm_s, double until_mm)
 {
     char request[48];
-    watched_t watched = {.run = self, .way = {.until_mm = until_mm, .moved_ms = selftest_now_ms()}};
+    watched_t watched = {.run = self, .way = {.until_mm = until_mm, .moved_ms = heaved_link_now_ms()}};
     samples_record_t record;
     while (samples_reader_next(&self->reader, &record)) { /* what was before says nothing */
     }
@@ -317,11 +298,11 @@ static bool try_way(run_t *self, const char *name, double speed_mm_s, double unt
     const int code = hold(self, request, &watch);
     (void)is_at_end(&watched, false);
     if (code != EXIT_DONE || !watched.way.has_first) {
-        note(self, name, SELFTEST_FAILED, "%s", "it was not led there; see what heaved said");
+        note_text(self, name, SELFTEST_FAILED, N_("it was not led there; see what heaved said"));
         return false;
     }
     if (!hold_has_arrived()) {
-        note(self, name, SELFTEST_SKIPPED, "%s", "ended before it was there");
+        note_text(self, name, SELFTEST_SKIPPED, N_("ended before it was there"));
         return false;
     }
     judge_way(self, name, &watched.way);
@@ -333,22 +314,23 @@ static void try_brakes(run_t *self)
 {
     char error[SELFTEST_NOTE_MAX];
     watched_t watched = {.run = self};
-    const struct timespec pause = {.tv_nsec = SELFTEST_LOOK_MS * 1000000L};
-    bool is_off = selftest_has_done(&self->link, "torque all off", error);
-    for (int64_t until_ms = selftest_now_ms() + REST_MS; !is_off && selftest_now_ms() < until_ms;) { /* it comes to rest first */
+    const struct timespec pause = {.tv_nsec = HEAVED_LINK_LOOK_MS * 1000000L};
+    bool is_off = heaved_link_has_done(&self->link, "torque all off", error);
+    for (int64_t until_ms = heaved_link_now_ms() + REST_MS;
+         !is_off && heaved_link_now_ms() < until_ms;) { /* it comes to rest first */
         (void)nanosleep(&pause, NULL);
-        is_off = selftest_has_done(&self->link, "torque all off", error);
+        is_off = heaved_link_has_done(&self->link, "torque all off", error);
     }
     if (!is_off) {
-        note(self, "brakes", SELFTEST_FAILED, "%s", error);
+        note_text(self, N_("brakes"), SELFTEST_FAILED, error);
         return;
     }
     (void)nanosleep(&pause, NULL);
     (void)is_at_end(&watched, false);
     watched.way = (way_t){0}; /* what was before, with torque, says nothing */
-    printf("Torque is off: the platform has to stay where it is for %d s.\n", DRIFT_MS / 1000);
-    const int64_t until_ms = selftest_now_ms() + DRIFT_MS;
-    while (selftest_now_ms() < until_ms && *self->link.is_interrupted == 0) {
+    printf(_("Torque is off: the platform has to stay where it is for %d s.\n"), DRIFT_MS / 1000);
+    const int64_t until_ms = heaved_link_now_ms() + DRIFT_MS;
+    while (heaved_link_now_ms() < until_ms && *self->link.is_interrupted == 0) {
         (void)nanosleep(&pause, NULL);
         (void)is_at_end(&watched, false);
     }
@@ -359,8 +341,8 @@ static void try_brakes(run_t *self)
                     : worst;
     }
     const double most_mm = watched.way.most_mm[worst] - watched.way.least_mm[worst];
-    note(self, "brakes", watched.way.has_first && most_mm <= self->drift_mm ? SELFTEST_PASSED : SELFTEST_FAILED,
-         "cylinder %u moved %.2f mm without torque (allowed: %.2f)", worst + 1, most_mm, self->drift_mm);
+    note(self, N_("brakes"), watched.way.has_first && most_mm <= self->drift_mm ? SELFTEST_PASSED : SELFTEST_FAILED,
+         _("cylinder %u moved %.2f mm without torque (allowed: %.2f)"), worst + 1, most_mm, self->drift_mm);
 }
 
 static void try_motion(run_t *self)
@@ -369,36 +351,36 @@ static void try_motion(run_t *self)
     if (!enter_service(self)) {
         return;
     }
-    printf("Now the platform moves, while you hold the space bar. Nobody may be on it or near it.\n");
-    const int key = selftest_question(&self->link, "Go on?");
+    printf(_("Now the platform moves, while you hold the space bar. Nobody may be on it or near it.\n"));
+    const int key = heaved_link_question(&self->link, _("Go on?"));
     if (key != 'y') {
-        note_answer(self, "ends", 's', "");
+        note_answer(self, N_("ends"), 's', "");
         return;
     }
-    if (!selftest_has_done(&self->link, "torque all on", error)) {
-        note(self, "torque", SELFTEST_FAILED, "%s", error);
+    if (!heaved_link_has_done(&self->link, "torque all on", error)) {
+        note_text(self, N_("torque"), SELFTEST_FAILED, error);
         return;
     }
-    if (selftest_wait(&self->link, "counts", has_torque, DRIVES_MS) != 'y') {
-        note(self, "torque", SELFTEST_FAILED, "%s", "not every drive has torque; heavectl counts shows which");
+    if (heaved_link_wait(&self->link, "counts", selftest_has_torque, DRIVES_MS) != 'y') {
+        note_text(self, N_("torque"), SELFTEST_FAILED, N_("not every drive has torque; heavectl counts shows which"));
         return;
     }
-    note(self, "torque", SELFTEST_PASSED, "%s", "");
-    if (selftest_wait(&self->link, "counts", is_homed, 2 * SELFTEST_LOOK_MS) == 'n' &&
+    note_text(self, N_("torque"), SELFTEST_PASSED, "");
+    if (heaved_link_wait(&self->link, "counts", selftest_is_homed, 2 * HEAVED_LINK_LOOK_MS) == 'n' &&
         hold(self, "home all", NULL) != EXIT_DONE) {
-        note(self, "home", SELFTEST_FAILED, "%s", "not every drive has found its zero");
+        note_text(self, N_("home"), SELFTEST_FAILED, N_("not every drive has found its zero"));
         return;
     }
-    printf("Up, to the end. ");
-    bool is_there = !self->link.is_over && try_way(self, "upper end", self->jog_mm_s, 0);
+    printf(_("Up, to the end. "));
+    bool is_there = !self->link.is_over && try_way(self, N_("upper end"), self->jog_mm_s, 0);
     if (is_there) {
-        printf("Down, to the end. ");
+        printf(_("Down, to the end. "));
     }
-    is_there = is_there && try_way(self, "lower end", -self->jog_mm_s, 0);
+    is_there = is_there && try_way(self, N_("lower end"), -self->jog_mm_s, 0);
     if (is_there) {
-        printf("A little up, where the brakes are tried. ");
+        printf(_("A little up, where the brakes are tried. "));
     }
-    if (is_there && try_way(self, "off the lower end", self->jog_mm_s, BRAKE_MM)) {
+    if (is_there && try_way(self, N_("off the lower end"), self->jog_mm_s, BRAKE_MM)) {
         try_brakes(self);
     }
 }
@@ -409,48 +391,48 @@ static int finish(run_t *self, const char *file, const char *configuration, cons
 {
     char error[SELFTEST_NOTE_MAX];
     const bool is_passed = selftest_has_passed(&self->report) && !self->link.is_over;
-    const bool is_told = selftest_has_done(&self->link, is_passed ? "selftest passed" : "selftest failed", error);
+    const bool is_told = heaved_link_has_done(&self->link, is_passed ? "selftest passed" : "selftest failed", error);
     if (!is_told) {
-        fprintf(stderr, "heavectl: selftest: %s\n", error);
+        (void)complain(EXIT_REFUSED, error);
     }
-    (void)selftest_has_done(&self->link, "service-off", error);
+    (void)heaved_link_has_done(&self->link, "service-off", error);
     const int wrong = file != NULL ? selftest_write(&self->report, file, configuration, version, build) : 0;
     if (wrong != 0) {
-        fprintf(stderr, "heavectl: %s: %s\n", file, strerror(wrong));
+        (void)ctl_complain(EXIT_IO, "%s: %s", file, error_text(wrong));
     }
-    printf("self-test: %s\n", is_passed ? "passed" : "failed");
+    printf("%s\n", is_passed ? _("self-test: passed") : _("self-test: failed"));
     return !is_told ? EXIT_UNAVAILABLE : wrong != 0 ? EXIT_IO : is_passed ? EXIT_DONE : EXIT_REFUSED;
 }
 
 static bool begin(run_t *self, cJSON **plan, cJSON **status)
 {
-    self->link.fd = selftest_connect(self->path);
+    self->link.fd = heaved_link_open(self->path);
     if (self->link.fd < 0) {
-        fprintf(stderr, "heavectl: heaved is not running at %s: %s\n", self->path, strerror(errno));
+        (void)ctl_complain(EXIT_UNAVAILABLE, "heaved is not running at %s: %s", self->path, error_text(errno));
         return false;
     }
-    *plan = selftest_ask(&self->link, "selftest");
-    *status = selftest_ask(&self->link, "status");
-    if (!selftest_is_set(*plan, "ok") || !selftest_is_set(*status, "ok")) {
-        fprintf(stderr, "heavectl: selftest: %s\n", *plan != NULL ? selftest_text(*plan, "error") : "heaved does not answer");
+    *plan = heaved_link_ask(&self->link, "selftest");
+    *status = heaved_link_ask(&self->link, "status");
+    if (!heaved_link_is_set(*plan, "ok") || !heaved_link_is_set(*status, "ok")) {
+        (void)complain(EXIT_REFUSED, *plan != NULL ? heaved_link_text(*plan, "error") : N_("heaved does not answer"));
         return false;
     }
-    self->following_mm = selftest_number(*plan, "following_mm");
-    self->drift_mm = selftest_number(*plan, "drift_mm");
-    self->jog_mm_s = selftest_number(*plan, "jog_mm_s");
+    self->following_mm = heaved_link_number(*plan, "following_mm");
+    self->drift_mm = heaved_link_number(*plan, "drift_mm");
+    self->jog_mm_s = heaved_link_number(*plan, "jog_mm_s");
     self->cylinders = (unsigned)cJSON_GetArraySize(cJSON_GetObjectItemCaseSensitive(*status, "cylinders"));
     self->cylinders = self->cylinders < CYLINDERS ? self->cylinders : CYLINDERS;
     if (send(self->link.fd, "samples\n", 8, MSG_NOSIGNAL) != 8) {
         return false;
     }
     const int samples = scope_receive(self->link.fd, self->link.line, sizeof self->link.line);
-    const char *wrong =
-        samples < 0 ? "there are no samples; [samples] seconds has to be above 0" : samples_reader_open(&self->reader, samples);
+    const char *wrong = samples < 0 ? N_("there are no samples; [samples] seconds has to be above 0")
+                                    : samples_reader_open(&self->reader, samples);
     if (samples >= 0) {
         (void)close(samples);
     }
     if (wrong != NULL) {
-        fprintf(stderr, "heavectl: selftest: %s\n", wrong);
+        (void)complain(EXIT_REFUSED, wrong);
     }
     return wrong == NULL;
 }
@@ -461,23 +443,22 @@ int selftest_run(const char *path, const char *file, const volatile sig_atomic_t
     cJSON *plan = NULL, *status = NULL;
     run = (run_t){.path = path, .link = {.is_interrupted = is_interrupted, .fd = -1}};
     if (isatty(STDIN_FILENO) == 0) {
-        fprintf(stderr, "heavectl: selftest takes a terminal: a person presses, looks and holds\n");
-        return EXIT_BAD_USAGE;
+        return ctl_complain(EXIT_BAD_USAGE, "selftest takes a terminal: a person presses, looks and holds");
     }
     int code = EXIT_UNAVAILABLE;
     if (begin(&run, &plan, &status)) {
         const cJSON *program = cJSON_GetObjectItemCaseSensitive(plan, "configuration");
-        printf("Self-test of configuration %s, with nobody on board.\n", cJSON_IsString(program) ? program->valuestring : "?");
+        printf(_("Self-test of configuration %s, with nobody on board.\n"), cJSON_IsString(program) ? program->valuestring : "?");
         if (enter_service(&run)) {
             try_switches(&run, plan);
             if (!run.link.is_over && enter_service(&run)) {
-                try_relays(&run, (unsigned)selftest_number(plan, "relays"));
+                try_relays(&run, (unsigned)heaved_link_number(plan, "relays"));
             }
             if (!run.link.is_over) {
                 try_motion(&run);
             }
-            code = finish(&run, file, selftest_text(plan, "configuration"), selftest_text(status, "version"),
-                          selftest_text(status, "build"));
+            code = finish(&run, file, heaved_link_text(plan, "configuration"), heaved_link_text(status, "version"),
+                          heaved_link_text(status, "build"));
         } else {
             code = EXIT_REFUSED;
         }

@@ -12,13 +12,18 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "common/columns.h"
+#include "common/translate.h"
+#include "common/sentence.h"
+#define RESULT_COLUMNS 8u
+
 static const char *result_name(selftest_result_t result)
 {
-    static const char *const k_names[] = {"passed", "failed", "skipped", "unused"};
+    static const char *const k_names[] = {N_("passed"), N_("failed"), N_("skipped"), N_("unused")};
     return k_names[result];
 }
 
-void selftest_note(selftest_report_t *self, const char *name, selftest_result_t result, const char *note)
+void selftest_note(selftest_report_t *self, const char *name, selftest_result_t result, const char *note, const char *shown)
 {
     if (self->items < SELFTEST_ITEMS_MAX) {
         selftest_item_t *item = &self->item[self->items++];
@@ -26,7 +31,10 @@ void selftest_note(selftest_report_t *self, const char *name, selftest_result_t 
         (void)snprintf(item->name, sizeof item->name, "%s", name);
         (void)snprintf(item->note, sizeof item->note, "%s", note);
     }
-    printf("  %-8s %s%s%s\n", result_name(result), name, note[0] != '\0' ? ": " : "", note);
+    const char *word = translate(result_name(result));
+    char own[SELFTEST_NOTE_MAX];
+    printf("  %s%*s %s%s%s\n", word, columns_lacking(word, RESULT_COLUMNS), "", sentence(name, own, sizeof own),
+           shown[0] != '\0' ? _(": ") : "", shown);
     (void)fflush(stdout);
 }
 

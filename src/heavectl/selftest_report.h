@@ -24,8 +24,10 @@ typedef struct {
     unsigned items;
 } selftest_report_t;
 
-/** Adds an item and prints its line. */
-void selftest_note(selftest_report_t *self, const char *name, selftest_result_t result, const char *note);
+/** Adds an item and prints its line.
+ *  @param name in English, as the note: so they are kept
+ *  @param shown the note in the language of who looks on */
+void selftest_note(selftest_report_t *self, const char *name, selftest_result_t result, const char *note, const char *shown);
 
 /** True where something has passed and nothing has failed or was left out: that was not seen to work. What is unused does not
  * count. */

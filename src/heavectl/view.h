@@ -10,11 +10,10 @@
 
 #define CTL_VIEW_BYTES 16384u
 
-/** How to draw. */
+/** How to draw; in what language, translate.h knows. */
 typedef struct {
     unsigned columns;     /**< lines are cut there */
     unsigned rows;        /**< so many lines are drawn, the last one without its end; 0 = all */
-    bool is_chinese;      /**< words for faults in Chinese, else English */
     bool is_utf8;         /**< blocks for bars, else ASCII */
     bool is_coloured;     /**< the state and a fault in colours of a terminal */
     const char *line_end; /**< "\n", or what clears the rest of the line as well */

@@ -13,7 +13,9 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include "common/sentence.h"
 #include "common/socket_path.h"
+#include "common/translate.h"
 #include "config/canraw.h"
 #include "config/cia402.h"
 #include "config/modbus.h"
@@ -39,7 +41,7 @@ static bool is_daemon_running(const char *path)
     return is_taken;
 }
 
-/* What is permitted is tried out, and taken back. */
+/* Tries out whether real-time priority and memory lock are permitted, and undoes both. */
 static doctor_host_t look_at_host(void)
 {
     doctor_host_t host = {0};
@@ -61,15 +63,16 @@ static doctor_host_t look_at_host(void)
 static void check_port(doctor_report_t *report, const config_udp_t *udp)
 {
     linux_udp_t socket;
+    char shown[SENTENCE_MAX];
     const linux_udp_config_t config = {.bind = udp->bind, .group = udp->group, .port = udp->port};
     if (linux_udp_open(&socket, &config) == HV_OK) {
         doctor_say(report, DOCTOR_OK, "UDP port %u is free", udp->port);
         linux_udp_close(&socket);
         return;
     }
-    doctor_say(report, DOCTOR_FAIL, "%s -> %s", socket.error_text,
-               socket.error == EADDRINUSE ? "end the program that `ss -ulpn` shows, or another [udp] port"
-                                          : "[udp] bind, port and group");
+    doctor_say(report, DOCTOR_FAIL, "%s -> %s", sentence(socket.error_text, shown, sizeof shown),
+               socket.error == EADDRINUSE ? _("end the program that `ss -ulpn` shows, or another [udp] port")
+                                          : _("[udp] bind, port and group"));
 }
 
 /* --- The bus --- */
@@ -81,7 +84,7 @@ static bool check_interface(doctor_report_t *report, const config_can_t *can, co
     struct mnl_socket *netlink = linux_can_link_open();
     if (netlink == NULL) {
         doctor_say(report, DOCTOR_FAIL, "the system does not tell about interfaces: %s -> not in a sandbox without AF_NETLINK",
-                   strerror(errno));
+                   error_text(errno));
         return false;
     }
     const hv_status_t status = linux_can_link_look(netlink, can->interface, &link);
@@ -94,7 +97,7 @@ static bool check_interface(doctor_report_t *report, const config_can_t *can, co
         doctor_say(report, DOCTOR_FAIL,
                    "there is no interface %s -> plug it in, or [can] interface: see `ip -br link show type can`", can->interface);
     } else {
-        doctor_say(report, DOCTOR_FAIL, "%s: %s -> docs/can.md", can->interface, strerror(error));
+        doctor_say(report, DOCTOR_FAIL, "%s: %s -> docs/can.md", can->interface, error_text(error));
     }
     return false;
 }
@@ -119,16 +122,17 @@ static void check_cia402(doctor_report_t *report, const config_t *config, doctor
 {
     static cia402_config_t drives;
     static doctor_node_t node[DRIVES_MAX];
+    char shown[SENTENCE_MAX];
     config_cia402(config, &drives);
     doctor_probe_listen(probe, LISTEN_MS);
     for (unsigned k = 0; k < drives.axes; k++) {
-        doctor_probe_node(probe, drives.axis[k].node, drives.sdo_timeout_ms, &node[k]);
+        doctor_probe_node(probe, &drives.axis[k], drives.sdo_timeout_ms, &node[k]);
         if (doctor_judge_wire(report, &config->can, doctor_probe_wire(probe))) {
             return;
         }
         doctor_judge_node(report, &drives, k, &node[k]);
         if (doctor_probe_trouble(probe) != NULL) {
-            doctor_say(report, DOCTOR_FAIL, "%s -> docs/can.md", doctor_probe_trouble(probe));
+            doctor_say(report, DOCTOR_FAIL, "%s -> docs/can.md", sentence(doctor_probe_trouble(probe), shown, sizeof shown));
             return;
         }
     }
@@ -160,6 +164,7 @@ static void check_can_raw(doctor_report_t *report, const config_t *config, docto
 static void check_bus(doctor_report_t *report, const config_t *config, const doctor_host_t *host)
 {
     static doctor_probe_t probe;
+    char shown[SENTENCE_MAX];
     const bool is_local = linux_can_local_is(config->can.interface);
     if (is_local) {
         doctor_say(report, DOCTOR_WARN,
@@ -170,7 +175,8 @@ static void check_bus(doctor_report_t *report, const config_t *config, const doc
         return;
     }
     if (!doctor_probe_open(&probe, config->can.interface)) {
-        doctor_say(report, DOCTOR_FAIL, "%s -> %s", doctor_probe_trouble(&probe) != NULL ? doctor_probe_trouble(&probe) : "?",
+        doctor_say(report, DOCTOR_FAIL, "%s -> %s",
+                   doctor_probe_trouble(&probe) != NULL ? sentence(doctor_probe_trouble(&probe), shown, sizeof shown) : "?",
                    is_local ? "docs/twin.md" : "docs/can.md");
         return;
     }

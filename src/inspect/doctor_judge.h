@@ -37,6 +37,8 @@ typedef enum {
     DOCTOR_SYNC_PERIOD, /**< 1006h */
     DOCTOR_CONSUMER,    /**< 1016h, the first of the guards */
     DOCTOR_PRODUCER,    /**< 1017h */
+    DOCTOR_GUARD_TIME,  /**< 100Ch */
+    DOCTOR_LIFE_FACTOR, /**< 100Dh */
     DOCTOR_ABORT_OPTION,
     DOCTOR_QUICK_STOP,
     DOCTOR_FAULT_REACTION,

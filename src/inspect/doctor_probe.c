@@ -13,6 +13,8 @@
 #define PAUSE_NS  200000
 #define EXTRA_US  5000u /* after an answer: who else answers? */
 #define SYNC_ID   0x80u
+#define OBJECTS   0x6000u /* of the first axis of a node; */
+#define CHANNEL   0x800u  /* those of the next one are so much further */
 #define SDO_ID    0x580u
 #define HEARTBEAT 0x700u
 
@@ -138,9 +140,10 @@ static unsigned transfer(doctor_probe_t *self, sdo_t *sdo)
     return extra;
 }
 
-static void read_object(doctor_probe_t *self, sdo_t *sdo, doctor_object_t object, doctor_node_t *out)
+static void read_object(doctor_probe_t *self, sdo_t *sdo, doctor_object_t object, unsigned channel, doctor_node_t *out)
 {
-    sdo_read(sdo, doctor_address[object].index, doctor_address[object].sub, TRIES);
+    const unsigned index = doctor_address[object].index;
+    sdo_read(sdo, (uint16_t)(index >= OBJECTS ? index + channel * CHANNEL : index), doctor_address[object].sub, TRIES);
     const uint64_t begin_us = now_us();
     unsigned extra = transfer(self, sdo);
     const uint64_t end_us = now_us();
@@ -154,13 +157,13 @@ static void read_object(doctor_probe_t *self, sdo_t *sdo, doctor_object_t object
     out->value[object] = sdo->state == SDO_DONE ? sdo_value_u32(sdo) : sdo->abort_code;
 }
 
-void doctor_probe_node(doctor_probe_t *self, uint8_t node, unsigned timeout_ms, doctor_node_t *out)
+void doctor_probe_node(doctor_probe_t *self, const cia402_axis_config_t *axis, unsigned timeout_ms, doctor_node_t *out)
 {
     sdo_t sdo;
     *out = (doctor_node_t){.nmt = -1};
-    sdo_init(&sdo, node, timeout_ms * 1000u);
+    sdo_init(&sdo, axis->node, timeout_ms * 1000u);
     for (unsigned object = 0; object < DOCTOR_OBJECTS; object++) {
-        read_object(self, &sdo, object, out);
+        read_object(self, &sdo, object, axis->channel, out);
         if (out->answer[object] == DOCTOR_NO_ANSWER) {
             break; /* the rest would only take time */
         }
@@ -172,16 +175,18 @@ void doctor_probe_node(doctor_probe_t *self, uint8_t node, unsigned timeout_ms, 
             doctor_take_name(out->name[name], sdo.value, sdo.size);
         }
     }
-    out->nmt = self->nmt[node];
+    out->nmt = self->nmt[axis->node];
 }
 
 /* --- Drives with frames of their own --- */
 
 static void send_query(doctor_probe_t *self, const canraw_map_t *map, unsigned axis)
 {
+    const int64_t value[CANRAW_VALUES] = {0};
     can_frame_t frame = {.id = map->axis[axis].command_id, .is_extended = map->is_extended, .length = map->position_query.length};
-    memcpy(frame.data, map->position_query.data, sizeof frame.data);
-    (void)!hal_can_send(self->bus, &frame);
+    if (canraw_pack(&map->position_query, value, frame.data) == HV_OK) {
+        (void)!hal_can_send(self->bus, &frame);
+    }
 }
 
 void doctor_probe_raw(doctor_probe_t *self, const canraw_map_t *map, unsigned ms, bool is_heard[DRIVES_MAX])

@@ -37,7 +37,7 @@ const doctor_wire_t *doctor_probe_wire(doctor_probe_t *self);
 void doctor_probe_listen(doctor_probe_t *self, unsigned ms);
 
 /** Reads a CiA 402 drive. */
-void doctor_probe_node(doctor_probe_t *self, uint8_t node, unsigned timeout_ms, doctor_node_t *out);
+void doctor_probe_node(doctor_probe_t *self, const cia402_axis_config_t *axis, unsigned timeout_ms, doctor_node_t *out);
 
 /** Sends the position query to all drives of a map.
  *  @param is_heard out: who has sent a frame with its reply_id */

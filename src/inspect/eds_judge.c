@@ -6,6 +6,7 @@
 #include <inttypes.h>
 #include <string.h>
 
+#include "common/translate.h"
 #include "config/cia402.h"
 #include "inspect/doctor_report.h"
 
@@ -33,6 +34,8 @@ static const struct {
     const char *key;
 } k_keys[] = {
     {0x1006, "sync_watched"},
+    {0x100C, "heartbeat_ms"},
+    {0x100D, "heartbeat_timeout_ms"},
     {0x1016, "heartbeat_timeout_ms"},
     {0x1017, "heartbeat_ms"},
     {0x1018, "vendor_id"},
@@ -86,14 +89,14 @@ static doctor_level_t level_of(const judge_t *self, const cia402_wish_t *wish)
 static const char *remedy_of(const judge_t *self, const cia402_wish_t *wish)
 {
     if (wish->need == CIA402_WISH_IF_THERE) {
-        return "nothing, heaved goes on without it";
+        return _("nothing, heaved goes on without it");
     }
     if (wish->need == CIA402_WISH_GUARD) {
-        return self->drives->is_unguarded_allowed ? "nothing, [cia402] allow_no_watchdog = yes"
-                                                  : "another drive, or [cia402] allow_no_watchdog = yes where nobody is on it";
+        return self->drives->is_unguarded_allowed ? _("nothing, [cia402] allow_no_watchdog = yes")
+                                                  : _("another drive, or [cia402] allow_no_watchdog = yes where nobody is on it");
     }
-    return wish->index >= PDO_FIRST && wish->index <= PDO_LAST ? "a drive whose PDOs can be mapped"
-                                                               : "another drive, or firmware";
+    return wish->index >= PDO_FIRST && wish->index <= PDO_LAST ? _("a drive whose PDOs can be mapped")
+                                                               : _("another drive, or firmware");
 }
 
 static void judge_missing(judge_t *self, const cia402_wish_t *wish)
@@ -107,9 +110,9 @@ static void judge_missing(judge_t *self, const cia402_wish_t *wish)
         return;
     }
     const char *remedy =
-        !wish->is_own && wish->need == CIA402_WISH_NEEDED ? "if-there behind the item, or without it" : remedy_of(self, wish);
-    (void)snprintf(text, sizeof text, "%04Xh:%02X is not in it%s -> %s", wish->index, wish->sub,
-                   wish->is_own ? "" : ", and is in [cia402-startup]", remedy);
+        !wish->is_own && wish->need == CIA402_WISH_NEEDED ? _("if-there behind the item, or without it") : remedy_of(self, wish);
+    (void)snprintf(text, sizeof text, _("%04Xh:%02X is not in it%s -> %s"), wish->index, wish->sub,
+                   wish->is_own ? "" : _(", and is in [cia402-startup]"), remedy);
     say(self, level_of(self, wish), text);
 }
 
@@ -133,9 +136,9 @@ static void judge_value(judge_t *self, const cia402_wish_t *wish, const eds_obje
     if (key == NULL || (!is_low && !is_high)) { /* COB-IDs and mappings are heaved's own affair */
         return;
     }
-    (void)snprintf(text, sizeof text, "%04Xh:%02X (line %u) takes %s %" PRId64 ", heaved sets %" PRId64 " -> %s%s", wish->index,
-                   wish->sub, object->line, is_low ? "at least" : "at most",
-                   shown(object, (uint32_t)(is_low ? object->low.value : object->high.value)), value,
+    (void)snprintf(text, sizeof text, _("%04Xh:%02X (line %u) takes %s %lld, heaved sets %lld -> %s%s"), wish->index, wish->sub,
+                   object->line, is_low ? _("at least") : _("at most"),
+                   (long long)shown(object, (uint32_t)(is_low ? object->low.value : object->high.value)), (long long)value,
                    key[0] == '[' ? "" : "[cia402] ", key);
     say(self, level_of(self, wish), text);
 }
@@ -149,15 +152,17 @@ static void judge_access(judge_t *self, const cia402_wish_t *wish, const eds_obj
     if (wish->is_written && !object->is_writable && !(wish->is_compared && is_equal)) {
         char holds[48] = "";
         if (object->fallback.is_there) {
-            (void)snprintf(holds, sizeof holds, " and holds %" PRId64, object->fallback.value);
+            (void)snprintf(holds, sizeof holds, _(" and holds %lld"), (long long)object->fallback.value);
         }
-        (void)snprintf(text, sizeof text, "%04Xh:%02X (line %u) can only be read%s, heaved sets %" PRId64 " -> %s", wish->index,
-                       wish->sub, object->line, holds, shown(object, wish->value), remedy_of(self, wish));
+        (void)snprintf(text, sizeof text, _("%04Xh:%02X (line %u) can only be read%s, heaved sets %lld -> %s"), wish->index,
+                       wish->sub, object->line, holds, (long long)shown(object, wish->value), remedy_of(self, wish));
         say(self, level_of(self, wish), text);
     } else if (wish->is_written && bytes != wish->bytes && wish->index != 0x1000) {
-        (void)snprintf(text, sizeof text, "%04Xh:%02X (line %u) is no value of %u byte%s, as heaved writes it -> %s", wish->index,
-                       wish->sub, object->line, wish->bytes, wish->bytes == 1 ? "" : "s",
-                       wish->is_own ? remedy_of(self, wish) : "the type in [cia402-startup]");
+        (void)snprintf(text, sizeof text,
+                       translate_count("%04Xh:%02X (line %u) is no value of %u byte, as heaved writes it -> %s",
+                                       "%04Xh:%02X (line %u) is no value of %u bytes, as heaved writes it -> %s", wish->bytes),
+                       wish->index, wish->sub, object->line, wish->bytes,
+                       wish->is_own ? remedy_of(self, wish) : _("the type in [cia402-startup]"));
         say(self, level_of(self, wish), text);
     } else if (wish->is_written) {
         judge_value(self, wish, object);
@@ -177,18 +182,21 @@ static void judge_wishes(judge_t *self, unsigned axis)
     }
 }
 
-/* What goes into the PDOs. */
-static void judge_mapping(judge_t *self)
+/* What goes into the PDOs, unless it is there already. */
+static void judge_mapping(judge_t *self, unsigned axis)
 {
-    const uint32_t mapped[] = {0x604000, self->drives->mode == CIA402_MODE_IP ? 0x60C101u : 0x607A00u, 0x604100, 0x606400,
-                               0x606100};
     char text[FINDING_BYTES];
-    for (unsigned i = 0; i < sizeof mapped / sizeof mapped[0]; i++) {
-        const eds_object_t *object = eds_find(self->eds, (uint16_t)(mapped[i] >> 8), (uint8_t)mapped[i]);
-        if (object == NULL || !object->is_mappable) {
-            (void)snprintf(text, sizeof text, "%04Xh:%02X %s -> another drive, or firmware", (unsigned)(mapped[i] >> 8),
-                           (unsigned)(mapped[i] & 0xFFu), object == NULL ? "is not in it" : "cannot be mapped into a PDO");
-            say(self, DOCTOR_FAIL, text);
+    for (unsigned which = 0; which < CIA402_PDOS; which++) {
+        const cia402_pdo_t pdo = cia402_pdo(self->drives, axis, which);
+        for (unsigned i = 0; i < pdo.entries && !pdo.is_fixed; i++) {
+            const uint32_t entry = pdo.entry[i];
+            const eds_object_t *object = eds_find(self->eds, (uint16_t)(entry >> 16), (uint8_t)(entry >> 8));
+            if (object == NULL || !object->is_mappable) {
+                (void)snprintf(text, sizeof text, _("%04Xh:%02X %s -> another drive, or firmware"), (unsigned)(entry >> 16),
+                               (unsigned)(entry >> 8 & 0xFFu),
+                               object == NULL ? _("is not in it") : _("cannot be mapped into a PDO"));
+                say(self, DOCTOR_FAIL, text);
+            }
         }
     }
 }
@@ -204,7 +212,7 @@ static void judge_identity(judge_t *self)
     char text[FINDING_BYTES];
     for (unsigned i = 0; i < 2; i++) {
         if (k_parts[i].wanted != 0 && k_parts[i].found->is_there && (uint32_t)k_parts[i].found->value != k_parts[i].wanted) {
-            (void)snprintf(text, sizeof text, "it is the file of another device: 0x%" PRIX32 " -> the right file, or [cia402] %s",
+            (void)snprintf(text, sizeof text, _("it is the file of another device: 0x%X -> the right file, or [cia402] %s"),
                            (uint32_t)k_parts[i].found->value, k_parts[i].key);
             say(self, DOCTOR_FAIL, text);
         }
@@ -217,7 +225,7 @@ static void judge_bitrate(judge_t *self)
     const unsigned kbps = self->config->can.bitrate_bps / 1000u;
     for (unsigned i = 0; self->eds->has_bitrates && eds_bitrates_kbps[i] != 0; i++) {
         if (eds_bitrates_kbps[i] == kbps && (self->eds->bitrates >> i & 1u) == 0) {
-            (void)snprintf(text, sizeof text, "no %u kbit/s (BaudRate_%u) -> [can] bitrate_bps", kbps, kbps);
+            (void)snprintf(text, sizeof text, _("no %u kbit/s (BaudRate_%u) -> [can] bitrate_bps"), kbps, kbps);
             say(self, DOCTOR_FAIL, text);
         }
     }
@@ -233,8 +241,8 @@ static void judge_mode(judge_t *self)
         (modes->fallback.value >> ((unsigned)self->drives->mode - 1u) & 1) != 0) {
         return;
     }
-    (void)snprintf(text, sizeof text, "6502h:00 (line %u) does not name mode %s (0x%" PRIX64 ") -> [cia402] mode", modes->line,
-                   k_names[self->drives->mode], modes->fallback.value);
+    (void)snprintf(text, sizeof text, _("6502h:00 (line %u) does not name mode %s (0x%llX) -> [cia402] mode"), modes->line,
+                   k_names[self->drives->mode], (unsigned long long)modes->fallback.value);
     say(self, DOCTOR_WARN, text);
 }
 
@@ -248,7 +256,9 @@ bool eds_judge(const eds_t *eds, const config_t *config, FILE *out)
     judge_identity(&self);
     judge_bitrate(&self);
     judge_mode(&self);
-    judge_mapping(&self);
+    for (unsigned k = 0; k < cylinders; k++) {
+        judge_mapping(&self, k);
+    }
     for (unsigned k = 0; k < cylinders; k++) {
         judge_wishes(&self, k);
     }
@@ -269,22 +279,22 @@ bool eds_judge(const eds_t *eds, const config_t *config, FILE *out)
 static const char *reason_to_leave(const eds_object_t *object)
 {
     if (object->parameter.has_node) {
-        return "depends on the node";
+        return _("depends on the node");
     }
     if (!object->is_writable) {
-        return "can only be read";
+        return _("can only be read");
     }
     if (object->index == 0x1010 || object->index == 0x1011) {
-        return "stores or restores";
-    }
-    if (cia402_is_own_object(object->index, object->sub)) {
-        return "is set by heaved itself, by the keys of [cia402]";
+        return _("stores or restores");
     }
     if ((object->index >= PDO_FIRST && object->index <= PDO_LAST) || (object->index >= SDO_FIRST && object->index <= SDO_LAST) ||
         object->index == 0x1005 || object->index == 0x1014) {
-        return "is a matter of the master";
+        return _("is a matter of the master");
     }
-    return eds_bytes(object) == 0 ? "is no whole number of up to 32 bits" : NULL;
+    if (cia402_is_own_object(object->index, object->sub)) {
+        return _("is set by heaved itself, by the keys of [cia402]");
+    }
+    return eds_bytes(object) == 0 ? _("is no whole number of up to 32 bits") : NULL;
 }
 
 void eds_write_startup(const eds_t *eds, FILE *out)
@@ -303,7 +313,7 @@ void eds_write_startup(const eds_t *eds, FILE *out)
             continue;
         }
         if (left == NULL && items++ >= CIA402_ITEMS_MAX) {
-            left = "is one too many: a list has up to 32; store the rest in the drive by its maker's program";
+            left = _("is one too many: a list has up to 32; store the rest in the drive by its maker's program");
         }
         if (left != NULL) {
             fprintf(out, "; 0x%04X:%02u %s\n", object->index, object->sub, left);
@@ -313,6 +323,6 @@ void eds_write_startup(const eds_t *eds, FILE *out)
         }
     }
     if (same > 0) {
-        fprintf(out, "; %u more hold their defaults\n", same);
+        fprintf(out, _("; %u more hold their defaults\n"), same);
     }
 }

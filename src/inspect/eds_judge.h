@@ -5,7 +5,7 @@
 #define HEAVE_INSPECT_EDS_JUDGE_H
 
 #include "config/config.h"
-#include "inspect/eds.h"
+#include "common/eds.h"
 
 /** Says which objects the cylinders' drives lack and which settings do not fit them.
  *  @param config  whose drives are CiA 402

@@ -8,6 +8,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "common/columns.h"
+#include "common/translate.h"
 #include "config/bus.h"
 #include "config/cia402.h" // config_cia402_pp_lag_q32
 #include "config/hash.h"
@@ -49,14 +51,14 @@ static double number_q16(q16_t value_q16)
 
 static void warn(report_t *self, const char *text)
 {
-    fprintf(self->out, "warning: %s\n", text);
+    fprintf(self->out, _("warning: %s\n"), translate(text));
     self->warnings++;
 }
 
 static void write_extensions(const report_t *self, const char *name, const pose_t *pose)
 {
     q32_t extension_q32[CYLINDERS_MAX] = {0};
-    fprintf(self->out, "%-24s", name);
+    columns_put(self->out, name, CONFIG_LABEL_COLUMNS - 2u);
     if (kin_inverse(&self->envelope.kin, pose, extension_q32) != HV_OK) {
         return;
     }
@@ -74,7 +76,8 @@ static void write_settled(const report_t *self)
     for (unsigned i = 0; i < self->envelope.cylinders; i++) {
         extension_q32[i] = q32_from_q16(self->settings->settled_extension_mm_q16);
     }
-    fprintf(self->out, "%-24s  %.3f mm of all cylinders", "settled", number_q16(self->settings->settled_extension_mm_q16));
+    columns_put(self->out, _("settled"), CONFIG_LABEL_COLUMNS);
+    fprintf(self->out, _("%.3f mm of all cylinders"), number_q16(self->settings->settled_extension_mm_q16));
     if (kin_forward(&self->envelope.kin, extension_q32, &guess, &pose, NULL) == HV_OK) {
         fprintf(self->out, ":");
         for (unsigned axis = 0; axis < POSE_AXES; axis++) {
@@ -94,24 +97,31 @@ static void write_bus(const report_t *self)
         return;
     }
     if (bus.section == NULL) {
-        fprintf(self->out, "%-24s  0 %% (simulated drives)\n", "bus load");
+        columns_put(self->out, _("bus load"), CONFIG_LABEL_COLUMNS);
+        fprintf(self->out, "%s\n", _("0 % (simulated drives)"));
         return;
     }
-    fprintf(self->out, "%-24s  %.1f %% at worst (%u us period, %u bit/s)\n", "bus load", config_bus_load_ppm(&bus) / 10000.0,
+    columns_put(self->out, _("bus load"), CONFIG_LABEL_COLUMNS);
+    fprintf(self->out, _("%.1f %% at worst (%u us period, %u bit/s)\n"), config_bus_load_ppm(&bus) / 10000.0,
             (unsigned)bus.period_us, (unsigned)bus.bitrate_bps);
 }
 
 static void write_head(const report_t *self, size_t ram_bytes)
 {
-    fprintf(self->out, "%-24s  %s, %u cylinders%s\n", "platform", config_kind_name(self->settings->geometry.kind),
-            self->envelope.cylinders, self->settings->has_angle ? ", rotation motor" : "");
-    fprintf(self->out, "%-24s  %s%s%s\n", "configuration", self->config->hash,
+    columns_put(self->out, _("platform"), CONFIG_LABEL_COLUMNS);
+    fprintf(self->out, _("%s, %u cylinders%s\n"), config_kind_name(self->settings->geometry.kind), self->envelope.cylinders,
+            self->settings->has_angle ? _(", rotation motor") : "");
+    columns_put(self->out, _("configuration"), CONFIG_LABEL_COLUMNS);
+    fprintf(self->out, "%s%s%s\n", self->config->hash,
             self->config->approved.text[0] == '\0' ? "" : ", [platform] approved = ", self->config->approved.text);
-    fprintf(self->out, "%-24s  %u us\n", "cycle", (unsigned)self->settings->cycle_us);
-    fprintf(self->out, "%-24s  %zu bytes\n", "memory of the gateway", ram_bytes);
+    columns_put(self->out, _("cycle"), CONFIG_LABEL_COLUMNS);
+    fprintf(self->out, "%u us\n", (unsigned)self->settings->cycle_us);
+    columns_put(self->out, _("memory of the gateway"), CONFIG_LABEL_COLUMNS);
+    fprintf(self->out, _("%zu bytes\n"), ram_bytes);
     write_bus(self);
     config_scaling_report(self->config, self->out);
-    fprintf(self->out, "%-24s  %u\n", "relays", self->settings->relays.count);
+    columns_put(self->out, _("relays"), CONFIG_LABEL_COLUMNS);
+    fprintf(self->out, "%u\n", self->settings->relays.count);
     write_settled(self);
 }
 
@@ -120,9 +130,9 @@ static const char *cause_text(unsigned cause, config_text_t *text)
 {
     config_text_clear(text);
     if (cause < CYLINDERS_MAX) {
-        config_text_add(text, "cylinder %u", cause + 1u);
+        config_text_add(text, _("cylinder %u"), cause + 1u);
     } else {
-        config_text_add(text, "%s", cause == ENVELOPE_SINGULAR ? "singularity" : "range");
+        config_text_add(text, "%s", cause == ENVELOPE_SINGULAR ? _("singularity") : _("range"));
     }
     return text->data;
 }
@@ -132,7 +142,8 @@ static void write_axis(const report_t *self, unsigned axis)
     const envelope_t *envelope = &self->envelope;
     const double slope = envelope->limits.rate[axis].slope;
     config_text_t low, high;
-    fprintf(self->out, "  %-6s %9.3f to %9.3f %-3s  ends at %s and %s; %.3f mm of a cylinder per %s, %.1f mm/s at full speed\n",
+    fprintf(self->out,
+            _("  %-6s %9.3f to %9.3f %-3s  ends at %s and %s; %.3f mm of a cylinder per %s, %.1f mm/s at full speed\n"),
             config_axis_section[axis], zero_free(envelope->low[axis].value), zero_free(envelope->high[axis].value),
             config_axis_unit(axis), cause_text(envelope->low[axis].cause, &low), cause_text(envelope->high[axis].cause, &high),
             slope, config_axis_unit(axis), slope * number_q16(self->settings->axis[axis].speed_q16));
@@ -140,14 +151,14 @@ static void write_axis(const report_t *self, unsigned axis)
 
 static void write_axes(const report_t *self)
 {
-    fprintf(self->out, "reach of each axis alone from neutral, its limits aside\n");
+    fprintf(self->out, _("reach of each axis alone from neutral, its limits aside\n"));
     for (unsigned axis = 0; axis < POSE_AXES; axis++) {
         if (self->envelope.has_axis[axis]) {
             write_axis(self, axis);
         }
     }
     if (self->settings->has_angle) {
-        fprintf(self->out, "  %-6s %9.3f to %9.3f deg  ends at limit and limit\n", config_axis_section[AXIS_ANGLE],
+        fprintf(self->out, _("  %-6s %9.3f to %9.3f deg  ends at limit and limit\n"), config_axis_section[AXIS_ANGLE],
                 number_q16(self->settings->axis[AXIS_ANGLE].min_q16), number_q16(self->settings->axis[AXIS_ANGLE].max_q16));
     }
 }
@@ -165,7 +176,8 @@ static double pair_share(const report_t *self, unsigned axis, unsigned other)
 
 static void write_pairs(const report_t *self)
 {
-    fprintf(self->out, "reach of two axes at once: so much of the reach of each, in the worst combination of senses\n        ");
+    fprintf(self->out,
+            _("reach of two axes at once: so much of the reach of each, in the worst combination of senses\n        "));
     for (unsigned axis = AXIS_PITCH; axis < POSE_AXES; axis++) {
         if (self->envelope.has_axis[axis]) {
             fprintf(self->out, "%8s", config_axis_section[axis]);
@@ -204,16 +216,18 @@ static void write_worst(const report_t *self)
 {
     const envelope_box_t *box = &self->envelope.limits;
     config_text_t pose;
-    fprintf(self->out, "%-24s  %.1f mm/s with all axes at full speed at once (%u poses); limit %.1f mm/s\n",
-            "worst cylinder speed", box->all_mm_s, box->poses, number_q16(self->settings->cylinder_speed_mm_s_q16));
-    fprintf(self->out, "%-24s  %.3f at neutral; %.3f at least within the limits, at %s; %.1f is too little\n",
-            "singularity margin", self->envelope.margin_at_neutral, box->margin, pose_text(self, &box->margin_pose, &pose),
+    columns_put(self->out, _("worst cylinder speed"), CONFIG_LABEL_COLUMNS);
+    fprintf(self->out, _("%.1f mm/s with all axes at full speed at once (%u poses); limit %.1f mm/s\n"), box->all_mm_s,
+            box->poses, number_q16(self->settings->cylinder_speed_mm_s_q16));
+    columns_put(self->out, _("singularity margin"), CONFIG_LABEL_COLUMNS);
+    fprintf(self->out, _("%.3f at neutral; %.3f at least within the limits, at %s; %.1f is too little\n"),
+            self->envelope.margin_at_neutral, box->margin, pose_text(self, &box->margin_pose, &pose),
             number(KIN_MARGIN_LEAST_Q32));
 }
 
 static void write_suggestions(const report_t *self)
 {
-    fprintf(self->out, "limits that each axis alone can have with these cylinders (%.5g mm/s, %.5g mm/s^2, %d mm/s^3)\n",
+    fprintf(self->out, _("limits that each axis alone can have with these cylinders (%.5g mm/s, %.5g mm/s^2, %d mm/s^3)\n"),
             number_q16(self->settings->cylinder_speed_mm_s_q16), number_q16(self->settings->cylinder_accel_mm_s2_q16),
             (int)self->settings->cylinder_jerk_mm_s3);
     for (unsigned axis = 0; axis < POSE_AXES; axis++) {
@@ -240,14 +254,14 @@ static void warn_reach(report_t *self, unsigned axis)
         return;
     }
     config_text_clear(&text);
-    config_text_add(&text, "[%s] limits %.3f to %.3f %s go beyond the reach:", config_axis_section[axis],
+    config_text_add(&text, _("[%s] limits %.3f to %.3f %s go beyond the reach:"), config_axis_section[axis],
                     number_q16(limits->min_q16), number_q16(limits->max_q16), unit);
     if (is_low) {
-        config_text_add(&text, " %s ends it at %.3f, set min_%s = %.6g%s", cause_text(envelope->low[axis].cause, &cause),
+        config_text_add(&text, _(" %s ends it at %.3f, set min_%s = %.6g%s"), cause_text(envelope->low[axis].cause, &cause),
                         envelope->low[axis].value, unit, envelope->suggested[axis].min, is_high ? ";" : "");
     }
     if (is_high) {
-        config_text_add(&text, " %s ends it at %.3f, set max_%s = %.6g", cause_text(envelope->high[axis].cause, &cause),
+        config_text_add(&text, _(" %s ends it at %.3f, set max_%s = %.6g"), cause_text(envelope->high[axis].cause, &cause),
                         envelope->high[axis].value, unit, envelope->suggested[axis].max);
     }
     warn(self, text.data);
@@ -262,8 +276,8 @@ static void warn_singularity(report_t *self)
     }
     config_text_clear(&text);
     config_text_add(&text,
-                    "poses within the limits are near a singularity: a margin of %.3f at %s, below %.1f: make the limits of "
-                    "these axes narrower",
+                    _("poses within the limits are near a singularity: a margin of %.3f at %s, below %.1f: make the limits of "
+                      "these axes narrower"),
                     box->margin, pose_text(self, &box->margin_pose, &pose), number(KIN_MARGIN_LEAST_Q32));
     warn(self, text.data);
 }
@@ -280,8 +294,8 @@ static void warn_acceleration(report_t *self, const char *section, const char *u
     }
     config_text_clear(&text);
     config_text_add(
-        &text, "[%s] the acceleration in force is %.1f of %.1f %s/s^2: speed, jerk and travel do not let it get higher", section,
-        number_q16(axis->accel_q16) * (double)ramp_safe_acceleration(&limits) / (double)limits.acc_per_cycle2_q32,
+        &text, _("[%s] the acceleration in force is %.1f of %.1f %s/s^2: speed, jerk and travel do not let it get higher"),
+        section, number_q16(axis->accel_q16) * (double)ramp_safe_acceleration(&limits) / (double)limits.acc_per_cycle2_q32,
         number_q16(axis->accel_q16), unit);
     warn(self, text.data);
 }
@@ -316,15 +330,16 @@ static double accel_in_force(const report_t *self, const axis_settings_t *axis)
 static void add_demand(config_text_t *text, const char *what, double asked, double limit, const char *unit, const char *key)
 {
     if (asked > limit) {
-        config_text_add(text, "%s its %s alone asks a cylinder for %.1f %s, above %s of [cylinders], %.1f",
+        config_text_add(text, _("%s its %s alone asks a cylinder for %.1f %s, above %s of [cylinders], %.1f"),
                         text->length > 0 ? ";" : "", what, asked, unit, key, limit);
     }
 }
 
-static void add_lower(config_text_t *text, const char *key, const char *unit, const char *per, double now, double lower)
+static void add_lower(config_text_t *text, size_t head, const char *key, const char *unit, const char *per, double now,
+                      double lower)
 {
     if (lower < now) {
-        config_text_add(text, "%s %s_%s_%s = %.6g", text->data[text->length - 1] == 't' ? "" : ",", key, unit, per, lower);
+        config_text_add(text, "%s %s_%s_%s = %.6g", text->length == head ? "" : ",", key, unit, per, lower);
     }
 }
 
@@ -341,18 +356,19 @@ static void warn_demand(report_t *self, unsigned axis)
     config_text_t text, whole;
     config_text_clear(&text);
     config_text_clear(&whole);
-    add_demand(&text, "speed", demand.speed_mm_s, number_q16(settings->cylinder_speed_mm_s_q16), "mm/s", "speed_mm_s");
-    add_demand(&text, "acceleration", demand.accel_mm_s2, number_q16(settings->cylinder_accel_mm_s2_q16), "mm/s^2",
+    add_demand(&text, _("speed"), demand.speed_mm_s, number_q16(settings->cylinder_speed_mm_s_q16), "mm/s", "speed_mm_s");
+    add_demand(&text, _("acceleration"), demand.accel_mm_s2, number_q16(settings->cylinder_accel_mm_s2_q16), "mm/s^2",
                "accel_mm_s2");
-    add_demand(&text, "jerk", demand.jerk_mm_s3, settings->cylinder_jerk_mm_s3, "mm/s^3", "jerk_mm_s3");
+    add_demand(&text, _("jerk"), demand.jerk_mm_s3, settings->cylinder_jerk_mm_s3, "mm/s^3", "jerk_mm_s3");
     if (text.length == 0) {
         return;
     }
     envelope_suggest(settings, rate, &lower);
-    config_text_add(&whole, "[%s]%s: set", config_axis_section[axis], text.data);
-    add_lower(&whole, "speed", config_axis_unit(axis), "s", now.speed, lower.speed);
-    add_lower(&whole, "accel", config_axis_unit(axis), "s2", now.accel, lower.accel);
-    add_lower(&whole, "jerk", config_axis_unit(axis), "s3", now.jerk, lower.jerk);
+    config_text_add(&whole, _("[%s]%s: set"), config_axis_section[axis], text.data);
+    const size_t head = whole.length;
+    add_lower(&whole, head, "speed", config_axis_unit(axis), "s", now.speed, lower.speed);
+    add_lower(&whole, head, "accel", config_axis_unit(axis), "s2", now.accel, lower.accel);
+    add_lower(&whole, head, "jerk", config_axis_unit(axis), "s3", now.jerk, lower.jerk);
     warn(self, whole.data);
 }
 
@@ -376,14 +392,24 @@ static void warn_bus(report_t *self)
     }
     const uint32_t fitting_us = config_bus_fitting_us(&bus, CONFIG_BUS_WARNED_PPM, self->settings->cycle_us);
     config_text_clear(&text);
-    config_text_add(&text, "[%s] period_us loads the bus by %.1f %% at worst: a repeated frame makes the next ones late; ",
+    config_text_add(&text, _("[%s] period_us loads the bus by %.1f %% at worst: a repeated frame makes the next ones late; "),
                     bus.section, config_bus_load_ppm(&bus) / 10000.0);
     if (fitting_us == 0) {
-        config_text_add(&text, "a higher bitrate_bps helps");
+        config_text_add(&text, _("a higher bitrate_bps helps"));
     } else {
-        config_text_add(&text, "%u us give %u %%", (unsigned)fitting_us, CONFIG_BUS_WARNED_PPM / 10000u);
+        config_text_add(&text, _("%u us give %u %%"), (unsigned)fitting_us, CONFIG_BUS_WARNED_PPM / 10000u);
     }
     warn(self, text.data);
+}
+
+static bool has_mode_pp(const config_t *config)
+{
+    for (unsigned i = 0; i < config->cia402.mode.count; i++) {
+        if (config->cia402.mode.word[i] == CONFIG_MODE_PP) {
+            return true;
+        }
+    }
+    return false;
 }
 
 /* In profile position drives may do no more than follow poses that are rare and near. */
@@ -391,7 +417,7 @@ static void warn_profile_lag(report_t *self)
 {
     const config_t *config = self->config;
     config_text_t text;
-    if (config->drives != CONFIG_DRIVES_CIA402 || config->cia402.mode != CONFIG_MODE_PP) {
+    if (config->drives != CONFIG_DRIVES_CIA402 || !has_mode_pp(config)) {
         return;
     }
     const q32_t lag_q32 = config_cia402_pp_lag_q32(config, config->settings.cylinder_speed_mm_s_q16);
@@ -399,8 +425,8 @@ static void warn_profile_lag(report_t *self)
         config_text_clear(&text);
         config_text_add(
             &text,
-            "[cia402] mode = pp: at [cylinders] speed_mm_s a drive is %.1f mm behind, and following_error_mm stops it before; "
-            "slower, or csp",
+            _("[cia402] mode = pp: at [cylinders] speed_mm_s a drive is %.1f mm behind, and following_error_mm stops it before; "
+              "slower, or csp"),
             (double)lag_q32 / (double)Q32_ONE);
         warn(self, text.data);
     }
@@ -451,8 +477,8 @@ int report_write(const config_t *config, size_t ram_bytes, FILE *out)
         return 1; /* not a configuration that config_load() accepted */
     }
     write_head(&self, ram_bytes);
-    write_extensions(&self, "extension at pose zero", &zero);
-    write_extensions(&self, "extension at neutral", &self.envelope.neutral);
+    write_extensions(&self, _("extension at pose zero"), &zero);
+    write_extensions(&self, _("extension at neutral"), &self.envelope.neutral);
     write_axes(&self);
     write_pairs(&self);
     write_worst(&self);

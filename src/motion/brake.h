@@ -12,17 +12,17 @@
 
 #include "heave/ramp.h"
 
-/** Signed distance from here to rest under the quickest stop (velocity and acceleration both end at 0). */
+/** Signed distance to rest under the quickest stop (velocity and acceleration both end at 0). */
 q32_t brake_distance(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32);
 
-/** Farthest the position still rises above where it is, exact in integers, when every cycle from now on takes the full jerk
- *  downwards (until -acc_safe): never below 0. Braking the other way is the mirror image. */
+/** Largest distance by which the position still rises if every cycle from now on takes the full jerk downwards (until
+ * -acc_safe). Exact in integers, never below 0. Braking in the other direction is the mirror image. */
 q32_t brake_peak(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32);
 
-/** Velocity the axis still reaches when acc is taken back to 0 with full jerk, exact in integers; acc >= 0. */
+/** Velocity that the axis still reaches if acc goes back to 0 with full jerk. Exact in integers; acc >= 0. */
 q32_t brake_velocity_peak(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32);
 
-/** brake_velocity_peak() is at or below `most`; acc in [0, acc_safe]. As a rule without a division. */
+/** True if brake_velocity_peak() is at or below most_q32; acc in [0, acc_safe]. Usually needs no division. */
 bool brake_keeps_velocity(const ramp_t *ramp, q32_t vel_q32, q32_t acc_q32, q32_t most_q32);
 
 /** Largest acceleration for the next cycle from which the velocity can be kept at or below vel + room; room >= 0. */

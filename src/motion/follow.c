@@ -14,10 +14,10 @@
 #include "active_axis.h"
 #include "axis_targets.h"
 
-#define INSTANT_MS     5                         /* no move is as short: frames with such a T ... */
+#define INSTANT_MS     5                         /* no move is this short: frames with such a T ... */
 #define INSTANT_GAP_US 20000                     /* ... that follow each other so closely are a stream like frames without T */
 #define HIDDEN_Q58     ((int64_t)1 << (58 - 10)) /* a share of 1/1024 */
-#define PERIODS_STATED 5                         /* senders that stream write up to so many periods as T */
+#define PERIODS_STATED 5                         /* a streaming sender writes at most this many periods as T */
 
 bool follow_is_moving(const motion_t *self)
 {
@@ -71,7 +71,7 @@ static void adopt_pose(motion_t *self)
     }
 }
 
-/* Goes over to a space; the other one's set-points are where it starts. */
+/* Changes to another space. It starts from the set-points of the present one. */
 static void enter_space(motion_t *self)
 {
     self->is_space_new = false;
@@ -206,7 +206,7 @@ static void change_space(motion_t *self, motion_space_t space)
     spike_filter_reset(&self->gate);
 }
 
-/* True if the sample of a stream of poses is held back for the next one to confirm. */
+/* True if a pose of a stream is withheld until the next one confirms it. */
 static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
     const uint32_t period_us = stream_is_live(&self->stream, now_us) ? stream_period_us(&self->stream) : 0;
@@ -224,7 +224,7 @@ static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t 
 static void take_target(motion_t *self, const motion_target_t *target, bool is_sample, uint32_t hint_us, uint64_t now_us)
 {
     axis_targets_take(self, target, self->slot_q32, self->slot_extension_mm_q32);
-    self->pending = *target; /* has_pending: where it has to wait for a stop after all */
+    self->pending = *target; /* has_pending is set if it has to wait for a stop */
     self->asked_cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
     self->timed_end_us = is_sample ? 0 : now_us + (uint64_t)self->asked_cycles * self->cycle_us;
     self->is_stretched = false;
@@ -276,7 +276,7 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
     }
 }
 
-/* A stream that ended with a sample that is withheld rests there. */
+/* A stream whose last sample was withheld ends at this sample. */
 static void take_last_word(motion_t *self, uint64_t now_us)
 {
     if (spike_filter_is_overdue(&self->gate, now_us)) {
@@ -285,7 +285,7 @@ static void take_last_word(motion_t *self, uint64_t now_us)
     }
 }
 
-/* A step to where the plan leads anyway. */
+/* A step to the end of the present plan. */
 static bool is_on_the_way(const motion_t *self)
 {
     const q32_t *to_q32 = self->source == MOTION_TIMED ? self->plan.quintic.target_q32 : self->plan.straight.to_q32;
@@ -299,8 +299,8 @@ static bool is_on_the_way(const motion_t *self)
     return i == self->planned_slots && axis_targets_is_planned(self, self->slot_q32);
 }
 
-/* What is faded in has not gone through a ramp: a sender may ask for far more than there is, and a plan that went on from there
- * would take hours to come back. A little more than the limits is only rounding. */
+/* References that are faded in have not passed a ramp. A sender may request far more than the limits, and a plan that started
+ * from there would take hours to come back. A little more than the limits is only rounding. */
 static bool is_led_beyond(const motion_t *self)
 {
     bool is_beyond = false;
@@ -312,7 +312,7 @@ static bool is_led_beyond(const motion_t *self)
     return is_beyond;
 }
 
-/* The take-over begins anew, from where the cylinders are. */
+/* Starts the take-over again, from the present extensions. */
 static void take_over_again(motion_t *self)
 {
     self->due = DUE_NOTHING;
@@ -320,7 +320,7 @@ static void take_over_again(motion_t *self)
     self->has_pending = true;
 }
 
-/* Plans what the targets of this cycle ask for. */
+/* Makes the plan for the targets of this cycle. */
 static void plan_what_is_due(motion_t *self, uint64_t now_us)
 {
     const motion_due_t due = self->due;
@@ -358,7 +358,7 @@ void follow_begin(motion_t *self, uint64_t now_us)
     }
 }
 
-/* A stop, and the straight way that begins in it. */
+/* A stop, and the straight move that begins during it. */
 static void step_stop_and_straight(motion_t *self, ramp_ref_t ref[AXES_MAX])
 {
     motion_straight_t *way = &self->plan.straight;
@@ -397,7 +397,7 @@ static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
     axis_targets_shift_refs(self, ref);
 }
 
-/* Fades a sender in, at engage speed beside its own. */
+/* Fades a sender in. The fading adds at most engage speed to its own motion. */
 static void take_over(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
     pose_t pose;
@@ -434,7 +434,7 @@ static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t 
     }
     kin_constrain(&self->kin, planned);
     const unsigned cylinder = workspace_pull_in(self, planned, extension_mm_q32, NULL);
-    kin_constrain(&self->kin, planned); /* what is parasitic is not on the straight way the pose was pulled along */
+    kin_constrain(&self->kin, planned); /* the parasitic axes are not on the straight line along which the pose was pulled in */
     out->limiting_cylinder = cylinder != 0 ? (uint8_t)cylinder : self->limiting_cylinder;
     for (unsigned i = 0; i < self->cylinders; i++) {
         ref[i] = history_advance(&self->reference[i], extension_mm_q32[i]);
@@ -457,7 +457,7 @@ static void step_slots(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t
     }
 }
 
-/* A step on its way at a speed limit. */
+/* A step in progress at a speed limit. */
 static bool is_step_cruising(const motion_t *self)
 {
     const scurve_t *path = &self->plan.straight.path;

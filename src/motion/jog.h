@@ -6,6 +6,22 @@
 
 #include "heave/motion.h"
 
+/** The limiter of an axis where nothing leads it: a cylinder, or AXIS_ANGLE. */
+ramp_t *jog_own_ramp(motion_t *self, unsigned axis);
+
+/** True where a jog may begin. */
+bool jog_is_ready(const motion_t *self);
+
+/** Where the platform is, exactly.
+ *  @return false: no pose belongs to the extensions */
+bool jog_find_here(const motion_t *self, q32_t from_q32[POSE_AXES]);
+
+/** True where every cylinder is within its stroke, or at least no further out than now, and the cylinders hold the plate. */
+bool jog_is_reached(const motion_t *self, const pose_t *pose);
+
+/** Leads axes along plan.straight. @param led bit i: this axis */
+void jog_begin(motion_t *self, uint32_t led, bool is_posed, const path_limits_t *limits);
+
 /** References of MOTION_JOGGED. */
 void jog_refer(motion_t *self, ramp_ref_t ref[AXES_MAX]);
 

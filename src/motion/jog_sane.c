@@ -32,11 +32,16 @@ bool jog_is_sane(const motion_t *saved, const motion_t *prepared)
     const jog_t *jog = &saved->jog;
     const uint32_t all = ((1u << saved->cylinders) - 1u) | 1u << AXIS_ANGLE;
     bool is_sane = are_limits_same(&saved->jog_limits.cylinder, &prepared->jog_limits.cylinder) &&
-                   saved->jog_limits.deg_per_cycle_q32 == prepared->jog_limits.deg_per_cycle_q32 && sane_bool(&jog->is_serving) &&
-                   sane_bool(&jog->is_posed) && (jog->led & ~all) == 0 &&
+                   saved->jog_limits.deg_per_cycle_q32 == prepared->jog_limits.deg_per_cycle_q32 &&
+                   saved->jog_limits.signal_mm_q32 == prepared->jog_limits.signal_mm_q32 &&
+                   saved->jog_limits.signal_deg_q32 == prepared->jog_limits.signal_deg_q32 &&
+                   saved->jog_limits.signal_mm_per_cycle_q32 == prepared->jog_limits.signal_mm_per_cycle_q32 &&
+                   sane_bool(&jog->is_serving) && sane_bool(&jog->is_posed) && sane_bool(&jog->is_excited) &&
+                   (!jog->is_excited || excitation_is_sane(&jog->signal)) && (jog->led & ~all) == 0 &&
                    (jog->is_serving || (jog->led == 0 && saved->source != MOTION_JOGGED));
     for (unsigned i = 0; is_sane && i < AXES_MAX; i++) {
-        const ramp_limits_t *own = i == AXIS_ANGLE ? &prepared->axis[AXIS_ANGLE].limits : &prepared->jog_limits.cylinder;
+        const ramp_limits_t *ride = i == AXIS_ANGLE ? &prepared->axis[AXIS_ANGLE].limits : &prepared->cylinder[i].limits;
+        const ramp_limits_t *own = i == AXIS_ANGLE || jog->is_excited ? ride : &prepared->jog_limits.cylinder;
         is_sane = (jog->led >> i & 1u) == 0 || is_ramp_sane(&jog->ramp[i], own);
     }
     return is_sane;

@@ -385,6 +385,11 @@ bool motion_is_done(const motion_t *self)
     return self->source == MOTION_RESTING && motion_is_at_rest(self);
 }
 
+bool motion_is_stopping(const motion_t *self)
+{
+    return self->source == MOTION_STOPPING;
+}
+
 q32_t motion_angle_target(const motion_t *self)
 {
     return self->angle_target_deg_q32;

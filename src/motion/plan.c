@@ -94,16 +94,21 @@ static bool try_quintic(motion_t *self, const task_t *task, int64_t cycles)
     return keeps_limits(self, task) && (self->space != MOTION_POSE || path_check_is_feasible(self, &self->plan.quintic));
 }
 
-/* A stop of all slots together from where a task starts. */
+/* A stop of all slots together from where a task starts, which the cylinders can go along with. */
 HV_OWN_FRAME static void sync_stop_slots(motion_t *self, const task_t *task)
 {
     const ramp_limits_t *limits[AXES_MAX];
     sync_stop_t *halt = &self->halt;
+    sync_stop_riders_t riders = {.count = self->space == MOTION_POSE ? self->cylinders : 0};
+    for (unsigned i = 0; i < riders.count; i++) {
+        riders.state[i] = &self->cylinder[i].state;
+        riders.limits[i] = &self->cylinder[i].limits;
+    }
     for (unsigned i = 0; i < task->slots; i++) {
         limits[i] = active_axis_limits(self, i);
         halt->start[i] = start_of(self, task, i);
     }
-    sync_stop_plan(halt, task->slots, POSE_AXES, halt->start, limits);
+    sync_stop_plan(halt, task->slots, POSE_AXES, halt->start, limits, &riders);
 }
 
 /* The straight way between two points of the slots, as a path with the limits of axes and cylinders. */

@@ -32,7 +32,7 @@ static int64_t product(int64_t a, int64_t b, int64_t most)
 }
 
 /* Sums of the jerk pattern lie between their ends. */
-static bool is_scurve_sane(const scurve_t *path)
+bool plan_scurve_is_sane(const scurve_t *path)
 {
     if (!is_within(path->nj, 1, COUNT_MAX) || !is_within(path->na, 0, COUNT_MAX) || !is_within(path->nv, 0, CYCLES_MAX)) {
         return false;
@@ -45,7 +45,8 @@ static bool is_scurve_sane(const scurve_t *path)
 
 bool plan_straight_is_sane(const motion_straight_t *way)
 {
-    bool is_sane = is_scurve_sane(&way->path) && sane_all_q32(way->from_q32, AXES_MAX) && sane_all_q32(way->to_q32, AXES_MAX);
+    bool is_sane =
+        plan_scurve_is_sane(&way->path) && sane_all_q32(way->from_q32, AXES_MAX) && sane_all_q32(way->to_q32, AXES_MAX);
     for (unsigned i = 0; i < AXES_MAX; i++) {
         is_sane = is_sane && is_history_sane(&way->history[i]);
     }

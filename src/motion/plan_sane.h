@@ -10,6 +10,9 @@
 /** The plan of the present source, and the stop if one is in progress; others are planned anew before they are used. */
 bool plan_is_sane(const motion_t *saved);
 
+/** A move of a path. */
+bool plan_scurve_is_sane(const scurve_t *path);
+
 /** A straight move. */
 bool plan_straight_is_sane(const motion_straight_t *way);
 

@@ -26,7 +26,7 @@ static void plan_stop(motion_t *self)
         halt->start[i] = ramp->state;
         limits[i] = &ramp->limits;
     }
-    sync_stop_plan(halt, AXES_MAX, CYLINDERS_MAX, halt->start, limits);
+    sync_stop_plan(halt, AXES_MAX, CYLINDERS_MAX, halt->start, limits, NULL);
     self->source = MOTION_STOPPING;
     self->angle_target_deg_q32 = halt->rest_q32[AXIS_ANGLE];
 }

@@ -5,6 +5,7 @@
  */
 #include "heave/stream.h"
 #include "stream_clock.h"
+#include "stream_control.h"
 #include "stream_curve.h"
 #include "stream_evidence.h"
 #include "stream_repeat.h"
@@ -25,7 +26,6 @@
 #define FEW                  16    /* grains in a step that tells too little */
 #define JUDGED_MAX           4u    /* periods that values are weighed for */
 #define SAME_US              2000u /* while the period is not known */
-#define YOUNG                3     /* samples */
 #define PAIR                 2u    /* samples that are steps; with the next one they are a stream, ... */
 #define BEGIN_US             (3 * STREAM_PERIOD_MIN_US) /* ... but of a flood, with those of so long */
 
@@ -359,7 +359,8 @@ static void take_sample(stream_t *self, uint64_t now_us, const kin_t *kin, const
         start_curve(self, kin, interval_us, sample_q32);
         return;
     }
-    stream_curve_average(&self->curve, self->evidence.weight_q32, stream_clock_is_gappy(&self->clock));
+    stream_control_lead(&self->curve, self->evidence.weight_q32, stream_clock_is_gappy(&self->clock),
+                        (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16));
     if (self->phase == STREAM_LONE) {
         self->pair++;
         self->pair_gap_us = interval_us > self->pair_gap_us ? interval_us : self->pair_gap_us;
@@ -412,6 +413,24 @@ static void advance(stream_t *self, uint64_t now_us, const kin_t *kin)
     self->rate_q32[1] += fx_mul_shift_fit(self->rate_q32[0] - self->rate_q32[1], filter, 32);
 }
 
+/* Of what is not negative: four instructions instead of ten. */
+static int64_t sixth(int64_t value)
+{
+    return (int64_t)((uint64_t)value / 6);
+}
+
+/* Cumulative weights of the cubic B-spline. Q60: sums up to 5 occur. */
+static void weigh(q32_t between_q32, int64_t weight_q60[3])
+{
+    const int64_t one = Q62_ONE / 4;
+    const int64_t u = between_q32 * (one / Q32_ONE);
+    const int64_t u2 = (int64_t)(((uint64_t)between_q32 * (uint64_t)between_q32 + 8) / 16); /* Q64, rounded to Q60 */
+    const int64_t u3 = fx_mul_shift_fit(u2, u, 60);
+    weight_q60[0] = sixth(5 * one + 3 * (u - u2) + u3);
+    weight_q60[1] = sixth(one + 3 * (u + u2) - 2 * u3);
+    weight_q60[2] = sixth(u3);
+}
+
 bool stream_step(stream_t *self, uint64_t now_us, const kin_t *kin, ramp_ref_t *ref)
 {
     if (self->phase == STREAM_EMPTY) {
@@ -427,7 +446,7 @@ bool stream_step(stream_t *self, uint64_t now_us, const kin_t *kin, ramp_ref_t *
     const unsigned axes = self->curve.axes;
     const bool is_fresh = self->is_fresh;
     int64_t weight_q60[3];
-    stream_curve_weigh(self->between_q32, weight_q60);
+    weigh(self->between_q32, weight_q60);
     for (unsigned axis = 0; axis < axes; axis++) {
         const q32_t pos_q32 = stream_curve_at(&self->curve, axis, weight_q60);
         if (is_fresh) {
@@ -450,53 +469,4 @@ bool stream_goes_on(const stream_t *self, uint64_t now_us)
 bool stream_is_live(const stream_t *self, uint64_t now_us)
 {
     return self->phase == STREAM_RUNNING && stream_clock_is_live(&self->clock, now_us);
-}
-
-uint32_t stream_period_us(const stream_t *self)
-{
-    return self->phase == STREAM_RUNNING ? (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16) : 0;
-}
-
-uint32_t stream_frame_us(const stream_t *self)
-{
-    return self->phase == STREAM_RUNNING && self->repeat.each > 1 ? self->repeat.span_us / self->repeat.frames
-                                                                  : stream_period_us(self);
-}
-
-uint32_t stream_delay_us(const stream_t *self)
-{
-    if (self->phase != STREAM_RUNNING) {
-        return 0;
-    }
-    const int64_t period = self->clock.period_us_q16;
-    const stream_curve_t *curve = &self->curve;
-    const q32_t led_q32 = fx_mul_shift(curve->lead_q32, curve->led_q32, 32);
-    const q32_t mean_q32 = curve->mean_q32 / 2 * ((int64_t)curve->mean_points - 1);
-    const int64_t spline = 2 * period - fx_mul_shift(period, led_q32 - mean_q32, 32) + (curve->window - 1) * period * 3 / 2;
-    const int64_t smoothing = (int64_t)governor_delay_us(&self->curve.governor) * STREAM_US_Q16;
-    const int64_t behind = fx_mul_shift(period, self->error_q32, 32);
-    return (uint32_t)(fx_clamp(spline + smoothing + self->clock.margin_us_q16 + behind, 0, INT64_MAX) / STREAM_US_Q16);
-}
-
-static uint32_t us_of(int64_t us_q16)
-{
-    return (uint32_t)(fx_clamp(us_q16, 0, (int64_t)UINT32_MAX * STREAM_US_Q16) / STREAM_US_Q16);
-}
-
-stream_report_t stream_report(const stream_t *self)
-{
-    const stream_clock_t *clock = &self->clock;
-    if (self->phase != STREAM_RUNNING) {
-        return (stream_report_t){.sender = STREAM_SENDER_UNKNOWN};
-    }
-    const bool is_arrived = self->evidence.weight_q32 > Q32_ONE / 2;
-    return (stream_report_t){.sender = is_arrived                      ? STREAM_SENDER_ARRIVALS
-                                       : stream_clock_is_bursty(clock) ? STREAM_SENDER_BURSTS
-                                                                       : STREAM_SENDER_EVEN,
-                             .period_us = stream_period_us(self) * clock->each,
-                             .jitter_us = us_of(clock->jitter_us_q16),
-                             .lost_permille = stream_clock_lost_permille(clock),
-                             .delay_us = stream_delay_us(self),
-                             .wait_us = us_of(clock->margin_us_q16),
-                             .smoothing_us = governor_delay_us(&self->curve.governor)};
 }

@@ -28,6 +28,7 @@ enum {
 #define MARGIN_MIN_Q16  ((int64_t)500 * STREAM_US_Q16)
 #define MARGIN_FREE_Q16 ((int64_t)200 * STREAM_US_Q16)
 #define MARGIN_FALL_Q16 ((int64_t)5000000 * STREAM_US_Q16) /* the time in which a margin that is not needed falls to 1/e */
+#define FAST_US         16000                              /* the line of a sender that is faster is found from more samples */
 #define AWAY_US         1000000u
 #define ELAPSED_MAX_US  4000000u /* far beyond the end of any curve */
 
@@ -348,6 +349,17 @@ void stream_clock_set_period(stream_clock_t *self, uint32_t period_us)
     set_period(self, (int64_t)period_us * STREAM_US_Q16);
 }
 
+/* Most samples that the line is found from. Of a fast sender lateness is a larger part of a period: what is left of it stays the
+ * same part where the number of samples rises with the square of the rate. Where lateness makes the count of periods doubtful, a
+ * long memory would keep its errors. */
+static unsigned most_memory(const stream_clock_t *self)
+{
+    const int64_t period_us = self->period_us_q16 / STREAM_US_Q16;
+    const int64_t samples = (int64_t)MEMORY * 4 / 3 * FAST_US * FAST_US / (period_us * period_us);
+    return period_us < FAST_US && stream_clock_is_even(self) ? (unsigned)fx_clamp(samples, MEMORY, STREAM_CLOCK_MEMORY_MAX)
+                                                             : MEMORY;
+}
+
 /* A line that lateness leaves slowly but far is that of another pace: a game whose frames take ever longer. Jitter, bursts and
  * stalls change the lateness from sample to sample. */
 static void adapt_memory(stream_clock_t *self, int64_t was_us_q16)
@@ -356,8 +368,9 @@ static void adapt_memory(stream_clock_t *self, int64_t was_us_q16)
     self->drift_us_q16 += (self->late_us_q16 - self->drift_us_q16) / DRIFT;
     if (fx_abs(self->drift_us_q16) > DRIFTS * self->rough_us_q16) {
         self->memory = self->memory > MEMORY_LEAST + MEMORY_FALL ? self->memory - MEMORY_FALL : MEMORY_LEAST;
-    } else if (self->memory < MEMORY) {
-        self->memory++;
+    } else {
+        const unsigned most = most_memory(self);
+        self->memory = self->memory < most ? self->memory + 1 : most;
     }
 }
 
@@ -447,7 +460,7 @@ bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods)
         record_gap(self, gap_us, periods);
         count_losses(self, periods);
     }
-    self->settled += self->settled < MEMORY ? 1u : 0u;
+    self->settled += self->settled < STREAM_CLOCK_MEMORY_MAX ? 1u : 0u;
     if (self->period_us_q16 == 0) {
         set_period(self, gap_us_q16);
         return false;

@@ -10,10 +10,11 @@
 #define STREAM_US_Q16 ((int64_t)Q16_ONE) /* 1 us */
 
 enum {
-    STREAM_CLOCK_MEMORY = 48,      /**< samples that the line is found from */
-    STREAM_CLOCK_HALVES = 4,       /**< samples half-way between two of the line that tell twice its rate */
-    STREAM_CLOCK_STALLED = 2,      /**< samples at the usual pace that tell that a sender stood still */
-    STREAM_CLOCK_LOST_MEMORY = 256 /**< samples that losses are counted in */
+    STREAM_CLOCK_MEMORY = 48,       /**< samples that the line is found from */
+    STREAM_CLOCK_MEMORY_MAX = 1024, /**< ... of a fast sender */
+    STREAM_CLOCK_HALVES = 4,        /**< samples half-way between two of the line that tell twice its rate */
+    STREAM_CLOCK_STALLED = 2,       /**< samples at the usual pace that tell that a sender stood still */
+    STREAM_CLOCK_LOST_MEMORY = 256  /**< samples that losses are counted in */
 };
 
 /** Forgets everything but what the sender states; the first sample came at now_us. */

@@ -8,13 +8,16 @@
 
 #include "heave/stream.h"
 
-#define STREAM_CURVE_LED_Q32 (Q32_ONE * 7 / 10) /**< periods that control points are led ahead of their points, if balanced */
+#define STREAM_CURVE_LED_Q32      (Q32_ONE * 7 / 10) /**< periods that control points are led ahead of their points, if balanced */
+#define STREAM_CURVE_PULL_MAX_Q32 (2 * Q32_ONE)      /**< of a motion to and fro in four samples: of fewer they tell none */
 
 enum {
     STREAM_CURVE_AGE_MAX = 100,  /**< samples after which an axis may move as fast as it can */
     STREAM_CURVE_AHEAD_MAX = 28, /**< samples kept that are not committed; the ring has room for the longest mean of led points
                                       behind them */
-    STREAM_CURVE_MEAN_MAX = 5    /**< points of which one is the mean, where samples belong to their arrivals */
+    STREAM_CURVE_FITTED_MIN = 8, /**< points that a motion to and fro is found from */
+    STREAM_CURVE_FITTED_MAX = 24,
+    STREAM_CURVE_MEAN_MAX = 5 /**< points of which one is the mean, where samples belong to their arrivals */
 };
 
 /** A curve that has always rested on the sample. */
@@ -23,9 +26,6 @@ void stream_curve_start(stream_curve_t *self, const kin_t *kin, const q32_t *sam
 /** Tells the period: how long a motion is kept up where samples are missing, and how firmly the curve comes back to them; and
  * the style: how far control points are led ahead of the points. */
 void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t period_us, uint32_t cycle_us, bool is_lossy);
-
-/** Samples belong to their arrivals by that share, [0, Q32_ONE]; many are lost. */
-void stream_curve_average(stream_curve_t *self, q32_t arrived_q32, bool is_lossy);
 
 /** Adds a sample the given number of periods after the newest; 0: in the place of the newest.
  *  @param is_of_stall others will follow it in a burst: its index is believed however late it is
@@ -51,10 +51,6 @@ void stream_curve_commit(stream_curve_t *self, const kin_t *kin);
 
 /** True once the curve rests exactly on the newest sample. */
 bool stream_curve_is_at_rest(const stream_curve_t *self);
-
-/** Weights of the ways between the control points at a phase after the commit of the newest point.
- *  @param between_q32 [0, 1)   @param weight_q60 out, each from 0 to 1 */
-void stream_curve_weigh(q32_t between_q32, int64_t weight_q60[3]);
 
 /** Position of an axis at that phase. Q36 times Q60 is Q32 by 2^64, which costs no shifts. */
 static inline q32_t stream_curve_at(const stream_curve_t *self, unsigned axis, const int64_t weight_q60[3])

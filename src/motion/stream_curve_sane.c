@@ -38,7 +38,9 @@ static bool is_lead_sane(const stream_lead_t *lead)
 {
     return stream_sane_within(lead->first_q32, -POINT_Q32, POINT_Q32) &&
            stream_sane_within(lead->go_q32, -POINT_Q32, POINT_Q32) && lead->rise_q32 <= Q32_ONE / 2 &&
-           stream_sane_within(lead->reach_q16, 0, REACH_MAX) && stream_sane_within(lead->full_q16, 0, lead->reach_q16);
+           stream_sane_within(lead->reach_q16, 0, REACH_MAX) && stream_sane_within(lead->full_q16, 0, lead->reach_q16) &&
+           stream_sane_within(lead->bend_q32, -POINT_Q32, POINT_Q32) &&
+           stream_sane_within(lead->pull_q32, 0, STREAM_CURVE_PULL_MAX_Q32);
 }
 
 /* The weights of a mean of coarse values are so many in sum. */
@@ -61,20 +63,22 @@ static bool is_pace_sane(const stream_curve_t *curve, stream_style_t style, bool
 {
     if (!is_running && curve->period_cycles_q16 == 0) {
         return curve->lead_q32 == 0 && curve->reach_min_q16 == 0 && curve->reach_max_q16 == 0 && curve->softest_q32 == 0 &&
-               curve->patience == 0;
+               curve->patience == 0 && curve->fitted == 0;
     }
     return stream_sane_within(curve->period_cycles_q16, CYCLES_MIN, CYCLES_MAX) &&
            curve->lead_q32 == (style == STREAM_BALANCED ? STREAM_CURVE_LED_Q32 : 0) &&
            stream_sane_within(curve->reach_min_q16, 0, REACH_MAX) && stream_sane_within(curve->reach_max_q16, 0, REACH_MAX) &&
            stream_sane_within(curve->softest_q32, SOFT_MIN_Q32, GRIP_MAX_Q32) &&
-           stream_sane_within(curve->patience, 1, PATIENCE_MAX);
+           stream_sane_within(curve->patience, 1, PATIENCE_MAX) &&
+           stream_sane_within(curve->fitted, STREAM_CURVE_FITTED_MIN, STREAM_CURVE_FITTED_MAX);
 }
 
 static bool are_axes_sane(const stream_curve_t *curve)
 {
-    bool is_sane = stream_sane_all(curve->control_q32, AXES_MAX, CONTROL_Q32) &&
-                   stream_sane_all(curve->newest_q32, AXES_MAX, POINT_Q32) &&
-                   stream_sane_all(curve->last_q32, AXES_MAX, POINT_Q32);
+    bool is_sane =
+        stream_sane_all(curve->control_q32, AXES_MAX, CONTROL_Q32) && stream_sane_all(curve->low_q32, AXES_MAX, CONTROL_Q32) &&
+        stream_sane_all(curve->high_q32, AXES_MAX, CONTROL_Q32) && stream_sane_all(curve->newest_q32, AXES_MAX, POINT_Q32) &&
+        stream_sane_all(curve->last_q32, AXES_MAX, POINT_Q32);
     for (unsigned i = 0; i < 3; i++) {
         is_sane = is_sane && stream_sane_all(curve->way_q36[i], AXES_MAX, WAY_Q36) &&
                   stream_sane_all(curve->was_q32[i], AXES_MAX, CONTROL_Q32);

@@ -53,7 +53,7 @@ static bool are_times_sane(const stream_clock_t *clock)
 
 static bool are_counts_sane(const stream_clock_t *clock, bool is_empty)
 {
-    return clock->settled <= STREAM_CLOCK_MEMORY && clock->memory <= STREAM_CLOCK_MEMORY &&
+    return clock->settled <= STREAM_CLOCK_MEMORY_MAX && clock->memory <= STREAM_CLOCK_MEMORY_MAX &&
            clock->counted <= STREAM_CLOCK_LOST_MEMORY && stream_sane_within(clock->lost_q16, 0, 8 * Q16_ONE) &&
            clock->each <= UINT16_MAX && (clock->each > 0 || is_empty) && clock->stalled < STREAM_CLOCK_STALLED &&
            clock->between <= COUNT_MAX && sane_bool(&clock->is_sparse);

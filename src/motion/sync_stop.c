@@ -4,7 +4,7 @@
  * With n1, n2, n3 cycles of change, hold and take-back the acceleration runs from a straight to the plateau p, stays there and
  * falls straight to 0. Its sum has to be -v:  p = -(2 v + a (n1 - 1)) / (n1 + 2 n2 + n3).  Limits: |p| <= A, |p| <= n3 J,
  * |p - a| <= n1 J. For given n1 and n3 each of them is a bound of the divisor, so the shortest n2 is found directly, and the
- * shortest stop by looking along n1 and n3 with halving steps.
+ * shortest stop by a search along n1 and n3 with halved steps.
  */
 #include "heave/sync_stop.h"
 #include "heave/profile.h"
@@ -13,7 +13,7 @@
 #define FURTHEST_Q32    ((q32_t)1 << 52) /* a million mm or degrees */
 #define ROUNDS_PER_STEP 8
 
-/* What a stop of one axis needs: limits with a little to spare for rounding. */
+/* Data for the stop of one axis. The limits are a little smaller than allowed, because of rounding. */
 typedef struct {
     q32_t vel_q32, acc_q32; /* turned so that vel is not negative */
     q32_t acc_max_q32, jerk_q32;
@@ -47,12 +47,12 @@ static int64_t divide_up(q32_t a, q32_t b)
 static void narrow(const need_t *need, int64_t change, int64_t back, int64_t *least, int64_t *most)
 {
     const q32_t push_q32 = 2 * need->vel_q32 + need->acc_q32 * (change - 1);
-    const int sign = push_q32 < 0 ? -1 : 1; /* the plateau is on the other side */
+    const int sign = push_q32 < 0 ? -1 : 1; /* the plateau has the opposite sign */
     const q32_t size_q32 = sign * push_q32;
     const q32_t acc_q32 = sign * need->acc_q32;
-    const q32_t reach_q32 = change * need->jerk_q32 - acc_q32; /* least plateau the change comes to, turned positive */
+    const q32_t reach_q32 = change * need->jerk_q32 - acc_q32; /* largest size of the plateau that the change can reach */
     const q32_t plateau_q32 = at_most(at_most(need->acc_max_q32, back * need->jerk_q32), reach_q32);
-    const q32_t left_q32 = -acc_q32 - change * need->jerk_q32; /* plateau that cannot be left behind: too strong a brake */
+    const q32_t left_q32 = -acc_q32 - change * need->jerk_q32; /* its smallest size; at or below 0: no lower bound */
     if (plateau_q32 <= 0) {
         *least = size_q32 > 0 || reach_q32 < 0 ? NONE_CYCLES : *least;
         return;
@@ -181,14 +181,19 @@ static bool is_carried_away(const ramp_state_t *start, const sync_stop_times_t *
     return rest_q32 < limits->pos_min_q32 || rest_q32 > limits->pos_max_q32 || fastest(start, common) > limits->vel_per_cycle_q32;
 }
 
-/* The times of the axes that stop together. */
-static sync_stop_times_t common_times(unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits)
+/* The times of the axes that stop together, and of what moves with them. */
+static sync_stop_times_t common_times(unsigned together, const ramp_state_t *start, const ramp_limits_t *const *limits,
+                                      const sync_stop_riders_t *riders)
 {
-    need_t need[AXES_MAX] = {{0}};
+    need_t need[AXES_MAX + CYLINDERS_MAX] = {{0}};
+    const unsigned count = riders != NULL ? riders->count : 0;
     for (unsigned i = 0; i < together; i++) {
         need[i] = need_of(&start[i], limits[i]);
     }
-    return shortest(need, together);
+    for (unsigned i = 0; i < count; i++) {
+        need[together + i] = need_of(riders->state[i], riders->limits[i]);
+    }
+    return shortest(need, together + count);
 }
 
 /* The times of one axis. */
@@ -203,9 +208,9 @@ static sync_stop_times_t own_times(const sync_stop_times_t *common, bool is_apar
 }
 
 void sync_stop_plan(sync_stop_t *self, unsigned axes, unsigned together, const ramp_state_t *start,
-                    const ramp_limits_t *const *limits)
+                    const ramp_limits_t *const *limits, const sync_stop_riders_t *riders)
 {
-    const sync_stop_times_t common = common_times(together, start, limits);
+    const sync_stop_times_t common = common_times(together, start, limits, riders);
     self->axes = axes;
     self->cycles = 0;
     self->elapsed = 0;
@@ -221,7 +226,7 @@ void sync_stop_plan(sync_stop_t *self, unsigned axes, unsigned together, const r
 
 void sync_stop_rests(unsigned axes, const ramp_state_t *start, const ramp_limits_t *const *limits, q32_t *rest_q32)
 {
-    const sync_stop_times_t common = common_times(axes, start, limits);
+    const sync_stop_times_t common = common_times(axes, start, limits, NULL);
     for (unsigned i = 0; i < axes; i++) {
         const sync_stop_times_t times = own_times(&common, false, &start[i], limits[i]);
         rest_q32[i] = rest_of(&start[i], &times);

@@ -21,7 +21,7 @@
 #define FREE_FAILURES 5u
 #define PENALTY_S     5
 #define WINDOW_S      10
-#define WINDOW_TRIES  20u /* each takes some 50 ms of the thread that passes beats on */
+#define WINDOW_TRIES  20u /* each takes some 50 ms of a processor */
 
 int access_role(const char *word)
 {
@@ -225,26 +225,35 @@ static access_session_t *place(access_t *self)
     return oldest;
 }
 
-access_login_t access_login(access_t *self, level_t role, const char *password, const char *address, int64_t now_s,
-                            char token[ACCESS_TOKEN_MAX])
+bool access_begin(access_t *self, const char *address, int64_t now_s)
 {
     access_failure_t *const failure = failure_of(self, address);
     if (!may_try(self, failure, now_s)) {
-        return ACCESS_TOO_OFTEN;
+        return false;
     }
     self->tries++;
+    failure->failures++; /* until it is known to be right: several may be looked at together */
+    failure->last_s = now_s;
+    return true;
+}
+
+bool access_is_right(const access_t *self, level_t role, const char *password)
+{
     const char *const wanted = self->hash[role];
     const char *const got = wanted[0] != '\0' ? crypt(password, wanted) : NULL;
-    if (got == NULL || !is_same(got, wanted) || !make_token(token)) {
-        failure->failures++;
-        failure->last_s = now_s;
-        return ACCESS_WRONG;
+    return got != NULL && is_same(got, wanted);
+}
+
+bool access_enter(access_t *self, level_t role, const char *address, int64_t now_s, char token[ACCESS_TOKEN_MAX])
+{
+    if (!make_token(token)) {
+        return false;
     }
-    failure->failures = 0;
+    failure_of(self, address)->failures = 0;
     access_session_t *const session = place(self);
     *session = (access_session_t){.role = role, .used_s = now_s, .began_s = now_s > 0 ? now_s : 1};
     (void)snprintf(session->token, sizeof session->token, "%s", token);
-    return ACCESS_IN;
+    return true;
 }
 
 static access_session_t *session_of(access_t *self, const char *token)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * access.h - who may do what at the panel: passwords of the roles, sessions, names that a browser may call it by, and how often
- * somebody may try. Time is an argument, in s.
+ * access.h - who may do what at the panel: the passwords of the roles, the sessions, the host names of the panel, and the
+ * limits on login attempts. Time is an argument, in s.
  */
 #ifndef HEAVE_PANEL_ACCESS_H
 #define HEAVE_PANEL_ACCESS_H
@@ -28,51 +28,55 @@ typedef struct {
     int64_t began_s; /**< 0: free */
 } access_session_t;
 
-/** Somebody whose password was wrong. */
+/** An address that has sent wrong passwords. */
 typedef struct {
     char address[ACCESS_ADDRESS_MAX];
     unsigned failures;
     int64_t last_s;
 } access_failure_t;
 
-/** All of it. */
+/** Everything that decides about access. */
 typedef struct {
     char hash[ACCESS_ROLES][ACCESS_HASH_MAX]; /**< "": the role has no password */
-    bool has_password;                        /**< any of them; else everybody on this machine is service */
+    bool has_password; /**< a role has a password. If none has one, everybody on this machine has the role service */
     char host[ACCESS_HOSTS_MAX][ACCESS_HOST_MAX];
     unsigned hosts;
     access_session_t session[ACCESS_SESSIONS_MAX];
     access_failure_t failure[ACCESS_SESSIONS_MAX];
-    int64_t window_s; /**< passwords are compared so often in ten seconds: */
-    unsigned tries;
+    int64_t window_s; /**< begin of the present ten seconds */
+    unsigned tries;   /**< passwords compared since window_s */
 } access_t;
 
-/** What came of a login. */
-typedef enum { ACCESS_IN, ACCESS_WRONG, ACCESS_TOO_OFTEN } access_login_t;
-
-/** Reads the passwords of a state directory; none is no error.
- *  @return false: the file is there and cannot be read, or is not one of ours; why says so */
+/** Reads the passwords of a state directory. A missing file is no error.
+ *  @return false: the file cannot be read, or has another format; `why` tells which */
 bool access_load(access_t *self, const char *directory, char *why, size_t size);
 
 /** Sets the password of a role. @return false, and why */
 bool access_set_password(const char *directory, level_t role, const char *password, char *why, size_t size);
 
-/** A name that a browser may call the panel by, without its port. */
+/** Adds a host name that browsers may use for the panel; without port. */
 bool access_allow_host(access_t *self, const char *name);
 
 /** Whether a Host header is one of these names. */
 bool access_is_host(const access_t *self, const char *host);
 
-/** Whether an Origin header is the page of that Host itself. */
+/** Whether an Origin header names the same host as the Host header. */
 bool access_is_own_origin(const char *origin, const char *host);
 
-/** A role of a word: "look", "operate", "service"; ACCESS_NOBODY for others. */
+/** The role that a word names: "look", "operate", "service"; ACCESS_NOBODY for other words. */
 int access_role(const char *word);
 
-access_login_t access_login(access_t *self, level_t role, const char *password, const char *address, int64_t now_s,
-                            char token[ACCESS_TOKEN_MAX]);
+/** Counts a try of an address. @return false: there were too many, and the password is not looked at */
+bool access_begin(access_t *self, const char *address, int64_t now_s);
 
-/** The role of a token, ACCESS_NOBODY where it is none (any more). */
+/** Compares a password; takes some 50 ms of a processor, and changes nothing: not for the thread that passes beats on. */
+bool access_is_right(const access_t *self, level_t role, const char *password);
+
+/** Begins a session. @param address whose try was right
+ *  @return false: there is no random token to be had */
+bool access_enter(access_t *self, level_t role, const char *address, int64_t now_s, char token[ACCESS_TOKEN_MAX]);
+
+/** The role of a token; ACCESS_NOBODY if the token is not valid, or not any more. */
 int access_find(access_t *self, const char *token, int64_t now_s);
 
 void access_logout(access_t *self, const char *token);

@@ -23,23 +23,45 @@ static feed_t *free_place(viewer_t *viewer)
     return NULL;
 }
 
-static bool find_columns(feed_t *stream, const cJSON *names, char *error, size_t size)
+/* The place of a column in the table; FEED_NOTHING: there is no such column. */
+static uint32_t find_column(const samples_header_t *header, const char *name, size_t length)
+{
+    uint32_t at = 0;
+    const samples_column_t *column = samples_column(header, 0);
+    while (column != NULL && (strnlen(column->name, sizeof column->name) != length || memcmp(column->name, name, length) != 0)) {
+        column = samples_column(header, ++at);
+    }
+    return column != NULL ? at : FEED_NOTHING;
+}
+
+/* A name, or `a-b`: the difference of two columns with the same unit. */
+static bool add_column(feed_t *stream, const char *name)
 {
     const samples_header_t *const header = stream->reader.header;
+    const char *const minus = strchr(name, '-');
+    if (stream->columns == VIEWER_COLUMNS_MAX) {
+        return false;
+    }
+    const uint32_t at = find_column(header, name, minus != NULL ? (size_t)(minus - name) : strlen(name));
+    const uint32_t less = minus != NULL ? find_column(header, minus + 1, strlen(minus + 1)) : FEED_NOTHING;
+    stream->column[stream->columns] = at;
+    stream->less[stream->columns++] = less;
+    return at != FEED_NOTHING && (minus == NULL || (less != FEED_NOTHING &&
+                                                    strncmp(samples_column(header, at)->unit, samples_column(header, less)->unit,
+                                                            sizeof samples_column(header, at)->unit) == 0));
+}
+
+static bool find_columns(feed_t *stream, const cJSON *names, char *error, size_t size)
+{
     const cJSON *name = NULL;
     cJSON_ArrayForEach(name, names)
     {
-        uint32_t at = 0;
-        const samples_column_t *column = samples_column(header, 0);
-        while (cJSON_IsString(name) && column != NULL && strncmp(column->name, name->valuestring, sizeof column->name) != 0) {
-            column = samples_column(header, ++at);
-        }
-        if (!cJSON_IsString(name) || column == NULL || stream->columns == VIEWER_COLUMNS_MAX) {
-            (void)snprintf(error, size, "samples: there is no column %.40s, or there are more than %u",
+        if (!cJSON_IsString(name) || !add_column(stream, name->valuestring)) {
+            (void)snprintf(error, size,
+                           "samples: there is no column %.40s, or there are more than %u; `a-b` takes two of one unit",
                            cJSON_IsString(name) ? name->valuestring : "", VIEWER_COLUMNS_MAX);
             return false;
         }
-        stream->column[stream->columns++] = at;
     }
     if (stream->columns == 0) {
         (void)snprintf(error, size, "samples: name at least one column");
@@ -87,7 +109,11 @@ cJSON *feed_describe(const feed_t *stream, int64_t id)
     for (unsigned i = 0; i < stream->columns; i++) {
         const samples_column_t *const column = samples_column(stream->reader.header, stream->column[i]);
         cJSON *const one = cJSON_CreateObject();
-        cJSON_AddStringToObject(one, "name", column->name);
+        char name[2 * sizeof column->name + 1];
+        const bool is_difference = stream->less[i] != FEED_NOTHING;
+        (void)snprintf(name, sizeof name, "%s%s%s", column->name, is_difference ? "-" : "",
+                       is_difference ? samples_column(stream->reader.header, stream->less[i])->name : "");
+        cJSON_AddStringToObject(one, "name", name);
         cJSON_AddStringToObject(one, "unit", column->unit);
         cJSON_AddItemToArray(columns, one);
     }
@@ -132,11 +158,18 @@ static bool put_block(viewer_t *viewer, feed_t *stream, const double *value, uin
     return true;
 }
 
+static double value_of(const feed_t *stream, unsigned c, const samples_record_t *record)
+{
+    const samples_header_t *const header = stream->reader.header;
+    const double value = samples_value(samples_column(header, stream->column[c]), record);
+    return stream->less[c] == FEED_NOTHING ? value : value - samples_value(samples_column(header, stream->less[c]), record);
+}
+
 /* Takes a record into the group. @return true: the group is complete */
 static bool gather(feed_t *stream, const samples_record_t *record)
 {
     for (unsigned c = 0; c < stream->columns; c++) {
-        const double now = samples_value(samples_column(stream->reader.header, stream->column[c]), record);
+        const double now = value_of(stream, c, record);
         stream->least[c] = stream->held == 0 || now < stream->least[c] ? now : stream->least[c];
         stream->most[c] = stream->held == 0 || now > stream->most[c] ? now : stream->most[c];
     }

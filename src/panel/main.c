@@ -10,12 +10,17 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include "common/message.h" // exit codes
+#include "common/message.h"
+#include "common/translate.h" // exit codes
 #include "panel/options.h"
 #include "panel/server.h"
 
 #ifndef HEAVE_PANEL_WWW
 #error "where the pages are installed"
+#endif
+
+#ifndef HEAVE_PANEL_HEAVED
+#error "where heaved is installed"
 #endif
 
 #define WHY_MAX      256u
@@ -153,6 +158,7 @@ static int serve(const panel_options_t *options)
     static pages_t pages;
     static upstream_t platform[VIEWER_PLATFORMS];
     static hall_t hall = {.platform = platform};
+    hall.state = state_of(options);
     char address[ACCESS_HOST_MAX];
     char why[WHY_MAX];
     const struct sigaction action = {.sa_handler = on_signal};
@@ -160,6 +166,7 @@ static int serve(const panel_options_t *options)
                        .certificate = options->certificate,
                        .key = options->key,
                        .state = state_of(options),
+                       .heaved = options->heaved != NULL ? options->heaved : HEAVE_PANEL_HEAVED,
                        .access = &access,
                        .pages = &pages,
                        .hall = &hall,
@@ -202,6 +209,7 @@ int main(int argc, char **argv)
     if (code != EXIT_DONE) {
         return code;
     }
+    (void)translate_begin_in("zh_CN"); /* for refusals: pages are in either language. Nothing else here is translated */
     if (options.is_help) {
         usage_print(&heave_panel_usage, stdout);
         return EXIT_DONE;

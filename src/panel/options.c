@@ -13,6 +13,7 @@ enum {
     OPTION_LISTEN = 256,
     OPTION_WWW,
     OPTION_STATE,
+    OPTION_HEAVED,
     OPTION_PLATFORM,
     OPTION_HOST,
     OPTION_CERT,
@@ -29,8 +30,11 @@ static const usage_row_t k_options[] = {
     {"listen", "ADDRESS:PORT", "where; else 127.0.0.1:9801. Other machines only once there is a password", OPTION_LISTEN},
     {"platform", "NAME=SOCKET", "a heaved; else all of /run/heave. May be given again", OPTION_PLATFORM},
     {"allow-host", "NAME", "a name or address that browsers call it by, beside its own. May be given again", OPTION_HOST},
-    {"state", "DIR", "where passwords are; else $STATE_DIRECTORY, else /var/lib/heave-panel", OPTION_STATE},
+    {"state", "DIR", "where passwords and configurations being edited are; else $STATE_DIRECTORY, else /var/lib/heave-panel",
+     OPTION_STATE},
     {"www", "DIR", "its pages", OPTION_WWW},
+    {"heaved", "PROGRAM", "heaved, which checks configurations that somebody edits; else the one that is installed",
+     OPTION_HEAVED},
     {"tls-cert", "FILE", "certificate, for https; with --tls-key", OPTION_CERT},
     {"tls-key", "FILE", "its key", OPTION_KEY},
     {"help", NULL, "print this", OPTION_HELP},
@@ -44,15 +48,36 @@ static const usage_exit_t k_exits[] = {{EXIT_DONE, "ended by a signal"},
                                        {EXIT_UNAVAILABLE, "it cannot listen there"},
                                        {0}};
 
+static const usage_section_t k_manual[] = {
+    {"DESCRIPTION",
+     "Serves pages for a browser: what every platform of this machine does, the buttons of an operator, moves by hand, curves, "
+     "incidents and the log of operators.\n\n"
+     "It listens on this machine alone until a password is set: then for other machines too, by --listen. The roles are look, "
+     "operate and service, as the levels of heaved's control socket. Hold is for all of them. Beyond a network of your own, use "
+     "--tls-cert and --tls-key.\n\n"
+     "It is a client of heaved. heaved does not need it, and stops what somebody moves by hand 250 ms after the last sign of "
+     "that hand, whatever becomes of this program.\n"},
+    {"EXAMPLES", "A password, and other machines:\n\n"
+                 "  heave-panel --state /var/lib/heave-panel passwd operate\n"
+                 "  heave-panel --listen 192.168.7.2:9801 --allow-host ride.local\n\n"
+                 "A heaved that was started by hand:\n\n"
+                 "  heave-panel --platform ride=/tmp/heaved.sock\n"},
+    {"FILES",
+     "/var/lib/heave-panel/passwords has a line for each role that has a password, hashed by crypt(5). staged-NAME.ini is the "
+     "configuration of a platform as somebody edits it.\n"},
+    {NULL, NULL},
+};
+
 const usage_t heave_panel_usage = {
     .program = "heave-panel",
     .manual_section = "8",
-    .summary = "the machine in a browser: state, curves, and the buttons of an operator",
+    .summary = "motion platforms in a browser, for operators",
     .forms = k_forms,
     .options = k_options,
     .notes = "What it can do, heavectl can do. heaved does not need it: it may die and come back at any time.",
     .exits = k_exits,
-    .see_also = "heaved(8), heavectl(1); docs/panel.md",
+    .manual = k_manual,
+    .see_also = "heaved(8), heavectl(1), crypt(5)",
 };
 
 static int complain(const char *what, const char *right)
@@ -73,6 +98,9 @@ static int take(panel_options_t *self, int option, const char *value)
     case OPTION_LISTEN:
         self->listen = value;
         return strrchr(value, ':') != NULL ? EXIT_DONE : complain("--listen", "written as 127.0.0.1:9801");
+    case OPTION_HEAVED:
+        self->heaved = value;
+        return EXIT_DONE;
     case OPTION_PLATFORM:
         if (self->platforms == OPTIONS_LIST_MAX || strchr(value, '=') == NULL) {
             return complain("--platform", "written as NAME=SOCKET, at most 16");

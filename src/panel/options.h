@@ -13,6 +13,7 @@ typedef struct {
     bool is_help, is_version;
     const char *listen; /**< ADDRESS:PORT */
     const char *www, *state;
+    const char *heaved; /**< the program, to check configurations with */
     const char *certificate, *key;
     const char *platform[OPTIONS_LIST_MAX]; /**< NAME=SOCKET */
     const char *host[OPTIONS_LIST_MAX];

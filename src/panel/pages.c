@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <zlib.h>
 
 #define FILE_BYTES_MAX ((long)4 << 20)
 
@@ -47,6 +48,29 @@ static bool load(page_t *page, const char *path, char *why, size_t size)
     return is_read;
 }
 
+#define GZIP_WINDOW (MAX_WBITS + 16) /* zlib's way to ask for gzip's head */
+
+/* Phones on a weak network get it in a third of the bytes. What cannot be packed is sent as it is. */
+static void pack(page_t *page)
+{
+    z_stream stream = {.next_in = page->data, .avail_in = (uInt)page->length};
+    page->packed = NULL;
+    page->packed_length = 0;
+    if (deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, GZIP_WINDOW, MAX_MEM_LEVEL, Z_DEFAULT_STRATEGY) != Z_OK) {
+        return;
+    }
+    unsigned char *const packed = malloc(page->length + 1);
+    stream.next_out = packed;
+    stream.avail_out = packed != NULL ? (uInt)page->length : 0;
+    if (packed != NULL && deflate(&stream, Z_FINISH) == Z_STREAM_END) {
+        page->packed = packed;
+        page->packed_length = stream.total_out;
+    } else {
+        free(packed);
+    }
+    (void)deflateEnd(&stream);
+}
+
 bool pages_load(pages_t *self, const char *folder, char *why, size_t size)
 {
     DIR *const directory = opendir(folder);
@@ -65,6 +89,9 @@ bool pages_load(pages_t *self, const char *folder, char *why, size_t size)
         (void)snprintf(page->path, sizeof page->path, "/%.90s", entry->d_name);
         page->type = type;
         is_right = load(page, path, why, size);
+        if (is_right) {
+            pack(page);
+        }
         self->count += is_right;
     }
     if (directory != NULL) {

@@ -16,6 +16,8 @@ typedef struct {
     const char *type;
     unsigned char *data;
     size_t length;
+    unsigned char *packed; /**< the same by gzip; NULL where that is no shorter */
+    size_t packed_length;
 } page_t;
 
 /** All of them. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * server.h - HTTP and WebSocket for pages. The only file behind it knows the library (libwebsockets), so that another one can
+ * server.h - HTTP and WebSocket for pages. Only server.c and http.c know the library (libwebsockets), so that another one can
  * take its place.
  */
 #ifndef HEAVE_PANEL_SERVER_H
@@ -17,6 +17,7 @@ typedef struct {
     int port;
     const char *certificate, *key; /**< NULL: no TLS */
     const char *state;             /**< directory with the passwords, looked at anew when they change */
+    const char *heaved;            /**< the program that checks configurations */
     access_t *access;
     pages_t *pages;
     hall_t *hall;

@@ -3,6 +3,7 @@
  */
 #include "panel/upstream.h"
 
+#include <cjson/cJSON.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -13,13 +14,16 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#define STATUS_HZ     10
-#define PATIENCE_US   300000 /* for the memory of the samples, once per connection */
-#define NO_CONNECTION "heaved is not there"
+#include "common/sentence.h"
+
+#define STATUS_HZ         10
+#define PATIENCE_US       300000 /* for the memory of the samples, once per connection */
+#define CONFIGURATION_MAX 131072 /* bytes, as heaved has it */
+#define NO_CONNECTION     "heaved is not there"
 
 bool upstream_init(upstream_t *self, const char *name, const char *path, const upstream_calls_t *calls)
 {
-    *self = (upstream_t){.calls = calls, .status = calloc(1, UPSTREAM_LINE_MAX)};
+    *self = (upstream_t){.calls = calls, .incidents = -1, .log = -1, .status = calloc(1, UPSTREAM_LINE_MAX)};
     bool is_ready = self->status != NULL;
     (void)snprintf(self->name, sizeof self->name, "%s", name);
     (void)snprintf(self->path, sizeof self->path, "%s", path);
@@ -46,10 +50,35 @@ static int join(const char *path)
     return fd;
 }
 
+/* @param passing goes with the first byte; -1: none */
+static bool put_with(int fd, const char *text, int passing)
+{
+    union {
+        struct cmsghdr header;
+        char bytes[CMSG_SPACE(sizeof(int))];
+    } control;
+    union {
+        const char *in;
+        char *out;
+    } bytes = {.in = text}; /* sendmsg changes nothing */
+    struct iovec part = {bytes.out, strlen(text)};
+    struct msghdr message = {.msg_iov = &part, .msg_iovlen = 1};
+    if (passing >= 0) {
+        memset(&control, 0, sizeof control);
+        message.msg_control = control.bytes;
+        message.msg_controllen = sizeof control.bytes;
+        struct cmsghdr *const head = CMSG_FIRSTHDR(&message);
+        head->cmsg_level = SOL_SOCKET;
+        head->cmsg_type = SCM_RIGHTS;
+        head->cmsg_len = CMSG_LEN(sizeof passing);
+        memcpy(CMSG_DATA(head), &passing, sizeof passing);
+    }
+    return sendmsg(fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)part.iov_len;
+}
+
 static bool put(int fd, const char *text)
 {
-    const size_t length = strlen(text);
-    return send(fd, text, length, MSG_DONTWAIT | MSG_NOSIGNAL) == (ssize_t)length;
+    return put_with(fd, text, -1);
 }
 
 /* Everybody who waits is told. */
@@ -65,6 +94,20 @@ static void lose(link_t *link)
     link->waits = 0;
 }
 
+static void forget(int *fd)
+{
+    if (*fd >= 0) {
+        (void)close(*fd);
+    }
+    *fd = -1;
+}
+
+static void forget_configuration(upstream_t *self)
+{
+    free(self->configuration.text);
+    self->configuration = (configuration_t){.text = NULL};
+}
+
 void upstream_closed(link_t *link)
 {
     upstream_t *const self = link->upstream;
@@ -75,6 +118,9 @@ void upstream_closed(link_t *link)
         self->status[0] = '\0';
         samples_reader_close(&self->samples);
         self->samples = (samples_reader_t){.header = NULL};
+        forget(&self->incidents);
+        forget(&self->log);
+        forget_configuration(self);
         self->calls->gone(self);
     }
 }
@@ -97,45 +143,139 @@ static bool open_link(link_t *link)
     return link->fd >= 0;
 }
 
-/* The descriptor comes with the first byte of the answer. */
-static int receive_memory(int fd)
+/* The descriptor comes with the first byte of the answer, which is one line. */
+static int receive_descriptor(int fd, char *line, size_t size)
 {
-    char text[256];
     union {
         struct cmsghdr align;
         char bytes[CMSG_SPACE(sizeof(int))];
     } control;
-    struct iovec part = {text, sizeof text};
+    struct iovec part = {line, size - 1};
     struct msghdr message = {
         .msg_iov = &part, .msg_iovlen = 1, .msg_control = control.bytes, .msg_controllen = sizeof control.bytes};
-    int memory = -1;
-    if (recvmsg(fd, &message, MSG_CMSG_CLOEXEC) <= 0) {
+    int passed = -1;
+    const ssize_t got = recvmsg(fd, &message, MSG_CMSG_CLOEXEC);
+    line[got > 0 ? got : 0] = '\0';
+    const struct cmsghdr *const head = got > 0 ? CMSG_FIRSTHDR(&message) : NULL;
+    if (head != NULL && head->cmsg_level == SOL_SOCKET && head->cmsg_type == SCM_RIGHTS) {
+        memcpy(&passed, CMSG_DATA(head), sizeof passed);
+    }
+    return passed;
+}
+
+/* The answers that are waited for, a little. @return a descriptor; -1: there is none, or it may not be had */
+static int ask_descriptor(const upstream_t *self, const char *request, char *line, size_t size)
+{
+    const struct timeval patience = {.tv_usec = PATIENCE_US};
+    const int fd = join(self->path);
+    line[0] = '\0';
+    if (fd < 0) {
         return -1;
     }
-    const struct cmsghdr *const head = CMSG_FIRSTHDR(&message);
-    if (head != NULL && head->cmsg_level == SOL_SOCKET && head->cmsg_type == SCM_RIGHTS) {
-        memcpy(&memory, CMSG_DATA(head), sizeof memory);
-    }
-    return memory;
+    (void)fcntl(fd, F_SETFL, 0);
+    (void)setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    const int passed = put(fd, request) ? receive_descriptor(fd, line, size) : -1;
+    (void)close(fd);
+    return passed;
 }
 
 static void open_samples(upstream_t *self)
 {
-    const struct timeval patience = {.tv_usec = PATIENCE_US};
-    const int fd = self->samples.header == NULL ? join(self->path) : -1;
-    if (fd < 0) {
-        return;
-    }
-    (void)fcntl(fd, F_SETFL, 0); /* the one answer that is waited for, a little */
-    (void)setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-    const int memory = put(fd, "samples\n") ? receive_memory(fd) : -1;
+    char line[256];
+    const int memory = self->samples.header == NULL ? ask_descriptor(self, "samples\n", line, sizeof line) : -1;
     if (memory >= 0) {
         if (samples_reader_open(&self->samples, memory) != NULL) {
             self->samples = (samples_reader_t){.header = NULL};
         }
         (void)close(memory);
     }
-    (void)close(fd);
+}
+
+/* Where incidents and the operator log are. What may be read there is the kernel's to say. */
+static void open_folders(upstream_t *self)
+{
+    static const char k_file[] = "\"file\":\"";
+    char line[256];
+    self->incidents = ask_descriptor(self, "incident-folder\n", line, sizeof line);
+    self->log = ask_descriptor(self, "operator-log\n", line, sizeof line);
+    const char *const name = strstr(line, k_file);
+    const size_t length = name != NULL ? strcspn(name + strlen(k_file), "\"") : 0;
+    (void)snprintf(self->log_name, sizeof self->log_name, "%.*s", (int)length, length > 0 ? name + strlen(k_file) : "");
+}
+
+static bool take_text(configuration_t *self, int fd, const cJSON *answer)
+{
+    const cJSON *const bytes = cJSON_GetObjectItemCaseSensitive(answer, "bytes");
+    const double length = cJSON_IsNumber(bytes) ? bytes->valuedouble : -1;
+    if (length < 0 || length > CONFIGURATION_MAX) {
+        return false;
+    }
+    self->length = (size_t)length;
+    self->text = malloc(self->length + 1u);
+    if (self->text == NULL || pread(fd, self->text, self->length, 0) != (ssize_t)self->length) {
+        return false;
+    }
+    self->text[self->length] = '\0';
+    return true;
+}
+
+static void copy_text(char *out, size_t size, const cJSON *answer, const char *name)
+{
+    const cJSON *const item = cJSON_GetObjectItemCaseSensitive(answer, name);
+    (void)snprintf(out, size, "%s", cJSON_IsString(item) ? item->valuestring : "");
+}
+
+/* Another one is in force than the one that is known. */
+static void open_configuration(upstream_t *self, const char *digest, size_t length)
+{
+    char line[1024];
+    configuration_t *const it = &self->configuration;
+    forget_configuration(self);
+    (void)snprintf(it->digest, sizeof it->digest, "%.*s", (int)length, digest);
+    const int fd = length > 0 ? ask_descriptor(self, "configuration\n", line, sizeof line) : -1;
+    cJSON *const answer = fd >= 0 ? cJSON_Parse(line) : NULL;
+    if (answer != NULL && !take_text(it, fd, answer)) {
+        free(it->text);
+        it->text = NULL;
+    }
+    copy_text(it->file, sizeof it->file, answer, "file");
+    it->is_applied = cJSON_IsString(cJSON_GetObjectItemCaseSensitive(answer, "applied"));
+    it->is_kept = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(answer, "keeps"));
+    cJSON_Delete(answer);
+    forget(&(int){fd});
+}
+
+static void watch_configuration(upstream_t *self, const char *status)
+{
+    static const char k_digest[] = "\"digest\":\"";
+    const char *const at = strstr(status, k_digest);
+    const char *const digest = at != NULL ? at + sizeof k_digest - 1u : "";
+    const size_t length = strcspn(digest, "\"");
+    if (length < UPSTREAM_DIGEST_MAX &&
+        (strlen(self->configuration.digest) != length || strncmp(self->configuration.digest, digest, length) != 0)) {
+        open_configuration(self, digest, length);
+    }
+}
+
+/* Looked up once for each reason: that takes longer than all else about a status. */
+static void watch_put_back(upstream_t *self, const char *status)
+{
+    static const char k_put_back[] = "\"put_back\":";
+    char out[SENTENCE_MAX];
+    const char *const at = strstr(status, k_put_back);
+    cJSON *const item = at != NULL ? cJSON_Parse(at + sizeof k_put_back - 1u) : NULL;
+    const char *const why = cJSON_IsString(item) ? item->valuestring : "";
+    if (strcmp(why, self->put_back) != 0) {
+        (void)snprintf(self->put_back, sizeof self->put_back, "%s", why);
+        self->put_back_zh[0] = '\0';
+        const char *const chinese = sentence(self->put_back, out, sizeof out);
+        cJSON *const text = chinese != self->put_back ? cJSON_CreateStringReference(chinese) : NULL;
+        if (text != NULL && !cJSON_PrintPreallocated(text, self->put_back_zh, (int)sizeof self->put_back_zh, false)) {
+            self->put_back_zh[0] = '\0'; /* longer than any */
+        }
+        cJSON_Delete(text);
+    }
+    cJSON_Delete(item);
 }
 
 void upstream_connect(upstream_t *self)
@@ -149,6 +289,11 @@ void upstream_connect(upstream_t *self)
 
 const char *upstream_send(upstream_t *self, link_kind_t kind, const char *line, const asker_t *asker)
 {
+    return upstream_send_with(self, kind, line, asker, -1);
+}
+
+const char *upstream_send_with(upstream_t *self, link_kind_t kind, const char *line, const asker_t *asker, int fd)
+{
     link_t *const link = &self->link[kind];
     char text[UPSTREAM_REQUEST + UPSTREAM_NAME_MAX + 8];
     const bool is_named = asker->by[0] != '\0' && strcmp(asker->by, link->by) != 0;
@@ -156,10 +301,10 @@ const char *upstream_send(upstream_t *self, link_kind_t kind, const char *line, 
         return NO_CONNECTION;
     }
     if (link->waits + 2 > UPSTREAM_WAITING) {
-        return "too many requests wait for heaved: try again";
+        return UPSTREAM_BUSY;
     }
     (void)snprintf(text, sizeof text, "%s%s%s%s\n", is_named ? "by " : "", is_named ? asker->by : "", is_named ? "\n" : "", line);
-    if (!put(link->fd, text)) { /* half a request may have gone: that connection is over */
+    if (!put_with(link->fd, text, fd)) { /* half a request may have gone: that connection is over */
         (void)shutdown(link->fd, SHUT_RDWR);
         return NO_CONNECTION;
     }
@@ -182,11 +327,16 @@ static void take_line(link_t *link, char *line)
     if (link->kind == LINK_WATCH) {
         (void)snprintf(self->status, UPSTREAM_LINE_MAX, "%s", line);
         const char *const percent = strstr(line, "\"now_percent\":");
+        const char *const told = strstr(line, "\"time_unix_ms\":");
+        self->told_ms = told != NULL ? strtoll(told + strlen("\"time_unix_ms\":"), NULL, 10) : 0;
         self->intensity = percent != NULL ? (unsigned)strtoul(percent + strlen("\"now_percent\":"), NULL, 10) : 0;
         if (!self->is_there) {
             self->is_there = true;
             open_samples(self);
+            open_folders(self);
         }
+        watch_configuration(self, line);
+        watch_put_back(self, line);
         self->calls->status(self);
         return;
     }

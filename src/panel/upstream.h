@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * upstream.h - one platform as the panel knows it: its connections to heaved, its newest status, its samples. Every request of
- * every viewer goes over two of them: one for what has to be quick (hold, hands and ticks), one for what may take its time. A
- * connection that is lost, or that gave way to another client of heaved, is made anew.
+ * every viewer goes over three of them: one for what has to be quick (hold, hands and ticks), one for most others, one for what
+ * heaved may take many seconds for. A connection that is lost, or that gave way to another client of heaved, is made anew.
  */
 #ifndef HEAVE_PANEL_UPSTREAM_H
 #define HEAVE_PANEL_UPSTREAM_H
@@ -12,13 +12,25 @@
 #include "common/samples.h"
 #include "common/socket_path.h"
 
-#define UPSTREAM_NAME_MAX 32u
-#define UPSTREAM_LINE_MAX 65536u
-#define UPSTREAM_WAITING  64u
-#define UPSTREAM_REQUEST  64u /* bytes of a request, as heaved takes them */
+#define UPSTREAM_NAME_MAX   32u
+#define UPSTREAM_LINE_MAX   65536u
+#define UPSTREAM_WAITING    64u
+#define UPSTREAM_LOG_MAX    128u
+#define UPSTREAM_DIGEST_MAX 17u
+#define UPSTREAM_PATH_MAX   256u
+#define UPSTREAM_WHY_MAX    256u
+#define UPSTREAM_WHY_ZH_MAX 1024u
+#define UPSTREAM_REQUEST    64u /* bytes of a request, as heaved takes them */
+#define UPSTREAM_BUSY       "too many requests wait for heaved: try again"
 
 /** Which connection. */
-typedef enum { LINK_WATCH, LINK_QUICK, LINK_SLOW, LINKS } link_kind_t;
+typedef enum {
+    LINK_WATCH,
+    LINK_QUICK,
+    LINK_SLOW,
+    LINK_LONG, /**< made when it is needed: heaved answers the requests of a connection one after the other */
+    LINKS
+} link_kind_t;
 
 /** Whom an answer is for. */
 typedef struct {
@@ -50,6 +62,16 @@ typedef struct {
     void (*gone)(struct upstream *self);
 } upstream_calls_t;
 
+/** Its configuration in force. */
+typedef struct {
+    char *text; /**< NULL: not known */
+    size_t length;
+    char digest[UPSTREAM_DIGEST_MAX]; /**< "": not asked yet */
+    char file[UPSTREAM_PATH_MAX];     /**< that heaved was started with */
+    bool is_applied;                  /**< another one has been applied over it */
+    bool is_kept;                     /**< heaved has a place to keep one that is applied */
+} configuration_t;
+
 /** A platform. */
 typedef struct upstream {
     char name[UPSTREAM_NAME_MAX];
@@ -59,9 +81,16 @@ typedef struct upstream {
     char *status; /**< the newest, one JSON object; "" before the first */
     bool is_there;
     samples_reader_t samples; /**< header NULL: none */
-    uint64_t holder;          /**< viewer with the controls; 0 = nobody */
+    int incidents;            /**< folder of the incidents as a place; -1: none */
+    int log;                  /**< that of the operator log; -1: none */
+    char log_name[UPSTREAM_LOG_MAX];
+    uint64_t holder; /**< viewer with the controls; 0 = nobody */
     char holder_name[UPSTREAM_NAME_MAX + 64];
-    unsigned intensity; /**< percent in force, for levels */
+    configuration_t configuration;
+    char put_back[UPSTREAM_WHY_MAX];       /**< why the configuration applied last is not in force; "": it is */
+    char put_back_zh[UPSTREAM_WHY_ZH_MAX]; /**< the same in Chinese, as a JSON string with its quotes; "": none */
+    unsigned intensity;                    /**< percent in force, for levels */
+    int64_t told_ms;                       /**< time_unix_ms of the newest status */
 } upstream_t;
 
 /** Prepares one; nothing is connected yet. */
@@ -72,6 +101,9 @@ void upstream_connect(upstream_t *self);
 
 /** Sends a request. @return NULL, or why not */
 const char *upstream_send(upstream_t *self, link_kind_t kind, const char *line, const asker_t *asker);
+
+/** The same with a descriptor for heaved, which stays the caller's; -1: none. */
+const char *upstream_send_with(upstream_t *self, link_kind_t kind, const char *line, const asker_t *asker, int fd);
 
 /** Reads what a connection has. @return false: it is over, and closed */
 bool upstream_readable(link_t *link);

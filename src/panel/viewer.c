@@ -10,48 +10,13 @@
 
 #include "panel/feed.h"
 #include "panel/outbox.h"
+#include "panel/viewer_call.h"
+#include "panel/viewer_service.h"
 
 #define STATUS_HZ_MAX 10.0
+#define LATE_MS       2000.0 /* a request behind the status that its page has seen */
 #define NO_PLATFORM   "there is no such platform here"
 #define TICK_ID       (-1) /* of the panel's own questions */
-
-/* --- Out --- */
-
-/* What may not be lost: a page that does not take it is closed, and comes again. */
-static void tell(hall_t *hall, viewer_t *viewer, const char *text, size_t length)
-{
-    viewer->is_over = viewer->is_over || !viewer_put(viewer, text, length, false);
-    hall->wake(viewer);
-}
-
-static void tell_json(hall_t *hall, viewer_t *viewer, cJSON *json)
-{
-    char *const text = cJSON_PrintUnformatted(json);
-    if (text != NULL) {
-        tell(hall, viewer, text, strlen(text));
-    }
-    cJSON_free(text);
-    cJSON_Delete(json);
-}
-
-static void answer_error(hall_t *hall, viewer_t *viewer, int64_t id, const char *error)
-{
-    cJSON *const json = cJSON_CreateObject();
-    cJSON_AddNumberToObject(json, "id", (double)id);
-    cJSON_AddStringToObject(json, "error", error);
-    tell_json(hall, viewer, json);
-}
-
-/* heaved's own object, unchanged, within one of ours. */
-static void tell_object(hall_t *hall, viewer_t *viewer, const char *head, const char *object)
-{
-    const size_t size = strlen(head) + strlen(object) + 2;
-    char *const text = malloc(size);
-    if (text != NULL) {
-        tell(hall, viewer, text, (size_t)snprintf(text, size, "%s%s}", head, object));
-    }
-    free(text);
-}
 
 /* --- Who --- */
 
@@ -70,28 +35,25 @@ viewer_t *viewer_enter(hall_t *hall, void *handle, int role, const char *name)
     return viewer;
 }
 
-static viewer_t *find(const hall_t *hall, uint64_t number)
+static void tell_controls_to(hall_t *hall, const upstream_t *upstream, viewer_t *viewer)
 {
-    viewer_t *viewer = hall->viewers;
-    while (viewer != NULL && viewer->number != number) {
-        viewer = viewer->next;
+    cJSON *const json = cJSON_CreateObject();
+    cJSON_AddStringToObject(json, "event", "controls");
+    cJSON_AddStringToObject(json, "platform", upstream->name);
+    if (upstream->holder != 0) {
+        cJSON_AddStringToObject(json, "holder", upstream->holder_name);
+    } else {
+        cJSON_AddNullToObject(json, "holder");
     }
-    return viewer;
+    cJSON_AddBoolToObject(json, "yours", upstream->holder == viewer->number);
+    hall_tell_json(hall, viewer, json);
 }
 
+/* Everybody, when they have changed. */
 static void tell_controls(hall_t *hall, const upstream_t *upstream)
 {
     for (viewer_t *viewer = hall->viewers; viewer != NULL; viewer = viewer->next) {
-        cJSON *const json = cJSON_CreateObject();
-        cJSON_AddStringToObject(json, "event", "controls");
-        cJSON_AddStringToObject(json, "platform", upstream->name);
-        if (upstream->holder != 0) {
-            cJSON_AddStringToObject(json, "holder", upstream->holder_name);
-        } else {
-            cJSON_AddNullToObject(json, "holder");
-        }
-        cJSON_AddBoolToObject(json, "yours", upstream->holder == viewer->number);
-        tell_json(hall, viewer, json);
+        tell_controls_to(hall, upstream, viewer);
     }
 }
 
@@ -131,37 +93,35 @@ void viewer_leave(hall_t *hall, viewer_t *viewer)
 
 /* --- What happens at heaved --- */
 
-static unsigned place_of(const hall_t *hall, const upstream_t *upstream)
-{
-    return (unsigned)(upstream - hall->platform);
-}
-
 void hall_status(hall_t *hall, const upstream_t *upstream)
 {
-    char head[128];
-    const unsigned at = place_of(hall, upstream);
-    (void)snprintf(head, sizeof head, "{\"event\":\"status\",\"platform\":\"%s\",\"status\":", upstream->name);
+    char head[128 + UPSTREAM_WHY_ZH_MAX];
+    const unsigned at = hall_place_of(hall, upstream);
+    const char *const put_back = upstream->put_back_zh;
+    (void)snprintf(head, sizeof head, "{\"event\":\"status\",\"platform\":\"%s\",%s%s%s\"status\":", upstream->name,
+                   put_back[0] != '\0' ? "\"put_back_zh\":" : "", put_back, put_back[0] != '\0' ? "," : "");
     for (viewer_t *viewer = hall->viewers; viewer != NULL; viewer = viewer->next) {
         const unsigned hz = viewer->status_hz[at];
         /* a page that has not taken the last ones gets the next one */
         if (hz != 0 && viewer->count < VIEWER_QUEUE / 4 && (hall->now_ms - viewer->status_ms[at]) * hz >= 900) {
             viewer->status_ms[at] = hall->now_ms;
-            tell_object(hall, viewer, head, upstream->status);
+            hall_tell_object(hall, viewer, head, upstream->status);
         }
     }
 }
 
 void hall_gone(hall_t *hall, const upstream_t *upstream)
 {
+    viewer_service_gone(hall, hall_place_of(hall, upstream));
     for (viewer_t *viewer = hall->viewers; viewer != NULL; viewer = viewer->next) {
         cJSON *const json = cJSON_CreateObject();
         cJSON_AddStringToObject(json, "event", "gone");
         cJSON_AddStringToObject(json, "platform", upstream->name);
-        viewer->series[place_of(hall, upstream)] = 0;
+        viewer->series[hall_place_of(hall, upstream)] = 0;
         for (unsigned i = 0; i < VIEWER_STREAMS_MAX; i++) {
             viewer->stream[i].number = viewer->stream[i].upstream == upstream ? 0 : viewer->stream[i].number;
         }
-        tell_json(hall, viewer, json);
+        hall_tell_json(hall, viewer, json);
     }
 }
 
@@ -180,16 +140,15 @@ static void note_series(viewer_t *viewer, unsigned at, const char *line)
 static void tell_tick(hall_t *hall, const upstream_t *upstream, const char *line)
 {
     char head[128];
-    const unsigned at = place_of(hall, upstream);
+    const unsigned at = hall_place_of(hall, upstream);
+    viewer_service_tick(hall, at, line);
     (void)snprintf(head, sizeof head, "{\"event\":\"tick\",\"platform\":\"%s\",\"tick\":", upstream->name);
     for (viewer_t *viewer = hall->viewers; viewer != NULL; viewer = viewer->next) {
         if (viewer->wants_ticks[at] && viewer->count < VIEWER_QUEUE / 2) {
-            tell_object(hall, viewer, head, line);
+            hall_tell_object(hall, viewer, head, line);
         }
     }
 }
-
-#define PRESS_BIT ((int64_t)1 << 52) /* of an id: the answer tells a series */
 
 void hall_answer(hall_t *hall, upstream_t *upstream, const asker_t *asker, const char *line)
 {
@@ -200,132 +159,94 @@ void hall_answer(hall_t *hall, upstream_t *upstream, const asker_t *asker, const
         }
         return;
     }
-    viewer_t *const viewer = find(hall, asker->viewer);
-    const bool is_press = (asker->id & PRESS_BIT) != 0;
+    viewer_t *const viewer = hall_find(hall, asker->viewer);
+    const bool is_press = (asker->id & VIEWER_PRESS_BIT) != 0;
     if (viewer == NULL) { /* gone meanwhile: what it pressed is nobody's; heaved lets go by itself within 250 ms */
         return;
     }
     if (line == NULL) {
-        answer_error(hall, viewer, asker->id & ~PRESS_BIT, "heaved has not answered");
+        if (is_press) {
+            viewer_service_pressed(hall, viewer, hall_place_of(hall, upstream));
+        }
+        hall_answer_error(hall, viewer, asker->id & ~VIEWER_PRESS_BIT, "heaved has not answered");
         return;
     }
     if (is_press) {
-        note_series(viewer, place_of(hall, upstream), line);
+        note_series(viewer, hall_place_of(hall, upstream), line);
+        viewer_service_pressed(hall, viewer, hall_place_of(hall, upstream));
     }
-    (void)snprintf(head, sizeof head, "{\"id\":%lld,\"answer\":", (long long)(asker->id & ~PRESS_BIT));
-    tell_object(hall, viewer, head, line);
+    if (strstr(line, "\"ok\":false") != NULL) {
+        hall_answer_refusal(hall, viewer, asker->id & ~VIEWER_PRESS_BIT, line);
+        return;
+    }
+    (void)snprintf(head, sizeof head, "{\"id\":%lld,\"answer\":", (long long)(asker->id & ~VIEWER_PRESS_BIT));
+    hall_tell_object(hall, viewer, head, line);
 }
 
 /* --- In --- */
 
-/* A message that was understood so far. */
-typedef struct {
-    hall_t *hall;
-    viewer_t *viewer;
-    const cJSON *json;
-    int64_t id;
-    upstream_t *upstream;
-} call_t;
-
-static const char *word_of(const cJSON *json, const char *name)
-{
-    const cJSON *const item = cJSON_GetObjectItemCaseSensitive(json, name);
-    return cJSON_IsString(item) ? item->valuestring : "";
-}
-
-static double number_of(const cJSON *json, const char *name, double fallback)
-{
-    const cJSON *const item = cJSON_GetObjectItemCaseSensitive(json, name);
-    return cJSON_IsNumber(item) ? item->valuedouble : fallback;
-}
-
-static void refuse(const call_t *call, const char *error)
-{
-    answer_error(call->hall, call->viewer, call->id, error);
-}
-
-static void send_to(const call_t *call, link_kind_t kind, const char *line, int64_t id)
-{
-    asker_t asker = {.viewer = call->viewer->number, .id = id};
-    (void)snprintf(asker.by, sizeof asker.by, "%s", call->viewer->name);
-    const char *const why = upstream_send(call->upstream, kind, line, &asker);
-    if (why != NULL) {
-        refuse(call, why);
-    }
-}
-
-/* One request, as heaved takes it: printable, short, one line. */
-static bool is_plain(const char *line)
-{
-    const size_t length = strlen(line);
-    for (size_t i = 0; i < length; i++) {
-        if (line[i] < ' ' || line[i] > '~') {
-            return false;
-        }
-    }
-    return length > 0 && length < UPSTREAM_REQUEST;
-}
-
-static bool begins(const char *line, const char *word)
-{
-    const size_t length = strlen(word);
-    return strncmp(line, word, length) == 0 && (line[length] == ' ' || line[length] == '\0');
-}
-
 /* What has an operation of its own, or is the panel's to say. */
 static bool is_kept_back(const char *line)
 {
-    static const char *const k_words[] = {"watch", "samples", "by", "beat", "jog", "home", "relay", "release"};
+    static const char *const k_words[] = {"watch", "samples", "by",      "beat",      "jog",          "home",
+                                          "relay", "signal",  "release", "configure", "configuration"};
     for (unsigned i = 0; i < sizeof k_words / sizeof k_words[0]; i++) {
-        if (begins(line, k_words[i])) {
+        if (viewer_begins(line, k_words[i])) {
             return true;
         }
     }
     return false;
 }
 
-static bool is_allowed(const call_t *call, const char *line)
+static link_kind_t link_for(const char *line)
 {
-    char error[128];
-    const level_t needed = levels_needed(line, call->upstream->intensity);
-    if (call->viewer->role < (int)needed) {
-        (void)snprintf(error, sizeof error, "%.20s: not allowed; it takes the role %s", line, level_name(needed));
-        refuse(call, error);
-        return false;
-    }
-    if (needed > LEVEL_LOOK && call->upstream->holder != call->viewer->number) {
-        refuse(call, call->upstream->holder == 0 ? "take the controls first" : "somebody else has the controls: take them first");
-        return false;
-    }
-    return true;
+    const bool is_quick = viewer_begins(line, "hold") || viewer_begins(line, "tick") || viewer_begins(line, "counts") ||
+                          viewer_begins(line, "geometry") || viewer_begins(line, "times");
+    const bool is_long = viewer_begins(line, "dump") || viewer_begins(line, "sdo"); /* a disk, a bus */
+    return is_quick ? LINK_QUICK : is_long ? LINK_LONG : LINK_SLOW;
+}
+
+/* Half of the places are for hold and for hands: nobody who asks much takes those. */
+static bool has_room(const upstream_t *upstream, const char *line)
+{
+    return viewer_begins(line, "hold") || upstream->link[link_for(line)].waits < UPSTREAM_WAITING / 2;
+}
+
+/* A network that stood still hands over late what somebody wanted earlier, when things were otherwise: that is not done any more.
+ * What only stops is never late. Programs that do not say what they have seen have to know for themselves. */
+static bool is_late(const call_t *call, const char *line)
+{
+    const double seen_ms = viewer_number(call->json, "seen", 0);
+    const bool is_stop = viewer_begins(line, "torque") && strstr(line, " off") != NULL;
+    return seen_ms > 0 && (double)call->upstream->told_ms - seen_ms > LATE_MS && !is_stop &&
+           levels_needed(line, call->upstream->intensity) > LEVEL_LOOK;
 }
 
 static void op_request(const call_t *call)
 {
-    const char *const line = word_of(call->json, "line");
-    if (!is_plain(line) || is_kept_back(line)) {
-        refuse(call, "that is no request that goes this way");
-    } else if (is_allowed(call, line)) {
-        const bool is_quick = begins(line, "hold") || begins(line, "tick") || begins(line, "counts") || begins(line, "geometry");
-        send_to(call, is_quick ? LINK_QUICK : LINK_SLOW, line, call->id);
+    const char *const line = viewer_word(call->json, "line");
+    if (!viewer_is_plain(line) || is_kept_back(line)) {
+        viewer_refuse(call, "that is no request that goes this way");
+    } else if (is_late(call, line)) {
+        viewer_refuse(call, "this came too late to be done: try again");
+    } else if (viewer_is_allowed(call, line)) {
+        if (has_room(call->upstream, line)) {
+            (void)viewer_send(call, link_for(line), line, call->id);
+        } else {
+            viewer_refuse(call, UPSTREAM_BUSY);
+        }
     }
 }
 
 static void op_press(const call_t *call)
 {
-    char line[UPSTREAM_REQUEST + 24];
-    const char *const wanted = word_of(call->json, "line");
-    const bool is_held = begins(wanted, "jog") || begins(wanted, "home") || begins(wanted, "relay");
-    if (!is_plain(wanted) || !is_held) {
-        refuse(call, "only jog, home and relay are held");
-    } else if (is_allowed(call, wanted)) {
-        call->viewer->wants_ticks[place_of(call->hall, call->upstream)] = true;
-        (void)snprintf(line, sizeof line, "%s %.0f", wanted, number_of(call->json, "tick", 0));
-        if (strlen(line) < UPSTREAM_REQUEST) {
-            send_to(call, LINK_QUICK, line, call->id | PRESS_BIT);
-        } else {
-            refuse(call, "that request is too long");
-        }
+    const char *const wanted = viewer_word(call->json, "line");
+    const bool is_held = viewer_begins(wanted, "jog") || viewer_begins(wanted, "home") || viewer_begins(wanted, "relay") ||
+                         viewer_begins(wanted, "signal");
+    if (!viewer_is_plain(wanted) || !is_held) {
+        viewer_refuse(call, "only jog, home, relay and signal are held");
+    } else {
+        (void)viewer_press(call, wanted);
     }
 }
 
@@ -334,10 +255,11 @@ static void op_beat(const call_t *call)
 {
     char line[UPSTREAM_REQUEST];
     const asker_t nobody = {.viewer = 0};
-    const uint32_t series = call->viewer->series[place_of(call->hall, call->upstream)];
-    if (series != 0 && (double)series == number_of(call->json, "series", 0) && call->upstream->holder == call->viewer->number) {
-        (void)snprintf(line, sizeof line, "beat %u %.0f %.0f", series, number_of(call->json, "counter", 0),
-                       number_of(call->json, "tick", 0));
+    const uint32_t series = call->viewer->series[hall_place_of(call->hall, call->upstream)];
+    if (series != 0 && (double)series == viewer_number(call->json, "series", 0) &&
+        call->upstream->holder == call->viewer->number) {
+        (void)snprintf(line, sizeof line, "beat %u %.0f %.0f", series, viewer_number(call->json, "counter", 0),
+                       viewer_number(call->json, "tick", 0));
         (void)upstream_send(call->upstream, LINK_QUICK, line, &nobody);
     }
 }
@@ -346,26 +268,29 @@ static void op_take(const call_t *call, bool is_taking)
 {
     upstream_t *const upstream = call->upstream;
     if (is_taking && call->viewer->role < (int)LEVEL_OPERATE) {
-        refuse(call, "not allowed; it takes the role operate");
+        viewer_refuse(call, "not allowed; it takes the role operate");
         return;
     }
-    viewer_t *const before = find(call->hall, upstream->holder);
+    viewer_t *const before = hall_find(call->hall, upstream->holder);
     if (before != NULL && (is_taking || before == call->viewer)) {
-        let_go(upstream, before, place_of(call->hall, upstream));
+        let_go(upstream, before, hall_place_of(call->hall, upstream));
     }
     if (is_taking) {
         upstream->holder = call->viewer->number;
         (void)snprintf(upstream->holder_name, sizeof upstream->holder_name, "%s", call->viewer->name);
     } else if (upstream->holder == call->viewer->number) {
         upstream->holder = 0;
+    } else { /* nothing has changed: others hear nothing of it, however often a page says so */
+        tell_controls_to(call->hall, upstream, call->viewer);
+        return;
     }
     tell_controls(call->hall, upstream);
 }
 
 static void op_status(const call_t *call)
 {
-    const unsigned at = place_of(call->hall, call->upstream);
-    const double hz = number_of(call->json, "hz", STATUS_HZ_MAX);
+    const unsigned at = hall_place_of(call->hall, call->upstream);
+    const double hz = viewer_number(call->json, "hz", STATUS_HZ_MAX);
     call->viewer->status_hz[at] = hz <= 0 ? 0 : hz < 1 ? 1u : hz > STATUS_HZ_MAX ? (unsigned)STATUS_HZ_MAX : (unsigned)hz;
     if (call->upstream->is_there) {
         hall_status(call->hall, call->upstream);
@@ -373,9 +298,9 @@ static void op_status(const call_t *call)
         cJSON *const json = cJSON_CreateObject();
         cJSON_AddStringToObject(json, "event", "gone");
         cJSON_AddStringToObject(json, "platform", call->upstream->name);
-        tell_json(call->hall, call->viewer, json);
+        hall_tell_json(call->hall, call->viewer, json);
     }
-    tell_controls(call->hall, call->upstream);
+    tell_controls_to(call->hall, call->upstream, call->viewer);
 }
 
 static void op_samples(const call_t *call)
@@ -383,15 +308,15 @@ static void op_samples(const call_t *call)
     char error[128] = "";
     feed_t *const stream = feed_begin(call->viewer, call->upstream, call->json, error, sizeof error);
     if (stream == NULL) {
-        refuse(call, error);
+        viewer_refuse(call, error);
     } else {
-        tell_json(call->hall, call->viewer, feed_describe(stream, call->id));
+        hall_tell_json(call->hall, call->viewer, feed_describe(stream, call->id));
     }
 }
 
 static void op_ticks(const call_t *call)
 {
-    call->viewer->wants_ticks[place_of(call->hall, call->upstream)] =
+    call->viewer->wants_ticks[hall_place_of(call->hall, call->upstream)] =
         cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(call->json, "on"));
 }
 
@@ -399,12 +324,16 @@ static void carry_out(const call_t *call, const char *op)
 {
     if (strcmp(op, "request") == 0) {
         op_request(call);
+    } else if (strcmp(op, "configure") == 0) {
+        viewer_configure(call);
+    } else if (strcmp(op, "identify") == 0) {
+        viewer_identify(call);
     } else if (strcmp(op, "press") == 0) {
         op_press(call);
     } else if (strcmp(op, "beat") == 0) {
         op_beat(call);
     } else if (strcmp(op, "release") == 0) {
-        let_go(call->upstream, call->viewer, place_of(call->hall, call->upstream));
+        let_go(call->upstream, call->viewer, hall_place_of(call->hall, call->upstream));
     } else if (strcmp(op, "take") == 0 || strcmp(op, "drop") == 0) {
         op_take(call, op[0] == 't');
     } else if (strcmp(op, "status") == 0) {
@@ -412,28 +341,29 @@ static void carry_out(const call_t *call, const char *op)
     } else if (strcmp(op, "samples") == 0) {
         op_samples(call);
     } else if (strcmp(op, "samples-end") == 0) {
-        feed_end(call->viewer, (uint32_t)number_of(call->json, "stream", 0));
+        feed_end(call->viewer, (uint32_t)viewer_number(call->json, "stream", 0));
     } else if (strcmp(op, "ticks") == 0) {
         op_ticks(call);
     } else {
-        refuse(call, "there is no such operation");
+        viewer_refuse(call, "there is no such operation");
     }
 }
 
 void viewer_hear(hall_t *hall, viewer_t *viewer, const char *text, size_t length)
 {
     cJSON *const json = cJSON_ParseWithLength(text, length);
-    call_t call = {.hall = hall, .viewer = viewer, .json = json, .id = (int64_t)number_of(json, "id", 0)};
-    if (!cJSON_IsObject(json) || call.id < 0 || call.id >= PRESS_BIT) {
-        answer_error(hall, viewer, 0, "a message is one JSON object with op, platform and a whole number as id");
+    call_t call = {.hall = hall, .viewer = viewer, .json = json, .id = (int64_t)viewer_number(json, "id", 0)};
+    if (!cJSON_IsObject(json) || call.id < 0 || call.id >= VIEWER_PRESS_BIT) {
+        hall_answer_error(hall, viewer, 0, "a message is one JSON object with op, platform and a whole number as id");
     } else {
         for (unsigned i = 0; i < hall->platforms; i++) {
-            call.upstream = strcmp(hall->platform[i].name, word_of(json, "platform")) == 0 ? &hall->platform[i] : call.upstream;
+            call.upstream =
+                strcmp(hall->platform[i].name, viewer_word(json, "platform")) == 0 ? &hall->platform[i] : call.upstream;
         }
         if (call.upstream == NULL) {
-            refuse(&call, NO_PLATFORM);
+            viewer_refuse(&call, NO_PLATFORM);
         } else {
-            carry_out(&call, word_of(json, "op"));
+            carry_out(&call, viewer_word(json, "op"));
         }
     }
     cJSON_Delete(json);
@@ -453,6 +383,7 @@ static bool wants_ticks(const hall_t *hall, unsigned at)
 
 void hall_pump(hall_t *hall)
 {
+    viewer_service_pump(hall);
     const asker_t own = {.viewer = 0, .id = TICK_ID};
     for (unsigned i = 0; i < hall->platforms; i++) {
         upstream_t *const upstream = &hall->platform[i];

@@ -6,6 +6,7 @@
 #ifndef HEAVE_PANEL_VIEWER_H
 #define HEAVE_PANEL_VIEWER_H
 
+#include "panel/identification.h"
 #include "panel/viewer_state.h"
 
 /** The platforms and pages of a panel. */
@@ -15,7 +16,9 @@ typedef struct {
     viewer_t *viewers;
     uint64_t last_viewer;
     int64_t now_ms;
-    void (*wake)(viewer_t *viewer); /**< it has something to send */
+    identification_t identification[VIEWER_PLATFORMS]; /**< of each platform */
+    const char *state;                                 /**< directory where configurations are staged */
+    void (*wake)(viewer_t *viewer);                    /**< it has something to send */
 } hall_t;
 
 /** A page has come; @return NULL where there is no memory */

@@ -4,6 +4,7 @@
 #ifndef HEAVE_PANEL_VIEWER_STATE_H
 #define HEAVE_PANEL_VIEWER_STATE_H
 
+#include "panel/access.h"
 #include "panel/upstream.h"
 #include "service/access_levels.h"
 
@@ -12,6 +13,7 @@
 #define VIEWER_COLUMNS_MAX 32u
 #define VIEWER_STREAMS_MAX 4u
 #define VIEWER_PLATFORMS   16u
+#define VIEWER_HEARD_MAX   16u /* messages of a page in a turn of 33 ms: what is more waits for the next one */
 
 /** A message that waits. */
 typedef struct {
@@ -20,6 +22,8 @@ typedef struct {
     unsigned char *data; /**< with room for the library's head before it */
 } message_t;
 
+#define FEED_NOTHING UINT32_MAX
+
 /** Samples that it wants. */
 typedef struct {
     uint32_t number; /**< 0: free */
@@ -27,6 +31,7 @@ typedef struct {
     samples_reader_t reader;
     unsigned columns;
     uint32_t column[VIEWER_COLUMNS_MAX]; /**< by place in the table */
+    uint32_t less[VIEWER_COLUMNS_MAX];   /**< the column that is taken off it; FEED_NOTHING: none */
     uint32_t every;
     uint64_t lost_told;
     uint32_t dropped; /**< rows that its link did not take */
@@ -41,7 +46,8 @@ typedef struct viewer {
     uint64_t number; /**< never used again */
     void *handle;    /**< of its connection */
     int role;
-    char name[UPSTREAM_NAME_MAX]; /**< for the operator log and for others: role@address */
+    char name[UPSTREAM_NAME_MAX];   /**< for the operator log and for others: role@address */
+    char session[ACCESS_TOKEN_MAX]; /**< "" where none is needed */
     message_t queue[VIEWER_QUEUE];
     unsigned first, count;
     char in[VIEWER_MESSAGE_MAX];
@@ -52,7 +58,8 @@ typedef struct viewer {
     uint32_t series[VIEWER_PLATFORMS]; /**< of what it holds; 0 = nothing */
     feed_t stream[VIEWER_STREAMS_MAX];
     uint32_t last_stream;
-    bool is_over; /**< to be closed */
+    unsigned heard; /**< messages since the last turn of hall_pump() */
+    bool is_over;   /**< to be closed */
 } viewer_t;
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * frame.c - the vendor's frames, one byte at a time.
  * Outside a frame: idle, or in text to be rejected. Inside: command, colon, values, mask or time. The first error sends the frame
- * to PHASE_REJECTED, where its remaining bytes are skipped up to its `#`, the next head or the end.
+ * to FRAME_PHASE_REJECTED, where its remaining bytes are skipped up to its `#`, the next head or the end.
  *
  * In the lenient dialect `#` is head and tail. Inside a frame or rejected text it is the tail, elsewhere a head. The `#` that
  * ends rejected text may have been meant as a head, so a command may follow it directly: bad text never spoils the good frame
@@ -10,18 +10,7 @@
 #include "heave/frame.h"
 #include "frame_command.h"
 #include "frame_quick.h"
-
-typedef enum {
-    PHASE_IDLE,
-    PHASE_LETTER,
-    PHASE_DIGIT,
-    PHASE_SUFFIX, /* T or colon */
-    PHASE_COLON,
-    PHASE_VALUE,
-    PHASE_MASK,
-    PHASE_TIME,
-    PHASE_REJECTED
-} phase_t;
+#include "frame_reject.h"
 
 enum { MASK_DIGITS_MAX = 4 };
 
@@ -47,53 +36,10 @@ static uint8_t command_byte(const frame_scanner_t *self, uint8_t byte)
     return self->dialect == FRAME_LENIENT && byte >= 'a' && byte <= 'z' ? (uint8_t)(byte - 'a' + 'A') : byte;
 }
 
-/* First byte of an offending character: how many bytes of UTF-8 follow it. */
-static void look_alike_begin(frame_scanner_t *self, uint8_t byte)
-{
-    self->utf8_left = byte < 0xC2 || byte > 0xF4 ? 0 : byte < 0xE0 ? 1 : byte < 0xF0 ? 2 : 3;
-    self->reject.look_alike = self->utf8_left == 0 ? 0 : byte & (0x3Fu >> self->utf8_left);
-}
-
-/* The bytes behind it. */
-static void look_alike_take(frame_scanner_t *self, uint8_t byte)
-{
-    const bool is_continuation = (byte & 0xC0u) == 0x80u;
-    self->reject.look_alike = is_continuation ? self->reject.look_alike << 6 | (byte & 0x3Fu) : 0;
-    self->utf8_left = is_continuation ? (uint8_t)(self->utf8_left - 1) : 0;
-}
-
-/* Records an error at an offset that no single byte explains. */
-static void fail_at(frame_scanner_t *self, frame_error_t error, uint32_t offset, uint8_t field)
-{
-    self->reject = (frame_reject_t){.error = error,
-                                    .offset = offset,
-                                    .start = self->start,
-                                    .field = field,
-                                    .command = self->frame.command,
-                                    .is_timed = self->frame.is_timed};
-    self->utf8_left = 0;
-    self->phase = PHASE_REJECTED;
-}
-
-/* Records an error at the byte being read. */
-static void fail(frame_scanner_t *self, frame_error_t error, uint8_t byte, uint8_t field)
-{
-    fail_at(self, error, self->offset, field);
-    self->reject.byte = byte;
-    look_alike_begin(self, byte);
-}
-
-static void fail_count(frame_scanner_t *self, uint8_t byte, unsigned found)
-{
-    fail(self, FRAME_ERR_COUNT, byte, 0);
-    self->reject.expected = self->frame.count;
-    self->reject.found = (uint8_t)found;
-}
-
 /* No command starts so: without a head of its own it was no frame at all. */
 static void fail_command(frame_scanner_t *self, uint8_t byte)
 {
-    fail(self, self->is_headless ? FRAME_ERR_NO_HEAD : FRAME_ERR_COMMAND, byte, 0);
+    frame_reject_byte(self, self->is_headless ? FRAME_ERR_NO_HEAD : FRAME_ERR_COMMAND, byte, 0);
 }
 
 static void begin_frame(frame_scanner_t *self, bool is_headless)
@@ -102,7 +48,7 @@ static void begin_frame(frame_scanner_t *self, bool is_headless)
     self->start = self->offset;
     self->is_headless = is_headless;
     self->may_be_headless = false;
-    self->phase = PHASE_LETTER;
+    self->phase = FRAME_PHASE_LETTER;
 }
 
 /* What a value is in messages: values count from 1 there. */
@@ -123,13 +69,13 @@ static void begin_field(frame_scanner_t *self, unsigned value)
     self->field_start = self->offset + 1;
     if (value < self->frame.count) {
         self->value = (uint8_t)value;
-        self->phase = PHASE_VALUE;
+        self->phase = FRAME_PHASE_VALUE;
         number_init(&self->number);
     } else if (self->frame.is_timed) {
-        self->phase = PHASE_TIME;
+        self->phase = FRAME_PHASE_TIME;
         number_init(&self->number);
     } else {
-        self->phase = PHASE_MASK;
+        self->phase = FRAME_PHASE_MASK;
         self->frame.relay_mask = 0;
         self->mask_digits = 0;
         self->is_mask_prefixed = false;
@@ -141,7 +87,7 @@ static void take_letter(frame_scanner_t *self, uint8_t byte)
 {
     self->letter = (char)command_byte(self, byte);
     if (self->letter == 'A' || self->letter == 'C') {
-        self->phase = PHASE_DIGIT;
+        self->phase = FRAME_PHASE_DIGIT;
     } else {
         fail_command(self, byte);
     }
@@ -156,18 +102,18 @@ static void take_digit(frame_scanner_t *self, uint8_t byte)
     }
     self->frame.command = command;
     self->frame.count = (uint8_t)frame_value_count(command);
-    self->phase = PHASE_SUFFIX;
+    self->phase = FRAME_PHASE_SUFFIX;
 }
 
 static void take_suffix(frame_scanner_t *self, uint8_t byte)
 {
     if (byte == ':') {
         begin_field(self, 0);
-    } else if (self->phase == PHASE_SUFFIX && command_byte(self, byte) == 'T') {
+    } else if (self->phase == FRAME_PHASE_SUFFIX && command_byte(self, byte) == 'T') {
         self->frame.is_timed = true;
-        self->phase = PHASE_COLON;
+        self->phase = FRAME_PHASE_COLON;
     } else {
-        fail(self, FRAME_ERR_SEPARATOR, byte, 0);
+        frame_reject_byte(self, FRAME_ERR_SEPARATOR, byte, 0);
     }
 }
 
@@ -178,13 +124,13 @@ static void finish_value(frame_scanner_t *self, uint8_t separator)
     case NUMBER_OK:
         break;
     case NUMBER_EMPTY:
-        fail(self, FRAME_ERR_VALUE_EMPTY, separator, value_field(self));
+        frame_reject_byte(self, FRAME_ERR_VALUE_EMPTY, separator, value_field(self));
         break;
     case NUMBER_SYNTAX:
-        fail(self, FRAME_ERR_VALUE_SYNTAX, separator, value_field(self));
+        frame_reject_byte(self, FRAME_ERR_VALUE_SYNTAX, separator, value_field(self));
         break;
     case NUMBER_OVERFLOW:
-        fail_at(self, FRAME_ERR_VALUE_OVERFLOW, self->field_start, value_field(self));
+        frame_reject_at(self, FRAME_ERR_VALUE_OVERFLOW, self->field_start, value_field(self));
         break;
     }
 }
@@ -193,11 +139,11 @@ static void take_value(frame_scanner_t *self, uint8_t byte)
 {
     if (byte == ',') {
         finish_value(self, byte);
-        if (self->phase != PHASE_REJECTED) {
+        if (self->phase != FRAME_PHASE_REJECTED) {
             begin_field(self, self->value + 1u);
         }
     } else if (number_feed(&self->number, byte) != NUMBER_OK) {
-        fail(self, FRAME_ERR_VALUE_SYNTAX, byte, value_field(self));
+        frame_reject_byte(self, FRAME_ERR_VALUE_SYNTAX, byte, value_field(self));
     }
 }
 
@@ -207,7 +153,7 @@ static void take_mask_digit(frame_scanner_t *self, uint8_t byte)
     const bool is_prefix =
         (byte | 0x20u) == 'x' && !self->is_mask_prefixed && self->mask_digits == 1 && self->frame.relay_mask == 0;
     if (self->is_mask_ended || (digit > 15 && !is_prefix) || self->mask_digits == MASK_DIGITS_MAX) {
-        fail(self, FRAME_ERR_MASK, byte, last_field(self));
+        frame_reject_byte(self, FRAME_ERR_MASK, byte, last_field(self));
     } else if (is_prefix) {
         self->is_mask_prefixed = true;
         self->mask_digits = 0;
@@ -220,7 +166,7 @@ static void take_mask_digit(frame_scanner_t *self, uint8_t byte)
 static void take_mask(frame_scanner_t *self, uint8_t byte)
 {
     if (byte == ',') {
-        fail_count(self, byte, self->frame.count + 2u);
+        frame_reject_count(self, byte, self->frame.count + 2u);
     } else if (is_blank(byte)) {
         self->is_mask_ended = self->mask_digits > 0 || self->is_mask_prefixed;
     } else {
@@ -231,7 +177,7 @@ static void take_mask(frame_scanner_t *self, uint8_t byte)
 static void finish_mask(frame_scanner_t *self, uint8_t tail)
 {
     if (self->mask_digits == 0) {
-        fail(self, FRAME_ERR_MASK, tail, last_field(self));
+        frame_reject_byte(self, FRAME_ERR_MASK, tail, last_field(self));
         return;
     }
     self->frame.relay_mask &= FRAME_RELAY_MASK;
@@ -241,9 +187,9 @@ static void finish_mask(frame_scanner_t *self, uint8_t tail)
 static void take_time(frame_scanner_t *self, uint8_t byte)
 {
     if (byte == ',') {
-        fail_count(self, byte, self->frame.count + 2u);
+        frame_reject_count(self, byte, self->frame.count + 2u);
     } else if (number_feed(&self->number, byte) != NUMBER_OK) {
-        fail(self, FRAME_ERR_TIME, byte, last_field(self));
+        frame_reject_byte(self, FRAME_ERR_TIME, byte, last_field(self));
     }
 }
 
@@ -251,11 +197,11 @@ static void finish_time(frame_scanner_t *self, uint8_t tail)
 {
     const number_error_t error = number_finish_natural(&self->number, &self->frame.time_ms);
     if (error == NUMBER_EMPTY || error == NUMBER_SYNTAX) {
-        fail(self, FRAME_ERR_TIME, tail, last_field(self));
+        frame_reject_byte(self, FRAME_ERR_TIME, tail, last_field(self));
     } else if (error == NUMBER_OVERFLOW && self->number.is_negative) {
-        fail_at(self, FRAME_ERR_TIME, self->field_start, last_field(self));
+        frame_reject_at(self, FRAME_ERR_TIME, self->field_start, last_field(self));
     } else if (error == NUMBER_OVERFLOW || self->frame.time_ms > FRAME_TIME_MAX_MS) {
-        fail_at(self, FRAME_ERR_TIME_RANGE, self->field_start, last_field(self));
+        frame_reject_at(self, FRAME_ERR_TIME_RANGE, self->field_start, last_field(self));
     }
 }
 
@@ -266,14 +212,14 @@ static void count_rejected(frame_scanner_t *self)
     if (error == FRAME_ERR_COUNT) {
         self->reject.found = (uint8_t)(self->reject.found + (self->reject.found < UINT8_MAX));
     } else if (error == FRAME_ERR_MASK || error == FRAME_ERR_TIME) {
-        fail_count(self, ',', self->frame.count + 2u);
+        frame_reject_count(self, ',', self->frame.count + 2u);
     }
 }
 
 static void take_rejected(frame_scanner_t *self, uint8_t byte)
 {
     if (self->utf8_left > 0) {
-        look_alike_take(self, byte);
+        frame_reject_take_byte(self, byte);
     }
     if (byte == ',') {
         count_rejected(self);
@@ -291,7 +237,7 @@ static void take_idle(frame_scanner_t *self, uint8_t byte)
     if (may_be_headless) {
         take_letter(self, byte);
     } else {
-        fail(self, FRAME_ERR_NO_HEAD, byte, 0);
+        frame_reject_byte(self, FRAME_ERR_NO_HEAD, byte, 0);
     }
 }
 
@@ -299,108 +245,81 @@ static void take_idle(frame_scanner_t *self, uint8_t byte)
 typedef void take_t(frame_scanner_t *self, uint8_t byte);
 
 static take_t *const k_take[] = {
-    [PHASE_IDLE] = take_idle,     [PHASE_LETTER] = take_letter, [PHASE_DIGIT] = take_digit,
-    [PHASE_SUFFIX] = take_suffix, [PHASE_COLON] = take_suffix,  [PHASE_VALUE] = take_value,
-    [PHASE_MASK] = take_mask,     [PHASE_TIME] = take_time,     [PHASE_REJECTED] = take_rejected,
+    [FRAME_PHASE_IDLE] = take_idle,     [FRAME_PHASE_LETTER] = take_letter, [FRAME_PHASE_DIGIT] = take_digit,
+    [FRAME_PHASE_SUFFIX] = take_suffix, [FRAME_PHASE_COLON] = take_suffix,  [FRAME_PHASE_VALUE] = take_value,
+    [FRAME_PHASE_MASK] = take_mask,     [FRAME_PHASE_TIME] = take_time,     [FRAME_PHASE_REJECTED] = take_rejected,
 };
-
-static bool is_unicode(uint32_t code_point, uint8_t first_byte)
-{
-    const uint32_t least = first_byte < 0xE0 ? 0x80u : first_byte < 0xF0 ? 0x800u : 0x10000u;
-    return code_point >= least && code_point <= 0x10FFFFu && (code_point < 0xD800u || code_point > 0xDFFFu);
-}
-
-/* Hands out the recorded error; the rejected text ends before `end`. */
-static frame_event_t report(frame_scanner_t *self, uint32_t end, frame_reject_t *reject)
-{
-    if (self->utf8_left > 0 || !is_unicode(self->reject.look_alike, self->reject.byte)) {
-        self->reject.look_alike = 0;
-    }
-    self->reject.end = end;
-    *reject = self->reject;
-    self->phase = PHASE_IDLE;
-    self->has_event = true;
-    return FRAME_EVENT_REJECT;
-}
-
-/* Reports what is pending as unfinished, unless it had an error before. */
-static frame_event_t report_unfinished(frame_scanner_t *self, uint32_t end, frame_reject_t *reject)
-{
-    if (self->phase != PHASE_REJECTED) {
-        fail_at(self, FRAME_ERR_UNFINISHED, self->offset, 0);
-    }
-    return report(self, end, reject);
-}
 
 /* `#` behind a value: all must be there but the mask. */
 static void finish_at_value(frame_scanner_t *self, uint8_t tail)
 {
     q16_t ignored;
     if (self->value == 0 && number_finish(&self->number, &ignored) == NUMBER_EMPTY) {
-        fail_count(self, tail, 0);
+        frame_reject_count(self, tail, 0);
         return;
     }
     finish_value(self, tail);
-    if (self->phase == PHASE_REJECTED) {
+    if (self->phase == FRAME_PHASE_REJECTED) {
         return;
     }
     if (value_field(self) < self->frame.count) {
-        fail_count(self, tail, value_field(self));
+        frame_reject_count(self, tail, value_field(self));
     } else if (self->frame.is_timed) {
-        fail(self, FRAME_ERR_TIME, tail, last_field(self));
+        frame_reject_byte(self, FRAME_ERR_TIME, tail, last_field(self));
     }
 }
 
 /* `#` inside a frame: the checks of its last field. */
 static void finish(frame_scanner_t *self, uint8_t tail)
 {
-    switch ((phase_t)self->phase) {
-    case PHASE_LETTER:
-    case PHASE_DIGIT:
+    switch ((frame_phase_t)self->phase) {
+    case FRAME_PHASE_LETTER:
+    case FRAME_PHASE_DIGIT:
         fail_command(self, tail);
         break;
-    case PHASE_SUFFIX:
-    case PHASE_COLON:
-        fail(self, FRAME_ERR_SEPARATOR, tail, 0);
+    case FRAME_PHASE_SUFFIX:
+    case FRAME_PHASE_COLON:
+        frame_reject_byte(self, FRAME_ERR_SEPARATOR, tail, 0);
         break;
-    case PHASE_VALUE:
+    case FRAME_PHASE_VALUE:
         finish_at_value(self, tail);
         break;
-    case PHASE_MASK:
+    case FRAME_PHASE_MASK:
         finish_mask(self, tail);
         break;
-    case PHASE_TIME:
+    case FRAME_PHASE_TIME:
         finish_time(self, tail);
         break;
-    case PHASE_IDLE:
-    case PHASE_REJECTED:
+    case FRAME_PHASE_IDLE:
+    case FRAME_PHASE_REJECTED:
         break;
     }
 }
 
 static frame_event_t take_at(frame_scanner_t *self, frame_reject_t *reject)
 {
-    const frame_event_t event = self->phase == PHASE_IDLE ? FRAME_EVENT_NONE : report_unfinished(self, self->offset, reject);
+    const frame_event_t event =
+        self->phase == FRAME_PHASE_IDLE ? FRAME_EVENT_NONE : frame_reject_unfinished(self, self->offset, reject);
     begin_frame(self, false);
     return event;
 }
 
 static frame_event_t take_hash(frame_scanner_t *self, frame_t *frame, frame_reject_t *reject)
 {
-    if (self->phase == PHASE_IDLE && self->dialect == FRAME_LENIENT) {
+    if (self->phase == FRAME_PHASE_IDLE && self->dialect == FRAME_LENIENT) {
         begin_frame(self, false);
         return FRAME_EVENT_NONE;
     }
-    if (self->phase == PHASE_IDLE) {
+    if (self->phase == FRAME_PHASE_IDLE) {
         take_idle(self, '#');
     }
     finish(self, '#');
-    if (self->phase == PHASE_REJECTED) {
+    if (self->phase == FRAME_PHASE_REJECTED) {
         self->may_be_headless = self->dialect == FRAME_LENIENT;
-        return report(self, self->offset + 1, reject);
+        return frame_reject_report(self, self->offset + 1, reject);
     }
     *frame = self->frame;
-    self->phase = PHASE_IDLE;
+    self->phase = FRAME_PHASE_IDLE;
     self->has_event = true;
     return FRAME_EVENT_FRAME;
 }
@@ -408,8 +327,8 @@ static frame_event_t take_hash(frame_scanner_t *self, frame_t *frame, frame_reje
 /* Blanks and NUL: a NUL ends the text, and a field starts behind its leading blanks. */
 static void take_white(frame_scanner_t *self, uint8_t byte)
 {
-    if (byte == '\0' && self->phase != PHASE_IDLE && self->phase != PHASE_REJECTED) {
-        fail(self, FRAME_ERR_UNFINISHED, byte, 0);
+    if (byte == '\0' && self->phase != FRAME_PHASE_IDLE && self->phase != FRAME_PHASE_REJECTED) {
+        frame_reject_byte(self, FRAME_ERR_UNFINISHED, byte, 0);
         return;
     }
     self->field_start += self->field_start == self->offset;
@@ -423,8 +342,8 @@ static frame_event_t take_other(frame_scanner_t *self, uint8_t byte, frame_rejec
     } else {
         k_take[self->phase](self, byte);
     }
-    if (self->offset - self->start >= FRAME_LENGTH_MAX - 1 && self->phase != PHASE_IDLE) {
-        return report_unfinished(self, self->offset + 1, reject);
+    if (self->offset - self->start >= FRAME_LENGTH_MAX - 1 && self->phase != FRAME_PHASE_IDLE) {
+        return frame_reject_unfinished(self, self->offset + 1, reject);
     }
     return FRAME_EVENT_NONE;
 }
@@ -433,8 +352,8 @@ void frame_scanner_init(frame_scanner_t *self, frame_dialect_t dialect)
 {
     /* copied, as clearing so many bytes is slow on some CPUs: `rep stos` takes a quarter of the time of a short frame */
     static const frame_scanner_t k_start[] = {
-        [FRAME_V3] = {.dialect = FRAME_V3, .phase = PHASE_IDLE},
-        [FRAME_LENIENT] = {.dialect = FRAME_LENIENT, .phase = PHASE_IDLE, .may_be_headless = true},
+        [FRAME_V3] = {.dialect = FRAME_V3, .phase = FRAME_PHASE_IDLE},
+        [FRAME_LENIENT] = {.dialect = FRAME_LENIENT, .phase = FRAME_PHASE_IDLE, .may_be_headless = true},
     };
     *self = k_start[dialect];
 }
@@ -456,12 +375,12 @@ frame_event_t frame_scanner_feed(frame_scanner_t *self, uint8_t byte, frame_t *f
 frame_event_t frame_scanner_end(frame_scanner_t *self, frame_reject_t *reject)
 {
     frame_event_t event = FRAME_EVENT_NONE;
-    if (self->phase == PHASE_IDLE && !self->has_event) {
+    if (self->phase == FRAME_PHASE_IDLE && !self->has_event) {
         self->frame.command = FRAME_COMMANDS;
-        fail_at(self, FRAME_ERR_NO_HEAD, 0, 0);
+        frame_reject_at(self, FRAME_ERR_NO_HEAD, 0, 0);
     }
-    if (self->phase != PHASE_IDLE) {
-        event = report_unfinished(self, self->offset, reject);
+    if (self->phase != FRAME_PHASE_IDLE) {
+        event = frame_reject_unfinished(self, self->offset, reject);
     }
     frame_scanner_init(self, self->dialect);
     return event;
@@ -470,7 +389,7 @@ frame_event_t frame_scanner_end(frame_scanner_t *self, frame_reject_t *reject)
 /* A plain frame where the scanner stands between frames; returns its bytes, 0: no such frame. */
 static size_t take_plain_frame(frame_scanner_t *self, const uint8_t *text, const uint8_t *end, frame_t *frame)
 {
-    const size_t used = self->phase == PHASE_IDLE && text[0] == '@' ? frame_quick(text, end, frame) : 0;
+    const size_t used = self->phase == FRAME_PHASE_IDLE && text[0] == '@' ? frame_quick(text, end, frame) : 0;
     if (used > 0) {
         self->start = self->offset;
         self->offset += (uint32_t)used;

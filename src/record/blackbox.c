@@ -4,14 +4,17 @@
 #include "record/blackbox.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "common/state_path.h"
 #include "record/blackbox_files.h"
+#include "record/blackbox_folders.h"
 #include "record/blackbox_kept.h"
 
 #define STATE_US         5000000u /* from one place where a replay can begin to the next */
@@ -100,6 +103,19 @@ static uint32_t newest_ticket(blackbox_t *self)
     return ticket;
 }
 
+/* In this thread, which may wait for a disk. */
+static void open_place(blackbox_t *self)
+{
+    if (self->place < 0) {
+        __atomic_store_n(&self->place, open(self->directory, O_PATH | O_DIRECTORY | O_CLOEXEC), __ATOMIC_RELEASE);
+    }
+}
+
+int blackbox_folder(const blackbox_t *self)
+{
+    return self->memory != NULL ? __atomic_load_n(&self->place, __ATOMIC_ACQUIRE) : -1;
+}
+
 void blackbox_step(blackbox_t *self, bool is_end)
 {
     char text[BLACKBOX_TEXT_MAX];
@@ -108,6 +124,7 @@ void blackbox_step(blackbox_t *self, bool is_end)
         self->due_us = 0;
         (void)blackbox_write(self, &self->cause, text);
     }
+    open_place(self);
     blackbox_keep_seen(self);
     const uint32_t ticket = newest_ticket(self);
     if (ticket != 0) {
@@ -213,6 +230,7 @@ static bool describe_platform(blackbox_t *self, const config_t *config)
 const char *blackbox_open(blackbox_t *self, const char *config_path, const config_t *config)
 {
     self->file.fd = -1;
+    self->place = -1;
     self->config_path = config_path;
     self->settings = &config->settings;
     memcpy(self->config_hash, config->hash, sizeof self->config_hash);
@@ -259,6 +277,10 @@ bool blackbox_close(blackbox_t *self)
 {
     if (!worker_close(&self->worker, END_WAIT_MS)) {
         return false;
+    }
+    if (self->memory != NULL && self->place >= 0) {
+        (void)close(self->place);
+        self->place = -1;
     }
     free(self->memory);
     free(self->platform);

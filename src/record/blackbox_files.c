@@ -1,36 +1,24 @@
 /* SPDX-License-Identifier: MIT
- * blackbox_files.c - the folders of the black box; see blackbox_files.h.
+ * blackbox_files.c - what an incident has in its files; see blackbox_files.h.
  */
 #include "record/blackbox_files.h"
 
-#include <dirent.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "common/build_id.h"
 #include "common/decimal.h"
 #include "common/message.h"
 #include "heave/text.h"
+#include "record/blackbox_folders.h"
 #include "record/blackbox_kept.h"
 
-#define PREFIX          "incident-"
-#define DUMP            "-dump"
-#define DIGITS          6u /* of a number, so that names sort as numbers do */
-#define NUMBERS         1000000u
-#define PART            ".incident.part"
-#define SEEN            ".seen"
 #define ITEMS_PER_TAKE  1000u /* written before what is fed meanwhile is taken over */
 #define FEEDBACK_PLACES 6u
-
-static const char *const k_files[] = {"frames", "trace.csv", "feedback.csv", "platform.ini"};
-enum { FILE_FRAMES, FILE_TRACE, FILE_FEEDBACK, FILE_PLATFORM, FILES };
 
 /** Where a replay begins. */
 typedef enum {
@@ -38,175 +26,6 @@ typedef enum {
     START_ZERO,  /**< time zero of the run */
     START_STATE  /**< read.state */
 } start_t;
-
-/* --- Names --- */
-
-static const char *path_of(blackbox_t *self, const char *folder, const char *file)
-{
-    text_t text = text_start(self->path, sizeof self->path);
-    text_put(&text, self->directory);
-    text_put(&text, "/");
-    text_put(&text, folder);
-    text_put(&text, file[0] != '\0' ? "/" : "");
-    text_put(&text, file);
-    return self->path;
-}
-
-static int by_name(const void *a, const void *b)
-{
-    return strcmp(((const blackbox_folder_t *)a)->name, ((const blackbox_folder_t *)b)->name);
-}
-
-/* Removes a folder with what is known to be in it. */
-static void remove_folder(blackbox_t *self, const char *name)
-{
-    for (unsigned i = 0; i < FILES; i++) {
-        (void)unlink(path_of(self, name, k_files[i]));
-    }
-    (void)rmdir(path_of(self, name, ""));
-}
-
-uint32_t blackbox_number(const char *name)
-{
-    const size_t prefix = strlen(PREFIX);
-    if (strncmp(name, PREFIX, prefix) != 0 || strspn(&name[prefix], "0123456789") != DIGITS ||
-        strlen(name) >= BLACKBOX_NAME_MAX) {
-        return 0;
-    }
-    return (uint32_t)strtoul(&name[prefix], NULL, 10);
-}
-
-bool blackbox_is_dump(const char *name)
-{
-    const size_t length = strlen(name);
-    return length >= strlen(DUMP) && strcmp(&name[length - strlen(DUMP)], DUMP) == 0;
-}
-
-static void drop(blackbox_t *self, uint32_t index)
-{
-    remove_folder(self, self->folder[index].name);
-    (void)pthread_mutex_lock(&self->mutex);
-    self->folders--;
-    memmove(&self->folder[index], &self->folder[index + 1], (self->folders - index) * sizeof self->folder[0]);
-    (void)pthread_mutex_unlock(&self->mutex);
-}
-
-/* The first fault since a person looked: what came of it hides what it was. */
-static uint32_t find_first_unseen(blackbox_t *self)
-{
-    (void)pthread_mutex_lock(&self->mutex);
-    const uint32_t seen = self->seen;
-    (void)pthread_mutex_unlock(&self->mutex);
-    uint32_t index = 0;
-    while (index < self->folders &&
-           (blackbox_is_dump(self->folder[index].name) || blackbox_number(self->folder[index].name) <= seen)) {
-        index++;
-    }
-    return index;
-}
-
-/* The oldest ones of a sort make way. The first fault that nobody has seen does not, and does not count. */
-static void drop_surplus(blackbox_t *self, bool is_dump)
-{
-    const uint32_t kept = find_first_unseen(self);
-    uint32_t count = 0;
-    for (uint32_t i = self->folders; i-- > 0;) {
-        if (blackbox_is_dump(self->folder[i].name) == is_dump && i != kept && ++count > self->folders_max) {
-            drop(self, i);
-        }
-    }
-}
-
-static void add_folder(blackbox_t *self, const char *name)
-{
-    if (self->folders == BLACKBOX_FOLDERS_MAX) {
-        return;
-    }
-    (void)pthread_mutex_lock(&self->mutex);
-    memcpy(self->folder[self->folders].name, name, strlen(name) + 1); /* blackbox_number() has looked at its length */
-    self->folders++;
-    (void)pthread_mutex_unlock(&self->mutex);
-}
-
-/* --- What a person has seen --- */
-
-static bool close_file(blackbox_t *self);
-
-static uint32_t read_seen(blackbox_t *self)
-{
-    char digits[DIGITS + 2] = "";
-    const int fd = open(path_of(self, SEEN, ""), O_RDONLY | O_CLOEXEC);
-    if (fd < 0) {
-        return 0;
-    }
-    const bool is_read = read(fd, digits, DIGITS) > 0;
-    (void)close(fd);
-    return is_read ? (uint32_t)strtoul(digits, NULL, 10) : 0;
-}
-
-/* Returns errno, 0 = it is on the disk. */
-static int write_seen(blackbox_t *self, uint32_t seen)
-{
-    char part[sizeof self->path];
-    char digits[DIGITS + 8];
-    const int length = snprintf(digits, sizeof digits, "%06u\n", (unsigned)(seen % NUMBERS));
-    (void)snprintf(part, sizeof part, "%s", path_of(self, SEEN ".part", ""));
-    if (!output_file_open(&self->file, part, OUTPUT_FILE_WAITS)) {
-        return self->file.error;
-    }
-    output_file_write(&self->file, digits, (size_t)length);
-    if (!close_file(self)) {
-        return self->file.error;
-    }
-    return rename(part, path_of(self, SEEN, "")) == 0 ? 0 : errno;
-}
-
-void blackbox_keep_seen(blackbox_t *self)
-{
-    (void)pthread_mutex_lock(&self->mutex);
-    const uint32_t seen = self->seen;
-    (void)pthread_mutex_unlock(&self->mutex);
-    if (seen == self->seen_kept) {
-        return;
-    }
-    const int error = write_seen(self, seen);
-    if (error != 0 && error != self->seen_error) {
-        (void)print_message(0, "black box: %s: %s; what has been seen is forgotten with the end of heaved", self->path,
-                            strerror(error));
-    }
-    self->seen_error = error;
-    self->seen_kept = error == 0 || seen < self->seen_kept ? seen : self->seen_kept;
-}
-
-const char *blackbox_find_folders(blackbox_t *self)
-{
-    static char text[BLACKBOX_TEXT_MAX];
-    (void)mkdir(self->directory, 0750);
-    DIR *directory = opendir(self->directory);
-    for (const struct dirent *entry = NULL; directory != NULL && (entry = readdir(directory)) != NULL;) {
-        const uint32_t number = blackbox_number(entry->d_name);
-        if (number != 0) {
-            add_folder(self, entry->d_name);
-            self->number = number > self->number ? number : self->number;
-        }
-    }
-    const int error = errno;
-    if (directory != NULL) {
-        (void)closedir(directory);
-    }
-    qsort(self->folder, self->folders, sizeof self->folder[0], by_name);
-    const time_t now = 0;
-    struct tm date;
-    (void)gmtime_r(&now, &date); /* what it allocates, it allocates here */
-    if (directory != NULL && access(self->directory, W_OK | X_OK) == 0) {
-        remove_folder(self, PART);
-        self->seen = self->seen_kept = read_seen(self);
-        return NULL;
-    }
-    (void)snprintf(text, sizeof text, "black box: %s: %s; until that changes, no incident can be written", self->directory,
-                   strerror(directory == NULL ? error : errno));
-    return text;
-}
 
 /* --- Where a replay begins --- */
 
@@ -249,17 +68,7 @@ static start_t find_start(blackbox_t *self, uint64_t *start_us)
 
 static bool open_file(blackbox_t *self, unsigned file)
 {
-    return output_file_open(&self->file, path_of(self, PART, k_files[file]), OUTPUT_FILE_WAITS);
-}
-
-/* On the disk, not only on its way: power may go next. */
-static bool close_file(blackbox_t *self)
-{
-    output_file_flush(&self->file);
-    if (self->file.error == 0 && fsync(self->file.fd) != 0) {
-        self->file.error = errno;
-    }
-    return output_file_close(&self->file);
+    return output_file_open(&self->file, blackbox_path_of(self, BLACKBOX_PART, blackbox_file_name[file]), OUTPUT_FILE_WAITS);
 }
 
 static void write_text(blackbox_t *self, const char *text)
@@ -392,7 +201,7 @@ static bool write_frames(blackbox_t *self, const blackbox_row_t *cause, const ch
 {
     record_writer_t writer;
     record_writer_init(&writer, self->settings, self->settings->engage == ENGAGE_AUTO && self->settings->auto_frames == 0);
-    if (!open_file(self, FILE_FRAMES)) {
+    if (!open_file(self, BLACKBOX_FRAMES)) {
         return false;
     }
     write_head(self, cause, name, start);
@@ -410,7 +219,7 @@ static bool write_frames(blackbox_t *self, const blackbox_row_t *cause, const ch
     if (start != START_NEVER) {
         write_end(self, &writer);
     }
-    return close_file(self);
+    return blackbox_close_file(self);
 }
 
 static void put_feedback_head(const settings_t *settings, char *to, size_t capacity)
@@ -471,12 +280,12 @@ static bool write_rows(blackbox_t *self, unsigned file, const char *head, size_t
             output_file_write(&self->file, line, format(&self->read.row, line));
         }
     }
-    return close_file(self);
+    return blackbox_close_file(self);
 }
 
 static bool write_platform(blackbox_t *self)
 {
-    if (!open_file(self, FILE_PLATFORM)) {
+    if (!open_file(self, BLACKBOX_PLATFORM)) {
         return false;
     }
     for (size_t at = 0; at < self->platform_length && self->file.error == 0;) {
@@ -485,7 +294,7 @@ static bool write_platform(blackbox_t *self)
         output_file_write(&self->file, &self->platform[at], piece);
         at += piece;
     }
-    return close_file(self);
+    return blackbox_close_file(self);
 }
 
 /* --- An incident --- */
@@ -506,54 +315,28 @@ static bool write_files(blackbox_t *self, const blackbox_row_t *cause, const cha
     const start_t start = find_start(self, &start_us);
     const uint64_t rows_us = start == START_ZERO ? 0 : start_us; /* what came before time zero is shown, if not replayed */
     bool is_good =
-        write_frames(self, cause, name, start, start_us) && write_rows(self, FILE_TRACE, trace_head, format_row, rows_us);
+        write_frames(self, cause, name, start, start_us) && write_rows(self, BLACKBOX_TRACE, trace_head, format_row, rows_us);
     start_reading(&self->rows); /* once more */
-    is_good = is_good && write_rows(self, FILE_FEEDBACK, feedback_head, format_feedback, rows_us) && write_platform(self);
+    is_good = is_good && write_rows(self, BLACKBOX_FEEDBACK, feedback_head, format_feedback, rows_us) && write_platform(self);
     self->states.is_reading = false;
     self->records.is_reading = false;
     self->rows.is_reading = false;
     return is_good;
 }
 
-/* The folder with what has been written gets its name; the directory is on the disk with it. */
-static bool name_folder(blackbox_t *self, const char *name)
-{
-    char part[sizeof self->path];
-    (void)snprintf(part, sizeof part, "%s", path_of(self, PART, ""));
-    if (rename(part, path_of(self, name, "")) != 0) {
-        return false;
-    }
-    const int directory = open(self->directory, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (directory >= 0) {
-        (void)fsync(directory);
-        (void)close(directory);
-    }
-    return true;
-}
-
-static void make_name(blackbox_t *self, bool is_dump, char name[BLACKBOX_NAME_MAX])
-{
-    const time_t now = time(NULL);
-    struct tm date;
-    (void)gmtime_r(&now, &date);
-    (void)snprintf(name, BLACKBOX_NAME_MAX, PREFIX "%06u-%04d%02d%02dT%02d%02d%02dZ%s", (unsigned)(self->number % NUMBERS),
-                   date.tm_year + 1900, date.tm_mon + 1, date.tm_mday, date.tm_hour, date.tm_min, date.tm_sec,
-                   is_dump ? DUMP : "");
-}
-
 static int make_incident(blackbox_t *self, const blackbox_row_t *cause, const char *name)
 {
-    remove_folder(self, PART);
+    blackbox_remove_folder(self, BLACKBOX_PART);
     (void)mkdir(self->directory, 0750);
-    if (mkdir(path_of(self, PART, ""), 0750) != 0) {
+    if (mkdir(blackbox_path_of(self, BLACKBOX_PART, ""), 0750) != 0) {
         return errno;
     }
     self->file.error = 0;
-    if (write_files(self, cause, name) && name_folder(self, name)) {
+    if (write_files(self, cause, name) && blackbox_name_folder(self, name)) {
         return 0;
     }
     const int error = self->file.error != 0 ? self->file.error : errno;
-    remove_folder(self, PART);
+    blackbox_remove_folder(self, BLACKBOX_PART);
     return error;
 }
 
@@ -561,7 +344,7 @@ bool blackbox_write(blackbox_t *self, const blackbox_row_t *cause, char text[BLA
 {
     char name[BLACKBOX_NAME_MAX];
     self->number++;
-    make_name(self, cause == NULL, name);
+    blackbox_make_name(self, cause == NULL, name);
     const int error = make_incident(self, cause, name);
     if (error != 0) {
         self->number--;
@@ -569,9 +352,9 @@ bool blackbox_write(blackbox_t *self, const blackbox_row_t *cause, char text[BLA
         (void)print_message(0, "black box: %s: no incident written", text);
         return false;
     }
-    add_folder(self, name);
-    drop_surplus(self, cause == NULL);
-    (void)snprintf(text, BLACKBOX_TEXT_MAX, "%s", path_of(self, name, ""));
+    blackbox_add_folder(self, name);
+    blackbox_drop_surplus(self, cause == NULL);
+    (void)snprintf(text, BLACKBOX_TEXT_MAX, "%s", blackbox_path_of(self, name, ""));
     (void)print_message(0, "black box: %s", text);
     return true;
 }

@@ -12,9 +12,6 @@
 
 #include "record/frames_line.h"
 
-#define FRAMES_TIME_MAX_MS 4294967295u /**< 49 days */
-#define FRAMES_TEXT_MAX    65507u      /**< longest datagram UDP carries */
-
 /** A file in memory. */
 typedef struct {
     frames_line_t *line; /**< without empty lines, comments and FRAMES_FROM */
@@ -24,14 +21,6 @@ typedef struct {
     hal_udp_peer_t from;     /**< of the datagrams of the lines to come */
     char *bytes;             /**< the file; texts point into it */
 } frames_t;
-
-/** Reads one line, without its newline.
- *  @param text   changed: escapes are resolved in place, and the line's text points into it
- *  @param length without newline; a CR at the end does not count
- *  @param out    valid where true is returned and *is_empty is false; out->line is left alone
- *  @param why    constant text where false is returned: what is wrong; what is allowed
- *  @return false: the line is wrong */
-bool frames_parse_line(char *text, size_t length, frames_line_t *out, bool *is_empty, const char **why);
 
 /** Loads a file, "-" being standard input.
  *  @param errors takes one line for each bad one: `FILE:LINE: what; what is allowed`

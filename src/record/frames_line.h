@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * frames_line.h - one line of a file of frames, read.
+ * frames_line.h - one line of a file of frames: what it says, and how it is read. Allocates nothing.
  */
 #ifndef HEAVE_RECORD_FRAMES_LINE_H
 #define HEAVE_RECORD_FRAMES_LINE_H
@@ -9,6 +9,9 @@
 #include "heave/hal/udp.h"
 #include "heave/service.h"
 #include "heave/supervisor.h"
+
+#define FRAMES_TIME_MAX_MS 4294967295u /**< 49 days */
+#define FRAMES_TEXT_MAX    65507u      /**< longest datagram UDP carries */
 
 /** What a line does. */
 typedef enum {
@@ -42,5 +45,13 @@ typedef struct {
     hal_udp_peer_t from;       /**< FRAMES_FROM: read from it; FRAMES_DATAGRAM: set by frames_load */
     uint32_t line;             /**< number in the file, from 1 */
 } frames_line_t;
+
+/** Reads one line, without its newline.
+ *  @param text   changed: escapes are resolved in place, and the line's text points into it
+ *  @param length without newline; a CR at the end does not count
+ *  @param out    valid where true is returned and *is_empty is false; out->line is left alone
+ *  @param why    constant text where false is returned: what is wrong; what is allowed
+ *  @return false: the line is wrong */
+bool frames_parse_line(char *text, size_t length, frames_line_t *out, bool *is_empty, const char **why);
 
 #endif

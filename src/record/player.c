@@ -12,8 +12,8 @@
 
 /* --- What the gateway sees --- */
 
-/* The next line of its sort whose time has come, NULL where there is none. Datagrams and the rest go their own ways through the
- * file: what a full cycle leaves of the datagrams must not hold a request up. */
+/* The next line of its sort whose time has come; NULL: none. Datagrams and all other lines have an index of their own, because
+ * datagrams that did not fit into a cycle must not delay a request. */
 static const frames_line_t *take_due(player_t *self, size_t *next, bool is_datagram)
 {
     const uint64_t t_us = self->session.now_us - self->session.zero_us;
@@ -43,7 +43,7 @@ static hv_status_t player_recv(void *ctx, uint8_t *buffer, size_t capacity, size
     return HV_OK;
 }
 
-/* How long ago that was. */
+/* Time since then. */
 static hv_status_t player_waited(void *ctx, uint32_t *us)
 {
     const player_t *self = ctx;
@@ -59,7 +59,7 @@ hal_udp_t player_udp(player_t *self)
     return (hal_udp_t){&k_udp, self};
 }
 
-/* --- Drives that lines tell of --- */
+/* --- Drives whose feedback is in the lines --- */
 
 static hv_status_t told_poll(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
 {
@@ -82,7 +82,7 @@ static hv_status_t told_send(void *ctx, uint64_t now_us, const q32_t setpoint_q3
     return self->is_told ? HV_OK : status;
 }
 
-/* What the contract says of the states that were told. */
+/* Accepts a request as the contract demands for the recorded states of the drives. */
 static hv_status_t told_request(void *ctx, drives_request_t request)
 {
     player_t *self = ctx;
@@ -111,7 +111,8 @@ static uint8_t told_count(void *ctx)
 
 drives_t player_drives(player_t *self)
 {
-    static const drives_ops_t k_ops = {told_poll, told_send, told_request, told_count, NULL, NULL, told_request_one, NULL};
+    static const drives_ops_t k_ops = {told_poll, told_send,        told_request, told_count, NULL,
+                                       NULL,      told_request_one, NULL,         NULL,       NULL};
     return (drives_t){&k_ops, self};
 }
 
@@ -124,7 +125,7 @@ static void tell_refused(const player_t *self, const frames_line_t *line, hv_sta
     }
 }
 
-/* What a drive did; one that this platform does not have did nothing. */
+/* Applies an event of a drive. Drives that this platform does not have are ignored. */
 static void inject(player_t *self, const frames_line_t *line)
 {
     const sim_drives_fault_t fault = {.kind = line->state == DRIVE_FAULT     ? SIM_DRIVES_FAULT
@@ -201,7 +202,7 @@ static bool is_state_at_rest(const snapshot_t *s)
         return false;
     case STATE_SETTLED:
     case STATE_NEUTRAL:
-        return s->goal == s->state; /* else it goes on with the next cycle */
+        return s->goal == s->state; /* otherwise the next cycle moves it on */
     case STATE_OFF:
     case STATE_ENGAGED:
     case STATE_HOLD:
@@ -214,7 +215,8 @@ static bool is_state_at_rest(const snapshot_t *s)
     return true;
 }
 
-/* Whether a set-point has changed. Not the pose: it is solved from them, and its last bits may go to and fro. */
+/* Whether a set-point has changed. The pose is not compared: it is calculated from the set-points, and its last bits may
+ * alternate. */
 static bool has_moved(const trace_row_t *before, const trace_row_t *row)
 {
     const size_t first = AXIS_ANGLE;
@@ -249,7 +251,8 @@ bool player_is_endless(const player_t *self)
     return self->row.t_us > last_line_us(self) + EXTRA_MAX_US;
 }
 
-/* Comes up to SETTLED. What the auto policy does comes after it: a platform that waits for frames is brought up by a request. */
+/* Brings the platform up to SETTLED. The auto policy acts only afterwards, so a request brings up a platform that waits for
+ * frames. */
 bool player_settle(player_t *self, const settings_t *settings)
 {
     const bool is_asked = settings->engage == ENGAGE_MANUAL || settings->auto_frames > 0;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * player.h - lines of a file of frames through a gateway, with simulated time: what an offline run is, without files.
+ * player.h - plays the lines of a frames file through a gateway, in simulated time. This is an offline run without its files.
  * Needs no operating system.
  */
 #ifndef HEAVE_RECORD_PLAYER_H
@@ -11,46 +11,47 @@
 #include "sim_drives.h"
 #include "sim_inputs.h"
 
-/** A run. The caller sets what stands before session, zeroes the rest, and calls session_init. */
+/** A run. The caller sets the members before session, zeroes the others, and calls session_init(). */
 typedef struct {
     const frames_line_t *line; /**< times never decrease */
     size_t lines;
-    sim_drives_t *drives;                                                    /**< where lines say what a drive did */
-    sim_inputs_t *inputs;                                                    /**< where lines press the e-stop */
-    void (*refused)(void *ctx, const frames_line_t *line, const char *what); /**< told of refused requests; NULL: nobody */
+    sim_drives_t *drives;                                                    /**< lines inject events of drives here */
+    sim_inputs_t *inputs;                                                    /**< lines press the e-stop here */
+    void (*refused)(void *ctx, const frames_line_t *line, const char *what); /**< gets each refused request; may be NULL */
     void *ctx;
 
     session_t session;
-    bool is_before_zero; /**< the run goes on from a state before time zero: lines' times are since the start */
-    bool is_told;        /**< lines tell what the drives told; the simulated ones are not asked */
+    bool is_before_zero; /**< the run continues from a state before time zero: times of lines count from the start of heaved */
+    bool is_told;        /**< lines contain the feedback of the drives; that of the simulated drives is not used */
     drive_feedback_t told[DRIVES_MAX];
-    size_t next_datagram; /**< line from which on to look for one */
+    size_t next_datagram; /**< line at which the search for the next datagram begins */
     size_t next_request;  /**< the same for everything else */
-    bool is_ended;        /**< a line has said so: the last cycle was the last one */
+    bool is_ended;        /**< a line has ended the run: no further cycle */
     uint64_t still_since_us;
     trace_row_t row; /**< of the last cycle */
 } player_t;
 
-/** The lines' datagrams, each once its time has come: for the io that session_init takes. */
+/** The source of datagrams for the io of session_init(). It delivers the datagram of each line when its time has come. */
 hal_udp_t player_udp(player_t *self);
 
-/** The drives: simulated, unless lines tell what they told. For the io that session_init or gateway_resume takes. */
+/** The drives for the io of session_init() or gateway_resume(): simulated ones, unless lines contain the feedback. */
 drives_t player_drives(player_t *self);
 
-/** Comes up to SETTLED as it does live: before time zero and without a row. What the auto policy does comes after it.
- *  @return false where the platform does not come up */
+/** Brings the platform up to SETTLED as in live operation: before time zero and without rows. The auto policy acts only
+ * afterwards.
+ *  @return false: the platform does not come up */
 bool player_settle(player_t *self, const settings_t *settings);
 
-/** The row of the last cycle before the first of player_cycle. */
+/** Fills `row` from the session as it is now. Call it before the first player_cycle(). */
 void player_begin(player_t *self);
 
-/** One cycle, with what is due before it, and its row. */
+/** Carries out the lines that are due, runs one cycle, and fills `row`. */
 void player_cycle(player_t *self);
 
-/** Nothing has moved for a while, and nothing more comes; or a line says that this is the end. */
+/** True if no set-point has changed for a while and no lines are left, or if a line has ended the run. */
 bool player_is_at_rest(const player_t *self);
 
-/** Two hours after the last line. */
+/** True two hours after the last line. */
 bool player_is_endless(const player_t *self);
 
 #endif

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * service_words.h - requests of SERVICE in words: as a client sends them, and as a frames file holds them. Pure.
  *
- *     torque N|all on|off          jog N|AXIS SPEED ...     home N|all ...     relay N ...     beat SERIES COUNTER ... release
- * SERIES
+ *     torque N|all on|off          jog N|AXIS SPEED [WAY] ...     home N|all ...     relay N ...
+ *     signal N|AXIS sine|step AMPLITUDE HZ SECONDS ...      signal N|AXIS chirp|noise AMPLITUDE HZ TO_HZ SECONDS ...
+ *     beat SERIES COUNTER ...      release SERIES
  *
  * A client ends what is held, and a beat, with the tick that it echoes. A file has the series there, where the client has none
  * yet, and the age of that tick in us: `jog z -2.5 17 1000`.
@@ -13,7 +14,7 @@
 #include "heave/service.h"
 
 /** Bytes that hold every request of a file, without end. */
-#define SERVICE_WORDS_MAX 96u
+#define SERVICE_WORDS_MAX 160u
 
 /** True where the first word is one of these. */
 bool service_words_are(const char *text, size_t length);

@@ -84,11 +84,11 @@ level_t levels_needed(const char *request, unsigned percent)
         const bool is_down = operator_read_percent(&request[sizeof k_intensity - 1], &wanted) && wanted <= percent;
         return is_down ? LEVEL_OPERATE : LEVEL_SERVICE;
     }
-    if (strcmp(request, "seen") == 0) {
+    if (strcmp(request, "seen") == 0 || strcmp(request, "operator-log") == 0) {
         return LEVEL_OPERATE;
     }
     if (service_words_are(request, strlen(request)) || strcmp(request, "dump") == 0 || strcmp(request, "acknowledge") == 0 ||
-        strncmp(request, "selftest ", 9) == 0) {
+        strncmp(request, "sdo", 3) == 0 || strncmp(request, "selftest ", 9) == 0 || strncmp(request, "configure ", 10) == 0) {
         return LEVEL_SERVICE;
     }
     const event_t event = operator_request_find(request);

@@ -46,7 +46,7 @@ static standing_t standing(const control_client_t *client, uint64_t now_us)
     if (client->request_id != 0 || now_us - client->came_us < CONTROL_GRACE_US) {
         return STAYS;
     }
-    if (client->dump_ticket != 0) {
+    if (client->dump_ticket != 0 || client->is_configuring) {
         return WAITS_FOR_DISK;
     }
     if (client->watch_period_us != 0) {
@@ -155,7 +155,9 @@ static void take_connection(control_t *self, unsigned at, uint64_t now_us)
     client->in_length = 0;
     client->out_length = 0;
     client->is_closing = false;
-    client->is_passing = false;
+    client->passing = -1;
+    client->received = -1;
+    client->is_configuring = false;
     client->request_id = 0;
     client->dump_ticket = 0;
     client->watch_period_us = 0;
@@ -215,6 +217,7 @@ void control_init(control_t *self)
     }
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         self->client[i].fd = -1;
+        self->client[i].received = -1;
         self->client[i].control = self;
     }
 }
@@ -227,6 +230,11 @@ int control_open(control_t *self, const char *path, const config_t *config, hand
     self->handover = handover;
     self->blackbox = blackbox;
     self->log = log;
+    self->mistakes_stream = fmemopen(self->mistakes, sizeof self->mistakes - 1u, "w"); /* now: nothing is allocated later */
+    if (self->mistakes_stream == NULL) {
+        return print_message(EXIT_UNAVAILABLE, "no memory");
+    }
+    (void)setvbuf(self->mistakes_stream, NULL, _IONBF, 0);
     int code = levels_open(&self->levels, config);
     code = code == EXIT_DONE ? control_socket_open(&self->socket[0], path, 0660) : code;
     if (code == EXIT_DONE && strcmp(config->look_socket, "none") != 0) {
@@ -247,5 +255,9 @@ void control_close(control_t *self)
     }
     for (unsigned at = 0; at < CONTROL_SOCKETS; at++) {
         control_socket_close(&self->socket[at]);
+    }
+    if (self->mistakes_stream != NULL) {
+        (void)fclose(self->mistakes_stream);
+        self->mistakes_stream = NULL;
     }
 }

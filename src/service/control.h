@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * control.h - the local socket through which heavectl reaches heaved: requests are lines, answers are JSON objects, one per line.
  * Requests: status, watch [HZ], intensity PERCENT, engage, hold, resume, park, reset, shutdown, dump, incidents, seen,
- * acknowledge, by NAME. The service thread owns it; nothing blocks, nothing allocates after the open, and a client that does not
- * read is dropped. An operator can always connect: if all places are taken, heaved closes the connection of the
- * least important client, with an error that says so.
+ * acknowledge, configuration, configure, by NAME. The service thread owns it; nothing blocks, nothing allocates after the open,
+ * and a client that does not read is dropped. An operator can always connect: if all places are taken, heaved closes the
+ * connection of the least important client, with an error that says so.
  */
 #ifndef HEAVE_SERVICE_CONTROL_H
 #define HEAVE_SERVICE_CONTROL_H
@@ -13,6 +13,7 @@
 
 #include "record/blackbox.h"
 #include "service/access_levels.h"
+#include "service/config_store.h"
 #include "service/handover.h"
 #include "service/operator_log.h"
 #include "service/status_json.h"
@@ -21,7 +22,7 @@
 #define CONTROL_SOCKETS      2u
 #define CONTROL_FDS          (CONTROL_CLIENTS + CONTROL_SOCKETS)
 #define CONTROL_LOOKERS      3u /* most clients of the second socket: those of the first always find a place */
-#define CONTROL_REQUEST_MAX  64u
+#define CONTROL_REQUEST_MAX  96u
 #define CONTROL_ANSWER_MAX   16384u
 #define CONTROL_OUT_BYTES    (4u * CONTROL_ANSWER_MAX)
 #define CONTROL_WATCH_HZ     20u /* where the client does not say */
@@ -41,12 +42,17 @@ typedef struct {
     size_t in_length;
     char out[CONTROL_OUT_BYTES];
     size_t out_length;
-    bool is_passing;           /**< the descriptor of the samples goes out with the next bytes */
+    int received;              /**< a descriptor that came with its bytes; -1 = none */
+    bool is_configuring;       /**< waits until the disk has its configuration */
+    int passing;               /**< a descriptor of its owner's that goes out with the next bytes; -1 = none */
     bool is_closing;           /**< nothing more is read; closed once everything is answered and sent */
     uint32_t request_id;       /**< waits for the motion thread; 0 = none */
     event_t request;           /**< or OPERATOR_INTENSITY */
     uint32_t number;           /**< of that */
     service_request_t service; /**< of OPERATOR_SERVICE */
+    uint8_t object_drive;      /**< of OPERATOR_OBJECT, from 1 */
+    uint8_t object_type;       /**< likewise: canopen_type_t; another number: not known */
+    char object_error[192];    /**< what is wrong with the last one */
     bool is_accepted;          /**< by the motion thread; a reset then still has to take effect */
     uint64_t answer_by_us;     /**< latest time of the answer */
     uint32_t dump_ticket;      /**< waits for the black box; 0 = does not */
@@ -83,6 +89,11 @@ typedef struct control {
     blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX]; /**< as last listed */
     int samples_fd;                                 /**< given to who asks for samples; -1: there are none. The owner sets it */
     status_lost_t lost;                             /**< the owner keeps it up to date */
+    config_store_t *store;                          /**< the owner's; NULL: none */
+    config_changes_t changes;                       /**< of what is being applied */
+    bool is_end_wanted;                             /**< a client has asked for shutdown */
+    FILE *mistakes_stream;                          /**< into: */
+    char mistakes[1024];
     motion_view_words_t view;
     level_peer_t
         acknowledged_by; /**< who has just acknowledged the configuration; the owner says it and sets it back; pid 0: nobody */

@@ -39,11 +39,39 @@ void control_client_drop(control_client_t *client)
     control_client_log(client, "the client has gone before it was answered", client->entry.before);
     (void)close(client->fd);
     client->fd = -1;
+    control_client_forget_received(client);
+}
+
+void control_client_forget_received(control_client_t *client)
+{
+    if (client->received >= 0) {
+        (void)close(client->received);
+    }
+    client->received = -1;
+}
+
+ssize_t control_client_receive(control_client_t *client)
+{
+    union {
+        struct cmsghdr header;
+        char bytes[CMSG_SPACE(sizeof(int))];
+    } passed;
+    struct iovec bytes = {&client->in[client->in_length], sizeof client->in - client->in_length};
+    struct msghdr message = {
+        .msg_iov = &bytes, .msg_iovlen = 1, .msg_control = passed.bytes, .msg_controllen = CMSG_LEN(sizeof(int))};
+    /* Room for one; in CMSG_SPACE two would fit. The kernel closes what does not. */
+    const ssize_t received = recvmsg(client->fd, &message, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
+    const struct cmsghdr *const head = received > 0 ? CMSG_FIRSTHDR(&message) : NULL;
+    if (head != NULL && head->cmsg_level == SOL_SOCKET && head->cmsg_type == SCM_RIGHTS) {
+        control_client_forget_received(client);
+        memcpy(&client->received, CMSG_DATA(head), sizeof(int));
+    }
+    return received;
 }
 
 bool control_client_is_waiting(const control_client_t *client)
 {
-    return client->request_id != 0 || client->dump_ticket != 0;
+    return client->request_id != 0 || client->dump_ticket != 0 || client->is_configuring;
 }
 
 /* Sends bytes, and with the first of them a descriptor that is due. */
@@ -55,7 +83,7 @@ static ssize_t send_bytes(control_client_t *client)
     } passed;
     struct iovec bytes = {client->out, client->out_length};
     struct msghdr message = {.msg_iov = &bytes, .msg_iovlen = 1};
-    if (client->is_passing) {
+    if (client->passing >= 0) {
         memset(&passed, 0, sizeof passed);
         message.msg_control = passed.bytes;
         message.msg_controllen = sizeof passed.bytes;
@@ -63,10 +91,10 @@ static ssize_t send_bytes(control_client_t *client)
         header->cmsg_level = SOL_SOCKET;
         header->cmsg_type = SCM_RIGHTS;
         header->cmsg_len = CMSG_LEN(sizeof(int));
-        memcpy(CMSG_DATA(header), &client->control->samples_fd, sizeof(int));
+        memcpy(CMSG_DATA(header), &client->passing, sizeof(int));
     }
     const ssize_t sent = sendmsg(client->fd, &message, MSG_DONTWAIT | MSG_NOSIGNAL);
-    client->is_passing = client->is_passing && sent <= 0;
+    client->passing = sent > 0 ? -1 : client->passing;
     return sent;
 }
 

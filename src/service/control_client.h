@@ -15,6 +15,12 @@ const snapshot_t *control_snapshot(const control_t *self);
 /** Closes the connection. A request that is still open is logged without an answer. */
 void control_client_drop(control_client_t *client);
 
+/** Reads what its socket has behind what it has sent already, and a descriptor that comes with it. As recv(). */
+ssize_t control_client_receive(control_client_t *client);
+
+/** Closes that descriptor; harmless where there is none. */
+void control_client_forget_received(control_client_t *client);
+
 /** Sends what the socket takes now. */
 void control_client_send(control_client_t *client);
 

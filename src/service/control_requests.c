@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * control_requests.c - see control_requests.h.
  */
+#include "common/translate.h"
 #include "service/control_requests.h"
 
 #include <errno.h>
@@ -11,20 +12,24 @@
 
 #include "record/service_words.h"
 #include "service/control_client.h"
-#include "service/control_geometry.h"
+#include "service/control_configuration.h"
+#include "service/control_object.h"
+#include "service/control_passing.h"
+#include "service/control_questions.h"
 #include "service/control_selftest.h"
 #include "service/operator_requests.h"
 #include "service/service_json.h"
 
 #define ANSWER_US 1000000u  /* the motion thread answers within a cycle or two */
+#define OBJECT_US 1000000u  /* beside what a drive may take: it is asked once, and left alone as long after that */
 #define DUMP_US   50000000u /* heavectl waits a little longer */
 #define RESET_US  2500000u  /* a reset takes effect when the drives say so */
 
 static const char k_unapproved[] =
-    "the configuration %s is not the one that was approved (%s): `heavectl acknowledge` lets it move until "
-    "heaved ends, [platform] approved for good";
+    N_("the configuration %s is not the one that was approved (%s): `heavectl acknowledge` lets it move until "
+       "heaved ends, [platform] approved for good");
 static const char k_untested[] =
-    "a self-test is due: `heavectl selftest`, with nobody on board, has to pass today with this configuration";
+    N_("a self-test is due: `heavectl selftest`, with nobody on board, has to pass today with this configuration");
 static const char k_acknowledge[] = "acknowledge";
 
 static control_client_t *find_client(control_t *self, uint32_t request_id)
@@ -70,6 +75,7 @@ static void hand_over(control_t *self, control_client_t *client, const motion_re
 
 static void begin_request(control_t *self, control_client_t *client, event_t event, uint32_t number, uint64_t now_us)
 {
+    self->is_end_wanted |= event == EVENT_SHUTDOWN;
     hand_over(self, client, &(motion_request_t){.event = (uint32_t)event, .number = number}, now_us);
 }
 
@@ -86,6 +92,19 @@ static void begin_service(control_t *self, control_client_t *client, const char 
         request.service.series = ++self->last_series;
     }
     hand_over(self, client, &request, now_us);
+}
+
+/* An object of a drive. */
+static void begin_object(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+{
+    motion_request_t request;
+    const char *wrong = control_object_read(client, line, &request);
+    if (wrong != NULL) {
+        control_client_answer_error(client, wrong, state_name(control_snapshot(self)->state));
+        return;
+    }
+    hand_over(self, client, &request, now_us);
+    client->answer_by_us += 2000u * (uint64_t)self->config->cia402.sdo_timeout_ms + OBJECT_US;
 }
 
 static void begin_intensity(control_t *self, control_client_t *client, const char *argument, uint64_t now_us)
@@ -182,38 +201,26 @@ static void answer_incidents(control_t *self, control_client_t *client, bool is_
     control_client_answer(client, &json);
 }
 
-/* The memory of the samples comes with the answer (SCM_RIGHTS). */
-static void answer_samples(const control_t *self, control_client_t *client)
-{
-    if (self->samples_fd < 0) {
-        control_client_answer_error(client, "samples: there are none; [samples] seconds says how long they are kept", NULL);
-        return;
-    }
-    client->is_passing = true;
-    json_t json = control_client_start_answer(client);
-    json_open(&json, NULL, '{');
-    json_bool(&json, "ok", true);
-    json_number(&json, "seconds", self->config->samples_seconds);
-    json_close(&json, '}');
-    control_client_answer(client, &json);
-}
-
 static const char k_intensity[] = "intensity ";
+static const char k_operator_log[] = "operator-log";
 static const char k_by[] = "by ";
 
 static bool is_look(const char *line)
 {
     return strcmp(line, "status") == 0 || strcmp(line, "tick") == 0 || strcmp(line, "counts") == 0 ||
            strncmp(line, "beat ", 5) == 0 || strcmp(line, "incidents") == 0 || strcmp(line, "samples") == 0 ||
-           strcmp(line, "selftest") == 0 || strcmp(line, "geometry") == 0 || strncmp(line, "watch", 5) == 0 ||
-           strncmp(line, k_by, strlen(k_by)) == 0;
+           strcmp(line, "selftest") == 0 || strcmp(line, "geometry") == 0 || strcmp(line, "times") == 0 ||
+           strcmp(line, "configuration") == 0 || strcmp(line, "incident-folder") == 0 || strcmp(line, k_operator_log) == 0 ||
+           strncmp(line, "watch", 5) == 0 || strncmp(line, k_by, strlen(k_by)) == 0 ||
+           (control_object_is_said(line) && !control_object_is_write(line));
 }
 
 static bool is_known(const char *line)
 {
     return operator_request_find(line) != EVENTS || service_words_are(line, strlen(line)) ||
            strncmp(line, k_intensity, strlen(k_intensity)) == 0 || strcmp(line, "dump") == 0 || strcmp(line, "seen") == 0 ||
-           strcmp(line, k_acknowledge) == 0 || control_selftest_is_said(line);
+           strcmp(line, k_acknowledge) == 0 || control_configuration_is(line) || control_selftest_is_said(line) ||
+           control_object_is_said(line);
 }
 
 /* Somebody has seen that this is not the configuration that was approved, and wants it. */
@@ -266,9 +273,9 @@ static bool is_allowed(const control_t *self, control_client_t *client, const ch
     if (client->peer.level >= needed) {
         return true;
     }
-    (void)snprintf(error, sizeof error, "%.20s: not allowed; it takes the level %s (%s%s)%s", line, level_name(needed),
-                   group->text[0] != '\0' ? "members of group " : "the other socket", group->text,
-                   client->is_looker ? ", and not this socket" : "");
+    (void)snprintf(error, sizeof error, N_("%.20s: not allowed; it takes the level %s (%s%s)%s"), line, level_name(needed),
+                   group->text[0] != '\0' ? N_("members of group ") : N_("the other socket"), group->text,
+                   client->is_looker ? N_(", and not this socket") : "");
     control_client_answer_error(client, error, state_name(control_snapshot(self)->state));
     return false;
 }
@@ -279,7 +286,7 @@ static void take_request(control_t *self, control_client_t *client, const char *
     if (!is_look(line)) {
         begin_entry(self, client, line);
     }
-    if (!is_allowed(self, client, line)) {
+    if (!is_allowed(self, client, line) || control_questions_answer(self, client, line)) {
         return;
     }
     if (event != EVENTS) {
@@ -288,6 +295,8 @@ static void take_request(control_t *self, control_client_t *client, const char *
         begin_intensity(self, client, &line[strlen(k_intensity)], now_us);
     } else if (service_words_are(line, strlen(line))) {
         begin_service(self, client, line, now_us);
+    } else if (control_object_is_said(line)) {
+        begin_object(self, client, line, now_us);
     } else if (strcmp(line, "tick") == 0 || strcmp(line, "counts") == 0) {
         answer_tick(self, client, line[0] == 'c');
     } else if (strcmp(line, "dump") == 0) {
@@ -300,10 +309,10 @@ static void take_request(control_t *self, control_client_t *client, const char *
         control_selftest_answer(self, client);
     } else if (control_selftest_is_said(line)) {
         control_selftest_take(self, client, line);
-    } else if (strcmp(line, "geometry") == 0) {
-        control_geometry_answer(self, client);
-    } else if (strcmp(line, "samples") == 0) {
-        answer_samples(self, client);
+    } else if (control_configuration_is(line)) {
+        control_configuration_take(self, client, line, now_us);
+    } else if (strcmp(line, "incident-folder") == 0 || strcmp(line, k_operator_log) == 0) {
+        control_pass_folder(self, client, line[0] == 'o');
     } else if (strcmp(line, "status") == 0) {
         control_client_answer_status(self, client);
     } else if (strncmp(line, k_by, strlen(k_by)) == 0) {
@@ -316,7 +325,8 @@ static void take_request(control_t *self, control_client_t *client, const char *
         control_client_answer_error(
             client,
             "unknown request; status, watch [HZ], tick, counts, intensity PERCENT, engage, hold, resume, park, reset, "
-            "shutdown, service, service-off, torque, jog, home, relay, beat, release, dump, incidents, samples, geometry, seen, "
+            "shutdown, service, service-off, torque, jog, signal, home, relay, beat, release, sdo, dump, incidents, samples, "
+            "geometry, incident-folder, operator-log, configuration, configure DIGEST, seen, "
             "selftest [passed|failed], acknowledge and by NAME are allowed",
             NULL);
     }
@@ -366,8 +376,7 @@ bool control_requests_is_reading(const control_client_t *client)
 
 void control_requests_receive(control_t *self, control_client_t *client, uint64_t now_us)
 {
-    const ssize_t received =
-        recv(client->fd, &client->in[client->in_length], sizeof client->in - client->in_length, MSG_DONTWAIT);
+    const ssize_t received = control_client_receive(client);
     if (received <= 0) {
         end_input(client, received < 0 && (errno == EAGAIN || errno == EINTR));
         return;
@@ -403,6 +412,9 @@ static void take_result(const control_t *self, control_client_t *client, const m
     } else if (client->request == OPERATOR_SERVICE) {
         client->request_id = 0;
         control_client_answer_service(client, result);
+    } else if (client->request == OPERATOR_OBJECT) {
+        client->request_id = 0;
+        control_object_answer(client, result);
     } else if (result->status != HV_OK) {
         client->request_id = 0;
         refuse(self, client, &result->snapshot, result->is_shutting_down);
@@ -468,6 +480,8 @@ void control_requests_serve_time(control_t *self, control_client_t *client, uint
         watch_request(self, client, now_us);
     } else if (client->dump_ticket != 0) {
         watch_dump(self, client, now_us);
+    } else if (client->is_configuring) {
+        control_configuration_watch(client, now_us);
     }
     take_lines(self, client, now_us); /* what waited for an answer */
     if (client->fd >= 0 && client->watch_period_us != 0 && now_us >= client->watch_next_us) {

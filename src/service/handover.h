@@ -48,10 +48,11 @@ typedef enum { MOTION_MEMORY_UNKNOWN, MOTION_MEMORY_LOCKED, MOTION_MEMORY_UNLOCK
 /** An operator's request on its way to the motion thread. */
 typedef struct {
     uint32_t id;               /**< the asking side's */
-    uint32_t event;            /**< event_t; OPERATOR_INTENSITY, OPERATOR_SERVICE */
+    uint32_t event;            /**< event_t; OPERATOR_INTENSITY, OPERATOR_SERVICE, OPERATOR_OBJECT */
     uint32_t number;           /**< of OPERATOR_INTENSITY: percent */
     service_request_t service; /**< of OPERATOR_SERVICE; its age comes from: */
     uint64_t tick_us;
+    drive_object_t object; /**< of OPERATOR_OBJECT; number is the drive, from 1 */
 } motion_request_t;
 
 /** What became of it, after the cycle that took it. */
@@ -64,7 +65,11 @@ typedef struct {
     bool is_unapproved;      /**< likewise */
     bool is_power_failing;   /**< likewise */
     bool is_untested;        /**< likewise: a self-test is due */
-    service_answer_t answer; /**< of OPERATOR_SERVICE */
+    bool is_later;           /**< private to the motion thread: the answer comes in a later cycle */
+    service_answer_t answer; /**< of OPERATOR_SERVICE, and whether OPERATOR_OBJECT was begun */
+    drive_object_t object;   /**< of OPERATOR_OBJECT, once it was begun: what was read, */
+    drive_object_state_t object_state;
+    uint32_t object_code; /**< and why the drive has refused it */
 } motion_result_t;
 
 /** Whether it was refused for a reason that has a flag of its own. */
@@ -81,7 +86,7 @@ typedef struct {
 } motion_reload_t;
 
 #define HANDOVER_RELOAD_BYTES  8192u
-#define HANDOVER_REQUEST_BYTES 2048u
+#define HANDOVER_REQUEST_BYTES 4096u
 #define HANDOVER_RESULT_BYTES  32768u
 #define HANDOVER_RECORD_BYTES  (1u << 21)
 #define HANDOVER_TRACE_BYTES   (1u << 21)

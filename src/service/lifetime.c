@@ -25,18 +25,6 @@
 
 /* --- The text of a file: lines that a person can read, then a checksum of them --- */
 
-static void checksum(const char *text, size_t length, char digits[DIGITS + 1u])
-{
-    uint8_t digest[SHA256_BYTES];
-    sha256_t hash;
-    sha256_start(&hash);
-    sha256_add(&hash, text, length);
-    sha256_end(&hash, digest);
-    for (unsigned i = 0; i < DIGITS / 2; i++) {
-        (void)snprintf(&digits[2 * i], 3, "%02x", (unsigned)digest[i]);
-    }
-}
-
 static size_t format(const lifetime_totals_t *totals, char text[TEXT_MAX])
 {
     char digits[DIGITS + 1u];
@@ -55,7 +43,7 @@ static size_t format(const lifetime_totals_t *totals, char text[TEXT_MAX])
         length += (size_t)snprintf(&text[length], TEXT_MAX - length, "selftest %u passed %u configuration %s\n", selftest->day,
                                    selftest->is_passed ? 1u : 0u, selftest->hash);
     }
-    checksum(text, length, digits);
+    sha256_digits(text, length, digits, sizeof digits);
     return length + (size_t)snprintf(&text[length], TEXT_MAX - length, "sum %s\n", digits);
 }
 

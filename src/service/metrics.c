@@ -190,6 +190,45 @@ static void put_drives(sheet_t *self, const snapshot_t *s)
     }
 }
 
+static bool is_any_telling(const snapshot_t *s, unsigned axes)
+{
+    unsigned told = 0;
+    for (unsigned i = 0; i < axes; i++) {
+        told |= s->report[i].telemetry.has;
+    }
+    return told != 0;
+}
+
+/* Only of drives that measure it. */
+static void put_telemetry(sheet_t *self, const snapshot_t *s)
+{
+    const unsigned axes = s->cylinders + (s->has_angle ? 1u : 0u);
+    char text[NUMBER_MAX];
+    if (!is_any_telling(s, axes)) {
+        return;
+    }
+    head(self, "drive_torque_percent", "gauge", "torque, of the rated one; positive pushes out");
+    for (unsigned i = 0; i < axes; i++) {
+        if ((s->report[i].telemetry.has & DRIVE_TELLS_TORQUE) != 0) {
+            const q32_t torque_q32 = q32_from_int(s->report[i].telemetry.torque_permille) / 10;
+            put(self, "heave_drive_torque_percent{axis=\"%u\"} %s\n", i + 1, q32_text(torque_q32, text));
+        }
+    }
+    head(self, "drive_following_error", "gauge", "demand less actual, as the drive sees it");
+    for (unsigned i = 0; i < axes; i++) {
+        if ((s->report[i].telemetry.has & DRIVE_TELLS_LAG) != 0) {
+            put(self, "heave_drive_following_error{axis=\"%u\",unit=\"%s\"} %s\n", i + 1, i < s->cylinders ? "mm" : "deg",
+                q32_text(s->report[i].telemetry.lag_q32, text));
+        }
+    }
+    head(self, "drive_inputs", "gauge", "digital inputs: bit 0 negative limit, 1 positive limit, 2 home");
+    for (unsigned i = 0; i < axes; i++) {
+        if ((s->report[i].telemetry.has & DRIVE_TELLS_INPUTS) != 0) {
+            put(self, "heave_drive_inputs{axis=\"%u\"} %" PRIu32 "\n", i + 1, s->report[i].telemetry.inputs);
+        }
+    }
+}
+
 /* Turns are in degrees, ways in millimetres. */
 static void put_rates(sheet_t *self, const char *name, const char *help, const char *per, const pose_t *rates)
 {
@@ -282,6 +321,7 @@ size_t metrics_text(const motion_view_t *view, const config_t *config, const cha
     put_state(&sheet, s);
     put_axes(&sheet, s);
     put_drives(&sheet, s);
+    put_telemetry(&sheet, s);
     put_plate(&sheet, s);
     put_relays(&sheet, s);
     put_frames(&sheet, view);

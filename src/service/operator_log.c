@@ -178,6 +178,26 @@ void operator_log_add(operator_log_t *self, const operator_entry_t *entry)
     (void)ring_push(&self->ring, &self->last, sizeof self->last, NULL, 0);
 }
 
+const char *operator_log_name(const operator_log_t *self)
+{
+    const char *const slash = strrchr(self->path, '/');
+    return slash != NULL ? slash + 1 : self->path;
+}
+
+int operator_log_folder(const operator_log_t *self)
+{
+    return self->path[0] != '\0' ? self->folder : -1;
+}
+
+/* Where the file is: at the start, as nobody who looks on may make heaved wait for a disk later. */
+static void open_folder(operator_log_t *self)
+{
+    char path[PATH_BYTES];
+    const size_t length = (size_t)(operator_log_name(self) - self->path);
+    (void)snprintf(path, sizeof path, "%.*s", length > 0 ? (int)length : 1, length > 0 ? self->path : ".");
+    self->folder = open(path, O_PATH | O_DIRECTORY | O_CLOEXEC);
+}
+
 uint32_t operator_log_lost(const operator_log_t *self)
 {
     return ring_dropped(&self->ring) + __atomic_load_n(&self->failed, __ATOMIC_RELAXED);
@@ -197,6 +217,7 @@ int operator_log_open(operator_log_t *self, const config_t *config)
 {
     ring_init(&self->ring, self->ring_bytes, sizeof self->ring_bytes);
     self->fd = -1;
+    self->folder = -1;
     self->bytes_max = (uint64_t)config->operator_log_kb * KB;
     self->files = config->operator_log_files;
     if (!state_path(self->path, sizeof self->path, config->operator_log, "/" OPERATOR_LOG_NAME)) {
@@ -204,6 +225,7 @@ int operator_log_open(operator_log_t *self, const config_t *config)
     }
     const int error = self->path[0] != '\0' ? open_file(self) : 0;
     if (error == 0) {
+        open_folder(self);
         return EXIT_DONE;
     }
     const int code = print_message(EXIT_NO_OUTPUT, "operator log %s: %s", self->path,
@@ -246,6 +268,10 @@ bool operator_log_close(operator_log_t *self)
     if (self->fd >= 0) {
         (void)close(self->fd);
         self->fd = -1;
+    }
+    if (self->folder >= 0) {
+        (void)close(self->folder);
+        self->folder = -1;
     }
     return true;
 }

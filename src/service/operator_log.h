@@ -18,7 +18,7 @@
 
 #define OPERATOR_LOG_NAME       "operator.log" /* in the state directory, where no file is configured */
 #define OPERATOR_LOG_BY_MAX     32u
-#define OPERATOR_LOG_ASKED_MAX  64u
+#define OPERATOR_LOG_ASKED_MAX  96u
 #define OPERATOR_LOG_ANSWER_MAX 192u
 #define OPERATOR_LOG_RING_BYTES (1u << 16)
 #define OPERATOR_LOG_REPEATS_S  10 /* the same again within that time is a number, not a line */
@@ -41,6 +41,7 @@ typedef struct {
 typedef struct {
     char path[CONFIG_PATH_MAX]; /**< "" = there is none */
     int fd;
+    int folder;         /**< the file's directory as a place (O_PATH); -1 = none */
     uint64_t bytes;     /**< of the file */
     uint64_t bytes_max; /**< beyond that it is rotated */
     uint32_t files;     /**< older ones that are kept */
@@ -65,6 +66,10 @@ bool operator_log_start(operator_log_t *self);
 
 /** Hands an entry over. Never blocks. The service thread. */
 void operator_log_add(operator_log_t *self, const operator_entry_t *entry);
+
+/** The directory of the file, for others to open it in (O_PATH); -1 = there is none. And its name there. */
+int operator_log_folder(const operator_log_t *self);
+const char *operator_log_name(const operator_log_t *self);
 
 /** Entries that are lost: no room for them on the way, or the disk does not take them. Any thread. */
 uint32_t operator_log_lost(const operator_log_t *self);

@@ -3,9 +3,10 @@
  */
 #include "service/operator_requests.h"
 
+#include <stdio.h>
 #include <string.h>
 
-#include "heave/text.h"
+#include "common/translate.h"
 
 const event_t operator_requests[OPERATOR_REQUESTS] = {EVENT_ENGAGE, EVENT_HOLD,     EVENT_RESUME,  EVENT_PARK,
                                                       EVENT_RESET,  EVENT_SHUTDOWN, EVENT_SERVICE, EVENT_SERVICE_OFF};
@@ -21,8 +22,8 @@ static const char *const k_possible[STATES] = {
     [STATE_HOLD] = "resume, engage, park",
     [STATE_SETTLING] = "hold, engage",
     [STATE_SERVICE] = "torque, jog, home, relay, hold, service-off",
-    [STATE_FAULT] = "reset, once the cause is gone",
-    [STATE_ESTOP] = "reset, once the e-stop is released",
+    [STATE_FAULT] = N_("reset, once the cause is gone"),
+    [STATE_ESTOP] = N_("reset, once the e-stop is released"),
 };
 
 event_t operator_request_find(const char *name)
@@ -47,13 +48,10 @@ bool operator_read_percent(const char *text, uint32_t *percent)
 
 size_t operator_explain_percent(uint32_t percent, unsigned max_percent, char *text, size_t capacity)
 {
-    text_t out = text_start(text, capacity);
-    text_put(&out, "intensity ");
-    text_put_u32(&out, percent);
-    text_put(&out, ": too much for this platform; possible: 0 to ");
-    text_put_u32(&out, max_percent);
-    text_put(&out, " % ([intensity] max_percent)");
-    return out.length;
+    const int length =
+        snprintf(text, capacity, N_("intensity %u: too much for this platform; possible: 0 to %u %% ([intensity] max_percent)"),
+                 (unsigned)percent, max_percent);
+    return length < 0 ? 0 : (size_t)length < capacity ? (size_t)length : capacity - 1u;
 }
 
 /* A drive that would be a fault as soon as the state is one in which drives are watched. */
@@ -72,39 +70,39 @@ static const char *reason(event_t request, const snapshot_t *s)
 {
     if (request == EVENT_RESET) {
         const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
-        return !is_latched ? "there is nothing to reset"
+        return !is_latched ? N_("there is nothing to reset")
                : s->fault.code == FAULT_ESTOP_CHANNELS && s->is_estop_active
-                   ? "the channels of the e-stop have disagreed: press it and release it, so that both open and close"
-               : s->is_estop_active ? "the e-stop is still active"
-                                    : "the cause is still there";
+                   ? N_("the channels of the e-stop have disagreed: press it and release it, so that both open and close")
+               : s->is_estop_active ? N_("the e-stop is still active")
+                                    : N_("the cause is still there");
     }
     if (request == EVENT_SERVICE && (s->state == STATE_OFF || s->state == STATE_SETTLED)) {
-        return is_drive_amiss(s) ? "a drive does not answer yet, or is in fault (`counts` says which)"
-                                 : "the drives are still going off: try again";
+        return is_drive_amiss(s) ? N_("a drive does not answer yet, or is in fault (`counts` says which)")
+                                 : N_("the drives are still going off: try again");
     }
-    return request == EVENT_RESUME ? "there is nothing to resume" : "this is not possible";
+    return request == EVENT_RESUME ? N_("there is nothing to resume") : N_("this is not possible");
+}
+
+/* The whole sentences, so that a translation has them as such (common/sentence.h). */
+static int explain(event_t request, const snapshot_t *snapshot, bool is_shutting_down, char *text, size_t capacity)
+{
+    const char *asked = event_name(request);
+    const char *possible = k_possible[snapshot->state];
+    if (is_shutting_down && request != EVENT_RESET) {
+        return snprintf(text, capacity, N_("%s: a shutdown is under way; %s"), asked,
+                        snapshot->state == STATE_HOLD ? N_("shutdown goes on with it, a second signal ends at once")
+                                                      : N_("start heaved again once it has ended"));
+    }
+    if (snapshot->state == STATE_FAULT) {
+        return snprintf(text, capacity, N_("%s: %s in %s (%s); possible: %s"), asked, reason(request, snapshot),
+                        state_name(snapshot->state), fault_text(snapshot->fault.code), possible);
+    }
+    return snprintf(text, capacity, N_("%s: %s in %s; possible: %s"), asked, reason(request, snapshot),
+                    state_name(snapshot->state), possible);
 }
 
 size_t operator_explain(event_t request, const snapshot_t *snapshot, bool is_shutting_down, char *text, size_t capacity)
 {
-    text_t out = text_start(text, capacity);
-    text_put(&out, event_name(request));
-    text_put(&out, ": ");
-    if (is_shutting_down && request != EVENT_RESET) {
-        text_put(&out, "a shutdown is under way; ");
-        text_put(&out, snapshot->state == STATE_HOLD ? "shutdown goes on with it, a second signal ends at once"
-                                                     : "start heaved again once it has ended");
-        return out.length;
-    }
-    text_put(&out, reason(request, snapshot));
-    text_put(&out, " in ");
-    text_put(&out, state_name(snapshot->state));
-    if (snapshot->state == STATE_FAULT) {
-        text_put(&out, " (");
-        text_put(&out, fault_text(snapshot->fault.code));
-        text_put(&out, ")");
-    }
-    text_put(&out, "; possible: ");
-    text_put(&out, k_possible[snapshot->state]);
-    return out.length;
+    const int length = explain(request, snapshot, is_shutting_down, text, capacity);
+    return length < 0 ? 0 : (size_t)length < capacity ? (size_t)length : capacity - 1u;
 }

@@ -15,6 +15,8 @@ extern const event_t operator_requests[OPERATOR_REQUESTS];
 
 /** Likewise: a request of SERVICE (heave/service.h). */
 #define OPERATOR_SERVICE ((event_t)(EVENTS + 1))
+/** Likewise: an object of a drive. */
+#define OPERATOR_OBJECT ((event_t)(EVENTS + 2))
 
 /** Reads what follows `intensity `.
  *  @return false where it is no whole number of at most three digits */

@@ -12,6 +12,8 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "config/telemetry.h"
+
 #define HEADER_BYTES 8192u
 #define NO_FRAME     UINT32_MAX
 
@@ -26,6 +28,7 @@ typedef struct {
     uint8_t bits; /* SAMPLE_... */
     uint32_t flags;
     uint32_t frame_age_us;
+    uint32_t wake_us, work_us;
     uint8_t drive[8];
     int64_t asked[POSE_AXES];
     int64_t sent[POSE_AXES];
@@ -34,6 +37,10 @@ typedef struct {
     int64_t actual_mm[CYLINDERS_MAX];
     int64_t sent_deg;
     int64_t actual_deg;
+    int16_t torque_permille[8]; /* what a drive tells beside its position; 0 until it has */
+    int32_t lag_q16[8];
+    uint32_t inputs[8];
+    uint8_t notes[8];
 } sample_t;
 
 #define WORDS (sizeof(sample_t) / 8u)
@@ -73,9 +80,40 @@ static void cylinder_columns(samples_header_t *header, const char *what, size_t 
     }
 }
 
+static void drive_column(samples_header_t *header, unsigned drive, const char *what, const char *unit, const char *type,
+                         size_t at, double scale)
+{
+    char name[32];
+    (void)snprintf(name, sizeof name, "drive%u%s%s", drive + 1u, what[0] != '\0' ? "_" : "", what);
+    (void)column(header, name, unit, type, at, scale);
+}
+
+/* Only of what the drives are set up to tell. */
+static void telemetry_columns(samples_header_t *header, const config_t *config, unsigned cylinders, unsigned drives)
+{
+    const uint8_t told = config_telemetry(config);
+    for (unsigned i = 0; i < drives; i++) {
+        if ((told & DRIVE_TELLS_TORQUE) != 0) {
+            drive_column(header, i, "torque_percent", "%", "i2", offsetof(sample_t, torque_permille) + 2u * i, 0.1);
+        }
+        if ((told & DRIVE_TELLS_LAG) != 0) {
+            const bool is_angle = i >= cylinders;
+            drive_column(header, i, is_angle ? "lag_deg" : "lag_mm", is_angle ? "deg" : "mm", "i4",
+                         offsetof(sample_t, lag_q16) + 4u * i, 1.0 / (double)Q16_ONE);
+        }
+        if ((told & DRIVE_TELLS_INPUTS) != 0) {
+            drive_column(header, i, "inputs", "", "u4", offsetof(sample_t, inputs) + 4u * i, 1);
+        }
+        if (config->drives == CONFIG_DRIVES_CIA402) {
+            drive_column(header, i, "notes", "", "u1", offsetof(sample_t, notes) + i, 1);
+        }
+    }
+}
+
 static void write_table(samples_header_t *header, const config_t *config)
 {
     const unsigned cylinders = config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u;
+    const unsigned drives = cylinders + (config->settings.has_angle ? 1u : 0u);
     (void)column(header, "cycle", "", "u8", offsetof(sample_t, cycle), 1);
     (void)column(header, "t_ms", "ms", "u8", offsetof(sample_t, time_us), 0.001);
     (void)column(header, "state", "", "u1", offsetof(sample_t, state), 1);
@@ -87,10 +125,10 @@ static void write_table(samples_header_t *header, const config_t *config)
     (void)column(header, "bits", "", "u1", offsetof(sample_t, bits), 1);
     (void)column(header, "flags", "", "u4", offsetof(sample_t, flags), 1);
     (void)column(header, "frame_age_ms", "ms", "u4", offsetof(sample_t, frame_age_us), 0.001);
-    for (unsigned i = 0; i < cylinders + (config->settings.has_angle ? 1u : 0u); i++) {
-        char name[32];
-        (void)snprintf(name, sizeof name, "drive%u", i + 1u);
-        (void)column(header, name, "", "u1", offsetof(sample_t, drive) + i, 1);
+    (void)column(header, "wake_us", "us", "u4", offsetof(sample_t, wake_us), 1);
+    (void)column(header, "work_us", "us", "u4", offsetof(sample_t, work_us), 1);
+    for (unsigned i = 0; i < drives; i++) {
+        drive_column(header, i, "", "", "u1", offsetof(sample_t, drive) + i, 1);
     }
     pose_columns(header, "asked", offsetof(sample_t, asked));
     pose_columns(header, "sent", offsetof(sample_t, sent));
@@ -101,6 +139,7 @@ static void write_table(samples_header_t *header, const config_t *config)
         (void)column(header, "sent_angle_deg", "deg", "i8", offsetof(sample_t, sent_deg), 1.0 / (double)Q32_ONE);
         (void)column(header, "actual_angle_deg", "deg", "i8", offsetof(sample_t, actual_deg), 1.0 / (double)Q32_ONE);
     }
+    telemetry_columns(header, config, cylinders, drives);
 }
 
 static uint64_t clock_ns(clockid_t clock)
@@ -186,6 +225,31 @@ static uint32_t frame_age_us(const snapshot_t *s)
     return s->last_frame_us == 0 || age_us >= NO_FRAME ? NO_FRAME : (uint32_t)age_us;
 }
 
+static uint32_t at_most(uint64_t us)
+{
+    return us < UINT32_MAX ? (uint32_t)us : UINT32_MAX;
+}
+
+static int32_t within(int64_t value, int32_t most)
+{
+    return value > most ? most : value < -most ? -most : (int32_t)value;
+}
+
+static void fill_telemetry(sample_t *out, const snapshot_t *s)
+{
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        const drive_telemetry_t *told = &s->report[i].telemetry;
+        out->torque_permille[i] = (int16_t)within(told->torque_permille, INT16_MAX);
+        out->lag_q16[i] = within(told->lag_q32 / (Q32_ONE / Q16_ONE), INT32_MAX);
+        out->inputs[i] = told->inputs;
+        out->notes[i] = (uint8_t)s->report[i].notes;
+    }
+    out->torque_permille[DRIVES_MAX] = 0;
+    out->lag_q16[DRIVES_MAX] = 0;
+    out->inputs[DRIVES_MAX] = 0;
+    out->notes[DRIVES_MAX] = 0;
+}
+
 static void fill(sample_t *out, const snapshot_t *s)
 {
     out->cycle = s->cycle;
@@ -212,9 +276,10 @@ static void fill(sample_t *out, const snapshot_t *s)
     }
     out->sent_deg = s->angle_deg_q32;
     out->actual_deg = s->has_angle ? s->drive[s->cylinders].actual_mm_q32 : 0;
+    fill_telemetry(out, s);
 }
 
-void samples_writer_add(samples_writer_t *self, const snapshot_t *snapshot)
+void samples_writer_add(samples_writer_t *self, const snapshot_t *snapshot, uint64_t wake_us, uint64_t work_us)
 {
     union {
         sample_t record;
@@ -224,6 +289,8 @@ void samples_writer_add(samples_writer_t *self, const snapshot_t *snapshot)
         return;
     }
     fill(&filled.record, snapshot);
+    filled.record.wake_us = at_most(wake_us);
+    filled.record.work_us = at_most(work_us);
     char *records = (char *)self->header + HEADER_BYTES;
     uint64_t *place = (uint64_t *)(void *)(records + (size_t)self->at * sizeof(sample_t));
     self->at = self->at + 1u == self->header->capacity ? 0 : self->at + 1u;

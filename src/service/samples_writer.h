@@ -22,8 +22,10 @@ typedef struct {
  *  @return false: errno says why; there is none then */
 bool samples_writer_open(samples_writer_t *self, const config_t *config);
 
-/** Adds what the newest cycle has come to. The motion thread: no system call, no waiting, 200 ns. */
-void samples_writer_add(samples_writer_t *self, const snapshot_t *snapshot);
+/** Adds what the newest cycle has come to. The motion thread: no system call, no waiting, 200 ns.
+ *  @param wake_us how late this cycle began
+ *  @param work_us how long the cycle before it took; 0 for the first one */
+void samples_writer_add(samples_writer_t *self, const snapshot_t *snapshot, uint64_t wake_us, uint64_t work_us);
 
 void samples_writer_close(samples_writer_t *self);
 

@@ -17,7 +17,7 @@ static void put_axis(json_t *json, const service_view_t *service)
         json_null(json, "axis");
     } else if (service->axis == SERVICE_ALL) {
         json_text(json, "axis", "all");
-    } else if (service->doing == SERVICE_JOG_POSE && service->axis <= POSE_AXES) {
+    } else if ((service->doing == SERVICE_JOG_POSE || service->doing == SERVICE_SIGNAL_POSE) && service->axis <= POSE_AXES) {
         json_text(json, "axis", k_axes[service->axis - 1u]);
     } else {
         json_number(json, "axis", service->axis);
@@ -29,6 +29,7 @@ void service_json_hand(json_t *json, const snapshot_t *snapshot)
     const service_view_t *service = &snapshot->service;
     json_number(json, "tick", service->tick_us);
     json_number(json, "series", service->series);
+    json_number(json, "finished", service->finished);
     json_bool(json, "held", service->is_held);
     json_text(json, "doing", service_verb_name(service->doing));
     put_axis(json, service);

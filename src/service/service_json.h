@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * service_json.h - SERVICE as JSON: what a hand needs to know, and what the drives count. Pure.
+ * service_json.h - the state SERVICE as JSON: what a client that holds a motion needs to know, and the counts of the drives.
+ * Pure.
  */
 #ifndef HEAVE_SERVICE_JSON_H
 #define HEAVE_SERVICE_JSON_H
@@ -8,13 +9,13 @@
 #include "common/json.h"
 #include "heave/telemetry.h"
 
-/** Members of an open object: the tick to echo, and what is held. */
+/** Adds to an open object: the tick to send back, and what is held. */
 void service_json_hand(json_t *json, const snapshot_t *snapshot);
 
-/** A member of an open object, an array: each drive's own count, before there is torque too. */
+/** Adds the array `drives` to an open object: state and raw count of each drive, also while it has no torque. */
 void service_json_drives(json_t *json, const snapshot_t *snapshot);
 
-/** When a self-test is asked for, whether one is due, and what came of the newest: member `selftest`. */
+/** Adds the object `selftest`: when a self-test is required, whether one is due, and the result of the newest one. */
 void service_json_selftest(json_t *json, const status_lost_t *lost, const config_t *config);
 
 #endif

@@ -8,6 +8,7 @@
 #include "common/build_id.h"
 #include "common/decimal.h"
 #include "heave/motion.h" // MOTION_CLAMPED and its kin
+#include "service/report_json.h"
 #include "service/service_json.h"
 
 static const char *const k_pose_keys[POSE_AXES] = {"roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm"};
@@ -45,82 +46,6 @@ static void write_actual(json_t *json, const char *key, const char *const axis_k
     } else {
         json_null(json, key);
     }
-}
-
-static void write_age(json_t *json, const char *key, uint64_t at_us, uint64_t now_us)
-{
-    if (at_us == 0 || at_us > now_us) {
-        json_null(json, key);
-    } else {
-        json_ms(json, key, now_us - at_us);
-    }
-}
-
-static void write_notes(json_t *json, uint32_t notes)
-{
-    json_open(json, "notes", '[');
-    for (unsigned i = 0; i < DRIVE_NOTES; i++) {
-        if ((notes >> i & 1u) != 0) {
-            json_text(json, NULL, drive_note_text(i));
-        }
-    }
-    json_close(json, ']');
-}
-
-/* The last error that a drive has told of; null where there was none. */
-static void write_emergency(json_t *json, const drive_report_t *report, uint64_t now_us)
-{
-    const drive_emergency_t *emergency = &report->emergency;
-    char maker[2 * sizeof emergency->maker + 1];
-    if (report->error == NULL) {
-        json_null(json, "emergency");
-        return;
-    }
-    for (unsigned i = 0; i < sizeof emergency->maker; i++) {
-        (void)snprintf(&maker[2u * i], 3, "%02X", emergency->maker[i]);
-    }
-    json_open(json, "emergency", '{');
-    json_number(json, "code", emergency->code);
-    json_text(json, "text", report->error);
-    json_number(json, "register", emergency->error_register);
-    json_text(json, "manufacturer", maker);
-    json_bool(json, "over", emergency->is_over);
-    json_number(json, "count", emergency->count);
-    write_age(json, "age_ms", emergency->at_us, now_us);
-    json_close(json, '}');
-}
-
-/* What the drive is at, in words; null where its driver has none. */
-static void write_report(json_t *json, const drive_report_t *report, uint64_t now_us)
-{
-    if (report->phase == NULL || report->phase[0] == '\0') {
-        json_null(json, "report");
-        return;
-    }
-    json_open(json, "report", '{');
-    json_number(json, "node", report->address);
-    json_text(json, "phase", report->phase);
-    json_text(json, "trouble", report->trouble);
-    json_number(json, "code", report->code);
-    json_number(json, "object", report->object >> 8);
-    json_number(json, "sub_index", report->object & 0xFFu);
-    if (report->is_modbus) {
-        json_number(json, "unit", report->address);
-        json_number(json, "register", report->object >> 8);
-    }
-    json_text(json, "detail", report->detail);
-    json_number(json, "detail_code", report->detail_code);
-    if (report->has_found) {
-        json_number(json, "found", report->found);
-        json_number(json, "wanted", report->wanted);
-    } else {
-        json_null(json, "found");
-        json_null(json, "wanted");
-    }
-    json_ms(json, "age_ms", now_us >= report->since_us ? now_us - report->since_us : 0);
-    write_notes(json, report->notes);
-    write_emergency(json, report, now_us);
-    json_close(json, '}');
 }
 
 /* What the device code of the fault meant when it began; of a drive that was not there, and said nothing, what it was at. */
@@ -164,7 +89,7 @@ static void write_fault(json_t *json, const snapshot_t *s)
     json_number(json, "axis", s->fault.axis);
     json_number(json, "device_code", s->fault.device_code);
     json_text(json, "device_text", device_text(s));
-    write_report(json, &s->fault_report, s->now_us);
+    report_json(json, &s->fault_report, s->fault.axis > s->cylinders, s->now_us);
     json_text(json, "found_by", found_by(s->fault.code));
     write_distance(json, s, false);
     write_distance(json, s, true);
@@ -240,8 +165,8 @@ static void write_service(json_t *json, const drive_feedback_t *drive, const dri
     } else {
         json_null(json, "period_ms");
     }
-    write_age(json, "setpoint_age_ms", report->setpoint_us, now_us);
-    write_age(json, "feedback_age_ms", drive->has_actual ? drive->actual_us : 0, now_us);
+    report_json_age(json, "setpoint_age_ms", report->setpoint_us, now_us);
+    report_json_age(json, "feedback_age_ms", drive->has_actual ? drive->actual_us : 0, now_us);
 }
 
 /* Members that every axis has; unit is "mm" or "deg" in the keys. */
@@ -259,7 +184,7 @@ static void write_axis(json_t *json, const snapshot_t *s, unsigned axis, q32_t s
     json_bool(json, "homed", drive->is_homed);
     json_number(json, "device_code", drive->fault_code);
     write_service(json, drive, &s->report[axis], s->now_us);
-    write_report(json, &s->report[axis], s->now_us);
+    report_json(json, &s->report[axis], axis >= s->cylinders, s->now_us);
 }
 
 static void write_axes(json_t *json, const snapshot_t *s, const config_t *config)
@@ -472,8 +397,10 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
     json_text(json, "build", build_id());
     json_open(json, "configuration", '{');
     json_text(json, "hash", config->hash);
+    json_text(json, "digest", lost->digest != NULL ? lost->digest : "");
     json_text(json, "approved", config->approved.text);
     json_bool(json, "barred", lost->is_unapproved);
+    json_text(json, "put_back", lost->put_back != NULL ? lost->put_back : "");
     json_close(json, '}');
 }
 

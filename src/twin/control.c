@@ -186,7 +186,7 @@ static size_t answer_board(char *out, size_t size, const modbus_board_t *board)
 }
 
 /* One JSON object; each drive where it really is. */
-static void answer_status(char *out, twin_t *twin)
+static void answer_status(char *out, twin_t *twin, uint64_t now_us)
 {
     pose_t pose;
     size_t at = (size_t)snprintf(out, ANSWER_MAX, "{\"ok\": true, \"drives\": [");
@@ -212,7 +212,11 @@ static void answer_status(char *out, twin_t *twin)
     if (twin->modbus.board.is_there && at < ANSWER_MAX) {
         at += answer_board(out + at, ANSWER_MAX - at, &twin->modbus.board);
     }
-    at += (size_t)snprintf(out + at, ANSWER_MAX - at, "], \"pose\": %s", has_pose ? "[" : "null");
+    at += (size_t)snprintf(out + at, ANSWER_MAX - at, "]");
+    if (twin->lines != NULL && at < ANSWER_MAX) {
+        at += lines_status(twin->lines, now_us, out + at, ANSWER_MAX - at);
+    }
+    at += (size_t)snprintf(out + at, ANSWER_MAX - at, ", \"pose\": %s", has_pose ? "[" : "null");
     for (unsigned i = 0; i < POSE_AXES && has_pose; i++) {
         at +=
             (size_t)snprintf(out + at, ANSWER_MAX - at, "%s%.4f", i == 0 ? "" : ", ", (double)pose.axis_q32[i] / (double)Q32_ONE);
@@ -226,7 +230,7 @@ static void answer(control_client_t *client, const char *line, twin_t *twin, uin
     char why[FAULT_WHY_MAX];
     fault_t fault;
     if (strcmp(line, "status") == 0) {
-        answer_status(out, twin);
+        answer_status(out, twin, now_us);
     } else if (fault_read(&fault, line, twin->drives, why) && fault_do(&fault, twin, now_us, why)) {
         (void)snprintf(out, sizeof out, "ok\n");
     } else {

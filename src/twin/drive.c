@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#define ERRORS_KEPT       4u /* in 1003h */
 #define FOLLOWING_ERROR   0x8611u
 #define CONNECTION_LOST   0x8130u
 #define SET_POINT_MISSING 0x8250u
@@ -23,6 +24,7 @@
 #define WARNING_C  80.0
 #define TOO_HOT_C  90.0
 #define ARRIVED    0.5 /* counts */
+#define HOME_NEAR  100.0
 #define ODD_MAX    8u
 #define WORD_RESET 0x80u
 
@@ -82,6 +84,15 @@ static uint16_t mode_bits(const drive_t *self)
     }
 }
 
+/* The switches at the ends, as 60FDh has them. Raw counts that run backwards have the lower end where the cylinder is out. */
+static uint32_t inputs(const drive_t *self)
+{
+    const motor_t *motor = &self->motor;
+    const bool has_stops = motor->stop_low < motor->stop_high;
+    return (has_stops && motor->actual <= motor->stop_low ? 1u : 0u) |
+           (has_stops && motor->actual >= motor->stop_high ? 2u : 0u) | (fabs(motor->actual - self->home) < HOME_NEAR ? 4u : 0u);
+}
+
 static void show(drive_t *self)
 {
     const unsigned powered = has_power(self->state) ? 0x10u : 0u;
@@ -93,6 +104,8 @@ static void show(drive_t *self)
     objects_put(&self->od, 0x6062, 0, (uint32_t)(int32_t)llround(self->motor.demand - self->origin));
     objects_put(&self->od, 0x606C, 0, (uint32_t)(int32_t)lround(self->motor.speed * 1e6));
     objects_put(&self->od, 0x60F4, 0, (uint32_t)(int32_t)lround(motor_error(&self->motor)));
+    objects_put(&self->od, 0x6077, 0, (uint16_t)(int16_t)lround(1000 * motor_effort(&self->motor)));
+    objects_put(&self->od, 0x60FD, 0, inputs(self));
 }
 
 /* --- States --- */
@@ -132,14 +145,24 @@ static void ramp_down(drive_t *self, twin_state_t state)
     self->stop_state = state;
 }
 
+/* The newest comes first. */
+static void remember(objects_t *od, uint16_t code)
+{
+    const uint32_t kept = objects_get(od, 0x1003, 0);
+    for (uint8_t sub = ERRORS_KEPT; sub > 1; sub--) {
+        objects_put(od, 0x1003, sub, objects_get(od, 0x1003, (uint8_t)(sub - 1)));
+    }
+    objects_put(od, 0x1003, 1, code);
+    objects_put(od, 0x1003, 0, kept < ERRORS_KEPT ? kept + 1 : ERRORS_KEPT);
+}
+
 static void tell(drive_t *self, uint16_t code, uint8_t error_register)
 {
     self->emergency = code;
     self->emergency_register = error_register;
     objects_put(&self->od, 0x603F, 0, code);
     objects_put(&self->od, 0x1001, 0, error_register);
-    objects_put(&self->od, 0x1003, 0, 1);
-    objects_put(&self->od, 0x1003, 1, code);
+    remember(&self->od, code);
 }
 
 void drive_fault(drive_t *self, uint16_t code)
@@ -251,6 +274,14 @@ static void transit(drive_t *self, command_t command)
     }
 }
 
+/* Methods 1 and 2, 17 and 18, 33 and 34 look for the same in the two directions. */
+static double home_of(const drive_t *self)
+{
+    const unsigned method = objects_get(&self->od, 0x6098, 0) & 0xFFu, usual = self->home_method;
+    const bool is_other = method != usual && method < 128u && (method + 1u) / 2u == (usual + 1u) / 2u;
+    return method == 35u || method == 37u ? self->motor.actual : is_other ? self->home_other : self->home;
+}
+
 /* Bit 4 means something else in every mode. */
 static void operate(drive_t *self, bool start)
 {
@@ -259,9 +290,8 @@ static void operate(drive_t *self, bool start)
     } else if (self->mode == MODE_PP && start && !self->has_start) {
         motor_travel(&self->motor, target_of(self), objects_get(&self->od, 0x6081, 0));
     } else if (self->mode == MODE_HOMING && start && self->homing == HOMING_NO) {
-        const bool is_here = objects_get(&self->od, 0x6098, 0) == 35 || objects_get(&self->od, 0x6098, 0) == 37;
         self->homing = HOMING_RUNNING;
-        motor_travel(&self->motor, is_here ? self->motor.actual : self->home, objects_get(&self->od, 0x6099, 1));
+        motor_travel(&self->motor, home_of(self), objects_get(&self->od, 0x6099, 1));
     } else if (self->mode == MODE_HOMING && !start) {
         self->homing = HOMING_NO;
     }

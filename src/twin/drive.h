@@ -31,6 +31,8 @@ typedef struct {
     uint32_t jump_counts;  /**< a set-point further away than this is a following error at once */
     uint8_t missed_max;    /**< so many SYNCs without a set-point are a fault; 0 = never */
     double home;           /**< where it finds its zero, raw counts */
+    double home_other;     /**< likewise, by the homing method of the other direction */
+    uint8_t home_method;   /**< that leads to home, as in 6098h */
     bool is_absolute;      /**< the position survives the supply */
     bool is_deaf;          /**< answers, but acts on nothing */
     bool is_broken;        /**< the cause of its fault stays */

@@ -26,6 +26,10 @@ bool fault_next_word(const char **at, char word[FAULT_WORD_MAX])
 bool fault_read_drives(const char *word, unsigned drives, uint32_t *out, char why[FAULT_WHY_MAX])
 {
     uint32_t found = 0;
+    if (drives == 0) {
+        (void)snprintf(why, FAULT_WHY_MAX, "there are no drives here: heaved simulates them itself ([drives] driver = sim)");
+        return false;
+    }
     if (strcmp(word, "all") == 0) {
         *out = (1u << drives) - 1;
         return true;
@@ -59,7 +63,7 @@ bool fault_read_object(const char *word, uint32_t *out, char why[FAULT_WHY_MAX])
     }
     objects_t any;
     const uint32_t identity[4] = {0};
-    objects_start(&any, 1, identity);
+    objects_start(&any, 1, identity, true);
     if (objects_find(&any, (uint16_t)index, (uint8_t)sub) == NULL) {
         (void)snprintf(why, FAULT_WHY_MAX, "these drives have no object %04lX:%lX", index, sub);
         return false;

@@ -9,7 +9,9 @@
 
 #include "twin/fault_words.h"
 #include "twin/frame_faults.h"
+#include "twin/line_faults.h"
 #include "twin/modbus_faults.h"
+#include "twin/node_internal.h"
 
 #define INDEX_MAX    0xFFFFu
 #define GENERIC      0x2310u     /* continuous over-current */
@@ -17,7 +19,7 @@
 #define HOT_C        120.0
 #define REGISTER_SET 0x81u
 
-/** One name. form: d = drives, o = an object, n = a number, N = one that may be left out. */
+/** One name. form: d = drives, o = an object, n = a number, N = one that may be left out, s = a switch's state, g = a section. */
 typedef struct {
     const char *name;
     const char *form;
@@ -34,9 +36,18 @@ static node_t *node_of(twin_t *twin, unsigned k)
     return &twin->node[k];
 }
 
+/* What has the supply and the bus of a drive. */
+static node_t *head_of(twin_t *twin, unsigned k)
+{
+    return node_head(&twin->node[k]);
+}
+
+/* As the first axis of a node has it. */
 static object_t *object_of(twin_t *twin, unsigned k, const fault_t *fault)
 {
-    return objects_find(&twin->node[k].drive.od, (uint16_t)(fault->object >> 8), (uint8_t)fault->object);
+    const uint32_t index = fault->object >> 8;
+    node_t *node = index < 0x1400 ? head_of(twin, k) : node_of(twin, k);
+    return objects_find(&node->drive.od, (uint16_t)(index < 0x6000 ? index : 0x6000 + index % 0x800), (uint8_t)fault->object);
 }
 
 /* --- One function per name --- */
@@ -64,13 +75,14 @@ ACT(act_mend)
 {
     UNUSED();
     node_t *node = node_of(twin, k);
+    node_t *head = head_of(twin, k);
     node->drive.is_broken = node->drive.is_deaf = node->drive.is_homing_broken = false;
     node->drive.motor.is_jammed = false;
     node->drive.motor.slip = 0;
-    node->drive.motor.temperature_c = MOTOR_AMBIENT_C;
-    node->is_mute = node->is_cut = node->is_sdo_silent = node->has_no_heartbeat = false;
+    node->drive.motor.temperature_c = node->drive.motor.ambient_c;
+    head->is_mute = head->is_cut = head->is_sdo_silent = head->has_no_heartbeat = false;
     node->tpdo_drop = node->tpdo_us = 0;
-    node->sdo_us = 1000;
+    head->sdo_us = 1000;
     node->drive.bits_set = node->drive.bits_clear = 0;
     for (uint32_t i = 0; i < node->drive.od.count; i++) {
         object_t *row = &node->drive.od.row[i];
@@ -83,29 +95,29 @@ ACT(act_mend)
             row->is_forced = false;
         }
     }
-    if (node->own_number != 0) {
-        node->number = node->own_number;
-        node->own_number = 0;
-        node_reboot(node, now_us);
+    if (head->own_number != 0) {
+        head->number = head->own_number;
+        head->own_number = 0;
+        node_reboot(head, now_us);
     }
 }
 
 ACT(act_emcy)
 {
     UNUSED();
-    node_emergency(node_of(twin, k), (uint16_t)fault->number[0], REGISTER_SET);
+    node_emergency(head_of(twin, k), (uint16_t)fault->number[0], REGISTER_SET);
 }
 
 ACT(act_heartbeat)
 {
     UNUSED();
-    node_of(twin, k)->has_no_heartbeat = true;
+    head_of(twin, k)->has_no_heartbeat = true;
 }
 
 ACT(act_reboot)
 {
     UNUSED();
-    node_reboot(node_of(twin, k), now_us);
+    node_reboot(head_of(twin, k), now_us);
 }
 
 ACT(act_power_off)
@@ -123,13 +135,13 @@ ACT(act_power_on)
 ACT(act_mute)
 {
     UNUSED();
-    node_of(twin, k)->is_mute = true;
+    head_of(twin, k)->is_mute = true;
 }
 
 ACT(act_cut)
 {
     UNUSED();
-    node_of(twin, k)->is_cut = true;
+    head_of(twin, k)->is_cut = true;
 }
 
 ACT(act_ignore)
@@ -167,13 +179,13 @@ ACT(act_preop)
     if (fault->number[0] > 0) {
         act_emcy(twin, k, fault, now_us);
     }
-    node_enter(node_of(twin, k), 0x7F);
+    node_enter(head_of(twin, k), 0x7F);
 }
 
 ACT(act_stopped)
 {
     UNUSED();
-    node_enter(node_of(twin, k), 0x04);
+    node_enter(head_of(twin, k), 0x04);
 }
 
 ACT(act_mode)
@@ -198,13 +210,13 @@ ACT(act_no_homing)
 ACT(act_sdo_silent)
 {
     UNUSED();
-    node_of(twin, k)->is_sdo_silent = true;
+    head_of(twin, k)->is_sdo_silent = true;
 }
 
 ACT(act_sdo_slow)
 {
     UNUSED();
-    node_of(twin, k)->sdo_us = (uint32_t)(fault->number[0] * 1000);
+    head_of(twin, k)->sdo_us = (uint32_t)(fault->number[0] * 1000);
 }
 
 ACT(act_sdo_refuse)
@@ -242,7 +254,7 @@ ACT(act_object)
 
 ACT(act_node)
 {
-    node_t *node = node_of(twin, k);
+    node_t *node = head_of(twin, k);
     node->own_number = node->own_number != 0 ? node->own_number : node->number;
     node->number = (uint8_t)fault->number[0];
     node_reboot(node, now_us);
@@ -341,11 +353,18 @@ static const row_t k_rows[] = {
     {"cable-in", "", "", "and is back", {0}, 0, NULL, BUS_CABLE_IN},
     {"down", "", "", "the interface goes down", {0}, 0, NULL, BUS_DOWN},
     {"up", "", "", "and up", {0}, 0, NULL, BUS_UP},
-    {"unplug", "", "", "Modbus: the adapters and the hosts are gone", {0}, 0, NULL, BUS_UNPLUG},
+    {"unplug", "", "", "Modbus, slcan: the adapters and the hosts are gone", {0}, 0, NULL, BUS_UNPLUG},
     {"plug", "", "", "and back", {0}, 0, NULL, BUS_PLUG},
     {"relays-silent", "", "", "the board of relays on Modbus does not answer", {0}, 0, NULL, BUS_RELAYS_SILENT},
     {"relays-forget", "", "", "it opens all its relays by itself, as after a dip of its supply", {0}, 0, NULL, BUS_RELAYS_FORGET},
     {"relays-back", "", "", "it answers again", {0}, 0, NULL, BUS_RELAYS_BACK},
+    {"estop", "s", "open|closed", "GPIO: the contact of the e-stop, which is closed while nobody presses it", {0, SWITCH_ESTOP}, 0, NULL, BUS_SWITCH},
+    {"estop2", "s", "open|closed", "GPIO: its second channel", {0, SWITCH_ESTOP2}, 0, NULL, BUS_SWITCH},
+    {"enable", "s", "open|closed", "GPIO: the enable key, closed while it is on", {0, SWITCH_ENABLE}, 0, NULL, BUS_SWITCH},
+    {"reset", "s", "open|closed", "GPIO: the reset button, closed while it is pressed", {0, SWITCH_RESET}, 0, NULL, BUS_SWITCH},
+    {"power", "s", "open|closed", "GPIO: the contact of the supply, closed while it is good", {0, SWITCH_POWER}, 0, NULL, BUS_SWITCH},
+    {"chip-gone", "g", "SECTION", "GPIO: the chip with the lines of relays, inputs or healthy goes", {0}, 0, NULL, BUS_CHIP_GONE},
+    {"chip-back", "g", "SECTION", "and is back", {0}, 0, NULL, BUS_CHIP_BACK},
 };
 /* clang-format on */
 
@@ -383,6 +402,8 @@ static bool read_arguments(fault_t *self, const row_t *row, const char *at, unsi
             return refuse_form(row, why);
         }
         const bool is_read = *form == 'd'   ? fault_read_drives(word, drives, &self->drives, why)
+                             : *form == 's' ? line_fault_read_state(word, &self->number[numbers++], why)
+                             : *form == 'g' ? line_fault_read_section(word, &self->number[numbers++], why)
                              : *form == 'o' ? fault_read_object(word, &self->object, why)
                                             : fault_read_number(word, row->most, &self->number[numbers++], why);
         if (!is_read) {
@@ -410,16 +431,6 @@ bool fault_read(fault_t *self, const char *line, unsigned drives, char why[FAULT
     return false;
 }
 
-static bool is_of_board(bus_fault_t fault)
-{
-    return fault == BUS_RELAYS_SILENT || fault == BUS_RELAYS_FORGET || fault == BUS_RELAYS_BACK;
-}
-
-static bool is_of_lines(bus_fault_t fault)
-{
-    return fault == BUS_UNPLUG || fault == BUS_PLUG;
-}
-
 /* What a name does to drives of that kind; NULL: they have no such fault. */
 static fault_act_t act_on(const row_t *row, twin_drives_t kind)
 {
@@ -428,55 +439,53 @@ static fault_act_t act_on(const row_t *row, twin_drives_t kind)
     if (kind == TWIN_DRIVES_CIA402) {
         return row->act == act_none ? NULL : row->act;
     }
+    if (kind == TWIN_DRIVES_NONE) {
+        return NULL;
+    }
     act = kind == TWIN_DRIVES_MODBUS ? modbus_fault_find(row->name, &is_shared) : frame_fault_find(row->name, &is_shared);
     return is_shared ? row->act : act;
 }
 
-static bool suits_bus(bus_fault_t fault, twin_drives_t kind, bool has_board)
+static bool suits_bus(const fault_t *self, bus_fault_t fault, const fault_machine_t *machine)
 {
-    const bool is_modbus = kind == TWIN_DRIVES_MODBUS;
-    return is_of_board(fault)   ? has_board
-           : is_of_lines(fault) ? is_modbus || has_board
-                                : !is_modbus || fault == BUS_CABLE_OUT || fault == BUS_CABLE_IN;
+    const bool is_modbus = machine->kind == TWIN_DRIVES_MODBUS;
+    return line_fault_is(fault)                ? line_fault_suits(self, fault, machine->lines)
+           : modbus_fault_is_board(fault)      ? machine->has_board
+           : modbus_fault_is_lines(fault)      ? is_modbus || machine->has_board || machine->has_adapter
+           : machine->kind == TWIN_DRIVES_NONE ? false
+                                               : !is_modbus || fault == BUS_CABLE_OUT || fault == BUS_CABLE_IN;
 }
 
-bool fault_suits(const fault_t *self, twin_drives_t kind, bool has_board, char why[FAULT_WHY_MAX])
+bool fault_suits(const fault_t *self, const fault_machine_t *machine, char why[FAULT_WHY_MAX])
 {
-    static const char *const k_drives[] = {"CiA 402 drives", "drives with CAN frames of their own", "drives on Modbus"};
+    static const char *const k_drives[] = {"CiA 402 drives", "drives with CAN frames of their own", "drives on Modbus",
+                                           "drives that heaved simulates"};
     const row_t *row = &k_rows[self->row];
-    const bool is_right = row->act == NULL ? suits_bus(row->bus, kind, has_board) : act_on(row, kind) != NULL;
-    if (!is_right && row->act == NULL && is_of_board(row->bus)) {
+    const bool is_right = row->act == NULL ? suits_bus(self, row->bus, machine) : act_on(row, machine->kind) != NULL;
+    if (!is_right && row->act == NULL && line_fault_is(row->bus)) {
+        (void)snprintf(why, FAULT_WHY_MAX, "%s: the configuration has no such GPIO line, or --no-gpio leaves it alone",
+                       row->name);
+    } else if (!is_right && row->act == NULL && modbus_fault_is_board(row->bus)) {
         (void)snprintf(why, FAULT_WHY_MAX, "%s: the configuration has no board of relays on Modbus", row->name);
     } else if (!is_right) {
         (void)snprintf(why, FAULT_WHY_MAX, "%s: %s have no such fault; docs/twin.md says which they have", row->name,
-                       k_drives[kind]);
+                       k_drives[machine->kind]);
     }
     return is_right;
-}
-
-/* Of lines and boards on Modbus. False: it is one of the CAN bus. */
-static bool do_on_modbus(modbus_side_t *side, bus_fault_t fault)
-{
-    const bool is_cable = side->drives > 0 && (fault == BUS_CABLE_OUT || fault == BUS_CABLE_IN);
-    if (is_cable) {
-        side->is_cable_out = fault == BUS_CABLE_OUT;
-    } else if (is_of_lines(fault)) {
-        side->is_unplugged = fault == BUS_UNPLUG;
-    } else if (fault == BUS_RELAYS_FORGET) {
-        memset(side->board.coil, 0, sizeof side->board.coil);
-    } else if (is_of_board(fault)) {
-        side->board.is_silent = fault == BUS_RELAYS_SILENT;
-    }
-    return is_cable || is_of_lines(fault) || is_of_board(fault);
 }
 
 bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT_WHY_MAX])
 {
     const row_t *row = &k_rows[self->row];
-    if (!fault_suits(self, twin->kind, twin->modbus.board.is_there, why)) {
+    const fault_machine_t machine = {twin->kind, twin->modbus.board.is_there, twin->bus.has_adapter, twin->lines};
+    if (!fault_suits(self, &machine, why)) {
         return false;
     }
-    if (row->act == NULL && do_on_modbus(&twin->modbus, row->bus)) {
+    if (row->act == NULL && line_fault_is(row->bus)) {
+        return line_fault_do(self, row->bus, twin->lines, why);
+    }
+    if (row->act == NULL && modbus_fault_do(&twin->modbus, row->bus) &&
+        !(machine.has_adapter && modbus_fault_is_lines(row->bus))) {
         return true;
     }
     if (row->act == NULL) {

@@ -9,6 +9,14 @@
 #define FAULT_WHY_MAX 240u
 #define FAULT_NUMBERS 2u
 
+/** What a configuration has that can fail. */
+typedef struct {
+    twin_drives_t kind;
+    bool has_board;       /**< of relays on Modbus */
+    bool has_adapter;     /**< the bus is behind a serial CAN adapter */
+    const lines_t *lines; /**< NULL = no GPIO lines */
+} fault_machine_t;
+
 /** A line that was understood. */
 typedef struct {
     unsigned row;
@@ -29,9 +37,8 @@ bool fault_read(fault_t *self, const char *line, unsigned drives, char why[FAULT
 bool fault_do(const fault_t *self, twin_t *twin, uint64_t now_us, char why[FAULT_WHY_MAX]);
 
 /** Why this configuration has no such fault.
- *  @param kind what the drives are on
  *  @return true where it has; else why says so */
-bool fault_suits(const fault_t *self, twin_drives_t kind, bool has_board, char why[FAULT_WHY_MAX]);
+bool fault_suits(const fault_t *self, const fault_machine_t *machine, char why[FAULT_WHY_MAX]);
 
 /** Row i of the table of names, for a help text; false behind the last one. */
 bool fault_describe(unsigned i, const char **name, const char **arguments, const char **help);

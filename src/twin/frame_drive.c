@@ -18,7 +18,7 @@ static bool has(const canraw_map_t *map, canraw_command_t command)
     return map->command[command].length != 0;
 }
 
-/* Conditions of the reply with the position; homing may have a reply of its own. */
+/* Conditions of the reply with the status; homing may have a reply of its own. */
 static status_conditions_t conditions_of(const canraw_map_t *map)
 {
     const bool is_apart = map->homing_query.length != 0;
@@ -67,10 +67,41 @@ static unsigned what_holds(const frame_drive_t *self)
 }
 
 /* What no field can hold is shown as its end. */
-static int64_t within_field(const canraw_frame_t *frame, canraw_value_t value, int64_t number)
+static int64_t within_field(const canraw_frame_t *frame, canraw_value_t value, unsigned slot, int64_t number)
 {
-    const canraw_field_t *field = canraw_find(frame, value);
+    const canraw_field_t *field = canraw_find_of(frame, value, slot);
     return field == NULL ? 0 : fx_clamp(number, canraw_field_min(field), canraw_field_max(field));
+}
+
+/* A frame that it sends, and which of its fields are this drive's. */
+typedef struct {
+    const canraw_frame_t *frame;
+    bool is_status; /* the status of its own frame */
+} told_t;
+
+static uint32_t id_of(const frame_drive_t *self, const told_t *told)
+{
+    return told->is_status ? self->axis->status_id : self->axis->reply_id;
+}
+
+static unsigned slot_of(const frame_drive_t *self, const told_t *told)
+{
+    return told->is_status ? self->axis->status_slot : self->axis->reply_slot;
+}
+
+/* The next drive that shares a frame with this one, the first where `before` is NULL; NULL behind the last. */
+static frame_drive_t *next_sharing(frame_drive_t *self, const told_t *told, frame_drive_t *before)
+{
+    if (self->all == NULL) {
+        return before == NULL ? self : NULL;
+    }
+    frame_drive_t *end = self->all + self->map->axes;
+    for (frame_drive_t *drive = before == NULL ? self->all : before + 1; drive < end; drive++) {
+        if (id_of(drive, told) == id_of(self, told)) {
+            return drive;
+        }
+    }
+    return NULL;
 }
 
 static uint64_t first_waiting(const frame_drive_t *self)
@@ -93,27 +124,71 @@ static void spoil(const canraw_frame_t *frame, uint8_t *data)
     data[0] ^= 0xFFu; /* without a check byte: another frame */
 }
 
-static void reply(frame_drive_t *self, const canraw_frame_t *frame, const status_conditions_t *conditions)
+/* What holds of those that share a status: of all, but faults of any. */
+static unsigned what_holds_together(frame_drive_t *self, const told_t *told)
 {
-    can_frame_t out = {.id = self->axis->reply_id, .is_extended = self->map->is_extended, .length = frame->length};
-    int64_t value[CANRAW_VALUES] = {0};
-    self->counter += self->is_stuck ? 0 : 1;
-    value[CANRAW_POSITION] = within_field(frame, CANRAW_POSITION, frame_drive_count(self));
-    value[CANRAW_STATUS] = (int64_t)status_word(conditions, what_holds(self));
-    value[CANRAW_COUNTER] = self->counter;
-    value[CANRAW_FAULT] = within_field(frame, CANRAW_FAULT, self->fault_code);
-    if (self->lost > 0 || self->is_mute || canraw_pack(frame, value, out.data) != HV_OK) {
-        self->lost -= self->lost > 0 ? 1 : 0;
+    const unsigned of_any = STATUS_FAILED | STATUS_FAULT;
+    unsigned all = ~0u;
+    unsigned any = 0;
+    for (frame_drive_t *drive = next_sharing(self, told, NULL); drive != NULL; drive = next_sharing(self, told, drive)) {
+        all &= what_holds(drive);
+        any |= what_holds(drive);
+    }
+    return (all & ~of_any) | (any & of_any);
+}
+
+/* Its numbers in a reply. Its torque is what drives it: how far the demand is ahead. */
+static void tell(frame_drive_t *self, const told_t *told, const status_conditions_t *conditions, int64_t *value)
+{
+    const unsigned slot = slot_of(self, told);
+    const canraw_field_t *status = canraw_find_of(told->frame, CANRAW_STATUS, slot);
+    const bool is_own = status != NULL && status->slot != 0;
+    const int64_t torque = self->motor->has_torque ? (int64_t)motor_error(self->motor) : 0;
+    value[canraw_value_at(CANRAW_POSITION, slot)] = within_field(told->frame, CANRAW_POSITION, slot, frame_drive_count(self));
+    value[canraw_value_at(CANRAW_STATUS, is_own ? slot : 0)] =
+        (int64_t)status_word(conditions, is_own ? what_holds(self) : what_holds_together(self, told));
+    value[canraw_value_at(CANRAW_FAULT, slot)] = within_field(told->frame, CANRAW_FAULT, slot, self->fault_code);
+    value[canraw_value_at(CANRAW_TORQUE, slot)] = within_field(told->frame, CANRAW_TORQUE, slot, torque);
+}
+
+/* What is wrong with a reply, of all that share it. Returns false where it is not sent. */
+static bool add_wrong(frame_drive_t *self, bool *is_damaged, bool *is_stuck, uint32_t *late_us)
+{
+    const bool is_sent = self->is_powered && !self->is_cut && !self->is_mute && self->lost == 0;
+    self->lost -= self->lost > 0 ? 1 : 0;
+    *is_damaged = *is_damaged || (is_sent && self->damaged > 0);
+    self->damaged -= is_sent && self->damaged > 0 ? 1 : 0;
+    *is_stuck = *is_stuck || self->is_stuck;
+    *late_us = self->late_us > *late_us ? self->late_us : *late_us;
+    return is_sent;
+}
+
+static void reply(frame_drive_t *self, told_t told, const status_conditions_t *conditions)
+{
+    can_frame_t out = {.id = id_of(self, &told), .is_extended = self->map->is_extended, .length = told.frame->length};
+    int64_t value[DRIVES_MAX * CANRAW_VALUES] = {0};
+    bool is_sent = true;
+    bool is_damaged = false;
+    bool is_stuck = false;
+    uint32_t late_us = 0;
+    frame_drive_t *first = next_sharing(self, &told, NULL);
+    uint32_t *counter = told.is_status ? &first->status_counter : &first->counter;
+    for (frame_drive_t *drive = first; drive != NULL; drive = next_sharing(self, &told, drive)) {
+        is_sent = add_wrong(drive, &is_damaged, &is_stuck, &late_us) && is_sent;
+        tell(drive, &told, conditions, value);
+    }
+    *counter += is_stuck ? 0 : 1;
+    value[CANRAW_COUNTER] = *counter;
+    if (!is_sent || canraw_pack(told.frame, value, out.data) != HV_OK) {
         return;
     }
-    if (self->damaged > 0) {
-        self->damaged--;
-        spoil(frame, out.data);
+    if (is_damaged) {
+        spoil(told.frame, out.data);
     }
-    if (self->late_us == 0) {
+    if (late_us == 0) {
         self->out.put(self->out.ctx, &out);
     } else if (self->waits < FRAME_DRIVE_WAITING) {
-        self->waiting[self->waits++] = (node_waiting_t){self->now_us + self->late_us, out};
+        self->waiting[self->waits++] = (node_waiting_t){self->now_us + late_us, out};
     }
 }
 
@@ -133,13 +208,19 @@ static void send_waiting(frame_drive_t *self)
 static void tell_position(frame_drive_t *self)
 {
     const status_conditions_t conditions = conditions_of(self->map);
-    reply(self, &self->map->position_reply, &conditions);
+    reply(self, (told_t){&self->map->position_reply, false}, &conditions);
 }
 
 static void tell_homing(frame_drive_t *self)
 {
     const status_conditions_t conditions = conditions_of_homing(self->map);
-    reply(self, &self->map->homing_reply, &conditions);
+    reply(self, (told_t){&self->map->homing_reply, false}, &conditions);
+}
+
+static void tell_status(frame_drive_t *self)
+{
+    const status_conditions_t conditions = conditions_of(self->map);
+    reply(self, (told_t){&self->map->status_reply, true}, &conditions);
 }
 
 /* --- What it does --- */
@@ -175,11 +256,12 @@ static bool is_always_on(const canraw_map_t *map)
 
 void frame_drive_power(frame_drive_t *self, bool is_on, uint64_t now_us)
 {
-    const bool is_incremental = has(self->map, CANRAW_HOME);
+    const bool is_incremental = has(self->map, CANRAW_HOME) && !self->is_absolute;
     self->is_powered = is_on;
     self->now_us = now_us;
-    self->boot_us = self->send_us = now_us + BOOT_US;
+    self->boot_us = self->send_us = self->status_us = now_us + BOOT_US;
     self->fault_code = 0;
+    self->steps = 0;
     self->has_homing_failed = false;
     self->is_homed = !is_incremental;
     self->origin = is_incremental ? self->motor->actual : self->origin;
@@ -232,7 +314,7 @@ static void command(frame_drive_t *self, canraw_command_t which)
 
 static void take_set_point(frame_drive_t *self, const uint8_t *data)
 {
-    const canraw_field_t *field = canraw_find(&self->map->setpoint, CANRAW_POSITION);
+    const canraw_field_t *field = canraw_find_of(&self->map->setpoint, CANRAW_POSITION, self->axis->setpoint_slot);
     if (self->state == FRAME_DRIVE_OFF && !has(self->map, CANRAW_ENABLE)) {
         torque_on(self); /* the first set-point is its word for torque */
     }
@@ -243,15 +325,46 @@ static void take_set_point(frame_drive_t *self, const uint8_t *data)
     motor_aim(self->motor, (double)canraw_extract(field, data) + self->origin, self->map->period_us);
 }
 
+static bool is_started(const frame_drive_t *self)
+{
+    return self->steps >= CANRAW_STEPS_MAX || self->map->step[self->steps].frame.length == 0;
+}
+
 static bool is_exactly(const canraw_frame_t *frame, const can_frame_t *heard)
 {
     return heard->length == frame->length && canraw_matches(frame, heard->data, heard->length);
+}
+
+/* Starting up, in this order; the first frame begins it again. Returns whether it was one of them. */
+static bool take_step(frame_drive_t *self, const can_frame_t *frame)
+{
+    const canraw_step_t *step = self->map->step;
+    const bool is_next = !is_started(self) && is_exactly(&step[self->steps].frame, frame);
+    if (!is_next && !is_exactly(&step[0].frame, frame)) {
+        return false;
+    }
+    self->steps = is_next ? self->steps : 0;
+    if (step[self->steps].answer.length > 0) {
+        const status_conditions_t none = {.done = {0, 0}};
+        reply(self, (told_t){&step[self->steps].answer, false}, &none);
+    }
+    self->steps++;
+    return true;
 }
 
 /* Questions and commands have constants that set-points lack. */
 static void take(frame_drive_t *self, const can_frame_t *frame)
 {
     const canraw_map_t *map = self->map;
+    if ((frame->id == self->axis->command_id && take_step(self, frame)) || !is_started(self)) {
+        return;
+    }
+    if (frame->id != self->axis->command_id) {
+        if (!self->is_deaf && is_exactly(&map->setpoint, frame)) {
+            take_set_point(self, frame->data);
+        }
+        return;
+    }
     if (is_exactly(&map->position_query, frame)) {
         tell_position(self);
         return;
@@ -268,7 +381,7 @@ static void take(frame_drive_t *self, const can_frame_t *frame)
             return;
         }
     }
-    if (!self->is_deaf && is_exactly(&map->setpoint, frame)) {
+    if (!self->is_deaf && frame->id == self->axis->setpoint_id && is_exactly(&map->setpoint, frame)) {
         take_set_point(self, frame->data);
     }
 }
@@ -276,7 +389,8 @@ static void take(frame_drive_t *self, const can_frame_t *frame)
 void frame_drive_hear(frame_drive_t *self, const can_frame_t *frame, uint64_t now_us)
 {
     if (!self->is_powered || self->is_cut || now_us < self->boot_us || frame->is_error ||
-        frame->is_extended != self->map->is_extended || frame->id != self->axis->command_id) {
+        frame->is_extended != self->map->is_extended ||
+        (frame->id != self->axis->command_id && frame->id != self->axis->setpoint_id)) {
         return;
     }
     frame_drive_advance(self, now_us);
@@ -304,6 +418,29 @@ static void end_homing(frame_drive_t *self)
     }
 }
 
+static bool is_unasked(const frame_drive_t *self, const told_t *told)
+{
+    return told->is_status ? told->frame->length != 0 : self->map->position_query.length == 0;
+}
+
+/* What comes by itself, from the first of those that share it. */
+static void tell_unasked(frame_drive_t *self, const told_t *told, uint64_t *due_us, uint32_t every_us)
+{
+    if (!is_unasked(self, told) || !is_started(self) || self->now_us < *due_us) {
+        return;
+    }
+    *due_us += every_us;
+    *due_us = *due_us > self->now_us ? *due_us : self->now_us + every_us;
+    if (next_sharing(self, told, NULL) != self) {
+        return;
+    }
+    if (told->is_status) {
+        tell_status(self);
+    } else {
+        tell_position(self);
+    }
+}
+
 void frame_drive_advance(frame_drive_t *self, uint64_t now_us)
 {
     self->now_us = now_us;
@@ -316,11 +453,9 @@ void frame_drive_advance(frame_drive_t *self, uint64_t now_us)
         return;
     }
     send_waiting(self);
-    if (self->map->position_query.length == 0 && now_us >= self->send_us) {
-        self->send_us += self->map->period_us;
-        self->send_us = self->send_us > now_us ? self->send_us : now_us + self->map->period_us;
-        tell_position(self);
-    }
+    tell_unasked(self, &(told_t){&self->map->position_reply, false}, &self->send_us, self->map->period_us);
+    tell_unasked(self, &(told_t){&self->map->status_reply, true}, &self->status_us,
+                 self->map->period_us * self->map->status_every);
 }
 
 uint64_t frame_drive_due_us(const frame_drive_t *self)
@@ -328,6 +463,8 @@ uint64_t frame_drive_due_us(const frame_drive_t *self)
     const uint64_t look_us = self->now_us + STEP_US;
     const uint64_t waiting_us = first_waiting(self);
     const uint64_t send_us = self->map->position_query.length == 0 && self->is_powered ? self->send_us : DRIVE_NEVER;
-    const uint64_t first_us = waiting_us < send_us ? waiting_us : send_us;
+    const uint64_t status_us = self->map->status_reply.length != 0 && self->is_powered ? self->status_us : DRIVE_NEVER;
+    const uint64_t told_us = send_us < status_us ? send_us : status_us;
+    const uint64_t first_us = waiting_us < told_us ? waiting_us : told_us;
     return first_us < look_us ? first_us : look_us;
 }

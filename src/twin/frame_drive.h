@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * frame_drive.h - a simulated drive with CAN frames of its own, made from the configuration's map read backwards: it takes the
- * frames that heaved sends, and sends those that heaved reads. Time is an argument, us.
+ * frames that heaved sends, and sends those that heaved reads. Drives that share a reply are one device: what one of them
+ * does to it happens to all. Time is an argument, us.
  */
 #ifndef HEAVE_TWIN_FRAME_DRIVE_H
 #define HEAVE_TWIN_FRAME_DRIVE_H
@@ -14,7 +15,7 @@
 typedef enum { FRAME_DRIVE_OFF, FRAME_DRIVE_TORQUE, FRAME_DRIVE_HOMING, FRAME_DRIVE_FAULT } frame_drive_state_t;
 
 /** One drive. The first block is what is made to fail; counts are of replies. */
-typedef struct {
+typedef struct frame_drive {
     bool is_mute;          /**< hears, but says nothing */
     bool is_cut;           /**< neither */
     bool is_deaf;          /**< answers, but acts on nothing */
@@ -28,13 +29,16 @@ typedef struct {
     const canraw_axis_map_t *axis;
     motor_t *motor;
     node_out_t out;
-    double home;        /**< where it finds its zero, raw counts */
-    double usual_speed; /**< counts/s, of a stop and of homing */
+    struct frame_drive *all; /**< the drives of the map, in their order, where some share frames; NULL: it shares none */
+    double home;             /**< where it finds its zero, raw counts */
+    double usual_speed;      /**< counts/s, of a stop and of homing */
 
     bool is_powered;
+    unsigned steps; /**< of starting up that it got; before the last of them it says and does nothing else */
     frame_drive_state_t state;
     frame_drive_state_t before_homing;
     uint32_t fault_code; /**< 0 = none */
+    bool is_absolute;    /**< its zero survives the supply, whatever the map has for homing */
     bool is_homed, has_homing_failed;
     double origin; /**< raw counts of its zero */
     uint64_t boot_us;
@@ -42,6 +46,8 @@ typedef struct {
     uint64_t now_us;
     uint32_t set_points;
     uint32_t counter;
+    uint64_t status_us; /**< when it tells its status next, where that comes apart */
+    uint32_t status_counter;
     uint32_t waits;
     node_waiting_t waiting[FRAME_DRIVE_WAITING];
 } frame_drive_t;

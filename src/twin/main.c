@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * main.c - heave-twin: the outside of a platform's configuration, until a signal ends it.
+ * main.c - heave-twin: simulates the drives, switches and relays of a configuration until a signal ends it.
  */
 #include <inttypes.h>
 #include <poll.h>
@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <sys/resource.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "common/message.h" // exit codes
 #include "config/modbus.h"
@@ -19,16 +20,17 @@
 
 #define FDS_MAX  (WIRE_FDS_MAX + CONTROL_FDS_MAX + MODBUS_PORTS_FDS_MAX)
 #define PRIORITY 40       /* heaved has 80, interrupts 50 */
-#define NICE     (-15)    /* the next best */
-#define AWAKE_US 1000000u /* it looks around so often, whatever happens */
+#define NICE     (-15)    /* if real-time priority is not allowed */
+#define AWAKE_US 1000000u /* longest time between two rounds of the main loop */
 
 /** A run of the program. */
 typedef struct {
     twin_options_t options;
     config_t config;
     twin_settings_t settings;
+    lines_t lines;
     script_t script;
-    wire_t wire; /**< where the drives are on CAN */
+    wire_t wire; /**< for drives on CAN */
     modbus_ports_t ports;
     control_t control;
     twin_t twin;
@@ -59,7 +61,7 @@ static int refuse(int code, const char *where, const char *why)
 
 static bool has_wire(const run_t *self)
 {
-    return self->script.kind != TWIN_DRIVES_MODBUS;
+    return self->script.machine.kind == TWIN_DRIVES_CIA402 || self->script.machine.kind == TWIN_DRIVES_FRAMES;
 }
 
 /* --- Before it runs --- */
@@ -80,20 +82,36 @@ static int read_script(run_t *self, unsigned drives)
     return wrong == 0 ? EXIT_DONE : wrong > 0 ? EXIT_BAD_DATA : EXIT_NO_INPUT;
 }
 
+static unsigned drives_of(const run_t *self)
+{
+    const settings_t *settings = &self->config.settings;
+    const unsigned drives = (settings->geometry.kind == KIN_HEXAPOD ? 6u : 3u) + (settings->has_angle ? 1u : 0u);
+    return twin_kind(&self->config) == TWIN_DRIVES_NONE ? 0 : drives;
+}
+
 static int prepare(run_t *self)
 {
     if (config_load(self->options.config, &self->config, stderr) != 0) {
         return EXIT_BAD_CONFIG;
     }
-    const char *refusal = twin_refusal(&self->config);
+    if (!self->options.is_without_gpio) {
+        lines_plan(&self->lines, &self->config);
+    }
+    const char *refusal = twin_refusal(&self->config, &self->lines);
     if (refusal != NULL) {
         return refuse(EXIT_BAD_CONFIG, self->options.config, refusal);
     }
     const unsigned cylinders = self->config.settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
-    const unsigned drives = cylinders + (self->config.settings.has_angle ? 1 : 0);
+    const unsigned drives = drives_of(self);
     twin_settings_init(&self->settings, &self->config);
-    self->script.kind = twin_kind(&self->config);
-    self->script.has_board = self->config.relays.driver == CONFIG_RELAYS_MODBUS;
+    self->script.machine = (fault_machine_t){.kind = twin_kind(&self->config),
+                                             .has_board = self->config.relays.driver == CONFIG_RELAYS_MODBUS,
+                                             .has_adapter = self->options.slcan != NULL,
+                                             .lines = &self->lines};
+    const char *bus = self->options.slcan != NULL ? "--slcan" : self->options.interface != NULL ? "--interface" : NULL;
+    if (bus != NULL && !has_wire(self)) {
+        return refuse(EXIT_BAD_USAGE, bus, "the drives of this configuration are not on CAN");
+    }
     const int code = twin_options_apply(&self->options, drives, cylinders, &self->settings);
     return code != EXIT_DONE ? code : read_script(self, drives);
 }
@@ -105,8 +123,12 @@ static int open_all(run_t *self)
     if (!modbus_ports_open(&self->ports, &self->config, why)) {
         return refuse(EXIT_UNAVAILABLE, self->options.config, why);
     }
-    if (has_wire(self) && !wire_open(&self->wire, self->config.can.interface, why)) {
-        return refuse(EXIT_UNAVAILABLE, "[can] interface", why);
+    if (has_wire(self) && !wire_open(&self->wire, &self->config.can, self->options.interface, self->options.slcan, why)) {
+        return refuse(EXIT_UNAVAILABLE, self->options.interface != NULL ? "--interface" : "[can] interface", why);
+    }
+    char line_why[LINES_WHY_MAX];
+    if (!lines_open(&self->lines, &self->config, clock_us(), line_why)) {
+        return refuse(EXIT_UNAVAILABLE, self->options.config, line_why);
     }
     if (!control_open(&self->control, self->options.socket, why)) {
         return refuse(EXIT_UNAVAILABLE, self->options.socket, why);
@@ -118,6 +140,12 @@ static void say_what_runs(const run_t *self)
 {
     const wire_t *wire = &self->wire;
     modbus_ports_describe(&self->ports, stdout);
+    lines_describe(&self->lines, stdout);
+    if (self->script.machine.kind == TWIN_DRIVES_NONE) {
+        printf("heave-twin: no drives: heaved simulates them itself\n");
+        (void)fflush(stdout);
+        return;
+    }
     if (!has_wire(self)) {
         printf("heave-twin: %u drives on Modbus, units", self->twin.drives);
         for (unsigned k = 0; k < self->twin.drives; k++) {
@@ -127,9 +155,14 @@ static void say_what_runs(const run_t *self)
         (void)fflush(stdout);
         return;
     }
-    const bool is_frames = self->script.kind == TWIN_DRIVES_FRAMES;
-    printf("heave-twin: %u drives on %s%s, %s", self->twin.drives, self->config.can.interface,
-           wire->is_local ? " (a bus between programs; no CAN)" : "",
+    if (wire->kind == WIRE_SLCAN) {
+        char terminal[64] = "?";
+        (void)ttyname_r(wire->slcan.terminal, terminal, sizeof terminal);
+        printf("heave-twin: a serial CAN adapter (slcan) at %s, which is %s\n", wire->adapter, terminal);
+    }
+    const bool is_frames = self->script.machine.kind == TWIN_DRIVES_FRAMES;
+    printf("heave-twin: %u drives on %s%s, %s", self->twin.drives, wire->kind == WIRE_SLCAN ? wire->adapter : wire->end,
+           wire->kind == WIRE_LOCAL ? " (a bus between programs; no CAN)" : "",
            is_frames ? "frames of their own to identifiers" : "CiA 402, nodes");
     for (unsigned k = 0; k < self->twin.drives; k++) {
         if (is_frames) {
@@ -181,7 +214,7 @@ static int run(run_t *self, const sigset_t *open)
         wait(self, open);
         self->now_us = clock_us();
         if (has_wire(self) && !wire_hear(&self->wire, hear, self)) {
-            return refuse(EXIT_UNAVAILABLE, self->wire.name, "the interface is gone");
+            return refuse(EXIT_UNAVAILABLE, self->wire.end, "the interface is gone");
         }
         twin_advance(&self->twin, self->now_us);
         modbus_ports_serve(&self->ports, &self->twin.modbus, self->now_us);
@@ -224,13 +257,15 @@ static int run_twin(run_t *self)
     if (code == EXIT_DONE) {
         self->start_us = self->now_us = clock_us();
         twin_start(&self->twin, &self->config, &self->settings, (node_out_t){wire_put, &self->wire}, self->now_us);
-        self->twin.bus = (twin_bus_t){wire_fault, &self->wire};
+        self->twin.bus = (twin_bus_t){wire_fault, &self->wire, self->options.slcan != NULL};
+        self->twin.lines = &self->lines;
         say_what_runs(self);
         code = run(self, &open);
     }
     control_close(&self->control);
     modbus_ports_close(&self->ports);
-    if (has_wire(self)) {
+    lines_close(&self->lines);
+    if (self->wire.name[0] != '\0') {
         wire_close(&self->wire);
     }
     return code;
@@ -238,14 +273,16 @@ static int run_twin(run_t *self)
 
 static int check(run_t *self)
 {
-    const unsigned drives =
-        (self->config.settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u) + (self->config.settings.has_angle ? 1u : 0u);
-    if (!has_wire(self)) {
+    const unsigned drives = drives_of(self);
+    lines_describe(&self->lines, stdout);
+    if (self->script.machine.kind == TWIN_DRIVES_NONE) {
+        printf("%s: no drives, %u GPIO lines, %u faults: right\n", self->options.config, self->lines.count, self->script.count);
+    } else if (!has_wire(self)) {
         printf("%s: %u drives on Modbus, %u faults: right\n", self->options.config, drives, self->script.count);
     } else {
         printf("%s: %u %s on %s, %u faults: right\n", self->options.config, drives,
-               self->script.kind == TWIN_DRIVES_FRAMES ? "drives with frames of their own" : "CiA 402 drives",
-               self->config.can.interface, self->script.count);
+               self->script.machine.kind == TWIN_DRIVES_FRAMES ? "drives with frames of their own" : "CiA 402 drives",
+               self->options.interface != NULL ? self->options.interface : self->config.can.interface, self->script.count);
     }
     return EXIT_DONE;
 }

@@ -183,3 +183,30 @@ fault_act_t modbus_fault_find(const char *name, bool *is_shared)
     *is_shared = row != NULL && row->act == NULL;
     return row != NULL ? row->act : NULL;
 }
+
+/* --- Of lines and boards --- */
+
+bool modbus_fault_is_board(bus_fault_t fault)
+{
+    return fault == BUS_RELAYS_SILENT || fault == BUS_RELAYS_FORGET || fault == BUS_RELAYS_BACK;
+}
+
+bool modbus_fault_is_lines(bus_fault_t fault)
+{
+    return fault == BUS_UNPLUG || fault == BUS_PLUG;
+}
+
+bool modbus_fault_do(modbus_side_t *side, bus_fault_t fault)
+{
+    const bool is_cable = side->drives > 0 && (fault == BUS_CABLE_OUT || fault == BUS_CABLE_IN);
+    if (is_cable) {
+        side->is_cable_out = fault == BUS_CABLE_OUT;
+    } else if (modbus_fault_is_lines(fault)) {
+        side->is_unplugged = fault == BUS_UNPLUG;
+    } else if (fault == BUS_RELAYS_FORGET) {
+        memset(side->board.coil, 0, sizeof side->board.coil);
+    } else if (modbus_fault_is_board(fault)) {
+        side->board.is_silent = fault == BUS_RELAYS_SILENT;
+    }
+    return is_cable || modbus_fault_is_lines(fault) || modbus_fault_is_board(fault);
+}

@@ -5,17 +5,15 @@
 
 #include <arpa/inet.h>
 #include <errno.h>
-#include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
-#include <termios.h>
 #include <unistd.h>
 
 #include "config/modbus.h"
+#include "twin/pty.h"
 
 #define HEAD_TCP 7u /* transaction, protocol, length, unit */
 #define CRC_SIZE 2u
@@ -46,47 +44,13 @@ static bool open_door(modbus_port_t *self, char why[MODBUS_WHY_MAX])
     return false;
 }
 
-/* A link of an earlier run that leads nowhere is replaced; a real adapter, or a file, never is. */
-static bool link_device(modbus_port_t *self, const char *terminal, char why[MODBUS_WHY_MAX])
-{
-    struct stat there;
-    struct stat target;
-    if (lstat(self->device, &there) == 0 && (!S_ISLNK(there.st_mode) || stat(self->device, &target) == 0)) {
-        (void)snprintf(
-            why, MODBUS_WHY_MAX,
-            "%s is there already: heave-twin makes its own; name a path that is free, as /tmp/heave-line, in a copy of the file",
-            self->device);
-        return false;
-    }
-    (void)unlink(self->device);
-    self->has_link = symlink(terminal, self->device) == 0;
-    if (!self->has_link) {
-        (void)snprintf(why, MODBUS_WHY_MAX, "%s: %s; name a path where you may write, as /tmp/heave-line, in a copy of the file",
-                       self->device, strerror(errno));
-    }
-    return self->has_link;
-}
-
-static bool open_terminal(modbus_port_t *self, char why[MODBUS_WHY_MAX])
-{
-    struct termios raw;
-    char name[64];
-    self->talk = posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC | O_NONBLOCK);
-    const bool is_ours =
-        self->talk >= 0 && grantpt(self->talk) == 0 && unlockpt(self->talk) == 0 && ptsname_r(self->talk, name, sizeof name) == 0;
-    self->door = is_ours ? open(name, O_RDWR | O_NOCTTY | O_CLOEXEC) : -1;
-    if (self->door < 0 || tcgetattr(self->door, &raw) != 0) {
-        (void)snprintf(why, MODBUS_WHY_MAX, "a pseudo terminal: %s", strerror(errno));
-        return false;
-    }
-    cfmakeraw(&raw);
-    (void)tcsetattr(self->door, TCSANOW, &raw);
-    return link_device(self, name, why);
-}
-
 static bool open_port(modbus_port_t *self, char why[MODBUS_WHY_MAX])
 {
-    return self->is_serial ? open_terminal(self, why) : open_door(self, why);
+    if (!self->is_serial) {
+        return open_door(self, why);
+    }
+    self->has_link = pty_open(self->device, &self->talk, &self->door, why, MODBUS_WHY_MAX);
+    return self->has_link;
 }
 
 static modbus_port_t *add(modbus_ports_t *self, unsigned line)

@@ -9,10 +9,13 @@
 #define RATED_RISE_C 45.0
 #define SECOND_US    1e6
 
+#define RATED_ERROR_S 0.02 /* of travel at rated speed: the error that takes the rated torque */
+#define EFFORT_MAX    3.0
+
 void motor_start(motor_t *self, double position, uint64_t now_us)
 {
     self->actual = position;
-    self->temperature_c = MOTOR_AMBIENT_C;
+    self->temperature_c = self->ambient_c;
     self->has_torque = false;
     self->now_us = now_us;
     motor_hold(self);
@@ -59,6 +62,12 @@ bool motor_is_there(const motor_t *self)
 double motor_error(const motor_t *self)
 {
     return self->demand - self->actual;
+}
+
+double motor_effort(const motor_t *self)
+{
+    const double rated = self->rated_speed * RATED_ERROR_S;
+    return self->has_torque && rated > 0 ? fmin(fmax(motor_error(self) / rated, -EFFORT_MAX), EFFORT_MAX) : 0;
 }
 
 static void move_demand(motor_t *self, double span_us)
@@ -109,7 +118,7 @@ void motor_advance(motor_t *self, uint64_t now_us)
         self->actual = fmin(fmax(self->actual, self->stop_low), self->stop_high);
     }
     const double pace = self->rated_speed > 0 ? (self->actual - before) / span_us * SECOND_US / self->rated_speed : 0;
-    const double warm_c = MOTOR_AMBIENT_C + RATED_RISE_C * fmin(pace * pace, 4);
+    const double warm_c = self->ambient_c + RATED_RISE_C * fmin(pace * pace, 4);
     self->temperature_c = warm_c + (self->temperature_c - warm_c) * exp(-span_us / WARM_US);
     if (!self->has_torque) {
         motor_hold(self);

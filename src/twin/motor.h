@@ -8,7 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define MOTOR_AMBIENT_C 25.0
+#define MOTOR_AMBIENT_C 25.0 /* unless it is said */
 
 /** One axis. Set by the caller: the first block. */
 typedef struct {
@@ -19,6 +19,7 @@ typedef struct {
     double stop_low;    /**< end stops; none where low is not below high */
     double stop_high;   /**< likewise */
     double rated_speed; /**< counts/s at which it warms to 45 C above its surroundings */
+    double ambient_c;   /**< temperature round it */
     bool is_jammed;     /**< stands whatever is asked */
 
     double actual;        /**< counts */
@@ -54,6 +55,9 @@ bool motor_is_there(const motor_t *self);
 
 /** Demand less actual. */
 double motor_error(const motor_t *self);
+
+/** Its torque, as a share of the rated one: that of a stiff controller, in proportion to the error. */
+double motor_effort(const motor_t *self);
 
 /** Moves it up to now. */
 void motor_advance(motor_t *self, uint64_t now_us);

@@ -3,66 +3,30 @@
  */
 #include "twin/node.h"
 
+#include "twin/node_internal.h"
+
 #include <string.h>
 
 #define PRE_OPERATIONAL 0x7Fu
-#define OPERATIONAL     0x05u
 #define STOPPED         0x04u
 
 #define HEARTBEAT_LOST 0x8130u
 #define SYNC_LATE      0x8100u
-#define PDO_SHORT      0x8210u
 #define SYNC_LENGTH    0x8240u
 
-#define SYNCHRONOUS_MAX 240u
-#define BAD_COMMAND     0x05040001u
-#define RESET_SHARE     4u   /* a reset of the communication takes so much less than a boot */
-#define EVENT_US        1000 /* PDOs that tell of changes leave a gap */
-#define LOOK_US         1000 /* an axis with power is looked at so often */
+#define BAD_COMMAND 0x05040001u
+#define RESET_SHARE 4u   /* a reset of the communication takes so much less than a boot */
+#define LOOK_US     1000 /* an axis with power is looked at so often */
 
-/* --- Out --- */
-
-static void put(node_t *self, uint32_t id, const uint8_t *data, uint8_t length)
+void node_join(node_t *const axis[], unsigned axes)
 {
-    can_frame_t frame = {.id = id, .length = length};
-    if (self->is_mute || self->is_cut) {
-        return;
-    }
-    if (length > 0) {
-        memcpy(frame.data, data, length);
-    }
-    self->out.put(self->out.ctx, &frame);
-}
-
-static void put_later(node_t *self, uint32_t delay_us, uint32_t id, const uint8_t *data, uint8_t length)
-{
-    if (delay_us == 0) {
-        put(self, id, data, length);
-    } else if (self->waits < NODE_WAITING_MAX) {
-        node_waiting_t *item = &self->waiting[self->waits++];
-        *item = (node_waiting_t){.due_us = self->now_us + delay_us, .frame = {.id = id, .length = length}};
-        memcpy(item->frame.data, data, length);
-    }
-}
-
-static void put_due(node_t *self)
-{
-    uint32_t kept = 0;
-    for (uint32_t i = 0; i < self->waits; i++) {
-        const node_waiting_t item = self->waiting[i];
-        if (item.due_us > self->now_us) {
-            self->waiting[kept++] = item;
-        } else {
-            put(self, item.frame.id, item.frame.data, item.frame.length);
+    for (unsigned i = 0; i < axes; i++) {
+        axis[0]->axis[i] = axis[i];
+        axis[i]->head = i == 0 ? NULL : axis[0];
+        for (unsigned n = 0; n < axes; n++) {
+            axis[i]->drive.od.axis[n] = &axis[n]->drive.od;
         }
     }
-    self->waits = kept;
-}
-
-void node_emergency(node_t *self, uint16_t code, uint8_t error_register)
-{
-    const uint8_t data[8] = {(uint8_t)code, (uint8_t)(code >> 8), error_register};
-    put(self, 0x80u + self->number, data, 8);
 }
 
 static void tell_emergency(node_t *self)
@@ -78,91 +42,27 @@ static void tell_emergency(node_t *self)
     }
 }
 
-/* --- PDOs --- */
-
-static uint8_t pack(const node_t *self, uint16_t mapping, uint8_t data[8])
-{
-    const objects_t *od = &self->drive.od;
-    uint8_t length = 0;
-    for (uint32_t k = 1; k <= objects_get(od, mapping, 0); k++) {
-        const uint32_t entry = objects_get(od, mapping, (uint8_t)k);
-        const uint32_t value = objects_get(od, (uint16_t)(entry >> 16), (uint8_t)(entry >> 8 & 0xFF));
-        for (unsigned i = 0; i < (entry & 0xFF) / 8 && length < 8; i++) {
-            data[length++] = (uint8_t)(value >> (8 * i));
-        }
-    }
-    return length;
-}
-
-static void put_tpdo(node_t *self, uint16_t n)
-{
-    uint8_t data[8] = {0};
-    const uint8_t length = pack(self, (uint16_t)(0x1A00 + n), data);
-    if (self->tpdo_drop > 0) {
-        self->tpdo_drop--;
-        return;
-    }
-    put_later(self, self->tpdo_us, objects_get(&self->drive.od, (uint16_t)(0x1800 + n), 1) & CAN_ID_MAX, data, length);
-}
-
-static void put_synchronous(node_t *self)
-{
-    for (uint16_t n = 0; n < OBJECT_PDOS; n++) {
-        const uint32_t rate = objects_get(&self->drive.od, (uint16_t)(0x1800 + n), 2);
-        if (!objects_is_pdo(&self->drive.od, (uint16_t)(0x1800 + n)) || rate > SYNCHRONOUS_MAX) {
-            continue;
-        }
-        self->rate_count[n]++;
-        if (self->rate_count[n] >= rate) {
-            self->rate_count[n] = 0;
-            put_tpdo(self, n);
-        }
-    }
-}
-
-static bool is_event_pdo(const node_t *self, uint16_t n)
-{
-    return objects_is_pdo(&self->drive.od, (uint16_t)(0x1800 + n)) &&
-           objects_get(&self->drive.od, (uint16_t)(0x1800 + n), 2) >= 254;
-}
-
-/* When a TPDO is sent whether its values have changed or not. */
-static uint64_t event_due_us(const node_t *self, uint16_t n)
-{
-    const uint32_t timer_ms = objects_get(&self->drive.od, (uint16_t)(0x1800 + n), 5);
-    if (self->nmt != OPERATIONAL || !is_event_pdo(self, n)) {
-        return DRIVE_NEVER;
-    }
-    return self->event_us[n] == 0 ? self->now_us : timer_ms == 0 ? DRIVE_NEVER : self->event_us[n] + timer_ms * 1000u;
-}
-
-static void put_events(node_t *self)
-{
-    for (uint16_t n = 0; n < OBJECT_PDOS && self->nmt == OPERATIONAL; n++) {
-        uint8_t data[8] = {0};
-        if (!is_event_pdo(self, n) || self->now_us < self->event_us[n] + EVENT_US) {
-            continue;
-        }
-        (void)pack(self, (uint16_t)(0x1A00 + n), data);
-        if (self->now_us >= event_due_us(self, n) || memcmp(data, self->event_data[n], 8) != 0) {
-            memcpy(self->event_data[n], data, 8);
-            self->event_us[n] = self->now_us;
-            put_tpdo(self, n);
-        }
-    }
-}
-
 /* --- NMT --- */
 
-void node_enter(node_t *self, uint8_t nmt)
+static void enter(node_t *self, uint8_t nmt)
 {
     const uint8_t was = self->nmt;
     self->nmt = nmt;
-    if (was == OPERATIONAL && nmt != OPERATIONAL) {
+    if (was == NODE_OPERATIONAL && nmt != NODE_OPERATIONAL) {
         drive_connection_lost(&self->drive);
     }
-    if (was != OPERATIONAL && nmt == OPERATIONAL) {
+    if (was != NODE_OPERATIONAL && nmt == NODE_OPERATIONAL) {
+        memset(self->rate_count, 0, sizeof self->rate_count);
+        memset(self->is_counting, 0, sizeof self->is_counting);
         memset(self->event_us, 0, sizeof self->event_us);
+    }
+}
+
+void node_enter(node_t *self, uint8_t nmt)
+{
+    enter(self, nmt);
+    for (unsigned i = 1; i < OBJECT_AXES && self->axis[i] != NULL; i++) {
+        enter(self->axis[i], nmt);
     }
 }
 
@@ -174,7 +74,7 @@ static void boot(node_t *self, uint32_t delay_us)
     self->beat_due_us = self->master_due_us = self->sync_due_us = DRIVE_NEVER;
     self->pending = 0;
     self->waits = 0;
-    memset(self->rate_count, 0, sizeof self->rate_count);
+    self->guard_toggle = 0;
 }
 
 /* What is wrong with single objects stays wrong when the drive starts again. */
@@ -187,28 +87,91 @@ static void keep_defects(objects_t *self, const objects_t *before)
     }
 }
 
-static void start(node_t *self)
+static bool has_number(const cia402_maps_t *maps, unsigned number)
 {
-    const objects_t before = self->drive.od;
-    objects_start(&self->drive.od, self->number, self->identity);
-    keep_defects(&self->drive.od, &before);
-    drive_start(&self->drive, self->now_us);
-    boot(self, self->boot_us);
+    for (unsigned i = 0; i < maps->count; i++) {
+        if (maps->map[i].number == number) {
+            return true;
+        }
+    }
+    return false;
 }
 
-void node_power(node_t *self, bool is_on, uint64_t now_us)
+/* The drive has as many PDOs as others. Those whose numbers are higher take the places of its last ones that are not in use.
+ * Returns the place of a PDO, from 1; 0: the drive has no such PDO. */
+static unsigned place_of(const cia402_maps_t *maps, unsigned number)
 {
-    if (is_on == self->is_powered) {
-        return;
+    unsigned place = OBJECT_PDOS;
+    for (unsigned i = 0; i < maps->count; i++) {
+        if (maps->map[i].number <= OBJECT_PDOS) {
+            continue;
+        }
+        while (has_number(maps, place)) {
+            place--;
+        }
+        if (maps->map[i].number == number || place == number) {
+            return maps->map[i].number == number ? place : 0;
+        }
+        place--;
     }
+    return number <= OBJECT_PDOS ? number : 0;
+}
+
+static void put_maps(node_t *self, uint16_t mappings, const cia402_maps_t *maps)
+{
+    for (unsigned i = 0; i < maps->count; i++) {
+        const cia402_map_t *map = &maps->map[i];
+        objects_map(&self->drive.od, (uint16_t)(mappings + place_of(maps, map->number) - 1), map->entry, map->entries,
+                    self->are_maps_fixed);
+    }
+}
+
+static void start_axis(node_t *self, uint64_t now_us)
+{
+    const objects_t before = self->drive.od;
+    self->now_us = now_us;
+    objects_start(&self->drive.od, self->number, self->identity, self->head == NULL);
+    put_maps(self, 0x1600, &self->commands);
+    put_maps(self, 0x1A00, &self->answers);
+    keep_defects(&self->drive.od, &before);
+    drive_start(&self->drive, now_us);
+}
+
+static void start(node_t *self)
+{
+    start_axis(self, self->now_us);
+    boot(self, self->boot_us);
+    for (unsigned i = 1; i < OBJECT_AXES && self->axis[i] != NULL; i++) {
+        start_axis(self->axis[i], self->now_us);
+        boot(self->axis[i], 0);
+        self->axis[i]->boot_due_us = DRIVE_NEVER; /* with the first one */
+    }
+}
+
+/* One axis of it. */
+static void cut_power(node_t *self, bool is_on, uint64_t now_us)
+{
     self->now_us = now_us;
     self->is_powered = is_on;
     self->nmt = 0;
     self->waits = 0;
-    if (is_on) {
-        start(self);
-    } else {
+    if (!is_on) {
         drive_drop(&self->drive);
+    }
+}
+
+void node_power(node_t *self, bool is_on, uint64_t now_us)
+{
+    node_t *head = node_head(self);
+    if (is_on == head->is_powered) {
+        return;
+    }
+    cut_power(head, is_on, now_us);
+    for (unsigned i = 1; i < OBJECT_AXES && head->axis[i] != NULL; i++) {
+        cut_power(head->axis[i], is_on, now_us);
+    }
+    if (is_on) {
+        start(head);
     }
 }
 
@@ -223,9 +186,14 @@ static void reset(node_t *self, bool is_all)
     node_enter(self, PRE_OPERATIONAL);
     if (is_all) {
         start(self);
-    } else {
-        objects_reset(&self->drive.od);
-        boot(self, self->boot_us / RESET_SHARE);
+        return;
+    }
+    objects_reset(&self->drive.od);
+    boot(self, self->boot_us / RESET_SHARE);
+    for (unsigned i = 1; i < OBJECT_AXES && self->axis[i] != NULL; i++) {
+        objects_reset(&self->axis[i]->drive.od);
+        boot(self->axis[i], 0);
+        self->axis[i]->boot_due_us = DRIVE_NEVER;
     }
 }
 
@@ -243,7 +211,7 @@ static void hear_nmt(node_t *self, const can_frame_t *frame)
     switch (frame->data[0]) {
     case 0x01:
         if (may_start(self)) {
-            node_enter(self, OPERATIONAL);
+            node_enter(self, NODE_OPERATIONAL);
         }
         break;
     case 0x02:
@@ -267,7 +235,7 @@ static void beat(node_t *self)
 {
     const uint32_t period_ms = objects_get(&self->drive.od, 0x1017, 0);
     if (!self->has_no_heartbeat) {
-        put(self, 0x700u + self->number, &self->nmt, 1);
+        node_put(self, 0x700u + self->number, &self->nmt, 1);
     }
     self->beat_due_us = period_ms == 0 ? DRIVE_NEVER : self->now_us + period_ms * 1000u;
 }
@@ -280,12 +248,29 @@ static void hear_heartbeat(node_t *self, uint32_t producer)
     }
 }
 
+/* Node guarding: its state, with a bit that changes from answer to answer. Who guards it is watched, too. */
+static void hear_guarding(node_t *self)
+{
+    const uint32_t life_ms = objects_get(&self->drive.od, 0x100C, 0) * objects_get(&self->drive.od, 0x100D, 0);
+    const uint8_t data = self->nmt | self->guard_toggle;
+    if (objects_get(&self->drive.od, 0x1017, 0) != 0) {
+        return;
+    }
+    if (life_ms != 0) {
+        self->master_due_us = self->now_us + life_ms * 1000u;
+    }
+    if (!self->has_no_heartbeat) {
+        self->guard_toggle ^= 0x80;
+        node_put(self, 0x700u + self->number, &data, 1);
+    }
+}
+
 static void master_lost(node_t *self)
 {
     self->master_due_us = DRIVE_NEVER;
     objects_put(&self->drive.od, 0x603F, 0, HEARTBEAT_LOST);
     node_emergency(self, HEARTBEAT_LOST, 0x11);
-    if (self->nmt == OPERATIONAL && objects_get(&self->drive.od, 0x1029, 1) != 1) {
+    if (self->nmt == NODE_OPERATIONAL && objects_get(&self->drive.od, 0x1029, 1) != 1) {
         node_enter(self, objects_get(&self->drive.od, 0x1029, 1) == 2 ? STOPPED : PRE_OPERATIONAL);
     }
     self->drive.emergency = 0; /* an error is told once */
@@ -293,47 +278,12 @@ static void master_lost(node_t *self)
 
 /* --- SYNC and RPDOs --- */
 
-static void apply(node_t *self, uint16_t n, const uint8_t *data)
-{
-    objects_t *od = &self->drive.od;
-    unsigned at = 0;
-    uint32_t control = UINT32_MAX;
-    for (uint32_t k = 1; k <= objects_get(od, (uint16_t)(0x1600 + n), 0); k++) {
-        const uint32_t entry = objects_get(od, (uint16_t)(0x1600 + n), (uint8_t)k);
-        const uint16_t index = (uint16_t)(entry >> 16);
-        uint32_t value = 0;
-        for (unsigned i = 0; i < (entry & 0xFF) / 8; i++) {
-            value |= (uint32_t)data[at++] << (8 * i);
-        }
-        objects_put(od, index, (uint8_t)(entry >> 8 & 0xFF), value);
-        self->drive.has_set_point |= index == 0x607A || index == 0x60C1;
-        control = index == 0x6040 ? value : control;
-        if (index == 0x6060 && (int8_t)value != self->drive.mode) {
-            (void)drive_choose_mode(&self->drive, (int8_t)value);
-        }
-    }
-    if (control != UINT32_MAX) {
-        drive_control(&self->drive, (uint16_t)control);
-    }
-}
-
-static void hear_rpdo(node_t *self, uint16_t n, const can_frame_t *frame)
-{
-    if (frame->length < objects_mapped_bytes(&self->drive.od, (uint16_t)(0x1600 + n))) {
-        node_emergency(self, PDO_SHORT, 0x11);
-    } else if (objects_get(&self->drive.od, (uint16_t)(0x1400 + n), 2) > SYNCHRONOUS_MAX) {
-        apply(self, n, frame->data);
-    } else {
-        memcpy(self->received[n], frame->data, 8);
-        self->pending |= 1u << n;
-    }
-}
-
+/* By the first axis for all of them: an RPDO may be for several. */
 static void hear_sync(node_t *self, const can_frame_t *frame)
 {
     const uint32_t counter = objects_get(&self->drive.od, 0x1019, 0);
     const uint32_t watch_us = objects_get(&self->drive.od, 0x1006, 0);
-    if (frame->length != (counter >= 2 && counter <= SYNCHRONOUS_MAX ? 1 : 0)) {
+    if (frame->length != (counter >= 2 && counter <= NODE_SYNCHRONOUS_MAX ? 1 : 0)) {
         node_emergency(self, SYNC_LENGTH, 0x11);
         return;
     }
@@ -341,39 +291,27 @@ static void hear_sync(node_t *self, const can_frame_t *frame)
         return;
     }
     self->sync_due_us = watch_us == 0 ? DRIVE_NEVER : self->now_us + watch_us + watch_us / 2;
-    if (self->nmt != OPERATIONAL) {
+    if (self->nmt != NODE_OPERATIONAL) {
         return;
     }
-    put_synchronous(self);
-    for (uint16_t n = 0; n < OBJECT_PDOS; n++) {
-        if ((self->pending >> n & 1u) != 0) {
-            apply(self, n, self->received[n]);
-        }
+    for (unsigned i = 0; i < OBJECT_AXES && self->axis[i] != NULL; i++) {
+        node_sync_pdos(self->axis[i], frame, self->now_us);
     }
-    self->pending = 0;
-    drive_sync(&self->drive, self->now_us);
+    for (unsigned i = 0; i < OBJECT_AXES && self->axis[i] != NULL; i++) {
+        drive_sync(&self->axis[i]->drive, self->now_us);
+    }
 }
 
 static void sync_late(node_t *self)
 {
     self->sync_due_us = DRIVE_NEVER;
-    if (self->nmt == OPERATIONAL) {
+    if (self->nmt == NODE_OPERATIONAL) {
         node_emergency(self, SYNC_LATE, 0x11);
         node_enter(self, PRE_OPERATIONAL);
     }
 }
 
-static void hear_pdo(node_t *self, const can_frame_t *frame)
-{
-    for (uint16_t n = 0; n < OBJECT_PDOS; n++) {
-        const uint16_t record = (uint16_t)(0x1400 + n);
-        if (objects_is_pdo(&self->drive.od, record) && (objects_get(&self->drive.od, record, 1) & CAN_ID_MAX) == frame->id) {
-            hear_rpdo(self, n, frame);
-        }
-    }
-}
-
-/* --- SDO: expedited, which is all that these objects need --- */
+/* --- SDO: expedited but for texts --- */
 
 static void answer(node_t *self, uint8_t command, const uint8_t *request, uint32_t value)
 {
@@ -385,13 +323,15 @@ static void answer(node_t *self, uint8_t command, const uint8_t *request, uint32
                              (uint8_t)(value >> 8),
                              (uint8_t)(value >> 16),
                              (uint8_t)(value >> 24)};
-    put_later(self, self->sdo_us, 0x580u + self->number, data, 8);
+    node_put_later(self, self->sdo_us, 0x580u + self->number, data, 8);
 }
 
 /* What a write means beyond its value. Returns an abort code. */
 static uint32_t written(node_t *self, uint16_t index, uint32_t value)
 {
     switch (index) {
+    case 0x100C:
+    case 0x100D:
     case 0x1016:
         self->master_due_us = DRIVE_NEVER;
         return 0;
@@ -408,30 +348,52 @@ static uint32_t written(node_t *self, uint16_t index, uint32_t value)
     }
 }
 
-static void take_write(node_t *self, const uint8_t *request, uint16_t index)
+static void take_write(node_t *self, node_t *owner, const uint8_t *request, uint16_t index)
 {
     const uint8_t bytes = (request[0] & 1) != 0 ? (uint8_t)(4 - (request[0] >> 2 & 3)) : 4;
     uint32_t value = 0;
     for (unsigned i = 0; i < bytes; i++) {
         value |= (uint32_t)request[4 + i] << (8 * i);
     }
-    uint32_t refusal = objects_write(&self->drive.od, index, request[3], value, bytes, self->nmt == OPERATIONAL);
-    refusal = refusal != 0 ? refusal : written(self, index, value);
+    uint32_t refusal = objects_write(&owner->drive.od, index, request[3], value, bytes, self->nmt == NODE_OPERATIONAL);
+    refusal = refusal != 0 ? refusal : written(owner, index, value);
     answer(self, refusal != 0 ? 0x80 : 0x60, request, refusal);
+}
+
+/* The axis that has an object, which it knows as the first one would. */
+static node_t *owner_of(node_t *self, uint16_t *index)
+{
+    const unsigned record = *index & 0x1FFu;
+    const unsigned step = self->pdo_step != 0 ? self->pdo_step : 64u;
+    const bool is_pdo = *index >= 0x1400 && *index < 0x1C00;
+    const unsigned channel = is_pdo ? record / step : *index >= 0x6000 ? (*index - 0x6000u) / 0x800u : 0;
+    const unsigned axis = channel < OBJECT_AXES && self->axis[channel] != NULL ? channel : 0;
+    node_t *owner = axis == 0 ? self : self->axis[axis];
+    *index = (uint16_t)(*index - (is_pdo ? axis * step : axis * 0x800u));
+    if (is_pdo) {
+        const unsigned number = (*index & 0x1FFu) + 1u;
+        const unsigned place = place_of(*index < 0x1800 ? &owner->commands : &owner->answers, number);
+        *index = (uint16_t)(place == 0 ? 0 : *index - number + place);
+    }
+    return owner;
 }
 
 static void hear_sdo(node_t *self, const can_frame_t *frame)
 {
     const uint8_t *request = frame->data;
-    const uint16_t index = (uint16_t)(request[1] | request[2] << 8);
-    const object_t *row = objects_find(&self->drive.od, index, request[3]);
-    const uint32_t refusal = objects_read_refusal(&self->drive.od, index, request[3]);
+    uint16_t index = (uint16_t)(request[1] | request[2] << 8);
+    node_t *owner = owner_of(self, &index);
+    const object_t *row = objects_find(&owner->drive.od, index, request[3]);
+    const uint32_t refusal = objects_read_refusal(&owner->drive.od, index, request[3]);
     if (self->nmt == STOPPED || frame->length != 8 || self->is_sdo_silent || request[0] == 0x80 ||
         (row != NULL && row->is_silent)) {
         return;
     }
-    if ((request[0] & 0xE2) == 0x22) {
-        take_write(self, request, index);
+    uint8_t text[8];
+    if ((refusal == 0 || (request[0] & 0xE0) == 0x60) && node_text_hear(&self->text, request, text)) {
+        node_put_later(self, self->sdo_us, 0x580u + self->number, text, 8);
+    } else if ((request[0] & 0xE2) == 0x22) {
+        take_write(self, owner, request, index);
     } else if ((request[0] & 0xE0) != 0x40) {
         answer(self, 0x80, request, BAD_COMMAND);
     } else if (refusal != 0 || row == NULL) {
@@ -445,24 +407,31 @@ static void hear_sdo(node_t *self, const can_frame_t *frame)
 
 void node_hear(node_t *self, const can_frame_t *frame, uint64_t now_us)
 {
-    if (!self->is_powered || self->nmt == 0 || self->is_cut || frame->is_rtr || frame->is_extended || frame->is_error) {
+    if (!self->is_powered || self->nmt == 0 || node_head(self)->is_cut || frame->is_extended || frame->is_error) {
         return;
     }
     self->now_us = now_us;
-    drive_advance(&self->drive, now_us);
-    if (frame->id == 0) {
-        hear_nmt(self, frame);
-    } else if (frame->id == (objects_get(&self->drive.od, 0x1005, 0) & CAN_ID_MAX)) {
-        hear_sync(self, frame);
-    } else if (frame->id == 0x600u + self->number) {
-        hear_sdo(self, frame);
-    } else if ((frame->id & 0x780u) == 0x700u) {
-        hear_heartbeat(self, frame->id & 0x7F);
-    } else if (self->nmt == OPERATIONAL) {
-        hear_pdo(self, frame);
+    if (frame->is_rtr) {
+        if (self->head == NULL && frame->id == 0x700u + self->number) {
+            hear_guarding(self);
+        }
+        return;
     }
     drive_advance(&self->drive, now_us);
-    put_events(self);
+    const bool is_first = self->head == NULL; /* what concerns the node is heard by its first axis */
+    if (is_first && frame->id == 0) {
+        hear_nmt(self, frame);
+    } else if (is_first && frame->id == (objects_get(&self->drive.od, 0x1005, 0) & CAN_ID_MAX)) {
+        hear_sync(self, frame);
+    } else if (is_first && frame->id == 0x600u + self->number) {
+        hear_sdo(self, frame);
+    } else if (is_first && (frame->id & 0x780u) == 0x700u) {
+        hear_heartbeat(self, frame->id & 0x7F);
+    } else if (!is_first || self->nmt == NODE_OPERATIONAL) {
+        node_hear_pdo(self, frame);
+    }
+    drive_advance(&self->drive, now_us);
+    node_put_events(self);
     tell_emergency(self);
 }
 
@@ -477,8 +446,8 @@ void node_advance(node_t *self, uint64_t now_us)
     if (now_us >= self->boot_due_us) {
         const uint8_t nothing = 0;
         self->boot_due_us = DRIVE_NEVER;
-        put(self, 0x700u + self->number, &nothing, 1);
-        self->nmt = PRE_OPERATIONAL;
+        node_put(self, 0x700u + self->number, &nothing, 1);
+        node_enter(self, PRE_OPERATIONAL);
     }
     if (now_us >= self->beat_due_us) {
         beat(self);
@@ -490,8 +459,8 @@ void node_advance(node_t *self, uint64_t now_us)
         sync_late(self);
     }
     tell_emergency(self);
-    put_events(self);
-    put_due(self);
+    node_put_events(self);
+    node_put_due(self);
 }
 
 static uint64_t least(uint64_t a, uint64_t b)
@@ -511,7 +480,7 @@ uint64_t node_due_us(const node_t *self)
         due_us = least(due_us, self->waiting[i].due_us);
     }
     for (uint16_t n = 0; n < OBJECT_PDOS; n++) {
-        due_us = least(due_us, event_due_us(self, n));
+        due_us = least(due_us, node_event_due_us(self, n));
     }
     const bool is_busy = self->drive.motor.has_torque || self->drive.motor.slip > 0;
     return is_busy && self->nmt != 0 ? least(due_us, self->now_us + LOOK_US) : due_us;

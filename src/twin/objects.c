@@ -18,8 +18,8 @@
 #define OUT(at, sub_, size, from) {.index = (at), .sub = (sub_), .bytes = (size), .fallback = (from), .is_read_only = true, .is_in_tpdo = true}
 
 static const object_t k_rows[] = {
-    RO(0x1000, 0, 4, 0x00020192), OUT(0x1001, 0, 1, 0), RW(0x1003, 0, 1, 0), RO(0x1003, 1, 4, 0), RW(0x1005, 0, 4, 0x80), RW(0x1006, 0, 4, 0),
-    RW(0x1007, 0, 4, 0), RO(0x1008, 0, 4, 0x6E697774 /* "twin" */), RO(0x1016, 0, 1, 1), RW(0x1016, 1, 4, 0), RW(0x1017, 0, 2, 0),
+    RO(0x1000, 0, 4, 0x00020192), OUT(0x1001, 0, 1, 0), RW(0x1003, 0, 1, 0), RO(0x1003, 1, 4, 0), RO(0x1003, 2, 4, 0), RO(0x1003, 3, 4, 0), RO(0x1003, 4, 4, 0), RW(0x1005, 0, 4, 0x80), RW(0x1006, 0, 4, 0),
+    RW(0x1007, 0, 4, 0), RW(0x100C, 0, 2, 0), RW(0x100D, 0, 1, 0), RO(0x1008, 0, 4, 0), RO(0x1009, 0, 4, 0), RO(0x100A, 0, 4, 0), /* texts: node_text.h */ RO(0x1016, 0, 1, 1), RW(0x1016, 1, 4, 0), RW(0x1017, 0, 2, 0),
     RO(0x1018, 0, 1, 4), RW(0x1019, 0, 1, 0), RO(0x1029, 0, 1, 1), RW(0x1029, 1, 1, 0),
     OUT(0x603F, 0, 2, 0), IN(0x6040, 0, 2, 0), OUT(0x6041, 0, 2, 0), RW(0x6007, 0, 2, 0), RW(0x605A, 0, 2, 0), RW(0x605B, 0, 2, 0),
     RW(0x605C, 0, 2, 0), RW(0x605D, 0, 2, 1), RW(0x605E, 0, 2, 0), IN(0x6060, 0, 1, 0), OUT(0x6061, 0, 1, 0), OUT(0x6062, 0, 4, 0),
@@ -27,9 +27,12 @@ static const object_t k_rows[] = {
     RW(0x607C, 0, 4, 0), RO(0x607D, 0, 1, 2), RW(0x607D, 1, 4, 0), RW(0x607D, 2, 4, 0), RW(0x6081, 0, 4, 10000), RW(0x6083, 0, 4, 100000),
     RW(0x6084, 0, 4, 100000), RW(0x6085, 0, 4, 1000000), RW(0x6098, 0, 1, 0), RO(0x6099, 0, 1, 2), RW(0x6099, 1, 4, 5000),
     RW(0x6099, 2, 4, 1000), RW(0x609A, 0, 4, 100000), RW(0x60C0, 0, 2, 0), RO(0x60C1, 0, 1, 1), IN(0x60C1, 1, 4, 0), RO(0x60C2, 0, 1, 2),
-    RW(0x60C2, 1, 1, 1), RW(0x60C2, 2, 1, 0xFD), OUT(0x60F4, 0, 4, 0), OUT(0x60FD, 0, 4, 0), RO(0x6502, 0, 4, 0xE1),
+    RW(0x60C2, 1, 1, 1), RW(0x60C2, 2, 1, 0xFD), OUT(0x60F4, 0, 4, 0), OUT(0x60FD, 0, 4, 0), OUT(0x6077, 0, 2, 0), RO(0x6502, 0, 4, 0xE1),
 };
 /* clang-format on */
+
+/* Of homing, most used first. */
+static const uint8_t k_methods[] = {35, 37, 17, 18, 19, 20, 21, 22, 1, 2, 7, 11, 23, 27, 33, 34};
 
 static void add(objects_t *self, object_t row)
 {
@@ -38,12 +41,12 @@ static void add(objects_t *self, object_t row)
 }
 
 /* As many drives come: valid and event-driven, until somebody configures them. */
-static void add_pdos(objects_t *self, uint8_t node)
+static void add_pdos(objects_t *self, uint8_t node, bool is_first)
 {
     static const uint32_t k_received[2][2] = {{0x60400010, 0}, {0x60400010, 0x607A0020}};
     static const uint32_t k_sent[2][2] = {{0x60410010, 0}, {0x60410010, 0x60640020}};
     for (uint16_t n = 0; n < OBJECT_PDOS; n++) {
-        const uint32_t off = n < 2 ? 0 : INVALID;
+        const uint32_t off = n < 2 && is_first ? 0 : INVALID;
         const uint32_t step = 0x100u * n + node;
         add(self, (object_t)RO((uint16_t)(0x1400 + n), 0, 1, 2));
         add(self, (object_t)RW((uint16_t)(0x1400 + n), 1, 4, (0x200 + step) | off));
@@ -64,17 +67,21 @@ static void add_pdos(objects_t *self, uint8_t node)
     }
 }
 
-void objects_start(objects_t *self, uint8_t node, const uint32_t identity[4])
+void objects_start(objects_t *self, uint8_t node, const uint32_t identity[4], bool is_first)
 {
     self->count = 0;
     for (uint32_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
         add(self, k_rows[i]);
     }
+    add(self, (object_t)RO(0x60E3, 0, 1, sizeof k_methods));
+    for (uint32_t i = 0; i < sizeof k_methods; i++) {
+        add(self, (object_t)RO(0x60E3, (uint8_t)(i + 1), 1, k_methods[i]));
+    }
     add(self, (object_t)RO(0x1014, 0, 4, 0x80u + node));
     for (uint8_t sub = 1; sub <= 4; sub++) {
         add(self, (object_t)RO(0x1018, sub, 4, identity[sub - 1]));
     }
-    add_pdos(self, node);
+    add_pdos(self, node, is_first);
 }
 
 void objects_reset(objects_t *self)
@@ -82,6 +89,18 @@ void objects_reset(objects_t *self)
     for (uint32_t i = 0; i < self->count; i++) {
         if (self->row[i].index < 0x2000) {
             self->row[i].value = self->row[i].fallback;
+        }
+    }
+}
+
+void objects_map(objects_t *self, uint16_t mapping, const uint32_t *entry, uint8_t entries, bool is_fixed)
+{
+    for (uint8_t sub = 0; sub <= 8; sub++) {
+        object_t *row = objects_find(self, mapping, sub);
+        const uint32_t mapped = sub == 0 ? entries : sub <= entries ? entry[sub - 1] : 0;
+        if (row != NULL) {
+            row->value = row->fallback = mapped;
+            row->is_read_only = is_fixed;
         }
     }
 }
@@ -146,9 +165,20 @@ uint32_t objects_read_refusal(objects_t *self, uint16_t index, uint8_t sub)
 
 /* --- The rules of mapping --- */
 
+#define AXIS_OBJECTS 0x6000u
+#define AXIS_STEP    0x800u
+
+object_t *objects_mapped(const objects_t *self, uint32_t entry)
+{
+    const uint32_t index = entry >> 16;
+    const uint32_t axis = index < AXIS_OBJECTS ? 0 : (index - AXIS_OBJECTS) / AXIS_STEP;
+    objects_t *of = axis < OBJECT_AXES ? self->axis[axis] : NULL;
+    return of == NULL ? NULL : objects_find(of, (uint16_t)(index - axis * AXIS_STEP), (uint8_t)(entry >> 8 & 0xFF));
+}
+
 static bool is_mappable(const objects_t *self, bool is_received, uint32_t entry)
 {
-    const object_t *target = find(self, (uint16_t)(entry >> 16), (uint8_t)(entry >> 8 & 0xFF));
+    const object_t *target = objects_mapped(self, entry);
     return target != NULL && !target->is_missing && (is_received ? target->is_in_rpdo : target->is_in_tpdo) &&
            (entry & 0xFF) == 8u * target->bytes;
 }
@@ -231,6 +261,16 @@ static uint32_t pdo_refusal(const objects_t *self, uint16_t index, uint8_t sub, 
     return (sub == 3 || sub == 6) && objects_is_pdo(self, index) ? OBJECT_UNSUPPORTED : 0;
 }
 
+/* Methods of the standard that it has; a maker's own are below 0. */
+static bool is_method(uint32_t value)
+{
+    bool is_listed = value == 0 || value >= 0x80;
+    for (uint32_t i = 0; i < sizeof k_methods; i++) {
+        is_listed |= k_methods[i] == value;
+    }
+    return is_listed;
+}
+
 /* What single objects do not take. */
 static uint32_t value_refusal(const objects_t *self, uint16_t index, uint8_t sub, uint32_t value)
 {
@@ -239,6 +279,8 @@ static uint32_t value_refusal(const objects_t *self, uint16_t index, uint8_t sub
         return value != 0 ? OBJECT_BAD_VALUE : 0;
     case 0x1019:
         return objects_get(self, 0x1006, 0) != 0 ? OBJECT_WRONG_STATE : 0;
+    case 0x6098:
+        return is_method(value) ? 0 : OBJECT_BAD_VALUE;
     case 0x60C2:
         return (sub == 1 && (value < 1 || value > 250)) || (sub == 2 && value != 0xFD && value != 0xFC) ? OBJECT_BAD_VALUE : 0;
     default:

@@ -8,8 +8,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define OBJECTS_MAX 200u
+#define OBJECTS_MAX 240u
 #define OBJECT_PDOS 4u
+#define OBJECT_AXES 4u
 
 /** SDO abort codes. */
 enum {
@@ -43,15 +44,26 @@ typedef struct {
     uint32_t was_value, was_fallback;
 } object_t;
 
-/** All objects of one drive. */
-typedef struct {
+/** All objects of one drive, as the first axis of a node has them. */
+typedef struct objects {
     uint32_t count;
     object_t row[OBJECTS_MAX];
+    struct objects *axis[OBJECT_AXES]; /**< of the node: what a PDO may have in it; NULL = there is none */
 } objects_t;
 
 /** As the drive leaves the factory.
- *  @param identity 1018h, sub 1 to 4 */
-void objects_start(objects_t *self, uint8_t node, const uint32_t identity[4]);
+ *  @param identity 1018h, sub 1 to 4
+ *  @param is_first the first axis of its node, whose PDOs have identifiers by themselves */
+void objects_start(objects_t *self, uint8_t node, const uint32_t identity[4], bool is_first);
+
+/** What a PDO has in it from the factory.
+ *  @param mapping  1600h to 1603h, 1A00h to 1A03h
+ *  @param entry    index << 16 | sub << 8 | bits
+ *  @param is_fixed and cannot be changed */
+void objects_map(objects_t *self, uint16_t mapping, const uint32_t *entry, uint8_t entries, bool is_fixed);
+
+/** What an entry of a mapping means, of whichever axis of the node; NULL where there is no such thing. */
+object_t *objects_mapped(const objects_t *self, uint32_t entry);
 
 /** Gives communication objects (1000h to 1FFFh) what they hold after a reset. */
 void objects_reset(objects_t *self);

@@ -24,6 +24,11 @@ enum {
     OPTION_LAG,
     OPTION_FRICTION,
     OPTION_LOAD,
+    OPTION_NO_GPIO,
+    OPTION_SLCAN,
+    OPTION_INTERFACE,
+    OPTION_AMBIENT,
+    OPTION_HOMED,
     OPTION_HELP,
     OPTION_VERSION
 };
@@ -32,6 +37,8 @@ enum {
 #define LEAD_MAX     1000.0
 #define COUNTS_MAX   2e9
 #define MM_MAX       10000.0
+#define COLDEST_C    (-40.0)
+#define HOTTEST_C    150.0
 
 static const usage_row_t k_forms[] = {
     {.argument = "--config FILE [OPTION ...]", .help = "run, until Ctrl-C"},
@@ -47,6 +54,9 @@ static const usage_row_t k_options[] = {
     {"fault", "LINE", "one line of a script; may be given 32 times", OPTION_FAULT},
     {"script", "FILE", "faults with times; see docs/twin.md", OPTION_SCRIPT},
     {"socket", "PATH", "where a running one can be asked", OPTION_SOCKET},
+    {"slcan", "PATH", "the bus is behind a serial CAN adapter (slcan), a terminal to which PATH leads", OPTION_SLCAN},
+    {"interface", "NAME", "the drives are on this CAN interface, the other end of a pair (vxcan); else [can] interface",
+     OPTION_INTERFACE},
     {"swap", "A,B", "drives A and B are on each other's leg; may be given several times", OPTION_SWAP},
     {"reverse", "A,B,...", "these drives run backwards", OPTION_REVERSE},
     {"lead", "A=X,...", "drive A moves X times the way that the configuration expects", OPTION_LEAD},
@@ -55,6 +65,9 @@ static const usage_row_t k_options[] = {
     {"lag", "MS", "time constant with which axes follow; else 2", OPTION_LAG},
     {"friction", "MM", "how far a demand is ahead before an axis breaks loose; else 0", OPTION_FRICTION},
     {"load", "MM", "how far cylinders give way under their load; else 0", OPTION_LOAD},
+    {"ambient", "C", "temperature round the motors; else 25", OPTION_AMBIENT},
+    {"homed", NULL, "the drives know their zero from the start, as those with absolute encoders do", OPTION_HOMED},
+    {"no-gpio", NULL, "leave the GPIO lines alone: they are real ones, or nobody needs them", OPTION_NO_GPIO},
     {"help", NULL, "print this", OPTION_HELP},
     {"version", NULL, "print the version", OPTION_VERSION},
     {0},
@@ -66,7 +79,7 @@ static const usage_exit_t k_exits[] = {
     {EXIT_BAD_USAGE, "usage"},
     {EXIT_BAD_DATA, "bad script"},
     {EXIT_NO_INPUT, "no script"},
-    {EXIT_UNAVAILABLE, "the bus or the socket cannot be used"},
+    {EXIT_UNAVAILABLE, "the bus, the lines or the socket cannot be used"},
     {EXIT_BAD_CONFIG, "configuration"},
     {0},
 };
@@ -76,10 +89,15 @@ static const usage_section_t k_manual[] = {
      "`heave-twin` is the outside of a platform: the drives that its configuration names, on their bus, and the mechanism that "
      "they move. heaved(8), or any other master, sees no difference, as long as nothing is made to fail. It has no part in a "
      "machine with real drives: never start it on their bus.\n\n"
-     "It takes configurations with CANopen drives (`[drives] driver = cia402`) and with drives on Modbus (modbus-tcp, "
-     "modbus-rtu), and a board of relays on Modbus. For Modbus TCP it is a server at each host; for a serial line it makes a "
+     "It takes configurations with CANopen drives (`[drives] driver = cia402`), with drives that have CAN frames of their own "
+     "(can-raw) and with drives on Modbus (modbus-tcp, modbus-rtu), and a board of relays on Modbus. Lines of [relays], [inputs] "
+     "and [healthy] with `driver = gpio` are on chips "
+     "that the kernel simulates (gpio-sim), which takes root; drives may then be heaved's own (`driver = sim`). For Modbus TCP "
+     "it is a server at each host; for a serial line it makes a "
      "pseudo terminal, and a link to it at the configured device. `[can] interface` is a SocketCAN interface, such "
-     "as vcan0; a name that begins with twin is a bus between programs, for kernels without CAN.\n"},
+     "as vcan0; a name that begins with twin is a bus between programs, for kernels without CAN. With `--slcan PATH` the drives "
+     "are behind a serial CAN adapter instead: slcand(1), or a program such as python-can, opens PATH. With `--interface NAME` "
+     "they are on the other end of a pair of interfaces (vxcan), which may be in another network name space than heaved.\n"},
     {"SCRIPTS",
      "A line is `SECONDS FAULT`: a time since heave-twin started. `+SECONDS FAULT` counts since all drives had torque. What "
      "stands behind a # is a comment. Each line that is wrong is named, and then nothing starts.\n"},
@@ -128,6 +146,10 @@ static const char **place_of(twin_options_t *self, int option)
         return &self->config;
     case OPTION_SCRIPT:
         return &self->script;
+    case OPTION_SLCAN:
+        return &self->slcan;
+    case OPTION_INTERFACE:
+        return &self->interface;
     case OPTION_SOCKET:
         return &self->socket;
     case OPTION_REVERSE:
@@ -144,6 +166,8 @@ static const char **place_of(twin_options_t *self, int option)
         return &self->friction;
     case OPTION_LOAD:
         return &self->load;
+    case OPTION_AMBIENT:
+        return &self->ambient;
     case OPTION_FAULT:
         return self->faults < OPTIONS_FAULTS_MAX ? &self->fault[self->faults++] : NULL;
     case OPTION_SWAP:
@@ -158,6 +182,10 @@ static bool take(twin_options_t *self, int option)
 {
     if (option == OPTION_CHECK || option == OPTION_HELP || option == OPTION_VERSION) {
         self->mode = option == OPTION_CHECK ? TWIN_CHECK : option == OPTION_HELP ? TWIN_HELP : TWIN_VERSION;
+        return true;
+    }
+    if (option == OPTION_NO_GPIO || option == OPTION_HOMED) {
+        *(option == OPTION_HOMED ? &self->is_homed : &self->is_without_gpio) = true;
         return true;
     }
     const char **place = place_of(self, option);
@@ -202,7 +230,14 @@ int twin_options_read(twin_options_t *self, int argc, char **argv)
     if (optind < argc) {
         return take_line(self, argc, argv);
     }
-    return self->config != NULL ? EXIT_DONE : complain("--config FILE", "", "is missing; see --help");
+    if (self->config == NULL) {
+        return complain("--config FILE", "", "is missing; see --help");
+    }
+    if (self->interface != NULL && self->slcan != NULL) {
+        return complain("--interface", self->interface, "the bus is behind the adapter of --slcan: one of both");
+    }
+    const bool is_name = self->interface == NULL || (self->interface[0] != '\0' && strlen(self->interface) < CONFIG_NAME_MAX);
+    return is_name ? EXIT_DONE : complain("--interface", self->interface, "a name of 1 to 15 characters");
 }
 
 /* --- Meaning --- */
@@ -283,6 +318,7 @@ static bool read_length(const char *text, double least, double *out)
 int twin_options_apply(const twin_options_t *self, unsigned drives, unsigned cylinders, twin_settings_t *out)
 {
     char right[80];
+    out->is_homed = self->is_homed;
     for (unsigned i = 0; i < self->swaps; i++) {
         if (!read_swap(self->swap[i], cylinders, out->leg_of)) {
             (void)snprintf(right, sizeof right, "two of the %u cylinders, as 2,5", cylinders);
@@ -303,6 +339,10 @@ int twin_options_apply(const twin_options_t *self, unsigned drives, unsigned cyl
     if (!read_length(self->start, -MM_MAX, &out->start_mm) || !read_length(self->friction, 0, &out->friction_mm) ||
         !read_length(self->load, -MM_MAX, &out->load_mm) || !read_length(self->lag, 0, &out->lag_ms)) {
         return complain("--start, --friction, --load or --lag", "", "is no number of mm or ms");
+    }
+    const char *ambient = self->ambient;
+    if (ambient != NULL && (!read_number(&ambient, COLDEST_C, HOTTEST_C, &out->ambient_c) || *ambient != '\0')) {
+        return complain("--ambient", self->ambient, "a temperature of -40 to 150 C");
     }
     return EXIT_DONE;
 }

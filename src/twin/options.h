@@ -17,15 +17,19 @@ typedef enum { TWIN_RUN, TWIN_CHECK, TWIN_ASK, TWIN_HELP, TWIN_VERSION } twin_mo
 /** A command line; texts point into argv. NULL: not there. */
 typedef struct {
     twin_mode_t mode;
+    bool is_without_gpio;
+    bool is_homed;
     const char *config;
     const char *script;
+    const char *slcan;
+    const char *interface;
     const char *socket;
     const char *fault[OPTIONS_FAULTS_MAX];
     unsigned faults;
     const char *swap[DRIVES_MAX];
     unsigned swaps;
     const char *reverse, *lead, *zero;
-    const char *start, *lag, *friction, *load;
+    const char *start, *lag, *friction, *load, *ambient;
     char line[OPTIONS_LINE_MAX]; /**< what to ask a running one */
 } twin_options_t;
 

@@ -199,7 +199,7 @@ void register_drive_drop(register_drive_t *self)
 
 void register_drive_power(register_drive_t *self, bool is_on, uint64_t now_us)
 {
-    const bool is_incremental = self->map->command[MODBUS_DRIVE_HOME].count != 0;
+    const bool is_incremental = self->map->command[MODBUS_DRIVE_HOME].count != 0 && !self->is_absolute;
     self->is_powered = is_on;
     self->boot_us = self->heard_us = now_us + BOOT_US;
     self->alarm = 0;

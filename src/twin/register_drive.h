@@ -42,7 +42,8 @@ typedef struct {
 
     bool is_powered;
     register_state_t state;
-    uint32_t alarm; /**< 0 = none */
+    uint32_t alarm;   /**< 0 = none */
+    bool is_absolute; /**< its zero survives the supply, whatever the map has for homing */
     bool is_homed, has_homing_failed;
     double origin; /**< raw counts of its zero */
     double target, speed;

@@ -33,9 +33,15 @@ bool script_add(script_t *self, const char *line, unsigned drives, char why[FAUL
         (void)snprintf(why, FAULT_WHY_MAX, "too much: at most %u lines of %u characters", SCRIPT_MAX, SCRIPT_LINE_MAX - 1);
         return false;
     }
+    if (is_after && self->machine.kind == TWIN_DRIVES_NONE) {
+        (void)snprintf(why, FAULT_WHY_MAX,
+                       "%.*s counts since the drives had torque, and heaved simulates them: write a time since the start",
+                       (int)strcspn(line, " \t"), line);
+        return false;
+    }
     script_entry_t *entry = &self->entry[self->count];
     *entry = (script_entry_t){.is_after_enabled = is_after, .at_us = (uint64_t)(seconds * SECOND_US)};
-    if (!fault_read(&entry->fault, end, drives, why) || !fault_suits(&entry->fault, self->kind, self->has_board, why)) {
+    if (!fault_read(&entry->fault, end, drives, why) || !fault_suits(&entry->fault, &self->machine, why)) {
         return false;
     }
     (void)snprintf(entry->text, sizeof entry->text, "%s", end + strspn(end, " \t"));

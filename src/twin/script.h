@@ -23,8 +23,7 @@ typedef struct {
 /** All of them. */
 typedef struct {
     unsigned count;
-    twin_drives_t kind; /**< which faults the configuration has; set by the caller, and so is ... */
-    bool has_board;     /**< ... whether it has a board of relays on Modbus */
+    fault_machine_t machine; /**< what can fail; set by the caller */
     script_entry_t entry[SCRIPT_MAX];
 } script_t;
 

@@ -31,6 +31,7 @@ void twin_settings_init(twin_settings_t *self, const config_t *config)
     }
     self->start_mm = config->settings.settled_extension_mm_q16 / (double)Q16_ONE;
     self->lag_ms = LAG_MS;
+    self->ambient_c = MOTOR_AMBIENT_C;
 }
 
 static const char *refusal_of_registers(const config_t *config)
@@ -51,17 +52,20 @@ twin_drives_t twin_kind(const config_t *config)
 {
     return config_modbus_is_used(config)             ? TWIN_DRIVES_MODBUS
            : config->drives == CONFIG_DRIVES_CAN_RAW ? TWIN_DRIVES_FRAMES
+           : config->drives == CONFIG_DRIVES_SIM     ? TWIN_DRIVES_NONE
                                                      : TWIN_DRIVES_CIA402;
 }
 
-const char *twin_refusal(const config_t *config)
+const char *twin_refusal(const config_t *config, const lines_t *lines)
 {
     switch (config->drives) {
     case CONFIG_DRIVES_CIA402:
         return NULL;
     case CONFIG_DRIVES_SIM:
-        return "[drives] driver = sim: heaved simulates these drives itself; heave-twin needs driver = cia402, can-raw, "
-               "modbus-tcp or modbus-rtu";
+        return lines->count > 0
+                   ? NULL
+                   : "[drives] driver = sim: heaved simulates these drives itself; heave-twin needs driver = cia402, "
+                     "can-raw, modbus-tcp or modbus-rtu, or GPIO lines";
     case CONFIG_DRIVES_CAN_RAW:
         return refusal_of_frames(config);
     case CONFIG_DRIVES_MODBUS_TCP:
@@ -83,11 +87,12 @@ static void couple(twin_t *self, const config_t *config, const twin_settings_t *
     const double counts = fabs(self->per_unit[k]);
     const bool is_cylinder = k < self->cylinders;
     motor->lag_us = settings->lag_ms * 1000;
+    motor->ambient_c = settings->ambient_c;
     motor->friction = settings->friction_mm * counts;
     motor->load = is_cylinder ? settings->load_mm * self->per_unit[k] : 0;
     motor->rated_speed = counts * (is_cylinder ? config->settings.cylinder_speed_mm_s_q16 / (double)Q16_ONE : ANGLE_RATED_U);
     drive->jump_counts = (uint32_t)fmin(JUMP_U * fabs(expected), 2e9);
-    drive->home = self->zero[k];
+    drive->home = drive->home_other = self->zero[k];
     double start = 0;
     if (is_cylinder) {
         const double stroke = config->settings.stroke_mm_q16[self->leg_of[k]] / (double)Q16_ONE;
@@ -97,6 +102,7 @@ static void couple(twin_t *self, const config_t *config, const twin_settings_t *
         motor->stop_high = fmax(in, out);
         /* it looks for its zero where the configuration has "in": backwards that is the other end */
         drive->home += settings->is_reversed[k] ? stroke * self->per_unit[k] : 0;
+        drive->home_other = self->zero[k] + (settings->is_reversed[k] ? 0 : stroke * self->per_unit[k]);
         start = settings->start_mm;
     }
     motor_start(motor, self->zero[k] + start * self->per_unit[k], 0);
@@ -110,6 +116,7 @@ static void start_modbus(twin_t *self, const config_t *config, const twin_settin
         couple(self, config, settings, &self->modbus.map.axis[k].scale, k);
         drive->motor = &self->node[k].drive.motor;
         drive->motor->now_us = now_us;
+        drive->is_absolute = settings->is_homed;
         drive->home = self->node[k].drive.home;
         drive->usual_speed = drive->motor->rated_speed;
         register_drive_power(drive, true, now_us);
@@ -124,11 +131,31 @@ static void start_frames(twin_t *self, const config_t *config, const twin_settin
         frame_drive_t *drive = &self->frame[k];
         frame_drive_init(drive, &self->frame_map, k, out);
         couple(self, config, settings, &self->frame_map.axis[k].scale, k);
+        drive->all = self->frame;
         drive->motor = &self->node[k].drive.motor;
         drive->motor->now_us = now_us;
+        drive->is_absolute = settings->is_homed;
         drive->home = self->node[k].drive.home;
         drive->usual_speed = drive->motor->rated_speed;
         frame_drive_power(drive, true, now_us);
+    }
+}
+
+/* Axes of one node, in the order that they have there. */
+static void join_axes(twin_t *self, const cia402_config_t *drives)
+{
+    for (unsigned k = 0; k < drives->axes; k++) {
+        node_t *axis[OBJECT_AXES] = {&self->node[k]};
+        unsigned axes = 1;
+        for (unsigned i = 0; i < drives->axes && drives->axis[k].channel == 0; i++) {
+            if (drives->axis[i].node == drives->axis[k].node && drives->axis[i].channel > 0) {
+                axis[drives->axis[i].channel] = &self->node[i];
+                axes++;
+            }
+        }
+        if (drives->axis[k].channel == 0) {
+            node_join(axis, axes);
+        }
     }
 }
 
@@ -142,6 +169,9 @@ void twin_start(twin_t *self, const config_t *config, const twin_settings_t *set
     modbus_side_init(&self->modbus, config);
     if (self->kind == TWIN_DRIVES_MODBUS) {
         start_modbus(self, config, settings, now_us);
+        return;
+    }
+    if (self->kind == TWIN_DRIVES_NONE) {
         return;
     }
     if (self->kind == TWIN_DRIVES_FRAMES) {
@@ -164,9 +194,17 @@ void twin_start(twin_t *self, const config_t *config, const twin_settings_t *set
         node->drive.switch_on_us = SWITCH_ON_US;
         node->drive.brake_us = BRAKE_US;
         node->drive.missed_max = MISSED_MAX;
-        node->drive.is_absolute = axis->homing_method == 0;
+        node->drive.is_absolute = axis->homing_method == 0 || settings->is_homed;
+        node->drive.home_method = (uint8_t)axis->homing_method;
+        node->pdo_step = drives.pdo_step;
+        node->commands = drives.commands;
+        node->answers = drives.answers;
+        node->are_maps_fixed = drives.are_maps_fixed;
         couple(self, config, settings, &axis->scale, k);
-        node_power(node, true, now_us);
+    }
+    join_axes(self, &drives);
+    for (unsigned k = 0; k < self->drives; k++) {
+        node_power(&self->node[k], true, now_us);
     }
 }
 
@@ -200,19 +238,23 @@ void twin_hear(twin_t *self, const can_frame_t *frame, uint64_t now_us)
 void twin_advance(twin_t *self, uint64_t now_us)
 {
     unsigned enabled = 0;
+    if (self->lines != NULL) {
+        lines_advance(self->lines, now_us);
+    }
     for (unsigned k = 0; k < self->drives; k++) {
         enabled += advance_drive(self, k, now_us);
     }
-    if (self->enabled_us == 0 && enabled == self->drives) {
+    if (self->enabled_us == 0 && self->drives > 0 && enabled == self->drives) {
         self->enabled_us = now_us;
     }
 }
 
 uint64_t twin_due_us(const twin_t *self)
 {
-    uint64_t due_us = DRIVE_NEVER;
+    uint64_t due_us = self->lines != NULL ? lines_due_us(self->lines) : DRIVE_NEVER;
     if (self->kind == TWIN_DRIVES_MODBUS) {
-        return self->node[0].drive.motor.now_us + MODBUS_STEP_US;
+        const uint64_t step_us = self->node[0].drive.motor.now_us + MODBUS_STEP_US;
+        return step_us < due_us ? step_us : due_us;
     }
     for (unsigned k = 0; k < self->drives; k++) {
         const uint64_t node_us =
@@ -234,6 +276,9 @@ bool twin_find_pose(twin_t *self, pose_t *out)
         extension_mm_q32[self->leg_of[k]] = (q32_t)(twin_position(self, k) * (double)Q32_ONE);
     }
     pose_t level;
+    if (self->drives == 0) {
+        return false;
+    }
     memset(&level, 0, sizeof level);
     if (kin_forward(&self->kin, extension_mm_q32, &self->pose, out, NULL) != HV_OK &&
         kin_forward(&self->kin, extension_mm_q32, &level, out, NULL) != HV_OK) {

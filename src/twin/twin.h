@@ -9,6 +9,7 @@
 #include "heave/drives.h"
 #include "heave/kin.h"
 #include "twin/frame_drive.h"
+#include "twin/lines.h"
 #include "twin/modbus_side.h"
 #include "twin/node.h"
 
@@ -16,17 +17,20 @@
 typedef enum {
     TWIN_DRIVES_CIA402, /**< CANopen */
     TWIN_DRIVES_FRAMES, /**< CAN, frames of their own */
-    TWIN_DRIVES_MODBUS
+    TWIN_DRIVES_MODBUS,
+    TWIN_DRIVES_NONE /**< heaved simulates the drives itself; heave-twin has only the GPIO lines */
 } twin_drives_t;
 
 /** How the machine was put together. */
 typedef struct {
     uint8_t leg_of[DRIVES_MAX]; /**< leg that each drive moves */
     bool is_reversed[DRIVES_MAX];
-    double lead[DRIVES_MAX];        /**< times the way that the configuration expects */
-    double zero_counts[DRIVES_MAX]; /**< its encoder is so much beside */
+    double lead[DRIVES_MAX];        /**< travel per turn, as factor of that in the configuration */
+    double zero_counts[DRIVES_MAX]; /**< error of the encoder */
     double start_mm;                /**< extension of all legs */
     double lag_ms, friction_mm, load_mm;
+    double ambient_c; /**< temperature round the motors */
+    bool is_homed;    /**< the drives know their zero, like absolute encoders, also if the configuration has homing */
 } twin_settings_t;
 
 /** Faults of the whole bus. */
@@ -44,13 +48,17 @@ typedef enum {
     BUS_PLUG,
     BUS_RELAYS_SILENT,
     BUS_RELAYS_FORGET,
-    BUS_RELAYS_BACK
+    BUS_RELAYS_BACK,
+    BUS_SWITCH, /**< of GPIO lines */
+    BUS_CHIP_GONE,
+    BUS_CHIP_BACK
 } bus_fault_t;
 
 /** Who makes them. act returns false where it cannot, and says why. */
 typedef struct {
     bool (*act)(void *ctx, bus_fault_t fault, uint32_t number, char *why, size_t size);
     void *ctx;
+    bool has_adapter; /**< on a serial line, which can be unplugged */
 } twin_bus_t;
 
 /** The outside. */
@@ -70,6 +78,7 @@ typedef struct {
     bool has_pose;
     uint64_t enabled_us; /**< all had torque for the first time; 0 = not yet */
     twin_bus_t bus;
+    lines_t *lines; /**< of the caller; NULL = there are none */
 } twin_t;
 
 /** Everything as it should be. */
@@ -78,8 +87,8 @@ void twin_settings_init(twin_settings_t *self, const config_t *config);
 /** What the drives of a configuration are on. */
 twin_drives_t twin_kind(const config_t *config);
 
-/** Whether the drives of a configuration can be simulated here. Returns NULL, or why not and what to do. */
-const char *twin_refusal(const config_t *config);
+/** Whether a configuration can be simulated here. Returns NULL, or why not and what to do. */
+const char *twin_refusal(const config_t *config, const lines_t *lines);
 
 /** Switches everything on. */
 void twin_start(twin_t *self, const config_t *config, const twin_settings_t *settings, node_out_t out, uint64_t now_us);

@@ -37,18 +37,18 @@ static bool open_can(wire_t *self, char why[WIRE_WHY_MAX])
     self->fd = socket(AF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
     if (self->fd < 0) {
         const bool is_missing = errno == EAFNOSUPPORT || errno == EPROTONOSUPPORT;
-        (void)snprintf(why, WIRE_WHY_MAX, "%s: %s", self->name, is_missing ? k_without : strerror(errno));
+        (void)snprintf(why, WIRE_WHY_MAX, "%s: %s", self->end, is_missing ? k_without : strerror(errno));
         return false;
     }
-    address.can_ifindex = (int)if_nametoindex(self->name);
+    address.can_ifindex = (int)if_nametoindex(self->end);
     if (address.can_ifindex == 0) {
         (void)snprintf(why, WIRE_WHY_MAX, "%s: there is no such interface. As root: ip link add %s type vcan; ip link set %s up",
-                       self->name, self->name, self->name);
+                       self->end, self->end, self->end);
         return false;
     }
     (void)setsockopt(self->fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
     if (bind(self->fd, (const struct sockaddr *)&address, sizeof address) != 0) {
-        (void)snprintf(why, WIRE_WHY_MAX, "%s: %s", self->name, strerror(errno));
+        (void)snprintf(why, WIRE_WHY_MAX, "%s: %s", self->end, strerror(errno));
         return false;
     }
     return true;
@@ -57,25 +57,36 @@ static bool open_can(wire_t *self, char why[WIRE_WHY_MAX])
 static bool open_local(wire_t *self, char why[WIRE_WHY_MAX])
 {
     struct sockaddr_un address;
-    const socklen_t length = linux_can_local_address(self->name, &address);
+    const socklen_t length = linux_can_local_address(self->end, &address);
     self->fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (self->fd < 0 || bind(self->fd, (const struct sockaddr *)&address, length) != 0 || listen(self->fd, BACKLOG) != 0) {
-        (void)snprintf(why, WIRE_WHY_MAX, "%s: %s", self->name,
+        (void)snprintf(why, WIRE_WHY_MAX, "%s: %s", self->end,
                        errno == EADDRINUSE ? "another heave-twin is this bus already" : strerror(errno));
         return false;
     }
     return true;
 }
 
-bool wire_open(wire_t *self, const char *name, char why[WIRE_WHY_MAX])
+static bool open_adapter(wire_t *self, char why[WIRE_WHY_MAX])
+{
+    return slcan_open(&self->slcan, self->adapter, self->slcan.bitrate_bps, why, WIRE_WHY_MAX);
+}
+
+bool wire_open(wire_t *self, const config_can_t *can, const char *end, const char *adapter, char why[WIRE_WHY_MAX])
 {
     memset(self, 0, sizeof *self);
-    (void)snprintf(self->name, sizeof self->name, "%s", name);
-    self->is_local = linux_can_local_is(name);
+    (void)snprintf(self->name, sizeof self->name, "%s", can->interface);
+    (void)snprintf(self->end, sizeof self->end, "%s", end != NULL ? end : can->interface);
+    self->kind = adapter != NULL ? WIRE_SLCAN : linux_can_local_is(self->end) ? WIRE_LOCAL : WIRE_CAN;
+    self->adapter = adapter;
+    self->slcan = (slcan_t){.end = -1, .terminal = -1, .bitrate_bps = can->bitrate_bps};
+    self->fd = -1;
     for (unsigned i = 0; i < WIRE_CLIENTS_MAX; i++) {
         self->client[i] = -1;
     }
-    const bool is_open = self->is_local ? open_local(self, why) : open_can(self, why);
+    const bool is_open = self->kind == WIRE_SLCAN   ? open_adapter(self, why)
+                         : self->kind == WIRE_LOCAL ? open_local(self, why)
+                                                    : open_can(self, why);
     if (!is_open) {
         wire_close(self);
     }
@@ -95,6 +106,7 @@ void wire_close(wire_t *self)
     for (unsigned i = 0; i < WIRE_CLIENTS_MAX; i++) {
         drop_client(self, i);
     }
+    slcan_close(&self->slcan);
     if (self->fd >= 0) {
         (void)close(self->fd);
     }
@@ -114,7 +126,7 @@ static void put_packet(wire_t *self, unsigned i, const struct can_frame *frame, 
 
 static void put_kernel_frame(wire_t *self, const struct can_frame *frame)
 {
-    if (!self->is_local) {
+    if (self->kind == WIRE_CAN) {
         self->refused += send(self->fd, frame, sizeof *frame, MSG_DONTWAIT) != (ssize_t)sizeof *frame;
         return;
     }
@@ -127,7 +139,9 @@ void wire_put(void *self, const can_frame_t *frame)
 {
     wire_t *wire = self;
     const struct can_frame out = linux_can_frame_to_kernel(frame);
-    if (wire->fd >= 0 && !wire->is_cable_out) {
+    if (wire->kind == WIRE_SLCAN) {
+        slcan_put(&wire->slcan, frame);
+    } else if (wire->fd >= 0 && !wire->is_cable_out) {
         put_kernel_frame(wire, &out);
     }
 }
@@ -135,6 +149,11 @@ void wire_put(void *self, const can_frame_t *frame)
 unsigned wire_watch(const wire_t *self, struct pollfd fds[WIRE_FDS_MAX])
 {
     unsigned count = 0;
+    const slcan_t *slcan = &self->slcan;
+    if (slcan->end >= 0 && (!slcan->is_deaf || slcan->waiting > 0)) {
+        fds[count++] = (struct pollfd){.fd = slcan->end,
+                                       .events = (short)((slcan->is_deaf ? 0 : POLLIN) | (slcan->waiting > 0 ? POLLOUT : 0))};
+    }
     if (self->fd >= 0) {
         fds[count++] = (struct pollfd){.fd = self->fd, .events = POLLIN};
     }
@@ -202,7 +221,11 @@ static void hear_client(wire_t *self, unsigned i, wire_heard_t heard, void *ctx)
 
 bool wire_hear(wire_t *self, wire_heard_t heard, void *ctx)
 {
-    if (!self->is_local) {
+    if (self->kind == WIRE_SLCAN) {
+        slcan_serve(&self->slcan, heard, ctx);
+        return true;
+    }
+    if (self->kind == WIRE_CAN) {
         return self->fd < 0 || hear_can(self, heard, ctx);
     }
     let_in(self);
@@ -273,9 +296,55 @@ static bool can_fault(const wire_t *self, bus_fault_t fault, char *why, size_t s
     return run(line, why, size);
 }
 
+/* What such an adapter tells of its controller: its state with both error counters, or one error of many kinds. */
+static bool adapter_fault(wire_t *self, bus_fault_t fault, uint32_t number, char *why, size_t size)
+{
+    slcan_t *slcan = &self->slcan;
+    switch (fault) {
+    case BUS_OFF:
+        slcan_say(slcan, "sb000256\r");
+        return true;
+    case BUS_PASSIVE:
+        slcan_say(slcan, "sp000128\r");
+        return true;
+    case BUS_ACTIVE:
+        slcan_say(slcan, "sa000000\r");
+        return true;
+    case BUS_STORM:
+        for (uint32_t i = 0; i < number; i++) {
+            slcan_say(slcan, "e1s\r");
+        }
+        return true;
+    case BUS_CABLE_OUT:
+    case BUS_CABLE_IN:
+        slcan->is_deaf = fault == BUS_CABLE_OUT;
+        return true;
+    case BUS_UNPLUG:
+        slcan_close(slcan);
+        return true;
+    case BUS_PLUG:
+        return slcan->end >= 0 || open_adapter(self, why);
+    case BUS_FULL: /* of the kernel's interface, where its user has made one */
+    case BUS_DOWN:
+    case BUS_UP:
+        return can_fault(self, fault, why, size);
+    case BUS_RELAYS_SILENT: /* not of this bus */
+    case BUS_RELAYS_FORGET:
+    case BUS_RELAYS_BACK:
+    case BUS_SWITCH:
+    case BUS_CHIP_GONE:
+    case BUS_CHIP_BACK:
+        break;
+    }
+    return false;
+}
+
 bool wire_fault(void *self, bus_fault_t fault, uint32_t number, char *why, size_t size)
 {
     wire_t *wire = self;
+    if (wire->kind == WIRE_SLCAN) {
+        return adapter_fault(wire, fault, number, why, size);
+    }
     switch (fault) {
     case BUS_OFF:
         report(wire, CAN_ERR_BUSOFF, 0);
@@ -296,12 +365,15 @@ bool wire_fault(void *self, bus_fault_t fault, uint32_t number, char *why, size_
     case BUS_CABLE_IN:
     case BUS_DOWN:
     case BUS_UP:
-        return wire->is_local ? local_fault(wire, fault, why) : can_fault(wire, fault, why, size);
+        return wire->kind == WIRE_LOCAL ? local_fault(wire, fault, why) : can_fault(wire, fault, why, size);
     case BUS_UNPLUG: /* of Modbus: nobody asks this bus for it */
     case BUS_PLUG:
     case BUS_RELAYS_SILENT:
     case BUS_RELAYS_FORGET:
     case BUS_RELAYS_BACK:
+    case BUS_SWITCH: /* of GPIO lines: likewise */
+    case BUS_CHIP_GONE:
+    case BUS_CHIP_BACK:
         break;
     }
     return false;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * wire.h - the bus as the drives' side has it: a CAN interface, or, where the kernel has no CAN, a bus between programs (see
- * linux_can_local.h) that this one is. Never blocks.
+ * wire.h - the bus as the drives' side has it: a CAN interface; where the kernel has no CAN, a bus between programs (see
+ * linux_can_local.h) that this one is; or the far side of a serial adapter. Never blocks.
  */
 #ifndef HEAVE_TWIN_WIRE_H
 #define HEAVE_TWIN_WIRE_H
@@ -8,16 +8,27 @@
 #include <poll.h>
 
 #include "heave/hal/can.h"
+#include "twin/slcan.h"
 #include "twin/twin.h"
 
 #define WIRE_CLIENTS_MAX 4u
 #define WIRE_FDS_MAX     (WIRE_CLIENTS_MAX + 1u)
 #define WIRE_WHY_MAX     240u
 
+/** How programs get to it. */
+typedef enum {
+    WIRE_CAN,   /**< an interface of the kernel */
+    WIRE_LOCAL, /**< a bus between programs */
+    WIRE_SLCAN  /**< an adapter on a serial line, on a pseudo terminal */
+} wire_kind_t;
+
 /** A bus. */
 typedef struct {
-    char name[CONFIG_NAME_MAX];
-    bool is_local;
+    char name[CONFIG_NAME_MAX]; /**< heaved's interface: what is done to the bus is done to it */
+    char end[CONFIG_NAME_MAX];  /**< the interface that the drives are on: the same, or the other end of a pair (vxcan) */
+    wire_kind_t kind;
+    slcan_t slcan; /**< of WIRE_SLCAN */
+    const char *adapter;
     int fd;                       /**< of the interface, or where programs come in; -1 = closed */
     int client[WIRE_CLIENTS_MAX]; /**< programs on a bus between programs; -1 = none */
     bool is_cable_out;            /**< on such a bus: nobody acknowledges */
@@ -28,8 +39,11 @@ typedef struct {
 typedef void (*wire_heard_t)(void *ctx, const can_frame_t *frame);
 
 /** Opens it.
+ *  @param can     heaved's interface, and rate
+ *  @param end     the interface to open in its place, where that is another; NULL = none
+ *  @param adapter path of an adapter on a serial line in place of the interface; NULL = none
  *  @param why what is wrong and what to do, where false is returned */
-bool wire_open(wire_t *self, const char *name, char why[WIRE_WHY_MAX]);
+bool wire_open(wire_t *self, const config_can_t *can, const char *end, const char *adapter, char why[WIRE_WHY_MAX]);
 
 void wire_close(wire_t *self);
 

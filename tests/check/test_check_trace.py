@@ -3,6 +3,8 @@
 """test_check_trace.py - tools/check_trace passes what keeps the limits, up to exactly on them, and finds each single thing that does not."""
 import json
 import math
+import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -466,6 +468,13 @@ def check_program(suite):
     with suite.case("a trace cut off in the middle of a row is a violation"):
         bad.write_text(good.read_text(encoding="ascii")[:-20], encoding="ascii")
         assert run_tool(CONFIG, bad).returncode == 1
+    with suite.case("commands end without a word where nobody reads what they print"):
+        for command in ([TOP / "tools/check_trace", CONFIG, good], [sys.executable, "-m", "heave", "check", CONFIG, good], [sys.executable, "-m", "heave", "--help"], [TOP / "tools/plot", "--help"]):
+            out, into = os.pipe()
+            os.close(out)
+            run = subprocess.run(list(map(str, command)), stdout=into, stderr=subprocess.PIPE, text=True, check=False, env={**os.environ, "PYTHONPATH": str(TOP / "python")})
+            os.close(into)
+            assert run.returncode == -signal.SIGPIPE and run.stderr == "", (command, run)
     with suite.case("exit status 2 where a limit is not stated, and the message names it"):
         CONFIG.write_text(synthetic.ini(cylinders__jerk_mm_s3=None), encoding="utf-8")
         run = run_tool(CONFIG, good)

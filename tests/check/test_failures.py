@@ -27,8 +27,8 @@ def is_there(name, text):
     return f"RUN_TEST({name});" in text if name.startswith("test_") else f'"{stem}"' in text or f'"{name}"' in text or f': {name}"' in text
 
 
-# Rows of which a bus, or a drive or a board on it, is the cause.
-OF_BUS = re.compile(r"\b(Modbus|CAN|bus|drives?|EMCY|TPDOs|ENOBUFS|acknowledges|slcan|axis|heartbeat|error-passive|controller|queue)\b")
+# Rows of which a bus, a drive or a board on it, or a GPIO line is the cause.
+OF_BUS = re.compile(r"\b(Modbus|CAN|bus|drives?|EMCY|TPDOs|ENOBUFS|acknowledges|slcan|axis|heartbeat|error-passive|controller|queue)\b|GPIO|^one channel of the e-stop|^the chip of|^contacts|^the supply fails, or|^the enable key")
 NOT_OF_BUS = re.compile(r"^(a flood of valid frames|anything that is not|SIGTERM while|a bus over its budget|more datagrams)|sender")
 
 
@@ -56,7 +56,7 @@ def main():
     with suite.case("docs/failures.md: every row names a test or says that there is none"):
         bad = [row for row in rows() if len(row) != 4 or ("`" in row[3]) == ("not yet" in row[3])]
         assert not bad, bad
-    with suite.case("docs/twin.md: every row that concerns a bus is played by a line, or says why not"):
+    with suite.case("docs/twin.md: every row that concerns a bus or a GPIO line is played by a line, or says why not"):
         wrong = wrong_twin_rows(rows(), twin_rows())
         assert not wrong, "\n".join(wrong)
         assert sum(len(row) == 3 and row[1].startswith("`") for row in twin_rows()) > 30

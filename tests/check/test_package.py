@@ -20,7 +20,7 @@ TOP = Path(__file__).resolve().parents[2]
 QUICK = ["-DCMAKE_BUILD_TYPE=None"]  # no optimisation
 CONFIG = "etc/heave/demo.ini"
 SOURCES = ("CHANGELOG.md", "CMakeLists.txt", "CMakePresets.json", "CONTRIBUTING.md", "LICENSE", "README.md", "README.zh-CN.md", "cmake", "config", "docs", "examples",
-           "hal", "include", "packaging", "python", "src", "tools")
+           "hal", "include", "packaging", "panel", "po", "python", "src", "tools")
 
 
 def run(*command, **more):
@@ -35,14 +35,19 @@ def checked(*command, **more):
     return text
 
 
+PANEL = subprocess.run(["pkg-config", "--exists", "libwebsockets"], check=False).returncode == 0
+
+
 def pack(source, build):
-    """Both packages: that of the programs, that for Python; quickly made: without SOURCE_DATE_EPOCH and ccache, whose answers would be the same anyway."""
+    """The packages: that of the programs, that for Python, that of the panel; quickly made: without SOURCE_DATE_EPOCH and ccache, whose answers would be the same anyway."""
     environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"} | {"CCACHE_DISABLE": "1"}
-    checked("cmake", "--preset", "package", "-B", build, *QUICK, cwd=source, env=environment)
+    checked("cmake", "--preset", "package", "-B", build, *QUICK, f"-DHEAVE_PANEL={'ON' if PANEL else 'OFF'}", cwd=source, env=environment)
     checked("cmake", "--build", build, env=environment)
     checked("cpack", "--config", build / "CPackConfig.cmake", "-B", build, env=environment)
     checked("cpack", "--config", build / "CPackPython.cmake", "-B", build, env=environment)
-    return next(build.glob("heave_*.deb")), next(build.glob("python3-heave_*.deb"))
+    if PANEL:
+        checked("cpack", "--config", build / "CPackPanel.cmake", "-B", build, env=environment)
+    return tuple(next(build.glob(f"{name}_*.deb")) for name in ("heave", "python3-heave", *(("heave-panel",) if PANEL else ())))
 
 
 def copy_sources(folder):
@@ -202,6 +207,36 @@ def python_goes(machine, deb):
     assert not left, f"left behind: {left}"
 
 
+def fields(deb):
+    return dict(line.split(": ", 1) for line in checked("dpkg-deb", "-f", deb).splitlines() if re.match(r"[\w-]+: ", line))
+
+
+def panel_is_apart(deb, panel_deb, machine):
+    if panel_deb is None:
+        raise tap.Skip("libwebsockets-dev is not there")
+    assert not re.search("websockets|node|crypt", fields(deb)["Depends"]) and not re.search(r"heave-panel|share/heave/panel", checked("dpkg-deb", "-c", deb)), fields(deb)["Depends"]
+    assert re.search(r"\blibwebsockets\d+", fields(panel_deb)["Depends"]) and re.search(r"\bheave \(>=", fields(panel_deb)["Depends"]) and "node" not in fields(panel_deb)["Depends"], fields(panel_deb)
+    accepted_by_lintian(panel_deb)
+    if os.geteuid() != 0:
+        raise tap.Skip("dpkg takes root")
+    machine.dpkg("-i", deb, panel_deb)
+    code, text = machine.program("heave-panel", "--version")
+    assert code == 0 and re.fullmatch(r"heave-panel \d+\.\d+\.\d+\n", text), text
+    pages = machine.folder / "usr/share/heave/panel"
+    assert {path.name for path in pages.iterdir()} == {"scene.js"} | {path.name for path in (TOP / "panel").iterdir() if path.is_file()}, sorted(pages.iterdir())
+    unit = (machine.folder / "usr/lib/systemd/system/heave-panel.service").read_text(encoding="utf-8")
+    assert "ExecStart=/usr/bin/heave-panel\n" in unit and "DynamicUser=yes" in unit and (machine.folder / "usr/share/man/man8/heave-panel.8.gz").exists()
+    passwords = machine.folder / "var/lib/private/heave-panel/passwords"
+    passwords.parent.mkdir(parents=True)
+    passwords.write_text("service:$y$\n", encoding="ascii")
+    machine.dpkg("-r", "heave-panel")
+    assert passwords.exists() and not pages.exists() and (machine.folder / "usr/bin/heaved").exists()
+    machine.dpkg("--purge", "heave-panel")
+    assert not passwords.parent.exists()
+    left = [path for path in machine.folder.rglob("*heave-panel*") if "dpkg" not in path.parts]
+    assert not left, left
+
+
 def accepted_by_lintian(deb):
     if shutil.which("lintian") is None:
         raise tap.Skip("lintian is not there")
@@ -223,11 +258,12 @@ def in_a_system(system, folder):
 
 def quickly(folder):
     suite = tap.Suite()
-    deb = python_deb = None
+    deb = python_deb = panel_deb = None
     with suite.case("has the same bytes when its sources are copied and built in another folder, later"):
         copy_sources(folder / "copy")
-        (deb, python_deb), others = pack(TOP, folder / "one"), pack(folder / "copy", folder / "elsewhere/two")
-        for one, other in zip((deb, python_deb), others):
+        ours, others = pack(TOP, folder / "one"), pack(folder / "copy", folder / "elsewhere/two")
+        deb, python_deb, panel_deb = (*ours, None)[:3]
+        for one, other in zip(ours, others):
             assert one.read_bytes() == other.read_bytes(), f"{one.name}: {one.stat().st_size} and {other.stat().st_size} bytes"
     with suite.case("lintian finds nothing to say"):
         accepted_by_lintian(deb)
@@ -237,6 +273,8 @@ def quickly(folder):
         python_works(python_deb, folder / "python")
     with suite.case("the Python package is removed: nothing of it is left"):
         python_goes(EmptyRoot(folder / "python-root"), python_deb)
+    with suite.case("heaved alone needs no library of the panel, and the panel is whole"):
+        panel_is_apart(deb, panel_deb, EmptyRoot(folder / "panel-root"))
     with suite.case("is refused where the units would name programs that are not there"):
         (folder / "local").mkdir()
         text = (folder / "one/CPackConfig.cmake").read_text(encoding="utf-8").replace('CPACK_HEAVE_PREFIX "/usr"', 'CPACK_HEAVE_PREFIX "/usr/local"')

@@ -27,7 +27,7 @@ FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.M | re.S)
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
 STATES = re.compile(r"<!-- states:begin -->.*?<!-- states:end -->", re.S)
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]*))?\)")
-NOT_OURS = {"cmake", "export", "printf", "cp", "nano", "sleep", "sudo", "gpiodetect", "gpioinfo"}
+NOT_OURS = {".", "cmake", "export", "printf", "cp", "nano", "sleep", "sudo", "pip", "python3", "gpiodetect", "gpioinfo"}
 OTHER_OPTIONS = {"--build", "--install", "--now", "--component", "--prefix"}  # of cmake, systemctl
 NUMBER = re.compile(r"-?\d+")
 OWN_STROKE_MM, OWN_POSE = 260, (5, 6, 0, 5.5, 3, 20)
@@ -150,8 +150,9 @@ class Manual:
         assert size <= README_BYTES, f"{size} bytes: what is more than two screens goes to docs/"
 
     def states(self):
-        result = run(sys.executable, TOP / "tools/gen_states.py", "--check", self.of("operation"))
-        assert result.returncode == 0, result.stdout + result.stderr
+        for path in (self.of("operation"), TOP / "panel/states.js"):
+            result = run(sys.executable, TOP / "tools/gen_states.py", "--check", path)
+            assert result.returncode == 0, result.stdout + result.stderr
 
     def the_two_commands(self):
         assert "tools/demo\ntools/test\n" in blocks(self.readme, "sh")
@@ -301,7 +302,7 @@ def recipes():
     told = re.findall(r"^### (Add .*)$", text, re.M)
     assert sorted(told) == sorted(examples), told
     places = [path for folder in ("include", "src", "hal/sim", "tests/unit", "tests/contract") for path in sorted((TOP / folder).rglob("*.[ch]"))]
-    places += [DOCS / "configuration.md", DOCS / "faults.md"]
+    places += [DOCS / "configuration.md", DOCS / "faults.md", TOP / "python/heave/faults.py"]
     texts = {str(path.relative_to(TOP)): path.read_text(encoding="utf-8") for path in places}
     for title, patterns in examples.items():
         part = re.search(rf"^### {title}$.*?(?=^##|\Z)", text, re.M | re.S)[0]

@@ -91,6 +91,20 @@ def main():
             run = analyze("security", "--offline=true", f"--threshold={EXPOSURE_MAX}", unit)
             assert run.returncode == 0, run.stdout[-400:]
             assert re.search(r"(?m)^CapabilityBoundingSet=$", text) and "NoNewPrivileges=yes" in text
+        with suite.case("systemd takes the unit of the panel without a word; it is exposed by as little, and has no capability and no device"):
+            source = build / "packaging/heave-panel.service"
+            if not source.exists():
+                raise tap.Skip("built without the panel")
+            panel = folder / source.name
+            panel_text = source.read_text(encoding="utf-8")
+            panel.write_text(re.sub(r"(?m)^ExecStart=\S+", "ExecStart=/bin/true", panel_text), encoding="utf-8")
+            run = analyze("verify", panel)
+            assert run.returncode == 0 and run.stdout.strip() == "", run.stdout
+            run = analyze("security", "--offline=true", f"--threshold={EXPOSURE_MAX}", panel)
+            assert run.returncode == 0, run.stdout[-400:]
+            for line in ("CapabilityBoundingSet=", "PrivateDevices=yes", "DynamicUser=yes", "NoNewPrivileges=yes", "UMask=0077", "IPAddressDeny=any"):
+                assert re.search(rf"(?m)^{line}$", panel_text), f"{line} is missing"
+            assert "heave-panel" in " ".join(files) and not re.search(r"(?m)^Requires=|^BindsTo=|^PartOf=", panel_text), "it goes with no platform"
         with suite.case(f"what sets up and flushes a CAN interface is exposed by {HELPER_EXPOSURE_MAX / 10} of 10 at most"):
             for helper in can_units[:2]:
                 run = analyze("security", "--offline=true", f"--threshold={HELPER_EXPOSURE_MAX}", helper)
@@ -117,7 +131,7 @@ def main():
             groups = re.findall(r"(?m)^g (\S+) -$", (PACKAGING / "heave.sysusers").read_text(encoding="ascii"))
             assert groups == ["heave", "heave-can"], "the group that the unit runs with, and the one that may have a bus flushed"
             assert re.search(r"(?m)^SupplementaryGroups=heave-can$", text) and "install -d -m 1770 -g heave-can /run/heave-can" in text
-            assert re.search(r"(?m)^IPAddressDeny=any$", text) and re.search(r"(?m)^IPAddressAllow=localhost ", text) and "UMask=0077" in text
+            assert re.search(r"(?m)^IPAddressDeny=any$", text) and re.search(r"(?m)^IPAddressAllow=localhost ", text) and re.search(r"(?m)^UMask=0027$", text)
         with suite.case("what a platform has beside its configuration is its own: it may run beside others"):
             for line in ("RuntimeDirectory=heave/%i", "StateDirectory=heave/%i"):
                 assert re.search(rf"(?m)^{line}$", text), f"{line} is missing"

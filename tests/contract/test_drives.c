@@ -105,7 +105,7 @@ static void settle_canraw(uint64_t until_us)
 /* On the bus, and long enough for the drives to say that they are homed. */
 static void start_canraw(drives_t *drives, bool is_rich)
 {
-    hal_can_filter_t filter[DRIVES_MAX];
+    hal_can_filter_t filter[CANRAW_FILTERS_MAX];
     sim_can_bus_init(&canraw_bus, 0, NULL, 0);
     canraw_slave_open(&canraw_slave, &canraw_bus, is_rich);
     canraw_map = is_rich ? canraw_maps_rich() : canraw_maps_plain();
@@ -713,6 +713,64 @@ static void test_request_one_home_leaves_the_others_holding(void)
 }
 
 /* What a person compares with the way a spindle was turned. */
+/* Cycles with set-points that move, until the access has ended. */
+static drive_object_state_t await_object(drive_object_t *object, uint32_t *code)
+{
+    drive_object_state_t state = drives_object_end(hal, object, code);
+    for (int i = 0; i < 2000 && state == DRIVE_OBJECT_BUSY; i++) {
+        for (uint8_t k = 0; k < AXES; k++) {
+            setpoint_q32[k] += MM(i % 200 < 100 ? 1 : -1) / 40;
+        }
+        cycle();
+        state = drives_object_end(hal, object, code);
+    }
+    return state;
+}
+
+static void test_object_is_read_beside_the_motion_or_not_supported(void)
+{
+    drive_object_t object = {.index = 0x1000};
+    uint32_t code = 0;
+    TEST_ASSERT_EQUAL(DRIVE_OBJECT_NONE, drives_object_end(hal, &object, &code));
+    enable();
+    const hv_status_t status = drives_object_begin(hal, 3, &object);
+    if (hal.ops->object_begin == NULL) {
+        TEST_ASSERT_EQUAL(HV_ERR_NOSUP, status);
+        TEST_ASSERT_EQUAL(DRIVE_OBJECT_NONE, drives_object_end(hal, &object, &code));
+        return;
+    }
+    TEST_ASSERT_EQUAL(HV_OK, status);
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, drives_object_begin(hal, 2, &object));
+    TEST_ASSERT_EQUAL(DRIVE_OBJECT_DONE, await_object(&object, &code));
+    TEST_ASSERT_EQUAL_UINT8(4, object.size);
+    TEST_ASSERT_EQUAL_UINT8(0x92, object.value[0]); /* 402 */
+    object.index = 0x5FFF;
+    TEST_ASSERT_EQUAL(HV_OK, drives_object_begin(hal, 6, &object));
+    TEST_ASSERT_EQUAL(DRIVE_OBJECT_REFUSED, await_object(&object, &code));
+    TEST_ASSERT_EQUAL_HEX32(0x06020000, code);
+    assert_all(DRIVE_ENABLED);
+}
+
+static void test_object_that_cannot_be_written_is_refused_at_once(void)
+{
+    drive_object_t object = {.index = 0x2000, .is_write = true};
+    if (hal.ops->object_begin == NULL) {
+        TEST_ASSERT_EQUAL(HV_ERR_NOSUP, drives_object_begin(hal, 0, &object));
+        return;
+    }
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, drives_object_begin(hal, 0, &object));
+    object.size = DRIVE_OBJECT_BYTES + 1u;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, drives_object_begin(hal, 0, &object));
+    object = (drive_object_t){.index = 0x6040, .is_write = true, .size = 2};
+    TEST_ASSERT_EQUAL(HV_ERR_ARG, drives_object_begin(hal, 0, &object));
+    fixture->set_power(4, false);
+    for (int i = 0; i < 400; i++) {
+        cycle();
+    }
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_object_begin(hal, 4, &(drive_object_t){.index = 0x1000}));
+    TEST_ASSERT_EQUAL(HV_OK, drives_object_begin(hal, 5, &(drive_object_t){.index = 0x1000}));
+}
+
 static void test_counts_go_with_the_position(void)
 {
     int64_t before = 0;
@@ -794,6 +852,8 @@ static void run_contract(void)
     RUN_TEST(test_request_home_needs_enabled_and_returns_there_homed);
     RUN_TEST(test_request_one_changes_that_axis_and_no_other);
     RUN_TEST(test_request_one_home_leaves_the_others_holding);
+    RUN_TEST(test_object_is_read_beside_the_motion_or_not_supported);
+    RUN_TEST(test_object_that_cannot_be_written_is_refused_at_once);
     RUN_TEST(test_counts_go_with_the_position);
     RUN_TEST(test_power_lost_is_offline_and_returns_disabled);
     RUN_TEST(test_power_lost_everywhere_says_io_and_comes_back);

@@ -21,10 +21,11 @@ INDIRECT = {
 OPTIONAL = {"ask_state", "counts", "read_back", "request_one", "waited"}  # of the contracts: a backend may leave them out, and then nothing is called
 # Calls of a parameter or of a table's entry: a pattern that finds everything the file puts there.
 NAMED = {
+    ("src/canopen/cia402_node.c", "is_such"): r"\bare\(drive, (\w+)\)",
     ("src/canopen/cia402_stage.c", "is_there"): r"\b(?:are_all|fail_where)\(self, (\w+)",
     ("src/canopen/cia402_watch.c", "is_seen"): r"\[CIA402_WATCH_\w+\]\s*=\s*\{(\w+)",
     ("src/record/player.c", "refused"): None,  # NULL in the firmware
-    ("src/protocol/frame.c", "k_take"): r"\[PHASE_\w+\]\s*=\s*(take_\w+)",
+    ("src/protocol/frame.c", "k_take"): r"\[FRAME_PHASE_\w+\]\s*=\s*(take_\w+)",
 }
 UNLISTED = "a call through a pointer that tests/cortex/stack_bound.py does not list: "
 SUFFIX = re.compile(r"\.(constprop|isra|part|cold|lto_priv)\.\d+|\.(cold|isra|part|constprop)\b")

@@ -151,6 +151,9 @@ static void configure(void)
                                  .window_ms = 20,
                                  .abort_option = 1,
                                  .is_reset_wanted = true,
+                                 .is_support_checked = true,
+                                 .telemetry = DRIVE_TELLS_TORQUE | DRIVE_TELLS_LAG | DRIVE_TELLS_INPUTS,
+                                 .telemetry_every = 2,
                                  .reaction = {CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_TELL, CIA402_TELL}};
     for (uint8_t k = 0; k < DRIVES_MAX; k++) {
         m_config.axis[k] = (cia402_axis_config_t){.node = (uint8_t)(k + 1),
@@ -194,11 +197,11 @@ static can_frame_t frame_of(const record_t *record, uint32_t function)
 /* Something that a node might send. */
 static can_frame_t any_frame(const record_t *record)
 {
-    static const uint32_t k_functions[] = {0x080, 0x180, 0x580, 0x700};
-    static const uint8_t k_length[] = {8, 7, 8, 1};
-    can_frame_t frame = frame_of(record, k_functions[record->kind % 4]);
+    static const uint32_t k_functions[] = {0x080, 0x180, 0x580, 0x700, 0x280, 0x380};
+    static const uint8_t k_length[] = {8, 7, 8, 1, 6, 4};
+    can_frame_t frame = frame_of(record, k_functions[record->kind % 6]);
     if ((record->kind & 0x80) == 0) { /* as long as it should be */
-        frame.length = k_length[record->kind % 4];
+        frame.length = k_length[record->kind % 6];
         memcpy(frame.data, record->data, frame.length);
     }
     return frame;
@@ -231,7 +234,7 @@ static can_frame_t strange_frame(const record_t *record)
         frame.id = (frame.id & FUNCTION) + DRIVES_MAX + 1u + record->kind % 64;
         break;
     case 3: /* a function that is not a drive's */
-        frame.id = 0x280u + (record->kind % 4) * 0x80u + record->drive + 1u;
+        frame.id = 0x400u + (record->kind % 3) * 0x80u + record->drive + 1u;
         break;
     case 4: /* an SDO answer that is too short */
         frame = frame_of(record, 0x580);

@@ -7,6 +7,7 @@
 """
 import base64
 import contextlib
+import itertools
 import json
 import os
 import shutil
@@ -19,7 +20,8 @@ import time
 import urllib.request
 from pathlib import Path
 
-WAIT_S = 20
+WAIT_S = 60  # for what comes as soon as the machine has time
+NUMBERS = itertools.count(1)
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 
 
@@ -28,9 +30,11 @@ class Refused(Exception):
 
 
 class WebSocket:
-    def __init__(self, host, port, path, protocol=None, origin=None, host_header=None, cookie=None, timeout=WAIT_S):
+    def __init__(self, host, port, path, protocol=None, origin=None, host_header=None, cookie=None, timeout=WAIT_S, context=None):
         self.blocks, self.waiting = [], b""
         self.socket = socket.create_connection((host, port), timeout=timeout)
+        if context is not None:
+            self.socket = context.wrap_socket(self.socket, server_hostname=host)
         name = host_header or f"{host}:{port}"
         rows = [f"GET {path} HTTP/1.1", f"Host: {name}", "Upgrade: websocket", "Connection: Upgrade", f"Sec-WebSocket-Key: {base64.b64encode(os.urandom(16)).decode()}",
                 "Sec-WebSocket-Version: 13"]
@@ -103,10 +107,10 @@ class WebSocket:
                 return message
         raise TimeoutError("no such message")
 
-    def ask(self, message, number=[0]):  # noqa: B006  one count for all
-        number[0] += 1
-        self.send({"id": number[0], **message})
-        return self.receive(lambda answer: answer.get("id") == number[0])
+    def ask(self, message):
+        number = next(NUMBERS)  # one count for all: several threads may ask, each for its own answer
+        self.send({"id": number, **message})
+        return self.receive(lambda answer: answer.get("id") == number)
 
 
 def browser():
@@ -117,10 +121,10 @@ def browser():
 class Page:
     """A page in a browser of its own."""
 
-    def __init__(self, url, width=390, height=844, language="en"):
+    def __init__(self, url, width=390, height=844, language="en", more=()):
         self.folder = tempfile.TemporaryDirectory(prefix="heave-browser-")
-        self.process = subprocess.Popen([browser(), "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--remote-debugging-port=0", "--remote-allow-origins=*",
-                                         f"--lang={language}", f"--user-data-dir={self.folder.name}", f"--window-size={width},{height}", url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        self.process = subprocess.Popen([browser(), "--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--no-first-run", "--remote-debugging-port=0", "--remote-allow-origins=*",
+                                         f"--lang={language}", f"--user-data-dir={self.folder.name}", f"--window-size={width},{height}", *more, url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                                         start_new_session=True)
         port_file = Path(self.folder.name) / "DevToolsActivePort"
         end = time.monotonic() + 60

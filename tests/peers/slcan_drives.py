@@ -2,7 +2,7 @@
 """slcan_drives.py LOG POSITION... - an adapter on a serial line (slcan) and the drives of raw_drive.py on its other side; takes root.
 
 The serial line is a pseudo terminal, so that all that an adapter does can be done to it: stop this process, and nobody takes frames any more;
-end it, and the adapter has been unplugged. LOG as that of raw_drives.py. Prints the name of the interface when it is up; ends when its
+end it, and the adapter has been unplugged. LOG gets a line per frame that they hear: `<time_us> <id> <bytes>`, and before the first of a drive `start <id> <counts>`. Prints the name of the interface when it is up; ends when its
 standard input does.
 """
 import fcntl

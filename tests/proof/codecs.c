@@ -84,11 +84,14 @@ void proof_canraw(void)
     canraw_field_t *field = &frame.field[0];
     canraw_frame_t other = {.length = (uint8_t)ANY_OF(0, 8), .constant = ANY_U8()};
     field->value = (canraw_value_t)ANY_OF(0, CANRAW_VALUES - 1);
-    field->bytes = (uint8_t)ANY_OF(1, 4);
+    field->bits = (uint8_t)ANY_OF(1, 32);
+    field->skip = (uint8_t)ANY_OF(0, 7);
     field->is_signed = ANY_BOOL();
     field->is_big_endian = ANY_BOOL();
-    //@ split field->bytes;
-    field->at = (uint8_t)ANY_OF(0, (int64_t)CANRAW_BYTES_MAX - field->bytes);
+    field->divisor = ANY_BOOL() ? (uint32_t)ANY_OF(1, CANRAW_DIVISOR_MAX) : 0;
+    //@ split field->bits;
+    //@ split field->skip;
+    field->at = (uint8_t)ANY_OF(0, (int64_t)CANRAW_BYTES_MAX - canraw_field_span(field));
     ANY_BYTES(frame.data);
     ANY_BYTES(other.data);
     ANY_BYTES(out);

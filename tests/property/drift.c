@@ -177,6 +177,7 @@ static void essence(motion_t *motion)
     }
     curve->head = curve->watched = 0;
     curve->ahead = curve->patience = 0;
+    curve->fitted = 0;
     curve->period_cycles_q16 = curve->grip_q32 = curve->softest_q32 = 0;
     curve->reach_min_q16 = curve->reach_max_q16 = 0;
     governor_t *governor =

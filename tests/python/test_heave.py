@@ -23,6 +23,7 @@ import heave
 from heave import judge, recording
 from heave.configuration import ConfigError, Configuration, changed
 from heave.plot import animation
+from heave.plot.feedback import Feedback
 from heave.plot.window import Window
 from heave.trace import HEADER
 
@@ -384,6 +385,9 @@ def limits_used_are_shares():
     frequencies, density = spectrum_of(run.window, "roll")
     peak = frequencies[density.argmax()]
     assert abs(peak - 100 / 16 / 2 / math.pi) < 0.3, peak
+    no_pose = heave.play(heave.demo_config(), [(2000, "@C6:100,100,100,100,100,100#")])
+    shares = shares_of(no_pose.window, Configuration(heave.demo_config()))
+    assert shares["roll"] == [None] * 4 and shares["c1"][1] > 0, "cylinder by cylinder no limit of a pose axis applies"
 
 
 def frequency_responses_are_read():
@@ -406,18 +410,85 @@ def frequency_responses_are_read():
     assert run.returncode == 0 and picture.count("<path") > 20, run.stderr
 
 
+def labels_of_requests_do_not_cover_each_other():
+    from heave.plot.window import labels_of
+    assert labels_of([], 100) == [] and labels_of([(0, "!hold"), (100, "!resume")], 100) == [(0, "!hold"), (100, "!resume")]
+    assert labels_of([(0, "!hold"), (60, "!resume"), (99, "!park"), (160, "!drive 3 fault 00008611")], 100) == [(0, "!hold +2"), (160, "!drive 3 faul…")]
+
+
 def feedback_of_an_incident_is_read():
-    from heave.plot.feedback import Feedback
     from heave.plot.window import TraceError
     head = "t_ms,c1_state,c1_actual_mm,c1_code,c1_error,c2_state,c2_actual_mm,c2_code,c2_error,fault"
     text = f"{head}\n1,enabled,10.5,0,0,enabled,11,0,0,\n2,enabled,10.6,0,0,offline,11,0,0,drive-offline\n3,fault,10.6,7,0,offline,11,0,0,drive-offline\n"
     feedback = Feedback(text.splitlines())
     assert feedback.actual == {"c1": [10.5, 10.6, 10.6], "c2": [11, None, None]} and feedback.times_us == [1000, 2000, 3000], feedback.actual
-    assert feedback.fault == (2000, "drive-offline")
+    assert feedback.faults == [(2000, "2 drive-offline")]
     assert Feedback(text.splitlines(), 2000, 2000).times_us == [2000]
+    before_zero = f"{head}\n1,disabled,5,0,0,disabled,5,0,0,drive-offline\n2,enabled,5,0,0,enabled,5,0,0,\n1,enabled,7,0,0,enabled,8,0,0,\n"
+    feedback = Feedback(before_zero.splitlines())
+    assert (feedback.times_us, feedback.actual, feedback.faults) == ([1000], {"c1": [7], "c2": [8]}, []), "what was before time zero is drawn over what came after"
     for wrong, words in (("a,b", "line 1 is not the header"), (f"{head}\n1,enabled,x,0,0,enabled,11,0,0,", "line 2 is no row"), (f"{head}\n1,enabled", "line 2 is no row"), ("", "line 1")):
         with refused(TraceError, "feedback.csv", words):
             Feedback(wrong.splitlines())
+
+
+def faults_are_marked_with_number_and_name():
+    """In curves and animations: those of an incident, one after another, and those that FRAMES bring."""
+    from heave.faults import NAMES, fault_text
+    told = re.findall(r"(?m)^\| (\d+) \| `([a-z-]+)` \|", (Path(__file__).resolve().parents[2] / "docs/faults.md").read_text(encoding="utf-8"))
+    assert {(int(number), name) for number, name in told} == set(enumerate(NAMES[1:], 1)), "faults.py is another table than that of heaved"
+    assert [fault_text(6), fault_text("6", "3"), fault_text("bus-lost"), fault_text("fire", 2), fault_text(99)] == ["6 following-error", "6 following-error, axis 3", "5 bus-lost", "fire, axis 2", "99"]
+    head = "t_ms,c1_state,c1_actual_mm,c1_code,c1_error,fault"
+    rows = ["1,enabled,1,0,0,", "2,fault,1,7,0,drive-fault", "3,fault,1,7,0,drive-fault", "4,enabled,1,0,0,", "5,offline,1,0,0,drive-offline"]
+    assert Feedback([head, *rows]).faults == [(2000, "1 drive-fault"), (5000, "2 drive-offline")]
+    assert Feedback([head, rows[1], *rows[:2]]).faults == [(2000, "1 drive-fault")], "what was before time zero"
+    run = heave.play(heave.demo_config(), [(3000, "!fault following-error 3"), (6000, "!end")])
+    trace, frames = write("faulty.csv", run.text), write("faulty.frames", "3000 !fault following-error 3\n3500 !hold\n")
+    states = animation.told_states(Window(run.text.splitlines(keepends=True)), [(3_000_000, "6 following-error, axis 3")])
+    assert states[-1] == "FAULT 6 following-error, axis 3" and "FAULT" not in states[0], (states[0], states[-1])
+    page = trace.with_suffix(".html")
+    assert command_run("plot", str(trace), "--config", str(heave.demo_config()), "--frames", str(frames), "-o", str(page)).returncode == 0 and states[-1] in page.read_text(encoding="utf-8")
+    ran = command_run("plot", str(trace), "--frames", str(frames), "-o", str(trace.with_suffix(".svg")))
+    if "needs matplotlib" not in ran.stderr:
+        drawn = trace.with_suffix(".svg").read_text(encoding="utf-8")
+        assert "<!-- 6 following-error, axis 3 -->" in drawn and "!hold" in drawn and "!fault" not in drawn, ran.stderr
+
+
+def samples_are_drawn_as_the_trace_of_the_same_ride():
+    from heave.plot.sampled import Sampled, is_sampled
+    from heave.plot.window import TraceError
+    with heave.Heaved() as heaved:
+        heaved.platform.wait_for("ENGAGED", timeout=WAIT_S)
+        command = [Path(os.environ["HEAVE_BIN"]) / "heavectl", "--socket", heaved.socket, "--for", "2", "scope"]
+        with subprocess.Popen(list(map(str, command)), stdout=subprocess.PIPE, text=True) as scope:
+            heaved.sender.a6(z=20, roll=3, time_ms=1000)
+            text = scope.communicate(timeout=WAIT_S)[0]
+        assert heaved.stop() == 0
+        trace = Window(heaved.trace.read_text(encoding="ascii").splitlines(keepends=True))
+    lines = text.splitlines(keepends=True)
+    assert is_sampled(lines[0]) and not is_sampled(HEADER) and not is_sampled("frequency_hz,gain,phase_deg")
+    samples = Sampled(lines)
+    window = Window(samples.trace)
+    feedback = Feedback(samples.feedback)
+    assert len(window.rows) > 500 and max(window.column("z")) > 15e9, len(window.rows)
+    rows = {tuple(round(value / 10) for value in row): state for row, state in zip(trace.rows, trace.states)}  # the last of nine decimals is rounded
+    found = [rows.get(tuple(round(value / 10) for value in row)) for row in window.rows]
+    assert sum(state == own for state, own in zip(found, window.states)) > 0.99 * len(found), "other rows than those of the trace"
+    assert abs(feedback.actual["z"][-1] - 20) < 0.1 and abs(feedback.actual["c1"][-1] - window.column("c1")[-1] / 1e9) < 0.1, feedback.actual["z"][-1]
+    names = lines[0].rstrip().split(",")
+    few = ["t_ms", "sent_z_mm", "actual_z_mm", "fault_axis", "fault"]
+    chosen = [",".join(line.rstrip().split(",")[names.index(name)] for name in few) + "\n" for line in lines]
+    chosen[-1] = chosen[-1].rsplit(",", 2)[0] + ",2,4\n"
+    some = Sampled(chosen)
+    assert Window(some.trace).column("z") == window.column("z") and set(Window(some.trace).states) == {"ENGAGED"} and Feedback(some.feedback).faults[0][1] == "4 drive-timeout, axis 2"
+    for wrong, words in ((["t_ms,actual_z_mm\n", "1,2\n"], "sent_"), (["t_ms,sent_z_mm\n", "1,2\n", "1\n"], "line 3 is no row"), (["t_ms,state,sent_z_mm\n", "1,99,2\n"], "line 2 is no row")):
+        with refused(TraceError, "ride.csv", words):
+            Sampled(wrong, "ride.csv")
+    page = Path(FOLDER.name) / "samples.html"
+    run = command_run("plot", str(write("samples.csv", text)), "--config", str(heave.demo_config()), "-o", str(page))
+    assert run.returncode == 0 and "<script>" in page.read_text(encoding="utf-8"), run.stderr
+    run = command_run("plot", str(write("samples.csv", text)), "-o", str(page.with_suffix(".svg")))
+    assert "needs matplotlib" in run.stderr or run.returncode == 0 and page.with_suffix(".svg").read_text(encoding="utf-8").count("<path") > 20, run.stderr
 
 
 def command_run(*words):
@@ -442,7 +513,8 @@ def main():
     for case in (frames_are_as_the_protocol_has_them, wrong_values_are_named, csv_becomes_frames, wrong_recordings_are_named_with_their_line, a_stream_does_not_drift, a_stream_makes_up_for_nothing,
                  a_stream_of_values_ends_with_them, a_recording_keeps_its_times, requests_say_who_asks, refusals_are_in_heaveds_words, waiting_ends_where_it_is_in_vain, nobody_there_is_said,
                  a_heaved_of_ones_own, a_recording_is_sent_to_it, a_heaved_that_cannot_start_says_why, configurations_are_changed, offline_runs_are_arrays, offline_runs_that_fail_say_why,
-                 the_judge_finds_what_is_wrong, what_a_configuration_leaves_out_is_filled_in, lag_and_gain_are_found, the_animation_is_one_page, limits_used_are_shares, frequency_responses_are_read, feedback_of_an_incident_is_read):
+                 the_judge_finds_what_is_wrong, what_a_configuration_leaves_out_is_filled_in, lag_and_gain_are_found, the_animation_is_one_page, limits_used_are_shares, faults_are_marked_with_number_and_name, frequency_responses_are_read,
+                 labels_of_requests_do_not_cover_each_other, feedback_of_an_incident_is_read, samples_are_drawn_as_the_trace_of_the_same_ride):
         with suite.case(case.__name__.replace("_", " ")):
             case()
     return suite.done()

@@ -85,6 +85,17 @@ def a_kernel_that_dies_is_said():
     assert run.returncode == 125 and "stopped before the command ended" in run.stderr, run
 
 
+def ends_where_nobody_reads():
+    need_kernel()
+    out, into = os.pipe()
+    run = subprocess.Popen([LAB, "run", "--", "sh", "-c", "echo begun; while sleep 0.2; do echo more; done"], stdin=subprocess.DEVNULL, stdout=into, stderr=subprocess.PIPE, text=True)
+    os.close(into)
+    assert os.read(out, 6) == b"begun\n"
+    os.close(out)
+    said = run.communicate(timeout=LIMIT_S)[1]
+    assert run.returncode == 141 and said == "", (run.returncode, said)
+
+
 def wrong_options_are_refused():
     for words, *arguments in ((("required",),), (("invalid choice", "walk"), "walk"), (("COMMAND",), "run"), (("seconds above 0",), "run", "--limit", "0", "--", "true"), (("'own'",), "run", "--kernel", "mine", "--", "true")):
         run = ask(*arguments)
@@ -96,7 +107,7 @@ def wrong_options_are_refused():
 
 def main():
     suite = tap.Suite()
-    for case in (output_status_folder_and_environment, virtual_time_is_exact, output_comes_while_it_runs, too_long_is_said, what_is_missing_is_said, a_kernel_that_dies_is_said, wrong_options_are_refused):
+    for case in (output_status_folder_and_environment, virtual_time_is_exact, output_comes_while_it_runs, too_long_is_said, what_is_missing_is_said, a_kernel_that_dies_is_said, ends_where_nobody_reads, wrong_options_are_refused):
         with suite.case(case.__name__.replace("_", " ")):
             case()
     return suite.done()

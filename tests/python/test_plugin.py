@@ -80,6 +80,9 @@ def a_twin_where_there_is_one(bench):
     twin = bench.folder / "bin/heave-twin"
     twin.symlink_to(Path(bench.bin) / "heave-twin")
     bench.expect(bench.pytest(test, *arguments), 0, "1 passed")
+    changes = {"can.interface": f"twin{os.getpid() % 1000000}", "pose.settled_extension_mm": 8}
+    marked = f"import pytest\n\n\n@pytest.mark.heave({str(TOP / 'config/hexapod-cia402.ini')!r}, changes={changes})\n"
+    bench.expect(bench.pytest(marked + test.replace("== 'OFF'", "== 'OFF' and abs(twin.positions[0] - 8) < 0.5"), *arguments), 0, "1 passed")
     bench.expect(bench.pytest("def test_it(twin):\n    twin.process.kill()\n    twin.process.wait()\n", *arguments), 1, "heave-twin ended with exit code -9")
     twin.unlink()
     twin.write_text("#!/bin/sh\necho 'no such interface'\nexit 5\n", encoding="ascii")

@@ -142,12 +142,11 @@ def wrong_memories_are_named():
 @contextlib.contextmanager
 def twin_and_heaved(*arguments, **options):
     """CiA 402 drives on a bus between programs, which every kernel has."""
-    text = (TOP / "config/hexapod-cia402.ini").read_text(encoding="utf-8")
-    with tempfile.TemporaryDirectory() as folder:
-        config = Path(folder) / "twin.ini"
-        config.write_text(changed(text, {"can.interface": f"twin{os.getpid() % 1000000}", "platform.engage": "auto", "platform.late_hold_cycles": 0, "udp.silence_hold_ms": 60000, "udp.silence_neutral_ms": 0, "udp.silence_settle_ms": 0}), encoding="utf-8")
-        with heave.Twin(config, arguments, **options) as twin, heave.Heaved(config) as heaved:
-            yield twin, heaved
+    config = TOP / "config/hexapod-cia402.ini"
+    changes = {"can.interface": f"twin{os.getpid() % 1000000}", "platform.engage": "auto", "platform.late_hold_cycles": 0, "udp.silence_hold_ms": 60000, "udp.silence_neutral_ms": 0,
+               "udp.silence_settle_ms": 0}
+    with heave.Twin(config, arguments, changes=changes, **options) as twin, heave.Heaved(config, changes=changes) as heaved:
+        yield twin, heaved
 
 
 def faults_and_positions_at_run_time():

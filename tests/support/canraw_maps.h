@@ -15,16 +15,23 @@ static inline canraw_map_t canraw_maps_plain(void)
         .query_every = 1,
         .offline_periods = 5,
         .speed_least = 3000,
-        .setpoint = {8, 0x03, 2, {0x01, 0x05}, {{CANRAW_POSITION, 2, 4, false, false}, {CANRAW_SPEED, 6, 2, false, false}}},
-        .command[CANRAW_HOME] = {8, 0xFF, 0, {0x01, 0x03, 0x01}, {{0}}},
-        .position_query = {2, 0x03, 0, {0x00, 0x15}, {{0}}},
-        .position_reply = {6, 0x00, 1, {0}, {{CANRAW_POSITION, 2, 4, true, false}}},
-        .homing_query = {2, 0x03, 0, {0x00, 0x12}, {{0}}},
-        .homing_reply = {3, 0x00, 1, {0}, {{CANRAW_STATUS, 2, 1, false, false}}},
+        .setpoint = {8,
+                     0x03,
+                     2,
+                     {0x01, 0x05},
+                     {{CANRAW_POSITION, 2, 32, false, false, 0, 0, 0}, {CANRAW_SPEED, 6, 16, false, false, 0, 0, 0}},
+                     0,
+                     0},
+        .command[CANRAW_HOME] = {8, 0xFF, 0, {0x01, 0x03, 0x01}, {{0}}, 0, 0},
+        .position_query = {2, 0x03, 0, {0x00, 0x15}, {{0}}, 0, 0},
+        .position_reply = {6, 0x00, 1, {0}, {{CANRAW_POSITION, 2, 32, true, false, 0, 0, 0}}, 0, 0},
+        .homing_query = {2, 0x03, 0, {0x00, 0x12}, {{0}}, 0, 0},
+        .homing_reply = {3, 0x00, 1, {0}, {{CANRAW_STATUS, 2, 8, false, false, 0, 0, 0}}, 0, 0},
         .homing_done = {0x01, 0xFF},
     };
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         map.axis[k] = (canraw_axis_map_t){.command_id = 0x601 + k,
+                                          .setpoint_id = 0x601 + k,
                                           .reply_id = 0x581 + k,
                                           .scale = {20000, 10, 0},
                                           .speed = {0, 1, 0},
@@ -43,20 +50,27 @@ static inline canraw_map_t canraw_maps_rich(void)
         .period_us = 2000,
         .query_every = 1,
         .offline_periods = 5,
-        .setpoint = {5, 0x01, 1, {0x10}, {{CANRAW_POSITION, 1, 4, true, true}}},
-        .command = {[CANRAW_STOP] = {1, 0x01, 0, {0x22}, {{0}}},
-                    [CANRAW_DISABLE] = {1, 0x01, 0, {0x21}, {{0}}},
-                    [CANRAW_RESET] = {1, 0x01, 0, {0x23}, {{0}}},
-                    [CANRAW_ENABLE] = {1, 0x01, 0, {0x20}, {{0}}},
-                    [CANRAW_HOME] = {1, 0x01, 0, {0x24}, {{0}}}},
-        .position_query = {1, 0x01, 0, {0x30}, {{0}}},
-        .position_reply = {6, 0x01, 2, {0x30}, {{CANRAW_STATUS, 1, 1, false, false}, {CANRAW_POSITION, 2, 4, true, true}}},
+        .setpoint = {5, 0x01, 1, {0x10}, {{CANRAW_POSITION, 1, 32, true, true, 0, 0, 0}}, 0, 0},
+        .command = {[CANRAW_STOP] = {1, 0x01, 0, {0x22}, {{0}}, 0, 0},
+                    [CANRAW_DISABLE] = {1, 0x01, 0, {0x21}, {{0}}, 0, 0},
+                    [CANRAW_RESET] = {1, 0x01, 0, {0x23}, {{0}}, 0, 0},
+                    [CANRAW_ENABLE] = {1, 0x01, 0, {0x20}, {{0}}, 0, 0},
+                    [CANRAW_HOME] = {1, 0x01, 0, {0x24}, {{0}}, 0, 0}},
+        .position_query = {1, 0x01, 0, {0x30}, {{0}}, 0, 0},
+        .position_reply = {6,
+                           0x01,
+                           2,
+                           {0x30},
+                           {{CANRAW_STATUS, 1, 8, false, false, 0, 0, 0}, {CANRAW_POSITION, 2, 32, true, true, 0, 0, 0}},
+                           0,
+                           0},
         .enabled_when = {0x01, 0x01},
         .fault_when = {0x02, 0x02},
         .homing_done = {0x04, 0x04},
     };
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         map.axis[k] = (canraw_axis_map_t){.command_id = 0x18FF0100 + k,
+                                          .setpoint_id = 0x18FF0100 + k,
                                           .reply_id = 0x18FF0200 + k,
                                           .scale = {-10000, 3, 4000000},
                                           .speed = {0, 1, 0},
@@ -69,9 +83,9 @@ static inline canraw_map_t canraw_maps_rich(void)
 /* Behind what there is: a counter, then a CRC-8. */
 static inline void canraw_maps_seal(canraw_frame_t *frame)
 {
-    frame->field[frame->fields++] = (canraw_field_t){CANRAW_COUNTER, frame->length, 1, false, false};
+    frame->field[frame->fields++] = (canraw_field_t){CANRAW_COUNTER, frame->length, 8, false, false, 0, 0, 0};
     frame->data[frame->length + 1u] = 0x1D;
-    frame->field[frame->fields++] = (canraw_field_t){CANRAW_CRC8, (uint8_t)(frame->length + 1u), 1, false, false};
+    frame->field[frame->fields++] = (canraw_field_t){CANRAW_CRC8, (uint8_t)(frame->length + 1u), 8, false, false, 0, 0, 0};
     frame->length = (uint8_t)(frame->length + 2u);
 }
 

@@ -55,12 +55,21 @@ static const cia402_slave_row_t k_rows[] = {
     {.index = 0x1800, .sub = 2, .bytes = 1, .value = 255},
     {.index = 0x1800, .sub = 3, .bytes = 2},
     {.index = 0x1800, .sub = 5, .bytes = 2, .value = 10},
+    {.index = 0x1800, .sub = 6, .bytes = 1},
     {.index = 0x1801, .sub = 1, .bytes = 4, .value = 0x40000280},
     {.index = 0x1801, .sub = 2, .bytes = 1, .value = 255},
     {.index = 0x1A00, .sub = 0, .bytes = 1, .value = 1},
     {.index = 0x1A00, .sub = 1, .bytes = 4, .value = 0x60410010},
     {.index = 0x1A00, .sub = 2, .bytes = 4},
     {.index = 0x1A00, .sub = 3, .bytes = 4},
+    {.index = 0x1801, .sub = 3, .bytes = 2},
+    {.index = 0x1802, .sub = 1, .bytes = 4, .value = 0xC0000380},
+    {.index = 0x1802, .sub = 2, .bytes = 1, .value = 255},
+    {.index = 0x1A01, .sub = 0, .bytes = 1},
+    {.index = 0x1A01, .sub = 1, .bytes = 4},
+    {.index = 0x1A01, .sub = 2, .bytes = 4},
+    {.index = 0x1A02, .sub = 0, .bytes = 1},
+    {.index = 0x1A02, .sub = 1, .bytes = 4},
     {.index = 0x2030, .sub = 1, .bytes = 2, .value = 7},
     {.index = 0x2031, .sub = 0, .bytes = 4},
     {.index = 0x2032, .sub = 0, .bytes = 1, .is_read_only = true, .value = 3},
@@ -89,6 +98,11 @@ static const cia402_slave_row_t k_rows[] = {
     {.index = 0x6099, .sub = 2, .bytes = 4},
     {.index = 0x609A, .sub = 0, .bytes = 4},
     {.index = 0x607C, .sub = 0, .bytes = 4},
+    {.index = 0x60E3, .sub = 0, .bytes = 1, .is_read_only = true, .value = 3},
+    {.index = 0x60E3, .sub = 1, .bytes = 1, .is_read_only = true, .value = 35},
+    {.index = 0x60E3, .sub = 2, .bytes = 2, .is_read_only = true, .value = 17},
+    {.index = 0x60E3, .sub = 3, .bytes = 1, .is_read_only = true, .value = 37},
+    {.index = 0x6502, .sub = 0, .bytes = 4, .is_read_only = true, .value = 0xE1},
 };
 
 static cia402_slave_row_t *find(cia402_slave_drive_t *d, uint16_t index, uint8_t sub)
@@ -343,35 +357,58 @@ static uint32_t mapped_value(cia402_slave_drive_t *d, uint32_t entry)
         return (uint32_t)d->position;
     case 0x606100:
         return (uint8_t)d->mode;
+    case 0x607700:
+        return (uint16_t)d->torque;
+    case 0x60F400:
+        return (uint32_t)d->lag;
+    case 0x60FD00:
+        return d->inputs;
     default:
         return 0;
     }
 }
 
-static void send_tpdo(cia402_slave_t *self, cia402_slave_drive_t *d)
+/* At every so manyth SYNC. */
+static void send_tpdo(cia402_slave_t *self, cia402_slave_drive_t *d, uint16_t n)
 {
     uint8_t data[8] = {0};
     uint8_t at = 0;
-    const uint32_t cob = *value(d, 0x1800, 1);
-    if ((cob & 0x80000000u) != 0 || *value(d, 0x1800, 2) > 240) {
+    const uint16_t mapping = (uint16_t)(0x1A00 + n);
+    const uint32_t cob = *value(d, (uint16_t)(0x1800 + n), 1);
+    const uint32_t rate = *value(d, (uint16_t)(0x1800 + n), 2);
+    if ((cob & 0x80000000u) != 0 || rate > 240) {
         return;
     }
-    if (d->tpdo_drop > 0) {
+    if (n == 0 && *value(d, 0x1800, 6) != 0 && !d->is_counting) {
+        d->is_counting = self->sync_number == *value(d, 0x1800, 6);
+        d->sync_count[0] = (uint8_t)(rate - 1u);
+        if (!d->is_counting) {
+            return;
+        }
+    }
+    d->sync_count[n]++;
+    if (d->sync_count[n] < rate) {
+        return;
+    }
+    d->sync_count[n] = 0;
+    if (n == 0 && d->tpdo_drop > 0) {
         d->tpdo_drop--;
         return;
     }
-    for (uint8_t k = 1; k <= *value(d, 0x1A00, 0); k++) {
-        const uint32_t entry = *value(d, 0x1A00, k);
+    for (uint8_t k = 1; k <= *value(d, mapping, 0); k++) {
+        const uint32_t entry = *value(d, mapping, k);
         const uint32_t now = mapped_value(d, entry);
         for (unsigned i = 0; i < (entry & 0xFF) / 8; i++) {
             data[at++] = (uint8_t)(now >> (8 * i));
         }
     }
-    out(self, d, cob & 0x7FF, (uint8_t)(at - d->tpdo_cut), data);
+    out(self, d, cob & 0x7FF, (uint8_t)(at - (n == 0 ? d->tpdo_cut : 0)), data);
 }
 
-static void take_sync(cia402_slave_t *self, cia402_slave_drive_t *d, uint8_t length)
+static void take_sync(cia402_slave_t *self, cia402_slave_drive_t *d, const can_frame_t *sync)
 {
+    const uint8_t length = sync->length;
+    self->sync_number = sync->data[0];
     if (d->nmt != OPERATIONAL) {
         return;
     }
@@ -379,7 +416,9 @@ static void take_sync(cia402_slave_t *self, cia402_slave_drive_t *d, uint8_t len
         emergency(self, d, 0x8240);
         return;
     }
-    send_tpdo(self, d);
+    for (uint16_t n = 0; n < CIA402_SLAVE_TPDOS; n++) {
+        send_tpdo(self, d, n);
+    }
     if (!d->has_rpdo) {
         return;
     }
@@ -558,6 +597,8 @@ static void set_nmt(cia402_slave_t *self, cia402_slave_drive_t *d, uint8_t state
 {
     const uint8_t was = d->nmt;
     d->nmt = state;
+    d->is_counting = false;
+    memset(d->sync_count, 0, sizeof d->sync_count);
     if (was == OPERATIONAL && state != OPERATIONAL) {
         connection_lost(self, d, false);
     }
@@ -614,7 +655,7 @@ static void hear(cia402_slave_t *self, cia402_slave_drive_t *d, const can_frame_
     if (frame->id == 0) {
         take_nmt(self, d, frame->data);
     } else if (frame->id == 0x80) {
-        take_sync(self, d, frame->length);
+        take_sync(self, d, frame);
     } else if (frame->id == (*value(d, 0x1400, 1) & 0x7FF)) {
         take_rpdo(d, frame);
     } else if (frame->id == 0x600u + d->node) {

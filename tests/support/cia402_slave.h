@@ -8,6 +8,7 @@
 #include "sim_can.h"
 
 #define CIA402_SLAVES      7u
+#define CIA402_SLAVE_TPDOS 3u
 #define CIA402_SLAVE_ROWS  96u
 #define CIA402_SLAVE_LOG   400u
 #define CIA402_SLAVE_PLAIN 0xFFFFu
@@ -40,6 +41,11 @@ typedef struct {
     uint16_t status_set, status_clear;      /**< bits of the statusword that it shows as 1, as 0, whatever it does */
     uint8_t tpdo_cut;                       /**< bytes that its TPDOs are too short by */
     uint32_t tpdo_drop;                     /**< so many TPDOs are not sent */
+    uint8_t sync_count[CIA402_SLAVE_TPDOS]; /**< since each was sent */
+    bool is_counting;                       /**< the SYNC with its number has come */
+    int16_t torque;                         /**< 6077h */
+    int32_t lag;                            /**< 60F4h */
+    uint32_t inputs;                        /**< 60FDh */
     uint32_t power_us, brake_us, homing_us; /**< how long it takes */
     int32_t jump_counts;                    /**< a target further away than this is a fault */
 
@@ -85,6 +91,7 @@ typedef struct {
     uint64_t now_us;
     uint64_t sync_us;
     uint32_t syncs;
+    uint8_t sync_number; /**< of the newest, where it has one */
     uint32_t heartbeats; /**< of the master */
     can_frame_t out[128];
     uint32_t outs;

@@ -43,6 +43,9 @@ static settings_t common(void)
                     .engage_accel_mm_s2_q16 = Q(200),
                     .jog_mm_s_q16 = Q(20),
                     .jog_deg_s_q16 = Q(5),
+                    .signal_mm_q16 = Q(10),
+                    .signal_deg_q16 = Q(3),
+                    .signal_mm_s_q16 = Q(100),
                     .spike_gate = 10,
                     .relays.count = 12,
                     .healthy = {.toggle_ms = 10, .off_ms = 100, .late_cycles = 3}};

@@ -78,8 +78,8 @@ class CanBench(harness.Bench):
         return rows
 
 
-class RecordedBench(CanBench):
-    """The same with a recorder beside it."""
+class Recorder(harness.Bench):
+    """A recorder of vcan0 beside whatever platform."""
 
     def __init__(self, bin_dir, **changes):
         super().__init__(bin_dir, **changes)
@@ -97,6 +97,10 @@ class RecordedBench(CanBench):
             self.recorder.wait(timeout=harness.WAIT_S)
             self.recorder.stdout.close()
             self.recorder = None
+
+
+class RecordedBench(Recorder, CanBench):
+    """Drives of tests/peers with a recorder beside them."""
 
     def record(self):
         """What was on the bus; ends the drives and the recorder."""

@@ -9,27 +9,28 @@ import signal
 import sys
 import time
 
+import can_bench
 import cantools
-import forked
 import harness
 import tap
-
-sys.path.append(str(harness.TOP / "tests/peers"))
-import raw_drives  # noqa: E402  the path above has to be set first
+import twin_bench
 
 PRESET = harness.TOP / "config/can-raw-hexapod.ini"
 CYLINDERS = 6
 COUNTS_PER_MM = 2000
-FIRST_ID = 0x601
+FIRST_ID, FIRST_REPLY = 0x601, 0x581
 PERIOD_US = 4000
 JITTER_US = 100
+BOOT_S = 0.5  # of the drives
 KILLS = 6
 SETPOINT = b"\x01\x05"
+QUESTIONS = (b"\x00\x15", b"\x00\x12")  # where it is, and whether it is homed
+REPLY_BYTES = 6  # to the first one
 LIMITS = (300.0, 3000.0, 50000.0)  # speed_mm_s, accel_mm_s2, jerk_mm_s3 of the preset
 
 
-class RawBench(harness.Bench):
-    """The preset on vcan0, rising by itself, with its drives."""
+class RawBench(can_bench.Recorder, twin_bench.WithTwin):
+    """The preset on vcan0, rising by itself, with heave-twin's drives and a recorder beside them."""
 
     def __init__(self, bin_dir, start):
         super().__init__(bin_dir)
@@ -38,34 +39,27 @@ class RawBench(harness.Bench):
             assert text.count(pattern) == 1, pattern
             text = text.replace(pattern, by)
         self.config = self.file("raw.ini", f"{text}\n[control]\nsocket = {self.socket}\n")
-        self.log = self.folder / "bus.log"
-        self.drives = forked.Forked(raw_drives.main, self.log, *start)
-        assert self.drives.stdout.readline() == "ready\n"
-
-    def __exit__(self, *exception):
-        self.end_drives()
-        super().__exit__(*exception)
-
-    def end_drives(self):
-        if self.drives.stdin:
-            self.drives.stdin.close()
-            code = self.drives.wait(timeout=harness.WAIT_S)
-            self.drives.stdout.close()
-            self.drives.stdin = None
-            assert code == 0, "the drives heard a frame that is none of theirs"
+        middle_mm, beside = start
+        self.start_twin("--homed", "--start", middle_mm, "--zero", ",".join(f"{k + 1}={counts}" for k, counts in enumerate(beside)))
+        time.sleep(BOOT_S)
 
     def setpoints(self):
-        """Of each drive, after end_drives(): where it stood, and (time_us, mm) of each set-point as cantools reads it."""
+        """Of each drive, at the end: where it said before the first set-point that it stood, and (time_us, mm) of each set-point, as cantools reads both. All that heaved
+        has sent is of its map."""
+        self.end_recorder()
         database = cantools.database.load_string(self.heaved("--config", self.config, "--dump-dbc").stdout, "dbc")
         starts, rows = {}, {FIRST_ID + k: [] for k in range(CYLINDERS)}
-        for line in self.log.read_text(encoding="ascii").splitlines():
-            what, identifier, rest = line.split()
-            if what == "start":
-                starts[int(identifier, 16)] = int(rest) / COUNTS_PER_MM
-            elif bytes.fromhex(rest)[:2] == SETPOINT:
-                signals = database.decode_message(int(identifier, 16), bytes.fromhex(rest))
+        for line in self.recording.read_text(encoding="ascii").splitlines():
+            when, identifier, data = line.split(" ")
+            identifier, data = int(identifier, 16), bytes.fromhex(data)
+            if identifier in rows and data[:2] == SETPOINT:
+                signals = database.decode_message(identifier, data)
                 assert str(signals["kind"]) == "setpoint" and signals["speed"] == 2000, signals
-                rows[int(identifier, 16)].append((int(what), signals["position"]))
+                rows[identifier].append((int(when), signals["position"]))
+            elif identifier in rows:
+                assert data in QUESTIONS, f"{identifier:x}: {data.hex()} is no frame of these drives"
+            elif len(data) == REPLY_BYTES and not rows[identifier - FIRST_REPLY + FIRST_ID]:
+                starts[identifier - FIRST_REPLY + FIRST_ID] = database.decode_message(identifier, data)["position"]
         return [(starts[identifier], rows[identifier]) for identifier in sorted(rows)]
 
 
@@ -75,8 +69,7 @@ def wave(t):
 
 def random_start(source):
     """A platform that somebody left anywhere: cylinders within a few mm of each other, as a rigid plate allows."""
-    middle = source.uniform(20, 250)
-    return [round((middle + source.uniform(-3, 3)) * COUNTS_PER_MM) for _ in range(CYLINDERS)]
+    return round(source.uniform(20, 250), 3), [round(source.uniform(-3, 3) * COUNTS_PER_MM) for _ in range(CYLINDERS)]
 
 
 def check_limits(start_mm, rows):
@@ -100,7 +93,6 @@ def follows_and_keeps_its_limits(bench, source):
         sender.stream(3, wave)
     assert bench.status()["state"] == "ENGAGED"
     assert bench.stop(daemon) == 0
-    bench.end_drives()
     columns = [[float(row[f"c{k + 1}_mm"]) for row in harness.rows_of(trace.read_bytes())] for k in range(CYLINDERS)]
     for k, (start_mm, rows) in enumerate(bench.setpoints()):
         assert abs(rows[0][1] - start_mm) <= 1 / COUNTS_PER_MM, f"first set-point {rows[0][1]}, the drive stood at {start_mm}"
@@ -122,7 +114,6 @@ def is_not_moved_by_enabling(bench, source):
     bench.wait_state("ENGAGED", "RISING", "HOMING")
     time.sleep(source.uniform(0.1, 2))
     bench.stop(daemon, signal.SIGKILL)
-    bench.end_drives()
     for start_mm, rows in bench.setpoints():
         assert rows and abs(rows[0][1] - start_mm) <= 1 / COUNTS_PER_MM, rows[:1]
         check_limits(start_mm, rows)
@@ -142,7 +133,6 @@ def comes_back_after_a_kill(bench, source):
         bench.stop(daemon, signal.SIGKILL)
         time.sleep(source.uniform(0.01, 0.2))
         bench.socket.unlink(missing_ok=True)
-    bench.end_drives()
     worst = 0
     most_mm = LIMITS[0] * PERIOD_US / 1e6 + 1 / COUNTS_PER_MM
     for start_mm, rows in bench.setpoints():
@@ -161,9 +151,9 @@ def comes_back_after_a_kill(bench, source):
 def silent_drives_stop_the_platform(bench, source):
     bench.start()
     bench.wait_state("ENGAGED")
-    bench.drives.send_signal(signal.SIGSTOP)
+    bench.twin.send_signal(signal.SIGSTOP)
     bench.wait_state("FAULT")
-    bench.drives.send_signal(signal.SIGCONT)
+    bench.twin.send_signal(signal.SIGCONT)
     time.sleep(1)
     status = bench.status()
     assert status["state"] == "FAULT" and status["fault"]["name"] in ("drive-offline", "bus-lost"), status["fault"]

@@ -1,20 +1,35 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_doctor.py BIN [PART OF A NAME] - heaved --doctor on simulated drives, one fault at a time, on vcan, on virtual time. Runs inside kernel.py."""
+"""test_doctor.py BIN [PART OF A NAME] - heaved --doctor on heave-twin's drives, one fault at a time, on vcan, on virtual time. Runs inside kernel.py."""
 import re
 import socket
 import subprocess
 import sys
+import time
 
 import can
-import can_bench
-import forked
 import harness
-import raw_drives
 import tap
+import vcan
 from test_can import can_config
+from twin_bench import WithTwin
 
 RAW_PRESET = harness.TOP / "config/can-raw-hexapod.ini"
+
+
+class DoctorBench(WithTwin):
+    def __init__(self, bin_dir):
+        super().__init__(bin_dir)
+        self.config = can_config(self)
+
+    def __exit__(self, *exception):
+        vcan.fast()
+        super().__exit__(*exception)
+
+    def start_drives(self, *faults):
+        """They have started, and have what is wrong with them."""
+        self.start_twin(*(word for line in faults for word in ("--fault", line)))
+        time.sleep(1)
 
 
 def link(*arguments):
@@ -58,7 +73,7 @@ def inventory_is_ready_to_paste(bench, config):
     bench.start_drives()
     output = bench.heaved("--config", config, "--doctor").stdout
     pasted = output.split("; the drives that were found", 1)[1].rsplit("\n", 2)[0].split("\n", 1)[1]
-    assert "; drive 1, node 1: simulated drive" in pasted and re.search(r"^serial_numbers = 0x", pasted, re.MULTILINE), output
+    assert "; drive 1, node 1: heave-twin" in pasted and re.search(r"^serial_numbers = 0x", pasted, re.MULTILINE), output
     text = config.read_text(encoding="utf-8")
     for line in pasted.splitlines():
         text = re.sub(rf"^{line.split(' ')[0]} = .*\n", "", text, flags=re.MULTILINE) if " = " in line else text
@@ -108,7 +123,7 @@ def short_queue(bench, config):
 
 
 def missing_node(bench, config):
-    bench.start_drives(only={4: {"is_there": False}})
+    bench.start_drives("0 power-off 4")
     doctor(bench, config, 1, "node 4 (drive 4) does not answer")
 
 
@@ -122,48 +137,48 @@ def nobody_acknowledges(bench, config):
     try:
         doctor(bench, config, 1, "nobody acknowledges on vcan0 (what was sent never left")
     finally:
-        bench.fast_bus()
+        vcan.fast()
 
 
 def wrong_identity(bench, config):
-    bench.start_drives(only={2: {"identity": [0x9A, 0x402, 1, 1]}})
+    bench.start_drives("0 object 2 1018:1 0x9A")
     doctor(bench, with_keys(bench, config, vendor_id=0x2E5), 1, "node 2: vendor_id is 154 (0x9A), configured 741")
 
 
 def not_402(bench, config):
-    bench.start_drives(only={5: {"defaults": {"1000": 0x00020191}}})
+    bench.start_drives("0 object 5 1000 0x20191")
     doctor(bench, config, 1, "node 5 is no CiA 402 drive (1000h = 0x20191)")
 
 
 def missing_watchdog(bench, config):
-    bench.start_drives(only={6: {"missing_objects": ["6007"]}})
+    bench.start_drives("0 missing 6 6007")
     doctor(bench, config, 1, "node 6 has no watchdog 6007h")
     doctor(bench, with_keys(bench, config, allow_no_watchdog="yes"), 0, "node 6 has no watchdog 6007h")
 
 
 def watchdogs_off(bench, config):
-    bench.start_drives(only={1: {"defaults": {"6007": 0, "605A": 0}}})
+    bench.start_drives("0 object 1 6007 0", "0 object 1 605A 0")
     rows = doctor(bench, config, 0)
     assert any("node 1: watchdogs off until heaved sets them" in text and "6007h 605Ah" in text for level, text in rows), rows
 
 
 def no_such_mode(bench, config):
-    bench.start_drives(only={3: {"defaults": {"6502": 0x61}}})
+    bench.start_drives("0 object 3 6502 0x61")
     doctor(bench, config, 1, "node 3 does not have mode csp (6502h = 0x61) -> [cia402] mode = ip")
 
 
 def no_mapping(bench, config):
-    bench.start_drives(only={3: {"refuse": {"1A00:0": 0x06020000}}})
+    bench.start_drives(*(f"0 missing 3 1A00:{sub}" for sub in range(9)))
     doctor(bench, config, 1, "node 3: 1A00h cannot be read: there is no such object")
 
 
 def drive_in_fault(bench, config):
-    bench.start_drives(plan=[{"at": 0.4, "drive": 7, "do": "fault", "code": 0x2310}])
+    bench.start_drives("0.4 fault 7 0x2310")
     doctor(bench, config, 1, "node 7 is in fault, 603Fh = 2310h: continuous over-current")
 
 
 def two_drives_with_one_number(bench, config):
-    bench.start_drives(only={2: {"node": 1, "identity": [0x2E5, 0x402, 0x10000, 2]}})
+    bench.start_drives("0 node 2 1")
     doctor(bench, config, 1, "two drives have this number", "node 2 (drive 2) does not answer")
 
 
@@ -200,14 +215,10 @@ def running_daemon(bench, config):
 
 def drives_with_frames_of_their_own(bench, _config):
     text = RAW_PRESET.read_text(encoding="utf-8").replace("interface = can0", "interface = vcan0").replace("port = 9800", f"port = {bench.port}")
-    config = bench.file("raw.ini", f"{text}\n[control]\nsocket = {bench.socket}\n")
-    drives = forked.Forked(raw_drives.main, bench.folder / "raw.log", *[10000] * 5)
-    assert drives.stdout.readline() == "ready\n"
-    rows = doctor(bench, config, 1, "drive 6: nothing with identifier 586h")
+    bench.config = bench.file("raw.ini", f"{text}\n[control]\nsocket = {bench.socket}\n")
+    bench.start_drives("0 power-off 6")
+    rows = doctor(bench, bench.config, 1, "drive 6: nothing with identifier 586h")
     assert [text for level, text in rows if "answers with" in text] == [f"drive {k + 1} answers with identifier {0x581 + k:X}h" for k in range(5)], rows
-    drives.stdin.close()
-    assert drives.wait(timeout=harness.WAIT_S) == 0
-    drives.stdout.close()
 
 
 CASES = [
@@ -243,8 +254,8 @@ def main():
     for name, case in CASES:
         if wanted not in name:
             continue
-        with suite.case(name), can_bench.CanBench(sys.argv[1]) as bench:
-            case(bench, can_config(bench))
+        with suite.case(name), DoctorBench(sys.argv[1]) as bench:
+            case(bench, bench.config)
     return suite.done()
 
 

@@ -24,6 +24,7 @@ OUTSIDE = "192.0.2.7"
 TAKEOVER_MS, SILENCE_MS, ENGAGE_MM_S = 2500, 1000, 150
 PATIENCE_MS = 60000  # where nobody is to take over, however late a busy machine lets its driver be
 PERIOD_S = 0.02
+LATE_MS = 100  # a cycle on a busy machine
 PROBE = "ip link set lo up && ip link add br0 type bridge && ip link add e0 type veth peer name e1"
 FAR = "@A6:0,0,0,0,0,40,0#"
 SETUP = f"""ip link set lo up
@@ -251,8 +252,9 @@ def speed_of_takeover(rows, since_ms):
 
 
 def taken_over_in_hold(rows, at_ms):
-    at = next(i for i, row in enumerate(rows) if float(row["t_ms"]) >= at_ms)
-    assert (rows[at - 1]["state"], rows[at]["state"]) == ("HOLD", "ENGAGED"), (at_ms, rows[at - 1], rows[at])
+    """A cycle takes what came until it ran, and a busy machine runs it later than its time in the row."""
+    changes = [float(row["t_ms"]) for before, row in zip(rows, rows[1:]) if (before["state"], row["state"]) == ("HOLD", "ENGAGED")]
+    assert any(at_ms - LATE_MS <= t <= at_ms + 1 for t in changes), (at_ms, changes)
 
 
 def two_senders(net):

@@ -7,6 +7,8 @@ All of it is judged by what heaved itself has written: its trace keeps every lim
 taken, and the platform rests 250 ms and a stop after the last of them.
 """
 import fcntl
+import json
+import math
 import os
 import pty
 import random
@@ -30,19 +32,20 @@ SEED = int(sys.argv[4]) if len(sys.argv) > 4 else 1
 HOLD_MS = 250
 STOP_MS = 120      # 5 mm/s at the acceleration of [engage] and the jerk of [cylinders], with much to spare
 KEY_S = 1 / 30     # a keyboard's repeat
+READS_S = 0.3      # what the screen asks for, before the key
 CONFIG = {"platform__engage": "manual"}
 
 
 class Hand(threading.Thread):
-    """heavectl in a terminal of its own, with a key that is held until let_go()."""
+    """heavectl in a terminal of its own, with a key that is held from when it is asked for until let_go(). is_early: it is down before that."""
 
-    def __init__(self, bench, *arguments, path=None):
+    def __init__(self, bench, *arguments, path=None, is_early=False):
         super().__init__(daemon=True)
         self.master, slave = pty.openpty()
         self.process = subprocess.Popen([BIN / "heavectl", "--socket", str(path or bench.socket), *arguments], stdin=slave, stdout=slave, stderr=slave,
                                         start_new_session=True)
         os.close(slave)
-        self.is_held, self.is_over, self.text = True, False, b""
+        self.is_held, self.is_over, self.text, self.is_asked = True, False, b"", is_early
         self.start()
 
     def run(self):
@@ -51,7 +54,9 @@ class Hand(threading.Thread):
             try:
                 if select.select([self.master], [], [], 0.005)[0]:
                     self.text += os.read(self.master, 4096)
-                if self.is_held and time.monotonic() >= next_key:
+                    if not self.is_asked and b"hold a key, the space bar" in self.text:
+                        self.is_asked, next_key = True, time.monotonic() + READS_S
+                if self.is_held and self.is_asked and time.monotonic() >= next_key:
                     next_key += KEY_S
                     os.write(self.master, b" ")
             except OSError:
@@ -73,6 +78,20 @@ class Hand(threading.Thread):
             self.let_go()
             time.sleep(0.4)
         raise AssertionError(f"{what}: not within {harness.WAIT_S} s: {self.text}")
+
+    def hold_to_end(self):
+        """Until the program ends by itself."""
+        end, asked = time.monotonic() + 3 * harness.WAIT_S, 0
+        while self.process.poll() is None:
+            assert time.monotonic() < end, f"it does not end: {self.text}"
+            if self.text.count(b"let go") > asked:  # the machine missed the key, and the program says so
+                asked = self.text.count(b"let go")
+                self.let_go()
+                time.sleep(0.4)
+            self.is_held = b"there: let go" not in self.text
+            time.sleep(0.02)
+        self.let_go()
+        self.join(timeout=10)  # until the terminal has nothing more to say
 
     def key(self, byte):
         os.write(self.master, byte)
@@ -132,7 +151,7 @@ class Between(threading.Thread):
 
 # --- What heaved has written ---
 
-HELD = re.compile(r"^([0-9.]+) !(jog|home|relay|beat) (.*)$")
+HELD = re.compile(r"^([0-9.]+) !(jog|home|relay|signal|beat) (.*)$")
 RELEASED = re.compile(r"^([0-9.]+) !(release|hold|service-off)\b")
 
 
@@ -242,14 +261,25 @@ def requests():
 
 
 def in_a_terminal():
-    """A tap moves nothing; a key that is held moves, until it is let go or q is pressed; a refusal ends with its reason."""
+    """A key that is down already, a tap and Enter move nothing; a key that is held moves, until it is let go or q is pressed; a refusal ends with its reason."""
     with harness.Bench(BIN, **CONFIG) as bench:
         daemon, trace, record = serve(bench, "terminal")
-        tap_hand = Hand(bench, "jog", "3", "5mm/s")
-        time.sleep(0.05)
+        tap_hand = Hand(bench, "jog", "3", "5mm/s", is_early=True)
+        harness.wait_for(lambda: b"let go of the key first" in tap_hand.text, "the screen says what to do")
+        time.sleep(1)
+        assert bench.status()["service"]["series"] == 0, "a key that was down already has begun something"
         tap_hand.let_go()
         time.sleep(0.6)
+        tap_hand.key(b" ")
+        time.sleep(0.6)
         assert bench.status()["service"]["series"] == 0, "a tap has begun something"
+        told = tap_hand.text.count(b"let go of the key first")
+        for _ in range(30):
+            tap_hand.key(b"\r")
+            time.sleep(KEY_S)
+        assert bench.status()["service"]["series"] == 0, "Enter has begun something"
+        assert tap_hand.text.count(b"let go of the key first") > told, tap_hand.text
+        time.sleep(0.6)
         tap_hand.hold_until(lambda: bench.status()["service"]["held"], "the key is held")
         time.sleep(0.5)
         tap_hand.let_go()
@@ -272,6 +302,61 @@ def in_a_terminal():
         end(bench, daemon)
         hands, moved = judge(bench, trace, record)
         assert len(hands) >= 2 and moved > 400, (hands, moved)
+
+
+def lift(line, mm):
+    """z up by so much, with a hand at the socket."""
+    answer = line.press("jog z 5")
+    for counter in range(1, int(mm / 5 / 0.05)):
+        time.sleep(0.05)
+        answer = line.ask(f"beat {answer['series']} {counter} {answer['tick']}")
+    line.good(f"release {answer['series']}")
+    harness.wait_for(lambda: line.good("tick")["doing"] == "nothing", "rests")
+    time.sleep(0.3)
+
+
+def identify():
+    """Lag and gain of simulated drives that are known; a hand that lets go leaves nothing known; all of it within every limit."""
+    for lag_ms in (12, 40):
+        with harness.Bench(BIN, sim__lag_ms=lag_ms, **CONFIG) as bench:
+            daemon, trace, record = serve(bench, "identify")
+            with harness.Line(bench.socket) as line:
+                line.refused(f"signal z sine 2 1 6 {line.good('tick')['tick']}", "way to both sides")
+                lift(line, 15)
+                for wrong, why in (("signal z sine 20 1 6", "signal_mm"), ("signal z sine 2 1 5", "six periods"), ("signal z saw 2 1 6", "signal:"), ("signal 9 sine 2 1 6", "no such")):
+                    line.refused(f"{wrong} {line.good('tick')['tick']}", why)
+            hand = Hand(bench, "signal", "z", "sine", "2", "1", "6")
+            hand.hold_to_end()
+            hand.end()
+            assert hand.process.returncode == 0 and b"there" in hand.text, hand.text
+            cut = Hand(bench, "identify", "z")
+            cut.hold_until(lambda: bench.status()["service"]["doing"] == "signal", "the chirp goes on")
+            cut.let_go()
+            harness.wait_for(lambda: bench.status()["service"]["doing"] == "nothing", "let go")
+            cut.key(b"q")
+            assert cut.process.wait(timeout=harness.WAIT_S) == 1, cut.text
+            cut.join(timeout=10)
+            assert b"ended before" in cut.text, cut.text
+            cut.end()
+            file = bench.folder / "z.csv"
+            hand = Hand(bench, "--json", "--band", "0.5-20", "--for", "24", "identify", "z", str(file))
+            hand.hold_to_end()
+            hand.end()
+            assert hand.process.returncode == 0, hand.text
+            found = json.loads(hand.text[hand.text.index(b'{"ok"'):])
+            assert len(found["channels"]) == 7, found
+            for channel in found["channels"]:
+                assert abs(channel["lag_ms"] - lag_ms - 0.5) < 0.05 * lag_ms + 0.5, (lag_ms, channel)  # a cycle of the daemon is in it, too
+                assert abs(channel["gain"] - 1) < 0.05 and channel["hysteresis"] < 0.02, channel
+                corner_hz = 1000 / (2 * math.pi * lag_ms)
+                assert channel["gain_3db_hz"] is not None and abs(channel["gain_3db_hz"] / corner_hz - 1) < 0.05, (corner_hz, channel)
+                assert all(point["coherence"] > 0.95 for point in channel["response"]), channel
+            assert len(file.read_text().splitlines()) == 2 + 7 * 25
+            plot = subprocess.run([sys.executable, harness.TOP / "tools/plot", file, "--what", "bode", "-o", bench.folder / "z.png"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+            assert plot.returncode == 0 or "matplotlib" in plot.stdout, plot.stdout
+            end(bench, daemon)
+            hands, moved = judge(bench, trace, record)
+            assert len(hands) >= 4 and moved > 20000, (hands, moved)
 
 
 def moments(bench, index, rng):
@@ -373,9 +458,11 @@ def black_box():
 
 
 def main():
+    harness.go_first()
     suite = tap.Suite()
     for name, case in (("requests are taken, or refused by name", requests),
                        ("heavectl in a terminal: while the key is held", in_a_terminal),
+                       ("identify: lag, gain and corner of drives that are known", identify),
                        ("a client killed, stopped, cut off or late: at rest 250 ms and a stop later", client_gone),
                        ("a recording of service plays back to the same bytes", plays_back),
                        ("a black box in a jog plays back to the same bytes", black_box)):

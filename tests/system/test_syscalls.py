@@ -15,6 +15,7 @@ import contextlib
 import errno
 import grp
 import hashlib
+import json
 import mmap
 import os
 import re
@@ -29,6 +30,7 @@ from pathlib import Path
 
 import harness
 import tap
+from twin_bench import TwinBench
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools/lib"))
 import rooms  # noqa: E402  the path above has to be set first
@@ -41,9 +43,9 @@ LIMIT_S = 60
 
 # What cannot fail, or asks nobody, or only looks into memory.
 HARMLESS = set("""
-atan2 bcmp feof hypot memrchr sin cos strcasecmp strncasecmp strcpy stpcpy strnlen __ctype_b_loc __cxa_finalize __errno_location __stack_chk_fail abort fmax fmin llround lround log10 pow sqrt sincos memchr memcmp memcpy memmove memset strchr strcmp
-strcspn strerror strlen strncmp strncpy strpbrk strrchr strspn strstr strtod strtoll strtoul strtoull snprintf vsnprintf gmtime_r localtime_r inet_ntop inet_pton qsort
-getenv dl_iterate_phdr getopt_long gai_strerror ferror fileno free freeaddrinfo pthread_self pthread_attr_destroy pthread_attr_init pthread_cond_broadcast pthread_cond_init pthread_cond_timedwait pthread_condattr_destroy pthread_condattr_init pthread_condattr_setclock pthread_attr_setinheritsched
+atan2 bcmp feof hypot memrchr sin cos strcasecmp strncasecmp strcpy stpcpy strnlen __ctype_b_loc __ctype_toupper_loc __cxa_finalize __errno_location __stack_chk_fail abort fmax fmin llround lround log10 pow sqrt sincos mbrtowc memchr memcmp memcpy memmove memset strchr strcmp
+strcspn strerror strerrorname_np strlen strncat strncmp strncpy strpbrk strrchr strspn strstr strtod strtok strtok_r strtoll strtoul strtoull wcwidth snprintf vsnprintf gmtime_r localtime_r inet_ntop inet_pton qsort
+getenv putenv rewind dl_iterate_phdr getopt_long gai_strerror ferror fileno free freeaddrinfo pthread_self pthread_attr_destroy pthread_attr_init pthread_cond_broadcast pthread_cond_init pthread_cond_timedwait pthread_condattr_destroy pthread_condattr_init pthread_condattr_setclock pthread_attr_setinheritsched
 pthread_attr_setschedparam pthread_attr_setschedpolicy pthread_attr_setstacksize pthread_equal pthread_mutex_init pthread_mutex_lock pthread_mutex_unlock
 pthread_join pthread_sigmask sigaction sigaddset sigemptyset sigfillset signal getpid time clock_gettime setvbuf setlocale nl_langinfo isatty munlockall ini_parse_stream
 mnl_attr_get_payload mnl_attr_get_payload_len mnl_attr_get_type mnl_attr_parse mnl_attr_parse_nested mnl_attr_put_strz mnl_nlmsg_get_payload
@@ -51,12 +53,12 @@ mnl_nlmsg_put_extra_header mnl_nlmsg_put_header mnl_cb_run mnl_socket_get_fd mnl
 modbus_set_response_timeout modbus_set_slave modbus_rtu_set_rts_delay gpiod_chip_label gpiod_chip_num_lines gpiod_line_consumer gpiod_line_is_used gpiod_line_name
 """.split())
 # Whose result nobody could do anything with: the file is gone, the pause was short. Formatted output fails into its stream, which is asked at its end.
-UNUSED = set("close closedir munmap nanosleep gpiod_chip_close mnl_socket_close modbus_close fprintf vfprintf printf fputc putchar fputs puts fwrite".split())
+UNUSED = set("close renameat closedir munmap nanosleep gpiod_chip_close mnl_socket_close modbus_close fprintf vfprintf printf fputc putchar fputs puts fwrite".split())
 
 # Not tried here, by file and function, and why.
 ELSEWHERE = {("metrics.c", "unlink"): "tidies up after another failure; the next second tries again",
              ("atomic_file.c", "unlink"): "tidies up after another failure, which is what is told",
-             ("live.c", "setrlimit"): "only where few descriptors are allowed; test_beside.py allows few",
+             ("main.c", "setrlimit"): "only where few descriptors are allowed; test_beside.py allows few",
              ("same_file.c", "stat"): "what cannot be looked at cannot be opened either, which is told then",
              ("standard_descriptors.c", "open"): "only where a standard descriptor is closed; test_beside.py closes them",
              ("operator_log.c", "rename"): "when the file is full: the old one goes on, see tests/unit/test_operator_log.c",
@@ -65,8 +67,14 @@ ELSEWHERE = {("metrics.c", "unlink"): "tidies up after another failure; the next
              ("output_file.c", "poll"): "when a pipe is full at the end",
              **{("hold.c", function): "only while a person holds a key; test_service_mode.py stops, kills and cuts it off" for function in ("fflush", "send", "recv", "read", "poll")},
              **{(file, function): "only with a person at a terminal; test_selftest.py kills it there, and gives it a report that cannot be written"
-                for file in ("selftest.c", "selftest_link.c", "selftest_report.c")
-                for function in ("fclose", "fflush", "fopen", "fsync", "rename", "unlink", "connect", "poll", "read", "recv", "send", "socket", "tcflush")},
+                for file in ("selftest.c", "heaved_link.c", "selftest_report.c", "identify.c", "identify_report.c")
+                for function in ("calloc", "fclose", "fflush", "fopen", "fsync", "rename", "unlink", "connect", "poll", "read", "recv", "send", "socket", "tcflush")},
+             ("control_configuration.c", "fflush"): "into memory, without a buffer",
+             ("config_store.c", "unlink"): "tidies up after another failure, which is what is told",
+             ("drive_dcf.c", "unlink"): "tidies up after another failure, which is what is told",
+             ("profile.c", "unlink"): "makes room, or tidies up: where it mattered, what comes after it fails, and is told",
+             **{("setup_session.c", function): "tidies up a folder that the next boot empties" for function in ("unlink", "rmdir")},
+             **{("setup_motion.c", function): "only while a person holds a key; test_setup.py kills it there, and lets go" for function in ("fflush", "poll", "read")},
              **{("linux_can_local.c", function): "the bus to heave-twin; test_twin.py takes its other side away" for function in ("socket", "connect", "send", "recv")},
              ("linux_modbus_link.c", "tcflush"): "its result is not used"}
 
@@ -76,17 +84,17 @@ MODBUS = ["ETIMEDOUT", "ECONNRESET", "EIO", "EBADF", 112345688 + 11]  # the last
 ERRNOS = {
     "accept4": ["EMFILE", "ECONNABORTED", "EINTR", "EAGAIN"], "access": ["EACCES", "EROFS"], "bind": ["EADDRINUSE", "EACCES", "EADDRNOTAVAIL", "ENODEV"],
     "calloc": MEMORY, "malloc": MEMORY, "realloc": MEMORY, "chmod": ["EPERM", "EROFS"], "clock_nanosleep": ["EINTR", "EINVAL"],
-    "connect": ["ECONNREFUSED", "EACCES", "ENOENT", "EAGAIN"], "eventfd": ["EMFILE", "ENOMEM"], "fchmod": ["EPERM", "EIO"], "fcntl": ["EBADF"], "fclose": DISK, "fdatasync": DISK, "ftruncate": DISK, "getgrnam": ["ENOENT", "EIO", "EMFILE"], "fflush": DISK,
-    "fdopen": MEMORY, "fgets": ["EIO"], "fopen": FILES, "memfd_create": ["EMFILE", "ENOMEM"], "mmap": MEMORY, "scandir": ["ENOENT", "ENOMEM"], "sendmsg": ["EPIPE", "EAGAIN", "EINTR"], "fread": ["EIO"], "fstat": ["EIO"], "fsync": DISK, "getaddrinfo": [-3, -10], "getrlimit": ["EFAULT"], "getrusage": ["EINVAL"], "setrlimit": ["EPERM"],
-    "getsockname": ["ENOBUFS"], "getsockopt": ["ENOBUFS"], "if_nametoindex": ["ENODEV", "EMFILE"], "ioctl": ["EIO", "ENODEV", "ENOTTY", "EBUSY", "EPERM"], "listen": ["EADDRINUSE"],
+    "connect": ["ECONNREFUSED", "EACCES", "ENOENT", "EAGAIN"], "dup3": ["EBUSY", "EMFILE"], "execv": ["ENOENT", "ENOMEM"], "eventfd": ["EMFILE", "ENOMEM"], "fchmod": ["EPERM", "EIO"], "fcntl": ["EBADF"], "fclose": DISK, "fdatasync": DISK, "ftruncate": DISK, "getgrnam": ["ENOENT", "EIO", "EMFILE"], "fflush": DISK,
+    "fdopen": MEMORY, "fgets": ["EIO"], "fmemopen": MEMORY, "fopen": FILES, "memfd_create": ["EMFILE", "ENOMEM"], "mmap": MEMORY, "scandir": ["ENOENT", "ENOMEM"], "sendmsg": ["EPIPE", "EAGAIN", "EINTR"], "fread": ["EIO"], "fstat": ["EIO"], "fsync": DISK, "getaddrinfo": [-3, -10], "getrlimit": ["EFAULT"], "getrusage": ["EINVAL"], "setrlimit": ["EPERM"],
+    "getsockname": ["ENOBUFS"], "getsockopt": ["ENOBUFS"], "if_nametoindex": ["ENODEV", "EMFILE"], "ioctl": ["EIO", "ENODEV", "ENOTTY", "EBUSY", "EPERM"], "link": ["EACCES", "ENOSPC"], "listen": ["EADDRINUSE"],
     "lstat": ["EACCES", "ENOENT"], "mkdir": ["EACCES", "ENOSPC", "EROFS"], "mlockall": ["EPERM", "ENOMEM"], "open": [*FILES, "ENOSPC", "EROFS", "EINTR"],
-    "open_memstream": MEMORY, "opendir": FILES, "poll": ["EINTR", "ENOMEM"], "ppoll": ["EINTR", "ENOMEM"], "pthread_create": ["EAGAIN", "EPERM"],
+    "open_memstream": MEMORY, "opendir": FILES, "poll": ["EINTR", "ENOMEM"], "ppoll": ["EINTR", "ENOMEM"], "pread": ["EIO"], "pwrite": ["ENOSPC", "ENOMEM"], "pthread_create": ["EAGAIN", "EPERM"],
     "pthread_setschedparam": ["EPERM"], "pthread_timedjoin_np": ["ETIMEDOUT"], "read": ["EINTR", "EAGAIN", "EIO"], "readdir": ["EIO"], "readlink": ["EACCES", "ENOENT"],
     "realpath": ["EACCES", "ENOENT", "ELOOP"], "recv": ["ECONNRESET", "EINTR", "EAGAIN"],
     "recvmsg": ["EINTR", "EAGAIN", "ENETDOWN", "ENOMEM", "ENODEV", "ENOBUFS", "ECONNREFUSED"], "rename": ["ENOSPC", "EACCES", "EIO"], "rmdir": ["ENOTEMPTY", "EACCES"],
     "sched_setscheduler": ["EPERM"], "send": ["EPIPE", "EAGAIN", "EINTR", "ENOBUFS", "ENETDOWN", "ENXIO", "EIO"], "sendto": ["ENOENT", "ECONNREFUSED", "EAGAIN", "EINTR", "ENOBUFS"],
     "setsockopt": ["ENOMEM", "EPERM", "ENOPROTOOPT"], "signalfd": ["EMFILE", "ENOMEM"], "sigprocmask": ["EINVAL"], "socket": ["EMFILE", "ENOMEM", "EACCES", "EAFNOSUPPORT"],
-    "stat": ["EACCES", "ENOENT"], "tcflush": ["EIO"], "uname": ["EFAULT"], "unlink": ["EACCES", "EROFS", "EBUSY"], "write": ["EINTR", "EAGAIN", *DISK, "EPIPE"],
+    "stat": ["EACCES", "ENOENT"], "symlink": ["EACCES", "EEXIST", "ENOSPC"], "tcflush": ["EIO"], "uname": ["EFAULT"], "unlink": ["EACCES", "EROFS", "EBUSY"], "write": ["EINTR", "EAGAIN", *DISK, "EPIPE"],
     "gpiod_chip_get_line": ["EINVAL"], "gpiod_chip_open": ["EACCES", "ENODEV", "EMFILE"], "gpiod_line_event_get_fd": ["EPERM"],
     "gpiod_line_event_read_multiple": ["EIO", "ENODEV", "EAGAIN"], "gpiod_line_get_value_bulk": ["EIO", "ENODEV"], "gpiod_line_request_bulk": ["EBUSY", "EINVAL", "ENOMEM"],
     "gpiod_line_set_value_bulk": ["EIO", "ENODEV"], "mnl_socket_bind": ["ENOMEM"], "mnl_socket_open2": ["EMFILE", "EAFNOSUPPORT"],
@@ -260,12 +268,13 @@ def commands_of(bench):
     frames = bench.file("frames.txt", "0 !engage\n3000 @A6:0,0,0,0,0,5,0#\n3500 !park\n")
     raw = harness.TOP / "config/can-raw-hexapod.ini"
     head = [bench.bin / "heaved", "--config"]
-    return [[*head, bench.config, "--check"], [*head, bench.config, "--dump-config"], [*head, raw, "--dump-dbc"],
+    return [[*head, bench.config, "--check"], [*head, bench.config, "--check", "--json"], [bench.bin / "heaved", "--keys"], [*head, bench.config, "--dump-config"], [*head, raw, "--dump-dbc"],
             [*head, bench.config, "--envelope", bench.file("old.csv", "old")], [*head, bench.config, "--envelope", bench.folder / "new.csv"],
             [*head, bench.config, "--envelope", "/dev/null"],
             [*head, bench.config, "--play", frames, "--trace", bench.folder / "played.csv"],
             [*head, bench.config, "--play", frames, "--trace", "-"], [*head, bench.config, "--doctor"],
-            [*head, harness.TOP / "config/hexapod-cia402.ini", "--doctor"], [bench.bin / "heaved", "--presets"],
+            [*head, harness.TOP / "config/hexapod-cia402.ini", "--doctor"], [bench.bin / "heaved", "--presets"], [bench.bin / "heaved", "--scan", "nobus0"],
+            [bench.bin / "heaved", "--scan", "/dev/null"],
             [*head, harness.TOP / "config/hexapod-cia402.ini", "--check", "--eds", bench.file("drive.eds", "[1000]\nParameterName=type\nDataType=0x0007\nAccessType=ro\n")]]
 
 
@@ -279,7 +288,7 @@ def offline(bench, places, _judge):
             page.set(place, error)
             code, stdout, stderr = run_to_end(page, command)
             judge_end(troubles, f"{name_of(place, error)}: {' '.join(map(str, command[1:]))}", code, stderr,
-                      is_silent=("--doctor" in command or "--eds" in command) and stdout.strip())
+                      is_silent={"--doctor", "--eds", "--scan"} & set(map(str, command)) and stdout.strip())
             STORY.note(place, page)
     page.close()
     troubles.done()
@@ -310,6 +319,34 @@ def interrupt(troubles, page, sends, command):
         troubles.judge(process.returncode == 0 and not stderr, f"Ctrl-C in {name_of(place, 'EINTR')}: exit {process.returncode}: {stderr.strip()[-300:]}")
 
 
+Told = collections.namedtuple("Told", "code stdout stderr")
+
+
+def is_told_of(place, error, told):
+    """By a line of its own, or one of a file that was read; with the system's word, where that is all there is to say."""
+    is_named = place.function not in ("poll", "recv") or error == "ECONNRESET" or os.strerror(number_of(error)) in told.stderr
+    return told.code in SANE_EXITS - {0} and re.search(r"^heavectl: |^/[^:]+:\d+: ", told.stderr, re.MULTILINE) and is_named
+
+
+def try_all(troubles, page, places, run, command, *, prepare=lambda: None, is_whole=lambda _: True, is_right=None):
+    """@param prepare puts back what a run may have changed @param is_whole what must hold of the files afterwards @param is_right of (place, error, told, expected)"""
+    is_right = is_right or (lambda place, error, told, expected: is_told_of(place, error, told) or (told.code == expected.code == 0 and told.stdout))
+    prepare()
+    page.clear()
+    page.seen(forget=True)
+    expected = Told(*run(page, command))
+    for place, error in trials(places, page.seen(), STORY.tried):
+        prepare()
+        page.set(place, error)
+        told = Told(*run(page, command))
+        page.clear()
+        what = f"{name_of(place, error)}: {' '.join(map(str, command[1:]))}: exit {told.code}"
+        troubles.judge(is_right(place, error, told, expected), f"{what}: {told.stderr.strip()[-300:]} {told.stdout[-300:]}")
+        troubles.judge(is_whole(told), f"{what}: files are not as they should be: {told.stderr.strip()[-300:]}")
+        STORY.note(place, page)
+    return expected
+
+
 def control(bench, _places, _judge):
     """What fails is told of with an exit code that is not 0, or does not matter: then the answer is there all the same."""
     page, troubles = Page(bench), Troubles()
@@ -320,23 +357,128 @@ def control(bench, _places, _judge):
                             (run_on_a_terminal, "watch", "--for", "0.2", *named), (run_to_end, "scope", "--for", "0.2", *named),
                             (run_to_end, "counts", *named), (run_on_a_terminal, "counts", "--for", "0.2", *named), (run_to_end, "presets"), (run_to_end, "intensity", "50", *named), (run_to_end, "--help"),
                             (run_to_end, "--version"), (run_to_end, "status")):
-        command = [bench.bin / "heavectl", *arguments]
-        page.clear()
-        page.seen(forget=True)
-        expected = run(page, command)[0]
-        for place, error in trials(places, page.seen(), STORY.tried):
-            page.set(place, error)
-            code, stdout, stderr = run(page, command)
-            is_told = code in SANE_EXITS - {0} and stderr.startswith("heavectl: ")
-            is_named = place.function not in ("poll", "recv") or error == "ECONNRESET" or os.strerror(number_of(error)) in stderr
-            troubles.judge((is_told and is_named) or (code == expected == 0 and stdout),
-                           f"{name_of(place, error)}: {arguments[0]}: exit {code}: {stderr.strip()[-300:]}")
-            STORY.note(place, page)
-    interrupt(troubles, page, [place for place in places if (place.file, place.function) == ("main.c", "send")], [bench.bin / "heavectl", "watch", *named])
+        try_all(troubles, page, places, run, [bench.bin / "heavectl", *arguments])
+    for tell in (in_chinese, profiles, one_drive, setup):
+        tell(bench, page, troubles, places)
+    interrupt(troubles, page, [place for place in places if (place.file, place.function) == ("connection.c", "send")], [bench.bin / "heavectl", "watch", *named])
     page.close()
     troubles.done()
     left = missing(places)
     assert not left, "\n".join(f"{place.file}:{place.line}: {place.function}" for place in left)
+
+
+@contextlib.contextmanager
+def environment(page, **changes):
+    before = page.options["env"]
+    page.options["env"] = {**before, **{name: str(value) for name, value in changes.items()}}
+    yield
+    page.options["env"] = before
+
+
+def in_chinese(bench, page, troubles, places):
+    """A catalogue that cannot be read: English, and on it goes."""
+    def is_english(_place, _error, told, expected):
+        return told.code == expected.code == 0 and told.stdout and told.stdout.isascii() and not told.stderr
+
+    with environment(page, LC_ALL="zh_CN.UTF-8", HEAVE_LOCALES=bench.bin.resolve().parent / "locale"):
+        expected = try_all(troubles, page, places, run_to_end, [bench.bin / "heavectl", "--help"], is_right=is_english)
+    assert not expected.stdout.isascii(), "there is no catalogue to lose"
+
+
+def profiles(bench, page, troubles, places):
+    """Two profiles of a platform that does not run, and a systemctl that is played; the profile of before is there, or the new one."""
+    folder, tools = bench.folder / "etc", bench.folder / "tools"
+    link, running = folder / "ride.ini", [bench.bin / "heavectl", "--socket", bench.folder / "nobody"]
+    (folder / "ride.d").mkdir(parents=True)
+    tools.mkdir()
+    for name in ("small", "large"):
+        (folder / f"ride.d/{name}.ini").write_bytes(bench.config.read_bytes())
+    (tools / "systemctl").write_text("#!/bin/sh\nexit 0\n", encoding="ascii")
+    (tools / "systemctl").chmod(0o755)
+
+    def prepare():
+        for file in folder.glob("ride.ini*"):
+            file.unlink()
+        link.symlink_to("ride.d/small.ini")
+
+    def is_whole(told):
+        return os.readlink(link) == ("ride.d/large.ini" if told.code == 0 and "profile: large" in told.stdout else "ride.d/small.ini") and not (folder / "ride.ini.new").exists()
+
+    with environment(page, HEAVE_CONFIG_DIRECTORY=folder, PATH=f"{tools}:{bench.bin}:{os.environ['PATH']}"):
+        for arguments in (["profile"], ["--json", "profile"], ["--platform", "ride", "profile", "large"]):
+            try_all(troubles, page, places, run_to_end, [*running, *arguments], prepare=prepare, is_whole=is_whole)
+
+
+def one_drive(bench, page, troubles, places):
+    """Of a heave-twin: what it is, its settings saved and compared. A file is whole, or not there."""
+    with TwinBench(bench.bin, platform__engage="manual") as rig:
+        (rig.folder / "kept").mkdir()
+        rig.start_twin()
+        rig.start(environment={"STATE_DIRECTORY": str(rig.folder / "kept")})
+        harness.wait_for(lambda: rig.status()["cylinders"][2]["drive"] == "disabled", "the drives are set up")
+        saved, whole = rig.folder / "saved.dcf", rig.folder / "whole.dcf"
+        eds = rig.file("drive.eds", "[6083]\nParameterName=acceleration\nDataType=0x0007\nAccessType=rw\n")
+        assert rig.ctl("--save", whole, "drive", "3").returncode == 0
+        ctl = [bench.bin / "heavectl", "--socket", rig.socket]
+        for arguments in (["drive", "3"], ["sdo", "3", "6083"], ["--compare", whole, "drive", "2"], ["config"], ["--json", "config"], ["config", rig.file("other.ini", rig.config.read_bytes() + b"; other\n")]):
+            try_all(troubles, page, places, run_to_end, [*ctl, *arguments])
+        for arguments in ([], ["--eds", eds]):
+            try_all(troubles, page, places, run_to_end, [*ctl, "--save", saved, *arguments, "drive", "3"], prepare=lambda: saved.unlink(missing_ok=True),
+                    is_whole=lambda told: saved.exists() == (told.code == 0))
+
+
+# --- heavectl setup ---
+
+def run_and_type(*lines):
+    """Types all of it at once; whatever is asked then is answered with \"quit\"."""
+    def run(page, command):
+        ours, its = os.openpty()
+        os.write(ours, "".join(f"{line}\n" for line in (*lines, *["quit"] * 4)).encode())
+        done = subprocess.run(list(map(str, command)), stdin=its, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=LIMIT_S, check=False, **page.options)
+        os.close(its)
+        os.close(ours)
+        return done.returncode, done.stdout, done.stderr
+    return run
+
+
+BEGUN = [["start", "hexapod-cia402"], ["start.found", "hexapod cia402"], ["kind", "hexapod"], ["driver", "cia402"], ["geometry", "k"], ["geometry.check", "right"]]
+LAST = [["start", "hexapod-400"], ["start.found", "hexapod sim"], ["kind", "hexapod"], ["driver", "sim"], ["geometry", "k"], ["geometry.check", "right"], ["limits", "shown"],
+        ["limits.take", "k"], ["relays.kind", "g"], ["relays.lines", "NO-SUCH-LINE"], ["switches.kind", "n"]]  # heaved ends at once, and says why
+
+
+def setup(bench, page, troubles, places):
+    """As far as nobody has to look or to hold a key. What fails is on the screen, or changes nothing; answers that were given are kept."""
+    file = bench.folder / "mine.ini"
+    state = bench.folder / "mine.ini.setup"
+
+    def story(answers, *lines, there=None):
+        def prepare():
+            state.unlink(missing_ok=True)
+            file.unlink(missing_ok=True)
+            if there:
+                file.write_text(there, encoding="utf-8")
+            if answers:
+                state.write_text(json.dumps({"heave_setup": 1, "answers": answers}), encoding="utf-8")
+
+        def is_right(place, error, told, expected):
+            if (place.file, place.function, error) == ("answers.c", "fopen", "ENOENT"):
+                return told.code == 1 and "From what do you want to begin" in told.stdout  # nobody has begun yet
+            screen = " ".join(told.stdout.replace("\n! ", " ").split())
+            is_told = re.search("^heavectl: ", told.stderr, re.MULTILINE) or os.strerror(number_of(error)) in screen or "Not taken" in screen or "! heaved has ended: heaved: " in screen
+            is_told = is_told or (error in ("EACCES", "EPERM") and "on a configuration that you may not read" in screen)
+            kept = json.loads(state.read_text(encoding="utf-8"))["answers"] if state.exists() else []
+            return told.code in SANE_EXITS - {0} and (is_told or told[:2] == expected[:2]) and kept[:len(answers)] == answers
+
+        expected = try_all(troubles, page, places, run_and_type(*lines), [bench.bin / "heavectl", "setup", file], prepare=prepare, is_right=is_right)
+        assert "goes on here" in expected.stdout and (file.read_text(encoding="utf-8") == there if there else not file.exists()), expected
+
+    with environment(page, PATH=f"{bench.bin}:{os.environ['PATH']}"):
+        for start in ("none", "hexapod-400", harness.TOP / "config/hexapod-400.ini"):
+            story([], start)
+        story(BEGUN[:-2], "k")
+        story(BEGUN[:-2], "k", there="; written by heavectl setup\n")
+        story(BEGUN, "nobus0")
+        story(LAST, "y")
 
 
 # --- The daemon ---
@@ -452,6 +594,79 @@ def start_and_end(bench, places, is_after_a_crash):
         judge_end(troubles, name_of(place, error), code, daemon.text())
     listener.shutdown(socket.SHUT_RDWR)  # ends the thread that reads it
     listener.close()
+    page.close()
+    troubles.done()
+
+
+FOOT = re.compile("; heaved: applied over [0-9a-f]+\n")
+
+
+def takes_a_configuration(bench, places, _judge):
+    """What comes into force is what was given, or what was before, and then it is told of. What is kept is one of the two, whole."""
+    page, troubles = Page(bench), Troubles()
+    state = bench.folder / "kept"
+    kept, own = state / "configuration.ini", bench.write_config("own.ini", platform__engage="manual")
+    state.mkdir()
+    page.options["env"]["STATE_DIRECTORY"] = str(state)
+    text = own.read_text(encoding="utf-8")
+    count = 0
+
+    def apply(change=""):
+        nonlocal count
+        count += 1
+        given = f"{re.sub('(?m)^stroke_mm = [^;]*', change, text) if change else text}; number {count}\n"
+        return bench.ctl("config", bench.file("given.ini", given)), given
+
+    def in_force():
+        return bench.ctl("config").stdout
+
+    def new():
+        daemon = Daemon(bench, page, own)
+        assert daemon.is_ready() and daemon.wait_for(lambda: '"OFF"' in daemon.ask()), daemon.text()
+        return daemon
+
+    daemon = new()
+    page.seen(forget=True)
+    for _ in range(3):  # older ones are there then
+        run, given = apply()
+        assert run.returncode == 0 and in_force() == given, run
+    own_places = [place for place in places if place.file in ("config_store.c", "config.c", "sealed.c")]  # what all requests need has its own cases
+    for place, error in trials(own_places, page.seen(), STORY.tried):
+        before, what = in_force(), name_of(place, error)
+        page.set(place, error)
+        run, given = apply()
+        page.clear()
+        STORY.note(place, page)
+        now = in_force()
+        is_told = run.returncode in SANE_EXITS - {0} and run.stderr.startswith("heavectl: ")
+        is_hidden = now == "" and place.function in ("memfd_create", "pwrite", "fcntl", "dup3")  # in force, but there is no memory to show it until SIGHUP
+        troubles.judge(now == given or is_hidden if run.returncode == 0 else is_told and now == before, f"{what}: exit {run.returncode}: {run.stderr.strip()[-300:]} {now[-60:]!r}")
+        whole = FOOT.sub("", kept.read_text(encoding="utf-8"))
+        troubles.judge(whole == (given if run.returncode == 0 else before), f"{what}: kept is {whole[-60:]!r}")
+        if daemon.has_ended() or now not in (before, given):
+            troubles.judge(not daemon.has_ended(), f"{what}: ended: {daemon.text()[-300:]}")
+            daemon.end()
+            daemon = new()
+    for place in (place for place in places if place.function == "execv"):
+        page.set(place, "ENOENT")
+        apply("stroke_mm = 199 ")
+        troubles.judge(daemon.wait_for(daemon.has_ended), "execv: it goes on")
+        STORY.note(place, page)
+        page.clear()
+        troubles.judge(daemon.end() == 69 and "cannot start anew" in daemon.text(), f"execv: {daemon.text()[-300:]}")
+        daemon = new()
+    assert daemon.end() == 0
+    own.write_text(text + "; edited\n", encoding="utf-8")  # and which counts is judged at the start
+    daemon = new()
+    starting = page.seen(forget=True)
+    daemon.end()
+    for place, error in trials([place for place in places if place.file in ("config_store.c", "main.c")], starting, STORY.tried):
+        page.set(place, error)
+        daemon = Daemon(bench, page, own)
+        troubles.judge(daemon.is_ready() or daemon.has_ended(), f"{name_of(place, error)}: neither ready nor ended")
+        STORY.note(place, page)
+        page.clear()
+        judge_end(troubles, name_of(place, error), daemon.end(), daemon.text())
     page.close()
     troubles.done()
 
@@ -645,7 +860,8 @@ CASES = {"backends": backends,
          "heavectl": control,
          "heaved starts and ends": lambda bench, places, _: start_and_end(bench, places, False),
          "heaved starts after a crash": lambda bench, places, _: start_and_end(bench, places, True),
-         "heaved in operation": in_operation}
+         "heaved in operation": in_operation,
+         "heaved takes a configuration": takes_a_configuration}
 
 
 def wrapped(bench):

@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: MIT
 """test_twin.py BIN [PART OF A NAME] - heave-twin on a bus between programs, as on a kernel without CAN: drives, mechanism, faults, and what it says to bad input."""
 import contextlib
+import csv
+import json
 import os
 import re
 import socket
 import struct
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -16,6 +19,17 @@ from twin_bench import TwinBench
 
 NEAR_MM = 2  # axes lag a little behind
 ERROR_FRAME = 0x20000000
+TWO_AXES = "1.1, 1.2, 2.1, 2.2, 3.1, 3.2, 4"
+FIXED = """
+command_map = 2: 0x6040/16 0x6060/8, 3: 0x607A/32
+answer_map = 1: 0x6041/16, 3: 0x6041/16 0x6064/32
+map_written = no
+"""
+ANY_NUMBERS = """
+command_map = 65: 0x6040/16 0x607A/32
+answer_map = 129: 0x6041/16 0x6064/32 0x6061/8
+"""
+MODES = "mode = csp, ip, csp, csp, ip, csp, csp"
 
 
 def up(bench, *arguments):
@@ -104,6 +118,78 @@ def faults_of_frames(bench):
         assert line != "fault 2 0x17" or "0x17" in str(found) or found["device_code"] == 0x17, found
         bench.do("active" if line == "bus-off" else "mend all")
         harness.wait_for(lambda: is_led_up(bench), f"{line}: up again", 0.5)
+
+
+def faults_of_a_shared_frame(bench):
+    """The one that fails is named; where both are one device, either of them."""
+    up(bench)
+    for line, fault, axes in (("fault 2 0x17", "drive-fault", (2,)), ("jam 3", "following-error", (3,)), ("drop 6", "drive-dropped", (6,)),
+                              ("mute 5", "drive-offline", (5, 6)), ("stuck-counter 1", "drive-offline", (1, 2))):
+        bench.do(line)
+        with bench.sender() as sender:
+            sender.send("@A6T:0,0,0,0,0,40,1500#")
+            harness.wait_for(lambda: bench.status()["state"] == "FAULT", f"{line}: a fault")
+        found = bench.status()["fault"]
+        assert (found["name"], found["axis"] in axes) == (fault, True), f"{line}: {found}"
+        bench.do("mend all")
+        harness.wait_for(lambda: is_led_up(bench), f"{line}: up again", 0.5)
+
+
+def faults_of_a_status_apart(bench, faults):
+    daemon = up(bench)
+    for line, fault, axes, text in faults:
+        bench.do(line)
+        harness.wait_for(lambda: bench.status()["state"] == "FAULT", f"{line}: a fault")
+        found = bench.status()["fault"]
+        assert (found["name"], found["axis"] in axes, found["device_text"]) == (fault, True, text), f"{line}: {found}"
+        assert fault != "drive-fault" or found["device_code"] == 0x1234, found
+        bench.do("mend all")
+        harness.wait_for(lambda: is_led_up(bench), f"{line}: up again", 0.5)
+    return daemon.log.read_text(encoding="utf-8")
+
+
+def said_in_a_status_apart(bench):
+    """The drive's own code, and a status that fails while positions come."""
+    faults_of_a_status_apart(bench, (("fault 2 0x1234", "drive-fault", (2,), "fault of the drive"), ("drop 6", "drive-dropped", (6,), ""),
+                                     ("reboot 2", "drive-dropped", (2,), "")))
+
+
+def wrong_in_a_status_apart(bench):
+    """What does not come, check bytes and counters that are wrong."""
+    log = faults_of_a_status_apart(bench, (("mute 5", "drive-offline", (5, 6), "nothing comes from it: supply, cable, identifier"),
+                                           ("stuck-counter 1", "drive-offline", (1, 2), "its alive counter stands still"),
+                                           ("damaged 4 100000", "drive-offline", (3, 4), "the check byte of what it sends is wrong")))
+    assert "axis 1, identifier 0x281, enabled: its alive counter stands still" in log, log
+
+
+def faults_of_a_node(bench):
+    """An axis of a node is lost: it is named, the other axis goes with it, the platform stops, and a reset leads out once both are there."""
+    up(bench)
+    bench.do("lose 2 400")
+    bench.wait_state("FAULT")
+    assert bench.status()["fault"]["name"] == "drive-offline", bench.status()["fault"]
+    assert bench.status()["fault"]["axis"] == 2, bench.status()["fault"]
+    cylinders = bench.status()["cylinders"]
+    assert [cylinders[i]["report"]["channel"] for i in (0, 1, 2)] == [1, 2, 1], cylinders
+    time.sleep(3)
+    assert bench.status()["state"] == "FAULT", "it came back by itself"
+    harness.wait_for(lambda: is_led_up(bench), "up again", 0.5)
+    bench.do("fault 4")
+    bench.wait_state("FAULT")
+    assert (bench.status()["fault"]["name"], bench.status()["fault"]["axis"]) == ("drive-fault", 4), bench.status()["fault"]
+
+
+def guarded_rise_and_fail(bench):
+    """Old drives, without 1016h and 1017h."""
+    up(bench, *(argument for drive in range(1, 8) for argument in ("--fault", f"0 missing {drive} 0x1017", "--fault", f"0 missing {drive} 0x1016:1")))
+    bench.do("heartbeat-lost 3")
+    bench.wait_state("FAULT")
+    fault = bench.status()["fault"]
+    assert (fault["name"], fault["axis"], fault["device_code"]) == ("drive-offline", 3, 0x10003), fault
+    bench.do("mend 3")
+    time.sleep(2)
+    assert bench.status()["state"] == "FAULT", "it came back by itself"
+    harness.wait_for(lambda: is_led_up(bench), "up again", 0.5)
 
 
 def script_runs(bench):
@@ -202,6 +288,115 @@ def hostile_clients_stop_nothing(bench):
     assert bench.status()["state"] == "ENGAGED", bench.status()["fault"]
 
 
+TELLS_ALL = "tell_torque = yes\ntell_following_error = yes\ntell_inputs = yes\ntell_every = 5"
+
+
+def telemetry_is_told(bench):
+    """Drive 2 pushes with 2 mm of error, drive 1 stands at its lower end until it rises."""
+    metrics = bench.folder / "heave.prom"
+    bench.config.write_text(bench.config.read_text(encoding="utf-8").replace("[control]\n", f"[control]\nmetrics = {metrics}\n"), encoding="utf-8")
+    up(bench)
+    bench.do("friction 2 2")
+    with bench.sender() as sender:
+        sender.send("@A6T:0,0,0,0,0,20,2000#")
+        time.sleep(3)
+    told = [leg["report"]["telemetry"] for leg in bench.status()["cylinders"]]
+    assert all(one["age_ms"] <= 100 and one["inputs"] & 3 == 0 for one in told), told
+    assert 1 < told[1]["following_error_mm"] < 3 and told[1]["torque_percent"] > 5, told[1]
+    assert abs(told[0]["following_error_mm"]) < 0.1, told[0]
+    table = " ".join(bench.ctl("status").stdout.split())
+    assert "behind by" in table and "inputs 0x" in table, table
+    rows = list(csv.DictReader(bench.ctl("--for", "0.1", "scope").stdout.splitlines()))
+    assert len(rows) > 20 and float(rows[-1]["drive2_torque_percent"]) > 5 and 1 < float(rows[-1]["drive2_lag_mm"]) < 3, rows[-1:]
+    assert rows[-1]["drive7_lag_deg"] and int(rows[-1]["drive1_inputs"]) & 3 == 0 and rows[-1]["drive1_notes"] == "0", rows[-1:]
+    harness.wait_for(lambda: "heave_drive_torque_percent{axis=\"2\"}" in metrics.read_text(encoding="utf-8"), "the metrics have it")
+    page = metrics.read_text(encoding="utf-8")
+    assert re.search(r'heave_drive_following_error\{axis="2",unit="mm"\} [12]\.', page) and 'heave_drive_inputs{axis="7"}' in page, page
+
+
+def words_of(run):
+    assert run.returncode == 0, run
+    return run.stdout
+
+
+def drives_in_their_own_words(bench):
+    """What a person who exchanges a drive does: looks at it, saves what it is set to, and compares the new one."""
+    bench.start_twin()
+    bench.start()
+    harness.wait_for(lambda: bench.status()["cylinders"][2]["drive"] == "disabled", "the drives are set up")
+    text = words_of(bench.ctl("drive", "3"))
+    for wanted in ("drive 3, node 3: disabled", "1008:00 device name: heave-twin", "1018:04 serial number: 3", "6041:00 statusword: 576 (0x0240): switch on disabled",
+                   "6502:00 supported modes: 225 (0x000000E1): pp, hm, ip, csp", "errors kept (1003): none"):
+        assert wanted in text, (wanted, text)
+    assert bench.ctl("drive", "8").returncode == 1
+    refused = bench.ctl("sdo", "3", "6083", "5")
+    assert refused.returncode == 1 and "in SERVICE only" in refused.stderr, refused
+    saved = bench.folder / "drive3.dcf"
+    assert "22 objects saved" in words_of(bench.ctl("--save", saved, "drive", "3"))
+    assert bench.ctl("--save", saved, "drive", "3").returncode == 73, "what was saved before is kept"
+    words_of(bench.ctl("service"))
+    assert "6083:00 profile acceleration, counts/s^2: 12345 (0x00003039), written" in words_of(bench.ctl("sdo", "3", "6083", "12345"))
+    assert "12345" in words_of(bench.ctl("sdo", "3", "6083:00"))
+    words_of(bench.ctl("sdo", "3", "6098", "i8", "-3"))
+    for place in ("6040", "6065", "607A", "1A00:1", "6092:1"):
+        refused = bench.ctl("sdo", "3", place, "u32", "5")
+        assert refused.returncode == 1 and "relies on this object" in refused.stderr, refused
+    refused = bench.ctl("sdo", "3", "5FFF", "u8", "1")
+    assert refused.returncode == 1 and "no such object (0x06020000)" in refused.stderr, refused
+    differs = bench.ctl("--compare", saved, "drive", "3")
+    assert differs.returncode == 1 and "6083:00 profile acceleration, counts/s^2: the drive has 12345, the file 100000" in differs.stdout, differs
+    assert "6098:00 homing method: the drive has -3, the file 0" in differs.stdout and "20 objects are the same, 2 differ" in differs.stdout, differs
+    assert "22 objects are the same, 0 differ" in words_of(bench.ctl("--compare", saved, "drive", "2"))
+    imported = subprocess.run([bench.bin / "heaved", "--config", bench.config, "--import-dcf", saved], stdout=subprocess.PIPE, text=True, timeout=60, check=False)
+    assert imported.returncode == 0 and "6083:00" in imported.stdout, imported
+    words_of(bench.ctl("service-off"))
+
+
+def late_watchdog_is_refused_in_words(bench):
+    """The drive waits ten seconds for a gateway that is gone, and cannot be told otherwise."""
+    bench.start_twin("--fault", "0 object 2 0x1016:1 0x7F2710")
+    bench.start()
+    harness.wait_for(lambda: (bench.status()["cylinders"][1].get("report") or {}).get("phase") == "refused", "drive 2 is refused")
+    text = words_of(bench.ctl("drive", "2"))
+    for wanted in ("would stop too late by itself when the gateway is gone (0x1001C)", "about object: 1016:01", "found: 0x7F2710, wanted: 0x7F00"):
+        assert wanted in text, (wanted, text)
+    table = " ".join(bench.ctl("status").stdout.split())
+    assert "node 2: refused, object 1016:01 ; would stop too late" in table and "found 0x7F2710, wanted 0x7F00" in table, table
+
+
+def axes_of_a_node_in_their_own_words(bench):
+    """The objects of the second axis are 800h further; those of the node are the same."""
+    bench.start_twin()
+    bench.start()
+    harness.wait_for(lambda: bench.status()["cylinders"][5]["drive"] == "disabled", "the drives are set up")
+    text = words_of(bench.ctl("drive", "4"))
+    for wanted in ("drive 4, node 2.2: disabled", "1008:00 device name: heave-twin", "6841:00 statusword: 576 (0x0240): switch on disabled", "6864:00 position, counts: "):
+        assert wanted in text, (wanted, text)
+    assert "6041" not in text and "6064" not in text, text
+    assert "drive 3, node 2.1: disabled" in words_of(bench.ctl("drive", "3"))
+    saved = bench.folder / "drive4.dcf"
+    assert "22 objects saved" in words_of(bench.ctl("--save", saved, "drive", "4"))
+    words_of(bench.ctl("service"))
+    assert "6883:00 profile acceleration, counts/s^2: 12345 (0x00003039), written" in words_of(bench.ctl("sdo", "4", "6883", "12345"))
+    differs = bench.ctl("--compare", saved, "drive", "4")
+    assert differs.returncode == 1 and "6883:00 profile acceleration, counts/s^2: the drive has 12345, the file 100000" in differs.stdout, differs
+    words_of(bench.ctl("service-off"))
+
+
+def drives_are_read_where_nothing_is_led(bench):
+    """In FAULT a person wants to know why; elsewhere the bus is the motion's. Set-points go on beside it."""
+    up(bench)
+    refused = json.loads(bench.ctl("--json", "sdo", "1", "6041:00").stdout)
+    assert not refused["ok"] and refused["why"] == "moving", refused
+    text = words_of(bench.ctl("drive", "3"))
+    assert "enabled, homed" in text and "elsewhere the bus belongs to the motion" in text, text
+    bench.do("fault 3 0x8611")
+    bench.wait_state("FAULT")
+    text = words_of(bench.ctl("drive", "3"))
+    for wanted in ("trouble: following error (0x8611)", "errors kept (1003), newest first:\n  0x8611 (following error)", "603F:00 error code: 34321 (0x8611): following error"):
+        assert wanted in text, (wanted, text)
+
+
 def cpu_us(pid):
     fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) * 1e6 / os.sysconf("SC_CLK_TCK")
@@ -225,12 +420,29 @@ CASES = [
     ("heave-twin: faults of each class, and back", faults_and_back, {}),
     ("heave-twin: drives with CAN frames of their own, a plain map", frames_of_their_own, {"frames": "plain"}),
     ("heave-twin: drives with CAN frames of their own, a rich map", off_in_the_end, {"frames": "rich"}),
+    ("heave-twin: drives with CAN frames of their own, fields of bits and floats", off_in_the_end, {"frames": "bits"}),
+    ("heave-twin: drives with CAN frames of their own, two in a frame", off_in_the_end, {"frames": "shared"}),
+    ("heave-twin: one of two drives in a frame fails, and back", faults_of_a_shared_frame, {"frames": "shared"}),
+    ("heave-twin: drives with CAN frames of their own, a status apart", off_in_the_end, {"frames": "apart"}),
+    ("heave-twin: faults that a status apart says, by name", said_in_a_status_apart, {"frames": "apart"}),
+    ("heave-twin: a status apart that is missing or wrong, by name", wrong_in_a_status_apart, {"frames": "apart"}),
     ("heave-twin: faults of drives with frames of their own, and back", faults_of_frames, {"frames": "rich"}),
+    ("heave-twin: drives with two axes each, some of them in mode ip, rise and follow", rises_and_follows, {"nodes": TWO_AXES, "more": MODES}),
+    ("heave-twin: drives whose PDOs have high numbers rise and follow", rises_and_follows, {"more": ANY_NUMBERS}),
+    ("heave-twin: one axis of a node fails, and back", faults_of_a_node, {"nodes": TWO_AXES}),
+    ("heave-twin: drives that are guarded, without heartbeats", guarded_rise_and_fail, {"more": "error_control = node-guarding"}),
+    ("heave-twin: drives with fixed maps rise and follow", rises_and_follows, {"more": FIXED}),
     ("heave-twin: a script runs by its times", script_runs, {}),
     ("heave-twin: heaved without it says what to do, and goes on when it is there", without_a_twin_it_says_what_to_do, {}),
     ("heave-twin: bad input is named", bad_input, {}),
     ("heave-twin: heaved --doctor asks the drives on a bus between programs", doctor_asks_them, {}),
     ("heave-twin: without SocketCAN, or without the interface, it says what to do", says_what_is_missing, {}),
+    ("heave-twin: torque, following error and inputs of the drives are in status and metrics", telemetry_is_told, {"more": TELLS_ALL}),
+    ("heave-twin: heavectl drive and sdo say what a drive is, set it, save it and compare", drives_in_their_own_words, {"platform__engage": "manual"}),
+    ("heave-twin: a watchdog that waits far too long is refused, and said in words", late_watchdog_is_refused_in_words, {"platform__engage": "manual"}),
+    ("heave-twin: heavectl drive reads the objects of the axis that it is asked for", axes_of_a_node_in_their_own_words, {"nodes": TWO_AXES, "platform__engage": "manual"}),
+    ("heave-twin: drives are read where nothing is led, with the errors they kept", drives_are_read_where_nothing_is_led, {}),
+    ("heave-twin: drives that answer at every fourth SYNC, in turns, rise and follow", rises_and_follows, {"more": "answer_every = 4\nsync_counter = 8\nfollowing_error_mm = 14\nangle_following_error_deg = 14"}),
     ("heave-twin: hostile clients stop nothing", hostile_clients_stop_nothing, {}),
     ("heave-twin: costs little, seven drives at 2 ms less than a quarter of a core", costs_little, {"period_us": 2000}),
 ]

@@ -3,7 +3,6 @@
 """test_twin_can.py BIN [PART OF A NAME] - heave-twin on vcan, on virtual time: every row of docs/twin.md that plays a failure, and foreign masters.
 Runs inside kernel.py --virtual-time --python."""
 import re
-import struct
 import subprocess
 import sys
 import time
@@ -14,16 +13,29 @@ import harness
 import tap
 import vcan
 from canopen.profiles.p402 import BaseNode402
+from plain_master import drives_node_4
+from test_twin import FIXED, is_led_up
 from twin_bench import COUNTS_PER_MM, TwinBench
 
 ROW = re.compile(r"^\| (.+) \| `([^`]+)` \| ([\w -]+) \|$", re.MULTILINE)
 SETTLE_S = 3     # after a fault has struck
 PATIENCE_S = 12  # a platform that shall not come up has not by then
-SETTLED_MM = 5
+
+
+TWO_AXES = {"nodes": "1.1, 1.2, 2.1, 2.2, 3.1, 3.2, 4"}
+TAKES_ITS_TORQUE = "drives with frames of their own take their torque"  # has a map without `enable`
+# What the sections of the page say of their configurations.
+SECTIONS = {"": {}, "On nodes with several axes": TWO_AXES, "With fixed maps": {"more": FIXED}, "With node guarding": {"more": "error_control = node-guarding"},
+            "With a start-up list": {"more": "[cia402-startup]\n0x6083:00 = 100000 u32"},
+            "On drives with CAN frames of their own": {"frames": "rich"}}
 
 
 def rows():
-    return ROW.findall((harness.TOP / "docs/twin.md").read_text(encoding="utf-8").split("## Each failure of Modbus")[0])
+    """[(what, line, says, options of the bench)]"""
+    text = (harness.TOP / "docs/twin.md").read_text(encoding="utf-8").split("## Each failure of Modbus")[0]
+    first, *others = re.split(r"^### (?=On |With )", text, flags=re.MULTILINE)
+    found = [(heading, row) for heading, part in [("", first), *(part.split("\n", 1) for part in others)] for row in ROW.findall(part)]
+    return [(*row, {"frames": "selfish"} if row[0].startswith(TAKES_ITS_TORQUE) else SECTIONS[heading]) for heading, row in found]
 
 
 def plays(line, says):
@@ -52,6 +64,7 @@ def play(bench, line, says):
         time.sleep(1)
         assert bench.status()["state"] == "ENGAGED", bench.status()["fault"]
         return
+    bench.wait_state("FAULT")
     time.sleep(SETTLE_S)
     status = bench.status()
     assert (status["state"], status["fault"]["name"]) == ("FAULT", says), status["fault"]
@@ -126,83 +139,111 @@ def canopens_profile_homes_and_drives_it(bench):
         network.disconnect()
 
 
-class PlainMaster:
-    """Frames by python-can, and nothing else: a cyclic master as somebody writes it in an afternoon."""
-
-    def __init__(self, node):
-        self.bus, self.node = can.Bus(interface="socketcan", channel="vcan0"), node
-
-    def send(self, identifier, data=b""):
-        self.bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
-
-    def wait(self, identifier):
-        end = time.monotonic() + 2
-        while time.monotonic() < end:
-            message = self.bus.recv(0.1)
-            if message is not None and message.arbitration_id == identifier:
-                return bytes(message.data)
-        raise AssertionError(f"nothing from {identifier:X}")
-
-    def write(self, index, sub, size, value):
-        self.send(0x600 + self.node, struct.pack("<BHBi", 0x23 | (4 - size) << 2, index, sub, value))
-        answer = self.wait(0x580 + self.node)
-        assert answer[0] == 0x60, f"{index:X}:{sub}: {answer.hex()}"
-
-    def cycle(self, word, target):
-        self.send(0x80)
-        word_back, position = struct.unpack("<Hi", self.wait(0x180 + self.node))
-        self.send(0x200 + self.node, struct.pack("<Hi", word, target))
-        time.sleep(0.004)
-        return word_back, position
-
-
 def plain_frames_drive_it(bench):
     bench.start_twin()
     time.sleep(0.5)
-    master = PlainMaster(4)
+    drives_node_4(bench, can.Bus(interface="socketcan", channel="vcan0"))
+
+
+def canopen_drives_the_second_axis_of_a_node(bench):
+    """The package canopen: the objects of a node's second axis are 800h further, its PDOs 40h; the first axis stays where it is."""
+    bench.start_twin("--start", "20")
+    network = canopen.Network()
+    network.connect(interface="socketcan", channel="vcan0")
     try:
-        for record, cob_id, entries in ((0x1400, 0x204, (0x60400010, 0x607A0020)), (0x1800, 0x40000184, (0x60410010, 0x60640020))):
-            for number, other in ((0, cob_id), (1, cob_id + 0x100)):
-                master.write(record + number, 1, 4, struct.unpack("<i", struct.pack("<I", other | 0x80000000))[0])
-            master.write(record, 2, 1, 1)
-            master.write(record + 0x200, 0, 1, 0)
-            for sub, entry in enumerate(entries, 1):
-                master.write(record + 0x200, sub, 4, entry)
-            master.write(record + 0x200, 0, 1, len(entries))
-            master.write(record, 1, 4, cob_id)
-        master.write(0x60C2, 1, 1, 4)
-        master.write(0x6060, 0, 1, 8)
-        master.send(0, bytes([1, 4]))
-        _, position = master.cycle(0x06, 0)
+        node = network.add_node(1, canopen.ObjectDictionary())
+        time.sleep(0.5)
+
+        def write(index, sub, value, size):
+            node.sdo.download(index, sub, value.to_bytes(size, "little", signed=value < 0))
+
+        def read(index, sub=0):
+            return int.from_bytes(node.sdo.upload(index, sub), "little")
+
+        assert read(0x1A40) > 0 and read(0x1840, 1) & 0x80000000, "the PDOs of the second axis are off until somebody maps them"
+        write(0x6860, 0, 1, 1)
+        write(0x6881, 0, 30 * COUNTS_PER_MM, 4)
+        node.nmt.state = "OPERATIONAL"
         for word in (0x06, 0x07, 0x0F):
-            for _ in range(60):
-                status, position = master.cycle(word, position)
-        assert status & 0x106F == 0x1027 & 0x106F, hex(status)
-        for step in range(250):
-            status, position = master.cycle(0x0F, SETTLED_MM * COUNTS_PER_MM + 40 * step)
-        assert abs(position - SETTLED_MM * COUNTS_PER_MM - 40 * 250) < 200, position
-        assert abs(bench.twin_status()["drives"][3]["position"] - 15) < 0.2
-        time.sleep(0.1)
-        master.cycle(0x0F, position)  # after a silence: the drive has seen no SYNC, and takes that as no fault
+            write(0x6840, 0, word, 2)
+            time.sleep(0.3)
+        assert read(0x6841) & 0x6F == 0x27, hex(read(0x6841))
+        assert read(0x6041) & 0x6F == 0x40, hex(read(0x6041))
+        write(0x687A, 0, 42 * COUNTS_PER_MM, 4)
+        write(0x6840, 0, 0x1F, 2)
+        time.sleep(2)
+        drives = bench.twin_status()["drives"]
+        assert abs(drives[1]["position"] - 42) < 0.1, drives[1]
+        assert abs(drives[0]["position"] - 20) < 0.1, drives[0]
+        assert abs(read(0x6864) - 42 * COUNTS_PER_MM) < 100
     finally:
-        master.bus.shutdown()
+        network.disconnect()
 
 
-CASES = [(f"docs/twin.md: {line}: {says}, {what}", plays(line, says)) for what, line, says in rows()] + [
-    ("masters: the package canopen and its profile 402 home and drive it", canopens_profile_homes_and_drives_it),
-    ("masters: frames by python-can drive it in a cyclic mode", plain_frames_drive_it),
+def two_axes_rise_and_fail(bench):
+    """heaved and nodes of two axes on SocketCAN: the platform rises, the loss of one axis is named, nothing comes back by itself."""
+    bench.start_twin()
+    bench.start()
+    bench.wait_state("ENGAGED")
+    bench.do("lose 4 400")
+    bench.wait_state("FAULT")
+    fault = bench.status()["fault"]
+    assert (fault["name"], fault["axis"]) == ("drive-offline", 4), fault
+    time.sleep(SETTLE_S)
+    assert bench.status()["state"] == "FAULT", "it came back by itself"
+    bench.ctl("reset")
+    harness.wait_for(lambda: bench.status()["state"] != "FAULT", "the reset leads out")
+
+
+# --- A pair of interfaces ---
+
+PAIR = ("vxcan0", "vxcan1")
+
+
+def follows_on_a_pair(bench):
+    """heaved at one end, the drives at the other; the cable is out at heaved's end, where the interface says so."""
+    subprocess.run(["ip", "link", "add", PAIR[0], "type", "vxcan", "peer", "name", PAIR[1]], check=True)
+    try:
+        for name in PAIR:
+            subprocess.run(["ip", "link", "set", name, "txqueuelen", "100", "up"], check=True)
+        bench.start_twin("--interface", PAIR[1])
+        bench.start()
+        bench.wait_state("ENGAGED")
+        with bench.sender() as sender:
+            sender.send("@A6T:0,0,0,0,0,20,1500#")
+            time.sleep(2)
+        twin, status = bench.twin_status(), bench.status()
+        for leg, drive in zip(status["cylinders"], twin["drives"]):
+            assert abs(leg["actual_mm"] - drive["position"]) < 2 and drive["set_points"] > 200, (leg, drive)
+        for line, mend in (("cable-out", "cable-in"), ("down", "up")):
+            bench.do(line)
+            bench.wait_state("FAULT")
+            assert bench.status()["fault"]["name"] == "bus-lost", f"{line}: {bench.status()['fault']}"
+            bench.do(mend)
+            harness.wait_for(lambda: is_led_up(bench), f"{line}: up again", 0.5)
+    finally:
+        bench.end_twin()
+        subprocess.run(["ip", "link", "del", PAIR[0]], check=True)
+
+
+CASES = [(f"docs/twin.md{' with a configuration of its own' if options else ''}: {line}: {says}, {what}", plays(line, says), options) for what, line, says, options in rows()] + [
+    ("masters: the package canopen and its profile 402 home and drive it", canopens_profile_homes_and_drives_it, {}),
+    ("masters: the package canopen drives the second axis of a node", canopen_drives_the_second_axis_of_a_node, TWO_AXES),
+    ("nodes: drives of two axes on SocketCAN rise, and one fails", two_axes_rise_and_fail, TWO_AXES),
+    ("masters: frames by python-can home it and drive it in a cyclic mode", plain_frames_drive_it, {}),
+    ("pair: the drives at the other end of vxcan", follows_on_a_pair, {"interface": PAIR[0]}),
 ]
 
 
 def main():
     suite = tap.Suite()
     seen = set()
-    for name, case in CASES:
-        line = name.split(",")[0]
-        if line in seen or (len(sys.argv) > 2 and not re.search(sys.argv[2], name)):
+    for name, case, options in CASES:
+        played = (name.split(",")[0], str(options))  # a line that plays several rows counts once
+        if played in seen or (len(sys.argv) > 2 and not re.search(sys.argv[2], name)):
             continue
-        seen.add(line)
-        with suite.case(name), TwinBench(sys.argv[1], interface="vcan0") as bench:
+        seen.add(played)
+        with suite.case(name), TwinBench(sys.argv[1], **{"interface": "vcan0", **options}) as bench:
             case(bench)
     return suite.done()
 

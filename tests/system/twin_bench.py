@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""twin_bench.py - a platform whose drives are heave-twin's, as its users run it.
+"""twin_bench.py - a platform whose drives, or GPIO lines, are heave-twin's, as its users run it.
 
     with TwinBench(bin_dir, interface="vcan0") as bench:
         bench.start_twin("--fault", "+1 reboot 3")
@@ -24,7 +24,7 @@ interface = {interface}
 bitrate_bps = 1000000
 
 [cia402]
-nodes = 1, 2, 3, 4, 5, 6, 7
+nodes = {nodes}
 counts_per_mm = {counts}
 angle_counts_per_deg = {counts}
 period_us = {period_us}
@@ -54,7 +54,48 @@ reset = 23 {counter:u8} {crc8:1D}
 position_reply = {status:u8} {position:i32be} {fault:u8} {counter:u8} {crc8:1D}
 enabled_when = 0x01/0x01
 fault_when = 0x02/0x02
+""", "bits": """
+command_id = 0x201
+reply_id = 0x281
+setpoint = A0 00 00 00 {position:i21be@0.4} {counter:u4@3.4} {crc8:2F/FF}
+enable = B1 00 {counter:u4@1.4} {crc8:2F/FF}
+disable = B2 {crc8:2F/FF}
+stop = B3 {crc8:2F/FF}
+reset = B4 {crc8:2F/FF}
+position_reply = {position:f32be/1000} 00 00 00 {status:u3@4.1} {fault:u5le@4.4} {counter:u10le@5.3}
+enabled_when = 0x01/0x01
+fault_when = 0x02/0x02
+""", "shared": """
+command_id = 0x601
+setpoint_id = 0x201
+reply_id = 0x281, 0x281, 0x282, 0x282, 0x283, 0x283, 0x284
+setpoint = {position.1:i24le} {position.2:i24le} {counter:u8} {crc8:1D}
+enable = B1
+disable = B2
+stop = B3
+reset = B4
+position_reply = {position.1:i24le} {position.2:i24le} 00 {status.1:u4@6.0} {status.2:u4@6.4} {counter:u8}
+enabled_when = 0x01/0x01
+fault_when = 0x02/0x02
+""", "apart": """
+command_id = 0x601
+reply_id = 0x281
+status_id = 0x701, 0x701, 0x702, 0x702, 0x703, 0x703, 0x704
+startup1 = 2F 10 {counter:u8} {xor} -> 60 10 .. {xor} wait 50
+startup2 = 2F 11 01
+startup3 = 2F 12 -> 60 12
+setpoint = 10 {position:i32le}
+enable = B1
+disable = B2
+stop = B3
+reset = B4
+position_reply = {position:i32le} {torque:i16le} {counter:u8} {xor}
+status_reply = {status.1:u8} {fault.1:u16le} {status.2:u8} {fault.2:u16le} {counter:u8} {sum}
+status_every = 5
+enabled_when = 0x01/0x01
+fault_when = 0x02/0x02
 """}
+FRAMES["selfish"] = "".join(line for line in FRAMES["rich"].splitlines(keepends=True) if not line.startswith("enable ="))  # set-points give torque
 OWN_FRAMES = """
 [drives]
 driver = can-raw
@@ -73,19 +114,14 @@ angle_following_error_deg = 10
 """
 
 
-class TwinBench(harness.Bench):
-    def __init__(self, bin_dir, interface=None, period_us=4000, more="", frames=None, **changes):
-        super().__init__(bin_dir, **changes)
-        self.interface = interface or f"twin{self.port}"  # a bus between programs, of this test alone
+class WithTwin(harness.Bench):
+    """Any platform, with a heave-twin beside it."""
+
+    def __init__(self, bin_dir, *arguments, **changes):
+        super().__init__(bin_dir, *arguments, **changes)
         self.twin = None
         self.twin_socket = self.folder / "twin.sock"
         self.twin_log = self.folder / "twin.log"
-        text = self.config.read_text(encoding="utf-8")
-        more = FRAMES[frames] if frames else more
-        section = (OWN_FRAMES if frames else DRIVES).format(interface=self.interface, counts=COUNTS_PER_MM, period_us=period_us).strip() + "\n" + more.strip() + "\n"
-        text, count = re.subn(r"\[drives\].*?(?=\n\[relays\])", section, text, flags=re.DOTALL)
-        assert count == 1
-        self.config.write_text(text, encoding="utf-8")
 
     def __exit__(self, *exception):
         self.end_twin()
@@ -118,3 +154,15 @@ class TwinBench(harness.Bench):
         run = self.run_twin("--socket", self.twin_socket, "status")
         assert run.returncode == 0, run.stderr
         return json.loads(run.stdout)
+
+
+class TwinBench(WithTwin):
+    def __init__(self, bin_dir, interface=None, period_us=4000, more="", frames=None, nodes="1, 2, 3, 4, 5, 6, 7", **changes):
+        super().__init__(bin_dir, **changes)
+        self.interface = interface or f"twin{self.port}"  # a bus between programs, of this test alone
+        text = self.config.read_text(encoding="utf-8")
+        more = FRAMES[frames] if frames else more
+        section = (OWN_FRAMES if frames else DRIVES).format(interface=self.interface, counts=COUNTS_PER_MM, period_us=period_us, nodes=nodes).strip() + "\n" + more.strip() + "\n"
+        text, count = re.subn(r"\[drives\].*?(?=\n\[relays\])", section, text, flags=re.DOTALL)
+        assert count == 1
+        self.config.write_text(text, encoding="utf-8")

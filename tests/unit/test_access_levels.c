@@ -82,6 +82,8 @@ static void test_levels_needed_by_each_request(void)
         {"incidents", LEVEL_LOOK},
         {"seen", LEVEL_OPERATE},
         {"acknowledge", LEVEL_SERVICE},
+        {"sdo 1 6041:00", LEVEL_SERVICE},
+        {"sdo 1 6083:00 5", LEVEL_SERVICE},
     };
     for (unsigned i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
         TEST_ASSERT_EQUAL_MESSAGE(k_rows[i].level, levels_needed(k_rows[i].request, 40), k_rows[i].request);

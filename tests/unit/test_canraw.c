@@ -79,7 +79,7 @@ static void await(drive_state_t state, int most)
 
 static void open_with(const sim_can_fault_t *plan, uint32_t planned, bool is_rich)
 {
-    hal_can_filter_t filter[DRIVES_MAX];
+    hal_can_filter_t filter[CANRAW_FILTERS_MAX];
     now_us = 1000000;
     sim_can_bus_init(&bus, 0, plan, planned);
     canraw_slave_open(&slave, &bus, is_rich);
@@ -245,12 +245,15 @@ static void test_drive_whose_counter_stands_still_is_lost_and_stays_so(void)
 static void test_fault_of_a_drive_has_the_code_that_it_tells(void)
 {
     map = canraw_maps_rich();
-    map.position_reply = (canraw_frame_t){
-        6,
-        0x01,
-        3,
-        {0x30},
-        {{CANRAW_STATUS, 1, 1, false, false}, {CANRAW_FAULT, 2, 1, false, false}, {CANRAW_POSITION, 3, 3, true, true}}};
+    map.position_reply = (canraw_frame_t){6,
+                                          0x01,
+                                          3,
+                                          {0x30},
+                                          {{CANRAW_STATUS, 1, 8, false, false, 0, 0, 0},
+                                           {CANRAW_FAULT, 2, 8, false, false, 0, 0, 0},
+                                           {CANRAW_POSITION, 3, 24, true, true, 0, 0, 0}},
+                                          0,
+                                          0};
     open_with(NULL, 0, true);
     const can_frame_t bad = {.id = 0x18FF0203, .is_extended = true, .length = 6, .data = {0x30, 0x02, 0x2A, 0xFF, 0xFF, 0xFE}};
     TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &bad));
@@ -873,7 +876,7 @@ static void test_homing_done_from_the_start_is_believed_after_a_while(void)
 static void test_homing_is_judged_by_its_own_query_where_there_is_one(void)
 {
     map.position_reply.fields = 2;
-    map.position_reply.field[1] = (canraw_field_t){CANRAW_STATUS, 1, 1, false, false}; /* 15h, always: done would be 1 */
+    map.position_reply.field[1] = (canraw_field_t){CANRAW_STATUS, 1, 8, false, false, 0, 0, 0}; /* 15h, always: done would be 1 */
     open_with(NULL, 0, false);
     enable();
     TEST_ASSERT_TRUE(feedback[0].is_homed);
@@ -1196,7 +1199,7 @@ static void test_init_map_that_contradicts_itself_is_refused(void)
             map.setpoint.field[1].at = 5;
             break;
         case 16:
-            map.setpoint.field[0].bytes = 3;
+            map.setpoint.field[0].bits = 24;
             break;
         case 17:
             map.setpoint.length = 7;
@@ -1232,7 +1235,7 @@ static void test_init_map_that_contradicts_itself_is_refused(void)
         case 27:
             map.command[CANRAW_HOME].constant = 0xFC;
             map.command[CANRAW_HOME].fields = 1;
-            map.command[CANRAW_HOME].field[0] = (canraw_field_t){CANRAW_POSITION, 0, 2, false, false};
+            map.command[CANRAW_HOME].field[0] = (canraw_field_t){CANRAW_POSITION, 0, 16, false, false, 0, 0, 0};
             break;
         case 28:
             map.command[CANRAW_HOME].length = 9;
@@ -1247,7 +1250,7 @@ static void test_init_map_that_contradicts_itself_is_refused(void)
             map.position_reply.field[0].at = 3;
             break;
         case 32:
-            map.homing_reply.field[0].bytes = 3;
+            map.homing_reply.field[0].bits = 24;
             break;
         case 33:
             map.setpoint.field[0].value = CANRAW_SPEED;

@@ -69,7 +69,8 @@ static void configure(void)
                                .power_timeout_ms = 300,
                                .window_ms = 20,
                                .abort_option = 1,
-                               .is_reset_wanted = true};
+                               .is_reset_wanted = true,
+                               .is_support_checked = true};
     for (unsigned k = 0; k < AXES; k++) {
         config.axis[k] = (cia402_axis_config_t){.node = (uint8_t)(k + 1),
                                                 .scale = {1000, 1, 0},
@@ -233,6 +234,38 @@ static void test_setup_pdos_are_mapped_in_the_order_every_stack_accepts(void)
     }
 }
 
+static void add_object(unsigned drive, uint16_t index, uint8_t sub, uint8_t bytes, uint32_t value)
+{
+    cia402_slave_drive_t *d = &slave.drive[drive];
+    TEST_ASSERT_TRUE(d->rows < CIA402_SLAVE_ROWS);
+    d->row[d->rows++] = (cia402_slave_row_t){.index = index, .sub = sub, .bytes = bytes, .value = value, .initial = value};
+}
+
+/* Any other than the first four, those too that have the numbers of a second axis elsewhere: a PDO that is on cannot be mapped.
+ */
+static void test_setup_pdo_with_a_high_number_is_switched_off_before_it_is_mapped(void)
+{
+    static const uint16_t k_numbers[] = {5, 65, 68, 129};
+    for (size_t i = 0; i < sizeof k_numbers / sizeof k_numbers[0]; i++) {
+        const uint16_t record = (uint16_t)(0x1400 + k_numbers[i] - 1);
+        const uint32_t map = 0x200u + record;
+        setUp();
+        config.commands = (cia402_maps_t){.count = 1, .map = {{k_numbers[i], 2, {0x60400010, 0x607A0020}}}};
+        for (unsigned k = 0; k < AXES; k++) {
+            add_object(k, record, 1, 4, 0x200 + k + 1); /* on, as the maker has it */
+            add_object(k, record, 2, 1, 255);
+            add_object(k, (uint16_t)map, 0, 1, 1);
+            add_object(k, (uint16_t)map, 1, 4, 0x60400010);
+            add_object(k, (uint16_t)map, 2, 4, 0);
+        }
+        come_up();
+        TEST_ASSERT_TRUE(place(0, (uint32_t)record << 8 | 1, 0) < place(0, map << 8, 0));
+        TEST_ASSERT_EQUAL_HEX32(0x201, cia402_slave_row(&slave, 0, record, 1)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x607A0020, cia402_slave_row(&slave, 0, (uint16_t)map, 2)->value);
+        TEST_ASSERT_EQUAL_HEX32(0x80000201, cia402_slave_row(&slave, 0, 0x1400, 1)->value); /* has the same identifier */
+    }
+}
+
 static void test_setup_drives_that_are_up_already_are_reset_first(void)
 {
     start();
@@ -366,6 +399,74 @@ static void test_setup_mapping_that_can_only_be_read_is_told_as_such(void)
     TEST_ASSERT_EQUAL_STRING("the object can only be read", r.detail);
     TEST_ASSERT_EQUAL_HEX32(0x60FF0020, r.found);
     TEST_ASSERT_EQUAL_HEX32(0x607A0020, r.wanted);
+}
+
+/* 6502h: bit 0 PP, 5 homing, 6 IP, 7 CSP. */
+static void test_setup_mode_that_a_drive_has_not_got_is_refused_before_it_is_asked_for(void)
+{
+    cia402_slave_row(&slave, 2, 0x6502, 0)->value = 0x61;
+    const drive_report_t r = refusal_of(2);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NO_SUCH_MODE, r.code);
+    TEST_ASSERT_EQUAL_HEX32(0x650200, r.object);
+    TEST_ASSERT_EQUAL_HEX32(0x61, r.found);
+    TEST_ASSERT_EQUAL_HEX32(0x80, r.wanted);
+    TEST_ASSERT_EQUAL_STRING("a bit for each mode that it supports", r.detail);
+    TEST_ASSERT_EQUAL_UINT32(0, cia402_slave_row(&slave, 2, 0x6060, 0)->value);
+}
+
+static void test_setup_homing_that_a_drive_has_not_got_is_refused_where_it_is_wanted(void)
+{
+    config.axis[1].homing_method = 17;
+    for (unsigned k = 0; k < AXES; k++) {
+        cia402_slave_row(&slave, k, 0x6502, 0)->value = 0xC1;
+    }
+    const drive_report_t r = refusal_of(1);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NO_SUCH_MODE, r.code);
+    TEST_ASSERT_EQUAL_HEX32(0xA0, r.wanted);
+}
+
+static void test_setup_homing_method_that_is_not_in_the_list_is_refused(void)
+{
+    config.axis[3].homing_method = 37;
+    config.axis[4].homing_method = 18;
+    const drive_report_t r = refusal_of(4);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NO_SUCH_HOMING, r.code);
+    TEST_ASSERT_EQUAL_HEX32(0x60E303, r.object);
+    TEST_ASSERT_EQUAL_HEX32(37, r.found);
+    TEST_ASSERT_EQUAL_HEX32(18, r.wanted);
+    TEST_ASSERT_EQUAL_STRING("the last of the methods that it supports", r.detail);
+    TEST_ASSERT_EQUAL_UINT32(0, cia402_slave_row(&slave, 4, 0x6098, 0)->value);
+    TEST_ASSERT_EQUAL_UINT32(37, cia402_slave_row(&slave, 3, 0x6098, 0)->value);
+}
+
+/* No object, 0, an empty list, a list that ends early, a method of the maker, no answer, or not asked: nothing is told, and the
+ * drive decides. */
+static void test_setup_what_a_drive_does_not_tell_is_no_refusal(void)
+{
+    for (unsigned k = 0; k < AXES; k++) {
+        config.axis[k].homing_method = 18;
+    }
+    config.axis[4].homing_method = -3;
+    cia402_slave_row(&slave, 0, 0x6502, 0)->is_missing = true;
+    cia402_slave_row(&slave, 0, 0x60E3, 0)->is_missing = true;
+    cia402_slave_row(&slave, 1, 0x6502, 0)->value = 0;
+    cia402_slave_row(&slave, 1, 0x60E3, 0)->value = 0;
+    cia402_slave_row(&slave, 2, 0x60E3, 2)->is_missing = true;
+    cia402_slave_row(&slave, 3, 0x6502, 0)->is_silent = true;
+    cia402_slave_row(&slave, 3, 0x60E3, 0)->is_silent = true;
+    for (unsigned k = 5; k < AXES; k++) {
+        cia402_slave_row(&slave, k, 0x60E3, 3)->value = 18;
+    }
+    come_up();
+    TEST_ASSERT_EQUAL_UINT32(18, cia402_slave_row(&slave, 0, 0x6098, 0)->value);
+}
+
+static void test_setup_what_a_drive_tells_does_not_count_where_it_is_not_asked(void)
+{
+    config.is_support_checked = false;
+    config.axis[4].homing_method = 18;
+    cia402_slave_row(&slave, 2, 0x6502, 0)->value = 0x61;
+    come_up();
 }
 
 static void test_setup_wrong_identity_is_refused(void)
@@ -544,8 +645,9 @@ static void test_setup_guard_that_cannot_be_written_is_taken_where_it_is_on(void
         uint32_t value;
         bool is_taken;
     } k_rows[] = {{0x605E, 0, 1, true},        {0x605E, 0, 0, false},        {0x605A, 0, 0xFFFF, false},
-                  {0x1016, 1, 0x7F0064, true}, {0x1016, 1, 0x7E0064, false}, {0x1016, 1, 0x7F0000, false}};
-    for (size_t i = 0; i < 6; i++) {
+                  {0x1016, 1, 0x7F0064, true}, {0x1016, 1, 0x7E0064, false}, {0x1016, 1, 0x7F0000, false},
+                  {0x1016, 1, 0x7F012C, true} /* twice of what was asked for */};
+    for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
         setUp();
         cia402_slave_row_t *row = cia402_slave_row(&slave, 1, k_rows[i].index, k_rows[i].sub);
         row->is_read_only = true;
@@ -555,6 +657,31 @@ static void test_setup_guard_that_cannot_be_written_is_taken_where_it_is_on(void
         } else {
             TEST_ASSERT_EQUAL_HEX32(CIA402_UNGUARDED, refusal_of(1).code);
         }
+    }
+}
+
+/* It is on, but the drive would go on for too long without us. */
+static void test_setup_consumer_time_that_is_far_too_long_is_refused_unless_allowed(void)
+{
+    for (unsigned is_allowed = 0; is_allowed < 2; is_allowed++) {
+        setUp();
+        config.is_unguarded_allowed = is_allowed != 0;
+        cia402_slave_row_t *row = cia402_slave_row(&slave, 1, 0x1016, 1);
+        row->is_read_only = true;
+        row->value = row->initial = 0x7F012D;
+        if (is_allowed != 0) {
+            come_up();
+            TEST_ASSERT_EQUAL_HEX32(0x101601, report(1).object);
+            continue;
+        }
+        const drive_report_t refused = refusal_of(1);
+        TEST_ASSERT_EQUAL_HEX32(CIA402_GUARDED_LATE, refused.code);
+        TEST_ASSERT_EQUAL_STRING("would stop too late by itself when the gateway is gone", refused.trouble);
+        TEST_ASSERT_EQUAL_HEX32(0x101601, refused.object);
+        TEST_ASSERT_EQUAL_STRING("the object can only be read", refused.detail);
+        TEST_ASSERT_TRUE(refused.has_found);
+        TEST_ASSERT_EQUAL_HEX32(0x7F012D, refused.found);
+        TEST_ASSERT_EQUAL_HEX32(0x7F0096, refused.wanted);
     }
 }
 
@@ -1377,10 +1504,11 @@ static unsigned energized(void)
 }
 
 /* What a drive is said to be without stays off, whatever it was at when it was asked to go off; and it is not said late. */
-static void test_off_is_told_once_it_is_so_whenever_it_is_asked_for(void)
+static void off_is_told_once_it_is_so(uint8_t every, unsigned step)
 {
-    for (unsigned i = 0; i < 260; i++) {
+    for (unsigned i = 0; i < 260; i += step) {
         setUp();
+        config.answer_every = every;
         come_up();
         cycles(5 * PERIOD);
         TEST_ASSERT_EQUAL_UINT(0, energized());
@@ -1389,8 +1517,8 @@ static void test_off_is_told_once_it_is_so_whenever_it_is_asked_for(void)
             (void)!cycle();
             follow_actual();
         }
-        slave.drive[3].tpdo_drop = i % 3; /* its answer is late */
-        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, i % 2 == 0 ? DRIVES_DISABLE : DRIVES_QUICK_STOP));
+        slave.drive[3].tpdo_drop = i / step % 3; /* its answer is late */
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, i / step % 2 == 0 ? DRIVES_DISABLE : DRIVES_QUICK_STOP));
         unsigned since = 0;
         for (unsigned n = 0; n < 400; n++) {
             (void)!cycle();
@@ -1400,10 +1528,20 @@ static void test_off_is_told_once_it_is_so_whenever_it_is_asked_for(void)
                 is_any |= has_power(k);
             }
             since = is_any ? 0 : since + 1u;
-            TEST_ASSERT_TRUE(since < 8 * PERIOD || energized() == 0);
+            TEST_ASSERT_TRUE(since < 8 * PERIOD * every || energized() == 0);
         }
         TEST_ASSERT_EQUAL_UINT(0, energized());
     }
+}
+
+static void test_off_is_told_once_it_is_so_whenever_it_is_asked_for(void)
+{
+    off_is_told_once_it_is_so(1, 1);
+}
+
+static void test_off_is_told_once_it_is_so_where_answers_are_rare(void)
+{
+    off_is_told_once_it_is_so(3, 5);
 }
 
 /* Nobody knows of a drive that was lost; one that has started again has no torque. */
@@ -2409,6 +2547,202 @@ static void test_emergency_that_leaves_operational_is_the_reason(void)
     TEST_ASSERT_EQUAL_HEX32(0x8100, report(1).detail_code);
 }
 
+/* --- Answers to every n-th SYNC --- */
+
+static void test_rare_answers_carry_a_motion(void)
+{
+    config.answer_every = 4;
+    come_up();
+    TEST_ASSERT_EQUAL_UINT32(4, cia402_slave_row(&slave, 3, 0x1800, 2)->value);
+    TEST_ASSERT_EQUAL_UINT32(0, cia402_slave_row(&slave, 3, 0x1800, 6)->value);
+    enable();
+    for (unsigned i = 0; i < 100; i++) {
+        for (unsigned k = 0; k < AXES; k++) {
+            setpoint_q32[k] += MM(1) / 4;
+        }
+        cycles(PERIOD);
+        TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        TEST_ASSERT_TRUE(now_us - feedback[3].actual_us <= 5 * PERIOD * CYCLE_US);
+    }
+    TEST_ASSERT_INT_WITHIN(2000, 128000, slave.drive[3].position);
+    TEST_ASSERT_TRUE(slave.drive[3].largest_step <= 250);
+}
+
+static void test_rare_answers_that_stay_away_are_a_loss_after_three_turns(void)
+{
+    config.answer_every = 4;
+    come_up();
+    enable();
+    for (int i = 0; i < 5; i++) {
+        slave.drive[2].tpdo_drop = 2;
+        cycles(16 * PERIOD);
+    }
+    TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+    slave.drive[2].is_mute = true;
+    const unsigned count = cycles_to_loss(CIA402_LOST_TPDO, DRIVE_OFFLINE);
+    TEST_ASSERT_TRUE(count <= 13 * PERIOD + 1 && count > 8 * PERIOD);
+}
+
+static void test_rare_answers_of_two_drives_are_told_apart(void)
+{
+    config.answer_every = 4;
+    come_up();
+    enable();
+    const uint64_t begin_us = now_us;
+    while (feedback[2].state != DRIVE_FAULT && now_us - begin_us < 400000) {
+        const can_frame_t frame = {.id = 0x183, .length = 7, .data = {0x37, 0x12, 0xB0, 0x8E, 1, 0, 8}};
+        TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+        cycles(4 * PERIOD);
+    }
+    TEST_ASSERT_EQUAL_HEX32(CIA402_TWICE, feedback[2].fault_code);
+    TEST_ASSERT_TRUE(now_us - begin_us <= 3 * 4 * PERIOD * CYCLE_US);
+}
+
+/* With a counter that goes round in whole turns no SYNC is answered by more drives than need be. */
+static void test_rare_answers_take_turns(void)
+{
+    uint32_t answers[4] = {0};
+    config.answer_every = 4;
+    config.sync_counter = 8;
+    come_up();
+    enable();
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(k % 4 + 1, cia402_slave_row(&slave, k, 0x1800, 6)->value);
+    }
+    for (unsigned i = 0; i < 40 * PERIOD; i++) {
+        uint64_t before_us[AXES];
+        for (unsigned k = 0; k < AXES; k++) {
+            before_us[k] = feedback[k].actual_us;
+        }
+        cycles(1);
+        for (unsigned k = 0; k < AXES; k++) {
+            answers[k % 4] += feedback[k].actual_us != before_us[k];
+            TEST_ASSERT_TRUE(feedback[k].actual_us == before_us[k] || slave.sync_number % 4 == (k + 1) % 4);
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT32(20, answers[0]);
+    TEST_ASSERT_EQUAL_UINT32(10, answers[3]);
+}
+
+static void test_rare_answers_need_1800_06_for_their_turns_only(void)
+{
+    config.answer_every = 4;
+    config.sync_counter = 9; /* no whole turns */
+    cia402_slave_row(&slave, 3, 0x1800, 6)->is_missing = true;
+    come_up();
+    setUp();
+    config.answer_every = 4;
+    config.sync_counter = 8;
+    cia402_slave_row(&slave, 3, 0x1800, 6)->is_missing = true;
+    TEST_ASSERT_EQUAL_HEX32(0x180006, refusal_of(3).object);
+}
+
+static void test_rare_answers_are_not_for_profile_position(void)
+{
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, NULL, 0));
+    config.answer_every = CIA402_ANSWER_EVERY_MAX;
+    TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &config, sim_can_hal(&node)));
+    config.answer_every++;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, cia402_init(&driver, &config, sim_can_hal(&node)));
+    config.mode = CIA402_MODE_PP;
+    config.answer_every = 2;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, cia402_init(&driver, &config, sim_can_hal(&node)));
+    config.answer_every = 1;
+    TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &config, sim_can_hal(&node)));
+}
+
+/* --- Telemetry --- */
+
+static void tell(uint8_t values, uint8_t every)
+{
+    config.telemetry = values;
+    config.telemetry_every = every;
+    config.axis[1].scale.num = -1000;
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.drive[k].torque = (int16_t)(250 - 100 * (int)k);
+        slave.drive[k].lag = 1500;
+        slave.drive[k].inputs = 0x80010005;
+    }
+}
+
+static void test_telemetry_of_all_kinds_takes_two_pdos(void)
+{
+    tell(DRIVE_TELLS_TORQUE | DRIVE_TELLS_LAG | DRIVE_TELLS_INPUTS, 1);
+    come_up();
+    cycles(3 * PERIOD);
+    TEST_ASSERT_EQUAL_HEX32(0x40000284, cia402_slave_row(&slave, 3, 0x1801, 1)->value);
+    TEST_ASSERT_EQUAL_UINT32(2, cia402_slave_row(&slave, 3, 0x1A01, 0)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60770010, cia402_slave_row(&slave, 3, 0x1A01, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60F40020, cia402_slave_row(&slave, 3, 0x1A01, 2)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x40000384, cia402_slave_row(&slave, 3, 0x1802, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60FD0020, cia402_slave_row(&slave, 3, 0x1A02, 1)->value);
+    const drive_telemetry_t plain = report(6).telemetry;
+    TEST_ASSERT_EQUAL_UINT8(7, plain.has);
+    TEST_ASSERT_EQUAL_INT32(-350, plain.torque_permille);
+    TEST_ASSERT_EQUAL_INT64(MM(3) / 2, plain.lag_q32);
+    TEST_ASSERT_EQUAL_HEX32(0x80010005, plain.inputs);
+    TEST_ASSERT_TRUE(now_us - plain.at_us <= PERIOD * CYCLE_US);
+    const drive_telemetry_t backwards = report(1).telemetry;
+    TEST_ASSERT_EQUAL_INT32(-150, backwards.torque_permille);
+    TEST_ASSERT_EQUAL_INT64(-MM(3) / 2, backwards.lag_q32);
+}
+
+static void test_telemetry_of_one_kind_comes_at_its_rate(void)
+{
+    tell(DRIVE_TELLS_INPUTS, 5);
+    come_up();
+    TEST_ASSERT_EQUAL_UINT32(5, cia402_slave_row(&slave, 2, 0x1801, 2)->value);
+    TEST_ASSERT_EQUAL_HEX32(0x60FD0020, cia402_slave_row(&slave, 2, 0x1A01, 1)->value);
+    TEST_ASSERT_EQUAL_HEX32(0xC0000383, cia402_slave_row(&slave, 2, 0x1802, 1)->value);
+    cycles(6 * PERIOD);
+    const uint64_t first_us = report(2).telemetry.at_us;
+    cycles(5 * PERIOD);
+    TEST_ASSERT_EQUAL_UINT64(5 * PERIOD * CYCLE_US, report(2).telemetry.at_us - first_us);
+    TEST_ASSERT_EQUAL_UINT8(DRIVE_TELLS_INPUTS, report(2).telemetry.has);
+    enable();
+}
+
+static void test_telemetry_that_a_drive_cannot_map_is_named(void)
+{
+    tell(DRIVE_TELLS_TORQUE, 1);
+    cia402_slave_row(&slave, 4, 0x1A01, 1)->refusal = 0x06040041;
+    const drive_report_t r = refusal_of(4);
+    TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, r.code);
+    TEST_ASSERT_EQUAL_HEX32(0x1A0101, r.object);
+}
+
+/* Nobody asked for it, it has another length, or another SYNC rate than there is: no telemetry, no trouble. */
+static void test_telemetry_that_was_not_asked_for_counts_for_nothing(void)
+{
+    hal_can_filter_t filter[CIA402_FILTERS_MAX];
+    const can_frame_t frame = {.id = 0x283, .length = 4, .data = {1, 2, 3, 4}};
+    TEST_ASSERT_EQUAL_UINT32(4 * AXES, cia402_filters(&config, filter));
+    come_up();
+    TEST_ASSERT_EQUAL_HEX32(0xC0000283, cia402_slave_row(&slave, 2, 0x1801, 1)->value);
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+    cycles(2);
+    TEST_ASSERT_EQUAL_UINT8(0, report(2).telemetry.has);
+}
+
+static void test_telemetry_of_another_length_counts_for_nothing(void)
+{
+    const can_frame_t frame = {.id = 0x283, .length = 3, .data = {1, 2, 3}};
+    tell(DRIVE_TELLS_TORQUE, 200);
+    come_up();
+    TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
+    cycles(2);
+    TEST_ASSERT_EQUAL_UINT8(0, report(2).telemetry.has);
+}
+
+static void test_telemetry_rate_is_checked(void)
+{
+    tell(DRIVE_TELLS_TORQUE, 0);
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, NULL, 0));
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, cia402_init(&driver, &config, sim_can_hal(&node)));
+    config.telemetry_every = 241;
+    TEST_ASSERT_EQUAL(HV_ERR_RANGE, cia402_init(&driver, &config, sim_can_hal(&node)));
+}
+
 /* --- Two drives with the same node id --- */
 
 /* The other one answers too, from somewhere else. */
@@ -2430,6 +2764,9 @@ static void test_twice_in_motion_is_a_fault_within_three_periods(void)
 {
     come_up();
     enable();
+    for (const uint32_t syncs = slave.syncs; slave.syncs == syncs;) { /* it answers SYNC, as the drive does */
+        cycles(1);
+    }
     const uint64_t begin_us = now_us;
     while (feedback[2].state != DRIVE_FAULT && now_us - begin_us < 100000) {
         const can_frame_t frame = {.id = 0x183, .length = 7, .data = {0x37, 0x12, 1, 2, 3, 0, 8}};
@@ -2492,11 +2829,29 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_setup_pdos_are_mapped_in_the_order_every_stack_accepts);
+    RUN_TEST(test_setup_pdo_with_a_high_number_is_switched_off_before_it_is_mapped);
     RUN_TEST(test_setup_drives_that_are_up_already_are_reset_first);
     RUN_TEST(test_setup_object_refused_names_drive_object_and_reason);
     RUN_TEST(test_setup_all_refused_is_no_lost_bus_and_a_reset_sets_up_again);
     RUN_TEST(test_loss_all_that_start_again_are_no_lost_bus);
     RUN_TEST(test_loss_all_silent_is_a_lost_bus_until_one_answers);
+    RUN_TEST(test_setup_mode_that_a_drive_has_not_got_is_refused_before_it_is_asked_for);
+    RUN_TEST(test_setup_homing_that_a_drive_has_not_got_is_refused_where_it_is_wanted);
+    RUN_TEST(test_setup_homing_method_that_is_not_in_the_list_is_refused);
+    RUN_TEST(test_setup_what_a_drive_does_not_tell_is_no_refusal);
+    RUN_TEST(test_setup_what_a_drive_tells_does_not_count_where_it_is_not_asked);
+    RUN_TEST(test_rare_answers_carry_a_motion);
+    RUN_TEST(test_rare_answers_that_stay_away_are_a_loss_after_three_turns);
+    RUN_TEST(test_rare_answers_of_two_drives_are_told_apart);
+    RUN_TEST(test_rare_answers_take_turns);
+    RUN_TEST(test_rare_answers_need_1800_06_for_their_turns_only);
+    RUN_TEST(test_rare_answers_are_not_for_profile_position);
+    RUN_TEST(test_telemetry_of_all_kinds_takes_two_pdos);
+    RUN_TEST(test_telemetry_of_one_kind_comes_at_its_rate);
+    RUN_TEST(test_telemetry_that_a_drive_cannot_map_is_named);
+    RUN_TEST(test_telemetry_that_was_not_asked_for_counts_for_nothing);
+    RUN_TEST(test_telemetry_of_another_length_counts_for_nothing);
+    RUN_TEST(test_telemetry_rate_is_checked);
     RUN_TEST(test_setup_wrong_identity_is_refused);
     RUN_TEST(test_setup_object_with_another_value_tells_both);
     RUN_TEST(test_setup_object_that_can_only_be_read_is_told_as_such);
@@ -2511,6 +2866,7 @@ int main(void)
     RUN_TEST(test_setup_other_profile_is_refused);
     RUN_TEST(test_setup_missing_guard_is_refused_unless_allowed);
     RUN_TEST(test_setup_guard_that_cannot_be_written_is_taken_where_it_is_on);
+    RUN_TEST(test_setup_consumer_time_that_is_far_too_long_is_refused_unless_allowed);
     RUN_TEST(test_setup_without_heartbeats_is_refused);
     RUN_TEST(test_setup_without_heartbeats_is_taken_where_allowed_and_watched_by_its_tpdos);
     RUN_TEST(test_setup_drive_that_goes_operational_by_itself_is_told_again);
@@ -2562,6 +2918,7 @@ int main(void)
     RUN_TEST(test_request_reset_of_a_fault_that_goes_by_itself);
     RUN_TEST(test_request_reset_is_one_edge_and_only_when_asked);
     RUN_TEST(test_off_is_told_once_it_is_so_whenever_it_is_asked_for);
+    RUN_TEST(test_off_is_told_once_it_is_so_where_answers_are_rare);
     RUN_TEST(test_off_of_a_drive_that_is_lost_is_as_it_was_heard_last);
     RUN_TEST(test_leave_drives_without_torque_forget_the_gateway);
     RUN_TEST(test_leave_drives_with_torque_are_left_to_their_watchdogs);

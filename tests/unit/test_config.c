@@ -686,17 +686,29 @@ static void test_load_key_before_any_section_is_an_error(void)
 
 static void test_load_line_longer_than_inih_takes_is_an_error(void)
 {
-    char expected[200], line[256];
+    char expected[200];
     for (unsigned length = 195; length < 205; length++) {
         take_good_file();
-        memset(line, 'x', sizeof line);
-        line[0] = ';';
-        line[length] = '\0';
-        insert_line(3, line);
+        const unsigned at = find_key("udp", "port");
+        snprintf(m_line[at], sizeof m_line[0], "port =%*d", (int)length - 6, 1234);
         const int count = load_lines();
         TEST_ASSERT_EQUAL_INT(length > 197 ? 1 : 0, count);
-        snprintf(expected, sizeof expected, "%s:4: line of %u bytes; allowed: at most 197\n", FILE_NAME, length);
+        snprintf(expected, sizeof expected, "%s:%u: line of %u bytes; allowed: at most 197\n", FILE_NAME, at + 1u, length);
         TEST_ASSERT_EQUAL_STRING(length > 197 ? expected : "", m_errors);
+    }
+}
+
+/* A line of Chinese has three bytes a character. */
+static void test_load_comments_may_be_longer(void)
+{
+    char line[256];
+    for (unsigned length = 195; length < 250; length++) {
+        take_good_file();
+        memset(line, 'x', sizeof line);
+        line[0] = length % 2u == 0 ? ';' : '#';
+        line[length] = '\0';
+        insert_line(3, line);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_lines(), m_errors);
     }
 }
 
@@ -1948,6 +1960,7 @@ int main(void)
     RUN_TEST(test_load_text_behind_a_section_header_is_an_error);
     RUN_TEST(test_load_key_before_any_section_is_an_error);
     RUN_TEST(test_load_line_longer_than_inih_takes_is_an_error);
+    RUN_TEST(test_load_comments_may_be_longer);
     RUN_TEST(test_load_line_of_exactly_the_limit_keeps_its_value);
     RUN_TEST(test_load_comments_blanks_crlf_and_bom_are_taken);
     RUN_TEST(test_load_last_line_without_newline_is_taken);

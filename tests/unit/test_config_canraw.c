@@ -193,6 +193,22 @@ static void test_preset_bus_load_is_the_sum_of_its_frames(void)
     TEST_ASSERT_EQUAL_UINT32((6 * 135 + 3 * 75 + 3 * 115) * 250, config_bus_load_ppm(&bus));
 }
 
+static const config_key_t *key_of(const char *name)
+{
+    return &config_keys[config_key_find(strcmp(name, "interface") == 0 ? "can" : "can-raw", name)];
+}
+
+static void expect_same(const char *name, const char *text)
+{
+    config_text_t why, out;
+    unsigned count = 0;
+    config_text_clear(&why);
+    config_text_clear(&out);
+    TEST_ASSERT_TRUE_MESSAGE(config_value_parse(key_of(name), text, &m_config, &count, &why), why.data);
+    config_value_format(key_of(name), &m_config, &out);
+    TEST_ASSERT_EQUAL_STRING(text, out.data);
+}
+
 /* ---- What is wrong ---- */
 
 typedef struct {
@@ -201,6 +217,9 @@ typedef struct {
     const char *message; /* its start, after [can-raw] KEY: */
 } spoilt_t;
 
+#define TWO_IN_A_FRAME                                                                                                           \
+    "setpoint = 00 00 00 00 00 00 00 00 {position.1:u20le@0.0} {speed.1:u12le@2.4} {position.2:u20le@4.0} {speed.2:u12le@6.4}"
+
 static const spoilt_t k_spoilt[] = {
     {"setpoint", "setpoint = none", "missing for driver = can-raw; allowed: "},
     {"setpoint", "setpoint = 01 {speed:u16le}", "has no {position}; allowed: with one such as {position:u32le}"},
@@ -208,9 +227,28 @@ static const spoilt_t k_spoilt[] = {
     {"setpoint", "setpoint = 01 05 {position:u32le} {speed:u16le} 00", "\"00\" goes beyond the 8 bytes of a frame; allowed: "},
     {"setpoint", "setpoint = 01 {position:u32le} {position:u16le}", "\"{position:u16le}\" is there twice; allowed: "},
     {"setpoint", "setpoint = 01 {position:u40le}", "\"{position:u40le}\" has no type that there is; allowed: "},
+    {"setpoint", "setpoint = 01 {position:u33le@1.0}", "\"{position:u33le@1.0}\" has no type that there is; allowed: "},
+    {"setpoint", "setpoint = 01 {position:i1@0.0}", "\"{position:i1@0.0}\" has no type that there is; allowed: "},
+    {"setpoint", "setpoint = 01 {position:f64le}", "\"{position:f64le}\" has no type that there is; allowed: "},
+    {"setpoint", "setpoint = 01 {position:u20le}", "\"{position:u20le}\" needs a place, such as @1.4 behind its type for "},
+    {"setpoint", "setpoint = 01 {position:u16}", "\"{position:u16}\" needs an order of its bytes, le or be; allowed: "},
+    {"setpoint", "setpoint = 01 00 {position:u4@0.6}", "\"{position:u4@0.6}\" needs an order of its bytes, le or be; "},
+    {"setpoint", "setpoint = 01 {position:u8le}", "\"{position:u8le}\" has an order of bytes, but only one byte; allowed: "},
+    {"setpoint", "setpoint = 00 {position:u4@0.8}", "\"{position:u4@0.8}\" has no place that there is, such as @1.4 for byte 1"},
+    {"setpoint", "setpoint = 00 {position:u4@8.0}", "\"{position:u4@8.0}\" has no place that there is, such as @1.4 for byte 1"},
+    {"setpoint", "setpoint = 01 {position:u20le@1.0}", "\"{position:u20le@1.0}\" lies on bytes that are not there; write them"},
+    {"setpoint", "setpoint = 01 {position:i32le} {speed:u4@4.0}", "\"{speed:u4@4.0}\" lies on bits of another field; allowed"},
+    {"setpoint", "setpoint = 01 {position:u7@0.0}", "\"{position:u7@0.0}\" lies on bits that are 1; write 0 for them; allowed"},
+    {"setpoint", "setpoint = 01 {position:f32le/0}", "\"{position:f32le/0}\" has no type that there is; allowed: "},
+    {"setpoint", "setpoint = 01 {position:f32le/1000001}", "\"{position:f32le/1000001}\" has no type that there is; allowed: "},
+    {"homing_reply", "homing_reply = 00 12 {status:f32le}", "\"{status:f32le}\" is to be whole: a type u or i; allowed: "},
     {"enable", "enable = 01 {position:u8}", "\"{position:u8}\" is no field of this frame; allowed: "},
-    {"enable", "enable = 01 {crc8}", "\"{crc8}\" has no polynomial of two digits, such as {crc8:07}; allowed: "},
-    {"enable", "enable = 01 {crc8:1}", "\"{crc8:1}\" has no polynomial of two digits, such as {crc8:07}; allowed: "},
+    {"enable", "enable = 01 {crc8}", "\"{crc8}\" has no polynomial of two digits, such as {crc8:07}, or "},
+    {"enable", "enable = 01 {crc8:1}", "\"{crc8:1}\" has no polynomial of two digits, such as {crc8:07}, or "},
+    {"enable", "enable = 01 {crc8:1D/F}",
+     "\"{crc8:1D/F}\" has no polynomial of two digits, such as {crc8:07}, or {crc8:1D/FF/00}"},
+    {"enable", "enable = 01 {crc8:1D/FF/00/00}", "\"{crc8:1D/FF/00/00}\" has no polynomial of two digits, such as {crc8:07}"},
+    {"enable", "enable = 01 {crc8ff:1D/FF}", "\"{crc8ff:1D/FF}\" has no polynomial of two digits, such as {crc8:07}"},
     {"enable", "enable = 01 {sum:u8}", "\"{sum:u8}\" takes no type; allowed: "},
     {"enable", "enable = 01 {sum} {xor}", "\"{xor}\" is a second check byte; allowed: "},
     {"enable", "enable = 01 02 03 04 05 06 07 08 {sum}", "\"{sum}\" goes beyond the 8 bytes of a frame; allowed: "},
@@ -228,6 +266,25 @@ static const spoilt_t k_spoilt[] = {
     {"command_id", "command_id = 1, 2, 3, 4, 5, 6, 7, 8", "has more than 7 values; allowed: "},
     {"reply_id", "reply_id = 0x600", "0x601 of drive 2 is command_id of drive 1 already; allowed: a different one for each"},
     {"reply_id", "reply_id = 0x20000000", "\"0x20000000\" is no identifier; allowed: "},
+    {"setpoint_id", "setpoint_id = 0x601",
+     "0x601 of drive 1 is command_id of drive 1 already; allowed: a different one for each"},
+    {"setpoint_id", "setpoint_id = 0x581", ""}, /* reported at reply_id */
+    {"setpoint_id", "setpoint_id = 0x201, 0x201, 0x202, 0x203, 0x204, 0x205",
+     "0x201 of drive 2 is setpoint_id of drive 1 already; allowed: a different one for each, or fields such as "
+     "{position.2:i16le} in setpoint"},
+    {"setpoint", "setpoint = {position.1:u20le@0.0}", "\"{position.1:u20le@0.0}\" lies on bytes that are not there; "},
+    {"setpoint", "setpoint = {position.8:u24le}", "\"{position.8:u24le}\" has no number of a drive from 1 to 7 behind its point"},
+    {"setpoint", "setpoint = {position.:u24le}", "\"{position.:u24le}\" has no number of a drive from 1 to 7 behind its point"},
+    {"setpoint", "setpoint = {position.1:u24le} {position:u24le}", "\"{position:u24le}\" is there twice; allowed: "},
+    {"setpoint", "setpoint = {position.1:u24le} {counter.1:u8}", "\"{counter.1:u8}\" is of the whole frame, and takes no number"},
+    {"setpoint", "setpoint = {position.1:u24le} {speed.1:u16le} {position.3:u24le}\nsetpoint_id = 0x201",
+     "{position.2} is missing; allowed: {position.1} to {position.3}, of the same type"},
+    {"setpoint", "setpoint = {position.1:u24le} {speed:u16le} {position.2:u24le}\nsetpoint_id = 0x201",
+     "{speed} is of one drive, and others share the frame; allowed: {speed.1} to {speed.2}"},
+    {"setpoint", "setpoint = {position.1:u24le} {speed.1:u16le} {position.2:i24le}\nsetpoint_id = 0x201",
+     "{position.2} is of another type; allowed: {position.1} to {position.2}, of the same type"},
+    {"status_id", "status_id = 0x700", "there is no status_reply; allowed: only with it"},
+    {"status_every", "status_every = 0", "\"0\" is out of range; allowed: "},
     {"counts_per_mm", "counts_per_mm = none", "missing for driver = can-raw; allowed: "},
     {"counts_per_mm", "counts_per_mm = 0", "\"0\" is no ratio; allowed: "},
     {"counts_per_mm", "counts_per_mm = 20000/0", "\"20000/0\" is no ratio; allowed: "},
@@ -270,7 +327,7 @@ static const spoilt_t k_spoilt[] = {
 /* Every field and check byte there is, from the file into the bytes, and the dump as it stood. */
 static void test_fields_and_check_bytes_reach_the_driver_as_they_are_written(void)
 {
-    static const char *const k_lines[] = {"setpoint = 01 {counter:u8} {position:i24be} {speed:u16le} {crc8ff:1D}",
+    static const char *const k_lines[] = {"setpoint = 01 {counter:u8} {position:i24be} {speed:u16le} {crc8:1D/FF/FF}",
                                           "enable = 20 {counter:u16le} {sum}", "stop = 22 {xor}",
                                           "position_reply = 30 {status:u8} {fault:u8} {counter:u8} {position:i24le} {crc8:07}"};
     static const char *const k_keys[] = {"setpoint", "enable", "stop", "position_reply"};
@@ -305,6 +362,170 @@ static void test_fields_and_check_bytes_reach_the_driver_as_they_are_written(voi
     for (unsigned i = 0; i < 4; i++) {
         TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, k_lines[i]), k_lines[i]);
     }
+}
+
+/* Bit fields and floats, from the file into the bytes. A place on whole bytes is the same as standing there. */
+static void test_bit_fields_and_floats_reach_the_driver_as_they_are_written(void)
+{
+    static const uint8_t k_setpoint[8] = {0x10, 0xE0, 0xFF, 0x7F, 0x44, 0x9A, 0x40, 0x00}; /* -2 in 18 bits, 40h; 1234.0 */
+    canraw_map_t map;
+    uint8_t out[8];
+    read_preset();
+    put_line("setpoint", "setpoint = 10 00 00 40 00 00 00 00 {position:i18le@1.4} {speed:f32be/10@4.7}");
+    put_line("position_reply", "position_reply = .. .. .. 00 {position:i20be@0.5} {status:u2@2.0}");
+    put_line("counts_per_mm", "counts_per_mm = 400");
+    put_line("speed_counts", "speed_counts = 12340");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_text(), m_errors);
+    config_canraw_map(&m_config, &map);
+    const int64_t value[CANRAW_VALUES] = {[CANRAW_POSITION] = -2, [CANRAW_SPEED] = 12340};
+    TEST_ASSERT_EQUAL(HV_OK, canraw_pack(&map.setpoint, value, out));
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(k_setpoint, out, 8);
+    const uint8_t reply[8] = {0xC0 | 0x04, 0x8D, 0x05 << 2 | 2, 0x00}; /* 12345h in 6, 8 and 6 bits, whatever is above */
+    TEST_ASSERT_TRUE(canraw_matches(&map.position_reply, reply, 4));
+    TEST_ASSERT_EQUAL_INT64(0x12345, canraw_extract(canraw_find(&map.position_reply, CANRAW_POSITION), reply));
+    TEST_ASSERT_EQUAL_INT64(2, canraw_extract(canraw_find(&map.position_reply, CANRAW_STATUS), reply));
+}
+
+static void test_a_status_of_its_own_frame_is_told_from_the_others(void)
+{
+    static const char *const k_cases[][3] = {
+        {"30 {torque:i16le}", "0x700", "[can-raw] status_reply: has no {status}; allowed: with one such as {status:u8}"},
+        {".. .. .. {status:u8}", "none", "[can-raw] status_reply: cannot be told from position_reply or homing_reply; allowed: "},
+        {"30 {status.1:u8} {status.2:u8}", "none", "[can-raw] status_reply: is of 2 drives, and position_reply with the same"},
+        {"30 {status.1:u8} {status.2:u8}", "0x700, 0x700, 0x700, 0x701, 0x701, 0x702",
+         "[can-raw] status_id: 0x700 is that of 3 drives, and status_reply has fields for 2; allowed: up to 2 drives"},
+        {"30 {status:u8}", "0x602", "[can-raw] status_id: 0x602 of drive 1 is command_id of drive 2 already; allowed: "},
+        {"30 {status:u8}", "0x700, 0x700, 0x700, 0x701, 0x701, 0x701", NULL},
+        {"30 {status.1:u8} {fault.1:u16le} {status.2:u8}", "0x700", "{fault} is shown only where fault_when holds"},
+    };
+    for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {
+        char line[200];
+        read_preset();
+        put_line("position_reply", "position_reply = 00 15 {position:i32le}");
+        put_line("homing_reply", "homing_reply = 00 12 {status:u8}");
+        snprintf(line, sizeof line, "status_reply = %s", k_cases[i][0]);
+        put_line("status_reply", line);
+        snprintf(line, sizeof line, "status_id = %s", k_cases[i][1]);
+        put_line("status_id", line);
+        if (i == 1) {
+            put_line("position_reply", "position_reply = .. .. {position:i32le}");
+        }
+        TEST_ASSERT_EQUAL_INT_MESSAGE(k_cases[i][2] != NULL, load_text(), m_errors);
+        TEST_ASSERT_TRUE_MESSAGE(k_cases[i][2] == NULL || strstr(m_errors, k_cases[i][2]) != NULL, m_errors);
+    }
+}
+
+/* Conditions are of the status, wherever it comes; three drives may have one. */
+static void test_a_status_of_its_own_frame_reaches_the_driver(void)
+{
+    canraw_map_t map;
+    config_bus_t bus;
+    read_preset();
+    put_line("status_reply", "status_reply = 30 {status:u8} {torque:i16le} {counter:u8}");
+    put_line("status_id", "status_id = 0x700");
+    put_line("status_every", "status_every = 25");
+    put_line("enabled_when", "enabled_when = 0x01/0x01");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_text(), m_errors);
+    config_canraw_map(&m_config, &map);
+    for (unsigned k = 0; k < 6; k++) {
+        TEST_ASSERT_EQUAL_HEX32(0x700 + k, map.axis[k].status_id);
+        TEST_ASSERT_EQUAL_UINT8(0, map.axis[k].status_slot);
+    }
+    TEST_ASSERT_EQUAL_UINT32(25, map.status_every);
+    TEST_ASSERT_EQUAL_UINT8(5, map.status_reply.length);
+    config_bus_describe(&m_config, &bus);
+    TEST_ASSERT_EQUAL_UINT32(4, bus.count);
+    TEST_ASSERT_EQUAL_UINT32(6, bus.entry[3].frames);
+    TEST_ASSERT_EQUAL_UINT32(25, bus.entry[3].periods);
+}
+
+static void test_steps_of_starting_up_are_read_checked_and_written_as_they_were(void)
+{
+    static const char *const k_cases[][3] = {
+        {"startup1", "2F 10 -> 00 15 .. .. .. ..",
+         "[can-raw] startup1: its answer cannot be told from position_reply, homing_reply or status_reply"},
+        {"startup2", "2F 10", "[can-raw] startup2: there is no startup1; allowed: one after the other from startup1"},
+        {"startup1", "2F .. -> 60", "\"..\" stands for any byte, which only replies can have; allowed: "},
+        {"startup1", "2F -> {position:u8}", "\"{position:u8}\" is no field of this frame; allowed: "},
+        {"startup1", "2F wait 20000", "\"wait 20000\" is no time; allowed: at its end, wait and milliseconds up to 10000"},
+        {"startup1", "-> 60", "\"\" is no frame; allowed: "},
+        {"startup1", "2F ->", "\"\" is no frame; allowed: "},
+        {"startup1", "2F 10 -> 00 15 .. ..", NULL}, /* shorter than a position */
+        {"startup1", "2F 10 {counter:u8} {xor} -> 60 .. {sum} wait 50", NULL},
+    };
+    canraw_map_t map;
+    for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {
+        char line[200];
+        read_preset();
+        put_line("position_reply", "position_reply = 00 15 {position:i32le}");
+        put_line("homing_reply", "homing_reply = 00 12 {status:u8}");
+        snprintf(line, sizeof line, "%s = %s", k_cases[i][0], k_cases[i][1]);
+        put_line(k_cases[i][0], line);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(k_cases[i][2] != NULL, load_text(), m_errors);
+        TEST_ASSERT_TRUE_MESSAGE(k_cases[i][2] == NULL || strstr(m_errors, k_cases[i][2]) != NULL, m_errors);
+    }
+    config_canraw_map(&m_config, &map);
+    TEST_ASSERT_EQUAL_UINT8(4, map.step[0].frame.length);
+    TEST_ASSERT_EQUAL_UINT8(3, map.step[0].answer.length);
+    TEST_ASSERT_EQUAL_UINT32(50000, map.step[0].wait_us);
+    TEST_ASSERT_EQUAL_UINT8(0, map.step[1].frame.length);
+    expect_same("startup1", "2F 10 {counter:u8} {xor} -> 60 .. {sum} wait 50");
+    expect_same("startup8", "2F");
+    expect_same("startup2", "2F wait 7");
+    expect_same("startup2", "2F -> ..");
+    expect_same("startup1", "none");
+}
+
+static void test_identifiers_of_too_many_drives_are_named(void)
+{
+    static const char *const k_cases[][2] = {
+        {"setpoint_id = 0x201, 0x201, 0x201, 0x203, 0x204, 0x205",
+         "[can-raw] setpoint_id: 0x201 is that of 3 drives, and setpoint has fields for 2; allowed: up to 2 drives with the "
+         "same"},
+        {"setpoint_id = 0x7FE", "[can-raw] setpoint_id: 0x800 of drive 5 has more than 11 bits; allowed: up to 0x7FF"},
+        {"setpoint_id = none",
+         "[can-raw] setpoint_id: missing where setpoint has fields of several drives; allowed: the identifier"},
+        {"setpoint_id = 0x201, 0x202", "[can-raw] setpoint_id: has 2 values; allowed: one, or one for each of the 6 drives"},
+    };
+    for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {
+        read_preset();
+        put_line("setpoint", TWO_IN_A_FRAME);
+        put_line("setpoint_id", k_cases[i][0]);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(1, load_text(), m_errors);
+        TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, k_cases[i][1]), m_errors);
+    }
+}
+
+/* One identifier for two drives each, or a list; who has which field. */
+static void test_drives_that_share_frames_have_their_identifiers_and_fields(void)
+{
+    canraw_map_t map;
+    config_bus_t bus;
+    read_preset();
+    put_line("setpoint", TWO_IN_A_FRAME);
+    put_line("setpoint_id", "setpoint_id = 0x201");
+    put_line("reply_id", "reply_id = 0x301, 0x302, 0x301, 0x302, 0x303, 0x303");
+    put_line("position_reply", "position_reply = 00 15 {position.1:i24le} {position.2:i24le}");
+    put_line("homing_reply", "homing_reply = 00 12 {status:u8}");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_text(), m_errors);
+    config_canraw_map(&m_config, &map);
+    for (unsigned k = 0; k < 6; k++) {
+        static const uint32_t k_replies[] = {0x301, 0x302, 0x301, 0x302, 0x303, 0x303};
+        static const uint8_t k_slots[] = {1, 1, 2, 2, 1, 2};
+        TEST_ASSERT_EQUAL_HEX32(0x601 + k, map.axis[k].command_id);
+        TEST_ASSERT_EQUAL_HEX32(0x201 + k / 2, map.axis[k].setpoint_id);
+        TEST_ASSERT_EQUAL_UINT8(1 + k % 2, map.axis[k].setpoint_slot);
+        TEST_ASSERT_EQUAL_HEX32(k_replies[k], map.axis[k].reply_id);
+        TEST_ASSERT_EQUAL_UINT8(k_slots[k], map.axis[k].reply_slot);
+    }
+    config_bus_describe(&m_config, &bus);
+    TEST_ASSERT_EQUAL_UINT32(3, bus.entry[0].frames); /* of set-points */
+    put_line("startup1", "startup1 = 2F 10");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load_text(), m_errors);
+    put_line("startup1", "startup1 = 2F 10 -> 60 10");
+    TEST_ASSERT_EQUAL_INT(1, load_text());
+    TEST_ASSERT_NOT_NULL_MESSAGE(
+        strstr(m_errors, "startup1: drives that share reply_id cannot be told apart by an answer; allowed: "), m_errors);
 }
 
 static void test_spoilt_lines_are_one_error_at_the_key_they_concern(void)
@@ -357,22 +578,6 @@ static void test_section_not_in_use_is_kept_and_not_checked(void)
 
 /* ---- Text and back ---- */
 
-static const config_key_t *key_of(const char *name)
-{
-    return &config_keys[config_key_find(strcmp(name, "interface") == 0 ? "can" : "can-raw", name)];
-}
-
-static void expect_same(const char *name, const char *text)
-{
-    config_text_t why, out;
-    unsigned count = 0;
-    config_text_clear(&why);
-    config_text_clear(&out);
-    TEST_ASSERT_TRUE_MESSAGE(config_value_parse(key_of(name), text, &m_config, &count, &why), why.data);
-    config_value_format(key_of(name), &m_config, &out);
-    TEST_ASSERT_EQUAL_STRING(text, out.data);
-}
-
 static void test_values_are_written_as_they_were_read(void)
 {
     static const char *const k_types[] = {"u8", "i8", "u16le", "u16be", "i16le", "i16be", "u32le", "u32be", "i32le", "i32be"};
@@ -383,6 +588,15 @@ static void test_values_are_written_as_they_were_read(void)
         snprintf(text, sizeof text, "{position:%s} 00 FF", k_types[i]);
         expect_same("setpoint", text);
     }
+    expect_same("position_reply", "00 .. 05 {position:i12le@0.4} {status:u4@0.0}");
+    expect_same("setpoint", "01 80 00 00 {position:u20be@1.6} {speed:u3@3.0}");
+    expect_same("setpoint", "01 {position:f32be/65536} 00 00 {speed:i12le@5.0}");
+    expect_same("setpoint", "{position:f32le} {speed:f32be/1000}");
+    expect_same("setpoint", &TWO_IN_A_FRAME[strlen("setpoint = ")]);
+    expect_same("position_reply", "{position.1:i16le} {position.2:i16le} {status:u8} 00 {fault.1:u4@5.0} {fault.2:u4@5.4}");
+    expect_same("setpoint_id", "0x200");
+    expect_same("home", "01 {crc8:9B/FF}");
+    expect_same("home", "01 {crc8:07/00/55}");
     expect_same("home", "none");
     expect_same("command_id", "0x601, 0x1FFFFFFF");
     expect_same("counts_per_mm", "20000/10, -3, 2147483647/2147483647");
@@ -399,6 +613,12 @@ int main(void)
     RUN_TEST(test_preset_drives_are_enabled_homed_and_led);
     RUN_TEST(test_preset_bus_load_is_the_sum_of_its_frames);
     RUN_TEST(test_fields_and_check_bytes_reach_the_driver_as_they_are_written);
+    RUN_TEST(test_bit_fields_and_floats_reach_the_driver_as_they_are_written);
+    RUN_TEST(test_drives_that_share_frames_have_their_identifiers_and_fields);
+    RUN_TEST(test_a_status_of_its_own_frame_is_told_from_the_others);
+    RUN_TEST(test_a_status_of_its_own_frame_reaches_the_driver);
+    RUN_TEST(test_steps_of_starting_up_are_read_checked_and_written_as_they_were);
+    RUN_TEST(test_identifiers_of_too_many_drives_are_named);
     RUN_TEST(test_spoilt_lines_are_one_error_at_the_key_they_concern);
     RUN_TEST(test_spoilt_bus_is_reported_where_it_is_wrong);
     RUN_TEST(test_section_not_in_use_is_kept_and_not_checked);

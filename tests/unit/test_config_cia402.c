@@ -10,6 +10,7 @@
 #include "config/bus.h"
 #include "config/cia402.h"
 #include "config/config.h"
+#include "config/value.h"
 #include "cia402_slave.h"
 #include "inspect/report.h"
 #include "unity.h"
@@ -121,6 +122,41 @@ static void test_load_preset_gives_what_the_driver_takes(void)
     }
 }
 
+/* What follows from answers that are rare: a wider window, no handshake, and all of them in one period unless they take turns. */
+static void test_load_rare_answers_need_a_wider_window(void)
+{
+    config_bus_t bus;
+    put("[cia402]", "answer_every = 4");
+    put("[cia402]", "following_error_mm = 8");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(1, load(), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "moves in 6 periods; allowed: at least 12.0"), m_errors);
+    put("[cia402]", "following_error_mm = 13");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_bus_describe(&m_config, &bus);
+    const uint32_t together_ppm = config_bus_load_ppm(&bus);
+    put("[cia402]", "sync_counter = 8");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_bus_describe(&m_config, &bus);
+    TEST_ASSERT_TRUE(config_bus_load_ppm(&bus) + 100000 < together_ppm); /* 2 answers of 6 */
+    put("[cia402]", "following_error_mm = 30");
+    put("[cia402]", "mode = pp");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(1, load(), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "answer_every: mode = pp needs the answer to every SYNC; allowed: 1"),
+                                 m_errors);
+}
+
+static void test_load_telemetry_is_in_the_load(void)
+{
+    config_bus_t bus;
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_bus_describe(&m_config, &bus);
+    const uint32_t plain_ppm = config_bus_load_ppm(&bus);
+    put("[cia402]", "tell_torque = yes");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_bus_describe(&m_config, &bus);
+    TEST_ASSERT_TRUE(config_bus_load_ppm(&bus) > plain_ppm + 100000);
+}
+
 static void test_load_lists_and_signs_reach_their_drives(void)
 {
     cia402_config_t drives;
@@ -146,6 +182,19 @@ static void test_load_lists_and_signs_reach_their_drives(void)
     TEST_ASSERT_EQUAL_INT32(-5000, drives.axis[0].limit_counts[0]);
     TEST_ASSERT_TRUE(drives.axis[1].has_limits && drives.axis[1].limit_counts[1] == 500 + 5000); /* it runs backwards */
     TEST_ASSERT_EQUAL(CIA402_MODE_IP, drives.mode);
+    TEST_ASSERT_TRUE(drives.is_support_checked);
+    put("[cia402]", "check_supported = no");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_cia402(&m_config, &drives);
+    TEST_ASSERT_FALSE(drives.is_support_checked);
+    TEST_ASSERT_EQUAL_UINT8(0, drives.telemetry);
+    put("[cia402]", "tell_following_error = yes");
+    put("[cia402]", "tell_inputs = yes");
+    put("[cia402]", "tell_every = 7");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_cia402(&m_config, &drives);
+    TEST_ASSERT_EQUAL_UINT8(DRIVE_TELLS_LAG | DRIVE_TELLS_INPUTS, drives.telemetry);
+    TEST_ASSERT_EQUAL_UINT8(7, drives.telemetry_every);
     TEST_ASSERT_EQUAL_INT16(3, drives.abort_option);
 }
 
@@ -326,14 +375,78 @@ static void test_load_startup_list_is_dumped_hashed_and_needs_a_restart(void)
     TEST_ASSERT_EQUAL_UINT8(2, running.cia402.startup.count);
 }
 
+static void test_load_axes_of_nodes_and_modes_reach_their_drives(void)
+{
+    cia402_config_t drives;
+    config_text_t text;
+    put("[cia402]", "nodes = 1.1, 1.2, 7.2, 7.1, 3, 4");
+    put("[cia402]", "mode = csp, ip, csp, csp, csp, csp");
+    put("[cia402]", "pdo_step = 4");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_cia402(&m_config, &drives);
+    TEST_ASSERT_EQUAL_UINT8(1, drives.axis[1].node);
+    TEST_ASSERT_EQUAL_UINT8(1, drives.axis[1].channel);
+    TEST_ASSERT_EQUAL_UINT8(7, drives.axis[2].node);
+    TEST_ASSERT_EQUAL_UINT8(1, drives.axis[2].channel);
+    TEST_ASSERT_EQUAL_UINT8(0, drives.axis[3].channel);
+    TEST_ASSERT_EQUAL_UINT8(0, drives.axis[5].channel);
+    TEST_ASSERT_EQUAL_UINT8(CIA402_MODE_IP, drives.axis[1].mode);
+    TEST_ASSERT_EQUAL_UINT8(CIA402_MODE_CSP, drives.axis[5].mode);
+    TEST_ASSERT_EQUAL_UINT8(4, drives.pdo_step);
+    config_text_clear(&text);
+    config_value_format(&config_keys[config_key_find("cia402", "nodes")], &m_config, &text);
+    TEST_ASSERT_EQUAL_STRING("0x1, 0x1.2, 0x7.2, 0x7, 0x3, 0x4", text.data);
+    config_text_clear(&text);
+    config_value_format(&config_keys[config_key_find("cia402", "mode")], &m_config, &text);
+    TEST_ASSERT_EQUAL_STRING("csp, ip, csp, csp, csp, csp", text.data);
+}
+
+static void test_load_maps_reach_the_driver_and_come_back_as_text(void)
+{
+    static const char k_text[] = "2: 0x6040:00/16 0x6060:00/8, 3: 0x607A:00/32";
+    cia402_config_t drives;
+    config_text_t text;
+    put("[cia402]", "command_map = 2: 0x6040/16 0x6060/8, 3:0x607A/32");
+    put("[cia402]", "answer_map = 1: 0x6041/16, 3: 0x6041/16 0x6064/32");
+    put("[cia402]", "map_written = no");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_cia402(&m_config, &drives);
+    TEST_ASSERT_TRUE(drives.are_maps_fixed);
+    TEST_ASSERT_EQUAL_UINT8(2, drives.commands.count);
+    TEST_ASSERT_EQUAL_UINT16(3, drives.commands.map[1].number);
+    TEST_ASSERT_EQUAL_HEX32(0x607A0020, drives.commands.map[1].entry[0]);
+    TEST_ASSERT_EQUAL_HEX32(0x60640020, drives.answers.map[1].entry[1]);
+    config_text_clear(&text);
+    config_value_format(&config_keys[config_key_find("cia402", "command_map")], &m_config, &text);
+    TEST_ASSERT_EQUAL_STRING(k_text, text.data);
+}
+
 static void test_load_what_contradicts_itself_is_refused_at_its_line(void)
 {
+    refuse("nodes = 1.1, 1.1, 2, 3, 4, 5", "1 of drive 2 is that of drive 1 already");
+    refuse("nodes = 1.1, 1.3, 2, 3, 4, 5", "1.3 of drive 2 is there without 1.2");
+    refuse("nodes = 1.5, 1, 2, 3, 4, 5", "\"1.5\" is no node");
+    refuse("nodes = 1.0, 1, 2, 3, 4, 5", "\"1.0\" is no node");
+    refuse("nodes = 1, 2, 3, 4, 5, 6, 7, 8", "is one more than drives there can be");
+    refuse("mode = csp, ip", "has 2 values");
+    refuse("mode = csv", "\"csv\" is not allowed; allowed: csp, ip or pp; or one for each drive");
+    refuse("command_map = 1: 0x6040/16", "the PDOs do not fit: the commands of each axis need 6040h");
+    refuse("command_map = 0x6040/16", "does not begin with the number of a PDO and a colon");
+    refuse("command_map = 1:", "has no object");
+    refuse("command_map = 1: 0x6040/17 0x607A/32", "has something that is no object with whole bytes");
+    refuse("command_map = 1: 0x6040/16 0x607A/32 0x60FF/32", "has more than 8 bytes");
+    refuse("command_map = 1: 0x6040/16, 2: 0x607A/32, 3: 0x60FF/32, 4: 0x6071/16", "is one PDO more than there can be");
+    refuse("answer_map = 1: 0x6041/16", "the PDOs do not fit: the answers of each axis need 6041h");
+    refuse("pdo_step = 65", "a whole number from 1 to 64");
+    refuse("answer_every = 11", "a whole number from 1 to 10");
+    refuse("tell_every = 0", "a whole number from 1 to 240");
     refuse("nodes = 0", "0 of drive 1 is no node id; allowed: 1 to 127");
     refuse("nodes = 1, 2, 3, 4, 5, 128", "128 of drive 6 is no node id");
     refuse("nodes = 1, 2, 3, 4, 5, 2", "2 of drive 6 is that of drive 2 already");
     refuse("nodes = 122", "127 of drive 6 is gateway_node");
     refuse("nodes = 1, 2", "has 2 values");
-    refuse("nodes = -1", "\"-1\" is no such number; allowed: a node id from 1 to 127, or one for each drive");
+    refuse("nodes = -1",
+           "\"-1\" is no node; allowed: a node id from 1 to 127, such as 5, or with the axis in the node, such as 5.2");
     refuse("serial_numbers = 1, 2", "has 2 values");
     refuse("serial_numbers = 1, 2, 3, 4, 5, 4294967296", "is no such number");
     refuse("nodes = none", "missing for driver = cia402");
@@ -421,7 +534,6 @@ static void test_period_of_no_use_is_refused_with_ones_that_the_bus_carries(void
 
 static void test_profile_position_needs_a_window_for_its_lag(void)
 {
-    m_config.cia402.mode = CONFIG_MODE_CSP;
     (void)put("[cia402]", "mode = pp");
     TEST_ASSERT_EQUAL_MESSAGE(0, load(), m_errors);
     (void)put("[cylinders]", "accel_mm_s2 = 3000");
@@ -550,6 +662,8 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_load_preset_gives_what_the_driver_takes);
+    RUN_TEST(test_load_rare_answers_need_a_wider_window);
+    RUN_TEST(test_load_telemetry_is_in_the_load);
     RUN_TEST(test_load_lists_and_signs_reach_their_drives);
     RUN_TEST(test_load_startup_list_reaches_every_drive_in_its_order);
     RUN_TEST(test_load_startup_item_that_cannot_be_is_refused_at_its_line);
@@ -567,6 +681,8 @@ int main(void)
     RUN_TEST(test_profile_position_needs_a_window_for_its_lag);
     RUN_TEST(test_lead_and_counts_per_turn_stand_in_place_of_counts_per_mm);
     RUN_TEST(test_lead_is_dumped_as_the_counts_that_follow);
+    RUN_TEST(test_load_axes_of_nodes_and_modes_reach_their_drives);
+    RUN_TEST(test_load_maps_reach_the_driver_and_come_back_as_text);
     RUN_TEST(test_lead_that_is_not_the_whole_story_is_one_error);
     RUN_TEST(test_lead_beside_counts_per_mm_is_an_error_that_names_the_other_line);
     RUN_TEST(test_check_report_says_what_the_scaling_comes_to);

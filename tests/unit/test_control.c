@@ -341,8 +341,8 @@ static void expect_taken(unsigned i, const char *request)
 
 static void test_the_look_socket_is_for_everybody_and_takes_a_hold_but_nothing_else(void)
 {
-    static const char *const k_refused[] = {"engage\n",   "resume\n", "park\n",        "reset\n",
-                                            "shutdown\n", "dump\n",   "intensity 0\n", "intensity x\n"};
+    static const char *const k_refused[] = {"engage\n", "resume\n",      "park\n",        "reset\n",       "shutdown\n",
+                                            "dump\n",   "intensity 0\n", "intensity x\n", "operator-log\n"};
     struct stat found;
     open_look_socket();
     TEST_ASSERT_EQUAL(0, stat(m_look_path, &found));

@@ -207,6 +207,22 @@ static void test_judge_node_sound_is_one_ok(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(s_text, "pre-operational"), s_text);
 }
 
+/* Two axes in a node: which of them, and its objects as it has them. */
+static void test_judge_node_with_several_axes_names_the_axis(void)
+{
+    s_drives.axes = 2;
+    s_drives.axis[1] = (cia402_axis_config_t){.node = 3, .channel = 1};
+    refuse(DOCTOR_WINDOW);
+    refuse(DOCTOR_PERIOD_VALUE);
+    doctor_judge_node(&s_report, &s_drives, 1, &s_node);
+    expect(2, 0, "node 3.2: 68C2h cannot be read: there is no such object");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(s_text, "node 3.2 has no watchdog 6865h"), s_text);
+    set(DOCTOR_WINDOW, 1);
+    set(DOCTOR_PERIOD_VALUE, 1);
+    doctor_judge_node(&s_report, &s_drives, 0, &s_node);
+    expect(2, 0, "ok    node 3.1 (drive 1)");
+}
+
 static void test_judge_node_silent_says_only_that(void)
 {
     s_node = (doctor_node_t){.nmt = -1};
@@ -319,20 +335,32 @@ static void test_judge_node_period_object_is_needed_in_cyclic_modes_only(void)
     expect(1, 0, "ok");
 }
 
+static void without_watchdog(unsigned object, bool is_guarded, bool is_allowed)
+{
+    tearDown();
+    setUp();
+    refuse(object);
+    s_drives.is_guarded = is_guarded;
+    s_drives.is_unguarded_allowed = is_allowed;
+    judge_node();
+}
+
 static void test_judge_node_each_missing_watchdog_fails_or_warns_where_allowed(void)
 {
     for (unsigned object = DOCTOR_CONSUMER; object <= DOCTOR_WINDOW; object++) {
-        tearDown();
-        setUp();
-        refuse(object);
-        judge_node();
+        const bool is_of_guarding = object == DOCTOR_GUARD_TIME || object == DOCTOR_LIFE_FACTOR;
+        without_watchdog(object, is_of_guarding, false);
         expect(1, 0, "has no watchdog");
-        tearDown();
-        setUp();
-        refuse(object);
-        s_drives.is_unguarded_allowed = true;
-        judge_node();
+        without_watchdog(object, is_of_guarding, true);
         expect(0, 1, "has no watchdog");
+    }
+}
+
+static void test_judge_node_needs_the_watchdogs_of_heartbeats_or_those_of_guarding(void)
+{
+    for (unsigned object = DOCTOR_CONSUMER; object <= DOCTOR_LIFE_FACTOR; object++) {
+        without_watchdog(object, object <= DOCTOR_PRODUCER, false);
+        expect(0, 0, "ok");
     }
 }
 
@@ -414,6 +442,10 @@ static void test_inventory_of_drives_that_differ_or_are_missing_says_so(void)
     node[2].answer[DOCTOR_SERIAL] = DOCTOR_REFUSED;
     inventory(node);
     expect_text("; drive 1, node 3: not found\n");
+    s_drives.axis[1].node = 3;
+    s_drives.axis[1].channel = 1;
+    inventory(node);
+    expect_text("; drive 1, node 3.1: not found\n; drive 2, node 3.2: ");
     expect_text("\nvendor_id = 0x1\n; product_code: they differ\nserial_numbers = 0x0, 0x1, 0x0\n");
 }
 
@@ -444,6 +476,7 @@ int main(void)
     RUN_TEST(test_judge_link_waiting_frames_are_left_alone);
     RUN_TEST(test_judge_host_warns_of_each);
     RUN_TEST(test_judge_node_sound_is_one_ok);
+    RUN_TEST(test_judge_node_with_several_axes_names_the_axis);
     RUN_TEST(test_judge_node_silent_says_only_that);
     RUN_TEST(test_judge_node_other_profile_fails);
     RUN_TEST(test_judge_node_identity_names_found_and_wanted);
@@ -456,6 +489,7 @@ int main(void)
     RUN_TEST(test_judge_node_without_mapping_fails);
     RUN_TEST(test_judge_node_period_object_is_needed_in_cyclic_modes_only);
     RUN_TEST(test_judge_node_each_missing_watchdog_fails_or_warns_where_allowed);
+    RUN_TEST(test_judge_node_needs_the_watchdogs_of_heartbeats_or_those_of_guarding);
     RUN_TEST(test_judge_node_watchdogs_that_are_off_are_listed_once);
     RUN_TEST(test_judge_node_foreign_sync_period_warns);
     RUN_TEST(test_judge_node_fault_has_code_and_text);

@@ -45,6 +45,13 @@ static void test_histogram_percentile_random_durations_is_that_of_the_sorted_lis
         TEST_ASSERT_EQUAL_UINT64(durations[at], histogram_percentile_us(&m_histogram, share));
     }
     TEST_ASSERT_EQUAL_UINT64(COUNT, histogram_count(&m_histogram));
+    uint64_t between = 0;
+    for (unsigned i = 0; i < COUNT; i++) {
+        between += durations[i] >= 100 && durations[i] < 250;
+    }
+    TEST_ASSERT_GREATER_THAN_UINT64(0, between);
+    TEST_ASSERT_EQUAL_UINT64(between, histogram_between(&m_histogram, 100, 250));
+    TEST_ASSERT_EQUAL_UINT64(COUNT, histogram_between(&m_histogram, 0, HISTOGRAM_BINS));
     TEST_ASSERT_EQUAL_UINT64(durations[COUNT - 1], histogram_max_us(&m_histogram));
 }
 

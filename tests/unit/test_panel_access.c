@@ -47,6 +47,18 @@ static void set(level_t role, const char *password)
     TEST_ASSERT_TRUE_MESSAGE(access_load(&m_access, m_folder, m_why, sizeof m_why), m_why);
 }
 
+typedef enum { ACCESS_IN, ACCESS_WRONG, ACCESS_TOO_OFTEN } login_t;
+
+/* As http.c, in one process. */
+static login_t log_in(level_t role, const char *password, const char *address, int64_t now_s, char token[ACCESS_TOKEN_MAX])
+{
+    if (!access_begin(&m_access, address, now_s)) {
+        return ACCESS_TOO_OFTEN;
+    }
+    const bool is_in = access_is_right(&m_access, role, password) && access_enter(&m_access, role, address, now_s, token);
+    return is_in ? ACCESS_IN : ACCESS_WRONG;
+}
+
 static void test_without_a_file_nobody_has_a_password(void)
 {
     TEST_ASSERT_TRUE(access_load(&m_access, m_folder, m_why, sizeof m_why));
@@ -61,12 +73,12 @@ static void test_each_role_has_a_password_of_its_own(void)
     set(LEVEL_SERVICE, "service, a long one");
     TEST_ASSERT_EQUAL(0, stat(file(), &status));
     TEST_ASSERT_EQUAL_HEX32(0600, status.st_mode & 0777);
-    TEST_ASSERT_EQUAL(ACCESS_WRONG, access_login(&m_access, LEVEL_SERVICE, "look, a long one", "a", 100, token));
-    TEST_ASSERT_EQUAL(ACCESS_WRONG, access_login(&m_access, LEVEL_OPERATE, "", "a", 100, token)); /* it has none */
-    TEST_ASSERT_EQUAL(ACCESS_IN, access_login(&m_access, LEVEL_SERVICE, "service, a long one", "a", 100, token));
+    TEST_ASSERT_EQUAL(ACCESS_WRONG, log_in(LEVEL_SERVICE, "look, a long one", "a", 100, token));
+    TEST_ASSERT_EQUAL(ACCESS_WRONG, log_in(LEVEL_OPERATE, "", "a", 100, token)); /* it has none */
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_SERVICE, "service, a long one", "a", 100, token));
     TEST_ASSERT_EQUAL(64, strlen(token));
     TEST_ASSERT_EQUAL(LEVEL_SERVICE, access_find(&m_access, token, 100));
-    TEST_ASSERT_EQUAL(ACCESS_IN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "a", 100, token));
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_LOOK, "look, a long one", "a", 100, token));
     TEST_ASSERT_EQUAL(LEVEL_LOOK, access_find(&m_access, token, 100));
 }
 
@@ -74,15 +86,15 @@ static void test_sessions_end(void)
 {
     char token[ACCESS_TOKEN_MAX];
     set(LEVEL_LOOK, "look, a long one");
-    TEST_ASSERT_EQUAL(ACCESS_IN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "a", 100, token));
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_LOOK, "look, a long one", "a", 100, token));
     TEST_ASSERT_EQUAL(LEVEL_LOOK, access_find(&m_access, token, 100 + 12 * 3600));
     TEST_ASSERT_EQUAL(ACCESS_NOBODY, access_find(&m_access, token, 100 + 24 * 3600 + 1));
     TEST_ASSERT_EQUAL(ACCESS_NOBODY, access_find(&m_access, token, 100));
-    TEST_ASSERT_EQUAL(ACCESS_IN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "a", 100, token));
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_LOOK, "look, a long one", "a", 100, token));
     int64_t now_s = 100;
     for (; access_find(&m_access, token, now_s) == LEVEL_LOOK && now_s < 10000000; now_s += 3600) {}
     TEST_ASSERT_INT64_WITHIN(3600, 100 + 7 * 24 * 3600, now_s);
-    TEST_ASSERT_EQUAL(ACCESS_IN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "a", 100, token));
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_LOOK, "look, a long one", "a", 100, token));
     access_logout(&m_access, token);
     TEST_ASSERT_EQUAL(ACCESS_NOBODY, access_find(&m_access, token, 100));
     TEST_ASSERT_EQUAL(ACCESS_NOBODY, access_find(&m_access, "", 100));
@@ -93,9 +105,9 @@ static void test_more_sessions_than_places_end_the_oldest(void)
 {
     char first[ACCESS_TOKEN_MAX], token[ACCESS_TOKEN_MAX];
     set(LEVEL_LOOK, "look, a long one");
-    TEST_ASSERT_EQUAL(ACCESS_IN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "a", 100, first));
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_LOOK, "look, a long one", "a", 100, first));
     for (int i = 0; i < (int)ACCESS_SESSIONS_MAX; i++) {
-        TEST_ASSERT_EQUAL(ACCESS_IN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "a", 200 + 20 * i, token));
+        TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_LOOK, "look, a long one", "a", 200 + 20 * i, token));
     }
     TEST_ASSERT_EQUAL(ACCESS_NOBODY, access_find(&m_access, first, 2000));
     TEST_ASSERT_EQUAL(LEVEL_LOOK, access_find(&m_access, token, 2000));
@@ -106,18 +118,30 @@ static void test_who_guesses_waits(void)
     char token[ACCESS_TOKEN_MAX];
     set(LEVEL_LOOK, "look, a long one");
     for (unsigned i = 0; i < 5; i++) {
-        TEST_ASSERT_EQUAL(ACCESS_WRONG, access_login(&m_access, LEVEL_LOOK, "guess", "a", 100, token));
+        TEST_ASSERT_EQUAL(ACCESS_WRONG, log_in(LEVEL_LOOK, "guess", "a", 100, token));
     }
-    TEST_ASSERT_EQUAL(ACCESS_TOO_OFTEN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "a", 104, token));
-    TEST_ASSERT_EQUAL(ACCESS_IN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "b", 104, token)); /* somebody else */
-    TEST_ASSERT_EQUAL(ACCESS_IN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "a", 105, token));
+    TEST_ASSERT_EQUAL(ACCESS_TOO_OFTEN, log_in(LEVEL_LOOK, "look, a long one", "a", 104, token));
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_LOOK, "look, a long one", "b", 104, token)); /* somebody else */
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_LOOK, "look, a long one", "a", 105, token));
     char name[8];
     for (unsigned i = 0; i < 13; i++) { /* many addresses */
         (void)snprintf(name, sizeof name, "c%u", i);
-        TEST_ASSERT_EQUAL(ACCESS_WRONG, access_login(&m_access, LEVEL_LOOK, "guess", name, 105, token));
+        TEST_ASSERT_EQUAL(ACCESS_WRONG, log_in(LEVEL_LOOK, "guess", name, 105, token));
     }
-    TEST_ASSERT_EQUAL(ACCESS_TOO_OFTEN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "d", 106, token));
-    TEST_ASSERT_EQUAL(ACCESS_IN, access_login(&m_access, LEVEL_LOOK, "look, a long one", "d", 110, token));
+    TEST_ASSERT_EQUAL(ACCESS_TOO_OFTEN, log_in(LEVEL_LOOK, "look, a long one", "d", 106, token));
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_LOOK, "look, a long one", "d", 110, token));
+}
+
+static void test_who_guesses_much_at_once_waits_too(void)
+{
+    char token[ACCESS_TOKEN_MAX];
+    set(LEVEL_LOOK, "look, a long one");
+    for (unsigned i = 0; i < 5; i++) { /* none of them is known to be wrong yet */
+        TEST_ASSERT_TRUE(access_begin(&m_access, "a", 100));
+    }
+    TEST_ASSERT_FALSE(access_begin(&m_access, "a", 100));
+    TEST_ASSERT_TRUE(access_enter(&m_access, LEVEL_LOOK, "a", 100, token)); /* one of them was right */
+    TEST_ASSERT_TRUE(access_begin(&m_access, "a", 100));
 }
 
 static void test_bad_files_and_passwords_are_named(void)
@@ -158,6 +182,7 @@ int main(void)
     RUN_TEST(test_sessions_end);
     RUN_TEST(test_more_sessions_than_places_end_the_oldest);
     RUN_TEST(test_who_guesses_waits);
+    RUN_TEST(test_who_guesses_much_at_once_waits_too);
     RUN_TEST(test_bad_files_and_passwords_are_named);
     RUN_TEST(test_names_of_the_panel);
     return UNITY_END();

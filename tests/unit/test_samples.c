@@ -18,7 +18,8 @@
 
 #include "unity.h"
 
-#define READERS 8u
+#define READERS         8u
+#define FIRST_OF_DRIVES (7u + 3u * POSE_AXES + 2u * CYLINDERS_MAX + 2u) /* word of what drives tell */
 
 static samples_writer_t m_writer;
 static config_t m_config;
@@ -38,6 +39,8 @@ static void open_ring(uint32_t seconds)
     m_config.settings.cycle_us = 1000;
     m_config.settings.has_angle = true;
     m_config.samples_seconds = seconds;
+    m_config.drives = CONFIG_DRIVES_CIA402;
+    m_config.cia402.is_torque_told = m_config.cia402.is_lag_told = m_config.cia402.are_inputs_told = true;
     memset(&m_snapshot, 0, sizeof m_snapshot);
     m_snapshot.cylinders = 6;
     m_snapshot.has_angle = true;
@@ -66,9 +69,13 @@ static void add_numbered(uint64_t number)
         m_snapshot.extension_mm_q32[i] = (q32_t)number;
         m_snapshot.drive[i].actual_mm_q32 = (q32_t)number;
     }
+    for (unsigned i = 0; i < DRIVES_MAX; i++) {
+        m_snapshot.report[i].telemetry.lag_q32 = (q32_t)number * (Q32_ONE / Q16_ONE);
+        m_snapshot.report[i].telemetry.inputs = (uint32_t)number;
+    }
     m_snapshot.angle_deg_q32 = (q32_t)number;
     m_snapshot.drive[6].actual_mm_q32 = (q32_t)number;
-    samples_writer_add(&m_writer, &m_snapshot);
+    samples_writer_add(&m_writer, &m_snapshot, 7, 23);
 }
 
 static double value_of(const samples_reader_t *reader, const samples_record_t *record, const char *name)
@@ -107,7 +114,11 @@ static void test_record_has_what_the_cycle_came_to(void)
     m_snapshot.angle_deg_q32 = q32_from_int(300);
     m_snapshot.drive[6].actual_mm_q32 = q32_from_int(299);
     m_snapshot.drive[6].state = DRIVE_HOMING;
-    samples_writer_add(&m_writer, &m_snapshot);
+    m_snapshot.report[0].telemetry = (drive_telemetry_t){.torque_permille = -1234, .lag_q32 = -Q32_ONE / 4, .inputs = 0x80000005};
+    m_snapshot.report[5].telemetry = (drive_telemetry_t){.torque_permille = 99999, .lag_q32 = INT64_MIN};
+    m_snapshot.report[6].telemetry.lag_q32 = 3 * Q32_ONE / 2;
+    m_snapshot.report[2].notes = 0x21;
+    samples_writer_add(&m_writer, &m_snapshot, 7, 23);
     TEST_ASSERT_TRUE(samples_reader_next(&reader, &record));
     TEST_ASSERT_FALSE(samples_reader_next(&reader, &record));
     const struct {
@@ -125,6 +136,8 @@ static void test_record_has_what_the_cycle_came_to(void)
         {"bits", 5},
         {"flags", 0x105},
         {"frame_age_ms", 7},
+        {"wake_us", 7},
+        {"work_us", 23},
         {"drive1", 0},
         {"drive6", 5},
         {"drive7", DRIVE_HOMING},
@@ -136,6 +149,13 @@ static void test_record_has_what_the_cycle_came_to(void)
         {"actual_c1_mm", 41},
         {"sent_angle_deg", 300},
         {"actual_angle_deg", 299},
+        {"drive1_torque_percent", -123.4},
+        {"drive1_lag_mm", -0.25},
+        {"drive1_inputs", 0x80000005},
+        {"drive6_torque_percent", 3276.7},
+        {"drive6_lag_mm", -(double)INT32_MAX / 65536},
+        {"drive7_lag_deg", 1.5},
+        {"drive3_notes", 0x21},
     };
     for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
         TEST_ASSERT_DOUBLE_WITHIN(1e-9, k_rows[i].value, value_of(&reader, &record, k_rows[i].name));
@@ -144,6 +164,32 @@ static void test_record_has_what_the_cycle_came_to(void)
     TEST_ASSERT_EQUAL_UINT32(1000, reader.header->cycle_us);
     TEST_ASSERT_EQUAL_UINT32(1000, reader.header->capacity);
     samples_reader_close(&reader);
+}
+
+/* What drives do not tell has no column, so that nobody takes a 0 for a measurement. */
+static void test_columns_are_those_of_what_drives_tell(void)
+{
+    samples_reader_t reader;
+    static const char *const k_names[] = {"drive2_torque_percent", "drive2_lag_mm", "drive2_inputs", "drive2_notes"};
+    for (unsigned told = 0; told < 5; told++) {
+        memset(&m_config, 0, sizeof m_config);
+        m_config.settings.geometry.kind = KIN_TRIPOD;
+        m_config.settings.cycle_us = 1000;
+        m_config.samples_seconds = 1;
+        m_config.drives = told == 4 ? CONFIG_DRIVES_SIM : CONFIG_DRIVES_CIA402;
+        m_config.cia402.is_torque_told = told == 0 || told == 4;
+        m_config.cia402.is_lag_told = told == 1;
+        m_config.cia402.are_inputs_told = told == 2;
+        TEST_ASSERT_TRUE(samples_writer_open(&m_writer, &m_config));
+        TEST_ASSERT_NULL(samples_reader_open(&reader, m_writer.fd));
+        for (unsigned i = 0; i < 4; i++) {
+            const bool is_wanted = i == told || (i == 3 && told < 4);
+            TEST_ASSERT_EQUAL(is_wanted, samples_column_named(reader.header, k_names[i], strlen(k_names[i])) != NULL);
+        }
+        TEST_ASSERT_NULL(samples_column_named(reader.header, "drive4_notes", 12));
+        samples_reader_close(&reader);
+        samples_writer_close(&m_writer);
+    }
 }
 
 static void test_nobody_else_writes_or_changes_the_size(void)
@@ -251,13 +297,17 @@ typedef struct {
 
 static uint32_t m_is_over; /* atomic */
 
-/* All words of a record but those of small columns have its number. */
-static bool is_torn(const samples_reader_t *reader, const samples_record_t *record)
+/* All words of a record but those of small columns have its number: once, or where two of four bytes share a word, twice. */
+static bool is_torn(const samples_record_t *record)
 {
     const uint64_t number = record->word[1];
     bool is_whole = record->word[2] == number && record->word[0] == number + 1;
-    for (uint32_t i = 6; i < reader->header->record_bytes / 8u; i++) {
+    for (uint32_t i = 7; i < FIRST_OF_DRIVES; i++) {
         is_whole = is_whole && record->word[i] == number;
+    }
+    for (uint32_t i = FIRST_OF_DRIVES + 2u; i < FIRST_OF_DRIVES + 10u; i++) { /* lag and inputs; the eighth drive has none */
+        const bool is_last = i % 4u == (FIRST_OF_DRIVES + 5u) % 4u;
+        is_whole = is_whole && record->word[i] == (is_last ? number : number << 32 | number);
     }
     return !is_whole;
 }
@@ -268,7 +318,7 @@ static void *look(void *argument)
     samples_record_t record;
     while (__atomic_load_n(&m_is_over, __ATOMIC_ACQUIRE) == 0) {
         while (samples_reader_next(&self->reader, &record)) {
-            self->torn += is_torn(&self->reader, &record);
+            self->torn += is_torn(&record);
             self->read++;
         }
     }
@@ -324,7 +374,7 @@ static void test_record_costs_less_than_200_ns(void)
         struct timespec from, to;
         clock_gettime(CLOCK_MONOTONIC, &from);
         for (unsigned i = 0; i < 1000; i++) {
-            samples_writer_add(&m_writer, &m_snapshot);
+            samples_writer_add(&m_writer, &m_snapshot, 7, 23);
         }
         clock_gettime(CLOCK_MONOTONIC, &to);
         const double ns = ((double)(to.tv_sec - from.tv_sec) * 1e9 + (double)(to.tv_nsec - from.tv_nsec)) / 1000;
@@ -350,6 +400,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_layout_is_the_contracts);
     RUN_TEST(test_record_has_what_the_cycle_came_to);
+    RUN_TEST(test_columns_are_those_of_what_drives_tell);
     RUN_TEST(test_nobody_else_writes_or_changes_the_size);
     RUN_TEST(test_no_seconds_is_no_ring);
     RUN_TEST(test_slow_reader_knows_what_it_has_lost);

@@ -203,10 +203,10 @@ static void test_a_stream_that_no_motion_has_is_refused(void)
     SPOIL(stream.clock.gap_periods[(m_saved.motion.stream.clock.gap_next + STREAM_GAPS - 1) % STREAM_GAPS], 0);
     SPOIL(stream.clock.gap_next, STREAM_GAPS);
     SPOIL(stream.clock.gaps, STREAM_GAPS + 1);
-    SPOIL(stream.clock.settled, 49);
+    SPOIL(stream.clock.settled, 1025);
     SPOIL(stream.clock.hint_us, UINT32_MAX);
     SPOIL(stream.clock.delay_max_us, 1);
-    SPOIL(stream.clock.memory, 49);
+    SPOIL(stream.clock.memory, 1025);
     SPOIL(stream.clock.drift_us_q16, INT64_MIN);
     SPOIL(stream.clock.rough_us_q16, -1);
     SPOIL(stream.clock.counted, 257);
@@ -247,6 +247,12 @@ static void test_a_curve_that_no_motion_has_is_refused(void)
     SPOIL(stream.curve.lead[3].rise_q32, UINT32_MAX);
     SPOIL(stream.curve.lead[3].reach_q16, -1);
     SPOIL(stream.curve.lead[3].full_q16, INT32_MAX);
+    SPOIL(stream.curve.lead[3].bend_q32, INT64_MIN);
+    SPOIL(stream.curve.lead[3].pull_q32, -1);
+    SPOIL(stream.curve.low_q32[6], INT64_MIN);
+    SPOIL(stream.curve.high_q32[0], INT64_MAX);
+    SPOIL(stream.curve.fitted, 0);
+    SPOIL(stream.curve.fitted, 25);
     SPOIL(stream.curve.grain[6].quantum_q32, -1);
     SPOIL(stream.curve.grain[6].found_q32, INT64_MAX);
     SPOIL(stream.curve.grain[6].step_q32, INT64_MIN);
@@ -381,12 +387,12 @@ static void test_no_member_is_forgotten(void)
     }
     TEST_ASSERT_EQUAL(256, sizeof(stream_clock_t));
     TEST_ASSERT_EQUAL(424, sizeof(stream_evidence_t));
-    TEST_ASSERT_EQUAL(9328, sizeof(stream_curve_t));
-    TEST_ASSERT_EQUAL(32, sizeof(stream_lead_t));
+    TEST_ASSERT_EQUAL(9560, sizeof(stream_curve_t));
+    TEST_ASSERT_EQUAL(48, sizeof(stream_lead_t));
     TEST_ASSERT_EQUAL(32, sizeof(stream_quantum_t));
     TEST_ASSERT_EQUAL(88, sizeof(stream_thin_t));
     TEST_ASSERT_EQUAL(40, sizeof(stream_repeat_t));
-    TEST_ASSERT_EQUAL(10392, sizeof(stream_t));
+    TEST_ASSERT_EQUAL(10624, sizeof(stream_t));
     TEST_ASSERT_EQUAL(4248, sizeof(governor_t));
     TEST_ASSERT_EQUAL(392, sizeof(spike_filter_t));
     TEST_ASSERT_EQUAL(144, sizeof(fade_t));
@@ -395,7 +401,7 @@ static void test_no_member_is_forgotten(void)
     TEST_ASSERT_EQUAL(344, sizeof(motion_straight_t));
     TEST_ASSERT_EQUAL(64, sizeof(scurve_t));
     TEST_ASSERT_EQUAL(168, sizeof(intensity_t));
-    TEST_ASSERT_EQUAL(16400, sizeof(motion_t));
+    TEST_ASSERT_EQUAL(17208, sizeof(motion_t));
 }
 
 int main(void)

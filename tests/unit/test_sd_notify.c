@@ -185,6 +185,21 @@ static void test_manager_that_does_not_read_is_told_later(void)
     (void)close(filler);
 }
 
+static void test_manager_waits_while_heaved_starts_anew(void)
+{
+    sd_notify_ready(&m_manager, 0);
+    (void)heard();
+    sd_notify_restart(&m_manager, false);
+    TEST_ASSERT_EQUAL_STRING("WATCHDOG=1\nWATCHDOG_USEC=30000000", heard());
+    sd_notify_restart(&m_manager, true);
+    TEST_ASSERT_EQUAL_STRING("WATCHDOG=1\nWATCHDOG_USEC=200000", heard());
+    TEST_ASSERT_EQUAL_INT(0, unsetenv("WATCHDOG_USEC"));
+    sd_notify_ready(&m_manager, 0);
+    (void)heard();
+    sd_notify_restart(&m_manager, false);
+    TEST_ASSERT_EQUAL_STRING("", heard());
+}
+
 static void test_manager_on_an_abstract_socket(void)
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
@@ -220,6 +235,7 @@ int main(void)
     RUN_TEST(test_manager_without_one_nothing_is_told);
     RUN_TEST(test_manager_that_is_not_there_does_no_harm);
     RUN_TEST(test_manager_that_does_not_read_is_told_later);
+    RUN_TEST(test_manager_waits_while_heaved_starts_anew);
     RUN_TEST(test_manager_on_an_abstract_socket);
     RUN_TEST(test_manager_watchdog_of_another_process_is_not_petted);
     return UNITY_END();

@@ -15,6 +15,8 @@
 static rig_t m_rig;
 static settings_t m_settings;
 static uint32_t m_series;
+static excitation_request_t m_signal; /* of the next requests, as this: */
+static q16_t m_way_q16;
 static double m_fastest[DRIVES_MAX]; /* mm/s, deg/s */
 static double m_last[DRIVES_MAX];
 
@@ -24,6 +26,8 @@ void setUp(void)
     m_settings.engage = ENGAGE_MANUAL;
     m_settings.following_error_mm_q16 = Q(5);
     m_series = 0;
+    m_way_q16 = 0;
+    m_signal = (excitation_request_t){EXCITATION_SINE, Q(2), 2000, 0, 4000};
 }
 
 void tearDown(void) {}
@@ -62,6 +66,8 @@ static service_answer_t ask_aged(service_verb_t verb, unsigned axis, double spee
     const service_request_t request = {.verb = verb,
                                        .axis = (uint8_t)axis,
                                        .speed_q16 = Q(speed),
+                                       .way_q16 = m_way_q16,
+                                       .signal = m_signal,
                                        .series = service_is_held(verb) ? ++m_series : m_series,
                                        .age_us = age_us};
     return gateway_service(&m_rig.gateway, &request, m_rig.now_us);
@@ -573,6 +579,42 @@ static void test_counts_are_those_of_the_drives_before_there_is_torque(void)
     TEST_ASSERT_EQUAL_INT64(before - 3000, seen()->service.counts[1]);
 }
 
+/* Objects of drives: who may do what where. These drives have none. */
+static void test_objects_are_read_at_rest_and_written_in_service(void)
+{
+    const drive_object_t read = {.index = 0x6041};
+    const drive_object_t write = {.index = 0x6083, .is_write = true, .size = 4};
+    drive_object_t out;
+    uint32_t code = 0;
+    start(true);
+    TEST_ASSERT_EQUAL(SERVICE_NO_SUCH, gateway_object_begin(&m_rig.gateway, 0, &read));
+    TEST_ASSERT_EQUAL(SERVICE_NO_SUCH, gateway_object_begin(&m_rig.gateway, 8, &read));
+    TEST_ASSERT_EQUAL(SERVICE_NO_OBJECTS, gateway_object_begin(&m_rig.gateway, 1, &read));
+    TEST_ASSERT_EQUAL(SERVICE_NO_OBJECTS, gateway_object_begin(&m_rig.gateway, 1, &write));
+    TEST_ASSERT_EQUAL(DRIVE_OBJECT_NONE, gateway_object_end(&m_rig.gateway, &out, &code));
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_JOG_AXIS, 1, 5));
+    hold_ms(500);
+    TEST_ASSERT_EQUAL(SERVICE_BUSY, gateway_object_begin(&m_rig.gateway, 1, &write));
+    TEST_ASSERT_EQUAL(SERVICE_NO_OBJECTS, gateway_object_begin(&m_rig.gateway, 1, &read));
+    rig_run_ms(&m_rig, 251); /* nobody holds, and it still moves */
+    TEST_ASSERT_EQUAL(SERVICE_BUSY, gateway_object_begin(&m_rig.gateway, 1, &write));
+    rig_run_ms(&m_rig, 2000);
+    TEST_ASSERT_EQUAL(SERVICE_NO_OBJECTS, gateway_object_begin(&m_rig.gateway, 1, &write));
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SERVICE_OFF));
+    rig_run_ms(&m_rig, 2000);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+    TEST_ASSERT_EQUAL(SERVICE_NO_OBJECTS, gateway_object_begin(&m_rig.gateway, 1, &read));
+    TEST_ASSERT_EQUAL(SERVICE_NOT_SERVING, gateway_object_begin(&m_rig.gateway, 1, &write));
+    m_rig.after_cycle = NULL;
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+    while (seen()->state != STATE_ENGAGED) {
+        rig_run_ms(&m_rig, 1);
+        const bool is_rest = seen()->state == STATE_OFF;
+        TEST_ASSERT_EQUAL(is_rest ? SERVICE_NO_OBJECTS : SERVICE_MOVING, gateway_object_begin(&m_rig.gateway, 1, &read));
+        TEST_ASSERT_EQUAL(SERVICE_NOT_SERVING, gateway_object_begin(&m_rig.gateway, 1, &write));
+    }
+}
+
 static void test_words_are_complete(void)
 {
     TEST_ASSERT_EQUAL_STRING("", service_answer_text(SERVICE_DONE));
@@ -610,6 +652,14 @@ static hv_status_t resume(const gateway_t *saved)
     static rig_t other;
     rig_start(&other, &m_settings, true);
     return gateway_resume(&other.gateway, saved, &other.gateway.io);
+}
+
+static void go_to_the_middle(void)
+{
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_JOG_POSE, AXIS_Z + 1, 20));
+    hold_ms(1500);
+    rig_run_ms(&m_rig, 1500);
+    forget_speeds();
 }
 
 /* A jog under way goes on from what was saved, and nothing is believed that no jog has. */
@@ -668,10 +718,195 @@ static void test_resume_in_a_jog_takes_what_was_saved_and_nothing_else(void)
     SPOIL(motion.plan.straight.path.total, 0); /* a divisor */
     SPOIL(motion.plan.straight.path.nj, -1);
     SPOIL(motion.plan.straight.to_q32[1], INT64_MAX);
+    m_signal = (excitation_request_t){EXCITATION_CHIRP, Q(2), 1000, 20000, 12000};
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_RELEASE, 0, 0));
+    rig_run_ms(&m_rig, 500);
+    go_to_the_middle();
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_SIGNAL_POSE, AXIS_Z + 1, 0));
+    for (unsigned at = 0; at < 400; at += 50) {
+        rig_run_ms(&m_rig, 50);
+        (void)beat(at + 1, 0);
+        gateway_save(&m_rig.gateway, &saved);
+        TEST_ASSERT_EQUAL(HV_OK, resume(&saved));
+    }
+    SPOIL(motion.jog.signal.kind, EXCITATION_KINDS);
+    SPOIL(motion.jog.signal.ramp_in, 0); /* a divisor, as the next two */
+    SPOIL(motion.jog.signal.turn_q64[0], 0);
+    SPOIL(motion.jog.signal.limits.vel_q62, 0);
+    SPOIL(motion.jog.signal.cycles, INT64_MAX);
+    SPOIL(motion.jog.signal.elapsed, -1);
+    SPOIL(motion.jog.signal.share_q62[3], INT64_MAX);
+    SPOIL(motion.jog.signal.is_out, true);
+    SPOIL(motion.jog.signal.kind, EXCITATION_STEP); /* without a step, and with half a period of 0 */
+    SPOIL(motion.jog_limits.signal_mm_q32, 1);
+    SPOIL(motion.jog_limits.signal_mm_per_cycle_q32, 1);
+    SPOIL(motion.jog.ramp[2].limits.acc_per_cycle2_q32, 1);
     saved.service.doing = SERVICE_RELAY;
     saved.service.axis = 0;
     TEST_ASSERT_EQUAL(HV_ERR_ARG, resume(&saved)); /* would be shifted by */
 #undef SPOIL
+}
+
+static void test_jog_with_a_way_ends_after_it(void)
+{
+    start(true);
+    const double from = setpoint(2);
+    m_way_q16 = Q(5);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_JOG_AXIS, 3, 10));
+    hold_ms(1000);
+    TEST_ASSERT_EQUAL(SERVICE_NOTHING, seen()->service.doing);
+    TEST_ASSERT_EQUAL(m_series, seen()->service.finished);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, from + 5, setpoint(2));
+    m_way_q16 = Q(3);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_JOG_AXIS, 3, -10));
+    hold_ms(1000);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, from + 2, setpoint(2));
+    m_way_q16 = Q(30000); /* further than there is way */
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_JOG_AXIS, 3, -20));
+    hold_ms(3000);
+    TEST_ASSERT_EQUAL(m_series, seen()->service.finished);
+    TEST_ASSERT_TRUE(setpoint(2) <= from + 2 && setpoint(2) >= 0);
+    const double z = (double)seen()->sent.axis_q32[AXIS_Z] / 4294967296.0;
+    m_way_q16 = Q(4);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_JOG_POSE, AXIS_Z + 1, 20));
+    hold_ms(2000);
+    TEST_ASSERT_EQUAL(m_series, seen()->service.finished);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, z + 4, (double)seen()->sent.axis_q32[AXIS_Z] / 4294967296.0);
+    TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+}
+
+/* ---- test signals ---- */
+
+static double pose_z(void)
+{
+    return (double)seen()->sent.axis_q32[AXIS_Z] / 4294967296.0;
+}
+
+/* A hand for so long; the widest way of z meanwhile. */
+static void hold_and_watch_z(unsigned ms, double *least, double *most)
+{
+    static uint32_t counter = 1000000;
+    for (unsigned at = 0; at < ms; at++) {
+        rig_run_ms(&m_rig, 1);
+        if (at % 50 == 0) {
+            (void)beat(++counter, 0);
+        }
+        *least = pose_z() < *least ? pose_z() : *least;
+        *most = pose_z() > *most ? pose_z() : *most;
+    }
+}
+
+static void test_signal_of_every_kind_ends_where_it_began(void)
+{
+    static const excitation_request_t k_signals[] = {{EXCITATION_SINE, Q(2), 2000, 0, 4000},
+                                                     {EXCITATION_STEP, Q(3), 500, 0, 9000},
+                                                     {EXCITATION_CHIRP, Q(5), 500, 20000, 25000},
+                                                     {EXCITATION_NOISE, Q(5), 500, 20000, 14000}};
+    start(true);
+    go_to_the_middle();
+    const double middle = pose_z();
+    for (unsigned i = 0; i < 4; i++) {
+        double least = middle, most = middle;
+        const double amplitude = k_signals[i].amplitude_q16 / 65536.0;
+        m_signal = k_signals[i];
+        TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_SIGNAL_POSE, AXIS_Z + 1, 0));
+        hold_and_watch_z(k_signals[i].duration_ms + 100, &least, &most);
+        TEST_ASSERT_EQUAL(SERVICE_NOTHING, seen()->service.doing);
+        TEST_ASSERT_EQUAL(m_series, seen()->service.finished);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5, middle, pose_z());
+        TEST_ASSERT_TRUE(most - middle <= amplitude + 1e-5 && middle - least <= amplitude + 1e-5);
+        TEST_ASSERT_TRUE(most - middle > amplitude * (i == 3 ? 0.1 : 0.7));
+        TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+        TEST_ASSERT_EQUAL(0, rig_following_errors(&m_rig));
+        for (unsigned k = 0; k < seen()->cylinders; k++) {
+            TEST_ASSERT_TRUE(m_fastest[k] <= 100 + 1e-6);
+        }
+    }
+}
+
+static void test_signal_leads_one_cylinder(void)
+{
+    start(true);
+    go_to_the_middle();
+    double from[DRIVES_MAX];
+    for (unsigned i = 0; i < m_rig.drives.count; i++) {
+        from[i] = setpoint(i);
+    }
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_SIGNAL_AXIS, 3, 0));
+    hold_ms(4100);
+    TEST_ASSERT_EQUAL(m_series, seen()->service.finished);
+    for (unsigned i = 0; i < m_rig.drives.count; i++) {
+        TEST_ASSERT_TRUE(i == 2 ? m_fastest[i] > 15 : m_fastest[i] == 0);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, from[i], setpoint(i));
+    }
+    TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+}
+
+/* The limits of a ride stop it: 100 mm/s at 3000 mm/s^2 take 34 ms, and the jerk 60 ms more. */
+static void test_signal_without_a_hand_stops(void)
+{
+    for (unsigned at = 300; at < 4000; at += 370) {
+        start(true);
+        go_to_the_middle();
+        m_signal = (excitation_request_t){EXCITATION_CHIRP, Q(10), 1000, 20000, 12000};
+        TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_SIGNAL_POSE, AXIS_Z + 1, 0));
+        hold_ms(at);
+        rig_run_ms(&m_rig, 250 + 150);
+        TEST_ASSERT_EQUAL(SERVICE_NOTHING, seen()->service.doing);
+        TEST_ASSERT_NOT_EQUAL(m_series, seen()->service.finished);
+        forget_speeds();
+        rig_run_ms(&m_rig, 500);
+        for (unsigned i = 0; i < m_rig.drives.count; i++) {
+            TEST_ASSERT_TRUE(m_fastest[i] == 0);
+        }
+        TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+    }
+}
+
+/* As motion does where a jog leads astray. */
+static void test_what_motion_stops_is_not_finished(void)
+{
+    start(true);
+    go_to_the_middle();
+    const uint32_t finished = seen()->service.finished;
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_SIGNAL_AXIS, 3, 0));
+    hold_ms(1000);
+    motion_stop(&m_rig.gateway.motion);
+    hold_ms(1000);
+    TEST_ASSERT_EQUAL(SERVICE_NOTHING, seen()->service.doing);
+    TEST_ASSERT_EQUAL(finished, seen()->service.finished);
+    m_way_q16 = Q(5);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_JOG_AXIS, 3, 10));
+    hold_ms(200);
+    motion_stop(&m_rig.gateway.motion);
+    hold_ms(1000);
+    TEST_ASSERT_EQUAL(SERVICE_NOTHING, seen()->service.doing);
+    TEST_ASSERT_EQUAL(finished, seen()->service.finished);
+    TEST_ASSERT_TRUE(rig_is_within_limits(&m_rig));
+}
+
+static void test_signal_is_refused_by_name(void)
+{
+    start(true);
+    TEST_ASSERT_EQUAL(SERVICE_AT_END, ask(SERVICE_SIGNAL_POSE, AXIS_Z + 1, 0)); /* settled: no way down */
+    go_to_the_middle();
+    TEST_ASSERT_EQUAL(SERVICE_NO_SUCH, ask(SERVICE_SIGNAL_AXIS, 9, 0));
+    TEST_ASSERT_EQUAL(SERVICE_NO_SUCH, ask(SERVICE_SIGNAL_AXIS, 0, 0));
+    TEST_ASSERT_EQUAL(SERVICE_NO_SUCH, ask(SERVICE_SIGNAL_POSE, 7, 0));
+    m_signal.amplitude_q16 = Q(10.1);
+    TEST_ASSERT_EQUAL(SERVICE_TOO_WIDE, ask(SERVICE_SIGNAL_POSE, AXIS_Z + 1, 0));
+    TEST_ASSERT_EQUAL(SERVICE_TOO_WIDE, ask(SERVICE_SIGNAL_AXIS, 2, 0));
+    m_signal.amplitude_q16 = Q(3.1);
+    TEST_ASSERT_EQUAL(SERVICE_TOO_WIDE, ask(SERVICE_SIGNAL_POSE, AXIS_ROLL + 1, 0));
+    m_signal.duration_ms = 2000;
+    TEST_ASSERT_EQUAL(SERVICE_BAD_SIGNAL, ask(SERVICE_SIGNAL_POSE, AXIS_Z + 1, 0));
+    m_signal.duration_ms = 4000;
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_TORQUE_OFF, 2, 0));
+    rig_run_ms(&m_rig, 100);
+    TEST_ASSERT_EQUAL(SERVICE_NO_TORQUE, ask(SERVICE_SIGNAL_POSE, AXIS_Z + 1, 0));
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_SIGNAL_AXIS, 3, 0)); /* has its own */
+    rig_run_ms(&m_rig, 20);
+    TEST_ASSERT_EQUAL(SERVICE_BUSY, ask(SERVICE_SIGNAL_AXIS, 4, 0));
 }
 
 /* Hands that come and go at random, with any request, for minutes: limits hold, and without a hand everything rests. */
@@ -688,7 +923,7 @@ static void test_random_hands_never_move_anything_alone(void)
         const bool is_away = n / 1500u % 2u == 1u;
         const unsigned what = random % 40u;
         if (!is_away && what == 0) {
-            (void)ask_aged((service_verb_t)(SERVICE_JOG_AXIS + random / 64u % 4u), random / 256u % 9u,
+            (void)ask_aged((service_verb_t)(SERVICE_JOG_AXIS + random / 64u % 6u), random / 256u % 9u,
                            (int)(random / 4096u % 61u) - 30, random / 8192u % 300000u);
         } else if (!is_away && what < 10) {
             (void)beat(n + 1, random / 8192u % 300000u);
@@ -746,6 +981,13 @@ int main(void)
     RUN_TEST(test_words_are_complete);
     RUN_TEST(test_ticks_are_as_old_as_they_were_shown);
     RUN_TEST(test_resume_in_a_jog_takes_what_was_saved_and_nothing_else);
+    RUN_TEST(test_jog_with_a_way_ends_after_it);
+    RUN_TEST(test_signal_of_every_kind_ends_where_it_began);
+    RUN_TEST(test_signal_leads_one_cylinder);
+    RUN_TEST(test_signal_without_a_hand_stops);
+    RUN_TEST(test_what_motion_stops_is_not_finished);
+    RUN_TEST(test_signal_is_refused_by_name);
     RUN_TEST(test_random_hands_never_move_anything_alone);
+    RUN_TEST(test_objects_are_read_at_rest_and_written_in_service);
     return UNITY_END();
 }

@@ -14,16 +14,12 @@ void tearDown(void) {}
 static void expect(const char *digest, const void *bytes, size_t length, size_t piece)
 {
     char text[2 * SHA256_BYTES + 1];
-    uint8_t is[SHA256_BYTES];
     sha256_t hash;
     sha256_start(&hash);
     for (size_t at = 0; at < length; at += piece) {
         sha256_add(&hash, (const uint8_t *)bytes + at, length - at < piece ? length - at : piece);
     }
-    sha256_end(&hash, is);
-    for (unsigned i = 0; i < SHA256_BYTES; i++) {
-        (void)snprintf(&text[2 * i], 3, "%02x", is[i]);
-    }
+    sha256_end_digits(&hash, text, sizeof text);
     TEST_ASSERT_EQUAL_STRING(digest, text);
 }
 
@@ -61,10 +57,24 @@ static void test_sha256_lengths_around_the_end_of_a_block(void)
     }
 }
 
+static void test_as_many_digits_as_fit(void)
+{
+    char digits[2 * SHA256_BYTES + 9];
+    sha256_digits("abc", 3, digits, 17);
+    TEST_ASSERT_EQUAL_STRING("ba7816bf8f01cfea", digits);
+    sha256_digits("abc", 3, digits, 16);
+    TEST_ASSERT_EQUAL_STRING("ba7816bf8f01cf", digits);
+    sha256_digits("abc", 3, digits, 1);
+    TEST_ASSERT_EQUAL_STRING("", digits);
+    sha256_digits("abc", 3, digits, sizeof digits);
+    TEST_ASSERT_EQUAL_STRING("ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad", digits);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_sha256_examples_of_the_standard);
     RUN_TEST(test_sha256_lengths_around_the_end_of_a_block);
+    RUN_TEST(test_as_many_digits_as_fit);
     return UNITY_END();
 }

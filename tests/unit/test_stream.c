@@ -644,6 +644,40 @@ static void test_stream_step_bursts_of_losses_are_bridged_softly(void)
     }
 }
 
+/* A shake of 1 mm: every 25 samples one or two are lost, or one comes late. What is guessed in their place turns back where the
+ * shake does. */
+static double most_of_a_shake(stream_style_t style, double hz, double rate_hz, int lost, double late)
+{
+    start(style);
+    for (int i = 0; i < (int)(9 * rate_hz); i++) {
+        const bool is_hit = i % 25 < (lost > 0 ? lost : 1);
+        if (!is_hit || lost == 0) {
+            send(i / rate_hz + 0.002 + (is_hit ? late / rate_hz : 0.0005 * random_unit()), sin(6.283185307 * hz * i / rate_hz));
+        }
+    }
+    render(0, 0, 8900);
+    double most = 0;
+    for (int ms = 3000; ms < 8900; ms++) {
+        most = fmax(most, fabs(mm(s_ref[ms].pos_q32)));
+    }
+    return most;
+}
+
+static void test_stream_step_shake_with_losses_swings_no_further(void)
+{
+    for (int i = 0; i < 60; i++) {
+        const double rate_hz = i % 3 == 0 ? 60 : i % 3 == 1 ? 90 : 120;
+        const double hz = 1.1 + 7.1 * (i / 6) / 10.0;
+        const int lost = i % 2 == 0 ? i % 4 / 2 + 1 : 0;
+        const stream_style_t style = i % 4 < 2 ? STREAM_SMOOTH : STREAM_BALANCED;
+        const double most = most_of_a_shake(style, hz, rate_hz, lost, 0.9);
+        if (getenv("STREAM_FIGURES")) {
+            printf("shake %.1f Hz at %.0f Hz, %d lost, style %d: %.3f\n", hz, rate_hz, lost, (int)style, most);
+        }
+        TEST_ASSERT_TRUE(most < 1.1);
+    }
+}
+
 /* Neither from rest nor out of a slow motion of 0.05 mm a sample. */
 static void test_stream_step_jump_at_the_end_is_not_continued(void)
 {
@@ -1140,6 +1174,7 @@ int main(void)
     RUN_TEST(test_stream_step_all_rates_converge);
     RUN_TEST(test_stream_step_lossy_start_finds_the_period);
     RUN_TEST(test_stream_step_ended_stream_rests_on_its_last_sample);
+    RUN_TEST(test_stream_step_shake_with_losses_swings_no_further);
     RUN_TEST(test_stream_step_jump_at_the_end_is_not_continued);
     RUN_TEST(test_stream_step_bursts_of_losses_are_bridged_softly);
     RUN_TEST(test_stream_coarse_values_come_out_as_the_motion_that_was_rounded);

@@ -70,12 +70,32 @@ static q32_t last_control(void)
     return m_curve.control_q32[0] + (m_curve.way_q36[0][0] + m_curve.way_q36[1][0] + m_curve.way_q36[2][0]) / 16;
 }
 
+/* What the curve is off leads it a sixteenth further than the motion has been, and no more. */
+static void test_commit_correction_stays_where_the_motion_has_been(void)
+{
+    append(1, 0);
+    m_curve.off_q32[0][0] = Q32_ONE;
+    m_curve.off_q32[0][1] = 7 * Q32_ONE;
+    m_curve.low_q32[0] = -2 * Q32_ONE;
+    m_curve.high_q32[0] = 2 * Q32_ONE;
+    m_curve.grip_q32 = Q32_ONE / 8;
+    m_curve.is_off = true;
+    commit(1);
+    TEST_ASSERT_EQUAL_INT64(2 * Q32_ONE + Q32_ONE / 4, last_control());
+    TEST_ASSERT_EQUAL_INT64(0, m_curve.off_q32[0][1]);
+    append(1, 0);
+    commit(1);
+    TEST_ASSERT_TRUE(last_control() < 2 * Q32_ONE + Q32_ONE / 4);
+}
+
 /* At the turn of a swing it is on the point for a moment, and yet not back. */
 static void test_commit_on_the_way_through_the_point_the_curve_is_still_off(void)
 {
     append(1, 0);
     m_curve.off_q32[0][0] = 4 * Q32_ONE;
     m_curve.off_q32[0][1] = -7 * Q32_ONE;
+    m_curve.low_q32[0] = -16 * Q32_ONE;
+    m_curve.high_q32[0] = 16 * Q32_ONE;
     m_curve.grip_q32 = Q32_ONE / 2;
     m_curve.is_off = true;
     commit(1);
@@ -144,6 +164,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_skip_without_two_samples_ahead_changes_nothing);
+    RUN_TEST(test_commit_correction_stays_where_the_motion_has_been);
     RUN_TEST(test_commit_on_the_way_through_the_point_the_curve_is_still_off);
     RUN_TEST(test_pace_a_longer_mean_than_needed_is_kept_where_one_less_would_do);
     RUN_TEST(test_elapsed_longer_than_it_counts_is_the_longest);

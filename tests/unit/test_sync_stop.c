@@ -134,7 +134,7 @@ static void test_halt_plan_one_axis_is_as_quick_as_its_limits(void)
         const ramp_state_t start = random_state(&limits);
         judge_t j = {.last = start};
         sync_stop_t halt;
-        sync_stop_plan(&halt, 1, 1, &start, list);
+        sync_stop_plan(&halt, 1, 1, &start, list, NULL);
         const double own = own_cycles(&start, &limits);
         worst = own > 50 ? fmax(worst, (double)halt.cycles / own) : worst;
         longer += (double)halt.cycles > own * 1.05 + 6;
@@ -165,7 +165,7 @@ static void test_halt_plan_one_body_ends_together_within_ten_percent_of_the_slow
             own = fmax(own, own_cycles(&start[i], &one));
         }
         sync_stop_t halt;
-        sync_stop_plan(&halt, AXES, AXES, start, list);
+        sync_stop_plan(&halt, AXES, AXES, start, list, NULL);
         walk(&halt, limits, j);
         for (unsigned i = 0; i < AXES; i++) {
             accel = fmax(accel, j[i].accel);
@@ -203,7 +203,7 @@ static void test_halt_plan_proportional_axes_keep_their_direction(void)
                                       (q32_t)((double)lead.acc_per_cycle2_q32 * share[i])};
         }
         sync_stop_t halt;
-        sync_stop_plan(&halt, AXES, AXES, start, list);
+        sync_stop_plan(&halt, AXES, AXES, start, list, NULL);
         TEST_ASSERT_TRUE((double)halt.cycles <= own_cycles(&lead, &one) * 1.05 + 6);
         while (!sync_stop_is_done(&halt)) {
             ramp_ref_t ref[AXES];
@@ -221,7 +221,7 @@ static void test_halt_plan_at_rest_stays_where_it_is(void)
     const ramp_limits_t *const list[2] = {&limits, &limits};
     const ramp_state_t start[2] = {{.pos_q32 = q32(3)}, {.pos_q32 = q32(-7)}};
     sync_stop_t halt;
-    sync_stop_plan(&halt, 2, 2, start, list);
+    sync_stop_plan(&halt, 2, 2, start, list, NULL);
     TEST_ASSERT_TRUE(halt.cycles <= 3);
     TEST_ASSERT_EQUAL_INT64(start[0].pos_q32, halt.rest_q32[0]);
     TEST_ASSERT_EQUAL_INT64(start[1].pos_q32, halt.rest_q32[1]);
@@ -236,7 +236,7 @@ static void test_halt_plan_acceleration_of_one_cycle_ends_where_it_is(void)
     const ramp_state_t start = {.pos_q32 = q32(20), .acc_per_cycle2_q32 = jerk_q32 - jerk_q32 / 128 - 4};
     judge_t j = {.last = start};
     sync_stop_t halt;
-    sync_stop_plan(&halt, 1, 1, &start, list);
+    sync_stop_plan(&halt, 1, 1, &start, list, NULL);
     TEST_ASSERT_EQUAL_INT64(2, halt.cycles);
     walk(&halt, &limits, &j);
     TEST_ASSERT_EQUAL_INT64(start.pos_q32, halt.rest_q32[0]);
@@ -251,7 +251,7 @@ static void test_halt_plan_axis_apart_takes_its_own_time(void)
     const ramp_state_t start[3] = {{0, q32(0.1), q32(0.003)}, {0, q32(0.2), 0}, {0, q32(0.06), 0}};
     judge_t j[3] = {{.last = start[0]}, {.last = start[1]}, {.last = start[2]}};
     sync_stop_t halt;
-    sync_stop_plan(&halt, 3, 2, start, list);
+    sync_stop_plan(&halt, 3, 2, start, list, NULL);
     TEST_ASSERT_TRUE(halt.cycles > 3000);
     TEST_ASSERT_TRUE(halt.times[0].change + halt.times[0].hold + halt.times[0].back < 250);
     TEST_ASSERT_EQUAL_INT64(halt.times[0].change, halt.times[1].change);
@@ -265,10 +265,10 @@ static void test_halt_plan_near_a_bound_takes_its_own_time(void)
     const ramp_limits_t *const list[2] = {&limits[0], &limits[1]};
     const ramp_state_t start[2] = {{0, q32(0.4), 0}, {0, q32(0.1), 0}};
     sync_stop_t halt;
-    sync_stop_plan(&halt, 2, 2, start, list);
+    sync_stop_plan(&halt, 2, 2, start, list, NULL);
     const q32_t together = halt.rest_q32[1];
     limits[1].pos_max_q32 = together - q32(1);
-    sync_stop_plan(&halt, 2, 2, start, list);
+    sync_stop_plan(&halt, 2, 2, start, list, NULL);
     TEST_ASSERT_TRUE(halt.rest_q32[1] < limits[1].pos_max_q32);
 }
 
@@ -284,7 +284,7 @@ static void test_halt_plan_far_beyond_the_limits_does_not_wrap_around(void)
         for (unsigned i = 0; i < 2; i++) {
             turned[i] = (ramp_state_t){0, sign * start[i].vel_per_cycle_q32, sign * start[i].acc_per_cycle2_q32};
         }
-        sync_stop_plan(&halt, 2, 2, turned, list);
+        sync_stop_plan(&halt, 2, 2, turned, list, NULL);
         for (unsigned i = 0; i < 2; i++) {
             TEST_ASSERT_TRUE(sign * halt.rest_q32[i] > q32(100) && sign * halt.rest_q32[i] <= q32(1 << 20));
         }

@@ -35,7 +35,7 @@ void setUp(void)
     m_map = (canraw_map_t){.axes = 2, .period_us = 4000, .query_every = 1, .offline_periods = 10};
     m_map.setpoint = frame_of(5, 0x01, (const uint8_t[]){0x10, 0, 0, 0, 0});
     m_map.setpoint.fields = 1;
-    m_map.setpoint.field[0] = (canraw_field_t){CANRAW_POSITION, 1, 4, true, true};
+    m_map.setpoint.field[0] = (canraw_field_t){CANRAW_POSITION, 1, 32, true, true, 0, 0, 0};
     const uint8_t bytes[CANRAW_COMMANDS] = {0x22, 0x21, 0x23, 0x20, 0x24};
     for (unsigned i = 0; i < CANRAW_COMMANDS; i++) {
         m_map.command[i] = frame_of(1, 0x01, &bytes[i]);
@@ -43,15 +43,15 @@ void setUp(void)
     m_map.position_query = frame_of(1, 0x01, (const uint8_t[]){0x30});
     m_map.position_reply = frame_of(8, 0x01, (const uint8_t[]){0x30, 0, 0, 0, 0, 0, 0, 0});
     m_map.position_reply.fields = 4;
-    m_map.position_reply.field[0] = (canraw_field_t){CANRAW_STATUS, 1, 1, false, false};
-    m_map.position_reply.field[1] = (canraw_field_t){CANRAW_POSITION, 2, 4, true, true};
-    m_map.position_reply.field[2] = (canraw_field_t){CANRAW_COUNTER, 6, 1, false, false};
-    m_map.position_reply.field[3] = (canraw_field_t){CANRAW_XOR, 7, 1, false, false};
+    m_map.position_reply.field[0] = (canraw_field_t){CANRAW_STATUS, 1, 8, false, false, 0, 0, 0};
+    m_map.position_reply.field[1] = (canraw_field_t){CANRAW_POSITION, 2, 32, true, true, 0, 0, 0};
+    m_map.position_reply.field[2] = (canraw_field_t){CANRAW_COUNTER, 6, 8, false, false, 0, 0, 0};
+    m_map.position_reply.field[3] = (canraw_field_t){CANRAW_XOR, 7, 8, false, false, 0, 0, 0};
     m_map.enabled_when = (canraw_when_t){1, 1};
     m_map.fault_when = (canraw_when_t){2, 2};
     m_map.homing_done = (canraw_when_t){4, 4};
     m_map.homing_failed = (canraw_when_t){8, 8};
-    m_map.axis[1] = (canraw_axis_map_t){.command_id = 0x602, .reply_id = 0x582, .scale = {1000, 1, 0}};
+    m_map.axis[1] = (canraw_axis_map_t){.command_id = 0x602, .setpoint_id = 0x602, .reply_id = 0x582, .scale = {1000, 1, 0}};
     memset(&m_motor, 0, sizeof m_motor);
     motor_start(&m_motor, 5000, 0);
     TEST_ASSERT_NULL(frame_drive_refusal(&m_map));
@@ -135,6 +135,17 @@ static void test_homing_finds_the_zero_and_gives_no_torque_that_was_not_there(vo
     TEST_ASSERT_EQUAL_HEX8(5, status());
     home();
     TEST_ASSERT_EQUAL_HEX8(5, status());
+}
+
+static void test_an_absolute_encoder_knows_its_zero_without_homing(void)
+{
+    m_drive.is_absolute = true;
+    m_drive.origin = 0;
+    frame_drive_power(&m_drive, false, m_now_us);
+    frame_drive_power(&m_drive, true, m_now_us);
+    m_now_us += 300000;
+    TEST_ASSERT_EQUAL(5000, frame_drive_count(&m_drive));
+    TEST_ASSERT_EQUAL_HEX8(4, status()); /* no torque, homed */
 }
 
 static void test_set_points_move_it_only_with_torque(void)
@@ -241,12 +252,84 @@ static void test_a_map_whose_states_no_status_tells_apart_is_refused(void)
     TEST_ASSERT_NOT_NULL(frame_drive_refusal(&m_map));
 }
 
+/* Two axes in a frame, as one controller has them: each takes its own field, and one frame tells both. */
+static void test_drives_that_share_frames_take_and_tell_their_own_fields(void)
+{
+    static frame_drive_t all[2];
+    motor_t motor[2];
+    m_map.setpoint = frame_of(6, 0x03, (const uint8_t[]){0x10, 0, 0, 0, 0, 0});
+    m_map.setpoint.fields = 2;
+    m_map.position_reply.fields = 3;
+    m_map.position_reply.constant = 0x01;
+    m_map.position_reply.length = 6;
+    m_map.position_query.length = 0;
+    m_map.command[CANRAW_HOME].length = 0;
+    m_map.homing_done = m_map.homing_failed = (canraw_when_t){0, 0};
+    m_map.position_reply.field[0] = (canraw_field_t){CANRAW_STATUS, 1, 8, false, false, 0, 0, 0};
+    for (unsigned k = 0; k < 2; k++) {
+        const uint8_t at = (uint8_t)(2 + 2 * k), slot = (uint8_t)(1 + k);
+        m_map.setpoint.field[k] = (canraw_field_t){CANRAW_POSITION, at, 16, true, false, 0, 0, slot};
+        m_map.position_reply.field[1 + k] = (canraw_field_t){CANRAW_POSITION, at, 16, true, false, 0, 0, slot};
+        m_map.axis[k] = (canraw_axis_map_t){.command_id = 0x602 + k,
+                                            .setpoint_id = 0x200,
+                                            .reply_id = 0x300,
+                                            .setpoint_slot = slot,
+                                            .reply_slot = slot,
+                                            .scale = {1000, 1, 0}};
+        memset(&motor[k], 0, sizeof motor[k]);
+        motor_start(&motor[k], 5000 + k, 0);
+        frame_drive_init(&all[k], &m_map, k, (node_out_t){put, NULL});
+        all[k].all = all;
+        all[k].motor = &motor[k];
+        all[k].usual_speed = 100000;
+    }
+    for (unsigned k = 0; k < 2; k++) {
+        frame_drive_power(&all[k], true, m_now_us);
+    }
+    m_now_us += 300000;
+    m_count = 0;
+    frame_drive_advance(&all[0], m_now_us);
+    frame_drive_advance(&all[1], m_now_us); /* does not tell the same again */
+    TEST_ASSERT_EQUAL(1, m_count);
+    TEST_ASSERT_EQUAL_HEX32(0x300, m_sent[0].id);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(((const uint8_t[]){0x30, 0x00, 0x88, 0x13, 0x89, 0x13}), m_sent[0].data, 6);
+    can_frame_t enable = {.id = 0x602, .length = 1, .data = {0x20}};
+    frame_drive_hear(&all[0], &enable, m_now_us);
+    frame_drive_hear(&all[1], &enable, m_now_us); /* not its own */
+    TEST_ASSERT_TRUE(frame_drive_is_enabled(&all[0]));
+    TEST_ASSERT_FALSE(frame_drive_is_enabled(&all[1]));
+    enable.id = 0x603;
+    frame_drive_hear(&all[1], &enable, m_now_us);
+    const can_frame_t setpoints = {.id = 0x200, .length = 6, .data = {0x10, 0x00, 0xA0, 0x0F, 0x70, 0x17}};
+    for (unsigned ms = 0; ms < 200; ms++) {
+        m_now_us += 1000;
+        m_count = 0;
+        for (unsigned k = 0; k < 2; k++) {
+            frame_drive_hear(&all[k], &setpoints, m_now_us);
+            frame_drive_advance(&all[k], m_now_us);
+        }
+    }
+    TEST_ASSERT_EQUAL(4000, frame_drive_count(&all[0]));
+    TEST_ASSERT_EQUAL(6000, frame_drive_count(&all[1]));
+    frame_drive_fault(&all[1], 5); /* a status of both: the fault of any */
+    m_count = 0;
+    m_now_us += 5000;
+    frame_drive_advance(&all[0], m_now_us);
+    TEST_ASSERT_EQUAL_HEX8(0x02, m_sent[0].data[1]);
+    all[1].is_mute = true; /* one device */
+    m_count = 0;
+    m_now_us += 5000;
+    frame_drive_advance(&all[0], m_now_us);
+    TEST_ASSERT_EQUAL(0, m_count);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_reply_has_status_position_counter_and_check_byte);
     RUN_TEST(test_other_frames_are_not_its_own);
     RUN_TEST(test_homing_finds_the_zero_and_gives_no_torque_that_was_not_there);
+    RUN_TEST(test_an_absolute_encoder_knows_its_zero_without_homing);
     RUN_TEST(test_set_points_move_it_only_with_torque);
     RUN_TEST(test_a_fault_stays_until_its_cause_is_gone);
     RUN_TEST(test_homing_that_fails_is_a_fault_that_says_so);
@@ -254,5 +337,6 @@ int main(void)
     RUN_TEST(test_without_a_query_it_tells_by_itself);
     RUN_TEST(test_a_map_without_a_word_for_torque_always_has_it);
     RUN_TEST(test_a_map_whose_states_no_status_tells_apart_is_refused);
+    RUN_TEST(test_drives_that_share_frames_take_and_tell_their_own_fields);
     return UNITY_END();
 }

@@ -15,6 +15,7 @@
 #define CONTROL  0x0210u
 #define WATCHDOG 0x0300u
 
+static const lines_t k_no_lines;
 static config_t m_config;
 static twin_settings_t m_settings;
 static twin_t m_twin;
@@ -231,8 +232,10 @@ static void test_faults_that_these_drives_lack_are_refused(void)
         TEST_ASSERT_FALSE_MESSAGE(fault_do(&fault, &m_twin, m_now_us, why), k_lines[i]);
     }
     TEST_ASSERT_TRUE(fault_read(&fault, "damaged 2 1", 6, why));
-    TEST_ASSERT_FALSE(fault_suits(&fault, TWIN_DRIVES_CIA402, false, why));
-    TEST_ASSERT_TRUE(fault_suits(&fault, TWIN_DRIVES_MODBUS, false, why));
+    const fault_machine_t other = {.kind = TWIN_DRIVES_CIA402};
+    const fault_machine_t modbus = {.kind = TWIN_DRIVES_MODBUS};
+    TEST_ASSERT_FALSE(fault_suits(&fault, &other, why));
+    TEST_ASSERT_TRUE(fault_suits(&fault, &modbus, why));
 }
 
 static void test_any_bytes_get_an_answer_or_none(void)
@@ -257,10 +260,10 @@ static void test_maps_of_the_presets_can_be_shown(void)
     static const char *const k_files[] = {HEAVE_CONFIG "/modbus-tcp-hexapod.ini"};
     for (unsigned i = 0; i < sizeof k_files / sizeof k_files[0]; i++) {
         TEST_ASSERT_EQUAL(0, config_load(k_files[i], &m_config, stderr));
-        TEST_ASSERT_NULL(twin_refusal(&m_config));
+        TEST_ASSERT_NULL(twin_refusal(&m_config, &k_no_lines));
     }
     m_config.modbus.fault_when = m_config.modbus.enabled_when; /* nobody could tell one from the other */
-    TEST_ASSERT_NOT_NULL(twin_refusal(&m_config));
+    TEST_ASSERT_NOT_NULL(twin_refusal(&m_config, &k_no_lines));
 }
 
 int main(void)

@@ -31,4 +31,4 @@ def build(folder, target, *options):
     elif options:
         run_tool("cmake", str(folder), *options, *(["-U", "CMAKE_CXX_COMPILER"] if _lacks_cxx(folder) else []))
     run_tool("cmake", "--build", str(folder), "--target", target)
-    return folder / {"heaved": "bin/heaved"}.get(target, f"tests/bench/{target}")
+    return folder / {"heaved": "bin/heaved", "heave_panel": "bin/heave-panel"}.get(target, f"tests/bench/{target}")

@@ -22,6 +22,7 @@ deps_build() {
     deps_need ninja-build cmd:ninja
     deps_need gcc cmd:gcc
     deps_need libc6-dev file:/usr/include/stdio.h
+    deps_need gettext cmd:msgfmt
     deps_need pkg-config cmd:pkg-config
     deps_need libinih-dev pc:inih
     deps_need libcjson-dev pc:libcjson

@@ -61,8 +61,8 @@ class Contracts(Target):
                 "-wp-cache", "none", *self.sources, "-then", "-report-csv", str(table)]
 
 
-PARSER = "src/protocol/frame.c src/protocol/frame_command.c src/protocol/frame_quick.c src/protocol/number.c"
-WORDS = "src/protocol/frame.c src/protocol/frame_command.c src/protocol/frame_text.c src/protocol/text.c"
+PARSER = "src/protocol/frame.c src/protocol/frame_command.c src/protocol/frame_quick.c src/protocol/frame_reject.c src/protocol/number.c"
+WORDS = "src/protocol/frame.c src/protocol/frame_command.c src/protocol/frame_reject.c src/protocol/frame_text.c src/protocol/text.c"
 FIXED = "src/fixed/fx.c src/fixed/fx_root.c src/fixed/fx_trig.c"
 DRIVERS = ("src/canopen/cia402_axis.c", "src/drives/canraw", "src/drives/modbus")  # of these, the codecs alone
 TARGETS = [
@@ -81,7 +81,7 @@ TARGETS = [
     Target("counts", "counts and units", "fixed", "src/drives/counts.c", "fx_mul_div"),
     Target("sdo", "SDO answers", "codecs", "src/canopen/sdo.c"),
     Target("pdo", "PDOs and emergencies", "codecs", "src/canopen/cia402_axis.c src/drives/counts.c src/fixed/fx.c", "fx_mul_div,fx_add_sat"),
-    Target("canraw", "frames of raw CAN drives", "codecs", "src/drives/canraw_frame.c"),
+    Target("canraw", "frames of raw CAN drives", "codecs", "src/drives/canraw_frame.c src/drives/canraw_float.c"),
     Target("modbus", "registers of Modbus drives", "codecs", "src/drives/modbus_drive_map.c"),
 ]
 

@@ -18,10 +18,12 @@ PROGRAMS = {
     "record": {"common", "config"},
     "inspect": {"common", "config"},
     "service": {"common", "config", "record"},
-    "daemon": {"common", "config", "record", "inspect", "service", "heavectl", "twin"},
+    "daemon": {"common", "config", "record", "inspect", "service", "heavectl", "twin", "panel"},
     "twin": {"common", "config"},
-    "heavectl": {"common"},
-    "panel": {"common", "service"},
+    "setup": {"common"},
+    "identify": {"common"},
+    "heavectl": {"common", "setup", "identify"},
+    "panel": {"common", "service", "identify"},
 }
 
 

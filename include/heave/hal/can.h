@@ -67,7 +67,7 @@ typedef struct {
     void *ctx;
 } hal_can_t;
 
-/** True where every mandatory op is there; refuse to start otherwise. */
+/** True if every mandatory op is set. If not, refuse to start. */
 static inline bool hal_can_valid(hal_can_t can)
 {
     return can.ops != NULL && can.ops->send != NULL && can.ops->recv != NULL;

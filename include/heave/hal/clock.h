@@ -20,7 +20,7 @@ typedef struct {
     void *ctx;
 } hal_clock_t;
 
-/** True where every mandatory op is there; refuse to start otherwise. */
+/** True if every mandatory op is set. If not, refuse to start. */
 static inline bool hal_clock_valid(hal_clock_t clock)
 {
     return clock.ops != NULL && clock.ops->now_us != NULL && clock.ops->sleep_until_us != NULL;

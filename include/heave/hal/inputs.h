@@ -30,7 +30,7 @@ typedef struct {
     void *ctx;
 } hal_inputs_t;
 
-/** True where every mandatory op is there; refuse to start otherwise. */
+/** True if every mandatory op is set. If not, refuse to start. */
 static inline bool hal_inputs_valid(hal_inputs_t inputs)
 {
     return inputs.ops != NULL && inputs.ops->read != NULL && inputs.ops->present != NULL;

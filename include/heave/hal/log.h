@@ -25,7 +25,7 @@ typedef struct {
     void *ctx;
 } hal_log_t;
 
-/** True where every mandatory op is there; refuse to start otherwise. */
+/** True if every mandatory op is set. If not, refuse to start. */
 static inline bool hal_log_valid(hal_log_t log)
 {
     return log.ops != NULL && log.ops->write != NULL && log.ops->dropped != NULL;

@@ -80,7 +80,7 @@ typedef struct {
     void *ctx;
 } hal_modbus_t;
 
-/** True where every mandatory op is there; refuse to start otherwise. */
+/** True if every mandatory op is set. If not, refuse to start. */
 static inline bool hal_modbus_valid(hal_modbus_t modbus)
 {
     return modbus.ops != NULL && modbus.ops->submit != NULL && modbus.ops->poll != NULL;

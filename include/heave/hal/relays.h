@@ -23,7 +23,7 @@ typedef struct {
     void *ctx;
 } hal_relays_t;
 
-/** True where every mandatory op is there; refuse to start otherwise. */
+/** True if every mandatory op is set. If not, refuse to start. */
 static inline bool hal_relays_valid(hal_relays_t relays)
 {
     return relays.ops != NULL && relays.ops->write != NULL && relays.ops->count != NULL;

@@ -47,7 +47,7 @@ typedef struct {
     void *ctx;
 } hal_udp_t;
 
-/** True where every mandatory op is there; refuse to start otherwise. */
+/** True if every mandatory op is set. If not, refuse to start. */
 static inline bool hal_udp_valid(hal_udp_t udp)
 {
     return udp.ops != NULL && udp.ops->recv != NULL;

@@ -22,9 +22,12 @@ In OFF, HOMING, ESTOP, and FAULT after the stop, set-points follow the actual po
 
 Exit status: 0 no violation, 1 violations (the first 20 are named), 2 files that cannot be read or a setting that is not stated.
 """
+from __future__ import annotations
+
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 
 from heave.configuration import ConfigError, Configuration
 from heave.judge.checker import Checker
@@ -33,7 +36,7 @@ from heave.recording import read_frames
 from heave.trace import COLUMNS, NANO
 
 
-def parse_arguments(words, program):
+def parse_arguments(words: Sequence[str] | None, program: str | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog=program, description="Checks every row of a trace against the limits of its configuration.")
     parser.add_argument("config", help="what heaved ran with")
     parser.add_argument("trace", help="what its --trace wrote, - for standard input")
@@ -47,7 +50,7 @@ def parse_arguments(words, program):
     return arguments
 
 
-def check(arguments):
+def check(arguments: argparse.Namespace) -> tuple[Checker, TimedWatcher | None]:
     platform = Configuration(arguments.config)
     timed = TimedWatcher(read_frames(arguments.frames), platform, COLUMNS) if arguments.frames else None
     checker = Checker(platform, every=arguments.every, watchers=[timed] if timed else [], is_strict=arguments.strict)
@@ -59,7 +62,7 @@ def check(arguments):
     return checker, timed
 
 
-def as_json(checker, timed):
+def as_json(checker: Checker, timed: TimedWatcher | None) -> str:
     rules = [dict(zip(("rule", "limit", "worst", "share", "t_us", "rows"), summary)) for summary in checker.summaries()]
     result = {"rows": checker.rows, "following_rows": checker.following_rows, "pose_rows": checker.pose_rows,
               "states": checker.state_rows, "flags": checker.flag_rows,
@@ -70,7 +73,7 @@ def as_json(checker, timed):
     return json.dumps(result, indent=1)
 
 
-def print_report(checker, timed):
+def print_report(checker: Checker, timed: TimedWatcher | None) -> None:
     print(f"{'rule':28} {'limit':>20} {'worst':>26} {'share':>9} {'at ms':>13} {'rows':>9}")
     for name, limit, worst, share, t_us, rows in checker.summaries():
         at = f"{t_us / 1000:.3f}" if t_us is not None else ""
@@ -86,7 +89,7 @@ def print_report(checker, timed):
     print(f"{checker.rows} rows, {checker.findings.count} violations")
 
 
-def main(words=None, program=None):
+def main(words: Sequence[str] | None = None, program: str | None = None) -> int:
     arguments = parse_arguments(words, program)
     try:
         checker, timed = check(arguments)

@@ -53,7 +53,7 @@ def following(asked_t: Sequence[float], asked: Sequence[float], made_t: Sequence
         return float(np.dot(rest, rest)), gain, rest
 
     lags = np.arange(0, lag_max_s + step, max(step, 1e-3))
-    fits = [fit(lag) for lag in lags]
+    fits = [fit(float(lag)) for lag in lags]
     energy = float(np.dot(values, values))
     errors = np.array([error if gain > 0 else np.inf for error, gain, _ in fits])  # against the motion: half a period of a sine, not a lag
     if not np.isfinite(errors).any():

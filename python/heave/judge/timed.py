@@ -4,12 +4,22 @@
 Only moves that leave no doubt are looked at: a single well-formed T frame, the platform ENGAGED and at rest, no other line near it. A move
 that the trace flags as stretched, clamped or taken over is not expected to be in time.
 """
-import re
-from fractions import Fraction
+from __future__ import annotations
 
-from heave.configuration import POSE_AXES, UNIT
+import re
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+from heave.configuration import POSE_AXES, UNIT, Configuration
+from heave.judge.rules import Block, Numbers
+from heave.recording import Line
 from heave.trace import NANO
 
+if TYPE_CHECKING:
+    from heave.judge.checker import Checker
+
+Candidate = tuple[int, int, dict[str, int]]  # t_us, T_us, {column name: target in 1e-9}
 FRAME = re.compile(r"@([AC])([3467])T:([-+0-9.,]+),(\d+)#[\r\n\0 ]*")
 EXCUSES = {"stretched", "takeover", "clamped"}
 QUIET_US = 300_000          # before the frame: so that it cannot pass for a sample of a stream
@@ -20,9 +30,11 @@ EARLY_LEFT = 1e-4           # ... at least this much of the way is left
 WORTH_CHECKING = NANO // 10
 
 
-def candidates(lines, platform):
+def candidates(lines: Sequence[Line], platform: Configuration) -> list[Candidate]:
     """(t_us, T_us, {column name: target in 1e-9}) of each isolated timed frame."""
-    found, line_us, frame_us = [], None, None
+    found: list[Candidate] = []
+    line_us: int | None = None
+    frame_us: int | None = None
     for i, line in enumerate(lines):
         quiet = QUIET_US if line_us is None else line.t_us - line_us
         period = None if frame_us is None else line.t_us - frame_us
@@ -41,7 +53,7 @@ def candidates(lines, platform):
     return found
 
 
-def targets(match, platform):
+def targets(match: re.Match[str], platform: Configuration) -> dict[str, int] | None:
     """{column name: target}, or None where the frame is not for this platform."""
     space, number, text, _ = match.groups()
     try:
@@ -67,7 +79,7 @@ def targets(match, platform):
     return result
 
 
-def axis_target(name, sent, platform):
+def axis_target(name: str, sent: Fraction, platform: Configuration) -> int:
     axis = platform.axes[name]
     asked = axis.sign * axis.scale * sent + axis.offset
     return int(min(max(asked, axis.low), axis.high) * NANO)
@@ -76,24 +88,29 @@ def axis_target(name, sent, platform):
 class TimedWatcher:
     """Follows the candidates through the blocks; what it needs of a row is taken when it passes."""
 
-    def __init__(self, lines, platform, columns):
+    def __init__(self, lines: Sequence[Line], platform: Configuration, columns: Sequence[str]) -> None:
         self.platform, self.columns = platform, columns
         self.waiting = candidates(lines, platform)
-        self.open = []
+        self.open: list[Move] = []
         self.checked = self.excused = 0
-        self.worst, self.worst_t_us = 0, None
+        self.worst = 0
+        self.worst_t_us: int | None = None
 
-    def look(self, block, checker):
+    def look(self, block: Block, checker: Checker) -> None:
         t0, cycle = block.times[0], self.platform.cycle_us
         end = block.times[-1] + cycle
         while self.waiting and self.waiting[0][0] < end:
             self.open.append(Move(*self.waiting.pop(0)))
-        index = lambda t_us: -(-(t_us - t0) // cycle)  # noqa: E731  the first row at or after a time
+
+        def index(t_us: int) -> int:
+            """The first row at or after a time."""
+            return -(-(t_us - t0) // cycle)
+
         for move in self.open:
             move.look(block, index, checker, self)
         self.open = [move for move in self.open if not move.is_over]
 
-    def judge(self, move, block, i, checker):
+    def judge(self, move: Move, block: Block, i: int, checker: Checker) -> None:
         if not move.is_clean or not move.is_at_rest or move.words & EXCUSES:
             self.excused += 1
             return
@@ -105,6 +122,8 @@ class TimedWatcher:
                 self.worst, self.worst_t_us = error, block.times[i]
             if error > TOLERANCE:
                 checker.findings.add("timed move is late", name, *block.at(i), f"{error / NANO:.6f} short", f"{TOLERANCE / NANO:g} at its end")
+            if move.at_start is None or move.at_early is None:  # rows are missing
+                continue
             way, left = abs(target - move.at_start[column]), abs(target - move.at_early[column])
             if way > WORTH_CHECKING and left < EARLY_LEFT * way:
                 checker.findings.add("timed move is early", name, *block.at(i), f"{left / NANO:.6f} left",
@@ -112,12 +131,14 @@ class TimedWatcher:
 
 
 class Move:
-    def __init__(self, t_us, move_us, target):
+    def __init__(self, t_us: int, move_us: int, target: dict[str, int]) -> None:
         self.t_us, self.move_us, self.target = t_us, move_us, target
-        self.words, self.is_clean, self.is_at_rest, self.is_over = set(), True, False, False
-        self.at_start = self.at_early = None
+        self.words: set[str] = set()
+        self.is_clean, self.is_at_rest, self.is_over = True, False, False
+        self.at_start: Numbers | None = None
+        self.at_early: Numbers | None = None
 
-    def look(self, block, index, checker, watcher):
+    def look(self, block: Block, index: Callable[[int], int], checker: Checker, watcher: TimedWatcher) -> None:
         start, early = index(self.t_us), index(self.t_us + int(EARLY_SHARE * self.move_us))
         last = index(self.t_us + self.move_us) + 1
         low, high = max(0, start), min(block.count, last + 1)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Sequence
 
 from heave import lab
+from heave.errors import HeaveError
 
-CANNOT, TOO_LONG = 125, 124
+CANNOT, TOO_LONG, NOBODY_READS = 125, 124, 141
 DESCRIPTION = """Runs a command on a kernel that has CAN (vcan0 is up), slcan and simulated GPIO lines (gpio-sim), where this machine's own kernel has none.
 The kernel is an ordinary program (User Mode Linux): no rights are needed, this machine's files are its files."""
-EPILOG = f"""exit status: that of the command; {TOO_LONG} after --limit; {CANNOT} where it could not be run, which is said.
+EPILOG = f"""exit status: that of the command; {TOO_LONG} after --limit; {NOBODY_READS} where nobody reads what it prints; {CANNOT} where it could not be run, which is said.
 The kernel is built once, by `heave-lab build`, from Debian's package linux-source into ~/.cache/heave: some minutes; takes gcc, make, flex, bison, bc and xz-utils.
 For a CI machine keep that folder in its cache."""
 
@@ -49,7 +51,10 @@ def main(words: Sequence[str] | None = None, program: str = "heave-lab") -> int:
             print(lab.find_kernel(build=options.verb == "build"))
             return 0
         finished = lab.run(options.command, kernel=options.kernel, virtual_time=options.virtual_time, limit_s=options.limit, memory=options.memory, echo=True)
-    except (lab.HeaveError, OSError) as error:
+    except BrokenPipeError:  # nobody reads what the command prints: the kernel is ended already
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return NOBODY_READS
+    except (HeaveError, OSError) as error:
         print(f"{program}: {error}", file=sys.stderr)
         return CANNOT if options.verb == "run" else 1
     except KeyboardInterrupt:

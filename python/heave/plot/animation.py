@@ -1,9 +1,16 @@
 # SPDX-License-Identifier: MIT
 """animation.py - a run as one page for a browser: the platform in motion, to be turned, stopped and looked at row by row. It asks nothing of any network."""
+from __future__ import annotations
+
 import html
 import json
+from collections.abc import Iterable, Sequence
+
+from heave.configuration import Configuration
+from heave.plot.window import Window
 
 FRAMES_PER_S = 25
+FAULTY = ("FAULT", "ESTOP")
 MOST_FRAMES = 15_000  # ten minutes; longer runs have fewer a second
 
 PAGE = """<!DOCTYPE html>
@@ -83,7 +90,7 @@ draw();
 """
 
 
-def chosen(window):
+def chosen(window: Window) -> tuple[list[int], int]:
     """The rows that are shown."""
     step_us = max(1_000_000 // FRAMES_PER_S, window.cycle_us, (window.times_us[-1] - window.times_us[0]) // MOST_FRAMES)
     rows, due = [], window.times_us[0]
@@ -94,15 +101,28 @@ def chosen(window):
     return rows, step_us
 
 
-def rounded(points, digits=1):
+def rounded(points: Iterable[Sequence[float]], digits: int = 1) -> list[list[float]]:
     return [[round(value, digits) for value in point] for point in points]
 
 
-def page(window, platform):
+def told_states(window: Window, faults: Sequence[tuple[int, str]]) -> list[str]:
+    """The states; those that a fault leads to with the newest fault."""
+    told, newest, due = [], "", list(faults)
+    for t_us, state in zip(window.times_us, window.states):
+        while due and due[0][0] <= t_us:
+            newest = due.pop(0)[1]
+        told.append(f"{state} {newest}".rstrip() if state in FAULTY else state)
+    return told
+
+
+def page(window: Window, platform: Configuration, faults: Sequence[tuple[int, str]] = ()) -> str:
     """The HTML. Where no pose belongs to the extensions the plate is left where it was."""
+    states = told_states(window, faults)
     rows, step_us = chosen(window)
     nose = [[max(abs(value) for arm in platform.arms for value in arm[:2]), 0.0, max(arm[2] for arm in platform.arms)]]
-    plates, noses, poses = [], [], []
+    plates: list[list[list[float]]] = []
+    noses: list[list[float]] = []
+    poses: list[list[float]] = []
     for i in rows:
         if "no-pose" not in window.flags[i].split("|") or not plates:
             pose = [value / 1e9 for value in window.rows[i][:6]]
@@ -111,7 +131,7 @@ def page(window, platform):
         noses.append(rounded([tip])[0])
         poses.append([round(value, 2) for value in pose])
     size = max(abs(value) for foot in platform.base for value in foot[:2])
-    run = {"t": [round(window.times_us[i] / 1e6, 3) for i in rows], "step": step_us / 1e6, "state": [window.states[i] for i in rows], "flags": [window.flags[i] for i in rows],
+    run = {"t": [round(window.times_us[i] / 1e6, 3) for i in rows], "step": step_us / 1e6, "state": [states[i] for i in rows], "flags": [window.flags[i] for i in rows],
            "names": ["roll", "pitch", "yaw", "x", "y", "z"], "pose": poses, "plate": plates, "nose": noses, "base": rounded(platform.base),
            "extensions": rounded([[value / 1e9 for value in window.rows[i][7:7 + platform.cylinders]] for i in rows]),
            "stroke": [float(value) for value in platform.strokes], "margin": float(platform.margin), "retracted": platform.retracted,

@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: MIT
 """bode.py - draws measured frequency responses: gain and phase over frequency, of files with columns frequency_hz, gain, phase_deg and, where there are several, axis."""
+from __future__ import annotations
+
 import csv
 import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
 
 from heave.plot.window import TraceError
 
+Point = tuple[float, float, float]  # Hz, gain, degrees
+Response = dict[str, list[Point]]
 COLUMNS = ("frequency_hz", "gain", "phase_deg")
 OF_WHOM = ("axis", "drive")
 
 
-def read_response(lines, name):
+def read_response(lines: Iterable[str], name: str) -> Response:
     """{axis: [(Hz, gain, degrees)]} by rising frequency; "" where the file has one response."""
     rows = csv.reader(line for line in lines if not line.startswith("#"))
     head = [word.strip() for word in next(rows, [])]
@@ -18,7 +25,7 @@ def read_response(lines, name):
         raise TraceError(f"{name}: line 1 has no column {missing[0]}; a frequency response has {', '.join(COLUMNS)}")
     who = next((head.index(column) for column in OF_WHOM if column in head), None)
     places = [head.index(column) for column in COLUMNS]
-    result = {}
+    result: Response = {}
     for row in rows:
         if not row:
             continue
@@ -35,15 +42,15 @@ def read_response(lines, name):
     return {label: sorted(points) for label, points in result.items()}
 
 
-def unwrapped(degrees):
+def unwrapped(degrees: Iterable[float]) -> list[float]:
     """The same phases without jumps of a turn."""
-    result = []
+    result: list[float] = []
     for value in degrees:
         result.append(value if not result else value - 360 * round((value - result[-1]) / 360))
     return result
 
 
-def bandwidth_hz(points):
+def bandwidth_hz(points: Sequence[Point]) -> float | None:
     """Where the gain falls below 1/sqrt(2) for the first time, between two points by their logarithms; None: it does not."""
     least = math.sqrt(0.5)
     for (f0, g0, _), (f1, g1, _) in zip(points, points[1:]):
@@ -53,16 +60,18 @@ def bandwidth_hz(points):
     return None
 
 
-def draw_bode(responses, path):
+def draw_bode(responses: Sequence[tuple[str, Response]], path: Path) -> None:
     """responses: [(name of the file, what read_response() gave)]."""
-    from heave.plot.curves import COLOURS, LIMIT_COLOUR, plt
+    import matplotlib.pyplot as plt
+
+    from heave.plot.curves import COLOURS, LIMIT_COLOUR
     figure, (gains, phases) = plt.subplots(2, 1, sharex=True, constrained_layout=True, figsize=(9, 6.4))
     lines = [(name, label, points) for name, response in responses for label, points in response.items()]
     for i, (name, label, points) in enumerate(lines):
         frequencies, values, degrees = zip(*points)
         limit_hz = bandwidth_hz(points)
         text = " ".join([*([name] if len(responses) > 1 else []), label]).strip() or name
-        style = {"color": COLOURS[i % len(COLOURS)], "linewidth": 1.2, "marker": ".", "markersize": 4, "label": text + (f": -3 dB at {limit_hz:.3g} Hz" if limit_hz else "")}
+        style: dict[str, Any] = {"color": COLOURS[i % len(COLOURS)], "linewidth": 1.2, "marker": ".", "markersize": 4, "label": text + (f": -3 dB at {limit_hz:.3g} Hz" if limit_hz else "")}
         gains.semilogx(frequencies, [20 * math.log10(value) for value in values], **style)
         phases.semilogx(frequencies, unwrapped(degrees), **style)
     gains.axhline(-3, color=LIMIT_COLOUR, linewidth=0.8, linestyle=(0, (5, 3)))

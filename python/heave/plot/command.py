@@ -3,7 +3,8 @@
 
 usage: heave plot TRACE [TRACE2] [-o FILE] [--what KIND] [--axes NAME,...] [--from S] [--to S] [--config FILE] [--frames FRAMES]
 
-TRACE    what heaved --trace wrote, or the folder of an incident, whose platform.ini, frames and feedback.csv (where the drives really were: dashed) are taken then. Two are drawn side by side, with the same scales.
+TRACE    what heaved --trace wrote; or samples, as `heavectl scope > FILE` writes them, all or columns of one's choice; or the folder of an incident, whose platform.ini, frames and
+         feedback.csv are taken then. Of samples and incidents, dashed lines are where the drives really were. Two are drawn side by side, with the same scales.
 -o FILE  .png, .svg or .pdf, or .html for an animation (default: TRACE with .png or .html)
 --what   curves; limits: how much of each limit was used; spectrum: acceleration over frequency; animation: the platform in motion, a page of its own for a browser.
          bode: gain and phase over frequency; TRACE is then a CSV file with columns frequency_hz, gain, phase_deg, and axis where it has several; two are drawn in one.
@@ -15,25 +16,33 @@ TRACE    what heaved --trace wrote, or the folder of an incident, whose platform
 --config and --frames may be given twice, for two traces; one counts for both.
 
 Speed, acceleration and jerk are finite differences of the nine-decimal integers, so nothing is smoothed; the peaks of long traces are kept.
-States colour the background, flags are bars below. Needs matplotlib; an animation does not.
+States colour the background, flags are bars below. Faults are red lines with number and name, of incidents and samples, and of the `!fault` of FRAMES. Needs matplotlib; an animation does not.
 
 Exit status: 0 drawn, 1 could not be, 2 wrong option.
 """
+from __future__ import annotations
+
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from heave.configuration import Configuration
 from heave.errors import HeaveError
+from heave.faults import fault_text
 from heave.plot import animation, bode
-from heave.plot.dots import dots_of
+from heave.plot.dots import Dot, dots_of
 from heave.plot.feedback import Feedback
+from heave.plot.sampled import Sampled, is_sampled
 from heave.plot.window import CYLINDERS, GROUPS, Window, axes_named
-from heave.recording import read_frames
+from heave.recording import Line, read_frames
 
+Parts = tuple[Window, Configuration | None, list[Dot], list[tuple[int, str]], Feedback | None, list[tuple[int, str]]]
 KINDS = ("curves", "limits", "spectrum", "bode", "animation")
 PAGE = ".html"
 SUFFIXES = (".png", ".svg", ".pdf")
+FAULT = "!fault "
+LATE = "!late "  # nobody asked for it: the bar of the flag `late` shows it
 NO_MATPLOTLIB = "needs matplotlib: apt-get install python3-matplotlib, or in a virtual environment pip install matplotlib"
 
 
@@ -41,7 +50,7 @@ class PlotError(HeaveError):
     """Why nothing is drawn."""
 
 
-def seconds(text):
+def seconds(text: str) -> int:
     try:
         value = float(text)
     except ValueError:
@@ -51,17 +60,17 @@ def seconds(text):
     return round(value * 1e6)
 
 
-def axes(text):
+def axes(text: str) -> list[str]:
     try:
         return axes_named(text)
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def parse_arguments(arguments=None, program=None):
+def parse_arguments(arguments: Sequence[str] | None = None, program: str | None = None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog=program or "tools/plot", description="Draws traces: set-points, speed, acceleration and jerk against their limits.",
                                      epilog="Speed, acceleration and jerk are finite differences of what the trace holds; peaks are kept.")
-    parser.add_argument("trace", nargs="+", metavar="TRACE", help="one, or two side by side; or folders of incidents")
+    parser.add_argument("trace", nargs="+", metavar="TRACE", help="one, or two side by side; or samples of heavectl scope; or folders of incidents")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"{', '.join(SUFFIXES)}, or {PAGE} for an animation (default: TRACE with .png or {PAGE})")
     parser.add_argument("--what", choices=KINDS, help="curves (default), limits used, spectrum of the acceleration, bode of a measured frequency response, animation (by the name of FILE)")
     parser.add_argument("--axes", type=axes, metavar="NAME,...",
@@ -93,16 +102,17 @@ def parse_arguments(arguments=None, program=None):
     return result
 
 
-def of_trace(given, i):
+def of_trace(given: Sequence[str], i: int) -> str | None:
     """What was given for the i-th trace: its own, the only one, or nothing."""
     return given[min(i, len(given) - 1)] if given else None
 
 
-def read(arguments, i):
-    """(window, configuration, dots, requests, feedback) of the i-th trace."""
+def read(arguments: argparse.Namespace, i: int) -> Parts:
+    """(window, configuration, dots, requests, feedback, faults) of the i-th trace."""
     feedback = None
     path = Path(arguments.trace[i])
-    config, frames = of_trace(arguments.config, i), of_trace(arguments.frames, i)
+    config: str | Path | None = of_trace(arguments.config, i)
+    frames: str | Path | None = of_trace(arguments.frames, i)
     if path.is_dir():
         folder, path = path, path / "trace.csv"
         config = config or (folder / "platform.ini" if (folder / "platform.ini").exists() else None)
@@ -110,19 +120,37 @@ def read(arguments, i):
         if (folder / "feedback.csv").exists():
             with open(folder / "feedback.csv", encoding="ascii", errors="replace", newline="") as file:
                 feedback = Feedback(file, arguments.from_us, arguments.to_us, name=str(folder / "feedback.csv"))
+    name = path.parent.name if Path(arguments.trace[i]).is_dir() else path.name
     with open(path, encoding="ascii", errors="replace", newline="\n") as file:
-        window = Window(file, arguments.from_us, arguments.to_us, name=path.parent.name if Path(arguments.trace[i]).is_dir() else path.name)
+        first = file.readline()
+        file.seek(0)
+        samples = Sampled(file, name) if is_sampled(first) else None
+        window = Window(samples.trace if samples else file, arguments.from_us, arguments.to_us, name=name)
+    if samples and samples.feedback:
+        feedback = Feedback(samples.feedback, arguments.from_us, arguments.to_us, name=name)
     platform = Configuration(config) if config else None
-    if arguments.what in ("limits", "animation") and platform is None:
-        raise PlotError(f"{arguments.what}: needs the configuration of the run, --config FILE")
+    if arguments.what in ("limits", "animation"):
+        of_run(arguments, platform)
     lines = read_frames(frames) if frames else []
-    return window, platform, dots_of(lines, platform), [(line.t_us, line.text) for line in lines if line.is_request], feedback
+    requests = [(line.t_us, line.text) for line in lines if line.is_request and not line.text.startswith((LATE, FAULT))]
+    return window, platform, dots_of(lines, platform), requests, feedback, feedback.faults if feedback else faults_of(lines)
 
 
-def draw(arguments):
+def faults_of(lines: Sequence[Line]) -> list[tuple[int, str]]:
+    """What heaved found by itself, where nothing else tells of faults."""
+    return [(line.t_us, fault_text(*line.text.split()[1:3])) for line in lines if line.text.startswith(FAULT)]
+
+
+def of_run(arguments: argparse.Namespace, platform: Configuration | None) -> Configuration:
+    if platform is None:
+        raise PlotError(f"{arguments.what}: needs the configuration of the run, --config FILE")
+    return platform
+
+
+def draw(arguments: argparse.Namespace) -> None:
     if arguments.what == "animation":
-        window, platform, *_ = read(arguments, 0)
-        arguments.output.write_text(animation.page(window, platform), encoding="utf-8")
+        window, platform, *_, faults = read(arguments, 0)
+        arguments.output.write_text(animation.page(window, of_run(arguments, platform), faults), encoding="utf-8")
         return
     if arguments.what == "bode":
         responses = []
@@ -143,14 +171,14 @@ def draw(arguments):
         raise PlotError(f"{NO_MATPLOTLIB} ({error})") from error
     scenes = [curves.Scene(*part) for part in parts]
     if arguments.what == "limits":
-        shares.draw_limits(scenes[0], arguments.output)
+        shares.draw_limits(scenes[0], of_run(arguments, scenes[0].platform), arguments.output)
     elif arguments.what == "spectrum":
         shares.draw_spectrum(scenes, names, arguments.output)
     else:
         curves.draw(scenes, names, arguments.output)
 
 
-def main(words=None, program=None):
+def main(words: Sequence[str] | None = None, program: str | None = None) -> int:
     arguments = parse_arguments(words, program)
     try:
         draw(arguments)

@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: MIT
 """curves.py - draws windows of traces with matplotlib. See command.py."""
+from __future__ import annotations
+
 import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import matplotlib
 matplotlib.use("Agg")
@@ -9,7 +14,14 @@ from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.patches import Patch  # noqa: E402
 from matplotlib.ticker import EngFormatter, MaxNLocator  # noqa: E402
 
-from heave.plot.window import UNITS, thinned  # noqa: E402
+from heave.configuration import Configuration  # noqa: E402
+from heave.plot.dots import Dot  # noqa: E402
+from heave.plot.feedback import Feedback  # noqa: E402
+from heave.plot.window import UNITS, Window, labels_of, thinned  # noqa: E402
+
+Axes = Any  # of matplotlib, which older distributions have without types
+Figure = Any
+Panels = Any
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#444444")  # told apart by colour-blind people too
 STATE_COLOURS = {"OFF": "#C9C9C9", "HOMING": "#D9CDEB", "SETTLED": "#E2E2E2", "RISING": "#CFE4F5", "NEUTRAL": "#DCEFD8", "ENGAGED": "#FFFFFF",
@@ -20,17 +32,20 @@ ORDER_UNIT = ("", "/s", "/s²", "/s³")
 MOST_POINTS = 6000      # of one line
 MANY_DOTS = 60          # more are drawn smaller, and behind the line
 FAR_LIMIT = 2.5         # a limit further out than so many times the peak would flatten the curve: it is told in words
+FAULT_ROWS = 5          # of labels below each other
+LABEL_ROOM = 0.05       # of the width: requests nearer than that share a label
 PANEL_WIDTH, PANEL_HEIGHT, FLAG_HEIGHT, LEGEND_HEIGHT = 7.5, 2.1, 0.2, 0.45  # inches
 
 
 class Scene:
     """One trace and what belongs to it."""
 
-    def __init__(self, window, platform=None, dots=(), requests=(), feedback=None):
-        self.window, self.platform, self.dots, self.requests, self.feedback = window, platform, dots, requests, feedback
+    def __init__(self, window: Window, platform: Configuration | None = None, dots: Sequence[Dot] = (), requests: Sequence[tuple[int, str]] = (), feedback: Feedback | None = None,
+                 faults: Sequence[tuple[int, str]] = ()) -> None:
+        self.window, self.platform, self.dots, self.requests, self.feedback, self.faults = window, platform, dots, requests, feedback, faults
 
 
-def draw(scenes, axes, path):
+def draw(scenes: Sequence[Scene], axes: Sequence[str], path: Path) -> None:
     """A column of panels per scene and unit; a row per order, and one of flags."""
     units = [unit for unit in ("deg", "mm") if any(UNITS[name] == unit for name in axes)]
     columns = [(scene, unit) for scene in scenes for unit in units]
@@ -49,6 +64,7 @@ def draw(scenes, axes, path):
             _panel(panels[order][c], scene, names, axes, order, unit)
         _flag_panel(panels[-1][c], scene, flags)
         _requests(panels, c, scene)
+        _faults(panels, c, scene)
         panels[0][c].set_title(scene.window.name + (f" ({unit})" if len(units) > 1 else ""), fontsize=10, pad=26 if scene.requests else 6)
         last = panels[-1]
         for row in panels:
@@ -63,7 +79,7 @@ def draw(scenes, axes, path):
     plt.close(figure)
 
 
-def _panel(panel, scene, names, axes, order, unit):
+def _panel(panel: Axes, scene: Scene, names: Sequence[str], axes: Sequence[str], order: int, unit: str) -> None:
     window = scene.window
     extent = window.extent(names, order)
     peak = max(map(abs, extent)) if extent else 0.0
@@ -81,7 +97,7 @@ def _panel(panel, scene, names, axes, order, unit):
         room = 0.08 * (extent[1] - extent[0])
         panel.set_ylim(extent[0] - room, extent[1] + room)
     if scene.platform:
-        _limits(panel, scene, names, axes, order, peak, unit)
+        _limits(panel, scene.platform, names, axes, order, peak, unit)
     panel.set_ylabel(f"{ORDER_LABEL[order]} [{unit}{ORDER_UNIT[order]}]", fontsize=9)
     panel.yaxis.set_major_locator(MaxNLocator(6))
     if order:
@@ -90,26 +106,33 @@ def _panel(panel, scene, names, axes, order, unit):
     panel.tick_params(labelsize=8)
 
 
-def _feedback(panel, feedback, names, axes):
-    """Where the drives were, dashed, and the first fault. Set-points have the scale: feedback beside them is cut off, as where a drive lies about itself."""
+def _feedback(panel: Axes, feedback: Feedback, names: Sequence[str], axes: Sequence[str]) -> None:
+    """Where the drives were, dashed. Set-points have the scale: feedback beside them is cut off, as where a drive lies about itself."""
     for name in names:
         times, values = thinned([t_us / 1e6 for t_us in feedback.times_us], feedback.actual.get(name, []), MOST_POINTS) if feedback.actual.get(name) else ([], [])
         panel.plot(times, [math.nan if value is None else value for value in values], color=colour_of(name, axes), linewidth=0.9, linestyle=(0, (4, 2)), zorder=4)
-    if feedback.fault:
-        t_us, text = feedback.fault
-        panel.axvline(t_us / 1e6, color=LIMIT_COLOUR, linewidth=1, zorder=2)
-        panel.annotate(text, (t_us / 1e6, 1), xycoords=("data", "axes fraction"), xytext=(3, -9), textcoords="offset points", fontsize=7.5, color=LIMIT_COLOUR)
 
 
-def colour_of(name, axes):
+def _faults(panels: Panels, column: int, scene: Scene) -> None:
+    """A line through all panels where a fault came, with its number and name; those beside each other below each other."""
+    first, last = scene.window.times_us[0], scene.window.times_us[-1]
+    for i, (t_us, text) in enumerate((t_us, text) for t_us, text in scene.faults if first <= t_us <= last):
+        for row in panels:
+            row[column].axvline(t_us / 1e6, color=LIMIT_COLOUR, linewidth=1, zorder=2)
+        is_at_end = t_us > last - 4 * LABEL_ROOM * (last - first)
+        panels[0][column].annotate(text, (t_us / 1e6, 1), xycoords=("data", "axes fraction"), xytext=(-3 if is_at_end else 3, -9 - 11 * (i % FAULT_ROWS)), textcoords="offset points",
+                                   fontsize=7.5, color=LIMIT_COLOUR, ha="right" if is_at_end else "left", bbox={"facecolor": "white", "linewidth": 0, "pad": 1}, zorder=5)
+
+
+def colour_of(name: str, axes: Sequence[str]) -> str:
     return COLOURS[axes.index(name) % len(COLOURS)]
 
 
-def _dots(panel, scene, names, axes):
+def _dots(panel: Axes, scene: Scene, names: Sequence[str], axes: Sequence[str]) -> None:
     """Frames may ask for anything: what lies outside the panel becomes an arrow at its edge."""
     first, last = scene.window.times_us[0], scene.window.times_us[-1]
     low, high = panel.get_ylim()
-    kinds = {}
+    kinds: dict[tuple[str, str, bool], list[tuple[float, float]]] = {}
     for dot in scene.dots:
         for name in names if first <= dot.t_us <= last else ():
             value = dot.values.get(name)
@@ -125,7 +148,7 @@ def _dots(panel, scene, names, axes):
     panel.set_ylim(low, high)
 
 
-def bounds_of(platform, name, order):
+def bounds_of(platform: Configuration, name: str, order: int) -> tuple[float, float] | None:
     """(low, high) of an axis or a cylinder, None where there is none."""
     if name.startswith("c"):
         index = int(name[1:]) - 1
@@ -133,8 +156,8 @@ def bounds_of(platform, name, order):
             return None
         limits, low, high = platform.limits, platform.margin, platform.strokes[index] - platform.margin
     elif name in platform.axes:
-        limits = platform.axes[name]
-        low, high = limits.low, limits.high
+        axis = platform.axes[name]
+        limits, low, high = axis, axis.low, axis.high
     else:
         return None
     if order == 0:
@@ -143,9 +166,8 @@ def bounds_of(platform, name, order):
     return -limit, limit
 
 
-def _limits(panel, scene, names, axes, order, peak, unit):
-    bounds = {name: bounds_of(scene.platform, name, order) for name in names}
-    bounds = {name: pair for name, pair in bounds.items() if pair}
+def _limits(panel: Axes, platform: Configuration, names: Sequence[str], axes: Sequence[str], order: int, peak: float, unit: str) -> None:
+    bounds = {name: pair for name, pair in ((name, bounds_of(platform, name, order)) for name in names) if pair}
     is_common = len(set(bounds.values())) == 1
     low, high = panel.get_ylim()
     room = (high - low) / 4 if order == 0 else peak * (FAR_LIMIT - 1)
@@ -163,13 +185,13 @@ def _limits(panel, scene, names, axes, order, peak, unit):
         at_right = [y for line in panel.lines[:len(names)] for y in line.get_ydata()[-len(line.get_ydata()) // 4:] if not math.isnan(y)]
         is_free = max(at_right, default=low) < low + 0.8 * (high - low)  # else the lines are there: the text goes below
         panel.text(0.995, 0.97 if is_free else 0.03, text, transform=panel.transAxes, ha="right", va="top" if is_free else "bottom",
-                   fontsize=7.5, color=LIMIT_COLOUR, zorder=5, bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 1.5})
+                   fontsize=7.5, color=LIMIT_COLOUR, zorder=5, bbox={"facecolor": "white", "linewidth": 0, "pad": 1.5})
     if drawn:
         spread = max(high, *drawn) - min(low, *drawn)
         panel.set_ylim(min(low, min(drawn) - 0.06 * spread), max(high, max(drawn) + 0.06 * spread))
 
 
-def _flag_panel(panel, scene, flags):
+def _flag_panel(panel: Axes, scene: Scene, flags: Sequence[str]) -> None:
     bands = scene.window.flag_bands()
     span_us = scene.window.times_us[-1] - scene.window.times_us[0]
     for i, word in enumerate(flags):
@@ -187,17 +209,19 @@ def _flag_panel(panel, scene, flags):
         panel.text(0.5, 0.5, "no flags", transform=panel.transAxes, ha="center", va="center", fontsize=8, color="#666666")
 
 
-def _requests(panels, column, scene):
+def _requests(panels: Panels, column: int, scene: Scene) -> None:
     first, last = scene.window.times_us[0], scene.window.times_us[-1]
-    for t_us, text in scene.requests:
-        if first <= t_us <= last:
-            for row in panels:
-                row[column].axvline(t_us / 1e6, color="#444444", linewidth=0.8, linestyle=":", zorder=2)
-            panels[0][column].annotate(text, (t_us / 1e6, 1.01), xycoords=("data", "axes fraction"), fontsize=7.5, ha="left", va="bottom",
-                                       rotation=35)
+    shown = [(t_us, text) for t_us, text in scene.requests if first <= t_us <= last]
+    for t_us, _ in shown:
+        for row in panels:
+            row[column].axvline(t_us / 1e6, color="#444444", linewidth=0.8, linestyle=":", zorder=2)
+    for t_us, text in labels_of(shown, LABEL_ROOM * (last - first)):
+        is_at_end = t_us > last - 2 * LABEL_ROOM * (last - first)  # else it would end beside the picture
+        panels[0][column].annotate(text, (t_us / 1e6, 1.01), xycoords=("data", "axes fraction"), fontsize=7.5, ha="right" if is_at_end else "left", va="bottom",
+                                   rotation=0 if is_at_end else 35)
 
 
-def _same_scales(panels, columns):
+def _same_scales(panels: Panels, columns: Sequence[tuple[Scene, str]]) -> None:
     """Panels of the same unit side by side get the same scale: that is what a comparison is for."""
     for row in panels[:-1]:
         for unit in {unit for _, unit in columns}:
@@ -207,7 +231,7 @@ def _same_scales(panels, columns):
                 panel.set_ylim(low, high)
 
 
-def _legend(figure, scenes, axes, wide):
+def _legend(figure: Figure, scenes: Sequence[Scene], axes: Sequence[str], wide: bool) -> None:
     handles = [Line2D([], [], color=colour_of(name, axes), linewidth=2, label=name) for name in axes]
     if any(scene.platform for scene in scenes):
         handles.append(Line2D([], [], color=LIMIT_COLOUR, linewidth=1, linestyle=(0, (5, 3)), label="limit"))

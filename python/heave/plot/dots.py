@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: MIT
 """dots.py - where the frames of a FRAMES file ask the platform to be, for plots. Only well-formed frames of the V3.0 form give a dot."""
+from __future__ import annotations
+
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from heave.configuration import POSE_AXES
+from heave.configuration import POSE_AXES, Configuration
+from heave.recording import Line
 
 FRAME = re.compile(r"@([AC])([3467])(T?):([^@#]*)#")
 ORDER = {"A3": ["roll", "pitch", "z"], "A4": ["roll", "pitch", "z", "angle"], "A6": list(POSE_AXES), "A7": [*POSE_AXES, "angle"],
@@ -14,10 +18,10 @@ ORDER = {"A3": ["roll", "pitch", "z"], "A4": ["roll", "pitch", "z", "angle"], "A
 class Dot:
     t_us: int
     is_timed: bool
-    values: dict  # axis: asked, in its own unit
+    values: dict[str, float]  # axis: asked, in its own unit
 
 
-def dots_of(lines, platform=None):
+def dots_of(lines: Iterable[Line], platform: Configuration | None = None) -> list[Dot]:
     """The dots of recording.Line's. With a platform, values are those of its axes, and poses give extensions too."""
     result = []
     for line in lines:
@@ -28,7 +32,7 @@ def dots_of(lines, platform=None):
     return result
 
 
-def _values(names, text, is_timed):
+def _values(names: list[str] | None, text: str, is_timed: bool) -> dict[str, float] | None:
     """{axis: number} or None; the last field is the mask or the time, a mask may be missing."""
     fields = [field.strip() for field in text.split(",")]
     if names is None or len(fields) not in ((len(names) + 1,) if is_timed else (len(names), len(names) + 1)):
@@ -39,7 +43,7 @@ def _values(names, text, is_timed):
         return None
 
 
-def _asked(values, space, platform):
+def _asked(values: dict[str, float], space: str, platform: Configuration | None) -> dict[str, float]:
     if platform is None:
         return values
     if space == "A":
@@ -52,7 +56,7 @@ def _asked(values, space, platform):
     return asked
 
 
-def _of_axis(platform, name, value):
+def _of_axis(platform: Configuration, name: str, value: float) -> float:
     axis = platform.axes.get(name)
     if axis is None:
         return value if name.startswith("c") else 0.0

@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: MIT
+ * eds.c - reads an EDS or DCF; see eds.h.
+ */
+#include "common/eds.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "common/translate.h"
+#define LINE_BYTES  1024u
+#define NAME_BYTES  40u
+#define OBJECTS_MAX 65536u
+#define BLANKS      " \t\r\n"
+
+const unsigned eds_bitrates_kbps[] = {10, 20, 50, 125, 250, 500, 800, 1000, 0};
+
+static const struct {
+    uint16_t type;
+    uint8_t bytes;
+    const char *name;
+} k_types[] = {{1, 1, "u8"}, {2, 1, "i8"}, {3, 2, "i16"}, {4, 4, "i32"}, {5, 1, "u8"}, {6, 2, "u16"}, {7, 4, "u32"}};
+#define TYPES (sizeof k_types / sizeof k_types[0])
+
+/** A file while it is read. */
+typedef struct {
+    eds_t *eds;
+    const char *name;
+    FILE *errors;
+    unsigned line;
+    eds_object_t *object; /* whose section this is, NULL where it is another one */
+    bool is_device;       /* [DeviceInfo] */
+    bool is_bad;
+} reader_t;
+
+static void complain(reader_t *self, const char *what, const char *about)
+{
+    fprintf(self->errors, "%s:%u: %.60s: %s\n", self->name, self->line, about, what);
+    self->is_bad = true;
+}
+
+/* Cuts blanks off both ends. */
+static char *trimmed(char *text)
+{
+    text += strspn(text, BLANKS);
+    size_t length = strlen(text);
+    while (length > 0 && strchr(BLANKS, text[length - 1u]) != NULL) {
+        text[--length] = '\0';
+    }
+    return text;
+}
+
+/* A number, with or without $NODEID+ in front of it; what is none is not there. */
+static eds_number_t number(const char *text)
+{
+    static const char k_node[] = "$NODEID";
+    eds_number_t out = {.has_node = strncasecmp(text, k_node, sizeof k_node - 1u) == 0};
+    char *end = NULL;
+    if (out.has_node) {
+        text += sizeof k_node - 1u;
+        text += strspn(text, " +");
+        out.is_there = *text == '\0';
+    }
+    errno = 0;
+    out.value = strtoll(text, &end, 0);
+    out.is_there |= errno == 0 && end != text && *end == '\0';
+    return out;
+}
+
+/* --- Sections --- */
+
+/* "605A", "1018sub1": hexadecimal. */
+static bool read_place(const char *name, uint16_t *index, uint8_t *sub)
+{
+    char *end = NULL;
+    const unsigned long first = strtoul(name, &end, 16);
+    *index = (uint16_t)first;
+    *sub = 0;
+    if (end - name != 4 || strspn(name, "0123456789ABCDEFabcdef") < 4) {
+        return false;
+    }
+    if (*end == '\0') {
+        return true;
+    }
+    const char *digits = end + 3;
+    if (strncasecmp(end, "sub", 3) != 0 || *digits == '\0' || strlen(digits) > 2) {
+        return false;
+    }
+    *sub = (uint8_t)strtoul(digits, &end, 16);
+    return *end == '\0';
+}
+
+/* The section of an object; a record and its first entry are both index and 0. */
+static void enter_object(reader_t *self, uint16_t index, uint8_t sub, bool is_entry)
+{
+    eds_t *eds = self->eds;
+    if (eds->objects == eds->room) {
+        const size_t room = eds->room == 0 ? 256 : 2 * eds->room;
+        if (room > OBJECTS_MAX) {
+            complain(self, _("too many objects"), _("object"));
+            return;
+        }
+        eds_object_t *grown = realloc(eds->object, room * sizeof *grown);
+        if (grown == NULL) {
+            complain(self, error_text(ENOMEM), _("object"));
+            return;
+        }
+        eds->object = grown;
+        eds->room = room;
+    }
+    self->object = &eds->object[eds->objects++];
+    *self->object = (eds_object_t){.index = index, .sub = sub, .line = self->line, .is_parent = !is_entry};
+}
+
+static void enter(reader_t *self, char *text)
+{
+    char *end = strchr(text, ']');
+    uint16_t index = 0;
+    uint8_t sub = 0;
+    self->object = NULL;
+    self->is_device = false;
+    if (end == NULL) {
+        complain(self, _("a section without ]"), text);
+        return;
+    }
+    *end = '\0';
+    text++;
+    if (read_place(text, &index, &sub)) {
+        enter_object(self, index, sub, strlen(text) > 4);
+    } else {
+        self->is_device = strcasecmp(text, "DeviceInfo") == 0;
+    }
+}
+
+/* --- Keys --- */
+
+static void take_access(reader_t *self, const char *value)
+{
+    const bool is_write_only = strcasecmp(value, "wo") == 0;
+    const bool is_both = strncasecmp(value, "rw", 2) == 0;
+    if (!is_write_only && !is_both && strcasecmp(value, "ro") != 0 && strcasecmp(value, "const") != 0) {
+        complain(self, _("no AccessType that there is; allowed: ro, wo, rw, rwr, rww, const"), value);
+    }
+    self->object->is_readable = !is_write_only;
+    self->object->is_writable = is_write_only || is_both;
+}
+
+static void take_of_object(reader_t *self, const char *key, const char *value)
+{
+    eds_object_t *object = self->object;
+    const eds_number_t found = number(value);
+    if (strcasecmp(key, "AccessType") == 0) {
+        take_access(self, value);
+    } else if (strcasecmp(key, "DataType") == 0) {
+        object->type = (uint16_t)found.value;
+        object->is_parent = false;
+        if (!found.is_there || found.value < 1 || found.value > UINT16_MAX) {
+            complain(self, _("no DataType that there is"), value);
+        }
+    } else if (strcasecmp(key, "PDOMapping") == 0) {
+        object->is_mappable = found.value != 0;
+    } else if (strcasecmp(key, "CompactSubObj") == 0) {
+        object->compact = found.value >= 0 && found.value < UINT8_MAX ? (uint8_t)found.value : 0;
+    } else if (strcasecmp(key, "LowLimit") == 0) {
+        object->low = found;
+    } else if (strcasecmp(key, "HighLimit") == 0) {
+        object->high = found;
+    } else if (strcasecmp(key, "DefaultValue") == 0) {
+        object->fallback = found;
+    } else if (strcasecmp(key, "ParameterValue") == 0) {
+        object->parameter = found;
+    }
+}
+
+static void take_of_device(reader_t *self, const char *key, const char *value)
+{
+    const eds_number_t found = number(value);
+    char name[NAME_BYTES];
+    if (strcasecmp(key, "VendorNumber") == 0) {
+        self->eds->vendor = found;
+    } else if (strcasecmp(key, "ProductNumber") == 0) {
+        self->eds->product = found;
+    }
+    for (unsigned i = 0; eds_bitrates_kbps[i] != 0; i++) {
+        (void)snprintf(name, sizeof name, "BaudRate_%u", eds_bitrates_kbps[i]);
+        if (strcasecmp(key, name) == 0) {
+            self->eds->has_bitrates = true;
+            self->eds->bitrates |= found.value == 1 ? 1u << i : 0u;
+        }
+    }
+}
+
+static void take_line(reader_t *self, char *text)
+{
+    text = trimmed(text);
+    if (text[0] == '\0' || text[0] == ';') {
+        return;
+    }
+    if (text[0] == '[') {
+        enter(self, text);
+        return;
+    }
+    char *equals = strchr(text, '=');
+    if (equals == NULL) {
+        complain(self, _("neither a section nor key=value: is this an EDS or DCF?"), text);
+        return;
+    }
+    *equals = '\0';
+    char *comment = strchr(equals + 1, ';'); /* not allowed for, and there */
+    if (comment != NULL) {
+        *comment = '\0';
+    }
+    const char *key = trimmed(text);
+    const char *value = trimmed(equals + 1);
+    if (value[0] == '\0') {
+        return;
+    }
+    if (self->object != NULL) {
+        take_of_object(self, key, value);
+    } else if (self->is_device) {
+        take_of_device(self, key, value);
+    }
+}
+
+bool eds_read(eds_t *self, FILE *in, const char *name, FILE *errors)
+{
+    char text[LINE_BYTES];
+    reader_t reader = {.eds = self, .name = name, .errors = errors};
+    *self = (eds_t){.object = NULL};
+    while (!reader.is_bad && fgets(text, sizeof text, in) != NULL) {
+        reader.line++;
+        if (strchr(text, '\n') == NULL && !feof(in)) {
+            complain(&reader, _("the line is too long"), text);
+        } else {
+            take_line(&reader, text);
+        }
+    }
+    if (!reader.is_bad && ferror(in)) {
+        complain(&reader, error_text(errno), _("cannot be read"));
+    }
+    if (!reader.is_bad && self->objects == 0) {
+        complain(&reader, _("allowed: an EDS or DCF"), _("no object in it"));
+    }
+    return !reader.is_bad;
+}
+
+void eds_free(eds_t *self)
+{
+    free(self->object);
+    *self = (eds_t){.object = NULL};
+}
+
+const eds_object_t *eds_find(const eds_t *self, uint16_t index, uint8_t sub)
+{
+    const eds_object_t *compact = NULL;
+    for (size_t i = 0; i < self->objects; i++) {
+        const eds_object_t *object = &self->object[i];
+        if (object->index == index && object->sub == sub && !object->is_parent && (object->compact == 0 || sub != 0)) {
+            return object;
+        }
+        if (object->index == index && object->sub == 0 && sub >= 1 && sub <= object->compact) {
+            compact = object;
+        }
+    }
+    return compact;
+}
+
+uint8_t eds_bytes(const eds_object_t *object)
+{
+    for (size_t i = 0; i < TYPES; i++) {
+        if (k_types[i].type == object->type) {
+            return k_types[i].bytes;
+        }
+    }
+    return 0;
+}
+
+const char *eds_type_name(const eds_object_t *object)
+{
+    for (size_t i = 0; i < TYPES; i++) {
+        if (k_types[i].type == object->type) {
+            return k_types[i].name;
+        }
+    }
+    return "";
+}

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: MIT
+ * flood_filter.h - what the kernel drops in a flood: datagrams that cannot be frames, and senders that are not allowed.
+ */
+#ifndef HEAVE_DAEMON_FLOOD_FILTER_H
+#define HEAVE_DAEMON_FLOOD_FILTER_H
+
+#include "config/config.h"
+#include "linux_udp_filter.h"
+
+/** Lets through every datagram that begins as a frame of the configured dialect does, as far as its command. Blanks and ends of
+ *  lines in front of it are let through too, as the scanner passes over them.
+ *  @return it points into constant tables */
+linux_udp_filter_t flood_filter_of(const config_t *config);
+
+#endif

@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: MIT
+ * viewer_call.c - see viewer_call.h.
+ */
+#include "panel/viewer_call.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "common/sentence.h"
+#include "panel/outbox.h"
+
+/* What may not be lost: a page that does not take it is closed, and comes again. */
+static void tell(hall_t *hall, viewer_t *viewer, const char *text, size_t length)
+{
+    viewer->is_over = viewer->is_over || !viewer_put(viewer, text, length, false);
+    hall->wake(viewer);
+}
+
+void hall_tell_json(hall_t *hall, viewer_t *viewer, cJSON *json)
+{
+    char *const text = cJSON_PrintUnformatted(json);
+    if (text != NULL) {
+        tell(hall, viewer, text, strlen(text));
+    }
+    cJSON_free(text);
+    cJSON_Delete(json);
+}
+
+void hall_add_chinese(cJSON *json, const char *error)
+{
+    char out[SENTENCE_MAX];
+    const char *const chinese = sentence(error, out, sizeof out);
+    if (strcmp(chinese, error) != 0) {
+        cJSON_AddStringToObject(json, "error_zh", chinese);
+    }
+}
+
+void hall_answer_error(hall_t *hall, viewer_t *viewer, int64_t id, const char *error)
+{
+    cJSON *const json = cJSON_CreateObject();
+    cJSON_AddNumberToObject(json, "id", (double)id);
+    cJSON_AddStringToObject(json, "error", error);
+    hall_add_chinese(json, error);
+    hall_tell_json(hall, viewer, json);
+}
+
+void hall_answer_refusal(hall_t *hall, viewer_t *viewer, int64_t id, const char *line)
+{
+    cJSON *const json = cJSON_CreateObject(), *const answer = cJSON_Parse(line);
+    cJSON_AddNumberToObject(json, "id", (double)id);
+    cJSON_AddItemToObject(json, "answer", cJSON_CreateRaw(line));
+    hall_add_chinese(json, viewer_word(answer, "error"));
+    cJSON_Delete(answer);
+    hall_tell_json(hall, viewer, json);
+}
+
+/* heaved's own object, unchanged, within one of ours. */
+void hall_tell_object(hall_t *hall, viewer_t *viewer, const char *head, const char *object)
+{
+    const size_t size = strlen(head) + strlen(object) + 2;
+    char *const text = malloc(size);
+    if (text != NULL) {
+        tell(hall, viewer, text, (size_t)snprintf(text, size, "%s%s}", head, object));
+    }
+    free(text);
+}
+
+viewer_t *hall_find(const hall_t *hall, uint64_t number)
+{
+    viewer_t *viewer = hall->viewers;
+    while (viewer != NULL && viewer->number != number) {
+        viewer = viewer->next;
+    }
+    return viewer;
+}
+
+unsigned hall_place_of(const hall_t *hall, const upstream_t *upstream)
+{
+    return (unsigned)(upstream - hall->platform);
+}
+
+const char *viewer_word(const cJSON *json, const char *name)
+{
+    const cJSON *const item = cJSON_GetObjectItemCaseSensitive(json, name);
+    return cJSON_IsString(item) ? item->valuestring : "";
+}
+
+double viewer_number(const cJSON *json, const char *name, double fallback)
+{
+    const cJSON *const item = cJSON_GetObjectItemCaseSensitive(json, name);
+    return cJSON_IsNumber(item) ? item->valuedouble : fallback;
+}
+
+void viewer_refuse(const call_t *call, const char *error)
+{
+    hall_answer_error(call->hall, call->viewer, call->id, error);
+}
+
+bool viewer_send(const call_t *call, link_kind_t kind, const char *line, int64_t id)
+{
+    asker_t asker = {.viewer = call->viewer->number, .id = id};
+    (void)snprintf(asker.by, sizeof asker.by, "%s", call->viewer->name);
+    const char *const why = upstream_send(call->upstream, kind, line, &asker);
+    if (why != NULL) {
+        viewer_refuse(call, why);
+    }
+    return why == NULL;
+}
+
+/* One request, as heaved takes it: printable, short, one line. */
+bool viewer_is_plain(const char *line)
+{
+    const size_t length = strlen(line);
+    for (size_t i = 0; i < length; i++) {
+        if (line[i] < ' ' || line[i] > '~') {
+            return false;
+        }
+    }
+    return length > 0 && length < UPSTREAM_REQUEST;
+}
+
+bool viewer_begins(const char *line, const char *word)
+{
+    const size_t length = strlen(word);
+    return strncmp(line, word, length) == 0 && (line[length] == ' ' || line[length] == '\0');
+}
+
+bool viewer_is_allowed(const call_t *call, const char *line)
+{
+    char error[128];
+    const level_t needed = levels_needed(line, call->upstream->intensity);
+    if (call->viewer->role < (int)needed) {
+        (void)snprintf(error, sizeof error, "%.20s: not allowed; it takes the role %s", line, level_name(needed));
+        viewer_refuse(call, error);
+        return false;
+    }
+    if (needed > LEVEL_LOOK && call->upstream->holder != call->viewer->number) {
+        viewer_refuse(call, call->upstream->holder == 0 ? "take the controls first"
+                                                        : "somebody else has the controls: take them first");
+        return false;
+    }
+    return true;
+}
+
+bool viewer_press(const call_t *call, const char *wanted)
+{
+    char line[UPSTREAM_REQUEST + 24];
+    if (!viewer_is_allowed(call, wanted)) {
+        return false;
+    }
+    call->viewer->wants_ticks[hall_place_of(call->hall, call->upstream)] = true;
+    (void)snprintf(line, sizeof line, "%s %.0f", wanted, viewer_number(call->json, "tick", 0));
+    if (strlen(line) >= UPSTREAM_REQUEST) {
+        viewer_refuse(call, "that request is too long");
+        return false;
+    }
+    return viewer_send(call, LINK_QUICK, line, call->id | VIEWER_PRESS_BIT);
+}

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: MIT
+ * viewer_call.h - a message of a page while it is carried out, and answers to it. For viewer.c and viewer_service.c.
+ */
+#ifndef HEAVE_PANEL_VIEWER_CALL_H
+#define HEAVE_PANEL_VIEWER_CALL_H
+
+#include <cjson/cJSON.h>
+
+#include "panel/viewer.h"
+
+#define VIEWER_PRESS_BIT ((int64_t)1 << 52) /**< of an id: the answer tells a series */
+
+/** A message that was understood so far. */
+typedef struct {
+    hall_t *hall;
+    viewer_t *viewer;
+    const cJSON *json;
+    int64_t id;
+    upstream_t *upstream;
+} call_t;
+
+const char *viewer_word(const cJSON *json, const char *name);
+double viewer_number(const cJSON *json, const char *name, double fallback);
+void viewer_refuse(const call_t *call, const char *error);
+
+/** One request, as heaved takes it: printable, short, one line. */
+bool viewer_is_plain(const char *line);
+
+/** Whether its role and the controls allow it; if not, that was said. */
+bool viewer_is_allowed(const call_t *call, const char *line);
+
+/** Begins to hold something, with the tick of the message. @return false: refused or not sent, which was said */
+bool viewer_press(const call_t *call, const char *wanted);
+
+/** @param json deleted here */
+void hall_tell_json(hall_t *hall, viewer_t *viewer, cJSON *json);
+
+/** heaved's own object, unchanged, within one of ours. */
+void hall_tell_object(hall_t *hall, viewer_t *viewer, const char *head, const char *object);
+unsigned hall_place_of(const hall_t *hall, const upstream_t *upstream);
+viewer_t *hall_find(const hall_t *hall, uint64_t number);
+
+/** One of the words that a request begins with. */
+bool viewer_begins(const char *line, const char *word);
+
+/** Hands a request to heaved; the answer goes to who asks. @return false: it could not be sent, which was said */
+bool viewer_send(const call_t *call, link_kind_t kind, const char *line, int64_t id);
+void hall_answer_error(hall_t *hall, viewer_t *viewer, int64_t id, const char *error);
+
+/** Adds `error_zh`, what an error says in Chinese: a page may be in another language than this program. None, where it has no
+ *  translation. */
+void hall_add_chinese(cJSON *json, const char *error);
+
+/** heaved's refusal, unchanged, and what it says in Chinese beside it. @param line of heaved, with `error` */
+void hall_answer_refusal(hall_t *hall, viewer_t *viewer, int64_t id, const char *line);
+
+#endif

@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: MIT
+ * control_configuration.h - `configuration` and `configure`: the text in force, and another one in its place. Private to
+ * control*.c, but for the end of it, which its owner tells.
+ */
+#ifndef HEAVE_SERVICE_CONTROL_CONFIGURATION_H
+#define HEAVE_SERVICE_CONTROL_CONFIGURATION_H
+
+#include "service/control.h"
+
+/** Whether a line is `configure DIGEST`. */
+bool control_configuration_is(const char *line);
+
+/** The text in force, as a descriptor. */
+void control_configuration_answer(const control_t *self, control_client_t *client);
+
+/** Judges a text, and has it written if it may come into force; the answer follows. */
+void control_configuration_take(control_t *self, control_client_t *client, const char *line, uint64_t now_us);
+
+/** Nobody waits for the disk for ever. */
+void control_configuration_watch(control_client_t *client, uint64_t now_us);
+
+/** For the owner: what came of it. @param error why it is not in force; NULL: it is */
+void control_configuration_end(control_t *self, const char *error, bool is_restarting);
+
+/** In which states another configuration may come into force: nobody rides.
+ *  @param is_restart it takes a restart */
+bool control_configuration_fits(state_t state, bool is_restart);
+
+#endif

@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: MIT
+ * control_object.h - requests for objects of drives: `sdo N INDEX:SUB [[TYPE] VALUE]`. Private to control*.c.
+ */
+#ifndef HEAVE_SERVICE_CONTROL_OBJECT_H
+#define HEAVE_SERVICE_CONTROL_OBJECT_H
+
+#include "service/control_client.h"
+
+/** True where a line is such a request. */
+bool control_object_is_said(const char *line);
+
+/** True where it would write: that is logged. */
+bool control_object_is_write(const char *line);
+
+/** Reads a request; of a client whose object it becomes.
+ *  @return NULL; or what is wrong: then nothing is asked of the motion thread. Valid until the next call of the client */
+const char *control_object_read(control_client_t *client, const char *line, motion_request_t *out);
+
+/** Answers with what has come of it. */
+void control_object_answer(control_client_t *client, const motion_result_t *result);
+
+#endif
