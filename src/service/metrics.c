@@ -267,15 +267,15 @@ static void put_relays(sheet_t *self, const snapshot_t *s)
 /* Percentiles, as a summary: the bins are finer than anything a collector wants to store. */
 static void put_times(sheet_t *self, const char *name, const char *help, const histogram_t *times)
 {
-    static const struct {
-        const char *quantile;
-        uint32_t of_100000;
-    } k_quantiles[] = {{"0.5", 50000}, {"0.99", 99000}, {"0.999", 99900}, {"0.9999", 99990}, {"1", 100000}};
+    static const uint32_t k_shares[] = {50000, 99000, 99900, 99990, 100000};
+    static const char *const k_quantiles[] = {"0.5", "0.99", "0.999", "0.9999", "1"};
+    enum { SHARES = sizeof k_shares / sizeof k_shares[0] };
+    uint64_t us[SHARES];
     char text[NUMBER_MAX];
+    histogram_percentiles_us(times, SHARES, k_shares, us);
     head(self, name, "summary", help);
-    for (size_t i = 0; i < sizeof k_quantiles / sizeof k_quantiles[0]; i++) {
-        put(self, "heave_%s{quantile=\"%s\"} %s\n", name, k_quantiles[i].quantile,
-            seconds_text(histogram_percentile_us(times, k_quantiles[i].of_100000), text));
+    for (unsigned i = 0; i < SHARES; i++) {
+        put(self, "heave_%s{quantile=\"%s\"} %s\n", name, k_quantiles[i], seconds_text(us[i], text));
     }
     put(self, "heave_%s_count %" PRIu64 "\n", name, histogram_count(times));
 }

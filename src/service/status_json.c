@@ -362,12 +362,16 @@ static void write_counters(json_t *json, const motion_view_t *view)
 
 static void write_times(json_t *json, const char *key, const histogram_t *times)
 {
+    static const uint32_t k_shares[] = {50000, 99000, 99900, 99990};
+    static const char *const k_keys[] = {"p50_us", "p99_us", "p99_9_us", "p99_99_us"};
+    enum { SHARES = sizeof k_shares / sizeof k_shares[0] };
+    uint64_t us[SHARES];
+    histogram_percentiles_us(times, SHARES, k_shares, us);
     json_open(json, key, '{');
     json_number(json, "count", histogram_count(times));
-    json_number(json, "p50_us", histogram_percentile_us(times, 50000));
-    json_number(json, "p99_us", histogram_percentile_us(times, 99000));
-    json_number(json, "p99_9_us", histogram_percentile_us(times, 99900));
-    json_number(json, "p99_99_us", histogram_percentile_us(times, 99990));
+    for (unsigned i = 0; i < SHARES; i++) {
+        json_number(json, k_keys[i], us[i]);
+    }
     json_number(json, "max_us", histogram_max_us(times));
     json_close(json, '}');
 }
