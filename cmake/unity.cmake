@@ -1,4 +1,4 @@
-# unity.cmake - the library target `unity`, and how tests are declared: heave_unit_test, heave_script_test, heave_kernel_test.
+# unity.cmake - the library target `unity`, and how tests are declared: heave_unit_test, heave_script_test, heave_kernel_test, heave_clock.
 # Unity is not part of this tree: tools/lib/unity.sh finds or fetches it, unless UNITY_DIR says where it is.
 set(UNITY_DIR "" CACHE PATH "Folder that holds unity.c and unity.h; empty: found or fetched by tools/lib/unity.sh")
 if(NOT EXISTS "${UNITY_DIR}/unity.c")
@@ -74,7 +74,7 @@ endfunction()
 # heave_kernel_test(NAME [VIRTUAL_TIME] [PYTHON] COMMAND [ARG...]): a program, Unity or TAP, on a kernel that has CAN; see tests/lib/kernel.py.
 function(heave_kernel_test name)
   cmake_parse_arguments(PARSE_ARGV 1 kernel "VIRTUAL_TIME;PYTHON" "" "")
-  set(options --limit 860)
+  set(options --limit 1700) # says that it never ends, not that it was slow
   set(weight ${HEAVE_COMPUTES})
   if(kernel_VIRTUAL_TIME)
     list(APPEND options --virtual-time)
@@ -87,7 +87,19 @@ function(heave_kernel_test name)
     list(APPEND options --instrumented)
   endif()
   add_test(NAME ${name} COMMAND ${Python3_EXECUTABLE} ${PROJECT_SOURCE_DIR}/tests/lib/kernel.py ${options} -- ${kernel_UNPARSED_ARGUMENTS})
-  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib:${PROJECT_SOURCE_DIR}/python;PYTHONDONTWRITEBYTECODE=1" LABELS kernel TIMEOUT 900
+  set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib:${PROJECT_SOURCE_DIR}/python;PYTHONDONTWRITEBYTECODE=1" LABELS kernel TIMEOUT 1800
                                                PROCESSORS ${weight})
   heave_order(${name})
+endfunction()
+
+# heave_clock(SENTENCE NAME...): these tests of this folder need real time, and the sentence says what for. A busy machine can make such a test fail, so that
+# tools/lib/run_tests.py tries it again, alone. Every other test is exact: the same on any machine, beside any load, and never tried again.
+function(heave_clock sentence)
+  foreach(name ${ARGN})
+    if(NOT TEST ${name}) # not in this build
+      continue()
+    endif()
+    set_property(TEST ${name} APPEND PROPERTY LABELS clock)
+    set_property(GLOBAL APPEND_STRING PROPERTY HEAVE_CLOCK_TESTS "${name}\t${sentence}\n")
+  endforeach()
 endfunction()

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """test_readme.py - what README and docs say is what the programs and the tree do, in both languages.
 
-usage: test_readme.py --heaved PROGRAM --heavectl PROGRAM --reference PROGRAM --faults PROGRAM
+usage: test_readme.py --build BUILD_DIR --heaved PROGRAM --heavectl PROGRAM --reference PROGRAM --faults PROGRAM
 """
 import argparse
 import functools
@@ -20,12 +20,15 @@ from xml.etree import ElementTree
 import tap
 
 TOP = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(TOP / "tools/lib"))
+import clock_tests  # noqa: E402  the path above has to be set first
+
 DOCS = TOP / "docs"
 LANGUAGES = {"": "README.md", ".zh-CN": "README.zh-CN.md"}
 README_BYTES = 8000
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.M | re.S)
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
-STATES = re.compile(r"<!-- states:begin -->.*?<!-- states:end -->", re.S)
+STATES = re.compile(r"<!-- (states|clock-tests):begin -->.*?<!-- \1:end -->", re.S)  # in one language, or in another one each
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]*))?\)")
 NOT_OURS = {".", "cmake", "export", "printf", "cp", "nano", "sleep", "sudo", "pip", "python3", "gpiodetect", "gpioinfo"}
 OTHER_OPTIONS = {"--build", "--install", "--now", "--component", "--prefix"}  # of cmake, systemctl
@@ -45,7 +48,7 @@ def help_of(program):
 
 
 def page(path):
-    """Without the states, which are in another language each."""
+    """Without what is made from a table of the programs or the tests."""
     return STATES.sub("", path.read_text(encoding="utf-8"))
 
 
@@ -317,8 +320,18 @@ def reference(program, page):
     assert got == wanted, f"{page} is not up to date: {program} > {page}"
 
 
+def lists_clock_tests(build):
+    """A build without heave-panel, or with sanitizers, has fewer."""
+    told = dict(re.findall(r"^\| ([^|]+) \| ([^|]+) \|$", clock_tests.written(), re.M))
+    missing = {name: sentence for sentence, names in clock_tests.declared(build).items() for name in names if f"`{name}`" not in told.get(sentence, "")}
+    assert not missing, f"not listed, or with another sentence: {missing}; tools/lib/clock_tests.py BUILD_DIR --write"
+    declarations = "".join(path.read_text(encoding="utf-8") for path in (TOP / "tests").rglob("CMakeLists.txt"))
+    assert len(told) > 5 and all(f'heave_clock("{sentence}"' in declarations for sentence in told if not sentence.startswith(("why", "---"))), told
+
+
 def main():
     parser = argparse.ArgumentParser()
+    parser.add_argument("--build", type=Path, required=True)
     for name in ("heaved", "heavectl", "reference", "faults"):
         parser.add_argument(f"--{name}", type=Path, required=True)
     arguments = parser.parse_args()
@@ -350,6 +363,8 @@ def main():
         picture(arguments.heaved)
     with suite.case("docs/configuration.md is what the table of keys says"):
         reference(arguments.reference, "docs/configuration.md")
+    with suite.case("docs/testing.md lists the clock tests"):
+        lists_clock_tests(arguments.build)
     with suite.case("docs/faults.md is what the table of faults says"):
         reference(arguments.faults, "docs/faults.md")
     return suite.done()

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """test_tools.py - the tools that count and check are themselves able to fail: each is given something wrong and has to say so."""
+import os
 import re
 import subprocess
 import sys
@@ -13,6 +14,7 @@ TOP = Path(__file__).resolve().parents[2]
 CHECKER = TOP / "tests/check/check_core.py"
 sys.path.insert(0, str(TOP / "tools/lib"))
 import run_tests  # noqa: E402  the path above has to be set first
+import shake  # noqa: E402
 
 # what a test printed, what ctest says of it, and the (passed, failed, skipped) that must come out
 COUNTED = {
@@ -106,8 +108,85 @@ def left_out_of_memory():
     return [name for name in names if not name.startswith(("config", "hal_")) and not re.search(chosen, f"unit.{name}")]
 
 
+# name, whether it is a clock test, what the n-th run prints before it fails (None: it passes), how often it runs, and (passed, failed)
+TRIED = [
+    ("late_once", True, ["not ok 1 - late", None], 2, (1, 0)),
+    ("late_twice", True, ["not ok 1 - late", "not ok 1 - late", None], 3, (1, 0)),
+    ("late_always", True, ["not ok 1 - late"] * 4, 3, (0, 1)),
+    ("exact_once", False, ["not ok 1 - wrong", None], 1, (0, 1)),
+    ("limit_once", True, ["not ok 1 - a\n# FAULT left a limit", None], 1, (0, 1)),
+    ("sanitizer_once", True, ["==1==ERROR: AddressSanitizer: heap-use-after-free", None], 1, (0, 1)),
+    ("undefined_once", True, ["a.c:1:2: runtime error: signed integer overflow", None], 1, (0, 1)),
+    ("assertion_once", True, ["heaved: a.c:1: f: Assertion `x > 0' failed.", None], 1, (0, 1)),
+    ("crash_once", True, ["SEGV", None], 1, (0, 1)),
+    ("fault_when_tried_again", True, ["not ok 1 - late", "not ok 1 - a\n# FAULT left a limit", None], 2, (0, 1)),
+    ("good", True, [None, None], 1, (1, 0)),
+]
+TRIED_SCRIPT = """
+import os, pathlib, signal, sys
+name, runs = sys.argv[1], eval(sys.argv[2])
+with open("runs", "a") as file:
+    file.write(name + chr(10))
+text = runs[pathlib.Path("runs").read_text().split().count(name) - 1]
+if text == "SEGV":
+    os.kill(os.getpid(), signal.SIGSEGV)
+print("ok 1 - fine" if text is None else text)
+print("1..1")
+sys.exit(text is not None)
+"""
+
+
+def run_tried(folder, *options):
+    """(exit status, output, {name: how often it ran}, in which order) of run_tests.py on a build that has these tests."""
+    source, build = Path(folder), Path(folder) / "build"
+    (source / "tried.py").write_text(TRIED_SCRIPT, encoding="utf-8")
+    tests = "".join(f'add_test(NAME {name} COMMAND {sys.executable} {source}/tried.py {name} [==[{runs}]==])\n' + (f"set_property(TEST {name} APPEND PROPERTY LABELS clock)\n" if is_clock else "")
+                    for name, is_clock, runs, *_ in TRIED)
+    (source / "CMakeLists.txt").write_text(f"cmake_minimum_required(VERSION 3.16)\nproject(tried NONE)\nenable_testing()\n{tests}", encoding="utf-8")
+    subprocess.run(["cmake", "-S", source, "-B", build], stdout=subprocess.DEVNULL, check=True)
+    run = subprocess.run([sys.executable, TOP / "tools/lib/run_tests.py", build, *options], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    return run.returncode, run.stdout, (build / "runs").read_text(encoding="utf-8").split()
+
+
+def tries_again_what_the_clock_explains():
+    with tempfile.TemporaryDirectory() as folder:
+        code, text, order = run_tried(folder)
+    for name, _, _, runs, _ in TRIED:
+        assert order.count(name) == runs, f"{name} ran {order.count(name)} times, must be {runs}:\n{text}"
+    assert len(set(order[:len(TRIED)])) == len(TRIED), f"tried again before all had run: {order}"
+    passed, failed = (sum(counts[i] for *_, counts in TRIED) for i in (0, 1))
+    assert code == 1 and text.splitlines()[-1] == f"{passed} passed, {failed} failed, 0 skipped", text
+    again = text.partition("Passed when tried again:\n")[2].partition("Failed:\n")[0].splitlines()
+    assert [line.strip() for line in again] == ["late_once: late", "not ok 1 - late", "1..1", "late_twice: late", "not ok 1 - late", "1..1"], text
+    with tempfile.TemporaryDirectory() as folder:
+        code, text, order = run_tried(folder, "^(late_once|late_twice|good)$")
+    assert code == 0 and text.splitlines()[-1] == "3 passed, 0 failed, 0 skipped", text
+
+
+def shakes():
+    """Clock tests alone, beside processes that are gone afterwards; whatever fails once has failed."""
+    with tempfile.TemporaryDirectory() as folder:
+        code, text, order = run_tried(folder, "--shake", "2", "once|good")
+    assert sorted(order) == sorted(2 * [name for name, is_clock, *_ in TRIED if is_clock and re.search("once|good", name)]), order
+    assert code == 1 and re.search(r"^  late_once +failed in 1 of 2$", text, re.MULTILINE) and re.search(r"^  good +failed in 0 of 2$", text, re.MULTILINE), text
+    assert text.splitlines()[-1] == f"{len(order) - 6} passed, 6 failed, 0 skipped", text
+    assert "4 busy processes" in text, text
+    with shake.shaken():
+        assert busy_children() == shake.BUSY
+    assert busy_children() == 0
+
+
+def busy_children():
+    run = subprocess.run(["ps", "--ppid", str(os.getpid()), "-o", "args"], stdout=subprocess.PIPE, text=True, check=True)
+    return run.stdout.count("tools/lib/shake.py compute")
+
+
 def main():
     suite = tap.Suite()
+    with suite.case("a clock test that fails is tried again alone, and nothing else is"):
+        tries_again_what_the_clock_explains()
+    with suite.case("--shake runs clock tests beside a shaken machine, and counts what fails"):
+        shakes()
     with suite.case("tools/test --sanitize=memory runs every unit test of the core"):
         assert not left_out_of_memory(), left_out_of_memory()
     for name, (lines, verdict, expected) in COUNTED.items():

@@ -8,7 +8,7 @@
         raise tap.Skip("this kernel has no vcan")
     sys.exit(suite.done())
 
-A case fails by any exception; what it says follows as comment lines. done() prints the plan; a script that dies before it has failed.
+A case fails by any exception; what it says follows as comment lines. A Fault says that no clock explains it, so that the test is not tried again. done() prints the plan; a script that dies before it has failed.
 """
 import contextlib
 import traceback
@@ -16,6 +16,10 @@ import traceback
 
 class Skip(Exception):
     """Raised in a case that cannot run here; the text is the reason."""
+
+
+class Fault(AssertionError):
+    """What is wrong however late the machine was: a limit that was left, a crash."""
 
 
 class Suite:
@@ -35,6 +39,8 @@ class Suite:
             self.failed += 1
             text = str(error) if isinstance(error, AssertionError) and str(error) else traceback.format_exc()
             print(f"not ok {self.count} - {name}")
+            if isinstance(error, Fault):
+                text = f"FAULT {text}"
             print("\n".join(f"# {line}" for line in text.rstrip().splitlines()), flush=True)
 
     def done(self):

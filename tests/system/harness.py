@@ -15,13 +15,17 @@ import signal
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
 
+import tap
+
 TOP = Path(__file__).resolve().parents[2]
 WAIT_S = 60  # for anything that has to happen: says that it never will, not that it was slow
 HAS_OWN_KERNEL = "HEAVE_OWN_KERNEL" in os.environ  # where to start a program takes long, and mostly no time
+CRASHES = {signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGILL, signal.SIGFPE}
 LOOK_S = 0.01 if HAS_OWN_KERNEL else 0.05  # between two looks whether it has: most of them start a program
 STATUS_LOOK_S = 0.1 if HAS_OWN_KERNEL else LOOK_S
 
@@ -94,7 +98,8 @@ class Guard:
         self.report.close()
         self.report = None
         is_judged = is_locked and not Guard.has_own_faults
-        assert not refused, f"heaved was ended where it allocates after its start: {log}"
+        if refused:
+            raise tap.Fault(f"heaved was ended where it allocates after its start: {log}")
         assert not page_faults or not is_judged or pages_moved() != self.moved, f"{page_faults} page faults of the motion thread in {cycles} cycles: {log}"
         Guard.cycles[bool(is_judged)] += cycles
 
@@ -106,6 +111,21 @@ class Guard:
 
 
 atexit.register(Guard.sum_up)
+
+
+def judge_trace(judge, config, trace):
+    """Every limit, in every row, by tests/judge."""
+    with open(trace, "rb") as rows:
+        run = subprocess.run([judge, config], stdin=rows, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=WAIT_S, check=False)
+    if run.returncode != 0:
+        raise tap.Fault(run.stdout)
+
+
+def check_trace(config, trace):
+    """As judge_trace, and relays, states and timed moves, by tools/check_trace."""
+    run = subprocess.run([sys.executable, TOP / "tools/check_trace", config, trace], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    if run.returncode != 0:
+        raise tap.Fault(run.stdout)
 
 
 class Bench:
@@ -166,15 +186,14 @@ class Bench:
 
     def check_limits(self, config=None):
         """Of what was played last: tests/judge, which takes a twentieth of check_trace's time. (What check_trace has more: relays, states, timed moves.)"""
-        with open(self.folder / "played.csv", "rb") as trace:
-            run = subprocess.run([self.bin.resolve().parent / "tests/judge/trace_judge", config or self.config], stdin=trace,
-                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=WAIT_S, check=False)
-        assert run.returncode == 0, run.stdout
+        judge_trace(self.bin.resolve().parent / "tests/judge/trace_judge", config or self.config, self.folder / "played.csv")
 
     def judge_ended(self):
-        """What the guard has to say of all that have ended so far."""
+        """Of all that have ended so far: none has crashed, and what the guard has to say."""
         for daemon in self.running:
             if daemon.poll() is not None:
+                if -daemon.returncode in CRASHES - {daemon.signal_sent}:
+                    raise tap.Fault(f"heaved has crashed, signal {-daemon.returncode}: {daemon.log.read_text(errors='replace') if daemon.log else ''}")
                 daemon.judge(daemon)
 
     def spawn(self, *arguments, config=None, environment=None, **options):
@@ -186,7 +205,7 @@ class Bench:
                                   **(guard.options if guard else {"env": environment}), **options)
         if guard:
             guard.started()
-        daemon.log = None
+        daemon.log = daemon.signal_sent = None
         daemon.judge = guard.judge if guard else lambda _: None
         self.running.append(daemon)
         return daemon
@@ -203,6 +222,7 @@ class Bench:
 
     def stop(self, daemon, number=signal.SIGTERM):
         """Signals and waits; the exit code."""
+        daemon.signal_sent = number
         daemon.send_signal(number)
         code = daemon.wait(timeout=WAIT_S)
         daemon.judge(daemon)

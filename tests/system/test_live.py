@@ -28,7 +28,6 @@ from pathlib import Path
 import harness
 import tap
 
-TRIES = 5  # for what has to be done within seconds
 COMMANDS = ["engage", "hold", "resume", "park", "reset", "shutdown"]
 MANUAL = {"platform__engage": "manual"}
 ELSEWHERE = {"platform__engage": "manual", "sim__start_extension_mm": "61.7", "sim__homed": "no"}
@@ -559,16 +558,12 @@ def signal_settles(bench, number):
 
 
 def second_signal_ends_at_once(bench):
-    for _ in range(TRIES):
-        daemon = bench.start()
-        bench.wait_state("ENGAGED")
-        daemon.send_signal(signal.SIGINT)
-        harness.wait_for(lambda: "-> SETTLING" in daemon.log.read_text(), "it settles")
-        code, log = bench.stop(daemon, signal.SIGINT), daemon.log.read_text()
-        assert not bench.socket.exists()
-        if "SETTLED -> OFF" not in log:
-            break
-        assert code in (0, 1), log  # the signal came too late on a busy machine
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    daemon.send_signal(signal.SIGINT)
+    harness.wait_for(lambda: "-> SETTLING" in daemon.log.read_text(), "it settles")
+    code, log = bench.stop(daemon, signal.SIGINT), daemon.log.read_text()
+    assert not bench.socket.exists()
     assert code == 1 and "second signal" in log, log
 
 

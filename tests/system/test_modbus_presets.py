@@ -28,7 +28,6 @@ COUNTS_PER_MM = 100
 STROKE_MM, SPEED_MM_S, STEP_MM = 300, 40, 6
 WIRE_S = 0.003  # of a question and its answer on a serial line: without it, this machine is busy with nothing but questions
 RIDE_SETPOINTS = 10
-TRIES = 3
 TELL_S = 0.02  # between two looks of a moving drive at its position
 
 
@@ -257,13 +256,9 @@ def wait_ready(bench):
 
 
 def engage(bench):
-    for _ in range(TRIES):
-        wait_ready(bench)
-        assert bench.ctl("engage").returncode == 0
-        status = bench.wait_state("ENGAGED", "FAULT")
-        if status["fault"]["name"] != "drive-timeout":
-            break
-        bench.reset()  # drives have ten seconds to get ready, and a busy machine may need them for the line alone
+    wait_ready(bench)
+    assert bench.ctl("engage").returncode == 0
+    status = bench.wait_state("ENGAGED", "FAULT")
     assert status["state"] == "ENGAGED", f"{status['fault']} {status['cylinders']}"
 
 

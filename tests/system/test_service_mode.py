@@ -175,12 +175,8 @@ def hands_of(record):
 
 def judge(bench, trace, record):
     """Every limit, and rest wherever there is no hand; the hands."""
-    with open(trace, "rb") as rows:
-        run = subprocess.run([JUDGE, bench.config], stdin=rows, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=harness.WAIT_S, check=False)
-    assert run.returncode == 0, run.stdout
-    check = subprocess.run([sys.executable, harness.TOP / "tools/check_trace", bench.config, trace], stdout=subprocess.PIPE,
-                           stderr=subprocess.STDOUT, text=True, timeout=harness.WAIT_S, check=False)
-    assert check.returncode == 0, check.stdout
+    harness.judge_trace(JUDGE, bench.config, trace)
+    harness.check_trace(bench.config, trace)
     hands = hands_of(record)
     last, allowed, moved = None, iter(hands), 0
     hand = next(allowed, None)

@@ -494,7 +494,7 @@ class Daemon:
         self.process = subprocess.Popen([bench.bin / "heaved", "--config", config or bench.config, *map(str, arguments)], stdout=subprocess.DEVNULL,
                                         stderr=subprocess.PIPE, text=True, errors="replace", **page.options)
         bench.running.append(self.process)
-        self.process.judge = lambda _: None
+        self.process.judge, self.process.log, self.process.signal_sent = lambda _: None, None, None
         self.reader = threading.Thread(target=lambda: self.said.extend(self.process.stderr), daemon=True)
         self.reader.start()
 
