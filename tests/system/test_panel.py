@@ -61,8 +61,8 @@ class PanelBench(harness.Bench):
         self.panel_log = self.folder / "panel.log"
         options.setdefault("env", {**os.environ, "HEAVE_LOCALES": str(BIN.parent / "locale")})
         with open(self.panel_log, "wb") as log:
-            self.panel = subprocess.Popen([BIN / "heave-panel", "--listen", f"127.0.0.1:{self.web}", "--www", WWW, "--state", self.state_folder, "--platform",
-                                           f"ride={self.socket}", "--heaved", BIN / "heaved", *self.more, *arguments], stdout=log, stderr=log, **options)
+            self.panel = subprocess.Popen([self.bin / "heave-panel", "--listen", f"127.0.0.1:{self.web}", "--www", self.bin.parent / "www", "--state", self.state_folder, "--platform",
+                                           f"ride={self.socket}", "--heaved", self.bin / "heaved", *self.more, *arguments], stdout=log, stderr=log, **options)
         harness.wait_for(lambda: "heave-panel: http" in self.panel_log.read_text(encoding="utf-8") or self.panel.poll() is not None, "the panel serves")
         assert self.panel.poll() is None, self.panel_log.read_text(encoding="utf-8")
 
@@ -71,6 +71,15 @@ class PanelBench(harness.Bench):
             self.panel.send_signal(how)
             self.panel.wait(20)
         self.panel = None
+
+    def open_programs(self):
+        """Copies that any user may run, wherever the tree is."""
+        place = self.folder / "build"
+        shutil.copytree(WWW, place / "www")
+        (place / "bin").mkdir()
+        for name in ("heaved", "heavectl", "heave-panel"):
+            shutil.copy(self.bin / name, place / "bin")
+        self.bin, self.guard = place / "bin", self.guard and Path(shutil.copy(self.guard, place))
 
     def both(self):
         daemon = self.start(environment={"STATE_DIRECTORY": str(self.kept)})
@@ -1076,6 +1085,7 @@ def rights_are_as_in_the_units(bench):
         os.chown(path, HEAVED_UID, HEAVE_GID)
         path.chmod(mode)
     bench.config.chmod(0o644)
+    bench.open_programs()
     os.chown(bench.state_folder, PANEL_UID, HEAVE_GID)
     bench.start(environment={"STATE_DIRECTORY": str(bench.kept)}, user=HEAVED_UID, group=HEAVE_GID, extra_groups=[], umask=umask)
     bench.start_panel(user=PANEL_UID, group=PANEL_UID, extra_groups=[HEAVE_GID], umask=0o077)
