@@ -453,7 +453,8 @@ void drive_advance(drive_t *self, uint64_t now_us)
 
 uint64_t drive_due_us(const drive_t *self)
 {
-    uint64_t due_us = self->state_due_us < self->stop_due_us ? self->state_due_us : self->stop_due_us;
+    const uint64_t state_us = self->is_deaf ? DRIVE_NEVER : self->state_due_us;
+    uint64_t due_us = state_us < self->stop_due_us ? state_us : self->stop_due_us;
     due_us = self->mode_due_us < due_us ? self->mode_due_us : due_us;
     return due_us;
 }

@@ -418,15 +418,17 @@ static void end_homing(frame_drive_t *self)
     }
 }
 
-static bool is_unasked(const frame_drive_t *self, const told_t *told)
+/* Whether it comes by itself, and does now. */
+static bool is_unasked(const frame_drive_t *self, bool is_status)
 {
-    return told->is_status ? told->frame->length != 0 : self->map->position_query.length == 0;
+    const bool is_by_itself = is_status ? self->map->status_reply.length != 0 : self->map->position_query.length == 0;
+    return is_by_itself && self->is_powered && !self->is_cut && is_started(self);
 }
 
 /* What comes by itself, from the first of those that share it. */
 static void tell_unasked(frame_drive_t *self, const told_t *told, uint64_t *due_us, uint32_t every_us)
 {
-    if (!is_unasked(self, told) || !is_started(self) || self->now_us < *due_us) {
+    if (!is_unasked(self, told->is_status) || self->now_us < *due_us) {
         return;
     }
     *due_us += every_us;
@@ -462,8 +464,8 @@ uint64_t frame_drive_due_us(const frame_drive_t *self)
 {
     const uint64_t look_us = self->now_us + STEP_US;
     const uint64_t waiting_us = first_waiting(self);
-    const uint64_t send_us = self->map->position_query.length == 0 && self->is_powered ? self->send_us : DRIVE_NEVER;
-    const uint64_t status_us = self->map->status_reply.length != 0 && self->is_powered ? self->status_us : DRIVE_NEVER;
+    const uint64_t send_us = is_unasked(self, false) ? self->send_us : DRIVE_NEVER;
+    const uint64_t status_us = is_unasked(self, true) ? self->status_us : DRIVE_NEVER;
     const uint64_t told_us = send_us < status_us ? send_us : status_us;
     const uint64_t first_us = waiting_us < told_us ? waiting_us : told_us;
     return first_us < look_us ? first_us : look_us;

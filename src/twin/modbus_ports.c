@@ -162,9 +162,8 @@ uint64_t modbus_ports_due_us(const modbus_ports_t *self)
 {
     uint64_t due_us = UINT64_MAX;
     for (unsigned i = 0; i < self->count; i++) {
-        for (unsigned k = 0; k < self->port[i].helds; k++) {
-            due_us = self->port[i].held[k].due_us < due_us ? self->port[i].held[k].due_us : due_us;
-        }
+        const modbus_port_t *port = &self->port[i]; /* the first that is held goes before the others, however late it is */
+        due_us = port->helds > 0 && port->held[0].due_us < due_us ? port->held[0].due_us : due_us;
     }
     return due_us;
 }

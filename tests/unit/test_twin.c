@@ -55,6 +55,7 @@ static void run(uint64_t span_us)
     while (m_now_us < end_us) {
         m_now_us += STEP_US;
         twin_advance(&m_twin, m_now_us);
+        TEST_ASSERT_TRUE_MESSAGE(twin_due_us(&m_twin) > m_now_us, "what is due has been done: heave-twin would never sleep");
     }
 }
 
@@ -549,6 +550,20 @@ static void test_mend_gives_objects_and_nodes_back_what_they_were(void)
     TEST_ASSERT_NOT_NULL(last(0x704));
 }
 
+static void test_deaf_drive_waits_for_nothing(void)
+{
+    operational();
+    ask_write(1, 0x6060, 0, 1, 8);
+    ask_write(1, 0x6040, 0, 2, 0x06);
+    ask_write(1, 0x6040, 0, 2, 0x07);
+    TEST_ASSERT_TRUE(drive_due_us(&m_twin.node[0].drive) < DRIVE_NEVER); /* it switches on in some milliseconds */
+    act("ignore 1");
+    run(200000);
+    act("mend 1");
+    run(1000);
+    TEST_ASSERT_EQUAL_HEX32(0x23, ask_read(1, 0x6041, 0) & 0x6F);
+}
+
 static void test_script_times_count_from_the_start_or_from_torque(void)
 {
     char why[FAULT_WHY_MAX];
@@ -718,6 +733,7 @@ int main(void)
     RUN_TEST(test_faults_wrong_lines_say_what_is_wrong);
     RUN_TEST(test_faults_of_a_drive_show_on_the_bus);
     RUN_TEST(test_mend_gives_objects_and_nodes_back_what_they_were);
+    RUN_TEST(test_deaf_drive_waits_for_nothing);
     RUN_TEST(test_script_times_count_from_the_start_or_from_torque);
     RUN_TEST(test_script_wrong_lines_are_named_with_their_number);
     RUN_TEST(test_local_bus_is_a_can_bus_with_echoes_and_faults);

@@ -93,6 +93,8 @@ static void wait_ms(unsigned ms)
     for (unsigned i = 0; i < ms; i++) {
         m_now_us += 1000;
         frame_drive_advance(&m_drive, m_now_us);
+        TEST_ASSERT_TRUE_MESSAGE(frame_drive_due_us(&m_drive) > m_now_us,
+                                 "what is due has been done: heave-twin would never sleep");
     }
 }
 
@@ -121,6 +123,22 @@ static void test_other_frames_are_not_its_own(void)
     can_frame_t frame = {.id = 0x602, .is_extended = true, .length = 1, .data = {0x30}};
     frame_drive_hear(&m_drive, &frame, m_now_us);
     TEST_ASSERT_EQUAL(0, m_count);
+}
+
+static void test_tells_nothing_by_itself_where_it_is_cut_off_or_not_started(void)
+{
+    m_map.position_query.length = 0;
+    m_map.status_every = 5;
+    m_map.status_reply = m_map.position_reply;
+    m_map.step[0].frame = frame_of(1, 0x01, (const uint8_t[]){0x40});
+    wait_ms(20);
+    TEST_ASSERT_EQUAL(0, m_count);
+    command(0x40);
+    wait_ms(20);
+    TEST_ASSERT_EQUAL(5 + 1, m_count);
+    m_drive.is_cut = true;
+    wait_ms(20);
+    TEST_ASSERT_EQUAL(5 + 1, m_count);
 }
 
 static void test_homing_finds_the_zero_and_gives_no_torque_that_was_not_there(void)
@@ -328,6 +346,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_reply_has_status_position_counter_and_check_byte);
     RUN_TEST(test_other_frames_are_not_its_own);
+    RUN_TEST(test_tells_nothing_by_itself_where_it_is_cut_off_or_not_started);
     RUN_TEST(test_homing_finds_the_zero_and_gives_no_torque_that_was_not_there);
     RUN_TEST(test_an_absolute_encoder_knows_its_zero_without_homing);
     RUN_TEST(test_set_points_move_it_only_with_torque);
