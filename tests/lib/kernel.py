@@ -28,7 +28,8 @@ from heave.lab import bounded, own_name_space  # noqa: E402,F401  for tests that
 
 def wanted_environment(extra):
     """The variables that a test may rely on; the host's others would only differ from machine to machine."""
-    kept = {name: value for name, value in os.environ.items() if name.startswith(("PYTHON", "HEAVE_", "LC_", "LANG", "XDG_CACHE"))}
+    kept = {"PYTHONHASHSEED": "0"}  # sets in the same order in each run
+    kept |= {name: value for name, value in os.environ.items() if name.startswith(("PYTHON", "HEAVE_", "LC_", "LANG", "XDG_CACHE"))}
     return {"PATH": "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin", "HOME": os.path.expanduser("~"), **kept, **profile(), **extra}
 
 
@@ -60,6 +61,7 @@ def run(command, virtual_time=False, limit_s=300, is_instrumented=False, is_ahea
             lab.find_kernel()
         except lab.LabError as reason:
             raise tap.Skip(reason) from reason
+    environment |= {"HEAVE_VIRTUAL_TIME": "1"} if virtual_time else {}
     return lab.run(command, kernel="any", virtual_time=virtual_time, limit_s=limit_s, environment=wanted_environment(environment), is_ahead=is_ahead)
 
 

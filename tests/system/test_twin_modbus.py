@@ -20,12 +20,6 @@ SAFE = 0x801
 FRAME = "@A6:0,0,0,0,0,5,{:03X}#"
 
 
-def free_tcp():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 class ModbusTwin(twin_bench.TwinBench):
     """A preset's platform; relays on a board beside it where there is a place for them."""
 
@@ -33,7 +27,7 @@ class ModbusTwin(twin_bench.TwinBench):
         super().__init__(bin_dir)
         text = (harness.TOP / f"config/{preset}.ini").read_text(encoding="utf-8")
         self.device = self.folder / "line"
-        changes = {"engage": "auto", "port": self.port, "hosts": ", ".join(f"127.0.0.1:{free_tcp()}" for _ in range(6)), "device": self.device, "parity": "none",
+        changes = {"engage": "auto", "port": self.port, "hosts": ", ".join(f"127.0.0.1:{harness.free_port(socket.SOCK_STREAM)}" for _ in range(6)), "device": self.device, "parity": "none",
                    "drive_timeout_confirmed": "yes", "timeout_ms": 60, "silence_hold_ms": 60000}
         for key, value in changes.items():
             text = re.sub(rf"^{key} = [^;\n]*", f"{key} = {value} ", text, flags=re.MULTILINE)
@@ -41,8 +35,8 @@ class ModbusTwin(twin_bench.TwinBench):
             lines = ", ".join(str(16 + i) for i in range(12))
             text, count = re.subn(r"\[relays\][^\[]*", f"[relays]\ndriver = modbus\nlines = {lines}\nsafe_mask = {SAFE:03X}\n\n", text)
             assert count == 1
-            text += f"\n[relays-modbus]\nhost = 127.0.0.1:{free_tcp()}\nunit = 3\n"
-        self.config.write_text(f"{text}\n[control]\nsocket = {self.socket}\n", encoding="utf-8")
+            text += f"\n[relays-modbus]\nhost = 127.0.0.1:{harness.free_port(socket.SOCK_STREAM)}\nunit = 3\n"
+        self.config.write_text(f"{twin_bench.in_a_hurry(text)}\n[control]\nsocket = {self.socket}\n", encoding="utf-8")
 
 
 def up(bench, *arguments):
@@ -89,7 +83,8 @@ def board_takes_the_masks(bench):
         harness.wait_for(lambda: bench.twin_status()["coils"] == coils(0x005), "it is told again")
         bench.do("relays-silent")
         harness.wait_for(lambda: not bench.status()["relays"]["known"], "not known")
-        assert bench.status()["state"] == "ENGAGED"
+        status = bench.status()
+        assert status["state"] == "ENGAGED", (status["state"], status["fault"], daemon.log.read_text(encoding="utf-8"))
         bench.do("relays-back")
         harness.wait_for(lambda: bench.status()["relays"]["known"], "known again")
     assert bench.stop(daemon) == 0

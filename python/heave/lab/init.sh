@@ -14,6 +14,13 @@ mount -t configfs configfs /sys/kernel/config
 ln -s /proc/self/fd /dev/fd
 # A process that never waits can starve a receiver here: there is one CPU, and no preemption.
 echo 16777216 >/proc/sys/net/core/rmem_default
+# Linux stops real-time threads for 50 ms in each second that they fill. This kernel counts in ticks of 10 ms, and a thread that wakes with
+# each tick fills it by doing nothing.
+echo -1 >/proc/sys/kernel/sched_rt_runtime_us
+# Who asks for random numbers first would have this kernel, which has one CPU and no preemption, stand still until there are some.
+head -c 1 /dev/random >/dev/null
+# The same addresses in each run.
+echo 0 >/proc/sys/kernel/randomize_va_space
 job=$(sed -n 's/.*\bjob=\([^ ]*\).*/\1/p' /proc/cmdline)
 # The host sees what is written when it is written back.
 if grep -q '\bheave_live\b' /proc/cmdline; then
