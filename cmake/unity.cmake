@@ -28,18 +28,17 @@ set(HEAVE_WAITS 1)
 # compute.
 set(HEAVE_SECONDS
   system.rt 1000 # the processors are its own: before all others
-  system.live 900 system.syscalls 800 system.coils 700 system.metrics 600 system.senders 500 system.flood 400
-  system.selftest 380 system.panel 370 system.service_mode 200 system.twin_modbus.tcp 195 system.twin_modbus.rtu 190 system.twin.frames 250
-  system.twin.frames_that_fail 260 system.twin.alone 270 system.panel_hands 240
-  system.can.failures.latched 90 system.can.failures.together 66 property.senders 80
-  python.recipes 100 python.lab 30 python.plugin 20 python.package 18
-  system.canraw 60 check.package 70 system.can.CSP 52 system.can.Mbit 45 system.can.PP 50
-  system.doctor 48 system.can.IP 42 check.judge 40 system.can.failures.killed 38 system.modbus_presets 38 check.lint 38 golden.s390x 37 golden.armhf 37
-  golden.arm64 37 golden.cortex 37 system.modbus_drives 37 check.trace 35 system.can.failures.nothing 32 property.hostile 32 system.kernel 29
-  system.timed_streams 28 golden.optimisation 27 property.singularity 26 system.can.jump 24 system.trouble.stopped 22 system.trouble.clock 22 peers.cia402 22
-  system.angle 20 unit.motion 20 property.limits.modbus-tcp-hexapod 32 property.limits.hexapod-cia402 32 property.limits.tripod-rotation 28
-  property.limits.hexapod-435-300 28 property.limits.hexapod-400 26 property.limits.demo-hexapod 24 property.limits.tripod 24
-  property.limits.can-raw-hexapod 22)
+  system.panel 900 system.panel_hands 890 system.panel_configuration 880 system.panel_commission 870 # one browser, one after the other
+  system.flood 800 system.syscalls 800 system.metrics 790 system.modbus_drives 780 python.recipes 770 system.kernel 760 system.modbus_line 750
+  system.setup.killed 100 check.package 95 system.modbus_presets 88 check.lint 80 golden.optimisation 75 system.setup.Modbus 71 check.judge 65
+  system.selftest 64 system.live 60 system.service_mode 58 system.setup.together 57 system.twin.alone 56 system.twin.not_enabled 53 system.setup.home 50
+  system.setup.Chinese 48 property.senders.engaged 48 property.senders.ramps 48 property.singularity 46 system.twin.configured 46 property.senders.streams 45
+  system.twin.of_drives 44 system.can.failures.together 44 system.setup_vcan 44 system.coils 42 golden.cortex 42 system.can.failures.named 40
+  system.twin_modbus.rtu 39 golden.s390x 37 golden.armhf 37 golden.arm64 37 system.beside 36 system.can.failures.latched 35 system.canraw 35 system.can.CSP 32
+  property.limits.modbus-tcp-hexapod 32 property.limits.hexapod-cia402 32 check.trace 30 system.twin_modbus.tcp 29 property.limits.tripod-rotation 28
+  property.limits.hexapod-435-300 28 system.doctor 28 system.can.PP 26 system.can.Mbit 26 property.limits.hexapod-400 26 system.angle 24
+  property.limits.demo-hexapod 24 property.limits.tripod 24 property.limits.can-raw-hexapod 22 system.chinese 23 system.spikes 21 property.hostile 21
+  unit.motion 20)
 
 # The place of a test in the order.
 function(heave_order name)
@@ -90,6 +89,21 @@ function(heave_kernel_test name)
   set_tests_properties(${name} PROPERTIES ENVIRONMENT "PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/lib:${PROJECT_SOURCE_DIR}/python;PYTHONDONTWRITEBYTECODE=1" LABELS kernel TIMEOUT 1800
                                                PROCESSORS ${weight})
   heave_order(${name})
+endfunction()
+
+# heave_exact_test(NAME [PYTHON] SCRIPT [ARG...]): a script that runs programs live, on virtual time. With sanitizers there is none: then a clock test.
+function(heave_exact_test name)
+  cmake_parse_arguments(PARSE_ARGV 1 exact "PYTHON" "" "")
+  list(POP_FRONT exact_UNPARSED_ARGUMENTS script)
+  if(HEAVE_SANITIZE)
+    heave_script_test(${name} ${script} ${exact_UNPARSED_ARGUMENTS})
+    set_tests_properties(${name} PROPERTIES LABELS system TIMEOUT 1800)
+    heave_clock("Programs with sanitizers do not run on virtual time." ${name})
+  elseif(exact_PYTHON)
+    heave_kernel_test(${name} VIRTUAL_TIME PYTHON ${CMAKE_CURRENT_SOURCE_DIR}/${script} ${exact_UNPARSED_ARGUMENTS})
+  else()
+    heave_kernel_test(${name} VIRTUAL_TIME ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/${script} ${exact_UNPARSED_ARGUMENTS})
+  endif()
 endfunction()
 
 # heave_clock(SENTENCE NAME...): these tests of this folder need real time, and the sentence says what for. A busy machine can make such a test fail, so that

@@ -222,6 +222,7 @@ def lint_findings(root, build, path):
 
 
 def check_lint(suite, root, args):
+    check_sleeps(suite, root)
     with suite.case(f"{CLANG_TIDY} has nothing to say"):
         if not shutil.which(CLANG_TIDY):
             raise tap.Skip(f"{CLANG_TIDY} is not installed")
@@ -231,6 +232,29 @@ def check_lint(suite, root, args):
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
             findings = pool.map(lambda path: lint_findings(root, args.build, path), sorted(paths))
         none_of(sorted({line for found in findings for line in found}), "findings")
+
+
+# What real time passes in: each is a sleep and then a look, which a busy machine makes wrong. These are left; the numbers only shrink.
+SLEEPS = {"system/harness.py": 2, "system/test_flood.py": 2, "system/test_kernel.py": 1, "system/test_metrics.py": 1, "system/test_modbus_drives.py": 1,
+          "system/test_modbus_line.py": 3, "system/test_panel.py": 36, "system/test_panel_commission.py": 9, "system/test_panel_configuration.py": 4,
+          "system/test_panel_hands.py": 10, "system/test_syscalls.py": 6, "system/rt_guest.py": 1, "python/test_heave.py": 1, "python/test_lab.py": 1, "python/test_samples.py": 4, "lib/forked.py": 1,
+          "lib/web_socket.py": 2, "peers/modbus_peer.py": 5}
+VIRTUAL = re.compile(r"heave_(?:exact|kernel)_test\(\S+ .*?(test_\w+\.py)")  # sleeps take no time there, and end exactly
+SLEEP, BARE = re.compile(r"\bsleep\("), re.compile(r"\b(?:took|passed|elapsed|needed)\w*_s\)? *<=? *[0-9.]+\b")
+
+
+def check_sleeps(suite, root):
+    tests = root / "tests"
+    virtual = {"person.py", "plain_master.py"}  # what the scripts below share
+    virtual |= {name for path in tests.rglob("CMakeLists.txt") for name in VIRTUAL.findall(path.read_text(encoding="utf-8"))}
+    texts = {str(path.relative_to(tests)): path.read_text(encoding="utf-8") for path in sorted(tests.rglob("*.py")) if path.name not in virtual and path != Path(__file__).resolve()}
+    with suite.case("tests in real time wait for causes, not for time"):
+        counts = {name: len(SLEEP.findall(text)) for name, text in texts.items() if name in SLEEPS or SLEEP.search(text)}
+        none_of([f"{name}: {count} sleeps, {SLEEPS.get(name, 0)} are allowed: wait for what has to happen (harness.wait_for); or it runs on virtual time (heave_exact_test)"
+                 for name, count in counts.items() if count > SLEEPS.get(name, 0)], "more sleeps")
+        none_of([f"{name}: {counts.get(name, 0)} sleeps are left: put that number into SLEEPS of {Path(__file__).name}" for name, count in SLEEPS.items() if counts.get(name, 0) < count], "fewer sleeps")
+    with suite.case("tests in real time compare no duration with a number alone"):
+        none_of([f"{name}: {found}: a busy machine takes longer" for name, text in texts.items() for found in BARE.findall(text)], "bare durations")
 
 
 def parse_arguments():

@@ -130,19 +130,20 @@ with open("runs", "a") as file:
 text = runs[pathlib.Path("runs").read_text().split().count(name) - 1]
 if text == "SEGV":
     os.kill(os.getpid(), signal.SIGSEGV)
+has_passed = text is None or text.startswith(("ok", "#"))
 print("ok 1 - fine" if text is None else text)
 print("1..1")
-sys.exit(text is not None)
+sys.exit(not has_passed)
 """
 
 
-def run_tried(folder, *options):
+def run_tried(folder, *options, tests=None):
     """(exit status, output, {name: how often it ran}, in which order) of run_tests.py on a build that has these tests."""
     source, build = Path(folder), Path(folder) / "build"
     (source / "tried.py").write_text(TRIED_SCRIPT, encoding="utf-8")
-    tests = "".join(f'add_test(NAME {name} COMMAND {sys.executable} {source}/tried.py {name} [==[{runs}]==])\n' + (f"set_property(TEST {name} APPEND PROPERTY LABELS clock)\n" if is_clock else "")
-                    for name, is_clock, runs, *_ in TRIED)
-    (source / "CMakeLists.txt").write_text(f"cmake_minimum_required(VERSION 3.16)\nproject(tried NONE)\nenable_testing()\n{tests}", encoding="utf-8")
+    declared = "".join(f'add_test(NAME {name} COMMAND {sys.executable} {source}/tried.py {name} [==[{runs}]==])\n' + (f"set_property(TEST {name} APPEND PROPERTY LABELS clock)\n" if is_clock else "")
+                       for name, is_clock, runs, *_ in tests or TRIED)
+    (source / "CMakeLists.txt").write_text(f"cmake_minimum_required(VERSION 3.16)\nproject(tried NONE)\nenable_testing()\n{declared}", encoding="utf-8")
     subprocess.run(["cmake", "-S", source, "-B", build], stdout=subprocess.DEVNULL, check=True)
     run = subprocess.run([sys.executable, TOP / "tools/lib/run_tests.py", build, *options], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     return run.returncode, run.stdout, (build / "runs").read_text(encoding="utf-8").split()
@@ -161,6 +162,17 @@ def tries_again_what_the_clock_explains():
     with tempfile.TemporaryDirectory() as folder:
         code, text, order = run_tried(folder, "^(late_once|late_twice|good)$")
     assert code == 0 and text.splitlines()[-1] == "3 passed, 0 failed, 0 skipped", text
+
+
+def runs_exact_tests_twice():
+    """What an exact test prints is the same each time, but for names of temporary files; clock tests do not run."""
+    tests = [("same", False, [f"ok 1 - x in /tmp/heave-{name}" for name in ("abcd1234", "dcba4321")], 2, (1, 0)),
+             ("another", False, ["ok 1 - x\n# figure 5 mm", "ok 1 - x\n# figure 6 mm"], 2, (1, 1)), ("clock", True, [None, None], 0, (0, 0))]
+    with tempfile.TemporaryDirectory() as folder:
+        code, text, order = run_tried(folder, "--same", tests=tests)
+    assert sorted(order) == ["another", "another", "same", "same"], order
+    assert code == 1 and "another: prints something else in a second run: '# figure 5 mm', then '# figure 6 mm'" in text and "same: prints" not in text, text
+    assert text.splitlines()[-1] == "2 passed, 1 failed, 0 skipped", text
 
 
 def shakes():
@@ -185,6 +197,8 @@ def main():
     suite = tap.Suite()
     with suite.case("a clock test that fails is tried again alone, and nothing else is"):
         tries_again_what_the_clock_explains()
+    with suite.case("--same runs exact tests twice, and finds what prints something else"):
+        runs_exact_tests_twice()
     with suite.case("--shake runs clock tests beside a shaken machine, and counts what fails"):
         shakes()
     with suite.case("tools/test --sanitize=memory runs every unit test of the core"):

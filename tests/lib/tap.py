@@ -11,9 +11,26 @@
 A case fails by any exception; what it says follows as comment lines. A Fault says that no clock explains it, so that the test is not tried again. done() prints the plan; a script that dies before it has failed.
 """
 import contextlib
+import importlib.util
 import os
+import subprocess
+import sys
 import time
 import traceback
+from pathlib import Path
+
+VENV = Path(__file__).resolve().parents[2] / "tools/lib/venv.sh"
+
+
+def needs_package(name):
+    """Begins the script again with the Python of tools/lib/venv.sh where this one has no such package; ends it as skipped where that one is not there."""
+    if importlib.util.find_spec(name):
+        return
+    found = subprocess.run([VENV, "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+    if found.returncode != 0:
+        print(f"1..0 # SKIP {found.stderr.strip()}")
+        sys.exit(0)
+    os.execv(found.stdout.strip(), [found.stdout.strip(), *sys.argv])
 
 
 class Skip(Exception):

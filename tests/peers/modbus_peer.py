@@ -29,7 +29,6 @@ from pymodbus.simulator import DataType, SimData, SimDevice
 
 ANSWER_S = 20  # a device that should answer
 TOO_LATE_S = 2  # an answer that this machine has held back for so long is not sent: no device is as late as that
-PATIENCE_S = 0.9  # of a gateway that is as patient as it can be
 REST_S = 0.2  # for the rest of a serial frame
 VALUES = 128
 
@@ -119,24 +118,13 @@ class Devices:
             return [values[0] for at, where, values in self.written if (at, where) == (unit, address)]
 
 
-class Wrong(AssertionError):
-    """What drives have received is wrong, however slow their line was."""
-
-
 @contextlib.contextmanager
 def judged_whatever():
-    """Around what is judged whatever the machine did."""
+    """Around what drives have received: what is wrong there is wrong however slow their line was."""
     try:
         yield
     except AssertionError as error:
-        raise Wrong(str(error)) from error
-
-
-def judge_failure(error, lines):
-    """Where the machine left a line standing for longer than drives are waited for, nothing can be said but what they received."""
-    slowest_s = max(line.slowest_s for line in lines)
-    if isinstance(error, Exception) and not isinstance(error, (Wrong, tap.Skip)) and slowest_s > PATIENCE_S:
-        raise tap.Skip(f"this machine is too busy: a line stood still for {slowest_s:.1f} s ({str(error)[:60]})") from error
+        raise tap.Fault(str(error)) from error
 
 
 def steps(setpoints):
@@ -171,7 +159,6 @@ class FaultyLine:
         self.is_serial = devices.kind == "serial"
         self.is_ending, self.is_unplugged = False, False
         self.client = None
-        self.wanted_s, self.slowest_s = 0.0, 0.0  # of delay_s in a round of the thread, and how much longer than that the longest one took
         self.done = threading.Event()
 
     def __enter__(self):
@@ -352,8 +339,7 @@ class FaultyLine:
         answer = self.read_answer(question) if unit in self.devices.units else b""
         if time.monotonic() - asked_s > TOO_LATE_S:
             return
-        self.wanted_s = self.delay_s(number)
-        time.sleep(self.wanted_s)
+        time.sleep(self.delay_s(number))
         if fault is Fault.CUT:
             self.drop_client()
             if self.is_serial:
@@ -362,11 +348,7 @@ class FaultyLine:
             self.send(self.client, self.deliver(fault, answer))
 
     def work(self):
-        begun_s = time.monotonic()
         while not self.is_ending:
-            last_s, begun_s = begun_s, time.monotonic()
-            self.slowest_s = max(self.slowest_s, begun_s - last_s - self.wanted_s)
-            self.wanted_s = 0.0
             if self.is_unplugged:
                 if self.client is not None or not self.is_serial and self.listener.fileno() >= 0:
                     self.drop_client()

@@ -1,11 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_coils.py BIN - relays on a Modbus board: the daemon's masks as the coils of a pymodbus server, on TCP and on a serial line.
-
-Runs itself again with the Python of tools/lib/venv.sh, which has pymodbus."""
-import os
+"""test_coils.py BIN - relays on a Modbus board: the daemon's masks as the coils of a pymodbus server, on TCP and on a serial line. With pymodbus, on virtual time."""
 import re
-import subprocess
 import sys
 
 import harness
@@ -122,13 +118,7 @@ CASES = {
 
 def main():
     only = sys.argv[sys.argv.index("--only") + 1] if "--only" in sys.argv else ""
-    if "HEAVE_TEST_VENV" not in os.environ:
-        found = subprocess.run([harness.TOP / "tools/lib/venv.sh", "--cached"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
-        if found.returncode != 0:
-            print(f"1..0 # SKIP {found.stderr.strip()}")
-            return 0
-        os.environ["HEAVE_TEST_VENV"] = "1"
-        os.execv(found.stdout.strip(), [found.stdout.strip(), *sys.argv])
+    tap.needs_package("pymodbus")
     suite = tap.Suite()
     for name, check in CASES.items():
         if only in name:

@@ -1046,11 +1046,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bin")
     parser.add_argument("--guard")
+    parser.add_argument("--here", action="store_true", help="only what takes the memory of this kernel, not of one of User Mode Linux")
     parser.add_argument("--only", default="", help="run the cases whose name contains this")
     arguments = parser.parse_args()
-    cases = {**CASES, "the guard against allocation ends a program, and says where": lambda bench: guard_ends_a_program(bench, arguments.guard),
-             "nothing is allocated after the start, and no page fault in the motion thread once memory is locked":
-                 lambda bench: faults_no_pages_and_allocates_nothing(bench, arguments.guard)}
+    cases = {**({} if arguments.here else CASES), "the guard against allocation ends a program, and says where": lambda bench: guard_ends_a_program(bench, arguments.guard),
+             **({} if harness.Guard.has_own_faults else
+                {"nothing is allocated after the start, and no page fault in the motion thread once memory is locked":
+                 lambda bench: faults_no_pages_and_allocates_nothing(bench, arguments.guard)})}
     suite = tap.Suite()
     for name, check in cases.items():
         if arguments.only in name:

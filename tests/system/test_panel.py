@@ -1477,6 +1477,7 @@ def more_buttons_in_a_browser(bench):
         spot = page.run("(() => { const all = [...document.querySelectorAll('#page button')].find((one) => one.getAttribute('aria-label')?.startsWith('Home all')); all.scrollIntoView({block: 'center'}); const b = all.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()")
         hold_until(page, spot, lambda: bench.raw("tick")["held"])
         mouse(page, spot, "mouseReleased")
+        harness.wait_for(lambda: bench.raw("status")["service"]["doing"] == "nothing", "homing has ended")
         click(page, "[data-request='torque all off']")
         harness.wait_for(lambda: not any(one["torque"] for one in bench.raw("counts")["drives"]), "no torque")
         click(page, "[data-request='service-off']")

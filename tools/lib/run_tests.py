@@ -4,11 +4,15 @@
 
 usage: run_tests.py BUILD_DIR [REGEX]
        run_tests.py BUILD_DIR --shake N [REGEX]    the clock tests N times beside a shaken machine, and how often which failed
+       run_tests.py BUILD_DIR --same [REGEX]       the exact tests twice, beside busy processes and without: whether they print the same
 
 A test with the label "clock" (heave_clock in cmake/unity.cmake) needs real time, which a busy machine may not give it. If one fails, it is tried again
 when all others have ended and nothing else runs, at most twice. What passes then counts as passed, and "Passed when tried again:" names it with what it
 printed first. An exact test is never tried again, and no test is whose failure no clock explains: a crash, a sanitizer's report, an assertion of the
 product, tap.Fault.
+
+An exact test prints the same in each run. Where all tests run, a tenth of the exact ones, those that take long left out, run a second time at the end, and
+fail where they print something else; --same does so with all of them.
 
 Two kinds of output are understood: Unity's ("file:12:test_name:PASS", "3 Tests 0 Failures 0 Ignored") and TAP
 ("ok 1 - name", "not ok 2 - name", "ok 3 - name # SKIP reason", "1..3"). Anything else counts as one case.
@@ -17,6 +21,8 @@ A comment "# figure N TEXT" says how much was tried: figures with the same text 
 Output: one line per test, below a failing one what it printed (except its passing cases), then the skipped and the failed cases, then "N passed, N failed, N skipped".
 Exit status 0 only if something passed and nothing failed.
 """
+import hashlib
+import itertools
 import json
 import os
 import re
@@ -28,6 +34,7 @@ import shake
 TEST_LIMIT_S = 1800  # says that it never ends, not that it was slow
 TRIES = 2  # more, of a clock test that failed
 SLOWEST = 10
+TENTH_S = 60  # tests that take longer have their second run in --same only
 WEIGHTS, MORE = 3, 2  # for each processor, and in all: see cmake/unity.cmake
 
 CTEST_OUTPUT = re.compile(r"^(\d+): ?(.*)$")
@@ -40,6 +47,8 @@ TAP_PLAN = re.compile(r"^1\.\.(\d+)(?: *# *(.*))?$")
 # What no clock explains, wherever a test prints it; ctest calls a crash of its own child an exception.
 FAULT = re.compile(r"^# FAULT |\b\w+Sanitizer: |: runtime error: |: Assertion `.*' failed|\*\*\* stack smashing|\bdumped core\b|\bSIG(SEGV|ABRT|BUS|ILL|FPE)\b")
 CRASH = "Exception"
+# What is another in each run of any test: names of temporary files, the virtual time at the end (tests/lib/tap.py), which one read of the clock changes.
+ANY_NAME, ANY_LINE = re.compile(r"(/tmp/|\./)?heave-[\w-]*[a-z0-9_]{8}\b|/tmp/tmp[a-z0-9_]{8}\b"), re.compile(r"^# \d+ ns$")
 
 
 class Result:
@@ -53,6 +62,7 @@ class Result:
         self.is_fault = False  # it failed by what no clock explains
         self.seconds = 0.0
         self.printed = []  # but for the cases that passed
+        self.said = []  # all that has to be the same in each run of an exact test
 
     def count_figures(self, lines):
         for number, text in (match.groups() for match in map(FIGURE.match, lines) if match):
@@ -105,6 +115,7 @@ def judge(lines, verdict):
     result = Result()
     result.count_figures(lines)
     result.is_fault = CRASH in verdict or any(map(FAULT.search, lines))
+    result.said = [ANY_NAME.sub("(a name)", line) for line in lines if not ANY_LINE.match(line)]
     result.printed = [line for line in lines if not line.startswith("ok ") and not line.endswith(":PASS")]
     if any(UNITY_SUMMARY.match(line) for line in lines):
         result.count_unity(lines)
@@ -142,11 +153,15 @@ def show(name, result, note=""):
         print(indented(result.printed), flush=True)
 
 
+def all_tests(build_dir):
+    """{name: its labels}"""
+    listed = subprocess.run(["ctest", "--test-dir", build_dir, "--show-only=json-v1"], stdout=subprocess.PIPE, text=True, check=True).stdout
+    return {test["name"]: next((label["value"] for label in test.get("properties", []) if label["name"] == "LABELS"), []) for test in json.loads(listed)["tests"]}
+
+
 def clock_tests(build_dir):
     """The names of the tests that were declared as such."""
-    listed = subprocess.run(["ctest", "--test-dir", build_dir, "--show-only=json-v1"], stdout=subprocess.PIPE, text=True, check=True).stdout
-    labels = {test["name"]: label["value"] for test in json.loads(listed)["tests"] for label in test.get("properties", []) if label["name"] == "LABELS"}
-    return {name for name, given in labels.items() if "clock" in given}
+    return {name for name, labels in all_tests(build_dir).items() if "clock" in labels}
 
 
 def run_ctest(build_dir, regex, jobs, note=""):
@@ -196,6 +211,23 @@ def try_again(build_dir, results, clock):
     return passed
 
 
+def differences(before, after):
+    """Adds a failure to each test whose second run has printed something else."""
+    for name, second in after.items():
+        pairs = itertools.zip_longest(before[name].said, second.said, fillvalue="nothing more")
+        unlike = next(((a, b) for a, b in pairs if a != b), None)
+        if unlike is not None and not before[name].failures:
+            before[name].failures.append(f"prints something else in a second run: {unlike[0]!r}, then {unlike[1]!r}")
+
+
+def second_runs(build_dir, results, clock):
+    """Of a tenth of the exact tests that have passed."""
+    names = [name for name, result in results.items() if name not in clock and not result.failures and result.passed and result.seconds < TENTH_S
+             and hashlib.sha256(name.encode()).digest()[0] % 10 == 0]
+    if names:
+        differences(results, dict(run_ctest(build_dir, only(names), all_jobs(), "   a second time")))
+
+
 def print_cases(title, results, kind):
     cases = [f"  {name}: {case}" for name, result in results.items() for case in getattr(result, kind)]
     if cases:
@@ -221,6 +253,8 @@ def print_figures(results):
 def run_all(build_dir, regex):
     clock = clock_tests(build_dir)
     results = dict(run_ctest(build_dir, regex, all_jobs()))
+    if regex is None:
+        second_runs(build_dir, results, clock)
     passed_again = try_again(build_dir, results, clock)
     if len(results) > SLOWEST:
         print_slowest(results)
@@ -228,6 +262,10 @@ def run_all(build_dir, regex):
         print("Passed when tried again:")
         for name, first in passed_again.items():
             print(f"  {name}: {'; '.join(first.failures)}", indented(first.printed), sep="\n")
+    return sum_up(results)
+
+
+def sum_up(results):
     print_cases("Skipped:", results, "skips")
     print_cases("Failed:", results, "failures")
     print_figures(results)
@@ -236,6 +274,16 @@ def run_all(build_dir, regex):
         print("No test ran.")
     print(f"{passed} passed, {failed} failed, {sum(len(result.skips) for result in results.values())} skipped")
     return 0 if passed and not failed else 1
+
+
+def run_same(build_dir, regex):
+    clock = clock_tests(build_dir)
+    names = {name for name in all_tests(build_dir) if name not in clock and (not regex or re.search(regex, name))}
+    with shake.busy() as what:
+        print(f"Beside {what}:", flush=True)
+        results = dict(run_ctest(build_dir, only(names), all_jobs())) if names else {}
+    differences(results, dict(run_ctest(build_dir, only(names), all_jobs(), "   a second time")) if names else {})
+    return sum_up(results)
 
 
 def run_shaken(build_dir, regex, rounds):
@@ -256,13 +304,17 @@ def run_shaken(build_dir, regex, rounds):
 
 def main():
     arguments = sys.argv[1:]
-    rounds = None
+    rounds, is_same = None, "--same" in arguments[1:2]
     if "--shake" in arguments[1:2]:
         rounds = int(arguments[2])
         del arguments[1:3]
+    if is_same:
+        del arguments[1]
     if len(arguments) not in (1, 2):
         sys.exit(__doc__)
     build_dir, regex = arguments[0], arguments[1] if len(arguments) == 2 else None
+    if is_same:
+        return run_same(build_dir, regex)
     return run_all(build_dir, regex) if rounds is None else run_shaken(build_dir, regex, rounds)
 
 

@@ -61,23 +61,35 @@ def child(*arguments):
 
 
 @contextlib.contextmanager
-def shaken(seed=None):
-    """Yields what is done to the machine, in words."""
-    seed = random.randrange(1 << 30) if seed is None else seed
-    begin = time.monotonic() + 1
-    children = [child("compute") for _ in range(BUSY)]
-    what = f"{BUSY} busy processes"
-    if may_stop():
-        children += [child("stop", processor, seed, begin) for processor in os.sched_getaffinity(0)]
-        what += f", stops of up to {STOP_MS} ms (seed {seed})"
-    else:
-        what += "; no stops, as this user may not have SCHED_FIFO"
+def ending(children):
     try:
-        yield what
+        yield
     finally:
         for one in children:
             one.kill()
             one.wait()
+
+
+@contextlib.contextmanager
+def busy():
+    """Without stops."""
+    with ending([child("compute") for _ in range(BUSY)]):
+        yield f"{BUSY} busy processes"
+
+
+@contextlib.contextmanager
+def shaken(seed=None):
+    """Yields what is done to the machine, in words."""
+    seed = random.randrange(1 << 30) if seed is None else seed
+    begin = time.monotonic() + 1
+    with contextlib.ExitStack() as stack:
+        what = stack.enter_context(busy())
+        if may_stop():
+            stack.enter_context(ending([child("stop", processor, seed, begin) for processor in os.sched_getaffinity(0)]))
+            what += f", stops of up to {STOP_MS} ms (seed {seed})"
+        else:
+            what += "; no stops, as this user may not have SCHED_FIFO"
+        yield what
 
 
 if __name__ == "__main__":
