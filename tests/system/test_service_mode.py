@@ -454,7 +454,6 @@ def black_box():
 
 
 def main():
-    harness.go_first()
     suite = tap.Suite()
     for name, case in (("requests are taken, or refused by name", requests),
                        ("heavectl in a terminal: while the key is held", in_a_terminal),

@@ -34,7 +34,7 @@ import shake
 TEST_LIMIT_S = 1800  # says that it never ends, not that it was slow
 TRIES = 2  # more, of a clock test that failed
 SLOWEST = 10
-TENTH_S = 60  # tests that take longer have their second run in --same only
+TENTH_S = 20  # tests that take longer have their second run in --same only
 WEIGHTS, MORE = 3, 2  # for each processor, and in all: see cmake/unity.cmake
 
 CTEST_OUTPUT = re.compile(r"^(\d+): ?(.*)$")

@@ -17,8 +17,9 @@ echo 16777216 >/proc/sys/net/core/rmem_default
 # Linux stops real-time threads for 50 ms in each second that they fill. This kernel counts in ticks of 10 ms, and a thread that wakes with
 # each tick fills it by doing nothing.
 echo -1 >/proc/sys/kernel/sched_rt_runtime_us
-# Who asks for random numbers first would have this kernel, which has one CPU and no preemption, stand still until there are some.
-head -c 1 /dev/random >/dev/null
+# On virtual time, who asks for random numbers first would have this kernel, which has one CPU and no preemption, stand still until there are
+# some. In real time they come by themselves, minutes later.
+if grep -q '\btime-travel=' /proc/cmdline; then head -c 1 /dev/random >/dev/null; fi
 # The same addresses in each run.
 echo 0 >/proc/sys/kernel/randomize_va_space
 job=$(sed -n 's/.*\bjob=\([^ ]*\).*/\1/p' /proc/cmdline)
