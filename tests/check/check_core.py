@@ -238,7 +238,7 @@ def check_lint(suite, root, args):
 SLEEPS = {"system/harness.py": 2, "system/test_flood.py": 2, "system/test_kernel.py": 1, "system/test_metrics.py": 1, "system/test_modbus_drives.py": 1,
           "system/test_modbus_line.py": 3, "system/test_panel.py": 36, "system/test_panel_commission.py": 9, "system/test_panel_configuration.py": 4,
           "system/test_panel_hands.py": 10, "system/test_syscalls.py": 6, "system/rt_guest.py": 1, "python/test_heave.py": 1, "python/test_lab.py": 1, "python/test_samples.py": 4, "lib/forked.py": 1,
-          "lib/web_socket.py": 2, "peers/modbus_peer.py": 5}
+          "lib/web_socket.py": 2, "system/test_senders.py": 2, "peers/modbus_peer.py": 5}
 VIRTUAL = re.compile(r"heave_(?:exact|kernel)_test\(\S+ .*?(test_\w+\.py)")  # sleeps take no time there, and end exactly
 SLEEP, BARE = re.compile(r"\bsleep\("), re.compile(r"\b(?:took|passed|elapsed|needed)\w*_s\)? *<=? *[0-9.]+\b")
 

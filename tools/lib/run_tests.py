@@ -48,7 +48,7 @@ TAP_PLAN = re.compile(r"^1\.\.(\d+)(?: *# *(.*))?$")
 FAULT = re.compile(r"^# FAULT |\b\w+Sanitizer: |: runtime error: |: Assertion `.*' failed|\*\*\* stack smashing|\bdumped core\b|\bSIG(SEGV|ABRT|BUS|ILL|FPE)\b")
 CRASH = "Exception"
 # What is another in each run of any test: names of temporary files, the virtual time at the end (tests/lib/tap.py), which one read of the clock changes.
-ANY_NAME, ANY_LINE = re.compile(r"(/tmp/|\./)?heave-[\w-]*[a-z0-9_]{8}\b|/tmp/tmp[a-z0-9_]{8}\b"), re.compile(r"^# \d+ ns$")
+ANY_NAME, ANY_LINE = re.compile(r"/tmp/[\w.-]+|\bheave-[\w-]*[a-z0-9_]{8}\b"), re.compile(r"^# \d+ ns$")
 
 
 class Result:
