@@ -122,15 +122,36 @@ bool sim_chip_name(const sim_chip_t *self, unsigned line, const char *name, char
     return (mkdir(folder, 0755) == 0 && put(folder, "name", name)) || refuse(name, why, size);
 }
 
+static void *pull_out(void *ctx)
+{
+    const sim_chip_t *self = ctx;
+    (void)put(self->folder, "live", "0");
+    return NULL;
+}
+
+static void wait_until_out(sim_chip_t *self)
+{
+    if (self->is_leaving) {
+        (void)pthread_join(self->thread, NULL);
+        self->is_leaving = false;
+    }
+}
+
 bool sim_chip_plug(sim_chip_t *self, bool is_live, char *why, size_t size)
 {
     char bank[PATH_MAX_HERE];
     char device[32];
     char chip[32];
-    if (!put(self->folder, "live", is_live ? "1" : "0")) {
-        return refuse(is_live ? "plugging the chip" : "pulling the chip out", why, size);
+    wait_until_out(self);
+    if (!is_live) {
+        self->is_live = false;
+        self->is_leaving = pthread_create(&self->thread, NULL, pull_out, self) == 0;
+        return self->is_leaving || put(self->folder, "live", "0") || refuse("pulling the chip out", why, size);
     }
-    self->is_live = is_live;
+    if (!put(self->folder, "live", "1")) {
+        return refuse("plugging the chip", why, size);
+    }
+    self->is_live = true;
     (void)snprintf(bank, sizeof bank, "%s/bank", self->folder);
     get(self->folder, "dev_name", device, sizeof device);
     get(bank, "chip_name", chip, sizeof chip);
@@ -140,6 +161,7 @@ bool sim_chip_plug(sim_chip_t *self, bool is_live, char *why, size_t size)
 
 void sim_chip_drop(sim_chip_t *self)
 {
+    wait_until_out(self);
     if (self->is_made) {
         remove_chip(self->folder);
     }

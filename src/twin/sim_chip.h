@@ -5,6 +5,7 @@
 #ifndef HEAVE_TWIN_SIM_CHIP_H
 #define HEAVE_TWIN_SIM_CHIP_H
 
+#include <pthread.h>
 #include <stdbool.h>
 #include <stddef.h>
 
@@ -15,6 +16,8 @@ typedef struct {
     char folder[96]; /**< in configfs */
     char sysfs[128]; /**< of its lines, while it is plugged */
     bool is_made, is_live;
+    bool is_leaving; /**< a thread pulls it out */
+    pthread_t thread;
 } sim_chip_t;
 
 /** Takes away what a program of that kind left behind that ended without doing so. */
@@ -28,7 +31,9 @@ bool sim_chip_make(sim_chip_t *self, unsigned number, const char *label, unsigne
 /** Names a line, before the chip is plugged. */
 bool sim_chip_name(const sim_chip_t *self, unsigned line, const char *name, char *why, size_t size);
 
-/** Plugs it, or pulls it out, whoever uses it. */
+/** Plugs it, or pulls it out, whoever uses it. Does not wait for a chip to be out: the kernel takes some ticks of its clock for
+ * that. Plugging it again does.
+ *  @param why what is wrong, where false is returned */
 bool sim_chip_plug(sim_chip_t *self, bool is_live, char *why, size_t size);
 
 /** Pulls it out and forgets it. */
