@@ -273,9 +273,12 @@ static void hold_if_too_late(motion_loop_t *self, uint32_t cycles)
 static void note_latency(motion_loop_t *self)
 {
     const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
-    const uint64_t now_us = hal_clock_now_us(self->clock);
     const bool is_followed = snapshot->state == STATE_ENGAGED && snapshot->last_frame_us == snapshot->now_us;
-    if (is_followed && self->tap.arrival_us != 0 && self->tap.arrival_us <= now_us) {
+    if (!is_followed || self->tap.arrival_us == 0) {
+        return;
+    }
+    const uint64_t now_us = hal_clock_now_us(self->clock);
+    if (self->tap.arrival_us <= now_us) {
         histogram_add(&self->handover.times.frame, now_us - self->tap.arrival_us);
     }
 }
