@@ -13,12 +13,15 @@
 """
 import argparse
 import concurrent.futures
+import hashlib
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import tap
@@ -28,6 +31,7 @@ import rooms  # noqa: E402  the path above has to be set first
 
 CLANG_FORMAT = "clang-format-14"  # another version formats differently
 CLANG_TIDY = "clang-tidy-14"      # another version has other checks
+TIDY_KEPT_S = 30 * 86400
 
 HEAP = re.compile(r"_*(malloc|calloc|realloc|reallocarray|free|alloca|aligned_alloc|posix_memalign|memalign|strdup|strndup|sbrk|mmap)$")
 SOFT_FLOAT = re.compile(r"__(aeabi_[df]|(add|sub|mul|div|neg|eq|ne|lt|le|gt|ge|unord|cmp|fix|fixuns|float|floatun|extend|trunc|pow)\w*[sdtx]f)")
@@ -216,7 +220,37 @@ def check_format(suite, root, _args):
 
 # --- lint ------------------------------------------------------------------------------------------------------------------------
 
-def lint_findings(root, build, path):
+def tidy_key(root, version, commands):
+    """Of all that clang-tidy looks at: the file with what it includes and their comments, the options, its own; wherever the tree is."""
+    key = hashlib.sha256(version + (root / ".clang-tidy").read_bytes())
+    for command in commands:
+        words = shlex.split(command["command"])
+        words[words.index("-o") + 1] = "/dev/stdout"
+        words[words.index("-c")] = "-E"
+        run = subprocess.run([*words, "-C"], cwd=command["directory"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True)
+        key.update(" ".join(words[1:]).encode().replace(bytes(root), b"") + run.stdout.replace(bytes(root), b""))
+    return key.hexdigest()
+
+
+def lint_findings(root, build, path, clean):
+    """clean: a file that says that nothing was found before."""
+    if clean.exists():
+        clean.touch()
+        return []
+    found = tidy_findings(root, build, path)
+    if not found:
+        clean.parent.mkdir(parents=True, exist_ok=True)
+        clean.touch()
+    return found
+
+
+def forget_old(folder):
+    for path in folder.glob("*"):
+        if time.time() - path.stat().st_mtime > TIDY_KEPT_S:
+            path.unlink(missing_ok=True)
+
+
+def tidy_findings(root, build, path):
     run = subprocess.run([CLANG_TIDY, "-p", build, "--quiet", path], cwd=root, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False)
     return [line.removeprefix(f"{root}/") for line in run.stdout.splitlines() if re.search(r": (warning|error): ", line)]
 
@@ -227,18 +261,24 @@ def check_lint(suite, root, args):
         if not shutil.which(CLANG_TIDY):
             raise tap.Skip(f"{CLANG_TIDY} is not installed")
         commands = json.loads((args.build / "compile_commands.json").read_text(encoding="utf-8"))
-        paths = {command["file"] for command in commands if re.match(r"(src|hal)/", os.path.relpath(command["file"], root))}  # once: with all its commands
-        assert paths, "no source found"
+        of_path = {}  # once: with all its commands
+        for command in commands:
+            if re.match(r"(src|hal)/", os.path.relpath(command["file"], root)):
+                of_path.setdefault(command["file"], []).append(command)
+        assert of_path, "no source found"
+        version = subprocess.run([CLANG_TIDY, "--version"], stdout=subprocess.PIPE, check=True).stdout
+        folder = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "heave/tidy"
+        forget_old(folder)
         with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-            findings = pool.map(lambda path: lint_findings(root, args.build, path), sorted(paths))
+            findings = pool.map(lambda path: lint_findings(root, args.build, path, folder / tidy_key(root, version, of_path[path])), sorted(of_path))
         none_of(sorted({line for found in findings for line in found}), "findings")
 
 
 # What real time passes in: each is a sleep and then a look, which a busy machine makes wrong. These are left; the numbers only shrink.
 SLEEPS = {"system/harness.py": 2, "system/test_flood.py": 2, "system/test_kernel.py": 1, "system/test_metrics.py": 1, "system/test_modbus_drives.py": 1,
-          "system/test_modbus_line.py": 3, "system/test_panel.py": 36, "system/test_panel_commission.py": 9, "system/test_panel_configuration.py": 4,
+          "system/test_modbus_line.py": 3, "system/test_panel_pages.py": 18, "system/test_panel_commission.py": 9, "system/test_panel_configuration.py": 4,
           "system/test_panel_hands.py": 10, "system/test_syscalls.py": 6, "system/rt_guest.py": 1, "python/test_heave.py": 1, "python/test_lab.py": 1, "python/test_samples.py": 4, "lib/forked.py": 1,
-          "lib/web_socket.py": 2, "system/test_senders.py": 2, "peers/modbus_peer.py": 5}
+          "lib/web_socket.py": 2, "peers/modbus_peer.py": 5}
 VIRTUAL = re.compile(r"heave_(?:exact|kernel)_test\(\S+ .*?(test_\w+\.py)")  # sleeps take no time there, and end exactly
 SLEEP, BARE = re.compile(r"\bsleep\("), re.compile(r"\b(?:took|passed|elapsed|needed)\w*_s\)? *<=? *[0-9.]+\b")
 
