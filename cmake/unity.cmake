@@ -27,10 +27,9 @@ set(HEAVE_WAITS 1)
 # Long ones begin first, so that none is left for the end: seconds, measured on two processors. Before them what waits for real time, beside which others
 # compute.
 set(HEAVE_SECONDS
-  system.rt 1000 # the processors are its own: before all others
-  system.panel 900 system.panel_hands 890 system.panel_configuration 880 system.panel_commission 870 # one browser, one after the other
+  system.panel_pages 900 system.panel_hands 890 system.panel_configuration 880 system.panel_commission 870 # one browser, one after the other
   system.flood 800 system.syscalls 800 system.metrics 790 system.modbus_drives 780 python.recipes 770 system.kernel 760 system.modbus_line 750
-  system.setup.killed 100 check.package 95 system.modbus_presets 88 check.lint 80 golden.optimisation 75 system.setup.Modbus 71 check.judge 65
+  system.panel 98 system.setup.killed 100 check.package 95 system.modbus_presets 88 check.lint 80 golden.optimisation 75 system.setup.Modbus 71 check.judge 65
   system.selftest 64 system.live 60 system.service_mode 58 system.setup.together 57 system.twin.alone 56 system.twin.not_enabled 53 system.setup.home 50
   system.setup.Chinese 48 property.senders.engaged 48 property.senders.ramps 48 property.singularity 46 system.twin.configured 46 property.senders.streams 45
   system.twin.of_drives 44 system.can.failures.together 44 system.setup_vcan 44 system.coils 42 golden.cortex 42 system.can.failures.named 40

@@ -14,7 +14,8 @@ from pathlib import Path
 import harness
 import tap
 import web_socket
-from test_panel import BIN, OVERFLOW, PICTURES, SMALL, STOP_S, UNNAMED, PanelBench, click, hold_until, mouse, moved, reach, take, until
+from test_panel import BIN, STOP_S, PanelBench, moved, reach, take, until
+from test_panel_pages import OVERFLOW, PICTURES, SMALL, UNNAMED, click, hold_until, mouse
 from web_socket import Page
 
 LAG_MS = 12

@@ -20,7 +20,8 @@ import harness
 import tap
 import web_socket
 from test_chinese import CHINESE
-from test_panel import BIN, OVERFLOW, PICTURES, SMALL, UNNAMED, PanelBench, click, reach, state_of, take
+from test_panel import BIN, PanelBench, reach, state_of, take
+from test_panel_pages import OVERFLOW, PICTURES, SMALL, UNNAMED, click
 from web_socket import Page
 
 SEALS = fcntl.F_SEAL_WRITE | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW

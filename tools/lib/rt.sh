@@ -69,7 +69,7 @@ lacking_tools() {
 main() {
     local lacking
     find_cached && return 0
-    [ "${1:-}" != --cached ] || { say "no whole PREEMPT_RT kernel in $cache: tools/test fetches one" && return 1; }
+    [ "${1:-}" != --cached ] || { say "no whole PREEMPT_RT kernel in $cache: tools/nightly --only rt fetches one" && return 1; }
     [ "$(uname -m)" = x86_64 ] || { say "only for x86_64 machines" && return 1; }
     lacking=$(lacking_tools)
     [ -z "$lacking" ] || { say "fetching the PREEMPT_RT kernel takes these, which are not here:$lacking" && return 1; }

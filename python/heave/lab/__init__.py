@@ -122,7 +122,7 @@ def _run_uml(kernel: Path, command: Sequence[Any], limit_s: float | None, enviro
         job = Path(folder)
         (job / "run.sh").write_text(_script_of(command, {**environment, "HEAVE_OWN_KERNEL": "1"}), encoding="utf-8")
         boot = [kernel, f"mem={memory}", "rootfstype=hostfs", "rootflags=/", "rw", f"init={HERE / 'init.sh'}", f"job={job}", f"uml_dir={job}/",
-                "vcan.echo=1", "quiet", "con=null", "con0=null,fd:1", *(["time-travel=inf-cpu"] if virtual_time else []), *(["heave_live"] if echo and not virtual_time else [])]
+                "vcan.echo=1", "seccomp=auto", "quiet", "con=null", "con0=null,fd:1", *(["time-travel=inf-cpu"] if virtual_time else []), *(["heave_live"] if echo and not virtual_time else [])]
         nice = NICE if virtual_time else AHEAD if is_ahead else 0
         with (job / "console").open("wb") as console, _one_processor() if virtual_time else contextlib.nullcontext(os.sched_getaffinity(0)) as processors:
             ended = _watched(boot, job / "output", limit_s, echo, stdout=console, stderr=console, env={**os.environ, "TMPDIR": folder},

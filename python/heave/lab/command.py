@@ -15,7 +15,8 @@ CANNOT, TOO_LONG, NOBODY_READS = 125, 124, 141
 DESCRIPTION = """Runs a command on a kernel that has CAN (vcan0 is up), slcan and simulated GPIO lines (gpio-sim), where this machine's own kernel has none.
 The kernel is an ordinary program (User Mode Linux): no rights are needed, this machine's files are its files."""
 EPILOG = f"""exit status: that of the command; {TOO_LONG} after --limit; {NOBODY_READS} where nobody reads what it prints; {CANNOT} where it could not be run, which is said.
-The kernel is built once, by `heave-lab build`, from Debian's package linux-source into ~/.cache/heave: some minutes; takes gcc, make, flex, bison, bc and xz-utils.
+The kernel is built once, by `heave-lab build`, from the newest package linux-source of Debian's backports (or else of this machine's lists),
+into ~/.cache/heave: some minutes; takes gcc, make, flex, bison, bc and xz-utils.
 For a CI machine keep that folder in its cache."""
 
 

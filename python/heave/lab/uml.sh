@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # uml.sh - prints the path of a User Mode Linux kernel with SocketCAN (vcan, slcan) and simulated GPIO after building
-# it once into the user's cache. It is an ordinary program of 4 MB that boots in half a second, for any user, on machines whose own kernel
+# it once into the user's cache. It is an ordinary program of 7 MB that boots in half a second, for any user, on machines whose own kernel
 # has no CAN; and it can run on virtual time, where sleeps are exact whatever else the machine does.
-# Debian's own user-mode-linux package panics on CPUs with AMX, hence from the sources: the package linux-source, fetched by apt without
-# installing it.
+# Debian's own user-mode-linux package panics on CPUs with AMX, hence from the sources: a package linux-source, fetched by apt without
+# installing it. Since Linux 6.16 a system call in such a kernel takes half the time, so the first choice is that of Debian's backports.
 #
 # usage: uml.sh [--cached]     --cached: only looks, builds nothing
 # Exit status: 0 and the path; 1 and one line on stderr that says why there is none.
@@ -12,6 +12,7 @@ set -u
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/heave
 build_limit_s=3600
+lists_limit_s=120
 
 say() { printf 'heave-lab: %s\n' "$*" >&2; }
 
@@ -26,17 +27,29 @@ find_cached() {
     return 1
 }
 
-# linux-source only points to the one with the version in its name.
-source_package() { apt-cache depends linux-source 2>/dev/null | sed -n 's/^ *Depends: \(linux-source-[0-9.]*\)$/\1/p' | head -n 1; }
-
-# Needs no rights: the package is only unpacked here.
-fetch() { # WORK
+# The newest linux-source of these lists: unpacked here only, so that it needs no rights.
+fetch_newest() { # WORK APT-OPTION...
     local package deb
-    package=$(source_package)
+    package=$(apt-cache "${@:2}" pkgnames linux-source- | grep -xE 'linux-source-[0-9.]+' | sort -V | tail -n 1)
     [ -n "$package" ] || { echo "E: apt knows no package linux-source" >&2 && return 1; }
-    (cd "$1" && apt-get -q download "$package") || return 1
+    (cd "$1" && apt-get -q "${@:2}" download "$package") || return 1
     deb=$(compgen -G "$1/linux-source-*.deb") || return 1
     dpkg-deb -x "$deb" "$1/deb" && rm "$deb"
+}
+
+# Where the machine has lists of Debian, their mirror.
+mirror() {
+    apt-get indextargets --format '$(REPO_URI)' 'Identifier: Packages' 'Origin: Debian' 'Label: Debian' 2>/dev/null | grep -m 1 '^http' ||
+        echo http://deb.debian.org/debian
+}
+
+# Its lists are in the folder of work, so that those of the machine stay as they are. apt checks the signature.
+fetch_backport() { # WORK
+    local keys=/usr/share/keyrings/debian-archive-keyring.gpg apt=$1/apt
+    local options=(-o "Dir::State=$apt" -o Dir::State::status=/dev/null -o "Dir::Cache=$apt" -o "Dir::Etc::SourceList=$apt/list" -o Dir::Etc::SourceParts=-
+        -o Acquire::Languages=none -o Acquire::Retries=2)
+    [ -e "$keys" ] && mkdir -p "$apt/lists/partial" && echo "deb [signed-by=$keys arch=amd64] $(mirror) stable-backports main" >"$apt/list" &&
+        timeout "$lists_limit_s" apt-get -q "${options[@]}" update && fetch_newest "$1" "${options[@]}"
 }
 
 # Sources of devices that no UML has stay packed: they are half of the tree. Their Kconfig and Makefile are read.
@@ -67,7 +80,7 @@ check_config() {
 }
 
 build() { # WORK
-    fetch "$1" && unpack "$1" && cd "$1/linux" && configure && check_config &&
+    { fetch_backport "$1" || fetch_newest "$1"; } && unpack "$1" && cd "$1/linux" && configure && check_config &&
         timeout "$build_limit_s" make ARCH=um -j"$(nproc)" linux && strip -s -o "$1/kernel" linux &&
         mv "$1/kernel" "$cache/uml-$(make -s ARCH=um kernelversion)-$(recipe_hash)"
 }
