@@ -29,15 +29,14 @@ set(HEAVE_WAITS 1)
 set(HEAVE_SECONDS
   system.panel_pages 900 system.panel_hands 890 system.panel_configuration 880 system.panel_commission 870 # one browser, one after the other
   system.flood 800 system.syscalls 800 system.metrics 790 system.modbus_drives 780 python.recipes 770 system.kernel 760 system.modbus_line 750
-  system.panel 98 system.setup.killed 100 check.package 95 system.modbus_presets 88 check.lint 80 golden.optimisation 75 system.setup.Modbus 71 check.judge 65
-  system.selftest 64 system.live 60 system.service_mode 58 system.setup.together 57 system.twin.alone 56 system.twin.not_enabled 53 system.setup.home 50
-  system.setup.Chinese 48 property.senders.engaged 48 property.senders.ramps 48 property.singularity 46 system.twin.configured 46 property.senders.streams 45
-  system.twin.of_drives 44 system.can.failures.together 44 system.setup_vcan 44 system.coils 42 golden.cortex 42 system.can.failures.named 40
-  system.twin_modbus.rtu 39 golden.s390x 37 golden.armhf 37 golden.arm64 37 system.beside 36 system.can.failures.latched 35 system.canraw 35 system.can.CSP 32
-  property.limits.modbus-tcp-hexapod 32 property.limits.hexapod-cia402 32 check.trace 30 system.twin_modbus.tcp 29 property.limits.tripod-rotation 28
-  property.limits.hexapod-435-300 28 system.doctor 28 system.can.PP 26 system.can.Mbit 26 property.limits.hexapod-400 26 system.angle 24
-  property.limits.demo-hexapod 24 property.limits.tripod 24 property.limits.can-raw-hexapod 22 system.chinese 23 system.spikes 21 property.hostile 21
-  unit.motion 20)
+  system.panel 100 golden.armhf 73 property.senders.engaged 72 golden.arm64 67 golden.optimisation 62 system.modbus_presets 59 system.setup.killed 56
+  golden.cortex 51 property.senders.streams 50 check.package 50 system.setup.Modbus 40 system.selftest 36 check.judge 36 property.senders.ramps 36
+  property.singularity 36 system.twin.alone 34 system.twin.not_enabled 33 system.setup.together 32 system.service_mode 31 system.live 31
+  system.twin.configured 29 system.setup.home 29 system.can.failures.named 27 system.setup.Chinese 27 check.trace 26 system.twin.of_drives 26
+  property.hostile 26 system.setup_vcan 25 system.can.failures.together 24 system.can.failures.latched 24 system.coils 22 system.timed_streams 22
+  system.senders 21 system.twin_modbus.rtu 21 system.canraw 21 system.angle 21 check.plot_bench 21 system.can.CSP 20 check.lint 20
+  property.senders.shakes 19 property.limits.tripod-rotation 19 system.twin_modbus.tcp 18 system.beside 18 system.twin_slcan 17 system.doctor 16
+  system.can.Mbit 16 golden.s390x 16)
 
 # The place of a test in the order.
 function(heave_order name)
