@@ -78,14 +78,26 @@ static uint64_t us_of(const struct timespec *time)
     return (uint64_t)time->tv_sec * 1000000u + (uint64_t)time->tv_nsec / 1000u;
 }
 
-/* The kernel stamps by the wall clock, we count by the other one: what both have in common is how long ago it was. */
-static uint64_t when_received_us(linux_can_t *self, const linux_can_received_t *received)
+static void read_clocks(linux_can_t *self)
 {
     struct timespec wall, now;
     (void)clock_gettime(CLOCK_REALTIME, &wall);
     (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    const uint64_t ago_us = us_of(&wall) - us_of(&received->stamp); /* huge where the stamp is of the future */
-    const uint64_t when_us = us_of(&now) - (ago_us < CLOCK_STEP_US ? ago_us : 0);
+    self->wall_us = us_of(&wall);
+    self->now_us = us_of(&now);
+    self->has_clocks = true;
+}
+
+/* The kernel stamps by the wall clock, we count by the other one: what both have in common is how long ago it was. The clocks are
+ * read once for all that waits; what came later, or around a change of the wall clock, has them read again. */
+static uint64_t when_received_us(linux_can_t *self, const linux_can_received_t *received)
+{
+    const uint64_t stamp_us = us_of(&received->stamp);
+    if (!self->has_clocks || self->wall_us - stamp_us >= CLOCK_STEP_US) {
+        read_clocks(self);
+    }
+    const uint64_t ago_us = self->wall_us - stamp_us; /* huge where the stamp is of the future */
+    const uint64_t when_us = self->now_us - (ago_us < CLOCK_STEP_US ? ago_us : 0);
     self->last_rx_us = when_us > self->last_rx_us ? when_us : self->last_rx_us;
     return self->last_rx_us;
 }
@@ -143,12 +155,13 @@ static hv_status_t receive_next(linux_can_t *self, linux_can_received_t *receive
         if (is_off(self)) {
             return HV_ERR_IO;
         }
-        const bool has_come = linux_can_frame_receive(self->fd, received);
+        const bool has_come = linux_can_frame_receive(&self->batch, self->fd, received);
         if (!has_come && errno != EAGAIN && errno != EWOULDBLOCK) {
             return linux_can_trouble_note_failure(self, errno, k_receiving);
         }
         linux_can_trouble_note_success(self, k_receiving);
         if (!has_come) {
+            self->has_clocks = false;
             return HV_ERR_AGAIN;
         }
         note_lost(self, received->lost);
@@ -270,7 +283,8 @@ static hv_status_t open_socket(linux_can_t *self, int index)
     linux_can_trouble_cut_off(self, HAL_CAN_DOWN);
     self->unconfirmed = 0;
     self->lost = 0;
-    self->is_overrun = false;
+    self->batch.first = self->batch.count = 0;
+    self->is_overrun = self->has_clocks = false;
     self->fd = socket(AF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
     if (self->fd < 0 && (errno == EAFNOSUPPORT || errno == EPROTONOSUPPORT)) {
         return linux_can_trouble_report(self, LINUX_CAN_NO_SUPPORT, errno,

@@ -10,6 +10,7 @@
 #define LINUX_CAN_H
 
 #include "heave/hal/can.h"
+#include "linux_can_frame.h"
 #include "linux_can_link.h"
 
 /** Longest lists of filters. */
@@ -69,13 +70,16 @@ typedef struct {
     uint32_t owns;
     uint32_t queue_frames;
     uint32_t unconfirmed;
+    linux_can_batch_t batch;
     uint64_t last_rx_us;
+    uint64_t wall_us, now_us; /**< both clocks at one moment, where has_clocks */
     hal_can_state_t state;
     const char *failing; /**< the call that trouble is about, where it may pass by itself; NULL = none */
     bool is_cut;         /**< nothing passes until restart */
     bool has_echo;       /**< the driver confirms what is on the wire */
     bool is_overrun;
-    bool has_kept; /**< kept waits behind the report of a gap */
+    bool has_clocks; /**< until nothing waits any more */
+    bool has_kept;   /**< kept waits behind the report of a gap */
     can_frame_t kept;
 } linux_can_t;
 

@@ -11,7 +11,7 @@
 
 /** Room for the kernel's time stamp and its count of lost frames, aligned as the kernel's macros want it. */
 typedef union {
-    struct cmsghdr header;
+    size_t alignment;
     uint8_t bytes[CMSG_SPACE(sizeof(struct timespec)) + CMSG_SPACE(sizeof(uint32_t))];
 } control_t;
 
@@ -26,18 +26,37 @@ static void keep_ancillary(linux_can_received_t *self, struct msghdr *message)
     }
 }
 
-bool linux_can_frame_receive(int fd, linux_can_received_t *out)
+/* How many there were. */
+static uint32_t receive_all(linux_can_received_t *frame, int fd)
 {
-    control_t control;
-    struct iovec part = {&out->frame, sizeof out->frame};
-    struct msghdr message = {.msg_iov = &part, .msg_iovlen = 1, .msg_control = &control, .msg_controllen = sizeof control};
-    memset(out, 0, sizeof *out);
-    const ssize_t length = recvmsg(fd, &message, MSG_DONTWAIT);
-    if (length < 0) {
+    control_t control[LINUX_CAN_BATCH];
+    struct iovec part[LINUX_CAN_BATCH];
+    struct mmsghdr message[LINUX_CAN_BATCH];
+    memset(frame, 0, LINUX_CAN_BATCH * sizeof *frame);
+    memset(message, 0, sizeof message);
+    for (uint32_t i = 0; i < LINUX_CAN_BATCH; i++) {
+        part[i] = (struct iovec){&frame[i].frame, sizeof frame[i].frame};
+        message[i].msg_hdr = (struct msghdr){
+            .msg_iov = &part[i], .msg_iovlen = 1, .msg_control = &control[i], .msg_controllen = sizeof control[i]};
+    }
+    const int count = recvmmsg(fd, message, LINUX_CAN_BATCH, MSG_DONTWAIT, NULL);
+    for (int i = 0; i < count; i++) {
+        frame[i].is_own = (message[i].msg_hdr.msg_flags & OWN_ECHO) != 0;
+        keep_ancillary(&frame[i], &message[i].msg_hdr);
+    }
+    return count > 0 ? (uint32_t)count : 0;
+}
+
+bool linux_can_frame_receive(linux_can_batch_t *self, int fd, linux_can_received_t *out)
+{
+    if (self->first == self->count) {
+        self->first = 0;
+        self->count = receive_all(self->frame, fd);
+    }
+    if (self->first == self->count) {
         return false;
     }
-    out->is_own = (message.msg_flags & OWN_ECHO) != 0;
-    keep_ancillary(out, &message);
+    *out = self->frame[self->first++];
     return true;
 }
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * linux_can_frame.h - frames between the kernel's form and ours, and what the reports of a controller mean. Keeps no state.
+ * linux_can_frame.h - frames between the kernel's form and ours, and what the reports of a controller mean.
  */
 #ifndef LINUX_CAN_FRAME_H
 #define LINUX_CAN_FRAME_H
@@ -9,6 +9,8 @@
 
 #include "heave/hal/can.h"
 
+#define LINUX_CAN_BATCH 16u /* a cycle of seven drives: the echo of each set-point, and each answer */
+
 /** A frame as the kernel gives it. */
 typedef struct {
     struct can_frame frame;
@@ -17,8 +19,15 @@ typedef struct {
     bool is_own;           /**< the echo of a frame of this socket */
 } linux_can_received_t;
 
-/** Takes the next frame of a socket; never blocks. False where there is none: errno says why. */
-bool linux_can_frame_receive(int fd, linux_can_received_t *out);
+/** Frames that were taken from a socket together. Zeroed: none. Members are private to linux_can_frame.c. */
+typedef struct {
+    linux_can_received_t frame[LINUX_CAN_BATCH];
+    uint32_t first, count;
+} linux_can_batch_t;
+
+/** Takes the next frame of a socket; never blocks. One system call takes up to LINUX_CAN_BATCH of them, for the next calls.
+ *  @return false where there is none: errno says why */
+bool linux_can_frame_receive(linux_can_batch_t *self, int fd, linux_can_received_t *out);
 
 /** To the kernel's form. */
 struct can_frame linux_can_frame_to_kernel(const can_frame_t *frame);

@@ -16,7 +16,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "linux_can_frame.h"
 #include "linux_can_local.h"
 
 #define BACKLOG       4
@@ -167,15 +166,14 @@ unsigned wire_watch(const wire_t *self, struct pollfd fds[WIRE_FDS_MAX])
 
 static bool hear_can(wire_t *self, wire_heard_t heard, void *ctx)
 {
-    struct can_frame frame;
-    ssize_t length;
-    while ((length = recv(self->fd, &frame, sizeof frame, MSG_DONTWAIT)) == (ssize_t)sizeof frame) {
-        if ((frame.can_id & CAN_ERR_FLAG) == 0) {
-            const can_frame_t out = linux_can_frame_from_kernel(&frame);
+    linux_can_received_t received;
+    while (linux_can_frame_receive(&self->batch, self->fd, &received)) {
+        if ((received.frame.can_id & CAN_ERR_FLAG) == 0) {
+            const can_frame_t out = linux_can_frame_from_kernel(&received.frame);
             heard(ctx, &out);
         }
     }
-    return !(length < 0 && (errno == ENODEV || errno == ENXIO));
+    return errno != ENODEV && errno != ENXIO;
 }
 
 static void let_in(wire_t *self)

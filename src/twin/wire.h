@@ -8,6 +8,7 @@
 #include <poll.h>
 
 #include "heave/hal/can.h"
+#include "linux_can_frame.h"
 #include "twin/slcan.h"
 #include "twin/twin.h"
 
@@ -29,7 +30,8 @@ typedef struct {
     wire_kind_t kind;
     slcan_t slcan; /**< of WIRE_SLCAN */
     const char *adapter;
-    int fd;                       /**< of the interface, or where programs come in; -1 = closed */
+    int fd; /**< of the interface, or where programs come in; -1 = closed */
+    linux_can_batch_t batch;
     int client[WIRE_CLIENTS_MAX]; /**< programs on a bus between programs; -1 = none */
     bool is_cable_out;            /**< on such a bus: nobody acknowledges */
     uint32_t refused;             /**< frames that the system did not take */

@@ -38,9 +38,9 @@ def checked(*command, **more):
 PANEL = subprocess.run(["pkg-config", "--exists", "libwebsockets"], check=False).returncode == 0
 
 
-def pack(source, build, **more):
-    """The packages: that of the programs, that for Python, that of the panel; without SOURCE_DATE_EPOCH."""
-    environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"} | more
+def pack(source, build):
+    """The packages: that of the programs, that for Python, that of the panel; without SOURCE_DATE_EPOCH, and without ccache, which writes other paths into what it keeps."""
+    environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"} | {"CCACHE_DISABLE": "1"}
     checked("cmake", "--preset", "package", "-B", build, *QUICK, f"-DHEAVE_PANEL={'ON' if PANEL else 'OFF'}", cwd=source, env=environment)
     checked("cmake", "--build", build, env=environment)
     checked("cpack", "--config", build / "CPackConfig.cmake", "-B", build, env=environment)
@@ -261,8 +261,7 @@ def quickly(folder):
     deb = python_deb = panel_deb = None
     with suite.case("has the same bytes when its sources are copied and built in another folder, later"):
         copy_sources(folder / "copy")
-        # The first may take what ccache has kept from yet another folder; the second is compiled.
-        ours, others = pack(TOP, folder / "one"), pack(folder / "copy", folder / "elsewhere/two", CCACHE_DISABLE="1")
+        ours, others = pack(TOP, folder / "one"), pack(folder / "copy", folder / "elsewhere/two")
         deb, python_deb, panel_deb = (*ours, None)[:3]
         for one, other in zip(ours, others):
             assert one.read_bytes() == other.read_bytes(), f"{one.name}: {one.stat().st_size} and {other.stat().st_size} bytes"

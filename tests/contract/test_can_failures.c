@@ -43,7 +43,7 @@ static const failing_errors_t k_errors[] = {
     {"setsockopt", {ENOMEM, EPERM, ENOPROTOOPT}},
     {"bind", {EACCES, EADDRNOTAVAIL, ENODEV, ENETDOWN}},
     {"send", {EAGAIN, EINTR, ENOBUFS, ENETDOWN, ENXIO, ENODEV, EPERM, EIO}},
-    {"recvmsg", {EINTR, EAGAIN, ENETDOWN, ENOMEM, ENODEV, ENOBUFS}},
+    {"recvmmsg", {EINTR, EAGAIN, ENETDOWN, ENOMEM, ENODEV, ENOBUFS}},
     {"recv", {EINTR, ENOBUFS, ENOMEM}},
     {"ioctl", {EIO, ENODEV, EBUSY, EPERM}},
     {"open", {EACCES, ENOENT, EMFILE, ENOSPC}},
@@ -131,7 +131,7 @@ int __wrap_setsockopt(int fd, int level, int option, const void *value, socklen_
 int __wrap_bind(int fd, const struct sockaddr *address, socklen_t size);
 ssize_t __wrap_send(int fd, const void *bytes, size_t size, int flags);
 ssize_t __wrap_recv(int fd, void *bytes, size_t size, int flags);
-ssize_t __wrap_recvmsg(int fd, struct msghdr *message, int flags);
+int __wrap_recvmmsg(int fd, struct mmsghdr *message, unsigned int count, int flags, struct timespec *limit);
 int __wrap_ioctl(int fd, unsigned long what, ...);
 ssize_t __wrap_readlink(const char *path, char *out, size_t size);
 
@@ -219,21 +219,30 @@ static void put_ancillary(struct msghdr *message)
     memcpy(CMSG_DATA(item), &m.lost, sizeof m.lost);
 }
 
-ssize_t __wrap_recvmsg(int fd, struct msghdr *message, int flags)
+static void deliver(struct msghdr *message)
 {
-    FAILING("recvmsg", -1);
-    (void)flags;
-    errno = is_open(fd) ? state_of_wire() : EBADF;
-    errno = errno == 0 && m.first == m.last ? EAGAIN : errno;
-    if (errno != 0) {
-        return -1;
-    }
     const delivery_t *next = &m.inbox[m.first++ % FRAMES_MAX];
     memcpy(message->msg_iov->iov_base, &next->frame, sizeof next->frame);
     memset(message->msg_control, 0, message->msg_controllen);
     put_ancillary(message);
     message->msg_flags = next->is_own ? MSG_CONFIRM : 0;
-    return (ssize_t)sizeof next->frame;
+}
+
+int __wrap_recvmmsg(int fd, struct mmsghdr *message, unsigned int count, int flags, struct timespec *limit)
+{
+    unsigned int delivered = 0;
+    FAILING("recvmmsg", -1);
+    (void)flags;
+    (void)limit;
+    errno = is_open(fd) ? state_of_wire() : EBADF;
+    errno = errno == 0 && m.first == m.last ? EAGAIN : errno;
+    if (errno != 0) {
+        return -1;
+    }
+    while (delivered < count && m.first != m.last) {
+        deliver(&message[delivered++].msg_hdr);
+    }
+    return (int)delivered;
 }
 
 int __wrap_ioctl(int fd, unsigned long what, ...)

@@ -91,6 +91,7 @@ ERRNOS = {
     "open_memstream": MEMORY, "opendir": FILES, "poll": ["EINTR", "ENOMEM"], "ppoll": ["EINTR", "ENOMEM"], "pread": ["EIO"], "pwrite": ["ENOSPC", "ENOMEM"], "pthread_create": ["EAGAIN", "EPERM"],
     "pthread_setschedparam": ["EPERM"], "pthread_timedjoin_np": ["ETIMEDOUT"], "read": ["EINTR", "EAGAIN", "EIO"], "readdir": ["EIO"], "readlink": ["EACCES", "ENOENT"],
     "realpath": ["EACCES", "ENOENT", "ELOOP"], "recv": ["ECONNRESET", "EINTR", "EAGAIN"],
+    "recvmmsg": ["EINTR", "EAGAIN", "ENETDOWN", "ENOMEM", "ENODEV", "ENOBUFS"],
     "recvmsg": ["EINTR", "EAGAIN", "ENETDOWN", "ENOMEM", "ENODEV", "ENOBUFS", "ECONNREFUSED"], "rename": ["ENOSPC", "EACCES", "EIO"], "rmdir": ["ENOTEMPTY", "EACCES"],
     "sched_setscheduler": ["EPERM"], "send": ["EPIPE", "EAGAIN", "EINTR", "ENOBUFS", "ENETDOWN", "ENXIO", "EIO"], "sendto": ["ENOENT", "ECONNREFUSED", "EAGAIN", "EINTR", "ENOBUFS"],
     "setsockopt": ["ENOMEM", "EPERM", "ENOPROTOOPT"], "signalfd": ["EMFILE", "ENOMEM"], "sigprocmask": ["EINVAL"], "socket": ["EMFILE", "ENOMEM", "EACCES", "EAFNOSUPPORT"],
