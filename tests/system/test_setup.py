@@ -28,7 +28,7 @@ from heave.configuration import changed
 BIN = Path(sys.argv[1])
 BASE, BASE_SPREAD, PLATE, PLATE_SPREAD, RETRACTED, STROKE = 1100, 16, 900, 18, 1300, 400
 WRONG = ("--swap", "2,5", "--reverse", "4", "--lead", "3=2.0", "--start", "120")
-KILLS = 12
+KILLS = 8
 WATCH_S = 1.5
 STILL_MM = 0.002
 REST_S = 0.25 + 0.02 + 0.15  # the hand counts for 250 ms; 2 mm/s at 100 mm/s^2; the drive's own lag, and a busy machine
