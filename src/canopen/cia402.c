@@ -13,7 +13,7 @@
 #include "cia402_stage.h"
 #include "cia402_visit.h"
 
-#define FRAMES_PER_POLL 128u
+#define FRAMES_PER_POLL 1024u /* also of a storm of error frames: what waits behind it is ours */
 #define COB_FUNCTION    0x780u
 #define NMT_PREOP       0x80u
 #define NMT_RESET       0x82u

@@ -9,7 +9,7 @@
 
 #define STALLED_PERIODS 3u      /* without an echo: the bus is gone */
 #define RESTART_US      500000u /* between attempts to restart the bus */
-#define FRAMES_PER_POLL 128u
+#define FRAMES_PER_POLL 1024u   /* also of a storm of error frames: what waits behind it is ours */
 
 static bool is_any_online(const canraw_t *self)
 {

@@ -1959,7 +1959,34 @@ static void test_storm_of_error_frames_is_bounded_and_stops_nothing(void)
     endless.recv = flood;
     driver.can.ops = &endless;
     (void)!cycle();
-    TEST_ASSERT_EQUAL_UINT(128, received);
+    TEST_ASSERT_EQUAL_UINT(1024, received);
+}
+
+static const hal_can_ops_t *s_behind;
+static unsigned s_burst;
+
+static hv_status_t burst_first(void *ctx, can_frame_t *out, uint64_t *rx_time_us)
+{
+    s_burst -= s_burst > 0 ? 1 : 0;
+    return s_burst > 0 ? flood(ctx, out, rx_time_us) : s_behind->recv(ctx, out, rx_time_us);
+}
+
+/* What came while the gateway could not run: the echoes of its frames wait behind it, at any moment of a period. */
+static void test_burst_of_error_frames_is_not_taken_for_a_bus_that_is_gone(void)
+{
+    s_behind = sim_can_hal(&node).ops;
+    hal_can_ops_t storm = *s_behind;
+    storm.recv = burst_first;
+    come_up();
+    enable();
+    driver.can.ops = &storm;
+    for (unsigned phase = 0; phase < 6; phase++) {
+        s_burst = 1700;
+        for (unsigned i = 0; i < 20 + phase; i++) {
+            (void)!cycle();
+            TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
+        }
+    }
 }
 
 static hv_status_t take_nothing(void *ctx, const can_frame_t *frame)
@@ -2941,6 +2968,7 @@ int main(void)
     RUN_TEST(test_bus_that_echoes_nothing_is_gone_after_three_periods);
     RUN_TEST(test_error_passive_is_failing_after_its_time_and_stops_nothing_here);
     RUN_TEST(test_storm_of_error_frames_is_bounded_and_stops_nothing);
+    RUN_TEST(test_burst_of_error_frames_is_not_taken_for_a_bus_that_is_gone);
     RUN_TEST(test_bus_whose_queue_stays_full_is_gone_after_three_periods);
     RUN_TEST(test_bus_that_never_takes_a_whole_set_is_gone_after_three_periods);
     RUN_TEST(test_bus_whose_queue_is_full_now_and_then_hinders_nothing);
