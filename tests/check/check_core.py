@@ -252,7 +252,8 @@ def forget_old(folder):
 
 def tidy_findings(root, build, path):
     run = subprocess.run([CLANG_TIDY, "-p", build, "--quiet", path], cwd=root, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False)
-    return [line.removeprefix(f"{root}/") for line in run.stdout.splitlines() if re.search(r": (warning|error): ", line)]
+    found = [line.removeprefix(f"{root}/") for line in run.stdout.splitlines() if re.search(r": (warning|error): ", line)]
+    return found or ([f"{os.path.relpath(path, root)}: {CLANG_TIDY} ends with {run.returncode}"] if run.returncode else [])
 
 
 def check_lint(suite, root, args):

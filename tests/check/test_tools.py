@@ -33,7 +33,8 @@ COUNTED = {
     "TAP: no plan": (["ok 1 - one"], "Passed", (1, 1, 0)),
     "TAP: fewer cases than planned": (["1..3", "ok 1 - one"], "Passed", (1, 1, 0)),
     "TAP: Unity's output quoted in a comment": (["# x.c:9:test_a:FAIL: no", "ok 1 - one", "1..1"], "Passed", (1, 0, 0)),
-    "plain: passed": (["hello"], "Passed", (1, 0, 0)),
+    "plain: no case": (["hello"], "Passed", (0, 1, 0)),
+    "TAP: passed beside a sanitizer's report": (["ok 1 - one", "==1==ERROR: AddressSanitizer: heap-use-after-free", "1..1"], "Passed", (1, 1, 0)),
     "plain: failed": (["hello"], "***Failed", (0, 1, 0)),
     "plain: took too long": ([], "***Timeout", (0, 1, 0)),
     "plain: not built": ([], "***Not Run", (0, 1, 0)),
@@ -119,6 +120,8 @@ TRIED = [
     ("undefined_once", True, ["a.c:1:2: runtime error: signed integer overflow", None], 1, (0, 1)),
     ("assertion_once", True, ["heaved: a.c:1: f: Assertion `x > 0' failed.", None], 1, (0, 1)),
     ("crash_once", True, ["SEGV", None], 1, (0, 1)),
+    ("crash_told_once", True, ["not ok 1 - the program ended with -11", None], 1, (0, 1)),
+    ("skipped_when_tried_again", True, ["not ok 1 - late"] + 2 * ["ok 1 - fine # SKIP busy"], 3, (0, 1)),
     ("fault_when_tried_again", True, ["not ok 1 - late", "not ok 1 - a\n# FAULT left a limit", None], 2, (0, 1)),
     ("good", True, [None, None], 1, (1, 0)),
 ]
@@ -166,13 +169,14 @@ def tries_again_what_the_clock_explains():
 
 def runs_exact_tests_twice():
     """What an exact test prints is the same each time, but for names of temporary files; clock tests do not run."""
-    tests = [("same", False, [f"ok 1 - x in /tmp/heave-{name}" for name in ("abcd1234", "dcba4321")], 2, (1, 0)),
+    tests = [("dies", False, [None, "SEGV"], 2, (1, 1)), ("same", False, [f"ok 1 - x in /tmp/heave-{name}" for name in ("abcd1234", "dcba4321")], 2, (1, 0)),
              ("another", False, ["ok 1 - x\n# figure 5 mm", "ok 1 - x\n# figure 6 mm"], 2, (1, 1)), ("clock", True, [None, None], 0, (0, 0))]
     with tempfile.TemporaryDirectory() as folder:
         code, text, order = run_tried(folder, "--same", tests=tests)
-    assert sorted(order) == ["another", "another", "same", "same"], order
+    assert sorted(order) == ["another", "another", "dies", "dies", "same", "same"], order
+    assert "dies: in a second run: " in text, text
     assert code == 1 and "another: prints something else in a second run: '# figure 5 mm', then '# figure 6 mm'" in text and "same: prints" not in text, text
-    assert text.splitlines()[-1] == "2 passed, 1 failed, 0 skipped", text
+    assert text.splitlines()[-1] == "3 passed, 3 failed, 0 skipped", text
 
 
 def shakes():
@@ -181,7 +185,7 @@ def shakes():
         code, text, order = run_tried(folder, "--shake", "2", "once|good")
     assert sorted(order) == sorted(2 * [name for name, is_clock, *_ in TRIED if is_clock and re.search("once|good", name)]), order
     assert code == 1 and re.search(r"^  late_once +failed in 1 of 2$", text, re.MULTILINE) and re.search(r"^  good +failed in 0 of 2$", text, re.MULTILINE), text
-    assert text.splitlines()[-1] == f"{len(order) - 6} passed, 6 failed, 0 skipped", text
+    assert text.splitlines()[-1] == f"{len(order) - 7} passed, 7 failed, 0 skipped", text
     assert "4 busy processes" in text, text
     with shake.shaken():
         assert busy_children() == shake.BUSY
@@ -208,6 +212,12 @@ def main():
             result = run_tests.judge(lines, verdict)
             got = (result.passed, len(result.failures), len(result.skips))
             assert got == expected, f"counted {got}, must be {expected}: {result.failures}"
+    with suite.case("counting, what has no plan is one case"):
+        assert run_tests.judge(["hello"], "Passed", is_plain=True).passed == 1
+    with suite.case("counting, what is missing has failed"):
+        results = {}
+        run_tests.not_run(results, {"gone"})
+        assert results["gone"].failures == ["ctest says it did not run"], results["gone"].failures
     with suite.case("counting, figures of the same name are added up"):
         result = run_tests.judge(["# figure 5 cycles", "ok 1 - a", "# figure 7 cycles", "# figure 1 seed", "1..1"], "Passed")
         assert (result.figures, result.passed) == ({"cycles": 12, "seed": 1}, 1), result.figures

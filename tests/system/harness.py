@@ -6,6 +6,7 @@ ended where it allocates after its start, and must have no page fault in its mot
 """
 import atexit
 import contextlib
+import hashlib
 import json
 import mmap
 import os
@@ -26,6 +27,7 @@ TOP = Path(__file__).resolve().parents[2]
 WAIT_S = 60  # for anything that has to happen: says that it never will, not that it was slow
 HAS_OWN_KERNEL = "HEAVE_OWN_KERNEL" in os.environ  # where to start a program takes long, and mostly no time
 CRASHES = {signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGILL, signal.SIGFPE}
+SANITIZER = re.compile(r"\w+Sanitizer: |: runtime error: ")
 LOOK_S = 0.01 if HAS_OWN_KERNEL else 0.05  # between two looks whether it has: most of them start a program
 STATUS_LOOK_S = 0.1 if HAS_OWN_KERNEL else LOOK_S
 
@@ -183,7 +185,9 @@ class Bench:
         trace = self.folder / "played.csv"
         run = self.heaved("--config", config or self.config, "--play", frames, "--trace", trace, *arguments)
         assert run.returncode == 0, f"exit {run.returncode}: {run.stderr}"
-        return trace.read_bytes()
+        played = trace.read_bytes()
+        print(f"# played {hashlib.sha256(played).hexdigest()[:16]}", flush=True)  # the same in each run
+        return played
 
     def check_limits(self, config=None):
         """Of what was played last: tests/judge, which takes a twentieth of check_trace's time. (What check_trace has more: relays, states, timed moves.)"""
@@ -193,8 +197,9 @@ class Bench:
         """Of all that have ended so far: none has crashed, and what the guard has to say."""
         for daemon in self.running:
             if daemon.poll() is not None:
-                if -daemon.returncode in CRASHES - {daemon.signal_sent}:
-                    raise tap.Fault(f"heaved has crashed, signal {-daemon.returncode}: {daemon.log.read_text(errors='replace') if daemon.log else ''}")
+                log = daemon.log.read_text(errors="replace") if daemon.log else ""
+                if -daemon.returncode in CRASHES - {daemon.signal_sent} or SANITIZER.search(log):
+                    raise tap.Fault(f"heaved has crashed, exit code {daemon.returncode}: {log}")
                 daemon.judge(daemon)
 
     def spawn(self, *arguments, config=None, environment=None, **options):

@@ -40,9 +40,6 @@ def can_config(bench, **changes):
     text, count = re.subn(r"\[drives\].*?(?=\n\[relays\])", DRIVES.strip() + "\n", text, flags=re.DOTALL)
     assert count == 1
     config = bench.file("can.ini", text)
-    check = bench.heaved("--config", config, "--check")
-    if "cia402" in check.stderr and check.returncode != 0:
-        raise tap.Skip("this heaved has no driver cia402")
     return config
 
 

@@ -65,9 +65,11 @@ class PanelBench(harness.Bench):
         assert self.panel.poll() is None, self.panel_log.read_text(encoding="utf-8")
 
     def end_panel(self, how=signal.SIGTERM):
-        if self.panel is not None and self.panel.poll() is None:
-            self.panel.send_signal(how)
-            self.panel.wait(20)
+        if self.panel is not None:
+            if self.panel.poll() is None:
+                self.panel.send_signal(how)
+            if -self.panel.wait(20) in harness.CRASHES:
+                raise tap.Fault(f"heave-panel has crashed, exit code {self.panel.returncode}: {self.panel_log.read_text(errors='replace')}")
         self.panel = None
 
     def open_programs(self):

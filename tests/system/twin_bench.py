@@ -12,6 +12,7 @@ import signal
 import subprocess
 
 import harness
+import tap
 
 COUNTS_PER_MM = 1000
 DRIVES = """
@@ -154,6 +155,8 @@ class WithTwin(harness.Bench):
         self.twin.send_signal(signal.SIGTERM)
         code = self.twin.wait(timeout=harness.WAIT_S)
         self.twin = None
+        if -code in harness.CRASHES:
+            raise tap.Fault(f"heave-twin has crashed, exit code {code}: {self.twin_log.read_text(errors='replace')}")
         return code
 
     def do(self, line):

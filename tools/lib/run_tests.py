@@ -32,6 +32,7 @@ import sys
 import shake
 
 TEST_LIMIT_S = 1800  # says that it never ends, not that it was slow
+TESTS_FAILED = 8  # ctest's exit status
 TRIES = 2  # more, of a clock test that failed
 SLOWEST = 10
 TENTH_S = 20  # tests that take longer have their second run in --same only
@@ -45,7 +46,9 @@ TAP_CASE = re.compile(r"^(not )?ok\b *\d* *(?:- *)?(.*?)(?: *# *(SKIP)\b *(.*))?
 FIGURE = re.compile(r"^# figure (\d+) (.+)$")
 TAP_PLAN = re.compile(r"^1\.\.(\d+)(?: *# *(.*))?$")
 # What no clock explains, wherever a test prints it; ctest calls a crash of its own child an exception.
-FAULT = re.compile(r"^# FAULT |\b\w+Sanitizer: |: runtime error: |: Assertion `.*' failed|\*\*\* stack smashing|\bdumped core\b|\bSIG(SEGV|ABRT|BUS|ILL|FPE)\b")
+SANITIZER = re.compile(r"\b\w+Sanitizer: |: runtime error: ")
+FAULT = re.compile(rf"^# FAULT |{SANITIZER.pattern}|: Assertion `.*' failed|\*\*\* stack smashing|buffer overflow detected|\bdumped core\b|\bSIG(SEGV|ABRT|BUS|ILL|FPE)\b"
+                   r"|\b(free|malloc|realloc)\(\): |double free|the kernel stopped before|\b(exit(ed)?|exit (code|status)|ended with|returncode=) ?-(4|6|7|8|11)\b")
 CRASH = "Exception"
 # What is another in each run of any test: names of temporary files, the virtual time at the end (tests/lib/tap.py), which one read of the clock changes.
 ANY_NAME, ANY_LINE = re.compile(r"/tmp/[\w.-]+|\bheave-[\w-]*[a-z0-9_]{8}\b"), re.compile(r"^# \d+ ns$")
@@ -110,8 +113,8 @@ class Result:
         return self.passed + len(self.failures) + len(self.skips)
 
 
-def judge(lines, verdict):
-    """The result of one test from what it printed and from what ctest says of it."""
+def judge(lines, verdict, is_plain=False):
+    """The result of one test from what it printed and from what ctest says of it. is_plain: it prints no cases, and counts as one."""
     result = Result()
     result.count_figures(lines)
     result.is_fault = CRASH in verdict or any(map(FAULT.search, lines))
@@ -123,12 +126,14 @@ def judge(lines, verdict):
         result.count_tap(lines)
     elif any(UNITY_CASE.search(line) for line in lines):
         result.count_unity(lines)
-    elif verdict == "Passed":
+    elif verdict == "Passed" and is_plain:
         result.passed = 1
     if "Skipped" in verdict and not result.cases():
         result.skips.append("skipped as a whole")
     elif verdict != "Passed" and not result.failures and "Skipped" not in verdict:
         result.failures.append(f"ctest says {verdict.strip('*') or 'failed'}")
+    if not result.failures and any(map(SANITIZER.search, lines)):
+        result.failures.append("a sanitizer's report")
     if not result.cases():
         result.failures.append("ran no case")
     return result
@@ -153,9 +158,9 @@ def show(name, result, note=""):
         print(indented(result.printed), flush=True)
 
 
-def all_tests(build_dir):
+def all_tests(build_dir, regex=None):
     """{name: its labels}"""
-    listed = subprocess.run(["ctest", "--test-dir", build_dir, "--show-only=json-v1"], stdout=subprocess.PIPE, text=True, check=True).stdout
+    listed = subprocess.run(["ctest", "--test-dir", build_dir, "--show-only=json-v1", *(["-R", regex] if regex else [])], stdout=subprocess.PIPE, text=True, check=True).stdout
     return {test["name"]: next((label["value"] for label in test.get("properties", []) if label["name"] == "LABELS"), []) for test in json.loads(listed)["tests"]}
 
 
@@ -165,11 +170,11 @@ def clock_tests(build_dir):
 
 
 def run_ctest(build_dir, regex, jobs, note=""):
-    """Yields (name, result) for each finished test, and one more that failed if ctest itself went wrong."""
+    """Yields (name, result) for each test that has finished."""
     command = ["ctest", "--test-dir", build_dir, "-V", "-j", str(jobs), "--timeout", str(TEST_LIMIT_S)]
     command += ["-R", regex] if regex else []
     ctest = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace")
-    printed, other, any_failed = {}, [], False
+    printed, other = {}, []
     for line in ctest.stdout:
         output, finished = CTEST_OUTPUT.match(line), CTEST_RESULT.match(line)
         if output:
@@ -178,14 +183,12 @@ def run_ctest(build_dir, regex, jobs, note=""):
             number, name, verdict, seconds = finished.groups()
             result = judge(after_preamble(printed.pop(number, [])), verdict)
             result.seconds = float(seconds)
-            any_failed |= verdict != "Passed"
             show(name, result, note)
             yield name, result
         else:
             other.append(line)
-    if ctest.wait() != 0 and not any_failed:
+    if ctest.wait() not in (0, TESTS_FAILED):
         print("".join(other))
-        yield "ctest", judge([], f"exit status {ctest.returncode}")
 
 
 def only(names):
@@ -205,19 +208,29 @@ def try_again(build_dir, results, clock):
             for _, result in run_ctest(build_dir, only([name]), 1, f"   tried again, {attempt + 1} of {TRIES}"):
                 if result.is_fault:
                     results[name] = result
-                elif not result.failures:
+                elif not result.failures and result.passed and len(result.skips) <= len(first[name].skips):
                     results[name], passed[name] = result, first[name]
         first = {name: result for name, result in first.items() if not results[name].is_fault}
     return passed
 
 
+def not_run(results, names):
+    """Each of these that is missing has failed."""
+    for name in sorted(names - results.keys()):
+        results[name] = judge([], "it did not run")
+
+
 def differences(before, after):
-    """Adds a failure to each test whose second run has printed something else."""
-    for name, second in after.items():
-        pairs = itertools.zip_longest(before[name].said, second.said, fillvalue="nothing more")
+    """Adds a failure to each test that had passed and whose second run has failed, is missing, or has printed something else."""
+    not_run(after, before.keys())
+    for name, first in before.items():
+        pairs = itertools.zip_longest(first.said, after[name].said, fillvalue="nothing more")
         unlike = next(((a, b) for a, b in pairs if a != b), None)
-        if unlike is not None and not before[name].failures:
-            before[name].failures.append(f"prints something else in a second run: {unlike[0]!r}, then {unlike[1]!r}")
+        if first.failures:
+            continue
+        if unlike is not None:
+            first.failures.append(f"prints something else in a second run: {unlike[0]!r}, then {unlike[1]!r}")
+        first.failures += [f"in a second run: {case}" for case in after[name].failures]
 
 
 def second_runs(build_dir, results, clock):
@@ -225,7 +238,7 @@ def second_runs(build_dir, results, clock):
     names = [name for name, result in results.items() if name not in clock and not result.failures and result.passed and result.seconds < TENTH_S
              and hashlib.sha256(name.encode()).digest()[0] % 10 == 0]
     if names:
-        differences(results, dict(run_ctest(build_dir, only(names), all_jobs(), "   a second time")))
+        differences({name: results[name] for name in names}, dict(run_ctest(build_dir, only(names), all_jobs(), "   a second time")))
 
 
 def print_cases(title, results, kind):
@@ -253,6 +266,7 @@ def print_figures(results):
 def run_all(build_dir, regex):
     clock = clock_tests(build_dir)
     results = dict(run_ctest(build_dir, regex, all_jobs()))
+    not_run(results, all_tests(build_dir, regex).keys())
     if regex is None:
         second_runs(build_dir, results, clock)
     passed_again = try_again(build_dir, results, clock)
@@ -282,6 +296,7 @@ def run_same(build_dir, regex):
     with shake.busy() as what:
         print(f"Beside {what}:", flush=True)
         results = dict(run_ctest(build_dir, only(names), all_jobs())) if names else {}
+    not_run(results, names)
     differences(results, dict(run_ctest(build_dir, only(names), all_jobs(), "   a second time")) if names else {})
     return sum_up(results)
 
