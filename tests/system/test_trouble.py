@@ -15,6 +15,7 @@ import time
 import harness
 import tap
 
+CLOCK_READ_US = 1  # virtual time passes only where the clock is read, a fraction of this each time
 CYCLE_US = 2000
 LATE_HOLD_CYCLES = 3
 SETTLE_MOST_S = 20
@@ -117,7 +118,7 @@ def clock_steps(bench, _):
             sender.stream(0.3, wave)
     after = bench.status()
     assert after["state"] == "ENGAGED" and after["late_cycles"] == before["late_cycles"] and after["counters"]["faults"] == 0, after
-    assert after["frame_latency"]["max_us"] <= 2 * CYCLE_US and after["wake_latency"]["max_us"] == before["wake_latency"]["max_us"], after
+    assert after["frame_latency"]["max_us"] <= 2 * CYCLE_US and after["wake_latency"]["max_us"] <= before["wake_latency"]["max_us"] + CLOCK_READ_US, after
     assert bench.stop(daemon) == 0
     judge(bench)
     replays(bench)
