@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: MIT
 """test_package.py - the Debian package: the same bytes from another folder, accepted by lintian, and what it leaves when it comes and goes.
 
-usage: test_package.py                      packed without optimisation, twice; into an empty root of dpkg, with this machine's libraries
+usage: test_package.py --build-dir DIR      packed without optimisation; into an empty root of dpkg, with this machine's libraries
+       test_package.py --twice              the same bytes from another folder, later
        test_package.py --root DIR           the package as tools/package makes it, into a copy of a system (debootstrap --variant=minbase), in chroot
 """
 import argparse
@@ -38,9 +39,11 @@ def checked(*command, **more):
 PANEL = subprocess.run(["pkg-config", "--exists", "libwebsockets"], check=False).returncode == 0
 
 
-def pack(source, build):
-    """The packages: that of the programs, that for Python, that of the panel; without SOURCE_DATE_EPOCH, and without ccache, which writes other paths into what it keeps."""
-    environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"} | {"CCACHE_DISABLE": "1"}
+def pack(source, build, **more):
+    """The packages: that of the programs, that for Python, that of the panel; without SOURCE_DATE_EPOCH."""
+    environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"} | more
+    for earlier in build.glob("*.deb"):
+        earlier.unlink()
     checked("cmake", "--preset", "package", "-B", build, *QUICK, f"-DHEAVE_PANEL={'ON' if PANEL else 'OFF'}", cwd=source, env=environment)
     checked("cmake", "--build", build, env=environment)
     checked("cpack", "--config", build / "CPackConfig.cmake", "-B", build, env=environment)
@@ -256,15 +259,22 @@ def in_a_system(system, folder):
     return suite.done()
 
 
-def quickly(folder):
+def twice(folder):
     suite = tap.Suite()
-    deb = python_deb = panel_deb = None
     with suite.case("has the same bytes when its sources are copied and built in another folder, later"):
         copy_sources(folder / "copy")
-        ours, others = pack(TOP, folder / "one"), pack(folder / "copy", folder / "elsewhere/two")
-        deb, python_deb, panel_deb = (*ours, None)[:3]
+        # without ccache, which writes other paths into what it keeps
+        ours, others = (pack(source, folder / build, CCACHE_DISABLE="1") for source, build in ((TOP, "one"), (folder / "copy", "elsewhere/two")))
         for one, other in zip(ours, others):
             assert one.read_bytes() == other.read_bytes(), f"{one.name}: {one.stat().st_size} and {other.stat().st_size} bytes"
+    return suite.done()
+
+
+def quickly(folder, build):
+    suite = tap.Suite()
+    deb = python_deb = panel_deb = None
+    with suite.case("is packed"):
+        deb, python_deb, panel_deb = (*pack(TOP, build), None)[:3]
     with suite.case("lintian finds nothing to say"):
         accepted_by_lintian(deb)
     with suite.case("lintian finds nothing to say about the Python package"):
@@ -277,7 +287,7 @@ def quickly(folder):
         panel_is_apart(deb, panel_deb, EmptyRoot(folder / "panel-root"))
     with suite.case("is refused where the units would name programs that are not there"):
         (folder / "local").mkdir()
-        text = (folder / "one/CPackConfig.cmake").read_text(encoding="utf-8").replace('CPACK_HEAVE_PREFIX "/usr"', 'CPACK_HEAVE_PREFIX "/usr/local"')
+        text = (build / "CPackConfig.cmake").read_text(encoding="utf-8").replace('CPACK_HEAVE_PREFIX "/usr"', 'CPACK_HEAVE_PREFIX "/usr/local"')
         (folder / "local/CPackConfig.cmake").write_text(text, encoding="utf-8")
         code, text = run("cpack", "--config", folder / "local/CPackConfig.cmake", "-B", folder / "local")
         assert code != 0 and "-DCMAKE_INSTALL_PREFIX=/usr" in text and not list((folder / "local").glob("*.deb")), text
@@ -287,15 +297,20 @@ def quickly(folder):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--root", type=Path)
-    root = parser.parse_args().root
+    way = parser.add_mutually_exclusive_group(required=True)
+    way.add_argument("--build-dir", type=Path)
+    way.add_argument("--twice", action="store_true")
+    way.add_argument("--root", type=Path)
+    options = parser.parse_args()
     for tool in ("dpkg", "dpkg-shlibdeps", "systemd-sysusers", "gzip"):
         if shutil.which(tool) is None:
             print(f"1..0 # SKIP {tool} is not there")
             return 0
     with tempfile.TemporaryDirectory(prefix="heave-") as name:
         folder = Path(name)
-        return in_a_system(root, folder) if root else quickly(folder)
+        if options.root:
+            return in_a_system(options.root, folder)
+        return twice(folder) if options.twice else quickly(folder, options.build_dir)
 
 
 if __name__ == "__main__":
