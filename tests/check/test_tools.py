@@ -167,6 +167,19 @@ def tries_again_what_the_clock_explains():
     assert code == 0 and text.splitlines()[-1] == "3 passed, 0 failed, 0 skipped", text
 
 
+def tries_again_without_other_runs():
+    """Runs that go on side by side share a file: a test here fails as long as others may run, and passes once none does."""
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder)
+        (source / "alone.sh").write_text(f"if flock -n -s {folder}/beside true; then echo 'not ok 1 - alone'; else echo 'ok 1 - alone'; fi; echo 1..1\n", encoding="ascii")
+        (source / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.16)\nproject(tried NONE)\nenable_testing()\n"
+                                               f"add_test(NAME alone COMMAND sh {source}/alone.sh)\nset_property(TEST alone PROPERTY LABELS clock)\n", encoding="utf-8")
+        subprocess.run(["cmake", "-S", source, "-B", source / "build"], stdout=subprocess.DEVNULL, check=True)
+        run = subprocess.run([sys.executable, TOP / "tools/lib/run_tests.py", source / "build"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False,
+                             env={**os.environ, "HEAVE_TESTS_BESIDE": str(source / "beside")})
+    assert run.stdout.splitlines()[-1] == "1 passed, 0 failed, 0 skipped" and "  alone: alone\n" in run.stdout, run.stdout
+
+
 def runs_exact_tests_twice():
     """What an exact test prints is the same each time, but for names of temporary files; clock tests do not run."""
     tests = [("dies", False, [None, "SEGV"], 2, (1, 1)), ("same", False, [f"ok 1 - x in /tmp/heave-{name}" for name in ("abcd1234", "dcba4321")], 2, (1, 0)),
@@ -201,6 +214,8 @@ def main():
     suite = tap.Suite()
     with suite.case("a clock test that fails is tried again alone, and nothing else is"):
         tries_again_what_the_clock_explains()
+    with suite.case("a test is tried again once no other run goes on"):
+        tries_again_without_other_runs()
     with suite.case("--same runs exact tests twice, and finds what prints something else"):
         runs_exact_tests_twice()
     with suite.case("--shake runs clock tests beside a shaken machine, and counts what fails"):

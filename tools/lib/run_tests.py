@@ -11,6 +11,8 @@ when all others have ended and nothing else runs, at most twice. What passes the
 printed first. An exact test is never tried again, and no test is whose failure no clock explains: a crash, a sanitizer's report, an assertion of the
 product, tap.Fault.
 
+Where HEAVE_TESTS_BESIDE names a file, other runs may go on at the same time, and name the same file: a test is tried again once all of them are that far.
+
 An exact test prints the same in each run. Where all tests run, a tenth of the exact ones, those that take long left out, run a second time at the end, and
 fail where they print something else; --same does so with all of them.
 
@@ -21,6 +23,8 @@ A comment "# figure N TEXT" says how much was tried: figures with the same text 
 Output: one line per test, below a failing one what it printed (except its passing cases), then the skipped and the failed cases, then "N passed, N failed, N skipped".
 Exit status 0 only if something passed and nothing failed.
 """
+import contextlib
+import fcntl
 import hashlib
 import itertools
 import json
@@ -50,6 +54,7 @@ SANITIZER = re.compile(r"\b\w+Sanitizer: |: runtime error: ")
 FAULT = re.compile(rf"^# FAULT |{SANITIZER.pattern}|: Assertion `.*' failed|\*\*\* stack smashing|buffer overflow detected|\bdumped core\b|\bSIG(SEGV|ABRT|BUS|ILL|FPE)\b"
                    r"|\b(free|malloc|realloc)\(\): |double free|the kernel stopped before|\b(exit(ed)?|exit (code|status)|ended with|returncode=) ?-(4|6|7|8|11)\b")
 CRASH = "Exception"
+BESIDE = os.environ.pop("HEAVE_TESTS_BESIDE", None)  # not for the runs that tests make
 # What is another in each run of any test: names of temporary files, the virtual time at the end (tests/lib/tap.py), which one read of the clock changes.
 ANY_NAME, ANY_LINE = re.compile(r"/tmp/[\w.-]+|\bheave-[\w-]*[a-z0-9_]{8}\b"), re.compile(r"^# \d+ ns$")
 
@@ -199,6 +204,15 @@ def all_jobs():
     return WEIGHTS * (os.cpu_count() or 1) + MORE
 
 
+@contextlib.contextmanager
+def turn(kind):
+    """LOCK_SH: beside other runs; LOCK_EX: alone."""
+    with open(BESIDE, "ab") if BESIDE else contextlib.nullcontext() as file:
+        if file:
+            fcntl.flock(file, kind)
+        yield
+
+
 def try_again(build_dir, results, clock):
     """Replaces what passes when it runs alone. Returns {name: how it failed first}."""
     first = {name: result for name, result in results.items() if name in clock and result.failures and not result.is_fault}
@@ -265,11 +279,13 @@ def print_figures(results):
 
 def run_all(build_dir, regex):
     clock = clock_tests(build_dir)
-    results = dict(run_ctest(build_dir, regex, all_jobs()))
-    not_run(results, all_tests(build_dir, regex).keys())
-    if regex is None:
-        second_runs(build_dir, results, clock)
-    passed_again = try_again(build_dir, results, clock)
+    with turn(fcntl.LOCK_SH):
+        results = dict(run_ctest(build_dir, regex, all_jobs()))
+        not_run(results, all_tests(build_dir, regex).keys())
+        if regex is None:
+            second_runs(build_dir, results, clock)
+    with turn(fcntl.LOCK_EX):
+        passed_again = try_again(build_dir, results, clock)
     if len(results) > SLOWEST:
         print_slowest(results)
     if passed_again:
