@@ -34,9 +34,8 @@ static uint64_t hand_us(const gateway_t *self, uint64_t now_us)
 
 uint64_t gateway_tick_age(const gateway_t *self, uint64_t tick_us)
 {
-    const uint64_t newest_us = self->snapshot.service.tick_us;
-    const uint64_t cycle_us = self->settings.cycle_us; /* this one's has not been told yet */
-    return tick_us <= newest_us ? newest_us + cycle_us - tick_us : UINT64_MAX;
+    const uint64_t next_us = self->snapshot.now_us + self->settings.cycle_us; /* this cycle's tick has not been told yet */
+    return tick_us <= self->snapshot.service.tick_us ? hand_us(self, next_us) - tick_us : UINT64_MAX;
 }
 
 bool service_is_up(const gateway_t *self, unsigned i)

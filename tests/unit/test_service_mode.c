@@ -640,6 +640,7 @@ static void test_ticks_are_as_old_as_they_were_shown(void)
     rig_run_ms(&m_rig, 10);
     TEST_ASSERT_EQUAL_UINT64(11000, gateway_tick_age(&m_rig.gateway, tick_us));
     gateway_note_late(&m_rig.gateway, 5);
+    TEST_ASSERT_EQUAL_UINT64(16000, gateway_tick_age(&m_rig.gateway, tick_us)); /* at once: a proof that waited as long is old */
     rig_run_ms(&m_rig, 1);
     TEST_ASSERT_EQUAL_UINT64(17000, gateway_tick_age(&m_rig.gateway, tick_us));
     TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, gateway_tick_age(&m_rig.gateway, tick_us + 1000000));
