@@ -27,7 +27,7 @@ function say(text) {
 }
 
 async function request(line) {
-  const got = await link.ask({ op: "request", platform: shown.platform, line, seen: shown.status?.time_unix_ms ?? 0 }); // what comes late is not done
+  const got = await link.ask({ op: "request", platform: shown.platform, line, tick: shown.status?.tick }); // heaved does not do what comes late
   const why = refusalOf(got);
   if (why) say(why);
   return got.answer;

@@ -62,7 +62,7 @@ export async function build({ page, shown, say, place, link, take }) {
   }
 
   async function apply() {
-    const got = await link.ask({ op: "configure", platform: shown.platform, base: draft.base.digest, staged: draft.staged });
+    const got = await link.ask({ op: "configure", platform: shown.platform, base: draft.base.digest, staged: draft.staged, tick: shown.status?.tick });
     const error = refusalOf(got);
     if (error) { say(error); return error; }
     if (got.answer.restart) draft.handedOver();

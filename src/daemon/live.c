@@ -156,8 +156,7 @@ static void take_signals(live_t *self)
         self->reconfigure.is_end_wanted = true;
         log_signal(self, &info);
         if (self->signals == 1) {
-            const motion_request_t request = {.event = EVENT_SHUTDOWN};
-            (void)ring_push(&self->loop.handover.requests, &request, sizeof request, NULL, 0);
+            __atomic_store_n(&self->loop.handover.is_end_due, 1, __ATOMIC_RELEASE);
             sd_notify_stopping(&self->manager, sd_notify_shutdown_us(&self->config.settings));
             writers_say(&self->writers, "shutting down: the platform settles first; once more ends at once");
         } else {
@@ -244,7 +243,7 @@ static void count_losses(live_t *self)
 static void serve_once(live_t *self)
 {
     struct pollfd fds[CONTROL_FDS + 1];
-    control_fill(&self->control, fds);
+    control_fill(&self->control, fds, now_us(self));
     fds[CONTROL_FDS] = (struct pollfd){.fd = self->signal_fd, .events = POLLIN};
     if (poll(fds, CONTROL_FDS + 1, control_timeout_ms(&self->control, now_us(self), TICK_MS)) < 0) {
         suppose_all(fds, CONTROL_FDS + 1);

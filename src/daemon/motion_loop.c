@@ -98,8 +98,16 @@ static hv_status_t carry_out(motion_loop_t *self, const motion_request_t *reques
     return gateway_request(&self->session.gateway, (event_t)request->event, self->session.now_us);
 }
 
+/* Who asked for a motion long ago may have given up, and turned to something else. */
+static bool is_old(const motion_loop_t *self, const motion_request_t *request, uint64_t now_us)
+{
+    const uint64_t since_us = now_us > request->since_us ? now_us - request->since_us : 0;
+    const uint64_t age_us = request->has_heard ? gateway_tick_age(&self->session.gateway, request->heard_us) : since_us;
+    return request->has_age && age_us >= REQUEST_FRESH_US;
+}
+
 /* Requests that wait, in order, before the cycle. Returns how many; their results are complete after the cycle. */
-static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE])
+static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE], uint64_t now_us)
 {
     unsigned count = 0;
     motion_request_t request;
@@ -109,11 +117,14 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
     for (; count < REQUESTS_PER_CYCLE && ring_pop(&self->handover.requests, &request, sizeof request) > 0; count++) {
         result[count].id = request.id;
         result[count].is_later = false;
+        result[count].is_old = is_old(self, &request, now_us);
         result[count].is_key_off = switches_is_key_off(&self->switches) && is_for_the_key(self, request.event);
         result[count].is_unapproved = is_unapproved && is_for_the_key(self, request.event);
         result[count].is_power_failing = switches_is_power_failing(&self->switches) && is_for_the_key(self, request.event);
         result[count].is_untested = is_untested && request.event == EVENT_ENGAGE;
-        if (request.event == OPERATOR_SERVICE) {
+        if (result[count].is_old) {
+            result[count].status = HV_ERR_STATE;
+        } else if (request.event == OPERATOR_SERVICE) {
             result[count].answer = serve(self, &request);
             result[count].status = HV_OK;
         } else if (request.event == OPERATOR_OBJECT) {
@@ -241,6 +252,7 @@ static void publish(motion_loop_t *self)
     motion_view_t *view = &self->current.view;
     view->snapshot = *gateway_snapshot(&self->session.gateway);
     view->udp_refused = self->tap.refused;
+    view->udp_stale = self->tap.stale;
     if (is_kernel_asked(self, KERNEL_ASKED_US / 2)) {
         (void)!hal_udp_dropped(self->tap.behind, &view->udp_dropped);
     }
@@ -289,7 +301,7 @@ static void note_hold(motion_loop_t *self)
     self->before_hold = state == STATE_HOLD ? self->before_hold : state;
 }
 
-static void run_cycle(motion_loop_t *self, uint64_t late_us)
+static void run_cycle(motion_loop_t *self, uint64_t now_us, uint64_t late_us)
 {
     motion_result_t result[REQUESTS_PER_CYCLE];
     const uint32_t skipped = (uint32_t)(late_us / self->session.cycle_us);
@@ -300,8 +312,12 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     }
     take_reloads(self);
     take_switches(self);
-    const unsigned requests = take_requests(self, result);
+    const unsigned requests = take_requests(self, result, now_us);
+    if (__atomic_exchange_n(&self->handover.is_end_due, 0, __ATOMIC_ACQ_REL) != 0) {
+        (void)!carry_out(self, &(motion_request_t){.event = EVENT_SHUTDOWN});
+    }
     self->tap.arrival_us = 0;
+    self->tap.late_us = late_us;
     const bool is_zero = session_cycle(&self->session);
     note_latency(self);
     note_hold(self);
@@ -361,7 +377,7 @@ static void run(motion_loop_t *self)
             quit(self, now_us);
             break;
         }
-        run_cycle(self, late_us);
+        run_cycle(self, now_us, late_us);
         histogram_add(&self->handover.times.wake, late_us);
         self->work_us = hal_clock_now_us(self->clock) - now_us;
         histogram_add(&self->handover.times.work, self->work_us);

@@ -295,7 +295,7 @@ const char *upstream_send(upstream_t *self, link_kind_t kind, const char *line, 
 const char *upstream_send_with(upstream_t *self, link_kind_t kind, const char *line, const asker_t *asker, int fd)
 {
     link_t *const link = &self->link[kind];
-    char text[UPSTREAM_REQUEST + UPSTREAM_NAME_MAX + 8];
+    char text[UPSTREAM_HEARD + UPSTREAM_NAME_MAX + 8];
     const bool is_named = asker->by[0] != '\0' && strcmp(asker->by, link->by) != 0;
     if (!open_link(link)) {
         return NO_CONNECTION;
@@ -327,8 +327,6 @@ static void take_line(link_t *link, char *line)
     if (link->kind == LINK_WATCH) {
         (void)snprintf(self->status, UPSTREAM_LINE_MAX, "%s", line);
         const char *const percent = strstr(line, "\"now_percent\":");
-        const char *const told = strstr(line, "\"time_unix_ms\":");
-        self->told_ms = told != NULL ? strtoll(told + strlen("\"time_unix_ms\":"), NULL, 10) : 0;
         self->intensity = percent != NULL ? (unsigned)strtoul(percent + strlen("\"now_percent\":"), NULL, 10) : 0;
         if (!self->is_there) {
             self->is_there = true;

@@ -20,7 +20,8 @@
 #define UPSTREAM_PATH_MAX   256u
 #define UPSTREAM_WHY_MAX    256u
 #define UPSTREAM_WHY_ZH_MAX 1024u
-#define UPSTREAM_REQUEST    64u /* bytes of a request, as heaved takes them */
+#define UPSTREAM_REQUEST    64u                      /* bytes of a request, as heaved takes them */
+#define UPSTREAM_HEARD      (UPSTREAM_REQUEST + 24u) /* with the tick that its page has seen */
 #define UPSTREAM_BUSY       "too many requests wait for heaved: try again"
 
 /** Which connection. */
@@ -90,7 +91,6 @@ typedef struct upstream {
     char put_back[UPSTREAM_WHY_MAX];       /**< why the configuration applied last is not in force; "": it is */
     char put_back_zh[UPSTREAM_WHY_ZH_MAX]; /**< the same in Chinese, as a JSON string with its quotes; "": none */
     unsigned intensity;                    /**< percent in force, for levels */
-    int64_t told_ms;                       /**< time_unix_ms of the newest status */
 } upstream_t;
 
 /** Prepares one; nothing is connected yet. */

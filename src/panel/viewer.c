@@ -14,7 +14,6 @@
 #include "panel/viewer_service.h"
 
 #define STATUS_HZ_MAX 10.0
-#define LATE_MS       2000.0 /* a request behind the status that its page has seen */
 #define NO_PLATFORM   "there is no such platform here"
 #define TICK_ID       (-1) /* of the panel's own questions */
 
@@ -212,26 +211,15 @@ static bool has_room(const upstream_t *upstream, const char *line)
     return viewer_begins(line, "hold") || upstream->link[link_for(line)].waits < UPSTREAM_WAITING / 2;
 }
 
-/* A network that stood still hands over late what somebody wanted earlier, when things were otherwise: that is not done any more.
- * What only stops is never late. Programs that do not say what they have seen have to know for themselves. */
-static bool is_late(const call_t *call, const char *line)
-{
-    const double seen_ms = viewer_number(call->json, "seen", 0);
-    const bool is_stop = viewer_begins(line, "torque") && strstr(line, " off") != NULL;
-    return seen_ms > 0 && (double)call->upstream->told_ms - seen_ms > LATE_MS && !is_stop &&
-           levels_needed(line, call->upstream->intensity) > LEVEL_LOOK;
-}
-
 static void op_request(const call_t *call)
 {
+    char heard[UPSTREAM_HEARD];
     const char *const line = viewer_word(call->json, "line");
     if (!viewer_is_plain(line) || is_kept_back(line)) {
         viewer_refuse(call, "that is no request that goes this way");
-    } else if (is_late(call, line)) {
-        viewer_refuse(call, "this came too late to be done: try again");
     } else if (viewer_is_allowed(call, line)) {
         if (has_room(call->upstream, line)) {
-            (void)viewer_send(call, link_for(line), line, call->id);
+            (void)viewer_send(call, link_for(line), viewer_heard(call, line, heard), call->id);
         } else {
             viewer_refuse(call, UPSTREAM_BUSY);
         }

@@ -10,6 +10,8 @@
 #include "common/sentence.h"
 #include "panel/outbox.h"
 
+#define TICK_MAX 9e15 /* whole numbers of JSON */
+
 /* What may not be lost: a page that does not take it is closed, and comes again. */
 static void tell(hall_t *hall, viewer_t *viewer, const char *text, size_t length)
 {
@@ -106,6 +108,16 @@ bool viewer_send(const call_t *call, link_kind_t kind, const char *line, int64_t
         viewer_refuse(call, why);
     }
     return why == NULL;
+}
+
+const char *viewer_heard(const call_t *call, const char *line, char out[UPSTREAM_HEARD])
+{
+    const double tick = viewer_number(call->json, "tick", -1);
+    if (!(tick >= 0 && tick <= TICK_MAX)) {
+        return line;
+    }
+    (void)snprintf(out, UPSTREAM_HEARD, "heard %.0f %s", tick, line);
+    return out;
 }
 
 /* One request, as heaved takes it: printable, short, one line. */

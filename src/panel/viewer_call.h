@@ -43,6 +43,10 @@ viewer_t *hall_find(const hall_t *hall, uint64_t number);
 /** One of the words that a request begins with. */
 bool viewer_begins(const char *line, const char *word);
 
+/** The request with the tick that its page has seen, if the page says so: a network, a panel or a heaved that stood still hands
+ *  over late what somebody wanted when things were otherwise, and heaved judges that. */
+const char *viewer_heard(const call_t *call, const char *line, char out[UPSTREAM_HEARD]);
+
 /** Hands a request to heaved; the answer goes to who asks. @return false: it could not be sent, which was said */
 bool viewer_send(const call_t *call, link_kind_t kind, const char *line, int64_t id);
 void hall_answer_error(hall_t *hall, viewer_t *viewer, int64_t id, const char *error);

@@ -15,6 +15,7 @@
 void viewer_configure(const call_t *call)
 {
     char line[UPSTREAM_REQUEST];
+    char heard[UPSTREAM_HEARD];
     char error[128];
     asker_t asker = {.viewer = call->viewer->number, .id = call->id};
     (void)snprintf(asker.by, sizeof asker.by, "%s", call->viewer->name);
@@ -31,7 +32,7 @@ void viewer_configure(const call_t *call)
         viewer_refuse(call, error);
         return;
     }
-    const char *const why = upstream_send_with(call->upstream, LINK_LONG, line, &asker, fd);
+    const char *const why = upstream_send_with(call->upstream, LINK_LONG, viewer_heard(call, line, heard), &asker, fd);
     (void)close(fd);
     if (why != NULL) {
         viewer_refuse(call, why);

@@ -7,7 +7,7 @@
 
 #include "record/record.h"
 
-#define REFUSED_PER_CALL 64u /* a flood from a stranger does not hold the cycle up; what is left of it waits */
+#define REFUSED_PER_CALL 64u /* neither a flood from a stranger nor an old queue holds the cycle up; what is left of it waits */
 
 bool udp_recorder_is_allowed(const hal_udp_networks_t *allow, const hal_udp_peer_t *peer)
 {
@@ -23,6 +23,15 @@ static void write_down(const udp_recorder_t *self, hv_status_t status, const hal
                                  *self->now_us - self->waited_us, from, bytes, length);
         }
     }
+}
+
+/* Its wait is measured by the time of day, which somebody may have set meanwhile: after as long a stop nothing is fresh that does
+ * not say how long it has waited. */
+static bool is_stale(const udp_recorder_t *self)
+{
+    uint32_t waited_us = 0;
+    (void)!hal_udp_waited(self->behind, &waited_us);
+    return waited_us > UDP_RECORDER_FRESH_US || (waited_us == 0 && self->late_us > UDP_RECORDER_FRESH_US);
 }
 
 /* When a datagram came, and when the oldest one of the cycle did, for those who measure. */
@@ -47,12 +56,14 @@ static hv_status_t tap_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t 
         if (status != HV_OK && status != HV_ERR_RANGE) {
             return status;
         }
-        if (udp_recorder_is_allowed(self->allow, from)) {
+        const bool is_allowed = udp_recorder_is_allowed(self->allow, from);
+        if (is_allowed && !is_stale(self)) {
             note_arrival(self);
             write_down(self, status, from, buffer, *length);
             return status;
         }
-        self->refused++;
+        self->refused += is_allowed ? 0u : 1u;
+        self->stale += is_allowed ? 1u : 0u;
     }
     return HV_ERR_AGAIN;
 }

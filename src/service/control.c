@@ -126,7 +126,9 @@ static void let_in(control_t *self, unsigned at, uint64_t now_us)
 {
     control_socket_t *listening = &self->socket[at];
     const bool was_shut = listening->is_shut;
+    listening->newcomer_us = listening->looked_us;
     listening->newcomer = accept4(listening->fd, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    listening->looked_us = listening->newcomer < 0 && errno == EAGAIN ? self->polled_us : listening->looked_us;
     listening->is_shut = listening->newcomer < 0 && errno != EAGAIN && errno != EINTR && errno != ECONNABORTED;
     control_client_t *least = listening->is_shut && !was_shut ? find_least(self, at > 0, now_us) : NULL;
     if (least != NULL) {
@@ -134,8 +136,8 @@ static void let_in(control_t *self, unsigned at, uint64_t now_us)
     }
 }
 
-/* A newcomer for whom there is no room yet waits for it. */
-static void take_connection(control_t *self, unsigned at, uint64_t now_us)
+/* A newcomer for whom there is no room yet waits for it. Returns false: nobody was let in. */
+static bool take_connection(control_t *self, unsigned at, uint64_t now_us)
 {
     control_socket_t *listening = &self->socket[at];
     if (listening->newcomer < 0) {
@@ -143,9 +145,10 @@ static void take_connection(control_t *self, unsigned at, uint64_t now_us)
     }
     control_client_t *client = listening->newcomer >= 0 ? make_room(self, at > 0, now_us) : NULL;
     if (client == NULL) {
-        return;
+        return false;
     }
     client->fd = listening->newcomer;
+    client->looked_us = listening->newcomer_us;
     listening->newcomer = -1;
     client->is_looker = at > 0;
     client->is_logged = false;
@@ -162,13 +165,17 @@ static void take_connection(control_t *self, unsigned at, uint64_t now_us)
     client->dump_ticket = 0;
     client->watch_period_us = 0;
     client->came_us = client->asked_us = now_us;
+    return true;
 }
 
-void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS])
+/* Who came while heaved was starting counts as come when it first looks. */
+void control_fill(control_t *self, struct pollfd fds[CONTROL_FDS], uint64_t now_us)
 {
+    self->polled_us = now_us;
     for (unsigned at = 0; at < CONTROL_SOCKETS; at++) { /* poll would not wait while nobody is let in */
-        const control_socket_t *listening = &self->socket[at];
+        control_socket_t *listening = &self->socket[at];
         const bool is_open = listening->newcomer < 0 && !listening->is_shut;
+        listening->looked_us = listening->looked_us == 0 ? now_us : listening->looked_us;
         fds[at] = (struct pollfd){.fd = is_open ? listening->fd : -1, .events = POLLIN};
     }
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
@@ -185,6 +192,8 @@ void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         control_client_t *client = &self->client[i];
         const short revents = fds[i + CONTROL_SOCKETS].revents;
+        const bool is_silent = (fds[i + CONTROL_SOCKETS].events & POLLIN) != 0 && (revents & POLLIN) == 0;
+        client->looked_us = is_silent ? self->polled_us : client->looked_us;
         if (client->fd >= 0 && (revents & POLLOUT) != 0) {
             control_client_send(client);
         }
@@ -198,9 +207,11 @@ void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64
         }
     }
     for (unsigned at = 0; at < CONTROL_SOCKETS; at++) {
-        const control_socket_t *listening = &self->socket[at];
-        if ((fds[at].revents & POLLIN) != 0 || listening->newcomer >= 0 || listening->is_shut) {
-            take_connection(self, at, now_us);
+        control_socket_t *listening = &self->socket[at];
+        const bool has_come = (fds[at].revents & POLLIN) != 0;
+        listening->looked_us = (fds[at].events & POLLIN) != 0 && !has_come ? self->polled_us : listening->looked_us;
+        if (has_come || listening->newcomer >= 0 || listening->is_shut) {
+            for (unsigned i = 0; i < CONTROL_CLIENTS && take_connection(self, at, now_us); i++) {}
         }
     }
 }

@@ -40,6 +40,11 @@ typedef struct {
     operator_entry_t entry;
     char in[CONTROL_REQUEST_MAX];
     size_t in_length;
+    uint64_t looked_us; /**< last time at which nothing had come from it */
+    uint64_t since_us;  /**< no byte of in has come before; */
+    bool is_moving;     /**< the request that is being taken has an age; */
+    bool has_heard;     /**< it tells a tick: */
+    uint64_t heard_us;  /**< the last that its client has heard */
     char out[CONTROL_OUT_BYTES];
     size_t out_length;
     int received;              /**< a descriptor that came with its bytes; -1 = none */
@@ -71,9 +76,11 @@ typedef struct {
 
 /** A listening socket; private to control*.c. */
 typedef struct {
-    int fd;       /**< -1: closed, or not there */
-    int newcomer; /**< has come, and nobody can give way yet; -1: nobody */
-    bool is_shut; /**< the system has no descriptor for a newcomer: not waited for until it is tried again */
+    int fd;               /**< -1: closed, or not there */
+    int newcomer;         /**< has come, and nobody can give way yet; -1: nobody */
+    bool is_shut;         /**< the system has no descriptor for a newcomer: not waited for until it is tried again */
+    uint64_t looked_us;   /**< last time at which nobody had come; 0: not looked yet */
+    uint64_t newcomer_us; /**< that time, when the newcomer came */
     char path[CONFIG_PATH_MAX];
     struct stat made; /**< identity of the socket file, so that only ours is removed */
 } control_socket_t;
@@ -95,6 +102,7 @@ typedef struct control {
     FILE *mistakes_stream;                          /**< into: */
     char mistakes[1024];
     motion_view_words_t view;
+    uint64_t polled_us; /**< before the last poll */
     level_peer_t
         acknowledged_by; /**< who has just acknowledged the configuration; the owner says it and sets it back; pid 0: nobody */
     control_selftest_t selftest; /**< what somebody has just said of a self-test; likewise */
@@ -115,8 +123,9 @@ void control_init(control_t *self);
 /** State that the newest view shows. */
 state_t control_state(const control_t *self);
 
-/** Fills CONTROL_FDS entries for poll. */
-void control_fill(const control_t *self, struct pollfd fds[CONTROL_FDS]);
+/** Fills CONTROL_FDS entries for poll, which follows.
+ *  @param now_us what poll does not find has not come before this time */
+void control_fill(control_t *self, struct pollfd fds[CONTROL_FDS], uint64_t now_us);
 
 /** How long poll may wait, in ms, not more than the given time. */
 int control_timeout_ms(const control_t *self, uint64_t now_us, int at_most_ms);

@@ -10,6 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "common/translate.h"
 #include "service/operator_requests.h"
 #include "service/service_json.h"
 
@@ -172,18 +173,40 @@ void control_client_answer_service(control_client_t *client, const motion_result
     control_client_answer(client, &json);
 }
 
-void control_client_answer_error(control_client_t *client, const char *error, const char *state)
+static void answer_no(control_client_t *client, const char *error, const char *why, const char *state)
 {
     control_client_log(client, error, control_state(client->control));
     json_t json = control_client_start_answer(client);
     json_open(&json, NULL, '{');
     json_bool(&json, "ok", false);
     json_text(&json, "error", error);
+    if (why != NULL) {
+        json_text(&json, "why", why);
+    }
     if (state != NULL) {
         json_text(&json, "state", state);
     }
     json_close(&json, '}');
     control_client_answer(client, &json);
+}
+
+void control_client_answer_error(control_client_t *client, const char *error, const char *state)
+{
+    answer_no(client, error, NULL, state);
+}
+
+void control_client_answer_stale(control_client_t *client)
+{
+    char error[160];
+    (void)snprintf(error, sizeof error, N_("%.20s: asked more than 1 s ago, so it is not done any more: ask again"),
+                   client->entry.request);
+    answer_no(client, error, service_answer_name(SERVICE_STALE), state_name(control_state(client->control)));
+}
+
+bool control_client_has_gone(const control_client_t *client)
+{
+    struct pollfd look = {.fd = client->fd};
+    return poll(&look, 1, 0) > 0 && (look.revents & (POLLHUP | POLLERR)) != 0;
 }
 
 void control_client_answer_status(control_t *self, control_client_t *client)

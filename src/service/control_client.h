@@ -39,6 +39,13 @@ bool control_client_is_waiting(const control_client_t *client);
 void control_client_answer_done(control_client_t *client, const snapshot_t *snapshot);
 void control_client_answer_service(control_client_t *client, const motion_result_t *result);
 void control_client_answer_error(control_client_t *client, const char *error, const char *state);
+
+/** Its request came too late to be done. */
+void control_client_answer_stale(control_client_t *client);
+
+/** True: nobody is there any more who could read an answer. A client that has only closed its sending side is there. */
+bool control_client_has_gone(const control_client_t *client);
+
 void control_client_answer_status(control_t *self, control_client_t *client);
 void control_client_answer_dumped(control_client_t *client, const char *folder);
 

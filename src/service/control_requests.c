@@ -20,6 +20,8 @@
 #include "service/operator_requests.h"
 #include "service/service_json.h"
 
+#define TICK_DIGITS_MAX 18u
+
 #define ANSWER_US 1000000u  /* the motion thread answers within a cycle or two */
 #define OBJECT_US 1000000u  /* beside what a drive may take: it is asked once, and left alone as long after that */
 #define DUMP_US   50000000u /* heavectl waits a little longer */
@@ -53,6 +55,54 @@ static void refuse(const control_t *self, control_client_t *client, const snapsh
     control_client_answer_error(client, error, state_name(snapshot->state));
 }
 
+/* --- How old --- */
+
+/* What can start or enlarge a motion is done now, for somebody who is there, or never. The motion thread looks once more: this
+ * thread may be stopped between now and then. */
+static bool is_fresh(const control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+{
+    const uint64_t tick_us = control_snapshot(self)->service.tick_us;
+    const uint64_t age_us = !client->has_heard            ? now_us - client->since_us
+                            : client->heard_us <= tick_us ? tick_us - client->heard_us
+                                                          : UINT64_MAX;
+    client->is_moving = operator_request_is_moving(line, control_snapshot(self)->intensity_percent) ||
+                        (control_object_is_said(line) && control_object_is_write(line));
+    if (!client->is_moving) {
+        return true;
+    }
+    if (control_client_has_gone(client)) {
+        control_client_drop(client);
+        return false;
+    }
+    if (age_us >= REQUEST_FRESH_US) {
+        control_client_answer_stale(client);
+        return false;
+    }
+    return true;
+}
+
+static const char k_heard[] = "heard ";
+
+/* `heard TICK REQUEST`. Returns the request; NULL: it is wrong, and was answered. */
+static const char *take_heard(control_client_t *client, const char *line)
+{
+    client->has_heard = strncmp(line, k_heard, strlen(k_heard)) == 0;
+    client->heard_us = 0;
+    if (!client->has_heard) {
+        return line;
+    }
+    const char *const tick = &line[strlen(k_heard)];
+    const size_t digits = strspn(tick, "0123456789");
+    if (digits == 0 || digits > TICK_DIGITS_MAX || tick[digits] != ' ') {
+        control_client_answer_error(client, "heard: a tick and a request are needed, as in `heard 81204000 engage`", NULL);
+        return NULL;
+    }
+    for (size_t i = 0; i < digits; i++) {
+        client->heard_us = client->heard_us * 10u + (uint64_t)(tick[i] - '0');
+    }
+    return &tick[digits + 1];
+}
+
 /* Hands a request to the motion thread; the answer follows.
  * @param content what it asks for, without its id */
 static void hand_over(control_t *self, control_client_t *client, const motion_request_t *content, uint64_t now_us)
@@ -61,6 +111,10 @@ static void hand_over(control_t *self, control_client_t *client, const motion_re
     motion_request_t request = *content;
     self->last_id += self->last_id == UINT32_MAX ? 2 : 1; /* 0 means none */
     request.id = self->last_id;
+    request.has_age = client->is_moving;
+    request.has_heard = client->has_heard;
+    request.heard_us = client->heard_us;
+    request.since_us = client->since_us;
     if (!ring_push(&self->handover->requests, &request, sizeof request, NULL, 0)) {
         control_client_answer_error(client, "heaved is busy: try again", NULL);
         return;
@@ -75,8 +129,8 @@ static void hand_over(control_t *self, control_client_t *client, const motion_re
 
 static void begin_request(control_t *self, control_client_t *client, event_t event, uint32_t number, uint64_t now_us)
 {
-    self->is_end_wanted |= event == EVENT_SHUTDOWN;
     hand_over(self, client, &(motion_request_t){.event = (uint32_t)event, .number = number}, now_us);
+    self->is_end_wanted |= event == EVENT_SHUTDOWN && client->request_id != 0;
 }
 
 /* By hand. What is held gets the number of its series here. */
@@ -280,13 +334,18 @@ static bool is_allowed(const control_t *self, control_client_t *client, const ch
     return false;
 }
 
-static void take_request(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+static void take_request(control_t *self, control_client_t *client, const char *said, uint64_t now_us)
 {
+    const char *const line = take_heard(client, said);
+    if (line == NULL) {
+        return;
+    }
     const event_t event = operator_request_find(line);
     if (!is_look(line)) {
         begin_entry(self, client, line);
     }
-    if (!is_allowed(self, client, line) || control_questions_answer(self, client, line)) {
+    if (!is_allowed(self, client, line) || !is_fresh(self, client, line, now_us) ||
+        control_questions_answer(self, client, line)) {
         return;
     }
     if (event != EVENTS) {
@@ -327,7 +386,7 @@ static void take_request(control_t *self, control_client_t *client, const char *
             "unknown request; status, watch [HZ], tick, counts, intensity PERCENT, engage, hold, resume, park, reset, "
             "shutdown, service, service-off, torque, jog, signal, home, relay, beat, release, sdo, dump, incidents, samples, "
             "geometry, incident-folder, operator-log, configuration, configure DIGEST, seen, "
-            "selftest [passed|failed], acknowledge and by NAME are allowed",
+            "selftest [passed|failed], acknowledge, by NAME and heard TICK REQUEST are allowed",
             NULL);
     }
 }
@@ -376,12 +435,17 @@ bool control_requests_is_reading(const control_client_t *client)
 
 void control_requests_receive(control_t *self, control_client_t *client, uint64_t now_us)
 {
+    const size_t room = sizeof client->in - client->in_length;
     const ssize_t received = control_client_receive(client);
     if (received <= 0) {
-        end_input(client, received < 0 && (errno == EAGAIN || errno == EINTR));
+        const bool is_false_alarm = received < 0 && (errno == EAGAIN || errno == EINTR);
+        client->looked_us = is_false_alarm ? self->polled_us : client->looked_us;
+        end_input(client, is_false_alarm);
         return;
     }
+    client->since_us = client->in_length == 0 ? client->looked_us : client->since_us;
     client->in_length += (size_t)received;
+    client->looked_us = (size_t)received < room ? self->polled_us : client->looked_us; /* else there may be more */
     take_lines(self, client, now_us);
     if (client->fd >= 0 && client->in_length == sizeof client->in && memchr(client->in, '\n', sizeof client->in) == NULL) {
         client->is_closing = true;
@@ -395,7 +459,10 @@ void control_requests_receive(control_t *self, control_client_t *client, uint64_
 static void take_result(const control_t *self, control_client_t *client, const motion_result_t *result)
 {
     char error[256];
-    if (result->is_key_off) {
+    if (result->is_old) {
+        client->request_id = 0;
+        control_client_answer_stale(client);
+    } else if (result->is_key_off) {
         client->request_id = 0;
         control_client_answer_error(client, "the enable key is off: turn it on first", state_name(result->snapshot.state));
     } else if (result->is_power_failing) {

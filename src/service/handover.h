@@ -18,6 +18,7 @@
 typedef struct {
     snapshot_t snapshot;
     uint32_t udp_refused; /**< datagrams of senders that are not allowed */
+    uint32_t udp_stale;   /**< datagrams that waited too long while heaved stood still */
     uint32_t udp_dropped; /**< datagrams the kernel lost because its queue was full, or dropped in a flood */
     bool is_realtime;     /**< scheduled before everything else */
     bool is_memory_locked;
@@ -45,11 +46,18 @@ typedef union {
 /** What has become of locking memory. */
 typedef enum { MOTION_MEMORY_UNKNOWN, MOTION_MEMORY_LOCKED, MOTION_MEMORY_UNLOCKED } motion_memory_t;
 
+/** What can start or enlarge a motion is carried out within this time, or never. */
+#define REQUEST_FRESH_US 1000000u
+
 /** An operator's request on its way to the motion thread. */
 typedef struct {
     uint32_t id;               /**< the asking side's */
     uint32_t event;            /**< event_t; OPERATOR_INTENSITY, OPERATOR_SERVICE, OPERATOR_OBJECT */
     uint32_t number;           /**< of OPERATOR_INTENSITY: percent */
+    bool has_age;              /**< refused once it is older than REQUEST_FRESH_US, since heard_us or else since_us */
+    bool has_heard;            /**< its client has said which tick it heard last: */
+    uint64_t heard_us;         /**< that tick */
+    uint64_t since_us;         /**< it has not come before this time of the clock */
     service_request_t service; /**< of OPERATOR_SERVICE; its age comes from: */
     uint64_t tick_us;
     drive_object_t object; /**< of OPERATOR_OBJECT; number is the drive, from 1 */
@@ -65,6 +73,7 @@ typedef struct {
     bool is_unapproved;      /**< likewise */
     bool is_power_failing;   /**< likewise */
     bool is_untested;        /**< likewise: a self-test is due */
+    bool is_old;             /**< likewise: see motion_request_t */
     bool is_later;           /**< private to the motion thread: the answer comes in a later cycle */
     service_answer_t answer; /**< of OPERATOR_SERVICE, and whether OPERATOR_OBJECT was begun */
     drive_object_t object;   /**< of OPERATOR_OBJECT, once it was begun: what was read, */
@@ -75,7 +84,7 @@ typedef struct {
 /** Whether it was refused for a reason that has a flag of its own. */
 static inline bool handover_is_barred(const motion_result_t *result)
 {
-    return result->is_key_off || result->is_unapproved || result->is_power_failing || result->is_untested;
+    return result->is_old || result->is_key_off || result->is_unapproved || result->is_power_failing || result->is_untested;
 }
 
 /** What a reload hands over. */
@@ -101,6 +110,7 @@ typedef struct {
     ring_t record;          /**< record_t from it, to the thread that writes files */
     ring_t trace;           /**< trace_row_t likewise */
     uint32_t is_quit;       /**< atomic: the service thread wants an end at once */
+    uint32_t is_end_due;    /**< atomic: a signal wants the platform settled, and an end; no request before it delays that */
     uint32_t is_unapproved; /**< atomic: nothing is brought up until it is over, as without the enable key */
     uint32_t is_untested;   /**< atomic: nobody engages until a self-test has passed */
     uint32_t is_ended;      /**< atomic: the motion thread has done its last cycle */

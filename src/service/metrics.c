@@ -93,6 +93,8 @@ static void put_frames(sheet_t *self, const motion_view_t *view)
     whole(self, "udp_datagrams_total", "counter", "datagrams read", c->datagrams);
     whole(self, "udp_dropped_total", "counter", "datagrams the kernel lost: its queue was full, or there was a flood",
           view->udp_dropped);
+    whole(self, "udp_stale_total", "counter",
+          "datagrams that had waited for more than 1 s while heaved stood still: not followed", view->udp_stale);
     whole(self, "udp_refused_total", "counter", "datagrams of senders that are not allowed", view->udp_refused);
     whole(self, "udp_other_sender_total", "counter", "valid frames of senders that do not drive", c->other_sender);
     whole(self, "owner_changes_total", "counter", "take-overs by another sender", c->owner_changes);

@@ -36,6 +36,24 @@ event_t operator_request_find(const char *name)
     return EVENTS;
 }
 
+bool operator_request_is_moving(const char *line, unsigned percent)
+{
+    static const char k_intensity[] = "intensity ";
+    static const char k_torque[] = "torque ";
+    uint32_t wanted = 0;
+    const event_t event = operator_request_find(line);
+    if (event != EVENTS) {
+        return event != EVENT_HOLD && event != EVENT_SERVICE_OFF;
+    }
+    if (strncmp(line, k_intensity, strlen(k_intensity)) == 0) {
+        return !operator_read_percent(&line[strlen(k_intensity)], &wanted) || wanted > percent;
+    }
+    if (strncmp(line, k_torque, strlen(k_torque)) == 0) {
+        return strstr(line, " on") != NULL;
+    }
+    return strcmp(line, "acknowledge") == 0 || strcmp(line, "selftest passed") == 0 || strncmp(line, "configure ", 10) == 0;
+}
+
 bool operator_read_percent(const char *text, uint32_t *percent)
 {
     *percent = 0;

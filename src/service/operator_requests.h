@@ -29,6 +29,11 @@ size_t operator_explain_percent(uint32_t percent, unsigned max_percent, char *te
 /** @return EVENTS where the name is no request */
 event_t operator_request_find(const char *name);
 
+/** True where a request can start or enlarge a motion, or makes that possible. What only makes things safer has no age: hold,
+ * release, torque off, service-off, and less intensity. What is held has its own proof of a hand.
+ *  @param percent intensity in force */
+bool operator_request_is_moving(const char *line, unsigned percent);
+
 /** Why a request was refused, and what would be possible.
  *  @param is_shutting_down a shutdown was asked for
  *  @return length without NUL; cut to fit */

@@ -341,6 +341,7 @@ static void write_counters(json_t *json, const motion_view_t *view)
     json_number(json, "oversize", c->oversize);
     json_number(json, "receive_errors", c->receive_errors);
     json_number(json, "refused_senders", view->udp_refused);
+    json_number(json, "stale", view->udp_stale);
     json_number(json, "lost_in_kernel", view->udp_dropped);
     write_frame_counters(json, c);
     json_number(json, "other_sender", c->other_sender);
@@ -381,6 +382,7 @@ static void write_program(json_t *json, const motion_view_t *view, const config_
 {
     json_number(json, "cycle", view->snapshot.cycle);
     json_number(json, "cycle_us", config->settings.cycle_us);
+    json_number(json, "tick", view->snapshot.service.tick_us);
     json_ms(json, "uptime_ms", (view->snapshot.cycle + view->snapshot.counters.late_cycles) * config->settings.cycle_us);
     json_number(json, "time_unix_ms", lost->unix_ms);
     json_number(json, "late_cycles", view->snapshot.counters.late_cycles);

@@ -509,6 +509,34 @@ def nobody_keeps_test_signals_away(bench):
         assert is_free(link), "of a page that has gone"
 
 
+def nothing_old_goes_through(bench):
+    """What a page asked while the panel or heaved stood still is not done later, and what only makes it safer is."""
+    daemon = bench.both()
+    with bench.link() as link:
+        take(link)
+
+        def in_a_stop(process, line, seconds, **more):
+            with standing_still(process):
+                link.send({"op": "request", "platform": "ride", "line": line, "id": 77, **more})
+                time.sleep(seconds)
+            return link.receive(lambda message: message.get("id") == 77)["answer"]
+
+        harness.wait_for(lambda: bench.raw("tick")["tick"] > 2000000, "heaved has run for 2 s")
+        for seconds in (1.1, 20):
+            for line in ("engage", "service"):
+                answer = in_a_stop(bench.panel, line, seconds, tick=bench.raw("tick")["tick"])
+                assert answer.get("why") == "stale", ("panel", line, seconds, answer)
+                for more in ({}, {"tick": bench.raw("tick")["tick"]}):
+                    answer = in_a_stop(daemon, line, seconds, **more)
+                    assert answer.get("why") == "stale", ("heaved", line, seconds, more, answer)
+            assert in_a_stop(bench.panel, "hold", seconds, tick=0)["ok"] is not None
+        assert state_of(bench) == "OFF"
+        assert in_a_stop(bench.panel, "engage", 0.5, tick=bench.raw("tick")["tick"])["ok"] is True
+        until(bench, "RISING", "NEUTRAL", "ENGAGED")
+        assert in_a_stop(daemon, "hold", 20, tick=0)["ok"] is True
+        until(bench, "HOLD")
+
+
 def passwords_and_roles(bench):
     bench.both()
     assert json.loads(bench.get("/api/me")[2])["role"] is None
@@ -948,6 +976,7 @@ CASES = [
     ("strangers, foreign pages and broken messages", strangers, {}),
     ("passwords, roles and sessions", passwords_and_roles, {"passwords": ("look", "operate", "service")}),
     ("nobody keeps hold away", nobody_keeps_hold_away, {"passwords": ("look",)}),
+    ("nothing old goes through", nothing_old_goes_through, {}),
     ("nobody keeps test signals away", nobody_keeps_test_signals_away, {}),
     ("a session over a WebSocket", sessions_over_a_web_socket, {"passwords": ("look", "service")}),
     ("ten thousand logins", ten_thousand_logins, {"passwords": ("operate", "service")}),

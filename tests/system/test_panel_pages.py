@@ -44,8 +44,8 @@ def refuses_in_chinese(bench):
             said = bench.ctl(*line.split(), env={**os.environ, **chinese}).stderr.strip()
             assert got["answer"]["ok"] is False and re.search("[\u4e00-\u9fff]", got["error_zh"]), got
             assert line == "nonsense" or said.endswith(got["error_zh"]), (line, said, got)
-        got = link.ask({"op": "request", "platform": "ride", "line": "engage", "seen": bench.raw("status")["time_unix_ms"] - 3000})
-        assert got["error"] == "this came too late to be done: try again" and re.search("[\u4e00-\u9fff]", got["error_zh"]), got
+        got = link.ask({"op": "request", "platform": "ride", "line": "engage", "tick": 0})
+        assert got["answer"]["why"] == "stale" and re.search("[\u4e00-\u9fff]", got["error_zh"]), got
         assert "error_zh" not in request(link, "status")
     if web_socket.browser() is None:
         return
@@ -455,13 +455,15 @@ def what_comes_late_is_not_done(bench):
         take(link)
 
         def ask(line, age_ms):
-            return link.ask({"op": "request", "platform": "ride", "line": line, "seen": bench.raw("status")["time_unix_ms"] - age_ms})
+            return link.ask({"op": "request", "platform": "ride", "line": line, "tick": max(0, bench.raw("status")["tick"] - age_ms * 1000)})
 
-        for line in ("engage", "resume", "park", "reset", "service", "torque all on", "intensity 100"):
-            assert ask(line, 3000)["error"] == "this came too late to be done: try again", line
+        harness.wait_for(lambda: bench.raw("status")["tick"] > 2000000, "heaved has run for 2 s")
+        for line in ("engage", "resume", "park", "reset", "service", "torque all on", "acknowledge", "selftest passed", "sdo 1 6065 5"):
+            answer = ask(line, 1001)["answer"]
+            assert answer["why"] == "stale" and "asked more than 1 s ago" in answer["error"], (line, answer)
         for line in ("hold", "torque all off", "geometry", "status"):
             assert "answer" in ask(line, 1e9), line
-        assert state_of(bench) == "OFF" and ask("engage", 1000)["answer"]["ok"] is True
+        assert state_of(bench) == "OFF" and ask("engage", 500)["answer"]["ok"] is True
         until(bench, "NEUTRAL", "ENGAGED", "HOLD")
         assert ask("hold", 1e9)["answer"]["ok"] is True
         until(bench, "HOLD")

@@ -40,7 +40,7 @@ static void pass(uint64_t us)
 {
     struct pollfd fds[CONTROL_FDS];
     m_now_us += us;
-    control_fill(&m_control, fds);
+    control_fill(&m_control, fds, m_now_us);
     (void)poll(fds, CONTROL_FDS, 0);
     control_serve(&m_control, fds, m_now_us);
 }
@@ -220,7 +220,7 @@ static void test_who_has_asked_since_the_poll_stays(void)
     come_all("");
     pass(CONTROL_IDLE_US);
     come(NEWCOMER);
-    control_fill(&m_control, fds);
+    control_fill(&m_control, fds, m_now_us);
     (void)poll(fds, CONTROL_FDS, 0);
     ask(0, "hold\n");
     control_serve(&m_control, fds, m_now_us);
@@ -236,7 +236,7 @@ static void test_nobody_gives_way_where_somebody_has_gone_since_the_poll(void)
     come_all("");
     pass(CONTROL_IDLE_US);
     come(NEWCOMER);
-    control_fill(&m_control, fds);
+    control_fill(&m_control, fds, m_now_us);
     (void)poll(fds, CONTROL_FDS, 0);
     (void)close(m_client[6]);
     m_client[6] = -1;
@@ -256,7 +256,7 @@ static void test_who_waits_for_the_motion_thread_gets_its_answer_and_a_newcomer_
     pass(LATE);
     pass(0);
     TEST_ASSERT_EQUAL(NEWCOMER, who_gave_way());
-    control_fill(&m_control, fds);
+    control_fill(&m_control, fds, m_now_us);
     TEST_ASSERT_EQUAL_MESSAGE(0, poll(fds, CONTROL_FDS, 0), "the loop would spin");
     motion_answers();
     pass(0);
@@ -265,7 +265,7 @@ static void test_who_waits_for_the_motion_thread_gets_its_answer_and_a_newcomer_
     TEST_ASSERT_EQUAL_STRING_LEN("{\"ok\":true", m_said, 10);
     TEST_ASSERT_NOT_NULL(strstr(m_said, IS_GONE));
     TEST_ASSERT_TRUE(has_heard(NEWCOMER, "\"counters\""));
-    control_fill(&m_control, fds);
+    control_fill(&m_control, fds, m_now_us);
     TEST_ASSERT_EQUAL(m_control.socket[0].fd, fds[0].fd);
 }
 
@@ -289,6 +289,198 @@ static void test_who_waits_for_the_disk_gives_way_last(void)
     TEST_ASSERT_TRUE(is_dropped(0));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_said, "dump: the disk has not taken it yet; heaved goes on trying"), m_said);
     TEST_ASSERT_FALSE(is_dropped(1));
+}
+
+/* --- What is old --- */
+
+static bool has_reached_the_motion_thread(void)
+{
+    return !ring_is_empty(&m_handover.requests);
+}
+
+static void show_tick(uint64_t tick_us)
+{
+    static motion_view_words_t view;
+    view.view.snapshot.service.tick_us = tick_us;
+    seqlock_write(&m_handover.view, view.word);
+}
+
+/* Asks, while heaved stands still for so long. */
+static void ask_in_a_stop(unsigned i, const char *request, uint64_t us)
+{
+    pass(0);
+    ask(i, request);
+    pass(us);
+}
+
+static void test_what_waited_while_heaved_stood_still_is_not_done(void)
+{
+    come(0);
+    pass(0);
+    ask_in_a_stop(0, "engage\n", REQUEST_FRESH_US);
+    /* control_fill() of the look that finds it comes after the stop: only the look before it says since when it may have waited
+     */
+    TEST_ASSERT_FALSE(has_reached_the_motion_thread());
+    TEST_ASSERT_TRUE_MESSAGE(
+        has_heard(0, "engage: asked more than 1 s ago, so it is not done any more: ask again\",\"why\":\"stale\""), m_said);
+    ask_in_a_stop(0, "engage\n", REQUEST_FRESH_US - 1);
+    TEST_ASSERT_TRUE(has_reached_the_motion_thread());
+}
+
+static void test_what_came_with_its_connection_is_as_old_as_that(void)
+{
+    pass(0);
+    come(0);
+    ask(0, "engage\n");
+    pass(REQUEST_FRESH_US);
+    pass(0);
+    TEST_ASSERT_FALSE(has_reached_the_motion_thread());
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(0, "\"stale\""), m_said);
+}
+
+static void test_who_came_before_the_first_look_came_then(void)
+{
+    come(0);
+    ask(0, "engage\n");
+    pass(20 * REQUEST_FRESH_US);
+    pass(0);
+    TEST_ASSERT_TRUE(has_reached_the_motion_thread());
+}
+
+static void test_one_that_came_among_many_is_as_old_as_it_is(void)
+{
+    pass(0);
+    for (unsigned i = 0; i < 4; i++) {
+        come(i);
+    }
+    pass(REQUEST_FRESH_US); /* all of them are let in at one look */
+    come(4);
+    ask(4, "engage\n");
+    pass(1000);
+    pass(0);
+    TEST_ASSERT_TRUE(has_reached_the_motion_thread());
+}
+
+static void test_what_only_makes_it_safer_has_no_age(void)
+{
+    static const char *const k_safe[] = {"hold\n", "service-off\n", "torque all off\n", "release 7\n", "intensity 0\n"};
+    come(0);
+    pass(0);
+    for (unsigned i = 0; i < sizeof k_safe / sizeof k_safe[0]; i++) {
+        ask_in_a_stop(0, k_safe[i], 30 * REQUEST_FRESH_US);
+        TEST_ASSERT_TRUE_MESSAGE(has_reached_the_motion_thread(), k_safe[i]);
+        motion_answers();
+        pass(0);
+    }
+}
+
+static void test_a_request_that_waits_behind_another_grows_old(void)
+{
+    come(0);
+    pass(0);
+    ask(0, "hold\nengage\n");
+    pass(0);
+    pass(REQUEST_FRESH_US - 1);
+    motion_answers();
+    pass(2);
+    TEST_ASSERT_FALSE(has_reached_the_motion_thread());
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(0, "\"stale\""), m_said);
+}
+
+static void test_who_has_gone_does_not_engage(void)
+{
+    come(0);
+    pass(0);
+    ask(0, "engage\n");
+    (void)close(m_client[0]);
+    m_client[0] = -1;
+    pass(0);
+    TEST_ASSERT_FALSE(has_reached_the_motion_thread());
+    TEST_ASSERT_EQUAL(-1, m_control.client[0].fd);
+}
+
+static void test_who_has_gone_still_holds(void)
+{
+    come(0);
+    pass(0);
+    ask(0, "hold\n");
+    (void)close(m_client[0]);
+    m_client[0] = -1;
+    pass(0);
+    TEST_ASSERT_TRUE(has_reached_the_motion_thread());
+}
+
+static void test_who_has_closed_its_sending_side_is_there(void)
+{
+    come(0);
+    pass(0);
+    ask(0, "engage\n");
+    (void)shutdown(m_client[0], SHUT_WR);
+    pass(0);
+    TEST_ASSERT_TRUE(has_reached_the_motion_thread());
+    motion_answers();
+    pass(0);
+    TEST_ASSERT_TRUE(has_heard(0, "{\"ok\":true"));
+}
+
+static void test_a_tick_says_when_its_client_heard_heaved(void)
+{
+    motion_request_t request;
+    show_tick(5000000);
+    come(0);
+    pass(0);
+    ask(0, "heard 4000000 engage\n");
+    pass(0);
+    TEST_ASSERT_FALSE(has_reached_the_motion_thread());
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(0, "engage: asked more than 1 s ago"), m_said);
+    ask(0, "heard 5000001 engage\n"); /* never told */
+    pass(0);
+    TEST_ASSERT_FALSE(has_reached_the_motion_thread());
+    ask(0, "heard 4000001 engage\n");
+    pass(0);
+    TEST_ASSERT_TRUE(ring_pop(&m_handover.requests, &request, sizeof request) > 0);
+    TEST_ASSERT_TRUE(request.event == EVENT_ENGAGE && request.has_age && request.has_heard);
+    TEST_ASSERT_EQUAL_UINT64(4000001, request.heard_us);
+}
+
+static void test_what_only_makes_it_safer_may_carry_any_tick(void)
+{
+    show_tick(5000000);
+    come(0);
+    pass(0);
+    ask(0, "heard 0 hold\n");
+    pass(0);
+    TEST_ASSERT_TRUE(has_reached_the_motion_thread());
+}
+
+static void test_a_wrong_tick_is_told(void)
+{
+    static const char *const k_wrong[] = {"heard engage\n", "heard 5\n", "heard -5 engage\n", "heard 5  \n",
+                                          "heard 1234567890123456789 engage\n"};
+    come(0);
+    for (unsigned i = 0; i < sizeof k_wrong / sizeof k_wrong[0]; i++) {
+        ask(0, k_wrong[i]);
+        pass(0);
+        pass(0);
+        TEST_ASSERT_TRUE_MESSAGE(has_heard(0, "{\"ok\":false"), k_wrong[i]);
+        TEST_ASSERT_FALSE_MESSAGE(has_reached_the_motion_thread(), k_wrong[i]);
+    }
+}
+
+static void test_the_motion_thread_may_say_that_it_is_old(void)
+{
+    static motion_result_t result;
+    motion_request_t request;
+    come(0);
+    pass(0);
+    ask(0, "park\n");
+    pass(0);
+    TEST_ASSERT_TRUE(ring_pop(&m_handover.requests, &request, sizeof request) > 0);
+    TEST_ASSERT_TRUE(request.has_age && !request.has_heard && request.since_us <= m_now_us);
+    result = (motion_result_t){.id = request.id, .status = HV_ERR_STATE, .is_old = true};
+    TEST_ASSERT_TRUE(ring_push(&m_handover.results, &result, sizeof result, NULL, 0));
+    pass(0);
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(0, "park: asked more than 1 s ago"), m_said);
 }
 
 /* --- Who may ask for what --- */
@@ -488,6 +680,19 @@ static void test_log_has_requests_whose_client_has_gone(void)
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_what_waited_while_heaved_stood_still_is_not_done);
+    RUN_TEST(test_what_came_with_its_connection_is_as_old_as_that);
+    RUN_TEST(test_who_came_before_the_first_look_came_then);
+    RUN_TEST(test_one_that_came_among_many_is_as_old_as_it_is);
+    RUN_TEST(test_what_only_makes_it_safer_has_no_age);
+    RUN_TEST(test_a_request_that_waits_behind_another_grows_old);
+    RUN_TEST(test_who_has_gone_does_not_engage);
+    RUN_TEST(test_who_has_gone_still_holds);
+    RUN_TEST(test_who_has_closed_its_sending_side_is_there);
+    RUN_TEST(test_a_tick_says_when_its_client_heard_heaved);
+    RUN_TEST(test_what_only_makes_it_safer_may_carry_any_tick);
+    RUN_TEST(test_a_wrong_tick_is_told);
+    RUN_TEST(test_the_motion_thread_may_say_that_it_is_old);
     RUN_TEST(test_a_client_that_asks_nothing_gives_way_before_watchers);
     RUN_TEST(test_of_idle_clients_the_one_that_asked_first_gives_way);
     RUN_TEST(test_the_oldest_watcher_gives_way_before_who_has_just_asked);

@@ -40,6 +40,32 @@ static void test_operator_request_find_knows_every_request_and_no_other_event(vo
     }
 }
 
+static void test_operator_request_is_moving_what_can_start_or_enlarge_a_motion(void)
+{
+    static const char *const k_moving[] = {"engage",
+                                           "resume",
+                                           "park",
+                                           "reset",
+                                           "shutdown",
+                                           "service",
+                                           "intensity 41",
+                                           "intensity x",
+                                           "torque 1 on",
+                                           "torque all on",
+                                           "acknowledge",
+                                           "selftest passed",
+                                           "configure 0123456789abcdef"};
+    static const char *const k_others[] = {
+        "hold",  "release 5", "service-off", "intensity 40",    "intensity 0", "torque 1 off", "torque all off", "status",
+        "watch", "dump",      "seen",        "selftest failed", "selftest",    "by on",        "beat 1 1 1",     ""};
+    for (size_t i = 0; i < sizeof k_moving / sizeof k_moving[0]; i++) {
+        TEST_ASSERT_TRUE_MESSAGE(operator_request_is_moving(k_moving[i], 40), k_moving[i]);
+    }
+    for (size_t i = 0; i < sizeof k_others / sizeof k_others[0]; i++) {
+        TEST_ASSERT_FALSE_MESSAGE(operator_request_is_moving(k_others[i], 40), k_others[i]);
+    }
+}
+
 static void test_operator_explain_says_why_and_what_else(void)
 {
     (void)operator_explain(EVENT_RESUME, &m_snapshot, false, m_text, sizeof m_text);
@@ -158,6 +184,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_operator_request_find_knows_every_request_and_no_other_event);
+    RUN_TEST(test_operator_request_is_moving_what_can_start_or_enlarge_a_motion);
     RUN_TEST(test_operator_explain_says_why_and_what_else);
     RUN_TEST(test_operator_read_percent_takes_whole_numbers_only);
     RUN_TEST(test_operator_explain_percent_says_the_cap);

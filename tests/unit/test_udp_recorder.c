@@ -100,9 +100,43 @@ static void test_tap_read_late_is_not_before_the_one_before(void)
     TEST_ASSERT_EQUAL_UINT64(5200, take(800));
 }
 
+/* What the tap makes of one that has waited so long, in a cycle that is so late. */
+static hv_status_t what_becomes(uint32_t waited_us, uint64_t late_us)
+{
+    uint8_t buffer[16];
+    size_t length = 0;
+    hal_udp_peer_t from;
+    m_waited_us = waited_us;
+    m_tap.late_us = late_us;
+    return hal_udp_recv(udp_recorder_hal(&m_tap), buffer, sizeof buffer, &length, &from);
+}
+
+static void test_tap_lets_nothing_old_through(void)
+{
+    TEST_ASSERT_EQUAL(HV_OK, what_becomes(UDP_RECORDER_FRESH_US, 30000000));
+    TEST_ASSERT_EQUAL(HV_OK, what_becomes(0, UDP_RECORDER_FRESH_US));
+    TEST_ASSERT_EQUAL_UINT32(0, m_tap.stale);
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, what_becomes(UDP_RECORDER_FRESH_US + 1, 0)); /* the backend never runs dry: a cycle's share */
+    const uint32_t share = m_tap.stale;
+    TEST_ASSERT_GREATER_THAN(0, share);
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, what_becomes(0, UDP_RECORDER_FRESH_US + 1)); /* nobody knows: the time of day was set */
+    TEST_ASSERT_EQUAL_UINT32(2 * share, m_tap.stale);
+    TEST_ASSERT_EQUAL_UINT32(0, m_tap.refused);
+}
+
+static void test_tap_writes_nothing_old_down(void)
+{
+    record_t record;
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, what_becomes(5000000, 0));
+    TEST_ASSERT_EQUAL(0, ring_pop(&m_ring, &record, sizeof record));
+    TEST_ASSERT_EQUAL_UINT64(0, m_tap.arrival_us);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_tap_lets_nothing_old_through);
+    RUN_TEST(test_tap_writes_nothing_old_down);
     RUN_TEST(test_tap_tells_when_a_datagram_came);
     RUN_TEST(test_tap_what_waited_for_longer_than_a_cycle_came_in_this_one);
     RUN_TEST(test_tap_read_late_is_not_before_the_one_before);
