@@ -87,8 +87,18 @@ static service_answer_t serve(motion_loop_t *self, const motion_request_t *reque
     return answer;
 }
 
+static hv_status_t hold(motion_loop_t *self)
+{
+    motion_note(self, RECORD_REQUEST, EVENT_HOLD);
+    self->held_tick_us = gateway_tick_age(&self->session.gateway, 0);
+    return gateway_request(&self->session.gateway, EVENT_HOLD, self->session.now_us);
+}
+
 static hv_status_t carry_out(motion_loop_t *self, const motion_request_t *request)
 {
+    if (request->event == EVENT_HOLD) {
+        return hold(self);
+    }
     if (request->event == OPERATOR_INTENSITY) {
         motion_note(self, RECORD_INTENSITY, request->number);
         return gateway_set_intensity(&self->session.gateway, request->number);
@@ -106,6 +116,14 @@ static bool is_old(const motion_loop_t *self, const motion_request_t *request, u
     return request->has_age && age_us >= REQUEST_FRESH_US;
 }
 
+/* Who asked for it did not know of the last hold. Where the client does not say what it has heard, the service thread has judged,
+ * but for a hold that it did not know of itself. */
+static bool is_void(const motion_loop_t *self, const motion_request_t *request)
+{
+    return request->is_voidable &&
+           (request->own_holds != self->current.view.own_holds || (request->has_heard && request->heard_us < self->held_tick_us));
+}
+
 /* Requests that wait, in order, before the cycle. Returns how many; their results are complete after the cycle. */
 static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE], uint64_t now_us)
 {
@@ -118,11 +136,12 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
         result[count].id = request.id;
         result[count].is_later = false;
         result[count].is_old = is_old(self, &request, now_us);
+        result[count].is_void = is_void(self, &request);
         result[count].is_key_off = switches_is_key_off(&self->switches) && is_for_the_key(self, request.event);
         result[count].is_unapproved = is_unapproved && is_for_the_key(self, request.event);
         result[count].is_power_failing = switches_is_power_failing(&self->switches) && is_for_the_key(self, request.event);
         result[count].is_untested = is_untested && request.event == EVENT_ENGAGE;
-        if (result[count].is_old) {
+        if (result[count].is_old || result[count].is_void) {
             result[count].status = HV_ERR_STATE;
         } else if (request.event == OPERATOR_SERVICE) {
             result[count].answer = serve(self, &request);
@@ -277,8 +296,8 @@ static void hold_if_too_late(motion_loop_t *self, uint32_t cycles)
     text_put_u32(&text, cycles);
     text_put(&text, " cycles late: holding ([platform] late_hold_cycles)");
     hal_log_write(self->io.log, HAL_LOG_ERROR, line);
-    motion_note(self, RECORD_REQUEST, EVENT_HOLD);
-    (void)!gateway_request(&self->session.gateway, EVENT_HOLD, self->session.now_us);
+    self->current.view.own_holds++;
+    (void)!hold(self);
 }
 
 /* How long a frame took to the drives. Measured beside the motion: nothing depends on it. */

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * upstream.h - one platform as the panel knows it: its connections to heaved, its newest status, its samples. Every request of
- * every viewer goes over three of them: one for what has to be quick (hold, hands and ticks), one for most others, one for what
- * heaved may take many seconds for. A connection that is lost, or that gave way to another client of heaved, is made anew.
+ * every viewer goes over four of them: one for what has to be quick (hold, hands and ticks), one for most others, one for a
+ * reset, which may take seconds, one for what may take many. A connection that is lost, or that gave way to another client of
+ * heaved, is made anew.
  */
 #ifndef HEAVE_PANEL_UPSTREAM_H
 #define HEAVE_PANEL_UPSTREAM_H
@@ -29,7 +30,8 @@ typedef enum {
     LINK_WATCH,
     LINK_QUICK,
     LINK_SLOW,
-    LINK_LONG, /**< made when it is needed: heaved answers the requests of a connection one after the other */
+    LINK_RESET, /**< made when they are needed: heaved answers the requests of a connection one after the other, and these */
+    LINK_LONG,  /**< take long */
     LINKS
 } link_kind_t;
 

@@ -202,7 +202,7 @@ static link_kind_t link_for(const char *line)
     const bool is_quick = viewer_begins(line, "hold") || viewer_begins(line, "tick") || viewer_begins(line, "counts") ||
                           viewer_begins(line, "geometry") || viewer_begins(line, "times");
     const bool is_long = viewer_begins(line, "dump") || viewer_begins(line, "sdo"); /* a disk, a bus */
-    return is_quick ? LINK_QUICK : is_long ? LINK_LONG : LINK_SLOW;
+    return is_quick ? LINK_QUICK : is_long ? LINK_LONG : viewer_begins(line, "reset") ? LINK_RESET : LINK_SLOW;
 }
 
 /* Half of the places are for hold and for hands: nobody who asks much takes those. */

@@ -149,6 +149,10 @@ static bool take_connection(control_t *self, unsigned at, uint64_t now_us)
     }
     client->fd = listening->newcomer;
     client->looked_us = listening->newcomer_us;
+    client->void_bytes = 0;
+    if (listening->newcomer_us < self->held_us) {
+        control_client_void(client);
+    }
     listening->newcomer = -1;
     client->is_looker = at > 0;
     client->is_logged = false;
@@ -188,6 +192,10 @@ void control_fill(control_t *self, struct pollfd fds[CONTROL_FDS], uint64_t now_
 void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64_t now_us)
 {
     (void)seqlock_read(&self->handover->view, self->view.word); /* the last view stays where there is no new one */
+    if (self->view.view.own_holds != self->own_holds) {
+        self->own_holds = self->view.view.own_holds;
+        control_requests_void(self, NULL, now_us);
+    }
     control_requests_take_results(self);
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         control_client_t *client = &self->client[i];

@@ -40,9 +40,11 @@ typedef struct {
     operator_entry_t entry;
     char in[CONTROL_REQUEST_MAX];
     size_t in_length;
+    size_t void_bytes;  /**< so many of the next ones came before a hold */
     uint64_t looked_us; /**< last time at which nothing had come from it */
     uint64_t since_us;  /**< no byte of in has come before; */
     bool is_moving;     /**< the request that is being taken has an age; */
+    bool is_voidable;   /**< a hold voids it; */
     bool has_heard;     /**< it tells a tick: */
     uint64_t heard_us;  /**< the last that its client has heard */
     char out[CONTROL_OUT_BYTES];
@@ -103,6 +105,8 @@ typedef struct control {
     char mistakes[1024];
     motion_view_words_t view;
     uint64_t polled_us; /**< before the last poll */
+    uint64_t held_us;   /**< when the last hold came */
+    uint32_t own_holds; /**< of the motion thread, as far as they are known */
     level_peer_t
         acknowledged_by; /**< who has just acknowledged the configuration; the owner says it and sets it back; pid 0: nobody */
     control_selftest_t selftest; /**< what somebody has just said of a self-test; likewise */

@@ -6,6 +6,7 @@
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
@@ -201,6 +202,21 @@ void control_client_answer_stale(control_client_t *client)
     (void)snprintf(error, sizeof error, N_("%.20s: asked more than 1 s ago, so it is not done any more: ask again"),
                    client->entry.request);
     answer_no(client, error, service_answer_name(SERVICE_STALE), state_name(control_state(client->control)));
+}
+
+void control_client_answer_void(control_client_t *client)
+{
+    char error[160];
+    (void)snprintf(error, sizeof error, N_("%.20s: a hold came after it was asked, so it is not done: ask again"),
+                   client->entry.request);
+    answer_no(client, error, "held", state_name(control_state(client->control)));
+}
+
+void control_client_void(control_client_t *client)
+{
+    int waiting = 0;
+    (void)ioctl(client->fd, FIONREAD, &waiting);
+    client->void_bytes = client->in_length + (size_t)waiting;
 }
 
 bool control_client_has_gone(const control_client_t *client)

@@ -43,6 +43,12 @@ void control_client_answer_error(control_client_t *client, const char *error, co
 /** Its request came too late to be done. */
 void control_client_answer_stale(control_client_t *client);
 
+/** Its request was asked before a hold that came since. */
+void control_client_answer_void(control_client_t *client);
+
+/** All that has come from it so far came before a hold. */
+void control_client_void(control_client_t *client);
+
 /** True: nobody is there any more who could read an answer. A client that has only closed its sending side is there. */
 bool control_client_has_gone(const control_client_t *client);
 

@@ -67,18 +67,36 @@ static bool is_fresh(const control_t *self, control_client_t *client, const char
                                                           : UINT64_MAX;
     client->is_moving = operator_request_is_moving(line, control_snapshot(self)->intensity_percent) ||
                         (control_object_is_said(line) && control_object_is_write(line));
-    if (!client->is_moving) {
+    client->is_voidable = operator_request_is_voidable(line, control_snapshot(self)->intensity_percent);
+    if (!client->is_moving && !client->is_voidable) {
         return true;
     }
     if (control_client_has_gone(client)) {
         control_client_drop(client);
         return false;
     }
+    if (client->void_bytes > 0 && client->is_voidable) {
+        control_client_answer_void(client);
+        return false;
+    }
+    if (!client->is_moving) {
+        return true;
+    }
     if (age_us >= REQUEST_FRESH_US) {
         control_client_answer_stale(client);
         return false;
     }
     return true;
+}
+
+void control_requests_void(control_t *self, const control_client_t *by, uint64_t now_us)
+{
+    self->held_us = now_us;
+    for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
+        if (self->client[i].fd >= 0 && &self->client[i] != by) {
+            control_client_void(&self->client[i]);
+        }
+    }
 }
 
 static const char k_heard[] = "heard ";
@@ -112,6 +130,8 @@ static void hand_over(control_t *self, control_client_t *client, const motion_re
     self->last_id += self->last_id == UINT32_MAX ? 2 : 1; /* 0 means none */
     request.id = self->last_id;
     request.has_age = client->is_moving;
+    request.is_voidable = client->is_voidable;
+    request.own_holds = self->own_holds;
     request.has_heard = client->has_heard;
     request.heard_us = client->heard_us;
     request.since_us = client->since_us;
@@ -348,6 +368,9 @@ static void take_request(control_t *self, control_client_t *client, const char *
         control_questions_answer(self, client, line)) {
         return;
     }
+    if (event == EVENT_HOLD) {
+        control_requests_void(self, client, now_us);
+    }
     if (event != EVENTS) {
         begin_request(self, client, event, 0, now_us);
     } else if (strncmp(line, k_intensity, strlen(k_intensity)) == 0) {
@@ -410,7 +433,9 @@ static void take_lines(control_t *self, control_client_t *client, uint64_t now_u
         } else {
             take_request(self, client, client->in, now_us);
         }
-        client->in_length -= (size_t)(newline + 1 - client->in);
+        const size_t taken = (size_t)(newline + 1 - client->in);
+        client->void_bytes -= client->void_bytes < taken ? client->void_bytes : taken;
+        client->in_length -= taken;
         memmove(client->in, newline + 1, client->in_length);
     }
 }
@@ -462,6 +487,9 @@ static void take_result(const control_t *self, control_client_t *client, const m
     if (result->is_old) {
         client->request_id = 0;
         control_client_answer_stale(client);
+    } else if (result->is_void) {
+        client->request_id = 0;
+        control_client_answer_void(client);
     } else if (result->is_key_off) {
         client->request_id = 0;
         control_client_answer_error(client, "the enable key is off: turn it on first", state_name(result->snapshot.state));

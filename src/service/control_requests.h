@@ -13,6 +13,10 @@ bool control_requests_is_reading(const control_client_t *client);
 /** Reads bytes of the client and takes the complete lines. */
 void control_requests_receive(control_t *self, control_client_t *client, uint64_t now_us);
 
+/** A hold came: what clients have asked before it and has not begun is void.
+ *  @param by who held: all that it asked before has begun; NULL: heaved itself */
+void control_requests_void(control_t *self, const control_client_t *by, uint64_t now_us);
+
 /** Takes the motion thread's results. */
 void control_requests_take_results(control_t *self);
 

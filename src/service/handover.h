@@ -24,6 +24,7 @@ typedef struct {
     bool is_memory_locked;
     uint32_t page_faults; /**< of the motion thread, since it was known whether memory is locked */
     bool is_shutting_down;
+    uint32_t own_holds;                      /**< how often heaved has held by itself because it was late */
     char bus_trouble[BUS_TROUBLE_SIZE];      /**< what is wrong with the drives' bus now, "" = nothing */
     char bus_last_trouble[BUS_TROUBLE_SIZE]; /**< what was last, "" = nothing so far */
 } motion_view_t;
@@ -55,6 +56,8 @@ typedef struct {
     uint32_t event;            /**< event_t; OPERATOR_INTENSITY, OPERATOR_SERVICE, OPERATOR_OBJECT */
     uint32_t number;           /**< of OPERATOR_INTENSITY: percent */
     bool has_age;              /**< refused once it is older than REQUEST_FRESH_US, since heard_us or else since_us */
+    bool is_voidable;          /**< refused where a hold came after it was asked */
+    uint32_t own_holds;        /**< motion_view_t of the time it was handed over */
     bool has_heard;            /**< its client has said which tick it heard last: */
     uint64_t heard_us;         /**< that tick */
     uint64_t since_us;         /**< it has not come before this time of the clock */
@@ -74,6 +77,7 @@ typedef struct {
     bool is_power_failing;   /**< likewise */
     bool is_untested;        /**< likewise: a self-test is due */
     bool is_old;             /**< likewise: see motion_request_t */
+    bool is_void;            /**< likewise */
     bool is_later;           /**< private to the motion thread: the answer comes in a later cycle */
     service_answer_t answer; /**< of OPERATOR_SERVICE, and whether OPERATOR_OBJECT was begun */
     drive_object_t object;   /**< of OPERATOR_OBJECT, once it was begun: what was read, */
@@ -84,7 +88,8 @@ typedef struct {
 /** Whether it was refused for a reason that has a flag of its own. */
 static inline bool handover_is_barred(const motion_result_t *result)
 {
-    return result->is_old || result->is_key_off || result->is_unapproved || result->is_power_failing || result->is_untested;
+    return result->is_old || result->is_void || result->is_key_off || result->is_unapproved || result->is_power_failing ||
+           result->is_untested;
 }
 
 /** What a reload hands over. */

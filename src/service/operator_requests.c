@@ -54,6 +54,17 @@ bool operator_request_is_moving(const char *line, unsigned percent)
     return strcmp(line, "acknowledge") == 0 || strcmp(line, "selftest passed") == 0 || strncmp(line, "configure ", 10) == 0;
 }
 
+bool operator_request_is_voidable(const char *line, unsigned percent)
+{
+    static const char *const k_held[] = {"jog ", "signal ", "home ", "relay "};
+    for (unsigned i = 0; i < sizeof k_held / sizeof k_held[0]; i++) {
+        if (strncmp(line, k_held[i], strlen(k_held[i])) == 0) {
+            return true;
+        }
+    }
+    return operator_request_is_moving(line, percent);
+}
+
 bool operator_read_percent(const char *text, uint32_t *percent)
 {
     *percent = 0;

@@ -34,6 +34,9 @@ event_t operator_request_find(const char *name);
  *  @param percent intensity in force */
 bool operator_request_is_moving(const char *line, unsigned percent);
 
+/** True where a hold voids a request that was asked before it and has not begun: those that are moving, and what is held. */
+bool operator_request_is_voidable(const char *line, unsigned percent);
+
 /** Why a request was refused, and what would be possible.
  *  @param is_shutting_down a shutdown was asked for
  *  @return length without NUL; cut to fit */

@@ -41,7 +41,7 @@ static operator_log_t m_log; /* there is none: it takes no entry */
 static client_t m_client[CLIENTS];
 static uint64_t m_now_us;
 static long m_asked; /* of the motion thread */
-static long m_stale; /* requests that were too old for it */
+static long m_stale; /* requests that were too old for it, or came before a hold */
 
 /* --- What the lines ask for, read anew --- */
 
@@ -108,7 +108,8 @@ static void check_line(client_t *client, const char *line, size_t length)
     const cJSON *ok = cJSON_GetObjectItemCaseSensitive(json, "ok");
     const bool is_status = cJSON_GetObjectItemCaseSensitive(json, "counters") != NULL;
     const cJSON *error = cJSON_GetObjectItemCaseSensitive(json, "error");
-    m_stale += cJSON_IsString(error) && strstr(error->valuestring, "asked more than 1 s ago") != NULL;
+    m_stale += cJSON_IsString(error) && (strstr(error->valuestring, "asked more than 1 s ago") != NULL ||
+                                         strstr(error->valuestring, "a hold came after it was asked") != NULL);
     FUZZ_REQUIRE(is_status || cJSON_IsTrue(ok) || cJSON_IsString(cJSON_GetObjectItemCaseSensitive(json, "error")));
     client->answers += !(is_status && client->is_watching);
     cJSON_Delete(json);

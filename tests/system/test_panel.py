@@ -723,7 +723,7 @@ class FalseHeaved(threading.Thread):
 
 
 class SlowDisk(FalseHeaved):
-    """A heaved that does not come to an end with what goes to a disk or a bus, and answers the requests of a connection one after the other."""
+    """A heaved that does not come to an end with what goes to a disk, to a bus or to drives that lead back, and answers the requests of a connection one after the other."""
 
     def serve(self, link):
         with contextlib.suppress(OSError), link, link.makefile("rb") as lines:
@@ -732,13 +732,13 @@ class SlowDisk(FalseHeaved):
                 while word == "watch":
                     link.sendall(json.dumps(self.status, separators=(",", ":")).encode() + b"\n")
                     time.sleep(0.1)
-                if word in ("dump", "sdo"):
+                if word in ("dump", "sdo", "reset"):
                     time.sleep(3600)
                 link.sendall(b'{"ok":true}\n')
 
 
 def nothing_waits_for_a_disk(bench):
-    """While heaved writes an incident or asks a bus, everything else is answered."""
+    """While heaved writes an incident, asks a bus or resets, everything else is answered."""
     daemon = bench.both()
     status, geometry = bench.raw("status"), bench.raw("geometry")
     bench.end_panel()
@@ -751,11 +751,11 @@ def nothing_waits_for_a_disk(bench):
         link.send({"op": "status", "platform": "ride", "hz": 1, "id": 0})
         link.receive(lambda message: message.get("event") == "status")
         take(link)
-        for number, line in enumerate(("dump", "sdo read 1 1000 0")):
+        for number, line in enumerate(("dump", "sdo read 1 1000 0", "reset")):
             link.send({"op": "request", "platform": "ride", "line": line, "id": 1000 + number})
         for line in ("engage", "park", "torque all off", "hold", "geometry"):
             link.send({"op": "request", "platform": "ride", "line": line, "id": 1})
-            assert link.receive(lambda message: message.get("id") in (1, 1000, 1001), 10) == {"id": 1, "answer": {"ok": True}}, line
+            assert link.receive(lambda message: message.get("id") in (1, 1000, 1001, 1002), 10) == {"id": 1, "answer": {"ok": True}}, line
 
 
 def bad_use(bench):

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_stale.py BIN [PART OF A NAME [STOPS [SEED]]] - what was asked or sent while heaved stood still moves nothing later. In virtual time, inside
-kernel.py --virtual-time. STOPS is how many stops of 0 to 30 s are tried."""
+"""test_stale.py BIN [STOPS [SEED [PART OF A NAME]]] - what was asked or sent while heaved stood still moves nothing later. In virtual time, inside
+kernel.py --virtual-time. STOPS is how many stops of 0 to 30 s are tried, and twice the number of
+orders of requests."""
 import json
 import random
 import signal
@@ -76,7 +77,7 @@ class Client:
             return None
         with self.link, self.link.makefile("rb") as file:
             answer = json.loads(file.readline())
-        assert answer["ok"] or answer["why"] == "stale", answer
+        assert answer["ok"] or answer["why"] in ("stale", "held"), answer  # held: heaved was late, too
         return answer["ok"]
 
 
@@ -132,6 +133,63 @@ def safer_requests_in_a_stop(bench, _chance, _stops):
     assert waiting.outcome() is False and daemon.wait(timeout=harness.WAIT_S) == 0, daemon.log.read_text()
 
 
+# --- Orders of requests ---
+
+MOVING = ("HOMING", "RISING", "NEUTRAL", "ENGAGED", "SETTLING")
+
+
+def start_state(bench, chance):
+    """In which an order begins."""
+    wanted = chance.choice(("SETTLED", "HOLD", "RISING"))
+    with harness.Line(bench.socket) as line:
+        state = line.good("status")["state"]
+        if state == "OFF" or (wanted == "SETTLED" and state != "SETTLED"):
+            line.good("park")
+            bench.wait_state("SETTLED")
+        if wanted != "SETTLED":
+            line.ask("engage")
+            time.sleep(chance.uniform(0.05, 1.5))
+        if wanted == "HOLD":
+            line.good("hold")
+    return wanted
+
+
+def orders_before_a_hold(bench, chance, stops):
+    """Nothing that was asked before HOLD runs after it, whatever waits for what, over whichever connections."""
+    config = bench.file("boxed.ini", f"{bench.config.read_text(encoding='utf-8')}\n[black-box]\ndirectory = {bench.folder}/box\nseconds = 10\n")
+    daemon = bench.start(config=config)
+    refused = 0
+    for _ in range(orders := stops // 2):
+        begin, said = start_state(bench, chance), []
+        lines = [harness.Line(bench.socket) for _ in range(3)]
+        asked = [0] * len(lines)
+
+        def ask(which, request, asked=asked, lines=lines, said=said):
+            lines[which].link.sendall(f"{request}\n".encode())
+            asked[which] += 1
+            said.append(f"{which}: {request}")
+
+        def ask_some(ask=ask, lines=lines):
+            for _ in range(chance.randint(0, 4)):
+                ask(chance.randrange(len(lines)), chance.choice(("dump", "dump", "reset", "engage", "engage", "park", "resume")))
+                time.sleep(chance.choice((0, 0, 0.001, 0.01)))
+
+        ask_some()
+        with Stopped(daemon, chance.choice((0, 0.02, chance.uniform(0, 0.9)))):
+            ask_some()
+            ask(chance.randrange(len(lines)), "hold")
+        for line, count in zip(lines, asked):
+            with line:
+                answers = [json.loads(line.file.readline()) for _ in range(count)]
+                refused += sum(answer.get("why") == "held" for answer in answers)
+        time.sleep(1)
+        state = bench.status()["state"]
+        assert state not in MOVING, f"from {begin}: {'; '.join(said)}: {state}\n{daemon.log.read_text()[-1500:]}"
+    print(f"# figure {orders} orders of requests with a hold at their end, {refused} requests void")
+    assert refused > orders / 10, refused
+    assert bench.stop(daemon) == 0
+
+
 # --- Frames ---
 
 def frames_in_a_stop(bench, _chance, _stops):
@@ -173,6 +231,7 @@ def frames_bring_nothing_up(bench, _chance, _stops):
 
 CASES = {
     "requests in stops of 0 to 30 s: now, for who is still there, or never": (requests_in_a_stop, {}),
+    "orders of requests with HOLD at their end: nothing runs after it": (orders_before_a_hold, {}),
     "hold and SIGTERM count however old they are": (safer_requests_in_a_stop, {}),
     "frames that waited for more than a second are not followed": (frames_in_a_stop, {}),
     "frames that waited bring nothing up": (frames_bring_nothing_up, {"platform__engage": "auto\nauto_frames = 10"}),
@@ -181,9 +240,9 @@ CASES = {
 
 def main():
     suite = tap.Suite()
-    wanted = sys.argv[2] if len(sys.argv) > 2 else ""
-    stops = int(sys.argv[3]) if len(sys.argv) > 3 else STOPS
-    seed = int(sys.argv[4]) if len(sys.argv) > 4 else SEED
+    stops = int(sys.argv[2]) if len(sys.argv) > 2 else STOPS
+    seed = int(sys.argv[3]) if len(sys.argv) > 3 else SEED
+    wanted = sys.argv[4] if len(sys.argv) > 4 else ""
     print(f"# seed {seed}")
     for name, (check, changes) in CASES.items():
         if wanted in name:

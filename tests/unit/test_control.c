@@ -483,6 +483,118 @@ static void test_the_motion_thread_may_say_that_it_is_old(void)
     TEST_ASSERT_TRUE_MESSAGE(has_heard(0, "park: asked more than 1 s ago"), m_said);
 }
 
+/* --- What was asked before a hold --- */
+
+#define VOID "a hold came after it was asked, so it is not done: ask again\",\"why\":\"held\""
+
+static void test_hold_voids_what_others_asked_before_it(void)
+{
+    come(0);
+    come(1);
+    pass(0);
+    ask(1, "dump\nengage\nstatus\n"); /* the dump is never answered in time */
+    pass(0);
+    ask(0, "hold\n");
+    pass(0);
+    motion_answers();
+    pass(0);
+    TEST_ASSERT_TRUE(has_heard(0, "{\"ok\":true"));
+    m_control.client[1].dump_ticket = 0; /* it is answered */
+    pass(0);
+    TEST_ASSERT_FALSE(has_reached_the_motion_thread());
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(1, "engage: " VOID), m_said);
+    TEST_ASSERT_NOT_NULL(strstr(m_said, "\"counters\""));
+    ask(1, "engage\n");
+    pass(0);
+    TEST_ASSERT_TRUE(has_reached_the_motion_thread());
+}
+
+static void test_hold_voids_what_still_waits_in_a_socket(void)
+{
+    char many[CONTROL_REQUEST_MAX * 2] = "dump\n";
+    come(0);
+    come(1);
+    pass(0);
+    for (size_t i = 0; i < 25; i++) {
+        (void)strcat(many, "engage\n"); /* more than heaved reads while it owes an answer */
+    }
+    ask(1, many);
+    pass(0);
+    ask(0, "hold\n");
+    pass(0);
+    motion_answers();
+    ask(1, "park\n"); /* after it */
+    pass(0);
+    m_control.client[1].dump_ticket = 0;
+    for (unsigned i = 0; i < 30 && !has_reached_the_motion_thread(); i++) {
+        pass(0);
+    }
+    motion_request_t request;
+    TEST_ASSERT_TRUE(ring_pop(&m_handover.requests, &request, sizeof request) > 0);
+    TEST_ASSERT_EQUAL(EVENT_PARK, request.event);
+}
+
+static void test_hold_of_a_client_does_not_void_what_it_asks_next(void)
+{
+    come(0);
+    pass(0);
+    ask(0, "hold\nengage\n");
+    pass(0);
+    motion_answers();
+    pass(0);
+    TEST_ASSERT_TRUE(has_reached_the_motion_thread());
+}
+
+static void test_who_heard_the_hold_and_comes_may_resume(void)
+{
+    come(0);
+    pass(0);
+    ask(0, "hold\n");
+    pass(1000);
+    motion_answers();
+    pass(1000);
+    TEST_ASSERT_TRUE(has_heard(0, "{\"ok\":true"));
+    come(1);
+    ask(1, "resume\n");
+    pass(1000);
+    pass(0);
+    TEST_ASSERT_TRUE(has_reached_the_motion_thread());
+}
+
+static void test_hold_voids_what_came_with_a_connection_before_it(void)
+{
+    come(0);
+    pass(1000);
+    ask(0, "hold\n");
+    come(1);
+    ask(1, "engage\n");
+    pass(1000);
+    motion_answers();
+    pass(0);
+    TEST_ASSERT_FALSE(has_reached_the_motion_thread());
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(1, VOID), m_said);
+}
+
+static void test_a_hold_of_heaved_itself_voids_what_waits(void)
+{
+    static motion_view_words_t view;
+    come(0);
+    pass(0);
+    ask(0, "hold\nengage\n");
+    pass(0);
+    motion_answers();
+    view.view.own_holds = 1;
+    seqlock_write(&m_handover.view, view.word);
+    pass(0);
+    TEST_ASSERT_FALSE(has_reached_the_motion_thread());
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(0, VOID), m_said);
+    ask(0, "engage\n");
+    pass(0);
+    motion_request_t request;
+    TEST_ASSERT_TRUE(ring_pop(&m_handover.requests, &request, sizeof request) > 0);
+    TEST_ASSERT_TRUE(request.is_voidable && request.own_holds == 1);
+}
+
 /* --- Who may ask for what --- */
 
 static char m_look_path[90];
@@ -680,6 +792,12 @@ static void test_log_has_requests_whose_client_has_gone(void)
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_hold_voids_what_others_asked_before_it);
+    RUN_TEST(test_hold_voids_what_still_waits_in_a_socket);
+    RUN_TEST(test_hold_of_a_client_does_not_void_what_it_asks_next);
+    RUN_TEST(test_who_heard_the_hold_and_comes_may_resume);
+    RUN_TEST(test_hold_voids_what_came_with_a_connection_before_it);
+    RUN_TEST(test_a_hold_of_heaved_itself_voids_what_waits);
     RUN_TEST(test_what_waited_while_heaved_stood_still_is_not_done);
     RUN_TEST(test_what_came_with_its_connection_is_as_old_as_that);
     RUN_TEST(test_who_came_before_the_first_look_came_then);

@@ -66,6 +66,20 @@ static void test_operator_request_is_moving_what_can_start_or_enlarge_a_motion(v
     }
 }
 
+static void test_operator_request_is_voidable_what_is_moving_and_what_is_held(void)
+{
+    static const char *const k_voidable[] = {
+        "engage", "park", "reset", "torque 1 on", "jog 3 2 5", "jog z 2 5 5", "signal z sine 1 1 9 5", "home all 5", "relay 2 5"};
+    static const char *const k_others[] = {"hold",         "release 5",      "beat 1 1 1", "service-off",
+                                           "intensity 40", "torque all off", "status",     "dump"};
+    for (size_t i = 0; i < sizeof k_voidable / sizeof k_voidable[0]; i++) {
+        TEST_ASSERT_TRUE_MESSAGE(operator_request_is_voidable(k_voidable[i], 40), k_voidable[i]);
+    }
+    for (size_t i = 0; i < sizeof k_others / sizeof k_others[0]; i++) {
+        TEST_ASSERT_FALSE_MESSAGE(operator_request_is_voidable(k_others[i], 40), k_others[i]);
+    }
+}
+
 static void test_operator_explain_says_why_and_what_else(void)
 {
     (void)operator_explain(EVENT_RESUME, &m_snapshot, false, m_text, sizeof m_text);
@@ -185,6 +199,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_operator_request_find_knows_every_request_and_no_other_event);
     RUN_TEST(test_operator_request_is_moving_what_can_start_or_enlarge_a_motion);
+    RUN_TEST(test_operator_request_is_voidable_what_is_moving_and_what_is_held);
     RUN_TEST(test_operator_explain_says_why_and_what_else);
     RUN_TEST(test_operator_read_percent_takes_whole_numbers_only);
     RUN_TEST(test_operator_explain_percent_says_the_cap);
