@@ -10,7 +10,10 @@ import { button, element, fill, number, rowsOf, table } from "/ui.js";
 import { View } from "/view.js";
 
 const at = (id) => document.getElementById(id);
-const shown = { me: null, platform: null, tab: "operate", status: null, isGone: false, holder: null, isMine: false, geometry: null, all: {} };
+const shown = { me: null, platform: null, tab: "operate", status: null, isGone: false, holder: null, isMine: false, geometry: null, all: {}, heardMs: {} };
+const OLD_MS = 1000; // from then on a page says how old it is
+const SELDOM_MS = 1000; // between two statuses of a platform that is on the wall only
+const SLOW = ["reset", "dump", "sdo"]; // may take heaved some seconds
 const AXES = ["roll", "pitch", "yaw", "x", "y", "z"];
 const unitOf = (axis) => (["x", "y", "z"].includes(axis) ? "mm" : "deg");
 let link, page = {}, hand, recorder;
@@ -24,6 +27,12 @@ function say(text) {
   at("said").classList.add("shown");
   clearTimeout(sayTimer);
   sayTimer = setTimeout(() => at("said").classList.remove("shown"), 8000);
+}
+
+// Nobody presses twice, or believes that it was done, because nothing is said.
+function saySlow(message) {
+  const word = message.line?.split(" ")[0] ?? message.op;
+  say(`${t(word) ?? word}: ${t(message.op === "configure" || SLOW.includes(word) ? "underWay" : "noAnswer")}`);
 }
 
 async function request(line) {
@@ -52,6 +61,16 @@ function showFrame() {
   fill(at("tabs"), ...names.map((name) => button(t(name), null,
     { role: "tab", "aria-selected": String(name === shown.tab), "data-tab": name })));
 }
+
+const agesMs = (name) => performance.now() - (shown.heardMs[name] ?? performance.now());
+
+// What is shown may have changed since. A panel, a heaved or a network that stands still looks like a machine that does.
+function showAge() {
+  const ageMs = agesMs(shown.platform);
+  at("age").textContent = shown.status && ageMs >= OLD_MS ? `${t("noNews")} ${Math.floor(ageMs / 1000)} s` : "";
+  if (shown.tab === "wall" && link?.isOpen) page.update?.();
+}
+setInterval(showAge, 250);
 
 at("platforms").addEventListener("click", (event) => event.target.dataset.platform && choose(event.target.dataset.platform));
 at("tabs").addEventListener("click", (event) => { if (event.target.dataset.tab) { shown.tab = event.target.dataset.tab; build(); } });
@@ -198,7 +217,9 @@ function buildWall() {
         const status = shown.all[name];
         const state = status ? t(status.state) : t("gone");
         const isBad = !status || ["FAULT", "ESTOP"].includes(status.state);
+        const isOld = status && agesMs(name) >= OLD_MS + SELDOM_MS;
         return element("section", { class: isBad ? "fault" : "" }, element("h2", {}, name), element("b", { class: isBad ? "bad" : status.state === "ENGAGED" ? "good" : "" }, state),
+          isOld ? element("p", { class: "notice bad" }, `${t("noNews")} ${Math.floor(agesMs(name) / 1000)} s`) : null,
           status ? element("p", {}, status.fault.code ? status.fault[chinese() ? "text_zh" : "text"] : `${t("sender")}: ${status.sender?.address ?? "–"}; ${t("intensity")} ${status.intensity.percent} %`) : null);
       }));
     },
@@ -231,6 +252,7 @@ async function onEvent(event) {
   if (event.put_back_zh) event.status.configuration.put_back_zh = event.put_back_zh;
   if (event.event === "status" || event.event === "gone") {
     shown.all[event.platform] = event.status ?? null;
+    shown.heardMs[event.platform] = performance.now();
     if (shown.tab === "wall") page.update?.();
   }
   if (event.platform !== shown.platform) return;
@@ -269,12 +291,28 @@ function showLogin() {
   } }, element("h2", {}, t("login")), element("label", { for: "role" }, t("role")), role, element("label", { for: "password" }, t("password")), password, element("button", {}, t("login"))));
 }
 
+// A panel that was restarted knows nobody any more.
+async function mayConnect() {
+  try {
+    shown.me = await (await fetch("/api/me")).json();
+  } catch {
+    return false;
+  }
+  if (!shown.me.role) {
+    showLogin();
+    return null;
+  }
+  return true;
+}
+
 async function start() {
   shown.me = await (await fetch("/api/me")).json();
   if (!shown.me.role) return showLogin();
   link = new Link({
     onEvent,
     onBlock: (block) => takers[block.stream]?.take(block),
+    onSlow: saySlow,
+    mayConnect,
     onChange: (isOpen) => { hand?.letGo(); recorder?.stop(); shown.isMine = false; if (isOpen) choose(shown.platform ?? shown.me.platforms[0]); else { shown.status = null; build(); } },
   });
   recorder = new Recorder(link, takers);

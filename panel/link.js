@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 // link.js - the WebSocket to heave-panel: requests with answers, events, samples. Comes back by itself when it is lost.
 const RETRY_MS = 1000;
+const SLOW_MS = 2000;
+const ANSWERED = ["request", "configure", "press", "identify"]; // by heaved
 
 export class Link {
-  constructor({ onEvent, onBlock, onChange }) {
-    Object.assign(this, { onEvent, onBlock, onChange, isOpen: false, next: 1 });
+  // onSlow: called every two seconds while there is no answer to a message. mayConnect: asked before it comes back; true, false: later, null: never.
+  constructor({ onEvent, onBlock, onChange, onSlow, mayConnect }) {
+    Object.assign(this, { onEvent, onBlock, onChange, onSlow, mayConnect, isOpen: false, next: 1 });
     this.waiting = new Map();
     this.connect();
   }
@@ -20,8 +23,16 @@ export class Link {
       this.waiting.clear();
       this.isOpen = false;
       this.onChange(false);
-      setTimeout(() => this.connect(), RETRY_MS);
+      this.retry();
     };
+  }
+
+  retry() {
+    setTimeout(async () => {
+      const may = await this.mayConnect();
+      if (may) this.connect();
+      else if (may !== null) this.retry();
+    }, RETRY_MS);
   }
 
   take(message) {
@@ -52,7 +63,8 @@ export class Link {
     return new Promise((resolve) => {
       if (!this.isOpen) return resolve({ error: "connection lost" });
       const id = this.next++;
-      this.waiting.set(id, resolve);
+      const timer = ANSWERED.includes(message.op) ? setInterval(() => this.onSlow(message), SLOW_MS) : null;
+      this.waiting.set(id, (got) => { clearInterval(timer); resolve(got); });
       this.send({ id, ...message });
     });
   }

@@ -3,6 +3,7 @@
 export const TEXT = {
   hold: ["HOLD", "暂停"], holdHelp: ["Hold: stops where it is. Key: Escape", "暂停：平台在原地停下。按键：Escape"],
   connected: ["connected", "已连接"], lost: ["CONNECTION LOST - buttons do nothing", "连接已断开，按钮无效"], gone: ["heaved is not running", "heaved 未运行"],
+  noNews: ["No news for", "数据未更新："], noAnswer: ["no answer yet. Use the e-stop if it has to stop.", "尚无应答。必须停止时请按急停。"], underWay: ["under way", "正在执行"], configure: ["Apply", "应用"],
   language: ["中文", "English"], logout: ["Log out", "退出登录"],
   operate: ["Operate", "操作"], live: ["Live", "实时"], service: ["Service", "检修"], incidents: ["Incidents", "事故记录"], wall: ["All platforms", "全部平台"],
   login: ["Log in", "登录"], role: ["Role", "角色"], password: ["Password", "密码"], look: ["look", "查看"], operateRole: ["operate", "操作"], serviceRole: ["service", "检修"],

@@ -189,6 +189,34 @@ void control_fill(control_t *self, struct pollfd fds[CONTROL_FDS], uint64_t now_
     }
 }
 
+static void serve_client(control_t *self, control_client_t *client, const struct pollfd *found, uint64_t now_us)
+{
+    const bool is_silent = (found->events & POLLIN) != 0 && (found->revents & POLLIN) == 0;
+    client->looked_us = is_silent ? self->polled_us : client->looked_us;
+    if (client->fd >= 0 && (found->revents & POLLOUT) != 0) {
+        control_client_send(client);
+    }
+    if (client->fd >= 0 && (found->revents & POLLIN) != 0) {
+        control_requests_receive(self, client, now_us);
+    } else if (client->fd >= 0 && (found->revents & (POLLHUP | POLLERR)) != 0) {
+        control_client_drop(client);
+    }
+    if (client->fd >= 0) {
+        control_requests_serve_time(self, client, now_us);
+    }
+}
+
+static void serve_socket(control_t *self, unsigned at, const struct pollfd *found, uint64_t now_us)
+{
+    control_socket_t *listening = &self->socket[at];
+    const bool has_come = (found->revents & POLLIN) != 0;
+    listening->looked_us = (found->events & POLLIN) != 0 && !has_come ? self->polled_us : listening->looked_us;
+    bool is_going_on = has_come || listening->newcomer >= 0 || listening->is_shut;
+    for (unsigned i = 0; i < CONTROL_CLIENTS && is_going_on; i++) {
+        is_going_on = take_connection(self, at, now_us);
+    }
+}
+
 void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64_t now_us)
 {
     (void)seqlock_read(&self->handover->view, self->view.word); /* the last view stays where there is no new one */
@@ -198,29 +226,10 @@ void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64
     }
     control_requests_take_results(self);
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
-        control_client_t *client = &self->client[i];
-        const short revents = fds[i + CONTROL_SOCKETS].revents;
-        const bool is_silent = (fds[i + CONTROL_SOCKETS].events & POLLIN) != 0 && (revents & POLLIN) == 0;
-        client->looked_us = is_silent ? self->polled_us : client->looked_us;
-        if (client->fd >= 0 && (revents & POLLOUT) != 0) {
-            control_client_send(client);
-        }
-        if (client->fd >= 0 && (revents & POLLIN) != 0) {
-            control_requests_receive(self, client, now_us);
-        } else if (client->fd >= 0 && (revents & (POLLHUP | POLLERR)) != 0) {
-            control_client_drop(client);
-        }
-        if (client->fd >= 0) {
-            control_requests_serve_time(self, client, now_us);
-        }
+        serve_client(self, &self->client[i], &fds[i + CONTROL_SOCKETS], now_us);
     }
     for (unsigned at = 0; at < CONTROL_SOCKETS; at++) {
-        control_socket_t *listening = &self->socket[at];
-        const bool has_come = (fds[at].revents & POLLIN) != 0;
-        listening->looked_us = (fds[at].events & POLLIN) != 0 && !has_come ? self->polled_us : listening->looked_us;
-        if (has_come || listening->newcomer >= 0 || listening->is_shut) {
-            for (unsigned i = 0; i < CONTROL_CLIENTS && take_connection(self, at, now_us); i++) {}
-        }
+        serve_socket(self, at, &fds[at], now_us);
     }
 }
 

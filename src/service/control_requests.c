@@ -149,6 +149,9 @@ static void hand_over(control_t *self, control_client_t *client, const motion_re
 
 static void begin_request(control_t *self, control_client_t *client, event_t event, uint32_t number, uint64_t now_us)
 {
+    if (event == EVENT_HOLD) {
+        control_requests_void(self, client, now_us);
+    }
     hand_over(self, client, &(motion_request_t){.event = (uint32_t)event, .number = number}, now_us);
     self->is_end_wanted |= event == EVENT_SHUTDOWN && client->request_id != 0;
 }
@@ -367,9 +370,6 @@ static void take_request(control_t *self, control_client_t *client, const char *
     if (!is_allowed(self, client, line) || !is_fresh(self, client, line, now_us) ||
         control_questions_answer(self, client, line)) {
         return;
-    }
-    if (event == EVENT_HOLD) {
-        control_requests_void(self, client, now_us);
     }
     if (event != EVENTS) {
         begin_request(self, client, event, 0, now_us);

@@ -483,6 +483,43 @@ def what_comes_late_is_not_done(bench):
         assert page.problems == [], page.problems
 
 
+def a_page_says_how_old_it_is(bench):
+    """While heaved or the panel stands still: large, from a second on; and a press that nobody answers is told."""
+    daemon = bench.both()
+    if web_socket.browser() is None:
+        raise tap.Skip("no browser is there")
+    with Page(f"http://127.0.0.1:{bench.web}/", 390, 844) as page:
+        page.wait("document.getElementById('state').textContent === 'OFF'", "the state is shown")
+        page.run("window.told = []; new MutationObserver(() => window.told.push(document.getElementById('said').textContent)).observe(document.getElementById('said'), { childList: true })")
+        for process in (daemon, bench.panel):
+            page.wait("document.getElementById('age').textContent === ''", "what is shown is new")
+            with standing_still(process):
+                page.wait("/^No news for [1-9][0-9]* s$/.test(document.getElementById('age').textContent)", "it is old")
+                shown = page.run("(() => { const box = document.getElementById('age').getBoundingClientRect(); return [box.width, box.height, document.getElementById('state').textContent]; })()")
+                assert shown[0] > 300 and shown[1] > 30 and shown[2] == "OFF", shown
+                click(page, "#hold")
+                page.wait("window.told.some((text) => text.startsWith('HOLD: no answer yet'))", "nobody answers")
+                page.run("window.told.length = 0")
+        page.wait("document.getElementById('age').textContent === ''", "it is new again")
+
+
+def a_restarted_panel_asks_who_it_is(bench):
+    """The page of somebody who was logged in shows the login, not for ever that its connection is lost."""
+    bench.both()
+    if web_socket.browser() is None:
+        raise tap.Skip("no browser is there")
+    with Page(f"http://127.0.0.1:{bench.web}/", 820, 1180) as page:
+        page.wait("document.getElementById('password') !== null", "the login")
+        page.run("document.getElementById('role').value = 'service'")
+        page.run(f"document.getElementById('password').value = '{PASSWORD} service'")
+        page.run("document.querySelector('form.login button').click()")
+        page.wait("document.getElementById('state').textContent === 'OFF'", "the state is shown")
+        bench.end_panel()
+        page.wait("document.getElementById('link').className === 'lost'", "the connection is lost")
+        bench.start_panel()
+        page.wait("document.getElementById('password') !== null", "the login, again")
+
+
 def a_page_stays_that_one(bench):
     """Who goes on to another page before heaved has answered the first one stays there."""
     if web_socket.browser() is None:
@@ -876,6 +913,8 @@ CASES = [
     ("Hold is the largest, and always there", hold_is_there, {}),
     ("Hold acts when it is touched", hold_acts_when_it_is_touched, {}),
     ("what comes late is not done", what_comes_late_is_not_done, {}),
+    ("a page says how old it is", a_page_says_how_old_it_is, {}),
+    ("a restarted panel asks who it is", a_restarted_panel_asks_who_it_is, {"passwords": ("service",)}),
     ("a page stays that one", a_page_stays_that_one, {}),
     ("buttons in a browser", buttons_in_a_browser, {}),
     ("more buttons in a browser", more_buttons_in_a_browser, {}),
