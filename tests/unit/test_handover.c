@@ -2,6 +2,7 @@
  * test_handover.c - the hand-overs between two threads: a ring of records and the newest value of a struct.
  */
 #include <pthread.h>
+#include <stdlib.h>
 #include <sched.h>
 #include <string.h>
 
@@ -97,7 +98,7 @@ static void test_ring_counts_wrap(void)
 
 /* --- Two threads --- */
 
-#define MESSAGES 200000u
+static uint32_t m_messages = 20000; /* HEAVE_HANDOVER_MESSAGES: beside other work each of them may cost a turn of the processor */
 
 typedef struct {
     uint32_t number;
@@ -108,7 +109,7 @@ typedef struct {
 static void *push_messages(void *unused)
 {
     (void)unused;
-    for (uint32_t i = 1; i <= MESSAGES;) {
+    for (uint32_t i = 1; i <= m_messages;) {
         message_t message = {.number = i};
         const size_t words = i % 12 + 1;
         for (size_t k = 0; k < words; k++) {
@@ -127,8 +128,10 @@ static void test_ring_two_threads_keep_every_record_whole_and_in_order(void)
 {
     pthread_t thread;
     uint32_t bad = 0;
+    const char *const wanted = getenv("HEAVE_HANDOVER_MESSAGES");
+    m_messages = wanted != NULL ? (uint32_t)strtoul(wanted, NULL, 10) : m_messages;
     TEST_ASSERT_EQUAL_INT(0, pthread_create(&thread, NULL, push_messages, NULL));
-    for (uint32_t expected = 1; expected <= MESSAGES;) {
+    for (uint32_t expected = 1; expected <= m_messages;) {
         message_t message;
         const size_t length = ring_pop(&m_ring, &message, sizeof message);
         if (length == 0) {
