@@ -36,6 +36,12 @@
 #define PLAIN_HZ      1u
 #define WATCH_REQUEST "watch 20" /* of who waits: HOLD may come after 100 ms */
 
+/* When what goes on for a time ends: never before it is over, though this clock counts whole milliseconds. */
+static int64_t until_ms_of(const ctl_t *self)
+{
+    return self->for_s > 0.0 ? ctl_now_ms() + (int64_t)(self->for_s * 1000.0) + 1 : INT64_MAX;
+}
+
 /* Standard output that took everything; EXIT_IO: it has not, and that was said. */
 static int end_stdout(int code)
 {
@@ -86,7 +92,7 @@ static bool show_update(const ctl_t *self, const char *line, bool is_terminal)
 /* Until time is up, Ctrl-C, the end of heaved, or a line in which it says no; that is left to show. */
 static int follow(ctl_t *self, bool is_terminal)
 {
-    const int64_t until_ms = self->for_s > 0.0 ? ctl_now_ms() + (int64_t)(self->for_s * 1000.0) : INT64_MAX;
+    const int64_t until_ms = until_ms_of(self);
     for (;;) {
         const char *line = ctl_receive(self, until_ms);
         if (line == NULL) {
@@ -172,7 +178,7 @@ static void show_end(const ctl_t *self, const cJSON *status)
 /* Until the state is there that was asked for, or cannot come any more. */
 static int wait_for_end(ctl_t *self)
 {
-    const int64_t until_ms = self->for_s > 0.0 ? ctl_now_ms() + (int64_t)(self->for_s * 1000.0) : INT64_MAX;
+    const int64_t until_ms = until_ms_of(self);
     const bool is_shutdown = strcmp(self->command, "shutdown") == 0;
     int code = ctl_send(self, WATCH_REQUEST);
     bool is_over = code != EXIT_DONE;
@@ -231,7 +237,7 @@ static int watch_counts(ctl_t *self)
         return ask(self);
     }
     ctl_catch_signals();
-    const int64_t until_ms = self->for_s > 0.0 ? ctl_now_ms() + (int64_t)(self->for_s * 1000.0) : INT64_MAX;
+    const int64_t until_ms = until_ms_of(self);
     printf("\x1b[2J");
     while (ctl_is_interrupted == 0 && ctl_now_ms() < until_ms) {
         printf("\x1b[H");
