@@ -90,7 +90,7 @@ static service_answer_t serve(motion_loop_t *self, const motion_request_t *reque
 static hv_status_t hold(motion_loop_t *self)
 {
     motion_note(self, RECORD_REQUEST, EVENT_HOLD);
-    self->held_tick_us = gateway_tick_age(&self->session.gateway, 0);
+    self->current.view.held_tick_us = gateway_tick_age(&self->session.gateway, 0);
     return gateway_request(&self->session.gateway, EVENT_HOLD, self->session.now_us);
 }
 
@@ -108,24 +108,38 @@ static hv_status_t carry_out(motion_loop_t *self, const motion_request_t *reques
     return gateway_request(&self->session.gateway, (event_t)request->event, self->session.now_us);
 }
 
-/* Who asked for a motion long ago may have given up, and turned to something else. */
-static bool is_old(const motion_loop_t *self, const motion_request_t *request, uint64_t now_us)
+/* By what has been asked so far: the service thread knows an earlier one. */
+static bool is_raising(const motion_loop_t *self, const motion_request_t *request)
 {
+    return request->event == OPERATOR_INTENSITY && request->number > motion_intensity(&self->session.gateway.motion)->percent;
+}
+
+/* Who asked for a motion long ago may have given up, and turned to something else. */
+static bool is_old(const motion_loop_t *self, const motion_request_t *request)
+{
+    if (!request->has_age && !is_raising(self, request)) {
+        return false;
+    }
+    const uint64_t now_us = hal_clock_now_us(self->clock);
     const uint64_t since_us = now_us > request->since_us ? now_us - request->since_us : 0;
-    const uint64_t age_us = request->has_heard ? gateway_tick_age(&self->session.gateway, request->heard_us) : since_us;
-    return request->has_age && age_us >= REQUEST_FRESH_US;
+    return since_us >= REQUEST_FRESH_US ||
+           (request->has_heard && gateway_tick_age(&self->session.gateway, request->heard_us) >= REQUEST_FRESH_US);
 }
 
 /* Who asked for it did not know of the last hold. Where the client does not say what it has heard, the service thread has judged,
  * but for a hold that it did not know of itself. */
 static bool is_void(const motion_loop_t *self, const motion_request_t *request)
 {
-    return request->is_voidable &&
-           (request->own_holds != self->current.view.own_holds || (request->has_heard && request->heard_us < self->held_tick_us));
+    const motion_view_t *view = &self->current.view;
+    const bool is_press = request->event == OPERATOR_SERVICE && service_is_held(request->service.verb);
+    const bool is_unaware = request->own_holds != view->own_holds ||
+                            (request->has_heard && request->heard_us < view->held_tick_us) ||
+                            (is_press && request->tick_us < view->held_tick_us);
+    return is_unaware && (request->is_voidable || is_raising(self, request));
 }
 
 /* Requests that wait, in order, before the cycle. Returns how many; their results are complete after the cycle. */
-static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE], uint64_t now_us)
+static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE])
 {
     unsigned count = 0;
     motion_request_t request;
@@ -135,7 +149,7 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
     for (; count < REQUESTS_PER_CYCLE && ring_pop(&self->handover.requests, &request, sizeof request) > 0; count++) {
         result[count].id = request.id;
         result[count].is_later = false;
-        result[count].is_old = is_old(self, &request, now_us);
+        result[count].is_old = is_old(self, &request);
         result[count].is_void = is_void(self, &request);
         result[count].is_key_off = switches_is_key_off(&self->switches) && is_for_the_key(self, request.event);
         result[count].is_unapproved = is_unapproved && is_for_the_key(self, request.event);
@@ -320,7 +334,7 @@ static void note_hold(motion_loop_t *self)
     self->before_hold = state == STATE_HOLD ? self->before_hold : state;
 }
 
-static void run_cycle(motion_loop_t *self, uint64_t now_us, uint64_t late_us)
+static void run_cycle(motion_loop_t *self, uint64_t late_us)
 {
     motion_result_t result[REQUESTS_PER_CYCLE];
     const uint32_t skipped = (uint32_t)(late_us / self->session.cycle_us);
@@ -331,7 +345,7 @@ static void run_cycle(motion_loop_t *self, uint64_t now_us, uint64_t late_us)
     }
     take_reloads(self);
     take_switches(self);
-    const unsigned requests = take_requests(self, result, now_us);
+    const unsigned requests = take_requests(self, result);
     if (__atomic_exchange_n(&self->handover.is_end_due, 0, __ATOMIC_ACQ_REL) != 0) {
         (void)!carry_out(self, &(motion_request_t){.event = EVENT_SHUTDOWN});
     }
@@ -396,7 +410,7 @@ static void run(motion_loop_t *self)
             quit(self, now_us);
             break;
         }
-        run_cycle(self, now_us, late_us);
+        run_cycle(self, late_us);
         histogram_add(&self->handover.times.wake, late_us);
         self->work_us = hal_clock_now_us(self->clock) - now_us;
         histogram_add(&self->handover.times.work, self->work_us);

@@ -23,10 +23,9 @@ typedef struct {
     devices_t devices;
     gateway_io_t io;
     udp_recorder_t tap;
-    switches_t switches;   /**< between the inputs and the gateway */
-    uint64_t held_tick_us; /**< tick of the last hold: who has heard an earlier one only did not know of it */
-    bool was_blind;        /**< the inputs could not be read */
-    state_t before_hold;   /**< newest state other than HOLD */
+    switches_t switches; /**< between the inputs and the gateway */
+    bool was_blind;      /**< the inputs could not be read */
+    state_t before_hold; /**< newest state other than HOLD */
     hal_clock_t clock;
     uint32_t late_hold_cycles; /**< the platform is held if more cycles than this are late at once; 0 = never */
     bool is_recording;

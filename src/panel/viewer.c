@@ -187,8 +187,8 @@ void hall_answer(hall_t *hall, upstream_t *upstream, const asker_t *asker, const
 /* What has an operation of its own, or is the panel's to say. */
 static bool is_kept_back(const char *line)
 {
-    static const char *const k_words[] = {"watch", "samples", "by",      "beat",      "jog",          "home",
-                                          "relay", "signal",  "release", "configure", "configuration"};
+    static const char *const k_words[] = {"watch", "samples", "by",      "beat",      "jog",           "home",
+                                          "relay", "signal",  "release", "configure", "configuration", "heard"};
     for (unsigned i = 0; i < sizeof k_words / sizeof k_words[0]; i++) {
         if (viewer_begins(line, k_words[i])) {
             return true;

@@ -129,7 +129,7 @@ bool viewer_is_plain(const char *line)
             return false;
         }
     }
-    return length > 0 && length < UPSTREAM_REQUEST;
+    return length > 0 && length < UPSTREAM_REQUEST && line[0] != ' ';
 }
 
 bool viewer_begins(const char *line, const char *word)

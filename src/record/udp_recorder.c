@@ -31,7 +31,7 @@ static bool is_stale(const udp_recorder_t *self)
 {
     uint32_t waited_us = 0;
     (void)!hal_udp_waited(self->behind, &waited_us);
-    return waited_us > UDP_RECORDER_FRESH_US || (waited_us == 0 && self->late_us > UDP_RECORDER_FRESH_US);
+    return waited_us > UDP_RECORDER_FRESH_US || (waited_us == 0 && self->is_draining);
 }
 
 /* When a datagram came, and when the oldest one of the cycle did, for those who measure. */
@@ -51,8 +51,10 @@ static void note_arrival(udp_recorder_t *self)
 static hv_status_t tap_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
 {
     udp_recorder_t *self = ctx;
+    self->is_draining |= self->late_us > UDP_RECORDER_FRESH_US;
     for (unsigned i = 0; i < REFUSED_PER_CALL; i++) {
         const hv_status_t status = hal_udp_recv(self->behind, buffer, capacity, length, from);
+        self->is_draining &= status != HV_ERR_AGAIN;
         if (status != HV_OK && status != HV_ERR_RANGE) {
             return status;
         }

@@ -25,6 +25,7 @@ typedef struct {
     uint32_t waited_us;  /**< by the newest datagram, below a cycle: a replay then has it in the same cycle */
     uint64_t arrival_us; /**< out: when the first datagram came since it was set to 0; by that clock; 0 = none did */
     uint64_t late_us;    /**< by which the running cycle is late */
+    bool is_draining;    /**< after such a stop, until nothing waits: what does not say how long it has waited is old */
     uint32_t refused;    /**< out: datagrams of senders that are not allowed */
     uint32_t stale;      /**< out: datagrams that had waited longer than UDP_RECORDER_FRESH_US: nothing follows them */
 } udp_recorder_t;

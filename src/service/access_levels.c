@@ -77,9 +77,15 @@ level_peer_t levels_peer(const levels_t *self, int fd)
     return (level_peer_t){.uid = peer.uid, .gid = peer.gid, .pid = peer.pid, .level = levels_of(self, peer.uid, gid, count)};
 }
 
-level_t levels_needed(const char *request, unsigned percent)
+level_t levels_needed(const char *said, unsigned percent)
 {
     uint32_t wanted = 0;
+    bool has_heard = false;
+    uint64_t tick_us = 0;
+    const char *const request = operator_request_behind_heard(said, &has_heard, &tick_us);
+    if (request == NULL) { /* it will be refused */
+        return LEVEL_LOOK;
+    }
     if (strncmp(request, k_intensity, sizeof k_intensity - 1) == 0) {
         const bool is_down = operator_read_percent(&request[sizeof k_intensity - 1], &wanted) && wanted <= percent;
         return is_down ? LEVEL_OPERATE : LEVEL_SERVICE;

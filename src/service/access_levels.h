@@ -47,7 +47,7 @@ level_peer_t levels_peer(const levels_t *self, int fd);
 
 /** Level that a request takes; LEVEL_LOOK for what is no request.
  *  @param percent of intensity in force now */
-level_t levels_needed(const char *request, unsigned percent);
+level_t levels_needed(const char *said, unsigned percent);
 
 /** "look", "operate", "service": constant text. */
 const char *level_name(level_t level);

@@ -149,10 +149,6 @@ static bool take_connection(control_t *self, unsigned at, uint64_t now_us)
     }
     client->fd = listening->newcomer;
     client->looked_us = listening->newcomer_us;
-    client->void_bytes = 0;
-    if (listening->newcomer_us < self->held_us) {
-        control_client_void(client);
-    }
     listening->newcomer = -1;
     client->is_looker = at > 0;
     client->is_logged = false;
@@ -169,6 +165,11 @@ static bool take_connection(control_t *self, unsigned at, uint64_t now_us)
     client->dump_ticket = 0;
     client->watch_period_us = 0;
     client->came_us = client->asked_us = now_us;
+    client->is_gone = false;
+    client->void_bytes = 0;
+    if (listening->newcomer_us < self->held_us) {
+        control_client_void(client);
+    }
     return true;
 }
 
@@ -180,7 +181,7 @@ void control_fill(control_t *self, struct pollfd fds[CONTROL_FDS], uint64_t now_
         control_socket_t *listening = &self->socket[at];
         const bool is_open = listening->newcomer < 0 && !listening->is_shut;
         listening->looked_us = listening->looked_us == 0 ? now_us : listening->looked_us;
-        fds[at] = (struct pollfd){.fd = is_open ? listening->fd : -1, .events = POLLIN};
+        fds[at] = (struct pollfd){.fd = is_open ? listening->fd : -1, .events = is_open ? POLLIN : 0};
     }
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         const control_client_t *client = &self->client[i];
@@ -198,11 +199,12 @@ static void serve_client(control_t *self, control_client_t *client, const struct
     }
     if (client->fd >= 0 && (found->revents & POLLIN) != 0) {
         control_requests_receive(self, client, now_us);
-    } else if (client->fd >= 0 && (found->revents & (POLLHUP | POLLERR)) != 0) {
-        control_client_drop(client);
     }
     if (client->fd >= 0) {
         control_requests_serve_time(self, client, now_us);
+    }
+    if (client->fd >= 0 && (client->is_gone || (found->revents & (POLLHUP | POLLERR)) != 0)) {
+        control_requests_end(self, client, now_us);
     }
 }
 

@@ -40,6 +40,7 @@ typedef struct {
     operator_entry_t entry;
     char in[CONTROL_REQUEST_MAX];
     size_t in_length;
+    bool is_gone;       /**< nobody reads answers any more */
     size_t void_bytes;  /**< so many of the next ones came before a hold */
     uint64_t looked_us; /**< last time at which nothing had come from it */
     uint64_t since_us;  /**< no byte of in has come before; */
@@ -100,6 +101,7 @@ typedef struct control {
     status_lost_t lost;                             /**< the owner keeps it up to date */
     config_store_t *store;                          /**< the owner's; NULL: none */
     config_changes_t changes;                       /**< of what is being applied */
+    uint32_t end_id;                                /**< of the last such request */
     bool is_end_wanted;                             /**< a client has asked for shutdown */
     FILE *mistakes_stream;                          /**< into: */
     char mistakes[1024];

@@ -109,7 +109,8 @@ void control_client_send(control_client_t *client)
     const ssize_t sent = send_bytes(client);
     if (sent < 0) {
         if (errno != EAGAIN && errno != EINTR) {
-            control_client_drop(client);
+            client->is_gone = true;
+            client->out_length = 0;
         }
         return;
     }
@@ -124,8 +125,10 @@ void control_client_send(control_client_t *client)
 void control_client_answer(control_client_t *client, json_t *json)
 {
     json_newline(json);
-    if (json->is_cut) {
-        control_client_drop(client);
+    client->is_gone |= json->is_cut;
+    if (client->is_gone) {
+        client->out_length = 0;
+        client->passing = -1;
         return;
     }
     client->out_length += json->length;

@@ -27,7 +27,7 @@ void control_client_send(control_client_t *client);
 /** Begins an answer behind those that still wait. */
 json_t control_client_start_answer(control_client_t *client);
 
-/** Queues a complete answer. A client that has not read the last ones is dropped: it would get half an answer. */
+/** Queues a complete answer. A client that has not read the last ones is given up (is_gone): it would get half an answer. */
 void control_client_answer(control_client_t *client, json_t *json);
 
 /** Writes the answer to a request into the operator log, once. */

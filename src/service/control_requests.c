@@ -20,8 +20,6 @@
 #include "service/operator_requests.h"
 #include "service/service_json.h"
 
-#define TICK_DIGITS_MAX 18u
-
 #define ANSWER_US 1000000u  /* the motion thread answers within a cycle or two */
 #define OBJECT_US 1000000u  /* beside what a drive may take: it is asked once, and left alone as long after that */
 #define DUMP_US   50000000u /* heavectl waits a little longer */
@@ -57,36 +55,37 @@ static void refuse(const control_t *self, control_client_t *client, const snapsh
 
 /* --- How old --- */
 
-/* What can start or enlarge a motion is done now, for somebody who is there, or never. The motion thread looks once more: this
- * thread may be stopped between now and then. */
-static bool is_fresh(const control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+/* Since its client has heard heaved, as far as it says so, or since heaved has looked at it: whichever is longer. */
+static uint64_t age_us(const control_t *self, const control_client_t *client, uint64_t now_us)
 {
     const uint64_t tick_us = control_snapshot(self)->service.tick_us;
-    const uint64_t age_us = !client->has_heard            ? now_us - client->since_us
-                            : client->heard_us <= tick_us ? tick_us - client->heard_us
-                                                          : UINT64_MAX;
+    const uint64_t looked_us = now_us - client->since_us;
+    if (!client->has_heard) {
+        return looked_us;
+    }
+    const uint64_t heard_us = client->heard_us <= tick_us ? tick_us - client->heard_us : UINT64_MAX;
+    return heard_us > looked_us ? heard_us : looked_us;
+}
+
+/* What can start or enlarge a motion is done now, for somebody who is there and knows of the last hold, or never. The motion
+ * thread looks once more: this thread may be stopped between now and then. */
+static bool is_fresh(const control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+{
+    const bool is_before_hold = client->void_bytes > 0 || (client->has_heard && client->heard_us < self->view.view.held_tick_us);
     client->is_moving = operator_request_is_moving(line, control_snapshot(self)->intensity_percent) ||
                         (control_object_is_said(line) && control_object_is_write(line));
-    client->is_voidable = operator_request_is_voidable(line, control_snapshot(self)->intensity_percent);
-    if (!client->is_moving && !client->is_voidable) {
-        return true;
-    }
-    if (control_client_has_gone(client)) {
-        control_client_drop(client);
-        return false;
-    }
-    if (client->void_bytes > 0 && client->is_voidable) {
+    client->is_voidable = client->is_moving || operator_request_is_held(line);
+    if (client->is_voidable && (client->is_gone || control_client_has_gone(client))) {
+        client->is_gone = true;
+        control_client_log(client, "the client has gone before it was carried out", control_state(self));
+    } else if (client->is_voidable && is_before_hold) {
         control_client_answer_void(client);
-        return false;
-    }
-    if (!client->is_moving) {
+    } else if (client->is_moving && age_us(self, client, now_us) >= REQUEST_FRESH_US) {
+        control_client_answer_stale(client);
+    } else {
         return true;
     }
-    if (age_us >= REQUEST_FRESH_US) {
-        control_client_answer_stale(client);
-        return false;
-    }
-    return true;
+    return false;
 }
 
 void control_requests_void(control_t *self, const control_client_t *by, uint64_t now_us)
@@ -97,28 +96,6 @@ void control_requests_void(control_t *self, const control_client_t *by, uint64_t
             control_client_void(&self->client[i]);
         }
     }
-}
-
-static const char k_heard[] = "heard ";
-
-/* `heard TICK REQUEST`. Returns the request; NULL: it is wrong, and was answered. */
-static const char *take_heard(control_client_t *client, const char *line)
-{
-    client->has_heard = strncmp(line, k_heard, strlen(k_heard)) == 0;
-    client->heard_us = 0;
-    if (!client->has_heard) {
-        return line;
-    }
-    const char *const tick = &line[strlen(k_heard)];
-    const size_t digits = strspn(tick, "0123456789");
-    if (digits == 0 || digits > TICK_DIGITS_MAX || tick[digits] != ' ') {
-        control_client_answer_error(client, "heard: a tick and a request are needed, as in `heard 81204000 engage`", NULL);
-        return NULL;
-    }
-    for (size_t i = 0; i < digits; i++) {
-        client->heard_us = client->heard_us * 10u + (uint64_t)(tick[i] - '0');
-    }
-    return &tick[digits + 1];
 }
 
 /* Hands a request to the motion thread; the answer follows.
@@ -153,7 +130,10 @@ static void begin_request(control_t *self, control_client_t *client, event_t eve
         control_requests_void(self, client, now_us);
     }
     hand_over(self, client, &(motion_request_t){.event = (uint32_t)event, .number = number}, now_us);
-    self->is_end_wanted |= event == EVENT_SHUTDOWN && client->request_id != 0;
+    if (event == EVENT_SHUTDOWN && client->request_id != 0) {
+        self->is_end_wanted = true;
+        self->end_id = client->request_id;
+    }
 }
 
 /* By hand. What is held gets the number of its series here. */
@@ -359,8 +339,9 @@ static bool is_allowed(const control_t *self, control_client_t *client, const ch
 
 static void take_request(control_t *self, control_client_t *client, const char *said, uint64_t now_us)
 {
-    const char *const line = take_heard(client, said);
+    const char *const line = operator_request_behind_heard(said, &client->has_heard, &client->heard_us);
     if (line == NULL) {
+        control_client_answer_error(client, "heard: a tick and a request are needed, as in `heard 81204000 engage`", NULL);
         return;
     }
     const event_t event = operator_request_find(line);
@@ -440,6 +421,33 @@ static void take_lines(control_t *self, control_client_t *client, uint64_t now_u
     }
 }
 
+static void forget_answers(control_client_t *client)
+{
+    control_client_log(client, "the client has gone before it was answered", client->entry.before);
+    client->request_id = 0;
+    client->dump_ticket = 0;
+    client->is_configuring = false;
+}
+
+void control_requests_end(control_t *self, control_client_t *client, uint64_t now_us)
+{
+    ssize_t received = 0;
+    client->is_gone = true;
+    client->out_length = 0;
+    do {
+        client->in_length += received > 0 ? (size_t)received : 0;
+        while (client->fd >= 0 && memchr(client->in, '\n', client->in_length) != NULL) {
+            forget_answers(client);
+            take_lines(self, client, now_us);
+        }
+        received = client->fd >= 0 && client->in_length < sizeof client->in ? control_client_receive(client) : 0;
+    } while (received > 0);
+    forget_answers(client);
+    if (client->fd >= 0) {
+        control_client_drop(client);
+    }
+}
+
 /* A client that has said all it wants to say still gets its answer. */
 static void end_input(control_client_t *client, bool is_false_alarm)
 {
@@ -461,6 +469,7 @@ bool control_requests_is_reading(const control_client_t *client)
 void control_requests_receive(control_t *self, control_client_t *client, uint64_t now_us)
 {
     const size_t room = sizeof client->in - client->in_length;
+    const int passed = client->received;
     const ssize_t received = control_client_receive(client);
     if (received <= 0) {
         const bool is_false_alarm = received < 0 && (errno == EAGAIN || errno == EINTR);
@@ -470,7 +479,8 @@ void control_requests_receive(control_t *self, control_client_t *client, uint64_
     }
     client->since_us = client->in_length == 0 ? client->looked_us : client->since_us;
     client->in_length += (size_t)received;
-    client->looked_us = (size_t)received < room ? self->polled_us : client->looked_us; /* else there may be more */
+    const bool is_all = (size_t)received < room && client->received == passed; /* the kernel stops behind a descriptor */
+    client->looked_us = is_all ? self->polled_us : client->looked_us;
     take_lines(self, client, now_us);
     if (client->fd >= 0 && client->in_length == sizeof client->in && memchr(client->in, '\n', sizeof client->in) == NULL) {
         client->is_closing = true;
@@ -526,6 +536,7 @@ void control_requests_take_results(control_t *self)
     motion_result_t result;
     while (ring_pop(&self->handover->results, &result, sizeof result) > 0) {
         control_client_t *client = find_client(self, result.id);
+        self->is_end_wanted &= result.id != self->end_id || handover_is_barred(&result) == 0;
         if (result.id != 0 && client != NULL) {
             take_result(self, client, &result);
         }

@@ -17,6 +17,10 @@ void control_requests_receive(control_t *self, control_client_t *client, uint64_
  *  @param by who held: all that it asked before has begun; NULL: heaved itself */
 void control_requests_void(control_t *self, const control_client_t *by, uint64_t now_us);
 
+/** Its client has gone, or reads no answers: what it has asked that only makes the machine safer is still carried out, without an
+ *  answer to the one before it. Closes the connection. */
+void control_requests_end(control_t *self, control_client_t *client, uint64_t now_us);
+
 /** Takes the motion thread's results. */
 void control_requests_take_results(control_t *self);
 

@@ -8,6 +8,8 @@
 
 #include "common/translate.h"
 
+#define TICK_DIGITS_MAX 18u
+
 const event_t operator_requests[OPERATOR_REQUESTS] = {EVENT_ENGAGE, EVENT_HOLD,     EVENT_RESUME,  EVENT_PARK,
                                                       EVENT_RESET,  EVENT_SHUTDOWN, EVENT_SERVICE, EVENT_SERVICE_OFF};
 
@@ -36,6 +38,27 @@ event_t operator_request_find(const char *name)
     return EVENTS;
 }
 
+const char *operator_request_behind_heard(const char *line, bool *has_heard, uint64_t *tick_us)
+{
+    static const char k_heard[] = "heard ";
+    line += strspn(line, " ");
+    *tick_us = 0;
+    *has_heard = strncmp(line, k_heard, strlen(k_heard)) == 0;
+    if (!*has_heard) {
+        return line;
+    }
+    line += strlen(k_heard);
+    const size_t digits = strspn(line, "0123456789");
+    if (digits == 0 || digits > TICK_DIGITS_MAX || line[digits] != ' ') {
+        return NULL;
+    }
+    for (size_t i = 0; i < digits; i++) {
+        *tick_us = *tick_us * 10u + (uint64_t)(line[i] - '0');
+    }
+    line += digits;
+    return line + strspn(line, " ");
+}
+
 bool operator_request_is_moving(const char *line, unsigned percent)
 {
     static const char k_intensity[] = "intensity ";
@@ -54,7 +77,7 @@ bool operator_request_is_moving(const char *line, unsigned percent)
     return strcmp(line, "acknowledge") == 0 || strcmp(line, "selftest passed") == 0 || strncmp(line, "configure ", 10) == 0;
 }
 
-bool operator_request_is_voidable(const char *line, unsigned percent)
+bool operator_request_is_held(const char *line)
 {
     static const char *const k_held[] = {"jog ", "signal ", "home ", "relay "};
     for (unsigned i = 0; i < sizeof k_held / sizeof k_held[0]; i++) {
@@ -62,7 +85,7 @@ bool operator_request_is_voidable(const char *line, unsigned percent)
             return true;
         }
     }
-    return operator_request_is_moving(line, percent);
+    return false;
 }
 
 bool operator_read_percent(const char *text, uint32_t *percent)

@@ -158,7 +158,7 @@ def answers_as_heaved_does(bench):
         assert request(link, "engage")["answer"]["ok"] is True
         link.receive(lambda message: message.get("event") == "status" and message["status"]["state"] == "NEUTRAL" or message.get("status", {}).get("state") in ("ENGAGED", "HOLD"), 60)
         assert request(link, "hold")["answer"]["ok"] is True
-        for line in ("watch", "by anna", "samples", "beat 1 1 1", "jog 1 1 1", "hold\nengage", "", "x" * 64):
+        for line in ("watch", "by anna", "samples", "beat 1 1 1", "jog 1 1 1", "hold\nengage", "", "x" * 64, "heard 1 status", "heard 1 engage", " engage", " watch", " heard 1 watch"):
             assert "error" in request(link, line), line
         for message in ({"op": "status"}, {"op": "explode", "platform": "ride"}, {"platform": "ride"}, {"op": "request", "platform": "none", "line": "hold"}):
             assert "error" in link.ask(message), message

@@ -399,15 +399,117 @@ static void test_who_has_gone_does_not_engage(void)
     TEST_ASSERT_EQUAL(-1, m_control.client[0].fd);
 }
 
-static void test_who_has_gone_still_holds(void)
+/* Says something, closes, and is looked at. Returns which events reach the motion thread, as bits. */
+static unsigned say_and_go(const char *text)
 {
+    motion_request_t request;
+    unsigned events = 0;
     come(0);
     pass(0);
-    ask(0, "hold\n");
+    ask(0, text);
+    (void)close(m_client[0]);
+    m_client[0] = -1;
+    for (unsigned i = 0; i < 5; i++) {
+        pass(0);
+        while (ring_pop(&m_handover.requests, &request, sizeof request) > 0) {
+            events |= 1u << request.event;
+        }
+    }
+    TEST_ASSERT_EQUAL_MESSAGE(-1, m_control.client[0].fd, text);
+    return events;
+}
+
+static void test_who_has_gone_still_holds_whatever_it_asked_before(void)
+{
+    static const char *const k_before[] = {
+        "",
+        "by anna\n",
+        "status\n",
+        "resume\n",
+        "nonsense\n",
+        "dump\n",
+        "watch\n",
+        "heard 1 park\n",
+        "service-off\n",
+        "status\nstatus\nstatus\nstatus\nstatus\nstatus\nstatus\nstatus\nstatus\nstatus\nstatus\nstatus\nstatus\nstatus\n"};
+    for (unsigned i = 0; i < sizeof k_before / sizeof k_before[0]; i++) {
+        char text[256];
+        (void)snprintf(text, sizeof text, "%shold\n", k_before[i]);
+        const unsigned events = say_and_go(text) & ~(1u << EVENT_SERVICE_OFF);
+        TEST_ASSERT_EQUAL_MESSAGE(1u << EVENT_HOLD, events, text);
+        (void)snprintf(text, sizeof text, "%sheard 1 hold\n", k_before[i]);
+        TEST_ASSERT_EQUAL_MESSAGE(1u << EVENT_HOLD, say_and_go(text) & ~(1u << EVENT_SERVICE_OFF), text);
+    }
+    TEST_ASSERT_EQUAL(0, say_and_go("status\nengage\njog 1 1 1\ntorque 1 on\nintensity 100\nreset\n"));
+}
+
+static void test_a_hold_behind_a_request_that_waits_for_its_answer_counts_when_its_client_goes(void)
+{
+    motion_request_t request;
+    come(0);
+    pass(0);
+    ask(0, "engage\nhold\n");
+    pass(0);
+    TEST_ASSERT_TRUE(ring_pop(&m_handover.requests, &request, sizeof request) > 0 && request.event == EVENT_ENGAGE);
     (void)close(m_client[0]);
     m_client[0] = -1;
     pass(0);
+    TEST_ASSERT_TRUE(ring_pop(&m_handover.requests, &request, sizeof request) > 0 && request.event == EVENT_HOLD);
+}
+
+static void test_who_waits_outside_grows_old_while_there_is_no_room(void)
+{
+    motion_request_t request;
+    bool is_engaged = false;
+    come_all("hold\n"); /* they stay, as long as the motion thread owes them an answer */
+    come(NEWCOMER);
+    pass(0);
+    const int first = m_client[0];
+    come(0);
+    ask(0, "engage\n");
+    for (unsigned i = 0; i < 30; i++) {
+        pass(REQUEST_FRESH_US / 10);
+        while (ring_pop(&m_handover.requests, &request, sizeof request) > 0) {
+            is_engaged |= request.event == EVENT_ENGAGE;
+        }
+    }
+    TEST_ASSERT_FALSE(is_engaged);
+    TEST_ASSERT_TRUE_MESSAGE(has_heard(0, "engage: asked more than 1 s ago") || has_heard(0, "engage: a hold came"), m_said);
+    (void)close(first);
+}
+
+static void test_bytes_of_the_one_before_do_not_count_for_a_newcomer(void)
+{
+    come(0);
+    pass(0);
+    ask(0, "a line without an end, as long as there is room for it in the buffer of heaved");
+    pass(0);
+    (void)close(m_client[0]);
+    m_client[0] = -1;
+    pass(0);
+    come(0);
+    come(1);
+    ask(1, "hold\n");
+    pass(0);
+    pass(0);
+    motion_answers();
+    pass(1000);
+    ask(0, "resume\n");
+    pass(0);
     TEST_ASSERT_TRUE(has_reached_the_motion_thread());
+}
+
+static void test_blanks_before_a_request_change_nothing(void)
+{
+    static const char *const k_asked[] = {"  engage\n", "   torque all on\n", "heard 1  torque all on\n"};
+    show_tick(5000000);
+    come(0);
+    pass(0);
+    for (unsigned i = 0; i < sizeof k_asked / sizeof k_asked[0]; i++) {
+        ask_in_a_stop(0, k_asked[i], REQUEST_FRESH_US);
+        TEST_ASSERT_FALSE_MESSAGE(has_reached_the_motion_thread(), k_asked[i]);
+        TEST_ASSERT_TRUE_MESSAGE(has_heard(0, "\"stale\""), m_said);
+    }
 }
 
 static void test_who_has_closed_its_sending_side_is_there(void)
@@ -792,6 +894,11 @@ static void test_log_has_requests_whose_client_has_gone(void)
 int main(void)
 {
     UNITY_BEGIN();
+    RUN_TEST(test_blanks_before_a_request_change_nothing);
+    RUN_TEST(test_bytes_of_the_one_before_do_not_count_for_a_newcomer);
+    RUN_TEST(test_who_waits_outside_grows_old_while_there_is_no_room);
+    RUN_TEST(test_a_hold_behind_a_request_that_waits_for_its_answer_counts_when_its_client_goes);
+    RUN_TEST(test_who_has_gone_still_holds_whatever_it_asked_before);
     RUN_TEST(test_hold_voids_what_others_asked_before_it);
     RUN_TEST(test_hold_voids_what_still_waits_in_a_socket);
     RUN_TEST(test_hold_of_a_client_does_not_void_what_it_asks_next);
@@ -805,7 +912,6 @@ int main(void)
     RUN_TEST(test_what_only_makes_it_safer_has_no_age);
     RUN_TEST(test_a_request_that_waits_behind_another_grows_old);
     RUN_TEST(test_who_has_gone_does_not_engage);
-    RUN_TEST(test_who_has_gone_still_holds);
     RUN_TEST(test_who_has_closed_its_sending_side_is_there);
     RUN_TEST(test_a_tick_says_when_its_client_heard_heaved);
     RUN_TEST(test_what_only_makes_it_safer_may_carry_any_tick);

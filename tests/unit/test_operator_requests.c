@@ -66,17 +66,26 @@ static void test_operator_request_is_moving_what_can_start_or_enlarge_a_motion(v
     }
 }
 
-static void test_operator_request_is_voidable_what_is_moving_and_what_is_held(void)
+static void test_operator_request_is_held_what_somebody_holds(void)
 {
-    static const char *const k_voidable[] = {
-        "engage", "park", "reset", "torque 1 on", "jog 3 2 5", "jog z 2 5 5", "signal z sine 1 1 9 5", "home all 5", "relay 2 5"};
-    static const char *const k_others[] = {"hold",         "release 5",      "beat 1 1 1", "service-off",
-                                           "intensity 40", "torque all off", "status",     "dump"};
-    for (size_t i = 0; i < sizeof k_voidable / sizeof k_voidable[0]; i++) {
-        TEST_ASSERT_TRUE_MESSAGE(operator_request_is_voidable(k_voidable[i], 40), k_voidable[i]);
-    }
-    for (size_t i = 0; i < sizeof k_others / sizeof k_others[0]; i++) {
-        TEST_ASSERT_FALSE_MESSAGE(operator_request_is_voidable(k_others[i], 40), k_others[i]);
+    TEST_ASSERT_TRUE(operator_request_is_held("jog 3 2 5") && operator_request_is_held("signal z sine 1 1 9 5") &&
+                     operator_request_is_held("home all 5") && operator_request_is_held("relay 2 5"));
+    TEST_ASSERT_FALSE(operator_request_is_held("hold") || operator_request_is_held("beat 1 1 1") ||
+                      operator_request_is_held("release 5") || operator_request_is_held("torque 1 on"));
+}
+
+static void test_operator_request_behind_heard_is_the_request(void)
+{
+    static const char *const k_wrong[] = {"heard ", "heard 5", "heard engage", "heard -5 engage",
+                                          "heard 1234567890123456789 engage"};
+    bool has_heard = true;
+    uint64_t tick_us = 9;
+    TEST_ASSERT_EQUAL_STRING("torque 1 on", operator_request_behind_heard("  torque 1 on", &has_heard, &tick_us));
+    TEST_ASSERT_TRUE(!has_heard && tick_us == 0);
+    TEST_ASSERT_EQUAL_STRING("engage", operator_request_behind_heard(" heard 123456789012345678  engage", &has_heard, &tick_us));
+    TEST_ASSERT_TRUE(has_heard && tick_us == 123456789012345678u);
+    for (size_t i = 0; i < sizeof k_wrong / sizeof k_wrong[0]; i++) {
+        TEST_ASSERT_NULL_MESSAGE(operator_request_behind_heard(k_wrong[i], &has_heard, &tick_us), k_wrong[i]);
     }
 }
 
@@ -199,7 +208,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_operator_request_find_knows_every_request_and_no_other_event);
     RUN_TEST(test_operator_request_is_moving_what_can_start_or_enlarge_a_motion);
-    RUN_TEST(test_operator_request_is_voidable_what_is_moving_and_what_is_held);
+    RUN_TEST(test_operator_request_is_held_what_somebody_holds);
+    RUN_TEST(test_operator_request_behind_heard_is_the_request);
     RUN_TEST(test_operator_explain_says_why_and_what_else);
     RUN_TEST(test_operator_read_percent_takes_whole_numbers_only);
     RUN_TEST(test_operator_explain_percent_says_the_cap);

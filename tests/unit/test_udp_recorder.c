@@ -9,6 +9,7 @@
 
 #define CYCLE_US 1000u
 
+static bool m_is_empty;
 static uint32_t m_waited_us;
 static uint64_t m_now_us;
 static uint8_t m_bytes[8192];
@@ -26,6 +27,9 @@ static hv_status_t behind_recv(void *ctx, uint8_t *buffer, size_t capacity, size
 {
     (void)ctx;
     (void)capacity;
+    if (m_is_empty) {
+        return HV_ERR_AGAIN;
+    }
     buffer[0] = 'x';
     *length = 1;
     *from = (hal_udp_peer_t){.port = 9};
@@ -113,14 +117,21 @@ static hv_status_t what_becomes(uint32_t waited_us, uint64_t late_us)
 
 static void test_tap_lets_nothing_old_through(void)
 {
-    TEST_ASSERT_EQUAL(HV_OK, what_becomes(UDP_RECORDER_FRESH_US, 30000000));
     TEST_ASSERT_EQUAL(HV_OK, what_becomes(0, UDP_RECORDER_FRESH_US));
+    TEST_ASSERT_EQUAL(HV_OK, what_becomes(UDP_RECORDER_FRESH_US, 30000000));
     TEST_ASSERT_EQUAL_UINT32(0, m_tap.stale);
     TEST_ASSERT_EQUAL(HV_ERR_AGAIN, what_becomes(UDP_RECORDER_FRESH_US + 1, 0)); /* the backend never runs dry: a cycle's share */
     const uint32_t share = m_tap.stale;
     TEST_ASSERT_GREATER_THAN(0, share);
     TEST_ASSERT_EQUAL(HV_ERR_AGAIN, what_becomes(0, UDP_RECORDER_FRESH_US + 1)); /* nobody knows: the time of day was set */
     TEST_ASSERT_EQUAL_UINT32(2 * share, m_tap.stale);
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, what_becomes(0, 0)); /* nor of the rest of that queue, in the next cycle */
+    TEST_ASSERT_EQUAL_UINT32(3 * share, m_tap.stale);
+    TEST_ASSERT_EQUAL(HV_OK, what_becomes(5, 0));
+    m_is_empty = true;
+    TEST_ASSERT_EQUAL(HV_ERR_AGAIN, what_becomes(0, 0));
+    m_is_empty = false;
+    TEST_ASSERT_EQUAL(HV_OK, what_becomes(0, 0));
     TEST_ASSERT_EQUAL_UINT32(0, m_tap.refused);
 }
 
