@@ -35,7 +35,7 @@ NAMES = set("""
 heave heaved heavectl heave-twin heave-panel systemd systemctl enable now modprobe vcan ip link set up down type show can mm deg us ms rpm bit kbit rms dB Hz
 CANopen CAN Modbus GPIO gpio udp modbus SocketCAN slcan bus-off error-passive operational pre-operational halt tick remote node_exporter textfile collector Prometheus
 heartbeat OFF ini json python3 import sys print load stdin state grep pty terminal python-can slcand gpiodetect gpioinfo gpio-sim dialout root crypt docs echo
-main auto manual kind accel jerk key value bus-failing wait if-there last offset min max prom true false config head hexapod tripod Mbit CiA passed failed by whole beat release geometry samples incident-folder operator-log configuration configure
+main auto manual kind accel jerk key value bus-failing wait if-there last offset min max prom true false config head hexapod tripod Mbit CiA passed failed by whole beat release geometry samples incident-folder operator-log configuration configure heard tick request
 """.split())
 STRIPPED = [r"Ctrl-C", r"tripod-3rps", r"`[^`]*`", r"\"[^\"]*\"", r"\[[\w-]+\]", r"--[\w-]+", r"(?<![\w.])/[\w./@*<>-]+", r"\b[\w.-]*\.(?:ini|md|csv|frames|sock|c|service|prom|log|eds|dcf|py)\b",
             r"\b[A-Za-z]*[_\d][\w.]*", r"\b[A-Z][A-Z0-9_./-]*(?:-[\w]+)?\b", r"\{[^}]*\}", r"\b\w+=\S+", r"->.*ip link.*", r"\$\w+", r"\b\w+\(\d\)"]

@@ -135,9 +135,9 @@ def every_function(program, kind):
         assert master.ask(3, 1, 0, 64)[0] == "ok" and master.ask(16, 2, 0, 64, *range(64))[0] == "ok"
         if kind == "serial":
             assert master.ask(16, 0, 50, 2, 11, 12)[0] == "ok"
-            peer.FaultyLine.wait_until(lambda: len(devices.values_written(0, 50)) == 1)
+            peer.FaultyLine.wait_until(lambda: len(devices.values_written(0, 50)) == 1 and all(devices.get(unit, 3, 50 + i) == 11 + i for unit in (1, 2) for i in (0, 1)))
             assert master.ask(5, 0, 60, 1, 1)[0] == "ok"
-            peer.FaultyLine.wait_until(lambda: len(devices.values_written(0, 60)) == 1)
+            peer.FaultyLine.wait_until(lambda: len(devices.values_written(0, 60)) == 1 and devices.get(2, 1, 60))
             assert master.ask(3, 1, 50, 2)[2] == [11, 12] and master.ask(3, 2, 50, 2)[2] == [11, 12] and master.ask(1, 2, 60, 1)[2] == [1]
 
 

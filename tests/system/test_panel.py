@@ -713,7 +713,7 @@ class FalseHeaved(threading.Thread):
     def serve(self, link):
         with contextlib.suppress(OSError), link, link.makefile("rb") as lines:
             for line in lines:
-                word = line.decode().split()[0]
+                word = line.decode().split()[2 if line.startswith(b"heard ") else 0]
                 answers = {"geometry": self.geometry, "incidents": {"ok": True, "incidents": [{"name": f"incident-000001-{HTML}", "dump": False, "seen": False}]}}
                 answer = answers.get(word, {"ok": False, "error": HTML})
                 while word == "watch":

@@ -708,6 +708,7 @@ class Day:
                 client.recv(65536)  # it has been let in, or turned away
             except OSError:
                 pass
+        self.daemon.ask("hold")  # voids what the others have asked; is_engaged() goes on
         for client in crowd:
             client.close()
         self.hours += 1
