@@ -69,7 +69,7 @@ bool operator_request_is_moving(const char *line, unsigned percent)
         return event != EVENT_HOLD && event != EVENT_SERVICE_OFF;
     }
     if (strncmp(line, k_intensity, strlen(k_intensity)) == 0) {
-        return !operator_read_percent(&line[strlen(k_intensity)], &wanted) || wanted > percent;
+        return operator_read_percent(&line[strlen(k_intensity)], &wanted) && wanted > percent;
     }
     if (strncmp(line, k_torque, strlen(k_torque)) == 0) {
         return strstr(line, " on") != NULL;

