@@ -11,6 +11,7 @@
 #include "common/message.h"
 #include "service/control_client.h"
 #include "service/control_requests.h"
+#include "service/control_results.h"
 #include "service/control_socket.h"
 
 #define WAITING_POLL_MS 1
@@ -226,7 +227,7 @@ void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64
         self->own_holds = self->view.view.own_holds;
         control_requests_void(self, NULL, now_us);
     }
-    control_requests_take_results(self);
+    control_results_take(self);
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         serve_client(self, &self->client[i], &fds[i + CONTROL_SOCKETS], now_us);
     }

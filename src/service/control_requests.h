@@ -21,9 +21,6 @@ void control_requests_void(control_t *self, const control_client_t *by, uint64_t
  *  answer to the one before it. Closes the connection. */
 void control_requests_end(control_t *self, control_client_t *client, uint64_t now_us);
 
-/** Takes the motion thread's results. */
-void control_requests_take_results(control_t *self);
-
 /** Answers that are due by now: results, timeouts, and the next status of a client that watches. */
 void control_requests_serve_time(control_t *self, control_client_t *client, uint64_t now_us);
 
