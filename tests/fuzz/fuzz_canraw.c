@@ -428,6 +428,19 @@ static can_frame_t reply(const world_t *world, const record_t *record)
     return frame;
 }
 
+/* Whether every drive that sends with an identifier has said something since it was lost: else any frame is a sign of life, with
+ * which its start-up begins. */
+static bool are_heard(const world_t *world, uint32_t id)
+{
+    const canraw_map_t *map = map_of(world);
+    bool are_so = true;
+    for (unsigned k = 0; k < map->axes; k++) {
+        const bool is_its = map->axis[k].reply_id == id || (map->status_reply.length != 0 && map->axis[k].status_id == id);
+        are_so = are_so && (!is_its || world->driver.axis[k].is_talking);
+    }
+    return are_so;
+}
+
 /* Nothing that concerns the driver, but for a count. */
 static can_frame_t strange_frame(const world_t *world, const record_t *record)
 {
@@ -447,6 +460,7 @@ static can_frame_t strange_frame(const world_t *world, const record_t *record)
         frame.id = map_of(world)->axis[record->drive].command_id;
         break;
     case 4: /* too short for anything */
+        frame.id = are_heard(world, frame.id) ? frame.id : map_of(world)->axis[record->drive].command_id;
         frame.length = (uint8_t)(record->length % 3);
         break;
     default: /* a report that changes nothing */
