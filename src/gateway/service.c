@@ -166,7 +166,10 @@ fault_code_t service_step(gateway_t *self, uint64_t now_us)
         service_let_go(self);
     }
     own->stop_due = ask_due(self, own->stop_due, DRIVES_QUICK_STOP);
-    own->off_due = ask_due(self, own->off_due, DRIVES_DISABLE);
+    if (own->off_due != 0 && motion_is_at_rest(&self->motion)) {
+        own->up &= ~own->off_due;
+        own->off_due = ask_due(self, own->off_due, DRIVES_DISABLE);
+    }
     for (unsigned i = 0; i < drive_count(self); i++) {
         if ((own->homing >> i & 1u) != 0) {
             is_in_time = step_home(self, i, now_us) && is_in_time;
@@ -235,14 +238,16 @@ static service_answer_t switch_torque(gateway_t *self, uint32_t axes, bool is_on
     if (axes != all_of(self) && !has_one_by_one(self)) {
         return SERVICE_TOGETHER;
     }
-    if (own->doing != SERVICE_NOTHING || !motion_is_at_rest(&self->motion)) {
-        return SERVICE_BUSY;
-    }
-    if (!is_on) {
+    if (!is_on) { /* never refused: what moves stops first */
+        if (own->doing != SERVICE_NOTHING && own->doing != SERVICE_RELAY) {
+            service_let_go(self);
+        }
         own->wanted &= ~axes;
-        own->up &= ~axes;
         own->off_due |= axes;
         return SERVICE_DONE;
+    }
+    if (own->doing != SERVICE_NOTHING || !motion_is_at_rest(&self->motion) || (own->stop_due & axes) != 0) {
+        return SERVICE_BUSY;
     }
     for (unsigned i = 0; i < drive_count(self); i++) {
         own->deadline_us[i] = (axes >> i & 1u) != 0 ? now_us + UP_TIMEOUT_US : own->deadline_us[i];
@@ -251,7 +256,6 @@ static service_answer_t switch_torque(gateway_t *self, uint32_t axes, bool is_on
         return SERVICE_NOT_TAKEN;
     }
     own->off_due &= ~axes;
-    own->stop_due &= ~axes;
     own->wanted |= axes;
     return SERVICE_DONE;
 }
@@ -259,7 +263,7 @@ static service_answer_t switch_torque(gateway_t *self, uint32_t axes, bool is_on
 /* Drives that are up and at rest, where they have to move. */
 static bool are_up(const gateway_t *self, uint32_t axes)
 {
-    return (self->service.up & ~self->service.homing & axes) == axes;
+    return (self->service.up & ~self->service.homing & ~self->service.off_due & axes) == axes;
 }
 
 /* Of a jog. */

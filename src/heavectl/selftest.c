@@ -313,15 +313,12 @@ static bool try_way(run_t *self, const char *name, double speed_mm_s, double unt
 static void try_brakes(run_t *self)
 {
     char error[SELFTEST_NOTE_MAX];
-    watched_t watched = {.run = self};
+    watched_t watched = {.run = self, .way = {.moved_ms = heaved_link_now_ms()}};
     const struct timespec pause = {.tv_nsec = HEAVED_LINK_LOOK_MS * 1000000L};
-    bool is_off = heaved_link_has_done(&self->link, "torque all off", error);
-    for (int64_t until_ms = heaved_link_now_ms() + REST_MS;
-         !is_off && heaved_link_now_ms() < until_ms;) { /* it comes to rest first */
+    while (!is_at_end(&watched, true) && *self->link.is_interrupted == 0) { /* it comes to rest first */
         (void)nanosleep(&pause, NULL);
-        is_off = heaved_link_has_done(&self->link, "torque all off", error);
     }
-    if (!is_off) {
+    if (!heaved_link_has_done(&self->link, "torque all off", error)) {
         note_text(self, N_("brakes"), SELFTEST_FAILED, error);
         return;
     }

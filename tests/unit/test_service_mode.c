@@ -347,10 +347,68 @@ static void test_jog_press_during_another_is_refused_and_changes_nothing(void)
     rig_run_ms(&m_rig, 100);
     const uint32_t series = m_series;
     TEST_ASSERT_EQUAL(SERVICE_BUSY, ask(SERVICE_JOG_AXIS, 4, 5));
-    TEST_ASSERT_EQUAL(SERVICE_BUSY, ask(SERVICE_TORQUE_OFF, 1, 0));
+    TEST_ASSERT_EQUAL(SERVICE_BUSY, ask(SERVICE_TORQUE_ON, 1, 0));
     TEST_ASSERT_EQUAL(series, seen()->service.series);
     rig_run_ms(&m_rig, 100);
     TEST_ASSERT_TRUE(m_fastest[3] == 0 && m_fastest[2] > 0);
+}
+
+/* It is never refused. What moves stops within its limits, which the rig's checker judges, and then the torque goes. */
+static void test_torque_off_during_a_jog_stops_it_first(void)
+{
+    for (unsigned off = 0; off < 3; off++) { /* of the drive that moves, of another one, of all */
+        start(true);
+        TEST_ASSERT_EQUAL(SERVICE_DONE, off == 1 ? ask(SERVICE_JOG_POSE, AXIS_Z + 1, 20) : ask(SERVICE_JOG_AXIS, 3, 20));
+        hold_ms(400);
+        const double speed = m_fastest[2];
+        TEST_ASSERT_TRUE(speed > 0.5 * JOG_MM_S);
+        TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_TORQUE_OFF, off == 0 ? 3 : off == 1 ? 1 : SERVICE_ALL, 0));
+        forget_speeds();
+        unsigned cycles = 0;
+        while ((seen()->service.torque >> (off == 1 ? 0 : 2) & 1u) != 0) {
+            TEST_ASSERT_EQUAL(DRIVE_ENABLED, seen()->drive[off == 1 ? 0 : 2].state);
+            rig_run_ms(&m_rig, 1);
+            TEST_ASSERT_EQUAL(SERVICE_NOTHING, seen()->service.doing);
+            cycles++;
+            TEST_ASSERT_LESS_THAN_UINT(1000, cycles);
+        }
+        TEST_ASSERT_GREATER_THAN_UINT(5, cycles);
+        TEST_ASSERT_TRUE(m_fastest[2] <= speed + 1e-6);
+        rig_run_ms(&m_rig, 100);
+        TEST_ASSERT_EQUAL(off == 0 ? 0x7B : off == 1 ? 0x7E : 0, seen()->service.torque);
+        const double at = setpoint(2);
+        rig_run_ms(&m_rig, 100);
+        TEST_ASSERT_TRUE(fabs(setpoint(2) - at) < 1e-3);
+        assert_well();
+    }
+}
+
+static void test_torque_off_during_homing_stops_it(void)
+{
+    start(true);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_HOME, 3, 0));
+    rig_run_ms(&m_rig, 20);
+    TEST_ASSERT_EQUAL(DRIVE_HOMING, seen()->drive[2].state);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_TORQUE_OFF, SERVICE_ALL, 0));
+    rig_run_ms(&m_rig, 20);
+    TEST_ASSERT_EQUAL(0, seen()->service.torque);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, seen()->drive[2].state);
+    TEST_ASSERT_EQUAL(STATE_SERVICE, seen()->state);
+}
+
+/* All before the next cycle: what stops the drive is still to be sent, and stays so. */
+static void test_torque_on_again_does_not_replace_the_stop_of_a_homing(void)
+{
+    start(true);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_HOME, 3, 0));
+    rig_run_ms(&m_rig, 20);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_TORQUE_OFF, 3, 0));
+    TEST_ASSERT_EQUAL(SERVICE_BUSY, ask(SERVICE_TORQUE_ON, 3, 0));
+    rig_run_ms(&m_rig, 20);
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, seen()->drive[2].state);
+    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_TORQUE_ON, 3, 0));
+    rig_run_ms(&m_rig, 200);
+    TEST_ASSERT_EQUAL(DRIVE_ENABLED, seen()->drive[2].state);
 }
 
 static void test_jog_hold_stops_it_and_stays_in_service(void)
@@ -929,7 +987,7 @@ static void test_random_hands_never_move_anything_alone(void)
         } else if (!is_away && what < 10) {
             (void)beat(n + 1, random / 8192u % 300000u);
         } else if (!is_away && what == 39 && random / 64u % 50u == 0) {
-            (void)ask(random / 8192u % 2u ? SERVICE_TORQUE_ON : SERVICE_TORQUE_OFF, random / 256u % 8u, 0);
+            (void)ask(random / 8192u % 8u ? SERVICE_TORQUE_ON : SERVICE_TORQUE_OFF, random / 256u % 8u, 0);
         }
         away_ms = is_away ? away_ms + 1 : 0;
         forget_speeds();
@@ -965,6 +1023,9 @@ int main(void)
     RUN_TEST(test_jog_of_a_pose_axis_goes_straight_and_keeps_every_cylinder_slow);
     RUN_TEST(test_jog_of_a_tripod_takes_the_axes_that_it_has);
     RUN_TEST(test_jog_press_during_another_is_refused_and_changes_nothing);
+    RUN_TEST(test_torque_off_during_a_jog_stops_it_first);
+    RUN_TEST(test_torque_off_during_homing_stops_it);
+    RUN_TEST(test_torque_on_again_does_not_replace_the_stop_of_a_homing);
     RUN_TEST(test_jog_hold_stops_it_and_stays_in_service);
     RUN_TEST(test_jog_fault_and_estop_end_it_as_anywhere);
     RUN_TEST(test_jog_stuck_cylinder_is_a_following_error);
