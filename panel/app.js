@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // app.js - the pages: what is shown, and what buttons ask for. All that is known comes from heaved's status; nothing is guessed.
+import { stateOf } from "/drives.js";
 import { Hand } from "/hand.js";
 import { atLimits, extensionOf, nearness } from "/limits.js";
 import { Link } from "/link.js";
@@ -185,7 +186,7 @@ function buildService() {
     update(status) {
       fill(page.controls, element("p", {}, controlsText()), element("div", { class: "buttons" }, takeButton()));
       page.notice.textContent = status.state === "SERVICE" ? t("serviceHelp") : t("notService");
-      fill(page.counts, table([t("drive"), t("state"), t("homed"), t("actual")], status.cylinders.map((one) => [String(one.number), t(one.drive === "fault" ? "faulted" : one.drive), t(one.homed ? "yes" : "no"), number(one.actual_mm, 3)])));
+      fill(page.counts, table([t("drive"), t("state"), t("homed"), t("actual")], status.cylinders.map((one) => [String(one.number), stateOf(one), t(one.homed ? "yes" : "no"), number(one.actual_mm, 3)])));
     },
     end() { hand.end(); link.send({ op: "ticks", platform: shown.platform, on: false, id: 0 }); hand = null; },
   };

@@ -2,6 +2,7 @@
 // commission.js - putting a machine into service, step by step: what is there, which leg is which, zeros, ends, relays, switches, test signals, and a report to
 // print. What was found is kept in this browser, so that it can be left and continued. All motion is by a held button, as on the page Service.
 import { drawBode } from "/bode.js";
+import { stateOf } from "/drives.js";
 import { Hand } from "/hand.js";
 import { chinese, refusalOf, t } from "/text.js";
 import { button, choice, element, fill, number, rowsOf, table } from "/ui.js";
@@ -90,7 +91,6 @@ export async function build({ page, shown, request, say, place, link, take }) {
 }
 
 const section = (title, ...children) => element("section", {}, element("h2", {}, t(title)), ...children);
-const driveName = (one) => t(one.drive === "fault" ? "faulted" : one.drive);
 
 // --- 1: what is there ---
 
@@ -108,7 +108,7 @@ function inventory({ shown, request, record }) {
     update(status) {
       const flat = (object) => Object.entries(object ?? {}).filter(([, value]) => ["string", "number", "boolean"].includes(typeof value) && value !== "");
       fill(bus, status.bus ? rowsOf(flat(status.bus).map(([name, value]) => [name, String(value)])) : element("p", { class: "soft" }, t("noBus")));
-      fill(drives, table([t("drive"), t("state"), t("homed"), t("report")], status.cylinders.map((one) => [String(one.number), driveName(one), t(one.homed ? "yes" : "no"), flat(one.report).map(([name, value]) => `${name}: ${value}`).join(", ") || "–"]), true));
+      fill(drives, table([t("drive"), t("state"), t("homed"), t("report")], status.cylinders.map((one) => [String(one.number), stateOf(one), t(one.homed ? "yes" : "no"), flat(one.report).map(([name, value]) => `${name}: ${value}`).join(", ") || "–"]), true));
       record().note("inventory", { drives: status.cylinders.map((one) => ({ number: one.number, drive: one.drive, report: Object.fromEntries(flat(one.report)) })), bus: Object.fromEntries(flat(status.bus)) });
       if (Date.now() - last > 500) { last = Date.now(); count(); }
     },
@@ -147,7 +147,7 @@ function zeros({ shown, held, record }) {
   return {
     parts: [section("step_zeros", element("p", {}, t("zerosHelp")), element("div", { class: "buttons" }, held(t("homeAll"), () => "home all", t("homeAll")), ...buttons), list)],
     update(status) {
-      fill(list, table([t("drive"), t("state"), t("homed"), t("actual")], status.cylinders.map((one) => [String(one.number), driveName(one), t(one.homed ? "yes" : "no"), number(one.actual_mm, 3)])));
+      fill(list, table([t("drive"), t("state"), t("homed"), t("actual")], status.cylinders.map((one) => [String(one.number), stateOf(one), t(one.homed ? "yes" : "no"), number(one.actual_mm, 3)])));
       record().note("zeros", { homed: status.cylinders.map((one) => one.homed) });
     },
   };

@@ -18,7 +18,13 @@ export function wordsOf(drive) {
 }
 
 const away = (drive) => { const [sent, actual] = [drive.sent_mm ?? drive.sent_deg, drive.actual_mm ?? drive.actual_deg]; return actual === null || actual === undefined ? null : sent - actual; };
-const stateOf = (drive) => t(drive.drive === "fault" ? "faulted" : drive.drive);
+
+// Its state; a drive that is off or has failed may still have torque while it stops.
+export function stateOf(drive) {
+  const state = t(drive.drive === "fault" ? "faulted" : drive.drive);
+  if (!drive.torque || (drive.drive !== "disabled" && drive.drive !== "fault")) return state;
+  return drive.drive === "fault" ? `${state}, ${t("stillTorque")}` : t("stillTorque");
+}
 
 // The table of a status, and what drives say below it.
 export function drivesOf(status) {

@@ -76,7 +76,7 @@ export const TEXT = {
   reportTitle: ["Report of commissioning", "调试报告"], reportBegan: ["begun", "开始时间"], reportNow: ["printed", "打印时间"], finished: ["finished", "完成时间"], notDone: ["not done", "未完成"], notes: ["Notes", "备注"], signature: ["Signature:", "签名："], secondPerson: ["Second person:", "复核人："],
   takeFirst: ["Take the controls first.", "请先取得控制权。"], noWebSocket: ["Waiting for the panel…", "正在等待面板……"],
   OFF: ["OFF", "关闭"], HOMING: ["HOMING", "回零"], SETTLED: ["SETTLED: people may board", "已回落：可以上下客"], RISING: ["RISING", "上升"], NEUTRAL: ["NEUTRAL", "中位"], ENGAGED: ["ENGAGED: follows the sender", "跟随发送端"], HOLD: ["HOLD", "暂停"], SETTLING: ["SETTLING", "回落中"], FAULT: ["FAULT", "故障"], ESTOP: ["E-STOP PRESSED OR LATCHED", "急停"], SERVICE: ["SERVICE: moved by hand", "检修：手动"],
-  offline: ["offline", "离线"], disabled: ["no torque", "未使能"], enabling: ["enabling", "使能中"], enabled: ["torque", "已使能"], homing: ["homing", "回零中"], faulted: ["fault", "故障"],
+  offline: ["offline", "离线"], disabled: ["no torque", "未使能"], enabling: ["enabling", "使能中"], enabled: ["torque", "已使能"], homing: ["homing", "回零中"], faulted: ["fault", "故障"], stillTorque: ["torque still on", "仍在使能"],
 };
 let language = localStorage.getItem("heave-language") ?? (navigator.language.startsWith("zh") ? 1 : 0);
 language = Number(language) === 1 ? 1 : 0;

@@ -416,15 +416,13 @@ void sim_drives_place(sim_drives_t *self, uint64_t now_us, const drive_feedback_
 
 drives_t sim_drives_hal(sim_drives_t *self)
 {
-    static const drives_ops_t k_ops = {drives_sim_poll,
-                                       drives_sim_send,
-                                       drives_sim_request,
-                                       drives_sim_count,
-                                       NULL,
-                                       NULL,
-                                       drives_sim_request_one,
-                                       drives_sim_counts,
-                                       NULL,
-                                       NULL};
+    static const drives_ops_t k_ops = {
+        .poll = drives_sim_poll,
+        .send = drives_sim_send,
+        .request = drives_sim_request,
+        .count = drives_sim_count,
+        .request_one = drives_sim_request_one,
+        .counts = drives_sim_counts,
+    };
     return (drives_t){&k_ops, self};
 }

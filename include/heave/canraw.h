@@ -7,12 +7,14 @@
  *
  * - OFFLINE: no position has been received for offline_periods of the bus, or the drive has not been started up: a drive gets
  *   the frames of step when the first frame comes from it, and meanwhile every second, since it may say nothing before.
+ *   A drive that is lost under torque is stopped as by DRIVES_QUICK_STOP: it may hear what it does not answer.
  * - ENABLING: requested. It ends when a position newer than the request has been received and, if the map has enabled_when, that
  *   condition holds. If the map has enable or enabled_when, the driver already sends set-points in this state.
  * - ENABLED: the driver sends set-points. Without enabled_when this only means: requested, and a position was received since.
  * - HOMING: the homing frame was sent. It ends when homing_done holds, a new position was received and, if the map has
  *   enabled_when, that condition holds.
  * - DISABLED: every other case; the driver sends no set-points. Without disable and stop frames a drive holds its last set-point.
+ *   After a quick stop of a map with both frames, disable follows stop once the drive stands still (quick_stop.h).
  * - FAULT: fault_when or homing_failed holds, or the driver found an error. These drives do not check set-points, so the driver
  *   does. It does not send a set-point further than step_max from the previous one (the first one: from the actual position), or
  *   further than following_max from the actual position.
@@ -24,6 +26,7 @@
 #include "heave/counts.h"
 #include "heave/drives.h"
 #include "heave/hal/can.h"
+#include "heave/quick_stop.h"
 
 #define CANRAW_BYTES_MAX  8u
 #define CANRAW_FIELDS_MAX 12u
@@ -200,6 +203,8 @@ typedef struct {
     uint64_t torque_us;
     uint64_t phase_us; /**< since when it is in its state */
     uint8_t phase;
+    uint64_t reset_asked_us; /**< a reset waits for the end of a stop since then; 0: none does */
+    quick_stop_t quick_stop; /**< `stop` was sent or will be; `disable` follows */
     drive_guard_t guard;
     uint64_t mark_us;        /**< time of the request or of the end of homing: actual has to be newer */
     uint64_t told_us;        /**< time of the last command */

@@ -47,6 +47,12 @@ typedef struct {
     drive_guard_t guard; /**< reason of DRIVE_FAULT if heaved found it */
 } drive_feedback_t;
 
+/** True if a drive has torque as far as is known, also one that no command takes it from. For display. */
+static inline bool drive_has_torque(const drive_feedback_t *drive)
+{
+    return drive->is_energized || drive->state == DRIVE_ENABLED || drive->state == DRIVE_HOMING;
+}
+
 /** Conditions of a drive that do not stop it: bits of drive_report_t.notes. */
 #define DRIVE_NOTES 6u
 static inline const char *drive_note_text(unsigned note)
@@ -110,7 +116,9 @@ typedef enum {
     DRIVES_DISABLE,    /**< any -> DISABLED (torque off by the drives' own ramps and brakes: is_energized tells when it is);
                           FAULT and OFFLINE stay */
     DRIVES_HOME,       /**< ENABLED -> HOMING -> ENABLED and is_homed. Afterwards the set-points must start at actual again */
-    DRIVES_QUICK_STOP, /**< stop now by the drives' own ramps, then DISABLED; also ends ENABLING and HOMING */
+    DRIVES_QUICK_STOP, /**< stop now by the drives' own ramps; DISABLED from then on. Also ends ENABLING and HOMING. The torque
+                          goes off as soon as a drive stands still, after five seconds at the latest: see is_energized. DISABLE
+                          and RESET_FAULT do not cut it short */
     DRIVES_RESET_FAULT /**< FAULT -> DISABLED where the cause is gone, else FAULT stays */
 } drives_request_t;
 
@@ -156,6 +164,7 @@ typedef struct {
     bool (*counts)(void *ctx, uint8_t axis, int64_t *out);                              /* optional: not known */
     hv_status_t (*object_begin)(void *ctx, uint8_t axis, const drive_object_t *object); /* optional, with the next */
     drive_object_state_t (*object_end)(void *ctx, drive_object_t *out, uint32_t *code);
+    bool (*is_stopping)(void *ctx); /* optional: never */
 } drives_ops_t;
 
 /** Passed by value; ctx belongs to the backend and lives until its close. */
@@ -202,7 +211,8 @@ static inline HV_MUST_CHECK hv_status_t drives_send(drives_t drives, uint64_t no
 /** Requests a change of all axes; asynchronous. A newer request replaces an unfinished one. Never blocks (<= 50 us). The next
  *  poll already returns ENABLING or HOMING for ENABLE or HOME, so that the previous state cannot be mistaken for the end of the
  *  request; later polls show the end. Axes in other states do not change.
- *  @return HV_OK: taken; HV_ERR_AGAIN: not taken, repeat it in the next cycle; HV_ERR_STATE: not every axis is in a state that
+ *  @return HV_OK: taken; HV_ERR_AGAIN: not taken, repeat it in the next cycle (ENABLE: perhaps a quick stop has not ended yet);
+ * HV_ERR_STATE: not every axis is in a state that
  * the request needs (ENABLE: DISABLED, ENABLING or ENABLED; HOME: ENABLED), nothing changes; HV_ERR_IO: the bus is gone, no drive
  * receives it. */
 static inline HV_MUST_CHECK hv_status_t drives_request(drives_t drives, drives_request_t request)
@@ -259,6 +269,13 @@ static inline bool drives_report(drives_t drives, uint8_t axis, drive_report_t *
     }
     drives.ops->report(drives.ctx, axis, out);
     return true;
+}
+
+/** True while the driver has to tell drives something at the end of a quick stop, or has not told them yet to stop. At the end of
+ * the program, poll until then. As of the last poll; never blocks. */
+static inline bool drives_is_stopping(drives_t drives)
+{
+    return drives.ops->is_stopping != NULL && drives.ops->is_stopping(drives.ctx);
 }
 
 /** True while the bus still works but is likely to be lost soon (a CAN controller that stays error-passive): there is time for a

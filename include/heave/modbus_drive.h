@@ -19,6 +19,7 @@
 #include "heave/counts.h"
 #include "heave/drives.h"
 #include "heave/hal/modbus.h"
+#include "heave/quick_stop.h"
 
 #define MODBUS_DRIVE_REGISTERS_MAX 16u /**< of a block */
 #define MODBUS_DRIVE_FIELDS_MAX    4u
@@ -171,7 +172,6 @@ typedef struct {
     uint8_t read_step; /**< block of the feedback */
     bool is_checking;  /**< the item is being read back */
     bool is_broadcast; /**< the stop goes to all drives of the line first; whichever slot has its turn carries it */
-    bool is_reset_due; /**< requested while a stop was in progress */
     bool is_homed;
     bool is_after_homing; /**< placed once more, torque is on */
     bool is_placed;       /**< the target was set to the actual position when following was last requested */
@@ -204,6 +204,8 @@ typedef struct {
     uint64_t read_us;        /**< when the present read of the feedback began */
     uint64_t mark_us;        /**< only feedback that began later counts */
     uint64_t reset_until_us; /**< 0: no reset in progress */
+    uint64_t reset_asked_us; /**< a reset waits for the end of a stop since then; 0: none does */
+    quick_stop_t quick_stop; /**< `stop` was written or will be; `disable` follows */
     drive_guard_t guard;
     uint64_t since_us; /**< of the phase */
     uint64_t trouble_us;
@@ -231,9 +233,6 @@ hv_status_t modbus_drive_init(modbus_drive_t *self, const modbus_drive_map_t *ma
 
 /** The implementation of drives.h. send never returns HV_ERR_AGAIN: the newest set-point wins. */
 drives_t modbus_drive_hal(modbus_drive_t *self);
-
-/** True if no stop, reset or start of a drive is still to be written. At the end of the program, poll until then. */
-bool modbus_drive_is_told(const modbus_drive_t *self);
 
 /** Range of a field's values. */
 int64_t modbus_drive_field_min(const modbus_drive_field_t *field);

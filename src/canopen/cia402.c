@@ -449,8 +449,17 @@ static bool cia402_is_failing(void *ctx)
 
 drives_t cia402_hal(cia402_t *self)
 {
-    static const drives_ops_t k_ops = {cia402_poll,       cia402_send, cia402_request, cia402_count,       cia402_report,
-                                       cia402_is_failing, NULL,        cia402_counts,  cia402_visit_begin, cia402_visit_end};
+    static const drives_ops_t k_ops = {
+        .poll = cia402_poll,
+        .send = cia402_send,
+        .request = cia402_request,
+        .count = cia402_count,
+        .report = cia402_report,
+        .is_failing = cia402_is_failing,
+        .counts = cia402_counts,
+        .object_begin = cia402_visit_begin,
+        .object_end = cia402_visit_end,
+    };
     return (drives_t){&k_ops, self};
 }
 

@@ -72,6 +72,7 @@ void cia402_stage_begin(cia402_t *self, bool is_homing)
     self->is_homing_asked = is_homing;
     for (unsigned k = 0; k < self->config->axes; k++) {
         self->axis[k].is_in = true;
+        self->axis[k].reset_until_us = 0; /* a fault from now on is not the one that was to be reset */
         self->axis[k].trouble = CIA402_TROUBLE_NONE;
         self->axis[k].homing = is_homing && needs_homing(self, k) ? CIA402_HOMING_WAITING : CIA402_HOMING_NO;
     }

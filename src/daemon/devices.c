@@ -11,9 +11,9 @@
 #include "config/modbus.h"
 #include "daemon/gpio_setup.h"
 
-#define LEAVE_NS      5000000 /* seven frames, even at 125 kbit/s */
-#define LEAVE_POLL_NS 1000000 /* between looks whether drives on Modbus have taken what stops them */
-#define LEAVE_POLLS   500u
+#define LEAVE_NS      5000000          /* seven frames, even at 125 kbit/s */
+#define LEAVE_POLL_NS 1000000          /* between looks whether drives have taken what stops them */
+#define LEAVE_POLLS   6000u            /* more than a quick stop takes */
 #define BROADCAST_US  20000u           /* after a broadcast, for drives to act */
 #define COIL_LOOK_US  1000000u         /* a board of relays is looked at so often */
 #define RUN_DIR       "/run/heave-can" /* where heave-can-flush@.path looks */
@@ -270,22 +270,22 @@ const char *devices_trouble(devices_t *self)
     return text[0] == '\0' && self->coil_line.is_open ? linux_modbus_text(&self->coil_line) : text;
 }
 
-/* What stops the drives may be several writes: the driver goes on until all have taken it, or do not answer. */
-static void leave_modbus(devices_t *self)
+/* What stops the drives may be several writes or frames: the driver goes on until all have taken it, or do not answer. */
+static void leave(drives_t drives, uint64_t now_us)
 {
     const struct timespec pause = {.tv_nsec = LEAVE_POLL_NS};
-    const drives_t drives = modbus_drive_hal(&self->modbus_drive);
     drive_feedback_t feedback[DRIVES_MAX];
-    for (unsigned i = 0; i < LEAVE_POLLS && !modbus_drive_is_told(&self->modbus_drive); i++) {
+    for (unsigned i = 0; i < LEAVE_POLLS && drives_is_stopping(drives); i++) {
         (void)nanosleep(&pause, NULL);
-        (void)!drives_poll(drives, self->modbus_drive.now_us + LEAVE_POLL_NS / 1000, feedback);
+        now_us += LEAVE_POLL_NS / 1000;
+        (void)!drives_poll(drives, now_us, feedback);
     }
 }
 
 static void close_modbus(devices_t *self)
 {
     if (self->modbus_drive.map != NULL) {
-        leave_modbus(self);
+        leave(modbus_drive_hal(&self->modbus_drive), self->modbus_drive.now_us);
     }
     for (unsigned i = 0; i < self->modbus_lines; i++) {
         linux_modbus_close(&self->modbus_line[i]);
@@ -317,6 +317,9 @@ bool devices_close(devices_t *self, uint16_t safe_mask)
     has_ended = linux_gpio_inputs_close(&self->gpio_inputs) && has_ended;
     close_coils(self, safe_mask);
     close_modbus(self);
+    if (self->canraw.map != NULL) {
+        leave(canraw_hal(&self->canraw), self->canraw.now_us);
+    }
     if ((self->is_can_open || self->is_can_local_open) && self->cia402.config != NULL) {
         leave_cia402(self);
     }

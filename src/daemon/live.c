@@ -37,7 +37,7 @@
 /* As many short datagrams as a cycle takes, and a third more: the kernel grants twice that and charges 768 bytes and more for
  * each. What does not fit is lost as it comes; a longer queue would have the cycle follow what is older than the one before. */
 #define UDP_BUFFER_BYTES 32768
-#define QUIT_WAIT_MS     1000
+#define QUIT_WAIT_MS     7000
 #define FIRST_CYCLE_US   500000u
 
 /** Everything of a live run. Large: from the heap, at the start. */

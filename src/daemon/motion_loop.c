@@ -11,6 +11,7 @@
 
 #include "daemon/motion_notes.h"
 #include "daemon/motion_objects.h"
+#include "heave/quick_stop.h"
 #include "heave/text.h"
 #include "service/operator_requests.h"
 
@@ -19,7 +20,8 @@
 #define STACK_TOUCH        (128u * 1024u)
 #define PAGE_BYTES         4096u
 #define REQUESTS_PER_CYCLE 4u
-#define QUIT_MOST_US       100000u /* for drives to take their last word; a brake and a ramp may take longer */
+#define QUIT_MOST_US       100000u                         /* for drives to take their last word */
+#define QUIT_STOP_US       (QUICK_STOP_MOST_US + 1000000u) /* where that is another one at the end of their stop */
 #define KERNEL_ASKED_US    100000u
 
 hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_udp_t udp, hal_log_t log, hal_clock_t clock)
@@ -382,7 +384,8 @@ static void run_drives(motion_loop_t *self)
  * Late cycles are skipped: polls one right after the other would take a bus that had no time to answer for lost. */
 static void quit(motion_loop_t *self, uint64_t now_us)
 {
-    const uint64_t until_us = now_us + QUIT_MOST_US;
+    const uint64_t last_us = now_us + QUIT_STOP_US;
+    uint64_t until_us = now_us + QUIT_MOST_US;
     hv_status_t told = drives_request(self->io.drives, DRIVES_QUICK_STOP);
     run_drives(self);
     while (self->is_energized && now_us < until_us) {
@@ -390,6 +393,9 @@ static void quit(motion_loop_t *self, uint64_t now_us)
         (void)!hal_clock_sleep_until_us(self->clock, now_us + self->session.cycle_us);
         now_us = hal_clock_now_us(self->clock);
         run_drives(self);
+        if (drives_is_stopping(self->io.drives) && now_us < last_us) {
+            until_us = now_us + QUIT_MOST_US;
+        }
     }
 }
 

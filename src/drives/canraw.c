@@ -5,6 +5,7 @@
 #include "heave/canraw.h"
 
 #include "canraw_axis.h"
+#include "canraw_setpoint.h"
 #include "canraw_startup.h"
 
 #define STALLED_PERIODS 3u      /* without an echo: the bus is gone */
@@ -24,7 +25,7 @@ static bool is_any_online(const canraw_t *self)
 static void lose_all(canraw_t *self)
 {
     for (unsigned k = 0; k < self->map->axes; k++) {
-        canraw_axis_lose(&self->axis[k], self->map);
+        canraw_axis_lose(&self->axis[k], self->map, self->now_us);
     }
 }
 
@@ -147,6 +148,9 @@ static void send_steps(canraw_t *self)
         const canraw_frame_t *frame = canraw_startup_next(&self->axis[k], self->map, self->now_us);
         const bool is_off_due =
             frame != NULL && self->axis[k].step == 0 && self->axis[k].is_energized; /* there is `disable` then */
+        if (is_off_due && canraw_axis_is_stopping(&self->axis[k])) {
+            continue; /* that comes first */
+        }
         if (is_off_due && send_plain(self, k, &self->map->command[CANRAW_DISABLE]) != HV_OK) {
             continue;
         }
@@ -174,87 +178,12 @@ static void send_queries(canraw_t *self)
     self->query_us = self->now_us;
 }
 
-/* The speed field of a way since the last set: its magnitude at least speed_least, what does not fit at the field's end. */
-static int64_t speed_of(const canraw_t *self, unsigned k, q32_t travel_q32)
-{
-    const canraw_field_t *field = canraw_find_of(&self->map->setpoint, CANRAW_SPEED, self->map->axis[k].setpoint_slot);
-    const counts_scale_t *scale = &self->map->axis[k].speed;
-    int64_t speed = 0;
-    if (field == NULL) {
-        return 0;
-    }
-    const q32_t per_s_q32 = fx_mul_div(travel_q32, 1000000, self->map->period_us);
-    if (counts_from_units(scale, per_s_q32, &speed) != HV_OK) {
-        speed = (per_s_q32 < 0) == (scale->num < 0) ? INT64_MAX : INT64_MIN;
-    }
-    const int64_t magnitude = fx_clamp(fx_abs(speed), self->map->speed_least, INT64_MAX);
-    return fx_clamp(field->is_signed && speed < 0 ? -magnitude : magnitude, canraw_field_min(field), canraw_field_max(field));
-}
-
-static bool is_carried(const canraw_map_t *map, const canraw_axis_map_t *axis, int64_t counts)
-{
-    const canraw_field_t *field = canraw_find_of(&map->setpoint, CANRAW_POSITION, axis->setpoint_slot);
-    return counts >= canraw_field_min(field) && counts <= canraw_field_max(field);
-}
-
-/* Counts of a set-point that goes out.
- * Returns false where the drive does not follow, or has stopped because it cannot. */
-static bool find_setpoint(canraw_t *self, unsigned k, q32_t setpoint_q32, int64_t *counts)
-{
-    const canraw_map_t *map = self->map;
-    const canraw_axis_map_t *axis_map = &map->axis[k];
-    canraw_axis_t *axis = &self->axis[k];
-    if (!canraw_axis_is_streaming(axis, map)) {
-        return false;
-    }
-    canraw_axis_watch(axis, map, axis_map, setpoint_q32);
-    if (!canraw_axis_is_streaming(axis, map)) {
-        return false;
-    }
-    if (counts_from_units(&axis_map->scale, setpoint_q32, counts) != HV_OK || !is_carried(map, axis_map, *counts)) {
-        const guard_limits_t limits = canraw_axis_limits(axis, axis_map);
-        const drive_guard_t guard = guard_out_of_counts(setpoint_q32, &limits);
-        canraw_axis_fault_of_guard(axis, map, &guard);
-        return false;
-    }
-    return true;
-}
-
-/* What a frame of set-points carries for drives that may share it. */
-typedef struct {
-    int64_t value[DRIVES_MAX * CANRAW_VALUES];
-    int64_t counts[DRIVES_MAX];
-    bool is_following[DRIVES_MAX];
-    bool is_any;     /* somebody follows, */
-    bool is_news;    /* and something is other than last time */
-    bool is_unknown; /* where somebody is, who shares it */
-} setpoints_t;
-
 static bool is_shared(const canraw_map_t *map, unsigned a, unsigned b)
 {
     return map->axis[a].setpoint_id == map->axis[b].setpoint_id;
 }
 
-static void add_setpoint(canraw_t *self, setpoints_t *set, unsigned k, q32_t setpoint_q32)
-{
-    const canraw_axis_map_t *axis_map = &self->map->axis[k];
-    const canraw_field_t *field = canraw_find_of(&self->map->setpoint, CANRAW_POSITION, axis_map->setpoint_slot);
-    const canraw_axis_t *axis = &self->axis[k];
-    const q32_t travel_q32 = axis->has_sent ? fx_sub_sat(setpoint_q32, axis->sent_q32) : 0;
-    int64_t *counts = &set->counts[k];
-    set->is_following[k] = find_setpoint(self, k, setpoint_q32, counts);
-    if (set->is_following[k]) {
-        set->is_any = true;
-        set->is_news |= !self->map->is_on_change || !axis->has_sent || *counts != axis->sent_counts;
-    } else {
-        *counts = fx_clamp(canraw_axis_held(axis, self->map), canraw_field_min(field), canraw_field_max(field));
-        set->is_unknown |= !axis->has_actual || axis->state == DRIVE_HOMING; /* it moves by itself: a set-point would end that */
-    }
-    set->value[canraw_value_at(CANRAW_POSITION, axis_map->setpoint_slot)] = *counts;
-    set->value[canraw_value_at(CANRAW_SPEED, axis_map->setpoint_slot)] = speed_of(self, k, set->is_following[k] ? travel_q32 : 0);
-}
-
-static hv_status_t send_setpoints(canraw_t *self, unsigned first, setpoints_t *set)
+static hv_status_t send_setpoints(canraw_t *self, unsigned first, canraw_setpoints_t *set)
 {
     const canraw_axis_map_t *axis_map = &self->map->axis[first];
     canraw_axis_t *axis = &self->axis[first];
@@ -271,10 +200,10 @@ static hv_status_t send_setpoints(canraw_t *self, unsigned first, setpoints_t *s
  * it where it is, and nothing is sent. */
 static hv_status_t send_frame_of(canraw_t *self, unsigned first, const q32_t setpoint_q32[DRIVES_MAX])
 {
-    setpoints_t set = {.is_any = false};
+    canraw_setpoints_t set = {.is_any = false};
     for (unsigned k = first; k < self->map->axes; k++) {
         if (is_shared(self->map, first, k)) {
-            add_setpoint(self, &set, k, setpoint_q32[k]);
+            canraw_setpoint_add(self, &set, k, setpoint_q32[k]);
         }
     }
     if (!set.is_any || set.is_unknown) {
@@ -345,6 +274,7 @@ static hv_status_t canraw_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
         canraw_axis_report(&self->axis[k], &feedback[k]);
     }
     if (!self->is_gone && self->is_free) {
+        send_commands(self, CANRAW_DISABLE);
         send_steps(self);
     }
     /* send asks once per period; where nobody calls it, or nobody answers, this does */
@@ -377,36 +307,31 @@ static hv_status_t canraw_send(void *ctx, uint64_t now_us, const q32_t setpoint_
     return HV_OK;
 }
 
-static bool is_axis_allowed(const canraw_t *self, unsigned k, drives_request_t request)
+/* Whether drives allow a request. One that is being stopped gets torque again only after it has lost it. */
+static hv_status_t judge(const canraw_t *self, unsigned from, unsigned end, drives_request_t request)
 {
-    drive_feedback_t feedback;
-    canraw_axis_report(&self->axis[k], &feedback);
-    return drives_allow(request, feedback.state);
-}
-
-static bool is_allowed(const canraw_t *self, drives_request_t request)
-{
-    for (unsigned k = 0; k < self->map->axes; k++) {
-        if (!is_axis_allowed(self, k, request)) {
-            return false;
+    hv_status_t status = HV_OK;
+    for (unsigned k = from; k < end; k++) {
+        drive_feedback_t feedback;
+        canraw_axis_report(&self->axis[k], &feedback);
+        if (!drives_allow(request, feedback.state)) {
+            return HV_ERR_STATE;
         }
+        status = request == DRIVES_ENABLE && canraw_axis_is_stopping(&self->axis[k]) ? HV_ERR_AGAIN : status;
     }
-    return true;
+    return status;
 }
 
-/* It was lost under torque, for its status or in its start-up, and is there. */
-static bool is_lost_and_heard(const canraw_t *self, unsigned k)
+static bool is_end(drives_request_t request)
 {
-    const canraw_axis_t *axis = &self->axis[k];
-    const uint64_t silent_us = (uint64_t)self->map->offline_periods * self->map->period_us;
-    return !axis->is_online && axis->is_energized && self->now_us - axis->heard_us <= silent_us;
+    return request == DRIVES_DISABLE || request == DRIVES_QUICK_STOP;
 }
 
-/* Whether a request is for it: what takes torque away is for those that are lost and can hear, too. */
+/* Whether a request is for it: what takes torque away is also for those that were lost under it. They may hear what they do not
+ * answer, and have no watchdog. */
 static bool is_told(const canraw_t *self, unsigned k, drives_request_t request)
 {
-    const bool is_end = request == DRIVES_DISABLE || request == DRIVES_QUICK_STOP;
-    return self->axis[k].is_online || (is_end && is_lost_and_heard(self, k));
+    return self->axis[k].is_online || (is_end(request) && self->axis[k].is_energized);
 }
 
 /* What stops drives goes out at once, past the gate: after the last set-point there may be no other chance. */
@@ -420,16 +345,14 @@ static hv_status_t canraw_request(void *ctx, drives_request_t request)
     if (self->is_gone || !is_any) {
         return HV_ERR_IO;
     }
-    if (!is_allowed(self, request)) {
-        return HV_ERR_STATE;
-    }
-    for (unsigned k = 0; k < self->map->axes; k++) {
+    const hv_status_t status = judge(self, 0, self->map->axes, request);
+    for (unsigned k = 0; k < self->map->axes && status == HV_OK; k++) {
         if (is_told(self, k, request)) {
             canraw_axis_request(&self->axis[k], self->map, request, self->now_us);
         }
     }
     send_commands(self, CANRAW_RESET);
-    return HV_OK;
+    return status;
 }
 
 /* Set-points are the word for torque, and others get the same frame. */
@@ -448,13 +371,16 @@ static hv_status_t canraw_request_one(void *ctx, uint8_t k, drives_request_t req
     if (self->is_gone || !is_any_online(self)) {
         return HV_ERR_IO;
     }
-    if (!is_axis_allowed(self, k, request) || (request == DRIVES_ENABLE && would_enable_others(self->map, k))) {
+    if (request == DRIVES_ENABLE && would_enable_others(self->map, k)) {
         return HV_ERR_STATE;
     }
-    const bool is_end = request == DRIVES_DISABLE || request == DRIVES_QUICK_STOP;
+    const hv_status_t status = judge(self, k, k + 1u, request);
+    if (status != HV_OK) {
+        return status;
+    }
     for (unsigned i = 0; i < self->map->axes; i++) { /* the next set-point of another would give it its torque again */
-        const bool goes_along = is_end && is_shared(self->map, i, k) && would_enable_others(self->map, k);
-        if (self->axis[i].is_online && (i == k || goes_along)) {
+        const bool goes_along = is_end(request) && is_shared(self->map, i, k) && would_enable_others(self->map, k);
+        if (is_told(self, i, request) && (i == k || goes_along)) {
             canraw_axis_request(&self->axis[i], self->map, request, self->now_us);
         }
     }
@@ -483,6 +409,19 @@ static bool canraw_is_failing(void *ctx)
     return self->passive.is_failing;
 }
 
+/* Until the last frame is on the wire. A bus that is gone takes nothing. */
+static bool canraw_is_stopping(void *ctx)
+{
+    const canraw_t *self = ctx;
+    bool is_stopping = false;
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        const canraw_axis_t *axis = &self->axis[k];
+        const bool is_under_way = axis->told_us != 0 && axis->told_us >= self->free_us;
+        is_stopping |= canraw_axis_is_stopping(axis) || is_under_way;
+    }
+    return is_stopping && !self->is_gone;
+}
+
 static void canraw_report(void *ctx, uint8_t k, drive_report_t *out)
 {
     const canraw_t *self = ctx;
@@ -491,7 +430,16 @@ static void canraw_report(void *ctx, uint8_t k, drive_report_t *out)
 
 drives_t canraw_hal(canraw_t *self)
 {
-    static const drives_ops_t k_ops = {canraw_poll,       canraw_send,        canraw_request, canraw_count, canraw_report,
-                                       canraw_is_failing, canraw_request_one, canraw_counts,  NULL,         NULL};
+    static const drives_ops_t k_ops = {
+        .poll = canraw_poll,
+        .send = canraw_send,
+        .request = canraw_request,
+        .count = canraw_count,
+        .report = canraw_report,
+        .is_failing = canraw_is_failing,
+        .request_one = canraw_request_one,
+        .counts = canraw_counts,
+        .is_stopping = canraw_is_stopping,
+    };
     return (drives_t){&k_ops, self};
 }

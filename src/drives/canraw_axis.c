@@ -8,6 +8,7 @@
 #include <string.h>
 
 #define RESET_US        1000000u /* after a reset, the drive has so long to take its fault back */
+#define RESET_WAIT_US   2000000u /* it may wait so long for the end of a stop: nobody counts on an older one */
 #define HOMING_BEGIN_US 500000u  /* "done" before "not done" is believed only after this: it may be that of the last homing */
 
 static bool has(const canraw_map_t *map, canraw_command_t command)
@@ -25,13 +26,33 @@ static void tell(canraw_axis_t *self, const canraw_map_t *map, canraw_command_t 
     self->pending = has(map, command) ? (uint8_t)command : CANRAW_NOTHING;
 }
 
-/* The frame that stops a drive: its own, else torque off. */
-static void tell_stop(canraw_axis_t *self, const canraw_map_t *map)
+/* The frame that stops a drive: its own, and torque off at rest; else torque off. */
+static void tell_stop(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
 {
-    tell(self, map, has(map, CANRAW_STOP) ? CANRAW_STOP : CANRAW_DISABLE);
+    self->reset_asked_us = 0;
+    if (!has(map, CANRAW_STOP)) {
+        tell(self, map, CANRAW_DISABLE);
+        return;
+    }
+    tell(self, map, CANRAW_STOP);
+    if (has(map, CANRAW_DISABLE)) {
+        quick_stop_begin(&self->quick_stop, now_us);
+    }
 }
 
-void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map)
+/* What stops it is still to be told, and goes on; where nothing is, it is told now, in case it hears what it does not answer. */
+static void keep_stopping(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_t *was, uint64_t now_us)
+{
+    if (canraw_axis_is_stopping(was)) {
+        self->pending = was->pending == CANRAW_STOP || was->pending == CANRAW_DISABLE ? was->pending : CANRAW_NOTHING;
+        self->quick_stop = was->quick_stop;
+        self->told_us = was->told_us;
+    } else if (was->is_energized) {
+        tell_stop(self, map, now_us);
+    }
+}
+
+void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
 {
     const canraw_axis_t was = *self;
     (void)memset(self, 0, sizeof *self); /* what lies between the members, too: states are compared byte by byte */
@@ -56,20 +77,21 @@ void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map)
     self->counts = was.counts;
     self->actual_q32 = was.actual_q32;
     self->actual_us = was.actual_us;
+    keep_stopping(self, map, &was, now_us);
 }
 
-void canraw_axis_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t code)
+void canraw_axis_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t code, uint64_t now_us)
 {
     self->state = DRIVE_FAULT;
     self->fault_code = code;
     self->guard = (drive_guard_t){.jump_q32 = 0};
     self->reset_until_us = 0;
-    tell_stop(self, map);
+    tell_stop(self, map, now_us);
 }
 
-void canraw_axis_fault_of_guard(canraw_axis_t *self, const canraw_map_t *map, const drive_guard_t *guard)
+void canraw_axis_fault_of_guard(canraw_axis_t *self, const canraw_map_t *map, const drive_guard_t *guard, uint64_t now_us)
 {
-    canraw_axis_fault(self, map, CANRAW_FAULT_FOLLOWING);
+    canraw_axis_fault(self, map, CANRAW_FAULT_FOLLOWING, now_us);
     self->guard = *guard;
 }
 
@@ -86,7 +108,7 @@ static void take_homing(canraw_axis_t *self, const canraw_map_t *map, uint32_t s
         return;
     }
     if (is_when(map->homing_failed, status)) {
-        canraw_axis_fault(self, map, CANRAW_FAULT_HOMING);
+        canraw_axis_fault(self, map, CANRAW_FAULT_HOMING, now_us);
     } else if (!is_done) {
         self->is_homing_seen = true;
     } else if (self->is_homing_seen || now_us - self->told_us >= HOMING_BEGIN_US) {
@@ -102,13 +124,14 @@ static void take_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t st
             self->state = DRIVE_FAULT;
             self->fault_code = code != 0 ? code : status != 0 ? status : 1u;
             self->guard = (drive_guard_t){.jump_q32 = 0};
-            const bool is_stopping = self->pending == CANRAW_STOP || self->pending == CANRAW_DISABLE;
-            self->pending = is_stopping ? self->pending : CANRAW_NOTHING;
+            self->reset_asked_us = 0;
+            self->pending = canraw_axis_is_stopping(self) ? self->pending : CANRAW_NOTHING;
         }
     } else if (self->reset_until_us != 0 && self->pending != CANRAW_RESET) {
         self->state = DRIVE_DISABLED;
         self->fault_code = 0;
         self->reset_until_us = 0;
+        self->reset_asked_us = 0;
     }
 }
 
@@ -169,14 +192,14 @@ static void take_beside(canraw_axis_t *self, const canraw_frame_t *frame, unsign
 }
 
 /* It is there once it has been started up, and all that it has to tell has come since. */
-static void note_online(canraw_axis_t *self, const canraw_map_t *map)
+static void note_online(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
 {
     if (self->is_online || !self->is_placed || !canraw_startup_is_over(self, map) ||
         (map->status_reply.length != 0 && !self->has_status)) {
         return;
     }
-    if (self->is_energized) { /* lost under torque, and what stopped the others may not have reached it */
-        tell(self, map, CANRAW_DISABLE);
+    if (self->is_energized && !canraw_axis_is_stopping(self)) { /* what it was told when it was lost may not have reached it */
+        tell_stop(self, map, now_us);
     }
     self->is_online = true;
 }
@@ -199,7 +222,7 @@ static bool take_position(canraw_axis_t *self, const canraw_map_t *map, const ca
     self->has_actual = true;
     self->actual_us = now_us;
     take_beside(self, reply, axis->reply_slot, data, now_us);
-    note_online(self, map);
+    note_online(self, map, now_us);
     if (status != NULL && map->status_reply.length == 0) {
         take_status(self, map, (uint32_t)canraw_extract(status, data), now_us);
     }
@@ -215,7 +238,7 @@ static bool take_status_reply(canraw_axis_t *self, const canraw_map_t *map, unsi
     self->has_status = true;
     self->status_us = now_us;
     take_beside(self, reply, slot, data, now_us);
-    note_online(self, map);
+    note_online(self, map, now_us);
     take_status(self, map, (uint32_t)canraw_extract(canraw_find_of(reply, CANRAW_STATUS, slot), data), now_us);
     return true;
 }
@@ -294,8 +317,42 @@ static bool is_enabled(const canraw_axis_t *self, const canraw_map_t *map)
 void canraw_axis_note_off(canraw_axis_t *self, const canraw_map_t *map)
 {
     const bool is_down = self->state == DRIVE_DISABLED || self->state == DRIVE_FAULT;
-    if (self->is_online && is_down && is_heard(self, map) && !is_when(map->enabled_when, self->status)) {
+    const bool is_over = is_heard(self, map) && !quick_stop_is_active(&self->quick_stop); /* until then it brakes */
+    if (self->is_online && is_down && is_over && !is_when(map->enabled_when, self->status)) {
         self->is_energized = false;
+    }
+}
+
+/* A drive that says nothing of faults is believed to have none after a reset. */
+static void begin_reset(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
+{
+    self->reset_asked_us = 0;
+    tell(self, map, CANRAW_RESET);
+    if (map->fault_when.mask != 0) {
+        self->reset_until_us = now_us + RESET_US;
+    } else {
+        self->state = DRIVE_DISABLED;
+        self->fault_code = 0;
+    }
+}
+
+bool canraw_axis_is_stopping(const canraw_axis_t *self)
+{
+    return self->pending == CANRAW_STOP || self->pending == CANRAW_DISABLE || quick_stop_is_active(&self->quick_stop);
+}
+
+/* What follows a command that stops the drive, once it has gone out: torque off at rest, then a reset that was asked for. */
+static void step_stop(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
+{
+    if (self->pending == CANRAW_NOTHING &&
+        quick_stop_step(&self->quick_stop, self->actual_q32, self->actual_us, self->told_us, now_us)) {
+        tell(self, map, CANRAW_DISABLE);
+    }
+    if (self->reset_asked_us != 0 && now_us - self->reset_asked_us > RESET_WAIT_US) {
+        self->reset_asked_us = 0;
+    }
+    if (self->reset_asked_us != 0 && !canraw_axis_is_stopping(self)) {
+        begin_reset(self, map, now_us);
     }
 }
 
@@ -305,11 +362,12 @@ void canraw_axis_step(canraw_axis_t *self, const canraw_map_t *map, uint64_t now
     const bool is_position_old = self->is_placed && now_us - self->actual_us > silent_us;
     const bool is_status_old = self->has_status && now_us - self->status_us > silent_us * map->status_every;
     if (is_position_old || is_status_old) {
-        canraw_axis_lose(self, map);
+        canraw_axis_lose(self, map, now_us);
     }
     if (self->reset_until_us != 0 && now_us > self->reset_until_us) {
         self->reset_until_us = 0;
     }
+    step_stop(self, map, now_us);
     if (!self->is_begun) { /* a request is seen in one poll before it can end in the next */
         self->is_begun = true;
     } else if (self->state == DRIVE_ENABLING && is_enabled(self, map)) {
@@ -344,18 +402,6 @@ static void begin_homing(canraw_axis_t *self, const canraw_map_t *map, uint64_t 
     self->is_homing_over = !has(map, CANRAW_HOME);
 }
 
-/* A drive that says nothing of faults is believed to have none after a reset. */
-static void begin_reset(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
-{
-    tell(self, map, CANRAW_RESET);
-    if (map->fault_when.mask != 0) {
-        self->reset_until_us = now_us + RESET_US;
-    } else {
-        self->state = DRIVE_DISABLED;
-        self->fault_code = 0;
-    }
-}
-
 void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_request_t request, uint64_t now_us)
 {
     switch (request) {
@@ -371,17 +417,17 @@ void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_re
         break;
     case DRIVES_DISABLE:
     case DRIVES_QUICK_STOP:
+        self->reset_asked_us = 0;
         if (request == DRIVES_QUICK_STOP) {
-            tell_stop(self, map);
-        } else {
+            tell_stop(self, map, now_us);
+        } else if (!canraw_axis_is_stopping(self)) { /* that goes on to its end */
             tell(self, map, CANRAW_DISABLE);
         }
         self->state = self->state != DRIVE_FAULT ? DRIVE_DISABLED : DRIVE_FAULT;
         break;
     case DRIVES_RESET_FAULT:
-        if (self->state == DRIVE_FAULT) {
-            begin_reset(self, map, now_us);
-        }
+        self->reset_asked_us = self->state == DRIVE_FAULT ? now_us : 0; /* as soon as it has been stopped */
+        step_stop(self, map, now_us);
         break;
     }
 }
@@ -410,12 +456,13 @@ guard_limits_t canraw_axis_limits(const canraw_axis_t *self, const canraw_axis_m
                             .window_q32 = axis->following_max_q32};
 }
 
-void canraw_axis_watch(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, q32_t setpoint_q32)
+void canraw_axis_watch(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, q32_t setpoint_q32,
+                       uint64_t now_us)
 {
     const guard_limits_t limits = canraw_axis_limits(self, axis);
     const drive_guard_t guard = guard_judge(setpoint_q32, &limits);
     if (drive_guard_is_found(&guard)) {
-        canraw_axis_fault_of_guard(self, map, &guard);
+        canraw_axis_fault_of_guard(self, map, &guard, now_us);
     }
 }
 

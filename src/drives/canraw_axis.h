@@ -8,8 +8,8 @@
 #include "heave/canraw.h"
 #include "heave/guard.h"
 
-/** A drive of which nothing has been heard (any more). */
-void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map);
+/** A drive of which nothing has been heard (any more). It is stopped if it has torque. */
+void canraw_axis_lose(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us);
 
 /** Takes a frame on its reply_id in.
  *  @return false where it means nothing here */
@@ -26,6 +26,9 @@ void canraw_axis_note_off(canraw_axis_t *self, const canraw_map_t *map);
 /** Carries out a request that is allowed. */
 void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_request_t request, uint64_t now_us);
 
+/** Whether what stops it has not gone out yet, or its torque is still to be taken after that. */
+bool canraw_axis_is_stopping(const canraw_axis_t *self);
+
 /** Whether set-points go out. */
 bool canraw_axis_is_streaming(const canraw_axis_t *self, const canraw_map_t *map);
 
@@ -34,13 +37,15 @@ bool canraw_axis_is_streaming(const canraw_axis_t *self, const canraw_map_t *map
 int64_t canraw_axis_held(const canraw_axis_t *self, const canraw_map_t *map);
 
 /** Stops following where a set-point is too far away. */
-void canraw_axis_watch(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, q32_t setpoint_q32);
+void canraw_axis_watch(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, q32_t setpoint_q32,
+                       uint64_t now_us);
 
-/** The drive stops in DRIVE_FAULT, by the map's stop frame, else its disable frame, else by hearing nothing more. */
-void canraw_axis_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t code);
+/** The drive stops in DRIVE_FAULT, by the map's stop frame and its disable frame at rest, or the one that it has, else by hearing
+ *  nothing more. */
+void canraw_axis_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t code, uint64_t now_us);
 
 /** Fails for its set-points. */
-void canraw_axis_fault_of_guard(canraw_axis_t *self, const canraw_map_t *map, const drive_guard_t *guard);
+void canraw_axis_fault_of_guard(canraw_axis_t *self, const canraw_map_t *map, const drive_guard_t *guard, uint64_t now_us);
 
 /** What a set-point of it is measured against. */
 guard_limits_t canraw_axis_limits(const canraw_axis_t *self, const canraw_axis_map_t *axis);

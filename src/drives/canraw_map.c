@@ -199,7 +199,8 @@ hv_status_t canraw_init(canraw_t *self, const canraw_map_t *map, hal_can_t can)
     }
     *self = (canraw_t){.map = map, .can = can};
     for (unsigned k = 0; k < map->axes; k++) {
-        canraw_axis_lose(&self->axis[k], map);
+        self->axis[k].pending = CANRAW_NOTHING;
+        canraw_axis_lose(&self->axis[k], map, 0);
     }
     return HV_OK;
 }

@@ -5,6 +5,7 @@
 #include "heave/modbus_drive.h"
 
 #include "modbus_drive_axis.h"
+#include "modbus_drive_phase.h"
 
 #define SHARE_ONE     (INT64_C(1) << 30)
 #define PERIOD_MAX_US 10000000u
@@ -226,14 +227,17 @@ static hv_status_t drive_send(void *ctx, uint64_t now_us, const q32_t setpoint_q
     return HV_OK;
 }
 
-static bool is_allowed(const modbus_drive_t *self, drives_request_t request)
+/* Whether drives allow a request. One that is being stopped gets torque again only after it has lost it. */
+static hv_status_t judge(const modbus_drive_t *self, unsigned from, unsigned end, drives_request_t request)
 {
-    for (unsigned k = 0; k < self->map->axes; k++) {
+    hv_status_t status = HV_OK;
+    for (unsigned k = from; k < end; k++) {
         if (!drives_allow(request, modbus_drive_axis_state(&self->axis[k]))) {
-            return false;
+            return HV_ERR_STATE;
         }
+        status = request == DRIVES_ENABLE && modbus_drive_phase_is_stopping(&self->axis[k]) ? HV_ERR_AGAIN : status;
     }
-    return true;
+    return status;
 }
 
 /* What stops drives is handed over at once and replaces set-points that wait: there may be no other cycle. */
@@ -243,8 +247,9 @@ static hv_status_t drive_request(void *ctx, drives_request_t request)
     if (!is_any_online(self)) {
         return HV_ERR_IO;
     }
-    if (!is_allowed(self, request)) {
-        return HV_ERR_STATE;
+    const hv_status_t status = judge(self, 0, self->map->axes, request);
+    if (status != HV_OK) {
+        return status;
     }
     self->is_one_by_one = false;
     for (unsigned k = 0; k < self->map->axes; k++) {
@@ -261,8 +266,9 @@ static hv_status_t drive_request_one(void *ctx, uint8_t k, drives_request_t requ
     if (!is_any_online(self)) {
         return HV_ERR_IO;
     }
-    if (!drives_allow(request, modbus_drive_axis_state(&self->axis[k]))) {
-        return HV_ERR_STATE;
+    const hv_status_t status = judge(self, k, k + 1u, request);
+    if (status != HV_OK) {
+        return status;
     }
     modbus_drive_axis_request(&self->axis[k], self->map, request, self->now_us);
     modbus_drive_axis_end_broadcast(&self->axis[k]);
@@ -292,19 +298,28 @@ static void drive_report(void *ctx, uint8_t axis, drive_report_t *out)
     modbus_drive_axis_words(&self->axis[axis], self->map, self->map->axis[axis].unit, out);
 }
 
-bool modbus_drive_is_told(const modbus_drive_t *self)
+static bool drive_is_stopping(void *ctx)
 {
+    const modbus_drive_t *self = ctx;
     for (unsigned k = 0; k < self->map->axes; k++) {
-        if (self->axis[k].job == MODBUS_DRIVE_JOB_COMMAND) {
-            return false;
+        if (modbus_drive_phase_is_stopping(&self->axis[k])) {
+            return true;
         }
     }
-    return true;
+    return false;
 }
 
 drives_t modbus_drive_hal(modbus_drive_t *self)
 {
-    static const drives_ops_t k_ops = {drive_poll, drive_send,        drive_request, drive_count, drive_report,
-                                       NULL,       drive_request_one, drive_counts,  NULL,        NULL};
+    static const drives_ops_t k_ops = {
+        .poll = drive_poll,
+        .send = drive_send,
+        .request = drive_request,
+        .count = drive_count,
+        .report = drive_report,
+        .request_one = drive_request_one,
+        .counts = drive_counts,
+        .is_stopping = drive_is_stopping,
+    };
     return (drives_t){&k_ops, self};
 }

@@ -89,15 +89,17 @@ static uint32_t field_of(const modbus_drive_axis_t *self, const modbus_drive_map
 }
 
 /* Torque that can be taken away. Where a drive says whether it has torque, off is what it says when it was asked after the last
- * command; else it was asked for, and is off once the drive has taken what stops it. */
+ * command; else it was asked for, and is off once the drive has taken `disable`. A drive in a quick stop may say that it is not
+ * enabled, and still brakes. */
 static void note_torque(modbus_drive_axis_t *self, const modbus_drive_map_t *map)
 {
     const bool is_down =
         !modbus_drive_phase_is_up(self) || self->phase == MODBUS_DRIVE_READY || self->phase == MODBUS_DRIVE_FAULT;
     const bool is_newer = self->job != MODBUS_DRIVE_JOB_COMMAND && self->read_us >= self->mark_us;
+    const bool is_over = is_newer && !quick_stop_is_active(&self->quick_stop);
     if (modbus_drive_phase_is_when(map->enabled_when, self->status)) {
         self->is_energized = modbus_drive_phase_has(map, MODBUS_DRIVE_DISABLE);
-    } else if (map->enabled_when.mask != 0 && is_down && is_newer) {
+    } else if (map->enabled_when.mask != 0 && is_down && is_over) {
         self->is_energized = false;
     }
 }

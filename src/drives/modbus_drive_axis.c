@@ -4,8 +4,9 @@
 #include "modbus_drive_axis.h"
 #include "modbus_drive_phase.h"
 
-#define REFUSED_US 2000000u /* until a drive that is not as it has to be is looked at again */
-#define RESET_US   1000000u /* after a reset, the drive has so long to take its fault back */
+#define REFUSED_US    2000000u /* until a drive that is not as it has to be is looked at again */
+#define RESET_WAIT_US 2000000u /* it may wait so long for the end of a stop: nobody counts on an older one */
+#define RESET_US      1000000u /* after a reset, the drive has so long to take its fault back */
 
 void modbus_drive_axis_init(modbus_drive_axis_t *self, const modbus_drive_map_t *map)
 {
@@ -57,8 +58,15 @@ void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t 
     if (self->phase == MODBUS_DRIVE_STARTING && self->job == MODBUS_DRIVE_JOB_STARTUP && self->step >= map->items) {
         end_startup(self, map, now_us);
     }
-    if (self->is_reset_due && !modbus_drive_phase_is_stopping(self)) {
-        self->is_reset_due = false;
+    if (self->job == MODBUS_DRIVE_NO_JOB &&
+        quick_stop_step(&self->quick_stop, self->actual_q32, self->actual_us, self->mark_us, now_us)) {
+        modbus_drive_phase_tell(self, map, MODBUS_DRIVE_DISABLE);
+    }
+    if (self->reset_asked_us != 0 && now_us - self->reset_asked_us > RESET_WAIT_US) {
+        self->reset_asked_us = 0;
+    }
+    if (self->reset_asked_us != 0 && !modbus_drive_phase_is_stopping(self)) {
+        self->reset_asked_us = 0;
         begin_reset(self, map, now_us);
     }
     if (self->phase == MODBUS_DRIVE_PLACING) {
@@ -177,19 +185,20 @@ static void begin_following(modbus_drive_axis_t *self, const modbus_drive_map_t 
     }
 }
 
+/* What stops it already goes on to its end. */
 static void stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map, bool is_quick, uint64_t now_us)
 {
     if (is_quick) {
-        modbus_drive_phase_tell_stop(self, map);
+        modbus_drive_phase_tell_stop(self, map, now_us);
         self->is_broadcast = map->is_broadcast && self->job == MODBUS_DRIVE_JOB_COMMAND;
-    } else {
+    } else if (!modbus_drive_phase_is_stopping(self)) {
         modbus_drive_phase_tell(self, map, MODBUS_DRIVE_DISABLE);
     }
     if (self->phase != MODBUS_DRIVE_FAULT) {
         modbus_drive_phase_enter(self, MODBUS_DRIVE_READY, now_us);
     }
     self->reset_until_us = 0;
-    self->is_reset_due = false;
+    self->reset_asked_us = 0;
 }
 
 void modbus_drive_axis_request(modbus_drive_axis_t *self, const modbus_drive_map_t *map, drives_request_t request,
@@ -215,7 +224,7 @@ void modbus_drive_axis_request(modbus_drive_axis_t *self, const modbus_drive_map
         stop(self, map, request == DRIVES_QUICK_STOP, now_us);
         break;
     case DRIVES_RESET_FAULT:
-        self->is_reset_due = self->phase == MODBUS_DRIVE_FAULT; /* as soon as it has been told to stop */
+        self->reset_asked_us = self->phase == MODBUS_DRIVE_FAULT ? now_us : 0; /* as soon as it has been stopped */
         break;
     }
 }

@@ -32,9 +32,16 @@ void modbus_drive_phase_tell(modbus_drive_axis_t *self, const modbus_drive_map_t
     self->command = command;
 }
 
-void modbus_drive_phase_tell_stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map)
+void modbus_drive_phase_tell_stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
-    modbus_drive_phase_tell(self, map, modbus_drive_phase_has(map, MODBUS_DRIVE_STOP) ? MODBUS_DRIVE_STOP : MODBUS_DRIVE_DISABLE);
+    if (!modbus_drive_phase_has(map, MODBUS_DRIVE_STOP)) {
+        modbus_drive_phase_tell(self, map, MODBUS_DRIVE_DISABLE);
+        return;
+    }
+    modbus_drive_phase_tell(self, map, MODBUS_DRIVE_STOP);
+    if (modbus_drive_phase_has(map, MODBUS_DRIVE_DISABLE)) {
+        quick_stop_begin(&self->quick_stop, now_us);
+    }
 }
 
 void modbus_drive_phase_note_trouble(modbus_drive_axis_t *self, uint32_t trouble, uint16_t object, uint64_t now_us)
@@ -57,7 +64,8 @@ void modbus_drive_phase_lose(modbus_drive_axis_t *self, const modbus_drive_map_t
     self->period_us = map->expected_us;
     self->setpoint_us = 0;
     self->reset_until_us = 0;
-    self->is_reset_due = false;
+    self->reset_asked_us = 0;
+    self->quick_stop = (quick_stop_t){.until_us = 0}; /* the start-up begins with `disable` */
     self->next_read_us = now_us + PROBE_US;
 }
 
@@ -67,8 +75,8 @@ void modbus_drive_phase_fail(modbus_drive_axis_t *self, const modbus_drive_map_t
     modbus_drive_phase_note_trouble(self, code, 0, now_us);
     self->guard = (drive_guard_t){.jump_q32 = 0};
     self->reset_until_us = 0;
-    self->is_reset_due = false;
-    modbus_drive_phase_tell_stop(self, map);
+    self->reset_asked_us = 0;
+    modbus_drive_phase_tell_stop(self, map, now_us);
 }
 
 bool modbus_drive_phase_is_up(const modbus_drive_axis_t *self)
@@ -81,9 +89,15 @@ bool modbus_drive_phase_is_faulty(const modbus_drive_axis_t *self, const modbus_
     return map->fault_when.mask != 0 ? modbus_drive_phase_is_when(map->fault_when, self->status) : self->alarm != 0;
 }
 
+static bool is_command(const modbus_drive_axis_t *self, modbus_drive_command_t command)
+{
+    return self->job == MODBUS_DRIVE_JOB_COMMAND && self->command == command;
+}
+
 bool modbus_drive_phase_is_stopping(const modbus_drive_axis_t *self)
 {
-    return self->job == MODBUS_DRIVE_JOB_COMMAND && (self->command == MODBUS_DRIVE_STOP || self->command == MODBUS_DRIVE_DISABLE);
+    return is_command(self, MODBUS_DRIVE_STOP) || is_command(self, MODBUS_DRIVE_DISABLE) ||
+           quick_stop_is_active(&self->quick_stop);
 }
 
 void modbus_drive_phase_place(modbus_drive_axis_t *self, uint64_t now_us)
@@ -116,7 +130,7 @@ void modbus_drive_phase_begin_enabling(modbus_drive_axis_t *self, const modbus_d
 
 void modbus_drive_phase_end_command(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
-    self->is_energized = self->is_energized && !(modbus_drive_phase_is_stopping(self) && map->enabled_when.mask == 0);
+    self->is_energized = self->is_energized && !(is_command(self, MODBUS_DRIVE_DISABLE) && map->enabled_when.mask == 0);
     modbus_drive_phase_start_job(self, self->phase == MODBUS_DRIVE_STARTING ? MODBUS_DRIVE_JOB_STARTUP : MODBUS_DRIVE_NO_JOB);
     self->mark_us = now_us;
     if (self->phase == MODBUS_DRIVE_ENABLING) {
@@ -143,6 +157,7 @@ void modbus_drive_phase_take_fault(modbus_drive_axis_t *self, const modbus_drive
             modbus_drive_phase_enter(self, MODBUS_DRIVE_FAULT, now_us);
             modbus_drive_phase_note_trouble(self, own_code(self), 0, now_us);
             self->reset_until_us = 0;
+            self->reset_asked_us = 0;
             if (!modbus_drive_phase_is_stopping(self)) {
                 modbus_drive_phase_start_job(self, MODBUS_DRIVE_NO_JOB);
             }
@@ -152,5 +167,6 @@ void modbus_drive_phase_take_fault(modbus_drive_axis_t *self, const modbus_drive
         modbus_drive_phase_enter(self, MODBUS_DRIVE_READY, now_us);
         modbus_drive_phase_note_trouble(self, MODBUS_DRIVE_NO_TROUBLE, 0, now_us);
         self->reset_until_us = 0;
+        self->reset_asked_us = 0;
     }
 }

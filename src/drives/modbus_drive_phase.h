@@ -23,7 +23,8 @@ bool modbus_drive_phase_is_up(const modbus_drive_axis_t *self);
 /** Whether the drive itself reports a fault. */
 bool modbus_drive_phase_is_faulty(const modbus_drive_axis_t *self, const modbus_drive_map_t *map);
 
-/** Whether a command that stops the drive has not been written yet. Nothing may replace it. */
+/** Whether a command that stops the drive has not been written yet, or its torque is still to be taken after that. Nothing may
+ *  replace it. */
 bool modbus_drive_phase_is_stopping(const modbus_drive_axis_t *self);
 
 /** What is written now, where that is a set-point or a command. */
@@ -40,8 +41,9 @@ void modbus_drive_phase_start_job(modbus_drive_axis_t *self, modbus_drive_job_t 
 /** Writes a command; nothing where the map has no such command. */
 void modbus_drive_phase_tell(modbus_drive_axis_t *self, const modbus_drive_map_t *map, modbus_drive_command_t command);
 
-/** Writes what stops the drive: `stop`, or `disable` where the map has no `stop`. */
-void modbus_drive_phase_tell_stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map);
+/** Writes what stops the drive: `stop`, or `disable` where the map has no `stop`. Where it has both, `disable` follows at rest.
+ */
+void modbus_drive_phase_tell_stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us);
 
 /** Why the drive is not usable, and since when. object: the register concerned, or 0 */
 void modbus_drive_phase_note_trouble(modbus_drive_axis_t *self, uint32_t trouble, uint16_t object, uint64_t now_us);

@@ -62,7 +62,8 @@ static const char *phase_text(const modbus_drive_axis_t *self)
         [MODBUS_DRIVE_HOMING] = "homing",
         [MODBUS_DRIVE_FAULT] = "fault",
     };
-    const bool is_stopping = self->phase == MODBUS_DRIVE_READY && self->job == MODBUS_DRIVE_JOB_COMMAND;
+    const bool is_stopping =
+        self->phase == MODBUS_DRIVE_READY && (self->job == MODBUS_DRIVE_JOB_COMMAND || quick_stop_is_active(&self->quick_stop));
     return is_stopping ? "stopping" : k_texts[self->phase];
 }
 

@@ -4,10 +4,11 @@
 #include "shutdown.h"
 
 #include "fault_watch.h"
+#include "heave/quick_stop.h"
 #include "heave/text.h"
 
-#define ENERGIZED_TIMEOUT_US 3000000u /* ramps, brakes, a line that has to try again */
-#define LOST_TIMEOUT_US      1000000u /* in which a drive may come back and be told */
+#define ENERGIZED_TIMEOUT_US (QUICK_STOP_MOST_US + 1000000u) /* a quick stop, brakes, a line that has to try again */
+#define LOST_TIMEOUT_US      1000000u                        /* in which a drive may come back and be told */
 
 static unsigned drive_count(const gateway_t *self)
 {

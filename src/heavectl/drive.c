@@ -89,7 +89,10 @@ static void show_seen(unsigned drive, const cJSON *axis)
     if (cJSON_HasObjectItem(report, "channel")) {
         printf(".%.0f", number(report, "channel"));
     }
-    printf(_(": %s, %s\n"), translate(drive_text(axis, "drive")),
+    const char *state = drive_text(axis, "drive");
+    const bool is_off = strcmp(state, "disabled") == 0 || strcmp(state, "fault") == 0;
+    const bool is_still_on = is_off && cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(axis, "torque"));
+    printf(_(": %s%s, %s\n"), translate(state), is_still_on ? _(", torque still on") : "",
            cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(axis, "homed")) ? _("homed") : _("not homed"));
     if (cJSON_IsNumber(actual)) {
         printf(_("  position: %.3f %s\n"), actual->valuedouble, is_angle ? "deg" : "mm");

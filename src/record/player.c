@@ -111,8 +111,13 @@ static uint8_t told_count(void *ctx)
 
 drives_t player_drives(player_t *self)
 {
-    static const drives_ops_t k_ops = {told_poll, told_send,        told_request, told_count, NULL,
-                                       NULL,      told_request_one, NULL,         NULL,       NULL};
+    static const drives_ops_t k_ops = {
+        .poll = told_poll,
+        .send = told_send,
+        .request = told_request,
+        .count = told_count,
+        .request_one = told_request_one,
+    };
     return (drives_t){&k_ops, self};
 }
 

@@ -181,6 +181,7 @@ static void write_axis(json_t *json, const snapshot_t *s, unsigned axis, q32_t s
         json_null(json, actual_key);
     }
     json_text(json, "drive", k_drive_states[drive->state]);
+    json_bool(json, "torque", drive_has_torque(drive));
     json_bool(json, "homed", drive->is_homed);
     json_number(json, "device_code", drive->fault_code);
     write_service(json, drive, &s->report[axis], s->now_us);

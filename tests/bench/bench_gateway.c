@@ -135,8 +135,12 @@ static uint32_t dropped_log(void *ctx)
 static gateway_io_t io_of(bench_gateway_t *b)
 {
     static const hal_udp_ops_t k_udp = {.recv = take_text};
-    static const drives_ops_t k_drives = {poll_drives, send_drives, request_drives, count_drives, NULL,
-                                          NULL,        NULL,        NULL,           NULL,         NULL};
+    static const drives_ops_t k_drives = {
+        .poll = poll_drives,
+        .send = send_drives,
+        .request = request_drives,
+        .count = count_drives,
+    };
     static const hal_relays_ops_t k_relays = {write_relays, NULL, count_relays};
     static const hal_inputs_ops_t k_inputs = {read_inputs, present_inputs};
     static const hal_log_ops_t k_log = {write_log, dropped_log};

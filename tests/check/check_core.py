@@ -286,7 +286,7 @@ SLEEP, BARE = re.compile(r"\bsleep\("), re.compile(r"\b(?:took|passed|elapsed|ne
 
 def check_sleeps(suite, root):
     tests = root / "tests"
-    virtual = {"person.py", "plain_master.py"}  # what the scripts below share
+    virtual = {"person.py", "plain_master.py", "twin_bench.py"}  # what the scripts below share
     virtual |= {name for path in tests.rglob("CMakeLists.txt") for name in VIRTUAL.findall(path.read_text(encoding="utf-8"))}
     texts = {str(path.relative_to(tests)): path.read_text(encoding="utf-8") for path in sorted(tests.rglob("*.py")) if path.name not in virtual and path != Path(__file__).resolve()}
     with suite.case("tests in real time wait for causes, not for time"):

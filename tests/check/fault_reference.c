@@ -31,7 +31,9 @@ int main(void)
            "`heavectl reset` with the cause gone. The first one is shown, all are counted, and the worst reaction wins.\n\n"
            "Reactions: `stop` is a controlled stop of all axes together, then the drives are disabled. `quick-stop` lets every "
            "drive stop now\n"
-           "by its own ramp, all in the same cycle. `silent` ends all set-points, as nobody hears them: the drives' own "
+           "by its own ramp, all in the same cycle; its torque goes off when it stands still, after 5 s at the latest. `silent` "
+           "ends "
+           "all set-points, as nobody hears them: the drives' own "
            "watchdogs act.\n");
     print_language(FAULT_ENGLISH, "English", "| code | name | what | cause | reaction | remedy |");
     print_language(FAULT_CHINESE, "中文", "| 代码 | 名称 | 现象 | 原因 | 反应 | 处理 |");

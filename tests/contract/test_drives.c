@@ -23,6 +23,9 @@ typedef struct {
     void (*settle)(uint64_t now_us);             /**< lets the other side act up to now */
     void (*fault_axis)(uint8_t axis);            /**< the drive of an axis fails; NULL: cannot */
     void (*set_power)(uint8_t axis, bool is_on); /**< takes an axis off the bus and back; NULL: cannot */
+    bool (*has_torque)(uint8_t axis);            /**< seen at the drive; NULL: nothing takes torque from these drives */
+    void (*glide)(uint32_t for_us);              /**< a stop leaves the drives their torque, and they go on for so long, at more
+                                                    than 10 mm/s; NULL: they stop dead */
 } fixture_t;
 
 #define AXES     DRIVES_MAX
@@ -89,6 +92,11 @@ static void power_sim(uint8_t axis, bool is_on)
     inject(is_on ? SIM_DRIVES_RECOVER : SIM_DRIVES_OFFLINE, axis);
 }
 
+static bool has_torque_sim(uint8_t axis)
+{
+    return sim.axis[axis].state != DRIVE_DISABLED && sim.axis[axis].state != DRIVE_FAULT;
+}
+
 /* Drives with frames of their own, behind the raw CAN driver. */
 
 static sim_can_bus_t canraw_bus;
@@ -146,6 +154,18 @@ static void fault_canraw(uint8_t axis)
 static void power_canraw(uint8_t axis, bool is_on)
 {
     canraw_slave.drive[axis].is_on = is_on;
+}
+
+static bool has_torque_canraw(uint8_t axis)
+{
+    return canraw_slave.drive[axis].is_enabled;
+}
+
+static void glide_canraw(uint32_t for_us)
+{
+    canraw_slave.is_holding_on_stop = true;
+    canraw_slave.glide_takes_us = for_us;
+    canraw_slave.glide_counts = 60;
 }
 
 /* CANopen drives, behind the CiA 402 driver. */
@@ -256,6 +276,21 @@ static void power_cia402(uint8_t axis, bool is_on)
     cia402_slave_power(&cia402_slave, axis, is_on);
 }
 
+/* Operation enabled, quick stop, fault reaction. */
+static bool has_torque_cia402(uint8_t axis)
+{
+    const uint16_t status = cia402_slave.drive[axis].status;
+    return status == 0x27 || status == 0x07 || status == 0x0F;
+}
+
+static void glide_cia402(uint32_t for_us)
+{
+    for (uint8_t k = 0; k < AXES; k++) {
+        cia402_slave.drive[k].quick_us = for_us;
+        cia402_slave.drive[k].quick_counts = 20;
+    }
+}
+
 /* Drives behind Modbus lines: one each (TCP), or one for all (RTU). */
 
 static modbus_slave_t modbus_slave;
@@ -322,17 +357,29 @@ static void power_modbus(uint8_t axis, bool is_on)
     modbus_slave.drive[axis].is_on = is_on;
 }
 
+static bool has_torque_modbus(uint8_t axis)
+{
+    return modbus_slave.drive[axis].is_enabled;
+}
+
+static void glide_modbus(uint32_t for_us)
+{
+    modbus_slave.is_holding_on_stop = true;
+    modbus_slave.glide_takes_us = for_us;
+    modbus_slave.glide_counts = modbus_slave.is_small ? 2 : 60;
+}
+
 static const fixture_t k_fixtures[] = {
-    {"sim", open_sim, close_sim, settle_sim, fault_sim, power_sim},
-    {"canraw-plain", open_canraw_plain, close_sim, settle_canraw, NULL, power_canraw},
-    {"canraw-rich", open_canraw_rich, close_sim, settle_canraw, fault_canraw, power_canraw},
-    {"cia402-csp", open_cia402_csp, close_sim, settle_cia402, fault_cia402, power_cia402},
-    {"cia402-slow", open_cia402_slow, close_sim, settle_cia402, fault_cia402, power_cia402},
-    {"cia402-ip", open_cia402_ip, close_sim, settle_cia402, fault_cia402, power_cia402},
-    {"cia402-pp", open_cia402_pp, close_sim, settle_cia402, fault_cia402, power_cia402},
-    {"modbus-tcp", open_modbus_tcp, close_sim, settle_modbus, fault_modbus, power_modbus},
-    {"modbus-rtu", open_modbus_rtu, close_sim, settle_modbus, fault_modbus, power_modbus},
-    {"modbus-small", open_modbus_small, close_sim, settle_modbus, fault_modbus, power_modbus},
+    {"sim", open_sim, close_sim, settle_sim, fault_sim, power_sim, has_torque_sim, NULL},
+    {"canraw-plain", open_canraw_plain, close_sim, settle_canraw, NULL, power_canraw, NULL, NULL},
+    {"canraw-rich", open_canraw_rich, close_sim, settle_canraw, fault_canraw, power_canraw, has_torque_canraw, glide_canraw},
+    {"cia402-csp", open_cia402_csp, close_sim, settle_cia402, fault_cia402, power_cia402, has_torque_cia402, glide_cia402},
+    {"cia402-slow", open_cia402_slow, close_sim, settle_cia402, fault_cia402, power_cia402, has_torque_cia402, glide_cia402},
+    {"cia402-ip", open_cia402_ip, close_sim, settle_cia402, fault_cia402, power_cia402, has_torque_cia402, glide_cia402},
+    {"cia402-pp", open_cia402_pp, close_sim, settle_cia402, fault_cia402, power_cia402, has_torque_cia402, glide_cia402},
+    {"modbus-tcp", open_modbus_tcp, close_sim, settle_modbus, fault_modbus, power_modbus, has_torque_modbus, glide_modbus},
+    {"modbus-rtu", open_modbus_rtu, close_sim, settle_modbus, fault_modbus, power_modbus, has_torque_modbus, glide_modbus},
+    {"modbus-small", open_modbus_small, close_sim, settle_modbus, fault_modbus, power_modbus, has_torque_modbus, glide_modbus},
 };
 
 static hv_status_t poll_once(void)
@@ -406,9 +453,15 @@ static void await(drive_state_t state)
     assert_all(state);
 }
 
+/* Drives that are being stopped take it later. */
 static void enable(void)
 {
-    request_ok(DRIVES_ENABLE);
+    hv_status_t status = drives_request(hal, DRIVES_ENABLE);
+    for (int i = 0; i < 6000 && status == HV_ERR_AGAIN; i++) {
+        cycle();
+        status = drives_request(hal, DRIVES_ENABLE);
+    }
+    TEST_ASSERT_EQUAL(HV_OK, status);
     await(DRIVE_ENABLED);
 }
 
@@ -606,27 +659,13 @@ static void test_request_disable_and_quick_stop_end_in_disabled(void)
         enable();
         request_ok(k_requests[i]);
         await(DRIVE_DISABLED);
-        request_ok(DRIVES_ENABLE);
+        for (int n = 0; n < 6000 && drives_request(hal, DRIVES_ENABLE) == HV_ERR_AGAIN; n++) {
+            cycle();
+        }
         cycle();
         request_ok(k_requests[i]);
         await(DRIVE_DISABLED);
     }
-}
-
-static void test_request_home_needs_enabled_and_returns_there_homed(void)
-{
-    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_HOME));
-    enable();
-    request_ok(DRIVES_HOME);
-    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_HOME));
-    await(DRIVE_ENABLED);
-    for (uint8_t k = 0; k < AXES; k++) {
-        TEST_ASSERT_TRUE(feedback[k].is_homed);
-    }
-    for (int i = 0; i < 50; i++) {
-        cycle();
-    }
-    assert_all(DRIVE_ENABLED);
 }
 
 /* ---- one by one ---- */
@@ -655,6 +694,193 @@ static void await_one(uint8_t axis, drive_state_t state)
         }
     }
     TEST_ASSERT_EQUAL(state, feedback[axis].state);
+}
+
+/* --- How a quick stop ends --- */
+
+static unsigned with_torque(void)
+{
+    unsigned count = 0;
+    for (uint8_t k = 0; k < AXES; k++) {
+        count += fixture->has_torque(k);
+    }
+    return count;
+}
+
+/* What has been told of the torque is true of every drive that answers. */
+static void cycle_watched(void)
+{
+    TEST_ASSERT_EQUAL(HV_OK, poll_once());
+    for (uint8_t k = 0; k < AXES; k++) {
+        setpoint_q32[k] = feedback[k].state == DRIVE_ENABLED ? setpoint_q32[k] : feedback[k].actual_mm_q32;
+        TEST_ASSERT_TRUE(feedback[k].is_energized || !fixture->has_torque(k));
+    }
+    TEST_ASSERT_EQUAL(HV_OK, drives_send(hal, now_us, setpoint_q32));
+}
+
+/* Enabled, with drives that keep their torque after a stop and go on for some time.
+ * Returns false where the backend's drives have no torque that can be taken. */
+static bool enable_gliding(uint32_t for_us)
+{
+    if (fixture->has_torque == NULL) {
+        return false;
+    }
+    if (fixture->glide != NULL) {
+        fixture->glide(for_us);
+    }
+    enable();
+    for (int i = 0; i < 50; i++) {
+        cycle_watched();
+    }
+    TEST_ASSERT_EQUAL_UINT(AXES, with_torque());
+    return true;
+}
+
+/* Until no drive has torque, which stays so. Returns the time it took [us]. */
+static uint64_t await_off(void)
+{
+    const uint64_t from_us = now_us;
+    while (with_torque() > 0 && now_us - from_us < 8000000) {
+        cycle_watched();
+    }
+    const uint64_t took_us = now_us - from_us;
+    TEST_ASSERT_EQUAL_UINT(0, with_torque());
+    for (int i = 0; i < 200; i++) {
+        cycle_watched();
+        TEST_ASSERT_EQUAL_UINT(0, with_torque());
+    }
+    TEST_ASSERT_EQUAL_UINT(0, energized());
+    return took_us;
+}
+
+/* A platform would drop under drives that lose their torque in motion, and stay up under those that never lose it. */
+static void test_quick_stop_takes_the_torque_at_rest(void)
+{
+    if (!enable_gliding(400000)) {
+        return;
+    }
+    request_ok(DRIVES_QUICK_STOP);
+    const uint64_t took_us = await_off();
+    TEST_ASSERT_TRUE(fixture->glide == NULL || took_us >= 400000);
+    TEST_ASSERT_TRUE(took_us <= 1000000);
+    assert_all(DRIVE_DISABLED);
+    enable();
+}
+
+static void test_quick_stop_without_rest_ends_after_five_seconds(void)
+{
+    if (!enable_gliding(7000000) || fixture->glide == NULL) {
+        return;
+    }
+    request_ok(DRIVES_QUICK_STOP);
+    const uint64_t took_us = await_off();
+    TEST_ASSERT_TRUE(took_us >= 4900000 && took_us <= 5200000);
+}
+
+/* As the gateway does it: the drive that fails, and then all. */
+static void test_quick_stop_after_a_fault_takes_the_torque_of_all(void)
+{
+    for (int is_own = 0; is_own < 2; is_own++) {
+        if (!enable_gliding(400000) || (is_own == 1 && fixture->fault_axis == NULL)) {
+            return;
+        }
+        if (is_own == 1) {
+            fixture->fault_axis(2);
+        } else {
+            setpoint_q32[2] += MM(50);
+        }
+        for (int i = 0; i < 300 && feedback[2].state != DRIVE_FAULT; i++) {
+            cycle();
+        }
+        TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+        request_ok(DRIVES_QUICK_STOP);
+        TEST_ASSERT_TRUE(await_off() <= 1000000);
+        TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+        request_ok(DRIVES_RESET_FAULT);
+        await(DRIVE_DISABLED);
+    }
+}
+
+/* Neither torque off nor a reset, both asked for in motion, cut it short. */
+static void test_quick_stop_goes_on_beside_other_requests(void)
+{
+    static const drives_request_t k_requests[] = {DRIVES_DISABLE, DRIVES_RESET_FAULT, DRIVES_QUICK_STOP};
+    for (size_t i = 0; i < sizeof k_requests / sizeof k_requests[0]; i++) {
+        if (!enable_gliding(400000)) {
+            return;
+        }
+        setpoint_q32[2] += MM(50);
+        for (int n = 0; n < 300 && feedback[2].state != DRIVE_FAULT; n++) {
+            cycle();
+        }
+        request_ok(DRIVES_QUICK_STOP);
+        for (int n = 0; n < 100; n++) {
+            cycle_watched();
+        }
+        request_ok(k_requests[i]);
+        const uint64_t took_us = await_off();
+        TEST_ASSERT_TRUE(fixture->glide == NULL || took_us >= 250000);
+        request_ok(DRIVES_RESET_FAULT);
+        await(DRIVE_DISABLED);
+    }
+}
+
+/* Asked for again and again, as the gateway does it. */
+static void test_quick_stop_ends_before_torque_comes_back(void)
+{
+    bool was_off[DRIVES_MAX] = {false};
+    if (!enable_gliding(400000)) {
+        return;
+    }
+    request_ok(DRIVES_QUICK_STOP);
+    cycle_watched();
+    for (uint8_t k = 0; k < AXES; k++) {
+        was_off[k] = !fixture->has_torque(k);
+    }
+    for (int i = 0; i < 5000 && !are_all(DRIVE_ENABLED); i++) {
+        const hv_status_t status = drives_request(hal, DRIVES_ENABLE);
+        TEST_ASSERT_TRUE(status == HV_OK || status == HV_ERR_AGAIN);
+        cycle_watched();
+        for (uint8_t k = 0; k < AXES; k++) {
+            was_off[k] |= !fixture->has_torque(k);
+            TEST_ASSERT_TRUE(was_off[k] || feedback[k].state != DRIVE_ENABLED);
+        }
+    }
+    assert_all(DRIVE_ENABLED);
+}
+
+static void test_quick_stop_of_one_drive_takes_its_torque_alone(void)
+{
+    if (!enable_gliding(400000) || hal.ops->request_one == NULL) {
+        return;
+    }
+    TEST_ASSERT_EQUAL(HV_OK, drives_request_one(hal, 1, DRIVES_QUICK_STOP));
+    for (int i = 0; i < 1000; i++) {
+        const hv_status_t status = drives_request_one(hal, 1, DRIVES_ENABLE);
+        TEST_ASSERT_TRUE(status == HV_OK || (status == HV_ERR_AGAIN && fixture->glide != NULL));
+        if (status == HV_OK) {
+            break;
+        }
+        cycle_watched();
+        TEST_ASSERT_TRUE(fixture->has_torque(0) && feedback[0].state == DRIVE_ENABLED);
+    }
+    await_one(1, DRIVE_ENABLED);
+}
+
+static void test_request_home_needs_enabled_and_returns_there_homed(void)
+{
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_HOME));
+    enable();
+    request_ok(DRIVES_HOME);
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, drives_request(hal, DRIVES_HOME));
+    await(DRIVE_ENABLED);
+    for (uint8_t k = 0; k < AXES; k++) {
+        TEST_ASSERT_TRUE(feedback[k].is_homed);
+    }
+    for (int i = 0; i < 50; i++) {
+        cycle();
+    }
+    assert_all(DRIVE_ENABLED);
 }
 
 static void test_request_one_changes_that_axis_and_no_other(void)
@@ -849,6 +1075,12 @@ static void run_contract(void)
     RUN_TEST(test_request_reset_fault_leads_back_to_enabled);
     RUN_TEST(test_request_taken_is_seen_in_the_next_poll);
     RUN_TEST(test_request_disable_and_quick_stop_end_in_disabled);
+    RUN_TEST(test_quick_stop_takes_the_torque_at_rest);
+    RUN_TEST(test_quick_stop_without_rest_ends_after_five_seconds);
+    RUN_TEST(test_quick_stop_after_a_fault_takes_the_torque_of_all);
+    RUN_TEST(test_quick_stop_goes_on_beside_other_requests);
+    RUN_TEST(test_quick_stop_ends_before_torque_comes_back);
+    RUN_TEST(test_quick_stop_of_one_drive_takes_its_torque_alone);
     RUN_TEST(test_request_home_needs_enabled_and_returns_there_homed);
     RUN_TEST(test_request_one_changes_that_axis_and_no_other);
     RUN_TEST(test_request_one_home_leaves_the_others_holding);

@@ -139,6 +139,7 @@ static void enable(canraw_slave_drive_t *drive)
         return;
     }
     drive->is_enabled = true;
+    drive->is_stopped = false;
     drive->largest_step = step > drive->largest_step ? step : drive->largest_step;
 }
 
@@ -159,7 +160,9 @@ static void take_rich(canraw_slave_t *self, unsigned k, const can_frame_t *frame
         drive->is_enabled = false;
         break;
     case 0x22:
-        drive->is_enabled = false;
+        drive->is_stopped = self->is_holding_on_stop && drive->is_enabled;
+        drive->glide_us = self->now_us + self->glide_takes_us;
+        drive->is_enabled = drive->is_stopped;
         drive->is_homing = false;
         drive->stops++;
         break;
@@ -216,6 +219,8 @@ static void move(canraw_slave_t *self, canraw_slave_drive_t *drive)
         drive->is_homed = true;
         drive->position = self->is_rich ? CANRAW_SLAVE_RICH_ZERO : 0;
         drive->setpoints = 0;
+    } else if (drive->is_enabled && drive->is_stopped) {
+        drive->position += self->now_us < drive->glide_us ? self->glide_counts : 0;
     } else if (is_following(self, drive) && drive->setpoints > 0) {
         const int64_t left = (int64_t)drive->target - drive->position;
         drive->position += (int32_t)(llabs(left) < 4 ? left : left / 2);

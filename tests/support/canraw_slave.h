@@ -27,7 +27,9 @@ typedef struct {
     bool is_dumb;              /**< works, but answers nothing */
     bool is_enabled_by_target; /**< rich only: a set-point puts its torque on */
     bool is_failing;           /**< never comes to the end of homing */
+    bool is_stopped;           /**< has torque, and follows no target */
     uint64_t homing_us;        /**< when homing ends */
+    uint64_t glide_us;         /**< when it comes to rest after a stop */
     uint64_t stale_until_us;
     int32_t target; /**< counts */
     int32_t position;
@@ -49,6 +51,9 @@ typedef struct {
     bool is_sealed; /**< rich, with a counter and a CRC-8 (1Dh from 0) behind each frame; set after opening */
     uint32_t homing_takes_us;
     uint32_t homing_stale_us; /**< for so long they report the last homing as done */
+    bool is_holding_on_stop;  /**< rich only: a stop leaves them their torque; */
+    uint32_t glide_takes_us;  /**< and for so long they go on */
+    int32_t glide_counts;     /**< by these in each step */
     uint64_t now_us;
     canraw_slave_drive_t drive[CANRAW_SLAVES];
     can_frame_t log[CANRAW_SLAVE_LOG]; /**< received */

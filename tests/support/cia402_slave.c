@@ -25,9 +25,8 @@
 #define BAD_VALUE   0x06090030u
 #define WRONG_STATE 0x08000022u
 
-#define BOOT_US       30000u
-#define JUMP_COUNTS   20000
-#define QUICK_STOP_US 3000u
+#define BOOT_US     30000u
+#define JUMP_COUNTS 20000
 
 static const cia402_slave_row_t k_rows[] = {
     {.index = 0x1000, .sub = 0, .bytes = 4, .is_read_only = true, .value = 0x00020192},
@@ -255,11 +254,16 @@ static void command(cia402_slave_t *self, cia402_slave_drive_t *d, uint16_t word
         } else if (is_quick) {
             d->quick_stops++;
             enter(self, d, ST_QUICK);
-            go(self, d, ST_DISABLED, QUICK_STOP_US);
+            go(self, d, ST_DISABLED, d->quick_us);
         } else if (is_shutdown) {
             go(self, d, ST_READY, 0);
         } else if (is_on) {
             go(self, d, ST_ON, 0);
+        }
+        break;
+    case ST_QUICK:
+        if (is_down) {
+            enter(self, d, ST_DISABLED);
         }
         break;
     default:
@@ -275,6 +279,7 @@ static void advance(cia402_slave_t *self, cia402_slave_drive_t *d)
     if (d->status == ST_NOT_READY) {
         go(self, d, ST_DISABLED, 1000);
     }
+    d->position += d->status == ST_QUICK ? d->quick_counts : 0;
     if (d->is_restless && d->nmt == OPERATIONAL && (d->word & 0x82) == 0 && d->target_state == d->status) {
         if (d->status == ST_DISABLED) {
             go(self, d, ST_READY, 1000);
@@ -703,6 +708,7 @@ void cia402_slave_open(cia402_slave_t *self, sim_can_bus_t *bus)
         cia402_slave_drive_t *d = &self->drive[k];
         d->node = (uint8_t)(k + 1);
         d->power_us = 5000;
+        d->quick_us = 3000;
         d->brake_us = 8000 + 1000 * k;
         d->homing_us = 50000;
         d->jump_counts = JUMP_COUNTS;

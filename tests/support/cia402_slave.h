@@ -47,6 +47,8 @@ typedef struct {
     int32_t lag;                            /**< 60F4h */
     uint32_t inputs;                        /**< 60FDh */
     uint32_t power_us, brake_us, homing_us; /**< how long it takes */
+    uint32_t quick_us;                      /**< and a quick stop; */
+    int32_t quick_counts;                   /**< it goes on by these in each step of it */
     int32_t jump_counts;                    /**< a target further away than this is a fault */
 
     uint8_t nmt;     /**< 0 = not booted */

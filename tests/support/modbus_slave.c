@@ -83,6 +83,7 @@ static void enable(modbus_slave_drive_t *drive)
         return;
     }
     drive->is_enabled = true;
+    drive->is_stopped = false;
     drive->largest_step = step > drive->largest_step ? step : drive->largest_step;
 }
 
@@ -93,14 +94,16 @@ static void begin_homing(modbus_slave_drive_t *drive, uint64_t now_us)
     drive->homing_us = now_us + HOMING_US;
 }
 
-static void stop(modbus_slave_drive_t *drive)
+static void stop(const modbus_slave_t *self, modbus_slave_drive_t *drive, uint64_t now_us)
 {
-    drive->is_enabled = false;
+    drive->is_stopped = self->is_holding_on_stop && drive->is_enabled;
+    drive->glide_us = now_us + self->glide_takes_us;
+    drive->is_enabled = drive->is_stopped;
     drive->is_homing = false;
     drive->stops++;
 }
 
-static void obey_wide(modbus_slave_drive_t *drive, sim_modbus_device_t *device, uint64_t now_us)
+static void obey_wide(const modbus_slave_t *self, modbus_slave_drive_t *drive, sim_modbus_device_t *device, uint64_t now_us)
 {
     set_target(drive, (int32_t)((uint32_t)device->holding[10] << 16 | device->holding[11]));
     drive->speed = device->holding[12];
@@ -113,7 +116,7 @@ static void obey_wide(modbus_slave_drive_t *drive, sim_modbus_device_t *device, 
         enable(drive);
         break;
     case 2:
-        stop(drive);
+        stop(self, drive, now_us);
         break;
     case 4:
         begin_homing(drive, now_us);
@@ -129,13 +132,13 @@ static void obey_wide(modbus_slave_drive_t *drive, sim_modbus_device_t *device, 
     device->holding[0] = UNTOUCHED;
 }
 
-static void obey_small(modbus_slave_drive_t *drive, sim_modbus_device_t *device)
+static void obey_small(const modbus_slave_t *self, modbus_slave_drive_t *drive, sim_modbus_device_t *device, uint64_t now_us)
 {
     set_target(drive, (int16_t)device->holding[100]);
     if (device->holding[102] != 0) {
-        stop(drive);
+        stop(self, drive, now_us);
         device->holding[102] = 0;
-        device->holding[101] = 0;
+        device->holding[101] = drive->is_enabled;
     } else if (device->holding[101] != 0) {
         enable(drive);
     } else {
@@ -158,10 +161,12 @@ static void end_homing(modbus_slave_drive_t *drive, sim_modbus_device_t *device)
     device->holding[11] = (uint16_t)MODBUS_SLAVE_WIDE_ZERO;
 }
 
-static void move(modbus_slave_drive_t *drive, sim_modbus_device_t *device, uint64_t now_us)
+static void move(const modbus_slave_t *self, modbus_slave_drive_t *drive, sim_modbus_device_t *device, uint64_t now_us)
 {
     if (drive->is_homing && now_us >= drive->homing_us) {
         end_homing(drive, device);
+    } else if (drive->is_enabled && drive->is_stopped) {
+        drive->position += now_us < drive->glide_us ? self->glide_counts : 0;
     } else if (drive->is_enabled && !drive->is_faulty && !drive->is_homing && drive->is_target_set && !drive->is_frozen) {
         const int64_t left = (int64_t)drive->target - drive->position;
         drive->position += (int32_t)(llabs(left) < 4 ? left : left / 2);
@@ -182,11 +187,11 @@ void modbus_slave_step(modbus_slave_t *self, uint64_t now_us)
             continue;
         }
         if (self->is_small) {
-            obey_small(&self->drive[k], &self->device[k]);
+            obey_small(self, &self->drive[k], &self->device[k], now_us);
         } else {
-            obey_wide(&self->drive[k], &self->device[k], now_us);
+            obey_wide(self, &self->drive[k], &self->device[k], now_us);
         }
-        move(&self->drive[k], &self->device[k], now_us);
+        move(self, &self->drive[k], &self->device[k], now_us);
         tell(self, k);
     }
 }

@@ -27,7 +27,9 @@ typedef struct {
     bool is_weak;       /**< never gets torque */
     bool is_frozen;     /**< answers, but does not move */
     bool is_target_set; /**< since torque went on, or before */
+    bool is_stopped;    /**< has torque, and follows no target */
     uint64_t homing_us; /**< when homing ends */
+    uint64_t glide_us;  /**< when it comes to rest after a stop */
     int32_t target;     /**< counts */
     int32_t position;
     int32_t largest_step; /**< of targets while it has torque; the way to the first one included */
@@ -41,6 +43,9 @@ typedef struct {
     bool is_small;
     bool is_shared;
     uint8_t unit;
+    bool is_holding_on_stop; /**< a stop leaves them their torque; */
+    uint32_t glide_takes_us; /**< and for so long they go on */
+    int32_t glide_counts;    /**< by these in each step */
     sim_modbus_t line[MODBUS_SLAVES];
     sim_modbus_device_t device[MODBUS_SLAVES];
     modbus_slave_drive_t drive[MODBUS_SLAVES];

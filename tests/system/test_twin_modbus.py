@@ -107,6 +107,7 @@ def faults_and_back(bench):
         harness.wait_for(lambda: bench.status()["state"] == "FAULT", f"{line}: a fault")
         found = bench.status()["fault"]["name"]
         assert found in faults, f"{line}: {found}"
+        bench.await_no_torque()
         bench.do(mend)
         harness.wait_for(lambda: is_led_up(bench), f"{line}: up again", 0.5)
     bench.do("jam 4")
@@ -115,6 +116,7 @@ def faults_and_back(bench):
         harness.wait_for(lambda: bench.status()["state"] == "FAULT", "a stuck cylinder")
     assert bench.status()["fault"]["axis"] == 4, bench.status()["fault"]
     assert bench.status()["fault"]["name"] in ("following-error", "drive-fault"), bench.status()["fault"]
+    bench.await_no_torque()
 
 
 def killed(bench):
@@ -204,6 +206,7 @@ def plays(line, says):
             return
         bench.wait_state("FAULT")
         assert bench.status()["fault"]["name"] in says.split(" or "), bench.status()["fault"]
+        bench.await_no_torque()
     return case
 
 
@@ -215,6 +218,7 @@ CASES = [
     ("Modbus: a board of relays takes the masks, forgets, falls silent and comes back", board_takes_the_masks, {"board": True}),
     ("Modbus TCP: faults of each class, and back", faults_and_back, {}),
     ("Modbus RTU: faults of each class, and back", faults_and_back, {"preset": "modbus/iai-robo-cylinder"}),
+    ("Modbus: faults, and the end of heaved", twin_bench.ends_after_a_fault, {}),
     ("Modbus: heaved is killed, the drives stop by their watchdogs", killed, {}),
     ("Modbus: a master of plain bytes, right and wrong", plain_questions, {}),
     ("Modbus: bad input is named", bad_input, {}),

@@ -10,11 +10,14 @@
 import re
 import signal
 import subprocess
+import time
 
 import harness
 import tap
 
 COUNTS_PER_MM = 1000
+OFF_S = 5.5  # the longest quick stop, and what it takes to be told and seen
+TORQUE = ("torque", "homing", "operation enabled", "quick stop", "fault reaction")
 DRIVES = """
 [drives]
 driver = cia402
@@ -167,14 +170,49 @@ class WithTwin(harness.Bench):
         with harness.Line(self.twin_socket) as line:
             return line.ask("status")
 
+    def await_no_torque(self, but=()):
+        """After a fault, seen at the drives: none of them has torque, at most OFF_S after the call. heaved says the same."""
+        begin = time.monotonic()
+        harness.wait_for(lambda: not self.with_torque(but), "the drives lose their torque")
+        took_s = time.monotonic() - begin
+        assert took_s <= OFF_S, f"after {took_s:.2f} s"
+        harness.wait_for(lambda: not any(leg["torque"] for leg in self.status()["cylinders"] if leg["number"] not in but and leg["drive"] != "offline"), "heaved tells so")
+        assert not self.with_torque(but), "it has come back"
+
+    def with_torque(self, but=()):
+        return [drive["drive"] for drive in self.twin_status()["drives"] if drive["state"] in TORQUE and drive["drive"] not in but]
+
 
 class TwinBench(WithTwin):
     def __init__(self, bin_dir, interface=None, period_us=4000, more="", frames=None, nodes="1, 2, 3, 4, 5, 6, 7", rises_fast=True, **changes):
         super().__init__(bin_dir, **changes)
         self.interface = interface or f"twin{self.port}"  # a bus between programs, of this test alone
         text = self.config.read_text(encoding="utf-8")
+        self.has_own_frames = frames is not None
         more = FRAMES[frames] if frames else more
         section = (OWN_FRAMES if frames else DRIVES).format(interface=self.interface, counts=COUNTS_PER_MM, period_us=period_us, nodes=nodes).strip() + "\n" + more.strip() + "\n"
         text, count = re.subn(r"\[drives\].*?(?=\n\[relays\])", section, text, flags=re.DOTALL)
         assert count == 1
         self.config.write_text(in_a_hurry(text, rises_fast), encoding="utf-8")
+
+
+def ends_after_a_fault(bench):
+    """The torque is off in the end, whenever heaved is told to end after a fault: in motion, while the drives stop, later; and at a second signal without a fault."""
+    for pause_s, is_at_once in ((0, False), (0.1, False), (1, False), (0, True)):
+        bench.start_twin()
+        daemon = bench.start()
+        bench.wait_state("ENGAGED")
+        with bench.sender() as sender:
+            sender.send("@A6T:0,0,0,0,0,40,1500#")
+            time.sleep(0.6)
+            if not is_at_once:
+                bench.do("fault 2 0x17")
+                bench.wait_state("FAULT")
+            time.sleep(pause_s)
+            daemon.terminate()
+            if is_at_once:
+                time.sleep(0.02)
+            code = bench.stop(daemon)
+        log = daemon.log.read_text(encoding="utf-8")
+        assert (code, "confirmed" in log, bench.with_torque()) == (1 if is_at_once else 0, False, []), (pause_s, code, bench.twin_status()["drives"], log)
+        assert bench.end_twin() == 0

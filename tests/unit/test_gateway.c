@@ -1874,7 +1874,7 @@ static void test_shutdown_while_a_drive_homes_for_ever_is_bounded(void)
     static const struct {
         sim_drives_fault_kind_t kind;
         unsigned most_ms;
-    } k_cases[] = {{SIM_DRIVES_FREEZE, 6010}, {SIM_DRIVES_BUSY, 1200}};
+    } k_cases[] = {{SIM_DRIVES_FREEZE, 9010}, {SIM_DRIVES_BUSY, 1200}};
     for (unsigned n = 0; n < 2; n++) {
         start(false);
         while (m_rig.drives.axis[2].state != DRIVE_HOMING) {
@@ -2191,7 +2191,7 @@ static void test_end_names_the_drive_that_does_not_confirm(void)
 {
     settled_with_a_frozen_drive(2);
     TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
-    rig_run_ms(&m_rig, 3000);
+    rig_run_ms(&m_rig, 6000);
     TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
     TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "not confirmed"));
     rig_run_ms(&m_rig, 1);
@@ -2210,7 +2210,7 @@ static void test_end_begins_when_the_drives_are_told(void)
     TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
     rig_run_ms(&m_rig, 80);
     m_rig.drives.is_busy = false;
-    rig_run_ms(&m_rig, 3000);
+    rig_run_ms(&m_rig, 6000);
     TEST_ASSERT_FALSE(gateway_is_finished(&m_rig.gateway));
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, m_rig.drives.axis[0].state);
     rig_run_ms(&m_rig, 3);

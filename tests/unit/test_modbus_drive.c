@@ -584,15 +584,15 @@ static void test_fault_while_a_stop_is_on_its_way_does_not_hold_it_up(void)
         }
         cycles(1);
         TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, i % 2 == 0 ? DRIVES_QUICK_STOP : DRIVES_DISABLE));
-        TEST_ASSERT_FALSE(modbus_drive_is_told(&driver));
+        TEST_ASSERT_TRUE(drives_is_stopping(hal));
         (void)!drives_poll(hal, now_us, feedback);
         TEST_ASSERT_TRUE(feedback[6].state == DRIVE_FAULT || strcmp(report_of(6).phase, "stopping") == 0);
-        for (int n = 0; n < 150; n++) {
+        for (int n = 0; n < 600; n++) {
             (void)!cycle();
-            TEST_ASSERT_TRUE(!modbus_drive_is_told(&driver) || !has_any_torque());
+            TEST_ASSERT_TRUE(drives_is_stopping(hal) || !has_any_torque());
         }
         TEST_ASSERT_TRUE(are_all(DRIVE_FAULT));
-        TEST_ASSERT_TRUE(modbus_drive_is_told(&driver));
+        TEST_ASSERT_FALSE(drives_is_stopping(hal));
         for (unsigned k = 0; k < AXES; k++) {
             TEST_ASSERT_EQUAL_UINT32(i % 2 == 0 ? 1 : 0, slave.drive[k].stops);
             TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
@@ -683,7 +683,7 @@ static void test_off_of_a_drive_that_says_otherwise_is_never_told(void)
         TEST_ASSERT_EQUAL_UINT(AXES, energized());
     }
     TEST_ASSERT_TRUE(are_all(DRIVE_DISABLED));
-    TEST_ASSERT_TRUE(modbus_drive_is_told(&driver));
+    TEST_ASSERT_FALSE(drives_is_stopping(hal));
 }
 
 /* An answer to what was asked before the drive had taken the command. */
@@ -731,7 +731,7 @@ static void test_off_is_not_told_by_what_a_drive_says_before_it_has_taken_it(voi
     TEST_ASSERT_EQUAL_UINT(AXES, energized());
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
     unsigned untold = 0;
-    while (!modbus_drive_is_told(&driver)) {
+    while (drives_is_stopping(hal)) {
         (void)!cycle();
         for (unsigned k = 0; k < AXES; k++) {
             TEST_ASSERT_TRUE(feedback[k].is_energized || driver.axis[k].job != MODBUS_DRIVE_JOB_COMMAND);
@@ -753,7 +753,7 @@ static void test_off_after_a_fault_is_told_when_the_drive_has_taken_it(void)
     TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
     TEST_ASSERT_TRUE(feedback[2].is_energized && slave.drive[2].is_enabled);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
-    cycles(50);
+    cycles(350);
     TEST_ASSERT_EQUAL_UINT(0, energized());
     TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
 }
@@ -797,7 +797,7 @@ static void test_enable_target_last_begins_where_the_drive_is_now(void)
         modbus_slave_place(&slave, k, slave.drive[k].position - 10000);
         slave.drive[k].is_frozen = true;
     }
-    cycles(20);
+    cycles(400);
     follow_actual();
     enable();
 }
@@ -1283,7 +1283,7 @@ static void test_quick_stop_where_the_map_has_none(void)
     }
 }
 
-/* Drives are told to stop first; the reset comes behind that, and counts once it was written. */
+/* Drives are stopped first, and lose their torque; the reset comes behind that, and counts once it was written. */
 static void test_reset_waits_for_the_stop(void)
 {
     open_shared(4000);
@@ -1295,7 +1295,7 @@ static void test_reset_waits_for_the_stop(void)
     }
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
     bool was_reset = false;
-    for (int i = 0; i < 300 && feedback[2].state == DRIVE_FAULT; i++) {
+    for (int i = 0; i < 900 && feedback[2].state == DRIVE_FAULT; i++) {
         was_reset |= driver.axis[2].job == MODBUS_DRIVE_JOB_COMMAND && driver.axis[2].command == MODBUS_DRIVE_RESET;
         TEST_ASSERT_TRUE(!was_reset || slave.drive[2].stops == 1);
         (void)!cycle();
@@ -1303,6 +1303,53 @@ static void test_reset_waits_for_the_stop(void)
     TEST_ASSERT_TRUE(was_reset);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[2].state);
     TEST_ASSERT_FALSE(slave.drive[2].is_enabled);
+}
+
+/* Until the drive has taken what stops it, and `disable` behind that, it is not enabled; a reset that waits for long is given up.
+ */
+static void test_stop_comes_before_torque_and_reset(void)
+{
+    for (int is_last = 0; is_last < 2; is_last++) {
+        map.is_target_last = is_last == 1;
+        open_slaves(false, false, 300);
+        slave.is_holding_on_stop = true;
+        slave.glide_takes_us = 4000000;
+        slave.glide_counts = 60;
+        for (unsigned k = 0; k < AXES; k++) {
+            slave.device[k].holding[10] = (uint16_t)((uint32_t)wide_counts(START_MM) >> 16);
+            slave.device[k].holding[11] = (uint16_t)wide_counts(START_MM);
+        }
+        enable();
+        cycles(20);
+        setpoint_q32[2] += MM(50);
+        cycles(20);
+        TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+        TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+        for (int i = 0; i < 5000 && has_any_torque(); i++) {
+            (void)!cycle();
+            TEST_ASSERT_TRUE(drives_is_stopping(hal) || !has_any_torque());
+            TEST_ASSERT_TRUE(!slave.drive[0].is_enabled || drives_request_one(hal, 0, DRIVES_ENABLE) == HV_ERR_AGAIN);
+        }
+        TEST_ASSERT_FALSE(has_any_torque());
+        cycles(50);
+        TEST_ASSERT_EQUAL(DRIVE_FAULT, feedback[2].state);
+    }
+}
+
+/* Without `disable` torque off does not replace the stop. */
+static void test_stop_without_disable_is_not_replaced(void)
+{
+    open_shared(4000);
+    map.command[MODBUS_DRIVE_DISABLE].count = 0;
+    enable();
+    cycles(20);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_QUICK_STOP));
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_DISABLE));
+    cycles(200);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL_UINT32(1, slave.drive[k].stops);
+    }
 }
 
 /* A position that has no place in millimetres is none. */
@@ -1346,7 +1393,7 @@ static void test_setpoint_far_from_a_drive_that_hangs_is_a_fault(void)
     TEST_ASSERT_EQUAL_INT64(MM(3), feedback[2].guard.allowed_q32);
     TEST_ASSERT_EQUAL_UINT32(1, slave.drive[2].stops);
     TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
-    cycles(20);
+    cycles(320);
     TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[2].state);
 }
 
@@ -1587,6 +1634,8 @@ int main(void)
     RUN_TEST(test_quick_stop_by_broadcast_goes_out_on_every_line);
     RUN_TEST(test_quick_stop_where_the_map_has_none);
     RUN_TEST(test_reset_waits_for_the_stop);
+    RUN_TEST(test_stop_comes_before_torque_and_reset);
+    RUN_TEST(test_stop_without_disable_is_not_replaced);
     RUN_TEST(test_position_beyond_all_millimetres_is_not_taken);
     RUN_TEST(test_setpoint_that_has_no_counts_is_a_fault);
     RUN_TEST(test_setpoint_far_from_a_drive_that_hangs_is_a_fault);
