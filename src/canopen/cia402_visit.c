@@ -88,15 +88,17 @@ drive_object_state_t cia402_visit_end(void *ctx, drive_object_t *out, uint32_t *
 /* Ranges of objects, both ends included: whatever the configuration is. What it has the driver write comes beside. */
 static const uint16_t k_kept[][2] = {
     {0x1005, 0x1007}, /* SYNC */
+    {0x100B, 0x100B}, /* node id, of older versions */
     {0x1012, 0x1017}, /* time stamp, emergencies, heartbeat */
     {0x1019, 0x1019}, /* SYNC counter */
     {0x1028, 0x1029}, /* emergencies, what an error does */
     {0x1200, 0x12FF}, /* SDO itself */
     {0x1400, 0x1BFF}, /* PDOs */
     {0x1F50, 0x1F57}, /* its program */
-    {0x1F80, 0x1F80}, /* start without a master */
+    {0x1F80, 0x1F8A}, /* start without a master */
     {0x6007, 0x6007}, /* what a lost master does */
     {0x6040, 0x6040}, /* controlword */
+    {0x6042, 0x6042}, /* target velocity of mode vl */
     {0x605A, 0x605E}, /* what stops do */
     {0x6060, 0x6060}, /* mode */
     {0x6065, 0x6066}, /* following window */

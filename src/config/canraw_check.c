@@ -299,7 +299,19 @@ static void check_status(config_source_t *self)
     }
 }
 
-/* One after the other, and answers are told from what comes anyway. */
+/* Some bytes are both frames. Those of one length: a drive tells frames apart by their bytes or by that. */
+static bool is_alike(const canraw_frame_t *step, const canraw_frame_t *command)
+{
+    return command->length == step->length && canraw_is_ambiguous(step, command);
+}
+
+static bool is_like_motion(const config_can_raw_t *raw, const canraw_frame_t *step)
+{
+    return is_alike(step, &raw->enable) || is_alike(step, &raw->home) ||
+           (raw->setpoint_id.count == 0 && is_alike(step, &raw->setpoint));
+}
+
+/* One after the other, answers are told from what comes anyway, and none gives a drive torque. */
 static void check_startup(config_source_t *self)
 {
     const config_can_raw_t *raw = &self->config->can_raw;
@@ -317,6 +329,13 @@ static void check_startup(config_source_t *self)
                 self, SECTION, name,
                 "its answer cannot be told from position_reply, homing_reply or status_reply; allowed: with a "
                 "byte that differs, shorter, or without an answer");
+            return;
+        }
+        if (step->frame.length > 0 && is_like_motion(raw, &step->frame)) {
+            config_source_key_error(
+                self, SECTION, name,
+                "a drive could take it for enable, home or setpoint, and have torque or move before anybody has "
+                "engaged; allowed: a frame with a byte that differs");
             return;
         }
         if (step->answer.length > 0 && canraw_slots(&raw->position_reply) > 0) {

@@ -170,10 +170,24 @@ static void check_setpoint_overlap(config_source_t *self, const char *name, cons
     }
 }
 
+/* What gives torque or moves is not for a list that is written at every start of a drive. */
+static bool is_of_command(const config_modbus_t *modbus, const modbus_drive_block_t *own)
+{
+    return common_register(own, &modbus->enable, modbus->enable.count) <= 65535 ||
+           common_register(own, &modbus->home, modbus->home.count) <= 65535;
+}
+
 static void check_item_overlap(config_source_t *self, const char *name, const config_items_t *items)
 {
     for (unsigned i = 0; i < items->count; i++) {
         const modbus_drive_block_t own = {.address = items->item[i].address, .count = 1};
+        if (items->item[i].is_written && is_of_command(modbus_of(self), &own)) {
+            config_source_key_error(self, SECTION, name,
+                                    "register 0x%04X is one of enable or home: it could give a drive torque before anybody has "
+                                    "engaged; allowed: other registers",
+                                    (unsigned)own.address);
+            return;
+        }
         const modbus_drive_blocks_t *setpoint = &modbus_of(self)->setpoint;
         bool is_twice = items->item[i].is_written && common_register(&own, setpoint, setpoint->count) <= 65535;
         for (unsigned n = 0; items != &modbus_of(self)->startup && n < modbus_of(self)->startup.count; n++) {

@@ -11,12 +11,11 @@
 
 #include "config/cia402.h"
 #include "config/startup.h"
+#include "config/startup_denied.h"
 
 #define WORDS_MAX  6u
 #define WORD_BYTES 24u
 #define BLANKS     " \t"
-#define STORE      0x1010u
-#define RESTORE    0x1011u
 
 static const struct {
     const char *name;
@@ -94,15 +93,6 @@ static const char *read_flag(const char *word, cia402_item_t *item)
     return NULL;
 }
 
-/* Errors of an item that do not depend on the drive. */
-static const char *judge(const cia402_item_t *item)
-{
-    if (item->is_written && (item->index == STORE || item->index == RESTORE)) {
-        return _("would write the drive's memory at each start, which wears it; store by the maker's program");
-    }
-    return NULL;
-}
-
 static const char *read_item(char word[WORDS_MAX + 1u][WORD_BYTES], unsigned words, cia402_item_t *item)
 {
     const bool is_looked_at = strcmp(word[1], "is") == 0;
@@ -115,7 +105,7 @@ static const char *read_item(char word[WORDS_MAX + 1u][WORD_BYTES], unsigned wor
     for (unsigned i = 4; wrong == NULL && i < words; i++) {
         wrong = read_flag(word[i], item);
     }
-    return wrong != NULL ? wrong : judge(item);
+    return wrong;
 }
 
 /* The words of a line, those that are too long cut. */
@@ -173,11 +163,19 @@ static bool is_written_by_heaved(const cia402_config_t *drives, unsigned axis, c
 static void check_list(config_source_t *self, const cia402_config_t *drives, unsigned axis, unsigned which)
 {
     const cia402_axis_config_t *own = &drives->axis[axis];
+    const char *section = which == 0 ? "cia402-startup" : "cia402-angle-startup";
     for (unsigned i = 0; i < own->items; i++) {
-        if (is_written_by_heaved(drives, axis, &own->item[i])) {
+        const cia402_item_t *item = &own->item[i];
+        const char *denied =
+            item->is_written ? config_startup_denied(item->index, item->sub, item->value, self->config->cia402.vendor_id) : NULL;
+        if (is_written_by_heaved(drives, axis, item)) {
             config_source_error(self, self->startup_line[which][i],
-                                "[%s] 0x%04X:%02u: heaved sets it itself; allowed: the keys of [cia402] for that",
-                                which == 0 ? "cia402-startup" : "cia402-angle-startup", own->item[i].index, own->item[i].sub);
+                                "[%s] 0x%04X:%02u: heaved sets it itself; allowed: the keys of [cia402] for that", section,
+                                item->index, item->sub);
+        } else if (denied != NULL) {
+            config_source_error(self, self->startup_line[which][i],
+                                "[%s] 0x%04X:%02u %s; allowed: other objects, or `is` to look", section, item->index, item->sub,
+                                denied);
         }
     }
 }

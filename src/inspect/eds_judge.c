@@ -8,14 +8,13 @@
 
 #include "common/translate.h"
 #include "config/cia402.h"
+#include "config/startup_denied.h"
 #include "inspect/doctor_report.h"
 
 #define FINDINGS_MAX  128u
 #define FINDING_BYTES 256u
 #define PDO_FIRST     0x1400u
 #define PDO_LAST      0x1BFFu
-#define SDO_FIRST     0x1200u
-#define SDO_LAST      0x12FFu
 
 /** A file being judged. Drives are alike: what has been said of one is not said again. */
 typedef struct {
@@ -276,7 +275,7 @@ bool eds_judge(const eds_t *eds, const config_t *config, FILE *out)
 /* --- A DCF as a list --- */
 
 /* Why a value is not taken over, NULL where it is. */
-static const char *reason_to_leave(const eds_object_t *object)
+static const char *reason_to_leave(const eds_object_t *object, int64_t vendor)
 {
     if (object->parameter.has_node) {
         return _("depends on the node");
@@ -284,15 +283,12 @@ static const char *reason_to_leave(const eds_object_t *object)
     if (!object->is_writable) {
         return _("can only be read");
     }
-    if (object->index == 0x1010 || object->index == 0x1011) {
-        return _("stores or restores");
-    }
-    if ((object->index >= PDO_FIRST && object->index <= PDO_LAST) || (object->index >= SDO_FIRST && object->index <= SDO_LAST) ||
-        object->index == 0x1005 || object->index == 0x1014) {
-        return _("is a matter of the master");
-    }
     if (cia402_is_own_object(object->index, object->sub)) {
         return _("is set by heaved itself, by the keys of [cia402]");
+    }
+    const char *denied = config_startup_denied(object->index, object->sub, (uint32_t)object->parameter.value, (uint32_t)vendor);
+    if (denied != NULL) {
+        return denied;
     }
     return eds_bytes(object) == 0 ? _("is no whole number of up to 32 bits") : NULL;
 }
@@ -307,7 +303,7 @@ void eds_write_startup(const eds_t *eds, FILE *out)
         if (!object->parameter.is_there || object->is_parent) {
             continue;
         }
-        const char *left = reason_to_leave(object);
+        const char *left = reason_to_leave(object, eds->vendor.is_there ? eds->vendor.value : 0);
         if (left == NULL && object->fallback.is_there && object->fallback.value == object->parameter.value) {
             same++;
             continue;

@@ -451,6 +451,9 @@ static void test_steps_of_starting_up_are_read_checked_and_written_as_they_were(
         {"startup1", "-> 60", "\"\" is no frame; allowed: "},
         {"startup1", "2F ->", "\"\" is no frame; allowed: "},
         {"startup1", "2F 10 -> 00 15 .. ..", NULL}, /* shorter than a position */
+        {"startup1", "01 03 01 00 00 00 00 00", "[can-raw] startup1: a drive could take it for enable, home or setpoint, and"},
+        {"startup1", "01 05 00 00 00 00 00 00", "[can-raw] startup1: a drive could take it for enable, home or setpoint, and"},
+        {"startup1", "01 03 02 00 00 00 00 00", NULL},
         {"startup1", "2F 10 {counter:u8} {xor} -> 60 .. {sum} wait 50", NULL},
     };
     canraw_map_t map;

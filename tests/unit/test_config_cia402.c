@@ -252,13 +252,12 @@ static void test_load_startup_item_that_cannot_be_is_refused_at_its_line(void)
     refuse_item("0x2030:01 = 1 u8 last last", "ends with a word that does not belong there");
     refuse_item("0x2030:01 is 1 u8 unchecked", "ends with a word that does not belong there");
     refuse_item("0x2030:01 = 1 u8 last if-there unchecked more", "is no object with value and type");
-    refuse_item("0x1010:01 = 0x65766173 u32", "which wears it");
 }
 
 /* What heaved writes is not for a list; what it would write with other keys is. */
 static void test_load_startup_item_that_heaved_sets_itself_is_refused_at_its_line(void)
 {
-    static const char *const k_own[] = {"0x605A:00 = 0 i16", "0x1800:01 = 0x181 u32 last", "0x6085:00 = 1 u32"};
+    static const char *const k_own[] = {"0x605A:00 = 0 i16", "0x1800:01 = 0x80000181 u32 last", "0x6085:00 = 1 u32"};
     static const char *const k_free[] = {"0x6098:00 = 1 i8", "0x605A:00 is 2 i16", "0x60C0:00 = 0 i16"};
     char place[200];
     for (unsigned i = 0; i < 3; i++) {
@@ -281,6 +280,68 @@ static void test_load_startup_item_that_heaved_sets_itself_is_refused_at_its_lin
     put("[cia402]", "quick_stop_mm_s2 = 0");
     strcat(m_text, "\n[cia402-startup]\n0x6085:00 = 1 u32\n");
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+}
+
+/* What gives torque, moves or changes the bus; where it is only looked at it may be in a list. */
+static void test_load_startup_item_that_moves_or_changes_the_bus_is_refused_at_its_line(void)
+{
+    static const struct {
+        const char *item; /* without its sign */
+        const char *rest;
+        const char *why;
+        unsigned vendor;
+    } k_items[] = {
+        {"0x6040:00", "15 u16 unchecked last", "torque or move it", 0},
+        {"0x6840:00", "15 u16", "torque or move it", 0}, /* of the second axis of a node */
+        {"0x607A:00", "100000 i32 if-there", "torque or move it", 0},
+        {"0x60C1:01", "1 i32", "torque or move it", 0},
+        {"0x60FF:00", "1 i32", "torque or move it", 0},
+        {"0x6071:00", "1 i16", "torque or move it", 0},
+        {"0x6042:00", "1 i16", "torque or move it", 0},
+        {"0x60B0:00", "1 i32", "torque or move it", 0},
+        {"0x60FE:01", "1 u32", "open its brake", 0},
+        {"0x1005:00", "0x40000080 u32", "changes the bus", 0},
+        {"0x1014:00", "0x81 u32", "changes the bus", 0},
+        {"0x1200:01", "0x601 u32", "changes the bus", 0},
+        {"0x1280:03", "1 u8", "changes the bus", 0},
+        {"0x1404:01", "0x300 u32", "belongs to the PDOs", 0},
+        {"0x1803:02", "255 u8", "belongs to the PDOs", 0},
+        {"0x1A05:01", "0x60640020 u32", "belongs to the PDOs", 0},
+        {"0x1F80:00", "8 u32", "start without heaved", 0},
+        {"0x1F51:01", "1 u8", "drive's program", 0},
+        {"0x100B:00", "3 u32", "node id or the bit rate", 0},
+        {"0x2000:00", "2 u8", "node id or the bit rate", 0xFB},
+        {"0x2009:00", "2 u32", "node id or the bit rate", 0x26C},
+        {"0x1010:01", "0x65766173 u32", "which wears it", 0},
+        {"0x1011:01", "0x64616F6C u32", "which wears it", 0},
+    };
+    static const char *const k_free[] = {"0x1804:01 = 0x80000480 u32 if-there", "0x2000:00 = 2 u8", "0x6072:00 = 900 u16"};
+    char line[80], place[120];
+    for (size_t i = 0; i < sizeof k_items / sizeof k_items[0]; i++) {
+        for (int is_looked_at = 0; is_looked_at < 2; is_looked_at++) {
+            setUp();
+            if (k_items[i].vendor != 0) {
+                sprintf(line, "vendor_id = %u", k_items[i].vendor);
+                put("[cia402]", line);
+            }
+            const int items = is_looked_at == 0
+                                  ? (int)strlen(k_items[i].rest)
+                                  : (int)strcspn(strchr(k_items[i].rest, ' ') + 1, " ") + (int)strcspn(k_items[i].rest, " ") + 1;
+            sprintf(line, "\n[cia402-startup]\n%s %s %.*s\n", k_items[i].item, is_looked_at == 0 ? "=" : "is", items,
+                    k_items[i].rest);
+            strcat(m_text, line);
+            TEST_ASSERT_EQUAL_INT_MESSAGE(is_looked_at == 0 ? 1 : 0, load(), is_looked_at == 0 ? line : m_errors);
+            sprintf(place, "[cia402-startup] %s", k_items[i].item);
+            TEST_ASSERT_TRUE_MESSAGE(
+                is_looked_at == 1 || (strstr(m_errors, place) != NULL && strstr(m_errors, k_items[i].why) != NULL), m_errors);
+        }
+    }
+    for (size_t i = 0; i < sizeof k_free / sizeof k_free[0]; i++) {
+        setUp();
+        sprintf(line, "\n[cia402-startup]\n%s\n", k_free[i]);
+        strcat(m_text, line);
+        TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    }
 }
 
 /* A drive family's file, on simulated drives that have its objects: all come up, and hold what the list says. */
@@ -668,6 +729,7 @@ int main(void)
     RUN_TEST(test_load_startup_list_reaches_every_drive_in_its_order);
     RUN_TEST(test_load_startup_item_that_cannot_be_is_refused_at_its_line);
     RUN_TEST(test_load_startup_item_that_heaved_sets_itself_is_refused_at_its_line);
+    RUN_TEST(test_load_startup_item_that_moves_or_changes_the_bus_is_refused_at_its_line);
     RUN_TEST(test_preset_of_a_drive_family_sets_its_drives_up);
     RUN_TEST(test_load_startup_list_of_more_than_32_is_refused);
     RUN_TEST(test_load_startup_list_is_dumped_hashed_and_needs_a_restart);

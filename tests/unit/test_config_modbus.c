@@ -214,6 +214,7 @@ static void test_registers_are_written_once(void)
     refuse("enable = 0x0210", "enable = 0x0201", "[modbus] enable", "register 0x0201 is one of setpoint, too");
     refuse("drive_timeout = 0x0300", "drive_timeout = 0x0202", "[modbus] drive_timeout", "register 0x0202 is written by");
     refuse("step_mm = 5", "startup = 0x0200 = 1", "[modbus] startup", "register 0x0200 is written by setpoint, too");
+    refuse("step_mm = 5", "startup = 0x0210 = 1", "[modbus] startup", "register 0x0210 is one of enable or home: it could give");
 }
 
 static void test_what_judges_needs_its_field(void)

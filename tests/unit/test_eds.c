@@ -272,7 +272,7 @@ static void test_startup_of_a_dcf_loads_as_it_is_written(void)
     put_object(0x2034, 0, 4, "rw", "ParameterValue=$NODEID+1");
     put_object(0x605A, 0, 2, "rw", "ParameterValue=0");
     put_object(0x1010, 1, 4, "rw", "ParameterValue=1");
-    put_object(0x1402, 2, 1, "rw", "ParameterValue=1");
+    put_object(0x1405, 2, 1, "rw", "ParameterValue=1");
     strcat(m_text,
            "[2035]\nDataType=0x9\nAccessType=rw\nParameterValue=words\n[2036]\nDataType=3\nAccessType=rw\nParameterValue=-7\n");
     TEST_ASSERT_TRUE(read_text());
@@ -284,8 +284,9 @@ static void test_startup_of_a_dcf_loads_as_it_is_written(void)
     expect("; 0x2033:00 can only be read\n");
     expect("; 0x2034:00 depends on the node\n");
     expect("; 0x605A:00 is set by heaved itself");
-    expect("; 0x1010:01 stores or restores\n");
-    expect("; 0x1402:02 is a matter of the master\n");
+    expect("; 0x1010:01 would write the drive's memory at each start, which wears it; store by the maker's program\n");
+    expect("; 0x1405:02 belongs to the PDOs, which heaved sets up; allowed is an identifier with bit 31, which switches a PDO "
+           "off\n");
     expect("; 1 more hold their defaults\n");
     FILE *preset = fopen(PRESET, "rb");
     FILE *file = fopen(FILE_NAME, "wb");

@@ -7,6 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "config/startup_denied.h"
 #include "heave/status.h"
 #include "linux_can_local.h"
 #include "twin/options.h"
@@ -713,6 +714,64 @@ static void test_local_bus_is_a_can_bus_with_echoes_and_faults(void)
     wire_close(&m_wire);
 }
 
+/* ---- Start-up lists ---- */
+
+#define LIST_ITEMS 100000u
+
+static uint32_t m_random = 2463534242u;
+
+static uint32_t next_random(void)
+{
+    m_random ^= m_random << 13;
+    m_random ^= m_random >> 17;
+    m_random ^= m_random << 5;
+    return m_random;
+}
+
+static bool is_without_torque(void)
+{
+    for (unsigned k = 0; k < m_twin.drives; k++) {
+        if (m_twin.node[k].drive.state != TWIN_DISABLED) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static uint32_t some_value(void)
+{
+    static const uint32_t k_values[] = {0, 1, 2, 6, 7, 8, 15, 0x1F, 0x80, 0x8F, 0xFFFFFFFF, 0x80000000};
+    return next_random() % 4u == 0 ? next_random() : k_values[next_random() % (sizeof k_values / sizeof k_values[0])];
+}
+
+/* Whatever a list writes that --check lets through, in whatever order, before NMT start and after it: no drive leaves the state
+ * in which it has no torque. What it does not let through does. */
+static void test_no_startup_list_gives_torque(void)
+{
+    const objects_t *objects = &m_twin.node[2].drive.od;
+    unsigned written = 0;
+    for (unsigned i = 0; i < LIST_ITEMS; i++) {
+        const object_t *object = &objects->row[next_random() % objects->count];
+        const uint32_t value = some_value();
+        if (i == LIST_ITEMS / 2) {
+            operational();
+            run(20000);
+        }
+        if (!object->is_read_only && config_startup_denied(object->index, object->sub, value, 0) == NULL) {
+            written += ask_write(3, object->index, object->sub, object->bytes, value) == 0;
+            TEST_ASSERT_TRUE(is_without_torque());
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_UINT(1000, written);
+    run(1000000);
+    TEST_ASSERT_TRUE(is_without_torque());
+    for (unsigned i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL_HEX32(0, ask_write(3, 0x6040, 0, 2, i == 0 ? 6 : i == 1 ? 7 : 15));
+        run(400000);
+    }
+    TEST_ASSERT_FALSE(is_without_torque());
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -737,5 +796,6 @@ int main(void)
     RUN_TEST(test_script_times_count_from_the_start_or_from_torque);
     RUN_TEST(test_script_wrong_lines_are_named_with_their_number);
     RUN_TEST(test_local_bus_is_a_can_bus_with_echoes_and_faults);
+    RUN_TEST(test_no_startup_list_gives_torque);
     return UNITY_END();
 }
