@@ -45,6 +45,21 @@ static long lines_of(const uint8_t *bytes, size_t length)
     return lines;
 }
 
+/* Bytes of a sign that an error may show as it is: plain ones, the degree sign, Chinese and Japanese writing and its punctuation
+ * (U+3000 to U+9FFF, U+FF00 to U+FF3F). Returns 0 for any other. */
+static size_t legible(const char *text)
+{
+    const unsigned char *byte = (const unsigned char *)text;
+    if (byte[0] >= ' ' && byte[0] <= '~') {
+        return 1;
+    }
+    if (byte[0] == 0xC2 && byte[1] == 0xB0) {
+        return 2;
+    }
+    const bool is_lead = (byte[0] >= 0xE3 && byte[0] <= 0xE9) || (byte[0] == 0xEF && byte[1] == 0xBC);
+    return is_lead && byte[1] >= 0x80 && byte[1] <= 0xBF && byte[2] >= 0x80 && byte[2] <= 0xBF ? 3 : 0;
+}
+
 /* Each error: `PATH:LINE: what is wrong`. */
 static void check_errors(const char *text, const char *path, int errors, long lines)
 {
@@ -55,8 +70,8 @@ static void check_errors(const char *text, const char *path, int errors, long li
         FUZZ_REQUIRE(end != NULL && strncmp(line, path, strlen(path)) == 0 && line[strlen(path)] == ':');
         const long number = strtol(line + strlen(path) + 1, &behind, 10);
         FUZZ_REQUIRE(number >= 1 && number <= lines && behind[0] == ':' && behind[1] == ' ' && behind + 2 < end);
-        for (const char *c = behind; c < end; c++) {
-            FUZZ_REQUIRE(*c >= ' ' && *c <= '~');
+        for (const char *c = behind; c < end; c += legible(c)) {
+            FUZZ_REQUIRE(legible(c) > 0);
         }
         line = end + 1;
     }
