@@ -34,7 +34,7 @@ static const struct {
     uint32_t vendor; /* 0: any */
     const char *reason;
 } k_denied[] = {
-    {0x1005, 0x1007, 0, k_bus},     /* SYNC */
+    {0x1005, 0x1006, 0, k_bus},     /* SYNC */
     {0x100B, 0x100B, 0, k_place},   /* node id, of older versions of CiA 301 */
     {0x1010, 0x1011, 0, k_memory},  /* store, restore */
     {0x1012, 0x1012, 0, k_bus},     /* identifier of the time stamp */

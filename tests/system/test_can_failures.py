@@ -415,7 +415,7 @@ def all_drives_refused(bench, _):
 STARTUP = """
 [cia402-startup]
 0x1007:00 = 1000 u32
-0x1005:00 = 0x80 u32 unchecked last
+0x605D:00 = 1 i16 unchecked last
 0x1000:00 is 0x20192 u32
 0x2999:00 = 1 u8 if-there
 """
