@@ -58,9 +58,14 @@ static const char *behind_tick(const char *line)
     return digits >= 1 && digits <= 18 && line[6 + digits] == ' ' ? line + 7 + digits : line;
 }
 
+static const char *behind_blanks(const char *line)
+{
+    return line + strspn(line, " ");
+}
+
 static void expect_line(client_t *client, const char *said)
 {
-    const char *const line = behind_tick(said);
+    const char *const line = behind_blanks(behind_tick(behind_blanks(said)));
     static const char *const k_requests[] = {"engage", "hold", "resume", "park", "reset", "shutdown", "service", "service-off"};
     if (strcmp(line, "watch") == 0 || (strncmp(line, "watch ", 6) == 0 && is_number(line + 6, 1, CONTROL_WATCH_MAX_HZ))) {
         client->is_watching = true;
