@@ -90,7 +90,7 @@ typedef struct {
     bool is_last;     /**< written after all other objects, else before them */
 } cia402_item_t;
 
-#define CIA402_ITEMS_MAX 32u /**< of a list */
+#define CIA402_ITEMS_MAX 64u /**< of a drive */
 
 #define CIA402_CHANNELS_MAX 4u /**< axes of a node: it has four TPDOs with identifiers of their own */
 #define CIA402_MAPS_MAX     3u /**< PDOs of a list of maps */
@@ -125,15 +125,15 @@ typedef struct {
     int8_t homing_method;     /**< 6098h; 0: no homing, the position is absolute */
     uint32_t homing_speed[2]; /**< 6099h, counts/s: towards the switch, and to the zero */
     uint32_t homing_accel;    /**< 609Ah, counts/s^2 */
-    int32_t homing_offset_counts; /**< 607Ch */
-    uint32_t quick_stop_accel;    /**< 6085h, counts/s^2; 0 = as it is */
-    uint32_t profile_speed;       /**< 6081h, mode PP only */
-    uint32_t profile_accel;       /**< 6083h, 6084h, mode PP only */
-    bool has_limits;              /**< 607Dh is written */
-    int32_t limit_counts[2];      /**< 607Dh: least and greatest position */
-    uint32_t identity[4];         /**< 1018h sub 1 to 4: vendor, product, revision, serial number; 0 = any */
-    const cia402_item_t *item;    /**< start-up list, has to stay valid; NULL: none */
-    uint8_t items;                /**< [0, CIA402_ITEMS_MAX] */
+    int32_t homing_offset_counts;         /**< 607Ch */
+    uint32_t quick_stop_accel;            /**< 6085h, counts/s^2; 0 = as it is */
+    uint32_t profile_speed;               /**< 6081h, mode PP only */
+    uint32_t profile_accel;               /**< 6083h, 6084h, mode PP only */
+    bool has_limits;                      /**< 607Dh is written */
+    int32_t limit_counts[2];              /**< 607Dh: least and greatest position */
+    uint32_t identity[4];                 /**< 1018h sub 1 to 4: vendor, product, revision, serial number; 0 = any */
+    cia402_item_t item[CIA402_ITEMS_MAX]; /**< start-up list */
+    uint8_t items;                        /**< [0, CIA402_ITEMS_MAX] */
 } cia402_axis_config_t;
 
 /** The drives of a platform. */

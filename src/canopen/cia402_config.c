@@ -56,7 +56,7 @@ static bool is_config_valid(const cia402_config_t *config)
     for (unsigned k = 0; k < config->axes; k++) {
         const cia402_axis_config_t *axis = &config->axis[k];
         if (!is_node_free(config, k) || !counts_is_valid(&axis->scale) || axis->step_max_q32 <= 0 ||
-            axis->following_max_q32 < 0 || axis->items > CIA402_ITEMS_MAX || (axis->items > 0 && axis->item == NULL)) {
+            axis->following_max_q32 < 0 || axis->items > CIA402_ITEMS_MAX) {
             return false;
         }
     }

@@ -31,6 +31,9 @@ typedef struct {
     unsigned line;
     eds_object_t *object; /* whose section this is, NULL where it is another one */
     bool is_device;       /* [DeviceInfo] */
+    bool is_drive;        /* [DeviceComissioning], as the standard spells it */
+    bool has_values;      /* [1010Value]: of an array written in short */
+    uint16_t array;       /* whose values these are */
     bool is_bad;
 } reader_t;
 
@@ -51,20 +54,41 @@ static char *trimmed(char *text)
     return text;
 }
 
-/* A number, with or without $NODEID+ in front of it; what is none is not there. */
+/* FNV-1a, so that equal texts are seen. */
+static int64_t hash_of(const char *text)
+{
+    uint64_t hash = 0xCBF29CE484222325u;
+    for (; *text != '\0'; text++) {
+        hash = (hash ^ (unsigned char)*text) * 0x100000001B3u;
+    }
+    return (int64_t)hash;
+}
+
+/* A number, $NODEID, or the sum of both in any order; what is none is a text. */
 static eds_number_t number(const char *text)
 {
     static const char k_node[] = "$NODEID";
-    eds_number_t out = {.has_node = strncasecmp(text, k_node, sizeof k_node - 1u) == 0};
-    char *end = NULL;
-    if (out.has_node) {
-        text += sizeof k_node - 1u;
-        text += strspn(text, " +");
-        out.is_there = *text == '\0';
+    eds_number_t out = {.is_there = true};
+    const char *at = text;
+    bool has_value = false;
+    do {
+        char *end = NULL;
+        at += strspn(at, " ");
+        if (!out.has_node && strncasecmp(at, k_node, sizeof k_node - 1u) == 0) {
+            out.has_node = true;
+            at += sizeof k_node - 1u;
+        } else {
+            errno = 0;
+            out.value = strtoll(at, &end, 0);
+            out.is_there = out.is_there && !has_value && end != at && errno == 0;
+            has_value = true;
+            at = end;
+        }
+        at += strspn(at, " ");
+    } while (out.is_there && *at++ == '+');
+    if (!out.is_there || at[-1] != '\0') {
+        out = (eds_number_t){.is_text = true, .value = hash_of(text)};
     }
-    errno = 0;
-    out.value = strtoll(text, &end, 0);
-    out.is_there |= errno == 0 && end != text && *end == '\0';
     return out;
 }
 
@@ -110,7 +134,24 @@ static void enter_object(reader_t *self, uint16_t index, uint8_t sub, bool is_en
         eds->room = room;
     }
     self->object = &eds->object[eds->objects++];
-    *self->object = (eds_object_t){.index = index, .sub = sub, .line = self->line, .is_parent = !is_entry};
+    const eds_object_t *before = eds->objects > 1 ? self->object - 1 : NULL;
+    *self->object = (eds_object_t){.index = index,
+                                   .sub = sub,
+                                   .line = self->line,
+                                   .is_parent = !is_entry,
+                                   .is_place = before != NULL && before->index == index && before->is_place};
+}
+
+/* "1010Value" */
+static bool read_array(const char *name, uint16_t *index)
+{
+    uint8_t sub = 0;
+    char first[] = "1000";
+    if (strlen(name) != sizeof first - 1u + strlen("Value") || strcasecmp(name + sizeof first - 1u, "Value") != 0) {
+        return false;
+    }
+    memcpy(first, name, sizeof first - 1u);
+    return read_place(first, index, &sub);
 }
 
 static void enter(reader_t *self, char *text)
@@ -119,7 +160,7 @@ static void enter(reader_t *self, char *text)
     uint16_t index = 0;
     uint8_t sub = 0;
     self->object = NULL;
-    self->is_device = false;
+    self->is_device = self->is_drive = self->has_values = false;
     if (end == NULL) {
         complain(self, _("a section without ]"), text);
         return;
@@ -130,6 +171,8 @@ static void enter(reader_t *self, char *text)
         enter_object(self, index, sub, strlen(text) > 4);
     } else {
         self->is_device = strcasecmp(text, "DeviceInfo") == 0;
+        self->is_drive = strcasecmp(text, "DeviceComissioning") == 0 || strcasecmp(text, "DeviceCommissioning") == 0;
+        self->has_values = read_array(text, &self->array);
     }
 }
 
@@ -144,6 +187,17 @@ static void take_access(reader_t *self, const char *value)
     }
     self->object->is_readable = !is_write_only;
     self->object->is_writable = is_write_only || is_both;
+}
+
+static bool is_name_of_place(const char *name)
+{
+    static const char *const k_words[] = {"node id", "node-id", "nodeid", "node_id", "baud", "bit rate", "bitrate", "bit-rate"};
+    for (size_t i = 0; i < sizeof k_words / sizeof k_words[0]; i++) {
+        if (strcasestr(name, k_words[i]) != NULL) {
+            return true;
+        }
+    }
+    return false;
 }
 
 static void take_of_object(reader_t *self, const char *key, const char *value)
@@ -170,7 +224,33 @@ static void take_of_object(reader_t *self, const char *key, const char *value)
         object->fallback = found;
     } else if (strcasecmp(key, "ParameterValue") == 0) {
         object->parameter = found;
+    } else if (strcasecmp(key, "ParameterName") == 0) {
+        object->is_place = object->is_place || is_name_of_place(value);
     }
+}
+
+/* A value of an array that is written in short, as an object with the attributes of the array. */
+static void take_of_array(reader_t *self, const char *key, const char *value)
+{
+    const eds_number_t sub = number(key);
+    const eds_t *eds = self->eds;
+    if (!sub.is_there || sub.has_node || sub.value < 1 || sub.value > UINT8_MAX) {
+        return; /* NrOfEntries */
+    }
+    const eds_object_t *array = eds_find(eds, self->array, (uint8_t)sub.value);
+    eds_object_t filled = {.index = self->array, .line = self->line};
+    if (array != NULL) {
+        filled = *array;
+        filled.line = self->line;
+    }
+    filled.sub = (uint8_t)sub.value;
+    filled.compact = 0;
+    filled.parameter = number(value);
+    enter_object(self, self->array, filled.sub, true);
+    if (self->object != NULL) {
+        *self->object = filled;
+    }
+    self->object = NULL;
 }
 
 static void take_of_device(reader_t *self, const char *key, const char *value)
@@ -220,6 +300,10 @@ static void take_line(reader_t *self, char *text)
         take_of_object(self, key, value);
     } else if (self->is_device) {
         take_of_device(self, key, value);
+    } else if (self->is_drive && strcasecmp(key, "NodeID") == 0) {
+        self->eds->node = number(value);
+    } else if (self->has_values) {
+        take_of_array(self, key, value);
     }
 }
 
@@ -274,6 +358,15 @@ uint8_t eds_bytes(const eds_object_t *object)
         }
     }
     return 0;
+}
+
+int64_t eds_shown(const eds_object_t *object, uint32_t value)
+{
+    const char *name = eds_type_name(object);
+    if (name[0] != 'i') {
+        return value;
+    }
+    return name[1] == '8' ? (int8_t)value : name[1] == '1' ? (int16_t)value : (int32_t)value;
 }
 
 const char *eds_type_name(const eds_object_t *object)

@@ -14,6 +14,7 @@
 typedef struct {
     bool is_there;
     bool has_node; /**< the drive's node id is to be added ($NODEID) */
+    bool is_text;  /**< not there, but a text is: a name, a decimal fraction, more than 64 bits; value is a hash of it */
     int64_t value;
 } eds_number_t;
 
@@ -25,6 +26,7 @@ typedef struct {
     bool is_writable;
     bool is_mappable;
     bool is_parent;  /**< has no value of its own, only sub-indices */
+    bool is_place;   /**< by its name, or that of its record, the node id or the bit rate */
     uint16_t type;   /**< as in the file: 5 is u8, and so on */
     uint8_t compact; /**< so many sub-indices have the attributes of this */
     unsigned line;   /**< of its section */
@@ -37,6 +39,7 @@ typedef struct {
     size_t objects;
     size_t room;
     eds_number_t vendor, product;
+    eds_number_t node; /**< of a DCF */
     unsigned bitrates; /**< bit N: the Nth of eds_bitrates_kbps */
     bool has_bitrates;
 } eds_t;
@@ -56,6 +59,9 @@ const eds_object_t *eds_find(const eds_t *self, uint16_t index, uint8_t sub);
 
 /** Bytes of a value; 0 where it is no whole number of up to 32 bits. */
 uint8_t eds_bytes(const eds_object_t *object);
+
+/** A value as its type has it: 0xFFF9 is -7 in an i16. */
+int64_t eds_shown(const eds_object_t *object, uint32_t value);
 
 /** Its type as a start-up list has it: "u16". */
 const char *eds_type_name(const eds_object_t *object);

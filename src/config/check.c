@@ -71,8 +71,9 @@ static void check_section(config_source_t *self, unsigned index)
         config_is_applicable(section->needs, self->config)) {
         return;
     }
-    config_source_error(self, self->section_line[index], "[%s]: a %s has no free %s; allowed: with kind = hexapod only",
-                        section->name, config_kind_name(settings_of(self)->geometry.kind), section->name);
+    config_source_error(self, self->section_line[index],
+                        "[%s]: a %s has no such axis or cylinder; allowed: with kind = hexapod only", section->name,
+                        config_kind_name(settings_of(self)->geometry.kind));
 }
 
 static void check_presence(config_source_t *self, const config_key_t *key, const config_entry_t *entry)

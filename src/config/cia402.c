@@ -78,6 +78,26 @@ cia402_mode_t config_cia402_mode(const config_t *config, unsigned axis)
     return k_modes[words->word[words->count == 1 ? 0 : axis]];
 }
 
+/* Its own list replaces lines of the family's. */
+static bool has_object(const config_startup_t *list, const cia402_item_t *item)
+{
+    for (unsigned i = 0; list != NULL && i < list->count; i++) {
+        if (list->item[i].index == item->index && list->item[i].sub == item->sub) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void add_list(cia402_axis_config_t *axis, const config_startup_t *list, const config_startup_t *own)
+{
+    for (unsigned i = 0; i < list->count; i++) {
+        if (!has_object(own, &list->item[i])) {
+            axis->item[axis->items++] = list->item[i];
+        }
+    }
+}
+
 static void describe_axis(const config_t *config, unsigned k, cia402_axis_config_t *axis)
 {
     const config_cia402_t *cia402 = &config->cia402;
@@ -104,9 +124,13 @@ static void describe_axis(const config_t *config, unsigned k, cia402_axis_config
         .profile_accel = magnitude(&scale, accel_q16),
         .identity = {cia402->vendor_id, cia402->product_code, cia402->revision_number,
                      cia402->serial_numbers.count == 0 ? 0 : cia402->serial_numbers.id[k]},
-        .item = (is_angle ? &cia402->angle_startup : &cia402->startup)->item,
-        .items = (is_angle ? &cia402->angle_startup : &cia402->startup)->count,
     };
+    if (is_angle) {
+        add_list(axis, &cia402->angle_startup, NULL);
+    } else {
+        add_list(axis, &cia402->startup, &cia402->drive_startup[k]);
+        add_list(axis, &cia402->drive_startup[k], NULL);
+    }
     describe_limits(config, k, axis);
 }
 

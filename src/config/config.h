@@ -231,10 +231,12 @@ typedef struct {
     q16_t accel_q16;      /**< u/s^2 */
 } config_homing_t;
 
-/** Objects that a family of CANopen drives has to hold, in the order of the file. */
+#define CONFIG_STARTUP_MAX (CIA402_ITEMS_MAX / 2u) /**< of a list: a drive gets that of its family and its own */
+
+/** Objects that CANopen drives have to hold, in the order of the file. */
 typedef struct {
     uint8_t count;
-    cia402_item_t item[CIA402_ITEMS_MAX];
+    cia402_item_t item[CONFIG_STARTUP_MAX];
 } config_startup_t;
 
 /** CANopen drives; what it means is in cia402.h. */
@@ -282,7 +284,8 @@ typedef struct {
     uint32_t product_code;
     uint32_t revision_number;
     config_ids_t serial_numbers;
-    config_startup_t startup;
+    config_startup_t startup;                      /**< of all cylinders' drives */
+    config_startup_t drive_startup[CYLINDERS_MAX]; /**< of one */
     config_startup_t angle_startup;
 } config_cia402_t;
 

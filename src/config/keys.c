@@ -13,6 +13,9 @@
 
 const char *const config_axis_section[AXES_MAX] = {"roll", "pitch", "yaw", "x", "y", "z", "angle"};
 
+static const char k_drive_startup[] =
+    N_("what the drive of this cylinder alone has to hold; a line here replaces that of the same object in [cia402-startup]");
+
 const config_section_t config_sections[] = {
     {"platform", N_("what it is and how it starts"), CONFIG_NEEDS_NOTHING},
     {"geometry", N_("joint centres and lengths, as measured; left-handed frame, +X forward, +Y right, +Z up"),
@@ -46,6 +49,12 @@ const config_section_t config_sections[] = {
      N_("what the cylinders' drives have to hold beyond what heaved sets in every drive, an object in a line; see "
         "docs/cia402.md"),
      CONFIG_NEEDS_NOTHING},
+    {"cia402-startup-1", k_drive_startup, CONFIG_NEEDS_NOTHING},
+    {"cia402-startup-2", k_drive_startup, CONFIG_NEEDS_NOTHING},
+    {"cia402-startup-3", k_drive_startup, CONFIG_NEEDS_NOTHING},
+    {"cia402-startup-4", k_drive_startup, CONFIG_NEEDS_HEXAPOD},
+    {"cia402-startup-5", k_drive_startup, CONFIG_NEEDS_HEXAPOD},
+    {"cia402-startup-6", k_drive_startup, CONFIG_NEEDS_HEXAPOD},
     {"cia402-angle-startup", N_("the same of the rotation motor"), CONFIG_NEEDS_ANGLE},
     {"can-raw", N_("drives on CAN with frames of their own ([drives] driver = can-raw); see docs/can-raw.md"),
      CONFIG_NEEDS_NOTHING},

@@ -73,7 +73,7 @@ typedef struct {
 } config_key_t;
 
 #define CONFIG_KEYS_MAX     352u /**< bound of arrays with one element per key */
-#define CONFIG_SECTIONS_MAX 32u
+#define CONFIG_SECTIONS_MAX 40u
 
 extern const config_section_t config_sections[];
 extern const size_t config_section_count;

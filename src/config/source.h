@@ -30,7 +30,7 @@ typedef struct {
     bool is_given_up; /**< the file cannot be read to its end */
     unsigned section_line[CONFIG_SECTIONS_MAX]; /**< 0: not in the file */
     config_entry_t entry[CONFIG_KEYS_MAX];
-    unsigned startup_line[2][CIA402_ITEMS_MAX]; /**< of the items of the cylinders' list, and of the rotation motor's */
+    unsigned startup_line[CONFIG_SECTIONS_MAX][CONFIG_STARTUP_MAX]; /**< of the items of a section that is a list */
 } config_source_t;
 
 /** Where a configuration comes from. */

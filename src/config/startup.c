@@ -18,10 +18,15 @@ const char config_startup_allowed[] =
 
 const config_startup_t *config_startup_of(const config_section_t *section, const config_t *config)
 {
-    if (strcmp(section->name, "cia402-startup") == 0) {
-        return &config->cia402.startup;
+    static const char k_name[] = "cia402-startup";
+    if (strcmp(section->name, "cia402-angle-startup") == 0) {
+        return &config->cia402.angle_startup;
     }
-    return strcmp(section->name, "cia402-angle-startup") == 0 ? &config->cia402.angle_startup : NULL;
+    if (strncmp(section->name, k_name, sizeof k_name - 1u) != 0) {
+        return NULL;
+    }
+    const char *number = section->name + sizeof k_name; /* behind the "-" */
+    return section->name[sizeof k_name - 1u] == '\0' ? &config->cia402.startup : &config->cia402.drive_startup[number[0] - '1'];
 }
 
 bool config_startup_is_list(const config_section_t *section)

@@ -124,8 +124,7 @@ static unsigned split(const char *line, char word[WORDS_MAX + 1u][WORD_BYTES])
 void config_startup_take(config_source_t *self, const char *before, const char *behind)
 {
     const config_section_t *section = &config_sections[self->section];
-    config_startup_t *list =
-        strcmp(section->name, "cia402-startup") == 0 ? &self->config->cia402.startup : &self->config->cia402.angle_startup;
+    config_startup_t *list = (config_startup_t *)config_startup_of(section, self->config);
     char word[WORDS_MAX + 1u][WORD_BYTES] = {""};
     config_text_t line, quoted;
     cia402_item_t item;
@@ -135,7 +134,7 @@ void config_startup_take(config_source_t *self, const char *before, const char *
     const bool is_colon = strchr(behind, '=') != NULL || strstr(behind, " is ") != NULL;
     config_text_add(&line, "%s%s%s", before, is_colon ? ":" : " = ", behind);
     const char *wrong = read_item(word, split(line.data, word), &item);
-    if (wrong == NULL && list->count == CIA402_ITEMS_MAX) {
+    if (wrong == NULL && list->count == CONFIG_STARTUP_MAX) {
         wrong = _("is one too many: a list has up to 32");
     }
     if (wrong != NULL) {
@@ -144,7 +143,7 @@ void config_startup_take(config_source_t *self, const char *before, const char *
                             translate(config_startup_allowed));
         return;
     }
-    self->startup_line[list == &self->config->cia402.startup ? 0 : 1][list->count] = self->line;
+    self->startup_line[self->section][list->count] = self->line;
     list->item[list->count++] = item;
 }
 
@@ -160,23 +159,32 @@ static bool is_written_by_heaved(const cia402_config_t *drives, unsigned axis, c
     return false;
 }
 
-static void check_list(config_source_t *self, const cia402_config_t *drives, unsigned axis, unsigned which)
+/* The first and the last axis whose drives get a list. */
+static void find_axes(const config_cia402_t *cia402, const config_startup_t *list, unsigned angle, unsigned axes[2])
 {
-    const cia402_axis_config_t *own = &drives->axis[axis];
-    const char *section = which == 0 ? "cia402-startup" : "cia402-angle-startup";
-    for (unsigned i = 0; i < own->items; i++) {
-        const cia402_item_t *item = &own->item[i];
-        const char *denied =
-            item->is_written ? config_startup_denied(item->index, item->sub, item->value, self->config->cia402.vendor_id) : NULL;
-        if (is_written_by_heaved(drives, axis, item)) {
-            config_source_error(self, self->startup_line[which][i],
-                                "[%s] 0x%04X:%02u: heaved sets it itself; allowed: the keys of [cia402] for that", section,
-                                item->index, item->sub);
-        } else if (denied != NULL) {
-            config_source_error(self, self->startup_line[which][i],
-                                "[%s] 0x%04X:%02u %s; allowed: other objects, or `is` to look", section, item->index, item->sub,
-                                denied);
-        }
+    if (list == &cia402->startup) {
+        axes[0] = 0;
+        axes[1] = angle - 1u;
+    } else {
+        axes[0] = axes[1] = list == &cia402->angle_startup ? angle : (unsigned)(list - cia402->drive_startup);
+    }
+}
+
+static void check_item(config_source_t *self, const cia402_config_t *drives, const unsigned axes[2], const char *section,
+                       const cia402_item_t *item, unsigned line)
+{
+    const char *denied =
+        item->is_written ? config_startup_denied(item->index, item->sub, item->value, self->config->cia402.vendor_id) : NULL;
+    bool is_own = false;
+    for (unsigned axis = axes[0]; axis <= axes[1]; axis++) {
+        is_own = is_own || is_written_by_heaved(drives, axis, item);
+    }
+    if (is_own) {
+        config_source_error(self, line, "[%s] 0x%04X:%02u: heaved sets it itself; allowed: the keys of [cia402] for that",
+                            section, item->index, item->sub);
+    } else if (denied != NULL) {
+        config_source_error(self, line, "[%s] 0x%04X:%02u %s; allowed: other objects, or `is` to look", section, item->index,
+                            item->sub, denied);
     }
 }
 
@@ -184,9 +192,17 @@ void config_startup_check(config_source_t *self)
 {
     static cia402_config_t drives;
     config_cia402(self->config, &drives);
-    check_list(self, &drives, 0, 0);
-    if (self->config->settings.has_angle) {
-        check_list(self, &drives, drives.axes - 1u, 1);
+    const unsigned angle = drives.axes - (self->config->settings.has_angle ? 1u : 0u);
+    for (size_t i = 0; i < config_section_count; i++) {
+        const config_startup_t *list = config_startup_of(&config_sections[i], self->config);
+        unsigned axes[2];
+        if (list == NULL || !config_is_applicable(config_sections[i].needs, self->config)) {
+            continue;
+        }
+        find_axes(&self->config->cia402, list, angle, axes);
+        for (unsigned k = 0; k < list->count; k++) {
+            check_item(self, &drives, axes, config_sections[i].name, &list->item[k], self->startup_line[i][k]);
+        }
     }
 }
 

@@ -26,6 +26,7 @@
 #include "heave/gateway.h"
 #include "inspect/dbc.h"
 #include "inspect/doctor.h"
+#include "inspect/dcf_startup.h"
 #include "inspect/eds_judge.h"
 #include "inspect/envelope_csv.h"
 #include "inspect/report.h"
@@ -62,10 +63,10 @@ typedef struct {
  * Returns EXIT_DONE; else it has said what is wrong. */
 static int check_outputs(const options_t *options, const char *metrics)
 {
-    const named_t named[] = {{"--config", options->config, false},    {"--play", options->play, false},
-                             {"--trace", options->trace, true},       {"--record", options->record, true},
-                             {"--eds", options->eds, false},          {"--import-dcf", options->dcf, false},
-                             {"--envelope", options->envelope, true}, {"[control] metrics", metrics, true}};
+    const named_t named[] = {{"--config", options->config, false}, {"--play", options->play, false},
+                             {"--trace", options->trace, true},    {"--record", options->record, true},
+                             {"--eds", options->eds, false},       {"--envelope", options->envelope, true},
+                             {"[control] metrics", metrics, true}};
     for (size_t out = 0; out < sizeof named / sizeof named[0]; out++) {
         for (size_t in = 0; named[out].is_output && named[out].path != NULL && in < out; in++) {
             if (named[in].path != NULL && same_file(named[out].path, named[in].path, named[in].is_output)) {
@@ -114,14 +115,29 @@ static int read_eds(eds_t *eds, const char *path)
     return is_read ? EXIT_DONE : EXIT_BAD_DATA;
 }
 
-static int import_dcf(const char *path)
+static int import_dcf(const options_t *options)
 {
-    eds_t eds;
-    const int code = read_eds(&eds, path);
-    if (code == EXIT_DONE) {
-        eds_write_startup(&eds, stdout);
+    eds_t file[OPTIONS_DCF_MAX] = {{.object = NULL}};
+    int code = EXIT_DONE;
+    unsigned read = 0;
+    while (code == EXIT_DONE && read < options->dcfs) {
+        code = read_eds(&file[read], options->dcf[read]);
+        read++;
     }
-    eds_free(&eds);
+    for (unsigned i = 1; code == EXIT_DONE && i < read; i++) {
+        if (file[i].vendor.value != file[0].vendor.value || file[i].product.value != file[0].product.value) {
+            code = print_message(EXIT_BAD_DATA, "%s: VendorNumber and ProductNumber are of another device than those of %s",
+                                 options->dcf[i], options->dcf[0]);
+        }
+    }
+    if (code == EXIT_DONE) {
+        const char *section = options->dcfs == 1 ? options->dcf_section : NULL;
+        const unsigned left = dcf_write_startup(file, options->dcf, read, section, stdout, stderr);
+        code = left > 0 && !options->is_partial ? EXIT_REFUSED : EXIT_DONE;
+    }
+    for (unsigned i = 0; i < read; i++) {
+        eds_free(&file[i]);
+    }
     return end_stdout(code);
 }
 
@@ -230,7 +246,7 @@ static int run_without_file(const options_t *options)
     case MODE_TEMPLATE:
         return write_template(options);
     case MODE_IMPORT_DCF:
-        return import_dcf(options->dcf);
+        return import_dcf(options);
     case MODE_RUN:
     case MODE_CHECK:
     case MODE_ENVELOPE:

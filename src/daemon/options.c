@@ -30,6 +30,8 @@ enum {
     OPTION_PRESETS,
     OPTION_SCAN,
     OPTION_TEMPLATE,
+    OPTION_DRIVE,
+    OPTION_PARTIAL,
     OPTION_HELP,
     OPTION_VERSION
 };
@@ -41,7 +43,8 @@ static const usage_row_t k_forms[] = {
     {.argument = "--doctor", .help = N_("look at machine, CAN interface and drives: what is wrong, what helps")},
     {.argument = "--dump-config", .help = N_("every key with its value, unit, range and help")},
     {.argument = "--dump-dbc", .help = N_("the frames of [can-raw] or [cia402] as a DBC file")},
-    {.argument = "--import-dcf DCF", .help = N_("what it sets, as a [cia402-startup] list")},
+    {.argument = "--import-dcf DCF --drive N|all", .help = N_("what it sets, as the start-up list of a drive, or of all")},
+    {.argument = "--import-dcf DCF...", .help = N_("of drives 1, 2, ...: what is alike for all of them, and lists of each")},
     {.argument = "--play FRAMES [--trace OUT]", .help = N_("offline: simulated time and devices")},
     {.argument = "--presets", .help = N_("ready-made platforms, without a file")},
     {.argument = "--keys", .help = N_("every key with help, unit, range and default as JSON, without a file")},
@@ -70,8 +73,11 @@ static const usage_row_t k_options[] = {
     {"dump-dbc", NULL, N_("for tools that show CAN frames"), OPTION_DUMP_DBC},
     {"eds", "EDS", N_("the file of the drives ([drives] driver = cia402): which objects they lack, which settings do not fit"),
      OPTION_EDS},
-    {"import-dcf", "DCF", N_("a drive as its maker's program left it; what heaved sets itself, or the node decides, stays out"),
+    {"import-dcf", "DCF", N_("a drive as its maker's program left it; what is left out is a comment, with the reason"),
      OPTION_IMPORT_DCF},
+    {"drive", "N", N_("of --import-dcf with one file: 1 to 6, angle for the rotation motor, or all for all cylinders alike"),
+     OPTION_DRIVE},
+    {"partial", NULL, N_("of --import-dcf: exit 0 also where settings are left out that the drive may need"), OPTION_PARTIAL},
     {"play", "FRAMES", N_("lines `<t_ms> <text>`, `<t_ms> !engage` ...; - is standard input"), OPTION_PLAY},
     {"trace", "OUT", N_("the set-points of every cycle (CSV); - is standard output"), OPTION_TRACE},
     {"record", "FRAMES", N_("log every datagram and request, so that --play repeats the run"), OPTION_RECORD},
@@ -83,7 +89,8 @@ static const usage_row_t k_options[] = {
 
 static const usage_exit_t k_exits[] = {
     {EXIT_DONE, N_("done")},
-    {EXIT_REFUSED, N_("ended by a second signal, torque not confirmed off, or --doctor, --scan or --eds found something wrong")},
+    {EXIT_REFUSED, N_("ended by a second signal, torque not confirmed off, --doctor, --scan or --eds found something wrong, or "
+                      "--import-dcf left something out")},
     {EXIT_BAD_USAGE, N_("usage")},
     {EXIT_BAD_DATA, N_("bad FRAMES, EDS or DCF")},
     {EXIT_NO_INPUT, N_("no input")},
@@ -162,8 +169,6 @@ static const char **value_of(options_t *self, int option)
         return &self->envelope;
     case OPTION_EDS:
         return &self->eds;
-    case OPTION_IMPORT_DCF:
-        return &self->dcf;
     case OPTION_PLAY:
         return &self->play;
     case OPTION_TRACE:
@@ -194,6 +199,27 @@ static const char *take_config(options_t *self, int option)
                : _("--preset needs one of the names that --presets shows");
 }
 
+static const char *take_dcf(options_t *self, const char *path)
+{
+    if (self->dcfs == OPTIONS_DCF_MAX) {
+        return _("--import-dcf takes up to 6 files, one for each cylinder's drive");
+    }
+    self->dcf[self->dcfs++] = path;
+    return NULL;
+}
+
+/* The list that a file goes into. */
+static const char *take_drive(options_t *self, const char *which)
+{
+    const bool is_number = which[0] >= '1' && which[0] < '1' + (int)OPTIONS_DCF_MAX && which[1] == '\0';
+    if (!is_number && strcmp(which, "all") != 0 && strcmp(which, "angle") != 0) {
+        return _("--drive is 1 to 6, angle or all");
+    }
+    (void)snprintf(self->dcf_section, sizeof self->dcf_section, "cia402-%sstartup%s%s", which[1] == 'n' ? "angle-" : "",
+                   is_number ? "-" : "", is_number ? which : "");
+    return NULL;
+}
+
 static const char *take_option(options_t *self, int option)
 {
     const run_mode_t mode = mode_of(option);
@@ -204,6 +230,13 @@ static const char *take_option(options_t *self, int option)
         return take_config(self, option);
     }
     self->is_json = self->is_json || option == OPTION_JSON;
+    self->is_partial = self->is_partial || option == OPTION_PARTIAL;
+    const char *wrong = option == OPTION_IMPORT_DCF ? take_dcf(self, optarg)
+                        : option == OPTION_DRIVE    ? take_drive(self, optarg)
+                                                    : NULL;
+    if (wrong != NULL) {
+        return wrong;
+    }
     if (value_of(self, option) != NULL) {
         *value_of(self, option) = optarg;
     }
@@ -215,9 +248,26 @@ static const char *take_option(options_t *self, int option)
     return NULL;
 }
 
+static const char *dcf_contradiction(const options_t *self)
+{
+    const bool has_drive = self->dcf_section[0] != '\0';
+    if (self->mode != MODE_IMPORT_DCF) {
+        return has_drive || self->is_partial ? _("--drive and --partial are for --import-dcf") : NULL;
+    }
+    if (self->dcfs > 1 && has_drive) {
+        return _("--drive is for --import-dcf with one file; several are of drives 1, 2, ...");
+    }
+    return self->dcfs > 1 || has_drive ? NULL
+                                       : _("whose file is it? --drive 1 to 6 or angle, or --drive all for all cylinders alike");
+}
+
 /* Options that do not go together. */
 static const char *contradiction(const options_t *self)
 {
+    const char *wrong = dcf_contradiction(self);
+    if (wrong != NULL) {
+        return wrong;
+    }
     if (self->mode == MODE_HELP || self->mode == MODE_VERSION || self->mode == MODE_PRESETS || self->mode == MODE_IMPORT_DCF ||
         self->mode == MODE_SCAN || self->mode == MODE_KEYS) {
         return NULL;
@@ -272,9 +322,13 @@ int options_read(options_t *self, int argc, char **argv)
     if (self->mode == MODE_TEMPLATE && optind < argc) {
         self->template_driver = argv[optind++];
     }
-    if (optind < argc) {
-        return complain(_("unexpected argument"), argv[optind]);
+    const char *wrong = NULL;
+    while (self->mode == MODE_IMPORT_DCF && optind < argc && wrong == NULL) {
+        wrong = take_dcf(self, argv[optind++]);
     }
-    const char *wrong = contradiction(self);
+    if (wrong != NULL || optind < argc) {
+        return wrong != NULL ? complain(wrong, NULL) : complain(_("unexpected argument"), argv[optind]);
+    }
+    wrong = contradiction(self);
     return wrong != NULL ? complain(wrong, NULL) : EXIT_DONE;
 }

@@ -8,6 +8,8 @@
 
 #include "daemon/anew.h"
 
+#define OPTIONS_DCF_MAX 6u /* a file for each cylinder */
+
 /** What to do. */
 typedef enum {
     MODE_RUN,
@@ -34,7 +36,10 @@ typedef struct {
     const char *play;
     const char *envelope;
     const char *eds;
-    const char *dcf;
+    const char *dcf[OPTIONS_DCF_MAX]; /**< files of --import-dcf */
+    unsigned dcfs;
+    char dcf_section[24]; /**< where the settings of a single one go, by --drive; "" where none was named */
+    bool is_partial;
     const char *trace;
     const char *record;
     const char *socket;

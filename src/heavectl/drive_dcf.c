@@ -68,7 +68,7 @@ static setting_t setting_of(const eds_object_t *object, uint8_t sub)
     return (setting_t){.index = object->index, .sub = sub, .bytes = eds_bytes(object), .is_signed = is_signed};
 }
 
-static void add_of_file(settings_list_t *list, const eds_object_t *object)
+static void add_of_file(settings_list_t *list, const eds_t *eds, const eds_object_t *object)
 {
     if (object->is_parent || !object->is_readable || !object->is_writable || !is_setting(object->index)) {
         return;
@@ -77,7 +77,9 @@ static void add_of_file(settings_list_t *list, const eds_object_t *object)
         add(list, setting_of(object, object->sub));
     }
     for (unsigned sub = 1; sub <= object->compact; sub++) {
-        add(list, setting_of(object, (uint8_t)sub));
+        if (eds_find(eds, object->index, (uint8_t)sub) == object) { /* else it has a section of its own */
+            add(list, setting_of(object, (uint8_t)sub));
+        }
     }
 }
 
@@ -117,7 +119,7 @@ static int choose(const ctl_t *self, unsigned channel, settings_list_t *list)
     }
     const int code = read_file(self->eds, &eds);
     for (size_t i = 0; code == EXIT_DONE && i < eds.objects; i++) {
-        add_of_file(list, &eds.object[i]);
+        add_of_file(list, &eds, &eds.object[i]);
     }
     eds_free(&eds);
     return code == EXIT_DONE && list->count == 0
@@ -330,7 +332,8 @@ int drive_save(ctl_t *self, unsigned drive, unsigned channel)
 typedef struct {
     unsigned same;
     unsigned differ;
-    cJSON *list; /* of those that differ */
+    unsigned skipped; /* no whole numbers of up to 32 bits */
+    cJSON *list;      /* of those that differ */
 } verdict_t;
 
 /* A number of the file as the object has it: files write -1 as 0xFFFF. */
@@ -379,10 +382,14 @@ static int compare_one(ctl_t *self, unsigned drive, const eds_object_t *object, 
     return code;
 }
 
+static bool is_wanted(const eds_object_t *object)
+{
+    return (object->parameter.is_there || object->parameter.is_text) && is_setting(object->index);
+}
+
 static bool is_compared(const eds_object_t *object)
 {
-    return !object->is_parent && object->parameter.is_there && object->is_readable && eds_bytes(object) > 0 &&
-           is_setting(object->index);
+    return !object->is_parent && object->parameter.is_there && object->is_readable && eds_bytes(object) > 0;
 }
 
 static int compare_all(ctl_t *self, unsigned drive, uint32_t node, const eds_t *eds, verdict_t *verdict)
@@ -397,8 +404,13 @@ static int compare_all(ctl_t *self, unsigned drive, uint32_t node, const eds_t *
         }
     }
     for (size_t i = 0; i < eds->objects && code == EXIT_DONE; i++) {
+        if (!is_wanted(&eds->object[i])) {
+            continue;
+        }
         if (is_compared(&eds->object[i])) {
             code = compare_one(self, drive, &eds->object[i], node, verdict);
+        } else {
+            verdict->skipped++;
         }
     }
     return code;
@@ -415,10 +427,15 @@ int drive_compare(ctl_t *self, unsigned drive, uint32_t node)
         code = ctl_complain(EXIT_BAD_DATA, "%s: no ParameterValue in it: a DCF is needed, an EDS has none", self->compare);
     } else if (code == EXIT_DONE && self->is_json) {
         char *text = cJSON_PrintUnformatted(verdict.list);
-        printf("{\"ok\":true,\"drive\":%u,\"same\":%u,\"differ\":%s}\n", drive, verdict.same, text != NULL ? text : "[]");
+        printf("{\"ok\":true,\"drive\":%u,\"same\":%u,\"not_compared\":%u,\"differ\":%s}\n", drive, verdict.same, verdict.skipped,
+               text != NULL ? text : "[]");
         free(text);
     } else if (code == EXIT_DONE) {
         printf(_("drive %u and %s: %u objects are the same, %u differ\n"), drive, self->compare, verdict.same, verdict.differ);
+        if (verdict.skipped > 0) {
+            printf(_("settings of the file that are not compared (no whole number of up to 32 bits, or write-only): %u\n"),
+                   verdict.skipped);
+        }
     }
     cJSON_Delete(verdict.list);
     return code == EXIT_DONE && verdict.differ > 0 ? EXIT_REFUSED : code;

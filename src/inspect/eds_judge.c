@@ -8,7 +8,6 @@
 
 #include "common/translate.h"
 #include "config/cia402.h"
-#include "config/startup_denied.h"
 #include "inspect/doctor_report.h"
 
 #define FINDINGS_MAX  128u
@@ -115,29 +114,20 @@ static void judge_missing(judge_t *self, const cia402_wish_t *wish)
     say(self, level_of(self, wish), text);
 }
 
-/* The value as its type shows it. */
-static int64_t shown(const eds_object_t *object, uint32_t value)
-{
-    const char *name = eds_type_name(object);
-    if (name[0] != 'i') {
-        return value;
-    }
-    return name[1] == '8' ? (int8_t)value : name[1] == '1' ? (int16_t)value : (int32_t)value;
-}
-
 static void judge_value(judge_t *self, const cia402_wish_t *wish, const eds_object_t *object)
 {
     char text[FINDING_BYTES];
-    const int64_t value = shown(object, wish->value);
-    const bool is_low = object->low.is_there && !object->low.has_node && value < shown(object, (uint32_t)object->low.value);
-    const bool is_high = object->high.is_there && !object->high.has_node && value > shown(object, (uint32_t)object->high.value);
+    const int64_t value = eds_shown(object, wish->value);
+    const bool is_low = object->low.is_there && !object->low.has_node && value < eds_shown(object, (uint32_t)object->low.value);
+    const bool is_high =
+        object->high.is_there && !object->high.has_node && value > eds_shown(object, (uint32_t)object->high.value);
     const char *key = key_of(wish);
     if (key == NULL || (!is_low && !is_high)) { /* COB-IDs and mappings are heaved's own affair */
         return;
     }
     (void)snprintf(text, sizeof text, _("%04Xh:%02X (line %u) takes %s %lld, heaved sets %lld -> %s%s"), wish->index, wish->sub,
                    object->line, is_low ? _("at least") : _("at most"),
-                   (long long)shown(object, (uint32_t)(is_low ? object->low.value : object->high.value)), (long long)value,
+                   (long long)eds_shown(object, (uint32_t)(is_low ? object->low.value : object->high.value)), (long long)value,
                    key[0] == '[' ? "" : "[cia402] ", key);
     say(self, level_of(self, wish), text);
 }
@@ -154,7 +144,7 @@ static void judge_access(judge_t *self, const cia402_wish_t *wish, const eds_obj
             (void)snprintf(holds, sizeof holds, _(" and holds %lld"), (long long)object->fallback.value);
         }
         (void)snprintf(text, sizeof text, _("%04Xh:%02X (line %u) can only be read%s, heaved sets %lld -> %s"), wish->index,
-                       wish->sub, object->line, holds, (long long)shown(object, wish->value), remedy_of(self, wish));
+                       wish->sub, object->line, holds, (long long)eds_shown(object, wish->value), remedy_of(self, wish));
         say(self, level_of(self, wish), text);
     } else if (wish->is_written && bytes != wish->bytes && wish->index != 0x1000) {
         (void)snprintf(text, sizeof text,
@@ -270,55 +260,4 @@ bool eds_judge(const eds_t *eds, const config_t *config, FILE *out)
     }
     doctor_sum(&self.report);
     return self.report.count[DOCTOR_FAIL] == 0;
-}
-
-/* --- A DCF as a list --- */
-
-/* Why a value is not taken over, NULL where it is. */
-static const char *reason_to_leave(const eds_object_t *object, int64_t vendor)
-{
-    if (object->parameter.has_node) {
-        return _("depends on the node");
-    }
-    if (!object->is_writable) {
-        return _("can only be read");
-    }
-    if (cia402_is_own_object(object->index, object->sub)) {
-        return _("is set by heaved itself, by the keys of [cia402]");
-    }
-    const char *denied = config_startup_denied(object->index, object->sub, (uint32_t)object->parameter.value, (uint32_t)vendor);
-    if (denied != NULL) {
-        return denied;
-    }
-    return eds_bytes(object) == 0 ? _("is no whole number of up to 32 bits") : NULL;
-}
-
-void eds_write_startup(const eds_t *eds, FILE *out)
-{
-    unsigned items = 0;
-    unsigned same = 0;
-    fprintf(out, "[cia402-startup]\n");
-    for (size_t i = 0; i < eds->objects; i++) {
-        const eds_object_t *object = &eds->object[i];
-        if (!object->parameter.is_there || object->is_parent) {
-            continue;
-        }
-        const char *left = reason_to_leave(object, eds->vendor.is_there ? eds->vendor.value : 0);
-        if (left == NULL && object->fallback.is_there && object->fallback.value == object->parameter.value) {
-            same++;
-            continue;
-        }
-        if (left == NULL && items++ >= CIA402_ITEMS_MAX) {
-            left = _("is one too many: a list has up to 32; store the rest in the drive by its maker's program");
-        }
-        if (left != NULL) {
-            fprintf(out, "; 0x%04X:%02u %s\n", object->index, object->sub, left);
-        } else {
-            fprintf(out, "0x%04X:%02u = %" PRId64 " %s\n", object->index, object->sub,
-                    shown(object, (uint32_t)object->parameter.value), eds_type_name(object));
-        }
-    }
-    if (same > 0) {
-        fprintf(out, _("; %u more hold their defaults\n"), same);
-    }
 }

@@ -12,7 +12,4 @@
  *  @return true where such a drive can be used */
 bool eds_judge(const eds_t *eds, const config_t *config, FILE *out);
 
-/** Writes what a DCF sets as a [cia402-startup] list, with comments for what it leaves out. */
-void eds_write_startup(const eds_t *eds, FILE *out);
-
 #endif

@@ -161,8 +161,8 @@ static void configure(void)
                                                   .step_max_q32 = q32_from_int(STEP_MM),
                                                   .following_max_q32 = q32_from_int(10),
                                                   .window_counts = 10000,
-                                                  .item = k_items,
                                                   .items = sizeof k_items / sizeof k_items[0]};
+        memcpy(m_config.axis[k].item, k_items, sizeof k_items);
     }
 }
 

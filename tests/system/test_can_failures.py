@@ -418,6 +418,8 @@ STARTUP = """
 0x605D:00 = 1 i16 unchecked last
 0x1000:00 is 0x20192 u32
 0x2999:00 = 1 u8 if-there
+[cia402-startup-2]
+0x1007:00 = 2000 u32
 """
 
 
@@ -441,7 +443,7 @@ def start_up_list(bench, _):
     report = bench.status()["cylinders"][VICTIM - 1]["report"]
     assert (report["code"], report["object"], report["sub_index"], report["detail_code"]) == (0x10009, 0x1007, 0, 0x06090030), report
     harness.wait_for(lambda: sum(leg["report"]["phase"] == "ready" for leg in bench.status()["cylinders"]) == 5, "the others are ready")
-    assert all(read_object(node, 0x1007) == 1000 for node in range(1, 7) if node != VICTIM)
+    assert all(read_object(node, 0x1007) == (2000 if node == 2 else 1000) for node in range(1, 7) if node != VICTIM)
     assert bench.ctl("engage").returncode != 0
     bench.wait_state("FAULT")
     bench.do("take sdo", VICTIM, index="1007", sub=0)

@@ -154,7 +154,7 @@ def main():
             judge.reads(program)
         for arguments in (["--config"], ["--config", "a", "--preset", "b"], ["--preset", "../x"], ["--check", "--doctor", "--config", "a"], ["--config", "a", "--check", "more"],
                           ["--config", "a", "--check", "--record", "b"], ["--config", "a", "--eds", "b"], ["--template", "hexapod"], ["--template", "octo_pod", "sim"],
-                          ["--config", "a", "--check", "--trace", "b"], ["--config", "/nonexistent", "--check"], ["--config", "/", "--check"], ["--import-dcf", "/nonexistent"],
+                          ["--config", "a", "--check", "--trace", "b"], ["--config", "/nonexistent", "--check"], ["--config", "/", "--check"], ["--import-dcf", "/nonexistent", "--drive", "all"], ["--import-dcf", "a"], ["--drive", "7"], ["--import-dcf", *"abcdefg"],
                           ["--config", "a", "--socket", ""]):
             judge.reads(heaved, *arguments)
         for arguments in (["--for", "x", "watch"], ["--hz", "99", "watch"], ["--band", "1", "identify", "z"], ["--amplitude", "x", "identify", "z"], ["--platform", "a/b", "status"],

@@ -352,8 +352,12 @@ def drives_in_their_own_words(bench):
     assert differs.returncode == 1 and "6083:00 profile acceleration, counts/s^2: the drive has 12345, the file 100000" in differs.stdout, differs
     assert "6098:00 homing method: the drive has -3, the file 0" in differs.stdout and "20 objects are the same, 2 differ" in differs.stdout, differs
     assert "22 objects are the same, 0 differ" in words_of(bench.ctl("--compare", saved, "drive", "2"))
-    imported = subprocess.run([bench.bin / "heaved", "--config", bench.config, "--import-dcf", saved], stdout=subprocess.PIPE, text=True, timeout=60, check=False)
-    assert imported.returncode == 0 and "6083:00" in imported.stdout, imported
+    with open(saved, "a", encoding="utf-8") as file:
+        file.write("[2100]\nObjectType=7\nDataType=8\nAccessType=rw\nParameterValue=1.5\n")
+    assert "write-only): 1" in words_of(bench.ctl("--compare", saved, "drive", "2"))
+    imported = subprocess.run([bench.bin / "heaved", "--import-dcf", saved, "--drive", "3"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+    assert imported.returncode == 1 and "drive3.dcf: left out" in imported.stderr, imported
+    assert imported.stdout.startswith("[cia402-startup-3]\n") and "; 0x2100:00 (line " in imported.stdout, imported
     words_of(bench.ctl("service-off"))
 
 

@@ -215,7 +215,7 @@ static void test_configuration_says_what_else_is_kept(void)
 {
     static const cia402_item_t k_items[] = {{.index = 0x2010, .sub = 3, .bytes = 2, .is_written = true},
                                             {.index = 0x2011, .sub = 0, .bytes = 2}};
-    config.axis[1].item = k_items;
+    memcpy(config.axis[1].item, k_items, sizeof k_items);
     config.axis[1].items = 2;
     TEST_ASSERT_TRUE(cia402_is_relied_on(&config, 1, 0x2010, 3));
     TEST_ASSERT_FALSE(cia402_is_relied_on(&config, 0, 0x2010, 3));

@@ -794,8 +794,9 @@ static void test_load_axis_section_of_a_tripod_is_an_error(void)
         insert_line(m_lines, header);
         insert_line(m_lines, "sign = 1");
         TEST_ASSERT_EQUAL_INT(1, load_lines());
-        snprintf(expected, sizeof expected, "%s:%u: [%s]: a tripod has no free %s; allowed: with kind = hexapod only\n",
-                 FILE_NAME, m_lines - 1, sections[i], sections[i]);
+        snprintf(expected, sizeof expected,
+                 "%s:%u: [%s]: a tripod has no such axis or cylinder; allowed: with kind = hexapod only\n", FILE_NAME,
+                 m_lines - 1, sections[i]);
         TEST_ASSERT_EQUAL_STRING(expected, m_errors);
     }
 }

@@ -218,6 +218,50 @@ static void test_load_startup_list_reaches_every_drive_in_its_order(void)
     }
 }
 
+static void test_load_startup_list_of_a_drive_reaches_it_alone(void)
+{
+    cia402_config_t drives;
+    strcat(m_text, "\n[cia402-startup]\n0x2030:01 = 50 u16\n0x2031:00 = 3 u8\n"
+                   "[cia402-startup-2]\n0x2030:01 = 60 u16\n0x2030:02 = 1 u8\n[cia402-startup-6]\n0x2040:00 is 1 u8\n");
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_cia402(&m_config, &drives);
+    for (unsigned k = 0; k < 6; k++) {
+        TEST_ASSERT_EQUAL_UINT8(k == 1 || k == 5 ? 3 : 2, drives.axis[k].items);
+    }
+    const cia402_item_t *own = drives.axis[1].item;
+    TEST_ASSERT_TRUE(own[0].index == 0x2031 && own[1].index == 0x2030 && own[1].value == 60 && own[2].sub == 2);
+    TEST_ASSERT_TRUE(drives.axis[0].item[0].value == 50 && drives.axis[5].item[2].index == 0x2040);
+}
+
+static void test_load_startup_lists_of_all_and_of_a_drive_may_be_full(void)
+{
+    cia402_config_t drives;
+    for (unsigned i = 0; i < 2 * CONFIG_STARTUP_MAX; i++) {
+        char line[40];
+        if (i % CONFIG_STARTUP_MAX == 0) {
+            strcat(m_text, i == 0 ? "\n[cia402-startup]\n" : "[cia402-startup-3]\n");
+        }
+        snprintf(line, sizeof line, "0x%04X:00 = 1 u8\n", 0x2100 + i);
+        strcat(m_text, line);
+    }
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
+    config_cia402(&m_config, &drives);
+    TEST_ASSERT_EQUAL_UINT8(CIA402_ITEMS_MAX, drives.axis[2].items);
+    TEST_ASSERT_EQUAL_UINT8(CONFIG_STARTUP_MAX, drives.axis[3].items);
+    strcat(m_text, "0x3000:00 = 1 u8\n");
+    TEST_ASSERT_EQUAL_INT(1, load());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "[cia402-startup-3] \"0x3000:00 = 1 u8\" is one too many: a list has up to 32"),
+                                 m_errors);
+}
+
+static void test_load_startup_list_of_a_drive_is_checked_as_that_of_all(void)
+{
+    strcat(m_text, "\n[cia402-startup-4]\n0x6040:00 = 15 u16\n0x605A:00 = 0 i16\n");
+    TEST_ASSERT_EQUAL_INT(2, load());
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "[cia402-startup-4] 0x6040:00"), m_errors);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, "[cia402-startup-4] 0x605A:00: heaved sets it itself"), m_errors);
+}
+
 static void refuse_item(const char *line, const char *why)
 {
     char place[200];
@@ -408,6 +452,7 @@ static void test_load_startup_list_of_more_than_32_is_refused(void)
 static void test_load_startup_list_is_dumped_hashed_and_needs_a_restart(void)
 {
     static config_t running;
+    static char text[CONFIG_TEXT_BYTES];
     char before[CONFIG_HASH_MAX];
     TEST_ASSERT_EQUAL_INT(0, load());
     strcpy(before, m_config.hash);
@@ -428,7 +473,7 @@ static void test_load_startup_list_is_dumped_hashed_and_needs_a_restart(void)
     fputs("0x2033:0 = 1 u8\n", file);
     fclose(file);
     rewind(report);
-    TEST_ASSERT_EQUAL_INT(0, config_reload(FILE_NAME, &running, report));
+    TEST_ASSERT_EQUAL_INT(0, config_reload(FILE_NAME, text, config_read(FILE_NAME, text), &running, report));
     rewind(report);
     m_errors[fread(m_errors, 1, sizeof m_errors - 1, report)] = '\0';
     fclose(report);
@@ -727,6 +772,9 @@ int main(void)
     RUN_TEST(test_load_telemetry_is_in_the_load);
     RUN_TEST(test_load_lists_and_signs_reach_their_drives);
     RUN_TEST(test_load_startup_list_reaches_every_drive_in_its_order);
+    RUN_TEST(test_load_startup_list_of_a_drive_reaches_it_alone);
+    RUN_TEST(test_load_startup_lists_of_all_and_of_a_drive_may_be_full);
+    RUN_TEST(test_load_startup_list_of_a_drive_is_checked_as_that_of_all);
     RUN_TEST(test_load_startup_item_that_cannot_be_is_refused_at_its_line);
     RUN_TEST(test_load_startup_item_that_heaved_sets_itself_is_refused_at_its_line);
     RUN_TEST(test_load_startup_item_that_moves_or_changes_the_bus_is_refused_at_its_line);

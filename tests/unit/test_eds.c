@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * test_eds.c - a drive's EDS against what heaved sets up: a file with everything, each object missing, of another size, read only
- * or with narrower limits; and a DCF as a start-up list that loads again.
+ * or with narrower limits.
  */
 #define _POSIX_C_SOURCE 200809L
 
@@ -12,8 +12,7 @@
 #include "inspect/eds_judge.h"
 #include "unity.h"
 
-#define PRESET    HEAVE_CONFIG_DIR "/hexapod-cia402.ini"
-#define FILE_NAME "test_eds.tmp.ini"
+#define PRESET HEAVE_CONFIG_DIR "/hexapod-cia402.ini"
 
 static config_t m_config;
 static cia402_config_t m_drives;
@@ -78,7 +77,6 @@ void setUp(void)
 void tearDown(void)
 {
     eds_free(&m_eds);
-    remove(FILE_NAME);
 }
 
 static void take_out(FILE *out)
@@ -259,63 +257,6 @@ static void test_read_arrays_written_in_short_have_their_entries(void)
     TEST_ASSERT_NULL(eds_find(&m_eds, 0x1016, 3));
 }
 
-/* --- A DCF as a list --- */
-
-static void test_startup_of_a_dcf_loads_as_it_is_written(void)
-{
-    FILE *out = tmpfile();
-    strcpy(m_text, "");
-    put_object(0x2030, 0, 2, "rw", "DefaultValue=5\nParameterValue=70");
-    put_object(0x2031, 1, 1, "rw", "DefaultValue=5\nParameterValue=5");
-    put_object(0x2032, 2, 4, "rww", "ParameterValue=0xFFFFFFFF");
-    put_object(0x2033, 0, 4, "ro", "ParameterValue=1");
-    put_object(0x2034, 0, 4, "rw", "ParameterValue=$NODEID+1");
-    put_object(0x605A, 0, 2, "rw", "ParameterValue=0");
-    put_object(0x1010, 1, 4, "rw", "ParameterValue=1");
-    put_object(0x1405, 2, 1, "rw", "ParameterValue=1");
-    strcat(m_text,
-           "[2035]\nDataType=0x9\nAccessType=rw\nParameterValue=words\n[2036]\nDataType=3\nAccessType=rw\nParameterValue=-7\n");
-    TEST_ASSERT_TRUE(read_text());
-    eds_write_startup(&m_eds, out);
-    take_out(out);
-    expect("[cia402-startup]\n0x2030:00 = 70 u16\n");
-    expect("\n0x2032:02 = 4294967295 u32\n");
-    expect("\n0x2036:00 = -7 i16\n");
-    expect("; 0x2033:00 can only be read\n");
-    expect("; 0x2034:00 depends on the node\n");
-    expect("; 0x605A:00 is set by heaved itself");
-    expect("; 0x1010:01 would write the drive's memory at each start, which wears it; store by the maker's program\n");
-    expect("; 0x1405:02 belongs to the PDOs, which heaved sets up; allowed is an identifier with bit 31, which switches a PDO "
-           "off\n");
-    expect("; 1 more hold their defaults\n");
-    FILE *preset = fopen(PRESET, "rb");
-    FILE *file = fopen(FILE_NAME, "wb");
-    size_t length = 0;
-    char piece[1024];
-    while ((length = fread(piece, 1, sizeof piece, preset)) > 0) {
-        fwrite(piece, 1, length, file);
-    }
-    fprintf(file, "\n%s", m_out);
-    fclose(file);
-    fclose(preset);
-    TEST_ASSERT_EQUAL_INT(0, config_load(FILE_NAME, &m_config, stderr));
-    TEST_ASSERT_EQUAL_UINT8(3, m_config.cia402.startup.count);
-    TEST_ASSERT_EQUAL_HEX32(0xFFF9, m_config.cia402.startup.item[2].value);
-}
-
-static void test_startup_longer_than_a_list_says_so(void)
-{
-    FILE *out = tmpfile();
-    strcpy(m_text, "");
-    for (unsigned i = 0; i < 34; i++) {
-        put_object(0x2100 + i, 0, 2, "rw", "ParameterValue=1");
-    }
-    TEST_ASSERT_TRUE(read_text());
-    eds_write_startup(&m_eds, out);
-    take_out(out);
-    expect("\n0x211F:00 = 1 u16\n; 0x2120:00 is one too many");
-}
-
 int main(void)
 {
     UNITY_BEGIN();
@@ -331,7 +272,5 @@ int main(void)
     RUN_TEST(test_judge_items_of_the_start_up_list_count);
     RUN_TEST(test_read_what_is_no_such_file_is_refused_at_its_line);
     RUN_TEST(test_read_arrays_written_in_short_have_their_entries);
-    RUN_TEST(test_startup_of_a_dcf_loads_as_it_is_written);
-    RUN_TEST(test_startup_longer_than_a_list_says_so);
     return UNITY_END();
 }
