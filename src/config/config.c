@@ -342,27 +342,31 @@ ssize_t config_read(const char *path, char text[CONFIG_TEXT_BYTES])
 }
 
 /* Where the file is longer than what is kept of it, or cannot be read, that is the only error. */
-static bool open_bytes(config_source_t *self)
+static bool open_bytes(config_source_t *self, const config_text_source_t *from)
 {
     static char bytes[CONFIG_TEXT_BYTES];
-    const ssize_t length = read_bytes(self->path, bytes, sizeof bytes, self->wait_ms);
-    if (length < 0 && errno == ETIMEDOUT) {
+    ssize_t length = from->length;
+    if (from->text == NULL) {
+        length = read_bytes(self->path, bytes, sizeof bytes, self->wait_ms);
+        length = length < 0 ? -errno : length;
+    }
+    if (length == -ETIMEDOUT) {
         config_source_error(self, 0, "nothing came from it within %d s; allowed: a file, or a pipe that somebody writes to",
                             self->wait_ms / 1000);
         return false;
     }
     if (length < 0) {
-        const bool is_opened = errno == EISDIR || errno == EIO;
+        const bool is_opened = length == -EISDIR || length == -EIO;
         config_source_error(self, 0, "cannot be %s: %s; allowed: a readable text file", is_opened ? _("read") : _("opened"),
-                            error_text(errno));
+                            error_text((int)-length));
         return false;
     }
     if (length > (ssize_t)CONFIG_FILE_MAX) {
         config_source_error(self, 0, "is larger than %u bytes; allowed: a configuration of one platform", CONFIG_FILE_MAX);
         return false;
     }
-    self->at = bytes;
-    self->end = &bytes[length];
+    self->at = from->text != NULL ? from->text : bytes;
+    self->end = self->at + length;
     return true;
 }
 
@@ -376,9 +380,7 @@ void config_source_load(config_source_t *self, const config_text_source_t *from,
     self->errors = errors;
     self->config = config;
     self->section = CONFIG_SECTION_NONE;
-    self->at = from->text;
-    self->end = from->text != NULL ? from->text + from->length : NULL;
-    if (from->text == NULL && !open_bytes(self)) {
+    if (!open_bytes(self, from)) {
         return;
     }
     set_defaults(self);

@@ -414,15 +414,13 @@ int config_load(const char *path, config_t *out, FILE *errors);
  *  @return their number, CONFIG_TEXT_BYTES: it is too long; -1: errno says why */
 ssize_t config_read(const char *path, char text[CONFIG_TEXT_BYTES]);
 
-/** Loads the file once more while its platform runs, and takes over what may change in operation. Allocates nothing.
+/** Loads a configuration while its platform runs, and takes over what may change in operation. Allocates nothing.
+ *  @param name     what the text is called in the report
+ *  @param length   of the text; beyond CONFIG_FILE_MAX: it is too long; negative: it could not be read, -errno
  *  @param running  changed only where the whole file is right, and only in keys that may change
  *  @param report   takes the errors as config_load() does, else a line per key that has changed: taken over, or needs a restart
  *  @return 0, or the number of errors: nothing has changed */
-int config_reload(const char *path, config_t *running, FILE *report);
-
-/** The same from memory.
- *  @param name what the text is called in the report */
-int config_reload_text(const char *name, const char *text, size_t length, config_t *running, FILE *report);
+int config_reload(const char *name, const char *text, ssize_t length, config_t *running, FILE *report);
 
 /** What a configuration would change on a running platform. */
 typedef struct {
@@ -431,7 +429,7 @@ typedef struct {
     char hash[CONFIG_HASH_MAX]; /**< of the whole new one */
 } config_changes_t;
 
-/** Looks at a configuration in memory as config_reload_text() would take it, and changes nothing. Allocates nothing.
+/** Looks at a configuration in memory as config_reload() would take it, and changes nothing. Allocates nothing.
  *  @return 0, or the number of errors, which went to errors */
 int config_judge_text(const char *name, const char *text, size_t length, const config_t *running, config_changes_t *changes,
                       FILE *errors);

@@ -65,9 +65,9 @@ static config_source_t *load(const config_text_source_t *from, FILE *report)
     return &self;
 }
 
-static int reload(const config_text_source_t *from, config_t *running, FILE *report)
+int config_reload(const char *name, const char *text, ssize_t length, config_t *running, FILE *report)
 {
-    const config_source_t *const self = load(from, report);
+    const config_source_t *const self = load(&(config_text_source_t){.name = name, .text = text, .length = length}, report);
     for (size_t i = 0; self->error_count == 0 && i < config_key_count; i++) {
         if (config_is_applicable(config_keys[i].needs, running)) {
             take_change(self, i, running);
@@ -80,20 +80,11 @@ static int reload(const config_text_source_t *from, config_t *running, FILE *rep
     return self->error_count;
 }
 
-int config_reload(const char *path, config_t *running, FILE *report)
-{
-    return reload(&(config_text_source_t){.name = path}, running, report);
-}
-
-int config_reload_text(const char *name, const char *text, size_t length, config_t *running, FILE *report)
-{
-    return reload(&(config_text_source_t){.name = name, .text = text, .length = length}, running, report);
-}
-
 int config_judge_text(const char *name, const char *text, size_t length, const config_t *running, config_changes_t *changes,
                       FILE *errors)
 {
-    const config_source_t *const self = load(&(config_text_source_t){.name = name, .text = text, .length = length}, errors);
+    const config_source_t *const self =
+        load(&(config_text_source_t){.name = name, .text = text, .length = (ssize_t)length}, errors);
     pair_t pair;
     *changes = (config_changes_t){.live = 0};
     if (self->error_count != 0) {

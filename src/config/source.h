@@ -37,8 +37,8 @@ typedef struct {
 typedef struct {
     const char *name; /**< the file's path; of a text, what it is called in errors */
     const char *text; /**< NULL: the file is read */
-    size_t length;
-    int wait_ms; /**< for each piece of a pipe */
+    ssize_t length;   /**< of the text; beyond CONFIG_FILE_MAX: it is too long; negative: it could not be read, -errno */
+    int wait_ms;      /**< for each piece of a pipe */
 } config_text_source_t;
 
 /** Loads into a configuration, whole or with errors. Allocates nothing. */

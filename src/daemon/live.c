@@ -121,14 +121,6 @@ static bool open_signals(live_t *self)
     return self->signal_fd >= 0;
 }
 
-/* What is let through of a flood follows from the configuration. */
-static void take_reload(live_t *self, bool is_in_force)
-{
-    if (is_in_force && self->flood.is_on) {
-        set_filter(self);
-    }
-}
-
 /* Who has sent it, as far as the kernel says. */
 static void log_signal(live_t *self, const struct signalfd_siginfo *info)
 {
@@ -149,7 +141,7 @@ static void take_signals(live_t *self)
     while (read(self->signal_fd, &info, sizeof info) == (ssize_t)sizeof info) {
         if (info.ssi_signo == SIGHUP) {
             log_signal(self, &info);
-            take_reload(self, reconfigure_reload(&self->reconfigure));
+            reconfigure_reload(&self->reconfigure);
             continue;
         }
         self->signals++;
@@ -250,7 +242,9 @@ static void serve_once(live_t *self)
     }
     take_signals(self);
     control_serve(&self->control, fds, now_us(self));
-    take_reload(self, reconfigure_serve(&self->reconfigure, &self->control));
+    if (reconfigure_serve(&self->reconfigure, &self->control, now_us(self)) && self->flood.is_on) {
+        set_filter(self); /* what is let through of a flood follows from the configuration */
+    }
     tell_others(self);
     tell_acknowledged(self);
     watch_selftest(self);
@@ -386,14 +380,6 @@ static void open_blackbox(live_t *self, const config_t *config)
     self->loop.blackbox = blackbox_feed(&self->blackbox);
 }
 
-/* Without a buffer: what is not taken at once is lost. */
-static void open_errors(live_t *self, int fd)
-{
-    FILE *const errors = fd != STDERR_FILENO ? fdopen(fd, "w") : stderr;
-    self->reconfigure.errors = errors != NULL ? errors : stderr;
-    (void)setvbuf(self->reconfigure.errors, NULL, _IONBF, 0);
-}
-
 /* What can be refused comes first: a second heaved must not empty the files of the first. */
 static int open_all(live_t *self, const config_t *config)
 {
@@ -417,7 +403,9 @@ static int open_all(live_t *self, const config_t *config)
     const int errors = output_file_unblocked(STDERR_FILENO);
     linux_log_init(&self->writers.log, errors);
     linux_log_init(&self->writers.said, errors);
-    open_errors(self, errors);
+    if (!reconfigure_open(&self->reconfigure)) {
+        return print_message(EXIT_UNAVAILABLE, "no memory");
+    }
     if (!open_signals(self)) {
         return print_message(EXIT_UNAVAILABLE, "signals: %s", strerror(errno));
     }
@@ -482,3 +470,4 @@ int live_run(const config_t *config, const options_t *options, bool *is_ready)
     }
     return code;
 }
+    reconfigure_close(&self->reconfigure);

@@ -3,12 +3,17 @@
  */
 #include "daemon/reconfigure.h"
 
+#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "common/translate.h"
 #include "config/hash.h"
 #include "service/control_configuration.h"
+
+#define LINE_MOST  (HAL_LOG_TEXT_MAX - 16u) /* without the prefix of writers_say() */
+#define LINE_LEAST (LINE_MOST / 2u)
+#define SLOW_US    2000000u
 
 /* Hands the configuration to the motion thread, and tells everybody. */
 static bool come_into_force(reconfigure_t *self, const char *path)
@@ -25,27 +30,102 @@ static bool come_into_force(reconfigure_t *self, const char *path)
     return true;
 }
 
-bool reconfigure_reload(reconfigure_t *self)
+/* --- What a configuration has to say --- */
+
+/* A line of the report as lines of the log, which have a longest length. */
+static void say_line(const reconfigure_t *self, const char *line)
 {
-    const char *text = NULL;
-    size_t length = 0;
-    if (config_store_is_busy(self->store)) {
-        writers_say(self->writers, "a configuration is just being written: send SIGHUP again");
-        return false;
+    while (strlen(line) > LINE_MOST) {
+        size_t length = LINE_MOST;
+        while (length > LINE_LEAST && line[length] != ' ') {
+            length--;
+        }
+        writers_say(self->writers, "%.*s", (int)length, line);
+        line += length;
     }
-    const char *const path = config_store_read(self->store, &text, &length);
-    /* a pipe, or what cannot be read, goes the way of the start: that says what is wrong */
-    const int mistakes = path != NULL ? config_reload_text(path, text, length, self->config, self->errors)
-                                      : config_reload(self->store->file, self->config, self->errors);
-    if (mistakes != 0) {
-        writers_say(self->writers, "%s is not right: nothing has changed", path != NULL ? path : self->store->file);
+    writers_say(self->writers, "%s", line);
+}
+
+/* Takes a configuration over, if all of it is right. Its words go the way of all words: nobody who does not read them keeps this
+ * thread from its clients. */
+static bool take_text(reconfigure_t *self, const char *name, const char *text, ssize_t length)
+{
+    memset(self->words, 0, sizeof self->words);
+    rewind(self->stream);
+    const int mistakes = config_reload(name, text, length, self->config, self->stream);
+    (void)fflush(self->stream);
+    const bool is_full = strlen(self->words) >= sizeof self->words - 2u;
+    char *rest = NULL;
+    for (char *line = strtok_r(self->words, "\n", &rest); line != NULL; line = strtok_r(NULL, "\n", &rest)) {
+        say_line(self, line);
+    }
+    if (is_full) {
+        writers_say(self->writers, "%s: this is not all there is to say; `heaved --config FILE --check` says the rest", name);
+    }
+    return mistakes == 0;
+}
+
+bool reconfigure_open(reconfigure_t *self)
+{
+    self->stream = fmemopen(self->words, sizeof self->words - 1u, "w");
+    if (self->stream != NULL) {
+        (void)setvbuf(self->stream, NULL, _IONBF, 0);
+    }
+    return self->stream != NULL;
+}
+
+void reconfigure_close(reconfigure_t *self)
+{
+    if (self->stream != NULL) {
+        (void)fclose(self->stream);
+        self->stream = NULL;
+    }
+}
+
+/* --- The file again --- */
+
+void reconfigure_reload(reconfigure_t *self)
+{
+    self->is_reload_wanted = true;
+}
+
+static bool take_file(reconfigure_t *self, const char *path, const char *text, ssize_t length)
+{
+    const char *const name = path != NULL ? path : self->store->file;
+    if (!take_text(self, name, text, length)) {
+        writers_say(self->writers, "%s is not right: nothing has changed", name);
         return false;
     }
     if (path != NULL) {
         config_store_adopt(self->store, path);
     }
-    return come_into_force(self, path != NULL ? path : self->store->file);
+    return come_into_force(self, name);
 }
+
+static bool serve_reload(reconfigure_t *self, uint64_t now_us)
+{
+    const char *path = NULL;
+    const char *text = NULL;
+    ssize_t length = 0;
+    if (self->is_reading && config_store_has_read(self->store, &path, &text, &length)) {
+        self->is_reading = false;
+        return take_file(self, path, text, length);
+    }
+    if (self->is_reading && now_us >= self->slow_us) {
+        self->slow_us = UINT64_MAX;
+        writers_say(self->writers, "%s is not read yet: its disk does not answer; until it does, nothing has changed",
+                    self->store->file);
+    }
+    if (self->is_reload_wanted && !config_store_is_busy(self->store)) {
+        self->is_reload_wanted = false;
+        self->is_reading = true;
+        self->slow_us = now_us + SLOW_US;
+        config_store_read(self->store);
+    }
+    return false;
+}
+
+/* --- One that is applied --- */
 
 static bool push(reconfigure_t *self, event_t event)
 {
@@ -67,15 +147,14 @@ static const char *restart(reconfigure_t *self, const control_t *control)
 
 static const char *take_over(reconfigure_t *self, const char *text, size_t length)
 {
-    if (config_reload_text(self->store->kept, text, length, self->config, self->errors) != 0 ||
-        !come_into_force(self, self->store->kept)) {
+    if (!take_text(self, self->store->kept, text, (ssize_t)length) || !come_into_force(self, self->store->kept)) {
         return N_("it is kept, but did not come into force: send SIGHUP");
     }
     config_store_adopt(self->store, self->store->kept);
     return NULL;
 }
 
-bool reconfigure_serve(reconfigure_t *self, control_t *control)
+static bool serve_applied(reconfigure_t *self, control_t *control)
 {
     const char *text = NULL;
     const char *why = NULL;
@@ -86,7 +165,9 @@ bool reconfigure_serve(reconfigure_t *self, control_t *control)
         return false;
     }
     const bool is_restart = control->changes.restart > 0;
-    if (error != 0) {
+    if (error == ESTALE) {
+        why = N_("the file that heaved was started with has changed meanwhile: `systemctl reload` (SIGHUP) reads it first");
+    } else if (error != 0) {
         (void)snprintf(said, sizeof said, N_("%.100s: %s; it is not in force"), self->store->kept, strerror(error));
         why = said;
     } else if (!control_configuration_fits(control_state(control), is_restart)) { /* the disk may have taken its time */
@@ -96,6 +177,12 @@ bool reconfigure_serve(reconfigure_t *self, control_t *control)
     }
     control_configuration_end(control, why, is_restart);
     return why == NULL && !is_restart;
+}
+
+bool reconfigure_serve(reconfigure_t *self, control_t *control, uint64_t now_us)
+{
+    const bool is_applied = serve_applied(self, control);
+    return serve_reload(self, now_us) || is_applied;
 }
 
 bool reconfigure_starts_anew(const reconfigure_t *self, const control_t *control)

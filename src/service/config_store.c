@@ -19,7 +19,7 @@
 #define PAUSE_MS    20u
 #define END_WAIT_MS 1000u
 
-enum { PHASE_IDLE, PHASE_WRITE, PHASE_WRITTEN };
+enum { PHASE_IDLE, PHASE_READ, PHASE_HAS_READ, PHASE_WRITE, PHASE_WRITTEN };
 
 static const char k_foot[] = "; heaved: applied over ";
 static const char *const k_size = N_("the text has no byte, or more than a configuration that is applied may have (130976)");
@@ -91,27 +91,45 @@ static void forget(int *fd)
     *fd = -1;
 }
 
+/* Only for its words a pipe, or what cannot be read, is tried once more. */
+static void read_again(config_store_t *self)
+{
+    self->path = choose(self->file, self->kept, self->file_digest, self->text, &self->text_length);
+    self->read_length = (ssize_t)self->text_length;
+    if (self->path == NULL) {
+        const ssize_t length = config_read(self->file, self->text);
+        self->read_length = length < 0 ? -errno : length;
+    }
+}
+
 void config_store_open(config_store_t *self, const char *file, const char *loaded)
 {
-    const char *text = NULL;
-    size_t length = 0;
     self->file = file;
     self->fd = -1;
     if (!state_path(self->kept, sizeof self->kept, "none", "/" CONFIG_STORE_NAME)) {
         self->kept[0] = '\0';
     }
-    const char *const path = config_store_read(self, &text, &length);
-    if (path != NULL && strcmp(path, loaded) == 0) {
-        config_store_adopt(self, path);
+    self->path = choose(self->file, self->kept, self->file_digest, self->text, &self->text_length);
+    if (self->path != NULL && strcmp(self->path, loaded) == 0) {
+        config_store_adopt(self, self->path);
     }
 }
 
-const char *config_store_read(config_store_t *self, const char **text, size_t *length)
+void config_store_read(config_store_t *self)
 {
-    const char *const path = choose(self->file, self->kept, self->file_digest, self->text, &self->text_length);
+    __atomic_store_n(&self->phase, (uint32_t)PHASE_READ, __ATOMIC_RELEASE);
+}
+
+bool config_store_has_read(config_store_t *self, const char **path, const char **text, ssize_t *length)
+{
+    if (__atomic_load_n(&self->phase, __ATOMIC_ACQUIRE) != PHASE_HAS_READ) {
+        return false;
+    }
+    *path = self->path;
     *text = self->text;
-    *length = self->text_length;
-    return path;
+    *length = self->read_length;
+    __atomic_store_n(&self->phase, (uint32_t)PHASE_IDLE, __ATOMIC_RELEASE);
+    return true;
 }
 
 /* The number of the descriptor does not change, because an answer with it may not have been sent yet. */
@@ -143,15 +161,9 @@ void config_store_adopt(config_store_t *self, const char *path)
 const char *config_store_take(config_store_t *self, int fd, const char **text, size_t *length)
 {
     struct stat about;
-    char now[CONFIG_STORE_DIGEST_MAX];
     const int seals = fd >= 0 ? fcntl(fd, F_GET_SEALS) : -1;
     if (seals < 0 || (seals & SEALED_AGAINST) != SEALED_AGAINST || fstat(fd, &about) != 0) {
         return N_("the text comes with the request: a memfd, sealed against writing, growing and shrinking");
-    }
-    const ssize_t bytes = read_file(self->file, self->text);
-    sha256_digits(self->text, bytes > 0 ? (size_t)bytes : 0, now, CONFIG_STORE_DIGEST_MAX);
-    if (bytes < 0 || strcmp(now, self->file_digest) != 0) {
-        return N_("the file that heaved was started with has changed meanwhile: `systemctl reload` (SIGHUP) reads it first");
     }
     if (about.st_size > (off_t)CONFIG_FILE_MAX || about.st_size == 0) {
         return k_size;
@@ -264,6 +276,16 @@ bool config_store_put_back(const char *kept)
     return keep_as(kept, failed) && put_back(kept) && sync_folder(kept); /* at each moment one of the two is there as a whole */
 }
 
+/* Somebody has edited the file, and would lose that. */
+static bool has_file_changed(const config_store_t *self)
+{
+    static char text[CONFIG_TEXT_BYTES]; /* the thread's */
+    char now[CONFIG_STORE_DIGEST_MAX];
+    const ssize_t bytes = read_file(self->file, text);
+    sha256_digits(text, bytes > 0 ? (size_t)bytes : 0, now, CONFIG_STORE_DIGEST_MAX);
+    return bytes < 0 || strcmp(now, self->file_digest) != 0;
+}
+
 static int write_kept(const config_store_t *self)
 {
     char path[CONFIG_PATH_MAX + 8u], foot[CONFIG_STORE_FOOT_MAX];
@@ -287,15 +309,19 @@ static void step(void *ctx, bool is_end)
 {
     config_store_t *const self = ctx;
     (void)is_end;
-    if (__atomic_load_n(&self->phase, __ATOMIC_ACQUIRE) == PHASE_WRITE) {
-        self->error = write_kept(self);
+    const uint32_t phase = __atomic_load_n(&self->phase, __ATOMIC_ACQUIRE);
+    if (phase == PHASE_READ) {
+        read_again(self);
+        __atomic_store_n(&self->phase, (uint32_t)PHASE_HAS_READ, __ATOMIC_RELEASE);
+    } else if (phase == PHASE_WRITE) {
+        self->error = has_file_changed(self) ? ESTALE : write_kept(self);
         __atomic_store_n(&self->phase, (uint32_t)PHASE_WRITTEN, __ATOMIC_RELEASE);
     }
 }
 
 bool config_store_start(config_store_t *self)
 {
-    return self->kept[0] == '\0' || worker_start(&self->worker, step, self, PAUSE_MS);
+    return worker_start(&self->worker, step, self, PAUSE_MS);
 }
 
 bool config_store_close(config_store_t *self)

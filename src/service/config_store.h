@@ -4,8 +4,8 @@
  *
  * heaved never writes the file that it was started with. It keeps an applied configuration in its state directory. The last
  * line of this copy holds a digest of the file's text. Once somebody has edited the file, the digest does not match, and the
- * file is used again. A thread of its own writes; the service thread hands over and never waits. Nothing is allocated after
- * config_store_open().
+ * file is used again. A thread of its own reads and writes; the service thread hands over and never waits. Nothing is allocated
+ * after config_store_open().
  */
 #ifndef HEAVE_SERVICE_CONFIG_STORE_H
 #define HEAVE_SERVICE_CONFIG_STORE_H
@@ -35,8 +35,10 @@ typedef struct {
     char file_digest[CONFIG_STORE_DIGEST_MAX];            /**< of the file when it was last read */
     char text[CONFIG_TEXT_BYTES + CONFIG_STORE_FOOT_MAX]; /**< being read, or written */
     size_t text_length;
-    uint32_t phase; /**< atomic */
-    int32_t error;  /**< of the write */
+    const char *path;    /**< of what was read; NULL: it cannot be put into force again from there */
+    ssize_t read_length; /**< -errno: it cannot be read */
+    uint32_t phase;      /**< atomic */
+    int32_t error;       /**< of the write */
     worker_t worker;
 } config_store_t;
 
@@ -57,13 +59,17 @@ bool config_store_start(config_store_t *self);
 /** @return false: a write still waits for the disk, and self has to stay */
 bool config_store_close(config_store_t *self);
 
-/** Chooses and reads again, for a reload. No write may be in progress.
- *  @param text,length out: valid until the next call
- *  @return path of the text; NULL: it cannot be read */
-const char *config_store_read(config_store_t *self, const char **text, size_t *length);
+/** Starts to choose and read again, for a reload. The store may not be busy, and is until config_store_has_read(). */
+void config_store_read(config_store_t *self);
+
+/** Returns what was read, once.
+ *  @param path out: of the text, for config_store_adopt(); NULL: it came from a pipe, or cannot be read
+ *  @param text,length out: valid until the next call; length as config_reload() takes it
+ *  @return false: no reading has ended */
+bool config_store_has_read(config_store_t *self, const char **path, const char **text, ssize_t *length);
 
 /** Puts the text that was last read or written into force.
- *  @param path as config_store_read() returned it; for a written text `kept` */
+ *  @param path as config_store_has_read() returned it; for a written text `kept` */
 void config_store_adopt(config_store_t *self, const char *path);
 
 /** Takes the text of a client, if it can be read without waiting, cannot change any more, and has 1 to CONFIG_STORE_TEXT_MAX
@@ -72,14 +78,16 @@ void config_store_adopt(config_store_t *self, const char *path);
  *  @return NULL, or a text that says what is wrong */
 const char *config_store_take(config_store_t *self, int fd, const char **text, size_t *length);
 
-/** Starts to write the text that was taken. Until config_store_done() has returned true, nothing else may be taken or read. */
+/** Starts to write the text that was taken. The store may not be busy, and is until config_store_done(). */
 void config_store_write(config_store_t *self);
 
-/** True from config_store_write() until config_store_done() has returned its result. */
+/** True from config_store_read() or config_store_write() until their result has been taken: nothing else may be taken, read or
+ *  written meanwhile. */
 bool config_store_is_busy(const config_store_t *self);
 
 /** Returns the result of a write, once. The text comes into force by config_store_adopt().
- *  @param error out: errno; 0: the text is on the disk
+ *  @param error out: errno; 0: the text is on the disk; ESTALE: nothing was written, as the file is another one than that in
+ * force
  *  @return false: no write has ended */
 bool config_store_done(config_store_t *self, int *error, const char **text, size_t *length);
 

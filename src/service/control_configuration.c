@@ -103,7 +103,7 @@ void control_configuration_take(control_t *self, control_client_t *client, const
     } else if (store->digest[0] == '\0' || strcmp(&line[sizeof k_configure - 1u], store->digest) != 0) {
         why = N_("another configuration is in force than the one that this was made from: read it again");
     } else if (config_store_is_busy(store)) {
-        why = N_("another one is just being written: try again");
+        why = N_("the file is just being read, or another one written: try again");
     } else {
         why = config_store_take(store, client->received, &text, &length);
     }

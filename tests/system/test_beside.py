@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """test_beside.py BIN [PART OF A NAME] - trouble beside the motion: descriptors, limits, devices and disks that are not as they should be. Operators
 and signals are heard all the same, and no input is written over."""
+import contextlib
 import json
 import os
 import re
@@ -239,6 +240,87 @@ def ends_on_a_disk_that_stalls(bench):
     assert "trace.csv: the disk does not answer: its end is missing" in daemon.log.read_text(), daemon.log.read_text()
 
 
+class Stalled:
+    """heaved with its configuration on a disk, the service manager beside it, and perhaps nobody who reads its standard error."""
+
+    def __init__(self, bench, is_log_full):
+        library = bench.bin.resolve().parent / "tests/system/libstalled_disk.so"
+        if not library.exists():
+            raise tap.Skip("instrumented build")
+        self.bench, disk, self.stall = bench, bench.folder / "disk", bench.folder / "disk.stall"
+        disk.mkdir()
+        self.config = disk / "platform.ini"
+        self.config.write_bytes(bench.config.read_bytes())
+        self.manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.manager.bind(str(bench.folder / "notify"))
+        self.manager.settimeout(0.5)  # half of:
+        environment = {"LD_PRELOAD": str(library), "HEAVE_STALLED": str(disk), "NOTIFY_SOCKET": self.manager.getsockname(), "WATCHDOG_USEC": "1000000"}
+        if is_log_full:
+            self.reader, writer = socket.socketpair()
+            self.daemon = bench.spawn(config=self.config, stderr=writer, environment=environment)
+            harness.wait_for(lambda: bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
+            with contextlib.suppress(BlockingIOError):
+                while writer.send(b"x" * 4096, socket.MSG_DONTWAIT):
+                    pass
+            writer.close()
+        else:
+            self.daemon = bench.start(config=self.config, environment=environment)
+        bench.wait_state("ENGAGED")
+
+    def serve(self, seconds, each=lambda: None):
+        """Whoever holds is answered in a tenth of a second, and the manager hears of heaved in half of its time."""
+        with Link(self.bench) as link, self.bench.sender() as sender:
+            end = time.monotonic() + seconds
+            while time.monotonic() < end:
+                sender.stream(0.1, wave)
+                each()
+                for request in ("hold", "resume"):
+                    since = time.monotonic()
+                    assert link.ask(f"{request}\n")["ok"] and time.monotonic() - since < 0.1, f"{request}: {time.monotonic() - since:.2f} s"
+                while self.manager.recv(500) != b"WATCHDOG=1":
+                    pass
+
+    def ends(self):
+        since = time.monotonic()
+        assert self.bench.stop(self.daemon) == 0 and time.monotonic() - since < 15, time.monotonic() - since
+        self.manager.close()
+
+
+def reload_of_a_file_that_does_not_open(bench):
+    """The configuration in force stays, which is said; what was asked meanwhile is one more reading; once the disk answers it is in force."""
+    stalled = Stalled(bench, False)
+    before = bench.status()["configuration"]["hash"]
+    said = lambda words: harness.wait_for(lambda: words in stalled.daemon.log.read_text(), words)  # noqa: E731
+    text = stalled.config.read_text(encoding="utf-8")
+    stalled.config.write_text(text.replace("silence_hold_ms", "silence_hold_ms = 777 ;", 1), encoding="utf-8")
+    stalled.stall.touch()
+    stalled.daemon.send_signal(signal.SIGHUP)
+    stalled.serve(4)
+    said("platform.ini is not read yet: its disk does not answer")
+    assert bench.status()["configuration"]["hash"] == before
+    stalled.daemon.send_signal(signal.SIGHUP)
+    stalled.serve(1)
+    stalled.stall.unlink()
+    harness.wait_for(lambda: stalled.daemon.log.read_text().count("has been read again") == 2, "read twice")
+    assert "silence_hold_ms: 777 from now on" in stalled.daemon.log.read_text() and bench.status()["configuration"]["hash"] != before
+    stalled.stall.touch()
+    stalled.daemon.send_signal(signal.SIGHUP)
+    stalled.ends()
+
+
+def reload_beside_a_log_that_nobody_reads(bench):
+    """Whatever a file of mistakes has to say, and a disk that stalls besides: no line of it is waited for."""
+    stalled = Stalled(bench, True)
+    text = stalled.config.read_text(encoding="utf-8")
+    stalled.config.write_text(text.replace("[platform]\n", "[platform]\nfrobnicate = 1\n" * 300), encoding="utf-8")
+    stalled.serve(5, lambda: stalled.daemon.send_signal(signal.SIGHUP))
+    stalled.stall.touch()
+    stalled.daemon.send_signal(signal.SIGHUP)
+    stalled.serve(2)
+    assert bench.status()["lost"]["log_lines"] > 0
+    stalled.ends()
+
+
 def zero_in_a_request(bench):
     daemon = bench.start()
     bench.wait_state("ENGAGED")
@@ -324,6 +406,8 @@ CASES = {
     "late in HOMING and SETTLING: counted, and it goes on": late_on_its_way,
     "a disk that stalls holds up nobody, and what is lost is counted": disk_that_stalls,
     "SIGTERM on a disk that stalls": ends_on_a_disk_that_stalls,
+    "SIGHUP with a file that does not open": reload_of_a_file_that_does_not_open,
+    "SIGHUP beside a log that nobody reads": reload_beside_a_log_that_nobody_reads,
     "a zero byte in a request is no end of it": zero_in_a_request,
 }
 

@@ -588,9 +588,12 @@ def hangup_reads_the_configuration_again(bench):
     daemon.send_signal(signal.SIGHUP)
     said("nothing has changed")
     assert re.search(r"platform.ini:\d+: \[geometry\] stroke_mm: ", daemon.log.read_text())
+    bench.config.write_text(text.replace("[platform]\n", "[platform]\nfrobnicate = 1\n" * 200))
+    daemon.send_signal(signal.SIGHUP)
+    said("platform.ini: this is not all there is to say")
     bench.config.unlink()
     daemon.send_signal(signal.SIGHUP)
-    harness.wait_for(lambda: daemon.log.read_text().count("nothing has changed") == 2, "a missing file changes nothing")
+    harness.wait_for(lambda: daemon.log.read_text().count("nothing has changed") == 3, "a missing file changes nothing")
     assert bench.status()["ok"] and bench.stop(daemon) == 0
 
 

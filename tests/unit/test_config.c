@@ -203,12 +203,20 @@ static void set_key(const char *section, const char *key, const char *value)
     snprintf(m_line[at], sizeof m_line[0], "%s = %s", key, value);
 }
 
+/* As a running platform reads it again. */
+static int reload_file(config_t *running, FILE *report)
+{
+    static char text[CONFIG_TEXT_BYTES];
+    const ssize_t length = config_read(FILE_NAME, text);
+    return config_reload(FILE_NAME, text, length, running, report);
+}
+
 /* Errors go where those of load_lines() do. */
 static int reload(config_t *running)
 {
     FILE *file = tmpfile();
     TEST_ASSERT_NOT_NULL(file);
-    const int errors = config_reload(FILE_NAME, running, file);
+    const int errors = reload_file(running, file);
     rewind(file);
     m_errors[fread(m_errors, 1, sizeof m_errors - 1, file)] = '\0';
     fclose(file);
@@ -1317,7 +1325,7 @@ static void test_reload_of_another_configuration_than_the_approved_one_is_refuse
     set_key("platform", "approved", line);
     TEST_ASSERT_EQUAL_INT(0, load_lines());
     config_t running = m_config;
-    TEST_ASSERT_EQUAL_INT(0, config_reload(FILE_NAME, &running, stderr));
+    TEST_ASSERT_EQUAL_INT(0, reload_file(&running, stderr));
     set_key("udp", "silence_hold_ms", "777");
     TEST_ASSERT_EQUAL_INT(0, load_lines()); /* it may be loaded, to be looked at */
     TEST_ASSERT_EQUAL_INT(1, reload(&running));

@@ -4,6 +4,7 @@
  */
 #include "service/config_store.h"
 
+#include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -90,6 +91,48 @@ static int write_now(void)
     return error;
 }
 
+static const char *m_read; /* path of what was read */
+static const char *m_text;
+static ssize_t m_length;
+
+static const char *read_now(void)
+{
+    bool is_read = false;
+    config_store_read(&m_store);
+    TEST_ASSERT_TRUE(config_store_is_busy(&m_store));
+    TEST_ASSERT_TRUE(config_store_start(&m_store));
+    for (unsigned i = 0; i < 1000 && !is_read; i++) {
+        (void)usleep(5000);
+        is_read = config_store_has_read(&m_store, &m_read, &m_text, &m_length);
+    }
+    TEST_ASSERT_TRUE(is_read);
+    TEST_ASSERT_FALSE(config_store_is_busy(&m_store));
+    TEST_ASSERT_TRUE(worker_close(&m_store.worker, 1000));
+    return m_read;
+}
+
+/* What can be read and never adopted: a pipe; and what cannot be read. */
+static void test_a_file_that_cannot_be_read_again_says_why(void)
+{
+    TEST_ASSERT_EQUAL(0, unlink(m_file));
+    TEST_ASSERT_NULL(read_now());
+    TEST_ASSERT_EQUAL(-ENOENT, m_length);
+    TEST_ASSERT_EQUAL(0, mkdir(m_file, 0700));
+    TEST_ASSERT_NULL(read_now());
+    TEST_ASSERT_EQUAL(-EISDIR, m_length);
+    TEST_ASSERT_EQUAL(0, rmdir(m_file));
+    TEST_ASSERT_EQUAL(0, mkfifo(m_file, 0600));
+    const int pipe = open(m_file, O_RDWR | O_CLOEXEC);
+    TEST_ASSERT_NULL(read_now());
+    TEST_ASSERT_EQUAL(-ETIMEDOUT, m_length);
+    (void)close(pipe);
+    TEST_ASSERT_EQUAL(0, unlink(m_file));
+    write_file(m_file, "; own again\n");
+    TEST_ASSERT_EQUAL_STRING(m_file, read_now());
+    TEST_ASSERT_EQUAL(12, m_length);
+    TEST_ASSERT_EQUAL_STRING_LEN("; own again\n", m_text, 12);
+}
+
 static void apply(const char *text)
 {
     TEST_ASSERT_NULL(take(text, SEALS));
@@ -133,12 +176,11 @@ static void test_a_changed_file_counts_again(void)
     apply("; mine\n");
     write_file(m_file, "; own, changed\n");
     TEST_ASSERT_EQUAL_STRING(m_file, config_store_choose(m_file, m_kept));
-    TEST_ASSERT_NOT_NULL(strstr(take("; again\n", SEALS), "has changed meanwhile"));
-    const char *text = NULL;
-    size_t length = 0;
-    const char *const path = config_store_read(&m_store, &text, &length);
-    TEST_ASSERT_EQUAL_STRING(m_file, path);
-    config_store_adopt(&m_store, path);
+    TEST_ASSERT_NULL(take("; again\n", SEALS));
+    TEST_ASSERT_EQUAL_MESSAGE(ESTALE, write_now(), "what somebody has edited would be lost");
+    TEST_ASSERT_EQUAL_STRING(m_file, config_store_choose(m_file, m_kept));
+    TEST_ASSERT_EQUAL_STRING(m_file, read_now());
+    config_store_adopt(&m_store, m_read);
     TEST_ASSERT_EQUAL_STRING("; own, changed\n", in_force());
     apply("; again\n");
     TEST_ASSERT_EQUAL_STRING(m_kept, config_store_choose(m_file, m_kept));
@@ -287,6 +329,7 @@ int main(void)
     RUN_TEST(test_the_file_counts_until_another_is_applied);
     RUN_TEST(test_what_is_written_is_in_force_once_it_is_adopted);
     RUN_TEST(test_a_changed_file_counts_again);
+    RUN_TEST(test_a_file_that_cannot_be_read_again_says_why);
     RUN_TEST(test_the_last_line_is_no_part_of_the_text);
     RUN_TEST(test_older_ones_are_kept);
     RUN_TEST(test_only_what_can_change_no_more_is_taken);
