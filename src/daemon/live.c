@@ -54,6 +54,7 @@ typedef struct {
     linux_udp_t udp;
     writers_t writers;
     bool was_lossy; /**< it has been said that something is lost */
+    bool was_held;  /**< a hold delays the end, which has been said */
     int signal_fd;
     bool is_ready; /* once */
     bool is_thread_running;
@@ -124,7 +125,7 @@ static bool open_signals(live_t *self)
 /* Who has sent it, as far as the kernel says. */
 static void log_signal(live_t *self, const struct signalfd_siginfo *info)
 {
-    operator_entry_t entry = {.uid = info->ssi_uid, .pid = (int32_t)info->ssi_pid};
+    operator_entry_t entry = {.uid = info->ssi_uid, .pid = (int32_t)info->ssi_pid, .level = LEVEL_SERVICE};
     (void)clock_gettime(CLOCK_REALTIME, &entry.at);
     (void)snprintf(entry.request, sizeof entry.request, "%s",
                    info->ssi_signo == SIGHUP    ? "SIGHUP"
@@ -232,6 +233,21 @@ static void count_losses(live_t *self)
     self->was_lossy = is_lossy;
 }
 
+/* Somebody has put the platform on hold after the signal. It says what will happen, and the manager waits as long. */
+static void watch_end(live_t *self)
+{
+    const bool is_held = self->signals == 1 && self->view.view.is_end_held;
+    if (is_held && !self->was_held) {
+        writers_say(&self->writers,
+                    "on hold in the middle of the end: it goes on in %u s, and after %u s however often somebody holds; once "
+                    "more ends at "
+                    "once, with the platform up",
+                    DELAYED_END_HOLD_US / 1000000u, DELAYED_END_HOLDS_US / 1000000u);
+        sd_notify_stopping(&self->manager, sd_notify_shutdown_us(&self->config.settings) + DELAYED_END_HOLDS_US);
+    }
+    self->was_held = is_held;
+}
+
 static void serve_once(live_t *self)
 {
     struct pollfd fds[CONTROL_FDS + 1];
@@ -248,6 +264,7 @@ static void serve_once(live_t *self)
     tell_others(self);
     tell_acknowledged(self);
     watch_selftest(self);
+    watch_end(self);
     tell_trouble(self);
     count_losses(self);
 }
@@ -456,6 +473,7 @@ int live_run(const config_t *config, const options_t *options, bool *is_ready)
     *is_ready = self->is_ready;
     control_close(&self->control);
     sd_notify_close(&self->manager);
+    reconfigure_close(&self->reconfigure);
     const bool has_life_ended = lifetime_close(&self->life);
     const bool has_store_ended = config_store_close(&self->store);
     const bool has_log_ended = operator_log_close(&self->operators) && has_life_ended && has_store_ended;
@@ -470,4 +488,3 @@ int live_run(const config_t *config, const options_t *options, bool *is_ready)
     }
     return code;
 }
-    reconfigure_close(&self->reconfigure);

@@ -91,8 +91,11 @@ static service_answer_t serve(motion_loop_t *self, const motion_request_t *reque
 
 static hv_status_t hold(motion_loop_t *self)
 {
-    motion_note(self, RECORD_REQUEST, EVENT_HOLD);
     self->current.view.held_tick_us = gateway_tick_age(&self->session.gateway, 0);
+    if (!delayed_end_hold(&self->end)) {
+        return HV_ERR_STATE;
+    }
+    motion_note(self, RECORD_REQUEST, EVENT_HOLD);
     return gateway_request(&self->session.gateway, EVENT_HOLD, self->session.now_us);
 }
 
@@ -169,6 +172,16 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
         }
     }
     return count;
+}
+
+static void take_end(motion_loop_t *self)
+{
+    const bool is_due = __atomic_exchange_n(&self->handover.is_end_due, 0, __ATOMIC_ACQ_REL) != 0;
+    const bool is_held = gateway_snapshot(&self->session.gateway)->state == STATE_HOLD;
+    if (delayed_end_step(&self->end, is_due, is_held, self->session.cycle_us)) {
+        (void)!carry_out(self, &(motion_request_t){.event = EVENT_SHUTDOWN});
+    }
+    self->current.view.is_end_held = delayed_end_is_held(&self->end);
 }
 
 static void turn_off(motion_loop_t *self)
@@ -348,9 +361,7 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     take_reloads(self);
     take_switches(self);
     const unsigned requests = take_requests(self, result);
-    if (__atomic_exchange_n(&self->handover.is_end_due, 0, __ATOMIC_ACQ_REL) != 0) {
-        (void)!carry_out(self, &(motion_request_t){.event = EVENT_SHUTDOWN});
-    }
+    take_end(self);
     self->tap.arrival_us = 0;
     self->tap.late_us = late_us;
     const bool is_zero = session_cycle(&self->session);

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """test_trouble.py BIN JUDGE [PART OF A NAME [SEED]] - the daemon on a machine that stalls, steps its clock, has no disk left or nobody who reads, and
 told to end at any moment. In virtual time, inside kernel.py --virtual-time: nothing is late there but what is made late. JUDGE is tests/judge's."""
+import contextlib
 import math
 import os
 import random
@@ -212,6 +213,30 @@ def ends_at_any_moment(bench, source):
             assert rows[-1]["state"] == "OFF" and re.search(r"SETTLED -> OFF", log), log
 
 
+def a_hold_delays_the_end(bench, _):
+    """By ten seconds, and a minute in all however often somebody holds: then it settles, and ends with torque off."""
+    for holds, pause_s, least_s, most_s in ((1, 2, 10, 10 + SETTLE_MOST_S), (60, 2, 60, 60 + SETTLE_MOST_S), (100000, 0.05, 60, 60 + SETTLE_MOST_S)):
+        daemon = bench.traced()
+        bench.engaged(0.5)
+        since, held = time.monotonic(), 0
+        daemon.signal_sent = signal.SIGTERM
+        daemon.send_signal(signal.SIGTERM)
+        time.sleep(0.2)
+        while held < holds and daemon.poll() is None:
+            with contextlib.suppress(OSError, ValueError), harness.Line(bench.socket) as line:
+                answer = line.ask("hold")
+                assert answer["state"] in ("HOLD", "SETTLING", "SETTLED", "OFF") and (answer["ok"] or time.monotonic() - since > least_s), answer
+            held += 1
+            time.sleep(pause_s)
+        code = daemon.wait(timeout=harness.WAIT_S)
+        took_s = time.monotonic() - since
+        log = daemon.log.read_text()
+        print(f"# SIGTERM and {held} holds: {took_s:.2f} s", flush=True)
+        assert code == 0 and least_s < took_s < most_s, f"exit {code} after {took_s} s\n{log}"
+        assert "on hold in the middle of the end: it goes on in 10 s, and after 60 s however often somebody holds" in log, log
+        assert judge(bench)[-1]["state"] == "OFF" and re.search(r"SETTLED -> OFF", log), log
+
+
 def ends_while_the_drives_come_up(bench, source):
     """They are waited for up to ten seconds, and homing may take minutes: not once somebody ends heaved."""
     daemon = bench.traced(config=bench.write_config("slow.ini", platform__cycle_us=CYCLE_US, sim__homed="no", sim__enable_delay_ms=9000))
@@ -246,6 +271,7 @@ CASES = {
     "standard error is full: nothing is late": standard_error_is_full,
     "a full disk is said, and the ride goes on": disk_is_full,
     "SIGTERM at any moment settles within limits and time": ends_at_any_moment,
+    "SIGTERM and holds: delayed, then it settles and ends": a_hold_delays_the_end,
     "SIGTERM while the drives come up ends at once": ends_while_the_drives_come_up,
     "a second SIGTERM at any moment ends at once": second_one_ends_at_once,
 }
