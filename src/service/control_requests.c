@@ -290,9 +290,10 @@ static void begin_entry(control_t *self, control_client_t *client, const char *l
     entry->uid = (uint32_t)client->peer.uid;
     entry->gid = (uint32_t)client->peer.gid;
     entry->pid = (int32_t)client->peer.pid;
+    entry->level = client->peer.level;
     (void)snprintf(entry->request, sizeof entry->request, "%s", line);
     entry->before = control_snapshot(self)->state;
-    entry->repeats = 0;
+    entry->repeats = entry->left_out = 0;
 }
 
 /* What the client may not ask for is refused here, in words that say who may. */

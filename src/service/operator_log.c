@@ -58,6 +58,7 @@ static size_t put_line(const operator_entry_t *entry, char line[LINE_MAX_BYTES])
     json_number(&json, "uid", entry->uid);
     json_number(&json, "gid", entry->gid);
     json_number(&json, "pid", (uint64_t)(entry->pid > 0 ? entry->pid : 0));
+    json_text(&json, "level", level_name(entry->level));
     json_text(&json, "by", entry->by);
     json_text(&json, "request", entry->request);
     json_bool(&json, "ok", entry->answer[0] == '\0');
@@ -65,6 +66,7 @@ static size_t put_line(const operator_entry_t *entry, char line[LINE_MAX_BYTES])
     json_text(&json, "before", state_name(entry->before));
     json_text(&json, "after", state_name(entry->after));
     json_number(&json, "repeats_before", entry->repeats);
+    json_number(&json, "left_out_before", entry->left_out);
     json_close(&json, '}');
     json_newline(&json);
     return json.is_cut ? 0 : json.length;
@@ -86,6 +88,7 @@ static int open_file(operator_log_t *self)
         return EINVAL;
     }
     self->bytes = (uint64_t)found.st_size;
+    self->minor_bytes = 0;
     return 0;
 }
 
@@ -122,10 +125,27 @@ static int write_line(operator_log_t *self, const char *line, size_t length)
     return error;
 }
 
-static int put_entry(operator_log_t *self, const operator_entry_t *entry)
+static bool is_minor(const operator_entry_t *entry)
+{
+    return entry->answer[0] != '\0' || entry->level == LEVEL_LOOK;
+}
+
+static bool has_room_for_minor(const operator_log_t *self, size_t length)
+{
+    return self->minor_bytes + length <= self->bytes_max / OPERATOR_LOG_MINOR_OF && self->bytes + length <= self->bytes_max;
+}
+
+static int put_entry(operator_log_t *self, operator_entry_t *entry)
 {
     char line[LINE_MAX_BYTES];
+    entry->left_out += self->minor_left_out;
     const size_t length = put_line(entry, line);
+    if (is_minor(entry) && !has_room_for_minor(self, length)) {
+        self->minor_left_out = entry->left_out + entry->repeats + 1u;
+        return 0;
+    }
+    self->minor_left_out = 0;
+    self->minor_bytes += is_minor(entry) ? length : 0;
     if (self->fd >= 0 && self->bytes + length > self->bytes_max && self->bytes > 0) {
         rotate(self);
     }
@@ -161,6 +181,41 @@ static bool is_repeat(const operator_entry_t *last, const operator_entry_t *entr
            entry->at.tv_sec >= last->at.tv_sec;
 }
 
+/* That of the user at the level, else that which was used longest ago. */
+static operator_share_t *share_of(operator_log_t *self, const operator_entry_t *entry)
+{
+    operator_share_t *oldest = &self->share[0];
+    for (unsigned i = 0; i < OPERATOR_LOG_SHARES; i++) {
+        operator_share_t *const share = &self->share[i];
+        if (share->at_s != 0 && share->uid == entry->uid && share->level == entry->level) {
+            return share;
+        }
+        oldest = share->at_s < oldest->at_s ? share : oldest;
+    }
+    *oldest = (operator_share_t){.uid = entry->uid, .level = entry->level, .lines = OPERATOR_LOG_BURST, .at_s = entry->at.tv_sec};
+    return oldest;
+}
+
+static bool takes_share(operator_log_t *self, const operator_entry_t *entry)
+{
+    operator_share_t *const share = share_of(self, entry);
+    const int64_t pauses = (entry->at.tv_sec - share->at_s) / OPERATOR_LOG_PAUSE_S;
+    if (pauses < 0) { /* somebody has set the clock */
+        share->at_s = entry->at.tv_sec;
+    } else if (pauses >= OPERATOR_LOG_BURST) {
+        share->lines = OPERATOR_LOG_BURST;
+        share->at_s = entry->at.tv_sec;
+    } else {
+        share->lines = share->lines + pauses < OPERATOR_LOG_BURST ? share->lines + (uint32_t)pauses : OPERATOR_LOG_BURST;
+        share->at_s += pauses * OPERATOR_LOG_PAUSE_S;
+    }
+    if (share->lines == 0) {
+        return false;
+    }
+    share->lines--;
+    return true;
+}
+
 /* Somebody who asks the same a thousand times a second does not rotate away what others did. */
 void operator_log_add(operator_log_t *self, const operator_entry_t *entry)
 {
@@ -172,9 +227,14 @@ void operator_log_add(operator_log_t *self, const operator_entry_t *entry)
         self->repeated_at = entry->at;
         return;
     }
+    if (is_minor(entry) && !takes_share(self, entry)) {
+        self->left_out++;
+        return;
+    }
     self->last = *entry;
     self->last.repeats = self->repeats;
-    self->repeats = 0;
+    self->last.left_out = self->left_out;
+    self->repeats = self->left_out = 0;
     (void)ring_push(&self->ring, &self->last, sizeof self->last, NULL, 0);
 }
 
@@ -251,7 +311,8 @@ static void end_repeats(operator_log_t *self)
     if (self->repeats > 0) {
         self->last.at = self->repeated_at;
         self->last.repeats = self->repeats - 1;
-        self->repeats = 0;
+        self->last.left_out = self->left_out;
+        self->repeats = self->left_out = 0;
         (void)ring_push(&self->ring, &self->last, sizeof self->last, NULL, 0);
     }
 }

@@ -15,6 +15,7 @@
 #include "common/worker.h"
 #include "config/config.h"
 #include "heave/supervisor.h"
+#include "service/access_levels.h"
 
 #define OPERATOR_LOG_NAME       "operator.log" /* in the state directory, where no file is configured */
 #define OPERATOR_LOG_BY_MAX     32u
@@ -23,19 +24,37 @@
 #define OPERATOR_LOG_RING_BYTES (1u << 16)
 #define OPERATOR_LOG_REPEATS_S  10 /* the same again within that time is a number, not a line */
 
+/* What is refused, or comes from somebody who may only look, is anybody's to ask: of each user at each level so many lines at
+ * once, then one in so many seconds, and in all one byte of so many of a file. What operators have done is never pushed out by
+ * it. */
+#define OPERATOR_LOG_BURST    10u
+#define OPERATOR_LOG_PAUSE_S  10
+#define OPERATOR_LOG_SHARES   8u
+#define OPERATOR_LOG_MINOR_OF 4u
+
 /** A request and its answer. Texts are cut to fit. */
 typedef struct {
     struct timespec at; /**< wall clock */
     uint32_t uid;
     uint32_t gid;
     int32_t pid;
+    level_t level;
     char by[OPERATOR_LOG_BY_MAX]; /**< whom the client says that it asks for; "" = nobody */
     char request[OPERATOR_LOG_ASKED_MAX];
     char answer[OPERATOR_LOG_ANSWER_MAX]; /**< why it was refused; "" = it was done */
     state_t before;
     state_t after;
-    uint32_t repeats; /**< of the entry before this one, that were not written */
+    uint32_t repeats;  /**< of the entry before this one, that were not written */
+    uint32_t left_out; /**< other entries since the one before, that were refused or of LEVEL_LOOK: not written */
 } operator_entry_t;
+
+/** How much of that may be written of a user at a level. */
+typedef struct {
+    uint32_t uid;
+    level_t level;
+    uint32_t lines; /**< now */
+    int64_t at_s;   /**< when they became so many; 0: nobody's */
+} operator_share_t;
 
 /** The log; large: from the heap, at the start. Private. */
 typedef struct {
@@ -48,10 +67,14 @@ typedef struct {
     operator_entry_t last;
     uint32_t repeats; /**< of the last one */
     struct timespec repeated_at;
-    ring_t ring;     /**< operator_entry_t to the writer */
-    uint32_t failed; /**< atomic: entries that could not be written */
-    int32_t error;   /**< atomic: errno of the newest failure, 0 = the newest entry is on the disk */
-    int32_t told;    /**< error that operator_log_trouble() has told of */
+    operator_share_t share[OPERATOR_LOG_SHARES];
+    uint32_t left_out;       /**< of the service thread */
+    uint32_t minor_left_out; /**< of the writer */
+    uint64_t minor_bytes;    /**< of the file, as far as this process has written them */
+    ring_t ring;             /**< operator_entry_t to the writer */
+    uint32_t failed;         /**< atomic: entries that could not be written */
+    int32_t error;           /**< atomic: errno of the newest failure, 0 = the newest entry is on the disk */
+    int32_t told;            /**< error that operator_log_trouble() has told of */
     worker_t worker;
     uint8_t ring_bytes[OPERATOR_LOG_RING_BYTES];
 } operator_log_t;

@@ -78,8 +78,13 @@ static unsigned lines(void)
 
 static operator_entry_t entry_of(const char *request, int64_t at_s)
 {
-    operator_entry_t entry = {
-        .at = {at_s, 7999999}, .uid = 1000, .gid = 100, .pid = 4711, .before = STATE_SETTLED, .after = STATE_RISING};
+    operator_entry_t entry = {.at = {at_s, 7999999},
+                              .uid = 1000,
+                              .gid = 100,
+                              .pid = 4711,
+                              .level = LEVEL_OPERATE,
+                              .before = STATE_SETTLED,
+                              .after = STATE_RISING};
     (void)snprintf(entry.request, sizeof entry.request, "%s", request);
     return entry;
 }
@@ -104,15 +109,19 @@ static void test_log_line_says_all(void)
     operator_log_step(&m_log);
     (void)read_file(m_path);
     TEST_ASSERT_EQUAL_STRING(
-        "{\"time\":\"2024-02-29T12:34:56.007Z\",\"uid\":1000,\"gid\":100,\"pid\":4711,\"by\":\"a\\\"b\\u000A\",\"request\":"
+        "{\"time\":\"2024-02-29T12:34:56.007Z\",\"uid\":1000,\"gid\":100,\"pid\":4711,\"level\":\"operate\",\"by\":"
+        "\"a\\\"b\\u000A\",\"request\":"
         "\"engage\",\"ok\":true,"
-        "\"answer\":\"\",\"before\":\"SETTLED\",\"after\":\"RISING\",\"repeats_before\":0}\n"
-        "{\"time\":\"2100-02-28T23:59:59.007Z\",\"uid\":1000,\"gid\":100,\"pid\":4711,\"by\":\"\",\"request\":\"reset\",\"ok\":"
+        "\"answer\":\"\",\"before\":\"SETTLED\",\"after\":\"RISING\",\"repeats_before\":0,\"left_out_before\":0}\n"
+        "{\"time\":\"2100-02-28T23:59:59.007Z\",\"uid\":1000,\"gid\":100,\"pid\":4711,\"level\":\"operate\",\"by\":\"\","
+        "\"request\":\"reset\",\"ok\":"
         "false,"
-        "\"answer\":\"reset: there is nothing to reset\",\"before\":\"SETTLED\",\"after\":\"SETTLED\",\"repeats_before\":0}\n"
-        "{\"time\":\"2000-02-29T00:00:00.007Z\",\"uid\":1000,\"gid\":100,\"pid\":4711,\"by\":\"\",\"request\":\"hold\",\"ok\":"
+        "\"answer\":\"reset: there is nothing to "
+        "reset\",\"before\":\"SETTLED\",\"after\":\"SETTLED\",\"repeats_before\":0,\"left_out_before\":0}\n"
+        "{\"time\":\"2000-02-29T00:00:00.007Z\",\"uid\":1000,\"gid\":100,\"pid\":4711,\"level\":\"operate\",\"by\":\"\","
+        "\"request\":\"hold\",\"ok\":"
         "true,"
-        "\"answer\":\"\",\"before\":\"SETTLED\",\"after\":\"RISING\",\"repeats_before\":0}\n",
+        "\"answer\":\"\",\"before\":\"SETTLED\",\"after\":\"RISING\",\"repeats_before\":0,\"left_out_before\":0}\n",
         m_text);
 }
 
@@ -196,9 +205,65 @@ static void test_log_the_same_again_and_again_is_a_number(void)
     (void)read_file(m_path);
     TEST_ASSERT_EQUAL_UINT(4, lines()); /* the end says the rest */
     TEST_ASSERT_NOT_NULL(strstr(m_text, "00:01:52.007Z"));
-    TEST_ASSERT_NOT_NULL(strstr(m_text, "\"repeats_before\":1}\n"));
-    TEST_ASSERT_NOT_NULL(strstr(m_text, "\"repeats_before\":99999}\n"));
+    TEST_ASSERT_NOT_NULL(strstr(m_text, "\"repeats_before\":1,"));
+    TEST_ASSERT_NOT_NULL(strstr(m_text, "\"repeats_before\":99999,"));
     TEST_ASSERT_EQUAL_UINT32(0, operator_log_lost(&m_log));
+}
+
+/* Who may only look, or is refused, asks by turns for ever: a day of it leaves what operators did. */
+static void test_log_what_is_refused_pushes_nothing_out(void)
+{
+    uint64_t told = 0;
+    unsigned asked = 0;
+    open_log();
+    add("engage", 1000);
+    for (int64_t at_s = 1000; at_s < 1000 + 86400; at_s += 2) {
+        for (unsigned i = 0; i < 4; i++) {
+            operator_entry_t entry = entry_of(i % 2 == 0 ? "engage" : "park", at_s);
+            entry.uid = 2000 + (i / 2);
+            entry.level = LEVEL_LOOK;
+            (void)snprintf(entry.answer, sizeof entry.answer, "%s: takes the level operate", entry.request);
+            operator_log_add(&m_log, &entry);
+            entry.level = LEVEL_OPERATE; /* holds: done, and refused to an operator */
+            operator_log_add(&m_log, &entry);
+            (void)snprintf(entry.by, sizeof entry.by, "%u", asked);
+            entry.level = LEVEL_LOOK;
+            entry.answer[0] = '\0';
+            operator_log_add(&m_log, &entry);
+            asked += 3;
+        }
+        operator_log_step(&m_log);
+    }
+    add("park", 1000 + 86400);
+    operator_log_step(&m_log);
+    char path[128];
+    (void)snprintf(path, sizeof path, "%s.1", m_path);
+    TEST_ASSERT_EQUAL_MESSAGE(0, read_file(path), "what is minor alone begins no other file");
+    const size_t bytes = read_file(m_path);
+    TEST_ASSERT_LESS_THAN(16 * 1024 / OPERATOR_LOG_MINOR_OF + 1024, bytes);
+    TEST_ASSERT_NOT_NULL(strstr(m_text, "\"request\":\"engage\",\"ok\":true"));
+    for (const char *at = m_text; (at = strstr(at, "_before\":")) != NULL; at++) {
+        told += strtoul(at + 9, NULL, 10);
+    }
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(asked + 2, told + lines(), "each is a line or counted");
+    TEST_ASSERT_EQUAL_UINT32(0, operator_log_lost(&m_log));
+}
+
+/* A busy operator is in the log as ever: what is refused now and then, and all that is done. */
+static void test_log_of_operators_has_each_request(void)
+{
+    open_log();
+    for (unsigned i = 0; i < 8; i++) {
+        operator_entry_t entry = entry_of(i % 2 == 0 ? "engage" : "reset", 1000 + i);
+        (void)snprintf(entry.answer, sizeof entry.answer, "not possible");
+        operator_log_add(&m_log, &entry);
+    }
+    for (unsigned i = 0; i < 20; i++) {
+        add(i % 2 == 0 ? "hold" : "resume", 1010);
+    }
+    operator_log_step(&m_log);
+    (void)read_file(m_path);
+    TEST_ASSERT_EQUAL_UINT(28, lines());
 }
 
 static void test_log_more_than_there_is_room_for_is_counted(void)
@@ -301,6 +366,8 @@ int main(void)
     RUN_TEST(test_log_rotation_keeps_so_many_files_and_every_newer_line);
     RUN_TEST(test_log_that_cannot_be_rotated_goes_on);
     RUN_TEST(test_log_the_same_again_and_again_is_a_number);
+    RUN_TEST(test_log_what_is_refused_pushes_nothing_out);
+    RUN_TEST(test_log_of_operators_has_each_request);
     RUN_TEST(test_log_more_than_there_is_room_for_is_counted);
     RUN_TEST(test_log_full_disk_is_told_counted_and_written_again);
     RUN_TEST(test_log_that_cannot_be_is_refused_at_the_start);
