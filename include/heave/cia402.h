@@ -396,6 +396,9 @@ bool cia402_next_wish(const cia402_config_t *config, unsigned axis, cia402_wish_
 /** True if heaved itself writes this object with some configuration. */
 bool cia402_is_own_object(uint16_t index, uint8_t sub);
 
+/** True if it does with every configuration. */
+bool cia402_is_always_own(uint16_t index, uint8_t sub);
+
 /** True for objects that a person must not write: those that the driver sets itself with this configuration, those that the
  * motion uses, and those that scale a count. */
 bool cia402_is_relied_on(const cia402_config_t *config, unsigned axis, uint16_t index, uint8_t sub);

@@ -435,7 +435,8 @@ bool cia402_next_wish(const cia402_config_t *config, unsigned axis, cia402_wish_
     return false;
 }
 
-bool cia402_is_own_object(uint16_t index, uint8_t sub)
+/* A row that writes it, of those that count always, or of any. */
+static bool is_set_by_row(uint16_t index, uint8_t sub, bool is_always)
 {
     if (index >= RECORDS && index < RECORDS_END && (index & 0x3Fu) < CIA402_PDOS_USUAL) { /* whichever of them are in use */
         return true;
@@ -443,9 +444,19 @@ bool cia402_is_own_object(uint16_t index, uint8_t sub)
     index = cia402_plain_index(index);
     for (uint8_t i = 0; i < cia402_objects_setup_end; i++) {
         const cia402_object_t *row = &cia402_objects[i];
-        if (row->index == index && row->sub == sub && is_written(row)) {
+        if (row->index == index && row->sub == sub && is_written(row) && (!is_always || row->when == CIA402_ALWAYS)) {
             return true;
         }
     }
     return false;
+}
+
+bool cia402_is_own_object(uint16_t index, uint8_t sub)
+{
+    return is_set_by_row(index, sub, false);
+}
+
+bool cia402_is_always_own(uint16_t index, uint8_t sub)
+{
+    return is_set_by_row(index, sub, true);
 }

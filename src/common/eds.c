@@ -154,6 +154,12 @@ static bool read_array(const char *name, uint16_t *index)
     return read_place(first, index, &sub);
 }
 
+static void note_stray(reader_t *self)
+{
+    self->eds->stray_line = self->eds->strays == 0 ? self->line : self->eds->stray_line;
+    self->eds->strays++;
+}
+
 static void enter(reader_t *self, char *text)
 {
     char *end = strchr(text, ']');
@@ -165,8 +171,12 @@ static void enter(reader_t *self, char *text)
         complain(self, _("a section without ]"), text);
         return;
     }
+    if (end[1 + strspn(end + 1, BLANKS)] != '\0' && end[1 + strspn(end + 1, BLANKS)] != ';') {
+        complain(self, _("text behind the ] of a section"), text);
+        return;
+    }
     *end = '\0';
-    text++;
+    text = trimmed(text + 1);
     if (read_place(text, &index, &sub)) {
         enter_object(self, index, sub, strlen(text) > 4);
     } else {
@@ -223,7 +233,12 @@ static void take_of_object(reader_t *self, const char *key, const char *value)
     } else if (strcasecmp(key, "DefaultValue") == 0) {
         object->fallback = found;
     } else if (strcasecmp(key, "ParameterValue") == 0) {
+        if (object->parameter.is_there || object->parameter.is_text) {
+            note_stray(self);
+        }
         object->parameter = found;
+    } else if (strcasecmp(key, "DownloadFile") == 0) {
+        object->parameter = (eds_number_t){.is_text = true, .value = hash_of(value)};
     } else if (strcasecmp(key, "ParameterName") == 0) {
         object->is_place = object->is_place || is_name_of_place(value);
     }
@@ -234,8 +249,12 @@ static void take_of_array(reader_t *self, const char *key, const char *value)
 {
     const eds_number_t sub = number(key);
     const eds_t *eds = self->eds;
+    if (strcasecmp(key, "NrOfEntries") == 0) {
+        return;
+    }
     if (!sub.is_there || sub.has_node || sub.value < 1 || sub.value > UINT8_MAX) {
-        return; /* NrOfEntries */
+        note_stray(self);
+        return;
     }
     const eds_object_t *array = eds_find(eds, self->array, (uint8_t)sub.value);
     eds_object_t filled = {.index = self->array, .line = self->line};
@@ -287,8 +306,8 @@ static void take_line(reader_t *self, char *text)
         return;
     }
     *equals = '\0';
-    char *comment = strchr(equals + 1, ';'); /* not allowed for, and there */
-    if (comment != NULL) {
+    char *comment = strpbrk(equals + 1, ";"); /* not allowed for, and there; one in a value is a part of it */
+    if (comment != NULL && strchr(BLANKS "=", comment[-1]) != NULL) {
         *comment = '\0';
     }
     const char *key = trimmed(text);
@@ -304,6 +323,8 @@ static void take_line(reader_t *self, char *text)
         self->eds->node = number(value);
     } else if (self->has_values) {
         take_of_array(self, key, value);
+    } else if (strcasecmp(key, "ParameterValue") == 0 || strcasecmp(key, "DownloadFile") == 0) {
+        note_stray(self);
     }
 }
 

@@ -39,8 +39,10 @@ typedef struct {
     size_t objects;
     size_t room;
     eds_number_t vendor, product;
-    eds_number_t node; /**< of a DCF */
-    unsigned bitrates; /**< bit N: the Nth of eds_bitrates_kbps */
+    eds_number_t node;   /**< of a DCF */
+    unsigned strays;     /**< values in sections that are no objects, of sub-indices that cannot be, or given twice */
+    unsigned stray_line; /**< of the first */
+    unsigned bitrates;   /**< bit N: the Nth of eds_bitrates_kbps */
     bool has_bitrates;
 } eds_t;
 

@@ -17,6 +17,7 @@ typedef enum {
     DCF_LISTED,
     DCF_DEFAULT, /**< the drive holds it anyway */
     DCF_KNOWN,   /**< nothing is lost: it cannot be set, or heaved sets it */
+    DCF_KEYS,    /**< heaved sets it with some configurations */
     DCF_NODE,    /**< depends on the node */
     DCF_UNSAFE,  /**< no list may write it */
     DCF_STRANGE, /**< no list can hold it */
@@ -93,8 +94,10 @@ static dcf_verdict_t judge(const eds_t *file, const eds_object_t *object, bool i
         return DCF_KNOWN;
     }
     if (cia402_is_own_object(object->index, object->sub)) {
-        *why = _("is set by heaved itself, by the keys of [cia402]");
-        return DCF_KNOWN;
+        const bool is_always = cia402_is_always_own(object->index, object->sub);
+        *why = is_always ? _("is set by heaved itself, by the keys of [cia402]")
+                         : _("is set by heaved with some keys of [cia402]; set them, or write a line for it where they do not");
+        return is_always ? DCF_KNOWN : DCF_KEYS;
     }
     *why = config_startup_denied(object->index, object->sub, (uint32_t)object->parameter.value, vendor);
     if (*why != NULL) {
@@ -158,22 +161,34 @@ static void write_list(const import_t *self, const eds_t *file, bool is_common_w
         }
         count[verdict]++;
         if (verdict == DCF_LISTED) {
-            fprintf(self->out, "0x%04X:%02u = %" PRId64 " %s\n", object->index, object->sub,
-                    eds_shown(object, (uint32_t)((uint64_t)object->parameter.value & mask_of(object))), eds_type_name(object));
+            fprintf(self->out, "0x%04X:%02u = %" PRId64 " %s%s\n", object->index, object->sub,
+                    eds_shown(object, (uint32_t)((uint64_t)object->parameter.value & mask_of(object))), eds_type_name(object),
+                    object->is_readable ? "" : " unchecked");
         } else if (verdict != DCF_DEFAULT) {
             fprintf(self->out, "; 0x%04X:%02u (line %u) %s\n", object->index, object->sub, object->line, why);
         }
     }
 }
 
+/* Values that belong to no object: what they were meant for nobody knows. */
+static void tell_strays(const import_t *self, const eds_t *file, unsigned count[DCF_VERDICTS])
+{
+    count[DCF_STRANGE] += file->strays;
+    if (file->strays > 0) {
+        fprintf(self->out, _("; %u values are of no object, or stand twice in its section; the first in line %u\n"), file->strays,
+                file->stray_line);
+    }
+}
+
 static unsigned say_left(const char *name, const unsigned count[DCF_VERDICTS], FILE *errors)
 {
-    const unsigned left = count[DCF_NODE] + count[DCF_UNSAFE] + count[DCF_STRANGE] + count[DCF_TOO_MANY];
+    const unsigned left = count[DCF_KEYS] + count[DCF_NODE] + count[DCF_UNSAFE] + count[DCF_STRANGE] + count[DCF_TOO_MANY];
     if (left > 0) {
         fprintf(errors,
-                _("%s: left out, each with a comment in the list: %u of the node, %u that no list may write, %u that no list can "
-                  "hold, %u too many\n"),
-                name, count[DCF_NODE], count[DCF_UNSAFE], count[DCF_STRANGE], count[DCF_TOO_MANY]);
+                _("%s: left out, each with a comment in the list: %u that keys of [cia402] decide, %u of the node, %u that no "
+                  "list may "
+                  "write, %u that no list can hold, %u too many\n"),
+                name, count[DCF_KEYS], count[DCF_NODE], count[DCF_UNSAFE], count[DCF_STRANGE], count[DCF_TOO_MANY]);
     }
     return left;
 }
@@ -196,6 +211,7 @@ unsigned dcf_write_startup(const eds_t *files, const char *const *names, unsigne
             fprintf(out, "\n[" FAMILY "-%u]\n", f + 1u);
         }
         write_list(&self, &files[f], false, own);
+        tell_strays(&self, &files[f], own);
         if (own[DCF_DEFAULT] > 0) {
             fprintf(out, _("; %u more hold their defaults\n"), own[DCF_DEFAULT]);
         }

@@ -153,7 +153,7 @@ def completion(built):
         assert complete(built, program, "--") == sorted(f"--{option}" for option in options), complete(built, program, "--")
         if commands:
             assert complete(built, program, "") == commands, complete(built, program, "")
-    assert complete(built, "heaved", "--d") == ["--doctor", "--dump-config", "--dump-dbc"]
+    assert complete(built, "heaved", "--d") == ["--doctor", "--drive", "--dump-config", "--dump-dbc"]
     assert complete(built, "heaved", "--config", "demo") == ["demo-hexapod.ini"]
     assert complete(built, "heavectl", "--json", "s") == ["scope", "sdo", "seen", "selftest", "service", "service-off", "setup", "shutdown", "signal", "status"]
     assert complete(built, "heavectl", "--hz", "") == []

@@ -36,7 +36,7 @@ USAGE = {
     "two DCFs of a drive": (["--drive", "1", "--import-dcf", "{dcf}", "{dcf}"], 64, "--drive is for --import-dcf with one file"),
     "seven DCFs": (["--import-dcf"] + ["{dcf}"] * 7, 64, "up to 6 files"),
     "a drive without a DCF": (["--config", "{ini}", "--check", "--drive", "1"], 64, "--drive and --partial are for --import-dcf"),
-    "a DCF with something left out": (["--import-dcf", "{dcf}", "--drive", "angle"], 1, "drive.dcf: left out, each with a comment in the list: 0 of the node, 1 that no list may write"),
+    "a DCF with something left out": (["--import-dcf", "{dcf}", "--drive", "angle"], 1, "drive.dcf: left out, each with a comment in the list: 0 that keys of [cia402] decide, 0 of the node, 1 that no list may write"),
     "the same, said to be right": (["--import-dcf", "{dcf}", "--drive", "angle", "--partial"], 0, "drive.dcf: left out"),
     "two DCFs": (["--import-dcf", "{dcf}", "--import-dcf", "{dcf}", "--partial"], 0, "drive.dcf: left out"),
     "two DCFs of different devices": (["--import-dcf", "{dcf}", "{other}"], 65, "other.dcf: VendorNumber and ProductNumber are of another device"),

@@ -125,7 +125,7 @@ static void test_import_of_a_dcf_loads_as_it_is_written(void)
     TEST_ASSERT_EQUAL_STRING("", m_errors);
     expect("[cia402-startup-3]\n0x2030:00 = 70 u16\n");
     expect("\n0x2032:02 = 4294967295 u32\n");
-    expect("\n0x2036:00 = -7 i16\n0x2037:00 = -7 i16\n");
+    expect("\n0x2036:00 = -7 i16 unchecked\n0x2037:00 = -7 i16\n");
     expect("; 0x2033:00 (line 18) can only be read\n");
     expect("; 0x605A:00 (line 23) is set by heaved itself, by the keys of [cia402]\n");
     expect("; 1 more hold their defaults\n");
@@ -146,10 +146,9 @@ static void test_import_names_what_no_list_may_write(void)
     put_object("6071", 3, "rw", "DefaultValue=0\nParameterValue=0"); /* as every drive has it */
     read_file(0);
     TEST_ASSERT_EQUAL_UINT(5, import(1, "cia402-startup"));
-    TEST_ASSERT_EQUAL_STRING(
-        "1.dcf: left out, each with a comment in the list: 0 of the node, 5 that no list may write, 0 that no "
-        "list can hold, 0 too many\n",
-        m_errors);
+    TEST_ASSERT_EQUAL_STRING("1.dcf: left out, each with a comment in the list: 0 that keys of [cia402] decide, 0 of the node, "
+                             "5 that no list may write, 0 that no list can hold, 0 too many\n",
+                             m_errors);
     expect("; 0x2000:00 (line 3) is the node id or the bit rate; set it by the maker's program\n");
     expect("; 0x6040:00 (line 9) can give a drive torque or move it, which nothing but engaging may do\n");
     expect("; 0x607A:00 ");
@@ -242,6 +241,36 @@ static void test_import_longer_than_a_list_names_the_rest(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, " 0 that no list can hold, 2 too many\n"), m_errors);
     load();
     TEST_ASSERT_EQUAL_UINT8(CONFIG_STARTUP_MAX, m_config.cia402.startup.count);
+}
+
+static void test_import_counts_what_keys_decide(void)
+{
+    put_object("6085", 7, "rw", "ParameterValue=24000"); /* only with quick_stop_mm_s2 */
+    put_object("6098", 2, "rw", "ParameterValue=35");    /* only where it homes */
+    read_file(0);
+    TEST_ASSERT_EQUAL_UINT(2, import(1, "cia402-startup"));
+    expect(
+        "; 0x6085:00 (line 1) is set by heaved with some keys of [cia402]; set them, or write a line for it where they do not\n");
+    expect("; 0x6098:00 (line 6) is set by heaved with some keys of [cia402]");
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(m_errors, " 2 that keys of [cia402] decide, 0 of the node"), m_errors);
+}
+
+static void test_import_counts_values_of_no_object(void)
+{
+    put("[ 2400 ]\nDataType=7\nAccessType=rw\nParameterValue=4\n");
+    put("[2401sub001]\nDataType=7\nAccessType=rw\nParameterValue=4\n[0x2402]\nParameterValue=5\n");
+    put_object("2403", 7, "rw", "ParameterValue=5\nParameterValue=6");
+    put_object("2404", 7, "rw", "ParameterValue=5;6");
+    put_object("2405", 7, "rw", "ParameterValue=7 ; seven");
+    put_object("2406", 15, "rw", "DownloadFile=params.bin");
+    put_object("2407", 6, "rw", "CompactSubObj=4\nDefaultValue=7");
+    put("[2407Value]\nNrOfEntries=3\n0=1\n256=2\nsub1=3\n1=9\n");
+    read_file(0);
+    TEST_ASSERT_EQUAL_UINT(8, import(1, "cia402-startup-1"));
+    expect("[cia402-startup-1]\n0x2400:00 = 4 u32\n0x2403:00 = 6 u32\n; 0x2404:00 (line 17) is no whole number of up to 32 bits "
+           "that its "
+           "type holds\n0x2405:00 = 7 u32\n; 0x2406:00 (line 27) is no whole number");
+    expect("\n0x2407:01 = 9 u16\n; 6 values are of no object, or stand twice in its section; the first in line 8\n");
 }
 
 /* --- Files of several drives --- */
@@ -375,6 +404,8 @@ int main(void)
     RUN_TEST(test_import_names_what_depends_on_the_node);
     RUN_TEST(test_import_names_what_no_list_can_hold);
     RUN_TEST(test_import_takes_the_values_of_arrays_written_in_short);
+    RUN_TEST(test_import_counts_what_keys_decide);
+    RUN_TEST(test_import_counts_values_of_no_object);
     RUN_TEST(test_import_longer_than_a_list_names_the_rest);
     RUN_TEST(test_import_of_several_files_keeps_apart_what_is_one_drives_own);
     RUN_TEST(test_import_of_any_file_loses_nothing_and_loads);
