@@ -94,7 +94,7 @@ static void forget(int *fd)
 /* Only for its words a pipe, or what cannot be read, is tried once more. */
 static void read_again(config_store_t *self)
 {
-    self->path = choose(self->file, self->kept, self->file_digest, self->text, &self->text_length);
+    self->path = choose(self->file, self->kept, self->read_digest, self->text, &self->text_length);
     self->read_length = (ssize_t)self->text_length;
     if (self->path == NULL) {
         const ssize_t length = config_read(self->file, self->text);
@@ -148,6 +148,10 @@ static bool replace_sealed(config_store_t *self)
 void config_store_adopt(config_store_t *self, const char *path)
 {
     self->put_back[0] = '\0';
+    if (self->read_digest[0] != '\0') {
+        memcpy(self->file_digest, self->read_digest, sizeof self->file_digest);
+        self->read_digest[0] = '\0';
+    }
     self->length = self->text_length;
     self->is_applied = path == self->kept;
     self->digest[0] = '\0';
@@ -183,6 +187,7 @@ const char *config_store_take(config_store_t *self, int fd, const char **text, s
 
 void config_store_write(config_store_t *self)
 {
+    self->read_digest[0] = '\0'; /* what was read and refused does not count */
     __atomic_store_n(&self->phase, (uint32_t)PHASE_WRITE, __ATOMIC_RELEASE);
 }
 

@@ -32,7 +32,8 @@ typedef struct {
     char put_back[CONFIG_STORE_WHY_MAX];  /**< set by the owner: why the applied configuration could not be started and was
                                              replaced by the one before; "" once another one is in force */
 
-    char file_digest[CONFIG_STORE_DIGEST_MAX];            /**< of the file when it was last read */
+    char file_digest[CONFIG_STORE_DIGEST_MAX];            /**< of the file whose text, or over which one, is in force */
+    char read_digest[CONFIG_STORE_DIGEST_MAX];            /**< of the file as it was read again; "": it was not */
     char text[CONFIG_TEXT_BYTES + CONFIG_STORE_FOOT_MAX]; /**< being read, or written */
     size_t text_length;
     const char *path;    /**< of what was read; NULL: it cannot be put into force again from there */

@@ -148,6 +148,21 @@ static const char *in_force(void)
     return text;
 }
 
+/* Somebody has edited the file, and made a mistake: that edit is not written over by what a client has made from the one before.
+ */
+static void test_a_file_that_was_read_and_refused_has_changed(void)
+{
+    write_file(m_file, "; own, with a mistake\n");
+    TEST_ASSERT_EQUAL_STRING(m_file, read_now()); /* and nothing is adopted */
+    TEST_ASSERT_NULL(take("; mine\n", SEALS));
+    TEST_ASSERT_EQUAL(ESTALE, write_now());
+    TEST_ASSERT_EQUAL_STRING(m_file, config_store_choose(m_file, m_kept));
+    TEST_ASSERT_EQUAL_STRING(m_file, read_now());
+    config_store_adopt(&m_store, m_read);
+    apply("; mine\n");
+    TEST_ASSERT_EQUAL_STRING(m_kept, config_store_choose(m_file, m_kept));
+}
+
 static void test_the_file_counts_until_another_is_applied(void)
 {
     TEST_ASSERT_EQUAL_STRING(m_file, config_store_choose(m_file, m_kept));
@@ -329,6 +344,7 @@ int main(void)
     RUN_TEST(test_the_file_counts_until_another_is_applied);
     RUN_TEST(test_what_is_written_is_in_force_once_it_is_adopted);
     RUN_TEST(test_a_changed_file_counts_again);
+    RUN_TEST(test_a_file_that_was_read_and_refused_has_changed);
     RUN_TEST(test_a_file_that_cannot_be_read_again_says_why);
     RUN_TEST(test_the_last_line_is_no_part_of_the_text);
     RUN_TEST(test_older_ones_are_kept);
