@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * delayed_end.h - the end that a signal has asked for, and somebody delays by a hold. The platform settles first; somebody may be
+ * delayed_end.h - the end that somebody has asked for, and somebody delays by a hold. The platform settles first; somebody may be
  * below it. But whoever held may have gone, and the service manager would end heaved with the platform up: so it goes on by
  * itself.
  */
@@ -16,7 +16,7 @@
 
 /** Zeroed: no end has been asked for. Private. */
 typedef struct {
-    bool is_asked;
+    bool is_asked;        /**< by a signal, or the request `shutdown`; the owner may set it */
     uint64_t held_us;     /**< how long the newest hold has delayed it, */
     uint64_t held_all_us; /**< and all of them */
 } delayed_end_t;

@@ -236,7 +236,7 @@ static void count_losses(live_t *self)
 /* Somebody has put the platform on hold after the signal. It says what will happen, and the manager waits as long. */
 static void watch_end(live_t *self)
 {
-    const bool is_held = self->signals == 1 && self->view.view.is_end_held;
+    const bool is_held = self->signals < 2 && self->view.view.is_end_held;
     if (is_held && !self->was_held) {
         writers_say(&self->writers,
                     "on hold in the middle of the end: it goes on in %u s, and after %u s however often somebody holds; once "

@@ -110,6 +110,7 @@ static hv_status_t carry_out(motion_loop_t *self, const motion_request_t *reques
     }
     motion_note(self, RECORD_REQUEST, request->event);
     self->current.view.is_shutting_down |= request->event == EVENT_SHUTDOWN;
+    self->end.is_asked |= request->event == EVENT_SHUTDOWN;
     return gateway_request(&self->session.gateway, (event_t)request->event, self->session.now_us);
 }
 
@@ -177,7 +178,7 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
 static void take_end(motion_loop_t *self)
 {
     const bool is_due = __atomic_exchange_n(&self->handover.is_end_due, 0, __ATOMIC_ACQ_REL) != 0;
-    const bool is_held = gateway_snapshot(&self->session.gateway)->state == STATE_HOLD;
+    const bool is_held = gateway_snapshot(&self->session.gateway)->state == STATE_HOLD && self->before_hold != STATE_HOMING;
     if (delayed_end_step(&self->end, is_due, is_held, self->session.cycle_us)) {
         (void)!carry_out(self, &(motion_request_t){.event = EVENT_SHUTDOWN});
     }

@@ -215,12 +215,15 @@ def ends_at_any_moment(bench, source):
 
 def a_hold_delays_the_end(bench, _):
     """By ten seconds, and a minute in all however often somebody holds: then it settles, and ends with torque off."""
-    for holds, pause_s, least_s, most_s in ((1, 2, 10, 10 + SETTLE_MOST_S), (60, 2, 60, 60 + SETTLE_MOST_S), (100000, 0.05, 60, 60 + SETTLE_MOST_S)):
+    for holds, pause_s, least_s, most_s, ends in ((1, 2, 10, 10 + SETTLE_MOST_S, "shutdown"), *(row + ("SIGTERM",) for row in ((1, 2, 10, 10 + SETTLE_MOST_S), (60, 2, 60, 60 + SETTLE_MOST_S), (100000, 0.05, 60, 60 + SETTLE_MOST_S)))):
         daemon = bench.traced()
         bench.engaged(0.5)
         since, held = time.monotonic(), 0
         daemon.signal_sent = signal.SIGTERM
-        daemon.send_signal(signal.SIGTERM)
+        if ends == "SIGTERM":
+            daemon.send_signal(signal.SIGTERM)
+        else:
+            bench.ask("shutdown")
         time.sleep(0.2)
         while held < holds and daemon.poll() is None:
             with contextlib.suppress(OSError, ValueError), harness.Line(bench.socket) as line:
