@@ -25,20 +25,35 @@ state_t control_state(const control_t *self)
     return control_snapshot(self)->state;
 }
 
-/* What became of a request, for the operator log. Once for each. */
-void control_client_log(control_client_t *client, const char *error, state_t after)
+static void log_it(control_client_t *client, const char *error, state_t after, bool is_refused)
 {
     if (client->is_logged) {
         client->is_logged = false;
+        client->entry.is_refused = is_refused;
         (void)snprintf(client->entry.answer, sizeof client->entry.answer, "%s", error);
         client->entry.after = after;
         operator_log_add(client->control->log, &client->entry);
     }
 }
 
+/* What became of a request, for the operator log. Once for each. */
+void control_client_log(control_client_t *client, const char *error, state_t after)
+{
+    log_it(client, error, after, error[0] != '\0');
+}
+
+/* What was handed over is carried out, whoever has gone. */
+void control_client_log_gone(control_client_t *client)
+{
+    const bool is_handed_over = control_client_is_waiting(client);
+    log_it(client,
+           is_handed_over ? "under way; the client has gone before it was answered" : "the client has gone before it was asked",
+           client->entry.before, !is_handed_over);
+}
+
 void control_client_drop(control_client_t *client)
 {
-    control_client_log(client, "the client has gone before it was answered", client->entry.before);
+    control_client_log_gone(client);
     (void)close(client->fd);
     client->fd = -1;
     control_client_forget_received(client);

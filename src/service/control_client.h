@@ -33,6 +33,9 @@ void control_client_answer(control_client_t *client, json_t *json);
 /** Writes the answer to a request into the operator log, once. */
 void control_client_log(control_client_t *client, const char *error, state_t after);
 
+/** The same where its client has gone. */
+void control_client_log_gone(control_client_t *client);
+
 /** True while the motion thread or the black box still owes an answer. */
 bool control_client_is_waiting(const control_client_t *client);
 

@@ -399,7 +399,7 @@ static void take_lines(control_t *self, control_client_t *client, uint64_t now_u
 
 static void forget_answers(control_client_t *client)
 {
-    control_client_log(client, "the client has gone before it was answered", client->entry.before);
+    control_client_log_gone(client);
     client->request_id = 0;
     client->dump_ticket = 0;
     client->is_configuring = false;

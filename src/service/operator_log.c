@@ -88,7 +88,7 @@ static int open_file(operator_log_t *self)
         return EINVAL;
     }
     self->bytes = (uint64_t)found.st_size;
-    self->minor_bytes = 0;
+    memset(self->minor_bytes, 0, sizeof self->minor_bytes);
     return 0;
 }
 
@@ -127,12 +127,13 @@ static int write_line(operator_log_t *self, const char *line, size_t length)
 
 static bool is_minor(const operator_entry_t *entry)
 {
-    return entry->answer[0] != '\0' || entry->level == LEVEL_LOOK;
+    return entry->is_refused || (entry->level == LEVEL_LOOK && entry->before == entry->after);
 }
 
-static bool has_room_for_minor(const operator_log_t *self, size_t length)
+static bool has_room_for_minor(const operator_log_t *self, level_t level, size_t length)
 {
-    return self->minor_bytes + length <= self->bytes_max / OPERATOR_LOG_MINOR_OF && self->bytes + length <= self->bytes_max;
+    return self->minor_bytes[level] + length <= self->bytes_max / OPERATOR_LOG_MINOR_OF &&
+           self->bytes + length <= self->bytes_max;
 }
 
 static int put_entry(operator_log_t *self, operator_entry_t *entry)
@@ -140,17 +141,18 @@ static int put_entry(operator_log_t *self, operator_entry_t *entry)
     char line[LINE_MAX_BYTES];
     entry->left_out += self->minor_left_out;
     const size_t length = put_line(entry, line);
-    if (is_minor(entry) && !has_room_for_minor(self, length)) {
+    if (is_minor(entry) && !has_room_for_minor(self, entry->level, length)) {
         self->minor_left_out = entry->left_out + entry->repeats + 1u;
         return 0;
     }
-    self->minor_left_out = 0;
-    self->minor_bytes += is_minor(entry) ? length : 0;
     if (self->fd >= 0 && self->bytes + length > self->bytes_max && self->bytes > 0) {
         rotate(self);
     }
-    const int error = self->fd < 0 ? open_file(self) : 0;
-    return error != 0 ? error : write_line(self, line, length);
+    int error = self->fd < 0 ? open_file(self) : 0;
+    error = error != 0 ? error : write_line(self, line, length);
+    self->minor_left_out = error != 0 ? entry->left_out + entry->repeats : 0;
+    self->minor_bytes[entry->level] += error == 0 && is_minor(entry) ? length : 0;
+    return error;
 }
 
 void operator_log_step(operator_log_t *self)
@@ -228,7 +230,7 @@ void operator_log_add(operator_log_t *self, const operator_entry_t *entry)
         return;
     }
     if (is_minor(entry) && !takes_share(self, entry)) {
-        self->left_out++;
+        self->left_out += self->left_out < UINT32_MAX;
         return;
     }
     self->last = *entry;

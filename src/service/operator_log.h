@@ -24,13 +24,13 @@
 #define OPERATOR_LOG_RING_BYTES (1u << 16)
 #define OPERATOR_LOG_REPEATS_S  10 /* the same again within that time is a number, not a line */
 
-/* What is refused, or comes from somebody who may only look, is anybody's to ask: of each user at each level so many lines at
- * once, then one in so many seconds, and in all one byte of so many of a file. What operators have done is never pushed out by
- * it. */
+/* What is refused, or asked by somebody who may only look and changes nothing, is anybody's to ask: of each user at each level so
+ * many lines at once, then one in so many seconds, and of each level one byte of so many of a file. What operators have done is
+ * never pushed out by it. */
 #define OPERATOR_LOG_BURST    10u
 #define OPERATOR_LOG_PAUSE_S  10
 #define OPERATOR_LOG_SHARES   8u
-#define OPERATOR_LOG_MINOR_OF 4u
+#define OPERATOR_LOG_MINOR_OF 8u
 
 /** A request and its answer. Texts are cut to fit. */
 typedef struct {
@@ -44,8 +44,9 @@ typedef struct {
     char answer[OPERATOR_LOG_ANSWER_MAX]; /**< why it was refused; "" = it was done */
     state_t before;
     state_t after;
+    bool is_refused;
     uint32_t repeats;  /**< of the entry before this one, that were not written */
-    uint32_t left_out; /**< other entries since the one before, that were refused or of LEVEL_LOOK: not written */
+    uint32_t left_out; /**< other entries since the one before, that count little: not written */
 } operator_entry_t;
 
 /** How much of that may be written of a user at a level. */
@@ -68,13 +69,13 @@ typedef struct {
     uint32_t repeats; /**< of the last one */
     struct timespec repeated_at;
     operator_share_t share[OPERATOR_LOG_SHARES];
-    uint32_t left_out;       /**< of the service thread */
-    uint32_t minor_left_out; /**< of the writer */
-    uint64_t minor_bytes;    /**< of the file, as far as this process has written them */
-    ring_t ring;             /**< operator_entry_t to the writer */
-    uint32_t failed;         /**< atomic: entries that could not be written */
-    int32_t error;           /**< atomic: errno of the newest failure, 0 = the newest entry is on the disk */
-    int32_t told;            /**< error that operator_log_trouble() has told of */
+    uint32_t left_out;                       /**< of the service thread */
+    uint32_t minor_left_out;                 /**< of the writer */
+    uint64_t minor_bytes[LEVEL_SERVICE + 1]; /**< of the file, as far as this process has written them */
+    ring_t ring;                             /**< operator_entry_t to the writer */
+    uint32_t failed;                         /**< atomic: entries that could not be written */
+    int32_t error;                           /**< atomic: errno of the newest failure, 0 = the newest entry is on the disk */
+    int32_t told;                            /**< error that operator_log_trouble() has told of */
     worker_t worker;
     uint8_t ring_bytes[OPERATOR_LOG_RING_BYTES];
 } operator_log_t;

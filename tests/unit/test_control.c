@@ -888,7 +888,8 @@ static void test_log_has_requests_whose_client_has_gone(void)
     control_close(&m_control);
     TEST_ASSERT_TRUE(takes_entry(&entry));
     TEST_ASSERT_EQUAL_STRING("hold", entry.request);
-    TEST_ASSERT_EQUAL_STRING("the client has gone before it was answered", entry.answer);
+    TEST_ASSERT_EQUAL_STRING("under way; the client has gone before it was answered", entry.answer);
+    TEST_ASSERT_FALSE_MESSAGE(entry.is_refused, "it is carried out all the same");
 }
 
 int main(void)

@@ -223,29 +223,41 @@ static void test_log_what_is_refused_pushes_nothing_out(void)
             entry.uid = 2000 + (i / 2);
             entry.level = LEVEL_LOOK;
             (void)snprintf(entry.answer, sizeof entry.answer, "%s: takes the level operate", entry.request);
+            entry.is_refused = true;
             operator_log_add(&m_log, &entry);
             entry.level = LEVEL_OPERATE; /* holds: done, and refused to an operator */
             operator_log_add(&m_log, &entry);
             (void)snprintf(entry.by, sizeof entry.by, "%u", asked);
             entry.level = LEVEL_LOOK;
             entry.answer[0] = '\0';
+            entry.is_refused = false;
+            entry.after = entry.before;
             operator_log_add(&m_log, &entry);
             asked += 3;
         }
         operator_log_step(&m_log);
     }
+    operator_entry_t held = entry_of("hold", 1000 + 86400); /* who has stopped a ride is told, whoever it was */
+    held.level = LEVEL_LOOK;
+    held.uid = 2000;
+    operator_log_add(&m_log, &held);
+    held = entry_of("engage", 1000 + 86400); /* carried out, though its client has gone */
+    (void)snprintf(held.answer, sizeof held.answer, "under way");
+    operator_log_add(&m_log, &held);
     add("park", 1000 + 86400);
     operator_log_step(&m_log);
     char path[128];
     (void)snprintf(path, sizeof path, "%s.1", m_path);
     TEST_ASSERT_EQUAL_MESSAGE(0, read_file(path), "what is minor alone begins no other file");
     const size_t bytes = read_file(m_path);
-    TEST_ASSERT_LESS_THAN(16 * 1024 / OPERATOR_LOG_MINOR_OF + 1024, bytes);
+    TEST_ASSERT_LESS_THAN(2 * 16 * 1024 / OPERATOR_LOG_MINOR_OF + 1600, bytes);
+    TEST_ASSERT_NOT_NULL(strstr(m_text, "\"level\":\"look\",\"by\":\"\",\"request\":\"hold\",\"ok\":true"));
+    TEST_ASSERT_NOT_NULL(strstr(m_text, "\"answer\":\"under way\""));
     TEST_ASSERT_NOT_NULL(strstr(m_text, "\"request\":\"engage\",\"ok\":true"));
     for (const char *at = m_text; (at = strstr(at, "_before\":")) != NULL; at++) {
         told += strtoul(at + 9, NULL, 10);
     }
-    TEST_ASSERT_EQUAL_UINT64_MESSAGE(asked + 2, told + lines(), "each is a line or counted");
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(asked + 4, told + lines(), "each is a line or counted");
     TEST_ASSERT_EQUAL_UINT32(0, operator_log_lost(&m_log));
 }
 
@@ -256,6 +268,7 @@ static void test_log_of_operators_has_each_request(void)
     for (unsigned i = 0; i < 8; i++) {
         operator_entry_t entry = entry_of(i % 2 == 0 ? "engage" : "reset", 1000 + i);
         (void)snprintf(entry.answer, sizeof entry.answer, "not possible");
+        entry.is_refused = true;
         operator_log_add(&m_log, &entry);
     }
     for (unsigned i = 0; i < 20; i++) {
