@@ -52,16 +52,8 @@ static object_t *object_of(twin_t *twin, unsigned k, const fault_t *fault)
 
 /* --- One function per name --- */
 
-#define ACT(name) static void name(twin_t *twin, unsigned k, const fault_t *fault, uint64_t now_us)
-#define UNUSED()                                                                                                                 \
-    do {                                                                                                                         \
-        (void)fault;                                                                                                             \
-        (void)now_us;                                                                                                            \
-    } while (false)
-
 ACT(act_fault)
 {
-    UNUSED();
     drive_fault(&node_of(twin, k)->drive, (uint16_t)fault->number[0]);
 }
 
@@ -73,7 +65,6 @@ ACT(act_broken)
 
 ACT(act_mend)
 {
-    UNUSED();
     node_t *node = node_of(twin, k);
     node_t *head = head_of(twin, k);
     node->drive.is_broken = node->drive.is_deaf = node->drive.is_homing_broken = false;
@@ -104,73 +95,61 @@ ACT(act_mend)
 
 ACT(act_emcy)
 {
-    UNUSED();
     node_emergency(head_of(twin, k), (uint16_t)fault->number[0], REGISTER_SET);
 }
 
 ACT(act_heartbeat)
 {
-    UNUSED();
     head_of(twin, k)->has_no_heartbeat = true;
 }
 
 ACT(act_reboot)
 {
-    UNUSED();
     node_reboot(head_of(twin, k), now_us);
 }
 
 ACT(act_power_off)
 {
-    UNUSED();
     node_power(node_of(twin, k), false, now_us);
 }
 
 ACT(act_power_on)
 {
-    UNUSED();
     node_power(node_of(twin, k), true, now_us);
 }
 
 ACT(act_mute)
 {
-    UNUSED();
     head_of(twin, k)->is_mute = true;
 }
 
 ACT(act_cut)
 {
-    UNUSED();
     head_of(twin, k)->is_cut = true;
 }
 
 ACT(act_ignore)
 {
-    UNUSED();
     node_of(twin, k)->drive.is_deaf = true;
 }
 
 ACT(act_jam)
 {
-    UNUSED();
     node_of(twin, k)->drive.motor.is_jammed = true;
 }
 
 ACT(act_drop)
 {
-    UNUSED();
     drive_drop(&node_of(twin, k)->drive);
 }
 
 ACT(act_lose)
 {
-    UNUSED();
     node_of(twin, k)->tpdo_drop = (uint32_t)fault->number[0];
 }
 
 ACT(act_late)
 {
-    UNUSED();
     node_of(twin, k)->tpdo_us = (uint32_t)(fault->number[0] * 1000);
 }
 
@@ -184,63 +163,53 @@ ACT(act_preop)
 
 ACT(act_stopped)
 {
-    UNUSED();
     node_enter(head_of(twin, k), 0x04);
 }
 
 ACT(act_mode)
 {
-    UNUSED();
     node_of(twin, k)->drive.mode = (int8_t)fault->number[0];
 }
 
 ACT(act_status)
 {
-    UNUSED();
     node_of(twin, k)->drive.bits_set = (uint16_t)fault->number[0];
     node_of(twin, k)->drive.bits_clear = (uint16_t)fault->number[1];
 }
 
 ACT(act_no_homing)
 {
-    UNUSED();
     node_of(twin, k)->drive.is_homing_broken = true;
 }
 
 ACT(act_sdo_silent)
 {
-    UNUSED();
     head_of(twin, k)->is_sdo_silent = true;
 }
 
 ACT(act_sdo_slow)
 {
-    UNUSED();
     head_of(twin, k)->sdo_us = (uint32_t)(fault->number[0] * 1000);
 }
 
 ACT(act_sdo_refuse)
 {
-    UNUSED();
     object_of(twin, k, fault)->refusal = (uint32_t)fault->number[0];
 }
 
 ACT(act_sdo_mute)
 {
-    UNUSED();
     object_of(twin, k, fault)->is_silent = true;
 }
 
 ACT(act_sdo_missing)
 {
-    UNUSED();
     object_of(twin, k, fault)->is_missing = true;
 }
 
 /* Holds it over a reset, too, and takes no other. */
 ACT(act_object)
 {
-    UNUSED();
     object_t *row = object_of(twin, k, fault);
     if (!row->is_forced) {
         row->was_value = row->value;
@@ -262,37 +231,31 @@ ACT(act_node)
 
 ACT(act_hot)
 {
-    UNUSED();
     node_of(twin, k)->drive.motor.temperature_c = HOT_C;
 }
 
 ACT(act_slip)
 {
-    UNUSED();
     node_of(twin, k)->drive.motor.slip = fault->number[0] * twin->per_unit[k];
 }
 
 ACT(act_load)
 {
-    UNUSED();
     node_of(twin, k)->drive.motor.load = fault->number[0] * twin->per_unit[k];
 }
 
 ACT(act_friction)
 {
-    UNUSED();
     node_of(twin, k)->drive.motor.friction = fault->number[0] * fabs(twin->per_unit[k]);
 }
 
 ACT(act_encoder)
 {
-    UNUSED();
     node_of(twin, k)->drive.origin -= fault->number[0] * twin->per_unit[k];
 }
 
 ACT(act_lag)
 {
-    UNUSED();
     node_of(twin, k)->drive.motor.lag_us = fault->number[0] * 1000;
 }
 
@@ -301,7 +264,6 @@ ACT(act_none)
 {
     (void)twin;
     (void)k;
-    UNUSED();
 }
 
 /* clang-format off */ /* a row is a record */

@@ -28,6 +28,11 @@ typedef struct {
 /** What a name does to drive k. */
 typedef void (*fault_act_t)(twin_t *twin, unsigned k, const fault_t *fault, uint64_t now_us);
 
+/** Head of a function of this type; few need all. */
+#define ACT(name)                                                                                                                \
+    static void name(twin_t *twin, unsigned k, const fault_t *fault __attribute__((unused)),                                     \
+                     uint64_t now_us __attribute__((unused)))
+
 /** Reads a line.
  *  @param drives how many the configuration has
  *  @param why    what is wrong and what would be right, where false is returned */

@@ -11,16 +11,8 @@ typedef struct {
     fault_act_t act;
 } row_t;
 
-#define ACT(name) static void name(twin_t *twin, unsigned k, const fault_t *fault, uint64_t now_us)
-#define UNUSED()                                                                                                                 \
-    do {                                                                                                                         \
-        (void)fault;                                                                                                             \
-        (void)now_us;                                                                                                            \
-    } while (false)
-
 ACT(act_fault)
 {
-    UNUSED();
     frame_drive_fault(&twin->frame[k], (uint32_t)fault->number[0]);
 }
 
@@ -32,79 +24,66 @@ ACT(act_broken)
 
 ACT(act_power_on)
 {
-    UNUSED();
     frame_drive_power(&twin->frame[k], true, now_us);
 }
 
 ACT(act_power_off)
 {
-    UNUSED();
     frame_drive_power(&twin->frame[k], false, now_us);
 }
 
 ACT(act_mute)
 {
-    UNUSED();
     twin->frame[k].is_mute = true;
 }
 
 ACT(act_cut)
 {
-    UNUSED();
     twin->frame[k].is_cut = true;
 }
 
 ACT(act_ignore)
 {
-    UNUSED();
     twin->frame[k].is_deaf = true;
 }
 
 ACT(act_drop)
 {
-    UNUSED();
     frame_drive_drop(&twin->frame[k]);
 }
 
 ACT(act_lose)
 {
-    UNUSED();
     twin->frame[k].lost = (uint32_t)fault->number[0];
 }
 
 ACT(act_late)
 {
-    UNUSED();
     twin->frame[k].late_us = (uint32_t)(fault->number[0] * 1000);
 }
 
 ACT(act_damaged)
 {
-    UNUSED();
     twin->frame[k].damaged = (uint32_t)fault->number[0];
 }
 
 ACT(act_stuck_counter)
 {
-    UNUSED();
     twin->frame[k].is_stuck = true;
 }
 
 ACT(act_homing_fails)
 {
-    UNUSED();
     twin->frame[k].is_homing_broken = true;
 }
 
 ACT(act_encoder)
 {
-    UNUSED();
     twin->frame[k].origin -= fault->number[0] * twin->per_unit[k];
 }
 
 ACT(act_mend)
 {
-    UNUSED();
     frame_drive_t *drive = &twin->frame[k];
     drive->is_broken = drive->is_mute = drive->is_cut = drive->is_deaf = drive->is_homing_broken = drive->is_stuck = false;
     drive->late_us = drive->lost = drive->damaged = 0;

@@ -13,13 +13,6 @@ typedef struct {
     fault_act_t act;
 } row_t;
 
-#define ACT(name) static void name(twin_t *twin, unsigned k, const fault_t *fault, uint64_t now_us)
-#define UNUSED()                                                                                                                 \
-    do {                                                                                                                         \
-        (void)fault;                                                                                                             \
-        (void)now_us;                                                                                                            \
-    } while (false)
-
 static register_drive_t *drive_of(twin_t *twin, unsigned k)
 {
     return &twin->modbus.drive[k];
@@ -27,7 +20,6 @@ static register_drive_t *drive_of(twin_t *twin, unsigned k)
 
 ACT(act_fault)
 {
-    UNUSED();
     register_drive_fault(drive_of(twin, k), (uint16_t)fault->number[0]);
 }
 
@@ -39,74 +31,62 @@ ACT(act_broken)
 
 ACT(act_power_on)
 {
-    UNUSED();
     register_drive_power(drive_of(twin, k), true, now_us);
 }
 
 ACT(act_power_off)
 {
-    UNUSED();
     register_drive_power(drive_of(twin, k), false, now_us);
 }
 
 ACT(act_mute)
 {
-    UNUSED();
     drive_of(twin, k)->is_mute = true;
 }
 
 ACT(act_cut)
 {
-    UNUSED();
     drive_of(twin, k)->is_cut = true;
 }
 
 ACT(act_ignore)
 {
-    UNUSED();
     drive_of(twin, k)->is_deaf = true;
 }
 
 ACT(act_drop)
 {
-    UNUSED();
     register_drive_drop(drive_of(twin, k));
 }
 
 ACT(act_lose)
 {
-    UNUSED();
     drive_of(twin, k)->lost = (uint32_t)fault->number[0];
 }
 
 ACT(act_late)
 {
-    UNUSED();
     drive_of(twin, k)->late_us = (uint32_t)(fault->number[0] * 1000);
 }
 
 ACT(act_damaged)
 {
-    UNUSED();
     drive_of(twin, k)->damaged = (uint32_t)fault->number[0];
 }
 
 ACT(act_half)
 {
-    UNUSED();
     drive_of(twin, k)->halved = (uint32_t)fault->number[0];
 }
 
 ACT(act_exception)
 {
-    UNUSED();
     drive_of(twin, k)->refused = (uint32_t)fault->number[0];
     drive_of(twin, k)->exception = fault->number[1] > 0 ? (uint8_t)fault->number[1] : BUSY;
 }
 
 ACT(act_register)
 {
-    UNUSED();
     register_cell_t *reg = register_drive_find(drive_of(twin, k), (uint16_t)fault->number[0]);
     if (reg != NULL) {
         reg->value = (uint16_t)fault->number[1];
@@ -116,19 +96,16 @@ ACT(act_register)
 
 ACT(act_homing_fails)
 {
-    UNUSED();
     drive_of(twin, k)->is_homing_broken = true;
 }
 
 ACT(act_encoder)
 {
-    UNUSED();
     drive_of(twin, k)->origin -= fault->number[0] * twin->per_unit[k];
 }
 
 ACT(act_mend)
 {
-    UNUSED();
     register_drive_t *drive = drive_of(twin, k);
     drive->is_broken = drive->is_mute = drive->is_cut = drive->is_deaf = drive->is_homing_broken = false;
     drive->late_us = drive->lost = drive->damaged = drive->halved = drive->refused = 0;
