@@ -17,6 +17,7 @@
 /** Zeroed: no end has been asked for. Private. */
 typedef struct {
     bool is_asked;        /**< by a signal, or the request `shutdown`; the owner may set it */
+    uint64_t step_us;     /**< time of the newest step */
     uint64_t held_us;     /**< how long the newest hold has delayed it, */
     uint64_t held_all_us; /**< and all of them */
 } delayed_end_t;
@@ -25,11 +26,12 @@ typedef struct {
  *  @return false: no hold delays the end any more; each one would only stop the platform once more on its way down */
 bool delayed_end_hold(delayed_end_t *self);
 
-/** Once in each cycle.
+/** Once in each cycle; those that a machine skips count by their time.
  *  @param is_due  a signal asks for the end in this cycle
  *  @param is_held the platform is on hold
+ *  @param now_us  never decreasing
  *  @return true: the platform is to settle and end now */
-bool delayed_end_step(delayed_end_t *self, bool is_due, bool is_held, uint32_t cycle_us);
+bool delayed_end_step(delayed_end_t *self, bool is_due, bool is_held, uint64_t now_us);
 
 /** Whether a hold delays the end. */
 bool delayed_end_is_held(const delayed_end_t *self);

@@ -179,7 +179,7 @@ static void take_end(motion_loop_t *self)
 {
     const bool is_due = __atomic_exchange_n(&self->handover.is_end_due, 0, __ATOMIC_ACQ_REL) != 0;
     const bool is_held = gateway_snapshot(&self->session.gateway)->state == STATE_HOLD && self->before_hold != STATE_HOMING;
-    if (delayed_end_step(&self->end, is_due, is_held, self->session.cycle_us)) {
+    if (delayed_end_step(&self->end, is_due, is_held, self->session.now_us)) {
         (void)!carry_out(self, &(motion_request_t){.event = EVENT_SHUTDOWN});
     }
     self->current.view.is_end_held = delayed_end_is_held(&self->end);

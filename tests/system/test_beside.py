@@ -243,14 +243,14 @@ def ends_on_a_disk_that_stalls(bench):
 class Stalled:
     """heaved with its configuration on a disk, the service manager beside it, and perhaps nobody who reads its standard error."""
 
-    def __init__(self, bench, is_log_full):
+    def __init__(self, bench, is_log_full, has_black_box=False):
         library = bench.bin.resolve().parent / "tests/system/libstalled_disk.so"
         if not library.exists():
             raise tap.Skip("instrumented build")
         self.bench, disk, self.stall = bench, bench.folder / "disk", bench.folder / "disk.stall"
         disk.mkdir()
         self.config = disk / "platform.ini"
-        self.config.write_bytes(bench.config.read_bytes())
+        self.config.write_text(bench.config.read_text(encoding="utf-8") + f"\n[black-box]\ndirectory = {disk}/box\n" * has_black_box, encoding="utf-8")
         self.manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self.manager.bind(str(bench.folder / "notify"))
         self.manager.settimeout(0.5)  # half of:
@@ -318,6 +318,22 @@ def reload_beside_a_log_that_nobody_reads(bench):
     stalled.daemon.send_signal(signal.SIGHUP)
     stalled.serve(2)
     assert bench.status()["lost"]["log_lines"] > 0
+    stalled.ends()
+
+
+def reload_beside_a_dump(bench):
+    """A dump that the disk does not take, and a file that it does not give: who asked for the dump waits, nobody else does."""
+    stalled = Stalled(bench, False, has_black_box=True)
+    assert bench.ctl("dump").returncode == 0
+    with Link(bench) as link:
+        stalled.stall.touch()
+        link.link.sendall(b"dump\n")
+        stalled.serve(4, lambda: stalled.daemon.send_signal(signal.SIGHUP))
+        link.link.sendall(b"dump\n")
+        stalled.serve(2)
+        stalled.stall.unlink()
+        folders = [json.loads(link.file.readline())["folder"] for _ in range(2)]
+        assert len(set(folders)) == 2, folders
     stalled.ends()
 
 
@@ -407,6 +423,7 @@ CASES = {
     "a disk that stalls holds up nobody, and what is lost is counted": disk_that_stalls,
     "SIGTERM on a disk that stalls": ends_on_a_disk_that_stalls,
     "SIGHUP with a file that does not open": reload_of_a_file_that_does_not_open,
+    "SIGHUP beside a dump on a disk that stalls": reload_beside_a_dump,
     "SIGHUP beside a log that nobody reads": reload_beside_a_log_that_nobody_reads,
     "a zero byte in a request is no end of it": zero_in_a_request,
 }

@@ -9,10 +9,19 @@
 #define CYCLES_S (1000000u / CYCLE_US)
 
 static delayed_end_t m_end;
+static uint64_t m_now_us;
+
+static bool step(bool is_due, bool is_held)
+{
+    m_now_us += CYCLE_US;
+    return delayed_end_step(&m_end, is_due, is_held, m_now_us);
+}
 
 void setUp(void)
 {
     m_end = (delayed_end_t){0};
+    m_now_us = 123456789;
+    TEST_ASSERT_FALSE(step(false, false));
 }
 
 void tearDown(void) {}
@@ -24,7 +33,7 @@ static unsigned cycles_until_on(unsigned hold_every, unsigned most)
         if (i % hold_every == 0 && !delayed_end_hold(&m_end)) {
             return i;
         }
-        if (delayed_end_step(&m_end, false, true, CYCLE_US)) {
+        if (step(false, true)) {
             return i;
         }
         TEST_ASSERT_TRUE(delayed_end_is_held(&m_end));
@@ -35,7 +44,7 @@ static unsigned cycles_until_on(unsigned hold_every, unsigned most)
 static void test_a_hold_without_an_end_is_none_of_its(void)
 {
     for (unsigned i = 0; i < 1000 * CYCLES_S; i++) {
-        TEST_ASSERT_FALSE(delayed_end_step(&m_end, false, true, CYCLE_US));
+        TEST_ASSERT_FALSE(step(false, true));
         TEST_ASSERT_FALSE(delayed_end_is_held(&m_end));
     }
     TEST_ASSERT_TRUE(delayed_end_hold(&m_end));
@@ -43,24 +52,24 @@ static void test_a_hold_without_an_end_is_none_of_its(void)
 
 static void test_the_end_of_a_platform_on_hold_begins_at_once(void)
 {
-    TEST_ASSERT_TRUE(delayed_end_step(&m_end, true, true, CYCLE_US));
+    TEST_ASSERT_TRUE(step(true, true));
     TEST_ASSERT_FALSE(delayed_end_is_held(&m_end));
-    TEST_ASSERT_FALSE(delayed_end_step(&m_end, false, false, CYCLE_US));
+    TEST_ASSERT_FALSE(step(false, false));
 }
 
 static void test_a_hold_delays_it_by_ten_seconds(void)
 {
-    TEST_ASSERT_TRUE(delayed_end_step(&m_end, true, false, CYCLE_US));
+    TEST_ASSERT_TRUE(step(true, false));
     TEST_ASSERT_TRUE(delayed_end_hold(&m_end));
     TEST_ASSERT_EQUAL_UINT(10 * CYCLES_S, cycles_until_on(UINT32_MAX, 100 * CYCLES_S));
-    TEST_ASSERT_FALSE(delayed_end_step(&m_end, false, false, CYCLE_US)); /* it settles */
+    TEST_ASSERT_FALSE(step(false, false)); /* it settles */
     TEST_ASSERT_TRUE(delayed_end_hold(&m_end));
     TEST_ASSERT_EQUAL_UINT(10 * CYCLES_S, cycles_until_on(UINT32_MAX, 100 * CYCLES_S));
 }
 
 static void test_a_hold_in_the_hold_delays_it_anew(void)
 {
-    TEST_ASSERT_TRUE(delayed_end_step(&m_end, true, false, CYCLE_US));
+    TEST_ASSERT_TRUE(step(true, false));
     TEST_ASSERT_TRUE(delayed_end_hold(&m_end));
     TEST_ASSERT_EQUAL_UINT(5 * CYCLES_S, cycles_until_on(UINT32_MAX, 5 * CYCLES_S));
     TEST_ASSERT_TRUE(delayed_end_hold(&m_end));
@@ -69,11 +78,24 @@ static void test_a_hold_in_the_hold_delays_it_anew(void)
 
 static void test_holds_without_end_delay_it_by_a_minute(void)
 {
-    TEST_ASSERT_TRUE(delayed_end_step(&m_end, true, false, CYCLE_US));
+    TEST_ASSERT_TRUE(step(true, false));
     TEST_ASSERT_EQUAL_UINT(60 * CYCLES_S, cycles_until_on(7, 1000 * CYCLES_S));
     TEST_ASSERT_FALSE(delayed_end_hold(&m_end));
-    TEST_ASSERT_FALSE(delayed_end_step(&m_end, false, false, CYCLE_US));
-    TEST_ASSERT_TRUE(delayed_end_step(&m_end, false, true, CYCLE_US)); /* heaved's own hold, for lateness */
+    TEST_ASSERT_FALSE(step(false, false));
+    TEST_ASSERT_TRUE(step(false, true)); /* heaved's own hold, for lateness */
+}
+
+/* A machine that skips nine of ten cycles is given no more time by the service manager. */
+static void test_cycles_that_are_skipped_count_by_their_time(void)
+{
+    TEST_ASSERT_TRUE(step(true, false));
+    TEST_ASSERT_TRUE(delayed_end_hold(&m_end));
+    for (unsigned i = 1; i < CYCLES_S; i++) {
+        m_now_us += 9 * CYCLE_US;
+        TEST_ASSERT_FALSE(step(false, true));
+    }
+    m_now_us += 9 * CYCLE_US;
+    TEST_ASSERT_TRUE(step(false, true));
 }
 
 int main(void)
@@ -83,6 +105,7 @@ int main(void)
     RUN_TEST(test_the_end_of_a_platform_on_hold_begins_at_once);
     RUN_TEST(test_a_hold_delays_it_by_ten_seconds);
     RUN_TEST(test_a_hold_in_the_hold_delays_it_anew);
+    RUN_TEST(test_cycles_that_are_skipped_count_by_their_time);
     RUN_TEST(test_holds_without_end_delay_it_by_a_minute);
     return UNITY_END();
 }
