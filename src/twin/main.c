@@ -11,6 +11,8 @@
 #include <unistd.h>
 
 #include "common/message.h" // exit codes
+#include "config/canraw.h"
+#include "config/cia402.h"
 #include "config/modbus.h"
 #include "twin/control.h"
 #include "twin/modbus_ports.h"
@@ -18,10 +20,12 @@
 #include "twin/script.h"
 #include "twin/wire.h"
 
-#define FDS_MAX  (WIRE_FDS_MAX + CONTROL_FDS_MAX + MODBUS_PORTS_FDS_MAX)
-#define PRIORITY 40       /* heaved has 80, interrupts 50 */
-#define NICE     (-15)    /* if real-time priority is not allowed */
-#define AWAKE_US 1000000u /* longest time between two rounds of the main loop */
+#define FDS_MAX        (WIRE_FDS_MAX + CONTROL_FDS_MAX + MODBUS_PORTS_FDS_MAX)
+#define PRIORITY       40    /* heaved has 80, interrupts 50 */
+#define NICE           (-15) /* if real-time priority is not allowed */
+#define LISTEN_US      2000000u
+#define LISTEN_STEP_MS 10
+#define AWAKE_US       1000000u /* longest time between two rounds of the main loop */
 
 /** A run of the program. */
 typedef struct {
@@ -116,15 +120,80 @@ static int prepare(run_t *self)
     return code != EXIT_DONE ? code : read_script(self, drives);
 }
 
+/* --- Before it speaks --- */
+
+/** What is listened for: which of the drives that will be simulated was heard. */
+typedef struct {
+    canraw_map_t frames;
+    cia402_config_t nodes;
+    bool is_frames;
+    unsigned heard; /**< from 1; 0 = none */
+} listening_t;
+
+/* What drives send: EMCY, TPDOs, answers to SDO, heartbeats. */
+static bool is_of_node(uint32_t id, uint8_t node)
+{
+    static const uint32_t k_functions[] = {0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700};
+    for (size_t i = 0; i < sizeof k_functions / sizeof k_functions[0]; i++) {
+        if (id == k_functions[i] + node) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void listen_to(void *ctx, const can_frame_t *frame)
+{
+    listening_t *self = ctx;
+    const unsigned axes = self->is_frames ? self->frames.axes : self->nodes.axes;
+    for (unsigned k = 0; k < axes; k++) {
+        const canraw_axis_map_t *axis = &self->frames.axis[k];
+        const bool is_heard = self->is_frames ? frame->is_extended == self->frames.is_extended &&
+                                                    (frame->id == axis->reply_id || frame->id == axis->status_id)
+                                              : !frame->is_extended && is_of_node(frame->id, self->nodes.axis[k].node);
+        self->heard = is_heard ? k + 1 : self->heard;
+    }
+}
+
+/* No real drive answers to what its master says, or tells of itself. */
+static bool is_alone(run_t *self, char why[WIRE_WHY_MAX])
+{
+    static listening_t listening;
+    const uint64_t end_us = clock_us() + LISTEN_US;
+    listening.is_frames = self->script.machine.kind == TWIN_DRIVES_FRAMES;
+    if (listening.is_frames) {
+        config_canraw_map(&self->config, &listening.frames);
+    } else {
+        config_cia402(&self->config, &listening.nodes);
+    }
+    while (listening.heard == 0 && clock_us() < end_us && is_ended == 0) {
+        struct pollfd fds[WIRE_FDS_MAX];
+        (void)poll(fds, wire_watch(&self->wire, fds), LISTEN_STEP_MS);
+        if (!wire_hear(&self->wire, listen_to, &listening)) {
+            break;
+        }
+    }
+    if (listening.heard != 0) {
+        (void)snprintf(why, WIRE_WHY_MAX, "%s: drive %u is there already, and heave-twin would answer in its place",
+                       self->wire.end, listening.heard);
+    }
+    return listening.heard == 0;
+}
+
 static int open_all(run_t *self)
 {
     char why[WIRE_WHY_MAX];
     self->control = (control_t){.fd = -1};
-    if (!modbus_ports_open(&self->ports, &self->config, why)) {
+    if (!modbus_ports_open(&self->ports, &self->config, self->options.is_on_real_bus, why)) {
         return refuse(EXIT_UNAVAILABLE, self->options.config, why);
     }
-    if (has_wire(self) && !wire_open(&self->wire, &self->config.can, self->options.interface, self->options.slcan, why)) {
-        return refuse(EXIT_UNAVAILABLE, self->options.interface != NULL ? "--interface" : "[can] interface", why);
+    const char *where = self->options.interface != NULL ? "--interface" : "[can] interface";
+    if (has_wire(self) && !wire_open(&self->wire, &self->config.can, self->options.interface, self->options.slcan,
+                                     self->options.is_on_real_bus, why)) {
+        return refuse(EXIT_UNAVAILABLE, where, why);
+    }
+    if (has_wire(self) && self->wire.is_real && !is_alone(self, why)) {
+        return refuse(EXIT_UNAVAILABLE, where, why);
     }
     char line_why[LINES_WHY_MAX];
     if (!lines_open(&self->lines, &self->config, clock_us(), line_why)) {

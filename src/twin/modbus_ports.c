@@ -44,6 +44,20 @@ static bool open_door(modbus_port_t *self, char why[MODBUS_WHY_MAX])
     return false;
 }
 
+/* A serial line is always a pseudo terminal of our own. */
+static bool is_of_this_machine(const modbus_port_t *self, char why[MODBUS_WHY_MAX])
+{
+    const bool is_loopback = self->is_serial || strncmp(self->host.address, "127.", 4) == 0;
+    if (!is_loopback) {
+        (void)snprintf(
+            why, MODBUS_WHY_MAX,
+            "%s:%u: on a network that may have real drives. Take 127.0.0.1 and a port of its own for each in a copy of "
+            "the file; --on-real-bus where no drive is on it",
+            self->host.address, self->host.port);
+    }
+    return is_loopback;
+}
+
 static bool open_port(modbus_port_t *self, char why[MODBUS_WHY_MAX])
 {
     if (!self->is_serial) {
@@ -74,7 +88,7 @@ static bool add_serial(modbus_ports_t *self, unsigned line, const config_modbus_
     return true;
 }
 
-bool modbus_ports_open(modbus_ports_t *self, const config_t *config, char why[MODBUS_WHY_MAX])
+bool modbus_ports_open(modbus_ports_t *self, const config_t *config, bool is_real_allowed, char why[MODBUS_WHY_MAX])
 {
     bool is_open = true;
     *self = (modbus_ports_t){0};
@@ -91,6 +105,9 @@ bool modbus_ports_open(modbus_ports_t *self, const config_t *config, char why[MO
         } else {
             is_open = add_serial(self, MODBUS_BOARD_LINE, &config->relays_modbus.serial, "[relays-modbus]", why) && is_open;
         }
+    }
+    for (unsigned i = 0; i < self->count && is_open && !is_real_allowed; i++) {
+        is_open = is_of_this_machine(&self->port[i], why);
     }
     for (unsigned i = 0; i < self->count && is_open; i++) {
         is_open = open_port(&self->port[i], why);

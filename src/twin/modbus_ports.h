@@ -44,8 +44,9 @@ typedef struct {
 } modbus_ports_t;
 
 /** Opens what the configuration names.
+ *  @param is_real_allowed hosts may be others than the loopback address
  *  @param why what is wrong and what to do, where false is returned */
-bool modbus_ports_open(modbus_ports_t *self, const config_t *config, char why[MODBUS_WHY_MAX]);
+bool modbus_ports_open(modbus_ports_t *self, const config_t *config, bool is_real_allowed, char why[MODBUS_WHY_MAX]);
 
 void modbus_ports_close(modbus_ports_t *self);
 

@@ -29,6 +29,7 @@ enum {
     OPTION_INTERFACE,
     OPTION_AMBIENT,
     OPTION_HOMED,
+    OPTION_ON_REAL_BUS,
     OPTION_HELP,
     OPTION_VERSION
 };
@@ -68,6 +69,8 @@ static const usage_row_t k_options[] = {
     {"ambient", "C", "temperature round the motors; else 25", OPTION_AMBIENT},
     {"homed", NULL, "the drives know their zero from the start, as those with absolute encoders do", OPTION_HOMED},
     {"no-gpio", NULL, "leave the GPIO lines alone: they are real ones, or nobody needs them", OPTION_NO_GPIO},
+    {"on-real-bus", NULL, "the interface, or the address of Modbus TCP, may lead to real drives; it listens for them first",
+     OPTION_ON_REAL_BUS},
     {"help", NULL, "print this", OPTION_HELP},
     {"version", NULL, "print the version", OPTION_VERSION},
     {0},
@@ -88,7 +91,10 @@ static const usage_section_t k_manual[] = {
     {"DESCRIPTION",
      "`heave-twin` is the outside of a platform: the drives that its configuration names, on their bus, and the mechanism that "
      "they move. heaved(8), or any other master, sees no difference, as long as nothing is made to fail. It has no part in a "
-     "machine with real drives: never start it on their bus.\n\n"
+     "machine with real drives: it takes vcan, vxcan, buses between programs, pseudo terminals and the loopback address. "
+     "Anything "
+     "else may lead to real drives, in whose place it would answer: that needs --on-real-bus, and it listens first, for two "
+     "seconds, and does not start if one of its drives is there already.\n\n"
      "It takes configurations with CANopen drives (`[drives] driver = cia402`), with drives that have CAN frames of their own "
      "(can-raw) and with drives on Modbus (modbus-tcp, modbus-rtu), and a board of relays on Modbus. Lines of [relays], [inputs] "
      "and [healthy] with `driver = gpio` are on chips "
@@ -184,8 +190,10 @@ static bool take(twin_options_t *self, int option)
         self->mode = option == OPTION_CHECK ? TWIN_CHECK : option == OPTION_HELP ? TWIN_HELP : TWIN_VERSION;
         return true;
     }
-    if (option == OPTION_NO_GPIO || option == OPTION_HOMED) {
-        *(option == OPTION_HOMED ? &self->is_homed : &self->is_without_gpio) = true;
+    if (option == OPTION_NO_GPIO || option == OPTION_HOMED || option == OPTION_ON_REAL_BUS) {
+        *(option == OPTION_HOMED         ? &self->is_homed
+          : option == OPTION_ON_REAL_BUS ? &self->is_on_real_bus
+                                         : &self->is_without_gpio) = true;
         return true;
     }
     const char **place = place_of(self, option);

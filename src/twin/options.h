@@ -18,6 +18,7 @@ typedef enum { TWIN_RUN, TWIN_CHECK, TWIN_ASK, TWIN_HELP, TWIN_VERSION } twin_mo
 typedef struct {
     twin_mode_t mode;
     bool is_without_gpio;
+    bool is_on_real_bus;
     bool is_homed;
     const char *config;
     const char *script;

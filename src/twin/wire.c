@@ -16,6 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "linux_can_link.h"
 #include "linux_can_local.h"
 
 #define BACKLOG       4
@@ -29,7 +30,17 @@ static const char k_without[] = "this kernel has no SocketCAN. Load it (as root:
 
 /* --- Opening --- */
 
-static bool open_can(wire_t *self, char why[WIRE_WHY_MAX])
+/* By what the kernel says, not by its name. Where it says nothing the interface counts as real. */
+static bool is_virtual(const char *name)
+{
+    linux_can_link_t link = {.kind = ""};
+    struct mnl_socket *netlink = linux_can_link_open();
+    const bool is_found = netlink != NULL && linux_can_link_look(netlink, name, &link) == HV_OK;
+    linux_can_link_close(netlink);
+    return is_found && (strcmp(link.kind, "vcan") == 0 || strcmp(link.kind, "vxcan") == 0);
+}
+
+static bool open_can(wire_t *self, bool is_real_allowed, char why[WIRE_WHY_MAX])
 {
     struct sockaddr_can address = {.can_family = AF_CAN};
     const int bytes = RECEIVE_BYTES;
@@ -43,6 +54,15 @@ static bool open_can(wire_t *self, char why[WIRE_WHY_MAX])
     if (address.can_ifindex == 0) {
         (void)snprintf(why, WIRE_WHY_MAX, "%s: there is no such interface. As root: ip link add %s type vcan; ip link set %s up",
                        self->end, self->end, self->end);
+        return false;
+    }
+    self->is_real = !is_virtual(self->end);
+    if (self->is_real && !is_real_allowed) {
+        (void)snprintf(
+            why, WIRE_WHY_MAX,
+            "%s: leads to real drives, in whose place heave-twin would answer. Take vcan, vxcan or twin0; --on-real-bus where no "
+            "drive is on it",
+            self->end);
         return false;
     }
     (void)setsockopt(self->fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
@@ -71,7 +91,8 @@ static bool open_adapter(wire_t *self, char why[WIRE_WHY_MAX])
     return slcan_open(&self->slcan, self->adapter, self->slcan.bitrate_bps, why, WIRE_WHY_MAX);
 }
 
-bool wire_open(wire_t *self, const config_can_t *can, const char *end, const char *adapter, char why[WIRE_WHY_MAX])
+bool wire_open(wire_t *self, const config_can_t *can, const char *end, const char *adapter, bool is_real_allowed,
+               char why[WIRE_WHY_MAX])
 {
     memset(self, 0, sizeof *self);
     (void)snprintf(self->name, sizeof self->name, "%s", can->interface);
@@ -85,7 +106,7 @@ bool wire_open(wire_t *self, const config_can_t *can, const char *end, const cha
     }
     const bool is_open = self->kind == WIRE_SLCAN   ? open_adapter(self, why)
                          : self->kind == WIRE_LOCAL ? open_local(self, why)
-                                                    : open_can(self, why);
+                                                    : open_can(self, is_real_allowed, why);
     if (!is_open) {
         wire_close(self);
     }

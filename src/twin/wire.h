@@ -30,7 +30,8 @@ typedef struct {
     wire_kind_t kind;
     slcan_t slcan; /**< of WIRE_SLCAN */
     const char *adapter;
-    int fd; /**< of the interface, or where programs come in; -1 = closed */
+    bool is_real; /**< an interface that may lead to real drives: neither vcan nor vxcan */
+    int fd;       /**< of the interface, or where programs come in; -1 = closed */
     linux_can_batch_t batch;
     int client[WIRE_CLIENTS_MAX]; /**< programs on a bus between programs; -1 = none */
     bool is_cable_out;            /**< on such a bus: nobody acknowledges */
@@ -44,8 +45,10 @@ typedef void (*wire_heard_t)(void *ctx, const can_frame_t *frame);
  *  @param can     heaved's interface, and rate
  *  @param end     the interface to open in its place, where that is another; NULL = none
  *  @param adapter path of an adapter on a serial line in place of the interface; NULL = none
+ *  @param is_real_allowed an interface may be opened that may lead to real drives
  *  @param why what is wrong and what to do, where false is returned */
-bool wire_open(wire_t *self, const config_can_t *can, const char *end, const char *adapter, char why[WIRE_WHY_MAX]);
+bool wire_open(wire_t *self, const config_can_t *can, const char *end, const char *adapter, bool is_real_allowed,
+               char why[WIRE_WHY_MAX]);
 
 void wire_close(wire_t *self);
 

@@ -114,6 +114,16 @@ def comes_back(bench):
         assert bench.status()["state"] == "ENGAGED", bench.status()["fault"]
 
 
+def not_in_place_of_real_drives(bench):
+    """By the kind of the interface: behind this one there are drives, which another heave-twin plays."""
+    command = [bench.bin / "heave-twin", "--config", bench.config]
+    with up(bench):
+        for options, words in (((), "leads to real drives"), (("--on-real-bus",), "is there already, and heave-twin would answer in its place")):
+            run = subprocess.run([*command, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, timeout=60, check=False)
+            assert run.returncode == 69 and f"{bench.interface}: " in run.stderr and words in run.stderr, run
+        assert bench.status()["state"] == "ENGAGED" and bench.status()["counters"]["faults"] == 0, bench.status()["fault"]
+
+
 CASES = [
     ("slcan: python-can alone drives it in a cyclic mode", foreign_master_drives_it),
     ("slcan: a wrong rate lets nothing pass, and is said", wrong_rate_is_said),
@@ -124,6 +134,7 @@ CASES = [
     ("slcan: error-passive", fails("passive", "bus-failing")),
     ("slcan: error frames", fails("storm 300", "goes on")),
     ("slcan: unplugged, and back", comes_back),
+    ("slcan: heave-twin does not answer in place of drives that are there", not_in_place_of_real_drives),
 ]
 
 
