@@ -12,7 +12,7 @@ import tap
 
 TOP = Path(__file__).resolve().parents[2]
 PO = "po/zh_CN.po"
-COPIED = ["src", "hal/linux", "config", "po", "tools/texts"]
+COPIED = ["src", "hal/linux", "include", "config", "po", "tools/texts"]
 
 
 def check(top):
