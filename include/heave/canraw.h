@@ -22,6 +22,7 @@
 #ifndef HEAVE_CANRAW_H
 #define HEAVE_CANRAW_H
 
+#include "heave/canmaster.h"
 #include "heave/canpassive.h"
 #include "heave/counts.h"
 #include "heave/drives.h"
@@ -36,7 +37,7 @@
 #define CANRAW_DIVISOR_MAX 1000000u
 
 #define CANRAW_OWNS_MAX    (2u * DRIVES_MAX)
-#define CANRAW_FILTERS_MAX (2u * DRIVES_MAX)
+#define CANRAW_FILTERS_MAX (4u * DRIVES_MAX)
 
 /** Fault codes of this driver. With fault_when, the code is the status as received (1 if that is 0). */
 #define CANRAW_FAULT_FOLLOWING 0x8611u /**< following error, the number CANopen drives use */
@@ -103,6 +104,13 @@ typedef struct {
     uint32_t wait_us;      /**< before the next step */
 } canraw_step_t;
 
+/** Reaction to another master: to frames with our identifiers that we have not sent. */
+typedef enum {
+    CANRAW_MASTER_IGNORE,
+    CANRAW_MASTER_TELL, /**< reported only */
+    CANRAW_MASTER_STOP  /**< nothing is sent at the start until none is heard; later all drives stop, in DRIVE_FAULT */
+} canraw_master_t;
+
 /** One drive. Unit u: mm, or deg of the rotation motor. */
 typedef struct {
     uint32_t command_id;   /**< of commands and queries: all different, also from the reply_ids */
@@ -126,6 +134,8 @@ typedef struct {
     uint32_t period_us;       /**< of the bus, a multiple of the motion cycle */
     uint32_t query_every;     /**< number of periods between two queries of a drive, [1, 1000] */
     uint32_t offline_periods; /**< > 2 * query_every */
+    canraw_master_t other_master;
+    uint32_t listen_ms;       /**< for how long it is listened for at the start, with CANRAW_MASTER_STOP; 0 = not at all */
     uint32_t passive_stop_ms; /**< the bus counts as failing after this time in error-passive; 0 = never */
     uint32_t rated_torque;    /**< counts of a torque field at the rated torque; 0 = not known: torque is not reported */
     uint32_t speed_least;     /**< smallest value of a speed field; its only value if axis[].speed is 0 per u/s */
@@ -156,11 +166,12 @@ typedef enum {
 
 /** Codes for the problems that drive_report_t names in words. The driver has found them, not the drive. */
 enum {
-    CANRAW_SILENT = 0x10001,     /**< nothing is received from the drive */
-    CANRAW_NO_STATUS = 0x10002,  /**< positions are received, but no status_reply */
-    CANRAW_STRANGE = 0x10003,    /**< plus (canraw_verdict_t - CANRAW_OTHER): received frames are rejected */
-    CANRAW_NO_ANSWER = 0x10008,  /**< no answer to a start-up step */
-    CANRAW_TELLS_ERROR = 0x10010 /**< the drive sends a fault code other than 0, but has no fault */
+    CANRAW_SILENT = 0x10001,                       /**< nothing is received from the drive */
+    CANRAW_NO_STATUS = 0x10002,                    /**< positions are received, but no status_reply */
+    CANRAW_STRANGE = 0x10003,                      /**< plus (canraw_verdict_t - CANRAW_OTHER): received frames are rejected */
+    CANRAW_NO_ANSWER = 0x10008,                    /**< no answer to a start-up step */
+    CANRAW_OTHER_MASTER = DRIVE_CODE_MASTER_FIRST, /**< somebody else sends frames with the identifiers of ours */
+    CANRAW_TELLS_ERROR = 0x10010                   /**< the drive sends a fault code other than 0, but has no fault */
 };
 
 /** Last query to a drive; private. */
@@ -226,6 +237,7 @@ typedef struct {
     bool is_refused; /**< the queue was full for the last set */
     bool has_time;
     canpassive_t passive;
+    canmaster_t master;
     uint64_t now_us;
     uint64_t set_us;     /**< when the last set was sent */
     uint64_t query_us;   /**< when the last queries were sent */

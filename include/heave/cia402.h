@@ -16,6 +16,7 @@
 #ifndef HEAVE_CIA402_H
 #define HEAVE_CIA402_H
 
+#include "heave/canmaster.h"
 #include "heave/canpassive.h"
 #include "heave/cia402_state.h"
 #include "heave/counts.h"
@@ -57,7 +58,11 @@ typedef enum {
     CIA402_NO_SUCH_MODE = 0x10019,   /**< 6502h does not list the mode, or homing */
     CIA402_NO_SUCH_HOMING = 0x1001A, /**< 60E3h does not list the homing method */
     CIA402_LOST_NODE = 0x1001B,      /**< another axis of its node was lost, and the node is set up again */
-    CIA402_GUARDED_LATE = 0x1001C    /**< its watchdog of the gateway is on, with more than twice the time that it has to have */
+    CIA402_GUARDED_LATE = 0x1001C,   /**< its watchdog of the gateway is on, with more than twice the time that it has to have */
+    CIA402_OTHER_SYNC = DRIVE_CODE_MASTER_FIRST,    /**< another master is on the bus: SYNC, */
+    CIA402_OTHER_NMT = 0x1001E,                     /**< NMT to our drives, */
+    CIA402_OTHER_COMMAND = 0x1001F,                 /**< an RPDO of our drives, */
+    CIA402_OTHER_HEARTBEAT = DRIVE_CODE_MASTER_LAST /**< or the heartbeat that they watch us by */
 } cia402_trouble_t;
 
 /** Conditions that are checked in every answer beside state and position: bits of drive_report_t.notes. */
@@ -68,6 +73,7 @@ typedef enum {
     CIA402_WATCH_VOLTAGE,
     CIA402_WATCH_LIMIT,
     CIA402_WATCH_WARNING,
+    CIA402_WATCH_MASTER, /**< another master, in no answer */
     CIA402_WATCHES
 } cia402_watch_t;
 
@@ -148,9 +154,11 @@ typedef struct {
     uint16_t boot_timeout_ms;      /**< after reset communication */
     uint16_t power_timeout_ms;     /**< to switch on, and to enable operation */
     uint16_t window_ms;            /**< 6066h */
-    uint32_t passive_stop_ms;      /**< the bus counts as failing after this time in error-passive; 0 = never */
-    int16_t abort_option;          /**< 6007h: 1 fault, 2 disable voltage, 3 quick stop */
-    uint8_t sync_counter;          /**< 1019h: 0 = none, or [2, 240] */
+    uint16_t listen_ms; /**< nothing is sent for so long at the start, and until no other master is heard for as long; 0 = not
+                             at all. Only where reaction[CIA402_WATCH_MASTER] is CIA402_STOP */
+    uint32_t passive_stop_ms;  /**< the bus counts as failing after this time in error-passive; 0 = never */
+    int16_t abort_option;      /**< 6007h: 1 fault, 2 disable voltage, 3 quick stop */
+    uint8_t sync_counter;      /**< 1019h: 0 = none, or [2, 240] */
     uint8_t pdo_step;          /**< PDO records from those of a channel to those of the next, [1, 64]; 0 = 64, as in CiA 301 */
     bool are_maps_fixed;       /**< the drives' maps are compared, not written */
     cia402_maps_t commands;    /**< RPDOs: with 6040h, and 607Ah or 60C1h:01; of channel 0, others are at their distance */
@@ -336,6 +344,7 @@ typedef struct {
     bool has_time;
     bool is_preop_due; /* NMT pre-operational has to be sent to all nodes */
     canpassive_t passive;
+    canmaster_t master;
     uint8_t pp_step; /* of the handshake in PP */
     uint8_t sync_count;
     uint64_t now_us;
@@ -432,7 +441,7 @@ uint8_t cia402_answer_every(const cia402_config_t *config);
  *  SYNC take turns. 0 = none: there is no counter, or its range is not a multiple of n. */
 uint8_t cia402_sync_start(const cia402_config_t *config, unsigned axis, uint8_t every);
 
-#define CIA402_FILTERS_MAX (7u * DRIVES_MAX) /* three and four TPDOs of a node */
+#define CIA402_FILTERS_MAX (3u + 10u * DRIVES_MAX) /* three, four TPDOs and three RPDOs of a node */
 #define CIA402_OWNS_MAX    (3u + 6u * DRIVES_MAX)
 
 /** Identifiers that are received, and those that are sent, for the backend's open.

@@ -34,6 +34,10 @@ static inline bool drive_guard_is_found(const drive_guard_t *guard)
     return guard->jump_q32 != 0 || guard->lag_q32 != 0;
 }
 
+/** Codes of the drivers for another master on the bus. */
+#define DRIVE_CODE_MASTER_FIRST 0x1001Du
+#define DRIVE_CODE_MASTER_LAST  0x10020u
+
 /** What one drive reports. */
 typedef struct {
     drive_state_t state;
@@ -53,13 +57,22 @@ static inline bool drive_has_torque(const drive_feedback_t *drive)
     return drive->is_energized || drive->state == DRIVE_ENABLED || drive->state == DRIVE_HOMING;
 }
 
+/** True if another master leads a drive, and the driver waits and sends nothing. */
+static inline bool drive_is_led_by_other(const drive_feedback_t *drive)
+{
+    return drive->state == DRIVE_OFFLINE && drive->fault_code >= DRIVE_CODE_MASTER_FIRST &&
+           drive->fault_code <= DRIVE_CODE_MASTER_LAST;
+}
+
 /** Conditions of a drive that do not stop it: bits of drive_report_t.notes. */
-#define DRIVE_NOTES 6u
+#define DRIVE_NOTES       7u
+#define DRIVE_NOTE_MASTER 6u /**< another master commands it, too */
 static inline const char *drive_note_text(unsigned note)
 {
     static const char *const k_texts[DRIVE_NOTES] = {
-        "has left its mode of operation",    "ignores its set-points",   "is under local control and may ignore a quick stop",
-        "has no voltage at its power stage", "is at a limit of its own", "warns",
+        "has left its mode of operation",     "ignores its set-points",   "is under local control and may ignore a quick stop",
+        "has no voltage at its power stage",  "is at a limit of its own", "warns",
+        "is commanded by another master too",
     };
     return note < DRIVE_NOTES ? k_texts[note] : "";
 }

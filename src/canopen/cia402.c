@@ -7,6 +7,7 @@
 #include "cia402_bus.h"
 #include "cia402_loss.h"
 #include "cia402_map.h"
+#include "cia402_master.h"
 #include "cia402_node.h"
 #include "cia402_pdo.h"
 #include "cia402_report.h"
@@ -55,7 +56,7 @@ static void take_for(cia402_t *self, unsigned k, const can_frame_t *frame)
 
 static void take_frame(cia402_t *self, const can_frame_t *frame)
 {
-    if (frame->is_extended || frame->is_rtr) {
+    if (frame->is_extended || frame->is_rtr || cia402_master_take(self, frame)) {
         return;
     }
     if (frame->id >= CIA402_COB_TPDO && frame->id < CIA402_COB_SDO_ANSWER) {
@@ -301,12 +302,16 @@ static void take_time(cia402_t *self, uint64_t now_us)
         for (unsigned k = 0; k < self->config->axes; k++) {
             cia402_axis_init(cia402_drive(self, k));
         }
+        cia402_master_begin(self);
     }
     self->is_due |= now_us >= self->due_us;
 }
 
 static void work(cia402_t *self)
 {
+    if (cia402_master_step(self)) {
+        return;
+    }
     for (unsigned k = 0; k < self->config->axes; k++) {
         cia402_axis_step(cia402_drive(self, k));
     }
@@ -390,6 +395,9 @@ static void stop_now(cia402_t *self)
 static hv_status_t cia402_request(void *ctx, drives_request_t request)
 {
     cia402_t *self = ctx;
+    if (request == DRIVES_RESET_FAULT) {
+        cia402_master_wake(self);
+    }
     if (self->is_gone || !is_any_answering(self)) {
         return HV_ERR_IO;
     }
@@ -465,7 +473,7 @@ drives_t cia402_hal(cia402_t *self)
 
 void cia402_leave(cia402_t *self)
 {
-    for (unsigned k = 0; k < self->config->axes && !self->is_gone; k++) {
+    for (unsigned k = 0; k < self->config->axes && !self->is_gone && !self->master.is_listening; k++) {
         if (self->config->axis[k].channel == 0 && cia402_node_is_off(cia402_drive(self, k))) {
             (void)!send_nmt(self, NMT_RESET, self->config->axis[k].node);
         }

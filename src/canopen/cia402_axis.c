@@ -206,11 +206,17 @@ void cia402_axis_take_heartbeat(cia402_drive_t drive, const can_frame_t *frame)
     self->heartbeat_us = drive.now_us;
 }
 
+void cia402_axis_note_foreign_sync(cia402_drive_t drive)
+{
+    cia402_axis_t *self = drive.axis;
+    self->awaited = self->awaited < silent_syncs_max(drive) ? (uint8_t)(self->awaited + 1u) : self->awaited;
+}
+
 void cia402_axis_note_sync(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     self->silent_syncs++;
-    self->awaited = self->awaited < silent_syncs_max(drive) ? (uint8_t)(self->awaited + 1u) : self->awaited;
+    cia402_axis_note_foreign_sync(drive);
     self->plain_syncs = self->plain_syncs < PLAIN_SYNCS ? (uint8_t)(self->plain_syncs + 1u) : self->plain_syncs;
     self->surplus = self->plain_syncs < PLAIN_SYNCS ? self->surplus : 0;
 }

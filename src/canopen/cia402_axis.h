@@ -43,6 +43,9 @@ void cia402_axis_note_answer(cia402_drive_t drive, unsigned n, uint8_t all);
 /** SYNC went out: a TPDO is due, now or at a later one. */
 void cia402_axis_note_sync(cia402_drive_t drive);
 
+/** SYNC of another master: it is answered like ours. */
+void cia402_axis_note_foreign_sync(cia402_drive_t drive);
+
 /** Once per poll, behind what was received: goes on with setting up, finds out whether the drive is lost or fell out. */
 void cia402_axis_step(cia402_drive_t drive);
 

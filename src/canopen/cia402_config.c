@@ -82,10 +82,26 @@ static uint32_t put_filter(hal_can_filter_t *filter, uint32_t id)
     return 1;
 }
 
+/* What only a master sends: our own is never received, so it is another one's. */
+static uint32_t put_masters(const cia402_config_t *config, hal_can_filter_t *filter)
+{
+    uint32_t count = 0;
+    count += put_filter(&filter[count], CIA402_COB_NMT);
+    count += put_filter(&filter[count], CIA402_COB_SYNC);
+    count += put_filter(&filter[count], CIA402_COB_HEARTBEAT + config->master_node);
+    for (unsigned k = 0; k < config->axes; k++) {
+        for (unsigned i = CIA402_COMMAND; i < CIA402_ANSWER; i++) {
+            const cia402_pdo_t pdo = cia402_pdo(config, k, i);
+            count += pdo.entries > 0 ? put_filter(&filter[count], pdo.id) : 0;
+        }
+    }
+    return count;
+}
+
 uint32_t cia402_filters(const cia402_config_t *config, hal_can_filter_t filter[CIA402_FILTERS_MAX])
 {
     static const uint32_t k_functions[] = {CIA402_COB_SYNC, CIA402_COB_SDO_ANSWER, CIA402_COB_HEARTBEAT};
-    uint32_t count = 0;
+    uint32_t count = put_masters(config, filter);
     for (unsigned k = 0; k < config->axes; k++) {
         for (size_t i = 0; i < sizeof k_functions / sizeof k_functions[0] && config->axis[k].channel == 0; i++) {
             count += put_filter(&filter[count], k_functions[i] + config->axis[k].node);
@@ -100,15 +116,8 @@ uint32_t cia402_filters(const cia402_config_t *config, hal_can_filter_t filter[C
 
 uint32_t cia402_owns(const cia402_config_t *config, hal_can_filter_t filter[CIA402_OWNS_MAX])
 {
-    uint32_t count = 0;
-    count += put_filter(&filter[count], CIA402_COB_NMT);
-    count += put_filter(&filter[count], CIA402_COB_SYNC);
-    count += put_filter(&filter[count], CIA402_COB_HEARTBEAT + config->master_node);
+    uint32_t count = put_masters(config, filter);
     for (unsigned k = 0; k < config->axes; k++) {
-        for (unsigned i = CIA402_COMMAND; i < CIA402_ANSWER; i++) {
-            const cia402_pdo_t pdo = cia402_pdo(config, k, i);
-            count += pdo.entries > 0 ? put_filter(&filter[count], pdo.id) : 0;
-        }
         if (config->axis[k].channel == 0) {
             count += put_filter(&filter[count], CIA402_COB_SDO_REQUEST + config->axis[k].node);
             count += config->is_guarded ? put_filter(&filter[count], CIA402_COB_HEARTBEAT + config->axis[k].node) : 0;

@@ -96,6 +96,10 @@ static const struct {
     {CIA402_NO_VOLTAGE, "has no voltage at its power stage: supply, contactor?"},
     {CIA402_LIMITED, "is at a limit of its own: torque, speed, position (607Dh)?"},
     {CIA402_WARNING, "warns: its manual and 603Fh say of what"},
+    {CIA402_OTHER_SYNC, "has another master on its bus: somebody else sends SYNC"},
+    {CIA402_OTHER_NMT, "has another master on its bus: somebody else sends NMT commands"},
+    {CIA402_OTHER_COMMAND, "has another master on its bus: somebody else sends set-points"},
+    {CIA402_OTHER_HEARTBEAT, "has another master on its bus: somebody else sends the heartbeat of gateway_node"},
 };
 
 static const char *code_text(uint32_t code)
@@ -143,6 +147,9 @@ static const char *phase_text(const cia402_t *self, uint8_t index)
         [CIA402_REFUSED] = "refused",
     };
     const cia402_phase_t phase = self->axis[index].phase;
+    if (self->master.is_listening) {
+        return "listening";
+    }
     return phase == CIA402_UP ? up_text(self, index) : k_texts[phase];
 }
 

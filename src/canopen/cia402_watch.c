@@ -61,6 +61,7 @@ static const struct {
     [CIA402_WATCH_VOLTAGE] = {is_without_voltage, CIA402_NO_VOLTAGE, false},
     [CIA402_WATCH_LIMIT] = {is_limited, CIA402_LIMITED, true},
     [CIA402_WATCH_WARNING] = {is_warning, CIA402_WARNING, false},
+    [CIA402_WATCH_MASTER] = {NULL, CIA402_TROUBLE_NONE, false}, /* in no answer: cia402_master.c */
 };
 
 void cia402_watch_restart(cia402_axis_t *self)
@@ -90,7 +91,7 @@ void cia402_watch_step(cia402_drive_t drive)
         learn(self);
     }
     for (unsigned i = 0; i < CIA402_WATCHES; i++) {
-        const bool is_seen = k_watches[i].is_seen(self);
+        const bool is_seen = k_watches[i].is_seen != NULL && k_watches[i].is_seen(self);
         uint8_t *answers = &self->watch_answers[i];
         *answers = !is_seen ? 0 : (uint8_t)(*answers + (is_answer && *answers < ANSWERS_MIN));
         if (*answers >= ANSWERS_MIN && drive.config->reaction[i] != CIA402_IGNORE) {

@@ -5,7 +5,9 @@
 
 #include <string.h>
 
-#define STEP_FACTOR 2 /* a set-point may be so much further than its speed limit allows before it counts as a jump */
+#define LISTEN_LEAST_MS 100
+#define LISTEN_MOST_MS  1000
+#define STEP_FACTOR     2 /* a set-point may be so much further than its speed limit allows before it counts as a jump */
 
 static unsigned cylinders_of(const config_t *config)
 {
@@ -117,6 +119,8 @@ void config_canraw_map(const config_t *config, canraw_map_t *map)
         .period_us = raw->period_us,
         .query_every = raw->query_every,
         .offline_periods = raw->offline_periods,
+        .other_master = (canraw_master_t)raw->other_master,
+        .listen_ms = (uint32_t)fx_clamp(raw->offline_periods * (int64_t)raw->period_us / 1000, LISTEN_LEAST_MS, LISTEN_MOST_MS),
         .passive_stop_ms = config->can.passive_stop_ms,
         .rated_torque = raw->rated_torque,
         .speed_least = raw->speed_counts,

@@ -103,6 +103,9 @@ typedef struct {
     uint32_t passive_stop_ms;
 } config_can_t;
 
+/** What follows from something that is watched: as cia402.h and canraw.h have it. */
+typedef enum { CONFIG_REACTION_IGNORE, CONFIG_REACTION_TELL, CONFIG_REACTION_STOP } config_reaction_t;
+
 /** Drives with CAN frames of their own. canraw.h describes the frames. */
 typedef struct {
     uint32_t period_us;
@@ -129,6 +132,7 @@ typedef struct {
     canraw_when_t enabled_when, fault_when, homing_done_when, homing_failed_when;
     uint32_t query_every;
     uint32_t offline_periods;
+    config_reaction_t other_master;
     q16_t following_error_mm_q16;
     q16_t angle_following_error_deg_q16;
 } config_can_raw_t;
@@ -213,9 +217,7 @@ typedef enum { CONFIG_MODE_CSP, CONFIG_MODE_IP, CONFIG_MODE_PP } config_mode_t;
 /** What CANopen drives do when the gateway falls silent: 6007h less 1. */
 typedef enum { CONFIG_LOST_FAULT, CONFIG_LOST_DISABLE_VOLTAGE, CONFIG_LOST_QUICK_STOP } config_lost_t;
 
-/** What is watched in what CANopen drives say, and what follows: as cia402.h has both. */
-#define CONFIG_REACTIONS 6u
-typedef enum { CONFIG_REACTION_IGNORE, CONFIG_REACTION_TELL, CONFIG_REACTION_STOP } config_reaction_t;
+#define CONFIG_REACTIONS 7u /* to what is watched in what CANopen drives say: in the order of cia402.h */
 
 /** How CANopen drives and the gateway watch each other. */
 typedef enum { CONFIG_CONTROL_HEARTBEAT, CONFIG_CONTROL_GUARDING } config_error_control_t;

@@ -31,8 +31,26 @@ static void lose_all(canraw_t *self)
 
 /* --- In --- */
 
+/* Nobody but us sends what drives hear; what they answer has other identifiers. */
+static bool is_of_master(const canraw_t *self, const can_frame_t *frame)
+{
+    bool is_such = false;
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        const canraw_axis_map_t *axis = &self->map->axis[k];
+        is_such = is_such || frame->id == axis->command_id || frame->id == axis->setpoint_id;
+    }
+    return is_such && frame->is_extended == self->map->is_extended && !frame->is_rtr;
+}
+
 static void take_frame(canraw_t *self, const can_frame_t *frame)
 {
+    if (is_of_master(self, frame)) {
+        canmaster_take(&self->master, CANRAW_OTHER_MASTER);
+        return;
+    }
+    if (self->master.is_listening) {
+        return; /* it begins with nothing known */
+    }
     bool is_of_drive = false;
     bool is_strange = false;
     for (unsigned k = 0; k < self->map->axes; k++) {
@@ -101,6 +119,26 @@ static void watch_bus(canraw_t *self, bool is_up)
         restart_bus(self);
     }
     self->is_gone = is_gone;
+}
+
+/* --- Another master --- */
+
+static void stop_for_master(canraw_t *self)
+{
+    for (unsigned k = 0; k < self->map->axes; k++) {
+        canraw_axis_t *axis = &self->axis[k];
+        if (axis->is_online && axis->state != DRIVE_FAULT) {
+            canraw_axis_fault(axis, self->map, CANRAW_OTHER_MASTER, self->now_us);
+        }
+    }
+}
+
+static void watch_master(canraw_t *self)
+{
+    const canmaster_verdict_t verdict = canmaster_step(&self->master, self->now_us);
+    if (verdict == CANMASTER_HEARD && self->map->other_master == CANRAW_MASTER_STOP) {
+        stop_for_master(self);
+    }
 }
 
 /* --- Out --- */
@@ -255,6 +293,7 @@ static void take_time(canraw_t *self, uint64_t now_us)
         self->is_due = true;
         self->free_us = now_us;
         self->set_us = now_us;
+        canmaster_listen(&self->master, self->map->other_master == CANRAW_MASTER_STOP ? self->map->listen_ms : 0, now_us);
     }
     self->is_due |= now_us - self->set_us >= self->map->period_us;
 }
@@ -265,6 +304,7 @@ static hv_status_t canraw_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
     take_time(self, now_us);
     const bool is_up = receive(self);
     watch_bus(self, is_up);
+    watch_master(self);
     canpassive_step(&self->passive, self->can, now_us, self->map->passive_stop_ms);
     for (unsigned k = 0; k < self->map->axes; k++) {
         canraw_axis_step(&self->axis[k], self->map, now_us);
@@ -272,13 +312,15 @@ static hv_status_t canraw_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
             canraw_axis_note_off(&self->axis[k], self->map);
         }
         canraw_axis_report(&self->axis[k], &feedback[k]);
+        feedback[k].fault_code = canmaster_leads(&self->master, now_us) ? CANRAW_OTHER_MASTER : feedback[k].fault_code;
     }
-    if (!self->is_gone && self->is_free) {
+    const bool may_speak = !self->is_gone && self->is_free && !self->master.is_listening;
+    if (may_speak) {
         send_commands(self, CANRAW_DISABLE);
         send_steps(self);
     }
     /* send asks once per period; where nobody calls it, or nobody answers, this does */
-    if (!self->is_gone && self->is_free && now_us - self->query_us >= 2u * (uint64_t)self->map->period_us) {
+    if (may_speak && now_us - self->query_us >= 2u * (uint64_t)self->map->period_us) {
         send_queries(self);
     }
     return self->is_gone || !is_any_online(self) ? HV_ERR_IO : HV_OK;
@@ -426,6 +468,12 @@ static void canraw_report(void *ctx, uint8_t k, drive_report_t *out)
 {
     const canraw_t *self = ctx;
     canraw_axis_words(&self->axis[k], self->map, k, self->now_us, out);
+    out->notes = canmaster_was_heard(&self->master, self->now_us) && self->map->other_master == CANRAW_MASTER_TELL
+                     ? 1u << DRIVE_NOTE_MASTER
+                     : 0;
+    if (self->master.is_listening) {
+        canraw_listening_words(canmaster_leads(&self->master, self->now_us), out);
+    }
 }
 
 drives_t canraw_hal(canraw_t *self)

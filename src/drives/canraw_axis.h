@@ -55,6 +55,13 @@ canraw_asked_t canraw_axis_next_query(canraw_axis_t *self, const canraw_map_t *m
 
 void canraw_axis_report(const canraw_axis_t *self, drive_feedback_t *feedback);
 
+/** A fault that this driver has found. */
+const char *canraw_fault_text(uint32_t code);
+
+/** A drive while nothing may be sent.
+ *  @param is_led another master leads it */
+void canraw_listening_words(bool is_led, drive_report_t *out);
+
 /** Drive k in words. */
 void canraw_axis_words(const canraw_axis_t *self, const canraw_map_t *map, unsigned k, uint64_t now_us, drive_report_t *out);
 

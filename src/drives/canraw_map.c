@@ -224,6 +224,8 @@ uint32_t canraw_filters(const canraw_map_t *map, hal_can_filter_t filter[CANRAW_
     for (unsigned k = 0; k < map->axes; k++) {
         count = add_filter(map, filter, count, map->axis[k].reply_id);
         count = map->status_reply.length != 0 ? add_filter(map, filter, count, map->axis[k].status_id) : count;
+        count = add_filter(map, filter, count, map->axis[k].command_id); /* another master's: ours are never received */
+        count = add_filter(map, filter, count, map->axis[k].setpoint_id);
     }
     return count;
 }

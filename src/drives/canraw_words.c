@@ -12,13 +12,15 @@ static const char *phase_of(const canraw_axis_t *self)
     return k_phases[self->is_online ? self->state : DRIVE_OFFLINE];
 }
 
-static const char *text_of_fault(uint32_t code)
+const char *canraw_fault_text(uint32_t code)
 {
     switch (code) {
     case CANRAW_FAULT_FOLLOWING:
         return "following error";
     case CANRAW_FAULT_HOMING:
         return "homing has failed";
+    case CANRAW_OTHER_MASTER:
+        return "another master is on the bus: somebody else sends frames with the identifiers of ours";
     default:
         return "fault of the drive";
     }
@@ -70,6 +72,15 @@ static drive_telemetry_t telemetry_of(const canraw_axis_t *self, const canraw_ma
                                .has = DRIVE_TELLS_TORQUE};
 }
 
+void canraw_listening_words(bool is_led, drive_report_t *out)
+{
+    out->phase = "listening";
+    out->code = is_led ? CANRAW_OTHER_MASTER : 0;
+    out->trouble = is_led ? canraw_fault_text(CANRAW_OTHER_MASTER) : "";
+    out->detail = "";
+    out->detail_code = 0;
+}
+
 void canraw_axis_words(const canraw_axis_t *self, const canraw_map_t *map, unsigned k, uint64_t now_us, drive_report_t *out)
 {
     *out = (drive_report_t){.phase = phase_of(self),
@@ -81,7 +92,7 @@ void canraw_axis_words(const canraw_axis_t *self, const canraw_map_t *map, unsig
                             .since_us = self->phase_us};
     if (self->is_online && self->state == DRIVE_FAULT) {
         out->code = self->fault_code;
-        out->trouble = text_of_fault(self->fault_code);
+        out->trouble = canraw_fault_text(self->fault_code);
     } else if (self->trouble != CANRAW_MATCH && now_us - self->trouble_us <= TROUBLE_SHOWN_US) {
         out->code = CANRAW_STRANGE + (uint32_t)self->trouble - CANRAW_OTHER;
         out->trouble = text_of_strange(self->trouble);

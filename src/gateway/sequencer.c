@@ -131,9 +131,24 @@ static void step_abandoned(gateway_t *self, uint64_t now_us)
     }
 }
 
+/* Who ends the other master does not expect that this one raises the platform. */
+static void void_auto(gateway_t *self)
+{
+    bool is_led_by_other = false;
+    for (unsigned i = 0; i < drive_count(self); i++) {
+        is_led_by_other |= drive_is_led_by_other(&self->snapshot.drive[i]);
+    }
+    if (self->auto_engage.is_due && is_led_by_other) {
+        auto_engage_end(&self->auto_engage);
+        hal_log_write(self->io.log, HAL_LOG_WARNING,
+                      "engage = auto is void: another master leads the drives; an operator has to engage");
+    }
+}
+
 /* The auto policy, once: brings the platform up as an operator's engage would. */
 static void step_auto(gateway_t *self, uint64_t now_us)
 {
+    void_auto(self);
     const state_t state = self->supervisor.state;
     const bool can_engage = (state == STATE_OFF && !actions_is_drive_fault_present(self)) || state == STATE_SETTLED;
     if (can_engage && auto_engage_is_ready(&self->auto_engage, now_us)) {

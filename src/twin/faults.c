@@ -259,6 +259,11 @@ ACT(act_lag)
     node_of(twin, k)->drive.motor.lag_us = fault->number[0] * 1000;
 }
 
+ACT(act_other_master)
+{
+    twin->other = (other_master_t){k, now_us, now_us + (uint64_t)(fault->number[0] * 1000)};
+}
+
 /* Not of CiA 402 drives: modbus_faults.c and frame_faults.c have what it does. */
 ACT(act_none)
 {
@@ -300,6 +305,7 @@ static const row_t k_rows[] = {
     {"friction", "dn", "DRIVE MM", "breaks loose so far behind its demand", {0}, 1e4, act_friction, BUS_OFF},
     {"encoder", "dn", "DRIVE MM", "its encoder tells so much more from now on", {0}, 1e4, act_encoder, BUS_OFF},
     {"lag", "dn", "DRIVE MS", "follows with this time constant", {0}, 1e5, act_lag, BUS_OFF},
+    {"other-master", "dN", "DRIVE [MS]", "another master on the bus commands it, once or for so long", {1}, 1e7, act_other_master, BUS_OFF},
     {"damaged", "dn", "DRIVE COUNT", "Modbus, own frames: so many of its answers are damaged, the check byte, CRC or function", {0}, 1e6, act_none, BUS_OFF},
     {"stuck-counter", "d", "DRIVE", "own frames: its alive counter stands still", {0}, 0, act_none, BUS_OFF},
     {"half", "dn", "DRIVE COUNT", "Modbus: of so many of its answers only a half comes", {0}, 1e6, act_none, BUS_OFF},

@@ -112,6 +112,7 @@ static const row_t k_rows[] = {
     {"friction", NULL},
     {"lag", NULL},
     {"encoder", act_encoder},
+    {"other-master", NULL},
     {"mend", act_mend},
 };
 

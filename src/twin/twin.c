@@ -10,17 +10,20 @@
 #include "config/cia402.h"
 #include "config/modbus.h"
 
-#define STOP_MM        3.0 /* end stops are so far beyond the stroke */
-#define BOOT_US        300000u
-#define SDO_US         1000u
-#define SWITCH_ON_US   50000u
-#define BRAKE_US       100000u
-#define JUMP_U         20.0 /* a set-point so far away is a following error at once; mm or deg */
-#define MISSED_MAX     3u
-#define LAG_MS         2.0
-#define VENDOR         0x2E5u
-#define MODBUS_STEP_US 10000u /* drives on Modbus are looked at so often beside their questions */
-#define ANGLE_RATED_U  360.0
+#define OTHER_US             20000u /* from one frame of another master to the next */
+#define CIA402_RPDO          0x200u
+#define CIA402_COMMAND_BYTES 6u  /* controlword and target */
+#define STOP_MM              3.0 /* end stops are so far beyond the stroke */
+#define BOOT_US              300000u
+#define SDO_US               1000u
+#define SWITCH_ON_US         50000u
+#define BRAKE_US             100000u
+#define JUMP_U               20.0 /* a set-point so far away is a following error at once; mm or deg */
+#define MISSED_MAX           3u
+#define LAG_MS               2.0
+#define VENDOR               0x2E5u
+#define MODBUS_STEP_US       10000u /* drives on Modbus are looked at so often beside their questions */
+#define ANGLE_RATED_U        360.0
 
 void twin_settings_init(twin_settings_t *self, const config_t *config)
 {
@@ -163,6 +166,7 @@ void twin_start(twin_t *self, const config_t *config, const twin_settings_t *set
 {
     cia402_config_t drives;
     memset(self, 0, sizeof *self);
+    self->out = out;
     self->has_pose = kin_init(&self->kin, &config->settings.geometry) == HV_OK;
     self->cylinders = kin_cylinders(&self->kin);
     self->kind = twin_kind(config);
@@ -235,9 +239,29 @@ void twin_hear(twin_t *self, const can_frame_t *frame, uint64_t now_us)
     }
 }
 
+/* The drives do not act on what it says: what heaved makes of it counts. */
+static void advance_other(twin_t *self, uint64_t now_us)
+{
+    other_master_t *other = &self->other;
+    const bool is_frames = self->kind == TWIN_DRIVES_FRAMES;
+    can_frame_t frame = {.id = CIA402_RPDO + self->node[other->drive].number, .length = CIA402_COMMAND_BYTES};
+    if (other->until_us == 0 || now_us < other->due_us) {
+        return;
+    }
+    if (is_frames) {
+        frame = (can_frame_t){.id = self->frame_map.axis[other->drive].command_id,
+                              .is_extended = self->frame_map.is_extended,
+                              .length = self->frame_map.setpoint.length};
+    }
+    self->out.put(self->out.ctx, &frame);
+    other->due_us = now_us + OTHER_US;
+    other->until_us = other->due_us <= other->until_us ? other->until_us : 0;
+}
+
 void twin_advance(twin_t *self, uint64_t now_us)
 {
     unsigned enabled = 0;
+    advance_other(self, now_us);
     if (self->lines != NULL) {
         lines_advance(self->lines, now_us);
     }
@@ -256,6 +280,7 @@ uint64_t twin_due_us(const twin_t *self)
         const uint64_t step_us = self->node[0].drive.motor.now_us + MODBUS_STEP_US;
         return step_us < due_us ? step_us : due_us;
     }
+    due_us = self->other.until_us != 0 && self->other.due_us < due_us ? self->other.due_us : due_us;
     for (unsigned k = 0; k < self->drives; k++) {
         const uint64_t node_us =
             self->kind == TWIN_DRIVES_FRAMES ? frame_drive_due_us(&self->frame[k]) : node_due_us(&self->node[k]);

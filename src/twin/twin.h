@@ -61,6 +61,13 @@ typedef struct {
     bool has_adapter; /**< on a serial line, which can be unplugged */
 } twin_bus_t;
 
+/** Another master, which commands one of the drives. */
+typedef struct {
+    unsigned drive;
+    uint64_t due_us;   /**< its next frame */
+    uint64_t until_us; /**< the last one; 0 = there is none */
+} other_master_t;
+
 /** The outside. */
 typedef struct {
     twin_drives_t kind;
@@ -77,6 +84,8 @@ typedef struct {
     pose_t pose; /**< the last that was found */
     bool has_pose;
     uint64_t enabled_us; /**< all had torque for the first time; 0 = not yet */
+    node_out_t out;      /**< the bus */
+    other_master_t other;
     twin_bus_t bus;
     lines_t *lines; /**< of the caller; NULL = there are none */
 } twin_t;

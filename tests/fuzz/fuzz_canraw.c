@@ -53,6 +53,7 @@ typedef struct {
     canraw_t driver;
     unsigned dialect;
     uint32_t strange; /* what no reply is, counted here */
+    bool is_led;      /* another master has spoken in this cycle, and that stops */
     seen_t seen[DRIVES_MAX];
 } world_t;
 
@@ -222,11 +223,19 @@ static void lose_all(world_t *self)
     }
 }
 
+static bool is_of_master(const world_t *self, const can_frame_t *frame)
+{
+    const bool has_status = is_rich(self);
+    return !frame->is_error && !frame->is_rtr && frame->is_extended == has_status &&
+           frame->id - (has_status ? 0x18FF0100u : 0x601u) < DRIVES_MAX;
+}
+
 static void see_received(void *watcher, const can_frame_t *frame)
 {
     world_t *self = watcher;
     const bool has_status = is_rich(self);
     const uint32_t k = frame->id - (has_status ? 0x18FF0200u : 0x581u);
+    self->is_led |= is_of_master(self, frame) && map_of(self)->other_master == CANRAW_MASTER_STOP;
     if (frame->is_error) {
         if ((frame->id & CAN_ERROR_RESTARTED) != 0) {
             lose_all(self);
@@ -262,7 +271,8 @@ static void check_drive(world_t *self, unsigned k)
     FUZZ_REQUIRE((feedback->state != DRIVE_OFFLINE) == is_there);
     FUZZ_REQUIRE(is_actual(self, k));
     FUZZ_REQUIRE((feedback->fault_code != 0) == is_faulty);
-    FUZZ_REQUIRE(!is_faulty || seen->was_faulty || seen->is_faulty);
+    FUZZ_REQUIRE(!is_faulty || seen->was_faulty || seen->is_faulty || self->is_led);
+    FUZZ_REQUIRE(!self->is_led || !is_there || is_faulty);
     FUZZ_REQUIRE(is_faulty || !seen->was_faulty || !is_there || seen->is_reset);
     FUZZ_REQUIRE(!is_there || (seen->status & STATUS_BAD) == 0 || is_faulty);
     FUZZ_REQUIRE(feedback->state != DRIVE_ENABLED || (seen->status & STATUS_ON) != 0);
@@ -280,6 +290,7 @@ static void poll(world_t *self)
     for (unsigned k = 0; k < DRIVES_MAX; k++) {
         check_drive(self, k);
     }
+    self->is_led = false;
     FUZZ_REQUIRE((status == HV_OK) == !drive_run_are_all(run, DRIVE_OFFLINE));
     FUZZ_REQUIRE(status == HV_OK || status == HV_ERR_IO);
     FUZZ_REQUIRE(self->driver.strange == self->strange);
@@ -354,6 +365,7 @@ static void configure(void)
     m_map[PLAIN].homing_reply.data[1] = 0x12;
     m_map[RICH] = canraw_maps_rich();
     m_map[SEALED] = canraw_maps_sealed();
+    m_map[RICH].other_master = m_map[SEALED].other_master = CANRAW_MASTER_STOP;
     m_map[RICH].homing_failed = m_map[SEALED].homing_failed = (canraw_when_t){STATUS_FAIL, STATUS_FAIL};
 }
 
@@ -467,6 +479,7 @@ static can_frame_t strange_frame(const world_t *world, const record_t *record)
         frame = (can_frame_t){.id = record->data[0] & ~(uint32_t)CAN_ERROR_RESTARTED, .is_error = true};
         break;
     }
+    frame.is_rtr |= is_of_master(world, &frame) && map_of(world)->other_master != CANRAW_MASTER_IGNORE;
     return frame;
 }
 
@@ -506,7 +519,10 @@ static void disturb_bus(world_t *self, const record_t *record)
 {
     static const hal_can_state_t k_states[] = {HAL_CAN_ACTIVE, HAL_CAN_WARNING, HAL_CAN_PASSIVE, HAL_CAN_BUS_OFF};
     const can_frame_t report = {.id = record->data[0], .is_error = true};
-    switch (record->kind % 5) {
+    const can_frame_t command = {.id = map_of(self)->axis[record->drive].command_id,
+                                 .is_extended = map_of(self)->is_extended,
+                                 .length = record->length % 9u};
+    switch (record->kind % 6) {
     case 0:
         sim_can_set_state(&self->node, k_states[record->data[0] % 4]);
         break;
@@ -519,8 +535,11 @@ static void disturb_bus(world_t *self, const record_t *record)
     case 3: /* nobody acknowledges */
         self->slave.node.is_plugged = record->data[0] % 2 != 0;
         break;
-    default:
+    case 4:
         receive(self, &report);
+        break;
+    default: /* another master */
+        receive(self, &command);
         break;
     }
 }
@@ -587,6 +606,7 @@ static void compare(void)
     some = m_world[1].driver;
     all.can = some.can;
     all.strange = some.strange;
+    all.master = some.master;                   /* where it is ignored it is counted, no more */
     for (unsigned k = 0; k < DRIVES_MAX; k++) { /* what is told of it in words */
         all.axis[k].trouble = some.axis[k].trouble;
         all.axis[k].trouble_us = some.axis[k].trouble_us;

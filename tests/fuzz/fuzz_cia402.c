@@ -139,22 +139,23 @@ static void cycle(void *world)
 
 static void configure(void)
 {
-    m_config = (cia402_config_t){.axes = DRIVES_MAX,
-                                 .master_node = 127,
-                                 .mode = CIA402_MODE_CSP,
-                                 .period_us = 2 * CYCLE_US,
-                                 .heartbeat_ms = 50,
-                                 .heartbeat_timeout_ms = 150,
-                                 .sdo_timeout_ms = 100,
-                                 .boot_timeout_ms = 1000,
-                                 .power_timeout_ms = 2000,
-                                 .window_ms = 20,
-                                 .abort_option = 1,
-                                 .is_reset_wanted = true,
-                                 .is_support_checked = true,
-                                 .telemetry = DRIVE_TELLS_TORQUE | DRIVE_TELLS_LAG | DRIVE_TELLS_INPUTS,
-                                 .telemetry_every = 2,
-                                 .reaction = {CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_TELL, CIA402_TELL}};
+    m_config = (cia402_config_t){
+        .axes = DRIVES_MAX,
+        .master_node = 127,
+        .mode = CIA402_MODE_CSP,
+        .period_us = 2 * CYCLE_US,
+        .heartbeat_ms = 50,
+        .heartbeat_timeout_ms = 150,
+        .sdo_timeout_ms = 100,
+        .boot_timeout_ms = 1000,
+        .power_timeout_ms = 2000,
+        .window_ms = 20,
+        .abort_option = 1,
+        .is_reset_wanted = true,
+        .is_support_checked = true,
+        .telemetry = DRIVE_TELLS_TORQUE | DRIVE_TELLS_LAG | DRIVE_TELLS_INPUTS,
+        .telemetry_every = 2,
+        .reaction = {CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_TELL, CIA402_TELL, CIA402_STOP}};
     for (uint8_t k = 0; k < DRIVES_MAX; k++) {
         m_config.axis[k] = (cia402_axis_config_t){.node = (uint8_t)(k + 1),
                                                   .scale = {k % 2 ? -COUNTS_PER_MM : COUNTS_PER_MM, 1, 5000 * k},
@@ -287,11 +288,27 @@ static void disturb(world_t *self, const record_t *record)
     }
 }
 
+/* Nobody moves on beside another master. */
+static void hear_master(world_t *self, const record_t *record)
+{
+    const uint32_t ids[] = {0x000, 0x080, 0x200u + record->drive + 1u, 0x77F};
+    can_frame_t frame = {.id = ids[record->data[0] % 4], .length = record->length};
+    memcpy(frame.data, record->data, record->length);
+    if (frame.id == 0x000) {
+        frame.length = 2;
+        frame.data[1] = record->data[1] % (DRIVES_MAX + 1u);
+    }
+    receive(self, &frame);
+    for (unsigned k = 0; k < DRIVES_MAX && self->driver.master.heard_us == self->run.now_us; k++) {
+        FUZZ_REQUIRE(self->run.feedback[k].state != DRIVE_ENABLED);
+    }
+}
+
 static void disturb_bus(world_t *self, const record_t *record)
 {
     static const hal_can_state_t k_states[] = {HAL_CAN_ACTIVE, HAL_CAN_WARNING, HAL_CAN_PASSIVE, HAL_CAN_BUS_OFF};
     const can_frame_t report = {.id = record->data[0], .is_error = true};
-    switch (record->kind % 4) {
+    switch (record->kind % 5) {
     case 0:
         sim_can_set_state(&self->node, k_states[record->data[0] % 4]);
         break;
@@ -301,8 +318,11 @@ static void disturb_bus(world_t *self, const record_t *record)
     case 2:
         sim_can_plug(&self->node);
         break;
-    default:
+    case 3:
         receive(self, &report);
+        break;
+    default:
+        hear_master(self, record);
         break;
     }
 }

@@ -530,7 +530,63 @@ def killed_anywhere(bench, source):
         assert not left, f"frames of a dead gateway: {left}"
 
 
+# --- Another master ---
+
+def other_master(identifier, data, code, words):
+    """Another program on the bus says once what only a master says."""
+    def case(bench, source):
+        in_motion(bench, source)
+        with can.Bus(interface="socketcan", channel="vcan0") as bus:
+            said_us = now_us()
+            bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
+        status = bench.wait_state("FAULT")
+        assert (status["fault"]["name"], status["fault"]["device_code"]) == ("drive-fault", code), status["fault"]
+        assert f"another master on its bus: somebody else sends {words}" in status["fault"]["report"]["trouble"], status["fault"]
+        harness.wait_for(lambda: not any(leg["torque"] for leg in bench.status()["cylinders"]), "the torque is off")
+        stops = stop_times(bench.record(), said_us)
+        assert max(stops.values()) - said_us <= PERIOD_US + REACTION_US, stops
+    return case
+
+
+MASTER_ROWS = [
+    ("another master, SYNC", 0x080, [], 0x1001D, "SYNC"),
+    ("another master, NMT to all", 0x000, [0x80, 0], 0x1001E, "NMT commands"),
+    ("another master, NMT to a drive", 0x000, [0x80, VICTIM], 0x1001E, "NMT commands"),
+    ("another master, set-points", 0x200 + VICTIM, [0x0F, 0, 0, 0, 0, 0], 0x1001F, "set-points"),
+    ("another master, our heartbeat", 0x77F, [5], 0x10020, "the heartbeat of gateway_node"),
+]
+
+
+def second_heaved(bench, source):
+    """Beside one that moves: it says why it waits, sends nothing, and sets the drives up once it is alone, without raising anything by itself."""
+    daemon = in_motion(bench, source)
+    text = bench.config.with_name("can.ini").read_text(encoding="utf-8")
+    socket_path = bench.folder / "second.sock"
+    second = bench.spawn(config=bench.file("second.ini", text.replace(str(bench.socket), str(socket_path)).replace(str(bench.port), str(harness.free_port()))))
+    harness.wait_for(socket_path.exists, "the second one is there")
+    with bench.sender() as sender:
+        sender.stream(3, lambda t: "@A6:0,0,0,0,0,0,0#")
+
+    def cylinders():
+        with harness.Line(socket_path) as line:
+            return [leg["report"] for leg in line.ask("status")["cylinders"]]
+
+    assert all(report["phase"] == "listening" and "another master on its bus" in report["trouble"] for report in cylinders()), cylinders()
+    status = bench.status()
+    assert status["state"] in ("RISING", "NEUTRAL", "ENGAGED") and status["counters"]["faults"] == 0, status["state"]
+    assert bench.stop(daemon) == 0
+    harness.wait_for(lambda: all(report["phase"] == "ready" for report in cylinders()), "the second one has set the drives up")
+    time.sleep(3)
+    with harness.Line(socket_path) as line:
+        assert line.ask("status")["state"] == "OFF", "engage = auto has raised what another master led"
+        assert line.ask("engage")["ok"]
+        harness.wait_for(lambda: line.ask("status")["state"] == "RISING", "an operator engages it")
+    assert bench.stop(second) == 0
+
+
 CASES = [(f"{name}: all stop together", stops_all_drives(*row)) for name, *row in ROWS]
+CASES += [(f"{name}: all stop together", other_master(*row)) for name, *row in MASTER_ROWS]
+CASES += [("a second heaved on the bus of one that moves waits and sends nothing", second_heaved)]
 CASES += [("the reason stays when the drive is back, a reboot: named until the reset", reason_stays("reboot", 0x10005, "started again by itself")),
           ("the reason stays when the drive is back, torque gone: named until the reset", reason_stays("disable", 0x10011, "left operation enabled by itself")),
           ("the reason stays when the drive is back, lost answers: named until the reset", reason_stays("tpdo drop", 0x10002, "sent no position", count=5))]

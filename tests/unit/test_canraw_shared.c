@@ -360,7 +360,7 @@ static void test_filters_have_each_identifier_once(void)
 {
     hal_can_filter_t filter[CANRAW_FILTERS_MAX];
     hal_can_filter_t own[CANRAW_OWNS_MAX];
-    TEST_ASSERT_EQUAL_UINT32(1, canraw_filters(&m_map, filter));
+    TEST_ASSERT_EQUAL_UINT32(6, canraw_filters(&m_map, filter)); /* and another master's */
     TEST_ASSERT_EQUAL_HEX32(0x281, filter[0].id);
     TEST_ASSERT_EQUAL_UINT32(5, canraw_owns(&m_map, own));
 }

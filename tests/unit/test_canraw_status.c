@@ -80,8 +80,8 @@ static void open_driver(void)
     hal_can_filter_t filter[CANRAW_FILTERS_MAX];
     m_now_us = 1000000;
     sim_can_bus_init(&m_bus, 0, NULL, 0);
-    TEST_ASSERT_EQUAL_UINT32(3, canraw_filters(&m_map, filter));
-    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&m_node, &m_bus, filter, 3));
+    TEST_ASSERT_EQUAL_UINT32(5, canraw_filters(&m_map, filter));
+    TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&m_node, &m_bus, filter, 5));
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&m_drives, &m_bus, NULL, 0));
     TEST_ASSERT_EQUAL(HV_OK, canraw_init(&m_driver, &m_map, sim_can_hal(&m_node)));
     m_hal = canraw_hal(&m_driver);

@@ -149,6 +149,9 @@ static void test_preset_drives_are_enabled_homed_and_led(void)
     q32_t setpoint_q32[DRIVES_MAX] = {0};
     load_preset();
     config_canraw_map(&m_config, &map);
+    TEST_ASSERT_EQUAL(CANRAW_MASTER_STOP, map.other_master);
+    TEST_ASSERT_EQUAL_UINT32(100, map.listen_ms);
+    map.listen_ms = 0; /* the times below are counted from the first frame */
     sim_can_bus_init(&bus, 100, NULL, 0);
     canraw_slave_open(&slave, &bus, false);
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, NULL, 0));

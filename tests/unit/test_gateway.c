@@ -326,6 +326,29 @@ static void test_start_auto_is_over_after_fault_estop_and_requests(void)
     }
 }
 
+/* Who ends the other master does not expect this one to go on. */
+static void test_start_auto_is_over_where_another_master_leads(void)
+{
+    for (uint32_t code = DRIVE_CODE_MASTER_FIRST - 1; code <= DRIVE_CODE_MASTER_LAST + 1; code++) {
+        const bool is_led = code >= DRIVE_CODE_MASTER_FIRST && code <= DRIVE_CODE_MASTER_LAST;
+        start(false);
+        rig_break(&m_rig, SIM_DRIVES_OFFLINE, SIM_DRIVES_ALL, 0);
+        rig_run_ms(&m_rig, 500);
+        m_rig.drives.axis[3].feedback.fault_code = code;
+        rig_run_ms(&m_rig, 1);
+        m_rig.drives.axis[3].feedback.fault_code = 0;
+        rig_run_ms(&m_rig, 2000);
+        rig_break(&m_rig, SIM_DRIVES_RECOVER, SIM_DRIVES_ALL, 0);
+        TEST_ASSERT_EQUAL(!is_led, rig_run_until(&m_rig, STATE_ENGAGED, 60000));
+        TEST_ASSERT_EQUAL(is_led, rig_was_logged(&m_rig, "engage = auto is void: another master leads the drives"));
+        if (is_led) {
+            TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+            TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+            TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 60000));
+        }
+    }
+}
+
 static void test_settled_manual_frames_move_nothing(void)
 {
     static const char *const k_frames[] = {"@A6:5,5,5,20,20,20,FFF#", "@A6T:5,5,5,20,20,20,500#", "@C6:50,60,70,80,90,100,7#",
@@ -2412,6 +2435,7 @@ static void run_driving(void)
     RUN_TEST(test_start_auto_waits_for_a_stream);
     RUN_TEST(test_start_auto_counts_the_newest_frames);
     RUN_TEST(test_start_auto_is_over_after_fault_estop_and_requests);
+    RUN_TEST(test_start_auto_is_over_where_another_master_leads);
     RUN_TEST(test_settled_manual_frames_move_nothing);
     RUN_TEST(test_off_reset_takes_back_the_faults_of_drives);
     RUN_TEST(test_frames_bad_ones_change_nothing_and_are_counted);

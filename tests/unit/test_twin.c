@@ -658,7 +658,7 @@ static void test_local_bus_is_a_can_bus_with_echoes_and_faults(void)
     TEST_ASSERT_EQUAL(HV_ERR_IO, hal_can_recv(can, &got, &at_us));
     config_can_t setup = {.bitrate_bps = 1000000};
     (void)snprintf(setup.interface, sizeof setup.interface, "%s", name);
-    TEST_ASSERT_TRUE_MESSAGE(wire_open(&m_wire, &setup, NULL, NULL, why), why);
+    TEST_ASSERT_TRUE_MESSAGE(wire_open(&m_wire, &setup, NULL, NULL, false, why), why);
     TEST_ASSERT_EQUAL(HV_OK, hal_can_restart(can));
     TEST_ASSERT_EQUAL(HV_OK, linux_can_local_open(&other, name));
     TEST_ASSERT_TRUE(wire_hear(&m_wire, count_heard, NULL)); /* one comes in at a time */
