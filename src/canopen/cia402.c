@@ -56,7 +56,7 @@ static void take_for(cia402_t *self, unsigned k, const can_frame_t *frame)
 
 static void take_frame(cia402_t *self, const can_frame_t *frame)
 {
-    if (frame->is_extended || frame->is_rtr || cia402_master_take(self, frame)) {
+    if (frame->is_extended || frame->is_rtr || cia402_master_take(self, frame) || self->master.is_listening) {
         return;
     }
     if (frame->id >= CIA402_COB_TPDO && frame->id < CIA402_COB_SDO_ANSWER) {

@@ -572,8 +572,16 @@ def second_heaved(bench, source):
             return [leg["report"] for leg in line.ask("status")["cylinders"]]
 
     assert all(report["phase"] == "listening" and "another master on its bus" in report["trouble"] for report in cylinders()), cylinders()
+    with harness.Line(socket_path) as line:
+        assert not any(leg["torque"] for leg in line.ask("status")["cylinders"]), "what others lead is not its own"
     status = bench.status()
     assert status["state"] in ("RISING", "NEUTRAL", "ENGAGED") and status["counters"]["faults"] == 0, status["state"]
+    since = time.monotonic()
+    assert bench.stop(second) == 0 and time.monotonic() - since < 0.5, "it has nothing to wait for"
+    assert bench.status()["state"] in ("RISING", "NEUTRAL", "ENGAGED")
+    socket_path.unlink(missing_ok=True)
+    second = bench.spawn(config=bench.folder / "second.ini")
+    harness.wait_for(socket_path.exists, "the second one is there again")
     assert bench.stop(daemon) == 0
     harness.wait_for(lambda: all(report["phase"] == "ready" for report in cylinders()), "the second one has set the drives up")
     time.sleep(3)
