@@ -135,7 +135,7 @@ function takeButton() {
 
 function buildOperate() {
   const main = at("page");
-  const intensity = element("input", { type: "number", min: 0, max: 100, step: 1, "aria-label": t("intensity"), id: "intensity" });
+  const intensity = element("input", { type: "number", min: 0, max: 100, step: 1, required: true, "aria-label": t("intensity"), id: "intensity" });
   page = {
     problems: element("div", {}), controls: element("div", {}), sender: element("div", {}), relays: element("div", {}), pose: element("div", {}), limits: element("div", {}),
     update(status) {
@@ -157,7 +157,7 @@ function buildOperate() {
   main.replaceChildren(page.problems, element("div", { class: "grid wide" }, element("div", { class: "stack" },
     element("section", {}, element("h2", {}, t("operate")), page.controls, element("div", { class: "buttons" }, ...["engage", "resume", "park", "reset"].map((name) =>
       button(t(name), () => request(name), { class: name === "engage" ? "main" : "", "data-request": name }))),
-    element("h2", {}, t("intensity")), element("div", { class: "buttons" }, intensity, button(t("apply"), () => request(`intensity ${Math.round(Number(intensity.value))}`)))),
+    element("h2", {}, t("intensity")), element("div", { class: "buttons" }, intensity, button(t("apply"), () => intensity.reportValidity() && request(`intensity ${intensity.valueAsNumber}`)))),
     element("section", {}, element("h2", {}, t("machine")), view, page.limits, legend())),
   element("div", { class: "stack" }, element("section", {}, element("h2", {}, t("sender")), page.sender, element("h2", {}, t("relays")), page.relays),
     element("section", {}, element("h2", {}, t("pose")), page.pose))));

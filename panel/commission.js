@@ -4,6 +4,7 @@
 import { drawBode } from "/bode.js";
 import { stateOf } from "/drives.js";
 import { Hand } from "/hand.js";
+import { store } from "/store.js";
 import { chinese, refusalOf, t } from "/text.js";
 import { button, choice, element, fill, number, rowsOf, table } from "/ui.js";
 
@@ -15,7 +16,7 @@ const WAY_MM = 5;
 class Record {
   constructor(platform) {
     this.name = `heave-commission-${platform}`;
-    this.all = JSON.parse(localStorage.getItem(this.name) ?? "null") ?? { began: new Date().toISOString(), found: {}, done: {} };
+    this.all = JSON.parse(store.get(this.name) ?? "null") ?? { began: new Date().toISOString(), found: {}, done: {} };
   }
 
   of(step) { return this.all.found[step] ?? {}; }
@@ -31,9 +32,9 @@ class Record {
     this.keep();
   }
 
-  keep() { localStorage.setItem(this.name, JSON.stringify(this.all)); }
+  keep() { store.set(this.name, JSON.stringify(this.all)); }
 
-  begin() { localStorage.removeItem(this.name); }
+  begin() { store.remove(this.name); }
 }
 
 export async function build({ page, shown, request, say, place, link, take }) {

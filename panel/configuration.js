@@ -3,6 +3,7 @@
 // bringing it into force by heaved's own rules.
 import { difference, Draft, entriesOf, withValue } from "/draft.js";
 import { buildSizes } from "/sizes.js";
+import { store } from "/store.js";
 import { chinese, putBackOf, refusalOf, t } from "/text.js";
 import { button, element, fill, rowsOf } from "/ui.js";
 
@@ -66,7 +67,7 @@ export async function build({ page, shown, say, place, link, take }) {
     const error = refusalOf(got);
     if (error) { say(error); return error; }
     if (got.answer.restart) draft.handedOver();
-    else localStorage.removeItem(draft.name);
+    else store.remove(draft.name);
     say(got.answer.restart ? t("appliedRestart") : t("applied"));
     draft.base = { ...draft.base, text: draft.text, digest: got.answer.digest, applied: true };
     draft.wasMadeFrom = got.answer.digest;

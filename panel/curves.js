@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // curves.js - curves of the samples, every cycle of the last half minute: each place of the screen shows the least and the most of what lies in it, so that no peak is lost, at any zoom. And the
 // spectrum of one of them.
+import { drawBand, widened } from "/band.js";
 import { penOn } from "/ui.js";
 
 // As the page is light or dark; they differ in lightness too.
@@ -38,17 +39,13 @@ export class Store {
     return low;
   }
 
-  // The least and the most of a column for each of so many places between two times: [[least, most] or null].
+  // A column in so many places between two times, as of band.js.
   envelope(column, from, to, places) {
     const out = new Array(places).fill(null), scale = places / (to - from), ring = this.data[column], times = this.data[0], begin = this.count - this.length;
     for (let i = this.find(from); i < this.length; i++) {
       const at = (begin + i) % this.capacity, place = Math.floor((times[at] - from) * scale), value = ring[at];
       if (place >= places) break;
-      if (!(value < NONE)) continue;
-      const one = out[place];
-      if (one === null) out[place] = [value, value];
-      else if (value < one[0]) one[0] = value;
-      else if (value > one[1]) one[1] = value;
+      if (value < NONE) out[place] = widened(out[place], value);
     }
     return out;
   }
@@ -222,15 +219,7 @@ export class Curves {
   curve(pen, places, y, stroke, dash) {
     Object.assign(pen, { strokeStyle: stroke, lineWidth: 2, lineJoin: "round" });
     pen.setLineDash(dash);
-    pen.beginPath();
-    let isDown = false;
-    places.forEach((one, at) => {
-      if (one === null) return;
-      if (isDown) pen.lineTo(LEFT + at, y(one[0])); else pen.moveTo(LEFT + at, y(one[0]));
-      if (one[1] !== one[0]) pen.lineTo(LEFT + at, y(one[1]));
-      isDown = true;
-    });
-    pen.stroke();
+    drawBand(pen, places, (at) => LEFT + at, y);
   }
 
   scale(pen, { colour, y, least, most, width, tall, end }) {

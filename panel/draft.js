@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // draft.js - a configuration as somebody edits it: the text, the one it was made from, and what heaved says of it. Kept in the browser until it is applied: a
 // lost network, a closed tab or an empty battery loses nothing.
+import { store } from "/store.js";
 import { chinese } from "/text.js";
 
 const CHECK_AFTER_MS = 500, AGAIN_MS = 700;
@@ -74,7 +75,7 @@ export class Draft {
     const answer = await fetch(`/api/config/${this.platform}`);
     const got = await answer.json();
     if (!answer.ok) throw new Error(got.error);
-    const kept = JSON.parse(localStorage.getItem(this.name) ?? "null");
+    const kept = JSON.parse(store.get(this.name) ?? "null");
     this.isRestored = kept !== null && kept.text !== got.text && `${kept.text}\n` !== got.text; // heaved ends the last line of what it keeps
     this.wasMadeFrom = this.isRestored ? kept.base : got.digest;
     this.text = this.isRestored ? kept.text : got.text;
@@ -85,7 +86,7 @@ export class Draft {
 
   // Another one is in force meanwhile, and the draft is made from that from now on.
   async rebase() {
-    localStorage.setItem(this.name, JSON.stringify({ base: this.base.digest, text: this.text }));
+    store.set(this.name, JSON.stringify({ base: this.base.digest, text: this.text }));
     await this.load();
     this.wasMadeFrom = this.base.digest;
     this.keep();
@@ -93,11 +94,11 @@ export class Draft {
   }
 
   // What was handed over is in force only once heaved has started with it; should it not be able to, the draft is here again.
-  handedOver() { localStorage.setItem(this.name, JSON.stringify({ base: this.base.digest, text: this.text })); }
+  handedOver() { store.set(this.name, JSON.stringify({ base: this.base.digest, text: this.text })); }
 
   keep() {
-    if (this.isChanged) localStorage.setItem(this.name, JSON.stringify({ base: this.wasMadeFrom, text: this.text }));
-    else localStorage.removeItem(this.name);
+    if (this.isChanged) store.set(this.name, JSON.stringify({ base: this.wasMadeFrom, text: this.text }));
+    else store.remove(this.name);
   }
 
   set(text) {

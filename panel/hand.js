@@ -4,6 +4,7 @@
 import { refusalOf } from "/text.js";
 
 const BEAT_MS = 50;
+const REST_MS = 150; // a finger that rests so long wants to move the machine; one that swipes wants to see more of the page
 let held = 0;
 
 // Whether a button that moves the machine is held, on any page of this tab: what can wait waits then.
@@ -63,19 +64,35 @@ export class Hand {
     this.onLetGo?.();
   }
 
-  // Makes a button one that is held. line(): what to press.
+  // Makes a button one that is held. line(): what to press. A finger that leaves the button lets go, and so does a page that scrolls below it.
   attach(button, line) {
-    const begin = (event) => {
-      event.preventDefault();
+    let rest = null;
+    const isHeld = () => button.classList.contains("held");
+    const begin = () => {
       button.classList.add("held");
       this.onLetGo = () => button.classList.remove("held");
       this.press(line());
     };
-    button.addEventListener("pointerdown", (event) => { if (event.button === 0) { button.setPointerCapture(event.pointerId); begin(event); } });
-    for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) button.addEventListener(name, this.letGo);
-    button.addEventListener("keydown", (event) => { if ((event.key === " " || event.key === "Enter") && !event.repeat) begin(event); });
-    button.addEventListener("keyup", this.letGo);
-    button.addEventListener("blur", this.letGo);
+    const end = () => {
+      clearTimeout(rest);
+      if (isHeld()) this.letGo();
+    };
+    button.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      event.preventDefault();
+      button.setPointerCapture(event.pointerId);
+      if (event.pointerType === "mouse") begin();
+      else rest = setTimeout(begin, REST_MS);
+    });
+    button.addEventListener("pointermove", (event) => {
+      const box = button.getBoundingClientRect();
+      if (event.clientX < box.left || event.clientX > box.right || event.clientY < box.top || event.clientY > box.bottom) end();
+    });
+    button.addEventListener("touchmove", (event) => { if (isHeld()) event.preventDefault(); }, { passive: false }); // no scrolling in the middle of a motion
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) button.addEventListener(name, end);
+    button.addEventListener("keydown", (event) => { if ((event.key === " " || event.key === "Enter") && !event.repeat) { event.preventDefault(); begin(); } });
+    button.addEventListener("keyup", end);
+    button.addEventListener("blur", end);
     button.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // incident.js - what the files of an incident say (docs/operation.md, docs/offline.md): columns over time, states, and what happened when.
+import { widened } from "/band.js";
+
 const WORDS = { from: "fromSender", fault: "wasFault", drive: "atDrive", estop: "atEstop", late: "wasLate", config: "wasReload" };
 
 // Columns of a CSV of numbers; the others as texts. Time runs on over time zero, where t_ms begins anew: what was before it is negative.
@@ -88,15 +90,13 @@ export function rowAt(times, t) {
   return low;
 }
 
-// The least and the most of a column for each of so many places, so that no peak is lost: [[least, most] or null].
+// A column in so many places between two times, as of band.js.
 export function envelope(times, values, from, to, places) {
   const out = Array.from({ length: places }, () => null);
   for (let i = rowAt(times, from); i < times.length && times[i] <= to; i++) {
     if (times[i] < from) continue;
     const place = Math.min(places - 1, Math.floor((times[i] - from) / (to - from) * places));
-    const one = out[place];
-    if (one === null) out[place] = [values[i], values[i]];
-    else { one[0] = Math.min(one[0], values[i]); one[1] = Math.max(one[1], values[i]); }
+    out[place] = widened(out[place], values[i]);
   }
   return out;
 }

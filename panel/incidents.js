@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // incidents.js - what the black box has written, and one of them looked at: time line, curves, the platform at any speed, its files.
+import { drawBand } from "/band.js";
 import { colours } from "/curves.js";
 import { envelope, readFrames, readGeometry, readTable, rowAt, statesOf } from "/incident.js";
 import { t } from "/text.js";
@@ -178,15 +179,7 @@ function drawCurves(canvas, { source, names, lines, from, to, now, states }) {
   bands.forEach((envelopes, i) => {
     pen.strokeStyle = lines[i % lines.length];
     pen.lineWidth = 1.5;
-    pen.beginPath();
-    let isDown = false;
-    envelopes.forEach((one, at) => {
-      if (one === null) return;
-      if (isDown) pen.lineTo(at, y(one[0])); else pen.moveTo(at, y(one[0]));
-      pen.lineTo(at, y(one[1]));
-      isDown = true;
-    });
-    pen.stroke();
+    drawBand(pen, envelopes, (at) => at, y);
   });
   pen.strokeStyle = colour("front");
   pen.lineWidth = 2;

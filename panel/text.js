@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 // text.js - every text of the pages, in English and Chinese. A test finds one that is missing.
+import { store } from "/store.js";
+
 export const TEXT = {
   hold: ["HOLD", "暂停"], holdHelp: ["Hold: stops where it is. Key: Escape", "暂停：平台在原地停下。按键：Escape"],
   connected: ["connected", "已连接"], lost: ["CONNECTION LOST - buttons do nothing", "连接已断开，按钮无效"], gone: ["heaved is not running", "heaved 未运行"],
@@ -78,7 +80,7 @@ export const TEXT = {
   OFF: ["OFF", "关闭"], HOMING: ["HOMING", "回零"], SETTLED: ["SETTLED: people may board", "已回落：可以上下客"], RISING: ["RISING", "上升"], NEUTRAL: ["NEUTRAL", "中位"], ENGAGED: ["ENGAGED: follows the sender", "跟随发送端"], HOLD: ["HOLD", "暂停"], SETTLING: ["SETTLING", "回落中"], FAULT: ["FAULT", "故障"], ESTOP: ["E-STOP PRESSED OR LATCHED", "急停"], SERVICE: ["SERVICE: moved by hand", "检修：手动"],
   offline: ["offline", "离线"], disabled: ["no torque", "未使能"], enabling: ["enabling", "使能中"], enabled: ["torque", "已使能"], homing: ["homing", "回零中"], faulted: ["fault", "故障"], stillTorque: ["torque still on", "仍在使能"],
 };
-let language = localStorage.getItem("heave-language") ?? (navigator.language.startsWith("zh") ? 1 : 0);
+let language = store.get("heave-language") ?? (navigator.language.startsWith("zh") ? 1 : 0);
 language = Number(language) === 1 ? 1 : 0;
 export const chinese = () => language === 1;
 export const t = (name) => TEXT[name]?.[language] ?? name;
@@ -88,5 +90,5 @@ export const refusalOf = (got) => (chinese() ? got.error_zh : null) ?? got.error
 export const putBackOf = (status) => (chinese() ? status?.configuration.put_back_zh : null) ?? status?.configuration.put_back ?? "";
 export function switchLanguage() {
   language = 1 - language;
-  localStorage.setItem("heave-language", String(language));
+  store.set("heave-language", String(language));
 }

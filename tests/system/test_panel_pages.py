@@ -201,6 +201,12 @@ def rights_are_as_in_the_units(bench):
     bench.open_programs()
     os.chown(bench.state_folder, PANEL_UID, HEAVE_GID)
     bench.start(environment={"STATE_DIRECTORY": str(bench.kept)}, user=HEAVED_UID, group=HEAVE_GID, extra_groups=[], umask=umask)
+    run = subprocess.run([bench.bin / "heave-panel", "--state", bench.state_folder, "passwd", "service"], input=f"{PASSWORD}\n", text=True, capture_output=True, check=False)  # as root
+    assert run.returncode == 0, run
+    bench.start_panel(user=PANEL_UID, group=PANEL_UID, extra_groups=[HEAVE_GID], umask=0o077)
+    assert bench.log_in("service", PASSWORD)[0] == 200, "the service reads what root has set"
+    bench.end_panel()
+    (bench.state_folder / "passwords").unlink()
     bench.start_panel(user=PANEL_UID, group=PANEL_UID, extra_groups=[HEAVE_GID], umask=0o077)
     harness.wait_for(lambda: bench.status()["state"] == "OFF", "heaved is up")
     with bench.link() as link:
@@ -295,7 +301,7 @@ def files_are_read_right(bench):
     assert [(one["t"], one["kind"], one["text"]) for one in got["events"]] == [(-1, "wasRequest", "engage"), (0.6, "fromSender", "10.0.0.7"), (1, "wasRequest", "park"), (2, "wasFault", "fault bus-lost")], got["events"]
     assert got["hash"] == "0123456789abcdef" and got["frames"] == 2 and got["cause"].startswith("bus lost, axis 2")
     assert got["geometry"]["base_mm"][2] == [7, 8, 9] and got["geometry"]["retracted_length_mm"] == [500] * 3 and got["none"] is None, got["geometry"]
-    assert got["peaks"] == [[0, 9], [-9, 2]] and got["gap"] == [[1, 1], None, None, [2, 2]], got
+    assert got["peaks"] == [[0, 9, 0, 0], [-9, 2, -9, 2]] and got["gap"] == [[1, 1, 1, 1], None, None, [2, 2, 2, 2]], got
 
 
 def recorder_keeps_every_cycle(bench):
@@ -404,6 +410,24 @@ def hold_is_there(bench):
             assert bench.raw("resume")["ok"], name
 
 COUNT_HOLDS = "(() => { const own = WebSocket.prototype.send; window.holds = 0; WebSocket.prototype.send = function (message) { window.holds += typeof message === 'string' && JSON.parse(message).line === 'hold'; own.call(this, message); }; })()"
+
+
+def storage_is_forbidden(bench):
+    """A browser that keeps nothing: all is there, HOLD first of all, and the language changes until the page is closed."""
+    if web_socket.browser() is None:
+        raise tap.Skip("no Chromium here")
+    bench.both()
+    for how in ("throw new DOMException('denied', 'SecurityError')", "return { getItem() { return null; }, setItem() { throw new DOMException('full', 'QuotaExceededError'); }, removeItem() {} }", "return null"):
+        with Page(f"http://127.0.0.1:{bench.web}/", 820, 1180) as page:
+            page.do("Page.addScriptToEvaluateOnNewDocument", source=f"Object.defineProperty(window, 'localStorage', {{ get() {{ {how}; }} }}); window.isForbidden = true;")
+            page.do("Page.reload")
+            page.wait("window.isForbidden === true && document.getElementById('state') !== null && document.getElementById('state').textContent !== ''", "shown")
+            click(page, "#language")
+            page.wait("document.getElementById('hold').textContent.includes('暂停')", "in Chinese")
+            reach(bench, "ENGAGED")
+            page.run("document.getElementById('hold').click()")
+            until(bench, "HOLD")
+            assert bench.raw("resume")["ok"] and page.problems == [], page.problems
 
 
 def hold_acts_when_it_is_touched(bench):
@@ -609,17 +633,69 @@ def buttons_in_a_browser(bench):
         assert moved(bench, 0.4) < 1e-6, "the browser died in the middle of a jog"
 
 
+def a_swipe_moves_the_page(bench):
+    """A phone: a finger that swipes over the buttons of service scrolls and moves no leg; one that rests there moves it, also if it slips a little, until it leaves the button."""
+    if web_socket.browser() is None:
+        raise tap.Skip("no Chromium here")
+    bench.both()
+    with Page(f"http://127.0.0.1:{bench.web}/", 390, 844) as page:
+        page.do("Emulation.setTouchEmulationEnabled", enabled=True)
+        page.wait("document.getElementById('state').textContent.startsWith('OFF')", "the state is shown")
+        for selector in ("[data-op=take]", "[data-tab=service]", "[data-request='service']"):
+            click(page, selector)
+        bench.wait_state("SERVICE")
+        click(page, "[data-request='torque all on']")
+        harness.wait_for(lambda: all(one["torque"] for one in bench.raw("counts")["drives"]), "torque")
+
+        def spot():
+            return page.run("(() => { const r = document.querySelector('[aria-label=\"3 +\"]'); r.scrollIntoView({block: 'center'}); const b = r.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2, b.height]; })()")
+
+        def touch(what, *points):
+            page.do("Input.dispatchTouchEvent", type=what, touchPoints=[{"x": x, "y": y} for x, y in points])
+
+        def sent():
+            return bench.status()["cylinders"][2]["sent_mm"]
+
+        before = sent()
+        for way in (-1, 1):
+            x, y, _ = spot()
+            at = page.run("document.scrollingElement.scrollTop")
+            touch("touchStart", (x, y))
+            for step in range(1, 13):
+                page.run("new Promise((done) => requestAnimationFrame(done))")
+                touch("touchMove", (x, y + way * 20 * step))
+            touch("touchEnd")
+            assert moved(bench, 0.4) < 1e-6 and sent() == before, (way, sent() - before)
+            assert page.run("document.scrollingElement.scrollTop") != at, "it scrolls"
+        x, y, height = spot()
+        touch("touchStart", (x, y))
+        harness.wait_for(lambda: sent() > before + 0.5, "it moves while the finger rests")
+        touch("touchMove", (x, y + height / 4))
+        at = sent()
+        harness.wait_for(lambda: sent() > at + 0.5, "it goes on while the finger slips a little")
+        at = sent()
+        touch("touchMove", (x, y + height))
+        harness.wait_for(lambda: moved(bench, 0.4) < 1e-6, "the finger has left the button")
+        assert sent() - at < 8, sent() - at
+        touch("touchEnd")
+
+
 def more_buttons_in_a_browser(bench):
     """Those that a ride needs less often: intensity, reset, home all, torque off, leave service."""
     if web_socket.browser() is None:
         raise tap.Skip("no Chromium here")
-    bench.both()
+    daemon = bench.both()
     with Page(f"http://127.0.0.1:{bench.web}/", 820, 1180) as page:
         page.wait("document.getElementById('state').textContent.startsWith('OFF')", "the state is shown")
         click(page, "[data-op=take]")
         page.wait("document.querySelector('[data-op=drop]') !== null", "has the controls")
         page.run("(() => { const i = document.getElementById('intensity'); i.focus(); i.value = '40'; i.nextElementSibling.click(); })()")
         harness.wait_for(lambda: bench.raw("status")["intensity"]["percent"] == 40, "the intensity is set")
+        for text in ("", "-1", "101", "12.5", "e"):
+            page.run(f"(() => {{ const i = document.getElementById('intensity'); i.focus(); i.value = '{text}'; i.nextElementSibling.click(); }})()")
+        page.run("(() => { const i = document.getElementById('intensity'); i.focus(); i.value = '41'; i.nextElementSibling.click(); })()")
+        harness.wait_for(lambda: bench.raw("status")["intensity"]["percent"] == 41, "a right one behind them")
+        assert re.findall(r"intensity (\d+) %", daemon.log.read_text(encoding="utf-8")) == ["40", "41"], "what is no intensity was asked for"
         reach(bench, "FAULT")
         page.wait("document.querySelector('.fault')?.textContent.includes('does not follow') ?? false", "the fault is shown with its remedy")
         bench.config.write_text(bench.config.read_text(encoding="utf-8").replace("following_error_mm = 0.01\n", ""), encoding="utf-8")
@@ -703,6 +779,11 @@ def ripple_is_found(bench):
         page.wait("document.getElementById('state').textContent !== ''", "shown")
         script = """import('/curves.js').then((c) => { const v = []; for (let i = 0; i < 4000; i++) v.push(20 * i / 4000 + 0.05 * Math.sin(2 * Math.PI * 37 * i / 1000) + 0.02 * Math.sin(2 * Math.PI * 60 * i / 1000));
                     const s = c.spectrum(v, 1000).filter(([hz]) => hz > 5); return c.strongest(s); })"""
+        teeth = page.run("""import('/band.js').then(({ drawBand, widened }) => { const worst = []; for (const way of [-1, 1]) { const places = Array(100).fill(null), path = [];
+                         for (let i = 0; i < 3000; i++) places[Math.floor(i / 30)] = widened(places[Math.floor(i / 30)], way * i);
+                         const note = (x, y) => path.push([x, y]); drawBand({ beginPath() {}, stroke() {}, moveTo: note, lineTo: note }, places, (at) => at, (value) => value);
+                         worst.push(Math.max(...path.slice(1).map(([x, y], i) => (x === path[i][0] ? 0 : Math.abs(y - path[i][1])))), path.length); } return worst; })""")
+        assert teeth == [1, 400, 1, 400], f"from place to place of a flank it is one value: {teeth}"
         assert page.run(TRIGGER) == [True, 1234, 1734, 300, 1]
         hz, amplitude = page.run(script)
         assert abs(hz - 37) < 0.5 and 0.04 < amplitude < 0.06, (hz, amplitude)
@@ -915,12 +996,14 @@ CASES = [
     ("the recorder keeps every cycle", recorder_keeps_every_cycle, {}),
     ("pages in a browser: three widths, two languages", pages_in_a_browser, {}),
     ("Hold is the largest, and always there", hold_is_there, {}),
+    ("a browser that forbids storage", storage_is_forbidden, {}),
     ("Hold acts when it is touched", hold_acts_when_it_is_touched, {}),
     ("what comes late is not done", what_comes_late_is_not_done, {}),
     ("a page says how old it is", a_page_says_how_old_it_is, {}),
     ("a restarted panel asks who it is", a_restarted_panel_asks_who_it_is, {"passwords": ("service",)}),
     ("a page stays that one", a_page_stays_that_one, {}),
     ("buttons in a browser", buttons_in_a_browser, {}),
+    ("a swipe moves the page", a_swipe_moves_the_page, {}),
     ("more buttons in a browser", more_buttons_in_a_browser, {}),
     ("axe-core finds no serious fault", nobody_is_left_out, {}),
     ("several platforms on a wall", several_platforms, {"more": ("--platform", "other=/nonexistent/heaved.sock")}),
