@@ -5,6 +5,7 @@
 
 #include <crypt.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
@@ -78,15 +79,24 @@ bool access_load(access_t *self, const char *directory, char *why, size_t size)
     return is_right;
 }
 
-/* All roles anew, in a file of its own that then takes the place of the old one. */
-static bool store(const access_t *self, const char *path, char *why, size_t size)
+/* Root sets passwords, and the service reads them with less rights: the file is whose the directory is. */
+static bool hand_over(int fd, const char *directory)
 {
+    struct stat status;
+    return geteuid() != 0 || (stat(directory, &status) == 0 && fchown(fd, status.st_uid, status.st_gid) == 0);
+}
+
+/* All roles anew, in a file of its own that then takes the place of the old one. */
+static bool store(const access_t *self, const char *directory, char *why, size_t size)
+{
+    char path[PATH_BYTES];
     char next[PATH_BYTES + 8];
+    (void)snprintf(path, sizeof path, "%s/" FILE_NAME, directory);
     (void)snprintf(next, sizeof next, "%s.new", path);
-    const mode_t mask = umask(0077);
-    FILE *const file = fopen(next, "we");
-    (void)umask(mask);
-    bool is_done = file != NULL;
+    (void)unlink(next); /* nobody's link leads elsewhere */
+    const int fd = open(next, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0600);
+    FILE *const file = fd >= 0 ? fdopen(fd, "w") : NULL;
+    bool is_done = file != NULL && hand_over(fileno(file), directory);
     for (unsigned i = 0; is_done && i < ACCESS_ROLES; i++) {
         is_done = self->hash[i][0] == '\0' || fprintf(file, "%s:%s\n", level_name((level_t)i), self->hash[i]) > 0;
     }
@@ -107,9 +117,7 @@ static bool store(const access_t *self, const char *path, char *why, size_t size
 bool access_set_password(const char *directory, level_t role, const char *password, char *why, size_t size)
 {
     static access_t all;
-    char path[PATH_BYTES];
     char salt[CRYPT_GENSALT_OUTPUT_SIZE];
-    (void)snprintf(path, sizeof path, "%s/" FILE_NAME, directory);
     if (strlen(password) < LEAST_LENGTH) {
         (void)snprintf(why, size, "a password has at least %u characters", LEAST_LENGTH);
         return false;
@@ -123,7 +131,8 @@ bool access_set_password(const char *directory, level_t role, const char *passwo
         return false;
     }
     (void)snprintf(all.hash[role], ACCESS_HASH_MAX, "%s", hash);
-    return store(&all, path, why, size);
+    (void)mkdir(directory, 0700); /* the service has not run yet */
+    return store(&all, directory, why, size);
 }
 
 bool access_allow_host(access_t *self, const char *name)
@@ -189,14 +198,32 @@ static access_failure_t *failure_of(access_t *self, const char *address)
     return oldest;
 }
 
-static bool may_try(access_t *self, const access_failure_t *failure, int64_t now_s)
+static bool may_try(access_t *self, const access_failure_t *failure, bool is_known, int64_t now_s)
 {
     if (now_s - self->window_s >= WINDOW_S) {
         self->window_s = now_s;
-        self->tries = 0;
+        self->tries[false] = self->tries[true] = 0;
     }
     const bool is_penalised = failure->failures >= FREE_FAILURES && now_s - failure->last_s < PENALTY_S;
-    return !is_penalised && self->tries < WINDOW_TRIES;
+    return !is_penalised && self->tries[is_known] < WINDOW_TRIES;
+}
+
+/* Somebody has logged in from there: tries of strangers, however many addresses they have, do not use up its own. */
+static bool is_known(const access_t *self, const char *address)
+{
+    for (unsigned i = 0; i < ACCESS_KNOWN_MAX; i++) {
+        if (strcmp(self->known[i], address) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void know(access_t *self, const char *address)
+{
+    if (!is_known(self, address)) {
+        (void)snprintf(self->known[self->next_known++ % ACCESS_KNOWN_MAX], ACCESS_ADDRESS_MAX, "%s", address);
+    }
 }
 
 static bool make_token(char token[ACCESS_TOKEN_MAX])
@@ -228,10 +255,11 @@ static access_session_t *place(access_t *self)
 bool access_begin(access_t *self, const char *address, int64_t now_s)
 {
     access_failure_t *const failure = failure_of(self, address);
-    if (!may_try(self, failure, now_s)) {
+    const bool has_own = is_known(self, address);
+    if (!may_try(self, failure, has_own, now_s)) {
         return false;
     }
-    self->tries++;
+    self->tries[has_own]++;
     failure->failures++; /* until it is known to be right: several may be looked at together */
     failure->last_s = now_s;
     return true;
@@ -250,6 +278,7 @@ bool access_enter(access_t *self, level_t role, const char *address, int64_t now
         return false;
     }
     failure_of(self, address)->failures = 0;
+    know(self, address);
     access_session_t *const session = place(self);
     *session = (access_session_t){.role = role, .used_s = now_s, .began_s = now_s > 0 ? now_s : 1};
     (void)snprintf(session->token, sizeof session->token, "%s", token);

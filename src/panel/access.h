@@ -13,6 +13,7 @@
 
 #define ACCESS_TOKEN_MAX    65u
 #define ACCESS_SESSIONS_MAX 64u
+#define ACCESS_KNOWN_MAX    32u
 #define ACCESS_HOSTS_MAX    16u
 #define ACCESS_HOST_MAX     128u
 #define ACCESS_HASH_MAX     256u
@@ -43,8 +44,10 @@ typedef struct {
     unsigned hosts;
     access_session_t session[ACCESS_SESSIONS_MAX];
     access_failure_t failure[ACCESS_SESSIONS_MAX];
-    int64_t window_s; /**< begin of the present ten seconds */
-    unsigned tries;   /**< passwords compared since window_s */
+    int64_t window_s;                                 /**< begin of the present ten seconds */
+    unsigned tries[2];                                /**< passwords compared since window_s, [1] from known addresses */
+    char known[ACCESS_KNOWN_MAX][ACCESS_ADDRESS_MAX]; /**< addresses of the newest logins */
+    unsigned next_known;
 } access_t;
 
 /** Reads the passwords of a state directory. A missing file is no error.

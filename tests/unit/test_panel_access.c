@@ -174,6 +174,61 @@ static void test_names_of_the_panel(void)
     TEST_ASSERT_FALSE(access_is_own_origin("", ""));
 }
 
+/* Many addresses use up what strangers may try, and nothing of who was in before. */
+static void test_strangers_do_not_lock_out_who_was_in_before(void)
+{
+    char token[ACCESS_TOKEN_MAX];
+    char address[ACCESS_ADDRESS_MAX];
+    set(LEVEL_OPERATE, "a long enough one");
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_OPERATE, "a long enough one", "192.168.7.5", 100, token));
+    unsigned refused = 0;
+    for (unsigned i = 0; i < 200; i++) {
+        (void)snprintf(address, sizeof address, "192.0.2.%u", i);
+        refused += !access_begin(&m_access, address, 200);
+    }
+    TEST_ASSERT_EQUAL_UINT(180, refused);
+    TEST_ASSERT_EQUAL(ACCESS_TOO_OFTEN, log_in(LEVEL_OPERATE, "a long enough one", "192.168.7.6", 200, token));
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_OPERATE, "a long enough one", "192.168.7.5", 200, token));
+    for (unsigned i = 0; i < 200; i++) {
+        (void)access_begin(&m_access, "192.168.7.5", 205); /* it has no more than others have together */
+    }
+    TEST_ASSERT_EQUAL_UINT(20, m_access.tries[0]);
+    TEST_ASSERT_LESS_OR_EQUAL_UINT(20, m_access.tries[1]);
+    TEST_ASSERT_EQUAL(ACCESS_IN, log_in(LEVEL_OPERATE, "a long enough one", "192.168.7.6", 211, token));
+}
+
+/* The service has less rights than root, who sets them; and what lies in its directory does not lead root elsewhere. */
+static void test_the_file_is_whose_the_directory_is(void)
+{
+    char next[128], other[96];
+    struct stat status;
+    (void)snprintf(next, sizeof next, "%s.new", file());
+    (void)snprintf(other, sizeof other, "%s/other", m_folder);
+    FILE *const made = fopen(other, "w");
+    TEST_ASSERT_NOT_NULL(made);
+    (void)fclose(made);
+    TEST_ASSERT_EQUAL_INT(0, symlink(other, next));
+    const uid_t owner = geteuid() == 0 ? 12345 : geteuid();
+    TEST_ASSERT_EQUAL_INT(0, chown(m_folder, owner, (gid_t)-1));
+    set(LEVEL_SERVICE, "a long enough one");
+    TEST_ASSERT_EQUAL_INT(0, lstat(file(), &status));
+    TEST_ASSERT_TRUE(S_ISREG(status.st_mode));
+    TEST_ASSERT_EQUAL_UINT(owner, status.st_uid);
+    TEST_ASSERT_EQUAL_UINT(0600, status.st_mode & 0777);
+    TEST_ASSERT_EQUAL_INT(0, stat(other, &status));
+    TEST_ASSERT_EQUAL_INT(0, status.st_size);
+    TEST_ASSERT_EQUAL_INT(0, unlink(other));
+}
+
+static void test_the_directory_is_made(void)
+{
+    struct stat status;
+    TEST_ASSERT_EQUAL_INT(0, rmdir(m_folder));
+    set(LEVEL_SERVICE, "a long enough one");
+    TEST_ASSERT_EQUAL_INT(0, stat(m_folder, &status));
+    TEST_ASSERT_EQUAL_UINT(0700, status.st_mode & 0777);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -185,5 +240,8 @@ int main(void)
     RUN_TEST(test_who_guesses_much_at_once_waits_too);
     RUN_TEST(test_bad_files_and_passwords_are_named);
     RUN_TEST(test_names_of_the_panel);
+    RUN_TEST(test_strangers_do_not_lock_out_who_was_in_before);
+    RUN_TEST(test_the_file_is_whose_the_directory_is);
+    RUN_TEST(test_the_directory_is_made);
     return UNITY_END();
 }
