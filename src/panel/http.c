@@ -114,12 +114,14 @@ static bool takes_gzip(struct lws *wsi)
 static int begin_request(struct lws *wsi, request_t *request, const char *path)
 {
     const bool is_post = lws_hdr_total_length(wsi, WSI_TOKEN_POST_URI) > 0;
-    http_end_request(request);
-    *request = (request_t){.length = 0};
+    if (request->is_begun) {
+        return -1; /* one each */
+    }
+    *request = (request_t){.is_begun = true};
     (void)snprintf(request->path, sizeof request->path, "%.90s", path);
-    if (!http_is_ours(wsi, is_post)) {
-        return http_answer_text(wsi, request, HTTP_STATUS_FORBIDDEN,
-                                "{\"error\":\"this is not a name of this panel; --allow-host makes it one\"}", NULL);
+    const char *const refusal = http_refusal(wsi, is_post);
+    if (refusal != NULL) {
+        return http_answer_error(wsi, request, HTTP_STATUS_FORBIDDEN, refusal);
     }
     if (is_post) {
         char type[64];
@@ -225,8 +227,11 @@ static int send_chunk(struct lws *wsi, request_t *request)
     static unsigned char chunk[LWS_PRE + CHUNK];
     const size_t left = request->length - request->sent;
     const size_t length = left < CHUNK ? left : CHUNK;
-    if ((request->data == NULL && !request->has_file) || left == 0) {
+    if (!request->is_answered) {
         return 0;
+    }
+    if (left == 0) {
+        return -1; /* all of it has gone: the connection ends */
     }
     if (!request->has_file) {
         memcpy(&chunk[LWS_PRE], request->data + request->sent, length);
@@ -237,10 +242,6 @@ static int send_chunk(struct lws *wsi, request_t *request)
         return -1;
     }
     request->sent += length;
-    if (request->sent == request->length) {
-        http_end_request(request);
-        return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
-    }
     (void)lws_callback_on_writable(wsi);
     return 0;
 }

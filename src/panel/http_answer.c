@@ -41,20 +41,38 @@ bool http_header(struct lws *wsi, enum lws_token_indexes which, char *out, int s
     return lws_hdr_copy(wsi, out, size, which) > 0;
 }
 
-bool http_is_ours(struct lws *wsi, bool has_origin)
+/* Everybody behind a proxy on this machine looks like this machine. */
+static bool is_forwarded(struct lws *wsi)
+{
+    static const enum lws_token_indexes k_tokens[] = {WSI_TOKEN_X_FORWARDED_FOR, WSI_TOKEN_HTTP_X_REAL_IP, WSI_TOKEN_HTTP_VIA};
+    static const char *const k_names[] = {"forwarded:", "x-forwarded-host:", "x-forwarded-proto:"};
+    bool is_such = false;
+    for (unsigned i = 0; i < sizeof k_tokens / sizeof k_tokens[0]; i++) {
+        is_such = is_such || lws_hdr_total_length(wsi, k_tokens[i]) > 0;
+    }
+    for (unsigned i = 0; i < sizeof k_names / sizeof k_names[0]; i++) {
+        is_such = is_such || lws_hdr_custom_length(wsi, k_names[i], (int)strlen(k_names[i])) > 0;
+    }
+    return is_such;
+}
+
+const char *http_refusal(struct lws *wsi, bool has_origin)
 {
     char host[ACCESS_HOST_MAX];
     char origin[ACCESS_HOST_MAX + 16];
     if (!http_header(wsi, WSI_TOKEN_HOST, host, (int)sizeof host) || !access_is_host(m_server->access, host)) {
-        return false;
+        return "this is not a name of this panel; --allow-host makes it one";
+    }
+    if (!m_server->access->has_password && is_forwarded(wsi)) {
+        return "through a proxy only once there is a password: heave-panel passwd";
     }
     const bool is_said = http_header(wsi, WSI_TOKEN_ORIGIN, origin, (int)sizeof origin);
-    return is_said ? access_is_own_origin(origin, host) : !has_origin;
+    return (is_said ? access_is_own_origin(origin, host) : !has_origin) ? NULL : "this comes from a page of another origin";
 }
 
 bool http_token(struct lws *wsi, char token[ACCESS_TOKEN_MAX])
 {
-    char cookies[1024];
+    char cookies[HTTP_HEAD_MAX]; /* other programs of this host have some, too */
     const char *at = http_header(wsi, WSI_TOKEN_HTTP_COOKIE, cookies, (int)sizeof cookies) ? cookies : "";
     token[0] = '\0';
     for (; *at != '\0'; at += strcspn(at, ";") + (strchr(at, ';') != NULL)) {
@@ -102,14 +120,16 @@ int http_begin_answer(struct lws *wsi, request_t *request, unsigned code, const 
     unsigned char head[LWS_PRE + HEAD_BYTES];
     unsigned char *const start = &head[LWS_PRE], *const end = &head[sizeof head - 1];
     unsigned char *at = start;
-    static const char *const k_headers[][2] = {{"content-security-policy:", POLICY},
-                                               {"x-content-type-options:", "nosniff"},
-                                               {"referrer-policy:", "no-referrer"},
-                                               {"cache-control:", "no-cache"},
-                                               {"cross-origin-opener-policy:", "same-origin"},
-                                               {"x-frame-options:", "DENY"},
-                                               {"cross-origin-resource-policy:", "same-origin"},
-                                               {"vary:", "accept-encoding"}};
+    static const char *const k_headers[][2] = {
+        {"content-security-policy:", POLICY},
+        {"x-content-type-options:", "nosniff"},
+        {"referrer-policy:", "no-referrer"},
+        {"cache-control:", "no-cache"},
+        {"cross-origin-opener-policy:", "same-origin"},
+        {"x-frame-options:", "DENY"},
+        {"cross-origin-resource-policy:", "same-origin"},
+        {"vary:", "accept-encoding"},
+        {"connection:", "close"}}; /* one request each: what stands behind it is nobody's */
     bool is_cut = lws_add_http_common_headers(wsi, code, type, (lws_filepos_t)length, &at, end) != 0;
     for (unsigned i = 0; i < sizeof k_headers / sizeof k_headers[0]; i++) {
         is_cut = is_cut ||
@@ -126,9 +146,7 @@ int http_begin_answer(struct lws *wsi, request_t *request, unsigned code, const 
     request->data = data;
     request->length = length;
     request->sent = 0;
-    if (length == 0) {
-        return lws_http_transaction_completed(wsi) != 0 ? -1 : 0;
-    }
+    request->is_answered = true;
     (void)lws_callback_on_writable(wsi);
     return 0;
 }

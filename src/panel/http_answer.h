@@ -9,12 +9,14 @@
 #include "panel/editor.h"
 #include "panel/server.h"
 
+#define HTTP_HEAD_MAX 8192u
 #define HTTP_BODY_MAX 512u
 
 /** One HTTP request. */
 typedef struct {
     const unsigned char *data;
     size_t length, sent;
+    bool is_begun, is_answered; /**< one request and one answer for each connection */
     bool has_file;
     int file;    /**< instead of data */
     char *owned; /**< data to be freed; NULL: none */
@@ -51,9 +53,10 @@ int http_begin_answer(struct lws *wsi, request_t *request, unsigned code, const 
 /** A short JSON text. @param cookie to set; NULL: none */
 int http_answer_text(struct lws *wsi, request_t *request, unsigned code, const char *text, const char *cookie);
 
-/** Whether it asks for a name of ours, from a page of ours.
- *  @param has_origin the browser has to say whose page it is: for all that is more than reading */
-bool http_is_ours(struct lws *wsi, bool has_origin);
+/** Why a request is none of ours: another name, a page of another origin, or, without passwords, through a proxy.
+ *  @param has_origin the browser has to say whose page it is: for all that is more than reading
+ *  @return NULL: it is ours */
+const char *http_refusal(struct lws *wsi, bool has_origin);
 
 /** The role of its session; ACCESS_NOBODY where it has none. */
 int http_role(struct lws *wsi);

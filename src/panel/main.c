@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * main.c - heave-panel: the platforms of a box in a browser.
  */
-#include <arpa/inet.h>
 #include <glob.h>
+#include <libgen.h>
+#include <limits.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,6 +26,7 @@
 
 #define WHY_MAX      256u
 #define PASSWORD_MAX 256u
+#define PLACE_MAX    (PATH_MAX + 16u)
 
 static volatile sig_atomic_t is_ended; /* set by the signal handler, which can reach nothing else */
 
@@ -124,73 +126,67 @@ static bool add_platforms(hall_t *hall, const panel_options_t *options)
     return true;
 }
 
-/* --- Where --- */
-
-static bool split(const char *listen, char address[ACCESS_HOST_MAX], int *port)
-{
-    const char *const colon = strrchr(listen, ':');
-    const size_t length = (size_t)(colon - listen);
-    char *end = NULL;
-    const long number = strtol(colon + 1, &end, 10);
-    if (length >= ACCESS_HOST_MAX || length == 0 || *end != '\0' || number < 1 || number > 65535) {
-        return false;
-    }
-    (void)snprintf(address, ACCESS_HOST_MAX, "%.*s", (int)length, listen);
-    *port = (int)number;
-    return true;
-}
-
-static bool is_this_machine(const char *address)
-{
-    struct in_addr ip;
-    return inet_pton(AF_INET, address, &ip) == 1 && (ntohl(ip.s_addr) >> 24) == 127;
-}
-
 static const char *state_of(const panel_options_t *options)
 {
     const char *const given = getenv("STATE_DIRECTORY");
     return options->state != NULL ? options->state : given != NULL ? given : "/var/lib/heave-panel";
 }
 
+/* What is installed; where it is not, that of the build which this program is part of. */
+static const char *installed_or_built(const char *installed, const char *name, char built[PLACE_MAX])
+{
+    char program[PATH_MAX];
+    const ssize_t length = readlink("/proc/self/exe", program, sizeof program);
+    if (access(installed, F_OK) == 0 || length <= 0 || length >= (ssize_t)sizeof program) {
+        return installed;
+    }
+    program[length] = '\0';
+    (void)snprintf(built, PLACE_MAX, "%s/%s", dirname(program), name);
+    return access(built, F_OK) == 0 ? built : installed;
+}
+
 static int serve(const panel_options_t *options)
 {
-    static access_t access;
+    static access_t passwords;
     static pages_t pages;
     static upstream_t platform[VIEWER_PLATFORMS];
     static hall_t hall = {.platform = platform};
     hall.state = state_of(options);
-    char address[ACCESS_HOST_MAX];
+    listener_address_t where;
     char why[WHY_MAX];
+    static char built[2][PLACE_MAX];
+    const char *const www = options->www != NULL ? options->www : installed_or_built(HEAVE_PANEL_WWW, "../www", built[0]);
     const struct sigaction action = {.sa_handler = on_signal};
-    server_t server = {.address = address,
+    server_t server = {.where = &where,
                        .certificate = options->certificate,
                        .key = options->key,
                        .state = state_of(options),
-                       .heaved = options->heaved != NULL ? options->heaved : HEAVE_PANEL_HEAVED,
-                       .access = &access,
+                       .heaved =
+                           options->heaved != NULL ? options->heaved : installed_or_built(HEAVE_PANEL_HEAVED, "heaved", built[1]),
+                       .access = &passwords,
                        .pages = &pages,
                        .hall = &hall,
                        .version = HEAVE_VERSION,
                        .is_ended = &is_ended};
-    if (!split(options->listen, address, &server.port)) {
-        return refuse(EXIT_BAD_USAGE, "--listen: written as 127.0.0.1:9801");
+    if (!listener_read(&where, options->listen)) {
+        return refuse(EXIT_BAD_USAGE, "--listen: written as 127.0.0.1:9801 or [::1]:9801, without names");
     }
-    if (!access_load(&access, server.state, why, sizeof why)) {
+    if (!access_load(&passwords, server.state, why, sizeof why)) {
         return refuse(EXIT_BAD_CONFIG, why);
     }
-    if (!access.has_password && !is_this_machine(address)) {
+    if (!passwords.has_password && !listener_is_this_machine(&where)) {
         return refuse(EXIT_BAD_CONFIG, "--listen: other machines only once there is a password: heave-panel passwd service");
     }
-    if (!pages_load(&pages, options->www != NULL ? options->www : HEAVE_PANEL_WWW, why, sizeof why)) {
+    if (!pages_load(&pages, www, why, sizeof why)) {
         return refuse(EXIT_BAD_CONFIG, why);
     }
     static const char *const k_names[] = {"127.0.0.1", "localhost", "[::1]"};
     for (unsigned i = 0; i < sizeof k_names / sizeof k_names[0]; i++) {
-        (void)access_allow_host(&access, k_names[i]);
+        (void)access_allow_host(&passwords, k_names[i]);
     }
-    (void)access_allow_host(&access, address);
+    (void)access_allow_host(&passwords, where.host);
     for (unsigned i = 0; i < options->hosts; i++) {
-        if (!access_allow_host(&access, options->host[i])) {
+        if (!access_allow_host(&passwords, options->host[i])) {
             return refuse(EXIT_BAD_USAGE, "--allow-host: too long");
         }
     }

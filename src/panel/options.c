@@ -27,7 +27,8 @@ static const usage_row_t k_forms[] = {
 };
 
 static const usage_row_t k_options[] = {
-    {"listen", "ADDRESS:PORT", "where; else 127.0.0.1:9801. Other machines only once there is a password", OPTION_LISTEN},
+    {"listen", "ADDRESS:PORT", "where, such as [fd00::2]:9801; else 127.0.0.1:9801. Other machines only once there is a password",
+     OPTION_LISTEN},
     {"platform", "NAME=SOCKET", "a heaved; else all of /run/heave. May be given again", OPTION_PLATFORM},
     {"allow-host", "NAME", "a name or address that browsers call it by, beside its own. May be given again", OPTION_HOST},
     {"state", "DIR", "where passwords and configurations being edited are; else $STATE_DIRECTORY, else /var/lib/heave-panel",
@@ -97,7 +98,7 @@ static int take(panel_options_t *self, int option, const char *value)
         return EXIT_DONE;
     case OPTION_LISTEN:
         self->listen = value;
-        return strrchr(value, ':') != NULL ? EXIT_DONE : complain("--listen", "written as 127.0.0.1:9801");
+        return EXIT_DONE;
     case OPTION_HEAVED:
         self->heaved = value;
         return EXIT_DONE;

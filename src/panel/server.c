@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "panel/child.h"
+#include "panel/connections.h"
 #include "panel/http.h"
 #include "panel/outbox.h"
 
@@ -20,6 +21,10 @@
 #define PUMP_US     (33 * LWS_US_PER_MS)
 #define SECOND_US   (1 * LWS_US_PER_SEC)
 #define VIEWERS_MAX 64u
+#define ACCEPTS_MAX 16u /* at a time: pages that are there have their turn between */
+#define SAID_MAX    20u
+#define SAID_MS     30000
+#define WHY_MAX     256u
 
 /* One WebSocket. */
 typedef struct {
@@ -31,6 +36,7 @@ static struct lws_context *m_context;
 static struct lws_vhost *m_vhost;
 static lws_sorted_usec_list_t m_pump, m_second;
 static unsigned m_viewers;
+static connections_t m_connections; /* that are no pages */
 
 static int64_t milliseconds(void)
 {
@@ -45,7 +51,7 @@ static int let_in(struct lws *wsi)
 {
     char path[32];
     const bool is_right = lws_hdr_copy(wsi, path, (int)sizeof path, WSI_TOKEN_GET_URI) > 0 && strcmp(path, "/ws") == 0 &&
-                          http_is_ours(wsi, true) && http_role(wsi) >= 0 && m_viewers < VIEWERS_MAX;
+                          http_refusal(wsi, true) == NULL && http_role(wsi) >= 0 && m_viewers < VIEWERS_MAX;
     return is_right ? 0 : -1;
 }
 
@@ -55,12 +61,12 @@ static int enter(struct lws *wsi, socket_t *socket)
     char name[UPSTREAM_NAME_MAX];
     const int role = http_role(wsi);
     (void)lws_get_peer_simple(wsi, address, ACCESS_ADDRESS_MAX);
-    const char *const plain = strncmp(address, "::ffff:", 7) == 0 ? address + 7 : address; /* IPv4 by a socket for both */
-    (void)snprintf(name, sizeof name, "%.8s@%.22s", role >= 0 ? level_name((level_t)role) : "?", plain);
+    (void)snprintf(name, sizeof name, "%.8s@%.22s", role >= 0 ? level_name((level_t)role) : "?", address);
     socket->viewer = role >= 0 ? viewer_enter(m_server->hall, wsi, role, name) : NULL;
     m_viewers += socket->viewer != NULL;
     if (socket->viewer != NULL) {
         (void)http_token(wsi, socket->viewer->session);
+        connections_remove(&m_connections, wsi);
     }
     return socket->viewer != NULL ? 0 : -1;
 }
@@ -69,6 +75,9 @@ static int hear(struct lws *wsi, viewer_t *viewer, const void *in, size_t length
 {
     if (lws_frame_is_binary(wsi) || viewer->in_length + length > sizeof viewer->in) {
         return -1; /* no message of ours */
+    }
+    if (!http_is_session(viewer->session)) {
+        return -1; /* logged out elsewhere, or it has ended */
     }
     memcpy(viewer->in + viewer->in_length, in, length);
     viewer->in_length += length;
@@ -240,6 +249,63 @@ static void watch_child(child_t *child)
     m_watching = NULL;
 }
 
+/* --- Who connects --- */
+
+static void take_in(int fd, const listener_peer_t *peer)
+{
+    void *const oldest = connections_give_way(&m_connections);
+    if (oldest != NULL) {
+        connections_remove(&m_connections, oldest);
+        lws_set_timeout(oldest, PENDING_TIMEOUT_USER_OK, LWS_TO_KILL_ASYNC);
+    }
+    struct lws *const wsi = lws_adopt_socket_vhost(m_vhost, fd);
+    if (wsi != NULL) {
+        connections_add(&m_connections, wsi, connections_network(peer->address));
+    }
+}
+
+static void take_all(int listening)
+{
+    listener_peer_t peer;
+    for (unsigned i = 0; i < ACCEPTS_MAX; i++) {
+        const int fd = listener_accept(listening, &peer);
+        if (fd < 0) {
+            return;
+        }
+        if (m_server->access->has_password || peer.is_this_machine) {
+            take_in(fd, &peer);
+        } else {
+            (void)close(fd);
+        }
+    }
+}
+
+static int serve_listener(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t length)
+{
+    (void)user;
+    (void)in;
+    (void)length;
+    switch ((int)reason) {
+    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
+        return -1; /* as in serve_link() */
+    case LWS_CALLBACK_RAW_RX_FILE:
+        take_all(lws_get_socket_fd(wsi));
+        return 0;
+    default:
+        return 0;
+    }
+}
+
+/* Of every connection, as the library's first protocol. */
+static int serve_http(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t length)
+{
+    if (reason == LWS_CALLBACK_WSI_DESTROY) {
+        connections_remove(&m_connections, wsi);
+        return 0;
+    }
+    return http_serve(wsi, reason, user, in, length);
+}
+
 /* --- Time --- */
 
 /* To pages that have had their turn. */
@@ -282,52 +348,84 @@ static void each_second(lws_sorted_usec_list_t *list)
     lws_sul_schedule(m_context, 0, list, each_second, SECOND_US);
 }
 
+/* Strangers do not fill the log. */
 static void say(int level, const char *line)
 {
+    static unsigned said, left_out;
+    static int64_t since_ms;
+    const int64_t now_ms = milliseconds();
     (void)level;
-    fprintf(stderr, "heave-panel: %s", line);
+    if (now_ms - since_ms >= SAID_MS) {
+        if (left_out > 0) {
+            fprintf(stderr, "heave-panel: %u lines before this one were left out\n", left_out);
+        }
+        since_ms = now_ms;
+        said = left_out = 0;
+    }
+    if (said < SAID_MAX) {
+        said++;
+        fprintf(stderr, "heave-panel: %s", line);
+    } else {
+        left_out++;
+    }
 }
 
-int server_run(server_t *server)
+static bool listen_at(const listener_address_t *where)
+{
+    char why[WHY_MAX] = "";
+    lws_sock_file_fd_type descriptor = {.filefd = listener_open(where, why, sizeof why)};
+    if (descriptor.filefd < 0) {
+        fprintf(stderr, "heave-panel: %s\n", why);
+        return false;
+    }
+    return lws_adopt_descriptor_vhost(m_vhost, LWS_ADOPT_RAW_FILE_DESC, descriptor, "listener", NULL) != NULL;
+}
+
+static bool begin(const server_t *server)
 {
     static const struct lws_protocols k_protocols[] = {
-        {.name = "http", .callback = http_serve, .per_session_data_size = sizeof(request_t), .rx_buffer_size = HTTP_BODY_MAX},
+        {.name = "http", .callback = serve_http, .per_session_data_size = sizeof(request_t), .rx_buffer_size = HTTP_BODY_MAX},
         {.name = PROTOCOL,
          .callback = serve_page,
          .per_session_data_size = sizeof(socket_t),
          .rx_buffer_size = VIEWER_MESSAGE_MAX},
         {.name = "heaved", .callback = serve_link, .per_session_data_size = sizeof(adopted_t)},
         {.name = "child", .callback = serve_child, .per_session_data_size = sizeof(watched_t)},
+        {.name = "listener", .callback = serve_listener},
         {.name = NULL}};
-    struct lws_context_creation_info info = {.port = server->port,
-                                             .iface = server->address,
+    struct lws_context_creation_info info = {.port = CONTEXT_PORT_NO_LISTEN_SERVER,
                                              .protocols = k_protocols,
                                              .ssl_cert_filepath = server->certificate,
                                              .ssl_private_key_filepath = server->key,
                                              .timeout_secs = 10,
-                                             .ka_time = 10,
-                                             .ka_interval = 2,
-                                             .ka_probes = 3,
+                                             .max_http_header_data = HTTP_HEAD_MAX,
+                                             .max_http_header_pool = CONNECTIONS_MAX,
                                              .server_string = "heave-panel",
                                              .alpn = "http/1.1"};
-    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND |
-                   (server->certificate != NULL ? LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT : 0);
+    info.options = LWS_SERVER_OPTION_EXPLICIT_VHOSTS | (server->certificate != NULL ? LWS_SERVER_OPTION_DO_SSL_GLOBAL_INIT : 0);
+    m_context = lws_create_context(&info);
+    m_vhost = m_context != NULL ? lws_create_vhost(m_context, &info) : NULL;
+    if (m_vhost == NULL) {
+        fprintf(stderr, "heave-panel: the certificate or its key cannot be used, or there is no memory\n");
+    }
+    return m_vhost != NULL && listen_at(server->where);
+}
+
+int server_run(server_t *server)
+{
     lws_set_log_level(LLL_ERR | LLL_WARN, say);
     m_server = server;
     http_init(server);
     child_watch = watch_child;
     server->hall->wake = wake;
-    m_context = lws_create_context(&info);
-    m_vhost = m_context != NULL ? lws_create_vhost(m_context, &info) : NULL;
-    if (m_vhost == NULL) {
-        fprintf(stderr, "heave-panel: cannot listen on %s port %d\n", server->address, server->port);
+    if (!begin(server)) {
         if (m_context != NULL) {
             lws_context_destroy(m_context);
         }
         return 1;
     }
-    printf("heave-panel: %s://%s:%d/ for %u platform%s\n", server->certificate != NULL ? "https" : "http", server->address,
-           server->port, server->hall->platforms, server->hall->platforms == 1 ? "" : "s");
+    printf("heave-panel: %s://%s:%d/ for %u platform%s\n", server->certificate != NULL ? "https" : "http", server->where->host,
+           server->where->port, server->hall->platforms, server->hall->platforms == 1 ? "" : "s");
     (void)fflush(stdout);
     each_second(&m_second);
     pump(&m_pump);

@@ -8,16 +8,16 @@
 #include <signal.h>
 
 #include "panel/access.h"
+#include "panel/listener.h"
 #include "panel/pages.h"
 #include "panel/viewer.h"
 
 /** What it serves and where. */
 typedef struct {
-    const char *address; /**< to listen on */
-    int port;
-    const char *certificate, *key; /**< NULL: no TLS */
-    const char *state;             /**< directory with the passwords, looked at anew when they change */
-    const char *heaved;            /**< the program that checks configurations */
+    const listener_address_t *where; /**< to listen */
+    const char *certificate, *key;   /**< NULL: no TLS */
+    const char *state;               /**< directory with the passwords, looked at anew when they change */
+    const char *heaved;              /**< the program that checks configurations */
     access_t *access;
     pages_t *pages;
     hall_t *hall;
