@@ -14,7 +14,7 @@
 #include "linux_can_link.h"
 
 /** Longest lists of filters. */
-#define LINUX_CAN_FILTERS_MAX 80u
+#define LINUX_CAN_FILTERS_MAX 104u
 
 /** Frames in flight that queue_frames 0 stands for: what a platform of seven drives sends at once. SYNC, seven set-points, the
  *  heartbeat and a service request to each drive. The kernel's smallest send buffer would hold seven. */

@@ -10,7 +10,7 @@
 #define SIM_CAN_NODES_MAX   16u /**< controllers on one bus */
 #define SIM_CAN_TX_FRAMES   16u /**< send queue of a controller */
 #define SIM_CAN_RX_FRAMES   64u /**< receive queue of a controller */
-#define SIM_CAN_FILTERS_MAX 56u
+#define SIM_CAN_FILTERS_MAX 104u
 
 /** What goes wrong with a frame. */
 typedef enum {

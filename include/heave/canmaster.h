@@ -27,9 +27,12 @@ typedef enum {
     CANMASTER_HEARD      /**< another one speaks beside us */
 } canmaster_verdict_t;
 
-/** Begins to listen; at the start only, never between a fault and its stop.
- *  @param listen_ms for so long, and until nobody was heard for as long; 0 = not at all */
+/** Begins to listen; where no drive has torque or a stop to hear of.
+ *  @param listen_ms for so long, and once somebody was heard until there was silence for 1 s; 0 = not at all */
 void canmaster_listen(canmaster_t *self, uint32_t listen_ms, uint64_t now_us);
+
+/** Nothing can be heard at present, the bus is down: this time does not count. Once per cycle, in place of canmaster_step(). */
+void canmaster_deaf(canmaster_t *self, uint64_t now_us);
 
 /** A frame came that only a master sends.
  *  @param what for the caller */

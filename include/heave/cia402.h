@@ -441,7 +441,7 @@ uint8_t cia402_answer_every(const cia402_config_t *config);
  *  SYNC take turns. 0 = none: there is no counter, or its range is not a multiple of n. */
 uint8_t cia402_sync_start(const cia402_config_t *config, unsigned axis, uint8_t every);
 
-#define CIA402_FILTERS_MAX (3u + 10u * DRIVES_MAX) /* three, four TPDOs and three RPDOs of a node */
+#define CIA402_FILTERS_MAX (3u + 14u * DRIVES_MAX) /* three, four TPDOs, four RPDOs, and those of the map */
 #define CIA402_OWNS_MAX    (3u + 6u * DRIVES_MAX)
 
 /** Identifiers that are received, and those that are sent, for the backend's open.

@@ -57,10 +57,10 @@ static inline bool drive_has_torque(const drive_feedback_t *drive)
     return drive->is_energized || drive->state == DRIVE_ENABLED || drive->state == DRIVE_HOMING;
 }
 
-/** True if another master leads a drive, and the driver waits and sends nothing. */
-static inline bool drive_is_led_by_other(const drive_feedback_t *drive)
+/** True if another master is why a drive is DRIVE_OFFLINE (the driver waits and sends nothing) or in DRIVE_FAULT. */
+static inline bool drive_has_other_master(const drive_feedback_t *drive)
 {
-    return drive->state == DRIVE_OFFLINE && drive->fault_code >= DRIVE_CODE_MASTER_FIRST &&
+    return (drive->state == DRIVE_OFFLINE || drive->state == DRIVE_FAULT) && drive->fault_code >= DRIVE_CODE_MASTER_FIRST &&
            drive->fault_code <= DRIVE_CODE_MASTER_LAST;
 }
 

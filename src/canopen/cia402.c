@@ -333,7 +333,9 @@ static hv_status_t cia402_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
     const bool is_up = receive(self);
     cia402_bus_watch(self, is_up);
     canpassive_step(&self->passive, self->can, now_us, self->config->passive_stop_ms);
-    if (!self->is_gone) {
+    if (self->is_gone) {
+        canmaster_deaf(&self->master, now_us);
+    } else {
         work(self);
     }
     cia402_visit_step(self);

@@ -106,6 +106,9 @@ uint32_t cia402_filters(const cia402_config_t *config, hal_can_filter_t filter[C
         for (size_t i = 0; i < sizeof k_functions / sizeof k_functions[0] && config->axis[k].channel == 0; i++) {
             count += put_filter(&filter[count], k_functions[i] + config->axis[k].node);
         }
+        for (uint32_t i = 0; i < CIA402_COB_RPDOS && config->axis[k].channel == 0; i++) { /* of another master */
+            count += put_filter(&filter[count], CIA402_COB_RPDO + i * CIA402_COB_NEXT + config->axis[k].node);
+        }
         for (unsigned i = CIA402_ANSWER; i < CIA402_PDOS; i++) {
             const cia402_pdo_t pdo = cia402_pdo(config, k, i);
             count += pdo.entries > 0 ? put_filter(&filter[count], pdo.id) : 0;

@@ -6,9 +6,10 @@
 
 #include "heave/cia402.h"
 
-#define CIA402_COB_TPDO 0x180u /* of the first; the next ones are CIA402_COB_NEXT further */
-#define CIA402_COB_RPDO 0x200u
-#define CIA402_COB_NEXT 0x100u
+#define CIA402_COB_TPDO  0x180u /* of the first; the next ones are CIA402_COB_NEXT further */
+#define CIA402_COB_RPDO  0x200u
+#define CIA402_COB_NEXT  0x100u
+#define CIA402_COB_RPDOS 4u /* of each node, as CiA 301 numbers them */
 
 /* What is mapped: index << 16 | sub-index << 8 | bits. */
 #define CIA402_PDO_BYTES         8u

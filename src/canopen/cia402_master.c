@@ -6,6 +6,7 @@
 #include "cia402_axis.h"
 #include "cia402_bus.h"
 #include "cia402_loss.h"
+#include "cia402_map.h"
 #include "cia402_node.h"
 
 #define NMT_PREOP 0x80u
@@ -22,9 +23,15 @@ static bool is_for_ours(const cia402_config_t *config, const can_frame_t *nmt)
     return is_ours;
 }
 
+/* Ours, or those that CiA 301 gives the node: another master has its own map. */
 static bool is_command(const cia402_t *self, uint32_t id)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
+        for (uint32_t i = 0; i < CIA402_COB_RPDOS; i++) {
+            if (id == CIA402_COB_RPDO + i * CIA402_COB_NEXT + self->config->axis[k].node) {
+                return true;
+            }
+        }
         for (unsigned i = CIA402_COMMAND; i < CIA402_ANSWER; i++) {
             if (self->pdo[k][i].entries > 0 && self->pdo[k][i].id == id) {
                 return true;
@@ -71,13 +78,45 @@ static void tell(cia402_t *self)
     }
 }
 
+/* A drive that is known, or has torque, or may have it: it has to hear of its stop. */
+static bool is_any_led(const cia402_t *self)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        if (cia402_axis_is_heard(&self->axis[k]) || cia402_axis_is_energized(&self->axis[k])) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void name(cia402_t *self)
+{
+    for (unsigned k = 0; k < self->config->axes; k++) {
+        cia402_axis_note_trouble(cia402_drive(self, k), self->master.what);
+    }
+}
+
+/* Those that are being set up cannot be used until a reset, either: all are stopped by it or none. */
 static void stop(cia402_t *self)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
-        if (self->axis[k].phase == CIA402_UP && self->axis[k].own_fault == 0) {
-            self->axis[k].surplus = 0; /* what the drives answered to it is no sign of a second drive */
+        cia402_axis_t *axis = &self->axis[k];
+        if (axis->phase == CIA402_UP && axis->own_fault == 0) {
+            axis->surplus = 0; /* what the drives answered to it is no sign of a second drive */
             cia402_axis_fail(cia402_drive(self, k), self->master.what);
+        } else if (axis->phase != CIA402_UP && axis->phase != CIA402_LEAVING && axis->phase != CIA402_REFUSED) {
+            cia402_axis_refuse(cia402_drive(self, k), (cia402_trouble_t)self->master.what);
         }
+    }
+}
+
+static void stop_or_wait(cia402_t *self)
+{
+    if (is_any_led(self)) {
+        stop(self);
+    } else {
+        cia402_master_begin(self);
+        name(self);
     }
 }
 
@@ -90,7 +129,7 @@ static void react(cia402_t *self)
         tell(self);
         break;
     case CIA402_STOP:
-        stop(self);
+        stop_or_wait(self);
         break;
     }
 }
@@ -104,16 +143,18 @@ void cia402_master_begin(cia402_t *self)
 /* As long as another one leads, we say nothing: a reset, or a set-point, would stop a machine that moves. */
 static void wait_for(cia402_t *self)
 {
-    for (unsigned k = 0; k < self->config->axes && self->master.heard_us == self->now_us; k++) {
-        cia402_axis_note_trouble(cia402_drive(self, k), self->master.what);
+    if (self->master.heard_us == self->now_us) {
+        name(self);
     }
 }
 
+/* With nothing known: what drives did meanwhile was not ours. */
 static void begin(cia402_t *self)
 {
     self->due_us = self->now_us;
+    self->is_preop_due = true;
     for (unsigned k = 0; k < self->config->axes; k++) {
-        self->axis[k].trouble = CIA402_TROUBLE_NONE;
+        cia402_axis_init(cia402_drive(self, k));
     }
 }
 
@@ -153,6 +194,9 @@ void cia402_master_wake(cia402_t *self)
         return;
     }
     for (unsigned k = 0; k < self->config->axes; k++) {
+        if (self->axis[k].phase == CIA402_REFUSED) {
+            cia402_axis_reset(cia402_drive(self, k)); /* one that was stopped after it was refused answers nothing, either */
+        }
         if (self->axis[k].phase == CIA402_MISSING && self->config->axis[k].channel == 0) {
             self->axis[k].nmt_command = NMT_PREOP;
         }

@@ -8,6 +8,7 @@
 
 #define PP_PERIODS        8 /* from one set-point that a drive takes to the next, and its own lag */
 #define LISTEN_HEARTBEATS 2
+#define LISTEN_LEAST_MS   100
 #define LISTEN_MOST_MS    1000
 #define STEP_FACTOR       2 /* a set-point may be so much further than its speed limit allows before it counts as a jump */
 
@@ -163,7 +164,7 @@ void config_cia402(const config_t *config, cia402_config_t *out)
         .boot_timeout_ms = cia402->boot_timeout_ms,
         .power_timeout_ms = cia402->power_timeout_ms,
         .window_ms = cia402->following_error_ms,
-        .listen_ms = (uint16_t)fx_clamp(LISTEN_HEARTBEATS * cia402->heartbeat_ms, 0, LISTEN_MOST_MS),
+        .listen_ms = (uint16_t)fx_clamp(LISTEN_HEARTBEATS * cia402->heartbeat_ms, LISTEN_LEAST_MS, LISTEN_MOST_MS),
         .passive_stop_ms = config->can.passive_stop_ms,
         .abort_option = (int16_t)((int)cia402->when_gateway_lost + 1),
         .sync_counter = cia402->sync_counter,

@@ -3,18 +3,33 @@
  */
 #include "heave/canmaster.h"
 
-#define SHOWN_US 5000000u
+#define SHOWN_US   5000000u
+#define SILENCE_US 1000000u /* whoever was heard may be restarting its bus */
+
+/* Nobody has been heard from now on: when it may be enough. */
+static void wait(canmaster_t *self, uint64_t now_us)
+{
+    const bool is_short = self->heard_us != 0 && self->listen_us < SILENCE_US;
+    self->until_us = now_us + (is_short ? SILENCE_US : self->listen_us);
+}
 
 void canmaster_listen(canmaster_t *self, uint32_t listen_ms, uint64_t now_us)
 {
     self->listen_us = listen_ms * 1000u;
-    self->until_us = now_us + self->listen_us;
     self->is_listening = listen_ms > 0;
+    wait(self, now_us);
+}
+
+void canmaster_deaf(canmaster_t *self, uint64_t now_us)
+{
+    if (self->is_listening) {
+        wait(self, now_us);
+    }
 }
 
 void canmaster_take(canmaster_t *self, uint32_t what)
 {
-    const bool is_named = self->is_listening && self->count > 0; /* its kinds would take turns in the log */
+    const bool is_named = self->is_listening && self->heard_us != 0; /* its kinds would take turns in the log */
     self->what = is_named ? self->what : what;
     self->is_new = true;
     self->count++;
@@ -28,7 +43,9 @@ canmaster_verdict_t canmaster_step(canmaster_t *self, uint64_t now_us)
     if (!self->is_listening) {
         return is_new ? CANMASTER_HEARD : CANMASTER_QUIET;
     }
-    self->until_us = is_new ? now_us + self->listen_us : self->until_us;
+    if (is_new) {
+        wait(self, now_us);
+    }
     self->is_listening = now_us < self->until_us;
     return self->is_listening ? CANMASTER_LISTENING : CANMASTER_BEGIN;
 }

@@ -5,6 +5,7 @@
 #include "heave/canraw.h"
 
 #include "canraw_axis.h"
+#include "canraw_master.h"
 #include "canraw_setpoint.h"
 #include "canraw_startup.h"
 
@@ -31,21 +32,9 @@ static void lose_all(canraw_t *self)
 
 /* --- In --- */
 
-/* Nobody but us sends what drives hear; what they answer has other identifiers. */
-static bool is_of_master(const canraw_t *self, const can_frame_t *frame)
-{
-    bool is_such = false;
-    for (unsigned k = 0; k < self->map->axes; k++) {
-        const canraw_axis_map_t *axis = &self->map->axis[k];
-        is_such = is_such || frame->id == axis->command_id || frame->id == axis->setpoint_id;
-    }
-    return is_such && frame->is_extended == self->map->is_extended && !frame->is_rtr;
-}
-
 static void take_frame(canraw_t *self, const can_frame_t *frame)
 {
-    if (is_of_master(self, frame)) {
-        canmaster_take(&self->master, CANRAW_OTHER_MASTER);
+    if (canraw_master_take(self, frame)) {
         return;
     }
     if (self->master.is_listening) {
@@ -119,26 +108,6 @@ static void watch_bus(canraw_t *self, bool is_up)
         restart_bus(self);
     }
     self->is_gone = is_gone;
-}
-
-/* --- Another master --- */
-
-static void stop_for_master(canraw_t *self)
-{
-    for (unsigned k = 0; k < self->map->axes; k++) {
-        canraw_axis_t *axis = &self->axis[k];
-        if (axis->is_online && axis->state != DRIVE_FAULT) {
-            canraw_axis_fault(axis, self->map, CANRAW_OTHER_MASTER, self->now_us);
-        }
-    }
-}
-
-static void watch_master(canraw_t *self)
-{
-    const canmaster_verdict_t verdict = canmaster_step(&self->master, self->now_us);
-    if (verdict == CANMASTER_HEARD && self->map->other_master == CANRAW_MASTER_STOP) {
-        stop_for_master(self);
-    }
 }
 
 /* --- Out --- */
@@ -293,7 +262,7 @@ static void take_time(canraw_t *self, uint64_t now_us)
         self->is_due = true;
         self->free_us = now_us;
         self->set_us = now_us;
-        canmaster_listen(&self->master, self->map->other_master == CANRAW_MASTER_STOP ? self->map->listen_ms : 0, now_us);
+        canraw_master_begin(self);
     }
     self->is_due |= now_us - self->set_us >= self->map->period_us;
 }
@@ -304,7 +273,7 @@ static hv_status_t canraw_poll(void *ctx, uint64_t now_us, drive_feedback_t feed
     take_time(self, now_us);
     const bool is_up = receive(self);
     watch_bus(self, is_up);
-    watch_master(self);
+    canraw_master_step(self);
     canpassive_step(&self->passive, self->can, now_us, self->map->passive_stop_ms);
     for (unsigned k = 0; k < self->map->axes; k++) {
         canraw_axis_step(&self->axis[k], self->map, now_us);

@@ -131,17 +131,17 @@ static void step_abandoned(gateway_t *self, uint64_t now_us)
     }
 }
 
-/* Who ends the other master does not expect that this one raises the platform. */
+/* Who ends the other master, or resets what it has led to, does not expect that this one raises the platform. */
 static void void_auto(gateway_t *self)
 {
-    bool is_led_by_other = false;
+    bool has_other = false;
     for (unsigned i = 0; i < drive_count(self); i++) {
-        is_led_by_other |= drive_is_led_by_other(&self->snapshot.drive[i]);
+        has_other |= drive_has_other_master(&self->snapshot.drive[i]);
     }
-    if (self->auto_engage.is_due && is_led_by_other) {
+    if (self->auto_engage.is_due && has_other) {
         auto_engage_end(&self->auto_engage);
         hal_log_write(self->io.log, HAL_LOG_WARNING,
-                      "engage = auto is void: another master leads the drives; an operator has to engage");
+                      "engage = auto is void: another master is on the bus; an operator has to engage");
     }
 }
 

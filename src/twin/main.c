@@ -166,18 +166,20 @@ static bool is_alone(run_t *self, char why[WIRE_WHY_MAX])
     } else {
         config_cia402(&self->config, &listening.nodes);
     }
-    while (listening.heard == 0 && clock_us() < end_us && is_ended == 0) {
+    bool is_up = wire_is_up(&self->wire);
+    while (is_up && listening.heard == 0 && clock_us() < end_us && is_ended == 0) {
         struct pollfd fds[WIRE_FDS_MAX];
         (void)poll(fds, wire_watch(&self->wire, fds), LISTEN_STEP_MS);
-        if (!wire_hear(&self->wire, listen_to, &listening)) {
-            break;
-        }
+        is_up = wire_hear(&self->wire, listen_to, &listening) && wire_is_up(&self->wire);
     }
     if (listening.heard != 0) {
         (void)snprintf(why, WIRE_WHY_MAX, "%s: drive %u is there already, and heave-twin would answer in its place",
                        self->wire.end, listening.heard);
+    } else if (!is_up) {
+        (void)snprintf(why, WIRE_WHY_MAX, "%s: is not up, so that nobody hears whether drives are there: ip link set %s up",
+                       self->wire.end, self->wire.end);
     }
-    return listening.heard == 0;
+    return is_up && listening.heard == 0;
 }
 
 static int open_all(run_t *self)

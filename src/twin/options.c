@@ -69,7 +69,8 @@ static const usage_row_t k_options[] = {
     {"ambient", "C", "temperature round the motors; else 25", OPTION_AMBIENT},
     {"homed", NULL, "the drives know their zero from the start, as those with absolute encoders do", OPTION_HOMED},
     {"no-gpio", NULL, "leave the GPIO lines alone: they are real ones, or nobody needs them", OPTION_NO_GPIO},
-    {"on-real-bus", NULL, "the interface, or the address of Modbus TCP, may lead to real drives; it listens for them first",
+    {"on-real-bus", NULL,
+     "the interface, or the address of Modbus TCP, may lead to real drives; on CAN it listens for them first",
      OPTION_ON_REAL_BUS},
     {"help", NULL, "print this", OPTION_HELP},
     {"version", NULL, "print the version", OPTION_VERSION},
@@ -93,7 +94,7 @@ static const usage_section_t k_manual[] = {
      "they move. heaved(8), or any other master, sees no difference, as long as nothing is made to fail. It has no part in a "
      "machine with real drives: it takes vcan, vxcan, buses between programs, pseudo terminals and the loopback address. "
      "Anything "
-     "else may lead to real drives, in whose place it would answer: that needs --on-real-bus, and it listens first, for two "
+     "else may lead to real drives, in whose place it would answer: that needs --on-real-bus. On CAN it listens first, for two "
      "seconds, and does not start if one of its drives is there already.\n\n"
      "It takes configurations with CANopen drives (`[drives] driver = cia402`), with drives that have CAN frames of their own "
      "(can-raw) and with drives on Modbus (modbus-tcp, modbus-rtu), and a board of relays on Modbus. Lines of [relays], [inputs] "

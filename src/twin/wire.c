@@ -30,14 +30,29 @@ static const char k_without[] = "this kernel has no SocketCAN. Load it (as root:
 
 /* --- Opening --- */
 
-/* By what the kernel says, not by its name. Where it says nothing the interface counts as real. */
-static bool is_virtual(const char *name)
+/* What the kernel says of an interface; nothing where it does not. */
+static linux_can_link_t look(const char *name)
 {
     linux_can_link_t link = {.kind = ""};
     struct mnl_socket *netlink = linux_can_link_open();
-    const bool is_found = netlink != NULL && linux_can_link_look(netlink, name, &link) == HV_OK;
+    if (netlink != NULL && linux_can_link_look(netlink, name, &link) != HV_OK) {
+        link = (linux_can_link_t){.kind = ""};
+    }
     linux_can_link_close(netlink);
-    return is_found && (strcmp(link.kind, "vcan") == 0 || strcmp(link.kind, "vxcan") == 0);
+    return link;
+}
+
+/* By that, not by its name. Where nothing is said the interface counts as real. */
+static bool is_virtual(const char *name)
+{
+    const linux_can_link_t link = look(name);
+    return strcmp(link.kind, "vcan") == 0 || strcmp(link.kind, "vxcan") == 0;
+}
+
+bool wire_is_up(const wire_t *self)
+{
+    const linux_can_link_t link = look(self->end);
+    return link.is_up && link.state != HAL_CAN_BUS_OFF && link.state != HAL_CAN_DOWN && link.state != HAL_CAN_GONE;
 }
 
 static bool open_can(wire_t *self, bool is_real_allowed, char why[WIRE_WHY_MAX])

@@ -50,6 +50,9 @@ typedef void (*wire_heard_t)(void *ctx, const can_frame_t *frame);
 bool wire_open(wire_t *self, const config_can_t *can, const char *end, const char *adapter, bool is_real_allowed,
                char why[WIRE_WHY_MAX]);
 
+/** Whether frames of others can be heard now. */
+bool wire_is_up(const wire_t *self);
+
 void wire_close(wire_t *self);
 
 /** Sends a frame: a node_out_t. */

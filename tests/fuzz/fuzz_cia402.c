@@ -235,7 +235,7 @@ static can_frame_t strange_frame(const record_t *record)
         frame.id = (frame.id & FUNCTION) + DRIVES_MAX + 1u + record->kind % 64;
         break;
     case 3: /* a function that is not a drive's */
-        frame.id = 0x400u + (record->kind % 3) * 0x80u + record->drive + 1u;
+        frame.id = 0x480u + record->drive + 1u;
         break;
     case 4: /* an SDO answer that is too short */
         frame = frame_of(record, 0x580);

@@ -58,7 +58,7 @@ static bool are_all(drive_state_t state)
 
 static void await(drive_state_t state)
 {
-    for (unsigned i = 0; i < 500 && !are_all(state); i++) {
+    for (unsigned i = 0; i < 3000 && !are_all(state); i++) {
         cycles(1);
     }
     TEST_ASSERT_TRUE(are_all(state));
@@ -123,7 +123,7 @@ static void test_nothing_is_sent_before_it_has_listened(void)
     cycles(LISTEN_MS);
     TEST_ASSERT_EQUAL_UINT(0, frames_heard());
     TEST_ASSERT_EQUAL_STRING("listening", report_of(0).phase);
-    TEST_ASSERT_FALSE(drive_is_led_by_other(&feedback[0]));
+    TEST_ASSERT_FALSE(drive_has_other_master(&feedback[0]));
     TEST_ASSERT_EQUAL_HEX32(0, report_of(0).code);
     cycles(2);
     TEST_ASSERT_GREATER_THAN_UINT(0, frames_heard());
@@ -140,7 +140,7 @@ static void test_a_bus_with_a_master_is_left_alone_until_that_is_silent(void)
         cycles(1);
         TEST_ASSERT_EQUAL_UINT(1, frames_heard());
         TEST_ASSERT_TRUE(are_all(DRIVE_OFFLINE));
-        TEST_ASSERT_TRUE(drive_is_led_by_other(&feedback[5]));
+        TEST_ASSERT_TRUE(drive_has_other_master(&feedback[5]));
         TEST_ASSERT_EQUAL_HEX32(CANRAW_OTHER_MASTER, report_of(5).code);
         TEST_ASSERT_NOT_NULL(strstr(report_of(5).trouble, "another master"));
     }
@@ -167,6 +167,66 @@ static void test_in_motion_it_is_named_within_a_period_and_all_stop(void)
         TEST_ASSERT_FALSE(feedback[k].is_energized);
         TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
     }
+}
+
+/* Each of its frames may have given torque again. */
+static void test_one_that_goes_on_is_answered_each_time(void)
+{
+    start(CANRAW_MASTER_STOP);
+    await(DRIVE_DISABLED);
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    await(DRIVE_ENABLED);
+    for (unsigned n = 0; n < 1000; n++) {
+        say(map.axis[1].setpoint_id);
+        cycles(5);
+        TEST_ASSERT_TRUE(are_all(DRIVE_FAULT));
+        TEST_ASSERT_FALSE(slave.drive[1].is_enabled && n > 300);
+        if (n == 500) {
+            slave.drive[1].is_enabled = true; /* it was told to */
+        }
+    }
+    cycles(1000);
+    for (uint8_t k = 0; k < AXES; k++) {
+        TEST_ASSERT_FALSE(feedback[k].is_energized);
+        TEST_ASSERT_FALSE(slave.drive[k].is_enabled);
+    }
+}
+
+/* Before any drive is known heaved is silent again, and begins anew. */
+static void test_while_no_drive_is_known_it_listens_again(void)
+{
+    start(CANRAW_MASTER_STOP);
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.drive[k].is_dumb = true;
+    }
+    cycles(3 * LISTEN_MS);
+    TEST_ASSERT_TRUE(are_all(DRIVE_OFFLINE));
+    say(map.axis[2].command_id);
+    cycles(1);
+    TEST_ASSERT_TRUE(drive_has_other_master(&feedback[0]));
+    cycles(2);
+    (void)frames_heard();
+    cycles(990);
+    TEST_ASSERT_EQUAL_UINT(0, frames_heard());
+    for (unsigned k = 0; k < AXES; k++) {
+        slave.drive[k].is_dumb = false;
+    }
+    await(DRIVE_DISABLED);
+}
+
+static void test_time_in_which_nothing_is_heard_does_not_count(void)
+{
+    start(CANRAW_MASTER_STOP);
+    sim_can_unplug(&node);
+    cycles(3000);
+    sim_can_plug(&node);
+    for (unsigned n = 0; n < 20; n++) {
+        (void)frames_heard();
+        say(map.axis[2].command_id);
+        cycles(LISTEN_MS - 10u);
+        TEST_ASSERT_EQUAL_UINT(1, frames_heard());
+    }
+    await(DRIVE_DISABLED);
 }
 
 static void test_told_or_ignored_it_goes_on(void)
@@ -196,6 +256,9 @@ int main(void)
     RUN_TEST(test_nothing_is_sent_before_it_has_listened);
     RUN_TEST(test_a_bus_with_a_master_is_left_alone_until_that_is_silent);
     RUN_TEST(test_in_motion_it_is_named_within_a_period_and_all_stop);
+    RUN_TEST(test_one_that_goes_on_is_answered_each_time);
+    RUN_TEST(test_while_no_drive_is_known_it_listens_again);
+    RUN_TEST(test_time_in_which_nothing_is_heard_does_not_count);
     RUN_TEST(test_told_or_ignored_it_goes_on);
     return UNITY_END();
 }

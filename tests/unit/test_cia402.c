@@ -2747,7 +2747,8 @@ static void test_telemetry_that_was_not_asked_for_counts_for_nothing(void)
 {
     hal_can_filter_t filter[CIA402_FILTERS_MAX];
     const can_frame_t frame = {.id = 0x283, .length = 4, .data = {1, 2, 3, 4}};
-    TEST_ASSERT_EQUAL_UINT32(3 + 5 * AXES, cia402_filters(&config, filter)); /* a master's, and its RPDOs */
+    TEST_ASSERT_EQUAL_UINT32(3 + 9 * AXES,
+                             cia402_filters(&config, filter)); /* a master's, its RPDO of ours, and those of the nodes */
     come_up();
     TEST_ASSERT_EQUAL_HEX32(0xC0000283, cia402_slave_row(&slave, 2, 0x1801, 1)->value);
     TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));

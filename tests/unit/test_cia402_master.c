@@ -116,14 +116,16 @@ static void say(uint32_t id, uint8_t length, uint8_t first, uint8_t second)
     TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&other), &frame));
 }
 
-/* Frames on the bus since the last call; what the other master says is one of them. */
+/* Frames on the bus since the last call, but what only drives say; what the other master says is one of them. */
 static unsigned frames_heard(void)
 {
     can_frame_t frame;
     uint64_t at_us = 0;
     unsigned count = 0;
     while (hal_can_recv(sim_can_hal(&spy), &frame, &at_us) == HV_OK) {
-        count += frame.id < 0x700 || frame.id == 0x77F; /* heartbeats of the drives are theirs */
+        const uint32_t function = frame.id & 0x780u;
+        count += frame.id == 0x000 || frame.id == 0x080 || frame.id == 0x77F || function == 0x600 || function == 0x200 ||
+                 function == 0x500;
     }
     return count;
 }
@@ -141,9 +143,10 @@ static const struct {
     uint8_t data[2];
     cia402_trouble_t trouble;
 } k_said[] = {
-    {0x080, 0, {0}, CIA402_OTHER_SYNC},         {0x080, 1, {7}, CIA402_OTHER_SYNC},
-    {0x000, 2, {0x80, 0}, CIA402_OTHER_NMT},    {0x000, 2, {0x01, 3}, CIA402_OTHER_NMT},
-    {0x77F, 1, {0x05}, CIA402_OTHER_HEARTBEAT}, {0x203, 6, {0x0F, 0}, CIA402_OTHER_COMMAND},
+    {0x080, 0, {0}, CIA402_OTHER_SYNC},          {0x080, 1, {7}, CIA402_OTHER_SYNC},
+    {0x000, 2, {0x80, 0}, CIA402_OTHER_NMT},     {0x000, 2, {0x01, 3}, CIA402_OTHER_NMT},
+    {0x77F, 1, {0x05}, CIA402_OTHER_HEARTBEAT},  {0x203, 6, {0x0F, 0}, CIA402_OTHER_COMMAND},
+    {0x502, 8, {0x0F, 0}, CIA402_OTHER_COMMAND}, /* of a map that is not ours */
 };
 #define SAID (sizeof k_said / sizeof k_said[0])
 
@@ -186,6 +189,77 @@ static void test_a_bus_with_a_master_is_left_alone_until_that_is_silent(void)
         await(DRIVE_DISABLED);
         TEST_ASSERT_EQUAL_HEX32(0, report_of(2).code);
     }
+}
+
+/* A bus that comes later: nobody was heard on it before. */
+static void test_time_in_which_nothing_is_heard_does_not_count(void)
+{
+    start();
+    sim_can_unplug(&node);
+    cycles(8000);
+    sim_can_plug(&node);
+    for (unsigned n = 0; n < 20; n++) {
+        cycles(LISTEN_MS - 10u);
+        (void)frames_heard();
+        say_row(0);
+        cycles(1);
+        TEST_ASSERT_EQUAL_UINT(1, frames_heard());
+    }
+    TEST_ASSERT_TRUE(drive_has_other_master(&feedback[0]));
+    await(DRIVE_DISABLED);
+}
+
+/* Whoever was heard may be silent while it restarts its bus. */
+static void test_who_was_heard_has_to_be_silent_for_a_second(void)
+{
+    start();
+    cycles(10);
+    say_row(0);
+    cycles(999);
+    TEST_ASSERT_EQUAL_UINT(1, frames_heard());
+    await(DRIVE_DISABLED);
+}
+
+/* Drives that are still being set up have nothing to hear of a stop: heaved is silent again, and begins anew. */
+static void test_while_no_drive_is_known_it_listens_again(void)
+{
+    for (unsigned at = 1; at < 40; at++) {
+        setUp();
+        start();
+        cycles(LISTEN_MS + at);
+        TEST_ASSERT_TRUE(are_all(DRIVE_OFFLINE));
+        say_row(2);
+        cycles(1);
+        TEST_ASSERT_TRUE(drive_has_other_master(&feedback[0]));
+        TEST_ASSERT_EQUAL_STRING("listening", report_of(0).phase);
+        cycles(2);
+        (void)frames_heard();
+        cycles(990);
+        TEST_ASSERT_EQUAL_UINT(0, frames_heard());
+        await(DRIVE_DISABLED);
+    }
+}
+
+/* One that comes later than the others is not left out. */
+static void test_in_the_middle_of_bringing_up_nobody_is_enabled(void)
+{
+    cia402_slave_power(&slave, 4, false);
+    start();
+    for (unsigned i = 0; i < 5000 && feedback[0].state != DRIVE_DISABLED; i++) {
+        cycles(1);
+    }
+    TEST_ASSERT_EQUAL(DRIVE_DISABLED, feedback[0].state);
+    say_row(3);
+    cycles(1);
+    for (unsigned k = 0; k < AXES; k++) {
+        TEST_ASSERT_EQUAL(k == 4 ? DRIVE_OFFLINE : DRIVE_FAULT, feedback[k].state);
+        TEST_ASSERT_TRUE(drive_has_other_master(&feedback[k]));
+    }
+    cia402_slave_power(&slave, 4, true);
+    cycles(3000);
+    TEST_ASSERT_NOT_EQUAL(HV_OK, drives_request(hal, DRIVES_ENABLE));
+    TEST_ASSERT_EQUAL(HV_OK, drives_request(hal, DRIVES_RESET_FAULT));
+    await(DRIVE_DISABLED);
 }
 
 /* All its kinds by turns would be a line of the log each time. */
@@ -357,6 +431,10 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_nothing_is_sent_before_it_has_listened);
     RUN_TEST(test_a_bus_with_a_master_is_left_alone_until_that_is_silent);
+    RUN_TEST(test_time_in_which_nothing_is_heard_does_not_count);
+    RUN_TEST(test_who_was_heard_has_to_be_silent_for_a_second);
+    RUN_TEST(test_while_no_drive_is_known_it_listens_again);
+    RUN_TEST(test_in_the_middle_of_bringing_up_nobody_is_enabled);
     RUN_TEST(test_the_first_that_was_heard_is_named);
     RUN_TEST(test_a_master_that_may_be_there_is_not_waited_for);
     RUN_TEST(test_in_motion_each_is_named_within_a_period_and_all_stop);

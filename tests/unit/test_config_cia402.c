@@ -410,7 +410,7 @@ static void test_preset_of_a_drive_family_sets_its_drives_up(void)
         cia402_slave_open(&slave, &bus);
         for (unsigned k = 0; k < drives.axes; k++) {
             cia402_slave_drive_t *drive = &slave.drive[k];
-            cia402_slave_row(&slave, k, 0x1018, 1)->value = 0xFB;
+            cia402_slave_row(&slave, k, 0x1018, 1)->value = cia402_slave_row(&slave, k, 0x1018, 1)->initial = 0xFB;
             for (unsigned at = 0; at < drives.axis[k].items; at++) {
                 const cia402_item_t *item = &drives.axis[k].item[at];
                 if (cia402_slave_row(&slave, k, item->index, item->sub) == NULL) {
