@@ -571,16 +571,17 @@ def mouse(page, spot, what):
     page.do("Input.dispatchMouseEvent", type=what, x=spot[0], y=spot[1], button="left", clickCount=1)
 
 
-def hold_until(page, spot, condition):
+def hold_until(page, spot, condition, press=None, let_go=None):
     """Presses and keeps pressing. A browser that hangs for a quarter of a second beside load has let go, which is right: then once more."""
+    press, let_go = press or (lambda: mouse(page, spot, "mousePressed")), let_go or (lambda: mouse(page, spot, "mouseReleased"))
     for _ in range(12):
-        mouse(page, spot, "mousePressed")
+        press()
         end = time.monotonic() + 4
         while time.monotonic() < end:
             if condition():
                 return
             time.sleep(0.05)
-        mouse(page, spot, "mouseReleased")
+        let_go()
         time.sleep(0.5)
     raise AssertionError("the held button does nothing")
 
@@ -648,10 +649,15 @@ def a_swipe_moves_the_page(bench):
         harness.wait_for(lambda: all(one["torque"] for one in bench.raw("counts")["drives"]), "torque")
 
         def spot():
-            return page.run("(() => { const r = document.querySelector('[aria-label=\"3 +\"]'); r.scrollIntoView({block: 'center'}); const b = r.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2, b.height]; })()")
+            """Where the button is, once nothing scrolls any more."""
+            page.run("document.querySelector('[aria-label=\"3 +\"]').scrollIntoView({block: 'center', behavior: 'instant'})")
+            page.wait("(async () => { const at = () => document.scrollingElement.scrollTop, one = at(); await new Promise((done) => setTimeout(done, 200)); return at() === one; })()", "it has come to rest")
+            return page.run("(() => { const b = document.querySelector('[aria-label=\"3 +\"]').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2, b.height]; })()")
 
         def touch(what, *points):
-            page.do("Input.dispatchTouchEvent", type=what, touchPoints=[{"x": x, "y": y} for x, y in points])
+            """Is not waited for: a finger does not, either."""
+            page.count += 1
+            page.link.send({"id": page.count, "method": "Input.dispatchTouchEvent", "params": {"type": what, "touchPoints": [{"x": x, "y": y} for x, y in points]}})
 
         def sent():
             return bench.status()["cylinders"][2]["sent_mm"]
@@ -662,17 +668,20 @@ def a_swipe_moves_the_page(bench):
             at = page.run("document.scrollingElement.scrollTop")
             touch("touchStart", (x, y))
             for step in range(1, 13):
-                page.run("new Promise((done) => requestAnimationFrame(done))")
                 touch("touchMove", (x, y + way * 20 * step))
             touch("touchEnd")
+            page.wait(f"document.scrollingElement.scrollTop !== {at}", "it scrolls")
             assert moved(bench, 0.4) < 1e-6 and sent() == before, (way, sent() - before)
-            assert page.run("document.scrollingElement.scrollTop") != at, "it scrolls"
         x, y, height = spot()
-        touch("touchStart", (x, y))
-        harness.wait_for(lambda: sent() > before + 0.5, "it moves while the finger rests")
-        touch("touchMove", (x, y + height / 4))
-        at = sent()
-        harness.wait_for(lambda: sent() > at + 0.5, "it goes on while the finger slips a little")
+
+        def press():
+            """Rests, and slips a little then."""
+            touch("touchStart", (x, y))
+            page.run("new Promise((done) => setTimeout(done, 400))")
+            touch("touchMove", (x, y + height / 4))
+            page.run("0")
+
+        hold_until(page, None, lambda: sent() > before + 5, press, lambda: touch("touchEnd"))
         at = sent()
         touch("touchMove", (x, y + height))
         harness.wait_for(lambda: moved(bench, 0.4) < 1e-6, "the finger has left the button")
@@ -695,7 +704,9 @@ def more_buttons_in_a_browser(bench):
             page.run(f"(() => {{ const i = document.getElementById('intensity'); i.focus(); i.value = '{text}'; i.nextElementSibling.click(); }})()")
         page.run("(() => { const i = document.getElementById('intensity'); i.focus(); i.value = '41'; i.nextElementSibling.click(); })()")
         harness.wait_for(lambda: bench.raw("status")["intensity"]["percent"] == 41, "a right one behind them")
-        assert re.findall(r"intensity (\d+) %", daemon.log.read_text(encoding="utf-8")) == ["40", "41"], "what is no intensity was asked for"
+        said = lambda: re.findall(r"intensity (\d+) %", daemon.log.read_text(encoding="utf-8"))  # noqa: E731
+        harness.wait_for(lambda: said()[-1:] == ["41"], "the log is written, a little later")
+        assert said() == ["40", "41"], f"what is no intensity was asked for: {said()}"
         reach(bench, "FAULT")
         page.wait("document.querySelector('.fault')?.textContent.includes('does not follow') ?? false", "the fault is shown with its remedy")
         bench.config.write_text(bench.config.read_text(encoding="utf-8").replace("following_error_mm = 0.01\n", ""), encoding="utf-8")
