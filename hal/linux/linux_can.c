@@ -20,6 +20,7 @@
 /* A waiting frame counts as no more against SO_SNDBUF: 768 in Linux 6.1, more in 7.2. The limit is unconfirmed. */
 #define FRAME_MEMORY  2048
 #define CLOCK_STEP_US 1000000u /* a frame that seems to have waited longer came around a change of the wall clock */
+#define STANDSTILL_US 200000u  /* on a bus that works a frame goes out in this time: at 20 kbit/s it takes 7 ms */
 
 static const char k_sending[] = "sending";
 static const char k_receiving[] = "receiving";
@@ -325,11 +326,37 @@ static hv_status_t look(linux_can_t *self, linux_can_link_t *link)
     return HV_OK;
 }
 
-/* Fresh or not at all: what waits in the interface is dropped, be it ours or of a program before us. */
+static uint64_t monotonic_us(void)
+{
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return us_of(&now);
+}
+
+/* Whose are the frames that wait? Those of a program that works go out, and taking the interface down would cut its bus; those of
+ * one that has died stand still. Two looks tell them apart. True once it is known, with is_alive. */
+static bool knows_whose(linux_can_t *self, const linux_can_link_t *link, bool *is_alive)
+{
+    const uint64_t now_us = monotonic_us();
+    if (!self->has_looked) {
+        self->has_looked = true;
+        self->looked_us = now_us;
+        self->looked_sent = link->sent;
+    }
+    *is_alive = link->sent != self->looked_sent;
+    return *is_alive || now_us - self->looked_us >= STANDSTILL_US;
+}
+
+/* Fresh or not at all: what stands still in the interface is dropped, be it ours or of a program before us. */
 static hv_status_t clear(linux_can_t *self, linux_can_link_t *link, bool is_suspect)
 {
-    const bool must = link->waiting > 0 || link->state == HAL_CAN_BUS_OFF || !link->is_up;
-    if (!must && !is_suspect) {
+    const bool must = is_suspect || link->state == HAL_CAN_BUS_OFF || !link->is_up;
+    bool is_alive = link->waiting == 0;
+    if (!must && !is_alive && !knows_whose(self, link, &is_alive)) {
+        return linux_can_trouble_report(self, LINUX_CAN_FRAMES_WAIT, 0,
+                                        "frames of another program wait in it; soon a second look tells whether they go out");
+    }
+    if (!must && is_alive) {
         return HV_OK;
     }
     if (linux_can_link_flush(self->name) == HV_OK) {
@@ -371,6 +398,7 @@ static hv_status_t start(linux_can_t *self)
         self->state = link.state == HAL_CAN_WARNING || link.state == HAL_CAN_PASSIVE ? link.state : HAL_CAN_ACTIVE;
         self->has_echo = link.has_echo;
         self->is_cut = false;
+        self->has_looked = false;
         linux_can_trouble_forget(self);
     }
     return status;

@@ -44,7 +44,7 @@ typedef enum {
     LINUX_CAN_NOT_CAN,      /**< the name is of something else */
     LINUX_CAN_IS_DOWN,
     LINUX_CAN_IS_BUS_OFF,
-    LINUX_CAN_FRAMES_WAIT, /**< old frames wait in the interface and we may not drop them */
+    LINUX_CAN_FRAMES_WAIT, /**< old frames wait in the interface and we may not drop them, or do not know yet whether they are */
     LINUX_CAN_NOT_ALLOWED,
     LINUX_CAN_SYSTEM_ERROR /**< error says which */
 } linux_can_trouble_t;
@@ -81,11 +81,15 @@ typedef struct {
     bool has_clocks; /**< until nothing waits any more */
     bool has_kept;   /**< kept waits behind the report of a gap */
     can_frame_t kept;
+    bool has_looked;      /**< frames of others waited, at looked_us, when the interface had sent looked_sent */
+    uint64_t looked_us;   /**< */
+    uint64_t looked_sent; /**< */
 } linux_can_t;
 
-/** Opens the interface. Before the loop starts: allocates, may take milliseconds. Frames that an earlier program left in the
- * queue are dropped; where that is not allowed the interface is opened all the same, cut off until a restart finds nothing
- * waiting.
+/** Opens the interface. Before the loop starts: allocates, may take milliseconds. Where frames wait in its queue it is opened all
+ * the same, cut off until a restart 0.2 s later or more: frames that have stood still by then were left by an earlier program and
+ * are dropped (where that is not allowed, cut off until nothing waits); where frames have gone out, a program uses the interface,
+ * and nothing is done to them.
  *  @return HV_OK; HV_ERR_AGAIN: not usable yet (no such interface, down, bus-off, old frames wait), the ops may be used and
  *          restart tries again; HV_ERR_ARG: not a CAN interface, a name or a list too long; HV_ERR_IO: the system refuses.
  * trouble and error_text say why. */

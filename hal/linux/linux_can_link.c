@@ -8,6 +8,7 @@
 #include <linux/can/netlink.h>
 #include <linux/if.h>
 #include <linux/if_arp.h>
+#include <linux/if_link.h>
 #include <linux/pkt_sched.h>
 #include <linux/rtnetlink.h>
 #include <stdio.h>
@@ -107,6 +108,7 @@ static int keep_link(const struct nlmsghdr *message, void *data)
     linux_can_link_t *self = data;
     const struct ifinfomsg *link = mnl_nlmsg_get_payload(message);
     attributes_t found = {{NULL}};
+    struct rtnl_link_stats64 counts = {.tx_packets = 0};
     (void)mnl_attr_parse(message, sizeof *link, keep_attribute, &found);
     const attributes_t info = inside(found.at[IFLA_LINKINFO]);
     self->index = link->ifi_index;
@@ -114,6 +116,8 @@ static int keep_link(const struct nlmsghdr *message, void *data)
     self->is_up = (link->ifi_flags & (unsigned)IFF_UP) != 0;
     self->has_echo = (link->ifi_flags & (unsigned)IFF_ECHO) != 0;
     self->queue_length = u32_of(found.at[IFLA_TXQLEN]);
+    (void)copy_payload(&counts, sizeof counts, found.at[IFLA_STATS64]);
+    self->sent = counts.tx_packets;
     (void)copy_payload(self->kind, sizeof self->kind - 1, info.at[IFLA_INFO_KIND]);
     keep_controller(self, info.at[IFLA_INFO_DATA]);
     keep_counters(self, info.at[IFLA_INFO_XSTATS]);

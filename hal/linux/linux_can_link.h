@@ -21,6 +21,7 @@ typedef struct {
     bool has_echo;         /**< its driver confirms frames when they are on the wire; else they are confirmed when queued */
     uint32_t queue_length; /**< frames that the interface's queue takes (txqueuelen); 0 where there is no queue */
     uint32_t waiting;      /**< frames in that queue now, of whatever program */
+    uint64_t sent;         /**< frames that went out since the interface is there, of whatever program */
     bool has_controller;
     hal_can_state_t state;     /**< of the controller; of an interface without one HAL_CAN_ACTIVE, or HAL_CAN_DOWN */
     uint32_t bitrate;          /**< bit/s, 0 = not set */

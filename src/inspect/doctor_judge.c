@@ -132,8 +132,8 @@ bool doctor_judge_link(doctor_report_t *report, const config_can_t *config, cons
     const bool is_on = judge_state(report, name, link);
     if (is_on && link->waiting > 0) {
         doctor_say(report, DOCTOR_FAIL,
-                   "%s: %u old frames wait in it, nobody acknowledges -> check cable and supply of the drives; then "
-                   "ip link set %s down && ip link set %s up",
+                   "%s: %u frames wait in it: a program uses it, or nobody acknowledges -> end that program; or check cable and "
+                   "supply of the drives, then ip link set %s down && ip link set %s up",
                    name, link->waiting, name, name);
         return false;
     }

@@ -185,7 +185,7 @@ static void test_judge_link_waiting_frames_are_left_alone(void)
 {
     s_link.waiting = 7;
     TEST_ASSERT_FALSE(judge_link());
-    expect(1, 0, "7 old frames wait");
+    expect(1, 0, "7 frames wait");
 }
 
 static void test_judge_host_warns_of_each(void)

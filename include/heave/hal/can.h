@@ -127,7 +127,7 @@ static inline HV_MUST_CHECK hv_status_t hal_can_unconfirmed(hal_can_t can, uint3
  * that wait to be sent, and forgets unconfirmed ones. Call only while no drive is enabled: a frame in the controller itself may
  * still go out. May block for some ms, unlike the other ops, and may run in another thread while no other op does.
  *  @return HV_OK; HV_ERR_AGAIN: the interface is not there yet, try later; HV_ERR_IO: it is there but refuses, is still down
- *          or bus-off, or old frames wait in it that this program has no right to drop; try later;
+ *          or bus-off, or frames wait in it that are not known to be old, or that this program has no right to drop; try later;
  *          HV_ERR_NOSUP. */
 static inline HV_MUST_CHECK hv_status_t hal_can_restart(hal_can_t can)
 {
