@@ -77,6 +77,7 @@ typedef struct {
     uint32_t look_alike;     /**< code point of a non-ASCII character (UTF-8) at offset; 0: it is ASCII or not UTF-8 */
     frame_command_t command; /**< FRAME_COMMANDS: none was recognised */
     bool is_timed;           /**< the T form of command */
+    bool is_nan;             /**< VALUE_SYNTAX, TIME: `1.#` and a letter, as a Windows program prints what is no number */
 } frame_reject_t;
 
 /** Result of a byte. Stray bytes before a head are reported at that head, a frame at its `#`. */
@@ -107,11 +108,13 @@ typedef struct {
 void frame_scanner_init(frame_scanner_t *self, frame_dialect_t dialect);
 
 /** Takes one byte; at most one event a byte.
+ *  @param next   the byte that follows, 0 where none does or none is known: a letter makes `1.#` no number instead of 1 and a
+ * tail
  *  @param frame  out: valid on FRAME_EVENT_FRAME, else unchanged
  *  @param reject out: valid on FRAME_EVENT_REJECT, else unchanged */
 /*@ requires \valid(self) && \valid(frame) && \valid(reject);
     assigns *self, *frame, *reject, \result; */
-frame_event_t frame_scanner_feed(frame_scanner_t *self, uint8_t byte, frame_t *frame, frame_reject_t *reject);
+frame_event_t frame_scanner_feed(frame_scanner_t *self, uint8_t byte, uint8_t next, frame_t *frame, frame_reject_t *reject);
 
 /** Ends a datagram: an unfinished frame, stray bytes, or a datagram that led to no event at all become a reject.
  *  The scanner is then ready for the next datagram. */

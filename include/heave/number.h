@@ -49,6 +49,10 @@ number_error_t number_finish(const number_t *self, q16_t *value_q16);
  *  @return NUMBER_OVERFLOW also for any value below zero, even one that would round to zero; -0 is zero. */
 number_error_t number_finish_natural(const number_t *self, uint32_t *value);
 
+/** Whether the text so far is the value 1 or -1 and ends in its point, as in `1.`: before `#` and a letter that is how
+ * Microsoft's C runtime begins what is no number (`1.#QNAN`, `-1.#IND`, `1.#INF`, rounded `1.#J`). */
+bool number_is_one_and_point(const number_t *self);
+
 /** number_init, number_feed and number_finish over a text of known length. */
 number_error_t number_parse(const char *text, size_t length, q16_t *value_q16);
 

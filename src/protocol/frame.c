@@ -269,6 +269,22 @@ static void finish_at_value(frame_scanner_t *self, uint8_t tail)
     }
 }
 
+/* Whether the `#` being read belongs to `1.#QNAN`, `-1.#IND00` or the like instead of ending the frame. */
+static bool is_nan(const frame_scanner_t *self, uint8_t next)
+{
+    const uint8_t lower = next | 0x20u;
+    return (self->phase == FRAME_PHASE_VALUE || self->phase == FRAME_PHASE_TIME) && lower >= 'a' && lower <= 'z' &&
+           number_is_one_and_point(&self->number);
+}
+
+static void fail_nan(frame_scanner_t *self)
+{
+    const bool is_value = self->phase == FRAME_PHASE_VALUE;
+    frame_reject_byte(self, is_value ? FRAME_ERR_VALUE_SYNTAX : FRAME_ERR_TIME, '#',
+                      is_value ? value_field(self) : last_field(self));
+    self->reject.is_nan = true;
+}
+
 /* `#` inside a frame: the checks of its last field. */
 static void finish(frame_scanner_t *self, uint8_t tail)
 {
@@ -304,7 +320,7 @@ static frame_event_t take_at(frame_scanner_t *self, frame_reject_t *reject)
     return event;
 }
 
-static frame_event_t take_hash(frame_scanner_t *self, frame_t *frame, frame_reject_t *reject)
+static frame_event_t take_hash(frame_scanner_t *self, uint8_t next, frame_t *frame, frame_reject_t *reject)
 {
     if (self->phase == FRAME_PHASE_IDLE && self->dialect == FRAME_LENIENT) {
         begin_frame(self, false);
@@ -313,7 +329,11 @@ static frame_event_t take_hash(frame_scanner_t *self, frame_t *frame, frame_reje
     if (self->phase == FRAME_PHASE_IDLE) {
         take_idle(self, '#');
     }
-    finish(self, '#');
+    if (is_nan(self, next)) {
+        fail_nan(self);
+    } else {
+        finish(self, '#');
+    }
     if (self->phase == FRAME_PHASE_REJECTED) {
         self->may_be_headless = self->dialect == FRAME_LENIENT;
         return frame_reject_report(self, self->offset + 1, reject);
@@ -358,13 +378,13 @@ void frame_scanner_init(frame_scanner_t *self, frame_dialect_t dialect)
     *self = k_start[dialect];
 }
 
-frame_event_t frame_scanner_feed(frame_scanner_t *self, uint8_t byte, frame_t *frame, frame_reject_t *reject)
+frame_event_t frame_scanner_feed(frame_scanner_t *self, uint8_t byte, uint8_t next, frame_t *frame, frame_reject_t *reject)
 {
     frame_event_t event = FRAME_EVENT_NONE;
     if (byte == '@') {
         event = take_at(self, reject);
     } else if (byte == '#') {
-        event = take_hash(self, frame, reject);
+        event = take_hash(self, next, frame, reject);
     } else {
         event = take_other(self, byte, reject);
     }
@@ -408,7 +428,8 @@ frame_event_t frame_next(frame_scanner_t *self, const uint8_t *datagram, size_t 
             *position = i + used;
             return FRAME_EVENT_FRAME;
         }
-        const frame_event_t event = frame_scanner_feed(self, datagram[i], frame, reject);
+        const uint8_t next = i + 1 < length ? datagram[i + 1] : 0;
+        const frame_event_t event = frame_scanner_feed(self, datagram[i], next, frame, reject);
         if (event != FRAME_EVENT_NONE) {
             *position = i + 1;
             return event;

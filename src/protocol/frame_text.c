@@ -209,7 +209,11 @@ static void put_bad_command(text_t *line, const frame_reject_t *reject)
 static void put_field(text_t *line, const frame_reject_t *reject, const char *what)
 {
     text_put(line, what);
-    put_found(line, reject);
+    if (reject->is_nan) {
+        text_put(line, "; 1.# and a letter is a Windows program's NaN or infinity");
+    } else {
+        put_found(line, reject);
+    }
 }
 
 static void put_reason(text_t *line, const frame_reject_t *reject)

@@ -295,6 +295,11 @@ number_error_t number_finish_natural(const number_t *self, uint32_t *value)
     return NUMBER_OK;
 }
 
+bool number_is_one_and_point(const number_t *self)
+{
+    return self->phase == PHASE_FRACTION && self->lead == 1 && self->lead_count == 1 && self->point == 1;
+}
+
 number_error_t number_parse(const char *text, size_t length, q16_t *value_q16)
 {
     number_t number;

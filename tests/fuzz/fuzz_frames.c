@@ -97,7 +97,7 @@ static bool is_same_reject(const frame_reject_t *a, const frame_reject_t *b)
 {
     return a->error == b->error && a->offset == b->offset && a->start == b->start && a->end == b->end && a->field == b->field &&
            a->expected == b->expected && a->found == b->found && a->byte == b->byte && a->look_alike == b->look_alike &&
-           a->command == b->command && a->is_timed == b->is_timed;
+           a->command == b->command && a->is_timed == b->is_timed && a->is_nan == b->is_nan;
 }
 
 static void require_event(const event_record_t *expected, frame_event_t event, const frame_t *frame, const frame_reject_t *reject)
@@ -115,8 +115,9 @@ static void check_bytes(frame_dialect_t dialect, const uint8_t *bytes, size_t si
     size_t seen = 0;
     frame_scanner_init(&scanner, dialect);
     for (size_t i = 0; i <= size; i++) {
-        const frame_event_t event =
-            i < size ? frame_scanner_feed(&scanner, bytes[i], &frame, &reject) : frame_scanner_end(&scanner, &reject);
+        const frame_event_t event = i < size
+                                        ? frame_scanner_feed(&scanner, bytes[i], i + 1 < size ? bytes[i + 1] : 0, &frame, &reject)
+                                        : frame_scanner_end(&scanner, &reject);
         if (event != FRAME_EVENT_NONE) {
             FUZZ_REQUIRE(seen < count);
             require_event(&expected[seen++], event, &frame, &reject);

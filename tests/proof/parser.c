@@ -31,7 +31,7 @@ void proof_scanner(void)
         loop widen_hints scanner.mask_digits, 4; */
     while (ANY_BOOL()) {
         if (ANY_BOOL()) {
-            frame_scanner_feed(&scanner, ANY_U8(), &frame, &reject);
+            frame_scanner_feed(&scanner, ANY_U8(), ANY_U8(), &frame, &reject);
         } else {
             frame_scanner_end(&scanner, &reject);
         }
@@ -85,6 +85,7 @@ void proof_words(void)
     reject.error = (frame_error_t)ANY_OF(0, FRAME_ERRORS - 1);
     reject.command = (frame_command_t)ANY_OF(0, FRAME_COMMANDS);
     reject.is_timed = ANY_BOOL();
+    reject.is_nan = ANY_BOOL();
     //@ split reject.command;
     frame_reject_describe(&reject, line, sizeof line);
     frame_reject_describe(&reject, line + sizeof line - 1, 1);

@@ -120,6 +120,25 @@ static bool oracle_frame(const char *bytes, size_t length, frame_dialect_t diale
     return false;
 }
 
+/* Whether text, up to a `#`, and what follows it are a Microsoft runtime's NaN or infinity: a last field of 1 and a point, then a
+ * letter. */
+static bool ends_in_nan(const char *bytes, size_t length, char after)
+{
+    size_t start = length;
+    while (start > 0 && strchr(",:", bytes[start - 1]) == NULL) {
+        start--;
+    }
+    while (start < length && is_blank(bytes[start])) {
+        start++;
+    }
+    start += start < length && strchr("+-", bytes[start]) != NULL;
+    while (start < length && bytes[start] == '0') {
+        start++;
+    }
+    return length - start == 2 && memcmp(bytes + start, "1.", 2) == 0 && isalpha((unsigned char)after) &&
+           (unsigned char)after < 128;
+}
+
 /* All right frames of a datagram, in order. */
 void frame_oracle(line_t *line, frame_dialect_t dialect, const char *bytes, size_t length)
 {
@@ -139,8 +158,9 @@ void frame_oracle(line_t *line, frame_dialect_t dialect, const char *bytes, size
             end++;
         }
         const bool is_finished = end < length && bytes[end] == '#';
-        const bool is_good =
-            is_finished && (has_head || may_be_headless) && oracle_frame(bytes + begin, end - begin, dialect, line);
+        const bool is_good = is_finished && (has_head || may_be_headless) &&
+                             !ends_in_nan(bytes + begin, end - begin, end + 1 < length ? bytes[end + 1] : '\0') &&
+                             oracle_frame(bytes + begin, end - begin, dialect, line);
         may_be_headless = dialect == FRAME_LENIENT && is_finished && !is_good;
         i = is_finished ? end + 1 : end;
     }

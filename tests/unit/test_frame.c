@@ -121,7 +121,7 @@ static void scan_bytes(line_t *line, frame_dialect_t dialect, const char *text, 
     frame_reject_t reject;
     frame_scanner_init(&scanner, dialect);
     for (const char *before = "@A6:1,2,nan"; *before != '\0'; before++) {
-        frame_scanner_feed(&scanner, (uint8_t)*before, &frame, &reject);
+        frame_scanner_feed(&scanner, (uint8_t)*before, (uint8_t)before[1], &frame, &reject);
     }
     TEST_ASSERT_EQUAL_INT(FRAME_EVENT_REJECT, frame_scanner_end(&scanner, &reject));
     line->length = 0;
@@ -129,8 +129,9 @@ static void scan_bytes(line_t *line, frame_dialect_t dialect, const char *text, 
     for (size_t i = 0; i <= length; i++) {
         memset(&frame, UNTOUCHED, sizeof frame);
         memset(&reject, UNTOUCHED, sizeof reject);
-        const frame_event_t event =
-            i < length ? frame_scanner_feed(&scanner, (uint8_t)text[i], &frame, &reject) : frame_scanner_end(&scanner, &reject);
+        const frame_event_t event = i < length ? frame_scanner_feed(&scanner, (uint8_t)text[i],
+                                                                    i + 1 < length ? (uint8_t)text[i + 1] : 0, &frame, &reject)
+                                               : frame_scanner_end(&scanner, &reject);
         add_event(line, event, &frame, &reject);
     }
 }
@@ -328,6 +329,49 @@ static void test_next_text_without_any_frame_is_counted(void)
     check_v3("!no_head@0/0; !no_head@1/0", "##");
 }
 
+/* What Microsoft's C runtime prints for what is no number, whole and rounded, in any place: its `#` ends no frame. */
+static void test_next_windows_nan_and_infinity_are_no_numbers(void)
+{
+    static const char *const k_nans[] = {"1.#QNAN",  "1.#SNAN", "1.#IND", "1.#INF", "1.#IND00",
+                                         "1.#INF00", "1.#QN",   "1.#J",   "1.#R",   "1.#qnan"};
+    static const char *const k_signs[] = {"", "-", "+", "00", "-00", " "};
+    for (unsigned nan = 0; nan < sizeof k_nans / sizeof k_nans[0]; nan++) {
+        for (unsigned sign = 0; sign < sizeof k_signs / sizeof k_signs[0]; sign++) {
+            for (unsigned place = 1; place <= 6; place++) {
+                char text[100] = "@A6:", expected[100];
+                for (unsigned value = 1; value <= 6; value++) {
+                    const bool is_place = value == place;
+                    snprintf(text + strlen(text), 20, "%s%s,", is_place ? k_signs[sign] : "0", is_place ? k_nans[nan] : "");
+                }
+                strcat(text, "0F#");
+                const unsigned hash = (unsigned)(strchr(text, '#') - text);
+                snprintf(expected, sizeof expected, "!value_syntax@%u/%u; !no_head@%u/0", hash, place, hash + 1);
+                check_v3(expected, text);
+                TEST_ASSERT_TRUE(reject_of(text).is_nan);
+            }
+        }
+    }
+    check_v3("!value_syntax@10/3; !no_head@11/0", "@A3:0,0,1.#INF#");
+    check_v3("!time@13/4; !no_head@14/0", "@A3T:0,0,0,1.#INF#");
+    check_v3("!mask@12/4; !no_head@14/0", "@A3:0,0,10,1.#QNAN#");
+    check_lenient("!value_syntax@10/3; !no_head@11/0; A3 0 0 0 mask=2", "#A3:0,0,1.#QNAN,0F#A3:0,0,0,2#");
+}
+
+static void test_next_one_and_a_point_is_a_number(void)
+{
+    check_v3("A3 0 0 65536 nomask", "@A3:0,0,1.#");
+    check_v3("A3 0 0 -65536 nomask", "@A3:0,0,-1.# \r\n");
+    check_v3("A3 0 0 65536 nomask; A3 0 0 0 mask=2", "@A3:0,0,1.#@A3:0,0,0,2#");
+    check_length(FRAME_V3, "A3 0 0 65536 nomask", "@A3:0,0,1.#\0", 12);
+    check_v3("A3 0 0 65536 nomask; !no_head@12/0", "@A3:0,0,1.# QNAN,0F#");
+    check_v3("A3 0 0 65536 nomask; !no_head@12/0", "@A3:0,0,1. #QNAN,0F#");
+    check_v3("A3 0 0 131072 nomask; !no_head@11/0", "@A3:0,0,2.#QNAN,0F#");
+    check_v3("A3 0 0 65536 nomask; !no_head@12/0", "@A3:0,0,1.0#QNAN,0F#");
+    check_v3("A3 0 0 65536 nomask; !no_head@11/0", "@A3:0,0,1.##");
+    check_v3("A3T 0 0 0 time=1", "@A3T:0,0,0,1.#");
+    check_lenient("A3 0 0 65536 nomask; A3 0 0 0 mask=2", "#A3:0,0,1.##A3:0,0,0,2#");
+}
+
 /* ---- rejections ---- */
 
 static void test_next_too_many_values_are_a_count_error_whatever_the_mask_looks_like(void)
@@ -386,47 +430,50 @@ static void check_reject(const char *text, const frame_reject_t *expected)
     TEST_ASSERT_EQUAL_HEX32_MESSAGE(expected->look_alike, reject.look_alike, text);
     TEST_ASSERT_EQUAL_INT_MESSAGE(expected->command, reject.command, text);
     TEST_ASSERT_EQUAL_INT_MESSAGE(expected->is_timed, reject.is_timed, text);
+    TEST_ASSERT_EQUAL_INT_MESSAGE(expected->is_nan, reject.is_nan, text);
 }
 
 static void test_next_rejections_say_where_and_what(void)
 {
     static const struct {
         const char *text;
-        frame_reject_t reject; /* error, offset, start, end, field, expected, found, byte, look_alike, command, is_timed */
+        frame_reject_t
+            reject; /* error, offset, start, end, field, expected, found, byte, look_alike, command, is_timed, is_nan */
     } k_rows[] = {
-        {" abc@A3:0,0,0#", {FRAME_ERR_NO_HEAD, 1, 1, 4, 0, 0, 0, 'a', 0, FRAME_COMMANDS, false}},
-        {"A3:0,0,0#@A3", {FRAME_ERR_NO_HEAD, 0, 0, 9, 0, 0, 0, 'A', 0, FRAME_COMMANDS, false}},
-        {"\r\n", {FRAME_ERR_NO_HEAD, 0, 0, 2, 0, 0, 0, 0, 0, FRAME_COMMANDS, false}},
-        {"@A3:0,0@A3", {FRAME_ERR_UNFINISHED, 7, 0, 7, 0, 0, 0, 0, 0, FRAME_A3, false}},
-        {" @C7T:0", {FRAME_ERR_UNFINISHED, 7, 1, 7, 0, 0, 0, 0, 0, FRAME_C7, true}},
-        {"@A5:1,2#", {FRAME_ERR_COMMAND, 2, 0, 8, 0, 0, 0, '5', 0, FRAME_COMMANDS, false}},
-        {"@A6 1,2#", {FRAME_ERR_SEPARATOR, 3, 0, 8, 0, 0, 0, ' ', 0, FRAME_A6, false}},
-        {"@A6:1,2#", {FRAME_ERR_COUNT, 7, 0, 8, 0, 6, 2, '#', 0, FRAME_A6, false}},
-        {"@A3:1,2,3,F,5,6#", {FRAME_ERR_COUNT, 11, 0, 16, 0, 3, 6, ',', 0, FRAME_A3, false}},
-        {"@A6T:1,,3#", {FRAME_ERR_VALUE_EMPTY, 7, 0, 10, 2, 0, 0, ',', 0, FRAME_A6, true}},
-        {"@A6:1,2x,3#", {FRAME_ERR_VALUE_SYNTAX, 7, 0, 11, 2, 0, 0, 'x', 0, FRAME_A6, false}},
-        {"@A6:1, 1e5 ,3#", {FRAME_ERR_VALUE_OVERFLOW, 7, 0, 14, 2, 0, 0, 0, 0, FRAME_A6, false}},
-        {"@A3:1,2,3,G#", {FRAME_ERR_MASK, 10, 0, 12, 4, 0, 0, 'G', 0, FRAME_A3, false}},
-        {"@A3T:1,2,3, -1#", {FRAME_ERR_TIME, 12, 0, 15, 4, 0, 0, 0, 0, FRAME_A3, true}},
-        {"@A3T:1,2,3,9999999#", {FRAME_ERR_TIME_RANGE, 11, 0, 19, 4, 0, 0, 0, 0, FRAME_A3, true}},
+        {" abc@A3:0,0,0#", {FRAME_ERR_NO_HEAD, 1, 1, 4, 0, 0, 0, 'a', 0, FRAME_COMMANDS, false, false}},
+        {"A3:0,0,0#@A3", {FRAME_ERR_NO_HEAD, 0, 0, 9, 0, 0, 0, 'A', 0, FRAME_COMMANDS, false, false}},
+        {"\r\n", {FRAME_ERR_NO_HEAD, 0, 0, 2, 0, 0, 0, 0, 0, FRAME_COMMANDS, false, false}},
+        {"@A3:0,0@A3", {FRAME_ERR_UNFINISHED, 7, 0, 7, 0, 0, 0, 0, 0, FRAME_A3, false, false}},
+        {" @C7T:0", {FRAME_ERR_UNFINISHED, 7, 1, 7, 0, 0, 0, 0, 0, FRAME_C7, true, false}},
+        {"@A5:1,2#", {FRAME_ERR_COMMAND, 2, 0, 8, 0, 0, 0, '5', 0, FRAME_COMMANDS, false, false}},
+        {"@A6 1,2#", {FRAME_ERR_SEPARATOR, 3, 0, 8, 0, 0, 0, ' ', 0, FRAME_A6, false, false}},
+        {"@A6:1,2#", {FRAME_ERR_COUNT, 7, 0, 8, 0, 6, 2, '#', 0, FRAME_A6, false, false}},
+        {"@A3:1,2,3,F,5,6#", {FRAME_ERR_COUNT, 11, 0, 16, 0, 3, 6, ',', 0, FRAME_A3, false, false}},
+        {"@A6T:1,,3#", {FRAME_ERR_VALUE_EMPTY, 7, 0, 10, 2, 0, 0, ',', 0, FRAME_A6, true, false}},
+        {"@A6:1,2x,3#", {FRAME_ERR_VALUE_SYNTAX, 7, 0, 11, 2, 0, 0, 'x', 0, FRAME_A6, false, false}},
+        {"@A6:1, 1e5 ,3#", {FRAME_ERR_VALUE_OVERFLOW, 7, 0, 14, 2, 0, 0, 0, 0, FRAME_A6, false, false}},
+        {"@A3:1,2,-1.#IND,0#", {FRAME_ERR_VALUE_SYNTAX, 11, 0, 12, 3, 0, 0, '#', 0, FRAME_A3, false, true}},
+        {"@A3:1,2,3,G#", {FRAME_ERR_MASK, 10, 0, 12, 4, 0, 0, 'G', 0, FRAME_A3, false, false}},
+        {"@A3T:1,2,3, -1#", {FRAME_ERR_TIME, 12, 0, 15, 4, 0, 0, 0, 0, FRAME_A3, true, false}},
+        {"@A3T:1,2,3,9999999#", {FRAME_ERR_TIME_RANGE, 11, 0, 19, 4, 0, 0, 0, 0, FRAME_A3, true, false}},
         {"@\xD0\x90"
          "3:1#",
-         {FRAME_ERR_COMMAND, 1, 0, 7, 0, 0, 0, 0xD0, 0x410, FRAME_COMMANDS, false}},
+         {FRAME_ERR_COMMAND, 1, 0, 7, 0, 0, 0, 0xD0, 0x410, FRAME_COMMANDS, false, false}},
         {"@A3\xEF\xBC\x9A"
          "1#",
-         {FRAME_ERR_SEPARATOR, 3, 0, 8, 0, 0, 0, 0xEF, 0xFF1A, FRAME_A3, false}},
-        {"@A3:1,2,3,0\xEF\xBC\x83", {FRAME_ERR_MASK, 11, 0, 14, 4, 0, 0, 0xEF, 0xFF03, FRAME_A3, false}},
-        {"@A3:1,\xF0\x9F\x98\x80,3#", {FRAME_ERR_VALUE_SYNTAX, 6, 0, 13, 2, 0, 0, 0xF0, 0x1F600, FRAME_A3, false}},
+         {FRAME_ERR_SEPARATOR, 3, 0, 8, 0, 0, 0, 0xEF, 0xFF1A, FRAME_A3, false, false}},
+        {"@A3:1,2,3,0\xEF\xBC\x83", {FRAME_ERR_MASK, 11, 0, 14, 4, 0, 0, 0xEF, 0xFF03, FRAME_A3, false, false}},
+        {"@A3:1,\xF0\x9F\x98\x80,3#", {FRAME_ERR_VALUE_SYNTAX, 6, 0, 13, 2, 0, 0, 0xF0, 0x1F600, FRAME_A3, false, false}},
         {"@A3\xA3\xBA"
          "1#",
-         {FRAME_ERR_SEPARATOR, 3, 0, 7, 0, 0, 0, 0xA3, 0, FRAME_A3, false}}, /* GBK */
+         {FRAME_ERR_SEPARATOR, 3, 0, 7, 0, 0, 0, 0xA3, 0, FRAME_A3, false, false}}, /* GBK */
         {"@A3\xEF\xBC"
          "1#",
-         {FRAME_ERR_SEPARATOR, 3, 0, 7, 0, 0, 0, 0xEF, 0, FRAME_A3, false}},                         /* cut short */
-        {"@A3\xE0\x80\xBA#", {FRAME_ERR_SEPARATOR, 3, 0, 7, 0, 0, 0, 0xE0, 0, FRAME_A3, false}},     /* overlong */
-        {"@A3\xED\xA0\x80#", {FRAME_ERR_SEPARATOR, 3, 0, 7, 0, 0, 0, 0xED, 0, FRAME_A3, false}},     /* surrogate */
-        {"@A3\xF4\x90\x80\x80#", {FRAME_ERR_SEPARATOR, 3, 0, 8, 0, 0, 0, 0xF4, 0, FRAME_A3, false}}, /* beyond Unicode */
-        {"@A3\xEF\xBC", {FRAME_ERR_SEPARATOR, 3, 0, 5, 0, 0, 0, 0xEF, 0, FRAME_A3, false}},
+         {FRAME_ERR_SEPARATOR, 3, 0, 7, 0, 0, 0, 0xEF, 0, FRAME_A3, false, false}},                         /* cut short */
+        {"@A3\xE0\x80\xBA#", {FRAME_ERR_SEPARATOR, 3, 0, 7, 0, 0, 0, 0xE0, 0, FRAME_A3, false, false}},     /* overlong */
+        {"@A3\xED\xA0\x80#", {FRAME_ERR_SEPARATOR, 3, 0, 7, 0, 0, 0, 0xED, 0, FRAME_A3, false, false}},     /* surrogate */
+        {"@A3\xF4\x90\x80\x80#", {FRAME_ERR_SEPARATOR, 3, 0, 8, 0, 0, 0, 0xF4, 0, FRAME_A3, false, false}}, /* beyond Unicode */
+        {"@A3\xEF\xBC", {FRAME_ERR_SEPARATOR, 3, 0, 5, 0, 0, 0, 0xEF, 0, FRAME_A3, false, false}},
     };
     for (size_t i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
         check_reject(k_rows[i].text, &k_rows[i].reject);
@@ -475,7 +522,7 @@ static unsigned feed(frame_scanner_t *scanner, const char *text, unsigned repeat
     frame_t frame;
     for (unsigned i = 0; i < repeats; i++) {
         for (const char *at = text; *at != '\0'; at++) {
-            count += frame_scanner_feed(scanner, (uint8_t)*at, &frame, reject) == kind;
+            count += frame_scanner_feed(scanner, (uint8_t)*at, (uint8_t)at[1], &frame, reject) == kind;
         }
     }
     return count;
@@ -711,8 +758,8 @@ static void test_next_damaged_frames_deliver_what_the_oracle_delivers(void)
 
 static void test_next_random_text_of_frame_characters_matches_the_oracle(void)
 {
-    static const char *const k_pieces[] = {"@",   "#", "A3", "C3", "a3",    "T", ":", ",", "1",
-                                           "0x1", "F", " ",  "\n", "1,2,3", "-", ".", "e", "A3:1,2,3"};
+    static const char *const k_pieces[] = {"@", "#", "A3", "C3",    "a3", "T", ":", ",",        "1",  "0x1",
+                                           "F", " ", "\n", "1,2,3", "-",  ".", "e", "A3:1,2,3", "1.#"};
     for (unsigned round = 0; round < 50000; round++) {
         char text[ORACLE_DATAGRAM_MAX] = "";
         for (unsigned i = below(14); i > 0; i--) {
@@ -773,6 +820,9 @@ static void test_describe_says_what_would_be_right(void)
     check_words("@A6T:5,6,0#", "byte 10: A6T takes 6 values and a time, found 3");
     check_words("@A6:5,6,nan,0,0,0,0#",
                 "byte 8: value 3 of A6 (yaw) is not a decimal number; write it as 5, -5.5 or 1E-05; found 'n'");
+    check_words("@A6:0,0,0,0,0,1.#QNAN,0F#",
+                "byte 16: value 6 of A6 (z) is not a decimal number; write it as 5, -5.5 or 1E-05; 1.# and a "
+                "letter is a Windows program's NaN or infinity");
     check_words("@C7:1,2,3,4,5,6,1e9,0#", "byte 16: value 7 of C7 (angle) is outside -32768 to 32767.9999");
     check_words("@A6:,6,0,0,0,0,0#", "byte 4: value 1 of A6 (roll) is empty; write 0");
     check_words("@A3:1,2,3,12345#", "byte 14: the relay mask is 1 to 4 hexadecimal digits, as in F0; found '5'");
@@ -943,6 +993,8 @@ int main(void)
     RUN_TEST(test_next_head_inside_an_unfinished_frame_starts_a_new_one);
     RUN_TEST(test_next_bad_frame_does_not_spoil_its_neighbours);
     RUN_TEST(test_next_text_without_any_frame_is_counted);
+    RUN_TEST(test_next_windows_nan_and_infinity_are_no_numbers);
+    RUN_TEST(test_next_one_and_a_point_is_a_number);
     RUN_TEST(test_next_too_many_values_are_a_count_error_whatever_the_mask_looks_like);
     RUN_TEST(test_next_count_found_stops_at_255);
     RUN_TEST(test_next_first_error_of_a_frame_is_the_one_reported);
