@@ -60,6 +60,7 @@ typedef enum {
     FRAME_ERR_TIME,           /**< T form without time, or a time that is negative or not a number */
     FRAME_ERR_TIME_RANGE,     /**< above FRAME_TIME_MAX_MS after rounding */
     FRAME_ERR_PLATFORM,       /**< well formed, but this platform has no such axis (set by the gateway) */
+    FRAME_ERR_MASK_FORM, /**< well formed, but with a mask where its sender sends none, or without one (set by the gateway) */
     FRAME_ERRORS
 } frame_error_t;
 

@@ -13,6 +13,7 @@
 #include "heave/hal/relays.h"
 #include "heave/hal/udp.h"
 #include "heave/healthy.h"
+#include "heave/mask_guard.h"
 #include "heave/motion.h"
 #include "heave/owner.h"
 #include "heave/relay_policy.h"
@@ -76,6 +77,7 @@ typedef struct {
     q16_t stroke_mm_q16[CYLINDERS_MAX];
     q16_t following_error_mm_q16;
     frame_dialect_t dialect;
+    mask_policy_t mask_policy;
     q16_t confirm_jump_mm_q16;
     q16_t confirm_jump_deg_q16;
     uint32_t takeover_ms;
@@ -122,8 +124,9 @@ typedef struct {
 /** The sender in control and what it asks for; members are private to src/gateway. */
 typedef struct {
     owner_t owner;
-    uint64_t start_us;      /**< start of the silence timer: last accepted frame or entry into ENGAGED */
-    uint16_t frame_mask;    /**< relay mask of the sender */
+    uint64_t start_us;   /**< start of the silence timer: last accepted frame or entry into ENGAGED */
+    uint16_t frame_mask; /**< relay mask of the sender */
+    mask_guard_t mask_guard;
     unsigned stream_frames; /**< frames in quick succession so far, up to the number that makes a stream */
     confirm_t confirm;
     unsigned targets; /**< of this cycle */
@@ -135,6 +138,7 @@ typedef struct {
     uint32_t other_suppressed;
     uint64_t spike_logged_us;
     uint32_t spikes_logged; /**< spikes that are already in the log */
+    uint64_t digits_logged_us;
     uint64_t jump_logged_us;
     uint32_t jumps_logged; /**< likewise */
 } gateway_sender_t;
@@ -206,8 +210,8 @@ void gateway_save(const gateway_t *self, gateway_t *out);
  *  @return HV_OK; HV_ERR_ARG as gateway_init, for another platform, or for a state that no gateway saves: self is unchanged */
 hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io) HV_MUST_CHECK;
 
-/** Takes over the settings that may change in operation: silence, take-over and priorities, dialect, safe mask and its delay,
- * following error, spike gate, confirmation of far jumps. Ignores the rest of the settings. */
+/** Takes over the settings that may change in operation: silence, take-over and priorities, dialect, masks, safe mask and its
+ * delay, following error, spike gate, confirmation of far jumps. Ignores the rest of the settings. */
 void gateway_reload(gateway_t *self, const settings_t *settings);
 
 /** A request of an operator: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET, EVENT_SHUTDOWN, EVENT_SERVICE or

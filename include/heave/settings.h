@@ -25,6 +25,14 @@ typedef enum {
     ANGLE_SHORTEST /**< modulo one turn, the shorter way round */
 } angle_wrap_t;
 
+/** Whether frames have a relay mask; see mask_guard.h. T frames never have one. */
+typedef enum {
+    MASK_LEARNT, /**< as the sender's first frames had it */
+    MASK_ALWAYS, /**< a frame without one is refused */
+    MASK_NEVER,  /**< a frame with one is refused */
+    MASK_ANY     /**< each frame as it comes */
+} mask_policy_t;
+
 /** One pose axis or the rotation motor. Unit u is deg or mm. Asked value = sign * scale * sent value + offset, then min..max. */
 typedef struct {
     int8_t sign;      /**< 1 or -1 */
@@ -81,6 +89,7 @@ typedef struct {
     uint32_t intensity_ramp_ms;      /**< [500, 10000]: from 0 to 100 % */
 
     frame_dialect_t dialect;
+    mask_policy_t mask_policy;
     q16_t confirm_jump_mm_q16;  /**< targets further than this from the last one wait for a second frame; 0 = off */
     q16_t confirm_jump_deg_q16; /**< the same of rotations and the rotation motor */
     uint32_t takeover_ms; /**< silence of the driving sender after which another one may take over; 0: all senders are followed */

@@ -9,6 +9,7 @@
 #include "heave/drives.h"
 #include "heave/fault.h"
 #include "heave/frame.h"
+#include "heave/mask_guard.h"
 #include "heave/owner.h"
 #include "heave/plate.h"
 #include "heave/service.h"
@@ -89,10 +90,11 @@ typedef struct {
     q32_t intensity_now_q32;   /**< in force, percent */
     uint32_t stream_period_us; /**< 0 while unknown */
     uint32_t stream_delay_us;
-    stream_report_t stream; /**< of the sender that drives */
-    owner_t owner;          /**< who drives */
-    owner_t other;          /**< the last sender that does not drive */
-    uint64_t last_frame_us; /**< 0 before the first accepted frame */
+    stream_report_t stream;  /**< of the sender that drives */
+    owner_t owner;           /**< who drives */
+    mask_habit_t mask_habit; /**< whether its frames have a mask */
+    owner_t other;           /**< the last sender that does not drive */
+    uint64_t last_frame_us;  /**< 0 before the first accepted frame */
     service_view_t service;
     counters_t counters;
 } snapshot_t;

@@ -246,6 +246,10 @@ const config_key_t config_keys[] = {
      .is_live = true, .help = "senders that take over from any behind them in the list, or not in it, without waiting"},
     {KEY("udp", "dialect"), AT(settings.dialect), .type = CONFIG_WORD, .unit = "", .fallback = "v3", .words = "v3|lenient",
      .is_live = true, .help = "frames as in V3.0; or also with the head # or none, and commands in lower case"},
+    {KEY("udp", "mask"), AT(settings.mask_policy), .type = CONFIG_WORD, .unit = "", .fallback = "learnt",
+     .words = "learnt|always|never|any", .is_live = true,
+     .help = "whether frames have a relay mask: as the sender's first ten in a row, in each frame, in none, or in some; a decimal comma looks "
+             "like one"},
     {KEY("udp", "stream"), AT(settings.stream_style), .type = CONFIG_WORD, .unit = "", .fallback = "smooth",
      .words = "smooth|balanced", .help = "how a stream is rendered: 2 periods late and smoother, or 1.3 periods late"},
     {KEY("udp", "delay_max_ms"), AT(settings.delay_max_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "120",

@@ -49,15 +49,15 @@ HV_OWN_FRAME static void reject(frame_receiver_t *self, const frame_receiver_io_
 }
 
 HV_OWN_FRAME void frame_receiver_refuse(frame_receiver_t *self, const frame_receiver_io_t *io, frame_command_t command,
-                                        const char *missing, const hal_udp_peer_t *from, uint64_t now_us)
+                                        frame_error_t error, const char *why, const hal_udp_peer_t *from, uint64_t now_us)
 {
     char reason[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(reason, sizeof reason);
     text_put(&text, frame_command_name(command));
     text_put(&text, ": ");
-    text_put(&text, missing);
-    io->counters->rejected[FRAME_ERR_PLATFORM]++;
-    log_reject(self, io->log, reason, FRAME_ERR_PLATFORM, (const uint8_t *)frame_command_name(command), 2, from, now_us);
+    text_put(&text, why);
+    io->counters->rejected[error]++;
+    log_reject(self, io->log, reason, error, (const uint8_t *)frame_command_name(command), 2, from, now_us);
 }
 
 /* How long the datagram has waited for its cycle: a sender's time line is finer than cycles. A longer wait means a late cycle,

@@ -26,10 +26,11 @@ void frame_receiver_begin(frame_receiver_t *self);
 bool frame_receiver_next(frame_receiver_t *self, const gateway_settings_t *settings, const frame_receiver_io_t *io,
                          uint64_t now_us, frame_t *frame);
 
-/** Counts and logs a valid frame that this platform cannot follow.
- *  @param missing why */
-void frame_receiver_refuse(frame_receiver_t *self, const frame_receiver_io_t *io, frame_command_t command, const char *missing,
-                           const hal_udp_peer_t *from, uint64_t now_us);
+/** Counts and logs a valid frame that is not followed.
+ *  @param error FRAME_ERR_PLATFORM or FRAME_ERR_MASK_FORM
+ *  @param why   in words */
+void frame_receiver_refuse(frame_receiver_t *self, const frame_receiver_io_t *io, frame_command_t command, frame_error_t error,
+                           const char *why, const hal_udp_peer_t *from, uint64_t now_us);
 
 /** Appends how many lines of this kind were left out since the last one; nothing for 0. */
 void frame_receiver_put_suppressed(text_t *text, uint32_t lines);

@@ -46,6 +46,7 @@ static void keep_changeable(gateway_settings_t *own, const settings_t *settings)
     own->relay_safe_after_ms = settings->relay_safe_after_ms;
     own->following_error_mm_q16 = settings->following_error_mm_q16;
     own->power_settle_ms = settings->power_settle_ms;
+    own->mask_policy = settings->mask_policy;
     own->confirm_jump_mm_q16 = settings->confirm_jump_mm_q16;
     own->confirm_jump_deg_q16 = settings->confirm_jump_deg_q16;
 }
@@ -127,8 +128,9 @@ static bool are_settings_sane(const gateway_settings_t *saved, const gateway_set
                    saved->auto_frames == prepared->auto_frames && saved->angle_wrap == prepared->angle_wrap &&
                    saved->angle_min_q16 == prepared->angle_min_q16 && saved->angle_max_q16 == prepared->angle_max_q16 &&
                    saved->relays.count == prepared->relays.count && is_pulse_same(&saved->healthy, &prepared->healthy) &&
-                   (unsigned)saved->dialect <= FRAME_LENIENT && saved->priority.count <= HAL_UDP_NETWORKS_MAX &&
-                   saved->following_error_mm_q16 >= 0 && saved->confirm_jump_mm_q16 >= 0 && saved->confirm_jump_deg_q16 >= 0;
+                   (unsigned)saved->dialect <= FRAME_LENIENT && (unsigned)saved->mask_policy <= MASK_ANY &&
+                   saved->priority.count <= HAL_UDP_NETWORKS_MAX && saved->following_error_mm_q16 >= 0 &&
+                   saved->confirm_jump_mm_q16 >= 0 && saved->confirm_jump_deg_q16 >= 0;
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const axis_input_t *axis = &saved->axis[i], *own = &prepared->axis[i];
         is_sane = is_sane && axis->sign == own->sign && axis->scale_q16 == own->scale_q16 && axis->offset_q16 == own->offset_q16;
@@ -206,6 +208,7 @@ static bool is_saved_sane(const gateway_t *saved, const gateway_t *prepared)
            auto_engage_is_sane(&saved->auto_engage, &prepared->auto_engage) && owner_is_sane(&saved->sender.owner) &&
            sane_time(saved->power_since_us) && sane_time(saved->relay_output.healthy.ill_us) &&
            sane_time(saved->relay_output.healthy.changed_us) && confirm_is_sane(&saved->sender.confirm) &&
+           mask_guard_is_sane(&saved->sender.mask_guard) && (unsigned)saved->snapshot.mask_habit <= MASK_DIGITS &&
            relay_policy_is_sane(&saved->relay_output.policy) && (unsigned)saved->sender.newest_command <= FRAME_COMMANDS &&
            motion_target_is_sane(&saved->sender.newest) && is_output_sane(&saved->output) &&
            motion_state_is_sane(&saved->motion, &prepared->motion);
@@ -368,6 +371,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->stream_delay_us = stream_delay_us(motion_stream(&self->motion));
     s->stream = stream_report(motion_stream(&self->motion));
     s->owner = self->sender.owner;
+    s->mask_habit = mask_guard_habit(&self->sender.mask_guard, self->settings.mask_policy);
     service_publish(self);
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
     s->counters.relay_cut = self->relay_output.policy.cut_count;

@@ -11,18 +11,43 @@
 #define STREAM_PERIOD_US 250000u  /* when each comes within that after the last one, */
 #define STREAM_GAP_US    1000000u /* and over when none has for that */
 
-static void refuse(gateway_t *self, frame_command_t command, const char *missing, const hal_udp_peer_t *from, uint64_t now_us)
+static void refuse(gateway_t *self, frame_command_t command, frame_error_t error, const char *why, const hal_udp_peer_t *from,
+                   uint64_t now_us)
 {
     const frame_receiver_io_t io = {self->io.udp, self->io.log, &self->snapshot.counters};
-    frame_receiver_refuse(&self->receiver, &io, command, missing, from, now_us);
+    frame_receiver_refuse(&self->receiver, &io, command, error, why, from, now_us);
+}
+
+/* One line where the digits of a value have been taken for masks. */
+static void log_digits(gateway_t *self, uint64_t now_us)
+{
+    if (self->sender.digits_logged_us == 0 || now_us - self->sender.digits_logged_us >= REJECT_LOG_INTERVAL_US) {
+        hal_log_write(self->io.log, HAL_LOG_WARNING,
+                      "relay masks change like the digits of a value, relays stay at safe_mask: decimal commas? ([udp] mask)");
+        self->sender.digits_logged_us = now_us;
+    }
+}
+
+/* Whether the frame has a mask that relays may follow. */
+static bool has_relay_mask(gateway_t *self, const frame_t *frame, uint64_t now_us)
+{
+    mask_guard_t *guard = &self->sender.mask_guard;
+    const bool was_digits = guard->is_digits;
+    if (!frame->has_mask || mask_guard_follows(guard, self->settings.mask_policy, frame->relay_mask)) {
+        return frame->has_mask;
+    }
+    if (guard->is_digits) {
+        self->sender.frame_mask = self->settings.relay_safe_mask;
+    }
+    if (guard->is_digits && !was_digits) {
+        log_digits(self, now_us);
+    }
+    return false;
 }
 
 /* What the sender asks of the relays; bits that no relay has are counted. */
 static void take_mask(gateway_t *self, const frame_t *frame)
 {
-    if (frame->is_timed || !frame->has_mask) {
-        return;
-    }
     const uint16_t wired = (uint16_t)((1u << self->settings.relays.count) - 1u);
     self->snapshot.counters.relay_missing += (frame->relay_mask & FRAME_RELAY_MASK & ~(unsigned)wired) != 0;
     self->sender.frame_mask = frame->relay_mask & wired;
@@ -130,6 +155,7 @@ HV_OWN_FRAME static void change_owner(gateway_t *self, uint64_t now_us)
 static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
 {
     const gateway_settings_t *settings = &self->settings;
+    const bool is_same_host = self->sender.owner.is_taken && hal_udp_is_same_host(&self->sender.owner.peer, from);
     const owner_verdict_t verdict = owner_judge(&self->sender.owner, from, (uint64_t)settings->takeover_ms * 1000,
                                                 &settings->priority, motion_timed_end_us(&self->motion), now_us);
     if (verdict == OWNER_OTHER) {
@@ -139,7 +165,18 @@ static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t no
     } else if (verdict == OWNER_NEW) {
         change_owner(self, now_us);
     }
+    if (verdict != OWNER_OTHER && !is_same_host) {
+        mask_guard_restart(&self->sender.mask_guard);
+    }
     return verdict != OWNER_OTHER;
+}
+
+HV_OWN_FRAME static void refuse_form(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    refuse(self, frame->command, FRAME_ERR_MASK_FORM,
+           frame->has_mask ? "it has a relay mask, and frames here have none: a decimal comma, or a value too many? ([udp] mask)"
+                           : "it has no relay mask, and frames here have one: a value too few? ([udp] mask)",
+           from, now_us);
 }
 
 /* Tells motion of a target.
@@ -150,7 +187,7 @@ static bool tell_motion(gateway_t *self, const motion_target_t *target, frame_co
     if (self->supervisor.state == STATE_ENGAGED &&
         motion_target(&self->motion, target, now_us - self->receiver.waited_us) != HV_OK) {
         self->snapshot.counters.impossible++;
-        refuse(self, command, "no pose has these extensions, or one too near a singularity", from, now_us);
+        refuse(self, command, FRAME_ERR_PLATFORM, "no pose has these extensions, or one too near a singularity", from, now_us);
         return false;
     }
     log_spikes(self, now_us);
@@ -229,10 +266,18 @@ void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
     const hal_udp_peer_t *from = &self->receiver.from;
     const char *missing = target_missing(frame->command, kin_cylinders(motion_kin(&self->motion)), self->settings.has_angle);
     if (missing != NULL) {
-        refuse(self, frame->command, missing, from, now_us);
+        refuse(self, frame->command, FRAME_ERR_PLATFORM, missing, from, now_us);
+        return;
+    }
+    if (!mask_guard_allows(self->settings.mask_policy, frame)) {
+        refuse_form(self, frame, from, now_us);
         return;
     }
     if (!is_followed(self, from, now_us)) {
+        return;
+    }
+    if (!mask_guard_passes(&self->sender.mask_guard, self->settings.mask_policy, frame, now_us)) {
+        refuse_form(self, frame, from, now_us);
         return;
     }
     auto_engage_frame(&self->auto_engage, now_us);
@@ -243,6 +288,7 @@ void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
     if (!is_waiting && !follow(self, &target, frame->command, from, now_us)) {
         return;
     }
+    const bool has_mask = has_relay_mask(self, frame, now_us);
     target_received(&self->snapshot, frame);
     counters_t *counters = &self->snapshot.counters;
     counters->accepted[frame->command]++;
@@ -251,7 +297,7 @@ void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
     self->sender.start_us = now_us;
     if (self->supervisor.state != STATE_ENGAGED) {
         counters->not_followed++;
-    } else if (!is_waiting) {
+    } else if (!is_waiting && has_mask) {
         take_mask(self, frame);
     }
 }

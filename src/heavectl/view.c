@@ -237,6 +237,9 @@ static void draw_senders(view_t *self, const cJSON *status)
     const cJSON *other = view_member(status, "other_sender");
     view_put_label(self, _("sender"));
     view_put(self, "%s", cJSON_IsObject(sender) ? view_word(sender, "address") : _("none yet"));
+    if (strcmp(view_word(sender, "mask"), "digits") == 0) {
+        view_put_piece(self, "; its relay masks change like digits, relays stay at safe_mask: decimal commas?");
+    }
     if (cJSON_IsObject(other)) {
         view_put_piece(self, "; not followed: %s, %.1f s ago", view_word(other, "address"),
                        view_number(other, "age_ms") / 1000.0);

@@ -263,6 +263,10 @@ static void put_reason(text_t *line, const frame_reject_t *reject)
         put_command(line, reject);
         text_put(line, " asks for an axis that this platform does not have");
         break;
+    case FRAME_ERR_MASK_FORM:
+        put_command(line, reject);
+        text_put(line, " has a relay mask where its sender sends none, or none where it sends one");
+        break;
     case FRAME_ERRORS:
         break;
     }
@@ -291,6 +295,7 @@ static const char *const k_error_names[FRAME_ERRORS] = {
     [FRAME_ERR_TIME] = "time",
     [FRAME_ERR_TIME_RANGE] = "time_range",
     [FRAME_ERR_PLATFORM] = "platform",
+    [FRAME_ERR_MASK_FORM] = "mask_form",
 };
 
 const char *frame_error_name(frame_error_t error)

@@ -304,8 +304,17 @@ static void write_stream(json_t *json, const snapshot_t *s)
     json_close(json, '}');
 }
 
-/* Who drives, or who else sent last; null where nobody does. */
-static void write_owner(json_t *json, const char *key, const owner_t *owner, uint64_t now_us)
+/* Whether its frames have a relay mask. */
+static const char *mask_name(mask_habit_t habit)
+{
+    static const char *const k_names[] = {
+        [MASK_UNKNOWN] = "unknown", [MASK_SENT] = "sent", [MASK_NONE] = "none", [MASK_DIGITS] = "digits"};
+    return k_names[habit];
+}
+
+/* Who drives, or who else sent last; null where nobody does.
+ * mask: NULL: of no matter. */
+static void write_owner(json_t *json, const char *key, const owner_t *owner, const char *mask, uint64_t now_us)
 {
     char peer[HAL_UDP_PEER_TEXT_MAX];
     if (!owner->is_taken) {
@@ -316,6 +325,9 @@ static void write_owner(json_t *json, const char *key, const owner_t *owner, uin
     json_open(json, key, '{');
     json_text(json, "address", peer);
     json_ms(json, "age_ms", now_us - owner->last_us);
+    if (mask != NULL) {
+        json_text(json, "mask", mask);
+    }
     json_close(json, '}');
 }
 
@@ -446,8 +458,8 @@ void status_json_write(json_t *json, const motion_view_t *view, const config_t *
     write_intensity(json, s, config);
     write_flags(json, s);
     write_stream(json, s);
-    write_owner(json, "sender", &s->owner, s->now_us);
-    write_owner(json, "other_sender", &s->other, s->now_us);
+    write_owner(json, "sender", &s->owner, mask_name(s->mask_habit), s->now_us);
+    write_owner(json, "other_sender", &s->other, NULL, s->now_us);
     json_bool(json, "flood", lost->is_flood);
     write_counters(json, view);
     write_fault_counts(json, s);

@@ -153,9 +153,10 @@ static void forget_rejects(const gateway_t *gateway, gateway_t *out)
 {
     gateway_save(gateway, out);
     counters_t *counters = &out->snapshot.counters;
-    const uint32_t platform = counters->rejected[FRAME_ERR_PLATFORM];
+    const uint32_t platform = counters->rejected[FRAME_ERR_PLATFORM], form = counters->rejected[FRAME_ERR_MASK_FORM];
     memset(counters->rejected, 0, sizeof counters->rejected);
     counters->rejected[FRAME_ERR_PLATFORM] = platform; /* of good frames */
+    counters->rejected[FRAME_ERR_MASK_FORM] = form;    /* as well */
     counters->datagrams = counters->oversize = 0;
     const uint32_t waited_us = out->receiver.waited_us;
     memset(&out->receiver, 0, sizeof out->receiver);
