@@ -28,6 +28,9 @@
  * the newest counts, so that the cost of a cycle is bounded. */
 #define GATEWAY_TARGETS_PER_CYCLE 20u
 
+/** Axes that turn: roll, pitch, yaw, the rotation motor. */
+#define ROTATIONS 4u
+
 /** Longest datagram taken. */
 #define GATEWAY_DATAGRAM_MAX 512u
 
@@ -57,11 +60,14 @@ typedef struct {
     uint16_t gap_cycles[AUTO_ENGAGE_FRAMES_MAX]; /**< cycles before each of these; at most 2000 in a second */
 } auto_engage_t;
 
-/** Converts a value of a frame into a value of an axis: sign * scale * value + offset. */
+/** Converts a value of a frame into a value of an axis: sign * scale * value + offset, of rotations then as `wrap` says. */
 typedef struct {
     int8_t sign;
     q16_t scale_q16;
     q16_t offset_q16;
+    angle_wrap_t wrap;
+    q16_t min_q16;
+    q16_t max_q16;
 } axis_input_t;
 
 /** Copies of the settings that the gateway needs while it runs. Motion has converted the rest. */
@@ -71,9 +77,6 @@ typedef struct {
     uint32_t auto_frames;
     axis_input_t axis[AXES_MAX];
     bool has_angle;
-    angle_wrap_t angle_wrap;
-    q16_t angle_min_q16;
-    q16_t angle_max_q16;
     q16_t stroke_mm_q16[CYLINDERS_MAX];
     q16_t following_error_mm_q16;
     frame_dialect_t dialect;
@@ -121,6 +124,12 @@ typedef struct {
     uint32_t reject_suppressed[FRAME_ERRORS];
 } frame_receiver_t;
 
+/** Roll, pitch, yaw and the angle of the motor of a frame, as sent. */
+typedef struct {
+    bool is_there[ROTATIONS];
+    q16_t deg_q16[ROTATIONS];
+} rotations_t;
+
 /** The sender in control and what it asks for; members are private to src/gateway. */
 typedef struct {
     owner_t owner;
@@ -137,7 +146,10 @@ typedef struct {
     uint64_t other_logged_us; /**< 0 = never */
     uint32_t other_suppressed;
     uint64_t spike_logged_us;
-    uint32_t spikes_logged; /**< spikes that are already in the log */
+    uint32_t spikes_logged;                /**< spikes that are already in the log */
+    q32_t rotation_deg_q32[AXIS_YAW + 1u]; /**< of the last pose that was followed, within the limits */
+    rotations_t rotations;                 /**< of the last frame, as sent */
+    uint64_t turn_logged_us;
     uint64_t digits_logged_us;
     uint64_t jump_logged_us;
     uint32_t jumps_logged; /**< likewise */

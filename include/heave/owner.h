@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * owner.h - decides which sender's frames the platform follows: one sender at a time.
- * The protocol has no log-in, so senders are identified by their address (not by the port: it changes when a program restarts).
+ * The protocol has no log-in, so senders are identified by their address. The port changes when a program restarts, and with some
+ * programs in every frame, so a new port is the same sender; but ports of one address that take turns are several programs
+ * (on one PC, or behind one router), and from then on the port counts too.
  * The first sender of a valid frame drives. Another sender takes over when the driving one has been silent for long enough, or at
  * once if it has a higher priority. Pure: time and settings are arguments; one caller at a time.
  */
@@ -9,11 +11,19 @@
 
 #include "heave/hal/udp.h"
 
-/** Who drives. Zeroed: nobody yet. */
+/** Ports of one address that are remembered. */
+#define OWNER_PORTS 4u
+
+/** Who drives. Zeroed: nobody yet. Readable: is_taken to is_port_fixed. */
 typedef struct {
     bool is_taken;
     hal_udp_peer_t peer; /**< the last port it used */
     uint64_t last_us;    /**< its last valid frame */
+    bool is_port_fixed;  /**< programs of this address have taken turns: only peer.port drives */
+
+    uint8_t ports; /**< private from here on: so many of them are valid */
+    uint8_t turns; /**< in a row, to a port that was there before */
+    uint16_t port[OWNER_PORTS];
 } owner_t;
 
 /** Decision about a frame. */

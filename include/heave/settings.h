@@ -19,9 +19,9 @@ typedef enum {
     ENGAGE_AUTO    /**< by itself, once after the start */
 } engage_policy_t;
 
-/** How an angle of the rotation motor is interpreted. */
+/** How an angle is interpreted. */
 typedef enum {
-    ANGLE_AS_SENT, /**< the number as it is, several turns allowed */
+    ANGLE_AS_SENT, /**< the number as it is; of the rotation motor, several turns allowed */
     ANGLE_SHORTEST /**< modulo one turn, the shorter way round */
 } angle_wrap_t;
 
@@ -38,11 +38,13 @@ typedef struct {
     int8_t sign;      /**< 1 or -1 */
     q16_t scale_q16;  /**< [0, 100] */
     q16_t offset_q16; /**< u */
-    q16_t min_q16;    /**< u */
-    q16_t max_q16;    /**< u, above min */
-    q16_t speed_q16;  /**< u/s, above 0 */
-    q16_t accel_q16;  /**< u/s^2, above 0 */
-    int32_t jerk;     /**< u/s^3, whole units, above 0 */
+    angle_wrap_t
+        wrap;      /**< of rotations. A turn is 360 deg as sent (scale times 360 of the axis), of the motor 360 deg of its own */
+    q16_t min_q16; /**< u */
+    q16_t max_q16; /**< u, above min */
+    q16_t speed_q16; /**< u/s, above 0 */
+    q16_t accel_q16; /**< u/s^2, above 0 */
+    int32_t jerk;    /**< u/s^3, whole units, above 0 */
 } axis_settings_t;
 
 /** Number and limits of the relays: see relay_policy.h. */
@@ -65,7 +67,6 @@ typedef struct {
 
     axis_settings_t axis[AXES_MAX]; /**< the last one is the rotation motor */
     bool has_angle;
-    angle_wrap_t angle_wrap;
     stream_style_t stream_style;
     uint32_t delay_max_ms; /**< [0, 1000]: upper limit of a stream's delay when its samples come late */
     uint32_t spike_gate;   /**< [0, SPIKE_FILTER_FACTOR_MAX] times accel_q16 of an axis; 0 = off */

@@ -104,6 +104,12 @@ const size_t config_section_count = sizeof config_sections / sizeof config_secti
     {KEY("geometry", set "_turn_deg"), AT(member.turn_deg_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "deg",              \
      .fallback = "0", RANGE(-180, 180), .help = "all these joints turned by so much, clockwise as seen from above"}
 
+/* How a rotation of the pose is read. */
+#define WRAP(name, index, need)                                                                                                 \
+    {KEY(name, "wrap"), AT(settings.axis[index].wrap), .type = CONFIG_WORD, .unit = "", .fallback = "as-sent",                  \
+     .words = "as-sent|shortest", .needs = need,                                                                               \
+     .help = "the number as it is; or modulo one turn, as of senders that count from 0 to 360: 358 is -2, the shorter way round from the last value sent, as far as the limits let it"}
+
 /* The rows of one axis; left_out: what stands for limits that the file does not give. */
 #define AXIS(name, u, index, need, low, high, left_out)                                                                         \
     {KEY(name, "sign"), AT(settings.axis[index].sign), .type = CONFIG_SIGN, .unit = "", .fallback = "1", .needs = need,         \
@@ -172,11 +178,14 @@ const config_key_t config_keys[] = {
      RANGE(0, 4000), .help = "of all cylinders, in which people board"},
 
     AXIS("roll", "deg", AXIS_ROLL, CONFIG_NEEDS_NOTHING, -90, 90, "suggested"),
+    WRAP("roll", AXIS_ROLL, CONFIG_NEEDS_NOTHING),
     AXIS("pitch", "deg", AXIS_PITCH, CONFIG_NEEDS_NOTHING, -90, 90, "suggested"),
+    WRAP("pitch", AXIS_PITCH, CONFIG_NEEDS_NOTHING),
     AXIS("yaw", "deg", AXIS_YAW, CONFIG_NEEDS_HEXAPOD, -180, 180, "suggested"),
+    WRAP("yaw", AXIS_YAW, CONFIG_NEEDS_HEXAPOD),
     {KEY("angle", "present"), AT(settings.has_angle), .type = CONFIG_YES_NO, .unit = "", .fallback = "no",
      .help = "whether there is a rotation motor; the other keys of the section are for yes only"},
-    {KEY("angle", "wrap"), AT(settings.angle_wrap), .type = CONFIG_WORD, .unit = "", .fallback = "as-sent",
+    {KEY("angle", "wrap"), AT(settings.axis[AXIS_ANGLE].wrap), .type = CONFIG_WORD, .unit = "", .fallback = "as-sent",
      .words = "as-sent|shortest", .needs = CONFIG_NEEDS_ANGLE,
      .help = "the number as it is, several turns allowed; or modulo one turn, the shorter way round from the last angle sent, as far as "
              "the limits let it"},

@@ -58,12 +58,9 @@ static void keep_settings(gateway_settings_t *own, const settings_t *settings)
     own->auto_frames = settings->auto_frames;
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const axis_settings_t *axis = &settings->axis[i];
-        own->axis[i] = (axis_input_t){axis->sign, axis->scale_q16, axis->offset_q16};
+        own->axis[i] = (axis_input_t){axis->sign, axis->scale_q16, axis->offset_q16, axis->wrap, axis->min_q16, axis->max_q16};
     }
     own->has_angle = settings->has_angle;
-    own->angle_wrap = settings->angle_wrap;
-    own->angle_min_q16 = settings->axis[AXIS_ANGLE].min_q16;
-    own->angle_max_q16 = settings->axis[AXIS_ANGLE].max_q16;
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
         own->stroke_mm_q16[i] = settings->stroke_mm_q16[i];
     }
@@ -125,15 +122,15 @@ static bool are_settings_sane(const gateway_settings_t *saved, const gateway_set
 {
     bool is_sane = saved->cycle_us == prepared->cycle_us && sane_bool(&saved->has_angle) &&
                    saved->has_angle == prepared->has_angle && saved->engage == prepared->engage &&
-                   saved->auto_frames == prepared->auto_frames && saved->angle_wrap == prepared->angle_wrap &&
-                   saved->angle_min_q16 == prepared->angle_min_q16 && saved->angle_max_q16 == prepared->angle_max_q16 &&
-                   saved->relays.count == prepared->relays.count && is_pulse_same(&saved->healthy, &prepared->healthy) &&
-                   (unsigned)saved->dialect <= FRAME_LENIENT && (unsigned)saved->mask_policy <= MASK_ANY &&
-                   saved->priority.count <= HAL_UDP_NETWORKS_MAX && saved->following_error_mm_q16 >= 0 &&
-                   saved->confirm_jump_mm_q16 >= 0 && saved->confirm_jump_deg_q16 >= 0;
+                   saved->auto_frames == prepared->auto_frames && saved->relays.count == prepared->relays.count &&
+                   is_pulse_same(&saved->healthy, &prepared->healthy) && (unsigned)saved->dialect <= FRAME_LENIENT &&
+                   (unsigned)saved->mask_policy <= MASK_ANY && saved->priority.count <= HAL_UDP_NETWORKS_MAX &&
+                   saved->following_error_mm_q16 >= 0 && saved->confirm_jump_mm_q16 >= 0 && saved->confirm_jump_deg_q16 >= 0;
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const axis_input_t *axis = &saved->axis[i], *own = &prepared->axis[i];
-        is_sane = is_sane && axis->sign == own->sign && axis->scale_q16 == own->scale_q16 && axis->offset_q16 == own->offset_q16;
+        is_sane = is_sane && axis->sign == own->sign && axis->scale_q16 == own->scale_q16 &&
+                  axis->offset_q16 == own->offset_q16 && axis->wrap == own->wrap && axis->min_q16 == own->min_q16 &&
+                  axis->max_q16 == own->max_q16;
     }
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
         is_sane = is_sane && saved->stroke_mm_q16[i] == prepared->stroke_mm_q16[i];
@@ -198,6 +195,15 @@ static bool are_bools_sane(const gateway_t *saved)
            sane_bool(&saved->relay_output.healthy.level);
 }
 
+static bool are_rotations_sane(const rotations_t *rotations)
+{
+    bool is_sane = true;
+    for (unsigned i = 0; i < ROTATIONS; i++) {
+        is_sane = is_sane && sane_bool(&rotations->is_there[i]);
+    }
+    return is_sane;
+}
+
 /* A file may hold anything: every index, enum, bool and divisor is judged before it is used. */
 static bool is_saved_sane(const gateway_t *saved, const gateway_t *prepared)
 {
@@ -208,6 +214,7 @@ static bool is_saved_sane(const gateway_t *saved, const gateway_t *prepared)
            auto_engage_is_sane(&saved->auto_engage, &prepared->auto_engage) && owner_is_sane(&saved->sender.owner) &&
            sane_time(saved->power_since_us) && sane_time(saved->relay_output.healthy.ill_us) &&
            sane_time(saved->relay_output.healthy.changed_us) && confirm_is_sane(&saved->sender.confirm) &&
+           sane_all_q32(saved->sender.rotation_deg_q32, AXIS_YAW + 1u) && are_rotations_sane(&saved->sender.rotations) &&
            mask_guard_is_sane(&saved->sender.mask_guard) && (unsigned)saved->snapshot.mask_habit <= MASK_DIGITS &&
            relay_policy_is_sane(&saved->relay_output.policy) && (unsigned)saved->sender.newest_command <= FRAME_COMMANDS &&
            motion_target_is_sane(&saved->sender.newest) && is_output_sane(&saved->output) &&

@@ -5,6 +5,8 @@
 
 #include "heave/sane.h"
 
+enum { TURNS = 3 };
+
 /* True where the sender that drives has to give way to another one now. */
 static bool gives_way(const owner_t *self, const hal_udp_peer_t *from, uint64_t silence_us, const hal_udp_networks_t *priority,
                       uint64_t busy_until_us, uint64_t now_us)
@@ -14,18 +16,68 @@ static bool gives_way(const owner_t *self, const hal_udp_peer_t *from, uint64_t 
     return is_silent || hal_udp_rank(priority, from) < hal_udp_rank(priority, &self->peer);
 }
 
+static bool is_known_port(const owner_t *self, uint16_t port)
+{
+    bool is_known = false;
+    for (unsigned i = 0; i < self->ports; i++) {
+        is_known = is_known || self->port[i] == port;
+    }
+    return is_known;
+}
+
+static void keep_port(owner_t *self, uint16_t port)
+{
+    for (unsigned i = OWNER_PORTS - 1; i > 0; i--) {
+        self->port[i] = self->port[i - 1];
+    }
+    self->port[0] = port;
+    self->ports = (uint8_t)(self->ports + (self->ports < OWNER_PORTS));
+}
+
+/* Three times in a row a port that was there before: these are several programs, and the first of them drives. Twice may be a
+ * late frame of a program that was started again, and the next one of the new program. */
+static void watch_port(owner_t *self, uint16_t port)
+{
+    if (self->ports > 0 && port == self->peer.port) {
+        return;
+    }
+    if (!is_known_port(self, port)) {
+        keep_port(self, port);
+        self->turns = 0;
+        return;
+    }
+    self->turns++;
+    if (self->turns == TURNS) {
+        self->is_port_fixed = true;
+        self->peer.port = self->port[self->ports - 1u];
+    }
+}
+
 owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t silence_us, const hal_udp_networks_t *priority,
                             uint64_t busy_until_us, uint64_t now_us)
 {
-    const bool is_same = !self->is_taken || silence_us == 0 || hal_udp_is_same_host(&self->peer, from);
+    const bool is_same_host = self->is_taken && hal_udp_is_same_host(&self->peer, from);
+    const bool is_same_port = !self->is_port_fixed || self->peer.port == from->port;
+    const bool is_same = !self->is_taken || silence_us == 0 || (is_same_host && is_same_port);
     if (!is_same && !gives_way(self, from, silence_us, priority, busy_until_us, now_us)) {
         return OWNER_OTHER;
     }
-    *self = (owner_t){.is_taken = true, .peer = *from, .last_us = now_us};
+    if (!is_same_host || !is_same_port || silence_us == 0) {
+        *self = (owner_t){.is_taken = true};
+    }
+    if (!self->is_port_fixed) {
+        watch_port(self, from->port);
+    }
+    if (self->is_port_fixed && self->peer.port != from->port) {
+        return OWNER_OTHER;
+    }
+    self->peer = *from;
+    self->last_us = now_us;
     return is_same ? OWNER_DRIVES : OWNER_NEW;
 }
 
 bool owner_is_sane(const owner_t *self)
 {
-    return sane_bool(&self->is_taken) && sane_bool(&self->peer.is_ipv6) && sane_time(self->last_us);
+    return sane_bool(&self->is_taken) && sane_bool(&self->peer.is_ipv6) && sane_time(self->last_us) &&
+           sane_bool(&self->is_port_fixed) && self->ports <= OWNER_PORTS && self->turns <= TURNS;
 }

@@ -156,6 +156,7 @@ static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t no
 {
     const gateway_settings_t *settings = &self->settings;
     const bool is_same_host = self->sender.owner.is_taken && hal_udp_is_same_host(&self->sender.owner.peer, from);
+    const bool was_port_fixed = self->sender.owner.is_port_fixed;
     const owner_verdict_t verdict = owner_judge(&self->sender.owner, from, (uint64_t)settings->takeover_ms * 1000,
                                                 &settings->priority, motion_timed_end_us(&self->motion), now_us);
     if (verdict == OWNER_OTHER) {
@@ -165,7 +166,11 @@ static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t no
     } else if (verdict == OWNER_NEW) {
         change_owner(self, now_us);
     }
-    if (verdict != OWNER_OTHER && !is_same_host) {
+    if (self->sender.owner.is_port_fixed && !was_port_fixed) {
+        hal_log_write(self->io.log, HAL_LOG_WARNING,
+                      "programs of one address send by turns: one of them drives, told by its port; end the others");
+    }
+    if (verdict == OWNER_NEW || (verdict == OWNER_DRIVES && !is_same_host)) {
         mask_guard_restart(&self->sender.mask_guard);
     }
     return verdict != OWNER_OTHER;
@@ -232,6 +237,15 @@ HV_OWN_FRAME static bool is_confirmed(gateway_t *self, const motion_target_t *ta
     return confirm_passes(&self->sender.confirm, &distance, &from, target, now_us);
 }
 
+static void keep_rotation(gateway_t *self, const motion_target_t *target)
+{
+    for (unsigned i = AXIS_ROLL; target->space == MOTION_POSE && i <= AXIS_YAW; i++) {
+        const axis_input_t *axis = &self->settings.axis[i];
+        self->sender.rotation_deg_q32[i] =
+            fx_clamp(target->value_q32[i], q32_from_q16(axis->min_q16), q32_from_q16(axis->max_q16));
+    }
+}
+
 /* Follows a target that nothing is to be waited for.
  * Returns false: it is impossible, and has been refused. */
 static bool follow(gateway_t *self, const motion_target_t *target, frame_command_t command, const hal_udp_peer_t *from,
@@ -240,6 +254,7 @@ static bool follow(gateway_t *self, const motion_target_t *target, frame_command
     const bool is_taken = take_target(self, target, command, from, now_us);
     if (is_taken) {
         confirm_followed(&self->sender.confirm, target);
+        keep_rotation(self, target);
     }
     return is_taken;
 }
@@ -259,6 +274,38 @@ static void watch_gap(gateway_t *self, uint64_t now_us)
     self->sender.stream_frames = !is_next                                     ? 0
                                  : self->sender.stream_frames < STREAM_FRAMES ? self->sender.stream_frames + 1
                                                                               : STREAM_FRAMES;
+}
+
+/* One line where a sender's angles go round from 0 to 360, say, and the platform would swing from one side to the other. */
+HV_OWN_FRAME static void watch_turn(gateway_t *self, const frame_t *frame, uint64_t now_us)
+{
+    const rotations_t now = target_rotations(frame);
+    const unsigned axis = target_jumps_by_turn(&self->settings, &self->sender.rotations, &now);
+    const bool is_stream = now_us - self->snapshot.last_frame_us < STREAM_PERIOD_US;
+    const bool is_due = self->sender.turn_logged_us == 0 || now_us - self->sender.turn_logged_us >= REJECT_LOG_INTERVAL_US;
+    self->sender.rotations = now;
+    if (axis == AXES_MAX || !is_stream || !is_due) {
+        return;
+    }
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    text_put(&text, axis_text(MOTION_POSE, axis));
+    text_put(&text, " jumps by nearly a whole turn from one frame to the next: set [");
+    text_put(&text, axis_text(MOTION_POSE, axis));
+    text_put(&text, "] wrap = shortest if this sender counts from 0 to 360, or from -180 to 180");
+    hal_log_write(self->io.log, HAL_LOG_WARNING, line);
+    self->sender.turn_logged_us = now_us;
+}
+
+/* As a target, by the last one of each axis that turns. */
+static motion_target_t target_from(gateway_t *self, const frame_t *frame, uint64_t now_us)
+{
+    q32_t last_deg_q32[AXES_MAX] = {[AXIS_ANGLE] = motion_angle_target(&self->motion)};
+    for (unsigned i = AXIS_ROLL; i <= AXIS_YAW; i++) {
+        last_deg_q32[i] = self->sender.rotation_deg_q32[i];
+    }
+    watch_turn(self, frame, now_us);
+    return target_of(&self->settings, last_deg_q32, frame);
 }
 
 void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
@@ -281,7 +328,7 @@ void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
         return;
     }
     auto_engage_frame(&self->auto_engage, now_us);
-    const motion_target_t target = target_of(&self->settings, motion_angle_target(&self->motion), frame);
+    const motion_target_t target = target_from(self, frame, now_us);
     actions_event(self, EVENT_FRAME, now_us);
     watch_gap(self, now_us);
     const bool is_waiting = !is_confirmed(self, &target, now_us);

@@ -3,7 +3,8 @@
  */
 #include "target.h"
 
-#define TURN_Q32 q32_from_int(360)
+#define TURN_Q32   q32_from_int(360)
+#define NEARLY_Q32 q32_from_int(30) /* of a turn, for what a sender may have turned meanwhile */
 
 /* Where the values of a frame go: an axis of the platform, or a cylinder (from SLOT_CYLINDER on). */
 enum { SLOT_CYLINDER = AXES_MAX };
@@ -46,33 +47,33 @@ static q32_t to_axis(const axis_input_t *axis, q16_t sent_q16)
 }
 
 /* The same angle some whole turns nearer, if it is beyond a limit and those bring it within both. */
-static q32_t turned_into_limits(const gateway_settings_t *settings, q32_t angle_q32)
+static q32_t turned_into_limits(const axis_input_t *axis, q32_t turn_q32, q32_t angle_q32)
 {
-    const q32_t min_q32 = q32_from_q16(settings->angle_min_q16);
-    const q32_t max_q32 = q32_from_q16(settings->angle_max_q16);
+    const q32_t min_q32 = q32_from_q16(axis->min_q16);
+    const q32_t max_q32 = q32_from_q16(axis->max_q16);
     const q32_t beyond_q32 = angle_q32 > max_q32 ? angle_q32 - max_q32 : angle_q32 < min_q32 ? angle_q32 - min_q32 : 0;
-    const q32_t turns = (fx_abs(beyond_q32) + TURN_Q32 - 1) / TURN_Q32;
-    const q32_t turned_q32 = angle_q32 - (beyond_q32 < 0 ? -turns : turns) * TURN_Q32;
+    const q32_t turns = (fx_abs(beyond_q32) + turn_q32 - 1) / turn_q32;
+    const q32_t turned_q32 = angle_q32 - (beyond_q32 < 0 ? -turns : turns) * turn_q32;
     return turned_q32 >= min_q32 && turned_q32 <= max_q32 ? turned_q32 : angle_q32;
 }
 
-/* If the motor takes the shorter way: the angle that is whole turns away and nearest to the last one that was asked for. Not to
- * where the motor is: it may be more than half a turn behind, and would change its direction with every frame. */
-static q32_t unwrap(const gateway_settings_t *settings, q32_t last_q32, q32_t angle_q32)
+/* If the shorter way is taken: the angle that is whole turns away and nearest to the last one that was asked for. Not to where
+ * the axis is: it may be more than half a turn behind, and would change its direction with every frame. */
+static q32_t unwrap(const axis_input_t *axis, q32_t turn_q32, q32_t last_q32, q32_t angle_q32)
 {
-    if (settings->angle_wrap == ANGLE_AS_SENT) {
+    if (axis->wrap == ANGLE_AS_SENT || turn_q32 == 0) {
         return angle_q32;
     }
-    q32_t travel_q32 = (angle_q32 - last_q32) % TURN_Q32;
-    if (travel_q32 > TURN_Q32 / 2) {
-        travel_q32 -= TURN_Q32;
-    } else if (travel_q32 < -TURN_Q32 / 2) {
-        travel_q32 += TURN_Q32;
+    q32_t travel_q32 = (angle_q32 - last_q32) % turn_q32;
+    if (travel_q32 > turn_q32 / 2) {
+        travel_q32 -= turn_q32;
+    } else if (travel_q32 < -turn_q32 / 2) {
+        travel_q32 += turn_q32;
     }
-    return turned_into_limits(settings, last_q32 + travel_q32);
+    return turned_into_limits(axis, turn_q32, last_q32 + travel_q32);
 }
 
-motion_target_t target_of(const gateway_settings_t *settings, q32_t last_angle_q32, const frame_t *frame)
+motion_target_t target_of(const gateway_settings_t *settings, const q32_t last_deg_q32[AXES_MAX], const frame_t *frame)
 {
     const bool is_pose = k_slots[frame->command][0] < SLOT_CYLINDER;
     motion_target_t target = {
@@ -89,9 +90,42 @@ motion_target_t target_of(const gateway_settings_t *settings, q32_t last_angle_q
     for (unsigned i = 0; is_pose && i < POSE_AXES; i++) {
         target.value_q32[i] = to_axis(&settings->axis[i], axis_q16[i]);
     }
+    for (unsigned i = AXIS_ROLL; is_pose && i <= AXIS_YAW; i++) { /* a turn of the sender's, which its scale makes another one */
+        const axis_input_t *axis = &settings->axis[i];
+        target.value_q32[i] = unwrap(axis, fx_mul_shift(TURN_Q32, axis->scale_q16, 16), last_deg_q32[i], target.value_q32[i]);
+    }
+    const axis_input_t *motor = &settings->axis[AXIS_ANGLE];
     target.has_angle = needs_angle(frame->command);
-    target.angle_deg_q32 = unwrap(settings, last_angle_q32, to_axis(&settings->axis[AXIS_ANGLE], axis_q16[AXIS_ANGLE]));
+    target.angle_deg_q32 = unwrap(motor, TURN_Q32, last_deg_q32[AXIS_ANGLE], to_axis(motor, axis_q16[AXIS_ANGLE]));
     return target;
+}
+
+static const uint8_t k_rotations[ROTATIONS] = {AXIS_ROLL, AXIS_PITCH, AXIS_YAW, AXIS_ANGLE};
+
+rotations_t target_rotations(const frame_t *frame)
+{
+    rotations_t rotations = {.is_there = {false}};
+    for (unsigned i = 0; i < frame->count; i++) {
+        for (unsigned k = 0; k < ROTATIONS; k++) {
+            if (k_slots[frame->command][i] == k_rotations[k]) {
+                rotations.is_there[k] = true;
+                rotations.deg_q16[k] = frame->value_q16[i];
+            }
+        }
+    }
+    return rotations;
+}
+
+unsigned target_jumps_by_turn(const gateway_settings_t *settings, const rotations_t *before, const rotations_t *now)
+{
+    for (unsigned k = 0; k < ROTATIONS; k++) {
+        const q32_t jump_q32 = fx_abs(q32_from_q16(now->deg_q16[k]) - q32_from_q16(before->deg_q16[k]));
+        const bool is_compared = before->is_there[k] && now->is_there[k] && settings->axis[k_rotations[k]].wrap == ANGLE_AS_SENT;
+        if (is_compared && fx_abs(jump_q32 - TURN_Q32) <= NEARLY_Q32) {
+            return k_rotations[k];
+        }
+    }
+    return AXES_MAX;
 }
 
 void target_received(snapshot_t *s, const frame_t *frame)

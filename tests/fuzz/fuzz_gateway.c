@@ -110,6 +110,10 @@ static void tidy_owner(owner_t *owner)
     owner->peer.scope_id = was.peer.scope_id;
     owner->peer.port = was.peer.port;
     owner->peer.is_ipv6 = was.peer.is_ipv6;
+    owner->is_port_fixed = was.is_port_fixed;
+    owner->ports = was.ports;
+    owner->turns = was.turns;
+    memcpy(owner->port, was.port, sizeof was.port);
 }
 
 static void tidy_target(motion_target_t *target)

@@ -310,7 +310,10 @@ static bool storm(settings_t settings, long cycles)
     settings.takeover_ms = 2500;
     settings.relay_safe_mask = 0x805;
     settings.relay_safe_after_ms = below(3) * 700;
-    settings.angle_wrap = one_in(2) ? ANGLE_SHORTEST : ANGLE_AS_SENT;
+    settings.axis[AXIS_ANGLE].wrap = one_in(2) ? ANGLE_SHORTEST : ANGLE_AS_SENT;
+    for (unsigned i = AXIS_ROLL; i <= AXIS_YAW; i++) {
+        settings.axis[i].wrap = one_in(2) ? ANGLE_SHORTEST : ANGLE_AS_SENT;
+    }
     m_cylinders = settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
     rig_start(&m_rig, &settings, false);
     m_rig.now_us = one_in(3) ? 0 : random_bits() >> (2 + below(40)); /* up for years, or for longer than anything lasts */

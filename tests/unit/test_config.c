@@ -593,7 +593,7 @@ static const spoilt_t k_spoilt[] = {
     {"roll", "scale", "sc\xD0\xB0le = 1", "[roll] sc\\xD0\\xB0le: unknown key; did you mean scale?"},
     {"roll", "scale", "= 1",
      "[roll] : unknown key; [roll] takes sign scale offset_deg min_deg max_deg speed_deg_s accel_deg_s2 "
-     "jerk_deg_s3"},
+     "jerk_deg_s3 wrap"},
     {"roll", "scale", "margin_mm = 1", "[roll] margin_mm: unknown key; it belongs to [cylinders]"},
     {"roll", "scale", "[roll", "malformed section header; allowed: [name] and nothing behind it but a ; comment"},
 };
@@ -1100,6 +1100,8 @@ static void test_load_values_arrive_where_they_belong(void)
     set_key("relays", "max_on_ms", "0, 0, 7000");
     set_key("relays", "min_toggle_ms", "250");
     set_key("inputs", "estop", "[E-STOP]");
+    set_key("yaw", "wrap", "shortest");
+    set_key("udp", "mask", "always");
     const int count = load_lines();
     TEST_ASSERT_EQUAL_STRING("", m_errors);
     TEST_ASSERT_EQUAL_INT(0, count);
@@ -1119,7 +1121,10 @@ static void test_load_values_arrive_where_they_belong(void)
     TEST_ASSERT_EQUAL_INT32(5898239, settings->axis[AXIS_Y].max_q16); /* 5898239.34 */
     TEST_ASSERT_EQUAL_INT32(2147483647, settings->axis[AXIS_Z].jerk);
     TEST_ASSERT_TRUE(settings->has_angle);
-    TEST_ASSERT_EQUAL_INT(ANGLE_SHORTEST, settings->angle_wrap);
+    TEST_ASSERT_EQUAL_INT(ANGLE_SHORTEST, settings->axis[AXIS_ANGLE].wrap);
+    TEST_ASSERT_EQUAL_INT(ANGLE_AS_SENT, settings->axis[AXIS_ROLL].wrap);
+    TEST_ASSERT_EQUAL_INT(ANGLE_SHORTEST, settings->axis[AXIS_YAW].wrap);
+    TEST_ASSERT_EQUAL_INT(MASK_ALWAYS, settings->mask_policy);
     TEST_ASSERT_EQUAL_INT(FRAME_LENIENT, settings->dialect);
     TEST_ASSERT_EQUAL_INT(STREAM_BALANCED, settings->stream_style);
     TEST_ASSERT_EQUAL_UINT32(10000, settings->silence_hold_ms);

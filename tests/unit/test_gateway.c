@@ -872,7 +872,7 @@ static void turn_to(double degrees)
 
 static void test_axes_shortest_angle_takes_the_shorter_way_round(void)
 {
-    m_settings.angle_wrap = ANGLE_SHORTEST;
+    m_settings.axis[AXIS_ANGLE].wrap = ANGLE_SHORTEST;
     engage();
     turn_to(359);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, -1, rig_angle_deg(&m_rig));
@@ -888,7 +888,7 @@ static void test_axes_shortest_angle_takes_the_shorter_way_round(void)
 /* The shorter way ends at a limit of the motor; the other way round does not. */
 static void test_axes_shortest_angle_turns_round_where_a_limit_is_in_the_way(void)
 {
-    m_settings.angle_wrap = ANGLE_SHORTEST;
+    m_settings.axis[AXIS_ANGLE].wrap = ANGLE_SHORTEST;
     m_settings.axis[AXIS_ANGLE].min_q16 = -200 * 65536;
     m_settings.axis[AXIS_ANGLE].max_q16 = 200 * 65536;
     engage();
@@ -910,12 +910,89 @@ static void test_axes_shortest_angle_turns_round_where_a_limit_is_in_the_way(voi
 
 static void test_axes_angle_as_sent_is_the_number_itself(void)
 {
-    m_settings.angle_wrap = ANGLE_AS_SENT;
+    m_settings.axis[AXIS_ANGLE].wrap = ANGLE_AS_SENT;
     engage();
     turn_to(359);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 359, rig_angle_deg(&m_rig));
     turn_to(1);
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1, rig_angle_deg(&m_rig));
+}
+
+/* A sender that counts from 0 to 360 moves the platform as one that counts from -180 to 180, whatever sign, scale and offset. */
+static void test_axes_rotations_from_0_to_360_move_as_signed_ones(void)
+{
+    static const char *const k_axes[] = {"@A6:%f,0,0,0,0,0#", "@A6:0,%f,0,0,0,0#", "@A6:0,0,%f,0,0,0#"};
+    for (unsigned axis = AXIS_ROLL; axis <= AXIS_YAW; axis++) {
+        for (int scaled = 0; scaled <= 1; scaled++) {
+            double signed_deg[400];
+            for (int is_turned = 0; is_turned <= 1; is_turned++) {
+                setUp();
+                m_settings.axis[axis].wrap = is_turned ? ANGLE_SHORTEST : ANGLE_AS_SENT;
+                m_settings.axis[axis].sign = scaled ? -1 : 1;
+                m_settings.axis[axis].scale_q16 = scaled ? 32768 : 65536;
+                m_settings.axis[axis].offset_q16 = scaled ? 2 * 65536 : 0;
+                engage();
+                for (unsigned i = 0; i < 400; i++) {
+                    const double deg = 6 * sin(i * 0.04);
+                    rig_sendf(&m_rig, k_axes[axis], is_turned && deg < 0 ? deg + 360 : deg);
+                    rig_run_ms(&m_rig, 16);
+                    const double at = rig_pose(&m_rig, axis);
+                    signed_deg[i] = is_turned ? signed_deg[i] : at;
+                    TEST_ASSERT_DOUBLE_WITHIN(0.001, signed_deg[i], at);
+                }
+                TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "jumps by nearly a whole turn"));
+            }
+        }
+    }
+}
+
+/* A heading goes all the way round: the platform goes from one limit to the other where that is the nearer one. */
+static void test_axes_heading_all_the_way_round_stays_within_the_limits(void)
+{
+    m_settings.axis[AXIS_YAW].wrap = ANGLE_SHORTEST;
+    m_settings.axis[AXIS_YAW].min_q16 = -10 * 65536;
+    m_settings.axis[AXIS_YAW].max_q16 = 10 * 65536;
+    engage();
+    for (unsigned turn = 0; turn < 3; turn++) {
+        for (unsigned deg = 0; deg < 360; deg += 2) {
+            rig_sendf(&m_rig, "@A6:0,0,%u,0,0,0#", deg);
+            rig_run_ms(&m_rig, 100);
+            const double asked = deg <= 10 ? deg : deg <= 190 ? 10 : deg < 350 ? -10 : (double)deg - 360;
+            const bool is_on_its_way = deg > 188 && deg < 220;
+            TEST_ASSERT_TRUE(is_on_its_way || fabs(rig_pose(&m_rig, AXIS_YAW) - asked) < 6);
+        }
+    }
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "jumps by nearly a whole turn"));
+}
+
+/* As sent, the platform would swing from limit to limit: that is followed, and told. */
+static void test_axes_jump_by_a_turn_is_told(void)
+{
+    static const struct {
+        const char *first, *second, *told; /**< told: NULL: nothing */
+        unsigned pause_ms;
+    } k_rows[] = {{"@A6:0,0,1,0,0,0#", "@A6:0,0,359,0,0,0#", "yaw jumps by nearly a whole turn", 16},
+                  {"@A6:0,0,359.5,0,0,0#", "@A6:0,0,4,0,0,0#", "set [yaw] wrap = shortest", 16},
+                  {"@A6:179,0,0,0,0,0#", "@A6:-179,0,0,0,0,0#", "roll jumps", 16},
+                  {"@A6:0,-175,0,0,0,0#", "@A6:0,170,0,0,0,0#", "pitch jumps", 16},
+                  {"@A7:0,0,0,0,0,0,355#", "@A7:0,0,0,0,0,0,2#", "angle jumps", 16},
+                  {"@A6:0,0,1,0,0,0#", "@A6:0,0,320,0,0,0#", NULL, 16},
+                  {"@A6:0,0,1,0,0,0#", "@A6:0,0,359,0,0,0#", NULL, 400}, /* poses one by one */
+                  {"@A6:0,0,359,0,0,0#", "@A3:0,0,0#", NULL, 16},        /* it does not say so, it has none */
+                  {"@C6:100,100,100,100,100,100#", "@C6:100,101,100,100,100,100#", NULL, 16}};
+    for (unsigned i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        engage();
+        send_and_run(k_rows[i].first, k_rows[i].pause_ms);
+        send_and_run(k_rows[i].second, 3000);
+        const char *told = k_rows[i].told != NULL ? k_rows[i].told : "jumps by nearly a whole turn";
+        TEST_ASSERT_EQUAL_MESSAGE(k_rows[i].told != NULL, rig_was_logged(&m_rig, told), k_rows[i].second);
+    }
+    engage(); /* and not with every frame */
+    for (unsigned i = 0; i < 60; i++) {
+        send_and_run(i % 2 ? "@A6:0,0,1,0,0,0#" : "@A6:0,0,359,0,0,0#", 16);
+    }
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "yaw jumps"));
+    TEST_ASSERT_FALSE(rig_was_logged(&m_rig, "yaw jumps"));
 }
 
 static void test_axes_frame_without_angle_keeps_it(void)
@@ -1107,6 +1184,43 @@ static void test_senders_priority_takes_over_in_motion_without_a_jump(void)
         assert_heights(-40); /* limits are judged in tearDown */
         TEST_ASSERT_EQUAL_UINT32(1, counted()->owner_changes);
     }
+}
+
+static void send_from_port(uint16_t port, const char *text)
+{
+    const hal_udp_peer_t from = {.address = {10, 0, 0, 1}, .port = port};
+    TEST_ASSERT_EQUAL(HV_OK, sim_udp_push(&m_rig.udp, (const uint8_t *)text, strlen(text), &from));
+}
+
+/* Two programs of one PC: the first one drives, and the second one's poses are not between its own. */
+static void test_sender_second_program_of_its_address_is_another_one(void)
+{
+    m_settings.takeover_ms = 2500;
+    start(true);
+    TEST_ASSERT_TRUE(rig_run_until(&m_rig, STATE_ENGAGED, 20000));
+    double lowest = 0;
+    for (unsigned i = 0; i < 600; i++) {
+        send_from_port(5000, "@A6:0,0,0,0,0,40,1#");
+        rig_run_ms(&m_rig, 8);
+        if (i >= 20) {
+            send_from_port(5001, "@A6:0,0,0,0,0,-40,2#");
+        }
+        rig_run_ms(&m_rig, 8);
+        lowest = fmin(lowest, rig_pose(&m_rig, AXIS_Z));
+    }
+    assert_heights(40);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 0, lowest);
+    TEST_ASSERT_EQUAL_HEX16(0x1, m_rig.relays.mask);
+    TEST_ASSERT_EQUAL_UINT16(5001, seen()->other.peer.port);
+    TEST_ASSERT_EQUAL_UINT32(578, counted()->other_sender);
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "programs of one address send by turns"));
+    TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "frame from 10.0.0.1:5001 not followed: 10.0.0.1:5000 drives"));
+    for (unsigned i = 0; i < 400; i++) { /* the first one ends */
+        send_from_port(5001, "@A6:0,0,0,0,0,-40,2#");
+        rig_run_ms(&m_rig, 16);
+    }
+    assert_heights(-40);
+    TEST_ASSERT_EQUAL_UINT32(1, counted()->owner_changes);
 }
 
 /* ---- far jumps ---- */
@@ -2483,6 +2597,9 @@ static void run_driving(void)
     RUN_TEST(test_axes_shortest_angle_takes_the_shorter_way_round);
     RUN_TEST(test_axes_shortest_angle_turns_round_where_a_limit_is_in_the_way);
     RUN_TEST(test_axes_angle_as_sent_is_the_number_itself);
+    RUN_TEST(test_axes_rotations_from_0_to_360_move_as_signed_ones);
+    RUN_TEST(test_axes_heading_all_the_way_round_stays_within_the_limits);
+    RUN_TEST(test_axes_jump_by_a_turn_is_told);
     RUN_TEST(test_axes_frame_without_angle_keeps_it);
     RUN_TEST(test_silence_holds_then_neutral_then_settles);
     RUN_TEST(test_silence_returning_sender_engages_again_at_engage_speed);
@@ -2494,6 +2611,7 @@ static void run_driving(void)
     RUN_TEST(test_senders_stream_that_returns_after_a_gap_is_taken_over_at_engage_speed);
     RUN_TEST(test_senders_poses_one_by_one_are_at_full_speed_whatever_is_between);
     RUN_TEST(test_senders_priority_takes_over_in_motion_without_a_jump);
+    RUN_TEST(test_sender_second_program_of_its_address_is_another_one);
     RUN_TEST(test_jumps_lone_far_frame_moves_nothing_relays_neither);
     RUN_TEST(test_jumps_are_named_by_cylinder_and_motor);
     RUN_TEST(test_jumps_are_no_matter_before_anybody_is_followed);

@@ -114,6 +114,78 @@ static void test_owner_judge_random_senders_agree_with_the_history(void)
     }
 }
 
+/* --- Programs of one address --- */
+
+static owner_verdict_t from_port(uint16_t port, uint64_t now_us)
+{
+    hal_udp_peer_t peer = host(1);
+    peer.port = port;
+    return owner_judge(&m_owner, &peer, SILENCE_US, &m_priority, 0, now_us);
+}
+
+/* Of so many programs at any paces, at most two frames of each but the first are taken before one drives. */
+static void test_owner_judge_ports_that_take_turns_are_several_programs(void)
+{
+    for (unsigned programs = 2; programs <= OWNER_PORTS; programs++) {
+        for (unsigned pace = 1; pace <= 5; pace++) {
+            setUp();
+            unsigned taken = 0;
+            for (uint64_t t = 0; t < 100; t++) {
+                TEST_ASSERT_EQUAL(OWNER_DRIVES, from_port(4000, t * 10000));
+                for (unsigned k = 1; k < programs && t % pace == 0; k++) {
+                    taken += from_port((uint16_t)(4000 + k), t * 10000 + k) != OWNER_OTHER;
+                }
+            }
+            TEST_ASSERT_TRUE(m_owner.is_port_fixed);
+            TEST_ASSERT_EQUAL_UINT16(4000, m_owner.peer.port);
+            TEST_ASSERT_LESS_OR_EQUAL_UINT(2 * (programs - 1), taken);
+        }
+    }
+}
+
+static void test_owner_judge_the_other_program_takes_over_after_silence(void)
+{
+    for (uint64_t t = 0; t < 10; t++) {
+        (void)from_port(t % 2 == 0 ? 4000 : 4001, t);
+    }
+    TEST_ASSERT_EQUAL(OWNER_OTHER, from_port(4001, 8 + SILENCE_US - 1));
+    TEST_ASSERT_EQUAL(OWNER_OTHER, from_port(9, 8 + SILENCE_US - 1)); /* a new port is another program, too */
+    TEST_ASSERT_EQUAL(OWNER_NEW, from_port(4001, 8 + SILENCE_US));
+    TEST_ASSERT_FALSE(m_owner.is_port_fixed);
+    TEST_ASSERT_EQUAL(OWNER_DRIVES, from_port(4002, 9 + SILENCE_US)); /* and is learnt anew */
+}
+
+static void test_owner_judge_a_new_port_in_each_frame_is_one_sender(void)
+{
+    uint32_t random = 1;
+    for (uint64_t t = 0; t < 100000; t++) {
+        random = random * 1664525u + 1013904223u;
+        TEST_ASSERT_EQUAL(OWNER_DRIVES, from_port((uint16_t)(32768 + (random >> 8) % 28232), t * 16000));
+    }
+}
+
+/* As with a program that is started again and again, with a late frame of the one before. */
+static void test_owner_judge_a_program_that_starts_again_is_one_sender(void)
+{
+    uint64_t t = 0;
+    for (uint16_t start = 0; start < 1000; start++) {
+        for (unsigned frame = 0; frame < 5; frame++) {
+            const bool is_late = frame == 3 && start > 0 && start % 3 == 0;
+            TEST_ASSERT_EQUAL(OWNER_DRIVES, from_port((uint16_t)(40000 + start - is_late), t++));
+        }
+    }
+    TEST_ASSERT_FALSE(m_owner.is_port_fixed);
+}
+
+static void test_owner_judge_where_all_are_followed_ports_do_not_matter(void)
+{
+    for (uint64_t t = 0; t < 100; t++) {
+        hal_udp_peer_t peer = host(1);
+        peer.port = (uint16_t)(4000 + t % 3);
+        TEST_ASSERT_EQUAL(OWNER_DRIVES, owner_judge(&m_owner, &peer, 0, &m_priority, 0, t));
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -125,5 +197,10 @@ int main(void)
     RUN_TEST(test_owner_judge_without_silence_every_sender_is_followed);
     RUN_TEST(test_owner_judge_priority_takes_over_at_once_and_never_backwards);
     RUN_TEST(test_owner_judge_random_senders_agree_with_the_history);
+    RUN_TEST(test_owner_judge_ports_that_take_turns_are_several_programs);
+    RUN_TEST(test_owner_judge_the_other_program_takes_over_after_silence);
+    RUN_TEST(test_owner_judge_a_new_port_in_each_frame_is_one_sender);
+    RUN_TEST(test_owner_judge_a_program_that_starts_again_is_one_sender);
+    RUN_TEST(test_owner_judge_where_all_are_followed_ports_do_not_matter);
     return UNITY_END();
 }
