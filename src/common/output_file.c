@@ -29,7 +29,8 @@ int output_file_unblocked(int fd)
 
 bool output_file_open(output_file_t *self, const char *path, output_file_patience_t patience)
 {
-    const int flags = O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | (patience == OUTPUT_FILE_WAITS ? 0 : O_NONBLOCK);
+    static const int k_more[] = {[OUTPUT_FILE_WAITS] = 0, [OUTPUT_FILE_IS_NEW] = O_EXCL, [OUTPUT_FILE_GOES_ON] = O_NONBLOCK};
+    const int flags = O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC | k_more[patience];
     const bool is_stdout = strcmp(path, "-") == 0;
     self->length = 0;
     self->patience = patience;
@@ -50,7 +51,7 @@ bool output_file_has_room(const output_file_t *self, size_t length)
 static bool waits_for_room(output_file_t *self)
 {
     struct pollfd wait = {.fd = self->fd, .events = POLLOUT};
-    if (self->patience != OUTPUT_FILE_WAITS) {
+    if (self->patience == OUTPUT_FILE_GOES_ON) {
         return false;
     }
     if (poll(&wait, 1, -1) < 0 && errno != EINTR) {

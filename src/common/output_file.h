@@ -12,6 +12,7 @@
 /** What to do when the other end of a pipe does not read. */
 typedef enum {
     OUTPUT_FILE_WAITS,  /**< for it */
+    OUTPUT_FILE_IS_NEW, /**< for it; the file must not exist, not even as a link */
     OUTPUT_FILE_GOES_ON /**< keep what waits in the buffer, as far as it has room */
 } output_file_patience_t;
 

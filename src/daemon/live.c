@@ -24,7 +24,9 @@
 #include "daemon/flood_filter.h"
 #include "daemon/motion_loop.h"
 #include "daemon/reconfigure.h"
+#include "daemon/locks.h"
 #include "daemon/sd_notify.h"
+#include "daemon/signals.h"
 #include "daemon/writers.h"
 #include "linux_clock.h"
 #include "linux_udp.h"
@@ -50,11 +52,11 @@ typedef struct {
     blackbox_t blackbox;
     operator_log_t operators;
     lifetime_t life;
+    locks_t locks;
     motion_view_words_t view; /**< for the manager, the life of the machine and the watch over floods */
     linux_udp_t udp;
     writers_t writers;
-    bool was_lossy; /**< it has been said that something is lost */
-    bool was_held;  /**< a hold delays the end, which has been said */
+    bool was_held; /**< a hold delays the end, which has been said */
     int signal_fd;
     bool is_ready; /* once */
     bool is_thread_running;
@@ -107,30 +109,12 @@ static void watch_floods(live_t *self, uint64_t now)
 
 /* --- Signals --- */
 
-static bool open_signals(live_t *self)
-{
-    sigset_t set;
-    (void)signal(SIGPIPE, SIG_IGN);
-    (void)sigemptyset(&set);
-    (void)sigaddset(&set, SIGTERM);
-    (void)sigaddset(&set, SIGINT);
-    (void)sigaddset(&set, SIGHUP);
-    if (sigprocmask(SIG_BLOCK, &set, NULL) != 0) {
-        return false;
-    }
-    self->signal_fd = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-    return self->signal_fd >= 0;
-}
-
 /* Who has sent it, as far as the kernel says. */
 static void log_signal(live_t *self, const struct signalfd_siginfo *info)
 {
     operator_entry_t entry = {.uid = info->ssi_uid, .pid = (int32_t)info->ssi_pid, .level = LEVEL_SERVICE};
     (void)clock_gettime(CLOCK_REALTIME, &entry.at);
-    (void)snprintf(entry.request, sizeof entry.request, "%s",
-                   info->ssi_signo == SIGHUP    ? "SIGHUP"
-                   : info->ssi_signo == SIGTERM ? "SIGTERM"
-                                                : "SIGINT");
+    (void)snprintf(entry.request, sizeof entry.request, "%s", signals_name((int)info->ssi_signo));
     entry.before = entry.after = control_state(&self->control);
     operator_log_add(&self->operators, &entry);
 }
@@ -224,13 +208,7 @@ static void count_losses(live_t *self)
     lost->digest = self->store.digest;
     lost->put_back = self->store.put_back;
     lost->is_unapproved = __atomic_load_n(&self->loop.handover.is_unapproved, __ATOMIC_ACQUIRE) != 0;
-    const bool is_lossy = lost->trace_rows != 0 || lost->record_lines != 0;
-    if (is_lossy && !self->was_lossy) {
-        writers_say(&self->writers,
-                    "what is written is lost: the disk or the reader of %s is too slow; `lost` in the status counts",
-                    lost->record_lines != 0 ? "--record" : "--trace");
-    }
-    self->was_lossy = is_lossy;
+    writers_say_losses(&self->writers);
 }
 
 /* Somebody has put the platform on hold after the signal. It says what will happen, and the manager waits as long. */
@@ -407,6 +385,7 @@ static int open_all(live_t *self, const config_t *config)
     code = code == EXIT_DONE
                ? control_open(&self->control, path, &self->config, &self->loop.handover, &self->blackbox, &self->operators)
                : code;
+    code = code == EXIT_DONE ? locks_take(&self->locks, config) : code;
     code = code == EXIT_DONE ? writers_open(&self->writers, self->options, config, &self->loop) : code;
     code = code == EXIT_DONE ? operator_log_open(&self->operators, config) : code;
     const uint32_t cylinders = config->settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
@@ -423,7 +402,8 @@ static int open_all(live_t *self, const config_t *config)
     if (!reconfigure_open(&self->reconfigure)) {
         return print_message(EXIT_UNAVAILABLE, "no memory");
     }
-    if (!open_signals(self)) {
+    self->signal_fd = signals_open();
+    if (self->signal_fd < 0) {
         return print_message(EXIT_UNAVAILABLE, "signals: %s", strerror(errno));
     }
     if (!samples_writer_open(&self->loop.samples, config)) { /* who looks on has to do without: the platform does not need it */
@@ -462,6 +442,7 @@ int live_run(const config_t *config, const options_t *options, bool *is_ready)
             ? "heaved writes --record or --trace, and does not start anew by itself: end it, and start it with "
               "another file"
             : NULL;
+    self->locks = (locks_t){{-1, -1, -1, -1}};
     control_init(&self->control);
     self->manager.fd = -1;
     self->has_writers_ended = true;
@@ -477,6 +458,7 @@ int live_run(const config_t *config, const options_t *options, bool *is_ready)
     const bool has_life_ended = lifetime_close(&self->life);
     const bool has_store_ended = config_store_close(&self->store);
     const bool has_log_ended = operator_log_close(&self->operators) && has_life_ended && has_store_ended;
+    locks_release(&self->locks);
     if (!self->is_thread_running) { /* a stuck thread may still use all this: the end of the process gives it back */
         const bool has_blackbox_ended = blackbox_close(&self->blackbox);
         const bool have_devices_ended = devices_close(&self->loop.devices, self->config.settings.relay_safe_mask);

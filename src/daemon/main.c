@@ -14,6 +14,7 @@
 #include "common/message.h"
 #include "common/presets.h"
 #include "common/same_file.h"
+#include "common/state_path.h"
 #include "common/standard_descriptors.h"
 #include "common/translate.h"
 #include "common/usage.h"
@@ -32,6 +33,8 @@
 #include "inspect/report.h"
 #include "inspect/scan.h"
 #include "service/config_store.h"
+#include "service/lifetime.h"
+#include "service/operator_log.h"
 
 #define DESCRIPTORS_MIN 64 /* all clients, lines and files at once; half of it is used in the worst case */
 
@@ -59,14 +62,31 @@ typedef struct {
     bool is_output;
 } named_t;
 
-/* Before anything is opened: an output that is an input would empty it, and two outputs would overwrite each other.
- * Returns EXIT_DONE; else it has said what is wrong. */
-static int check_outputs(const options_t *options, const char *metrics)
+static const char *if_any(const char *path)
 {
-    const named_t named[] = {{"--config", options->config, false}, {"--play", options->play, false},
-                             {"--trace", options->trace, true},    {"--record", options->record, true},
-                             {"--eds", options->eds, false},       {"--envelope", options->envelope, true},
-                             {"[control] metrics", metrics, true}};
+    return path[0] != '\0' && strcmp(path, "none") != 0 ? path : NULL;
+}
+
+/* Before anything is opened: an output that is an input would empty it, and two outputs would overwrite each other.
+ * config: NULL before it has been read.
+ * Returns EXIT_DONE; else it has said what is wrong. */
+static int check_outputs(const options_t *options, const config_t *config)
+{
+    char life[CONFIG_PATH_MAX] = "", operators[CONFIG_PATH_MAX] = "";
+    const char *metrics = config != NULL && options->mode == MODE_RUN ? config->metrics_file : "";
+    if (config != NULL) {
+        (void)state_path(life, sizeof life, config->life_file, "/" LIFETIME_NAME);
+        (void)state_path(operators, sizeof operators, config->operator_log, "/" OPERATOR_LOG_NAME);
+    }
+    const named_t named[] = {{"--config", options->config, false},
+                             {"--play", options->play, false},
+                             {"--trace", options->trace, true},
+                             {"--record", options->record, true},
+                             {"--eds", options->eds, false},
+                             {"--envelope", options->envelope, true},
+                             {"[control] metrics", if_any(metrics), true},
+                             {"[control] operator_log", if_any(operators), true},
+                             {"[platform] life_file", if_any(life), true}};
     for (size_t out = 0; out < sizeof named / sizeof named[0]; out++) {
         for (size_t in = 0; named[out].is_output && named[out].path != NULL && in < out; in++) {
             if (named[in].path != NULL && same_file(named[out].path, named[in].path, named[in].is_output)) {
@@ -306,8 +326,7 @@ static int load(const options_t *options, config_t *config)
     if (config_load(options->config, config, stderr) != 0) {
         return EXIT_BAD_CONFIG;
     }
-    const bool has_metrics = options->mode == MODE_RUN && strcmp(config->metrics_file, "none") != 0;
-    return check_outputs(options, has_metrics ? config->metrics_file : NULL);
+    return check_outputs(options, config);
 }
 
 static int run_live(options_t *options, config_t *config, char **argv)

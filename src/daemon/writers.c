@@ -26,32 +26,42 @@ static uint64_t now_us(const writers_t *self)
 
 /* --- Recording and trace --- */
 
+/* After an error lines are still taken from the ring, and counted. */
+static void put_line(writers_file_t *out, const char *line, size_t length)
+{
+    output_file_write(&out->file, line, length);
+    if (out->file.error != 0) {
+        __atomic_store_n(&out->error, out->file.error, __ATOMIC_RELAXED);
+        __atomic_store_n(&out->thrown, out->thrown + 1u, __ATOMIC_RELAXED);
+    }
+}
+
 /* What fits into the buffer, and as much of that as the file takes. What has to wait stays in the ring, which counts what it
  * cannot hold. */
 static void write_records(writers_t *self)
 {
     record_t record;
     char line[RECORD_LINE_MAX];
-    output_file_flush(&self->record);
-    while (output_file_has_room(&self->record, sizeof line)) {
+    output_file_flush(&self->record.file);
+    while (output_file_has_room(&self->record.file, sizeof line)) {
         const size_t length = ring_pop(&self->loop->handover.record, &record, sizeof record);
         if (length == 0) {
             break;
         }
-        output_file_write(&self->record, line, record_writer_line(&self->lines, &record, length - sizeof record.head, line));
+        put_line(&self->record, line, record_writer_line(&self->lines, &record, length - sizeof record.head, line));
     }
-    output_file_flush(&self->record);
+    output_file_flush(&self->record.file);
 }
 
 static void write_rows(writers_t *self)
 {
     trace_row_t row;
     char line[TRACE_LINE_MAX];
-    output_file_flush(&self->trace);
-    while (output_file_has_room(&self->trace, sizeof line) && ring_pop(&self->loop->handover.trace, &row, sizeof row) > 0) {
-        output_file_write(&self->trace, line, trace_format(&row, line));
+    output_file_flush(&self->trace.file);
+    while (output_file_has_room(&self->trace.file, sizeof line) && ring_pop(&self->loop->handover.trace, &row, sizeof row) > 0) {
+        put_line(&self->trace, line, trace_format(&row, line));
     }
-    output_file_flush(&self->trace);
+    output_file_flush(&self->trace.file);
 }
 
 /* The ring holds more than the buffer: at the end, what a slow reader still takes within its time. */
@@ -69,13 +79,13 @@ static void write_file(writers_t *self, void (*write_more)(writers_t *self), con
 static void record_step(void *ctx, bool is_end)
 {
     writers_t *self = ctx;
-    write_file(self, write_records, &self->loop->handover.record, &self->record, is_end);
+    write_file(self, write_records, &self->loop->handover.record, &self->record.file, is_end);
 }
 
 static void trace_step(void *ctx, bool is_end)
 {
     writers_t *self = ctx;
-    write_file(self, write_rows, &self->loop->handover.trace, &self->trace, is_end);
+    write_file(self, write_rows, &self->loop->handover.trace, &self->trace.file, is_end);
 }
 
 /* --- Metrics and log --- */
@@ -104,10 +114,9 @@ static void metrics_step(void *ctx, bool is_end)
 static void log_step(void *ctx, bool is_end)
 {
     writers_t *self = ctx;
-    (void)is_end;
-    if (linux_log_flush(&self->log) == HV_OK) { /* what does not go out now goes out later */
-        (void)!linux_log_flush(&self->said);
-    }
+    hv_status_t status = linux_log_flush(&self->log); /* what does not go out now goes out later */
+    status = status == HV_OK ? linux_log_flush(&self->said) : status;
+    self->is_log_broken = is_end && status == HV_ERR_IO;
 }
 
 void writers_say(writers_t *self, const char *format, ...)
@@ -123,11 +132,12 @@ void writers_say(writers_t *self, const char *format, ...)
 
 /* --- Start --- */
 
-static bool open_file(output_file_t *file, const char *path, bool *is_used)
+static bool open_file(writers_file_t *out, const char *path, bool *is_used)
 {
-    file->fd = -1;
+    out->file.fd = -1;
+    out->path = path;
     *is_used = path != NULL;
-    return path == NULL || output_file_open(file, path, OUTPUT_FILE_GOES_ON);
+    return path == NULL || output_file_open(&out->file, path, OUTPUT_FILE_GOES_ON);
 }
 
 static void write_record_head(writers_t *self, const char *config_path)
@@ -141,7 +151,7 @@ static void write_record_head(writers_t *self, const char *config_path)
                                 "; before time zero: comments, in ms since the start\n",
                                 HEAVE_VERSION, build_id(), config_path, self->config->hash, date.tm_year + 1900, date.tm_mon + 1,
                                 date.tm_mday, date.tm_hour, date.tm_min, date.tm_sec);
-    output_file_write(&self->record, line, (size_t)length);
+    output_file_write(&self->record.file, line, (size_t)length);
 }
 
 int writers_open(writers_t *self, const options_t *options, const config_t *config, motion_loop_t *loop)
@@ -152,17 +162,17 @@ int writers_open(writers_t *self, const options_t *options, const config_t *conf
     seqlock_init(&self->hash, self->hash_words.word, sizeof self->hash_words / sizeof(uint64_t));
     writers_tell_hash(self, config->hash);
     if (!open_file(&self->record, options->record, &loop->is_recording)) {
-        return print_message(EXIT_NO_OUTPUT, "%s: %s", options->record, strerror(self->record.error));
+        return print_message(EXIT_NO_OUTPUT, "%s: %s", options->record, strerror(self->record.file.error));
     }
     if (!open_file(&self->trace, options->trace, &loop->is_tracing)) {
-        return print_message(EXIT_NO_OUTPUT, "%s: %s", options->trace, strerror(self->trace.error));
+        return print_message(EXIT_NO_OUTPUT, "%s: %s", options->trace, strerror(self->trace.file.error));
     }
     if (loop->is_recording) {
         write_record_head(self, options->config);
     }
     if (loop->is_tracing) {
         char header[TRACE_LINE_MAX];
-        output_file_write(&self->trace, header, trace_header(header));
+        output_file_write(&self->trace.file, header, trace_header(header));
     }
     const settings_t *settings = &config->settings;
     record_writer_init(&self->lines, settings, settings->engage == ENGAGE_AUTO && settings->auto_frames == 0);
@@ -192,10 +202,34 @@ void writers_start(writers_t *self)
     }
 }
 
+static uint32_t count_lost(const writers_file_t *out, const ring_t *ring)
+{
+    return ring_dropped(ring) + __atomic_load_n(&out->thrown, __ATOMIC_RELAXED);
+}
+
+static void say_losses(writers_t *self, writers_file_t *out, const ring_t *ring)
+{
+    const int error = __atomic_load_n(&out->error, __ATOMIC_RELAXED);
+    if (error != 0 && !out->is_error_told) {
+        out->is_error_told = true;
+        writers_say(self, "%s: %s: nothing more is written to it; `lost` in the status counts", out->path, strerror(error));
+    }
+    if (ring_dropped(ring) != 0 && !out->is_told) {
+        out->is_told = true;
+        writers_say(self, "%s: lines are lost: its disk or its reader is too slow; `lost` in the status counts", out->path);
+    }
+}
+
+void writers_say_losses(writers_t *self)
+{
+    say_losses(self, &self->record, &self->loop->handover.record);
+    say_losses(self, &self->trace, &self->loop->handover.trace);
+}
+
 void writers_count(writers_t *self, status_lost_t *lost)
 {
-    lost->record_lines = ring_dropped(&self->loop->handover.record);
-    lost->trace_rows = ring_dropped(&self->loop->handover.trace);
+    lost->record_lines = count_lost(&self->record, &self->loop->handover.record);
+    lost->trace_rows = count_lost(&self->trace, &self->loop->handover.trace);
     lost->log_lines = hal_log_dropped(linux_log_hal(&self->log)) + hal_log_dropped(linux_log_hal(&self->said));
     lost->metrics = metrics_lost(&self->metrics, now_us(self));
 }
@@ -203,15 +237,15 @@ void writers_count(writers_t *self, status_lost_t *lost)
 /* --- The end --- */
 
 /* What is missing in a file. Of one whose disk does not answer nothing is known but what could not be handed over. */
-static int judge_file(const output_file_t *file, bool has_ended, const char *path, const ring_t *ring, const char *what)
+static int judge_file(const writers_file_t *out, bool has_ended, const ring_t *ring, const char *what)
 {
     if (ring_dropped(ring) > 0) {
-        (void)print_message(0, "%s: %" PRIu32 " %s are missing: writing was too slow", path, ring_dropped(ring), what);
+        (void)print_message(0, "%s: %" PRIu32 " %s are missing: writing was too slow", out->path, ring_dropped(ring), what);
     }
     if (!has_ended) {
-        return print_message(EXIT_IO, "%s: the disk does not answer: its end is missing", path);
+        return print_message(EXIT_IO, "%s: the disk does not answer: its end is missing", out->path);
     }
-    return file->error == 0 ? EXIT_DONE : print_message(EXIT_IO, "%s: %s", path, strerror(file->error));
+    return out->file.error == 0 ? EXIT_DONE : print_message(EXIT_IO, "%s: %s", out->path, strerror(out->file.error));
 }
 
 static bool close_by(writers_t *self, worker_t *worker, uint64_t until_us)
@@ -230,14 +264,18 @@ int writers_close(writers_t *self, bool *has_ended)
     const bool has_log = close_by(self, &self->log_worker, until_us);
     const bool has_record = close_by(self, &self->record_worker, until_us);
     const bool has_trace = close_by(self, &self->trace_worker, until_us);
-    *has_ended = close_by(self, &self->metrics_worker, until_us) && has_log && has_record && has_trace;
+    const bool has_metrics = close_by(self, &self->metrics_worker, until_us);
+    *has_ended = has_metrics && has_log && has_record && has_trace;
     int code = EXIT_DONE;
     if (self->loop->is_recording) {
-        code = judge_file(&self->record, has_record, self->options->record, &self->loop->handover.record, "lines");
+        code = judge_file(&self->record, has_record, &self->loop->handover.record, "lines");
     }
     if (self->loop->is_tracing) {
-        const int trace_code = judge_file(&self->trace, has_trace, self->options->trace, &self->loop->handover.trace, "rows");
+        const int trace_code = judge_file(&self->trace, has_trace, &self->loop->handover.trace, "rows");
         code = code == EXIT_DONE ? trace_code : code;
     }
-    return code;
+    if (code == EXIT_DONE && has_metrics && self->metrics.error != 0) {
+        code = print_message(EXIT_IO, "metrics %s: %s", self->config->metrics_file, strerror(self->metrics.error));
+    }
+    return code == EXIT_DONE && has_log && self->is_log_broken ? EXIT_IO : code;
 }

@@ -20,6 +20,16 @@ typedef union {
     uint64_t word[(CONFIG_HASH_MAX + 7u) / 8u];
 } writers_hash_t;
 
+/** A recording or a trace. */
+typedef struct {
+    output_file_t file; /**< its thread's, until that has ended */
+    const char *path;
+    uint32_t thrown; /**< atomic: lines that came after its error */
+    int error;       /**< atomic: errno of the write that ended it, 0 = none */
+    bool is_told;    /**< that lines are lost; the service thread's, as the next one */
+    bool is_error_told;
+} writers_file_t;
+
 /** The writers; large: from the heap, at the start. Private to writers.c but for the log. */
 typedef struct {
     motion_loop_t *loop;
@@ -28,8 +38,9 @@ typedef struct {
     linux_log_t log;  /**< of the motion thread */
     linux_log_t said; /**< of the service thread */
     record_writer_t lines;
-    output_file_t record;
-    output_file_t trace;
+    writers_file_t record;
+    writers_file_t trace;
+    bool is_log_broken; /**< its end could not be written; of the thread of the log, until that has ended */
     metrics_t metrics;
     seqlock_t hash; /**< of the configuration in force, to the metrics */
     writers_hash_t hash_words;
@@ -56,6 +67,9 @@ void writers_say(writers_t *self, const char *format, ...) __attribute__((format
 
 /** What has been lost so far. Any thread. */
 void writers_count(writers_t *self, status_lost_t *lost);
+
+/** Says once what can no longer be written, and that lines are lost. The service thread, again and again. */
+void writers_say_losses(writers_t *self);
 
 /** Writes what waits and closes, within seconds. Says what is missing.
  *  @param has_ended out: false where a disk does not answer: self has to stay

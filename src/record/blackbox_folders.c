@@ -16,11 +16,12 @@
 #include "common/message.h"
 #include "heave/text.h"
 
-#define PREFIX  "incident-"
-#define DUMP    "-dump"
-#define DIGITS  6u /* of a number, so that names sort as numbers do */
-#define NUMBERS 1000000u
-#define SEEN    ".seen"
+#define PREFIX      "incident-"
+#define DUMP        "-dump"
+#define DIGITS      6u          /* of a number at least, so that names sort as numbers do */
+#define DIGITS_MAX  10u         /* behind 999999, which only a folder of somebody else can lead to */
+#define NUMBER_LAST 4000000000u /* a folder of a larger number is none of ours: there is always a next one */
+#define SEEN        ".seen"
 
 const char *const blackbox_file_name[BLACKBOX_FILES] = {"frames", "trace.csv", "feedback.csv", "platform.ini"};
 
@@ -37,7 +38,9 @@ const char *blackbox_path_of(blackbox_t *self, const char *folder, const char *f
 
 static int by_name(const void *a, const void *b)
 {
-    return strcmp(((const blackbox_folder_t *)a)->name, ((const blackbox_folder_t *)b)->name);
+    const char *one = ((const blackbox_folder_t *)a)->name, *other = ((const blackbox_folder_t *)b)->name;
+    const uint32_t number = blackbox_number(one), others = blackbox_number(other);
+    return number != others ? (number > others ? 1 : -1) : strcmp(one, other);
 }
 
 /* Removes a folder and the files that are known to be in it. */
@@ -52,11 +55,12 @@ void blackbox_remove_folder(blackbox_t *self, const char *name)
 uint32_t blackbox_number(const char *name)
 {
     const size_t prefix = strlen(PREFIX);
-    if (strncmp(name, PREFIX, prefix) != 0 || strspn(&name[prefix], "0123456789") != DIGITS ||
-        strlen(name) >= BLACKBOX_NAME_MAX) {
+    if (strncmp(name, PREFIX, prefix) != 0 || strlen(name) >= BLACKBOX_NAME_MAX) {
         return 0;
     }
-    return (uint32_t)strtoul(&name[prefix], NULL, 10);
+    const size_t digits = strspn(&name[prefix], "0123456789");
+    const unsigned long long number = digits < DIGITS || digits > DIGITS_MAX ? 0 : strtoull(&name[prefix], NULL, 10);
+    return number <= NUMBER_LAST ? (uint32_t)number : 0;
 }
 
 bool blackbox_is_dump(const char *name)
@@ -142,7 +146,7 @@ void blackbox_make_name(blackbox_t *self, bool is_dump, char name[BLACKBOX_NAME_
     const time_t now = time(NULL);
     struct tm date;
     (void)gmtime_r(&now, &date);
-    (void)snprintf(name, BLACKBOX_NAME_MAX, PREFIX "%06u-%04d%02d%02dT%02d%02d%02dZ%s", (unsigned)(self->number % NUMBERS),
+    (void)snprintf(name, BLACKBOX_NAME_MAX, PREFIX "%06u-%04d%02d%02dT%02d%02d%02dZ%s", (unsigned)self->number,
                    date.tm_year + 1900, date.tm_mon + 1, date.tm_mday, date.tm_hour, date.tm_min, date.tm_sec,
                    is_dump ? DUMP : "");
 }
@@ -151,12 +155,12 @@ void blackbox_make_name(blackbox_t *self, bool is_dump, char name[BLACKBOX_NAME_
 
 static uint32_t read_seen(blackbox_t *self)
 {
-    char digits[DIGITS + 2] = "";
+    char digits[DIGITS_MAX + 2] = "";
     const int fd = open(blackbox_path_of(self, SEEN, ""), O_RDONLY | O_CLOEXEC);
     if (fd < 0) {
         return 0;
     }
-    const bool is_read = read(fd, digits, DIGITS) > 0;
+    const bool is_read = read(fd, digits, DIGITS_MAX) > 0;
     (void)close(fd);
     return is_read ? (uint32_t)strtoul(digits, NULL, 10) : 0;
 }
@@ -165,10 +169,11 @@ static uint32_t read_seen(blackbox_t *self)
 static int write_seen(blackbox_t *self, uint32_t seen)
 {
     char part[sizeof self->path];
-    char digits[DIGITS + 8];
-    const int length = snprintf(digits, sizeof digits, "%06u\n", (unsigned)(seen % NUMBERS));
+    char digits[DIGITS_MAX + 8];
+    const int length = snprintf(digits, sizeof digits, "%06u\n", (unsigned)seen);
     (void)snprintf(part, sizeof part, "%s", blackbox_path_of(self, SEEN ".part", ""));
-    if (!output_file_open(&self->file, part, OUTPUT_FILE_WAITS)) {
+    (void)unlink(part); /* in a folder where others write, too, it may be a link of theirs */
+    if (!output_file_open(&self->file, part, OUTPUT_FILE_IS_NEW)) {
         return self->file.error;
     }
     output_file_write(&self->file, digits, (size_t)length);

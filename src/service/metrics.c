@@ -349,7 +349,8 @@ static int replace(const metrics_t *self, size_t length)
     if (length == 0) {
         return EMSGSIZE;
     }
-    const int fd = open(self->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+    (void)unlink(self->temporary); /* in a folder where others write, too, it may be a link of theirs */
+    const int fd = open(self->temporary, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
     if (fd < 0) {
         return errno;
     }

@@ -49,6 +49,13 @@ def flush_takes_away(folder):
                              stderr=subprocess.PIPE, text=True, check=False)
         assert run.returncode == 0 and log.read_text() == "link set can7 down\nlink set can7 up\n", (run.stderr, log.read_text())
     assert (kept / "file").exists()
+    request.write_text("")  # and one that cannot be removed stops no flush
+    (tools / "rm").write_text("#!/bin/sh\nexit 1\n")
+    (tools / "rm").chmod(0o755)
+    (tools / "ip").write_text(f'#!/bin/sh\necho "$@" >>{log}\n')
+    log.write_text("")
+    run = subprocess.run(["sh", PACKAGING / "heave-can", "flush", "can7"], env={"PATH": f"{tools}:/usr/bin:/bin", "HEAVE_RUN": str(requests)}, check=False)
+    assert run.returncode == 1 and log.read_text() == "link set can7 down\nlink set can7 up\n", log.read_text()
 
 
 def settling_s(config):

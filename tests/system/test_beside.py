@@ -175,6 +175,16 @@ def output_onto_input(bench):
     config.write_text(text.replace("[control]\n", f"[control]\nmetrics = {soft}\n"))
     run = bench.heaved("--config", config)
     assert run.returncode == EXIT_USAGE and "[control] metrics" in run.stderr, run
+    for section, key in (("control", "operator_log"), ("platform", "life_file")):
+        for target, arguments in ((soft, []), (new, ["--trace", new]), (new, ["--record", odd])):
+            config.write_text(text.replace(f"[{section}]\n", f"[{section}]\n{key} = {target}\n"))
+            before = config.read_bytes()
+            run = bench.heaved("--config", config, *arguments)
+            assert run.returncode == EXIT_USAGE and f"[{section}] {key}" in run.stderr and not new.exists(), (arguments, run)
+            assert config.read_bytes() == before
+    config.write_text(text.replace("[control]\n", f"[control]\noperator_log = {new}\n").replace("[platform]\n", f"[platform]\nlife_file = {new}\n"))
+    run = bench.heaved("--config", config)
+    assert run.returncode == EXIT_USAGE and "would be written over" in run.stderr and not new.exists(), run
     config.write_text(text)
     assert bench.heaved("--config", config, *play, "--trace", "/dev/null").returncode == 0
 
@@ -221,7 +231,7 @@ def disk_that_stalls(bench):
     assert bench.ctl("status").returncode == 0
     assert bench.stop(daemon) == 0
     said = (disk / "log").read_text()
-    assert "is lost: the disk or the reader of" in said and re.search(r"trace.csv: \d{4,} rows are missing", said), said
+    assert "trace.csv: lines are lost: its disk or its reader is too slow" in said and re.search(r"trace.csv: \d{4,} rows are missing", said), said
     assert (disk / "trace.csv").read_text().endswith("\n") and not (disk / "heave.prom").exists()
 
 
@@ -238,6 +248,30 @@ def ends_on_a_disk_that_stalls(bench):
     since = time.monotonic()
     assert bench.stop(daemon) == EXIT_IO and time.monotonic() - since < 15
     assert "trace.csv: the disk does not answer: its end is missing" in daemon.log.read_text(), daemon.log.read_text()
+
+
+def signals_of_others(bench):
+    """None but those that end it has an effect, and SIGQUIT ends it as SIGTERM does."""
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    kept = {signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM, signal.SIGINT, signal.SIGQUIT, signal.SIGHUP, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE,
+            signal.SIGILL, signal.SIGSEGV, signal.SIGSYS, signal.SIGTRAP, signal.SIGXCPU, signal.SIGCONT}
+    with bench.sender() as sender:
+        for number in sorted(set(range(1, signal.SIGRTMAX + 1)) - kept - {32, 33}):
+            daemon.send_signal(number)
+            sender.stream(0.02, wave)
+            assert daemon.poll() is None, number
+    status = bench.status()
+    assert status["state"] == "ENGAGED", status["state"]
+    daemon.send_signal(signal.SIGQUIT)
+    bench.wait_state("SETTLING")
+    assert daemon.wait(20) == 0 and "SIGQUIT" not in daemon.log.read_text()
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    daemon.send_signal(signal.SIGQUIT)
+    time.sleep(0.2)
+    daemon.send_signal(signal.SIGQUIT)
+    assert daemon.wait(5) != 0, "once more ends at once"
 
 
 class Stalled:
@@ -421,6 +455,7 @@ CASES = {
     "an output that is an input is refused, and stays as it is": output_onto_input,
     "late in HOMING and SETTLING: counted, and it goes on": late_on_its_way,
     "a disk that stalls holds up nobody, and what is lost is counted": disk_that_stalls,
+    "signals that others send change nothing": signals_of_others,
     "SIGTERM on a disk that stalls": ends_on_a_disk_that_stalls,
     "SIGHUP with a file that does not open": reload_of_a_file_that_does_not_open,
     "SIGHUP beside a dump on a disk that stalls": reload_beside_a_dump,

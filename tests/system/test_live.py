@@ -500,7 +500,7 @@ def replays_a_following_error(bench):
     assert f"由 heaved 发现：偏差 {fault['off_mm']:.2f} mm，允许 0.01 mm" in chinese, chinese
     assert re.search(rf"axis {fault['axis']}: found by heaved, \d+\.\d\d mm off, allowed 0\.01 mm", daemon.log.read_text())
     assert bench.stop(daemon) == 0
-    folder, = directory.iterdir()
+    folder, = directory.glob("incident-*")
     assert " !fault following-error " in (folder / "frames").read_text()
     trace = harness.since_zero((folder / "trace.csv").read_bytes())
     states = [row["state"] for row in harness.rows_of(trace)]
@@ -621,6 +621,34 @@ def socket_of_a_running_daemon(bench):
     assert bench.stop(daemon) == 0
 
 
+def files_of_a_running_daemon(bench):
+    """Two platforms on one file each: the second one does not start, and starts once the first one has ended, however it has."""
+    def config(name, key, path):
+        text = (bench.config if name == "first" else bench.write_config("base.ini", udp__port=harness.free_port())).read_text(encoding="utf-8")
+        section, key = key
+        text = text.replace(f"[{section}]\n", f"[{section}]\n{key} = {path}\n") if f"[{section}]\n" in text else f"{text}\n[{section}]\n{key} = {path}\n"
+        return bench.file(f"{name}.ini", text)
+
+    places = {("platform", "life_file"): bench.folder / "life", ("control", "operator_log"): bench.folder / "log.jsonl",
+              ("black-box", "directory"): bench.folder / "box", ("control", "metrics"): bench.folder / "heave.prom"}
+    other = bench.folder / "other.sock"
+    for number, (key, path) in enumerate(places.items()):
+        daemon = bench.start(config=config("first", key, path))
+        second = config("second", key, path)
+        run = bench.heaved("--config", second, "--socket", other)
+        assert run.returncode == 69 and f"[{key[0]}] {key[1]} {path}: another heaved writes it" in run.stderr and run.stderr.count("\n") == 1, run
+        assert bench.status()["ok"] and not other.exists(), key
+        if number % 2:
+            daemon.kill()
+            daemon.wait()
+        else:
+            assert bench.stop(daemon) == 0
+        daemon = bench.spawn("--socket", other, config=second)
+        harness.wait_for(other.exists, "the second one starts now")
+        assert bench.stop(daemon) == 0
+        bench.socket.unlink(missing_ok=True)
+
+
 def socket_of_a_dead_daemon(bench):
     daemon = bench.start()
     daemon.kill()
@@ -683,8 +711,28 @@ def full_disk(bench):
         with open("/dev/full", "w", encoding="ascii") as full:
             run = subprocess.run([bench.bin / "heavectl", "--socket", str(bench.socket), *arguments], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
         assert run.returncode == 74 and run.stderr == "heavectl: standard output: No space left on device\n", run
+    said = "heaved: /dev/full: No space left on device: nothing more is written to it"
+    harness.wait_for(lambda: said in daemon.log.read_text(), "it is said at once")
+    lost = harness.wait_for(lambda: bench.status()["lost"]["trace_rows"], "counted")
+    harness.wait_for(lambda: bench.status()["lost"]["trace_rows"] > lost, "more are lost")
     assert bench.stop(daemon) == 74
-    assert "/dev/full: No space left" in daemon.log.read_text()
+    assert daemon.log.read_text().count(said) == 1 and "/dev/full: No space left" in daemon.log.read_text().rsplit(said, 1)[1]
+    daemon = bench.start("--record", "/dev/full")
+    bench.wait_state("ENGAGED")
+    with bench.sender() as sender:
+        sender.stream(0.5, wave)
+    harness.wait_for(lambda: bench.status()["lost"]["record_lines"], "counted")
+    assert bench.stop(daemon) == 74
+    with open("/dev/full", "w", encoding="ascii") as full:  # the log
+        daemon = bench.spawn(stderr=full)
+        harness.wait_for(lambda: bench.socket.exists() and bench.ctl("status").returncode == 0, "heaved answers")
+        assert bench.stop(daemon) == 74
+    metrics = bench.folder / "folder"
+    (metrics / "in-the-way").mkdir(parents=True)
+    text = bench.config.read_text(encoding="utf-8")
+    daemon = bench.start(config=bench.file("metrics.ini", text.replace("[control]\n", f"[control]\nmetrics = {metrics}\n")))
+    harness.wait_for(lambda: f"metrics {metrics}: Is a directory; tried again every second" in daemon.log.read_text(), "it is said")
+    assert bench.stop(daemon) == 74
 
 
 def strangers_are_refused(bench):
@@ -1031,6 +1079,7 @@ CASES = {
     "SIGHUP reads the configuration again": hangup_reads_the_configuration_again,
     "the port is in use": port_in_use,
     "the socket belongs to a running daemon": socket_of_a_running_daemon,
+    "files of a running heaved are locked": files_of_a_running_daemon,
     "the socket of a dead daemon is replaced": socket_of_a_dead_daemon,
     "something else has the socket's name": path_of_something_else,
     "a service manager's directory takes the socket that is not set": directory_of_a_service_manager,

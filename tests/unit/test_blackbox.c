@@ -445,6 +445,28 @@ static void test_blackbox_dumps_are_bounded_and_delete_no_fault_and_a_part_is_re
     }
 }
 
+/* A folder that somebody has put there, or a copy of another machine's: there is always a number behind it. */
+static void test_blackbox_highest_number_of_six_digits_is_not_the_last(void)
+{
+    static blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX];
+    uint32_t seen = 0;
+    (void)mkdir(m_config.black_box.directory, 0700);
+    make_folder("incident-999999-20200101T000000Z");
+    make_folder("incident-4000000001-20200101T000000Z"); /* none of ours */
+    make_folder("incident-99999-20200101T000000Z");
+    run((story_t){.end_us = 1000000});
+    blackbox_see(&m_box);
+    blackbox_step(&m_box, false);
+    for (unsigned i = 0; i < 2; i++) {
+        start_anew();
+        run((story_t){.end_us = 5000000, .fault_us = 2000000});
+        TEST_ASSERT_EQUAL_UINT32(1000000 + i, m_box.number);
+        TEST_ASSERT_EQUAL_UINT32(2 + i, blackbox_list(&m_box, folder, &seen));
+        TEST_ASSERT_EQUAL_UINT32(999999, seen);
+        TEST_ASSERT_EQUAL_STRING_LEN("incident-1000000-", folder[1].name, 17); /* in the order of their numbers */
+    }
+}
+
 static void test_blackbox_first_fault_since_a_person_looked_is_never_dropped(void)
 {
     static blackbox_folder_t folder[BLACKBOX_FOLDERS_MAX];
@@ -565,6 +587,7 @@ int main(void)
     RUN_TEST(test_blackbox_what_was_not_handed_over_is_not_replayed);
     RUN_TEST(test_blackbox_nothing_to_begin_with_is_said);
     RUN_TEST(test_blackbox_dumps_are_bounded_and_delete_no_fault_and_a_part_is_removed);
+    RUN_TEST(test_blackbox_highest_number_of_six_digits_is_not_the_last);
     RUN_TEST(test_blackbox_first_fault_since_a_person_looked_is_never_dropped);
     RUN_TEST(test_blackbox_full_disk_leaves_nothing_behind);
     RUN_TEST(test_blackbox_directory_that_cannot_be_is_said_at_the_start);
