@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * linux_udp_filter.c - a filter in front of a socket's queue; see linux_udp_filter.h.
  * At a UDP socket data begin with the UDP header; the network header is reached through SKF_NET_OFF. IPv4 and IPv6 are told apart
- * by the version in it, not by the socket: one of IPv6 hears both. A load beyond the end of a datagram drops it.
+ * by the version in it, not by the socket: one of IPv6 hears both. A load beyond the end of a datagram drops it. A share of
+ * datagrams is a share of random numbers (SKF_AD_RANDOM, Linux 4.0).
  */
 #include "linux_udp_filter.h"
 
@@ -19,8 +20,9 @@
 
 #define LENGTH_STEPS  4u
 #define FORM_STEPS    (LINUX_UDP_PLACES_MAX * (LINUX_UDP_SET_MAX + 2u) + 1u)
+#define FIRST_STEPS   17u
 #define NETWORK_STEPS (3u + 3u * WORDS_MAX + 1u)
-#define STEPS_MAX     (LENGTH_STEPS + LINUX_UDP_FORMS_MAX * FORM_STEPS + 1u + HAL_UDP_NETWORKS_MAX * NETWORK_STEPS + 1u)
+#define STEPS_MAX     (LENGTH_STEPS + LINUX_UDP_FORMS_MAX * FORM_STEPS + 1u + FIRST_STEPS + HAL_UDP_NETWORKS_MAX * NETWORK_STEPS + 1u)
 
 /** A program being written. */
 typedef struct {
@@ -124,6 +126,32 @@ static void put_network(program_t *self, const hal_udp_network_t *network)
     put(self, BPF_RET | BPF_K, PASS);
 }
 
+/* Passes a datagram of the one sender; of the others goes on with one in so many. */
+static void put_first(program_t *self, const linux_udp_filter_t *filter)
+{
+    const uint32_t net = (uint32_t)SKF_NET_OFF;
+    const hal_udp_peer_t *first = &filter->first;
+    const uint32_t source = net + (first->is_ipv6 ? IPV6_SOURCE : IPV4_SOURCE);
+    const unsigned words = first->is_ipv6 ? WORDS_MAX : 1u;
+    unsigned left = 2u * words + (filter->is_first_any_port ? 1u : 3u); /* steps between a comparison and the others */
+    put(self, BPF_LD | BPF_B | BPF_ABS, net);
+    put(self, BPF_ALU | BPF_AND | BPF_K, 0xF0);
+    put_jump(self, BPF_JEQ, first->is_ipv6 ? 0x60 : 0x40, 0, left);
+    for (unsigned i = 0; i < words; i++) {
+        left -= 2u;
+        put(self, BPF_LD | BPF_W | BPF_ABS, source + 4u * i);
+        put_jump(self, BPF_JEQ, word_at(&first->address[4u * i]), 0, left);
+    }
+    if (!filter->is_first_any_port) {
+        put(self, BPF_LD | BPF_H | BPF_ABS, 0);
+        put_jump(self, BPF_JEQ, first->port, 0, 1);
+    }
+    put(self, BPF_RET | BPF_K, PASS);
+    put(self, BPF_LD | BPF_W | BPF_ABS, (uint32_t)(SKF_AD_OFF + SKF_AD_RANDOM));
+    put_jump(self, BPF_JGT, UINT32_MAX / filter->others_one_of, 0, 1);
+    put(self, BPF_RET | BPF_K, DROP);
+}
+
 static bool are_forms_right(const linux_udp_filter_t *filter)
 {
     bool is_right = filter->form_count >= 1 && filter->form_count <= LINUX_UDP_FORMS_MAX;
@@ -156,6 +184,9 @@ hv_status_t linux_udp_filter_on(const linux_udp_t *self, const linux_udp_filter_
     }
     put_length(&program, filter->bytes_min, filter->bytes_max);
     put_forms(&program, filter);
+    if (filter->others_one_of > 0) {
+        put_first(&program, filter);
+    }
     for (unsigned i = 0; i < filter->allow.count; i++) {
         put_network(&program, &filter->allow.network[i]);
     }

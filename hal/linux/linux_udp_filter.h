@@ -33,6 +33,10 @@ typedef struct {
     uint32_t bytes_min;            /**< it is no shorter than that */
     uint32_t bytes_max;            /**< it is no longer than that */
     hal_udp_networks_t allow;      /**< it comes from one of them; none at all: from anyone */
+    uint32_t
+        others_one_of;    /**< [1, ...]: of datagrams that do not come from `first`, one in so many, at random; 0: all of them */
+    hal_udp_peer_t first; /**< used where others_one_of > 0; always allowed */
+    bool is_first_any_port; /**< its address counts, its port does not */
 } linux_udp_filter_t;
 
 /** Puts the filter in front of the queue, in the place of one that is there. What waits in the queue stays. May allocate (in the

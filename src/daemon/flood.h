@@ -7,9 +7,9 @@
 
 #include "heave/status.h"
 
-#define FLOOD_WINDOW_US   100000u /**< shortest time over which the rate is measured */
-#define FLOOD_BEGIN_PER_S 5000u   /**< more than the wrong frames of ten senders */
-#define FLOOD_END_PER_S   1000u   /**< the flood ends when the rate has stayed below this for FLOOD_CALM_US */
+#define FLOOD_WINDOW_US   20000u /**< shortest time over which the rate is measured */
+#define FLOOD_BEGIN_PER_S 5000u  /**< more than the wrong frames of ten senders */
+#define FLOOD_END_PER_S   1000u  /**< the flood ends when the rate has stayed below this for FLOOD_CALM_US */
 #define FLOOD_CALM_US     5000000u
 
 /** State; all zero: no flood. All members except is_on are private to flood.c. */

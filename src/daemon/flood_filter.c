@@ -7,7 +7,19 @@
 
 #define FRAME_BYTES_MIN 9u /* A3:0,0,0# */
 
-linux_udp_filter_t flood_filter_of(const config_t *config)
+/* A sender whose port changes is known by its address alone. */
+static bool is_any_port(const owner_t *owner)
+{
+    return owner->ports > 1 && !owner->is_port_fixed;
+}
+
+bool flood_filter_is_old(const owner_t *before, const owner_t *owner)
+{
+    return before->is_taken != owner->is_taken || !hal_udp_is_same_host(&before->peer, &owner->peer) ||
+           is_any_port(before) != is_any_port(owner) || (!is_any_port(owner) && before->peer.port != owner->peer.port);
+}
+
+linux_udp_filter_t flood_filter_of(const config_t *config, const owner_t *owner)
 {
 #define WHITE                                                                                                                    \
     {                                                                                                                            \
@@ -27,5 +39,8 @@ linux_udp_filter_t flood_filter_of(const config_t *config)
                                 .form_count = is_lenient ? sizeof k_lenient / sizeof k_lenient[0] : sizeof k_v3 / sizeof k_v3[0],
                                 .bytes_min = FRAME_BYTES_MIN,
                                 .bytes_max = GATEWAY_DATAGRAM_MAX,
-                                .allow = config->udp.allow};
+                                .allow = config->udp.allow,
+                                .others_one_of = owner->is_taken ? FLOOD_OTHERS_ONE_OF : 0,
+                                .first = owner->peer,
+                                .is_first_any_port = is_any_port(owner)};
 }

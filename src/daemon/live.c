@@ -49,6 +49,7 @@ typedef struct {
     config_t config; /**< as it was, with what reloads changed */
     sd_notify_t manager;
     flood_t flood;
+    owner_t flood_driver; /**< for whom the filter is */
     blackbox_t blackbox;
     operator_log_t operators;
     lifetime_t life;
@@ -69,20 +70,24 @@ typedef struct {
 
 /* --- Floods --- */
 
+static bool put_filter(live_t *self)
+{
+    self->flood_driver = self->view.view.snapshot.owner;
+    const linux_udp_filter_t filter = flood_filter_of(&self->config, &self->flood_driver);
+    return linux_udp_filter_on(&self->udp, &filter) == HV_OK;
+}
+
 /* Says what becomes of useless datagrams from now on. */
 static void set_filter(live_t *self)
 {
     if (!self->flood.is_on) {
         linux_udp_filter_off(&self->udp);
         writers_say(&self->writers, "the flood is over: rejected frames are told again");
-        return;
-    }
-    const linux_udp_filter_t filter = flood_filter_of(&self->config);
-    if (linux_udp_filter_on(&self->udp, &filter) == HV_OK) {
+    } else if (put_filter(self)) {
         writers_say(
             &self->writers,
-            "a flood of useless datagrams: what cannot be a frame, or comes from a sender that is not allowed, is dropped "
-            "in the kernel and counted as lost there until it is over");
+            "a flood of useless datagrams: what cannot be a frame, or comes from a sender that is not allowed, and most of what "
+            "comes from senders that do not drive, is dropped in the kernel and counted as lost there until it is over");
     } else {
         writers_say(&self->writers, "a flood of useless datagrams, and the kernel takes no filter against it: %s",
                     strerror(errno));
@@ -104,6 +109,8 @@ static void watch_floods(live_t *self, uint64_t now)
     if (flood_judge(&self->flood, useless(&self->view.view), now)) {
         set_filter(self);
         self->control.lost.is_flood = self->flood.is_on;
+    } else if (self->flood.is_on && flood_filter_is_old(&self->flood_driver, &self->view.view.snapshot.owner)) {
+        (void)!put_filter(self); /* the one before stays where the kernel refuses */
     }
 }
 

@@ -685,6 +685,62 @@ static void test_filter_other_family_does_not_come(void)
     assert_dropped(0, 1);
 }
 
+/* Of so many datagrams: how many come through. */
+static unsigned count_coming(const linux_udp_filter_t *filter, unsigned count)
+{
+    uint8_t byte;
+    size_t length;
+    hal_udp_peer_t from;
+    uint32_t before, dropped;
+    unsigned come = 0;
+    TEST_ASSERT_EQUAL(HV_OK, hal_udp_dropped(hal, &before));
+    TEST_ASSERT_EQUAL(HV_OK, linux_udp_filter_on(&lin, filter));
+    for (unsigned i = 0; i < count; i++) {
+        (void)send_linux("@", 1);
+        dropped = before;
+        for (unsigned k = 0; k < 1200 && come + (dropped - before) < i + 1; k++) { /* it has come, or it is lost */
+            come += hal_udp_recv(hal, &byte, 1, &length, &from) == HV_OK;
+            TEST_ASSERT_EQUAL(HV_OK, hal_udp_dropped(hal, &dropped));
+            if (k > 0) {
+                wait_linux();
+            }
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT32(count, come + (dropped - before));
+    return come;
+}
+
+/* One sender comes through whole, by address and port or by its address; of all others one datagram in so many. */
+static void test_filter_first_sender_comes_whole_and_others_by_their_share(void)
+{
+    const hal_udp_peer_t me = send_linux("@", 1);
+    assert_received("@", 1, &me);
+    linux_udp_filter_t filter = filter_of(NULL, 0);
+    filter.first = me;
+    filter.others_one_of = UINT32_MAX; /* as good as none */
+    TEST_ASSERT_EQUAL_UINT(20, count_coming(&filter, 20));
+    filter.first.port ^= 1u;
+    TEST_ASSERT_EQUAL_UINT(0, count_coming(&filter, 20));
+    filter.is_first_any_port = true;
+    TEST_ASSERT_EQUAL_UINT(20, count_coming(&filter, 20));
+    for (unsigned bit = 0; bit < (me.is_ipv6 ? 128u : 32u); bit++) {
+        filter.first = me;
+        filter.first.address[bit / 8] ^= (uint8_t)(0x80u >> bit % 8);
+        TEST_ASSERT_EQUAL_UINT(0, count_coming(&filter, 1));
+    }
+    filter.first = me;
+    filter.first.is_ipv6 = !me.is_ipv6;
+    TEST_ASSERT_EQUAL_UINT(0, count_coming(&filter, 20));
+    filter.others_one_of = 8;
+    TEST_ASSERT_UINT_WITHIN(120, 250, count_coming(&filter, 2000)); /* eight times its standard deviation */
+    filter.others_one_of = 1;
+    TEST_ASSERT_EQUAL_UINT(20, count_coming(&filter, 20));
+    const hal_udp_network_t nobody = {.is_ipv6 = me.is_ipv6, .prefix = 8, .address = {0xFE}}; /* a share is no permission */
+    filter = filter_of(&nobody, 1);
+    filter.others_one_of = 1;
+    TEST_ASSERT_EQUAL_UINT(0, count_coming(&filter, 20));
+}
+
 static void test_filter_what_is_out_of_range_is_refused(void)
 {
     const hal_udp_network_t too_long = {.prefix = 33};
@@ -722,6 +778,7 @@ static void run_sockets(void)
     RUN_TEST(test_filter_drops_are_counted_at_once);
     RUN_TEST(test_filter_networks_decide);
     RUN_TEST(test_filter_other_family_does_not_come);
+    RUN_TEST(test_filter_first_sender_comes_whole_and_others_by_their_share);
     RUN_TEST(test_filter_what_is_out_of_range_is_refused);
 }
 

@@ -34,6 +34,7 @@ print(sent)
 PER_CYCLE = 64  # datagrams that a cycle takes, GATEWAY_DATAGRAMS_PER_CYCLE
 GARBAGE = [b"\x80\x21" * 30, b"hello", bytes(range(1, 9)), b"{\"speed\": 1}", b"@A6:1" * 200]
 LOOKS_LIKE_FRAMES = [b"@@@@@@@@@@@@", b"@Axyz:1,2,3,0#", b"@B6:1,2,3,4,5,6,0#", b"@A9:1,2,3,4,5,6,0#", b"@A6;1,2,3,4,5,6,0#", b"@A6:1#"]
+RUBBISH = [b"@A6:1,rubbish", b"@A6:1,2,3,4,5,6,7,8,9#", b"@A6:nan,2,3,4,5,6,0#"]
 STRANGER = [b"@A6:9,9,9,50,50,50,FFF#", b"@A6T:9,9,9,50,50,50,0#"]
 
 
@@ -135,6 +136,25 @@ def is_kept_out(bench, source, at_least, payloads, **changes):
     harness.check_trace(config, trace)
 
 
+def driver_has_a_share(bench, source):
+    """What looks like a frame, from an address that is allowed: hardly a frame of the sender that drives is lost, from the first one of the flood on."""
+    daemon = bench.start()
+    bench.wait_state("ENGAGED")
+    with streaming(bench) as stream:
+        harness.wait_for(lambda: counted(bench.status()["counters"])[0] > 10, "the stream is followed")
+        on_the_way, sent, followed = lost_on_the_way(), stream.sent, counted(bench.status()["counters"])[0]
+        with flooding(bench, source, 400_000, RUBBISH) as child:
+            harness.wait_for(lambda: bench.status()["flood"], "the flood is noticed")
+            harness.wait_for(lambda: stream.sent >= sent + 500, "the stream goes on in the flood")
+            useless = int(child.communicate(input="")[0])
+        stream.end()
+        harness.wait_for(lambda: not bench.status()["flood"], "it is over")
+        share = (counted(bench.status()["counters"])[0] - followed) / (stream.sent - sent)
+        print(f"# {100 * share:.2f} % of {stream.sent - sent} frames followed beside {useless} others")
+        assert share >= 0.99 or on_the_way != lost_on_the_way(), share
+    assert bench.stop(daemon) == 0
+
+
 def is_told_again(bench, daemon):
     """Single wrong frames are, once it is over."""
     harness.wait_for(lambda: not bench.status()["flood"], "it is over")
@@ -219,6 +239,8 @@ CASES = {
     "what came while heaved could not run is little": queue_is_short,
     "a flood beside a good stream is kept from the program": lambda bench: is_kept_out(bench, "127.0.0.1", 200_000, GARBAGE),
     "a flood of what begins as a frame does beside a good stream": lambda bench: is_kept_out(bench, "127.0.0.1", 200_000, LOOKS_LIKE_FRAMES),
+    "a flood of rubbish with a head, of another program on the PC of the sender": lambda bench: driver_has_a_share(bench, "127.0.0.1"),
+    "a flood of rubbish with a head, from another address": lambda bench: driver_has_a_share(bench, "127.0.0.2"),
     "a flood of valid frames from a sender that is not allowed": lambda bench: is_kept_out(bench, "127.0.0.2", 50_000, STRANGER, udp__allow="127.0.0.1"),
 }
 
