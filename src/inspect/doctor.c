@@ -13,6 +13,7 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include "common/clock_trust.h"
 #include "common/sentence.h"
 #include "common/socket_path.h"
 #include "common/translate.h"
@@ -42,9 +43,10 @@ static bool is_daemon_running(const char *path)
 }
 
 /* Tries out whether real-time priority and memory lock are permitted, and undoes both. */
-static doctor_host_t look_at_host(void)
+static doctor_host_t look_at_host(const config_t *config)
 {
-    doctor_host_t host = {0};
+    doctor_host_t host = {.is_clock_trusted = clock_is_trusted(&clock_trust_files),
+                          .is_date_of_matter = config->selftest.when == CONFIG_SELFTEST_DAILY};
     struct utsname name;
     const struct sched_param first_in = {.sched_priority = 1};
     const struct sched_param usual = {.sched_priority = 0};
@@ -212,7 +214,7 @@ bool doctor_run(const config_t *config, const char *file, FILE *out)
                    path);
         return false;
     }
-    const doctor_host_t host = look_at_host();
+    const doctor_host_t host = look_at_host(config);
     doctor_judge_host(&report, &host);
     check_port(&report, &config->udp);
     if (config->drives == CONFIG_DRIVES_SIM) {

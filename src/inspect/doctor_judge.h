@@ -15,6 +15,8 @@ typedef struct {
     unsigned kernel_minor;
     bool is_realtime_allowed;
     bool is_memory_lock_allowed;
+    bool is_clock_trusted;  /**< clock_is_trusted() */
+    bool is_date_of_matter; /**< a self-test is due each day */
 } doctor_host_t;
 
 /** Objects that are read from a CiA 402 drive. */

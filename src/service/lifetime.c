@@ -29,7 +29,7 @@ static size_t format(const lifetime_totals_t *totals, char text[TEXT_MAX])
 {
     char digits[DIGITS + 1u];
     const lifetime_selftest_t *selftest = &totals->selftest;
-    const unsigned version = selftest->day == 0 ? 1 : 2; /* where there was none, an older heaved can read it */
+    const unsigned version = selftest->day == 0 ? 1 : selftest->boot == 0 ? 2 : 3; /* an older heaved can read what it knows */
     size_t length =
         (size_t)snprintf(text, TEXT_MAX, "heave life %u\nsequence %" PRIu64 "\nrides %" PRIu64 "\nfaults %" PRIu64 "\naxes %u\n",
                          version, totals->sequence, totals->rides, totals->faults, (unsigned)totals->axes);
@@ -40,8 +40,10 @@ static size_t format(const lifetime_totals_t *totals, char text[TEXT_MAX])
                                    axis->energized_ms, axis->travel_milli, axis->turns);
     }
     if (version > 1) {
-        length += (size_t)snprintf(&text[length], TEXT_MAX - length, "selftest %u passed %u configuration %s\n", selftest->day,
-                                   selftest->is_passed ? 1u : 0u, selftest->hash);
+        length += (size_t)snprintf(&text[length], TEXT_MAX - length, "selftest %u passed %u", selftest->day,
+                                   selftest->is_passed ? 1u : 0u);
+        length += version == 2 ? 0 : (size_t)snprintf(&text[length], TEXT_MAX - length, " boot %" PRIu64, selftest->boot);
+        length += (size_t)snprintf(&text[length], TEXT_MAX - length, " configuration %s\n", selftest->hash);
     }
     sha256_digits(text, length, digits, sizeof digits);
     return length + (size_t)snprintf(&text[length], TEXT_MAX - length, "sum %s\n", digits);
@@ -67,11 +69,11 @@ static bool read_axis(const char **at, lifetime_axis_t *axis)
            read_number(at, " travel_milli ", &axis->travel_milli) && read_number(at, " turns ", &axis->turns);
 }
 
-static bool read_selftest(const char **at, lifetime_selftest_t *selftest)
+static bool read_selftest(const char **at, bool has_boot, lifetime_selftest_t *selftest)
 {
     uint64_t day = 0, passed = 0;
     if (!read_number(at, "\nselftest ", &day) || !read_number(at, " passed ", &passed) ||
-        strncmp(*at, " configuration ", 15) != 0) {
+        (has_boot && !read_number(at, " boot ", &selftest->boot)) || strncmp(*at, " configuration ", 15) != 0) {
         return false;
     }
     *at += 15;
@@ -103,7 +105,7 @@ static bool parse(const char *text, size_t length, lifetime_totals_t *totals)
             return false;
         }
     }
-    if (version > 1 && !read_selftest(&text, &totals->selftest)) {
+    if (version > 1 && !read_selftest(&text, version > 2, &totals->selftest)) {
         return false;
     }
     return format(totals, again) == length && memcmp(again, whole, length) == 0;

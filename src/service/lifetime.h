@@ -26,6 +26,7 @@ typedef struct {
 typedef struct {
     uint32_t day; /**< of the local calendar, as 20261123; 0 = there was none */
     bool is_passed;
+    uint64_t boot;              /**< clock_boot() of the machine then; 0 = not known */
     char hash[CONFIG_HASH_MAX]; /**< of the configuration it was made with */
 } lifetime_selftest_t;
 

@@ -45,7 +45,7 @@ LIMIT_S = 60
 HARMLESS = set("""
 atan2 bcmp feof hypot memrchr sin cos strcasecmp strcasestr strncasecmp strcpy stpcpy strnlen __ctype_b_loc __ctype_toupper_loc __cxa_finalize __errno_location __stack_chk_fail abort fmax fmin llround lround log10 pow sqrt sincos mbrtowc memchr memcmp memcpy memmove memset strchr strcmp
 strcspn strerror strerrorname_np strlen strncat strncmp strncpy strpbrk strrchr strspn strstr strtod strtok strtok_r strtoll strtoul strtoull wcwidth snprintf vsnprintf gmtime_r localtime_r inet_ntop inet_pton qsort
-getenv putenv rewind dl_iterate_phdr getopt_long gai_strerror ferror fileno free freeaddrinfo pthread_self pthread_attr_destroy pthread_attr_init pthread_cond_broadcast pthread_cond_init pthread_cond_timedwait pthread_condattr_destroy pthread_condattr_init pthread_condattr_setclock pthread_attr_setinheritsched
+__libc_current_sigrtmax getenv putenv rewind dl_iterate_phdr getopt_long gai_strerror ferror fileno free freeaddrinfo pthread_self pthread_attr_destroy pthread_attr_init pthread_cond_broadcast pthread_cond_init pthread_cond_timedwait pthread_condattr_destroy pthread_condattr_init pthread_condattr_setclock pthread_attr_setinheritsched
 pthread_attr_setschedparam pthread_attr_setschedpolicy pthread_attr_setstacksize pthread_equal pthread_mutex_init pthread_mutex_lock pthread_mutex_unlock
 pthread_join pthread_sigmask sigaction sigaddset sigemptyset sigfillset signal getpid time clock_gettime setvbuf setlocale nl_langinfo isatty munlockall ini_parse_stream
 mnl_attr_get_payload mnl_attr_get_payload_len mnl_attr_get_type mnl_attr_parse mnl_attr_parse_nested mnl_attr_put_strz mnl_nlmsg_get_payload
@@ -82,7 +82,7 @@ MEMORY, FILES = ["ENOMEM"], ["EACCES", "ENOENT", "EMFILE", "EIO"]
 DISK = ["ENOSPC", "EIO", "EDQUOT"]
 MODBUS = ["ETIMEDOUT", "ECONNRESET", "EIO", "EBADF", 112345688 + 11]  # the last one: EMBXGTAR, an exception of the device
 ERRNOS = {
-    "accept4": ["EMFILE", "ECONNABORTED", "EINTR", "EAGAIN"], "access": ["EACCES", "EROFS"], "bind": ["EADDRINUSE", "EACCES", "EADDRNOTAVAIL", "ENODEV"],
+    "adjtimex": ["EPERM"], "accept4": ["EMFILE", "ECONNABORTED", "EINTR", "EAGAIN"], "access": ["EACCES", "EROFS"], "bind": ["EADDRINUSE", "EACCES", "EADDRNOTAVAIL", "ENODEV"],
     "calloc": MEMORY, "malloc": MEMORY, "realloc": MEMORY, "chmod": ["EPERM", "EROFS"], "clock_nanosleep": ["EINTR", "EINVAL"],
     "connect": ["ECONNREFUSED", "EACCES", "ENOENT", "EAGAIN"], "dup3": ["EBUSY", "EMFILE"], "execv": ["ENOENT", "ENOMEM"], "eventfd": ["EMFILE", "ENOMEM"], "fchmod": ["EPERM", "EIO"], "fcntl": ["EBADF"], "fclose": DISK, "fdatasync": DISK, "ftruncate": DISK, "getgrnam": ["ENOENT", "EIO", "EMFILE"], "fflush": DISK,
     "fdopen": MEMORY, "fgets": ["EIO"], "fmemopen": MEMORY, "fopen": FILES, "memfd_create": ["EMFILE", "ENOMEM"], "mmap": MEMORY, "scandir": ["ENOENT", "ENOMEM"], "sendmsg": ["EPIPE", "EAGAIN", "EINTR"], "fread": ["EIO"], "fstat": ["EIO"], "fsync": DISK, "getaddrinfo": [-3, -10], "getrlimit": ["EFAULT"], "getrusage": ["EINVAL"], "setrlimit": ["EPERM"],

@@ -46,7 +46,7 @@ void setUp(void)
                                 .has_controller = true,
                                 .state = HAL_CAN_ACTIVE,
                                 .bitrate = 1000000};
-    s_host = (doctor_host_t){6, 6, true, true};
+    s_host = (doctor_host_t){6, 6, true, true, true, false};
     s_drives = (cia402_config_t){.axes = 1, .master_node = 127, .mode = CIA402_MODE_CSP, .period_us = 4000};
     s_drives.axis[0].node = 3;
     s_node = (doctor_node_t){.nmt = 127};
@@ -153,10 +153,10 @@ static void test_judge_link_gs_usb_warns_before_6_6_only(void)
     s_host.kernel_minor = 5;
     (void)judge_link();
     expect(0, 1, "gs_usb of kernel 6.5");
-    s_host = (doctor_host_t){5, 15, true, true};
+    s_host = (doctor_host_t){5, 15, true, true, true, false};
     (void)judge_link();
     expect(0, 2, "gs_usb of kernel 5.15");
-    s_host = (doctor_host_t){7, 0, true, true};
+    s_host = (doctor_host_t){7, 0, true, true, true, false};
     (void)judge_link();
     expect(0, 2, "ok");
 }
@@ -196,6 +196,14 @@ static void test_judge_host_warns_of_each(void)
     doctor_judge_host(&s_report, &s_host);
     expect(0, 2, "LimitMEMLOCK");
     TEST_ASSERT_NOT_NULL(strstr(s_text, "LimitRTPRIO"));
+    s_host = (doctor_host_t){6, 6, true, true, false, false}; /* where no self-test depends on it the date does not matter */
+    doctor_judge_host(&s_report, &s_host);
+    s_host.is_date_of_matter = s_host.is_clock_trusted = true;
+    doctor_judge_host(&s_report, &s_host);
+    expect(0, 2, "ok");
+    s_host.is_clock_trusted = false;
+    doctor_judge_host(&s_report, &s_host);
+    expect(0, 3, "the date may be wrong");
 }
 
 /* --- Drives --- */

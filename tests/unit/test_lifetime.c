@@ -136,6 +136,22 @@ static void test_selftest_counts_for_its_day_and_configuration(void)
     TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 20261123, "0123456789abcdef"));
 }
 
+/* With the start of the machine where that is known: an older heaved reads a file without it. */
+static void test_selftest_keeps_the_start_of_the_machine(void)
+{
+    for (unsigned known = 0; known <= 1; known++) {
+        const lifetime_selftest_t selftest = {
+            .day = 20261123, .is_passed = true, .boot = known ? UINT64_MAX - 7 : 0, .hash = "0123456789abcdef"};
+        TEST_ASSERT_EQUAL(EXIT_DONE, start());
+        lifetime_note_selftest(&m_life, &selftest);
+        TEST_ASSERT_TRUE(lifetime_close(&m_life));
+        TEST_ASSERT_EQUAL(EXIT_DONE, start());
+        TEST_ASSERT_EQUAL_UINT64(selftest.boot, m_life.now.selftest.boot);
+        TEST_ASSERT_TRUE(lifetime_has_passed(&m_life, 20261123, "0123456789abcdef"));
+        TEST_ASSERT_TRUE(lifetime_close(&m_life));
+    }
+}
+
 /* So many writes: each one more than the last, in turn to both. */
 static void live(unsigned writes)
 {
@@ -268,6 +284,7 @@ int main(void)
     RUN_TEST(test_life_goes_on_after_every_start);
     RUN_TEST(test_life_is_written_once_a_minute_and_when_it_goes_off);
     RUN_TEST(test_selftest_counts_for_its_day_and_configuration);
+    RUN_TEST(test_selftest_keeps_the_start_of_the_machine);
     RUN_TEST(test_life_survives_any_damage_of_one_file);
     RUN_TEST(test_life_without_a_file_that_is_right_does_not_begin_at_zero);
     RUN_TEST(test_life_of_another_machine_is_refused);
