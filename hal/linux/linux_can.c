@@ -20,6 +20,8 @@
 /* A waiting frame counts as no more against SO_SNDBUF: 768 in Linux 6.1, more in 7.2. The limit is unconfirmed. */
 #define FRAME_MEMORY  2048
 #define CLOCK_STEP_US 1000000u /* a frame that seems to have waited longer came around a change of the wall clock */
+#define LOOK_OLD_US   5000000u /* what was seen so long ago says nothing of the frames that wait now */
+#define IN_ADAPTER    64u      /* frames that an adapter has taken may be counted as neither waiting nor sent */
 #define STANDSTILL_US 200000u  /* on a bus that works a frame goes out in this time: at 20 kbit/s it takes 7 ms */
 
 static const char k_sending[] = "sending";
@@ -333,18 +335,30 @@ static uint64_t monotonic_us(void)
     return us_of(&now);
 }
 
-/* Whose are the frames that wait? Those of a program that works go out, and taking the interface down would cut its bus; those of
- * one that has died stand still. Two looks tell them apart. True once it is known, with is_alive. */
+static void keep_look(linux_can_t *self, const linux_can_link_t *link, uint64_t now_us)
+{
+    self->has_looked = true;
+    self->looked_us = now_us;
+    self->looked_sent = link->sent;
+    self->looked_waiting = link->waiting;
+}
+
+/* Whose are the frames that wait? A program that works adds others, and taking the interface down would cut its bus; those of one
+ * that has died stand still, or go out and are not followed by more. Looks one after the other tell them apart. True once it is
+ * known, with is_alive. */
 static bool knows_whose(linux_can_t *self, const linux_can_link_t *link, bool *is_alive)
 {
     const uint64_t now_us = monotonic_us();
-    if (!self->has_looked) {
-        self->has_looked = true;
-        self->looked_us = now_us;
-        self->looked_sent = link->sent;
+    if (!self->has_looked || now_us - self->looked_us >= LOOK_OLD_US || link->sent < self->looked_sent) {
+        keep_look(self, link, now_us);
+        return false;
     }
-    *is_alive = link->sent != self->looked_sent;
-    return *is_alive || now_us - self->looked_us >= STANDSTILL_US;
+    const uint64_t gone_out = link->sent - self->looked_sent;
+    *is_alive = gone_out + link->waiting > (uint64_t)self->looked_waiting + IN_ADAPTER;
+    if (gone_out > 0 && !*is_alive) {
+        keep_look(self, link, now_us);
+    }
+    return *is_alive || (gone_out == 0 && now_us - self->looked_us >= STANDSTILL_US);
 }
 
 /* Fresh or not at all: what stands still in the interface is dropped, be it ours or of a program before us. */

@@ -84,12 +84,13 @@ typedef struct {
     bool has_looked;      /**< frames of others waited, at looked_us, when the interface had sent looked_sent */
     uint64_t looked_us;   /**< */
     uint64_t looked_sent; /**< */
+    uint32_t looked_waiting;
 } linux_can_t;
 
 /** Opens the interface. Before the loop starts: allocates, may take milliseconds. Where frames wait in its queue it is opened all
  * the same, cut off until a restart 0.2 s later or more: frames that have stood still by then were left by an earlier program and
- * are dropped (where that is not allowed, cut off until nothing waits); where frames have gone out, a program uses the interface,
- * and nothing is done to them.
+ * are dropped (where that is not allowed, cut off until nothing waits); where further ones have been added, a program uses the
+ * interface, and nothing is done to them.
  *  @return HV_OK; HV_ERR_AGAIN: not usable yet (no such interface, down, bus-off, old frames wait), the ops may be used and
  *          restart tries again; HV_ERR_ARG: not a CAN interface, a name or a list too long; HV_ERR_IO: the system refuses.
  * trouble and error_text say why. */

@@ -3,9 +3,10 @@
  * Masks may be missing, and a decimal comma looks like one: `@A3:0,0,13,37#` is z = 13 with relay mask 37 hex, or z = 13.37
  * without a mask. One frame cannot tell, but its sender can: most senders send a mask in every frame, or in none. After
  * MASK_GUARD_FRAMES frames in a row of one form the other form is refused, until the sender has been silent for
- * MASK_GUARD_GAP_US. Masks that change more than twice a second between many, and are decimal digits all of them, are the digits
- * of a value: no relay follows these, until a mask has a letter, or the sender is silent. Masks of frames that are
- * MASK_GUARD_QUICK_US apart or more do not count, nor do patterns that go round, with equally many relays in each.
+ * MASK_GUARD_GAP_US; refused frames are no silence. Masks that change more than twice a second between many, and are decimal
+ * digits all of them, 8 or 9 among them, are the digits of a value: no relay follows these, until a mask has a letter, or the
+ * sender is silent. Masks of frames that are MASK_GUARD_QUICK_US apart or more do not count, nor do patterns that go round, with
+ * equally many relays in each.
  * T frames have no mask; they count as no frame of either form. Owns no clock and no settings; one owner.
  */
 #ifndef HEAVE_MASK_GUARD_H
@@ -15,7 +16,7 @@
 
 #define MASK_GUARD_FRAMES   10u
 #define MASK_GUARD_GAP_US   1000000u
-#define MASK_GUARD_QUICK_US 100000u
+#define MASK_GUARD_QUICK_US 120000u
 #define MASK_GUARD_RECENT   8u
 
 /** Of a sender: whether its frames have a mask. */

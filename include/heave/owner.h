@@ -22,8 +22,10 @@ typedef struct {
     bool is_port_fixed;  /**< programs of this address have taken turns: only peer.port drives */
 
     uint8_t ports; /**< private from here on: so many of them are valid */
-    uint8_t turns; /**< in a row, to a port that was there before */
+    uint8_t turns; /**< in quick succession, to a port that was there before */
     uint16_t port[OWNER_PORTS];
+    uint16_t first_port; /**< the first one that came back: it was there before the others */
+    uint64_t turn_us;    /**< the last turn */
 } owner_t;
 
 /** Decision about a frame. */
@@ -39,6 +41,9 @@ typedef enum {
  *  @param busy_until_us end of the requested timed move: until then its sender does not count as silent */
 owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t silence_us, const hal_udp_networks_t *priority,
                             uint64_t busy_until_us, uint64_t now_us);
+
+/** Whether a sender is the one that drives, by all that is known: not another address, and no port that is new. */
+bool owner_is_known(const owner_t *self, const hal_udp_peer_t *from);
 
 /** True if all members are valid; for data that was loaded from a file, see sane.h. */
 bool owner_is_sane(const owner_t *self);

@@ -189,10 +189,10 @@ static bool are_bools_sane(const gateway_t *saved)
 {
     return sane_bool(&saved->is_bus_lost) && sane_bool(&saved->is_bus_failing) && sane_bool(&saved->is_tracking_actual) &&
            sane_bool(&saved->is_disable_due) && sane_bool(&saved->is_shutdown_asked) && sane_bool(&saved->is_end_overdue) &&
-           sane_bool(&saved->sender.has_newest) && sane_bool(&saved->relay_output.is_mask_written) &&
-           sane_bool(&saved->sender.newest_from.is_ipv6) && sane_bool(&saved->is_estop_apart) &&
-           sane_bool(&saved->is_power_overdue) && sane_bool(&saved->is_late) && sane_bool(&saved->relay_output.is_pulse_lost) &&
-           sane_bool(&saved->relay_output.healthy.level);
+           sane_bool(&saved->sender.has_newest) && sane_bool(&saved->sender.is_known) &&
+           sane_bool(&saved->relay_output.is_mask_written) && sane_bool(&saved->sender.newest_from.is_ipv6) &&
+           sane_bool(&saved->is_estop_apart) && sane_bool(&saved->is_power_overdue) && sane_bool(&saved->is_late) &&
+           sane_bool(&saved->relay_output.is_pulse_lost) && sane_bool(&saved->relay_output.healthy.level);
 }
 
 static bool are_rotations_sane(const rotations_t *rotations)
@@ -246,6 +246,9 @@ void gateway_start_settled(gateway_t *self)
 
 void gateway_reload(gateway_t *self, const settings_t *settings)
 {
+    if (self->settings.mask_policy != settings->mask_policy) {
+        mask_guard_restart(&self->sender.mask_guard);
+    }
     keep_changeable(&self->settings, settings);
     motion_set_spike_gate(&self->motion, settings->spike_gate);
 }

@@ -5,6 +5,7 @@
 
 #include "heave/sane.h"
 
+#define EIGHTS  0x888u
 #define LEAK_US 500000u /* each takes one change off the score */
 
 enum {
@@ -42,10 +43,11 @@ static void keep(mask_guard_t *self, uint16_t mask)
     self->recents = (uint8_t)(self->recents + (self->recents < MASK_GUARD_RECENT));
 }
 
-/* Whether the recent masks are as many different ones as digits are. */
+/* Whether the recent masks are as many different ones as digits are. Where relays of all four bits of a digit are switched, there
+ * are letters, too: an 8 or 9 and no letter is telling. */
 static bool are_digit_like(const mask_guard_t *self)
 {
-    unsigned masks = 0, sums = 0;
+    unsigned masks = 0, sums = 0, bits = 0;
     for (unsigned i = 0; i < self->recents; i++) {
         bool is_known = false;
         for (unsigned k = i + 1; k < self->recents; k++) {
@@ -53,8 +55,9 @@ static bool are_digit_like(const mask_guard_t *self)
         }
         masks += !is_known;
         sums |= 1u << count_bits(self->recent[i]);
+        bits |= self->recent[i];
     }
-    return masks >= MASKS && count_bits(sums) >= SUMS;
+    return masks >= MASKS && count_bits(sums) >= SUMS && (bits & EIGHTS) != 0;
 }
 
 static void leak(mask_guard_t *self)

@@ -5,6 +5,8 @@
 
 #include "heave/sane.h"
 
+#define TURN_US 5000000u /* a program that changes between two sockets of its own does so less often */
+
 enum { TURNS = 3 };
 
 /* True where the sender that drives has to give way to another one now. */
@@ -34,9 +36,9 @@ static void keep_port(owner_t *self, uint16_t port)
     self->ports = (uint8_t)(self->ports + (self->ports < OWNER_PORTS));
 }
 
-/* Three times in a row a port that was there before: these are several programs, and the first of them drives. Twice may be a
- * late frame of a program that was started again, and the next one of the new program. */
-static void watch_port(owner_t *self, uint16_t port)
+/* Three times in quick succession a port that was there before: these are several programs, and the one that was there first
+ * drives. Twice may be a late frame of a program that was started again, and the next one of the new program. */
+static void watch_port(owner_t *self, uint16_t port, uint64_t now_us)
 {
     if (self->ports > 0 && port == self->peer.port) {
         return;
@@ -46,11 +48,18 @@ static void watch_port(owner_t *self, uint16_t port)
         self->turns = 0;
         return;
     }
-    self->turns++;
+    self->turns = self->turns > 0 && now_us - self->turn_us < TURN_US ? (uint8_t)(self->turns + 1) : 1;
+    self->turn_us = now_us;
+    self->first_port = self->turns == 1 ? port : self->first_port;
     if (self->turns == TURNS) {
         self->is_port_fixed = true;
-        self->peer.port = self->port[self->ports - 1u];
+        self->peer.port = self->first_port;
     }
+}
+
+bool owner_is_known(const owner_t *self, const hal_udp_peer_t *from)
+{
+    return self->is_taken && hal_udp_is_same_host(&self->peer, from) && is_known_port(self, from->port);
 }
 
 owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t silence_us, const hal_udp_networks_t *priority,
@@ -66,7 +75,7 @@ owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t 
         *self = (owner_t){.is_taken = true};
     }
     if (!self->is_port_fixed) {
-        watch_port(self, from->port);
+        watch_port(self, from->port, now_us);
     }
     if (self->is_port_fixed && self->peer.port != from->port) {
         return OWNER_OTHER;
@@ -79,5 +88,5 @@ owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t 
 bool owner_is_sane(const owner_t *self)
 {
     return sane_bool(&self->is_taken) && sane_bool(&self->peer.is_ipv6) && sane_time(self->last_us) &&
-           sane_bool(&self->is_port_fixed) && self->ports <= OWNER_PORTS && self->turns <= TURNS;
+           sane_bool(&self->is_port_fixed) && self->ports <= OWNER_PORTS && self->turns <= TURNS && sane_time(self->turn_us);
 }

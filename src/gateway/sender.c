@@ -134,6 +134,15 @@ HV_OWN_FRAME static void log_other(gateway_t *self, const hal_udp_peer_t *from, 
     self->sender.other_suppressed = 0;
 }
 
+/* What the next rotations are nearest to, where they count modulo one turn. */
+static void keep_rotation(gateway_t *self, const pose_t *pose)
+{
+    for (unsigned i = AXIS_ROLL; i <= AXIS_YAW; i++) {
+        const axis_input_t *axis = &self->settings.axis[i];
+        self->sender.rotation_deg_q32[i] = fx_clamp(pose->axis_q32[i], q32_from_q16(axis->min_q16), q32_from_q16(axis->max_q16));
+    }
+}
+
 /* A sender takes over from another: the platform stops and goes to its first pose at engage speed. */
 HV_OWN_FRAME static void change_owner(gateway_t *self, uint64_t now_us)
 {
@@ -146,6 +155,7 @@ HV_OWN_FRAME static void change_owner(gateway_t *self, uint64_t now_us)
     hal_log_write(self->io.log, HAL_LOG_NOTICE, line);
     self->snapshot.counters.owner_changes++;
     confirm_restart(&self->sender.confirm); /* what waits is another sender's */
+    keep_rotation(self, &self->output.sent);
     if (self->supervisor.state == STATE_ENGAGED) {
         actions_follow(self, now_us);
     }
@@ -155,7 +165,6 @@ HV_OWN_FRAME static void change_owner(gateway_t *self, uint64_t now_us)
 static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
 {
     const gateway_settings_t *settings = &self->settings;
-    const bool is_same_host = self->sender.owner.is_taken && hal_udp_is_same_host(&self->sender.owner.peer, from);
     const bool was_port_fixed = self->sender.owner.is_port_fixed;
     const owner_verdict_t verdict = owner_judge(&self->sender.owner, from, (uint64_t)settings->takeover_ms * 1000,
                                                 &settings->priority, motion_timed_end_us(&self->motion), now_us);
@@ -170,10 +179,35 @@ static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t no
         hal_log_write(self->io.log, HAL_LOG_WARNING,
                       "programs of one address send by turns: one of them drives, told by its port; end the others");
     }
-    if (verdict == OWNER_NEW || (verdict == OWNER_DRIVES && !is_same_host)) {
-        mask_guard_restart(&self->sender.mask_guard);
-    }
     return verdict != OWNER_OTHER;
+}
+
+/* False for a frame that is no silence, but none of the sender's either: its sender may be taken over as if it had not come. */
+static bool is_of_its_form(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *from, uint64_t now_us)
+{
+    self->sender.is_known = owner_is_known(&self->sender.owner, from);
+    return mask_guard_allows(self->settings.mask_policy, frame) &&
+           (!self->sender.is_known || mask_guard_passes(&self->sender.mask_guard, self->settings.mask_policy, frame, now_us));
+}
+
+/* The first frame of a sender, or of a new port of it: another program. What was learnt of the last one is not true of it. */
+static void begin_sender(gateway_t *self, const frame_t *frame, uint64_t now_us)
+{
+    mask_guard_restart(&self->sender.mask_guard);
+    (void)mask_guard_passes(&self->sender.mask_guard, self->settings.mask_policy, frame, now_us);
+    self->sender.rotations = (rotations_t){.is_there = {false}};
+}
+
+/* Whoever sends no masks asks for nothing: an effect that an earlier frame began does not go on. Where all senders are followed,
+ * another one may have asked for it. */
+static void watch_mask_habit(gateway_t *self)
+{
+    if (self->settings.takeover_ms != 0 && mask_guard_habit(&self->sender.mask_guard, self->settings.mask_policy) == MASK_NONE &&
+        self->sender.frame_mask != self->settings.relay_safe_mask) {
+        self->sender.frame_mask = self->settings.relay_safe_mask;
+        hal_log_write(self->io.log, HAL_LOG_WARNING,
+                      "frames here have no relay masks any more: relays go to safe_mask ([udp] mask = any keeps them)");
+    }
 }
 
 HV_OWN_FRAME static void refuse_form(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *from, uint64_t now_us)
@@ -237,12 +271,14 @@ HV_OWN_FRAME static bool is_confirmed(gateway_t *self, const motion_target_t *ta
     return confirm_passes(&self->sender.confirm, &distance, &from, target, now_us);
 }
 
-static void keep_rotation(gateway_t *self, const motion_target_t *target)
+static void keep_asked_rotation(gateway_t *self, const motion_target_t *target)
 {
-    for (unsigned i = AXIS_ROLL; target->space == MOTION_POSE && i <= AXIS_YAW; i++) {
-        const axis_input_t *axis = &self->settings.axis[i];
-        self->sender.rotation_deg_q32[i] =
-            fx_clamp(target->value_q32[i], q32_from_q16(axis->min_q16), q32_from_q16(axis->max_q16));
+    if (target->space == MOTION_POSE) {
+        pose_t pose;
+        for (unsigned i = 0; i < POSE_AXES; i++) {
+            pose.axis_q32[i] = target->value_q32[i];
+        }
+        keep_rotation(self, &pose);
     }
 }
 
@@ -254,7 +290,7 @@ static bool follow(gateway_t *self, const motion_target_t *target, frame_command
     const bool is_taken = take_target(self, target, command, from, now_us);
     if (is_taken) {
         confirm_followed(&self->sender.confirm, target);
-        keep_rotation(self, target);
+        keep_asked_rotation(self, target);
     }
     return is_taken;
 }
@@ -301,6 +337,9 @@ HV_OWN_FRAME static void watch_turn(gateway_t *self, const frame_t *frame, uint6
 static motion_target_t target_from(gateway_t *self, const frame_t *frame, uint64_t now_us)
 {
     q32_t last_deg_q32[AXES_MAX] = {[AXIS_ANGLE] = motion_angle_target(&self->motion)};
+    if (self->supervisor.state != STATE_ENGAGED) {
+        keep_rotation(self, &self->output.sent);
+    }
     for (unsigned i = AXIS_ROLL; i <= AXIS_YAW; i++) {
         last_deg_q32[i] = self->sender.rotation_deg_q32[i];
     }
@@ -316,16 +355,15 @@ void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
         refuse(self, frame->command, FRAME_ERR_PLATFORM, missing, from, now_us);
         return;
     }
-    if (!mask_guard_allows(self->settings.mask_policy, frame)) {
+    if (!is_of_its_form(self, frame, from, now_us)) {
         refuse_form(self, frame, from, now_us);
         return;
     }
     if (!is_followed(self, from, now_us)) {
         return;
     }
-    if (!mask_guard_passes(&self->sender.mask_guard, self->settings.mask_policy, frame, now_us)) {
-        refuse_form(self, frame, from, now_us);
-        return;
+    if (!self->sender.is_known) {
+        begin_sender(self, frame, now_us);
     }
     auto_engage_frame(&self->auto_engage, now_us);
     const motion_target_t target = target_from(self, frame, now_us);
@@ -336,6 +374,7 @@ void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
         return;
     }
     const bool has_mask = has_relay_mask(self, frame, now_us);
+    watch_mask_habit(self);
     target_received(&self->snapshot, frame);
     counters_t *counters = &self->snapshot.counters;
     counters->accepted[frame->command]++;

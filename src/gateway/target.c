@@ -120,7 +120,9 @@ unsigned target_jumps_by_turn(const gateway_settings_t *settings, const rotation
 {
     for (unsigned k = 0; k < ROTATIONS; k++) {
         const q32_t jump_q32 = fx_abs(q32_from_q16(now->deg_q16[k]) - q32_from_q16(before->deg_q16[k]));
-        const bool is_compared = before->is_there[k] && now->is_there[k] && settings->axis[k_rotations[k]].wrap == ANGLE_AS_SENT;
+        const bool is_compared = before->is_there[k] && now->is_there[k] &&
+                                 settings->axis[k_rotations[k]].wrap == ANGLE_AS_SENT &&
+                                 settings->axis[k_rotations[k]].scale_q16 != 0;
         if (is_compared && fx_abs(jump_q32 - TURN_Q32) <= NEARLY_Q32) {
             return k_rotations[k];
         }

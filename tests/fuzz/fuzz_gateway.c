@@ -113,6 +113,8 @@ static void tidy_owner(owner_t *owner)
     owner->is_port_fixed = was.is_port_fixed;
     owner->ports = was.ports;
     owner->turns = was.turns;
+    owner->first_port = was.first_port;
+    owner->turn_us = was.turn_us;
     memcpy(owner->port, was.port, sizeof was.port);
 }
 

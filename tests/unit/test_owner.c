@@ -143,6 +143,38 @@ static void test_owner_judge_ports_that_take_turns_are_several_programs(void)
     }
 }
 
+/* A program that has been started again before the second one came: its old port is nobody's. */
+static void test_owner_judge_the_first_of_several_is_one_that_is_there(void)
+{
+    for (unsigned starts = 1; starts < 4; starts++) {
+        setUp();
+        uint64_t t = 0;
+        for (unsigned start = 0; start <= starts; start++) {
+            for (unsigned frame = 0; frame < 5; frame++) {
+                TEST_ASSERT_EQUAL(OWNER_DRIVES, from_port((uint16_t)(4000 + start), t += 16000));
+            }
+        }
+        for (unsigned i = 0; i < 20; i++) {
+            (void)from_port(5000, t += 8000);
+            TEST_ASSERT_EQUAL(OWNER_DRIVES, from_port((uint16_t)(4000 + starts), t += 8000));
+        }
+        TEST_ASSERT_TRUE(m_owner.is_port_fixed);
+        TEST_ASSERT_EQUAL_UINT16(4000 + starts, m_owner.peer.port);
+    }
+}
+
+/* A program with two sockets of its own, one after the other, for as long as it likes. */
+static void test_owner_judge_two_sockets_at_leisure_are_one_sender(void)
+{
+    uint64_t t = 0;
+    for (unsigned i = 0; i < 100; i++) {
+        for (unsigned frame = 0; frame < 400; frame++) {
+            TEST_ASSERT_EQUAL(OWNER_DRIVES, from_port((uint16_t)(4000 + i % 2), t += 16000));
+        }
+    }
+    TEST_ASSERT_FALSE(m_owner.is_port_fixed);
+}
+
 static void test_owner_judge_the_other_program_takes_over_after_silence(void)
 {
     for (uint64_t t = 0; t < 10; t++) {
@@ -198,6 +230,8 @@ int main(void)
     RUN_TEST(test_owner_judge_priority_takes_over_at_once_and_never_backwards);
     RUN_TEST(test_owner_judge_random_senders_agree_with_the_history);
     RUN_TEST(test_owner_judge_ports_that_take_turns_are_several_programs);
+    RUN_TEST(test_owner_judge_the_first_of_several_is_one_that_is_there);
+    RUN_TEST(test_owner_judge_two_sockets_at_leisure_are_one_sender);
     RUN_TEST(test_owner_judge_the_other_program_takes_over_after_silence);
     RUN_TEST(test_owner_judge_a_new_port_in_each_frame_is_one_sender);
     RUN_TEST(test_owner_judge_a_program_that_starts_again_is_one_sender);
