@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 from heave.errors import HeaveError
+from heave.text import read_text
 
+SEPARATOR = re.compile("[=:]")
 POSE_AXES = ("roll", "pitch", "yaw", "x", "y", "z")
 UNIT = {"roll": "deg", "pitch": "deg", "yaw": "deg", "x": "mm", "y": "mm", "z": "mm", "angle": "deg"}
 
@@ -45,20 +48,19 @@ def read_ini(path: str | os.PathLike[str]) -> dict[str, dict[str, str]]:
     """{section: {key: text}}; full-line comments start with ; or #, others with a blank and ;"""
     sections: dict[str, dict[str, str]] = {}
     section: dict[str, str] | None = None
-    with open(path, encoding="utf-8") as file:
-        for number, line in enumerate(file, 1):
-            text = line.strip()
-            if not text or text[0] in ";#":
-                continue
-            for blank in (" ;", "\t;"):
-                text = text.split(blank)[0].rstrip()
-            if text.startswith("[") and text.endswith("]"):
-                section = sections.setdefault(text[1:-1].strip(), {})
-            elif "=" in text and section is not None:
-                key, value = text.split("=", 1)
-                section[key.strip()] = value.strip()
-            else:
-                raise ConfigError(f"{path}:{number}: neither [section] nor key = value")
+    for number, line in enumerate(read_text(path, ConfigError).splitlines(), 1):
+        text = line.strip()
+        if not text or text[0] in ";#":
+            continue
+        for blank in (" ;", "\t;"):
+            text = text.split(blank)[0].rstrip()
+        pair = SEPARATOR.split(text, maxsplit=1)
+        if text.startswith("[") and text.endswith("]"):
+            section = sections.setdefault(text[1:-1].strip(), {})
+        elif len(pair) == 2 and section is not None:
+            section[pair[0].strip()] = pair[1].strip()
+        else:
+            raise ConfigError(f"{path}:{number}: stray text {text[:60]!r}; allowed: key = value, [section], ; comment")
     return sections
 
 

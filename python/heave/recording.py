@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 import re
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from heave.errors import HeaveError
 from heave.errors import FrameError
 from heave.frames import COMMANDS, frame
+from heave.text import read_text
 
 ESCAPE = re.compile(r"\\(x[0-9A-Fa-f]{2}|[0-7]{1,3}|.)", re.DOTALL)
 PLAIN = {"n": "\n", "r": "\r", "t": "\t", "0": "\0", "a": "\a", "b": "\b", "f": "\f", "v": "\v"}
@@ -45,16 +47,15 @@ def unescape(text: str) -> str:
 def read_frames(path: str | os.PathLike[str]) -> list[Line]:
     """The lines of a FRAMES file, in its order, without comments."""
     lines = []
-    with open(path, encoding="utf-8", newline="\n") as file:
-        for number, text in enumerate(file, 1):
-            text = text.rstrip("\n")
-            if not text or text.startswith(";"):
-                continue
-            time, blank, rest = text.partition(" ")
-            match = TIME.fullmatch(time)
-            if not match or not blank:
-                raise RecordingError(f"{path}:{number}: {text[:60]!r}; lines are `<t_ms> <text>`")
-            lines.append(Line(int(match[1]) * 1000 + int((match[2] or "").ljust(3, "0")), unescape(rest)))
+    for number, text in enumerate(read_text(path, RecordingError).split("\n"), 1):
+        text = text.removesuffix("\r")
+        if not text.strip() or text.startswith(";"):
+            continue
+        time, blank, rest = text.partition(" ")
+        match = TIME.fullmatch(time)
+        if not match or not blank:
+            raise RecordingError(f"{path}:{number}: {text[:60]!r}; lines are `<t_ms> <text>`")
+        lines.append(Line(int(match[1]) * 1000 + int((match[2] or "").ljust(3, "0")), unescape(rest)))
     return lines
 
 
@@ -68,25 +69,32 @@ def _command_of(path: str | os.PathLike[str], names: list[str]) -> str:
     raise RecordingError(f"{path}:1: the header names neither poses ({', '.join(COMMANDS['A7'])}) nor cylinders (c1 to c6), beside the time (t_ms, t_s or t)")
 
 
+def _delimiter_of(header: str) -> str:
+    """Spreadsheets of a language with decimal commas separate by semicolons."""
+    return ";" if ";" in header and "," not in header else ","
+
+
 def read_csv(path: str | os.PathLike[str], command: str | None = None) -> list[Line]:
     """A header `t_ms,roll,pitch,...` (or t_s; units as in roll_deg may stand behind), then a row per frame. `mask` (hexadecimal) and `time_ms` may be columns.
 
-    A column that a command needs and the file lacks is 0. command: which one to send, where the smallest that takes the columns is not meant."""
+    Values are separated by commas; or by semicolons, and then they may have decimal commas. A column that a command needs and the file lacks is 0. command: which one to send, where the smallest that takes the columns is not meant."""
     lines: list[Line] = []
-    with open(path, encoding="utf-8-sig", newline="") as file:
-        rows = csv.reader(file)
-        header = [UNIT.sub("", name.strip().lower()) for name in next(rows, [])]
-        time_name = next((name for name in header if name in TIME_COLUMNS), None)
-        if time_name is None:
-            raise RecordingError(f"{path}:1: no column for the time; one of {', '.join(TIME_COLUMNS)} is needed")
-        command = command or _command_of(path, header)
-        if command not in COMMANDS:
-            raise RecordingError(f"{command!r} is no command; there are {', '.join(COMMANDS)}")
-        for row in rows:
-            if row and not row[0].startswith((";", "#")):
-                lines.append(_line_of(f"{path}:{rows.line_num}", header, row, time_name, command))
-                if len(lines) > 1 and lines[-1].t_us < lines[-2].t_us:
-                    raise RecordingError(f"{path}:{rows.line_num}: its time is before that of the row before")
+    text = read_text(path, RecordingError)
+    delimiter = _delimiter_of(text.partition("\n")[0])
+    rows = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter)
+    header = [UNIT.sub("", name.strip().lower()) for name in next(rows, [])]
+    time_name = next((name for name in header if name in TIME_COLUMNS), None)
+    if time_name is None:
+        raise RecordingError(f"{path}:1: no column for the time; one of {', '.join(TIME_COLUMNS)} is needed")
+    command = command or _command_of(path, header)
+    if command not in COMMANDS:
+        raise RecordingError(f"{command!r} is no command; there are {', '.join(COMMANDS)}")
+    for row in rows:
+        if row and not row[0].startswith((";", "#")):
+            cells = row if delimiter == "," else [cell.replace(",", ".") for cell in row]
+            lines.append(_line_of(f"{path}:{rows.line_num}", header, cells, time_name, command))
+            if len(lines) > 1 and lines[-1].t_us < lines[-2].t_us:
+                raise RecordingError(f"{path}:{rows.line_num}: its time is before that of the row before")
     return lines
 
 

@@ -8,6 +8,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "common/encoding.h"
 #include "common/translate.h"
 #define LINE_BYTES  1024u
 #define NAME_BYTES  40u
@@ -334,11 +335,13 @@ bool eds_read(eds_t *self, FILE *in, const char *name, FILE *errors)
     reader_t reader = {.eds = self, .name = name, .errors = errors};
     *self = (eds_t){.object = NULL};
     while (!reader.is_bad && fgets(text, sizeof text, in) != NULL) {
-        reader.line++;
-        if (strchr(text, '\n') == NULL && !feof(in)) {
+        const size_t mark = reader.line++ == 0 ? encoding_mark(text, strlen(text)) : 0;
+        if (reader.line == 1 && encoding_is_utf16(text, strlen(text))) {
+            complain(&reader, _("allowed: plain text (UTF-8)"), _("the file is UTF-16"));
+        } else if (strchr(text, '\n') == NULL && !feof(in)) {
             complain(&reader, _("the line is too long"), text);
         } else {
-            take_line(&reader, text);
+            take_line(&reader, text + mark);
         }
     }
     if (!reader.is_bad && ferror(in)) {

@@ -6,8 +6,6 @@
  */
 #include "config/config.h"
 
-#include "common/translate.h"
-
 #include <errno.h>
 #include <fcntl.h>
 #include <ini.h>
@@ -15,6 +13,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "common/encoding.h"
+#include "common/translate.h"
 #include "config/check.h"
 #include "config/hash.h"
 #include "config/source.h"
@@ -162,18 +162,14 @@ static bool inspect(config_source_t *self, char *line, size_t length)
     return is_pair(self, line);
 }
 
-/* Takes the marks of encodings off the first line. Returns false where the file is in one that cannot be read. */
-static bool take_encoding(config_source_t *self, char *line, size_t *length)
+/* An encoding that cannot be read is the only error that is told. */
+static bool is_utf16(config_source_t *self, const char *line, size_t length)
 {
-    if (self->line == 1u && *length >= 3u && memcmp(line, "\xEF\xBB\xBF", 3) == 0) {
-        *length -= 3u;
-        memmove(line, line + 3, *length + 1u);
+    self->is_given_up = self->line == 1u && encoding_is_utf16(line, length);
+    if (self->is_given_up) {
+        config_source_error(self, self->line, "the file is UTF-16; allowed: plain text (UTF-8)");
     }
-    if (self->line != 1u || *length < 2u || (memcmp(line, "\xFF\xFE", 2) != 0 && memcmp(line, "\xFE\xFF", 2) != 0)) {
-        return true;
-    }
-    config_source_error(self, self->line, "the file is UTF-16; allowed: plain text (UTF-8)");
-    return false;
+    return self->is_given_up;
 }
 
 /* inih's line source, as fgets. */
@@ -182,22 +178,23 @@ static char *read_line(char *text, int size, void *stream)
     config_source_t *self = stream;
     const size_t longest = (size_t)size - 3u; /* inih: room for CR, LF, NUL */
     size_t length = 0;
-    if (self->is_given_up || !take_line(self, text, (size_t)size, &length)) {
+    if (self->is_given_up || !take_line(self, text, (size_t)size, &length) || is_utf16(self, text, length)) {
         return NULL;
     }
     if (length > 0 && length < (size_t)size && text[length - 1u] == '\r') {
         text[--length] = '\0';
     }
+    const size_t mark = self->line == 1u ? encoding_mark(text, length) : 0;
     if (length > longest) {
-        if (text[0] != ';' && text[0] != '#') { /* a comment is as long as it likes: nobody keeps it */
+        if (text[mark] != ';' && text[mark] != '#') { /* a comment is as long as it likes: nobody keeps it */
             config_source_error(self, self->line, "line of %zu bytes; allowed: at most %zu", length, longest);
         }
         text[0] = '\0';
-    } else if (!take_encoding(self, text, &length)) {
-        self->is_given_up = true;
-        return NULL;
-    } else if (!inspect(self, text, length)) {
-        text[0] = '\0';
+    } else {
+        memmove(text, text + mark, length - mark + 1u);
+        if (!inspect(self, text, length - mark)) {
+            text[0] = '\0';
+        }
     }
     strcat(text, "\n");
     return text;

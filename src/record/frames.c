@@ -3,6 +3,8 @@
  */
 #include "record/frames.h"
 
+#include "common/encoding.h"
+
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -114,12 +116,6 @@ static int take_line(frames_t *self, char *text, size_t length, uint32_t number,
     return append(self, &line) ? 0 : -1;
 }
 
-/* Windows editors begin files with one. */
-static size_t byte_order_mark(const char *bytes, size_t length)
-{
-    return length >= 3 && memcmp(bytes, "\xEF\xBB\xBF", 3) == 0 ? 3 : 0;
-}
-
 int frames_load(frames_t *self, const char *path, FILE *errors)
 {
     size_t length = 0;
@@ -129,7 +125,10 @@ int frames_load(frames_t *self, const char *path, FILE *errors)
     if (!read_file(path, &self->bytes, &length)) {
         return -1;
     }
-    for (size_t at = byte_order_mark(self->bytes, length); at < length;) {
+    if (encoding_is_utf16(self->bytes, length)) {
+        return report(errors, path, 1, "the file is UTF-16; allowed: plain text (UTF-8)");
+    }
+    for (size_t at = encoding_mark(self->bytes, length); at < length;) {
         char *const start = &self->bytes[at];
         const char *const newline = memchr(start, '\n', length - at);
         const size_t line_length = newline != NULL ? (size_t)(newline - start) : length - at;

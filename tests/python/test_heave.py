@@ -76,6 +76,41 @@ def csv_becomes_frames():
     assert recording.read_csv(write("a.csv", "t,z\n1,4\n"), "A7")[0].text == "@A7:0,0,0,0,0,4,0#"
 
 
+def files_of_people_are_read_as_heaved_reads_them():
+    """Marks of Windows editors, comments in GBK and a Windows code page, ends of lines of both kinds; UTF-16 is refused, in heaved's words."""
+    heaved = Path(os.environ["HEAVE_BIN"]) / "heaved"
+    ini = (Path(__file__).parents[2] / "config/demo-hexapod.ini").read_bytes()
+    frames, csv = b"0 !engage\n3000 @A6:0,0,0,0,0,5#\n3500 !park\n", b"t_ms,z_mm\n0,1.5\n20,2.5\n"
+    marks = {"plain": b"", "BOM": b"\xef\xbb\xbf", "GBK": b"; \xd6\xd0\xce\xc4\xa3\xbb=\n", "cp1252": b"; M\xfcnchen \x80\n"}
+    for name, mark in marks.items():
+        for end in (b"\n", b"\r\n"):
+            config, show, table = (Path(FOLDER.name) / file for file in ("odd.ini", "odd.frames", "odd.csv"))
+            config.write_bytes((mark + ini).replace(b"\n", end))
+            show.write_bytes((mark + frames).replace(b"\n", end))
+            table.write_bytes(((mark if name in ("plain", "BOM") else b"") + csv).replace(b"\n", end))
+            assert Configuration(config).cylinders == 6, name
+            assert [line.text for line in recording.read(show)] == ["!engage", "@A6:0,0,0,0,0,5#", "!park"], name
+            assert [line.text for line in recording.read(table)] == ["@A3:0,0,1.5#", "@A3:0,0,2.5#"], name
+            run = subprocess.run([heaved, "--config", config, "--play", show], capture_output=True, check=False)
+            assert run.returncode == 0, (name, run.stderr)
+    words = "the file is UTF-16; allowed: plain text (UTF-8)"
+    for encoding in ("utf-16-le", "utf-16-be"):
+        for name, data in (("wide.ini", ini), ("wide.frames", frames), ("wide.csv", csv)):
+            path = Path(FOLDER.name) / name
+            path.write_bytes(("\ufeff" + data.decode()).encode(encoding))
+            with refused(heave.HeaveError, f"{path}:1: {words}"):
+                (Configuration if name.endswith(".ini") else recording.read)(path)
+        for arguments in (["--config", Path(FOLDER.name) / "wide.ini", "--check"], ["--config", config, "--play", Path(FOLDER.name) / "wide.frames"]):
+            run = subprocess.run([heaved, *arguments], capture_output=True, text=True, check=False)
+            assert run.returncode != 0 and f":1: {words}" in run.stderr, run
+    assert recording.read(write("semicolons.csv", "t_ms;roll;z\n0;1,5;2\n20;;-0,25\n")) == [recording.Line(0, "@A3:1.5,0,2#"), recording.Line(20_000, "@A3:0,0,-0.25#")]
+    with refused(ConfigError, "odd.ini:1: stray text 'kind'; allowed: key = value, [section], ; comment"):
+        Configuration(write("odd.ini", "kind\n"))
+    config = Path(FOLDER.name) / "colon.ini"
+    config.write_bytes(ini.replace(b"kind = ", b"kind: ", 1))
+    assert Configuration(config).kind == "hexapod"
+
+
 def wrong_recordings_are_named_with_their_line():
     for name, text, *words in (("a.csv", "roll,z\n", ":1:", "time"), ("a.csv", "t_ms,state\n0,OFF\n", ":1:", "poses"), ("a.csv", "t_ms,roll\n0,1\n1,x\n", ":3:", "roll", "'x'"),
                                ("a.csv", "t_ms,roll\n0,1,2\n", ":2:", "3 values under 2"), ("a.csv", "t_ms,roll\n5,1\n4,1\n", ":3:", "before"), ("a.csv", "t_ms,roll\n0,99999\n", ":2:", "roll", "32768"),
@@ -510,7 +545,7 @@ def main():
     python_with_numpy()
     os.environ["HEAVE_BIN"] = options.bin
     suite = tap.Suite()
-    for case in (frames_are_as_the_protocol_has_them, wrong_values_are_named, csv_becomes_frames, wrong_recordings_are_named_with_their_line, a_stream_does_not_drift, a_stream_makes_up_for_nothing,
+    for case in (frames_are_as_the_protocol_has_them, wrong_values_are_named, csv_becomes_frames, files_of_people_are_read_as_heaved_reads_them, wrong_recordings_are_named_with_their_line, a_stream_does_not_drift, a_stream_makes_up_for_nothing,
                  a_stream_of_values_ends_with_them, a_recording_keeps_its_times, requests_say_who_asks, refusals_are_in_heaveds_words, waiting_ends_where_it_is_in_vain, nobody_there_is_said,
                  a_heaved_of_ones_own, a_recording_is_sent_to_it, a_heaved_that_cannot_start_says_why, configurations_are_changed, offline_runs_are_arrays, offline_runs_that_fail_say_why,
                  the_judge_finds_what_is_wrong, what_a_configuration_leaves_out_is_filled_in, lag_and_gain_are_found, the_animation_is_one_page, limits_used_are_shares, faults_are_marked_with_number_and_name, frequency_responses_are_read,

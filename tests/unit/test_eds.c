@@ -122,6 +122,17 @@ static void test_judge_file_with_everything_is_fine(void)
     expect("1 ok, 0 to look at, 0 wrong");
 }
 
+/* As Windows editors save it. */
+static void test_read_mark_of_utf_8_is_passed_over_and_utf_16_refused(void)
+{
+    memmove(m_text + 3, m_text, strlen(m_text) + 1);
+    memcpy(m_text, "\xEF\xBB\xBF", 3);
+    TEST_ASSERT_TRUE_MESSAGE(judge(), m_out);
+    memcpy(m_text, "\xFF\xFE;", 3);
+    TEST_ASSERT_FALSE(read_text());
+    expect("a.eds:1: the file is UTF-16: allowed: plain text (UTF-8)");
+}
+
 static void test_judge_each_object_that_is_missing_is_named(void)
 {
     cia402_wish_t wish = {0};
@@ -261,6 +272,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_judge_file_with_everything_is_fine);
+    RUN_TEST(test_read_mark_of_utf_8_is_passed_over_and_utf_16_refused);
     RUN_TEST(test_judge_each_object_that_is_missing_is_named);
     RUN_TEST(test_judge_guard_that_is_missing_may_be_allowed);
     RUN_TEST(test_judge_object_that_can_only_be_read_has_to_hold_the_value);

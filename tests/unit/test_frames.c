@@ -252,6 +252,19 @@ static void test_frames_load_file_without_last_newline(void)
     frames_free(&frames);
 }
 
+static void test_frames_load_utf_16_is_refused_by_its_name(void)
+{
+    static const char *const k_marks[] = {"\xFF\xFE", "\xFE\xFF"};
+    for (unsigned i = 0; i < 2; i++) {
+        char file[8] = "xx1 a\n";
+        frames_t frames;
+        memcpy(file, k_marks[i], 2);
+        TEST_ASSERT_EQUAL_INT(1, load(file, 6, &frames));
+        TEST_ASSERT_NOT_NULL(strstr(m_errors, ":1: the file is UTF-16; allowed: plain text (UTF-8)\n"));
+        frames_free(&frames);
+    }
+}
+
 static void test_frames_load_all_bad_lines_are_reported(void)
 {
     static const char k_file[] = "5 a\nx\n4.999 b\n6 \\q\n7 c\n";
@@ -488,6 +501,7 @@ int main(void)
     RUN_TEST(test_frames_parse_line_bad_text_is_refused);
     RUN_TEST(test_frames_parse_line_bad_request_is_refused);
     RUN_TEST(test_frames_load_file_without_last_newline);
+    RUN_TEST(test_frames_load_utf_16_is_refused_by_its_name);
     RUN_TEST(test_frames_load_all_bad_lines_are_reported);
     RUN_TEST(test_frames_load_datagrams_and_requests_are_in_order_each_for_themselves);
     RUN_TEST(test_frames_load_empty_file_holds_nothing);
