@@ -148,6 +148,9 @@ bool access_allow_host(access_t *self, const char *name)
 static size_t name_length(const char *host)
 {
     const char *const bracket = host[0] == '[' ? strchr(host, ']') : NULL;
+    if (bracket != NULL && bracket[1] != '\0' && bracket[1] != ':') {
+        return strlen(host); /* no address, whatever it is */
+    }
     return bracket != NULL ? (size_t)(bracket + 1 - host) : strcspn(host, ":");
 }
 

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "panel/child.h"
+#include "panel/listener.h"
 
 #define HEAD_BYTES 2048u
 
@@ -60,7 +61,8 @@ const char *http_refusal(struct lws *wsi, bool has_origin)
 {
     char host[ACCESS_HOST_MAX];
     char origin[ACCESS_HOST_MAX + 16];
-    if (!http_header(wsi, WSI_TOKEN_HOST, host, (int)sizeof host) || !access_is_host(m_server->access, host)) {
+    if (!http_header(wsi, WSI_TOKEN_HOST, host, (int)sizeof host) ||
+        !(access_is_host(m_server->access, host) || listener_is_own(lws_get_socket_fd(wsi), host))) {
         return "this is not a name of this panel; --allow-host makes it one";
     }
     if (!m_server->access->has_password && is_forwarded(wsi)) {

@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 #define WAITING_MAX 256
@@ -137,4 +138,21 @@ int listener_accept(int fd, listener_peer_t *peer)
     (void)inet_ntop(address.ss_family, from, peer->address, sizeof peer->address);
     tune(taken);
     return taken;
+}
+
+bool listener_is_own(int fd, const char *host)
+{
+    struct sockaddr_storage own;
+    socklen_t size = sizeof own;
+    char text[INET6_ADDRSTRLEN] = "";
+    char name[INET6_ADDRSTRLEN + 2];
+    if (getsockname(fd, (struct sockaddr *)&own, &size) != 0) {
+        return false;
+    }
+    const bool is_v6 = own.ss_family == AF_INET6;
+    const void *const address = is_v6 ? (const void *)&((const struct sockaddr_in6 *)(const void *)&own)->sin6_addr
+                                      : (const void *)&((const struct sockaddr_in *)(const void *)&own)->sin_addr;
+    (void)inet_ntop(own.ss_family, address, text, sizeof text);
+    const size_t length = (size_t)snprintf(name, sizeof name, is_v6 ? "[%s]" : "%s", text);
+    return text[0] != '\0' && strncasecmp(host, name, length) == 0 && (host[length] == '\0' || host[length] == ':');
 }

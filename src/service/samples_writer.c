@@ -250,10 +250,11 @@ static void fill_telemetry(sample_t *out, const snapshot_t *s)
     out->notes[DRIVES_MAX] = 0;
 }
 
-static void fill(sample_t *out, const snapshot_t *s)
+/* The motion's time stands still where a cycle was too late; that of a record goes on. */
+static void fill(sample_t *out, const snapshot_t *s, uint32_t cycle_us)
 {
     out->cycle = s->cycle;
-    out->time_us = s->now_us;
+    out->time_us = s->now_us + (uint64_t)s->counters.late_cycles * cycle_us;
     out->state = (uint8_t)s->state;
     out->goal = (uint8_t)s->goal;
     out->fault = (uint8_t)s->fault.code;
@@ -288,7 +289,7 @@ void samples_writer_add(samples_writer_t *self, const snapshot_t *snapshot, uint
     if (self->header == NULL) {
         return;
     }
-    fill(&filled.record, snapshot);
+    fill(&filled.record, snapshot, self->header->cycle_us);
     filled.record.wake_us = at_most(wake_us);
     filled.record.work_us = at_most(work_us);
     char *records = (char *)self->header + HEADER_BYTES;

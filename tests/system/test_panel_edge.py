@@ -29,6 +29,12 @@ def is_open(address, port):
     return True
 
 
+def status_of(address, port, host):
+    with socket.create_connection((address, port), timeout=5) as link:
+        link.sendall(f"GET / HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+        return int(link.recv(4096).split()[1])
+
+
 def refused(bench, *arguments):
     return subprocess.run([BIN / "heave-panel", "--state", bench.state_folder, "--www", WWW, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=30, check=False)
 
@@ -39,6 +45,11 @@ def listens_where_it_was_told(bench):
     for address, wanted in rows.items():
         bench.start_panel("--listen", f"{address}:{bench.web}")
         assert {where for where in everywhere if is_open(where, bench.web)} == wanted, address
+        if address in ("0.0.0.0", "[::]"):
+            for where in wanted:  # by the address that it has there, and by no other
+                literal = f"[{where}]" if ":" in where else where
+                for host, code in ((f"{literal}:{bench.web}", 200), (literal, 200), ("127.8.8.8", 403), ("[fd00::1]", 403), (f"{literal}.evil.example", 403), (f"{literal}0", 403)):
+                    assert status_of(where, bench.web, host) == code, (where, host)
         bench.end_panel()
 
 

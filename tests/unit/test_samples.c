@@ -118,6 +118,7 @@ static void test_record_has_what_the_cycle_came_to(void)
     m_snapshot.report[5].telemetry = (drive_telemetry_t){.torque_permille = 99999, .lag_q32 = INT64_MIN};
     m_snapshot.report[6].telemetry.lag_q32 = 3 * Q32_ONE / 2;
     m_snapshot.report[2].notes = 0x21;
+    m_snapshot.counters.late_cycles = 390;
     samples_writer_add(&m_writer, &m_snapshot, 7, 23);
     TEST_ASSERT_TRUE(samples_reader_next(&reader, &record));
     TEST_ASSERT_FALSE(samples_reader_next(&reader, &record));
@@ -126,7 +127,7 @@ static void test_record_has_what_the_cycle_came_to(void)
         double value;
     } k_rows[] = {
         {"cycle", 77},
-        {"t_ms", 77.123},
+        {"t_ms", 77.123 + 390 * 1},
         {"state", STATE_ENGAGED},
         {"goal", STATE_SETTLED},
         {"fault", FAULT_FOLLOWING},
