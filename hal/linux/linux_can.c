@@ -335,30 +335,25 @@ static uint64_t monotonic_us(void)
     return us_of(&now);
 }
 
-static void keep_look(linux_can_t *self, const linux_can_link_t *link, uint64_t now_us)
-{
-    self->has_looked = true;
-    self->looked_us = now_us;
-    self->looked_sent = link->sent;
-    self->looked_waiting = link->waiting;
-}
-
 /* Whose are the frames that wait? A program that works adds others, and taking the interface down would cut its bus; those of one
  * that has died stand still, or go out and are not followed by more. Looks one after the other tell them apart. True once it is
  * known, with is_alive. */
 static bool knows_whose(linux_can_t *self, const linux_can_link_t *link, bool *is_alive)
 {
     const uint64_t now_us = monotonic_us();
-    if (!self->has_looked || now_us - self->looked_us >= LOOK_OLD_US || link->sent < self->looked_sent) {
-        keep_look(self, link, now_us);
+    if (!self->has_looked || now_us - self->looked_us >= LOOK_OLD_US || link->sent < self->moved_sent) {
+        self->has_looked = true;
+        self->looked_us = self->moved_us = now_us;
+        self->looked_sent = self->moved_sent = link->sent;
+        self->looked_waiting = link->waiting;
         return false;
     }
-    const uint64_t gone_out = link->sent - self->looked_sent;
-    *is_alive = gone_out + link->waiting > (uint64_t)self->looked_waiting + IN_ADAPTER;
-    if (gone_out > 0 && !*is_alive) {
-        keep_look(self, link, now_us);
+    if (link->sent != self->moved_sent) {
+        self->moved_us = now_us;
+        self->moved_sent = link->sent;
     }
-    return *is_alive || (gone_out == 0 && now_us - self->looked_us >= STANDSTILL_US);
+    *is_alive = link->sent - self->looked_sent + link->waiting > (uint64_t)self->looked_waiting + IN_ADAPTER;
+    return *is_alive || now_us - self->moved_us >= STANDSTILL_US;
 }
 
 /* Fresh or not at all: what stands still in the interface is dropped, be it ours or of a program before us. */

@@ -85,6 +85,8 @@ typedef struct {
     uint64_t looked_us;   /**< */
     uint64_t looked_sent; /**< */
     uint32_t looked_waiting;
+    uint64_t moved_us;   /**< when it was seen last that frames have gone out, by moved_sent */
+    uint64_t moved_sent; /**< */
 } linux_can_t;
 
 /** Opens the interface. Before the loop starts: allocates, may take milliseconds. Where frames wait in its queue it is opened all

@@ -59,7 +59,8 @@ static void watch_port(owner_t *self, uint16_t port, uint64_t now_us)
 
 bool owner_is_known(const owner_t *self, const hal_udp_peer_t *from)
 {
-    return self->is_taken && hal_udp_is_same_host(&self->peer, from) && is_known_port(self, from->port);
+    return self->is_taken && hal_udp_is_same_host(&self->peer, from) && is_known_port(self, from->port) &&
+           (!self->is_port_fixed || self->peer.port == from->port);
 }
 
 owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t silence_us, const hal_udp_networks_t *priority,

@@ -960,13 +960,14 @@ static void test_frames_of_others_are_dropped_where_they_stand_still(void)
         } look[LOOKS];
         uint32_t left;
     } k_cases[] = {
-        {{{0, 5, 0, HV_ERR_IO}, {0, 5, 1, HV_OK}}, 0},                       /* too early to tell, then dead */
-        {{{70, 5, 0, HV_OK}}, 5},                                            /* alive: it has added 70 */
-        {{{70, 3, 1, HV_OK}}, 3},                                            /* */
-        {{{2, 3, 1, HV_ERR_IO}, {0, 3, 1, HV_OK}}, 0},                       /* two have gone out, none was added: dead */
-        {{{2, 3, 1, HV_ERR_IO}, {1, 2, 1, HV_ERR_IO}, {2, 0, 1, HV_OK}}, 0}, /* all of them go out */
-        {{{2, 4, 1, HV_ERR_IO}, {0, 4, 1, HV_OK}}, 0},                       /* one was in the adapter */
-        {{{0, 5, 10, HV_ERR_IO}, {0, 5, 1, HV_OK}}, 0},                      /* the first look was long ago */
+        {{{0, 5, 0, HV_ERR_IO}, {0, 5, 1, HV_OK}}, 0},                          /* too early to tell, then dead */
+        {{{70, 5, 0, HV_OK}}, 5},                                               /* alive: it has added 70 */
+        {{{70, 3, 1, HV_OK}}, 3},                                               /* */
+        {{{2, 3, 1, HV_ERR_IO}, {0, 3, 1, HV_OK}}, 0},                          /* two have gone out, none was added: dead */
+        {{{2, 3, 1, HV_ERR_IO}, {1, 2, 1, HV_ERR_IO}, {2, 0, 1, HV_OK}}, 0},    /* all of them go out */
+        {{{2, 4, 1, HV_ERR_IO}, {0, 4, 1, HV_OK}}, 0},                          /* one was in the adapter */
+        {{{0, 5, 10, HV_ERR_IO}, {0, 5, 1, HV_OK}}, 0},                         /* the first look was long ago */
+        {{{30, 5, 1, HV_ERR_IO}, {30, 5, 1, HV_ERR_IO}, {30, 5, 1, HV_OK}}, 5}, /* alive, and slow */
         {{{9, 9, 10, HV_ERR_IO}, {200, 9, 1, HV_OK}}, 9},
     };
     for (unsigned i = 0; i < sizeof k_cases / sizeof k_cases[0]; i++) {

@@ -192,6 +192,22 @@ static void test_a_program_that_starts_again_may_have_another_form(void)
     TEST_ASSERT_EQUAL_UINT32(1, refused());
 }
 
+/* A second program of the same PC that has another form is another sender, and teaches nothing. */
+static void test_another_program_of_the_pc_teaches_nothing(void)
+{
+    engage();
+    for (unsigned i = 0; i < 100; i++) {
+        send_from_port(5000, "@A6:0,0,0,0,0,5,F0#", 1);
+        send_from_port(5001, "@A6:0,0,0,0,0,5#", 1);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0, refused());
+    TEST_ASSERT_EQUAL_UINT32(98, seen()->counters.other_sender);
+    TEST_ASSERT_EQUAL(MASK_SENT, seen()->mask_habit);
+    TEST_ASSERT_EQUAL_HEX16(0xF0, m_rig.relays.mask);
+    send_from_port(5000, "@A6:0,0,0,0,0,5#", 1);
+    TEST_ASSERT_EQUAL_UINT32(1, refused());
+}
+
 /* An effect that one frame began ends with a sender that sends no masks any more, also by a policy. */
 static void test_relays_do_not_stay_on_without_masks(void)
 {
@@ -286,6 +302,7 @@ int main(void)
     RUN_TEST(test_lone_frames_and_the_first_ones_are_taken_as_they_are);
     RUN_TEST(test_each_sender_has_its_own_form);
     RUN_TEST(test_a_program_that_starts_again_may_have_another_form);
+    RUN_TEST(test_another_program_of_the_pc_teaches_nothing);
     RUN_TEST(test_relays_do_not_stay_on_without_masks);
     RUN_TEST(test_senders_by_turns_are_followed_where_all_are);
     RUN_TEST(test_a_form_that_is_set_is_refused_from_the_first_frame_on);
