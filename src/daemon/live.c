@@ -16,7 +16,6 @@
 #include <unistd.h>
 
 #include "common/build_id.h"
-#include "common/clock_trust.h"
 #include "common/message.h"
 #include "common/output_file.h"
 #include "common/socket_path.h"
@@ -452,8 +451,6 @@ int live_run(const config_t *config, const options_t *options, bool *is_ready)
             : NULL;
     self->locks = (locks_t){{-1, -1, -1, -1}};
     control_init(&self->control);
-    self->control.boot = clock_boot(&clock_trust_files);
-    self->control.clock_asked_s = -3600; /* never */
     self->manager.fd = -1;
     self->has_writers_ended = true;
     self->udp.fd = -1;

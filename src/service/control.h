@@ -10,7 +10,6 @@
 
 #include <poll.h>
 #include <sys/stat.h>
-#include <time.h>
 
 #include "record/blackbox.h"
 #include "service/access_levels.h"
@@ -112,11 +111,7 @@ typedef struct control {
     uint32_t own_holds; /**< of the motion thread, as far as they are known */
     level_peer_t
         acknowledged_by; /**< who has just acknowledged the configuration; the owner says it and sets it back; pid 0: nobody */
-    control_selftest_t selftest;
-    uint64_t boot;         /**< clock_boot(), */
-    bool is_clock_trusted; /**< and that it was so once since then */
-    time_t clock_asked_s; /**< when the system was asked last, by the clock that never jumps */ /**< what somebody has just said
-                                                                                                   of a self-test; likewise */
+    control_selftest_t selftest; /**< what somebody has just said of a self-test; likewise */
     uint32_t last_id;
     uint32_t last_series; /**< given out: of what somebody has begun to hold */
     control_client_t client[CONTROL_CLIENTS];

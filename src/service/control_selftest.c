@@ -7,11 +7,8 @@
 #include <string.h>
 #include <time.h>
 
-#include "common/clock_trust.h"
 #include "service/control_client.h"
 #include "service/service_json.h"
-
-#define CLOCK_ASK_S 10
 
 static const char k_passed[] = "selftest passed";
 
@@ -66,25 +63,12 @@ static uint32_t today(void)
     return (uint32_t)((date.tm_year + 1900) * 10000 + (date.tm_mon + 1) * 100 + date.tm_mday);
 }
 
-/* A pass of before a new start of the machine counts by its date, so only where the date can be right. A date that was once right
- * is right until the machine starts anew. */
-static bool counts(control_t *self, const lifetime_selftest_t *selftest)
-{
-    struct timespec now = {0};
-    (void)clock_gettime(CLOCK_MONOTONIC, &now);
-    if (!self->is_clock_trusted && now.tv_sec - self->clock_asked_s >= CLOCK_ASK_S) {
-        self->clock_asked_s = now.tv_sec;
-        self->is_clock_trusted = clock_is_trusted(&clock_trust_files);
-    }
-    return self->is_clock_trusted || (self->boot != 0 && selftest->boot == self->boot);
-}
-
 bool control_selftest_watch(control_t *self, lifetime_t *life, const config_t *config, char said[128])
 {
     const uint32_t day = today();
     const bool is_news = self->selftest.is_news;
     if (is_news) {
-        lifetime_selftest_t selftest = {.day = day, .is_passed = self->selftest.is_passed, .boot = self->boot};
+        lifetime_selftest_t selftest = {.day = day, .is_passed = self->selftest.is_passed};
         memcpy(selftest.hash, config->hash, sizeof selftest.hash);
         lifetime_note_selftest(life, &selftest);
         (void)snprintf(said, 128, "self-test %s, by user %u, process %d, configuration %s",
@@ -92,8 +76,7 @@ bool control_selftest_watch(control_t *self, lifetime_t *life, const config_t *c
                        config->hash);
         self->selftest.is_news = false;
     }
-    self->lost.is_untested = config->selftest.when == CONFIG_SELFTEST_DAILY &&
-                             !(lifetime_has_passed(life, day, config->hash) && counts(self, &life->now.selftest));
+    self->lost.is_untested = config->selftest.when == CONFIG_SELFTEST_DAILY && !lifetime_has_passed(life, day, config->hash);
     __atomic_store_n(&self->handover->is_untested, self->lost.is_untested ? 1u : 0u, __ATOMIC_RELEASE);
     return is_news;
 }

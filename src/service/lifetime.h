@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT
  * lifetime.h - what the axes of a machine have done over its life: kept in two files that are written in turn, each as a whole,
  * with a checksum, so that one of them is right whenever the power goes. A thread of its own writes them; the service thread
- * hands over and never waits. Nothing is allocated after the open.
+ * hands over and never waits. That thread asks the system whether its date can be right, too. Nothing is allocated after the
+ * open.
  */
 #ifndef HEAVE_SERVICE_LIFETIME_H
 #define HEAVE_SERVICE_LIFETIME_H
@@ -47,9 +48,12 @@ typedef struct {
     lifetime_totals_t now;
     state_t state; /**< of the last look */
     uint64_t next_us;
-    ring_t ring;   /**< lifetime_totals_t to the writer */
-    int32_t error; /**< atomic: errno of the newest write, 0 = it worked */
-    int32_t told;  /**< error that lifetime_trouble() has told of */
+    ring_t ring;               /**< lifetime_totals_t to the writer */
+    int32_t error;             /**< atomic: errno of the newest write, 0 = it worked */
+    int32_t told;              /**< error that lifetime_trouble() has told of */
+    uint64_t boot;             /**< clock_boot() */
+    uint32_t is_clock_trusted; /**< atomic: clock_is_trusted(), and that it was so once since the start */
+    unsigned steps;            /**< of the writer, until it asks */
     worker_t worker;
     uint8_t ring_bytes[LIFETIME_RING_BYTES];
 } lifetime_t;
@@ -66,10 +70,11 @@ bool lifetime_start(lifetime_t *self);
 /** Takes a view in, and hands over where it is time to. The service thread, often. */
 void lifetime_serve(lifetime_t *self, const snapshot_t *snapshot, uint64_t now_us);
 
-/** Keeps what has come of a self-test, on the disk as soon as it takes it. */
+/** Keeps what has come of a self-test, on the disk as soon as it takes it; `boot` is filled in. */
 void lifetime_note_selftest(lifetime_t *self, const lifetime_selftest_t *selftest);
 
-/** Whether a self-test has passed on that day, with that configuration. */
+/** Whether a self-test has passed on that day, with that configuration. One of before the machine was started counts by its date,
+ * so only where the date can be right. */
 bool lifetime_has_passed(const lifetime_t *self, uint32_t day, const char *hash);
 
 /** Whether writing has begun to fail, or works again, since the last call.

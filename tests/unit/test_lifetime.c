@@ -119,6 +119,7 @@ static void test_selftest_counts_for_its_day_and_configuration(void)
 {
     lifetime_selftest_t selftest = {.day = 20261123, .is_passed = true, .hash = "0123456789abcdef"};
     TEST_ASSERT_EQUAL(EXIT_DONE, start());
+    TEST_ASSERT_NOT_EQUAL(0, m_life.boot);
     TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 20261123, "0123456789abcdef"));
     TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 0, ""));
     lifetime_note_selftest(&m_life, &selftest);
@@ -140,15 +141,36 @@ static void test_selftest_counts_for_its_day_and_configuration(void)
 static void test_selftest_keeps_the_start_of_the_machine(void)
 {
     for (unsigned known = 0; known <= 1; known++) {
-        const lifetime_selftest_t selftest = {
-            .day = 20261123, .is_passed = true, .boot = known ? UINT64_MAX - 7 : 0, .hash = "0123456789abcdef"};
+        const lifetime_selftest_t selftest = {.day = 20261123, .is_passed = true, .hash = "0123456789abcdef"};
+        const uint64_t boot = known ? UINT64_MAX - 7 : 0;
         TEST_ASSERT_EQUAL(EXIT_DONE, start());
+        m_life.boot = boot;
         lifetime_note_selftest(&m_life, &selftest);
         TEST_ASSERT_TRUE(lifetime_close(&m_life));
         TEST_ASSERT_EQUAL(EXIT_DONE, start());
-        TEST_ASSERT_EQUAL_UINT64(selftest.boot, m_life.now.selftest.boot);
-        TEST_ASSERT_TRUE(lifetime_has_passed(&m_life, 20261123, "0123456789abcdef"));
+        TEST_ASSERT_EQUAL_UINT64(boot, m_life.now.selftest.boot);
         TEST_ASSERT_TRUE(lifetime_close(&m_life));
+    }
+}
+
+/* A box without a clock chip starts with the date of yesterday: there a pass of before counts once a time server has been heard.
+ */
+static void test_selftest_of_an_older_start_counts_by_a_date_that_can_be_right(void)
+{
+    const lifetime_selftest_t selftest = {.day = 20261123, .is_passed = true, .hash = "0123456789abcdef"};
+    static const struct {
+        uint64_t then, now;
+        bool is_date_right, counts;
+    } k_rows[] = {{5, 5, false, true},  {5, 6, false, false}, {5, 0, false, false}, {0, 5, false, false},
+                  {0, 0, false, false}, {5, 5, true, true},   {5, 6, true, true},   {0, 0, true, true}};
+    TEST_ASSERT_EQUAL(EXIT_DONE, start());
+    for (unsigned i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        m_life.boot = k_rows[i].then;
+        lifetime_note_selftest(&m_life, &selftest);
+        m_life.boot = k_rows[i].now;
+        m_life.is_clock_trusted = k_rows[i].is_date_right;
+        TEST_ASSERT_EQUAL(k_rows[i].counts, lifetime_has_passed(&m_life, 20261123, "0123456789abcdef"));
+        TEST_ASSERT_FALSE(lifetime_has_passed(&m_life, 20261124, "0123456789abcdef"));
     }
 }
 
@@ -285,6 +307,7 @@ int main(void)
     RUN_TEST(test_life_is_written_once_a_minute_and_when_it_goes_off);
     RUN_TEST(test_selftest_counts_for_its_day_and_configuration);
     RUN_TEST(test_selftest_keeps_the_start_of_the_machine);
+    RUN_TEST(test_selftest_of_an_older_start_counts_by_a_date_that_can_be_right);
     RUN_TEST(test_life_survives_any_damage_of_one_file);
     RUN_TEST(test_life_without_a_file_that_is_right_does_not_begin_at_zero);
     RUN_TEST(test_life_of_another_machine_is_refused);
