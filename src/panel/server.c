@@ -5,10 +5,12 @@
  */
 #include "panel/server.h"
 
+#include <errno.h>
 #include <libwebsockets.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -26,6 +28,10 @@
 #define SAID_MS     30000
 #define WHY_MAX     256u
 
+/* A connection may be sending a file; a platform has its links and its samples; the rest is the library's, children's and room.
+ */
+#define DESCRIPTORS (CONNECTIONS_MAX * 2u + VIEWERS_MAX + VIEWER_PLATFORMS * 6u + 64u)
+
 /* One WebSocket. */
 typedef struct {
     viewer_t *viewer;
@@ -37,6 +43,8 @@ static struct lws_vhost *m_vhost;
 static lws_sorted_usec_list_t m_pump, m_second;
 static unsigned m_viewers;
 static connections_t m_connections; /* that are no pages */
+static struct lws *m_listener;
+static bool m_is_full;
 
 static int64_t milliseconds(void)
 {
@@ -264,12 +272,23 @@ static void take_in(int fd, const listener_peer_t *peer)
     }
 }
 
+/* Where nothing is left for one more, the kernel goes on telling who waits. Not before the next turn, so that pages that are
+ * there have the processor. */
+static void listen_later(void)
+{
+    if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
+        m_is_full = true;
+        (void)lws_rx_flow_control(m_listener, 0);
+    }
+}
+
 static void take_all(int listening)
 {
     listener_peer_t peer;
     for (unsigned i = 0; i < ACCEPTS_MAX; i++) {
         const int fd = listener_accept(listening, &peer);
         if (fd < 0) {
+            listen_later();
             return;
         }
         if (m_server->access->has_password || peer.is_this_machine) {
@@ -311,6 +330,10 @@ static int serve_http(struct lws *wsi, enum lws_callback_reasons reason, void *u
 /* To pages that have had their turn. */
 static void listen_again(void)
 {
+    if (m_is_full) {
+        m_is_full = false;
+        (void)lws_rx_flow_control(m_listener, 1);
+    }
     for (viewer_t *viewer = m_server->hall->viewers; viewer != NULL; viewer = viewer->next) {
         if (viewer->heard >= VIEWER_HEARD_MAX) {
             (void)lws_rx_flow_control(viewer->handle, 1);
@@ -378,7 +401,24 @@ static bool listen_at(const listener_address_t *where)
         fprintf(stderr, "heave-panel: %s\n", why);
         return false;
     }
-    return lws_adopt_descriptor_vhost(m_vhost, LWS_ADOPT_RAW_FILE_DESC, descriptor, "listener", NULL) != NULL;
+    m_listener = lws_adopt_descriptor_vhost(m_vhost, LWS_ADOPT_RAW_FILE_DESC, descriptor, "listener", NULL);
+    return m_listener != NULL;
+}
+
+/* So that strangers cannot take those that pages and heaved need. */
+static bool has_descriptors(void)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0) {
+        return true;
+    }
+    if (limit.rlim_max < DESCRIPTORS) {
+        fprintf(stderr, "heave-panel: it needs %u file descriptors, and may have %llu (ulimit -n, LimitNOFILE=)\n", DESCRIPTORS,
+                (unsigned long long)limit.rlim_max);
+        return false;
+    }
+    limit.rlim_cur = limit.rlim_cur < DESCRIPTORS ? DESCRIPTORS : limit.rlim_cur;
+    return setrlimit(RLIMIT_NOFILE, &limit) == 0;
 }
 
 static bool begin(const server_t *server)
@@ -418,7 +458,7 @@ int server_run(server_t *server)
     http_init(server);
     child_watch = watch_child;
     server->hall->wake = wake;
-    if (!begin(server)) {
+    if (!has_descriptors() || !begin(server)) {
         if (m_context != NULL) {
             lws_context_destroy(m_context);
         }

@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import harness
 import tap
@@ -212,6 +213,37 @@ def nobody_is_locked_out(bench):
             one.close()
 
 
+def few_descriptors(bench):
+    """A limit that the panel may raise is raised, one that it may not is said. Where none is left all the same, it waits, and pages that are there go on."""
+    def started(soft, hard):
+        return subprocess.run(["prlimit", f"--nofile={soft}:{hard}", BIN / "heave-panel", "--state", bench.state_folder, "--www", WWW, "--listen", f"127.0.0.1:{bench.web}"], stdin=subprocess.DEVNULL, capture_output=True,
+                              text=True, timeout=30, check=False)
+    run = started(100, 256)
+    assert run.returncode == 69 and re.search(r"needs \d+ file descriptors, and may have 256", run.stderr), run
+    bench.both()
+    cookie = bench.log_in("operate")[1]
+    with bench.link(cookie=cookie) as link:
+        assert request(link, "times")["answer"]["ok"]
+        used = max(int(one.name) for one in Path(f"/proc/{bench.panel.pid}/fd").iterdir()) + 1
+        soft, hard = resource.prlimit(bench.panel.pid, resource.RLIMIT_NOFILE)
+        waiting = []
+        try:
+            resource.prlimit(bench.panel.pid, resource.RLIMIT_NOFILE, (used + 2, hard))
+            for _ in range(10):
+                waiting.append(socket.create_connection(("127.0.0.1", bench.web), timeout=5))
+            before_s = cpu_s(bench.panel.pid)
+            for _ in range(40):
+                assert request(link, "times")["answer"]["ok"]
+                time.sleep(0.05)
+            spent_s = cpu_s(bench.panel.pid) - before_s
+            assert spent_s < 0.3, f"{spent_s} s of a core in 2 s"
+        finally:
+            resource.prlimit(bench.panel.pid, resource.RLIMIT_NOFILE, (soft, hard))
+            for one in waiting:
+                one.close()
+        assert bench.log_in("operate")[0] == 200, "whoever waited comes in once there is room"
+
+
 FLOOD = """
 import socket, sys
 while True:
@@ -267,6 +299,7 @@ CASES = [
     ("one answer to each connection", one_answer_each, {"passwords": ("service",)}),
     ("what is refused leaves a session alone", refused_with_a_cookie, {"passwords": ("service",)}),
     ("nobody is locked out by connections", nobody_is_locked_out, {"passwords": ("operate",)}),
+    ("few descriptors", few_descriptors, {"passwords": ("operate",)}),
     ("out is out at once", out_at_once, {"passwords": ("operate",)}),
     ("pages of a build", from_a_build, {}),
     ("cookies of other programs", cookies_of_others, {"passwords": ("operate",)}),
