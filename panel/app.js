@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: MIT
 // app.js - the pages: what is shown, and what buttons ask for. All that is known comes from heaved's status; nothing is guessed.
-import { stateOf } from "/drives.js";
-import { Hand } from "/hand.js";
-import { atLimits, extensionOf, nearness } from "/limits.js";
-import { Link } from "/link.js";
-import { Motion } from "/motion.js";
-import { Recorder } from "/recorder.js";
-import { chinese, putBackOf, refusalOf, switchLanguage, t } from "/text.js";
-import { button, element, fill, number, rowsOf, table } from "/ui.js";
-import { View } from "/view.js";
+import { stateOf } from "./drives.js";
+import { Hand } from "./hand.js";
+import { atLimits, extensionOf, nearness } from "./limits.js";
+import { Link } from "./link.js";
+import { Motion } from "./motion.js";
+import { Recorder } from "./recorder.js";
+import { chinese, putBackOf, refusalOf, switchLanguage, t } from "./text.js";
+import { button, element, fill, number, rowsOf, table } from "./ui.js";
+import { View } from "./view.js";
 
 const at = (id) => document.getElementById(id);
 const shown = { me: null, platform: null, tab: "operate", status: null, isGone: false, holder: null, isMine: false, geometry: null, all: {}, heardMs: {} };
@@ -80,7 +80,7 @@ at("hold").addEventListener("pointerdown", () => { isHoldPressed = true; request
 at("hold").addEventListener("click", (event) => { if (event.detail === 0 || !isHoldPressed) request("hold"); isHoldPressed = false; }); // by keyboard or screen reader
 at("hold").addEventListener("contextmenu", (event) => event.preventDefault());
 at("language").addEventListener("click", () => { switchLanguage(); build(); });
-at("logout").addEventListener("click", async () => { await fetch("/api/logout", { method: "POST", headers: { "Content-Type": "application/json" }, body: "{}" }); location.reload(); });
+at("logout").addEventListener("click", async () => { await fetch("api/logout", { method: "POST", headers: { "Content-Type": "application/json" }, body: "{}" }); location.reload(); });
 document.addEventListener("keydown", (event) => { if (event.key === "Escape") { event.preventDefault(); request("hold"); } });
 
 // --- Operate ---
@@ -239,7 +239,7 @@ function build() {
     at("page").replaceChildren(element("p", {}, shown.isGone ? t("gone") : t("noWebSocket")));
     return;
   }
-  ({ operate: buildOperate, live: () => buildLater("/live.js"), service: buildService, incidents: () => buildLater("/incidents.js"), log: () => buildLater("/log.js"), configuration: () => buildLater("/configuration.js"), commission: () => buildLater("/commission.js"), wall: buildWall })[shown.tab]();
+  ({ operate: buildOperate, live: () => buildLater("./live.js"), service: buildService, incidents: () => buildLater("./incidents.js"), log: () => buildLater("./log.js"), configuration: () => buildLater("./configuration.js"), commission: () => buildLater("./commission.js"), wall: buildWall })[shown.tab]();
   page.update?.(shown.status);
 }
 
@@ -287,7 +287,7 @@ function showLogin() {
   showFrame();
   at("page").replaceChildren(element("form", { class: "login", onsubmit: async (event) => {
     event.preventDefault();
-    const answer = await fetch("/api/login", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ role: role.value, password: password.value }) });
+    const answer = await fetch("api/login", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ role: role.value, password: password.value }) });
     if (answer.ok) location.reload(); else say((await answer.json()).error);
   } }, element("h2", {}, t("login")), element("label", { for: "role" }, t("role")), role, element("label", { for: "password" }, t("password")), password, element("button", {}, t("login"))));
 }
@@ -295,7 +295,7 @@ function showLogin() {
 // A panel that was restarted knows nobody any more.
 async function mayConnect() {
   try {
-    shown.me = await (await fetch("/api/me")).json();
+    shown.me = await (await fetch("api/me")).json();
   } catch {
     return false;
   }
@@ -307,7 +307,7 @@ async function mayConnect() {
 }
 
 async function start() {
-  shown.me = await (await fetch("/api/me")).json();
+  shown.me = await (await fetch("api/me")).json();
   if (!shown.me.role) return showLogin();
   link = new Link({
     onEvent,

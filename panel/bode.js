@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // bode.js - gain and phase over frequency of what an identification has found: the axis thick, its drives thin. The numbers are heaved's side of the link; nothing is worked out here.
-import { colours } from "/curves.js";
-import { t } from "/text.js";
-import { penOn } from "/ui.js";
+import { colours } from "./curves.js";
+import { t } from "./text.js";
+import { penOn } from "./ui.js";
 
 const LEFT = 52, GAP = 26, BOTTOM = 24;
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 // commission.js - putting a machine into service, step by step: what is there, which leg is which, zeros, ends, relays, switches, test signals, and a report to
 // print. What was found is kept in this browser, so that it can be left and continued. All motion is by a held button, as on the page Service.
-import { drawBode } from "/bode.js";
-import { stateOf } from "/drives.js";
-import { Hand } from "/hand.js";
-import { store } from "/store.js";
-import { chinese, refusalOf, t } from "/text.js";
-import { button, choice, element, fill, number, rowsOf, table } from "/ui.js";
+import { drawBode } from "./bode.js";
+import { stateOf } from "./drives.js";
+import { Hand } from "./hand.js";
+import { store } from "./store.js";
+import { chinese, refusalOf, t } from "./text.js";
+import { button, choice, element, fill, number, rowsOf, table } from "./ui.js";
 
 const STEPS = ["inventory", "legs", "zeros", "ends", "outputs", "switches", "signals", "report"];
 const AXES = ["z", "x", "y", "roll", "pitch", "yaw"];

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // configuration.js - the configuration of a platform as text and as sizes: what each key means, what heaved says of it at its line, what would change, and
 // bringing it into force by heaved's own rules.
-import { difference, Draft, entriesOf, withValue } from "/draft.js";
-import { buildSizes } from "/sizes.js";
-import { store } from "/store.js";
-import { chinese, putBackOf, refusalOf, t } from "/text.js";
-import { button, element, fill, rowsOf } from "/ui.js";
+import { difference, Draft, entriesOf, withValue } from "./draft.js";
+import { buildSizes } from "./sizes.js";
+import { store } from "./store.js";
+import { chinese, putBackOf, refusalOf, t } from "./text.js";
+import { button, element, fill, rowsOf } from "./ui.js";
 
 const LINE_PX = 24;
 let keys = {}; // by language: the table never changes while heaved is the same
@@ -13,7 +13,7 @@ let keys = {}; // by language: the table never changes while heaved is the same
 async function keyTable() {
   const language = chinese() ? "zh" : "en";
   if (!keys[language]) {
-    const answer = await fetch(chinese() ? "/api/keys/zh" : "/api/keys");
+    const answer = await fetch(chinese() ? "api/keys/zh" : "api/keys");
     const got = await answer.json();
     if (!answer.ok) throw new Error(got.error);
     keys[language] = got.sections;

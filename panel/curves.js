@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // curves.js - curves of the samples, every cycle of the last half minute: each place of the screen shows the least and the most of what lies in it, so that no peak is lost, at any zoom. And the
 // spectrum of one of them.
-import { drawBand, widened } from "/band.js";
-import { penOn } from "/ui.js";
+import { drawBand, widened } from "./band.js";
+import { penOn } from "./ui.js";
 
 // As the page is light or dark; they differ in lightness too.
 export const colours = () => { const style = getComputedStyle(document.documentElement); return [1, 2, 3, 4, 5, 6, 7].map((n) => style.getPropertyValue(`--c${n}`).trim()); };

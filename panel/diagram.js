@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // diagram.js - the states of a platform: where it is, where it is going, and what can happen next, as a picture and in words.
-import { ACTORS, ROWS, WORDS } from "/states.js";
-import { chinese, t } from "/text.js";
-import { element, fill } from "/ui.js";
+import { ACTORS, ROWS, WORDS } from "./states.js";
+import { chinese, t } from "./text.js";
+import { element, fill } from "./ui.js";
 
 const WIDE = 104, TALL = 38;
 const PLACES = { OFF: [180, 402], HOMING: [180, 332], SETTLED: [180, 262], RISING: [180, 180], NEUTRAL: [180, 104], ENGAGED: [180, 28], HOLD: [304, 104], SETTLING: [304, 222], SERVICE: [56, 332], FAULT: [56, 28], ESTOP: [56, 104] };

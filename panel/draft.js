@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // draft.js - a configuration as somebody edits it: the text, the one it was made from, and what heaved says of it. Kept in the browser until it is applied: a
 // lost network, a closed tab or an empty battery loses nothing.
-import { store } from "/store.js";
-import { chinese } from "/text.js";
+import { store } from "./store.js";
+import { chinese } from "./text.js";
 
 const CHECK_AFTER_MS = 500, AGAIN_MS = 700;
 const headOf = (line) => /^\[([^\]]+)\]/.exec(line)?.[1];
@@ -72,7 +72,7 @@ export class Draft {
 
   // The configuration in force. The draft that was left stays the text.
   async load() {
-    const answer = await fetch(`/api/config/${this.platform}`);
+    const answer = await fetch(`api/config/${this.platform}`);
     const got = await answer.json();
     if (!answer.ok) throw new Error(got.error);
     const kept = JSON.parse(store.get(this.name) ?? "null");
@@ -127,7 +127,7 @@ export class Draft {
     const mine = ++this.count;
     let got = {};
     try {
-      const answer = await fetch(`/api/check/${this.platform}${chinese() ? "/zh" : ""}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ text: this.text }) });
+      const answer = await fetch(`api/check/${this.platform}${chinese() ? "/zh" : ""}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ text: this.text }) });
       got = await answer.json();
       if (answer.status === 503 && mine === this.count) { this.error = got.error; this.tell(); this.timer = setTimeout(() => this.check(), AGAIN_MS); return; }
     } catch (error) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // drives.js - buses and drives with what they say: `cylinders[]`, `rotation` and `bus` of the status (docs/status-json.md).
-import { t } from "/text.js";
-import { element, number, rowsOf, table } from "/ui.js";
+import { t } from "./text.js";
+import { element, number, rowsOf, table } from "./ui.js";
 
 const hex = (value) => `0x${value.toString(16).toUpperCase().padStart(4, "0")}`;
 

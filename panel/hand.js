@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // hand.js - a button that moves the machine as long as it is held: a press, beats of 50 ms from the main thread with the newest tick that
 // this page has heard, a release. Whatever ends the hold (finger, window, tab, connection) ends the beats; heaved stops 250 ms later by itself.
-import { refusalOf } from "/text.js";
+import { refusalOf } from "./text.js";
 
 const BEAT_MS = 50;
 const REST_MS = 150; // a finger that rests so long wants to move the machine; one that swipes wants to see more of the page

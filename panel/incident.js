@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // incident.js - what the files of an incident say (docs/operation.md, docs/offline.md): columns over time, states, and what happened when.
-import { widened } from "/band.js";
+import { widened } from "./band.js";
 
 const WORDS = { from: "fromSender", fault: "wasFault", drive: "atDrive", estop: "atEstop", late: "wasLate", config: "wasReload" };
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // incidents.js - what the black box has written, and one of them looked at: time line, curves, the platform at any speed, its files.
-import { drawBand } from "/band.js";
-import { colours } from "/curves.js";
-import { envelope, readFrames, readGeometry, readTable, rowAt, statesOf } from "/incident.js";
-import { t } from "/text.js";
-import { button, choice, element, fill, number, penOn, table } from "/ui.js";
-import { View } from "/view.js";
+import { drawBand } from "./band.js";
+import { colours } from "./curves.js";
+import { envelope, readFrames, readGeometry, readTable, rowAt, statesOf } from "./incident.js";
+import { t } from "./text.js";
+import { button, choice, element, fill, number, penOn, table } from "./ui.js";
+import { View } from "./view.js";
 
 const FILES = ["trace.csv", "feedback.csv", "frames", "platform.ini"];
 const SPEEDS = ["0.05", "0.1", "0.25", "0.5", "1", "2", "5", "10", "50"];
@@ -26,7 +26,7 @@ export async function build({ page, shown, request, place }) {
   show(await request("incidents"));
 }
 
-const pathOf = (platform, name, file) => `/api/incident/${platform}/${name}/${file}`;
+const pathOf = (platform, name, file) => `api/incident/${platform}/${name}/${file}`;
 
 async function read(platform, name, file) {
   const answer = await fetch(pathOf(platform, name, file));

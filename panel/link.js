@@ -13,8 +13,9 @@ export class Link {
   }
 
   connect() {
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
-    this.socket = new WebSocket(`${scheme}://${location.host}/ws`, "heave-panel.1");
+    const address = new URL("ws", location); // beside the page, which a proxy may serve below a path
+    address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    this.socket = new WebSocket(address, "heave-panel.1");
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => { this.isOpen = true; this.onChange(true); };
     this.socket.onmessage = (message) => (typeof message.data === "string" ? this.take(JSON.parse(message.data)) : this.takeBlock(message.data));

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // live.js - what the platform does now: curves of every cycle, the platform, its states, who sends, how late things are, what buses and drives say.
-import { Curves, spectrum, strongest } from "/curves.js";
-import { Diagram } from "/diagram.js";
-import { busOf, drivesOf } from "/drives.js";
-import { Motion } from "/motion.js";
-import { refusalOf, t } from "/text.js";
-import { Times } from "/times.js";
-import { button, choice, element, fill, number, penOn } from "/ui.js";
-import { View } from "/view.js";
+import { Curves, spectrum, strongest } from "./curves.js";
+import { Diagram } from "./diagram.js";
+import { busOf, drivesOf } from "./drives.js";
+import { Motion } from "./motion.js";
+import { refusalOf, t } from "./text.js";
+import { Times } from "./times.js";
+import { button, choice, element, fill, number, penOn } from "./ui.js";
+import { View } from "./view.js";
 
 const SPECTRUM_ROWS = 4096, FLOOR = 0.0005; // what is less is rounding
 const FRAME_MS = 45, SLOW_EVERY = 6, TIMES_MS = 2000;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // log.js - who asked for what, and what became of it: the operator log of heaved, the newest first.
-import { t } from "/text.js";
-import { button, element, table } from "/ui.js";
+import { t } from "./text.js";
+import { button, element, table } from "./ui.js";
 
 const SHOWN = 500;
 
@@ -22,7 +22,7 @@ export async function build({ page, shown, place }) {
       row.request + (row.repeats_before ? ` (+${row.repeats_before})` : ""), row.ok ? t("done") : row.answer, row.before === row.after ? row.after : `${row.before} → ${row.after}`]), true) : element("p", {}, t("noIncidents")));
   };
   const load = async () => {
-    const answer = await fetch(`/api/log/${shown.platform}`);
+    const answer = await fetch(`api/log/${shown.platform}`);
     if (answer.ok) {
       text = await answer.text();
       show();
@@ -32,7 +32,7 @@ export async function build({ page, shown, place }) {
   };
   word.addEventListener("input", show);
   place.replaceChildren(element("section", {}, element("h2", {}, t("log")), element("div", { class: "buttons" }, word, button(t("again"), load),
-    element("a", { class: "button", href: `/api/log/${shown.platform}`, download: `${shown.platform}-operator.log` }, t("download"))), list));
+    element("a", { class: "button", href: `api/log/${shown.platform}`, download: `${shown.platform}-operator.log` }, t("download"))), list));
   page.update = () => {};
   await load();
 }

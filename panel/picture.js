@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // picture.js - the platform as it is: joints, cylinders with their stroke, plate, and in grey where the sender asks it to be. A flat canvas:
 // the same on a phone without WebGL.
-import { extensionOf, nearness } from "/limits.js";
-import { camera, plateJoints } from "/space.js";
+import { extensionOf, nearness } from "./limits.js";
+import { camera, plateJoints } from "./space.js";
 
 export class Picture {
   constructor(canvas) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // recorder.js - every cycle from a press of a button to the next, as the file that `heavectl scope` writes. In the page's memory; goes on on other pages.
-import { refusalOf } from "/text.js";
+import { refusalOf } from "./text.js";
 
 const MAX_S = 600;
 const AXES = ["roll_deg", "pitch_deg", "yaw_deg", "x_mm", "y_mm", "z_mm"];

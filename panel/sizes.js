@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // sizes.js - the sizes of a platform as a form over the same draft, beside what heaved makes of them: seen from above with its measures, and in a pose.
-import { extensions } from "/space.js";
-import { t } from "/text.js";
-import { button, choice, element, fill, number, table } from "/ui.js";
-import { View } from "/view.js";
+import { extensions } from "./space.js";
+import { t } from "./text.js";
+import { button, choice, element, fill, number, table } from "./ui.js";
+import { View } from "./view.js";
 
 const SIZES = ["base_radius_mm", "base_spread_deg", "base_turn_deg", "plate_radius_mm", "plate_spread_deg", "plate_turn_deg"];
 const LENGTHS = ["retracted_length_mm", "stroke_mm", "margin_mm", "zero_height_mm", "mrp_mm"];

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // text.js - every text of the pages, in English and Chinese. A test finds one that is missing.
-import { store } from "/store.js";
+import { store } from "./store.js";
 
 export const TEXT = {
   hold: ["HOLD", "暂停"], holdHelp: ["Hold: stops where it is. Key: Escape", "暂停：平台在原地停下。按键：Escape"],

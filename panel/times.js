@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // times.js - how long things took since the start: a histogram of each, and its percentiles.
-import { t } from "/text.js";
-import { element, number, penOn, table } from "/ui.js";
+import { t } from "./text.js";
+import { element, number, penOn, table } from "./ui.js";
 
 const TALL = 96, FOOT = 18;
 const KINDS = [["frame_latency", "frameLatency"], ["wake_latency", "wakeLatency"], ["cycle_time", "cycleTime"]];

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // view.js - the platform, to be looked at from any side: in WebGL, loaded when somebody looks at it; flat where there is none, where the file is missing, and until it has come.
-import { isHolding } from "/hand.js";
-import { Picture } from "/picture.js";
-import { t } from "/text.js";
-import { button, element } from "/ui.js";
+import { isHolding } from "./hand.js";
+import { Picture } from "./picture.js";
+import { t } from "./text.js";
+import { button, element } from "./ui.js";
 
 const PAUSE_MS = 33, PAUSE_SLOW_MS = 250, PAUSE_HELD_MS = 500; // between two images; slow: without a graphics card; while a button is held, what draws them must not keep its beats waiting
 const TURN_DEG = 0.4; // for each pixel
@@ -22,7 +22,7 @@ function kindOfWebGL() {
 }
 
 // Whether the panel was built with the file that draws in 3D; only asked, not loaded.
-const hasScene = () => fetch("/scene.js").then((answer) => { answer.body?.cancel(); return answer.ok; }, () => false);
+const hasScene = () => fetch("scene.js").then((answer) => { answer.body?.cancel(); return answer.ok; }, () => false);
 
 export class View {
   // place: an element that gets the picture.
@@ -64,7 +64,7 @@ export class View {
     if (kindOfWebGL() === "software" && !isWanted && !(await hasScene())) return this.flat(t("noScene")); // no button that leads nowhere
     if (kindOfWebGL() === "software" && !isWanted) return this.flat(t("slowWebGL"), button(t("allTheSame"), () => { isWanted = true; this.note.replaceChildren(); this.note.hidden = true; this.load(); }, { class: "in-3d" }));
     try {
-      const { Scene } = await import("/scene.js");
+      const { Scene } = await import("./scene.js");
       if (!this.isOver) this.put(Scene);
     } catch (error) {
       return this.flat(t("noScene"));

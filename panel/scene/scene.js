@@ -3,8 +3,8 @@
 // as words. Bundled with three.js by tools/lib/scene.sh; view.js loads it when somebody looks at it.
 import { AmbientLight, BufferGeometry, CanvasTexture, Color, CylinderGeometry, DirectionalLight, DoubleSide, EdgesGeometry, ExtrudeGeometry, GridHelper, Group, Line, LineBasicMaterial, LineLoop, LineSegments, Mesh,
   MeshLambertMaterial, PerspectiveCamera, Scene as World, Shape, SphereGeometry, Sprite, SRGBColorSpace, SpriteMaterial, Vector3, WebGLRenderer } from "three";
-import { extensionOf, nearness } from "/limits.js";
-import { fromThree, plateMatrix, standpoint, toThree } from "/space.js";
+import { extensionOf, nearness } from "./limits.js";
+import { fromThree, plateMatrix, standpoint, toThree } from "./space.js";
 
 const FIELD_DEG = 32;
 const UP = new Vector3(0, 1, 0);

@@ -3,6 +3,7 @@
  */
 #include "panel/access.h"
 
+#include <arpa/inet.h>
 #include <crypt.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -23,6 +24,20 @@
 #define PENALTY_S     5
 #define WINDOW_S      10
 #define WINDOW_TRIES  20u /* each takes some 50 ms of a processor */
+
+bool access_read_address(const char *text, char address[ACCESS_ADDRESS_MAX])
+{
+    struct in6_addr bytes;
+    const int family = strchr(text, ':') != NULL ? AF_INET6 : AF_INET;
+    return inet_pton(family, text, &bytes) == 1 && inet_ntop(family, &bytes, address, ACCESS_ADDRESS_MAX) != NULL;
+}
+
+bool access_forwarded(const char *header, char address[ACCESS_ADDRESS_MAX])
+{
+    const char *const comma = strrchr(header, ',');
+    const char *const last = comma != NULL ? comma + 1 : header;
+    return access_read_address(last + strspn(last, " \t"), address);
+}
 
 int access_role(const char *word)
 {

@@ -66,6 +66,13 @@ bool access_is_host(const access_t *self, const char *host);
 /** Whether an Origin header names the same host as the Host header. */
 bool access_is_own_origin(const char *origin, const char *host);
 
+/** The address that a proxy has added to X-Forwarded-For: the last one; what stands before it anybody can say.
+ *  @return false: it is no address, and `address` is as before */
+bool access_forwarded(const char *header, char address[ACCESS_ADDRESS_MAX]);
+
+/** Writes an address in the one form that the system gives it. @return false: it is none */
+bool access_read_address(const char *text, char address[ACCESS_ADDRESS_MAX]);
+
 /** The role that a word names: "look", "operate", "service"; ACCESS_NOBODY for other words. */
 int access_role(const char *word);
 

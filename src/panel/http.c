@@ -184,7 +184,7 @@ static void on_compared(void *context, int code, char *text, size_t length)
         return;
     }
     (void)snprintf(cookie, sizeof cookie, "heave=%s; HttpOnly; SameSite=Strict; Path=/%s", token,
-                   m_server->certificate != NULL ? "; Secure" : "");
+                   http_is_secure(request->wsi) ? "; Secure" : "");
     (void)http_answer_text(request->wsi, request, HTTP_STATUS_OK, "{}", cookie);
 }
 
@@ -196,7 +196,7 @@ static int log_in(struct lws *wsi, request_t *request)
     const cJSON *const password = cJSON_GetObjectItemCaseSensitive(json, "password");
     const int wanted = cJSON_IsString(role) ? access_role(role->valuestring) : ACCESS_NOBODY;
     const bool is_login = wanted >= 0 && cJSON_IsString(password);
-    (void)lws_get_peer_simple(wsi, request->address, sizeof request->address);
+    http_peer(wsi, request->address);
     if (is_login) {
         request->role = (level_t)wanted;
         (void)snprintf(m_password, sizeof m_password, "%s", password->valuestring);

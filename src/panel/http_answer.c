@@ -13,7 +13,8 @@
 #include "panel/child.h"
 #include "panel/listener.h"
 
-#define HEAD_BYTES 2048u
+#define HEAD_BYTES    2048u
+#define FORWARDED_MAX 1024u
 
 /* Nothing but our own files and this origin's WebSocket; nobody may put the page into a frame. */
 #define POLICY                                                                                                                   \
@@ -40,6 +41,31 @@ bool http_header(struct lws *wsi, enum lws_token_indexes which, char *out, int s
 {
     out[0] = '\0';
     return lws_hdr_copy(wsi, out, size, which) > 0;
+}
+
+static bool is_proxy(struct lws *wsi, char address[ACCESS_ADDRESS_MAX])
+{
+    address[0] = '\0';
+    (void)lws_get_peer_simple(wsi, address, ACCESS_ADDRESS_MAX);
+    return m_server->proxy != NULL && strcmp(address, m_server->proxy) == 0;
+}
+
+void http_peer(struct lws *wsi, char address[ACCESS_ADDRESS_MAX])
+{
+    char list[FORWARDED_MAX];
+    if (is_proxy(wsi, address) && http_header(wsi, WSI_TOKEN_X_FORWARDED_FOR, list, (int)sizeof list)) {
+        (void)access_forwarded(list, address);
+    }
+}
+
+bool http_is_secure(struct lws *wsi)
+{
+    static const char k_name[] = "x-forwarded-proto:";
+    char address[ACCESS_ADDRESS_MAX];
+    char scheme[16] = "";
+    return m_server->certificate != NULL ||
+           (is_proxy(wsi, address) && lws_hdr_custom_copy(wsi, scheme, (int)sizeof scheme, k_name, (int)strlen(k_name)) > 0 &&
+            strcmp(scheme, "https") == 0);
 }
 
 /* Everybody behind a proxy on this machine looks like this machine. */

@@ -37,6 +37,12 @@ typedef struct {
 /** Once, before anything is served. */
 void http_answer_init(server_t *server);
 
+/** Whose request it is; behind the proxy the browser. */
+void http_peer(struct lws *wsi, char address[ACCESS_ADDRESS_MAX]);
+
+/** Whether the browser speaks TLS, with the panel or with its proxy. */
+bool http_is_secure(struct lws *wsi);
+
 /** A header's value. @return false: there is none */
 bool http_header(struct lws *wsi, enum lws_token_indexes which, char *out, int size);
 

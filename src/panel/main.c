@@ -154,12 +154,14 @@ static int serve(const panel_options_t *options)
     hall.state = state_of(options);
     listener_address_t where;
     char why[WHY_MAX];
+    char proxy[ACCESS_ADDRESS_MAX];
     static char built[2][PLACE_MAX];
     const char *const www = options->www != NULL ? options->www : installed_or_built(HEAVE_PANEL_WWW, "../www", built[0]);
     const struct sigaction action = {.sa_handler = on_signal};
     server_t server = {.where = &where,
                        .certificate = options->certificate,
                        .key = options->key,
+                       .proxy = options->proxy != NULL ? proxy : NULL,
                        .state = state_of(options),
                        .heaved =
                            options->heaved != NULL ? options->heaved : installed_or_built(HEAVE_PANEL_HEAVED, "heaved", built[1]),
@@ -170,6 +172,9 @@ static int serve(const panel_options_t *options)
                        .is_ended = &is_ended};
     if (!listener_read(&where, options->listen)) {
         return refuse(EXIT_BAD_USAGE, "--listen: written as 127.0.0.1:9801 or [::1]:9801, without names");
+    }
+    if (options->proxy != NULL && !access_read_address(options->proxy, proxy)) {
+        return refuse(EXIT_BAD_USAGE, "--proxy: an address, written as 127.0.0.1 or ::1");
     }
     if (!access_load(&passwords, server.state, why, sizeof why)) {
         return refuse(EXIT_BAD_CONFIG, why);

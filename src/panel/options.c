@@ -16,6 +16,7 @@ enum {
     OPTION_HEAVED,
     OPTION_PLATFORM,
     OPTION_HOST,
+    OPTION_PROXY,
     OPTION_CERT,
     OPTION_KEY
 };
@@ -31,6 +32,8 @@ static const usage_row_t k_options[] = {
      OPTION_LISTEN},
     {"platform", "NAME=SOCKET", "a heaved; else all of /run/heave. May be given again", OPTION_PLATFORM},
     {"allow-host", "NAME", "a name or address that browsers call it by, beside its own. May be given again", OPTION_HOST},
+    {"proxy", "ADDRESS", "a web server that passes requests on from there, and names the browser in X-Forwarded-For",
+     OPTION_PROXY},
     {"state", "DIR", "where passwords and configurations being edited are; else $STATE_DIRECTORY, else /var/lib/heave-panel",
      OPTION_STATE},
     {"www", "DIR", "its pages", OPTION_WWW},
@@ -46,7 +49,7 @@ static const usage_row_t k_options[] = {
 static const usage_exit_t k_exits[] = {{EXIT_DONE, "ended by a signal"},
                                        {EXIT_BAD_USAGE, "wrong use"},
                                        {EXIT_BAD_CONFIG, "passwords or pages cannot be read, or an address needs a password"},
-                                       {EXIT_UNAVAILABLE, "it cannot listen there"},
+                                       {EXIT_UNAVAILABLE, "it cannot listen there, or may not open enough files"},
                                        {0}};
 
 static const usage_section_t k_manual[] = {
@@ -61,6 +64,8 @@ static const usage_section_t k_manual[] = {
     {"EXAMPLES", "A password, and other machines:\n\n"
                  "  heave-panel --state /var/lib/heave-panel passwd operate\n"
                  "  heave-panel --listen 192.168.7.2:9801 --allow-host ride.local\n\n"
+                 "Behind a web server of this machine, with TLS or below a path:\n\n"
+                 "  heave-panel --proxy 127.0.0.1 --allow-host hall.example\n\n"
                  "A heaved that was started by hand:\n\n"
                  "  heave-panel --platform ride=/tmp/heaved.sock\n"},
     {"FILES",
@@ -113,6 +118,9 @@ static int take(panel_options_t *self, int option, const char *value)
             return complain("--allow-host", "at most 16");
         }
         self->host[self->hosts++] = value;
+        return EXIT_DONE;
+    case OPTION_PROXY:
+        self->proxy = value;
         return EXIT_DONE;
     case OPTION_STATE:
         self->state = value;

@@ -15,6 +15,7 @@ typedef struct {
     const char *www, *state;
     const char *heaved; /**< the program, to check configurations with */
     const char *certificate, *key;
+    const char *proxy;                      /**< ADDRESS; NULL: none */
     const char *platform[OPTIONS_LIST_MAX]; /**< NAME=SOCKET */
     const char *host[OPTIONS_LIST_MAX];
     unsigned platforms, hosts;

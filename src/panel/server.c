@@ -65,10 +65,10 @@ static int let_in(struct lws *wsi)
 
 static int enter(struct lws *wsi, socket_t *socket)
 {
-    char address[ACCESS_ADDRESS_MAX] = "";
+    char address[ACCESS_ADDRESS_MAX];
     char name[UPSTREAM_NAME_MAX];
     const int role = http_role(wsi);
-    (void)lws_get_peer_simple(wsi, address, ACCESS_ADDRESS_MAX);
+    http_peer(wsi, address);
     (void)snprintf(name, sizeof name, "%.8s@%.22s", role >= 0 ? level_name((level_t)role) : "?", address);
     socket->viewer = role >= 0 ? viewer_enter(m_server->hall, wsi, role, name) : NULL;
     m_viewers += socket->viewer != NULL;

@@ -30,9 +30,9 @@ class Refused(Exception):
 
 
 class WebSocket:
-    def __init__(self, host, port, path, protocol=None, origin=None, host_header=None, cookie=None, timeout=WAIT_S, context=None):
+    def __init__(self, host, port, path, protocol=None, origin=None, host_header=None, cookie=None, timeout=WAIT_S, context=None, source=None):
         self.blocks, self.waiting = [], b""
-        self.socket = socket.create_connection((host, port), timeout=timeout)
+        self.socket = socket.create_connection((host, port), timeout=timeout, source_address=source and (source, 0))
         if context is not None:
             self.socket = context.wrap_socket(self.socket, server_hostname=host)
         name = host_header or f"{host}:{port}"

@@ -959,7 +959,7 @@ def first_page_is_small(bench):
             text = gzip.decompress(text)
         assert text == bench.get(path)[2] and "content-encoding" not in bench.get(path)[1], path
         assert "content-encoding" not in bench.get(path, Accept_Encoding="gzip;q=0, br")[1], path
-        wanted += [one for one in re.findall(r'(?:from|src=)\s*"(/[\w.]+)"', text.decode()) if one not in wanted]
+        wanted += [f"/{one}" for one in re.findall(r'(?:from|src=)\s*"(?:\./)?([\w.]+)"', text.decode()) if f"/{one}" not in wanted]
     assert "/app.js" in wanted and "/incidents.js" not in wanted, wanted
     print(f"# figure {total} bytes of the first page, compressed: {len(wanted)} files", flush=True)
     assert total < 60000, total

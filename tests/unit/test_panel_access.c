@@ -220,6 +220,27 @@ static void test_the_file_is_whose_the_directory_is(void)
     TEST_ASSERT_EQUAL_INT(0, unlink(other));
 }
 
+/* The proxy has added the last address; a browser can have written what stands before it. */
+static void test_a_proxy_names_the_browser(void)
+{
+    static const char *const k_rows[][2] = {{"10.0.0.1", "10.0.0.1"},
+                                            {"1.1.1.1, 10.0.0.1", "10.0.0.1"},
+                                            {"1.1.1.1,\t 2.2.2.2 ,10.0.0.1", "10.0.0.1"},
+                                            {", 2001:DB8:0::7", "2001:db8::7"},
+                                            {"10.0.0.1, unknown", "before"},
+                                            {"10.0.0.1:80", "before"},
+                                            {"[::1]", "before"},
+                                            {"10.0.0.1,", "before"},
+                                            {"10.0.0.1 x", "before"},
+                                            {"10.0.1", "before"},
+                                            {"", "before"}};
+    for (unsigned i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
+        char address[ACCESS_ADDRESS_MAX] = "before";
+        TEST_ASSERT_EQUAL(strcmp(k_rows[i][1], "before") != 0, access_forwarded(k_rows[i][0], address));
+        TEST_ASSERT_EQUAL_STRING(k_rows[i][1], address);
+    }
+}
+
 static void test_the_directory_is_made(void)
 {
     struct stat status;
@@ -243,5 +264,6 @@ int main(void)
     RUN_TEST(test_strangers_do_not_lock_out_who_was_in_before);
     RUN_TEST(test_the_file_is_whose_the_directory_is);
     RUN_TEST(test_the_directory_is_made);
+    RUN_TEST(test_a_proxy_names_the_browser);
     return UNITY_END();
 }

@@ -36,7 +36,7 @@ fi
 made=$(mktemp "$out.XXXXXX") || exit 1
 trap 'rm -f "$made"' EXIT
 if ! (cd "$recipe" && NODE_PATH=$place/node_modules node "$place/node_modules/esbuild/bin/esbuild" scene.js --bundle --format=esm --target=es2020 --minify --legal-comments=inline --charset=utf8 \
-    --external:/limits.js --external:/space.js --log-level=warning) >"$made" 2>"$place/log"; then
+    --external:./limits.js --external:./space.js --log-level=warning) >"$made" 2>"$place/log"; then
     give_up "esbuild failed ($(reason "$place/log")); see $place/log"
 fi
 chmod 644 "$made" && mv "$made" "$out"
