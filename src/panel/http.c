@@ -277,7 +277,7 @@ int http_serve(struct lws *wsi, enum lws_callback_reasons reason, void *user, vo
     case LWS_CALLBACK_HTTP:
         return begin_request(wsi, request, in);
     case LWS_CALLBACK_HTTP_BODY:
-        return request->wants_body ? take_body(request, in, length) : 0;
+        return request->wants_body && length > 0 ? take_body(request, in, length) : 0;
     case LWS_CALLBACK_HTTP_BODY_COMPLETION:
         return request->wants_body ? end_body(wsi, request) : 0;
     case LWS_CALLBACK_HTTP_WRITEABLE:

@@ -168,8 +168,7 @@ static int serve(const panel_options_t *options)
                        .access = &passwords,
                        .pages = &pages,
                        .hall = &hall,
-                       .version = HEAVE_VERSION,
-                       .is_ended = &is_ended};
+                       .version = HEAVE_VERSION};
     if (!listener_read(&where, options->listen)) {
         return refuse(EXIT_BAD_USAGE, "--listen: written as 127.0.0.1:9801 or [::1]:9801, without names");
     }
@@ -200,7 +199,12 @@ static int serve(const panel_options_t *options)
     }
     (void)sigaction(SIGINT, &action, NULL);
     (void)sigaction(SIGTERM, &action, NULL);
-    return server_run(&server) == 0 ? EXIT_DONE : EXIT_UNAVAILABLE;
+    if (!server_open(&server)) {
+        return EXIT_UNAVAILABLE;
+    }
+    while (is_ended == 0 && server_turn(true)) {}
+    server_close();
+    return EXIT_DONE;
 }
 
 int main(int argc, char **argv)

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
@@ -87,8 +88,10 @@ static int hear(struct lws *wsi, viewer_t *viewer, const void *in, size_t length
     if (!http_is_session(viewer->session)) {
         return -1; /* logged out elsewhere, or it has ended */
     }
-    memcpy(viewer->in + viewer->in_length, in, length);
-    viewer->in_length += length;
+    if (length > 0) {
+        memcpy(viewer->in + viewer->in_length, in, length);
+        viewer->in_length += length;
+    }
     if (lws_remaining_packet_payload(wsi) == 0 && lws_is_final_fragment(wsi)) {
         m_server->hall->now_ms = milliseconds();
         viewer_hear(m_server->hall, viewer, viewer->in, viewer->in_length);
@@ -322,6 +325,9 @@ static int serve_http(struct lws *wsi, enum lws_callback_reasons reason, void *u
         connections_remove(&m_connections, wsi);
         return 0;
     }
+    if (reason == LWS_CALLBACK_HTTP_CONFIRM_UPGRADE) {
+        return in != NULL && strcasecmp(in, "websocket") == 0 ? 0 : -1; /* HTTP/2 has many requests for each connection */
+    }
     return http_serve(wsi, reason, user, in, length);
 }
 
@@ -421,7 +427,7 @@ static bool has_descriptors(void)
     return setrlimit(RLIMIT_NOFILE, &limit) == 0;
 }
 
-static bool begin(const server_t *server)
+static bool make_context(const server_t *server)
 {
     static const struct lws_protocols k_protocols[] = {
         {.name = "http", .callback = serve_http, .per_session_data_size = sizeof(request_t), .rx_buffer_size = HTTP_BODY_MAX},
@@ -451,25 +457,34 @@ static bool begin(const server_t *server)
     return m_vhost != NULL && listen_at(server->where);
 }
 
-int server_run(server_t *server)
+bool server_open(server_t *server)
 {
     lws_set_log_level(LLL_ERR | LLL_WARN, say);
     m_server = server;
     http_init(server);
     child_watch = watch_child;
     server->hall->wake = wake;
-    if (!has_descriptors() || !begin(server)) {
-        if (m_context != NULL) {
-            lws_context_destroy(m_context);
-        }
-        return 1;
+    if (!has_descriptors() || !make_context(server)) {
+        server_close();
+        return false;
     }
     printf("heave-panel: %s://%s:%d/ for %u platform%s\n", server->certificate != NULL ? "https" : "http", server->where->host,
            server->where->port, server->hall->platforms, server->hall->platforms == 1 ? "" : "s");
     (void)fflush(stdout);
     each_second(&m_second);
     pump(&m_pump);
-    while (*server->is_ended == 0 && lws_service(m_context, 0) >= 0) {}
-    lws_context_destroy(m_context);
-    return 0;
+    return true;
+}
+
+bool server_turn(bool waits)
+{
+    return lws_service(m_context, waits ? 0 : -1) >= 0;
+}
+
+void server_close(void)
+{
+    if (m_context != NULL) {
+        lws_context_destroy(m_context);
+    }
+    m_context = NULL;
 }

@@ -5,8 +5,6 @@
 #ifndef HEAVE_PANEL_SERVER_H
 #define HEAVE_PANEL_SERVER_H
 
-#include <signal.h>
-
 #include "panel/access.h"
 #include "panel/listener.h"
 #include "panel/pages.h"
@@ -23,13 +21,19 @@ typedef struct {
     pages_t *pages;
     hall_t *hall;
     const char *version;
-    const volatile sig_atomic_t *is_ended;
 } server_t;
 
 /** Calls of the platforms, for upstream_init(). */
 extern const upstream_calls_t server_upstream_calls;
 
-/** Serves until it is ended. @return 0; else it could not, and said why */
-int server_run(server_t *server);
+/** Begins to listen. One in a process. @return false: it cannot, and has said why */
+bool server_open(server_t *server);
+
+/** Serves what has come.
+ *  @param waits else it looks and returns
+ *  @return false: it cannot go on */
+bool server_turn(bool waits);
+
+void server_close(void);
 
 #endif

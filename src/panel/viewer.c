@@ -329,7 +329,10 @@ static void carry_out(const call_t *call, const char *op)
     } else if (strcmp(op, "samples") == 0) {
         op_samples(call);
     } else if (strcmp(op, "samples-end") == 0) {
-        feed_end(call->viewer, (uint32_t)viewer_number(call->json, "stream", 0));
+        int64_t stream = 0;
+        if (viewer_whole(call->json, "stream", UINT32_MAX, &stream)) {
+            feed_end(call->viewer, (uint32_t)stream);
+        }
     } else if (strcmp(op, "ticks") == 0) {
         op_ticks(call);
     } else {
@@ -340,8 +343,8 @@ static void carry_out(const call_t *call, const char *op)
 void viewer_hear(hall_t *hall, viewer_t *viewer, const char *text, size_t length)
 {
     cJSON *const json = cJSON_ParseWithLength(text, length);
-    call_t call = {.hall = hall, .viewer = viewer, .json = json, .id = (int64_t)viewer_number(json, "id", 0)};
-    if (!cJSON_IsObject(json) || call.id < 0 || call.id >= VIEWER_PRESS_BIT) {
+    call_t call = {.hall = hall, .viewer = viewer, .json = json};
+    if (!cJSON_IsObject(json) || !viewer_whole(json, "id", VIEWER_PRESS_BIT - 1, &call.id)) {
         hall_answer_error(hall, viewer, 0, "a message is one JSON object with op, platform and a whole number as id");
     } else {
         for (unsigned i = 0; i < hall->platforms; i++) {

@@ -94,6 +94,16 @@ double viewer_number(const cJSON *json, const char *name, double fallback)
     return cJSON_IsNumber(item) ? item->valuedouble : fallback;
 }
 
+bool viewer_whole(const cJSON *json, const char *name, int64_t most, int64_t *number)
+{
+    const double value = viewer_number(json, name, 0);
+    if (!(value >= 0 && value <= (double)most) || value != (double)(int64_t)value) {
+        return false;
+    }
+    *number = (int64_t)value;
+    return true;
+}
+
 void viewer_refuse(const call_t *call, const char *error)
 {
     hall_answer_error(call->hall, call->viewer, call->id, error);

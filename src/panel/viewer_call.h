@@ -21,6 +21,10 @@ typedef struct {
 
 const char *viewer_word(const cJSON *json, const char *name);
 double viewer_number(const cJSON *json, const char *name, double fallback);
+
+/** A whole number. @param number out: 0 where it is not there; else as before
+ *  @return false: it is none from 0 to `most` */
+bool viewer_whole(const cJSON *json, const char *name, int64_t most, int64_t *number);
 void viewer_refuse(const call_t *call, const char *error);
 
 /** One request, as heaved takes it: printable, short, one line. */

@@ -155,6 +155,7 @@ def one_answer_each(bench):
             codes = re.findall(rb"HTTP/1\.[01] (\d+)", out)
             assert len(codes) <= 1, (what, codes[:10], len(codes))
             assert b"set-cookie" not in out.lower(), (what, out)
+            assert b"101" not in codes, (what, out)
             assert b"403" in codes or "foreign" not in what or "host" not in what or not codes, (what, codes)
             assert cpu_s(bench.panel.pid) - before_s < 0.3, (what, cpu_s(bench.panel.pid) - before_s)
             assert bench.panel_log.stat().st_size - before_log < 4096, what
