@@ -42,7 +42,6 @@ static server_t *m_server; /* the library's callbacks reach nothing else */
 static struct lws_context *m_context;
 static struct lws_vhost *m_vhost;
 static lws_sorted_usec_list_t m_pump, m_second;
-static unsigned m_viewers;
 static connections_t m_connections; /* that are no pages */
 static struct lws *m_listener;
 static bool m_is_full;
@@ -56,12 +55,38 @@ static int64_t milliseconds(void)
 
 /* --- WebSocket --- */
 
+static void wake(viewer_t *viewer)
+{
+    (void)lws_callback_on_writable(viewer->handle);
+}
+
+/* The oldest page of the lowest role below this one, which gives way to it. */
+static viewer_t *page_below(int role)
+{
+    viewer_t *lowest = NULL;
+    for (viewer_t *viewer = m_server->hall->viewers; viewer != NULL; viewer = viewer->next) { /* the newest first */
+        if (!viewer->is_over && viewer->role < role && (lowest == NULL || viewer->role <= lowest->role)) {
+            lowest = viewer;
+        }
+    }
+    return lowest;
+}
+
+static bool is_full(void)
+{
+    unsigned pages = 0;
+    for (const viewer_t *viewer = m_server->hall->viewers; viewer != NULL; viewer = viewer->next) {
+        pages += !viewer->is_over;
+    }
+    return pages >= VIEWERS_MAX;
+}
+
 static int let_in(struct lws *wsi)
 {
     char path[32];
     const bool is_right = lws_hdr_copy(wsi, path, (int)sizeof path, WSI_TOKEN_GET_URI) > 0 && strcmp(path, "/ws") == 0 &&
-                          http_refusal(wsi, true) == NULL && http_role(wsi) >= 0 && m_viewers < VIEWERS_MAX;
-    return is_right ? 0 : -1;
+                          http_refusal(wsi, true) == NULL && http_role(wsi) >= 0;
+    return is_right && (!is_full() || page_below(http_role(wsi)) != NULL) ? 0 : -1;
 }
 
 static int enter(struct lws *wsi, socket_t *socket)
@@ -71,8 +96,12 @@ static int enter(struct lws *wsi, socket_t *socket)
     const int role = http_role(wsi);
     http_peer(wsi, address);
     (void)snprintf(name, sizeof name, "%.8s@%.22s", role >= 0 ? level_name((level_t)role) : "?", address);
-    socket->viewer = role >= 0 ? viewer_enter(m_server->hall, wsi, role, name) : NULL;
-    m_viewers += socket->viewer != NULL;
+    viewer_t *const below = role >= 0 && is_full() ? page_below(role) : NULL;
+    if (below != NULL) {
+        below->is_over = true;
+        wake(below);
+    }
+    socket->viewer = role >= 0 && !is_full() ? viewer_enter(m_server->hall, wsi, role, name) : NULL;
     if (socket->viewer != NULL) {
         (void)http_token(wsi, socket->viewer->session);
         connections_remove(&m_connections, wsi);
@@ -136,18 +165,12 @@ static int serve_page(struct lws *wsi, enum lws_callback_reasons reason, void *u
     case LWS_CALLBACK_CLOSED:
         if (socket->viewer != NULL) {
             viewer_leave(m_server->hall, socket->viewer);
-            m_viewers--;
             socket->viewer = NULL;
         }
         return 0;
     default:
         return 0;
     }
-}
-
-static void wake(viewer_t *viewer)
-{
-    (void)lws_callback_on_writable(viewer->handle);
 }
 
 /* --- Connections to heaved --- */

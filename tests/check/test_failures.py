@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_failures.py - every row of docs/failures.md has a test that is in the tree, or says "not yet"."""
+"""test_failures.py - every row of docs/failures.md has a test that is in the tree, or says "not yet"; and so have who may do what at
+the panel, and what it protects against."""
 import re
 import sys
 from pathlib import Path
@@ -15,6 +16,12 @@ def rows(part=0):
     """0: of what fails; 1: of when the torque is off."""
     lines = (TOP / "docs/failures.md").read_text(encoding="utf-8").split("\n## When the torque is off\n")[part].splitlines()
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")][2:]
+
+
+def panel_rows():
+    """Who may do what, and against what it protects."""
+    text = (TOP / "docs/panel.md").read_text(encoding="utf-8").split("\n## Who may do what\n", 1)[1].split("\n## Messages\n")[0]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("| ") and not line.endswith("| test |")]
 
 
 def tests_there():
@@ -58,6 +65,10 @@ def main():
         bad = [row for row in rows() if len(row) != 4 or ("`" in row[3]) == ("not yet" in row[3])]
         assert not bad, bad
         assert len(rows(1)) > 5 and all(len(row) == 4 and ("`" in row[3] or row[3] == "the test of the row") for row in rows(1)), rows(1)
+    with suite.case("docs/panel.md: every row of who may do what, and of what it protects against, names tests that are there"):
+        assert len(panel_rows()) > 20 and all(len(row) == 3 and "`" in row[2] for row in panel_rows()), panel_rows()
+        missing = [f"{row[0]}: {name}" for row in panel_rows() for name in re.findall(r"`([^`]+)`", row[2]) if not is_there(name, text) and not (TOP / f"tests/fuzz/fuzz_{name}.c").is_file()]
+        assert not missing, "\n".join(missing)
     with suite.case("docs/twin.md: every row that concerns a bus or a GPIO line is played by a line, or says why not"):
         wrong = wrong_twin_rows(rows(), twin_rows())
         assert not wrong, "\n".join(wrong)

@@ -14,6 +14,7 @@ from pathlib import Path
 import harness
 import tap
 from test_panel import BIN, PASSWORD, WWW, PanelBench, free_port, request, take
+from web_socket import Refused
 
 OTHER_V4, OTHER_V6, NOBODYS = "198.51.100.7", "2001:db8::7", "203.0.113.1"
 IDLE, FLOODERS = 1500, 3
@@ -214,6 +215,33 @@ def nobody_is_locked_out(bench):
             one.close()
 
 
+def pages_of_the_highest_role(bench):
+    """Sixty-four pages are open: no more of that role come in, and nobody who may do more is kept out by them."""
+    bench.both()
+    cookie = {role: bench.log_in(role)[1] for role in ("look", "operate", "service")}
+
+    def is_in(link):
+        try:
+            return "answer" in request(link, "times")
+        except ConnectionError:
+            return False
+
+    with contextlib.ExitStack() as stack:
+        pages = [stack.enter_context(bench.link(cookie=cookie["look"])) for _ in range(64)]
+        assert all(is_in(link) for link in pages[:3])
+        for _ in range(3):
+            try:
+                stack.enter_context(bench.link(cookie=cookie["look"]))
+            except Refused:
+                continue
+            raise AssertionError("a 65th page of the same role")
+        operator, mechanic = (stack.enter_context(bench.link(cookie=cookie[role])) for role in ("operate", "service"))
+        take(operator)
+        assert request(operator, "engage")["answer"]["ok"] and request(mechanic, "hold")["answer"]["ok"]
+        assert not is_in(pages[0]) and not is_in(pages[1]) and is_in(pages[2]), "the oldest of them give way"
+        assert is_in(operator), "service is let in for one that looks, not for operate"
+
+
 def few_descriptors(bench):
     """A limit that the panel may raise is raised, one that it may not is said. Where none is left all the same, it waits, and pages that are there go on."""
     def started(soft, hard):
@@ -300,6 +328,7 @@ CASES = [
     ("one answer to each connection", one_answer_each, {"passwords": ("service",)}),
     ("what is refused leaves a session alone", refused_with_a_cookie, {"passwords": ("service",)}),
     ("nobody is locked out by connections", nobody_is_locked_out, {"passwords": ("operate",)}),
+    ("pages of the highest role", pages_of_the_highest_role, {"passwords": ("look", "operate", "service")}),
     ("few descriptors", few_descriptors, {"passwords": ("operate",)}),
     ("out is out at once", out_at_once, {"passwords": ("operate",)}),
     ("pages of a build", from_a_build, {}),
