@@ -15,7 +15,7 @@ typedef struct {
     const listener_address_t *where; /**< to listen */
     const char *certificate, *key;   /**< NULL: no TLS */
     const char *proxy;               /**< address whose X-Forwarded-... are believed; NULL: none's */
-    const char *state;               /**< directory with the passwords, looked at anew when they change */
+    const char *state;               /**< directory with the passwords and what is staged */
     const char *heaved;              /**< the program that checks configurations */
     access_t *access;
     pages_t *pages;

@@ -62,6 +62,11 @@ has_no_privilege() {
     grep -q '^NoNewPrivs:[[:space:]]*1$' $status
 }
 
+# In its sandbox it cannot ask the system.
+knows_the_start_of_the_machine() {
+    tr '\0' '\n' </proc/"$(property MainPID)"/environ | grep -qx "HEAVE_BOOT_ID=$(tr -d - </proc/sys/kernel/random/boot_id)"
+}
+
 is_real_time() {
     local pid
     pid=$(property MainPID)
@@ -260,6 +265,7 @@ useradd -G heave keeper
 ip link set lo up
 check "systemctl enable --now returns when the platform is ready, and shows its state" starts
 check "runs as a user of its own making, without a capability" has_no_privilege
+check "knows which start of the machine it is" knows_the_start_of_the_machine
 check "has real-time priority and locked memory all the same" is_real_time
 check "members of group heave may use heavectl, others are told that they may not; anybody reads the metrics" may_be_used_by_its_group
 check "follows frames from the network" follows_frames
