@@ -180,10 +180,10 @@ bool access_is_host(const access_t *self, const char *host)
     return false;
 }
 
-bool access_is_own_origin(const char *origin, const char *host)
+bool access_is_own_origin(const char *origin, const char *host, bool is_secure)
 {
     const char *const slashes = strstr(origin, "://");
-    const bool is_web = strncmp(origin, "http://", 7) == 0 || strncmp(origin, "https://", 8) == 0;
+    const bool is_web = (!is_secure && strncmp(origin, "http://", 7) == 0) || strncmp(origin, "https://", 8) == 0;
     return is_web && slashes != NULL && strcasecmp(slashes + 3, host) == 0;
 }
 

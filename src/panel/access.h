@@ -63,8 +63,9 @@ bool access_allow_host(access_t *self, const char *name);
 /** Whether a Host header is one of these names. */
 bool access_is_host(const access_t *self, const char *host);
 
-/** Whether an Origin header names the same host as the Host header. */
-bool access_is_own_origin(const char *origin, const char *host);
+/** Whether an Origin header names the same host as the Host header.
+ *  @param is_secure the page came over TLS: one that came without it is somebody else's who sits between */
+bool access_is_own_origin(const char *origin, const char *host, bool is_secure);
 
 /** The address that a proxy has added to X-Forwarded-For: the last one; what stands before it anybody can say.
  *  @return false: it is no address, and `address` is as before */

@@ -95,7 +95,9 @@ const char *http_refusal(struct lws *wsi, bool has_origin)
         return "through a proxy only once there is a password: heave-panel passwd";
     }
     const bool is_said = http_header(wsi, WSI_TOKEN_ORIGIN, origin, (int)sizeof origin);
-    return (is_said ? access_is_own_origin(origin, host) : !has_origin) ? NULL : "this comes from a page of another origin";
+    return (is_said ? access_is_own_origin(origin, host, http_is_secure(wsi)) : !has_origin)
+               ? NULL
+               : "this comes from a page of another origin";
 }
 
 bool http_token(struct lws *wsi, char token[ACCESS_TOKEN_MAX])

@@ -96,7 +96,7 @@ def as_documented(bench):
             bench.wait_state(*UP)
             assert request(link, "hold")["answer"]["ok"]
         harness.wait_for(lambda: f"operate@{HERE}".encode() in proxy.ask("/api/log/ride", Cookie=token)[2], "the log names the browser")
-        for origin in (f"http://127.0.0.1:{bench.web}", "https://evil.example", "null"):
+        for origin in (f"http://127.0.0.1:{bench.web}", f"http://127.0.0.1:{proxy.port}", "https://evil.example", "null"):
             code, cookie, _ = proxy.ask("/api/login", "POST", {"role": "operate", "password": f"{PASSWORD} operate"}, Content_Type="application/json", Origin=origin)
             assert code == 403 and cookie is None, (origin, code)
 

@@ -166,12 +166,14 @@ static void test_names_of_the_panel(void)
     TEST_ASSERT_FALSE(access_is_host(&m_access, "localhost.evil:9801"));
     TEST_ASSERT_FALSE(access_is_host(&m_access, "evil:9801"));
     TEST_ASSERT_FALSE(access_is_host(&m_access, ""));
-    TEST_ASSERT_TRUE(access_is_own_origin("http://localhost:9801", "localhost:9801"));
-    TEST_ASSERT_TRUE(access_is_own_origin("https://localhost:9801", "localhost:9801"));
-    TEST_ASSERT_FALSE(access_is_own_origin("http://localhost:9802", "localhost:9801"));
-    TEST_ASSERT_FALSE(access_is_own_origin("null", "localhost:9801"));
-    TEST_ASSERT_FALSE(access_is_own_origin("file://localhost:9801", "localhost:9801"));
-    TEST_ASSERT_FALSE(access_is_own_origin("", ""));
+    TEST_ASSERT_TRUE(access_is_own_origin("http://localhost:9801", "localhost:9801", false));
+    TEST_ASSERT_TRUE(access_is_own_origin("https://localhost:9801", "localhost:9801", false));
+    TEST_ASSERT_FALSE(access_is_own_origin("http://localhost:9802", "localhost:9801", false));
+    TEST_ASSERT_FALSE(access_is_own_origin("null", "localhost:9801", false));
+    TEST_ASSERT_TRUE(access_is_own_origin("https://localhost:9801", "localhost:9801", true));
+    TEST_ASSERT_FALSE(access_is_own_origin("http://localhost:9801", "localhost:9801", true));
+    TEST_ASSERT_FALSE(access_is_own_origin("file://localhost:9801", "localhost:9801", false));
+    TEST_ASSERT_FALSE(access_is_own_origin("", "", false));
 }
 
 /* Many addresses use up what strangers may try, and nothing of who was in before. */
