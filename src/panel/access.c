@@ -34,9 +34,21 @@ bool access_read_address(const char *text, char address[ACCESS_ADDRESS_MAX])
 
 bool access_forwarded(const char *header, char address[ACCESS_ADDRESS_MAX])
 {
+    char text[ACCESS_ADDRESS_MAX + 2];
     const char *const comma = strrchr(header, ',');
-    const char *const last = comma != NULL ? comma + 1 : header;
-    return access_read_address(last + strspn(last, " \t"), address);
+    const char *last = comma != NULL ? comma + 1 : header;
+    last += strspn(last, " \t");
+    const char *const bracket = last[0] == '[' ? strchr(last, ']') : NULL;
+    const char *const colon = strchr(last, ':');
+    const bool has_port = colon != NULL && strchr(colon + 1, ':') == NULL;
+    const size_t length = bracket != NULL ? (size_t)(bracket - last) - 1 : has_port ? (size_t)(colon - last) : strlen(last);
+    const char *const behind = bracket != NULL ? bracket + 1 : has_port ? colon : "";
+    if (length >= sizeof text ||
+        (behind[0] != '\0' && (behind[0] != ':' || strspn(behind + 1, "0123456789") != strlen(behind + 1)))) {
+        return false;
+    }
+    (void)snprintf(text, sizeof text, "%.*s", (int)length, bracket != NULL ? last + 1 : last);
+    return access_read_address(text, address);
 }
 
 int access_role(const char *word)

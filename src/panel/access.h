@@ -67,7 +67,8 @@ bool access_is_host(const access_t *self, const char *host);
  *  @param is_secure the page came over TLS: one that came without it is somebody else's who sits between */
 bool access_is_own_origin(const char *origin, const char *host, bool is_secure);
 
-/** The address that a proxy has added to X-Forwarded-For: the last one; what stands before it anybody can say.
+/** The address that a proxy has added to X-Forwarded-For: the last one, with or without a port; what stands before it anybody can
+ * say.
  *  @return false: it is no address, and `address` is as before */
 bool access_forwarded(const char *header, char address[ACCESS_ADDRESS_MAX]);
 

@@ -106,19 +106,32 @@ static pid_t begin(child_t *child, child_end_t *end, void *context, int64_t now_
     return pid;
 }
 
+static unsigned count_programs(void)
+{
+    unsigned count = 0;
+    for (unsigned i = 0; i < CHILDREN_MAX; i++) {
+        count += m_child[i].pid != 0 && m_child[i].is_program;
+    }
+    return count;
+}
+
 bool child_run(const char *const *argv, const char *language, child_end_t *end, void *context, int64_t now_ms)
 {
-    const pid_t pid = begin(find_free(), end, context, now_ms);
+    child_t *const child = count_programs() < CHILD_PROGRAMS ? find_free() : NULL;
+    const pid_t pid = begin(child, end, context, now_ms);
     if (pid == 0) {
         run_program(argv, language);
         _exit(127);
+    }
+    if (pid > 0) {
+        child->is_program = true;
     }
     return pid > 0;
 }
 
 bool child_work(int (*work)(void *context, int fd), void *context, child_end_t *end, int64_t now_ms)
 {
-    const pid_t pid = begin(find_free(), end, context, now_ms);
+    const pid_t pid = begin(child_count(end) < CHILD_WORKS ? find_free() : NULL, end, context, now_ms);
     if (pid == 0) {
         _exit(work(context, STDOUT_FILENO));
     }

@@ -11,7 +11,9 @@
 #include <stdint.h>
 #include <sys/types.h>
 
-#define CHILDREN_MAX     4u
+#define CHILD_PROGRAMS   4u /* at a time */
+#define CHILD_WORKS      2u /* of each kind at a time: a program that somebody runs keeps no login away */
+#define CHILDREN_MAX     8u
 #define CHILD_OUTPUT_MAX (2u * 1024u * 1024u)
 #define CHILD_LONGEST_MS 15000
 
@@ -22,6 +24,7 @@ typedef void child_end_t(void *context, int code, char *text, size_t length);
 /** One. */
 typedef struct child {
     pid_t pid; /**< 0: free */
+    bool is_program;
     int fd;
     void *handle; /**< of the event loop */
     char *text;

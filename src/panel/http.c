@@ -15,7 +15,6 @@
 
 #define CHUNK            16384u
 #define WHY_MAX          256u
-#define LOGINS_MAX       2u /* compared at once: the other children are for checks of configurations */
 #define LOGIN_PATIENCE_S 30
 
 static server_t *m_server;             /* the library's callbacks reach nothing else */
@@ -206,7 +205,7 @@ static int log_in(struct lws *wsi, request_t *request)
     memset(request->body, 0, sizeof request->body);
     request->wsi = wsi;
     lws_set_timeout(wsi, PENDING_TIMEOUT_HTTP_CONTENT, LOGIN_PATIENCE_S);
-    const bool is_begun = is_login && child_count(on_compared) < LOGINS_MAX &&
+    const bool is_begun = is_login && child_count(on_compared) < CHILD_WORKS &&
                           access_begin(m_server->access, request->address, http_seconds()) &&
                           child_work(compare, request, on_compared, http_seconds() * 1000);
     memset(m_password, 0, sizeof m_password);

@@ -45,16 +45,18 @@ bool http_header(struct lws *wsi, enum lws_token_indexes which, char *out, int s
 
 static bool is_proxy(struct lws *wsi, char address[ACCESS_ADDRESS_MAX])
 {
-    address[0] = '\0';
-    (void)lws_get_peer_simple(wsi, address, ACCESS_ADDRESS_MAX);
+    listener_peer_t peer;
+    (void)listener_peer(lws_get_socket_fd(wsi), &peer);
+    (void)snprintf(address, ACCESS_ADDRESS_MAX, "%s", peer.address);
     return m_server->proxy != NULL && strcmp(address, m_server->proxy) == 0;
 }
 
 void http_peer(struct lws *wsi, char address[ACCESS_ADDRESS_MAX])
 {
     char list[FORWARDED_MAX];
-    if (is_proxy(wsi, address) && http_header(wsi, WSI_TOKEN_X_FORWARDED_FOR, list, (int)sizeof list)) {
-        (void)access_forwarded(list, address);
+    if (is_proxy(wsi, address) &&
+        !(http_header(wsi, WSI_TOKEN_X_FORWARDED_FOR, list, (int)sizeof list) && access_forwarded(list, address))) {
+        lwsl_warn("the proxy names no browser: its X-Forwarded-For has to end with an address\n");
     }
 }
 

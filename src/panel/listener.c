@@ -123,21 +123,37 @@ static void tune(int fd)
     }
 }
 
+static void describe(const struct sockaddr_storage *address, listener_peer_t *peer)
+{
+    const void *const from = address->ss_family == AF_INET6
+                                 ? (const void *)&((const struct sockaddr_in6 *)(const void *)address)->sin6_addr
+                                 : (const void *)&((const struct sockaddr_in *)(const void *)address)->sin_addr;
+    *peer = (listener_peer_t){.is_this_machine = is_this_machine(address)};
+    (void)inet_ntop(address->ss_family, from, peer->address, sizeof peer->address);
+}
+
 int listener_accept(int fd, listener_peer_t *peer)
 {
     struct sockaddr_storage address;
     socklen_t length = sizeof address;
     const int taken = accept4(fd, (struct sockaddr *)&address, &length, SOCK_NONBLOCK | SOCK_CLOEXEC);
-    if (taken < 0) {
-        return -1;
+    if (taken >= 0) {
+        describe(&address, peer);
+        tune(taken);
     }
-    const void *const from = address.ss_family == AF_INET6
-                                 ? (const void *)&((const struct sockaddr_in6 *)(const void *)&address)->sin6_addr
-                                 : (const void *)&((const struct sockaddr_in *)(const void *)&address)->sin_addr;
-    *peer = (listener_peer_t){.is_this_machine = is_this_machine(&address)};
-    (void)inet_ntop(address.ss_family, from, peer->address, sizeof peer->address);
-    tune(taken);
     return taken;
+}
+
+bool listener_peer(int fd, listener_peer_t *peer)
+{
+    struct sockaddr_storage address;
+    socklen_t length = sizeof address;
+    *peer = (listener_peer_t){.is_this_machine = false};
+    if (getpeername(fd, (struct sockaddr *)&address, &length) != 0) {
+        return false;
+    }
+    describe(&address, peer);
+    return true;
 }
 
 bool listener_is_own(int fd, const char *host)

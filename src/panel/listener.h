@@ -40,6 +40,9 @@ int listener_open(const listener_address_t *self, char *why, size_t size);
  *  @return descriptor, not blocking; -1: none waits, or it has gone, or errno says what is missing */
 int listener_accept(int fd, listener_peer_t *peer);
 
+/** Who is at the other end of a connection. @return false: nobody any more */
+bool listener_peer(int fd, listener_peer_t *peer);
+
 /** Whether a Host header, with or without a port, is the address that a connection came to, written as a number: a name of
  * somebody else's that leads here is not. */
 bool listener_is_own(int fd, const char *host);

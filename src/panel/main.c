@@ -145,17 +145,49 @@ static const char *installed_or_built(const char *installed, const char *name, c
     return access(built, F_OK) == 0 ? built : installed;
 }
 
+/* Who may come in, and where. */
+static int read_access(const panel_options_t *options, listener_address_t *where, char proxy[ACCESS_ADDRESS_MAX],
+                       access_t *access)
+{
+    static const char *const k_names[] = {"127.0.0.1", "localhost", "[::1]"};
+    char why[WHY_MAX];
+    if (!listener_read(where, options->listen)) {
+        return refuse(EXIT_BAD_USAGE, "--listen: written as 127.0.0.1:9801 or [::1]:9801, without names");
+    }
+    if (options->proxy != NULL && (!access_read_address(options->proxy, proxy) || strncmp(proxy, "::ffff:", 7) == 0)) {
+        return refuse(EXIT_BAD_USAGE, "--proxy: an address, written as 127.0.0.1 or ::1");
+    }
+    if (!access_load(access, state_of(options), why, sizeof why)) {
+        return refuse(EXIT_BAD_CONFIG, why);
+    }
+    if (!access->has_password && !listener_is_this_machine(where)) {
+        return refuse(EXIT_BAD_CONFIG, "--listen: other machines only once there is a password: heave-panel passwd service");
+    }
+    if (!access->has_password && options->proxy != NULL) {
+        return refuse(EXIT_BAD_CONFIG, "--proxy: only once there is a password: heave-panel passwd service");
+    }
+    for (unsigned i = 0; i < sizeof k_names / sizeof k_names[0]; i++) {
+        (void)access_allow_host(access, k_names[i]);
+    }
+    (void)access_allow_host(access, where->host);
+    for (unsigned i = 0; i < options->hosts; i++) {
+        if (!access_allow_host(access, options->host[i])) {
+            return refuse(EXIT_BAD_USAGE, "--allow-host: too long");
+        }
+    }
+    return EXIT_DONE;
+}
+
 static int serve(const panel_options_t *options)
 {
     static access_t passwords;
     static pages_t pages;
     static upstream_t platform[VIEWER_PLATFORMS];
     static hall_t hall = {.platform = platform};
-    hall.state = state_of(options);
+    static char built[2][PLACE_MAX];
     listener_address_t where;
     char why[WHY_MAX];
     char proxy[ACCESS_ADDRESS_MAX];
-    static char built[2][PLACE_MAX];
     const char *const www = options->www != NULL ? options->www : installed_or_built(HEAVE_PANEL_WWW, "../www", built[0]);
     const struct sigaction action = {.sa_handler = on_signal};
     server_t server = {.where = &where,
@@ -169,30 +201,13 @@ static int serve(const panel_options_t *options)
                        .pages = &pages,
                        .hall = &hall,
                        .version = HEAVE_VERSION};
-    if (!listener_read(&where, options->listen)) {
-        return refuse(EXIT_BAD_USAGE, "--listen: written as 127.0.0.1:9801 or [::1]:9801, without names");
-    }
-    if (options->proxy != NULL && !access_read_address(options->proxy, proxy)) {
-        return refuse(EXIT_BAD_USAGE, "--proxy: an address, written as 127.0.0.1 or ::1");
-    }
-    if (!access_load(&passwords, server.state, why, sizeof why)) {
-        return refuse(EXIT_BAD_CONFIG, why);
-    }
-    if (!passwords.has_password && !listener_is_this_machine(&where)) {
-        return refuse(EXIT_BAD_CONFIG, "--listen: other machines only once there is a password: heave-panel passwd service");
+    hall.state = server.state;
+    const int code = read_access(options, &where, proxy, &passwords);
+    if (code != EXIT_DONE) {
+        return code;
     }
     if (!pages_load(&pages, www, why, sizeof why)) {
         return refuse(EXIT_BAD_CONFIG, why);
-    }
-    static const char *const k_names[] = {"127.0.0.1", "localhost", "[::1]"};
-    for (unsigned i = 0; i < sizeof k_names / sizeof k_names[0]; i++) {
-        (void)access_allow_host(&passwords, k_names[i]);
-    }
-    (void)access_allow_host(&passwords, where.host);
-    for (unsigned i = 0; i < options->hosts; i++) {
-        if (!access_allow_host(&passwords, options->host[i])) {
-            return refuse(EXIT_BAD_USAGE, "--allow-host: too long");
-        }
     }
     if (!add_platforms(&hall, options)) {
         return refuse(EXIT_BAD_USAGE, "--platform: NAME has 1 to 31 letters, digits, - _ or .");

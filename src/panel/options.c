@@ -32,8 +32,7 @@ static const usage_row_t k_options[] = {
      OPTION_LISTEN},
     {"platform", "NAME=SOCKET", "a heaved; else all of /run/heave. May be given again", OPTION_PLATFORM},
     {"allow-host", "NAME", "a name or address that browsers call it by, beside its own. May be given again", OPTION_HOST},
-    {"proxy", "ADDRESS", "a web server that passes requests on from there, and names the browser in X-Forwarded-For",
-     OPTION_PROXY},
+    {"proxy", "ADDRESS", "address of a reverse proxy; its X-Forwarded-For and X-Forwarded-Proto are believed", OPTION_PROXY},
     {"state", "DIR", "where passwords and configurations being edited are; else $STATE_DIRECTORY, else /var/lib/heave-panel",
      OPTION_STATE},
     {"www", "DIR", "its pages", OPTION_WWW},
@@ -46,11 +45,12 @@ static const usage_row_t k_options[] = {
     {0},
 };
 
-static const usage_exit_t k_exits[] = {{EXIT_DONE, "ended by a signal"},
-                                       {EXIT_BAD_USAGE, "wrong use"},
-                                       {EXIT_BAD_CONFIG, "passwords or pages cannot be read, or an address needs a password"},
-                                       {EXIT_UNAVAILABLE, "it cannot listen there, or may not open enough files"},
-                                       {0}};
+static const usage_exit_t k_exits[] = {
+    {EXIT_DONE, "ended by a signal"},
+    {EXIT_BAD_USAGE, "wrong use"},
+    {EXIT_BAD_CONFIG, "passwords or pages cannot be read, or --listen or --proxy needs a password"},
+    {EXIT_UNAVAILABLE, "it cannot listen there, or its limit of open files is too low"},
+    {0}};
 
 static const usage_section_t k_manual[] = {
     {"DESCRIPTION",
@@ -64,7 +64,7 @@ static const usage_section_t k_manual[] = {
     {"EXAMPLES", "A password, and other machines:\n\n"
                  "  heave-panel --state /var/lib/heave-panel passwd operate\n"
                  "  heave-panel --listen 192.168.7.2:9801 --allow-host ride.local\n\n"
-                 "Behind a web server of this machine, with TLS or below a path:\n\n"
+                 "Behind a reverse proxy of this machine, with TLS or below a path:\n\n"
                  "  heave-panel --proxy 127.0.0.1 --allow-host hall.example\n\n"
                  "A heaved that was started by hand:\n\n"
                  "  heave-panel --platform ride=/tmp/heaved.sock\n"},
@@ -120,6 +120,9 @@ static int take(panel_options_t *self, int option, const char *value)
         self->host[self->hosts++] = value;
         return EXIT_DONE;
     case OPTION_PROXY:
+        if (self->proxy != NULL) {
+            return complain("--proxy", "once");
+        }
         self->proxy = value;
         return EXIT_DONE;
     case OPTION_STATE:

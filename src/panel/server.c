@@ -57,7 +57,11 @@ static int64_t milliseconds(void)
 
 static void wake(viewer_t *viewer)
 {
-    (void)lws_callback_on_writable(viewer->handle);
+    if (viewer->is_over) { /* also where it does not read any more */
+        lws_set_timeout(viewer->handle, PENDING_TIMEOUT_USER_OK, LWS_TO_KILL_ASYNC);
+    } else {
+        (void)lws_callback_on_writable(viewer->handle);
+    }
 }
 
 /* The oldest page of the lowest role below this one, which gives way to it. */
@@ -92,10 +96,10 @@ static int let_in(struct lws *wsi)
 static int enter(struct lws *wsi, socket_t *socket)
 {
     char address[ACCESS_ADDRESS_MAX];
-    char name[UPSTREAM_NAME_MAX];
+    char name[UPSTREAM_BY_MAX];
     const int role = http_role(wsi);
     http_peer(wsi, address);
-    (void)snprintf(name, sizeof name, "%.8s@%.22s", role >= 0 ? level_name((level_t)role) : "?", address);
+    (void)snprintf(name, sizeof name, "%.7s@%.39s", role >= 0 ? level_name((level_t)role) : "?", address);
     viewer_t *const below = role >= 0 && is_full() ? page_below(role) : NULL;
     if (below != NULL) {
         below->is_over = true;
@@ -446,8 +450,11 @@ static bool has_descriptors(void)
                 (unsigned long long)limit.rlim_max);
         return false;
     }
-    limit.rlim_cur = limit.rlim_cur < DESCRIPTORS ? DESCRIPTORS : limit.rlim_cur;
-    return setrlimit(RLIMIT_NOFILE, &limit) == 0;
+    if (limit.rlim_cur < DESCRIPTORS) {
+        limit.rlim_cur = DESCRIPTORS;
+        (void)setrlimit(RLIMIT_NOFILE, &limit); /* where a sandbox forbids it, new connections wait for those that end */
+    }
+    return true;
 }
 
 static bool make_context(const server_t *server)

@@ -295,7 +295,7 @@ const char *upstream_send(upstream_t *self, link_kind_t kind, const char *line, 
 const char *upstream_send_with(upstream_t *self, link_kind_t kind, const char *line, const asker_t *asker, int fd)
 {
     link_t *const link = &self->link[kind];
-    char text[UPSTREAM_HEARD + UPSTREAM_NAME_MAX + 8];
+    char text[UPSTREAM_HEARD + UPSTREAM_BY_MAX + 8];
     const bool is_named = asker->by[0] != '\0' && strcmp(asker->by, link->by) != 0;
     if (!open_link(link)) {
         return NO_CONNECTION;

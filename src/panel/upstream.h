@@ -14,6 +14,7 @@
 #include "common/socket_path.h"
 
 #define UPSTREAM_NAME_MAX   32u
+#define UPSTREAM_BY_MAX     48u /* role@address */
 #define UPSTREAM_LINE_MAX   65536u
 #define UPSTREAM_WAITING    64u
 #define UPSTREAM_LOG_MAX    128u
@@ -39,7 +40,7 @@ typedef enum {
 typedef struct {
     uint64_t viewer; /**< 0: nobody; the answer is thrown away, or is a tick */
     int64_t id;
-    char by[UPSTREAM_NAME_MAX]; /**< for the operator log */
+    char by[UPSTREAM_BY_MAX]; /**< for the operator log */
 } asker_t;
 
 struct upstream;
@@ -54,7 +55,7 @@ typedef struct {
     size_t length;
     unsigned waits;
     asker_t waiting[UPSTREAM_WAITING]; /**< for answers, the first first */
-    char by[UPSTREAM_NAME_MAX];        /**< whom heaved was told last */
+    char by[UPSTREAM_BY_MAX];          /**< whom heaved was told last */
 } link_t;
 
 /** What happens. Called from upstream_*(). */
@@ -88,7 +89,7 @@ typedef struct upstream {
     int log;                  /**< that of the operator log; -1: none */
     char log_name[UPSTREAM_LOG_MAX];
     uint64_t holder; /**< viewer with the controls; 0 = nobody */
-    char holder_name[UPSTREAM_NAME_MAX + 64];
+    char holder_name[UPSTREAM_BY_MAX];
     configuration_t configuration;
     char put_back[UPSTREAM_WHY_MAX];       /**< why the configuration applied last is not in force; "": it is */
     char put_back_zh[UPSTREAM_WHY_ZH_MAX]; /**< the same in Chinese, as a JSON string with its quotes; "": none */

@@ -46,7 +46,7 @@ typedef struct viewer {
     uint64_t number; /**< never used again */
     void *handle;    /**< of its connection */
     int role;
-    char name[UPSTREAM_NAME_MAX];   /**< for the operator log and for others: role@address */
+    char name[UPSTREAM_BY_MAX];     /**< for the operator log and for others: role@address */
     char session[ACCESS_TOKEN_MAX]; /**< "" where none is needed */
     message_t queue[VIEWER_QUEUE];
     unsigned first, count;

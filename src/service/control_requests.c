@@ -274,7 +274,7 @@ static void take_by(control_t *self, control_client_t *client, const char *name)
     (void)snprintf(client->entry.by, sizeof client->entry.by, "%s", name);
     if (name[0] == '\0' || strlen(name) >= sizeof client->entry.by) {
         client->entry.by[0] = '\0';
-        control_client_answer_error(client, "by: a name of 1 to 31 bytes is needed, as in `by anna`", NULL);
+        control_client_answer_error(client, "by: a name of 1 to 47 bytes is needed, as in `by anna`", NULL);
     } else {
         client->request = EVENT_TICK; /* none that the motion thread has to answer */
         control_client_answer_done(client, control_snapshot(self));

@@ -238,6 +238,7 @@ void lifetime_note_selftest(lifetime_t *self, const lifetime_selftest_t *selftes
 {
     self->now.selftest = *selftest;
     self->now.selftest.boot = self->boot;
+    self->has_own = true;
     if (self->path[0] != '\0') {
         hand_over(self);
     }
@@ -248,7 +249,7 @@ bool lifetime_has_passed(const lifetime_t *self, uint32_t day, const char *hash)
     const lifetime_selftest_t *selftest = &self->now.selftest;
     const bool is_date_right = __atomic_load_n(&self->is_clock_trusted, __ATOMIC_ACQUIRE) != 0;
     return selftest->is_passed && selftest->day == day && strcmp(selftest->hash, hash) == 0 &&
-           (is_date_right || (self->boot != 0 && selftest->boot == self->boot));
+           (self->has_own || is_date_right || (self->boot != 0 && selftest->boot == self->boot));
 }
 
 bool lifetime_trouble(lifetime_t *self, int *error)

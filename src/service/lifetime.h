@@ -53,6 +53,7 @@ typedef struct {
     int32_t told;              /**< error that lifetime_trouble() has told of */
     uint64_t boot;             /**< clock_boot() */
     uint32_t is_clock_trusted; /**< atomic: clock_is_trusted(), and that it was so once since the start */
+    bool has_own;              /**< the newest self-test was made since heaved started */
     unsigned steps;            /**< of the writer, until it asks */
     worker_t worker;
     uint8_t ring_bytes[LIFETIME_RING_BYTES];

@@ -18,7 +18,7 @@
 #include "service/access_levels.h"
 
 #define OPERATOR_LOG_NAME       "operator.log" /* in the state directory, where no file is configured */
-#define OPERATOR_LOG_BY_MAX     32u
+#define OPERATOR_LOG_BY_MAX     48u
 #define OPERATOR_LOG_ASKED_MAX  96u
 #define OPERATOR_LOG_ANSWER_MAX 192u
 #define OPERATOR_LOG_RING_BYTES (1u << 16)

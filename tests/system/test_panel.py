@@ -919,7 +919,8 @@ def incidents_are_handed_over(bench):
 
 def files_by_role(bench):
     names = make_incident_as(bench)
-    for path, roles in ((f"/api/incident/ride/{names[0]}/frames", {"look", "operate", "service"}), ("/api/log/ride", {"operate", "service"})):
+    for path, roles in ((f"/api/incident/ride/{names[0]}/frames", {"look", "operate", "service"}), (f"/api/incident/ride/{names[0]}/platform.ini", {"look", "operate", "service"}),
+                        ("/api/config/ride", {"look", "operate", "service"}), ("/api/log/ride", {"operate", "service"})):
         assert bench.get(path)[0] == 401, path
         for role in ("look", "operate", "service"):
             code = bench.get(path, Cookie=bench.log_in(role)[1])[0]

@@ -258,19 +258,26 @@ def few_descriptors(bench):
         waiting = []
         try:
             resource.prlimit(bench.panel.pid, resource.RLIMIT_NOFILE, (used + 2, hard))
-            for _ in range(10):
+            for _ in range(40):  # whatever places are left in between
                 waiting.append(socket.create_connection(("127.0.0.1", bench.web), timeout=5))
+            waiting[-1].sendall(f"GET /api/me HTTP/1.1\r\nHost: 127.0.0.1:{bench.web}\r\n\r\n".encode())
             before_s = cpu_s(bench.panel.pid)
             for _ in range(40):
                 assert request(link, "times")["answer"]["ok"]
                 time.sleep(0.05)
             spent_s = cpu_s(bench.panel.pid) - before_s
             assert spent_s < 0.3, f"{spent_s} s of a core in 2 s"
+            waiting[-1].setblocking(False)
+            with contextlib.suppress(BlockingIOError):
+                raise AssertionError(f"there was a place for it: {waiting[-1].recv(100)}")
+            waiting[-1].settimeout(20)
+            resource.prlimit(bench.panel.pid, resource.RLIMIT_NOFILE, (soft, hard))
+            assert b" 200 " in waiting[-1].recv(100), "it comes in once there is room"
         finally:
             resource.prlimit(bench.panel.pid, resource.RLIMIT_NOFILE, (soft, hard))
             for one in waiting:
                 one.close()
-        assert bench.log_in("operate")[0] == 200, "whoever waited comes in once there is room"
+        assert bench.log_in("operate")[0] == 200
 
 
 FLOOD = """
@@ -297,6 +304,26 @@ def out_at_once(bench):
             answer = request(link, "engage")
             raise AssertionError(f"answered after the end of its session: {answer}")
     assert bench.status()["state"] in ("OFF", "SETTLED")
+
+
+def out_without_reading(bench):
+    """A page that reads nothing, and has more to read than its link holds, is closed too."""
+    bench.both()
+    cookie = bench.log_in("operate")[1]
+    folder = Path(f"/proc/{bench.panel.pid}/fd")
+    harness.wait_for(lambda: bench.status()["tick"] > 1000000, "samples to send")
+    before = len(list(folder.iterdir()))
+    with contextlib.ExitStack() as stack:
+        for _ in range(5):
+            link = stack.enter_context(bench.link(cookie=cookie))
+            link.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            for number in range(4):
+                link.send({"op": "samples", "platform": "ride", "columns": ["t_ms"] * 32, "history_s": 30, "id": number})
+            link.send({"op": "status", "platform": "ride", "hz": 10, "id": 9})
+        time.sleep(20)  # 1 MB a second for each
+        assert len(list(folder.iterdir())) >= before + 5
+        assert bench.get("/api/logout", "POST", {}, Content_Type="application/json", Origin=f"http://127.0.0.1:{bench.web}", Cookie=cookie)[0] == 200
+        harness.wait_for(lambda: len(list(folder.iterdir())) <= before, "their connections are closed", 3)
 
 
 def cookies_of_others(bench):
@@ -331,6 +358,7 @@ CASES = [
     ("pages of the highest role", pages_of_the_highest_role, {"passwords": ("look", "operate", "service")}),
     ("few descriptors", few_descriptors, {"passwords": ("operate",)}),
     ("out is out at once", out_at_once, {"passwords": ("operate",)}),
+    ("out without reading", out_without_reading, {"passwords": ("operate",)}),
     ("pages of a build", from_a_build, {}),
     ("cookies of other programs", cookies_of_others, {"passwords": ("operate",)}),
 ]

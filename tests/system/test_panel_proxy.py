@@ -125,9 +125,12 @@ def only_the_proxy_is_believed(bench):
         assert bench.get("/api/login", "POST", {"role": "operate", "password": "wrong"}, Content_Type="application/json", Origin=f"http://127.0.0.1:{bench.web}", X_Forwarded_For="10.0.0.1")[0] == 401
         assert "login from 127.0.0.1: wrong" in bench.panel_log.read_text(encoding="utf-8")
         bench.end_panel()
-    for text in ("localhost", "127.1", "127.0.0.1:80", "[::1]", "", "10.0.0.0/8"):
+    for text in ("localhost", "127.1", "127.0.0.1:80", "[::1]", "", "10.0.0.0/8", "::ffff:127.0.0.1"):
         run = subprocess.run([BIN / "heave-panel", "--state", bench.state_folder, "--proxy", text], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=30, check=False)
         assert run.returncode == 64 and "--proxy: an address" in run.stderr, (text, run)
+    for arguments, code, why in ((("--proxy", "::1", "--proxy", "::1"), 64, "--proxy: once"), (("--state", bench.folder / "empty", "--proxy", "::1"), 78, "--proxy: only once there is a password")):
+        run = subprocess.run([BIN / "heave-panel", "--state", bench.state_folder, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=30, check=False)
+        assert run.returncode == code and why in run.stderr, run
 
 
 def pages_below_a_path(bench):
@@ -172,7 +175,7 @@ def main():
     for name, case, options in CASES:
         if only in name:
             with suite.case(name), PanelBench(**options) as bench:
-                if NGINX == "" or shutil.which("openssl") is None:
+                if case is not only_the_proxy_is_believed and NGINX == "" or shutil.which("openssl") is None:
                     raise tap.Skip("it takes nginx and openssl")
                 case(bench)
     return suite.done()

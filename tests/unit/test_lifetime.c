@@ -167,6 +167,8 @@ static void test_selftest_of_an_older_start_counts_by_a_date_that_can_be_right(v
     for (unsigned i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
         m_life.boot = k_rows[i].then;
         lifetime_note_selftest(&m_life, &selftest);
+        TEST_ASSERT_TRUE(lifetime_has_passed(&m_life, 20261123, "0123456789abcdef")); /* it has just been made */
+        m_life.has_own = false;
         m_life.boot = k_rows[i].now;
         m_life.is_clock_trusted = k_rows[i].is_date_right;
         TEST_ASSERT_EQUAL(k_rows[i].counts, lifetime_has_passed(&m_life, 20261123, "0123456789abcdef"));

@@ -42,6 +42,12 @@ static void end(void *context, int code, char *text, size_t length)
     m_told++;
 }
 
+/* Of another kind. */
+static void other_end(void *context, int code, char *text, size_t length)
+{
+    end(context, code, text, length);
+}
+
 void setUp(void)
 {
     child_watch = watch;
@@ -148,20 +154,6 @@ static void test_too_long_ends_it(void)
     TEST_ASSERT_EQUAL_INT(-1, m_code);
 }
 
-static void test_few_at_a_time(void)
-{
-    for (unsigned i = 0; i < CHILDREN_MAX; i++) {
-        TEST_ASSERT_TRUE(start("exec sleep 600", ""));
-    }
-    TEST_ASSERT_FALSE(start("exit 0", ""));
-    child_watch_time(1000 + CHILD_LONGEST_MS);
-    for (unsigned i = 0; i < CHILDREN_MAX; i++) {
-        wait_for(m_watched[i]);
-    }
-    TEST_ASSERT_EQUAL_INT(CHILDREN_MAX, m_told);
-    TEST_ASSERT_EQUAL_STRING("again\n", run("echo again", ""));
-}
-
 static void test_who_is_gone_is_not_told(void)
 {
     TEST_ASSERT_TRUE(start("echo late", ""));
@@ -183,6 +175,25 @@ static void test_this_process_works_something_out(void)
     wait_for(m_watched[0]);
     TEST_ASSERT_EQUAL_INT(5, m_code);
     TEST_ASSERT_EQUAL_STRING("worked out", m_text);
+}
+
+/* And they keep no work away, which is of two at a time for each kind. */
+static void test_few_at_a_time(void)
+{
+    for (unsigned i = 0; i < CHILD_PROGRAMS; i++) {
+        TEST_ASSERT_TRUE(start("exec sleep 600", ""));
+    }
+    TEST_ASSERT_FALSE(start("exit 0", ""));
+    for (unsigned i = 0; i < CHILD_WORKS; i++) {
+        TEST_ASSERT_TRUE(child_work(work, (char[]){"worked out"}, other_end, 1000));
+    }
+    TEST_ASSERT_FALSE(child_work(work, (char[]){"worked out"}, other_end, 1000));
+    child_watch_time(1000 + CHILD_LONGEST_MS);
+    for (unsigned i = 0; i < CHILD_PROGRAMS + CHILD_WORKS; i++) {
+        wait_for(m_watched[i]);
+    }
+    TEST_ASSERT_EQUAL_INT(CHILD_PROGRAMS + CHILD_WORKS, m_told);
+    TEST_ASSERT_EQUAL_STRING("again\n", run("echo again", ""));
 }
 
 int main(void)
