@@ -5,33 +5,25 @@
  */
 #include "panel/server.h"
 
-#include <errno.h>
 #include <libwebsockets.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/resource.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "panel/child.h"
 #include "panel/connections.h"
+#include "panel/door.h"
 #include "panel/http.h"
 #include "panel/outbox.h"
 
-#define PROTOCOL    "heave-panel.1"
-#define PUMP_US     (33 * LWS_US_PER_MS)
-#define SECOND_US   (1 * LWS_US_PER_SEC)
-#define VIEWERS_MAX 64u
-#define ACCEPTS_MAX 16u /* at a time: pages that are there have their turn between */
-#define SAID_MAX    20u
-#define SAID_MS     30000
-#define WHY_MAX     256u
-
-/* A connection may be sending a file; a platform has its links and its samples; the rest is the library's, children's and room.
- */
-#define DESCRIPTORS (CONNECTIONS_MAX * 2u + VIEWERS_MAX + VIEWER_PLATFORMS * 6u + 64u)
+#define PROTOCOL  "heave-panel.1"
+#define PUMP_US   (33 * LWS_US_PER_MS)
+#define SECOND_US (1 * LWS_US_PER_SEC)
+#define SAID_MAX  20u
+#define SAID_MS   30000
 
 /* One WebSocket. */
 typedef struct {
@@ -42,9 +34,6 @@ static server_t *m_server; /* the library's callbacks reach nothing else */
 static struct lws_context *m_context;
 static struct lws_vhost *m_vhost;
 static lws_sorted_usec_list_t m_pump, m_second;
-static connections_t m_connections; /* that are no pages */
-static struct lws *m_listener;
-static bool m_is_full;
 
 static int64_t milliseconds(void)
 {
@@ -82,7 +71,7 @@ static bool is_full(void)
     for (const viewer_t *viewer = m_server->hall->viewers; viewer != NULL; viewer = viewer->next) {
         pages += !viewer->is_over;
     }
-    return pages >= VIEWERS_MAX;
+    return pages >= DOOR_PAGES_MAX;
 }
 
 static int let_in(struct lws *wsi)
@@ -108,7 +97,7 @@ static int enter(struct lws *wsi, socket_t *socket)
     socket->viewer = role >= 0 && !is_full() ? viewer_enter(m_server->hall, wsi, role, name) : NULL;
     if (socket->viewer != NULL) {
         (void)http_token(wsi, socket->viewer->session);
-        connections_remove(&m_connections, wsi);
+        door_passed(wsi);
     }
     return socket->viewer != NULL ? 0 : -1;
 }
@@ -287,69 +276,13 @@ static void watch_child(child_t *child)
     m_watching = NULL;
 }
 
-/* --- Who connects --- */
-
-static void take_in(int fd, const listener_peer_t *peer)
-{
-    void *const oldest = connections_give_way(&m_connections);
-    if (oldest != NULL) {
-        connections_remove(&m_connections, oldest);
-        lws_set_timeout(oldest, PENDING_TIMEOUT_USER_OK, LWS_TO_KILL_ASYNC);
-    }
-    struct lws *const wsi = lws_adopt_socket_vhost(m_vhost, fd);
-    if (wsi != NULL) {
-        connections_add(&m_connections, wsi, connections_network(peer->address));
-    }
-}
-
-/* Where nothing is left for one more, the kernel goes on telling who waits. Not before the next turn, so that pages that are
- * there have the processor. */
-static void listen_later(void)
-{
-    if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
-        m_is_full = true;
-        (void)lws_rx_flow_control(m_listener, 0);
-    }
-}
-
-static void take_all(int listening)
-{
-    listener_peer_t peer;
-    for (unsigned i = 0; i < ACCEPTS_MAX; i++) {
-        const int fd = listener_accept(listening, &peer);
-        if (fd < 0) {
-            listen_later();
-            return;
-        }
-        if (m_server->access->has_password || peer.is_this_machine) {
-            take_in(fd, &peer);
-        } else {
-            (void)close(fd);
-        }
-    }
-}
-
-static int serve_listener(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t length)
-{
-    (void)user;
-    (void)in;
-    (void)length;
-    switch ((int)reason) {
-    case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
-        return -1; /* as in serve_link() */
-    case LWS_CALLBACK_RAW_RX_FILE:
-        take_all(lws_get_socket_fd(wsi));
-        return 0;
-    default:
-        return 0;
-    }
-}
+/* --- Connections of browsers --- */
 
 /* Of every connection, as the library's first protocol. */
 static int serve_http(struct lws *wsi, enum lws_callback_reasons reason, void *user, void *in, size_t length)
 {
     if (reason == LWS_CALLBACK_WSI_DESTROY) {
-        connections_remove(&m_connections, wsi);
+        door_passed(wsi);
         return 0;
     }
     if (reason == LWS_CALLBACK_HTTP_CONFIRM_UPGRADE) {
@@ -363,10 +296,7 @@ static int serve_http(struct lws *wsi, enum lws_callback_reasons reason, void *u
 /* To pages that have had their turn. */
 static void listen_again(void)
 {
-    if (m_is_full) {
-        m_is_full = false;
-        (void)lws_rx_flow_control(m_listener, 1);
-    }
+    door_turn();
     for (viewer_t *viewer = m_server->hall->viewers; viewer != NULL; viewer = viewer->next) {
         if (viewer->heard >= VIEWER_HEARD_MAX) {
             (void)lws_rx_flow_control(viewer->handle, 1);
@@ -426,37 +356,6 @@ static void say(int level, const char *line)
     }
 }
 
-static bool listen_at(const listener_address_t *where)
-{
-    char why[WHY_MAX] = "";
-    lws_sock_file_fd_type descriptor = {.filefd = listener_open(where, why, sizeof why)};
-    if (descriptor.filefd < 0) {
-        fprintf(stderr, "heave-panel: %s\n", why);
-        return false;
-    }
-    m_listener = lws_adopt_descriptor_vhost(m_vhost, LWS_ADOPT_RAW_FILE_DESC, descriptor, "listener", NULL);
-    return m_listener != NULL;
-}
-
-/* So that strangers cannot take those that pages and heaved need. */
-static bool has_descriptors(void)
-{
-    struct rlimit limit;
-    if (getrlimit(RLIMIT_NOFILE, &limit) != 0) {
-        return true;
-    }
-    if (limit.rlim_max < DESCRIPTORS) {
-        fprintf(stderr, "heave-panel: it needs %u file descriptors, and may have %llu (ulimit -n, LimitNOFILE=)\n", DESCRIPTORS,
-                (unsigned long long)limit.rlim_max);
-        return false;
-    }
-    if (limit.rlim_cur < DESCRIPTORS) {
-        limit.rlim_cur = DESCRIPTORS;
-        (void)setrlimit(RLIMIT_NOFILE, &limit); /* where a sandbox forbids it, new connections wait for those that end */
-    }
-    return true;
-}
-
 static bool make_context(const server_t *server)
 {
     static const struct lws_protocols k_protocols[] = {
@@ -467,7 +366,7 @@ static bool make_context(const server_t *server)
          .rx_buffer_size = VIEWER_MESSAGE_MAX},
         {.name = "heaved", .callback = serve_link, .per_session_data_size = sizeof(adopted_t)},
         {.name = "child", .callback = serve_child, .per_session_data_size = sizeof(watched_t)},
-        {.name = "listener", .callback = serve_listener},
+        {.name = "listener", .callback = door_serve},
         {.name = NULL}};
     struct lws_context_creation_info info = {.port = CONTEXT_PORT_NO_LISTEN_SERVER,
                                              .protocols = k_protocols,
@@ -484,7 +383,7 @@ static bool make_context(const server_t *server)
     if (m_vhost == NULL) {
         fprintf(stderr, "heave-panel: the certificate or its key cannot be used, or there is no memory\n");
     }
-    return m_vhost != NULL && listen_at(server->where);
+    return m_vhost != NULL && door_open(m_vhost, server);
 }
 
 bool server_open(server_t *server)
@@ -494,7 +393,7 @@ bool server_open(server_t *server)
     http_init(server);
     child_watch = watch_child;
     server->hall->wake = wake;
-    if (!has_descriptors() || !make_context(server)) {
+    if (!door_has_descriptors() || !make_context(server)) {
         server_close();
         return false;
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * server.h - HTTP and WebSocket for pages. Only server.c and http.c know the library (libwebsockets), so that another one can
- * take its place.
+ * server.h - HTTP and WebSocket for pages. Only server.c, door.c and http*.c know the library (libwebsockets), so that another
+ * one can take its place.
  */
 #ifndef HEAVE_PANEL_SERVER_H
 #define HEAVE_PANEL_SERVER_H

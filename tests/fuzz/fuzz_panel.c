@@ -26,7 +26,7 @@
 #define SENT_MAX    16384u
 #define GOT_MAX     (1u << 20)
 #define TURNS       4u
-#define PATIENCE    2000u /* turns, until what was closed is closed */
+#define PATIENCE    20000u /* turns, until what was closed is closed */
 #define TOKEN       "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa"
 #define HOST        "127.0.0.1"
 
@@ -198,6 +198,15 @@ static void turn(unsigned count)
     }
 }
 
+/* Something is not there yet: the machine may be busy. */
+static void turn_late(unsigned patience)
+{
+    turn(1);
+    if (patience % 100 == 50) {
+        (void)usleep(10000);
+    }
+}
+
 static unsigned count_handles(void)
 {
     DIR *const folder = opendir("/proc/self/fd");
@@ -286,7 +295,7 @@ static void start_server(void)
     while (!m_platform.is_there || count_links() < 3) {
         turn(1);
     }
-    turn(PATIENCE / 10);
+    turn(200);
 }
 
 /* --- Each input --- */
@@ -339,9 +348,8 @@ static void enter(peer_t *self)
     self->is_page = true;
     send_bytes(self, k_enter, sizeof k_enter - 1);
     turn(TURNS);
-    for (unsigned patience = PATIENCE; self->got_length == 0 && patience > 0; patience--) { /* the machine may be busy */
-        turn(1);
-        (void)usleep(patience % 10 == 0 ? 1000 : 0);
+    for (unsigned patience = PATIENCE; self->got_length == 0 && patience > 0; patience--) {
+        turn_late(patience);
     }
     FUZZ_REQUIRE(!has_session || memmem(self->got, self->got_length, " 101 ", 5) != NULL);
 }
@@ -469,8 +477,7 @@ static void finish(void)
     }
     unsigned patience = PATIENCE;
     while ((count_viewers() > 0 || count_handles() - count_links() != m_handles) && patience-- > 0) {
-        turn(1);
-        (void)usleep(patience % 10 == 0 ? 1000 : 0);
+        turn_late(patience);
     }
     FUZZ_REQUIRE(count_viewers() == 0 && count_handles() - count_links() == m_handles);
 }

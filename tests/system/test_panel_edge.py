@@ -313,17 +313,14 @@ def out_without_reading(bench):
     folder = Path(f"/proc/{bench.panel.pid}/fd")
     harness.wait_for(lambda: bench.status()["tick"] > 1000000, "samples to send")
     before = len(list(folder.iterdir()))
-    with contextlib.ExitStack() as stack:
-        for _ in range(5):
-            link = stack.enter_context(bench.link(cookie=cookie))
-            link.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-            for number in range(4):
-                link.send({"op": "samples", "platform": "ride", "columns": ["t_ms"] * 32, "history_s": 30, "id": number})
-            link.send({"op": "status", "platform": "ride", "hz": 10, "id": 9})
-        time.sleep(20)  # 1 MB a second for each
-        assert len(list(folder.iterdir())) >= before + 5
+    with bench.link(cookie=cookie) as link:
+        link.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        for number in range(4):
+            link.send({"op": "samples", "platform": "ride", "columns": ["t_ms"] * 32, "history_s": 30, "id": number})
+        time.sleep(10)  # 1 MB a second
+        assert len(list(folder.iterdir())) > before
         assert bench.get("/api/logout", "POST", {}, Content_Type="application/json", Origin=f"http://127.0.0.1:{bench.web}", Cookie=cookie)[0] == 200
-        harness.wait_for(lambda: len(list(folder.iterdir())) <= before, "their connections are closed", 3)
+        harness.wait_for(lambda: len(list(folder.iterdir())) <= before, "its connection is closed", 3)
 
 
 def cookies_of_others(bench):
