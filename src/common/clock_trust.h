@@ -12,8 +12,8 @@
 typedef struct {
     const char *boot_id;      /**< 128 bits in hexadecimal, other ones after each start of the machine */
     const char *clock_chip;   /**< seconds since 1970 */
-    const char *synchronised; /**< is there once a time server has been heard */
-    bool asks_kernel;         /**< which knows that, too, where it may be asked */
+    const char *synchronised; /**< is there once systemd-timesyncd has heard a time server. (The kernel knows it, too, but
+                                 sandboxes end a program that asks it: adjtimex is among the calls that set the clock.) */
 } clock_trust_files_t;
 
 extern const clock_trust_files_t clock_trust_files;

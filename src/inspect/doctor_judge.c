@@ -50,7 +50,8 @@ void doctor_judge_host(doctor_report_t *report, const doctor_host_t *host)
     }
     if (host->is_date_of_matter && !host->is_clock_trusted) {
         doctor_say(report, DOCTOR_WARN,
-                   "the date may be wrong: this machine has no clock chip, and has heard no time server; after each start of the "
+                   "the date may be wrong: this machine has no clock chip, and systemd-timesyncd has heard no time server; after "
+                   "each start of the "
                    "machine the self-test is due again -> a clock chip with a battery, or a time server");
     }
 }

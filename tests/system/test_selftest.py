@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """test_selftest.py BIN - heavectl selftest as a person makes it, in a terminal: what passes, what is found, what it takes to engage afterwards."""
-import ctypes
 import json
 import os
 import pty
@@ -102,10 +101,8 @@ def tick(bench):
 
 
 def clock_is_trusted():
-    """By other means than heaved's: the status of the kernel's clock, and what systemd says."""
     chip = Path("/sys/class/rtc/rtc0/since_epoch")
-    kernel = ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(256))  # modes 0: it only tells
-    return kernel in range(5) or Path("/run/systemd/timesync/synchronized").exists() or (chip.exists() and abs(int(chip.read_text()) - time.time()) < 54000)
+    return Path("/run/systemd/timesync/synchronized").exists() or (chip.exists() and abs(int(chip.read_text()) - time.time()) < 54000)
 
 
 def passes():

@@ -10,7 +10,7 @@
 #include <time.h>
 #include <unistd.h>
 
-static const clock_trust_files_t k_files = {"test_clock_trust.boot", "test_clock_trust.chip", "test_clock_trust.server", false};
+static const clock_trust_files_t k_files = {"test_clock_trust.boot", "test_clock_trust.chip", "test_clock_trust.server"};
 
 static void write_text(const char *path, const char *text)
 {
