@@ -3,12 +3,10 @@
 """test_sandbox.py BIN - heaved and heave-panel with the system calls that their units allow, and no others: a call that systemd would end the service for ends
 the program here, too. What else systemd does to a service is tried in an emulated machine (tools/nightly --only service)."""
 import json
-import os
 import signal
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import harness
@@ -41,6 +39,10 @@ def send(bench, text):
         link.sendto(text.encode(), ("127.0.0.1", bench.port))
 
 
+def accepted(bench):
+    return sum(bench.status()["counters"]["accepted"].values())
+
+
 def a_day_of_heaved(bench):
     """Self-test, ride, incident, SERVICE, another configuration, a new start by itself, SIGHUP, end; with all that it keeps."""
     text = bench.config.read_text(encoding="utf-8").replace("[control]\n", f"[control]\nmetrics = {bench.folder}/heave.prom\n", 1)
@@ -51,9 +53,10 @@ def a_day_of_heaved(bench):
     assert bench.raw("selftest passed")["ok"]
     assert bench.raw("engage")["ok"]
     bench.wait_state("ENGAGED")
-    for i in range(50):
+    for i in range(20):
+        before = accepted(bench)
         send(bench, f"@A6:{i / 10},0,0,1,1,1,F0#")
-        time.sleep(0.02)
+        harness.wait_for(lambda before=before: accepted(bench) > before, "the frame has come")
     for line in ("status", "times", "geometry", "incidents", "counts", "dump", "intensity 50", "hold", "resume", "park"):
         assert bench.raw(line)["ok"], line
     bench.wait_state("SETTLED")
