@@ -24,7 +24,7 @@ import kernel  # noqa: E402  the path above has to be set first
 import tap  # noqa: E402
 import test_package  # noqa: E402
 
-PACKAGES = "libinih1,libcjson1,libmnl0,libmodbus5,libgpiod2,systemd-sysv,dbus,udev,iproute2,procps"
+PACKAGES = "libinih1,libcjson1,libmnl0,libmodbus5,libgpiod2,systemd-sysv,dbus,udev,kmod,iproute2,procps"
 QEMU = "qemu-system-x86_64"
 LIMIT_S = 1500
 TOLERANT = "no_timer_check nowatchdog rcupdate.rcu_cpu_stall_suppress=1"
@@ -46,7 +46,7 @@ WantedBy=multi-user.target
 def find_root():
     """A debootstrapped system in the cache."""
     cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "heave"
-    root = cache / "system-bookworm-1"
+    root = cache / "system-bookworm-2"
     if not root.exists():
         if not shutil.which("debootstrap"):
             raise tap.Skip("no debootstrap")
