@@ -37,6 +37,28 @@ def free_port():
         return one.getsockname()[1]
 
 
+def make_certificate(folder):
+    """(certificate, key) of 127.0.0.1, by openssl."""
+    certificate, key = folder / "cert.pem", folder / "key.pem"
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj", "/CN=ride", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out",
+                    certificate], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    return certificate, key
+
+
+def trusting(certificate):
+    """More arguments of a Page: Chromium takes this certificate."""
+    public = subprocess.run(f"openssl x509 -in {certificate} -pubkey -noout | openssl pkey -pubin -outform der | openssl dgst -sha256 -binary | base64", shell=True, capture_output=True, text=True, check=True).stdout.strip()
+    return (f"--ignore-certificate-errors-spki-list={public}",)
+
+
+def enter_password(page):
+    page.wait("document.getElementById('password') !== null", "it asks who it is")
+    page.run("document.getElementById('role').value = 'service'")
+    page.run(f"document.getElementById('password').value = '{PASSWORD} service'")
+    page.run("document.querySelector('form button').click()")
+    page.wait("document.getElementById('state').textContent.startsWith('OFF')", "the state is shown")
+
+
 class PanelBench(harness.Bench):
     """heaved and a panel for it, called ride."""
 

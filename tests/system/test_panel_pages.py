@@ -22,8 +22,8 @@ import harness
 import tap
 import web_socket
 from mechanism import turn
-from test_panel import (BIN, HTML, PASSWORD, STOP_S, WWW, FalseHeaved, PanelBench, free_port, make_incident, moved, reach, request, standing_still, state_of, take,
-                        until)
+from test_panel import (BIN, HTML, PASSWORD, STOP_S, WWW, FalseHeaved, PanelBench, enter_password, free_port, make_certificate, make_incident, moved, reach, request,
+                        standing_still, state_of, take, trusting, until)
 from web_socket import Page
 
 PICTURES = Path(sys.argv[2])
@@ -143,9 +143,7 @@ def over_tls(bench):
     """openssl and a browser: TLS 1.2 and later, the cookie for TLS alone, WebSocket too; plain HTTP gets nothing."""
     if shutil.which("openssl") is None:
         raise tap.Skip("openssl is not there")
-    certificate, key = bench.folder / "cert.pem", bench.folder / "key.pem"
-    subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj", "/CN=ride", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out",
-                    certificate], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    certificate, key = make_certificate(bench.folder)
     bench.more = ("--tls-cert", certificate, "--tls-key", key)
     bench.both()
 
@@ -176,13 +174,8 @@ def over_tls(bench):
     assert run.returncode == 69, run
     if web_socket.browser() is None:
         raise tap.Skip("no Chromium here; openssl was tried")
-    public = subprocess.run(f"openssl x509 -in {certificate} -pubkey -noout | openssl pkey -pubin -outform der | openssl dgst -sha256 -binary | base64", shell=True, capture_output=True, text=True, check=True).stdout.strip()
-    with Page(f"{own}/", 820, 1180, more=(f"--ignore-certificate-errors-spki-list={public}",)) as page:
-        page.wait("document.getElementById('password') !== null", "it asks who it is")
-        page.run("document.getElementById('role').value = 'service'")
-        page.run(f"document.getElementById('password').value = '{PASSWORD} service'")
-        page.run("document.querySelector('form button').click()")
-        page.wait("document.getElementById('state').textContent.startsWith('OFF')", "the state is shown")
+    with Page(f"{own}/", 820, 1180, more=trusting(certificate)) as page:
+        enter_password(page)
         assert page.run("document.cookie") == "" and page.run("location.protocol") == "https:"
         assert page.problems == [], page.problems
 

@@ -13,7 +13,7 @@ import sys
 import harness
 import tap
 import web_socket
-from test_panel import BIN, PASSWORD, PanelBench, free_port, request, take
+from test_panel import BIN, PASSWORD, PanelBench, enter_password, free_port, make_certificate, request, take, trusting
 from web_socket import Page, WebSocket
 
 NGINX = subprocess.run([harness.TOP / "tools/lib/nginx.sh", "--cached"], capture_output=True, text=True, check=False).stdout.strip()
@@ -31,9 +31,7 @@ class Proxy:
 
     def __init__(self, bench, **changes):
         self.bench, self.port = bench, free_port()
-        self.certificate, self.key = bench.folder / "hall.crt", bench.folder / "hall.key"
-        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2", "-subj", "/CN=hall", "-addext", "subjectAltName=IP:127.0.0.1", "-keyout", self.key,
-                        "-out", self.certificate], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.certificate, self.key = make_certificate(bench.folder)
         text = documented()
         for before, after in {"hall.example": "127.0.0.1", "/etc/ssl/hall.crt": str(self.certificate), "/etc/ssl/hall.key": str(self.key), "listen 443": f"listen 127.0.0.1:{self.port}",
                               "127.0.0.1:9801": f"127.0.0.1:{bench.web}", **changes}.items():
@@ -140,13 +138,8 @@ def pages_below_a_path(bench):
     bench.more = ("--proxy", "127.0.0.1", "--allow-host", "127.0.0.1")
     bench.both()
     with Proxy(bench) as proxy:
-        public = subprocess.run(f"openssl x509 -in {proxy.certificate} -pubkey -noout | openssl pkey -pubin -outform der | openssl dgst -sha256 -binary | base64", shell=True, capture_output=True, text=True, check=True).stdout.strip()
-        with Page(f"{proxy.origin}/ride", 820, 1180, more=(f"--ignore-certificate-errors-spki-list={public}",)) as page:
-            page.wait("document.getElementById('password') !== null", "it asks who it is")
-            page.run("document.getElementById('role').value = 'service'")
-            page.run(f"document.getElementById('password').value = '{PASSWORD} service'")
-            page.run("document.querySelector('form button').click()")
-            page.wait("document.getElementById('state').textContent.startsWith('OFF')", "the state is shown")
+        with Page(f"{proxy.origin}/ride", 820, 1180, more=trusting(proxy.certificate)) as page:
+            enter_password(page)
             for tab in page.run("[...document.querySelectorAll('[data-tab]')].map((one) => one.dataset.tab)"):
                 page.run(f"document.querySelector('[data-tab={tab}]').click()")
                 page.wait("document.querySelector('main').innerText.length > 20", f"the page {tab}")
