@@ -16,9 +16,9 @@
  * Coarse values: if the rounding steps of the values exceed what the axes can do, they are smoothed by a mean of up to
  * STREAM_WINDOW_MAX points, applied three times. Each point after the first adds 1.5 periods of delay.
  *
- * Losses: if a point is missing when the curve needs it, the motion is extrapolated with the last step and its curvature (at most
- * 4 times the larger of the two steps before) and slows down like the quickest stop of the axis (a slow motion in 100 ms, over
- * 50 ms of travel). When samples return, or after 150 ms without any, the curve returns softly to the samples or to the last one:
+ * Losses: if a point is missing when the curve needs it, the motion is extrapolated by a linear prediction of its steps (at most
+ * twice the second largest of the last 12) and slows down like the quickest stop of the axis (a slow motion in 100 ms, over 50 ms
+ * of travel). When samples return, or after 150 ms without any, the curve returns softly to the samples or to the last one:
  * position and velocity of the control points are continuous. So a stream that has ended comes to rest exactly on its last
  * sample, within 2 s, or within 24 periods of a slow stream. A known stream may pause for a second and continues. A new rate
  * gives a new grid, on which the curve continues.
@@ -96,15 +96,21 @@ typedef struct {
     q32_t weight_q32;  /**< [0, Q32_ONE]: 0 by the line, 1 by arrivals */
 } stream_evidence_t;
 
-/** Extrapolation where samples are missing; private to src/motion. */
+/** How the step of a motion follows from the two before it; private to src/motion. */
 typedef struct {
-    q32_t first_q32;   /**< in the first period */
-    q32_t go_q32;      /**< in the later ones, if it did not fade */
+    q32_t by_newest_q32; /**< [-1, 2] */
+    q32_t by_before_q32; /**< [-1, 1] */
+} stream_predictor_t;
+
+/** Extrapolation of an axis where samples are missing; private to src/motion. */
+typedef struct {
+    q32_t step_q32;    /**< the newest step, guessed or not */
+    q32_t before_q32;  /**< the step before it */
+    q32_t first_q32;   /**< the first guessed step, before it slows down */
+    q32_t most_q32;    /**< no guessed step is larger */
     uint32_t rise_q32; /**< share of its time in which the acceleration builds up, [0, 0.5] */
     int32_t reach_q16; /**< duration of the extrapolation, in periods */
     int32_t full_q16;  /**< periods of these before it slows down */
-    q32_t bend_q32;    /**< of an oscillation: change of the step in the first period */
-    int64_t pull_q32;  /**< of an oscillation: share of each step that is subtracted from that change; 0: no oscillation */
 } stream_lead_t;
 
 /** Resolution of a sender's values on one axis; private to src/motion. */
@@ -126,6 +132,7 @@ typedef struct {
     q32_t low_q32[AXES_MAX];      /**< recent range of the motion, lower end: the offset never leads the curve out of it */
     q32_t high_q32[AXES_MAX];     /**< upper end */
     stream_lead_t lead[AXES_MAX];
+    stream_predictor_t predictor; /**< of the guesses */
     stream_quantum_t grain[AXES_MAX];
     uint32_t watched; /**< samples since the watch for a grain began */
     int32_t window;   /**< each control point is a running mean of this many points, applied three times; 1: the point itself */
@@ -135,7 +142,6 @@ typedef struct {
     q32_t mean_q32;                 /**< a point is replaced by a mean of some points to this share */
     q32_t led_q32;                  /**< share of the distance to the predicted point by which control points are led */
     uint32_t mean_points;           /**< number of points in that mean */
-    uint32_t fitted;                /**< points used to detect an oscillation */
     int32_t reach_min_q16;          /**< shortest and longest time, in periods, of a motion without samples */
     int32_t reach_max_q16;
     int32_t change; /**< how much the points at head have changed since the curve passed them, in guesses; 0: not at all */

@@ -476,7 +476,8 @@ static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX
     stream_set_scale(&self->stream, intensity_largest_q16(&self->intensity));
     (void)stream_step(&self->stream, now_us, kin_followed(self), ref);
     axis_targets_scale_refs(self, ref);
-    out->flags |= self->stream.curve.governor.strength_q32 >= 2 * Q32_ONE ? MOTION_ACCEL : 0;
+    out->flags |= (self->stream.curve.governor.strength_q32 >= 2 * Q32_ONE ? MOTION_ACCEL : 0) |
+                  (self->stream.curve.governor.is_slowed ? MOTION_SPEED : 0);
 }
 
 void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_MAX], motion_output_t *out)

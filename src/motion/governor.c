@@ -1,21 +1,23 @@
 /* SPDX-License-Identifier: MIT
- * governor.c - smooths what a stream asks for beyond the limits; see governor.h.
+ * governor.c - makes what a stream asks for beyond the limits slower and smoother; see governor.h.
  * Differences of means are means of differences, so a point between two levels needs at most what the needs of both mix to: the
  * strength follows from the needs in closed form. It rises as quickly as the output itself can bear, and falls slowly.
  */
-#include "heave/governor.h"
-
+#include "governor_speed.h"
 #include "heave/sane.h"
 
-#define SPAN_US     150000u
-#define RELEASE_US  300000u           /* time constant with which the strength falls ... */
-#define SOFT_US     100000u           /* ... which that rate comes to */
-#define RELEASE_DIV 4                 /* ... and at least by a level in so many seconds, ... */
-#define CATCH_DIV   6                 /* ... but not so fast that the output gains more than a sixth of the time, ... */
-#define CATCH_SPEED 12                /* ... or a twelfth of the largest speed, whichever is more */
-#define LOOK_US     6000u             /* needs are those of differences over so long */
-#define NEED_GOAL   (Q16_ONE * 4 / 5) /* of the limits */
-#define NEED_MAX    (1000 * Q16_ONE)
+#define SPAN_US     150000u             /* needs within such a time are one event, ... */
+#define MEMORY_US   1500000u            /* ... which counts for so long: a shake of 0.4 Hz turns twice meanwhile */
+#define BEGIN_US    1000000u            /* a stream begins for so long */
+#define QUIET_SHARE 4                   /* while no more than such a share of the goal is needed ... */
+#define QUIET_TIMES 4u                  /* ... it is forgotten so much sooner */
+#define RELEASE_US  300000u             /* time constant with which the strength falls ... */
+#define SOFT_US     100000u             /* ... which that rate comes to */
+#define RELEASE_DIV 4                   /* ... and at least by a level in so many seconds, ... */
+#define CATCH_DIV   6                   /* ... but not so fast that the output gains more than a sixth of the time, ... */
+#define CATCH_SPEED 12                  /* ... or a twelfth of the largest speed, whichever is more */
+#define LOOK_US     6000u               /* needs are those of differences over so long */
+#define NEED_GOAL   (Q16_ONE * 19 / 20) /* of the limits */
 #define PACE_SAME   64                  /* a period that differs by less than this share is the same */
 #define NEAR_Q32    (Q32_ONE / 1000000) /* a low-pass so near to its input has arrived */
 
@@ -69,11 +71,6 @@ static unsigned channels_with_limits(const governor_t *self)
     return channels;
 }
 
-static q32_t share_of_period(uint32_t period_us, unsigned level)
-{
-    return Q32_ONE * (int64_t)period_us / ((int64_t)period_us + k_time_constant_us[level]);
-}
-
 static void stretch(governor_track_t *track, int64_t by_q32)
 {
     track->vel_q32 = fx_mul_shift(track->vel_q32, by_q32, 32);
@@ -115,7 +112,7 @@ void governor_pace(governor_t *self, uint32_t period_us, uint32_t cycle_us)
         self->brake_q16[i] = brake_share(limits);
     }
     for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
-        self->share_q32[level] = share_of_period(period_us, level);
+        self->share_q32[level] = governor_share_of_period(period_us, k_time_constant_us[level]);
     }
 }
 
@@ -131,12 +128,11 @@ static void place_strength(governor_t *self, q32_t strength_q32)
 
 void governor_start(governor_t *self)
 {
-    for (unsigned span = 0; span < GOVERNOR_SPANS; span++) {
-        for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
-            self->need_q16[span][level] = 0;
-        }
+    for (unsigned event = 0; event < GOVERNOR_EVENTS; event++) {
+        self->event[event] = (governor_event_t){.age_us = MEMORY_US};
     }
-    self->span_us = 0;
+    self->begun_us = 0;
+    self->is_slowed = false;
     self->strength_q32 = 0;
     self->glide_q32 = 0;
     place_strength(self, 0);
@@ -149,6 +145,8 @@ void governor_place(governor_t *self, unsigned channel, bool is_steady, const q3
     const q32_t before_q32 = value_q32[1] - value_q32[0];
     governor_track_t track = {value_q32[2], vel_q32 * each, (vel_q32 - before_q32) * each * each};
     self->out[channel] = track;
+    self->asked_q32[channel] = track.pos_q32;
+    self->behind_q32[channel] = 0;
     self->track[0][channel] = track;
     self->level_q32[0][channel] = track.pos_q32;
     for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) { /* as far behind as a low-pass is in even motion */
@@ -162,28 +160,17 @@ void governor_place(governor_t *self, unsigned channel, bool is_steady, const q3
     }
 }
 
-static int32_t larger(int32_t a, int32_t b)
-{
-    return a > b ? a : b;
-}
-
-/* The share of a limit that a difference is. */
-static int32_t share_of(q32_t difference_q32, int64_t per_limit_q62)
-{
-    return (int32_t)fx_clamp(fx_mul_shift(fx_abs(difference_q32), per_limit_q62, 46), 0, NEED_MAX);
-}
-
 /* What a value needs of the limits of a channel if it comes after a track. */
 static int32_t need_of(const governor_t *self, unsigned channel, const governor_track_t *track, q32_t pos_q32)
 {
     const int64_t *per_limit_q62 = self->per_limit_q62[channel];
     const q32_t vel_q32 = pos_q32 - track->pos_q32;
     const q32_t acc_q32 = vel_q32 - track->vel_q32;
-    const int32_t by_jerk = share_of(acc_q32 - track->acc_q32, per_limit_q62[2]);
-    const int32_t by_acc = share_of(acc_q32, per_limit_q62[1]);
+    const int32_t by_jerk = governor_share_of(acc_q32 - track->acc_q32, per_limit_q62[2]);
+    const int32_t by_acc = governor_share_of(acc_q32, per_limit_q62[1]);
     const int64_t square = (int64_t)by_acc * by_acc / Q16_ONE;
-    const int64_t by_vel = share_of(vel_q32, per_limit_q62[0]) + square * self->brake_q16[channel] / Q16_ONE;
-    return larger(by_jerk, larger((int32_t)fx_clamp(by_vel, 0, NEED_MAX), by_acc));
+    const int64_t by_vel = governor_share_of(vel_q32, per_limit_q62[0]) + square * self->brake_q16[channel] / Q16_ONE;
+    return governor_larger(by_jerk, governor_larger((int32_t)fx_clamp(by_vel, 0, GOVERNOR_NEED_MAX), by_acc));
 }
 
 static void go_on(governor_track_t *track, q32_t pos_q32)
@@ -199,19 +186,20 @@ static q32_t low_pass(q32_t at_q32, q32_t input_q32, q32_t share_q32)
     return fx_abs(travel_q32) < NEAR_Q32 ? input_q32 : at_q32 + fx_mul_shift_fit(travel_q32, share_q32, 32);
 }
 
-/* Another quarter of a second begins. */
-static void pass_time(governor_t *self)
+/* Events become older, and more quickly while little moves. Where more is needed than there is, and the newest event is over,
+ * another one begins. */
+static void pass_time(governor_t *self, int32_t need_q16)
 {
-    self->span_us += self->period_us * self->each;
-    if (self->span_us < SPAN_US) {
-        return;
+    self->begun_us += self->begun_us < BEGIN_US ? self->period_us * self->each : 0;
+    const uint32_t passed_us = self->period_us * self->each * (need_q16 < NEED_GOAL / QUIET_SHARE ? QUIET_TIMES : 1);
+    for (unsigned i = 0; i < GOVERNOR_EVENTS; i++) {
+        self->event[i].age_us += self->event[i].age_us < MEMORY_US ? passed_us : 0;
     }
-    self->span_us = 0;
-    for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
-        for (unsigned span = GOVERNOR_SPANS - 1; span > 0; span--) {
-            self->need_q16[span][level] = self->need_q16[span - 1][level];
+    if (need_q16 > NEED_GOAL && self->event[0].age_us >= SPAN_US) {
+        for (unsigned i = GOVERNOR_EVENTS - 1; i > 0; i--) {
+            self->event[i] = self->event[i - 1];
         }
-        self->need_q16[0][level] = 0;
+        self->event[0] = (governor_event_t){0};
     }
 }
 
@@ -227,27 +215,36 @@ static void step_levels(governor_t *self, const q32_t *asked_q32)
     }
 }
 
-/* What each level needs. */
+/* What each level needs, and in which event. */
 static void note_needs(governor_t *self, int32_t scale_q16)
 {
+    int32_t need_q16[GOVERNOR_LEVELS + 1] = {0};
     for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
-        int32_t need_q16 = 0;
         for (unsigned i = 0; i < self->channels; i++) {
-            need_q16 = larger(need_q16, need_of(self, i, &self->track[level][i], self->level_q32[level][i]));
+            need_q16[level] =
+                governor_larger(need_q16[level], need_of(self, i, &self->track[level][i], self->level_q32[level][i]));
             go_on(&self->track[level][i], self->level_q32[level][i]);
         }
-        need_q16 = (int32_t)fx_mul_shift(need_q16, scale_q16, 16);
-        self->need_q16[0][level] = larger(self->need_q16[0][level], need_q16);
+        need_q16[level] = (int32_t)fx_mul_shift(need_q16[level], scale_q16, 16);
+    }
+    pass_time(self, need_q16[0]);
+    for (unsigned level = 0; level <= GOVERNOR_LEVELS && self->event[0].age_us < SPAN_US; level++) {
+        self->event[0].need_q16[level] = governor_larger(self->event[0].need_q16[level], need_q16[level]);
     }
 }
 
+/* What a level needs again and again: the second largest of the events. One alone is brief, as a jump is: to smooth it would take
+ * longer than to be late once. But where a stream begins, one alone is its beginning. */
 static int32_t lasting_need(const governor_t *self, unsigned level)
 {
-    int32_t need_q16 = 0;
-    for (unsigned span = 0; span < GOVERNOR_SPANS; span++) {
-        need_q16 = larger(need_q16, self->need_q16[span][level]);
+    int32_t largest_q16 = 0;
+    int32_t second_q16 = 0;
+    for (unsigned i = 0; i < GOVERNOR_EVENTS; i++) {
+        const int32_t need_q16 = self->event[i].age_us < MEMORY_US ? self->event[i].need_q16[level] : 0;
+        second_q16 = governor_larger(second_q16, need_q16 < largest_q16 ? need_q16 : largest_q16);
+        largest_q16 = governor_larger(largest_q16, need_q16);
     }
-    return need_q16;
+    return self->begun_us < BEGIN_US ? largest_q16 : second_q16;
 }
 
 /* How far the output is on its way from a level to the next one: 3 u^2 - 2 u^3 of the strength between them. Ways between levels
@@ -305,12 +302,13 @@ static q32_t value_at(const governor_t *self, unsigned channel, q32_t strength_q
 
 q32_t governor_lag(const governor_t *self, unsigned channel)
 {
-    return self->level_q32[0][channel] - value_at(self, channel, self->strength_q32);
+    return self->asked_q32[channel] - value_at(self, channel, self->strength_q32);
 }
 
 void governor_shift(governor_t *self, unsigned channel, q32_t asked_q32)
 {
-    const q32_t by_q32 = asked_q32 - self->level_q32[0][channel];
+    const q32_t by_q32 = asked_q32 - self->asked_q32[channel];
+    self->asked_q32[channel] = asked_q32;
     self->out[channel].pos_q32 += by_q32;
     for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
         self->level_q32[level][channel] += by_q32;
@@ -330,7 +328,7 @@ static int32_t need_at(const governor_t *self, q32_t strength_q32)
 {
     int32_t need_q16 = 0;
     for (unsigned i = 0; i < self->channels; i++) {
-        need_q16 = larger(need_q16, need_of(self, i, &self->out[i], value_at(self, i, strength_q32)));
+        need_q16 = governor_larger(need_q16, need_of(self, i, &self->out[i], value_at(self, i, strength_q32)));
     }
     return need_q16;
 }
@@ -342,7 +340,8 @@ static q32_t largest_fall(const governor_t *self, uint32_t since_us)
     const unsigned level = (unsigned)fx_clamp(self->strength_q32 / Q32_ONE, 0, GOVERNOR_LEVELS - 1);
     int32_t way_q16 = 1; /* in what the largest speed goes meanwhile */
     for (unsigned i = 0; i < self->channels; i++) {
-        way_q16 = larger(way_q16, share_of(self->level_q32[level + 1][i] - self->level_q32[level][i], self->per_limit_q62[i][0]));
+        way_q16 = governor_larger(
+            way_q16, governor_share_of(self->level_q32[level + 1][i] - self->level_q32[level][i], self->per_limit_q62[i][0]));
     }
     const q32_t by_time_q32 = Q32_ONE * (int64_t)since_us / (CATCH_DIV * (int64_t)k_time_constant_us[level]);
     const q32_t by_speed_q32 = Q32_ONE / CATCH_SPEED * Q16_ONE / way_q16;
@@ -385,12 +384,13 @@ static void follow_need(governor_t *self, q32_t wanted_q32)
 
 void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, q32_t *out_q32)
 {
-    step_levels(self, asked_q32);
+    q32_t kept_q32[GOVERNOR_CHANNELS];
+    governor_limit_speed(self, asked_q32, scale_q16, kept_q32);
+    step_levels(self, kept_q32);
     self->since++;
     const bool is_looked_at = self->since >= self->each;
     if (is_looked_at) {
         self->since = 0;
-        pass_time(self);
         note_needs(self, scale_q16);
         const q32_t wanted_q32 = needed_strength(self);
         follow_need(self, wanted_q32);
@@ -439,7 +439,7 @@ static bool is_pace_sane(const governor_t *self, uint32_t cycle_us)
                   self->brake_q16[i] == brake_share(limits);
     }
     for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
-        is_sane = is_sane && self->share_q32[level] == share_of_period(self->period_us, level);
+        is_sane = is_sane && self->share_q32[level] == governor_share_of_period(self->period_us, k_time_constant_us[level]);
     }
     return is_sane;
 }
@@ -471,7 +471,7 @@ static bool are_levels_sane(const governor_t *self)
 {
     bool is_sane = true;
     for (unsigned i = 0; i < GOVERNOR_CHANNELS; i++) {
-        is_sane = is_sane && is_track_sane(&self->out[i]);
+        is_sane = is_sane && is_track_sane(&self->out[i]) && sane_q32(self->asked_q32[i]) && sane_q32(self->behind_q32[i]);
         for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
             is_sane = is_sane && sane_q32(self->level_q32[level][i]) && is_track_sane(&self->track[level][i]);
         }
@@ -481,10 +481,11 @@ static bool are_levels_sane(const governor_t *self)
 
 static bool are_needs_sane(const governor_t *self)
 {
-    bool is_sane = self->span_us <= SPAN_US;
-    for (unsigned span = 0; span < GOVERNOR_SPANS; span++) {
+    bool is_sane = sane_bool(&self->is_slowed) && self->begun_us <= BEGIN_US + 2000000u * LOOK_US;
+    for (unsigned i = 0; i < GOVERNOR_EVENTS; i++) {
+        is_sane = is_sane && self->event[i].age_us <= MEMORY_US + 2000000u * LOOK_US;
         for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
-            is_sane = is_sane && self->need_q16[span][level] >= 0 && self->need_q16[span][level] <= 2 * NEED_MAX;
+            is_sane = is_sane && self->event[i].need_q16[level] >= 0 && self->event[i].need_q16[level] <= 2 * GOVERNOR_NEED_MAX;
         }
     }
     return is_sane;

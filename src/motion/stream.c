@@ -8,6 +8,7 @@
 #include "stream_control.h"
 #include "stream_curve.h"
 #include "stream_evidence.h"
+#include "stream_predictor.h"
 #include "stream_repeat.h"
 
 #define PACE_GAIN_DIV        8                  /* a rate correction of 1/8 per period of error ... */
@@ -168,9 +169,9 @@ static int32_t telling(const stream_t *self, unsigned periods, q32_t ahead_q32)
 }
 
 /* What a long interval was: a loss where time and value agree, else a pause of the sender. */
-static void note_loss(stream_t *self, unsigned by_time, unsigned periods, q32_t misfit_q32)
+static void note_loss(stream_t *self, const stream_predictor_t *predictor, unsigned by_time, unsigned periods, q32_t misfit_q32)
 {
-    const q32_t apart_q32 = stream_evidence_apart(&self->evidence, &self->curve.governor, by_time, by_time - 1);
+    const q32_t apart_q32 = stream_evidence_apart(&self->evidence, &self->curve.governor, predictor, by_time, by_time - 1);
     if (by_time < 2 || (misfit_q32 + self->misfit_q32) * TELLING >= apart_q32) {
         return;
     }
@@ -200,21 +201,24 @@ static unsigned judge_periods(stream_t *self, uint64_t now_us, const q32_t *samp
         return by_time;
     }
     unsigned best = by_time;
-    const q32_t expected_q32 = stream_evidence_misfit(seen, scale, by_time, sample_q32);
+    const stream_predictor_t parabola = {2 * Q32_ONE, -Q32_ONE};
+    const stream_predictor_t predictor = stream_predictor_fit(&self->curve, parabola);
+    const q32_t expected_q32 = stream_evidence_misfit(seen, scale, &predictor, by_time, sample_q32);
     q32_t least_q32 = expected_q32;
     for (unsigned periods = 1; periods <= JUDGED_MAX && periods * Q32_ONE <= ahead_q32 + early_q32; periods++) {
-        const q32_t misfit_q32 = stream_evidence_misfit(seen, scale, periods, sample_q32);
-        const q32_t apart_q32 = stream_evidence_apart(seen, scale, periods, by_time);
+        const q32_t misfit_q32 = stream_evidence_misfit(seen, scale, &predictor, periods, sample_q32);
+        const q32_t apart_q32 = stream_evidence_apart(seen, scale, &predictor, periods, by_time);
         const q32_t doubt_q32 = misfit_q32 + self->misfit_q32;
         if (doubt_q32 * telling(self, periods, ahead_q32) < apart_q32 && misfit_q32 < least_q32) {
             least_q32 = misfit_q32;
             best = periods;
         }
     }
-    note_loss(self, by_time, best, least_q32);
+    note_loss(self, &predictor, by_time, best, least_q32);
     self->misfit_q32 += (least_q32 - self->misfit_q32) / MISFIT_MEMORY;
     const q32_t advance_q32 = advance_of(self, sample_q32);
-    if (is_even && best == by_time && expected_q32 * TELLING > stream_evidence_apart(seen, scale, by_time, by_time + 1) &&
+    if (is_even && best == by_time &&
+        expected_q32 * TELLING > stream_evidence_apart(seen, scale, &predictor, by_time, by_time + 1) &&
         fx_abs(ahead_q32 - best * Q32_ONE) > stream_clock_jitter(&self->clock) + BESIDE_Q32 &&
         fx_abs(advance_q32 - ahead_q32) < CLEAR_Q32) {
         *shift_q32 = advance_q32 - best * Q32_ONE;

@@ -31,8 +31,7 @@ enum {
 #define REACH_MAX_US  100000 /* ... and longer only as far as the axis takes to stop: so long at most */
 #define OFF_US        80000
 #define PATIENCE_US   300000
-#define WAY_SHIFT     4       /* from Q32 to Q36 */
-#define FITTED_US     100000u /* length of the samples that tell whether a motion oscillates */
+#define WAY_SHIFT     4 /* from Q32 to Q36 */
 
 static void copy_point(const stream_curve_t *self, q32_t *to_q32, const q32_t *from_q32)
 {
@@ -172,7 +171,6 @@ void stream_curve_pace(stream_curve_t *self, stream_style_t style, uint32_t peri
     self->reach_max_q16 = (int32_t)((int64_t)REACH_MAX_US * Q16_ONE / period_us);
     self->softest_q32 = fx_clamp((int64_t)period_us * Q32_ONE / OFF_US, Q32_ONE / 32, Q32_ONE / 2);
     self->patience = (int32_t)(PATIENCE_US / period_us) + 3;
-    self->fitted = (uint32_t)fx_clamp(FITTED_US / period_us, STREAM_CURVE_FITTED_MIN, STREAM_CURVE_FITTED_MAX);
     stream_control_set_mean(self, period_us);
     governor_pace(&self->governor, period_us, cycle_us);
     set_window(self, stream_control_window(self));
@@ -293,7 +291,7 @@ HV_WRAPS static void give_up(stream_curve_t *self)
         copy_point(self, self->point_q32[stream_points_slot(self->head - (uint32_t)back)], self->last_q32);
     }
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        self->lead[axis] = (stream_lead_t){.rise_q32 = 0};
+        self->lead[axis] = (stream_lead_t){0};
     }
     keep_going(self);
     stream_offset_soften_to_limits(self);
@@ -340,7 +338,7 @@ static void govern(stream_curve_t *self, const kin_t *kin, q32_t asked_q32[AXES_
     q32_t channel_q32[GOVERNOR_CHANNELS];
     if (!find_channels(self, kin, asked_q32, channel_q32)) {
         for (unsigned i = POSE_AXES; i < GOVERNOR_CHANNELS; i++) {
-            channel_q32[i] = self->governor.level_q32[0][i]; /* there is no such pose: only the axes count */
+            channel_q32[i] = self->governor.asked_q32[i]; /* there is no such pose: only the axes count */
         }
     }
     governor_step(&self->governor, channel_q32, self->scale_q16, channel_q32);

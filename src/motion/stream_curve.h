@@ -8,16 +8,13 @@
 
 #include "heave/stream.h"
 
-#define STREAM_CURVE_LED_Q32      (Q32_ONE * 7 / 10) /**< periods that control points are led ahead of their points, if balanced */
-#define STREAM_CURVE_PULL_MAX_Q32 (2 * Q32_ONE)      /**< of a motion to and fro in four samples: of fewer they tell none */
+#define STREAM_CURVE_LED_Q32 (Q32_ONE * 7 / 10) /**< periods that control points are led ahead of their points, if balanced */
 
 enum {
     STREAM_CURVE_AGE_MAX = 100,  /**< samples after which an axis may move as fast as it can */
     STREAM_CURVE_AHEAD_MAX = 28, /**< samples kept that are not committed; the ring has room for the longest mean of led points
                                       behind them */
-    STREAM_CURVE_FITTED_MIN = 8, /**< points that a motion to and fro is found from */
-    STREAM_CURVE_FITTED_MAX = 24,
-    STREAM_CURVE_MEAN_MAX = 5 /**< points of which one is the mean, where samples belong to their arrivals */
+    STREAM_CURVE_MEAN_MAX = 5    /**< points of which one is the mean, where samples belong to their arrivals */
 };
 
 /** A curve that has always rested on the sample. */

@@ -36,11 +36,17 @@ static bool is_quantum_sane(const stream_quantum_t *grain)
 
 static bool is_lead_sane(const stream_lead_t *lead)
 {
-    return stream_sane_within(lead->first_q32, -POINT_Q32, POINT_Q32) &&
-           stream_sane_within(lead->go_q32, -POINT_Q32, POINT_Q32) && lead->rise_q32 <= Q32_ONE / 2 &&
-           stream_sane_within(lead->reach_q16, 0, REACH_MAX) && stream_sane_within(lead->full_q16, 0, lead->reach_q16) &&
-           stream_sane_within(lead->bend_q32, -POINT_Q32, POINT_Q32) &&
-           stream_sane_within(lead->pull_q32, 0, STREAM_CURVE_PULL_MAX_Q32);
+    return stream_sane_within(lead->step_q32, -2 * POINT_Q32, 2 * POINT_Q32) &&
+           stream_sane_within(lead->before_q32, -2 * POINT_Q32, 2 * POINT_Q32) &&
+           stream_sane_within(lead->most_q32, 0, 8 * POINT_Q32) &&
+           stream_sane_within(lead->first_q32, -lead->most_q32, lead->most_q32) && lead->rise_q32 <= Q32_ONE / 2 &&
+           stream_sane_within(lead->reach_q16, 0, REACH_MAX) && stream_sane_within(lead->full_q16, 0, lead->reach_q16);
+}
+
+static bool is_predictor_sane(const stream_predictor_t *predictor)
+{
+    return stream_sane_within(predictor->by_newest_q32, -Q32_ONE, 2 * Q32_ONE) &&
+           stream_sane_within(predictor->by_before_q32, -Q32_ONE, Q32_ONE);
 }
 
 /* The weights of a mean of coarse values are so many in sum. */
@@ -63,14 +69,13 @@ static bool is_pace_sane(const stream_curve_t *curve, stream_style_t style, bool
 {
     if (!is_running && curve->period_cycles_q16 == 0) {
         return curve->lead_q32 == 0 && curve->reach_min_q16 == 0 && curve->reach_max_q16 == 0 && curve->softest_q32 == 0 &&
-               curve->patience == 0 && curve->fitted == 0;
+               curve->patience == 0;
     }
     return stream_sane_within(curve->period_cycles_q16, CYCLES_MIN, CYCLES_MAX) &&
            curve->lead_q32 == (style == STREAM_BALANCED ? STREAM_CURVE_LED_Q32 : 0) &&
            stream_sane_within(curve->reach_min_q16, 0, REACH_MAX) && stream_sane_within(curve->reach_max_q16, 0, REACH_MAX) &&
            stream_sane_within(curve->softest_q32, SOFT_MIN_Q32, GRIP_MAX_Q32) &&
-           stream_sane_within(curve->patience, 1, PATIENCE_MAX) &&
-           stream_sane_within(curve->fitted, STREAM_CURVE_FITTED_MIN, STREAM_CURVE_FITTED_MAX);
+           stream_sane_within(curve->patience, 1, PATIENCE_MAX);
 }
 
 static bool are_axes_sane(const stream_curve_t *curve)
@@ -93,8 +98,8 @@ static bool are_axes_sane(const stream_curve_t *curve)
 bool stream_curve_is_sane(const stream_curve_t *saved, const stream_curve_t *prepared, stream_style_t style, bool is_running)
 {
     return saved->axes == prepared->axes && are_points_sane(saved) && are_axes_sane(saved) && is_mean_sane(saved, is_running) &&
-           is_pace_sane(saved, style, is_running) && saved->watched <= STREAM_QUANTUM_WATCH &&
-           stream_sane_within(saved->change, 0, GUESSES_MAX) && sane_bool(&saved->is_off) &&
-           stream_sane_within(saved->grip_q32, 0, GRIP_MAX_Q32) && stream_sane_within(saved->age, 0, STREAM_CURVE_AGE_MAX) &&
-           stream_sane_within(saved->scale_q16, 0, 2 * Q16_ONE);
+           is_pace_sane(saved, style, is_running) && is_predictor_sane(&saved->predictor) &&
+           saved->watched <= STREAM_QUANTUM_WATCH && stream_sane_within(saved->change, 0, GUESSES_MAX) &&
+           sane_bool(&saved->is_off) && stream_sane_within(saved->grip_q32, 0, GRIP_MAX_Q32) &&
+           stream_sane_within(saved->age, 0, STREAM_CURVE_AGE_MAX) && stream_sane_within(saved->scale_q16, 0, 2 * Q16_ONE);
 }

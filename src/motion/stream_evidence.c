@@ -6,6 +6,8 @@
  */
 #include "stream_evidence.h"
 
+#include "stream_predictor.h"
+
 #define MEMORY_SHIFT 5                /* 2^6 samples */
 #define LEAST_Q32    (Q32_ONE / 4096) /* sum(p p) that tells anything: 1/64 of the way of a period at the speed limit */
 #define EVEN_Q32     (Q32_ONE / 5)    /* below that share values are even, ... */
@@ -17,7 +19,10 @@
 #define LATE_MAX_Q32  Q32_ONE
 #define NEAR_Q32      (Q32_ONE / 4) /* samples that came closer to each other tell no speed */
 
-enum { MIDDLE = STREAM_EVIDENCE / 2 };
+enum {
+    MIDDLE = STREAM_EVIDENCE / 2,
+    LED_MAX = 6 /* periods that a motion is led on: after more, a value does not tell how many */
+};
 
 void stream_evidence_reset(stream_evidence_t *self, bool keep_weight)
 {
@@ -145,14 +150,20 @@ q32_t stream_evidence_on_line(const stream_evidence_t *self, unsigned axis)
 }
 
 /* Where the motion of the newest three samples leads in so many periods, from the newest one. */
-static q32_t way_in(const stream_evidence_t *self, unsigned axis, unsigned periods)
+static q32_t way_in(const stream_evidence_t *self, const stream_predictor_t *predictor, unsigned axis, unsigned periods)
 {
     const int32_t h1 = self->index[1] > 0 ? self->index[1] : 1;
     const int32_t h2 = self->index[2] > self->index[1] ? self->index[2] - self->index[1] : 1;
-    const q32_t step_q32 = (self->value_q32[0][axis] - self->value_q32[1][axis]) / h1;
-    const q32_t bend_q32 = (step_q32 - (self->value_q32[1][axis] - self->value_q32[2][axis]) / h2) * 2 / (h1 + h2);
-    const int32_t n = (int32_t)periods;
-    return n * step_q32 + (q32_t)(n * (n + h1) / 2) * bend_q32;
+    q32_t step_q32 = (self->value_q32[0][axis] - self->value_q32[1][axis]) / h1;
+    q32_t before_q32 = (self->value_q32[1][axis] - self->value_q32[2][axis]) / h2;
+    q32_t way_q32 = 0;
+    for (unsigned i = 0; i < periods && i < LED_MAX; i++) {
+        const q32_t next_q32 = stream_predictor_next(predictor, step_q32, before_q32);
+        before_q32 = step_q32;
+        step_q32 = next_q32;
+        way_q32 += next_q32;
+    }
+    return way_q32;
 }
 
 static q32_t in_speed_limits(const governor_t *governor, unsigned axis, q32_t travel_q32)
@@ -160,21 +171,23 @@ static q32_t in_speed_limits(const governor_t *governor, unsigned axis, q32_t tr
     return fx_clamp(fx_mul_shift(fx_abs(travel_q32), governor->per_limit_q62[axis][0], 30), 0, 256 * Q32_ONE);
 }
 
-q32_t stream_evidence_misfit(const stream_evidence_t *self, const governor_t *governor, unsigned periods, const q32_t *sample_q32)
+q32_t stream_evidence_misfit(const stream_evidence_t *self, const governor_t *governor, const stream_predictor_t *predictor,
+                             unsigned periods, const q32_t *sample_q32)
 {
     q32_t sum_q32 = 0;
     for (unsigned axis = 0; axis < self->axes && axis < POSE_AXES; axis++) {
         const q32_t travel_q32 = sample_q32[axis] - self->value_q32[0][axis];
-        sum_q32 += in_speed_limits(governor, axis, travel_q32 - way_in(self, axis, periods));
+        sum_q32 += in_speed_limits(governor, axis, travel_q32 - way_in(self, predictor, axis, periods));
     }
     return sum_q32;
 }
 
-q32_t stream_evidence_apart(const stream_evidence_t *self, const governor_t *governor, unsigned a, unsigned b)
+q32_t stream_evidence_apart(const stream_evidence_t *self, const governor_t *governor, const stream_predictor_t *predictor,
+                            unsigned a, unsigned b)
 {
     q32_t sum_q32 = 0;
     for (unsigned axis = 0; axis < self->axes && axis < POSE_AXES; axis++) {
-        sum_q32 += in_speed_limits(governor, axis, way_in(self, axis, a) - way_in(self, axis, b));
+        sum_q32 += in_speed_limits(governor, axis, way_in(self, predictor, axis, a) - way_in(self, predictor, axis, b));
     }
     return sum_q32;
 }

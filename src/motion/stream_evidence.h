@@ -23,11 +23,12 @@ void stream_evidence_take(stream_evidence_t *self, const governor_t *governor, u
 q32_t stream_evidence_on_line(const stream_evidence_t *self, unsigned axis);
 
 /** How far a sample is from where the motion of the last three leads in so many periods, in shares of the axes' speed limits. */
-q32_t stream_evidence_misfit(const stream_evidence_t *self, const governor_t *governor, unsigned periods,
-                             const q32_t *sample_q32);
+q32_t stream_evidence_misfit(const stream_evidence_t *self, const governor_t *governor, const stream_predictor_t *predictor,
+                             unsigned periods, const q32_t *sample_q32);
 
 /** How far apart are where it leads in so many periods, and in so many. */
-q32_t stream_evidence_apart(const stream_evidence_t *self, const governor_t *governor, unsigned a, unsigned b);
+q32_t stream_evidence_apart(const stream_evidence_t *self, const governor_t *governor, const stream_predictor_t *predictor,
+                            unsigned a, unsigned b);
 
 /** True if a sample equals the newest one in all axes. */
 bool stream_evidence_is_newest(const stream_evidence_t *self, unsigned axes, const q32_t *sample_q32);

@@ -5,9 +5,9 @@
 
 #include "stream_curve.h"
 #include "stream_points.h"
+#include "stream_predictor.h"
 
-#define FITTED_Q32 (Q32_ONE * 1024)  /* as far from the newest point, and no further, the sums are exact */
-#define SWING_Q32  (Q32_ONE * 5 / 2) /* (2 pi f)^2 in the time of the points that are fitted: 2.5 Hz in 0.1 s */
+enum { LARGEST_OF = 12 /* newest steps: what is guessed is hardly larger than the largest of them */ };
 
 /* Periods that a motion may be kept up so that it does not go further than the axis takes to stop: of v = step / period, the time
  * is sqrt(v / J), or half of v / A + A / J where the acceleration binds. Also the share of such a stop in which A builds up. */
@@ -50,109 +50,44 @@ q32_t stream_guess_within_speed(const stream_curve_t *self, unsigned axis, q32_t
     return limits->jerk_per_cycle3_q32 > 0 ? fx_clamp(step_q32, -least_q32, least_q32) : step_q32;
 }
 
-/* Where the motion of the last samples goes in one period. A jump is not taken for a motion: one just made would go on (hence at
- * most 4 x the larger of the two steps before), one made before would be undone (hence the bend, where it turned, at most the
- * step). */
-HV_WRAPS static q32_t lead(const stream_curve_t *self, unsigned axis)
+/* How large a step after the newest ones may be: twice the second largest of them. The largest may be a jump,
+ * which is no motion that goes on. */
+static q32_t largest_step(const stream_curve_t *self, unsigned axis, const q32_t step_q32[LARGEST_OF])
 {
-    const uint32_t last = stream_points_newest(self);
-    q32_t step[3];
-    for (uint32_t i = 0; i < 3; i++) {
-        step[i] = self->point_q32[stream_points_slot(last - i)][axis] - self->point_q32[stream_points_slot(last - i - 1)][axis];
+    q32_t largest_q32 = 0;
+    q32_t second_q32 = 0;
+    for (unsigned i = 0; i < LARGEST_OF; i++) {
+        const q32_t size_q32 = fx_abs(step_q32[i]);
+        const q32_t smaller_q32 = size_q32 < largest_q32 ? size_q32 : largest_q32;
+        second_q32 = smaller_q32 > second_q32 ? smaller_q32 : second_q32;
+        largest_q32 = size_q32 > largest_q32 ? size_q32 : largest_q32;
     }
-    const q32_t bend = step[0] - step[1];
-    const bool has_turned = (bend > 0) != (step[1] - step[2] > 0);
-    const q32_t bend_max = has_turned ? fx_abs(step[0]) : fx_abs(bend);
-    const q32_t before = fx_abs(step[1]) > fx_abs(step[2]) ? fx_abs(step[1]) : fx_abs(step[2]);
-    return fx_clamp(step[0] + fx_clamp(bend, -bend_max, bend_max), -4 * before, 4 * before);
+    return stream_guess_within_speed(self, axis, 2 * second_q32);
 }
 
-/** Sums over points and their second differences, as far as a line through them takes. Products are Q32 as well. */
-typedef struct {
-    int64_t y, d, yy, yd, dd;
-    int64_t up_q32, down_q32; /**< ways to either side */
-} fit_sums_t;
-
-HV_WRAPS static fit_sums_t sum_up(const stream_curve_t *self, unsigned axis)
+/* The next step of the motion. */
+static q32_t next_step(const stream_curve_t *self, const stream_lead_t *on)
 {
-    fit_sums_t sums = {0};
-    const uint32_t last = stream_points_newest(self);
-    const q32_t from_q32 = self->point_q32[stream_points_slot(last)][axis];
-    for (uint32_t back = 1; back <= self->fitted; back++) {
-        const q32_t here_q32 = self->point_q32[stream_points_slot(last - back)][axis];
-        const q32_t after_q32 = self->point_q32[stream_points_slot(last - back + 1)][axis];
-        const q32_t before_q32 = self->point_q32[stream_points_slot(last - back - 1)][axis];
-        const q32_t y = fx_clamp(here_q32 - from_q32, -FITTED_Q32, FITTED_Q32);
-        const q32_t d = fx_clamp((after_q32 - here_q32) - (here_q32 - before_q32), -FITTED_Q32, FITTED_Q32);
-        const q32_t step_q32 = fx_clamp(here_q32 - before_q32, -FITTED_Q32, FITTED_Q32);
-        sums.up_q32 += step_q32 > 0 ? step_q32 : 0;
-        sums.down_q32 -= step_q32 < 0 ? step_q32 : 0;
-        sums.y += y;
-        sums.d += d;
-        sums.yy += fx_mul_shift(y, y, 32);
-        sums.yd += fx_mul_shift(y, d, 32);
-        sums.dd += fx_mul_shift(d, d, 32);
-    }
-    const int64_t n = self->fitted;
-    sums.yy -= fx_mul_shift(sums.y, sums.y, 32) / n;
-    sums.yd -= fx_mul_shift(sums.y, sums.d, 32) / n;
-    sums.dd -= fx_mul_shift(sums.d, sums.d, 32) / n;
-    return sums;
-}
-
-/* A motion to and fro about a middle m turns back by k (m - x) in each period: the line through its second differences over its
- * values, by least squares. It counts where it tells most of what the differences do, and where the motion has turned. A motion
- * that goes on straight, or whose differences are the noise of arrivals, is none. */
-static void find_swing(const stream_curve_t *self, unsigned axis, stream_lead_t *on)
-{
-    const fit_sums_t sums = sum_up(self, axis);
-    const int64_t n = self->fitted;
-    on->pull_q32 = 0;
-    on->bend_q32 = 0;
-    const int64_t less_q32 = sums.up_q32 < sums.down_q32 ? sums.up_q32 : sums.down_q32;
-    const int64_t more_q32 = sums.up_q32 < sums.down_q32 ? sums.down_q32 : sums.up_q32;
-    if (sums.yy <= 0 || sums.yd >= 0 || less_q32 < more_q32 / 2) {
-        return;
-    }
-    const int64_t pull_q32 = fx_clamp(fx_mul_div(-sums.yd, Q32_ONE, sums.yy), 0, STREAM_CURVE_PULL_MAX_Q32);
-    const bool is_quick =
-        pull_q32 * n * n >= SWING_Q32; /* slower ones turn once in a while: their differences are mostly noise */
-    if (is_quick && fx_mul_shift(-sums.yd, pull_q32, 32) >= sums.dd / 4 * 3) {
-        on->pull_q32 = pull_q32;
-        on->bend_q32 = sums.d / n + fx_mul_shift(sums.y / n, pull_q32, 32);
-    }
+    return fx_clamp(stream_predictor_next(&self->predictor, on->step_q32, on->before_q32), -on->most_q32, on->most_q32);
 }
 
 HV_WRAPS void stream_guess_begin(stream_curve_t *self)
 {
+    const uint32_t newest = stream_points_newest(self);
+    self->predictor = stream_predictor_fit(self, (stream_predictor_t){.by_newest_q32 = Q32_ONE}); /* even */
     for (unsigned axis = 0; axis < self->axes; axis++) {
         stream_lead_t *on = &self->lead[axis];
-        const q32_t step_q32 =
-            fx_abs(self->last_q32[axis] - self->point_q32[stream_points_slot(stream_points_newest(self) - 1)][axis]);
-        on->first_q32 = stream_guess_within_speed(self, axis, lead(self, axis));
-        on->go_q32 = fx_clamp(on->first_q32, -step_q32, step_q32);
-        find_swing(self, axis, on);
-        if (on->pull_q32 != 0) {
-            const q32_t newest_step_q32 =
-                self->last_q32[axis] - self->point_q32[stream_points_slot(stream_points_newest(self) - 1)][axis];
-            on->go_q32 = stream_guess_within_speed(self, axis, newest_step_q32);
+        q32_t step_q32[LARGEST_OF];
+        for (uint32_t i = 0; i < LARGEST_OF; i++) {
+            step_q32[i] =
+                self->point_q32[stream_points_slot(newest - i)][axis] - self->point_q32[stream_points_slot(newest - i - 1)][axis];
         }
-        find_reach(self, axis, fx_abs(on->go_q32), on);
+        on->step_q32 = step_q32[0];
+        on->before_q32 = step_q32[1];
+        on->most_q32 = largest_step(self, axis, step_q32);
+        on->first_q32 = next_step(self, on);
+        find_reach(self, axis, stream_guess_within_speed(self, axis, fx_abs(step_q32[0])), on);
     }
-}
-
-/* How far a motion to and fro gets in that time, if it gets no faster. */
-static q32_t swing_q32(const stream_lead_t *on, int64_t time_q16)
-{
-    const q32_t most_q32 = fx_abs(on->go_q32);
-    q32_t way_q32 = 0;
-    q32_t step_q32 = on->go_q32;
-    for (; time_q16 > 0; time_q16 -= Q16_ONE) {
-        step_q32 += on->bend_q32 - fx_mul_shift(way_q32, on->pull_q32, 32);
-        step_q32 = fx_clamp(step_q32, -most_q32, most_q32);
-        way_q32 += time_q16 >= Q16_ONE ? step_q32 : fx_mul_shift(step_q32, time_q16, 16);
-    }
-    return way_q32;
 }
 
 /* What a stop has lost so far against a motion that goes on, up to the middle of it: the acceleration rises, then stays. Time and
@@ -181,18 +116,17 @@ static int64_t way_q16(const stream_lead_t *on, int64_t periods)
     return full_q16 + fx_mul_shift(travel_q32, stop_q16, 32);
 }
 
-/* The point so many periods beyond the newest sample: the motion goes on, ever more slowly. */
+/* The motion goes on, ever more slowly. */
 HV_WRAPS void stream_guess_point(stream_curve_t *self, int32_t periods)
 {
-    q32_t *const point_q32 = self->point_q32[stream_points_slot(stream_points_newest(self) + (uint32_t)periods)];
+    const uint32_t index = stream_points_newest(self) + (uint32_t)periods;
     for (unsigned axis = 0; axis < self->axes; axis++) {
-        const stream_lead_t *on = &self->lead[axis];
-        const int64_t first_q16 = way_q16(on, 1);
-        if (on->pull_q32 != 0) {
-            point_q32[axis] = self->last_q32[axis] + swing_q32(on, way_q16(on, periods));
-            continue;
-        }
-        point_q32[axis] = self->last_q32[axis] + fx_mul_shift(on->first_q32, first_q16, 16) +
-                          fx_mul_shift(on->go_q32, way_q16(on, periods) - first_q16, 16);
+        stream_lead_t *on = &self->lead[axis];
+        const q32_t step_q32 = next_step(self, on);
+        const int64_t share_q16 = way_q16(on, periods) - way_q16(on, periods - 1);
+        self->point_q32[stream_points_slot(index)][axis] =
+            self->point_q32[stream_points_slot(index - 1)][axis] + fx_mul_shift(step_q32, share_q16, 16);
+        on->before_q32 = on->step_q32;
+        on->step_q32 = step_q32;
     }
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * stream_guess.h - points of a stream's curve where samples are missing: the motion of the last samples goes on for a while and
- * stops. A motion to and fro goes on as one. Private to src/motion; changes the points beyond the newest sample and `lead` alone.
+ * stream_guess.h - points of a stream's curve where samples are missing: the motion of the last samples goes on, as
+ * stream_predictor.h predicts it, for a while and stops. Private to src/motion; changes the points beyond the newest sample,
+ * `lead` and `predictor` alone.
  */
 #ifndef STREAM_GUESS_H
 #define STREAM_GUESS_H
@@ -10,7 +11,7 @@
 /** Looks where the motion of the newest samples leads. Before the first point that is guessed. */
 void stream_guess_begin(stream_curve_t *self);
 
-/** Guesses the point so many periods beyond the newest sample, at least 1. */
+/** Guesses the point so many periods beyond the newest sample: 1, then 2, and so on. */
 void stream_guess_point(stream_curve_t *self, int32_t periods);
 
 /** A step of one period, as far as the axis moves at most, and since the stream began at rest can move so far: what was asked may

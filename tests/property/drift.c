@@ -174,15 +174,18 @@ static void essence(motion_t *motion)
     stream_curve_t *curve = &stream->curve;
     for (unsigned i = 0; i < AXES_MAX; i++) {
         curve->lead[i] = (stream_lead_t){0};
+        curve->low_q32[i] = curve->high_q32[i] =
+            0; /* the recent range narrows for half a minute; off_q32, which it bounds, is compared */
     }
+    curve->predictor = (stream_predictor_t){0};
     curve->head = curve->watched = 0;
     curve->ahead = curve->patience = 0;
-    curve->fitted = 0;
     curve->period_cycles_q16 = curve->grip_q32 = curve->softest_q32 = 0;
     curve->reach_min_q16 = curve->reach_max_q16 = 0;
     governor_t *governor =
         &curve->governor; /* its levels, output and strength are compared; the rest is worked out from the period */
-    governor->span_us = governor->period_us = 0;
+    governor->period_us = governor->begun_us = 0;
+    memset(governor->event, 0, sizeof governor->event); /* when more was needed than there was */
     governor->fall_q32 = governor->strength_q32 == 0 ? 0 : governor->fall_q32;
     memset(governor->per_limit_q62, 0, sizeof governor->per_limit_q62);
     memset(governor->share_q32, 0, sizeof governor->share_q32);

@@ -138,11 +138,11 @@ def track(make_samples, worst_mm=1.5, size=40.0, hz=0.4, axis="z", decimals=3, s
     return make
 
 
-def cue(make_samples, sizes, bars=None, seconds=40.0, decimals=3, top_hz=6.0, knee_hz=0.35, of_limits=None, accel_share=None):
+def cue(make_samples, sizes, bars=None, seconds=40.0, decimals=3, top_hz=6.0, knee_hz=0.35, steep=2.0, of_limits=None, accel_share=None):
     """A motion cue on several axes. of_limits: scaled so that it uses this much of the limits."""
     def make(platform, chance):
         size = along(platform, **sizes)
-        signal = S.Cue(chance, platform.home, size, seconds, top_hz, knee_hz=knee_hz)
+        signal = S.Cue(chance, platform.home, size, seconds, top_hz, knee_hz=knee_hz, steep=steep)
         if of_limits:
             table = signal.table(rows(seconds), 1e-3)
             use = max(J.most(J.differences(column, order)) / limit for order in (1, 2, 3) for column, limit in zip(table, platform.limits[order - 1]))
@@ -396,6 +396,11 @@ def table(seed):
         put(f"shake {k}: {config} {direction}{' C' if space == 'C' else ''} {hz:.1f} Hz, {over:.2f} x {limit}, {rate} Hz", config,
             shake(round(hz, 2), round(over, 3), limit, rate, direction, space, rise=chance.choice((0, 2.0)), phase=chance.choice((0.0, 1.57))))
 
+    # the same through a network that loses some: what is guessed swings no further, either
+    for hz, over, limit in ((6.0, 3.3, "accel"), (3.6, 0.85, "jerk"), (4.7, 0.8, "jerk"), (5.3, 1.5, "jerk"), (2.3, 1.0, "accel"), (1.1, 1.3, "speed")):
+        put(f"lossy shake: z {hz} Hz, {over} x {limit}", LARGE,
+            shake(hz, over, limit, 60, seconds=30.0, make_sender=lambda c, r, s: via(2, 7, lambda c, s: S.dropped(S.even(60, s), c, 0.01))(c, s)))
+
     # senders as they are: 40 mm at 0.4 Hz
     for sigma_ms, bar in ((0.5, 0.5), (1, 0.5), (2, 0.8)):
         put(f"frame time 16.7 +- {sigma_ms} ms", LARGE, track(frame_times(60, sigma_ms), bar))
@@ -487,6 +492,11 @@ def table(seed):
     six = {"x": 60, "y": 60, "z": 60, "roll": 5, "pitch": 5, "yaw": 5}
     for hz, top_hz, share in ((120, 12.0, 0.7), (60, 6.0, 0.5)):
         put(f"recorded: six axes, {hz} Hz, three decimals", LARGE, cue(wired(even(hz)), six, recorded, 24.0, top_hz=top_hz, of_limits=share, accel_share=5))
+    # a ride that is bound by speed: near the limits as inside them; beyond them late by what the speed does not allow, and no more
+    for share, lag_ms, worst_mm in ((0.6, 40, 1), (0.9, 45, 3), (1.3, 60, 20)):
+        bars = {style: {"lag_ms": lag_ms, "worst_mm": worst_mm} for style in STYLES}
+        put(f"near the limits: six axes, {share} of them", LARGE,
+            cue(via(1, 3, even(60)), {"x": 80, "y": 80, "z": 60, "roll": 4, "pitch": 4, "yaw": 6}, bars, 30.0, knee_hz=0.75, steep=2.3, of_limits=share))
 
     # what is right today
     put("timed moves", LARGE, timed_moves())

@@ -306,7 +306,7 @@ static void test_stream_within_the_limits_is_not_smoothed(void)
             take(&target);
         }
         step(400);
-        TEST_ASSERT_TRUE(ms < 2500 || m_motion.stream.curve.governor.strength_q32 == 0);
+        TEST_ASSERT_TRUE(ms < 3200 || m_motion.stream.curve.governor.strength_q32 == 0);
     }
 }
 

@@ -243,16 +243,16 @@ static void test_a_curve_that_no_motion_has_is_refused(void)
     SPOIL(stream.curve.way_q36[2][6], INT64_MAX);
     SPOIL(stream.curve.off_q32[6][2], INT64_MAX);
     SPOIL(stream.curve.lead[3].first_q32, INT64_MAX);
-    SPOIL(stream.curve.lead[3].go_q32, INT64_MIN);
+    SPOIL(stream.curve.lead[3].step_q32, INT64_MIN);
+    SPOIL(stream.curve.lead[3].before_q32, INT64_MAX);
     SPOIL(stream.curve.lead[3].rise_q32, UINT32_MAX);
     SPOIL(stream.curve.lead[3].reach_q16, -1);
     SPOIL(stream.curve.lead[3].full_q16, INT32_MAX);
-    SPOIL(stream.curve.lead[3].bend_q32, INT64_MIN);
-    SPOIL(stream.curve.lead[3].pull_q32, -1);
+    SPOIL(stream.curve.lead[3].most_q32, -1);
+    SPOIL(stream.curve.predictor.by_newest_q32, 3 * Q32_ONE);
+    SPOIL(stream.curve.predictor.by_before_q32, -2 * Q32_ONE);
     SPOIL(stream.curve.low_q32[6], INT64_MIN);
     SPOIL(stream.curve.high_q32[0], INT64_MAX);
-    SPOIL(stream.curve.fitted, 0);
-    SPOIL(stream.curve.fitted, 25);
     SPOIL(stream.curve.grain[6].quantum_q32, -1);
     SPOIL(stream.curve.grain[6].found_q32, INT64_MAX);
     SPOIL(stream.curve.grain[6].step_q32, INT64_MIN);
@@ -294,8 +294,12 @@ static void test_a_curve_that_no_motion_has_is_refused(void)
     SPOIL(stream.curve.governor.since, UINT32_MAX);
     SPOIL(stream.curve.governor.track[7][11].acc_q32, INT64_MAX);
     SPOIL(stream.curve.governor.out[11].vel_q32, INT64_MIN);
-    SPOIL(stream.curve.governor.need_q16[3][7], -1);
-    SPOIL(stream.curve.governor.span_us, UINT32_MAX);
+    SPOIL(stream.curve.governor.event[3].need_q16[7], -1);
+    SPOIL(stream.curve.governor.event[7].age_us, UINT32_MAX);
+    SPOIL(stream.curve.governor.asked_q32[11], INT64_MAX);
+    SPOIL(stream.curve.governor.behind_q32[0], INT64_MIN);
+    SPOIL_BOOL(stream.curve.governor.is_slowed);
+    SPOIL(stream.curve.governor.begun_us, UINT32_MAX);
     SPOIL(stream.curve.governor.target_q32, -1);
     SPOIL(stream.curve.governor.pole_q32[2], 8 * Q32_ONE); /* no level is there */
     SPOIL(stream.curve.governor.fall_q32, -1);
@@ -387,13 +391,13 @@ static void test_no_member_is_forgotten(void)
     }
     TEST_ASSERT_EQUAL(256, sizeof(stream_clock_t));
     TEST_ASSERT_EQUAL(424, sizeof(stream_evidence_t));
-    TEST_ASSERT_EQUAL(9560, sizeof(stream_curve_t));
+    TEST_ASSERT_EQUAL(9928, sizeof(stream_curve_t));
     TEST_ASSERT_EQUAL(48, sizeof(stream_lead_t));
     TEST_ASSERT_EQUAL(32, sizeof(stream_quantum_t));
     TEST_ASSERT_EQUAL(88, sizeof(stream_thin_t));
     TEST_ASSERT_EQUAL(40, sizeof(stream_repeat_t));
-    TEST_ASSERT_EQUAL(10624, sizeof(stream_t));
-    TEST_ASSERT_EQUAL(4248, sizeof(governor_t));
+    TEST_ASSERT_EQUAL(10992, sizeof(stream_t));
+    TEST_ASSERT_EQUAL(4608, sizeof(governor_t));
     TEST_ASSERT_EQUAL(392, sizeof(spike_filter_t));
     TEST_ASSERT_EQUAL(144, sizeof(fade_t));
     TEST_ASSERT_EQUAL(584, sizeof(sync_stop_t));
@@ -401,7 +405,7 @@ static void test_no_member_is_forgotten(void)
     TEST_ASSERT_EQUAL(344, sizeof(motion_straight_t));
     TEST_ASSERT_EQUAL(64, sizeof(scurve_t));
     TEST_ASSERT_EQUAL(168, sizeof(intensity_t));
-    TEST_ASSERT_EQUAL(17208, sizeof(motion_t));
+    TEST_ASSERT_EQUAL(17576, sizeof(motion_t));
 }
 
 int main(void)
