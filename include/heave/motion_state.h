@@ -94,7 +94,8 @@ struct motion {
     q32_t angle_target_deg_q32;
     uint64_t last_us;        /**< arrival of the last target */
     uint32_t last_stated_us; /**< period that it stated, 0 = none */
-    uint32_t last_gap_us;    /**< interval before it if it stated a period; else 0 */
+    uint32_t last_gap_us;    /**< interval before it, if it is as short as one of a stream; else 0 */
+    bool is_time_idle;       /**< targets have come long before the time had passed that the one before them stated */
     uint64_t timed_end_us;
     int64_t timed_share_q46;       /**< intensity used for planning the move */
     q32_t timed_way_q32[AXES_MAX]; /**< from neutral to the target of the sender, before intensity */

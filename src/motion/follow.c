@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * follow.c - following a sender.
  *
- * Poses: references of the pose axes, scaled by intensity -> ramps -> workspace -> inverse kinematics -> references of the
- * cylinders. Extensions: the references go to the cylinders as they are. When the space changes, forward kinematics of the last
- * three set-points gives the pose axes their position, velocity and acceleration, so that nothing jumps. At a take-over the
- * references are faded in (fade.h) before the ramps, so that all limits hold then too.
+ * Poses: references of the pose axes, scaled by intensity -> ramps -> workspace -> inverse kinematics -> references of cylinders.
+ * Extensions go to the cylinders as they are. When the space changes, forward kinematics of the last three set-points gives the
+ * pose axes their position, velocity and acceleration. At a take-over the references are faded in (fade.h) before the ramps.
  */
 #include "follow.h"
 
@@ -17,7 +16,7 @@
 #define INSTANT_MS     5                         /* no move is this short: frames with such a T ... */
 #define INSTANT_GAP_US 20000                     /* ... that follow each other so closely are a stream like frames without T */
 #define HIDDEN_Q58     ((int64_t)1 << (58 - 10)) /* a share of 1/1024 */
-#define PERIODS_STATED 5                         /* a streaming sender writes at most this many periods as T */
+#define PERIODS_STATED 5 /* so many periods a streaming sender may write as T, and more if it does not mean T */
 
 bool follow_is_moving(const motion_t *self)
 {
@@ -123,14 +122,14 @@ static bool is_instant(const motion_t *self, const motion_target_t *target, uint
            (target->time_ms <= INSTANT_MS && (now_us - self->last_us <= INSTANT_GAP_US || period_us <= INSTANT_GAP_US));
 }
 
-/* Targets with a time that follow each other as quickly and as evenly as those of a stream, whatever time they state. */
+/* Targets that follow each other as quickly and as evenly as those of a stream, whatever time they state. */
 static bool is_in_a_row(const motion_t *self, uint64_t gap_us)
 {
     return self->last_gap_us > 0 && gap_us <= STREAM_PERIOD_MAX_US && is_about(gap_us, self->last_gap_us);
 }
 
-/* A timed target is a sample of a stream if its time is about the period of the one that runs, or some periods, or if targets
- * follow each other in about the time that both state, or three of them evenly. */
+/* A timed target is a sample of a stream if its time is about the period of the one that runs, or if it comes at that one's pace
+ * and its time is some periods, or not meant; or if targets follow each other in the time that both state, or three evenly. */
 static bool is_stream_sample(const motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
     const uint32_t stated_us = period_stated(target);
@@ -142,8 +141,10 @@ static bool is_stream_sample(const motion_t *self, const motion_target_t *target
         return false;
     }
     if (stream_goes_on(&self->stream, now_us)) {
-        return is_about(stated_us, stream_period_us(&self->stream)) || is_about(stated_us, stream_frame_us(&self->stream)) ||
-               (stated_us <= PERIODS_STATED * stream_period_us(&self->stream) && stated_us == self->last_stated_us);
+        const uint32_t period_us = stream_period_us(&self->stream);
+        const uint32_t interval_us = stream_frame_us(&self->stream);
+        return is_about(stated_us, period_us) || is_about(stated_us, interval_us) ||
+               (gap_us * 2 <= interval_us * 5 && (stated_us <= PERIODS_STATED * period_us || self->is_time_idle));
     }
     return is_in_a_row(self, gap_us) || (is_about(gap_us, stated_us) && is_about(gap_us, self->last_stated_us));
 }
@@ -193,6 +194,7 @@ static void change_space(motion_t *self, motion_space_t space)
     self->is_space_new = true;
     self->last_stated_us = 0;
     self->last_gap_us = 0;
+    self->is_time_idle = false;
     self->source = MOTION_STREAMED;
     stream_reset(&self->stream);
     for (unsigned i = 0; i < AXES_MAX; i++) {
@@ -265,7 +267,10 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
     const bool is_sample = is_stream_sample(self, target, now_us);
     const uint64_t gap_us = now_us - self->last_us;
     const uint32_t hint_us = period_hinted(self, target, gap_us);
-    self->last_gap_us = period_stated(target) > 0 && gap_us <= STREAM_PERIOD_MAX_US ? (uint32_t)gap_us : 0;
+    /* a sender that does not wait for the time it states does not mean it */
+    self->is_time_idle = gap_us <= STREAM_HINT_MAX_US && (self->is_time_idle || gap_us * 5 < self->last_stated_us * UINT64_C(2));
+    const bool is_short = target->is_timed && target->time_ms <= STREAM_HINT_MAX_US / 1000;
+    self->last_gap_us = is_short && gap_us <= STREAM_PERIOD_MAX_US ? (uint32_t)gap_us : 0;
     self->last_us = now_us;
     self->last_stated_us = period_stated(target);
     if (!is_sample && is_under_way(self, target)) {

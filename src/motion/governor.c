@@ -6,20 +6,21 @@
 #include "governor_speed.h"
 #include "heave/sane.h"
 
-#define SPAN_US     150000u             /* needs within such a time are one event, ... */
-#define MEMORY_US   1500000u            /* ... which counts for so long: a shake of 0.4 Hz turns twice meanwhile */
-#define BEGIN_US    1000000u            /* a stream begins for so long */
-#define QUIET_SHARE 4                   /* while no more than such a share of the goal is needed ... */
-#define QUIET_TIMES 4u                  /* ... it is forgotten so much sooner */
-#define RELEASE_US  300000u             /* time constant with which the strength falls ... */
-#define SOFT_US     100000u             /* ... which that rate comes to */
-#define RELEASE_DIV 4                   /* ... and at least by a level in so many seconds, ... */
-#define CATCH_DIV   6                   /* ... but not so fast that the output gains more than a sixth of the time, ... */
-#define CATCH_SPEED 12                  /* ... or a twelfth of the largest speed, whichever is more */
-#define LOOK_US     6000u               /* needs are those of differences over so long */
-#define NEED_GOAL   (Q16_ONE * 19 / 20) /* of the limits */
-#define PACE_SAME   64                  /* a period that differs by less than this share is the same */
-#define NEAR_Q32    (Q32_ONE / 1000000) /* a low-pass so near to its input has arrived */
+#define SPAN_US       150000u  /* needs within such a time are one event, ... */
+#define MEMORY_US     1500000u /* ... which counts for so long: a shake of 0.4 Hz turns twice meanwhile */
+#define BEGIN_US      1000000u /* a stream begins for so long */
+#define QUIET_SHARE   4        /* while no more than such a share of the goal is needed ... */
+#define QUIET_TIMES   4u       /* ... it is forgotten so much sooner */
+#define RELEASE_US    300000u  /* time constant with which the strength falls ... */
+#define SOFT_US       100000u  /* ... which that rate comes to */
+#define RELEASE_DIV   4        /* ... and at least by a level in so many seconds, ... */
+#define CATCH_DIV     6        /* ... but not so fast that the output gains more than a sixth of the time, ... */
+#define CATCH_SPEED   12       /* ... or a twelfth of the largest speed, whichever is more */
+#define PERIOD_MAX_US 2000000u
+#define LOOK_US       6000u               /* needs are those of differences over so long */
+#define NEED_GOAL     (Q16_ONE * 19 / 20) /* of the limits */
+#define PACE_SAME     64                  /* a period that differs by less than this share is the same */
+#define NEAR_Q32      (Q32_ONE / 1000000) /* a low-pass so near to its input has arrived */
 
 static const uint32_t k_time_constant_us[GOVERNOR_LEVELS] = {6000, 12000, 25000, 50000, 100000, 200000, 400000};
 
@@ -429,7 +430,7 @@ static bool is_pace_sane(const governor_t *self, uint32_t cycle_us)
 {
     const uint32_t each = periods_of_look(self->period_us);
     const int64_t cycles_q16 = cycles_of_look(self->period_us, each, cycle_us);
-    bool is_sane = self->period_us >= 1000 && self->period_us <= 2000000 && self->each == each && self->since < each &&
+    bool is_sane = self->period_us >= 1000 && self->period_us <= PERIOD_MAX_US && self->each == each && self->since < each &&
                    self->channels == channels_with_limits(self);
     for (unsigned i = 0; i < GOVERNOR_CHANNELS; i++) {
         const governor_limits_t *limits = &self->limits[i];
@@ -481,9 +482,9 @@ static bool are_levels_sane(const governor_t *self)
 
 static bool are_needs_sane(const governor_t *self)
 {
-    bool is_sane = sane_bool(&self->is_slowed) && self->begun_us <= BEGIN_US + 2000000u * LOOK_US;
+    bool is_sane = sane_bool(&self->is_slowed) && self->begun_us <= BEGIN_US + PERIOD_MAX_US;
     for (unsigned i = 0; i < GOVERNOR_EVENTS; i++) {
-        is_sane = is_sane && self->event[i].age_us <= MEMORY_US + 2000000u * LOOK_US;
+        is_sane = is_sane && self->event[i].age_us <= MEMORY_US + QUIET_TIMES * PERIOD_MAX_US;
         for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
             is_sane = is_sane && self->event[i].need_q16[level] >= 0 && self->event[i].need_q16[level] <= 2 * GOVERNOR_NEED_MAX;
         }

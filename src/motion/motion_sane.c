@@ -89,7 +89,7 @@ static bool are_bools_sane(const motion_t *saved)
 {
     return sane_bool(&saved->is_pose_stale) && sane_bool(&saved->is_space_new) && sane_bool(&saved->is_following) &&
            sane_bool(&saved->is_taking_over) && sane_bool(&saved->is_fading) && sane_bool(&saved->has_pending) &&
-           sane_bool(&saved->is_stretched) && sane_bool(&saved->is_clamped);
+           sane_bool(&saved->is_stretched) && sane_bool(&saved->is_clamped) && sane_bool(&saved->is_time_idle);
 }
 
 static bool are_numbers_sane(const motion_t *saved)

@@ -36,8 +36,8 @@ static bool is_quantum_sane(const stream_quantum_t *grain)
 
 static bool is_lead_sane(const stream_lead_t *lead)
 {
-    return stream_sane_within(lead->step_q32, -2 * POINT_Q32, 2 * POINT_Q32) &&
-           stream_sane_within(lead->before_q32, -2 * POINT_Q32, 2 * POINT_Q32) &&
+    return stream_sane_within(lead->step_q32, -8 * POINT_Q32, 8 * POINT_Q32) &&
+           stream_sane_within(lead->before_q32, -8 * POINT_Q32, 8 * POINT_Q32) &&
            stream_sane_within(lead->most_q32, 0, 8 * POINT_Q32) &&
            stream_sane_within(lead->first_q32, -lead->most_q32, lead->most_q32) && lead->rise_q32 <= Q32_ONE / 2 &&
            stream_sane_within(lead->reach_q16, 0, REACH_MAX) && stream_sane_within(lead->full_q16, 0, lead->reach_q16);

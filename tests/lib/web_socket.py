@@ -125,7 +125,7 @@ class Page:
         self.folder = tempfile.TemporaryDirectory(prefix="heave-browser-")
         self.process = subprocess.Popen([browser(), "--headless=new", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--no-first-run", "--remote-debugging-port=0", "--remote-allow-origins=*",
                                          f"--lang={language}", f"--user-data-dir={self.folder.name}", f"--window-size={width},{height}", *more, url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-                                        start_new_session=True)
+                                        env={**os.environ, "TMPDIR": self.folder.name}, start_new_session=True)  # it leaves folders there where it is killed
         port_file = Path(self.folder.name) / "DevToolsActivePort"
         end = time.monotonic() + 60
         while (not port_file.exists() or not port_file.read_text(encoding="ascii").strip()) and time.monotonic() < end:
@@ -159,13 +159,21 @@ class Page:
             self.process.wait()
 
     def do(self, method, **parameters):
+        end = time.monotonic() + WAIT_S
+        while True:
+            message = self.answer(method, parameters)
+            # nothing can be asked of a page that is just being replaced by the next one
+            if message.get("error", {}).get("message") != "Not attached to an active page" or time.monotonic() > end:
+                assert "error" not in message, message
+                return message["result"]
+
+    def answer(self, method, parameters):
         self.count += 1
         self.link.send({"id": self.count, "method": method, "params": parameters})
         while True:
             message = json.loads(self.link.next()[1])
             if message.get("id") == self.count:
-                assert "error" not in message, message
-                return message["result"]
+                return message
             if message.get("method") == "Runtime.exceptionThrown":
                 self.problems.append(message["params"]["exceptionDetails"].get("exception", {}).get("description", "an exception"))
             if message.get("method") == "Log.entryAdded" and message["params"]["entry"]["level"] == "error":

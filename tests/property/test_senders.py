@@ -457,6 +457,16 @@ def table(seed):
                     is_extra=hz != 60 and times in (0.3, 1.6, 2.0, 4.0))
     for times in (1.0, 2.5, 3.0):
         put(f"A6T 50 Hz, T of {times} periods", LARGE, track(lambda c, s, t=round(20 * times): S.timed(wired(even(50))(c, s), t)))
+    # T in any mixture: the sender does not wait for it
+    mixed = {"0 and 20 by turns": (60, lambda i, c: (0, 20)[i % 2]), "20, then 60": (60, lambda i, c: 20 if i < 900 else 60), "100": (50, lambda i, c: 100),
+             "random, 10 to 100": (60, lambda i, c: c.randint(10, 100)), "400": (60, lambda i, c: 400), "0": (60, lambda i, c: 0)}
+    for name, (hz, time_ms) in mixed.items():
+        def make(chance, seconds, hz=hz, time_ms=time_ms):
+            samples = wired(even(hz))(chance, seconds)
+            for i, s in enumerate(samples):
+                s.time_ms = time_ms(i, chance)
+            return samples
+        put(f"T of {name}, {hz} Hz", LARGE, track(make, 1.5, bars={style: {"lag_ms": 50} for style in STYLES}))
     for stall_s in (0.1, 0.2, 0.3):
         # a soft stop is right, a way back is not; at most twice the speed, at most that from standing within 67 ms
         trouble(f"Wi-Fi stall of {1000 * stall_s:.0f} ms", 60, lambda s, c, e, d=stall_s: S.stalled(s, [(when, d) for when in e]), -0.05, 2.0, accel=600)

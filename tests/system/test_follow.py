@@ -82,7 +82,7 @@ def ends(bench):
                 most_mm = max(1.04 * stop_mm, 0 if stands else bridged_s * speed) + lead_mm + 0.01
                 over, back = beyond_an_end(bench, rate, speed, style, stands)
                 assert over <= most_mm, f"{style}, {rate} Hz, {speed} mm/s, {stands}: {over:.3f} mm, not {most_mm:.3f}"
-                most_back_mm = {"smooth": 0.05, "balanced": 0.05 + 0.25 * speed / rate}[style]
+                most_back_mm = {"smooth": 0.05, "balanced": 0.05 + 0.26 * speed / rate}[style]
                 assert back < most_back_mm, f"{style}, {rate} Hz, {speed} mm/s, {stands}: {back:.3f} mm back"
 
 

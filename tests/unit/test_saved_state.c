@@ -368,6 +368,7 @@ static void test_plans_that_no_motion_has_are_refused(void)
     SPOIL(halt.start[6].pos_q32, INT64_MIN);
     SPOIL(halt.now[6].pos_q32, INT64_MIN);
     SPOIL(halt.rest_q32[6], INT64_MIN);
+    SPOIL_BOOL(is_time_idle);
     SPOIL(straight_after, -1);
     SPOIL(plan.straight.path.nj, 0);
     SPOIL(plan.straight.path.na, INT64_MAX);
@@ -405,7 +406,7 @@ static void test_no_member_is_forgotten(void)
     TEST_ASSERT_EQUAL(344, sizeof(motion_straight_t));
     TEST_ASSERT_EQUAL(64, sizeof(scurve_t));
     TEST_ASSERT_EQUAL(168, sizeof(intensity_t));
-    TEST_ASSERT_EQUAL(17576, sizeof(motion_t));
+    TEST_ASSERT_EQUAL(17584, sizeof(motion_t));
 }
 
 int main(void)
