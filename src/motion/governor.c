@@ -191,8 +191,9 @@ static q32_t low_pass(q32_t at_q32, q32_t input_q32, q32_t share_q32)
  * another one begins. */
 static void pass_time(governor_t *self, int32_t need_q16)
 {
-    self->begun_us += self->begun_us < BEGIN_US ? self->period_us * self->each : 0;
-    const uint32_t passed_us = self->period_us * self->each * (need_q16 < NEED_GOAL / QUIET_SHARE ? QUIET_TIMES : 1);
+    const uint32_t look_us = self->period_us * self->each;
+    const uint32_t passed_us = need_q16 < NEED_GOAL / QUIET_SHARE ? QUIET_TIMES * look_us : look_us;
+    self->begun_us += self->begun_us < BEGIN_US ? look_us : 0;
     for (unsigned i = 0; i < GOVERNOR_EVENTS; i++) {
         self->event[i].age_us += self->event[i].age_us < MEMORY_US ? passed_us : 0;
     }

@@ -7,8 +7,8 @@
 
 #define SPEED_TOP   (Q16_ONE * 92 / 100) /* of the speed limits: the largest speed, ... */
 #define SPEED_KNEE  (Q16_ONE / 10)       /* ... which speeds from so much below to so much above it bend to */
-#define CATCH_UP_US 100000u              /* time constant with which what was left behind is caught up, ... */
-#define NOTHING_Q32 (Q32_ONE / 2000)     /* ... until it is no more than this: 0.5 um */
+#define NOTHING_Q32 (Q32_ONE / 2000)     /* what is left behind is caught up until it is no more than this: 0.5 um, ... */
+#define CATCH_UP    4                    /* ... as the low-pass of 100 ms does it */
 
 /* A share of the speed limits, bent so that it comes to SPEED_TOP and no further. */
 static int32_t bent(int32_t need_q16)
@@ -22,11 +22,10 @@ static int32_t bent(int32_t need_q16)
 
 void governor_limit_speed(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, q32_t *kept_q32)
 {
-    const q32_t catch_up_q32 = governor_share_of_period(self->period_us, CATCH_UP_US);
     q32_t way_q32[GOVERNOR_CHANNELS];
     int32_t need_q16 = 0;
     for (unsigned i = 0; i < self->channels; i++) {
-        way_q32[i] = asked_q32[i] - self->asked_q32[i] + fx_mul_shift(self->behind_q32[i], catch_up_q32, 32);
+        way_q32[i] = asked_q32[i] - self->asked_q32[i] + fx_mul_shift(self->behind_q32[i], self->share_q32[CATCH_UP], 32);
         need_q16 = governor_larger(need_q16, governor_share_of(way_q32[i] * (int64_t)self->each, self->per_limit_q62[i][0]));
     }
     need_q16 = (int32_t)fx_mul_shift(need_q16, scale_q16, 16);

@@ -21,25 +21,25 @@ typedef struct {
 } sums_t;
 
 /* Steps in shares of the speed limits, so that degrees and millimetres can be added; the newest first.
- * @return the largest */
-HV_WRAPS static q32_t find_steps(const stream_curve_t *curve, unsigned axes, q32_t step_q32[POSE_AXES][STEPS])
+ * @return the bits of all sizes together: as many as the largest has */
+HV_WRAPS static uint64_t find_steps(const stream_curve_t *curve, unsigned axes, q32_t step_q32[POSE_AXES][STEPS])
 {
     const uint32_t newest = stream_points_newest(curve);
-    q32_t largest_q32 = 0;
+    uint64_t bits = 0;
     for (unsigned axis = 0; axis < axes; axis++) {
         const int64_t per_speed_q62 = curve->governor.per_limit_q62[axis][0];
         for (uint32_t i = 0; i < STEPS; i++) {
             const q32_t step = curve->point_q32[stream_points_slot(newest - i)][axis] -
                                curve->point_q32[stream_points_slot(newest - i - 1)][axis];
             step_q32[axis][i] = per_speed_q62 > 0 ? fx_mul_shift(step, per_speed_q62, 30) : step;
-            largest_q32 = fx_abs(step_q32[axis][i]) > largest_q32 ? fx_abs(step_q32[axis][i]) : largest_q32;
+            bits |= (uint64_t)fx_abs(step_q32[axis][i]);
         }
     }
-    return largest_q32;
+    return bits;
 }
 
 /* The number of bits beyond so many. */
-static unsigned bits_beyond(int64_t value, unsigned bits)
+static unsigned bits_beyond(uint64_t value, unsigned bits)
 {
     unsigned beyond = 0;
     while ((value >> beyond) >> bits != 0) {
@@ -48,10 +48,10 @@ static unsigned bits_beyond(int64_t value, unsigned bits)
     return beyond;
 }
 
-static sums_t sum_up(q32_t step_q32[POSE_AXES][STEPS], unsigned axes, unsigned steps, q32_t largest_q32)
+static sums_t sum_up(q32_t step_q32[POSE_AXES][STEPS], unsigned axes, unsigned steps, uint64_t bits)
 {
     sums_t sums = {0};
-    const unsigned down = bits_beyond(largest_q32, STEP_BITS);
+    const unsigned down = bits_beyond(bits, STEP_BITS);
     for (unsigned axis = 0; axis < axes; axis++) {
         for (unsigned i = 0; i + 2 < steps; i++) {
             const int64_t here = fx_shift_down(step_q32[axis][i], down);
@@ -71,15 +71,15 @@ HV_OWN_FRAME stream_predictor_t stream_predictor_fit(const stream_curve_t *curve
 {
     q32_t step_q32[POSE_AXES][STEPS];
     const unsigned axes = curve->axes < POSE_AXES ? curve->axes : POSE_AXES;
-    const q32_t largest_q32 = find_steps(curve, axes, step_q32);
+    const uint64_t bits = find_steps(curve, axes, step_q32);
     const unsigned steps = curve->age < STEPS ? (unsigned)curve->age : STEPS;
     if (steps < STEPS_MIN) {
         return when_few;
     }
-    const sums_t sums = sum_up(step_q32, axes, steps, largest_q32);
-    const int64_t most = sums.newest2 > sums.before2 ? sums.newest2 : sums.before2;
-    const int64_t by_most = fx_abs(sums.by_newest) > fx_abs(sums.by_before) ? fx_abs(sums.by_newest) : fx_abs(sums.by_before);
-    const unsigned down = bits_beyond(most > by_most ? most : by_most, SUM_BITS - 1);
+    const sums_t sums = sum_up(step_q32, axes, steps, bits);
+    const uint64_t squares = (uint64_t)sums.newest2 | (uint64_t)sums.before2;
+    const uint64_t products = (uint64_t)fx_abs(sums.by_newest) | (uint64_t)fx_abs(sums.by_before);
+    const unsigned down = bits_beyond(squares | products, SUM_BITS - 1);
     const int64_t ridge = fx_shift_down(sums.newest2 + sums.before2, down + RIDGE_SHIFT) + 1;
     const int64_t newest2 = fx_shift_down(sums.newest2, down) + ridge;
     const int64_t before2 = fx_shift_down(sums.before2, down) + ridge;
