@@ -6,17 +6,17 @@
 #include "governor_speed.h"
 #include "heave/sane.h"
 
-#define SPAN_US       150000u  /* needs within such a time are one event, ... */
-#define MEMORY_US     1500000u /* ... which counts for so long: a shake of 0.4 Hz turns twice meanwhile */
-#define BEGIN_US      1000000u /* a stream begins for so long */
-#define QUIET_SHARE   4        /* while no more than such a share of the goal is needed ... */
-#define QUIET_TIMES   4u       /* ... it is forgotten so much sooner */
-#define RELEASE_US    300000u  /* time constant with which the strength falls ... */
-#define SOFT_US       100000u  /* ... which that rate comes to */
-#define RELEASE_DIV   4        /* ... and at least by a level in so many seconds, ... */
-#define CATCH_DIV     6        /* ... but not so fast that the output gains more than a sixth of the time, ... */
-#define CATCH_SPEED   12       /* ... or a twelfth of the largest speed, whichever is more */
-#define PERIOD_MAX_US 2000000u
+#define SPAN_US       150000u             /* needs within such a time are one event, ... */
+#define MEMORY_US     1500000u            /* ... which counts for so long: a shake of 0.4 Hz turns twice meanwhile */
+#define BEGIN_US      1000000u            /* a stream begins for so long */
+#define QUIET_SHARE   4                   /* while no more than such a share of the goal is needed ... */
+#define QUIET_TIMES   4u                  /* ... it is forgotten so much sooner */
+#define RELEASE_US    300000u             /* time constant with which the strength falls ... */
+#define SOFT_US       100000u             /* ... which that rate comes to */
+#define RELEASE_DIV   4                   /* ... and at least by a level in so many seconds, ... */
+#define CATCH_DIV     6                   /* ... but not so fast that the output gains more than a sixth of the time, ... */
+#define CATCH_SPEED   12                  /* ... or a twelfth of the largest speed, whichever is more */
+#define PERIOD_MAX_US 2000000u            /* see governor_pace() */
 #define LOOK_US       6000u               /* needs are those of differences over so long */
 #define NEED_GOAL     (Q16_ONE * 19 / 20) /* of the limits */
 #define PACE_SAME     64                  /* a period that differs by less than this share is the same */

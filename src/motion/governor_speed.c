@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
  * governor_speed.c - keeps a stream within the speed limits; see governor_speed.h.
- * A speed limit is no matter of smoothing: a low-pass that makes a slow motion slower is late by hundreds of milliseconds, where
- * the motion is beyond the limit for a part of them.
+ * Smoothing is no cure for a speed: a low-pass that makes a slow motion slower is late by hundreds of milliseconds, while the
+ * motion exceeds the limit for a part of that time only.
  */
 #include "governor_speed.h"
 

@@ -7,7 +7,7 @@
 #include "stream_points.h"
 #include "stream_predictor.h"
 
-enum { LARGEST_OF = 12 /* newest steps: what is guessed is hardly larger than the largest of them */ };
+enum { LARGEST_OF = 12 /* newest steps, which bound those that are guessed */ };
 
 /* Periods that a motion may be kept up so that it does not go further than the axis takes to stop: of v = step / period, the time
  * is sqrt(v / J), or half of v / A + A / J where the acceleration binds. Also the share of such a stop in which A builds up. */
@@ -50,8 +50,8 @@ q32_t stream_guess_within_speed(const stream_curve_t *self, unsigned axis, q32_t
     return limits->jerk_per_cycle3_q32 > 0 ? fx_clamp(step_q32, -least_q32, least_q32) : step_q32;
 }
 
-/* How large a step after the newest ones may be: twice the second largest of them. The largest may be a jump,
- * which is no motion that goes on. */
+/* How large a step after the newest ones may be: twice the second largest of them. The largest may be a jump, which is no motion
+ * that goes on. */
 static q32_t largest_step(const stream_curve_t *self, unsigned axis, const q32_t step_q32[LARGEST_OF])
 {
     q32_t largest_q32 = 0;
