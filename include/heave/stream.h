@@ -23,8 +23,9 @@
  * sample, within 2 s, or within 24 periods of a slow stream. A known stream may pause for a second and continues. A new rate
  * gives a new grid, on which the curve continues.
  *
- * Repeats: a sender may send each value up to 8 times, such as a loop beside a slower game. After about 12 values it is followed
- * at the rate of its values. A repetition of the newest values within three quarters of a period is not a sample.
+ * Frames that are no samples: repetitions of the newest values, values that freeze for up to three frames and then catch up, old
+ * frames and frames that others have overtaken. See "What a sample is" in src/DESIGN.md. A sender may send each value up to 8
+ * times, such as a loop beside a slower game. After about 12 values it is followed at the rate of its values.
  *
  * Hints: a sender that states its period may be slower, and late and lost samples are known from its second sample on. The margin
  * is then at least an eighth of the period, because extrapolation of such a slow stream is poor.
@@ -52,6 +53,9 @@ enum {
     STREAM_POINTS = 64,     /**< ring of points, a power of 2 */
     STREAM_EVIDENCE = 5,    /**< samples for a decision about one of them */
     STREAM_LOSSES_MAX = 4,  /**< so often it counts that a long interval was a loss */
+    STREAM_STOOD_MAX = 3,   /**< for so many frames the values of a sender that freezes may stand */
+    STREAM_MOVED_MAX = 2,   /**< so many frames in a row tell a step */
+    STREAM_CAUGHT_MAX = 3,  /**< so often it counts that values caught up */
     STREAM_WINDOW_MAX = 10, /**< points in the longest mean of coarse values; the ring has room for three of them */
     STREAM_WEIGHTS = 3 * STREAM_WINDOW_MAX - 2 /**< points of a control point in that case */
 };
@@ -79,7 +83,6 @@ typedef struct {
     unsigned each;         /**< for a while, the sender sends one sample per this many periods */
     bool is_sparse;        /**< so sparse that the curve waits for each sample until the next one is here */
     unsigned stalled;      /**< samples at the usual pace that were too late to wait for */
-    unsigned between;      /**< samples in a row that lay half-way between two of the line */
 } stream_clock_t;
 
 /** Decides from the values to which time a sender's samples belong; members are private to src/motion. */
@@ -179,6 +182,18 @@ typedef struct {
     q32_t spare_q32[AXES_MAX]; /**< that sample */
 } stream_thin_t;
 
+/** What is known of a sender's frames, for the decision what is a sample; members are private to src/motion. */
+typedef struct {
+    q32_t misfit_q32;  /**< recent distance of values from the predicted motion, in units of the speed limit */
+    unsigned losses;   /**< long intervals in a row that were losses according to their values, up to a maximum */
+    unsigned stood;    /**< frames in a row that came in time with the newest values again, up to a maximum */
+    unsigned moved;    /**< frames in a row before these that came with new values, up to a maximum */
+    unsigned caught;   /**< how much more often than not values have caught up after standing, up to a maximum */
+    unsigned halves;   /**< frames that lay half-way between two of the line */
+    uint32_t doubt_us; /**< the newest sample looks like an old one; for so long the one in whose place it is may come; 0: it does
+                          not */
+} stream_sample_t;
+
 /** How often a sender repeats each value; members are private to src/motion. */
 typedef struct {
     uint64_t began_us; /**< arrival of the first of the equal samples */
@@ -205,8 +220,7 @@ typedef struct {
     uint64_t began_us;    /**< arrival of the first of them */
     stream_clock_t clock;
     stream_evidence_t evidence;
-    q32_t misfit_q32; /**< recent distance of values from the predicted motion, in units of the speed limit */
-    unsigned losses;  /**< long intervals in a row that were losses according to their values, up to a maximum */
+    stream_sample_t sample;
     stream_curve_t curve;
     q32_t between_q32; /**< render phase behind head, [0, 1) */
     q32_t rate_q32[2]; /**< periods per cycle behind the first and the second low-pass; the second is rendered */
@@ -272,8 +286,8 @@ bool stream_goes_on(const stream_t *self, uint64_t now_us);
  *  @param kin        the mechanism, where the axes are those of poses; else NULL
  *  @param sample_q32 one value per axis, within +-2^48
  *  A sample within STREAM_PERIOD_MAX_US of the last one (or within 3.5 periods of a stream that runs) continues or begins a
- *  stream; any other, and one that follows a lone sample within 2 ms, is a lone sample. The same values again within three
- *  quarters of a period are no sample. Two samples are steps; the third one makes a stream, or the second where the sender states
+ *  stream; any other, and one that follows a lone sample within 2 ms, is a lone sample. Repeated, frozen and old values are
+ *  no samples. Two samples are steps; the third one makes a stream, or the second where the sender states
  *  its period. */
 void stream_push(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32);
 

@@ -8,26 +8,18 @@
 #include "stream_control.h"
 #include "stream_curve.h"
 #include "stream_evidence.h"
-#include "stream_predictor.h"
 #include "stream_repeat.h"
+#include "stream_sample.h"
 
-#define PACE_GAIN_DIV        8                  /* a rate correction of 1/8 per period of error ... */
-#define PACE_GAIN_DIV_HINTED 3                  /* ... 1/3 where the period is stated, and often a long one */
-#define PACE_MAX_Q32         (Q32_ONE / 10)     /* ... but at most this */
-#define PACE_SLOW_Q32        (Q32_ONE * 2 / 5)  /* ... and so much slower where it is ... */
-#define FAR_BEFORE_Q32       (Q32_ONE / 2)      /* ... so far before its time: what comes next is a guess */
-#define PACE_FILTER_MAX      (Q32_ONE / 2)      /* keeps the filters stable where a cycle is longer than a period */
-#define BEHIND_MAX_Q32       (Q32_ONE * 6)      /* further behind its time, a sample is skipped */
-#define SAME_Q32             (Q32_ONE * 3 / 4)  /* the newest values again so soon after the newest sample say nothing */
-#define CLEAR_Q32            (Q32_ONE * 3 / 10) /* a sample so near to its time is the one of that time */
-#define BESIDE_Q32           (Q32_ONE / 8)      /* one further from its time than by jitter and so much is beside it */
-#define TELLING              4     /* a value tells if it is off by less than such a share of what there is to tell, ... */
-#define TELLING_OPEN         2     /* ... of such a one where the time leaves it open */
-#define MISFIT_MEMORY        16    /* samples */
-#define FEW                  16    /* grains in a step that tells too little */
-#define JUDGED_MAX           4u    /* periods that values are weighed for */
-#define SAME_US              2000u /* while the period is not known */
-#define PAIR                 2u    /* samples that are steps; with the next one they are a stream, ... */
+#define PACE_GAIN_DIV        8                          /* a rate correction of 1/8 per period of error ... */
+#define PACE_GAIN_DIV_HINTED 3                          /* ... 1/3 where the period is stated, and often a long one */
+#define PACE_MAX_Q32         (Q32_ONE / 10)             /* ... but at most this */
+#define PACE_SLOW_Q32        (Q32_ONE * 2 / 5)          /* ... and so much slower where it is ... */
+#define FAR_BEFORE_Q32       (Q32_ONE / 2)              /* ... so far before its time: what comes next is a guess */
+#define PACE_FILTER_MAX      (Q32_ONE / 2)              /* keeps the filters stable where a cycle is longer than a period */
+#define BEHIND_MAX_Q32       (Q32_ONE * 6)              /* further behind its time, a sample is skipped */
+#define FEW                  16                         /* grains in a step that tells too little */
+#define PAIR                 2u                         /* samples that are steps; with the next one they are a stream, ... */
 #define BEGIN_US             (3 * STREAM_PERIOD_MIN_US) /* ... but of a flood, with those of so long */
 
 /* Thinning out. Counted, not timed: every so manyth sample of an even stream is an even stream. */
@@ -121,8 +113,7 @@ static void start_lone(stream_t *self, uint64_t now_us, const kin_t *kin, const 
     stream_repeat_reset(&self->repeat, now_us);
     stream_evidence_reset(&self->evidence, self->phase != STREAM_EMPTY);
     note_sample(self, 0, 0, sample_q32);
-    self->misfit_q32 = 0;
-    self->losses = 0;
+    stream_sample_reset(&self->sample, self->phase != STREAM_EMPTY);
     self->phase = STREAM_LONE;
     self->pair = 1;
     self->pair_gap_us = 0;
@@ -133,97 +124,6 @@ static void start_lone(stream_t *self, uint64_t now_us, const kin_t *kin, const 
 static q32_t error_at(const stream_t *self, uint64_t now_us)
 {
     return self->curve.ahead * Q32_ONE + stream_clock_periods(&self->clock, now_us) - self->between_q32;
-}
-
-/* How many periods the motion so far would take to a sample: its way along the newest step, in steps. 0 where it stands. */
-static q32_t advance_of(const stream_t *self, const q32_t *sample_q32)
-{
-    const stream_evidence_t *seen = &self->evidence;
-    int64_t along_q32 = 0;
-    int64_t square_q32 = 0;
-    if (seen->count < 2 || seen->index[1] < 1) {
-        return 0;
-    }
-    for (unsigned axis = 0; axis < POSE_AXES && axis < self->curve.axes; axis++) {
-        const int64_t per_speed_q62 = self->curve.governor.per_limit_q62[axis][0];
-        const q32_t step_q32 =
-            fx_mul_shift((seen->value_q32[0][axis] - seen->value_q32[1][axis]) / seen->index[1], per_speed_q62, 30);
-        const q32_t travel_q32 = fx_mul_shift(sample_q32[axis] - seen->value_q32[0][axis], per_speed_q62, 30);
-        along_q32 +=
-            fx_mul_shift(fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), fx_clamp(travel_q32, -16 * Q32_ONE, 16 * Q32_ONE), 32);
-        square_q32 +=
-            fx_mul_shift(fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), 32);
-    }
-    return square_q32 > 0 ? fx_mul_div(along_q32, Q32_ONE, square_q32) : 0;
-}
-
-/* How much better than by the time the value has to tell a number of periods. Where the time leaves it open, a little; else more,
- * and much more the more often an interval of an even sender that was too long has been told to be a loss. */
-static int32_t telling(const stream_t *self, unsigned periods, q32_t ahead_q32)
-{
-    const q32_t off_q32 = fx_abs(ahead_q32 - periods * Q32_ONE);
-    if (off_q32 <= stream_clock_jitter(&self->clock) + CLEAR_Q32) {
-        return TELLING_OPEN;
-    }
-    return TELLING << (stream_clock_is_even(&self->clock) ? self->losses : 0);
-}
-
-/* What a long interval was: a loss where time and value agree, else a pause of the sender. */
-static void note_loss(stream_t *self, const stream_predictor_t *predictor, unsigned by_time, unsigned periods, q32_t misfit_q32)
-{
-    const q32_t apart_q32 = stream_evidence_apart(&self->evidence, &self->curve.governor, predictor, by_time, by_time - 1);
-    if (by_time < 2 || (misfit_q32 + self->misfit_q32) * TELLING >= apart_q32) {
-        return;
-    }
-    if (periods != by_time) {
-        self->losses = 0;
-    } else if (self->losses < (unsigned)STREAM_LOSSES_MAX) {
-        self->losses++;
-    }
-}
-
-/* Periods from the newest sample to this one. A loss and a late sample look alike to the clock. Where the motion so far leads to
- * the sample in another number of periods than the time tells, and well beside it in that, the value counts; but where the time
- * is clear.
- * @param shift_q32 out: where value and time agree on a time between two points of the line, how far it is after the one */
-static unsigned judge_periods(stream_t *self, uint64_t now_us, const q32_t *sample_q32, q32_t *shift_q32)
-{
-    q32_t ahead_q32;
-    q32_t late_q32;
-    const stream_evidence_t *seen = &self->evidence;
-    const governor_t *scale = &self->curve.governor;
-    const unsigned by_time = stream_clock_expect(&self->clock, now_us, &ahead_q32, &late_q32);
-    const q32_t early_q32 = late_q32 < Q32_ONE / 2 ? Q32_ONE / 2 : late_q32;
-    const bool is_even = stream_clock_is_even(&self->clock);
-    *shift_q32 = 0;
-    const bool is_arrived = seen->weight_q32 > Q32_ONE / 2; /* the value is that of the arrival, whatever the number */
-    if (seen->count < 3 || is_arrived || (is_even && by_time == 1 && fx_abs(ahead_q32 - Q32_ONE) < CLEAR_Q32)) {
-        return by_time;
-    }
-    unsigned best = by_time;
-    const stream_predictor_t parabola = {2 * Q32_ONE, -Q32_ONE};
-    const stream_predictor_t predictor = stream_predictor_fit(&self->curve, parabola);
-    const q32_t expected_q32 = stream_evidence_misfit(seen, scale, &predictor, by_time, sample_q32);
-    q32_t least_q32 = expected_q32;
-    for (unsigned periods = 1; periods <= JUDGED_MAX && periods * Q32_ONE <= ahead_q32 + early_q32; periods++) {
-        const q32_t misfit_q32 = stream_evidence_misfit(seen, scale, &predictor, periods, sample_q32);
-        const q32_t apart_q32 = stream_evidence_apart(seen, scale, &predictor, periods, by_time);
-        const q32_t doubt_q32 = misfit_q32 + self->misfit_q32;
-        if (doubt_q32 * telling(self, periods, ahead_q32) < apart_q32 && misfit_q32 < least_q32) {
-            least_q32 = misfit_q32;
-            best = periods;
-        }
-    }
-    note_loss(self, &predictor, by_time, best, least_q32);
-    self->misfit_q32 += (least_q32 - self->misfit_q32) / MISFIT_MEMORY;
-    const q32_t advance_q32 = advance_of(self, sample_q32);
-    if (is_even && best == by_time &&
-        expected_q32 * TELLING > stream_evidence_apart(seen, scale, &predictor, by_time, by_time + 1) &&
-        fx_abs(ahead_q32 - best * Q32_ONE) > stream_clock_jitter(&self->clock) + BESIDE_Q32 &&
-        fx_abs(advance_q32 - ahead_q32) < CLEAR_Q32) {
-        *shift_q32 = advance_q32 - best * Q32_ONE;
-    }
-    return best;
 }
 
 /* Which of the samples are taken, from the mean interval of all of them. */
@@ -270,21 +170,6 @@ static bool is_thinned_anew(stream_t *self, uint64_t now_us)
     return period_us > 0;
 }
 
-/* The newest values again, too soon for the next sample: another relay mask, or the same datagram twice. */
-static bool says_nothing(const stream_t *self, uint64_t now_us, const q32_t *sample_q32)
-{
-    q32_t ahead_q32;
-    q32_t late_q32;
-    if (!stream_evidence_is_newest(&self->evidence, self->curve.axes, sample_q32)) {
-        return false;
-    }
-    if (self->clock.period_us_q16 == 0) {
-        return stream_clock_elapsed_us(&self->clock, now_us) < SAME_US;
-    }
-    (void)stream_clock_expect(&self->clock, now_us, &ahead_q32, &late_q32);
-    return ahead_q32 < SAME_Q32;
-}
-
 static void pace_curve(stream_t *self)
 {
     stream_curve_pace(&self->curve, self->style, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us,
@@ -328,31 +213,16 @@ static void thin_from_start(stream_t *self, uint64_t now_us)
     pace_curve(self);
 }
 
-static void take_sample(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
+static void take_sample(stream_t *self, uint64_t now_us, const kin_t *kin, bool is_twice_as_fast, const q32_t *sample_q32)
 {
-    self->thin.passed = 0;
     const uint32_t interval_us = stream_clock_elapsed_us(&self->clock, now_us);
-    if (self->phase == STREAM_EMPTY || !stream_clock_is_near(&self->clock, now_us)) {
-        stream_clock_start(&self->clock, now_us);
-        start_lone(self, now_us, kin, sample_q32);
-        return;
-    }
-    const bool is_repeat = self->phase == STREAM_RUNNING && stream_repeat_watch(self, now_us, sample_q32);
-    if (is_repeat || says_nothing(self, now_us, sample_q32)) {
-        return;
-    }
-    const unsigned between =
-        self->phase == STREAM_RUNNING ? stream_clock_between(&self->clock, now_us, advance_of(self, sample_q32)) : 0;
-    if (between == 1) {
-        return;
-    }
-    if (between == 2) {
+    if (is_twice_as_fast) {
         stream_clock_set_period(&self->clock, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16 / 2));
     }
-    const bool is_thinned = is_thinned_anew(self, now_us) || between == 2;
+    const bool is_thinned = is_thinned_anew(self, now_us) || is_twice_as_fast;
     q32_t shift_q32 = 0;
     const unsigned periods =
-        self->phase == STREAM_LONE && self->pair == 1 ? 1 : judge_periods(self, now_us, sample_q32, &shift_q32);
+        self->phase == STREAM_LONE && self->pair == 1 ? 1 : stream_sample_periods(self, now_us, sample_q32, &shift_q32);
     const bool is_new_rate = (stream_clock_take(&self->clock, now_us, periods) && self->phase == STREAM_RUNNING) || is_thinned;
     pace_curve(self);
     if (is_new_rate) {
@@ -387,10 +257,40 @@ static void take_sample(stream_t *self, uint64_t now_us, const kin_t *kin, const
     }
 }
 
+/* A sample that looks like an old one, or one that comes in the place of such a one: its time tells nothing of the line, and its
+ * value nothing of the sender. */
+static void take_doubtful(stream_t *self, uint64_t now_us, unsigned periods, const q32_t *sample_q32)
+{
+    stream_clock_put(&self->clock, now_us, periods);
+    stream_evidence_take(&self->evidence, &self->curve.governor, self->curve.axes, periods, stream_clock_lateness(&self->clock),
+                         0, true, sample_q32);
+    stream_curve_append(&self->curve, periods, false, sample_q32, sample_q32);
+}
+
+static void take_frame(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
+{
+    self->thin.passed = 0;
+    if (self->phase == STREAM_EMPTY || !stream_clock_is_near(&self->clock, now_us)) {
+        stream_clock_start(&self->clock, now_us);
+        start_lone(self, now_us, kin, sample_q32);
+        return;
+    }
+    q32_t ahead_q32;
+    q32_t late_q32;
+    const stream_sample_kind_t kind = stream_sample_kind(self, now_us, sample_q32);
+    if (kind == STREAM_SAMPLE_DOUBTFUL) {
+        take_doubtful(self, now_us, stream_clock_expect(&self->clock, now_us, &ahead_q32, &late_q32), sample_q32);
+    } else if (kind == STREAM_SAMPLE_INSTEAD) {
+        take_doubtful(self, now_us, 0, sample_q32);
+    } else if (kind != STREAM_SAMPLE_NONE) {
+        take_sample(self, now_us, kin, kind == STREAM_SAMPLE_OTHER_RATE, sample_q32);
+    }
+}
+
 void stream_push(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
 {
     if (!is_passed_by(self, now_us, sample_q32)) {
-        take_sample(self, now_us, kin, sample_q32);
+        take_frame(self, now_us, kin, sample_q32);
     }
 }
 
@@ -442,7 +342,7 @@ bool stream_step(stream_t *self, uint64_t now_us, const kin_t *kin, ramp_ref_t *
     }
     if (self->thin.has_spare && now_us - self->thin.last_us >= THIN_WAIT_US) {
         self->thin.has_spare = false;
-        take_sample(self, now_us, kin, self->thin.spare_q32);
+        take_frame(self, now_us, kin, self->thin.spare_q32);
     }
     if (self->phase == STREAM_RUNNING) {
         advance(self, now_us, kin);

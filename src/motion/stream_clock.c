@@ -16,7 +16,6 @@ enum {
     SECOND = 2,       /* intervals that tell that a stated period is wrong */
     STATED = 4,       /* a stated period counts as much as so many samples */
     BURSTS = 2,       /* short intervals, of the newest 24, that tell a sender that sends in bursts */
-    HALVES = STREAM_CLOCK_HALVES,
     STALLED = STREAM_CLOCK_STALLED,
     NEW_RATE = 3, /* and so does one that eight intervals told */
     LOST_MEMORY = STREAM_CLOCK_LOST_MEMORY,
@@ -320,30 +319,10 @@ bool stream_clock_is_gappy(const stream_clock_t *self)
     return self->lost_q16 > Q16_ONE / 16 && self->each == 1;
 }
 
-static bool is_about_half(q32_t periods_q32)
-{
-    return periods_q32 > Q32_ONE * 3 / 10 && periods_q32 < Q32_ONE * 7 / 10;
-}
-
-unsigned stream_clock_between(stream_clock_t *self, uint64_t now_us, q32_t advance_q32)
-{
-    q32_t ahead_q32;
-    q32_t late_q32;
-    (void)stream_clock_expect(self, now_us, &ahead_q32, &late_q32);
-    if (!stream_clock_is_even(self) || !is_about_half(ahead_q32) || !is_about_half(advance_q32) ||
-        self->period_us_q16 < 2 * PERIOD_MIN_Q16) {
-        self->between = self->between > 0 && ahead_q32 > Q32_ONE * 5 / 4 ? 0 : self->between;
-        return 0;
-    }
-    self->between++;
-    return self->between >= HALVES ? 2 : 1;
-}
-
 void stream_clock_set_period(stream_clock_t *self, uint32_t period_us)
 {
     self->gaps = 0;
     self->each = 1;
-    self->between = 0;
     self->settled = NEW_RATE;
     self->late_us_q16 = 0;
     set_period(self, (int64_t)period_us * STREAM_US_Q16);
@@ -412,11 +391,15 @@ static bool is_other_than_stated(const stream_clock_t *self)
 }
 
 /* What is later than can be waited for is of a stall, and so is what follows it in a burst: it says nothing of the line. Where a
- * sample comes at the usual pace and is as late, the sender itself has stood still, and the line goes on from there. */
-static bool is_of_stall(stream_clock_t *self, bool is_paced)
+ * sample comes at the usual pace and is as late, the sender itself has stood still, and the line goes on from there. So it does
+ * where samples come at their pace and too early: one before them was taken for a later one. */
+static bool is_of_stall(stream_clock_t *self, int64_t gap_us_q16)
 {
-    const bool is_late = self->settled >= MEMORY && self->late_us_q16 > margin_max_q16(self);
-    const bool is_stall = is_late || (self->stalled > 0 && !is_paced);
+    const bool is_paced = gap_us_q16 * 2 > self->period_us_q16;
+    const bool is_next = gap_us_q16 * 4 > self->period_us_q16 * 3;
+    const bool is_early = is_next && -self->late_us_q16 > self->jitter_us_q16 + self->period_us_q16 / 2;
+    const bool is_late = self->late_us_q16 > margin_max_q16(self);
+    const bool is_stall = (self->settled >= MEMORY && (is_late || is_early)) || (self->stalled > 0 && !is_paced);
     self->stalled = !is_stall ? 0 : self->stalled + (is_paced ? 1u : 0u);
     if (self->stalled < STALLED) {
         return is_stall;
@@ -448,6 +431,12 @@ static bool is_taken_as_stated(stream_clock_t *self, int64_t gap_us_q16)
     return false;
 }
 
+void stream_clock_put(stream_clock_t *self, uint64_t now_us, unsigned periods)
+{
+    self->late_us_q16 += (int64_t)stream_clock_elapsed_us(self, now_us) * STREAM_US_Q16 - (int64_t)periods * self->period_us_q16;
+    self->last_us = now_us;
+}
+
 bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods)
 {
     const uint32_t gap_us = stream_clock_elapsed_us(self, now_us);
@@ -470,7 +459,7 @@ bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods)
     }
     const int64_t was_us_q16 = self->late_us_q16;
     self->late_us_q16 += gap_us_q16 - (int64_t)periods * self->period_us_q16;
-    if (is_of_stall(self, is_paced)) {
+    if (is_of_stall(self, gap_us_q16)) {
         return false;
     }
     correct(self, self->late_us_q16, periods);

@@ -12,7 +12,6 @@
 enum {
     STREAM_CLOCK_MEMORY = 48,       /**< samples that the line is found from */
     STREAM_CLOCK_MEMORY_MAX = 1024, /**< ... of a fast sender */
-    STREAM_CLOCK_HALVES = 4,        /**< samples half-way between two of the line that tell twice its rate */
     STREAM_CLOCK_STALLED = 2,       /**< samples at the usual pace that tell that a sender stood still */
     STREAM_CLOCK_LOST_MEMORY = 256  /**< samples that losses are counted in */
 };
@@ -48,6 +47,9 @@ unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t 
  *  @return true where the sender has another rate now: its time line begins anew with this sample */
 bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods);
 
+/** Takes a sample whose time tells nothing of the line. */
+void stream_clock_put(stream_clock_t *self, uint64_t now_us, unsigned periods);
+
 /** How late the latest samples of the last seconds were, in periods. Period known. */
 q32_t stream_clock_jitter(const stream_clock_t *self);
 
@@ -65,11 +67,6 @@ uint32_t stream_clock_lost_permille(const stream_clock_t *self);
 
 /** True where more than one of 16 is lost, of a sender that has a sample for each period. */
 bool stream_clock_is_gappy(const stream_clock_t *self);
-
-/** Whether a sample that came at now_us, and whose value says so too, lies half-way between two of the line: a sender that is
- *  twice as fast now, if it goes on so.
- *  @return 1 where it does, 2 where that has lasted: another rate is due; 0 where it is none */
-unsigned stream_clock_between(stream_clock_t *self, uint64_t now_us, q32_t advance_q32);
 
 /** How late the newest sample was against the line, in periods; negative: early. Period known. */
 q32_t stream_clock_lateness(const stream_clock_t *self);

@@ -225,11 +225,12 @@ static q32_t point_between(q32_t before_q32, q32_t last_q32, q32_t next_q32, int
     return periods == 2 ? last_q32 + (next_q32 - before_q32) / 3 : last_q32 + (next_q32 - last_q32) / periods;
 }
 
-/* Interpolates the committed points between the newest sample and the sample before it, which is `periods` older. */
+/* Interpolates the points between the newest sample and the sample before it, which is `periods` older. What is found here for
+ * those that are not committed yet is improved then. */
 HV_WRAPS static void fill_gap(stream_curve_t *self, int32_t periods, const q32_t *before_q32)
 {
     const q32_t *const two_before_q32 = self->point_q32[stream_points_slot(stream_points_newest(self) - 3)];
-    for (int32_t back = self->ahead > 1 ? self->ahead : 1; back < periods && back < self->ahead + BEHIND_MAX; back++) {
+    for (int32_t back = 1; back < periods && back < self->ahead + BEHIND_MAX; back++) {
         q32_t *const point_q32 = self->point_q32[stream_points_slot(stream_points_newest(self) - (uint32_t)back)];
         for (unsigned axis = 0; axis < self->axes; axis++) {
             const q32_t way = self->last_q32[axis] - before_q32[axis];
@@ -243,8 +244,8 @@ HV_WRAPS void stream_curve_append(stream_curve_t *self, unsigned periods, bool i
                                   const q32_t *point_q32)
 {
     q32_t before_q32[AXES_MAX];
-    if (self->ahead < 0) {
-        note_change(self, -self->ahead);
+    if (self->ahead < 0 || (self->ahead == 0 && periods == 0)) {
+        note_change(self, self->ahead < 0 ? -self->ahead : 1);
     }
     const int32_t furthest = is_of_stall ? -AHEAD_MAX : -BEHIND_MAX - (int32_t)periods;
     if (self->ahead < furthest) {
@@ -399,15 +400,27 @@ static q32_t jump_speed(const stream_curve_t *self, q32_t off_q32)
     return fx_mul_shift(fx_abs(off_q32), fx_clamp(self->grip_q32 * 5 / 16, 0, Q32_ONE / 16), 32);
 }
 
+/* Of two steps, the one that both tell of a motion: the smaller one, or none where they go to and fro. */
+static q32_t common_step(q32_t a_q32, q32_t b_q32)
+{
+    const q32_t smaller_q32 = fx_abs(a_q32) < fx_abs(b_q32) ? a_q32 : b_q32;
+    return (a_q32 < 0) == (b_q32 < 0) ? smaller_q32 : 0;
+}
+
 /* Places points in even steps up to a sample that is `periods` after the last one. Points before the last one continue these
- * steps; at the begin of a stream they lie where it began. */
-HV_WRAPS static void place_points(stream_curve_t *self, const q32_t *first_q32, unsigned periods, const q32_t *sample_q32)
+ * steps; at the begin of a stream that is seen they lie where it began. One that is not seen yet may be moving already, but no
+ * faster than the axis may, and as its first three samples agree on. */
+HV_WRAPS static void place_points(stream_curve_t *self, const q32_t *first_q32, bool is_seen, unsigned periods,
+                                  const q32_t *sample_q32)
 {
     for (unsigned axis = 0; axis < self->axes; axis++) {
         const q32_t travel_q32 = sample_q32[axis] - self->last_q32[axis];
-        const q32_t step_q32 = (int32_t)periods > self->patience ? 0 : travel_q32 / (int32_t)periods;
+        q32_t step_q32 = (int32_t)periods > self->patience ? 0 : travel_q32 / (int32_t)periods;
+        if (!is_seen) {
+            step_q32 = stream_guess_within_speed(self, axis, common_step(step_q32, self->last_q32[axis] - first_q32[axis]));
+        }
         for (int32_t back = 0; back < STREAM_POINTS - AHEAD_MAX; back++) {
-            const bool is_before = first_q32 != NULL && back > (int32_t)periods;
+            const bool is_before = first_q32 != NULL && is_seen && back > (int32_t)periods;
             self->point_q32[stream_points_slot(self->head - (uint32_t)back)][axis] =
                 is_before ? first_q32[axis] : sample_q32[axis] - back * step_q32;
         }
@@ -437,7 +450,7 @@ HV_WRAPS void stream_curve_regrid(stream_curve_t *self, const kin_t *kin, const 
     self->change = 0;
     self->is_off = false; /* offset and grip were per period of the old grid */
     (void)stream_offset_soften(self, SHIFT_GUESSES);
-    place_points(self, now != NULL ? first_q32 : NULL, periods, sample_q32);
+    place_points(self, first_q32, now != NULL, periods, sample_q32);
     for (unsigned axis = 0; axis < self->axes; axis++) {
         q32_t control_q32[3];
         for (uint32_t i = 0; i < 3; i++) {

@@ -17,7 +17,8 @@
 #define SHIFT_FADE    16             /* samples in which a shift of the line fades to 1/e, as the line follows */
 #define CHANGE_Q32    (Q32_ONE / 32) /* of the weight in a sample */
 #define LATE_MAX_Q32  Q32_ONE
-#define NEAR_Q32      (Q32_ONE / 4) /* samples that came closer to each other tell no speed */
+#define SPEED_MAX_Q32 (16 * Q32_ONE) /* steps beyond so many speed limits count as that */
+#define NEAR_Q32      (Q32_ONE / 4)  /* samples that came closer to each other tell no speed */
 
 enum {
     MIDDLE = STREAM_EVIDENCE / 2,
@@ -64,8 +65,8 @@ static void weigh(stream_evidence_t *self, const governor_t *governor, unsigned 
         const int64_t per_speed_q62 = governor->per_limit_q62[axis][0];
         const q32_t step_q32 = fx_mul_shift((value_q32[MIDDLE - 1] - value_q32[MIDDLE + 1]) / 2, per_speed_q62, 30);
         const q32_t off_q32 = fx_mul_shift(off_neighbours(value_q32), per_speed_q62, 30);
-        const q32_t moved = fx_mul_shift(fx_clamp(step_q32, -16 * Q32_ONE, 16 * Q32_ONE), late_q32, 32);
-        const q32_t off = fx_clamp(off_q32, -16 * Q32_ONE, 16 * Q32_ONE);
+        const q32_t moved = fx_mul_shift(fx_clamp(step_q32, -SPEED_MAX_Q32, SPEED_MAX_Q32), late_q32, 32);
+        const q32_t off = fx_clamp(off_q32, -SPEED_MAX_Q32, SPEED_MAX_Q32);
         told_q32 += fx_mul_shift(off, moved, 32);
         all_off_q32 += fx_mul_shift(off, off, 32);
         moved_q32 += fx_mul_shift(moved, moved, 32);
@@ -93,7 +94,7 @@ static void change_weight(stream_evidence_t *self)
 void stream_evidence_take(stream_evidence_t *self, const governor_t *governor, unsigned axes, unsigned periods, q32_t late_q32,
                           q32_t shift_q32, bool is_coarse, const q32_t *sample_q32)
 {
-    for (unsigned i = STREAM_EVIDENCE - 1; i > 0; i--) {
+    for (unsigned i = STREAM_EVIDENCE - 1; i > 0 && (periods > 0 || self->count == 0); i--) {
         for (unsigned axis = 0; axis < axes; axis++) {
             self->value_q32[i][axis] = self->value_q32[i - 1][axis];
         }
@@ -108,7 +109,7 @@ void stream_evidence_take(stream_evidence_t *self, const governor_t *governor, u
     self->index[0] = 0;
     self->shift_q32[0] = fx_clamp(self->shift_q32[0] - self->shift_q32[0] / SHIFT_FADE + shift_q32, -LATE_MAX_Q32, LATE_MAX_Q32);
     self->axes = axes;
-    self->count += self->count < STREAM_EVIDENCE ? 1u : 0u;
+    self->count += self->count < STREAM_EVIDENCE && (periods > 0 || self->count == 0) ? 1u : 0u;
     if (is_even_run(self) && !is_coarse) {
         weigh(self, governor, axes);
         change_weight(self);
@@ -166,7 +167,7 @@ static q32_t way_in(const stream_evidence_t *self, const stream_predictor_t *pre
     return way_q32;
 }
 
-static q32_t in_speed_limits(const governor_t *governor, unsigned axis, q32_t travel_q32)
+q32_t stream_evidence_in_speed_limits(const governor_t *governor, unsigned axis, q32_t travel_q32)
 {
     return fx_clamp(fx_mul_shift(fx_abs(travel_q32), governor->per_limit_q62[axis][0], 30), 0, 256 * Q32_ONE);
 }
@@ -177,7 +178,7 @@ q32_t stream_evidence_misfit(const stream_evidence_t *self, const governor_t *go
     q32_t sum_q32 = 0;
     for (unsigned axis = 0; axis < self->axes && axis < POSE_AXES; axis++) {
         const q32_t travel_q32 = sample_q32[axis] - self->value_q32[0][axis];
-        sum_q32 += in_speed_limits(governor, axis, travel_q32 - way_in(self, predictor, axis, periods));
+        sum_q32 += stream_evidence_in_speed_limits(governor, axis, travel_q32 - way_in(self, predictor, axis, periods));
     }
     return sum_q32;
 }
@@ -187,16 +188,60 @@ q32_t stream_evidence_apart(const stream_evidence_t *self, const governor_t *gov
 {
     q32_t sum_q32 = 0;
     for (unsigned axis = 0; axis < self->axes && axis < POSE_AXES; axis++) {
-        sum_q32 += in_speed_limits(governor, axis, way_in(self, predictor, axis, a) - way_in(self, predictor, axis, b));
+        sum_q32 +=
+            stream_evidence_in_speed_limits(governor, axis, way_in(self, predictor, axis, a) - way_in(self, predictor, axis, b));
     }
     return sum_q32;
 }
 
-bool stream_evidence_is_newest(const stream_evidence_t *self, unsigned axes, const q32_t *sample_q32)
+/* True if two of the samples, or one of them and another, are equal in all axes. */
+static bool is_equal(const q32_t *a_q32, const q32_t *b_q32, unsigned axes)
 {
     unsigned axis = 0;
-    while (axis < axes && self->value_q32[0][axis] == sample_q32[axis]) {
+    while (axis < axes && a_q32[axis] == b_q32[axis]) {
         axis++;
     }
     return axis == axes;
+}
+
+bool stream_evidence_is_newest(const stream_evidence_t *self, unsigned axes, const q32_t *sample_q32)
+{
+    return is_equal(self->value_q32[0], sample_q32, axes);
+}
+
+q32_t stream_evidence_advance(const stream_evidence_t *self, const governor_t *governor, const q32_t *sample_q32)
+{
+    int64_t along_q32 = 0;
+    int64_t square_q32 = 0;
+    unsigned at = 1; /* the newest sample before those that are equal to the newest */
+    while (at < self->count && is_equal(self->value_q32[at], self->value_q32[0], self->axes)) {
+        at++;
+    }
+    if (at >= self->count || self->index[at] <= self->index[at - 1]) {
+        return 0;
+    }
+    for (unsigned axis = 0; axis < POSE_AXES && axis < self->axes; axis++) {
+        const int64_t per_speed_q62 = governor->per_limit_q62[axis][0];
+        const q32_t step_q32 = fx_mul_shift(
+            (self->value_q32[0][axis] - self->value_q32[at][axis]) / (self->index[at] - self->index[at - 1]), per_speed_q62, 30);
+        const q32_t travel_q32 = fx_mul_shift(sample_q32[axis] - self->value_q32[0][axis], per_speed_q62, 30);
+        const q32_t told_q32 = fx_clamp(step_q32, -SPEED_MAX_Q32, SPEED_MAX_Q32);
+        along_q32 += fx_mul_shift(told_q32, fx_clamp(travel_q32, -SPEED_MAX_Q32, SPEED_MAX_Q32), 32);
+        square_q32 += fx_mul_shift(told_q32, told_q32, 32);
+    }
+    return square_q32 > 0 ? fx_mul_div(along_q32, Q32_ONE, square_q32) : 0;
+}
+
+q32_t stream_evidence_rounding(const stream_evidence_t *self, const stream_curve_t *curve)
+{
+    q32_t sum_q32 = 0;
+    for (unsigned axis = 0; axis < self->axes && axis < POSE_AXES; axis++) {
+        sum_q32 += stream_evidence_in_speed_limits(&curve->governor, axis, curve->grain[axis].quantum_q32);
+    }
+    return sum_q32;
+}
+
+bool stream_evidence_is_beyond_noise(const stream_evidence_t *self, q32_t misfit_q32)
+{
+    return fx_mul_shift(misfit_q32, misfit_q32, 32) > fx_shift_down(self->off_q32, MEMORY_SHIFT);
 }

@@ -7,7 +7,10 @@
 #include "stream_points.h"
 #include "stream_predictor.h"
 
-enum { LARGEST_OF = 12 /* newest steps, which bound those that are guessed */ };
+enum {
+    LARGEST_OF = 12, /* newest steps, which bound those that are guessed */
+    FEW = 8          /* samples of a stream that tell no more of its motion than its newest two steps do */
+};
 
 /* Periods that a motion may be kept up so that it does not go further than the axis takes to stop: of v = step / period, the time
  * is sqrt(v / J), or half of v / A + A / J where the acceleration binds. Also the share of such a stop in which A builds up. */
@@ -51,9 +54,14 @@ q32_t stream_guess_within_speed(const stream_curve_t *self, unsigned axis, q32_t
 }
 
 /* How large a step after the newest ones may be: twice the second largest of them. The largest may be a jump, which is no motion
- * that goes on. */
+ * that goes on. Of a stream that has just begun, not larger than the newest two, and none where these go to and fro. */
 static q32_t largest_step(const stream_curve_t *self, unsigned axis, const q32_t step_q32[LARGEST_OF])
 {
+    if (self->age < FEW) {
+        const bool is_one_way = (step_q32[0] < 0) == (step_q32[1] < 0);
+        const q32_t smaller_q32 = fx_abs(step_q32[0]) < fx_abs(step_q32[1]) ? fx_abs(step_q32[0]) : fx_abs(step_q32[1]);
+        return stream_guess_within_speed(self, axis, is_one_way ? smaller_q32 : 0);
+    }
     q32_t largest_q32 = 0;
     q32_t second_q32 = 0;
     for (unsigned i = 0; i < LARGEST_OF; i++) {

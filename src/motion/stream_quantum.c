@@ -5,7 +5,11 @@
  */
 #include "stream_quantum.h"
 
-enum { WATCH = STREAM_QUANTUM_WATCH, TURNS = STREAM_QUANTUM_TURNS };
+enum {
+    WATCH = STREAM_QUANTUM_WATCH,
+    TURNS = STREAM_QUANTUM_TURNS,
+    TELLING = 4 /* grains in a step that is not the rounding of a slow motion */
+};
 
 #define NOTHING_Q32 (Q32_ONE / 1024) /* values are rounded to 2^-16, and maybe scaled: what is less says nothing */
 #define FINEST_Q32  (Q32_ONE / 256)  /* finer grains cannot be told */
@@ -64,4 +68,14 @@ void stream_quantum_watch(stream_curve_t *self, unsigned periods, const q32_t *s
         watch_step(&self->grain[axis], (int32_t)periods, sample_q32[axis] - self->newest_q32[axis]);
         judge(&self->grain[axis], self->watched == WATCH);
     }
+}
+
+bool stream_quantum_tells(const stream_curve_t *self, const q32_t *from_q32, const q32_t *to_q32)
+{
+    bool is_far = false;
+    for (unsigned axis = 0; axis < self->axes; axis++) {
+        const q32_t step_q32 = fx_abs(to_q32[axis] - from_q32[axis]);
+        is_far |= self->grain[axis].found_q32 > 0 && step_q32 >= TELLING * self->grain[axis].found_q32;
+    }
+    return is_far;
 }

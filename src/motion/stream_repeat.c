@@ -7,14 +7,13 @@
 #include "stream_repeat.h"
 
 #include "stream_clock.h"
-#include "stream_curve.h"
 #include "stream_evidence.h"
+#include "stream_quantum.h"
 
 enum {
     RUN_MAX = STREAM_REPEAT_RUN_MAX,
     RUNS_LEAST = 8, /* that tell */
-    RUNS_MOST = STREAM_REPEAT_RUNS_MOST,
-    TELLING = 4 /* grains in a step that is not the rounding of a slow motion */
+    RUNS_MOST = STREAM_REPEAT_RUNS_MOST
 };
 
 #define NEXT_DUE_Q32 (Q32_ONE * 7 / 8) /* of a period after the newest sample, one that stands is the next */
@@ -22,16 +21,6 @@ enum {
 void stream_repeat_reset(stream_repeat_t *self, uint64_t now_us)
 {
     *self = (stream_repeat_t){.began_us = now_us, .run = 1, .each = 1};
-}
-
-static bool is_telling(const stream_curve_t *curve, const q32_t *sample_q32)
-{
-    bool is_far = false;
-    for (unsigned axis = 0; axis < curve->axes; axis++) {
-        const q32_t step_q32 = fx_abs(sample_q32[axis] - curve->newest_q32[axis]);
-        is_far |= curve->grain[axis].found_q32 > 0 && step_q32 >= TELLING * curve->grain[axis].found_q32;
-    }
-    return is_far;
 }
 
 /* A run is over. Of a sender that is known to repeat, a longer one is two that happen to be of one value. */
@@ -56,13 +45,15 @@ HV_WRAPS static void count_run(stream_repeat_t *self, uint64_t now_us, bool tell
     }
 }
 
-bool stream_repeat_watch(stream_t *stream, uint64_t now_us, const q32_t *sample_q32)
+bool stream_repeat_watch(stream_t *stream, uint64_t now_us, bool is_caught_up, const q32_t *sample_q32)
 {
     stream_repeat_t *const self = &stream->repeat;
     q32_t ahead_q32;
     q32_t late_q32;
     if (!stream_evidence_is_newest(&stream->evidence, stream->curve.axes, sample_q32)) {
-        count_run(self, now_us, is_telling(&stream->curve, sample_q32));
+        if (!is_caught_up) {
+            count_run(self, now_us, stream_quantum_tells(&stream->curve, stream->curve.newest_q32, sample_q32));
+        }
         self->run = 1;
         self->began_us = now_us;
         return false;
@@ -78,7 +69,8 @@ static unsigned find_each(const stream_repeat_t *self)
 {
     const bool is_known = self->runs >= RUNS_LEAST && self->telling * 2 >= self->runs;
     const bool is_even = self->longest * self->runs <= 2 * self->frames;
-    const unsigned each = (self->frames * 4 + self->runs * 3) / (self->runs * 4 + 1);
+    const bool is_alone = self->frames * 3 <= self->runs * 4; /* a shake has two equal samples at each of its turns */
+    const unsigned each = is_alone ? 1 : (self->frames * 4 + self->runs * 3) / (self->runs * 4 + 1);
     const bool is_less = each == 1 || self->frames * 2 + 3 * self->runs < 2 * self->each * self->runs;
     return is_known && (each > self->each ? is_even : is_less) ? each : self->each;
 }

@@ -15,8 +15,9 @@ enum {
 void stream_repeat_reset(stream_repeat_t *self, uint64_t now_us);
 
 /** Looks at the next sample. The stream runs.
+ *  @param is_caught_up its values froze before it: that was no repetition
  *  @return true if it only repeats the newest one, as this sender does; a sample that stands for longer is none of these */
-bool stream_repeat_watch(stream_t *stream, uint64_t now_us, const q32_t *sample_q32);
+bool stream_repeat_watch(stream_t *stream, uint64_t now_us, bool is_caught_up, const q32_t *sample_q32);
 
 /** The period of the values, where it is just found that the sender repeats them, or how often; else 0. */
 uint32_t stream_repeat_period_us(stream_t *stream);

@@ -56,7 +56,7 @@ static bool are_counts_sane(const stream_clock_t *clock, bool is_empty)
     return clock->settled <= STREAM_CLOCK_MEMORY_MAX && clock->memory <= STREAM_CLOCK_MEMORY_MAX &&
            clock->counted <= STREAM_CLOCK_LOST_MEMORY && stream_sane_within(clock->lost_q16, 0, 8 * Q16_ONE) &&
            clock->each <= UINT16_MAX && (clock->each > 0 || is_empty) && clock->stalled < STREAM_CLOCK_STALLED &&
-           clock->between <= COUNT_MAX && sane_bool(&clock->is_sparse);
+           sane_bool(&clock->is_sparse);
 }
 
 static bool is_clock_sane(const stream_t *saved, const stream_t *prepared)
@@ -90,6 +90,13 @@ static bool is_thin_sane(const stream_thin_t *thin)
            stream_sane_all(thin->spare_q32, AXES_MAX, SAMPLE_MAX_Q32);
 }
 
+static bool is_sample_sane(const stream_sample_t *sample)
+{
+    return stream_sane_within(sample->misfit_q32, 0, MISFIT_MAX_Q32) && sample->losses <= STREAM_LOSSES_MAX &&
+           sample->stood <= STREAM_STOOD_MAX + 1 && sample->moved <= STREAM_MOVED_MAX && sample->caught <= STREAM_CAUGHT_MAX &&
+           sample->halves <= COUNT_MAX && sample->doubt_us <= GAP_MAX_US;
+}
+
 /* A stream that has not begun has seen no run. */
 static bool is_repeat_sane(const stream_repeat_t *repeat, bool is_empty)
 {
@@ -108,8 +115,7 @@ bool stream_is_sane(const stream_t *saved, const stream_t *prepared)
     bool is_sane = is_clock_sane(saved, prepared) && is_evidence_sane(&saved->evidence) && is_thin_sane(&saved->thin) &&
                    is_repeat_sane(&saved->repeat, is_empty) && sane_bool(&saved->is_fresh) && sane_bool(&saved->is_hidden) &&
                    saved->pair <= COUNT_MAX && (saved->pair > 0 || is_empty) && sane_time(saved->began_us) &&
-                   stream_sane_within(saved->misfit_q32, 0, MISFIT_MAX_Q32) && saved->losses <= STREAM_LOSSES_MAX &&
-                   stream_sane_within(saved->between_q32, 0, Q32_ONE - 1) &&
+                   is_sample_sane(&saved->sample) && stream_sane_within(saved->between_q32, 0, Q32_ONE - 1) &&
                    stream_sane_within(saved->error_q32, -ERROR_MAX_Q32, ERROR_MAX_Q32) &&
                    stream_curve_is_sane(&saved->curve, &prepared->curve, saved->style, saved->phase == STREAM_RUNNING) &&
                    governor_is_sane(&saved->curve.governor, saved->cycle_us, saved->phase == STREAM_RUNNING);

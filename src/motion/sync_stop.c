@@ -258,7 +258,7 @@ q32_t sync_stop_velocity(const sync_stop_t *self, unsigned axis, int64_t cycle)
 void sync_stop_step(sync_stop_t *self, ramp_ref_t *ref)
 {
     const bool was_done = sync_stop_is_done(self);
-    self->elapsed++;
+    self->elapsed += self->elapsed <= self->cycles ? 1 : 0; /* past the end it does not count for ever */
     for (unsigned i = 0; i < self->axes; i++) {
         const sync_stop_times_t *t = &self->times[i];
         const bool is_ending = self->elapsed >= t->change + t->hold + t->back;

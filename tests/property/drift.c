@@ -169,7 +169,8 @@ static void essence(motion_t *motion)
     stream_t *stream = &motion->stream;
     memset(&stream->thin, 0, sizeof stream->thin);
     memset(&stream->clock, 0, sizeof stream->clock);
-    memset(&stream->evidence, 0, sizeof stream->evidence); /* which values came at which times; misfit_q32 is compared */
+    memset(&stream->evidence, 0, sizeof stream->evidence); /* which values came at which times, ... */
+    stream->sample = (stream_sample_t){0};                 /* ... and how well they fitted; all are equal now */
     stream->between_q32 = stream->error_q32 = stream->rate_q32[0] = stream->rate_q32[1] = 0;
     stream_curve_t *curve = &stream->curve;
     for (unsigned i = 0; i < AXES_MAX; i++) {
@@ -179,6 +180,10 @@ static void essence(motion_t *motion)
     }
     curve->predictor = (stream_predictor_t){0};
     curve->head = curve->watched = 0;
+    curve->mean_points = 0; /* of equal points, any number has the same mean, ... */
+    curve->led_q32 = 0;     /* ... and none leads anywhere, ... */
+    curve->change = 0;      /* ... nor is a change of them one */
+    memset(curve->was_q32, 0, sizeof curve->was_q32);
     curve->ahead = curve->patience = 0;
     curve->period_cycles_q16 = curve->grip_q32 = curve->softest_q32 = 0;
     curve->reach_min_q16 = curve->reach_max_q16 = 0;

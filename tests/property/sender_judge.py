@@ -13,6 +13,7 @@ from operator import mul, sub
 COLUMNS = 17
 FIRST_POSE, FIRST_CYLINDER = 2, 9
 ROUNDING = (0.0, 1e-9, 2e-9, 4e-9)  # what nine decimals are worth in a difference
+FELT_MS = 25
 LAGS_MS = range(-20, 1301)
 
 
@@ -144,21 +145,28 @@ def errors(column, truth, lag, first, last):
     return [y - a - part * (b - a) for y, a, b in zip(column[first:last], near, far)]
 
 
-def following(trace, truth, platform, first, last, weights, worst_mm=None, lag_ms=None, shape=None, jerk=None, main=None):
-    """Lag (one for all axes), error beside the truth of that lag, jerk over the truth's own. main: the axis that bars speak of, the others are
-    reported as the largest. Times outside first..last are left out: settling at the start."""
+def felt(error):
+    """rms of an error's acceleration below some 20 Hz, in m/s^2: its second difference over steps of FELT_MS, which weighs what is faster less and less."""
+    seconds = [c - 2 * b + a for a, b, c in zip(error, error[FELT_MS:], error[2 * FELT_MS:])]
+    return rms(seconds) / 1000 / (FELT_MS / 1000) ** 2
+
+
+def following(trace, truth, platform, first, last, weights, worst_mm=None, lag_ms=None, shape=None, jerk=None, accel=None, main=None):
+    """Lag (one for all axes), error beside the truth of that lag, the acceleration of that error that a person feels, jerk over the truth's own. main:
+    the axis that bars speak of, the others are reported as the largest. Times outside first..last are left out: settling at the start."""
     lag = best_lag(trace.values, truth, weights, first, last)
     used = [k for k, column in enumerate(truth) if max(column) > min(column)]
     main = used[0] if main is None else main
-    worst, shapes, jerks = {}, {}, {}
+    worst, shapes, jerks, accels = {}, {}, {}, {}
     for k in used:
         error = errors(trace.values[k], truth[k], lag, first, last)
-        worst[k], shapes[k] = most(error), rms(error)
+        worst[k], shapes[k], accels[k] = most(error), rms(error), felt(error) * weights[k]
         whole = round(lag)
         own = rms(differences(truth[k][first - whole:last - whole], 3))
         jerks[k] = rms(differences(trace.values[k][first:last], 3)) / own if own else 0.0
     figures = [Figure("lag", lag, high=lag_ms, unit=" ms"), Figure("worst", worst[main], high=worst_mm, unit=" mm"),
-               Figure("shape", 1000 * shapes[main], high=shape, unit=" um"), Figure("jerk ratio", jerks[main], high=jerk)]
+               Figure("shape", 1000 * shapes[main], high=shape, unit=" um"), Figure("jerk ratio", jerks[main], high=jerk),
+               Figure("accel not asked for", max(accels.values()), high=accel, unit=" m/s^2")]
     if len(used) > 1:
         figures += [Figure("worst of all", max(worst[k] * weights[k] for k in used), high=worst_mm, unit=" mm"),
                     Figure("shape of all", 1000 * max(shapes.values()), high=shape), Figure("jerk ratio of all", max(jerks.values()))]

@@ -295,6 +295,32 @@ def repeated(samples, period_s, times):
     return [Sample(s.at, s.arrives + k * period_s) for s in samples for k in range(times)]
 
 
+def frozen(samples, chance, share):
+    """Values that stand for one to three frames now and then: a program that sends on while the one that makes its values is late."""
+    i = 1
+    while i < len(samples):
+        if chance.random() < share:
+            for s in samples[i:i + chance.randint(1, 3)]:
+                s.at = samples[i - 1].at
+            i += 4
+        else:
+            i += 1
+    return samples
+
+
+def coming_again(samples, chance, share, low_s, high_s):
+    """Some frames come a second time, when others have come meanwhile."""
+    again = [Sample(s.at, s.arrives + chance.uniform(low_s, high_s), s.time_ms, s.mask) for s in samples if chance.random() < share]
+    return sorted(samples + again, key=lambda s: s.arrives)
+
+
+def overtaken(samples, chance, share, late_s):
+    """Some frames come later than those behind them."""
+    for s in samples:
+        s.arrives += late_s if chance.random() < share else 0.0
+    return sorted(samples, key=lambda s: s.arrives)
+
+
 def timed(samples, time_ms):
     for s in samples:
         s.time_ms = time_ms

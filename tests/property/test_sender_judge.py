@@ -72,7 +72,7 @@ def main():
         good[z][100] = high[z] + 0.03 * max((h - l) * w for l, h, w in zip(low, high, weights)) / weights[z]
         expect([J.reach(good, low, high, weights)], "beyond range")
     with suite.case("following: lag to a hundredth of a ms; one row 2 mm off, a slow drift, a rough one, a late one"):
-        bars = {"worst_mm": 1.5, "lag_ms": 41.0, "shape": 20.0, "jerk": 1.2}
+        bars = {"worst_mm": 1.5, "lag_ms": 41.0, "shape": 20.0, "jerk": 1.2, "accel": 0.05}
         judged = lambda columns, **change: J.following(Made(columns), truth, platform, FIRST, ROWS - 100, weights, main=z, **{**bars, **change})  # noqa: E731
         good = lagged(sine, 40.37)
         figures = judged(good)
@@ -80,10 +80,13 @@ def main():
         assert abs(figures[0].value - 40.37) < 0.01 and figures[2].value < 0.2, f"lag {figures[0]}, {figures[2]}"
         off = [column[:] for column in good]
         off[z][9000] += 2.0
-        expect(judged(off, jerk=None), "worst")
+        expect(judged(off, jerk=None, accel=None), "worst")
         wave = [column[:] for column in good]
         wave[z] = [v + 0.05 * math.sin(0.01 * i) for i, v in enumerate(wave[z])]
         expect(judged(wave), "shape")
+        shaken = [column[:] for column in good]
+        shaken[z] = [v + 0.025 * math.sin(2 * math.pi * 10 * 1e-3 * i) for i, v in enumerate(shaken[z])]  # 0.07 m/s^2
+        expect(judged(shaken, jerk=None), "accel not asked for")
         rough = [column[:] for column in good]
         rough[z] = [v + (1e-5 if i % 7 == 0 else 0) for i, v in enumerate(rough[z])]
         expect(judged(rough), "jerk ratio")

@@ -104,12 +104,14 @@ def shake(hz, over, limit, rate_hz, direction="z", space="A", decimals=6, second
 
 
 # ---- streams: error at the best lag ----
-def limits(trace, platform, last):
-    """The limits of the axes, while fading in and then."""
+def limits(trace, platform, last, jerk=None):
+    """The limits of the axes, while fading in and then. jerk: another bar where cylinders that cannot follow lead an axis beyond its jerk."""
     figures = J.limits(trace, platform, [("fade-in ", 0, rows(SETTLED_S)), ("", rows(SETTLED_S), last)])
     for figure in figures:
         if figure.name == "fade-in jerk/limit":
             figure.high = None  # judged where fading in is what is tested
+        elif figure.name == "jerk/limit" and jerk:
+            figure.high = jerk
     return figures
 
 
@@ -138,8 +140,8 @@ def track(make_samples, worst_mm=1.5, size=40.0, hz=0.4, axis="z", decimals=3, s
     return make
 
 
-def cue(make_samples, sizes, bars=None, seconds=40.0, decimals=3, top_hz=6.0, knee_hz=0.35, steep=2.0, of_limits=None, accel_share=None):
-    """A motion cue on several axes. of_limits: scaled so that it uses this much of the limits."""
+def cue(make_samples, sizes, bars=None, seconds=40.0, decimals=3, top_hz=6.0, knee_hz=0.35, steep=2.0, of_limits=None, accel_share=None, most_jerk=None):
+    """A motion cue on several axes. of_limits: scaled so that it uses this much of the limits. most_jerk: see limits()."""
     def make(platform, chance):
         size = along(platform, **sizes)
         signal = S.Cue(chance, platform.home, size, seconds, top_hz, knee_hz=knee_hz, steep=steep)
@@ -155,7 +157,7 @@ def cue(make_samples, sizes, bars=None, seconds=40.0, decimals=3, top_hz=6.0, kn
             first, last = rows(SETTLED_S), rows(min(seconds, samples[-1].arrives))
             figures = J.following(trace, truth, platform, first, last, weights, main=platform.index("z"), **(bars or {}).get(style, {}))
             return [*figures, Fig("flag accel", 100 * trace.share_of("accel", first, last), high=accel_share, unit=" %"),
-                    settle_range(trace, platform, truth, weights, last), *limits(trace, platform, last)]
+                    settle_range(trace, platform, truth, weights, last), *limits(trace, platform, last, most_jerk)]
         return Ride(S.frames(platform, signal, samples, "A", decimals), judge, S.UP_MS + 1000 * seconds)
     return make
 
@@ -507,6 +509,23 @@ def table(seed):
         bars = {style: {"lag_ms": lag_ms, "worst_mm": worst_mm} for style in STYLES}
         put(f"near the limits: six axes, {share} of them", LARGE,
             cue(via(1, 3, even(60)), {"x": 80, "y": 80, "z": 60, "roll": 4, "pitch": 4, "yaw": 6}, bars, 30.0, knee_hz=0.75, steep=2.3, of_limits=share))
+
+    # frames that are no samples: repeated, frozen, old. Late by what a loss costs at most
+    for name, hz, lag_ms, change in (
+            ("values freeze for 1 to 3 frames, 4 %", 60, 70, lambda s, c: S.frozen(s, c, 0.04)),
+            ("values freeze for 1 to 3 frames, 4 %", 100, 50, lambda s, c: S.frozen(s, c, 0.04)),
+            ("3 % come again after 18 to 60 ms", 60, 45, lambda s, c: S.coming_again(s, c, 0.03, 0.018, 0.060)),
+            ("3 % come again after 18 to 60 ms", 100, 35, lambda s, c: S.coming_again(s, c, 0.03, 0.018, 0.060)),
+            ("2 % come 20 ms late", 60, 50, lambda s, c: S.overtaken(s, c, 0.02, 0.020)),
+            ("2 % come 20 ms late", 100, 40, lambda s, c: S.overtaken(s, c, 0.02, 0.020)),
+            ("10 % come again with other relays after 7 to 15 ms", 60, 45, lambda s, c: S.coming_again(s, c, 0.1, 0.007, 0.015)),
+            ("all come again with other relays after 7 to 15 ms", 60, 45, lambda s, c: S.coming_again(s, c, 1.0, 0.007, 0.015))):
+        bars = {style: {"lag_ms": lag_ms, "worst_mm": 3.0, "accel": 0.15} for style in STYLES}
+        put(f"no sample: {name}, {hz} Hz", LARGE,
+            cue(lambda c, s, hz=hz, f=change: f(via(1, 3, even(hz))(c, s), c), {"x": 80, "y": 80, "z": 60, "roll": 4, "pitch": 4, "yaw": 6}, bars, 30.0,
+                knee_hz=0.75, steep=2.3, of_limits=0.5, most_jerk=3.0))
+        if hz == 60:
+            trouble(f"no sample: {name}", 60, lambda s, c, e, f=change: f(s, c), *((0.9, 1.1) if "come again" in name else (0.5, 1.6)))
 
     # what is right today
     put("timed moves", LARGE, timed_moves())

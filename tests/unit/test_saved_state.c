@@ -186,8 +186,13 @@ static void test_a_stream_that_no_motion_has_is_refused(void)
     SPOIL_BOOL(stream.is_hidden);
     SPOIL(stream.pair, 0);
     SPOIL(stream.began_us, UINT64_MAX);
-    SPOIL(stream.misfit_q32, -1);
-    SPOIL(stream.losses, STREAM_LOSSES_MAX + 1);
+    SPOIL(stream.sample.misfit_q32, -1);
+    SPOIL(stream.sample.losses, STREAM_LOSSES_MAX + 1);
+    SPOIL(stream.sample.stood, STREAM_STOOD_MAX + 2);
+    SPOIL(stream.sample.moved, STREAM_MOVED_MAX + 1);
+    SPOIL(stream.sample.caught, STREAM_CAUGHT_MAX + 1);
+    SPOIL(stream.sample.halves, UINT32_MAX);
+    SPOIL(stream.sample.doubt_us, UINT32_MAX);
     SPOIL(stream.between_q32, Q32_ONE);
     SPOIL(stream.rate_q32[1], INT64_MAX);
     SPOIL(stream.error_q32, INT64_MIN);
@@ -214,7 +219,6 @@ static void test_a_stream_that_no_motion_has_is_refused(void)
     SPOIL(stream.clock.each, 0);
     SPOIL_BOOL(stream.clock.is_sparse);
     SPOIL(stream.clock.stalled, 2);
-    SPOIL(stream.clock.between, UINT32_MAX);
     SPOIL(stream.evidence.value_q32[4][6], INT64_MAX);
     SPOIL(stream.evidence.late_q32[0], 2 * Q32_ONE);
     SPOIL(stream.evidence.shift_q32[4], -2 * Q32_ONE);
@@ -397,7 +401,7 @@ static void test_no_member_is_forgotten(void)
     TEST_ASSERT_EQUAL(32, sizeof(stream_quantum_t));
     TEST_ASSERT_EQUAL(88, sizeof(stream_thin_t));
     TEST_ASSERT_EQUAL(40, sizeof(stream_repeat_t));
-    TEST_ASSERT_EQUAL(10992, sizeof(stream_t));
+    TEST_ASSERT_EQUAL(11008, sizeof(stream_t));
     TEST_ASSERT_EQUAL(4608, sizeof(governor_t));
     TEST_ASSERT_EQUAL(392, sizeof(spike_filter_t));
     TEST_ASSERT_EQUAL(144, sizeof(fade_t));
@@ -406,7 +410,7 @@ static void test_no_member_is_forgotten(void)
     TEST_ASSERT_EQUAL(344, sizeof(motion_straight_t));
     TEST_ASSERT_EQUAL(64, sizeof(scurve_t));
     TEST_ASSERT_EQUAL(168, sizeof(intensity_t));
-    TEST_ASSERT_EQUAL(17584, sizeof(motion_t));
+    TEST_ASSERT_EQUAL(17600, sizeof(motion_t));
 }
 
 int main(void)
