@@ -18,17 +18,17 @@
  *
  * Losses: if a point is missing when the curve needs it, the motion is extrapolated by a linear prediction of its steps (at most
  * twice the second largest of the last 12) and slows down like the quickest stop of the axis (a slow motion in 100 ms, over 50 ms
- * of travel). When samples return, or after 150 ms without any, the curve returns softly to the samples or to the last one:
- * position and velocity of the control points are continuous. So a stream that has ended comes to rest exactly on its last
- * sample, within 2 s, or within 24 periods of a slow stream. A known stream may pause for a second and continues. A new rate
- * gives a new grid, on which the curve continues.
+ * of travel). When samples return, or after 150 ms (or 3.5 periods) without any, the curve returns softly to the samples or to
+ * the last one: position and velocity of the control points are continuous. So a stream that has ended comes to rest exactly on
+ * its last sample, within 2 s, or within 24 periods of a slow stream. A known stream may pause for a second and continues. A new
+ * rate gives a new grid, on which the curve continues.
  *
  * Frames that are no samples: repetitions of the newest values, values that freeze for up to three frames and then catch up, old
  * frames and frames that others have overtaken. See "What a sample is" in src/DESIGN.md. A sender may send each value up to 8
  * times, such as a loop beside a slower game. After about 12 values it is followed at the rate of its values.
  *
- * Hints: a sender that states its period may be slower, and late and lost samples are known from its second sample on. The margin
- * is then at least an eighth of the period, because extrapolation of such a slow stream is poor.
+ * Hints: of a sender that states its period, late and lost samples are known from its second sample on. The margin of such a
+ * stream, and of one below 25 Hz, is at least an eighth of the period, because extrapolation of a slow stream is poor.
  */
 #ifndef HEAVE_STREAM_H
 #define HEAVE_STREAM_H
@@ -44,7 +44,8 @@ typedef enum {
 } stream_style_t;
 
 #define STREAM_PERIOD_MIN_US 4000u   /**< fastest stream: 250 Hz; of a faster one, every second, third, ... sample is used */
-#define STREAM_PERIOD_MAX_US 150000u /**< slowest without a hint: 6.7 Hz; samples further apart are steps */
+#define STREAM_PERIOD_MAX_US 550000u /**< slowest stream: 1.8 Hz; samples further apart are steps */
+#define STREAM_QUIET_US      150000u /**< a faster sender that was silent for so long is quiet */
 #define STREAM_HINT_MIN_US   50000u  /**< a shorter hint is ignored: timers of senders have steps of up to 16 ms */
 #define STREAM_HINT_MAX_US   500000u /**< slowest with a hint: 2 Hz */
 
@@ -273,22 +274,23 @@ void stream_place(stream_t *self, const history_t *now);
 /** Forgets the stream; the next sample starts a new one. */
 void stream_reset(stream_t *self);
 
-/** Sets the period that the sender states with the next sample, at most STREAM_HINT_MAX_US; 0 = none (default). With a hint, a
- * stream may be slower than STREAM_PERIOD_MAX_US, and its second sample may be late. Without one, such a slow stream ends. */
+/** Sets the period that the sender states with the next sample, at most STREAM_HINT_MAX_US; 0 = none (default). With a hint, the
+ * second sample of a stream may be late. */
 void stream_hint_period(stream_t *self, uint32_t period_us);
 
 /** True if a sample at now_us would continue the present stream. A stream of 12 samples or more may pause for a second; a shorter
- * one for STREAM_PERIOD_MAX_US or 3.5 periods. */
+ * one for STREAM_QUIET_US or 3.5 periods. */
 bool stream_goes_on(const stream_t *self, uint64_t now_us);
 
 /** Takes a sample. Bounded time.
  *  @param now_us     arrival, never decreasing
  *  @param kin        the mechanism, where the axes are those of poses; else NULL
  *  @param sample_q32 one value per axis, within +-2^48
- *  A sample within STREAM_PERIOD_MAX_US of the last one (or within 3.5 periods of a stream that runs) continues or begins a
- *  stream; any other, and one that follows a lone sample within 2 ms, is a lone sample. Repeated, frozen and old values are
- *  no samples. Two samples are steps; the third one makes a stream, or the second where the sender states
- *  its period. */
+ *  A sample within STREAM_PERIOD_MAX_US of the first or second one (or within STREAM_QUIET_US or 3.5 periods of the last one of a
+ *  stream that runs) continues or begins a stream; any other, and one that follows a lone sample within 2 ms, is a lone sample.
+ *  Repeated, frozen and old values are no samples. Two samples are steps; the third one makes a stream, or the second where the
+ *  sender states its period. Where one of their intervals is longer than STREAM_QUIET_US, the third one makes a stream only if
+ * they are alike. */
 void stream_push(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32);
 
 /** References for the cycle at now_us, one per axis, with consistent backward differences (vel[k] = pos[k]-pos[k-1] and so on,
@@ -299,7 +301,7 @@ void stream_push(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t 
  *  @return false while no sample has come since reset (ref unchanged). */
 bool stream_step(stream_t *self, uint64_t now_us, const kin_t *kin, ramp_ref_t *ref);
 
-/** True while samples come regularly: period known, last arrival at most STREAM_PERIOD_MAX_US or 3.5 periods ago. */
+/** True while samples come regularly: period known, last arrival at most STREAM_QUIET_US or 3.5 periods ago. */
 bool stream_is_live(const stream_t *self, uint64_t now_us);
 
 /** Estimated period of the sender, 0 while unknown; and how late the samples are rendered, for display. us. */

@@ -125,7 +125,7 @@ static bool is_instant(const motion_t *self, const motion_target_t *target, uint
 /* Targets that follow each other as quickly and as evenly as those of a stream, whatever time they state. */
 static bool is_in_a_row(const motion_t *self, uint64_t gap_us)
 {
-    return self->last_gap_us > 0 && gap_us <= STREAM_PERIOD_MAX_US && is_about(gap_us, self->last_gap_us);
+    return self->last_gap_us > 0 && gap_us <= STREAM_QUIET_US && is_about(gap_us, self->last_gap_us);
 }
 
 /* A timed target is a sample of a stream if its time is about the period of the one that runs, or if it comes at that one's pace
@@ -270,7 +270,7 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
     /* a sender that does not wait for the time it states does not mean it */
     self->is_time_idle = gap_us <= STREAM_HINT_MAX_US && (self->is_time_idle || gap_us * 5 < self->last_stated_us * UINT64_C(2));
     const bool is_short = target->is_timed && target->time_ms <= STREAM_HINT_MAX_US / 1000;
-    self->last_gap_us = is_short && gap_us <= STREAM_PERIOD_MAX_US ? (uint32_t)gap_us : 0;
+    self->last_gap_us = is_short && gap_us <= STREAM_QUIET_US ? (uint32_t)gap_us : 0;
     self->last_us = now_us;
     self->last_stated_us = period_stated(target);
     if (!is_sample && is_under_way(self, target)) {

@@ -11,7 +11,7 @@
 #define COEFFICIENT_MAX ((q32_t)1 << 56)   /* see profile.c */
 #define STOP_TERM_MAX   ((int64_t)1 << 60) /* of the products that a velocity in a stop is made of */
 #define ONE_Q58         ((int64_t)1 << 58)
-#define PERIOD_MAX_US   (STREAM_HINT_MAX_US * 2)
+#define PERIOD_MAX_US   (STREAM_PERIOD_MAX_US * 2)
 
 enum { SETTLED_MAX = 8, GAP_MAX = 5 }; /* see spike_filter.c */
 

@@ -20,6 +20,9 @@
 #define BEHIND_MAX_Q32       (Q32_ONE * 6)              /* further behind its time, a sample is skipped */
 #define FEW                  16                         /* grains in a step that tells too little */
 #define PAIR                 2u                         /* samples that are steps; with the next one they are a stream, ... */
+#define UNEVEN_PARTS         6                          /* slow steps that differ by more than such a part are uneven */
+#define ON_LEAST_Q32         (Q32_ONE / 3)              /* ... and one that is not such a part of the one before it ... */
+#define ON_MOST_Q32          (Q32_ONE * 3)              /* ... to so many times it does not lead on */
 #define BEGIN_US             (3 * STREAM_PERIOD_MIN_US) /* ... but of a flood, with those of so long */
 
 /* Thinning out. Counted, not timed: every so manyth sample of an even stream is an even stream. */
@@ -84,9 +87,7 @@ void stream_reset(stream_t *self)
 void stream_hint_period(stream_t *self, uint32_t period_us)
 {
     HV_ASSERT(period_us <= STREAM_HINT_MAX_US);
-    if (stream_clock_hint(&self->clock, period_us > STREAM_HINT_MIN_US ? period_us : 0)) {
-        self->phase = STREAM_EMPTY;
-    }
+    stream_clock_hint(&self->clock, period_us > STREAM_HINT_MIN_US ? period_us : 0);
 }
 
 /* True where steps are a few grains: then values tell no time. */
@@ -172,8 +173,11 @@ static bool is_thinned_anew(stream_t *self, uint64_t now_us)
 
 static void pace_curve(stream_t *self)
 {
-    stream_curve_pace(&self->curve, self->style, (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16), self->cycle_us,
-                      stream_clock_is_lossy(&self->clock));
+    const uint32_t period_us = (uint32_t)(self->clock.period_us_q16 / STREAM_US_Q16);
+    stream_curve_pace(&self->curve, self->style, period_us, self->cycle_us, stream_clock_is_lossy(&self->clock));
+    if (period_us > STREAM_QUIET_US && self->clock.hint_us == 0) { /* no other sample may follow: it stops on this one */
+        self->curve.reach_min_q16 = self->curve.reach_max_q16 = 0;
+    }
 }
 
 /* A curve from where the axes are, through the samples from now on. */
@@ -197,6 +201,32 @@ static void start_curve(stream_t *self, const kin_t *kin, uint32_t interval_us, 
 static bool is_begun(const stream_t *self, uint64_t now_us)
 {
     return self->clock.hint_us > 0 || (self->pair > PAIR && now_us - self->began_us >= BEGIN_US);
+}
+
+/* Steps that are far apart are those of a stream where they come evenly and the newer one leads on where the older one did. Poses
+ * to and fro, and one that is repeated, are moves of their own: the curve would make a third of them, and late. */
+static bool is_slow_move(const stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+{
+    const uint32_t gap_us = stream_clock_elapsed_us(&self->clock, now_us);
+    const uint32_t longer_us = gap_us > self->pair_gap_us ? gap_us : self->pair_gap_us;
+    const uint32_t shorter_us = gap_us < self->pair_gap_us ? gap_us : self->pair_gap_us;
+    if (self->phase != STREAM_LONE || self->pair != PAIR || self->clock.hint_us > 0 || longer_us <= STREAM_QUIET_US) {
+        return false;
+    }
+    const q32_t advance_q32 = stream_evidence_advance(&self->evidence, &self->curve.governor, sample_q32);
+    return longer_us - shorter_us > longer_us / UNEVEN_PARTS || advance_q32 < ON_LEAST_Q32 || advance_q32 > ON_MOST_Q32;
+}
+
+/* The newer two of three such steps may be the first ones of a stream. */
+static void start_at_second(stream_t *self, const kin_t *kin)
+{
+    const uint64_t second_us = self->clock.last_us;
+    q32_t second_q32[AXES_MAX];
+    for (unsigned axis = 0; axis < self->curve.axes; axis++) {
+        second_q32[axis] = self->evidence.value_q32[0][axis];
+    }
+    stream_clock_start(&self->clock, second_us);
+    start_lone(self, second_us, kin, second_q32);
 }
 
 /* A stream that begins as a flood is thinned out from its beginning. */
@@ -283,6 +313,9 @@ static void take_frame(stream_t *self, uint64_t now_us, const kin_t *kin, const 
     } else if (kind == STREAM_SAMPLE_INSTEAD) {
         take_doubtful(self, now_us, 0, sample_q32);
     } else if (kind != STREAM_SAMPLE_NONE) {
+        if (is_slow_move(self, now_us, sample_q32)) {
+            start_at_second(self, kin);
+        }
         take_sample(self, now_us, kin, kind == STREAM_SAMPLE_OTHER_RATE, sample_q32);
     }
 }

@@ -23,6 +23,8 @@ enum {
 };
 
 #define PERIOD_MIN_Q16  ((int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16)
+#define PERIOD_MAX_Q16  ((int64_t)STREAM_PERIOD_MAX_US * STREAM_US_Q16 / 3 * 4) /* of one that runs: no flipping at the edge */
+#define OPEN_Q16        ((int64_t)100000 * STREAM_US_Q16) /* at first, any sample may be late, but of a slower sender */
 #define SLOW_Q16        ((int64_t)40000 * STREAM_US_Q16)
 #define MARGIN_MIN_Q16  ((int64_t)500 * STREAM_US_Q16)
 #define MARGIN_FREE_Q16 ((int64_t)200 * STREAM_US_Q16)
@@ -30,13 +32,6 @@ enum {
 #define FAST_US         16000                              /* the line of a sender that is faster is found from more samples */
 #define AWAY_US         1000000u
 #define ELAPSED_MAX_US  4000000u /* far beyond the end of any curve */
-
-/* A running stream may be slower than what it may begin with: no flipping at the edge. */
-static int64_t period_max_q16(const stream_clock_t *self)
-{
-    const uint32_t slowest_us = self->hint_us > STREAM_PERIOD_MAX_US ? self->hint_us : STREAM_PERIOD_MAX_US;
-    return (int64_t)slowest_us * STREAM_US_Q16 / 3 * 4;
-}
 
 /* Slow senders, and those that state their period, are programs that wait that long and wake late by a share of it. A guess at so
  * slow a stream is poor, and an eighth of a period more is little beside its delay. */
@@ -56,7 +51,7 @@ static int64_t margin_max_q16(const stream_clock_t *self)
 
 static void set_period(stream_clock_t *self, int64_t period_us_q16)
 {
-    self->period_us_q16 = fx_clamp(period_us_q16, PERIOD_MIN_Q16, period_max_q16(self));
+    self->period_us_q16 = fx_clamp(period_us_q16, PERIOD_MIN_Q16, PERIOD_MAX_Q16);
     self->per_us_q46 = Q62_ONE / self->period_us_q16;
 }
 
@@ -64,10 +59,10 @@ void stream_clock_start(stream_clock_t *self, uint64_t now_us)
 {
     const uint32_t hint_us = self->hint_us;
     *self = (stream_clock_t){.last_us = now_us, .delay_max_us = self->delay_max_us, .memory = MEMORY, .each = 1};
-    (void)stream_clock_hint(self, hint_us);
+    stream_clock_hint(self, hint_us);
 }
 
-bool stream_clock_hint(stream_clock_t *self, uint32_t hint_us)
+void stream_clock_hint(stream_clock_t *self, uint32_t hint_us)
 {
     self->hint_us = hint_us;
     if (self->settled == 0) {
@@ -78,7 +73,6 @@ bool stream_clock_hint(stream_clock_t *self, uint32_t hint_us)
         set_period(self, (int64_t)hint_us * STREAM_US_Q16);
         self->margin_us_q16 = margin_min_q16(self);
     }
-    return self->period_us_q16 > period_max_q16(self);
 }
 
 uint32_t stream_clock_elapsed_us(const stream_clock_t *self, uint64_t now_us)
@@ -96,12 +90,13 @@ static bool is_within(const stream_clock_t *self, uint64_t now_us, uint32_t leas
 
 bool stream_clock_is_live(const stream_clock_t *self, uint64_t now_us)
 {
-    return is_within(self, now_us, STREAM_PERIOD_MAX_US);
+    return is_within(self, now_us, STREAM_QUIET_US);
 }
 
 bool stream_clock_is_near(const stream_clock_t *self, uint64_t now_us)
 {
-    return is_within(self, now_us, self->settled >= KNOWN ? AWAY_US : STREAM_PERIOD_MAX_US);
+    const bool is_slow = self->settled < SECOND && self->hint_us == 0; /* perhaps */
+    return is_within(self, now_us, self->settled >= KNOWN ? AWAY_US : is_slow ? STREAM_PERIOD_MAX_US : STREAM_QUIET_US);
 }
 
 q32_t stream_clock_span(const stream_clock_t *self, uint32_t span_us)
@@ -283,7 +278,8 @@ unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t 
     }
     const q32_t late = stream_clock_jitter(self) + (stream_clock_is_bursty(self) ? Q32_ONE : Q32_ONE / 4);
     *ahead_q32 = fx_mul_shift(ahead_us_q16, self->per_us_q46, 30);
-    *late_q32 = fx_clamp(late, self->settled < KNOWN ? Q32_ONE * 5 / 2 : Q32_ONE * 3 / 5, INT64_MAX);
+    const bool is_open = self->settled < KNOWN && self->period_us_q16 < OPEN_Q16;
+    *late_q32 = fx_clamp(late, is_open ? Q32_ONE * 5 / 2 : Q32_ONE * 3 / 5, INT64_MAX);
     const bool is_next = *ahead_q32 <= Q32_ONE + *late_q32 ||
                          (int64_t)stream_clock_elapsed_us(self, now_us) * STREAM_US_Q16 * 2 < self->period_us_q16 * 3;
     return is_next ? 1u : (unsigned)((*ahead_q32 + Q32_ONE / 2) / Q32_ONE);

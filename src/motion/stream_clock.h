@@ -19,9 +19,8 @@ enum {
 /** Forgets everything but what the sender states; the first sample came at now_us. */
 void stream_clock_start(stream_clock_t *self, uint64_t now_us);
 
-/** What the sender states as its period now, 0 = nothing.
- *  @return true if the time line is slower than one without a statement may be */
-bool stream_clock_hint(stream_clock_t *self, uint32_t hint_us);
+/** What the sender states as its period now, 0 = nothing. */
+void stream_clock_hint(stream_clock_t *self, uint32_t hint_us);
 
 /** True while samples come regularly: the newest is 150 ms or 3.5 periods old at most. */
 bool stream_clock_is_live(const stream_clock_t *self, uint64_t now_us);

@@ -80,7 +80,7 @@ uint32_t stream_repeat_period_us(stream_t *stream)
     stream_repeat_t *const self = &stream->repeat;
     const unsigned each = find_each(self);
     const uint32_t period_us = self->runs > 0 ? self->span_us / self->runs : 0;
-    if (self->run != 1 || each == self->each || period_us > STREAM_PERIOD_MAX_US || stream->clock.hint_us > 0 ||
+    if (self->run != 1 || each == self->each || period_us > STREAM_QUIET_US || stream->clock.hint_us > 0 ||
         stream->clock.settled < STREAM_GAPS) {
         return 0;
     }

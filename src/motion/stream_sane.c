@@ -9,7 +9,7 @@
 
 #define LATE_MAX_Q16   ((int64_t)8000000 * STREAM_US_Q16)              /* longer than any stream may be away */
 #define PERIOD_MIN_Q16 ((int64_t)STREAM_PERIOD_MIN_US * STREAM_US_Q16) /* stream_clock.c holds it in these bounds */
-#define PERIOD_MAX_Q16 ((int64_t)STREAM_HINT_MAX_US * STREAM_US_Q16 / 3 * 4)
+#define PERIOD_MAX_Q16 ((int64_t)STREAM_PERIOD_MAX_US * STREAM_US_Q16 / 3 * 4)
 #define SAMPLE_MAX_Q32 ((q32_t)1 << 47) /* see SLOT_MAX_Q32 of axis_targets.c */
 #define SUM_MAX_Q32    ((int64_t)1 << 53)
 #define MISFIT_MAX_Q32 ((q32_t)1 << 44)

@@ -125,7 +125,7 @@ class Cue(Signal):
                 hz = 0.08 * (top_hz / 0.08) ** (k / (waves - 1))
                 parts.append((chance.gauss(0, 1) / (1 + (hz / knee_hz) ** steep), 2 * math.pi * hz * chance.uniform(.97, 1.03), chance.uniform(0, 6.28)))
             bursts = []
-            for _ in range(max(2, int(seconds / 8)) if most else 0):
+            for _ in range(max(2, int(seconds / 8)) if most and top_hz >= 2.5 else 0):
                 hz = chance.uniform(2.5, top_hz)
                 bursts.append((chance.uniform(0, seconds), chance.uniform(.15, .6), hz, 0.012 * 3 / hz))
             peak = max((abs(sum(a * math.sin(w * t + p) for a, w, p in parts)) for t in (i * 0.05 for i in range(int(seconds / 0.05)))), default=1.0) or 1.0

@@ -169,8 +169,8 @@ Fig = J.Figure
 RAMP_BEGIN_S, RAMP_FROM_S = 7.0, 1.2  # judged from 1.2 s after the sender starts to move, to 0.1 s before it stops
 
 
-def ramp(change, hz, low=0.5, high=1.6, speed=20.0, reach=80.0, axis="z", decimals=3, accel=None, make_samples=None):
-    """A constant speed; change(samples, chance, times of the events) is what happens to the sender meanwhile."""
+def ramp(change, hz, low=0.5, high=1.6, speed=20.0, reach=80.0, axis="z", decimals=3, accel=None, make_samples=None, from_s=RAMP_FROM_S):
+    """A constant speed; change(samples, chance, times of the events) is what happens to the sender meanwhile. from_s: after its begin, judged from then on."""
     def make(platform, chance):
         span = platform.fits(along(platform, **{axis: reach})) * reach
         move_s = 2 * span / speed
@@ -181,7 +181,7 @@ def ramp(change, hz, low=0.5, high=1.6, speed=20.0, reach=80.0, axis="z", decima
         samples = change(base, chance, events)
 
         def judge(trace, style):
-            column, first, last = trace.values[platform.index(axis)], rows(RAMP_BEGIN_S + RAMP_FROM_S), rows(RAMP_BEGIN_S + move_s - 0.1)
+            column, first, last = trace.values[platform.index(axis)], rows(RAMP_BEGIN_S + from_s), rows(RAMP_BEGIN_S + move_s - 0.1)
             accels = J.most(J.differences(column[first:last], 2))
             sides = [-span, span]
             return [*J.ramp_speed(column, speed, first, last, low, high), Fig("acceleration", accels, high=accel, unit=" mm/s^2"),
@@ -527,6 +527,15 @@ def table(seed):
         if hz == 60:
             trouble(f"no sample: {name}", 60, lambda s, c, e, f=change: f(s, c), *((0.9, 1.1) if "come again" in name else (0.5, 1.6)))
 
+    # slow senders: 2 1/8 periods late
+    for hz in (2, 3, 5, 7):
+        bars = {style: {"lag_ms": 2250 / hz, "worst_mm": 4.0, "accel": 0.15} for style in STYLES}
+        for name, make_samples in (("network 2-7 ms", even(hz)), ("network 2-7 ms, 2 % lost", lambda c, s, hz=hz: S.dropped(S.even(hz, s), c, 0.02)),
+                                   ("ticks of 15.6 ms, network 2-7 ms", lambda c, s, hz=hz: S.ticks(hz, s))):
+            put(f"slow: ride, {hz} Hz, {name}", LARGE,
+                cue(via(2, 7, make_samples), {"x": 60, "y": 60, "z": 40, "roll": 3, "pitch": 3, "yaw": 4}, bars, 60.0, top_hz=hz / 5, knee_hz=hz / 20, steep=2.3))
+            put(f"slow: ramp, {hz} Hz, {name}", LARGE, ramp(lambda s, c, e: s, hz, make_samples=via(2, 7, make_samples), from_s=RAMP_FROM_S + 2.25 / hz))
+
     # what is right today
     put("timed moves", LARGE, timed_moves())
     put("timed moves, demo", DEMO, timed_moves())
@@ -539,9 +548,9 @@ def table(seed):
              (43.5, 21.5), (.08, .08), (1.1, 5.2)),
             ("slow: 10 Hz", LARGE, plain(10), {"hz": 0.2}, (204, 94), (0.11, 0.08), (1.05, 7.5)),
             ("slow: 6.7 Hz", LARGE, plain(6.7), {"hz": 0.15}, (303, 139), (0.14, 0.1), (1.05, 9.6)),
-            ("slow: 5 Hz", LARGE, plain(5), {"hz": 0.1}, (None, None), (1.3, 1.3), (4700, 4700)),
-            ("slow: 3 Hz", LARGE, plain(3), {"hz": 0.06}, (None, None), (1.75, 1.75), (17000, 17000)),
-            ("slow: 2 Hz", LARGE, plain(2), {"hz": 0.05}, (None, None), (2.5, 2.5), (25000, 25000)),
+            ("slow: 5 Hz", LARGE, plain(5), {"hz": 0.1}, (430, 200), (0.12, 0.12), (1.1, 1.1)),
+            ("slow: 3 Hz", LARGE, plain(3), {"hz": 0.06}, (715, 340), (0.12, 0.12), (1.5, 1.5)),
+            ("slow: 2 Hz", LARGE, plain(2), {"hz": 0.05}, (1075, 510), (0.36, 0.36), (2.1, 2.1)),
             ("plain: 30 Hz", LARGE, plain(30), {}, (70, 33.5), (.055, .045), (1.05, 4.7)),
             ("plain: 60 Hz", LARGE, plain(60), {}, (36.6, 18.3), (.035, .035), (1.35, 7.8)),
             ("plain: 100 Hz", LARGE, plain(100), {}, (23.2, 12.2), (.007, .006), (3.3, 21)),

@@ -278,8 +278,8 @@ static void test_stream_step_lone_sample_is_a_step(void)
     send(0.010 + 0.0005 + 0.001 * STREAM_PERIOD_MAX_US / 1000 + 0.001, -50); /* too late to be a stream */
     render(1, 0, 1000);
     assert_at_rest(q32(12.345), &s_ref[10]);
-    assert_at_rest(q32(12.345), &s_ref[161]);
-    assert_at_rest(q32(-50), &s_ref[162]);
+    assert_at_rest(q32(12.345), &s_ref[561]);
+    assert_at_rest(q32(-50), &s_ref[562]);
     assert_at_rest(q32(-50), &s_ref[999]);
     TEST_ASSERT_FALSE(stream_is_live(&s_stream, 1000000));
     TEST_ASSERT_EQUAL_UINT32(0, stream_period_us(&s_stream));
@@ -315,6 +315,91 @@ static void test_stream_step_third_sample_starts_at_the_second(void)
     /* 10 mm in 20 ms, of which 20 ms at 3000 mm/s^2 make 60 mm/s, and what the curve needs for its way to them */
     TEST_ASSERT_TRUE(speed_max(50, 2000) < 65);
     assert_at_rest(q32(30), &s_ref[1999]);
+}
+
+/* ---- slow senders ---- */
+
+/* Renders what is sent, from 10 ms on, up to two seconds after the last sample; how many rows differ from a step to each sample.
+ */
+static int rows_beside_steps(int *until_ms)
+{
+    int count = 0;
+    *until_ms = (int)(s_sent.at[s_sent.count - 1] * 1000) + 2000;
+    render(1000000, 0, *until_ms);
+    for (int ms = 10, i = 0; ms < *until_ms; ms++) {
+        while (i + 1 < s_sent.count && s_sent.at[i + 1] * 1000 <= ms) {
+            i++;
+        }
+        count += s_ref[ms].pos_q32 != q32(s_sent.value[i]) ? 1 : 0;
+    }
+    return count;
+}
+
+/* Even steps that lead on: a stream from the third one on, which ends on its last sample and goes nowhere else. */
+static void test_stream_step_even_slow_steps_are_a_stream_that_ends_on_the_last(void)
+{
+    for (int period_ms = 160; period_ms <= 540; period_ms += 95) {
+        int until_ms;
+        start(STREAM_SMOOTH);
+        for (int i = 0; i < 8; i++) {
+            send(0.010 + 0.001 * period_ms * i, 3.0 * i);
+        }
+        TEST_ASSERT_TRUE(rows_beside_steps(&until_ms) > 0);
+        for (int ms = 10; ms < until_ms; ms++) {
+            const double at = mm(s_ref[ms].pos_q32);
+            TEST_ASSERT_TRUE(at >= 0 && at <= 21);
+            TEST_ASSERT_TRUE(ms <= 12 + 2 * period_ms || fabs(mm(s_ref[ms].vel_per_cycle_q32)) <= 3.0 / period_ms * 1.15);
+        }
+        assert_at_rest(q32(21), &s_ref[until_ms - 1]);
+    }
+}
+
+static void test_stream_step_slow_poses_that_do_not_lead_on_are_steps(void)
+{
+    const double values[][8] = {
+        {0, 20, -20, 20, -20, 20, -20, 20}, /* to and fro */
+        {5, 5, 5, 5, 30, 30, 30, 30},       /* repeated */
+        {0, 20, 21, 1, 5, 40, 20, 15},      /* now far, now near */
+    };
+    for (unsigned i = 0; i < sizeof values / sizeof values[0]; i++) {
+        for (int period_ms = 160; period_ms <= 540; period_ms += 95) {
+            int until_ms;
+            start(STREAM_SMOOTH);
+            for (int k = 0; k < 8; k++) {
+                send(0.010 + 0.001 * period_ms * k, values[i][k]);
+            }
+            TEST_ASSERT_EQUAL_INT(0, rows_beside_steps(&until_ms));
+        }
+    }
+}
+
+static void test_stream_step_uneven_slow_steps_are_steps(void)
+{
+    const double gaps_s[] = {0.3, 0.2, 0.45, 0.16, 0.3, 0.4, 0.25, 0.54};
+    int until_ms;
+    double at = 0.010;
+    start(STREAM_SMOOTH);
+    for (int i = 0; i < 8; i++) {
+        send(at, 3.0 * i);
+        at += gaps_s[i];
+    }
+    TEST_ASSERT_EQUAL_INT(0, rows_beside_steps(&until_ms));
+}
+
+/* One that is lost among the first samples is missing, and not late for ever. */
+static void test_stream_step_slow_stream_with_an_early_loss_is_no_later(void)
+{
+    for (int lost = 3; lost < 12; lost++) {
+        start(STREAM_SMOOTH);
+        for (int i = 0; i < 24; i++) {
+            if (i != lost) {
+                send(0.010 + 0.3 * i, 3.0 * i);
+            }
+        }
+        render(1000000, 0, 7000);
+        TEST_ASSERT_UINT32_WITHIN(3000, 300000, stream_period_us(&s_stream));
+        TEST_ASSERT_UINT32_WITHIN(20000, 300000 * 17 / 8, stream_delay_us(&s_stream));
+    }
 }
 
 /* ---- exactness ---- */
@@ -1153,7 +1238,7 @@ static void test_stream_step_noise_stays_bounded(void)
             }
             const q32_t span = high - low; /* noise as fast as this swings the curve about: not out of all bounds */
             TEST_ASSERT_TRUE(ref.pos_q32 >= low - 30 * span - 2 && ref.pos_q32 <= high + 30 * span + 2);
-            TEST_ASSERT_TRUE(stream_period_us(&s_stream) <= 200000);
+            TEST_ASSERT_TRUE(stream_period_us(&s_stream) <= STREAM_PERIOD_MAX_US / 3 * 4);
         }
     }
 }
@@ -1165,6 +1250,10 @@ int main(void)
     RUN_TEST(test_stream_step_lone_sample_is_a_step);
     RUN_TEST(test_stream_push_two_samples_at_once_steps_to_the_second);
     RUN_TEST(test_stream_step_third_sample_starts_at_the_second);
+    RUN_TEST(test_stream_step_even_slow_steps_are_a_stream_that_ends_on_the_last);
+    RUN_TEST(test_stream_step_slow_poses_that_do_not_lead_on_are_steps);
+    RUN_TEST(test_stream_step_uneven_slow_steps_are_steps);
+    RUN_TEST(test_stream_step_slow_stream_with_an_early_loss_is_no_later);
     RUN_TEST(test_stream_step_constant_samples_give_a_constant_reference);
     RUN_TEST(test_stream_step_differences_are_consistent);
     RUN_TEST(test_stream_step_signal_that_stops_is_met_exactly);
