@@ -28,6 +28,7 @@ import bench_cortex  # noqa: E402
 import bench_cost  # noqa: E402
 import bench_latency  # noqa: E402
 import bench_peers  # noqa: E402
+import bench_senders  # noqa: E402
 import bench_signal as signals  # noqa: E402
 import latency_run as latency_runs  # noqa: E402
 from bench_rivals import two_limits  # noqa: E402
@@ -331,6 +332,9 @@ def check_bench_arguments(suite):
         "a rate that is no number": (("motion", "--rates", "60,fast"), 2, "60,fast"),
         "a rate out of range": (("motion", "--rates", "60,1"), 2, "from 10 to 200"),
         "a record too short": (("motion", "--seconds", "5"), 2, "from 12"),
+        "a pattern that is none": (("senders", "--only", "(ride"), 2, "'(ride'"),
+        "a ride that there is not": (("senders", "--only", "no such ride", "--no-ruckig", "--program", "/bin/false"), 1, "no such ride", "--list"),
+        "heaved that fails in a ride": (("senders", "--only", "limits: six axes, 0.6", "--no-ruckig", "--program", "/bin/false"), 1, "status 1"),
         "no rounds": (("cost", "--rounds", "0"), 2, "from 1"),
         "too few frames": (("latency", "--frames", "9"), 2, "from 10"),
         "a part of the latency that is none": (("latency", "--only", "can,lin"), 2, "'lin'", "modbus-design"),
@@ -481,6 +485,15 @@ def check_rival(suite):
             best = 2 * math.sqrt(way / 3000) if way < 400**2 / 3000 else way / 400 + 400 / 3000
             expect_near(cycles, 1000 * best, 3, f"ms for {way} mm")
             assert beyond < 0.002, f"{way} mm: {beyond} mm beyond"
+    arrivals = [(100.0 * k, [3.0 * k]) for k in range(20)]
+    with suite.case("the held value, and the straight line to it in the usual time"):
+        assert bench_senders.held(arrivals, 0, 250)[99:201:50] == [0, 3, 3] and bench_senders.held(arrivals, 0, 250)[-1] == 6
+        line = bench_senders.interpolated(arrivals, 0, 2000)
+        expect_near(max(abs(value - max(0, 0.03 * (cycle - 100))) for cycle, value in enumerate(line)), 0, 1e-9, "the distance from the line, a period late")
+    with suite.case("the low-pass is late by its two poles, and its speed is right"):
+        made = bench_senders.low_pass([0.03 * cycle for cycle in range(2000)])
+        expect_near(made[-1] - made[-2], 0.03, 1e-9, "the step")
+        expect_near(1999 - made[-1] / 0.03, 2000 / (2 * math.pi * bench_senders.POLES_HZ), 1.5, "the lag in ms")
 
 
 def times_of(own, peer, rounds=101):
@@ -591,6 +604,16 @@ def check_programs(suite, heaved, bench_core):
         expect_near(row["lag_ms"], smooth["lag_ms"], 0.5, "the lag of z")
         expect_near(row["lag_ms_worst"], row["lag_ms"], 1, "the lag of the worst axis")
         assert row["shape_um"] <= 50 * row["shape_permille_worst"] + 1e-9 < held["shape_um"] and row["jerk_rms_of_true"] <= row["jerk_rms_of_true_worst"] < 10, row
+    with suite.case("bench senders judges heaved and the others alike"):
+        if not heaved:
+            raise tap.Skip("no --heaved")
+        result = run("bench", "senders", "--no-ruckig", "--program", heaved, "--only", "^near the limits: six axes, 0.6", "--json")
+        assert result.returncode == 0, result.stderr
+        (methods,) = json.loads(result.stdout).values()
+        assert list(methods) == ["heaved smooth", "heaved balanced", "low-pass", "line, low-pass", "two limits"], methods
+        smooth = methods["heaved smooth"]
+        assert all(smooth["worst_mm"] < row["worst_mm"] and smooth["jerk_of_true"] < row["jerk_of_true"] for name, row in methods.items() if "heaved" not in name)
+        expect_near(methods["low-pass"]["lag_ms"], 53 + 8 + 2, 5, "the lag of the low-pass")
     with suite.case("bench cost knows every subject of its program, and runs it"):
         if not bench_core:
             raise tap.Skip("no --bench-core")
