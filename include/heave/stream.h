@@ -289,8 +289,8 @@ bool stream_goes_on(const stream_t *self, uint64_t now_us);
  *  A sample within STREAM_PERIOD_MAX_US of the first or second one (or within STREAM_QUIET_US or 3.5 periods of the last one of a
  *  stream that runs) continues or begins a stream; any other, and one that follows a lone sample within 2 ms, is a lone sample.
  *  Repeated, frozen and old values are no samples. Two samples are steps; the third one makes a stream, or the second where the
- *  sender states its period. Where one of their intervals is longer than STREAM_QUIET_US, the third one makes a stream only if
- * they are alike. */
+ *  sender states its period. Where one of their intervals is longer than STREAM_QUIET_US, the fourth one makes a
+ *  stream if they are alike and each step leads on along the one before it, and a sample far beside that is a lone one again. */
 void stream_push(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32);
 
 /** References for the cycle at now_us, one per axis, with consistent backward differences (vel[k] = pos[k]-pos[k-1] and so on,

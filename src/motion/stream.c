@@ -8,6 +8,7 @@
 #include "stream_control.h"
 #include "stream_curve.h"
 #include "stream_evidence.h"
+#include "stream_predictor.h"
 #include "stream_repeat.h"
 #include "stream_sample.h"
 
@@ -23,6 +24,7 @@
 #define UNEVEN_PARTS         6                          /* slow steps that differ by more than such a part are uneven */
 #define ON_LEAST_Q32         (Q32_ONE / 3)              /* ... and one that is not such a part of the one before it ... */
 #define ON_MOST_Q32          (Q32_ONE * 3)              /* ... to so many times it does not lead on */
+#define LEAP_HALVES          3                          /* so many halves of the largest step beside the way it is a leap */
 #define BEGIN_US             (3 * STREAM_PERIOD_MIN_US) /* ... but of a flood, with those of so long */
 
 /* Thinning out. Counted, not timed: every so manyth sample of an even stream is an even stream. */
@@ -197,10 +199,11 @@ static void start_curve(stream_t *self, const kin_t *kin, uint32_t interval_us, 
     self->phase = STREAM_RUNNING;
 }
 
-/* Whether the samples so far make a stream: three of them, or two where the sender states its period. */
+/* Whether the samples so far make a stream: three of them, four of a slow one, or two where the sender states its period. */
 static bool is_begun(const stream_t *self, uint64_t now_us)
 {
-    return self->clock.hint_us > 0 || (self->pair > PAIR && now_us - self->began_us >= BEGIN_US);
+    const unsigned steps = self->pair_gap_us > STREAM_QUIET_US ? PAIR + 1 : PAIR;
+    return self->clock.hint_us > 0 || (self->pair > steps && now_us - self->began_us >= BEGIN_US);
 }
 
 /* Steps that are far apart are those of a stream where they come evenly and the newer one leads on where the older one did. Poses
@@ -210,11 +213,34 @@ static bool is_slow_move(const stream_t *self, uint64_t now_us, const q32_t *sam
     const uint32_t gap_us = stream_clock_elapsed_us(&self->clock, now_us);
     const uint32_t longer_us = gap_us > self->pair_gap_us ? gap_us : self->pair_gap_us;
     const uint32_t shorter_us = gap_us < self->pair_gap_us ? gap_us : self->pair_gap_us;
-    if (self->phase != STREAM_LONE || self->pair != PAIR || self->clock.hint_us > 0 || longer_us <= STREAM_QUIET_US) {
+    if (self->phase != STREAM_LONE || self->pair < PAIR || self->clock.hint_us > 0 || longer_us <= STREAM_QUIET_US) {
         return false;
     }
     const q32_t advance_q32 = stream_evidence_advance(&self->evidence, &self->curve.governor, sample_q32);
     return longer_us - shorter_us > longer_us / UNEVEN_PARTS || advance_q32 < ON_LEAST_Q32 || advance_q32 > ON_MOST_Q32;
+}
+
+/* A sample of a slow stream that is far from where the newest step leads, against the steps so far: no motion that is sampled so
+ * rarely goes on like that, and the curve would make little of it. It is a move of its own, and no stream goes on. */
+static bool is_leap(const stream_t *self, const q32_t *sample_q32)
+{
+    const stream_evidence_t *seen = &self->evidence;
+    const governor_t *scale = &self->curve.governor;
+    const stream_predictor_t even = {.by_newest_q32 = Q32_ONE};
+    if (self->phase != STREAM_RUNNING || self->clock.hint_us > 0 || seen->count < 3 ||
+        self->clock.period_us_q16 <= (int64_t)STREAM_QUIET_US * STREAM_US_Q16) {
+        return false;
+    }
+    q32_t largest_q32 = 0;
+    for (unsigned i = 0; i < seen->count; i++) {
+        const q32_t *const after_q32 = i == 0 ? sample_q32 : seen->value_q32[i - 1];
+        q32_t step_q32 = 0;
+        for (unsigned axis = 0; axis < self->curve.axes && axis < POSE_AXES; axis++) {
+            step_q32 += stream_evidence_in_speed_limits(scale, axis, after_q32[axis] - seen->value_q32[i][axis]);
+        }
+        largest_q32 = step_q32 > largest_q32 ? step_q32 : largest_q32;
+    }
+    return stream_evidence_misfit(seen, scale, &even, 1, sample_q32) * 2 > largest_q32 * LEAP_HALVES;
 }
 
 /* The newer two of three such steps may be the first ones of a stream. */
@@ -300,7 +326,7 @@ static void take_doubtful(stream_t *self, uint64_t now_us, unsigned periods, con
 static void take_frame(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
 {
     self->thin.passed = 0;
-    if (self->phase == STREAM_EMPTY || !stream_clock_is_near(&self->clock, now_us)) {
+    if (self->phase == STREAM_EMPTY || !stream_clock_is_near(&self->clock, now_us) || is_leap(self, sample_q32)) {
         stream_clock_start(&self->clock, now_us);
         start_lone(self, now_us, kin, sample_q32);
         return;

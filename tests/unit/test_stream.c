@@ -335,7 +335,7 @@ static int rows_beside_steps(int *until_ms)
     return count;
 }
 
-/* Even steps that lead on: a stream from the third one on, which ends on its last sample and goes nowhere else. */
+/* Even steps that lead on: a stream from the fourth one on, which ends on its last sample and goes nowhere else. */
 static void test_stream_step_even_slow_steps_are_a_stream_that_ends_on_the_last(void)
 {
     for (int period_ms = 160; period_ms <= 540; period_ms += 95) {
@@ -369,6 +369,24 @@ static void test_stream_step_slow_poses_that_do_not_lead_on_are_steps(void)
                 send(0.010 + 0.001 * period_ms * k, values[i][k]);
             }
             TEST_ASSERT_EQUAL_INT(0, rows_beside_steps(&until_ms));
+        }
+    }
+}
+
+/* A slow stream whose samples begin to go to and fro has ended: they are steps. */
+static void test_stream_step_leaps_of_a_slow_stream_are_steps(void)
+{
+    const double values[] = {0, 4, 8, 12, 16, 10, 16, 10, 16};
+    for (int period_ms = 160; period_ms <= 540; period_ms += 95) {
+        start(STREAM_SMOOTH);
+        for (int i = 0; i < 9; i++) {
+            send(0.010 + 0.001 * period_ms * i, values[i]);
+        }
+        render(1000000, 0, 10 + 9 * period_ms);
+        TEST_ASSERT_TRUE(s_ref[9 + 5 * period_ms].pos_q32 < q32(12)); /* a stream, and late */
+        for (int ms = 11 + 5 * period_ms; ms < 10 + 9 * period_ms; ms++) {
+            const bool is_arriving = (ms - 10) % period_ms == 0; /* in this row or in the next one: times are rounded */
+            TEST_ASSERT_TRUE(is_arriving || s_ref[ms].pos_q32 == q32(values[(ms - 10) / period_ms]));
         }
     }
 }
@@ -1252,6 +1270,7 @@ int main(void)
     RUN_TEST(test_stream_step_third_sample_starts_at_the_second);
     RUN_TEST(test_stream_step_even_slow_steps_are_a_stream_that_ends_on_the_last);
     RUN_TEST(test_stream_step_slow_poses_that_do_not_lead_on_are_steps);
+    RUN_TEST(test_stream_step_leaps_of_a_slow_stream_are_steps);
     RUN_TEST(test_stream_step_uneven_slow_steps_are_steps);
     RUN_TEST(test_stream_step_slow_stream_with_an_early_loss_is_no_later);
     RUN_TEST(test_stream_step_constant_samples_give_a_constant_reference);

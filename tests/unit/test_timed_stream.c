@@ -325,6 +325,21 @@ static void test_lone_frames_far_apart_stay_steps(void)
     }
 }
 
+/* Poses of a program that happen to lead on for a while, and then go to and fro: each is reached, and all within the limits. */
+static void test_poses_to_and_fro_after_some_that_led_on_are_steps(void)
+{
+    static const double k_z[] = {4, 8, 12, 16, 20, 15, 20, 15, 20};
+    for (unsigned gap_ms = 300; gap_ms <= 540; gap_ms += 60) {
+        m_rig = m_ready;
+        for (unsigned k = 0; k < 9; k++) {
+            rig_sendf(&m_rig, "@A6:0,0,0,0,0,%.3f#", k_z[k]);
+            rig_run_ms(&m_rig, gap_ms);
+            TEST_ASSERT_TRUE(k < 6 || fabs(rig_pose(&m_rig, AXIS_Z) - k_z[k]) < 1e-3);
+        }
+        check_kept();
+    }
+}
+
 /* From some frame on the sender writes no time any more: the stream goes on. */
 static void test_frames_without_a_time_go_on_with_a_timed_stream(void)
 {
@@ -398,6 +413,7 @@ int main(void)
     RUN_TEST(test_isolated_timed_frame_arrives_at_its_time);
     RUN_TEST(test_isolated_timed_frame_after_a_stream_arrives_at_its_time);
     RUN_TEST(test_lone_frames_far_apart_stay_steps);
+    RUN_TEST(test_poses_to_and_fro_after_some_that_led_on_are_steps);
     RUN_TEST(test_frames_without_a_time_go_on_with_a_timed_stream);
     RUN_TEST(test_timed_frame_unlike_the_period_of_a_stream_is_a_move);
     RUN_TEST(test_stream_with_times_of_1_ms_is_one_without_also_where_a_frame_is_lost);
