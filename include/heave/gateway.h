@@ -136,8 +136,7 @@ typedef struct {
     uint64_t start_us;   /**< start of the silence timer: last accepted frame or entry into ENGAGED */
     uint16_t frame_mask; /**< relay mask of the sender */
     mask_guard_t mask_guard;
-    bool is_known;          /**< the frame being taken is of the sender that drives, and of a port that has been heard */
-    unsigned stream_frames; /**< frames in quick succession so far, up to the number that makes a stream */
+    bool is_known; /**< the frame being taken is of the sender that drives, and of a port that has been heard */
     confirm_t confirm;
     unsigned targets; /**< of this cycle */
     bool has_newest;  /**< newest is of this cycle, and motion has not got it yet */

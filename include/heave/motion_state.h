@@ -53,6 +53,7 @@ struct motion {
     q32_t settled_mm_q32[CYLINDERS_MAX];
     ramp_limits_t engage_limits; /**< of every cylinder on a path */
     fade_limits_t fade_limits;   /**< at a take-over */
+    uint32_t blend_cycles;       /**< that a take-over takes at least */
     jog_limits_t jog_limits;
 
     bool is_axis_moved[AXES_MAX];       /**< the others stay at 0 */
@@ -86,6 +87,7 @@ struct motion {
 
     bool is_following;
     bool is_taking_over; /**< a sender is being blended in, or will be with its first target */
+    bool is_return;      /**< it has driven before: blending need not take blend_cycles */
     bool is_fading;
     fade_t fade;
 

@@ -82,6 +82,9 @@ void scurve_plan(scurve_t *self, const path_limits_t *limits, int64_t least_cycl
 /** Advances one cycle. */
 void scurve_step(scurve_t *self);
 
+/** Goes to the end of the path. */
+void scurve_end(scurve_t *self);
+
 /** The present position of the path between two values. */
 q32_t scurve_between(const scurve_t *self, q32_t from_q32, q32_t to_q32);
 

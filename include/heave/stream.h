@@ -227,6 +227,8 @@ typedef struct {
     q32_t rate_q32[2]; /**< periods per cycle behind the first and the second low-pass; the second is rendered */
     q32_t error_q32;   /**< how far rendering is behind its time, in periods */
     history_t previous[AXES_MAX];
+    uint64_t back_us;          /**< when it came back after its last silence, 0: it has not been silent */
+    q32_t left_q32[POSE_AXES]; /**< its last sample before that */
 } stream_t;
 
 /** How a sender's samples arrive. */
@@ -281,6 +283,11 @@ void stream_hint_period(stream_t *self, uint32_t period_us);
 /** True if a sample at now_us would continue the present stream. A stream of 12 samples or more may pause for a second; a shorter
  * one for STREAM_QUIET_US or 3.5 periods. */
 bool stream_goes_on(const stream_t *self, uint64_t now_us);
+
+/** Before each target: true if a stream of 10 samples or more has been silent until its motion ended, and this target is
+ * elsewhere: it comes in the first 100 ms of its return, and is further from the last sample before the silence than the axes can
+ * go in that time and a period. Never true of slow streams, whose period is above STREAM_QUIET_US. */
+bool stream_returns_elsewhere(stream_t *self, uint64_t now_us, const q32_t *sample_q32);
 
 /** Takes a sample. Bounded time.
  *  @param now_us     arrival, never decreasing

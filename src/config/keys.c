@@ -212,7 +212,7 @@ const config_key_t config_keys[] = {
     {KEY("engage", "accel_mm_s2"), AT(settings.engage_accel_mm_s2_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s^2",
      .fallback = "100", ABOVE_ZERO(MOST_Q16), .help = "acceleration limit, at most that of [cylinders]"},
     {KEY("engage", "blend_ms"), AT(settings.blend_ms), .type = CONFIG_INTEGER, .unit = "ms", .fallback = "2000",
-     RANGE(250, 20000), .help = "least time in which a sender is faded in"},
+     RANGE(250, 20000), .help = "least time in which a new sender is faded in"},
 
     {KEY("service", "jog_mm_s"), AT(settings.jog_mm_s_q16), .type = CONFIG_DECIMAL, .count = 1, .unit = "mm/s", .fallback = "5",
      ABOVE_ZERO(50), .help = "no cylinder is faster than that while a hand leads it, nor than the limit of [cylinders]"},

@@ -7,9 +7,7 @@
 #include "actions.h"
 #include "target.h"
 
-#define STREAM_FRAMES    10u      /* as many are a stream, */
-#define STREAM_PERIOD_US 250000u  /* when each comes within that after the last one, */
-#define STREAM_GAP_US    1000000u /* and over when none has for that */
+#define STREAM_PERIOD_US 250000u /* frames that follow each other so quickly may be those of a stream */
 
 static void refuse(gateway_t *self, frame_command_t command, frame_error_t error, const char *why, const hal_udp_peer_t *from,
                    uint64_t now_us)
@@ -295,23 +293,6 @@ static bool follow(gateway_t *self, const motion_target_t *target, frame_command
     return is_taken;
 }
 
-/* A stream that comes back after a gap, as of a sender that was started again, is taken over like a new sender's: nothing says
- * that it goes on where it ended. Where silence leads to HOLD within the gap that has happened already. Poses sent one by one are
- * no stream. */
-static void watch_gap(gateway_t *self, uint64_t now_us)
-{
-    const uint64_t end_us = motion_timed_end_us(&self->motion);
-    const uint64_t since_us = end_us > self->sender.start_us ? end_us : self->sender.start_us;
-    const bool is_gap = now_us > since_us && now_us - since_us >= STREAM_GAP_US;
-    if (is_gap && self->sender.stream_frames >= STREAM_FRAMES && self->supervisor.state == STATE_ENGAGED) {
-        actions_follow(self, now_us);
-    }
-    const bool is_next = !is_gap && now_us - self->snapshot.last_frame_us < STREAM_PERIOD_US;
-    self->sender.stream_frames = !is_next                                     ? 0
-                                 : self->sender.stream_frames < STREAM_FRAMES ? self->sender.stream_frames + 1
-                                                                              : STREAM_FRAMES;
-}
-
 /* One line where a sender's angles go round from 0 to 360, say, and the platform would swing from one side to the other. */
 HV_OWN_FRAME static void watch_turn(gateway_t *self, const frame_t *frame, uint64_t now_us)
 {
@@ -368,7 +349,6 @@ void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
     auto_engage_frame(&self->auto_engage, now_us);
     const motion_target_t target = target_from(self, frame, now_us);
     actions_event(self, EVENT_FRAME, now_us);
-    watch_gap(self, now_us);
     const bool is_waiting = !is_confirmed(self, &target, now_us);
     if (!is_waiting && !follow(self, &target, frame->command, from, now_us)) {
         return;

@@ -9,14 +9,15 @@
 
 #include "ref_history.h"
 #include "plan.h"
+#include "take_over.h"
 #include "workspace.h"
 #include "active_axis.h"
 #include "axis_targets.h"
 
-#define INSTANT_MS     5                         /* no move is this short: frames with such a T ... */
-#define INSTANT_GAP_US 20000                     /* ... that follow each other so closely are a stream like frames without T */
-#define HIDDEN_Q58     ((int64_t)1 << (58 - 10)) /* a share of 1/1024 */
-#define PERIODS_STATED 5 /* so many periods a streaming sender may write as T, and more if it does not mean T */
+#define INSTANT_MS     5       /* no move is this short: frames with such a T ... */
+#define INSTANT_GAP_US 20000   /* ... that follow each other so closely are a stream like frames without T */
+#define RETURN_GAP_US  1000000 /* whatever a sender sends after that may be another program's */
+#define PERIODS_STATED 5       /* so many periods a streaming sender may write as T, and more if it does not mean T */
 
 bool follow_is_moving(const motion_t *self)
 {
@@ -81,24 +82,6 @@ static void enter_space(motion_t *self)
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
         self->led[i] = self->cylinder[i].state;
     }
-}
-
-/* The first target after a rest is faded in from where the platform is. */
-HV_OWN_FRAME static void begin_fade(motion_t *self)
-{
-    q32_t from_q32[POSE_AXES];
-    q32_t from_mm_q32[CYLINDERS_MAX];
-    q32_t to_mm_q32[CYLINDERS_MAX];
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        from_mm_q32[i] = self->cylinder[i].state.pos_q32;
-        to_mm_q32[i] = i < self->cylinders ? self->slot_extension_mm_q32[i] : from_mm_q32[i];
-    }
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        from_q32[i] = self->space == MOTION_POSE ? self->axis[i].state.pos_q32 : from_mm_q32[i];
-    }
-    fade_begin(&self->fade, from_q32, from_mm_q32);
-    fade_look(&self->fade, to_mm_q32);
-    self->is_fading = true;
 }
 
 /* The time of a target that could be a stream's period, else 0. */
@@ -239,7 +222,7 @@ static void take_target(motion_t *self, const motion_target_t *target, bool is_s
         axis_targets_unscaled_states(self, now);
         stream_place(&self->stream, now);
     }
-    stream_hide_start(&self->stream, self->is_taking_over && (!self->is_fading || self->fade.share_q58[0] < HIDDEN_Q58));
+    stream_hide_start(&self->stream, take_over_is_hidden(self));
     stream_hint_period(&self->stream, hint_us);
     stream_push(&self->stream, now_us, kin_followed(self), self->slot_q32);
     self->due = !is_sample ? DUE_TIMED : self->stream.phase == STREAM_RUNNING ? DUE_STREAM : DUE_STEP;
@@ -265,6 +248,14 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
         change_space(self, target->space);
     }
     const bool is_sample = is_stream_sample(self, target, now_us);
+    /* a move that states its time is as quick as it says */
+    const bool may_return = is_sample || now_us - self->last_us >= RETURN_GAP_US;
+    if (may_return && !self->is_taking_over && stream_returns_elsewhere(&self->stream, now_us, target->value_q32)) {
+        self->pending = *target;
+        take_over_again(self);
+        self->is_return = true;
+        return;
+    }
     const uint64_t gap_us = now_us - self->last_us;
     const uint32_t hint_us = period_hinted(self, target, gap_us);
     /* a sender that does not wait for the time it states does not mean it */
@@ -304,33 +295,12 @@ static bool is_on_the_way(const motion_t *self)
     return i == self->planned_slots && axis_targets_is_planned(self, self->slot_q32);
 }
 
-/* References that are faded in have not passed a ramp. A sender may request far more than the limits, and a plan that started
- * from there would take hours to come back. A little more than the limits is only rounding. */
-static bool is_led_beyond(const motion_t *self)
-{
-    bool is_beyond = false;
-    for (unsigned i = 0; self->is_fading && i < POSE_AXES; i++) {
-        const ramp_limits_t *limits = active_axis_limits(self, i);
-        is_beyond = is_beyond || fx_abs(self->led[i].vel_per_cycle_q32) > 2 * limits->vel_per_cycle_q32 ||
-                    fx_abs(self->led[i].acc_per_cycle2_q32) > 2 * limits->acc_per_cycle2_q32;
-    }
-    return is_beyond;
-}
-
-/* Starts the take-over again, from the present extensions. */
-static void take_over_again(motion_t *self)
-{
-    self->due = DUE_NOTHING;
-    motion_follow(self);
-    self->has_pending = true;
-}
-
 /* Makes the plan for the targets of this cycle. */
 static void plan_what_is_due(motion_t *self, uint64_t now_us)
 {
     const motion_due_t due = self->due;
     const bool is_first = self->is_taking_over && !self->is_fading;
-    if ((due == DUE_TIMED || due == DUE_STEP) && is_led_beyond(self)) {
+    if ((due == DUE_TIMED || due == DUE_STEP) && take_over_is_led_beyond(self)) {
         take_over_again(self);
         return;
     }
@@ -342,7 +312,10 @@ static void plan_what_is_due(motion_t *self, uint64_t now_us)
         axis_targets_scale(self, self->space, self->slot_q32, self->goal_q32);
     }
     if (due != DUE_NOTHING && is_first) {
-        begin_fade(self);
+        take_over_begin(self);
+    }
+    if (due != DUE_NOTHING && self->is_fading) {
+        take_over_aim(self, due != DUE_STREAM);
     }
     if (due == DUE_TIMED) {
         plan_timed(self, self->asked_cycles, is_first, now_us);
@@ -402,31 +375,6 @@ static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
     axis_targets_shift_refs(self, ref);
 }
 
-/* Fades a sender in. The fading adds at most engage speed to its own motion. */
-static void take_over(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
-{
-    pose_t pose;
-    q32_t extension_mm_q32[CYLINDERS_MAX];
-    if (!self->is_fading) {
-        return;
-    }
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        const bool is_given = self->space == MOTION_CYLINDERS && i < self->cylinders;
-        extension_mm_q32[i] = is_given ? ref[i].pos_q32 : self->cylinder[i].state.pos_q32;
-    }
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        pose.axis_q32[i] = ref[i].pos_q32;
-    }
-    if (self->space == MOTION_POSE) {
-        kin_constrain(&self->kin, &pose);
-        (void)workspace_pull_in(self, &pose, extension_mm_q32, NULL);
-    }
-    fade_look(&self->fade, extension_mm_q32);
-    self->is_fading = fade_step(&self->fade, &self->fade_limits, ref);
-    self->is_taking_over = self->is_fading;
-    out->flags |= MOTION_TAKEOVER;
-}
-
 /* Pose axes through their ramps, into the workspace, to cylinders. */
 static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
@@ -454,7 +402,7 @@ static void step_slots(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t
     for (unsigned i = 0; i < AXES_MAX; i++) {
         self->led[i] = (history_t){ref[i].pos_q32, ref[i].vel_per_cycle_q32, ref[i].acc_per_cycle2_q32};
     }
-    take_over(self, ref, out);
+    take_over_step(self, ref, out);
     if (self->space == MOTION_POSE) {
         step_pose(self, ref, out);
     } else {

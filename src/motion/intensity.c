@@ -82,12 +82,7 @@ q32_t intensity_unscaled(const intensity_t *self, q32_t neutral_q32, q32_t scale
 
 ramp_ref_t intensity_scale(const intensity_t *self, q32_t neutral_q32, const ramp_ref_t *ref)
 {
-    q32_t at_q32[REF_HISTORY];
-    ref_history_of(ref, at_q32);
-    for (unsigned age = 0; age < REF_HISTORY; age++) {
-        at_q32[age] = neutral_q32 + fx_mul_shift(at_q32[age] - neutral_q32, self->share_q46[age], INTENSITY_SHIFT);
-    }
-    return ref_history_ref(at_q32);
+    return ref_history_scaled(ref, neutral_q32, self->share_q46, INTENSITY_SHIFT);
 }
 
 bool intensity_is_still(const intensity_t *self, int64_t planned_q46)

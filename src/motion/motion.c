@@ -12,6 +12,8 @@
 #include "axis_targets.h"
 #include "stop.h"
 
+#define FADE_RISE_US 64000 /* in which fading reaches the acceleration of [engage]: nobody is to feel it begin */
+
 /* Extensions of a pose, inside the stroke with its margins. */
 static bool reaches(const motion_t *self, const pose_t *pose, q32_t extension_mm_q32[CYLINDERS_MAX])
 {
@@ -35,9 +37,9 @@ static hv_status_t init_cylinders(motion_t *self, const settings_t *s)
     }
     const hv_status_t status = ramp_limits_from_units(0, s->stroke_mm_q16[0], s->engage_speed_mm_s_q16, s->engage_accel_mm_s2_q16,
                                                       s->cylinder_jerk_mm_s3, s->cycle_us, &self->engage_limits);
-    self->fade_limits = (fade_limits_t){.vel_per_cycle_q32 = self->engage_limits.vel_per_cycle_q32,
-                                        .acc_per_cycle2_q32 = self->engage_limits.acc_per_cycle2_q32,
-                                        .least_cycles = (int64_t)s->blend_ms * 1000 / s->cycle_us};
+    const q32_t acc_q32 = self->engage_limits.acc_per_cycle2_q32;
+    self->blend_cycles = s->blend_ms * 1000 / s->cycle_us;
+    self->fade_limits = (fade_limits_t){self->engage_limits.vel_per_cycle_q32, acc_q32, acc_q32 * s->cycle_us / FADE_RISE_US};
     return status;
 }
 

@@ -89,7 +89,8 @@ static bool are_bools_sane(const motion_t *saved)
 {
     return sane_bool(&saved->is_pose_stale) && sane_bool(&saved->is_space_new) && sane_bool(&saved->is_following) &&
            sane_bool(&saved->is_taking_over) && sane_bool(&saved->is_fading) && sane_bool(&saved->has_pending) &&
-           sane_bool(&saved->is_stretched) && sane_bool(&saved->is_clamped) && sane_bool(&saved->is_time_idle);
+           sane_bool(&saved->is_stretched) && sane_bool(&saved->is_clamped) && sane_bool(&saved->is_time_idle) &&
+           sane_bool(&saved->is_return) && (!saved->is_fading || saved->fade.least_cycles > 0);
 }
 
 static bool are_numbers_sane(const motion_t *saved)
@@ -97,7 +98,7 @@ static bool are_numbers_sane(const motion_t *saved)
     return sane_all_q32(saved->pose.axis_q32, POSE_AXES) && stream_sane_all(saved->slot_q32, AXES_MAX, SLOT_Q32) &&
            stream_sane_all(saved->goal_q32, AXES_MAX, SLOT_Q32) && stream_sane_all(saved->timed_way_q32, AXES_MAX, SLOT_Q32) &&
            stream_sane_all(saved->slot_extension_mm_q32, CYLINDERS_MAX, SLOT_Q32) &&
-           sane_all_q32(saved->fade.from_q32, POSE_AXES) && sane_all_q32(saved->fade.from_mm_q32, CYLINDERS_MAX) &&
+
            sane_q32(saved->angle_target_deg_q32) && saved->asked_cycles >= 0 && saved->asked_cycles <= CYCLES_MAX &&
            saved->straight_after >= 0 && saved->straight_after <= CYCLES_MAX && saved->timed_share_q46 >= 0 &&
            saved->timed_share_q46 <= INTENSITY_FULL && sane_time(saved->last_us) && sane_time(saved->timed_end_us);
@@ -129,8 +130,7 @@ static bool are_stream_limits_sane(const motion_t *saved, bool has_followed)
 
 static bool are_fade_limits_same(const fade_limits_t *a, const fade_limits_t *b)
 {
-    return a->vel_per_cycle_q32 == b->vel_per_cycle_q32 && a->acc_per_cycle2_q32 == b->acc_per_cycle2_q32 &&
-           a->least_cycles == b->least_cycles;
+    return a->vel_q32 == b->vel_q32 && a->acc_q32 == b->acc_q32 && a->jerk_q32 == b->jerk_q32;
 }
 
 static bool is_what_leads_sane(const motion_t *saved, const motion_t *prepared)
@@ -138,7 +138,7 @@ static bool is_what_leads_sane(const motion_t *saved, const motion_t *prepared)
     return stream_is_sane(&saved->stream, &prepared->stream) &&
            (are_stream_limits_sane(saved, true) || are_stream_limits_sane(saved, false)) &&
            spike_filter_is_sane(&saved->gate, &prepared->gate) && plan_is_sane(saved) && fade_is_sane(&saved->fade) &&
-           are_fade_limits_same(&saved->fade_limits, &prepared->fade_limits);
+           are_fade_limits_same(&saved->fade_limits, &prepared->fade_limits) && saved->blend_cycles == prepared->blend_cycles;
 }
 
 bool motion_state_is_sane(const motion_t *saved, const motion_t *prepared)

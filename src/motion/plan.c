@@ -7,6 +7,7 @@
 #include "active_axis.h"
 #include "axis_targets.h"
 #include "path_check.h"
+#include "take_over.h"
 
 #define BLEND_PARTS     8 /* of a stop, after which the way behind it may begin */
 #define SMALL_WAY_Q32   (Q32_ONE / 16)
@@ -181,9 +182,8 @@ void plan_timed(motion_t *self, int64_t asked, bool is_first, uint64_t now_us)
     self->planned_slots = AXES_MAX;
     axis_targets_plan(self, self->slot_q32);
     int64_t cycles = plan_timed_cycles(self, asked > 0 ? asked : 1);
-    if (is_first && fade_cycles_left(&self->fade, &self->fade_limits) > cycles) {
-        cycles = fade_cycles_left(&self->fade, &self->fade_limits);
-    }
+    const int64_t fade = is_first ? fade_cycles(&self->fade, &self->fade_limits) : 0;
+    cycles = fade > cycles ? fade : cycles;
     self->is_stretched = asked > 0 && cycles > asked;
     self->stretched_count += self->is_stretched;
     self->timed_end_us = now_us + (uint64_t)cycles * self->cycle_us;
@@ -233,6 +233,9 @@ void plan_step(motion_t *self)
     axis_targets_plan(self, self->slot_q32);
     if (active_axis_all_at_rest(self, POSE_AXES)) {
         plan_straight(self, POSE_AXES, 1);
+        if (take_over_is_hidden(self)) { /* fading is the move */
+            scurve_end(&self->plan.straight.path);
+        }
         return;
     }
     if (!self->is_fading && (self->space == MOTION_CYLINDERS || can_axes_go_alone(self))) {

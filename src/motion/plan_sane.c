@@ -6,11 +6,11 @@
 #include "heave/sane.h"
 
 #define CYCLES_MAX      ((int64_t)1 << 40)
-#define COUNT_MAX       ((int64_t)1 << 24) /* cycles of a part of a move: hours */
-#define TOTAL_MAX       (INT64_MAX / 4)    /* running sums go three times as far at most */
-#define COEFFICIENT_MAX ((q32_t)1 << 56)   /* see profile.c */
-#define STOP_TERM_MAX   ((int64_t)1 << 60) /* of the products that a velocity in a stop is made of */
-#define ONE_Q58         ((int64_t)1 << 58)
+#define COUNT_MAX       ((int64_t)1 << 24)  /* cycles of a part of a move: hours */
+#define TOTAL_MAX       (INT64_MAX / 4)     /* running sums go three times as far at most */
+#define COEFFICIENT_MAX ((q32_t)1 << 56)    /* see profile.c */
+#define STOP_TERM_MAX   ((int64_t)1 << 60)  /* of the products that a velocity in a stop is made of */
+#define TRAVEL_MAX_Q32  (SANE_Q32_MAX * 64) /* as far as a small part may be, times their number */
 #define PERIOD_MAX_US   (STREAM_PERIOD_MAX_US * 2)
 
 enum { SETTLED_MAX = 8, GAP_MAX = 5 }; /* see spike_filter.c */
@@ -118,10 +118,10 @@ bool plan_is_sane(const motion_t *saved)
 
 bool fade_is_sane(const fade_t *fade)
 {
-    bool is_sane = sane_all_q32(fade->from_q32, POSE_AXES) && sane_all_q32(fade->from_mm_q32, CYLINDERS_MAX) &&
-                   is_within(fade->farthest_mm_q32, 0, 2 * SANE_Q32_MAX) && is_within(fade->progress_q58, 0, ONE_Q58);
-    for (unsigned age = 0; age < sizeof fade->share_q58 / sizeof fade->share_q58[0]; age++) {
-        is_sane = is_sane && is_within(fade->share_q58[age], 0, ONE_Q58);
+    bool is_sane = sane_all_q32(fade->from_q32, POSE_AXES) && is_within(fade->plan_travel_mm_q32, 0, TRAVEL_MAX_Q32) &&
+                   (fade->least_cycles == 0 || is_within(fade->least_cycles, FADE_CYCLES_MIN, FADE_CYCLES_MAX));
+    for (unsigned age = 0; age < sizeof fade->share_q46 / sizeof fade->share_q46[0]; age++) {
+        is_sane = is_sane && is_within(fade->share_q46[age], 0, FADE_FULL);
     }
     return is_sane;
 }

@@ -315,6 +315,14 @@ void scurve_step(scurve_t *self)
     self->elapsed++;
 }
 
+void scurve_end(scurve_t *self)
+{
+    self->acc = 0;
+    self->vel = 0;
+    self->pos = self->total;
+    self->elapsed = scurve_cycles(self);
+}
+
 q32_t scurve_between(const scurve_t *self, q32_t from_q32, q32_t to_q32)
 {
     return scurve_is_done(self) ? to_q32 : from_q32 + fx_mul_div(to_q32 - from_q32, self->pos, self->total);

@@ -37,4 +37,8 @@ static inline ramp_ref_t ref_history_ref(const q32_t at_q32[REF_HISTORY])
     return (ramp_ref_t){at_q32[0], v0, v0 - v1, v0 - 2 * v1 + v2};
 }
 
+/** A reference of which only a share counts from a position on.
+ *  @param share of this cycle and those before it, 2^shift is all */
+ramp_ref_t ref_history_scaled(const ramp_ref_t *ref, q32_t from_q32, const int64_t share[REF_HISTORY], unsigned shift);
+
 #endif

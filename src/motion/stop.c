@@ -56,4 +56,5 @@ void motion_follow(motion_t *self)
     stop_begin(self, MOTION_THEN_FOLLOW);
     self->is_taking_over = true;
     self->is_fading = false;
+    self->is_return = false;
 }

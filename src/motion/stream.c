@@ -27,6 +27,9 @@
 #define LEAP_HALVES          3                          /* so many halves of the largest step beside the way it is a leap */
 #define BEGIN_US             (3 * STREAM_PERIOD_MIN_US) /* ... but of a flood, with those of so long */
 
+#define RETURN_US 100000u /* what a sender sends in this time tells where it returns */
+#define AGE_LEAST 10      /* fewer samples are poses, and moves of their own */
+
 /* Thinning out. Counted, not timed: every so manyth sample of an even stream is an even stream. */
 #define THIN_GAP_FIRST_US 10000u /* a few short intervals at a start, or in a burst, say nothing */
 #define THIN_GAP_MAX_US   20000u
@@ -82,6 +85,7 @@ void stream_place(stream_t *self, const history_t *now)
 
 void stream_reset(stream_t *self)
 {
+    self->back_us = 0;
     self->phase = STREAM_EMPTY; /* everything else begins with the next sample */
     self->thin.has_spare = false;
 }
@@ -427,6 +431,34 @@ bool stream_step(stream_t *self, uint64_t now_us, const kin_t *kin, ramp_ref_t *
 bool stream_goes_on(const stream_t *self, uint64_t now_us)
 {
     return self->phase == STREAM_RUNNING && stream_clock_is_near(&self->clock, now_us);
+}
+
+/* A stream that was silent until its motion ended. A slow one has no silence: its next sample is a move of its own. */
+static bool is_over(const stream_t *self)
+{
+    return self->phase != STREAM_EMPTY && self->clock.period_us_q16 <= (int64_t)STREAM_QUIET_US * STREAM_US_Q16 &&
+           self->curve.age >= AGE_LEAST && -self->curve.ahead > self->curve.patience;
+}
+
+bool stream_returns_elsewhere(stream_t *self, uint64_t now_us, const q32_t *sample_q32)
+{
+    stream_curve_t *const curve = &self->curve;
+    if (is_over(self)) {
+        self->back_us = now_us;
+        for (unsigned axis = 0; axis < POSE_AXES; axis++) {
+            self->left_q32[axis] = curve->newest_q32[axis];
+        }
+    }
+    if (self->back_us == 0 || now_us - self->back_us > RETURN_US) {
+        return false;
+    }
+    const int64_t cycles = fx_shift_down(curve->period_cycles_q16, 16) + (uint32_t)(now_us - self->back_us) / self->cycle_us + 1;
+    bool is_far = false;
+    for (unsigned axis = 0; axis < POSE_AXES; axis++) {
+        const q32_t most_q32 = curve->limits[axis].vel_per_cycle_q32 * cycles;
+        is_far |= most_q32 > 0 && fx_abs(sample_q32[axis] - self->left_q32[axis]) > most_q32;
+    }
+    return is_far;
 }
 
 bool stream_is_live(const stream_t *self, uint64_t now_us)

@@ -115,7 +115,8 @@ bool stream_is_sane(const stream_t *saved, const stream_t *prepared)
     bool is_sane = is_clock_sane(saved, prepared) && is_evidence_sane(&saved->evidence) && is_thin_sane(&saved->thin) &&
                    is_repeat_sane(&saved->repeat, is_empty) && sane_bool(&saved->is_fresh) && sane_bool(&saved->is_hidden) &&
                    saved->pair <= COUNT_MAX && (saved->pair > 0 || is_empty) && sane_time(saved->began_us) &&
-                   is_sample_sane(&saved->sample) && stream_sane_within(saved->between_q32, 0, Q32_ONE - 1) &&
+                   sane_time(saved->back_us) && sane_all_q32(saved->left_q32, POSE_AXES) && is_sample_sane(&saved->sample) &&
+                   stream_sane_within(saved->between_q32, 0, Q32_ONE - 1) &&
                    stream_sane_within(saved->error_q32, -ERROR_MAX_Q32, ERROR_MAX_Q32) &&
                    stream_curve_is_sane(&saved->curve, &prepared->curve, saved->style, saved->phase == STREAM_RUNNING) &&
                    governor_is_sane(&saved->curve.governor, saved->cycle_us, saved->phase == STREAM_RUNNING);

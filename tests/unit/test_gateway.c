@@ -1145,13 +1145,53 @@ static void test_senders_stream_that_returns_after_a_gap_is_taken_over_at_engage
     engage();
     (void)stream_height("@A6:0,0,0,0,0,-40#", 200);
     TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,40#", 200) > 100); /* no gap: a step of the stream */
-    rig_run_ms(&m_rig, 900);
-    TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,-40#", 200) > 100); /* shorter than what counts */
-    rig_run_ms(&m_rig, 1100);
-    TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,40#", 250) <= 50.1);
-    assert_heights(40);
-    TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,-40#", 200) > 100); /* and then as ever */
-    assert_heights(-40);
+    rig_run_ms(&m_rig, 150);
+    TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,-40#", 200) > 100); /* a gap in which the motion has not ended yet */
+    for (unsigned gap_ms = 400; gap_ms < 1500; gap_ms += 170) {
+        rig_run_ms(&m_rig, gap_ms);
+        TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,40#", 250) <= 50.1);
+        assert_heights(40);
+        TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,-40#", 200) > 100); /* and then as ever */
+        assert_heights(-40);
+    }
+}
+
+/* What a stall held back comes in one go, and its first frames are where the motion ended. */
+static void test_senders_burst_after_a_silence_is_taken_over_at_engage_speed(void)
+{
+    m_settings.silence_hold_ms = 0;
+    engage();
+    for (unsigned gap_ms = 450; gap_ms < 1000; gap_ms += 110) {
+        (void)stream_height("@A6:0,0,0,0,0,-40#", 200);
+        rig_run_ms(&m_rig, gap_ms);
+        rig_check_reset(&m_rig);
+        for (unsigned frame = 0; frame < 20; frame++) {
+            rig_sendf(&m_rig, "@A6:0,0,0,0,0,%u#", 2 * frame - 38);
+        }
+        TEST_ASSERT_TRUE(stream_height("@A6:0,0,0,0,0,0#", 250) <= 50.1);
+        assert_heights(0);
+    }
+}
+
+/* Whoever moves a slider sends only while it moves: nothing is taken over. */
+static void test_senders_stream_that_goes_on_from_where_it_ended_is_followed_at_once(void)
+{
+    m_settings.silence_hold_ms = 0;
+    engage();
+    (void)stream_height("@A6:0,0,0,0,0,-40#", 200);
+    for (unsigned gap_ms = 400; gap_ms < 900; gap_ms += 170) {
+        rig_run_ms(&m_rig, gap_ms);
+        for (int mm = -39; mm <= 40; mm++) {
+            rig_sendf(&m_rig, "@A6:0,0,0,0,0,%d#", mm);
+            rig_run_ms(&m_rig, 17);
+            TEST_ASSERT_EQUAL_UINT(0, seen()->flags & MOTION_TAKEOVER);
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(60 * 0.06, 40, rig_pose(&m_rig, AXIS_Z)); /* no later than any stream */
+        for (int mm = 39; mm >= -40; mm--) {
+            rig_sendf(&m_rig, "@A6:0,0,0,0,0,%d#", mm);
+            rig_run_ms(&m_rig, 17);
+        }
+    }
 }
 
 static void test_senders_poses_one_by_one_are_at_full_speed_whatever_is_between(void)
@@ -2608,6 +2648,8 @@ static void run_driving(void)
     RUN_TEST(test_senders_two_at_once_only_one_is_followed);
     RUN_TEST(test_senders_take_over_after_silence_at_engage_speed);
     RUN_TEST(test_senders_stream_that_returns_after_a_gap_is_taken_over_at_engage_speed);
+    RUN_TEST(test_senders_burst_after_a_silence_is_taken_over_at_engage_speed);
+    RUN_TEST(test_senders_stream_that_goes_on_from_where_it_ended_is_followed_at_once);
     RUN_TEST(test_senders_poses_one_by_one_are_at_full_speed_whatever_is_between);
     RUN_TEST(test_senders_priority_takes_over_in_motion_without_a_jump);
     RUN_TEST(test_sender_second_program_of_its_address_is_another_one);

@@ -186,6 +186,8 @@ static void test_a_stream_that_no_motion_has_is_refused(void)
     SPOIL_BOOL(stream.is_hidden);
     SPOIL(stream.pair, 0);
     SPOIL(stream.began_us, UINT64_MAX);
+    SPOIL(stream.back_us, UINT64_MAX);
+    SPOIL(stream.left_q32[5], INT64_MAX);
     SPOIL(stream.sample.misfit_q32, -1);
     SPOIL(stream.sample.losses, STREAM_LOSSES_MAX + 1);
     SPOIL(stream.sample.stood, STREAM_STOOD_MAX + 2);
@@ -331,11 +333,12 @@ static void test_a_filter_and_a_fade_that_no_motion_has_are_refused(void)
     SPOIL(gate.spike.axis, POSE_AXES);
     SPOIL(gate.withheld_q32[5], INT64_MIN);
     SPOIL(fade.from_q32[5], INT64_MIN);
-    SPOIL(fade.from_mm_q32[5], INT64_MAX);
-    SPOIL(fade.farthest_mm_q32, -1);
-    SPOIL(fade.progress_q58, -1);
-    SPOIL(fade.share_q58[3], INT64_MAX);
-    SPOIL(fade_limits.least_cycles, m_saved.motion.fade_limits.least_cycles + 1);
+    SPOIL(fade.plan_travel_mm_q32, -1);
+    SPOIL(fade.least_cycles, FADE_CYCLES_MIN - 1);
+    SPOIL(fade.share_q46[3], INT64_MAX);
+    SPOIL(fade_limits.jerk_q32, m_saved.motion.fade_limits.jerk_q32 + 1);
+    SPOIL(blend_cycles, m_saved.motion.blend_cycles + 1);
+    SPOIL_BOOL(is_return);
     SPOIL(intensity.share_q46[0], 0);
     SPOIL(intensity.share_q46[2], 0); /* a jump */
     SPOIL(timed_share_q46, -1);
@@ -401,16 +404,16 @@ static void test_no_member_is_forgotten(void)
     TEST_ASSERT_EQUAL(32, sizeof(stream_quantum_t));
     TEST_ASSERT_EQUAL(88, sizeof(stream_thin_t));
     TEST_ASSERT_EQUAL(40, sizeof(stream_repeat_t));
-    TEST_ASSERT_EQUAL(11008, sizeof(stream_t));
+    TEST_ASSERT_EQUAL(11064, sizeof(stream_t));
     TEST_ASSERT_EQUAL(4608, sizeof(governor_t));
     TEST_ASSERT_EQUAL(392, sizeof(spike_filter_t));
-    TEST_ASSERT_EQUAL(144, sizeof(fade_t));
+    TEST_ASSERT_EQUAL(96, sizeof(fade_t));
     TEST_ASSERT_EQUAL(584, sizeof(sync_stop_t));
     TEST_ASSERT_EQUAL(584, sizeof(quintic_t));
     TEST_ASSERT_EQUAL(344, sizeof(motion_straight_t));
     TEST_ASSERT_EQUAL(64, sizeof(scurve_t));
     TEST_ASSERT_EQUAL(168, sizeof(intensity_t));
-    TEST_ASSERT_EQUAL(17600, sizeof(motion_t));
+    TEST_ASSERT_EQUAL(17616, sizeof(motion_t));
 }
 
 int main(void)
