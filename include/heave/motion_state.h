@@ -37,9 +37,15 @@ typedef struct {
     history_t history[AXES_MAX];
 } motion_straight_t;
 
+/** What a stream's jumps have left of the way to its references, before intensity. */
+typedef struct {
+    ramp_t off[POSE_AXES];
+} jump_t;
+
 /** The active plan: one of these at a time. */
 typedef union {
     quintic_t quintic;          /**< MOTION_TIMED */
+    jump_t jump;                /**< MOTION_STREAMED, if is_jumping */
     motion_straight_t straight; /**< MOTION_RESTING, MOTION_ON_PATH, MOTION_JOGGED, MOTION_STRAIGHT; begun before a stop ends */
 } motion_plan_t;
 
@@ -86,6 +92,7 @@ struct motion {
     jog_t jog;
 
     bool is_following;
+    bool is_jumping;     /**< an offset leads to where the stream has jumped */
     bool is_taking_over; /**< a sender is being blended in, or will be with its first target */
     bool is_return;      /**< it has driven before: blending need not take blend_cycles */
     bool is_fading;

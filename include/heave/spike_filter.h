@@ -32,6 +32,7 @@ typedef struct {
     uint64_t last_us; /**< arrival of the newest sample that passed */
     q32_t past_q32[SPIKE_FILTER_HISTORY][POSE_AXES];
     bool is_withholding;
+    bool is_step; /**< the newest sample has confirmed that the one before it was a step */
     uint64_t withheld_us;
     int64_t withheld_periods; /**< after the newest sample that passed */
     spike_t withheld;         /**< to be reported if the next sample is back on the course */

@@ -9,6 +9,7 @@
 
 #include "ref_history.h"
 #include "plan.h"
+#include "jump.h"
 #include "take_over.h"
 #include "workspace.h"
 #include "active_axis.h"
@@ -180,6 +181,7 @@ static void change_space(motion_t *self, motion_space_t space)
     self->is_time_idle = false;
     self->source = MOTION_STREAMED;
     stream_reset(&self->stream);
+    self->is_jumping = false;
     for (unsigned i = 0; i < AXES_MAX; i++) {
         const governor_limits_t limits = follow_axis_limits(self, i);
         stream_set_limits(&self->stream, i, &limits);
@@ -205,6 +207,22 @@ static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t 
     return true;
 }
 
+/* Whether this sample of a stream goes on from a step that the gate has held back. */
+static bool has_jumped(const motion_t *self, bool is_sample)
+{
+    return is_sample && self->gate.is_step && self->space == MOTION_POSE && self->source == MOTION_STREAMED &&
+           !self->is_taking_over && self->stream.phase == STREAM_RUNNING;
+}
+
+static void take_jump(motion_t *self, const motion_target_t *target)
+{
+    q32_t step_q32[POSE_AXES];
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        step_q32[i] = target->value_q32[i] - self->withheld.value_q32[i];
+    }
+    jump_take(self, step_q32);
+}
+
 /* A sample, or a target by itself. */
 static void take_target(motion_t *self, const motion_target_t *target, bool is_sample, uint32_t hint_us, uint64_t now_us)
 {
@@ -221,6 +239,9 @@ static void take_target(motion_t *self, const motion_target_t *target, bool is_s
         history_t now[AXES_MAX];
         axis_targets_unscaled_states(self, now);
         stream_place(&self->stream, now);
+    }
+    if (has_jumped(self, is_sample)) {
+        take_jump(self, target);
     }
     stream_hide_start(&self->stream, take_over_is_hidden(self));
     stream_hint_period(&self->stream, hint_us);
@@ -277,6 +298,7 @@ static void take_last_word(motion_t *self, uint64_t now_us)
 {
     if (spike_filter_is_overdue(&self->gate, now_us)) {
         spike_filter_reset(&self->gate);
+        self->gate.is_step = true;
         take_target(self, &self->withheld, true, 0, now_us);
     }
 }
@@ -428,6 +450,7 @@ static void step_stream(motion_t *self, uint64_t now_us, ramp_ref_t ref[AXES_MAX
 {
     stream_set_scale(&self->stream, intensity_largest_q16(&self->intensity));
     (void)stream_step(&self->stream, now_us, kin_followed(self), ref);
+    jump_step(self, ref);
     axis_targets_scale_refs(self, ref);
     out->flags |= (self->stream.curve.governor.strength_q32 >= 2 * Q32_ONE ? MOTION_ACCEL : 0) |
                   (self->stream.curve.governor.is_slowed ? MOTION_SPEED : 0);
@@ -439,6 +462,7 @@ void follow_step(motion_t *self, uint64_t now_us, ramp_ref_t cylinder_ref[AXES_M
     if (self->source == MOTION_STREAMED) {
         step_stream(self, now_us, cylinder_ref, out);
     } else {
+        self->is_jumping = false;
         step_source(self, cylinder_ref);
         out->flags |= is_step_cruising(self) ? MOTION_SPEED : 0;
     }

@@ -133,9 +133,21 @@ static bool are_fade_limits_same(const fade_limits_t *a, const fade_limits_t *b)
     return a->vel_q32 == b->vel_q32 && a->acc_q32 == b->acc_q32 && a->jerk_q32 == b->jerk_q32;
 }
 
+static bool is_jump_sane(const motion_t *saved)
+{
+    bool is_sane = sane_bool(&saved->is_jumping);
+    for (unsigned i = 0; i < POSE_AXES && is_sane && saved->is_jumping && saved->source == MOTION_STREAMED; i++) {
+        const ramp_t *ramp = &saved->plan.jump.off[i];
+        const bool is_there = ramp->state.pos_q32 != 0 || !ramp_is_at_rest(ramp);
+        is_sane = is_sane &&
+                  (!is_there || (sane_q32(ramp->limits.vel_per_cycle_q32) && ramp_is_prepared(ramp) && is_ramp_sane(ramp, ramp)));
+    }
+    return is_sane;
+}
+
 static bool is_what_leads_sane(const motion_t *saved, const motion_t *prepared)
 {
-    return stream_is_sane(&saved->stream, &prepared->stream) &&
+    return stream_is_sane(&saved->stream, &prepared->stream) && is_jump_sane(saved) &&
            (are_stream_limits_sane(saved, true) || are_stream_limits_sane(saved, false)) &&
            spike_filter_is_sane(&saved->gate, &prepared->gate) && plan_is_sane(saved) && fade_is_sane(&saved->fade) &&
            are_fade_limits_same(&saved->fade_limits, &prepared->fade_limits) && saved->blend_cycles == prepared->blend_cycles;

@@ -112,15 +112,14 @@ HV_OWN_FRAME static void sync_stop_slots(motion_t *self, const task_t *task)
     sync_stop_plan(halt, task->slots, POSE_AXES, halt->start, limits, &riders);
 }
 
-/* The straight way between two points of the slots, as a path with the limits of axes and cylinders. */
-static path_limits_t limits_of_straight(const motion_t *self, unsigned slots, const q32_t *from_q32)
+path_limits_t plan_limits_of_straight(const motion_t *self, unsigned slots, const q32_t *from_q32, const q32_t *to_q32)
 {
     path_limits_t limits = path_limits_none();
     for (unsigned i = 0; i < slots; i++) {
-        path_limits_narrow(&limits, self->goal_q32[i] - from_q32[i], active_axis_limits(self, i));
+        path_limits_narrow(&limits, to_q32[i] - from_q32[i], active_axis_limits(self, i));
     }
     if (self->space == MOTION_POSE) {
-        path_check_narrow(self, from_q32, self->goal_q32, &limits);
+        path_check_narrow(self, from_q32, to_q32, &limits);
     }
     return limits;
 }
@@ -133,7 +132,7 @@ void plan_straight(motion_t *self, unsigned slots, int64_t least_cycles)
         self->plan.straight.from_q32[i] = self->plan.straight.history[i].pos_q32;
         self->plan.straight.to_q32[i] = self->goal_q32[i];
     }
-    const path_limits_t limits = limits_of_straight(self, slots, self->plan.straight.from_q32);
+    const path_limits_t limits = plan_limits_of_straight(self, slots, self->plan.straight.from_q32, self->goal_q32);
     scurve_plan(&self->plan.straight.path, &limits, least_cycles);
     self->source = MOTION_STRAIGHT;
 }
@@ -150,7 +149,7 @@ static int64_t plan_stop_and_straight(motion_t *self, const task_t *task, int64_
         way->from_q32[i] = self->halt.rest_q32[i];
         way->to_q32[i] = self->goal_q32[i];
     }
-    const path_limits_t limits = limits_of_straight(self, task->slots, way->from_q32);
+    const path_limits_t limits = plan_limits_of_straight(self, task->slots, way->from_q32, self->goal_q32);
     scurve_plan(&way->path, &limits, 1);
     int64_t part = 0;
     while (part < BLEND_PARTS && !path_check_blend_is_feasible(self, task->slots, self->halt.cycles * part / BLEND_PARTS)) {

@@ -133,11 +133,12 @@ static bool is_spike_sane(const spike_t *spike)
 
 bool spike_filter_is_sane(const spike_filter_t *saved, const spike_filter_t *prepared)
 {
-    bool is_sane =
-        saved->factor <= SPIKE_FILTER_FACTOR_MAX && saved->settled <= SETTLED_MAX && saved->period_us <= PERIOD_MAX_US &&
-        (saved->period_us > 0 || (saved->settled == 0 && !saved->is_withholding)) && sane_time(saved->last_us) &&
-        sane_bool(&saved->is_withholding) && sane_time(saved->withheld_us) && is_within(saved->withheld_periods, 0, GAP_MAX) &&
-        is_spike_sane(&saved->withheld) && is_spike_sane(&saved->spike) && sane_all_q32(saved->withheld_q32, POSE_AXES);
+    bool is_sane = saved->factor <= SPIKE_FILTER_FACTOR_MAX && saved->settled <= SETTLED_MAX &&
+                   saved->period_us <= PERIOD_MAX_US &&
+                   (saved->period_us > 0 || (saved->settled == 0 && !saved->is_withholding)) && sane_time(saved->last_us) &&
+                   sane_bool(&saved->is_withholding) && sane_bool(&saved->is_step) && sane_time(saved->withheld_us) &&
+                   is_within(saved->withheld_periods, 0, GAP_MAX) && is_spike_sane(&saved->withheld) &&
+                   is_spike_sane(&saved->spike) && sane_all_q32(saved->withheld_q32, POSE_AXES);
     for (unsigned i = 0; i < POSE_AXES; i++) {
         is_sane = is_sane && saved->accel_q32[i] == prepared->accel_q32[i] && is_within(saved->quantum_q32[i], 0, SANE_Q32_MAX);
     }

@@ -71,22 +71,47 @@ static void make_acceleration_whole(ramp_t *self)
     self->acc_safe_q32 = self->limits.jerk_per_cycle3_q32 * self->acc_cycles;
 }
 
-hv_status_t ramp_init(ramp_t *self, const ramp_limits_t *limits, q32_t pos_q32)
+static bool are_limits_possible(const ramp_limits_t *limits)
 {
-    const q32_t jerk_q32 = limits->jerk_per_cycle3_q32;
-    if (limits->pos_min_q32 >= limits->pos_max_q32 || limits->vel_per_cycle_q32 <= 0 || limits->acc_per_cycle2_q32 <= 0 ||
-        jerk_q32 < RAMP_JERK_MIN_Q32 || limits->vel_per_cycle_q32 / jerk_q32 > RAMP_SPEED_PER_JERK_MAX) {
-        return HV_ERR_RANGE;
-    }
-    *self = (ramp_t){.limits = *limits, .state = {.pos_q32 = pos_q32}, .acc_safe_q32 = ramp_safe_acceleration(limits)};
-    make_acceleration_whole(self);
+    return limits->pos_min_q32 < limits->pos_max_q32 && limits->vel_per_cycle_q32 > 0 && limits->acc_per_cycle2_q32 > 0 &&
+           limits->jerk_per_cycle3_q32 >= RAMP_JERK_MIN_Q32 &&
+           limits->vel_per_cycle_q32 / limits->jerk_per_cycle3_q32 <= RAMP_SPEED_PER_JERK_MAX;
+}
+
+/* What follows from the limits and a whole acceleration. */
+static void derive(ramp_t *self)
+{
+    const q32_t vel_q32 = self->limits.vel_per_cycle_q32;
     self->per_jerk_q62 = Q62_ONE / self->limits.jerk_per_cycle3_q32;
     self->per_acc_q62 = Q62_ONE / self->acc_safe_q32;
-    const q32_t vel_q32 = limits->vel_per_cycle_q32;
     const q32_t acc_cycles_q32 = fx_mul_shift(self->acc_safe_q32, self->per_jerk_q62, 30);
     const q32_t cycles_q32 = fx_add_sat(fx_mul_shift(vel_q32, self->per_acc_q62, 30), 2 * acc_cycles_q32);
     self->brake_reach_q32 = fx_add_sat(fx_mul_shift(vel_q32, cycles_q32, 32), 4 * vel_q32);
     const int64_t cycles = vel_q32 / self->acc_safe_q32 / 2 + 2 * self->acc_cycles + 8; /* 8 for roundings */
     self->brake_cycles = cycles <= UINT32_MAX && cycles <= INT64_MAX / vel_q32 ? (uint32_t)cycles : 0;
+}
+
+hv_status_t ramp_init(ramp_t *self, const ramp_limits_t *limits, q32_t pos_q32)
+{
+    if (!are_limits_possible(limits)) {
+        return HV_ERR_RANGE;
+    }
+    *self = (ramp_t){.limits = *limits, .state = {.pos_q32 = pos_q32}, .acc_safe_q32 = ramp_safe_acceleration(limits)};
+    make_acceleration_whole(self);
+    derive(self);
     return HV_OK;
+}
+
+bool ramp_is_prepared(const ramp_t *self)
+{
+    const ramp_limits_t *limits = &self->limits;
+    if (!are_limits_possible(limits) || self->acc_safe_q32 <= 0 ||
+        self->acc_safe_q32 / limits->jerk_per_cycle3_q32 != self->acc_cycles ||
+        self->acc_safe_q32 % limits->jerk_per_cycle3_q32 != 0 || self->acc_safe_q32 > limits->acc_per_cycle2_q32) {
+        return false;
+    }
+    ramp_t again = *self;
+    derive(&again);
+    return again.per_jerk_q62 == self->per_jerk_q62 && again.per_acc_q62 == self->per_acc_q62 &&
+           again.brake_reach_q32 == self->brake_reach_q32 && again.brake_cycles == self->brake_cycles;
 }

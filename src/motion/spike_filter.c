@@ -123,7 +123,8 @@ static void settle_withheld(spike_filter_t *self, int64_t periods, const q32_t v
     const q32_t course_q32 = self->past_q32[0][axis] + step_q32 * periods;
     const q32_t onward_q32 = self->withheld_q32[axis] + step_q32 * (periods - self->withheld_periods);
     self->is_withholding = false;
-    if (fx_abs(value_q32[axis] - onward_q32) <= fx_abs(value_q32[axis] - course_q32)) {
+    self->is_step = fx_abs(value_q32[axis] - onward_q32) <= fx_abs(value_q32[axis] - course_q32);
+    if (self->is_step) {
         note_jump(self, self->withheld_q32);
     } else {
         self->spikes++;
@@ -139,6 +140,7 @@ void spike_filter_set_quantum(spike_filter_t *self, unsigned axis, q32_t quantum
 
 bool spike_filter_passes(spike_filter_t *self, uint64_t now_us, uint32_t period_us, const q32_t value_q32[POSE_AXES])
 {
+    self->is_step = false;
     if (self->factor == 0 || period_us == 0) {
         spike_filter_reset(self);
         return true;

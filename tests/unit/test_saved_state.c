@@ -327,6 +327,7 @@ static void test_a_filter_and_a_fade_that_no_motion_has_are_refused(void)
     SPOIL(gate.last_us, UINT64_MAX);
     SPOIL(gate.past_q32[2][5], INT64_MAX);
     SPOIL_BOOL(gate.is_withholding);
+    SPOIL_BOOL(gate.is_step);
     SPOIL(gate.withheld_us, UINT64_MAX);
     SPOIL(gate.withheld_periods, -1);
     SPOIL(gate.withheld.axis, POSE_AXES);
@@ -344,6 +345,37 @@ static void test_a_filter_and_a_fade_that_no_motion_has_are_refused(void)
     SPOIL(timed_share_q46, -1);
     SPOIL(timed_way_q32[6], INT64_MAX);
     SPOIL(slot_q32[0], INT64_MAX);
+}
+
+static void hold_at(unsigned frames, double z)
+{
+    for (unsigned i = 0; i < frames; i++) {
+        rig_sendf(&m_rig, k_fine, 0.1 * z, 0.0, 0.0, z, 0.0, z);
+        run_and_save(16);
+    }
+}
+
+static void test_jumps_go_on_and_one_that_no_motion_has_is_refused(void)
+{
+    m_settings.spike_gate = 10;
+    engage();
+    hold_at(80, 0);
+    hold_at(10, 40);
+    hold_at(20, -20);
+    hold_at(10, 20);
+    gateway_save(&m_rig.gateway, &m_saved);
+    TEST_ASSERT_TRUE(m_saved.motion.is_jumping);
+    SPOIL_BOOL(is_jumping);
+    SPOIL(plan.jump.off[5].state.pos_q32, INT64_MAX);
+    SPOIL(plan.jump.off[5].state.vel_per_cycle_q32, m_saved.motion.plan.jump.off[5].limits.vel_per_cycle_q32 + 1);
+    SPOIL(plan.jump.off[0].limits.jerk_per_cycle3_q32, 0);
+    SPOIL(plan.jump.off[0].limits.vel_per_cycle_q32, INT64_MAX);
+    SPOIL(plan.jump.off[0].acc_safe_q32, m_saved.motion.plan.jump.off[0].acc_safe_q32 + 1);
+    SPOIL(plan.jump.off[0].acc_cycles, 0);
+    SPOIL(plan.jump.off[3].per_jerk_q62, 1);
+    SPOIL(plan.jump.off[3].per_acc_q62, 1);
+    SPOIL(plan.jump.off[3].brake_reach_q32, 1);
+    SPOIL(plan.jump.off[3].brake_cycles, 1);
 }
 
 static void test_plans_that_no_motion_has_are_refused(void)
@@ -413,7 +445,7 @@ static void test_no_member_is_forgotten(void)
     TEST_ASSERT_EQUAL(344, sizeof(motion_straight_t));
     TEST_ASSERT_EQUAL(64, sizeof(scurve_t));
     TEST_ASSERT_EQUAL(168, sizeof(intensity_t));
-    TEST_ASSERT_EQUAL(17616, sizeof(motion_t));
+    TEST_ASSERT_EQUAL(17800, sizeof(motion_t));
 }
 
 int main(void)
@@ -426,6 +458,7 @@ int main(void)
     RUN_TEST(test_a_stream_that_no_motion_has_is_refused);
     RUN_TEST(test_a_curve_that_no_motion_has_is_refused);
     RUN_TEST(test_a_filter_and_a_fade_that_no_motion_has_are_refused);
+    RUN_TEST(test_jumps_go_on_and_one_that_no_motion_has_is_refused);
     RUN_TEST(test_plans_that_no_motion_has_are_refused);
     RUN_TEST(test_no_member_is_forgotten);
     return UNITY_END();

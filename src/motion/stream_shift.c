@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: MIT
+ * stream_shift.c - see stream_shift.h.
+ */
+#include "stream_shift.h"
+
+static void shift_curve(stream_curve_t *curve, unsigned axis, q32_t by_q32)
+{
+    for (unsigned i = 0; i < STREAM_POINTS; i++) {
+        curve->point_q32[i][axis] += by_q32;
+    }
+    for (unsigned i = 0; i < 3; i++) {
+        curve->was_q32[i][axis] += by_q32;
+    }
+    curve->control_q32[axis] += by_q32;
+    curve->low_q32[axis] += by_q32;
+    curve->high_q32[axis] += by_q32;
+    curve->newest_q32[axis] += by_q32;
+    curve->last_q32[axis] += by_q32;
+}
+
+/* Cylinders as far as the pose that was asked for last takes them: of its smoothed copies, which are near, that is close enough.
+ */
+static void shift_governor(governor_t *governor, const kin_t *kin, const q32_t by_q32[POSE_AXES])
+{
+    pose_t pose;
+    q32_t extension_mm_q32[CYLINDERS_MAX];
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        pose.axis_q32[i] = governor->asked_q32[i] + by_q32[i];
+        governor_shift(governor, i, pose.axis_q32[i]);
+    }
+    if (kin_inverse(kin, &pose, extension_mm_q32) == HV_OK) {
+        for (unsigned i = POSE_AXES; i < governor->channels; i++) {
+            governor_shift(governor, i, extension_mm_q32[i - POSE_AXES]);
+        }
+    }
+}
+
+void stream_shift(stream_t *self, const kin_t *kin, const q32_t by_q32[POSE_AXES])
+{
+    for (unsigned axis = 0; axis < POSE_AXES; axis++) {
+        shift_curve(&self->curve, axis, by_q32[axis]);
+        for (unsigned i = 0; i < STREAM_EVIDENCE; i++) {
+            self->evidence.value_q32[i][axis] += by_q32[axis];
+        }
+        self->previous[axis].pos_q32 += by_q32[axis];
+        self->left_q32[axis] += by_q32[axis];
+    }
+    shift_governor(&self->curve.governor, kin, by_q32);
+    self->curve.governor.begun_us = 0; /* what exceeds the limits next is no longer a single jump */
+}
