@@ -38,7 +38,7 @@ enum {
     MOTION_STRETCHED = 1u << 3,    /**< the running timed move takes longer than asked */
     MOTION_TAKEOVER = 1u << 4,     /**< moving to a sender's first pose at engage speed */
     MOTION_IN_CYLINDERS = 1u << 5, /**< moving in cylinder space: pose limits do not apply */
-    MOTION_OFF_PATH = 1u << 6,     /**< a cylinder's limiter is not on its reference: pose limits do not hold exactly */
+    MOTION_OFF_PATH = 1u << 6,     /**< a cylinder's limiter is not on its reference: limits of the axes do not hold */
     MOTION_NO_POSE = 1u << 7       /**< no pose belongs to the extensions: the pose shown is the last one */
 };
 

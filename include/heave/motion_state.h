@@ -37,7 +37,7 @@ typedef struct {
     history_t history[AXES_MAX];
 } motion_straight_t;
 
-/** What a stream's jumps have left of the way to its references, before intensity. */
+/** The offset from a stream's references that its jumps have not yet made up, before intensity. */
 typedef struct {
     ramp_t off[POSE_AXES];
 } jump_t;

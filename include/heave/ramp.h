@@ -100,6 +100,18 @@ q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip);
  *  @return the flags of all together */
 unsigned ramp_step_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *pos_q32);
 
+/** The two halves of a step, for axes that are moved together.
+ *  ramp_aim_all(): the acceleration that each takes in the coming cycle, within the limits; sets flags, moves nothing.
+ *  @param acc_q32 out, of each, u/cycle^2   @return the flags of all together */
+unsigned ramp_aim_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *acc_q32);
+
+/** The acceleration nearest to a wanted one that keeps all that ramp_step() guarantees. These accelerations are an interval: what
+ *  lies between two of them is one. Adds to self->flags. */
+q32_t ramp_allowed(ramp_t *self, q32_t wanted_q32);
+
+/** Advances one cycle with an allowed acceleration. @return the new position */
+q32_t ramp_advance(ramp_t *self, q32_t acc_q32);
+
 /** Where the ramp comes to rest if it starts to brake now (within the bounds): the reference of a controlled stop. */
 q32_t ramp_stop_position(const ramp_t *self);
 

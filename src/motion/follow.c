@@ -11,7 +11,7 @@
 #include "plan.h"
 #include "jump.h"
 #include "take_over.h"
-#include "workspace.h"
+#include "coordinated_step.h"
 #include "active_axis.h"
 #include "axis_targets.h"
 
@@ -401,21 +401,18 @@ static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
 static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
     const ramp_grip_t grip = self->source == MOTION_STREAMED ? RAMP_SOFT : RAMP_FIRM;
-    q32_t extension_mm_q32[CYLINDERS_MAX];
-    pose_t *planned = &out->sent;
-    const unsigned flags = ramp_step_all(self->axis, POSE_AXES, ref, grip, planned->axis_q32);
+    coordinated_step_t to;
+    const unsigned flags = coordinated_step(self, ref, grip, &to);
     for (unsigned i = 0; i < POSE_AXES; i++) {
         out->asked.axis_q32[i] = ref[i].pos_q32;
     }
-    kin_constrain(&self->kin, planned);
-    const unsigned cylinder = workspace_pull_in(self, planned, extension_mm_q32, NULL);
-    kin_constrain(&self->kin, planned); /* the parasitic axes are not on the straight line along which the pose was pulled in */
-    out->limiting_cylinder = cylinder != 0 ? (uint8_t)cylinder : self->limiting_cylinder;
+    out->sent = to.pose;
+    out->limiting_cylinder = to.limiting_cylinder != 0 ? (uint8_t)to.limiting_cylinder : self->limiting_cylinder;
     for (unsigned i = 0; i < self->cylinders; i++) {
-        ref[i] = history_advance(&self->reference[i], extension_mm_q32[i]);
+        ref[i] = history_advance(&self->reference[i], to.extension_mm_q32[i]);
     }
     out->flags |= ((flags & RAMP_CLAMPED) ? MOTION_CLAMPED : 0) | ((flags & RAMP_SPEED) ? MOTION_SPEED : 0) |
-                  ((flags & RAMP_ACCEL) ? MOTION_ACCEL : 0) | (cylinder != 0 ? MOTION_CLAMPED : 0);
+                  ((flags & RAMP_ACCEL) ? MOTION_ACCEL : 0) | (to.limiting_cylinder != 0 ? MOTION_CLAMPED : 0);
 }
 
 /* From the slots' references to the cylinders'. */

@@ -318,8 +318,7 @@ static q32_t limit_by_speed(ramp_t *self, q32_t wanted_q32, int sign)
     return sign * (room_q32 > 0 ? brake_acc_for_velocity_room(self, room_q32) : 0);
 }
 
-/* The acceleration of the coming cycle: the wanted one inside everything the limits say. */
-static q32_t allowed_acceleration(ramp_t *self, q32_t wanted_q32)
+q32_t ramp_allowed(ramp_t *self, q32_t wanted_q32)
 {
     const q32_t acc_q32 = self->state.acc_per_cycle2_q32;
     const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
@@ -366,7 +365,7 @@ static void note_use(ramp_t *self, const ramp_ref_t *ref)
         is_within(ref->acc_per_cycle2_q32, acc_q32) ? acc_q32 : fx_clamp(fx_abs(ref->acc_per_cycle2_q32), 0, self->acc_safe_q32);
 }
 
-static q32_t advance(ramp_t *self, q32_t acc_q32)
+q32_t ramp_advance(ramp_t *self, q32_t acc_q32)
 {
     self->state.acc_per_cycle2_q32 = acc_q32;
     self->state.vel_per_cycle_q32 += acc_q32;
@@ -379,35 +378,45 @@ static bool is_reference_inside(const ramp_t *self, const ramp_ref_t *ref)
     return ref->pos_q32 >= self->limits.pos_min_q32 && ref->pos_q32 <= self->limits.pos_max_q32;
 }
 
-/* A cycle in which a limit may bind, or the reference is far away. */
-HV_OUT_OF_LINE static q32_t step_with_care(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+/* The acceleration of a cycle in which a limit may bind, or the reference is far away. */
+HV_OUT_OF_LINE static q32_t aim_with_care(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
 {
     const ramp_ref_t inside = reference_within_bounds(self, ref);
     note_use(self, &inside);
-    return advance(self, allowed_acceleration(self, wanted_acceleration(self, &inside, grip)));
+    return ramp_allowed(self, wanted_acceleration(self, &inside, grip));
 }
 
-static inline q32_t step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+static inline q32_t aim(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
 {
     q32_t jerk_q32;
     self->flags = 0;
     if (!is_reference_inside(self, ref) || !find_by_law(self, ref, grip, &jerk_q32) || !is_free(self, jerk_q32)) {
-        return step_with_care(self, ref, grip);
+        return aim_with_care(self, ref, grip);
     }
     note_use(self, ref);
-    return advance(self, self->state.acc_per_cycle2_q32 + jerk_q32);
+    return self->state.acc_per_cycle2_q32 + jerk_q32;
 }
 
 q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
 {
-    return step(self, ref, grip);
+    return ramp_advance(self, aim(self, ref, grip));
+}
+
+unsigned ramp_aim_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *acc_q32)
+{
+    unsigned flags = 0;
+    for (unsigned i = 0; i < count; i++) {
+        acc_q32[i] = aim(&ramp[i], &ref[i], grip);
+        flags |= ramp[i].flags;
+    }
+    return flags;
 }
 
 unsigned ramp_step_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *pos_q32)
 {
     unsigned flags = 0;
     for (unsigned i = 0; i < count; i++) {
-        pos_q32[i] = step(&ramp[i], &ref[i], grip);
+        pos_q32[i] = ramp_advance(&ramp[i], aim(&ramp[i], &ref[i], grip));
         flags |= ramp[i].flags;
     }
     return flags;
