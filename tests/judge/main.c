@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT
  * main.c - judges a trace of set-points, fast enough for tens of millions of cycles.
  *
- *   trace_judge [--strict] CONFIG [FRAMES] <TRACE    what was judged, one figure a line; then what was broken, and the first of
+ *   trace_judge CONFIG [FRAMES] <TRACE    what was judged, one figure a line; then what was broken, and the first of
  * it
  *
- * --strict: the limits of the pose axes count wherever a pose is followed, in rows with takeover, off-path or clamped, too.
  * With the frames that were played it is also judged whether they were followed.
  *
  * Exit status: 0 nothing broken, 1 something, 2 a configuration that cannot be read.
@@ -34,16 +33,13 @@ int main(int argc, char **argv)
     static rules_t s_rules;
     static following_t s_following;
     char line[LINE_BYTES];
-    const bool is_strict = argc > 1 && strcmp(argv[1], "--strict") == 0;
-    argc -= is_strict;
-    argv += is_strict;
     const bool has_frames = argc == 3;
     if (argc < 2 || argc > 3 || !mechanism_read(&s_mechanism, argv[1]) ||
         (has_frames && !following_read(&s_following, &s_mechanism, argv[2]))) {
-        fputs("usage: trace_judge [--strict] CONFIG [FRAMES] <TRACE\n", stderr);
+        fputs("usage: trace_judge CONFIG [FRAMES] <TRACE\n", stderr);
         return 2;
     }
-    rules_init(&s_rules, &s_mechanism, is_strict);
+    rules_init(&s_rules, &s_mechanism);
     size_t length = next_line(line);
     if (length != strlen(row_header) + 1 || memcmp(line, row_header, length - 1) != 0) {
         rules_bad_line(&s_rules);

@@ -11,11 +11,13 @@
 #define POSE_NOISE 10  /* a pose at rest may be solved anew from the same extensions, 1e-9 */
 #define AGREE_MM   1e-6
 #define POSE_SLACK 1000 /* the same in 1e-9 */
-#define ANYWHERE_FLAGS                                                                                                           \
-    ((unsigned)FLAG_CYLINDERS | FLAG_TAKEOVER | FLAG_NO_POSE) /* the pose axes take over where such a row ends */
-#define NO_BOUNDS_FLAGS (ANYWHERE_FLAGS | FLAG_OFF_PATH)
-#define NO_RATES_FLAGS  (NO_BOUNDS_FLAGS | FLAG_CLAMPED)
-#define STRICT_FLAGS    ((unsigned)FLAG_CYLINDERS | FLAG_NO_POSE) /* no pose is followed */
+#define NO_POSE_FLAGS                                                                                                            \
+    ((unsigned)FLAG_CYLINDERS | FLAG_NO_POSE)                 /* no pose is followed; the axes take over where such a row ends */
+#define PULLED_FLAGS ((unsigned)FLAG_CLAMPED | FLAG_OFF_PATH) /* the axes are where the cylinders can be ... */
+
+/* ... and may move with so many times their limits of speed, acceleration and jerk: near singular poses a little of a cylinder
+ * is much of an axis. */
+static const int k_pulled_times[ORDERS] = {1, 4, 4, 8};
 
 static int64_t magnitude(int64_t value)
 {
@@ -47,11 +49,14 @@ static void find(rules_t *self, unsigned rule, unsigned column, int64_t value)
     }
 }
 
-static void check_rate(rules_t *self, unsigned rule, unsigned column, unsigned order, const bounds_t *bounds)
+/* times: that the limit counts */
+static void check_rate(rules_t *self, unsigned rule, unsigned column, unsigned order, const bounds_t *bounds, int times)
 {
     const int64_t value = magnitude(self->difference[order][column]);
-    self->worst[rule] = fmax(self->worst[rule], (double)value / bounds->exact[order]);
-    if (value > bounds->most[order]) {
+    if (times == 1) {
+        self->worst[rule] = fmax(self->worst[rule], (double)value / bounds->exact[order]);
+    }
+    if (value > bounds->most[order] * times) {
         find(self, rule, column, value);
     }
 }
@@ -110,7 +115,7 @@ static void check_movers(rules_t *self)
         }
         for (unsigned order = 1; order < ORDERS; order++) {
             if (self->age >= k_rows_needed[order]) {
-                check_rate(self, RULE_COLUMN + 4 * column + order, column, order, &self->mechanism->column[column]);
+                check_rate(self, RULE_COLUMN + 4 * column + order, column, order, &self->mechanism->column[column], 1);
             }
         }
         check_range(self, column, 0, false);
@@ -124,25 +129,28 @@ static void check_movers(rules_t *self)
  * it would have been. */
 static void check_pose(rules_t *self, unsigned flags)
 {
-    const bool has_bounds = (flags & (self->is_strict ? STRICT_FLAGS : NO_BOUNDS_FLAGS)) == 0;
-    const bool has_rates = (flags & (self->is_strict ? STRICT_FLAGS : NO_RATES_FLAGS)) == 0;
+    const bool is_followed = (flags & NO_POSE_FLAGS) == 0;
+    const bool is_pulled = (flags & PULLED_FLAGS) != 0;
     for (unsigned axis = 0; axis < POSE_COLUMNS; axis++) {
         if (!self->mechanism->is_free[axis]) {
             continue;
         }
-        if (!has_bounds) {
-            allow(self, axis, true, (flags & ANYWHERE_FLAGS) == 0);
+        if (!is_followed || (flags & FLAG_OFF_PATH) != 0) {
+            allow(self, axis, true, is_followed);
         } else {
             check_range(self, axis, POSE_SLACK, (flags & FLAG_CLAMPED) != 0);
         }
-        for (unsigned order = 1; order < ORDERS && has_rates; order++) {
+        for (unsigned order = 1; order < ORDERS && is_followed; order++) {
             if (self->pose_age >= order) {
-                check_rate(self, RULE_COLUMN + 4 * axis + order, axis, order, &self->mechanism->column[axis]);
+                const bool is_free = !is_pulled && self->free_age >= order;
+                check_rate(self, RULE_COLUMN + 4 * axis + order, axis, order, &self->mechanism->column[axis],
+                           is_free ? 1 : k_pulled_times[order]);
             }
         }
     }
-    self->pose_judged += has_rates;
-    self->pose_age = has_rates ? self->pose_age + 1 : 0;
+    self->pose_judged += is_followed;
+    self->pose_age = is_followed ? self->pose_age + 1 : 0;
+    self->free_age = is_pulled ? 0 : self->free_age + 1;
 }
 
 /* ---- set-points that follow the actual positions ---- */
@@ -214,9 +222,9 @@ static void check_gentle(rules_t *self, bool is_still)
     const int64_t speed = peak(self, 1, FIRST_CYLINDER, false), accel = peak(self, 2, FIRST_CYLINDER, false);
     self->is_stopping_anew |= accel > self->mechanism->engage.most[2] && speed < self->last_speed;
     for (unsigned i = 0; i < self->mechanism->cylinders; i++) {
-        check_rate(self, RULE_ENGAGE_SPEED, FIRST_CYLINDER + i, 1, &self->mechanism->engage);
+        check_rate(self, RULE_ENGAGE_SPEED, FIRST_CYLINDER + i, 1, &self->mechanism->engage, 1);
         if (!self->is_stopping_anew) {
-            check_rate(self, RULE_ENGAGE_ACCEL, FIRST_CYLINDER + i, 2, &self->mechanism->engage);
+            check_rate(self, RULE_ENGAGE_ACCEL, FIRST_CYLINDER + i, 2, &self->mechanism->engage, 1);
         }
     }
     self->is_stopping_anew = self->is_stopping_anew && !is_still;
@@ -300,9 +308,9 @@ static void count(rules_t *self, const row_t *row)
     }
 }
 
-void rules_init(rules_t *self, const mechanism_t *mechanism, bool is_strict)
+void rules_init(rules_t *self, const mechanism_t *mechanism)
 {
-    *self = (rules_t){.mechanism = mechanism, .is_strict = is_strict};
+    *self = (rules_t){.mechanism = mechanism};
 }
 
 void rules_bad_line(rules_t *self)

@@ -40,7 +40,6 @@ typedef struct {
 
 typedef struct {
     const mechanism_t *mechanism;
-    bool is_strict; /**< the pose axes are judged wherever a pose is followed: taken over, clamped, behind the reference */
     uint64_t rows, judged, pose_judged, in_place[PLACES], with_flag[FLAG_COUNT];
     uint64_t broken[RULES];
     double worst[RULES]; /**< share of the limit; RULE_AGREE, RULE_GUIDE: mm */
@@ -52,6 +51,7 @@ typedef struct {
     allowance_t allowance[COLUMNS];
     bool is_limited;
     unsigned age, pose_age; /**< rows in a row that limits held in */
+    unsigned free_age;      /**< rows since one in which cylinders pulled the pose axes */
     bool was_still;         /**< every cylinder and the motor at rest in the last row */
     bool has_rested;        /**< in this stay in the state */
     bool is_stopping_anew;  /**< RISING or SETTLING: in another controlled stop than the first */
@@ -59,7 +59,7 @@ typedef struct {
     int64_t last_speed; /**< of the fastest cylinder */
 } rules_t;
 
-void rules_init(rules_t *self, const mechanism_t *mechanism, bool is_strict);
+void rules_init(rules_t *self, const mechanism_t *mechanism);
 
 /** Judges the next row. */
 void rules_row(rules_t *self, const row_t *row);

@@ -112,7 +112,7 @@ class Seed:
     """One seed, its files in a folder."""
 
     def __init__(self, programs, config, number, folder):
-        self.heaved, self.judge, self.strict, self.number = *programs, number
+        self.heaved, self.judge, self.number = *programs, number
         self.frames, self.ini, self.trace = folder / "frames", folder / "platform.ini", folder / "trace.csv"
         changes = variants(Configuration(config))[(number - 1) % 5]
         self.ini.write_text(with_changes(config.read_text(encoding="utf-8"), changes), encoding="utf-8")
@@ -127,7 +127,7 @@ class Seed:
         """Row by row through a pipe, no file between."""
         with tempfile.TemporaryFile("w+") as log:
             with subprocess.Popen(self.play_command("-"), stdout=subprocess.PIPE, stderr=log) as heaved:
-                judge = subprocess.run([self.judge, *self.strict, self.ini], stdin=heaved.stdout, capture_output=True, text=True, check=False)
+                judge = subprocess.run([self.judge, self.ini], stdin=heaved.stdout, capture_output=True, text=True, check=False)
                 heaved.stdout.close()
             log.seek(0)
             if heaved.returncode != 0 or judge.returncode not in (0, 1):
@@ -141,8 +141,8 @@ class Seed:
         with open(self.trace, encoding="ascii") as rows, open(part, "w", encoding="ascii") as first_rows:
             first_rows.writelines(islice(rows, 1 + most))
         with open(part, encoding="ascii") as rows:
-            judge = subprocess.run([self.judge, *self.strict, self.ini], stdin=rows, capture_output=True, text=True, check=False)
-        check = subprocess.run([sys.executable, TOP / "tools/check_trace", "--json", *self.strict, "--frames", self.frames, self.ini, part],
+            judge = subprocess.run([self.judge, self.ini], stdin=rows, capture_output=True, text=True, check=False)
+        check = subprocess.run([sys.executable, TOP / "tools/check_trace", "--json", "--frames", self.frames, self.ini, part],
                                stdout=subprocess.PIPE, text=True, check=False)
         if check.returncode not in (0, 1):
             raise Unplayable("check_trace could not check")
@@ -163,7 +163,7 @@ class Hunt:
 
     def again(self, number):
         a = self.arguments
-        return f"PYTHONPATH=tests/lib python3 tests/property/test_limits.py --heaved {a.heaved} --judge {a.judge} --config {a.config} --seed {number} --seeds 1 --keep DIR{' --strict' if a.strict else ''}"
+        return f"PYTHONPATH=tests/lib python3 tests/property/test_limits.py --heaved {a.heaved} --judge {a.judge} --config {a.config} --seed {number} --seeds 1 --keep DIR"
 
     def judge(self, seed):
         verdict = seed.play_and_judge()
@@ -187,7 +187,7 @@ class Hunt:
         a, name, verdict = self.arguments, self.arguments.config.stem, None
         what = describe(variants(Configuration(a.config))[(number - 1) % 5])
         with suite.case(f"{name}, {what}, seed {number}: no limit is exceeded in any cycle"):
-            seed = Seed((a.heaved, a.judge, ["--strict"] if a.strict else []), a.config, number, folder)
+            seed = Seed((a.heaved, a.judge), a.config, number, folder)
             verdict = self.judge(seed)
         if verdict and not self.timed_moves:
             with suite.case(f"{name}, seed {number}: check_trace judges the same first rows and finds nothing either"):
@@ -212,7 +212,6 @@ def main():
     parser.add_argument("--seed", type=int, default=1, help="the first")
     parser.add_argument("--seeds", type=int, help="so many, whatever the cycles")
     parser.add_argument("--slowly", type=int, default=SLOWLY_ROWS, metavar="ROWS", help="so many rows of a seed by check_trace")
-    parser.add_argument("--strict", action="store_true", help="limits of the pose axes in take-over, off-path and clamped, too")
     parser.add_argument("--keep", type=Path, metavar="DIR", help="leave the last seed's files there")
     arguments = parser.parse_args()
     suite, hunt = tap.Suite(), Hunt(arguments)

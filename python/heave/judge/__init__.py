@@ -83,12 +83,12 @@ def configuration_of(path: str | os.PathLike[str]) -> Configuration:
 
 
 def check(config: str | os.PathLike[str], trace: Run | str | os.PathLike[str] | Iterable[str], *, frames: str | os.PathLike[str] | Sequence[recording.Line] | None = None,
-          strict: bool = False, every: int = 10) -> Verdict:
-    """trace: a run of heave.play(), the path of a trace, or its lines. frames: timed moves are checked too. strict and every: as for heave check."""
+          every: int = 10) -> Verdict:
+    """trace: a run of heave.play(), the path of a trace, or its lines. frames: timed moves are checked too. every: as for heave check."""
     configuration = configuration_of(config)
     lines = recording.read(frames) if isinstance(frames, (str, os.PathLike)) else frames
     timed = TimedWatcher(lines, configuration, COLUMNS) if lines else None
-    checker = Checker(configuration, every=every, watchers=[timed] if timed else [], is_strict=strict)
+    checker = Checker(configuration, every=every, watchers=[timed] if timed else [])
     if isinstance(trace, (str, os.PathLike)):
         with open(trace, encoding="ascii", errors="replace", newline="\n") as file:
             checker.read(file)

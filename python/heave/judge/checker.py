@@ -25,10 +25,9 @@ MOVING_GENTLY = {"RISING", "SETTLING"}
 NOT_BEFORE_ENGAGED = {"OFF", "HOMING", "SETTLED", "SERVICE", LOOSE, "FAULT", "ESTOP"}
 LATCHED = {"FAULT": {"FAULT", "ESTOP", "OFF"}, "ESTOP": {"ESTOP", "FAULT", "OFF"}}
 
-NO_POSE_BOUNDS = {"cylinders", "off-path", "takeover", "no-pose"}
-NO_POSE_LIMITS = NO_POSE_BOUNDS | {"clamped"}
-POSE_ANYWHERE = NO_POSE_BOUNDS - {"off-path"}  # the pose axes take over where such a row leaves them
-STRICTLY_NO_POSE = {"cylinders", "no-pose"}    # where a pose is followed, all rows count: taken over, pulled in, behind the reference
+NO_POSE = {"cylinders", "no-pose"}  # no pose is followed; the axes take over where such a row ends
+PULLED = {"clamped", "off-path"}    # the axes are where the cylinders can be ...
+PULLED_TIMES = {1: 4, 2: 4, 3: 8}   # ... and may move with so many times their limits: near singular poses a little of a cylinder is much of an axis
 
 BLOCK_ROWS = 8192
 REST_ROWS = 20  # as many equal rows are taken for rest, not for the slow start of a move
@@ -46,27 +45,23 @@ class Watcher(Protocol):
 
 
 class FlagTable(dict[str, FlagFacts]):
-    """flags as printed -> (has pose limits, has pose bounds, has a pose, is well-formed, pose axes are led elsewhere, is clamped); filled when
-    asked."""
-
-    def __init__(self, is_strict: bool) -> None:
-        super().__init__()
-        self.no_limits, self.no_bounds, self.anywhere = [STRICTLY_NO_POSE] * 3 if is_strict else (NO_POSE_LIMITS, NO_POSE_BOUNDS, POSE_ANYWHERE)
+    """flags as printed -> (a pose is followed, pose bounds hold, has a pose, is well-formed, pose axes are pulled, is clamped); filled when asked."""
 
     def __missing__(self, text: str) -> FlagFacts:
         words = text.split("|") if text else []
         known = set(words)
         fine = known <= FLAGS and len(known) == len(words)
-        self[text] = result = (not known & self.no_limits, not known & self.no_bounds, "no-pose" not in known, fine, known & self.anywhere != set(),
+        is_followed = not known & NO_POSE
+        self[text] = result = (is_followed, is_followed and "off-path" not in known, "no-pose" not in known, fine, known & PULLED != set(),
                                "clamped" in known)
         return result
 
 
 class Checker:
-    def __init__(self, platform: Configuration, every: int = 10, kept: int = 20, watchers: Sequence[Watcher] = (), block_rows: int = BLOCK_ROWS, is_strict: bool = False) -> None:
+    def __init__(self, platform: Configuration, every: int = 10, kept: int = 20, watchers: Sequence[Watcher] = (), block_rows: int = BLOCK_ROWS) -> None:
         self.platform, self.every, self.watchers, self.block_rows = platform, every, watchers, block_rows
         self.findings = Findings(kept)
-        self.flag_table = FlagTable(is_strict)
+        self.flag_table = FlagTable()
         self.rows = self.following_rows = self.pose_rows = 0
         self.state_rows: Counter[str] = Counter()
         self.flag_rows: Counter[str] = Counter()
@@ -79,6 +74,7 @@ class Checker:
         self.is_limited = False      # whether limits held in the last row
         self.age = 0                 # rows before the next one that limits held in, without a break
         self.pose_age = 0            # the same of the limits of the pose axes
+        self.free_age = 0            # rows since one in which cylinders pulled the pose axes
         self.was_still = False       # the last row is the third equal one, or the first of all
         self.has_rested = False      # in this stay in the state, everything came to rest
         self.still_rows = 0
@@ -311,19 +307,23 @@ class Checker:
                 for rule in self.pose_ranges:
                     rule.check(block, i, end, self.findings, keeps=facts[5])
             else:
-                self._place_pose(block, end - 1, keeps=not facts[4])
+                self._place_pose(block, end - 1, keeps=facts[0])
             if facts[0]:
-                self._check_pose_rates(block, i, end)
+                self._check_pose_rates(block, i, end, facts[4])
             else:
                 self.pose_age = 0
+            self.free_age = 0 if facts[4] else self.free_age + end - i
             i = end
 
-    def _check_pose_rates(self, block: Block, start: int, stop: int) -> None:
+    def _check_pose_rates(self, block: Block, start: int, stop: int, is_pulled: bool) -> None:
         self.pose_rows += stop - start
         for axis in self.pose_rates:
             for rule in axis:
                 first = start + max(0, rule.order - self.pose_age)
-                rule.check(block, block.magnitudes[rule.columns[0]][rule.order], first, stop, self.findings)
+                free = stop if is_pulled else min(stop, max(first, start + max(0, rule.order - self.free_age)))
+                magnitudes = block.magnitudes[rule.columns[0]][rule.order]
+                rule.check(block, magnitudes, first, free, self.findings, PULLED_TIMES[rule.order])
+                rule.check(block, magnitudes, free, stop, self.findings)
         self.pose_age += stop - start
 
     def _follow(self, block: Block, stop: int) -> None:

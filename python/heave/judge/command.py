@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """command.py - proves row by row that a trace of set-points kept every limit of its configuration. Shares nothing with the core.
 
-usage: heave check [--json] [--strict] [--frames FRAMES] [--every N] CONFIG TRACE        (TRACE may be -)
+usage: heave check [--json] [--frames FRAMES] [--every N] CONFIG TRACE        (TRACE may be -)
 
 CONFIG is what heaved ran with, TRACE what its --trace wrote. Numbers are read as integers of 1e-9, so that limit checks involve no rounding
 of their own. The only tolerance is that of the nine printed decimals: 1, 1, 2 and 4 units of the last one for position, first, second and
@@ -10,9 +10,9 @@ third difference. Checked are:
   time         every row one cycle after the one before; whole cycles may be missing before a row flagged late
   stroke       of each cylinder, margins included; where the platform was placed outside, it may not go further out
   rates        speed, acceleration and jerk of each cylinder and of the rotation motor, as finite differences
-  pose axes    bounds, speed, acceleration and jerk, in rows without the flags cylinders, off-path, takeover, no-pose and, of the rates, clamped;
-               an axis that comes from such rows outside its bounds, or moving, may take its stopping distance and go no further out;
-               --strict: in all rows without cylinders and no-pose, where a pose is followed: take-over, off-path and clamped count, too
+  pose axes    bounds, speed, acceleration and jerk, in all rows in which a pose is followed (without the flags cylinders and no-pose); in rows
+               with off-path or clamped, where cylinders pull the axes, four times speed and acceleration, eight times jerk, and with off-path
+               no bounds; an axis that comes from such rows outside its bounds, or moving, may take its stopping distance and go no further out
   rest         SETTLED and NEUTRAL do not move and are where the configuration says; HOLD, FAULT and OFF come to rest; a HOLD then stays
   engage       RISING and SETTLING: after the stop they begin with, engage speed and acceleration
   relays       the safe mask unless ENGAGED; never a line that the platform lacks
@@ -42,7 +42,6 @@ def parse_arguments(words: Sequence[str] | None, program: str | None) -> argpars
     parser.add_argument("trace", help="what its --trace wrote, - for standard input")
     parser.add_argument("--frames", help="what it played: timed moves are checked too")
     parser.add_argument("--every", type=int, default=10, metavar="N", help="kinematics of every Nth row (default 10; 1 = all)")
-    parser.add_argument("--strict", action="store_true", help="limits of the pose axes in take-over, off-path and clamped, too")
     parser.add_argument("--json", action="store_true", help="the result as one JSON object")
     arguments = parser.parse_args(words)
     if arguments.every < 1:
@@ -53,7 +52,7 @@ def parse_arguments(words: Sequence[str] | None, program: str | None) -> argpars
 def check(arguments: argparse.Namespace) -> tuple[Checker, TimedWatcher | None]:
     platform = Configuration(arguments.config)
     timed = TimedWatcher(read_frames(arguments.frames), platform, COLUMNS) if arguments.frames else None
-    checker = Checker(platform, every=arguments.every, watchers=[timed] if timed else [], is_strict=arguments.strict)
+    checker = Checker(platform, every=arguments.every, watchers=[timed] if timed else [])
     if arguments.trace == "-":
         checker.read(sys.stdin)
     else:

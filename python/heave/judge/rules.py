@@ -102,23 +102,24 @@ class RateRule:
         self.worst = self.rows = 0
         self.worst_t_us: int | None = None
 
-    def check(self, block: Block, peak: list[int], start: int, stop: int, findings: Findings) -> None:
+    def check(self, block: Block, peak: list[int], start: int, stop: int, findings: Findings, times: int = 1) -> None:
+        """times: that the limit counts; rows with more than one are not part of the summary."""
         if start >= stop:
             return
-        self.rows += stop - start
         top = max(peak[start:stop])
-        if top > self.worst or self.worst_t_us is None:
+        self.rows += stop - start if times == 1 else 0
+        if times == 1 and (top > self.worst or self.worst_t_us is None):
             self.worst, self.worst_t_us = top, block.times[peak.index(top, start, stop)]
-        if top > self.most:
+        if top > self.most * times:
             for i in range(start, stop):
-                if peak[i] > self.most:
-                    self._report(block, i, findings)
+                if peak[i] > self.most * times:
+                    self._report(block, i, findings, times)
 
-    def _report(self, block: Block, i: int, findings: Findings) -> None:
+    def _report(self, block: Block, i: int, findings: Findings, times: int) -> None:
         for column in self.columns:
             magnitude = block.magnitudes[column][self.order][i]
-            if magnitude > self.most:
-                findings.add(self.name, self.names[column], *block.at(i), self.text(magnitude), self.limit_text())
+            if magnitude > self.most * times:
+                findings.add(self.name, self.names[column], *block.at(i), self.text(magnitude), ("" if times == 1 else f"{times} x ") + self.limit_text())
 
     def text(self, magnitude: int) -> str:
         return f"{float(magnitude * self.stated / self.per_cycle):.6f} {self.unit}{ORDER_UNIT[self.order]}"
