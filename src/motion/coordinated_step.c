@@ -54,7 +54,7 @@ static bool can_all_follow(const motion_t *self, const coordinated_step_t *to)
 }
 
 /* The gain of the brake jerk = -g^2 vel - 2 g acc, two poles at -g: as large as one axis or cylinder bears, with seven eighths of
- * its jerk, and without more than its acceleration on the way (at most g vel / 2). */
+ * its jerk, and without more than its acceleration on the way (from an even speed g vel / e at most). */
 static int64_t gain_borne(const ramp_t *ramp, const ramp_state_t *at, int64_t gain_q16)
 {
     const q32_t jerk_q32 = ramp->limits.jerk_per_cycle3_q32;
