@@ -8,7 +8,8 @@
  * Acceleration and jerk: level 0 is the curve with that speed. Each further level is the previous one after one more low-pass
  * (time constants 6, 12, 25, 50, 100, 200, 400 ms). For each level the governor records which share of the limits of axes and
  * cylinders it needed. The output is interpolated between the levels, as far along as the limits require. A need counts
- * if it comes again within 1.5 s, or in the first second of a stream: what exceeds the limits once is left to the ramps.
+ * if it comes again within 1.5 s, or in the first second of a stream or after a rest: what exceeds the limits once is left to
+ * the ramps.
  * Every level is a mean of the requested curve, and so is the output: it never leaves the range of the request and cannot
  * oscillate. All axes share one factor and one strength, so the direction is kept. Owns no clock; not re-entrant per instance.
  */
@@ -22,6 +23,7 @@ enum {
     GOVERNOR_LEVELS = 7,                   /**< low-passes */
     GOVERNOR_CHANNELS = 2 * CYLINDERS_MAX, /**< pose axes, then the cylinders that follow from them */
     GOVERNOR_POLES = 3,                    /**< number of low-passes that smooth a rising strength */
+    GOVERNOR_BEGIN_US = 1000000,           /**< where a motion begins, one event alone counts for so long */
     GOVERNOR_EVENTS = 8                    /**< events that are remembered, in which more was needed than there was */
 };
 
@@ -59,13 +61,13 @@ typedef struct {
     unsigned since; /**< periods since the last calculation */
     governor_track_t track[GOVERNOR_LEVELS + 1][GOVERNOR_CHANNELS]; /**< levels at the last calculation, and ... */
     governor_track_t out[GOVERNOR_CHANNELS];                        /**< ... the output */
-    uint32_t begun_us;                                              /**< since the stream began, up to a second */
-    governor_event_t event[GOVERNOR_EVENTS];                        /**< the newest first */
-    q32_t target_q32;                                               /**< strength that it goes to ... */
-    q32_t pole_q32[GOVERNOR_POLES];                                 /**< ... through low-passes */
-    q32_t fall_q32;                                                 /**< present rate of fall of the target */
-    q32_t glide_q32;                                                /**< change of the strength per period */
-    q32_t strength_q32;                                             /**< [0, GOVERNOR_LEVELS]: 0 is the curve as asked */
+    uint32_t single_us;                      /**< time for which one event alone counts, [0, GOVERNOR_BEGIN_US] */
+    governor_event_t event[GOVERNOR_EVENTS]; /**< the newest first */
+    q32_t target_q32;                        /**< strength that it goes to ... */
+    q32_t pole_q32[GOVERNOR_POLES];          /**< ... through low-passes */
+    q32_t fall_q32;                          /**< present rate of fall of the target */
+    q32_t glide_q32;                         /**< change of the strength per period */
+    q32_t strength_q32;                      /**< [0, GOVERNOR_LEVELS]: 0 is the curve as asked */
 } governor_t;
 
 /** Sets the limits of a channel; jerk 0: none. Call before governor_place(). */

@@ -8,9 +8,11 @@
 
 #define SPAN_US       150000u             /* needs within such a time are one event, ... */
 #define MEMORY_US     1500000u            /* ... which counts for so long: a shake of 0.4 Hz turns twice meanwhile */
-#define BEGIN_US      1000000u            /* a stream begins for so long */
+#define REST_SHARE    128                 /* where no more than such a share of the goal is needed, it rests, ... */
+#define REST_TIMES    2                   /* ... and half a second of that makes a beginning of what comes next */
 #define QUIET_SHARE   4                   /* while no more than such a share of the goal is needed ... */
 #define QUIET_TIMES   4u                  /* ... it is forgotten so much sooner */
+#define RISE_Q32      (Q32_ONE * 3 / 8)   /* share of a low-pass through which the strength rises */
 #define RELEASE_US    300000u             /* time constant with which the strength falls ... */
 #define SOFT_US       100000u             /* ... which that rate comes to */
 #define RELEASE_DIV   4                   /* ... and at least by a level in so many seconds, ... */
@@ -132,7 +134,7 @@ void governor_start(governor_t *self)
     for (unsigned event = 0; event < GOVERNOR_EVENTS; event++) {
         self->event[event] = (governor_event_t){.age_us = MEMORY_US};
     }
-    self->begun_us = 0;
+    self->single_us = GOVERNOR_BEGIN_US;
     self->is_slowed = false;
     self->strength_q32 = 0;
     self->glide_q32 = 0;
@@ -188,12 +190,13 @@ static q32_t low_pass(q32_t at_q32, q32_t input_q32, q32_t share_q32)
 }
 
 /* Events become older, and more quickly while little moves. Where more is needed than there is, and the newest event is over,
- * another one begins. */
+ * another one begins. A rest brings the levels together: to change the strength then moves nothing, so one event is enough. */
 static void pass_time(governor_t *self, int32_t need_q16)
 {
     const uint32_t look_us = self->period_us * self->each;
     const uint32_t passed_us = need_q16 < NEED_GOAL / QUIET_SHARE ? QUIET_TIMES * look_us : look_us;
-    self->begun_us += self->begun_us < BEGIN_US ? look_us : 0;
+    const int64_t rest_us = need_q16 < NEED_GOAL / REST_SHARE ? REST_TIMES * (int64_t)look_us : -(int64_t)look_us;
+    self->single_us = (uint32_t)fx_clamp(self->single_us + rest_us, 0, GOVERNOR_BEGIN_US);
     for (unsigned i = 0; i < GOVERNOR_EVENTS; i++) {
         self->event[i].age_us += self->event[i].age_us < MEMORY_US ? passed_us : 0;
     }
@@ -236,7 +239,7 @@ static void note_needs(governor_t *self, int32_t scale_q16)
 }
 
 /* What a level needs again and again: the second largest of the events. One alone is brief, as a jump is: to smooth it would take
- * longer than to be late once. But where a stream begins, one alone is its beginning. */
+ * longer than to be late once. But where a motion begins, one alone is its beginning. */
 static int32_t lasting_need(const governor_t *self, unsigned level)
 {
     int32_t largest_q16 = 0;
@@ -246,7 +249,7 @@ static int32_t lasting_need(const governor_t *self, unsigned level)
         second_q16 = governor_larger(second_q16, need_q16 < largest_q16 ? need_q16 : largest_q16);
         largest_q16 = governor_larger(largest_q16, need_q16);
     }
-    return self->begun_us < BEGIN_US ? largest_q16 : second_q16;
+    return self->single_us > 0 ? largest_q16 : second_q16;
 }
 
 /* How far the output is on its way from a level to the next one: 3 u^2 - 2 u^3 of the strength between them. Ways between levels
@@ -362,7 +365,7 @@ static q32_t fall_of(const governor_t *self, q32_t wanted_q32)
 }
 
 /* The levels are apart where the motion is quick, so that every change of the strength is a motion of its own: it goes through
- * low-passes. Where not even so much is bearable, as after a jump, a rise comes at once, if that is better by half. */
+ * low-passes. Where not even so much is bearable, as after a jump or a rest, a rise comes at once, if that asks for less. */
 static void follow_need(governor_t *self, q32_t wanted_q32)
 {
     const q32_t fall_q32 = wanted_q32 < self->target_q32 ? fall_of(self, wanted_q32) : 0;
@@ -372,12 +375,11 @@ static void follow_need(governor_t *self, q32_t wanted_q32)
     self->target_q32 = wanted_q32 > fallen_q32 ? wanted_q32 : fallen_q32;
     q32_t next_q32 = self->target_q32;
     for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
-        const q32_t travel_q32 = next_q32 - self->pole_q32[pole];
-        self->pole_q32[pole] = fx_abs(travel_q32) < NEAR_Q32 ? next_q32 : self->pole_q32[pole] + travel_q32 * 3 / 8;
+        self->pole_q32[pole] = low_pass(self->pole_q32[pole], next_q32, RISE_Q32);
         next_q32 = self->pole_q32[pole];
     }
     const int32_t soft_q16 = wanted_q32 > next_q32 ? need_at(self, next_q32) : 0;
-    if (soft_q16 > 2 * NEED_GOAL && 2 * need_at(self, wanted_q32) < soft_q16) {
+    if (soft_q16 > 2 * NEED_GOAL && need_at(self, wanted_q32) < soft_q16) {
         place_strength(self, wanted_q32);
         next_q32 = wanted_q32;
     }
@@ -389,13 +391,11 @@ void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, 
     q32_t kept_q32[GOVERNOR_CHANNELS];
     governor_limit_speed(self, asked_q32, scale_q16, kept_q32);
     step_levels(self, kept_q32);
-    self->since++;
-    const bool is_looked_at = self->since >= self->each;
+    const bool is_looked_at = ++self->since >= self->each;
     if (is_looked_at) {
         self->since = 0;
         note_needs(self, scale_q16);
-        const q32_t wanted_q32 = needed_strength(self);
-        follow_need(self, wanted_q32);
+        follow_need(self, needed_strength(self));
     }
     self->strength_q32 += self->glide_q32;
     for (unsigned i = 0; i < self->channels; i++) {
@@ -483,7 +483,7 @@ static bool are_levels_sane(const governor_t *self)
 
 static bool are_needs_sane(const governor_t *self)
 {
-    bool is_sane = sane_bool(&self->is_slowed) && self->begun_us <= BEGIN_US + PERIOD_MAX_US;
+    bool is_sane = sane_bool(&self->is_slowed) && self->single_us <= GOVERNOR_BEGIN_US;
     for (unsigned i = 0; i < GOVERNOR_EVENTS; i++) {
         is_sane = is_sane && self->event[i].age_us <= MEMORY_US + QUIET_TIMES * PERIOD_MAX_US;
         for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {

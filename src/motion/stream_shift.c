@@ -46,5 +46,5 @@ void stream_shift(stream_t *self, const kin_t *kin, const q32_t by_q32[POSE_AXES
         self->left_q32[axis] += by_q32[axis];
     }
     shift_governor(&self->curve.governor, kin, by_q32);
-    self->curve.governor.begun_us = 0; /* what exceeds the limits next is no longer a single jump */
+    self->curve.governor.single_us = GOVERNOR_BEGIN_US; /* what exceeds the limits next is no longer a single jump */
 }

@@ -189,7 +189,7 @@ static void essence(motion_t *motion)
     curve->reach_min_q16 = curve->reach_max_q16 = 0;
     governor_t *governor =
         &curve->governor; /* its levels, output and strength are compared; the rest is worked out from the period */
-    governor->period_us = governor->begun_us = 0;
+    governor->period_us = governor->single_us = 0;
     memset(governor->event, 0, sizeof governor->event); /* when more was needed than there was */
     governor->fall_q32 = governor->strength_q32 == 0 ? 0 : governor->fall_q32;
     memset(governor->per_limit_q62, 0, sizeof governor->per_limit_q62);

@@ -186,6 +186,35 @@ static void test_noise_of_all_axes_leaves_no_cylinder_behind(void)
     }
 }
 
+/* A sender that stands, and then sends noise on some axes. */
+static void test_noise_that_begins_at_rest_hardly_leaves_its_range(void)
+{
+    static const unsigned k_axes[] = {0x20, 0x38, 0x07, 0x11, 0x3F};
+    double farthest = 0;
+    for (unsigned i = 0; i < 20; i++) {
+        const double size = 0.5 * (1 << i / 5);
+        m_rig = m_ready;
+        m_seen.cycles = 0;
+        for (unsigned t = 0; t < 4500; t++) {
+            if (t % 50 % 17 == 0) {
+                double pose[POSE_AXES];
+                for (unsigned axis = 0; axis < POSE_AXES; axis++) {
+                    const bool is_noisy = t >= 1500 && (k_axes[i % 5] >> axis & 1) != 0;
+                    pose[axis] = is_noisy ? between(-size, size) * (axis < AXIS_X ? 0.2 : 1) : 0;
+                }
+                send(pose);
+            }
+            run_cycle();
+            for (unsigned axis = 0; axis < POSE_AXES; axis++) {
+                farthest = larger(farthest, fabs(rig_pose(&m_rig, axis)) / size / (axis < AXIS_X ? 0.2 : 1));
+            }
+        }
+        expect_together();
+    }
+    printf("noise after a rest: at most %.2f of its range\n", farthest);
+    TEST_ASSERT_TRUE(farthest < 1.5); /* a governor that waits for a second event: 10 */
+}
+
 /* How far the pose is from a line through neutral, as a share of the line; degrees count as ten mm. */
 static double beside(const double way[POSE_AXES])
 {
@@ -239,6 +268,7 @@ int main(void)
     RUN_TEST(test_rides_of_all_axes_leave_no_cylinder_behind);
     RUN_TEST(test_a_sender_that_leaps_to_zero_and_stops_leaves_no_cylinder_behind);
     RUN_TEST(test_noise_of_all_axes_leaves_no_cylinder_behind);
+    RUN_TEST(test_noise_that_begins_at_rest_hardly_leaves_its_range);
     RUN_TEST(test_what_stops_dead_hardly_leaves_its_line);
     return UNITY_END();
 }

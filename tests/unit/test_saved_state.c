@@ -305,7 +305,7 @@ static void test_a_curve_that_no_motion_has_is_refused(void)
     SPOIL(stream.curve.governor.asked_q32[11], INT64_MAX);
     SPOIL(stream.curve.governor.behind_q32[0], INT64_MIN);
     SPOIL_BOOL(stream.curve.governor.is_slowed);
-    SPOIL(stream.curve.governor.begun_us, UINT32_MAX);
+    SPOIL(stream.curve.governor.single_us, GOVERNOR_BEGIN_US + 1);
     SPOIL(stream.curve.governor.target_q32, -1);
     SPOIL(stream.curve.governor.pole_q32[2], 8 * Q32_ONE); /* no level is there */
     SPOIL(stream.curve.governor.fall_q32, -1);
