@@ -69,7 +69,7 @@ typedef struct {
     int64_t jitter_us_q16;             /**< recent lateness of the latest samples */
     int64_t margin_us_q16;             /**< waiting time for a sample beyond its time */
     int64_t per_us_q46;                /**< 1 / period: periods per us, Q46 */
-    uint32_t gap_us[STREAM_GAPS];      /**< newest intervals, a ring */
+    uint32_t gap_us[STREAM_GAPS];      /**< newest intervals, a ring; the first `gaps` are filled */
     uint16_t gap_periods[STREAM_GAPS]; /**< number of periods of each interval */
     unsigned gap_next;
     unsigned gaps;         /**< intervals in the ring that belong to the present rate */

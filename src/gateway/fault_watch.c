@@ -199,7 +199,7 @@ static fault_code_t judge_drive(gateway_t *self, unsigned i, uint64_t now_us)
 static fault_code_t find_fault(gateway_t *self, unsigned i, uint64_t now_us)
 {
     const fault_code_t judged = judge_drive(self, i, now_us);
-    for (unsigned code = FAULT_NONE + 1u; code < FAULT_CODES; code++) {
+    for (unsigned code = FAULT_NONE + 1u; code < FAULT_CODES && self->told[i + 1] != 0; code++) {
         if (fault_is_of_axis((fault_code_t)code) && fault_watch_is_told(self, (fault_code_t)code, i + 1)) {
             return (fault_code_t)code;
         }

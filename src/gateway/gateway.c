@@ -378,8 +378,8 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->intensity_percent = (uint8_t)motion_intensity(&self->motion)->percent;
     s->intensity_now_q32 = intensity_percent_q32(motion_intensity(&self->motion));
     s->stream_period_us = stream_period_us(motion_stream(&self->motion));
-    s->stream_delay_us = stream_delay_us(motion_stream(&self->motion));
     s->stream = stream_report(motion_stream(&self->motion));
+    s->stream_delay_us = s->stream.delay_us;
     s->owner = self->sender.owner;
     s->mask_habit = mask_guard_habit(&self->sender.mask_guard, self->settings.mask_policy);
     service_publish(self);

@@ -57,7 +57,8 @@ static void step(relay_policy_t *self, const relay_settings_t *settings, unsigne
 
 uint16_t relay_policy_step(relay_policy_t *self, const relay_settings_t *settings, uint16_t asked, bool is_safe, uint64_t now_us)
 {
-    for (unsigned i = 0; i < settings->count; i++) {
+    const unsigned busy = (unsigned)asked | self->mask | self->cut | self->delayed; /* the others are open, and are to be */
+    for (unsigned i = 0; i < settings->count && busy >> i != 0; i++) {
         step(self, settings, i, (asked >> i & 1u) != 0, is_safe, now_us);
     }
     return self->mask;

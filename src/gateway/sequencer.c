@@ -179,7 +179,9 @@ static void watch_service(gateway_t *self, uint64_t now_us)
 void sequencer_before_frames(gateway_t *self, uint64_t now_us)
 {
     clear_faults(self->snapshot.begun);
-    actions_event(self, EVENT_TICK, now_us);
+    if (self->supervisor.state != self->supervisor.goal) { /* what a cycle changes leads to the goal */
+        actions_event(self, EVENT_TICK, now_us);
+    }
     const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->snapshot.drive) == HV_OK;
     fault_watch_bus(self, !is_bus_heard || fault_watch_is_bus_stalled(self), now_us);
     fault_watch_bus_failing(self, now_us);

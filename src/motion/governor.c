@@ -408,12 +408,12 @@ void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, 
 
 uint32_t governor_delay_us(const governor_t *self)
 {
-    uint64_t delay_us = 0;
-    for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
-        const q32_t part_q32 = way_share(fx_clamp(self->strength_q32 - level * Q32_ONE, 0, Q32_ONE));
-        delay_us += (uint64_t)part_q32 * k_time_constant_us[level] / (uint64_t)Q32_ONE;
+    uint32_t delay_us = 0;
+    for (unsigned level = 0; level * Q32_ONE < self->strength_q32; level++) {
+        const q32_t beyond_q32 = self->strength_q32 - level * Q32_ONE;
+        delay_us += (uint32_t)fx_mul_shift(k_time_constant_us[level], beyond_q32 < Q32_ONE ? way_share(beyond_q32) : Q32_ONE, 32);
     }
-    return (uint32_t)delay_us;
+    return delay_us;
 }
 
 static bool is_strength(q32_t strength_q32)

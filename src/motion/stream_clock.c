@@ -187,10 +187,10 @@ q32_t stream_clock_jitter(const stream_clock_t *self)
 
 bool stream_clock_is_bursty(const stream_clock_t *self)
 {
+    const int64_t quarter_us = (self->period_us_q16 + 4 * STREAM_US_Q16 - 1) / (4 * STREAM_US_Q16);
     unsigned short_ones = 0;
     for (unsigned i = 0; i < self->gaps; i++) {
-        const unsigned at = (self->gap_next + STREAM_GAPS - 1 - i) % STREAM_GAPS;
-        short_ones += gap_q16(self, at) * 4 < self->period_us_q16 ? 1u : 0u;
+        short_ones += self->gap_us[i] < quarter_us;
     }
     return short_ones >= BURSTS;
 }
@@ -318,6 +318,7 @@ bool stream_clock_is_gappy(const stream_clock_t *self)
 void stream_clock_set_period(stream_clock_t *self, uint32_t period_us)
 {
     self->gaps = 0;
+    self->gap_next = 0;
     self->each = 1;
     self->settled = NEW_RATE;
     self->late_us_q16 = 0;

@@ -16,19 +16,22 @@ uint32_t stream_frame_us(const stream_t *self)
                                                                   : stream_period_us(self);
 }
 
-uint32_t stream_delay_us(const stream_t *self)
+/* Of a running one. */
+static uint32_t delay_us(const stream_t *self, uint32_t smoothing_us)
 {
-    if (self->phase != STREAM_RUNNING) {
-        return 0;
-    }
     const int64_t period = self->clock.period_us_q16;
     const stream_curve_t *curve = &self->curve;
     const q32_t led_q32 = fx_mul_shift(curve->lead_q32, curve->led_q32, 32);
     const q32_t mean_q32 = curve->mean_q32 / 2 * ((int64_t)curve->mean_points - 1);
     const int64_t spline = 2 * period - fx_mul_shift(period, led_q32 - mean_q32, 32) + (curve->window - 1) * period * 3 / 2;
-    const int64_t smoothing = (int64_t)governor_delay_us(&self->curve.governor) * STREAM_US_Q16;
+    const int64_t smoothing = (int64_t)smoothing_us * STREAM_US_Q16;
     const int64_t behind = fx_mul_shift(period, self->error_q32, 32);
     return (uint32_t)(fx_clamp(spline + smoothing + self->clock.margin_us_q16 + behind, 0, INT64_MAX) / STREAM_US_Q16);
+}
+
+uint32_t stream_delay_us(const stream_t *self)
+{
+    return self->phase == STREAM_RUNNING ? delay_us(self, governor_delay_us(&self->curve.governor)) : 0;
 }
 
 static uint32_t us_of(int64_t us_q16)
@@ -42,6 +45,7 @@ stream_report_t stream_report(const stream_t *self)
     if (self->phase != STREAM_RUNNING) {
         return (stream_report_t){.sender = STREAM_SENDER_UNKNOWN};
     }
+    const uint32_t smoothing_us = governor_delay_us(&self->curve.governor);
     const bool is_arrived = self->evidence.weight_q32 > Q32_ONE / 2;
     return (stream_report_t){.sender = is_arrived                      ? STREAM_SENDER_ARRIVALS
                                        : stream_clock_is_bursty(clock) ? STREAM_SENDER_BURSTS
@@ -49,7 +53,7 @@ stream_report_t stream_report(const stream_t *self)
                              .period_us = stream_period_us(self) * clock->each,
                              .jitter_us = us_of(clock->jitter_us_q16),
                              .lost_permille = stream_clock_lost_permille(clock),
-                             .delay_us = stream_delay_us(self),
+                             .delay_us = delay_us(self, smoothing_us),
                              .wait_us = us_of(clock->margin_us_q16),
-                             .smoothing_us = governor_delay_us(&self->curve.governor)};
+                             .smoothing_us = smoothing_us};
 }

@@ -22,13 +22,10 @@
 /* The newest intervals are divided by their periods. */
 static bool are_gaps_sane(const stream_clock_t *clock)
 {
-    if (clock->gap_next >= STREAM_GAPS || clock->gaps > STREAM_GAPS) {
-        return false;
-    }
-    bool is_sane = true;
+    bool is_sane =
+        clock->gaps == STREAM_GAPS ? clock->gap_next < STREAM_GAPS : clock->gaps < STREAM_GAPS && clock->gap_next == clock->gaps;
     for (unsigned i = 0; i < STREAM_GAPS; i++) {
-        const unsigned at = (clock->gap_next + STREAM_GAPS - 1 - i) % STREAM_GAPS;
-        is_sane = is_sane && clock->gap_us[at] <= GAP_MAX_US && (i >= clock->gaps || clock->gap_periods[at] > 0);
+        is_sane = is_sane && clock->gap_us[i] <= GAP_MAX_US && (i >= clock->gaps || clock->gap_periods[i] > 0);
     }
     return is_sane;
 }
