@@ -44,23 +44,14 @@ static void start_filter(plate_t *self)
     self->samples = 0;
 }
 
-/* Where its course leads; 0: where it is. */
-static pose_t look_ahead(const plate_t *self, int64_t step_us)
-{
-    pose_t ahead = self->filtered;
-    for (unsigned axis = 0; axis < POSE_AXES && step_us > 0; axis++) {
-        const q32_t by_speed_q32 = fx_mul_div(self->speed_per_s.axis_q32[axis], step_us, US_PER_S);
-        const q32_t by_accel_q32 = fx_mul_div(self->accel_per_s2.axis_q32[axis], step_us * step_us, 2 * US_PER_S * US_PER_S);
-        ahead.axis_q32[axis] = fx_add_sat(ahead.axis_q32[axis], fx_add_sat(by_speed_q32, by_accel_q32));
-    }
-    return ahead;
-}
-
 /* Takes a sample of an axis in; false where it is a jump. */
-static bool filter_axis(plate_t *self, unsigned axis, q32_t ahead_q32, int64_t step_us)
+static bool filter_axis(plate_t *self, unsigned axis, int64_t step_us)
 {
     q32_t *speed = &self->speed_per_s.axis_q32[axis], *accel = &self->accel_per_s2.axis_q32[axis];
     const int64_t square_us2 = step_us * step_us;
+    const q32_t by_speed_q32 = fx_mul_div(*speed, step_us, US_PER_S);
+    const q32_t by_accel_q32 = fx_mul_div(*accel, square_us2, 2 * US_PER_S * US_PER_S);
+    const q32_t ahead_q32 = fx_add_sat(self->filtered.axis_q32[axis], fx_add_sat(by_speed_q32, by_accel_q32));
     const q32_t off_q32 = fx_sub_sat(self->pose.axis_q32[axis], ahead_q32);
     self->filtered.axis_q32[axis] = fx_add_sat(ahead_q32, fx_mul_div(off_q32, 7, 8));
     *speed =
@@ -69,12 +60,13 @@ static bool filter_axis(plate_t *self, unsigned axis, q32_t ahead_q32, int64_t s
     return fx_abs(off_q32) <= JUMP_Q32;
 }
 
-/* @param step_us 0: after a gap */
-static void filter(plate_t *self, const pose_t *ahead, int64_t step_us)
+/* A time that goes back is a gap. */
+static void filter(plate_t *self, uint64_t at_us)
 {
-    bool is_smooth = step_us > 0;
+    const int64_t step_us = (int64_t)at_us - (int64_t)self->at_us;
+    bool is_smooth = self->has_pose && step_us > 0 && step_us <= PLATE_GAP_US;
     for (unsigned axis = 0; axis < POSE_AXES && is_smooth; axis++) {
-        is_smooth = filter_axis(self, axis, ahead->axis_q32[axis], step_us);
+        is_smooth = filter_axis(self, axis, step_us);
     }
     if (!is_smooth) {
         start_filter(self);
@@ -92,18 +84,15 @@ void plate_take(plate_t *self, const kin_t *kin, const drive_feedback_t feedback
     }
     const bool is_new = !self->was_sought || at_us < self->at_us || at_us - self->at_us >= PLATE_PERIOD_US;
     if (is_new) {
-        const int64_t since_us = (int64_t)at_us - (int64_t)self->at_us; /* a time that goes back is a gap */
-        const int64_t step_us = self->has_pose && since_us > 0 && since_us <= PLATE_GAP_US ? since_us : 0;
-        const pose_t ahead = look_ahead(self, step_us);
         pose_t pose;
-        const bool is_found = (self->has_pose && kin_forward(kin, extension_mm_q32, &ahead, &pose, NULL) == HV_OK) ||
+        const bool is_found = (self->has_pose && kin_forward(kin, extension_mm_q32, &self->pose, &pose, NULL) == HV_OK) ||
                               kin_forward(kin, extension_mm_q32, guess, &pose, NULL) == HV_OK;
         if (!is_found) { /* a search that finds nothing takes longest: not in every cycle */
             *self = (plate_t){.at_us = at_us, .was_sought = true};
             return;
         }
         self->pose = pose;
-        filter(self, &ahead, step_us);
+        filter(self, at_us);
         self->at_us = at_us;
         self->has_pose = true;
         self->was_sought = true;
