@@ -55,7 +55,4 @@ void confirm_followed(confirm_t *self, const motion_target_t *target);
 /** Drops a target that has waited for too long. Call once per cycle. */
 void confirm_cycle(confirm_t *self, uint64_t now_us);
 
-/** True if all members are valid; for data that was loaded from a file, see sane.h. */
-bool confirm_is_sane(const confirm_t *self);
-
 #endif

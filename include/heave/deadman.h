@@ -44,7 +44,4 @@ void deadman_release(deadman_t *self);
  *  @return true while the series is held */
 bool deadman_step(deadman_t *self, uint64_t now_us);
 
-/** True if all members are valid; for data that was loaded from a file, see sane.h. */
-bool deadman_is_sane(const deadman_t *self);
-
 #endif

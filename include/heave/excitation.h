@@ -71,7 +71,4 @@ static inline bool excitation_is_done(const excitation_t *self)
     return self->elapsed >= self->cycles && !self->is_out && scurve_is_done(&self->way);
 }
 
-/** True for one that may be used; see heave/sane.h. */
-bool excitation_is_sane(const excitation_t *saved);
-
 #endif

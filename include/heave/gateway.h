@@ -216,11 +216,10 @@ void gateway_restart_auto(gateway_t *self);
  *  @param out not a gateway that runs: gateway_resume() makes one of it */
 void gateway_save(const gateway_t *self, gateway_t *out);
 
-/** Continues from a saved state, with other handles.
- *  @param self  prepared by gateway_init() with the same settings; members that follow from the settings are kept
- *  @param saved is checked, because anybody may have written the file; see sane.h
- *  @return HV_OK; HV_ERR_ARG as gateway_init, for another platform, or for a state that no gateway saves: self is unchanged */
-hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io) HV_MUST_CHECK;
+/** Continues from a saved state.
+ *  @param self  prepared by gateway_init() with the settings of the start; its handles are kept
+ *  @param saved is believed: whoever has it from a file calls this, and all that follows, where it can do no harm */
+void gateway_resume(gateway_t *self, const gateway_t *saved);
 
 /** Takes over the settings that may change in operation: silence, take-over and priorities, dialect, masks, safe mask and its
  * delay, following error, spike gate, confirmation of far jumps. Ignores the rest of the settings. */

@@ -98,8 +98,4 @@ void governor_step(governor_t *self, const q32_t *asked_q32, int32_t scale_q16, 
 /** Present delay by smoothing, in us. */
 uint32_t governor_delay_us(const governor_t *self);
 
-/** Whether a governor that was loaded may go on; see sane.h. Its limits are judged by the caller.
- *  @param is_running governor_step() will be called before governor_pace() */
-bool governor_is_sane(const governor_t *saved, uint32_t cycle_us, bool is_running);
-
 #endif

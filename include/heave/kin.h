@@ -49,9 +49,6 @@ typedef struct {
  *  @return HV_OK; HV_ERR_RANGE where a value is outside the ranges above. On error *self is unchanged. */
 hv_status_t kin_init(kin_t *self, const kin_geometry_t *geometry) HV_MUST_CHECK;
 
-/** True if two mechanisms are equal, member by member. A loaded one may hold any bytes. */
-bool kin_is_same(const kin_t *a, const kin_t *b);
-
 /** Cylinders of the mechanism: 6 or 3. */
 static inline unsigned kin_cylinders(const kin_t *self)
 {

@@ -59,7 +59,4 @@ bool mask_guard_follows(mask_guard_t *self, mask_policy_t policy, uint16_t mask)
 /** What is known of the sender, or set. */
 mask_habit_t mask_guard_habit(const mask_guard_t *self, mask_policy_t policy);
 
-/** True if all members are valid; for data that was loaded from a file, see sane.h. */
-bool mask_guard_is_sane(const mask_guard_t *self);
-
 #endif

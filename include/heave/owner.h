@@ -45,7 +45,4 @@ owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t 
 /** Whether a sender is the one that drives, by all that is known: not another address, and no port that is new. */
 bool owner_is_known(const owner_t *self, const hal_udp_peer_t *from);
 
-/** True if all members are valid; for data that was loaded from a file, see sane.h. */
-bool owner_is_sane(const owner_t *self);
-
 #endif

@@ -33,7 +33,4 @@ void plate_init(plate_t *self);
  *  @param guess    a nearby pose, such as the pose sent; used if there is no last pose or it does not converge */
 void plate_take(plate_t *self, const kin_t *kin, const drive_feedback_t feedback[], const pose_t *guess, uint64_t now_us);
 
-/** True if all members are valid; for data that was loaded from a file, see sane.h. */
-bool plate_is_sane(const plate_t *self);
-
 #endif

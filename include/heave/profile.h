@@ -38,11 +38,6 @@ typedef struct {
 hv_status_t quintic_plan(quintic_t *self, unsigned axes, const ramp_state_t *start, const q32_t *target_q32,
                          int64_t cycles) HV_MUST_CHECK;
 
-/** Adds to an axis the motion that continues from a state while its acceleration fades to 0 over the quintic's cycles. For checks
- *  only: do not step such a quintic.
- *  @param sign 1; -1 removes it again, exactly */
-void quintic_add_motion(quintic_t *self, unsigned axis, const ramp_state_t *from, int sign);
-
 /** True if every axis stays within its limits (checked at 33 points with 1/64 to spare). */
 bool quintic_is_feasible(const quintic_t *self, const ramp_limits_t *const *limits);
 

@@ -83,9 +83,6 @@ q32_t ramp_safe_acceleration(const ramp_limits_t *limits);
  *  @return HV_OK; HV_ERR_RANGE where limits make no sense. */
 hv_status_t ramp_init(ramp_t *self, const ramp_limits_t *limits, q32_t pos_q32) HV_MUST_CHECK;
 
-/** True if all that a ramp has beside its state fits together, as after ramp_init(): for ramps that were loaded. */
-bool ramp_is_prepared(const ramp_t *self);
-
 /** Continues from a given state, clipped to the limits. */
 void ramp_take_over(ramp_t *self, const ramp_state_t *state);
 

@@ -27,7 +27,4 @@ typedef struct {
  *  @return the mask */
 uint16_t relay_policy_step(relay_policy_t *self, const relay_settings_t *settings, uint16_t asked, bool is_safe, uint64_t now_us);
 
-/** True if all members are valid; for data that was loaded from a file, see sane.h. */
-bool relay_policy_is_sane(const relay_policy_t *self);
-
 #endif

@@ -98,7 +98,4 @@ bool supervisor_is_latched(const supervisor_t *self);
 const char *state_name(state_t state);
 const char *event_name(event_t event);
 
-/** True if all members are valid; for data that was loaded from a file, see sane.h. */
-bool supervisor_is_sane(const supervisor_t *self);
-
 #endif

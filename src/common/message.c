@@ -13,6 +13,7 @@
 #define LINE_MAX_BYTES 1024
 #define WAIT_MS        200 /* for a reader of standard error; a line that nobody takes must not hold the program up */
 
+static bool m_is_patient;
 static char *m_kept; /* NULL: nobody wants it */
 static size_t m_kept_size;
 
@@ -20,6 +21,11 @@ void print_message_keep(char *buffer, size_t size)
 {
     m_kept = buffer;
     m_kept_size = size;
+}
+
+void print_message_wait(void)
+{
+    m_is_patient = true;
 }
 
 int print_message(int code, const char *format, ...)
@@ -40,7 +46,7 @@ int print_message(int code, const char *format, ...)
     }
     line[length] = '\n';
     struct pollfd wait = {.fd = STDERR_FILENO, .events = POLLOUT};
-    if (poll(&wait, 1, WAIT_MS) > 0) {
+    if (m_is_patient || poll(&wait, 1, WAIT_MS) > 0) {
         (void)!write(STDERR_FILENO, line, (size_t)length + 1); /* nobody is left to tell */
     }
     return code;

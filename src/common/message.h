@@ -29,4 +29,7 @@ int print_message(int code, const char *format, ...) __attribute__((format(print
  *  thread; NULL: no more. */
 void print_message_keep(char *buffer, size_t size);
 
+/** From now on a line waits as long as it takes: for a process that may only write. */
+void print_message_wait(void);
+
 #endif

@@ -13,9 +13,7 @@
 
 #define CLOSE_WAIT_MS 1000
 
-/* Opened anew, because the flag of a shared descriptor would be everybody's. Files do not block, sockets cannot be opened anew.
- */
-int output_file_unblocked(int fd)
+int output_file_reopened(int fd, bool is_waiting)
 {
     struct stat about;
     char path[32];
@@ -23,8 +21,11 @@ int output_file_unblocked(int fd)
         return fd;
     }
     (void)snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
-    const int unblocked = open(path, O_WRONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY);
-    return unblocked >= 0 ? unblocked : fd;
+    const int reopened = open(path, O_WRONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY); /* else this would wait for a reader */
+    if (reopened >= 0 && is_waiting) {
+        (void)fcntl(reopened, F_SETFL, 0);
+    }
+    return reopened >= 0 ? reopened : fd;
 }
 
 bool output_file_open(output_file_t *self, const char *path, output_file_patience_t patience)
@@ -34,11 +35,8 @@ bool output_file_open(output_file_t *self, const char *path, output_file_patienc
     const bool is_stdout = strcmp(path, "-") == 0;
     self->length = 0;
     self->patience = patience;
-    self->fd = is_stdout ? STDOUT_FILENO : open(path, flags, 0666);
+    self->fd = is_stdout ? output_file_reopened(STDOUT_FILENO, patience != OUTPUT_FILE_GOES_ON) : open(path, flags, 0666);
     self->error = self->fd < 0 ? errno : 0;
-    if (is_stdout && patience == OUTPUT_FILE_GOES_ON) {
-        self->fd = output_file_unblocked(STDOUT_FILENO);
-    }
     return self->fd >= 0;
 }
 
@@ -47,7 +45,7 @@ bool output_file_has_room(const output_file_t *self, size_t length)
     return OUTPUT_FILE_BYTES - self->length >= length;
 }
 
-/* Standard output may have been set not to block by another program that has it, too. False where what is left has to wait. */
+/* A socket may have been set not to block by another program that has it, too. False where what is left has to wait. */
 static bool waits_for_room(output_file_t *self)
 {
     struct pollfd wait = {.fd = self->fd, .events = POLLOUT};

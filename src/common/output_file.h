@@ -42,7 +42,8 @@ void output_file_flush(output_file_t *self);
  *  @return false: something was lost, error says why */
 bool output_file_close(output_file_t *self);
 
-/** A descriptor of the same pipe or terminal that does not block; fd itself where there is no such thing. */
-int output_file_unblocked(int fd);
+/** A descriptor of the same pipe or terminal that blocks, or does not, because the flag of a shared one would be everybody's;
+ *  fd itself where there is no such thing: files do not block, sockets cannot be opened anew. */
+int output_file_reopened(int fd, bool is_waiting);
 
 #endif

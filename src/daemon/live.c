@@ -403,7 +403,7 @@ static int open_all(live_t *self, const config_t *config)
         return code;
     }
     open_blackbox(self, config);
-    const int errors = output_file_unblocked(STDERR_FILENO);
+    const int errors = output_file_reopened(STDERR_FILENO, false);
     linux_log_init(&self->writers.log, errors);
     linux_log_init(&self->writers.said, errors);
     if (!reconfigure_open(&self->reconfigure)) {

@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "common/cage.h"
 #include "common/message.h"
 #include "common/output_file.h"
 #include "daemon/devices.h"
@@ -16,7 +17,8 @@
 #include "record/frames.h"
 #include "record/player.h"
 
-#define NOTES 10u
+#define NOTES        10u
+#define CAGE_SPARE_S 10u /* processor time beyond the simulated time, which a replay takes a hundredth of */
 
 /** A line of the log worth repeating in the summary. */
 typedef struct {
@@ -29,8 +31,9 @@ typedef struct {
     player_t player;
     devices_t devices;
     frames_t frames;
+    session_t saved; /**< where the run goes on from, if the file says so */
     output_file_t out;
-    bool is_tracing;
+    const char *trace_path; /**< NULL: no trace is wanted */
     note_t note[NOTES];
     uint32_t notes; /**< seen, kept or not */
     uint32_t refused_requests;
@@ -84,7 +87,7 @@ static gateway_io_t io_of(play_t *self)
 static void write_row(play_t *self)
 {
     char line[TRACE_LINE_MAX];
-    if (self->is_tracing) {
+    if (self->trace_path != NULL) {
         output_file_write(&self->out, line, trace_format(&self->player.row, line));
     }
     self->rows++;
@@ -94,36 +97,6 @@ static void write_row(play_t *self)
 static bool has_state(const play_t *self)
 {
     return self->frames.count > 0 && self->frames.line[0].kind == FRAMES_STATE;
-}
-
-/* Goes on from a saved state, the drives included.
- * Returns NULL; or what is wrong. */
-static const char *resume(play_t *self, const config_t *config, const gateway_io_t *io)
-{
-    static session_t saved;
-    q32_t setpoint_q32[DRIVES_MAX] = {0};
-    const char *wrong = checkpoint_parse(self->frames.line[0].text, self->frames.line[0].length, &saved);
-    if (wrong != NULL) {
-        return wrong;
-    }
-    if (!session_is_sane(&saved, config->settings.cycle_us) ||
-        gateway_resume(&self->player.session.gateway, &saved.gateway, io) != HV_OK) {
-        return "the !state is of another platform, or no heaved has written it; play it with the platform.ini beside it";
-    }
-    self->player.session.cycle_us = saved.cycle_us;
-    self->player.session.now_us = saved.now_us;
-    self->player.session.has_zero = saved.has_zero;
-    self->player.is_before_zero = !saved.has_zero;
-    self->player.session.zero_us = saved.zero_us;
-    self->player.session.late_cycles = saved.late_cycles;
-    const snapshot_t *snapshot = gateway_snapshot(&self->player.session.gateway);
-    for (unsigned i = 0; i < snapshot->cylinders; i++) {
-        setpoint_q32[i] = snapshot->extension_mm_q32[i];
-    }
-    setpoint_q32[snapshot->cylinders] = snapshot->angle_deg_q32;
-    sim_drives_place(&self->devices.sim_drives, snapshot->now_us, snapshot->drive, setpoint_q32);
-    sim_inputs_set(&self->devices.sim_inputs, INPUT_ESTOP, snapshot->is_estop_active);
-    return NULL;
 }
 
 /* From time zero, or where it goes on from, to rest.
@@ -206,7 +179,8 @@ static int load(play_t *self, const char *path)
     return bad > 0 ? EXIT_BAD_DATA : EXIT_DONE;
 }
 
-static int open_all(play_t *self, const config_t *config, const char *trace_path)
+/* Whether the platform can begin, or the saved state be read. */
+static int open_player(play_t *self, const config_t *config)
 {
     gateway_io_t io = io_of(self);
     self->player.line = self->frames.line;
@@ -222,34 +196,78 @@ static int open_all(play_t *self, const config_t *config, const char *trace_path
         return print_message(EXIT_BAD_CONFIG,
                              "this platform cannot be simulated: its settled or neutral position is out of reach");
     }
-    const char *wrong = has_state(self) ? resume(self, config, &io) : NULL;
+    const frames_line_t *first = self->frames.line;
+    const char *wrong = has_state(self) ? checkpoint_parse(first->text, first->length, config->hash, &self->saved) : NULL;
     if (wrong != NULL) {
-        return print_message(EXIT_BAD_DATA, "line %u: %s", (unsigned)self->frames.line[0].line, wrong);
+        return print_message(EXIT_BAD_DATA, "line %u: %s", (unsigned)first->line, wrong);
     }
-    if (!output_file_open(&self->out, trace_path != NULL ? trace_path : "/dev/null", OUTPUT_FILE_WAITS)) {
-        return print_message(EXIT_NO_OUTPUT, "%s: %s", trace_path, strerror(self->out.error));
-    }
-    self->is_tracing = trace_path != NULL;
-    char header[TRACE_LINE_MAX];
-    output_file_write(&self->out, header, trace_header(header));
     return EXIT_DONE;
+}
+
+static int open_trace(play_t *self, const char *path)
+{
+    char header[TRACE_LINE_MAX];
+    if (!output_file_open(&self->out, path != NULL ? path : "/dev/null", OUTPUT_FILE_WAITS)) {
+        return print_message(EXIT_NO_OUTPUT, "%s: %s", path, strerror(self->out.error));
+    }
+    self->trace_path = path;
+    output_file_write(&self->out, header, trace_header(header));
+    output_file_flush(&self->out); /* of this process, not of the one in the cage, too */
+    return EXIT_DONE;
+}
+
+static int run_and_say(play_t *self)
+{
+    if (!run(self)) {
+        (void)print_message(0, "not at rest two hours after the last line: the run ends here");
+    }
+    output_file_flush(&self->out);
+    if (self->out.error != 0) {
+        return print_message(EXIT_IO, "%s: %s", self->trace_path, strerror(self->out.error));
+    }
+    say_summary(self);
+    return EXIT_DONE;
+}
+
+static int run_saved(void *ctx)
+{
+    play_t *self = ctx;
+    print_message_wait();
+    player_resume(&self->player, &self->saved);
+    return run_and_say(self);
+}
+
+/* A saved state may be anybody's. Nobody judges it, but the process that believes it can only write its trace. */
+static int run_in_cage(play_t *self)
+{
+    const uint64_t span_s = player_span_us(&self->player) / 1000000;
+    const int code = cage_run(run_saved, self, self->out.fd, (unsigned)span_s + CAGE_SPARE_S);
+    if (code == CAGE_MISSING) {
+        return print_message(EXIT_UNAVAILABLE,
+                             "a !state only replays where Linux can confine a process (seccomp), which it cannot here");
+    }
+    if (code == CAGE_BROKEN) {
+        return print_message(
+            EXIT_BAD_DATA,
+            "line %u: the replay from this !state crashed or did not end, and was stopped; is it as heaved wrote it?",
+            (unsigned)self->frames.line[0].line);
+    }
+    return code;
 }
 
 static int play(play_t *self, const config_t *config, const char *frames_path, const char *trace_path)
 {
     int code = load(self, frames_path);
-    code = code == EXIT_DONE ? open_all(self, config, trace_path) : code;
+    code = code == EXIT_DONE ? open_player(self, config) : code;
+    code = code == EXIT_DONE ? open_trace(self, trace_path) : code;
     if (code != EXIT_DONE) {
         return code;
     }
-    if (!run(self)) {
-        (void)print_message(0, "not at rest two hours after the last line: the run ends here");
-    }
-    if (!output_file_close(&self->out)) {
+    code = has_state(self) ? run_in_cage(self) : run_and_say(self);
+    if (!output_file_close(&self->out) && code == EXIT_DONE) {
         return print_message(EXIT_IO, "%s: %s", trace_path, strerror(self->out.error));
     }
-    say_summary(self);
-    return EXIT_DONE;
+    return code;
 }
 
 int play_run(const config_t *config, const char *frames_path, const char *trace_path)

@@ -3,8 +3,6 @@
  */
 #include "auto_engage.h"
 
-#include "heave/sane.h"
-
 #define WINDOW_US 1000000u
 
 void auto_engage_init(auto_engage_t *self, bool is_due, uint32_t cycle_us, uint32_t frames)
@@ -48,10 +46,4 @@ bool auto_engage_is_ready(const auto_engage_t *self, uint64_t now_us)
 void auto_engage_end(auto_engage_t *self)
 {
     self->is_due = false;
-}
-
-bool auto_engage_is_sane(const auto_engage_t *self, const auto_engage_t *prepared)
-{
-    return sane_bool(&self->is_due) && self->cycle_us == prepared->cycle_us && self->frames == prepared->frames &&
-           sane_time(self->last_us);
 }

@@ -20,8 +20,4 @@ bool auto_engage_is_ready(const auto_engage_t *self, uint64_t now_us);
 /** It has been used, or somebody else decides from now on. */
 void auto_engage_end(auto_engage_t *self);
 
-/** True for one that may be used, whatever file it comes from; see sane.h.
- *  @param prepared as auto_engage_init() leaves it for the same settings */
-bool auto_engage_is_sane(const auto_engage_t *self, const auto_engage_t *prepared);
-
 #endif

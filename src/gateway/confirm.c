@@ -3,9 +3,6 @@
  */
 #include "heave/confirm.h"
 
-#include "heave/motion_sane.h"
-#include "heave/sane.h"
-
 enum { NO_AXIS = AXIS_ANGLE + 1 };
 
 static q32_t value_of(const motion_target_t *target, unsigned axis)
@@ -100,17 +97,4 @@ void confirm_followed(confirm_t *self, const motion_target_t *target)
         self->last.has_angle = before.has_angle;
         self->last.angle_deg_q32 = before.angle_deg_q32;
     }
-}
-
-static bool is_jump_sane(const confirm_jump_t *jump)
-{
-    return (unsigned)jump->space <= MOTION_CYLINDERS && jump->axis < AXES_MAX && sane_q32(jump->value_q32) &&
-           sane_q32(jump->from_q32);
-}
-
-bool confirm_is_sane(const confirm_t *self)
-{
-    return sane_bool(&self->has_last) && sane_bool(&self->is_waiting) && motion_target_is_sane(&self->last) &&
-           motion_target_is_sane(&self->waiting) && sane_time(self->waiting_us) && is_jump_sane(&self->jump) &&
-           is_jump_sane(&self->drop);
 }

@@ -3,8 +3,6 @@
  */
 #include "heave/deadman.h"
 
-#include "heave/sane.h"
-
 deadman_answer_t deadman_press(deadman_t *self, uint32_t series, uint64_t age_us, uint64_t now_us)
 {
     if (age_us >= DEADMAN_HOLD_US) {
@@ -43,9 +41,4 @@ bool deadman_step(deadman_t *self, uint64_t now_us)
 {
     self->is_held = self->is_held && now_us < self->until_us;
     return self->is_held;
-}
-
-bool deadman_is_sane(const deadman_t *self)
-{
-    return sane_bool(&self->is_held) && sane_time(self->until_us);
 }

@@ -55,12 +55,6 @@ static void log_fault(gateway_t *self, const fault_t *fault, const drive_report_
     hal_log_write(self->io.log, HAL_LOG_ERROR, line);
 }
 
-/* A replay says that the fault was found in this cycle. */
-bool fault_watch_is_told(const gateway_t *self, fault_code_t code, unsigned axis)
-{
-    return self->supervisor.state != STATE_OFF && (self->told[axis] >> (unsigned)code & 1u) != 0;
-}
-
 /* What the drive of a fault is at; "" where none is concerned. */
 drive_report_t fault_watch_report_of(const gateway_t *self, const fault_t *fault)
 {
@@ -105,7 +99,7 @@ void fault_watch_raise(gateway_t *self, const fault_t *fault)
 void fault_watch_bus(gateway_t *self, bool is_lost, uint64_t now_us)
 {
     const bool is_new = is_lost && !self->is_bus_lost && self->supervisor.state != STATE_OFF;
-    if (is_new || fault_watch_is_told(self, FAULT_BUS, 0)) {
+    if (is_new) {
         fault_watch_give_up_reset(self);
         fault_watch_raise(self, &(fault_t){.code = FAULT_BUS, .at_us = now_us});
     }
@@ -117,7 +111,7 @@ void fault_watch_bus(gateway_t *self, bool is_lost, uint64_t now_us)
 void fault_watch_bus_failing(gateway_t *self, uint64_t now_us)
 {
     const bool is_failing = drives_is_failing(self->io.drives) && self->supervisor.state != STATE_OFF;
-    if ((is_failing && !self->is_bus_failing) || fault_watch_is_told(self, FAULT_BUS_FAILING, 0)) {
+    if (is_failing && !self->is_bus_failing) {
         fault_watch_give_up_reset(self);
         fault_watch_raise(self, &(fault_t){.code = FAULT_BUS_FAILING, .at_us = now_us});
     }
@@ -195,18 +189,6 @@ static fault_code_t judge_drive(gateway_t *self, unsigned i, uint64_t now_us)
     return is_behind ? FAULT_FOLLOWING : FAULT_NONE;
 }
 
-/* What a replay says was wrong with a drive, or else what is. */
-static fault_code_t find_fault(gateway_t *self, unsigned i, uint64_t now_us)
-{
-    const fault_code_t judged = judge_drive(self, i, now_us);
-    for (unsigned code = FAULT_NONE + 1u; code < FAULT_CODES && self->told[i + 1] != 0; code++) {
-        if (fault_is_of_axis((fault_code_t)code) && fault_watch_is_told(self, (fault_code_t)code, i + 1)) {
-            return (fault_code_t)code;
-        }
-    }
-    return judged;
-}
-
 /* With how far off an axis is, where heaved has found that. */
 static fault_t fault_of(const gateway_t *self, fault_code_t code, unsigned i, uint64_t now_us)
 {
@@ -231,7 +213,7 @@ static fault_t fault_of(const gateway_t *self, fault_code_t code, unsigned i, ui
 void fault_watch_drives(gateway_t *self, uint64_t now_us)
 {
     for (unsigned i = 0; i < drive_count(self); i++) {
-        const fault_code_t code = self->supervisor.state == STATE_OFF ? FAULT_NONE : find_fault(self, i, now_us);
+        const fault_code_t code = self->supervisor.state == STATE_OFF ? FAULT_NONE : judge_drive(self, i, now_us);
         const bool is_new = code != FAULT_NONE && code != self->axis_fault[i];
         if (is_new && self->axis_fault[i] == FAULT_NONE) { /* else a drive on its way out of the fault that is reset */
             fault_watch_give_up_reset(self);
@@ -244,10 +226,32 @@ void fault_watch_drives(gateway_t *self, uint64_t now_us)
     }
 }
 
+static void raise_told(gateway_t *self, unsigned axis, uint32_t codes, uint64_t now_us)
+{
+    for (unsigned code = FAULT_NONE + 1u; codes >> code != 0; code++) {
+        if ((codes >> code & 1u) != 0) {
+            const fault_t fault = axis != 0 ? fault_of(self, (fault_code_t)code, axis - 1u, now_us)
+                                            : (fault_t){.code = (fault_code_t)code, .at_us = now_us};
+            fault_watch_give_up_reset(self);
+            fault_watch_raise(self, &fault);
+        }
+    }
+}
+
+void fault_watch_told(gateway_t *self, uint64_t now_us)
+{
+    for (unsigned axis = 0; axis <= DRIVES_MAX; axis++) {
+        if (self->told[axis] != 0 && self->supervisor.state != STATE_OFF) {
+            raise_told(self, axis, self->told[axis] & ~self->snapshot.begun[axis], now_us);
+        }
+        self->told[axis] = 0;
+    }
+}
+
 /* The e-stop is active as long as its channels disagree: they are no reason for another state, but one for another look. */
 void fault_watch_channels(gateway_t *self, bool is_apart, uint64_t now_us)
 {
-    if ((is_apart && !self->is_estop_apart) || fault_watch_is_told(self, FAULT_ESTOP_CHANNELS, 0)) {
+    if (is_apart && !self->is_estop_apart) {
         fault_watch_raise(self, &(fault_t){.code = FAULT_ESTOP_CHANNELS, .at_us = now_us});
     }
     self->is_estop_apart = is_apart;
@@ -267,7 +271,7 @@ void fault_watch_power(gateway_t *self, bool is_failing, uint64_t now_us)
     }
     const bool is_overdue = is_failing && self->settings.power_settle_ms != 0 && !is_down &&
                             now_us - self->power_since_us >= (uint64_t)self->settings.power_settle_ms * 1000;
-    if ((is_overdue && !self->is_power_overdue) || fault_watch_is_told(self, FAULT_POWER, 0)) {
+    if (is_overdue && !self->is_power_overdue) {
         fault_watch_raise(self, &(fault_t){.code = FAULT_POWER, .at_us = now_us});
     }
     self->is_power_overdue = is_overdue;

@@ -10,10 +10,6 @@
 /** Raises a fault: counts and logs it, keeps the first one, and carries out the worst reaction so far. */
 void fault_watch_raise(gateway_t *self, const fault_t *fault);
 
-/** True if a replay says that this cycle found the fault.
- *  @param axis as in fault_t */
-bool fault_watch_is_told(const gateway_t *self, fault_code_t code, unsigned axis);
-
 /** Ends a reset that still waits for the drives: its operator did not know of the newer fault. */
 void fault_watch_give_up_reset(gateway_t *self);
 
@@ -28,6 +24,9 @@ void fault_watch_bus_failing(gateway_t *self, uint64_t now_us);
 
 /** Judges every drive. */
 void fault_watch_drives(gateway_t *self, uint64_t now_us);
+
+/** Raises what gateway_tell_fault() was told and this cycle has not found by itself. */
+void fault_watch_told(gateway_t *self, uint64_t now_us);
 
 /** The two channels of the e-stop disagree. */
 void fault_watch_channels(gateway_t *self, bool is_apart, uint64_t now_us);

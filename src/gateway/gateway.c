@@ -4,8 +4,6 @@
 #include "heave/gateway.h"
 
 #include "auto_engage.h"
-#include "heave/motion_sane.h"
-#include "heave/sane.h"
 #include "heave/text.h"
 #include "frame_receiver.h"
 #include "actions.h"
@@ -111,127 +109,13 @@ void gateway_save(const gateway_t *self, gateway_t *out)
     }
 }
 
-static bool is_pulse_same(const healthy_settings_t *saved, const healthy_settings_t *prepared)
+void gateway_resume(gateway_t *self, const gateway_t *saved)
 {
-    return saved->relay == prepared->relay && saved->toggle_ms == prepared->toggle_ms && saved->off_ms == prepared->off_ms &&
-           saved->late_cycles == prepared->late_cycles;
-}
-
-/* What may change in operation may be another than in the configuration of the start; the rest may not. */
-static bool are_settings_sane(const gateway_settings_t *saved, const gateway_settings_t *prepared)
-{
-    bool is_sane = saved->cycle_us == prepared->cycle_us && sane_bool(&saved->has_angle) &&
-                   saved->has_angle == prepared->has_angle && saved->engage == prepared->engage &&
-                   saved->auto_frames == prepared->auto_frames && saved->relays.count == prepared->relays.count &&
-                   is_pulse_same(&saved->healthy, &prepared->healthy) && (unsigned)saved->dialect <= FRAME_LENIENT &&
-                   (unsigned)saved->mask_policy <= MASK_ANY && saved->priority.count <= HAL_UDP_NETWORKS_MAX &&
-                   saved->following_error_mm_q16 >= 0 && saved->confirm_jump_mm_q16 >= 0 && saved->confirm_jump_deg_q16 >= 0;
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        const axis_input_t *axis = &saved->axis[i], *own = &prepared->axis[i];
-        is_sane = is_sane && axis->sign == own->sign && axis->scale_q16 == own->scale_q16 &&
-                  axis->offset_q16 == own->offset_q16 && axis->wrap == own->wrap && axis->min_q16 == own->min_q16 &&
-                  axis->max_q16 == own->max_q16;
-    }
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        is_sane = is_sane && saved->stroke_mm_q16[i] == prepared->stroke_mm_q16[i];
-    }
-    for (unsigned i = 0; i < HAL_RELAYS_MAX; i++) {
-        is_sane = is_sane && saved->relays.max_on_ms[i] == prepared->relays.max_on_ms[i] &&
-                  saved->relays.min_toggle_ms[i] == prepared->relays.min_toggle_ms[i];
-    }
-    for (unsigned i = 0; is_sane && i < saved->priority.count; i++) {
-        const hal_udp_network_t *network = &saved->priority.network[i];
-        is_sane = sane_bool(&network->is_ipv6) && network->prefix <= (network->is_ipv6 ? 128u : 32u);
-    }
-    return is_sane;
-}
-
-static bool is_output_sane(const motion_output_t *output)
-{
-    return sane_all_q32(output->asked.axis_q32, POSE_AXES) && sane_all_q32(output->sent.axis_q32, POSE_AXES) &&
-           sane_all_q32(output->extension_mm_q32, CYLINDERS_MAX) && sane_q32(output->angle_deg_q32) &&
-           output->limiting_cylinder <= CYLINDERS_MAX;
-}
-
-static bool are_drives_sane(const gateway_t *saved)
-{
-    bool is_sane = true;
-    for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        const drive_feedback_t *drive = &saved->snapshot.drive[i];
-        const wear_t *wear = &saved->snapshot.wear[i];
-        is_sane = is_sane && sane_bool(&wear->is_known) && sane_bool(&wear->is_upwards) && sane_q32(wear->mark_q32) &&
-                  sane_q32(wear->extreme_q32);
-        is_sane = is_sane && (unsigned)saved->axis_fault[i] < FAULT_CODES && (unsigned)drive->state <= DRIVE_FAULT &&
-                  sane_bool(&drive->is_homed) && sane_bool(&drive->has_actual) && sane_bool(&drive->is_energized) &&
-                  sane_q32(drive->actual_mm_q32) && sane_time(drive->actual_us) && sane_q32(drive->guard.jump_q32) &&
-                  sane_q32(drive->guard.lag_q32) && sane_q32(drive->guard.allowed_q32);
-    }
-    for (unsigned i = 0; i <= DRIVES_MAX; i++) {
-        is_sane = is_sane && ((saved->told[i] | saved->snapshot.begun[i]) >> (unsigned)FAULT_CODES) == 0;
-    }
-    return is_sane;
-}
-
-static bool is_snapshot_sane(const snapshot_t *s, const snapshot_t *prepared)
-{
-    return sane_time(s->now_us) && (unsigned)s->state < STATES && (unsigned)s->goal < STATES && sane_bool(&s->is_estop_active) &&
-           sane_bool(&s->is_power_failing) && sane_bool(&s->is_healthy) && (unsigned)s->fault.code < FAULT_CODES &&
-           s->fault.axis <= DRIVES_MAX && (unsigned)s->reaction <= FAULT_REACT_SILENT && s->cylinders == prepared->cylinders &&
-           sane_bool(&s->has_angle) && s->has_angle == prepared->has_angle && s->relay_count == prepared->relay_count &&
-           sane_bool(&s->is_relays_unknown) && plate_is_sane(&s->plate) && sane_all_q32(s->asked.axis_q32, POSE_AXES) &&
-           sane_all_q32(s->sent.axis_q32, POSE_AXES) && sane_all_q32(s->extension_mm_q32, CYLINDERS_MAX) &&
-           sane_q32(s->angle_deg_q32) && s->limiting_cylinder <= CYLINDERS_MAX && owner_is_sane(&s->owner) &&
-           owner_is_sane(&s->other) && sane_bool(&s->service.is_held) && sane_time(s->service.tick_us) &&
-           (unsigned)s->service.doing < SERVICE_VERBS;
-}
-
-static bool are_bools_sane(const gateway_t *saved)
-{
-    return sane_bool(&saved->is_bus_lost) && sane_bool(&saved->is_bus_failing) && sane_bool(&saved->is_tracking_actual) &&
-           sane_bool(&saved->is_disable_due) && sane_bool(&saved->is_shutdown_asked) && sane_bool(&saved->is_end_overdue) &&
-           sane_bool(&saved->sender.has_newest) && sane_bool(&saved->sender.is_known) &&
-           sane_bool(&saved->relay_output.is_mask_written) && sane_bool(&saved->sender.newest_from.is_ipv6) &&
-           sane_bool(&saved->is_estop_apart) && sane_bool(&saved->is_power_overdue) && sane_bool(&saved->is_late) &&
-           sane_bool(&saved->relay_output.is_pulse_lost) && sane_bool(&saved->relay_output.healthy.level);
-}
-
-static bool are_rotations_sane(const rotations_t *rotations)
-{
-    bool is_sane = true;
-    for (unsigned i = 0; i < ROTATIONS; i++) {
-        is_sane = is_sane && sane_bool(&rotations->is_there[i]);
-    }
-    return is_sane;
-}
-
-/* A file may hold anything: every index, enum, bool and divisor is judged before it is used. */
-static bool is_saved_sane(const gateway_t *saved, const gateway_t *prepared)
-{
-    return are_bools_sane(saved) && are_settings_sane(&saved->settings, &prepared->settings) &&
-           is_snapshot_sane(&saved->snapshot, &prepared->snapshot) && are_drives_sane(saved) &&
-           supervisor_is_sane(&saved->supervisor) && (unsigned)saved->bring_up <= BRING_UP_MOVE &&
-           service_is_sane(&saved->service, &prepared->service, prepared->snapshot.cylinders + 1u) &&
-           auto_engage_is_sane(&saved->auto_engage, &prepared->auto_engage) && owner_is_sane(&saved->sender.owner) &&
-           sane_time(saved->power_since_us) && sane_time(saved->relay_output.healthy.ill_us) &&
-           sane_time(saved->relay_output.healthy.changed_us) && confirm_is_sane(&saved->sender.confirm) &&
-           sane_all_q32(saved->sender.rotation_deg_q32, AXIS_YAW + 1u) && are_rotations_sane(&saved->sender.rotations) &&
-           mask_guard_is_sane(&saved->sender.mask_guard) && (unsigned)saved->snapshot.mask_habit <= MASK_DIGITS &&
-           relay_policy_is_sane(&saved->relay_output.policy) && (unsigned)saved->sender.newest_command <= FRAME_COMMANDS &&
-           motion_target_is_sane(&saved->sender.newest) && is_output_sane(&saved->output) &&
-           motion_state_is_sane(&saved->motion, &prepared->motion);
-}
-
-hv_status_t gateway_resume(gateway_t *self, const gateway_t *saved, const gateway_io_t *io)
-{
-    if (!is_io_valid(io) || !is_saved_sane(saved, self) ||
-        drives_count(io->drives) != self->snapshot.cylinders + (self->settings.has_angle ? 1u : 0u)) {
-        return HV_ERR_ARG;
-    }
+    const gateway_io_t io = self->io;
     *self = *saved;
-    self->io = *io;
+    self->io = io;
     frame_scanner_init(&self->receiver.scanner, self->settings.dialect); /* it starts anew with every datagram */
     clear_reports(self);
-    return HV_OK;
 }
 
 void gateway_start_settled(gateway_t *self)
@@ -282,7 +166,7 @@ void gateway_note_late(gateway_t *self, uint32_t cycles)
 
 void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
 {
-    if ((unsigned)code < FAULT_CODES && axis <= DRIVES_MAX) {
+    if ((unsigned)code < FAULT_CODES && axis <= drives_count(self->io.drives) && (axis != 0) == fault_is_of_axis(code)) {
         self->told[axis] |= 1u << (unsigned)code;
     }
 }

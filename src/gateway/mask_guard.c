@@ -3,8 +3,6 @@
  */
 #include "heave/mask_guard.h"
 
-#include "heave/sane.h"
-
 #define EIGHTS  0x888u
 #define LEAK_US 500000u /* each takes one change off the score */
 
@@ -138,11 +136,4 @@ mask_habit_t mask_guard_habit(const mask_guard_t *self, mask_policy_t policy)
         return MASK_DIGITS;
     }
     return self->frames < MASK_GUARD_FRAMES ? MASK_UNKNOWN : self->has_mask ? MASK_SENT : MASK_NONE;
-}
-
-bool mask_guard_is_sane(const mask_guard_t *self)
-{
-    return sane_bool(&self->has_mask) && sane_bool(&self->is_quick) && sane_bool(&self->is_digits) &&
-           self->recents <= MASK_GUARD_RECENT && self->frames <= MASK_GUARD_FRAMES && self->score <= SCORE_DIGITS &&
-           self->in_row <= ROW_HELD && sane_time(self->last_us) && self->leaked_us <= self->last_us;
 }

@@ -3,8 +3,6 @@
  */
 #include "heave/owner.h"
 
-#include "heave/sane.h"
-
 #define TURN_US 5000000u /* a program that changes between two sockets of its own does so less often */
 
 enum { TURNS = 3 };
@@ -84,10 +82,4 @@ owner_verdict_t owner_judge(owner_t *self, const hal_udp_peer_t *from, uint64_t 
     self->peer = *from;
     self->last_us = now_us;
     return is_same ? OWNER_DRIVES : OWNER_NEW;
-}
-
-bool owner_is_sane(const owner_t *self)
-{
-    return sane_bool(&self->is_taken) && sane_bool(&self->peer.is_ipv6) && sane_time(self->last_us) &&
-           sane_bool(&self->is_port_fixed) && self->ports <= OWNER_PORTS && self->turns <= TURNS && sane_time(self->turn_us);
 }

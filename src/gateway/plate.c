@@ -8,8 +8,6 @@
  */
 #include "heave/plate.h"
 
-#include "heave/sane.h"
-
 #define US_PER_S INT64_C(1000000)
 
 /* No platform moves further from its course between two samples; feedback does when homing ends. deg or mm. */
@@ -98,11 +96,4 @@ void plate_take(plate_t *self, const kin_t *kin, const drive_feedback_t feedback
         self->was_sought = true;
     }
     self->has_rates = self->samples >= PLATE_SAMPLES && now_us - self->at_us <= PLATE_GAP_US;
-}
-
-bool plate_is_sane(const plate_t *self)
-{
-    return sane_bool(&self->has_pose) && sane_bool(&self->has_rates) && sane_bool(&self->was_sought) && sane_time(self->at_us) &&
-           sane_all_q32(self->pose.axis_q32, POSE_AXES) && sane_all_q32(self->speed_per_s.axis_q32, POSE_AXES) &&
-           sane_all_q32(self->accel_per_s2.axis_q32, POSE_AXES) && sane_all_q32(self->filtered.axis_q32, POSE_AXES);
 }

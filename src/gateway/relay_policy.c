@@ -3,8 +3,6 @@
  */
 #include "heave/relay_policy.h"
 
-#include "heave/sane.h"
-
 static bool has_passed(const relay_policy_t *self, unsigned i, uint32_t time_ms, uint64_t now_us)
 {
     return now_us - self->changed_us[i] >= (uint64_t)time_ms * 1000;
@@ -62,14 +60,4 @@ uint16_t relay_policy_step(relay_policy_t *self, const relay_settings_t *setting
         step(self, settings, i, (asked >> i & 1u) != 0, is_safe, now_us);
     }
     return self->mask;
-}
-
-bool relay_policy_is_sane(const relay_policy_t *self)
-{
-    const unsigned all = (1u << HAL_RELAYS_MAX) - 1u;
-    bool is_sane = ((self->mask | self->changed | self->cut | self->delayed) & ~all) == 0;
-    for (unsigned i = 0; i < HAL_RELAYS_MAX; i++) {
-        is_sane = is_sane && sane_time(self->changed_us[i]);
-    }
-    return is_sane;
 }

@@ -35,7 +35,7 @@ static bool are_all(const gateway_t *self, drive_state_t state, bool is_zero_nee
 static void step_bring_up(gateway_t *self, uint64_t now_us)
 {
     const bool is_late = actions_is_coming_up(self) && now_us >= self->bring_up_deadline_us;
-    if (is_late || fault_watch_is_told(self, FAULT_DRIVE_TIMEOUT, 0)) {
+    if (is_late) {
         fault_watch_raise(self, &(fault_t){.code = FAULT_DRIVE_TIMEOUT, .at_us = now_us});
         return;
     }
@@ -159,14 +159,6 @@ static void step_auto(gateway_t *self, uint64_t now_us)
     }
 }
 
-/* Those of a cycle. */
-static void clear_faults(uint32_t by_axis[DRIVES_MAX + 1u])
-{
-    for (unsigned i = 0; i <= DRIVES_MAX; i++) {
-        by_axis[i] = 0;
-    }
-}
-
 /* What hands do, and drives that take too long about it. */
 static void watch_service(gateway_t *self, uint64_t now_us)
 {
@@ -178,7 +170,9 @@ static void watch_service(gateway_t *self, uint64_t now_us)
 
 void sequencer_before_frames(gateway_t *self, uint64_t now_us)
 {
-    clear_faults(self->snapshot.begun);
+    for (unsigned i = 0; i <= DRIVES_MAX; i++) {
+        self->snapshot.begun[i] = 0;
+    }
     if (self->supervisor.state != self->supervisor.goal) { /* what a cycle changes leads to the goal */
         actions_event(self, EVENT_TICK, now_us);
     }
@@ -186,6 +180,7 @@ void sequencer_before_frames(gateway_t *self, uint64_t now_us)
     fault_watch_bus(self, !is_bus_heard || fault_watch_is_bus_stalled(self), now_us);
     fault_watch_bus_failing(self, now_us);
     fault_watch_drives(self, now_us);
+    fault_watch_told(self, now_us);
     read_inputs(self, now_us);
     step_reset(self, now_us);
     step_abandoned(self, now_us);
@@ -203,7 +198,6 @@ void sequencer_before_frames(gateway_t *self, uint64_t now_us)
     if (self->supervisor.state == STATE_SERVICE) {
         watch_service(self, now_us);
     }
-    clear_faults(self->told);
 }
 
 static bool has_passed(uint64_t now_us, uint64_t since_us, uint32_t limit_ms)

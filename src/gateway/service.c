@@ -5,7 +5,6 @@
  */
 #include "service.h"
 
-#include "heave/sane.h"
 #include "actions.h"
 
 #define UP_TIMEOUT_US   10000000u
@@ -460,15 +459,4 @@ service_answer_t gateway_service(gateway_t *self, const service_request_t *reque
         break;
     }
     return SERVICE_NO_SUCH;
-}
-
-bool service_is_sane(const service_t *saved, const service_t *prepared, unsigned drives)
-{
-    const uint32_t none = ~((1u << drives) - 1u);
-    (void)prepared;
-    return deadman_is_sane(&saved->hand) && sane_bool(&saved->has_end) && (unsigned)saved->doing < SERVICE_VERBS &&
-           (saved->doing == SERVICE_NOTHING || service_is_held(saved->doing)) &&
-           (saved->doing != SERVICE_RELAY || (saved->axis >= 1 && saved->axis <= HAL_RELAYS_MAX)) &&
-           ((saved->wanted | saved->up | saved->homing | saved->off_due | saved->stop_due) & none) == 0 &&
-           sane_time(saved->late_us);
 }

@@ -26,7 +26,4 @@ uint16_t service_relays(const gateway_t *self);
 /** For the snapshot. */
 void service_publish(gateway_t *self);
 
-/** True for one that may be used, whatever file it comes from; see heave/sane.h. */
-bool service_is_sane(const service_t *saved, const service_t *prepared, unsigned drives);
-
 #endif

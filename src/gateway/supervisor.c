@@ -9,8 +9,6 @@
  */
 #include "heave/supervisor.h"
 
-#include "heave/sane.h"
-
 /** What must be true for a row to match. */
 typedef enum {
     ALWAYS,
@@ -267,10 +265,4 @@ const char *event_name(event_t event)
         [EVENT_ESTOP] = "estop",
     };
     return (unsigned)event < EVENTS ? k_names[event] : "?";
-}
-
-bool supervisor_is_sane(const supervisor_t *self)
-{
-    return (unsigned)self->state < STATES && (unsigned)self->goal < STATES && (unsigned)self->interrupted < STATES &&
-           sane_bool(&self->is_held_by_silence);
 }

@@ -133,6 +133,7 @@ int setup_session_run(setup_session_t *self, const ini_text_t *config, const cha
         return -1;
     }
     const pid_t pid = fork();
+    const int fork_error = pid < 0 ? errno : 0;
     if (pid == 0) {
         (void)dup2(ends[1], STDOUT_FILENO);
         (void)dup2(ends[1], STDERR_FILENO);
@@ -140,10 +141,11 @@ int setup_session_run(setup_session_t *self, const ini_text_t *config, const cha
         _exit(NOT_RUN);
     }
     (void)close(ends[1]);
-    const int error = collect(self, ends[0]);
+    const int collect_error = collect(self, ends[0]);
+    const int error = fork_error != 0 ? fork_error : collect_error;
     (void)close(ends[0]);
     while (pid > 0 && waitpid(pid, &status, 0) < 0 && errno == EINTR) {}
-    if (error != 0 || pid < 0 || !WIFEXITED(status) || WEXITSTATUS(status) == NOT_RUN) {
+    if (error != 0 || !WIFEXITED(status) || WEXITSTATUS(status) == NOT_RUN) {
         (void)fail(self, self->program, error != 0 ? error_text(error) : _("cannot be run"));
         return -1;
     }
@@ -356,6 +358,9 @@ static bool start(setup_session_t *self, const ini_text_t *config, bool is_bus)
     self->pid = fork();
     if (self->pid == 0) {
         be_heaved(self, parent);
+    }
+    if (self->pid < 0) {
+        return fail(self, self->program, error_text(errno));
     }
     while (heaved_link_now_ms() < until_ms && *self->is_interrupted == 0) {
         if (!is_running(self)) {

@@ -376,24 +376,3 @@ void kin_constrain(const kin_t *self, pose_t *pose)
         break;
     }
 }
-
-static bool are_same(const int64_t *a, const int64_t *b, unsigned count)
-{
-    bool is_same = true;
-    for (unsigned i = 0; i < count; i++) {
-        is_same = is_same && a[i] == b[i];
-    }
-    return is_same;
-}
-
-bool kin_is_same(const kin_t *a, const kin_t *b)
-{
-    bool is_same =
-        a->kind == b->kind && a->cylinders == b->cylinders && a->reach_shift == b->reach_shift &&
-        are_same(a->retracted_mm_q32, b->retracted_mm_q32, CYLINDERS_MAX) && are_same(a->centre_mm_q44, b->centre_mm_q44, 3) &&
-        a->hinge_half_radius_mm_q48 == b->hinge_half_radius_mm_q48 && are_same(a->hinge_offset_mm_q48, b->hinge_offset_mm_q48, 3);
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        is_same = is_same && are_same(a->base_mm_q44[i], b->base_mm_q44[i], 3) && are_same(a->arm_mm_q48[i], b->arm_mm_q48[i], 3);
-    }
-    return is_same;
-}

@@ -5,15 +5,11 @@
  */
 #include "heave/excitation.h"
 
-#include "heave/sane.h"
-#include "plan_sane.h"
-
 #define TWO_PI_Q60    7244019458077122842
 #define LN2_Q62       3196577161300663915
 #define MHZ_US        1000000000u /* 1 in 1/1000 Hz times us */
 #define SUBSTEPS      256         /* of the growth from one sine of noise to the next */
 #define NOISE_SEED    2463534242u
-#define CYCLES_MOST   ((int64_t)1 << 40)
 #define TURN_MOST_Q64 ((int64_t)1 << 61) /* eight cycles for a period */
 
 /* --- Frequencies --- */
@@ -278,29 +274,4 @@ q62_t excitation_step(excitation_t *self)
         break;
     }
     return fx_mul_shift(step_sines(self, 1), window(self), 62);
-}
-
-/* --- What was loaded --- */
-
-static bool is_between(int64_t value, int64_t least, int64_t most)
-{
-    return value >= least && value <= most;
-}
-
-bool excitation_is_sane(const excitation_t *saved)
-{
-    const path_limits_t *limits = &saved->limits;
-    bool is_sane = (unsigned)saved->kind < EXCITATION_KINDS && is_between(saved->cycles, 1, CYCLES_MOST) &&
-                   is_between(saved->elapsed, 0, saved->cycles) && is_between(saved->ramp_in, 1, CYCLES_MOST) &&
-                   is_between(saved->ramp_out, 1, CYCLES_MOST) && is_between(limits->vel_q62, 1, Q62_ONE) &&
-                   is_between(limits->acc_q62, 1, Q62_ONE) && is_between(limits->jerk_q62, 1, Q62_ONE) &&
-                   is_between(saved->growth_q62, 0, Q62_ONE) && sane_bool(&saved->is_out) &&
-                   is_between(saved->half, saved->kind == EXCITATION_STEP ? 1 : 0, CYCLES_MOST) &&
-                   is_between(saved->turn_q64[0], 1, TURN_MOST_Q64) &&
-                   (saved->kind == EXCITATION_STEP && saved->elapsed > 0 ? plan_scurve_is_sane(&saved->way) : !saved->is_out);
-    for (unsigned i = 0; i < EXCITATION_SINES; i++) {
-        is_sane = is_sane && is_between(saved->turn_q64[i], 0, TURN_MOST_Q64) &&
-                  is_between(saved->share_q62[i], 0, saved->kind == EXCITATION_NOISE ? Q62_ONE / EXCITATION_SINES : Q62_ONE);
-    }
-    return is_sane;
 }

@@ -4,7 +4,6 @@
  * strength follows from the needs in closed form. It rises as quickly as the output itself can bear, and falls slowly.
  */
 #include "governor_speed.h"
-#include "heave/sane.h"
 
 #define SPAN_US       150000u             /* needs within such a time are one event, ... */
 #define MEMORY_US     1500000u            /* ... which counts for so long: a shake of 0.4 Hz turns twice meanwhile */
@@ -414,87 +413,4 @@ uint32_t governor_delay_us(const governor_t *self)
         delay_us += (uint32_t)fx_mul_shift(k_time_constant_us[level], beyond_q32 < Q32_ONE ? way_share(beyond_q32) : Q32_ONE, 32);
     }
     return delay_us;
-}
-
-static bool is_strength(q32_t strength_q32)
-{
-    return strength_q32 >= 0 && strength_q32 <= GOVERNOR_LEVELS * Q32_ONE;
-}
-
-static bool is_track_sane(const governor_track_t *track)
-{
-    return sane_q32(track->pos_q32) && sane_q32(track->vel_q32) && sane_q32(track->acc_q32);
-}
-
-/* What governor_pace() makes of the limits and the period; nothing before it was called. */
-static bool is_pace_sane(const governor_t *self, uint32_t cycle_us)
-{
-    const uint32_t each = periods_of_look(self->period_us);
-    const int64_t cycles_q16 = cycles_of_look(self->period_us, each, cycle_us);
-    bool is_sane = self->period_us >= 1000 && self->period_us <= PERIOD_MAX_US && self->each == each && self->since < each &&
-                   self->channels == channels_with_limits(self);
-    for (unsigned i = 0; i < GOVERNOR_CHANNELS; i++) {
-        const governor_limits_t *limits = &self->limits[i];
-        is_sane = is_sane && self->per_limit_q62[i][0] == reciprocal(limits->vel_per_cycle_q32, cycles_q16, 1) &&
-                  self->per_limit_q62[i][1] == reciprocal(limits->acc_per_cycle2_q32, cycles_q16, 2) &&
-                  self->per_limit_q62[i][2] == reciprocal(limits->jerk_per_cycle3_q32, cycles_q16, 3) &&
-                  self->brake_q16[i] == brake_share(limits);
-    }
-    for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
-        is_sane = is_sane && self->share_q32[level] == governor_share_of_period(self->period_us, k_time_constant_us[level]);
-    }
-    return is_sane;
-}
-
-/* New limits wait for a period: what was made of the old ones is not used any more. */
-static bool is_waiting_sane(const governor_t *self)
-{
-    bool is_sane = self->period_us == 0 && self->channels <= GOVERNOR_CHANNELS && self->each <= LOOK_US;
-    for (unsigned level = 0; level < GOVERNOR_LEVELS; level++) {
-        is_sane = is_sane && self->share_q32[level] >= 0 && self->share_q32[level] <= Q32_ONE;
-    }
-    return is_sane;
-}
-
-/* The strength picks a level; it glides on until needs are looked at again. */
-static bool is_strength_sane(const governor_t *self)
-{
-    const int64_t glides = self->since < self->each ? (int64_t)(self->each - 1 - self->since) : 0;
-    bool is_sane = is_strength(self->strength_q32) && fx_abs(self->glide_q32) <= GOVERNOR_LEVELS * Q32_ONE &&
-                   is_strength(self->strength_q32 + self->glide_q32 * glides) && is_strength(self->target_q32) &&
-                   is_strength(self->fall_q32);
-    for (unsigned pole = 0; pole < GOVERNOR_POLES; pole++) {
-        is_sane = is_sane && is_strength(self->pole_q32[pole]);
-    }
-    return is_sane;
-}
-
-static bool are_levels_sane(const governor_t *self)
-{
-    bool is_sane = true;
-    for (unsigned i = 0; i < GOVERNOR_CHANNELS; i++) {
-        is_sane = is_sane && is_track_sane(&self->out[i]) && sane_q32(self->asked_q32[i]) && sane_q32(self->behind_q32[i]);
-        for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
-            is_sane = is_sane && sane_q32(self->level_q32[level][i]) && is_track_sane(&self->track[level][i]);
-        }
-    }
-    return is_sane;
-}
-
-static bool are_needs_sane(const governor_t *self)
-{
-    bool is_sane = sane_bool(&self->is_slowed) && self->single_us <= GOVERNOR_BEGIN_US;
-    for (unsigned i = 0; i < GOVERNOR_EVENTS; i++) {
-        is_sane = is_sane && self->event[i].age_us <= MEMORY_US + QUIET_TIMES * PERIOD_MAX_US;
-        for (unsigned level = 0; level <= GOVERNOR_LEVELS; level++) {
-            is_sane = is_sane && self->event[i].need_q16[level] >= 0 && self->event[i].need_q16[level] <= 2 * GOVERNOR_NEED_MAX;
-        }
-    }
-    return is_sane;
-}
-
-bool governor_is_sane(const governor_t *saved, uint32_t cycle_us, bool is_running)
-{
-    return (is_pace_sane(saved, cycle_us) || (!is_running && is_waiting_sane(saved))) && is_strength_sane(saved) &&
-           are_levels_sane(saved) && are_needs_sane(saved);
 }

@@ -36,7 +36,4 @@ bool jog_is_astray(const motion_t *self);
 /** True where the jog has come to the end of its way. */
 bool jog_is_done(const motion_t *self);
 
-/** True for one that may be used; see heave/sane.h. */
-bool jog_is_sane(const motion_t *saved, const motion_t *prepared);
-
 #endif

@@ -59,15 +59,6 @@ hv_status_t quintic_plan(quintic_t *self, unsigned axes, const ramp_state_t *sta
     return HV_OK;
 }
 
-void quintic_add_motion(quintic_t *self, unsigned axis, const ramp_state_t *from, int sign)
-{
-    const q32_t bend_q32 = sign * product(product(from->acc_per_cycle2_q32, self->cycles), self->cycles);
-    self->start_q32[axis] += sign * from->pos_q32;
-    self->coefficient_q32[axis][0] += sign * product(central_velocity(from), self->cycles);
-    self->coefficient_q32[axis][1] += bend_q32 / 2;
-    self->coefficient_q32[axis][2] -= bend_q32 / 6;
-}
-
 /* c[first] + c[first + 1] t + ..., each coefficient times its factor. */
 static q32_t polynomial(const q32_t *c, const int64_t *factor, unsigned first, q62_t t_q62)
 {

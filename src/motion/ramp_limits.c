@@ -101,17 +101,3 @@ hv_status_t ramp_init(ramp_t *self, const ramp_limits_t *limits, q32_t pos_q32)
     derive(self);
     return HV_OK;
 }
-
-bool ramp_is_prepared(const ramp_t *self)
-{
-    const ramp_limits_t *limits = &self->limits;
-    if (!are_limits_possible(limits) || self->acc_safe_q32 <= 0 ||
-        self->acc_safe_q32 / limits->jerk_per_cycle3_q32 != self->acc_cycles ||
-        self->acc_safe_q32 % limits->jerk_per_cycle3_q32 != 0 || self->acc_safe_q32 > limits->acc_per_cycle2_q32) {
-        return false;
-    }
-    ramp_t again = *self;
-    derive(&again);
-    return again.per_jerk_q62 == self->per_jerk_q62 && again.per_acc_q62 == self->per_acc_q62 &&
-           again.brake_reach_q32 == self->brake_reach_q32 && again.brake_cycles == self->brake_cycles;
-}

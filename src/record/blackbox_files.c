@@ -209,7 +209,7 @@ static bool write_frames(blackbox_t *self, const blackbox_row_t *cause, const ch
     if (start == START_STATE) {
         writer.has_zero = true;
         writer.zero_us = self->zero_us;
-        output_file_write(&self->file, self->line, checkpoint_format(&self->read.state, self->line));
+        output_file_write(&self->file, self->line, checkpoint_format(&self->read.state, self->config_hash, self->line));
     }
     if (start == START_STATE && self->zero_us == 0) {
         write_told(self, &writer, start_us);

@@ -10,8 +10,14 @@
 #define CRC_POLYNOMIAL 0xEDB88320u
 #define CRC_DIGITS     8u
 
-/* What the bytes mean depends on the version; sizes and byte order tell most other machines. */
-static const char k_about[] = HEAVE_VERSION " ";
+#if __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+#define BYTE_ORDER_NAME "le"
+#else
+#define BYTE_ORDER_NAME "be"
+#endif
+
+/* What the bytes mean depends on the version and on the order of bytes; their number tells most other machines. */
+static const char k_version[] = HEAVE_VERSION "-" BYTE_ORDER_NAME " ";
 
 static uint32_t crc_of(const uint8_t *bytes, size_t length)
 {
@@ -31,12 +37,14 @@ void checkpoint_take(const session_t *session, session_t *out)
     gateway_save(&session->gateway, &out->gateway);
 }
 
-size_t checkpoint_format(const session_t *saved, char to[CHECKPOINT_LINE_MAX])
+size_t checkpoint_format(const session_t *saved, const char *hash, char to[CHECKPOINT_LINE_MAX])
 {
     const uint8_t *bytes = (const uint8_t *)saved;
     size_t at = decimal_put_ms(to, saved->now_us - saved->zero_us);
     at += decimal_put_text(&to[at], " !state ");
-    at += decimal_put_text(&to[at], k_about);
+    at += decimal_put_text(&to[at], k_version);
+    at += decimal_put_text(&to[at], hash);
+    at += decimal_put_text(&to[at], " ");
     at += decimal_put_hex(&to[at], crc_of(bytes, sizeof *saved), CRC_DIGITS);
     at += decimal_put_text(&to[at], " ");
     for (size_t i = 0; i < sizeof *saved; i++) {
@@ -77,13 +85,17 @@ static bool read_bytes(const uint8_t *text, uint8_t *bytes, size_t count)
     return true;
 }
 
-const char *checkpoint_parse(const uint8_t *text, size_t length, session_t *out)
+const char *checkpoint_parse(const uint8_t *text, size_t length, const char *hash, session_t *out)
 {
-    const size_t about = strlen(k_about);
+    const size_t version = strlen(k_version);
+    const size_t about = version + strlen(hash) + 1;
     const size_t head = about + CRC_DIGITS + 1;
     uint32_t crc = 0;
-    if (length < head || memcmp(text, k_about, about) != 0 || length != head + 2 * sizeof *out) {
+    if (length != head + 2 * sizeof *out || memcmp(text, k_version, version) != 0) {
         return "the !state is of another version of heaved, or of another kind of machine; play it with the heaved that wrote it";
+    }
+    if (memcmp(&text[version], hash, strlen(hash)) != 0) {
+        return "the !state is of another configuration; play it with the platform.ini beside it";
     }
     if (!read_hex(&text[about], CRC_DIGITS, &crc) || !read_bytes(&text[head], (uint8_t *)out, sizeof *out) ||
         crc != crc_of((const uint8_t *)out, sizeof *out)) {

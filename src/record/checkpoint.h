@@ -13,13 +13,15 @@
 /** Takes everything but handles. */
 void checkpoint_take(const session_t *session, session_t *out);
 
-/** `<t_ms> !state ...` with its newline; the time is that of the coming cycle.
+/** `<t_ms> !state VERSION HASH CRC BYTES` with its newline; the time is that of the coming cycle.
+ *  @param hash of the configuration at the start (config/hash.h)
  *  @return bytes written */
-size_t checkpoint_format(const session_t *saved, char to[CHECKPOINT_LINE_MAX]);
+size_t checkpoint_format(const session_t *saved, const char *hash, char to[CHECKPOINT_LINE_MAX]);
 
 /** Reads what stands behind `!state `.
- *  @param text is not believed: a file that was changed by hand is refused, one that was forged is not
+ *  @param hash of the configuration that goes on
+ *  @param out may hold anything where the text was forged: a gateway that goes on from it has to be in a cage (common/cage.h)
  *  @return NULL; or what is wrong, and what is allowed */
-const char *checkpoint_parse(const uint8_t *text, size_t length, session_t *out);
+const char *checkpoint_parse(const uint8_t *text, size_t length, const char *hash, session_t *out);
 
 #endif

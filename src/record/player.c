@@ -237,6 +237,12 @@ static void watch_rest(player_t *self, const trace_row_t *before)
     }
 }
 
+uint64_t player_span_us(const player_t *self)
+{
+    const frames_line_t *last = &self->line[self->lines - 1];
+    return last->t_us - self->line[0].t_us + (last->kind == FRAMES_END ? 0 : EXTRA_MAX_US);
+}
+
 static uint64_t last_line_us(const player_t *self)
 {
     return self->lines > 0 ? self->line[self->lines - 1].t_us : 0;
@@ -273,6 +279,25 @@ bool player_settle(player_t *self, const settings_t *settings)
         }
     }
     return false;
+}
+
+void player_resume(player_t *self, const session_t *saved)
+{
+    q32_t setpoint_q32[DRIVES_MAX] = {0};
+    gateway_resume(&self->session.gateway, &saved->gateway);
+    self->session.cycle_us = saved->cycle_us;
+    self->session.now_us = saved->now_us;
+    self->session.has_zero = saved->has_zero;
+    self->session.zero_us = saved->zero_us;
+    self->session.late_cycles = saved->late_cycles;
+    self->is_before_zero = !saved->has_zero;
+    const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
+    for (unsigned i = 0; i < snapshot->cylinders; i++) {
+        setpoint_q32[i] = snapshot->extension_mm_q32[i];
+    }
+    setpoint_q32[snapshot->cylinders] = snapshot->angle_deg_q32;
+    sim_drives_place(self->drives, snapshot->now_us, snapshot->drive, setpoint_q32);
+    sim_inputs_set(self->inputs, INPUT_ESTOP, snapshot->is_estop_active);
 }
 
 void player_begin(player_t *self)

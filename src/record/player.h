@@ -34,13 +34,17 @@ typedef struct {
 /** The source of datagrams for the io of session_init(). It delivers the datagram of each line when its time has come. */
 hal_udp_t player_udp(player_t *self);
 
-/** The drives for the io of session_init() or gateway_resume(): simulated ones, unless lines contain the feedback. */
+/** The drives for the io of session_init(): simulated ones, unless lines contain the feedback. */
 drives_t player_drives(player_t *self);
 
 /** Brings the platform up to SETTLED as in live operation: before time zero and without rows. The auto policy acts only
  * afterwards.
  *  @return false: the platform does not come up */
 bool player_settle(player_t *self, const settings_t *settings);
+
+/** Goes on from a saved session, the drives included. In a cage (common/cage.h) where the bytes came from a file.
+ *  @param saved of the same configuration; is believed */
+void player_resume(player_t *self, const session_t *saved);
 
 /** Fills `row` from the session as it is now. Call it before the first player_cycle(). */
 void player_begin(player_t *self);
@@ -53,5 +57,8 @@ bool player_is_at_rest(const player_t *self);
 
 /** True two hours after the last line. */
 bool player_is_endless(const player_t *self);
+
+/** The longest time that a run simulates from its first line on. There has to be one. */
+uint64_t player_span_us(const player_t *self);
 
 #endif

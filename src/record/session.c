@@ -3,8 +3,6 @@
  */
 #include "record/session.h"
 
-#include "heave/sane.h"
-
 hv_status_t session_init(session_t *self, const settings_t *settings, const gateway_io_t *io)
 {
     self->cycle_us = settings->cycle_us;
@@ -35,10 +33,4 @@ void session_row(session_t *self, trace_row_t *out)
     const uint32_t late_cycles = snapshot->counters.late_cycles;
     trace_take(out, snapshot, snapshot->now_us - self->zero_us, late_cycles != self->late_cycles, !self->has_zero);
     self->late_cycles = late_cycles;
-}
-
-bool session_is_sane(const session_t *saved, uint32_t cycle_us)
-{
-    return saved->cycle_us == cycle_us && sane_bool(&saved->has_zero) && sane_time(saved->now_us) && saved->now_us >= cycle_us &&
-           saved->zero_us <= saved->now_us && saved->gateway.snapshot.now_us <= saved->now_us;
 }

@@ -21,10 +21,6 @@ typedef struct {
 /** @return as gateway_init */
 hv_status_t session_init(session_t *self, const settings_t *settings, const gateway_io_t *io) HV_MUST_CHECK;
 
-/** True for the time line of one that may go on, whatever file it comes from, at the period of the configuration; see
- * heave/sane.h. */
-bool session_is_sane(const session_t *saved, uint32_t cycle_us);
-
 /** One cycle.
  *  @return true where it is time zero */
 bool session_cycle(session_t *self);

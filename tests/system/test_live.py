@@ -5,6 +5,7 @@
 --guard LIB: malloc_guard.c as a shared library; without it (instrumented builds) the cases about it are skipped.
 """
 import argparse
+import collections
 import fcntl
 import grp
 import json
@@ -12,6 +13,7 @@ import math
 import mmap
 import os
 import pty
+import random
 import re
 import select
 import signal
@@ -461,8 +463,8 @@ def dumps_the_black_box(bench):
         assert played == trace, f"{folder.name} plays back otherwise"
 
 
-def refuses_a_forged_state(bench):
-    """With its check sum right, but a cycle of 0 us, by which is divided: the first bytes of a state are the settings' period."""
+def replays_a_forged_state_in_a_cage(bench):
+    """With its check sum right. A state that nothing can be made of ends the run; whatever one does, nothing but the trace is written, and it ends."""
     config, directory = with_black_box(bench)
     daemon = bench.start(config=config)
     bench.wait_state("ENGAGED")
@@ -471,15 +473,38 @@ def refuses_a_forged_state(bench):
     assert bench.ask("dump")[1] == 0
     harness.wait_for(lambda: list(directory.glob("*/frames")), "the incident")
     assert bench.stop(daemon) == 0
-    frames = min(directory.glob("*/frames"))
-    head, about, _, digits = re.search(r"(?m)^(\S+ !state )(\S+ )([0-9A-F]{8}) ([0-9A-F]+)$", frames.read_text(encoding="utf-8")).groups()
+    text = min(directory.glob("*/frames")).read_text(encoding="utf-8")
+    head, about, _, digits = re.search(r"(?m)^(\S+ !state )(\S+ [0-9a-f]{16} )([0-9A-F]{8}) ([0-9A-F]+)$", text).groups()
     state = bytes.fromhex(digits)
     assert struct.unpack_from("=I", state)[0] == 1000
-    for forged, code in ((state, 0), (bytes(4) + state[4:], 65)):
-        line = f"{head}{about}{zlib.crc32(forged):08X} {forged.hex().upper()}\n"
-        run = bench.heaved("--config", config, "--play", bench.file("forged.txt", line), "--trace", bench.folder / "forged.csv")
-        assert run.returncode == code, (code, run.returncode, run.stderr)
-    assert "line 1: the !state is of another platform, or no heaved has written it" in run.stderr, run.stderr
+    end = f"{float(head.split()[0]) + 1000:.3f} !end\n"
+    trace = bench.folder / "forged.csv"
+
+    def play(forged, about=about):
+        frames = bench.file("forged.txt", f"{head}{about}{zlib.crc32(forged):08X} {forged.hex().upper()}\n{end}")
+        return bench.heaved("--config", config, "--play", frames, "--trace", trace)
+
+    def files():
+        return {path: path.stat().st_mtime_ns for path in bench.folder.rglob("*") if path.is_file() and path.name not in ("forged.csv", "forged.txt")}
+
+    run = play(state)
+    assert run.returncode == 0 and len(trace.read_bytes().splitlines()) > 1000, run.stderr
+    run = play(state, about[:-2] + ("0 " if about[-2] != "0" else "1 "))
+    assert run.returncode == 65 and "line 1: the !state is of another configuration; play it with the platform.ini beside it" in run.stderr, run.stderr
+    trace.unlink()
+    before = files()
+    codes = collections.Counter()
+    chance = random.Random(5)
+    for i in range(60):
+        forged = bytearray(state)
+        for _ in range(i % 4 + 1 if i > 0 else 2000):
+            at = chance.randrange(len(forged) - 8)
+            forged[at:at + 8] = chance.choice([bytes(8), b"\xff" * 8, b"\xff" * 7 + b"\x7f", chance.randbytes(8)])
+        run = play(bytes(forged))
+        codes[run.returncode] += 1
+        assert run.returncode == 0 or (run.returncode == 65 and "line 1: the replay from this !state crashed or did not end, and was stopped" in run.stderr), (i, run.returncode, run.stderr)
+    assert codes[65] > 0, codes  # the first at least
+    assert files() == before, "a replay has written something else"
 
 
 def replays_a_following_error(bench):
@@ -1069,7 +1094,7 @@ CASES = {
     "a recording plays back to the same bytes, engage = manual, homed from elsewhere": lambda bench: replays_to_the_same_bytes(bench, **ELSEWHERE),
     "a cycle that is very late holds the platform, and replays": a_late_cycle_holds,
     "the black box is written on request, and replays": dumps_the_black_box,
-    "a forged state is refused": refuses_a_forged_state,
+    "a forged state replays in a cage": replays_a_forged_state_in_a_cage,
     "a fault that heaved finds itself replays in its cycle": replays_a_following_error,
     "without a directory there is no black box": dumps_nothing,
     "the service manager is told": tells_the_service_manager,

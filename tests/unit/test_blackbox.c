@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "config/hash.h"
 #include "daemon/motion_loop.h"
 #include "daemon/play.h"
 #include "record/blackbox.h"
@@ -122,6 +123,7 @@ static void run(story_t story)
     m_story = story;
     sim_udp_init(&m_udp);
     sim_log_init(&m_log);
+    config_hash(&m_config);
     TEST_ASSERT_NULL(blackbox_open(&m_box, "test.ini", &m_config));
     m_loop.blackbox = blackbox_feed(&m_box);
     TEST_ASSERT_EQUAL(
@@ -554,19 +556,21 @@ static void test_checkpoint_damaged_text_is_refused(void)
     static char line[CHECKPOINT_LINE_MAX];
     static session_t session, out;
     sim_log_init(&m_log);
-    const size_t length = checkpoint_format(&session, line);
+    const size_t length = checkpoint_format(&session, "0123456789abcdef", line);
     char *text = strstr(line, "!state ") + strlen("!state ");
     const size_t rest = length - 1 - (size_t)(text - line);
-    TEST_ASSERT_NULL(checkpoint_parse((const uint8_t *)text, rest, &out));
+    TEST_ASSERT_NULL(checkpoint_parse((const uint8_t *)text, rest, "0123456789abcdef", &out));
+    const char *wrong = checkpoint_parse((const uint8_t *)text, rest, "0123456789abcdee", &out);
+    TEST_ASSERT_NOT_NULL(strstr(wrong, "another configuration"));
     TEST_ASSERT_EQUAL_MEMORY(&session, &out, sizeof out);
     for (size_t i = 0; i < rest; i += 97) {
         const char was = text[i];
         text[i] = was == '1' ? '2' : '1';
-        TEST_ASSERT_NOT_NULL(checkpoint_parse((const uint8_t *)text, rest, &out));
+        TEST_ASSERT_NOT_NULL(checkpoint_parse((const uint8_t *)text, rest, "0123456789abcdef", &out));
         text[i] = was;
     }
     for (size_t i = 0; i < rest; i += 997) {
-        TEST_ASSERT_NOT_NULL(checkpoint_parse((const uint8_t *)text, i, &out));
+        TEST_ASSERT_NOT_NULL(checkpoint_parse((const uint8_t *)text, i, "0123456789abcdef", &out));
     }
 }
 

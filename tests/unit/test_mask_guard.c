@@ -23,10 +23,7 @@ void setUp(void)
     m_random = UINT64_C(0x9E3779B97F4A7C15);
 }
 
-void tearDown(void)
-{
-    TEST_ASSERT_TRUE(mask_guard_is_sane(&m_guard));
-}
+void tearDown(void) {}
 
 static unsigned below(unsigned end)
 {
@@ -296,38 +293,6 @@ static void test_a_pulse_of_one_frame_is_followed(void)
     }
 }
 
-/* A file may hold anything. */
-static void test_sane_judges_each_member(void)
-{
-    mask_guard_t bad = m_guard;
-    bad.recents = MASK_GUARD_RECENT + 1;
-    TEST_ASSERT_FALSE(mask_guard_is_sane(&bad));
-    bad = m_guard;
-    bad.score = bad.in_row = 4;
-    TEST_ASSERT_FALSE(mask_guard_is_sane(&bad));
-    bad = m_guard;
-    bad.score = 13;
-    TEST_ASSERT_FALSE(mask_guard_is_sane(&bad));
-    bad = m_guard;
-    bad.leaked_us = bad.last_us + 1;
-    TEST_ASSERT_FALSE(mask_guard_is_sane(&bad));
-    bad = m_guard;
-    bad.frames = MASK_GUARD_FRAMES + 1;
-    TEST_ASSERT_FALSE(mask_guard_is_sane(&bad));
-    bad = m_guard;
-    memset(&bad.has_mask, 2, 1);
-    TEST_ASSERT_FALSE(mask_guard_is_sane(&bad));
-    bad = m_guard;
-    memset(&bad.is_quick, 2, 1);
-    TEST_ASSERT_FALSE(mask_guard_is_sane(&bad));
-    bad = m_guard;
-    memset(&bad.is_digits, 2, 1);
-    TEST_ASSERT_FALSE(mask_guard_is_sane(&bad));
-    bad = m_guard;
-    bad.last_us = UINT64_MAX;
-    TEST_ASSERT_FALSE(mask_guard_is_sane(&bad));
-}
-
 int main(void)
 {
     UNITY_BEGIN();
@@ -341,6 +306,5 @@ int main(void)
     RUN_TEST(test_digits_end_with_a_mask_that_has_a_letter_or_with_silence);
     RUN_TEST(test_masks_at_leisure_are_followed);
     RUN_TEST(test_a_pulse_of_one_frame_is_followed);
-    RUN_TEST(test_sane_judges_each_member);
     return UNITY_END();
 }

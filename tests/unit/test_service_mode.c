@@ -704,106 +704,12 @@ static void test_ticks_are_as_old_as_they_were_shown(void)
     TEST_ASSERT_EQUAL_UINT64(UINT64_MAX, gateway_tick_age(&m_rig.gateway, tick_us + 1000000));
 }
 
-/* ---- from a file ---- */
-
-static hv_status_t resume(const gateway_t *saved)
-{
-    static rig_t other;
-    rig_start(&other, &m_settings, true);
-    return gateway_resume(&other.gateway, saved, &other.gateway.io);
-}
-
 static void go_to_the_middle(void)
 {
     TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_JOG_POSE, AXIS_Z + 1, 20));
     hold_ms(1500);
     rig_run_ms(&m_rig, 1500);
     forget_speeds();
-}
-
-/* A jog under way goes on from what was saved, and nothing is believed that no jog has. */
-static void test_resume_in_a_jog_takes_what_was_saved_and_nothing_else(void)
-{
-    static gateway_t saved, spoiled;
-    const struct {
-        service_verb_t verb;
-        unsigned axis;
-        double speed;
-    } k_jogs[] = {{SERVICE_JOG_AXIS, 3, 5}, {SERVICE_JOG_AXIS, 7, 3}, {SERVICE_JOG_POSE, AXIS_PITCH + 1, 2}};
-    for (unsigned i = 0; i < sizeof k_jogs / sizeof k_jogs[0]; i++) {
-        start(true);
-        TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_JOG_POSE, AXIS_Z + 1, 20));
-        hold_ms(2000);
-        TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_RELEASE, 0, 0));
-        rig_run_ms(&m_rig, 300);
-        TEST_ASSERT_EQUAL(SERVICE_DONE, ask(k_jogs[i].verb, k_jogs[i].axis, k_jogs[i].speed));
-        for (unsigned at = 0; at < 400; at += 50) { /* in every part of the way, and of the stop after it */
-            rig_run_ms(&m_rig, 50);
-            gateway_save(&m_rig.gateway, &saved);
-            TEST_ASSERT_EQUAL(HV_OK, resume(&saved));
-        }
-        TEST_ASSERT_EQUAL(SERVICE_DONE, ask(k_jogs[i].verb, k_jogs[i].axis, k_jogs[i].speed));
-        rig_run_ms(&m_rig, 100);
-        gateway_save(&m_rig.gateway, &saved);
-    }
-#define SPOIL(member, value)                                                                                                     \
-    do {                                                                                                                         \
-        spoiled = saved;                                                                                                         \
-        spoiled.member = (value);                                                                                                \
-        TEST_ASSERT_EQUAL_MESSAGE(HV_ERR_ARG, resume(&spoiled), #member);                                                        \
-    } while (0)
-    TEST_ASSERT_EQUAL(HV_OK, resume(&saved));
-    SPOIL(service.doing, (service_verb_t)SERVICE_VERBS);
-    SPOIL(service.doing, SERVICE_BEAT);
-    SPOIL(service.wanted, 1u << 7);
-    SPOIL(service.up, 1u << 31);
-    SPOIL(service.homing, 1u << 7);
-    SPOIL(service.off_due, 1u << 7);
-    SPOIL(service.stop_due, 1u << 7);
-    SPOIL(service.late_us, UINT64_MAX);
-    SPOIL(service.hand.until_us, UINT64_MAX);
-    SPOIL(snapshot.service.tick_us, UINT64_MAX);
-    SPOIL(snapshot.service.doing, (service_verb_t)SERVICE_VERBS);
-    SPOIL(motion.jog.led, 1u << 7);
-    SPOIL(motion.jog.is_serving, false); /* while a jog leads */
-    SPOIL(motion.jog.ramp[2].acc_safe_q32, 0);
-    SPOIL(motion.jog.ramp[2].per_jerk_q62, 1);
-    SPOIL(motion.jog.ramp[2].limits.vel_per_cycle_q32, (q32_t)1 << 40);
-    SPOIL(motion.jog.ramp[2].limits.jerk_per_cycle3_q32, 0);
-    SPOIL(motion.jog.ramp[2].state.pos_q32, INT64_MAX);
-    SPOIL(motion.jog.ramp[2].state.vel_per_cycle_q32, (q32_t)1 << 40);
-    SPOIL(motion.jog_limits.cylinder.acc_per_cycle2_q32, 0);
-    SPOIL(motion.jog_limits.deg_per_cycle_q32, 1);
-    SPOIL(motion.plan.straight.path.total, 0); /* a divisor */
-    SPOIL(motion.plan.straight.path.nj, -1);
-    SPOIL(motion.plan.straight.to_q32[1], INT64_MAX);
-    m_signal = (excitation_request_t){EXCITATION_CHIRP, Q(2), 1000, 20000, 12000};
-    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_RELEASE, 0, 0));
-    rig_run_ms(&m_rig, 500);
-    go_to_the_middle();
-    TEST_ASSERT_EQUAL(SERVICE_DONE, ask(SERVICE_SIGNAL_POSE, AXIS_Z + 1, 0));
-    for (unsigned at = 0; at < 400; at += 50) {
-        rig_run_ms(&m_rig, 50);
-        (void)beat(at + 1, 0);
-        gateway_save(&m_rig.gateway, &saved);
-        TEST_ASSERT_EQUAL(HV_OK, resume(&saved));
-    }
-    SPOIL(motion.jog.signal.kind, EXCITATION_KINDS);
-    SPOIL(motion.jog.signal.ramp_in, 0); /* a divisor, as the next two */
-    SPOIL(motion.jog.signal.turn_q64[0], 0);
-    SPOIL(motion.jog.signal.limits.vel_q62, 0);
-    SPOIL(motion.jog.signal.cycles, INT64_MAX);
-    SPOIL(motion.jog.signal.elapsed, -1);
-    SPOIL(motion.jog.signal.share_q62[3], INT64_MAX);
-    SPOIL(motion.jog.signal.is_out, true);
-    SPOIL(motion.jog.signal.kind, EXCITATION_STEP); /* without a step, and with half a period of 0 */
-    SPOIL(motion.jog_limits.signal_mm_q32, 1);
-    SPOIL(motion.jog_limits.signal_mm_per_cycle_q32, 1);
-    SPOIL(motion.jog.ramp[2].limits.acc_per_cycle2_q32, 1);
-    saved.service.doing = SERVICE_RELAY;
-    saved.service.axis = 0;
-    TEST_ASSERT_EQUAL(HV_ERR_ARG, resume(&saved)); /* would be shifted by */
-#undef SPOIL
 }
 
 static void test_jog_with_a_way_ends_after_it(void)
@@ -1042,7 +948,6 @@ int main(void)
     RUN_TEST(test_counts_are_those_of_the_drives_before_there_is_torque);
     RUN_TEST(test_words_are_complete);
     RUN_TEST(test_ticks_are_as_old_as_they_were_shown);
-    RUN_TEST(test_resume_in_a_jog_takes_what_was_saved_and_nothing_else);
     RUN_TEST(test_jog_with_a_way_ends_after_it);
     RUN_TEST(test_signal_of_every_kind_ends_where_it_began);
     RUN_TEST(test_signal_leads_one_cylinder);

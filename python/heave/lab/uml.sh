@@ -74,7 +74,7 @@ configure() {
 # What was asked for and is not there would fail much later and far from here. (gpio-sim came with Linux 5.17; tests of it skip without.)
 check_config() {
     local wanted missing=''
-    for wanted in UML_TIME_TRAVEL_SUPPORT HOSTFS CAN_RAW CAN_VCAN CAN_SLCAN NET_SCH_TBF; do
+    for wanted in UML_TIME_TRAVEL_SUPPORT SECCOMP HOSTFS CAN_RAW CAN_VCAN CAN_SLCAN NET_SCH_TBF; do
         grep -q "^CONFIG_$wanted=y" .config || missing+=" $wanted"
     done
     [ -z "$missing" ] || { echo "E: this kernel source does not give$missing" >&2 && return 1; }
