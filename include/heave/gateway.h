@@ -60,41 +60,6 @@ typedef struct {
     uint16_t gap_cycles[AUTO_ENGAGE_FRAMES_MAX]; /**< cycles before each of these; at most 2000 in a second */
 } auto_engage_t;
 
-/** Converts a value of a frame into a value of an axis: sign * scale * value + offset, of rotations then as `wrap` says. */
-typedef struct {
-    int8_t sign;
-    q16_t scale_q16;
-    q16_t offset_q16;
-    angle_wrap_t wrap;
-    q16_t min_q16;
-    q16_t max_q16;
-} axis_input_t;
-
-/** Copies of the settings that the gateway needs while it runs. Motion has converted the rest. */
-typedef struct {
-    uint32_t cycle_us;
-    engage_policy_t engage;
-    uint32_t auto_frames;
-    axis_input_t axis[AXES_MAX];
-    bool has_angle;
-    q16_t stroke_mm_q16[CYLINDERS_MAX];
-    q16_t following_error_mm_q16;
-    frame_dialect_t dialect;
-    mask_policy_t mask_policy;
-    q16_t confirm_jump_mm_q16;
-    q16_t confirm_jump_deg_q16;
-    uint32_t takeover_ms;
-    hal_udp_networks_t priority;
-    uint32_t silence_hold_ms;
-    uint32_t silence_neutral_ms;
-    uint32_t silence_settle_ms;
-    relay_settings_t relays;
-    uint16_t relay_safe_mask;
-    uint32_t relay_safe_after_ms;
-    healthy_settings_t healthy;
-    uint32_t power_settle_ms;
-} gateway_settings_t;
-
 /** The last log line about a drive. Limits the rate, so that a drive that comes and goes does not fill the log. */
 typedef struct {
     uint64_t next_us; /**< when the next line may be written; a burst may be earlier */
@@ -167,7 +132,7 @@ typedef struct {
 
 /** A gateway; members are private to src/gateway. */
 typedef struct {
-    gateway_settings_t settings;
+    const settings_t *settings; /**< in force, the owner's */
     gateway_io_t io;
     motion_t motion;
     motion_output_t output;
@@ -202,6 +167,7 @@ typedef struct {
 } gateway_t;
 
 /** Prepares a gateway in OFF. Touches no device.
+ *  @param settings read in every cycle: they stay where they are, and as they are, until gateway_reload()
  *  @return HV_OK; HV_ERR_ARG for an invalid handle or drives whose count does not fit the platform; HV_ERR_RANGE for settings. */
 hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gateway_io_t *io) HV_MUST_CHECK;
 
@@ -211,18 +177,19 @@ void gateway_start_settled(gateway_t *self);
 /** Offline runs that came up to SETTLED by a request: the auto policy is as at the start. */
 void gateway_restart_auto(gateway_t *self);
 
-/** Everything a gateway knows but its handles, so that an offline run can go on from there. Plain data: the same bytes mean the
- *  same to a program built from the same sources for a machine of the same kind.
+/** Everything a gateway knows but its handles and settings, so that an offline run can go on from there. Plain data: the same
+ * bytes mean the same to a program built from the same sources for a machine of the same kind.
  *  @param out not a gateway that runs: gateway_resume() makes one of it */
 void gateway_save(const gateway_t *self, gateway_t *out);
 
 /** Continues from a saved state.
- *  @param self  prepared by gateway_init() with the settings of the start; its handles are kept
+ *  @param self  prepared by gateway_init() with the settings that were in force; they and its handles are kept
  *  @param saved is believed: whoever has it from a file calls this, and all that follows, where it can do no harm */
 void gateway_resume(gateway_t *self, const gateway_t *saved);
 
-/** Takes over the settings that may change in operation: silence, take-over and priorities, dialect, masks, safe mask and its
- * delay, following error, spike gate, confirmation of far jumps. Ignores the rest of the settings. */
+/** Other settings from the next cycle on.
+ *  @param settings as for gateway_init(). May differ in silence, take-over and priorities, dialect, masks, safe mask and its
+ *                  delay, following error, spike gate, confirmation of far jumps, supply; the others have to be as before */
 void gateway_reload(gateway_t *self, const settings_t *settings);
 
 /** A request of an operator: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET, EVENT_SHUTDOWN, EVENT_SERVICE or

@@ -36,6 +36,7 @@ typedef struct {
     uint8_t score;                      /**< changes as of digits, less what has leaked away */
     uint8_t in_row;                     /**< such changes in a row, up to those that wait */
     uint8_t frames;                     /**< in a row of one form, up to MASK_GUARD_FRAMES */
+    uint8_t policy;                     /**< mask_policy_t of the last frame: with another one all starts anew */
     bool has_mask;                      /**< that form */
     bool is_quick;                      /**< the last frame came soon after the one before it */
     bool is_digits;

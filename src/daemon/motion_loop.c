@@ -55,7 +55,7 @@ static void take_reloads(motion_loop_t *self)
     motion_reload_t reload;
     while (ring_pop(&self->handover.reloads, &reload, sizeof reload) > 0) {
         motion_note(self, RECORD_RELOAD, 0);
-        gateway_reload(&self->session.gateway, &reload.settings);
+        session_reload(&self->session, &reload.settings);
         self->allow = reload.allow;
         self->late_hold_cycles = reload.late_hold_cycles;
     }
@@ -275,7 +275,7 @@ static void note_bus(motion_view_t *view, devices_t *devices)
 /* The kernel is asked for its counts ten times a second, not in each cycle: each question is a system call. */
 static bool is_kernel_asked(const motion_loop_t *self, uint64_t phase_us)
 {
-    return (self->session.now_us + phase_us) % KERNEL_ASKED_US < self->session.cycle_us;
+    return (self->session.now_us + phase_us) % KERNEL_ASKED_US < self->session.settings.cycle_us;
 }
 
 /* Page faults of this thread, once it is known whether there should be any. */
@@ -353,7 +353,7 @@ static void note_hold(motion_loop_t *self)
 static void run_cycle(motion_loop_t *self, uint64_t late_us)
 {
     motion_result_t result[REQUESTS_PER_CYCLE];
-    const uint32_t skipped = (uint32_t)(late_us / self->session.cycle_us);
+    const uint32_t skipped = (uint32_t)(late_us / self->session.settings.cycle_us);
     if (skipped > 0) {
         motion_note(self, RECORD_LATE, skipped);
         gateway_note_late(&self->session.gateway, skipped);
@@ -389,7 +389,7 @@ static void run_drives(motion_loop_t *self)
     for (unsigned i = 0; i < drives_count(self->io.drives); i++) {
         self->is_energized |= feedback[i].is_energized;
     }
-    self->session.now_us += self->session.cycle_us;
+    self->session.now_us += self->session.settings.cycle_us;
 }
 
 /* All drives stop now by their own ramps. What tells them may need some cycles: room on the bus, a SYNC behind it, a second try.
@@ -402,7 +402,7 @@ static void quit(motion_loop_t *self, uint64_t now_us)
     run_drives(self);
     while (self->is_energized && now_us < until_us) {
         told = told == HV_ERR_AGAIN ? drives_request(self->io.drives, DRIVES_QUICK_STOP) : told;
-        (void)!hal_clock_sleep_until_us(self->clock, now_us + self->session.cycle_us);
+        (void)!hal_clock_sleep_until_us(self->clock, now_us + self->session.settings.cycle_us);
         now_us = hal_clock_now_us(self->clock);
         run_drives(self);
         if (drives_is_stopping(self->io.drives) && now_us < last_us) {
@@ -414,7 +414,7 @@ static void quit(motion_loop_t *self, uint64_t now_us)
 /* Cycle after cycle until the end; deadlines are absolute, so that nothing adds up. */
 static void run(motion_loop_t *self)
 {
-    const uint64_t cycle_us = self->session.cycle_us;
+    const uint64_t cycle_us = self->session.settings.cycle_us;
     uint64_t deadline_us = hal_clock_now_us(self->clock) + cycle_us;
     while (!gateway_is_finished(&self->session.gateway)) {
         if (hal_clock_sleep_until_us(self->clock, deadline_us) != HV_OK) {

@@ -70,7 +70,7 @@ void actions_track_actual(gateway_t *self)
     for (unsigned i = 0; i < cylinders; i++) {
         extension_mm_q32[i] = self->snapshot.drive[i].actual_mm_q32;
     }
-    motion_place(&self->motion, extension_mm_q32, self->settings.has_angle ? self->snapshot.drive[cylinders].actual_mm_q32 : 0);
+    motion_place(&self->motion, extension_mm_q32, self->settings->has_angle ? self->snapshot.drive[cylinders].actual_mm_q32 : 0);
 }
 
 static void begin_bring_up(gateway_t *self, uint64_t now_us)
@@ -83,7 +83,7 @@ static void begin_bring_up(gateway_t *self, uint64_t now_us)
 void actions_follow(gateway_t *self, uint64_t now_us)
 {
     self->sender.start_us = now_us;
-    self->sender.frame_mask = self->settings.relay_safe_mask;
+    self->sender.frame_mask = self->settings->relay_safe_mask;
     confirm_restart(&self->sender.confirm);
     motion_follow(&self->motion);
 }

@@ -120,7 +120,7 @@ void fault_watch_bus_failing(gateway_t *self, uint64_t now_us)
 
 bool fault_watch_is_bus_stalled(const gateway_t *self)
 {
-    return self->unsent_cycles * (uint64_t)self->settings.cycle_us > UNSENT_MAX_US;
+    return self->unsent_cycles * (uint64_t)self->settings->cycle_us > UNSENT_MAX_US;
 }
 
 /* Of a drive, in a state that is not OFF. */
@@ -137,7 +137,7 @@ static bool is_torque_expected(const gateway_t *self, unsigned i)
 /* True where a cylinder has been further from its set-point than allowed for too long. */
 static bool is_left_behind(gateway_t *self, unsigned i, uint64_t now_us)
 {
-    const q32_t window_q32 = q32_from_q16(self->settings.following_error_mm_q16);
+    const q32_t window_q32 = q32_from_q16(self->settings->following_error_mm_q16);
     if (i >= kin_cylinders(motion_kin(&self->motion)) || window_q32 == 0) {
         return false;
     }
@@ -155,7 +155,7 @@ static bool is_left_behind(gateway_t *self, unsigned i, uint64_t now_us)
 static q32_t outside_stroke(const gateway_t *self, unsigned i)
 {
     const q32_t actual_q32 = self->snapshot.drive[i].actual_mm_q32;
-    const q32_t beyond_q32 = fx_sub_sat(actual_q32, q32_from_q16(self->settings.stroke_mm_q16[i]));
+    const q32_t beyond_q32 = fx_sub_sat(actual_q32, q32_from_q16(self->settings->stroke_mm_q16[i]));
     return actual_q32 < 0 ? -actual_q32 : beyond_q32 > 0 ? beyond_q32 : 0;
 }
 
@@ -205,7 +205,7 @@ static fault_t fault_of(const gateway_t *self, fault_code_t code, unsigned i, ui
         fault.allowed_q32 = drive->guard.allowed_q32;
     } else if (i < kin_cylinders(motion_kin(&self->motion))) {
         fault.off_q32 = fx_abs(fx_sub_sat(self->output.extension_mm_q32[i], drive->actual_mm_q32));
-        fault.allowed_q32 = q32_from_q16(self->settings.following_error_mm_q16);
+        fault.allowed_q32 = q32_from_q16(self->settings->following_error_mm_q16);
     }
     return fault;
 }
@@ -269,8 +269,8 @@ void fault_watch_power(gateway_t *self, bool is_failing, uint64_t now_us)
     } else if (self->power_since_us == 0) {
         self->power_since_us = now_us;
     }
-    const bool is_overdue = is_failing && self->settings.power_settle_ms != 0 && !is_down &&
-                            now_us - self->power_since_us >= (uint64_t)self->settings.power_settle_ms * 1000;
+    const bool is_overdue = is_failing && self->settings->power_settle_ms != 0 && !is_down &&
+                            now_us - self->power_since_us >= (uint64_t)self->settings->power_settle_ms * 1000;
     if (is_overdue && !self->is_power_overdue) {
         fault_watch_raise(self, &(fault_t){.code = FAULT_POWER, .at_us = now_us});
     }

@@ -71,7 +71,7 @@ static void note_arrival(frame_receiver_t *self, hal_udp_t udp, uint32_t cycle_u
 
 /* Receives the next datagram that is not too long.
  * Returns false where none has arrived, or the cycle has had its share. */
-static bool receive(frame_receiver_t *self, const gateway_settings_t *settings, const frame_receiver_io_t *io, uint64_t now_us)
+static bool receive(frame_receiver_t *self, const settings_t *settings, const frame_receiver_io_t *io, uint64_t now_us)
 {
     while (self->datagrams < GATEWAY_DATAGRAMS_PER_CYCLE) {
         self->position = 0;
@@ -103,8 +103,8 @@ void frame_receiver_begin(frame_receiver_t *self)
     self->is_open = false;
 }
 
-bool frame_receiver_next(frame_receiver_t *self, const gateway_settings_t *settings, const frame_receiver_io_t *io,
-                         uint64_t now_us, frame_t *frame)
+bool frame_receiver_next(frame_receiver_t *self, const settings_t *settings, const frame_receiver_io_t *io, uint64_t now_us,
+                         frame_t *frame)
 {
     for (;;) {
         self->is_open = self->is_open || receive(self, settings, io, now_us);

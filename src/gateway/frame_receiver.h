@@ -23,8 +23,8 @@ void frame_receiver_begin(frame_receiver_t *self);
 /** The next valid frame of this cycle, out of at most GATEWAY_DATAGRAMS_PER_CYCLE datagrams. self->from is its sender and
  *  self->waited_us the time that it waited for the cycle.
  *  @return false: there is none */
-bool frame_receiver_next(frame_receiver_t *self, const gateway_settings_t *settings, const frame_receiver_io_t *io,
-                         uint64_t now_us, frame_t *frame);
+bool frame_receiver_next(frame_receiver_t *self, const settings_t *settings, const frame_receiver_io_t *io, uint64_t now_us,
+                         frame_t *frame);
 
 /** Counts and logs a valid frame that is not followed.
  *  @param error FRAME_ERR_PLATFORM or FRAME_ERR_MASK_FORM

@@ -31,49 +31,12 @@ static void clear_reports(gateway_t *self)
     }
 }
 
-/* What may change in operation. */
-static void keep_changeable(gateway_settings_t *own, const settings_t *settings)
-{
-    own->silence_hold_ms = settings->silence_hold_ms;
-    own->silence_neutral_ms = settings->silence_neutral_ms;
-    own->silence_settle_ms = settings->silence_settle_ms;
-    own->takeover_ms = settings->takeover_ms;
-    own->priority = settings->priority;
-    own->dialect = settings->dialect;
-    own->relay_safe_mask = settings->relay_safe_mask;
-    own->relay_safe_after_ms = settings->relay_safe_after_ms;
-    own->following_error_mm_q16 = settings->following_error_mm_q16;
-    own->power_settle_ms = settings->power_settle_ms;
-    own->mask_policy = settings->mask_policy;
-    own->confirm_jump_mm_q16 = settings->confirm_jump_mm_q16;
-    own->confirm_jump_deg_q16 = settings->confirm_jump_deg_q16;
-}
-
-static void keep_settings(gateway_settings_t *own, const settings_t *settings)
-{
-    own->cycle_us = settings->cycle_us;
-    own->engage = settings->engage;
-    own->auto_frames = settings->auto_frames;
-    for (unsigned i = 0; i < AXES_MAX; i++) {
-        const axis_settings_t *axis = &settings->axis[i];
-        own->axis[i] = (axis_input_t){axis->sign, axis->scale_q16, axis->offset_q16, axis->wrap, axis->min_q16, axis->max_q16};
-    }
-    own->has_angle = settings->has_angle;
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        own->stroke_mm_q16[i] = settings->stroke_mm_q16[i];
-    }
-    own->relays = settings->relays;
-    own->healthy = settings->healthy;
-    keep_changeable(own, settings);
-}
-
 hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gateway_io_t *io)
 {
     if (!is_io_valid(io)) {
         return HV_ERR_ARG;
     }
-    *self = (gateway_t){.io = *io, .is_tracking_actual = true};
-    keep_settings(&self->settings, settings);
+    *self = (gateway_t){.settings = settings, .io = *io, .is_tracking_actual = true};
     clear_reports(self);
     gateway_restart_auto(self);
     const hv_status_t status = motion_init(&self->motion, settings);
@@ -95,13 +58,14 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
 
 void gateway_restart_auto(gateway_t *self)
 {
-    const gateway_settings_t *own = &self->settings;
-    auto_engage_init(&self->auto_engage, own->engage == ENGAGE_AUTO, own->cycle_us, own->auto_frames);
+    const settings_t *settings = self->settings;
+    auto_engage_init(&self->auto_engage, settings->engage == ENGAGE_AUTO, settings->cycle_us, settings->auto_frames);
 }
 
 void gateway_save(const gateway_t *self, gateway_t *out)
 {
     *out = *self;
+    out->settings = NULL;
     out->io = (gateway_io_t){.udp = {NULL, NULL}};
     out->snapshot.fault_report = (drive_report_t){.phase = NULL};
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
@@ -111,10 +75,12 @@ void gateway_save(const gateway_t *self, gateway_t *out)
 
 void gateway_resume(gateway_t *self, const gateway_t *saved)
 {
+    const settings_t *settings = self->settings;
     const gateway_io_t io = self->io;
     *self = *saved;
+    self->settings = settings;
     self->io = io;
-    frame_scanner_init(&self->receiver.scanner, self->settings.dialect); /* it starts anew with every datagram */
+    frame_scanner_init(&self->receiver.scanner, self->settings->dialect); /* it starts anew with every datagram */
     clear_reports(self);
 }
 
@@ -130,10 +96,7 @@ void gateway_start_settled(gateway_t *self)
 
 void gateway_reload(gateway_t *self, const settings_t *settings)
 {
-    if (self->settings.mask_policy != settings->mask_policy) {
-        mask_guard_restart(&self->sender.mask_guard);
-    }
-    keep_changeable(&self->settings, settings);
+    self->settings = settings;
     motion_set_spike_gate(&self->motion, settings->spike_gate);
 }
 
@@ -160,8 +123,8 @@ void gateway_note_late(gateway_t *self, uint32_t cycles)
 {
     uint32_t *late = &self->snapshot.counters.late_cycles;
     *late = cycles < UINT32_MAX - *late ? *late + cycles : UINT32_MAX; /* a count that began anew would look like none late */
-    self->service.late_us += (uint64_t)cycles * self->settings.cycle_us;
-    self->is_late |= cycles > self->settings.healthy.late_cycles;
+    self->service.late_us += (uint64_t)cycles * self->settings->cycle_us;
+    self->is_late |= cycles > self->settings->healthy.late_cycles;
 }
 
 void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
@@ -175,7 +138,7 @@ void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
 static bool is_hold_young(const gateway_t *self, uint64_t now_us)
 {
     return self->supervisor.state == STATE_HOLD && self->supervisor.interrupted == STATE_ENGAGED &&
-           now_us - self->state_since_us < (uint64_t)self->settings.relay_safe_after_ms * 1000;
+           now_us - self->state_since_us < (uint64_t)self->settings->relay_safe_after_ms * 1000;
 }
 
 /* Only an engaged sender commands the relays, or a hand in service; the safe mask holds everywhere else. */
@@ -185,12 +148,12 @@ static void write_relays(gateway_t *self, uint64_t now_us)
     const bool is_serving = self->supervisor.state == STATE_SERVICE;
     const uint16_t wanted = is_sender_heard ? self->sender.frame_mask
                             : is_serving    ? service_relays(self)
-                                            : self->settings.relay_safe_mask;
+                                            : self->settings->relay_safe_mask;
     const relay_output_in_t in = {.wanted_mask = wanted,
-                                  .is_safe = wanted == self->settings.relay_safe_mask && !is_sender_heard,
+                                  .is_safe = wanted == self->settings->relay_safe_mask && !is_sender_heard,
                                   .is_well = sequencer_is_well(self),
                                   .was_unknown = self->snapshot.is_relays_unknown};
-    const relay_output_out_t out = relay_output_step(&self->relay_output, &self->settings, &self->io, &in, now_us);
+    const relay_output_out_t out = relay_output_step(&self->relay_output, self->settings, &self->io, &in, now_us);
     self->is_late = false;
     self->snapshot.is_healthy = out.is_healthy;
     self->snapshot.is_relays_unknown = out.is_unknown;
@@ -214,7 +177,7 @@ static void receive_frames(gateway_t *self, uint64_t now_us)
     frame_t frame;
     frame_receiver_begin(&self->receiver);
     sender_begin(self, now_us);
-    while (frame_receiver_next(&self->receiver, &self->settings, &io, now_us, &frame)) {
+    while (frame_receiver_next(&self->receiver, self->settings, &io, now_us, &frame)) {
         sender_take(self, &frame, now_us);
     }
     sender_end(self, now_us);
@@ -265,7 +228,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->stream = stream_report(motion_stream(&self->motion));
     s->stream_delay_us = s->stream.delay_us;
     s->owner = self->sender.owner;
-    s->mask_habit = mask_guard_habit(&self->sender.mask_guard, self->settings.mask_policy);
+    s->mask_habit = mask_guard_habit(&self->sender.mask_guard, self->settings->mask_policy);
     service_publish(self);
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
     s->counters.relay_cut = self->relay_output.policy.cut_count;
@@ -275,7 +238,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->counters.unconfirmed = self->sender.confirm.dropped;
     s->counters.stretched = motion_stretched_count(&self->motion);
     for (unsigned i = 0; i < drives_count(self->io.drives); i++) {
-        wear_step(&s->wear[i], &s->drive[i], self->settings.cycle_us);
+        wear_step(&s->wear[i], &s->drive[i], self->settings->cycle_us);
     }
     plate_take(&s->plate, motion_kin(&self->motion), s->drive, &s->sent, now_us);
     s->cycle++;

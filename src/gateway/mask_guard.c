@@ -99,9 +99,10 @@ bool mask_guard_allows(mask_policy_t policy, const frame_t *frame)
 
 bool mask_guard_passes(mask_guard_t *self, mask_policy_t policy, const frame_t *frame, uint64_t now_us)
 {
-    if (now_us - self->last_us >= MASK_GUARD_GAP_US) {
+    if (now_us - self->last_us >= MASK_GUARD_GAP_US || self->policy != (uint8_t)policy) {
         mask_guard_restart(self);
     }
+    self->policy = (uint8_t)policy;
     self->is_quick = now_us - self->last_us < MASK_GUARD_QUICK_US;
     self->last_us = now_us;
     return policy != MASK_LEARNT || frame->is_timed || passes_learnt(self, frame->has_mask);
@@ -131,6 +132,9 @@ mask_habit_t mask_guard_habit(const mask_guard_t *self, mask_policy_t policy)
 {
     if (policy != MASK_LEARNT) {
         return policy == MASK_ALWAYS ? MASK_SENT : policy == MASK_NEVER ? MASK_NONE : MASK_UNKNOWN;
+    }
+    if (self->policy != (uint8_t)policy) {
+        return MASK_UNKNOWN;
     }
     if (self->is_digits) {
         return MASK_DIGITS;

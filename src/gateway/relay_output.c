@@ -38,7 +38,7 @@ static void verify(relay_output_t *self, const gateway_io_t *io, bool was_unknow
     }
 }
 
-relay_output_out_t relay_output_step(relay_output_t *self, const gateway_settings_t *settings, const gateway_io_t *io,
+relay_output_out_t relay_output_step(relay_output_t *self, const settings_t *settings, const gateway_io_t *io,
                                      const relay_output_in_t *in, uint64_t now_us)
 {
     relay_output_out_t out = {.is_refused = false};

@@ -22,7 +22,7 @@ typedef struct {
 
 /** Applies the limits of time to the wanted mask, adds the healthy pulse and writes the relays if something has changed.
  *  Logs when the relays or the line of the pulse can no longer be written, and when they can again. */
-relay_output_out_t relay_output_step(relay_output_t *self, const gateway_settings_t *settings, const gateway_io_t *io,
+relay_output_out_t relay_output_step(relay_output_t *self, const settings_t *settings, const gateway_io_t *io,
                                      const relay_output_in_t *in, uint64_t now_us);
 
 #endif

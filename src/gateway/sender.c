@@ -31,11 +31,11 @@ static bool has_relay_mask(gateway_t *self, const frame_t *frame, uint64_t now_u
 {
     mask_guard_t *guard = &self->sender.mask_guard;
     const bool was_digits = guard->is_digits;
-    if (!frame->has_mask || mask_guard_follows(guard, self->settings.mask_policy, frame->relay_mask)) {
+    if (!frame->has_mask || mask_guard_follows(guard, self->settings->mask_policy, frame->relay_mask)) {
         return frame->has_mask;
     }
     if (guard->is_digits) {
-        self->sender.frame_mask = self->settings.relay_safe_mask;
+        self->sender.frame_mask = self->settings->relay_safe_mask;
     }
     if (guard->is_digits && !was_digits) {
         log_digits(self, now_us);
@@ -46,7 +46,7 @@ static bool has_relay_mask(gateway_t *self, const frame_t *frame, uint64_t now_u
 /* What the sender asks of the relays; bits that no relay has are counted. */
 static void take_mask(gateway_t *self, const frame_t *frame)
 {
-    const uint16_t wired = (uint16_t)((1u << self->settings.relays.count) - 1u);
+    const uint16_t wired = (uint16_t)((1u << self->settings->relays.count) - 1u);
     self->snapshot.counters.relay_missing += (frame->relay_mask & FRAME_RELAY_MASK & ~(unsigned)wired) != 0;
     self->sender.frame_mask = frame->relay_mask & wired;
 }
@@ -136,7 +136,7 @@ HV_OWN_FRAME static void log_other(gateway_t *self, const hal_udp_peer_t *from, 
 static void keep_rotation(gateway_t *self, const pose_t *pose)
 {
     for (unsigned i = AXIS_ROLL; i <= AXIS_YAW; i++) {
-        const axis_input_t *axis = &self->settings.axis[i];
+        const axis_settings_t *axis = &self->settings->axis[i];
         self->sender.rotation_deg_q32[i] = fx_clamp(pose->axis_q32[i], q32_from_q16(axis->min_q16), q32_from_q16(axis->max_q16));
     }
 }
@@ -162,7 +162,7 @@ HV_OWN_FRAME static void change_owner(gateway_t *self, uint64_t now_us)
 /* Whether the frame is of the sender that drives; keeps who that is. */
 static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t now_us)
 {
-    const gateway_settings_t *settings = &self->settings;
+    const settings_t *settings = self->settings;
     const bool was_port_fixed = self->sender.owner.is_port_fixed;
     const owner_verdict_t verdict = owner_judge(&self->sender.owner, from, (uint64_t)settings->takeover_ms * 1000,
                                                 &settings->priority, motion_timed_end_us(&self->motion), now_us);
@@ -184,15 +184,15 @@ static bool is_followed(gateway_t *self, const hal_udp_peer_t *from, uint64_t no
 static bool is_of_its_form(gateway_t *self, const frame_t *frame, const hal_udp_peer_t *from, uint64_t now_us)
 {
     self->sender.is_known = owner_is_known(&self->sender.owner, from);
-    return mask_guard_allows(self->settings.mask_policy, frame) &&
-           (!self->sender.is_known || mask_guard_passes(&self->sender.mask_guard, self->settings.mask_policy, frame, now_us));
+    return mask_guard_allows(self->settings->mask_policy, frame) &&
+           (!self->sender.is_known || mask_guard_passes(&self->sender.mask_guard, self->settings->mask_policy, frame, now_us));
 }
 
 /* The first frame of a sender, or of a new port of it: another program. What was learnt of the last one is not true of it. */
 static void begin_sender(gateway_t *self, const frame_t *frame, uint64_t now_us)
 {
     mask_guard_restart(&self->sender.mask_guard);
-    (void)mask_guard_passes(&self->sender.mask_guard, self->settings.mask_policy, frame, now_us);
+    (void)mask_guard_passes(&self->sender.mask_guard, self->settings->mask_policy, frame, now_us);
     self->sender.rotations = (rotations_t){.is_there = {false}};
 }
 
@@ -200,9 +200,10 @@ static void begin_sender(gateway_t *self, const frame_t *frame, uint64_t now_us)
  * another one may have asked for it. */
 static void watch_mask_habit(gateway_t *self)
 {
-    if (self->settings.takeover_ms != 0 && mask_guard_habit(&self->sender.mask_guard, self->settings.mask_policy) == MASK_NONE &&
-        self->sender.frame_mask != self->settings.relay_safe_mask) {
-        self->sender.frame_mask = self->settings.relay_safe_mask;
+    if (self->settings->takeover_ms != 0 &&
+        mask_guard_habit(&self->sender.mask_guard, self->settings->mask_policy) == MASK_NONE &&
+        self->sender.frame_mask != self->settings->relay_safe_mask) {
+        self->sender.frame_mask = self->settings->relay_safe_mask;
         hal_log_write(self->io.log, HAL_LOG_WARNING,
                       "frames here have no relay masks any more: relays go to safe_mask ([udp] mask = any keeps them)");
     }
@@ -249,7 +250,8 @@ static bool take_target(gateway_t *self, const motion_target_t *target, frame_co
 /* Where the platform is, as a target of that space. */
 static motion_target_t here(const gateway_t *self, motion_space_t space)
 {
-    motion_target_t target = {.space = space, .has_angle = self->settings.has_angle, .angle_deg_q32 = self->output.angle_deg_q32};
+    motion_target_t target = {
+        .space = space, .has_angle = self->settings->has_angle, .angle_deg_q32 = self->output.angle_deg_q32};
     for (unsigned i = 0; i < POSE_AXES; i++) {
         target.value_q32[i] = space == MOTION_POSE ? self->output.sent.axis_q32[i] : self->output.extension_mm_q32[i];
     }
@@ -259,12 +261,12 @@ static motion_target_t here(const gateway_t *self, motion_space_t space)
 /* False for a far jump that waits for a second frame. */
 HV_OWN_FRAME static bool is_confirmed(gateway_t *self, const motion_target_t *target, uint64_t now_us)
 {
-    const bool is_asked_for = self->settings.confirm_jump_mm_q16 != 0 || self->settings.confirm_jump_deg_q16 != 0;
+    const bool is_asked_for = self->settings->confirm_jump_mm_q16 != 0 || self->settings->confirm_jump_deg_q16 != 0;
     if (!is_asked_for || self->supervisor.state != STATE_ENGAGED) {
         return true;
     }
-    const confirm_distance_t distance = {q32_from_q16(self->settings.confirm_jump_mm_q16),
-                                         q32_from_q16(self->settings.confirm_jump_deg_q16)};
+    const confirm_distance_t distance = {q32_from_q16(self->settings->confirm_jump_mm_q16),
+                                         q32_from_q16(self->settings->confirm_jump_deg_q16)};
     const motion_target_t from = here(self, target->space);
     return confirm_passes(&self->sender.confirm, &distance, &from, target, now_us);
 }
@@ -297,7 +299,7 @@ static bool follow(gateway_t *self, const motion_target_t *target, frame_command
 HV_OWN_FRAME static void watch_turn(gateway_t *self, const frame_t *frame, uint64_t now_us)
 {
     const rotations_t now = target_rotations(frame);
-    const unsigned axis = target_jumps_by_turn(&self->settings, &self->sender.rotations, &now);
+    const unsigned axis = target_jumps_by_turn(self->settings, &self->sender.rotations, &now);
     const bool is_stream = now_us - self->snapshot.last_frame_us < STREAM_PERIOD_US;
     const bool is_due = self->sender.turn_logged_us == 0 || now_us - self->sender.turn_logged_us >= REJECT_LOG_INTERVAL_US;
     self->sender.rotations = now;
@@ -325,13 +327,13 @@ static motion_target_t target_from(gateway_t *self, const frame_t *frame, uint64
         last_deg_q32[i] = self->sender.rotation_deg_q32[i];
     }
     watch_turn(self, frame, now_us);
-    return target_of(&self->settings, last_deg_q32, frame);
+    return target_of(self->settings, last_deg_q32, frame);
 }
 
 void sender_take(gateway_t *self, const frame_t *frame, uint64_t now_us)
 {
     const hal_udp_peer_t *from = &self->receiver.from;
-    const char *missing = target_missing(frame->command, kin_cylinders(motion_kin(&self->motion)), self->settings.has_angle);
+    const char *missing = target_missing(frame->command, kin_cylinders(motion_kin(&self->motion)), self->settings->has_angle);
     if (missing != NULL) {
         refuse(self, frame->command, FRAME_ERR_PLATFORM, missing, from, now_us);
         return;

@@ -209,13 +209,13 @@ void sequencer_after_frames(gateway_t *self, uint64_t now_us)
 {
     const uint64_t end_us = motion_timed_end_us(&self->motion);
     const uint64_t since_us = end_us > self->sender.start_us ? end_us : self->sender.start_us;
-    if (has_passed(now_us, since_us, self->settings.silence_hold_ms)) {
+    if (has_passed(now_us, since_us, self->settings->silence_hold_ms)) {
         actions_event(self, EVENT_SILENCE_HOLD, now_us);
     }
-    if (has_passed(now_us, since_us, self->settings.silence_neutral_ms)) {
+    if (has_passed(now_us, since_us, self->settings->silence_neutral_ms)) {
         actions_event(self, EVENT_SILENCE_NEUTRAL, now_us);
     }
-    if (has_passed(now_us, since_us, self->settings.silence_settle_ms)) {
+    if (has_passed(now_us, since_us, self->settings->silence_settle_ms)) {
         actions_event(self, EVENT_SILENCE_SETTLE, now_us);
     }
     if (self->is_tracking_actual) {

@@ -33,7 +33,7 @@ static uint64_t hand_us(const gateway_t *self, uint64_t now_us)
 
 uint64_t gateway_tick_age(const gateway_t *self, uint64_t tick_us)
 {
-    const uint64_t next_us = self->snapshot.now_us + self->settings.cycle_us; /* this cycle's tick has not been told yet */
+    const uint64_t next_us = self->snapshot.now_us + self->settings->cycle_us; /* this cycle's tick has not been told yet */
     return tick_us <= self->snapshot.service.tick_us ? hand_us(self, next_us) - tick_us : UINT64_MAX;
 }
 
@@ -191,7 +191,7 @@ fault_code_t service_step(gateway_t *self, uint64_t now_us)
 
 uint16_t service_relays(const gateway_t *self)
 {
-    const uint16_t safe = self->settings.relay_safe_mask;
+    const uint16_t safe = self->settings->relay_safe_mask;
     return self->service.doing == SERVICE_RELAY ? (uint16_t)(safe ^ 1u << (self->service.axis - 1u)) : safe;
 }
 
@@ -323,7 +323,7 @@ static service_answer_t excite(gateway_t *self, const service_request_t *request
     if (axes == 0 || (is_posed && (request->axis < 1 || request->axis > POSE_AXES))) {
         return SERVICE_NO_SUCH;
     }
-    if (!excitation_is_allowed(&request->signal, self->settings.cycle_us)) {
+    if (!excitation_is_allowed(&request->signal, self->settings->cycle_us)) {
         return SERVICE_BAD_SIGNAL;
     }
     if (!are_up(self, axes)) {
@@ -363,9 +363,9 @@ static service_answer_t home(gateway_t *self, const service_request_t *request, 
 
 static service_answer_t take_relay(const gateway_t *self, uint8_t relay)
 {
-    return relay < 1 || relay > self->settings.relays.count ? SERVICE_NO_SUCH
-           : relay == self->settings.healthy.relay          ? SERVICE_PULSE
-                                                            : SERVICE_DONE;
+    return relay < 1 || relay > self->settings->relays.count ? SERVICE_NO_SUCH
+           : relay == self->settings->healthy.relay          ? SERVICE_PULSE
+                                                             : SERVICE_DONE;
 }
 
 static service_answer_t start(gateway_t *self, const service_request_t *request, uint64_t now_us)

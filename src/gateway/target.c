@@ -40,14 +40,14 @@ const char *target_missing(frame_command_t command, unsigned cylinders, bool has
 }
 
 /* The value in the platform's own axis: sign * scale * sent + offset. */
-static q32_t to_axis(const axis_input_t *axis, q16_t sent_q16)
+static q32_t to_axis(const axis_settings_t *axis, q16_t sent_q16)
 {
     const q32_t scaled_q32 = fx_mul_shift(q32_from_q16(sent_q16), axis->scale_q16, 16);
     return (axis->sign < 0 ? -scaled_q32 : scaled_q32) + q32_from_q16(axis->offset_q16);
 }
 
 /* The same angle some whole turns nearer, if it is beyond a limit and those bring it within both. */
-static q32_t turned_into_limits(const axis_input_t *axis, q32_t turn_q32, q32_t angle_q32)
+static q32_t turned_into_limits(const axis_settings_t *axis, q32_t turn_q32, q32_t angle_q32)
 {
     const q32_t min_q32 = q32_from_q16(axis->min_q16);
     const q32_t max_q32 = q32_from_q16(axis->max_q16);
@@ -59,7 +59,7 @@ static q32_t turned_into_limits(const axis_input_t *axis, q32_t turn_q32, q32_t 
 
 /* If the shorter way is taken: the angle that is whole turns away and nearest to the last one that was asked for. Not to where
  * the axis is: it may be more than half a turn behind, and would change its direction with every frame. */
-static q32_t unwrap(const axis_input_t *axis, q32_t turn_q32, q32_t last_q32, q32_t angle_q32)
+static q32_t unwrap(const axis_settings_t *axis, q32_t turn_q32, q32_t last_q32, q32_t angle_q32)
 {
     if (axis->wrap == ANGLE_AS_SENT || turn_q32 == 0) {
         return angle_q32;
@@ -73,7 +73,7 @@ static q32_t unwrap(const axis_input_t *axis, q32_t turn_q32, q32_t last_q32, q3
     return turned_into_limits(axis, turn_q32, last_q32 + travel_q32);
 }
 
-motion_target_t target_of(const gateway_settings_t *settings, const q32_t last_deg_q32[AXES_MAX], const frame_t *frame)
+motion_target_t target_of(const settings_t *settings, const q32_t last_deg_q32[AXES_MAX], const frame_t *frame)
 {
     const bool is_pose = k_slots[frame->command][0] < SLOT_CYLINDER;
     motion_target_t target = {
@@ -91,10 +91,10 @@ motion_target_t target_of(const gateway_settings_t *settings, const q32_t last_d
         target.value_q32[i] = to_axis(&settings->axis[i], axis_q16[i]);
     }
     for (unsigned i = AXIS_ROLL; is_pose && i <= AXIS_YAW; i++) { /* a turn of the sender's, which its scale makes another one */
-        const axis_input_t *axis = &settings->axis[i];
+        const axis_settings_t *axis = &settings->axis[i];
         target.value_q32[i] = unwrap(axis, fx_mul_shift(TURN_Q32, axis->scale_q16, 16), last_deg_q32[i], target.value_q32[i]);
     }
-    const axis_input_t *motor = &settings->axis[AXIS_ANGLE];
+    const axis_settings_t *motor = &settings->axis[AXIS_ANGLE];
     target.has_angle = needs_angle(frame->command);
     target.angle_deg_q32 = unwrap(motor, TURN_Q32, last_deg_q32[AXIS_ANGLE], to_axis(motor, axis_q16[AXIS_ANGLE]));
     return target;
@@ -116,7 +116,7 @@ rotations_t target_rotations(const frame_t *frame)
     return rotations;
 }
 
-unsigned target_jumps_by_turn(const gateway_settings_t *settings, const rotations_t *before, const rotations_t *now)
+unsigned target_jumps_by_turn(const settings_t *settings, const rotations_t *before, const rotations_t *now)
 {
     for (unsigned k = 0; k < ROTATIONS; k++) {
         const q32_t jump_q32 = fx_abs(q32_from_q16(now->deg_q16[k]) - q32_from_q16(before->deg_q16[k]));

@@ -11,13 +11,13 @@ const char *target_missing(frame_command_t command, unsigned cylinders, bool has
 
 /** Converts the values of a frame to axes of the platform or to extensions.
  *  @param last_deg_q32 the last rotations and angle that were asked for, by axis; `wrap` may relate the new ones to them */
-motion_target_t target_of(const gateway_settings_t *settings, const q32_t last_deg_q32[AXES_MAX], const frame_t *frame);
+motion_target_t target_of(const settings_t *settings, const q32_t last_deg_q32[AXES_MAX], const frame_t *frame);
 
 /** What a frame says of the axes that turn. */
 rotations_t target_rotations(const frame_t *frame);
 
 /** The first axis that is taken as sent and whose value is nearly a turn from the one before; AXES_MAX: none. */
-unsigned target_jumps_by_turn(const gateway_settings_t *settings, const rotations_t *before, const rotations_t *now);
+unsigned target_jumps_by_turn(const settings_t *settings, const rotations_t *before, const rotations_t *now);
 
 /** Copies the values of a frame to s->received_q16, before sign, scale, offset, intensity and limits. */
 void target_received(snapshot_t *s, const frame_t *frame);

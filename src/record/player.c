@@ -284,12 +284,7 @@ bool player_settle(player_t *self, const settings_t *settings)
 void player_resume(player_t *self, const session_t *saved)
 {
     q32_t setpoint_q32[DRIVES_MAX] = {0};
-    gateway_resume(&self->session.gateway, &saved->gateway);
-    self->session.cycle_us = saved->cycle_us;
-    self->session.now_us = saved->now_us;
-    self->session.has_zero = saved->has_zero;
-    self->session.zero_us = saved->zero_us;
-    self->session.late_cycles = saved->late_cycles;
+    session_resume(&self->session, saved);
     self->is_before_zero = !saved->has_zero;
     const snapshot_t *snapshot = gateway_snapshot(&self->session.gateway);
     for (unsigned i = 0; i < snapshot->cylinders; i++) {

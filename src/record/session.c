@@ -5,12 +5,28 @@
 
 hv_status_t session_init(session_t *self, const settings_t *settings, const gateway_io_t *io)
 {
-    self->cycle_us = settings->cycle_us;
+    self->settings = *settings;
     self->now_us = settings->cycle_us;
     self->has_zero = false;
     self->zero_us = 0;
     self->late_cycles = 0;
-    return gateway_init(&self->gateway, settings, io);
+    return gateway_init(&self->gateway, &self->settings, io);
+}
+
+void session_reload(session_t *self, const settings_t *settings)
+{
+    self->settings = *settings;
+    gateway_reload(&self->gateway, &self->settings);
+}
+
+void session_resume(session_t *self, const session_t *saved)
+{
+    gateway_resume(&self->gateway, &saved->gateway);
+    self->settings = saved->settings;
+    self->now_us = saved->now_us;
+    self->has_zero = saved->has_zero;
+    self->zero_us = saved->zero_us;
+    self->late_cycles = saved->late_cycles;
 }
 
 bool session_cycle(session_t *self)
@@ -23,7 +39,7 @@ bool session_cycle(session_t *self)
         self->has_zero = true;
         self->zero_us = self->now_us;
     }
-    self->now_us += self->cycle_us;
+    self->now_us += self->settings.cycle_us;
     return is_zero;
 }
 

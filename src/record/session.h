@@ -11,8 +11,8 @@
 /** A running gateway. */
 typedef struct {
     gateway_t gateway;
-    uint32_t cycle_us;
-    uint64_t now_us; /**< of the coming cycle; the first one is at cycle_us, because 0 means "never" to the gateway */
+    settings_t settings; /**< in force */
+    uint64_t now_us;     /**< of the coming cycle; the first one is at cycle_us, because 0 means "never" to the gateway */
     bool has_zero;
     uint64_t zero_us;
     uint32_t late_cycles; /**< counted up to the last row */
@@ -20,6 +20,12 @@ typedef struct {
 
 /** @return as gateway_init */
 hv_status_t session_init(session_t *self, const settings_t *settings, const gateway_io_t *io) HV_MUST_CHECK;
+
+/** As gateway_reload(); copied. */
+void session_reload(session_t *self, const settings_t *settings);
+
+/** As gateway_resume(), with the settings that were in force. */
+void session_resume(session_t *self, const session_t *saved);
 
 /** One cycle.
  *  @return true where it is time zero */

@@ -150,19 +150,19 @@ static gateway_io_t io_of(bench_gateway_t *b)
 void bench_gateway_start(bench_gateway_t *self)
 {
     static const bench_texts_t k_zero = {.text = {"@A6:0,0,0,0,0,0,0#"}, .length = {18}, .count = 1};
-    const settings_t settings = rig_hexapod();
     const gateway_io_t io = io_of(self);
+    self->settings = rig_hexapod();
     self->texts = &k_zero;
     for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        self->setpoint_q32[i] = q32_from_q16(settings.settled_extension_mm_q16);
+        self->setpoint_q32[i] = q32_from_q16(self->settings.settled_extension_mm_q16);
     }
-    if (gateway_init(&self->gateway, &settings, &io) != HV_OK) {
+    if (gateway_init(&self->gateway, &self->settings, &io) != HV_OK) {
         bench_fail("the gateway does not start");
     }
     gateway_start_settled(&self->gateway);
     for (unsigned i = 0; i < RISE_CYCLES; i++) {
         self->due = i == RISE_CYCLES / 2;
-        gateway_cycle(&self->gateway, self->now_us += settings.cycle_us);
+        gateway_cycle(&self->gateway, self->now_us += self->settings.cycle_us);
     }
     if (self->gateway.snapshot.state != STATE_ENGAGED || !motion_is_at_rest(&self->gateway.motion)) {
         bench_fail("the gateway is not engaged and at rest");

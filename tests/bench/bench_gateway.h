@@ -18,6 +18,7 @@ typedef struct {
 
 typedef struct {
     gateway_t gateway;
+    settings_t settings;
     uint64_t now_us;
     q32_t setpoint_q32[DRIVES_MAX];
     const bench_texts_t *texts; /**< what arrives */

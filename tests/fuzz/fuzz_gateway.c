@@ -49,8 +49,8 @@ static void start(uint8_t choice)
     m_pair = m_start[choice % PLATFORMS];
     const frame_dialect_t dialect = (choice & 2) != 0 ? FRAME_LENIENT : FRAME_V3;
     const q16_t confirm_mm_q16 = (choice & 4) != 0 ? 20 * 65536 : 0;
-    m_pair.all.gateway.settings.dialect = m_pair.good.gateway.settings.dialect = dialect;
-    m_pair.all.gateway.settings.confirm_jump_mm_q16 = m_pair.good.gateway.settings.confirm_jump_mm_q16 = confirm_mm_q16;
+    m_pair.all.settings.dialect = m_pair.good.settings.dialect = dialect;
+    m_pair.all.settings.confirm_jump_mm_q16 = m_pair.good.settings.confirm_jump_mm_q16 = confirm_mm_q16;
 }
 
 static void push(rig_t *rig, unsigned host, const void *bytes, size_t length)
@@ -74,7 +74,7 @@ static uint32_t send_both(unsigned host, const uint8_t *bytes, size_t length, ui
     if (length > GATEWAY_DATAGRAM_MAX) {
         return 0;
     }
-    frame_scanner_init(&scanner, m_pair.all.gateway.settings.dialect);
+    frame_scanner_init(&scanner, m_pair.all.settings.dialect);
     while ((event = frame_next(&scanner, bytes, length, &position, &frame, &reject)) != FRAME_EVENT_NONE) {
         events++;
         if (event == FRAME_EVENT_FRAME) {

@@ -274,7 +274,7 @@ void rig_start(rig_t *self, const settings_t *settings, bool is_settled)
                              .inputs = sim_inputs_hal(&self->inputs),
                              .log = sim_log_hal(&self->log),
                              .healthy = sim_relays_hal(&self->healthy)};
-    if (gateway_init(&self->gateway, settings, &io) != HV_OK) {
+    if (gateway_init(&self->gateway, &self->settings, &io) != HV_OK) {
         fail("gateway_init");
     }
     if (is_settled) {

@@ -476,7 +476,6 @@ def replays_a_forged_state_in_a_cage(bench):
     text = min(directory.glob("*/frames")).read_text(encoding="utf-8")
     head, about, _, digits = re.search(r"(?m)^(\S+ !state )(\S+ [0-9a-f]{16} )([0-9A-F]{8}) ([0-9A-F]+)$", text).groups()
     state = bytes.fromhex(digits)
-    assert struct.unpack_from("=I", state)[0] == 1000
     end = f"{float(head.split()[0]) + 1000:.3f} !end\n"
     trace = bench.folder / "forged.csv"
 
