@@ -60,6 +60,13 @@ typedef struct {
     uint16_t gap_cycles[AUTO_ENGAGE_FRAMES_MAX]; /**< cycles before each of these; at most 2000 in a second */
 } auto_engage_t;
 
+/** Lines of the log about the same thing; members are private to src/gateway. */
+typedef struct {
+    uint64_t last_us; /**< of the last line; 0 = never */
+    uint32_t logged;  /**< things that a line told of or counted */
+    uint32_t events;  /**< things, where nobody else counts them */
+} log_limit_t;
+
 /** The last log line about a drive. Limits the rate, so that a drive that comes and goes does not fill the log. */
 typedef struct {
     uint64_t next_us; /**< when the next line may be written; a burst may be earlier */
@@ -70,9 +77,8 @@ typedef struct {
 
 /** Log lines about what the drives report; members are private to src/gateway. */
 typedef struct {
-    gateway_told_t told_of[DRIVES_MAX];       /**< the last line about the report of a drive */
-    uint64_t emergency_logged_us[DRIVES_MAX]; /**< 0 = never */
-    uint32_t emergencies_logged[DRIVES_MAX];  /**< emergencies of a drive that a line reported or counted */
+    gateway_told_t told_of[DRIVES_MAX]; /**< the last line about the report of a drive */
+    log_limit_t emergency_log[DRIVES_MAX];
 } reports_t;
 
 /** From datagrams to frames; members are private to src/gateway. */
@@ -85,8 +91,7 @@ typedef struct {
     uint32_t waited_us;  /**< time that it waited for its cycle */
     unsigned datagrams;  /**< received in this cycle */
     bool is_open;        /**< the present datagram may hold further frames */
-    uint64_t reject_logged_us[FRAME_ERRORS];
-    uint32_t reject_suppressed[FRAME_ERRORS];
+    log_limit_t reject_log[FRAME_ERRORS];
 } frame_receiver_t;
 
 /** Roll, pitch, yaw and the angle of the motor of a frame, as sent. */
@@ -98,27 +103,21 @@ typedef struct {
 /** The sender in control and what it asks for; members are private to src/gateway. */
 typedef struct {
     owner_t owner;
-    uint64_t start_us;   /**< start of the silence timer: last accepted frame or entry into ENGAGED */
-    uint16_t frame_mask; /**< relay mask of the sender */
+    owner_t other;          /**< the last one that did not drive */
+    uint64_t start_us;      /**< start of the silence timer: last accepted frame or entry into ENGAGED */
+    uint64_t last_frame_us; /**< accepted; 0 = none */
+    uint16_t frame_mask;    /**< relay mask of the sender */
     mask_guard_t mask_guard;
-    bool is_known; /**< the frame being taken is of the sender that drives, and of a port that has been heard */
     confirm_t confirm;
     unsigned targets; /**< of this cycle */
     bool has_newest;  /**< newest is of this cycle, and motion has not got it yet */
     motion_target_t newest;
     frame_command_t newest_command;
     hal_udp_peer_t newest_from;
-    uint64_t other_logged_us; /**< 0 = never */
-    uint32_t other_suppressed;
-    uint64_t spike_logged_us;
-    uint32_t spikes_logged;                /**< spikes that are already in the log */
     q32_t rotation_deg_q32[AXIS_YAW + 1u]; /**< of the last pose that was followed, within the limits */
     rotations_t rotations;                 /**< of the last frame, as sent */
-    uint64_t turn_logged_us;
-    uint64_t digits_logged_us;
-    uint64_t jump_logged_us;
-    uint32_t jumps_logged; /**< likewise */
-} gateway_sender_t;
+    log_limit_t other_log, spike_log, jump_log, turn_log, digits_log;
+} sender_t;
 
 /** Relays and the healthy pulse as they were written; members are private to src/gateway. */
 typedef struct {
@@ -138,7 +137,7 @@ typedef struct {
     motion_output_t output;
     supervisor_t supervisor;
     frame_receiver_t receiver;
-    gateway_sender_t sender;
+    sender_t sender;
     relay_output_t relay_output;
     reports_t reports;
     snapshot_t snapshot;
@@ -162,8 +161,8 @@ typedef struct {
     uint64_t end_since_us;   /**< when a shutdown reached OFF, FAULT or ESTOP and the drives were told; 0 = not yet */
     uint64_t state_since_us; /**< when the state was entered */
     service_t service;
-    bool is_late;                /**< the next cycle is too late for the healthy pulse */
-    uint64_t singular_logged_us; /**< 0 = never */
+    bool is_late; /**< the next cycle is too late for the healthy pulse */
+    log_limit_t singular_log;
 } gateway_t;
 
 /** Prepares a gateway in OFF. Touches no device.

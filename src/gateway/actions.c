@@ -4,6 +4,7 @@
 #include "actions.h"
 
 #include "heave/text.h"
+#include "sender.h"
 #include "service.h"
 
 #define ENABLE_TIMEOUT_US    10000000u
@@ -82,9 +83,7 @@ static void begin_bring_up(gateway_t *self, uint64_t now_us)
 
 void actions_follow(gateway_t *self, uint64_t now_us)
 {
-    self->sender.start_us = now_us;
-    self->sender.frame_mask = self->settings->relay_safe_mask;
-    confirm_restart(&self->sender.confirm);
+    sender_restart(&self->sender, self->settings->relay_safe_mask, now_us);
     motion_follow(&self->motion);
 }
 

@@ -3,24 +3,16 @@
  */
 #include "frame_receiver.h"
 
-#define REJECT_TEXT_BYTES 60u
+#include "log_limit.h"
 
-void frame_receiver_put_suppressed(text_t *text, uint32_t lines)
-{
-    if (lines > 0) {
-        text_put(text, "; before that ");
-        text_put_u32(text, lines);
-        text_put(text, " more");
-    }
-}
+#define REJECT_TEXT_BYTES 60u
 
 /* One line for the first reject of a burst, with what was left out since the last one. */
 static void log_reject(frame_receiver_t *self, hal_log_t log, const char *reason, frame_error_t error, const uint8_t *bytes,
                        size_t length, const hal_udp_peer_t *from, uint64_t now_us)
 {
-    uint64_t *logged_us = &self->reject_logged_us[error];
-    if (*logged_us != 0 && now_us - *logged_us < REJECT_LOG_INTERVAL_US) {
-        self->reject_suppressed[error]++;
+    const uint32_t count = log_limit_event(&self->reject_log[error], now_us);
+    if (count == 0) {
         return;
     }
     char line[HAL_LOG_TEXT_MAX + 1];
@@ -34,10 +26,8 @@ static void log_reject(frame_receiver_t *self, hal_log_t log, const char *reason
     text_put(&text, ": \"");
     text_put_escaped(&text, bytes, length < REJECT_TEXT_BYTES ? length : REJECT_TEXT_BYTES);
     text_put(&text, "\"");
-    frame_receiver_put_suppressed(&text, self->reject_suppressed[error]);
+    log_limit_put(&text, count);
     hal_log_write(log, HAL_LOG_WARNING, line);
-    *logged_us = now_us;
-    self->reject_suppressed[error] = 0;
 }
 
 HV_OWN_FRAME static void reject(frame_receiver_t *self, const frame_receiver_io_t *io, const frame_reject_t *why, uint64_t now_us)

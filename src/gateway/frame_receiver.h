@@ -6,9 +6,6 @@
 #define FRAME_RECEIVER_H
 
 #include "heave/gateway.h"
-#include "heave/text.h"
-
-#define REJECT_LOG_INTERVAL_US 1000000u /* lines of the log about the same thing are at least this far apart */
 
 /** What the intake reads and writes besides its own state. */
 typedef struct {
@@ -31,8 +28,5 @@ bool frame_receiver_next(frame_receiver_t *self, const settings_t *settings, con
  *  @param why   in words */
 void frame_receiver_refuse(frame_receiver_t *self, const frame_receiver_io_t *io, frame_command_t command, frame_error_t error,
                            const char *why, const hal_udp_peer_t *from, uint64_t now_us);
-
-/** Appends how many lines of this kind were left out since the last one; nothing for 0. */
-void frame_receiver_put_suppressed(text_t *text, uint32_t lines);
 
 #endif

@@ -6,6 +6,7 @@
 #include "auto_engage.h"
 #include "heave/text.h"
 #include "frame_receiver.h"
+#include "log_limit.h"
 #include "actions.h"
 #include "relay_output.h"
 #include "reports.h"
@@ -13,8 +14,7 @@
 #include "sequencer.h"
 #include "service.h"
 #include "shutdown.h"
-
-#define SINGULAR_LOG_US 1000000 /* lines about the same thing are no closer */
+#include "target.h"
 
 static bool is_io_valid(const gateway_io_t *io)
 {
@@ -171,16 +171,42 @@ HV_OWN_FRAME static void send_setpoints(gateway_t *self, uint64_t now_us)
     self->unsent_cycles = drives_send(self->io.drives, now_us, setpoint_q32) == HV_OK ? 0 : self->unsent_cycles + 1;
 }
 
+/* A frame may end a hold, and another sender's first one begins anew. */
+static void take_frame(gateway_t *self, sender_in_t *in, const frame_t *frame)
+{
+    in->state = self->supervisor.state;
+    const sender_verdict_t verdict = sender_judge(&self->sender, in, frame);
+    if (verdict == SENDER_REFUSED) {
+        return;
+    }
+    if (verdict == SENDER_NEW && in->state == STATE_ENGAGED) {
+        actions_follow(self, in->now_us);
+    }
+    auto_engage_frame(&self->auto_engage, in->now_us);
+    const motion_target_t target = sender_target(&self->sender, in, frame);
+    actions_event(self, EVENT_FRAME, in->now_us);
+    in->state = self->supervisor.state;
+    if (sender_follow(&self->sender, in, frame, &target)) {
+        target_received(&self->snapshot, frame);
+    }
+}
+
 static void receive_frames(gateway_t *self, uint64_t now_us)
 {
-    const frame_receiver_io_t io = {self->io.udp, self->io.log, &self->snapshot.counters};
+    sender_in_t in = {.settings = self->settings,
+                      .io = {self->io.udp, self->io.log, &self->snapshot.counters},
+                      .receiver = &self->receiver,
+                      .motion = &self->motion,
+                      .output = &self->output,
+                      .now_us = now_us};
     frame_t frame;
     frame_receiver_begin(&self->receiver);
-    sender_begin(self, now_us);
-    while (frame_receiver_next(&self->receiver, self->settings, &io, now_us, &frame)) {
-        sender_take(self, &frame, now_us);
+    sender_begin(&self->sender, now_us);
+    while (frame_receiver_next(&self->receiver, self->settings, &in.io, now_us, &frame)) {
+        take_frame(self, &in, &frame);
     }
-    sender_end(self, now_us);
+    in.state = self->supervisor.state;
+    sender_end(&self->sender, &in);
 }
 
 /* Motion waits for a bus that has not taken the last set: what the drives get next then follows on what they got last. Where the
@@ -196,11 +222,9 @@ static void step_motion(gateway_t *self, uint64_t now_us)
 static void note_singular_stops(gateway_t *self, uint64_t now_us)
 {
     const uint32_t stops = motion_singular_stops(&self->motion);
-    if (stops != self->snapshot.counters.singular_stops &&
-        (self->singular_logged_us == 0 || now_us - self->singular_logged_us >= SINGULAR_LOG_US)) {
+    if (stops != self->snapshot.counters.singular_stops && log_limit_due(&self->singular_log, stops, now_us) > 0) {
         hal_log_write(self->io.log, HAL_LOG_WARNING,
                       "stopped: the extensions sent lead too near a singularity; send ones that go round it");
-        self->singular_logged_us = now_us;
     }
     self->snapshot.counters.singular_stops = stops;
 }
@@ -228,6 +252,8 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->stream = stream_report(motion_stream(&self->motion));
     s->stream_delay_us = s->stream.delay_us;
     s->owner = self->sender.owner;
+    s->other = self->sender.other;
+    s->last_frame_us = self->sender.last_frame_us;
     s->mask_habit = mask_guard_habit(&self->sender.mask_guard, self->settings->mask_policy);
     service_publish(self);
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;

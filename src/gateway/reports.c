@@ -4,10 +4,10 @@
 #include "reports.h"
 
 #include "heave/text.h"
+#include "log_limit.h"
 
-#define EMERGENCY_LOG_US 1000000u
-#define REPORT_LOG_US    10000000u /* a line about a drive each, in the long run, */
-#define REPORT_BURST     5u        /* and as many at once */
+#define REPORT_LOG_US 10000000u /* a line about a drive each, in the long run, */
+#define REPORT_BURST  5u        /* and as many at once */
 
 static void put_object(text_t *text, bool is_register, uint32_t object)
 {
@@ -106,11 +106,10 @@ static void log_notes(hal_log_t log, unsigned axis, const drive_report_t *report
 static void log_emergency(reports_t *self, hal_log_t log, unsigned axis, const drive_report_t *report, uint64_t now_us)
 {
     const drive_emergency_t *emergency = &report->emergency;
-    const uint32_t count = emergency->count - self->emergencies_logged[axis];
+    const uint32_t count = report->error != NULL ? log_limit_due(&self->emergency_log[axis], emergency->count, now_us) : 0;
     char line[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(line, sizeof line);
-    if (count == 0 || report->error == NULL ||
-        (self->emergency_logged_us[axis] != 0 && now_us - self->emergency_logged_us[axis] < EMERGENCY_LOG_US)) {
+    if (count == 0) {
         return;
     }
     text_put(&text, "axis ");
@@ -132,8 +131,6 @@ static void log_emergency(reports_t *self, hal_log_t log, unsigned axis, const d
         text_put_u32(&text, count);
     }
     hal_log_write(log, HAL_LOG_WARNING, line);
-    self->emergency_logged_us[axis] = now_us;
-    self->emergencies_logged[axis] = emergency->count;
 }
 
 /* Worth a line: another trouble, the end of one, or a refusal with its reason. */

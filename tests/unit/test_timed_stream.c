@@ -76,28 +76,28 @@ typedef struct {
     unsigned lost;    /* this frame does not come */
     unsigned untimed; /* from this frame on there is no time in them */
     unsigned frames;
-} sender_t;
+} timed_sender_t;
 
-static sender_t sender(unsigned time_ms)
+static timed_sender_t sender(unsigned time_ms)
 {
-    sender_t s = {.format = "@A6T:0,0,0,0,0,%.4f,%u#",
-                  .time_ms = time_ms,
-                  .period_ms = time_ms,
-                  .speed = time_ms > 100 ? 10 : 25,
-                  .late = ~0u,
-                  .lost = ~0u,
-                  .untimed = ~0u};
+    timed_sender_t s = {.format = "@A6T:0,0,0,0,0,%.4f,%u#",
+                        .time_ms = time_ms,
+                        .period_ms = time_ms,
+                        .speed = time_ms > 100 ? 10 : 25,
+                        .late = ~0u,
+                        .lost = ~0u,
+                        .untimed = ~0u};
     s.frames = 2500 / time_ms > 14 ? 2500 / time_ms : 14;
     return s;
 }
 
-static double sent_z(const sender_t *s, unsigned frame)
+static double sent_z(const timed_sender_t *s, unsigned frame)
 {
     return s->speed * frame * s->period_ms / 1000;
 }
 
 /* Sends it all and keeps where the platform was; ends a period after the last frame. Returns the ms. */
-static unsigned run(const sender_t *s)
+static unsigned run(const timed_sender_t *s)
 {
     const unsigned total = (unsigned)((s->frames + 1) * s->period_ms) + 10;
     double before = 0, at = s->phase_ms + (s->late == 0 ? s->lateness * s->period_ms : 0);
@@ -122,7 +122,7 @@ static unsigned run(const sender_t *s)
 }
 
 /* Least speed from one ms to another as a share of the sender's. */
-static double least_share(const sender_t *s, unsigned from_ms, unsigned to_ms)
+static double least_share(const timed_sender_t *s, unsigned from_ms, unsigned to_ms)
 {
     double least = INFINITY;
     for (unsigned t = from_ms; t < to_ms; t++) {
@@ -132,7 +132,7 @@ static double least_share(const sender_t *s, unsigned from_ms, unsigned to_ms)
 }
 
 /* The first ms in which the speed is up to that share of the sender's. */
-static unsigned first_at_share(const sender_t *s, double share, unsigned most_ms)
+static unsigned first_at_share(const timed_sender_t *s, double share, unsigned most_ms)
 {
     unsigned t = 0;
     while (t < most_ms && 1000 * (m_z[t + 1] - m_z[t]) < share * s->speed) {
@@ -150,7 +150,7 @@ static void test_ramp_constant_rate_keeps_its_speed_from_when_it_is_reached(void
         for (unsigned jitter = 0; jitter <= 5; jitter += 5) {
             double worst = 1;
             for (unsigned k = 0; k < 6; k++) {
-                sender_t s = sender(k_times_ms[i]);
+                timed_sender_t s = sender(k_times_ms[i]);
                 s.jitter_ms = jitter;
                 s.phase_ms = unit() * s.time_ms;
                 const unsigned total = run(&s);
@@ -172,7 +172,7 @@ static void test_ramp_time_a_bit_off_the_period_keeps_its_speed(void)
     static const double k_shares[] = {0.7, 0.9, 0.97, 1.03, 1.1, 1.2, 1.5};
     for (unsigned i = 0; i < TIMES; i++) {
         for (unsigned k = 0; k < sizeof k_shares / sizeof k_shares[0]; k++) {
-            sender_t s = sender(k_times_ms[i]);
+            timed_sender_t s = sender(k_times_ms[i]);
             s.period_ms = k_shares[k] * s.time_ms;
             const unsigned far = (unsigned)(80000 / s.speed / s.period_ms); /* within the workspace */
             s.frames = s.frames < far ? s.frames : far;
@@ -197,7 +197,7 @@ static void test_ramp_late_and_lost_frames_do_not_stop_it(void)
         for (unsigned k = 0; k < 3; k++) {
             double worst = 1;
             for (unsigned jitter = 0; jitter <= 5; jitter += 5) {
-                sender_t s = sender(k_times_ms[i]);
+                timed_sender_t s = sender(k_times_ms[i]);
                 s.jitter_ms = jitter;
                 s.lateness = k_lateness[k];
                 *(k < 2 ? &s.late : &s.lost) = s.frames - 5;
@@ -217,7 +217,7 @@ static void test_ramp_late_and_lost_frames_do_not_stop_it(void)
 static void test_ramp_begins_without_a_dip_however_late_its_first_frames_are(void)
 {
     for (unsigned i = 0; i < 200; i++) {
-        sender_t s = sender(60 + (unsigned)(unit() * 440));
+        timed_sender_t s = sender(60 + (unsigned)(unit() * 440));
         s.phase_ms = unit() * s.time_ms;
         s.late = i % 2;
         s.lateness = unit() * 0.5;
@@ -255,7 +255,7 @@ static void test_ramp_begins_somewhere_else_within_limits(void)
 static void test_ramp_ends_at_rest_on_its_last_sample(void)
 {
     for (unsigned i = 0; i < TIMES; i++) {
-        const sender_t s = sender(k_times_ms[i]);
+        const timed_sender_t s = sender(k_times_ms[i]);
         (void)run(&s);
         rig_run_ms(&m_rig, 1000 + 30 * s.time_ms);
         TEST_ASSERT_TRUE(is_resting());
@@ -295,7 +295,7 @@ static void test_isolated_timed_frame_arrives_at_its_time(void)
 static void test_isolated_timed_frame_after_a_stream_arrives_at_its_time(void)
 {
     for (unsigned i = 0; i < TIMES; i++) {
-        const sender_t s = sender(k_times_ms[i]);
+        const timed_sender_t s = sender(k_times_ms[i]);
         (void)run(&s);
         rig_run_ms(&m_rig, 1000 + 30 * s.time_ms);
         const double z = sent_z(&s, s.frames - 1) - 8;
@@ -344,7 +344,7 @@ static void test_poses_to_and_fro_after_some_that_led_on_are_steps(void)
 static void test_frames_without_a_time_go_on_with_a_timed_stream(void)
 {
     for (unsigned i = 0; i < TIMES; i++) {
-        sender_t s = sender(k_times_ms[i]);
+        timed_sender_t s = sender(k_times_ms[i]);
         s.untimed = s.frames / 2;
         const unsigned total = run(&s);
         TEST_ASSERT_TRUE(least_share(&s, first_at_share(&s, 0.9, total), total - s.time_ms) >= 0.7); /* as with times */
@@ -367,7 +367,7 @@ static void test_timed_frame_unlike_the_period_of_a_stream_is_a_move(void)
 static void test_stream_with_times_of_1_ms_is_one_without_also_where_a_frame_is_lost(void)
 {
     static double plain_z[LONGEST_MS + 1];
-    sender_t s = sender(16);
+    timed_sender_t s = sender(16);
     s.lost = 60;
     s.format = "@A6:0,0,0,0,0,%.4f#";
     const unsigned total = run(&s);
