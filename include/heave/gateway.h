@@ -129,6 +129,13 @@ typedef struct {
     bool is_pulse_lost; /**< its line cannot be written */
 } relay_output_t;
 
+/** The end of the program; members are private to src/gateway. */
+typedef struct {
+    bool is_asked;     /**< the platform may not rise any more */
+    bool is_overdue;   /**< the time for drives to confirm that their torque is off has passed */
+    uint64_t since_us; /**< when it reached OFF, FAULT or ESTOP and the drives were told; 0 = not yet */
+} shutdown_t;
+
 /** A gateway; members are private to src/gateway. */
 typedef struct {
     const settings_t *settings; /**< in force, the owner's */
@@ -154,11 +161,9 @@ typedef struct {
     bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
     bool is_disable_due;     /**< disable the drives once at rest */
     auto_engage_t auto_engage;
-    bool is_shutdown_asked;  /**< the platform may not rise any more */
-    bool is_end_overdue;     /**< the time for drives to confirm that their torque is off has passed */
+    shutdown_t shutdown;
     uint32_t unsent_cycles;  /**< cycles in a row whose set-points the bus did not take */
     uint64_t reset_until_us; /**< end of the time in which a reset waits for the drives; 0 = no reset */
-    uint64_t end_since_us;   /**< when a shutdown reached OFF, FAULT or ESTOP and the drives were told; 0 = not yet */
     uint64_t state_since_us; /**< when the state was entered */
     service_t service;
     bool is_late; /**< the next cycle is too late for the healthy pulse */

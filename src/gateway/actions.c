@@ -5,14 +5,13 @@
 
 #include "heave/text.h"
 #include "sender.h"
-#include "service.h"
 
 #define ENABLE_TIMEOUT_US    10000000u
 #define AT_SETTLED_WINDOW_MM 1
 
-static unsigned drive_count(const gateway_t *self)
+feedback_t actions_feedback(const gateway_t *self)
 {
-    return drives_count(self->io.drives);
+    return (feedback_t){self->snapshot.drive, drives_count(self->io.drives)};
 }
 
 static bool is_at_settled(const gateway_t *self)
@@ -29,15 +28,7 @@ static bool is_at_settled(const gateway_t *self)
 /* What a reset would come too early for. */
 bool actions_is_drive_fault_present(const gateway_t *self)
 {
-    if (drives_is_failing(self->io.drives)) {
-        return true;
-    }
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        if (self->snapshot.drive[i].state == DRIVE_FAULT || self->snapshot.drive[i].state == DRIVE_OFFLINE) {
-            return true;
-        }
-    }
-    return false;
+    return drives_is_failing(self->io.drives) || feedback_has_fault(actions_feedback(self));
 }
 
 static supervisor_view_t view_of(const gateway_t *self)
@@ -141,6 +132,23 @@ void actions_react(gateway_t *self)
     }
 }
 
+service_in_t actions_service_in(gateway_t *self, uint64_t now_us)
+{
+    return (service_in_t){.settings = self->settings,
+                          .drives = self->io.drives,
+                          .motion = &self->motion,
+                          .drive = self->snapshot.drive,
+                          .cylinders = self->snapshot.cylinders,
+                          .now_us = now_us};
+}
+
+static void serve(gateway_t *self, uint64_t now_us)
+{
+    const service_in_t in = actions_service_in(self, now_us);
+    service_begin(&self->service, &in, !self->is_tracking_actual);
+    self->is_tracking_actual = false;
+}
+
 static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
 {
     switch (action) {
@@ -166,7 +174,7 @@ static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
         actions_react(self);
         break;
     case ACTION_SERVE:
-        service_begin(self, !self->is_tracking_actual);
+        serve(self, now_us);
         break;
     case ACTION_ESTOP:
         self->bring_up = BRING_UP_IDLE;

@@ -5,6 +5,8 @@
 #define ACTIONS_H
 
 #include "heave/gateway.h"
+#include "feedback.h"
+#include "service.h"
 
 /** Offers an event and carries out the action of the transition. Logs every change of state. */
 void actions_event(gateway_t *self, event_t event, uint64_t now_us);
@@ -26,6 +28,12 @@ void actions_react(gateway_t *self);
 
 /** Puts the set-points on the actual positions. */
 void actions_track_actual(gateway_t *self);
+
+/** What the drives said in this cycle. */
+feedback_t actions_feedback(const gateway_t *self);
+
+/** What manual operation gets. */
+service_in_t actions_service_in(gateway_t *self, uint64_t now_us);
 
 /** Asks the drives to go off; is_disable_due stays true if they cannot be asked now. */
 void actions_disable_drives(gateway_t *self);

@@ -11,11 +11,6 @@
 #define OUTSIDE_STROKE_MM 5       /* what a stop gives way, and what a homing switch is off */
 #define UNSENT_MAX_US     100000u /* the drives' own watch is quicker: it knows the period of its bus */
 
-static unsigned drive_count(const gateway_t *self)
-{
-    return drives_count(self->io.drives);
-}
-
 void fault_watch_give_up_reset(gateway_t *self)
 {
     if (self->reset_until_us != 0) {
@@ -128,7 +123,7 @@ static bool is_torque_expected(const gateway_t *self, unsigned i)
 {
     const state_t state = self->supervisor.state;
     if (state == STATE_SERVICE) {
-        return service_is_up(self, i);
+        return service_is_up(&self->service, i);
     }
     return state != STATE_FAULT && state != STATE_ESTOP && self->bring_up != BRING_UP_ENABLE && self->bring_up != BRING_UP_HOME &&
            !self->is_tracking_actual;
@@ -212,7 +207,7 @@ static fault_t fault_of(const gateway_t *self, fault_code_t code, unsigned i, ui
 
 void fault_watch_drives(gateway_t *self, uint64_t now_us)
 {
-    for (unsigned i = 0; i < drive_count(self); i++) {
+    for (unsigned i = 0; i < drives_count(self->io.drives); i++) {
         const fault_code_t code = self->supervisor.state == STATE_OFF ? FAULT_NONE : judge_drive(self, i, now_us);
         const bool is_new = code != FAULT_NONE && code != self->axis_fault[i];
         if (is_new && self->axis_fault[i] == FAULT_NONE) { /* else a drive on its way out of the fault that is reset */

@@ -8,6 +8,7 @@
 #include "frame_receiver.h"
 #include "log_limit.h"
 #include "actions.h"
+#include "fault_watch.h"
 #include "relay_output.h"
 #include "reports.h"
 #include "sender.h"
@@ -105,6 +106,18 @@ hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)
     return sequencer_request(self, request, now_us);
 }
 
+service_answer_t gateway_service(gateway_t *self, const service_request_t *request, uint64_t now_us)
+{
+    const service_in_t in = actions_service_in(self, now_us);
+    return self->supervisor.state == STATE_SERVICE ? service_request(&self->service, &in, request) : SERVICE_NOT_SERVING;
+}
+
+uint64_t gateway_tick_age(const gateway_t *self, uint64_t tick_us)
+{
+    const uint64_t next_us = self->snapshot.now_us + self->settings->cycle_us; /* this cycle's tick has not been told yet */
+    return tick_us <= self->snapshot.service.tick_us ? next_us + self->service.late_us - tick_us : UINT64_MAX;
+}
+
 hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent)
 {
     const hv_status_t status = motion_set_intensity(&self->motion, percent);
@@ -147,7 +160,7 @@ static void write_relays(gateway_t *self, uint64_t now_us)
     const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, now_us);
     const bool is_serving = self->supervisor.state == STATE_SERVICE;
     const uint16_t wanted = is_sender_heard ? self->sender.frame_mask
-                            : is_serving    ? service_relays(self)
+                            : is_serving    ? service_relays(&self->service, self->settings->relay_safe_mask)
                                             : self->settings->relay_safe_mask;
     const relay_output_in_t in = {.wanted_mask = wanted,
                                   .is_safe = wanted == self->settings->relay_safe_mask && !is_sender_heard,
@@ -255,7 +268,8 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->other = self->sender.other;
     s->last_frame_us = self->sender.last_frame_us;
     s->mask_habit = mask_guard_habit(&self->sender.mask_guard, self->settings->mask_policy);
-    service_publish(self);
+    const service_in_t service_in = actions_service_in(self, now_us);
+    service_publish(&self->service, &service_in, &s->service);
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
     s->counters.relay_cut = self->relay_output.policy.cut_count;
     s->counters.relay_delayed = self->relay_output.policy.delay_count;
@@ -278,7 +292,11 @@ void gateway_cycle(gateway_t *self, uint64_t now_us)
     step_motion(self, now_us);
     send_setpoints(self, now_us);
     actions_after_motion(self);
-    shutdown_watch(self, now_us);
+    const shutdown_in_t in = {.feedback = actions_feedback(self),
+                              .is_down = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor),
+                              .is_disable_due = self->is_disable_due,
+                              .is_bus_lost = self->is_bus_lost || fault_watch_is_bus_stalled(self)};
+    shutdown_step(&self->shutdown, &in, self->io.log, now_us);
     write_relays(self, now_us);
     publish(self, now_us);
 }
@@ -290,10 +308,10 @@ const snapshot_t *gateway_snapshot(const gateway_t *self)
 
 bool gateway_is_finished(const gateway_t *self)
 {
-    return self->end_since_us != 0 && (gateway_energized(self) == 0 || self->is_end_overdue);
+    return shutdown_is_finished(&self->shutdown, actions_feedback(self));
 }
 
 uint32_t gateway_energized(const gateway_t *self)
 {
-    return shutdown_energized(self, false);
+    return feedback_energized(actions_feedback(self), false);
 }

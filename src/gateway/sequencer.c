@@ -8,28 +8,10 @@
 #include "fault_watch.h"
 #include "actions.h"
 #include "service.h"
-#include "shutdown.h"
 
 #define HOMING_TIMEOUT_US  120000000u
 #define RESET_TIMEOUT_US   2000000u
 #define ABANDON_TIMEOUT_US 3000000u
-
-static unsigned drive_count(const gateway_t *self)
-{
-    return drives_count(self->io.drives);
-}
-
-/* True if every drive is in the state and knows where it is. */
-static bool are_all(const gateway_t *self, drive_state_t state, bool is_zero_needed)
-{
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        const drive_feedback_t *f = &self->snapshot.drive[i];
-        if (f->state != state || !f->has_actual || (is_zero_needed && !f->is_homed)) {
-            return false;
-        }
-    }
-    return true;
-}
 
 /* Next step of bringing up, when the last one is complete. */
 static void step_bring_up(gateway_t *self, uint64_t now_us)
@@ -39,16 +21,16 @@ static void step_bring_up(gateway_t *self, uint64_t now_us)
         fault_watch_raise(self, &(fault_t){.code = FAULT_DRIVE_TIMEOUT, .at_us = now_us});
         return;
     }
-    if (self->bring_up == BRING_UP_ENABLE && !are_all(self, DRIVE_ENABLED, true)) {
+    if (self->bring_up == BRING_UP_ENABLE && !feedback_are_all(actions_feedback(self), DRIVE_ENABLED, true)) {
         self->is_tracking_actual = true;
-        if (!are_all(self, DRIVE_ENABLED, false)) {
+        if (!feedback_are_all(actions_feedback(self), DRIVE_ENABLED, false)) {
             (void)!drives_request(self->io.drives, DRIVES_ENABLE);
         } else if (drives_request(self->io.drives, DRIVES_HOME) == HV_OK) {
             self->bring_up = BRING_UP_HOME;
             self->bring_up_deadline_us = now_us + HOMING_TIMEOUT_US;
         }
     }
-    if (actions_is_coming_up(self) && are_all(self, DRIVE_ENABLED, true)) {
+    if (actions_is_coming_up(self) && feedback_are_all(actions_feedback(self), DRIVE_ENABLED, true)) {
         self->bring_up = BRING_UP_MOVE;
         if (self->is_tracking_actual) { /* else it goes on from the motion it is in */
             self->is_tracking_actual = false;
@@ -118,15 +100,12 @@ static void step_reset(gateway_t *self, uint64_t now_us)
  */
 static void step_abandoned(gateway_t *self, uint64_t now_us)
 {
-    const bool is_abandoned = self->is_shutdown_asked && self->supervisor.state == STATE_HOLD && self->is_tracking_actual;
+    const bool is_abandoned = self->shutdown.is_asked && self->supervisor.state == STATE_HOLD && self->is_tracking_actual;
     if (!is_abandoned || self->is_disable_due) {
         return;
     }
-    unsigned down = 0;
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        down += self->snapshot.drive[i].state == DRIVE_DISABLED; /* one that cannot tell would be a fault */
-    }
-    if (down == drive_count(self) || now_us - self->state_since_us >= ABANDON_TIMEOUT_US) {
+    const feedback_t feedback = actions_feedback(self); /* of drives that answer: others would be a fault */
+    if (feedback_count(feedback, DRIVE_DISABLED) == feedback.count || now_us - self->state_since_us >= ABANDON_TIMEOUT_US) {
         actions_event(self, EVENT_SHUTDOWN, now_us);
     }
 }
@@ -134,11 +113,7 @@ static void step_abandoned(gateway_t *self, uint64_t now_us)
 /* Who ends the other master, or resets what it has led to, does not expect that this one raises the platform. */
 static void void_auto(gateway_t *self)
 {
-    bool has_other = false;
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        has_other |= drive_has_other_master(&self->snapshot.drive[i]);
-    }
-    if (self->auto_engage.is_due && has_other) {
+    if (self->auto_engage.is_due && feedback_has_other_master(actions_feedback(self))) {
         auto_engage_end(&self->auto_engage);
         hal_log_write(self->io.log, HAL_LOG_WARNING,
                       "engage = auto is void: another master is on the bus; an operator has to engage");
@@ -162,7 +137,8 @@ static void step_auto(gateway_t *self, uint64_t now_us)
 /* What hands do, and drives that take too long about it. */
 static void watch_service(gateway_t *self, uint64_t now_us)
 {
-    const fault_code_t code = service_step(self, now_us);
+    const service_in_t in = actions_service_in(self, now_us);
+    const fault_code_t code = service_step(&self->service, &in);
     if (code != FAULT_NONE) {
         fault_watch_raise(self, &(fault_t){.code = code, .at_us = now_us});
     }
@@ -185,7 +161,8 @@ void sequencer_before_frames(gateway_t *self, uint64_t now_us)
     step_reset(self, now_us);
     step_abandoned(self, now_us);
     step_auto(self, now_us);
-    if (self->supervisor.state == STATE_OFF && are_all(self, DRIVE_ENABLED, true) && !self->is_disable_due) {
+    if (self->supervisor.state == STATE_OFF && feedback_are_all(actions_feedback(self), DRIVE_ENABLED, true) &&
+        !self->is_disable_due) {
         actions_track_actual(self); /* they may have told where they are in this cycle only */
         actions_event(self, EVENT_DRIVES_READY, now_us);
         self->is_tracking_actual = self->supervisor.state == STATE_OFF;
@@ -240,9 +217,9 @@ hv_status_t sequencer_request(gateway_t *self, event_t request, uint64_t now_us)
         return HV_OK;
     }
     auto_engage_end(&self->auto_engage);
-    self->is_shutdown_asked |= request == EVENT_SHUTDOWN;
+    self->shutdown.is_asked |= request == EVENT_SHUTDOWN;
     const uint32_t ignored = self->supervisor.ignored[request];
-    if (self->is_shutdown_asked && request != EVENT_SHUTDOWN && request != EVENT_HOLD) {
+    if (self->shutdown.is_asked && request != EVENT_SHUTDOWN && request != EVENT_HOLD) {
         return HV_ERR_STATE;
     }
     const bool is_going_off = self->is_disable_due || !motion_is_at_rest(&self->motion);
@@ -250,7 +227,7 @@ hv_status_t sequencer_request(gateway_t *self, event_t request, uint64_t now_us)
         return HV_ERR_STATE; /* it would become a fault at once */
     }
     if (request == EVENT_HOLD && self->supervisor.state == STATE_SERVICE) {
-        service_let_go(self);
+        service_let_go(&self->service, &self->motion);
     }
     if (request == EVENT_SHUTDOWN && actions_is_coming_up(self)) {
         actions_event(self, EVENT_HOLD, now_us); /* homing may take minutes, and who ends heaved has less patience */
@@ -266,25 +243,14 @@ hv_status_t sequencer_request(gateway_t *self, event_t request, uint64_t now_us)
  * pulse comes first. */
 static bool is_being_reset(const gateway_t *self)
 {
-    return self->reset_until_us != 0 && !self->snapshot.is_estop_active && shutdown_energized(self, false) == 0;
-}
-
-/* In OFF, and while they are reset, drives may be in fault: they have no torque. */
-static bool are_drives_well(const gateway_t *self)
-{
-    const bool is_fault_borne = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor);
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        const drive_state_t state = self->snapshot.drive[i].state;
-        if (state == DRIVE_OFFLINE || (state == DRIVE_FAULT && !is_fault_borne)) {
-            return false;
-        }
-    }
-    return true;
+    return self->reset_until_us != 0 && !self->snapshot.is_estop_active && feedback_energized(actions_feedback(self), false) == 0;
 }
 
 bool sequencer_is_well(const gateway_t *self)
 {
     const bool is_state_well = !supervisor_is_latched(&self->supervisor) || is_being_reset(self);
     const bool is_bus_well = !self->is_bus_lost && !drives_is_failing(self->io.drives) && !fault_watch_is_bus_stalled(self);
-    return is_state_well && is_bus_well && are_drives_well(self) && !self->is_late && !self->is_end_overdue;
+    const bool is_fault_borne = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor);
+    return is_state_well && is_bus_well && feedback_is_well(actions_feedback(self), is_fault_borne) && !self->is_late &&
+           !self->shutdown.is_overdue;
 }

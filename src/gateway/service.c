@@ -5,73 +5,57 @@
  */
 #include "service.h"
 
-#include "actions.h"
-
 #define UP_TIMEOUT_US   10000000u
 #define HOME_TIMEOUT_US 120000000u
 
-static unsigned drive_count(const gateway_t *self)
+static uint32_t all_of(const service_in_t *in)
 {
-    return drives_count(self->io.drives);
+    return (1u << drives_count(in->drives)) - 1u;
 }
 
-static uint32_t all_of(const gateway_t *self)
+static unsigned motion_axis(const service_in_t *in, unsigned i)
 {
-    return (1u << drive_count(self)) - 1u;
-}
-
-static unsigned motion_axis(const gateway_t *self, unsigned i)
-{
-    return i < self->snapshot.cylinders ? i : (unsigned)AXIS_ANGLE;
+    return i < in->cylinders ? i : (unsigned)AXIS_ANGLE;
 }
 
 /* A hand's time: that of the gateway, and the cycles that were skipped. */
-static uint64_t hand_us(const gateway_t *self, uint64_t now_us)
+static uint64_t hand_us(const service_t *self, const service_in_t *in)
 {
-    return now_us + self->service.late_us;
+    return in->now_us + self->late_us;
 }
 
-uint64_t gateway_tick_age(const gateway_t *self, uint64_t tick_us)
+bool service_is_up(const service_t *self, unsigned i)
 {
-    const uint64_t next_us = self->snapshot.now_us + self->settings->cycle_us; /* this cycle's tick has not been told yet */
-    return tick_us <= self->snapshot.service.tick_us ? hand_us(self, next_us) - tick_us : UINT64_MAX;
+    return (self->up & ~self->homing) >> i & 1u;
 }
 
-bool service_is_up(const gateway_t *self, unsigned i)
+void service_begin(service_t *self, const service_in_t *in, bool has_torque)
 {
-    return (self->service.up & ~self->service.homing) >> i & 1u;
-}
-
-void service_begin(gateway_t *self, bool has_torque)
-{
-    service_t *own = &self->service;
-    const uint32_t axes = has_torque ? all_of(self) : 0;
-    own->doing = SERVICE_NOTHING;
-    own->wanted = axes;
-    own->up = axes;
-    own->homing = 0;
-    own->off_due = 0;
-    own->stop_due = 0;
-    deadman_release(&own->hand);
-    self->is_tracking_actual = false;
-    motion_serve(&self->motion);
+    const uint32_t axes = has_torque ? all_of(in) : 0;
+    self->doing = SERVICE_NOTHING;
+    self->wanted = axes;
+    self->up = axes;
+    self->homing = 0;
+    self->off_due = 0;
+    self->stop_due = 0;
+    deadman_release(&self->hand);
+    motion_serve(in->motion);
 }
 
 /* --- Letting go --- */
 
-static hv_status_t ask(gateway_t *self, unsigned i, drives_request_t request)
+static hv_status_t ask(const service_in_t *in, unsigned i, drives_request_t request)
 {
-    return drives_request_one(self->io.drives, (uint8_t)i, request);
+    return drives_request_one(in->drives, (uint8_t)i, request);
 }
 
 /* Drives that look for their zero move by themselves: they are stopped, and have no torque then. */
-static void stop_homing(gateway_t *self)
+static void stop_homing(service_t *self)
 {
-    service_t *own = &self->service;
-    own->stop_due |= own->homing;
-    own->wanted &= ~own->homing;
-    own->up &= ~own->homing;
-    own->homing = 0;
+    self->stop_due |= self->homing;
+    self->wanted &= ~self->homing;
+    self->up &= ~self->homing;
+    self->homing = 0;
 }
 
 static bool is_signal(service_verb_t verb)
@@ -84,29 +68,28 @@ static bool moves_by_hand(service_verb_t verb)
     return verb == SERVICE_JOG_AXIS || verb == SERVICE_JOG_POSE || is_signal(verb);
 }
 
-void service_let_go(gateway_t *self)
+void service_let_go(service_t *self, motion_t *motion)
 {
-    service_t *own = &self->service;
-    deadman_release(&own->hand);
-    if (moves_by_hand(own->doing)) {
-        motion_stop(&self->motion);
-    } else if (own->doing == SERVICE_HOME) {
+    deadman_release(&self->hand);
+    if (moves_by_hand(self->doing)) {
+        motion_stop(motion);
+    } else if (self->doing == SERVICE_HOME) {
         stop_homing(self);
     }
-    own->doing = SERVICE_NOTHING;
+    self->doing = SERVICE_NOTHING;
 }
 
 /* --- The cycle --- */
 
 /* Asks drives, together where it is all of them, since a bus may know it no other way.
  * Returns those that the bus has not taken it for. */
-static uint32_t ask_due(gateway_t *self, uint32_t due, drives_request_t request)
+static uint32_t ask_due(const service_in_t *in, uint32_t due, drives_request_t request)
 {
-    if (due == all_of(self)) {
-        return drives_request(self->io.drives, request) == HV_ERR_AGAIN ? due : 0;
+    if (due == all_of(in)) {
+        return drives_request(in->drives, request) == HV_ERR_AGAIN ? due : 0;
     }
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        if ((due >> i & 1u) != 0 && ask(self, i, request) != HV_ERR_AGAIN) {
+    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+        if ((due >> i & 1u) != 0 && ask(in, i, request) != HV_ERR_AGAIN) {
             due &= ~(1u << i);
         }
     }
@@ -114,102 +97,96 @@ static uint32_t ask_due(gateway_t *self, uint32_t due, drives_request_t request)
 }
 
 /* The axis is where its drive is. */
-static void place(gateway_t *self, unsigned i)
+static void place(const service_in_t *in, unsigned i)
 {
-    motion_place_axis(&self->motion, motion_axis(self, i), self->snapshot.drive[i].actual_mm_q32);
+    motion_place_axis(in->motion, motion_axis(in, i), in->drive[i].actual_mm_q32);
 }
 
 /* Asks a drive that is to come up, or notes that it has.
  * Returns false where it takes too long. */
-static bool step_up(gateway_t *self, unsigned i, uint64_t now_us)
+static bool step_up(service_t *self, const service_in_t *in, unsigned i)
 {
-    service_t *own = &self->service;
-    const drive_state_t state = self->snapshot.drive[i].state;
-    if (state == DRIVE_ENABLED && self->snapshot.drive[i].has_actual) {
-        own->up |= 1u << i;
-        place(self, i);
-    } else if (state == DRIVE_DISABLED && ((own->off_due | own->stop_due) >> i & 1u) == 0) {
-        (void)!ask(self, i, DRIVES_ENABLE);
+    const drive_state_t state = in->drive[i].state;
+    if (state == DRIVE_ENABLED && in->drive[i].has_actual) {
+        self->up |= 1u << i;
+        place(in, i);
+    } else if (state == DRIVE_DISABLED && ((self->off_due | self->stop_due) >> i & 1u) == 0) {
+        (void)!ask(in, i, DRIVES_ENABLE);
     }
-    return now_us < own->deadline_us[i];
+    return in->now_us < self->deadline_us[i];
 }
 
 /* Returns false where it takes too long. */
-static bool step_home(gateway_t *self, unsigned i, uint64_t now_us)
+static bool step_home(service_t *self, const service_in_t *in, unsigned i)
 {
-    service_t *own = &self->service;
-    const drive_feedback_t *drive = &self->snapshot.drive[i];
+    const drive_feedback_t *drive = &in->drive[i];
     if (drive->state == DRIVE_ENABLED && drive->is_homed) {
-        own->homing &= ~(1u << i);
-        place(self, i); /* on its new zero */
+        self->homing &= ~(1u << i);
+        place(in, i); /* on its new zero */
     }
-    return now_us < own->deadline_us[i];
+    return in->now_us < self->deadline_us[i];
 }
 
 /* What has no torque, or moves by itself, is where it is. */
-static void place_loose(gateway_t *self)
+static void place_loose(service_t *self, const service_in_t *in)
 {
-    const uint32_t loose = ~self->service.up | self->service.homing;
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        if ((loose >> i & 1u) != 0 && self->snapshot.drive[i].has_actual) {
-            place(self, i);
+    const uint32_t loose = ~self->up | self->homing;
+    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+        if ((loose >> i & 1u) != 0 && in->drive[i].has_actual) {
+            place(in, i);
         }
     }
 }
 
-fault_code_t service_step(gateway_t *self, uint64_t now_us)
+fault_code_t service_step(service_t *self, const service_in_t *in)
 {
-    service_t *own = &self->service;
     bool is_in_time = true;
-    if (own->doing != SERVICE_NOTHING && !deadman_step(&own->hand, hand_us(self, now_us))) {
-        service_let_go(self);
+    if (self->doing != SERVICE_NOTHING && !deadman_step(&self->hand, hand_us(self, in))) {
+        service_let_go(self, in->motion);
     }
-    own->stop_due = ask_due(self, own->stop_due, DRIVES_QUICK_STOP);
-    if (own->off_due != 0 && motion_is_at_rest(&self->motion)) {
-        own->up &= ~own->off_due;
-        own->off_due = ask_due(self, own->off_due, DRIVES_DISABLE);
+    self->stop_due = ask_due(in, self->stop_due, DRIVES_QUICK_STOP);
+    if (self->off_due != 0 && motion_is_at_rest(in->motion)) {
+        self->up &= ~self->off_due;
+        self->off_due = ask_due(in, self->off_due, DRIVES_DISABLE);
     }
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        if ((own->homing >> i & 1u) != 0) {
-            is_in_time = step_home(self, i, now_us) && is_in_time;
-        } else if (((own->wanted & ~own->up) >> i & 1u) != 0) {
-            is_in_time = step_up(self, i, now_us) && is_in_time;
+    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+        if ((self->homing >> i & 1u) != 0) {
+            is_in_time = step_home(self, in, i) && is_in_time;
+        } else if (((self->wanted & ~self->up) >> i & 1u) != 0) {
+            is_in_time = step_up(self, in, i) && is_in_time;
         }
     }
-    place_loose(self);
-    if (moves_by_hand(own->doing) && motion_is_stopping(&self->motion)) {
-        service_let_go(self); /* motion stopped what led astray: that is no end of its own */
+    place_loose(self, in);
+    if (moves_by_hand(self->doing) && motion_is_stopping(in->motion)) {
+        service_let_go(self, in->motion); /* motion stopped what led astray: that is no end of its own */
     }
-    if ((own->doing == SERVICE_HOME && own->homing == 0) ||
-        (own->has_end && moves_by_hand(own->doing) && motion_is_done(&self->motion))) {
-        own->doing = SERVICE_NOTHING;
-        own->finished = own->hand.series;
-        deadman_release(&own->hand);
+    if ((self->doing == SERVICE_HOME && self->homing == 0) ||
+        (self->has_end && moves_by_hand(self->doing) && motion_is_done(in->motion))) {
+        self->doing = SERVICE_NOTHING;
+        self->finished = self->hand.series;
+        deadman_release(&self->hand);
     }
     return is_in_time ? FAULT_NONE : FAULT_DRIVE_TIMEOUT;
 }
 
-uint16_t service_relays(const gateway_t *self)
+uint16_t service_relays(const service_t *self, uint16_t safe_mask)
 {
-    const uint16_t safe = self->settings->relay_safe_mask;
-    return self->service.doing == SERVICE_RELAY ? (uint16_t)(safe ^ 1u << (self->service.axis - 1u)) : safe;
+    return self->doing == SERVICE_RELAY ? (uint16_t)(safe_mask ^ 1u << (self->axis - 1u)) : safe_mask;
 }
 
-void service_publish(gateway_t *self)
+void service_publish(const service_t *self, const service_in_t *in, service_view_t *view)
 {
-    const service_t *own = &self->service;
-    service_view_t *view = &self->snapshot.service;
-    view->tick_us = hand_us(self, self->snapshot.now_us);
-    view->doing = own->doing;
-    view->axis = own->axis;
-    view->is_held = own->hand.is_held;
-    view->series = own->hand.series;
-    view->finished = own->finished;
-    view->torque = own->up;
-    view->homing = own->homing;
+    view->tick_us = hand_us(self, in);
+    view->doing = self->doing;
+    view->axis = self->axis;
+    view->is_held = self->hand.is_held;
+    view->series = self->hand.series;
+    view->finished = self->finished;
+    view->torque = self->up;
+    view->homing = self->homing;
     view->has_counts = 0;
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        if (drives_counts(self->io.drives, (uint8_t)i, &view->counts[i])) {
+    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+        if (drives_counts(in->drives, (uint8_t)i, &view->counts[i])) {
             view->has_counts |= 1u << i;
         }
     }
@@ -218,51 +195,50 @@ void service_publish(gateway_t *self)
 /* --- Requests --- */
 
 /* The drives that a request names; 0: no such drive. */
-static uint32_t named(const gateway_t *self, uint8_t axis)
+static uint32_t named(const service_in_t *in, uint8_t axis)
 {
-    return axis == SERVICE_ALL ? all_of(self) : axis <= drive_count(self) ? 1u << (axis - 1u) : 0;
+    return axis == SERVICE_ALL ? all_of(in) : axis <= drives_count(in->drives) ? 1u << (axis - 1u) : 0;
 }
 
-static bool has_one_by_one(const gateway_t *self)
+static bool has_one_by_one(const service_in_t *in)
 {
-    return self->io.drives.ops->request_one != NULL;
+    return in->drives.ops->request_one != NULL;
 }
 
-static service_answer_t switch_torque(gateway_t *self, uint32_t axes, bool is_on, uint64_t now_us)
+static service_answer_t switch_torque(service_t *self, const service_in_t *in, uint32_t axes, bool is_on)
 {
-    service_t *own = &self->service;
     if (axes == 0) {
         return SERVICE_NO_SUCH;
     }
-    if (axes != all_of(self) && !has_one_by_one(self)) {
+    if (axes != all_of(in) && !has_one_by_one(in)) {
         return SERVICE_TOGETHER;
     }
     if (!is_on) { /* never refused: what moves stops first */
-        if (own->doing != SERVICE_NOTHING && own->doing != SERVICE_RELAY) {
-            service_let_go(self);
+        if (self->doing != SERVICE_NOTHING && self->doing != SERVICE_RELAY) {
+            service_let_go(self, in->motion);
         }
-        own->wanted &= ~axes;
-        own->off_due |= axes;
+        self->wanted &= ~axes;
+        self->off_due |= axes;
         return SERVICE_DONE;
     }
-    if (own->doing != SERVICE_NOTHING || !motion_is_at_rest(&self->motion) || (own->stop_due & axes) != 0) {
+    if (self->doing != SERVICE_NOTHING || !motion_is_at_rest(in->motion) || (self->stop_due & axes) != 0) {
         return SERVICE_BUSY;
     }
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        own->deadline_us[i] = (axes >> i & 1u) != 0 ? now_us + UP_TIMEOUT_US : own->deadline_us[i];
+    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+        self->deadline_us[i] = (axes >> i & 1u) != 0 ? in->now_us + UP_TIMEOUT_US : self->deadline_us[i];
     }
-    if (!has_one_by_one(self) && drives_request(self->io.drives, DRIVES_ENABLE) != HV_OK) {
+    if (!has_one_by_one(in) && drives_request(in->drives, DRIVES_ENABLE) != HV_OK) {
         return SERVICE_NOT_TAKEN;
     }
-    own->off_due &= ~axes;
-    own->wanted |= axes;
+    self->off_due &= ~axes;
+    self->wanted |= axes;
     return SERVICE_DONE;
 }
 
 /* Drives that are up and at rest, where they have to move. */
-static bool are_up(const gateway_t *self, uint32_t axes)
+static bool are_up(const service_t *self, uint32_t axes)
 {
-    return (self->service.up & ~self->service.homing & ~self->service.off_due & axes) == axes;
+    return (self->up & ~self->homing & ~self->off_due & axes) == axes;
 }
 
 /* Of a jog. */
@@ -276,112 +252,109 @@ static service_answer_t answer_of(hv_status_t status)
                                      : SERVICE_BUSY;
 }
 
-static bool are_homed(const gateway_t *self, uint32_t axes)
+static bool are_homed(const service_in_t *in, uint32_t axes)
 {
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        if ((axes >> i & 1u) != 0 && !self->snapshot.drive[i].is_homed) {
+    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+        if ((axes >> i & 1u) != 0 && !in->drive[i].is_homed) {
             return false;
         }
     }
     return true;
 }
 
-static service_answer_t jog_axis(gateway_t *self, const service_request_t *request)
+static service_answer_t jog_axis(service_t *self, const service_in_t *in, const service_request_t *request)
 {
-    const uint32_t axes = request->axis != SERVICE_ALL ? named(self, request->axis) : 0;
+    const uint32_t axes = request->axis != SERVICE_ALL ? named(in, request->axis) : 0;
     if (axes == 0) {
         return SERVICE_NO_SUCH;
     }
     if (!are_up(self, axes)) {
         return SERVICE_NO_TORQUE;
     }
-    return answer_of(motion_jog_axis(&self->motion, motion_axis(self, request->axis - 1u), request->speed_q16, request->way_q16));
+    return answer_of(motion_jog_axis(in->motion, motion_axis(in, request->axis - 1u), request->speed_q16, request->way_q16));
 }
 
-static service_answer_t jog_pose(gateway_t *self, const service_request_t *request)
+static service_answer_t jog_pose(service_t *self, const service_in_t *in, const service_request_t *request)
 {
-    const unsigned cylinders = self->snapshot.cylinders;
+    const unsigned cylinders = in->cylinders;
     if (request->axis < 1 || request->axis > POSE_AXES) {
         return SERVICE_NO_SUCH;
     }
     if (!are_up(self, (1u << cylinders) - 1u)) {
         return SERVICE_NO_TORQUE;
     }
-    if (!are_homed(self, (1u << cylinders) - 1u)) {
+    if (!are_homed(in, (1u << cylinders) - 1u)) {
         return SERVICE_NOT_HOMED;
     }
-    return answer_of(motion_jog_pose(&self->motion, request->axis - 1u, request->speed_q16, request->way_q16));
+    return answer_of(motion_jog_pose(in->motion, request->axis - 1u, request->speed_q16, request->way_q16));
 }
 
 /* A signal goes by where things are, so its drives have found their zero. */
-static service_answer_t excite(gateway_t *self, const service_request_t *request)
+static service_answer_t excite(service_t *self, const service_in_t *in, const service_request_t *request)
 {
     const bool is_posed = request->verb == SERVICE_SIGNAL_POSE;
-    const uint32_t axes = is_posed                       ? (1u << self->snapshot.cylinders) - 1u
-                          : request->axis != SERVICE_ALL ? named(self, request->axis)
-                                                         : 0;
+    const uint32_t axes = is_posed ? (1u << in->cylinders) - 1u : request->axis != SERVICE_ALL ? named(in, request->axis) : 0;
     if (axes == 0 || (is_posed && (request->axis < 1 || request->axis > POSE_AXES))) {
         return SERVICE_NO_SUCH;
     }
-    if (!excitation_is_allowed(&request->signal, self->settings->cycle_us)) {
+    if (!excitation_is_allowed(&request->signal, in->settings->cycle_us)) {
         return SERVICE_BAD_SIGNAL;
     }
     if (!are_up(self, axes)) {
         return SERVICE_NO_TORQUE;
     }
-    if (!are_homed(self, axes)) {
+    if (!are_homed(in, axes)) {
         return SERVICE_NOT_HOMED;
     }
-    return answer_of(is_posed ? motion_excite_pose(&self->motion, request->axis - 1u, &request->signal)
-                              : motion_excite_axis(&self->motion, motion_axis(self, request->axis - 1u), &request->signal));
+    return answer_of(is_posed ? motion_excite_pose(in->motion, request->axis - 1u, &request->signal)
+                              : motion_excite_axis(in->motion, motion_axis(in, request->axis - 1u), &request->signal));
 }
 
-static service_answer_t home(gateway_t *self, const service_request_t *request, uint64_t now_us)
+static service_answer_t home(service_t *self, const service_in_t *in, const service_request_t *request)
 {
-    service_t *own = &self->service;
-    const uint32_t axes = named(self, request->axis);
+    const uint32_t axes = named(in, request->axis);
     if (axes == 0) {
         return SERVICE_NO_SUCH;
     }
     if (!are_up(self, axes)) {
         return SERVICE_NO_TORQUE;
     }
-    if (axes != all_of(self) && !has_one_by_one(self)) {
+    if (axes != all_of(in) && !has_one_by_one(in)) {
         return SERVICE_TOGETHER;
     }
     const hv_status_t status =
-        axes == all_of(self) ? drives_request(self->io.drives, DRIVES_HOME) : ask(self, request->axis - 1u, DRIVES_HOME);
+        axes == all_of(in) ? drives_request(in->drives, DRIVES_HOME) : ask(in, request->axis - 1u, DRIVES_HOME);
     if (status != HV_OK) {
         return SERVICE_NOT_TAKEN;
     }
-    own->homing = axes;
-    for (unsigned i = 0; i < drive_count(self); i++) {
-        own->deadline_us[i] = now_us + HOME_TIMEOUT_US;
+    self->homing = axes;
+    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+        self->deadline_us[i] = in->now_us + HOME_TIMEOUT_US;
     }
     return SERVICE_DONE;
 }
 
-static service_answer_t take_relay(const gateway_t *self, uint8_t relay)
+static service_answer_t take_relay(const service_in_t *in, uint8_t relay)
 {
-    return relay < 1 || relay > self->settings->relays.count ? SERVICE_NO_SUCH
-           : relay == self->settings->healthy.relay          ? SERVICE_PULSE
-                                                             : SERVICE_DONE;
+    return relay < 1 || relay > in->settings->relays.count ? SERVICE_NO_SUCH
+           : relay == in->settings->healthy.relay          ? SERVICE_PULSE
+                                                           : SERVICE_DONE;
 }
 
-static service_answer_t start(gateway_t *self, const service_request_t *request, uint64_t now_us)
+static service_answer_t start(service_t *self, const service_in_t *in, const service_request_t *request)
 {
     switch (request->verb) {
     case SERVICE_JOG_AXIS:
-        return jog_axis(self, request);
+        return jog_axis(self, in, request);
     case SERVICE_JOG_POSE:
-        return jog_pose(self, request);
+        return jog_pose(self, in, request);
     case SERVICE_HOME:
-        return home(self, request, now_us);
+        return home(self, in, request);
     case SERVICE_RELAY:
-        return take_relay(self, request->axis);
+        return take_relay(in, request->axis);
     case SERVICE_SIGNAL_AXIS:
     case SERVICE_SIGNAL_POSE:
-        return excite(self, request);
+        return excite(self, in, request);
     case SERVICE_NOTHING:
     case SERVICE_TORQUE_ON:
     case SERVICE_TORQUE_OFF:
@@ -402,53 +375,48 @@ static service_answer_t answer_of_hand(deadman_answer_t answer)
 }
 
 /* The proof first: what is stale must not even begin. */
-static service_answer_t hold(gateway_t *self, const service_request_t *request, uint64_t now_us)
+static service_answer_t hold(service_t *self, const service_in_t *in, const service_request_t *request)
 {
-    service_t *own = &self->service;
-    deadman_t hand = own->hand;
-    const deadman_answer_t pressed = deadman_press(&hand, request->series, request->age_us, hand_us(self, now_us));
+    deadman_t hand = self->hand;
+    const deadman_answer_t pressed = deadman_press(&hand, request->series, request->age_us, hand_us(self, in));
     if (pressed != DEADMAN_TAKEN) {
         return answer_of_hand(pressed);
     }
-    if (own->doing != SERVICE_NOTHING) {
+    if (self->doing != SERVICE_NOTHING) {
         return SERVICE_BUSY;
     }
-    const service_answer_t answer = start(self, request, now_us);
+    const service_answer_t answer = start(self, in, request);
     if (answer == SERVICE_DONE) {
-        own->hand = hand;
-        own->doing = request->verb;
-        own->has_end = is_signal(request->verb) || request->way_q16 > 0;
-        own->axis = request->axis;
+        self->hand = hand;
+        self->doing = request->verb;
+        self->has_end = is_signal(request->verb) || request->way_q16 > 0;
+        self->axis = request->axis;
     }
     return answer;
 }
 
 /* A release of what is over is done already. */
-static service_answer_t release(gateway_t *self, uint32_t series)
+static service_answer_t release(service_t *self, motion_t *motion, uint32_t series)
 {
-    if (self->service.hand.is_held && self->service.hand.series == series) {
-        service_let_go(self);
+    if (self->hand.is_held && self->hand.series == series) {
+        service_let_go(self, motion);
     }
     return SERVICE_DONE;
 }
 
-service_answer_t gateway_service(gateway_t *self, const service_request_t *request, uint64_t now_us)
+service_answer_t service_request(service_t *self, const service_in_t *in, const service_request_t *request)
 {
-    if (self->supervisor.state != STATE_SERVICE) {
-        return SERVICE_NOT_SERVING;
-    }
     if (service_is_held(request->verb)) {
-        return hold(self, request, now_us);
+        return hold(self, in, request);
     }
     switch (request->verb) {
     case SERVICE_TORQUE_ON:
     case SERVICE_TORQUE_OFF:
-        return switch_torque(self, named(self, request->axis), request->verb == SERVICE_TORQUE_ON, now_us);
+        return switch_torque(self, in, named(in, request->axis), request->verb == SERVICE_TORQUE_ON);
     case SERVICE_BEAT:
-        return answer_of_hand(
-            deadman_beat(&self->service.hand, request->series, request->counter, request->age_us, hand_us(self, now_us)));
+        return answer_of_hand(deadman_beat(&self->hand, request->series, request->counter, request->age_us, hand_us(self, in)));
     case SERVICE_RELEASE:
-        return release(self, request->series);
+        return release(self, in->motion, request->series);
     case SERVICE_NOTHING:
     case SERVICE_JOG_AXIS:
     case SERVICE_JOG_POSE:

@@ -6,24 +6,37 @@
 
 #include "heave/gateway.h"
 
+/** What manual operation reads, and what it moves. */
+typedef struct {
+    const settings_t *settings;
+    drives_t drives;
+    motion_t *motion;
+    const drive_feedback_t *drive; /**< of this cycle */
+    uint8_t cylinders;             /**< drives of these; one more is the rotation motor */
+    uint64_t now_us;
+} service_in_t;
+
 /** On entering SERVICE.
  *  @param has_torque the drives are up */
-void service_begin(gateway_t *self, bool has_torque);
+void service_begin(service_t *self, const service_in_t *in, bool has_torque);
 
 /** Once per cycle in SERVICE, before the motion: what the hand holds, and drives on their way up, down, or to their zero.
  *  @return a fault of a drive that took too long; FAULT_NONE */
-fault_code_t service_step(gateway_t *self, uint64_t now_us);
+fault_code_t service_step(service_t *self, const service_in_t *in);
 
 /** Stops whatever the hand holds. */
-void service_let_go(gateway_t *self);
+void service_let_go(service_t *self, motion_t *motion);
+
+/** In SERVICE, see gateway_service(). */
+service_answer_t service_request(service_t *self, const service_in_t *in, const service_request_t *request);
 
 /** True where drive i is meant to hold its position. */
-bool service_is_up(const gateway_t *self, unsigned i);
+bool service_is_up(const service_t *self, unsigned i);
 
 /** The relays that are asked for in SERVICE. */
-uint16_t service_relays(const gateway_t *self);
+uint16_t service_relays(const service_t *self, uint16_t safe_mask);
 
 /** For the snapshot. */
-void service_publish(gateway_t *self);
+void service_publish(const service_t *self, const service_in_t *in, service_view_t *view);
 
 #endif
