@@ -129,6 +129,17 @@ typedef struct {
     bool is_pulse_lost; /**< its line cannot be written */
 } relay_output_t;
 
+/** What is wrong with bus, drives and inputs, so that each fault is found once; members are private to src/gateway. */
+typedef struct {
+    fault_code_t axis_fault[DRIVES_MAX];        /**< present fault of each drive */
+    uint64_t following_since_us[CYLINDERS_MAX]; /**< start of a distance from the set-point that is too large; 0 = none */
+    bool is_bus_lost;
+    bool is_bus_failing;
+    bool is_estop_apart;
+    bool is_power_overdue;
+    uint64_t power_since_us; /**< start of the failure of the supply; 0 = none */
+} fault_watch_t;
+
 /** The end of the program; members are private to src/gateway. */
 typedef struct {
     bool is_asked;     /**< the platform may not rise any more */
@@ -148,16 +159,10 @@ typedef struct {
     relay_output_t relay_output;
     reports_t reports;
     snapshot_t snapshot;
-    fault_code_t axis_fault[DRIVES_MAX];        /**< present fault of each drive */
-    uint32_t told[DRIVES_MAX + 1u];             /**< faults that the next cycle has to find, as snapshot.begun */
-    uint64_t following_since_us[CYLINDERS_MAX]; /**< start of a distance from the set-point that is too large; 0 = none */
+    fault_watch_t fault_watch;
+    uint32_t told[DRIVES_MAX + 1u]; /**< faults that the next cycle has to find, as snapshot.begun */
     bring_up_t bring_up;
     uint64_t bring_up_deadline_us;
-    bool is_bus_lost;        /**< the fault has been counted already */
-    bool is_bus_failing;     /**< the same */
-    bool is_estop_apart;     /**< the same */
-    bool is_power_overdue;   /**< the same */
-    uint64_t power_since_us; /**< start of the failure of the supply; 0 = none */
     bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
     bool is_disable_due;     /**< disable the drives once at rest */
     auto_engage_t auto_engage;

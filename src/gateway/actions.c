@@ -4,6 +4,7 @@
 #include "actions.h"
 
 #include "heave/text.h"
+#include "faults.h"
 #include "sender.h"
 
 #define ENABLE_TIMEOUT_US    10000000u
@@ -11,7 +12,7 @@
 
 feedback_t actions_feedback(const gateway_t *self)
 {
-    return (feedback_t){self->snapshot.drive, drives_count(self->io.drives)};
+    return (feedback_t){self->snapshot.drive, self->snapshot.cylinders + (self->snapshot.has_angle ? 1u : 0u)};
 }
 
 static bool is_at_settled(const gateway_t *self)
@@ -122,7 +123,7 @@ static void stop_and_disable(gateway_t *self)
 }
 
 /* What the worst fault so far asks for. */
-void actions_react(gateway_t *self)
+static void react(gateway_t *self)
 {
     if (self->snapshot.reaction >= FAULT_REACT_QUICK_STOP) {
         self->bring_up = BRING_UP_IDLE;
@@ -137,7 +138,7 @@ service_in_t actions_service_in(gateway_t *self, uint64_t now_us)
     return (service_in_t){.settings = self->settings,
                           .drives = self->io.drives,
                           .motion = &self->motion,
-                          .drive = self->snapshot.drive,
+                          .feedback = actions_feedback(self),
                           .cylinders = self->snapshot.cylinders,
                           .now_us = now_us};
 }
@@ -147,6 +148,20 @@ static void serve(gateway_t *self, uint64_t now_us)
     const service_in_t in = actions_service_in(self, now_us);
     service_begin(&self->service, &in, !self->is_tracking_actual);
     self->is_tracking_actual = false;
+}
+
+void actions_raise(gateway_t *self, const fault_t *fault)
+{
+    const state_t state = self->supervisor.state;
+    if (state == STATE_ESTOP && fault->code != FAULT_ESTOP_CHANNELS) { /* that one is of the e-stop itself */
+        return;
+    }
+    const bool is_worse = faults_note(&self->snapshot, fault, self->io.drives, self->io.log);
+    if (!supervisor_is_latched(&self->supervisor)) {
+        actions_event(self, EVENT_FAULT, fault->at_us);
+    } else if (is_worse && state == STATE_FAULT) {
+        react(self);
+    }
 }
 
 static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
@@ -171,7 +186,7 @@ static void carry_out(gateway_t *self, action_t action, uint64_t now_us)
         stop_and_disable(self);
         break;
     case ACTION_FAULT_STOP:
-        actions_react(self);
+        react(self);
         break;
     case ACTION_SERVE:
         serve(self, now_us);

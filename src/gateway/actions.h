@@ -23,8 +23,8 @@ bool actions_is_coming_up(const gateway_t *self);
 /** True if a drive or the bus has a fault that a reset would come too early for. */
 bool actions_is_drive_fault_present(const gateway_t *self);
 
-/** Carries out the reaction of the worst fault so far. */
-void actions_react(gateway_t *self);
+/** A fault begins: it is counted and logged, and the worst reaction wins, also over one that is under way. */
+void actions_raise(gateway_t *self, const fault_t *fault);
 
 /** Puts the set-points on the actual positions. */
 void actions_track_actual(gateway_t *self);

@@ -1,40 +1,51 @@
 /* SPDX-License-Identifier: MIT
- * fault_watch.h - finds faults of bus, drives, e-stop channels and supply, and raises each one once.
+ * fault_watch.h - finds faults of bus, drives, e-stop channels and supply, each one once. Knows nothing of what follows.
  * Private to src/gateway.
  */
 #ifndef GATEWAY_FAULT_WATCH_H
 #define GATEWAY_FAULT_WATCH_H
 
 #include "heave/gateway.h"
+#include "feedback.h"
 
-/** Raises a fault: counts and logs it, keeps the first one, and carries out the worst reaction so far. */
-void fault_watch_raise(gateway_t *self, const fault_t *fault);
+/** Of this cycle. */
+typedef struct {
+    const settings_t *settings;
+    drives_t drives; /**< for what they say about a fault */
+    feedback_t feedback;
+    const q32_t *setpoint_mm_q32; /**< of the cylinders, of the last cycle */
+    unsigned cylinders;           /**< one more drive is the rotation motor */
+    uint32_t torque;              /**< drives that have to hold or move something: bit i for axis i + 1 */
+    bool is_coming_up;            /**< the drives are being enabled, or home by themselves */
+    uint64_t now_us;
+} fault_watch_in_t;
 
-/** Ends a reset that still waits for the drives: its operator did not know of the newer fault. */
-void fault_watch_give_up_reset(gateway_t *self);
+/** The bus is lost: the drives no longer get set-points.
+ *  @return true: the fault begins */
+bool fault_watch_bus(fault_watch_t *self, bool is_lost);
 
-/** The report of the drive that a fault is about; empty texts if the fault is about no drive. */
-drive_report_t fault_watch_report_of(const gateway_t *self, const fault_t *fault);
+/** The bus is about to be lost; the drives still get set-points.
+ *  @return true: the fault begins */
+bool fault_watch_bus_failing(fault_watch_t *self, bool is_failing);
 
-/** The bus is lost: the drives no longer get set-points. */
-void fault_watch_bus(gateway_t *self, bool is_lost, uint64_t now_us);
+/** Judges a drive.
+ *  @param i from 0
+ *  @return true: another fault than before begins */
+bool fault_watch_axis(fault_watch_t *self, const fault_watch_in_t *in, unsigned i);
 
-/** The bus is about to be lost; the drives still get set-points. */
-void fault_watch_bus_failing(gateway_t *self, uint64_t now_us);
+/** The two channels of the e-stop disagree.
+ *  @return true: the fault begins */
+bool fault_watch_channels(fault_watch_t *self, bool is_apart);
 
-/** Judges every drive. */
-void fault_watch_drives(gateway_t *self, uint64_t now_us);
+/** The supply fails.
+ *  @param settle_ms a fault if the platform is not down so long after; 0 = never
+ *  @return true: the fault begins */
+bool fault_watch_power(fault_watch_t *self, bool is_failing, uint32_t settle_ms, bool is_down, uint64_t now_us);
 
-/** Raises what gateway_tell_fault() was told and this cycle has not found by itself. */
-void fault_watch_told(gateway_t *self, uint64_t now_us);
-
-/** The two channels of the e-stop disagree. */
-void fault_watch_channels(gateway_t *self, bool is_apart, uint64_t now_us);
-
-/** The supply fails; a fault if the platform is not down in time. */
-void fault_watch_power(gateway_t *self, bool is_failing, uint64_t now_us);
+/** A fault of drive i, with how far off its axis is where heaved has found that, and what the drive says of it. */
+fault_t fault_watch_fault_of(const fault_watch_in_t *in, fault_code_t code, unsigned i);
 
 /** True if the bus has taken no set-points for so long that none can be expected to get through. */
-bool fault_watch_is_bus_stalled(const gateway_t *self);
+bool fault_watch_is_bus_stalled(uint32_t unsent_cycles, uint32_t cycle_us);
 
 #endif

@@ -25,7 +25,13 @@ unsigned feedback_count(feedback_t self, drive_state_t state)
 
 bool feedback_is_well(feedback_t self, bool is_fault_borne)
 {
-    return feedback_count(self, DRIVE_OFFLINE) == 0 && (is_fault_borne || feedback_count(self, DRIVE_FAULT) == 0);
+    for (unsigned i = 0; i < self.count; i++) {
+        const drive_state_t state = self.drive[i].state;
+        if (state == DRIVE_OFFLINE || (state == DRIVE_FAULT && !is_fault_borne)) {
+            return false;
+        }
+    }
+    return true;
 }
 
 bool feedback_has_fault(feedback_t self)

@@ -277,7 +277,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     note_singular_stops(self, now_us);
     s->counters.unconfirmed = self->sender.confirm.dropped;
     s->counters.stretched = motion_stretched_count(&self->motion);
-    for (unsigned i = 0; i < drives_count(self->io.drives); i++) {
+    for (unsigned i = 0; i < service_in.feedback.count; i++) {
         wear_step(&s->wear[i], &s->drive[i], self->settings->cycle_us);
     }
     plate_take(&s->plate, motion_kin(&self->motion), s->drive, &s->sent, now_us);
@@ -295,7 +295,8 @@ void gateway_cycle(gateway_t *self, uint64_t now_us)
     const shutdown_in_t in = {.feedback = actions_feedback(self),
                               .is_down = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor),
                               .is_disable_due = self->is_disable_due,
-                              .is_bus_lost = self->is_bus_lost || fault_watch_is_bus_stalled(self)};
+                              .is_bus_lost = self->fault_watch.is_bus_lost ||
+                                             fault_watch_is_bus_stalled(self->unsent_cycles, self->settings->cycle_us)};
     shutdown_step(&self->shutdown, &in, self->io.log, now_us);
     write_relays(self, now_us);
     publish(self, now_us);

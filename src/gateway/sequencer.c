@@ -6,6 +6,7 @@
 
 #include "auto_engage.h"
 #include "fault_watch.h"
+#include "faults.h"
 #include "actions.h"
 #include "service.h"
 
@@ -18,7 +19,7 @@ static void step_bring_up(gateway_t *self, uint64_t now_us)
 {
     const bool is_late = actions_is_coming_up(self) && now_us >= self->bring_up_deadline_us;
     if (is_late) {
-        fault_watch_raise(self, &(fault_t){.code = FAULT_DRIVE_TIMEOUT, .at_us = now_us});
+        actions_raise(self, &(fault_t){.code = FAULT_DRIVE_TIMEOUT, .at_us = now_us});
         return;
     }
     if (self->bring_up == BRING_UP_ENABLE && !feedback_are_all(actions_feedback(self), DRIVE_ENABLED, true)) {
@@ -63,17 +64,125 @@ static bool is_move_done(const gateway_t *self)
     return false;
 }
 
+static void give_up_reset(gateway_t *self)
+{
+    if (self->reset_until_us != 0) {
+        self->reset_until_us = 0;
+        hal_log_write(self->io.log, HAL_LOG_WARNING, "reset refused: a new fault or the e-stop came after it");
+    }
+}
+
+/* Drives of which torque is expected, in a state that is not OFF. */
+static uint32_t torque_expected(const gateway_t *self)
+{
+    const state_t state = self->supervisor.state;
+    if (state == STATE_SERVICE) {
+        return service_up(&self->service);
+    }
+    const bool is_led = state != STATE_FAULT && state != STATE_ESTOP && !actions_is_coming_up(self) && !self->is_tracking_actual;
+    return is_led ? ~0u : 0;
+}
+
+static fault_watch_in_t watch_in(const gateway_t *self, uint64_t now_us)
+{
+    return (fault_watch_in_t){.settings = self->settings,
+                              .drives = self->io.drives,
+                              .feedback = actions_feedback(self),
+                              .setpoint_mm_q32 = self->output.extension_mm_q32,
+                              .cylinders = self->snapshot.cylinders,
+                              .torque = torque_expected(self),
+                              .is_coming_up = actions_is_coming_up(self),
+                              .now_us = now_us};
+}
+
+static bool is_bus_stalled(const gateway_t *self)
+{
+    return fault_watch_is_bus_stalled(self->unsent_cycles, self->settings->cycle_us);
+}
+
+/* Where nobody hears the set-points any more, a controlled stop would only make them jump when the bus is back. */
+static void watch_bus(gateway_t *self, bool is_heard, uint64_t now_us)
+{
+    const bool is_off = self->supervisor.state == STATE_OFF;
+    const bool is_lost = !is_heard || is_bus_stalled(self);
+    if (fault_watch_bus(&self->fault_watch, is_lost && !is_off)) {
+        give_up_reset(self);
+        actions_raise(self, &(fault_t){.code = FAULT_BUS, .at_us = now_us});
+    }
+    self->is_tracking_actual |= is_lost;
+    if (fault_watch_bus_failing(&self->fault_watch, drives_is_failing(self->io.drives) && self->supervisor.state != STATE_OFF)) {
+        give_up_reset(self);
+        actions_raise(self, &(fault_t){.code = FAULT_BUS_FAILING, .at_us = now_us});
+    }
+}
+
+static void watch_drives(gateway_t *self, uint64_t now_us)
+{
+    fault_watch_in_t in = watch_in(self, now_us);
+    for (unsigned i = 0; i < in.feedback.count; i++) {
+        const bool was_well = self->fault_watch.axis_fault[i] == FAULT_NONE;
+        if (self->supervisor.state == STATE_OFF) {
+            self->fault_watch.axis_fault[i] = FAULT_NONE;
+        } else if (fault_watch_axis(&self->fault_watch, &in, i)) {
+            const fault_t fault = fault_watch_fault_of(&in, self->fault_watch.axis_fault[i], i);
+            if (was_well) { /* else a drive on its way out of the fault that is reset */
+                give_up_reset(self);
+            }
+            actions_raise(self, &fault);
+            in = watch_in(self, now_us); /* it may have led to another state */
+        }
+    }
+}
+
+static void raise_told(gateway_t *self, unsigned axis, uint32_t codes, uint64_t now_us)
+{
+    const fault_watch_in_t in = watch_in(self, now_us);
+    for (unsigned code = FAULT_NONE + 1u; codes >> code != 0; code++) {
+        if ((codes >> code & 1u) != 0) {
+            const fault_t fault = axis != 0 ? fault_watch_fault_of(&in, (fault_code_t)code, axis - 1u)
+                                            : (fault_t){.code = (fault_code_t)code, .at_us = now_us};
+            give_up_reset(self);
+            actions_raise(self, &fault);
+        }
+    }
+}
+
+/* What gateway_tell_fault() was told and this cycle has not found by itself. */
+static void watch_told(gateway_t *self, uint64_t now_us)
+{
+    for (unsigned axis = 0; axis <= DRIVES_MAX; axis++) {
+        if (self->told[axis] != 0 && self->supervisor.state != STATE_OFF) {
+            raise_told(self, axis, self->told[axis] & ~self->snapshot.begun[axis], now_us);
+        }
+        self->told[axis] = 0;
+    }
+}
+
+/* Who leads the platform down is the program around; here it is only watched that it gets there while there is power left. */
+static void watch_power(gateway_t *self, bool is_failing, uint64_t now_us)
+{
+    const state_t state = self->supervisor.state;
+    const bool is_down = state == STATE_OFF || state == STATE_SETTLED || supervisor_is_latched(&self->supervisor);
+    self->snapshot.is_power_failing = is_failing;
+    if (fault_watch_power(&self->fault_watch, is_failing, self->settings->power_settle_ms, is_down, now_us)) {
+        actions_raise(self, &(fault_t){.code = FAULT_POWER, .at_us = now_us});
+    }
+}
+
 static void read_inputs(gateway_t *self, uint64_t now_us)
 {
     uint32_t levels = 0;
     const bool is_read = hal_inputs_read(self->io.inputs, &levels) == HV_OK;
     self->snapshot.is_estop_active = !is_read || (levels & INPUT_ESTOP) != 0;
     if (self->snapshot.is_estop_active) {
-        fault_watch_give_up_reset(self);
+        give_up_reset(self);
         actions_event(self, EVENT_ESTOP, now_us);
     }
-    fault_watch_channels(self, is_read ? (levels & INPUT_APART) != 0 : self->is_estop_apart, now_us);
-    fault_watch_power(self, is_read ? (levels & INPUT_POWER) != 0 : self->snapshot.is_power_failing, now_us);
+    /* The e-stop is active as long as its channels disagree: they are no reason for another state, but one for another look. */
+    if (is_read && fault_watch_channels(&self->fault_watch, (levels & INPUT_APART) != 0)) {
+        actions_raise(self, &(fault_t){.code = FAULT_ESTOP_CHANNELS, .at_us = now_us});
+    }
+    watch_power(self, is_read ? (levels & INPUT_POWER) != 0 : self->snapshot.is_power_failing, now_us);
 }
 
 /* A reset first asks the drives; it takes effect when none of them is in fault any more. */
@@ -87,9 +196,7 @@ static void step_reset(gateway_t *self, uint64_t now_us)
     }
     if (!supervisor_is_latched(&self->supervisor)) {
         self->reset_until_us = 0;
-        self->snapshot.fault = (fault_t){.code = FAULT_NONE};
-        self->snapshot.fault_report = fault_watch_report_of(self, &self->snapshot.fault);
-        self->snapshot.reaction = FAULT_REACT_NONE;
+        faults_clear(&self->snapshot);
     } else if (now_us >= self->reset_until_us) {
         self->reset_until_us = 0;
         hal_log_write(self->io.log, HAL_LOG_WARNING, "reset refused: the cause of the fault or the e-stop is still there");
@@ -140,7 +247,7 @@ static void watch_service(gateway_t *self, uint64_t now_us)
     const service_in_t in = actions_service_in(self, now_us);
     const fault_code_t code = service_step(&self->service, &in);
     if (code != FAULT_NONE) {
-        fault_watch_raise(self, &(fault_t){.code = code, .at_us = now_us});
+        actions_raise(self, &(fault_t){.code = code, .at_us = now_us});
     }
 }
 
@@ -153,10 +260,9 @@ void sequencer_before_frames(gateway_t *self, uint64_t now_us)
         actions_event(self, EVENT_TICK, now_us);
     }
     const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->snapshot.drive) == HV_OK;
-    fault_watch_bus(self, !is_bus_heard || fault_watch_is_bus_stalled(self), now_us);
-    fault_watch_bus_failing(self, now_us);
-    fault_watch_drives(self, now_us);
-    fault_watch_told(self, now_us);
+    watch_bus(self, is_bus_heard, now_us);
+    watch_drives(self, now_us);
+    watch_told(self, now_us);
     read_inputs(self, now_us);
     step_reset(self, now_us);
     step_abandoned(self, now_us);
@@ -249,7 +355,7 @@ static bool is_being_reset(const gateway_t *self)
 bool sequencer_is_well(const gateway_t *self)
 {
     const bool is_state_well = !supervisor_is_latched(&self->supervisor) || is_being_reset(self);
-    const bool is_bus_well = !self->is_bus_lost && !drives_is_failing(self->io.drives) && !fault_watch_is_bus_stalled(self);
+    const bool is_bus_well = !self->fault_watch.is_bus_lost && !drives_is_failing(self->io.drives) && !is_bus_stalled(self);
     const bool is_fault_borne = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor);
     return is_state_well && is_bus_well && feedback_is_well(actions_feedback(self), is_fault_borne) && !self->is_late &&
            !self->shutdown.is_overdue;

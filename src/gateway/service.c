@@ -10,7 +10,7 @@
 
 static uint32_t all_of(const service_in_t *in)
 {
-    return (1u << drives_count(in->drives)) - 1u;
+    return (1u << in->feedback.count) - 1u;
 }
 
 static unsigned motion_axis(const service_in_t *in, unsigned i)
@@ -24,9 +24,9 @@ static uint64_t hand_us(const service_t *self, const service_in_t *in)
     return in->now_us + self->late_us;
 }
 
-bool service_is_up(const service_t *self, unsigned i)
+uint32_t service_up(const service_t *self)
 {
-    return (self->up & ~self->homing) >> i & 1u;
+    return self->up & ~self->homing;
 }
 
 void service_begin(service_t *self, const service_in_t *in, bool has_torque)
@@ -88,7 +88,7 @@ static uint32_t ask_due(const service_in_t *in, uint32_t due, drives_request_t r
     if (due == all_of(in)) {
         return drives_request(in->drives, request) == HV_ERR_AGAIN ? due : 0;
     }
-    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+    for (unsigned i = 0; i < in->feedback.count; i++) {
         if ((due >> i & 1u) != 0 && ask(in, i, request) != HV_ERR_AGAIN) {
             due &= ~(1u << i);
         }
@@ -99,15 +99,15 @@ static uint32_t ask_due(const service_in_t *in, uint32_t due, drives_request_t r
 /* The axis is where its drive is. */
 static void place(const service_in_t *in, unsigned i)
 {
-    motion_place_axis(in->motion, motion_axis(in, i), in->drive[i].actual_mm_q32);
+    motion_place_axis(in->motion, motion_axis(in, i), in->feedback.drive[i].actual_mm_q32);
 }
 
 /* Asks a drive that is to come up, or notes that it has.
  * Returns false where it takes too long. */
 static bool step_up(service_t *self, const service_in_t *in, unsigned i)
 {
-    const drive_state_t state = in->drive[i].state;
-    if (state == DRIVE_ENABLED && in->drive[i].has_actual) {
+    const drive_state_t state = in->feedback.drive[i].state;
+    if (state == DRIVE_ENABLED && in->feedback.drive[i].has_actual) {
         self->up |= 1u << i;
         place(in, i);
     } else if (state == DRIVE_DISABLED && ((self->off_due | self->stop_due) >> i & 1u) == 0) {
@@ -119,7 +119,7 @@ static bool step_up(service_t *self, const service_in_t *in, unsigned i)
 /* Returns false where it takes too long. */
 static bool step_home(service_t *self, const service_in_t *in, unsigned i)
 {
-    const drive_feedback_t *drive = &in->drive[i];
+    const drive_feedback_t *drive = &in->feedback.drive[i];
     if (drive->state == DRIVE_ENABLED && drive->is_homed) {
         self->homing &= ~(1u << i);
         place(in, i); /* on its new zero */
@@ -131,8 +131,8 @@ static bool step_home(service_t *self, const service_in_t *in, unsigned i)
 static void place_loose(service_t *self, const service_in_t *in)
 {
     const uint32_t loose = ~self->up | self->homing;
-    for (unsigned i = 0; i < drives_count(in->drives); i++) {
-        if ((loose >> i & 1u) != 0 && in->drive[i].has_actual) {
+    for (unsigned i = 0; i < in->feedback.count; i++) {
+        if ((loose >> i & 1u) != 0 && in->feedback.drive[i].has_actual) {
             place(in, i);
         }
     }
@@ -149,7 +149,7 @@ fault_code_t service_step(service_t *self, const service_in_t *in)
         self->up &= ~self->off_due;
         self->off_due = ask_due(in, self->off_due, DRIVES_DISABLE);
     }
-    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+    for (unsigned i = 0; i < in->feedback.count; i++) {
         if ((self->homing >> i & 1u) != 0) {
             is_in_time = step_home(self, in, i) && is_in_time;
         } else if (((self->wanted & ~self->up) >> i & 1u) != 0) {
@@ -185,7 +185,7 @@ void service_publish(const service_t *self, const service_in_t *in, service_view
     view->torque = self->up;
     view->homing = self->homing;
     view->has_counts = 0;
-    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+    for (unsigned i = 0; i < in->feedback.count; i++) {
         if (drives_counts(in->drives, (uint8_t)i, &view->counts[i])) {
             view->has_counts |= 1u << i;
         }
@@ -197,7 +197,7 @@ void service_publish(const service_t *self, const service_in_t *in, service_view
 /* The drives that a request names; 0: no such drive. */
 static uint32_t named(const service_in_t *in, uint8_t axis)
 {
-    return axis == SERVICE_ALL ? all_of(in) : axis <= drives_count(in->drives) ? 1u << (axis - 1u) : 0;
+    return axis == SERVICE_ALL ? all_of(in) : axis <= in->feedback.count ? 1u << (axis - 1u) : 0;
 }
 
 static bool has_one_by_one(const service_in_t *in)
@@ -224,7 +224,7 @@ static service_answer_t switch_torque(service_t *self, const service_in_t *in, u
     if (self->doing != SERVICE_NOTHING || !motion_is_at_rest(in->motion) || (self->stop_due & axes) != 0) {
         return SERVICE_BUSY;
     }
-    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+    for (unsigned i = 0; i < in->feedback.count; i++) {
         self->deadline_us[i] = (axes >> i & 1u) != 0 ? in->now_us + UP_TIMEOUT_US : self->deadline_us[i];
     }
     if (!has_one_by_one(in) && drives_request(in->drives, DRIVES_ENABLE) != HV_OK) {
@@ -254,8 +254,8 @@ static service_answer_t answer_of(hv_status_t status)
 
 static bool are_homed(const service_in_t *in, uint32_t axes)
 {
-    for (unsigned i = 0; i < drives_count(in->drives); i++) {
-        if ((axes >> i & 1u) != 0 && !in->drive[i].is_homed) {
+    for (unsigned i = 0; i < in->feedback.count; i++) {
+        if ((axes >> i & 1u) != 0 && !in->feedback.drive[i].is_homed) {
             return false;
         }
     }
@@ -328,7 +328,7 @@ static service_answer_t home(service_t *self, const service_in_t *in, const serv
         return SERVICE_NOT_TAKEN;
     }
     self->homing = axes;
-    for (unsigned i = 0; i < drives_count(in->drives); i++) {
+    for (unsigned i = 0; i < in->feedback.count; i++) {
         self->deadline_us[i] = in->now_us + HOME_TIMEOUT_US;
     }
     return SERVICE_DONE;

@@ -5,14 +5,15 @@
 #define GATEWAY_SERVICE_H
 
 #include "heave/gateway.h"
+#include "feedback.h"
 
 /** What manual operation reads, and what it moves. */
 typedef struct {
     const settings_t *settings;
     drives_t drives;
     motion_t *motion;
-    const drive_feedback_t *drive; /**< of this cycle */
-    uint8_t cylinders;             /**< drives of these; one more is the rotation motor */
+    feedback_t feedback; /**< of this cycle */
+    uint8_t cylinders;   /**< one more drive is the rotation motor */
     uint64_t now_us;
 } service_in_t;
 
@@ -30,8 +31,8 @@ void service_let_go(service_t *self, motion_t *motion);
 /** In SERVICE, see gateway_service(). */
 service_answer_t service_request(service_t *self, const service_in_t *in, const service_request_t *request);
 
-/** True where drive i is meant to hold its position. */
-bool service_is_up(const service_t *self, unsigned i);
+/** Drives that are meant to hold their position: bit i for axis i + 1. */
+uint32_t service_up(const service_t *self);
 
 /** The relays that are asked for in SERVICE. */
 uint16_t service_relays(const service_t *self, uint16_t safe_mask);
