@@ -140,6 +140,15 @@ typedef struct {
     uint64_t power_since_us; /**< start of the failure of the supply; 0 = none */
 } fault_watch_t;
 
+/** Torque of all drives together; members are private to src/gateway. */
+typedef struct {
+    bring_up_t bring_up;
+    uint64_t deadline_us;   /**< of the phase of bringing up */
+    bool is_tracking;       /**< set-points follow the actual positions: drives off, or e-stop */
+    bool is_disable_due;    /**< disable the drives once at rest */
+    uint32_t unsent_cycles; /**< in a row, whose set-points the bus did not take */
+} drive_control_t;
+
 /** The end of the program; members are private to src/gateway. */
 typedef struct {
     bool is_asked;     /**< the platform may not rise any more */
@@ -161,13 +170,9 @@ typedef struct {
     snapshot_t snapshot;
     fault_watch_t fault_watch;
     uint32_t told[DRIVES_MAX + 1u]; /**< faults that the next cycle has to find, as snapshot.begun */
-    bring_up_t bring_up;
-    uint64_t bring_up_deadline_us;
-    bool is_tracking_actual; /**< set-points follow the actual positions: drives off, or e-stop */
-    bool is_disable_due;     /**< disable the drives once at rest */
+    drive_control_t drive_control;
     auto_engage_t auto_engage;
     shutdown_t shutdown;
-    uint32_t unsent_cycles;  /**< cycles in a row whose set-points the bus did not take */
     uint64_t reset_until_us; /**< end of the time in which a reset waits for the drives; 0 = no reset */
     uint64_t state_since_us; /**< when the state was entered */
     service_t service;

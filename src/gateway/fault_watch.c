@@ -6,8 +6,7 @@
 #include "faults.h"
 
 #define FOLLOWING_TIME_US 20000u
-#define OUTSIDE_STROKE_MM 5       /* what a stop gives way, and what a homing switch is off */
-#define UNSENT_MAX_US     100000u /* the drives' own watch is quicker: it knows the period of its bus */
+#define OUTSIDE_STROKE_MM 5 /* what a stop gives way, and what a homing switch is off */
 
 /* Keeps whether something is wrong.
  * Returns true where it begins. */
@@ -43,11 +42,6 @@ bool fault_watch_power(fault_watch_t *self, bool is_failing, uint32_t settle_ms,
     const bool is_overdue =
         is_failing && settle_ms != 0 && !is_down && now_us - self->power_since_us >= (uint64_t)settle_ms * 1000;
     return begins(&self->is_power_overdue, is_overdue);
-}
-
-bool fault_watch_is_bus_stalled(uint32_t unsent_cycles, uint32_t cycle_us)
-{
-    return unsent_cycles * (uint64_t)cycle_us > UNSENT_MAX_US;
 }
 
 static bool is_torque_expected(const fault_watch_in_t *in, unsigned i)

@@ -45,7 +45,4 @@ bool fault_watch_power(fault_watch_t *self, bool is_failing, uint32_t settle_ms,
 /** A fault of drive i, with how far off its axis is where heaved has found that, and what the drive says of it. */
 fault_t fault_watch_fault_of(const fault_watch_in_t *in, fault_code_t code, unsigned i);
 
-/** True if the bus has taken no set-points for so long that none can be expected to get through. */
-bool fault_watch_is_bus_stalled(uint32_t unsent_cycles, uint32_t cycle_us);
-
 #endif

@@ -37,7 +37,7 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
     if (!is_io_valid(io)) {
         return HV_ERR_ARG;
     }
-    *self = (gateway_t){.settings = settings, .io = *io, .is_tracking_actual = true};
+    *self = (gateway_t){.settings = settings, .io = *io, .drive_control = {.is_tracking = true}};
     clear_reports(self);
     gateway_restart_auto(self);
     const hv_status_t status = motion_init(&self->motion, settings);
@@ -88,7 +88,7 @@ void gateway_resume(gateway_t *self, const gateway_t *saved)
 void gateway_start_settled(gateway_t *self)
 {
     supervisor_init_settled(&self->supervisor);
-    self->is_tracking_actual = false;
+    self->drive_control.is_tracking = false;
     if (auto_engage_is_ready(&self->auto_engage, 0)) {
         auto_engage_end(&self->auto_engage);
         self->supervisor.goal = STATE_ENGAGED;
@@ -103,13 +103,14 @@ void gateway_reload(gateway_t *self, const settings_t *settings)
 
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)
 {
-    return sequencer_request(self, request, now_us);
+    const cycle_t cycle = actions_cycle(self, now_us);
+    return sequencer_request(self, request, &cycle);
 }
 
 service_answer_t gateway_service(gateway_t *self, const service_request_t *request, uint64_t now_us)
 {
-    const service_in_t in = actions_service_in(self, now_us);
-    return self->supervisor.state == STATE_SERVICE ? service_request(&self->service, &in, request) : SERVICE_NOT_SERVING;
+    const cycle_t cycle = actions_cycle(self, now_us);
+    return self->supervisor.state == STATE_SERVICE ? service_request(&self->service, &cycle, request) : SERVICE_NOT_SERVING;
 }
 
 uint64_t gateway_tick_age(const gateway_t *self, uint64_t tick_us)
@@ -155,37 +156,26 @@ static bool is_hold_young(const gateway_t *self, uint64_t now_us)
 }
 
 /* Only an engaged sender commands the relays, or a hand in service; the safe mask holds everywhere else. */
-static void write_relays(gateway_t *self, uint64_t now_us)
+static void write_relays(gateway_t *self, const cycle_t *cycle)
 {
-    const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, now_us);
+    const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, cycle->now_us);
     const bool is_serving = self->supervisor.state == STATE_SERVICE;
     const uint16_t wanted = is_sender_heard ? self->sender.frame_mask
                             : is_serving    ? service_relays(&self->service, self->settings->relay_safe_mask)
                                             : self->settings->relay_safe_mask;
     const relay_output_in_t in = {.wanted_mask = wanted,
                                   .is_safe = wanted == self->settings->relay_safe_mask && !is_sender_heard,
-                                  .is_well = sequencer_is_well(self),
+                                  .is_well = sequencer_is_well(self, cycle),
                                   .was_unknown = self->snapshot.is_relays_unknown};
-    const relay_output_out_t out = relay_output_step(&self->relay_output, self->settings, &self->io, &in, now_us);
+    const relay_output_out_t out = relay_output_step(&self->relay_output, self->settings, &self->io, &in, cycle->now_us);
     self->is_late = false;
     self->snapshot.is_healthy = out.is_healthy;
     self->snapshot.is_relays_unknown = out.is_unknown;
     self->snapshot.counters.relay_errors += out.is_refused;
 }
 
-HV_OWN_FRAME static void send_setpoints(gateway_t *self, uint64_t now_us)
-{
-    q32_t setpoint_q32[DRIVES_MAX] = {0};
-    const unsigned cylinders = kin_cylinders(motion_kin(&self->motion));
-    for (unsigned i = 0; i < cylinders; i++) {
-        setpoint_q32[i] = self->output.extension_mm_q32[i];
-    }
-    setpoint_q32[cylinders] = self->output.angle_deg_q32;
-    self->unsent_cycles = drives_send(self->io.drives, now_us, setpoint_q32) == HV_OK ? 0 : self->unsent_cycles + 1;
-}
-
 /* A frame may end a hold, and another sender's first one begins anew. */
-static void take_frame(gateway_t *self, sender_in_t *in, const frame_t *frame)
+static void take_frame(gateway_t *self, sender_in_t *in, const cycle_t *cycle, const frame_t *frame)
 {
     in->state = self->supervisor.state;
     const sender_verdict_t verdict = sender_judge(&self->sender, in, frame);
@@ -197,15 +187,16 @@ static void take_frame(gateway_t *self, sender_in_t *in, const frame_t *frame)
     }
     auto_engage_frame(&self->auto_engage, in->now_us);
     const motion_target_t target = sender_target(&self->sender, in, frame);
-    actions_event(self, EVENT_FRAME, in->now_us);
+    actions_event(self, EVENT_FRAME, cycle);
     in->state = self->supervisor.state;
     if (sender_follow(&self->sender, in, frame, &target)) {
         target_received(&self->snapshot, frame);
     }
 }
 
-static void receive_frames(gateway_t *self, uint64_t now_us)
+static void receive_frames(gateway_t *self, const cycle_t *cycle)
 {
+    const uint64_t now_us = cycle->now_us;
     sender_in_t in = {.settings = self->settings,
                       .io = {self->io.udp, self->io.log, &self->snapshot.counters},
                       .receiver = &self->receiver,
@@ -216,19 +207,10 @@ static void receive_frames(gateway_t *self, uint64_t now_us)
     frame_receiver_begin(&self->receiver);
     sender_begin(&self->sender, now_us);
     while (frame_receiver_next(&self->receiver, self->settings, &in.io, now_us, &frame)) {
-        take_frame(self, &in, &frame);
+        take_frame(self, &in, cycle, &frame);
     }
     in.state = self->supervisor.state;
     sender_end(&self->sender, &in);
-}
-
-/* Motion waits for a bus that has not taken the last set: what the drives get next then follows on what they got last. Where the
- * set-points follow the drives there is nothing to wait for. */
-static void step_motion(gateway_t *self, uint64_t now_us)
-{
-    if (self->unsent_cycles == 0 || self->is_tracking_actual) {
-        motion_step(&self->motion, now_us, &self->output);
-    }
 }
 
 /* One line for the first such stop of a burst. */
@@ -242,8 +224,9 @@ static void note_singular_stops(gateway_t *self, uint64_t now_us)
     self->snapshot.counters.singular_stops = stops;
 }
 
-static void publish(gateway_t *self, uint64_t now_us)
+static void publish(gateway_t *self, const cycle_t *cycle)
 {
+    const uint64_t now_us = cycle->now_us;
     snapshot_t *s = &self->snapshot;
     s->now_us = now_us;
     s->state = self->supervisor.state;
@@ -268,8 +251,7 @@ static void publish(gateway_t *self, uint64_t now_us)
     s->other = self->sender.other;
     s->last_frame_us = self->sender.last_frame_us;
     s->mask_habit = mask_guard_habit(&self->sender.mask_guard, self->settings->mask_policy);
-    const service_in_t service_in = actions_service_in(self, now_us);
-    service_publish(&self->service, &service_in, &s->service);
+    service_publish(&self->service, cycle, &s->service);
     s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
     s->counters.relay_cut = self->relay_output.policy.cut_count;
     s->counters.relay_delayed = self->relay_output.policy.delay_count;
@@ -277,29 +259,37 @@ static void publish(gateway_t *self, uint64_t now_us)
     note_singular_stops(self, now_us);
     s->counters.unconfirmed = self->sender.confirm.dropped;
     s->counters.stretched = motion_stretched_count(&self->motion);
-    for (unsigned i = 0; i < service_in.feedback.count; i++) {
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
         wear_step(&s->wear[i], &s->drive[i], self->settings->cycle_us);
     }
     plate_take(&s->plate, motion_kin(&self->motion), s->drive, &s->sent, now_us);
     s->cycle++;
 }
 
+static void step_shutdown(gateway_t *self, const cycle_t *cycle)
+{
+    const shutdown_in_t in = {.feedback = cycle->feedback,
+                              .is_down = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor),
+                              .is_disable_due = self->drive_control.is_disable_due,
+                              .is_bus_lost = self->fault_watch.is_bus_lost ||
+                                             drive_control_is_bus_stalled(&self->drive_control, self->settings->cycle_us)};
+    shutdown_step(&self->shutdown, &in, self->io.log, cycle->now_us);
+}
+
 void gateway_cycle(gateway_t *self, uint64_t now_us)
 {
-    sequencer_before_frames(self, now_us);
-    receive_frames(self, now_us);
-    sequencer_after_frames(self, now_us);
-    step_motion(self, now_us);
-    send_setpoints(self, now_us);
-    actions_after_motion(self);
-    const shutdown_in_t in = {.feedback = actions_feedback(self),
-                              .is_down = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor),
-                              .is_disable_due = self->is_disable_due,
-                              .is_bus_lost = self->fault_watch.is_bus_lost ||
-                                             fault_watch_is_bus_stalled(self->unsent_cycles, self->settings->cycle_us)};
-    shutdown_step(&self->shutdown, &in, self->io.log, now_us);
-    write_relays(self, now_us);
-    publish(self, now_us);
+    const cycle_t cycle = actions_cycle(self, now_us);
+    sequencer_before_frames(self, &cycle);
+    receive_frames(self, &cycle);
+    sequencer_after_frames(self, &cycle);
+    if (drive_control_takes_motion(&self->drive_control)) {
+        motion_step(&self->motion, now_us, &self->output);
+    }
+    drive_control_send(&self->drive_control, &cycle, &self->output);
+    sequencer_after_motion(self, &cycle);
+    step_shutdown(self, &cycle);
+    write_relays(self, &cycle);
+    publish(self, &cycle);
 }
 
 const snapshot_t *gateway_snapshot(const gateway_t *self)

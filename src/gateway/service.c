@@ -8,20 +8,20 @@
 #define UP_TIMEOUT_US   10000000u
 #define HOME_TIMEOUT_US 120000000u
 
-static uint32_t all_of(const service_in_t *in)
+static uint32_t all_of(const cycle_t *cycle)
 {
-    return (1u << in->feedback.count) - 1u;
+    return (1u << cycle->feedback.count) - 1u;
 }
 
-static unsigned motion_axis(const service_in_t *in, unsigned i)
+static unsigned motion_axis(const cycle_t *cycle, unsigned i)
 {
-    return i < in->cylinders ? i : (unsigned)AXIS_ANGLE;
+    return i < cycle->cylinders ? i : (unsigned)AXIS_ANGLE;
 }
 
 /* A hand's time: that of the gateway, and the cycles that were skipped. */
-static uint64_t hand_us(const service_t *self, const service_in_t *in)
+static uint64_t hand_us(const service_t *self, const cycle_t *cycle)
 {
-    return in->now_us + self->late_us;
+    return cycle->now_us + self->late_us;
 }
 
 uint32_t service_up(const service_t *self)
@@ -29,9 +29,9 @@ uint32_t service_up(const service_t *self)
     return self->up & ~self->homing;
 }
 
-void service_begin(service_t *self, const service_in_t *in, bool has_torque)
+void service_begin(service_t *self, const cycle_t *cycle, bool has_torque)
 {
-    const uint32_t axes = has_torque ? all_of(in) : 0;
+    const uint32_t axes = has_torque ? all_of(cycle) : 0;
     self->doing = SERVICE_NOTHING;
     self->wanted = axes;
     self->up = axes;
@@ -39,14 +39,14 @@ void service_begin(service_t *self, const service_in_t *in, bool has_torque)
     self->off_due = 0;
     self->stop_due = 0;
     deadman_release(&self->hand);
-    motion_serve(in->motion);
+    motion_serve(cycle->motion);
 }
 
 /* --- Letting go --- */
 
-static hv_status_t ask(const service_in_t *in, unsigned i, drives_request_t request)
+static hv_status_t ask(const cycle_t *cycle, unsigned i, drives_request_t request)
 {
-    return drives_request_one(in->drives, (uint8_t)i, request);
+    return drives_request_one(cycle->drives, (uint8_t)i, request);
 }
 
 /* Drives that look for their zero move by themselves: they are stopped, and have no torque then. */
@@ -83,13 +83,13 @@ void service_let_go(service_t *self, motion_t *motion)
 
 /* Asks drives, together where it is all of them, since a bus may know it no other way.
  * Returns those that the bus has not taken it for. */
-static uint32_t ask_due(const service_in_t *in, uint32_t due, drives_request_t request)
+static uint32_t ask_due(const cycle_t *cycle, uint32_t due, drives_request_t request)
 {
-    if (due == all_of(in)) {
-        return drives_request(in->drives, request) == HV_ERR_AGAIN ? due : 0;
+    if (due == all_of(cycle)) {
+        return drives_request(cycle->drives, request) == HV_ERR_AGAIN ? due : 0;
     }
-    for (unsigned i = 0; i < in->feedback.count; i++) {
-        if ((due >> i & 1u) != 0 && ask(in, i, request) != HV_ERR_AGAIN) {
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
+        if ((due >> i & 1u) != 0 && ask(cycle, i, request) != HV_ERR_AGAIN) {
             due &= ~(1u << i);
         }
     }
@@ -97,71 +97,71 @@ static uint32_t ask_due(const service_in_t *in, uint32_t due, drives_request_t r
 }
 
 /* The axis is where its drive is. */
-static void place(const service_in_t *in, unsigned i)
+static void place(const cycle_t *cycle, unsigned i)
 {
-    motion_place_axis(in->motion, motion_axis(in, i), in->feedback.drive[i].actual_mm_q32);
+    motion_place_axis(cycle->motion, motion_axis(cycle, i), cycle->feedback.drive[i].actual_mm_q32);
 }
 
 /* Asks a drive that is to come up, or notes that it has.
  * Returns false where it takes too long. */
-static bool step_up(service_t *self, const service_in_t *in, unsigned i)
+static bool step_up(service_t *self, const cycle_t *cycle, unsigned i)
 {
-    const drive_state_t state = in->feedback.drive[i].state;
-    if (state == DRIVE_ENABLED && in->feedback.drive[i].has_actual) {
+    const drive_state_t state = cycle->feedback.drive[i].state;
+    if (state == DRIVE_ENABLED && cycle->feedback.drive[i].has_actual) {
         self->up |= 1u << i;
-        place(in, i);
+        place(cycle, i);
     } else if (state == DRIVE_DISABLED && ((self->off_due | self->stop_due) >> i & 1u) == 0) {
-        (void)!ask(in, i, DRIVES_ENABLE);
+        (void)!ask(cycle, i, DRIVES_ENABLE);
     }
-    return in->now_us < self->deadline_us[i];
+    return cycle->now_us < self->deadline_us[i];
 }
 
 /* Returns false where it takes too long. */
-static bool step_home(service_t *self, const service_in_t *in, unsigned i)
+static bool step_home(service_t *self, const cycle_t *cycle, unsigned i)
 {
-    const drive_feedback_t *drive = &in->feedback.drive[i];
+    const drive_feedback_t *drive = &cycle->feedback.drive[i];
     if (drive->state == DRIVE_ENABLED && drive->is_homed) {
         self->homing &= ~(1u << i);
-        place(in, i); /* on its new zero */
+        place(cycle, i); /* on its new zero */
     }
-    return in->now_us < self->deadline_us[i];
+    return cycle->now_us < self->deadline_us[i];
 }
 
 /* What has no torque, or moves by itself, is where it is. */
-static void place_loose(service_t *self, const service_in_t *in)
+static void place_loose(service_t *self, const cycle_t *cycle)
 {
     const uint32_t loose = ~self->up | self->homing;
-    for (unsigned i = 0; i < in->feedback.count; i++) {
-        if ((loose >> i & 1u) != 0 && in->feedback.drive[i].has_actual) {
-            place(in, i);
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
+        if ((loose >> i & 1u) != 0 && cycle->feedback.drive[i].has_actual) {
+            place(cycle, i);
         }
     }
 }
 
-fault_code_t service_step(service_t *self, const service_in_t *in)
+fault_code_t service_step(service_t *self, const cycle_t *cycle)
 {
     bool is_in_time = true;
-    if (self->doing != SERVICE_NOTHING && !deadman_step(&self->hand, hand_us(self, in))) {
-        service_let_go(self, in->motion);
+    if (self->doing != SERVICE_NOTHING && !deadman_step(&self->hand, hand_us(self, cycle))) {
+        service_let_go(self, cycle->motion);
     }
-    self->stop_due = ask_due(in, self->stop_due, DRIVES_QUICK_STOP);
-    if (self->off_due != 0 && motion_is_at_rest(in->motion)) {
+    self->stop_due = ask_due(cycle, self->stop_due, DRIVES_QUICK_STOP);
+    if (self->off_due != 0 && motion_is_at_rest(cycle->motion)) {
         self->up &= ~self->off_due;
-        self->off_due = ask_due(in, self->off_due, DRIVES_DISABLE);
+        self->off_due = ask_due(cycle, self->off_due, DRIVES_DISABLE);
     }
-    for (unsigned i = 0; i < in->feedback.count; i++) {
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
         if ((self->homing >> i & 1u) != 0) {
-            is_in_time = step_home(self, in, i) && is_in_time;
+            is_in_time = step_home(self, cycle, i) && is_in_time;
         } else if (((self->wanted & ~self->up) >> i & 1u) != 0) {
-            is_in_time = step_up(self, in, i) && is_in_time;
+            is_in_time = step_up(self, cycle, i) && is_in_time;
         }
     }
-    place_loose(self, in);
-    if (moves_by_hand(self->doing) && motion_is_stopping(in->motion)) {
-        service_let_go(self, in->motion); /* motion stopped what led astray: that is no end of its own */
+    place_loose(self, cycle);
+    if (moves_by_hand(self->doing) && motion_is_stopping(cycle->motion)) {
+        service_let_go(self, cycle->motion); /* motion stopped what led astray: that is no end of its own */
     }
     if ((self->doing == SERVICE_HOME && self->homing == 0) ||
-        (self->has_end && moves_by_hand(self->doing) && motion_is_done(in->motion))) {
+        (self->has_end && moves_by_hand(self->doing) && motion_is_done(cycle->motion))) {
         self->doing = SERVICE_NOTHING;
         self->finished = self->hand.series;
         deadman_release(&self->hand);
@@ -174,9 +174,9 @@ uint16_t service_relays(const service_t *self, uint16_t safe_mask)
     return self->doing == SERVICE_RELAY ? (uint16_t)(safe_mask ^ 1u << (self->axis - 1u)) : safe_mask;
 }
 
-void service_publish(const service_t *self, const service_in_t *in, service_view_t *view)
+void service_publish(const service_t *self, const cycle_t *cycle, service_view_t *view)
 {
-    view->tick_us = hand_us(self, in);
+    view->tick_us = hand_us(self, cycle);
     view->doing = self->doing;
     view->axis = self->axis;
     view->is_held = self->hand.is_held;
@@ -185,8 +185,8 @@ void service_publish(const service_t *self, const service_in_t *in, service_view
     view->torque = self->up;
     view->homing = self->homing;
     view->has_counts = 0;
-    for (unsigned i = 0; i < in->feedback.count; i++) {
-        if (drives_counts(in->drives, (uint8_t)i, &view->counts[i])) {
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
+        if (drives_counts(cycle->drives, (uint8_t)i, &view->counts[i])) {
             view->has_counts |= 1u << i;
         }
     }
@@ -195,39 +195,39 @@ void service_publish(const service_t *self, const service_in_t *in, service_view
 /* --- Requests --- */
 
 /* The drives that a request names; 0: no such drive. */
-static uint32_t named(const service_in_t *in, uint8_t axis)
+static uint32_t named(const cycle_t *cycle, uint8_t axis)
 {
-    return axis == SERVICE_ALL ? all_of(in) : axis <= in->feedback.count ? 1u << (axis - 1u) : 0;
+    return axis == SERVICE_ALL ? all_of(cycle) : axis <= cycle->feedback.count ? 1u << (axis - 1u) : 0;
 }
 
-static bool has_one_by_one(const service_in_t *in)
+static bool has_one_by_one(const cycle_t *cycle)
 {
-    return in->drives.ops->request_one != NULL;
+    return cycle->drives.ops->request_one != NULL;
 }
 
-static service_answer_t switch_torque(service_t *self, const service_in_t *in, uint32_t axes, bool is_on)
+static service_answer_t switch_torque(service_t *self, const cycle_t *cycle, uint32_t axes, bool is_on)
 {
     if (axes == 0) {
         return SERVICE_NO_SUCH;
     }
-    if (axes != all_of(in) && !has_one_by_one(in)) {
+    if (axes != all_of(cycle) && !has_one_by_one(cycle)) {
         return SERVICE_TOGETHER;
     }
     if (!is_on) { /* never refused: what moves stops first */
         if (self->doing != SERVICE_NOTHING && self->doing != SERVICE_RELAY) {
-            service_let_go(self, in->motion);
+            service_let_go(self, cycle->motion);
         }
         self->wanted &= ~axes;
         self->off_due |= axes;
         return SERVICE_DONE;
     }
-    if (self->doing != SERVICE_NOTHING || !motion_is_at_rest(in->motion) || (self->stop_due & axes) != 0) {
+    if (self->doing != SERVICE_NOTHING || !motion_is_at_rest(cycle->motion) || (self->stop_due & axes) != 0) {
         return SERVICE_BUSY;
     }
-    for (unsigned i = 0; i < in->feedback.count; i++) {
-        self->deadline_us[i] = (axes >> i & 1u) != 0 ? in->now_us + UP_TIMEOUT_US : self->deadline_us[i];
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
+        self->deadline_us[i] = (axes >> i & 1u) != 0 ? cycle->now_us + UP_TIMEOUT_US : self->deadline_us[i];
     }
-    if (!has_one_by_one(in) && drives_request(in->drives, DRIVES_ENABLE) != HV_OK) {
+    if (!has_one_by_one(cycle) && drives_request(cycle->drives, DRIVES_ENABLE) != HV_OK) {
         return SERVICE_NOT_TAKEN;
     }
     self->off_due &= ~axes;
@@ -252,109 +252,112 @@ static service_answer_t answer_of(hv_status_t status)
                                      : SERVICE_BUSY;
 }
 
-static bool are_homed(const service_in_t *in, uint32_t axes)
+static bool are_homed(const cycle_t *cycle, uint32_t axes)
 {
-    for (unsigned i = 0; i < in->feedback.count; i++) {
-        if ((axes >> i & 1u) != 0 && !in->feedback.drive[i].is_homed) {
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
+        if ((axes >> i & 1u) != 0 && !cycle->feedback.drive[i].is_homed) {
             return false;
         }
     }
     return true;
 }
 
-static service_answer_t jog_axis(service_t *self, const service_in_t *in, const service_request_t *request)
+static service_answer_t jog_axis(service_t *self, const cycle_t *cycle, const service_request_t *request)
 {
-    const uint32_t axes = request->axis != SERVICE_ALL ? named(in, request->axis) : 0;
+    const uint32_t axes = request->axis != SERVICE_ALL ? named(cycle, request->axis) : 0;
     if (axes == 0) {
         return SERVICE_NO_SUCH;
     }
     if (!are_up(self, axes)) {
         return SERVICE_NO_TORQUE;
     }
-    return answer_of(motion_jog_axis(in->motion, motion_axis(in, request->axis - 1u), request->speed_q16, request->way_q16));
+    return answer_of(
+        motion_jog_axis(cycle->motion, motion_axis(cycle, request->axis - 1u), request->speed_q16, request->way_q16));
 }
 
-static service_answer_t jog_pose(service_t *self, const service_in_t *in, const service_request_t *request)
+static service_answer_t jog_pose(service_t *self, const cycle_t *cycle, const service_request_t *request)
 {
-    const unsigned cylinders = in->cylinders;
+    const unsigned cylinders = cycle->cylinders;
     if (request->axis < 1 || request->axis > POSE_AXES) {
         return SERVICE_NO_SUCH;
     }
     if (!are_up(self, (1u << cylinders) - 1u)) {
         return SERVICE_NO_TORQUE;
     }
-    if (!are_homed(in, (1u << cylinders) - 1u)) {
+    if (!are_homed(cycle, (1u << cylinders) - 1u)) {
         return SERVICE_NOT_HOMED;
     }
-    return answer_of(motion_jog_pose(in->motion, request->axis - 1u, request->speed_q16, request->way_q16));
+    return answer_of(motion_jog_pose(cycle->motion, request->axis - 1u, request->speed_q16, request->way_q16));
 }
 
 /* A signal goes by where things are, so its drives have found their zero. */
-static service_answer_t excite(service_t *self, const service_in_t *in, const service_request_t *request)
+static service_answer_t excite(service_t *self, const cycle_t *cycle, const service_request_t *request)
 {
     const bool is_posed = request->verb == SERVICE_SIGNAL_POSE;
-    const uint32_t axes = is_posed ? (1u << in->cylinders) - 1u : request->axis != SERVICE_ALL ? named(in, request->axis) : 0;
+    const uint32_t axes = is_posed                       ? (1u << cycle->cylinders) - 1u
+                          : request->axis != SERVICE_ALL ? named(cycle, request->axis)
+                                                         : 0;
     if (axes == 0 || (is_posed && (request->axis < 1 || request->axis > POSE_AXES))) {
         return SERVICE_NO_SUCH;
     }
-    if (!excitation_is_allowed(&request->signal, in->settings->cycle_us)) {
+    if (!excitation_is_allowed(&request->signal, cycle->settings->cycle_us)) {
         return SERVICE_BAD_SIGNAL;
     }
     if (!are_up(self, axes)) {
         return SERVICE_NO_TORQUE;
     }
-    if (!are_homed(in, axes)) {
+    if (!are_homed(cycle, axes)) {
         return SERVICE_NOT_HOMED;
     }
-    return answer_of(is_posed ? motion_excite_pose(in->motion, request->axis - 1u, &request->signal)
-                              : motion_excite_axis(in->motion, motion_axis(in, request->axis - 1u), &request->signal));
+    return answer_of(is_posed ? motion_excite_pose(cycle->motion, request->axis - 1u, &request->signal)
+                              : motion_excite_axis(cycle->motion, motion_axis(cycle, request->axis - 1u), &request->signal));
 }
 
-static service_answer_t home(service_t *self, const service_in_t *in, const service_request_t *request)
+static service_answer_t home(service_t *self, const cycle_t *cycle, const service_request_t *request)
 {
-    const uint32_t axes = named(in, request->axis);
+    const uint32_t axes = named(cycle, request->axis);
     if (axes == 0) {
         return SERVICE_NO_SUCH;
     }
     if (!are_up(self, axes)) {
         return SERVICE_NO_TORQUE;
     }
-    if (axes != all_of(in) && !has_one_by_one(in)) {
+    if (axes != all_of(cycle) && !has_one_by_one(cycle)) {
         return SERVICE_TOGETHER;
     }
     const hv_status_t status =
-        axes == all_of(in) ? drives_request(in->drives, DRIVES_HOME) : ask(in, request->axis - 1u, DRIVES_HOME);
+        axes == all_of(cycle) ? drives_request(cycle->drives, DRIVES_HOME) : ask(cycle, request->axis - 1u, DRIVES_HOME);
     if (status != HV_OK) {
         return SERVICE_NOT_TAKEN;
     }
     self->homing = axes;
-    for (unsigned i = 0; i < in->feedback.count; i++) {
-        self->deadline_us[i] = in->now_us + HOME_TIMEOUT_US;
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
+        self->deadline_us[i] = cycle->now_us + HOME_TIMEOUT_US;
     }
     return SERVICE_DONE;
 }
 
-static service_answer_t take_relay(const service_in_t *in, uint8_t relay)
+static service_answer_t take_relay(const cycle_t *cycle, uint8_t relay)
 {
-    return relay < 1 || relay > in->settings->relays.count ? SERVICE_NO_SUCH
-           : relay == in->settings->healthy.relay          ? SERVICE_PULSE
-                                                           : SERVICE_DONE;
+    return relay < 1 || relay > cycle->settings->relays.count ? SERVICE_NO_SUCH
+           : relay == cycle->settings->healthy.relay          ? SERVICE_PULSE
+                                                              : SERVICE_DONE;
 }
 
-static service_answer_t start(service_t *self, const service_in_t *in, const service_request_t *request)
+static service_answer_t start(service_t *self, const cycle_t *cycle, const service_request_t *request)
 {
     switch (request->verb) {
     case SERVICE_JOG_AXIS:
-        return jog_axis(self, in, request);
+        return jog_axis(self, cycle, request);
     case SERVICE_JOG_POSE:
-        return jog_pose(self, in, request);
+        return jog_pose(self, cycle, request);
     case SERVICE_HOME:
-        return home(self, in, request);
+        return home(self, cycle, request);
     case SERVICE_RELAY:
-        return take_relay(in, request->axis);
+        return take_relay(cycle, request->axis);
     case SERVICE_SIGNAL_AXIS:
     case SERVICE_SIGNAL_POSE:
-        return excite(self, in, request);
+        return excite(self, cycle, request);
     case SERVICE_NOTHING:
     case SERVICE_TORQUE_ON:
     case SERVICE_TORQUE_OFF:
@@ -375,17 +378,17 @@ static service_answer_t answer_of_hand(deadman_answer_t answer)
 }
 
 /* The proof first: what is stale must not even begin. */
-static service_answer_t hold(service_t *self, const service_in_t *in, const service_request_t *request)
+static service_answer_t hold(service_t *self, const cycle_t *cycle, const service_request_t *request)
 {
     deadman_t hand = self->hand;
-    const deadman_answer_t pressed = deadman_press(&hand, request->series, request->age_us, hand_us(self, in));
+    const deadman_answer_t pressed = deadman_press(&hand, request->series, request->age_us, hand_us(self, cycle));
     if (pressed != DEADMAN_TAKEN) {
         return answer_of_hand(pressed);
     }
     if (self->doing != SERVICE_NOTHING) {
         return SERVICE_BUSY;
     }
-    const service_answer_t answer = start(self, in, request);
+    const service_answer_t answer = start(self, cycle, request);
     if (answer == SERVICE_DONE) {
         self->hand = hand;
         self->doing = request->verb;
@@ -404,19 +407,20 @@ static service_answer_t release(service_t *self, motion_t *motion, uint32_t seri
     return SERVICE_DONE;
 }
 
-service_answer_t service_request(service_t *self, const service_in_t *in, const service_request_t *request)
+service_answer_t service_request(service_t *self, const cycle_t *cycle, const service_request_t *request)
 {
     if (service_is_held(request->verb)) {
-        return hold(self, in, request);
+        return hold(self, cycle, request);
     }
     switch (request->verb) {
     case SERVICE_TORQUE_ON:
     case SERVICE_TORQUE_OFF:
-        return switch_torque(self, in, named(in, request->axis), request->verb == SERVICE_TORQUE_ON);
+        return switch_torque(self, cycle, named(cycle, request->axis), request->verb == SERVICE_TORQUE_ON);
     case SERVICE_BEAT:
-        return answer_of_hand(deadman_beat(&self->hand, request->series, request->counter, request->age_us, hand_us(self, in)));
+        return answer_of_hand(
+            deadman_beat(&self->hand, request->series, request->counter, request->age_us, hand_us(self, cycle)));
     case SERVICE_RELEASE:
-        return release(self, in->motion, request->series);
+        return release(self, cycle->motion, request->series);
     case SERVICE_NOTHING:
     case SERVICE_JOG_AXIS:
     case SERVICE_JOG_POSE:
