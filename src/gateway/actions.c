@@ -12,27 +12,17 @@ feedback_t actions_feedback(const gateway_t *self)
     return (feedback_t){self->snapshot.drive, self->snapshot.cylinders + (self->snapshot.has_angle ? 1u : 0u)};
 }
 
-static supervisor_view_t view_of(const gateway_t *self, const cycle_t *cycle)
-{
-    return (supervisor_view_t){
-        .is_at_settled = drive_control_is_at_settled(cycle),
-        .is_at_rest = motion_is_at_rest(&self->motion),
-        .is_fault_present = drive_control_has_fault(cycle),
-        .is_estop_active = self->snapshot.is_estop_active,
-    };
-}
-
-static void log_change(gateway_t *self, state_t from, event_t event)
+static void log_change(hal_log_t log, state_t from, state_t to, event_t event)
 {
     char line[HAL_LOG_TEXT_MAX + 1];
     text_t text = text_start(line, sizeof line);
     text_put(&text, state_name(from));
     text_put(&text, " -> ");
-    text_put(&text, state_name(self->supervisor.state));
+    text_put(&text, state_name(to));
     text_put(&text, " (");
     text_put(&text, event_name(event));
     text_put(&text, ")");
-    hal_log_write(self->io.log, supervisor_is_latched(&self->supervisor) ? HAL_LOG_ERROR : HAL_LOG_NOTICE, line);
+    hal_log_write(log, to == STATE_FAULT || to == STATE_ESTOP ? HAL_LOG_ERROR : HAL_LOG_NOTICE, line);
 }
 
 void actions_follow(gateway_t *self, uint64_t now_us)
@@ -42,12 +32,12 @@ void actions_follow(gateway_t *self, uint64_t now_us)
 }
 
 /* What the worst fault so far asks for. */
-static void react(gateway_t *self, const cycle_t *cycle)
+static void react(drive_control_t *control, fault_reaction_t reaction, const cycle_t *cycle)
 {
-    if (self->snapshot.reaction >= FAULT_REACT_QUICK_STOP) {
-        drive_control_drop(&self->drive_control, cycle);
+    if (reaction >= FAULT_REACT_QUICK_STOP) {
+        drive_control_drop(control, cycle);
     } else {
-        drive_control_stop(&self->drive_control, cycle);
+        drive_control_stop(control, cycle);
     }
 }
 
@@ -61,12 +51,6 @@ cycle_t actions_cycle(gateway_t *self, uint64_t now_us)
                      .now_us = now_us};
 }
 
-static void serve(gateway_t *self, const cycle_t *cycle)
-{
-    service_begin(&self->service, cycle, !self->drive_control.is_tracking);
-    self->drive_control.is_tracking = false;
-}
-
 void actions_raise(gateway_t *self, const fault_t *fault, const cycle_t *cycle)
 {
     const state_t state = self->supervisor.state;
@@ -77,7 +61,7 @@ void actions_raise(gateway_t *self, const fault_t *fault, const cycle_t *cycle)
     if (!supervisor_is_latched(&self->supervisor)) {
         actions_event(self, EVENT_FAULT, cycle);
     } else if (is_worse && state == STATE_FAULT) {
-        react(self, cycle);
+        react(&self->drive_control, self->snapshot.reaction, cycle);
     }
 }
 
@@ -103,10 +87,11 @@ static void carry_out(gateway_t *self, action_t action, const cycle_t *cycle)
         drive_control_stop(&self->drive_control, cycle);
         break;
     case ACTION_FAULT_STOP:
-        react(self, cycle);
+        react(&self->drive_control, self->snapshot.reaction, cycle);
         break;
     case ACTION_SERVE:
-        serve(self, cycle);
+        service_begin(&self->service, cycle, !self->drive_control.is_tracking);
+        self->drive_control.is_tracking = false;
         break;
     case ACTION_ESTOP:
         drive_control_drop(&self->drive_control, cycle);
@@ -120,12 +105,15 @@ static void carry_out(gateway_t *self, action_t action, const cycle_t *cycle)
 void actions_event(gateway_t *self, event_t event, const cycle_t *cycle)
 {
     const state_t before = self->supervisor.state;
-    const supervisor_view_t view = view_of(self, cycle);
+    const supervisor_view_t view = {.is_at_settled = drive_control_is_at_settled(cycle),
+                                    .is_at_rest = motion_is_at_rest(cycle->motion),
+                                    .is_fault_present = drive_control_has_fault(cycle),
+                                    .is_estop_active = self->snapshot.is_estop_active};
     const action_t action = supervisor_event(&self->supervisor, event, &view);
     if (self->supervisor.state != before) {
         self->state_since_us = cycle->now_us;
         self->snapshot.rides += before == STATE_NEUTRAL && self->supervisor.state == STATE_ENGAGED;
-        log_change(self, before, event);
+        log_change(self->io.log, before, self->supervisor.state, event);
     }
     carry_out(self, action, cycle);
 }

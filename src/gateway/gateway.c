@@ -24,11 +24,11 @@ static bool is_io_valid(const gateway_io_t *io)
 }
 
 /* Texts of drives that have said nothing yet. */
-static void clear_reports(gateway_t *self)
+static void clear_reports(snapshot_t *shown)
 {
-    self->snapshot.fault_report = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
+    shown->fault_report = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        self->snapshot.report[i] = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
+        shown->report[i] = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
     }
 }
 
@@ -38,7 +38,7 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
         return HV_ERR_ARG;
     }
     *self = (gateway_t){.settings = settings, .io = *io, .drive_control = {.is_tracking = true}};
-    clear_reports(self);
+    clear_reports(&self->snapshot);
     gateway_restart_auto(self);
     const hv_status_t status = motion_init(&self->motion, settings);
     if (status != HV_OK) {
@@ -82,7 +82,7 @@ void gateway_resume(gateway_t *self, const gateway_t *saved)
     self->settings = settings;
     self->io = io;
     frame_scanner_init(&self->receiver.scanner, self->settings->dialect); /* it starts anew with every datagram */
-    clear_reports(self);
+    clear_reports(&self->snapshot);
 }
 
 void gateway_start_settled(gateway_t *self)

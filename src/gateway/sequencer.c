@@ -14,14 +14,14 @@
 #define ABANDON_TIMEOUT_US 3000000u
 
 /* The move of HOMING, RISING or SETTLING has arrived. */
-static bool is_move_done(const gateway_t *self, const cycle_t *cycle)
+static bool is_move_done(state_t state, const drive_control_t *control, const cycle_t *cycle)
 {
-    switch (self->supervisor.state) {
+    switch (state) {
     case STATE_HOMING:
-        return drive_control_has_arrived(&self->drive_control, cycle);
+        return drive_control_has_arrived(control, cycle);
     case STATE_RISING:
     case STATE_SETTLING:
-        return motion_is_done(&self->motion);
+        return motion_is_done(cycle->motion);
     case STATE_OFF:
     case STATE_SETTLED:
     case STATE_NEUTRAL:
@@ -36,22 +36,21 @@ static bool is_move_done(const gateway_t *self, const cycle_t *cycle)
     return false;
 }
 
-static void give_up_reset(gateway_t *self)
+static void give_up_reset(uint64_t *until_us, hal_log_t log)
 {
-    if (self->reset_until_us != 0) {
-        self->reset_until_us = 0;
-        hal_log_write(self->io.log, HAL_LOG_WARNING, "reset refused: a new fault or the e-stop came after it");
+    if (*until_us != 0) {
+        *until_us = 0;
+        hal_log_write(log, HAL_LOG_WARNING, "reset refused: a new fault or the e-stop came after it");
     }
 }
 
 /* Drives of which torque is expected, in a state that is not OFF. */
-static uint32_t torque_expected(const gateway_t *self)
+static uint32_t torque_expected(state_t state, const service_t *service, const drive_control_t *control)
 {
-    const state_t state = self->supervisor.state;
     if (state == STATE_SERVICE) {
-        return service_up(&self->service);
+        return service_up(service);
     }
-    const bool is_led = state != STATE_FAULT && state != STATE_ESTOP && drive_control_is_leading(&self->drive_control);
+    const bool is_led = state != STATE_FAULT && state != STATE_ESTOP && drive_control_is_leading(control);
     return is_led ? ~0u : 0;
 }
 
@@ -62,7 +61,7 @@ static fault_watch_in_t watch_in(const gateway_t *self, const cycle_t *cycle)
                               .feedback = cycle->feedback,
                               .setpoint_mm_q32 = self->output.extension_mm_q32,
                               .cylinders = self->snapshot.cylinders,
-                              .torque = torque_expected(self),
+                              .torque = torque_expected(self->supervisor.state, &self->service, &self->drive_control),
                               .is_coming_up = drive_control_is_coming_up(&self->drive_control),
                               .now_us = cycle->now_us};
 }
@@ -73,12 +72,12 @@ static void watch_bus(gateway_t *self, bool is_heard, const cycle_t *cycle)
     const bool is_off = self->supervisor.state == STATE_OFF;
     const bool is_lost = !is_heard || drive_control_is_bus_stalled(&self->drive_control, self->settings->cycle_us);
     if (fault_watch_bus(&self->fault_watch, is_lost && !is_off)) {
-        give_up_reset(self);
+        give_up_reset(&self->reset_until_us, self->io.log);
         actions_raise(self, &(fault_t){.code = FAULT_BUS, .at_us = cycle->now_us}, cycle);
     }
     self->drive_control.is_tracking |= is_lost;
     if (fault_watch_bus_failing(&self->fault_watch, drives_is_failing(self->io.drives) && self->supervisor.state != STATE_OFF)) {
-        give_up_reset(self);
+        give_up_reset(&self->reset_until_us, self->io.log);
         actions_raise(self, &(fault_t){.code = FAULT_BUS_FAILING, .at_us = cycle->now_us}, cycle);
     }
 }
@@ -93,7 +92,7 @@ static void watch_drives(gateway_t *self, const cycle_t *cycle)
         } else if (fault_watch_axis(&self->fault_watch, &in, i)) {
             const fault_t fault = fault_watch_fault_of(&in, self->fault_watch.axis_fault[i], i);
             if (was_well) { /* else a drive on its way out of the fault that is reset */
-                give_up_reset(self);
+                give_up_reset(&self->reset_until_us, self->io.log);
             }
             actions_raise(self, &fault, cycle);
             in = watch_in(self, cycle); /* it may have led to another state */
@@ -108,7 +107,7 @@ static void raise_told(gateway_t *self, unsigned axis, uint32_t codes, const cyc
         if ((codes >> code & 1u) != 0) {
             const fault_t fault = axis != 0 ? fault_watch_fault_of(&in, (fault_code_t)code, axis - 1u)
                                             : (fault_t){.code = (fault_code_t)code, .at_us = cycle->now_us};
-            give_up_reset(self);
+            give_up_reset(&self->reset_until_us, self->io.log);
             actions_raise(self, &fault, cycle);
         }
     }
@@ -142,7 +141,7 @@ static void read_inputs(gateway_t *self, const cycle_t *cycle)
     const bool is_read = hal_inputs_read(self->io.inputs, &levels) == HV_OK;
     self->snapshot.is_estop_active = !is_read || (levels & INPUT_ESTOP) != 0;
     if (self->snapshot.is_estop_active) {
-        give_up_reset(self);
+        give_up_reset(&self->reset_until_us, self->io.log);
         actions_event(self, EVENT_ESTOP, cycle);
     }
     /* The e-stop is active as long as its channels disagree: they are no reason for another state, but one for another look. */
@@ -186,19 +185,18 @@ static void step_abandoned(gateway_t *self, const cycle_t *cycle)
 }
 
 /* Who ends the other master, or resets what it has led to, does not expect that this one raises the platform. */
-static void void_auto(gateway_t *self, const cycle_t *cycle)
+static void void_auto(auto_engage_t *policy, feedback_t feedback, hal_log_t log)
 {
-    if (self->auto_engage.is_due && feedback_has_other_master(cycle->feedback)) {
-        auto_engage_end(&self->auto_engage);
-        hal_log_write(self->io.log, HAL_LOG_WARNING,
-                      "engage = auto is void: another master is on the bus; an operator has to engage");
+    if (policy->is_due && feedback_has_other_master(feedback)) {
+        auto_engage_end(policy);
+        hal_log_write(log, HAL_LOG_WARNING, "engage = auto is void: another master is on the bus; an operator has to engage");
     }
 }
 
 /* The auto policy, once: brings the platform up as an operator's engage would. */
 static void step_auto(gateway_t *self, const cycle_t *cycle)
 {
-    void_auto(self, cycle);
+    void_auto(&self->auto_engage, cycle->feedback, self->io.log);
     const state_t state = self->supervisor.state;
     const bool can_engage = (state == STATE_OFF && !drive_control_has_fault(cycle)) || state == STATE_SETTLED;
     if (can_engage && auto_engage_is_ready(&self->auto_engage, cycle->now_us)) {
@@ -243,7 +241,7 @@ void sequencer_before_frames(gateway_t *self, const cycle_t *cycle)
     if (!drive_control_bring_up(&self->drive_control, cycle)) {
         actions_raise(self, &(fault_t){.code = FAULT_DRIVE_TIMEOUT, .at_us = cycle->now_us}, cycle);
     }
-    if (is_move_done(self, cycle)) {
+    if (is_move_done(self->supervisor.state, &self->drive_control, cycle)) {
         self->drive_control.bring_up = BRING_UP_IDLE;
         actions_event(self, EVENT_MOVE_DONE, cycle);
     }
@@ -253,11 +251,10 @@ void sequencer_before_frames(gateway_t *self, const cycle_t *cycle)
 }
 
 /* How the torque goes off where it is due. */
-static drives_request_t how_off(const gateway_t *self)
+static drives_request_t how_off(state_t state, fault_reaction_t reaction)
 {
-    const state_t state = self->supervisor.state;
-    const bool is_quick = state == STATE_ESTOP || state == STATE_HOLD ||
-                          (state == STATE_FAULT && self->snapshot.reaction >= FAULT_REACT_QUICK_STOP);
+    const bool is_quick =
+        state == STATE_ESTOP || state == STATE_HOLD || (state == STATE_FAULT && reaction >= FAULT_REACT_QUICK_STOP);
     return is_quick ? DRIVES_QUICK_STOP : DRIVES_DISABLE;
 }
 
@@ -279,12 +276,12 @@ void sequencer_after_frames(gateway_t *self, const cycle_t *cycle)
     if (has_passed(cycle->now_us, since_us, self->settings->silence_settle_ms)) {
         actions_event(self, EVENT_SILENCE_SETTLE, cycle);
     }
-    drive_control_before_motion(&self->drive_control, cycle, how_off(self));
+    drive_control_before_motion(&self->drive_control, cycle, how_off(self->supervisor.state, self->snapshot.reaction));
 }
 
 void sequencer_after_motion(gateway_t *self, const cycle_t *cycle)
 {
-    drive_control_after_motion(&self->drive_control, cycle, how_off(self));
+    drive_control_after_motion(&self->drive_control, cycle, how_off(self->supervisor.state, self->snapshot.reaction));
 }
 
 hv_status_t sequencer_request(gateway_t *self, event_t request, const cycle_t *cycle)
@@ -322,16 +319,13 @@ hv_status_t sequencer_request(gateway_t *self, event_t request, const cycle_t *c
 
 /* --- Health --- */
 
-/* A person has asked for a reset and nothing moves: drives whose safe-torque-off is a fault to them can only come back where the
- * pulse comes first. */
-static bool is_being_reset(const gateway_t *self, const cycle_t *cycle)
-{
-    return self->reset_until_us != 0 && !self->snapshot.is_estop_active && feedback_energized(cycle->feedback, false) == 0;
-}
-
 bool sequencer_is_well(const gateway_t *self, const cycle_t *cycle)
 {
-    const bool is_state_well = !supervisor_is_latched(&self->supervisor) || is_being_reset(self, cycle);
+    /* A person has asked for a reset and nothing moves: drives whose safe-torque-off is a fault to them can only come back where
+     * the pulse comes first. */
+    const bool is_being_reset =
+        self->reset_until_us != 0 && !self->snapshot.is_estop_active && feedback_energized(cycle->feedback, false) == 0;
+    const bool is_state_well = !supervisor_is_latched(&self->supervisor) || is_being_reset;
     const bool is_bus_well = !self->fault_watch.is_bus_lost && !drives_is_failing(self->io.drives) &&
                              !drive_control_is_bus_stalled(&self->drive_control, self->settings->cycle_us);
     const bool is_fault_borne = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor);
