@@ -50,7 +50,7 @@ endfunction()
 
 # heave_unit_test(NAME [SOURCE...]): one executable per module, tests/unit/test_NAME.c, linked with the core.
 function(heave_unit_test name)
-  add_executable(test_${name} test_${name}.c ${ARGN})
+  add_executable(test_${name} test_${name}.c ${PROJECT_SOURCE_DIR}/tests/support/unity_assert.c ${ARGN})
   target_link_libraries(test_${name} PRIVATE heave_core unity m)
   target_compile_definitions(test_${name} PRIVATE HEAVE_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data")
   # on the file, because a target's own options stand before those of heave_options and would lose

@@ -59,6 +59,7 @@ typedef struct {
     uint64_t now_us;
     state_t state;
     state_t goal;
+    state_t interrupted; /**< by the last hold */
     bool is_held_by_silence;
     bool is_estop_active;
     bool is_power_failing;

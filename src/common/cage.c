@@ -51,20 +51,15 @@ static bool is_from_outside(int signal)
     return signal == SIGINT || signal == SIGTERM || signal == SIGHUP || signal == SIGQUIT || signal == SIGPIPE;
 }
 
-/* The C library would end all threads of the process, which the cage does not allow. */
-__attribute__((noreturn)) static void end(int code)
-{
-    for (;;) {
-        (void)syscall(SYS_exit, code);
-    }
-}
-
 int cage_run(int (*run)(void *ctx), void *ctx, int output, unsigned seconds)
 {
     int status = 0;
     const pid_t child = fork();
     if (child == 0) {
-        end(enter(output, seconds) ? run(ctx) : NO_CAGE);
+        const int code = enter(output, seconds) ? run(ctx) : NO_CAGE;
+        for (;;) { /* the C library would end all threads of the process, which the cage does not allow */
+            (void)syscall(SYS_exit, code);
+        }
     }
     while (child > 0 && waitpid(child, &status, 0) < 0 && errno == EINTR) {}
     if (child < 0 || (WIFEXITED(status) && WEXITSTATUS(status) == NO_CAGE)) {

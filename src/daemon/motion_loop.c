@@ -66,8 +66,8 @@ static void take_reloads(motion_loop_t *self)
 /* A hold of drives that were coming up has disabled them. */
 static bool is_down(const motion_loop_t *self)
 {
-    const state_t state = gateway_snapshot(&self->session.gateway)->state;
-    return state == STATE_OFF || (state == STATE_HOLD && self->before_hold == STATE_HOMING);
+    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
+    return s->state == STATE_OFF || (s->state == STATE_HOLD && s->interrupted == STATE_HOMING);
 }
 
 /* Without the key nothing goes up, and drives stay off. */
@@ -178,7 +178,7 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
 static void take_end(motion_loop_t *self)
 {
     const bool is_due = __atomic_exchange_n(&self->handover.is_end_due, 0, __ATOMIC_ACQ_REL) != 0;
-    const bool is_held = gateway_snapshot(&self->session.gateway)->state == STATE_HOLD && self->before_hold != STATE_HOMING;
+    const bool is_held = gateway_snapshot(&self->session.gateway)->state == STATE_HOLD && !is_down(self);
     if (delayed_end_step(&self->end, is_due, is_held, self->session.now_us)) {
         (void)!carry_out(self, &(motion_request_t){.event = EVENT_SHUTDOWN});
     }
@@ -344,12 +344,6 @@ static void note_latency(motion_loop_t *self)
     }
 }
 
-static void note_hold(motion_loop_t *self)
-{
-    const state_t state = gateway_snapshot(&self->session.gateway)->state;
-    self->before_hold = state == STATE_HOLD ? self->before_hold : state;
-}
-
 static void run_cycle(motion_loop_t *self, uint64_t late_us)
 {
     motion_result_t result[REQUESTS_PER_CYCLE];
@@ -367,7 +361,6 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     self->tap.late_us = late_us;
     const bool is_zero = session_cycle(&self->session);
     note_latency(self);
-    note_hold(self);
     motion_write_down(self, is_zero);
     publish(self);
     samples_writer_add(&self->samples, gateway_snapshot(&self->session.gateway), late_us, self->work_us);

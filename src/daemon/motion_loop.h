@@ -26,7 +26,6 @@ typedef struct {
     udp_recorder_t tap;
     switches_t switches; /**< between the inputs and the gateway */
     bool was_blind;      /**< the inputs could not be read */
-    state_t before_hold; /**< newest state other than HOLD */
     delayed_end_t end;
     hal_clock_t clock;
     uint32_t late_hold_cycles; /**< the platform is held if more cycles than this are late at once; 0 = never */

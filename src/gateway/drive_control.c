@@ -89,13 +89,13 @@ static void lead(drive_control_t *self, const cycle_t *cycle)
     motion_settle(cycle->motion);
 }
 
-bool drive_control_bring_up(drive_control_t *self, const cycle_t *cycle)
+fault_code_t drive_control_bring_up(drive_control_t *self, const cycle_t *cycle)
 {
     if (!drive_control_is_coming_up(self)) {
-        return true;
+        return FAULT_NONE;
     }
     if (cycle->now_us >= self->deadline_us) {
-        return false;
+        return FAULT_DRIVE_TIMEOUT;
     }
     if (feedback_are_all(cycle->feedback, DRIVE_ENABLED, true)) {
         lead(self, cycle);
@@ -108,7 +108,7 @@ bool drive_control_bring_up(drive_control_t *self, const cycle_t *cycle)
             self->deadline_us = cycle->now_us + HOMING_TIMEOUT_US;
         }
     }
-    return true;
+    return FAULT_NONE;
 }
 
 bool drive_control_has_arrived(const drive_control_t *self, const cycle_t *cycle)

@@ -35,8 +35,8 @@ void drive_control_stop(drive_control_t *self, const cycle_t *cycle);
 void drive_control_drop(drive_control_t *self, const cycle_t *cycle);
 
 /** The next step of bringing up, once the last one is complete.
- *  @return false: it takes too long */
-bool drive_control_bring_up(drive_control_t *self, const cycle_t *cycle);
+ *  @return FAULT_DRIVE_TIMEOUT: it takes too long; else FAULT_NONE */
+fault_code_t drive_control_bring_up(drive_control_t *self, const cycle_t *cycle);
 
 /** True when a platform that was brought up has arrived at the settled extension. */
 bool drive_control_has_arrived(const drive_control_t *self, const cycle_t *cycle);

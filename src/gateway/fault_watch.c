@@ -9,30 +9,30 @@
 #define OUTSIDE_STROKE_MM 5 /* what a stop gives way, and what a homing switch is off */
 
 /* Keeps whether something is wrong.
- * Returns true where it begins. */
-static bool begins(bool *is_wrong, bool is_now)
+ * Returns the fault where it begins. */
+static fault_code_t begun(bool *is_wrong, bool is_now, fault_code_t code)
 {
     const bool was = *is_wrong;
     *is_wrong = is_now;
-    return is_now && !was;
+    return is_now && !was ? code : FAULT_NONE;
 }
 
-bool fault_watch_bus(fault_watch_t *self, bool is_lost)
+fault_code_t fault_watch_bus(fault_watch_t *self, bool is_lost)
 {
-    return begins(&self->is_bus_lost, is_lost);
+    return begun(&self->is_bus_lost, is_lost, FAULT_BUS);
 }
 
-bool fault_watch_bus_failing(fault_watch_t *self, bool is_failing)
+fault_code_t fault_watch_bus_failing(fault_watch_t *self, bool is_failing)
 {
-    return begins(&self->is_bus_failing, is_failing);
+    return begun(&self->is_bus_failing, is_failing, FAULT_BUS_FAILING);
 }
 
-bool fault_watch_channels(fault_watch_t *self, bool is_apart)
+fault_code_t fault_watch_channels(fault_watch_t *self, bool is_apart)
 {
-    return begins(&self->is_estop_apart, is_apart);
+    return begun(&self->is_estop_apart, is_apart, FAULT_ESTOP_CHANNELS);
 }
 
-bool fault_watch_power(fault_watch_t *self, bool is_failing, uint32_t settle_ms, bool is_down, uint64_t now_us)
+fault_code_t fault_watch_power(fault_watch_t *self, bool is_failing, uint32_t settle_ms, bool is_down, uint64_t now_us)
 {
     if (!is_failing) {
         self->power_since_us = 0;
@@ -41,7 +41,7 @@ bool fault_watch_power(fault_watch_t *self, bool is_failing, uint32_t settle_ms,
     }
     const bool is_overdue =
         is_failing && settle_ms != 0 && !is_down && now_us - self->power_since_us >= (uint64_t)settle_ms * 1000;
-    return begins(&self->is_power_overdue, is_overdue);
+    return begun(&self->is_power_overdue, is_overdue, FAULT_POWER);
 }
 
 static bool is_torque_expected(const fault_watch_in_t *in, unsigned i)
@@ -124,9 +124,9 @@ fault_t fault_watch_fault_of(const fault_watch_in_t *in, fault_code_t code, unsi
     return fault;
 }
 
-bool fault_watch_axis(fault_watch_t *self, const fault_watch_in_t *in, unsigned i)
+fault_code_t fault_watch_axis(fault_watch_t *self, const fault_watch_in_t *in, unsigned i)
 {
     const fault_code_t was = self->axis_fault[i];
     self->axis_fault[i] = judge_drive(self, in, i);
-    return self->axis_fault[i] != FAULT_NONE && self->axis_fault[i] != was;
+    return self->axis_fault[i] != was ? self->axis_fault[i] : FAULT_NONE;
 }

@@ -21,26 +21,26 @@ typedef struct {
 } fault_watch_in_t;
 
 /** The bus is lost: the drives no longer get set-points.
- *  @return true: the fault begins */
-bool fault_watch_bus(fault_watch_t *self, bool is_lost);
+ *  @return the fault where it begins, else FAULT_NONE */
+fault_code_t fault_watch_bus(fault_watch_t *self, bool is_lost);
 
 /** The bus is about to be lost; the drives still get set-points.
- *  @return true: the fault begins */
-bool fault_watch_bus_failing(fault_watch_t *self, bool is_failing);
+ *  @return the fault where it begins, else FAULT_NONE */
+fault_code_t fault_watch_bus_failing(fault_watch_t *self, bool is_failing);
 
 /** Judges a drive.
  *  @param i from 0
- *  @return true: another fault than before begins */
-bool fault_watch_axis(fault_watch_t *self, const fault_watch_in_t *in, unsigned i);
+ *  @return the fault where another one than before begins, else FAULT_NONE */
+fault_code_t fault_watch_axis(fault_watch_t *self, const fault_watch_in_t *in, unsigned i);
 
 /** The two channels of the e-stop disagree.
- *  @return true: the fault begins */
-bool fault_watch_channels(fault_watch_t *self, bool is_apart);
+ *  @return the fault where it begins, else FAULT_NONE */
+fault_code_t fault_watch_channels(fault_watch_t *self, bool is_apart);
 
 /** The supply fails.
  *  @param settle_ms a fault if the platform is not down so long after; 0 = never
- *  @return true: the fault begins */
-bool fault_watch_power(fault_watch_t *self, bool is_failing, uint32_t settle_ms, bool is_down, uint64_t now_us);
+ *  @return the fault where it begins, else FAULT_NONE */
+fault_code_t fault_watch_power(fault_watch_t *self, bool is_failing, uint32_t settle_ms, bool is_down, uint64_t now_us);
 
 /** A fault of drive i, with how far off its axis is where heaved has found that, and what the drive says of it. */
 fault_t fault_watch_fault_of(const fault_watch_in_t *in, fault_code_t code, unsigned i);

@@ -231,6 +231,7 @@ static void publish(gateway_t *self, const cycle_t *cycle)
     s->now_us = now_us;
     s->state = self->supervisor.state;
     s->goal = self->supervisor.goal;
+    s->interrupted = self->supervisor.interrupted;
     s->is_held_by_silence = self->supervisor.is_held_by_silence;
     s->relay_mask = self->relay_output.effects_mask;
     s->asked = self->output.asked;

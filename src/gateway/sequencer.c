@@ -66,20 +66,27 @@ static fault_watch_in_t watch_in(const gateway_t *self, const cycle_t *cycle)
                               .now_us = cycle->now_us};
 }
 
+/* A fault of no axis, where one has begun. */
+static void raise_begun(gateway_t *self, fault_code_t code, const cycle_t *cycle)
+{
+    if (code != FAULT_NONE) {
+        actions_raise(self, &(fault_t){.code = code, .at_us = cycle->now_us}, cycle);
+    }
+}
+
 /* Where nobody hears the set-points any more, a controlled stop would only make them jump when the bus is back. */
 static void watch_bus(gateway_t *self, bool is_heard, const cycle_t *cycle)
 {
     const bool is_off = self->supervisor.state == STATE_OFF;
     const bool is_lost = !is_heard || drive_control_is_bus_stalled(&self->drive_control, self->settings->cycle_us);
-    if (fault_watch_bus(&self->fault_watch, is_lost && !is_off)) {
+    const fault_code_t lost = fault_watch_bus(&self->fault_watch, is_lost && !is_off);
+    const fault_code_t failing = fault_watch_bus_failing(&self->fault_watch, drives_is_failing(self->io.drives) && !is_off);
+    if (lost != FAULT_NONE || failing != FAULT_NONE) {
         give_up_reset(&self->reset_until_us, self->io.log);
-        actions_raise(self, &(fault_t){.code = FAULT_BUS, .at_us = cycle->now_us}, cycle);
     }
+    raise_begun(self, lost, cycle);
+    raise_begun(self, failing, cycle);
     self->drive_control.is_tracking |= is_lost;
-    if (fault_watch_bus_failing(&self->fault_watch, drives_is_failing(self->io.drives) && self->supervisor.state != STATE_OFF)) {
-        give_up_reset(&self->reset_until_us, self->io.log);
-        actions_raise(self, &(fault_t){.code = FAULT_BUS_FAILING, .at_us = cycle->now_us}, cycle);
-    }
 }
 
 static void watch_drives(gateway_t *self, const cycle_t *cycle)
@@ -87,10 +94,13 @@ static void watch_drives(gateway_t *self, const cycle_t *cycle)
     fault_watch_in_t in = watch_in(self, cycle);
     for (unsigned i = 0; i < in.feedback.count; i++) {
         const bool was_well = self->fault_watch.axis_fault[i] == FAULT_NONE;
-        if (self->supervisor.state == STATE_OFF) {
+        const bool is_off = self->supervisor.state == STATE_OFF;
+        const fault_code_t code = is_off ? FAULT_NONE : fault_watch_axis(&self->fault_watch, &in, i);
+        if (is_off) {
             self->fault_watch.axis_fault[i] = FAULT_NONE;
-        } else if (fault_watch_axis(&self->fault_watch, &in, i)) {
-            const fault_t fault = fault_watch_fault_of(&in, self->fault_watch.axis_fault[i], i);
+        }
+        if (code != FAULT_NONE) {
+            const fault_t fault = fault_watch_fault_of(&in, code, i);
             if (was_well) { /* else a drive on its way out of the fault that is reset */
                 give_up_reset(&self->reset_until_us, self->io.log);
             }
@@ -130,9 +140,8 @@ static void watch_power(gateway_t *self, bool is_failing, const cycle_t *cycle)
     const state_t state = self->supervisor.state;
     const bool is_down = state == STATE_OFF || state == STATE_SETTLED || supervisor_is_latched(&self->supervisor);
     self->snapshot.is_power_failing = is_failing;
-    if (fault_watch_power(&self->fault_watch, is_failing, self->settings->power_settle_ms, is_down, cycle->now_us)) {
-        actions_raise(self, &(fault_t){.code = FAULT_POWER, .at_us = cycle->now_us}, cycle);
-    }
+    raise_begun(self, fault_watch_power(&self->fault_watch, is_failing, self->settings->power_settle_ms, is_down, cycle->now_us),
+                cycle);
 }
 
 static void read_inputs(gateway_t *self, const cycle_t *cycle)
@@ -145,8 +154,8 @@ static void read_inputs(gateway_t *self, const cycle_t *cycle)
         actions_event(self, EVENT_ESTOP, cycle);
     }
     /* The e-stop is active as long as its channels disagree: they are no reason for another state, but one for another look. */
-    if (is_read && fault_watch_channels(&self->fault_watch, (levels & INPUT_APART) != 0)) {
-        actions_raise(self, &(fault_t){.code = FAULT_ESTOP_CHANNELS, .at_us = cycle->now_us}, cycle);
+    if (is_read) {
+        raise_begun(self, fault_watch_channels(&self->fault_watch, (levels & INPUT_APART) != 0), cycle);
     }
     watch_power(self, is_read ? (levels & INPUT_POWER) != 0 : self->snapshot.is_power_failing, cycle);
 }
@@ -207,15 +216,6 @@ static void step_auto(gateway_t *self, const cycle_t *cycle)
     }
 }
 
-/* What hands do, and drives that take too long about it. */
-static void watch_service(gateway_t *self, const cycle_t *cycle)
-{
-    const fault_code_t code = service_step(&self->service, cycle);
-    if (code != FAULT_NONE) {
-        actions_raise(self, &(fault_t){.code = code, .at_us = cycle->now_us}, cycle);
-    }
-}
-
 void sequencer_before_frames(gateway_t *self, const cycle_t *cycle)
 {
     for (unsigned i = 0; i <= DRIVES_MAX; i++) {
@@ -238,15 +238,13 @@ void sequencer_before_frames(gateway_t *self, const cycle_t *cycle)
         actions_event(self, EVENT_DRIVES_READY, cycle);
         self->drive_control.is_tracking = self->supervisor.state == STATE_OFF;
     }
-    if (!drive_control_bring_up(&self->drive_control, cycle)) {
-        actions_raise(self, &(fault_t){.code = FAULT_DRIVE_TIMEOUT, .at_us = cycle->now_us}, cycle);
-    }
+    raise_begun(self, drive_control_bring_up(&self->drive_control, cycle), cycle);
     if (is_move_done(self->supervisor.state, &self->drive_control, cycle)) {
         self->drive_control.bring_up = BRING_UP_IDLE;
         actions_event(self, EVENT_MOVE_DONE, cycle);
     }
     if (self->supervisor.state == STATE_SERVICE) {
-        watch_service(self, cycle);
+        raise_begun(self, service_step(&self->service, cycle), cycle); /* a drive takes too long */
     }
 }
 

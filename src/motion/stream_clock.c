@@ -17,7 +17,7 @@ enum {
     STATED = 4,       /* a stated period counts as much as so many samples */
     BURSTS = 2,       /* short intervals, of the newest 24, that tell a sender that sends in bursts */
     STALLED = STREAM_CLOCK_STALLED,
-    NEW_RATE = 3, /* and so does one that eight intervals told */
+    NEW_RATE = 3, /* and so does one that the kept intervals told */
     LOST_MEMORY = STREAM_CLOCK_LOST_MEMORY,
     LOST_FIRST = 64 /* samples that losses are counted in at first */
 };

@@ -11,13 +11,6 @@
 #include "common/message.h"
 #include "unity.h"
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 void setUp(void) {}
 void tearDown(void) {}
 

@@ -25,13 +25,6 @@
 #define FRAME_US    16000u
 #define FILE_BYTES  (64u << 20)
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 /* What happens in a run; times in us since its start, 0 = never. */
 typedef struct {
     uint64_t end_us;

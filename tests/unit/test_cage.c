@@ -20,13 +20,6 @@
 static int m_pipe[2];
 static volatile int m_zero;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 void setUp(void)
 {
     TEST_ASSERT_EQUAL(0, pipe(m_pipe));

@@ -11,13 +11,6 @@
 void setUp(void) {}
 void tearDown(void) {}
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 /* Without stuffing: 47 + 8n and 67 + 8n bits; one stuffing bit for four bits of 34 + 8n or 54 + 8n. */
 static void test_frame_bits_standard_match_the_table(void)
 {

@@ -12,13 +12,6 @@ void setUp(void) {}
 
 void tearDown(void) {}
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static void test_table_has_each_object_once(void)
 {
     for (const canopen_object_t *row = canopen_objects; row->name != NULL; row++) {

@@ -16,13 +16,6 @@ void setUp(void)
 
 void tearDown(void) {}
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static uint32_t next_random(void)
 {
     seed ^= seed << 13;

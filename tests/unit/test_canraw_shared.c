@@ -28,13 +28,6 @@ static bool m_takes_torque;   /* with the first set-point */
 static can_frame_t m_last[2]; /* of 201h and 202h */
 static unsigned m_heard[2];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static canraw_field_t position(uint8_t slot)
 {
     return (canraw_field_t){CANRAW_POSITION, (uint8_t)(2 * slot - 2), 16, true, false, 0, 0, slot};

@@ -29,13 +29,6 @@ static bool m_is_on, m_is_wrong, m_is_talking_before;
 static bool m_is_deaf;    /* takes no step */
 static bool m_has_torque; /* and takes no step while it has */
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static void describe(void)
 {
     m_map = (canraw_map_t){.axes = 1, .period_us = 2000, .query_every = 1, .offline_periods = 5};

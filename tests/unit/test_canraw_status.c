@@ -27,13 +27,6 @@ static uint8_t m_counter;
 static bool m_is_status_on, m_is_position_on, m_is_stuck, m_is_check_wrong;
 static unsigned m_enables, m_disables;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static canraw_frame_t command(uint8_t byte)
 {
     return (canraw_frame_t){.length = 1, .constant = 1, .data = {byte}};

@@ -26,13 +26,6 @@ static drive_feedback_t feedback[DRIVES_MAX];
 static q32_t setpoint_q32[DRIVES_MAX];
 static unsigned absolute; /* the axis that has no zero to find */
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static hv_status_t cycle(void)
 {
     now_us += CYCLE_US;

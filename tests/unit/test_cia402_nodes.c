@@ -32,13 +32,6 @@ static bool is_boot_lost; /* boot-ups do not arrive */
 static can_frame_t waiting[OUT_MAX]; /* of the drives, on their way */
 static unsigned outs;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static void put(void *ctx, const can_frame_t *frame)
 {
     (void)ctx;

@@ -9,13 +9,6 @@ void setUp(void) {}
 
 void tearDown(void) {}
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 /* Bits 6, 5, 3, 2, 1, 0 as the standard prints them, x = does not matter. */
 static const char *const k_patterns[] = {
     [CIA402_NOT_READY] = "0x0000",          [CIA402_SWITCH_ON_DISABLED] = "1x0000",

@@ -25,13 +25,6 @@ static q32_t setpoint_q32[DRIVES_MAX];
 static drive_object_t object;
 static uint32_t code;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static void cycles(unsigned count)
 {
     while (count-- > 0) {

@@ -35,13 +35,6 @@ static char m_line[LINES_MAX][256];
 static unsigned m_lines;
 static uint32_t m_random;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     memset(&m_config, 0, sizeof m_config);

@@ -21,13 +21,6 @@ static config_t m_config;
 static char m_text[20000];
 static char m_errors[20000];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     memset(&m_config, 0, sizeof m_config);

@@ -22,13 +22,6 @@ static char m_folder[64];
 static char m_file[96];
 static char m_kept[CONFIG_PATH_MAX];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 static void write_file(const char *path, const char *text)
 {
     FILE *const file = fopen(path, "w");

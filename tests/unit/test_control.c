@@ -14,13 +14,6 @@
 #define LATE    (CONTROL_GRACE_US + 1)
 #define IS_GONE "too many clients: this one had to give way to a newer one"
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 static config_t m_config;
 static handover_t m_handover;
 static blackbox_t m_blackbox;

@@ -10,13 +10,6 @@
 void setUp(void) {}
 void tearDown(void) {}
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static int64_t counts_of(counts_scale_t scale, q32_t units_q32)
 {
     int64_t counts = INT64_MIN;

@@ -24,13 +24,6 @@ static char m_text[60000];
 static char m_out[60000];
 static char m_errors[4000];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     strcpy(m_text, "");

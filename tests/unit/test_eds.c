@@ -20,13 +20,6 @@ static eds_t m_eds;
 static char m_text[60000];
 static char m_out[20000];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 /* An entry of a complete file. */
 static void put_object(unsigned index, unsigned sub, unsigned bytes, const char *access, const char *more)
 {

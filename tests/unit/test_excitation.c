@@ -17,13 +17,6 @@ static double m_share[SAMPLES_MAX + 8];
 static int m_samples;
 static uint64_t m_random;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     m_random = 88172645463325252u;

@@ -33,13 +33,6 @@ static uint64_t m_random;
 static unsigned m_most, m_count, m_near_most;
 static q32_t m_worst_mm_q32, m_worst_deg_q32;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     m_random = 88172645463325252u;

@@ -17,13 +17,6 @@ static const char *m_why;
 static char m_path[] = "/tmp/heave_frames_XXXXXX";
 static char m_errors[1024];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 void setUp(void)
 {
     m_line = (frames_line_t){.line = 7};

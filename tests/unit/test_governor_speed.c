@@ -10,13 +10,6 @@
 
 static governor_t m_governor;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     m_governor = (governor_t){0};

@@ -15,13 +15,6 @@
 static ring_t m_ring;
 static uint8_t m_memory[RING_BYTES];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 void setUp(void)
 {
     ring_init(&m_ring, m_memory, sizeof m_memory);

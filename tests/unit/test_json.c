@@ -10,13 +10,6 @@
 static char m_buffer[256];
 static json_t m_json;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 void setUp(void)
 {
     memset(m_buffer, 'Z', sizeof m_buffer);

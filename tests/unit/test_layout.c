@@ -23,13 +23,6 @@ static kin_geometry_t *const m_geometry = &m_config.settings.geometry;
 static char m_errors[4000];
 static uint32_t m_random = 2463534242u;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void) {}
 
 void tearDown(void) {}

@@ -22,13 +22,6 @@ static char m_folder[64];
 static char m_path[80];
 static char m_second[96];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 void setUp(void)
 {
     (void)unsetenv("STATE_DIRECTORY");

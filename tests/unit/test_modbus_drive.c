@@ -23,13 +23,6 @@ static uint64_t now_us;
 static drive_feedback_t feedback[DRIVES_MAX];
 static q32_t setpoint_q32[DRIVES_MAX];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static int32_t wide_counts(int32_t mm)
 {
     return MODBUS_SLAVE_WIDE_ZERO - (mm * 10000 + 1) / 3;

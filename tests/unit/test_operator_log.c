@@ -22,13 +22,6 @@ static char m_folder[64];
 static char m_path[96];
 static char m_text[1u << 20];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 static void open_log(void)
 {
     memset(&m_log, 0, sizeof m_log);

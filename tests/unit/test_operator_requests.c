@@ -11,13 +11,6 @@
 static char m_text[256];
 static snapshot_t m_snapshot;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 void setUp(void)
 {
     memset(m_text, 0, sizeof m_text);

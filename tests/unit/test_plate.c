@@ -20,13 +20,6 @@ static kin_t m_kin;
 static plate_t m_plate;
 static drive_feedback_t m_feedback[CYLINDERS_MAX];
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     static const double k_base_deg[CYLINDERS] = {-8, 8, 112, 128, 232, 248},

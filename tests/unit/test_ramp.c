@@ -16,13 +16,6 @@
 
 static uint64_t m_random;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     m_random = 88172645463325252u;

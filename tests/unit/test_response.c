@@ -18,13 +18,6 @@ static double m_sent[COUNT];
 static double m_actual[COUNT];
 static response_t m_response;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 /* 0.2 to 20 Hz, 50 mm/s, 2500 mm/s^2, 50000 mm/s^3. */
 void setUp(void)
 {

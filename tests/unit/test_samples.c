@@ -25,13 +25,6 @@ static samples_writer_t m_writer;
 static config_t m_config;
 static snapshot_t m_snapshot;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static void open_ring(uint32_t seconds)
 {
     memset(&m_config, 0, sizeof m_config);

@@ -16,13 +16,6 @@ static int m_fd = -1;
 static sd_notify_t m_manager = {.fd = -1};
 static snapshot_t m_snapshot;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 void setUp(void)
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};

@@ -15,13 +15,6 @@ static sdo_t sdo;
 static uint64_t now_us;
 static can_frame_t request;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     now_us = 1000;

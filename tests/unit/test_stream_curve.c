@@ -14,13 +14,6 @@
 static stream_curve_t m_curve;
 static stream_clock_t m_clock;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     const q32_t zero_q32 = 0;

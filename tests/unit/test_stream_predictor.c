@@ -11,13 +11,6 @@
 static stream_curve_t m_curve;
 static const stream_predictor_t k_even = {.by_newest_q32 = Q32_ONE};
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 void setUp(void)
 {
     m_curve = (stream_curve_t){.axes = POSE_AXES, .age = 100, .head = 40};

@@ -14,13 +14,6 @@ static stream_t m_stream;
 static uint64_t m_now_us; /* the newest frame that came in time */
 static unsigned m_at;     /* whose value that was */
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion");
-}
-
 static q32_t q32(double value)
 {
     return (q32_t)llround(value * 65536.0) * 65536;

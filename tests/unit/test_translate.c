@@ -33,13 +33,6 @@ static char m_folder[64];
 static uint8_t m_bytes[BYTES_MAX];
 static size_t m_length;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 static void put_number(size_t at, size_t value)
 {
     for (unsigned i = 0; i < 4; i++) {

@@ -16,13 +16,6 @@ static uint8_t m_bytes[8192];
 static ring_t m_ring;
 static udp_recorder_t m_tap;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 static hv_status_t behind_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
 {
     (void)ctx;

@@ -12,13 +12,6 @@
 static wear_t m_wear;
 static drive_feedback_t m_feedback;
 
-void hv_assert_failed(const char *file, int line)
-{
-    (void)file;
-    (void)line;
-    TEST_FAIL_MESSAGE("assertion failed");
-}
-
 void setUp(void)
 {
     m_wear = (wear_t){.turns = 0};
