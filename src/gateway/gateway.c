@@ -8,7 +8,6 @@
 #include "frame_receiver.h"
 #include "log_limit.h"
 #include "actions.h"
-#include "fault_watch.h"
 #include "relay_output.h"
 #include "reports.h"
 #include "sender.h"

@@ -240,7 +240,8 @@ static void watch_rest(player_t *self, const trace_row_t *before)
 uint64_t player_span_us(const player_t *self)
 {
     const frames_line_t *last = &self->line[self->lines - 1];
-    return last->t_us - self->line[0].t_us + (last->kind == FRAMES_END ? 0 : EXTRA_MAX_US);
+    const uint64_t first_us = self->line[0].t_us; /* of all sorts; a datagram at the end of the file may be before it */
+    return (last->t_us > first_us ? last->t_us - first_us : 0) + (last->kind == FRAMES_END ? 0 : EXTRA_MAX_US);
 }
 
 static uint64_t last_line_us(const player_t *self)

@@ -17,6 +17,7 @@
 #include "daemon/motion_loop.h"
 #include "daemon/play.h"
 #include "record/blackbox.h"
+#include "record/player.h"
 #include "sim_log.h"
 #include "sim_udp.h"
 #include "unity.h"
@@ -567,6 +568,17 @@ static void test_checkpoint_damaged_text_is_refused(void)
     }
 }
 
+/* The processor time of a replay is limited by it. */
+static void test_player_span_is_never_less_than_nothing(void)
+{
+    frames_line_t line[] = {{.kind = FRAMES_STATE, .t_us = UINT64_C(28800000000)}, {.kind = FRAMES_END}};
+    const player_t player = {.line = line, .lines = 2};
+    line[1].t_us = line[0].t_us + 5000000;
+    TEST_ASSERT_EQUAL_UINT64(5000000, player_span_us(&player));
+    line[1] = (frames_line_t){.kind = FRAMES_DATAGRAM}; /* hours before, as only a file made by hand has it */
+    TEST_ASSERT_EQUAL_UINT64(UINT64_C(7200000000), player_span_us(&player));
+}
+
 int main(void)
 {
     (void)unsetenv("STATE_DIRECTORY"); // NOLINT(concurrency-mt-unsafe): before any thread
@@ -591,5 +603,6 @@ int main(void)
     RUN_TEST(test_blackbox_without_directory_there_is_none);
     RUN_TEST(test_blackbox_whose_thread_could_not_be_started_says_so_at_once);
     RUN_TEST(test_checkpoint_damaged_text_is_refused);
+    RUN_TEST(test_player_span_is_never_less_than_nothing);
     return UNITY_END();
 }
