@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""gen_states.py - the state diagram and table of docs/operation.md, drawn from the rows of src/gateway/supervisor.c.
+"""gen_states.py - the state diagram and tables of docs/operation.md, drawn from the rows of src/gateway/supervisor.c.
 
     tools/gen_states.py [--lang en|zh|js]              print the block
     tools/gen_states.py [--lang en|zh|js] --check FILE exit 1, with a diff, if the block between FILE's markers differs
@@ -38,10 +38,18 @@ EN = {
     "guards": {"COMES_UP_SETTLED": "at the settled extension", "GOAL_OFF": "goal OFF", "GOAL_UP": "goal up",
                "GOAL_ENGAGED": "goal ENGAGED", "BY_SILENCE": "held by silence", "WAS_HOMING": "was HOMING",
                "WAS_RISING": "was RISING", "WAS_NEUTRAL": "was NEUTRAL", "WAS_ENGAGED": "was ENGAGED",
-               "WAS_SETTLING": "was SETTLING", "FAULT_CLEARED": "cause gone, at rest",
+               "WAS_SETTLING": "was SETTLING", "COMING_UP": "drives come up", "STANDS_STILL": "at rest, no fault", "FAULT_CLEARED": "cause gone, at rest",
                "ESTOP_RELEASED": "released, no fault"},
     "any": "any state",
     "note": "`FAULT` and `ESTOP` are entered from every state (`FAULT` not from `ESTOP`) and are left by reset only.",
+    "needs": "What these requests need beside the state. While a shutdown is under way, heaved takes only hold, shutdown and reset.",
+    "needs_head": ["Request", "In", "Needs"],
+    "loss": "What heaved does by itself, as if an operator had asked for it:",
+    "loss_head": ["What happens", "In", "Request"], "nothing": "none",
+    "permits": {"KEY": "enable key on", "SUPPLY": "supply well", "APPROVAL": "configuration approved",
+                "SELFTEST": "self-test passed (where one is due)"},
+    "losses": {"KEY": "the enable key is turned off", "SUPPLY": "the supply fails",
+               "PUNCTUAL": "more cycles are late at once than `late_hold_cycles`"},
     "colon": ": ", "comma": ", ", "semicolon": "; ", "brackets": " [{}]", "or": " or ",
 }
 
@@ -61,10 +69,17 @@ ZH = {
     "guards": {"COMES_UP_SETTLED": "位于回落位", "GOAL_OFF": "目标为 OFF", "GOAL_UP": "目标在上方",
                "GOAL_ENGAGED": "目标为 ENGAGED", "BY_SILENCE": "因静默进入", "WAS_HOMING": "原为 HOMING",
                "WAS_RISING": "原为 RISING", "WAS_NEUTRAL": "原为 NEUTRAL", "WAS_ENGAGED": "原为 ENGAGED",
-               "WAS_SETTLING": "原为 SETTLING", "FAULT_CLEARED": "原因已消除且静止",
+               "WAS_SETTLING": "原为 SETTLING", "COMING_UP": "驱动器正在使能或回零", "STANDS_STILL": "静止且无故障", "FAULT_CLEARED": "原因已消除且静止",
                "ESTOP_RELEASED": "已松开且无故障"},
     "any": "任意状态",
     "note": "任何状态都可进入 `FAULT` 和 `ESTOP`（`ESTOP` 不会转入 `FAULT`），只能通过复位离开。",
+    "needs": "除状态外，下列请求还需要满足的条件。关机过程中，heaved 只接受暂停、关机和复位。",
+    "needs_head": ["请求", "所在状态", "需要"],
+    "loss": "heaved 自行执行的动作，等同于操作员发出的请求：",
+    "loss_head": ["发生什么", "所在状态", "请求"], "nothing": "无",
+    "permits": {"KEY": "使能钥匙接通", "SUPPLY": "电源正常", "APPROVAL": "配置已批准",
+                "SELFTEST": "自检已通过（如果要求自检）"},
+    "losses": {"KEY": "使能钥匙断开", "SUPPLY": "电源即将断电", "PUNCTUAL": "一次延误的周期数超过 `late_hold_cycles`"},
     "colon": "：", "comma": "、", "semicolon": "；", "brackets": "（{}）", "or": " 或",
 }
 
@@ -88,23 +103,43 @@ def read_header():
     return states
 
 
-def read_rows(states):
-    """(from, event, guard, to) of every row that changes the state, in table order."""
+def read_table(name, pattern):
+    """The groups of the pattern in every row of a table."""
     text = (ROOT / "src/gateway/supervisor.c").read_text(encoding="utf-8")
-    table = re.search(r"k_rows\[\] = \{(.*?)\n\};", text, re.S)
+    table = re.search(name + r"\[\] = \{(.*?)\n\};", text, re.S)
     if not table:
-        fail("no k_rows in supervisor.c")
+        fail("no %s in supervisor.c" % name)
     body = re.sub(r"/\*.*?\*/", "", table.group(1), flags=re.S)
-    rows = []
     for line in filter(None, (part.strip() for part in body.split("\n"))):
-        row = re.fullmatch(r"\{(?:STATE_)?(\w+),\s*EVENT_(\w+),\s*(\w+),\s*(?:STATE_)?(\w+),\s*\w+,\s*\w+,\s*\w+\},", line)
+        row = re.fullmatch(pattern, line)
         if not row:
             fail("cannot read the row: " + line)
-        source, event, guard, target = row.groups()
+        yield row.groups()
+
+
+def read_all_rows():
+    """(from, event, guard, needs, to) of every row, in table order."""
+    for source, event, guard, needs, target in read_table("k_rows", r"\{(?:STATE_)?(\w+),\s*EVENT_(\w+),\s*(\w+),\s*(\w+),\s*(?:STATE_)?(\w+),\s*\w+,\s*\w+,\s*\w+\},"):
+        yield source, event.lower().replace("_", "-"), guard, needs, target
+
+
+def read_needs():
+    """The permits of each set that rows name."""
+    text = (ROOT / "src/gateway/supervisor.c").read_text(encoding="utf-8")
+    sets = {}
+    for name, value in re.findall(r"^#define (NONE|RUNNING|UP|FIRST) +(.+?)(?: +/\*.*)?$", text, re.M):
+        sets[name] = [permit for word in re.findall(r"\w+", value) for permit in sets.get(word, [word.removeprefix("PERMIT_")] if word != "0u" else [])]
+    return sets
+
+
+def read_rows(states):
+    """(from, event, guard, to) of every row that changes the state, in table order."""
+    rows = []
+    for source, event, guard, _, target in read_all_rows():
         if source not in states and source != "ANY" or target not in states and target != "STAY":
-            fail("unknown state in the row: " + line)
+            fail("unknown state in the row: %s %s" % (source, event))
         if target != "STAY":
-            rows.append((source, event.lower().replace("_", "-"), guard, target))
+            rows.append((source, event, guard, target))
     if {target for source, _, _, target in rows if source == "ANY"} != {"FAULT", "ESTOP"}:
         fail("the note below the table says that only FAULT and ESTOP are entered from every state")
     return rows
@@ -163,12 +198,51 @@ def table(words, states, rows):
     return lines + ["", words["note"]]
 
 
+def places(words, pairs):
+    """Texts of (state, guard) pairs. A state with several guards stands for itself: the others have rows of their own."""
+    guards_of = {}
+    for state, guard in pairs:
+        guards_of.setdefault(state, []).append(guard)
+    return words["comma"].join("`%s`" % state + (words["brackets"].format(words["guards"][guards[0]]) if len(guards) == 1 and guards[0] != "ALWAYS" else "")
+                               for state, guards in guards_of.items())
+
+
+def needs_table(words):
+    """What a request needs, where it needs anything."""
+    sets, found = read_needs(), {}
+    for source, event, guard, needs, _ in read_all_rows():
+        if needs not in ("NONE", "RUNNING"):
+            found.setdefault((event, needs), []).append((source, guard if guard.startswith("WAS_") else "ALWAYS"))
+    lines = [words["needs"], "", "| " + " | ".join(words["needs_head"]) + " |", "| --- | --- | --- |"]
+    for event in ACTORS["operator"]:
+        for (name, needs), pairs in found.items():
+            if name == event:
+                lines.append("| %s | %s | %s |" % (event_text(words, event), places(words, pairs), words["comma"].join(words["permits"][p] for p in sets[needs] if p != "RUNNING")))
+    return lines
+
+
+def loss_table(words):
+    """What follows where a permit is lost."""
+    found = {}
+    for source, lost, guard, request in read_table("k_responses", r"\{STATE_(\w+),\s*([A-Z_ |]+),\s*(\w+),\s*(\w+)\},"):
+        for permit in re.findall(r"PERMIT_(\w+)", lost):
+            found.setdefault((permit, request), []).append((source, guard))
+    lines = [words["loss"], "", "| " + " | ".join(words["loss_head"]) + " |", "| --- | --- | --- |"]
+    for permit in words["losses"]:
+        for (name, request), pairs in found.items():
+            if name == permit:
+                event = request.removeprefix("EVENT_").lower().replace("_", "-")
+                lines.append("| %s | %s | %s |" % (words["losses"][permit], places(words, pairs), words["nothing"] if request == "EVENTS" else event_text(words, event)))
+    return lines
+
+
 def block(lang):
     words = {"en": EN, "zh": ZH}[lang]
     states = read_header()
     rows = read_rows(states)
     try:
-        return "\n".join(diagram(words, rows) + [""] + table(words, states, rows)) + "\n"
+        parts = [diagram(words, rows), table(words, states, rows), needs_table(words), loss_table(words)]
+        return "\n\n".join("\n".join(part) for part in parts) + "\n"
     except KeyError as missing:
         fail("no %s text for %s" % (lang, missing))
 

@@ -163,6 +163,7 @@ typedef struct {
     motion_t motion;
     motion_output_t output;
     supervisor_t supervisor;
+    uint32_t withheld; /**< PERMIT_KEY | ... */
     frame_receiver_t receiver;
     sender_t sender;
     relay_output_t relay_output;
@@ -206,9 +207,20 @@ void gateway_resume(gateway_t *self, const gateway_t *saved);
  *                  delay, following error, spike gate, confirmation of far jumps, supply; the others have to be as before */
 void gateway_reload(gateway_t *self, const settings_t *settings);
 
+/** What the machine and the people beside it do not permit from now on. Once in each cycle, before its requests. Where nobody
+ * calls it, nothing is withheld.
+ *  @param permits PERMIT_KEY | ... of supervisor.h, without PERMIT_RUNNING: the gateway knows of a shutdown by itself
+ *  @return the request that follows from what is withheld since this call, for gateway_request(); EVENTS: none. The caller
+ *          makes it, so that a recording holds it like an operator's */
+event_t gateway_withhold(gateway_t *self, uint32_t permits) HV_MUST_CHECK;
+
+/** Permits for want of which gateway_request() would refuse a request now: PERMIT_KEY | ...; 0: none, though the state may not
+ * allow it (see supervisor_missing). */
+uint32_t gateway_missing(gateway_t *self, event_t request);
+
 /** A request of an operator: EVENT_ENGAGE, EVENT_HOLD, EVENT_RESUME, EVENT_PARK, EVENT_RESET, EVENT_SHUTDOWN, EVENT_SERVICE or
  *  EVENT_SERVICE_OFF.
- *  @return HV_OK; HV_ERR_STATE: the state does not allow it, and nothing changes. */
+ *  @return HV_OK; HV_ERR_STATE: the state does not allow it, or a permit is missing; nothing changes */
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us) HV_MUST_CHECK;
 
 /** A request for manual operation in SERVICE.

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT
- * supervisor.h - the state machine of a platform: one table, pure, no clock and no I/O.
- * The gateway generates the events and carries out the action of each transition. The table is in supervisor.c;
- * tools/gen_states.py draws the diagram in docs/operation.md from it. One caller at a time per instance; nothing blocks.
+ * supervisor.h - the state machine of a platform: two tables, pure, no clock and no I/O. One has the transitions and what each
+ * of them needs, the other what the loss of a permit leads to.
+ * The gateway generates the events and carries out the action of each transition. The tables are in supervisor.c;
+ * tools/gen_states.py draws docs/operation.md from them. One caller at a time per instance; nothing blocks.
  */
 #ifndef HEAVE_SUPERVISOR_H
 #define HEAVE_SUPERVISOR_H
@@ -62,12 +63,26 @@ typedef enum {
     ACTION_ESTOP       /**< stop targets at once, set-points follow actual; relays to the safe mask */
 } action_t;
 
+/** What a request may need of the machine and the people beside it. What nobody withholds is given: where there is no enable key,
+ * its permit always is. */
+enum {
+    PERMIT_KEY = 1u,      /**< the enable key is on */
+    PERMIT_SUPPLY = 2u,   /**< the supply is well */
+    PERMIT_APPROVAL = 4u, /**< somebody has approved this configuration */
+    PERMIT_SELFTEST = 8u, /**< no self-test is due */
+    PERMIT_RUNNING = 16u, /**< no shutdown has been asked for */
+    PERMIT_PUNCTUAL = 32u /**< the cycles come in time; no request needs it, its loss leads to one */
+};
+
 /** Inputs of the guards of the table; the gateway fills it before each event. */
 typedef struct {
     bool is_at_settled;    /**< actual extensions at the settled extension */
     bool is_at_rest;       /**< set-points at rest */
     bool is_fault_present; /**< the cause of a fault is still there */
     bool is_estop_active;
+    bool is_going_off; /**< the drives are still to be disabled */
+    bool is_coming_up; /**< the drives are being enabled or homed */
+    uint32_t withheld; /**< PERMIT_KEY | ... */
 } supervisor_view_t;
 
 /** A platform's state; others read it, only supervisor.c writes it. */
@@ -76,7 +91,7 @@ typedef struct {
     state_t goal;             /**< state to end in: STATE_OFF, STATE_SETTLED, STATE_NEUTRAL or STATE_ENGAGED */
     state_t interrupted;      /**< in HOLD: the state that was interrupted */
     bool is_held_by_silence;  /**< HOLD, RISING or NEUTRAL because the sender fell silent: its next frame engages again */
-    uint32_t ignored[EVENTS]; /**< events that had no row for the state, by event; wraps */
+    uint32_t ignored[EVENTS]; /**< events that had no row for the state or lacked a permit, by event; wraps */
 } supervisor_t;
 
 /** Starts in OFF with the goal SETTLED: changes to SETTLED if the drives are already enabled at the settled extension. After
@@ -87,9 +102,18 @@ void supervisor_init(supervisor_t *self);
 void supervisor_init_settled(supervisor_t *self);
 
 /** Takes an event.
- *  @return the action to carry out now. Every change of state has one; ACTION_NONE where the state stays. An event without a row
- *  is counted in ignored[], nothing else. */
+ *  @return the action to carry out now. Every change of state has one; ACTION_NONE where the state stays. An event that has no
+ *  row, or lacks a permit, is counted in ignored[], nothing else. */
 action_t supervisor_event(supervisor_t *self, event_t event, const supervisor_view_t *view);
+
+/** Permits that the event would need now and that are withheld: PERMIT_KEY | ... Where it has no row: those that it needs in
+ * every state that has one; a person gives them before looking for such a state. */
+uint32_t supervisor_missing(const supervisor_t *self, event_t event, const supervisor_view_t *view);
+
+/** The request that follows from the loss of permits. It is a request like an operator's, so that a recording can hold it.
+ *  @param lost PERMIT_KEY | ...: those that are withheld in this cycle and were not in the last one
+ *  @return EVENTS: none */
+event_t supervisor_response(const supervisor_t *self, uint32_t lost);
 
 /** True in FAULT and ESTOP, which only RESET leaves for OFF. */
 bool supervisor_is_latched(const supervisor_t *self);

@@ -214,7 +214,7 @@ static void count_losses(live_t *self)
     lost->operator_entries = operator_log_lost(&self->operators);
     lost->digest = self->store.digest;
     lost->put_back = self->store.put_back;
-    lost->is_unapproved = __atomic_load_n(&self->loop.handover.is_unapproved, __ATOMIC_ACQUIRE) != 0;
+    lost->is_unapproved = handover_is_withheld(&self->loop.handover, PERMIT_APPROVAL);
     writers_say_losses(&self->writers);
 }
 
@@ -278,7 +278,7 @@ static void say_ready(const live_t *self, const config_t *config)
         (void)print_message(0, "a self-test is due: nobody engages until `heavectl selftest` has passed%s",
                             self->life.path[0] != '\0' ? "" : "; without [platform] life_file that is forgotten at the end");
     }
-    if (__atomic_load_n(&self->loop.handover.is_unapproved, __ATOMIC_ACQUIRE) != 0) {
+    if (handover_is_withheld(&self->loop.handover, PERMIT_APPROVAL)) {
         (void)print_message(0, "configuration %s was approved, this is another one: nothing moves until `heavectl acknowledge`",
                             config->approved.text);
     }
@@ -417,7 +417,7 @@ static int open_all(live_t *self, const config_t *config)
         (void)print_message(0, "samples: no memory to share: %s", strerror(errno));
     }
     self->control.samples_fd = self->loop.samples.fd;
-    self->loop.handover.is_unapproved = config_is_unapproved(config);
+    (void)handover_withhold(&self->loop.handover, PERMIT_APPROVAL, config_is_unapproved(config));
     watch_selftest(self);
     const hv_status_t status =
         motion_loop_init(&self->loop, config, linux_udp_hal(&self->udp), linux_log_hal(&self->writers.log), linux_clock_hal());

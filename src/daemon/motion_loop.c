@@ -63,19 +63,6 @@ static void take_reloads(motion_loop_t *self)
 
 /* --- The operator: requests, switches --- */
 
-/* A hold of drives that were coming up has disabled them. */
-static bool is_down(const motion_loop_t *self)
-{
-    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
-    return s->state == STATE_OFF || (s->state == STATE_HOLD && s->interrupted == STATE_HOMING);
-}
-
-/* Without the key nothing goes up, and drives stay off. */
-static bool is_for_the_key(const motion_loop_t *self, uint32_t event)
-{
-    return event == EVENT_ENGAGE || event == EVENT_RESUME || event == EVENT_SERVICE || (event == EVENT_PARK && is_down(self));
-}
-
 /* What was refused has changed nothing: a recording does without. */
 static service_answer_t serve(motion_loop_t *self, const motion_request_t *request)
 {
@@ -99,19 +86,38 @@ static hv_status_t hold(motion_loop_t *self)
     return gateway_request(&self->session.gateway, EVENT_HOLD, self->session.now_us);
 }
 
-static hv_status_t carry_out(motion_loop_t *self, const motion_request_t *request)
+static hv_status_t ask(motion_loop_t *self, event_t event)
 {
-    if (request->event == EVENT_HOLD) {
+    if (event == EVENT_HOLD) {
         return hold(self);
     }
-    if (request->event == OPERATOR_INTENSITY) {
-        motion_note(self, RECORD_INTENSITY, request->number);
-        return gateway_set_intensity(&self->session.gateway, request->number);
+    motion_note(self, RECORD_REQUEST, event);
+    self->current.view.is_shutting_down |= event == EVENT_SHUTDOWN;
+    self->end.is_asked |= event == EVENT_SHUTDOWN;
+    return gateway_request(&self->session.gateway, event, self->session.now_us);
+}
+
+static hv_status_t set_intensity(motion_loop_t *self, uint32_t percent)
+{
+    motion_note(self, RECORD_INTENSITY, percent);
+    return gateway_set_intensity(&self->session.gateway, percent);
+}
+
+/* What lacks a permit is not asked, nor recorded: a replay knows of no permits, and would carry it out. */
+static void carry_out(motion_loop_t *self, const motion_request_t *request, motion_result_t *result)
+{
+    if (request->event == OPERATOR_SERVICE) {
+        result->answer = serve(self, request);
+        result->status = HV_OK;
+    } else if (request->event == OPERATOR_OBJECT) {
+        motion_objects_take(self, request, result);
+    } else if (request->event == OPERATOR_INTENSITY) {
+        result->status = set_intensity(self, request->number);
+    } else {
+        const event_t event = (event_t)request->event;
+        result->missing = gateway_missing(&self->session.gateway, event);
+        result->status = result->missing != 0 ? HV_ERR_STATE : ask(self, event);
     }
-    motion_note(self, RECORD_REQUEST, request->event);
-    self->current.view.is_shutting_down |= request->event == EVENT_SHUTDOWN;
-    self->end.is_asked |= request->event == EVENT_SHUTDOWN;
-    return gateway_request(&self->session.gateway, (event_t)request->event, self->session.now_us);
 }
 
 /* By what has been asked so far: the service thread knows an earlier one. */
@@ -149,27 +155,15 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
 {
     unsigned count = 0;
     motion_request_t request;
-    const bool is_unapproved = __atomic_load_n(&self->handover.is_unapproved, __ATOMIC_ACQUIRE) != 0;
-    const bool is_below = is_down(self) || gateway_snapshot(&self->session.gateway)->state == STATE_SETTLED;
-    const bool is_untested = is_below && __atomic_load_n(&self->handover.is_untested, __ATOMIC_ACQUIRE) != 0;
     for (; count < REQUESTS_PER_CYCLE && ring_pop(&self->handover.requests, &request, sizeof request) > 0; count++) {
         result[count].id = request.id;
         result[count].is_later = false;
+        result[count].missing = 0;
         result[count].is_old = is_old(self, &request);
         result[count].is_void = is_void(self, &request);
-        result[count].is_key_off = switches_is_key_off(&self->switches) && is_for_the_key(self, request.event);
-        result[count].is_unapproved = is_unapproved && is_for_the_key(self, request.event);
-        result[count].is_power_failing = switches_is_power_failing(&self->switches) && is_for_the_key(self, request.event);
-        result[count].is_untested = is_untested && request.event == EVENT_ENGAGE;
-        if (result[count].is_old || result[count].is_void) {
-            result[count].status = HV_ERR_STATE;
-        } else if (request.event == OPERATOR_SERVICE) {
-            result[count].answer = serve(self, &request);
-            result[count].status = HV_OK;
-        } else if (request.event == OPERATOR_OBJECT) {
-            motion_objects_take(self, &request, &result[count]);
-        } else {
-            result[count].status = handover_is_barred(&result[count]) ? HV_ERR_STATE : carry_out(self, &request);
+        result[count].status = HV_ERR_STATE;
+        if (!result[count].is_old && !result[count].is_void) {
+            carry_out(self, &request, &result[count]);
         }
     }
     return count;
@@ -178,44 +172,12 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
 static void take_end(motion_loop_t *self)
 {
     const bool is_due = __atomic_exchange_n(&self->handover.is_end_due, 0, __ATOMIC_ACQ_REL) != 0;
-    const bool is_held = gateway_snapshot(&self->session.gateway)->state == STATE_HOLD && !is_down(self);
+    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
+    const bool is_held = s->state == STATE_HOLD && s->interrupted != STATE_HOMING;
     if (delayed_end_step(&self->end, is_due, is_held, self->session.now_us)) {
-        (void)!carry_out(self, &(motion_request_t){.event = EVENT_SHUTDOWN});
+        (void)!ask(self, EVENT_SHUTDOWN);
     }
     self->current.view.is_end_held = delayed_end_is_held(&self->end);
-}
-
-static void turn_off(motion_loop_t *self)
-{
-    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
-    const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
-    if (s->state == STATE_SERVICE) {
-        hal_log_write(self->io.log, HAL_LOG_NOTICE, "the enable key was turned off: service ends");
-        (void)!carry_out(self, &(motion_request_t){.event = EVENT_SERVICE_OFF});
-    } else if (!is_latched && !is_down(self) && (s->goal == STATE_NEUTRAL || s->goal == STATE_ENGAGED)) {
-        hal_log_write(self->io.log, HAL_LOG_NOTICE, "the enable key was turned off: parking");
-        (void)!carry_out(self, &(motion_request_t){.event = EVENT_PARK});
-    }
-}
-
-/* Down as long as there is power, but nobody's hold is ended for it: somebody may be below. What does not get there in time is
- * the gateway's to stop. */
-static void lose_power(motion_loop_t *self)
-{
-    const snapshot_t *s = gateway_snapshot(&self->session.gateway);
-    const bool is_latched = s->state == STATE_FAULT || s->state == STATE_ESTOP;
-    const bool is_held = s->state == STATE_HOLD && !s->is_held_by_silence;
-    hal_log_write(self->io.log, HAL_LOG_ERROR,
-                  is_held                     ? "the supply is failing: the platform is on hold, park settles it"
-                  : s->state == STATE_SERVICE ? "the supply is failing: service ends"
-                                              : "the supply is failing: settling");
-    if (s->state == STATE_SERVICE) {
-        (void)!carry_out(self, &(motion_request_t){.event = EVENT_SERVICE_OFF});
-        return;
-    }
-    if (!is_latched && !is_held && !is_down(self)) {
-        (void)!carry_out(self, &(motion_request_t){.event = EVENT_PARK});
-    }
 }
 
 static void tell_blind(motion_loop_t *self)
@@ -228,26 +190,66 @@ static void tell_blind(motion_loop_t *self)
     self->was_blind = is_blind;
 }
 
-/* Key and button as requests, so that a recording replays them. The e-stop is the gateway's. */
-static void take_switches(motion_loop_t *self)
+/* --- What is withheld --- */
+
+/* A line of the log about what happens by itself, with what follows from it. */
+static void log_loss(motion_loop_t *self, hal_log_level_t level, const char *what, event_t response)
 {
-    const switches_change_t change = switches_step(&self->switches, self->session.now_us);
-    tell_blind(self);
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    text_put(&text, what);
+    text_put(&text, response == EVENT_PARK ? ": parking" : response == EVENT_SERVICE_OFF ? ": service ends" : "");
+    hal_log_write(self->io.log, level, line);
+}
+
+static void log_late(motion_loop_t *self, uint32_t cycles)
+{
+    char line[HAL_LOG_TEXT_MAX + 1];
+    text_t text = text_start(line, sizeof line);
+    text_put_u32(&text, cycles);
+    text_put(&text, " cycles late: holding ([platform] late_hold_cycles)");
+    hal_log_write(self->io.log, HAL_LOG_ERROR, line);
+}
+
+static void log_losses(motion_loop_t *self, switches_change_t change, event_t response)
+{
     if ((change.off & INPUT_ENABLE) != 0) {
-        turn_off(self);
+        log_loss(self, HAL_LOG_NOTICE, "the enable key was turned off", response);
     }
     if ((change.on & INPUT_POWER) != 0) {
-        lose_power(self);
+        const bool is_held = response == EVENTS && gateway_snapshot(&self->session.gateway)->state == STATE_HOLD;
+        log_loss(self, HAL_LOG_ERROR,
+                 is_held ? "the supply is failing: on hold, park settles the platform" : "the supply is failing", response);
     }
     if ((change.off & INPUT_POWER) != 0) {
         hal_log_write(self->io.log, HAL_LOG_NOTICE, "the supply is back");
     }
-    if ((change.on & INPUT_RESET) != 0) {
-        hal_log_write(self->io.log, HAL_LOG_NOTICE, "the reset button was pressed");
-        if (carry_out(self, &(motion_request_t){.event = EVENT_RESET}) != HV_OK) {
-            hal_log_write(self->io.log, HAL_LOG_WARNING,
-                          "reset refused: the e-stop is still active, or there is nothing to reset");
-        }
+}
+
+/* Cycles that are late count where the drives have had no set-points for so long that going on as if nothing had happened would
+ * be a guess. */
+static void withhold_permits(motion_loop_t *self, switches_change_t change, uint32_t late_cycles)
+{
+    const bool is_too_late = self->late_hold_cycles != 0 && late_cycles > self->late_hold_cycles;
+    const uint32_t permits =
+        __atomic_load_n(&self->handover.withheld, __ATOMIC_ACQUIRE) | (switches_is_key_off(&self->switches) ? PERMIT_KEY : 0u) |
+        (switches_is_power_failing(&self->switches) ? PERMIT_SUPPLY : 0u) | (is_too_late ? PERMIT_PUNCTUAL : 0u);
+    const event_t response = gateway_withhold(&self->session.gateway, permits);
+    log_losses(self, change, response);
+    if (response == EVENT_HOLD) {
+        log_late(self, late_cycles);
+        self->current.view.own_holds++;
+    }
+    if (response != EVENTS) {
+        (void)!ask(self, response);
+    }
+}
+
+static void press_reset(motion_loop_t *self)
+{
+    hal_log_write(self->io.log, HAL_LOG_NOTICE, "the reset button was pressed");
+    if (ask(self, EVENT_RESET) != HV_OK) {
+        hal_log_write(self->io.log, HAL_LOG_WARNING, "reset refused: the e-stop is still active, or there is nothing to reset");
     }
 }
 
@@ -312,24 +314,6 @@ static void publish(motion_loop_t *self)
 
 /* --- The thread --- */
 
-/* The drives have had no set-points for so long that going on as if nothing had happened would be a guess. As an operator's
- * request, so that a recording replays it. */
-static void hold_if_too_late(motion_loop_t *self, uint32_t cycles)
-{
-    const state_t state = gateway_snapshot(&self->session.gateway)->state;
-    const bool is_leading = state == STATE_ENGAGED || state == STATE_RISING || state == STATE_NEUTRAL || state == STATE_SERVICE;
-    if (self->late_hold_cycles == 0 || cycles <= self->late_hold_cycles || !is_leading) {
-        return;
-    }
-    char line[HAL_LOG_TEXT_MAX + 1];
-    text_t text = text_start(line, sizeof line);
-    text_put_u32(&text, cycles);
-    text_put(&text, " cycles late: holding ([platform] late_hold_cycles)");
-    hal_log_write(self->io.log, HAL_LOG_ERROR, line);
-    self->current.view.own_holds++;
-    (void)!hold(self);
-}
-
 /* How long a frame took to the drives. Measured beside the motion: nothing depends on it. */
 static void note_latency(motion_loop_t *self)
 {
@@ -351,10 +335,14 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
     if (skipped > 0) {
         motion_note(self, RECORD_LATE, skipped);
         gateway_note_late(&self->session.gateway, skipped);
-        hold_if_too_late(self, skipped);
     }
     take_reloads(self);
-    take_switches(self);
+    const switches_change_t change = switches_step(&self->switches, self->session.now_us);
+    tell_blind(self);
+    withhold_permits(self, change, skipped);
+    if ((change.on & INPUT_RESET) != 0) {
+        press_reset(self);
+    }
     const unsigned requests = take_requests(self, result);
     take_end(self);
     self->tap.arrival_us = 0;

@@ -25,7 +25,7 @@ static bool come_into_force(reconfigure_t *self, const char *path)
     writers_say(self->writers, "%s has been read again: configuration %s", path, self->config->hash);
     writers_tell_hash(self->writers, self->config->hash);
     if (!config_is_unapproved(self->config)) {
-        __atomic_store_n(&self->loop->handover.is_unapproved, 0, __ATOMIC_RELEASE);
+        (void)handover_withhold(&self->loop->handover, PERMIT_APPROVAL, false);
     }
     return true;
 }

@@ -102,13 +102,21 @@ static void carry_out(gateway_t *self, action_t action, const cycle_t *cycle)
     }
 }
 
+supervisor_view_t actions_view(const gateway_t *self, const cycle_t *cycle)
+{
+    return (supervisor_view_t){.is_at_settled = drive_control_is_at_settled(cycle),
+                               .is_at_rest = motion_is_at_rest(cycle->motion),
+                               .is_fault_present = drive_control_has_fault(cycle),
+                               .is_estop_active = self->snapshot.is_estop_active,
+                               .is_going_off = self->drive_control.is_disable_due,
+                               .is_coming_up = drive_control_is_coming_up(&self->drive_control),
+                               .withheld = self->withheld | (self->shutdown.is_asked ? PERMIT_RUNNING : 0u)};
+}
+
 void actions_event(gateway_t *self, event_t event, const cycle_t *cycle)
 {
     const state_t before = self->supervisor.state;
-    const supervisor_view_t view = {.is_at_settled = drive_control_is_at_settled(cycle),
-                                    .is_at_rest = motion_is_at_rest(cycle->motion),
-                                    .is_fault_present = drive_control_has_fault(cycle),
-                                    .is_estop_active = self->snapshot.is_estop_active};
+    const supervisor_view_t view = actions_view(self, cycle);
     const action_t action = supervisor_event(&self->supervisor, event, &view);
     if (self->supervisor.state != before) {
         self->state_since_us = cycle->now_us;

@@ -11,6 +11,9 @@
 /** Offers an event and carries out the action of the transition. Logs every change of state. */
 void actions_event(gateway_t *self, event_t event, const cycle_t *cycle);
 
+/** What the supervisor sees now. */
+supervisor_view_t actions_view(const gateway_t *self, const cycle_t *cycle);
+
 /** Follows a sender from now on: its first pose at engage speed, relays safe until it says otherwise. */
 void actions_follow(gateway_t *self, uint64_t now_us);
 

@@ -80,6 +80,7 @@ void gateway_resume(gateway_t *self, const gateway_t *saved)
     *self = *saved;
     self->settings = settings;
     self->io = io;
+    self->withheld = 0; /* a recording holds only requests that lacked nothing */
     frame_scanner_init(&self->receiver.scanner, self->settings->dialect); /* it starts anew with every datagram */
     clear_reports(&self->snapshot);
 }
@@ -98,6 +99,20 @@ void gateway_reload(gateway_t *self, const settings_t *settings)
 {
     self->settings = settings;
     motion_set_spike_gate(&self->motion, settings->spike_gate);
+}
+
+event_t gateway_withhold(gateway_t *self, uint32_t permits)
+{
+    const uint32_t lost = permits & ~self->withheld;
+    self->withheld = permits & ~(uint32_t)PERMIT_PUNCTUAL; /* each cycle that is late is a loss of its own */
+    return supervisor_response(&self->supervisor, lost);
+}
+
+uint32_t gateway_missing(gateway_t *self, event_t request)
+{
+    const cycle_t cycle = actions_cycle(self, self->snapshot.now_us);
+    const supervisor_view_t view = actions_view(self, &cycle);
+    return supervisor_missing(&self->supervisor, request, &view);
 }
 
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)

@@ -297,19 +297,8 @@ hv_status_t sequencer_request(gateway_t *self, event_t request, const cycle_t *c
     auto_engage_end(&self->auto_engage);
     self->shutdown.is_asked |= request == EVENT_SHUTDOWN;
     const uint32_t ignored = self->supervisor.ignored[request];
-    if (self->shutdown.is_asked && request != EVENT_SHUTDOWN && request != EVENT_HOLD) {
-        return HV_ERR_STATE;
-    }
-    const bool is_going_off = self->drive_control.is_disable_due || !motion_is_at_rest(&self->motion);
-    if (request == EVENT_SERVICE && (is_going_off || drive_control_has_fault(cycle))) {
-        return HV_ERR_STATE; /* it would become a fault at once */
-    }
     if (request == EVENT_HOLD && self->supervisor.state == STATE_SERVICE) {
         service_let_go(&self->service, &self->motion);
-    }
-    if (request == EVENT_SHUTDOWN && drive_control_is_coming_up(&self->drive_control)) {
-        actions_event(self, EVENT_HOLD, cycle); /* homing may take minutes, and who ends heaved has less patience */
-        return HV_OK;
     }
     actions_event(self, request, cycle);
     return self->supervisor.ignored[request] == ignored ? HV_OK : HV_ERR_STATE;

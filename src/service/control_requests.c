@@ -258,7 +258,7 @@ static bool is_known(const char *line)
 /* Somebody has seen that this is not the configuration that was approved, and wants it. */
 static void acknowledge(control_t *self, control_client_t *client)
 {
-    if (__atomic_exchange_n(&self->handover->is_unapproved, 0, __ATOMIC_ACQ_REL) == 0) {
+    if (!handover_withhold(self->handover, PERMIT_APPROVAL, false)) {
         control_client_answer_error(client, "acknowledge: there is nothing to acknowledge",
                                     state_name(control_snapshot(self)->state));
         return;

@@ -15,6 +15,7 @@ static const char k_unapproved[] =
        "heaved ends, [platform] approved for good");
 static const char k_untested[] =
     N_("a self-test is due: `heavectl selftest`, with nobody on board, has to pass today with this configuration");
+
 static control_client_t *find_client(control_t *self, uint32_t request_id)
 {
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
@@ -36,30 +37,36 @@ static void refuse(const control_t *self, control_client_t *client, const snapsh
     control_client_answer_error(client, error, state_name(snapshot->state));
 }
 
+/* What would have to be given first; NULL: nothing that somebody could give. */
+static const char *explain_missing(const control_t *self, uint32_t missing, char *text, size_t capacity)
+{
+    if ((missing & PERMIT_KEY) != 0) {
+        return N_("the enable key is off: turn it on first");
+    }
+    if ((missing & PERMIT_SUPPLY) != 0) {
+        return N_("the supply is failing: nothing goes up until it is back");
+    }
+    if ((missing & PERMIT_APPROVAL) != 0) {
+        (void)snprintf(text, capacity, k_unapproved, self->config->hash, self->config->approved.text);
+        return text;
+    }
+    return (missing & PERMIT_SELFTEST) != 0 ? k_untested : NULL;
+}
+
 /* A reset has an effect once the platform has left FAULT or ESTOP; everything else has its answer after one cycle. */
 static void take_result(const control_t *self, control_client_t *client, const motion_result_t *result)
 {
-    char error[256];
+    char text[256];
+    const char *missing = explain_missing(self, result->missing, text, sizeof text);
     if (result->is_old) {
         client->request_id = 0;
         control_client_answer_stale(client);
     } else if (result->is_void) {
         client->request_id = 0;
         control_client_answer_void(client);
-    } else if (result->is_key_off) {
+    } else if (missing != NULL) {
         client->request_id = 0;
-        control_client_answer_error(client, "the enable key is off: turn it on first", state_name(result->snapshot.state));
-    } else if (result->is_power_failing) {
-        client->request_id = 0;
-        control_client_answer_error(client, "the supply is failing: nothing goes up until it is back",
-                                    state_name(result->snapshot.state));
-    } else if (result->is_unapproved) {
-        client->request_id = 0;
-        (void)snprintf(error, sizeof error, k_unapproved, self->config->hash, self->config->approved.text);
-        control_client_answer_error(client, error, state_name(result->snapshot.state));
-    } else if (result->is_untested) {
-        client->request_id = 0;
-        control_client_answer_error(client, k_untested, state_name(result->snapshot.state));
+        control_client_answer_error(client, missing, state_name(result->snapshot.state));
     } else if (client->request == OPERATOR_SERVICE) {
         client->request_id = 0;
         control_client_answer_service(client, result);

@@ -77,6 +77,6 @@ bool control_selftest_watch(control_t *self, lifetime_t *life, const config_t *c
         self->selftest.is_news = false;
     }
     self->lost.is_untested = config->selftest.when == CONFIG_SELFTEST_DAILY && !lifetime_has_passed(life, day, config->hash);
-    __atomic_store_n(&self->handover->is_untested, self->lost.is_untested ? 1u : 0u, __ATOMIC_RELEASE);
+    (void)handover_withhold(self->handover, PERMIT_SELFTEST, self->lost.is_untested);
     return is_news;
 }

@@ -74,11 +74,8 @@ typedef struct {
     int32_t status; /**< hv_status_t */
     snapshot_t snapshot;
     bool is_shutting_down;
-    bool is_key_off;         /**< refused because of that */
-    bool is_unapproved;      /**< likewise */
-    bool is_power_failing;   /**< likewise */
-    bool is_untested;        /**< likewise: a self-test is due */
-    bool is_old;             /**< likewise: see motion_request_t */
+    uint32_t missing;        /**< refused for want of these permits: PERMIT_KEY | ... */
+    bool is_old;             /**< refused because of that: see motion_request_t */
     bool is_void;            /**< likewise */
     bool is_later;           /**< private to the motion thread: the answer comes in a later cycle */
     service_answer_t answer; /**< of OPERATOR_SERVICE, and whether OPERATOR_OBJECT was begun */
@@ -87,11 +84,10 @@ typedef struct {
     uint32_t object_code; /**< and why the drive has refused it */
 } motion_result_t;
 
-/** Whether it was refused for a reason that has a flag of its own. */
+/** Whether it was refused, and not because of the state. */
 static inline bool handover_is_barred(const motion_result_t *result)
 {
-    return result->is_old || result->is_void || result->is_key_off || result->is_unapproved || result->is_power_failing ||
-           result->is_untested;
+    return result->is_old || result->is_void || result->missing != 0;
 }
 
 /** What a reload hands over. */
@@ -109,19 +105,18 @@ typedef struct {
 
 /** All hand-overs. Large. */
 typedef struct {
-    motion_times_t times;   /**< the motion thread adds, others read */
-    seqlock_t view;         /**< motion_view_t from the motion thread */
-    ring_t requests;        /**< motion_request_t to it, from the service thread */
-    ring_t reloads;         /**< motion_reload_t likewise */
-    ring_t results;         /**< motion_result_t from it, to the service thread */
-    ring_t record;          /**< record_t from it, to the thread that writes files */
-    ring_t trace;           /**< trace_row_t likewise */
-    uint32_t is_quit;       /**< atomic: the service thread wants an end at once */
-    uint32_t is_end_due;    /**< atomic: a signal wants the platform settled, and an end; no request before it delays that */
-    uint32_t is_unapproved; /**< atomic: nothing is brought up until it is over, as without the enable key */
-    uint32_t is_untested;   /**< atomic: nobody engages until a self-test has passed */
-    uint32_t is_ended;      /**< atomic: the motion thread has done its last cycle */
-    uint32_t memory;        /**< atomic: motion_memory_t */
+    motion_times_t times; /**< the motion thread adds, others read */
+    seqlock_t view;       /**< motion_view_t from the motion thread */
+    ring_t requests;      /**< motion_request_t to it, from the service thread */
+    ring_t reloads;       /**< motion_reload_t likewise */
+    ring_t results;       /**< motion_result_t from it, to the service thread */
+    ring_t record;        /**< record_t from it, to the thread that writes files */
+    ring_t trace;         /**< trace_row_t likewise */
+    uint32_t is_quit;     /**< atomic: the service thread wants an end at once */
+    uint32_t is_end_due;  /**< atomic: a signal wants the platform settled, and an end; no request before it delays that */
+    uint32_t withheld;    /**< atomic: what the service thread does not permit, PERMIT_APPROVAL | PERMIT_SELFTEST */
+    uint32_t is_ended;    /**< atomic: the motion thread has done its last cycle */
+    uint32_t memory;      /**< atomic: motion_memory_t */
     uint64_t view_word[MOTION_VIEW_WORDS];
     uint8_t reload_bytes[HANDOVER_RELOAD_BYTES];
     uint8_t request_bytes[HANDOVER_REQUEST_BYTES];
@@ -130,7 +125,22 @@ typedef struct {
     uint8_t trace_bytes[HANDOVER_TRACE_BYTES];
 } handover_t;
 
-/** Empties all of them; is_unapproved and is_quit stay as they are. Before there are threads. */
+/** Empties all of them; withheld and is_quit stay as they are. Before there are threads. */
 void handover_init(handover_t *self);
+
+/** Withholds permits, or gives them again. Any thread.
+ *  @return true: they were withheld before */
+static inline bool handover_withhold(handover_t *self, uint32_t permits, bool is_withheld)
+{
+    const uint32_t before = is_withheld ? __atomic_fetch_or(&self->withheld, permits, __ATOMIC_ACQ_REL)
+                                        : __atomic_fetch_and(&self->withheld, ~permits, __ATOMIC_ACQ_REL);
+    return (before & permits) != 0;
+}
+
+/** Whether a permit is withheld. Any thread. */
+static inline bool handover_is_withheld(const handover_t *self, uint32_t permits)
+{
+    return (__atomic_load_n(&self->withheld, __ATOMIC_ACQUIRE) & permits) != 0;
+}
 
 #endif

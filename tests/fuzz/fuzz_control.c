@@ -162,7 +162,7 @@ static void answer_requests(uint8_t how)
         m_asked++;
         result = (motion_result_t){.id = request.id,
                                    .status = k_status[how % 4],
-                                   .is_key_off = how >= 0xF0,
+                                   .missing = how >= 0xF0 ? PERMIT_KEY : 0,
                                    .answer = (service_answer_t)(how % SERVICE_ANSWERS)};
         result.snapshot.state = (state_t)(how % STATES);
         (void)ring_push(&m_handover.results, &result, sizeof result, NULL, 0);

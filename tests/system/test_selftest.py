@@ -134,6 +134,9 @@ def passes():
         bench.config.write_text(bench.config.read_text(encoding="utf-8").replace("jog_mm_s = 50", "jog_mm_s = 40"))
         daemon = bench.start()
         assert bench.ask("engage")[0]["error"] == DUE, "it was another configuration"
+        assert bench.ask("park")[1] == 0
+        answer = bench.ask("engage")[0]
+        assert answer["error"] == DUE and answer["state"] == "HOMING", f"who comes up to board does not go on from there: {answer}"
         bench.stop(daemon)
 
 

@@ -1837,6 +1837,56 @@ static void test_power_that_fails_stops_what_is_not_settled_in_time(void)
     }
 }
 
+/* What heaved makes of keys, supply and approvals. */
+static void test_what_is_withheld_keeps_the_platform_down_and_leads_it_down(void)
+{
+    start(false);
+    TEST_ASSERT_EQUAL(EVENTS, gateway_withhold(&m_rig.gateway, PERMIT_KEY | PERMIT_SELFTEST));
+    TEST_ASSERT_EQUAL_UINT32(PERMIT_KEY | PERMIT_SELFTEST, gateway_missing(&m_rig.gateway, EVENT_ENGAGE));
+    TEST_ASSERT_EQUAL_UINT32(PERMIT_KEY, gateway_missing(&m_rig.gateway, EVENT_PARK));
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_ENGAGE));
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_PARK));
+    rig_run_ms(&m_rig, 100);
+    TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
+
+    engage();
+    TEST_ASSERT_EQUAL_UINT32(0, gateway_missing(&m_rig.gateway, EVENT_HOLD));
+    TEST_ASSERT_EQUAL(EVENT_PARK, gateway_withhold(&m_rig.gateway, PERMIT_SUPPLY));
+    TEST_ASSERT_EQUAL(EVENTS, gateway_withhold(&m_rig.gateway, PERMIT_SUPPLY)); /* once */
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_PARK));
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_HOLD));
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_RESUME));
+    TEST_ASSERT_EQUAL(HV_ERR_STATE, rig_request(&m_rig, EVENT_ENGAGE));
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_PARK)); /* down is always allowed */
+    rig_run_ms(&m_rig, 5000);
+    TEST_ASSERT_EQUAL(STATE_SETTLED, seen()->state);
+    TEST_ASSERT_EQUAL(EVENTS, gateway_withhold(&m_rig.gateway, 0));
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_ENGAGE));
+}
+
+static void test_each_cycle_that_is_too_late_leads_to_a_hold(void)
+{
+    engage();
+    for (unsigned i = 0; i < 3; i++) {
+        TEST_ASSERT_EQUAL(EVENT_HOLD, gateway_withhold(&m_rig.gateway, PERMIT_PUNCTUAL));
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_HOLD));
+        TEST_ASSERT_EQUAL(EVENTS, gateway_withhold(&m_rig.gateway, PERMIT_PUNCTUAL)); /* it is on hold already */
+        TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_RESUME));
+        rig_run_ms(&m_rig, 1);
+    }
+}
+
+static void test_a_shutdown_withholds_by_itself_all_that_is_not_its_own(void)
+{
+    engage();
+    TEST_ASSERT_EQUAL_UINT32(0, gateway_missing(&m_rig.gateway, EVENT_PARK));
+    TEST_ASSERT_EQUAL(HV_OK, rig_request(&m_rig, EVENT_SHUTDOWN));
+    TEST_ASSERT_EQUAL_UINT32(PERMIT_RUNNING, gateway_missing(&m_rig.gateway, EVENT_PARK));
+    TEST_ASSERT_EQUAL_UINT32(PERMIT_RUNNING, gateway_missing(&m_rig.gateway, EVENT_ENGAGE));
+    TEST_ASSERT_EQUAL_UINT32(0, gateway_missing(&m_rig.gateway, EVENT_HOLD));
+    TEST_ASSERT_EQUAL_UINT32(0, gateway_missing(&m_rig.gateway, EVENT_SHUTDOWN));
+}
+
 static void test_power_that_fails_leaves_who_is_down_in_peace(void)
 {
     m_settings.power_settle_ms = 100;
@@ -2476,6 +2526,7 @@ static void test_resume_goes_on_as_what_was_saved(void)
     engage();
     for (unsigned moment = 0; moment < 8; moment++) { /* at rest, and in a move */
         then = m_rig;
+        TEST_ASSERT_EQUAL(EVENTS, gateway_withhold(&m_rig.gateway, PERMIT_APPROVAL)); /* a replay knows of none */
         gateway_save(&m_rig.gateway, &saved);
         TEST_ASSERT_NULL(saved.io.drives.ctx);
         ride_on();
@@ -2483,6 +2534,7 @@ static void test_resume_goes_on_as_what_was_saved(void)
         m_rig = then;
         TEST_ASSERT_EQUAL(HV_OK, gateway_init(&other, &m_settings, &m_rig.gateway.io));
         gateway_resume(&other, &saved);
+        TEST_ASSERT_EQUAL_UINT32(0, gateway_missing(&other, EVENT_ENGAGE));
         TEST_ASSERT_EQUAL_STRING("", other.snapshot.report[0].phase);
         m_rig.gateway = other;
         ride_on();
@@ -2581,6 +2633,9 @@ static void run_supervision(void)
     RUN_TEST(test_fault_worse_one_later_escalates_and_the_first_is_kept);
     RUN_TEST(test_channels_apart_are_a_fault_in_estop_that_holds_back_a_reset);
     RUN_TEST(test_power_that_fails_stops_what_is_not_settled_in_time);
+    RUN_TEST(test_what_is_withheld_keeps_the_platform_down_and_leads_it_down);
+    RUN_TEST(test_each_cycle_that_is_too_late_leads_to_a_hold);
+    RUN_TEST(test_a_shutdown_withholds_by_itself_all_that_is_not_its_own);
     RUN_TEST(test_power_that_fails_leaves_who_is_down_in_peace);
     RUN_TEST(test_fault_tables_are_complete);
     RUN_TEST(test_fault_bus_gone_is_a_fault_that_can_be_reset);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * test_supervisor.c - every situation x event against a matrix written from the requirement, then invariants over every state
- * that can be reached at all, and over long random walks.
+ * test_supervisor.c - every situation x event against a matrix written from the requirement, and every permit against another,
+ * then invariants over every state that can be reached at all, and over long random walks.
  */
 #include "heave/supervisor.h"
 
@@ -53,7 +53,8 @@ typedef struct {
     const char *goals;       /* any of these */
     const char *interrupted; /* any of these; only looked at in HOLD */
     tri_t by_silence;
-    tri_t cond;        /* OFF: at the settled extension; FAULT: cause gone and at rest; ESTOP: released and cause gone */
+    tri_t cond; /* OFF: at the settled extension; HOMING: drives come up; FAULT: cause gone and at rest; ESTOP: released and
+                   cause gone */
     const char *cells; /* one per event, in the order of event_t, CELL characters apart */
 } situation_t;
 
@@ -63,7 +64,8 @@ static const situation_t k_matrix[] = {
     {"off, at settled", 'O', "SNE",  "",  NO,  YES, "SS0y -    .    HE0h .    .    HS0h .    =O0- VO0v .    .    -    -    -    F=0x X=0e"},
     {"off, elsewhere",  'O', "SNE",  "",  NO,  NO,  "-    -    .    HE0h .    .    HS0h .    =O0- VO0v .    .    -    -    -    F=0x X=0e"},
     {"off on request",  'O', "O",    "",  NO,  ANY, "-    -    .    HE0h .    .    HS0h .    =O0- VO0v .    .    -    -    -    F=0x X=0e"},
-    {"homing",          'H', "OSNE", "",  NO,  ANY, "-    -    S=0y =E0- D=0s .    =S0- .    =O0- .    .    .    -    -    -    F=0x X=0e"},
+    {"homing, to home", 'H', "OSNE", "",  NO,  YES, "-    -    S=0y =E0- D=0s .    =S0- .    DO0s .    .    .    -    -    -    F=0x X=0e"},
+    {"homing, to place",'H', "OSNE", "",  NO,  NO,  "-    -    S=0y =E0- D=0s .    =S0- .    =O0- .    .    .    -    -    -    F=0x X=0e"},
     {"settled",         'S', "S",    "",  NO,  ANY, "-    -    .    RE0r .    .    =S0- .    OO0o VO0v .    .    -    -    -    F=0x X=0e"},
     {"settled, to up",  'S', "NE",   "",  NO,  ANY, "-    R=0r .    RE0r =S0- .    =S0- .    OO0o VO0v .    .    -    -    -    F=0x X=0e"},
     {"settled, to off", 'S', "O",    "",  NO,  ANY, "-    OO0o .    RE0r .    .    =S0- .    OO0o VO0v .    .    -    -    -    F=0x X=0e"},
@@ -112,7 +114,7 @@ static bool condition(const supervisor_t *sup, const supervisor_view_t *view)
         return view->is_at_rest && !view->is_fault_present;
     if (sup->state == STATE_ESTOP)
         return !(view->is_estop_active || view->is_fault_present);
-    return view->is_at_settled;
+    return sup->state == STATE_HOMING ? view->is_coming_up : view->is_at_settled;
 }
 
 static bool situation_fits(const situation_t *s, const supervisor_t *sup, const supervisor_view_t *view)
@@ -135,9 +137,16 @@ static const situation_t *situation_find(const supervisor_t *sup, const supervis
 
 static supervisor_view_t view_of(unsigned bits)
 {
-    return (supervisor_view_t){bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3 & 1};
+    return (supervisor_view_t){bits & 1, bits >> 1 & 1, bits >> 2 & 1, bits >> 3 & 1, bits >> 4 & 1, bits >> 5 & 1, 0};
 }
-#define VIEWS 16u
+#define VIEWS 64u
+
+/* Into SERVICE only what stands still gets: a V of another situation counts as a point. */
+static const char *cell_of(const situation_t *s, event_t event, const supervisor_view_t *view)
+{
+    const char *cell = s->cells + CELL * event;
+    return cell[0] == 'V' && (!view->is_at_rest || view->is_fault_present || view->is_going_off) ? ".    " : cell;
+}
 
 /* What a cell promises. */
 static action_t cell_apply(const char *cell, event_t event, supervisor_t *sup)
@@ -159,7 +168,7 @@ static void check_cell(const situation_t *s, const supervisor_t *before, event_t
     char text[120];
     snprintf(text, sizeof text, "%s (goal %s) + %s", s->name, state_name(before->goal), event_name(event));
     supervisor_t expected = *before, actual = *before;
-    const action_t expected_action = cell_apply(s->cells + CELL * event, event, &expected);
+    const action_t expected_action = cell_apply(cell_of(s, event, view), event, &expected);
     const action_t action = supervisor_event(&actual, event, view);
     TEST_ASSERT_EQUAL_STRING_MESSAGE(state_name(expected.state), state_name(actual.state), text);
     TEST_ASSERT_EQUAL_STRING_MESSAGE(state_name(expected.goal), state_name(actual.goal), text);
@@ -385,6 +394,130 @@ static void test_supervisor_event_silence_settle_lowers_whatever_it_held(void)
     TEST_ASSERT_GREATER_THAN(2, held);
 }
 
+/* ---- permits ----
+ * What each request needs, by state: F key, supply, approval, self-test and no shutdown   U the same without a self-test   R no
+ * shutdown   . nothing, or there is no such request. */
+static const event_t k_requests[] = {EVENT_ENGAGE, EVENT_HOLD,     EVENT_RESUME,  EVENT_PARK,
+                                     EVENT_RESET,  EVENT_SHUTDOWN, EVENT_SERVICE, EVENT_SERVICE_OFF};
+
+static const char *needs_by_hand(const supervisor_t *sup)
+{
+    /*                                   EhrpRsSo */
+    static const char *const k_needs = "O F..U..U."
+                                       "H F..R...."
+                                       "S F..R..U."
+                                       "R U..R...."
+                                       "N U..R...."
+                                       "E U..R...."
+                                       "D U.UR...."
+                                       "T U..R...."
+                                       "V ......UR"
+                                       "F ........"
+                                       "X ........";
+    const bool is_homing_held = sup->state == STATE_HOLD && sup->interrupted == STATE_HOMING;
+    return is_homing_held ? "F.UU...." : k_needs + 10 * (strchr(k_states, letter(sup->state)) - k_states) + 2;
+}
+
+static bool is_needed(char set, uint32_t permit)
+{
+    return permit == PERMIT_RUNNING                                                       ? set != '.'
+           : permit == PERMIT_SELFTEST                                                    ? set == 'F'
+           : permit == PERMIT_KEY || permit == PERMIT_SUPPLY || permit == PERMIT_APPROVAL ? set == 'F' || set == 'U'
+                                                                                          : false;
+}
+
+static char needed_by(const supervisor_t *sup, event_t event)
+{
+    for (unsigned i = 0; i < sizeof k_requests / sizeof k_requests[0]; i++)
+        if (k_requests[i] == event)
+            return needs_by_hand(sup)[i];
+    return '.';
+}
+
+/* Where there is no such request: what it needs anywhere. */
+static char needed_anywhere(const supervisor_t *sup, event_t event)
+{
+    const char set = needed_by(sup, event);
+    const bool is_lifting = event == EVENT_ENGAGE || event == EVENT_RESUME || event == EVENT_SERVICE;
+    return set != '.' ? set : is_lifting ? 'U' : event == EVENT_PARK || event == EVENT_SERVICE_OFF ? 'R' : '.';
+}
+
+static void check_permit(const supervisor_t *before, event_t event, uint32_t permit)
+{
+    const bool needed = is_needed(needed_by(before, event), permit);
+    const supervisor_view_t given = {.is_at_rest = true}, withheld = {.is_at_rest = true, .withheld = permit};
+    supervisor_t expected = *before, actual = *before;
+    char text[100];
+    snprintf(text, sizeof text, "%s in %s without %u", event_name(event), state_name(before->state), (unsigned)permit);
+    if (needed)
+        expected.ignored[event]++;
+    const action_t expected_action = needed ? ACTION_NONE : supervisor_event(&expected, event, &given);
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(is_needed(needed_anywhere(before, event), permit) ? permit : 0,
+                                     supervisor_missing(before, event, &withheld), text);
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(0, supervisor_missing(before, event, &given), text);
+    TEST_ASSERT_EQUAL_MESSAGE(expected_action, supervisor_event(&actual, event, &withheld), text);
+    TEST_ASSERT_EQUAL_MEMORY_MESSAGE(&expected, &actual, sizeof actual, text);
+}
+
+static void test_supervisor_event_without_a_permit_nothing_goes_up_and_everything_goes_down(void)
+{
+    bool seen[CONTEXTS];
+    reach(seen, NULL);
+    for (unsigned n = 0; n < CONTEXTS; n++)
+        for (unsigned i = 0; seen[n] && i < EVENTS * 6u; i++) {
+            const supervisor_t sup = context_of(n);
+            check_permit(&sup, (event_t)(i / 6u), 1u << i % 6u);
+        }
+}
+
+static void test_supervisor_missing_names_all_that_is_withheld_and_needed(void)
+{
+    const supervisor_view_t view = {.is_at_rest = true, .withheld = PERMIT_KEY | PERMIT_SELFTEST | PERMIT_PUNCTUAL};
+    TEST_ASSERT_EQUAL_UINT32(PERMIT_KEY | PERMIT_SELFTEST, supervisor_missing(&m_sup, EVENT_ENGAGE, &view));
+    TEST_ASSERT_EQUAL_UINT32(PERMIT_KEY, supervisor_missing(&m_sup, EVENT_PARK, &view));
+    TEST_ASSERT_EQUAL_UINT32(PERMIT_KEY, supervisor_missing(&m_sup, EVENT_RESUME, &view)); /* and there is nothing to resume */
+    TEST_ASSERT_EQUAL_UINT32(0, supervisor_missing(&m_sup, EVENT_HOLD, &view));
+}
+
+/* Said again from the requirement: down as long as there is power, but no hold of a person ends for that; the key ends it. */
+static event_t response_by_hand(const supervisor_t *sup, uint32_t lost)
+{
+    const bool is_held = sup->state == STATE_HOLD, is_up = sup->goal == STATE_NEUTRAL || sup->goal == STATE_ENGAGED;
+    const bool is_down = sup->state == STATE_OFF || (is_held && sup->interrupted == STATE_HOMING) || supervisor_is_latched(sup);
+    if (sup->state == STATE_SERVICE)
+        return lost == 0 ? EVENTS : lost == PERMIT_PUNCTUAL ? EVENT_HOLD : EVENT_SERVICE_OFF;
+    if (!is_down && is_up && ((lost & PERMIT_KEY) != 0 || ((lost & PERMIT_SUPPLY) != 0 && (!is_held || sup->is_held_by_silence))))
+        return EVENT_PARK;
+    const bool is_led = sup->state == STATE_RISING || sup->state == STATE_NEUTRAL || sup->state == STATE_ENGAGED;
+    return is_led && (lost & PERMIT_PUNCTUAL) != 0 ? EVENT_HOLD : EVENTS;
+}
+
+static void test_supervisor_response_leads_down_and_lacks_nothing(void)
+{
+    static const uint32_t k_lost[] = {PERMIT_KEY, PERMIT_SUPPLY, PERMIT_PUNCTUAL};
+    bool seen[CONTEXTS];
+    unsigned responses = 0;
+    reach(seen, NULL);
+    for (unsigned n = 0; n < CONTEXTS; n++)
+        for (unsigned i = 0; seen[n] && i < 8u; i++) {
+            supervisor_t sup = context_of(n);
+            const uint32_t lost = (i & 1u ? k_lost[0] : 0) | (i & 2u ? k_lost[1] : 0) | (i & 4u ? k_lost[2] : 0);
+            const supervisor_view_t view = {.is_at_rest = true, .withheld = lost};
+            const event_t response = supervisor_response(&sup, lost);
+            TEST_ASSERT_EQUAL_STRING_MESSAGE(event_name(response_by_hand(&sup, lost)), event_name(response),
+                                             state_name(sup.state));
+            if (response == EVENTS)
+                continue;
+            responses++;
+            supervisor_event(&sup, response, &view);
+            TEST_ASSERT_EQUAL_UINT32(0, sup.ignored[response]);
+            run_on(&sup);
+            TEST_ASSERT_TRUE(sup.state == STATE_SETTLED || sup.state == STATE_OFF || lost == PERMIT_PUNCTUAL);
+        }
+    TEST_ASSERT_GREATER_THAN(50, responses);
+    TEST_ASSERT_EQUAL(EVENTS, supervisor_response(&m_sup, PERMIT_APPROVAL | PERMIT_SELFTEST | PERMIT_RUNNING));
+}
+
 /* ---- random walks ---- */
 
 static uint32_t random_below(uint32_t n)
@@ -548,6 +681,9 @@ int main(void)
     RUN_TEST(test_supervisor_event_park_always_ends_settled);
     RUN_TEST(test_supervisor_event_shutdown_always_ends_off);
     RUN_TEST(test_supervisor_event_silence_settle_lowers_whatever_it_held);
+    RUN_TEST(test_supervisor_event_without_a_permit_nothing_goes_up_and_everything_goes_down);
+    RUN_TEST(test_supervisor_missing_names_all_that_is_withheld_and_needed);
+    RUN_TEST(test_supervisor_response_leads_down_and_lacks_nothing);
     RUN_TEST(test_supervisor_event_random_walks_raise_nobody_without_engage);
     RUN_TEST(test_supervisor_event_same_walk_twice_gives_the_same_bytes);
     RUN_TEST(test_supervisor_event_engage_from_off_passes_every_state_on_the_way);

@@ -58,7 +58,7 @@ test("every event and condition of the states has words in both languages, and e
 });
 
 test("what is possible next is what the supervisor has", () => {
-  assert.deepEqual(possible("OFF").operator, { engage: [{ to: "HOMING", guard: "ALWAYS" }], park: [{ to: "HOMING", guard: "ALWAYS" }], service: [{ to: "SERVICE", guard: "ALWAYS" }] });
+  assert.deepEqual(possible("OFF").operator, { engage: [{ to: "HOMING", guard: "ALWAYS" }], park: [{ to: "HOMING", guard: "ALWAYS" }], service: [{ to: "SERVICE", guard: "STANDS_STILL" }] });
   assert.deepEqual(Object.keys(possible("FAULT").operator), ["reset"]);
   assert.equal(possible("HOLD").operator.resume.length, 5);
 });
