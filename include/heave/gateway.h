@@ -100,6 +100,12 @@ typedef struct {
     q16_t deg_q16[ROTATIONS];
 } rotations_t;
 
+/** The values of a pose as they stood in its frame. */
+typedef struct {
+    bool is_pose; /**< false: the frame had no pose, and the values are 0 */
+    q16_t value_q16[POSE_AXES];
+} received_t;
+
 /** The sender in control and what it asks for; members are private to src/gateway. */
 typedef struct {
     owner_t owner;
@@ -116,6 +122,7 @@ typedef struct {
     hal_udp_peer_t newest_from;
     q32_t rotation_deg_q32[AXIS_YAW + 1u]; /**< of the last pose that was followed, within the limits */
     rotations_t rotations;                 /**< of the last frame, as sent */
+    received_t received;                   /**< of the newest frame that was followed, as sent */
     log_limit_t other_log, spike_log, jump_log, turn_log, digits_log;
 } sender_t;
 
@@ -127,7 +134,27 @@ typedef struct {
     uint16_t written_mask; /**< with it */
     bool is_mask_written;
     bool is_pulse_lost; /**< its line cannot be written */
+    bool is_healthy;    /**< the healthy pulse runs, or would run if it had a line */
+    bool is_unknown;    /**< the relays cannot be written or read back */
 } relay_output_t;
+
+/** Levels of the inputs; members are private to src/gateway. */
+typedef struct {
+    bool is_estop_active; /**< also where the inputs cannot be read */
+    bool is_apart;        /**< the channels of the e-stop disagree */
+    bool is_power_failing;
+} input_levels_t;
+
+/** What is kept of faults; members are private to src/gateway. */
+typedef struct {
+    uint32_t begun[DRIVES_MAX + 1u]; /**< in this cycle, by axis as in fault_t: bit N for fault_code_t N */
+    fault_t first;                   /**< since the last reset */
+    drive_report_t report;           /**< of its drive at that time */
+    fault_reaction_t reaction;       /**< the worst since the last reset */
+    uint32_t total;                  /**< since the start; wraps */
+    uint64_t last_us[FAULT_CODES];   /**< last beginning of each fault, 0 = never */
+    uint32_t count[FAULT_CODES];     /**< of each */
+} faults_t;
 
 /** What is wrong with bus, drives and inputs, so that each fault is found once; members are private to src/gateway. */
 typedef struct {
@@ -156,29 +183,39 @@ typedef struct {
     uint64_t since_us; /**< when it reached OFF, FAULT or ESTOP and the drives were told; 0 = not yet */
 } shutdown_t;
 
+/** The state of the platform and all that leads to another one; members are private to src/gateway. */
+typedef struct {
+    supervisor_t supervisor;
+    drive_control_t drive_control;
+    service_t service;
+    fault_watch_t fault_watch;
+    faults_t faults;
+    input_levels_t inputs;
+    auto_engage_t auto_engage;
+    shutdown_t shutdown;
+    uint32_t told[DRIVES_MAX + 1u]; /**< faults that the next cycle has to find, as faults_t.begun */
+    bool has_told;                  /**< any of these */
+    uint32_t withheld;              /**< PERMIT_KEY | ... */
+    uint32_t rides;                 /**< times that it was engaged from NEUTRAL */
+    uint64_t reset_until_us;        /**< end of the time in which a reset waits for the drives; 0 = no reset */
+    uint64_t state_since_us;        /**< when the state was entered */
+    bool is_late;                   /**< the next cycle is too late for the healthy pulse */
+} sequencer_t;
+
 /** A gateway; members are private to src/gateway. */
 typedef struct {
     const settings_t *settings; /**< in force, the owner's */
     gateway_io_t io;
-    motion_t motion;
-    motion_output_t output;
-    supervisor_t supervisor;
-    uint32_t withheld; /**< PERMIT_KEY | ... */
+    uint8_t cylinders;
     frame_receiver_t receiver;
     sender_t sender;
+    sequencer_t sequencer;
+    motion_t motion;
+    motion_output_t output;
     relay_output_t relay_output;
     reports_t reports;
-    snapshot_t snapshot;
-    fault_watch_t fault_watch;
-    uint32_t told[DRIVES_MAX + 1u]; /**< faults that the next cycle has to find, as snapshot.begun */
-    drive_control_t drive_control;
-    auto_engage_t auto_engage;
-    shutdown_t shutdown;
-    uint64_t reset_until_us; /**< end of the time in which a reset waits for the drives; 0 = no reset */
-    uint64_t state_since_us; /**< when the state was entered */
-    service_t service;
-    bool is_late; /**< the next cycle is too late for the healthy pulse */
     log_limit_t singular_log;
+    snapshot_t snapshot; /**< written at the end of a cycle; but feedback and counters come into it as they come up */
 } gateway_t;
 
 /** Prepares a gateway in OFF. Touches no device.

@@ -4,13 +4,10 @@
 #include "actions.h"
 
 #include "heave/text.h"
+#include "drive_control.h"
 #include "faults.h"
 #include "sender.h"
-
-feedback_t actions_feedback(const gateway_t *self)
-{
-    return (feedback_t){self->snapshot.drive, self->snapshot.cylinders + (self->snapshot.has_angle ? 1u : 0u)};
-}
+#include "service.h"
 
 static void log_change(hal_log_t log, state_t from, state_t to, event_t event)
 {
@@ -25,10 +22,10 @@ static void log_change(hal_log_t log, state_t from, state_t to, event_t event)
     hal_log_write(log, to == STATE_FAULT || to == STATE_ESTOP ? HAL_LOG_ERROR : HAL_LOG_NOTICE, line);
 }
 
-void actions_follow(gateway_t *self, uint64_t now_us)
+void actions_follow(const cycle_t *cycle)
 {
-    sender_restart(&self->sender, self->settings->relay_safe_mask, now_us);
-    motion_follow(&self->motion);
+    sender_restart(cycle->sender, cycle->settings->relay_safe_mask, cycle->now_us);
+    motion_follow(cycle->motion);
 }
 
 /* What the worst fault so far asks for. */
@@ -41,44 +38,34 @@ static void react(drive_control_t *control, fault_reaction_t reaction, const cyc
     }
 }
 
-cycle_t actions_cycle(gateway_t *self, uint64_t now_us)
-{
-    return (cycle_t){.settings = self->settings,
-                     .drives = self->io.drives,
-                     .motion = &self->motion,
-                     .feedback = actions_feedback(self),
-                     .cylinders = self->snapshot.cylinders,
-                     .now_us = now_us};
-}
-
-void actions_raise(gateway_t *self, const fault_t *fault, const cycle_t *cycle)
+void actions_raise(sequencer_t *self, const fault_t *fault, const cycle_t *cycle)
 {
     const state_t state = self->supervisor.state;
     if (state == STATE_ESTOP && fault->code != FAULT_ESTOP_CHANNELS) { /* that one is of the e-stop itself */
         return;
     }
-    const bool is_worse = faults_note(&self->snapshot, fault, self->io.drives, self->io.log);
+    const bool is_worse = faults_note(&self->faults, fault, cycle->drives, cycle->cylinders, cycle->log);
     if (!supervisor_is_latched(&self->supervisor)) {
         actions_event(self, EVENT_FAULT, cycle);
     } else if (is_worse && state == STATE_FAULT) {
-        react(&self->drive_control, self->snapshot.reaction, cycle);
+        react(&self->drive_control, self->faults.reaction, cycle);
     }
 }
 
-static void carry_out(gateway_t *self, action_t action, const cycle_t *cycle)
+static void carry_out(sequencer_t *self, action_t action, const cycle_t *cycle)
 {
     switch (action) {
     case ACTION_HOME:
         drive_control_begin(&self->drive_control, cycle->now_us);
         break;
     case ACTION_SETTLE:
-        motion_settle(&self->motion);
+        motion_settle(cycle->motion);
         break;
     case ACTION_RISE:
-        motion_rise(&self->motion);
+        motion_rise(cycle->motion);
         break;
     case ACTION_FOLLOW:
-        actions_follow(self, cycle->now_us);
+        actions_follow(cycle);
         break;
     case ACTION_STOP:
         drive_control_hold(&self->drive_control, cycle);
@@ -87,7 +74,7 @@ static void carry_out(gateway_t *self, action_t action, const cycle_t *cycle)
         drive_control_stop(&self->drive_control, cycle);
         break;
     case ACTION_FAULT_STOP:
-        react(&self->drive_control, self->snapshot.reaction, cycle);
+        react(&self->drive_control, self->faults.reaction, cycle);
         break;
     case ACTION_SERVE:
         service_begin(&self->service, cycle, !self->drive_control.is_tracking);
@@ -102,26 +89,26 @@ static void carry_out(gateway_t *self, action_t action, const cycle_t *cycle)
     }
 }
 
-supervisor_view_t actions_view(const gateway_t *self, const cycle_t *cycle)
+supervisor_view_t actions_view(const sequencer_t *self, const cycle_t *cycle)
 {
     return (supervisor_view_t){.is_at_settled = drive_control_is_at_settled(cycle),
                                .is_at_rest = motion_is_at_rest(cycle->motion),
                                .is_fault_present = drive_control_has_fault(cycle),
-                               .is_estop_active = self->snapshot.is_estop_active,
+                               .is_estop_active = self->inputs.is_estop_active,
                                .is_going_off = self->drive_control.is_disable_due,
                                .is_coming_up = drive_control_is_coming_up(&self->drive_control),
                                .withheld = self->withheld | (self->shutdown.is_asked ? PERMIT_RUNNING : 0u)};
 }
 
-void actions_event(gateway_t *self, event_t event, const cycle_t *cycle)
+void actions_event(sequencer_t *self, event_t event, const cycle_t *cycle)
 {
     const state_t before = self->supervisor.state;
     const supervisor_view_t view = actions_view(self, cycle);
     const action_t action = supervisor_event(&self->supervisor, event, &view);
     if (self->supervisor.state != before) {
         self->state_since_us = cycle->now_us;
-        self->snapshot.rides += before == STATE_NEUTRAL && self->supervisor.state == STATE_ENGAGED;
-        log_change(self->io.log, before, self->supervisor.state, event);
+        self->rides += before == STATE_NEUTRAL && self->supervisor.state == STATE_ENGAGED;
+        log_change(cycle->log, before, self->supervisor.state, event);
     }
     carry_out(self, action, cycle);
 }

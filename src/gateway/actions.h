@@ -4,26 +4,18 @@
 #ifndef ACTIONS_H
 #define ACTIONS_H
 
-#include "heave/gateway.h"
-#include "drive_control.h"
-#include "service.h"
+#include "cycle.h"
 
 /** Offers an event and carries out the action of the transition. Logs every change of state. */
-void actions_event(gateway_t *self, event_t event, const cycle_t *cycle);
+void actions_event(sequencer_t *self, event_t event, const cycle_t *cycle);
 
 /** What the supervisor sees now. */
-supervisor_view_t actions_view(const gateway_t *self, const cycle_t *cycle);
+supervisor_view_t actions_view(const sequencer_t *self, const cycle_t *cycle);
 
 /** Follows a sender from now on: its first pose at engage speed, relays safe until it says otherwise. */
-void actions_follow(gateway_t *self, uint64_t now_us);
+void actions_follow(const cycle_t *cycle);
 
 /** A fault begins: it is counted and logged, and the worst reaction wins, also over one that is under way. */
-void actions_raise(gateway_t *self, const fault_t *fault, const cycle_t *cycle);
-
-/** What the drives said in this cycle. */
-feedback_t actions_feedback(const gateway_t *self);
-
-/** What stages get of a cycle, or of a request between two. */
-cycle_t actions_cycle(gateway_t *self, uint64_t now_us);
+void actions_raise(sequencer_t *self, const fault_t *fault, const cycle_t *cycle);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * cycle.h - what stages that lead drives get of a cycle. Private to src/gateway.
+ * cycle.h - what stages get of a cycle, or of a request between two. Private to src/gateway.
  */
 #ifndef GATEWAY_CYCLE_H
 #define GATEWAY_CYCLE_H
@@ -11,7 +11,10 @@
 typedef struct {
     const settings_t *settings;
     drives_t drives;
+    hal_log_t log;
+    sender_t *sender;
     motion_t *motion;
+    const motion_output_t *output; /**< of the last cycle, until motion has made its step */
     feedback_t feedback;
     unsigned cylinders; /**< one more drive is the rotation motor */
     uint64_t now_us;

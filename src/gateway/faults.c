@@ -45,28 +45,34 @@ drive_report_t faults_report_of(drives_t drives, const fault_t *fault)
     return report;
 }
 
-bool faults_note(snapshot_t *shown, const fault_t *fault, drives_t drives, hal_log_t log)
+void faults_init(faults_t *self)
+{
+    *self = (faults_t){.first = {.code = FAULT_NONE}};
+    faults_clear(self);
+}
+
+bool faults_note(faults_t *self, const fault_t *fault, drives_t drives, unsigned cylinders, hal_log_t log)
 {
     const fault_code_t code = fault->code;
     const fault_reaction_t reaction = fault_reaction(code);
     const drive_report_t report = faults_report_of(drives, fault);
-    shown->begun[fault->axis] |= 1u << (unsigned)code;
-    shown->counters.faults++;
-    shown->counters.fault[code]++;
-    shown->fault_last_us[code] = fault->at_us;
-    log_fault(log, fault, &report, shown->cylinders);
-    if (shown->fault.code == FAULT_NONE) {
-        shown->fault = *fault;
-        shown->fault_report = report;
+    self->begun[fault->axis] |= 1u << (unsigned)code;
+    self->total++;
+    self->count[code]++;
+    self->last_us[code] = fault->at_us;
+    log_fault(log, fault, &report, cylinders);
+    if (self->first.code == FAULT_NONE) {
+        self->first = *fault;
+        self->report = report;
     }
-    const bool is_worse = reaction > shown->reaction;
-    shown->reaction = is_worse ? reaction : shown->reaction;
+    const bool is_worse = reaction > self->reaction;
+    self->reaction = is_worse ? reaction : self->reaction;
     return is_worse;
 }
 
-void faults_clear(snapshot_t *shown)
+void faults_clear(faults_t *self)
 {
-    shown->fault = (fault_t){.code = FAULT_NONE};
-    shown->fault_report = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
-    shown->reaction = FAULT_REACT_NONE;
+    self->first = (fault_t){.code = FAULT_NONE};
+    self->report = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
+    self->reaction = FAULT_REACT_NONE;
 }

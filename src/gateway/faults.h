@@ -7,12 +7,15 @@
 
 #include "heave/gateway.h"
 
+/** No fault has been. */
+void faults_init(faults_t *self);
+
 /** Counts and logs a fault that begins.
- *  @return true: its reaction is worse than any so far */
-bool faults_note(snapshot_t *shown, const fault_t *fault, drives_t drives, hal_log_t log);
+ *  @return true: its reaction is worse than any since the last reset */
+bool faults_note(faults_t *self, const fault_t *fault, drives_t drives, unsigned cylinders, hal_log_t log);
 
 /** A reset: none is shown any more. */
-void faults_clear(snapshot_t *shown);
+void faults_clear(faults_t *self);
 
 /** The report of the drive that a fault is about; empty texts if the fault is about no drive. */
 drive_report_t faults_report_of(drives_t drives, const fault_t *fault);

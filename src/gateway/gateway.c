@@ -3,18 +3,18 @@
  */
 #include "heave/gateway.h"
 
-#include "auto_engage.h"
-#include "heave/text.h"
-#include "frame_receiver.h"
-#include "log_limit.h"
 #include "actions.h"
+#include "auto_engage.h"
+#include "drive_control.h"
+#include "frame_receiver.h"
+#include "heave/text.h"
+#include "log_limit.h"
 #include "relay_output.h"
 #include "reports.h"
 #include "sender.h"
 #include "sequencer.h"
 #include "service.h"
 #include "shutdown.h"
-#include "target.h"
 
 static bool is_io_valid(const gateway_io_t *io)
 {
@@ -22,13 +22,32 @@ static bool is_io_valid(const gateway_io_t *io)
            hal_log_valid(io->log) && (io->healthy.ops == NULL || hal_relays_valid(io->healthy));
 }
 
-/* Texts of drives that have said nothing yet. */
-static void clear_reports(snapshot_t *shown)
+static const drive_report_t k_no_report = {.phase = "", .trouble = "", .detail = ""};
+
+static void set_reports(snapshot_t *shown, const drive_report_t *report)
 {
-    shown->fault_report = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
+    shown->fault_report = *report;
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        shown->report[i] = (drive_report_t){.phase = "", .trouble = "", .detail = ""};
+        shown->report[i] = *report;
     }
+}
+
+static feedback_t feedback_of(const gateway_t *self)
+{
+    return (feedback_t){self->snapshot.drive, self->cylinders + (self->settings->has_angle ? 1u : 0u)};
+}
+
+static cycle_t cycle_of(gateway_t *self, uint64_t now_us)
+{
+    return (cycle_t){.settings = self->settings,
+                     .drives = self->io.drives,
+                     .log = self->io.log,
+                     .sender = &self->sender,
+                     .motion = &self->motion,
+                     .output = &self->output,
+                     .feedback = feedback_of(self),
+                     .cylinders = self->cylinders,
+                     .now_us = now_us};
 }
 
 hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gateway_io_t *io)
@@ -36,9 +55,9 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
     if (!is_io_valid(io)) {
         return HV_ERR_ARG;
     }
-    *self = (gateway_t){.settings = settings, .io = *io, .drive_control = {.is_tracking = true}};
-    clear_reports(&self->snapshot);
-    gateway_restart_auto(self);
+    *self = (gateway_t){.settings = settings, .io = *io};
+    sequencer_init(&self->sequencer, settings);
+    set_reports(&self->snapshot, &k_no_report);
     const hv_status_t status = motion_init(&self->motion, settings);
     if (status != HV_OK) {
         return status;
@@ -47,8 +66,8 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
     if (drives_count(io->drives) != cylinders + (settings->has_angle ? 1u : 0u)) {
         return HV_ERR_ARG;
     }
-    supervisor_init(&self->supervisor);
-    self->snapshot.cylinders = (uint8_t)cylinders;
+    self->cylinders = (uint8_t)cylinders;
+    self->snapshot.cylinders = self->cylinders;
     self->snapshot.has_angle = settings->has_angle;
     self->snapshot.relay_count = settings->relays.count;
     self->snapshot.sent = self->motion.pose;
@@ -58,8 +77,7 @@ hv_status_t gateway_init(gateway_t *self, const settings_t *settings, const gate
 
 void gateway_restart_auto(gateway_t *self)
 {
-    const settings_t *settings = self->settings;
-    auto_engage_init(&self->auto_engage, settings->engage == ENGAGE_AUTO, settings->cycle_us, settings->auto_frames);
+    sequencer_restart_auto(&self->sequencer, self->settings);
 }
 
 void gateway_save(const gateway_t *self, gateway_t *out)
@@ -67,10 +85,8 @@ void gateway_save(const gateway_t *self, gateway_t *out)
     *out = *self;
     out->settings = NULL;
     out->io = (gateway_io_t){.udp = {NULL, NULL}};
-    out->snapshot.fault_report = (drive_report_t){.phase = NULL};
-    for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        out->snapshot.report[i] = (drive_report_t){.phase = NULL};
-    }
+    out->sequencer.faults.report = (drive_report_t){.phase = NULL};
+    set_reports(&out->snapshot, &out->sequencer.faults.report);
 }
 
 void gateway_resume(gateway_t *self, const gateway_t *saved)
@@ -80,19 +96,15 @@ void gateway_resume(gateway_t *self, const gateway_t *saved)
     *self = *saved;
     self->settings = settings;
     self->io = io;
-    self->withheld = 0; /* a recording holds only requests that lacked nothing */
+    self->sequencer.withheld = 0; /* a recording holds only requests that lacked nothing */
     frame_scanner_init(&self->receiver.scanner, self->settings->dialect); /* it starts anew with every datagram */
-    clear_reports(&self->snapshot);
+    self->sequencer.faults.report = k_no_report;
+    set_reports(&self->snapshot, &k_no_report);
 }
 
 void gateway_start_settled(gateway_t *self)
 {
-    supervisor_init_settled(&self->supervisor);
-    self->drive_control.is_tracking = false;
-    if (auto_engage_is_ready(&self->auto_engage, 0)) {
-        auto_engage_end(&self->auto_engage);
-        self->supervisor.goal = STATE_ENGAGED;
-    }
+    sequencer_start_settled(&self->sequencer);
 }
 
 void gateway_reload(gateway_t *self, const settings_t *settings)
@@ -103,34 +115,35 @@ void gateway_reload(gateway_t *self, const settings_t *settings)
 
 event_t gateway_withhold(gateway_t *self, uint32_t permits)
 {
-    const uint32_t lost = permits & ~self->withheld;
-    self->withheld = permits & ~(uint32_t)PERMIT_PUNCTUAL; /* each cycle that is late is a loss of its own */
-    return supervisor_response(&self->supervisor, lost);
+    const uint32_t lost = permits & ~self->sequencer.withheld;
+    self->sequencer.withheld = permits & ~(uint32_t)PERMIT_PUNCTUAL; /* each cycle that is late is a loss of its own */
+    return supervisor_response(&self->sequencer.supervisor, lost);
 }
 
 uint32_t gateway_missing(gateway_t *self, event_t request)
 {
-    const cycle_t cycle = actions_cycle(self, self->snapshot.now_us);
-    const supervisor_view_t view = actions_view(self, &cycle);
-    return supervisor_missing(&self->supervisor, request, &view);
+    const cycle_t cycle = cycle_of(self, self->snapshot.now_us);
+    const supervisor_view_t view = actions_view(&self->sequencer, &cycle);
+    return supervisor_missing(&self->sequencer.supervisor, request, &view);
 }
 
 hv_status_t gateway_request(gateway_t *self, event_t request, uint64_t now_us)
 {
-    const cycle_t cycle = actions_cycle(self, now_us);
-    return sequencer_request(self, request, &cycle);
+    const cycle_t cycle = cycle_of(self, now_us);
+    return sequencer_request(&self->sequencer, request, &cycle);
 }
 
 service_answer_t gateway_service(gateway_t *self, const service_request_t *request, uint64_t now_us)
 {
-    const cycle_t cycle = actions_cycle(self, now_us);
-    return self->supervisor.state == STATE_SERVICE ? service_request(&self->service, &cycle, request) : SERVICE_NOT_SERVING;
+    const cycle_t cycle = cycle_of(self, now_us);
+    return self->sequencer.supervisor.state == STATE_SERVICE ? service_request(&self->sequencer.service, &cycle, request)
+                                                             : SERVICE_NOT_SERVING;
 }
 
 uint64_t gateway_tick_age(const gateway_t *self, uint64_t tick_us)
 {
     const uint64_t next_us = self->snapshot.now_us + self->settings->cycle_us; /* this cycle's tick has not been told yet */
-    return tick_us <= self->snapshot.service.tick_us ? next_us + self->service.late_us - tick_us : UINT64_MAX;
+    return tick_us <= self->snapshot.service.tick_us ? next_us + self->sequencer.service.late_us - tick_us : UINT64_MAX;
 }
 
 hv_status_t gateway_set_intensity(gateway_t *self, unsigned percent)
@@ -151,61 +164,60 @@ void gateway_note_late(gateway_t *self, uint32_t cycles)
 {
     uint32_t *late = &self->snapshot.counters.late_cycles;
     *late = cycles < UINT32_MAX - *late ? *late + cycles : UINT32_MAX; /* a count that began anew would look like none late */
-    self->service.late_us += (uint64_t)cycles * self->settings->cycle_us;
-    self->is_late |= cycles > self->settings->healthy.late_cycles;
+    self->sequencer.service.late_us += (uint64_t)cycles * self->settings->cycle_us;
+    self->sequencer.is_late |= cycles > self->settings->healthy.late_cycles;
 }
 
 void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
 {
     if ((unsigned)code < FAULT_CODES && axis <= drives_count(self->io.drives) && (axis != 0) == fault_is_of_axis(code)) {
-        self->told[axis] |= 1u << (unsigned)code;
+        self->sequencer.has_told = true;
+        self->sequencer.told[axis] |= 1u << (unsigned)code;
     }
 }
 
 /* A hold leaves a ride's relays as they are for a while, if so configured. */
-static bool is_hold_young(const gateway_t *self, uint64_t now_us)
+static bool is_hold_young(const sequencer_t *sequencer, uint32_t safe_after_ms, uint64_t now_us)
 {
-    return self->supervisor.state == STATE_HOLD && self->supervisor.interrupted == STATE_ENGAGED &&
-           now_us - self->state_since_us < (uint64_t)self->settings->relay_safe_after_ms * 1000;
+    return sequencer->supervisor.state == STATE_HOLD && sequencer->supervisor.interrupted == STATE_ENGAGED &&
+           now_us - sequencer->state_since_us < (uint64_t)safe_after_ms * 1000;
 }
 
 /* Only an engaged sender commands the relays, or a hand in service; the safe mask holds everywhere else. */
 static void write_relays(gateway_t *self, const cycle_t *cycle)
 {
-    const bool is_sender_heard = self->supervisor.state == STATE_ENGAGED || is_hold_young(self, cycle->now_us);
-    const bool is_serving = self->supervisor.state == STATE_SERVICE;
+    const sequencer_t *sequencer = &self->sequencer;
+    const uint16_t safe_mask = self->settings->relay_safe_mask;
+    const bool is_sender_heard = sequencer->supervisor.state == STATE_ENGAGED ||
+                                 is_hold_young(sequencer, self->settings->relay_safe_after_ms, cycle->now_us);
+    const bool is_serving = sequencer->supervisor.state == STATE_SERVICE;
     const uint16_t wanted = is_sender_heard ? self->sender.frame_mask
-                            : is_serving    ? service_relays(&self->service, self->settings->relay_safe_mask)
-                                            : self->settings->relay_safe_mask;
+                            : is_serving    ? service_relays(&sequencer->service, safe_mask)
+                                            : safe_mask;
     const relay_output_in_t in = {.wanted_mask = wanted,
-                                  .is_safe = wanted == self->settings->relay_safe_mask && !is_sender_heard,
-                                  .is_well = sequencer_is_well(self, cycle),
-                                  .was_unknown = self->snapshot.is_relays_unknown};
-    const relay_output_out_t out = relay_output_step(&self->relay_output, self->settings, &self->io, &in, cycle->now_us);
-    self->is_late = false;
-    self->snapshot.is_healthy = out.is_healthy;
-    self->snapshot.is_relays_unknown = out.is_unknown;
-    self->snapshot.counters.relay_errors += out.is_refused;
+                                  .is_safe = wanted == safe_mask && !is_sender_heard,
+                                  .is_well = sequencer_is_well(sequencer, cycle)};
+    self->snapshot.counters.relay_errors +=
+        !relay_output_step(&self->relay_output, self->settings, &self->io, &in, cycle->now_us);
+    self->sequencer.is_late = false;
 }
 
 /* A frame may end a hold, and another sender's first one begins anew. */
 static void take_frame(gateway_t *self, sender_in_t *in, const cycle_t *cycle, const frame_t *frame)
 {
-    in->state = self->supervisor.state;
+    in->state = self->sequencer.supervisor.state;
     const sender_verdict_t verdict = sender_judge(&self->sender, in, frame);
     if (verdict == SENDER_REFUSED) {
         return;
     }
     if (verdict == SENDER_NEW && in->state == STATE_ENGAGED) {
-        actions_follow(self, in->now_us);
+        actions_follow(cycle);
     }
-    auto_engage_frame(&self->auto_engage, in->now_us);
+    auto_engage_frame(&self->sequencer.auto_engage, in->now_us);
     const motion_target_t target = sender_target(&self->sender, in, frame);
-    actions_event(self, EVENT_FRAME, cycle);
-    in->state = self->supervisor.state;
-    if (sender_follow(&self->sender, in, frame, &target)) {
-        target_received(&self->snapshot, frame);
-    }
+    actions_event(&self->sequencer, EVENT_FRAME, cycle);
+    in->state = self->sequencer.supervisor.state;
+    (void)sender_follow(&self->sender, in, frame, &target);
 }
 
 static void receive_frames(gateway_t *self, const cycle_t *cycle)
@@ -223,86 +235,129 @@ static void receive_frames(gateway_t *self, const cycle_t *cycle)
     while (frame_receiver_next(&self->receiver, self->settings, &in.io, now_us, &frame)) {
         take_frame(self, &in, cycle, &frame);
     }
-    in.state = self->supervisor.state;
+    in.state = self->sequencer.supervisor.state;
     sender_end(&self->sender, &in);
 }
 
 /* One line for the first such stop of a burst. */
-static void note_singular_stops(gateway_t *self, uint64_t now_us)
+static void log_singular_stops(log_limit_t *limit, hal_log_t log, uint32_t stops, uint32_t before, uint64_t now_us)
 {
-    const uint32_t stops = motion_singular_stops(&self->motion);
-    if (stops != self->snapshot.counters.singular_stops && log_limit_due(&self->singular_log, stops, now_us) > 0) {
-        hal_log_write(self->io.log, HAL_LOG_WARNING,
+    if (stops != before && log_limit_due(limit, stops, now_us) > 0) {
+        hal_log_write(log, HAL_LOG_WARNING,
                       "stopped: the extensions sent lead too near a singularity; send ones that go round it");
     }
-    self->snapshot.counters.singular_stops = stops;
+}
+
+static void show_states(snapshot_t *s, const sequencer_t *sequencer)
+{
+    const supervisor_t *supervisor = &sequencer->supervisor;
+    s->state = supervisor->state;
+    s->goal = supervisor->goal;
+    s->interrupted = supervisor->interrupted;
+    s->is_held_by_silence = supervisor->is_held_by_silence;
+    s->is_estop_active = sequencer->inputs.is_estop_active;
+    s->is_power_failing = sequencer->inputs.is_power_failing;
+    s->rides = sequencer->rides;
+}
+
+static void show_faults(snapshot_t *s, const faults_t *faults)
+{
+    s->fault = faults->first;
+    s->fault_report = faults->report;
+    s->reaction = faults->reaction;
+    for (unsigned i = 0; s->counters.faults != faults->total && i < FAULT_CODES; i++) {
+        s->fault_last_us[i] = faults->last_us[i];
+        s->counters.fault[i] = faults->count[i];
+    }
+    s->counters.faults = faults->total;
+    for (unsigned i = 0; i <= DRIVES_MAX; i++) {
+        s->begun[i] = faults->begun[i];
+    }
+}
+
+static void show_sender(snapshot_t *s, const sender_t *sender, mask_policy_t mask_policy)
+{
+    s->owner = sender->owner;
+    s->other = sender->other;
+    s->last_frame_us = sender->last_frame_us;
+    s->mask_habit = mask_guard_habit(&sender->mask_guard, mask_policy);
+    s->has_received = sender->received.is_pose;
+    for (unsigned i = 0; i < POSE_AXES; i++) {
+        s->received_q16[i] = sender->received.value_q16[i];
+    }
+    s->counters.unconfirmed = sender->confirm.dropped;
+}
+
+static void show_relays(snapshot_t *s, const relay_output_t *relays)
+{
+    s->relay_mask = relays->effects_mask;
+    s->is_healthy = relays->is_healthy;
+    s->is_relays_unknown = relays->is_unknown;
+    s->counters.relay_cut = relays->policy.cut_count;
+    s->counters.relay_delayed = relays->policy.delay_count;
+}
+
+static void show_motion(snapshot_t *s, const motion_t *motion, const motion_output_t *output)
+{
+    s->asked = output->asked;
+    s->sent = output->sent;
+    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
+        s->extension_mm_q32[i] = output->extension_mm_q32[i];
+    }
+    s->angle_deg_q32 = output->angle_deg_q32;
+    s->flags = output->flags;
+    s->limiting_cylinder = output->limiting_cylinder;
+    s->intensity_percent = (uint8_t)motion_intensity(motion)->percent;
+    s->intensity_now_q32 = intensity_percent_q32(motion_intensity(motion));
+    s->stream_period_us = stream_period_us(motion_stream(motion));
+    s->stream = stream_report(motion_stream(motion));
+    s->stream_delay_us = s->stream.delay_us;
+    s->counters.spikes = spike_filter_spikes(motion_spike_filter(motion));
+    s->counters.singular_stops = motion_singular_stops(motion);
+    s->counters.stretched = motion_stretched_count(motion);
+}
+
+/* What follows from the feedback. */
+static void show_drives(snapshot_t *s, const cycle_t *cycle)
+{
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
+        wear_step(&s->wear[i], &s->drive[i], cycle->settings->cycle_us);
+    }
+    plate_take(&s->plate, motion_kin(cycle->motion), s->drive, &s->sent, cycle->now_us);
 }
 
 static void publish(gateway_t *self, const cycle_t *cycle)
 {
-    const uint64_t now_us = cycle->now_us;
     snapshot_t *s = &self->snapshot;
-    s->now_us = now_us;
-    s->state = self->supervisor.state;
-    s->goal = self->supervisor.goal;
-    s->interrupted = self->supervisor.interrupted;
-    s->is_held_by_silence = self->supervisor.is_held_by_silence;
-    s->relay_mask = self->relay_output.effects_mask;
-    s->asked = self->output.asked;
-    s->sent = self->output.sent;
-    for (unsigned i = 0; i < CYLINDERS_MAX; i++) {
-        s->extension_mm_q32[i] = self->output.extension_mm_q32[i];
-    }
-    s->angle_deg_q32 = self->output.angle_deg_q32;
-    reports_take(&self->reports, self->io.drives, self->io.log, now_us, s->report);
-    s->flags = self->output.flags;
-    s->limiting_cylinder = self->output.limiting_cylinder;
-    s->intensity_percent = (uint8_t)motion_intensity(&self->motion)->percent;
-    s->intensity_now_q32 = intensity_percent_q32(motion_intensity(&self->motion));
-    s->stream_period_us = stream_period_us(motion_stream(&self->motion));
-    s->stream = stream_report(motion_stream(&self->motion));
-    s->stream_delay_us = s->stream.delay_us;
-    s->owner = self->sender.owner;
-    s->other = self->sender.other;
-    s->last_frame_us = self->sender.last_frame_us;
-    s->mask_habit = mask_guard_habit(&self->sender.mask_guard, self->settings->mask_policy);
-    service_publish(&self->service, cycle, &s->service);
-    s->counters.clamped += (s->flags & MOTION_CLAMPED) != 0;
-    s->counters.relay_cut = self->relay_output.policy.cut_count;
-    s->counters.relay_delayed = self->relay_output.policy.delay_count;
-    s->counters.spikes = spike_filter_spikes(motion_spike_filter(&self->motion));
-    note_singular_stops(self, now_us);
-    s->counters.unconfirmed = self->sender.confirm.dropped;
-    s->counters.stretched = motion_stretched_count(&self->motion);
-    for (unsigned i = 0; i < cycle->feedback.count; i++) {
-        wear_step(&s->wear[i], &s->drive[i], self->settings->cycle_us);
-    }
-    plate_take(&s->plate, motion_kin(&self->motion), s->drive, &s->sent, now_us);
+    s->now_us = cycle->now_us;
     s->cycle++;
-}
-
-static void step_shutdown(gateway_t *self, const cycle_t *cycle)
-{
-    const shutdown_in_t in = {.feedback = cycle->feedback,
-                              .is_down = self->supervisor.state == STATE_OFF || supervisor_is_latched(&self->supervisor),
-                              .is_disable_due = self->drive_control.is_disable_due,
-                              .is_bus_lost = self->fault_watch.is_bus_lost ||
-                                             drive_control_is_bus_stalled(&self->drive_control, self->settings->cycle_us)};
-    shutdown_step(&self->shutdown, &in, self->io.log, cycle->now_us);
+    s->counters.clamped += (self->output.flags & MOTION_CLAMPED) != 0;
+    log_singular_stops(&self->singular_log, self->io.log, motion_singular_stops(&self->motion), s->counters.singular_stops,
+                       cycle->now_us);
+    show_states(s, &self->sequencer);
+    show_faults(s, &self->sequencer.faults);
+    show_sender(s, &self->sender, self->settings->mask_policy);
+    show_relays(s, &self->relay_output);
+    show_motion(s, &self->motion, &self->output);
+    show_drives(s, cycle);
+    service_publish(&self->sequencer.service, cycle, &s->service);
+    reports_take(&self->reports, self->io.drives, self->io.log, cycle->now_us, s->report);
 }
 
 void gateway_cycle(gateway_t *self, uint64_t now_us)
 {
-    const cycle_t cycle = actions_cycle(self, now_us);
-    sequencer_before_frames(self, &cycle);
+    const cycle_t cycle = cycle_of(self, now_us);
+    sequencer_t *sequencer = &self->sequencer;
+    sequencer_begin(sequencer, &cycle);
+    const bool is_bus_heard = drives_poll(self->io.drives, now_us, self->snapshot.drive) == HV_OK;
+    sequencer_before_frames(sequencer, &cycle, self->io.inputs, is_bus_heard);
     receive_frames(self, &cycle);
-    sequencer_after_frames(self, &cycle);
-    if (drive_control_takes_motion(&self->drive_control)) {
+    sequencer_after_frames(sequencer, &cycle);
+    if (drive_control_takes_motion(&sequencer->drive_control)) {
         motion_step(&self->motion, now_us, &self->output);
     }
-    drive_control_send(&self->drive_control, &cycle, &self->output);
-    sequencer_after_motion(self, &cycle);
-    step_shutdown(self, &cycle);
+    drive_control_send(&sequencer->drive_control, &cycle, &self->output);
+    sequencer_after_motion(sequencer, &cycle);
     write_relays(self, &cycle);
     publish(self, &cycle);
 }
@@ -314,10 +369,10 @@ const snapshot_t *gateway_snapshot(const gateway_t *self)
 
 bool gateway_is_finished(const gateway_t *self)
 {
-    return shutdown_is_finished(&self->shutdown, actions_feedback(self));
+    return shutdown_is_finished(&self->sequencer.shutdown, feedback_of(self));
 }
 
 uint32_t gateway_energized(const gateway_t *self)
 {
-    return feedback_energized(actions_feedback(self), false);
+    return feedback_energized(feedback_of(self), false);
 }

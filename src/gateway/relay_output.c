@@ -26,32 +26,32 @@ static uint16_t pulse(relay_output_t *self, const healthy_settings_t *settings, 
 }
 
 /* Relays that cannot be written or read back are written again in every cycle. One line of the log says so. */
-static void verify(relay_output_t *self, const gateway_io_t *io, bool was_unknown)
+static void verify(relay_output_t *self, const gateway_io_t *io)
 {
     uint16_t mask = 0;
     const bool is_answered = hal_relays_read_back(io->relays, &mask) != HV_ERR_IO; /* slow banks continue in this call */
     self->is_mask_written = self->is_mask_written && is_answered;
-    const bool is_unknown = !self->is_mask_written;
-    if (is_unknown != was_unknown) {
+    const bool was_unknown = self->is_unknown;
+    self->is_unknown = !self->is_mask_written;
+    if (self->is_unknown != was_unknown) {
         hal_log_write(io->log, was_unknown ? HAL_LOG_NOTICE : HAL_LOG_ERROR,
                       was_unknown ? "relays: switched again" : "relays: cannot be switched, their state is not known");
     }
 }
 
-relay_output_out_t relay_output_step(relay_output_t *self, const settings_t *settings, const gateway_io_t *io,
-                                     const relay_output_in_t *in, uint64_t now_us)
+bool relay_output_step(relay_output_t *self, const settings_t *settings, const gateway_io_t *io, const relay_output_in_t *in,
+                       uint64_t now_us)
 {
-    relay_output_out_t out = {.is_refused = false};
+    bool is_taken = true;
     const uint16_t asked = (uint16_t)(in->wanted_mask & ~pulse_bit(&settings->healthy)); /* its pace is not limited */
     self->effects_mask = relay_policy_step(&self->policy, &settings->relays, asked, in->is_safe, now_us);
     const uint16_t mask = (uint16_t)(self->effects_mask | pulse(self, &settings->healthy, io, in->is_well, now_us));
     if (!self->is_mask_written || mask != self->written_mask) {
         self->is_mask_written = hal_relays_write(io->relays, mask) == HV_OK;
-        out.is_refused = !self->is_mask_written;
+        is_taken = self->is_mask_written;
         self->written_mask = mask;
     }
-    verify(self, io, in->was_unknown);
-    out.is_unknown = !self->is_mask_written;
-    out.is_healthy = healthy_is_running(&self->healthy, &settings->healthy, now_us);
-    return out;
+    verify(self, io);
+    self->is_healthy = healthy_is_running(&self->healthy, &settings->healthy, now_us);
+    return is_taken;
 }

@@ -322,6 +322,7 @@ bool sender_follow(sender_t *self, const sender_in_t *in, const frame_t *frame, 
     watch_mask_habit(self, in);
     counters->accepted[frame->command]++;
     counters->accepted_timed += frame->is_timed;
+    self->received = target_received(frame);
     self->last_frame_us = in->now_us;
     self->start_us = in->now_us;
     if (in->state != STATE_ENGAGED) {

@@ -20,7 +20,7 @@ static service_answer_t answer_of(hv_status_t status)
 
 service_answer_t gateway_object_begin(gateway_t *self, unsigned drive, const drive_object_t *object)
 {
-    const state_t state = self->supervisor.state;
+    const state_t state = self->sequencer.supervisor.state;
     if (object->is_write && state != STATE_SERVICE) {
         return SERVICE_NOT_SERVING;
     }
@@ -30,7 +30,7 @@ service_answer_t gateway_object_begin(gateway_t *self, unsigned drive, const dri
     if (drive < 1 || drive > drives_count(self->io.drives)) {
         return SERVICE_NO_SUCH;
     }
-    if (object->is_write && (self->service.doing != SERVICE_NOTHING || !motion_is_at_rest(&self->motion))) {
+    if (object->is_write && (self->sequencer.service.doing != SERVICE_NOTHING || !motion_is_at_rest(&self->motion))) {
         return SERVICE_BUSY;
     }
     return answer_of(drives_object_begin(self->io.drives, (uint8_t)(drive - 1u), object));

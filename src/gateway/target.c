@@ -130,15 +130,13 @@ unsigned target_jumps_by_turn(const settings_t *settings, const rotations_t *bef
     return AXES_MAX;
 }
 
-void target_received(snapshot_t *s, const frame_t *frame)
+received_t target_received(const frame_t *frame)
 {
-    s->has_received = k_slots[frame->command][0] < SLOT_CYLINDER;
-    for (unsigned i = 0; i < POSE_AXES; i++) {
-        s->received_q16[i] = 0;
-    }
-    for (unsigned i = 0; s->has_received && i < frame->count; i++) {
+    received_t received = {.is_pose = k_slots[frame->command][0] < SLOT_CYLINDER};
+    for (unsigned i = 0; received.is_pose && i < frame->count; i++) {
         if (k_slots[frame->command][i] < POSE_AXES) {
-            s->received_q16[k_slots[frame->command][i]] = frame->value_q16[i];
+            received.value_q16[k_slots[frame->command][i]] = frame->value_q16[i];
         }
     }
+    return received;
 }

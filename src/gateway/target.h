@@ -19,7 +19,7 @@ rotations_t target_rotations(const frame_t *frame);
 /** The first axis that is taken as sent and whose value is nearly a turn from the one before; AXES_MAX: none. */
 unsigned target_jumps_by_turn(const settings_t *settings, const rotations_t *before, const rotations_t *now);
 
-/** Copies the values of a frame to s->received_q16, before sign, scale, offset, intensity and limits. */
-void target_received(snapshot_t *s, const frame_t *frame);
+/** The pose of a frame before sign, scale, offset, intensity and limits. */
+received_t target_received(const frame_t *frame);
 
 #endif

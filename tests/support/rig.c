@@ -182,7 +182,7 @@ static hv_status_t spy_send(void *ctx, uint64_t now_us, const q32_t *setpoint_q3
     }
     watch_steps(self, setpoint_q32);
     if (self->is_auto_checking) {
-        self->is_checking = are_drives_led(self) && !self->gateway.drive_control.is_tracking;
+        self->is_checking = are_drives_led(self) && !self->gateway.sequencer.drive_control.is_tracking;
     }
     for (unsigned i = 0; self->is_checking && i < self->drives.count; i++) {
         check_axis(self, i, setpoint_q32[i]);
