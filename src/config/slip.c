@@ -65,11 +65,6 @@ static bool has_hash_comment(const char *text)
     return hash != NULL && hash > text && is_blank(hash[-1]);
 }
 
-static bool is_number_key(const config_key_t *key)
-{
-    return key->type == CONFIG_DECIMAL || key->type == CONFIG_PER_CYLINDER || key->type == CONFIG_INTEGER;
-}
-
 /* "600,5": a comma between digits, in a list that has too many values, or where there is no list. */
 static bool has_decimal_comma(const config_key_t *key, const char *text)
 {
@@ -79,7 +74,8 @@ static bool has_decimal_comma(const config_key_t *key, const char *text)
         commas += text[i] == ',';
         is_tight = is_tight || (text[i] == ',' && is_digit(text[i - 1]) && is_digit(text[i + 1]));
     }
-    return is_number_key(key) && is_tight && commas >= (key->type == CONFIG_DECIMAL ? key->count : 1u);
+    const unsigned values = key->count > 0 ? key->count : 1u;
+    return key->type->is_number && is_tight && commas >= values;
 }
 
 /* "0 -3 600": numbers with blanks alone between them. */
@@ -93,9 +89,8 @@ static bool has_no_commas(const config_key_t *key, const char *text)
         has_gap = has_gap || (i > 0 && is_blank(text[i]) && is_digit(text[i - 1]) &&
                               strchr("0123456789+-.", text[i + strspn(&text[i], " \t")]) != NULL);
     }
-    return has_gap &&
-           ((key->type == CONFIG_DECIMAL && key->count > 1) || key->type == CONFIG_PER_CYLINDER ||
-            key->type == CONFIG_PER_RELAY || key->type == CONFIG_WHOLES || key->type == CONFIG_IDS || key->type == CONFIG_NODES);
+    const bool is_one = key->type->is_number && key->count == 1;
+    return has_gap && key->type->is_list && !is_one;
 }
 
 /* "600 mm" or "600mm". */
@@ -103,7 +98,7 @@ static bool has_unit(const config_key_t *key, const char *text)
 {
     const size_t number = strspn(text, "0123456789+-.");
     const size_t gap = strspn(&text[number], " \t");
-    return is_number_key(key) && number > 0 && key->unit[0] != '\0' &&
+    return key->type->is_number && number > 0 && key->unit[0] != '\0' &&
            strncmp(&text[number + gap], key->unit, strcspn(key->unit, " /^")) == 0;
 }
 

@@ -3,6 +3,7 @@
  */
 #include "config/span.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #define WHOLE_DIGITS_MAX 12u /* more than any range needs */
@@ -30,6 +31,13 @@ span_t span_next_item(const char **rest)
     const span_t item = {*rest, comma == NULL ? strlen(*rest) : (size_t)(comma - *rest)};
     *rest = comma == NULL ? NULL : comma + 1;
     return span_trimmed(item);
+}
+
+const char *span_copy_item(const char **rest, char *item, size_t bytes)
+{
+    const span_t next = span_next_item(rest);
+    (void)snprintf(item, bytes, "%.*s", (int)next.length, next.at);
+    return item;
 }
 
 unsigned span_count_items(const char *text)

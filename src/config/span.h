@@ -20,6 +20,10 @@ span_t span_trimmed(span_t span);
 /** Takes the next item off a list with commas, without blanks around it; *rest becomes NULL with the last one. */
 span_t span_next_item(const char **rest);
 
+/** The same, copied: what is longer than the buffer is cut.
+ *  @return item */
+const char *span_copy_item(const char **rest, char *item, size_t bytes);
+
 /** Items of a list with commas; an empty text is one. */
 unsigned span_count_items(const char *text);
 

@@ -6,7 +6,6 @@
 
 #include "config/keys.h"
 #include "config/span.h"
-#include "config/text.h"
 
 /** Stores a value.
  *  @param text   without blanks around it
@@ -21,9 +20,19 @@ void config_value_format(const config_key_t *key, const config_t *config, config
 /** Appends what the key takes: "a number from -90 to 90 deg". */
 void config_value_allowed(const config_key_t *key, config_text_t *text);
 
+/* --- For the types --- */
+
 /** Says what is wrong with an item, or with the number of items of a list, then what is allowed.
  *  @return false */
 bool config_value_refuse(const config_key_t *key, span_t item, const char *what, config_text_t *why);
+bool config_value_refuse_text(const config_key_t *key, const char *item, const char *what, config_text_t *why);
 bool config_value_refuse_count(const config_key_t *key, unsigned count, config_text_t *why);
+
+/** Appends the range of numbers: " from -90 to 90 deg". */
+void config_value_add_range(const config_key_t *key, config_text_t *text);
+
+/** Stores a whole number in a field of 1, 2 or 4 bytes, and reads it back; 4 bytes are signed. */
+void config_value_store(void *field, size_t size, int64_t value);
+int64_t config_value_load(const void *field, size_t size);
 
 #endif

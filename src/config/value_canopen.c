@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * value_canopen.c - values that only CANopen drives have; see value_canopen.h.
+ * value_canopen.c - values that only CANopen drives have: nodes and their axes, modes, maps of PDOs.
  */
-#include "config/value_canopen.h"
+#include "config/value.h"
 
 #include "common/translate.h"
 
@@ -13,27 +13,6 @@
 #define BLANKS     " \t"
 #define DECIMAL    "0123456789"
 #define HEX        "0123456789ABCDEFabcdef"
-
-static bool refuse(const config_key_t *key, const char *item, const char *what, config_text_t *why)
-{
-    config_text_add_quoted(why, item, strlen(item));
-    config_text_add(why, _(" %s; allowed: "), what);
-    config_value_canopen_allowed(key, why);
-    return false;
-}
-
-/* The next item of a list, without the blanks round it; *rest becomes NULL with the last one. */
-static const char *take_item(const char **rest, char item[ITEM_BYTES])
-{
-    const char *start = *rest + strspn(*rest, BLANKS);
-    size_t length = strcspn(start, ",");
-    *rest = start[length] == ',' ? start + length + 1 : NULL;
-    while (length > 0 && strchr(BLANKS, start[length - 1]) != NULL) {
-        length--;
-    }
-    (void)snprintf(item, ITEM_BYTES, "%.*s", (int)length, start);
-    return item;
-}
 
 /* A whole number, hexadecimal behind 0x. Returns what follows, NULL where it is none or too large. */
 static const char *read_number(const char *text, uint32_t most, uint32_t *value)
@@ -62,24 +41,27 @@ static bool read_node(const char *item, uint32_t *id)
     return end != NULL && *end == '\0';
 }
 
-static bool parse_nodes(const config_key_t *key, const char *text, config_ids_t *nodes, config_text_t *why)
+static bool parse_nodes(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
+    config_ids_t *nodes = field;
     char item[ITEM_BYTES];
     memset(nodes, 0, sizeof *nodes);
     for (const char *rest = text; rest != NULL; nodes->count++) {
-        take_item(&rest, item);
+        (void)span_copy_item(&rest, item, sizeof item);
         if (nodes->count == DRIVES_MAX) {
-            return refuse(key, item, _("is one more than drives there can be"), why);
+            return config_value_refuse_text(key, item, _("is one more than drives there can be"), why);
         }
         if (!read_node(item, &nodes->id[nodes->count])) {
-            return refuse(key, item, _("is no node"), why);
+            return config_value_refuse_text(key, item, _("is no node"), why);
         }
     }
     return true;
 }
 
-static void format_nodes(const config_ids_t *nodes, config_text_t *text)
+static void format_nodes(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
+    const config_ids_t *nodes = field;
+    (void)key, (void)config;
     for (unsigned i = 0; i < nodes->count; i++) {
         const uint32_t channel = nodes->id[i] >> CONFIG_CHANNEL_SHIFT;
         config_text_add(text, "%s0x%X", i == 0 ? "" : ", ", (unsigned)(nodes->id[i] & CONFIG_NODE_MASK));
@@ -89,36 +71,38 @@ static void format_nodes(const config_ids_t *nodes, config_text_t *text)
     }
 }
 
-/* --- Words, one for all drives or one for each --- */
-
-static int find_word(const char *words, const char *asked)
+static void allowed_nodes(const config_key_t *key, config_text_t *text)
 {
-    for (int index = 0; words != NULL; index++) {
-        const size_t length = strcspn(words, "|");
-        if (strlen(asked) == length && memcmp(asked, words, length) == 0) {
-            return index;
-        }
-        words = words[length] == '|' ? words + length + 1 : NULL;
-    }
-    return -1;
+    (void)key;
+    config_text_add(text,
+                    _("a node id from 1 to 127, such as 5, or with the axis in the node, such as 5.2, or one for each drive"));
 }
 
-static bool parse_words(const config_key_t *key, const char *text, config_words_t *out, config_text_t *why)
+const config_type_t config_type_nodes = {
+    .has_none = true, .is_list = true, .parse = parse_nodes, .format = format_nodes, .allowed = allowed_nodes};
+
+/* --- Words, one for all drives or one for each --- */
+
+static bool parse_words(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
-    char item[ITEM_BYTES];
+    config_words_t *out = field;
     memset(out, 0, sizeof *out);
     for (const char *rest = text; rest != NULL; out->count++) {
-        const int index = find_word(key->words, take_item(&rest, item));
+        const span_t item = span_next_item(&rest);
+        const int index = span_find_word(key->words, item);
         if (index < 0 || out->count == DRIVES_MAX) {
-            return refuse(key, item, index < 0 ? _("is not allowed") : _("is one more than drives there can be"), why);
+            return config_value_refuse(key, item, index < 0 ? _("is not allowed") : _("is one more than drives there can be"),
+                                       why);
         }
         out->word[out->count] = (uint8_t)index;
     }
     return true;
 }
 
-static void format_words(const config_key_t *key, const config_words_t *words, config_text_t *text)
+static void format_words(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
+    const config_words_t *words = field;
+    (void)config;
     for (unsigned i = 0; i < words->count; i++) {
         const char *word = key->words;
         for (unsigned n = 0; n < words->word[i]; n++) {
@@ -127,6 +111,18 @@ static void format_words(const config_key_t *key, const config_words_t *words, c
         config_text_add(text, "%s%.*s", i == 0 ? "" : ", ", (int)strcspn(word, "|"), word);
     }
 }
+
+static void allowed_words(const config_key_t *key, config_text_t *text)
+{
+    for (const char *word = key->words; word != NULL;) {
+        const size_t length = strcspn(word, "|");
+        config_text_add(text, "%s%.*s", word == key->words ? "" : word[length] == '|' ? ", " : _(" or "), (int)length, word);
+        word = word[length] == '|' ? word + length + 1 : NULL;
+    }
+    config_text_add(text, _("; or one for each drive"));
+}
+
+const config_type_t config_type_words = {.parse = parse_words, .format = format_words, .allowed = allowed_words};
 
 /* --- Maps: 1: 0x6040/16 0x607A/32, 3: 0x60C1:01/32 --- */
 
@@ -164,23 +160,26 @@ static const char *wrong_map(const char *item, cia402_map_t *map)
     return map->entries == 0 ? _("has no object") : bits > 64u ? _("has more than 8 bytes") : NULL;
 }
 
-static bool parse_maps(const config_key_t *key, const char *text, cia402_maps_t *maps, config_text_t *why)
+static bool parse_maps(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
+    cia402_maps_t *maps = field;
     char item[ITEM_BYTES];
     memset(maps, 0, sizeof *maps);
     for (const char *rest = text; rest != NULL; maps->count++) {
-        take_item(&rest, item);
+        (void)span_copy_item(&rest, item, sizeof item);
         const char *wrong =
             maps->count == CIA402_MAPS_MAX ? _("is one PDO more than there can be") : wrong_map(item, &maps->map[maps->count]);
         if (wrong != NULL) {
-            return refuse(key, item, wrong, why);
+            return config_value_refuse_text(key, item, wrong, why);
         }
     }
     return true;
 }
 
-static void format_maps(const cia402_maps_t *maps, config_text_t *text)
+static void format_maps(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
+    const cia402_maps_t *maps = field;
+    (void)key, (void)config;
     for (unsigned i = 0; i < maps->count; i++) {
         config_text_add(text, "%s%u:", i == 0 ? "" : ", ", maps->map[i].number);
         for (unsigned n = 0; n < maps->map[i].entries; n++) {
@@ -190,48 +189,10 @@ static void format_maps(const cia402_maps_t *maps, config_text_t *text)
     }
 }
 
-/* --- All --- */
-
-bool config_value_canopen_parse(const config_key_t *key, const char *text, void *field, config_text_t *why)
+static void allowed_maps(const config_key_t *key, config_text_t *text)
 {
-    if (strcmp(text, "none") == 0 && key->type != CONFIG_WORDS) {
-        memset(field, 0, key->size);
-        return true;
-    }
-    if (key->type == CONFIG_NODES) {
-        return parse_nodes(key, text, field, why);
-    }
-    return key->type == CONFIG_WORDS ? parse_words(key, text, field, why) : parse_maps(key, text, field, why);
+    (void)key;
+    config_text_add(text, _("none, or up to %u PDOs such as 1: 0x6040/16 0x607A/32"), CIA402_MAPS_MAX);
 }
 
-void config_value_canopen_format(const config_key_t *key, const void *field, config_text_t *text)
-{
-    const size_t length = text->length;
-    if (key->type == CONFIG_NODES) {
-        format_nodes(field, text);
-    } else if (key->type == CONFIG_WORDS) {
-        format_words(key, field, text);
-    } else {
-        format_maps(field, text);
-    }
-    if (text->length == length) {
-        config_text_add(text, "none");
-    }
-}
-
-void config_value_canopen_allowed(const config_key_t *key, config_text_t *text)
-{
-    if (key->type == CONFIG_NODES) {
-        config_text_add(
-            text, _("a node id from 1 to 127, such as 5, or with the axis in the node, such as 5.2, or one for each drive"));
-    } else if (key->type == CONFIG_WORDS) {
-        for (const char *word = key->words; word != NULL;) {
-            const size_t length = strcspn(word, "|");
-            config_text_add(text, "%s%.*s", word == key->words ? "" : word[length] == '|' ? ", " : _(" or "), (int)length, word);
-            word = word[length] == '|' ? word + length + 1 : NULL;
-        }
-        config_text_add(text, _("; or one for each drive"));
-    } else {
-        config_text_add(text, _("none, or up to %u PDOs such as 1: 0x6040/16 0x607A/32"), CIA402_MAPS_MAX);
-    }
-}
+const config_type_t config_type_maps = {.has_none = true, .parse = parse_maps, .format = format_maps, .allowed = allowed_maps};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * value_frame.c - frames of CAN drives; see value_frame.h.
+ * value_frame.c - frames of CAN drives, and steps of starting up.
  */
-#include "config/value_frame.h"
+#include "config/value.h"
 
 #include "common/translate.h"
 
@@ -16,16 +16,6 @@
 
 static const char *const k_values[CANRAW_VALUES] = {"position", "speed", "status", "counter", "fault",
                                                     "torque",   "sum",   "xor",    "crc8"};
-
-static bool is_listed(const char *words, const char *name, size_t length)
-{
-    for (; words != NULL; words = strchr(words, '|') != NULL ? strchr(words, '|') + 1 : NULL) {
-        if (strcspn(words, "|") == length && memcmp(words, name, length) == 0) {
-            return true;
-        }
-    }
-    return false;
-}
 
 static bool is_whole_bytes(const canraw_field_t *field)
 {
@@ -77,10 +67,10 @@ static bool add_check(const char *token, size_t length, canraw_frame_t *frame, c
 {
     const char *colon = memchr(token, ':', length);
     const size_t name_length = (colon != NULL ? (size_t)(colon - token) : length - 1u) - 1u;
-    const bool is_inverted = is_listed("crc8ff", token + 1, name_length);
+    const bool is_inverted = span_is_word((span_t){token + 1, name_length}, "crc8ff");
     canraw_field_t field = {.at = frame->length, .bits = 8};
     for (unsigned i = CANRAW_SUM; i < CANRAW_VALUES && length > 2 && token[length - 1] == '}'; i++) {
-        const bool is_it = is_listed(k_values[i], token + 1, name_length) || (i == CANRAW_CRC8 && is_inverted);
+        const bool is_it = span_is_word((span_t){token + 1, name_length}, k_values[i]) || (i == CANRAW_CRC8 && is_inverted);
         field.value = is_it ? (canraw_value_t)i : field.value;
     }
     if (!canraw_is_check(field.value)) {
@@ -240,11 +230,11 @@ static const char *add_field(const config_key_t *key, const char *token, size_t 
         return _("has no number of a drive from 1 to 7 behind its point");
     }
     field.slot = (uint8_t)slot;
-    if (!is_listed(key->words, token + 1, name_length)) {
+    if (span_find_word(key->words, (span_t){token + 1, name_length}) < 0) {
         return _("is no field of this frame");
     }
     for (unsigned i = 0; i < CANRAW_VALUES; i++) {
-        field.value = is_listed(k_values[i], token + 1, name_length) ? (canraw_value_t)i : field.value;
+        field.value = span_is_word((span_t){token + 1, name_length}, k_values[i]) ? (canraw_value_t)i : field.value;
     }
     if (slot != 0 && field.value == CANRAW_COUNTER) {
         return _("is of the whole frame, and takes no number");
@@ -283,8 +273,9 @@ static const char *add_byte(const config_key_t *key, const char *token, size_t l
     return NULL;
 }
 
-bool config_value_frame_parse(const config_key_t *key, const char *text, canraw_frame_t *frame, config_text_t *why)
+static bool parse_frame(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
+    canraw_frame_t *frame = field;
     const char *wrong = *text == '\0' ? _("is no frame") : NULL;
     memset(frame, 0, sizeof *frame);
     while (*text != '\0' || wrong != NULL) {
@@ -293,10 +284,7 @@ bool config_value_frame_parse(const config_key_t *key, const char *text, canraw_
             wrong = text[0] == '{' ? add_field(key, text, length, frame) : add_byte(key, text, length, frame);
         }
         if (wrong != NULL) {
-            config_text_add_quoted(why, text, length);
-            config_text_add(why, _(" %s; allowed: "), wrong);
-            config_value_frame_allowed(key, why);
-            return false;
+            return config_value_refuse(key, (span_t){text, length}, wrong, why);
         }
         text += length;
         text += strspn(text, " \t");
@@ -314,12 +302,13 @@ static bool parse_part(const config_key_t *key, const char *start, size_t length
         length--;
     }
     (void)snprintf(part, sizeof part, "%.*s", (int)length, start);
-    return config_value_frame_parse(key, part, frame, why);
+    return parse_frame(key, part, frame, why);
 }
 
 /* `2B 10 00 -> 60 .. wait 50`: a frame, its answer, ms before the next. */
-bool config_value_step_parse(const config_key_t *key, const char *text, canraw_step_t *step, config_text_t *why)
+static bool parse_step(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
+    canraw_step_t *step = field;
     const char *wait = strstr(text, "wait");
     const size_t length = wait != NULL ? (size_t)(wait - text) : strlen(text);
     const char *arrow = strstr(text, "->");
@@ -395,7 +384,7 @@ static const canraw_field_t *whole_field_at(const canraw_frame_t *frame, unsigne
     return NULL;
 }
 
-void config_value_frame_format(const canraw_frame_t *frame, config_text_t *text)
+static void add_frame(const canraw_frame_t *frame, config_text_t *text)
 {
     for (unsigned at = 0; at < frame->length;) {
         const canraw_field_t *field = whole_field_at(frame, at);
@@ -417,19 +406,27 @@ void config_value_frame_format(const canraw_frame_t *frame, config_text_t *text)
     }
 }
 
-void config_value_step_format(const canraw_step_t *step, config_text_t *text)
+static void format_frame(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
-    config_value_frame_format(&step->frame, text);
+    (void)key, (void)config;
+    add_frame(field, text);
+}
+
+static void format_step(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
+{
+    const canraw_step_t *step = field;
+    (void)key, (void)config;
+    add_frame(&step->frame, text);
     if (step->answer.length > 0) {
         config_text_add(text, " -> ");
-        config_value_frame_format(&step->answer, text);
+        add_frame(&step->answer, text);
     }
     if (step->wait_us > 0) {
         config_text_add(text, " wait %" PRIu32, step->wait_us / 1000u);
     }
 }
 
-void config_value_frame_allowed(const config_key_t *key, config_text_t *text)
+static void allowed_frame(const config_key_t *key, config_text_t *text)
 {
     config_text_add(text, _("none, or up to 8 bytes such as 01 1F%s"), key->count != 0 ? " .." : "");
     for (const char *word = key->words; word != NULL; word = strchr(word, '|') != NULL ? strchr(word, '|') + 1 : NULL) {
@@ -439,7 +436,14 @@ void config_value_frame_allowed(const config_key_t *key, config_text_t *text)
         config_text_add(text, _(" with T u8 i16le u24be f32le/1000 i12le@1.4"));
     }
     config_text_add(text, _(", {sum} {xor} {crc8:07}"));
-    if (key->type == CONFIG_STEP) {
-        config_text_add(text, _("; then -> and an answer such as 60 ..; then wait 50"));
-    }
 }
+
+static void allowed_step(const config_key_t *key, config_text_t *text)
+{
+    allowed_frame(key, text);
+    config_text_add(text, _("; then -> and an answer such as 60 ..; then wait 50"));
+}
+
+const config_type_t config_type_frame = {
+    .has_none = true, .parse = parse_frame, .format = format_frame, .allowed = allowed_frame};
+const config_type_t config_type_step = {.has_none = true, .parse = parse_step, .format = format_step, .allowed = allowed_step};

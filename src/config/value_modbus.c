@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT
- * value_modbus.c - values that only Modbus drives have; see value_modbus.h.
+ * value_modbus.c - values that only Modbus drives have: hosts, blocks of registers, start-up lists.
  */
-#include "config/value_modbus.h"
+#include "config/value.h"
 
 #include "common/translate.h"
 
@@ -28,14 +28,6 @@ static const field_type_t k_types[] = {
 #define TYPES (sizeof k_types / sizeof k_types[0])
 
 static const char *const k_values[MODBUS_DRIVE_VALUES] = {"position", "speed", "status", "alarm"};
-
-static bool refuse(const config_key_t *key, const char *item, const char *what, config_text_t *why)
-{
-    config_text_add_quoted(why, item, strlen(item));
-    config_text_add(why, _(" %s; allowed: "), what);
-    config_value_modbus_allowed(key, why);
-    return false;
-}
 
 /* The next piece up to one of the ends, copied without the blanks round it; *rest becomes NULL with the last one. */
 static void take(const char **rest, const char *ends, char token[TOKEN_BYTES])
@@ -85,33 +77,24 @@ static bool read_host(char *text, config_host_t *host)
     return true;
 }
 
-static bool parse_hosts(const config_key_t *key, const char *text, config_hosts_t *hosts, config_text_t *why)
+static bool parse_hosts(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
+    config_hosts_t *hosts = field;
     char token[TOKEN_BYTES];
     memset(hosts, 0, sizeof *hosts);
     for (const char *rest = text; rest != NULL; hosts->count++) {
-        take(&rest, ",", token);
+        (void)span_copy_item(&rest, token, sizeof token);
         if (hosts->count == DRIVES_MAX) {
-            return refuse(key, token, _("is one too many"), why);
+            return config_value_refuse_text(key, token, _("is one too many"), why);
         }
         if (!read_host(token, &hosts->host[hosts->count])) {
-            return refuse(key, token, _("is no IPv4 address with or without :port"), why);
+            return config_value_refuse_text(key, token, _("is no IPv4 address with or without :port"), why);
         }
     }
     return true;
 }
 
 /* --- Blocks --- */
-
-static bool is_listed(const char *words, const char *name, size_t length)
-{
-    for (; words != NULL; words = strchr(words, '|') != NULL ? strchr(words, '|') + 1 : NULL) {
-        if (strcspn(words, "|") == length && memcmp(words, name, length) == 0) {
-            return true;
-        }
-    }
-    return false;
-}
 
 static bool is_twice(const modbus_drive_blocks_t *blocks, modbus_drive_value_t value)
 {
@@ -128,15 +111,15 @@ static const char *add_field(const config_key_t *key, const char *token, modbus_
         return _("is no field");
     }
     const size_t name_length = (size_t)(colon - token) - 1u;
-    if (!is_listed(key->words, token + 1, name_length)) {
+    if (span_find_word(key->words, (span_t){token + 1, name_length}) < 0) {
         return _("is no field of these blocks");
     }
     modbus_drive_field_t field = {.at = block->count};
     for (unsigned i = 0; i < MODBUS_DRIVE_VALUES; i++) {
-        field.value = is_listed(k_values[i], token + 1, name_length) ? (modbus_drive_value_t)i : field.value;
+        field.value = span_is_word((span_t){token + 1, name_length}, k_values[i]) ? (modbus_drive_value_t)i : field.value;
     }
     for (unsigned i = 0; i < TYPES; i++) {
-        if (is_listed(k_types[i].name, colon + 1, length - name_length - 3u)) {
+        if (span_is_word((span_t){colon + 1, length - name_length - 3u}, k_types[i].name)) {
             field.registers = k_types[i].registers;
             field.is_signed = k_types[i].is_signed;
             field.is_low_first = k_types[i].is_low_first;
@@ -189,16 +172,17 @@ static bool end_block(const config_key_t *key, const char *text, const modbus_dr
 {
     const modbus_drive_block_t *block = &blocks->block[blocks->count - 1u];
     if (blocks->count == 0 || block->count == 0) {
-        return refuse(key, text, _("has a block without registers"), why);
+        return config_value_refuse_text(key, text, _("has a block without registers"), why);
     }
     if (block->address + (unsigned)block->count > 65536u) {
-        return refuse(key, text, _("goes beyond register 65535"), why);
+        return config_value_refuse_text(key, text, _("goes beyond register 65535"), why);
     }
     return true;
 }
 
-static bool parse_blocks(const config_key_t *key, const char *text, modbus_drive_blocks_t *blocks, config_text_t *why)
+static bool parse_blocks(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
+    modbus_drive_blocks_t *blocks = field;
     char token[TOKEN_BYTES];
     bool is_start = true;
     memset(blocks, 0, sizeof *blocks);
@@ -215,11 +199,12 @@ static bool parse_blocks(const config_key_t *key, const char *text, modbus_drive
                             : token[0] == '{' ? add_field(key, token, blocks)
                                               : add_register(key, token, blocks);
         if (wrong != NULL) {
-            return refuse(key, token, wrong, why);
+            return config_value_refuse_text(key, token, wrong, why);
         }
         is_start = false;
     }
-    return is_start ? refuse(key, text, _("ends where a block should begin"), why) : end_block(key, text, blocks, why);
+    return is_start ? config_value_refuse_text(key, text, _("ends where a block should begin"), why)
+                    : end_block(key, text, blocks, why);
 }
 
 /* --- Start-up lists --- */
@@ -245,39 +230,30 @@ static const char *read_item(const char *text, modbus_drive_item_t *item)
     return NULL;
 }
 
-static bool parse_items(const config_key_t *key, const char *text, config_items_t *items, config_text_t *why)
+static bool parse_items(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
+    config_items_t *items = field;
     char token[TOKEN_BYTES];
     memset(items, 0, sizeof *items);
     for (const char *rest = text; rest != NULL; items->count++) {
-        take(&rest, ",", token);
+        (void)span_copy_item(&rest, token, sizeof token);
         if (items->count == CONFIG_ITEMS_MAX) {
-            return refuse(key, token, _("is one too many"), why);
+            return config_value_refuse_text(key, token, _("is one too many"), why);
         }
         const char *wrong = read_item(token, &items->item[items->count]);
         if (wrong != NULL) {
-            return refuse(key, token, wrong, why);
+            return config_value_refuse_text(key, token, wrong, why);
         }
     }
     return true;
 }
 
-bool config_value_modbus_parse(const config_key_t *key, const char *text, void *field, config_text_t *why)
-{
-    if (strcmp(text, "none") == 0) {
-        memset(field, 0, key->size);
-        return true;
-    }
-    if (key->type == CONFIG_HOSTS) {
-        return parse_hosts(key, text, field, why);
-    }
-    return key->type == CONFIG_BLOCKS ? parse_blocks(key, text, field, why) : parse_items(key, text, field, why);
-}
-
 /* --- To text --- */
 
-static void format_hosts(const config_hosts_t *hosts, config_text_t *text)
+static void format_hosts(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
+    const config_hosts_t *hosts = field;
+    (void)key, (void)config;
     for (unsigned i = 0; i < hosts->count; i++) {
         config_text_add(text, "%s%s", i == 0 ? "" : ", ", hosts->host[i].address);
         if (hosts->host[i].port != PORT_DEFAULT) {
@@ -285,6 +261,15 @@ static void format_hosts(const config_hosts_t *hosts, config_text_t *text)
         }
     }
 }
+
+static void allowed_hosts(const config_key_t *key, config_text_t *text)
+{
+    (void)key;
+    config_text_add(text, _("none, or IPv4 addresses such as 192.168.1.11 or 192.168.1.11:1502, one for each drive"));
+}
+
+const config_type_t config_type_hosts = {
+    .has_none = true, .parse = parse_hosts, .format = format_hosts, .allowed = allowed_hosts};
 
 static const modbus_drive_field_t *field_at(const modbus_drive_block_t *block, unsigned at)
 {
@@ -323,32 +308,13 @@ static void format_block(const modbus_drive_block_t *block, config_text_t *text)
     }
 }
 
-static void format_item(const modbus_drive_item_t *item, config_text_t *text)
+static void format_blocks(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
-    config_text_add(text, "0x%04X %s %u%s", (unsigned)item->address, item->is_written ? "=" : "is", (unsigned)item->value,
-                    item->is_checked ? "" : " unchecked");
-}
-
-void config_value_modbus_format(const config_key_t *key, const void *field, config_text_t *text)
-{
-    const size_t length = text->length;
-    if (key->type == CONFIG_HOSTS) {
-        format_hosts(field, text);
-    } else if (key->type == CONFIG_BLOCKS) {
-        const modbus_drive_blocks_t *blocks = field;
-        for (unsigned b = 0; b < blocks->count; b++) {
-            config_text_add(text, "%s", b == 0 ? "" : " | ");
-            format_block(&blocks->block[b], text);
-        }
-    } else {
-        const config_items_t *items = field;
-        for (unsigned i = 0; i < items->count; i++) {
-            config_text_add(text, "%s", i == 0 ? "" : ", ");
-            format_item(&items->item[i], text);
-        }
-    }
-    if (text->length == length) {
-        config_text_add(text, "none");
+    const modbus_drive_blocks_t *blocks = field;
+    (void)key, (void)config;
+    for (unsigned b = 0; b < blocks->count; b++) {
+        config_text_add(text, "%s", b == 0 ? "" : " | ");
+        format_block(&blocks->block[b], text);
     }
 }
 
@@ -362,16 +328,28 @@ static void allowed_blocks(const config_key_t *key, config_text_t *text)
                     key->count != 0 ? _(", .. for any register") : "");
 }
 
-void config_value_modbus_allowed(const config_key_t *key, config_text_t *text)
+const config_type_t config_type_blocks = {
+    .has_none = true, .parse = parse_blocks, .format = format_blocks, .allowed = allowed_blocks};
+
+static void format_items(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
-    if (key->type == CONFIG_HOSTS) {
-        config_text_add(text, _("none, or IPv4 addresses such as 192.168.1.11 or 192.168.1.11:1502, one for each drive"));
-    } else if (key->type == CONFIG_BLOCKS) {
-        allowed_blocks(key, text);
-    } else {
-        config_text_add(text,
-                        _("none, or items such as 0x0304 = 50 (written and read back), 0x0304 = 50 unchecked, 0x0000 is 3 (only "
-                          "looked at), up to %u"),
-                        CONFIG_ITEMS_MAX);
+    const config_items_t *items = field;
+    (void)key, (void)config;
+    for (unsigned i = 0; i < items->count; i++) {
+        const modbus_drive_item_t *item = &items->item[i];
+        config_text_add(text, "%s0x%04X %s %u%s", i == 0 ? "" : ", ", (unsigned)item->address, item->is_written ? "=" : "is",
+                        (unsigned)item->value, item->is_checked ? "" : " unchecked");
     }
 }
+
+static void allowed_items(const config_key_t *key, config_text_t *text)
+{
+    (void)key;
+    config_text_add(text,
+                    _("none, or items such as 0x0304 = 50 (written and read back), 0x0304 = 50 unchecked, 0x0000 is 3 (only "
+                      "looked at), up to %u"),
+                    CONFIG_ITEMS_MAX);
+}
+
+const config_type_t config_type_items = {
+    .has_none = true, .parse = parse_items, .format = format_items, .allowed = allowed_items};

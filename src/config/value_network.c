@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: MIT
- * value_network.c - addresses, multicast groups and networks from text; see value_network.h.
+ * value_network.c - addresses, multicast groups and networks from text; how they are written.
  */
-#include "config/value_network.h"
+#include "config/value.h"
 
 #include <arpa/inet.h>
 #include <string.h>
 
 #include "common/translate.h"
-#include "config/value.h"
 #include "heave/hal/udp.h"
 
 /* Reads a numeric address into 16 bytes.
@@ -33,8 +32,15 @@ static bool is_group(const uint8_t *address, unsigned bits)
     return bits == 32u ? (address[0] & 0xF0u) == 0xE0u : bits == 128u && address[0] == 0xFFu;
 }
 
-bool config_value_network_parse_address(const config_key_t *key, span_t item, char *field, config_text_t *why)
+static void format_text(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
+    (void)key, (void)config;
+    config_text_add(text, "%s", (const char *)field);
+}
+
+static bool parse_address(const config_key_t *key, const char *text, void *field, config_text_t *why)
+{
+    const span_t item = {text, strlen(text)};
     uint8_t address[16];
     const unsigned bits = read_address(item, address);
     if (bits == 0) {
@@ -52,6 +58,14 @@ bool config_value_network_parse_address(const config_key_t *key, span_t item, ch
     return true;
 }
 
+static void allowed_address(const config_key_t *key, config_text_t *text)
+{
+    (void)key;
+    config_text_add(text, _("a numeric IPv4 or IPv6 address"));
+}
+
+const config_type_t config_type_address = {.parse = parse_address, .format = format_text, .allowed = allowed_address};
+
 /* What the kernel takes as the name of an interface. */
 static bool is_interface(span_t item)
 {
@@ -62,13 +76,11 @@ static bool is_interface(span_t item)
     return is_name;
 }
 
-bool config_value_network_parse_group(const config_key_t *key, span_t item, char *field, config_text_t *why)
+static bool parse_group(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
+    const span_t item = {text, strlen(text)};
     uint8_t address[16];
     memset(field, 0, key->size);
-    if (span_find_word(key->words, item) == 0) {
-        return true;
-    }
     const char *const sign = memchr(item.at, '%', item.length);
     const span_t host = {item.at, sign == NULL ? item.length : (size_t)(sign - item.at)};
     const unsigned bits = read_address(host, address);
@@ -84,6 +96,14 @@ bool config_value_network_parse_group(const config_key_t *key, span_t item, char
     memcpy(field, item.at, item.length);
     return true;
 }
+
+static void allowed_group(const config_key_t *key, config_text_t *text)
+{
+    config_text_add(text, _("%s, or a multicast address and its network card, such as 239.1.2.3%%eth0 or ff15::9800%%eth0"),
+                    key->words);
+}
+
+const config_type_t config_type_group = {.has_none = true, .parse = parse_group, .format = format_text, .allowed = allowed_group};
 
 /* True where an address has a bit set behind the first prefix bits. */
 static bool has_host_bits(const hal_udp_network_t *network)
@@ -122,8 +142,9 @@ static bool parse_network(const config_key_t *key, span_t item, hal_udp_network_
     return true;
 }
 
-bool config_value_network_parse_list(const config_key_t *key, const char *text, hal_udp_networks_t *networks, config_text_t *why)
+static bool parse_networks(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
+    hal_udp_networks_t *networks = field;
     const unsigned count = span_count_items(text);
     const char *rest = text;
     memset(networks, 0, sizeof *networks);
@@ -141,3 +162,28 @@ bool config_value_network_parse_list(const config_key_t *key, const char *text, 
     }
     return true;
 }
+
+static void format_networks(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
+{
+    const hal_udp_networks_t *networks = field;
+    (void)config;
+    if (networks->count == 0) {
+        config_text_add(text, "%s", key->words);
+    }
+    for (unsigned i = 0; i < networks->count; i++) {
+        const hal_udp_network_t *network = &networks->network[i];
+        char address[INET6_ADDRSTRLEN] = "";
+        (void)inet_ntop(network->is_ipv6 ? AF_INET6 : AF_INET, network->address, address, sizeof address);
+        config_text_add(text, "%s%s", i == 0 ? "" : ",", address); /* no blanks: never longer than what was read */
+        if (network->prefix != (network->is_ipv6 ? 128u : 32u)) {
+            config_text_add(text, "/%u", network->prefix);
+        }
+    }
+}
+
+static void allowed_networks(const config_key_t *key, config_text_t *text)
+{
+    config_text_add(text, _("%s, or up to %u addresses or networks such as 192.168.7.0/24"), key->words, HAL_UDP_NETWORKS_MAX);
+}
+
+const config_type_t config_type_networks = {.parse = parse_networks, .format = format_networks, .allowed = allowed_networks};

@@ -1,225 +1,96 @@
 /* SPDX-License-Identifier: MIT
- * value_text.c - values of the configuration file to text, and what each key takes in words.
+ * value_text.c - values that are words or names: choices, paths, lines and chips, network interfaces.
  */
 #include "config/value.h"
 
 #include "common/translate.h"
 
-#include "config/value_can.h"
-#include "config/value_canopen.h"
-#include "config/value_modbus.h"
-
-#include <arpa/inet.h>
-#include <inttypes.h>
 #include <string.h>
 
-static int64_t load_whole(const void *field, size_t size)
+#define NAME_BYTES "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-"
+
+static void format_text(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
-    if (size == 1u) {
-        return *(const uint8_t *)field;
-    }
-    if (size == 2u) {
-        return *(const uint16_t *)field;
-    }
-    return *(const int32_t *)field; /* no range goes above that of int32_t */
+    (void)key, (void)config;
+    config_text_add(text, "%s", (const char *)field);
 }
 
-static void format_decimals(const config_key_t *key, const q16_t *values_q16, unsigned count, config_text_t *text)
+/* --- Words --- */
+
+static bool parse_word(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
-    for (unsigned i = 0; i < count; i++) {
-        config_text_add(text, "%s", i == 0 ? "" : ", ");
-        if (key->words != NULL && values_q16[i] == CONFIG_NONE) {
-            config_text_add(text, "%s", key->words);
-        } else {
-            config_text_add_q16(text, values_q16[i]);
-        }
+    const span_t item = {text, strlen(text)};
+    const int index = span_find_word(key->words, item);
+    if (index >= 0) {
+        config_value_store(field, key->size, index);
+        return true;
     }
+    if (span_find_word(key->absent, item) < 0) {
+        return config_value_refuse(key, item, _("is not known"), why);
+    }
+    config_text_add(why, _("driver %.*s is not built into this heaved; allowed: "), (int)item.length, item.at);
+    config_value_allowed(key, why);
+    return false;
 }
 
-/* One number where all cylinders have the same. */
-static void format_per_cylinder(const config_key_t *key, const config_t *config, const q16_t *values_q16, config_text_t *text)
+static void format_word(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
-    const unsigned cylinders = config->settings.geometry.kind == KIN_HEXAPOD ? 6u : 3u;
-    bool is_same = true;
-    for (unsigned i = 1; i < cylinders; i++) {
-        is_same = is_same && values_q16[i] == values_q16[0];
-    }
-    format_decimals(key, values_q16, is_same ? 1u : cylinders, text);
-}
-
-static void format_word(const char *words, int64_t index, config_text_t *text)
-{
-    for (; index > 0; index--) {
+    const char *words = key->words;
+    (void)config;
+    for (int64_t index = config_value_load(field, key->size); index > 0; index--) {
         words = strchr(words, '|') + 1;
     }
     config_text_add(text, "%.*s", (int)strcspn(words, "|"), words);
 }
 
-static void format_integer(const config_key_t *key, const void *field, config_text_t *text)
+static void allowed_word(const config_key_t *key, config_text_t *text)
 {
-    const int64_t value = load_whole(field, key->size);
-    if (key->words != NULL && value == CONFIG_NONE) {
-        config_text_add(text, "%s", key->words);
-    } else {
-        config_text_add(text, "%" PRId64, value);
-    }
-}
-
-static void format_networks(const config_key_t *key, const hal_udp_networks_t *networks, config_text_t *text)
-{
-    if (networks->count == 0) {
-        config_text_add(text, "%s", key->words);
-    }
-    for (unsigned i = 0; i < networks->count; i++) {
-        const hal_udp_network_t *network = &networks->network[i];
-        char address[INET6_ADDRSTRLEN] = "";
-        (void)inet_ntop(network->is_ipv6 ? AF_INET6 : AF_INET, network->address, address, sizeof address);
-        config_text_add(text, "%s%s", i == 0 ? "" : ",", address); /* no blanks: never longer than what was read */
-        if (network->prefix != (network->is_ipv6 ? 128u : 32u)) {
-            config_text_add(text, "/%u", network->prefix);
-        }
-    }
-}
-
-static void format_lines(const config_lines_t *lines, config_text_t *text)
-{
-    if (lines->count == 0) {
-        config_text_add(text, "none");
-    }
-    for (unsigned i = 0; i < lines->count; i++) {
-        config_text_add(text, "%s%s", i == 0 ? "" : ", ", lines->line[i].text);
-    }
-}
-
-/* One number where all relays have the same. */
-static void format_per_relay(const config_t *config, const uint32_t *values, config_text_t *text)
-{
-    const unsigned relays = config->relays.lines.count;
-    bool is_same = true;
-    for (unsigned i = 1; i < relays; i++) {
-        is_same = is_same && values[i] == values[0];
-    }
-    for (unsigned i = 0; i < (is_same ? 1u : relays); i++) {
-        config_text_add(text, "%s%" PRIu32, i == 0 ? "" : ", ", values[i]);
-    }
-}
-
-/* A value that is text. */
-static const char *text_of(const config_key_t *key, const char *field)
-{
-    const bool has_none = key->type == CONFIG_LABEL || key->type == CONFIG_GROUP;
-    return has_none && field[0] == '\0' ? "none" : field;
-}
-
-void config_value_format(const config_key_t *key, const config_t *config, config_text_t *text)
-{
-    const void *const field = (const char *)config + key->offset;
-    switch (key->type) {
-    case CONFIG_DECIMAL:
-        format_decimals(key, field, key->count, text);
-        break;
-    case CONFIG_PER_CYLINDER:
-        format_per_cylinder(key, config, field, text);
-        break;
-    case CONFIG_INTEGER:
-        format_integer(key, field, text);
-        break;
-    case CONFIG_MASK:
-        config_text_add(text, "%03X", (unsigned)load_whole(field, key->size));
-        break;
-    case CONFIG_SIGN:
-        config_text_add(text, "%d", *(const int8_t *)field);
-        break;
-    case CONFIG_WORD:
-        format_word(key->words, load_whole(field, key->size), text);
-        break;
-    case CONFIG_YES_NO:
-        config_text_add(text, "%s", *(const bool *)field ? "yes" : "no");
-        break;
-    case CONFIG_ADDRESS:
-    case CONFIG_PATH:
-    case CONFIG_GROUP:
-    case CONFIG_LABEL:
-        config_text_add(text, "%s", text_of(key, field));
-        break;
-    case CONFIG_NETWORKS:
-        format_networks(key, field, text);
-        break;
-    case CONFIG_LINES:
-        format_lines(field, text);
-        break;
-    case CONFIG_PER_RELAY:
-        format_per_relay(config, field, text);
-        break;
-    case CONFIG_NAME:
-    case CONFIG_IDS:
-    case CONFIG_RATIOS:
-    case CONFIG_WHOLES:
-    case CONFIG_FRAME:
-    case CONFIG_STEP:
-    case CONFIG_WHEN:
-        config_value_can_format(key, field, text);
-        break;
-    case CONFIG_NODES:
-    case CONFIG_WORDS:
-    case CONFIG_MAPS:
-        config_value_canopen_format(key, field, text);
-        break;
-    case CONFIG_HOSTS:
-    case CONFIG_BLOCKS:
-    case CONFIG_ITEMS:
-        config_value_modbus_format(key, field, text);
-        break;
-    }
-}
-
-static void add_range(const config_key_t *key, config_text_t *text)
-{
-    config_text_add(text, _(" from "));
-    config_text_add_milli(text, key->low_milli);
-    config_text_add(text, _(" to "));
-    config_text_add_milli(text, key->high_milli);
-    config_text_add(text, "%s%s", key->unit[0] == '\0' ? "" : " ", translate(key->unit));
-}
-
-/* "or none": the word that may stand in place of a number. */
-static void add_number_word(const config_key_t *key, config_text_t *text)
-{
-    if (key->words != NULL) {
-        config_text_add(text, _(", or %s"), key->words);
-    }
-}
-
-static void add_words(const char *words, config_text_t *text)
-{
-    for (const char *byte = words; *byte != '\0'; byte++) {
+    for (const char *byte = key->words; *byte != '\0'; byte++) {
         config_text_add(text, *byte == '|' ? " %c " : "%c", *byte);
     }
 }
 
-static void allowed_decimals(const config_key_t *key, config_text_t *text)
+const config_type_t config_type_word = {.parse = parse_word, .format = format_word, .allowed = allowed_word};
+
+static bool parse_yes_no(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
-    if (key->count == 1u) {
-        config_text_add(text, _("a number"));
-    } else {
-        config_text_add(text, _("%u numbers"), key->count);
+    const int index = span_find_word("no|yes", (span_t){text, strlen(text)});
+    if (index < 0) {
+        return config_value_refuse_text(key, text, _("is neither yes nor no"), why);
     }
-    add_range(key, text);
-    config_text_add(text, "%s", key->count == 1u ? "" : _(", separated by commas"));
-    add_number_word(key, text);
+    *(bool *)field = index == 1;
+    return true;
 }
 
-static void allowed_addresses(const config_key_t *key, config_text_t *text)
+static void format_yes_no(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
 {
-    if (key->type == CONFIG_ADDRESS) {
-        config_text_add(text, _("a numeric IPv4 or IPv6 address"));
-    } else if (key->type == CONFIG_GROUP) {
-        config_text_add(text, _("%s, or a multicast address and its network card, such as 239.1.2.3%%eth0 or ff15::9800%%eth0"),
-                        key->words);
-    } else {
-        config_text_add(text, _("%s, or up to %u addresses or networks such as 192.168.7.0/24"), key->words,
-                        HAL_UDP_NETWORKS_MAX);
+    (void)key, (void)config;
+    config_text_add(text, "%s", *(const bool *)field ? "yes" : "no");
+}
+
+static void allowed_yes_no(const config_key_t *key, config_text_t *text)
+{
+    (void)key;
+    config_text_add(text, _("yes | no"));
+}
+
+const config_type_t config_type_yes_no = {.parse = parse_yes_no, .format = format_yes_no, .allowed = allowed_yes_no};
+
+/* --- Paths --- */
+
+static bool parse_path(const config_key_t *key, const char *text, void *field, config_text_t *why)
+{
+    const span_t item = {text, strlen(text)};
+    const bool is_none = key->words != NULL && span_is_word(item, key->words);
+    if (!is_none && (item.length == 0 || item.at[0] != '/')) {
+        return config_value_refuse(key, item, _("is not an absolute path"), why);
     }
+    if (item.length >= key->size) {
+        return config_value_refuse(key, item, _("is too long"), why);
+    }
+    memset(field, 0, key->size);
+    memcpy(field, item.at, item.length);
+    return true;
 }
 
 static void allowed_path(const config_key_t *key, config_text_t *text)
@@ -230,87 +101,115 @@ static void allowed_path(const config_key_t *key, config_text_t *text)
     config_text_add(text, _("an absolute path of at most %u characters"), (unsigned)key->size - 1u);
 }
 
-static void allowed_each(const config_key_t *key, config_text_t *text)
+const config_type_t config_type_path = {.parse = parse_path, .format = format_text, .allowed = allowed_path};
+
+/* --- Lines and chips --- */
+
+/* Bytes that names of GPIO lines and chips are made of. */
+static bool is_label_byte(char byte)
 {
-    const bool is_relay = key->type == CONFIG_PER_RELAY;
-    config_text_add(text, "%s", is_relay ? _("a whole number") : _("a number"));
-    add_range(key, text);
-    config_text_add(text, _(", or one for each %s"), is_relay ? _("relay") : _("cylinder"));
+    const bool is_letter = (byte >= 'a' && byte <= 'z') || (byte >= 'A' && byte <= 'Z');
+    return is_letter || (byte >= '0' && byte <= '9') || (byte != '\0' && strchr(" _-+./:#()[]&*~", byte) != NULL);
 }
 
-void config_value_allowed(const config_key_t *key, config_text_t *text)
+static bool read_label(const config_key_t *key, span_t item, config_label_t *label, config_text_t *why)
 {
-    switch (key->type) {
-    case CONFIG_DECIMAL:
-        allowed_decimals(key, text);
-        break;
-    case CONFIG_PER_CYLINDER:
-    case CONFIG_PER_RELAY:
-        allowed_each(key, text);
-        break;
-    case CONFIG_INTEGER:
-        config_text_add(text, _("a whole number"));
-        add_range(key, text);
-        config_text_add(text, "%s", CONFIG_IS_HEX(key) ? _(", or hexadecimal with 0x") : "");
-        add_number_word(key, text);
-        break;
-    case CONFIG_MASK:
-        config_text_add(text, _("hexadecimal 0 to %X"), (unsigned)(key->high_milli / 1000));
-        break;
-    case CONFIG_WORD:
-        add_words(key->words, text);
-        break;
-    case CONFIG_SIGN:
-    case CONFIG_YES_NO:
-        config_text_add(text, "%s", key->type == CONFIG_SIGN ? _("1 or -1") : _("yes | no"));
-        break;
-    case CONFIG_ADDRESS:
-    case CONFIG_GROUP:
-    case CONFIG_NETWORKS:
-        allowed_addresses(key, text);
-        break;
-    case CONFIG_PATH:
-        allowed_path(key, text);
-        break;
-    case CONFIG_LABEL:
-        config_text_add(text, _("none, or a name of at most %u characters"), CONFIG_LABEL_MAX - 1u);
-        break;
-    case CONFIG_LINES:
-        config_text_add(text, _("none, or up to %u different lines, by name or number"), CONFIG_RELAYS_MAX);
-        break;
-    case CONFIG_NAME:
-    case CONFIG_IDS:
-    case CONFIG_RATIOS:
-    case CONFIG_WHOLES:
-    case CONFIG_FRAME:
-    case CONFIG_STEP:
-    case CONFIG_WHEN:
-        config_value_can_allowed(key, text);
-        break;
-    case CONFIG_NODES:
-    case CONFIG_WORDS:
-    case CONFIG_MAPS:
-        config_value_canopen_allowed(key, text);
-        break;
-    case CONFIG_HOSTS:
-    case CONFIG_BLOCKS:
-    case CONFIG_ITEMS:
-        config_value_modbus_allowed(key, text);
-        break;
+    memset(label, 0, sizeof *label);
+    if (span_is_word(item, "none")) {
+        return true;
+    }
+    if (item.length == 0 || item.length >= sizeof label->text) {
+        return config_value_refuse(key, item, item.length == 0 ? _("has no name") : _("is too long"), why);
+    }
+    for (size_t i = 0; i < item.length; i++) {
+        if (!is_label_byte(item.at[i])) {
+            return config_value_refuse(key, item, _("is no name"), why);
+        }
+        label->text[i] = item.at[i];
+    }
+    return true;
+}
+
+static bool parse_label(const config_key_t *key, const char *text, void *field, config_text_t *why)
+{
+    return read_label(key, (span_t){text, strlen(text)}, field, why);
+}
+
+static void allowed_label(const config_key_t *key, config_text_t *text)
+{
+    (void)key;
+    config_text_add(text, _("none, or a name of at most %u characters"), CONFIG_LABEL_MAX - 1u);
+}
+
+const config_type_t config_type_label = {.has_none = true, .parse = parse_label, .format = format_text, .allowed = allowed_label};
+
+static bool has_line(const config_lines_t *lines, const config_label_t *line)
+{
+    for (unsigned i = 0; i < lines->count; i++) {
+        if (strcmp(lines->line[i].text, line->text) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool parse_lines(const config_key_t *key, const char *text, void *field, config_text_t *why)
+{
+    config_lines_t *lines = field;
+    const unsigned count = span_count_items(text);
+    const char *rest = text;
+    memset(lines, 0, sizeof *lines);
+    if (count > CONFIG_RELAYS_MAX) {
+        return config_value_refuse_count(key, count, why);
+    }
+    while (rest != NULL) {
+        const span_t item = span_next_item(&rest);
+        config_label_t line;
+        if (!read_label(key, item, &line, why)) {
+            return false;
+        }
+        if (line.text[0] == '\0' || has_line(lines, &line)) {
+            return config_value_refuse(key, item, line.text[0] == '\0' ? _("is no line") : _("is listed twice"), why);
+        }
+        lines->line[lines->count++] = line;
+    }
+    return true;
+}
+
+static void format_lines(const config_key_t *key, const config_t *config, const void *field, config_text_t *text)
+{
+    const config_lines_t *lines = field;
+    (void)key, (void)config;
+    for (unsigned i = 0; i < lines->count; i++) {
+        config_text_add(text, "%s%s", i == 0 ? "" : ", ", lines->line[i].text);
     }
 }
 
-bool config_value_refuse(const config_key_t *key, span_t item, const char *what, config_text_t *why)
+static void allowed_lines(const config_key_t *key, config_text_t *text)
 {
-    config_text_add_quoted(why, item.at, item.length);
-    config_text_add(why, _(" %s; allowed: "), what);
-    config_value_allowed(key, why);
-    return false;
+    (void)key;
+    config_text_add(text, _("none, or up to %u different lines, by name or number"), CONFIG_RELAYS_MAX);
 }
 
-bool config_value_refuse_count(const config_key_t *key, unsigned count, config_text_t *why)
+const config_type_t config_type_lines = {
+    .has_none = true, .parse = parse_lines, .format = format_lines, .allowed = allowed_lines};
+
+/* --- Names --- */
+
+static bool parse_name(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
-    config_text_add(why, translate_count("has %u value; allowed: ", "has %u values; allowed: ", count), count);
-    config_value_allowed(key, why);
-    return false;
+    const size_t length = strlen(text);
+    if (length == 0 || strspn(text, NAME_BYTES) != length || length >= key->size) {
+        return config_value_refuse_text(key, text, _("is no name of an interface"), why);
+    }
+    memset(field, 0, key->size);
+    memcpy(field, text, length);
+    return true;
 }
+
+static void allowed_name(const config_key_t *key, config_text_t *text)
+{
+    config_text_add(text, _("a name of up to %u letters, digits and . _ -"), (unsigned)key->size - 1u);
+}
+
+const config_type_t config_type_name = {.parse = parse_name, .format = format_text, .allowed = allowed_name};

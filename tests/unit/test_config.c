@@ -246,7 +246,7 @@ static void test_load_every_key_with_wrong_type_is_one_error_at_its_line(void)
         set_key(key->section, key->name, "abc!");
         TEST_ASSERT_EQUAL_INT_MESSAGE(1, load_lines(), key->name);
         expect_start(prefix(find_key(key->section, key->name) + 1, key->section, key->name));
-        if (key->type != CONFIG_DECIMAL || key->count == 1) /* a vector is short of values first */
+        if (key->type != &config_type_decimal || key->count == 1) /* a vector is short of values first */
             expect_contains("\"abc!\"");
         expect_contains("; allowed: ");
     }
@@ -265,19 +265,19 @@ static void test_load_every_key_without_value_is_one_error_at_its_line(void)
 
 static bool has_range(const config_key_t *key)
 {
-    return key->type == CONFIG_INTEGER || key->type == CONFIG_PER_CYLINDER || key->type == CONFIG_DECIMAL;
+    return key->type == &config_type_integer || key->type == &config_type_per_cylinder || key->type == &config_type_decimal;
 }
 
 /* `value` thousandths as text, as many times as the key has values, the last one being the one that counts. */
 static void repeat_milli(const config_key_t *key, int64_t value_milli, char *text, size_t capacity)
 {
-    const unsigned count = key->type == CONFIG_DECIMAL ? key->count : 1;
+    const unsigned count = key->type == &config_type_decimal ? key->count : 1;
     size_t length = 0;
     for (unsigned i = 1; i < count; i++)
         length += (size_t)snprintf(text + length, capacity - length, "0, ");
     snprintf(text + length, capacity - length, "%s%lld.%03lld", value_milli < 0 ? "-" : "", llabs(value_milli) / 1000,
              llabs(value_milli) % 1000);
-    if (key->type == CONFIG_INTEGER)
+    if (key->type == &config_type_integer)
         *strrchr(text, '.') = '\0';
 }
 
@@ -296,7 +296,7 @@ static void test_load_every_number_outside_its_range_is_one_error_at_its_line(vo
 {
     for (size_t i = 0; i < config_key_count; i++) {
         const config_key_t *key = &config_keys[i];
-        const int64_t step = key->type == CONFIG_INTEGER ? 1000 : 1;
+        const int64_t step = key->type == &config_type_integer ? 1000 : 1;
         if (!has_range(key))
             continue;
         expect_out_of_range(key, key->low_milli - step);
@@ -1277,7 +1277,8 @@ static void test_hash_changes_with_every_number(void)
     const config_t good = m_config;
     for (size_t i = 0; i < config_key_count; i++) {
         const config_key_t *key = &config_keys[i];
-        const bool is_number = key->type == CONFIG_DECIMAL || key->type == CONFIG_INTEGER || key->type == CONFIG_MASK;
+        const bool is_number =
+            key->type == &config_type_decimal || key->type == &config_type_integer || key->type == &config_type_mask;
         if (is_number && config_is_applicable(key->needs, &good)) {
             m_config = good;
             ((uint8_t *)&m_config)[key->offset] ^= 1;
