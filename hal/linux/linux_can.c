@@ -105,7 +105,7 @@ static uint64_t when_received_us(linux_can_t *self, const linux_can_received_t *
     return self->last_rx_us;
 }
 
-static can_frame_t take_report(linux_can_t *self, const struct can_frame *frame)
+static can_frame_t receive_report(linux_can_t *self, const struct can_frame *frame)
 {
     const can_frame_t out = {.id = linux_can_frame_report(frame, &self->state), .is_error = true};
     self->reports++;
@@ -128,10 +128,10 @@ static void note_lost(linux_can_t *self, uint32_t lost)
 }
 
 /* False where the frame is not for the caller. */
-static bool take_in(linux_can_t *self, const linux_can_received_t *received, can_frame_t *out)
+static bool receive_one(linux_can_t *self, const linux_can_received_t *received, can_frame_t *out)
 {
     if ((received->frame.can_id & CAN_ERR_FLAG) != 0) {
-        *out = take_report(self, &received->frame);
+        *out = receive_report(self, &received->frame);
         return true;
     }
     if (received->is_own) {
@@ -168,7 +168,7 @@ static hv_status_t receive_next(linux_can_t *self, linux_can_received_t *receive
             return HV_ERR_AGAIN;
         }
         note_lost(self, received->lost);
-        *is_taken = take_in(self, received, out);
+        *is_taken = receive_one(self, received, out);
     } while (!*is_taken && !self->is_overrun);
     return HV_OK;
 }

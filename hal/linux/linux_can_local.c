@@ -88,7 +88,7 @@ static hv_status_t local_send(void *ctx, const can_frame_t *frame)
 }
 
 /* An error frame. */
-static void take_report(linux_can_local_t *self, const struct can_frame *frame, can_frame_t *out)
+static void receive_report(linux_can_local_t *self, const struct can_frame *frame, can_frame_t *out)
 {
     *out = (can_frame_t){.is_error = true, .id = linux_can_frame_report(frame, &self->state)};
     if (self->state == HAL_CAN_BUS_OFF) {
@@ -114,7 +114,7 @@ static hv_status_t local_receive(void *ctx, can_frame_t *out, uint64_t *rx_time_
             continue;
         }
         if ((packet.frame.can_id & CAN_ERR_FLAG) != 0) {
-            take_report(self, &packet.frame, out);
+            receive_report(self, &packet.frame, out);
         } else {
             *out = linux_can_frame_from_kernel(&packet.frame);
         }

@@ -149,7 +149,7 @@ static void look_at_all(search_t *search)
 
 /* --- What came of it, in words --- */
 
-static hv_status_t tell_nothing_seen(const search_t *search, char text[LINUX_GPIO_TEXT_SIZE])
+static hv_status_t describe_nothing_seen(const search_t *search, char text[LINUX_GPIO_TEXT_SIZE])
 {
     if (search->refused == 0) {
         put(text, "gpio: this machine has no GPIO chip (/dev/gpiochip*)");
@@ -161,7 +161,7 @@ static hv_status_t tell_nothing_seen(const search_t *search, char text[LINUX_GPI
     return HV_ERR_NOSUP;
 }
 
-static hv_status_t tell_missing(const search_t *search, char text[LINUX_GPIO_TEXT_SIZE])
+static hv_status_t describe_missing(const search_t *search, char text[LINUX_GPIO_TEXT_SIZE])
 {
     const linux_gpio_names_t *names = search->names;
     unsigned first = 0;
@@ -178,14 +178,14 @@ static hv_status_t tell_missing(const search_t *search, char text[LINUX_GPIO_TEX
     return HV_ERR_RANGE;
 }
 
-static hv_status_t tell(const search_t *search, char text[LINUX_GPIO_TEXT_SIZE])
+static hv_status_t describe(const search_t *search, char text[LINUX_GPIO_TEXT_SIZE])
 {
     if (search->complete == 1) {
         text[0] = '\0';
         return HV_OK;
     }
     if (search->chips == 0) {
-        return tell_nothing_seen(search, text);
+        return describe_nothing_seen(search, text);
     }
     if (search->labelled == 0) {
         put(text, "gpio: no chip has the label %s; there are: %s", search->names->chip, search->labels);
@@ -198,7 +198,7 @@ static hv_status_t tell(const search_t *search, char text[LINUX_GPIO_TEXT_SIZE])
             search->complete, search->names->chip);
         return HV_ERR_RANGE;
     }
-    return tell_missing(search, text);
+    return describe_missing(search, text);
 }
 
 hv_status_t linux_gpio_find(const linux_gpio_names_t *names, linux_gpio_place_t *place, char text[LINUX_GPIO_TEXT_SIZE])
@@ -211,7 +211,7 @@ hv_status_t linux_gpio_find(const linux_gpio_names_t *names, linux_gpio_place_t 
         }
     }
     look_at_all(&search);
-    const hv_status_t status = tell(&search, text);
+    const hv_status_t status = describe(&search, text);
     if (search.chips > 0 && search.complete == 0 && search.refused > 0) {
         const size_t used = strlen(text);
         (void)snprintf(&text[used], LINUX_GPIO_TEXT_SIZE - used, "; not every chip could be looked at: %s",
@@ -222,8 +222,8 @@ hv_status_t linux_gpio_find(const linux_gpio_names_t *names, linux_gpio_place_t 
 
 /* --- Requesting --- */
 
-static void tell_refused(linux_gpio_chip_t *chip, const linux_gpio_names_t *names, const linux_gpio_place_t *place, int error,
-                         char text[LINUX_GPIO_TEXT_SIZE])
+static void describe_refused(linux_gpio_chip_t *chip, const linux_gpio_names_t *names, const linux_gpio_place_t *place, int error,
+                             char text[LINUX_GPIO_TEXT_SIZE])
 {
     for (unsigned i = 0; error == EBUSY && i < place->count; i++) {
         linux_gpio_line_info_t info;
@@ -259,7 +259,7 @@ hv_status_t linux_gpio_request(linux_gpio_chip_t *chip, const linux_gpio_names_t
         error = linux_gpio_chip_request(chip, request);
     }
     if (error != 0) {
-        tell_refused(chip, names, &place, error, text);
+        describe_refused(chip, names, &place, error, text);
         linux_gpio_chip_close(chip);
         return HV_ERR_IO;
     }

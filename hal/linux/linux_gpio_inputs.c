@@ -62,7 +62,7 @@ static int look(linux_gpio_inputs_t *self, bool is_deaf)
 
 /* An e-stop whose contact has moved was open, whichever way: the kernel says how a line stands when it gets to an edge, so that
  * of a short opening only the closing is left. */
-static void take_edges(linux_gpio_inputs_t *self, const struct pollfd *edge, unsigned edges)
+static void read_edges(linux_gpio_inputs_t *self, const struct pollfd *edge, unsigned edges)
 {
     uint32_t rose = 0, fell = 0;
     for (unsigned i = 0; i < edges; i++) {
@@ -88,7 +88,7 @@ static bool await_edges(linux_gpio_inputs_t *self, bool is_lost)
     }
     const int ready = linux_gpio_thread_wait(poll_fd, 1 + edges, is_lost ? LOST_MS : edges > 0 ? LOOK_MS : POLL_MS);
     if (ready > 0) {
-        take_edges(self, &poll_fd[1], edges);
+        read_edges(self, &poll_fd[1], edges);
     }
     return ready >= 0 || edges == 0;
 }

@@ -25,15 +25,15 @@ int linux_gpio_chip_open(linux_gpio_chip_t *self, const char *path, linux_gpio_c
     memset(self, 0, sizeof *self);
     errno = 0;
     self->chip = gpiod_chip_open(path);
-    struct gpiod_chip_info *told = self->chip != NULL ? gpiod_chip_get_info(self->chip) : NULL;
-    if (told == NULL) {
+    struct gpiod_chip_info *found = self->chip != NULL ? gpiod_chip_get_info(self->chip) : NULL;
+    if (found == NULL) {
         const int error = error_now();
         linux_gpio_chip_close(self);
         return error;
     }
-    copy_name(info->label, gpiod_chip_info_get_label(told));
-    info->lines = (unsigned)gpiod_chip_info_get_num_lines(told);
-    gpiod_chip_info_free(told);
+    copy_name(info->label, gpiod_chip_info_get_label(found));
+    info->lines = (unsigned)gpiod_chip_info_get_num_lines(found);
+    gpiod_chip_info_free(found);
     return 0;
 }
 
@@ -54,14 +54,14 @@ void linux_gpio_chip_close(linux_gpio_chip_t *self)
 int linux_gpio_chip_line(linux_gpio_chip_t *self, unsigned offset, linux_gpio_line_info_t *info)
 {
     errno = 0;
-    struct gpiod_line_info *told = gpiod_chip_get_line_info(self->chip, offset);
-    if (told == NULL) {
+    struct gpiod_line_info *found = gpiod_chip_get_line_info(self->chip, offset);
+    if (found == NULL) {
         return error_now();
     }
-    copy_name(info->name, gpiod_line_info_get_name(told));
-    copy_name(info->consumer, gpiod_line_info_get_consumer(told));
-    info->is_used = gpiod_line_info_is_used(told);
-    gpiod_line_info_free(told);
+    copy_name(info->name, gpiod_line_info_get_name(found));
+    copy_name(info->consumer, gpiod_line_info_get_consumer(found));
+    info->is_used = gpiod_line_info_is_used(found);
+    gpiod_line_info_free(found);
     return 0;
 }
 

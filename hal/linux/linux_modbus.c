@@ -17,11 +17,11 @@
 /* --- The worker --- */
 
 /* The next slot in turn that waits, so that none starves; false where none does. */
-static bool take_next(linux_modbus_t *self)
+static bool pop_next(linux_modbus_t *self)
 {
     for (unsigned i = 1; i <= HAL_MODBUS_SLOTS; i++) {
         const unsigned slot = (self->last + i) % HAL_MODBUS_SLOTS;
-        if (newest_take(&self->slot[slot].asked)) {
+        if (newest_pop(&self->slot[slot].asked)) {
             self->last = slot;
             return true;
         }
@@ -33,10 +33,10 @@ static void serve(linux_modbus_t *self)
 {
     linux_modbus_slot_t *slot = &self->slot[self->last];
     const modbus_request_t *request = &slot->request[newest_front(&slot->asked)];
-    modbus_result_t *result = &slot->result[newest_back(&slot->told)];
+    modbus_result_t *result = &slot->result[newest_back(&slot->answered)];
     linux_modbus_link_run(&self->link, request, result);
     result->tag = request->tag;
-    (void)newest_put(&slot->told);
+    (void)newest_put(&slot->answered);
     __atomic_store_n(&self->served, self->served + 1, __ATOMIC_RELEASE);
 }
 
@@ -60,7 +60,7 @@ static void *worker(void *argument)
         (void)!read(self->wake, &woken, sizeof woken); /* before looking, so that nothing asked after is slept through */
         const bool is_ending = __atomic_load_n(&self->is_ending, __ATOMIC_ACQUIRE) != 0;
         linux_modbus_link_mend(&self->link);
-        if (take_next(self)) {
+        if (pop_next(self)) {
             serve(self);
         } else if (is_ending) {
             return NULL;
@@ -99,10 +99,10 @@ static hv_status_t poll_op(void *ctx, unsigned index, modbus_result_t *result)
         return HV_ERR_ARG;
     }
     linux_modbus_slot_t *slot = &self->slot[index];
-    if (!newest_take(&slot->told)) {
+    if (!newest_pop(&slot->answered)) {
         return HV_ERR_AGAIN;
     }
-    *result = slot->result[newest_front(&slot->told)];
+    *result = slot->result[newest_front(&slot->answered)];
     return HV_OK;
 }
 
@@ -174,7 +174,7 @@ const char *linux_modbus_text(linux_modbus_t *self)
 
 /* --- Opening and closing --- */
 
-static hv_status_t refuse(linux_modbus_t *self, hv_status_t status, const char *what)
+static hv_status_t reject(linux_modbus_t *self, hv_status_t status, const char *what)
 {
     (void)snprintf(self->text, sizeof self->text, "modbus: %s: %s", self->name, what);
     linux_modbus_link_close(&self->link);
@@ -211,22 +211,22 @@ hv_status_t linux_modbus_open(linux_modbus_t *self, const linux_modbus_config_t 
     }
     for (unsigned i = 0; i < HAL_MODBUS_SLOTS; i++) {
         self->slot[i].asked = newest_start();
-        self->slot[i].told = newest_start();
+        self->slot[i].answered = newest_start();
     }
     self->last = HAL_MODBUS_SLOTS - 1;
     self->is_serial = config->host == NULL;
     const hv_status_t status = linux_modbus_link_open(&self->link, config, &what);
     if (status != HV_OK) {
-        return refuse(self, status, what);
+        return reject(self, status, what);
     }
     self->wake = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
     if (self->wake < 0) {
-        return refuse(self, HV_ERR_IO, strerror(errno));
+        return reject(self, HV_ERR_IO, strerror(errno));
     }
     const int error = start_worker(self);
     if (error != 0) {
         (void)close(self->wake);
-        return refuse(self, HV_ERR_IO, strerror(error));
+        return reject(self, HV_ERR_IO, strerror(error));
     }
     self->is_open = true;
     return HV_OK;

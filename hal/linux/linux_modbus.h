@@ -17,7 +17,7 @@
 /** A request on its way to the worker and a result on its way back; private. */
 typedef struct {
     newest_t asked;
-    newest_t told;
+    newest_t answered;
     modbus_request_t request[NEWEST_BUFFERS];
     modbus_result_t result[NEWEST_BUFFERS];
 } linux_modbus_slot_t;

@@ -209,7 +209,7 @@ void linux_modbus_link_mend(linux_modbus_link_t *self)
 /* --- Silence --- */
 
 /* Takes what came in unasked; false where the link is gone. On TCP nothing may: it would be taken for the next answer. */
-static bool take_strays(linux_modbus_link_t *self)
+static bool read_strays(linux_modbus_link_t *self)
 {
     uint8_t bytes[LINUX_MODBUS_FRAME_MAX];
     const ssize_t got = read(modbus_get_socket(self->modbus), bytes, sizeof bytes);
@@ -235,7 +235,7 @@ static bool make_quiet(linux_modbus_link_t *self)
         if (ppoll(&line, 1, &wait, NULL) <= 0 || now_us >= limit_us) {
             return true;
         }
-        if (!take_strays(self)) {
+        if (!read_strays(self)) {
             return false;
         }
         self->silent_until_us = linux_modbus_now_us() + self->silence_us;

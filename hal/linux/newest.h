@@ -44,7 +44,7 @@ static inline bool newest_put(newest_t *self)
 
 /** Takes the newest value, once.
  *  @return false: there is nothing new; true: it is in newest_front() until the next take */
-static inline bool newest_take(newest_t *self)
+static inline bool newest_pop(newest_t *self)
 {
     if ((__atomic_load_n(&self->middle, __ATOMIC_RELAXED) & NEWEST_FRESH) == 0) {
         return false;

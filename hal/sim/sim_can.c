@@ -54,7 +54,7 @@ static bool passes(const sim_can_t *self, const can_frame_t *frame)
     return self->filters == 0;
 }
 
-static void take_in(sim_can_t *self, const can_frame_t *frame, uint64_t time_us)
+static void receive(sim_can_t *self, const can_frame_t *frame, uint64_t time_us)
 {
     if (!is_on_bus(self) || !passes(self, frame)) {
         return;
@@ -125,7 +125,7 @@ static void deliver(sim_can_bus_t *self, const sim_can_t *sender, const sim_can_
 {
     for (uint32_t i = 0; i < self->nodes; i++) {
         for (uint8_t copy = 0; self->node[i] != sender && copy < sent->copies; copy++) {
-            take_in(self->node[i], &sent->frame, time_us);
+            receive(self->node[i], &sent->frame, time_us);
         }
     }
 }

@@ -210,7 +210,7 @@ static bool is_bus_gone(const sim_drives_t *self)
 }
 
 /* Time since the last poll; the first one only sets the clock. */
-static uint32_t take_time(sim_drives_t *self, uint64_t now_us)
+static uint32_t step_time(sim_drives_t *self, uint64_t now_us)
 {
     const uint64_t dt_us = self->has_time && now_us > self->now_us ? now_us - self->now_us : 0;
     self->has_time = true;
@@ -221,7 +221,7 @@ static uint32_t take_time(sim_drives_t *self, uint64_t now_us)
 static hv_status_t drives_sim_poll(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
 {
     sim_drives_t *self = ctx;
-    const uint32_t dt_us = take_time(self, now_us);
+    const uint32_t dt_us = step_time(self, now_us);
     self->polls++;
     apply_plan(self);
     for (uint8_t k = 0; k < self->count; k++) {
@@ -232,7 +232,7 @@ static hv_status_t drives_sim_poll(void *ctx, uint64_t now_us, drive_feedback_t 
     return is_bus_gone(self) ? HV_ERR_IO : HV_OK;
 }
 
-static void take_setpoint(sim_drive_t *axis, const sim_drive_config_t *config, q32_t setpoint_q32)
+static void apply_setpoint(sim_drive_t *axis, const sim_drive_config_t *config, q32_t setpoint_q32)
 {
     const q32_t from_q32 = axis->setpoint_q32;
     if (axis->is_offline) {
@@ -255,7 +255,7 @@ static hv_status_t drives_sim_send(void *ctx, uint64_t now_us, const q32_t setpo
     }
     self->sends++;
     for (uint8_t k = 0; k < self->count; k++) {
-        take_setpoint(&self->axis[k], &self->config[k], setpoint_q32[k]);
+        apply_setpoint(&self->axis[k], &self->config[k], setpoint_q32[k]);
     }
     return HV_OK;
 }

@@ -29,7 +29,7 @@ void sim_log_init(sim_log_t *self)
     memset(self, 0, sizeof *self);
 }
 
-const sim_log_line_t *sim_log_take(sim_log_t *self)
+const sim_log_line_t *sim_log_pop(sim_log_t *self)
 {
     if (self->count == 0) {
         return NULL;

@@ -28,7 +28,7 @@ void sim_log_init(sim_log_t *self);
 
 /** Takes the oldest line.
  *  @return the line, valid until SIM_LOG_LINES more were written; NULL: none */
-const sim_log_line_t *sim_log_take(sim_log_t *self);
+const sim_log_line_t *sim_log_pop(sim_log_t *self);
 
 /** The log as hal/log.h wants it. */
 hal_log_t sim_log_hal(sim_log_t *self);

@@ -36,7 +36,7 @@ void canmaster_deaf(canmaster_t *self, uint64_t now_us);
 
 /** A frame came that only a master sends.
  *  @param what for the caller */
-void canmaster_take(canmaster_t *self, uint32_t what);
+void canmaster_note(canmaster_t *self, uint32_t what);
 
 /** Once per cycle, behind all that was received.
  *  @param now_us never decreasing */

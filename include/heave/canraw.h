@@ -107,8 +107,8 @@ typedef struct {
 /** Reaction to another master: to frames with our identifiers that we have not sent. */
 typedef enum {
     CANRAW_MASTER_IGNORE,
-    CANRAW_MASTER_TELL, /**< reported only */
-    CANRAW_MASTER_STOP  /**< nothing is sent at the start until none is heard; later all drives stop, in DRIVE_FAULT */
+    CANRAW_MASTER_REPORT, /**< reported only */
+    CANRAW_MASTER_STOP    /**< nothing is sent at the start until none is heard; later all drives stop, in DRIVE_FAULT */
 } canraw_master_t;
 
 /** One drive. Unit u: mm, or deg of the rotation motor. */
@@ -171,7 +171,7 @@ enum {
     CANRAW_STRANGE = 0x10003,                      /**< plus (canraw_verdict_t - CANRAW_OTHER): received frames are rejected */
     CANRAW_NO_ANSWER = 0x10008,                    /**< no answer to a start-up step */
     CANRAW_OTHER_MASTER = DRIVE_CODE_MASTER_FIRST, /**< somebody else sends frames with the identifiers of ours */
-    CANRAW_TELLS_ERROR = 0x10010                   /**< the drive sends a fault code other than 0, but has no fault */
+    CANRAW_REPORTS_ERROR = 0x10010                 /**< the drive sends a fault code other than 0, but has no fault */
 };
 
 /** Last query to a drive; private. */
@@ -197,7 +197,7 @@ typedef struct {
     uint32_t setpoint_counter; /**< and of the next set-points where they have an identifier of their own */
     uint32_t status;
     uint32_t fault_code;
-    uint32_t told_code; /**< the fault field of the last reply that has one */
+    uint32_t reported_code; /**< the fault field of the last reply that has one */
     int64_t torque;
     bool has_torque;
     bool is_talking;     /**< something came since it was lost */
@@ -218,7 +218,7 @@ typedef struct {
     quick_stop_t quick_stop; /**< `stop` was sent or will be; `disable` follows */
     drive_guard_t guard;
     uint64_t mark_us;        /**< time of the request or of the end of homing: actual has to be newer */
-    uint64_t told_us;        /**< time of the last command */
+    uint64_t command_us;     /**< time of the last command */
     uint64_t reset_until_us; /**< end of the time in which a reset may end the fault; 0: no reset */
     uint64_t actual_us;
     int64_t counts; /**< of the last position, in counts of the drive */

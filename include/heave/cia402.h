@@ -80,8 +80,8 @@ typedef enum {
 /** Reaction to such a condition. */
 typedef enum {
     CIA402_IGNORE,
-    CIA402_TELL, /**< reported only */
-    CIA402_STOP  /**< a fault of the drive: all drives stop, and this one is not enabled */
+    CIA402_REPORT, /**< reported only */
+    CIA402_STOP    /**< a fault of the drive: all drives stop, and this one is not enabled */
 } cia402_reaction_t;
 
 /** An object of a start-up list: a setting that a family of drives needs in addition to the settings of all drives. */

@@ -88,7 +88,7 @@ typedef struct {
 } drive_emergency_t;
 
 /** Values that a drive measures in addition to its position: bits of drive_telemetry_t.has. */
-enum { DRIVE_TELLS_TORQUE = 1, DRIVE_TELLS_LAG = 2, DRIVE_TELLS_INPUTS = 4 };
+enum { DRIVE_HAS_TORQUE = 1, DRIVE_HAS_LAG = 2, DRIVE_HAS_INPUTS = 4 };
 
 /** The newest of these values. All 0: none yet. */
 typedef struct {

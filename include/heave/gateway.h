@@ -73,11 +73,11 @@ typedef struct {
     uint32_t code;
     uint32_t detail_code;
     uint32_t left_out; /**< changes since then without a line */
-} gateway_told_t;
+} report_log_t;
 
 /** Log lines about what the drives report; members are private to src/gateway. */
 typedef struct {
-    gateway_told_t told_of[DRIVES_MAX]; /**< the last line about the report of a drive */
+    report_log_t change_log[DRIVES_MAX]; /**< the last line about the report of a drive */
     log_limit_t emergency_log[DRIVES_MAX];
 } reports_t;
 
@@ -193,13 +193,13 @@ typedef struct {
     input_levels_t inputs;
     auto_engage_t auto_engage;
     shutdown_t shutdown;
-    uint32_t told[DRIVES_MAX + 1u]; /**< faults that the next cycle has to find, as faults_t.begun */
-    bool has_told;                  /**< any of these */
-    uint32_t withheld;              /**< PERMIT_KEY | ... */
-    uint32_t rides;                 /**< times that it was engaged from NEUTRAL */
-    uint64_t reset_until_us;        /**< end of the time in which a reset waits for the drives; 0 = no reset */
-    uint64_t state_since_us;        /**< when the state was entered */
-    bool is_late;                   /**< the next cycle is too late for the healthy pulse */
+    uint32_t injected[DRIVES_MAX + 1u]; /**< faults that the next cycle has to find, as faults_t.begun */
+    bool has_injected;                  /**< any of these */
+    uint32_t withheld;                  /**< PERMIT_KEY | ... */
+    uint32_t rides;                     /**< times that it was engaged from NEUTRAL */
+    uint64_t reset_until_us;            /**< end of the time in which a reset waits for the drives; 0 = no reset */
+    uint64_t state_since_us;            /**< when the state was entered */
+    bool is_late;                       /**< the next cycle is too late for the healthy pulse */
 } sequencer_t;
 
 /** A gateway; members are private to src/gateway. */
@@ -293,7 +293,7 @@ void gateway_note_late(gateway_t *self, uint32_t cycles);
 
 /** Offline runs: the next cycle finds this fault, whatever the drives do. If the cycle finds it by itself, nothing is added.
  *  @param axis as in fault_t; ignored if the platform does not have this axis, or if it does not fit the code */
-void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis);
+void gateway_inject_fault(gateway_t *self, fault_code_t code, unsigned axis);
 
 /** True when a shutdown has ended: the state is OFF, or FAULT / ESTOP with a shutdown requested, the drives were told (if their
  * bus works), and no drive is energized as far as is known. Waits 3 s for drives that do not confirm this, or 1 s if none of them

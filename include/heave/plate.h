@@ -31,6 +31,6 @@ void plate_init(plate_t *self);
 /** Processes feedback. Call once per cycle. Calculates only for a new sample: at most two forward solutions.
  *  @param feedback one per cylinder
  *  @param guess    a nearby pose, such as the pose sent; used if there is no last pose or it does not converge */
-void plate_take(plate_t *self, const kin_t *kin, const drive_feedback_t feedback[], const pose_t *guess, uint64_t now_us);
+void plate_step(plate_t *self, const kin_t *kin, const drive_feedback_t feedback[], const pose_t *guess, uint64_t now_us);
 
 #endif

@@ -34,8 +34,8 @@ void quick_stop_begin(quick_stop_t *self, uint64_t now_us);
 /** Judges the newest position. Call it in every poll after the drive has taken the command that stops it.
  *  @param actual_q32 [mm, deg]
  *  @param actual_us  when it was received; the same position may be passed again
- *  @param told_us    when the drive took the command: older positions do not count
+ *  @param command_us    when the drive took the command: older positions do not count
  *  @return true: take the torque now, the quick stop is over; false: not yet, or none is active */
-bool quick_stop_step(quick_stop_t *self, q32_t actual_q32, uint64_t actual_us, uint64_t told_us, uint64_t now_us);
+bool quick_stop_step(quick_stop_t *self, q32_t actual_q32, uint64_t actual_us, uint64_t command_us, uint64_t now_us);
 
 #endif

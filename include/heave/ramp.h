@@ -42,7 +42,7 @@ typedef struct {
 typedef enum {
     RAMP_SOFT, /**< streams: bandwidth 1/16 per cycle, filters the noise of reconstructed samples */
     RAMP_FIRM  /**< steps, timed moves, cylinders: bandwidth 1/4 per cycle */
-} ramp_grip_t;
+} ramp_bandwidth_t;
 
 /** What limited a cycle; flags may be combined. */
 enum {
@@ -84,23 +84,23 @@ q32_t ramp_safe_acceleration(const ramp_limits_t *limits);
 hv_status_t ramp_init(ramp_t *self, const ramp_limits_t *limits, q32_t pos_q32) HV_MUST_CHECK;
 
 /** Continues from a given state, clipped to the limits. */
-void ramp_take_over(ramp_t *self, const ramp_state_t *state);
+void ramp_adopt(ramp_t *self, const ramp_state_t *state);
 
 /** Advances one cycle towards the reference. Constant time.
  *  Guarantees, exact in integers: |vel|, |acc|, |jerk| within the limits, pos within the bounds, and a stop within the bounds
  *  stays possible. Ends exactly at rest on a reference that rests within the bounds. Sets self->flags.
  *  @return the new position */
-q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip);
+q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_bandwidth_t bandwidth);
 
 /** ramp_step() of several ramps, one after the other, each towards its own reference.
  *  @param pos_q32 out, the new position of each
  *  @return the flags of all together */
-unsigned ramp_step_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *pos_q32);
+unsigned ramp_step_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_bandwidth_t bandwidth, q32_t *pos_q32);
 
 /** The two halves of a step, for axes that are moved together.
  *  ramp_aim_all(): the acceleration that each takes in the coming cycle, within the limits; sets flags, moves nothing.
  *  @param acc_q32 out, of each, u/cycle^2   @return the flags of all together */
-unsigned ramp_aim_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *acc_q32);
+unsigned ramp_aim_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_bandwidth_t bandwidth, q32_t *acc_q32);
 
 /** The acceleration nearest to a wanted one that keeps all that ramp_step() guarantees. These accelerations are an interval: what
  *  lies between two of them is one. Adds to self->flags. */

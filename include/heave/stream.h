@@ -94,10 +94,10 @@ typedef struct {
     int32_t index[STREAM_EVIDENCE];             /**< periods of each before the newest */
     unsigned count;
     unsigned axes;
-    int64_t told_q32;  /**< deviation from the neighbours that the lateness explains */
-    int64_t off_q32;   /**< total deviation from the neighbours */
-    int64_t moved_q32; /**< deviation if the samples belonged to their arrivals */
-    q32_t weight_q32;  /**< [0, Q32_ONE]: 0 by the line, 1 by arrivals */
+    int64_t by_lateness_q32; /**< deviation from the neighbours that the lateness explains */
+    int64_t off_q32;         /**< total deviation from the neighbours */
+    int64_t moved_q32;       /**< deviation if the samples belonged to their arrivals */
+    q32_t weight_q32;        /**< [0, Q32_ONE]: 0 by the line, 1 by arrivals */
 } stream_evidence_t;
 
 /** How the step of a motion follows from the two before it; private to src/motion. */
@@ -137,8 +137,8 @@ typedef struct {
     q32_t high_q32[AXES_MAX];     /**< upper end */
     stream_lead_t lead[AXES_MAX];
     stream_predictor_t predictor; /**< of the guesses */
-    stream_quantum_t grain[AXES_MAX];
-    uint32_t watched; /**< samples since the watch for a grain began */
+    stream_quantum_t quantum[AXES_MAX];
+    uint32_t watched; /**< samples since the watch for a quantum began */
     int32_t window;   /**< each control point is a running mean of this many points, applied three times; 1: the point itself */
     uint8_t weight[STREAM_WEIGHTS]; /**< of the points in that mean, the newest first: 75 at most */
     int64_t period_cycles_q16;      /**< cycles in a period */
@@ -151,8 +151,8 @@ typedef struct {
     int32_t change; /**< how much the points at head have changed since the curve passed them, in guesses; 0: not at all */
     q32_t was_q32[3][AXES_MAX]; /**< if changed: points at head and before it that the curve has passed */
     bool is_off;                /**< an axis has an offset */
-    int64_t grip_q32;           /**< rate at which the offset is taken back, per period */
-    int64_t softest_q32;        /**< smallest grip_q32 */
+    int64_t bandwidth_q32;      /**< rate at which the offset is taken back, per period */
+    int64_t softest_q32;        /**< smallest bandwidth_q32 */
     int32_t age;                /**< samples since the stream began at rest, up to a maximum */
     int32_t patience;           /**< number of guesses after which the stream counts as ended */
     governor_limits_t limits[AXES_MAX];
@@ -197,14 +197,14 @@ typedef struct {
 
 /** How often a sender repeats each value; members are private to src/motion. */
 typedef struct {
-    uint64_t began_us; /**< arrival of the first of the equal samples */
-    uint32_t run;      /**< equal samples so far */
-    uint32_t each;     /**< repetitions of each value; 1: the sender does not repeat values */
-    uint32_t frames;   /**< frames in the newest counted runs */
-    uint32_t span_us;  /**< duration of these runs */
-    uint32_t runs;     /**< number of these runs */
-    uint32_t telling;  /**< runs of these whose step is larger than rounding */
-    uint32_t longest;  /**< longest of these runs */
+    uint64_t began_us;    /**< arrival of the first of the equal samples */
+    uint32_t run;         /**< equal samples so far */
+    uint32_t each;        /**< repetitions of each value; 1: the sender does not repeat values */
+    uint32_t frames;      /**< frames in the newest counted runs */
+    uint32_t span_us;     /**< duration of these runs */
+    uint32_t runs;        /**< number of these runs */
+    uint32_t significant; /**< runs of these whose step is larger than rounding */
+    uint32_t longest;     /**< longest of these runs */
 } stream_repeat_t;
 
 /** Stream state; members are private to src/motion. */

@@ -33,13 +33,13 @@ static bool is_any_answering(const cia402_t *self)
 
 /* --- In --- */
 
-static void take_for(cia402_t *self, unsigned k, const can_frame_t *frame)
+static void receive_for(cia402_t *self, unsigned k, const can_frame_t *frame)
 {
     const cia402_drive_t drive = cia402_drive(self, k);
     switch (frame->id & COB_FUNCTION) {
     case CIA402_COB_SYNC:
         self->emergencies += drive.own->channel == 0;
-        cia402_axis_take_emergency(drive, frame);
+        cia402_axis_receive_emergency(drive, frame);
         break;
     case CIA402_COB_SDO_ANSWER:
         if (drive.axis->is_asking) {
@@ -47,25 +47,25 @@ static void take_for(cia402_t *self, unsigned k, const can_frame_t *frame)
         }
         break;
     case CIA402_COB_HEARTBEAT:
-        cia402_axis_take_heartbeat(drive, frame);
+        cia402_axis_receive_heartbeat(drive, frame);
         break;
     default: /* no enum: whatever else is on the bus */
         break;
     }
 }
 
-static void take_frame(cia402_t *self, const can_frame_t *frame)
+static void receive_frame(cia402_t *self, const can_frame_t *frame)
 {
-    if (frame->is_extended || frame->is_rtr || cia402_master_take(self, frame) || self->master.is_listening) {
+    if (frame->is_extended || frame->is_rtr || cia402_master_receive(self, frame) || self->master.is_listening) {
         return;
     }
     if (frame->id >= CIA402_COB_TPDO && frame->id < CIA402_COB_SDO_ANSWER) {
-        cia402_pdo_take(self, frame);
+        cia402_pdo_receive(self, frame);
         return;
     }
     for (unsigned k = 0; k < self->config->axes; k++) {
         if ((frame->id & CIA402_NODE_MAX) == self->config->axis[k].node) {
-            take_for(self, k, frame);
+            receive_for(self, k, frame);
         }
     }
 }
@@ -82,7 +82,7 @@ static bool receive(cia402_t *self)
             return status == HV_ERR_AGAIN;
         }
         if (!frame.is_error) {
-            take_frame(self, &frame);
+            receive_frame(self, &frame);
         } else if ((frame.id & CAN_ERROR_RESTARTED) != 0) {
             cia402_bus_lose(self);
         }
@@ -209,7 +209,7 @@ static guard_limits_t limits_of(const cia402_t *self, unsigned k)
                             .window_q32 = own->following_max_q32};
 }
 
-static void take_setpoint(cia402_t *self, unsigned k, q32_t setpoint_q32)
+static void apply_setpoint(cia402_t *self, unsigned k, q32_t setpoint_q32)
 {
     cia402_axis_t *axis = &self->axis[k];
     const guard_limits_t limits = limits_of(self, k);
@@ -236,7 +236,7 @@ static void choose_target(cia402_t *self, unsigned k, q32_t setpoint_q32)
     const bool is_holding = axis->is_in && cia402_axis_is_operating(cia402_drive(self, k)) && axis->homing == CIA402_HOMING_NO;
     if (axis->is_in && self->stage == CIA402_STAGE_FOLLOW) {
         if (self->pp_step == 0 || cia402_mode(self->config, k) != CIA402_MODE_PP) {
-            take_setpoint(self, k, setpoint_q32);
+            apply_setpoint(self, k, setpoint_q32);
         }
     } else if (!is_holding && axis->phase == CIA402_UP) {
         axis->target_counts = axis->actual_counts;
@@ -291,7 +291,7 @@ static hv_status_t send_set(cia402_t *self, const q32_t setpoint_q32[DRIVES_MAX]
 
 /* --- drives.h --- */
 
-static void take_time(cia402_t *self, uint64_t now_us)
+static void step_time(cia402_t *self, uint64_t now_us)
 {
     self->now_us = now_us;
     if (!self->has_time) {
@@ -329,7 +329,7 @@ static void work(cia402_t *self)
 static hv_status_t cia402_poll(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
 {
     cia402_t *self = ctx;
-    take_time(self, now_us);
+    step_time(self, now_us);
     const bool is_up = receive(self);
     cia402_bus_watch(self, is_up);
     canpassive_step(&self->passive, self->can, now_us, self->config->passive_stop_ms);

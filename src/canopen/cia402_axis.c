@@ -88,7 +88,7 @@ static int32_t i32_of(uint32_t bits)
 }
 
 /* The position goes on where the 32 bits of the drive wrap round. */
-HV_WRAPS void cia402_axis_take_position(cia402_drive_t drive, uint32_t bits)
+HV_WRAPS void cia402_axis_receive_position(cia402_drive_t drive, uint32_t bits)
 {
     cia402_axis_t *self = drive.axis;
     const int32_t moved = i32_of(bits - (uint32_t)self->actual_counts);
@@ -114,7 +114,7 @@ static void count_answer(cia402_drive_t drive)
     }
 }
 
-bool cia402_axis_is_told(const cia402_axis_t *self)
+bool cia402_axis_is_commanded(const cia402_axis_t *self)
 {
     return self->phase == CIA402_UP || self->phase == CIA402_STARTING;
 }
@@ -122,7 +122,7 @@ bool cia402_axis_is_told(const cia402_axis_t *self)
 void cia402_axis_note_answer(cia402_drive_t drive, unsigned n, uint8_t all)
 {
     cia402_axis_t *self = drive.axis;
-    if (!cia402_axis_is_told(self)) {
+    if (!cia402_axis_is_commanded(self)) {
         return;
     }
     if (n == 0 && self->phase == CIA402_STARTING && !self->has_answered) {
@@ -139,7 +139,7 @@ void cia402_axis_note_answer(cia402_drive_t drive, unsigned n, uint8_t all)
     }
 }
 
-void cia402_axis_take_emergency(cia402_drive_t drive, const can_frame_t *frame)
+void cia402_axis_receive_emergency(cia402_drive_t drive, const can_frame_t *frame)
 {
     const uint16_t code = (uint16_t)(frame->data[0] | frame->data[1] << 8);
     drive_emergency_t *emergency = &drive.axis->emergency;
@@ -160,7 +160,7 @@ void cia402_axis_take_emergency(cia402_drive_t drive, const can_frame_t *frame)
     }
 }
 
-static void take_boot(cia402_drive_t drive)
+static void receive_boot(cia402_drive_t drive)
 {
     cia402_axis_t *self = drive.axis;
     const bool is_twice = self->boot_us != 0 && drive.now_us - self->boot_us < BOOTS_APART_US;
@@ -176,7 +176,7 @@ static void take_boot(cia402_drive_t drive)
     self->emergency.is_over = true;
     cia402_axis_look_for(drive);
     if (is_twice) {
-        cia402_axis_refuse(drive, CIA402_TWICE);
+        cia402_axis_reject(drive, CIA402_TWICE);
     }
 }
 
@@ -188,14 +188,14 @@ static bool is_next_answer(cia402_axis_t *self, uint8_t toggle)
     return is_next;
 }
 
-void cia402_axis_take_heartbeat(cia402_drive_t drive, const can_frame_t *frame)
+void cia402_axis_receive_heartbeat(cia402_drive_t drive, const can_frame_t *frame)
 {
     cia402_axis_t *self = drive.axis;
     if (frame->length != 1) {
         return;
     }
     if (frame->data[0] == NMT_STATE_BOOT) {
-        take_boot(drive);
+        receive_boot(drive);
         return;
     }
     if (drive.config->is_guarded && !is_next_answer(self, frame->data[0] & NMT_TOGGLE)) {

@@ -28,12 +28,12 @@ typedef struct {
 void cia402_axis_init(cia402_drive_t drive);
 
 /** Received: by the kind of identifier. */
-void cia402_axis_take_position(cia402_drive_t drive, uint32_t bits);
-void cia402_axis_take_emergency(cia402_drive_t drive, const can_frame_t *frame);
-void cia402_axis_take_heartbeat(cia402_drive_t drive, const can_frame_t *frame);
+void cia402_axis_receive_position(cia402_drive_t drive, uint32_t bits);
+void cia402_axis_receive_emergency(cia402_drive_t drive, const can_frame_t *frame);
+void cia402_axis_receive_heartbeat(cia402_drive_t drive, const can_frame_t *frame);
 
 /** True where its PDOs count. */
-bool cia402_axis_is_told(const cia402_axis_t *self);
+bool cia402_axis_is_commanded(const cia402_axis_t *self);
 
 /** A TPDO with an answer came.
  *  @param n   which of them

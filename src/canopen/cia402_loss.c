@@ -88,7 +88,7 @@ void cia402_axis_lose(cia402_drive_t drive, cia402_trouble_t why)
 }
 
 /* Cannot be used until it boots or the operator resets. */
-void cia402_axis_refuse(cia402_drive_t drive, cia402_trouble_t why)
+void cia402_axis_reject(cia402_drive_t drive, cia402_trouble_t why)
 {
     drive.axis->setup.job = CIA402_JOB_NONE;
     sdo_cancel(&drive.axis->sdo);

@@ -13,7 +13,7 @@ void cia402_axis_enter(cia402_drive_t drive, cia402_phase_t phase);
 void cia402_axis_note_trouble(cia402_drive_t drive, cia402_trouble_t why);
 
 /** The drive cannot be used until it boots or the operator resets. */
-void cia402_axis_refuse(cia402_drive_t drive, cia402_trouble_t why);
+void cia402_axis_reject(cia402_drive_t drive, cia402_trouble_t why);
 
 /** As cia402_axis_lose(), without the others of its node. */
 void cia402_axis_lose_alone(cia402_drive_t drive, cia402_trouble_t why);

@@ -14,9 +14,9 @@ static const struct {
     uint32_t entry;
     uint8_t bit; /* of cia402_config_t.telemetry */
 } k_values[] = {
-    {CIA402_ENTRY_TORQUE, DRIVE_TELLS_TORQUE},
-    {CIA402_ENTRY_LAG, DRIVE_TELLS_LAG},
-    {CIA402_ENTRY_INPUTS, DRIVE_TELLS_INPUTS},
+    {CIA402_ENTRY_TORQUE, DRIVE_HAS_TORQUE},
+    {CIA402_ENTRY_LAG, DRIVE_HAS_LAG},
+    {CIA402_ENTRY_INPUTS, DRIVE_HAS_INPUTS},
 };
 
 /* --- Nodes and channels --- */
@@ -274,7 +274,7 @@ static const char *misfit_of(const cia402_config_t *config, unsigned axis)
     const unsigned commands = (cia402_map_is_shared(&config->commands) ? 1u : channels) * cia402_map_count(&config->commands);
     const unsigned answers = (cia402_map_is_shared(&config->answers) ? 1u : channels) * cia402_map_count(&config->answers);
     const unsigned most = channels > 1u ? step_of(config) : CIA402_PDO_NUMBER_MAX;
-    const unsigned telling = (cia402_map_is_shared(&config->answers) ? channels : 1u) * telemetries_of(config);
+    const unsigned telemetry_pdos = (cia402_map_is_shared(&config->answers) ? channels : 1u) * telemetries_of(config);
     if (count_entry(config, axis, false, CIA402_ENTRY_CONTROLWORD) != 1u ||
         count_entry(config, axis, false, is_ip ? CIA402_ENTRY_TARGET_IP : CIA402_ENTRY_TARGET) != 1u) {
         return "the commands of each axis need 6040h with 16 bits and 607Ah (mode ip: 60C1h:01) with 32, each once";
@@ -286,7 +286,8 @@ static const char *misfit_of(const cia402_config_t *config, unsigned axis)
     if (commands > IDENTIFIERS || answers + channels * telemetries_of(config) > IDENTIFIERS) {
         return "a node has four identifiers for commands, and four for answers and telemetry";
     }
-    return are_numbers_fine(config, &config->commands, most, telling) && are_numbers_fine(config, &config->answers, most, telling)
+    return are_numbers_fine(config, &config->commands, most, telemetry_pdos) &&
+                   are_numbers_fine(config, &config->answers, most, telemetry_pdos)
                ? NULL
                : "PDOs of a node need different numbers, and those of a channel are below pdo_step of the next";
 }

@@ -55,13 +55,13 @@ static cia402_trouble_t judge(const cia402_t *self, const can_frame_t *frame)
     return is_command(self, frame->id) ? CIA402_OTHER_COMMAND : CIA402_TROUBLE_NONE;
 }
 
-bool cia402_master_take(cia402_t *self, const can_frame_t *frame)
+bool cia402_master_receive(cia402_t *self, const can_frame_t *frame)
 {
     const cia402_trouble_t other = judge(self, frame);
     if (other == CIA402_TROUBLE_NONE) {
         return false;
     }
-    canmaster_take(&self->master, other);
+    canmaster_note(&self->master, other);
     for (unsigned k = 0; k < self->config->axes && other == CIA402_OTHER_SYNC; k++) {
         cia402_axis_note_foreign_sync(cia402_drive(self, k));
     }
@@ -70,7 +70,7 @@ bool cia402_master_take(cia402_t *self, const can_frame_t *frame)
 
 /* --- What comes of it --- */
 
-static void tell(cia402_t *self)
+static void note_master(cia402_t *self)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
         self->axis[k].notes |= 1u << CIA402_WATCH_MASTER;
@@ -105,7 +105,7 @@ static void stop(cia402_t *self)
             axis->surplus = 0; /* what the drives answered to it is no sign of a second drive */
             cia402_axis_fail(cia402_drive(self, k), self->master.what);
         } else if (axis->phase != CIA402_UP && axis->phase != CIA402_LEAVING && axis->phase != CIA402_REFUSED) {
-            cia402_axis_refuse(cia402_drive(self, k), (cia402_trouble_t)self->master.what);
+            cia402_axis_reject(cia402_drive(self, k), (cia402_trouble_t)self->master.what);
         }
     }
 }
@@ -125,8 +125,8 @@ static void react(cia402_t *self)
     switch (self->config->reaction[CIA402_WATCH_MASTER]) {
     case CIA402_IGNORE:
         break;
-    case CIA402_TELL:
-        tell(self);
+    case CIA402_REPORT:
+        note_master(self);
         break;
     case CIA402_STOP:
         stop_or_wait(self);

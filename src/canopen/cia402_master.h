@@ -8,7 +8,7 @@
 
 /** A frame was received, which is never our own.
  *  @return true: only a master sends it, and there is nothing else to be done with it */
-bool cia402_master_take(cia402_t *self, const can_frame_t *frame);
+bool cia402_master_receive(cia402_t *self, const can_frame_t *frame);
 
 /** Once at the first poll: begins to listen, where the configuration wants it. */
 void cia402_master_begin(cia402_t *self);

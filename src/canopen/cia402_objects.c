@@ -51,9 +51,9 @@ const cia402_object_t cia402_objects[] = {
     {.index = 0x1000, .bytes = 4, .deed = CIA402_CHECK, .when = CIA402_IF_FIRST, .constant = 0x0192, .trouble = CIA402_NOT_402},
     IDENTITY(1), IDENTITY(2), IDENTITY(3), IDENTITY(4),
     {.deed = CIA402_LIST, .constant = false},
-    {.index = 0x6502, .bytes = 4, .deed = CIA402_HAS, .need = CIA402_IF_TOLD, .when = CIA402_IF_SUPPORT, .source = CIA402_MODE_BITS,
+    {.index = 0x6502, .bytes = 4, .deed = CIA402_HAS, .need = CIA402_IF_ANSWERED, .when = CIA402_IF_SUPPORT, .source = CIA402_MODE_BITS,
      .trouble = CIA402_NO_SUCH_MODE},
-    {.index = 0x60E3, .bytes = 1, .deed = CIA402_LISTED, .need = CIA402_IF_TOLD, .when = CIA402_IF_STANDARD_HOMING,
+    {.index = 0x60E3, .bytes = 1, .deed = CIA402_LISTED, .need = CIA402_IF_ANSWERED, .when = CIA402_IF_STANDARD_HOMING,
      .source = CIA402_HOMING_METHOD, .trouble = CIA402_NO_SUCH_HOMING},
 
     LIFE(CIA402_IF_HEARTBEAT, 0x1017, 0, 2, CIA402_HEARTBEAT),

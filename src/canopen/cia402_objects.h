@@ -25,10 +25,10 @@ typedef enum {
 
 /** What follows from a refusal. */
 typedef enum {
-    CIA402_MUST,     /**< the drive cannot be used */
-    CIA402_IF_THERE, /**< nothing */
-    CIA402_IF_TOLD,  /**< nothing where it is missing; else the drive cannot be used */
-    CIA402_GUARD     /**< the drive would not stop by itself: refused unless the configuration allows that */
+    CIA402_MUST,        /**< the drive cannot be used */
+    CIA402_IF_THERE,    /**< nothing */
+    CIA402_IF_ANSWERED, /**< nothing where it is missing; else the drive cannot be used */
+    CIA402_GUARD        /**< the drive would not stop by itself: refused unless the configuration allows that */
 } cia402_need_t;
 
 /** Which configurations a row is for. */

@@ -78,7 +78,7 @@ static int32_t signed_of(uint32_t bits, uint8_t bytes)
 }
 
 /* In the direction of the extension, whichever way the drive counts. */
-static void take_telemetry(const cia402_drive_t *drive, uint32_t entry, uint32_t bits)
+static void apply_telemetry(const cia402_drive_t *drive, uint32_t entry, uint32_t bits)
 {
     drive_telemetry_t *out = &drive->axis->telemetry;
     const counts_scale_t *scale = &drive->own->scale;
@@ -88,28 +88,28 @@ static void take_telemetry(const cia402_drive_t *drive, uint32_t entry, uint32_t
     switch (entry) {
     case CIA402_ENTRY_TORQUE:
         out->torque_permille = scale->num < 0 ? -value : value;
-        out->has |= DRIVE_TELLS_TORQUE;
+        out->has |= DRIVE_HAS_TORQUE;
         break;
     case CIA402_ENTRY_LAG:
         if (counts_to_units(&ratio, value, &out->lag_q32) == HV_OK) {
-            out->has |= DRIVE_TELLS_LAG;
+            out->has |= DRIVE_HAS_LAG;
         }
         break;
     default: /* CIA402_ENTRY_INPUTS */
         out->inputs = bits;
-        out->has |= DRIVE_TELLS_INPUTS;
+        out->has |= DRIVE_HAS_INPUTS;
         break;
     }
 }
 
-static void take_value(const cia402_drive_t *drive, uint32_t entry, uint32_t bits)
+static void apply_value(const cia402_drive_t *drive, uint32_t entry, uint32_t bits)
 {
     switch (entry) {
     case CIA402_ENTRY_STATUSWORD:
         drive->axis->statusword = (uint16_t)bits;
         break;
     case CIA402_ENTRY_ACTUAL:
-        cia402_axis_take_position(*drive, bits);
+        cia402_axis_receive_position(*drive, bits);
         break;
     case CIA402_ENTRY_MODE_SHOWN:
         drive->axis->mode_shown = (int8_t)signed_of(bits, 1);
@@ -118,7 +118,7 @@ static void take_value(const cia402_drive_t *drive, uint32_t entry, uint32_t bit
     case CIA402_ENTRY_LAG:
     case CIA402_ENTRY_INPUTS:
         if (drive->axis->phase == CIA402_UP) {
-            take_telemetry(drive, entry, bits);
+            apply_telemetry(drive, entry, bits);
         }
         break;
     default: /* what a fixed map has beside */
@@ -135,26 +135,26 @@ static uint64_t data_of(const can_frame_t *frame)
     return data;
 }
 
-static void take_entries(cia402_t *self, unsigned axis, const cia402_pdo_t *pdo, const can_frame_t *frame)
+static void apply_entries(cia402_t *self, unsigned axis, const cia402_pdo_t *pdo, const can_frame_t *frame)
 {
     cia402_drive_t drive = cia402_drive(self, axis);
     const uint64_t data = data_of(frame);
     unsigned at = 0;
     for (unsigned i = 0; i < pdo->entries && at < 8u * CIA402_PDO_BYTES; i++) {
         const unsigned k = axis_of(self->config, axis, pdo->entry[i]);
-        if (k < self->config->axes && cia402_axis_is_told(&self->axis[k])) {
+        if (k < self->config->axes && cia402_axis_is_commanded(&self->axis[k])) {
             if (k != axis) {
                 axis = k;
                 drive = cia402_drive(self, k);
             }
-            take_value(&drive, cia402_map_plain(pdo->entry[i]), (uint32_t)(data >> at) & mask_of(pdo->entry[i]));
+            apply_value(&drive, cia402_map_plain(pdo->entry[i]), (uint32_t)(data >> at) & mask_of(pdo->entry[i]));
         }
         at += CIA402_BITS_OF(pdo->entry[i]);
     }
 }
 
 /* Of an axis, or of all of its node. */
-static void take_answer(cia402_t *self, unsigned axis, unsigned n, const cia402_pdo_t *pdo, const can_frame_t *frame)
+static void receive_answer(cia402_t *self, unsigned axis, unsigned n, const cia402_pdo_t *pdo, const can_frame_t *frame)
 {
     const uint8_t all = (uint8_t)((1u << cia402_map_count(&self->config->answers)) - 1u);
     const bool is_of_node = cia402_map_is_shared(&self->config->answers);
@@ -164,24 +164,24 @@ static void take_answer(cia402_t *self, unsigned axis, unsigned n, const cia402_
             cia402_axis_note_answer(cia402_drive(self, k), n, all);
         }
     }
-    take_entries(self, axis, pdo, frame);
+    apply_entries(self, axis, pdo, frame);
 }
 
-static void take_pdo(cia402_t *self, unsigned axis, unsigned which, const can_frame_t *frame)
+static void receive_pdo(cia402_t *self, unsigned axis, unsigned which, const can_frame_t *frame)
 {
     const cia402_pdo_t *pdo = &self->pdo[axis][which];
     if (pdo->bytes != frame->length) {
         return;
     }
     if (which < CIA402_TELEMETRY) {
-        take_answer(self, axis, which - CIA402_ANSWER, pdo, frame);
+        receive_answer(self, axis, which - CIA402_ANSWER, pdo, frame);
     } else if (self->axis[axis].phase == CIA402_UP) {
-        take_entries(self, axis, pdo, frame);
+        apply_entries(self, axis, pdo, frame);
     }
 }
 
 /* An identifier is of one PDO; those that are not in use have none. */
-void cia402_pdo_take(cia402_t *self, const can_frame_t *frame)
+void cia402_pdo_receive(cia402_t *self, const can_frame_t *frame)
 {
     for (unsigned k = 0; k < self->config->axes; k++) {
         if (self->config->axis[k].node != (frame->id & CIA402_NODE_MAX)) {
@@ -189,7 +189,7 @@ void cia402_pdo_take(cia402_t *self, const can_frame_t *frame)
         }
         for (unsigned which = CIA402_ANSWER; which < CIA402_PDOS; which++) {
             if (self->pdo[k][which].id == frame->id) {
-                take_pdo(self, k, which, frame);
+                receive_pdo(self, k, which, frame);
                 return;
             }
         }

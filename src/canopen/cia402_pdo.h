@@ -14,6 +14,6 @@ void cia402_pdo_init(cia402_t *self);
 bool cia402_pdo_command(const cia402_t *self, unsigned axis, unsigned which, can_frame_t *out);
 
 /** A TPDO was received: reads what is in it. Another length than is mapped counts for nothing. */
-void cia402_pdo_take(cia402_t *self, const can_frame_t *frame);
+void cia402_pdo_receive(cia402_t *self, const can_frame_t *frame);
 
 #endif

@@ -101,7 +101,7 @@ static void repeat_later(const visit_t *self, uint32_t pause_us)
 
 static bool may_be_missing(const cia402_object_t *row)
 {
-    return row->need == CIA402_IF_THERE || row->need == CIA402_IF_TOLD;
+    return row->need == CIA402_IF_THERE || row->need == CIA402_IF_ANSWERED;
 }
 
 static uint32_t object_of(const cia402_object_t *row)
@@ -115,7 +115,7 @@ uint32_t cia402_setup_object(const cia402_axis_t *self, const cia402_config_t *c
     return object_of(&row);
 }
 
-static cia402_setup_result_t refuse(const visit_t *self, uint32_t code)
+static cia402_setup_result_t reject(const visit_t *self, uint32_t code)
 {
     cia402_axis_t *axis = self->axis;
     axis->setup.job = CIA402_JOB_NONE;
@@ -131,7 +131,7 @@ static cia402_setup_result_t give_up(const visit_t *self, uint32_t code)
 {
     const cia402_object_t *row = &self->row;
     if (row->need == CIA402_MUST || (row->need == CIA402_GUARD && !self->config->is_unguarded_allowed)) {
-        return refuse(self, code);
+        return reject(self, code);
     }
     if (row->need == CIA402_GUARD) {
         self->axis->warned_object = row->index != 0 ? object_of(row) : 0x101700u;
@@ -169,7 +169,7 @@ static bool is_worth_another_try(const cia402_axis_t *self)
     return (code == ABORT_STATE || code == ABORT_ACCESS || code == ABORT_LOCAL) && self->setup.tries < STATE_TRIES;
 }
 
-static cia402_setup_result_t take_abort(const visit_t *self)
+static cia402_setup_result_t judge_abort(const visit_t *self)
 {
     cia402_axis_t *axis = self->axis;
     if (!may_be_missing(&self->row) && is_worth_another_try(axis)) {
@@ -229,7 +229,7 @@ static cia402_setup_result_t compare(const visit_t *self)
     }
     /* a write that was refused before says why; its object may have been another entry of the same record */
     const uint32_t refusal = axis->setup.refused == row->index ? axis->setup.refusal : 0;
-    const cia402_setup_result_t result = row->need == CIA402_IF_TOLD ? refuse(self, refusal) : give_up(self, refusal);
+    const cia402_setup_result_t result = row->need == CIA402_IF_ANSWERED ? reject(self, refusal) : give_up(self, refusal);
     if (result == CIA402_SETUP_REFUSED) {
         note_found(axis, found, wanted);
         axis->trouble = is_late(self, found) ? (uint32_t)CIA402_GUARDED_LATE : axis->trouble;
@@ -253,13 +253,13 @@ static cia402_setup_result_t seek(const visit_t *self)
         setup->is_asked = false;
         return CIA402_SETUP_BUSY;
     }
-    const cia402_setup_result_t result = refuse(self, 0);
+    const cia402_setup_result_t result = reject(self, 0);
     self->axis->trouble_object += setup->entry;
     note_found(self->axis, found, wanted);
     return result;
 }
 
-static cia402_setup_result_t take_answer(const visit_t *self)
+static cia402_setup_result_t judge_answer(const visit_t *self)
 {
     const step_t step = step_of(self);
     if (step == STEP_COMPARE || step == STEP_POLL) {
@@ -294,7 +294,7 @@ static cia402_setup_result_t listen(const visit_t *self)
 }
 
 /* What may be missing may be so without a word: some drives drop questions for objects that they do not have. */
-static cia402_setup_result_t take_silence(const visit_t *self)
+static cia402_setup_result_t judge_silence(const visit_t *self)
 {
     if (may_be_missing(&self->row)) {
         return give_up(self, 0);
@@ -314,12 +314,12 @@ static cia402_setup_result_t go_on(const visit_t *self)
         return CIA402_SETUP_BUSY;
     }
     if (sdo->state == SDO_DONE) {
-        return take_answer(self);
+        return judge_answer(self);
     }
     if (sdo->state == SDO_ABORTED) {
-        return take_abort(self);
+        return judge_abort(self);
     }
-    return sdo->state == SDO_SILENT ? take_silence(self) : CIA402_SETUP_BUSY;
+    return sdo->state == SDO_SILENT ? judge_silence(self) : CIA402_SETUP_BUSY;
 }
 
 /* Passes over rows that mean nothing here.

@@ -189,7 +189,7 @@ void cia402_start_starting(cia402_drive_t drive)
     const uint64_t limit_us = OPERATIONAL_US + 3000u * (uint64_t)drive.config->heartbeat_ms +
                               (cia402_answer_every(drive.config) - 1u) * (uint64_t)drive.config->period_us;
     if (self->surplus >= CIA402_SURPLUS_MAX) {
-        cia402_axis_refuse(drive, CIA402_TWICE);
+        cia402_axis_reject(drive, CIA402_TWICE);
         return;
     }
     if (cia402_node_is_short(drive)) {
@@ -210,7 +210,7 @@ void cia402_start_starting(cia402_drive_t drive)
     }
     self->starts++;
     if (self->starts >= RESTARTS_MAX) {
-        cia402_axis_refuse(drive, CIA402_NO_START);
+        cia402_axis_reject(drive, CIA402_NO_START);
     } else { /* once more from the beginning */
         self->is_reset_done = false;
         cia402_axis_look_for(drive);

@@ -4,7 +4,7 @@
 #include "cia402_watch.h"
 
 #define ANSWERS_MIN 2u
-#define TOLD_US     5000000u /* a limit that is met now and then is told of once, not at every peak */
+#define NOTE_US     5000000u /* a limit that is met now and then is told of once, not at every peak */
 
 static bool is_enabled(const cia402_axis_t *axis)
 {
@@ -97,7 +97,7 @@ void cia402_watch_step(cia402_drive_t drive)
         if (*answers >= ANSWERS_MIN && drive.config->reaction[i] != CIA402_IGNORE) {
             self->notes |= 1u << i;
             self->note_us[i] = drive.now_us;
-        } else if (drive.now_us - self->note_us[i] >= TOLD_US) {
+        } else if (drive.now_us - self->note_us[i] >= NOTE_US) {
             self->notes &= ~(1u << i);
         }
     }

@@ -156,7 +156,7 @@ static void fail(sdo_t *self, uint32_t code)
 }
 
 /* The server sent what makes no sense: it is told so. */
-static void refuse(sdo_t *self, uint32_t code)
+static void reject(sdo_t *self, uint32_t code)
 {
     fail(self, code);
     compose_abort(self, code);
@@ -167,7 +167,7 @@ static bool is_about_object(const sdo_t *self, const uint8_t *data)
     return data[1] == (uint8_t)self->index && data[2] == (uint8_t)(self->index >> 8) && data[3] == self->sub;
 }
 
-static void take_expedited(sdo_t *self, const uint8_t *data)
+static void receive_expedited(sdo_t *self, const uint8_t *data)
 {
     const bool has_size = (data[0] & 1u) != 0;
     self->size = (uint8_t)(has_size ? EXPEDITED_MAX - (data[0] >> 2 & 3u) : EXPEDITED_MAX);
@@ -177,22 +177,22 @@ static void take_expedited(sdo_t *self, const uint8_t *data)
     self->state = SDO_DONE;
 }
 
-static void take_read_initiate(sdo_t *self, const uint8_t *data)
+static void receive_read_initiate(sdo_t *self, const uint8_t *data)
 {
     if ((data[0] & SPECIFIER) != ANSWER_READ) {
         return;
     }
     if ((data[0] & 2u) != 0) {
-        take_expedited(self, data);
+        receive_expedited(self, data);
     } else if ((data[0] & 1u) != 0 && u32_of(&data[4]) > SDO_BYTES_MAX) {
-        refuse(self, ABORT_TOO_LONG);
+        reject(self, ABORT_TOO_LONG);
     } else {
         self->await = SDO_AWAIT_SEGMENT;
         compose_read_segment(self);
     }
 }
 
-static void take_write_initiate(sdo_t *self, const uint8_t *data)
+static void receive_write_initiate(sdo_t *self, const uint8_t *data)
 {
     if ((data[0] & SPECIFIER) != ANSWER_WRITE) {
         return;
@@ -205,12 +205,12 @@ static void take_write_initiate(sdo_t *self, const uint8_t *data)
     }
 }
 
-static void take_read_segment(sdo_t *self, const uint8_t *data)
+static void receive_read_segment(sdo_t *self, const uint8_t *data)
 {
     const unsigned bytes = SEGMENT_MAX - (data[0] >> 1 & 7u);
     //@ split bytes;
     if (self->at + bytes > SDO_BYTES_MAX) {
-        refuse(self, ABORT_TOO_LONG);
+        reject(self, ABORT_TOO_LONG);
         return;
     }
     for (unsigned i = 0; i < bytes; i++) {
@@ -226,7 +226,7 @@ static void take_read_segment(sdo_t *self, const uint8_t *data)
     }
 }
 
-static void take_write_segment(sdo_t *self)
+static void receive_write_segment(sdo_t *self)
 {
     self->is_toggled = !self->is_toggled;
     if (self->at == self->size) {
@@ -236,21 +236,21 @@ static void take_write_segment(sdo_t *self)
     }
 }
 
-static void take_segment(sdo_t *self, const uint8_t *data)
+static void receive_segment(sdo_t *self, const uint8_t *data)
 {
     const unsigned expected = self->is_read ? ANSWER_READ_SEGMENT : ANSWER_WRITE_SEGMENT;
     if ((data[0] & SPECIFIER) != expected || (data[0] & TOGGLE) != toggle_bit(self)) {
         return; /* late, or repeated */
     }
     if (self->is_read) {
-        take_read_segment(self, data);
+        receive_read_segment(self, data);
     } else {
-        take_write_segment(self);
+        receive_write_segment(self);
     }
 }
 
 /* In segments an abort may name any object. */
-static void take_abort(sdo_t *self, const uint8_t *data)
+static void receive_abort(sdo_t *self, const uint8_t *data)
 {
     if (self->await == SDO_AWAIT_SEGMENT || is_about_object(self, data)) {
         fail(self, u32_of(&data[4]));
@@ -264,20 +264,20 @@ void sdo_receive(sdo_t *self, const can_frame_t *frame)
         return;
     }
     if (data[0] == COMMAND_ABORT) {
-        take_abort(self, data);
+        receive_abort(self, data);
     } else if (self->await == SDO_AWAIT_SEGMENT) {
-        take_segment(self, data);
+        receive_segment(self, data);
     } else if (is_about_object(self, data) && self->is_read) {
-        take_read_initiate(self, data);
+        receive_read_initiate(self, data);
     } else if (is_about_object(self, data)) {
-        take_write_initiate(self, data);
+        receive_write_initiate(self, data);
     }
 }
 
 /* --- Time --- */
 
 /* No answer: the server is told, left alone for a while, and asked again. */
-static void take_timeout(sdo_t *self)
+static void retry_or_abort(sdo_t *self)
 {
     if (self->await != SDO_AWAIT_QUIET) {
         self->await = SDO_AWAIT_QUIET;
@@ -293,7 +293,7 @@ static void take_timeout(sdo_t *self)
 bool sdo_step(sdo_t *self, uint64_t now_us, can_frame_t *out)
 {
     if (self->state == SDO_BUSY && !self->has_request && now_us >= self->deadline_us) {
-        take_timeout(self);
+        retry_or_abort(self);
     }
     if (!self->has_request) {
         return false;

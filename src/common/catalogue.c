@@ -61,7 +61,7 @@ static bool is_sorted(const catalogue_t *self)
     return true;
 }
 
-static bool take(catalogue_t *self)
+static bool parse(catalogue_t *self)
 {
     if (self->size < HEADER_BYTES || number_at(self, 0) != MAGIC || number_at(self, 4) >> 16 != 0) {
         return false;
@@ -86,7 +86,7 @@ bool catalogue_open(catalogue_t *self, const char *path)
         self->size = bytes != MAP_FAILED ? (size_t)about.st_size : 0;
     }
     (void)close(fd);
-    if (self->bytes != NULL && !take(self)) {
+    if (self->bytes != NULL && !parse(self)) {
         catalogue_close(self);
     }
     return self->bytes != NULL;

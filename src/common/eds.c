@@ -189,7 +189,7 @@ static void enter(reader_t *self, char *text)
 
 /* --- Keys --- */
 
-static void take_access(reader_t *self, const char *value)
+static void parse_access(reader_t *self, const char *value)
 {
     const bool is_write_only = strcasecmp(value, "wo") == 0;
     const bool is_both = strncasecmp(value, "rw", 2) == 0;
@@ -211,12 +211,12 @@ static bool is_name_of_place(const char *name)
     return false;
 }
 
-static void take_of_object(reader_t *self, const char *key, const char *value)
+static void parse_of_object(reader_t *self, const char *key, const char *value)
 {
     eds_object_t *object = self->object;
     const eds_number_t found = number(value);
     if (strcasecmp(key, "AccessType") == 0) {
-        take_access(self, value);
+        parse_access(self, value);
     } else if (strcasecmp(key, "DataType") == 0) {
         object->type = (uint16_t)found.value;
         object->is_parent = false;
@@ -246,7 +246,7 @@ static void take_of_object(reader_t *self, const char *key, const char *value)
 }
 
 /* A value of an array that is written in short, as an object with the attributes of the array. */
-static void take_of_array(reader_t *self, const char *key, const char *value)
+static void parse_of_array(reader_t *self, const char *key, const char *value)
 {
     const eds_number_t sub = number(key);
     const eds_t *eds = self->eds;
@@ -273,7 +273,7 @@ static void take_of_array(reader_t *self, const char *key, const char *value)
     self->object = NULL;
 }
 
-static void take_of_device(reader_t *self, const char *key, const char *value)
+static void parse_of_device(reader_t *self, const char *key, const char *value)
 {
     const eds_number_t found = number(value);
     char name[NAME_BYTES];
@@ -291,7 +291,7 @@ static void take_of_device(reader_t *self, const char *key, const char *value)
     }
 }
 
-static void take_line(reader_t *self, char *text)
+static void parse_line(reader_t *self, char *text)
 {
     text = trimmed(text);
     if (text[0] == '\0' || text[0] == ';') {
@@ -317,13 +317,13 @@ static void take_line(reader_t *self, char *text)
         return;
     }
     if (self->object != NULL) {
-        take_of_object(self, key, value);
+        parse_of_object(self, key, value);
     } else if (self->is_device) {
-        take_of_device(self, key, value);
+        parse_of_device(self, key, value);
     } else if (self->is_drive && strcasecmp(key, "NodeID") == 0) {
         self->eds->node = number(value);
     } else if (self->has_values) {
-        take_of_array(self, key, value);
+        parse_of_array(self, key, value);
     } else if (strcasecmp(key, "ParameterValue") == 0 || strcasecmp(key, "DownloadFile") == 0) {
         note_stray(self);
     }
@@ -341,7 +341,7 @@ bool eds_read(eds_t *self, FILE *in, const char *name, FILE *errors)
         } else if (strchr(text, '\n') == NULL && !feof(in)) {
             complain(&reader, _("the line is too long"), text);
         } else {
-            take_line(&reader, text + mark);
+            parse_line(&reader, text + mark);
         }
     }
     if (!reader.is_bad && ferror(in)) {

@@ -179,7 +179,7 @@ static bool fill_format(const char *english, char *out, size_t size, unsigned de
 
 /* A part beside a mark: in its translation, or as it is; a single word in front of it is a name. Returns whether it was
  * translated. */
-static bool take_part(const char *at, size_t length, char *out, size_t size, unsigned depth)
+static bool translate_part(const char *at, size_t length, char *out, size_t size, unsigned depth)
 {
     char part[SENTENCE_MAX];
     (void)snprintf(part, sizeof part, "%.*s", (int)length, at);
@@ -212,7 +212,7 @@ static bool fill_parts(const char *english, char *out, size_t size, unsigned dep
     }
     const char *mark = joined != NULL ? "" : at == colon ? _(": ") : at == semicolon ? _("; ") : _(", ");
     const char *rest = joined != NULL ? at : at + 2;
-    const bool is_before_known = take_part(english, (size_t)(at - english), before, sizeof before, depth);
+    const bool is_before_known = translate_part(english, (size_t)(at - english), before, sizeof before, depth);
     const bool is_known = translated(rest, behind, sizeof behind, depth + 1u);
     (void)snprintf(out, size, "%s%s%s", before, mark, is_known ? behind : rest);
     return is_known || is_before_known;

@@ -40,7 +40,7 @@ static void expand(const uint8_t block[BLOCK_BYTES], uint32_t word[64])
     }
 }
 
-static void take_block(sha256_t *self)
+static void add_block(sha256_t *self)
 {
     uint32_t word[64], v[8];
     expand(self->block, word);
@@ -71,7 +71,7 @@ void sha256_add(sha256_t *self, const void *bytes, size_t length)
     for (size_t i = 0; i < length; i++) {
         self->block[self->length++ % BLOCK_BYTES] = from[i];
         if (self->length % BLOCK_BYTES == 0) {
-            take_block(self);
+            add_block(self);
         }
     }
 }

@@ -65,7 +65,7 @@ static bool open_language(const char *language, size_t length)
 /* A locale's name without codeset and modifier, then its language alone. There is one written Chinese, which is better than none
  * for those who read another.
  * Returns true: it is settled; English needs no catalogue. */
-static bool take_locale(const char *name, size_t length)
+static bool open_locale(const char *name, size_t length)
 {
     const size_t territory = strcspn(name, ".@:");
     const size_t language = strcspn(name, "_.@:");
@@ -88,12 +88,12 @@ void translate_begin(void)
     }
     while (wishes != NULL && wishes[0] != '\0') {
         const size_t length = strcspn(wishes, ":");
-        if (length > 0 && take_locale(wishes, length)) {
+        if (length > 0 && open_locale(wishes, length)) {
             return;
         }
         wishes += length + (wishes[length] == ':' ? 1u : 0u);
     }
-    (void)take_locale(locale, strlen(locale));
+    (void)open_locale(locale, strlen(locale));
 }
 
 bool translate_begin_in(const char *language)

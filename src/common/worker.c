@@ -78,7 +78,7 @@ bool worker_start(worker_t *self, worker_step_t *step, void *ctx, unsigned pause
     return self->is_running;
 }
 
-void worker_tell_end(worker_t *self)
+void worker_request_end(worker_t *self)
 {
     if (self->is_running) {
         set(self, &self->is_quit);
@@ -91,7 +91,7 @@ bool worker_close(worker_t *self, unsigned most_ms)
         return true;
     }
     if (self->is_running) {
-        worker_tell_end(self);
+        worker_request_end(self);
         (void)pthread_mutex_lock(&self->mutex);
         const bool is_ended = await(self, &self->is_ended, most_ms);
         (void)pthread_mutex_unlock(&self->mutex);

@@ -31,7 +31,7 @@ typedef struct {
 bool worker_start(worker_t *self, worker_step_t *step, void *ctx, unsigned pause_ms);
 
 /** Tells it to do its last step; waits for nothing. Harmless on none. */
-void worker_tell_end(worker_t *self);
+void worker_request_end(worker_t *self);
 
 /** Tells it to do its last step, and waits for the end of that. One that could not be started does it here. Harmless on none.
  *  @return false: it still runs, as a disk does not answer, and all that it uses has to stay */

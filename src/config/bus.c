@@ -3,8 +3,8 @@
  */
 #include "config/bus.h"
 
-#include "config/canraw.h"
-#include "config/cia402.h"
+#include "config/canraw_section.h"
+#include "config/cia402_section.h"
 
 #define SDO_EVERY_US 20000u /* service requests while drives move: next to none */
 
@@ -164,7 +164,7 @@ static void check_load(config_source_t *self, const config_bus_t *bus, uint32_t 
 }
 
 /* Of the periods beside it only those that the bus can carry. */
-static void refuse_period(config_source_t *self, const config_bus_t *bus, uint32_t cycle_us)
+static void reject_period(config_source_t *self, const config_bus_t *bus, uint32_t cycle_us)
 {
     const uint32_t below_us = bus->period_us < cycle_us ? cycle_us : bus->period_us - bus->period_us % cycle_us;
     const uint32_t least_us = config_bus_fitting_us(bus, CONFIG_BUS_REFUSED_PPM, cycle_us);
@@ -190,7 +190,7 @@ void config_bus_check(config_source_t *self)
         return;
     }
     if (bus.period_us % cycle_us != 0) {
-        refuse_period(self, &bus, cycle_us);
+        reject_period(self, &bus, cycle_us);
         return;
     }
     check_load(self, &bus, cycle_us);

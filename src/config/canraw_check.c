@@ -2,7 +2,7 @@
  * canraw_check.c - what the keys of [can-raw] mean together: frames that lack their field, numbers that do not fit their
  * field at full stroke, identifiers used twice. Each error is reported at the key it concerns.
  */
-#include "config/canraw.h"
+#include "config/canraw_section.h"
 
 #include "common/translate.h"
 #include "config/drives_check.h"

@@ -9,14 +9,14 @@
 #include <string.h>
 
 #include "config/bus.h"
-#include "config/canraw.h"
-#include "config/cia402.h"
+#include "config/canraw_section.h"
+#include "config/cia402_section.h"
 #include "config/coils.h"
 #include "config/gpio.h"
-#include "config/healthy.h"
+#include "config/healthy_section.h"
 #include "config/limits.h"
 #include "config/mechanism.h"
-#include "config/modbus.h"
+#include "config/modbus_section.h"
 #include "config/scaling.h"
 #include "config/sizes.h"
 #include "config/source.h"

@@ -2,10 +2,10 @@
  * cia402_check.c - what the keys of [cia402] mean together: nodes, counts at full stroke, periods, times. Each error is
  * reported at the key it concerns.
  */
-#include "config/canraw.h" // config_canraw_axes
+#include "config/canraw_section.h" // config_canraw_axes
 
 #include "common/translate.h"
-#include "config/cia402.h"
+#include "config/cia402_section.h"
 #include "config/startup_read.h"
 #include "config/value.h"
 

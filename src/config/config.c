@@ -29,7 +29,7 @@
 
 /* Reads one line without its end into text.
  * Returns false at the end of the file; *length is the line's whole length, also where text could not hold it. */
-static bool take_line(config_source_t *self, char *text, size_t capacity, size_t *length)
+static bool copy_line(config_source_t *self, char *text, size_t capacity, size_t *length)
 {
     *length = 0;
     if (self->at == self->end) {
@@ -83,7 +83,7 @@ static size_t find_control(const char *text, size_t length)
 }
 
 /* "did you mean [...]", or all sections there are. */
-static void refuse_section(config_source_t *self, const char *name)
+static void reject_section(config_source_t *self, const char *name)
 {
     const char *near = config_section_suggest(name);
     config_text_t text;
@@ -110,7 +110,7 @@ static void enter_section(config_source_t *self, char *line)
     const char *name = line + 1;
     const int section = config_section_find(name);
     if (section < 0) {
-        refuse_section(self, name);
+        reject_section(self, name);
         return;
     }
     if (self->section_line[section] != 0) {
@@ -178,7 +178,7 @@ static char *read_line(char *text, int size, void *stream)
     config_source_t *self = stream;
     const size_t longest = (size_t)size - 3u; /* inih: room for CR, LF, NUL */
     size_t length = 0;
-    if (self->is_given_up || !take_line(self, text, (size_t)size, &length) || is_utf16(self, text, length)) {
+    if (self->is_given_up || !copy_line(self, text, (size_t)size, &length) || is_utf16(self, text, length)) {
         return NULL;
     }
     if (length > 0 && length < (size_t)size && text[length - 1u] == '\r') {
@@ -224,7 +224,7 @@ static void suggest_key(const char *section, const char *name, config_text_t *te
     }
 }
 
-static void refuse_key(config_source_t *self, const char *section, const char *name)
+static void reject_key(config_source_t *self, const char *section, const char *name)
 {
     config_text_t text;
     config_text_clear(&text);
@@ -235,7 +235,7 @@ static void refuse_key(config_source_t *self, const char *section, const char *n
     config_source_error(self, self->line, "%s", text.data);
 }
 
-static void take_value(config_source_t *self, const config_key_t *key, config_entry_t *entry, const char *value)
+static void parse_value(config_source_t *self, const config_key_t *key, config_entry_t *entry, const char *value)
 {
     config_text_t why;
     config_text_clear(&why);
@@ -247,7 +247,7 @@ static void take_value(config_source_t *self, const config_key_t *key, config_en
 }
 
 /* inih's handler: one key and its value. The reader keeps track of the section. */
-static int take_pair(void *user, const char *section, const char *name, const char *value)
+static int parse_pair(void *user, const char *section, const char *name, const char *value)
 {
     config_source_t *self = user;
     (void)section;
@@ -259,17 +259,17 @@ static int take_pair(void *user, const char *section, const char *name, const ch
     }
     const char *in = config_sections[self->section].name;
     if (config_startup_of(&config_sections[self->section], self->config) != NULL) {
-        config_startup_take(self, name, value);
+        config_startup_parse(self, name, value);
         return CONTINUE;
     }
     const int key = config_key_find(in, name);
     if (key < 0) {
-        refuse_key(self, in, name);
+        reject_key(self, in, name);
     } else if (self->entry[key].line != 0) {
         config_source_error(self, self->line, "[%s] %s: given again; allowed: once, and it is at line %u", in, name,
                             self->entry[key].line);
     } else {
-        take_value(self, &config_keys[key], &self->entry[key], value);
+        parse_value(self, &config_keys[key], &self->entry[key], value);
     }
     return CONTINUE;
 }
@@ -293,7 +293,7 @@ static void set_defaults(config_source_t *self)
 
 static void read_file(config_source_t *self)
 {
-    const int bad_line = ini_parse_stream(read_line, self, take_pair, self);
+    const int bad_line = ini_parse_stream(read_line, self, parse_pair, self);
     if (bad_line != 0 && self->error_count == 0) {
         config_source_error(self, bad_line > 0 ? (unsigned)bad_line : 0u, _("not understood; allowed: key = value"));
     }

@@ -104,7 +104,7 @@ typedef struct {
 } config_can_t;
 
 /** What follows from something that is watched: as cia402.h and canraw.h have it. */
-typedef enum { CONFIG_REACTION_IGNORE, CONFIG_REACTION_TELL, CONFIG_REACTION_STOP } config_reaction_t;
+typedef enum { CONFIG_REACTION_IGNORE, CONFIG_REACTION_REPORT, CONFIG_REACTION_STOP } config_reaction_t;
 
 /** Drives with CAN frames of their own. canraw.h describes the frames. */
 typedef struct {
@@ -217,7 +217,7 @@ typedef enum { CONFIG_MODE_CSP, CONFIG_MODE_IP, CONFIG_MODE_PP } config_mode_t;
 /** What CANopen drives do when the gateway falls silent: 6007h less 1. */
 typedef enum { CONFIG_LOST_FAULT, CONFIG_LOST_DISABLE_VOLTAGE, CONFIG_LOST_QUICK_STOP } config_lost_t;
 
-#define CONFIG_REACTIONS 7u /* to what is watched in what CANopen drives say: in the order of cia402.h */
+#define CONFIG_REACTIONS 7u /* to what is watched in what CANopen drives say: in the order of cia402_section.h */
 
 /** How CANopen drives and the gateway watch each other. */
 typedef enum { CONFIG_CONTROL_HEARTBEAT, CONFIG_CONTROL_GUARDING } config_error_control_t;
@@ -241,7 +241,7 @@ typedef struct {
     cia402_item_t item[CONFIG_STARTUP_MAX];
 } config_startup_t;
 
-/** CANopen drives; what it means is in cia402.h. */
+/** CANopen drives; what it means is in cia402_section.h. */
 typedef struct {
     config_ids_t nodes;
     uint8_t gateway_node;
@@ -276,10 +276,10 @@ typedef struct {
     bool is_reset_wanted;
     bool is_support_checked;
     uint8_t answer_every;
-    bool is_torque_told;
-    bool is_lag_told;
-    bool are_inputs_told;
-    uint8_t tell_every;
+    bool has_torque_report;
+    bool has_lag;
+    bool has_inputs;
+    uint8_t telemetry_every;
     bool is_no_watchdog_allowed;
     q16_t software_limit_mm_q16;
     uint32_t vendor_id;

@@ -166,7 +166,7 @@ static bool find_stencil(const envelope_t *self, const pose_t *pose, unsigned ax
 }
 
 /* Takes a pose into the worst of one axis; adds what each cylinder does at the axis' speed limit. */
-static void take_axis(const envelope_t *self, const pose_t *pose, unsigned axis, envelope_rate_t *worst, double speed_mm_s[])
+static void add_axis(const envelope_t *self, const pose_t *pose, unsigned axis, envelope_rate_t *worst, double speed_mm_s[])
 {
     const double speed = from_q16(self->settings->axis[axis].speed_q16), h = STENCIL_STEP;
     double mm[STENCIL_POINTS][CYLINDERS_MAX];
@@ -189,12 +189,12 @@ static void take_axis(const envelope_t *self, const pose_t *pose, unsigned axis,
     }
 }
 
-static void take_pose(const envelope_t *self, const pose_t *pose, envelope_box_t *box)
+static void add_pose(const envelope_t *self, const pose_t *pose, envelope_box_t *box)
 {
     double speed_mm_s[CYLINDERS_MAX] = {0};
     for (unsigned axis = 0; axis < POSE_AXES; axis++) {
         if (self->has_axis[axis]) {
-            take_axis(self, pose, axis, &box->rate[axis], speed_mm_s);
+            add_axis(self, pose, axis, &box->rate[axis], speed_mm_s);
         }
     }
     for (unsigned i = 0; i < self->cylinders; i++) {
@@ -250,7 +250,7 @@ static bool climb_along(const envelope_t *self, envelope_box_t *box, unsigned wh
     const double neutral = from_q32(self->neutral.axis_q32[axis]);
     way[axis] = fmin(fmax(way[axis] + step, box->low[axis] - neutral), box->high[axis] - neutral);
     const pose_t pose = pull_in(self, way);
-    take_pose(self, &pose, box);
+    add_pose(self, &pose, box);
     return worst_value(box, what) > before;
 }
 
@@ -293,7 +293,7 @@ static void find_box(const envelope_t *self, envelope_box_t *box)
             }
         }
         const pose_t pose = pull_in(self, way);
-        take_pose(self, &pose, box);
+        add_pose(self, &pose, box);
     }
     for (unsigned i = 0; i < CLIMBS * WORSTS; i++) { /* one climb may find a better start for another */
         if (i % WORSTS >= POSE_AXES || self->has_axis[i % WORSTS]) {
@@ -303,7 +303,7 @@ static void find_box(const envelope_t *self, envelope_box_t *box)
 }
 
 /* What was found in a part of a box holds for the box. */
-static void take_part(envelope_box_t *box, const envelope_box_t *part)
+static void add_part(envelope_box_t *box, const envelope_box_t *part)
 {
     for (unsigned axis = 0; axis < POSE_AXES; axis++) {
         const envelope_rate_t *rate = &part->rate[axis];
@@ -398,7 +398,7 @@ static void find_axis(envelope_t *self, unsigned axis)
     double ignored[CYLINDERS_MAX] = {0};
     self->low[axis] = find_end(self, axis, -1);
     self->high[axis] = find_end(self, axis, 1);
-    take_axis(self, &self->neutral, axis, &self->at_neutral[axis], ignored);
+    add_axis(self, &self->neutral, axis, &self->at_neutral[axis], ignored);
     self->reach.low[axis] = self->low[axis].value;
     self->reach.high[axis] = self->high[axis].value;
     self->limits.low[axis] = fmax(self->low[axis].value, from_q16(configured->min_q16));
@@ -425,7 +425,7 @@ bool envelope_find(envelope_t *self, const settings_t *settings)
     }
     find_box(self, &self->limits);
     find_box(self, &self->reach);
-    take_part(&self->reach, &self->limits);
+    add_part(&self->reach, &self->limits);
     for (unsigned axis = 0; axis < POSE_AXES; axis++) {
         const double neutral = from_q32(self->neutral.axis_q32[axis]);
         if (self->has_axis[axis]) {

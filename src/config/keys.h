@@ -6,7 +6,7 @@
 #define HEAVE_CONFIG_KEYS_H
 
 #include "config/config.h"
-#include "config/text.h"
+#include "config/config_text.h"
 
 typedef struct config_key config_key_t;
 

@@ -100,10 +100,10 @@ static fit_t fit_of(const layout_t *layout)
 /* Whether undoing a slip explains what is seen, and better than the best so far. */
 static bool is_better(const fit_t *tried, const fit_t *seen, const guess_t *best)
 {
-    const bool is_told_by_spread = seen->spread > SUSPECT_MM && tried->spread * EVIDENCE < seen->spread;
-    const bool is_told_by_length = tried->mean + SHORTER_MM < seen->mean;
+    const bool is_shown_by_spread = seen->spread > SUSPECT_MM && tried->spread * EVIDENCE < seen->spread;
+    const bool is_shown_by_length = tried->mean + SHORTER_MM < seen->mean;
     const bool is_first = best->what.length == 0;
-    return tried->is_within && tried->spread < AGREE_MM && (is_told_by_spread || is_told_by_length) &&
+    return tried->is_within && tried->spread < AGREE_MM && (is_shown_by_spread || is_shown_by_length) &&
            (is_first || tried->mean + AGREE_MM < best->fit.mean);
 }
 

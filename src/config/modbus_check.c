@@ -5,11 +5,11 @@
  */
 #include <string.h>
 
-#include "config/canraw.h"
+#include "config/canraw_section.h"
 
 #include "common/translate.h"
 #include "config/drives_check.h"
-#include "config/modbus.h"
+#include "config/modbus_section.h"
 
 #define SECTION     "modbus"
 #define USED_BY     "drives on Modbus"

@@ -25,7 +25,7 @@ static bool has_changed(const config_key_t *key, const config_t *running, const 
 }
 
 /* Takes over one key that has another value now, or says that it cannot. */
-static void take_change(const config_source_t *self, size_t i, config_t *running)
+static void apply_change(const config_source_t *self, size_t i, config_t *running)
 {
     const config_key_t *key = &config_keys[i];
     pair_t pair;
@@ -70,7 +70,7 @@ int config_reload(const char *name, const char *text, ssize_t length, config_t *
     const config_source_t *const self = load(&(config_text_source_t){.name = name, .text = text, .length = length}, report);
     for (size_t i = 0; self->error_count == 0 && i < config_key_count; i++) {
         if (config_is_applicable(config_keys[i].needs, running)) {
-            take_change(self, i, running);
+            apply_change(self, i, running);
         }
     }
     if (self->error_count == 0) {

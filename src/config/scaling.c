@@ -9,10 +9,10 @@
 #include <inttypes.h>
 #include <string.h>
 
-#include "config/canraw.h"
-#include "config/cia402.h"
+#include "config/canraw_section.h"
+#include "config/cia402_section.h"
 #include "config/drives_check.h"
-#include "config/modbus.h"
+#include "config/modbus_section.h"
 
 #define SECTION          "drives"
 #define COUNTS_OF_STROKE 100 /* a cylinder that knows no more places than that is none */

@@ -93,7 +93,7 @@ static bool is_spread_given(config_source_t *self, const set_t *set, unsigned cy
 }
 
 /* Without a radius the others mean nothing. */
-static void refuse_rest(config_source_t *self, const set_t *set)
+static void reject_rest(config_source_t *self, const set_t *set)
 {
     const bool is_spread = cylinders_of(self) == 6u && set->circle->spread_deg_q16 != CONFIG_NONE;
     if (is_spread || set->circle->turn_deg_q16 != 0) {
@@ -122,7 +122,7 @@ static void resolve_set(config_source_t *self, const set_t *set)
         return;
     }
     if (set->circle->radius_mm_q16 == CONFIG_NONE) {
-        refuse_rest(self, set);
+        reject_rest(self, set);
     } else {
         const bool is_right = is_alone(self, set, cylinders) && is_spread_given(self, set, cylinders);
         mark_joints(self, set, is_right);

@@ -5,7 +5,7 @@
 #define HEAVE_CONFIG_SLIP_H
 
 #include "config/keys.h"
-#include "config/text.h"
+#include "config/config_text.h"
 
 /** Looks at a value that its key does not take.
  *  @param why takes the value and what is odd about it, up to "; allowed: "

@@ -6,7 +6,7 @@
 #define HEAVE_CONFIG_SOURCE_H
 
 #include "config/keys.h"
-#include "config/text.h"
+#include "config/config_text.h"
 
 /** What the file said for one key. */
 typedef struct {

@@ -5,7 +5,7 @@
 #define HEAVE_CONFIG_STARTUP_H
 
 #include "config/keys.h"
-#include "config/text.h"
+#include "config/config_text.h"
 
 /** What a line may be, for the reference. */
 extern const char config_startup_help[];

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "config/cia402.h"
+#include "config/cia402_section.h"
 #include "config/startup.h"
 #include "config/startup_denied.h"
 
@@ -121,7 +121,7 @@ static unsigned split(const char *line, char word[WORDS_MAX + 1u][WORD_BYTES])
     return words;
 }
 
-void config_startup_take(config_source_t *self, const char *before, const char *behind)
+void config_startup_parse(config_source_t *self, const char *before, const char *behind)
 {
     const config_section_t *section = &config_sections[self->section];
     config_startup_t *list = (config_startup_t *)config_startup_of(section, self->config);

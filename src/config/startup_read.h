@@ -7,7 +7,7 @@
 #include "config/source.h"
 
 /** Takes a line of the section that the reader is in, cut in two at its first = or :. */
-void config_startup_take(config_source_t *self, const char *before, const char *behind);
+void config_startup_parse(config_source_t *self, const char *before, const char *behind);
 
 /** Refuses items that heaved sets itself for this configuration. */
 void config_startup_check(config_source_t *self);

@@ -47,7 +47,7 @@ void config_value_allowed(const config_key_t *key, config_text_t *text)
     key->type->allowed(key, text);
 }
 
-bool config_value_refuse(const config_key_t *key, span_t item, const char *what, config_text_t *why)
+bool config_value_reject(const config_key_t *key, span_t item, const char *what, config_text_t *why)
 {
     config_text_add_quoted(why, item.at, item.length);
     config_text_add(why, _(" %s; allowed: "), what);
@@ -55,12 +55,12 @@ bool config_value_refuse(const config_key_t *key, span_t item, const char *what,
     return false;
 }
 
-bool config_value_refuse_text(const config_key_t *key, const char *item, const char *what, config_text_t *why)
+bool config_value_reject_text(const config_key_t *key, const char *item, const char *what, config_text_t *why)
 {
-    return config_value_refuse(key, (span_t){item, strlen(item)}, what, why);
+    return config_value_reject(key, (span_t){item, strlen(item)}, what, why);
 }
 
-bool config_value_refuse_count(const config_key_t *key, unsigned count, config_text_t *why)
+bool config_value_reject_count(const config_key_t *key, unsigned count, config_text_t *why)
 {
     config_text_add(why, translate_count("has %u value; allowed: ", "has %u values; allowed: ", count), count);
     config_value_allowed(key, why);

@@ -24,9 +24,9 @@ void config_value_allowed(const config_key_t *key, config_text_t *text);
 
 /** Says what is wrong with an item, or with the number of items of a list, then what is allowed.
  *  @return false */
-bool config_value_refuse(const config_key_t *key, span_t item, const char *what, config_text_t *why);
-bool config_value_refuse_text(const config_key_t *key, const char *item, const char *what, config_text_t *why);
-bool config_value_refuse_count(const config_key_t *key, unsigned count, config_text_t *why);
+bool config_value_reject(const config_key_t *key, span_t item, const char *what, config_text_t *why);
+bool config_value_reject_text(const config_key_t *key, const char *item, const char *what, config_text_t *why);
+bool config_value_reject_count(const config_key_t *key, unsigned count, config_text_t *why);
 
 /** Appends the range of numbers: " from -90 to 90 deg". */
 void config_value_add_range(const config_key_t *key, config_text_t *text);

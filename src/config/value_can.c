@@ -27,7 +27,7 @@ static const char *read_number(const char *text, int64_t low, int64_t high, int6
     return errno == 0 && *value >= low && *value <= high ? end : NULL;
 }
 
-static bool refuse_many(const config_key_t *key, unsigned most, config_text_t *why)
+static bool reject_many(const config_key_t *key, unsigned most, config_text_t *why)
 {
     config_text_add(why, _("has more than %u values; allowed: "), most);
     config_value_allowed(key, why);
@@ -46,10 +46,10 @@ static bool parse_ids(const config_key_t *key, const char *text, void *field, co
         const char *end = read_number(span_copy_item(&rest, item, sizeof item), 0, most, &value);
         if (end == NULL || *end != '\0') {
             const bool is_identifier = key->high_milli == 0 && key->words == NULL;
-            return config_value_refuse_text(key, item, is_identifier ? _("is no identifier") : _("is no such number"), why);
+            return config_value_reject_text(key, item, is_identifier ? _("is no identifier") : _("is no such number"), why);
         }
         if (ids->count == DRIVES_MAX) {
-            return refuse_many(key, DRIVES_MAX, why);
+            return reject_many(key, DRIVES_MAX, why);
         }
         ids->id[ids->count++] = (uint32_t)value;
     }
@@ -118,10 +118,10 @@ static bool parse_ratios(const config_key_t *key, const char *text, void *field,
     for (const char *rest = text; rest != NULL; ratios->count++) {
         span_copy_item(&rest, item, sizeof item);
         if (ratios->count == key->count) {
-            return refuse_many(key, key->count, why);
+            return reject_many(key, key->count, why);
         }
         if (!read_ratio(item, &ratios->num[ratios->count], &ratios->den[ratios->count])) {
-            return config_value_refuse_text(key, item, _("is no ratio"), why);
+            return config_value_reject_text(key, item, _("is no ratio"), why);
         }
     }
     return true;
@@ -157,10 +157,10 @@ static bool parse_wholes(const config_key_t *key, const char *text, void *field,
         int64_t value = 0;
         const char *end = read_number(span_copy_item(&rest, item, sizeof item), -INT32_MAX, INT32_MAX, &value);
         if (wholes->count == key->count) {
-            return refuse_many(key, key->count, why);
+            return reject_many(key, key->count, why);
         }
         if (end == NULL || *end != '\0') {
-            return config_value_refuse_text(key, item, _("is no whole number"), why);
+            return config_value_reject_text(key, item, _("is no whole number"), why);
         }
         wholes->value[wholes->count] = (int32_t)value;
     }
@@ -192,10 +192,10 @@ static bool parse_when(const config_key_t *key, const char *text, void *field, c
     const char *slash = read_number(text, 0, UINT32_MAX, &value);
     const char *end = slash != NULL && *slash == '/' ? read_number(slash + 1, 1, UINT32_MAX, &mask) : NULL;
     if (end == NULL || *end != '\0') {
-        return config_value_refuse_text(key, text, _("is no value/mask"), why);
+        return config_value_reject_text(key, text, _("is no value/mask"), why);
     }
     if ((value & ~mask) != 0) {
-        return config_value_refuse_text(key, text, _("has a value with bits outside its mask"), why);
+        return config_value_reject_text(key, text, _("has a value with bits outside its mask"), why);
     }
     *(canraw_when_t *)field = (canraw_when_t){.value = (uint32_t)value, .mask = (uint32_t)mask};
     return true;

@@ -49,10 +49,10 @@ static bool parse_nodes(const config_key_t *key, const char *text, void *field, 
     for (const char *rest = text; rest != NULL; nodes->count++) {
         (void)span_copy_item(&rest, item, sizeof item);
         if (nodes->count == DRIVES_MAX) {
-            return config_value_refuse_text(key, item, _("is one more than drives there can be"), why);
+            return config_value_reject_text(key, item, _("is one more than drives there can be"), why);
         }
         if (!read_node(item, &nodes->id[nodes->count])) {
-            return config_value_refuse_text(key, item, _("is no node"), why);
+            return config_value_reject_text(key, item, _("is no node"), why);
         }
     }
     return true;
@@ -91,7 +91,7 @@ static bool parse_words(const config_key_t *key, const char *text, void *field, 
         const span_t item = span_next_item(&rest);
         const int index = span_find_word(key->words, item);
         if (index < 0 || out->count == DRIVES_MAX) {
-            return config_value_refuse(key, item, index < 0 ? _("is not allowed") : _("is one more than drives there can be"),
+            return config_value_reject(key, item, index < 0 ? _("is not allowed") : _("is one more than drives there can be"),
                                        why);
         }
         out->word[out->count] = (uint8_t)index;
@@ -170,7 +170,7 @@ static bool parse_maps(const config_key_t *key, const char *text, void *field, c
         const char *wrong =
             maps->count == CIA402_MAPS_MAX ? _("is one PDO more than there can be") : wrong_map(item, &maps->map[maps->count]);
         if (wrong != NULL) {
-            return config_value_refuse_text(key, item, wrong, why);
+            return config_value_reject_text(key, item, wrong, why);
         }
     }
     return true;

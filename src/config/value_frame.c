@@ -284,7 +284,7 @@ static bool parse_frame(const config_key_t *key, const char *text, void *field, 
             wrong = text[0] == '{' ? add_field(key, text, length, frame) : add_byte(key, text, length, frame);
         }
         if (wrong != NULL) {
-            return config_value_refuse(key, (span_t){text, length}, wrong, why);
+            return config_value_reject(key, (span_t){text, length}, wrong, why);
         }
         text += length;
         text += strspn(text, " \t");

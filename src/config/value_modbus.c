@@ -30,7 +30,7 @@ static const field_type_t k_types[] = {
 static const char *const k_values[MODBUS_DRIVE_VALUES] = {"position", "speed", "status", "alarm"};
 
 /* The next piece up to one of the ends, copied without the blanks round it; *rest becomes NULL with the last one. */
-static void take(const char **rest, const char *ends, char token[TOKEN_BYTES])
+static void copy_piece(const char **rest, const char *ends, char token[TOKEN_BYTES])
 {
     const char *start = *rest + strspn(*rest, BLANKS);
     size_t length = strcspn(start, ends);
@@ -85,10 +85,10 @@ static bool parse_hosts(const config_key_t *key, const char *text, void *field, 
     for (const char *rest = text; rest != NULL; hosts->count++) {
         (void)span_copy_item(&rest, token, sizeof token);
         if (hosts->count == DRIVES_MAX) {
-            return config_value_refuse_text(key, token, _("is one too many"), why);
+            return config_value_reject_text(key, token, _("is one too many"), why);
         }
         if (!read_host(token, &hosts->host[hosts->count])) {
-            return config_value_refuse_text(key, token, _("is no IPv4 address with or without :port"), why);
+            return config_value_reject_text(key, token, _("is no IPv4 address with or without :port"), why);
         }
     }
     return true;
@@ -172,10 +172,10 @@ static bool end_block(const config_key_t *key, const char *text, const modbus_dr
 {
     const modbus_drive_block_t *block = &blocks->block[blocks->count - 1u];
     if (blocks->count == 0 || block->count == 0) {
-        return config_value_refuse_text(key, text, _("has a block without registers"), why);
+        return config_value_reject_text(key, text, _("has a block without registers"), why);
     }
     if (block->address + (unsigned)block->count > 65536u) {
-        return config_value_refuse_text(key, text, _("goes beyond register 65535"), why);
+        return config_value_reject_text(key, text, _("goes beyond register 65535"), why);
     }
     return true;
 }
@@ -187,7 +187,7 @@ static bool parse_blocks(const config_key_t *key, const char *text, void *field,
     bool is_start = true;
     memset(blocks, 0, sizeof *blocks);
     for (const char *rest = text; rest != NULL;) {
-        take(&rest, BLANKS, token);
+        copy_piece(&rest, BLANKS, token);
         if (strcmp(token, "|") == 0) {
             if (!end_block(key, text, blocks, why)) {
                 return false;
@@ -199,11 +199,11 @@ static bool parse_blocks(const config_key_t *key, const char *text, void *field,
                             : token[0] == '{' ? add_field(key, token, blocks)
                                               : add_register(key, token, blocks);
         if (wrong != NULL) {
-            return config_value_refuse_text(key, token, wrong, why);
+            return config_value_reject_text(key, token, wrong, why);
         }
         is_start = false;
     }
-    return is_start ? config_value_refuse_text(key, text, _("ends where a block should begin"), why)
+    return is_start ? config_value_reject_text(key, text, _("ends where a block should begin"), why)
                     : end_block(key, text, blocks, why);
 }
 
@@ -215,7 +215,7 @@ static const char *read_item(const char *text, modbus_drive_item_t *item)
     char token[4][TOKEN_BYTES] = {"", "", "", ""};
     unsigned count = 0;
     for (const char *rest = text; rest != NULL && count < 4;) {
-        take(&rest, BLANKS, token[count++]);
+        copy_piece(&rest, BLANKS, token[count++]);
     }
     const bool is_written = strcmp(token[1], "=") == 0;
     const bool is_unchecked = is_written && strcmp(token[3], "unchecked") == 0;
@@ -238,11 +238,11 @@ static bool parse_items(const config_key_t *key, const char *text, void *field, 
     for (const char *rest = text; rest != NULL; items->count++) {
         (void)span_copy_item(&rest, token, sizeof token);
         if (items->count == CONFIG_ITEMS_MAX) {
-            return config_value_refuse_text(key, token, _("is one too many"), why);
+            return config_value_reject_text(key, token, _("is one too many"), why);
         }
         const char *wrong = read_item(token, &items->item[items->count]);
         if (wrong != NULL) {
-            return config_value_refuse_text(key, token, wrong, why);
+            return config_value_reject_text(key, token, wrong, why);
         }
     }
     return true;

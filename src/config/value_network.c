@@ -44,7 +44,7 @@ static bool parse_address(const config_key_t *key, const char *text, void *field
     uint8_t address[16];
     const unsigned bits = read_address(item, address);
     if (bits == 0) {
-        return config_value_refuse(key, item, _("is not an address"), why);
+        return config_value_reject(key, item, _("is not an address"), why);
     }
     if (is_group(address, bits)) {
         config_text_add_quoted(why, item.at, item.length);
@@ -85,13 +85,13 @@ static bool parse_group(const config_key_t *key, const char *text, void *field, 
     const span_t host = {item.at, sign == NULL ? item.length : (size_t)(sign - item.at)};
     const unsigned bits = read_address(host, address);
     if (bits == 0) {
-        return config_value_refuse(key, item, _("is not an address"), why);
+        return config_value_reject(key, item, _("is not an address"), why);
     }
     if (!is_group(address, bits)) {
-        return config_value_refuse(key, item, _("is not the address of a multicast group"), why);
+        return config_value_reject(key, item, _("is not the address of a multicast group"), why);
     }
     if (sign == NULL || !is_interface((span_t){sign + 1, item.length - host.length - 1u})) {
-        return config_value_refuse(key, item, _("does not name a network card"), why);
+        return config_value_reject(key, item, _("does not name a network card"), why);
     }
     memcpy(field, item.at, item.length);
     return true;
@@ -125,19 +125,19 @@ static bool parse_network(const config_key_t *key, span_t item, hal_udp_network_
     const unsigned bits = read_address(address, network->address);
     int64_t prefix = bits;
     if (bits == 0) {
-        return config_value_refuse(key, item, _("is not an address"), why);
+        return config_value_reject(key, item, _("is not an address"), why);
     }
     if (slash != NULL) {
         const span_t digits = {slash + 1, item.length - address.length - 1u};
         if (!span_read_whole(digits, &prefix) || prefix < 0 || prefix > bits) {
-            return config_value_refuse(key, item,
+            return config_value_reject(key, item,
                                        bits == 32u ? _("has no prefix from 0 to 32") : _("has no prefix from 0 to 128"), why);
         }
     }
     network->is_ipv6 = bits == 128u;
     network->prefix = (uint8_t)prefix;
     if (has_host_bits(network)) {
-        return config_value_refuse(key, item, _("has bits set behind its prefix"), why);
+        return config_value_reject(key, item, _("has bits set behind its prefix"), why);
     }
     return true;
 }
@@ -152,7 +152,7 @@ static bool parse_networks(const config_key_t *key, const char *text, void *fiel
         return true;
     }
     if (count > HAL_UDP_NETWORKS_MAX) {
-        return config_value_refuse_count(key, count, why);
+        return config_value_reject_count(key, count, why);
     }
     while (rest != NULL) {
         if (!parse_network(key, span_next_item(&rest), &networks->network[networks->count], why)) {

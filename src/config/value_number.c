@@ -39,14 +39,14 @@ static bool parse_decimal(const config_key_t *key, span_t item, q16_t *value_q16
     case NUMBER_OK:
         break;
     case NUMBER_EMPTY:
-        return config_value_refuse(key, item, _("has no number"), why);
+        return config_value_reject(key, item, _("has no number"), why);
     case NUMBER_SYNTAX:
-        return config_value_refuse(key, item, _("is not a number"), why);
+        return config_value_reject(key, item, _("is not a number"), why);
     case NUMBER_OVERFLOW:
-        return config_value_refuse(key, item, _("is out of range"), why);
+        return config_value_reject(key, item, _("is out of range"), why);
     }
     if (parsed_q16 < q16_from_milli(key->low_milli) || parsed_q16 > q16_from_milli(key->high_milli)) {
-        return config_value_refuse(key, item, _("is out of range"), why);
+        return config_value_reject(key, item, _("is out of range"), why);
     }
     *value_q16 = parsed_q16;
     return true;
@@ -67,7 +67,7 @@ static bool parse_each(const config_key_t *key, const char *text, q16_t *values_
 static bool parse_decimals(const config_key_t *key, const char *text, void *field, config_text_t *why)
 {
     const unsigned count = span_count_items(text);
-    return count == key->count ? parse_each(key, text, field, count, why) : config_value_refuse_count(key, count, why);
+    return count == key->count ? parse_each(key, text, field, count, why) : config_value_reject_count(key, count, why);
 }
 
 static void format_each(const config_key_t *key, const q16_t *values_q16, unsigned count, config_text_t *text)
@@ -110,7 +110,7 @@ static bool parse_per_cylinder(const config_key_t *key, const char *text, void *
     const unsigned count = span_count_items(text);
     q16_t *values_q16 = field;
     if (count != 1u && count != 3u && count != CYLINDERS_MAX) {
-        return config_value_refuse_count(key, count, why);
+        return config_value_reject_count(key, count, why);
     }
     if (!parse_each(key, text, values_q16, count, why)) {
         return false;
@@ -151,10 +151,10 @@ static bool parse_whole(const config_key_t *key, span_t item, int64_t *value, co
 {
     int64_t parsed = 0;
     if (!span_read_whole(item, &parsed)) {
-        return config_value_refuse(key, item, _("is not a whole number"), why);
+        return config_value_reject(key, item, _("is not a whole number"), why);
     }
     if (parsed * 1000 < key->low_milli || parsed * 1000 > key->high_milli) {
-        return config_value_refuse(key, item, _("is out of range"), why);
+        return config_value_reject(key, item, _("is out of range"), why);
     }
     *value = parsed;
     return true;
@@ -236,7 +236,7 @@ static bool parse_per_relay(const config_key_t *key, const char *text, void *fie
     const char *rest = text;
     uint32_t *values = field;
     if (count > CONFIG_RELAYS_MAX) {
-        return config_value_refuse_count(key, count, why);
+        return config_value_reject_count(key, count, why);
     }
     memset(values, 0, key->size);
     for (unsigned i = 0; i < count; i++) {
@@ -285,17 +285,17 @@ static bool parse_mask(const config_key_t *key, const char *text, void *field, c
     const size_t start = has_prefix ? 2u : 0u;
     int64_t value = 0;
     if (item.length == start || item.length - start > 4u) {
-        return config_value_refuse(key, item, _("is not a mask"), why);
+        return config_value_reject(key, item, _("is not a mask"), why);
     }
     for (size_t i = start; i < item.length; i++) {
         const int digit = hex_digit(item.at[i]);
         if (digit < 0) {
-            return config_value_refuse(key, item, _("is not a mask"), why);
+            return config_value_reject(key, item, _("is not a mask"), why);
         }
         value = value * 16 + digit;
     }
     if (value * 1000 > key->high_milli) {
-        return config_value_refuse(key, item, _("is out of range"), why);
+        return config_value_reject(key, item, _("is out of range"), why);
     }
     config_value_store(field, key->size, value);
     return true;
@@ -318,7 +318,7 @@ static bool parse_sign(const config_key_t *key, const char *text, void *field, c
 {
     int64_t value = 0;
     if (!span_read_whole((span_t){text, strlen(text)}, &value) || (value != 1 && value != -1)) {
-        return config_value_refuse_text(key, text, _("is not a sign"), why);
+        return config_value_reject_text(key, text, _("is not a sign"), why);
     }
     *(int8_t *)field = (int8_t)value;
     return true;

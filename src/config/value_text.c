@@ -26,7 +26,7 @@ static bool parse_word(const config_key_t *key, const char *text, void *field, c
         return true;
     }
     if (span_find_word(key->absent, item) < 0) {
-        return config_value_refuse(key, item, _("is not known"), why);
+        return config_value_reject(key, item, _("is not known"), why);
     }
     config_text_add(why, _("driver %.*s is not built into this heaved; allowed: "), (int)item.length, item.at);
     config_value_allowed(key, why);
@@ -56,7 +56,7 @@ static bool parse_yes_no(const config_key_t *key, const char *text, void *field,
 {
     const int index = span_find_word("no|yes", (span_t){text, strlen(text)});
     if (index < 0) {
-        return config_value_refuse_text(key, text, _("is neither yes nor no"), why);
+        return config_value_reject_text(key, text, _("is neither yes nor no"), why);
     }
     *(bool *)field = index == 1;
     return true;
@@ -83,10 +83,10 @@ static bool parse_path(const config_key_t *key, const char *text, void *field, c
     const span_t item = {text, strlen(text)};
     const bool is_none = key->words != NULL && span_is_word(item, key->words);
     if (!is_none && (item.length == 0 || item.at[0] != '/')) {
-        return config_value_refuse(key, item, _("is not an absolute path"), why);
+        return config_value_reject(key, item, _("is not an absolute path"), why);
     }
     if (item.length >= key->size) {
-        return config_value_refuse(key, item, _("is too long"), why);
+        return config_value_reject(key, item, _("is too long"), why);
     }
     memset(field, 0, key->size);
     memcpy(field, item.at, item.length);
@@ -119,11 +119,11 @@ static bool read_label(const config_key_t *key, span_t item, config_label_t *lab
         return true;
     }
     if (item.length == 0 || item.length >= sizeof label->text) {
-        return config_value_refuse(key, item, item.length == 0 ? _("has no name") : _("is too long"), why);
+        return config_value_reject(key, item, item.length == 0 ? _("has no name") : _("is too long"), why);
     }
     for (size_t i = 0; i < item.length; i++) {
         if (!is_label_byte(item.at[i])) {
-            return config_value_refuse(key, item, _("is no name"), why);
+            return config_value_reject(key, item, _("is no name"), why);
         }
         label->text[i] = item.at[i];
     }
@@ -160,7 +160,7 @@ static bool parse_lines(const config_key_t *key, const char *text, void *field, 
     const char *rest = text;
     memset(lines, 0, sizeof *lines);
     if (count > CONFIG_RELAYS_MAX) {
-        return config_value_refuse_count(key, count, why);
+        return config_value_reject_count(key, count, why);
     }
     while (rest != NULL) {
         const span_t item = span_next_item(&rest);
@@ -169,7 +169,7 @@ static bool parse_lines(const config_key_t *key, const char *text, void *field, 
             return false;
         }
         if (line.text[0] == '\0' || has_line(lines, &line)) {
-            return config_value_refuse(key, item, line.text[0] == '\0' ? _("is no line") : _("is listed twice"), why);
+            return config_value_reject(key, item, line.text[0] == '\0' ? _("is no line") : _("is listed twice"), why);
         }
         lines->line[lines->count++] = line;
     }
@@ -200,7 +200,7 @@ static bool parse_name(const config_key_t *key, const char *text, void *field, c
 {
     const size_t length = strlen(text);
     if (length == 0 || strspn(text, NAME_BYTES) != length || length >= key->size) {
-        return config_value_refuse_text(key, text, _("is no name of an interface"), why);
+        return config_value_reject_text(key, text, _("is no name of an interface"), why);
     }
     memset(field, 0, key->size);
     memcpy(field, text, length);

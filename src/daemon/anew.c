@@ -15,8 +15,8 @@ static char s_said[sizeof NAME + 1u + ANEW_WHY_MAX] = NAME "=0";
 
 anew_t anew_read(char why[ANEW_WHY_MAX])
 {
-    const char *const told = getenv(NAME); // NOLINT(concurrency-mt-unsafe): no other thread yet
-    const char *const said = told != NULL ? told : "0";
+    const char *const value = getenv(NAME); // NOLINT(concurrency-mt-unsafe): no other thread yet
+    const char *const said = value != NULL ? value : "0";
     const anew_t how = said[0] == '1' ? ANEW_APPLIED : said[0] == '2' ? ANEW_PUT_BACK : ANEW_NOT;
     (void)snprintf(why, ANEW_WHY_MAX, "%s", how == ANEW_PUT_BACK ? &said[1] : "");
     (void)putenv(s_said); // NOLINT(concurrency-mt-unsafe)

@@ -8,7 +8,7 @@
 #include "common/columns.h"
 #include "common/sentence.h"
 #include "common/translate.h"
-#include "config/text.h"
+#include "config/config_text.h"
 
 linux_gpio_relays_config_t gpio_setup_relays(const config_t *config)
 {

@@ -127,7 +127,7 @@ static void log_signal(live_t *self, const struct signalfd_siginfo *info)
 }
 
 /* The first signal settles the platform, the second one ends at once. */
-static void take_signals(live_t *self)
+static void receive_signals(live_t *self)
 {
     struct signalfd_siginfo info;
     while (read(self->signal_fd, &info, sizeof info) == (ssize_t)sizeof info) {
@@ -156,7 +156,7 @@ static uint64_t now_us(const live_t *self)
     return hal_clock_now_us(self->loop.clock);
 }
 
-static void tell_acknowledged(live_t *self)
+static void log_acknowledged(live_t *self)
 {
     const level_peer_t by = self->control.acknowledged_by;
     if (by.pid != 0) {
@@ -175,7 +175,7 @@ static void watch_selftest(live_t *self)
 }
 
 /* Both go on being tried, and heaved goes on. */
-static void tell_trouble(live_t *self)
+static void log_trouble(live_t *self)
 {
     int error = 0;
     if (operator_log_trouble(&self->operators, &error)) {
@@ -188,7 +188,7 @@ static void tell_trouble(live_t *self)
 }
 
 /* The service manager; and who reads the log, where something is lost. */
-static void tell_others(live_t *self)
+static void serve_others(live_t *self)
 {
     if (seqlock_read(&self->loop.handover.view, self->view.word)) {
         watch_floods(self, now_us(self));
@@ -241,16 +241,16 @@ static void serve_once(live_t *self)
     if (poll(fds, CONTROL_FDS + 1, control_timeout_ms(&self->control, now_us(self), TICK_MS)) < 0) {
         suppose_all(fds, CONTROL_FDS + 1);
     }
-    take_signals(self);
+    receive_signals(self);
     control_serve(&self->control, fds, now_us(self));
     if (reconfigure_serve(&self->reconfigure, &self->control, now_us(self)) && self->flood.is_on) {
         set_filter(self); /* what is let through of a flood follows from the configuration */
     }
-    tell_others(self);
-    tell_acknowledged(self);
+    serve_others(self);
+    log_acknowledged(self);
     watch_selftest(self);
     watch_end(self);
-    tell_trouble(self);
+    log_trouble(self);
     count_losses(self);
 }
 
@@ -392,7 +392,7 @@ static int open_all(live_t *self, const config_t *config)
     code = code == EXIT_DONE
                ? control_open(&self->control, path, &self->config, &self->loop.handover, &self->blackbox, &self->operators)
                : code;
-    code = code == EXIT_DONE ? locks_take(&self->locks, config) : code;
+    code = code == EXIT_DONE ? locks_acquire(&self->locks, config) : code;
     code = code == EXIT_DONE ? writers_open(&self->writers, self->options, config, &self->loop) : code;
     code = code == EXIT_DONE ? operator_log_open(&self->operators, config) : code;
     const uint32_t cylinders = config->settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;

@@ -36,7 +36,7 @@ static int lock_file(const char *path)
     return fd;
 }
 
-int locks_take(locks_t *self, const config_t *config)
+int locks_acquire(locks_t *self, const config_t *config)
 {
     const struct {
         const char *what, *configured, *name, *lock;

@@ -17,9 +17,9 @@ typedef struct {
 /** Locks them, by a file `NAME.lock` beside each. Where that file cannot be created nothing is locked: what it stands for says so
  *  by itself. At the start; opens files.
  *  @return EXIT_DONE; EXIT_UNAVAILABLE: another heaved has one of them, which has been said */
-int locks_take(locks_t *self, const config_t *config);
+int locks_acquire(locks_t *self, const config_t *config);
 
-/** Releases them; harmless where locks_take() failed. */
+/** Releases them; harmless where locks_acquire() failed. */
 void locks_release(locks_t *self);
 
 #endif

@@ -13,16 +13,10 @@
 #include "common/usage.h"
 #include "config/config.h"
 #include "heave/status.h"
-#include "twin/options.h"
+#include "twin/twin_options.h"
 #ifdef HEAVE_HAS_PANEL
-#include "panel/options.h"
+#include "panel/panel_options.h"
 #endif
-
-void hv_assert_failed(const char *file, int line)
-{
-    fprintf(stderr, "%s:%d: assertion failed\n", file, line);
-    abort();
-}
 
 static void write_synopsis(const usage_t *usage, FILE *out)
 {

@@ -50,7 +50,7 @@ hv_status_t motion_loop_init(motion_loop_t *self, const config_t *config, hal_ud
 
 /* --- Hand-overs --- */
 
-static void take_reloads(motion_loop_t *self)
+static void apply_reloads(motion_loop_t *self)
 {
     motion_reload_t reload;
     while (ring_pop(&self->handover.reloads, &reload, sizeof reload) > 0) {
@@ -110,7 +110,7 @@ static void carry_out(motion_loop_t *self, const motion_request_t *request, moti
         result->answer = serve(self, request);
         result->status = HV_OK;
     } else if (request->event == OPERATOR_OBJECT) {
-        motion_objects_take(self, request, result);
+        motion_objects_accept(self, request, result);
     } else if (request->event == OPERATOR_INTENSITY) {
         result->status = set_intensity(self, request->number);
     } else {
@@ -151,7 +151,7 @@ static bool is_void(const motion_loop_t *self, const motion_request_t *request)
 }
 
 /* Requests that wait, in order, before the cycle. Returns how many; their results are complete after the cycle. */
-static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE])
+static unsigned pop_requests(motion_loop_t *self, motion_result_t result[REQUESTS_PER_CYCLE])
 {
     unsigned count = 0;
     motion_request_t request;
@@ -169,7 +169,7 @@ static unsigned take_requests(motion_loop_t *self, motion_result_t result[REQUES
     return count;
 }
 
-static void take_end(motion_loop_t *self)
+static void step_end(motion_loop_t *self)
 {
     const bool is_due = __atomic_exchange_n(&self->handover.is_end_due, 0, __ATOMIC_ACQ_REL) != 0;
     const snapshot_t *s = gateway_snapshot(&self->session.gateway);
@@ -180,7 +180,7 @@ static void take_end(motion_loop_t *self)
     self->current.view.is_end_held = delayed_end_is_held(&self->end);
 }
 
-static void tell_blind(motion_loop_t *self)
+static void log_blind(motion_loop_t *self)
 {
     const bool is_blind = switches_is_lost(&self->switches);
     if (is_blind != self->was_blind) {
@@ -336,15 +336,15 @@ static void run_cycle(motion_loop_t *self, uint64_t late_us)
         motion_note(self, RECORD_LATE, skipped);
         gateway_note_late(&self->session.gateway, skipped);
     }
-    take_reloads(self);
+    apply_reloads(self);
     const switches_change_t change = switches_step(&self->switches, self->session.now_us);
-    tell_blind(self);
+    log_blind(self);
     withhold_permits(self, change, skipped);
     if ((change.on & INPUT_RESET) != 0) {
         press_reset(self);
     }
-    const unsigned requests = take_requests(self, result);
-    take_end(self);
+    const unsigned requests = pop_requests(self, result);
+    step_end(self);
     self->tap.arrival_us = 0;
     self->tap.late_us = late_us;
     const bool is_zero = session_cycle(&self->session);
@@ -379,10 +379,10 @@ static void quit(motion_loop_t *self, uint64_t now_us)
 {
     const uint64_t last_us = now_us + QUIT_STOP_US;
     uint64_t until_us = now_us + QUIT_MOST_US;
-    hv_status_t told = drives_request(self->io.drives, DRIVES_QUICK_STOP);
+    hv_status_t status = drives_request(self->io.drives, DRIVES_QUICK_STOP);
     run_drives(self);
     while (self->is_energized && now_us < until_us) {
-        told = told == HV_ERR_AGAIN ? drives_request(self->io.drives, DRIVES_QUICK_STOP) : told;
+        status = status == HV_ERR_AGAIN ? drives_request(self->io.drives, DRIVES_QUICK_STOP) : status;
         (void)!hal_clock_sleep_until_us(self->clock, now_us + self->session.settings.cycle_us);
         now_us = hal_clock_now_us(self->clock);
         run_drives(self);

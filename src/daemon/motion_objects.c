@@ -3,7 +3,7 @@
  */
 #include "daemon/motion_objects.h"
 
-void motion_objects_take(motion_loop_t *self, const motion_request_t *request, motion_result_t *result)
+void motion_objects_accept(motion_loop_t *self, const motion_request_t *request, motion_result_t *result)
 {
     result->status = HV_OK;
     result->object = request->object;

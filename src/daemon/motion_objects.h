@@ -8,7 +8,7 @@
 #include "daemon/motion_loop.h"
 
 /** Takes a request. Where it was begun, its result is later. */
-void motion_objects_take(motion_loop_t *self, const motion_request_t *request, motion_result_t *result);
+void motion_objects_accept(motion_loop_t *self, const motion_request_t *request, motion_result_t *result);
 
 /** Once per cycle: hands over the result of what has ended. */
 void motion_objects_step(motion_loop_t *self);

@@ -187,7 +187,7 @@ static const char **value_of(options_t *self, int option)
 }
 
 /* Which configuration: a file, or one of the ready-made platforms. */
-static const char *take_config(options_t *self, int option)
+static const char *accept_config(options_t *self, int option)
 {
     const bool is_preset = option == OPTION_PRESET;
     if (is_preset ? self->config != NULL : self->config == self->preset) {
@@ -199,7 +199,7 @@ static const char *take_config(options_t *self, int option)
                : _("--preset needs one of the names that --presets shows");
 }
 
-static const char *take_dcf(options_t *self, const char *path)
+static const char *accept_dcf(options_t *self, const char *path)
 {
     if (self->dcfs == OPTIONS_DCF_MAX) {
         return _("--import-dcf takes up to 6 files, one for each cylinder's drive");
@@ -209,7 +209,7 @@ static const char *take_dcf(options_t *self, const char *path)
 }
 
 /* The list that a file goes into. */
-static const char *take_drive(options_t *self, const char *which)
+static const char *accept_drive(options_t *self, const char *which)
 {
     const bool is_number = which[0] >= '1' && which[0] < '1' + (int)OPTIONS_DCF_MAX && which[1] == '\0';
     if (!is_number && strcmp(which, "all") != 0 && strcmp(which, "angle") != 0) {
@@ -220,19 +220,19 @@ static const char *take_drive(options_t *self, const char *which)
     return NULL;
 }
 
-static const char *take_option(options_t *self, int option)
+static const char *accept_option(options_t *self, int option)
 {
     const run_mode_t mode = mode_of(option);
     if (option == '?' || option == ':') { /* getopt's own */
         return option == ':' ? _("option needs a value") : _("unknown option");
     }
     if (option == OPTION_CONFIG || option == OPTION_PRESET) {
-        return take_config(self, option);
+        return accept_config(self, option);
     }
     self->is_json = self->is_json || option == OPTION_JSON;
     self->is_partial = self->is_partial || option == OPTION_PARTIAL;
-    const char *wrong = option == OPTION_IMPORT_DCF ? take_dcf(self, optarg)
-                        : option == OPTION_DRIVE    ? take_drive(self, optarg)
+    const char *wrong = option == OPTION_IMPORT_DCF ? accept_dcf(self, optarg)
+                        : option == OPTION_DRIVE    ? accept_drive(self, optarg)
                                                     : NULL;
     if (wrong != NULL) {
         return wrong;
@@ -314,7 +314,7 @@ int options_read(options_t *self, int argc, char **argv)
         if (option < 0) {
             break;
         }
-        const char *wrong = take_option(self, option);
+        const char *wrong = accept_option(self, option);
         if (wrong != NULL) {
             return complain(wrong, option == '?' || option == ':' ? argv[at] : NULL);
         }
@@ -324,7 +324,7 @@ int options_read(options_t *self, int argc, char **argv)
     }
     const char *wrong = NULL;
     while (self->mode == MODE_IMPORT_DCF && optind < argc && wrong == NULL) {
-        wrong = take_dcf(self, argv[optind++]);
+        wrong = accept_dcf(self, argv[optind++]);
     }
     if (wrong != NULL || optind < argc) {
         return wrong != NULL ? complain(wrong, NULL) : complain(_("unexpected argument"), argv[optind]);

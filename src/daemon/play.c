@@ -42,7 +42,7 @@ typedef struct {
 
 /* --- What the gateway sees --- */
 
-static void take_note(play_t *self, const char *text)
+static void add_note(play_t *self, const char *text)
 {
     if (self->notes < NOTES) {
         note_t *note = &self->note[self->notes];
@@ -56,7 +56,7 @@ static void play_log(void *ctx, hal_log_level_t level, const char *text)
 {
     play_t *self = ctx;
     if (level <= HAL_LOG_WARNING) {
-        take_note(self, text);
+        add_note(self, text);
     }
 }
 
@@ -66,7 +66,7 @@ static void note_refused(void *ctx, const frames_line_t *line, const char *what)
     char text[HAL_LOG_TEXT_MAX + 1];
     (void)snprintf(text, sizeof text, "line %" PRIu32 ": %s is refused in %s", line->line, what,
                    state_name(gateway_snapshot(&self->player.session.gateway)->state));
-    take_note(self, text);
+    add_note(self, text);
     self->refused_requests++;
 }
 

@@ -23,7 +23,7 @@ static bool come_into_force(reconfigure_t *self, const char *path)
         return false;
     }
     writers_say(self->writers, "%s has been read again: configuration %s", path, self->config->hash);
-    writers_tell_hash(self->writers, self->config->hash);
+    writers_put_hash(self->writers, self->config->hash);
     if (!config_is_unapproved(self->config)) {
         (void)handover_withhold(&self->loop->handover, PERMIT_APPROVAL, false);
     }
@@ -48,7 +48,7 @@ static void say_line(const reconfigure_t *self, const char *line)
 
 /* Takes a configuration over, if all of it is right. Its words go the way of all words: nobody who does not read them keeps this
  * thread from its clients. */
-static bool take_text(reconfigure_t *self, const char *name, const char *text, ssize_t length)
+static bool load_text(reconfigure_t *self, const char *name, const char *text, ssize_t length)
 {
     memset(self->words, 0, sizeof self->words);
     rewind(self->stream);
@@ -89,10 +89,10 @@ void reconfigure_reload(reconfigure_t *self)
     self->is_reload_wanted = true;
 }
 
-static bool take_file(reconfigure_t *self, const char *path, const char *text, ssize_t length)
+static bool load_file(reconfigure_t *self, const char *path, const char *text, ssize_t length)
 {
     const char *const name = path != NULL ? path : self->store->file;
-    if (!take_text(self, name, text, length)) {
+    if (!load_text(self, name, text, length)) {
         writers_say(self->writers, "%s is not right: nothing has changed", name);
         return false;
     }
@@ -109,7 +109,7 @@ static bool serve_reload(reconfigure_t *self, uint64_t now_us)
     ssize_t length = 0;
     if (self->is_reading && config_store_has_read(self->store, &path, &text, &length)) {
         self->is_reading = false;
-        return take_file(self, path, text, length);
+        return load_file(self, path, text, length);
     }
     if (self->is_reading && now_us >= self->slow_us) {
         self->slow_us = UINT64_MAX;
@@ -145,9 +145,9 @@ static const char *restart(reconfigure_t *self, const control_t *control)
     return NULL;
 }
 
-static const char *take_over(reconfigure_t *self, const char *text, size_t length)
+static const char *apply(reconfigure_t *self, const char *text, size_t length)
 {
-    if (!take_text(self, self->store->kept, text, (ssize_t)length) || !come_into_force(self, self->store->kept)) {
+    if (!load_text(self, self->store->kept, text, (ssize_t)length) || !come_into_force(self, self->store->kept)) {
         return N_("it is kept, but did not come into force: send SIGHUP");
     }
     config_store_adopt(self->store, self->store->kept);
@@ -173,7 +173,7 @@ static bool serve_applied(reconfigure_t *self, control_t *control)
     } else if (!control_configuration_fits(control_state(control), is_restart)) { /* the disk may have taken its time */
         why = N_("the state has changed meanwhile: it is kept, and comes into force with SIGHUP, or when heaved starts anew");
     } else {
-        why = is_restart ? restart(self, control) : take_over(self, text, length);
+        why = is_restart ? restart(self, control) : apply(self, text, length);
     }
     control_configuration_end(control, why, is_restart);
     return why == NULL && !is_restart;

@@ -14,7 +14,7 @@
 #define RESTART_US       30000000u /* files and devices closed, opened again */
 
 /* Whether there is nothing left to tell: taken, or nobody is there to take it. */
-static bool tell(const sd_notify_t *self, const char *text)
+static bool put(const sd_notify_t *self, const char *text)
 {
     if (self->fd < 0) {
         return true;
@@ -55,43 +55,43 @@ void sd_notify_ready(sd_notify_t *self, uint64_t now_us)
     *self = (sd_notify_t){.fd = -1, .watchdog_us = watchdog_us()};
     self->next_us = now_us + self->watchdog_us;
     open_socket(self);
-    self->is_ready_told = tell(self, "READY=1");
+    self->is_ready_sent = put(self, "READY=1");
 }
 
-static void tell_state(sd_notify_t *self, const snapshot_t *snapshot)
+static void send_state(sd_notify_t *self, const snapshot_t *snapshot)
 {
     char text[128];
     const bool is_fault = snapshot->fault.code != FAULT_NONE;
     (void)snprintf(text, sizeof text, "STATUS=%s%s%s", state_name(snapshot->state), is_fault ? ": " : "",
                    is_fault ? fault_text(snapshot->fault.code) : "");
-    self->is_told = tell(self, text);
+    self->is_sent = put(self, text);
     self->state = snapshot->state;
     self->fault = snapshot->fault.code;
 }
 
 /* Without it the manager ends what takes longer than its unit says. */
-static void tell_stopping(sd_notify_t *self)
+static void send_stopping(sd_notify_t *self)
 {
     char text[64];
-    (void)snprintf(text, sizeof text, "STOPPING=1\nEXTEND_TIMEOUT_USEC=%llu", (unsigned long long)self->untold_us);
-    self->untold_us = tell(self, text) ? 0 : self->untold_us;
+    (void)snprintf(text, sizeof text, "STOPPING=1\nEXTEND_TIMEOUT_USEC=%llu", (unsigned long long)self->unsent_us);
+    self->unsent_us = put(self, text) ? 0 : self->unsent_us;
 }
 
 void sd_notify_serve(sd_notify_t *self, const snapshot_t *snapshot, uint64_t now_us)
 {
-    if (!self->is_ready_told) {
-        self->is_ready_told = tell(self, "READY=1");
+    if (!self->is_ready_sent) {
+        self->is_ready_sent = put(self, "READY=1");
     }
-    if (self->untold_us != 0) {
-        tell_stopping(self);
+    if (self->unsent_us != 0) {
+        send_stopping(self);
     }
-    if (!self->is_told || self->state != snapshot->state || self->fault != snapshot->fault.code) {
-        tell_state(self, snapshot);
+    if (!self->is_sent || self->state != snapshot->state || self->fault != snapshot->fault.code) {
+        send_state(self, snapshot);
     }
     if (self->watchdog_us == 0 || now_us < self->next_us || snapshot->cycle == self->cycle) {
         return; /* a motion thread that stands still is the manager's business: it ends the program, and the drives stop */
     }
-    if (tell(self, "WATCHDOG=1")) {
+    if (put(self, "WATCHDOG=1")) {
         self->cycle = snapshot->cycle;
         self->next_us = now_us + self->watchdog_us;
     }
@@ -111,8 +111,8 @@ uint64_t sd_notify_shutdown_us(const settings_t *settings)
 
 void sd_notify_stopping(sd_notify_t *self, uint64_t within_us)
 {
-    self->untold_us = within_us;
-    tell_stopping(self);
+    self->unsent_us = within_us;
+    send_stopping(self);
 }
 
 void sd_notify_restart(const sd_notify_t *self, bool is_over)
@@ -121,7 +121,7 @@ void sd_notify_restart(const sd_notify_t *self, bool is_over)
     const unsigned long long period_us = is_over ? 2u * self->watchdog_us : RESTART_US;
     (void)snprintf(text, sizeof text, "WATCHDOG=1\nWATCHDOG_USEC=%llu", period_us);
     if (self->watchdog_us != 0) {
-        (void)tell(self, text);
+        (void)put(self, text);
     }
 }
 

@@ -17,9 +17,9 @@ typedef struct {
     uint64_t watchdog_us; /**< how often the manager wants to hear of it, halved; 0 = it does not */
     uint64_t next_us;
     uint64_t cycle;     /**< of the motion thread, when told last */
-    uint64_t untold_us; /**< how long the shutdown may take, not told yet; 0 = told, or there is none */
-    bool is_ready_told;
-    bool is_told;
+    uint64_t unsent_us; /**< how long the shutdown may take, not told yet; 0 = told, or there is none */
+    bool is_ready_sent;
+    bool is_sent;
     state_t state;
     fault_code_t fault;
     int fd; /**< -1 = there is no manager; private, as the address */

@@ -90,7 +90,7 @@ static void trace_step(void *ctx, bool is_end)
 
 /* --- Metrics and log --- */
 
-void writers_tell_hash(writers_t *self, const char *hash)
+void writers_put_hash(writers_t *self, const char *hash)
 {
     writers_hash_t words = {{0}};
     (void)snprintf(words.text, sizeof words.text, "%s", hash);
@@ -160,7 +160,7 @@ int writers_open(writers_t *self, const options_t *options, const config_t *conf
     self->config = config;
     self->loop = loop;
     seqlock_init(&self->hash, self->hash_words.word, sizeof self->hash_words / sizeof(uint64_t));
-    writers_tell_hash(self, config->hash);
+    writers_put_hash(self, config->hash);
     if (!open_file(&self->record, options->record, &loop->is_recording)) {
         return print_message(EXIT_NO_OUTPUT, "%s: %s", options->record, strerror(self->record.file.error));
     }
@@ -210,12 +210,12 @@ static uint32_t count_lost(const writers_file_t *out, const ring_t *ring)
 static void say_losses(writers_t *self, writers_file_t *out, const ring_t *ring)
 {
     const int error = __atomic_load_n(&out->error, __ATOMIC_RELAXED);
-    if (error != 0 && !out->is_error_told) {
-        out->is_error_told = true;
+    if (error != 0 && !out->is_error_logged) {
+        out->is_error_logged = true;
         writers_say(self, "%s: %s: nothing more is written to it; `lost` in the status counts", out->path, strerror(error));
     }
-    if (ring_dropped(ring) != 0 && !out->is_told) {
-        out->is_told = true;
+    if (ring_dropped(ring) != 0 && !out->is_logged) {
+        out->is_logged = true;
         writers_say(self, "%s: lines are lost: its disk or its reader is too slow; `lost` in the status counts", out->path);
     }
 }
@@ -257,10 +257,10 @@ static bool close_by(writers_t *self, worker_t *worker, uint64_t until_us)
 int writers_close(writers_t *self, bool *has_ended)
 {
     const uint64_t until_us = now_us(self) + CLOSE_WAIT_MS * 1000u;
-    worker_tell_end(&self->metrics_worker); /* all at once: they wait beside each other */
-    worker_tell_end(&self->record_worker);
-    worker_tell_end(&self->trace_worker);
-    worker_tell_end(&self->log_worker);
+    worker_request_end(&self->metrics_worker); /* all at once: they wait beside each other */
+    worker_request_end(&self->record_worker);
+    worker_request_end(&self->trace_worker);
+    worker_request_end(&self->log_worker);
     const bool has_log = close_by(self, &self->log_worker, until_us);
     const bool has_record = close_by(self, &self->record_worker, until_us);
     const bool has_trace = close_by(self, &self->trace_worker, until_us);

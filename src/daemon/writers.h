@@ -26,8 +26,8 @@ typedef struct {
     const char *path;
     uint32_t thrown; /**< atomic: lines that came after its error */
     int error;       /**< atomic: errno of the write that ended it, 0 = none */
-    bool is_told;    /**< that lines are lost; the service thread's, as the next one */
-    bool is_error_told;
+    bool is_logged;  /**< that lines are lost; the service thread's, as the next one */
+    bool is_error_logged;
 } writers_file_t;
 
 /** The writers; large: from the heap, at the start. Private to writers.c but for the log. */
@@ -60,7 +60,7 @@ int writers_open(writers_t *self, const options_t *options, const config_t *conf
 void writers_start(writers_t *self);
 
 /** The configuration in force is another one from now on. The service thread. */
-void writers_tell_hash(writers_t *self, const char *hash);
+void writers_put_hash(writers_t *self, const char *hash);
 
 /** A line of the service thread, with what is said about as `heaved: ...`. Never waits. */
 void writers_say(writers_t *self, const char *format, ...) __attribute__((format(printf, 2, 3)));

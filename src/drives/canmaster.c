@@ -27,7 +27,7 @@ void canmaster_deaf(canmaster_t *self, uint64_t now_us)
     }
 }
 
-void canmaster_take(canmaster_t *self, uint32_t what)
+void canmaster_note(canmaster_t *self, uint32_t what)
 {
     const bool is_named = self->is_listening && self->heard_us != 0; /* its kinds would take turns in the log */
     self->what = is_named ? self->what : what;

@@ -32,9 +32,9 @@ static void lose_all(canraw_t *self)
 
 /* --- In --- */
 
-static void take_frame(canraw_t *self, const can_frame_t *frame)
+static void receive_frame(canraw_t *self, const can_frame_t *frame)
 {
-    if (canraw_master_take(self, frame)) {
+    if (canraw_master_receive(self, frame)) {
         return;
     }
     if (self->master.is_listening) {
@@ -66,7 +66,7 @@ static bool receive(canraw_t *self)
             return status == HV_ERR_AGAIN;
         }
         if (!frame.is_error) {
-            take_frame(self, &frame);
+            receive_frame(self, &frame);
         } else if ((frame.id & CAN_ERROR_RESTARTED) != 0) {
             lose_all(self);
         }
@@ -143,7 +143,7 @@ static void send_commands(canraw_t *self, canraw_command_t last)
         const canraw_frame_t *command = &self->map->command[axis->pending];
         if (send_plain(self, k, command) == HV_OK) {
             axis->pending = CANRAW_NOTHING;
-            axis->told_us = self->now_us;
+            axis->command_us = self->now_us;
         }
     }
 }
@@ -254,7 +254,7 @@ static hv_status_t send_set(canraw_t *self, const q32_t setpoint_q32[DRIVES_MAX]
 
 /* --- drives.h --- */
 
-static void take_time(canraw_t *self, uint64_t now_us)
+static void step_time(canraw_t *self, uint64_t now_us)
 {
     self->now_us = now_us;
     if (!self->has_time) {
@@ -270,7 +270,7 @@ static void take_time(canraw_t *self, uint64_t now_us)
 static hv_status_t canraw_poll(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
 {
     canraw_t *self = ctx;
-    take_time(self, now_us);
+    step_time(self, now_us);
     const bool is_up = receive(self);
     watch_bus(self, is_up);
     canraw_master_step(self);
@@ -340,7 +340,7 @@ static bool is_end(drives_request_t request)
 
 /* Whether a request is for it: what takes torque away is also for those that were lost under it. They may hear what they do not
  * answer, and have no watchdog. */
-static bool is_told(const canraw_t *self, unsigned k, drives_request_t request)
+static bool is_commanded(const canraw_t *self, unsigned k, drives_request_t request)
 {
     return self->axis[k].is_online || (is_end(request) && self->axis[k].is_energized);
 }
@@ -351,14 +351,14 @@ static hv_status_t canraw_request(void *ctx, drives_request_t request)
     canraw_t *self = ctx;
     bool is_any = false;
     for (unsigned k = 0; k < self->map->axes; k++) {
-        is_any |= is_told(self, k, request);
+        is_any |= is_commanded(self, k, request);
     }
     if (self->is_gone || !is_any) {
         return HV_ERR_IO;
     }
     const hv_status_t status = judge(self, 0, self->map->axes, request);
     for (unsigned k = 0; k < self->map->axes && status == HV_OK; k++) {
-        if (is_told(self, k, request)) {
+        if (is_commanded(self, k, request)) {
             canraw_axis_request(&self->axis[k], self->map, request, self->now_us);
         }
     }
@@ -391,7 +391,7 @@ static hv_status_t canraw_request_one(void *ctx, uint8_t k, drives_request_t req
     }
     for (unsigned i = 0; i < self->map->axes; i++) { /* the next set-point of another would give it its torque again */
         const bool goes_along = is_end(request) && is_shared(self->map, i, k) && would_enable_others(self->map, k);
-        if (is_told(self, i, request) && (i == k || goes_along)) {
+        if (is_commanded(self, i, request) && (i == k || goes_along)) {
             canraw_axis_request(&self->axis[i], self->map, request, self->now_us);
         }
     }
@@ -427,7 +427,7 @@ static bool canraw_is_stopping(void *ctx)
     bool is_stopping = false;
     for (unsigned k = 0; k < self->map->axes; k++) {
         const canraw_axis_t *axis = &self->axis[k];
-        const bool is_under_way = axis->told_us != 0 && axis->told_us >= self->free_us;
+        const bool is_under_way = axis->command_us != 0 && axis->command_us >= self->free_us;
         is_stopping |= canraw_axis_is_stopping(axis) || is_under_way;
     }
     return is_stopping && !self->is_gone;
@@ -437,7 +437,7 @@ static void canraw_report(void *ctx, uint8_t k, drive_report_t *out)
 {
     const canraw_t *self = ctx;
     canraw_axis_words(&self->axis[k], self->map, k, self->now_us, out);
-    out->notes = canmaster_was_heard(&self->master, self->now_us) && self->map->other_master == CANRAW_MASTER_TELL
+    out->notes = canmaster_was_heard(&self->master, self->now_us) && self->map->other_master == CANRAW_MASTER_REPORT
                      ? 1u << DRIVE_NOTE_MASTER
                      : 0;
     if (self->master.is_listening) {

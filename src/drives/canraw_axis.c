@@ -21,20 +21,20 @@ static bool is_when(canraw_when_t when, uint32_t status)
     return when.mask != 0 && (status & when.mask) == when.value;
 }
 
-static void tell(canraw_axis_t *self, const canraw_map_t *map, canraw_command_t command)
+static void queue_command(canraw_axis_t *self, const canraw_map_t *map, canraw_command_t command)
 {
     self->pending = has(map, command) ? (uint8_t)command : CANRAW_NOTHING;
 }
 
 /* The frame that stops a drive: its own, and torque off at rest; else torque off. */
-static void tell_stop(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
+static void queue_stop(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
 {
     self->reset_asked_us = 0;
     if (!has(map, CANRAW_STOP)) {
-        tell(self, map, CANRAW_DISABLE);
+        queue_command(self, map, CANRAW_DISABLE);
         return;
     }
-    tell(self, map, CANRAW_STOP);
+    queue_command(self, map, CANRAW_STOP);
     if (has(map, CANRAW_DISABLE)) {
         quick_stop_begin(&self->quick_stop, now_us);
     }
@@ -46,9 +46,9 @@ static void keep_stopping(canraw_axis_t *self, const canraw_map_t *map, const ca
     if (canraw_axis_is_stopping(was)) {
         self->pending = was->pending == CANRAW_STOP || was->pending == CANRAW_DISABLE ? was->pending : CANRAW_NOTHING;
         self->quick_stop = was->quick_stop;
-        self->told_us = was->told_us;
+        self->command_us = was->command_us;
     } else if (was->is_energized) {
-        tell_stop(self, map, now_us);
+        queue_stop(self, map, now_us);
     }
 }
 
@@ -86,7 +86,7 @@ void canraw_axis_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t co
     self->fault_code = code;
     self->guard = (drive_guard_t){.jump_q32 = 0};
     self->reset_until_us = 0;
-    tell_stop(self, map, now_us);
+    queue_stop(self, map, now_us);
 }
 
 void canraw_axis_fault_of_guard(canraw_axis_t *self, const canraw_map_t *map, const drive_guard_t *guard, uint64_t now_us)
@@ -97,7 +97,7 @@ void canraw_axis_fault_of_guard(canraw_axis_t *self, const canraw_map_t *map, co
 
 /* --- Received --- */
 
-static void take_homing(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint64_t now_us)
+static void judge_homing(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint64_t now_us)
 {
     const bool is_done = is_when(map->homing_done, status);
     if (self->state != DRIVE_HOMING) {
@@ -111,13 +111,13 @@ static void take_homing(canraw_axis_t *self, const canraw_map_t *map, uint32_t s
         canraw_axis_fault(self, map, CANRAW_FAULT_HOMING, now_us);
     } else if (!is_done) {
         self->is_homing_seen = true;
-    } else if (self->is_homing_seen || now_us - self->told_us >= HOMING_BEGIN_US) {
+    } else if (self->is_homing_seen || now_us - self->command_us >= HOMING_BEGIN_US) {
         self->is_homing_over = true;
         self->mark_us = now_us;
     }
 }
 
-static void take_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint32_t code)
+static void judge_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint32_t code)
 {
     if (is_when(map->fault_when, status)) {
         if (self->state != DRIVE_FAULT) {
@@ -136,17 +136,17 @@ static void take_fault(canraw_axis_t *self, const canraw_map_t *map, uint32_t st
 }
 
 /* The status of a reply that tells it; the field is there where the map judges by it. */
-static void take_status(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint64_t now_us)
+static void judge_status(canraw_axis_t *self, const canraw_map_t *map, uint32_t status, uint64_t now_us)
 {
     self->status = status;
     if (is_when(map->enabled_when, status)) {
         self->is_energized = has(map, CANRAW_DISABLE); /* whatever it was told */
     }
     if (map->fault_when.mask != 0) {
-        take_fault(self, map, status, self->told_code);
+        judge_fault(self, map, status, self->reported_code);
     }
     if (map->homing_query.length == 0 && has(map, CANRAW_HOME)) {
-        take_homing(self, map, status, now_us);
+        judge_homing(self, map, status, now_us);
     }
     if (self->state == DRIVE_ENABLED && map->enabled_when.mask != 0 && !is_when(map->enabled_when, status)) {
         self->state = DRIVE_DISABLED;
@@ -177,12 +177,12 @@ static bool is_repeated(canraw_axis_t *self, unsigned which, const canraw_frame_
 }
 
 /* What any reply may tell beside its own. */
-static void take_beside(canraw_axis_t *self, const canraw_frame_t *frame, unsigned slot, const uint8_t *data, uint64_t now_us)
+static void apply_beside(canraw_axis_t *self, const canraw_frame_t *frame, unsigned slot, const uint8_t *data, uint64_t now_us)
 {
     const canraw_field_t *fault = canraw_find_of(frame, CANRAW_FAULT, slot);
     const canraw_field_t *torque = canraw_find_of(frame, CANRAW_TORQUE, slot);
     if (fault != NULL) {
-        self->told_code = (uint32_t)canraw_extract(fault, data);
+        self->reported_code = (uint32_t)canraw_extract(fault, data);
     }
     if (torque != NULL) {
         self->torque = canraw_extract(torque, data);
@@ -199,13 +199,13 @@ static void note_online(canraw_axis_t *self, const canraw_map_t *map, uint64_t n
         return;
     }
     if (self->is_energized && !canraw_axis_is_stopping(self)) { /* what it was told when it was lost may not have reached it */
-        tell_stop(self, map, now_us);
+        queue_stop(self, map, now_us);
     }
     self->is_online = true;
 }
 
-static bool take_position(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const uint8_t *data,
-                          uint64_t now_us)
+static bool apply_position(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const uint8_t *data,
+                           uint64_t now_us)
 {
     const canraw_frame_t *reply = &map->position_reply;
     const canraw_field_t *status = canraw_find_of(reply, CANRAW_STATUS, axis->reply_slot);
@@ -221,15 +221,15 @@ static bool take_position(canraw_axis_t *self, const canraw_map_t *map, const ca
     self->is_placed = true;
     self->has_actual = true;
     self->actual_us = now_us;
-    take_beside(self, reply, axis->reply_slot, data, now_us);
+    apply_beside(self, reply, axis->reply_slot, data, now_us);
     note_online(self, map, now_us);
     if (status != NULL && map->status_reply.length == 0) {
-        take_status(self, map, (uint32_t)canraw_extract(status, data), now_us);
+        judge_status(self, map, (uint32_t)canraw_extract(status, data), now_us);
     }
     return true;
 }
 
-static bool take_status_reply(canraw_axis_t *self, const canraw_map_t *map, unsigned slot, const uint8_t *data, uint64_t now_us)
+static bool receive_status(canraw_axis_t *self, const canraw_map_t *map, unsigned slot, const uint8_t *data, uint64_t now_us)
 {
     const canraw_frame_t *reply = &map->status_reply;
     if (is_repeated(self, 1, reply, data, now_us)) {
@@ -237,9 +237,9 @@ static bool take_status_reply(canraw_axis_t *self, const canraw_map_t *map, unsi
     }
     self->has_status = true;
     self->status_us = now_us;
-    take_beside(self, reply, slot, data, now_us);
+    apply_beside(self, reply, slot, data, now_us);
     note_online(self, map, now_us);
-    take_status(self, map, (uint32_t)canraw_extract(canraw_find_of(reply, CANRAW_STATUS, slot), data), now_us);
+    judge_status(self, map, (uint32_t)canraw_extract(canraw_find_of(reply, CANRAW_STATUS, slot), data), now_us);
     return true;
 }
 
@@ -255,21 +255,21 @@ static canraw_verdict_t nearer(canraw_verdict_t a, canraw_verdict_t b)
 }
 
 /* A frame on its reply_id. Returns false where it is none, and how near it comes. */
-static bool take_reply(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const can_frame_t *frame,
-                       canraw_verdict_t *verdict, uint64_t now_us)
+static bool receive_reply(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const can_frame_t *frame,
+                          canraw_verdict_t *verdict, uint64_t now_us)
 {
     const canraw_verdict_t homing = canraw_judge(&map->homing_reply, frame->data, frame->length);
     const canraw_verdict_t position = canraw_judge(&map->position_reply, frame->data, frame->length);
     if (homing == CANRAW_MATCH && is_expected(self, map, CANRAW_ASKED_HOMING)) {
         const canraw_field_t *status = canraw_find_of(&map->homing_reply, CANRAW_STATUS, axis->reply_slot);
         self->asked = CANRAW_ASKED_NOTHING;
-        take_homing(self, map, (uint32_t)canraw_extract(status, frame->data), now_us);
+        judge_homing(self, map, (uint32_t)canraw_extract(status, frame->data), now_us);
         return true;
     }
     if (position == CANRAW_MATCH && is_expected(self, map, CANRAW_ASKED_POSITION)) {
         self->asked = CANRAW_ASKED_NOTHING;
         *verdict = CANRAW_MATCH; /* what is wrong with it then is noted there */
-        return take_position(self, map, axis, frame->data, now_us);
+        return apply_position(self, map, axis, frame->data, now_us);
     }
     const bool is_late = homing == CANRAW_MATCH || position == CANRAW_MATCH;
     *verdict = is_late ? CANRAW_MATCH : nearer(*verdict, nearer(homing, position));
@@ -281,16 +281,16 @@ bool canraw_axis_receive(canraw_axis_t *self, const canraw_map_t *map, const can
 {
     canraw_verdict_t verdict = CANRAW_OTHER;
     self->heard_us = now_us;
-    if (canraw_startup_take(self, map, axis, frame, now_us)) {
+    if (canraw_startup_receive(self, map, axis, frame, now_us)) {
         return true;
     }
     if (map->status_reply.length != 0 && frame->id == axis->status_id) {
         verdict = canraw_judge(&map->status_reply, frame->data, frame->length);
         if (verdict == CANRAW_MATCH) {
-            return take_status_reply(self, map, axis->status_slot, frame->data, now_us);
+            return receive_status(self, map, axis->status_slot, frame->data, now_us);
         }
     }
-    if (frame->id == axis->reply_id && take_reply(self, map, axis, frame, &verdict, now_us)) {
+    if (frame->id == axis->reply_id && receive_reply(self, map, axis, frame, &verdict, now_us)) {
         return true;
     }
     if (verdict != CANRAW_MATCH) {
@@ -304,7 +304,7 @@ bool canraw_axis_receive(canraw_axis_t *self, const canraw_map_t *map, const can
 /* A position has come since the request and since the command went out; and a status, where it comes apart. */
 static bool is_heard(const canraw_axis_t *self, const canraw_map_t *map)
 {
-    const uint64_t since_us = self->mark_us > self->told_us ? self->mark_us : self->told_us;
+    const uint64_t since_us = self->mark_us > self->command_us ? self->mark_us : self->command_us;
     const bool is_status = map->status_reply.length == 0 || self->status_us > since_us;
     return self->pending == CANRAW_NOTHING && self->actual_us > since_us && is_status;
 }
@@ -327,7 +327,7 @@ void canraw_axis_note_off(canraw_axis_t *self, const canraw_map_t *map)
 static void begin_reset(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
 {
     self->reset_asked_us = 0;
-    tell(self, map, CANRAW_RESET);
+    queue_command(self, map, CANRAW_RESET);
     if (map->fault_when.mask != 0) {
         self->reset_until_us = now_us + RESET_US;
     } else {
@@ -345,8 +345,8 @@ bool canraw_axis_is_stopping(const canraw_axis_t *self)
 static void step_stop(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
 {
     if (self->pending == CANRAW_NOTHING &&
-        quick_stop_step(&self->quick_stop, self->actual_q32, self->actual_us, self->told_us, now_us)) {
-        tell(self, map, CANRAW_DISABLE);
+        quick_stop_step(&self->quick_stop, self->actual_q32, self->actual_us, self->command_us, now_us)) {
+        queue_command(self, map, CANRAW_DISABLE);
     }
     if (self->reset_asked_us != 0 && now_us - self->reset_asked_us > RESET_WAIT_US) {
         self->reset_asked_us = 0;
@@ -396,7 +396,7 @@ static void begin(canraw_axis_t *self, drive_state_t state, uint64_t now_us)
 static void begin_homing(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
 {
     begin(self, DRIVE_HOMING, now_us);
-    tell(self, map, CANRAW_HOME);
+    queue_command(self, map, CANRAW_HOME);
     self->is_homed = false;
     self->is_homing_seen = false;
     self->is_homing_over = !has(map, CANRAW_HOME);
@@ -408,7 +408,7 @@ void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_re
     case DRIVES_ENABLE:
         if (self->state == DRIVE_DISABLED) {
             begin(self, DRIVE_ENABLING, now_us);
-            tell(self, map, CANRAW_ENABLE);
+            queue_command(self, map, CANRAW_ENABLE);
             self->is_energized = has(map, CANRAW_DISABLE);
         }
         break;
@@ -419,9 +419,9 @@ void canraw_axis_request(canraw_axis_t *self, const canraw_map_t *map, drives_re
     case DRIVES_QUICK_STOP:
         self->reset_asked_us = 0;
         if (request == DRIVES_QUICK_STOP) {
-            tell_stop(self, map, now_us);
+            queue_stop(self, map, now_us);
         } else if (!canraw_axis_is_stopping(self)) { /* that goes on to its end */
-            tell(self, map, CANRAW_DISABLE);
+            queue_command(self, map, CANRAW_DISABLE);
         }
         self->state = self->state != DRIVE_FAULT ? DRIVE_DISABLED : DRIVE_FAULT;
         break;
@@ -443,8 +443,8 @@ bool canraw_axis_is_streaming(const canraw_axis_t *self, const canraw_map_t *map
 
 int64_t canraw_axis_held(const canraw_axis_t *self, const canraw_map_t *map)
 {
-    const bool is_told_off = map->enabled_when.mask != 0 && !is_when(map->enabled_when, self->status);
-    const bool is_off = is_told_off || (has(map, CANRAW_DISABLE) && !self->is_energized);
+    const bool is_reported_off = map->enabled_when.mask != 0 && !is_when(map->enabled_when, self->status);
+    const bool is_off = is_reported_off || (has(map, CANRAW_DISABLE) && !self->is_energized);
     return self->has_sent && !is_off ? self->sent_counts : self->counts;
 }
 

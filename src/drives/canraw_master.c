@@ -16,11 +16,11 @@ static bool is_of_master(const canraw_t *self, const can_frame_t *frame)
     return is_such && frame->is_extended == self->map->is_extended && !frame->is_rtr;
 }
 
-bool canraw_master_take(canraw_t *self, const can_frame_t *frame)
+bool canraw_master_receive(canraw_t *self, const can_frame_t *frame)
 {
     const bool is_such = is_of_master(self, frame);
     if (is_such) {
-        canmaster_take(&self->master, CANRAW_OTHER_MASTER);
+        canmaster_note(&self->master, CANRAW_OTHER_MASTER);
     }
     return is_such;
 }

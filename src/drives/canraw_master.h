@@ -10,7 +10,7 @@
 void canraw_master_begin(canraw_t *self);
 
 /** @return true: it is of another master */
-bool canraw_master_take(canraw_t *self, const can_frame_t *frame);
+bool canraw_master_receive(canraw_t *self, const can_frame_t *frame);
 
 /** Once per poll, behind what was received and what has become of the bus. */
 void canraw_master_step(canraw_t *self);

@@ -40,8 +40,8 @@ bool canraw_startup_is_mixed(const canraw_step_t *step, const canraw_frame_t *re
 
 /* Anything from a drive that was silent: whatever it was sent meanwhile it may not have heard.
  * Returns true for the answer to a step. */
-bool canraw_startup_take(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const can_frame_t *frame,
-                         uint64_t now_us)
+bool canraw_startup_receive(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const can_frame_t *frame,
+                            uint64_t now_us)
 {
     const bool is_awaited = self->is_step_sent && frame->id == axis->reply_id;
     if (is_awaited && is_answer(&map->step[self->step].answer, frame)) {

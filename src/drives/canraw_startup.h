@@ -13,8 +13,8 @@ bool canraw_startup_is_over(const canraw_axis_t *self, const canraw_map_t *map);
 
 /** A frame on one of its identifiers.
  *  @return true for the answer to a step */
-bool canraw_startup_take(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const can_frame_t *frame,
-                         uint64_t now_us);
+bool canraw_startup_receive(canraw_axis_t *self, const canraw_map_t *map, const canraw_axis_map_t *axis, const can_frame_t *frame,
+                            uint64_t now_us);
 
 /** The frame that is due, or NULL. */
 const canraw_frame_t *canraw_startup_next(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us);

@@ -43,7 +43,7 @@ static const char *text_of_strange(canraw_verdict_t verdict)
 }
 
 /* At the start there is time for the first frame. */
-static void tell_missing(const canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us, drive_report_t *out)
+static void describe_missing(const canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us, drive_report_t *out)
 {
     if (self->heard_us == 0 && now_us - self->phase_us <= (uint64_t)map->offline_periods * map->period_us) {
         return;
@@ -69,7 +69,7 @@ static drive_telemetry_t telemetry_of(const canraw_axis_t *self, const canraw_ma
     const int64_t permille = fx_clamp(self->torque * 1000 / (int64_t)map->rated_torque, -INT32_MAX, INT32_MAX);
     return (drive_telemetry_t){.at_us = self->torque_us,
                                .torque_permille = (int32_t)(map->axis[k].scale.num < 0 ? -permille : permille),
-                               .has = DRIVE_TELLS_TORQUE};
+                               .has = DRIVE_HAS_TORQUE};
 }
 
 void canraw_listening_words(bool is_led, drive_report_t *out)
@@ -97,11 +97,11 @@ void canraw_axis_words(const canraw_axis_t *self, const canraw_map_t *map, unsig
         out->code = CANRAW_STRANGE + (uint32_t)self->trouble - CANRAW_OTHER;
         out->trouble = text_of_strange(self->trouble);
     } else if (!self->is_online) {
-        tell_missing(self, map, now_us, out);
-    } else if (self->told_code != 0) {
-        out->code = CANRAW_TELLS_ERROR;
+        describe_missing(self, map, now_us, out);
+    } else if (self->reported_code != 0) {
+        out->code = CANRAW_REPORTS_ERROR;
         out->trouble = "it tells of an error, and goes on";
         out->detail = "its fault code";
-        out->detail_code = self->told_code;
+        out->detail_code = self->reported_code;
     }
 }

@@ -53,7 +53,7 @@ static uint16_t mask_of(const coil_relays_t *self, const modbus_result_t *result
 }
 
 /* A read has values, a write that worked has none: then the board has what it was told. */
-static void take_answer(coil_relays_t *self, const modbus_result_t *result)
+static void apply_answer(coil_relays_t *self, const modbus_result_t *result)
 {
     self->failures = 0;
     self->calls = 0;
@@ -62,7 +62,7 @@ static void take_answer(coil_relays_t *self, const modbus_result_t *result)
     self->is_written = self->reported == self->wanted;
 }
 
-static void take_result(coil_relays_t *self)
+static void receive_result(coil_relays_t *self)
 {
     modbus_result_t result;
     if (hal_modbus_poll(self->config.line, self->config.slot, &result) != HV_OK || result.tag != self->tag) {
@@ -70,7 +70,7 @@ static void take_result(coil_relays_t *self)
     }
     self->is_asking = false;
     if (result.status == HV_OK && (result.count == 0 || result.count == self->config.count)) {
-        take_answer(self, &result);
+        apply_answer(self, &result);
     } else if (self->failures < COIL_RELAYS_TRIES) {
         self->failures++;
     }
@@ -111,7 +111,7 @@ static hv_status_t relays_read_back(void *ctx, uint16_t *mask)
 {
     coil_relays_t *self = ctx;
     if (self->config.count > 0) {
-        take_result(self);
+        receive_result(self);
         self->calls += self->calls < self->config.look_calls;
         if (self->is_asking && self->calls == self->config.look_calls) {
             self->failures = COIL_RELAYS_TRIES; /* the line's worker is stuck */

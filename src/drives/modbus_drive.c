@@ -77,11 +77,11 @@ static void receive(modbus_drive_t *self, unsigned k)
         if (axis->is_broadcast && result.tag == axis->write.tag) {
             end_broadcasts(self, self->map->axis[k].line);
         }
-        self->setpoints += modbus_drive_axis_take_write(axis, self->map, &result, self->now_us);
+        self->setpoints += modbus_drive_axis_receive_write(axis, self->map, &result, self->now_us);
         self->failures += result.status != HV_OK;
     }
     if (hal_modbus_poll(line_of(self, k), read_slot(k), &result) == HV_OK) {
-        modbus_drive_axis_take_read(axis, self->map, &self->map->axis[k].scale, &result, self->now_us);
+        modbus_drive_axis_receive_read(axis, self->map, &self->map->axis[k].scale, &result, self->now_us);
         self->failures += result.status != HV_OK;
     }
 }

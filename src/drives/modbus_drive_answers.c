@@ -18,8 +18,8 @@ static modbus_drive_trouble_t trouble_of(hv_status_t status)
 }
 
 /* A transaction of a slot has failed. What it was for is tried again, up to a limit; then the drive is gone. */
-static void take_failure(modbus_drive_axis_t *self, const modbus_drive_map_t *map, modbus_drive_slot_t *slot,
-                         const modbus_result_t *result, uint16_t object, uint64_t now_us)
+static void judge_failure(modbus_drive_axis_t *self, const modbus_drive_map_t *map, modbus_drive_slot_t *slot,
+                          const modbus_result_t *result, uint16_t object, uint64_t now_us)
 {
     const modbus_drive_trouble_t trouble = trouble_of(result->status);
     slot->failures++;
@@ -41,7 +41,7 @@ HV_WRAPS static bool is_current(modbus_drive_slot_t *slot, const modbus_result_t
     return true;
 }
 
-static void take_homing(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+static void judge_homing(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     const bool is_done =
         !modbus_drive_phase_has(map, MODBUS_DRIVE_HOME) || modbus_drive_phase_is_when(map->homing_done, self->status);
@@ -66,7 +66,7 @@ static void take_homing(modbus_drive_axis_t *self, const modbus_drive_map_t *map
 }
 
 /* Feedback that was asked for after the torque went on. */
-static void take_enabling(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+static void judge_enabling(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     const bool has_torque = map->enabled_when.mask == 0 || modbus_drive_phase_is_when(map->enabled_when, self->status);
     if (self->phase == MODBUS_DRIVE_CONFIRMING && self->read_us >= self->mark_us && has_torque) {
@@ -105,7 +105,7 @@ static void note_torque(modbus_drive_axis_t *self, const modbus_drive_map_t *map
 }
 
 /* All blocks of the feedback are there. */
-static void take_feedback(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const counts_scale_t *scale, uint64_t now_us)
+static void apply_feedback(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const counts_scale_t *scale, uint64_t now_us)
 {
     unsigned block = 0;
     const modbus_drive_field_t *position = modbus_drive_find(&map->feedback, MODBUS_DRIVE_POSITION, &block);
@@ -122,22 +122,22 @@ static void take_feedback(modbus_drive_axis_t *self, const modbus_drive_map_t *m
         modbus_drive_phase_begin_startup(self, map, now_us);
     }
     if (modbus_drive_phase_is_up(self)) {
-        modbus_drive_phase_take_fault(self, map, now_us);
-        take_homing(self, map, now_us);
-        take_enabling(self, map, now_us);
+        modbus_drive_phase_enter_fault(self, map, now_us);
+        judge_homing(self, map, now_us);
+        judge_enabling(self, map, now_us);
     }
     note_torque(self, map);
 }
 
-void modbus_drive_axis_take_read(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const counts_scale_t *scale,
-                                 const modbus_result_t *result, uint64_t now_us)
+void modbus_drive_axis_receive_read(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const counts_scale_t *scale,
+                                    const modbus_result_t *result, uint64_t now_us)
 {
     const modbus_drive_block_t *block = &map->feedback.block[self->read_step];
     if (!is_current(&self->read, result)) {
         return;
     }
     if (result->status != HV_OK || result->count != block->count) {
-        take_failure(self, map, &self->read, result, block->address, now_us);
+        judge_failure(self, map, &self->read, result, block->address, now_us);
         return;
     }
     self->read.failures = 0;
@@ -147,13 +147,13 @@ void modbus_drive_axis_take_read(modbus_drive_axis_t *self, const modbus_drive_m
     self->read_step++;
     if (self->read_step == map->feedback.count) {
         self->read_step = 0;
-        take_feedback(self, map, scale, now_us);
+        apply_feedback(self, map, scale, now_us);
     }
 }
 
 /* --- What was written --- */
 
-static void refuse(modbus_drive_axis_t *self, uint32_t trouble, uint16_t object, uint64_t now_us)
+static void reject(modbus_drive_axis_t *self, uint32_t trouble, uint16_t object, uint64_t now_us)
 {
     modbus_drive_phase_enter(self, MODBUS_DRIVE_REFUSED, now_us);
     modbus_drive_phase_note_trouble(self, trouble, object, now_us);
@@ -162,13 +162,13 @@ static void refuse(modbus_drive_axis_t *self, uint32_t trouble, uint16_t object,
 }
 
 /* An item was written, or read back. */
-static void take_item(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_result_t *result, uint64_t now_us)
+static void receive_item(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_result_t *result, uint64_t now_us)
 {
     const modbus_drive_item_t *item = &map->item[self->step];
     const bool is_read = self->is_checking || !item->is_written;
     if (is_read && (result->count != 1 || result->value[0] != item->value)) {
         self->exception = 0;
-        refuse(self, MODBUS_DRIVE_VALUE, item->address, now_us);
+        reject(self, MODBUS_DRIVE_VALUE, item->address, now_us);
         return;
     }
     self->is_checking = !is_read && item->is_checked;
@@ -215,7 +215,7 @@ static uint16_t address_of(const modbus_drive_axis_t *self, const modbus_drive_m
     return modbus_drive_phase_blocks_of(self, map)->block[self->step].address;
 }
 
-static bool take_block(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+static bool receive_block(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     const bool is_setpoint = self->job == MODBUS_DRIVE_JOB_SETPOINT && self->phase == MODBUS_DRIVE_ENABLED;
     self->step++;
@@ -240,25 +240,25 @@ void modbus_drive_axis_end_broadcast(modbus_drive_axis_t *self)
 }
 
 /* During start-up a drive that will not have a value is a case of its own: it is there, and not as it has to be. */
-bool modbus_drive_axis_take_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_result_t *result,
-                                  uint64_t now_us)
+bool modbus_drive_axis_receive_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_result_t *result,
+                                     uint64_t now_us)
 {
     if (!is_current(&self->write, result)) { /* nor is one where there is no job: its start has forgotten them all */
         return false;
     }
     if (result->status == HV_ERR_STATE && self->phase == MODBUS_DRIVE_STARTING && self->write.failures >= map->retries) {
         self->exception = result->exception;
-        refuse(self, MODBUS_DRIVE_EXCEPTION, address_of(self, map), now_us);
+        reject(self, MODBUS_DRIVE_EXCEPTION, address_of(self, map), now_us);
         return false;
     }
     if (result->status != HV_OK) {
-        take_failure(self, map, &self->write, result, address_of(self, map), now_us);
+        judge_failure(self, map, &self->write, result, address_of(self, map), now_us);
         return false;
     }
     self->write.failures = 0;
     if (self->job == MODBUS_DRIVE_JOB_STARTUP) {
-        take_item(self, map, result, now_us);
+        receive_item(self, map, result, now_us);
         return false;
     }
-    return take_block(self, map, now_us);
+    return receive_block(self, map, now_us);
 }

@@ -19,7 +19,7 @@ void modbus_drive_axis_init(modbus_drive_axis_t *self, const modbus_drive_map_t 
 
 static void begin_reset(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
-    modbus_drive_phase_tell(self, map, MODBUS_DRIVE_RESET);
+    modbus_drive_phase_command(self, map, MODBUS_DRIVE_RESET);
     self->mark_us = now_us;
     self->reset_until_us = now_us + RESET_US;
 }
@@ -40,7 +40,7 @@ static void end_startup(modbus_drive_axis_t *self, const modbus_drive_map_t *map
     modbus_drive_phase_enter(self, MODBUS_DRIVE_READY, now_us);
     modbus_drive_phase_note_trouble(self, MODBUS_DRIVE_NO_TROUBLE, 0, now_us);
     modbus_drive_phase_start_job(self, MODBUS_DRIVE_NO_JOB);
-    modbus_drive_phase_take_fault(self, map, now_us);
+    modbus_drive_phase_enter_fault(self, map, now_us);
 }
 
 void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
@@ -60,7 +60,7 @@ void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t 
     }
     if (self->job == MODBUS_DRIVE_NO_JOB &&
         quick_stop_step(&self->quick_stop, self->actual_q32, self->actual_us, self->mark_us, now_us)) {
-        modbus_drive_phase_tell(self, map, MODBUS_DRIVE_DISABLE);
+        modbus_drive_phase_command(self, map, MODBUS_DRIVE_DISABLE);
     }
     if (self->reset_asked_us != 0 && now_us - self->reset_asked_us > RESET_WAIT_US) {
         self->reset_asked_us = 0;
@@ -167,7 +167,7 @@ bool modbus_drive_axis_next_write(modbus_drive_axis_t *self, const modbus_drive_
 static void begin_homing(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     modbus_drive_phase_enter(self, MODBUS_DRIVE_HOMING, now_us);
-    modbus_drive_phase_tell(self, map, MODBUS_DRIVE_HOME);
+    modbus_drive_phase_command(self, map, MODBUS_DRIVE_HOME);
     self->mark_us = now_us;
     self->is_homed = false;
     self->is_homing_seen = false;
@@ -189,10 +189,10 @@ static void begin_following(modbus_drive_axis_t *self, const modbus_drive_map_t 
 static void stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map, bool is_quick, uint64_t now_us)
 {
     if (is_quick) {
-        modbus_drive_phase_tell_stop(self, map, now_us);
+        modbus_drive_phase_command_stop(self, map, now_us);
         self->is_broadcast = map->is_broadcast && self->job == MODBUS_DRIVE_JOB_COMMAND;
     } else if (!modbus_drive_phase_is_stopping(self)) {
-        modbus_drive_phase_tell(self, map, MODBUS_DRIVE_DISABLE);
+        modbus_drive_phase_command(self, map, MODBUS_DRIVE_DISABLE);
     }
     if (self->phase != MODBUS_DRIVE_FAULT) {
         modbus_drive_phase_enter(self, MODBUS_DRIVE_READY, now_us);

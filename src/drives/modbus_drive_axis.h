@@ -16,10 +16,10 @@ void modbus_drive_axis_init(modbus_drive_axis_t *self, const modbus_drive_map_t 
 
 /** What became of a transaction of its read or its write slot.
  *  @return true where a set-point was confirmed by it */
-void modbus_drive_axis_take_read(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const counts_scale_t *scale,
-                                 const modbus_result_t *result, uint64_t now_us);
-bool modbus_drive_axis_take_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_result_t *result,
-                                  uint64_t now_us);
+void modbus_drive_axis_receive_read(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const counts_scale_t *scale,
+                                    const modbus_result_t *result, uint64_t now_us);
+bool modbus_drive_axis_receive_write(modbus_drive_axis_t *self, const modbus_drive_map_t *map, const modbus_result_t *result,
+                                     uint64_t now_us);
 
 /** A stop has gone to all drives of its line: now to itself. */
 void modbus_drive_axis_end_broadcast(modbus_drive_axis_t *self);

@@ -26,19 +26,19 @@ void modbus_drive_phase_start_job(modbus_drive_axis_t *self, modbus_drive_job_t 
     self->is_broadcast = false;
 }
 
-void modbus_drive_phase_tell(modbus_drive_axis_t *self, const modbus_drive_map_t *map, modbus_drive_command_t command)
+void modbus_drive_phase_command(modbus_drive_axis_t *self, const modbus_drive_map_t *map, modbus_drive_command_t command)
 {
     modbus_drive_phase_start_job(self, modbus_drive_phase_has(map, command) ? MODBUS_DRIVE_JOB_COMMAND : MODBUS_DRIVE_NO_JOB);
     self->command = command;
 }
 
-void modbus_drive_phase_tell_stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+void modbus_drive_phase_command_stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     if (!modbus_drive_phase_has(map, MODBUS_DRIVE_STOP)) {
-        modbus_drive_phase_tell(self, map, MODBUS_DRIVE_DISABLE);
+        modbus_drive_phase_command(self, map, MODBUS_DRIVE_DISABLE);
         return;
     }
-    modbus_drive_phase_tell(self, map, MODBUS_DRIVE_STOP);
+    modbus_drive_phase_command(self, map, MODBUS_DRIVE_STOP);
     if (modbus_drive_phase_has(map, MODBUS_DRIVE_DISABLE)) {
         quick_stop_begin(&self->quick_stop, now_us);
     }
@@ -76,7 +76,7 @@ void modbus_drive_phase_fail(modbus_drive_axis_t *self, const modbus_drive_map_t
     self->guard = (drive_guard_t){.jump_q32 = 0};
     self->reset_until_us = 0;
     self->reset_asked_us = 0;
-    modbus_drive_phase_tell_stop(self, map, now_us);
+    modbus_drive_phase_command_stop(self, map, now_us);
 }
 
 bool modbus_drive_phase_is_up(const modbus_drive_axis_t *self)
@@ -112,7 +112,7 @@ void modbus_drive_phase_place(modbus_drive_axis_t *self, uint64_t now_us)
 void modbus_drive_phase_begin_startup(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     modbus_drive_phase_enter(self, MODBUS_DRIVE_STARTING, now_us);
-    modbus_drive_phase_tell(self, map, MODBUS_DRIVE_DISABLE);
+    modbus_drive_phase_command(self, map, MODBUS_DRIVE_DISABLE);
     if (self->job == MODBUS_DRIVE_NO_JOB) {
         modbus_drive_phase_start_job(self, MODBUS_DRIVE_JOB_STARTUP);
     }
@@ -121,7 +121,7 @@ void modbus_drive_phase_begin_startup(modbus_drive_axis_t *self, const modbus_dr
 void modbus_drive_phase_begin_enabling(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     modbus_drive_phase_enter(self, MODBUS_DRIVE_ENABLING, now_us);
-    modbus_drive_phase_tell(self, map, MODBUS_DRIVE_ENABLE);
+    modbus_drive_phase_command(self, map, MODBUS_DRIVE_ENABLE);
     self->is_energized = modbus_drive_phase_has(map, MODBUS_DRIVE_DISABLE);
     if (self->job == MODBUS_DRIVE_NO_JOB) {
         modbus_drive_phase_end_command(self, map, now_us);
@@ -150,7 +150,7 @@ static uint32_t own_code(const modbus_drive_axis_t *self)
     return code != 0 ? code : 1u;
 }
 
-void modbus_drive_phase_take_fault(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+void modbus_drive_phase_enter_fault(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     if (modbus_drive_phase_is_faulty(self, map)) {
         if (self->phase != MODBUS_DRIVE_FAULT) {

@@ -39,11 +39,11 @@ void modbus_drive_phase_forget(modbus_drive_slot_t *slot);
 void modbus_drive_phase_start_job(modbus_drive_axis_t *self, modbus_drive_job_t job);
 
 /** Writes a command; nothing where the map has no such command. */
-void modbus_drive_phase_tell(modbus_drive_axis_t *self, const modbus_drive_map_t *map, modbus_drive_command_t command);
+void modbus_drive_phase_command(modbus_drive_axis_t *self, const modbus_drive_map_t *map, modbus_drive_command_t command);
 
 /** Writes what stops the drive: `stop`, or `disable` where the map has no `stop`. Where it has both, `disable` follows at rest.
  */
-void modbus_drive_phase_tell_stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us);
+void modbus_drive_phase_command_stop(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us);
 
 /** Why the drive is not usable, and since when. object: the register concerned, or 0 */
 void modbus_drive_phase_note_trouble(modbus_drive_axis_t *self, uint32_t trouble, uint16_t object, uint64_t now_us);
@@ -55,7 +55,7 @@ void modbus_drive_phase_lose(modbus_drive_axis_t *self, const modbus_drive_map_t
 void modbus_drive_phase_fail(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint32_t code, uint64_t now_us);
 
 /** What follows from what the drive reports: it has a fault now, or its fault is gone after a reset. */
-void modbus_drive_phase_take_fault(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us);
+void modbus_drive_phase_enter_fault(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us);
 
 /** The target of the drive is set to where it is: before torque or right after it, and once more after homing. */
 void modbus_drive_phase_place(modbus_drive_axis_t *self, uint64_t now_us);

@@ -9,13 +9,13 @@ void quick_stop_begin(quick_stop_t *self, uint64_t now_us)
     self->rest_us = 0;
 }
 
-bool quick_stop_step(quick_stop_t *self, q32_t actual_q32, uint64_t actual_us, uint64_t told_us, uint64_t now_us)
+bool quick_stop_step(quick_stop_t *self, q32_t actual_q32, uint64_t actual_us, uint64_t command_us, uint64_t now_us)
 {
     if (!quick_stop_is_active(self)) {
         return false;
     }
     const bool has_moved = fx_abs(fx_sub_sat(actual_q32, self->rest_q32)) > QUICK_STOP_REST_Q32;
-    if (actual_us > told_us && (self->rest_us == 0 || has_moved)) {
+    if (actual_us > command_us && (self->rest_us == 0 || has_moved)) {
         self->rest_us = actual_us;
         self->rest_q32 = actual_q32;
     }

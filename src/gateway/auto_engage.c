@@ -13,7 +13,7 @@ void auto_engage_init(auto_engage_t *self, bool is_due, uint32_t cycle_us, uint3
 
 /* The ring holds the gap in front of each of the frames that are wanted. That in front of the oldest does not lie between them.
  */
-static void take_gap(auto_engage_t *self, uint32_t gap_cycles)
+static void add_gap(auto_engage_t *self, uint32_t gap_cycles)
 {
     self->gap_cycles[self->seen % self->frames] = (uint16_t)gap_cycles;
     self->seen++;
@@ -30,7 +30,7 @@ void auto_engage_frame(auto_engage_t *self, uint64_t now_us)
     if (gap_us > WINDOW_US) {
         auto_engage_init(self, self->is_due, self->cycle_us, self->frames);
     }
-    take_gap(self, self->seen > 0 ? (uint32_t)gap_us / self->cycle_us : 0);
+    add_gap(self, self->seen > 0 ? (uint32_t)gap_us / self->cycle_us : 0);
     self->last_us = now_us;
 }
 

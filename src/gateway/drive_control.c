@@ -140,7 +140,7 @@ void drive_control_after_motion(drive_control_t *self, const cycle_t *cycle, dri
     }
 }
 
-bool drive_control_takes_motion(const drive_control_t *self)
+bool drive_control_accepts_motion(const drive_control_t *self)
 {
     return self->unsent_cycles == 0 || self->is_tracking;
 }

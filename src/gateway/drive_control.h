@@ -48,7 +48,7 @@ void drive_control_after_motion(drive_control_t *self, const cycle_t *cycle, dri
 
 /** Motion waits for a bus that has not taken the last set: what the drives get next then follows on what they got last. Where the
  * set-points follow the drives there is nothing to wait for. */
-bool drive_control_takes_motion(const drive_control_t *self);
+bool drive_control_accepts_motion(const drive_control_t *self);
 
 /** Sends the set-points of the cycle. */
 void drive_control_send(drive_control_t *self, const cycle_t *cycle, const motion_output_t *output);

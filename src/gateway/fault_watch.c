@@ -50,7 +50,7 @@ static bool is_torque_expected(const fault_watch_in_t *in, unsigned i)
 }
 
 /* True where a cylinder has been further from its set-point than allowed for too long. */
-static bool is_left_behind(fault_watch_t *self, const fault_watch_in_t *in, unsigned i)
+static bool has_following_error(fault_watch_t *self, const fault_watch_in_t *in, unsigned i)
 {
     const q32_t window_q32 = q32_from_q16(in->settings->following_error_mm_q16);
     if (i >= in->cylinders || window_q32 == 0) {
@@ -87,7 +87,7 @@ static bool is_outside_stroke(const fault_watch_in_t *in, unsigned i)
 static fault_code_t judge_drive(fault_watch_t *self, const fault_watch_in_t *in, unsigned i)
 {
     const drive_state_t state = in->feedback.drive[i].state;
-    const bool is_behind = is_left_behind(self, in, i);
+    const bool is_behind = has_following_error(self, in, i);
     if (state == DRIVE_FAULT) {
         const drive_guard_t *guard = &in->feedback.drive[i].guard;
         return !drive_guard_is_found(guard) ? FAULT_DRIVE : guard->jump_q32 != 0 ? FAULT_SETPOINT_JUMP : FAULT_FOLLOWING;

@@ -38,7 +38,7 @@ HV_OWN_FRAME static void reject(frame_receiver_t *self, const frame_receiver_io_
     log_reject(self, io->log, reason, why->error, &self->datagram[why->start], why->end - why->start, &self->from, now_us);
 }
 
-HV_OWN_FRAME void frame_receiver_refuse(frame_receiver_t *self, const frame_receiver_io_t *io, frame_command_t command,
+HV_OWN_FRAME void frame_receiver_reject(frame_receiver_t *self, const frame_receiver_io_t *io, frame_command_t command,
                                         frame_error_t error, const char *why, const hal_udp_peer_t *from, uint64_t now_us)
 {
     char reason[HAL_LOG_TEXT_MAX + 1];

@@ -26,7 +26,7 @@ bool frame_receiver_next(frame_receiver_t *self, const settings_t *settings, con
 /** Counts and logs a valid frame that is not followed.
  *  @param error FRAME_ERR_PLATFORM or FRAME_ERR_MASK_FORM
  *  @param why   in words */
-void frame_receiver_refuse(frame_receiver_t *self, const frame_receiver_io_t *io, frame_command_t command, frame_error_t error,
+void frame_receiver_reject(frame_receiver_t *self, const frame_receiver_io_t *io, frame_command_t command, frame_error_t error,
                            const char *why, const hal_udp_peer_t *from, uint64_t now_us);
 
 #endif

@@ -168,11 +168,11 @@ void gateway_note_late(gateway_t *self, uint32_t cycles)
     self->sequencer.is_late |= cycles > self->settings->healthy.late_cycles;
 }
 
-void gateway_tell_fault(gateway_t *self, fault_code_t code, unsigned axis)
+void gateway_inject_fault(gateway_t *self, fault_code_t code, unsigned axis)
 {
     if ((unsigned)code < FAULT_CODES && axis <= drives_count(self->io.drives) && (axis != 0) == fault_is_of_axis(code)) {
-        self->sequencer.has_told = true;
-        self->sequencer.told[axis] |= 1u << (unsigned)code;
+        self->sequencer.has_injected = true;
+        self->sequencer.injected[axis] |= 1u << (unsigned)code;
     }
 }
 
@@ -203,7 +203,7 @@ static void write_relays(gateway_t *self, const cycle_t *cycle)
 }
 
 /* A frame may end a hold, and another sender's first one begins anew. */
-static void take_frame(gateway_t *self, sender_in_t *in, const cycle_t *cycle, const frame_t *frame)
+static void accept_frame(gateway_t *self, sender_in_t *in, const cycle_t *cycle, const frame_t *frame)
 {
     in->state = self->sequencer.supervisor.state;
     const sender_verdict_t verdict = sender_judge(&self->sender, in, frame);
@@ -233,7 +233,7 @@ static void receive_frames(gateway_t *self, const cycle_t *cycle)
     frame_receiver_begin(&self->receiver);
     sender_begin(&self->sender, now_us);
     while (frame_receiver_next(&self->receiver, self->settings, &in.io, now_us, &frame)) {
-        take_frame(self, &in, cycle, &frame);
+        accept_frame(self, &in, cycle, &frame);
     }
     in.state = self->sequencer.supervisor.state;
     sender_end(&self->sender, &in);
@@ -323,7 +323,7 @@ static void show_drives(snapshot_t *s, const cycle_t *cycle)
     for (unsigned i = 0; i < cycle->feedback.count; i++) {
         wear_step(&s->wear[i], &s->drive[i], cycle->settings->cycle_us);
     }
-    plate_take(&s->plate, motion_kin(cycle->motion), s->drive, &s->sent, cycle->now_us);
+    plate_step(&s->plate, motion_kin(cycle->motion), s->drive, &s->sent, cycle->now_us);
 }
 
 static void publish(gateway_t *self, const cycle_t *cycle)
@@ -341,7 +341,7 @@ static void publish(gateway_t *self, const cycle_t *cycle)
     show_motion(s, &self->motion, &self->output);
     show_drives(s, cycle);
     service_publish(&self->sequencer.service, cycle, &s->service);
-    reports_take(&self->reports, self->io.drives, self->io.log, cycle->now_us, s->report);
+    reports_step(&self->reports, self->io.drives, self->io.log, cycle->now_us, s->report);
 }
 
 void gateway_cycle(gateway_t *self, uint64_t now_us)
@@ -353,7 +353,7 @@ void gateway_cycle(gateway_t *self, uint64_t now_us)
     sequencer_before_frames(sequencer, &cycle, self->io.inputs, is_bus_heard);
     receive_frames(self, &cycle);
     sequencer_after_frames(sequencer, &cycle);
-    if (drive_control_takes_motion(&sequencer->drive_control)) {
+    if (drive_control_accepts_motion(&sequencer->drive_control)) {
         motion_step(&self->motion, now_us, &self->output);
     }
     drive_control_send(&sequencer->drive_control, &cycle, &self->output);

@@ -42,7 +42,7 @@ static void keep(mask_guard_t *self, uint16_t mask)
 }
 
 /* Whether the recent masks are as many different ones as digits are. Where relays of all four bits of a digit are switched, there
- * are letters, too: an 8 or 9 and no letter is telling. */
+ * are letters, too: an 8 or 9 and no letter says decimal. */
 static bool are_digit_like(const mask_guard_t *self)
 {
     unsigned masks = 0, sums = 0, bits = 0;

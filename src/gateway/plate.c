@@ -72,7 +72,7 @@ static void filter(plate_t *self, uint64_t at_us)
     self->samples += self->samples < PLATE_SAMPLES;
 }
 
-void plate_take(plate_t *self, const kin_t *kin, const drive_feedback_t feedback[], const pose_t *guess, uint64_t now_us)
+void plate_step(plate_t *self, const kin_t *kin, const drive_feedback_t feedback[], const pose_t *guess, uint64_t now_us)
 {
     q32_t extension_mm_q32[CYLINDERS_MAX] = {0};
     uint64_t at_us = 0;

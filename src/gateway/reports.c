@@ -140,27 +140,27 @@ static bool is_news(uint32_t code, uint32_t detail_code, const drive_report_t *i
 }
 
 /* A trouble that comes and goes is logged less often; the last one is always logged. */
-static void tell_report(reports_t *self, hal_log_t log, unsigned axis, const drive_report_t *was, const drive_report_t *report,
-                        uint64_t now_us)
+static void log_change(reports_t *self, hal_log_t log, unsigned axis, const drive_report_t *was, const drive_report_t *report,
+                       uint64_t now_us)
 {
-    gateway_told_t *told = &self->told_of[axis];
-    const bool is_free = now_us + (uint64_t)(REPORT_BURST - 1u) * REPORT_LOG_US >= told->next_us;
-    if (is_news(told->code, told->detail_code, report) && is_free) {
-        log_report(log, axis, report, told->left_out);
-        *told = (gateway_told_t){.next_us = (told->next_us > now_us ? told->next_us : now_us) + REPORT_LOG_US,
-                                 .code = report->code,
-                                 .detail_code = report->detail_code};
+    report_log_t *line = &self->change_log[axis];
+    const bool is_free = now_us + (uint64_t)(REPORT_BURST - 1u) * REPORT_LOG_US >= line->next_us;
+    if (is_news(line->code, line->detail_code, report) && is_free) {
+        log_report(log, axis, report, line->left_out);
+        *line = (report_log_t){.next_us = (line->next_us > now_us ? line->next_us : now_us) + REPORT_LOG_US,
+                               .code = report->code,
+                               .detail_code = report->detail_code};
     } else {
-        told->left_out += is_news(was->code, was->detail_code, report);
+        line->left_out += is_news(was->code, was->detail_code, report);
     }
 }
 
-void reports_take(reports_t *self, drives_t drives, hal_log_t log, uint64_t now_us, drive_report_t shown[DRIVES_MAX])
+void reports_step(reports_t *self, drives_t drives, hal_log_t log, uint64_t now_us, drive_report_t shown[DRIVES_MAX])
 {
     for (uint8_t i = 0; i < drives_count(drives); i++) {
         drive_report_t report;
         (void)drives_report(drives, i, &report);
-        tell_report(self, log, i, &shown[i], &report, now_us);
+        log_change(self, log, i, &shown[i], &report, now_us);
         if (shown[i].notes != report.notes) {
             log_notes(log, i, &report);
         }

@@ -8,6 +8,6 @@
 
 /** Once per cycle. Drivers that tell nothing leave the texts empty.
  *  @param shown in: the reports of the last cycle; out: the present ones */
-void reports_take(reports_t *self, drives_t drives, hal_log_t log, uint64_t now_us, drive_report_t shown[DRIVES_MAX]);
+void reports_step(reports_t *self, drives_t drives, hal_log_t log, uint64_t now_us, drive_report_t shown[DRIVES_MAX]);
 
 #endif

@@ -8,10 +8,10 @@
 
 #define STREAM_PERIOD_US 250000u /* frames that follow each other so quickly may be those of a stream */
 
-static void refuse(const sender_in_t *in, frame_command_t command, frame_error_t error, const char *why,
+static void reject(const sender_in_t *in, frame_command_t command, frame_error_t error, const char *why,
                    const hal_udp_peer_t *from)
 {
-    frame_receiver_refuse(in->receiver, &in->io, command, error, why, from, in->now_us);
+    frame_receiver_reject(in->receiver, &in->io, command, error, why, from, in->now_us);
 }
 
 /* Whether the frame has a mask that relays may follow. */
@@ -33,7 +33,7 @@ static bool has_relay_mask(sender_t *self, const sender_in_t *in, const frame_t 
 }
 
 /* What the sender asks of the relays; bits that no relay has are counted. */
-static void take_mask(sender_t *self, const sender_in_t *in, const frame_t *frame)
+static void apply_mask(sender_t *self, const sender_in_t *in, const frame_t *frame)
 {
     const uint16_t wired = (uint16_t)((1u << in->settings->relays.count) - 1u);
     in->io.counters->relay_missing += (frame->relay_mask & FRAME_RELAY_MASK & ~(unsigned)wired) != 0;
@@ -183,9 +183,9 @@ static void watch_mask_habit(sender_t *self, const sender_in_t *in)
     }
 }
 
-HV_OWN_FRAME static void refuse_form(const sender_in_t *in, const frame_t *frame)
+HV_OWN_FRAME static void reject_form(const sender_in_t *in, const frame_t *frame)
 {
-    refuse(in, frame->command, FRAME_ERR_MASK_FORM,
+    reject(in, frame->command, FRAME_ERR_MASK_FORM,
            frame->has_mask ? "it has a relay mask, and frames here have none: a decimal comma, or a value too many? ([udp] mask)"
                            : "it has no relay mask, and frames here have one: a value too few? ([udp] mask)",
            &in->receiver->from);
@@ -193,12 +193,12 @@ HV_OWN_FRAME static void refuse_form(const sender_in_t *in, const frame_t *frame
 
 /* Tells motion of a target.
  * Returns false: it is impossible, and has been refused. */
-static bool tell_motion(sender_t *self, const sender_in_t *in, const motion_target_t *target, frame_command_t command,
+static bool send_target(sender_t *self, const sender_in_t *in, const motion_target_t *target, frame_command_t command,
                         const hal_udp_peer_t *from)
 {
     if (in->state == STATE_ENGAGED && motion_target(in->motion, target, in->now_us - in->receiver->waited_us) != HV_OK) {
         in->io.counters->impossible++;
-        refuse(in, command, FRAME_ERR_PLATFORM, "no pose has these extensions, or one too near a singularity", from);
+        reject(in, command, FRAME_ERR_PLATFORM, "no pose has these extensions, or one too near a singularity", from);
         return false;
     }
     log_spikes(self, in);
@@ -206,11 +206,11 @@ static bool tell_motion(sender_t *self, const sender_in_t *in, const motion_targ
 }
 
 /* The first ones of a cycle at once; then the newest one waits until there is no newer one, and counts as possible. */
-static bool take_target(sender_t *self, const sender_in_t *in, const motion_target_t *target, frame_command_t command)
+static bool queue_target(sender_t *self, const sender_in_t *in, const motion_target_t *target, frame_command_t command)
 {
     self->targets++;
     if (self->targets <= GATEWAY_TARGETS_PER_CYCLE) {
-        return tell_motion(self, in, target, command, &in->receiver->from);
+        return send_target(self, in, target, command, &in->receiver->from);
     }
     self->has_newest = true;
     self->newest = *target;
@@ -246,7 +246,7 @@ HV_OWN_FRAME static bool is_confirmed(sender_t *self, const sender_in_t *in, con
  * Returns false: it is impossible, and has been refused. */
 static bool follow(sender_t *self, const sender_in_t *in, const motion_target_t *target, frame_command_t command)
 {
-    const bool is_taken = take_target(self, in, target, command);
+    const bool is_taken = queue_target(self, in, target, command);
     if (is_taken) {
         confirm_followed(&self->confirm, target);
     }
@@ -281,11 +281,11 @@ sender_verdict_t sender_judge(sender_t *self, const sender_in_t *in, const frame
     const char *missing = target_missing(frame->command, kin_cylinders(motion_kin(in->motion)), in->settings->has_angle);
     const bool is_known = owner_is_known(&self->owner, from);
     if (missing != NULL) {
-        refuse(in, frame->command, FRAME_ERR_PLATFORM, missing, from);
+        reject(in, frame->command, FRAME_ERR_PLATFORM, missing, from);
         return SENDER_REFUSED;
     }
     if (!is_of_its_form(self, in, frame, is_known)) {
-        refuse_form(in, frame);
+        reject_form(in, frame);
         return SENDER_REFUSED;
     }
     const owner_verdict_t verdict = judge_owner(self, in, from);
@@ -328,7 +328,7 @@ bool sender_follow(sender_t *self, const sender_in_t *in, const frame_t *frame, 
     if (in->state != STATE_ENGAGED) {
         counters->not_followed++;
     } else if (!is_waiting && has_mask) {
-        take_mask(self, in, frame);
+        apply_mask(self, in, frame);
     }
     return true;
 }
@@ -343,7 +343,7 @@ void sender_end(sender_t *self, const sender_in_t *in)
 {
     if (self->has_newest) {
         self->has_newest = false;
-        (void)tell_motion(self, in, &self->newest, self->newest_command, &self->newest_from);
+        (void)send_target(self, in, &self->newest, self->newest_command, &self->newest_from);
     }
     log_jumps(self, in);
 }

@@ -115,7 +115,7 @@ static void watch_drives(sequencer_t *self, const cycle_t *cycle)
     }
 }
 
-static void raise_told(sequencer_t *self, unsigned axis, uint32_t codes, const cycle_t *cycle)
+static void raise_injected(sequencer_t *self, unsigned axis, uint32_t codes, const cycle_t *cycle)
 {
     const fault_watch_in_t in = watch_in(self, cycle);
     for (unsigned code = FAULT_NONE + 1u; codes >> code != 0; code++) {
@@ -128,16 +128,16 @@ static void raise_told(sequencer_t *self, unsigned axis, uint32_t codes, const c
     }
 }
 
-/* What gateway_tell_fault() was told and this cycle has not found by itself. */
-static void watch_told(sequencer_t *self, const cycle_t *cycle)
+/* Faults of gateway_inject_fault() that this cycle has not found by itself. */
+static void watch_injected(sequencer_t *self, const cycle_t *cycle)
 {
-    for (unsigned axis = 0; self->has_told && axis <= DRIVES_MAX; axis++) {
-        if (self->told[axis] != 0 && self->supervisor.state != STATE_OFF) {
-            raise_told(self, axis, self->told[axis] & ~self->faults.begun[axis], cycle);
+    for (unsigned axis = 0; self->has_injected && axis <= DRIVES_MAX; axis++) {
+        if (self->injected[axis] != 0 && self->supervisor.state != STATE_OFF) {
+            raise_injected(self, axis, self->injected[axis] & ~self->faults.begun[axis], cycle);
         }
-        self->told[axis] = 0;
+        self->injected[axis] = 0;
     }
-    self->has_told = false;
+    self->has_injected = false;
 }
 
 /* What cannot be read is an e-stop; of the others it is not known that they have changed. */
@@ -277,7 +277,7 @@ void sequencer_before_frames(sequencer_t *self, const cycle_t *cycle, hal_inputs
 {
     watch_bus(self, is_bus_heard, cycle);
     watch_drives(self, cycle);
-    watch_told(self, cycle);
+    watch_injected(self, cycle);
     watch_inputs(self, inputs, cycle);
     step_reset(self, cycle);
     step_abandoned(self, cycle);

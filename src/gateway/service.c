@@ -158,7 +158,7 @@ fault_code_t service_step(service_t *self, const cycle_t *cycle)
     }
     place_loose(self, cycle);
     if (moves_by_hand(self->doing) && motion_is_stopping(cycle->motion)) {
-        service_let_go(self, cycle->motion); /* motion stopped what led astray: that is no end of its own */
+        service_let_go(self, cycle->motion); /* motion stopped it before a singularity or an end: that is no end of its own */
     }
     if ((self->doing == SERVICE_HOME && self->homing == 0) ||
         (self->has_end && moves_by_hand(self->doing) && motion_is_done(cycle->motion))) {
@@ -337,7 +337,7 @@ static service_answer_t home(service_t *self, const cycle_t *cycle, const servic
     return SERVICE_DONE;
 }
 
-static service_answer_t take_relay(const cycle_t *cycle, uint8_t relay)
+static service_answer_t judge_relay(const cycle_t *cycle, uint8_t relay)
 {
     return relay < 1 || relay > cycle->settings->relays.count ? SERVICE_NO_SUCH
            : relay == cycle->settings->healthy.relay          ? SERVICE_PULSE
@@ -354,7 +354,7 @@ static service_answer_t start(service_t *self, const cycle_t *cycle, const servi
     case SERVICE_HOME:
         return home(self, cycle, request);
     case SERVICE_RELAY:
-        return take_relay(cycle, request->axis);
+        return judge_relay(cycle, request->axis);
     case SERVICE_SIGNAL_AXIS:
     case SERVICE_SIGNAL_POSE:
         return excite(self, cycle, request);

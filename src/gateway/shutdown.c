@@ -27,8 +27,8 @@ static void log_energized(hal_log_t log, uint32_t axes)
 
 void shutdown_step(shutdown_t *self, const shutdown_in_t *in, hal_log_t log, uint64_t now_us)
 {
-    const bool are_told = !in->is_disable_due || in->is_bus_lost;
-    if (!self->is_asked || !in->is_down || !are_told) {
+    const bool are_commanded = !in->is_disable_due || in->is_bus_lost;
+    if (!self->is_asked || !in->is_down || !are_commanded) {
         self->since_us = 0;
         return;
     }

@@ -232,7 +232,7 @@ static const row_t *find_row(const supervisor_t *self, event_t event, const supe
     return NULL;
 }
 
-static void take(supervisor_t *self, const row_t *row)
+static void apply(supervisor_t *self, const row_t *row)
 {
     if (row->to == STATE_HOLD) {
         self->interrupted = self->state;
@@ -266,7 +266,7 @@ action_t supervisor_event(supervisor_t *self, event_t event, const supervisor_vi
         self->ignored[event]++;
         return ACTION_NONE;
     }
-    take(self, row);
+    apply(self, row);
     return row->action;
 }
 

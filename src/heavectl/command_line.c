@@ -11,7 +11,7 @@
 #include "heavectl/ctl.h"
 #include "heavectl/identify.h"
 #include "heavectl/socket.h"
-#include "heavectl/usage.h"
+#include "heavectl/command_usage.h"
 
 #define FOR_MAX_S 1e9
 
@@ -43,7 +43,7 @@ static bool read_hz(const char *text, unsigned *out)
 }
 
 /* Takes an option; returns what is wrong with it, NULL if nothing is. */
-static const char *take_option(ctl_t *self, int option)
+static const char *accept_option(ctl_t *self, int option)
 {
     switch (option) {
     case OPTION_JSON:
@@ -103,7 +103,7 @@ static void hide_signs(int argc, char **argv)
     }
 }
 
-const char *ctl_take_options(ctl_t *self, int argc, char **argv)
+const char *ctl_parse_options(ctl_t *self, int argc, char **argv)
 {
     struct option known[USAGE_OPTIONS_MAX + 1];
     usage_options(&heavectl_usage, known);
@@ -114,7 +114,7 @@ const char *ctl_take_options(ctl_t *self, int argc, char **argv)
         if (option < 0) {
             return NULL;
         }
-        const char *wrong = take_option(self, option);
+        const char *wrong = accept_option(self, option);
         if (wrong != NULL) {
             return wrong;
         }
@@ -191,7 +191,7 @@ static bool join(ctl_t *self, char *const *word, int count)
     return true;
 }
 
-const char *ctl_take_command(ctl_t *self, int argc, char **argv)
+const char *ctl_parse_command(ctl_t *self, int argc, char **argv)
 {
     static char wrong[128];
     if (optind == argc) {

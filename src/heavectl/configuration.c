@@ -110,8 +110,8 @@ static int apply(ctl_t *self)
     }
     const bool is_sent = send_with(self->fd, line, fd);
     (void)close(fd);
-    const char *const told = is_sent ? ctl_receive(self, ctl_now_ms() + ANSWER_MS) : NULL;
-    return told != NULL ? ctl_show(self, told) : ctl_not_heard(self, "heaved does not answer");
+    const char *const heard = is_sent ? ctl_receive(self, ctl_now_ms() + ANSWER_MS) : NULL;
+    return heard != NULL ? ctl_show(self, heard) : ctl_not_heard(self, "heaved does not answer");
 }
 
 int configuration_run(ctl_t *self)

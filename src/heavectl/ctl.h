@@ -75,8 +75,8 @@ int ctl_show(const ctl_t *self, const char *line);
 
 /** Takes options and the command.
  *  @return NULL; or what is wrong with them */
-const char *ctl_take_options(ctl_t *self, int argc, char **argv);
-const char *ctl_take_command(ctl_t *self, int argc, char **argv);
+const char *ctl_parse_options(ctl_t *self, int argc, char **argv);
+const char *ctl_parse_command(ctl_t *self, int argc, char **argv);
 
 /** Whom to ask: what the command line names, then the environment, then what is there. @return exit code */
 int ctl_choose_socket(ctl_t *self);

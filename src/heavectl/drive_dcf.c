@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT
- * drive_dcf.c - what a drive is set to, as a file of the standard (DCF, CiA 306), and what differs from such a file; see drive.h.
+ * drive_dcf.c - what a drive is set to, as a file of the standard (DCF, CiA 306), and what differs from such a file; see
+ * drive_commands.h.
  */
 #include <errno.h>
 #include <inttypes.h>
@@ -15,7 +16,7 @@
 #include "common/sentence.h"
 #include "common/translate.h"
 #include "heave/cia402.h"
-#include "heavectl/drive.h"
+#include "heavectl/drive_commands.h"
 
 #define SETTINGS_MAX 4096u
 #define IDENTITY     0x1018
@@ -130,7 +131,7 @@ static int choose(const ctl_t *self, unsigned channel, settings_list_t *list)
 /* --- Reading --- */
 
 /* Bytes of an answer as a number; false: it has none, or of another length. */
-static bool take_value(const cJSON *answer, setting_t *setting)
+static bool parse_value(const cJSON *answer, setting_t *setting)
 {
     const char *hex = drive_text(answer, "hex");
     uint8_t bytes[4];
@@ -161,7 +162,7 @@ static int read_setting(ctl_t *self, unsigned drive, setting_t *setting, char *r
     if (!drive_is_good(answer)) {
         (void)snprintf(refusal, capacity, "%s", drive_text(answer, "error"));
         code = drive_is_missing(answer) ? EXIT_DONE : ctl_judge(answer);
-    } else if (!take_value(answer, setting)) {
+    } else if (!parse_value(answer, setting)) {
         (void)snprintf(refusal, capacity, N_("has %zu bytes"), strlen(drive_text(answer, "hex")) / 2u);
     }
     cJSON_Delete(answer);
@@ -344,7 +345,7 @@ static int64_t as_the_object_has_it(const setting_t *setting, int64_t value)
     return canopen_value(setting->is_signed ? CANOPEN_I32 : CANOPEN_U32, bytes, setting->bytes);
 }
 
-static void tell(const ctl_t *self, verdict_t *verdict, const setting_t *setting, int64_t wanted, const char *refusal)
+static void show_verdict(const ctl_t *self, verdict_t *verdict, const setting_t *setting, int64_t wanted, const char *refusal)
 {
     const canopen_object_t *row = canopen_object_find(setting->index, setting->sub);
     char place[16];
@@ -377,7 +378,7 @@ static int compare_one(ctl_t *self, unsigned drive, const eds_object_t *object, 
     if (code == EXIT_DONE && setting.has_value && setting.value == wanted) {
         verdict->same++;
     } else if (code == EXIT_DONE) {
-        tell(self, verdict, &setting, wanted, refusal);
+        show_verdict(self, verdict, &setting, wanted, refusal);
     }
     return code;
 }
@@ -400,7 +401,7 @@ static int compare_all(ctl_t *self, unsigned drive, uint32_t node, const eds_t *
     for (uint8_t i = 0; i < 2 && code == EXIT_DONE; i++) {
         setting_t own = {.index = IDENTITY, .sub = (uint8_t)(i + 1u), .bytes = 4, .has_value = true, .value = identity[i]};
         if (named[i].is_there && named[i].value != 0 && (uint32_t)named[i].value != identity[i]) {
-            tell(self, verdict, &own, named[i].value, "");
+            show_verdict(self, verdict, &own, named[i].value, "");
         }
     }
     for (size_t i = 0; i < eds->objects && code == EXIT_DONE; i++) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
- * drive_object.c - asks for an object of a drive, and shows it; see drive.h.
+ * drive_object.c - asks for an object of a drive, and shows it; see drive_commands.h.
  */
 #include <inttypes.h>
 #include <stdio.h>
@@ -9,7 +9,7 @@
 #include "common/message.h" // exit codes
 #include "common/sentence.h"
 #include "common/translate.h"
-#include "heavectl/drive.h"
+#include "heavectl/drive_commands.h"
 
 #define ANSWER_MS 30000 /* a drive that is slow, and slow settings for it */
 #define TRIES     40u

@@ -40,7 +40,7 @@ typedef struct {
     bool has_tick;
     bool is_pressed;    /**< heaved holds it */
     bool is_let_go_due; /**< the key has to be let go before it can begin again */
-    bool is_told;       /**< and the screen says so */
+    bool is_shown;      /**< and the screen says so */
     bool is_over;       /**< the run is */
     bool has_arrived;   /**< because of watch, or by itself */
     const hold_watch_t *watch;
@@ -49,7 +49,7 @@ typedef struct {
     size_t length;
 } hold_t;
 
-void hold_key_take(hold_key_t *self, int64_t now_ms)
+void hold_key_repeat(hold_key_t *self, int64_t now_ms)
 {
     if (!hold_key_is_held(self, now_ms) && (self->reads == 0 || now_ms - self->last_ms > HOLD_KEY_GAP_MS)) {
         *self = (hold_key_t){.since_ms = now_ms};
@@ -141,7 +141,7 @@ static void speak(hold_t *self)
 {
     const bool is_held = hold_key_is_held(&self->key, now_ms());
     self->is_let_go_due = self->is_let_go_due && !hold_key_is_let_go(&self->key, now_ms());
-    self->is_told = self->is_told && self->is_let_go_due;
+    self->is_shown = self->is_shown && self->is_let_go_due;
     if (self->asked != ASKED_NOTHING) {
         return;
     }
@@ -173,7 +173,7 @@ static const char *text_of(const cJSON *answer, const char *name)
     return cJSON_IsString(text) ? text->valuestring : "";
 }
 
-static void take_press(hold_t *self, const cJSON *answer, bool is_done)
+static void receive_press(hold_t *self, const cJSON *answer, bool is_done)
 {
     const char *why = text_of(answer, "why");
     self->is_pressed = is_done;
@@ -186,7 +186,7 @@ static void take_press(hold_t *self, const cJSON *answer, bool is_done)
 }
 
 /* What ends by itself has arrived; what ended otherwise takes a new press. */
-static void take_beat(hold_t *self, const cJSON *answer, bool is_done)
+static void receive_beat(hold_t *self, const cJSON *answer, bool is_done)
 {
     const bool is_finished = strcmp(text_of(answer, "doing"), "nothing") == 0;
     const bool has_come = is_finished && number_of(answer, "finished") == self->series && self->series != 0;
@@ -201,12 +201,12 @@ static void take_beat(hold_t *self, const cJSON *answer, bool is_done)
     } else if (!is_done && is_finished) {
         self->is_pressed = false;
         self->is_let_go_due = true;
-        self->is_told = true;
+        self->is_shown = true;
         show(_("stopped: let go of the key and hold it again"));
     }
 }
 
-static void take_answer(hold_t *self, const cJSON *answer)
+static void receive_answer(hold_t *self, const cJSON *answer)
 {
     const asked_t asked = self->asked;
     const bool is_done = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(answer, "ok"));
@@ -215,21 +215,21 @@ static void take_answer(hold_t *self, const cJSON *answer)
     self->has_tick = self->has_tick || tick != 0;
     self->tick = tick > self->tick ? tick : self->tick;
     if (asked == ASKED_PRESS) {
-        take_press(self, answer, is_done);
+        receive_press(self, answer, is_done);
     } else if (asked == ASKED_BEAT) {
-        take_beat(self, answer, is_done);
+        receive_beat(self, answer, is_done);
     } else if (!is_done) {
         end(self, EXIT_REFUSED, text_of(answer, "error"));
     }
 }
 
-static void take_lines(hold_t *self)
+static void receive_lines(hold_t *self)
 {
     char *newline = memchr(self->line, '\n', self->length);
     while (newline != NULL && !self->is_over) {
         *newline = '\0';
         cJSON *answer = cJSON_Parse(self->line);
-        take_answer(self, answer);
+        receive_answer(self, answer);
         cJSON_Delete(answer);
         self->length -= (size_t)(newline + 1 - self->line);
         memmove(self->line, newline + 1, self->length);
@@ -242,7 +242,7 @@ static void hear(hold_t *self)
     const ssize_t received = recv(self->fd, &self->line[self->length], sizeof self->line - self->length, MSG_DONTWAIT);
     if (received > 0) {
         self->length += (size_t)received;
-        take_lines(self);
+        receive_lines(self);
     } else if (received == 0 || (errno != EAGAIN && errno != EINTR)) {
         end(self, EXIT_UNAVAILABLE, N_("heaved has ended"));
     }
@@ -252,16 +252,16 @@ static void hear(hold_t *self)
 
 /* A key that is down already was meant for something else. Enter never counts: it ended the answer before, and the pause before
  * a key's first repeat looks as if it had been let go. */
-static void take_key(hold_t *self, bool is_enter)
+static void accept_key(hold_t *self, bool is_enter)
 {
     if (!is_enter) {
-        hold_key_take(&self->key, now_ms());
+        hold_key_repeat(&self->key, now_ms());
     } else if (!self->is_pressed) {
         hold_key_miss(&self->key, now_ms());
         self->is_let_go_due = true;
     }
-    if (self->is_let_go_due && !self->is_told) {
-        self->is_told = true;
+    if (self->is_let_go_due && !self->is_shown) {
+        self->is_shown = true;
         show(_("let go of the key first, then hold the space bar; q ends"));
     }
 }
@@ -282,7 +282,7 @@ static void read_keys(hold_t *self)
         }
         is_enter = is_enter || keys[i] == '\r' || keys[i] == '\n';
     }
-    take_key(self, is_enter);
+    accept_key(self, is_enter);
 }
 
 static void run(hold_t *self, const volatile sig_atomic_t *is_interrupted)

@@ -24,7 +24,7 @@ typedef struct {
 } hold_key_t;
 
 /** Notes that bytes of the key have arrived. */
-void hold_key_take(hold_key_t *self, int64_t now_ms);
+void hold_key_repeat(hold_key_t *self, int64_t now_ms);
 
 /** Whether the key is held now. */
 bool hold_key_is_held(hold_key_t *self, int64_t now_ms);

@@ -197,7 +197,7 @@ static int make_signal(run_t *self)
 
 /* --- The run --- */
 
-static void take_limits(run_t *self)
+static void read_limits(run_t *self)
 {
     cJSON *geometry = heaved_link_ask(&self->link, "geometry");
     const cJSON *cylinders = cJSON_GetObjectItemCaseSensitive(geometry, "cylinder_limits");
@@ -215,7 +215,7 @@ static bool begin(run_t *self, const char *path)
         (void)fail(EXIT_UNAVAILABLE, error_text(errno));
         return false;
     }
-    take_limits(self);
+    read_limits(self);
     if (send(self->link.fd, "samples\n", 8, MSG_NOSIGNAL) != 8) {
         return false;
     }

@@ -18,15 +18,15 @@
 #include "common/usage.h"
 #include "heavectl/configuration.h"
 #include "heavectl/ctl.h"
-#include "heavectl/drive.h"
+#include "heavectl/drive_commands.h"
 #include "heavectl/hold.h"
 #include "heavectl/identify.h"
 #include "heavectl/lists.h"
-#include "heavectl/profile.h"
+#include "heavectl/rig_profile.h"
 #include "heavectl/scope.h"
 #include "heavectl/selftest.h"
-#include "heavectl/setup.h"
-#include "heavectl/usage.h"
+#include "heavectl/setup_dialog.h"
+#include "heavectl/command_usage.h"
 #include "heavectl/view.h"
 
 #define ANSWER_MS     5000
@@ -312,7 +312,7 @@ int main(int argc, char **argv)
         return ctl_complain(EXIT_UNAVAILABLE, "the null device: %s", error_text(errno));
     }
     translate_begin();
-    const char *wrong = ctl_take_options(&ctl, argc, argv);
+    const char *wrong = ctl_parse_options(&ctl, argc, argv);
     if (wrong == NULL && ctl.command != NULL) {
         if (strcmp(ctl.command, "help") == 0) {
             usage_print(&heavectl_usage, stdout);
@@ -321,7 +321,7 @@ int main(int argc, char **argv)
         }
         return end_stdout(EXIT_DONE);
     }
-    wrong = wrong == NULL ? ctl_take_command(&ctl, argc, argv) : wrong;
+    wrong = wrong == NULL ? ctl_parse_command(&ctl, argc, argv) : wrong;
     if (wrong != NULL) {
         return ctl_complain(EXIT_BAD_USAGE, "%s; see heavectl --help", wrong);
     }

@@ -225,7 +225,7 @@ static double value(const run_t *self, const samples_record_t *record, const cha
     return column != NULL ? samples_value(column, record) : 0.0;
 }
 
-static void take_sample(const run_t *self, way_t *way, const samples_record_t *record)
+static void add_sample(const run_t *self, way_t *way, const samples_record_t *record)
 {
     const samples_column_t *z = samples_column_named(self->reader.header, "sent_z_mm", strlen("sent_z_mm"));
     const double z_mm = z != NULL ? samples_value(z, record) : 0.0;
@@ -254,7 +254,7 @@ static bool is_at_end(void *context, bool is_pressed)
     watched_t *self = context;
     samples_record_t record;
     while (samples_reader_next(&self->run->reader, &record)) {
-        take_sample(self->run, &self->way, &record);
+        add_sample(self->run, &self->way, &record);
     }
     if (!is_pressed) {
         self->way.moved_ms = heaved_link_now_ms();
@@ -388,8 +388,8 @@ static int finish(run_t *self, const char *file, const char *configuration, cons
 {
     char error[SELFTEST_NOTE_MAX];
     const bool is_passed = selftest_has_passed(&self->report) && !self->link.is_over;
-    const bool is_told = heaved_link_has_done(&self->link, is_passed ? "selftest passed" : "selftest failed", error);
-    if (!is_told) {
+    const bool is_accepted = heaved_link_has_done(&self->link, is_passed ? "selftest passed" : "selftest failed", error);
+    if (!is_accepted) {
         (void)complain(EXIT_REFUSED, error);
     }
     (void)heaved_link_has_done(&self->link, "service-off", error);
@@ -398,7 +398,7 @@ static int finish(run_t *self, const char *file, const char *configuration, cons
         (void)ctl_complain(EXIT_IO, "%s: %s", file, error_text(wrong));
     }
     printf("%s\n", is_passed ? _("self-test: passed") : _("self-test: failed"));
-    return !is_told ? EXIT_UNAVAILABLE : wrong != 0 ? EXIT_IO : is_passed ? EXIT_DONE : EXIT_REFUSED;
+    return !is_accepted ? EXIT_UNAVAILABLE : wrong != 0 ? EXIT_IO : is_passed ? EXIT_DONE : EXIT_REFUSED;
 }
 
 static bool begin(run_t *self, cJSON **plan, cJSON **status)

@@ -8,7 +8,7 @@
 #include "heavectl/setup_session.h"
 #include "setup/setup.h"
 
-/** Each does what the act of its name in setup.h says, and writes its result; false: session->error says why not. */
+/** Each does what the act of its name in setup_dialog.h says, and writes its result; false: session->error says why not. */
 typedef bool setup_motion_t(setup_session_t *session, const setup_t *setup, const setup_question_t *question,
                             char result[SETUP_ANSWER_MAX]);
 

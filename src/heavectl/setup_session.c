@@ -177,7 +177,7 @@ bool setup_session_load(setup_session_t *self, setup_t *setup)
     if (code != 0) {
         return fail(self, self->program, self->output);
     }
-    ini_text_take(&setup->start, self->output);
+    ini_text_load(&setup->start, self->output);
     return true;
 }
 

@@ -11,7 +11,7 @@
 #include "common/message.h" // exit codes
 #include "common/translate.h"
 #include "heavectl/ctl.h"
-#include "heavectl/drive.h"
+#include "heavectl/drive_commands.h"
 #include "heavectl/lists.h"
 #include "common/sentence.h"
 #include "heavectl/view.h"
@@ -62,9 +62,9 @@ const char *ctl_own_words(const cJSON *object, const char *name)
 {
     char own[32];
     (void)snprintf(own, sizeof own, "%s_%.2s", name, translate_language());
-    const cJSON *told = cJSON_GetObjectItemCaseSensitive(object, own);
+    const cJSON *translated = cJSON_GetObjectItemCaseSensitive(object, own);
     const cJSON *english = cJSON_GetObjectItemCaseSensitive(object, name);
-    return cJSON_IsString(told) ? told->valuestring : cJSON_IsString(english) ? translate(english->valuestring) : "?";
+    return cJSON_IsString(translated) ? translated->valuestring : cJSON_IsString(english) ? translate(english->valuestring) : "?";
 }
 
 /* What heaved said no to.

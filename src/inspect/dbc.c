@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "config/canraw.h"
+#include "config/canraw_section.h"
 
 #define FRAMES_MAX   (8u + CANRAW_STEPS_MAX)
 #define PREFIX_MAX   4u
@@ -61,7 +61,7 @@ static bool has_prefix(const canraw_frame_t *frame, unsigned bytes)
 }
 
 /* Whether so many bytes at the beginning tell all frames apart. */
-static bool is_telling(const group_t *self, unsigned bytes)
+static bool is_significant(const group_t *self, unsigned bytes)
 {
     for (unsigned i = 0; i < self->count; i++) {
         if (!has_prefix(self->frame[i], bytes)) {
@@ -80,7 +80,7 @@ static void find_prefix(group_t *self)
 {
     self->prefix = 0;
     for (unsigned bytes = 1; bytes <= PREFIX_MAX && self->count > 1 && self->prefix == 0; bytes++) {
-        self->prefix = is_telling(self, bytes) ? bytes : 0;
+        self->prefix = is_significant(self, bytes) ? bytes : 0;
     }
     self->count = self->prefix == 0 && self->count > 1 ? 1 : self->count;
 }

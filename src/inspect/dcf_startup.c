@@ -171,7 +171,7 @@ static void write_list(const import_t *self, const eds_t *file, bool is_common_w
 }
 
 /* Values that belong to no object: what they were meant for nobody knows. */
-static void tell_strays(const import_t *self, const eds_t *file, unsigned count[DCF_VERDICTS])
+static void show_strays(const import_t *self, const eds_t *file, unsigned count[DCF_VERDICTS])
 {
     count[DCF_STRANGE] += file->strays;
     if (file->strays > 0) {
@@ -211,7 +211,7 @@ unsigned dcf_write_startup(const eds_t *files, const char *const *names, unsigne
             fprintf(out, "\n[" FAMILY "-%u]\n", f + 1u);
         }
         write_list(&self, &files[f], false, own);
-        tell_strays(&self, &files[f], own);
+        show_strays(&self, &files[f], own);
         if (own[DCF_DEFAULT] > 0) {
             fprintf(out, _("; %u more hold their defaults\n"), own[DCF_DEFAULT]);
         }

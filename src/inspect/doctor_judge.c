@@ -397,7 +397,7 @@ void doctor_judge_node(doctor_report_t *report, const cia402_config_t *config, u
 
 /* --- Inventory --- */
 
-void doctor_take_name(char name[DOCTOR_NAME_MAX], const uint8_t *bytes, size_t length)
+void doctor_copy_name(char name[DOCTOR_NAME_MAX], const uint8_t *bytes, size_t length)
 {
     size_t at = 0;
     for (; at < length && at < DOCTOR_NAME_MAX - 1u && bytes[at] != 0; at++) {
@@ -467,8 +467,8 @@ void doctor_write_inventory(FILE *out, const cia402_config_t *config, const doct
     write_common(out, "vendor_id", DOCTOR_VENDOR, config->axes, node);
     write_common(out, "product_code", DOCTOR_PRODUCT, config->axes, node);
     for (unsigned k = 0; has_serial && k < config->axes; k++) {
-        const bool is_told = is_drive(&node[k]) && node[k].answer[DOCTOR_SERIAL] == DOCTOR_READ;
-        (void)fprintf(out, "%s0x%X", k == 0 ? "serial_numbers = " : ", ", is_told ? node[k].value[DOCTOR_SERIAL] : 0);
+        const bool is_known = is_drive(&node[k]) && node[k].answer[DOCTOR_SERIAL] == DOCTOR_READ;
+        (void)fprintf(out, "%s0x%X", k == 0 ? "serial_numbers = " : ", ", is_known ? node[k].value[DOCTOR_SERIAL] : 0);
     }
     (void)fprintf(out, "%s\n", has_serial ? "\n" : "");
 }

@@ -97,7 +97,7 @@ bool doctor_judge_wire(doctor_report_t *report, const config_can_t *config, cons
 void doctor_judge_host(doctor_report_t *report, const doctor_host_t *host);
 
 /** Keeps what prints of a name that a drive gives. */
-void doctor_take_name(char name[DOCTOR_NAME_MAX], const uint8_t *bytes, size_t length);
+void doctor_copy_name(char name[DOCTOR_NAME_MAX], const uint8_t *bytes, size_t length);
 
 /** What drives answered, as lines of [cia402]: identities where all have the same, serial numbers, and a comment for each.
  *  @param node for each drive of the configuration */

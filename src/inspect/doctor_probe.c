@@ -110,7 +110,7 @@ void doctor_probe_listen(doctor_probe_t *self, unsigned ms)
 /* --- CANopen --- */
 
 /* Frames of a node: the client takes what it waits for, the others are too many. */
-static unsigned take_answers(doctor_probe_t *self, sdo_t *sdo)
+static unsigned receive_answers(doctor_probe_t *self, sdo_t *sdo)
 {
     can_frame_t frame;
     unsigned extra = 0;
@@ -129,7 +129,7 @@ static unsigned transfer(doctor_probe_t *self, sdo_t *sdo)
     can_frame_t frame;
     unsigned extra = 0;
     while (sdo->state == SDO_BUSY) {
-        extra += take_answers(self, sdo);
+        extra += receive_answers(self, sdo);
         if (sdo_step(sdo, now_us(), &frame) && hal_can_send(self->bus, &frame) == HV_OK) {
             sdo_sent(sdo, now_us());
         } else if (doctor_probe_trouble(self) != NULL) {
@@ -149,7 +149,7 @@ static void read_object(doctor_probe_t *self, sdo_t *sdo, doctor_object_t object
     const uint64_t end_us = now_us();
     const bool is_first_try = end_us - begin_us < sdo->timeout_us;
     while (now_us() < end_us + EXTRA_US) {
-        extra += take_answers(self, sdo);
+        extra += receive_answers(self, sdo);
         pause_briefly();
     }
     out->extra_answers += is_first_try ? extra : 0; /* after a second try the answer to the first may come late */
@@ -172,7 +172,7 @@ void doctor_probe_node(doctor_probe_t *self, const cia402_axis_config_t *axis, u
         sdo_read(&sdo, doctor_name_index[name], 0, 1);
         (void)transfer(self, &sdo);
         if (sdo.state == SDO_DONE) {
-            doctor_take_name(out->name[name], sdo.value, sdo.size);
+            doctor_copy_name(out->name[name], sdo.value, sdo.size);
         }
     }
     out->nmt = self->nmt[axis->node];

@@ -6,7 +6,7 @@
 #include <math.h>
 
 #include "config/keys.h"
-#include "config/text.h"
+#include "config/config_text.h"
 
 /* What a row says. */
 typedef struct {

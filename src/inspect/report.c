@@ -11,13 +11,13 @@
 #include "common/columns.h"
 #include "common/translate.h"
 #include "config/bus.h"
-#include "config/cia402.h" // config_cia402_pp_lag_q32
+#include "config/cia402_section.h" // config_cia402_pp_lag_q32
 #include "config/hash.h"
 #include "config/keys.h"
 #include "config/layout.h"
-#include "config/modbus.h"
+#include "config/modbus_section.h"
 #include "config/scaling.h"
-#include "config/text.h"
+#include "config/config_text.h"
 #include "heave/ramp.h"
 #include "config/envelope.h"
 

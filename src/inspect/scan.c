@@ -23,7 +23,7 @@
 
 /* --- CANopen --- */
 
-static void tell_node(const doctor_node_t *node, unsigned id, FILE *out)
+static void show_node(const doctor_node_t *node, unsigned id, FILE *out)
 {
     const uint32_t *value = node->value;
     if (node->answer[DOCTOR_TYPE] == DOCTOR_READ && (value[DOCTOR_TYPE] & 0xFFFFu) != DRIVE_PROFILE) {
@@ -49,7 +49,7 @@ static bool ask_nodes(doctor_probe_t *probe, FILE *out)
     for (unsigned id = 1; id < DOCTOR_NODES && is_well; id++) {
         doctor_probe_node(probe, &(cia402_axis_config_t){.node = (uint8_t)id}, probe->nmt[id] >= 0 ? KNOWN_MS : NODE_MS, &node);
         if (node.answer[DOCTOR_TYPE] != DOCTOR_NO_ANSWER) {
-            tell_node(&node, id, out);
+            show_node(&node, id, out);
             is_well = node.extra_answers == 0;
         } else if (probe->nmt[id] >= 0) {
             fprintf(out, _("other node %u: has a heartbeat, and answers no SDO\n"), id);

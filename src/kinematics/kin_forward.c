@@ -83,7 +83,7 @@ static q32_t find_largest(unsigned count, const q32_t values_q32[])
 }
 
 /* Adds a solution to the unknown axes; arc lengths become degrees. */
-static void take_step(const kin_t *self, const q32_t step_q32[], const uint8_t axes[], pose_t *pose)
+static void apply_step(const kin_t *self, const q32_t step_q32[], const uint8_t axes[], pose_t *pose)
 {
     for (unsigned i = 0; i < self->cylinders; i++) {
         const q32_t change_q32 =
@@ -107,7 +107,7 @@ static hv_status_t iterate(const kin_t *self, const q32_t extension_mm_q32[], po
         if (!kin_solve(self->cylinders, matrix_q28, step_q32)) {
             return HV_ERR_RANGE;
         }
-        take_step(self, step_q32, axes, pose);
+        apply_step(self, step_q32, axes, pose);
         ++*iterations;
         if (is_last) {
             return HV_OK;

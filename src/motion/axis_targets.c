@@ -74,8 +74,8 @@ static void pull_slots_in(motion_t *self, q32_t slot_q32[AXES_MAX], const q32_t 
     }
 }
 
-void axis_targets_take(motion_t *self, const motion_target_t *target, q32_t slot_q32[AXES_MAX],
-                       q32_t extension_mm_q32[CYLINDERS_MAX])
+void axis_targets_accept(motion_t *self, const motion_target_t *target, q32_t slot_q32[AXES_MAX],
+                         q32_t extension_mm_q32[CYLINDERS_MAX])
 {
     q32_t scaled_q32[AXES_MAX];
     if (target->has_angle) {

@@ -13,8 +13,8 @@ bool axis_targets_can_assemble(const motion_t *self, const motion_target_t *targ
 /** The slots of a target; what they are scaled to is inside the limits, the whole pose in the workspace. Notes what was pulled
  * in.
  *  @param extension_mm_q32 out: of the scaled slots */
-void axis_targets_take(motion_t *self, const motion_target_t *target, q32_t slot_q32[AXES_MAX],
-                       q32_t extension_mm_q32[CYLINDERS_MAX]);
+void axis_targets_accept(motion_t *self, const motion_target_t *target, q32_t slot_q32[AXES_MAX],
+                         q32_t extension_mm_q32[CYLINDERS_MAX]);
 
 /** Slots with the intensity in force. */
 void axis_targets_scale(const motion_t *self, motion_space_t space, const q32_t slot_q32[AXES_MAX], q32_t scaled_q32[AXES_MAX]);

@@ -132,10 +132,10 @@ static void cut(motion_t *self, q32_t acc_q32[POSE_AXES], coordinated_step_t *to
     lead(self, acc_q32, to);
 }
 
-unsigned coordinated_step(motion_t *self, const ramp_ref_t ref[POSE_AXES], ramp_grip_t grip, coordinated_step_t *to)
+unsigned coordinated_step(motion_t *self, const ramp_ref_t ref[POSE_AXES], ramp_bandwidth_t bandwidth, coordinated_step_t *to)
 {
     q32_t acc_q32[POSE_AXES];
-    unsigned flags = ramp_aim_all(self->axis, POSE_AXES, ref, grip, acc_q32);
+    unsigned flags = ramp_aim_all(self->axis, POSE_AXES, ref, bandwidth, acc_q32);
     lead(self, acc_q32, to);
     if (to->limiting_cylinder == 0 && !can_all_follow(self, to)) {
         flags |= RAMP_ACCEL;

@@ -58,7 +58,7 @@ static bool prepare(ramp_t *ramp, const ramp_limits_t *share, int64_t times, int
     limits.jerk_per_cycle3_q32 = fx_mul_div(limits.jerk_per_cycle3_q32, times, parts);
     const bool is_ready = ramp_init(ramp, &limits, state->pos_q32) == HV_OK;
     if (is_ready) {
-        ramp_take_over(ramp, state);
+        ramp_adopt(ramp, state);
     }
     return is_ready;
 }

@@ -10,7 +10,7 @@
 #include "ref_history.h"
 #include "plan.h"
 #include "jump.h"
-#include "take_over.h"
+#include "fade_in.h"
 #include "coordinated_step.h"
 #include "active_axis.h"
 #include "axis_targets.h"
@@ -67,7 +67,7 @@ static void adopt_pose(motion_t *self)
     for (unsigned i = 0; i < POSE_AXES; i++) {
         const ramp_state_t state = state_from(pose, i);
         const ramp_state_t at_rest = {.pos_q32 = self->is_axis_moved[i] ? state.pos_q32 : 0};
-        ramp_take_over(&self->axis[i], is_resting || !self->is_axis_moved[i] ? &at_rest : &state);
+        ramp_adopt(&self->axis[i], is_resting || !self->is_axis_moved[i] ? &at_rest : &state);
         self->led[i] = self->axis[i].state;
     }
 }
@@ -198,7 +198,7 @@ static bool is_withheld(motion_t *self, const motion_target_t *target, uint64_t 
 {
     const uint32_t period_us = stream_is_live(&self->stream, now_us) ? stream_period_us(&self->stream) : 0;
     for (unsigned i = 0; i < POSE_AXES; i++) {
-        spike_filter_set_quantum(&self->gate, i, self->stream.curve.grain[i].quantum_q32);
+        spike_filter_set_quantum(&self->gate, i, self->stream.curve.quantum[i].quantum_q32);
     }
     if (target->space != MOTION_POSE || spike_filter_passes(&self->gate, now_us, period_us, target->value_q32)) {
         return false;
@@ -214,19 +214,19 @@ static bool has_jumped(const motion_t *self, bool is_sample)
            !self->is_taking_over && self->stream.phase == STREAM_RUNNING;
 }
 
-static void take_jump(motion_t *self, const motion_target_t *target)
+static void accept_jump(motion_t *self, const motion_target_t *target)
 {
     q32_t step_q32[POSE_AXES];
     for (unsigned i = 0; i < POSE_AXES; i++) {
         step_q32[i] = target->value_q32[i] - self->withheld.value_q32[i];
     }
-    jump_take(self, step_q32);
+    jump_accept(self, step_q32);
 }
 
 /* A sample, or a target by itself. */
-static void take_target(motion_t *self, const motion_target_t *target, bool is_sample, uint32_t hint_us, uint64_t now_us)
+static void accept_target(motion_t *self, const motion_target_t *target, bool is_sample, uint32_t hint_us, uint64_t now_us)
 {
-    axis_targets_take(self, target, self->slot_q32, self->slot_extension_mm_q32);
+    axis_targets_accept(self, target, self->slot_q32, self->slot_extension_mm_q32);
     self->pending = *target; /* has_pending is set if it has to wait for a stop */
     self->asked_cycles = is_sample ? 0 : ((int64_t)target->time_ms * 1000 + self->cycle_us / 2) / self->cycle_us;
     self->timed_end_us = is_sample ? 0 : now_us + (uint64_t)self->asked_cycles * self->cycle_us;
@@ -241,9 +241,9 @@ static void take_target(motion_t *self, const motion_target_t *target, bool is_s
         stream_place(&self->stream, now);
     }
     if (has_jumped(self, is_sample)) {
-        take_jump(self, target);
+        accept_jump(self, target);
     }
-    stream_hide_start(&self->stream, take_over_is_hidden(self));
+    stream_hide_start(&self->stream, fade_in_is_hidden(self));
     stream_hint_period(&self->stream, hint_us);
     stream_push(&self->stream, now_us, kin_followed(self), self->slot_q32);
     self->due = !is_sample ? DUE_TIMED : self->stream.phase == STREAM_RUNNING ? DUE_STREAM : DUE_STEP;
@@ -273,7 +273,7 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
     const bool may_return = is_sample || now_us - self->last_us >= RETURN_GAP_US;
     if (may_return && !self->is_taking_over && stream_returns_elsewhere(&self->stream, now_us, target->value_q32)) {
         self->pending = *target;
-        take_over_again(self);
+        fade_in_again(self);
         self->is_return = true;
         return;
     }
@@ -289,17 +289,17 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
         return;
     }
     if (!is_sample || !is_withheld(self, target, now_us)) {
-        take_target(self, target, is_sample, hint_us, now_us);
+        accept_target(self, target, is_sample, hint_us, now_us);
     }
 }
 
 /* A stream whose last sample was withheld ends at this sample. */
-static void take_last_word(motion_t *self, uint64_t now_us)
+static void accept_withheld(motion_t *self, uint64_t now_us)
 {
     if (spike_filter_is_overdue(&self->gate, now_us)) {
         spike_filter_reset(&self->gate);
         self->gate.is_step = true;
-        take_target(self, &self->withheld, true, 0, now_us);
+        accept_target(self, &self->withheld, true, 0, now_us);
     }
 }
 
@@ -322,8 +322,8 @@ static void plan_what_is_due(motion_t *self, uint64_t now_us)
 {
     const motion_due_t due = self->due;
     const bool is_first = self->is_taking_over && !self->is_fading;
-    if ((due == DUE_TIMED || due == DUE_STEP) && take_over_is_led_beyond(self)) {
-        take_over_again(self);
+    if ((due == DUE_TIMED || due == DUE_STEP) && fade_in_is_led_beyond(self)) {
+        fade_in_again(self);
         return;
     }
     self->due = DUE_NOTHING;
@@ -334,10 +334,10 @@ static void plan_what_is_due(motion_t *self, uint64_t now_us)
         axis_targets_scale(self, self->space, self->slot_q32, self->goal_q32);
     }
     if (due != DUE_NOTHING && is_first) {
-        take_over_begin(self);
+        fade_in_begin(self);
     }
     if (due != DUE_NOTHING && self->is_fading) {
-        take_over_aim(self, due != DUE_STREAM);
+        fade_in_aim(self, due != DUE_STREAM);
     }
     if (due == DUE_TIMED) {
         plan_timed(self, self->asked_cycles, is_first, now_us);
@@ -400,9 +400,9 @@ static void step_source(motion_t *self, ramp_ref_t ref[AXES_MAX])
 /* Pose axes through their ramps, into the workspace, to cylinders. */
 static void step_pose(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t *out)
 {
-    const ramp_grip_t grip = self->source == MOTION_STREAMED ? RAMP_SOFT : RAMP_FIRM;
+    const ramp_bandwidth_t bandwidth = self->source == MOTION_STREAMED ? RAMP_SOFT : RAMP_FIRM;
     coordinated_step_t to;
-    const unsigned flags = coordinated_step(self, ref, grip, &to);
+    const unsigned flags = coordinated_step(self, ref, bandwidth, &to);
     for (unsigned i = 0; i < POSE_AXES; i++) {
         out->asked.axis_q32[i] = ref[i].pos_q32;
     }
@@ -421,7 +421,7 @@ static void step_slots(motion_t *self, ramp_ref_t ref[AXES_MAX], motion_output_t
     for (unsigned i = 0; i < AXES_MAX; i++) {
         self->led[i] = (history_t){ref[i].pos_q32, ref[i].vel_per_cycle_q32, ref[i].acc_per_cycle2_q32};
     }
-    take_over_step(self, ref, out);
+    fade_in_step(self, ref, out);
     if (self->space == MOTION_POSE) {
         step_pose(self, ref, out);
     } else {
@@ -438,7 +438,7 @@ static bool is_step_cruising(const motion_t *self)
 
 void follow_plan(motion_t *self, uint64_t now_us)
 {
-    take_last_word(self, now_us);
+    accept_withheld(self, now_us);
     plan_what_is_due(self, now_us);
 }
 

@@ -45,7 +45,7 @@ void motion_place_axis(motion_t *self, unsigned axis, q32_t position_q32)
 }
 
 /* As gentle as a jog, as fast as is asked for, and as wide as to where the axis is. */
-static hv_status_t take_lead(motion_t *self, unsigned axis, q32_t vel_q32)
+static hv_status_t shape_axis(motion_t *self, unsigned axis, q32_t vel_q32)
 {
     const ramp_t *own = jog_own_ramp(self, axis);
     ramp_limits_t limits = axis == AXIS_ANGLE ? own->limits : self->jog_limits.cylinder;
@@ -101,7 +101,7 @@ hv_status_t motion_jog_axis(motion_t *self, unsigned axis, q16_t speed_q16, q16_
     const q32_t to_q32 = end_of(own->state.pos_q32, &own->limits, speed_q16, way_q16);
     const q32_t left_q32 = fx_sub_sat(to_q32, own->state.pos_q32);
     const bool is_there = speed_q16 > 0 ? left_q32 <= 0 : left_q32 >= 0;
-    const hv_status_t status = is_there ? HV_ERR_RANGE : take_lead(self, axis, vel_of(self, speed_q16));
+    const hv_status_t status = is_there ? HV_ERR_RANGE : shape_axis(self, axis, vel_of(self, speed_q16));
     if (status != HV_OK) {
         return status;
     }
@@ -184,11 +184,11 @@ bool jog_find_here(const motion_t *self, q32_t from_q32[POSE_AXES])
     return true;
 }
 
-static hv_status_t take_all(motion_t *self)
+static hv_status_t shape_all(motion_t *self)
 {
     hv_status_t status = HV_OK;
     for (unsigned i = 0; i < self->cylinders && status == HV_OK; i++) {
-        status = take_lead(self, i, self->jog_limits.cylinder.vel_per_cycle_q32);
+        status = shape_axis(self, i, self->jog_limits.cylinder.vel_per_cycle_q32);
     }
     return status;
 }
@@ -218,7 +218,7 @@ hv_status_t motion_jog_pose(motion_t *self, unsigned axis, q16_t speed_q16, q16_
     const q32_t most_q32 = is_rotation ? self->jog_limits.deg_per_cycle_q32 : self->jog_limits.cylinder.vel_per_cycle_q32;
     const q32_t vel_q32 = fx_clamp(vel_of(self, speed_q16), 0, most_q32);
     asked.vel_per_cycle_q32 = vel_q32 < asked.vel_per_cycle_q32 ? vel_q32 : asked.vel_per_cycle_q32;
-    if (is_there || asked.vel_per_cycle_q32 <= 0 || !shorten(self, from_q32, to_q32, axis) || take_all(self) != HV_OK) {
+    if (is_there || asked.vel_per_cycle_q32 <= 0 || !shorten(self, from_q32, to_q32, axis) || shape_all(self) != HV_OK) {
         return HV_ERR_RANGE;
     }
     self->jog.led = (1u << self->cylinders) - 1u; /* their limits are those of the way */
@@ -307,7 +307,7 @@ q32_t jog_limit_angle(motion_t *self, const ramp_ref_t *ref)
 }
 
 /* Where no pose is known, as before homing, there is nothing to go by. */
-bool jog_is_astray(const motion_t *self)
+bool jog_is_beyond_stroke(const motion_t *self)
 {
     const uint32_t cylinders = (1u << CYLINDERS_MAX) - 1u;
     return self->source == MOTION_JOGGED && !self->jog.is_posed && (self->jog.led & cylinders) != 0 && !self->is_pose_stale &&

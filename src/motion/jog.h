@@ -31,7 +31,7 @@ unsigned jog_limit(motion_t *self, const ramp_ref_t ref[AXES_MAX], q32_t extensi
 q32_t jog_limit_angle(motion_t *self, const ramp_ref_t *ref);
 
 /** True where the jog has to stop: extensions led one by one come to where the cylinders would not hold the plate. */
-bool jog_is_astray(const motion_t *self);
+bool jog_is_beyond_stroke(const motion_t *self);
 
 /** True where the jog has come to the end of its way. */
 bool jog_is_done(const motion_t *self);

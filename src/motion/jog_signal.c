@@ -7,7 +7,7 @@
 #include "path_check.h"
 
 /* The limits of a ride, but not as fast, and as wide as to where the axis is. */
-static hv_status_t take_lead(motion_t *self, unsigned axis)
+static hv_status_t shape_axis(motion_t *self, unsigned axis)
 {
     const ramp_t *own = jog_own_ramp(self, axis);
     ramp_limits_t limits = own->limits;
@@ -49,7 +49,7 @@ hv_status_t motion_excite_axis(motion_t *self, unsigned axis, const excitation_r
         return HV_ERR_FORMAT;
     }
     if (fx_add_sat(here_q32, amplitude_q32) > own->limits.pos_max_q32 ||
-        fx_sub_sat(here_q32, amplitude_q32) < own->limits.pos_min_q32 || take_lead(self, axis) != HV_OK) {
+        fx_sub_sat(here_q32, amplitude_q32) < own->limits.pos_min_q32 || shape_axis(self, axis) != HV_OK) {
         return HV_ERR_RANGE;
     }
     for (unsigned i = 0; i < AXES_MAX; i++) {
@@ -85,7 +85,7 @@ static bool look_at_width(motion_t *self, unsigned axis, const q32_t from_q32[PO
         }
     }
     for (unsigned i = 0; i < self->cylinders; i++) {
-        if (take_lead(self, i) != HV_OK) {
+        if (shape_axis(self, i) != HV_OK) {
             return false;
         }
     }

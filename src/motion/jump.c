@@ -60,11 +60,11 @@ static void lead_back(ramp_t *ramp, const path_limits_t *path, q32_t off_q32)
         limits.vel_per_cycle_q32 = larger(limits.vel_per_cycle_q32, ramp->limits.vel_per_cycle_q32);
     }
     if (ramp_init(ramp, &limits, off_q32) == HV_OK) {
-        ramp_take_over(ramp, &state);
+        ramp_adopt(ramp, &state);
     }
 }
 
-void jump_take(motion_t *self, const q32_t step_q32[POSE_AXES])
+void jump_accept(motion_t *self, const q32_t step_q32[POSE_AXES])
 {
     q32_t by_q32[POSE_AXES];
     q32_t slot_q32[AXES_MAX] = {0};

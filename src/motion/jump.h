@@ -11,7 +11,7 @@
 /** Takes the jump to the newest slots out of the stream. Without effect where it is not far larger than the steps around it: the
  * stream makes these.
  *  @param step_q32 how far the sender has gone since the sample that jumped first */
-void jump_take(motion_t *self, const q32_t step_q32[POSE_AXES]);
+void jump_accept(motion_t *self, const q32_t step_q32[POSE_AXES]);
 
 /** One cycle: adds the offset to a stream's references. */
 void jump_step(motion_t *self, ramp_ref_t ref[AXES_MAX]);

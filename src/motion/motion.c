@@ -322,7 +322,7 @@ HV_OWN_FRAME static void find_pose(motion_t *self, bool is_planned, motion_outpu
 }
 
 /* Whether extensions given one by one lead to where the cylinders would not hold the plate. */
-static bool is_led_astray(const motion_t *self)
+static bool is_near_singularity(const motion_t *self)
 {
     return follow_is_moving(self) && self->space == MOTION_CYLINDERS && are_cylinders_moving(self) && !assembly_can_stop(self);
 }
@@ -340,10 +340,10 @@ static void end_cycle(motion_t *self, uint64_t now_us)
         }
     } else if (jog_is_done(self)) {
         rest_here(self);
-    } else if (jog_is_astray(self)) {
+    } else if (jog_is_beyond_stroke(self)) {
         self->singular_stops++;
         motion_stop(self);
-    } else if (is_led_astray(self)) {
+    } else if (is_near_singularity(self)) {
         self->singular_stops++;
         motion_follow(self);
     }

@@ -7,7 +7,7 @@
 #include "active_axis.h"
 #include "axis_targets.h"
 #include "path_check.h"
-#include "take_over.h"
+#include "fade_in.h"
 
 #define BLEND_PARTS     8 /* of a stop, after which the way behind it may begin */
 #define SMALL_WAY_Q32   (Q32_ONE / 16)
@@ -232,7 +232,7 @@ void plan_step(motion_t *self)
     axis_targets_plan(self, self->slot_q32);
     if (active_axis_all_at_rest(self, POSE_AXES)) {
         plan_straight(self, POSE_AXES, 1);
-        if (take_over_is_hidden(self)) { /* fading is the move */
+        if (fade_in_is_hidden(self)) { /* fading is the move */
             scurve_end(&self->plan.straight.path);
         }
         return;

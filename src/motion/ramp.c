@@ -19,14 +19,14 @@
 #include "brake.h"
 #include "root.h"
 
-/* Boundary layer and gains of a grip: gains in units of 1 / 2^gain_shift, layer sizes in multiples of the jerk limit / 8. */
+/* Boundary layer and gains of a bandwidth: gains in units of 1 / 2^gain_shift, layer sizes in multiples of the jerk limit / 8. */
 typedef struct {
     int64_t k1, k2, k3;
     unsigned gain_shift;
     int64_t layer_d, layer_w, layer_b;
-} grip_t;
+} bandwidth_t;
 
-static const grip_t k_grips[] = {
+static const bandwidth_t k_bandwidths[] = {
     [RAMP_SOFT] = {.k1 = 1, .k2 = 46, .k3 = 721, .gain_shift = 12, .layer_d = 8 * 4096, .layer_w = 8 * 178, .layer_b = 8 * 11},
     [RAMP_FIRM] = {.k1 = 1, .k2 = 10, .k3 = 37, .gain_shift = 6, .layer_d = 8 * 13, .layer_w = 8 * 3, .layer_b = 7},
 };
@@ -41,7 +41,7 @@ typedef struct {
     q32_t d, w, b;
 } errors_t;
 
-void ramp_take_over(ramp_t *self, const ramp_state_t *state)
+void ramp_adopt(ramp_t *self, const ramp_state_t *state)
 {
     const q32_t acc_q32 = fx_clamp(state->acc_per_cycle2_q32, -self->acc_safe_q32, self->acc_safe_q32);
     const q32_t vel_max_q32 = self->limits.vel_per_cycle_q32;
@@ -146,7 +146,7 @@ static q32_t layer_size(q32_t jerk_q32, int64_t eighths)
     return fx_shift_down(jerk_q32 * eighths + 32, 3) | 7;
 }
 
-static bool is_in_layer(const errors_t *e, q32_t jerk_q32, const grip_t *g)
+static bool is_in_layer(const errors_t *e, q32_t jerk_q32, const bandwidth_t *g)
 {
     return is_within(e->d, layer_size(jerk_q32, g->layer_d)) && is_within(e->w, layer_size(jerk_q32, g->layer_w)) &&
            is_within(e->b, layer_size(jerk_q32, g->layer_b));
@@ -158,42 +158,42 @@ static uint64_t size_of(q32_t value_q32)
     return (uint64_t)value_q32 ^ (uint64_t)fx_shift_down(value_q32, 63);
 }
 
-/* Well inside the layer of the soft grip, as nearly all cycles of a stream are: one test for all three errors, as none is above
- * what their bits are together. */
+/* Well inside the layer of the soft bandwidth, as nearly all cycles of a stream are: one test for all three errors, as none is
+ * above what their bits are together. */
 static bool is_deep_in_soft_layer(const errors_t *e, q32_t jerk_q32)
 {
     return ((size_of(e->d) >> 12) | (size_of(e->w) >> 7) | (size_of(e->b) >> 3)) < (uint64_t)jerk_q32;
 }
 
-/* The jerk by the law of a grip. */
-static inline q32_t by_law(const errors_t *e, const ramp_ref_t *ref, const grip_t *g)
+/* The jerk by the law of a bandwidth. */
+static inline q32_t by_law(const errors_t *e, const ramp_ref_t *ref, const bandwidth_t *g)
 {
     return ref->jerk_per_cycle3_q32 + scale_down(g->k1 * e->d - g->k2 * e->w - g->k3 * e->b, g->gain_shift);
 }
 
 /* The jerk that a linear law takes to the reference; false if the reference is too far away for them. */
-static inline bool find_by_law(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *to_take_q32)
+static inline bool find_by_law(const ramp_t *self, const ramp_ref_t *ref, ramp_bandwidth_t bandwidth, q32_t *wanted_jerk_q32)
 {
     const q32_t jerk_q32 = self->limits.jerk_per_cycle3_q32;
-    const bool is_firm = grip == RAMP_FIRM || is_at_rest(ref);
+    const bool is_firm = bandwidth == RAMP_FIRM || is_at_rest(ref);
     const errors_t e = errors_against(&self->state, ref);
     if (!is_firm && is_deep_in_soft_layer(&e, jerk_q32)) {
-        *to_take_q32 = by_law(&e, ref, &k_grips[RAMP_SOFT]);
+        *wanted_jerk_q32 = by_law(&e, ref, &k_bandwidths[RAMP_SOFT]);
         return true;
     }
     if (is_firm && can_close_in_three(&e, jerk_q32)) {
-        *to_take_q32 = ref->acc_per_cycle2_q32 + e.d - e.w - self->state.acc_per_cycle2_q32;
+        *wanted_jerk_q32 = ref->acc_per_cycle2_q32 + e.d - e.w - self->state.acc_per_cycle2_q32;
         return true;
     }
-    if (is_firm && is_in_layer(&e, jerk_q32, &k_grips[RAMP_FIRM])) {
-        *to_take_q32 = by_law(&e, ref, &k_grips[RAMP_FIRM]);
+    if (is_firm && is_in_layer(&e, jerk_q32, &k_bandwidths[RAMP_FIRM])) {
+        *wanted_jerk_q32 = by_law(&e, ref, &k_bandwidths[RAMP_FIRM]);
         return true;
     }
     /* towards a reference in motion the firm law has a wider layer around its own: without it, it would miss that for ever */
-    if (is_at_rest(ref) || !is_in_layer(&e, jerk_q32, &k_grips[RAMP_SOFT])) {
+    if (is_at_rest(ref) || !is_in_layer(&e, jerk_q32, &k_bandwidths[RAMP_SOFT])) {
         return false;
     }
-    *to_take_q32 = by_law(&e, ref, &k_grips[RAMP_SOFT]);
+    *wanted_jerk_q32 = by_law(&e, ref, &k_bandwidths[RAMP_SOFT]);
     return true;
 }
 
@@ -214,10 +214,11 @@ static q32_t acceleration_to_stop(const ramp_t *self, const ramp_ref_t *ref)
 }
 
 /* The acceleration the reference asks for. */
-static q32_t wanted_acceleration(const ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+static q32_t wanted_acceleration(const ramp_t *self, const ramp_ref_t *ref, ramp_bandwidth_t bandwidth)
 {
     q32_t jerk_q32;
-    return find_by_law(self, ref, grip, &jerk_q32) ? self->state.acc_per_cycle2_q32 + jerk_q32 : acceleration_to_stop(self, ref);
+    return find_by_law(self, ref, bandwidth, &jerk_q32) ? self->state.acc_per_cycle2_q32 + jerk_q32
+                                                        : acceleration_to_stop(self, ref);
 }
 
 /* True if the wanted jerk is within the limits and leads to none of them, whatever comes then: as can be told without
@@ -379,44 +380,44 @@ static bool is_reference_inside(const ramp_t *self, const ramp_ref_t *ref)
 }
 
 /* The acceleration of a cycle in which a limit may bind, or the reference is far away. */
-HV_OUT_OF_LINE static q32_t aim_with_care(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+HV_OUT_OF_LINE static q32_t aim_with_care(ramp_t *self, const ramp_ref_t *ref, ramp_bandwidth_t bandwidth)
 {
     const ramp_ref_t inside = reference_within_bounds(self, ref);
     note_use(self, &inside);
-    return ramp_allowed(self, wanted_acceleration(self, &inside, grip));
+    return ramp_allowed(self, wanted_acceleration(self, &inside, bandwidth));
 }
 
-static inline q32_t aim(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+static inline q32_t aim(ramp_t *self, const ramp_ref_t *ref, ramp_bandwidth_t bandwidth)
 {
     q32_t jerk_q32;
     self->flags = 0;
-    if (!is_reference_inside(self, ref) || !find_by_law(self, ref, grip, &jerk_q32) || !is_free(self, jerk_q32)) {
-        return aim_with_care(self, ref, grip);
+    if (!is_reference_inside(self, ref) || !find_by_law(self, ref, bandwidth, &jerk_q32) || !is_free(self, jerk_q32)) {
+        return aim_with_care(self, ref, bandwidth);
     }
     note_use(self, ref);
     return self->state.acc_per_cycle2_q32 + jerk_q32;
 }
 
-q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_grip_t grip)
+q32_t ramp_step(ramp_t *self, const ramp_ref_t *ref, ramp_bandwidth_t bandwidth)
 {
-    return ramp_advance(self, aim(self, ref, grip));
+    return ramp_advance(self, aim(self, ref, bandwidth));
 }
 
-unsigned ramp_aim_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *acc_q32)
+unsigned ramp_aim_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_bandwidth_t bandwidth, q32_t *acc_q32)
 {
     unsigned flags = 0;
     for (unsigned i = 0; i < count; i++) {
-        acc_q32[i] = aim(&ramp[i], &ref[i], grip);
+        acc_q32[i] = aim(&ramp[i], &ref[i], bandwidth);
         flags |= ramp[i].flags;
     }
     return flags;
 }
 
-unsigned ramp_step_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_grip_t grip, q32_t *pos_q32)
+unsigned ramp_step_all(ramp_t *ramp, unsigned count, const ramp_ref_t *ref, ramp_bandwidth_t bandwidth, q32_t *pos_q32)
 {
     unsigned flags = 0;
     for (unsigned i = 0; i < count; i++) {
-        pos_q32[i] = ramp_advance(&ramp[i], aim(&ramp[i], &ref[i], grip));
+        pos_q32[i] = ramp_advance(&ramp[i], aim(&ramp[i], &ref[i], bandwidth));
         flags |= ramp[i].flags;
     }
     return flags;

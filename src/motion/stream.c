@@ -19,7 +19,7 @@
 #define FAR_BEFORE_Q32       (Q32_ONE / 2)              /* ... so far before its time: what comes next is a guess */
 #define PACE_FILTER_MAX      (Q32_ONE / 2)              /* keeps the filters stable where a cycle is longer than a period */
 #define BEHIND_MAX_Q32       (Q32_ONE * 6)              /* further behind its time, a sample is skipped */
-#define FEW                  16                         /* grains in a step that tells too little */
+#define FEW                  16                         /* quanta in a step that tells too little */
 #define PAIR                 2u                         /* samples that are steps; with the next one they are a stream, ... */
 #define UNEVEN_PARTS         6                          /* slow steps that differ by more than such a part are uneven */
 #define ON_LEAST_Q32         (Q32_ONE / 3)              /* ... and one that is not such a part of the one before it ... */
@@ -96,13 +96,13 @@ void stream_hint_period(stream_t *self, uint32_t period_us)
     stream_clock_hint(&self->clock, period_us > STREAM_HINT_MIN_US ? period_us : 0);
 }
 
-/* True where steps are a few grains: then values tell no time. */
+/* True where steps are a few quanta: then values tell no time. */
 static bool is_coarse(const stream_t *self)
 {
     const stream_curve_t *curve = &self->curve;
     bool is_found = false;
     for (unsigned axis = 0; axis < POSE_AXES && axis < curve->axes; axis++) {
-        is_found |= fx_abs(curve->grain[axis].step_q32) < FEW * curve->grain[axis].quantum_q32;
+        is_found |= fx_abs(curve->quantum[axis].step_q32) < FEW * curve->quantum[axis].quantum_q32;
     }
     return is_found || curve->window > 1;
 }
@@ -110,8 +110,8 @@ static bool is_coarse(const stream_t *self)
 static void note_sample(stream_t *self, unsigned periods, q32_t shift_q32, const q32_t *sample_q32)
 {
     const q32_t late_q32 = self->clock.period_us_q16 > 0 ? stream_clock_lateness(&self->clock) : 0;
-    stream_evidence_take(&self->evidence, &self->curve.governor, self->curve.axes, periods, late_q32, shift_q32, is_coarse(self),
-                         sample_q32);
+    stream_evidence_add(&self->evidence, &self->curve.governor, self->curve.axes, periods, late_q32, shift_q32, is_coarse(self),
+                        sample_q32);
 }
 
 static void start_lone(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
@@ -273,7 +273,7 @@ static void thin_from_start(stream_t *self, uint64_t now_us)
     pace_curve(self);
 }
 
-static void take_sample(stream_t *self, uint64_t now_us, const kin_t *kin, bool is_twice_as_fast, const q32_t *sample_q32)
+static void accept_sample(stream_t *self, uint64_t now_us, const kin_t *kin, bool is_twice_as_fast, const q32_t *sample_q32)
 {
     const uint32_t interval_us = stream_clock_elapsed_us(&self->clock, now_us);
     if (is_twice_as_fast) {
@@ -283,7 +283,7 @@ static void take_sample(stream_t *self, uint64_t now_us, const kin_t *kin, bool 
     q32_t shift_q32 = 0;
     const unsigned periods =
         self->phase == STREAM_LONE && self->pair == 1 ? 1 : stream_sample_periods(self, now_us, sample_q32, &shift_q32);
-    const bool is_new_rate = (stream_clock_take(&self->clock, now_us, periods) && self->phase == STREAM_RUNNING) || is_thinned;
+    const bool is_new_rate = (stream_clock_accept(&self->clock, now_us, periods) && self->phase == STREAM_RUNNING) || is_thinned;
     pace_curve(self);
     if (is_new_rate) {
         stream_evidence_reset(&self->evidence, true);
@@ -319,15 +319,15 @@ static void take_sample(stream_t *self, uint64_t now_us, const kin_t *kin, bool 
 
 /* A sample that looks like an old one, or one that comes in the place of such a one: its time tells nothing of the line, and its
  * value nothing of the sender. */
-static void take_doubtful(stream_t *self, uint64_t now_us, unsigned periods, const q32_t *sample_q32)
+static void accept_doubtful(stream_t *self, uint64_t now_us, unsigned periods, const q32_t *sample_q32)
 {
     stream_clock_put(&self->clock, now_us, periods);
-    stream_evidence_take(&self->evidence, &self->curve.governor, self->curve.axes, periods, stream_clock_lateness(&self->clock),
-                         0, true, sample_q32);
+    stream_evidence_add(&self->evidence, &self->curve.governor, self->curve.axes, periods, stream_clock_lateness(&self->clock), 0,
+                        true, sample_q32);
     stream_curve_append(&self->curve, periods, false, sample_q32, sample_q32);
 }
 
-static void take_frame(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
+static void accept_frame(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
 {
     self->thin.passed = 0;
     if (self->phase == STREAM_EMPTY || !stream_clock_is_near(&self->clock, now_us) || is_leap(self, sample_q32)) {
@@ -339,21 +339,21 @@ static void take_frame(stream_t *self, uint64_t now_us, const kin_t *kin, const 
     q32_t late_q32;
     const stream_sample_kind_t kind = stream_sample_kind(self, now_us, sample_q32);
     if (kind == STREAM_SAMPLE_DOUBTFUL) {
-        take_doubtful(self, now_us, stream_clock_expect(&self->clock, now_us, &ahead_q32, &late_q32), sample_q32);
+        accept_doubtful(self, now_us, stream_clock_expect(&self->clock, now_us, &ahead_q32, &late_q32), sample_q32);
     } else if (kind == STREAM_SAMPLE_INSTEAD) {
-        take_doubtful(self, now_us, 0, sample_q32);
+        accept_doubtful(self, now_us, 0, sample_q32);
     } else if (kind != STREAM_SAMPLE_NONE) {
         if (is_slow_move(self, now_us, sample_q32)) {
             start_at_second(self, kin);
         }
-        take_sample(self, now_us, kin, kind == STREAM_SAMPLE_OTHER_RATE, sample_q32);
+        accept_sample(self, now_us, kin, kind == STREAM_SAMPLE_OTHER_RATE, sample_q32);
     }
 }
 
 void stream_push(stream_t *self, uint64_t now_us, const kin_t *kin, const q32_t *sample_q32)
 {
     if (!is_passed_by(self, now_us, sample_q32)) {
-        take_frame(self, now_us, kin, sample_q32);
+        accept_frame(self, now_us, kin, sample_q32);
     }
 }
 
@@ -405,7 +405,7 @@ bool stream_step(stream_t *self, uint64_t now_us, const kin_t *kin, ramp_ref_t *
     }
     if (self->thin.has_spare && now_us - self->thin.last_us >= THIN_WAIT_US) {
         self->thin.has_spare = false;
-        take_frame(self, now_us, kin, self->thin.spare_q32);
+        accept_frame(self, now_us, kin, self->thin.spare_q32);
     }
     if (self->phase == STREAM_RUNNING) {
         advance(self, now_us, kin);

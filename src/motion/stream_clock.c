@@ -357,9 +357,9 @@ static void correct(stream_clock_t *self, int64_t off_us_q16, unsigned periods)
     const int64_t m = self->settled < self->memory ? self->settled : self->memory;
     const int64_t gain_div = (m + 1) * (m + 2);
     const int64_t most_us_q16 = self->settled < KNOWN ? INT64_MAX : 2 * self->period_us_q16;
-    const int64_t told_us_q16 = fx_clamp(off_us_q16, -most_us_q16, most_us_q16);
-    self->late_us_q16 = off_us_q16 - told_us_q16 * 2 * (2 * m + 1) / gain_div;
-    set_period(self, self->period_us_q16 + told_us_q16 * 6 / gain_div / (int64_t)periods);
+    const int64_t clamped_us_q16 = fx_clamp(off_us_q16, -most_us_q16, most_us_q16);
+    self->late_us_q16 = off_us_q16 - clamped_us_q16 * 2 * (2 * m + 1) / gain_div;
+    set_period(self, self->period_us_q16 + clamped_us_q16 * 6 / gain_div / (int64_t)periods);
 }
 
 /* A sender that has a sample for every second period only, or the third, is at that rate for a while: nothing is lost. */
@@ -434,7 +434,7 @@ void stream_clock_put(stream_clock_t *self, uint64_t now_us, unsigned periods)
     self->last_us = now_us;
 }
 
-bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods)
+bool stream_clock_accept(stream_clock_t *self, uint64_t now_us, unsigned periods)
 {
     const uint32_t gap_us = stream_clock_elapsed_us(self, now_us);
     const int64_t gap_us_q16 = (int64_t)gap_us * STREAM_US_Q16;

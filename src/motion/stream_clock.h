@@ -44,7 +44,7 @@ unsigned stream_clock_expect(const stream_clock_t *self, uint64_t now_us, q32_t 
 
 /** Takes the arrival of a sample that is so many periods after the newest.
  *  @return true where the sender has another rate now: its time line begins anew with this sample */
-bool stream_clock_take(stream_clock_t *self, uint64_t now_us, unsigned periods);
+bool stream_clock_accept(stream_clock_t *self, uint64_t now_us, unsigned periods);
 
 /** Takes a sample whose time tells nothing of the line. */
 void stream_clock_put(stream_clock_t *self, uint64_t now_us, unsigned periods);

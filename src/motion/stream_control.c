@@ -71,7 +71,7 @@ static int32_t window_of_axis(const stream_curve_t *self, unsigned axis)
 {
     const governor_limits_t *stop = &self->limits[axis];
     const int64_t n_q16 = self->period_cycles_q16;
-    const q32_t quantum_q32 = self->grain[axis].quantum_q32;
+    const q32_t quantum_q32 = self->quantum[axis].quantum_q32;
     if (quantum_q32 == 0 || stop->jerk_per_cycle3_q32 <= 0) {
         return 1;
     }

@@ -87,7 +87,7 @@ void stream_curve_start(stream_curve_t *self, const kin_t *kin, const q32_t *sam
         self->way_q36[0][axis] = self->way_q36[1][axis] = self->way_q36[2][axis] = 0;
         self->off_q32[axis][0] = self->off_q32[axis][1] = self->off_q32[axis][2] = 0;
         self->lead[axis] = (stream_lead_t){0};
-        self->grain[axis] = (stream_quantum_t){0};
+        self->quantum[axis] = (stream_quantum_t){0};
         self->low_q32[axis] = self->high_q32[axis] = sample_q32[axis];
     }
     self->watched = 0;
@@ -121,7 +121,7 @@ static void note_change(stream_curve_t *self, int32_t guessed)
 }
 
 /* Takes back half of the error of a single guess at once, as far as the limits allow. Such an error is one of position only. */
-static void take_back_half(stream_curve_t *self)
+static void remove_half(stream_curve_t *self)
 {
     for (unsigned axis = 0; axis < self->axes; axis++) {
         const q32_t error_q32 = self->was_q32[0][axis] - stream_control_point(self, axis, self->head);
@@ -210,7 +210,7 @@ static void make_up(stream_curve_t *self)
         guess_again(self);
     }
     if (self->change == 1) {
-        take_back_half(self);
+        remove_half(self);
     } else {
         keep_going(self);
     }
@@ -355,7 +355,7 @@ static void put_control(stream_curve_t *self, const kin_t *kin)
     self->is_off = false;
     for (unsigned axis = 0; axis < self->axes; axis++) {
         const q32_t point_q32 = stream_control_point(self, axis, self->head);
-        stream_offset_take_back(self, self->off_q32[axis]);
+        stream_offset_decay(self, self->off_q32[axis]);
         stream_offset_bound(self, axis, point_q32);
         control_q32[axis] = point_q32 + self->off_q32[axis][0];
         stream_offset_widen(self, axis, point_q32);
@@ -397,7 +397,7 @@ static void control_from(q32_t pos_q32, q32_t vel_q32, q32_t acc_q32, q32_t cont
  * overshoot. At 60 Hz it is a sixteenth of the offset per period. */
 static q32_t jump_speed(const stream_curve_t *self, q32_t off_q32)
 {
-    return fx_mul_shift(fx_abs(off_q32), fx_clamp(self->grip_q32 * 5 / 16, 0, Q32_ONE / 16), 32);
+    return fx_mul_shift(fx_abs(off_q32), fx_clamp(self->bandwidth_q32 * 5 / 16, 0, Q32_ONE / 16), 32);
 }
 
 /* Of two steps, the one that both tell of a motion: the smaller one, or none where they go to and fro. */
@@ -448,7 +448,7 @@ HV_WRAPS void stream_curve_regrid(stream_curve_t *self, const kin_t *kin, const 
     self->ahead = 0;
     self->age = goes_on ? self->age : now == NULL ? AGE_MAX : 1;
     self->change = 0;
-    self->is_off = false; /* offset and grip were per period of the old grid */
+    self->is_off = false; /* offset and bandwidth were per period of the old grid */
     (void)stream_offset_soften(self, SHIFT_GUESSES);
     place_points(self, first_q32, now != NULL, periods, sample_q32);
     for (unsigned axis = 0; axis < self->axes; axis++) {

@@ -29,7 +29,7 @@ void stream_evidence_reset(stream_evidence_t *self, bool keep_weight)
 {
     self->count = 0;
     self->shift_q32[0] = 0;
-    self->told_q32 = 0;
+    self->by_lateness_q32 = 0;
     self->moved_q32 = 0;
     self->off_q32 = 0;
     self->weight_q32 = keep_weight ? self->weight_q32 : 0;
@@ -54,7 +54,7 @@ static bool is_even_run(const stream_evidence_t *self)
 static void weigh(stream_evidence_t *self, const governor_t *governor, unsigned axes)
 {
     const q32_t late_q32 = off_neighbours(self->late_q32);
-    int64_t told_q32 = 0;
+    int64_t by_lateness_q32 = 0;
     int64_t moved_q32 = 0;
     int64_t all_off_q32 = 0;
     for (unsigned axis = 0; axis < axes && axis < POSE_AXES; axis++) {
@@ -67,11 +67,11 @@ static void weigh(stream_evidence_t *self, const governor_t *governor, unsigned 
         const q32_t off_q32 = fx_mul_shift(off_neighbours(value_q32), per_speed_q62, 30);
         const q32_t moved = fx_mul_shift(fx_clamp(step_q32, -SPEED_MAX_Q32, SPEED_MAX_Q32), late_q32, 32);
         const q32_t off = fx_clamp(off_q32, -SPEED_MAX_Q32, SPEED_MAX_Q32);
-        told_q32 += fx_mul_shift(off, moved, 32);
+        by_lateness_q32 += fx_mul_shift(off, moved, 32);
         all_off_q32 += fx_mul_shift(off, off, 32);
         moved_q32 += fx_mul_shift(moved, moved, 32);
     }
-    self->told_q32 += told_q32 - fx_shift_down(self->told_q32, MEMORY_SHIFT);
+    self->by_lateness_q32 += by_lateness_q32 - fx_shift_down(self->by_lateness_q32, MEMORY_SHIFT);
     self->moved_q32 += moved_q32 - fx_shift_down(self->moved_q32, MEMORY_SHIFT);
     self->off_q32 += all_off_q32 - fx_shift_down(self->off_q32, MEMORY_SHIFT);
 }
@@ -81,8 +81,8 @@ static void change_weight(stream_evidence_t *self)
     if (self->moved_q32 < LEAST_Q32 / 64) {
         return;
     }
-    const q32_t share_q32 = fx_mul_div(self->told_q32, Q32_ONE, self->moved_q32);
-    const q32_t explained_q32 = fx_mul_div(self->told_q32, share_q32, Q32_ONE); /* of what the values are off */
+    const q32_t share_q32 = fx_mul_div(self->by_lateness_q32, Q32_ONE, self->moved_q32);
+    const q32_t explained_q32 = fx_mul_div(self->by_lateness_q32, share_q32, Q32_ONE); /* of what the values are off */
     if (explained_q32 < self->off_q32 / EXPLAINED_DIV) {
         self->weight_q32 = fx_clamp(0, self->weight_q32 - CHANGE_Q32, self->weight_q32);
         return;
@@ -91,8 +91,8 @@ static void change_weight(stream_evidence_t *self)
     self->weight_q32 = fx_clamp(wished_q32, self->weight_q32 - CHANGE_Q32, self->weight_q32 + CHANGE_Q32);
 }
 
-void stream_evidence_take(stream_evidence_t *self, const governor_t *governor, unsigned axes, unsigned periods, q32_t late_q32,
-                          q32_t shift_q32, bool is_coarse, const q32_t *sample_q32)
+void stream_evidence_add(stream_evidence_t *self, const governor_t *governor, unsigned axes, unsigned periods, q32_t late_q32,
+                         q32_t shift_q32, bool is_coarse, const q32_t *sample_q32)
 {
     for (unsigned i = STREAM_EVIDENCE - 1; i > 0 && (periods > 0 || self->count == 0); i--) {
         for (unsigned axis = 0; axis < axes; axis++) {
@@ -225,9 +225,9 @@ q32_t stream_evidence_advance(const stream_evidence_t *self, const governor_t *g
         const q32_t step_q32 = fx_mul_shift(
             (self->value_q32[0][axis] - self->value_q32[at][axis]) / (self->index[at] - self->index[at - 1]), per_speed_q62, 30);
         const q32_t travel_q32 = fx_mul_shift(sample_q32[axis] - self->value_q32[0][axis], per_speed_q62, 30);
-        const q32_t told_q32 = fx_clamp(step_q32, -SPEED_MAX_Q32, SPEED_MAX_Q32);
-        along_q32 += fx_mul_shift(told_q32, fx_clamp(travel_q32, -SPEED_MAX_Q32, SPEED_MAX_Q32), 32);
-        square_q32 += fx_mul_shift(told_q32, told_q32, 32);
+        const q32_t by_lateness_q32 = fx_clamp(step_q32, -SPEED_MAX_Q32, SPEED_MAX_Q32);
+        along_q32 += fx_mul_shift(by_lateness_q32, fx_clamp(travel_q32, -SPEED_MAX_Q32, SPEED_MAX_Q32), 32);
+        square_q32 += fx_mul_shift(by_lateness_q32, by_lateness_q32, 32);
     }
     return square_q32 > 0 ? fx_mul_div(along_q32, Q32_ONE, square_q32) : 0;
 }
@@ -236,7 +236,7 @@ q32_t stream_evidence_rounding(const stream_evidence_t *self, const stream_curve
 {
     q32_t sum_q32 = 0;
     for (unsigned axis = 0; axis < self->axes && axis < POSE_AXES; axis++) {
-        sum_q32 += stream_evidence_in_speed_limits(&curve->governor, axis, curve->grain[axis].quantum_q32);
+        sum_q32 += stream_evidence_in_speed_limits(&curve->governor, axis, curve->quantum[axis].quantum_q32);
     }
     return sum_q32;
 }

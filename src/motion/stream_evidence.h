@@ -16,8 +16,8 @@ void stream_evidence_reset(stream_evidence_t *self, bool keep_weight);
  *  @param shift_q32 from here on samples are that much later than the line, which follows
  *  @param is_coarse values are rounded so much that they tell no time, or this one is in doubt
  *  @param governor knows what a motion is measured by: the speed limits of the axes */
-void stream_evidence_take(stream_evidence_t *self, const governor_t *governor, unsigned axes, unsigned periods, q32_t late_q32,
-                          q32_t shift_q32, bool is_coarse, const q32_t *sample_q32);
+void stream_evidence_add(stream_evidence_t *self, const governor_t *governor, unsigned axes, unsigned periods, q32_t late_q32,
+                         q32_t shift_q32, bool is_coarse, const q32_t *sample_q32);
 
 /** What the newest sample is at its place on the line. */
 q32_t stream_evidence_on_line(const stream_evidence_t *self, unsigned axis);

@@ -19,7 +19,7 @@ q32_t stream_offset_jump(const stream_curve_t *self, unsigned axis)
 
 /* Whether what is off comes back with less than half of what an axis can do: with three poles at 1 - g a distance d needs g^2 d
  * of acceleration and g^3 d of jerk at most, a speed e 3 g e and 3 g^2 e. */
-static bool is_bearable(const stream_curve_t *self, unsigned axis, int64_t grip_q32)
+static bool is_bearable(const stream_curve_t *self, unsigned axis, int64_t bandwidth_q32)
 {
     const governor_limits_t *limits = &self->limits[axis];
     const int64_t n_q16 = self->period_cycles_q16;
@@ -28,18 +28,18 @@ static bool is_bearable(const stream_curve_t *self, unsigned axis, int64_t grip_
     }
     const q32_t acc_q32 = fx_mul_shift(fx_mul_shift(limits->acc_per_cycle2_q32, n_q16, 16), n_q16, 16);
     const q32_t jerk_q32 = fx_mul_shift(fx_mul_shift(fx_mul_shift(limits->jerk_per_cycle3_q32, n_q16, 16), n_q16, 16), n_q16, 16);
-    const q32_t by_way_q32 = fx_mul_shift(fx_abs(self->off_q32[axis][0]), grip_q32, 32);
+    const q32_t by_way_q32 = fx_mul_shift(fx_abs(self->off_q32[axis][0]), bandwidth_q32, 32);
     const q32_t by_speed_q32 = 3 * fx_abs(self->off_q32[axis][1]);
-    const q32_t needs_acc_q32 = fx_mul_shift(by_way_q32 + by_speed_q32, grip_q32, 32);
-    const q32_t needs_jerk_q32 = fx_mul_shift(needs_acc_q32, grip_q32, 32);
+    const q32_t needs_acc_q32 = fx_mul_shift(by_way_q32 + by_speed_q32, bandwidth_q32, 32);
+    const q32_t needs_jerk_q32 = fx_mul_shift(needs_acc_q32, bandwidth_q32, 32);
     return 2 * needs_acc_q32 <= acc_q32 && 2 * needs_jerk_q32 <= jerk_q32;
 }
 
 void stream_offset_soften_to_limits(stream_curve_t *self)
 {
     for (unsigned axis = 0; axis < self->axes && axis < POSE_AXES; axis++) {
-        while (self->grip_q32 > self->softest_q32 && !is_bearable(self, axis, self->grip_q32)) {
-            self->grip_q32 -= self->grip_q32 / 8;
+        while (self->bandwidth_q32 > self->softest_q32 && !is_bearable(self, axis, self->bandwidth_q32)) {
+            self->bandwidth_q32 -= self->bandwidth_q32 / 8;
         }
     }
 }
@@ -48,17 +48,17 @@ q32_t stream_offset_soften(stream_curve_t *self, int32_t guessed)
 {
     const int64_t softest_q32 = guessed >= STREAM_OFFSET_STALL ? self->softest_q32 / 5 * 4 : self->softest_q32;
     const int64_t wished_q32 = fx_clamp(Q32_ONE / (guessed + 2), softest_q32, Q32_ONE / 2);
-    self->grip_q32 = self->is_off && self->grip_q32 < wished_q32 ? self->grip_q32 : wished_q32;
+    self->bandwidth_q32 = self->is_off && self->bandwidth_q32 < wished_q32 ? self->bandwidth_q32 : wished_q32;
     self->is_off = true;
-    return fx_mul_div(self->grip_q32, Q32_ONE, wished_q32);
+    return fx_mul_div(self->bandwidth_q32, Q32_ONE, wished_q32);
 }
 
-void stream_offset_take_back(const stream_curve_t *self, q32_t off_q32[3])
+void stream_offset_decay(const stream_curve_t *self, q32_t off_q32[3])
 {
     if (((uint64_t)off_q32[0] | (uint64_t)off_q32[1] | (uint64_t)off_q32[2]) == 0) {
         return;
     }
-    const int64_t g = self->grip_q32;
+    const int64_t g = self->bandwidth_q32;
     const int64_t g2 = fx_mul_shift(g, g, 32);
     const int64_t g3 = fx_mul_shift(g2, g, 32);
     off_q32[2] -= fx_mul_shift(off_q32[0], g3, 32) + fx_mul_shift(off_q32[1], 3 * g2 - 2 * g3, 32) +

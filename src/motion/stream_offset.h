@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT
  * stream_offset.h - the offset of the curve of a stream from its points (`off_q32`: offset, its change per period and per
- * period^2). A filter with three equal poles at 1 - `grip_q32` takes it back to 0. The offset never leads the curve further
+ * period^2). A filter with three equal poles at 1 - `bandwidth_q32` takes it back to 0. The offset never leads the curve further
  * than the motion has recently been: a correction is not a motion of the sender, but the governor would treat its overshoot as
  * one. Private to src/motion.
  */
@@ -20,11 +20,11 @@ q32_t stream_offset_jump(const stream_curve_t *self, unsigned axis);
  *  Returns the share of a velocity that may be added: with a softer filter the same velocity overshoots further. */
 q32_t stream_offset_soften(stream_curve_t *self, int32_t guessed);
 
-/** The softest grip that any axis needs. */
+/** The softest bandwidth that any axis needs. */
 void stream_offset_soften_to_limits(stream_curve_t *self);
 
-/** One period of the filter. q^3 with q = 1 - grip, see the ramp in DESIGN.md. */
-void stream_offset_take_back(const stream_curve_t *self, q32_t off_q32[3]);
+/** One period of the filter. q^3 with q = 1 - bandwidth, see the ramp in DESIGN.md. */
+void stream_offset_decay(const stream_curve_t *self, q32_t off_q32[3]);
 
 /** Bounds the offset of the curve on its way to the control point of point_q32. */
 void stream_offset_bound(stream_curve_t *self, unsigned axis, q32_t point_q32);

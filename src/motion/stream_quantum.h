@@ -16,6 +16,6 @@ enum {
 void stream_quantum_watch(stream_curve_t *self, unsigned periods, const q32_t *sample_q32);
 
 /** True if the step between two samples is larger than what rounding makes of a slow motion. */
-bool stream_quantum_tells(const stream_curve_t *self, const q32_t *from_q32, const q32_t *to_q32);
+bool stream_quantum_is_significant(const stream_curve_t *self, const q32_t *from_q32, const q32_t *to_q32);
 
 #endif

@@ -2,7 +2,7 @@
  * stream_repeat.c - which samples only say the last one again.
  * The values of such a sender are a stream of their own rate, and its frames a staircase that no platform is to follow. How often
  * a value comes is the mean length of a run of equal samples. A motion that is rounded makes such runs where it is slow, but its
- * steps are then of one grain, or two: they tell nothing. Nor does a run that is long: the sender stands.
+ * steps are then of one quantum, or two: they say nothing of the sender. Nor does a run that is long: the sender stands.
  */
 #include "stream_repeat.h"
 
@@ -24,7 +24,7 @@ void stream_repeat_reset(stream_repeat_t *self, uint64_t now_us)
 }
 
 /* A run is over. Of a sender that is known to repeat, a longer one is two that happen to be of one value. */
-HV_WRAPS static void count_run(stream_repeat_t *self, uint64_t now_us, bool tells)
+HV_WRAPS static void count_run(stream_repeat_t *self, uint64_t now_us, bool is_significant)
 {
     const uint32_t run = self->each > 1 && self->run > self->each ? self->each + 1 : self->run;
     const uint32_t took_us = (uint32_t)(now_us - self->began_us);
@@ -34,12 +34,12 @@ HV_WRAPS static void count_run(stream_repeat_t *self, uint64_t now_us, bool tell
     self->longest = run > self->longest ? run : self->longest;
     self->frames += run;
     self->span_us += took_us / self->run * run;
-    self->telling += tells ? 1u : 0u;
+    self->significant += is_significant ? 1u : 0u;
     self->runs++;
     if (self->runs == RUNS_MOST) {
         self->frames /= 2;
         self->span_us /= 2;
-        self->telling /= 2;
+        self->significant /= 2;
         self->runs /= 2;
         self->longest = 0;
     }
@@ -52,7 +52,7 @@ bool stream_repeat_watch(stream_t *stream, uint64_t now_us, bool is_caught_up, c
     q32_t late_q32;
     if (!stream_evidence_is_newest(&stream->evidence, stream->curve.axes, sample_q32)) {
         if (!is_caught_up) {
-            count_run(self, now_us, stream_quantum_tells(&stream->curve, stream->curve.newest_q32, sample_q32));
+            count_run(self, now_us, stream_quantum_is_significant(&stream->curve, stream->curve.newest_q32, sample_q32));
         }
         self->run = 1;
         self->began_us = now_us;
@@ -67,7 +67,7 @@ bool stream_repeat_watch(stream_t *stream, uint64_t now_us, bool is_caught_up, c
  * so. */
 static unsigned find_each(const stream_repeat_t *self)
 {
-    const bool is_known = self->runs >= RUNS_LEAST && self->telling * 2 >= self->runs;
+    const bool is_known = self->runs >= RUNS_LEAST && self->significant * 2 >= self->runs;
     const bool is_even = self->longest * self->runs <= 2 * self->frames;
     const bool is_alone = self->frames * 3 <= self->runs * 4; /* a shake has two equal samples at each of its turns */
     const unsigned each = is_alone ? 1 : (self->frames * 4 + self->runs * 3) / (self->runs * 4 + 1);

@@ -12,8 +12,8 @@
 #include "stream_repeat.h"
 
 enum {
-    TELLING = 4,      /* a value tells if it is off by less than such a share of what there is to tell, ... */
-    TELLING_OPEN = 2, /* ... of such a one where the time leaves it open */
+    SIGNIFICANT = 4,      /* a value tells if it is off by less than such a share of what there is to tell, ... */
+    SIGNIFICANT_OPEN = 2, /* ... of such a one where the time leaves it open */
     MISFIT_MEMORY = 16,
     JUDGED_MAX = 4,               /* periods that values are weighed for */
     STOOD_MAX = STREAM_STOOD_MAX, /* frames that a value may stand of a sender that freezes */
@@ -73,7 +73,7 @@ static bool note_caught_up(stream_t *stream, uint64_t now_us, const frame_t *fra
     const bool has_stood = self->stood > 0 && self->stood <= STOOD_MAX && self->moved == STREAM_MOVED_MAX;
     self->moved = self->stood > 0 ? 1 : self->moved < STREAM_MOVED_MAX ? self->moved + 1 : STREAM_MOVED_MAX;
     self->stood = 0;
-    if (!has_stood || !stream_quantum_tells(&stream->curve, stream->curve.newest_q32, frame->value_q32)) {
+    if (!has_stood || !stream_quantum_is_significant(&stream->curve, stream->curve.newest_q32, frame->value_q32)) {
         return false;
     }
     const uint64_t since_us = now_us - stream->repeat.began_us;
@@ -136,8 +136,8 @@ static bool is_old(const stream_t *stream, const frame_t *frame)
         const q32_t off_q32 = stream_evidence_misfit(seen, &curve->governor, &predictor, frame->by_time + lost, frame->value_q32);
         misfit_q32 = off_q32 < misfit_q32 ? off_q32 : misfit_q32;
     }
-    return (off_past(stream, frame) + stream_evidence_rounding(seen, curve)) * TELLING < misfit_q32 &&
-           stream_evidence_is_beyond_noise(seen, misfit_q32 / TELLING);
+    return (off_past(stream, frame) + stream_evidence_rounding(seen, curve)) * SIGNIFICANT < misfit_q32 &&
+           stream_evidence_is_beyond_noise(seen, misfit_q32 / SIGNIFICANT);
 }
 
 static bool is_about_half(q32_t periods_q32)
@@ -197,20 +197,20 @@ stream_sample_kind_t stream_sample_kind(stream_t *stream, uint64_t now_us, const
 
 /* How much better than by the time the value has to tell a number of periods. Where the time leaves it open, a little; else more,
  * and much more the more often an interval of an even sender that was too long has been told to be a loss. */
-static int32_t telling(const stream_t *stream, unsigned periods, q32_t ahead_q32)
+static int32_t significance(const stream_t *stream, unsigned periods, q32_t ahead_q32)
 {
     const q32_t off_q32 = fx_abs(ahead_q32 - periods * Q32_ONE);
     if (off_q32 <= stream_clock_jitter(&stream->clock) + CLEAR_Q32) {
-        return TELLING_OPEN;
+        return SIGNIFICANT_OPEN;
     }
-    return TELLING << (stream_clock_is_even(&stream->clock) ? stream->sample.losses : 0);
+    return SIGNIFICANT << (stream_clock_is_even(&stream->clock) ? stream->sample.losses : 0);
 }
 
 /* What a long interval was: a loss where time and value agree, else a pause of the sender. */
 static void note_loss(stream_t *stream, const stream_predictor_t *predictor, unsigned by_time, unsigned periods, q32_t misfit_q32)
 {
     const q32_t apart_q32 = stream_evidence_apart(&stream->evidence, &stream->curve.governor, predictor, by_time, by_time - 1);
-    if (by_time < 2 || (misfit_q32 + stream->sample.misfit_q32) * TELLING >= apart_q32) {
+    if (by_time < 2 || (misfit_q32 + stream->sample.misfit_q32) * SIGNIFICANT >= apart_q32) {
         return;
     }
     if (periods != by_time) {
@@ -242,7 +242,7 @@ unsigned stream_sample_periods(stream_t *stream, uint64_t now_us, const q32_t *s
         const q32_t misfit_q32 = stream_evidence_misfit(seen, scale, &predictor, periods, sample_q32);
         const q32_t apart_q32 = stream_evidence_apart(seen, scale, &predictor, periods, by_time);
         const q32_t doubt_q32 = misfit_q32 + stream->sample.misfit_q32;
-        if (doubt_q32 * telling(stream, periods, ahead_q32) < apart_q32 && misfit_q32 < least_q32) {
+        if (doubt_q32 * significance(stream, periods, ahead_q32) < apart_q32 && misfit_q32 < least_q32) {
             least_q32 = misfit_q32;
             best = periods;
         }
@@ -250,7 +250,7 @@ unsigned stream_sample_periods(stream_t *stream, uint64_t now_us, const q32_t *s
     note_loss(stream, &predictor, by_time, best, least_q32);
     stream->sample.misfit_q32 += (least_q32 - stream->sample.misfit_q32) / MISFIT_MEMORY;
     if (is_even && best == by_time &&
-        expected_q32 * TELLING > stream_evidence_apart(seen, scale, &predictor, by_time, by_time + 1) &&
+        expected_q32 * SIGNIFICANT > stream_evidence_apart(seen, scale, &predictor, by_time, by_time + 1) &&
         fx_abs(ahead_q32 - best * Q32_ONE) > stream_clock_jitter(&stream->clock) + BESIDE_Q32 &&
         fx_abs(frame.advance_q32 - ahead_q32) < CLEAR_Q32) {
         *shift_q32 = frame.advance_q32 - best * Q32_ONE;

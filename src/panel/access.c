@@ -61,7 +61,7 @@ int access_role(const char *word)
     return ACCESS_NOBODY;
 }
 
-static bool take_line(access_t *self, char *line)
+static bool parse_line(access_t *self, char *line)
 {
     char *const colon = strchr(line, ':');
     line[strcspn(line, "\n")] = '\0';
@@ -97,7 +97,7 @@ bool access_load(access_t *self, const char *directory, char *why, size_t size)
     bool is_right = true;
     while (is_right && fgets(line, sizeof line, file) != NULL) {
         number++;
-        is_right = take_line(self, line);
+        is_right = parse_line(self, line);
     }
     (void)fclose(file);
     if (!is_right) {

@@ -55,7 +55,7 @@ bool door_open(struct lws_vhost *vhost, const server_t *server)
     return m_listener != NULL;
 }
 
-static void take_in(int fd, const listener_peer_t *peer)
+static void accept_one(int fd, const listener_peer_t *peer)
 {
     void *const oldest = connections_give_way(&m_connections);
     if (oldest != NULL) {
@@ -86,7 +86,7 @@ void door_turn(void)
     }
 }
 
-static void take_all(int listening)
+static void accept_all(int listening)
 {
     listener_peer_t peer;
     for (unsigned i = 0; i < ACCEPTS_MAX; i++) {
@@ -96,7 +96,7 @@ static void take_all(int listening)
             return;
         }
         if (m_server->access->has_password || peer.is_this_machine) {
-            take_in(fd, &peer);
+            accept_one(fd, &peer);
         } else {
             (void)close(fd);
         }
@@ -112,7 +112,7 @@ int door_serve(struct lws *wsi, enum lws_callback_reasons reason, void *user, vo
     case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION:
         return -1; /* nobody's WebSocket: a client names its protocol */
     case LWS_CALLBACK_RAW_RX_FILE:
-        take_all(lws_get_socket_fd(wsi));
+        accept_all(lws_get_socket_fd(wsi));
         return 0;
     default:
         return 0;

@@ -139,7 +139,7 @@ static void put_u32(unsigned char *at, uint32_t value)
 static bool put_block(viewer_t *viewer, feed_t *stream, const double *value, uint32_t rows, uint64_t first)
 {
     static unsigned char block[HEAD_BYTES + sizeof(double) * ROWS_MAX * VIEWER_COLUMNS_MAX];
-    const uint64_t lost = stream->reader.lost - stream->lost_told + stream->dropped;
+    const uint64_t lost = stream->reader.lost - stream->lost_logged + stream->dropped;
     put_u32(block, stream->number);
     put_u32(block + 4, rows);
     put_u32(block + 8, (uint32_t)first);
@@ -153,7 +153,7 @@ static bool put_block(viewer_t *viewer, feed_t *stream, const double *value, uin
         stream->dropped += rows;
         return false;
     }
-    stream->lost_told = stream->reader.lost;
+    stream->lost_logged = stream->reader.lost;
     stream->dropped = 0;
     return true;
 }

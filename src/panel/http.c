@@ -44,8 +44,8 @@ static int answer_me(struct lws *wsi, request_t *request)
     cJSON_AddBoolToObject(json, "login_needed", m_server->access->has_password);
     cJSON_AddStringToObject(json, "version", m_server->version);
     cJSON *const names = cJSON_AddArrayToObject(json, "platforms");
-    for (unsigned i = 0; role >= 0 && i < m_server->hall->platforms; i++) {
-        cJSON_AddItemToArray(names, cJSON_CreateString(m_server->hall->platform[i].name));
+    for (unsigned i = 0; role >= 0 && i < m_server->viewers->platforms; i++) {
+        cJSON_AddItemToArray(names, cJSON_CreateString(m_server->viewers->platform[i].name));
     }
     char *const text = cJSON_PrintUnformatted(json);
     const int result = http_answer_text(wsi, request, HTTP_STATUS_OK, text != NULL ? text : "{}", NULL);
@@ -102,7 +102,7 @@ static int answer_files(struct lws *wsi, request_t *request, const char *path)
 }
 
 /* gzip, and not with q=0. */
-static bool takes_gzip(struct lws *wsi)
+static bool accepts_gzip(struct lws *wsi)
 {
     char value[128];
     const char *const at =
@@ -149,13 +149,13 @@ static int begin_request(struct lws *wsi, request_t *request, const char *path)
     if (page == NULL) {
         return http_answer_text(wsi, request, HTTP_STATUS_NOT_FOUND, "{\"error\":\"there is no such page\"}", NULL);
     }
-    return page->packed != NULL && takes_gzip(wsi)
+    return page->packed != NULL && accepts_gzip(wsi)
                ? http_begin_answer(wsi, request, HTTP_STATUS_OK, page->type, page->packed, page->packed_length,
                                    "content-encoding:", "gzip")
                : http_begin_answer(wsi, request, HTTP_STATUS_OK, page->type, page->data, page->length, NULL, NULL);
 }
 
-static int refuse_login(struct lws *wsi, request_t *request, bool is_too_often)
+static int reject_login(struct lws *wsi, request_t *request, bool is_too_often)
 {
     lwsl_warn("login from %s: %s\n", request->address, is_too_often ? "too often" : "wrong");
     return is_too_often
@@ -179,7 +179,7 @@ static void on_compared(void *context, int code, char *text, size_t length)
     (void)length;
     free(text);
     if (code != EXIT_SUCCESS || !access_enter(m_server->access, request->role, request->address, http_seconds(), token)) {
-        (void)refuse_login(request->wsi, request, false);
+        (void)reject_login(request->wsi, request, false);
         return;
     }
     (void)snprintf(cookie, sizeof cookie, "heave=%s; HttpOnly; SameSite=Strict; Path=/%s", token,
@@ -209,7 +209,7 @@ static int log_in(struct lws *wsi, request_t *request)
                           access_begin(m_server->access, request->address, http_seconds()) &&
                           child_work(compare, request, on_compared, http_seconds() * 1000);
     memset(m_password, 0, sizeof m_password);
-    return is_begun ? 0 : refuse_login(wsi, request, is_login);
+    return is_begun ? 0 : reject_login(wsi, request, is_login);
 }
 
 static int log_out(struct lws *wsi, request_t *request)
@@ -245,10 +245,10 @@ static int send_chunk(struct lws *wsi, request_t *request)
     return 0;
 }
 
-static int take_body(request_t *request, const void *bytes, size_t length)
+static int receive_body(request_t *request, const void *bytes, size_t length)
 {
     if (http_editor_is_post(request->path)) {
-        return http_editor_take(request, bytes, length);
+        return http_editor_receive(request, bytes, length);
     }
     if (request->body_length + length > sizeof request->body) {
         return -1;
@@ -276,7 +276,7 @@ int http_serve(struct lws *wsi, enum lws_callback_reasons reason, void *user, vo
     case LWS_CALLBACK_HTTP:
         return begin_request(wsi, request, in);
     case LWS_CALLBACK_HTTP_BODY:
-        return request->wants_body && length > 0 ? take_body(request, in, length) : 0;
+        return request->wants_body && length > 0 ? receive_body(request, in, length) : 0;
     case LWS_CALLBACK_HTTP_BODY_COMPLETION:
         return request->wants_body ? end_body(wsi, request) : 0;
     case LWS_CALLBACK_HTTP_WRITEABLE:

@@ -212,8 +212,8 @@ const upstream_t *http_platform(const char *path, const char **rest)
 {
     const size_t length = strcspn(path, "/");
     *rest = path[length] == '/' ? path + length + 1 : "";
-    for (unsigned i = 0; i < m_server->hall->platforms; i++) {
-        const upstream_t *const one = &m_server->hall->platform[i];
+    for (unsigned i = 0; i < m_server->viewers->platforms; i++) {
+        const upstream_t *const one = &m_server->viewers->platform[i];
         if (strlen(one->name) == length && strncmp(one->name, path, length) == 0) {
             return one;
         }

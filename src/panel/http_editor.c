@@ -112,7 +112,7 @@ bool http_editor_is_post(const char *path)
 }
 
 /* It is answered once its body has gone by: an answer in the middle of it would be cut off. */
-static int refuse(request_t *request, unsigned code, const char *why)
+static int reject(request_t *request, unsigned code, const char *why)
 {
     request->refused = code;
     request->refusal = why;
@@ -124,20 +124,20 @@ int http_editor_begin(struct lws *wsi, request_t *request, const char *type)
     const char *rest = "";
     const int role = http_role(wsi);
     if (!begins(type, "application/json")) { /* a form of another page cannot say that */
-        return refuse(request, HTTP_STATUS_NOT_FOUND, "there is no such request");
+        return reject(request, HTTP_STATUS_NOT_FOUND, "there is no such request");
     }
     if (role < (int)LEVEL_SERVICE) {
-        return role < 0 ? refuse(request, HTTP_STATUS_UNAUTHORIZED, "log in first")
-                        : refuse(request, HTTP_STATUS_FORBIDDEN, "not allowed; it takes the role service");
+        return role < 0 ? reject(request, HTTP_STATUS_UNAUTHORIZED, "log in first")
+                        : reject(request, HTTP_STATUS_FORBIDDEN, "not allowed; it takes the role service");
     }
     if (http_platform(request->path + strlen(k_check), &rest) == NULL || (rest[0] != '\0' && strcmp(rest, "zh") != 0)) {
-        return refuse(request, HTTP_STATUS_NOT_FOUND, "there is no such platform here");
+        return reject(request, HTTP_STATUS_NOT_FOUND, "there is no such platform here");
     }
     request->large = malloc(BODY_MAX);
     return request->large != NULL ? 0 : -1;
 }
 
-int http_editor_take(request_t *request, const void *bytes, size_t length)
+int http_editor_receive(request_t *request, const void *bytes, size_t length)
 {
     if (request->body_length + length > BODY_MAX) {
         return -1;

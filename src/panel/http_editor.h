@@ -17,7 +17,7 @@ bool http_editor_is_post(const char *path);
 
 /** @param type of its content: JSON alone is taken. @return as the callback */
 int http_editor_begin(struct lws *wsi, request_t *request, const char *type);
-int http_editor_take(request_t *request, const void *bytes, size_t length);
+int http_editor_receive(request_t *request, const void *bytes, size_t length);
 int http_editor_end(struct lws *wsi, request_t *request);
 
 #endif

@@ -77,7 +77,7 @@ static double number_of(const cJSON *message, const char *name)
 }
 
 /* Limits of every cylinder stand in the geometry, which pages ask for as well; without them nothing is recommended of limits. */
-static void take_limits(identification_t *self, const cJSON *message)
+static void parse_limits(identification_t *self, const cJSON *message)
 {
     const cJSON *const limits = cJSON_GetObjectItemCaseSensitive(message, "cylinder_limits");
     self->report.speed_mm_s = number_of(limits, "speed_mm_s");
@@ -113,7 +113,7 @@ bool identification_begin(identification_t *self, const upstream_t *upstream, co
     self->report.from_hz = number_of(message, "from_hz");
     self->report.to_hz = number_of(message, "to_hz");
     self->report.seconds = number_of(message, "seconds");
-    take_limits(self, message);
+    parse_limits(self, message);
     if (!identify_plan(&self->report, cycle_s, why, size)) {
         return false;
     }

@@ -15,7 +15,7 @@
 /** One. Zeroed: none. */
 typedef struct {
     uint64_t viewer; /**< 0: none */
-    void *hall;      /**< of the viewers */
+    void *viewers;   /**< of the viewers */
     bool is_working; /**< it is being worked out */
     uint32_t series; /**< of its signal; 0: not begun */
     char axis[IDENTIFICATION_AXIS_MAX];

@@ -13,7 +13,7 @@
 
 #include "common/message.h"
 #include "common/translate.h" // exit codes
-#include "panel/options.h"
+#include "panel/panel_options.h"
 #include "panel/server.h"
 
 #ifndef HEAVE_PANEL_WWW
@@ -36,7 +36,7 @@ static void on_signal(int number)
     is_ended = 1;
 }
 
-static int refuse(int code, const char *why)
+static int reject(int code, const char *why)
 {
     fprintf(stderr, "heave-panel: %s\n", why);
     return code;
@@ -71,12 +71,12 @@ static int set_password(const char *state, const char *word)
     char why[WHY_MAX];
     const int role = access_role(word);
     if (role < 0) {
-        return refuse(EXIT_BAD_USAGE, "passwd: the roles are look, operate and service");
+        return reject(EXIT_BAD_USAGE, "passwd: the roles are look, operate and service");
     }
     const bool is_set = read_password(password) && access_set_password(state, (level_t)role, password, why, sizeof why);
     memset(password, 0, sizeof password);
     if (!is_set) {
-        return refuse(EXIT_BAD_CONFIG, why);
+        return reject(EXIT_BAD_CONFIG, why);
     }
     printf("heave-panel: the password of %s is set; restart heave-panel\n", word);
     return EXIT_DONE;
@@ -85,43 +85,44 @@ static int set_password(const char *state, const char *word)
 /* --- Platforms --- */
 
 /* A name stands in messages as it is. */
-static bool add(hall_t *hall, const char *name, size_t length, const char *path)
+static bool add(viewers_t *viewers, const char *name, size_t length, const char *path)
 {
     static const char k_letters[] = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.";
     char short_name[UPSTREAM_NAME_MAX];
-    if (hall->platforms == VIEWER_PLATFORMS || length == 0 || length >= sizeof short_name || strspn(name, k_letters) < length) {
+    if (viewers->platforms == VIEWER_PLATFORMS || length == 0 || length >= sizeof short_name ||
+        strspn(name, k_letters) < length) {
         return false;
     }
     (void)snprintf(short_name, sizeof short_name, "%.*s", (int)length, name);
-    return upstream_init(&hall->platform[hall->platforms++], short_name, path, &server_upstream_calls);
+    return upstream_init(&viewers->platform[viewers->platforms++], short_name, path, &server_upstream_calls);
 }
 
 /* Those of services, by their folders; and that of a heaved started by hand. */
-static void add_found(hall_t *hall)
+static void add_found(viewers_t *viewers)
 {
     glob_t found = {0};
     if (glob(SOCKET_DIRECTORY "/*/" SOCKET_NAME, 0, NULL, &found) == 0) {
         for (size_t i = 0; i < found.gl_pathc; i++) {
             const char *const name = found.gl_pathv[i] + strlen(SOCKET_DIRECTORY "/");
-            (void)add(hall, name, strcspn(name, "/"), found.gl_pathv[i]);
+            (void)add(viewers, name, strcspn(name, "/"), found.gl_pathv[i]);
         }
     }
     globfree(&found);
-    if (hall->platforms == 0) {
-        (void)add(hall, "heave", strlen("heave"), SOCKET_DIRECTORY "/" SOCKET_NAME);
+    if (viewers->platforms == 0) {
+        (void)add(viewers, "heave", strlen("heave"), SOCKET_DIRECTORY "/" SOCKET_NAME);
     }
 }
 
-static bool add_platforms(hall_t *hall, const panel_options_t *options)
+static bool add_platforms(viewers_t *viewers, const panel_options_t *options)
 {
     for (unsigned i = 0; i < options->platforms; i++) {
         const char *const equals = strchr(options->platform[i], '=');
-        if (!add(hall, options->platform[i], (size_t)(equals - options->platform[i]), equals + 1)) {
+        if (!add(viewers, options->platform[i], (size_t)(equals - options->platform[i]), equals + 1)) {
             return false;
         }
     }
     if (options->platforms == 0) {
-        add_found(hall);
+        add_found(viewers);
     }
     return true;
 }
@@ -152,19 +153,19 @@ static int read_access(const panel_options_t *options, listener_address_t *where
     static const char *const k_names[] = {"127.0.0.1", "localhost", "[::1]"};
     char why[WHY_MAX];
     if (!listener_read(where, options->listen)) {
-        return refuse(EXIT_BAD_USAGE, "--listen: written as 127.0.0.1:9801 or [::1]:9801, without names");
+        return reject(EXIT_BAD_USAGE, "--listen: written as 127.0.0.1:9801 or [::1]:9801, without names");
     }
     if (options->proxy != NULL && (!access_read_address(options->proxy, proxy) || strncmp(proxy, "::ffff:", 7) == 0)) {
-        return refuse(EXIT_BAD_USAGE, "--proxy: an address, written as 127.0.0.1 or ::1");
+        return reject(EXIT_BAD_USAGE, "--proxy: an address, written as 127.0.0.1 or ::1");
     }
     if (!access_load(access, state_of(options), why, sizeof why)) {
-        return refuse(EXIT_BAD_CONFIG, why);
+        return reject(EXIT_BAD_CONFIG, why);
     }
     if (!access->has_password && !listener_is_this_machine(where)) {
-        return refuse(EXIT_BAD_CONFIG, "--listen: other machines only once there is a password: heave-panel passwd service");
+        return reject(EXIT_BAD_CONFIG, "--listen: other machines only once there is a password: heave-panel passwd service");
     }
     if (!access->has_password && options->proxy != NULL) {
-        return refuse(EXIT_BAD_CONFIG, "--proxy: only once there is a password: heave-panel passwd service");
+        return reject(EXIT_BAD_CONFIG, "--proxy: only once there is a password: heave-panel passwd service");
     }
     for (unsigned i = 0; i < sizeof k_names / sizeof k_names[0]; i++) {
         (void)access_allow_host(access, k_names[i]);
@@ -172,7 +173,7 @@ static int read_access(const panel_options_t *options, listener_address_t *where
     (void)access_allow_host(access, where->host);
     for (unsigned i = 0; i < options->hosts; i++) {
         if (!access_allow_host(access, options->host[i])) {
-            return refuse(EXIT_BAD_USAGE, "--allow-host: too long");
+            return reject(EXIT_BAD_USAGE, "--allow-host: too long");
         }
     }
     return EXIT_DONE;
@@ -183,7 +184,7 @@ static int serve(const panel_options_t *options)
     static access_t passwords;
     static pages_t pages;
     static upstream_t platform[VIEWER_PLATFORMS];
-    static hall_t hall = {.platform = platform};
+    static viewers_t viewers = {.platform = platform};
     static char built[2][PLACE_MAX];
     listener_address_t where;
     char why[WHY_MAX];
@@ -199,18 +200,18 @@ static int serve(const panel_options_t *options)
                            options->heaved != NULL ? options->heaved : installed_or_built(HEAVE_PANEL_HEAVED, "heaved", built[1]),
                        .access = &passwords,
                        .pages = &pages,
-                       .hall = &hall,
+                       .viewers = &viewers,
                        .version = HEAVE_VERSION};
-    hall.state = server.state;
+    viewers.state = server.state;
     const int code = read_access(options, &where, proxy, &passwords);
     if (code != EXIT_DONE) {
         return code;
     }
     if (!pages_load(&pages, www, why, sizeof why)) {
-        return refuse(EXIT_BAD_CONFIG, why);
+        return reject(EXIT_BAD_CONFIG, why);
     }
-    if (!add_platforms(&hall, options)) {
-        return refuse(EXIT_BAD_USAGE, "--platform: NAME has 1 to 31 letters, digits, - _ or .");
+    if (!add_platforms(&viewers, options)) {
+        return reject(EXIT_BAD_USAGE, "--platform: NAME has 1 to 31 letters, digits, - _ or .");
     }
     (void)sigaction(SIGINT, &action, NULL);
     (void)sigaction(SIGTERM, &action, NULL);

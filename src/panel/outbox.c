@@ -21,7 +21,7 @@ bool viewer_put(viewer_t *viewer, const void *data, size_t length, bool is_binar
     return true;
 }
 
-bool viewer_take(viewer_t *viewer, message_t *out)
+bool viewer_pop(viewer_t *viewer, message_t *out)
 {
     if (viewer->count == 0) {
         return false;

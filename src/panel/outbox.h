@@ -12,6 +12,6 @@
 bool viewer_put(viewer_t *viewer, const void *data, size_t length, bool is_binary);
 
 /** The next message to send; false where there is none. The caller frees its data. */
-bool viewer_take(viewer_t *viewer, message_t *out);
+bool viewer_pop(viewer_t *viewer, message_t *out);
 
 #endif

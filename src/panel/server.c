@@ -57,7 +57,7 @@ static void wake(viewer_t *viewer)
 static viewer_t *page_below(int role)
 {
     viewer_t *lowest = NULL;
-    for (viewer_t *viewer = m_server->hall->viewers; viewer != NULL; viewer = viewer->next) { /* the newest first */
+    for (viewer_t *viewer = m_server->viewers->first; viewer != NULL; viewer = viewer->next) { /* the newest first */
         if (!viewer->is_over && viewer->role < role && (lowest == NULL || viewer->role <= lowest->role)) {
             lowest = viewer;
         }
@@ -68,7 +68,7 @@ static viewer_t *page_below(int role)
 static bool is_full(void)
 {
     unsigned pages = 0;
-    for (const viewer_t *viewer = m_server->hall->viewers; viewer != NULL; viewer = viewer->next) {
+    for (const viewer_t *viewer = m_server->viewers->first; viewer != NULL; viewer = viewer->next) {
         pages += !viewer->is_over;
     }
     return pages >= DOOR_PAGES_MAX;
@@ -94,7 +94,7 @@ static int enter(struct lws *wsi, socket_t *socket)
         below->is_over = true;
         wake(below);
     }
-    socket->viewer = role >= 0 && !is_full() ? viewer_enter(m_server->hall, wsi, role, name) : NULL;
+    socket->viewer = role >= 0 && !is_full() ? viewer_enter(m_server->viewers, wsi, role, name) : NULL;
     if (socket->viewer != NULL) {
         (void)http_token(wsi, socket->viewer->session);
         door_passed(wsi);
@@ -115,8 +115,8 @@ static int hear(struct lws *wsi, viewer_t *viewer, const void *in, size_t length
         viewer->in_length += length;
     }
     if (lws_remaining_packet_payload(wsi) == 0 && lws_is_final_fragment(wsi)) {
-        m_server->hall->now_ms = milliseconds();
-        viewer_hear(m_server->hall, viewer, viewer->in, viewer->in_length);
+        m_server->viewers->now_ms = milliseconds();
+        viewer_hear(m_server->viewers, viewer, viewer->in, viewer->in_length);
         viewer->in_length = 0;
         if (++viewer->heard >= VIEWER_HEARD_MAX) { /* so that a page that asks without end holds up nobody's ticks */
             (void)lws_rx_flow_control(wsi, 0);
@@ -131,7 +131,7 @@ static int talk(struct lws *wsi, viewer_t *viewer)
     if (viewer->is_over) {
         return -1;
     }
-    if (!viewer_take(viewer, &message)) {
+    if (!viewer_pop(viewer, &message)) {
         return 0;
     }
     const int sent =
@@ -157,7 +157,7 @@ static int serve_page(struct lws *wsi, enum lws_callback_reasons reason, void *u
         return talk(wsi, socket->viewer);
     case LWS_CALLBACK_CLOSED:
         if (socket->viewer != NULL) {
-            viewer_leave(m_server->hall, socket->viewer);
+            viewer_leave(m_server->viewers, socket->viewer);
             socket->viewer = NULL;
         }
         return 0;
@@ -187,7 +187,7 @@ static int serve_link(struct lws *wsi, enum lws_callback_reasons reason, void *u
         m_adopting->handle = wsi;
         return 0;
     case LWS_CALLBACK_RAW_RX_FILE:
-        m_server->hall->now_ms = milliseconds();
+        m_server->viewers->now_ms = milliseconds();
         return adopted->link == NULL || upstream_readable(adopted->link) ? 0 : -1;
     case LWS_CALLBACK_RAW_CLOSE_FILE:
         if (adopted->link != NULL) {
@@ -215,17 +215,17 @@ static void watch_fd(link_t *link)
 
 static void on_status(upstream_t *upstream)
 {
-    hall_status(m_server->hall, upstream);
+    viewers_status(m_server->viewers, upstream);
 }
 
 static void on_gone(upstream_t *upstream)
 {
-    hall_gone(m_server->hall, upstream);
+    viewers_gone(m_server->viewers, upstream);
 }
 
 static void on_answer(upstream_t *upstream, const asker_t *asker, const char *line)
 {
-    hall_answer(m_server->hall, upstream, asker, line);
+    viewers_answer(m_server->viewers, upstream, asker, line);
 }
 
 const upstream_calls_t server_upstream_calls = {watch_fd, on_status, on_answer, on_gone};
@@ -297,7 +297,7 @@ static int serve_http(struct lws *wsi, enum lws_callback_reasons reason, void *u
 static void listen_again(void)
 {
     door_turn();
-    for (viewer_t *viewer = m_server->hall->viewers; viewer != NULL; viewer = viewer->next) {
+    for (viewer_t *viewer = m_server->viewers->first; viewer != NULL; viewer = viewer->next) {
         if (viewer->heard >= VIEWER_HEARD_MAX) {
             (void)lws_rx_flow_control(viewer->handle, 1);
         }
@@ -307,8 +307,8 @@ static void listen_again(void)
 
 static void pump(lws_sorted_usec_list_t *list)
 {
-    m_server->hall->now_ms = milliseconds();
-    hall_pump(m_server->hall);
+    m_server->viewers->now_ms = milliseconds();
+    viewers_pump(m_server->viewers);
     listen_again();
     lws_sul_schedule(m_context, 0, list, pump, PUMP_US);
 }
@@ -316,7 +316,7 @@ static void pump(lws_sorted_usec_list_t *list)
 /* Who has logged out elsewhere, or whose session has ended, is out here too. */
 static void end_sessions(void)
 {
-    for (viewer_t *viewer = m_server->hall->viewers; viewer != NULL; viewer = viewer->next) {
+    for (viewer_t *viewer = m_server->viewers->first; viewer != NULL; viewer = viewer->next) {
         if (!viewer->is_over && !http_is_session(viewer->session)) {
             viewer->is_over = true;
             wake(viewer);
@@ -328,8 +328,8 @@ static void each_second(lws_sorted_usec_list_t *list)
 {
     end_sessions();
     child_watch_time(milliseconds());
-    for (unsigned i = 0; i < m_server->hall->platforms; i++) {
-        upstream_connect(&m_server->hall->platform[i]);
+    for (unsigned i = 0; i < m_server->viewers->platforms; i++) {
+        upstream_connect(&m_server->viewers->platform[i]);
     }
     lws_sul_schedule(m_context, 0, list, each_second, SECOND_US);
 }
@@ -392,13 +392,13 @@ bool server_open(server_t *server)
     m_server = server;
     http_init(server);
     child_watch = watch_child;
-    server->hall->wake = wake;
+    server->viewers->wake = wake;
     if (!door_has_descriptors() || !make_context(server)) {
         server_close();
         return false;
     }
     printf("heave-panel: %s://%s:%d/ for %u platform%s\n", server->certificate != NULL ? "https" : "http", server->where->host,
-           server->where->port, server->hall->platforms, server->hall->platforms == 1 ? "" : "s");
+           server->where->port, server->viewers->platforms, server->viewers->platforms == 1 ? "" : "s");
     (void)fflush(stdout);
     each_second(&m_second);
     pump(&m_pump);

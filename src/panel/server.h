@@ -19,7 +19,7 @@ typedef struct {
     const char *heaved;              /**< the program that checks configurations */
     access_t *access;
     pages_t *pages;
-    hall_t *hall;
+    viewers_t *viewers;
     const char *version;
 } server_t;
 

@@ -203,7 +203,7 @@ static void open_folders(upstream_t *self)
     (void)snprintf(self->log_name, sizeof self->log_name, "%.*s", (int)length, length > 0 ? name + strlen(k_file) : "");
 }
 
-static bool take_text(configuration_t *self, int fd, const cJSON *answer)
+static bool receive_text(configuration_t *self, int fd, const cJSON *answer)
 {
     const cJSON *const bytes = cJSON_GetObjectItemCaseSensitive(answer, "bytes");
     const double length = cJSON_IsNumber(bytes) ? bytes->valuedouble : -1;
@@ -234,7 +234,7 @@ static void open_configuration(upstream_t *self, const char *digest, size_t leng
     (void)snprintf(it->digest, sizeof it->digest, "%.*s", (int)length, digest);
     const int fd = length > 0 ? ask_descriptor(self, "configuration\n", line, sizeof line) : -1;
     cJSON *const answer = fd >= 0 ? cJSON_Parse(line) : NULL;
-    if (answer != NULL && !take_text(it, fd, answer)) {
+    if (answer != NULL && !receive_text(it, fd, answer)) {
         free(it->text);
         it->text = NULL;
     }
@@ -318,7 +318,7 @@ const char *upstream_send_with(upstream_t *self, link_kind_t kind, const char *l
 
 static const char k_good[] = "{\"ok\":true";
 
-static void take_line(link_t *link, char *line)
+static void receive_line(link_t *link, char *line)
 {
     upstream_t *const self = link->upstream;
     if (link->kind == LINK_WATCH && strncmp(line, k_good, strlen(k_good)) != 0) {
@@ -358,7 +358,7 @@ bool upstream_readable(link_t *link)
     while ((end = memchr(link->line, '\n', link->length)) != NULL) {
         const size_t used = (size_t)(end - link->line) + 1;
         *end = '\0';
-        take_line(link, link->line);
+        receive_line(link, link->line);
         if (link->fd < 0) {
             return true;
         }

@@ -19,22 +19,22 @@
 
 /* --- Who --- */
 
-viewer_t *viewer_enter(hall_t *hall, void *handle, int role, const char *name)
+viewer_t *viewer_enter(viewers_t *viewers, void *handle, int role, const char *name)
 {
     viewer_t *const viewer = calloc(1, sizeof *viewer);
     if (viewer == NULL) {
         return NULL;
     }
-    viewer->number = ++hall->last_viewer;
+    viewer->number = ++viewers->last_viewer;
     viewer->handle = handle;
     viewer->role = role;
     (void)snprintf(viewer->name, sizeof viewer->name, "%s", name);
-    viewer->next = hall->viewers;
-    hall->viewers = viewer;
+    viewer->next = viewers->first;
+    viewers->first = viewer;
     return viewer;
 }
 
-static void tell_controls_to(hall_t *hall, const upstream_t *upstream, viewer_t *viewer)
+static void send_controls_to(viewers_t *viewers, const upstream_t *upstream, viewer_t *viewer)
 {
     cJSON *const json = cJSON_CreateObject();
     cJSON_AddStringToObject(json, "event", "controls");
@@ -45,14 +45,14 @@ static void tell_controls_to(hall_t *hall, const upstream_t *upstream, viewer_t 
         cJSON_AddNullToObject(json, "holder");
     }
     cJSON_AddBoolToObject(json, "yours", upstream->holder == viewer->number);
-    hall_tell_json(hall, viewer, json);
+    viewers_send_json(viewers, viewer, json);
 }
 
 /* Everybody, when they have changed. */
-static void tell_controls(hall_t *hall, const upstream_t *upstream)
+static void send_controls(viewers_t *viewers, const upstream_t *upstream)
 {
-    for (viewer_t *viewer = hall->viewers; viewer != NULL; viewer = viewer->next) {
-        tell_controls_to(hall, upstream, viewer);
+    for (viewer_t *viewer = viewers->first; viewer != NULL; viewer = viewer->next) {
+        send_controls_to(viewers, upstream, viewer);
     }
 }
 
@@ -67,9 +67,9 @@ static void let_go(upstream_t *upstream, viewer_t *viewer, unsigned at)
     }
 }
 
-void viewer_leave(hall_t *hall, viewer_t *viewer)
+void viewer_leave(viewers_t *viewers, viewer_t *viewer)
 {
-    viewer_t **at = &hall->viewers;
+    viewer_t **at = &viewers->first;
     message_t message;
     while (*at != NULL && *at != viewer) {
         at = &(*at)->next;
@@ -77,14 +77,14 @@ void viewer_leave(hall_t *hall, viewer_t *viewer)
     if (*at == viewer) {
         *at = viewer->next;
     }
-    for (unsigned i = 0; i < hall->platforms; i++) {
-        let_go(&hall->platform[i], viewer, i);
-        if (hall->platform[i].holder == viewer->number) {
-            hall->platform[i].holder = 0;
-            tell_controls(hall, &hall->platform[i]);
+    for (unsigned i = 0; i < viewers->platforms; i++) {
+        let_go(&viewers->platform[i], viewer, i);
+        if (viewers->platform[i].holder == viewer->number) {
+            viewers->platform[i].holder = 0;
+            send_controls(viewers, &viewers->platform[i]);
         }
     }
-    while (viewer_take(viewer, &message)) {
+    while (viewer_pop(viewer, &message)) {
         free(message.data);
     }
     free(viewer);
@@ -92,35 +92,35 @@ void viewer_leave(hall_t *hall, viewer_t *viewer)
 
 /* --- What happens at heaved --- */
 
-void hall_status(hall_t *hall, const upstream_t *upstream)
+void viewers_status(viewers_t *viewers, const upstream_t *upstream)
 {
     char head[128 + UPSTREAM_WHY_ZH_MAX];
-    const unsigned at = hall_place_of(hall, upstream);
+    const unsigned at = viewers_place_of(viewers, upstream);
     const char *const put_back = upstream->put_back_zh;
     (void)snprintf(head, sizeof head, "{\"event\":\"status\",\"platform\":\"%s\",%s%s%s\"status\":", upstream->name,
                    put_back[0] != '\0' ? "\"put_back_zh\":" : "", put_back, put_back[0] != '\0' ? "," : "");
-    for (viewer_t *viewer = hall->viewers; viewer != NULL; viewer = viewer->next) {
+    for (viewer_t *viewer = viewers->first; viewer != NULL; viewer = viewer->next) {
         const unsigned hz = viewer->status_hz[at];
         /* a page that has not taken the last ones gets the next one */
-        if (hz != 0 && viewer->count < VIEWER_QUEUE / 4 && (hall->now_ms - viewer->status_ms[at]) * hz >= 900) {
-            viewer->status_ms[at] = hall->now_ms;
-            hall_tell_object(hall, viewer, head, upstream->status);
+        if (hz != 0 && viewer->count < VIEWER_QUEUE / 4 && (viewers->now_ms - viewer->status_ms[at]) * hz >= 900) {
+            viewer->status_ms[at] = viewers->now_ms;
+            viewers_send_object(viewers, viewer, head, upstream->status);
         }
     }
 }
 
-void hall_gone(hall_t *hall, const upstream_t *upstream)
+void viewers_gone(viewers_t *viewers, const upstream_t *upstream)
 {
-    viewer_service_gone(hall, hall_place_of(hall, upstream));
-    for (viewer_t *viewer = hall->viewers; viewer != NULL; viewer = viewer->next) {
+    viewer_service_gone(viewers, viewers_place_of(viewers, upstream));
+    for (viewer_t *viewer = viewers->first; viewer != NULL; viewer = viewer->next) {
         cJSON *const json = cJSON_CreateObject();
         cJSON_AddStringToObject(json, "event", "gone");
         cJSON_AddStringToObject(json, "platform", upstream->name);
-        viewer->series[hall_place_of(hall, upstream)] = 0;
+        viewer->series[viewers_place_of(viewers, upstream)] = 0;
         for (unsigned i = 0; i < VIEWER_STREAMS_MAX; i++) {
             viewer->stream[i].number = viewer->stream[i].upstream == upstream ? 0 : viewer->stream[i].number;
         }
-        hall_tell_json(hall, viewer, json);
+        viewers_send_json(viewers, viewer, json);
     }
 }
 
@@ -136,50 +136,50 @@ static void note_series(viewer_t *viewer, unsigned at, const char *line)
     cJSON_Delete(answer);
 }
 
-static void tell_tick(hall_t *hall, const upstream_t *upstream, const char *line)
+static void send_tick(viewers_t *viewers, const upstream_t *upstream, const char *line)
 {
     char head[128];
-    const unsigned at = hall_place_of(hall, upstream);
-    viewer_service_tick(hall, at, line);
+    const unsigned at = viewers_place_of(viewers, upstream);
+    viewer_service_tick(viewers, at, line);
     (void)snprintf(head, sizeof head, "{\"event\":\"tick\",\"platform\":\"%s\",\"tick\":", upstream->name);
-    for (viewer_t *viewer = hall->viewers; viewer != NULL; viewer = viewer->next) {
+    for (viewer_t *viewer = viewers->first; viewer != NULL; viewer = viewer->next) {
         if (viewer->wants_ticks[at] && viewer->count < VIEWER_QUEUE / 2) {
-            hall_tell_object(hall, viewer, head, line);
+            viewers_send_object(viewers, viewer, head, line);
         }
     }
 }
 
-void hall_answer(hall_t *hall, upstream_t *upstream, const asker_t *asker, const char *line)
+void viewers_answer(viewers_t *viewers, upstream_t *upstream, const asker_t *asker, const char *line)
 {
     char head[64];
     if (asker->viewer == 0) {
         if (asker->id == TICK_ID && line != NULL) {
-            tell_tick(hall, upstream, line);
+            send_tick(viewers, upstream, line);
         }
         return;
     }
-    viewer_t *const viewer = hall_find(hall, asker->viewer);
+    viewer_t *const viewer = viewers_find(viewers, asker->viewer);
     const bool is_press = (asker->id & VIEWER_PRESS_BIT) != 0;
     if (viewer == NULL) { /* gone meanwhile: what it pressed is nobody's; heaved lets go by itself within 250 ms */
         return;
     }
     if (line == NULL) {
         if (is_press) {
-            viewer_service_pressed(hall, viewer, hall_place_of(hall, upstream));
+            viewer_service_pressed(viewers, viewer, viewers_place_of(viewers, upstream));
         }
-        hall_answer_error(hall, viewer, asker->id & ~VIEWER_PRESS_BIT, "heaved has not answered");
+        viewers_answer_error(viewers, viewer, asker->id & ~VIEWER_PRESS_BIT, "heaved has not answered");
         return;
     }
     if (is_press) {
-        note_series(viewer, hall_place_of(hall, upstream), line);
-        viewer_service_pressed(hall, viewer, hall_place_of(hall, upstream));
+        note_series(viewer, viewers_place_of(viewers, upstream), line);
+        viewer_service_pressed(viewers, viewer, viewers_place_of(viewers, upstream));
     }
     if (strstr(line, "\"ok\":false") != NULL) {
-        hall_answer_refusal(hall, viewer, asker->id & ~VIEWER_PRESS_BIT, line);
+        viewers_answer_refusal(viewers, viewer, asker->id & ~VIEWER_PRESS_BIT, line);
         return;
     }
     (void)snprintf(head, sizeof head, "{\"id\":%lld,\"answer\":", (long long)(asker->id & ~VIEWER_PRESS_BIT));
-    hall_tell_object(hall, viewer, head, line);
+    viewers_send_object(viewers, viewer, head, line);
 }
 
 /* --- In --- */
@@ -216,12 +216,12 @@ static void op_request(const call_t *call)
     char heard[UPSTREAM_HEARD];
     const char *const line = viewer_word(call->json, "line");
     if (!viewer_is_plain(line) || is_kept_back(line)) {
-        viewer_refuse(call, "that is no request that goes this way");
+        viewer_reject(call, "that is no request that goes this way");
     } else if (viewer_is_allowed(call, line)) {
         if (has_room(call->upstream, line)) {
             (void)viewer_send(call, link_for(line), viewer_heard(call, line, heard), call->id);
         } else {
-            viewer_refuse(call, UPSTREAM_BUSY);
+            viewer_reject(call, UPSTREAM_BUSY);
         }
     }
 }
@@ -232,7 +232,7 @@ static void op_press(const call_t *call)
     const bool is_held = viewer_begins(wanted, "jog") || viewer_begins(wanted, "home") || viewer_begins(wanted, "relay") ||
                          viewer_begins(wanted, "signal");
     if (!viewer_is_plain(wanted) || !is_held) {
-        viewer_refuse(call, "only jog, home, relay and signal are held");
+        viewer_reject(call, "only jog, home, relay and signal are held");
     } else {
         (void)viewer_press(call, wanted);
     }
@@ -243,7 +243,7 @@ static void op_beat(const call_t *call)
 {
     char line[UPSTREAM_REQUEST];
     const asker_t nobody = {.viewer = 0};
-    const uint32_t series = call->viewer->series[hall_place_of(call->hall, call->upstream)];
+    const uint32_t series = call->viewer->series[viewers_place_of(call->viewers, call->upstream)];
     if (series != 0 && (double)series == viewer_number(call->json, "series", 0) &&
         call->upstream->holder == call->viewer->number) {
         (void)snprintf(line, sizeof line, "beat %u %.0f %.0f", series, viewer_number(call->json, "counter", 0),
@@ -252,16 +252,16 @@ static void op_beat(const call_t *call)
     }
 }
 
-static void op_take(const call_t *call, bool is_taking)
+static void op_controls(const call_t *call, bool is_taking)
 {
     upstream_t *const upstream = call->upstream;
     if (is_taking && call->viewer->role < (int)LEVEL_OPERATE) {
-        viewer_refuse(call, "not allowed; it takes the role operate");
+        viewer_reject(call, "not allowed; it takes the role operate");
         return;
     }
-    viewer_t *const before = hall_find(call->hall, upstream->holder);
+    viewer_t *const before = viewers_find(call->viewers, upstream->holder);
     if (before != NULL && (is_taking || before == call->viewer)) {
-        let_go(upstream, before, hall_place_of(call->hall, upstream));
+        let_go(upstream, before, viewers_place_of(call->viewers, upstream));
     }
     if (is_taking) {
         upstream->holder = call->viewer->number;
@@ -269,26 +269,26 @@ static void op_take(const call_t *call, bool is_taking)
     } else if (upstream->holder == call->viewer->number) {
         upstream->holder = 0;
     } else { /* nothing has changed: others hear nothing of it, however often a page says so */
-        tell_controls_to(call->hall, upstream, call->viewer);
+        send_controls_to(call->viewers, upstream, call->viewer);
         return;
     }
-    tell_controls(call->hall, upstream);
+    send_controls(call->viewers, upstream);
 }
 
 static void op_status(const call_t *call)
 {
-    const unsigned at = hall_place_of(call->hall, call->upstream);
+    const unsigned at = viewers_place_of(call->viewers, call->upstream);
     const double hz = viewer_number(call->json, "hz", STATUS_HZ_MAX);
     call->viewer->status_hz[at] = hz <= 0 ? 0 : hz < 1 ? 1u : hz > STATUS_HZ_MAX ? (unsigned)STATUS_HZ_MAX : (unsigned)hz;
     if (call->upstream->is_there) {
-        hall_status(call->hall, call->upstream);
+        viewers_status(call->viewers, call->upstream);
     } else {
         cJSON *const json = cJSON_CreateObject();
         cJSON_AddStringToObject(json, "event", "gone");
         cJSON_AddStringToObject(json, "platform", call->upstream->name);
-        hall_tell_json(call->hall, call->viewer, json);
+        viewers_send_json(call->viewers, call->viewer, json);
     }
-    tell_controls_to(call->hall, call->upstream, call->viewer);
+    send_controls_to(call->viewers, call->upstream, call->viewer);
 }
 
 static void op_samples(const call_t *call)
@@ -296,15 +296,15 @@ static void op_samples(const call_t *call)
     char error[128] = "";
     feed_t *const stream = feed_begin(call->viewer, call->upstream, call->json, error, sizeof error);
     if (stream == NULL) {
-        viewer_refuse(call, error);
+        viewer_reject(call, error);
     } else {
-        hall_tell_json(call->hall, call->viewer, feed_describe(stream, call->id));
+        viewers_send_json(call->viewers, call->viewer, feed_describe(stream, call->id));
     }
 }
 
 static void op_ticks(const call_t *call)
 {
-    call->viewer->wants_ticks[hall_place_of(call->hall, call->upstream)] =
+    call->viewer->wants_ticks[viewers_place_of(call->viewers, call->upstream)] =
         cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(call->json, "on"));
 }
 
@@ -321,9 +321,9 @@ static void carry_out(const call_t *call, const char *op)
     } else if (strcmp(op, "beat") == 0) {
         op_beat(call);
     } else if (strcmp(op, "release") == 0) {
-        let_go(call->upstream, call->viewer, hall_place_of(call->hall, call->upstream));
+        let_go(call->upstream, call->viewer, viewers_place_of(call->viewers, call->upstream));
     } else if (strcmp(op, "take") == 0 || strcmp(op, "drop") == 0) {
-        op_take(call, op[0] == 't');
+        op_controls(call, op[0] == 't');
     } else if (strcmp(op, "status") == 0) {
         op_status(call);
     } else if (strcmp(op, "samples") == 0) {
@@ -336,23 +336,23 @@ static void carry_out(const call_t *call, const char *op)
     } else if (strcmp(op, "ticks") == 0) {
         op_ticks(call);
     } else {
-        viewer_refuse(call, "there is no such operation");
+        viewer_reject(call, "there is no such operation");
     }
 }
 
-void viewer_hear(hall_t *hall, viewer_t *viewer, const char *text, size_t length)
+void viewer_hear(viewers_t *viewers, viewer_t *viewer, const char *text, size_t length)
 {
     cJSON *const json = cJSON_ParseWithLength(text, length);
-    call_t call = {.hall = hall, .viewer = viewer, .json = json};
+    call_t call = {.viewers = viewers, .viewer = viewer, .json = json};
     if (!cJSON_IsObject(json) || !viewer_whole(json, "id", VIEWER_PRESS_BIT - 1, &call.id)) {
-        hall_answer_error(hall, viewer, 0, "a message is one JSON object with op, platform and a whole number as id");
+        viewers_answer_error(viewers, viewer, 0, "a message is one JSON object with op, platform and a whole number as id");
     } else {
-        for (unsigned i = 0; i < hall->platforms; i++) {
+        for (unsigned i = 0; i < viewers->platforms; i++) {
             call.upstream =
-                strcmp(hall->platform[i].name, viewer_word(json, "platform")) == 0 ? &hall->platform[i] : call.upstream;
+                strcmp(viewers->platform[i].name, viewer_word(json, "platform")) == 0 ? &viewers->platform[i] : call.upstream;
         }
         if (call.upstream == NULL) {
-            viewer_refuse(&call, NO_PLATFORM);
+            viewer_reject(&call, NO_PLATFORM);
         } else {
             carry_out(&call, viewer_word(json, "op"));
         }
@@ -362,9 +362,9 @@ void viewer_hear(hall_t *hall, viewer_t *viewer, const char *text, size_t length
 
 /* --- By time --- */
 
-static bool wants_ticks(const hall_t *hall, unsigned at)
+static bool wants_ticks(const viewers_t *viewers, unsigned at)
 {
-    for (const viewer_t *viewer = hall->viewers; viewer != NULL; viewer = viewer->next) {
+    for (const viewer_t *viewer = viewers->first; viewer != NULL; viewer = viewer->next) {
         if (viewer->wants_ticks[at]) {
             return true;
         }
@@ -372,19 +372,19 @@ static bool wants_ticks(const hall_t *hall, unsigned at)
     return false;
 }
 
-void hall_pump(hall_t *hall)
+void viewers_pump(viewers_t *viewers)
 {
-    viewer_service_pump(hall);
+    viewer_service_pump(viewers);
     const asker_t own = {.viewer = 0, .id = TICK_ID};
-    for (unsigned i = 0; i < hall->platforms; i++) {
-        upstream_t *const upstream = &hall->platform[i];
-        if (upstream->is_there && wants_ticks(hall, i) && upstream->link[LINK_QUICK].waits < UPSTREAM_WAITING / 4) {
+    for (unsigned i = 0; i < viewers->platforms; i++) {
+        upstream_t *const upstream = &viewers->platform[i];
+        if (upstream->is_there && wants_ticks(viewers, i) && upstream->link[LINK_QUICK].waits < UPSTREAM_WAITING / 4) {
             (void)upstream_send(upstream, LINK_QUICK, "tick", &own);
         }
     }
-    for (viewer_t *viewer = hall->viewers; viewer != NULL; viewer = viewer->next) {
+    for (viewer_t *viewer = viewers->first; viewer != NULL; viewer = viewer->next) {
         if (feed_pump(viewer)) {
-            hall->wake(viewer);
+            viewers->wake(viewer);
         }
     }
 }

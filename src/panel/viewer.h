@@ -13,29 +13,29 @@
 typedef struct {
     upstream_t *platform;
     unsigned platforms;
-    viewer_t *viewers;
+    viewer_t *first;
     uint64_t last_viewer;
     int64_t now_ms;
     identification_t identification[VIEWER_PLATFORMS]; /**< of each platform */
     const char *state;                                 /**< directory where configurations are staged */
     void (*wake)(viewer_t *viewer);                    /**< it has something to send */
-} hall_t;
+} viewers_t;
 
 /** A page has come; @return NULL where there is no memory */
-viewer_t *viewer_enter(hall_t *hall, void *handle, int role, const char *name);
+viewer_t *viewer_enter(viewers_t *viewers, void *handle, int role, const char *name);
 
 /** A page has gone: what it held is let go. */
-void viewer_leave(hall_t *hall, viewer_t *viewer);
+void viewer_leave(viewers_t *viewers, viewer_t *viewer);
 
 /** A message of a page. */
-void viewer_hear(hall_t *hall, viewer_t *viewer, const char *text, size_t length);
+void viewer_hear(viewers_t *viewers, viewer_t *viewer, const char *text, size_t length);
 
 /** The newest status of a platform has come, heaved is gone, or has answered. */
-void hall_status(hall_t *hall, const upstream_t *upstream);
-void hall_gone(hall_t *hall, const upstream_t *upstream);
-void hall_answer(hall_t *hall, upstream_t *upstream, const asker_t *asker, const char *line);
+void viewers_status(viewers_t *viewers, const upstream_t *upstream);
+void viewers_gone(viewers_t *viewers, const upstream_t *upstream);
+void viewers_answer(viewers_t *viewers, upstream_t *upstream, const asker_t *asker, const char *line);
 
 /** Every 33 ms: samples, and ticks where somebody wants them. */
-void hall_pump(hall_t *hall);
+void viewers_pump(viewers_t *viewers);
 
 #endif

@@ -13,23 +13,23 @@
 #define TICK_MAX 9e15 /* whole numbers of JSON */
 
 /* What may not be lost: a page that does not take it is closed, and comes again. */
-static void tell(hall_t *hall, viewer_t *viewer, const char *text, size_t length)
+static void send(viewers_t *viewers, viewer_t *viewer, const char *text, size_t length)
 {
     viewer->is_over = viewer->is_over || !viewer_put(viewer, text, length, false);
-    hall->wake(viewer);
+    viewers->wake(viewer);
 }
 
-void hall_tell_json(hall_t *hall, viewer_t *viewer, cJSON *json)
+void viewers_send_json(viewers_t *viewers, viewer_t *viewer, cJSON *json)
 {
     char *const text = cJSON_PrintUnformatted(json);
     if (text != NULL) {
-        tell(hall, viewer, text, strlen(text));
+        send(viewers, viewer, text, strlen(text));
     }
     cJSON_free(text);
     cJSON_Delete(json);
 }
 
-void hall_add_chinese(cJSON *json, const char *error)
+void viewers_add_chinese(cJSON *json, const char *error)
 {
     char out[SENTENCE_MAX];
     const char *const chinese = sentence(error, out, sizeof out);
@@ -38,48 +38,48 @@ void hall_add_chinese(cJSON *json, const char *error)
     }
 }
 
-void hall_answer_error(hall_t *hall, viewer_t *viewer, int64_t id, const char *error)
+void viewers_answer_error(viewers_t *viewers, viewer_t *viewer, int64_t id, const char *error)
 {
     cJSON *const json = cJSON_CreateObject();
     cJSON_AddNumberToObject(json, "id", (double)id);
     cJSON_AddStringToObject(json, "error", error);
-    hall_add_chinese(json, error);
-    hall_tell_json(hall, viewer, json);
+    viewers_add_chinese(json, error);
+    viewers_send_json(viewers, viewer, json);
 }
 
-void hall_answer_refusal(hall_t *hall, viewer_t *viewer, int64_t id, const char *line)
+void viewers_answer_refusal(viewers_t *viewers, viewer_t *viewer, int64_t id, const char *line)
 {
     cJSON *const json = cJSON_CreateObject(), *const answer = cJSON_Parse(line);
     cJSON_AddNumberToObject(json, "id", (double)id);
     cJSON_AddItemToObject(json, "answer", cJSON_CreateRaw(line));
-    hall_add_chinese(json, viewer_word(answer, "error"));
+    viewers_add_chinese(json, viewer_word(answer, "error"));
     cJSON_Delete(answer);
-    hall_tell_json(hall, viewer, json);
+    viewers_send_json(viewers, viewer, json);
 }
 
 /* heaved's own object, unchanged, within one of ours. */
-void hall_tell_object(hall_t *hall, viewer_t *viewer, const char *head, const char *object)
+void viewers_send_object(viewers_t *viewers, viewer_t *viewer, const char *head, const char *object)
 {
     const size_t size = strlen(head) + strlen(object) + 2;
     char *const text = malloc(size);
     if (text != NULL) {
-        tell(hall, viewer, text, (size_t)snprintf(text, size, "%s%s}", head, object));
+        send(viewers, viewer, text, (size_t)snprintf(text, size, "%s%s}", head, object));
     }
     free(text);
 }
 
-viewer_t *hall_find(const hall_t *hall, uint64_t number)
+viewer_t *viewers_find(const viewers_t *viewers, uint64_t number)
 {
-    viewer_t *viewer = hall->viewers;
+    viewer_t *viewer = viewers->first;
     while (viewer != NULL && viewer->number != number) {
         viewer = viewer->next;
     }
     return viewer;
 }
 
-unsigned hall_place_of(const hall_t *hall, const upstream_t *upstream)
+unsigned viewers_place_of(const viewers_t *viewers, const upstream_t *upstream)
 {
-    return (unsigned)(upstream - hall->platform);
+    return (unsigned)(upstream - viewers->platform);
 }
 
 const char *viewer_word(const cJSON *json, const char *name)
@@ -104,9 +104,9 @@ bool viewer_whole(const cJSON *json, const char *name, int64_t most, int64_t *nu
     return true;
 }
 
-void viewer_refuse(const call_t *call, const char *error)
+void viewer_reject(const call_t *call, const char *error)
 {
-    hall_answer_error(call->hall, call->viewer, call->id, error);
+    viewers_answer_error(call->viewers, call->viewer, call->id, error);
 }
 
 bool viewer_send(const call_t *call, link_kind_t kind, const char *line, int64_t id)
@@ -115,7 +115,7 @@ bool viewer_send(const call_t *call, link_kind_t kind, const char *line, int64_t
     (void)snprintf(asker.by, sizeof asker.by, "%s", call->viewer->name);
     const char *const why = upstream_send(call->upstream, kind, line, &asker);
     if (why != NULL) {
-        viewer_refuse(call, why);
+        viewer_reject(call, why);
     }
     return why == NULL;
 }
@@ -154,11 +154,11 @@ bool viewer_is_allowed(const call_t *call, const char *line)
     const level_t needed = levels_needed(line, call->upstream->intensity);
     if (call->viewer->role < (int)needed) {
         (void)snprintf(error, sizeof error, "%.20s: not allowed; it takes the role %s", line, level_name(needed));
-        viewer_refuse(call, error);
+        viewer_reject(call, error);
         return false;
     }
     if (needed > LEVEL_LOOK && call->upstream->holder != call->viewer->number) {
-        viewer_refuse(call, call->upstream->holder == 0 ? "take the controls first"
+        viewer_reject(call, call->upstream->holder == 0 ? "take the controls first"
                                                         : "somebody else has the controls: take them first");
         return false;
     }
@@ -171,10 +171,10 @@ bool viewer_press(const call_t *call, const char *wanted)
     if (!viewer_is_allowed(call, wanted)) {
         return false;
     }
-    call->viewer->wants_ticks[hall_place_of(call->hall, call->upstream)] = true;
+    call->viewer->wants_ticks[viewers_place_of(call->viewers, call->upstream)] = true;
     (void)snprintf(line, sizeof line, "%s %.0f", wanted, viewer_number(call->json, "tick", 0));
     if (strlen(line) >= UPSTREAM_REQUEST) {
-        viewer_refuse(call, "that request is too long");
+        viewer_reject(call, "that request is too long");
         return false;
     }
     return viewer_send(call, LINK_QUICK, line, call->id | VIEWER_PRESS_BIT);

@@ -12,7 +12,7 @@
 
 /** A message that was understood so far. */
 typedef struct {
-    hall_t *hall;
+    viewers_t *viewers;
     viewer_t *viewer;
     const cJSON *json;
     int64_t id;
@@ -25,7 +25,7 @@ double viewer_number(const cJSON *json, const char *name, double fallback);
 /** A whole number. @param number out: 0 where it is not there; else as before
  *  @return false: it is none from 0 to `most` */
 bool viewer_whole(const cJSON *json, const char *name, int64_t most, int64_t *number);
-void viewer_refuse(const call_t *call, const char *error);
+void viewer_reject(const call_t *call, const char *error);
 
 /** One request, as heaved takes it: printable, short, one line. */
 bool viewer_is_plain(const char *line);
@@ -37,12 +37,12 @@ bool viewer_is_allowed(const call_t *call, const char *line);
 bool viewer_press(const call_t *call, const char *wanted);
 
 /** @param json deleted here */
-void hall_tell_json(hall_t *hall, viewer_t *viewer, cJSON *json);
+void viewers_send_json(viewers_t *viewers, viewer_t *viewer, cJSON *json);
 
 /** heaved's own object, unchanged, within one of ours. */
-void hall_tell_object(hall_t *hall, viewer_t *viewer, const char *head, const char *object);
-unsigned hall_place_of(const hall_t *hall, const upstream_t *upstream);
-viewer_t *hall_find(const hall_t *hall, uint64_t number);
+void viewers_send_object(viewers_t *viewers, viewer_t *viewer, const char *head, const char *object);
+unsigned viewers_place_of(const viewers_t *viewers, const upstream_t *upstream);
+viewer_t *viewers_find(const viewers_t *viewers, uint64_t number);
 
 /** One of the words that a request begins with. */
 bool viewer_begins(const char *line, const char *word);
@@ -53,13 +53,13 @@ const char *viewer_heard(const call_t *call, const char *line, char out[UPSTREAM
 
 /** Hands a request to heaved; the answer goes to who asks. @return false: it could not be sent, which was said */
 bool viewer_send(const call_t *call, link_kind_t kind, const char *line, int64_t id);
-void hall_answer_error(hall_t *hall, viewer_t *viewer, int64_t id, const char *error);
+void viewers_answer_error(viewers_t *viewers, viewer_t *viewer, int64_t id, const char *error);
 
 /** Adds `error_zh`, what an error says in Chinese: a page may be in another language than this program. None, where it has no
  *  translation. */
-void hall_add_chinese(cJSON *json, const char *error);
+void viewers_add_chinese(cJSON *json, const char *error);
 
 /** heaved's refusal, unchanged, and what it says in Chinese beside it. @param line of heaved, with `error` */
-void hall_answer_refusal(hall_t *hall, viewer_t *viewer, int64_t id, const char *line);
+void viewers_answer_refusal(viewers_t *viewers, viewer_t *viewer, int64_t id, const char *line);
 
 #endif

@@ -21,68 +21,68 @@ void viewer_configure(const call_t *call)
     (void)snprintf(asker.by, sizeof asker.by, "%s", call->viewer->name);
     (void)snprintf(line, sizeof line, "configure %.16s", viewer_word(call->json, "base"));
     if (!viewer_is_plain(line)) {
-        viewer_refuse(call, "that is no request that goes this way");
+        viewer_reject(call, "that is no request that goes this way");
         return;
     }
     if (!viewer_is_allowed(call, line)) {
         return;
     }
-    const int fd = editor_open(call->hall->state, call->upstream, viewer_word(call->json, "staged"), error, sizeof error);
+    const int fd = editor_open(call->viewers->state, call->upstream, viewer_word(call->json, "staged"), error, sizeof error);
     if (fd < 0) {
-        viewer_refuse(call, error);
+        viewer_reject(call, error);
         return;
     }
     const char *const why = upstream_send_with(call->upstream, LINK_LONG, viewer_heard(call, line, heard), &asker, fd);
     (void)close(fd);
     if (why != NULL) {
-        viewer_refuse(call, why);
+        viewer_reject(call, why);
     }
 }
 
 /* --- Test signals --- */
 
 /* Tells who has pressed, if that page is still there, and is done with it. @param result deleted here */
-static void end_with(hall_t *hall, unsigned at, cJSON *result)
+static void end_with(viewers_t *viewers, unsigned at, cJSON *result)
 {
-    identification_t *const it = &hall->identification[at];
-    viewer_t *const viewer = hall_find(hall, it->viewer);
+    identification_t *const it = &viewers->identification[at];
+    viewer_t *const viewer = viewers_find(viewers, it->viewer);
     cJSON *const json = cJSON_CreateObject();
     cJSON_AddStringToObject(json, "event", "identified");
-    cJSON_AddStringToObject(json, "platform", hall->platform[at].name);
-    hall_add_chinese(json, viewer_word(result, "error"));
+    cJSON_AddStringToObject(json, "platform", viewers->platform[at].name);
+    viewers_add_chinese(json, viewer_word(result, "error"));
     cJSON_AddItemToObject(json, "result", result);
     identification_end(it);
     if (viewer != NULL) {
-        hall_tell_json(hall, viewer, json);
+        viewers_send_json(viewers, viewer, json);
     } else {
         cJSON_Delete(json);
     }
 }
 
-static void end_without(hall_t *hall, unsigned at, const char *error)
+static void end_without(viewers_t *viewers, unsigned at, const char *error)
 {
     cJSON *const result = cJSON_CreateObject();
     cJSON_AddFalseToObject(result, "ok");
     cJSON_AddStringToObject(result, "error", error);
-    end_with(hall, at, result);
+    end_with(viewers, at, result);
 }
 
 void viewer_identify(const call_t *call)
 {
     char line[UPSTREAM_REQUEST];
     char why[192];
-    const unsigned at = hall_place_of(call->hall, call->upstream);
-    identification_t *const it = &call->hall->identification[at];
+    const unsigned at = viewers_place_of(call->viewers, call->upstream);
+    identification_t *const it = &call->viewers->identification[at];
     if (it->viewer != 0) {
-        viewer_refuse(call, "a test signal is being made, or worked out: wait for it");
+        viewer_reject(call, "a test signal is being made, or worked out: wait for it");
         return;
     }
     if (!identification_begin(it, call->upstream, call->json, line, sizeof line, why, sizeof why)) {
         identification_end(it);
-        viewer_refuse(call, why);
+        viewer_reject(call, why);
         return;
     }
-    it->hall = call->hall;
+    it->viewers = call->viewers;
     it->viewer = call->viewer->number;
     call->viewer->series[at] = 0;
     if (!viewer_press(call, line)) {
@@ -90,9 +90,9 @@ void viewer_identify(const call_t *call)
     }
 }
 
-void viewer_service_pressed(hall_t *hall, const viewer_t *viewer, unsigned at)
+void viewer_service_pressed(viewers_t *viewers, const viewer_t *viewer, unsigned at)
 {
-    identification_t *const it = &hall->identification[at];
+    identification_t *const it = &viewers->identification[at];
     if (it->viewer != viewer->number || it->series != 0) {
         return;
     }
@@ -102,18 +102,18 @@ void viewer_service_pressed(hall_t *hall, const viewer_t *viewer, unsigned at)
     }
 }
 
-void viewer_service_tick(hall_t *hall, unsigned at, const char *line)
+void viewer_service_tick(viewers_t *viewers, unsigned at, const char *line)
 {
-    identification_t *const it = &hall->identification[at];
+    identification_t *const it = &viewers->identification[at];
     if (it->series == 0 || it->until_ms != 0) {
         return;
     }
     cJSON *const tick = cJSON_Parse(line);
     const bool is_held = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(tick, "held"));
     if (viewer_number(tick, "finished", 0) == (double)it->series) {
-        identification_arrived(it, hall->now_ms);
+        identification_arrived(it, viewers->now_ms);
     } else if (!is_held || viewer_number(tick, "series", 0) != (double)it->series) {
-        end_without(hall, at, "ended before the signal was: nothing is known; hold the button until it says so");
+        end_without(viewers, at, "ended before the signal was: nothing is known; hold the button until it says so");
     }
     cJSON_Delete(tick);
 }
@@ -121,40 +121,40 @@ void viewer_service_tick(hall_t *hall, unsigned at, const char *line)
 static void on_worked_out(void *context, int code, char *text, size_t length)
 {
     identification_t *const it = context;
-    hall_t *const hall = it->hall;
-    const unsigned at = (unsigned)(it - hall->identification);
+    viewers_t *const viewers = it->viewers;
+    const unsigned at = (unsigned)(it - viewers->identification);
     cJSON *const result = code == 0 && length > 0 ? cJSON_Parse(text) : NULL;
     free(text);
     if (cJSON_IsObject(result)) {
-        end_with(hall, at, result);
+        end_with(viewers, at, result);
         return;
     }
     cJSON_Delete(result);
-    end_without(hall, at, "it could not be worked out");
+    end_without(viewers, at, "it could not be worked out");
 }
 
-void viewer_service_gone(hall_t *hall, unsigned at)
+void viewer_service_gone(viewers_t *viewers, unsigned at)
 {
-    identification_t *const it = &hall->identification[at];
+    identification_t *const it = &viewers->identification[at];
     if (it->viewer != 0 && !it->is_working) {
-        end_without(hall, at, "heaved has ended");
+        end_without(viewers, at, "heaved has ended");
     }
 }
 
-void viewer_service_pump(hall_t *hall)
+void viewer_service_pump(viewers_t *viewers)
 {
-    for (unsigned at = 0; at < hall->platforms; at++) {
-        identification_t *const it = &hall->identification[at];
-        if (it->viewer != 0 && !it->is_working && hall_find(hall, it->viewer) == NULL) { /* nobody holds it any more */
+    for (unsigned at = 0; at < viewers->platforms; at++) {
+        identification_t *const it = &viewers->identification[at];
+        if (it->viewer != 0 && !it->is_working && viewers_find(viewers, it->viewer) == NULL) { /* nobody holds it any more */
             identification_end(it);
             continue;
         }
-        if (it->series == 0 || it->is_working || !identification_collect(it, hall->now_ms)) {
+        if (it->series == 0 || it->is_working || !identification_collect(it, viewers->now_ms)) {
             continue;
         }
         it->is_working = true;
-        if (!child_work(identification_work, it, on_worked_out, hall->now_ms)) {
-            end_without(hall, at, "too much is being worked out at once: try again");
+        if (!child_work(identification_work, it, on_worked_out, viewers->now_ms)) {
+            end_without(viewers, at, "too much is being worked out at once: try again");
         }
     }
 }

@@ -10,9 +10,9 @@ void viewer_configure(const call_t *call);
 void viewer_identify(const call_t *call);
 
 /** A press was answered, a tick has come, a platform has gone, time passes. */
-void viewer_service_pressed(hall_t *hall, const viewer_t *viewer, unsigned at);
-void viewer_service_tick(hall_t *hall, unsigned at, const char *line);
-void viewer_service_gone(hall_t *hall, unsigned at);
-void viewer_service_pump(hall_t *hall);
+void viewer_service_pressed(viewers_t *viewers, const viewer_t *viewer, unsigned at);
+void viewer_service_tick(viewers_t *viewers, unsigned at, const char *line);
+void viewer_service_gone(viewers_t *viewers, unsigned at);
+void viewer_service_pump(viewers_t *viewers);
 
 #endif

@@ -33,7 +33,7 @@ typedef struct {
     uint32_t column[VIEWER_COLUMNS_MAX]; /**< by place in the table */
     uint32_t less[VIEWER_COLUMNS_MAX];   /**< the column that is taken off it; FEED_NOTHING: none */
     uint32_t every;
-    uint64_t lost_told;
+    uint64_t lost_logged;
     uint32_t dropped; /**< rows that its link did not take */
     uint32_t held;    /**< records in the group that is not complete */
     double least[VIEWER_COLUMNS_MAX], most[VIEWER_COLUMNS_MAX];
@@ -58,7 +58,7 @@ typedef struct viewer {
     uint32_t series[VIEWER_PLATFORMS]; /**< of what it holds; 0 = nothing */
     feed_t stream[VIEWER_STREAMS_MAX];
     uint32_t last_stream;
-    unsigned heard; /**< messages since the last turn of hall_pump() */
+    unsigned heard; /**< messages since the last turn of viewers_pump() */
     bool is_over;   /**< to be closed */
 } viewer_t;
 

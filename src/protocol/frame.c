@@ -83,7 +83,7 @@ static void begin_field(frame_scanner_t *self, unsigned value)
     }
 }
 
-static void take_letter(frame_scanner_t *self, uint8_t byte)
+static void scan_letter(frame_scanner_t *self, uint8_t byte)
 {
     self->letter = (char)command_byte(self, byte);
     if (self->letter == 'A' || self->letter == 'C') {
@@ -93,7 +93,7 @@ static void take_letter(frame_scanner_t *self, uint8_t byte)
     }
 }
 
-static void take_digit(frame_scanner_t *self, uint8_t byte)
+static void scan_digit(frame_scanner_t *self, uint8_t byte)
 {
     const frame_command_t command = frame_find_command(self->letter, byte);
     if (command == FRAME_COMMANDS) {
@@ -105,7 +105,7 @@ static void take_digit(frame_scanner_t *self, uint8_t byte)
     self->phase = FRAME_PHASE_SUFFIX;
 }
 
-static void take_suffix(frame_scanner_t *self, uint8_t byte)
+static void scan_suffix(frame_scanner_t *self, uint8_t byte)
 {
     if (byte == ':') {
         begin_field(self, 0);
@@ -135,7 +135,7 @@ static void finish_value(frame_scanner_t *self, uint8_t separator)
     }
 }
 
-static void take_value(frame_scanner_t *self, uint8_t byte)
+static void scan_value(frame_scanner_t *self, uint8_t byte)
 {
     if (byte == ',') {
         finish_value(self, byte);
@@ -147,7 +147,7 @@ static void take_value(frame_scanner_t *self, uint8_t byte)
     }
 }
 
-static void take_mask_digit(frame_scanner_t *self, uint8_t byte)
+static void scan_mask_digit(frame_scanner_t *self, uint8_t byte)
 {
     const unsigned digit = hex_value(byte);
     const bool is_prefix =
@@ -163,14 +163,14 @@ static void take_mask_digit(frame_scanner_t *self, uint8_t byte)
     }
 }
 
-static void take_mask(frame_scanner_t *self, uint8_t byte)
+static void scan_mask(frame_scanner_t *self, uint8_t byte)
 {
     if (byte == ',') {
         frame_reject_count(self, byte, self->frame.count + 2u);
     } else if (is_blank(byte)) {
         self->is_mask_ended = self->mask_digits > 0 || self->is_mask_prefixed;
     } else {
-        take_mask_digit(self, byte);
+        scan_mask_digit(self, byte);
     }
 }
 
@@ -184,7 +184,7 @@ static void finish_mask(frame_scanner_t *self, uint8_t tail)
     self->frame.has_mask = true;
 }
 
-static void take_time(frame_scanner_t *self, uint8_t byte)
+static void scan_time(frame_scanner_t *self, uint8_t byte)
 {
     if (byte == ',') {
         frame_reject_count(self, byte, self->frame.count + 2u);
@@ -216,17 +216,17 @@ static void count_rejected(frame_scanner_t *self)
     }
 }
 
-static void take_rejected(frame_scanner_t *self, uint8_t byte)
+static void scan_rejected(frame_scanner_t *self, uint8_t byte)
 {
     if (self->utf8_left > 0) {
-        frame_reject_take_byte(self, byte);
+        frame_reject_add_byte(self, byte);
     }
     if (byte == ',') {
         count_rejected(self);
     }
 }
 
-static void take_idle(frame_scanner_t *self, uint8_t byte)
+static void scan_idle(frame_scanner_t *self, uint8_t byte)
 {
     const bool may_be_headless = self->may_be_headless;
     self->may_be_headless = false;
@@ -235,19 +235,19 @@ static void take_idle(frame_scanner_t *self, uint8_t byte)
     }
     begin_frame(self, true);
     if (may_be_headless) {
-        take_letter(self, byte);
+        scan_letter(self, byte);
     } else {
         frame_reject_byte(self, FRAME_ERR_NO_HEAD, byte, 0);
     }
 }
 
 /* Any byte but a head or a tail. */
-typedef void take_t(frame_scanner_t *self, uint8_t byte);
+typedef void scan_t(frame_scanner_t *self, uint8_t byte);
 
-static take_t *const k_take[] = {
-    [FRAME_PHASE_IDLE] = take_idle,     [FRAME_PHASE_LETTER] = take_letter, [FRAME_PHASE_DIGIT] = take_digit,
-    [FRAME_PHASE_SUFFIX] = take_suffix, [FRAME_PHASE_COLON] = take_suffix,  [FRAME_PHASE_VALUE] = take_value,
-    [FRAME_PHASE_MASK] = take_mask,     [FRAME_PHASE_TIME] = take_time,     [FRAME_PHASE_REJECTED] = take_rejected,
+static scan_t *const k_scan[] = {
+    [FRAME_PHASE_IDLE] = scan_idle,     [FRAME_PHASE_LETTER] = scan_letter, [FRAME_PHASE_DIGIT] = scan_digit,
+    [FRAME_PHASE_SUFFIX] = scan_suffix, [FRAME_PHASE_COLON] = scan_suffix,  [FRAME_PHASE_VALUE] = scan_value,
+    [FRAME_PHASE_MASK] = scan_mask,     [FRAME_PHASE_TIME] = scan_time,     [FRAME_PHASE_REJECTED] = scan_rejected,
 };
 
 /* `#` behind a value: all must be there but the mask. */
@@ -312,7 +312,7 @@ static void finish(frame_scanner_t *self, uint8_t tail)
     }
 }
 
-static frame_event_t take_at(frame_scanner_t *self, frame_reject_t *reject)
+static frame_event_t scan_at(frame_scanner_t *self, frame_reject_t *reject)
 {
     const frame_event_t event =
         self->phase == FRAME_PHASE_IDLE ? FRAME_EVENT_NONE : frame_reject_unfinished(self, self->offset, reject);
@@ -320,14 +320,14 @@ static frame_event_t take_at(frame_scanner_t *self, frame_reject_t *reject)
     return event;
 }
 
-static frame_event_t take_hash(frame_scanner_t *self, uint8_t next, frame_t *frame, frame_reject_t *reject)
+static frame_event_t scan_hash(frame_scanner_t *self, uint8_t next, frame_t *frame, frame_reject_t *reject)
 {
     if (self->phase == FRAME_PHASE_IDLE && self->dialect == FRAME_LENIENT) {
         begin_frame(self, false);
         return FRAME_EVENT_NONE;
     }
     if (self->phase == FRAME_PHASE_IDLE) {
-        take_idle(self, '#');
+        scan_idle(self, '#');
     }
     if (is_nan(self, next)) {
         fail_nan(self);
@@ -345,22 +345,22 @@ static frame_event_t take_hash(frame_scanner_t *self, uint8_t next, frame_t *fra
 }
 
 /* Blanks and NUL: a NUL ends the text, and a field starts behind its leading blanks. */
-static void take_white(frame_scanner_t *self, uint8_t byte)
+static void scan_white(frame_scanner_t *self, uint8_t byte)
 {
     if (byte == '\0' && self->phase != FRAME_PHASE_IDLE && self->phase != FRAME_PHASE_REJECTED) {
         frame_reject_byte(self, FRAME_ERR_UNFINISHED, byte, 0);
         return;
     }
     self->field_start += self->field_start == self->offset;
-    k_take[self->phase](self, byte);
+    k_scan[self->phase](self, byte);
 }
 
-static frame_event_t take_other(frame_scanner_t *self, uint8_t byte, frame_reject_t *reject)
+static frame_event_t scan_other(frame_scanner_t *self, uint8_t byte, frame_reject_t *reject)
 {
     if (byte <= ' ') {
-        take_white(self, byte);
+        scan_white(self, byte);
     } else {
-        k_take[self->phase](self, byte);
+        k_scan[self->phase](self, byte);
     }
     if (self->offset - self->start >= FRAME_LENGTH_MAX - 1 && self->phase != FRAME_PHASE_IDLE) {
         return frame_reject_unfinished(self, self->offset + 1, reject);
@@ -382,11 +382,11 @@ frame_event_t frame_scanner_feed(frame_scanner_t *self, uint8_t byte, uint8_t ne
 {
     frame_event_t event = FRAME_EVENT_NONE;
     if (byte == '@') {
-        event = take_at(self, reject);
+        event = scan_at(self, reject);
     } else if (byte == '#') {
-        event = take_hash(self, next, frame, reject);
+        event = scan_hash(self, next, frame, reject);
     } else {
-        event = take_other(self, byte, reject);
+        event = scan_other(self, byte, reject);
     }
     self->offset++;
     return event;
@@ -407,7 +407,7 @@ frame_event_t frame_scanner_end(frame_scanner_t *self, frame_reject_t *reject)
 }
 
 /* A plain frame where the scanner stands between frames; returns its bytes, 0: no such frame. */
-static size_t take_plain_frame(frame_scanner_t *self, const uint8_t *text, const uint8_t *end, frame_t *frame)
+static size_t scan_plain_frame(frame_scanner_t *self, const uint8_t *text, const uint8_t *end, frame_t *frame)
 {
     const size_t used = self->phase == FRAME_PHASE_IDLE && text[0] == '@' ? frame_quick(text, end, frame) : 0;
     if (used > 0) {
@@ -423,7 +423,7 @@ frame_event_t frame_next(frame_scanner_t *self, const uint8_t *datagram, size_t 
                          frame_reject_t *reject)
 {
     for (size_t i = *position; i < length; i++) {
-        const size_t used = take_plain_frame(self, datagram + i, datagram + length, frame);
+        const size_t used = scan_plain_frame(self, datagram + i, datagram + length, frame);
         if (used > 0) {
             *position = i + used;
             return FRAME_EVENT_FRAME;

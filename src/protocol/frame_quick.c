@@ -38,7 +38,7 @@ typedef struct {
 } reader_t;
 
 /* Takes the byte if it is the next one. */
-static inline bool take(reader_t *reader, uint8_t byte)
+static inline bool read_byte(reader_t *reader, uint8_t byte)
 {
     const bool is_next = reader->at < reader->end && *reader->at == byte;
     reader->at += is_next;
@@ -46,7 +46,7 @@ static inline bool take(reader_t *reader, uint8_t byte)
 }
 
 /* Appends all digits that follow to the number; it wraps where there are too many. */
-HV_WRAPS static inline uint64_t take_digits(reader_t *reader, uint64_t number)
+HV_WRAPS static inline uint64_t read_digits(reader_t *reader, uint64_t number)
 {
     const uint8_t *at = reader->at;
     for (; at < reader->end; at++) {
@@ -61,19 +61,19 @@ HV_WRAPS static inline uint64_t take_digits(reader_t *reader, uint64_t number)
 }
 
 /* false where digits are missing or too many, or Q16.16 cannot hold the value. */
-static inline bool take_value(reader_t *reader, q16_t *value_q16)
+static inline bool read_value(reader_t *reader, q16_t *value_q16)
 {
-    const bool is_negative = take(reader, '-');
+    const bool is_negative = read_byte(reader, '-');
     const uint8_t *const start = reader->at;
-    uint64_t digits = take_digits(reader, 0);
+    uint64_t digits = read_digits(reader, 0);
     uint64_t value = digits << 16;
     const size_t count = (size_t)(reader->at - start);
     if (count == 0 || count > DIGITS_MAX) {
         return false;
     }
-    if (take(reader, '.')) {
+    if (read_byte(reader, '.')) {
         const uint8_t *const point = reader->at;
-        digits = take_digits(reader, digits);
+        digits = read_digits(reader, digits);
         const size_t fraction = (size_t)(reader->at - point);
         if (fraction == 0 || fraction > DIGITS_MAX - count) {
             return false;
@@ -95,7 +95,7 @@ HV_WRAPS static inline unsigned hex_value(uint8_t byte)
     return digit <= 9 ? digit : letter < 6 ? letter + 10u : 16u;
 }
 
-static inline bool take_mask(reader_t *reader, frame_t *frame)
+static inline bool read_mask(reader_t *reader, frame_t *frame)
 {
     const uint8_t *const start = reader->at;
     unsigned mask = 0;
@@ -111,10 +111,10 @@ static inline bool take_mask(reader_t *reader, frame_t *frame)
     return reader->at > start && reader->at - start <= MASK_DIGITS_MAX;
 }
 
-static inline bool take_time(reader_t *reader, frame_t *frame)
+static inline bool read_time(reader_t *reader, frame_t *frame)
 {
     const uint8_t *const start = reader->at;
-    const uint64_t time_ms = take_digits(reader, 0);
+    const uint64_t time_ms = read_digits(reader, 0);
     if (reader->at == start || reader->at - start > TIME_DIGITS_MAX || time_ms > FRAME_TIME_MAX_MS) {
         return false;
     }
@@ -123,7 +123,7 @@ static inline bool take_time(reader_t *reader, frame_t *frame)
 }
 
 /* Head, command, T and colon. */
-static inline bool take_command(reader_t *reader, frame_t *frame)
+static inline bool read_command(reader_t *reader, frame_t *frame)
 {
     if (reader->end - reader->at < 3) {
         return false;
@@ -134,34 +134,34 @@ static inline bool take_command(reader_t *reader, frame_t *frame)
     }
     reader->at += 3;
     frame->command = command;
-    frame->is_timed = take(reader, 'T');
-    return take(reader, ':');
+    frame->is_timed = read_byte(reader, 'T');
+    return read_byte(reader, ':');
 }
 
 /* A comma and what belongs behind the values, or in the untimed form nothing at all. */
-static inline bool take_last_field(reader_t *reader, frame_t *frame)
+static inline bool read_last_field(reader_t *reader, frame_t *frame)
 {
-    const bool has_field = take(reader, ',');
+    const bool has_field = read_byte(reader, ',');
     if (frame->is_timed) {
-        return has_field && take_time(reader, frame);
+        return has_field && read_time(reader, frame);
     }
-    return !has_field || take_mask(reader, frame);
+    return !has_field || read_mask(reader, frame);
 }
 
 size_t frame_quick(const uint8_t *text, const uint8_t *end, frame_t *frame)
 {
     frame_t plain = {.count = 0};
     reader_t reader = {text, end};
-    if (!take_command(&reader, &plain)) {
+    if (!read_command(&reader, &plain)) {
         return 0;
     }
     plain.count = (uint8_t)frame_value_count(plain.command);
     for (unsigned i = 0; i < plain.count; i++) {
-        if ((i > 0 && !take(&reader, ',')) || !take_value(&reader, &plain.value_q16[i])) {
+        if ((i > 0 && !read_byte(&reader, ',')) || !read_value(&reader, &plain.value_q16[i])) {
             return 0;
         }
     }
-    if (!take_last_field(&reader, &plain) || !take(&reader, '#')) {
+    if (!read_last_field(&reader, &plain) || !read_byte(&reader, '#')) {
         return 0;
     }
     *frame = plain;

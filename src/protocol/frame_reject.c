@@ -10,7 +10,7 @@ static void look_alike_begin(frame_scanner_t *self, uint8_t byte)
     self->reject.look_alike = self->utf8_left == 0 ? 0 : byte & (0x3Fu >> self->utf8_left);
 }
 
-void frame_reject_take_byte(frame_scanner_t *self, uint8_t byte)
+void frame_reject_add_byte(frame_scanner_t *self, uint8_t byte)
 {
     const bool is_continuation = (byte & 0xC0u) == 0x80u;
     self->reject.look_alike = is_continuation ? self->reject.look_alike << 6 | (byte & 0x3Fu) : 0;

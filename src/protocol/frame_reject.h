@@ -30,7 +30,7 @@ void frame_reject_byte(frame_scanner_t *self, frame_error_t error, uint8_t byte,
 void frame_reject_count(frame_scanner_t *self, uint8_t byte, unsigned found);
 
 /** Takes a further byte of the offending character, where it is one of UTF-8. */
-void frame_reject_take_byte(frame_scanner_t *self, uint8_t byte);
+void frame_reject_add_byte(frame_scanner_t *self, uint8_t byte);
 
 /** Hands out the recorded error. The rejected text ends before `end`. */
 frame_event_t frame_reject_report(frame_scanner_t *self, uint32_t end, frame_reject_t *reject);

@@ -110,7 +110,7 @@ static void keep_digit(number_t *self, uint8_t digit)
 }
 
 /* A digit before or behind the point. */
-static void take_digit(number_t *self, uint8_t digit, bool is_integer)
+static void add_digit(number_t *self, uint8_t digit, bool is_integer)
 {
     if (self->lead != 0 || digit != 0) {
         keep_digit(self, digit);
@@ -120,7 +120,7 @@ static void take_digit(number_t *self, uint8_t digit, bool is_integer)
     }
 }
 
-static void take_exponent_digit(number_t *self, uint8_t digit)
+static void add_exponent_digit(number_t *self, uint8_t digit)
 {
     if (self->exponent < EXPONENT_SATURATED) {
         self->exponent = self->exponent * 10 + digit;
@@ -150,7 +150,7 @@ static unsigned class_of(uint8_t byte)
 }
 
 /* A byte that is no digit. */
-static number_error_t take_mark(number_t *self, uint8_t byte)
+static number_error_t parse_mark(number_t *self, uint8_t byte)
 {
     const unsigned class = class_of(byte);
     self->phase = class < CLASSES ? k_next[self->phase][class] : (uint8_t)PHASE_DEAD;
@@ -163,13 +163,13 @@ number_error_t number_feed(number_t *self, uint8_t byte)
 {
     const uint8_t digit = (uint8_t)(byte - '0');
     if (digit > 9) {
-        return take_mark(self, byte);
+        return parse_mark(self, byte);
     }
     self->phase = k_next[self->phase][CLASS_DIGIT];
     if (self->phase == PHASE_INTEGER || self->phase == PHASE_FRACTION) {
-        take_digit(self, digit, self->phase == PHASE_INTEGER);
+        add_digit(self, digit, self->phase == PHASE_INTEGER);
     } else if (self->phase == PHASE_EXPONENT_DIGITS) {
-        take_exponent_digit(self, digit);
+        add_exponent_digit(self, digit);
     }
     return self->phase == PHASE_DEAD ? NUMBER_SYNTAX : NUMBER_OK;
 }

@@ -78,7 +78,7 @@ void blackbox_cycle(blackbox_feed_t *feed, const session_t *session, const trace
     push_row(feed, session, row);
     if (session->now_us >= feed->next_state_us && is_replay_possible(session)) {
         session_t state;
-        checkpoint_take(session, &state);
+        checkpoint_copy(session, &state);
         (void)ring_push(&feed->states, &state, sizeof state, NULL, 0);
         feed->next_state_us = session->now_us + STATE_US;
     }
@@ -119,7 +119,7 @@ int blackbox_folder(const blackbox_t *self)
 void blackbox_step(blackbox_t *self, bool is_end)
 {
     char text[BLACKBOX_TEXT_MAX];
-    blackbox_take(self);
+    blackbox_pop(self);
     if (self->due_us != 0 && (is_end || self->newest_us >= self->due_us)) {
         self->due_us = 0;
         (void)blackbox_write(self, &self->cause, text);

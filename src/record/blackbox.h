@@ -106,7 +106,7 @@ typedef struct {
     blackbox_item_t item;
     blackbox_item_t oldest; /**< the item that is overwritten */
     blackbox_item_t read;
-    blackbox_row_t told[2]; /**< rows whose feedback a replay uses: the previous and the present one */
+    blackbox_row_t written[2]; /**< rows whose feedback a replay uses: the previous and the present one */
     char line[CHECKPOINT_LINE_MAX];
 
     pthread_mutex_t mutex; /**< guards the members below; only the thread of the black box changes the list */

@@ -17,7 +17,7 @@
 #include "record/blackbox_folders.h"
 #include "record/blackbox_kept.h"
 
-#define ITEMS_PER_TAKE  1000u /* written before what is fed meanwhile is taken over */
+#define ITEMS_PER_POP   1000u /* written before what is fed meanwhile is taken over */
 #define FEEDBACK_PLACES 6u
 
 /** Where a replay begins. */
@@ -80,8 +80,8 @@ static void write_text(blackbox_t *self, const char *text)
  * Returns whether to go on. */
 static bool go_on(blackbox_t *self, uint32_t *items)
 {
-    if (++*items % ITEMS_PER_TAKE == 0) {
-        blackbox_take(self);
+    if (++*items % ITEMS_PER_POP == 0) {
+        blackbox_pop(self);
     }
     return self->file.error == 0;
 }
@@ -165,15 +165,15 @@ static void write_feedback(blackbox_t *self, const blackbox_row_t *row, const bl
 }
 
 /* Before time zero drives live by times of their own: a replay is told what they told, among the records. */
-static void write_told(blackbox_t *self, record_writer_t *writer, uint64_t from_us)
+static void write_drives(blackbox_t *self, record_writer_t *writer, uint64_t from_us)
 {
     char line[RECORD_LINE_MAX];
     uint32_t items = 0;
     size_t record = 0;
-    self->told[0].drives = 0;
+    self->written[0].drives = 0;
     bool has_record = read_next(self, &self->records, &record);
-    while (go_on(self, &items) && ring_pop(&self->rows.reader, &self->told[1], sizeof self->told[1]) > 0) {
-        const blackbox_row_t *row = &self->told[1];
+    while (go_on(self, &items) && ring_pop(&self->rows.reader, &self->written[1], sizeof self->written[1]) > 0) {
+        const blackbox_row_t *row = &self->written[1];
         for (; has_record && self->read.record.head.t_us <= row->now_us; has_record = read_next(self, &self->records, &record)) {
             if (self->read.record.head.t_us >= from_us && row->now_us <= self->until_us) {
                 const size_t bytes = record - sizeof self->read.record.head;
@@ -181,8 +181,8 @@ static void write_told(blackbox_t *self, record_writer_t *writer, uint64_t from_
             }
         }
         if (row->now_us >= from_us && row->now_us <= self->until_us) {
-            write_feedback(self, row, &self->told[0]);
-            self->told[0] = *row;
+            write_feedback(self, row, &self->written[0]);
+            self->written[0] = *row;
         }
     }
     start_reading(&self->rows); /* for the files that follow */
@@ -212,7 +212,7 @@ static bool write_frames(blackbox_t *self, const blackbox_row_t *cause, const ch
         output_file_write(&self->file, self->line, checkpoint_format(&self->read.state, self->config_hash, self->line));
     }
     if (start == START_STATE && self->zero_us == 0) {
-        write_told(self, &writer, start_us);
+        write_drives(self, &writer, start_us);
     } else {
         write_records(self, &writer, start == START_STATE ? start_us : 0);
     }
@@ -305,9 +305,9 @@ static bool write_files(blackbox_t *self, const blackbox_row_t *cause, const cha
     char trace_head[TRACE_LINE_MAX];
     trace_head[trace_header(trace_head)] = '\0';
     put_feedback_head(self->settings, feedback_head, sizeof feedback_head);
-    blackbox_take(self);
+    blackbox_pop(self);
     self->until_us = self->newest_us;
-    blackbox_take(self); /* every record of the cycles up to then has come now */
+    blackbox_pop(self); /* every record of the cycles up to then has come now */
     start_reading(&self->states);
     start_reading(&self->records);
     start_reading(&self->rows);

@@ -55,7 +55,7 @@ static void watch(blackbox_t *self, const blackbox_row_t *row)
     self->last_state = row->row.state;
 }
 
-static void take_rows(blackbox_t *self)
+static void pop_rows(blackbox_t *self)
 {
     size_t length = ring_pop(self->rows.from, &self->item, sizeof self->item);
     for (; length > 0; length = ring_pop(self->rows.from, &self->item, sizeof self->item)) {
@@ -64,7 +64,7 @@ static void take_rows(blackbox_t *self)
     }
 }
 
-static void take_records(blackbox_t *self)
+static void pop_records(blackbox_t *self)
 {
     size_t length = ring_pop(self->records.from, &self->item, sizeof self->item);
     for (; length > 0; length = ring_pop(self->records.from, &self->item, sizeof self->item)) {
@@ -77,7 +77,7 @@ static void take_records(blackbox_t *self)
     }
 }
 
-static void take_states(blackbox_t *self)
+static void pop_states(blackbox_t *self)
 {
     size_t length = ring_pop(self->states.from, &self->item, sizeof self->item);
     for (; length > 0; length = ring_pop(self->states.from, &self->item, sizeof self->item)) {
@@ -93,14 +93,14 @@ static void note_drops(blackbox_lane_t *lane, uint32_t dropped)
     lane->dropped = dropped;
 }
 
-void blackbox_take(blackbox_t *self)
+void blackbox_pop(blackbox_t *self)
 {
-    take_rows(self);
-    take_records(self);
+    pop_rows(self);
+    pop_records(self);
     const uint32_t records = ring_dropped(self->records.from);
     const uint32_t rows = ring_dropped(self->rows.from);
-    take_rows(self);
+    pop_rows(self);
     note_drops(&self->records, records);
     note_drops(&self->rows, rows);
-    take_states(self);
+    pop_states(self);
 }

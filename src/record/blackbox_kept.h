@@ -7,6 +7,6 @@
 #include "record/blackbox.h"
 
 /** Takes over what was fed meanwhile, and notices where an incident begins. */
-void blackbox_take(blackbox_t *self);
+void blackbox_pop(blackbox_t *self);
 
 #endif

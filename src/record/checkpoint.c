@@ -31,7 +31,7 @@ static uint32_t crc_of(const uint8_t *bytes, size_t length)
     return ~crc;
 }
 
-void checkpoint_take(const session_t *session, session_t *out)
+void checkpoint_copy(const session_t *session, session_t *out)
 {
     *out = *session;
     gateway_save(&session->gateway, &out->gateway);

@@ -11,7 +11,7 @@
 #define CHECKPOINT_LINE_MAX (2u * sizeof(session_t) + 128u)
 
 /** Takes everything but handles. */
-void checkpoint_take(const session_t *session, session_t *out);
+void checkpoint_copy(const session_t *session, session_t *out);
 
 /** `<t_ms> !state VERSION HASH CRC BYTES` with its newline; the time is that of the coming cycle.
  *  @param hash of the configuration at the start (config/hash.h)

@@ -89,7 +89,7 @@ static int report_order(FILE *errors, const char *path, const frames_line_t *lin
 
 /* One line into the list.
  * Returns the number of errors, or -1 where memory ran out. */
-static int take_line(frames_t *self, char *text, size_t length, uint32_t number, const char *path, FILE *errors)
+static int parse_line(frames_t *self, char *text, size_t length, uint32_t number, const char *path, FILE *errors)
 {
     frames_line_t line = {.line = number};
     bool is_empty = false;
@@ -132,7 +132,7 @@ int frames_load(frames_t *self, const char *path, FILE *errors)
         char *const start = &self->bytes[at];
         const char *const newline = memchr(start, '\n', length - at);
         const size_t line_length = newline != NULL ? (size_t)(newline - start) : length - at;
-        const int result = take_line(self, start, line_length, ++number, path, errors);
+        const int result = parse_line(self, start, line_length, ++number, path, errors);
         if (result < 0) {
             return -1;
         }

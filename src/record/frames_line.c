@@ -185,7 +185,7 @@ static const char *read_text(cursor_t *self, frames_line_t *out)
 }
 
 /* Takes a word if it stands next, with a blank or the end behind it. */
-static bool take_word(cursor_t *self, const char *word)
+static bool parse_word(cursor_t *self, const char *word)
 {
     const size_t length = strlen(word);
     const size_t left = (size_t)(self->end - self->at);
@@ -242,10 +242,10 @@ static bool read_drive(cursor_t *self, frames_line_t *out)
     skip_blanks(self);
     out->kind = FRAMES_DRIVE;
     out->drive = (uint8_t)drive;
-    if (!take_word(self, "fault")) {
-        const bool is_offline = take_word(self, "offline");
+    if (!parse_word(self, "fault")) {
+        const bool is_offline = parse_word(self, "offline");
         out->state = is_offline ? DRIVE_OFFLINE : DRIVE_DISABLED;
-        return is_offline || take_word(self, "back");
+        return is_offline || parse_word(self, "back");
     }
     out->state = DRIVE_FAULT;
     out->number = 0;
@@ -304,7 +304,7 @@ static bool read_fault(cursor_t *self, frames_line_t *out)
     uint32_t axis = 0;
     out->kind = FRAMES_FAULT;
     for (unsigned i = FAULT_NONE + 1u; i < FAULT_CODES; i++) {
-        if (take_word(self, fault_help((fault_code_t)i)->name)) {
+        if (parse_word(self, fault_help((fault_code_t)i)->name)) {
             out->fault = (fault_code_t)i;
             const bool is_good = !fault_is_of_axis(out->fault) || (read_count(self, DRIVES_MAX, &axis) && axis != 0);
             out->drive = (uint8_t)axis;
@@ -316,19 +316,19 @@ static bool read_fault(cursor_t *self, frames_line_t *out)
 
 /* What a recording tells of drives and senders.
  * Returns what is wrong with the words, NULL = nothing. */
-static const char *read_told_words(cursor_t *self, frames_line_t *out)
+static const char *parse_recorded(cursor_t *self, frames_line_t *out)
 {
     static const struct {
         const char *word;
         const char *bad;
         bool (*read)(cursor_t *self, frames_line_t *out);
-    } k_told[] = {{"drive", k_bad_drive, read_drive},
-                  {"fault", k_bad_fault, read_fault},
-                  {"feedback", k_bad_feedback, read_feedback},
-                  {"from", k_bad_from, read_address}};
-    for (size_t i = 0; i < sizeof k_told / sizeof k_told[0]; i++) {
-        if (take_word(self, k_told[i].word)) {
-            return k_told[i].read(self, out) ? NULL : k_told[i].bad;
+    } k_recorded[] = {{"drive", k_bad_drive, read_drive},
+                      {"fault", k_bad_fault, read_fault},
+                      {"feedback", k_bad_feedback, read_feedback},
+                      {"from", k_bad_from, read_address}};
+    for (size_t i = 0; i < sizeof k_recorded / sizeof k_recorded[0]; i++) {
+        if (parse_word(self, k_recorded[i].word)) {
+            return k_recorded[i].read(self, out) ? NULL : k_recorded[i].bad;
         }
     }
     return k_bad_request;
@@ -339,22 +339,22 @@ static const char *read_told_words(cursor_t *self, frames_line_t *out)
 static const char *read_request_words(cursor_t *self, frames_line_t *out)
 {
     for (size_t i = 0; i < sizeof k_requests / sizeof k_requests[0]; i++) {
-        if (take_word(self, k_requests[i].word)) {
+        if (parse_word(self, k_requests[i].word)) {
             out->kind = FRAMES_REQUEST;
             out->request = k_requests[i].event;
             return NULL;
         }
     }
-    if (take_word(self, "estop")) {
+    if (parse_word(self, "estop")) {
         out->kind = FRAMES_ESTOP;
-        out->number = take_word(self, "on");
-        return out->number == 1 || take_word(self, "off") ? NULL : k_bad_estop;
+        out->number = parse_word(self, "on");
+        return out->number == 1 || parse_word(self, "off") ? NULL : k_bad_estop;
     }
-    if (take_word(self, "intensity")) {
+    if (parse_word(self, "intensity")) {
         out->kind = FRAMES_INTENSITY;
         return read_count(self, PERCENT_MAX, &out->number) ? NULL : k_bad_intensity;
     }
-    if (take_word(self, "late")) {
+    if (parse_word(self, "late")) {
         out->kind = FRAMES_LATE;
         return read_count(self, UINT32_MAX, &out->number) ? NULL : k_bad_late;
     }
@@ -365,18 +365,18 @@ static const char *read_request_words(cursor_t *self, frames_line_t *out)
         self->at += self->end - self->at;
         return why == NULL ? NULL : k_bad_service;
     }
-    if (take_word(self, "end")) {
+    if (parse_word(self, "end")) {
         out->kind = FRAMES_END;
         return NULL;
     }
-    if (take_word(self, "state")) {
+    if (parse_word(self, "state")) {
         out->kind = FRAMES_STATE;
         out->text = (const uint8_t *)self->at;
         out->length = (uint32_t)(self->end - self->at);
         self->at += out->length;
         return NULL;
     }
-    return read_told_words(self, out);
+    return parse_recorded(self, out);
 }
 
 static const char *read_request(cursor_t *self, frames_line_t *out)

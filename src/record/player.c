@@ -14,7 +14,7 @@
 
 /* The next line of its sort whose time has come; NULL: none. Datagrams and all other lines have an index of their own, because
  * datagrams that did not fit into a cycle must not delay a request. */
-static const frames_line_t *take_due(player_t *self, size_t *next, bool is_datagram)
+static const frames_line_t *pop_due(player_t *self, size_t *next, bool is_datagram)
 {
     const uint64_t t_us = self->session.now_us - self->session.zero_us;
     while ((self->session.has_zero || self->is_before_zero) && *next < self->lines && self->line[*next].t_us <= t_us) {
@@ -30,7 +30,7 @@ static const frames_line_t *take_due(player_t *self, size_t *next, bool is_datag
 static hv_status_t player_recv(void *ctx, uint8_t *buffer, size_t capacity, size_t *length, hal_udp_peer_t *from)
 {
     player_t *self = ctx;
-    const frames_line_t *line = take_due(self, &self->next_datagram, true);
+    const frames_line_t *line = pop_due(self, &self->next_datagram, true);
     if (line == NULL) {
         return HV_ERR_AGAIN;
     }
@@ -61,49 +61,50 @@ hal_udp_t player_udp(player_t *self)
 
 /* --- Drives whose feedback is in the lines --- */
 
-static hv_status_t told_poll(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
+static hv_status_t recorded_poll(void *ctx, uint64_t now_us, drive_feedback_t feedback[DRIVES_MAX])
 {
     player_t *self = ctx;
     const drives_t behind = sim_drives_hal(self->drives);
     const hv_status_t status = drives_poll(behind, now_us, feedback);
-    bool is_any = !self->is_told;
-    for (unsigned i = 0; self->is_told && i < drives_count(behind); i++) {
-        feedback[i] = self->told[i];
-        feedback[i].actual_us = now_us - (self->told[i].actual_us < now_us ? self->told[i].actual_us : now_us);
+    bool is_any = !self->is_recorded;
+    for (unsigned i = 0; self->is_recorded && i < drives_count(behind); i++) {
+        feedback[i] = self->recorded_drive[i];
+        feedback[i].actual_us =
+            now_us - (self->recorded_drive[i].actual_us < now_us ? self->recorded_drive[i].actual_us : now_us);
         is_any = is_any || feedback[i].state != DRIVE_OFFLINE;
     }
-    return self->is_told ? (is_any ? HV_OK : HV_ERR_IO) : status;
+    return self->is_recorded ? (is_any ? HV_OK : HV_ERR_IO) : status;
 }
 
-static hv_status_t told_send(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
+static hv_status_t recorded_send(void *ctx, uint64_t now_us, const q32_t setpoint_q32[DRIVES_MAX])
 {
     player_t *self = ctx;
     const hv_status_t status = drives_send(sim_drives_hal(self->drives), now_us, setpoint_q32);
-    return self->is_told ? HV_OK : status;
+    return self->is_recorded ? HV_OK : status;
 }
 
 /* Accepts a request as the contract demands for the recorded states of the drives. */
-static hv_status_t told_request(void *ctx, drives_request_t request)
+static hv_status_t recorded_request(void *ctx, drives_request_t request)
 {
     player_t *self = ctx;
     const drives_t behind = sim_drives_hal(self->drives);
     const hv_status_t status = drives_request(behind, request);
-    for (unsigned i = 0; self->is_told && i < drives_count(behind); i++) {
-        if (!drives_allow(request, self->told[i].state)) {
+    for (unsigned i = 0; self->is_recorded && i < drives_count(behind); i++) {
+        if (!drives_allow(request, self->recorded_drive[i].state)) {
             return HV_ERR_STATE;
         }
     }
-    return self->is_told ? HV_OK : status;
+    return self->is_recorded ? HV_OK : status;
 }
 
-static hv_status_t told_request_one(void *ctx, uint8_t axis, drives_request_t request)
+static hv_status_t recorded_request_one(void *ctx, uint8_t axis, drives_request_t request)
 {
     player_t *self = ctx;
     const hv_status_t status = drives_request_one(sim_drives_hal(self->drives), axis, request);
-    return !self->is_told ? status : drives_allow(request, self->told[axis].state) ? HV_OK : HV_ERR_STATE;
+    return !self->is_recorded ? status : drives_allow(request, self->recorded_drive[axis].state) ? HV_OK : HV_ERR_STATE;
 }
 
-static uint8_t told_count(void *ctx)
+static uint8_t recorded_count(void *ctx)
 {
     const player_t *self = ctx;
     return drives_count(sim_drives_hal(self->drives));
@@ -112,18 +113,18 @@ static uint8_t told_count(void *ctx)
 drives_t player_drives(player_t *self)
 {
     static const drives_ops_t k_ops = {
-        .poll = told_poll,
-        .send = told_send,
-        .request = told_request,
-        .count = told_count,
-        .request_one = told_request_one,
+        .poll = recorded_poll,
+        .send = recorded_send,
+        .request = recorded_request,
+        .count = recorded_count,
+        .request_one = recorded_request_one,
     };
     return (drives_t){&k_ops, self};
 }
 
 /* --- Running --- */
 
-static void tell_refused(const player_t *self, const frames_line_t *line, hv_status_t status, const char *what)
+static void log_refused(const player_t *self, const frames_line_t *line, hv_status_t status, const char *what)
 {
     if (status != HV_OK && self->refused != NULL) {
         self->refused(self->ctx, line, what);
@@ -144,7 +145,7 @@ static void inject(player_t *self, const frames_line_t *line)
 static void serve(player_t *self, const frames_line_t *line)
 {
     const service_answer_t answer = gateway_service(&self->session.gateway, &line->service, self->session.now_us);
-    tell_refused(self, line, answer == SERVICE_DONE ? HV_OK : HV_ERR_STATE, service_verb_name(line->service.verb));
+    log_refused(self, line, answer == SERVICE_DONE ? HV_OK : HV_ERR_STATE, service_verb_name(line->service.verb));
 }
 
 static void carry_out(player_t *self, const frames_line_t *line)
@@ -152,10 +153,10 @@ static void carry_out(player_t *self, const frames_line_t *line)
     gateway_t *gateway = &self->session.gateway;
     switch (line->kind) {
     case FRAMES_REQUEST:
-        tell_refused(self, line, gateway_request(gateway, line->request, self->session.now_us), event_name(line->request));
+        log_refused(self, line, gateway_request(gateway, line->request, self->session.now_us), event_name(line->request));
         break;
     case FRAMES_INTENSITY:
-        tell_refused(self, line, gateway_set_intensity(gateway, line->number), "intensity beyond [motion] intensity_max_percent");
+        log_refused(self, line, gateway_set_intensity(gateway, line->number), "intensity beyond [motion] intensity_max_percent");
         break;
     case FRAMES_SERVICE:
         serve(self, line);
@@ -170,11 +171,11 @@ static void carry_out(player_t *self, const frames_line_t *line)
         inject(self, line);
         break;
     case FRAMES_FAULT:
-        gateway_tell_fault(gateway, line->fault, line->drive);
+        gateway_inject_fault(gateway, line->fault, line->drive);
         break;
     case FRAMES_FEEDBACK:
-        self->is_told = true;
-        self->told[line->drive - 1] = line->feedback;
+        self->is_recorded = true;
+        self->recorded_drive[line->drive - 1] = line->feedback;
         break;
     case FRAMES_END:
         self->is_ended = true;
@@ -190,7 +191,7 @@ static void carry_out(player_t *self, const frames_line_t *line)
 static void carry_out_due(player_t *self)
 {
     for (;;) {
-        const frames_line_t *line = take_due(self, &self->next_request, false);
+        const frames_line_t *line = pop_due(self, &self->next_request, false);
         if (line == NULL) {
             return;
         }

@@ -22,8 +22,8 @@ typedef struct {
 
     session_t session;
     bool is_before_zero; /**< the run continues from a state before time zero: times of lines count from the start of heaved */
-    bool is_told;        /**< lines contain the feedback of the drives; that of the simulated drives is not used */
-    drive_feedback_t told[DRIVES_MAX];
+    bool is_recorded;    /**< lines contain the feedback of the drives; that of the simulated drives is not used */
+    drive_feedback_t recorded_drive[DRIVES_MAX];
     size_t next_datagram; /**< line at which the search for the next datagram begins */
     size_t next_request;  /**< the same for everything else */
     bool is_ended;        /**< a line has ended the run: no further cycle */

@@ -47,6 +47,6 @@ void session_row(session_t *self, trace_row_t *out)
 {
     const snapshot_t *snapshot = gateway_snapshot(&self->gateway);
     const uint32_t late_cycles = snapshot->counters.late_cycles;
-    trace_take(out, snapshot, snapshot->now_us - self->zero_us, late_cycles != self->late_cycles, !self->has_zero);
+    trace_fill(out, snapshot, snapshot->now_us - self->zero_us, late_cycles != self->late_cycles, !self->has_zero);
     self->late_cycles = late_cycles;
 }

@@ -45,7 +45,7 @@ static unsigned flags_of(const snapshot_t *s, bool is_late)
            (is_late ? FLAG_LATE : 0u) | (is_loose(s) ? FLAG_LOOSE : 0u);
 }
 
-void trace_take(trace_row_t *self, const snapshot_t *snapshot, uint64_t t_us, bool is_late, bool is_before_zero)
+void trace_fill(trace_row_t *self, const snapshot_t *snapshot, uint64_t t_us, bool is_late, bool is_before_zero)
 {
     *self = (trace_row_t){.t_us = t_us,
                           .relay_mask = snapshot->relay_mask,

@@ -25,7 +25,7 @@ typedef struct {
 /** Takes what the trace needs of a cycle.
  *  @param is_late        cycles were skipped before this one
  *  @param is_before_zero time zero has not come yet: t_us is since the start */
-void trace_take(trace_row_t *self, const snapshot_t *snapshot, uint64_t t_us, bool is_late, bool is_before_zero);
+void trace_fill(trace_row_t *self, const snapshot_t *snapshot, uint64_t t_us, bool is_late, bool is_before_zero);
 
 /** The header line, with its newline.
  *  @return bytes written, without NUL */

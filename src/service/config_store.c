@@ -162,7 +162,7 @@ void config_store_adopt(config_store_t *self, const char *path)
 
 /* --- One that is applied --- */
 
-const char *config_store_take(config_store_t *self, int fd, const char **text, size_t *length)
+const char *config_store_accept(config_store_t *self, int fd, const char **text, size_t *length)
 {
     struct stat about;
     const int seals = fd >= 0 ? fcntl(fd, F_GET_SEALS) : -1;

@@ -77,7 +77,7 @@ void config_store_adopt(config_store_t *self, const char *path);
  * bytes.
  *  @param fd a sealed memfd
  *  @return NULL, or a text that says what is wrong */
-const char *config_store_take(config_store_t *self, int fd, const char **text, size_t *length);
+const char *config_store_accept(config_store_t *self, int fd, const char **text, size_t *length);
 
 /** Starts to write the text that was taken. The store may not be busy, and is until config_store_done(). */
 void config_store_write(config_store_t *self);

@@ -39,10 +39,10 @@ int control_timeout_ms(const control_t *self, uint64_t now_us, int at_most_ms)
 /* --- Connections --- */
 
 /* In the order in which clients give way. */
-typedef enum { IDLE, WATCHES, TALKS, WAITS_FOR_DISK, STAYS } standing_t;
+typedef enum { IDLE, WATCHES, TALKS, WAITS_FOR_DISK, STAYS } eviction_rank_t;
 
 /* Who waits for the motion thread stays, for a moment. Not so for the disk: that may take a minute. */
-static standing_t standing(const control_client_t *client, uint64_t now_us)
+static eviction_rank_t eviction_rank(const control_client_t *client, uint64_t now_us)
 {
     if (client->request_id != 0 || now_us - client->came_us < CONTROL_GRACE_US) {
         return STAYS;
@@ -60,13 +60,13 @@ static standing_t standing(const control_client_t *client, uint64_t now_us)
 static control_client_t *find_least(control_t *self, bool is_among_lookers, uint64_t now_us)
 {
     control_client_t *least = NULL;
-    standing_t least_standing = STAYS;
+    eviction_rank_t least_rank = STAYS;
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         control_client_t *client = &self->client[i];
-        const standing_t its = client->is_looker || !is_among_lookers ? standing(client, now_us) : STAYS;
-        if (its < least_standing || (its == least_standing && least != NULL && client->asked_us < least->asked_us)) {
+        const eviction_rank_t its = client->is_looker || !is_among_lookers ? eviction_rank(client, now_us) : STAYS;
+        if (its < least_rank || (its == least_rank && least != NULL && client->asked_us < least->asked_us)) {
             least = client;
-            least_standing = its;
+            least_rank = its;
         }
     }
     return least;
@@ -138,7 +138,7 @@ static void let_in(control_t *self, unsigned at, uint64_t now_us)
 }
 
 /* A newcomer for whom there is no room yet waits for it. Returns false: nobody was let in. */
-static bool take_connection(control_t *self, unsigned at, uint64_t now_us)
+static bool accept_connection(control_t *self, unsigned at, uint64_t now_us)
 {
     control_socket_t *listening = &self->socket[at];
     if (listening->newcomer < 0) {
@@ -216,7 +216,7 @@ static void serve_socket(control_t *self, unsigned at, const struct pollfd *foun
     listening->looked_us = (found->events & POLLIN) != 0 && !has_come ? self->polled_us : listening->looked_us;
     bool is_going_on = has_come || listening->newcomer >= 0 || listening->is_shut;
     for (unsigned i = 0; i < CONTROL_CLIENTS && is_going_on; i++) {
-        is_going_on = take_connection(self, at, now_us);
+        is_going_on = accept_connection(self, at, now_us);
     }
 }
 
@@ -227,7 +227,7 @@ void control_serve(control_t *self, const struct pollfd fds[CONTROL_FDS], uint64
         self->own_holds = self->view.view.own_holds;
         control_requests_void(self, NULL, now_us);
     }
-    control_results_take(self);
+    control_results_pop(self);
     for (unsigned i = 0; i < CONTROL_CLIENTS; i++) {
         serve_client(self, &self->client[i], &fds[i + CONTROL_SOCKETS], now_us);
     }

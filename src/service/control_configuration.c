@@ -49,7 +49,7 @@ void control_configuration_answer(const control_t *self, control_client_t *clien
     control_client_answer(client, &json);
 }
 
-static void refuse(const control_t *self, control_client_t *client, const char *why)
+static void reject(const control_t *self, control_client_t *client, const char *why)
 {
     char error[640];
     (void)snprintf(error, sizeof error, "configure: %s", why);
@@ -73,7 +73,7 @@ static bool is_right(control_t *self, control_client_t *client, const char *text
     } else {
         (void)snprintf(why, sizeof why, N_("%d mistakes, nothing has changed: %.480s"), mistakes, self->mistakes);
     }
-    refuse(self, client, why);
+    reject(self, client, why);
     return false;
 }
 
@@ -91,7 +91,7 @@ static const char *why_not_now(const control_t *self, const config_changes_t *ch
     return is_restart ? self->store->no_restart : NULL;
 }
 
-void control_configuration_take(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+void control_configuration_accept(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
 {
     config_changes_t changes;
     config_store_t *const store = self->store;
@@ -105,11 +105,11 @@ void control_configuration_take(control_t *self, control_client_t *client, const
     } else if (config_store_is_busy(store)) {
         why = N_("the file is just being read, or another one written: try again");
     } else {
-        why = config_store_take(store, client->received, &text, &length);
+        why = config_store_accept(store, client->received, &text, &length);
     }
     control_client_forget_received(client);
     if (why != NULL) {
-        refuse(self, client, why);
+        reject(self, client, why);
         return;
     }
     if (!is_right(self, client, text, length, &changes)) {
@@ -117,7 +117,7 @@ void control_configuration_take(control_t *self, control_client_t *client, const
     }
     why = why_not_now(self, &changes);
     if (why != NULL) {
-        refuse(self, client, why);
+        reject(self, client, why);
         return;
     }
     self->changes = changes;
@@ -159,7 +159,7 @@ void control_configuration_end(control_t *self, const char *error, bool is_resta
         }
         client->is_configuring = false;
         if (error != NULL) {
-            refuse(self, client, error);
+            reject(self, client, error);
         } else {
             answer(self, client, is_restarting);
         }

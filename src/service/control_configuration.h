@@ -14,7 +14,7 @@ bool control_configuration_is(const char *line);
 void control_configuration_answer(const control_t *self, control_client_t *client);
 
 /** Judges a text, and has it written if it may come into force; the answer follows. */
-void control_configuration_take(control_t *self, control_client_t *client, const char *line, uint64_t now_us);
+void control_configuration_accept(control_t *self, control_client_t *client, const char *line, uint64_t now_us);
 
 /** Nobody waits for the disk for ever. */
 void control_configuration_watch(control_client_t *client, uint64_t now_us);

@@ -47,7 +47,7 @@ bool control_object_is_write(const char *line)
 }
 
 /* The value of a write into the object; false: error says what is wrong. */
-static bool take_value(control_client_t *client, const char *text, drive_object_t *object)
+static bool parse_value(control_client_t *client, const char *text, drive_object_t *object)
 {
     const canopen_type_t type = (canopen_type_t)client->object_type;
     int64_t value = 0, least = 0, most = 0;
@@ -67,7 +67,7 @@ static bool take_value(control_client_t *client, const char *text, drive_object_
 }
 
 /* The type of a write: as it is said, else that of the object. */
-static bool take_type(control_client_t *client, const char *name, const drive_object_t *object)
+static bool parse_type(control_client_t *client, const char *name, const drive_object_t *object)
 {
     const canopen_object_t *row = canopen_object_find(object->index, object->sub);
     canopen_type_t type = row != NULL ? (canopen_type_t)row->type : CANOPEN_TEXT;
@@ -102,7 +102,7 @@ const char *control_object_read(control_client_t *client, const char *line, moti
     const canopen_object_t *row = canopen_object_find(object->index, object->sub);
     client->object_type = row != NULL ? row->type : CANOPEN_TYPES;
     if (words > 3u &&
-        (!take_type(client, words == 5u ? word[3] : NULL, object) || !take_value(client, word[words - 1u], object))) {
+        (!parse_type(client, words == 5u ? word[3] : NULL, object) || !parse_value(client, word[words - 1u], object))) {
         return client->object_error;
     }
     client->object_drive = (uint8_t)out->number;

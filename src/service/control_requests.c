@@ -269,7 +269,7 @@ static void acknowledge(control_t *self, control_client_t *client)
 }
 
 /* Whom it asks for, in its own words: a panel has people behind it that the kernel does not know. */
-static void take_by(control_t *self, control_client_t *client, const char *name)
+static void parse_by(control_t *self, control_client_t *client, const char *name)
 {
     (void)snprintf(client->entry.by, sizeof client->entry.by, "%s", name);
     if (name[0] == '\0' || strlen(name) >= sizeof client->entry.by) {
@@ -313,7 +313,7 @@ static bool is_allowed(const control_t *self, control_client_t *client, const ch
     return false;
 }
 
-static void take_request(control_t *self, control_client_t *client, const char *said, uint64_t now_us)
+static void accept_request(control_t *self, control_client_t *client, const char *said, uint64_t now_us)
 {
     const char *const line = operator_request_behind_heard(said, &client->has_heard, &client->heard_us);
     if (line == NULL) {
@@ -347,15 +347,15 @@ static void take_request(control_t *self, control_client_t *client, const char *
     } else if (strcmp(line, "selftest") == 0) {
         control_selftest_answer(self, client);
     } else if (control_selftest_is_said(line)) {
-        control_selftest_take(self, client, line);
+        control_selftest_accept(self, client, line);
     } else if (control_configuration_is(line)) {
-        control_configuration_take(self, client, line, now_us);
+        control_configuration_accept(self, client, line, now_us);
     } else if (strcmp(line, "incident-folder") == 0 || strcmp(line, k_operator_log) == 0) {
         control_pass_folder(self, client, line[0] == 'o');
     } else if (strcmp(line, "status") == 0) {
         control_client_answer_status(self, client);
     } else if (strncmp(line, k_by, strlen(k_by)) == 0) {
-        take_by(self, client, &line[strlen(k_by)]);
+        parse_by(self, client, &line[strlen(k_by)]);
     } else if (strncmp(line, "watch", 5) == 0) {
         if (!begin_watch(client, &line[5], now_us)) {
             control_client_answer_error(client, "watch: `watch` or `watch HZ` with 1 to 50 is allowed", NULL);
@@ -372,7 +372,7 @@ static void take_request(control_t *self, control_client_t *client, const char *
 }
 
 /* Carries out the complete lines of a client, one at a time: the next one waits for the answer to the last. */
-static void take_lines(control_t *self, control_client_t *client, uint64_t now_us)
+static void parse_lines(control_t *self, control_client_t *client, uint64_t now_us)
 {
     while (client->fd >= 0 && !control_client_is_waiting(client)) {
         char *const newline = memchr(client->in, '\n', client->in_length);
@@ -388,7 +388,7 @@ static void take_lines(control_t *self, control_client_t *client, uint64_t now_u
         if (has_zero) {
             control_client_answer_error(client, "a zero byte in the request; allowed: text, one request per line", NULL);
         } else {
-            take_request(self, client, client->in, now_us);
+            accept_request(self, client, client->in, now_us);
         }
         const size_t taken = (size_t)(newline + 1 - client->in);
         client->void_bytes -= client->void_bytes < taken ? client->void_bytes : taken;
@@ -414,7 +414,7 @@ void control_requests_end(control_t *self, control_client_t *client, uint64_t no
         client->in_length += received > 0 ? (size_t)received : 0;
         while (client->fd >= 0 && memchr(client->in, '\n', client->in_length) != NULL) {
             forget_answers(client);
-            take_lines(self, client, now_us);
+            parse_lines(self, client, now_us);
         }
         received = client->fd >= 0 && client->in_length < sizeof client->in ? control_client_receive(client) : 0;
     } while (received > 0);
@@ -457,7 +457,7 @@ void control_requests_receive(control_t *self, control_client_t *client, uint64_
     client->in_length += (size_t)received;
     const bool is_all = (size_t)received < room && client->received == passed; /* the kernel stops behind a descriptor */
     client->looked_us = is_all ? self->polled_us : client->looked_us;
-    take_lines(self, client, now_us);
+    parse_lines(self, client, now_us);
     if (client->fd >= 0 && client->in_length == sizeof client->in && memchr(client->in, '\n', sizeof client->in) == NULL) {
         client->is_closing = true;
         control_client_answer_error(client, "request too long", NULL);
@@ -475,7 +475,7 @@ void control_requests_serve_time(control_t *self, control_client_t *client, uint
     } else if (client->is_configuring) {
         control_configuration_watch(client, now_us);
     }
-    take_lines(self, client, now_us); /* what waited for an answer */
+    parse_lines(self, client, now_us); /* what waited for an answer */
     if (client->fd >= 0 && client->watch_period_us != 0 && now_us >= client->watch_next_us) {
         client->watch_next_us += client->watch_period_us * (1 + (now_us - client->watch_next_us) / client->watch_period_us);
         control_client_answer_status(self, client);

@@ -26,7 +26,7 @@ static control_client_t *find_client(control_t *self, uint32_t request_id)
     return NULL;
 }
 
-static void refuse(const control_t *self, control_client_t *client, const snapshot_t *snapshot, bool is_shutting_down)
+static void reject(const control_t *self, control_client_t *client, const snapshot_t *snapshot, bool is_shutting_down)
 {
     char error[256];
     if (client->request == OPERATOR_INTENSITY) {
@@ -54,7 +54,7 @@ static const char *explain_missing(const control_t *self, uint32_t missing, char
 }
 
 /* A reset has an effect once the platform has left FAULT or ESTOP; everything else has its answer after one cycle. */
-static void take_result(const control_t *self, control_client_t *client, const motion_result_t *result)
+static void answer_result(const control_t *self, control_client_t *client, const motion_result_t *result)
 {
     char text[256];
     const char *missing = explain_missing(self, result->missing, text, sizeof text);
@@ -75,7 +75,7 @@ static void take_result(const control_t *self, control_client_t *client, const m
         control_object_answer(client, result);
     } else if (result->status != HV_OK) {
         client->request_id = 0;
-        refuse(self, client, &result->snapshot, result->is_shutting_down);
+        reject(self, client, &result->snapshot, result->is_shutting_down);
     } else if (client->request == EVENT_RESET) {
         client->is_accepted = true;
     } else {
@@ -84,14 +84,14 @@ static void take_result(const control_t *self, control_client_t *client, const m
     }
 }
 
-void control_results_take(control_t *self)
+void control_results_pop(control_t *self)
 {
     motion_result_t result;
     while (ring_pop(&self->handover->results, &result, sizeof result) > 0) {
         control_client_t *client = find_client(self, result.id);
         self->is_end_wanted &= result.id != self->end_id || handover_is_barred(&result) == 0;
         if (result.id != 0 && client != NULL) {
-            take_result(self, client, &result);
+            answer_result(self, client, &result);
         }
     }
 }
@@ -107,7 +107,7 @@ void control_results_watch_request(control_t *self, control_client_t *client, ui
     } else if (now_us >= client->answer_by_us) {
         client->request_id = 0;
         if (client->is_accepted) {
-            refuse(self, client, s, self->view.view.is_shutting_down);
+            reject(self, client, s, self->view.view.is_shutting_down);
         } else {
             control_client_answer_error(client, "no answer from the motion thread", NULL);
         }

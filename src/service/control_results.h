@@ -8,7 +8,7 @@
 #include "service/control.h"
 
 /** Takes the motion thread's results. */
-void control_results_take(control_t *self);
+void control_results_pop(control_t *self);
 
 /** A request whose answer comes with time: a reset that took effect, or one that never got its answer. */
 void control_results_watch_request(control_t *self, control_client_t *client, uint64_t now_us);

@@ -47,7 +47,7 @@ void control_selftest_answer(control_t *self, control_client_t *client)
     control_client_answer(client, &json);
 }
 
-void control_selftest_take(control_t *self, control_client_t *client, const char *line)
+void control_selftest_accept(control_t *self, control_client_t *client, const char *line)
 {
     self->selftest = (control_selftest_t){.is_news = true, .is_passed = strcmp(line, k_passed) == 0, .peer = client->peer};
     client->request = EVENT_TICK; /* none that the motion thread has to answer */

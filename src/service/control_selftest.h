@@ -14,7 +14,7 @@ bool control_selftest_is_said(const char *line);
 void control_selftest_answer(control_t *self, control_client_t *client);
 
 /** Takes `selftest passed` or `selftest failed`. Who said it is in the operator log. */
-void control_selftest_take(control_t *self, control_client_t *client, const char *line);
+void control_selftest_accept(control_t *self, control_client_t *client, const char *line);
 
 /** Keeps what somebody has said of a self-test, and finds whether one is due on this day of the local calendar, whichever way the
  * clock went. The service thread, often.

@@ -210,7 +210,7 @@ static void hand_over(lifetime_t *self)
                     0); /* no room: the disk hangs, and the next one has it all */
 }
 
-static void take(lifetime_t *self, const snapshot_t *snapshot)
+static void add_wear(lifetime_t *self, const snapshot_t *snapshot)
 {
     for (unsigned i = 0; i < self->now.axes; i++) {
         const wear_t *wear = &snapshot->wear[i];
@@ -224,7 +224,7 @@ static void take(lifetime_t *self, const snapshot_t *snapshot)
 
 void lifetime_serve(lifetime_t *self, const snapshot_t *snapshot, uint64_t now_us)
 {
-    take(self, snapshot);
+    add_wear(self, snapshot);
     const bool is_down =
         snapshot->state == STATE_OFF && self->state != STATE_OFF; /* a good moment: who has parked it may switch it off */
     self->state = snapshot->state;
@@ -255,8 +255,8 @@ bool lifetime_has_passed(const lifetime_t *self, uint32_t day, const char *hash)
 bool lifetime_trouble(lifetime_t *self, int *error)
 {
     *error = __atomic_load_n(&self->error, __ATOMIC_ACQUIRE);
-    const bool is_news = (*error != 0) != (self->told != 0);
-    self->told = *error;
+    const bool is_news = (*error != 0) != (self->logged_error != 0);
+    self->logged_error = *error;
     return is_news;
 }
 

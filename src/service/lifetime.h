@@ -50,7 +50,7 @@ typedef struct {
     uint64_t next_us;
     ring_t ring;               /**< lifetime_totals_t to the writer */
     int32_t error;             /**< atomic: errno of the newest write, 0 = it worked */
-    int32_t told;              /**< error that lifetime_trouble() has told of */
+    int32_t logged_error;      /**< error that lifetime_trouble() has told of */
     uint64_t boot;             /**< clock_boot() */
     uint32_t is_clock_trusted; /**< atomic: clock_is_trusted(), and that it was so once since the start */
     bool has_own;              /**< the newest self-test was made since heaved started */

@@ -192,13 +192,13 @@ static void put_drives(sheet_t *self, const snapshot_t *s)
     }
 }
 
-static bool is_any_telling(const snapshot_t *s, unsigned axes)
+static bool has_telemetry(const snapshot_t *s, unsigned axes)
 {
-    unsigned told = 0;
+    unsigned has = 0;
     for (unsigned i = 0; i < axes; i++) {
-        told |= s->report[i].telemetry.has;
+        has |= s->report[i].telemetry.has;
     }
-    return told != 0;
+    return has != 0;
 }
 
 /* Only of drives that measure it. */
@@ -206,26 +206,26 @@ static void put_telemetry(sheet_t *self, const snapshot_t *s)
 {
     const unsigned axes = s->cylinders + (s->has_angle ? 1u : 0u);
     char text[NUMBER_MAX];
-    if (!is_any_telling(s, axes)) {
+    if (!has_telemetry(s, axes)) {
         return;
     }
     head(self, "drive_torque_percent", "gauge", "torque, of the rated one; positive pushes out");
     for (unsigned i = 0; i < axes; i++) {
-        if ((s->report[i].telemetry.has & DRIVE_TELLS_TORQUE) != 0) {
+        if ((s->report[i].telemetry.has & DRIVE_HAS_TORQUE) != 0) {
             const q32_t torque_q32 = q32_from_int(s->report[i].telemetry.torque_permille) / 10;
             put(self, "heave_drive_torque_percent{axis=\"%u\"} %s\n", i + 1, q32_text(torque_q32, text));
         }
     }
     head(self, "drive_following_error", "gauge", "demand less actual, as the drive sees it");
     for (unsigned i = 0; i < axes; i++) {
-        if ((s->report[i].telemetry.has & DRIVE_TELLS_LAG) != 0) {
+        if ((s->report[i].telemetry.has & DRIVE_HAS_LAG) != 0) {
             put(self, "heave_drive_following_error{axis=\"%u\",unit=\"%s\"} %s\n", i + 1, i < s->cylinders ? "mm" : "deg",
                 q32_text(s->report[i].telemetry.lag_q32, text));
         }
     }
     head(self, "drive_inputs", "gauge", "digital inputs: bit 0 negative limit, 1 positive limit, 2 home");
     for (unsigned i = 0; i < axes; i++) {
-        if ((s->report[i].telemetry.has & DRIVE_TELLS_INPUTS) != 0) {
+        if ((s->report[i].telemetry.has & DRIVE_HAS_INPUTS) != 0) {
             put(self, "heave_drive_inputs{axis=\"%u\"} %" PRIu32 "\n", i + 1, s->report[i].telemetry.inputs);
         }
     }

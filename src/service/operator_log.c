@@ -198,7 +198,7 @@ static operator_share_t *share_of(operator_log_t *self, const operator_entry_t *
     return oldest;
 }
 
-static bool takes_share(operator_log_t *self, const operator_entry_t *entry)
+static bool uses_share(operator_log_t *self, const operator_entry_t *entry)
 {
     operator_share_t *const share = share_of(self, entry);
     const int64_t pauses = (entry->at.tv_sec - share->at_s) / OPERATOR_LOG_PAUSE_S;
@@ -229,7 +229,7 @@ void operator_log_add(operator_log_t *self, const operator_entry_t *entry)
         self->repeated_at = entry->at;
         return;
     }
-    if (is_minor(entry) && !takes_share(self, entry)) {
+    if (is_minor(entry) && !uses_share(self, entry)) {
         self->left_out += self->left_out < UINT32_MAX;
         return;
     }
@@ -268,8 +268,8 @@ uint32_t operator_log_lost(const operator_log_t *self)
 bool operator_log_trouble(operator_log_t *self, int *error)
 {
     *error = __atomic_load_n(&self->error, __ATOMIC_ACQUIRE);
-    const bool is_news = (*error != 0) != (self->told != 0);
-    self->told = *error;
+    const bool is_news = (*error != 0) != (self->logged_error != 0);
+    self->logged_error = *error;
     return is_news;
 }
 

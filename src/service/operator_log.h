@@ -75,7 +75,7 @@ typedef struct {
     ring_t ring;                             /**< operator_entry_t to the writer */
     uint32_t failed;                         /**< atomic: entries that could not be written */
     int32_t error;                           /**< atomic: errno of the newest failure, 0 = the newest entry is on the disk */
-    int32_t told;                            /**< error that operator_log_trouble() has told of */
+    int32_t logged_error;                    /**< error that operator_log_trouble() has told of */
     worker_t worker;
     uint8_t ring_bytes[OPERATOR_LOG_RING_BYTES];
 } operator_log_t;

@@ -56,13 +56,13 @@ static void write_telemetry(json_t *json, const drive_telemetry_t *telemetry, bo
         return;
     }
     json_open(json, "telemetry", '{');
-    if ((telemetry->has & DRIVE_TELLS_TORQUE) != 0) {
+    if ((telemetry->has & DRIVE_HAS_TORQUE) != 0) {
         json_q32(json, "torque_percent", q32_from_int(telemetry->torque_permille) / 10);
     }
-    if ((telemetry->has & DRIVE_TELLS_LAG) != 0) {
+    if ((telemetry->has & DRIVE_HAS_LAG) != 0) {
         json_q32(json, is_angle ? "following_error_deg" : "following_error_mm", telemetry->lag_q32);
     }
-    if ((telemetry->has & DRIVE_TELLS_INPUTS) != 0) {
+    if ((telemetry->has & DRIVE_HAS_INPUTS) != 0) {
         json_number(json, "inputs", telemetry->inputs);
     }
     report_json_age(json, "age_ms", telemetry->at_us, now_us);

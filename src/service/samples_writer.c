@@ -12,7 +12,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "config/telemetry.h"
+#include "config/telemetry_section.h"
 
 #define HEADER_BYTES 8192u
 #define NO_FRAME     UINT32_MAX
@@ -91,17 +91,17 @@ static void drive_column(samples_header_t *header, unsigned drive, const char *w
 /* Only of what the drives are set up to tell. */
 static void telemetry_columns(samples_header_t *header, const config_t *config, unsigned cylinders, unsigned drives)
 {
-    const uint8_t told = config_telemetry(config);
+    const uint8_t shown = config_telemetry(config);
     for (unsigned i = 0; i < drives; i++) {
-        if ((told & DRIVE_TELLS_TORQUE) != 0) {
+        if ((shown & DRIVE_HAS_TORQUE) != 0) {
             drive_column(header, i, "torque_percent", "%", "i2", offsetof(sample_t, torque_permille) + 2u * i, 0.1);
         }
-        if ((told & DRIVE_TELLS_LAG) != 0) {
+        if ((shown & DRIVE_HAS_LAG) != 0) {
             const bool is_angle = i >= cylinders;
             drive_column(header, i, is_angle ? "lag_deg" : "lag_mm", is_angle ? "deg" : "mm", "i4",
                          offsetof(sample_t, lag_q16) + 4u * i, 1.0 / (double)Q16_ONE);
         }
-        if ((told & DRIVE_TELLS_INPUTS) != 0) {
+        if ((shown & DRIVE_HAS_INPUTS) != 0) {
             drive_column(header, i, "inputs", "", "u4", offsetof(sample_t, inputs) + 4u * i, 1);
         }
         if (config->drives == CONFIG_DRIVES_CIA402) {
@@ -238,10 +238,10 @@ static int32_t within(int64_t value, int32_t most)
 static void fill_telemetry(sample_t *out, const snapshot_t *s)
 {
     for (unsigned i = 0; i < DRIVES_MAX; i++) {
-        const drive_telemetry_t *told = &s->report[i].telemetry;
-        out->torque_permille[i] = (int16_t)within(told->torque_permille, INT16_MAX);
-        out->lag_q16[i] = within(told->lag_q32 / (Q32_ONE / Q16_ONE), INT32_MAX);
-        out->inputs[i] = told->inputs;
+        const drive_telemetry_t *shown = &s->report[i].telemetry;
+        out->torque_permille[i] = (int16_t)within(shown->torque_permille, INT16_MAX);
+        out->lag_q16[i] = within(shown->lag_q32 / (Q32_ONE / Q16_ONE), INT32_MAX);
+        out->inputs[i] = shown->inputs;
         out->notes[i] = (uint8_t)s->report[i].notes;
     }
     out->torque_permille[DRIVES_MAX] = 0;

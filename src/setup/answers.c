@@ -142,7 +142,7 @@ bool setup_save(const setup_t *self, const char *path)
     return is_saved;
 }
 
-static bool take(setup_t *self, const cJSON *root)
+static bool parse(setup_t *self, const cJSON *root)
 {
     const cJSON *one = NULL, *version = cJSON_GetObjectItemCaseSensitive(root, "heave_setup");
     const cJSON *list = cJSON_GetObjectItemCaseSensitive(root, "answers");
@@ -169,7 +169,7 @@ bool setup_load(setup_t *self, const char *path)
     (void)fclose(file);
     text[length] = '\0';
     cJSON *root = error == 0 ? cJSON_Parse(text) : NULL;
-    const bool is_right = root != NULL && take(self, root);
+    const bool is_right = root != NULL && parse(self, root);
     cJSON_Delete(root);
     self->count = is_right ? self->count : 0;
     errno = error != 0 ? error : EINVAL;

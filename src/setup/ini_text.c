@@ -88,7 +88,7 @@ static void replace(ini_text_t *self, const line_t *part, const char *text)
     memcpy(&self->text[at], text, length);
 }
 
-void ini_text_take(ini_text_t *self, const char *text)
+void ini_text_load(ini_text_t *self, const char *text)
 {
     self->is_cut = strlen(text) >= INI_TEXT_MAX;
     (void)snprintf(self->text, sizeof self->text, "%s", text);

@@ -16,7 +16,7 @@ typedef struct {
     bool is_cut; /**< something did not fit: not to be used */
 } ini_text_t;
 
-void ini_text_take(ini_text_t *self, const char *text);
+void ini_text_load(ini_text_t *self, const char *text);
 
 /** @return false: errno says why there is no such file */
 bool ini_text_read(ini_text_t *self, const char *path);

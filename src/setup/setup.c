@@ -167,7 +167,7 @@ static bool check_choice(const setup_question_t *question, const char *text, cha
     return false;
 }
 
-bool setup_take(setup_t *self, const setup_question_t *question, const char *text, char error[SETUP_ERROR_MAX])
+bool setup_accept(setup_t *self, const setup_question_t *question, const char *text, char error[SETUP_ERROR_MAX])
 {
     const step_t *step = step_of(question->key);
     char answer[SETUP_ANSWER_MAX];

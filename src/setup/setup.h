@@ -89,7 +89,7 @@ void setup_next(const setup_t *self, setup_question_t *out);
 
 /** Takes an answer, or the result of what was done.
  *  @param error out: why it is not taken, where false is returned; nothing has changed then */
-bool setup_take(setup_t *self, const setup_question_t *question, const char *text, char error[SETUP_ERROR_MAX]);
+bool setup_accept(setup_t *self, const setup_question_t *question, const char *text, char error[SETUP_ERROR_MAX]);
 
 /** Takes the newest answer of the person back, and what was done since. @return false: there is none */
 bool setup_back(setup_t *self);

@@ -39,7 +39,7 @@ static unsigned if_bus(const setup_t *self)
     return !is_driver(self, "sim");
 }
 
-static void take_driver(setup_t *self, unsigned index, const char *text)
+static void accept_driver(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
     (void)answers_set(self, "driver", strcmp(text, "c") == 0 ? "cia402" : "sim");
@@ -158,7 +158,7 @@ static bool check_nodes(const setup_t *self, unsigned index, const char *text, c
     return true;
 }
 
-static void take_nodes(setup_t *self, unsigned index, const char *text)
+static void accept_nodes(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
     if (strcmp(text, "a") == 0) {
@@ -206,7 +206,7 @@ const step_t steps_drives[] = {
     {.key = "drives",
      .kind = SETUP_CHOICE,
      .times = if_blank,
-     .took = take_driver,
+     .took = accept_driver,
      .text = N_("What drives has it?"),
      .choices = N_("c CANopen drives (CiA 402)|s none yet: simulated ones"),
      .help = N_("Drives on Modbus and drives with CAN frames of their own begin from a file that has their registers or frames: "
@@ -229,7 +229,7 @@ const step_t steps_drives[] = {
      .check = check_device,
      .help = N_("`ls /dev/serial/by-id` shows the adapters. Bit rate and parity are those of the file that was begun from.")},
     {.key = "scan", .kind = SETUP_DO, .times = if_scanned, .act = SETUP_ACT_SCAN},
-    {.key = "nodes", .kind = SETUP_TEXT, .times = if_scanned, .say = say_nodes, .check = check_nodes, .took = take_nodes},
+    {.key = "nodes", .kind = SETUP_TEXT, .times = if_scanned, .say = say_nodes, .check = check_nodes, .took = accept_nodes},
     {.key = "turn",
      .kind = SETUP_NUMBER,
      .times = if_bus,

@@ -61,7 +61,7 @@ static bool check_lines(const setup_t *self, unsigned index, const char *text, c
     return strpbrk(text, ";=[]\"") == NULL;
 }
 
-static void take_relay(setup_t *self, unsigned index, const char *text)
+static void accept_relay(setup_t *self, unsigned index, const char *text)
 {
     char note[SETUP_ANSWER_MAX];
     if (strcmp(text, "n") == 0) {
@@ -100,7 +100,7 @@ static void say_switch(const setup_t *self, setup_question_t *out)
     (void)self;
     (void)snprintf(out->text, sizeof out->text, "%s", _(k_work[out->index - 1u]));
 }
-static void take_switch(setup_t *self, unsigned index, const char *text)
+static void accept_switch(setup_t *self, unsigned index, const char *text)
 {
     char note[SETUP_ANSWER_MAX];
     if (strcmp(text, "seen") != 0) {
@@ -125,7 +125,7 @@ static void say_risen(const setup_t *self, setup_question_t *out)
 {
     (void)snprintf(out->text, sizeof out->text, _("Has it risen by %.1f mm, straight up?"), answers_number(self, "rise.way", 0));
 }
-static void take_risen(setup_t *self, unsigned index, const char *text)
+static void accept_risen(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
     if (strcmp(text, "n") == 0) {
@@ -139,7 +139,7 @@ static void take_risen(setup_t *self, unsigned index, const char *text)
     }
 }
 
-static void take_write(setup_t *self, unsigned index, const char *text)
+static void accept_write(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
     if (strcmp(text, "y") != 0) {
@@ -189,7 +189,7 @@ const step_t steps_end[] = {
      .is_repeated = true,
      .applies = is_tried,
      .text = N_("Has relay %u, and no other, switched and gone back?"),
-     .took = take_relay,
+     .took = accept_relay,
      .choices = N_("y yes|n no: note it, and go on|a try again")},
     {.key = "switch",
      .kind = SETUP_DO,
@@ -199,7 +199,7 @@ const step_t steps_end[] = {
      .act = SETUP_ACT_SWITCH,
      .stage = SETUP_STAGE_FULL,
      .say = say_switch,
-     .took = take_switch},
+     .took = accept_switch},
     {.key = "rise.ready",
      .kind = SETUP_CHOICE,
      .text = N_("Now the first rise, by 20 mm, while you hold a key. Nobody is on the platform or near it, and the e-stop is in "
@@ -210,13 +210,13 @@ const step_t steps_end[] = {
      .kind = SETUP_CHOICE,
      .times = if_rising,
      .say = say_risen,
-     .took = take_risen,
+     .took = accept_risen,
      .choices = N_("y yes|n no: measure the cylinders again")},
     {.key = "write",
      .kind = SETUP_CHOICE,
      .text = N_("That is all. Write the configuration, and the report beside it?"),
      .choices = N_("y yes"),
-     .took = take_write,
+     .took = accept_write,
      .help = N_("\"quit\" leaves without writing; all answers stay, and setup goes on here.")},
     {.key = "written", .kind = SETUP_DO, .act = SETUP_ACT_WRITE, .stage = SETUP_STAGE_FULL},
     {.key = NULL},

@@ -79,7 +79,7 @@ static bool check_start(const setup_t *self, unsigned index, const char *text, c
 }
 
 /* "hexapod cia402", or "none". */
-static void take_start(setup_t *self, unsigned index, const char *text)
+static void accept_start(setup_t *self, unsigned index, const char *text)
 {
     char kind[SETUP_ANSWER_MAX], driver[SETUP_ANSWER_MAX];
     (void)index;
@@ -89,7 +89,7 @@ static void take_start(setup_t *self, unsigned index, const char *text)
     }
 }
 
-static void take_cylinders(setup_t *self, unsigned index, const char *text)
+static void accept_cylinders(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
     (void)answers_set(self, "kind", strcmp(text, "6") == 0 ? "hexapod" : "tripod");
@@ -152,7 +152,7 @@ static void say_sizes(const setup_t *self, setup_question_t *out)
                    base[0], base[1], plate[0], plate[1]);
 }
 
-static void take_sizes(setup_t *self, unsigned index, const char *text)
+static void accept_sizes(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
     if (strcmp(text, "n") == 0) {
@@ -215,7 +215,7 @@ static void say_plate_fit(const setup_t *self, setup_question_t *out)
     say_fit(self, out, "plate", N_("upper"));
 }
 
-static void take_fit(setup_t *self, const char *set, const char *text)
+static void accept_fit(setup_t *self, const char *set, const char *text)
 {
     double distance_mm[LENGTHS_PAIRS];
     lengths_found_t found = {.suspect = 0};
@@ -249,15 +249,15 @@ static void take_fit(setup_t *self, const char *set, const char *text)
     (void)snprintf(value, sizeof value, "%.2f", found.suspect_mm);
     (void)answers_set(self, key, value);
 }
-static void take_base_fit(setup_t *self, unsigned index, const char *text)
+static void accept_base_fit(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
-    take_fit(self, "base", text);
+    accept_fit(self, "base", text);
 }
-static void take_plate_fit(setup_t *self, unsigned index, const char *text)
+static void accept_plate_fit(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
-    take_fit(self, "plate", text);
+    accept_fit(self, "plate", text);
 }
 
 /* --- Joints --- */
@@ -345,7 +345,7 @@ static bool read_exchanged(const char *found, char set[8], unsigned *a, unsigned
     return is_read;
 }
 
-static void take_mend(setup_t *self, unsigned index, const char *text)
+static void accept_mend(setup_t *self, unsigned index, const char *text)
 {
     char set[8], note[SETUP_ANSWER_MAX];
     unsigned a = 0, b = 0;
@@ -387,11 +387,11 @@ const step_t steps_geometry[] = {
      .help = N_("A file gives every value that is not asked for here. It is read, never changed. Drives on Modbus or with CAN "
                 "frames of their own "
                 "need a file that has their registers or frames: those in /usr/share/doc/heave/config.")},
-    {.key = "start.found", .kind = SETUP_DO, .act = SETUP_ACT_START, .took = take_start},
+    {.key = "start.found", .kind = SETUP_DO, .act = SETUP_ACT_START, .took = accept_start},
     {.key = "cylinders",
      .kind = SETUP_CHOICE,
      .times = if_blank,
-     .took = take_cylinders,
+     .took = accept_cylinders,
      .fallback = "6",
      .text = N_("How many cylinders has the platform?"),
      .choices = N_("6 a hexapod|3 round a central guide")},
@@ -442,7 +442,7 @@ const step_t steps_geometry[] = {
      .kind = SETUP_CHOICE,
      .times = if_sizes,
      .say = say_sizes,
-     .took = take_sizes,
+     .took = accept_sizes,
      .choices = N_("y yes|n measure again")},
     {.key = "base.distance",
      MM_ROW,
@@ -452,7 +452,7 @@ const step_t steps_geometry[] = {
      .most = 8000,
      .say = say_base_distance,
      .help = PICTURES_HELP},
-    {.key = "base.fit", .kind = SETUP_CHOICE, .times = if_fit, .say = say_base_fit, .took = take_base_fit},
+    {.key = "base.fit", .kind = SETUP_CHOICE, .times = if_fit, .say = say_base_fit, .took = accept_base_fit},
     {.key = "plate.distance",
      MM_ROW,
      .times = if_distances,
@@ -461,7 +461,7 @@ const step_t steps_geometry[] = {
      .most = 8000,
      .say = say_plate_distance,
      .help = PICTURES_HELP},
-    {.key = "plate.fit", .kind = SETUP_CHOICE, .times = if_fit, .say = say_plate_fit, .took = take_plate_fit},
+    {.key = "plate.fit", .kind = SETUP_CHOICE, .times = if_fit, .say = say_plate_fit, .took = accept_plate_fit},
     {.key = "base.joint",
      .kind = SETUP_TEXT,
      .times = if_joints,
@@ -489,6 +489,6 @@ const step_t steps_geometry[] = {
      .most = 4000,
      .text = N_("Stroke of a cylinder, from end to end?")},
     {.key = "geometry.check", .kind = SETUP_DO, .act = SETUP_ACT_CHECK, .stage = SETUP_STAGE_GEOMETRY},
-    {.key = "geometry.mend", .kind = SETUP_CHOICE, .applies = is_refused, .say = say_mend, .took = take_mend},
+    {.key = "geometry.mend", .kind = SETUP_CHOICE, .applies = is_refused, .say = say_mend, .took = accept_mend},
     {.key = NULL},
 };

@@ -106,7 +106,7 @@ static void say_verdict(const setup_t *self, setup_question_t *out)
     }
 }
 
-static void take_verdict(setup_t *self, unsigned index, const char *text)
+static void accept_verdict(setup_t *self, unsigned index, const char *text)
 {
     legs_found_t found;
     char mistakes[LEGS_TEXT_MAX];
@@ -150,7 +150,7 @@ static void say_right(const setup_t *self, setup_question_t *out)
                    out->index, fabs(way_mm));
 }
 
-static void take_right(setup_t *self, unsigned index, const char *text)
+static void accept_right(setup_t *self, unsigned index, const char *text)
 {
     char note[SETUP_ANSWER_MAX];
     if (strcmp(text, "n") == 0) {
@@ -214,7 +214,7 @@ const step_t steps_legs[] = {
      .applies = has_moved,
      .most = 2000,
      .say = say_measured},
-    {.key = "legs.verdict", .kind = SETUP_CHOICE, .times = if_bus, .say = say_verdict, .took = take_verdict},
+    {.key = "legs.verdict", .kind = SETUP_CHOICE, .times = if_bus, .say = say_verdict, .took = accept_verdict},
     {.key = "again.way",
      .kind = SETUP_DO,
      .group = 2,
@@ -229,7 +229,7 @@ const step_t steps_legs[] = {
      .times = each,
      .is_repeated = true,
      .say = say_right,
-     .took = take_right,
+     .took = accept_right,
      .choices = N_("y yes|n no")},
     {.key = NULL},
 };

@@ -63,7 +63,7 @@ static bool check_length(const setup_t *self, unsigned index, const char *text, 
     return false;
 }
 
-static void take_same(setup_t *self, unsigned index, const char *text)
+static void accept_same(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
     if (strcmp(text, "moved") == 0) {
@@ -84,7 +84,7 @@ static void say_pose(const setup_t *self, setup_question_t *out)
         pose[5], pose[3], pose[4], pose[0], pose[1], pose[2]);
 }
 
-static void take_pose(setup_t *self, unsigned index, const char *text)
+static void accept_pose(setup_t *self, unsigned index, const char *text)
 {
     (void)index;
     if (strcmp(text, "n") == 0) {
@@ -130,13 +130,13 @@ const step_t steps_zero[] = {
      .least = 10,
      .most = 12000,
      .help = N_("From the centre of the lower joint to the centre of the upper one.")},
-    {.key = "zero.same", .kind = SETUP_DO, .times = if_bus, .act = SETUP_ACT_SAME, .say = say_counts, .took = take_same},
+    {.key = "zero.same", .kind = SETUP_DO, .times = if_bus, .act = SETUP_ACT_SAME, .say = say_counts, .took = accept_same},
     {.key = "zero.pose", .kind = SETUP_DO, .times = if_bus, .act = SETUP_ACT_POSE, .stage = SETUP_STAGE_FULL},
     {.key = "zero.right",
      .kind = SETUP_CHOICE,
      .times = if_bus,
      .say = say_pose,
-     .took = take_pose,
+     .took = accept_pose,
      .choices = N_("y yes|n no: measure the cylinders again"),
      .help =
          N_("If the lengths are right and the plate stands otherwise, the joints are wrong: \"back\" as far as their chapter.")},

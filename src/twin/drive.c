@@ -156,7 +156,7 @@ static void remember(objects_t *od, uint16_t code)
     objects_put(od, 0x1003, 0, kept < ERRORS_KEPT ? kept + 1 : ERRORS_KEPT);
 }
 
-static void tell(drive_t *self, uint16_t code, uint8_t error_register)
+static void raise_emergency(drive_t *self, uint16_t code, uint8_t error_register)
 {
     self->emergency = code;
     self->emergency_register = error_register;
@@ -172,7 +172,7 @@ void drive_fault(drive_t *self, uint16_t code)
     if (self->state == TWIN_FAULT || self->state == TWIN_REACTION) {
         return;
     }
-    tell(self, code, 0x21);
+    raise_emergency(self, code, 0x21);
     if (!is_ramped) {
         enter(self, TWIN_FAULT);
         return;

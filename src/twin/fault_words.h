@@ -4,7 +4,7 @@
 #ifndef HEAVE_TWIN_FAULT_WORDS_H
 #define HEAVE_TWIN_FAULT_WORDS_H
 
-#include "twin/faults.h"
+#include "twin/twin_faults.h"
 
 #define FAULT_WORD_MAX 32u
 

@@ -35,9 +35,9 @@ static status_conditions_t conditions_of_homing(const canraw_map_t *map)
 const char *frame_drive_refusal(const canraw_map_t *map)
 {
     const status_conditions_t conditions = conditions_of(map);
-    return status_word_tells(&conditions) ? NULL
-                                          : "[can-raw] enabled_when, fault_when and homing_done_when: no status tells them "
-                                            "apart, so heave-twin can show none";
+    return status_word_is_distinct(&conditions) ? NULL
+                                                : "[can-raw] enabled_when, fault_when and homing_done_when: no status tells them "
+                                                  "apart, so heave-twin can show none";
 }
 
 void frame_drive_init(frame_drive_t *self, const canraw_map_t *map, unsigned axis, node_out_t out)
@@ -77,27 +77,27 @@ static int64_t within_field(const canraw_frame_t *frame, canraw_value_t value, u
 typedef struct {
     const canraw_frame_t *frame;
     bool is_status; /* the status of its own frame */
-} told_t;
+} reply_t;
 
-static uint32_t id_of(const frame_drive_t *self, const told_t *told)
+static uint32_t id_of(const frame_drive_t *self, const reply_t *form)
 {
-    return told->is_status ? self->axis->status_id : self->axis->reply_id;
+    return form->is_status ? self->axis->status_id : self->axis->reply_id;
 }
 
-static unsigned slot_of(const frame_drive_t *self, const told_t *told)
+static unsigned slot_of(const frame_drive_t *self, const reply_t *form)
 {
-    return told->is_status ? self->axis->status_slot : self->axis->reply_slot;
+    return form->is_status ? self->axis->status_slot : self->axis->reply_slot;
 }
 
 /* The next drive that shares a frame with this one, the first where `before` is NULL; NULL behind the last. */
-static frame_drive_t *next_sharing(frame_drive_t *self, const told_t *told, frame_drive_t *before)
+static frame_drive_t *next_sharing(frame_drive_t *self, const reply_t *form, frame_drive_t *before)
 {
     if (self->all == NULL) {
         return before == NULL ? self : NULL;
     }
     frame_drive_t *end = self->all + self->map->axes;
     for (frame_drive_t *drive = before == NULL ? self->all : before + 1; drive < end; drive++) {
-        if (id_of(drive, told) == id_of(self, told)) {
+        if (id_of(drive, form) == id_of(self, form)) {
             return drive;
         }
     }
@@ -125,12 +125,12 @@ static void spoil(const canraw_frame_t *frame, uint8_t *data)
 }
 
 /* What holds of those that share a status: of all, but faults of any. */
-static unsigned what_holds_together(frame_drive_t *self, const told_t *told)
+static unsigned what_holds_together(frame_drive_t *self, const reply_t *form)
 {
     const unsigned of_any = STATUS_FAILED | STATUS_FAULT;
     unsigned all = ~0u;
     unsigned any = 0;
-    for (frame_drive_t *drive = next_sharing(self, told, NULL); drive != NULL; drive = next_sharing(self, told, drive)) {
+    for (frame_drive_t *drive = next_sharing(self, form, NULL); drive != NULL; drive = next_sharing(self, form, drive)) {
         all &= what_holds(drive);
         any |= what_holds(drive);
     }
@@ -138,17 +138,17 @@ static unsigned what_holds_together(frame_drive_t *self, const told_t *told)
 }
 
 /* Its numbers in a reply. Its torque is what drives it: how far the demand is ahead. */
-static void tell(frame_drive_t *self, const told_t *told, const status_conditions_t *conditions, int64_t *value)
+static void send_reply(frame_drive_t *self, const reply_t *form, const status_conditions_t *conditions, int64_t *value)
 {
-    const unsigned slot = slot_of(self, told);
-    const canraw_field_t *status = canraw_find_of(told->frame, CANRAW_STATUS, slot);
+    const unsigned slot = slot_of(self, form);
+    const canraw_field_t *status = canraw_find_of(form->frame, CANRAW_STATUS, slot);
     const bool is_own = status != NULL && status->slot != 0;
     const int64_t torque = self->motor->has_torque ? (int64_t)motor_error(self->motor) : 0;
-    value[canraw_value_at(CANRAW_POSITION, slot)] = within_field(told->frame, CANRAW_POSITION, slot, frame_drive_count(self));
+    value[canraw_value_at(CANRAW_POSITION, slot)] = within_field(form->frame, CANRAW_POSITION, slot, frame_drive_count(self));
     value[canraw_value_at(CANRAW_STATUS, is_own ? slot : 0)] =
-        (int64_t)status_word(conditions, is_own ? what_holds(self) : what_holds_together(self, told));
-    value[canraw_value_at(CANRAW_FAULT, slot)] = within_field(told->frame, CANRAW_FAULT, slot, self->fault_code);
-    value[canraw_value_at(CANRAW_TORQUE, slot)] = within_field(told->frame, CANRAW_TORQUE, slot, torque);
+        (int64_t)status_word(conditions, is_own ? what_holds(self) : what_holds_together(self, form));
+    value[canraw_value_at(CANRAW_FAULT, slot)] = within_field(form->frame, CANRAW_FAULT, slot, self->fault_code);
+    value[canraw_value_at(CANRAW_TORQUE, slot)] = within_field(form->frame, CANRAW_TORQUE, slot, torque);
 }
 
 /* What is wrong with a reply, of all that share it. Returns false where it is not sent. */
@@ -163,27 +163,27 @@ static bool add_wrong(frame_drive_t *self, bool *is_damaged, bool *is_stuck, uin
     return is_sent;
 }
 
-static void reply(frame_drive_t *self, told_t told, const status_conditions_t *conditions)
+static void reply(frame_drive_t *self, reply_t form, const status_conditions_t *conditions)
 {
-    can_frame_t out = {.id = id_of(self, &told), .is_extended = self->map->is_extended, .length = told.frame->length};
+    can_frame_t out = {.id = id_of(self, &form), .is_extended = self->map->is_extended, .length = form.frame->length};
     int64_t value[DRIVES_MAX * CANRAW_VALUES] = {0};
     bool is_sent = true;
     bool is_damaged = false;
     bool is_stuck = false;
     uint32_t late_us = 0;
-    frame_drive_t *first = next_sharing(self, &told, NULL);
-    uint32_t *counter = told.is_status ? &first->status_counter : &first->counter;
-    for (frame_drive_t *drive = first; drive != NULL; drive = next_sharing(self, &told, drive)) {
+    frame_drive_t *first = next_sharing(self, &form, NULL);
+    uint32_t *counter = form.is_status ? &first->status_counter : &first->counter;
+    for (frame_drive_t *drive = first; drive != NULL; drive = next_sharing(self, &form, drive)) {
         is_sent = add_wrong(drive, &is_damaged, &is_stuck, &late_us) && is_sent;
-        tell(drive, &told, conditions, value);
+        send_reply(drive, &form, conditions, value);
     }
     *counter += is_stuck ? 0 : 1;
     value[CANRAW_COUNTER] = *counter;
-    if (!is_sent || canraw_pack(told.frame, value, out.data) != HV_OK) {
+    if (!is_sent || canraw_pack(form.frame, value, out.data) != HV_OK) {
         return;
     }
     if (is_damaged) {
-        spoil(told.frame, out.data);
+        spoil(form.frame, out.data);
     }
     if (late_us == 0) {
         self->out.put(self->out.ctx, &out);
@@ -205,22 +205,22 @@ static void send_waiting(frame_drive_t *self)
     self->waits = left;
 }
 
-static void tell_position(frame_drive_t *self)
+static void send_position(frame_drive_t *self)
 {
     const status_conditions_t conditions = conditions_of(self->map);
-    reply(self, (told_t){&self->map->position_reply, false}, &conditions);
+    reply(self, (reply_t){&self->map->position_reply, false}, &conditions);
 }
 
-static void tell_homing(frame_drive_t *self)
+static void send_homing(frame_drive_t *self)
 {
     const status_conditions_t conditions = conditions_of_homing(self->map);
-    reply(self, (told_t){&self->map->homing_reply, false}, &conditions);
+    reply(self, (reply_t){&self->map->homing_reply, false}, &conditions);
 }
 
-static void tell_status(frame_drive_t *self)
+static void send_status(frame_drive_t *self)
 {
     const status_conditions_t conditions = conditions_of(self->map);
-    reply(self, (told_t){&self->map->status_reply, true}, &conditions);
+    reply(self, (reply_t){&self->map->status_reply, true}, &conditions);
 }
 
 /* --- What it does --- */
@@ -312,7 +312,7 @@ static void command(frame_drive_t *self, canraw_command_t which)
     }
 }
 
-static void take_set_point(frame_drive_t *self, const uint8_t *data)
+static void apply_set_point(frame_drive_t *self, const uint8_t *data)
 {
     const canraw_field_t *field = canraw_find_of(&self->map->setpoint, CANRAW_POSITION, self->axis->setpoint_slot);
     if (self->state == FRAME_DRIVE_OFF && !has(self->map, CANRAW_ENABLE)) {
@@ -336,7 +336,7 @@ static bool is_exactly(const canraw_frame_t *frame, const can_frame_t *heard)
 }
 
 /* Starting up, in this order; the first frame begins it again. Returns whether it was one of them. */
-static bool take_step(frame_drive_t *self, const can_frame_t *frame)
+static bool accept_step(frame_drive_t *self, const can_frame_t *frame)
 {
     const canraw_step_t *step = self->map->step;
     const bool is_next = !is_started(self) && is_exactly(&step[self->steps].frame, frame);
@@ -346,31 +346,31 @@ static bool take_step(frame_drive_t *self, const can_frame_t *frame)
     self->steps = is_next ? self->steps : 0;
     if (step[self->steps].answer.length > 0) {
         const status_conditions_t none = {.done = {0, 0}};
-        reply(self, (told_t){&step[self->steps].answer, false}, &none);
+        reply(self, (reply_t){&step[self->steps].answer, false}, &none);
     }
     self->steps++;
     return true;
 }
 
 /* Questions and commands have constants that set-points lack. */
-static void take(frame_drive_t *self, const can_frame_t *frame)
+static void receive(frame_drive_t *self, const can_frame_t *frame)
 {
     const canraw_map_t *map = self->map;
-    if ((frame->id == self->axis->command_id && take_step(self, frame)) || !is_started(self)) {
+    if ((frame->id == self->axis->command_id && accept_step(self, frame)) || !is_started(self)) {
         return;
     }
     if (frame->id != self->axis->command_id) {
         if (!self->is_deaf && is_exactly(&map->setpoint, frame)) {
-            take_set_point(self, frame->data);
+            apply_set_point(self, frame->data);
         }
         return;
     }
     if (is_exactly(&map->position_query, frame)) {
-        tell_position(self);
+        send_position(self);
         return;
     }
     if (is_exactly(&map->homing_query, frame)) {
-        tell_homing(self);
+        send_homing(self);
         return;
     }
     for (unsigned i = 0; i < CANRAW_COMMANDS; i++) {
@@ -382,7 +382,7 @@ static void take(frame_drive_t *self, const can_frame_t *frame)
         }
     }
     if (!self->is_deaf && frame->id == self->axis->setpoint_id && is_exactly(&map->setpoint, frame)) {
-        take_set_point(self, frame->data);
+        apply_set_point(self, frame->data);
     }
 }
 
@@ -394,7 +394,7 @@ void frame_drive_hear(frame_drive_t *self, const can_frame_t *frame, uint64_t no
         return;
     }
     frame_drive_advance(self, now_us);
-    take(self, frame);
+    receive(self, frame);
 }
 
 /* Homing is over. What had no torque before has none again. */
@@ -426,20 +426,20 @@ static bool is_unasked(const frame_drive_t *self, bool is_status)
 }
 
 /* What comes by itself, from the first of those that share it. */
-static void tell_unasked(frame_drive_t *self, const told_t *told, uint64_t *due_us, uint32_t every_us)
+static void send_unasked(frame_drive_t *self, const reply_t *form, uint64_t *due_us, uint32_t every_us)
 {
-    if (!is_unasked(self, told->is_status) || self->now_us < *due_us) {
+    if (!is_unasked(self, form->is_status) || self->now_us < *due_us) {
         return;
     }
     *due_us += every_us;
     *due_us = *due_us > self->now_us ? *due_us : self->now_us + every_us;
-    if (next_sharing(self, told, NULL) != self) {
+    if (next_sharing(self, form, NULL) != self) {
         return;
     }
-    if (told->is_status) {
-        tell_status(self);
+    if (form->is_status) {
+        send_status(self);
     } else {
-        tell_position(self);
+        send_position(self);
     }
 }
 
@@ -455,8 +455,8 @@ void frame_drive_advance(frame_drive_t *self, uint64_t now_us)
         return;
     }
     send_waiting(self);
-    tell_unasked(self, &(told_t){&self->map->position_reply, false}, &self->send_us, self->map->period_us);
-    tell_unasked(self, &(told_t){&self->map->status_reply, true}, &self->status_us,
+    send_unasked(self, &(reply_t){&self->map->position_reply, false}, &self->send_us, self->map->period_us);
+    send_unasked(self, &(reply_t){&self->map->status_reply, true}, &self->status_us,
                  self->map->period_us * self->map->status_every);
 }
 
@@ -466,7 +466,7 @@ uint64_t frame_drive_due_us(const frame_drive_t *self)
     const uint64_t waiting_us = first_waiting(self);
     const uint64_t send_us = is_unasked(self, false) ? self->send_us : DRIVE_NEVER;
     const uint64_t status_us = is_unasked(self, true) ? self->status_us : DRIVE_NEVER;
-    const uint64_t told_us = send_us < status_us ? send_us : status_us;
-    const uint64_t first_us = waiting_us < told_us ? waiting_us : told_us;
+    const uint64_t command_us = send_us < status_us ? send_us : status_us;
+    const uint64_t first_us = waiting_us < command_us ? waiting_us : command_us;
     return first_us < look_us ? first_us : look_us;
 }

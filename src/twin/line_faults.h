@@ -4,7 +4,7 @@
 #ifndef HEAVE_TWIN_LINE_FAULTS_H
 #define HEAVE_TWIN_LINE_FAULTS_H
 
-#include "twin/faults.h"
+#include "twin/twin_faults.h"
 
 /** `open` or `closed`: 0 or 1. */
 bool line_fault_read_state(const char *word, double *out, char why[FAULT_WHY_MAX]);

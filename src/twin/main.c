@@ -11,12 +11,12 @@
 #include <unistd.h>
 
 #include "common/message.h" // exit codes
-#include "config/canraw.h"
-#include "config/cia402.h"
-#include "config/modbus.h"
-#include "twin/control.h"
+#include "config/canraw_section.h"
+#include "config/cia402_section.h"
+#include "config/modbus_section.h"
+#include "twin/twin_control.h"
 #include "twin/modbus_ports.h"
-#include "twin/options.h"
+#include "twin/twin_options.h"
 #include "twin/script.h"
 #include "twin/wire.h"
 
@@ -57,7 +57,7 @@ static uint64_t clock_us(void)
     return (uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u;
 }
 
-static int refuse(int code, const char *where, const char *why)
+static int reject(int code, const char *where, const char *why)
 {
     fprintf(stderr, "heave-twin: %s: %s\n", where, why);
     return code;
@@ -103,7 +103,7 @@ static int prepare(run_t *self)
     }
     const char *refusal = twin_refusal(&self->config, &self->lines);
     if (refusal != NULL) {
-        return refuse(EXIT_BAD_CONFIG, self->options.config, refusal);
+        return reject(EXIT_BAD_CONFIG, self->options.config, refusal);
     }
     const unsigned cylinders = self->config.settings.geometry.kind == KIN_HEXAPOD ? 6 : 3;
     const unsigned drives = drives_of(self);
@@ -114,7 +114,7 @@ static int prepare(run_t *self)
                                              .lines = &self->lines};
     const char *bus = self->options.slcan != NULL ? "--slcan" : self->options.interface != NULL ? "--interface" : NULL;
     if (bus != NULL && !has_wire(self)) {
-        return refuse(EXIT_BAD_USAGE, bus, "the drives of this configuration are not on CAN");
+        return reject(EXIT_BAD_USAGE, bus, "the drives of this configuration are not on CAN");
     }
     const int code = twin_options_apply(&self->options, drives, cylinders, &self->settings);
     return code != EXIT_DONE ? code : read_script(self, drives);
@@ -187,22 +187,22 @@ static int open_all(run_t *self)
     char why[WIRE_WHY_MAX];
     self->control = (control_t){.fd = -1};
     if (!modbus_ports_open(&self->ports, &self->config, self->options.is_on_real_bus, why)) {
-        return refuse(EXIT_UNAVAILABLE, self->options.config, why);
+        return reject(EXIT_UNAVAILABLE, self->options.config, why);
     }
     const char *where = self->options.interface != NULL ? "--interface" : "[can] interface";
     if (has_wire(self) && !wire_open(&self->wire, &self->config.can, self->options.interface, self->options.slcan,
                                      self->options.is_on_real_bus, why)) {
-        return refuse(EXIT_UNAVAILABLE, where, why);
+        return reject(EXIT_UNAVAILABLE, where, why);
     }
     if (has_wire(self) && self->wire.is_real && !is_alone(self, why)) {
-        return refuse(EXIT_UNAVAILABLE, where, why);
+        return reject(EXIT_UNAVAILABLE, where, why);
     }
     char line_why[LINES_WHY_MAX];
     if (!lines_open(&self->lines, &self->config, clock_us(), line_why)) {
-        return refuse(EXIT_UNAVAILABLE, self->options.config, line_why);
+        return reject(EXIT_UNAVAILABLE, self->options.config, line_why);
     }
     if (!control_open(&self->control, self->options.socket, why)) {
-        return refuse(EXIT_UNAVAILABLE, self->options.socket, why);
+        return reject(EXIT_UNAVAILABLE, self->options.socket, why);
     }
     return EXIT_DONE;
 }
@@ -285,7 +285,7 @@ static int run(run_t *self, const sigset_t *open)
         wait(self, open);
         self->now_us = clock_us();
         if (has_wire(self) && !wire_hear(&self->wire, hear, self)) {
-            return refuse(EXIT_UNAVAILABLE, self->wire.end, "the interface is gone");
+            return reject(EXIT_UNAVAILABLE, self->wire.end, "the interface is gone");
         }
         twin_advance(&self->twin, self->now_us);
         modbus_ports_serve(&self->ports, &self->twin.modbus, self->now_us);

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-#include "config/modbus.h"
+#include "config/modbus_section.h"
 
 #define VALUES_MAX  125u
 #define COIL_ON     0xFF00u
@@ -48,7 +48,7 @@ static void put_word(uint8_t *bytes, unsigned word)
     bytes[1] = (uint8_t)word;
 }
 
-static unsigned refuse(const uint8_t *question, int exception, uint8_t *answer)
+static unsigned reject(const uint8_t *question, int exception, uint8_t *answer)
 {
     answer[0] = (uint8_t)(question[0] | 0x80u);
     answer[1] = (uint8_t)exception;
@@ -77,11 +77,11 @@ static unsigned ask_drive(register_drive_t *drive, const uint8_t *question, unsi
     int exception = MODBUS_NO_EXCEPTION;
     if (length == 5 && is_read(question[0])) {
         if (second < 1 || second > VALUES_MAX) {
-            return refuse(question, MODBUS_NO_VALUE, answer);
+            return reject(question, MODBUS_NO_VALUE, answer);
         }
         exception = register_drive_read(drive, (uint16_t)address, value, second);
         if (exception != MODBUS_NO_EXCEPTION) {
-            return refuse(question, exception, answer);
+            return reject(question, exception, answer);
         }
         drive->heard_us = now_us;
         answer[0] = question[0];
@@ -96,7 +96,7 @@ static unsigned ask_drive(register_drive_t *drive, const uint8_t *question, unsi
         exception = register_drive_write(drive, (uint16_t)address, value, 1, now_us);
     } else if (length >= 6 && question[0] == MODBUS_WRITE_REGISTERS) {
         if (second < 1 || second > VALUES_MAX || question[5] != 2 * second || length != 6 + 2 * second) {
-            return refuse(question, MODBUS_NO_VALUE, answer);
+            return reject(question, MODBUS_NO_VALUE, answer);
         }
         for (unsigned i = 0; i < second; i++) {
             value[i] = (uint16_t)word_at(question + 6 + (size_t)2 * i);
@@ -105,11 +105,11 @@ static unsigned ask_drive(register_drive_t *drive, const uint8_t *question, unsi
     } else {
         exception = MODBUS_NO_FUNCTION;
     }
-    return exception == MODBUS_NO_EXCEPTION ? confirm(question, answer) : refuse(question, exception, answer);
+    return exception == MODBUS_NO_EXCEPTION ? confirm(question, answer) : reject(question, exception, answer);
 }
 
 /* One of so many that are still to come. */
-static bool takes_one(uint32_t *count)
+static bool uses_one(uint32_t *count)
 {
     const bool is_due = *count > 0;
     *count -= is_due;
@@ -119,12 +119,12 @@ static bool takes_one(uint32_t *count)
 /* What is done to the answer of a drive; 0 where it is lost. */
 static unsigned spoil(register_drive_t *drive, unsigned length, modbus_way_t *way)
 {
-    if (drive->is_mute || takes_one(&drive->lost)) {
+    if (drive->is_mute || uses_one(&drive->lost)) {
         return 0;
     }
     way->late_us = drive->late_us;
-    way->is_half = takes_one(&drive->halved);
-    way->is_damaged = takes_one(&drive->damaged);
+    way->is_half = uses_one(&drive->halved);
+    way->is_damaged = uses_one(&drive->damaged);
     return length;
 }
 
@@ -136,12 +136,12 @@ static unsigned ask_board(modbus_board_t *board, const uint8_t *question, unsign
     const unsigned second = length >= 5 ? word_at(question + 3) : 0;
     const bool is_one = question[0] == MODBUS_WRITE_COIL;
     if (length < 5 || (question[0] != MODBUS_READ_COILS && question[0] != MODBUS_WRITE_COILS && !is_one)) {
-        return refuse(question, MODBUS_NO_FUNCTION, answer);
+        return reject(question, MODBUS_NO_FUNCTION, answer);
     }
     const unsigned count = is_one ? 1 : second;
     const unsigned bytes = (count + 7) / 8;
     if (count < 1 || address + count > MODBUS_COILS_MAX) {
-        return refuse(question, MODBUS_NO_ADDRESS, answer);
+        return reject(question, MODBUS_NO_ADDRESS, answer);
     }
     if (question[0] == MODBUS_READ_COILS) {
         memset(answer, 0, 2 + (size_t)bytes);
@@ -153,7 +153,7 @@ static unsigned ask_board(modbus_board_t *board, const uint8_t *question, unsign
         return 2 + bytes;
     }
     if (is_one ? second != COIL_ON && second != 0 : length != 6 + bytes || question[5] != bytes) {
-        return refuse(question, MODBUS_NO_VALUE, answer);
+        return reject(question, MODBUS_NO_VALUE, answer);
     }
     for (unsigned i = 0; i < count; i++) {
         board->coil[address + i] = is_one ? second == COIL_ON : (question[6 + i / 8] >> i % 8 & 1u) != 0;
@@ -181,8 +181,8 @@ unsigned modbus_side_ask(modbus_side_t *self, unsigned line, uint8_t unit, const
             !register_drive_is_there(drive, now_us)) {
             continue;
         }
-        if (unit != HAL_MODBUS_BROADCAST && takes_one(&drive->refused)) {
-            said = refuse(question, drive->exception, answer);
+        if (unit != HAL_MODBUS_BROADCAST && uses_one(&drive->refused)) {
+            said = reject(question, drive->exception, answer);
         } else {
             said = ask_drive(drive, question, length, now_us, answer);
         }

@@ -29,7 +29,7 @@ void node_join(node_t *const axis[], unsigned axes)
     }
 }
 
-static void tell_emergency(node_t *self)
+static void send_emergency(node_t *self)
 {
     drive_t *drive = &self->drive;
     if (drive->emergency != 0 && self->nmt != 0 && self->nmt != STOPPED) {
@@ -348,7 +348,7 @@ static uint32_t written(node_t *self, uint16_t index, uint32_t value)
     }
 }
 
-static void take_write(node_t *self, node_t *owner, const uint8_t *request, uint16_t index)
+static void accept_write(node_t *self, node_t *owner, const uint8_t *request, uint16_t index)
 {
     const uint8_t bytes = (request[0] & 1) != 0 ? (uint8_t)(4 - (request[0] >> 2 & 3)) : 4;
     uint32_t value = 0;
@@ -393,7 +393,7 @@ static void hear_sdo(node_t *self, const can_frame_t *frame)
     if ((refusal == 0 || (request[0] & 0xE0) == 0x60) && node_text_hear(&self->text, request, text)) {
         node_put_later(self, self->sdo_us, 0x580u + self->number, text, 8);
     } else if ((request[0] & 0xE2) == 0x22) {
-        take_write(self, owner, request, index);
+        accept_write(self, owner, request, index);
     } else if ((request[0] & 0xE0) != 0x40) {
         answer(self, 0x80, request, BAD_COMMAND);
     } else if (refusal != 0 || row == NULL) {
@@ -432,7 +432,7 @@ void node_hear(node_t *self, const can_frame_t *frame, uint64_t now_us)
     }
     drive_advance(&self->drive, now_us);
     node_put_events(self);
-    tell_emergency(self);
+    send_emergency(self);
 }
 
 void node_advance(node_t *self, uint64_t now_us)
@@ -458,7 +458,7 @@ void node_advance(node_t *self, uint64_t now_us)
     if (now_us >= self->sync_due_us) {
         sync_late(self);
     }
-    tell_emergency(self);
+    send_emergency(self);
     node_put_events(self);
     node_put_due(self);
 }

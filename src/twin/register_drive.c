@@ -73,9 +73,10 @@ static status_conditions_t conditions_of(const modbus_drive_map_t *map)
 const char *register_drive_refusal(const modbus_drive_map_t *map)
 {
     const status_conditions_t conditions = conditions_of(map);
-    return status_word_tells(&conditions) ? NULL
-                                          : "[modbus] enabled_when, fault_when and homing_done_when: no status tells them apart, "
-                                            "so heave-twin can show none";
+    return status_word_is_distinct(&conditions)
+               ? NULL
+               : "[modbus] enabled_when, fault_when and homing_done_when: no status tells them apart, "
+                 "so heave-twin can show none";
 }
 
 /* --- Registers --- */
@@ -263,7 +264,7 @@ static void command(register_drive_t *self, modbus_drive_command_t which)
 }
 
 /* A command is done when its last block has come behind the others. Blocks that several share count for each. */
-static bool take_commands(register_drive_t *self, uint16_t address, const uint16_t *value, unsigned count)
+static bool accept_commands(register_drive_t *self, uint16_t address, const uint16_t *value, unsigned count)
 {
     bool is_taken = false;
     for (unsigned i = 0; i < MODBUS_DRIVE_COMMANDS; i++) {
@@ -283,7 +284,7 @@ static bool take_commands(register_drive_t *self, uint16_t address, const uint16
     return is_taken;
 }
 
-static void take_set_point(register_drive_t *self, const modbus_drive_block_t *block, const uint16_t *value)
+static void apply_set_point(register_drive_t *self, const modbus_drive_block_t *block, const uint16_t *value)
 {
     bool is_position = false;
     const double per_speed = fabs((double)self->axis->scale.num / self->axis->scale.den) * self->axis->speed.den /
@@ -309,17 +310,17 @@ static void take_set_point(register_drive_t *self, const modbus_drive_block_t *b
 }
 
 /* Only what the map has is taken: a drive whose registers mean something else would act on it in its own way. */
-static bool take(register_drive_t *self, uint16_t address, const uint16_t *value, unsigned count)
+static bool accept(register_drive_t *self, uint16_t address, const uint16_t *value, unsigned count)
 {
     for (unsigned i = 0; i < self->map->setpoint.count; i++) {
         if (is_block(&self->map->setpoint.block[i], address, value, count)) {
             if (!self->is_deaf) {
-                take_set_point(self, &self->map->setpoint.block[i], value);
+                apply_set_point(self, &self->map->setpoint.block[i], value);
             }
             return true;
         }
     }
-    if (self->is_deaf || take_commands(self, address, value, count)) {
+    if (self->is_deaf || accept_commands(self, address, value, count)) {
         return true;
     }
     for (unsigned i = 0; i < self->map->items; i++) {
@@ -338,7 +339,7 @@ int register_drive_write(register_drive_t *self, uint16_t address, const uint16_
         }
     }
     self->heard_us = now_us;
-    if (!take(self, address, value, count)) {
+    if (!accept(self, address, value, count)) {
         return MODBUS_NO_VALUE;
     }
     for (unsigned i = 0; i < count; i++) {

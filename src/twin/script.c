@@ -11,7 +11,7 @@
 #define SECONDS_MAX 1e6
 #define SECOND_US   1e6
 
-static bool refuse_time(const char *line, char why[FAULT_WHY_MAX])
+static bool reject_time(const char *line, char why[FAULT_WHY_MAX])
 {
     (void)snprintf(why, FAULT_WHY_MAX,
                    "%.*s is no time: seconds since the start as 2.5, or since all drives had torque as +2.5; at most 1000000",
@@ -27,7 +27,7 @@ bool script_add(script_t *self, const char *line, unsigned drives, char why[FAUL
     const double seconds = strtod(number, &end);
     const bool is_number = strspn(number, "0123456789.") == (size_t)(end - number) && end != number;
     if (!is_number || (*end != ' ' && *end != '\t') || !(seconds <= SECONDS_MAX)) {
-        return refuse_time(line, why);
+        return reject_time(line, why);
     }
     if (self->count == SCRIPT_MAX || strlen(line) >= SCRIPT_LINE_MAX) {
         (void)snprintf(why, FAULT_WHY_MAX, "too much: at most %u lines of %u characters", SCRIPT_MAX, SCRIPT_LINE_MAX - 1);

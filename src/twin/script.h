@@ -6,7 +6,7 @@
 
 #include <stdio.h>
 
-#include "twin/faults.h"
+#include "twin/twin_faults.h"
 
 #define SCRIPT_MAX      256u
 #define SCRIPT_LINE_MAX 160u

@@ -48,7 +48,7 @@ static void get(const char *folder, const char *name, char *text, size_t size)
     }
 }
 
-static bool refuse(const char *what, char *why, size_t size)
+static bool reject(const char *what, char *why, size_t size)
 {
     const char *help = errno == EACCES || errno == EPERM ? "; it takes root" : "";
     (void)snprintf(why, size, "gpio-sim: %s: %s%s", what, strerror(errno), help);
@@ -106,11 +106,11 @@ bool sim_chip_make(sim_chip_t *self, unsigned number, const char *label, unsigne
         return false;
     }
     if (mkdir(self->folder, 0755) != 0) {
-        return refuse("a chip", why, size);
+        return reject("a chip", why, size);
     }
     self->is_made = true;
     if (mkdir(bank, 0755) != 0 || !put(bank, "num_lines", count) || !put(bank, "label", label)) {
-        return refuse(label, why, size);
+        return reject(label, why, size);
     }
     return true;
 }
@@ -119,7 +119,7 @@ bool sim_chip_name(const sim_chip_t *self, unsigned line, const char *name, char
 {
     char folder[PATH_MAX_HERE];
     (void)snprintf(folder, sizeof folder, "%s/bank/line%u", self->folder, line);
-    return (mkdir(folder, 0755) == 0 && put(folder, "name", name)) || refuse(name, why, size);
+    return (mkdir(folder, 0755) == 0 && put(folder, "name", name)) || reject(name, why, size);
 }
 
 static void *pull_out(void *ctx)
@@ -146,10 +146,10 @@ bool sim_chip_plug(sim_chip_t *self, bool is_live, char *why, size_t size)
     if (!is_live) {
         self->is_live = false;
         self->is_leaving = pthread_create(&self->thread, NULL, pull_out, self) == 0;
-        return self->is_leaving || put(self->folder, "live", "0") || refuse("pulling the chip out", why, size);
+        return self->is_leaving || put(self->folder, "live", "0") || reject("pulling the chip out", why, size);
     }
     if (!put(self->folder, "live", "1")) {
-        return refuse("plugging the chip", why, size);
+        return reject("plugging the chip", why, size);
     }
     self->is_live = true;
     (void)snprintf(bank, sizeof bank, "%s/bank", self->folder);

@@ -205,7 +205,7 @@ static const char *answer(slcan_t *self, slcan_heard_t heard, void *ctx)
     }
 }
 
-void slcan_take(slcan_t *self, char byte, slcan_heard_t heard, void *ctx)
+void slcan_receive(slcan_t *self, char byte, slcan_heard_t heard, void *ctx)
 {
     if (byte != '\r') {
         self->length += self->length < SLCAN_LINE_MAX ? 1u : 0u; /* a line that is too long stays too long */
@@ -226,7 +226,7 @@ void slcan_serve(slcan_t *self, slcan_heard_t heard, void *ctx)
     ssize_t length = 0;
     while (self->end >= 0 && !self->is_deaf && (length = read(self->end, bytes, sizeof bytes)) > 0) {
         for (ssize_t i = 0; i < length; i++) {
-            slcan_take(self, bytes[i], heard, ctx);
+            slcan_receive(self, bytes[i], heard, ctx);
         }
     }
     if (self->end >= 0) {

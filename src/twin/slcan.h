@@ -37,7 +37,7 @@ bool slcan_open(slcan_t *self, const char *path, uint32_t bitrate_bps, char *why
 void slcan_close(slcan_t *self);
 
 /** A byte from its user. */
-void slcan_take(slcan_t *self, char byte, slcan_heard_t heard, void *ctx);
+void slcan_receive(slcan_t *self, char byte, slcan_heard_t heard, void *ctx);
 
 /** A frame of the bus, for its user. */
 void slcan_put(slcan_t *self, const can_frame_t *frame);

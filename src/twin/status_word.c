@@ -43,7 +43,7 @@ uint32_t status_word(const status_conditions_t *conditions, unsigned wanted)
     return status;
 }
 
-static bool tells(const status_conditions_t *conditions, unsigned wanted)
+static bool is_distinct(const status_conditions_t *conditions, unsigned wanted)
 {
     canraw_when_t when[CONDITIONS];
     const uint32_t status = status_word(conditions, wanted);
@@ -56,11 +56,11 @@ static bool tells(const status_conditions_t *conditions, unsigned wanted)
     return true;
 }
 
-bool status_word_tells(const status_conditions_t *conditions)
+bool status_word_is_distinct(const status_conditions_t *conditions)
 {
     static const unsigned k_states[] = {0, STATUS_DONE, STATUS_ENABLED | STATUS_DONE, STATUS_FAULT | STATUS_DONE, STATUS_FAULT};
     for (unsigned i = 0; i < sizeof k_states / sizeof k_states[0]; i++) {
-        if (!tells(conditions, k_states[i])) {
+        if (!is_distinct(conditions, k_states[i])) {
             return false;
         }
     }

@@ -18,6 +18,6 @@ enum { STATUS_DONE = 1, STATUS_FAILED = 2, STATUS_ENABLED = 4, STATUS_FAULT = 8 
 uint32_t status_word(const status_conditions_t *conditions, unsigned wanted);
 
 /** Whether there is such a status for each state that a drive can have. */
-bool status_word_tells(const status_conditions_t *conditions);
+bool status_word_is_distinct(const status_conditions_t *conditions);
 
 #endif

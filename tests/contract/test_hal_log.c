@@ -40,7 +40,7 @@ static void close_sim(void) {}
 
 static bool take_sim(int *level, char *text)
 {
-    const sim_log_line_t *line = sim_log_take(&sim);
+    const sim_log_line_t *line = sim_log_pop(&sim);
     if (line != NULL) {
         *level = (int)line->level;
         strcpy(text, line->text);

@@ -25,7 +25,7 @@ NAMED = {
     ("src/canopen/cia402_stage.c", "is_there"): r"\b(?:are_all|fail_where)\(self, (\w+)",
     ("src/canopen/cia402_watch.c", "is_seen"): r"\[CIA402_WATCH_\w+\]\s*=\s*\{(\w+)",
     ("src/record/player.c", "refused"): None,  # NULL in the firmware
-    ("src/protocol/frame.c", "k_take"): r"\[FRAME_PHASE_\w+\]\s*=\s*(take_\w+)",
+    ("src/protocol/frame.c", "k_scan"): r"\[FRAME_PHASE_\w+\]\s*=\s*(scan_\w+)",
 }
 UNLISTED = "a call through a pointer that tests/cortex/stack_bound.py does not list: "
 SUFFIX = re.compile(r"\.(constprop|isra|part|cold|lto_priv)\.\d+|\.(cold|isra|part|constprop)\b")

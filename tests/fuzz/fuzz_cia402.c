@@ -153,9 +153,9 @@ static void configure(void)
         .abort_option = 1,
         .is_reset_wanted = true,
         .is_support_checked = true,
-        .telemetry = DRIVE_TELLS_TORQUE | DRIVE_TELLS_LAG | DRIVE_TELLS_INPUTS,
+        .telemetry = DRIVE_HAS_TORQUE | DRIVE_HAS_LAG | DRIVE_HAS_INPUTS,
         .telemetry_every = 2,
-        .reaction = {CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_TELL, CIA402_TELL, CIA402_STOP}};
+        .reaction = {CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_STOP, CIA402_REPORT, CIA402_REPORT, CIA402_STOP}};
     for (uint8_t k = 0; k < DRIVES_MAX; k++) {
         m_config.axis[k] = (cia402_axis_config_t){.node = (uint8_t)(k + 1),
                                                   .scale = {k % 2 ? -COUNTS_PER_MM : COUNTS_PER_MM, 1, 5000 * k},

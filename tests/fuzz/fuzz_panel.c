@@ -52,7 +52,7 @@ static listener_address_t m_where;
 static access_t m_access;
 static pages_t m_pages;
 static upstream_t m_platform;
-static hall_t m_hall = {.platform = &m_platform};
+static viewers_t m_viewers = {.platform = &m_platform};
 static peer_t m_connection[CONNECTIONS];
 static char m_folder[] = "/tmp/heave-fuzz-panel-XXXXXX";
 static bool m_has_token; /* somebody of this input */
@@ -232,7 +232,7 @@ static unsigned count_links(void)
 static unsigned count_viewers(void)
 {
     unsigned count = 0;
-    for (const viewer_t *viewer = m_hall.viewers; viewer != NULL; viewer = viewer->next) {
+    for (const viewer_t *viewer = m_viewers.first; viewer != NULL; viewer = viewer->next) {
         count++;
     }
     return count;
@@ -280,8 +280,8 @@ static void start_server(void)
     FUZZ_REQUIRE(listener_read(&m_where, where) && access_allow_host(&m_access, HOST));
     FUZZ_REQUIRE(upstream_init(&m_platform, "ride", path, &server_upstream_calls));
     m_access.has_password = true;
-    m_hall.platforms = 1;
-    m_hall.state = m_folder;
+    m_viewers.platforms = 1;
+    m_viewers.state = m_folder;
     m_pages.page[m_pages.count++] = (page_t){
         .path = "/index.html", .type = "text/html", .data = (unsigned char *)strdup(k_page), .length = sizeof k_page - 1};
     m_server = (server_t){.where = &m_where,
@@ -289,7 +289,7 @@ static void start_server(void)
                           .heaved = "/nonexistent",
                           .access = &m_access,
                           .pages = &m_pages,
-                          .hall = &m_hall,
+                          .viewers = &m_viewers,
                           .version = "fuzz"};
     FUZZ_REQUIRE(server_open(&m_server));
     while (!m_platform.is_there || count_links() < 3) {

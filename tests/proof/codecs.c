@@ -4,6 +4,9 @@
 #include "any.h"
 
 #include "cia402_axis.h"
+#include "cia402_map.h"
+#include "cia402_node.h"
+#include "cia402_pdo.h"
 #include "heave/canraw.h"
 #include "heave/modbus_drive.h"
 #include "heave/sdo.h"
@@ -62,16 +65,27 @@ void proof_sdo(void)
 /* Any process data, for ever, from a drive in any phase. */
 void proof_pdo(void)
 {
-    static cia402_axis_t axis;
+    static cia402_t self;
     static cia402_config_t config;
-    static cia402_axis_config_t own;
-    own.scale = (counts_scale_t){.num = ANY_I32(), .den = (int32_t)ANY_OF(1, INT32_MAX), .zero = ANY_I32()};
+    const cia402_pdo_t answer = {.entry = {CIA402_ENTRY_STATUSWORD, CIA402_ENTRY_ACTUAL, CIA402_ENTRY_MODE_SHOWN},
+                                 .entries = 3,
+                                 .bytes = 7,
+                                 .every = 1,
+                                 .id = 0x181};
+    const cia402_pdo_t telemetry = {
+        .entry = {CIA402_ENTRY_TORQUE, CIA402_ENTRY_LAG}, .entries = 2, .bytes = 6, .every = 1, .id = 0x281};
+    config.axes = 1;
+    config.axis[0].node = 1;
+    config.axis[0].scale = (counts_scale_t){.num = ANY_I32(), .den = (int32_t)ANY_OF(1, INT32_MAX), .zero = ANY_I32()};
+    self.config = &config;
+    self.pdo[0][CIA402_ANSWER] = answer;
+    self.pdo[0][CIA402_ANSWER + 1] = telemetry;
     while (ANY_BOOL()) {
         const can_frame_t frame = any_frame();
-        const cia402_drive_t drive = {.axis = &axis, .config = &config, .own = &own, .now_us = ANY_U64()};
-        axis.phase = (cia402_phase_t)ANY_OF(0, CIA402_REFUSED);
-        cia402_axis_take_tpdo(drive, &frame);
-        cia402_axis_take_emergency(drive, &frame);
+        self.now_us = ANY_U64();
+        self.axis[0].phase = (cia402_phase_t)ANY_OF(0, CIA402_REFUSED);
+        cia402_pdo_receive(&self, &frame);
+        cia402_axis_receive_emergency(cia402_drive(&self, 0), &frame);
     }
 }
 

@@ -185,7 +185,7 @@ static void essence(motion_t *motion)
     curve->change = 0;      /* ... nor is a change of them one */
     memset(curve->was_q32, 0, sizeof curve->was_q32);
     curve->ahead = curve->patience = 0;
-    curve->period_cycles_q16 = curve->grip_q32 = curve->softest_q32 = 0;
+    curve->period_cycles_q16 = curve->bandwidth_q32 = curve->softest_q32 = 0;
     curve->reach_min_q16 = curve->reach_max_q16 = 0;
     governor_t *governor =
         &curve->governor; /* its levels, output and strength are compared; the rest is worked out from the period */

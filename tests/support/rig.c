@@ -321,7 +321,7 @@ hv_status_t rig_request(rig_t *self, event_t request)
 bool rig_was_logged(rig_t *self, const char *text)
 {
     const sim_log_line_t *line;
-    while ((line = sim_log_take(&self->log)) != NULL) {
+    while ((line = sim_log_pop(&self->log)) != NULL) {
         if (strstr(line->text, text) != NULL) {
             return true;
         }

@@ -224,7 +224,7 @@ static void test_time_in_which_nothing_is_heard_does_not_count(void)
 
 static void test_told_or_ignored_it_goes_on(void)
 {
-    for (unsigned reaction = CANRAW_MASTER_IGNORE; reaction <= CANRAW_MASTER_TELL; reaction++) {
+    for (unsigned reaction = CANRAW_MASTER_IGNORE; reaction <= CANRAW_MASTER_REPORT; reaction++) {
         start((canraw_master_t)reaction);
         cycles(2);
         TEST_ASSERT_GREATER_THAN_UINT(0, frames_heard());
@@ -237,7 +237,7 @@ static void test_told_or_ignored_it_goes_on(void)
         say(map.axis[1].command_id);
         cycles(5);
         TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
-        TEST_ASSERT_EQUAL_UINT32(reaction == CANRAW_MASTER_TELL ? 1u << DRIVE_NOTE_MASTER : 0u, report_of(0).notes);
+        TEST_ASSERT_EQUAL_UINT32(reaction == CANRAW_MASTER_REPORT ? 1u << DRIVE_NOTE_MASTER : 0u, report_of(0).notes);
         cycles(6000);
         TEST_ASSERT_EQUAL_UINT32(0, report_of(0).notes);
     }

@@ -259,7 +259,7 @@ static void test_a_code_without_a_fault_is_told(void)
     m_code[0] = 7;
     cycles(12);
     TEST_ASSERT_EQUAL(DRIVE_ENABLED, m_feedback[0].state);
-    TEST_ASSERT_EQUAL_HEX32(CANRAW_TELLS_ERROR, report(0).code);
+    TEST_ASSERT_EQUAL_HEX32(CANRAW_REPORTS_ERROR, report(0).code);
     TEST_ASSERT_EQUAL_HEX32(7, report(0).detail_code);
     TEST_ASSERT_EQUAL_HEX32(0, report(1).code);
     m_code[0] = 0;
@@ -276,7 +276,7 @@ static void test_torque_is_told_in_the_direction_of_the_extension(void)
     cycles(30);
     for (uint8_t k = 0; k < 2; k++) {
         const drive_telemetry_t told = report(k).telemetry;
-        TEST_ASSERT_EQUAL_HEX8(DRIVE_TELLS_TORQUE, told.has);
+        TEST_ASSERT_EQUAL_HEX8(DRIVE_HAS_TORQUE, told.has);
         TEST_ASSERT_EQUAL_INT32(k == 0 ? -5 : 5, told.torque_permille);
         TEST_ASSERT_TRUE(m_now_us - told.at_us <= 2 * PERIOD_US);
     }

@@ -2395,7 +2395,7 @@ static void test_watch_what_is_told_stops_nothing_and_is_told_for_some_seconds(v
 {
     for (size_t i = 0; i < WATCHES; i++) {
         setUp();
-        config.reaction[k_watches[i].watch] = CIA402_TELL;
+        config.reaction[k_watches[i].watch] = CIA402_REPORT;
         come_up();
         enable();
         show(2, i, true);
@@ -2691,7 +2691,7 @@ static void tell(uint8_t values, uint8_t every)
 
 static void test_telemetry_of_all_kinds_takes_two_pdos(void)
 {
-    tell(DRIVE_TELLS_TORQUE | DRIVE_TELLS_LAG | DRIVE_TELLS_INPUTS, 1);
+    tell(DRIVE_HAS_TORQUE | DRIVE_HAS_LAG | DRIVE_HAS_INPUTS, 1);
     come_up();
     cycles(3 * PERIOD);
     TEST_ASSERT_EQUAL_HEX32(0x40000284, cia402_slave_row(&slave, 3, 0x1801, 1)->value);
@@ -2713,7 +2713,7 @@ static void test_telemetry_of_all_kinds_takes_two_pdos(void)
 
 static void test_telemetry_of_one_kind_comes_at_its_rate(void)
 {
-    tell(DRIVE_TELLS_INPUTS, 5);
+    tell(DRIVE_HAS_INPUTS, 5);
     come_up();
     TEST_ASSERT_EQUAL_UINT32(5, cia402_slave_row(&slave, 2, 0x1801, 2)->value);
     TEST_ASSERT_EQUAL_HEX32(0x60FD0020, cia402_slave_row(&slave, 2, 0x1A01, 1)->value);
@@ -2722,13 +2722,13 @@ static void test_telemetry_of_one_kind_comes_at_its_rate(void)
     const uint64_t first_us = report(2).telemetry.at_us;
     cycles(5 * PERIOD);
     TEST_ASSERT_EQUAL_UINT64(5 * PERIOD * CYCLE_US, report(2).telemetry.at_us - first_us);
-    TEST_ASSERT_EQUAL_UINT8(DRIVE_TELLS_INPUTS, report(2).telemetry.has);
+    TEST_ASSERT_EQUAL_UINT8(DRIVE_HAS_INPUTS, report(2).telemetry.has);
     enable();
 }
 
 static void test_telemetry_that_a_drive_cannot_map_is_named(void)
 {
-    tell(DRIVE_TELLS_TORQUE, 1);
+    tell(DRIVE_HAS_TORQUE, 1);
     cia402_slave_row(&slave, 4, 0x1A01, 1)->refusal = 0x06040041;
     const drive_report_t r = refusal_of(4);
     TEST_ASSERT_EQUAL_HEX32(CIA402_NOT_TAKEN, r.code);
@@ -2752,7 +2752,7 @@ static void test_telemetry_that_was_not_asked_for_counts_for_nothing(void)
 static void test_telemetry_of_another_length_counts_for_nothing(void)
 {
     const can_frame_t frame = {.id = 0x283, .length = 3, .data = {1, 2, 3}};
-    tell(DRIVE_TELLS_TORQUE, 200);
+    tell(DRIVE_HAS_TORQUE, 200);
     come_up();
     TEST_ASSERT_EQUAL(HV_OK, hal_can_send(sim_can_hal(&slave.node), &frame));
     cycles(2);
@@ -2761,7 +2761,7 @@ static void test_telemetry_of_another_length_counts_for_nothing(void)
 
 static void test_telemetry_rate_is_checked(void)
 {
-    tell(DRIVE_TELLS_TORQUE, 0);
+    tell(DRIVE_HAS_TORQUE, 0);
     TEST_ASSERT_EQUAL(HV_OK, sim_can_open(&node, &bus, NULL, 0));
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, cia402_init(&driver, &config, sim_can_hal(&node)));
     config.telemetry_every = 241;

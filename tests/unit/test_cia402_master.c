@@ -270,7 +270,7 @@ static void test_the_first_that_was_heard_is_named(void)
 
 static void test_a_master_that_may_be_there_is_not_waited_for(void)
 {
-    for (unsigned reaction = CIA402_IGNORE; reaction <= CIA402_TELL; reaction++) {
+    for (unsigned reaction = CIA402_IGNORE; reaction <= CIA402_REPORT; reaction++) {
         setUp();
         config.reaction[CIA402_WATCH_MASTER] = (cia402_reaction_t)reaction;
         start();
@@ -325,7 +325,7 @@ static void test_at_rest_nobody_is_enabled_until_a_reset_and_silence(void)
 /* SYNC of somebody else ten times: the drives answer to each, and are not taken for two of a kind. */
 static void test_told_or_ignored_it_goes_on(void)
 {
-    for (unsigned reaction = CIA402_IGNORE; reaction <= CIA402_TELL; reaction++) {
+    for (unsigned reaction = CIA402_IGNORE; reaction <= CIA402_REPORT; reaction++) {
         setUp();
         config.reaction[CIA402_WATCH_MASTER] = (cia402_reaction_t)reaction;
         start();
@@ -338,7 +338,7 @@ static void test_told_or_ignored_it_goes_on(void)
             TEST_ASSERT_TRUE(are_all(DRIVE_ENABLED));
         }
         const bool is_told = (report_of(0).notes >> CIA402_WATCH_MASTER & 1u) != 0;
-        TEST_ASSERT_EQUAL(reaction == CIA402_TELL, is_told);
+        TEST_ASSERT_EQUAL(reaction == CIA402_REPORT, is_told);
         cycles(6000);
         TEST_ASSERT_EQUAL_UINT32(0, report_of(0).notes >> CIA402_WATCH_MASTER & 1u);
     }
@@ -364,7 +364,7 @@ static void test_what_is_no_concern_of_ours_is_none(void)
 
 static void come_up_beside_a_master(void)
 {
-    config.reaction[CIA402_WATCH_MASTER] = CIA402_TELL;
+    config.reaction[CIA402_WATCH_MASTER] = CIA402_REPORT;
     start();
     await(DRIVE_DISABLED);
 }

@@ -127,7 +127,7 @@ static void configure(void)
                                                 .homing_accel = 100000};
     }
     for (unsigned i = 0; i < CIA402_WATCHES; i++) {
-        config.reaction[i] = i < CIA402_WATCH_LIMIT ? CIA402_STOP : CIA402_TELL;
+        config.reaction[i] = i < CIA402_WATCH_LIMIT ? CIA402_STOP : CIA402_REPORT;
     }
 }
 
@@ -445,10 +445,10 @@ static void test_nodes_and_channels_that_contradict_are_refused(void)
     config.axis[1].channel = 2; /* a gap */
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, cia402_init(&driver, &config, sim_can_hal(&slaves)));
     configure();
-    config.telemetry = DRIVE_TELLS_TORQUE | DRIVE_TELLS_LAG | DRIVE_TELLS_INPUTS; /* six identifiers of four */
+    config.telemetry = DRIVE_HAS_TORQUE | DRIVE_HAS_LAG | DRIVE_HAS_INPUTS; /* six identifiers of four */
     config.telemetry_every = 1;
     TEST_ASSERT_EQUAL(HV_ERR_RANGE, cia402_init(&driver, &config, sim_can_hal(&slaves)));
-    config.telemetry = DRIVE_TELLS_TORQUE | DRIVE_TELLS_LAG;
+    config.telemetry = DRIVE_HAS_TORQUE | DRIVE_HAS_LAG;
     TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &config, sim_can_hal(&slaves)));
     config.answer_every = 2;
     config.axis[3].mode = CIA402_MODE_PP;
@@ -664,14 +664,14 @@ static void test_life_factor_that_is_far_too_large_is_refused(void)
 
 static void test_telemetry_of_both_axes_arrives(void)
 {
-    config.telemetry = DRIVE_TELLS_TORQUE | DRIVE_TELLS_INPUTS;
+    config.telemetry = DRIVE_HAS_TORQUE | DRIVE_HAS_INPUTS;
     config.telemetry_every = 2;
     come_up();
     enable();
     node[1].drive.motor.load = 500;
     cycles(40);
-    TEST_ASSERT_EQUAL_HEX8(DRIVE_TELLS_TORQUE | DRIVE_TELLS_INPUTS, report(0).telemetry.has);
-    TEST_ASSERT_EQUAL_HEX8(DRIVE_TELLS_TORQUE | DRIVE_TELLS_INPUTS, report(1).telemetry.has);
+    TEST_ASSERT_EQUAL_HEX8(DRIVE_HAS_TORQUE | DRIVE_HAS_INPUTS, report(0).telemetry.has);
+    TEST_ASSERT_EQUAL_HEX8(DRIVE_HAS_TORQUE | DRIVE_HAS_INPUTS, report(1).telemetry.has);
     TEST_ASSERT_EQUAL_INT16((int16_t)held(1, 0x6077, 0), report(1).telemetry.torque_permille);
     TEST_ASSERT_TRUE(frames[0x381] > 5 && frames[0x481] > 5);
 }
@@ -713,7 +713,7 @@ static void take_pdos_away(unsigned axis)
 static void test_whole_node_needs_no_pdos_of_its_other_axes(void)
 {
     share_pdos();
-    config.telemetry = DRIVE_TELLS_TORQUE;
+    config.telemetry = DRIVE_HAS_TORQUE;
     config.telemetry_every = 2;
     start();
     for (unsigned k = 1; k < axes; k += 2) {
@@ -740,7 +740,7 @@ static void test_whole_node_needs_room_for_the_telemetry_of_its_axes(void)
 {
     const char *why = NULL;
     share_pdos();
-    config.telemetry = DRIVE_TELLS_TORQUE;
+    config.telemetry = DRIVE_HAS_TORQUE;
     config.telemetry_every = 2;
     config.pdo_step = 4;
     TEST_ASSERT_TRUE(cia402_pdos_fit(&config, &why));
@@ -773,7 +773,7 @@ static void test_pdos_may_have_any_numbers(void)
     alone();
     config.commands = (cia402_maps_t){.count = 2, .map = {{65, 1, {0x60400010}}, {4, 1, {0x607A0020}}}};
     config.answers = (cia402_maps_t){.count = 1, .map = {{129, 3, {0x60410010, 0x60640020, 0x60610008}}}};
-    config.telemetry = DRIVE_TELLS_TORQUE;
+    config.telemetry = DRIVE_HAS_TORQUE;
     config.telemetry_every = 2;
     start();
     for (unsigned k = 0; k < axes; k++) { /* the places that they have taken: the last ones that are free */
@@ -786,7 +786,7 @@ static void test_pdos_may_have_any_numbers(void)
     follow();
     TEST_ASSERT_EQUAL_HEX32(0x201, held(0, 0x1402, 1));
     TEST_ASSERT_EQUAL_HEX32(0x40000181, held(0, 0x1803, 1));
-    TEST_ASSERT_EQUAL_HEX8(DRIVE_TELLS_TORQUE, report(0).telemetry.has);
+    TEST_ASSERT_EQUAL_HEX8(DRIVE_HAS_TORQUE, report(0).telemetry.has);
     config.commands.map[1].number = 5; /* which the drive has not got: it was not made for it */
     TEST_ASSERT_EQUAL(HV_OK, cia402_init(&driver, &config, sim_can_hal(&master)));
     cycles(3000);

@@ -8,7 +8,7 @@
 #include "config/config.h"
 #include "config/hash.h"
 #include "config/keys.h"
-#include "config/text.h"
+#include "config/config_text.h"
 #include "config/value.h"
 #include "inspect/report.h"
 

@@ -9,7 +9,7 @@
 
 #include "canraw_slave.h"
 #include "config/bus.h"
-#include "config/canraw.h"
+#include "config/canraw_section.h"
 #include "config/config.h"
 #include "config/value.h"
 #include "unity.h"

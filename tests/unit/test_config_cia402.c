@@ -8,7 +8,7 @@
 #include <string.h>
 
 #include "config/bus.h"
-#include "config/cia402.h"
+#include "config/cia402_section.h"
 #include "config/config.h"
 #include "config/value.h"
 #include "cia402_slave.h"
@@ -186,7 +186,7 @@ static void test_load_lists_and_signs_reach_their_drives(void)
     put("[cia402]", "tell_every = 7");
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, load(), m_errors);
     config_cia402(&m_config, &drives);
-    TEST_ASSERT_EQUAL_UINT8(DRIVE_TELLS_LAG | DRIVE_TELLS_INPUTS, drives.telemetry);
+    TEST_ASSERT_EQUAL_UINT8(DRIVE_HAS_LAG | DRIVE_HAS_INPUTS, drives.telemetry);
     TEST_ASSERT_EQUAL_UINT8(7, drives.telemetry_every);
     TEST_ASSERT_EQUAL_INT16(3, drives.abort_option);
 }

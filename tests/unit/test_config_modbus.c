@@ -4,7 +4,7 @@
  */
 #define _POSIX_C_SOURCE 200809L
 
-#include "config/modbus.h"
+#include "config/modbus_section.h"
 
 #include <stdio.h>
 #include <string.h>

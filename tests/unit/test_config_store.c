@@ -63,7 +63,7 @@ static const char *take(const char *text, int seals)
     const char *got = NULL;
     size_t length = 0;
     const int fd = memory(text, seals);
-    const char *const why = config_store_take(&m_store, fd, &got, &length);
+    const char *const why = config_store_accept(&m_store, fd, &got, &length);
     (void)close(fd);
     return why;
 }
@@ -234,8 +234,8 @@ static void test_only_what_can_change_no_more_is_taken(void)
     TEST_ASSERT_NOT_NULL(take("; mine\n", F_SEAL_GROW));
     TEST_ASSERT_NOT_NULL(take("; mine\n", F_SEAL_WRITE | F_SEAL_SHRINK));
     TEST_ASSERT_NOT_NULL(take("", SEALS));
-    TEST_ASSERT_NOT_NULL(config_store_take(&m_store, -1, &text, &length));
-    TEST_ASSERT_NOT_NULL(config_store_take(&m_store, STDIN_FILENO, &text, &length));
+    TEST_ASSERT_NOT_NULL(config_store_accept(&m_store, -1, &text, &length));
+    TEST_ASSERT_NOT_NULL(config_store_accept(&m_store, STDIN_FILENO, &text, &length));
 }
 
 /* As the next start reads it. */

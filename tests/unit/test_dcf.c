@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "config/cia402.h"
+#include "config/cia402_section.h"
 #include "config/config.h"
 #include "inspect/dcf_startup.h"
 #include "unity.h"

@@ -434,7 +434,7 @@ static void test_inventory_is_ready_for_the_configuration(void)
         node[k].value[DOCTOR_PRODUCT] = 0x60500000;
         node[k].value[DOCTOR_REVISION] = 0x01700000;
         node[k].value[DOCTOR_SERIAL] = 0x1000 + k;
-        doctor_take_name(node[k].name[DOCTOR_DEVICE], (const uint8_t *)"EPOS4 24\xFF  ", 11);
+        doctor_copy_name(node[k].name[DOCTOR_DEVICE], (const uint8_t *)"EPOS4 24\xFF  ", 11);
     }
     inventory(node);
     expect_text("; drive 2, node 6: EPOS4 24?, hardware (not told), software (not told), revision 0x1700000\n");

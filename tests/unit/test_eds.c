@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "config/cia402.h"
+#include "config/cia402_section.h"
 #include "config/config.h"
 #include "inspect/eds_judge.h"
 #include "unity.h"

@@ -614,7 +614,7 @@ static void test_frames_extensions_without_a_pose_are_counted_and_move_nothing(v
 }
 
 /* Both ends of the way are held by their cylinders, the middle is not: 842 and 891 are reached through a plate on edge. */
-static void engage_where_ways_lead_astray(void)
+static void engage_where_ways_lead_near_a_singularity(void)
 {
     m_settings = rig_tripod();
     m_settings.blend_ms = 250; /* each frame is a sender of its own, and gets to where its way leads */
@@ -630,7 +630,7 @@ static void engage_where_ways_lead_astray(void)
 
 static void test_frames_extensions_that_lead_near_a_singularity_stop_the_platform(void)
 {
-    engage_where_ways_lead_astray();
+    engage_where_ways_lead_near_a_singularity();
     TEST_ASSERT_TRUE(rig_was_logged(&m_rig, "stopped: the extensions sent lead too near a singularity"));
     TEST_ASSERT_TRUE(kin_margin(motion_kin(&m_rig.gateway.motion), &seen()->sent) >= KIN_MARGIN_LEAST_Q32 * 99 / 100);
     rig_send(&m_rig, "@C3:260,842,891#"); /* a sender that insists does not make it try again */
@@ -642,9 +642,9 @@ static void test_frames_extensions_that_lead_near_a_singularity_stop_the_platfor
     TEST_ASSERT_EQUAL_UINT32(1, counted()->singular_stops);
 }
 
-static void test_frames_that_lead_astray_again_and_again_are_told_at_most_once_a_second(void)
+static void test_frames_that_lead_near_a_singularity_are_logged_at_most_once_a_second(void)
 {
-    engage_where_ways_lead_astray();
+    engage_where_ways_lead_near_a_singularity();
     unsigned lines = 0;
     for (unsigned i = 0; i < 100; i++) {
         send_and_run("@C3:360,360,360#", 300); /* by itself, not a stream whose jumps are smoothed */
@@ -674,7 +674,7 @@ static void expect_line(const char *beginning, const char *line)
 {
     const sim_log_line_t *logged;
     do {
-        logged = sim_log_take(&m_rig.log);
+        logged = sim_log_pop(&m_rig.log);
         TEST_ASSERT_NOT_NULL_MESSAGE(logged, line);
     } while (strncmp(logged->text, beginning, strlen(beginning)) != 0);
     TEST_ASSERT_EQUAL_STRING(line, logged->text);
@@ -1735,10 +1735,10 @@ static void test_fault_told_is_found_in_the_next_cycle(void)
         engage();
         start_moving(150);
         const uint32_t faults = seen()->counters.faults;
-        gateway_tell_fault(&m_rig.gateway, (fault_code_t)code, axis == 0 ? 1 : 0); /* it does not go with that axis */
+        gateway_inject_fault(&m_rig.gateway, (fault_code_t)code, axis == 0 ? 1 : 0); /* it does not go with that axis */
         rig_run_ms(&m_rig, 1);
         TEST_ASSERT_EQUAL(STATE_ENGAGED, seen()->state);
-        gateway_tell_fault(&m_rig.gateway, (fault_code_t)code, axis);
+        gateway_inject_fault(&m_rig.gateway, (fault_code_t)code, axis);
         rig_run_ms(&m_rig, 1);
         expect_fault((fault_code_t)code, axis, 0);
         TEST_ASSERT_EQUAL(fault_reaction((fault_code_t)code), seen()->reaction);
@@ -1754,7 +1754,7 @@ static void test_fault_told_that_is_there_counts_once(void)
     engage();
     const uint32_t faults = seen()->counters.faults;
     rig_break(&m_rig, SIM_DRIVES_FAULT, 2, 0x2310);
-    gateway_tell_fault(&m_rig.gateway, FAULT_DRIVE, 3);
+    gateway_inject_fault(&m_rig.gateway, FAULT_DRIVE, 3);
     rig_run_ms(&m_rig, 1);
     expect_fault(FAULT_DRIVE, 3, 0x2310);
     rig_run_ms(&m_rig, 10);
@@ -1764,9 +1764,9 @@ static void test_fault_told_that_is_there_counts_once(void)
 static void test_fault_told_in_off_is_none(void)
 {
     start(false);
-    gateway_tell_fault(&m_rig.gateway, FAULT_BUS, 0);
-    gateway_tell_fault(&m_rig.gateway, FAULT_CODES, 0);
-    gateway_tell_fault(&m_rig.gateway, FAULT_DRIVE, DRIVES_MAX + 1u);
+    gateway_inject_fault(&m_rig.gateway, FAULT_BUS, 0);
+    gateway_inject_fault(&m_rig.gateway, FAULT_CODES, 0);
+    gateway_inject_fault(&m_rig.gateway, FAULT_DRIVE, DRIVES_MAX + 1u);
     TEST_ASSERT_EQUAL(STATE_OFF, seen()->state);
     rig_run_ms(&m_rig, 2);
     TEST_ASSERT_EQUAL_UINT32(0, seen()->counters.faults);
@@ -2570,7 +2570,7 @@ static void run_driving(void)
     RUN_TEST(test_frames_tripod_with_motor_takes_a4);
     RUN_TEST(test_frames_extensions_without_a_pose_are_counted_and_move_nothing);
     RUN_TEST(test_frames_extensions_that_lead_near_a_singularity_stop_the_platform);
-    RUN_TEST(test_frames_that_lead_astray_again_and_again_are_told_at_most_once_a_second);
+    RUN_TEST(test_frames_that_lead_near_a_singularity_are_logged_at_most_once_a_second);
     RUN_TEST(test_frames_reject_lines_are_rate_limited_and_count_what_was_left_out);
     RUN_TEST(test_frames_a_reject_line_quotes_the_frame_alone);
     RUN_TEST(test_spikes_are_told_and_the_gate_may_be_opened_in_operation);

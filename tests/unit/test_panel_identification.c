@@ -207,33 +207,33 @@ static void wake(viewer_t *viewer)
 }
 
 /* A page whose press is on its way to heaved. */
-static viewer_t *ask_for_a_signal(hall_t *hall, const char *name)
+static viewer_t *ask_for_a_signal(viewers_t *viewers, const char *name)
 {
-    viewer_t *const viewer = viewer_enter(hall, NULL, LEVEL_SERVICE, name);
+    viewer_t *const viewer = viewer_enter(viewers, NULL, LEVEL_SERVICE, name);
     TEST_ASSERT_NOT_NULL(viewer);
     cJSON *const json = cJSON_Parse("{\"axis\":\"3\"}");
     TEST_ASSERT_TRUE(
-        identification_begin(&hall->identification[0], &m_upstream, json, m_line, sizeof m_line, m_why, sizeof m_why));
+        identification_begin(&viewers->identification[0], &m_upstream, json, m_line, sizeof m_line, m_why, sizeof m_why));
     cJSON_Delete(json);
-    hall->identification[0].viewer = viewer->number;
+    viewers->identification[0].viewer = viewer->number;
     return viewer;
 }
 
 static void test_a_page_that_has_gone_or_has_no_answer_keeps_nobody_out(void)
 {
-    static hall_t hall;
-    hall = (hall_t){.platform = &m_upstream, .platforms = 1, .wake = wake};
-    viewer_t *const lost = ask_for_a_signal(&hall, "lost");
+    static viewers_t viewers;
+    viewers = (viewers_t){.platform = &m_upstream, .platforms = 1, .wake = wake};
+    viewer_t *const lost = ask_for_a_signal(&viewers, "lost");
     const asker_t asker = {.viewer = lost->number, .id = 7 | VIEWER_PRESS_BIT};
-    viewer_service_pump(&hall);
-    TEST_ASSERT_EQUAL_UINT64(lost->number, hall.identification[0].viewer); /* it is still waited for */
-    hall_answer(&hall, &m_upstream, &asker, NULL);                         /* the connection to heaved is lost */
-    TEST_ASSERT_EQUAL_UINT64(0, hall.identification[0].viewer);
-    viewer_leave(&hall, lost);
-    viewer_leave(&hall, ask_for_a_signal(&hall, "gone"));
-    viewer_service_pump(&hall);
-    TEST_ASSERT_EQUAL_UINT64(0, hall.identification[0].viewer);
-    TEST_ASSERT_NULL(hall.identification[0].sent_at[0]);
+    viewer_service_pump(&viewers);
+    TEST_ASSERT_EQUAL_UINT64(lost->number, viewers.identification[0].viewer); /* it is still waited for */
+    viewers_answer(&viewers, &m_upstream, &asker, NULL);                      /* the connection to heaved is lost */
+    TEST_ASSERT_EQUAL_UINT64(0, viewers.identification[0].viewer);
+    viewer_leave(&viewers, lost);
+    viewer_leave(&viewers, ask_for_a_signal(&viewers, "gone"));
+    viewer_service_pump(&viewers);
+    TEST_ASSERT_EQUAL_UINT64(0, viewers.identification[0].viewer);
+    TEST_ASSERT_NULL(viewers.identification[0].sent_at[0]);
 }
 
 int main(void)

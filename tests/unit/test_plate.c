@@ -76,7 +76,7 @@ static void feed(const double pose[POSE_AXES], uint64_t at_us, double count_mm)
 static void take(uint64_t now_us)
 {
     const pose_t zero = {{0}};
-    plate_take(&m_plate, &m_kin, m_feedback, &zero, now_us);
+    plate_step(&m_plate, &m_kin, m_feedback, &zero, now_us);
 }
 
 static double real(q32_t value_q32)

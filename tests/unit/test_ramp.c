@@ -189,10 +189,10 @@ static void storm(ramp_t *ramp, judge_t *judge_of, int phases, void (*judging)(j
     ramp_ref_t ref = {.pos_q32 = ramp->state.pos_q32};
     for (int phase = 0; phase < phases; phase++) {
         const long cycles = 1 + (long)random_log(1, 400);
-        const ramp_grip_t grip = random_bits() % 2 == 0 ? RAMP_SOFT : RAMP_FIRM;
+        const ramp_bandwidth_t bandwidth = random_bits() % 2 == 0 ? RAMP_SOFT : RAMP_FIRM;
         ref = random_reference(&ramp->limits, &ref);
         for (long i = 0; i < cycles; i++) {
-            judging(judge_of, ramp_step(ramp, &ref, grip));
+            judging(judge_of, ramp_step(ramp, &ref, bandwidth));
             go_on(&ref);
         }
     }
@@ -266,12 +266,12 @@ static void test_ramp_step_without_working_brakes_out_is_the_same(void)
         const ramp_limits_t limits = random_limits();
         ramp_t quick = ramp_of(&limits, limits.pos_min_q32);
         for (int i = 0; i < 600; i++) {
-            const ramp_grip_t grip = random_bits() % 2 == 0 ? RAMP_SOFT : RAMP_FIRM;
+            const ramp_bandwidth_t bandwidth = random_bits() % 2 == 0 ? RAMP_SOFT : RAMP_FIRM;
             ramp_ref_t ref =
                 i % 3 == 0 ? place_anywhere(&quick) : random_reference(&limits, &(ramp_ref_t){.pos_q32 = quick.state.pos_q32});
             ramp_t careful = quick;
             careful.brake_cycles = 0;
-            TEST_ASSERT_EQUAL_INT64(ramp_step(&careful, &ref, grip), ramp_step(&quick, &ref, grip));
+            TEST_ASSERT_EQUAL_INT64(ramp_step(&careful, &ref, bandwidth), ramp_step(&quick, &ref, bandwidth));
             careful.brake_cycles = quick.brake_cycles;
             TEST_ASSERT_EQUAL_MEMORY(&careful, &quick, sizeof quick);
             alike += quick.flags == 0;
@@ -317,7 +317,7 @@ static void test_ramp_step_all_is_each_by_itself(void)
         q32_t pos[RAMPS + 1];
         unsigned flags = 0;
         const unsigned count = (unsigned)(random_bits() % (RAMPS + 1));
-        const ramp_grip_t grip = random_bits() % 2 == 0 ? RAMP_SOFT : RAMP_FIRM;
+        const ramp_bandwidth_t bandwidth = random_bits() % 2 == 0 ? RAMP_SOFT : RAMP_FIRM;
         for (unsigned i = 0; i < RAMPS; i++) {
             const ramp_limits_t limits = random_limits();
             one[i] = ramp_of(&limits, limits.pos_min_q32);
@@ -327,9 +327,9 @@ static void test_ramp_step_all_is_each_by_itself(void)
             pos[i] = 42;
         }
         pos[RAMPS] = 42;
-        const unsigned all_flags = ramp_step_all(all, count, ref, grip, pos);
+        const unsigned all_flags = ramp_step_all(all, count, ref, bandwidth, pos);
         for (unsigned i = 0; i < count; i++) {
-            TEST_ASSERT_EQUAL_INT64(ramp_step(&one[i], &ref[i], grip), pos[i]);
+            TEST_ASSERT_EQUAL_INT64(ramp_step(&one[i], &ref[i], bandwidth), pos[i]);
             flags |= one[i].flags;
         }
         TEST_ASSERT_EQUAL_MEMORY(one, all, sizeof one);
@@ -362,7 +362,7 @@ static void test_ramp_take_over_own_state_keeps_every_limit(void)
         for (int change = 0; change < 10; change++) {
             storm(&ramp, &j, 10, judge);
             ramp_t next = ramp_of(&limits, 0);
-            ramp_take_over(&next, &ramp.state);
+            ramp_adopt(&next, &ramp.state);
             TEST_ASSERT_EQUAL_MEMORY(&ramp.state, &next.state, sizeof next.state);
             ramp = next;
         }
@@ -377,7 +377,7 @@ static void test_ramp_take_over_any_state_keeps_differences_and_comes_in(void)
         ramp_t ramp = ramp_of(&limits, limits.pos_min_q32);
         const ramp_state_t any = {random_position(&limits), random_around(limits.vel_per_cycle_q32, 3),
                                   random_around(limits.acc_per_cycle2_q32, 3)};
-        ramp_take_over(&ramp, &any);
+        ramp_adopt(&ramp, &any);
         judge_t j = {.limits = &limits, .last = ramp.state};
         TEST_ASSERT_EQUAL_INT64(any.pos_q32, ramp.state.pos_q32);
         storm(&ramp, &j, 40, judge_differences);
@@ -436,7 +436,7 @@ static double optimal_s(double distance, double speed, double accel, double jerk
 }
 
 /* Cycles until the ramp rests exactly on a step; how far it went beyond. */
-static long settle(ramp_t *ramp, q32_t target_q32, ramp_grip_t grip, q32_t *overshoot_q32)
+static long settle(ramp_t *ramp, q32_t target_q32, ramp_bandwidth_t bandwidth, q32_t *overshoot_q32)
 {
     const ramp_ref_t ref = {.pos_q32 = target_q32};
     const int sign = target_q32 >= ramp->state.pos_q32 ? 1 : -1;
@@ -446,7 +446,7 @@ static long settle(ramp_t *ramp, q32_t target_q32, ramp_grip_t grip, q32_t *over
         if (ramp_is_at_rest(ramp) && ramp->state.pos_q32 == target_q32) {
             return i;
         }
-        const q32_t pos = ramp_step(ramp, &ref, grip);
+        const q32_t pos = ramp_step(ramp, &ref, bandwidth);
         judge(&j, pos);
         *overshoot_q32 = sign * (pos - target_q32) > *overshoot_q32 ? sign * (pos - target_q32) : *overshoot_q32;
     }
@@ -506,12 +506,12 @@ static void test_ramp_step_at_rest_stays_exactly_for_a_constant_reference(void)
         const ramp_limits_t limits = run == 0 ? usual_limits() : random_limits();
         ramp_t ramp = ramp_of(&limits, limits.pos_min_q32);
         const q32_t target = fx_clamp(random_position(&limits), limits.pos_min_q32, limits.pos_max_q32);
-        const ramp_grip_t grip = run % 2 == 0 ? RAMP_FIRM : RAMP_SOFT;
+        const ramp_bandwidth_t bandwidth = run % 2 == 0 ? RAMP_FIRM : RAMP_SOFT;
         q32_t over;
-        (void)settle(&ramp, target, grip, &over);
+        (void)settle(&ramp, target, bandwidth, &over);
         const ramp_ref_t ref = {.pos_q32 = target};
         for (long i = 0; i < 100000; i++) {
-            TEST_ASSERT_EQUAL_INT64(target, ramp_step(&ramp, &ref, grip));
+            TEST_ASSERT_EQUAL_INT64(target, ramp_step(&ramp, &ref, bandwidth));
         }
     }
 }
@@ -549,7 +549,7 @@ static ramp_ref_t sine_at(sine_t *self, long cycle)
 }
 
 /* Largest error over so many cycles after the lock-in. */
-static q32_t track_sine(const ramp_limits_t *limits, sine_t sine, ramp_grip_t grip, long lock_in)
+static q32_t track_sine(const ramp_limits_t *limits, sine_t sine, ramp_bandwidth_t bandwidth, long lock_in)
 {
     ramp_t ramp = ramp_of(limits, 0);
     judge_t j = {.limits = limits};
@@ -559,7 +559,7 @@ static q32_t track_sine(const ramp_limits_t *limits, sine_t sine, ramp_grip_t gr
     }
     for (long i = 0; i < lock_in + 5000; i++) {
         const ramp_ref_t ref = sine_at(&sine, i);
-        const q32_t pos = ramp_step(&ramp, &ref, grip);
+        const q32_t pos = ramp_step(&ramp, &ref, bandwidth);
         judge(&j, pos);
         const q32_t error = llabs(pos - ref.pos_q32);
         worst = i >= lock_in && error > worst ? error : worst;
@@ -597,7 +597,7 @@ typedef struct {
 } joins_t;
 
 /* Random starts beside sines whose speed (power 1), acceleration (2) or jerk (3) peaks at a share of the limit. */
-static joins_t join_sines(unsigned power, double share, ramp_grip_t grip)
+static joins_t join_sines(unsigned power, double share, ramp_bandwidth_t bandwidth)
 {
     static const double k_limit[] = {0, 400, 3000, 50000};
     static const double k_omega[] = {0, 4, 9, 18};
@@ -614,7 +614,7 @@ static joins_t join_sines(unsigned power, double share, ramp_grip_t grip)
                           ramp_init(&ramp, &limits, q32(sine.amplitude * (2 * random_unit() - 1) + 40 * random_unit() - 20)));
         for (long i = 3; i < 5000; i++) {
             const ramp_ref_t ref = sine_at(&sine, i);
-            const double error = fabs((double)(ramp_step(&ramp, &ref, grip) - ref.pos_q32)) / 4294967296.0;
+            const double error = fabs((double)(ramp_step(&ramp, &ref, bandwidth) - ref.pos_q32)) / 4294967296.0;
             if (i > 1500) {
                 cycles++;
                 locked += error < 0.01;
@@ -676,11 +676,11 @@ static void test_ramp_step_mirrored_references_give_mirrored_positions(void)
         ramp_ref_t ref = {.pos_q32 = limits.pos_min_q32};
         for (int phase = 0; phase < 60; phase++) {
             ref = random_reference(&limits, &ref);
-            const ramp_grip_t grip = phase % 2 == 0 ? RAMP_SOFT : RAMP_FIRM;
+            const ramp_bandwidth_t bandwidth = phase % 2 == 0 ? RAMP_SOFT : RAMP_FIRM;
             for (long i = 0; i < 100; i++) {
                 const ramp_ref_t opposite = {-ref.pos_q32, -ref.vel_per_cycle_q32, -ref.acc_per_cycle2_q32,
                                              -ref.jerk_per_cycle3_q32};
-                TEST_ASSERT_EQUAL_INT64(ramp_step(&a, &ref, grip), -ramp_step(&b, &opposite, grip));
+                TEST_ASSERT_EQUAL_INT64(ramp_step(&a, &ref, bandwidth), -ramp_step(&b, &opposite, bandwidth));
                 TEST_ASSERT_EQUAL_UINT(a.flags, b.flags);
                 go_on(&ref);
             }

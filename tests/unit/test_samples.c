@@ -33,7 +33,7 @@ static void open_ring(uint32_t seconds)
     m_config.settings.has_angle = true;
     m_config.samples_seconds = seconds;
     m_config.drives = CONFIG_DRIVES_CIA402;
-    m_config.cia402.is_torque_told = m_config.cia402.is_lag_told = m_config.cia402.are_inputs_told = true;
+    m_config.cia402.has_torque_report = m_config.cia402.has_lag = m_config.cia402.has_inputs = true;
     memset(&m_snapshot, 0, sizeof m_snapshot);
     m_snapshot.cylinders = 6;
     m_snapshot.has_angle = true;
@@ -171,9 +171,9 @@ static void test_columns_are_those_of_what_drives_tell(void)
         m_config.settings.cycle_us = 1000;
         m_config.samples_seconds = 1;
         m_config.drives = told == 4 ? CONFIG_DRIVES_SIM : CONFIG_DRIVES_CIA402;
-        m_config.cia402.is_torque_told = told == 0 || told == 4;
-        m_config.cia402.is_lag_told = told == 1;
-        m_config.cia402.are_inputs_told = told == 2;
+        m_config.cia402.has_torque_report = told == 0 || told == 4;
+        m_config.cia402.has_lag = told == 1;
+        m_config.cia402.has_inputs = told == 2;
         TEST_ASSERT_TRUE(samples_writer_open(&m_writer, &m_config));
         TEST_ASSERT_NULL(samples_reader_open(&reader, m_writer.fd));
         for (unsigned i = 0; i < 4; i++) {

@@ -828,7 +828,7 @@ static void test_signal_without_a_hand_stops(void)
     }
 }
 
-/* As motion does where a jog leads astray. */
+/* As motion does where a jog leads near a singularity or beyond the stroke. */
 static void test_what_motion_stops_is_not_finished(void)
 {
     start(true);

@@ -34,7 +34,7 @@ static bool answer(const char *key, const char *text)
 {
     const setup_question_t question = next();
     TEST_ASSERT_EQUAL_STRING(key, question.key);
-    return setup_take(&s_setup, &question, text, s_error);
+    return setup_accept(&s_setup, &question, text, s_error);
 }
 
 static void say(const char *key, const char *text)
@@ -272,7 +272,7 @@ static void test_kept_on_the_disk(void)
 static void test_ini_text(void)
 {
     char value[INI_VALUE_MAX];
-    ini_text_take(&s_text, "; head\n[a]\nx = 1 ; one\n;y = 2\n\n; of b\n[b]\nx = 5\n");
+    ini_text_load(&s_text, "; head\n[a]\nx = 1 ; one\n;y = 2\n\n; of b\n[b]\nx = 5\n");
     ini_text_set(&s_text, "a", "x", "3", NULL);
     ini_text_set(&s_text, "a", "y", "4", "four");
     ini_text_set(&s_text, "a", "z", "5", NULL);

@@ -312,16 +312,16 @@ static void test_gate_at_rest_is_factor_times_acceleration_times_period_squared(
 }
 
 /* Whole units at 100 Hz: a step of one is more than the gate lets pass, but no spike where they are known to be the values'
- * grain. */
-static void test_gate_grain_passes_steps_as_coarse_as_the_values(void)
+ * quantum. */
+static void test_gate_quantum_passes_steps_as_coarse_as_the_values(void)
 {
-    for (int grain = 0; grain <= 1; grain++) {
+    for (int quantum = 0; quantum <= 1; quantum++) {
         start(FACTOR);
-        spike_filter_set_quantum(&s_gate, 2, grain * 4 * Q32_ONE);
+        spike_filter_set_quantum(&s_gate, 2, quantum * 4 * Q32_ONE);
         for (int i = 0; i < 40; i++) {
             (void)push(i * 0.01, 10000, 2, 0);
         }
-        TEST_ASSERT_EQUAL(grain, push(0.4, 10000, 2, 4));
+        TEST_ASSERT_EQUAL(quantum, push(0.4, 10000, 2, 4));
         TEST_ASSERT_TRUE(push(0.41, 10000, 2, 4));
         (void)push(0.42, 10000, 2, 4);
         (void)push(0.43, 10000, 2, 4);
@@ -333,7 +333,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_gate_passes_ordinary_motion_at_all_rates);
-    RUN_TEST(test_gate_grain_passes_steps_as_coarse_as_the_values);
+    RUN_TEST(test_gate_quantum_passes_steps_as_coarse_as_the_values);
     RUN_TEST(test_gate_passes_frames_that_come_twice);
     RUN_TEST(test_gate_passes_everything_outside_a_stream);
     RUN_TEST(test_gate_passes_after_a_gap_without_a_known_course);

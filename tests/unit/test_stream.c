@@ -1184,13 +1184,13 @@ static void test_stream_step_values_repeated_less_often_are_followed_too(void)
 /* A slow motion in whole or tenths of millimetres has equal values too, of its own making; and a sender that stands. */
 static void test_stream_step_slow_coarse_motion_repeats_nothing(void)
 {
-    const double grains[] = {0.1, 1};
+    const double quanta[] = {0.1, 1};
     for (unsigned i = 0; i < 2; i++) {
         double off = 0;
         start(STREAM_SMOOTH);
         for (double at = 0; at < 30; at += 0.01) {
             const double value = fmod(at, 7) < 4 ? sin(at) + 0.5 * sin(2.3 * at) : 0.3;
-            send(at + 0.002 + 0.002 * random_unit(), grains[i] * round(20 * value));
+            send(at + 0.002 + 0.002 * random_unit(), quanta[i] * round(20 * value));
         }
         for (int ms = 0; ms < 30000; ms++) {
             render(0, ms, ms + 1);

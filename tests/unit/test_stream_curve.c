@@ -71,7 +71,7 @@ static void test_commit_correction_stays_where_the_motion_has_been(void)
     m_curve.off_q32[0][1] = 7 * Q32_ONE;
     m_curve.low_q32[0] = -2 * Q32_ONE;
     m_curve.high_q32[0] = 2 * Q32_ONE;
-    m_curve.grip_q32 = Q32_ONE / 8;
+    m_curve.bandwidth_q32 = Q32_ONE / 8;
     m_curve.is_off = true;
     commit(1);
     TEST_ASSERT_EQUAL_INT64(2 * Q32_ONE + Q32_ONE / 4, last_control());
@@ -89,7 +89,7 @@ static void test_commit_on_the_way_through_the_point_the_curve_is_still_off(void
     m_curve.off_q32[0][1] = -7 * Q32_ONE;
     m_curve.low_q32[0] = -16 * Q32_ONE;
     m_curve.high_q32[0] = 16 * Q32_ONE;
-    m_curve.grip_q32 = Q32_ONE / 2;
+    m_curve.bandwidth_q32 = Q32_ONE / 2;
     m_curve.is_off = true;
     commit(1);
     TEST_ASSERT_EQUAL_INT64(0, last_control());
@@ -118,7 +118,7 @@ static void check_window(int32_t expected, uint32_t period_us)
 static void test_pace_a_longer_mean_than_needed_is_kept_where_one_less_would_do(void)
 {
     m_curve.limits[0] = (governor_limits_t){.acc_per_cycle2_q32 = Q32_ONE * 3 / 1000, .jerk_per_cycle3_q32 = Q32_ONE};
-    m_curve.grain[0].quantum_q32 = Q32_ONE;
+    m_curve.quantum[0].quantum_q32 = Q32_ONE;
     check_window(2, 20000);
     check_window(3, 16000);
     check_window(3, 20000);
@@ -145,10 +145,10 @@ static void test_take_after_more_periods_than_it_counts_keeps_the_period(void)
     stream_clock_start(&m_clock, now_us);
     for (unsigned i = 0; i < 2 * STREAM_GAPS; i++) {
         now_us += STREAM_PERIOD_MIN_US;
-        (void)stream_clock_take(&m_clock, now_us, 1);
+        (void)stream_clock_accept(&m_clock, now_us, 1);
     }
     now_us += 260u * STREAM_PERIOD_MIN_US;
-    TEST_ASSERT_FALSE(stream_clock_take(&m_clock, now_us, 260));
+    TEST_ASSERT_FALSE(stream_clock_accept(&m_clock, now_us, 260));
     TEST_ASSERT_INT64_WITHIN(STREAM_PERIOD_MIN_US * STREAM_US_Q16 / 50, STREAM_PERIOD_MIN_US * STREAM_US_Q16,
                              m_clock.period_us_q16);
 }

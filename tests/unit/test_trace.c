@@ -108,7 +108,7 @@ static const char *row_text(const snapshot_t *s, uint64_t t_us, bool is_late)
 {
     static char text[TRACE_LINE_MAX + 1];
     trace_row_t row;
-    trace_take(&row, s, t_us, is_late, false);
+    trace_fill(&row, s, t_us, is_late, false);
     text[trace_format(&row, text)] = '\0';
     return text;
 }

@@ -10,7 +10,7 @@
 #include "config/startup_denied.h"
 #include "heave/status.h"
 #include "linux_can_local.h"
-#include "twin/options.h"
+#include "twin/twin_options.h"
 #include "twin/wire.h"
 #include "unity.h"
 

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "twin/faults.h"
+#include "twin/twin_faults.h"
 #include "twin/script.h"
 #include "unity.h"
 

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "heave/status.h"
-#include "twin/faults.h"
+#include "twin/twin_faults.h"
 #include "unity.h"
 
 #define STEP_US  1000u

@@ -31,7 +31,7 @@ static void hear(void *ctx, const can_frame_t *frame)
 static void tell(const char *text, size_t length)
 {
     for (size_t i = 0; i < length; i++) {
-        slcan_take(&m_slcan, text[i], hear, NULL);
+        slcan_receive(&m_slcan, text[i], hear, NULL);
     }
 }
 
@@ -138,7 +138,7 @@ static void test_any_bytes_do_no_harm(void)
         if (rand() % 16 == 0) {
             tell("\rT000001231", 11);
         }
-        slcan_take(&m_slcan, byte, hear, NULL);
+        slcan_receive(&m_slcan, byte, hear, NULL);
         TEST_ASSERT_TRUE(m_slcan.length <= SLCAN_LINE_MAX && m_slcan.waiting <= SLCAN_OUT_MAX);
         m_slcan.waiting = i % 1000 == 0 ? 0 : m_slcan.waiting;
         m_slcan.set_bps = 0;

@@ -64,7 +64,7 @@ class Contracts(Target):
 PARSER = "src/protocol/frame.c src/protocol/frame_command.c src/protocol/frame_quick.c src/protocol/frame_reject.c src/protocol/number.c"
 WORDS = "src/protocol/frame.c src/protocol/frame_command.c src/protocol/frame_reject.c src/protocol/frame_text.c src/protocol/text.c"
 FIXED = "src/fixed/fx.c src/fixed/fx_root.c src/fixed/fx_trig.c"
-DRIVERS = ("src/canopen/cia402_axis.c", "src/drives/canraw", "src/drives/modbus")  # of these, the codecs alone
+DRIVERS = ("src/canopen/cia402_axis.c", "src/canopen/cia402_pdo.c", "src/drives/canraw", "src/drives/modbus")  # of these, the codecs alone
 TARGETS = [
     Target("scanner", "frames, byte by byte", "parser", PARSER),
     Target("quick", "a plain frame", "parser", PARSER),
@@ -80,7 +80,7 @@ TARGETS = [
     Target("angles", "sines and cosines", "fixed", FIXED, "fx_mul_high,fx_mul_high_0,fx_mul_high_1,fx_mul_high_2,fx_mul_high_here,fx_mul_high_here_0,fx_mul_high_here_1,fx_mul_high_here_2"),
     Target("counts", "counts and units", "fixed", "src/drives/counts.c", "fx_mul_div"),
     Target("sdo", "SDO answers", "codecs", "src/canopen/sdo.c"),
-    Target("pdo", "PDOs and emergencies", "codecs", "src/canopen/cia402_axis.c src/drives/counts.c src/fixed/fx.c", "fx_mul_div,fx_add_sat"),
+    Target("pdo", "PDOs and emergencies", "codecs", "src/canopen/cia402_pdo.c src/canopen/cia402_pdo_rows.c src/canopen/cia402_map.c src/canopen/cia402_axis.c src/drives/counts.c src/fixed/fx.c", "fx_mul_div,fx_add_sat"),
     Target("canraw", "frames of raw CAN drives", "codecs", "src/drives/canraw_frame.c src/drives/canraw_float.c"),
     Target("modbus", "registers of Modbus drives", "codecs", "src/drives/modbus_drive_map.c"),
 ]
