@@ -72,7 +72,7 @@ ELSEWHERE = {("metrics.c", "unlink"): "tidies up after another failure; the next
              ("control_configuration.c", "fflush"): "into memory, without a buffer",
              ("config_store.c", "unlink"): "tidies up after another failure, which is what is told",
              ("drive_dcf.c", "unlink"): "tidies up after another failure, which is what is told",
-             ("profile.c", "unlink"): "makes room, or tidies up: where it mattered, what comes after it fails, and is told",
+             ("rig_profile.c", "unlink"): "makes room, or tidies up: where it mattered, what comes after it fails, and is told",
              **{("setup_session.c", function): "tidies up a folder that the next boot empties" for function in ("unlink", "rmdir")},
              ("setup_session.c", "waitpid"): "an error says that there is no child any more, which is what is waited for",
              **{("setup_motion.c", function): "only while a person holds a key; test_setup.py kills it there, and lets go" for function in ("fflush", "poll", "read")},
