@@ -9,6 +9,7 @@
 
 #include "common/sentence.h"
 #include "panel/outbox.h"
+#include "service/request_table.h"
 
 #define TICK_MAX 9e15 /* whole numbers of JSON */
 
@@ -151,7 +152,7 @@ bool viewer_begins(const char *line, const char *word)
 bool viewer_is_allowed(const call_t *call, const char *line)
 {
     char error[128];
-    const level_t needed = levels_needed(line, call->upstream->intensity);
+    const level_t needed = request_level(line, call->upstream->intensity);
     if (call->viewer->role < (int)needed) {
         (void)snprintf(error, sizeof error, "%.20s: not allowed; it takes the role %s", line, level_name(needed));
         viewer_reject(call, error);

@@ -9,12 +9,8 @@
 #include <sys/socket.h>
 
 #include "common/message.h"
-#include "record/service_words.h"
-#include "service/operator_requests.h"
 
 #define GROUPS_MAX 256u
-
-static const char k_intensity[] = "intensity ";
 
 static int find_group(const char *key, const config_label_t *name, bool *has_group, gid_t *gid)
 {
@@ -75,35 +71,6 @@ level_peer_t levels_peer(const levels_t *self, int fd)
     gid[0] = peer.gid;
     const unsigned count = 1u + (unsigned)(bytes / sizeof gid[0]);
     return (level_peer_t){.uid = peer.uid, .gid = peer.gid, .pid = peer.pid, .level = levels_of(self, peer.uid, gid, count)};
-}
-
-level_t levels_needed(const char *said, unsigned percent)
-{
-    uint32_t wanted = 0;
-    bool has_heard = false;
-    uint64_t tick_us = 0;
-    const char *const request = operator_request_behind_heard(said, &has_heard, &tick_us);
-    if (request == NULL) { /* it will be refused */
-        return LEVEL_LOOK;
-    }
-    if (strncmp(request, k_intensity, sizeof k_intensity - 1) == 0) {
-        const bool is_down = operator_read_percent(&request[sizeof k_intensity - 1], &wanted) && wanted <= percent;
-        return is_down ? LEVEL_OPERATE : LEVEL_SERVICE;
-    }
-    if (strcmp(request, "seen") == 0 || strcmp(request, "operator-log") == 0) {
-        return LEVEL_OPERATE;
-    }
-    if (service_words_are(request, strlen(request)) || strcmp(request, "dump") == 0 || strcmp(request, "acknowledge") == 0 ||
-        strncmp(request, "sdo", 3) == 0 || strncmp(request, "selftest ", 9) == 0 || strncmp(request, "configure ", 10) == 0) {
-        return LEVEL_SERVICE;
-    }
-    const event_t event = operator_request_find(request);
-    if (event == EVENTS || event == EVENT_HOLD) {
-        return LEVEL_LOOK;
-    }
-    return event == EVENT_RESET || event == EVENT_SHUTDOWN || event == EVENT_SERVICE || event == EVENT_SERVICE_OFF
-               ? LEVEL_SERVICE
-               : LEVEL_OPERATE;
 }
 
 const char *level_name(level_t level)

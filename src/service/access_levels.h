@@ -45,10 +45,6 @@ level_t levels_of(const levels_t *self, uid_t uid, const gid_t *gid, unsigned co
 /** Who has connected. Where the kernel does not tell, nobody may do more than look. */
 level_peer_t levels_peer(const levels_t *self, int fd);
 
-/** Level that a request takes; LEVEL_LOOK for what is no request.
- *  @param percent of intensity in force now */
-level_t levels_needed(const char *said, unsigned percent);
-
 /** "look", "operate", "service": constant text. */
 const char *level_name(level_t level);
 

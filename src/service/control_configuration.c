@@ -12,13 +12,6 @@
 
 #define WRITE_US 10000000u
 
-static const char k_configure[] = "configure ";
-
-bool control_configuration_is(const char *line)
-{
-    return strncmp(line, k_configure, sizeof k_configure - 1u) == 0;
-}
-
 bool control_configuration_fits(state_t state, bool is_restart)
 {
     return state == STATE_OFF || state == STATE_SETTLED || (!is_restart && state == STATE_SERVICE);
@@ -91,7 +84,7 @@ static const char *why_not_now(const control_t *self, const config_changes_t *ch
     return is_restart ? self->store->no_restart : NULL;
 }
 
-void control_configuration_accept(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+void control_configuration_accept(control_t *self, control_client_t *client, const char *digest, uint64_t now_us)
 {
     config_changes_t changes;
     config_store_t *const store = self->store;
@@ -100,7 +93,7 @@ void control_configuration_accept(control_t *self, control_client_t *client, con
     const char *why = NULL;
     if (store == NULL || store->kept[0] == '\0') {
         why = N_("there is no state directory to keep it in (STATE_DIRECTORY; the service heave@ has one)");
-    } else if (store->digest[0] == '\0' || strcmp(&line[sizeof k_configure - 1u], store->digest) != 0) {
+    } else if (store->digest[0] == '\0' || strcmp(digest, store->digest) != 0) {
         why = N_("another configuration is in force than the one that this was made from: read it again");
     } else if (config_store_is_busy(store)) {
         why = N_("the file is just being read, or another one written: try again");

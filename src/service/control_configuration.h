@@ -7,14 +7,12 @@
 
 #include "service/control.h"
 
-/** Whether a line is `configure DIGEST`. */
-bool control_configuration_is(const char *line);
-
 /** The text in force, as a descriptor. */
 void control_configuration_answer(const control_t *self, control_client_t *client);
 
-/** Judges a text, and has it written if it may come into force; the answer follows. */
-void control_configuration_accept(control_t *self, control_client_t *client, const char *line, uint64_t now_us);
+/** Judges a text, and has it written if it may come into force; the answer follows.
+ *  @param digest of the one that it was made from */
+void control_configuration_accept(control_t *self, control_client_t *client, const char *digest, uint64_t now_us);
 
 /** Nobody waits for the disk for ever. */
 void control_configuration_watch(control_client_t *client, uint64_t now_us);

@@ -15,7 +15,6 @@
 
 #define WORDS_MAX 5u
 
-static const char k_word[] = "sdo ";
 static const char k_usage[] =
     N_("sdo: needs N INDEX:SUB to read, N INDEX:SUB [TYPE] VALUE to write; as in `sdo 3 6041:00`, `sdo 3 2000:01 u16 5`");
 
@@ -31,19 +30,6 @@ static unsigned split(char *text, char *word[WORDS_MAX])
         word[count++] = next;
     }
     return count;
-}
-
-bool control_object_is_said(const char *line)
-{
-    return strncmp(line, k_word, sizeof k_word - 1u) == 0 || strcmp(line, "sdo") == 0;
-}
-
-bool control_object_is_write(const char *line)
-{
-    char text[CONTROL_REQUEST_MAX];
-    char *word[WORDS_MAX];
-    (void)snprintf(text, sizeof text, "%s", line);
-    return split(text, word) > 3u;
 }
 
 /* The value of a write into the object; false: error says what is wrong. */

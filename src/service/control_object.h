@@ -6,12 +6,6 @@
 
 #include "service/control_client.h"
 
-/** True where a line is such a request. */
-bool control_object_is_said(const char *line);
-
-/** True where it would write: that is logged. */
-bool control_object_is_write(const char *line);
-
 /** Reads a request; of a client whose object it becomes.
  *  @return NULL; or what is wrong: then nothing is asked of the motion thread. Valid until the next call of the client */
 const char *control_object_read(control_client_t *client, const char *line, motion_request_t *out);

@@ -23,7 +23,7 @@ void control_pass_samples(const control_t *self, control_client_t *client)
 
 /* A folder as a place (O_PATH): what may be opened from there the kernel says, by the rights of the files. heaved itself touches
  * no disk for somebody who looks on. */
-void control_pass_folder(const control_t *self, control_client_t *client, bool is_log)
+static void pass_folder(const control_t *self, control_client_t *client, bool is_log)
 {
     const int fd = is_log ? operator_log_folder(self->log) : blackbox_folder(self->blackbox);
     if (fd < 0) {
@@ -43,4 +43,14 @@ void control_pass_folder(const control_t *self, control_client_t *client, bool i
     }
     json_close(&json, '}');
     control_client_answer(client, &json);
+}
+
+void control_pass_incident_folder(const control_t *self, control_client_t *client)
+{
+    pass_folder(self, client, false);
+}
+
+void control_pass_operator_log(const control_t *self, control_client_t *client)
+{
+    pass_folder(self, client, true);
 }

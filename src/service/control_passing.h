@@ -9,7 +9,7 @@
 
 void control_pass_samples(const control_t *self, control_client_t *client);
 
-/** @param is_log that of the operator log; else that of the incidents */
-void control_pass_folder(const control_t *self, control_client_t *client, bool is_log);
+void control_pass_incident_folder(const control_t *self, control_client_t *client);
+void control_pass_operator_log(const control_t *self, control_client_t *client);
 
 #endif

@@ -6,27 +6,29 @@
 
 #include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include "record/service_words.h"
+#include "service/control_answers.h"
 #include "service/control_client.h"
 #include "service/control_configuration.h"
 #include "service/control_object.h"
+#include "service/control_geometry.h"
 #include "service/control_passing.h"
-#include "service/control_questions.h"
 #include "service/control_results.h"
 #include "service/control_selftest.h"
+#include "service/control_times.h"
 #include "service/operator_requests.h"
+#include "service/request_table.h"
 #include "service/service_json.h"
 
 #define ANSWER_US 1000000u  /* the motion thread answers within a cycle or two */
 #define OBJECT_US 1000000u  /* beside what a drive may take: it is asked once, and left alone as long after that */
 #define DUMP_US   50000000u /* heavectl waits a little longer */
 #define RESET_US  2500000u  /* a reset takes effect when the drives say so */
-
-static const char k_acknowledge[] = "acknowledge";
 
 /* --- How old --- */
 
@@ -44,12 +46,11 @@ static uint64_t age_us(const control_t *self, const control_client_t *client, ui
 
 /* What can start or enlarge a motion is done now, for somebody who is there and knows of the last hold, or never. The motion
  * thread looks once more: this thread may be stopped between now and then. */
-static bool is_fresh(const control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+static bool is_fresh(const control_t *self, control_client_t *client, const request_t *request, uint64_t now_us)
 {
     const bool is_before_hold = client->void_bytes > 0 || (client->has_heard && client->heard_us < self->view.view.held_tick_us);
-    client->is_moving = operator_request_is_moving(line, control_snapshot(self)->intensity_percent) ||
-                        (control_object_is_said(line) && control_object_is_write(line));
-    client->is_voidable = client->is_moving || operator_request_is_held(line);
+    client->is_moving = request->is_moving;
+    client->is_voidable = request->is_moving || request->is_held;
     if (client->is_voidable && (client->is_gone || control_client_has_gone(client))) {
         client->is_gone = true;
         control_client_log(client, "the client has gone before it was carried out", control_state(self));
@@ -111,6 +112,11 @@ static void begin_request(control_t *self, control_client_t *client, event_t eve
     }
 }
 
+static void begin_state(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
+{
+    begin_request(self, client, operator_request_find(line), 0, now_us);
+}
+
 /* By hand. What is held gets the number of its series here. */
 static void begin_service(control_t *self, control_client_t *client, const char *line, uint64_t now_us)
 {
@@ -139,10 +145,10 @@ static void begin_object(control_t *self, control_client_t *client, const char *
     client->answer_by_us += 2000u * (uint64_t)self->config->cia402.sdo_timeout_ms + OBJECT_US;
 }
 
-static void begin_intensity(control_t *self, control_client_t *client, const char *argument, uint64_t now_us)
+static void begin_intensity(control_t *self, control_client_t *client, const char *words, uint64_t now_us)
 {
     uint32_t percent = 0;
-    if (operator_read_percent(argument, &percent)) {
+    if (operator_read_percent(words, &percent)) {
         begin_request(self, client, OPERATOR_INTENSITY, percent, now_us);
     } else {
         control_client_answer_error(client, "intensity: a whole number of percent is needed, as in `intensity 50`", NULL);
@@ -155,104 +161,28 @@ static bool is_digits(const char *text)
 }
 
 /* "watch" or "watch HZ". */
-static bool begin_watch(control_client_t *client, const char *argument, uint64_t now_us)
+static void begin_watch(control_t *self, control_client_t *client, const char *words, uint64_t now_us)
 {
-    unsigned hz = CONTROL_WATCH_HZ;
-    if (argument[0] == ' ') {
-        argument++;
-        if (!is_digits(argument)) {
-            return false;
-        }
-        for (hz = 0; *argument != '\0'; argument++) {
-            hz = hz * 10 + (unsigned)(*argument - '0');
-        }
-    } else if (argument[0] != '\0') {
-        return false;
-    }
+    const bool has_rate = words[0] != '\0';
+    const unsigned long hz = !has_rate ? CONTROL_WATCH_HZ : is_digits(words) ? strtoul(words, NULL, 10) : 0;
+    (void)self;
     if (hz < 1 || hz > CONTROL_WATCH_MAX_HZ) {
-        return false;
+        control_client_answer_error(client, "watch: `watch` or `watch HZ` with 1 to 50 is allowed", NULL);
+        return;
     }
-    client->watch_period_us = 1000000u / hz;
+    client->watch_period_us = 1000000u / (uint32_t)hz;
     client->watch_next_us = now_us;
-    return true;
 }
 
 /* The answer follows when everything is on the disk. */
-static void begin_dump(control_t *self, control_client_t *client, uint64_t now_us)
+static void begin_dump(control_t *self, control_client_t *client, const char *words, uint64_t now_us)
 {
+    (void)words;
     client->dump_ticket = blackbox_ask(self->blackbox);
     client->answer_by_us = now_us + DUMP_US;
     if (client->dump_ticket == 0) {
         control_client_answer_error(client, "dump: there is no black box; [black-box] directory says where it writes to", NULL);
     }
-}
-
-/* `tick`, `counts`: what a hand needs before and while it does anything. From the newest view: nothing is asked of the motion. */
-static void answer_tick(control_t *self, control_client_t *client, bool has_counts)
-{
-    const snapshot_t *s = control_snapshot(self);
-    json_t json = control_client_start_answer(client);
-    json_open(&json, NULL, '{');
-    json_bool(&json, "ok", true);
-    json_text(&json, "state", state_name(s->state));
-    service_json_hand(&json, s);
-    if (has_counts) {
-        service_json_drives(&json, s);
-    }
-    json_close(&json, '}');
-    control_client_answer(client, &json);
-}
-
-/* Who says that they have been seen gets the list of what was. */
-static void answer_incidents(control_t *self, control_client_t *client, bool is_seeing)
-{
-    uint32_t seen = 0;
-    if (blackbox_feed(self->blackbox) == NULL) {
-        control_client_answer_error(client, "incidents: there is no black box; [black-box] directory says where it writes to",
-                                    NULL);
-        return;
-    }
-    if (is_seeing) {
-        blackbox_see(self->blackbox);
-        control_client_log(client, "", control_snapshot(self)->state);
-    }
-    const uint32_t count = blackbox_list(self->blackbox, self->folder, &seen);
-    json_t json = control_client_start_answer(client);
-    json_open(&json, NULL, '{');
-    json_bool(&json, "ok", true);
-    json_open(&json, "incidents", '[');
-    for (uint32_t i = 0; i < count; i++) {
-        json_open(&json, NULL, '{');
-        json_text(&json, "name", self->folder[i].name);
-        json_bool(&json, "dump", blackbox_is_dump(self->folder[i].name));
-        json_bool(&json, "seen", blackbox_number(self->folder[i].name) <= seen);
-        json_close(&json, '}');
-    }
-    json_close(&json, ']');
-    json_close(&json, '}');
-    control_client_answer(client, &json);
-}
-
-static const char k_intensity[] = "intensity ";
-static const char k_operator_log[] = "operator-log";
-static const char k_by[] = "by ";
-
-static bool is_look(const char *line)
-{
-    return strcmp(line, "status") == 0 || strcmp(line, "tick") == 0 || strcmp(line, "counts") == 0 ||
-           strncmp(line, "beat ", 5) == 0 || strcmp(line, "incidents") == 0 || strcmp(line, "samples") == 0 ||
-           strcmp(line, "selftest") == 0 || strcmp(line, "geometry") == 0 || strcmp(line, "times") == 0 ||
-           strcmp(line, "configuration") == 0 || strcmp(line, "incident-folder") == 0 || strcmp(line, k_operator_log) == 0 ||
-           strncmp(line, "watch", 5) == 0 || strncmp(line, k_by, strlen(k_by)) == 0 ||
-           (control_object_is_said(line) && !control_object_is_write(line));
-}
-
-static bool is_known(const char *line)
-{
-    return operator_request_find(line) != EVENTS || service_words_are(line, strlen(line)) ||
-           strncmp(line, k_intensity, strlen(k_intensity)) == 0 || strcmp(line, "dump") == 0 || strcmp(line, "seen") == 0 ||
-           strcmp(line, k_acknowledge) == 0 || control_configuration_is(line) || control_selftest_is_said(line) ||
-           control_object_is_said(line);
 }
 
 /* Somebody has seen that this is not the configuration that was approved, and wants it. */
@@ -269,8 +199,9 @@ static void acknowledge(control_t *self, control_client_t *client)
 }
 
 /* Whom it asks for, in its own words: a panel has people behind it that the kernel does not know. */
-static void parse_by(control_t *self, control_client_t *client, const char *name)
+static void begin_by(control_t *self, control_client_t *client, const char *name, uint64_t now_us)
 {
+    (void)now_us;
     (void)snprintf(client->entry.by, sizeof client->entry.by, "%s", name);
     if (name[0] == '\0' || strlen(name) >= sizeof client->entry.by) {
         client->entry.by[0] = '\0';
@@ -282,10 +213,10 @@ static void parse_by(control_t *self, control_client_t *client, const char *name
 }
 
 /* Everything but looking on is written down. */
-static void begin_entry(control_t *self, control_client_t *client, const char *line)
+static void begin_entry(control_t *self, control_client_t *client, const char *line, bool is_logged)
 {
     operator_entry_t *entry = &client->entry;
-    client->is_logged = is_known(line);
+    client->is_logged = is_logged;
     (void)clock_gettime(CLOCK_REALTIME, &entry->at);
     entry->uid = (uint32_t)client->peer.uid;
     entry->gid = (uint32_t)client->peer.gid;
@@ -297,9 +228,8 @@ static void begin_entry(control_t *self, control_client_t *client, const char *l
 }
 
 /* What the client may not ask for is refused here, in words that say who may. */
-static bool is_allowed(const control_t *self, control_client_t *client, const char *line)
+static bool is_allowed(const control_t *self, control_client_t *client, const char *line, level_t needed)
 {
-    const level_t needed = levels_needed(line, control_snapshot(self)->intensity_percent);
     const config_label_t *group =
         needed == LEVEL_SERVICE && self->levels.has_service_group ? &self->config->service_group : &self->config->operate_group;
     char error[192];
@@ -313,6 +243,66 @@ static bool is_allowed(const control_t *self, control_client_t *client, const ch
     return false;
 }
 
+/* --- Who carries it out --- */
+
+static void answer_unknown(const control_t *self, control_client_t *client)
+{
+    (void)self;
+    control_client_answer_error(
+        client,
+        "unknown request; status, watch [HZ], tick, counts, intensity PERCENT, engage, hold, resume, park, reset, "
+        "shutdown, service, service-off, torque, jog, signal, home, relay, beat, release, sdo, dump, incidents, samples, "
+        "geometry, incident-folder, operator-log, configuration, configure DIGEST, seen, "
+        "selftest [passed|failed], acknowledge, by NAME and heard TICK REQUEST are allowed",
+        NULL);
+}
+
+/** One of these: it looks, it does something at once, or it needs its words and the time. */
+typedef struct {
+    void (*answer)(const control_t *self, control_client_t *client);
+    void (*act)(control_t *self, control_client_t *client);
+    void (*begin)(control_t *self, control_client_t *client, const char *words, uint64_t now_us);
+} carrier_t;
+
+static const carrier_t k_carriers[REQUEST_KINDS + 1] = {
+    [REQUEST_STATE] = {.begin = begin_state},
+    [REQUEST_INTENSITY] = {.begin = begin_intensity},
+    [REQUEST_HAND] = {.begin = begin_service},
+    [REQUEST_OBJECT] = {.begin = begin_object},
+    [REQUEST_TICK] = {.answer = control_answer_tick},
+    [REQUEST_COUNTS] = {.answer = control_answer_counts},
+    [REQUEST_DUMP] = {.begin = begin_dump},
+    [REQUEST_INCIDENTS] = {.act = control_answer_incidents},
+    [REQUEST_SEEN] = {.act = control_answer_seen},
+    [REQUEST_ACKNOWLEDGE] = {.act = acknowledge},
+    [REQUEST_SELFTEST] = {.act = control_selftest_answer},
+    [REQUEST_SELFTEST_PASSED] = {.act = control_selftest_pass},
+    [REQUEST_SELFTEST_FAILED] = {.act = control_selftest_fail},
+    [REQUEST_CONFIGURATION] = {.answer = control_configuration_answer},
+    [REQUEST_CONFIGURE] = {.begin = control_configuration_accept},
+    [REQUEST_INCIDENT_FOLDER] = {.answer = control_pass_incident_folder},
+    [REQUEST_OPERATOR_LOG] = {.answer = control_pass_operator_log},
+    [REQUEST_STATUS] = {.act = control_client_answer_status},
+    [REQUEST_BY] = {.begin = begin_by},
+    [REQUEST_WATCH] = {.begin = begin_watch},
+    [REQUEST_GEOMETRY] = {.answer = control_geometry_answer},
+    [REQUEST_TIMES] = {.answer = control_times_answer},
+    [REQUEST_SAMPLES] = {.answer = control_pass_samples},
+    [REQUEST_UNKNOWN] = {.answer = answer_unknown},
+};
+
+static void carry_out(control_t *self, control_client_t *client, const request_t *request, uint64_t now_us)
+{
+    const carrier_t *carrier = &k_carriers[request->kind];
+    if (carrier->answer != NULL) {
+        carrier->answer(self, client);
+    } else if (carrier->act != NULL) {
+        carrier->act(self, client);
+    } else {
+        carrier->begin(self, client, request->words, now_us);
+    }
+}
+
 static void accept_request(control_t *self, control_client_t *client, const char *said, uint64_t now_us)
 {
     const char *const line = operator_request_behind_heard(said, &client->has_heard, &client->heard_us);
@@ -320,54 +310,12 @@ static void accept_request(control_t *self, control_client_t *client, const char
         control_client_answer_error(client, "heard: a tick and a request are needed, as in `heard 81204000 engage`", NULL);
         return;
     }
-    const event_t event = operator_request_find(line);
-    if (!is_look(line)) {
-        begin_entry(self, client, line);
+    const request_t request = request_read(line, control_snapshot(self)->intensity_percent);
+    if (!request.is_look) {
+        begin_entry(self, client, line, request.kind != REQUEST_UNKNOWN);
     }
-    if (!is_allowed(self, client, line) || !is_fresh(self, client, line, now_us) ||
-        control_questions_answer(self, client, line)) {
-        return;
-    }
-    if (event != EVENTS) {
-        begin_request(self, client, event, 0, now_us);
-    } else if (strncmp(line, k_intensity, strlen(k_intensity)) == 0) {
-        begin_intensity(self, client, &line[strlen(k_intensity)], now_us);
-    } else if (service_words_are(line, strlen(line))) {
-        begin_service(self, client, line, now_us);
-    } else if (control_object_is_said(line)) {
-        begin_object(self, client, line, now_us);
-    } else if (strcmp(line, "tick") == 0 || strcmp(line, "counts") == 0) {
-        answer_tick(self, client, line[0] == 'c');
-    } else if (strcmp(line, "dump") == 0) {
-        begin_dump(self, client, now_us);
-    } else if (strcmp(line, "incidents") == 0 || strcmp(line, "seen") == 0) {
-        answer_incidents(self, client, line[0] == 's');
-    } else if (strcmp(line, k_acknowledge) == 0) {
-        acknowledge(self, client);
-    } else if (strcmp(line, "selftest") == 0) {
-        control_selftest_answer(self, client);
-    } else if (control_selftest_is_said(line)) {
-        control_selftest_accept(self, client, line);
-    } else if (control_configuration_is(line)) {
-        control_configuration_accept(self, client, line, now_us);
-    } else if (strcmp(line, "incident-folder") == 0 || strcmp(line, k_operator_log) == 0) {
-        control_pass_folder(self, client, line[0] == 'o');
-    } else if (strcmp(line, "status") == 0) {
-        control_client_answer_status(self, client);
-    } else if (strncmp(line, k_by, strlen(k_by)) == 0) {
-        parse_by(self, client, &line[strlen(k_by)]);
-    } else if (strncmp(line, "watch", 5) == 0) {
-        if (!begin_watch(client, &line[5], now_us)) {
-            control_client_answer_error(client, "watch: `watch` or `watch HZ` with 1 to 50 is allowed", NULL);
-        }
-    } else {
-        control_client_answer_error(
-            client,
-            "unknown request; status, watch [HZ], tick, counts, intensity PERCENT, engage, hold, resume, park, reset, "
-            "shutdown, service, service-off, torque, jog, signal, home, relay, beat, release, sdo, dump, incidents, samples, "
-            "geometry, incident-folder, operator-log, configuration, configure DIGEST, seen, "
-            "selftest [passed|failed], acknowledge, by NAME and heard TICK REQUEST are allowed",
-            NULL);
+    if (is_allowed(self, client, line, request.level) && is_fresh(self, client, &request, now_us)) {
+        carry_out(self, client, &request, now_us);
     }
 }
 

@@ -10,13 +10,6 @@
 #include "service/control_client.h"
 #include "service/service_json.h"
 
-static const char k_passed[] = "selftest passed";
-
-bool control_selftest_is_said(const char *line)
-{
-    return strcmp(line, k_passed) == 0 || strcmp(line, "selftest failed") == 0;
-}
-
 static void put_switch(json_t *json, const char *name, const config_label_t *line)
 {
     json_bool(json, name, line->text[0] != '\0');
@@ -47,11 +40,21 @@ void control_selftest_answer(control_t *self, control_client_t *client)
     control_client_answer(client, &json);
 }
 
-void control_selftest_accept(control_t *self, control_client_t *client, const char *line)
+static void note_result(control_t *self, control_client_t *client, bool is_passed)
 {
-    self->selftest = (control_selftest_t){.is_news = true, .is_passed = strcmp(line, k_passed) == 0, .peer = client->peer};
+    self->selftest = (control_selftest_t){.is_news = true, .is_passed = is_passed, .peer = client->peer};
     client->request = EVENT_TICK; /* none that the motion thread has to answer */
     control_client_answer_done(client, control_snapshot(self));
+}
+
+void control_selftest_pass(control_t *self, control_client_t *client)
+{
+    note_result(self, client, true);
+}
+
+void control_selftest_fail(control_t *self, control_client_t *client)
+{
+    note_result(self, client, false);
 }
 
 static uint32_t today(void)

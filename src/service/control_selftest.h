@@ -7,14 +7,12 @@
 #include "service/control.h"
 #include "service/lifetime.h"
 
-/** Whether a line says what came of a self-test; the bare word `selftest` asks. */
-bool control_selftest_is_said(const char *line);
-
 /** Answers `selftest`: what there is to look at, what is allowed, and what is known of the newest one. */
 void control_selftest_answer(control_t *self, control_client_t *client);
 
-/** Takes `selftest passed` or `selftest failed`. Who said it is in the operator log. */
-void control_selftest_accept(control_t *self, control_client_t *client, const char *line);
+/** What came of a self-test. Who said it is in the operator log. */
+void control_selftest_pass(control_t *self, control_client_t *client);
+void control_selftest_fail(control_t *self, control_client_t *client);
 
 /** Keeps what somebody has said of a self-test, and finds whether one is due on this day of the local calendar, whichever way the
  * clock went. The service thread, often.

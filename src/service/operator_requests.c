@@ -59,35 +59,6 @@ const char *operator_request_behind_heard(const char *line, bool *has_heard, uin
     return line + strspn(line, " ");
 }
 
-bool operator_request_is_moving(const char *line, unsigned percent)
-{
-    static const char k_intensity[] = "intensity ";
-    static const char k_torque[] = "torque ";
-    uint32_t wanted = 0;
-    const event_t event = operator_request_find(line);
-    if (event != EVENTS) {
-        return event != EVENT_HOLD && event != EVENT_SERVICE_OFF;
-    }
-    if (strncmp(line, k_intensity, strlen(k_intensity)) == 0) {
-        return operator_read_percent(&line[strlen(k_intensity)], &wanted) && wanted > percent;
-    }
-    if (strncmp(line, k_torque, strlen(k_torque)) == 0) {
-        return strstr(line, " on") != NULL;
-    }
-    return strcmp(line, "acknowledge") == 0 || strcmp(line, "selftest passed") == 0 || strncmp(line, "configure ", 10) == 0;
-}
-
-bool operator_request_is_held(const char *line)
-{
-    static const char *const k_held[] = {"jog ", "signal ", "home ", "relay "};
-    for (unsigned i = 0; i < sizeof k_held / sizeof k_held[0]; i++) {
-        if (strncmp(line, k_held[i], strlen(k_held[i])) == 0) {
-            return true;
-        }
-    }
-    return false;
-}
-
 bool operator_read_percent(const char *text, uint32_t *percent)
 {
     *percent = 0;

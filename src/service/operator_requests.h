@@ -35,14 +35,6 @@ event_t operator_request_find(const char *name);
  *  @return within line; NULL: `heard` without a tick or a request */
 const char *operator_request_behind_heard(const char *line, bool *has_heard, uint64_t *tick_us);
 
-/** True where a request can start or enlarge a motion, or makes that possible. What only makes things safer has no age: hold,
- * release, torque off, service-off, and less intensity. What is held has its own proof of a hand.
- *  @param percent intensity in force */
-bool operator_request_is_moving(const char *line, unsigned percent);
-
-/** True for what is held: jog, signal, home, relay. It has its own proof of a hand, and a hold before it begins voids it, too. */
-bool operator_request_is_held(const char *line);
-
 /** Why a request was refused, and what would be possible.
  *  @param is_shutting_down a shutdown was asked for
  *  @return length without NUL; cut to fit */

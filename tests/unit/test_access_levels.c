@@ -38,51 +38,6 @@ static void test_levels_of_groups(void)
     TEST_ASSERT_EQUAL(LEVEL_SERVICE, level(true, true, 0, OTHERS, OTHERS)); /* root */
 }
 
-static void test_levels_needed_by_each_request(void)
-{
-    static const struct {
-        const char *request;
-        level_t level;
-    } k_rows[] = {
-        {"status", LEVEL_LOOK},
-        {"watch 5", LEVEL_LOOK},
-        {"hold", LEVEL_LOOK},
-        {"by anna", LEVEL_LOOK},
-        {"nonsense", LEVEL_LOOK},
-        {"engage", LEVEL_OPERATE},
-        {"resume", LEVEL_OPERATE},
-        {"park", LEVEL_OPERATE},
-        {"intensity 0", LEVEL_OPERATE},
-        {"intensity 40", LEVEL_OPERATE},
-        {"intensity 41", LEVEL_SERVICE},
-        {"intensity 100", LEVEL_SERVICE},
-        {"service", LEVEL_SERVICE},
-        {"service-off", LEVEL_SERVICE},
-        {"torque 1 on", LEVEL_SERVICE},
-        {"jog 1 5 1", LEVEL_SERVICE},
-        {"home all 1", LEVEL_SERVICE},
-        {"relay 1 1", LEVEL_SERVICE},
-        {"beat 1 1 1", LEVEL_SERVICE},
-        {"release 1", LEVEL_SERVICE},
-        {"tick", LEVEL_LOOK},
-        {"counts", LEVEL_LOOK},
-        {"intensity -1", LEVEL_SERVICE},
-        {"intensity ", LEVEL_SERVICE},
-        {"intensity 0040", LEVEL_SERVICE},
-        {"reset", LEVEL_SERVICE},
-        {"shutdown", LEVEL_SERVICE},
-        {"dump", LEVEL_SERVICE},
-        {"incidents", LEVEL_LOOK},
-        {"seen", LEVEL_OPERATE},
-        {"acknowledge", LEVEL_SERVICE},
-        {"sdo 1 6041:00", LEVEL_SERVICE},
-        {"sdo 1 6083:00 5", LEVEL_SERVICE},
-    };
-    for (unsigned i = 0; i < sizeof k_rows / sizeof k_rows[0]; i++) {
-        TEST_ASSERT_EQUAL_MESSAGE(k_rows[i].level, levels_needed(k_rows[i].request, 40), k_rows[i].request);
-    }
-}
-
 static void test_levels_open_finds_groups_and_refuses_those_that_are_not_there(void)
 {
     static config_t config;
@@ -115,7 +70,6 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_levels_of_groups);
-    RUN_TEST(test_levels_needed_by_each_request);
     RUN_TEST(test_levels_open_finds_groups_and_refuses_those_that_are_not_there);
     RUN_TEST(test_levels_peer_is_who_the_kernel_says);
     return UNITY_END();

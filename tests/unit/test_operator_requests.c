@@ -33,32 +33,6 @@ static void test_operator_request_find_knows_every_request_and_no_other_event(vo
     }
 }
 
-static void test_operator_request_is_moving_what_can_start_or_enlarge_a_motion(void)
-{
-    static const char *const k_moving[] = {
-        "engage",      "resume",        "park",        "reset",           "shutdown",
-        "service",     "intensity 41",
-
-        "torque 1 on", "torque all on", "acknowledge", "selftest passed", "configure 0123456789abcdef"};
-    static const char *const k_others[] = {
-        "hold",  "release 5", "service-off", "intensity 40",    "intensity 0", "torque 1 off", "torque all off", "status",
-        "watch", "dump",      "seen",        "selftest failed", "selftest",    "by on",        "beat 1 1 1",     ""};
-    for (size_t i = 0; i < sizeof k_moving / sizeof k_moving[0]; i++) {
-        TEST_ASSERT_TRUE_MESSAGE(operator_request_is_moving(k_moving[i], 40), k_moving[i]);
-    }
-    for (size_t i = 0; i < sizeof k_others / sizeof k_others[0]; i++) {
-        TEST_ASSERT_FALSE_MESSAGE(operator_request_is_moving(k_others[i], 40), k_others[i]);
-    }
-}
-
-static void test_operator_request_is_held_what_somebody_holds(void)
-{
-    TEST_ASSERT_TRUE(operator_request_is_held("jog 3 2 5") && operator_request_is_held("signal z sine 1 1 9 5") &&
-                     operator_request_is_held("home all 5") && operator_request_is_held("relay 2 5"));
-    TEST_ASSERT_FALSE(operator_request_is_held("hold") || operator_request_is_held("beat 1 1 1") ||
-                      operator_request_is_held("release 5") || operator_request_is_held("torque 1 on"));
-}
-
 static void test_operator_request_behind_heard_is_the_request(void)
 {
     static const char *const k_wrong[] = {"heard ", "heard 5", "heard engage", "heard -5 engage",
@@ -192,8 +166,6 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_operator_request_find_knows_every_request_and_no_other_event);
-    RUN_TEST(test_operator_request_is_moving_what_can_start_or_enlarge_a_motion);
-    RUN_TEST(test_operator_request_is_held_what_somebody_holds);
     RUN_TEST(test_operator_request_behind_heard_is_the_request);
     RUN_TEST(test_operator_explain_says_why_and_what_else);
     RUN_TEST(test_operator_read_percent_takes_whole_numbers_only);
