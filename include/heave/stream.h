@@ -24,8 +24,8 @@
  * rate gives a new grid, on which the curve continues.
  *
  * Frames that are no samples: repetitions of the newest values, values that freeze for up to three frames and then catch up, old
- * frames and frames that others have overtaken. See "What a sample is" in src/DESIGN.md. A sender may send each value up to 8
- * times, such as a loop beside a slower game. After about 12 values it is followed at the rate of its values.
+ * frames and frames that others have overtaken. See "What a sample is" in src/motion/DESIGN.md. A sender may send each value up
+ * to 8 times, such as a loop beside a slower game. After about 12 values it is followed at the rate of its values.
  *
  * Hints: of a sender that states its period, late and lost samples are known from its second sample on. The margin of such a
  * stream, and of one below 25 Hz, is at least an eighth of the period, because extrapolation of a slow stream is poor.
