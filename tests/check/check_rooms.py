@@ -40,6 +40,21 @@ def included(root):
                     break
 
 
+def backend_ways(root):
+    """Includes of a backend where none belongs, and of anything but contracts in a backend."""
+    wrong = []
+    for path in sorted((root / "src").rglob("*.[ch]")) + sorted((root / "hal").rglob("*.[ch]")):
+        top, room = path.relative_to(root).parts[:2]
+        for name in INCLUDE.findall(path.read_text(encoding="utf-8")):
+            found = next((base for base in (path.parent, root / "src", root / "include", *(root / "hal" / backend for backend in rooms.BACKENDS)) if (base / name).is_file()), None)
+            target = (found / name).resolve().relative_to(root.resolve()).parts if found else ()
+            is_backend = target[:1] == ("hal",) and target[:2] != (top, room)
+            is_allowed = target[1] in rooms.NAMES_BACKEND.get(room, ()) if top == "src" and is_backend else not is_backend
+            if not is_allowed or (top == "hal" and target[:1] == ("src",)):
+                wrong.append(f"{path.relative_to(root)} includes {name}: {top}/{room} may not use {'/'.join(target[:2])}")
+    return wrong
+
+
 def references(build):
     """{source: the sources that define what it needs}"""
     defined, needed = {}, {}
@@ -137,6 +152,8 @@ def main():
         found = references(args.build)
         assert found, f"no object in {args.build}"
         must(circles(found), "circles")
+    with suite.case("backends are named where they may be, and use contracts only"):
+        must(backend_ways(root), "includes")
     with suite.case("src/DESIGN.md says the same"):
         must(design_rows(root), "differs")
     with suite.case(f"no room has more than {HEAVIEST:.0%} of the lines"):

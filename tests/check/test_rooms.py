@@ -36,6 +36,20 @@ def private():
     assert planted({"src/daemon/g.c": '#include "motion/d.h"\n'}) == ([], ["src/daemon/g.c includes motion/d.h"])
 
 
+def backend():
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder).resolve()
+        for name, text in {"hal/linux/x.h": "", "hal/linux/y.c": '#include "x.h"\n#include "heave/c.h"\n', "hal/sim/s.h": "", "include/heave/c.h": "", "src/common/b.h": "",
+                           "src/daemon/d.c": '#include "x.h"\n#include "s.h"\n'}.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(text, encoding="utf-8")
+        assert check_rooms.backend_ways(root) == [], check_rooms.backend_ways(root)
+        (root / "src/common/e.c").write_text('#include "x.h"\n', encoding="utf-8")
+        (root / "hal/sim/t.c").write_text('#include "common/b.h"\n#include "x.h"\n', encoding="utf-8")
+        assert check_rooms.backend_ways(root) == ["src/common/e.c includes x.h: src/common may not use hal/linux", "hal/sim/t.c includes common/b.h: hal/sim may not use src/common",
+                                                  "hal/sim/t.c includes x.h: hal/sim may not use hal/linux"], check_rooms.backend_ways(root)
+
+
 def circle():
     with tempfile.TemporaryDirectory() as folder:
         objects = Path(folder) / "src/config/CMakeFiles/x.dir"
@@ -61,6 +75,7 @@ def long_file():
 def main():
     suite = tap.Suite()
     for name, check in {"nothing wrong is nothing": fine, "an include the wrong way": wrong_way, "a private header of the core": private,
+                        "a backend that is named elsewhere, and one that uses more than contracts": backend,
                         "sources that lead to each other": circle, "a file that is too long": long_file}.items():
         with suite.case(f"rooms: {name}"):
             check()

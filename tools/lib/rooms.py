@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""rooms.py - the folders of src/ and which of them each may use. tests/check/check_rooms.py holds the sources and src/DESIGN.md to it."""
+"""rooms.py - the folders of src/ and hal/, and which of them each may use. tests/check/check_rooms.py holds the sources and src/DESIGN.md to it."""
 from pathlib import PurePath
 
 # The portable core: firmware. Without it, the programs.
@@ -24,6 +24,15 @@ PROGRAMS = {
     "identify": {"common"},
     "heavectl": {"common", "setup", "identify"},
     "panel": {"common", "service", "identify"},
+}
+# The backends use the contracts in include/ and nothing else.
+BACKENDS = ("sim", "linux", "template")
+# The rooms that name a backend: only the daemon chooses one for a platform.
+NAMES_BACKEND = {
+    "daemon": {"sim", "linux"},
+    "record": {"sim"},  # plays on simulated drives
+    "inspect": {"linux"},  # opens a bus to look at it
+    "twin": {"linux"},  # opens a bus to be on it
 }
 
 
