@@ -39,28 +39,41 @@ static bool are_modes_valid(const cia402_config_t *config)
     return true;
 }
 
-static bool is_config_valid(const cia402_config_t *config)
+static bool are_times_valid(const cia402_config_t *config)
+{
+    return cia402_is_period(config->period_us) && config->heartbeat_ms != 0 &&
+           config->heartbeat_timeout_ms > config->heartbeat_ms && config->sdo_timeout_ms != 0;
+}
+
+static bool are_rates_valid(const cia402_config_t *config)
 {
     const bool is_counter = config->sync_counter == 0 || (config->sync_counter >= 2 && config->sync_counter <= 240);
     const bool is_telemetry = config->telemetry == 0 || (config->telemetry_every >= 1 && config->telemetry_every <= 240);
-    const bool is_rate = config->answer_every <= CIA402_ANSWER_EVERY_MAX;
+    return is_counter && is_telemetry && config->answer_every <= CIA402_ANSWER_EVERY_MAX;
+}
+
+static bool is_axis_valid(const cia402_config_t *config, unsigned k)
+{
+    const cia402_axis_config_t *axis = &config->axis[k];
+    return is_node_free(config, k) && counts_is_valid(&axis->scale) && axis->step_max_q32 > 0 && axis->following_max_q32 >= 0 &&
+           axis->items <= CIA402_ITEMS_MAX;
+}
+
+static bool is_config_valid(const cia402_config_t *config)
+{
     const char *why = NULL;
-    if (config->axes < 1 || config->axes > DRIVES_MAX || config->master_node < 1 || config->master_node > CIA402_NODE_MAX ||
-        !is_counter || !is_telemetry || !is_rate || !cia402_is_period(config->period_us) || config->heartbeat_ms == 0 ||
-        config->heartbeat_timeout_ms <= config->heartbeat_ms || config->sdo_timeout_ms == 0) {
+    if (config->axes < 1 || config->axes > DRIVES_MAX || config->master_node < 1 || config->master_node > CIA402_NODE_MAX) {
         return false;
     }
-    if (!are_modes_valid(config) || config->pdo_step > 64u || !cia402_pdos_fit(config, &why)) {
+    if (!are_times_valid(config) || !are_rates_valid(config) || !are_modes_valid(config) || config->pdo_step > 64u ||
+        !cia402_pdos_fit(config, &why)) {
         return false;
     }
+    bool are_valid = true;
     for (unsigned k = 0; k < config->axes; k++) {
-        const cia402_axis_config_t *axis = &config->axis[k];
-        if (!is_node_free(config, k) || !counts_is_valid(&axis->scale) || axis->step_max_q32 <= 0 ||
-            axis->following_max_q32 < 0 || axis->items > CIA402_ITEMS_MAX) {
-            return false;
-        }
+        are_valid = are_valid && is_axis_valid(config, k);
     }
-    return true;
+    return are_valid;
 }
 
 hv_status_t cia402_init(cia402_t *self, const cia402_config_t *config, hal_can_t can)

@@ -211,28 +211,43 @@ static bool is_name_of_place(const char *name)
     return false;
 }
 
+static void parse_type(reader_t *self, const eds_number_t *found, const char *value)
+{
+    self->object->type = (uint16_t)found->value;
+    self->object->is_parent = false;
+    if (!found->is_there || found->value < 1 || found->value > UINT16_MAX) {
+        complain(self, _("no DataType that there is"), value);
+    }
+}
+
+/* Keys whose value is kept as it is; false where it is another one. */
+static bool keep_number(eds_object_t *object, const char *key, const eds_number_t *found)
+{
+    eds_number_t *place = strcasecmp(key, "LowLimit") == 0       ? &object->low
+                          : strcasecmp(key, "HighLimit") == 0    ? &object->high
+                          : strcasecmp(key, "DefaultValue") == 0 ? &object->fallback
+                                                                 : NULL;
+    if (place != NULL) {
+        *place = *found;
+    }
+    return place != NULL;
+}
+
 static void parse_of_object(reader_t *self, const char *key, const char *value)
 {
     eds_object_t *object = self->object;
     const eds_number_t found = number(value);
+    if (keep_number(object, key, &found)) {
+        return;
+    }
     if (strcasecmp(key, "AccessType") == 0) {
         parse_access(self, value);
     } else if (strcasecmp(key, "DataType") == 0) {
-        object->type = (uint16_t)found.value;
-        object->is_parent = false;
-        if (!found.is_there || found.value < 1 || found.value > UINT16_MAX) {
-            complain(self, _("no DataType that there is"), value);
-        }
+        parse_type(self, &found, value);
     } else if (strcasecmp(key, "PDOMapping") == 0) {
         object->is_mappable = found.value != 0;
     } else if (strcasecmp(key, "CompactSubObj") == 0) {
         object->compact = found.value >= 0 && found.value < UINT8_MAX ? (uint8_t)found.value : 0;
-    } else if (strcasecmp(key, "LowLimit") == 0) {
-        object->low = found;
-    } else if (strcasecmp(key, "HighLimit") == 0) {
-        object->high = found;
-    } else if (strcasecmp(key, "DefaultValue") == 0) {
-        object->fallback = found;
     } else if (strcasecmp(key, "ParameterValue") == 0) {
         if (object->parameter.is_there || object->parameter.is_text) {
             note_stray(self);

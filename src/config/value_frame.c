@@ -210,6 +210,43 @@ static const char *append(canraw_frame_t *frame, canraw_field_t *field, bool has
     return NULL;
 }
 
+/* `name` or `name.3` between the brace and the colon. Returns what is wrong, NULL where nothing is. */
+static const char *read_name(const config_key_t *key, const char *token, const char *colon, canraw_field_t *field)
+{
+    const char *point = memchr(token, '.', (size_t)(colon - token));
+    const span_t name = {token + 1, (size_t)((point != NULL ? point : colon) - token) - 1u};
+    unsigned slot = 0;
+    if (point != NULL && read_small(point + 1, 1, DRIVES_MAX, &slot) != colon) {
+        return _("has no number of a drive from 1 to 7 behind its point");
+    }
+    field->slot = (uint8_t)slot;
+    if (span_find_word(key->words, name) < 0) {
+        return _("is no field of this frame");
+    }
+    for (unsigned i = 0; i < CANRAW_VALUES; i++) {
+        field->value = span_is_word(name, k_values[i]) ? (canraw_value_t)i : field->value;
+    }
+    return slot != 0 && field->value == CANRAW_COUNTER ? _("is of the whole frame, and takes no number") : NULL;
+}
+
+/* The type, and a place if there is one, up to the brace. Returns what is wrong, NULL where nothing is. */
+static const char *read_form(const char *at, const char *brace, const canraw_frame_t *frame, canraw_field_t *field,
+                             bool *has_place)
+{
+    bool has_order = false;
+    const char *end = read_type(at, field, &has_order);
+    *has_place = end != NULL && *end == '@';
+    if (end == NULL || (*end != '}' && !*has_place)) {
+        return _("has no type that there is");
+    }
+    end = *has_place ? read_place(end, field) : end;
+    if (end != brace) {
+        return _("has no place that there is, such as @1.4 for byte 1, bit 4");
+    }
+    const char *wrong = judge_type(frame, field, has_order, *has_place);
+    return wrong == NULL && *has_place ? judge_place(frame, field) : wrong;
+}
+
 /* Reads `{name:type}` into the next field. Returns what is wrong, NULL where nothing is. */
 static const char *add_field(const config_key_t *key, const char *token, size_t length, canraw_frame_t *frame)
 {
@@ -221,35 +258,12 @@ static const char *add_field(const config_key_t *key, const char *token, size_t 
     if (length < 2 || length > FIELD_BYTES || token[length - 1] != '}' || colon == NULL) {
         return _("is no field");
     }
-    const char *point = memchr(token, '.', (size_t)(colon - token));
-    const size_t name_length = (size_t)((point != NULL ? point : colon) - token) - 1u;
     canraw_field_t field = {.at = 0};
-    bool has_order = false;
-    unsigned slot = 0;
-    if (point != NULL && read_small(point + 1, 1, DRIVES_MAX, &slot) != colon) {
-        return _("has no number of a drive from 1 to 7 behind its point");
+    bool has_place = false;
+    wrong = read_name(key, token, colon, &field);
+    if (wrong == NULL) {
+        wrong = read_form(colon + 1, token + length - 1, frame, &field, &has_place);
     }
-    field.slot = (uint8_t)slot;
-    if (span_find_word(key->words, (span_t){token + 1, name_length}) < 0) {
-        return _("is no field of this frame");
-    }
-    for (unsigned i = 0; i < CANRAW_VALUES; i++) {
-        field.value = span_is_word((span_t){token + 1, name_length}, k_values[i]) ? (canraw_value_t)i : field.value;
-    }
-    if (slot != 0 && field.value == CANRAW_COUNTER) {
-        return _("is of the whole frame, and takes no number");
-    }
-    const char *end = read_type(colon + 1, &field, &has_order);
-    const bool has_place = end != NULL && *end == '@';
-    if (end == NULL || (*end != '}' && !has_place)) {
-        return _("has no type that there is");
-    }
-    end = has_place ? read_place(end, &field) : end;
-    if (end == NULL || end != token + length - 1) {
-        return _("has no place that there is, such as @1.4 for byte 1, bit 4");
-    }
-    wrong = judge_type(frame, &field, has_order, has_place);
-    wrong = wrong == NULL && has_place ? judge_place(frame, &field) : wrong;
     return wrong != NULL ? wrong : append(frame, &field, has_place);
 }
 
@@ -339,22 +353,26 @@ static bool parse_step(const config_key_t *key, const char *text, void *field, c
 
 /* --- To text --- */
 
-static void format_field(const canraw_frame_t *frame, const canraw_field_t *field, config_text_t *text)
+static void format_check(const canraw_frame_t *frame, const canraw_field_t *field, config_text_t *text)
 {
-    const char *name = k_values[field->value];
-    if (field->value == CANRAW_SUM || field->value == CANRAW_XOR) {
-        config_text_add(text, "{%s}", name);
-        return;
-    }
-    if (canraw_is_check(field->value)) {
-        config_text_add(text, "{%s:%02X", name, (unsigned)frame->data[field->at]);
+    config_text_add(text, "{%s", k_values[field->value]);
+    if (field->value != CANRAW_SUM && field->value != CANRAW_XOR) {
+        config_text_add(text, ":%02X", (unsigned)frame->data[field->at]);
         if (frame->crc_initial != 0 || frame->crc_final != 0) {
             config_text_add(text, "/%02X", (unsigned)frame->crc_initial);
         }
         if (frame->crc_final != 0) {
             config_text_add(text, "/%02X", (unsigned)frame->crc_final);
         }
-        config_text_add(text, "}");
+    }
+    config_text_add(text, "}");
+}
+
+static void format_field(const canraw_frame_t *frame, const canraw_field_t *field, config_text_t *text)
+{
+    const char *name = k_values[field->value];
+    if (canraw_is_check(field->value)) {
+        format_check(frame, field, text);
         return;
     }
     config_text_add(text, "{%s", name);

@@ -308,7 +308,7 @@ static void await_first_cycle(live_t *self)
     }
 }
 
-static int run(live_t *self, const config_t *config)
+static int start_threads(live_t *self)
 {
     if (!operator_log_start(&self->operators)) {
         return print_message(EXIT_UNAVAILABLE, "cannot start the operator log: %s", strerror(errno));
@@ -327,6 +327,32 @@ static int run(live_t *self, const config_t *config)
         (void)print_message(0, "cannot start the black box: %s", strerror(errno));
     }
     writers_start(&self->writers);
+    return EXIT_DONE;
+}
+
+/* What the end was like; code where nothing is to be said of it. */
+static int judge_end(const live_t *self, bool has_ended, int code)
+{
+    if (has_ended && self->loop.has_lost_clock) {
+        return print_message(EXIT_SOFTWARE, "the system does not wait for the next cycle: all drives were told to stop now");
+    }
+    if (self->signals > 1) {
+        const bool is_energized = has_ended && self->loop.is_energized;
+        return print_message(EXIT_REFUSED, "ended at once by a second signal%s",
+                             is_energized ? ", and not every drive has confirmed that its torque is off" : "");
+    }
+    if (has_ended && gateway_energized(&self->loop.session.gateway) != 0) {
+        return print_message(EXIT_REFUSED, "ended, but not every drive has confirmed that its torque is off");
+    }
+    return code;
+}
+
+static int run(live_t *self, const config_t *config)
+{
+    const int refused = start_threads(self);
+    if (refused != EXIT_DONE) {
+        return refused;
+    }
     await_first_cycle(self);
     const bool is_locked = mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
     motion_loop_memory(&self->loop, is_locked ? MOTION_MEMORY_LOCKED : MOTION_MEMORY_UNLOCKED);
@@ -344,18 +370,7 @@ static int run(live_t *self, const config_t *config)
         (void)pthread_join(self->loop.thread, NULL);
         self->is_thread_running = false;
     }
-    const int code = finish(self);
-    if (has_ended && self->loop.has_lost_clock) {
-        return print_message(EXIT_SOFTWARE, "the system does not wait for the next cycle: all drives were told to stop now");
-    }
-    if (self->signals > 1) {
-        const bool is_energized = has_ended && self->loop.is_energized;
-        return print_message(EXIT_REFUSED, "ended at once by a second signal%s",
-                             is_energized ? ", and not every drive has confirmed that its torque is off" : "");
-    }
-    if (has_ended && gateway_energized(&self->loop.session.gateway) != 0) {
-        return print_message(EXIT_REFUSED, "ended, but not every drive has confirmed that its torque is off");
-    }
+    const int code = judge_end(self, has_ended, finish(self));
     const bool is_anew = has_ended && code == EXIT_DONE && reconfigure_starts_anew(&self->reconfigure, &self->control);
     if (is_anew) {
         sd_notify_restart(&self->manager, false);
@@ -383,7 +398,7 @@ static void open_blackbox(live_t *self, const config_t *config)
 }
 
 /* What can be refused comes first: a second heaved must not empty the files of the first. */
-static int open_all(live_t *self, const config_t *config)
+static int open_what_can_be_refused(live_t *self, const config_t *config)
 {
     char in_directory[SOCKET_PATH_MAX];
     const char *path =
@@ -399,6 +414,12 @@ static int open_all(live_t *self, const config_t *config)
     code = code == EXIT_DONE ? lifetime_open(&self->life, config, cylinders + (config->settings.has_angle ? 1u : 0u)) : code;
     self->control.lost.life = &self->life.now;
     self->control.store = &self->store;
+    return code;
+}
+
+static int open_all(live_t *self, const config_t *config)
+{
+    const int code = open_what_can_be_refused(self, config);
     if (code != EXIT_DONE) {
         return code;
     }

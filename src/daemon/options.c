@@ -220,9 +220,19 @@ static const char *accept_drive(options_t *self, const char *which)
     return NULL;
 }
 
+/* Of the things that heaved does, one at a time. */
+static const char *accept_mode(options_t *self, run_mode_t mode)
+{
+    if (mode != MODE_RUN && self->mode != MODE_RUN && self->mode != mode) {
+        return _("only one of --check, --envelope, --doctor, --dump-config, --dump-dbc, --import-dcf, --play, --presets, "
+                 "--scan, --template, --keys, --help, --version at a time");
+    }
+    self->mode = mode != MODE_RUN ? mode : self->mode;
+    return NULL;
+}
+
 static const char *accept_option(options_t *self, int option)
 {
-    const run_mode_t mode = mode_of(option);
     if (option == '?' || option == ':') { /* getopt's own */
         return option == ':' ? _("option needs a value") : _("unknown option");
     }
@@ -240,12 +250,7 @@ static const char *accept_option(options_t *self, int option)
     if (value_of(self, option) != NULL) {
         *value_of(self, option) = optarg;
     }
-    if (mode != MODE_RUN && self->mode != MODE_RUN && self->mode != mode) {
-        return _("only one of --check, --envelope, --doctor, --dump-config, --dump-dbc, --import-dcf, --play, --presets, "
-                 "--scan, --template, --keys, --help, --version at a time");
-    }
-    self->mode = mode != MODE_RUN ? mode : self->mode;
-    return NULL;
+    return accept_mode(self, mode_of(option));
 }
 
 static const char *dcf_contradiction(const options_t *self)
@@ -262,22 +267,9 @@ static const char *dcf_contradiction(const options_t *self)
 }
 
 /* Options that do not go together. */
-static const char *contradiction(const options_t *self)
+/* Options of another mode than the one that was asked for. */
+static const char *stray_option(const options_t *self)
 {
-    const char *wrong = dcf_contradiction(self);
-    if (wrong != NULL) {
-        return wrong;
-    }
-    if (self->mode == MODE_HELP || self->mode == MODE_VERSION || self->mode == MODE_PRESETS || self->mode == MODE_IMPORT_DCF ||
-        self->mode == MODE_SCAN || self->mode == MODE_KEYS) {
-        return NULL;
-    }
-    if (self->mode == MODE_TEMPLATE) {
-        return self->template_driver != NULL ? NULL : _("--template needs a kind and a driver, as in --template hexapod cia402");
-    }
-    if (self->config == NULL) {
-        return _("--config FILE or --preset NAME is missing");
-    }
     if (self->mode != MODE_RUN && (self->record != NULL || self->socket != NULL)) {
         return _("--record and --socket are for running live");
     }
@@ -294,6 +286,24 @@ static const char *contradiction(const options_t *self)
         return _("--socket needs a path of 1 to 107 characters");
     }
     return NULL;
+}
+
+static bool is_without_config(run_mode_t mode)
+{
+    return mode == MODE_HELP || mode == MODE_VERSION || mode == MODE_PRESETS || mode == MODE_IMPORT_DCF || mode == MODE_SCAN ||
+           mode == MODE_KEYS;
+}
+
+static const char *contradiction(const options_t *self)
+{
+    const char *wrong = dcf_contradiction(self);
+    if (wrong != NULL || is_without_config(self->mode)) {
+        return wrong;
+    }
+    if (self->mode == MODE_TEMPLATE) {
+        return self->template_driver != NULL ? NULL : _("--template needs a kind and a driver, as in --template hexapod cia402");
+    }
+    return self->config == NULL ? _("--config FILE or --preset NAME is missing") : stray_option(self);
 }
 
 static int complain(const char *what, const char *about)

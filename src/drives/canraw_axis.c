@@ -356,17 +356,20 @@ static void step_stop(canraw_axis_t *self, const canraw_map_t *map, uint64_t now
     }
 }
 
-void canraw_axis_step(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
+/* Its position, or its status, is older than it may be. */
+static bool is_silent(const canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
 {
     const uint64_t silent_us = (uint64_t)map->offline_periods * map->period_us;
-    const bool is_position_old = self->is_placed && now_us - self->actual_us > silent_us;
-    const bool is_status_old = self->has_status && now_us - self->status_us > silent_us * map->status_every;
-    if (is_position_old || is_status_old) {
+    return (self->is_placed && now_us - self->actual_us > silent_us) ||
+           (self->has_status && now_us - self->status_us > silent_us * map->status_every);
+}
+
+void canraw_axis_step(canraw_axis_t *self, const canraw_map_t *map, uint64_t now_us)
+{
+    if (is_silent(self, map, now_us)) {
         canraw_axis_lose(self, map, now_us);
     }
-    if (self->reset_until_us != 0 && now_us > self->reset_until_us) {
-        self->reset_until_us = 0;
-    }
+    self->reset_until_us = now_us > self->reset_until_us ? 0 : self->reset_until_us;
     step_stop(self, map, now_us);
     if (!self->is_begun) { /* a request is seen in one poll before it can end in the next */
         self->is_begun = true;

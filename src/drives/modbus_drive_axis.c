@@ -43,6 +43,18 @@ static void end_startup(modbus_drive_axis_t *self, const modbus_drive_map_t *map
     modbus_drive_phase_enter_fault(self, map, now_us);
 }
 
+/* A reset that was asked for waits until the drive stands, and not for ever. */
+static void step_reset(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
+{
+    if (self->reset_asked_us != 0 && now_us - self->reset_asked_us > RESET_WAIT_US) {
+        self->reset_asked_us = 0;
+    }
+    if (self->reset_asked_us != 0 && !modbus_drive_phase_is_stopping(self)) {
+        self->reset_asked_us = 0;
+        begin_reset(self, map, now_us);
+    }
+}
+
 void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t *map, uint64_t now_us)
 {
     if (self->phase != MODBUS_DRIVE_WAITING && now_us - self->actual_us > map->feedback_timeout_us) {
@@ -62,13 +74,7 @@ void modbus_drive_axis_step(modbus_drive_axis_t *self, const modbus_drive_map_t 
         quick_stop_step(&self->quick_stop, self->actual_q32, self->actual_us, self->mark_us, now_us)) {
         modbus_drive_phase_command(self, map, MODBUS_DRIVE_DISABLE);
     }
-    if (self->reset_asked_us != 0 && now_us - self->reset_asked_us > RESET_WAIT_US) {
-        self->reset_asked_us = 0;
-    }
-    if (self->reset_asked_us != 0 && !modbus_drive_phase_is_stopping(self)) {
-        self->reset_asked_us = 0;
-        begin_reset(self, map, now_us);
-    }
+    step_reset(self, map, now_us);
     if (self->phase == MODBUS_DRIVE_PLACING) {
         step_placing(self, map);
     }

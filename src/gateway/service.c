@@ -138,9 +138,29 @@ static void place_loose(service_t *self, const cycle_t *cycle)
     }
 }
 
-fault_code_t service_step(service_t *self, const cycle_t *cycle)
+/* Drives on their way to their zero, or up. Returns false where one takes too long. */
+static bool step_drives(service_t *self, const cycle_t *cycle)
 {
     bool is_in_time = true;
+    for (unsigned i = 0; i < cycle->feedback.count; i++) {
+        if ((self->homing >> i & 1u) != 0) {
+            is_in_time = step_home(self, cycle, i) && is_in_time;
+        } else if (((self->wanted & ~self->up) >> i & 1u) != 0) {
+            is_in_time = step_up(self, cycle, i) && is_in_time;
+        }
+    }
+    return is_in_time;
+}
+
+/* What the hand holds has come to its own end. */
+static bool has_finished(const service_t *self, const cycle_t *cycle)
+{
+    return (self->doing == SERVICE_HOME && self->homing == 0) ||
+           (self->has_end && moves_by_hand(self->doing) && motion_is_done(cycle->motion));
+}
+
+fault_code_t service_step(service_t *self, const cycle_t *cycle)
+{
     if (self->doing != SERVICE_NOTHING && !deadman_step(&self->hand, hand_us(self, cycle))) {
         service_let_go(self, cycle->motion);
     }
@@ -149,19 +169,12 @@ fault_code_t service_step(service_t *self, const cycle_t *cycle)
         self->up &= ~self->off_due;
         self->off_due = ask_due(cycle, self->off_due, DRIVES_DISABLE);
     }
-    for (unsigned i = 0; i < cycle->feedback.count; i++) {
-        if ((self->homing >> i & 1u) != 0) {
-            is_in_time = step_home(self, cycle, i) && is_in_time;
-        } else if (((self->wanted & ~self->up) >> i & 1u) != 0) {
-            is_in_time = step_up(self, cycle, i) && is_in_time;
-        }
-    }
+    const bool is_in_time = step_drives(self, cycle);
     place_loose(self, cycle);
     if (moves_by_hand(self->doing) && motion_is_stopping(cycle->motion)) {
         service_let_go(self, cycle->motion); /* motion stopped it before a singularity or an end: that is no end of its own */
     }
-    if ((self->doing == SERVICE_HOME && self->homing == 0) ||
-        (self->has_end && moves_by_hand(self->doing) && motion_is_done(cycle->motion))) {
+    if (has_finished(self, cycle)) {
         self->doing = SERVICE_NOTHING;
         self->finished = self->hand.series;
         deadman_release(&self->hand);

@@ -191,6 +191,21 @@ static bool join(ctl_t *self, char *const *word, int count)
     return true;
 }
 
+/* Options that go with other commands, or not together; NULL: none. */
+static const char *stray_option(const ctl_t *self, const char *command)
+{
+    if (self->is_waiting && ctl_destination(command) == NULL) {
+        return _("--wait goes with engage, resume, park and shutdown");
+    }
+    if ((self->save != NULL || self->compare != NULL || self->eds != NULL) && strcmp(command, "drive") != 0) {
+        return _("--save, --compare and --eds go with drive");
+    }
+    if (self->compare != NULL && (self->save != NULL || self->eds != NULL)) {
+        return _("--save, with or without --eds, or --compare, not both");
+    }
+    return self->eds != NULL && self->save == NULL ? _("--eds goes with --save") : NULL;
+}
+
 const char *ctl_parse_command(ctl_t *self, int argc, char **argv)
 {
     static char wrong[128];
@@ -217,17 +232,9 @@ const char *ctl_parse_command(ctl_t *self, int argc, char **argv)
     if (!join(self, &argv[optind + 1], words)) {
         return _("a word is empty, has a blank in it, or is too long");
     }
-    if (self->is_waiting && ctl_destination(row->name) == NULL) {
-        return _("--wait goes with engage, resume, park and shutdown");
-    }
-    if ((self->save != NULL || self->compare != NULL || self->eds != NULL) && strcmp(row->name, "drive") != 0) {
-        return _("--save, --compare and --eds go with drive");
-    }
-    if (self->compare != NULL && (self->save != NULL || self->eds != NULL)) {
-        return _("--save, with or without --eds, or --compare, not both");
-    }
-    if (self->eds != NULL && self->save == NULL) {
-        return _("--eds goes with --save");
+    const char *stray = stray_option(self, row->name);
+    if (stray != NULL) {
+        return stray;
     }
     self->command = row->name;
     if (strcmp(row->name, "jog") == 0) {

@@ -285,6 +285,28 @@ static void read_keys(hold_t *self)
     accept_key(self, is_enter);
 }
 
+/* Stopped, or starved: whoever holds the key has to say so anew. */
+static void watch_absence(hold_t *self, int64_t looked_ms)
+{
+    if (now_ms() - looked_ms > HOLD_ABSENCE_MS) {
+        hold_key_miss(&self->key, now_ms());
+        self->is_let_go_due = true;
+    }
+}
+
+/* Silence of heaved, or the end of what is watched. */
+static void watch_ends(hold_t *self)
+{
+    if (self->asked != ASKED_NOTHING && now_ms() - self->asked_ms > HOLD_SILENCE_MS) {
+        end(self, EXIT_UNAVAILABLE, N_("heaved does not answer"));
+    }
+    if (!self->is_over && self->watch != NULL && self->watch->is_over(self->watch->context, self->is_pressed)) {
+        show(self->is_pressed ? _("there: let go of the key") : _("let go"));
+        self->has_arrived = true;
+        end(self, EXIT_DONE, NULL);
+    }
+}
+
 static void run(hold_t *self, const volatile sig_atomic_t *is_interrupted)
 {
     int64_t looked_ms = now_ms();
@@ -294,10 +316,7 @@ static void run(hold_t *self, const volatile sig_atomic_t *is_interrupted)
             end(self, EXIT_UNAVAILABLE, error_text(errno));
             return;
         }
-        if (now_ms() - looked_ms > HOLD_ABSENCE_MS) { /* stopped, or starved: whoever holds the key has to say so anew */
-            hold_key_miss(&self->key, now_ms());
-            self->is_let_go_due = true;
-        }
+        watch_absence(self, looked_ms);
         looked_ms = now_ms();
         if (wait[1].revents != 0) {
             hear(self);
@@ -305,14 +324,7 @@ static void run(hold_t *self, const volatile sig_atomic_t *is_interrupted)
         if (wait[0].revents != 0 && !self->is_over) {
             read_keys(self);
         }
-        if (self->asked != ASKED_NOTHING && now_ms() - self->asked_ms > HOLD_SILENCE_MS) {
-            end(self, EXIT_UNAVAILABLE, N_("heaved does not answer"));
-        }
-        if (!self->is_over && self->watch != NULL && self->watch->is_over(self->watch->context, self->is_pressed)) {
-            show(self->is_pressed ? _("there: let go of the key") : _("let go"));
-            self->has_arrived = true;
-            end(self, EXIT_DONE, NULL);
-        }
+        watch_ends(self);
         if (!self->is_over) {
             speak(self);
         }

@@ -34,23 +34,28 @@ static int complain(int code, const char *what, const char *why)
     return code;
 }
 
+/* False: it is over with the terminal, or somebody has interrupted it. */
+static bool read_byte(const run_t *self, char *byte)
+{
+    ssize_t got = -1;
+    do {
+        got = read(STDIN_FILENO, byte, 1);
+    } while (got < 0 && errno == EINTR && *self->is_interrupted == 0);
+    if (got < 0 && errno != EINTR) {
+        (void)complain(EXIT_IO, _("the terminal"), error_text(errno));
+    }
+    return got == 1 && *self->is_interrupted == 0;
+}
+
 /* Byte by byte: what comes after the line feed may be a key that is held. */
 static typed_t read_line(const run_t *self, char line[LINE_MAX_BYTES])
 {
     size_t length = 0;
-    for (;;) {
-        char byte = '\0';
-        const ssize_t got = read(STDIN_FILENO, &byte, 1);
-        if (got < 0 && errno != EINTR) {
-            (void)complain(EXIT_IO, _("the terminal"), error_text(errno));
-        }
-        if (*self->is_interrupted != 0 || got == 0 || (got < 0 && errno != EINTR)) {
+    for (char byte = '\0'; byte != '\n';) {
+        if (!read_byte(self, &byte)) {
             return TYPED_QUIT;
         }
-        if (got == 1 && byte == '\n') {
-            break;
-        }
-        if (got == 1 && length < LINE_MAX_BYTES - 1u) {
+        if (byte != '\n' && length < LINE_MAX_BYTES - 1u) {
             line[length++] = byte;
         }
     }

@@ -112,22 +112,10 @@ static int collect(setup_session_t *self, int fd)
     return error;
 }
 
-int setup_session_run(setup_session_t *self, const ini_text_t *config, const char *const *options)
+/* Runs the program with what it says kept. Returns its exit code; -1: it was not run, which has been said. */
+static int run_program(setup_session_t *self, char *const arguments[])
 {
-    char *arguments[8] = {self->program};
     int ends[2], status = 0;
-    unsigned count = 1;
-    if (config != NULL && !write_config(self, config)) {
-        (void)fail(self, self->config, error_text(errno));
-        return -1;
-    }
-    if (config != NULL) {
-        arguments[count++] = (char *)"--config";
-        arguments[count++] = self->config;
-    }
-    for (; *options != NULL && count < 7u; options++) {
-        arguments[count++] = (char *)(uintptr_t)*options;
-    }
     if (pipe2(ends, O_CLOEXEC) != 0) {
         (void)fail(self, "pipe", error_text(errno));
         return -1;
@@ -150,6 +138,24 @@ int setup_session_run(setup_session_t *self, const ini_text_t *config, const cha
         return -1;
     }
     return WEXITSTATUS(status);
+}
+
+int setup_session_run(setup_session_t *self, const ini_text_t *config, const char *const *options)
+{
+    char *arguments[8] = {self->program};
+    unsigned count = 1;
+    if (config != NULL && !write_config(self, config)) {
+        (void)fail(self, self->config, error_text(errno));
+        return -1;
+    }
+    if (config != NULL) {
+        arguments[count++] = (char *)"--config";
+        arguments[count++] = self->config;
+    }
+    for (; *options != NULL && count < 7u; options++) {
+        arguments[count++] = (char *)(uintptr_t)*options;
+    }
+    return run_program(self, arguments);
 }
 
 /* --- What it begins from --- */

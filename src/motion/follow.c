@@ -263,6 +263,17 @@ static bool is_under_way(const motion_t *self, const motion_target_t *target)
     return is_same;
 }
 
+/* What a sender says of the time between its frames, and what it keeps of that. */
+static void note_times(motion_t *self, const motion_target_t *target, uint64_t gap_us, uint64_t now_us)
+{
+    /* a sender that does not wait for the time it states does not mean it */
+    self->is_time_idle = gap_us <= STREAM_HINT_MAX_US && (self->is_time_idle || gap_us * 5 < self->last_stated_us * UINT64_C(2));
+    const bool is_short = target->is_timed && target->time_ms <= STREAM_HINT_MAX_US / 1000;
+    self->last_gap_us = is_short && gap_us <= STREAM_QUIET_US ? (uint32_t)gap_us : 0;
+    self->last_us = now_us;
+    self->last_stated_us = period_stated(target);
+}
+
 void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_us)
 {
     if (target->space != self->space || !follow_is_moving(self)) {
@@ -279,12 +290,7 @@ void follow_target(motion_t *self, const motion_target_t *target, uint64_t now_u
     }
     const uint64_t gap_us = now_us - self->last_us;
     const uint32_t hint_us = period_hinted(self, target, gap_us);
-    /* a sender that does not wait for the time it states does not mean it */
-    self->is_time_idle = gap_us <= STREAM_HINT_MAX_US && (self->is_time_idle || gap_us * 5 < self->last_stated_us * UINT64_C(2));
-    const bool is_short = target->is_timed && target->time_ms <= STREAM_HINT_MAX_US / 1000;
-    self->last_gap_us = is_short && gap_us <= STREAM_QUIET_US ? (uint32_t)gap_us : 0;
-    self->last_us = now_us;
-    self->last_stated_us = period_stated(target);
+    note_times(self, target, gap_us, now_us);
     if (!is_sample && is_under_way(self, target)) {
         return;
     }
@@ -317,6 +323,21 @@ static bool is_on_the_way(const motion_t *self)
     return i == self->planned_slots && axis_targets_is_planned(self, self->slot_q32);
 }
 
+/* Before the plan: the axes of its space, and a sender that is still to be faded in. */
+static void prepare_plan(motion_t *self, motion_due_t due, bool is_first)
+{
+    if (self->is_space_new) {
+        enter_space(self);
+    }
+    axis_targets_scale(self, self->space, self->slot_q32, self->goal_q32);
+    if (is_first) {
+        fade_in_begin(self);
+    }
+    if (self->is_fading) {
+        fade_in_aim(self, due != DUE_STREAM);
+    }
+}
+
 /* Makes the plan for the targets of this cycle. */
 static void plan_what_is_due(motion_t *self, uint64_t now_us)
 {
@@ -327,17 +348,8 @@ static void plan_what_is_due(motion_t *self, uint64_t now_us)
         return;
     }
     self->due = DUE_NOTHING;
-    if (due != DUE_NOTHING && self->is_space_new) {
-        enter_space(self);
-    }
     if (due != DUE_NOTHING) {
-        axis_targets_scale(self, self->space, self->slot_q32, self->goal_q32);
-    }
-    if (due != DUE_NOTHING && is_first) {
-        fade_in_begin(self);
-    }
-    if (due != DUE_NOTHING && self->is_fading) {
-        fade_in_aim(self, due != DUE_STREAM);
+        prepare_plan(self, due, is_first);
     }
     if (due == DUE_TIMED) {
         plan_timed(self, self->asked_cycles, is_first, now_us);

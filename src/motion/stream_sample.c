@@ -220,6 +220,14 @@ static void note_loss(stream_t *stream, const stream_predictor_t *predictor, uns
     }
 }
 
+/* The sample is clearly of this arrival, and its value lies where the line was at another time: by so much is it shifted. */
+static bool is_shifted(const stream_t *stream, const frame_t *frame, unsigned best, q32_t expected_q32, q32_t apart_q32)
+{
+    return expected_q32 * SIGNIFICANT > apart_q32 &&
+           fx_abs(frame->ahead_q32 - best * Q32_ONE) > stream_clock_jitter(&stream->clock) + BESIDE_Q32 &&
+           fx_abs(frame->advance_q32 - frame->ahead_q32) < CLEAR_Q32;
+}
+
 unsigned stream_sample_periods(stream_t *stream, uint64_t now_us, const q32_t *sample_q32, q32_t *shift_q32)
 {
     const stream_evidence_t *seen = &stream->evidence;
@@ -250,9 +258,7 @@ unsigned stream_sample_periods(stream_t *stream, uint64_t now_us, const q32_t *s
     note_loss(stream, &predictor, by_time, best, least_q32);
     stream->sample.misfit_q32 += (least_q32 - stream->sample.misfit_q32) / MISFIT_MEMORY;
     if (is_even && best == by_time &&
-        expected_q32 * SIGNIFICANT > stream_evidence_apart(seen, scale, &predictor, by_time, by_time + 1) &&
-        fx_abs(ahead_q32 - best * Q32_ONE) > stream_clock_jitter(&stream->clock) + BESIDE_Q32 &&
-        fx_abs(frame.advance_q32 - ahead_q32) < CLEAR_Q32) {
+        is_shifted(stream, &frame, best, expected_q32, stream_evidence_apart(seen, scale, &predictor, by_time, by_time + 1))) {
         *shift_q32 = frame.advance_q32 - best * Q32_ONE;
     }
     return best;

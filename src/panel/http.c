@@ -110,6 +110,21 @@ static bool accepts_gzip(struct lws *wsi)
     return at != NULL && (strncmp(at, "gzip;q=0", 8) != 0 || at[8] == '.');
 }
 
+static int begin_post(struct lws *wsi, request_t *request, const char *path)
+{
+    char type[64];
+    if (http_editor_is_post(path)) {
+        request->wants_body = true;
+        return http_editor_begin(wsi, request, http_header(wsi, WSI_TOKEN_HTTP_CONTENT_TYPE, type, (int)sizeof type) ? type : "");
+    }
+    const bool is_json = http_header(wsi, WSI_TOKEN_HTTP_CONTENT_TYPE, type, (int)sizeof type) &&
+                         strncmp(type, "application/json", 16) == 0; /* a form of another page cannot say that */
+    request->wants_body = is_json && (strcmp(path, "/api/login") == 0 || strcmp(path, "/api/logout") == 0);
+    return request->wants_body
+               ? 0
+               : http_answer_text(wsi, request, HTTP_STATUS_NOT_FOUND, "{\"error\":\"there is no such request\"}", NULL);
+}
+
 static int begin_request(struct lws *wsi, request_t *request, const char *path)
 {
     const bool is_post = lws_hdr_total_length(wsi, WSI_TOKEN_POST_URI) > 0;
@@ -123,18 +138,7 @@ static int begin_request(struct lws *wsi, request_t *request, const char *path)
         return http_answer_error(wsi, request, HTTP_STATUS_FORBIDDEN, refusal);
     }
     if (is_post) {
-        char type[64];
-        if (http_editor_is_post(path)) {
-            request->wants_body = true;
-            return http_editor_begin(wsi, request,
-                                     http_header(wsi, WSI_TOKEN_HTTP_CONTENT_TYPE, type, (int)sizeof type) ? type : "");
-        }
-        const bool is_json = http_header(wsi, WSI_TOKEN_HTTP_CONTENT_TYPE, type, (int)sizeof type) &&
-                             strncmp(type, "application/json", 16) == 0; /* a form of another page cannot say that */
-        request->wants_body = is_json && (strcmp(path, "/api/login") == 0 || strcmp(path, "/api/logout") == 0);
-        return request->wants_body
-                   ? 0
-                   : http_answer_text(wsi, request, HTTP_STATUS_NOT_FOUND, "{\"error\":\"there is no such request\"}", NULL);
+        return begin_post(wsi, request, path);
     }
     if (strcmp(path, "/api/me") == 0) {
         return answer_me(wsi, request);

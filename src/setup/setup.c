@@ -128,7 +128,13 @@ void setup_next(const setup_t *self, setup_question_t *out)
     out->choices = out->choices != NULL ? _(out->choices) : NULL;
 }
 
-/* --- Taking --- */
+/* --- Answers --- */
+
+/* What was typed in metres, most likely. */
+static bool is_in_metres(const setup_question_t *question, const char *unit, double value)
+{
+    return strcmp(unit, "mm") == 0 && value > 0 && value < question->least && value < 10;
+}
 
 /* The decimal point of this country, units, degrees and words are named. */
 static bool check_number(const setup_question_t *question, const char *text, char error[SETUP_ERROR_MAX])
@@ -145,9 +151,8 @@ static bool check_number(const setup_question_t *question, const char *text, cha
         (void)snprintf(error, SETUP_ERROR_MAX, length > 0 ? _("\"%s\" is no number of %s") : _("\"%s\" is no number"), text,
                        unit);
     } else if (value < question->least || value > question->most) {
-        (void)snprintf(
-            error, SETUP_ERROR_MAX, _("%g %s: allowed are %g to %g %s%s"), value, unit, question->least, question->most, unit,
-            strcmp(unit, "mm") == 0 && value > 0 && value < question->least && value < 10 ? _(". In mm, not in metres") : "");
+        (void)snprintf(error, SETUP_ERROR_MAX, _("%g %s: allowed are %g to %g %s%s"), value, unit, question->least,
+                       question->most, unit, is_in_metres(question, unit, value) ? _(". In mm, not in metres") : "");
     } else {
         return true;
     }
@@ -167,23 +172,22 @@ static bool check_choice(const setup_question_t *question, const char *text, cha
     return false;
 }
 
-bool setup_accept(setup_t *self, const setup_question_t *question, const char *text, char error[SETUP_ERROR_MAX])
+/* The line without blanks at its ends, or what is meant where it is empty. */
+static bool read_answer(const setup_question_t *question, const char *text, char answer[SETUP_ANSWER_MAX],
+                        char error[SETUP_ERROR_MAX])
 {
-    const step_t *step = step_of(question->key);
-    char answer[SETUP_ANSWER_MAX];
-    error[0] = '\0';
     text += strspn(text, " \t");
     size_t length = strcspn(text, "\r\n");
     while (length > 0 && (text[length - 1u] == ' ' || text[length - 1u] == '\t')) {
         length--;
     }
-    if (length >= sizeof answer) {
+    if (length >= SETUP_ANSWER_MAX) {
         (void)snprintf(error, SETUP_ERROR_MAX, _("too long: at most %u characters"), SETUP_ANSWER_MAX - 1u);
         return false;
     }
-    (void)snprintf(answer, sizeof answer, "%.*s", (int)length, length > 0 ? text : "");
+    (void)snprintf(answer, SETUP_ANSWER_MAX, "%.*s", (int)length, length > 0 ? text : "");
     if (answer[0] == '\0') {
-        (void)snprintf(answer, sizeof answer, "%s", question->fallback);
+        (void)snprintf(answer, SETUP_ANSWER_MAX, "%s", question->fallback);
     }
     for (const char *at = answer; *at != '\0'; at++) {
         if ((unsigned char)*at < ' ') {
@@ -193,6 +197,17 @@ bool setup_accept(setup_t *self, const setup_question_t *question, const char *t
     }
     if (answer[0] == '\0') {
         (void)snprintf(error, SETUP_ERROR_MAX, _("an answer is needed"));
+        return false;
+    }
+    return true;
+}
+
+bool setup_accept(setup_t *self, const setup_question_t *question, const char *text, char error[SETUP_ERROR_MAX])
+{
+    const step_t *step = step_of(question->key);
+    char answer[SETUP_ANSWER_MAX];
+    error[0] = '\0';
+    if (!read_answer(question, text, answer, error)) {
         return false;
     }
     if ((question->kind == SETUP_NUMBER && !check_number(question, answer, error)) ||

@@ -69,41 +69,50 @@ static bool is_read(uint8_t function)
 
 /* --- A drive --- */
 
-static unsigned ask_drive(register_drive_t *drive, const uint8_t *question, unsigned length, uint64_t now_us, uint8_t *answer)
+static unsigned read_registers(register_drive_t *drive, const uint8_t *question, uint64_t now_us, uint8_t *answer)
 {
     uint16_t value[VALUES_MAX];
-    const unsigned address = length >= 5 ? word_at(question + 1) : 0;
-    const unsigned second = length >= 5 ? word_at(question + 3) : 0;
-    int exception = MODBUS_NO_EXCEPTION;
+    const unsigned count = word_at(question + 3);
+    if (count < 1 || count > VALUES_MAX) {
+        return reject(question, MODBUS_NO_VALUE, answer);
+    }
+    const int exception = register_drive_read(drive, (uint16_t)word_at(question + 1), value, count);
+    if (exception != MODBUS_NO_EXCEPTION) {
+        return reject(question, exception, answer);
+    }
+    drive->heard_us = now_us;
+    answer[0] = question[0];
+    answer[1] = (uint8_t)(2 * count);
+    for (unsigned i = 0; i < count; i++) {
+        put_word(answer + 2 + (size_t)2 * i, value[i]);
+    }
+    return 2 + 2 * count;
+}
+
+static int write_registers(register_drive_t *drive, const uint8_t *question, unsigned length, uint64_t now_us)
+{
+    uint16_t value[VALUES_MAX];
+    const unsigned count = word_at(question + 3);
+    if (count < 1 || count > VALUES_MAX || question[5] != 2 * count || length != 6 + 2 * count) {
+        return MODBUS_NO_VALUE;
+    }
+    for (unsigned i = 0; i < count; i++) {
+        value[i] = (uint16_t)word_at(question + 6 + (size_t)2 * i);
+    }
+    return register_drive_write(drive, (uint16_t)word_at(question + 1), value, count, now_us);
+}
+
+static unsigned ask_drive(register_drive_t *drive, const uint8_t *question, unsigned length, uint64_t now_us, uint8_t *answer)
+{
+    int exception = MODBUS_NO_FUNCTION;
     if (length == 5 && is_read(question[0])) {
-        if (second < 1 || second > VALUES_MAX) {
-            return reject(question, MODBUS_NO_VALUE, answer);
-        }
-        exception = register_drive_read(drive, (uint16_t)address, value, second);
-        if (exception != MODBUS_NO_EXCEPTION) {
-            return reject(question, exception, answer);
-        }
-        drive->heard_us = now_us;
-        answer[0] = question[0];
-        answer[1] = (uint8_t)(2 * second);
-        for (unsigned i = 0; i < second; i++) {
-            put_word(answer + 2 + (size_t)2 * i, value[i]);
-        }
-        return 2 + 2 * second;
+        return read_registers(drive, question, now_us, answer);
     }
     if (length == 5 && question[0] == MODBUS_WRITE_REGISTER) {
-        value[0] = (uint16_t)second;
-        exception = register_drive_write(drive, (uint16_t)address, value, 1, now_us);
+        const uint16_t value = (uint16_t)word_at(question + 3);
+        exception = register_drive_write(drive, (uint16_t)word_at(question + 1), &value, 1, now_us);
     } else if (length >= 6 && question[0] == MODBUS_WRITE_REGISTERS) {
-        if (second < 1 || second > VALUES_MAX || question[5] != 2 * second || length != 6 + 2 * second) {
-            return reject(question, MODBUS_NO_VALUE, answer);
-        }
-        for (unsigned i = 0; i < second; i++) {
-            value[i] = (uint16_t)word_at(question + 6 + (size_t)2 * i);
-        }
-        exception = register_drive_write(drive, (uint16_t)address, value, second, now_us);
-    } else {
-        exception = MODBUS_NO_FUNCTION;
+        exception = write_registers(drive, question, length, now_us);
     }
     return exception == MODBUS_NO_EXCEPTION ? confirm(question, answer) : reject(question, exception, answer);
 }
@@ -130,35 +139,54 @@ static unsigned spoil(register_drive_t *drive, unsigned length, modbus_way_t *wa
 
 /* --- The board --- */
 
+static unsigned read_coils(const modbus_board_t *board, const uint8_t *question, unsigned count, uint8_t *answer)
+{
+    const unsigned address = word_at(question + 1);
+    const unsigned bytes = (count + 7) / 8;
+    memset(answer, 0, 2 + (size_t)bytes);
+    answer[0] = question[0];
+    answer[1] = (uint8_t)bytes;
+    for (unsigned i = 0; i < count; i++) {
+        answer[2 + i / 8] = (uint8_t)(answer[2 + i / 8] | (unsigned)board->coil[address + i] << i % 8);
+    }
+    return 2 + bytes;
+}
+
+static unsigned write_coil(modbus_board_t *board, const uint8_t *question, uint8_t *answer)
+{
+    const unsigned value = word_at(question + 3);
+    if (value != COIL_ON && value != 0) {
+        return reject(question, MODBUS_NO_VALUE, answer);
+    }
+    board->coil[word_at(question + 1)] = value == COIL_ON;
+    return confirm(question, answer);
+}
+
+static unsigned write_coils(modbus_board_t *board, const uint8_t *question, unsigned length, unsigned count, uint8_t *answer)
+{
+    const unsigned bytes = (count + 7) / 8;
+    if (length != 6 + bytes || question[5] != bytes) {
+        return reject(question, MODBUS_NO_VALUE, answer);
+    }
+    for (unsigned i = 0; i < count; i++) {
+        board->coil[word_at(question + 1) + i] = (question[6 + i / 8] >> i % 8 & 1u) != 0;
+    }
+    return confirm(question, answer);
+}
+
 static unsigned ask_board(modbus_board_t *board, const uint8_t *question, unsigned length, uint8_t *answer)
 {
-    const unsigned address = length >= 5 ? word_at(question + 1) : 0;
-    const unsigned second = length >= 5 ? word_at(question + 3) : 0;
     const bool is_one = question[0] == MODBUS_WRITE_COIL;
     if (length < 5 || (question[0] != MODBUS_READ_COILS && question[0] != MODBUS_WRITE_COILS && !is_one)) {
         return reject(question, MODBUS_NO_FUNCTION, answer);
     }
-    const unsigned count = is_one ? 1 : second;
-    const unsigned bytes = (count + 7) / 8;
-    if (count < 1 || address + count > MODBUS_COILS_MAX) {
+    const unsigned count = is_one ? 1 : word_at(question + 3);
+    if (count < 1 || word_at(question + 1) + count > MODBUS_COILS_MAX) {
         return reject(question, MODBUS_NO_ADDRESS, answer);
     }
-    if (question[0] == MODBUS_READ_COILS) {
-        memset(answer, 0, 2 + (size_t)bytes);
-        answer[0] = question[0];
-        answer[1] = (uint8_t)bytes;
-        for (unsigned i = 0; i < count; i++) {
-            answer[2 + i / 8] = (uint8_t)(answer[2 + i / 8] | (unsigned)board->coil[address + i] << i % 8);
-        }
-        return 2 + bytes;
-    }
-    if (is_one ? second != COIL_ON && second != 0 : length != 6 + bytes || question[5] != bytes) {
-        return reject(question, MODBUS_NO_VALUE, answer);
-    }
-    for (unsigned i = 0; i < count; i++) {
-        board->coil[address + i] = is_one ? second == COIL_ON : (question[6 + i / 8] >> i % 8 & 1u) != 0;
-    }
-    return confirm(question, answer);
+    return question[0] == MODBUS_READ_COILS ? read_coils(board, question, count, answer)
+           : is_one                         ? write_coil(board, question, answer)
+                                            : write_coils(board, question, length, count, answer);
 }
 
 /* --- All --- */

@@ -405,6 +405,22 @@ static void hear_sdo(node_t *self, const can_frame_t *frame)
 
 /* --- Life --- */
 
+static void hear_data(node_t *self, const can_frame_t *frame)
+{
+    const bool is_first = self->head == NULL; /* what concerns the node is heard by its first axis */
+    if (is_first && frame->id == 0) {
+        hear_nmt(self, frame);
+    } else if (is_first && frame->id == (objects_get(&self->drive.od, 0x1005, 0) & CAN_ID_MAX)) {
+        hear_sync(self, frame);
+    } else if (is_first && frame->id == 0x600u + self->number) {
+        hear_sdo(self, frame);
+    } else if (is_first && (frame->id & 0x780u) == 0x700u) {
+        hear_heartbeat(self, frame->id & 0x7F);
+    } else if (!is_first || self->nmt == NODE_OPERATIONAL) {
+        node_hear_pdo(self, frame);
+    }
+}
+
 void node_hear(node_t *self, const can_frame_t *frame, uint64_t now_us)
 {
     if (!self->is_powered || self->nmt == 0 || node_head(self)->is_cut || frame->is_extended || frame->is_error) {
@@ -418,18 +434,7 @@ void node_hear(node_t *self, const can_frame_t *frame, uint64_t now_us)
         return;
     }
     drive_advance(&self->drive, now_us);
-    const bool is_first = self->head == NULL; /* what concerns the node is heard by its first axis */
-    if (is_first && frame->id == 0) {
-        hear_nmt(self, frame);
-    } else if (is_first && frame->id == (objects_get(&self->drive.od, 0x1005, 0) & CAN_ID_MAX)) {
-        hear_sync(self, frame);
-    } else if (is_first && frame->id == 0x600u + self->number) {
-        hear_sdo(self, frame);
-    } else if (is_first && (frame->id & 0x780u) == 0x700u) {
-        hear_heartbeat(self, frame->id & 0x7F);
-    } else if (!is_first || self->nmt == NODE_OPERATIONAL) {
-        node_hear_pdo(self, frame);
-    }
+    hear_data(self, frame);
     drive_advance(&self->drive, now_us);
     node_put_events(self);
     send_emergency(self);

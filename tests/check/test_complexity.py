@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""test_complexity.py - tools/complexity counts functions, half of them, nine of ten, the longest, and names the worst; on a pmccabe that only pretends."""
+"""test_complexity.py - no function branches more than 15 times. And tools/complexity counts functions, half of them, nine of ten, the longest, and names the
+worst; on a pmccabe that only pretends."""
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -39,7 +41,7 @@ def rows():
 def counted():
     code, text = complexity(rows())
     table = {line.split()[0]: line.split()[1:] for line in text.splitlines()[1:4]}
-    assert code == 0, text
+    assert code == 1, text
     assert table == {"core": ["10", "60", "100", "40.0", "%", "6", "10", "10"], "programs": ["1", "5", "5", "0.0", "%", "30", "30", "30"],
                      "backends": ["1", "3", "3", "0.0", "%", "2", "2", "2"]}, text
 
@@ -47,6 +49,8 @@ def counted():
 def named():
     assert complexity(rows())[1].splitlines()[4:] == [f"{PROGRAM}:7: main: complexity 30, 5 lines"]
     assert len(complexity(rows(), "--over", "8")[1].splitlines()[4:]) == 3
+    code, text = complexity(rows(), "--over", "30")
+    assert code == 0 and len(text.splitlines()) == 4, text
 
 
 def told():
@@ -55,7 +59,14 @@ def told():
     assert complexity([], "--frobnicate")[0] == 2 and "--over N" in complexity([], "--help")[1]
 
 
-CASES = {"the core, the programs and the backends are counted apart": counted, "what branches more than asked for is named, the worst first": named,
+def sources():
+    if not shutil.which("pmccabe"):
+        raise tap.Skip("pmccabe is missing")
+    run = subprocess.run([sys.executable, TOP / "tools/complexity"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    assert run.returncode == 0, run.stdout
+
+
+CASES = {"no function branches more than 15 times": sources, "the core, the programs and the backends are counted apart": counted, "what branches more than asked for is named, the worst first": named,
          "a missing pmccabe, wrong options, and help": told}
 
 
