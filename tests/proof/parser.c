@@ -100,6 +100,7 @@ static void write_line(char *line, size_t capacity)
         text_put(&text, ANY_BOOL() ? "" : "some words");
         text_put_u32(&text, ANY_U32());
         text_put_hex(&text, ANY_U32(), (unsigned)ANY_OF(0, 8));
+        text_put_q32(&text, ANY_I64(), (unsigned)ANY_OF(0, 3));
         text_put_escaped(&text, bytes + ANY_OF(0, 9), (size_t)ANY_OF(0, DATAGRAM_MAX - 9));
     }
 }
