@@ -14,7 +14,8 @@
 
 uint32_t canraw_float_from(int64_t counts, uint32_t divisor)
 {
-    uint64_t above = counts < 0 ? UINT64_C(0) - (uint64_t)counts : (uint64_t)counts;
+    const int64_t whole = counts < 0 ? -(counts + 1) : counts;
+    uint64_t above = (uint64_t)whole + (counts < 0 ? 1u : 0u);
     uint32_t exponent = EXPONENT_ONE + 1u;
     if (counts == 0) {
         return 0;
